@@ -37,7 +37,7 @@ if [[ $purpose != program ]]; then
   # tests and benchmarks, and the programs they take as oracles
   packages+=(
     libgtest-dev libgmock-dev libbenchmark-dev coinor-csdp hdf5-tools
-    sqlite3 slurm-wlm munge
+    sqlite3 slurm-wlm munge strace xz-utils
     chromium chromium-driver python3-numpy python3-optuna python3-h5py doxygen
     xvfb xdotool imagemagick tmux zsh bash-completion
     # the Python module

@@ -77,8 +77,8 @@ struct EngineCompletion {
 /// Completes a description, and gives it frames of links and the inertias that the engine compiled. A robot
 /// on wheels, one with an object, and a parameter file of another mechanism are left for the adapter to
 /// match.
-EngineCompletion Complete(const ConsistencyOptions& options, const mjModel& engine, bool is_table,
-                          Comparison* comparison, RobotDescription* robot) {
+EngineCompletion Complete(const ConsistencyOptions& options, const MjcfFile& mjcf, const mjModel& engine,
+                          bool is_table, Comparison* comparison, RobotDescription* robot) {
   const std::string file = comparison->second.filename().string();
   const BaseType base = robot->spec.base.type;
   EngineCompletion result;
@@ -88,8 +88,7 @@ EngineCompletion Complete(const ConsistencyOptions& options, const mjModel& engi
       result.completion = CompleteFromEngine(engine, file, &completed, options.ignore);
       RobotDescription compiled = ReadMjcfDescription(engine, file);
       result.has_link_frames = AddLinkFrames(&completed, &compiled);
-      const std::optional<std::string> inertias =
-          TakeCompiledInertias(comparison->second, engine, &completed);
+      const std::optional<std::string> inertias = TakeCompiledInertias(mjcf, engine, &completed);
       if (inertias) comparison->notes.push_back(*inertias);
       *robot = std::move(completed);
       return result;
@@ -114,7 +113,7 @@ void CompareWithEngine(const DescriptionFile& first, const DescriptionFile& seco
     if (motors) comparison->not_compared.push_back(*motors);
   }
   const EngineCompletion completed =
-      Complete(options, *engine, format == RobotFormat::kToml, comparison, &robot);
+      Complete(options, second.document(), *engine, format == RobotFormat::kToml, comparison, &robot);
   const Completion& completion = completed.completion;
   comparison->model.emplace(robot.spec);
   const Adapter adapter(*comparison->model, *engine, comparison->second.string());

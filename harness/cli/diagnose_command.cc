@@ -157,8 +157,8 @@ void Require(bool is_right, const std::filesystem::path& file, const char* expec
 /// What is to be repaired, completed by what only the MJCF states when it is a URDF. What a URDF has no place
 /// for is taken out of the engine's model.
 /// @param robot as its file has it. @param notes on what is the engine's.
-RobotModel Complete(const DiagnoseRequest& request, RobotDescription robot, mjModel* engine,
-                    std::vector<std::string>* notes) {
+RobotModel Complete(const DiagnoseRequest& request, const MjcfFile& document, RobotDescription robot,
+                    mjModel* engine, std::vector<std::string>* notes) {
   const std::string mjcf = request.files.mjcf.filename().string();
   const bool is_table = robot.format == RobotFormat::kToml;
   if (!is_table) SetAsideMotors(mjcf, engine);
@@ -166,7 +166,7 @@ RobotModel Complete(const DiagnoseRequest& request, RobotDescription robot, mjMo
   UndoOneSided(completion.one_sided, &robot.spec);
   const BaseType base = robot.spec.base.type;
   if (base == BaseType::kFixed || base == BaseType::kFloating) {
-    if (const std::optional<std::string> inertias = TakeCompiledInertias(request.files.mjcf, *engine, &robot))
+    if (const std::optional<std::string> inertias = TakeCompiledInertias(document, *engine, &robot))
       notes->push_back(*inertias);
   }
   return RobotModel(robot.spec);
@@ -184,7 +184,7 @@ int Run(DiagnoseRequest request) {
           "must be an MJCF, which is taken to be right (dexcheck consistency compares any two files)");
   const MjModelPtr engine = mjcf.CopyEngine();
   std::vector<std::string> notes;
-  const RobotModel model = Complete(request, robot, engine.get(), &notes);
+  const RobotModel model = Complete(request, mjcf.document(), robot, engine.get(), &notes);
   RequireNoBalls(model, "in a diagnosis of single numbers (dexcheck consistency names likely faults)");
   CatchInterrupts();
   ResultFile json(request.json_file);

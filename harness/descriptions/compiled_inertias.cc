@@ -24,14 +24,9 @@ using tinyxml2::XMLElement;
 /// The tensors that a file states, by the engine's body: its bodies are numbered as they come, depth first.
 class FullInertias {
  public:
-  FullInertias(const std::filesystem::path& mjcf, const mjModel& engine) : engine_(engine) {
-    try {
-      const MjcfFile file(mjcf);
-      for (const XMLElement* world : ListChildren(file.root(), "worldbody")) Visit(*world);
-    } catch (const InputError&) {
-      number_ = -1;
-    }
-    // Elements that make bodies of their own, or a file that cannot be read as this one.
+  FullInertias(const MjcfFile& mjcf, const mjModel& engine) : engine_(engine) {
+    for (const XMLElement* world : ListChildren(mjcf.root(), "worldbody")) Visit(*world);
+    // Elements that make bodies of their own.
     if (number_ + 1 != engine.nbody) tensors_.clear();
   }
 
@@ -66,10 +61,10 @@ class FullInertias {
 
 }  // namespace
 
-std::optional<std::string> TakeCompiledInertias(const std::filesystem::path& mjcf, const mjModel& engine,
+std::optional<std::string> TakeCompiledInertias(const MjcfFile& mjcf, const mjModel& engine,
                                                 RobotDescription* robot) {
   const FullInertias written(mjcf, engine);
-  const RobotDescription compiled = ReadMjcfDescription(engine, mjcf.string());
+  const RobotDescription compiled = ReadMjcfDescription(engine, mjcf.source());
   const std::vector<LinkPlace> places = PlaceLinks(*robot, compiled);
   std::vector<std::string> names;
   double largest = 0.0;

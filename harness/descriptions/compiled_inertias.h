@@ -9,6 +9,7 @@
 #include <string>
 
 #include "harness/descriptions/robot_description.h"
+#include "harness/engine/mjcf_file.h"
 
 namespace dexcheck {
 
@@ -16,7 +17,7 @@ namespace dexcheck {
 /// bodies, 1e-6. Gives each body of a description whose inertia is, to rounding, the one that the MJCF states
 /// so the inertia that the engine made of it: the difference is the engine's, and no fault of the file.
 /// @param robot as CompleteFromEngine left it. @return a note, when there are such bodies.
-std::optional<std::string> TakeCompiledInertias(const std::filesystem::path& mjcf, const mjModel& engine,
+std::optional<std::string> TakeCompiledInertias(const MjcfFile& mjcf, const mjModel& engine,
                                                 RobotDescription* robot);
 
 }  // namespace dexcheck

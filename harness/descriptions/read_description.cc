@@ -88,7 +88,8 @@ DescriptionFile::DescriptionFile(std::filesystem::path path, const UrdfOptions& 
       description_ = ParseUrdf(text_, path_.string(), options);
       break;
     case RobotFormat::kMjcf:
-      engine_ = LoadMjcf(path_);
+      document_ = std::make_unique<MjcfFile>(path_, &text_);
+      engine_ = LoadMjcf(document_.get());
       break;
     case RobotFormat::kToml:
       description_ = ReadTable(text_, path_.string());

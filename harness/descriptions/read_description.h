@@ -3,6 +3,7 @@
 // Files that describe a robot, each opened once.
 
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -33,7 +34,9 @@ class DescriptionFile {
   [[nodiscard]] RobotDescription Describe() const;
   /// The same; none of such an MJCF.
   [[nodiscard]] std::optional<RobotDescription> TryToDescribe() const;
-  /// A copy of the engine's model. @pre the format is kMjcf.
+  /// The document. @pre the format is kMjcf, here and below.
+  [[nodiscard]] const MjcfFile& document() const { return *document_; }
+  /// A copy of the engine's model.
   [[nodiscard]] MjModelPtr CopyEngine() const;
 
  private:
@@ -41,7 +44,8 @@ class DescriptionFile {
   std::string text_;
   RobotFormat format_;
   std::optional<RobotDescription> description_;  // of a parameter file or URDF
-  MjModelPtr engine_;                            // of an MJCF
+  std::unique_ptr<MjcfFile> document_;           // of an MJCF
+  MjModelPtr engine_;                            // likewise
 };
 
 /// What one file says. @throws InputError as DescriptionFile.

@@ -45,16 +45,6 @@ void CheckVersion() {
                    FormatRelease(mj_version()));
 }
 
-void CheckReadable(const std::filesystem::path& path) {
-  const auto fail = [&](const std::string& why) {
-    throw InputError(path.string() + ": cannot be read: " + why);
-  };
-  std::error_code ignored;
-  if (std::filesystem::is_directory(path, ignored)) fail("is a directory");
-  errno = 0;
-  if (!std::ifstream(path)) fail(std::strerror(errno));
-}
-
 void PrepareEngine() {
   InstallMessageHandlers();
   CheckVersion();
@@ -128,10 +118,13 @@ MjModelPtr LoadText(const std::string& text, const std::string& source) {
   }
 }
 
+MjModelPtr LoadDocument(const MjcfFile& mjcf) {
+  return LoadText(mjcf.PrintFor(std::filesystem::current_path()), mjcf.source());
+}
+
 /// @param load what loads it when nothing need be changed.
 template <typename Load>
 MjModelPtr LoadAdapted(MjcfFile* mjcf, const Load& load) {
-  if (mjcf->IsUrdf()) return load();
   AdaptMjcf(mjcf);
   if (mjcf->changes().empty()) {
     try {
@@ -142,7 +135,7 @@ MjModelPtr LoadAdapted(MjcfFile* mjcf, const Load& load) {
     }
   }
   StateNewDefaults(mjcf);
-  MjModelPtr model = LoadText(mjcf->PrintFor(std::filesystem::current_path()), mjcf->source());
+  MjModelPtr model = LoadDocument(*mjcf);
   WarnOnce(mjcf->SummarizeChanges());
   return model;
 }
@@ -150,20 +143,32 @@ MjModelPtr LoadAdapted(MjcfFile* mjcf, const Load& load) {
 }  // namespace
 
 MjModelPtr LoadMjcf(const std::filesystem::path& path) {
+  MjcfFile document(path);
+  return LoadMjcf(&document);
+}
+
+MjModelPtr LoadMjcf(MjcfFile* document) {
   PrepareEngine();
-  CheckReadable(path);
-  MjcfFile mjcf(path);
-  if (!mjcf.HasWorld() && !mjcf.IsUrdf()) {
-    throw InputError(path.string() +
+  const std::string& path = document->source();
+  if (document->IsUrdf()) return Load(path, nullptr, path);
+  if (!document->HasWorld()) {
+    throw InputError(path +
                      ": has no <worldbody>: it is a part for <include>; give the file that includes it");
   }
-  return LoadAdapted(&mjcf, [&] { return Load(path.string(), nullptr, path.string()); });
+  return LoadAdapted(document, [&] {
+    try {
+      return LoadDocument(*document);
+    } catch (const InputError&) {
+      return Load(path, nullptr, path);  // its refusal has the lines of the file
+    }
+  });
 }
 
 MjModelPtr LoadMjcfText(const std::string& text, const std::string& source) {
   PrepareEngine();
   MjcfFile mjcf(text, source);
-  return LoadAdapted(&mjcf, [&] { return LoadText(text, source); });
+  const auto load = [&] { return LoadText(text, source); };
+  return mjcf.IsUrdf() ? load() : LoadAdapted(&mjcf, load);
 }
 
 std::vector<std::string> ListLoadNotes() {

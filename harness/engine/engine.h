@@ -8,6 +8,8 @@
 #include <memory>
 #include <string>
 
+#include "harness/engine/mjcf_file.h"
+
 namespace dexcheck {
 
 struct MjModelDeleter {
@@ -24,6 +26,8 @@ using MjDataPtr = std::unique_ptr<mjData, MjDataDeleter>;
 /// @throws InputError when the file cannot be read or compiled, or when the engine library at run time is not
 /// the version that this program was built for.
 MjModelPtr LoadMjcf(const std::filesystem::path& path);
+/// The same of a file that was read; what other releases of the engine have is taken out of the document.
+MjModelPtr LoadMjcf(MjcfFile* document);
 
 /// Compiles MJCF text (tests, replays). @throws InputError as LoadMjcf; `source` names the text in messages.
 MjModelPtr LoadMjcfText(const std::string& text, const std::string& source);

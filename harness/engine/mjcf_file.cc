@@ -7,6 +7,7 @@
 #include <system_error>
 
 #include "controller/common/text.h"
+#include "harness/base/files.h"
 #include "harness/engine/mjcf_passes.h"
 #include "harness/engine/xml.h"
 
@@ -50,9 +51,9 @@ std::filesystem::path AssetFolders::Find(const std::string& folder, const std::s
   return std::filesystem::path(folder) / (strips_paths ? path.filename() : path);
 }
 
-MjcfFile::MjcfFile(const std::filesystem::path& file)
+MjcfFile::MjcfFile(const std::filesystem::path& file, const std::string* text)
     : source_(file.string()), folder_(std::filesystem::absolute(file).parent_path()) {
-  Parse(ReadFile(file, source_));
+  Parse(text != nullptr ? *text : ReadBytes(file));
   if (IsUrdf()) return;
   while (XMLElement* const include = FindInclude(root_)) Splice(include);
 }

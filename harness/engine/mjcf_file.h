@@ -40,8 +40,9 @@ struct AssetFolders {
 class MjcfFile {
  public:
   /// What is included takes the place of its `include`.
+  /// @param text of the file, where it was read already.
   /// @throws InputError when a file cannot be read, is not XML, or is included twice.
-  explicit MjcfFile(const std::filesystem::path& file);
+  explicit MjcfFile(const std::filesystem::path& file, const std::string* text = nullptr);
   /// A text, whose files are found from the working directory; its `include` elements stay.
   /// @param source its name in messages. @throws InputError.
   MjcfFile(std::string_view text, const std::string& source);

@@ -36,16 +36,22 @@ TEST_F(CompareFiles, ADescriptionIsOpenedOnce) {
   Write("c.urdf", kUrdf);
   for (const char* arguments :
        {"consistency a.urdf c.urdf --samples 5", "consistency a.urdf b.xml --samples 5",
-        "engines a.urdf --engines analytic,mujoco --samples 5", "audit a.urdf"}) {
+        "consistency b.xml b.xml --samples 5", "diagnose --robot a.urdf --mjcf b.xml",
+        "engines b.xml --engines analytic,mujoco --samples 5",
+        "engines a.urdf --engines analytic,mujoco --samples 5", "audit a.urdf", "audit b.xml"}) {
     SCOPED_TRACE(arguments);
     ProgramOptions options;
     options.folder = folder_.path();
     RunProgram(Words("strace -f -e trace=openat -o trace.txt") + DexcheckCommand(arguments), options);
     const std::string trace = Read("trace.txt");
-    size_t opened = 0;
-    for (size_t at = trace.find("\"a.urdf\""); at != std::string::npos; at = trace.find("\"a.urdf\"", at + 1))
-      ++opened;
-    EXPECT_EQ(opened, 1U);
+    for (const char* file : {"a.urdf", "b.xml"}) {
+      size_t named = 0;
+      size_t opened = 0;
+      for (const std::string& word : Words(arguments)) named += word == file ? 1 : 0;
+      const std::string quoted = "\"" + std::string(file) + "\"";
+      for (size_t at = trace.find(quoted); at != std::string::npos; at = trace.find(quoted, at + 1)) ++opened;
+      EXPECT_EQ(opened, named) << file;
+    }
   }
 }
 

@@ -169,5 +169,26 @@ TEST(NewerMjcf, ARangeLimits) {
   }
 }
 
+/// The compiled model, byte by byte.
+std::string Save(const mjModel& model) {
+  std::string bytes(static_cast<size_t>(mj_sizeModel(&model)), '\0');
+  mj_saveModel(&model, nullptr, bytes.data(), static_cast<int>(bytes.size()));
+  return bytes;
+}
+
+// One document with what it includes is given to the compiler, instead of the files.
+TEST(JoinedDocument, IsCompiledToTheModelOfTheFiles) {
+  int files = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(SourcePath("/mjcf"))) {
+    if (entry.path().extension() != ".xml") continue;
+    char message[1000] = "";
+    const MjModelPtr own(mj_loadXML(entry.path().c_str(), nullptr, message, sizeof(message)));
+    if (!own) continue;  // a part for include
+    EXPECT_EQ(Save(*LoadMjcf(entry.path())), Save(*own)) << entry.path();
+    ++files;
+  }
+  EXPECT_GE(files, 5);
+}
+
 }  // namespace
 }  // namespace dexcheck::testing::newer_mjcf_test
