@@ -40,6 +40,7 @@ ClosedLoop::ClosedLoop(const Setup& setup, bool check, LoopParts parts)
   const Scenario& scenario = setup.scenario();
   RequireKnownBounds(scenario);
   if (check) checks_.emplace(setup, plant_->motors(), parts.knows_law);
+  if (check) store_.emplace(setup, checks_->law());
   if (check && parts.threads > 1) checker_.emplace([this] { JudgeStep(); });
   record_.model = record_.true_model = &controller_->model();
   record_.command.tau.setZero(setup.model().num_velocities());
@@ -71,7 +72,7 @@ bool ClosedLoop::Settle(const std::function<bool()>& should_stop) {
   if (trajectory_) controller_->Follow(*trajectory_);
   BeginRun();
   times_ = LoopTimes{};
-  if (checks_) checks_->Reset();
+  ForgetSteps();
   is_running_ = true;
   return true;
 }
@@ -93,15 +94,21 @@ bool ClosedLoop::SettleOn(const Trajectory& motion, double duration,
   const long count = std::lround(duration / dt);
   const long grip = std::lround(kFindsGrip / dt);
   controller_->Follow(motion);
-  if (checks_) checks_->Reset();
+  ForgetSteps();
   for (long i = 0; i < count; ++i) {
     if (should_stop()) return false;
     const double t = static_cast<double>(i) * dt;
     record_.time = t - duration;
     ControlStep(t);
     // The first contact is rough; what goes wrong later has a cause that the checks should tell.
-    if (checks_ && i == grip) checks_->Forget();
-    if (checks_ && t >= kRoughTime) checks_->JudgeSettling(record_);
+    if (checks_ && i == grip) {
+      checks_->Forget();
+      store_->Reset();
+    }
+    if (checks_ && t >= kRoughTime) {
+      checks_->JudgeSettling(record_);
+      store_->Add(record_, checks_->analysis(), checks_->differs());
+    }
     try {
       CheckGrasp();
     } catch (const RunFailure&) {
@@ -128,6 +135,12 @@ bool ClosedLoop::StartMoving(const Vector3d& v, const std::function<bool()>& sho
   sensing_.Translate(-way);
   if (checks_) checks_->Translate(-way);
   return true;
+}
+
+void ClosedLoop::ForgetSteps() {
+  if (!checks_) return;
+  checks_->Reset();
+  store_->Reset();
 }
 
 void ClosedLoop::ControlStep(double t) {
@@ -163,7 +176,10 @@ void ClosedLoop::DriveMotors(double t) {
     if (checks_) record_.true_model = &checks_->Follow(record_);
     // Torques that are too large may be those of no law. While everything settles they follow another
     // trajectory.
-    if (checks_ && is_running_) checks_->JudgeUnsent(record_);
+    if (checks_ && is_running_) {
+      checks_->JudgeUnsent(record_);
+      store_->Add(record_, checks_->analysis(), checks_->differs(), /*answered=*/false);
+    }
     throw;
   }
   if (checks_) checks_->JudgeEffort(record_, t);
@@ -178,6 +194,7 @@ void ClosedLoop::JudgeStep() {
   const auto begin = Clock::now();
   checks_->JudgeModel(record_);
   checks_->JudgeStep(record_);
+  store_->Add(record_, checks_->analysis(), checks_->differs());
   times_.cross_check += Seconds(begin, Clock::now());
 }
 
