@@ -76,7 +76,7 @@ class Search {
       const MatrixXd& C = candidates_[i].columns;
       if (C.cols() == 0 || std::find(beside.begin(), beside.end(), i) != beside.end()) continue;
       const double explained = CalcExplained(C, Q, r);
-      if (!(explained > 0.0)) continue;
+      if (!(explained > 0.0) || !IsPossible(candidates_[i], Q, r)) continue;
       scores[i] = Score(std::max(0.0, r.squaredNorm() - explained), parameters + CountParameters({i}));
     }
     return scores;
@@ -96,6 +96,13 @@ class Search {
         own.col(j) -= own.col(k).dot(own.col(j)) * own.col(k);
     }
     return explained;
+  }
+
+  static bool IsPossible(const Candidate& candidate, const MatrixXd& Q, const VectorXd& r) {
+    if (candidate.columns.cols() != 1 || !std::isfinite(candidate.least)) return true;
+    const VectorXd own = candidate.columns.col(0) - Q * (Q.transpose() * candidate.columns.col(0));
+    constexpr double kRounding = 1e-6;
+    return own.dot(r) >= (candidate.least - kRounding * std::abs(candidate.least)) * own.squaredNorm();
   }
 
   [[nodiscard]] Best FindBest(const std::vector<size_t>& beside) const {
@@ -189,6 +196,9 @@ class Search {
       if (i == term->candidate) continue;
       // The criterion is twice the negative logarithm of the likelihood.
       const double odds = 0.5 * (scores[i] - criterion);
+      // One with more columns has simpler ones as a special case.
+      const bool is_wider = candidates_[i].columns.cols() > candidates_[term->candidate].columns.cols();
+      if (odds < kEqualLogOdds && is_wider) continue;
       if (odds < kEqualLogOdds) {
         const MatrixXd& C = candidates_[i].columns;
         const MatrixXd own = C - Q * (Q.transpose() * C);

@@ -9,6 +9,7 @@
 //
 // by orthogonal matching pursuit, in which every choice is looked at again after each that follows it.
 
+#include <limits>
 #include <span>
 #include <string>
 #include <utility>
@@ -26,6 +27,8 @@ struct Candidate {
   double nominal = 0.0;  ///< The value without the fault: the amplitude is added to it.
   MatrixXd columns;      ///< N x p.
   int parameters = 0;    ///< That were fitted beforehand, besides the amplitudes.
+  /// Least amplitude that can be, where there is one column: no friction or mass is negative.
+  double least = -std::numeric_limits<double>::infinity();
 };
 
 /// A candidate that is part of the explanation.
@@ -33,7 +36,8 @@ struct CauseTerm {
   size_t candidate = 0;
   VectorXd amplitude, error;   ///< p, with standard errors.
   double fraction = 0.0;       ///< Of |y|^2 that is left over without it.
-  /// Candidates that would do as well in its place, with their amplitudes there: not isolable from it.
+  /// Candidates that would do as well in its place with no more columns, and their amplitudes there: not
+  /// isolable from it.
   std::vector<std::pair<size_t, VectorXd>> same;
   size_t rival = SIZE_MAX;     ///< The next best in its place; SIZE_MAX for none.
   double log_odds = 0.0;       ///< Against the rival, natural logarithm.

@@ -18,13 +18,17 @@ using Eigen::Index;
 // Columns agree with what a fault does to this fraction: platforms tilt, and wheels slip, by as much.
 constexpr double kAccuracy = 1e-4;
 // What is left over may be this many times the noise and is explained all the same.
-constexpr double kLeft = 10.0;
+constexpr double kLeft = 3.0;
+// And of what there is to explain, squared, at least this fraction.
+constexpr double kExplains = 0.99;
 constexpr Index kMostSteps = 40;  // that are looked at
 constexpr size_t kMostSegments = 8;
 // Residuals that change by this fraction from one step to the next have begun, or ended.
 constexpr double kJump = 0.3;
 // Gravity whose size differs by less than this fraction of its change only points elsewhere.
 constexpr double kTilted = 0.2;
+
+constexpr const char* kBearing = "dry friction of the bearing";
 
 Matrix3d Cross(const Vector3d& a) {
   Matrix3d A;
@@ -120,6 +124,8 @@ class StepForces {
     if (next_ == candidates->size()) {
       candidates->push_back(
           {fault, place, unit, nominal, MatrixXd::Zero(rows() * steps_, width), 0});
+      // Masses, frictions and the like are not negative.
+      if (width == 1 && std::string_view(fault) != "torque") candidates->back().least = -nominal;
     }
     return (*candidates)[next_++];
   }
@@ -191,6 +197,13 @@ void StepForces::AddJoints(std::vector<Candidate>* candidates) {
                    joint == nullptr ? base.wheel.damping : joint->damping, 1),
              VectorXd(-rate[i] * f));
     const double sign = rate[i] > 0.0 ? 1.0 : rate[i] < 0.0 ? -1.0 : 0.0;
+    if (joint != nullptr) {
+      // Where the plant says it, also of a joint that sticks. The largest is told.
+      const double known = store_.Get(StepStore::kDryFriction)(i, step_);
+      Candidate& bearing = Next(candidates, kBearing, place, force, 0.0, 1);
+      bearing.nominal = std::max(bearing.nominal, std::abs(known));
+      AddRobot(&bearing, VectorXd(known * f));
+    }
     AddRobot(&Next(candidates, "dry friction", place, force, joint == nullptr ? 0.0 : joint->dry_friction, 1),
              VectorXd(-sign * f));
     if (joint == nullptr || joint->type == JointType::kBall) continue;
@@ -311,7 +324,11 @@ std::string TellVector(const Eigen::Ref<const VectorXd>& v) {
 Fault MakeFault(const Candidate& candidate, const VectorXd& a, const VectorXd& error, const Vector3d& gravity) {
   Fault fault{candidate.fault, candidate.place, candidate.nominal + a[0], error.size() > 0 ? error[0] : 0.0,
               candidate.unit, ""};
-  if (candidate.fault == "spring") {
+  if (candidate.fault == kBearing) {
+    fault.fault = "dry friction";
+    fault.value = candidate.nominal * a[0];
+    fault.error *= candidate.nominal;
+  } else if (candidate.fault == "spring") {
     if (a[0] != 0.0) fault.detail = "relaxed at " + FormatNumber(a[1] / a[0], 4);
   } else if (candidate.fault == "tether") {
     if (a[0] != 0.0) fault.detail = "to " + TellVector(a.tail<3>() / a[0]) + " m";
@@ -363,7 +380,8 @@ class Problem {
   /// Faults that do not change.
   bool ExplainConstant(const Segment& segment, Causes* causes) const {
     const CauseSelection selection = SelectCauses(y_, candidates_, {6, floor_});
-    if (!(selection.left <= kLeft * std::sqrt(floor_))) return false;
+    if (selection.fraction < kExplains || !(selection.left <= kLeft * std::sqrt(floor_))) return false;
+    if (ExplainJoint(segment, selection, causes)) return true;
     for (const CauseTerm& term : selection.terms) {
       Explanation one = Start(segment);
       one.fraction = selection.terms.size() == 1 ? selection.fraction : term.fraction;
@@ -379,6 +397,28 @@ class Problem {
       }
       causes->push_back(one);
     }
+    return true;
+  }
+
+  /// Two faults of one joint may be anything that acts there.
+  bool ExplainJoint(const Segment& segment, const CauseSelection& selection, Causes* causes) const {
+    if (selection.terms.size() < 2) return false;
+    const std::string& place = candidates_[selection.terms.front().candidate].place;
+    Explanation one = Start(segment);
+    one.outcome = CauseOutcome::kNamedClass;
+    one.fraction = selection.fraction;
+    one.left = selection.left;
+    one.faults.push_back({"torque that changes", place, 0.0, 0.0, "", ""});
+    for (const CauseTerm& term : selection.terms) {
+      const Candidate& candidate = candidates_[term.candidate];
+      if (candidate.place != place || !place.starts_with("joint ")) return false;
+      one.faults.push_back(MakeFault(candidate, term.amplitude, term.error, forces_->model().gravity()));
+    }
+    for (Index k = 0; k < steps_; ++k) {
+      const VectorXd y = y_.segment(k * forces_->rows(), forces_->rows());
+      one.faults.front().value = std::max(one.faults.front().value, CalcTorque(place, k, y));
+    }
+    causes->push_back(one);
     return true;
   }
 
@@ -415,7 +455,7 @@ class Problem {
     Explanation one = Start(segment);
     one.fraction = 1.0 - all.front().left / y_.squaredNorm();
     one.left = std::sqrt(all.front().left / rows);
-    const bool explained = one.left <= kLeft * std::sqrt(floor_);
+    const bool explained = one.fraction >= kExplains && one.left <= kLeft * std::sqrt(floor_);
     for (const Free& free : all) {
       const Candidate& candidate = candidates_[free.candidate];
       const double odds = 0.5 * (free.criterion - all.front().criterion);
@@ -433,6 +473,16 @@ class Problem {
   }
 
  private:
+  /// Size of the torque of that joint that explains most of y, a step's rows.
+  [[nodiscard]] double CalcTorque(const std::string& place, Index step, const VectorXd& y) const {
+    for (const Candidate& candidate : candidates_) {
+      if (candidate.place != place || candidate.fault != "torque") continue;
+      const VectorXd column = candidate.columns.col(0).segment(step * forces_->rows(), forces_->rows());
+      return std::abs(column.dot(y)) / column.squaredNorm();
+    }
+    return 0.0;
+  }
+
   [[nodiscard]] Explanation Start(const Segment& segment) const {
     Explanation one;
     one.channel = CauseChannel::kBalance;
@@ -459,7 +509,8 @@ void FindSegments(const StepStore& store, StepForces* forces, Segment* whole, st
     if (!(store.Get(StepStore::kNoise)(0, i) > 0.0)) continue;
     forces->SetStep(i);
     const VectorXd y = forces->CalcResidual();
-    const bool differs = y.head(y.size() - 6).norm() > 1.0 || y.tail<6>().norm() > 1.0;
+    const bool differs = y.head(y.size() - 6).squaredNorm() > static_cast<double>(y.size() - 6) ||
+                         y.tail<6>().squaredNorm() > 6.0;
     if (differs) {
       const double time = store.Get(StepStore::kTime)(0, i);
       const bool begins = i != last + 1 || (y - before).norm() > kJump * std::max(y.norm(), before.norm());

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
-#include <numeric>
+#include <tuple>
 
 #include "controller/model/platform.h"
 #include "harness/diagnosis/cause_estimator.h"
@@ -97,10 +97,12 @@ void AddDelay(const ArrayXd& got, const SignalSeries& series, const Steps& steps
   }
 }
 
-void AddLimits(const ArrayXd& u, const ArrayXd& got, const std::string& unit, std::vector<Shape>* shapes) {
+void AddLimits(const ArrayXd& u, const ArrayXd& got, const std::string& unit, bool is_motor,
+               std::vector<Shape>* shapes) {
   const double most = got.abs().maxCoeff();
   if (most > 0.0 && most < u.abs().maxCoeff())
     shapes->push_back({"limit", unit, "", most, 1, u.min(most).max(-most), false});
+  if (!is_motor) return;
   // Outside of a dead zone |u| - |g| is its half width.
   std::vector<double> less;
   for (Index i = 0; i < u.size(); ++i)
@@ -156,7 +158,7 @@ std::vector<Shape> ListShapes(const SignalSeries& series, const Steps& steps,
   std::vector<Shape> shapes;
   shapes.push_back({.fault = "", .unit = "", .detail = "", .output = u});
   AddDelay(got, series, steps, &shapes);
-  AddLimits(u, got, series.name.unit, &shapes);
+  AddLimits(u, got, series.name.unit, series.name.group == "motors", &shapes);
   AddSteps(u, got, series.name.unit, &shapes);
   AddExchange(got, series, steps, others, &shapes);
   const bool is_still = (got - got.mean()).abs().maxCoeff() <= series.noise;
@@ -224,8 +226,13 @@ std::vector<Candidate> ListAdded(const SignalSeries& series, const Steps& steps,
   }
   if (series.rate.size() > 0) {
     const ArrayXd rate = steps.Take(series.rate);
-    add("viscous friction", name.unit + " s/rad", -rate);
-    add("dry friction", name.unit, -rate.sign());
+    for (const auto& [fault, unit, column] :
+         {std::tuple{"viscous friction", name.unit + " s/rad", ArrayXd(-rate)},
+          std::tuple{"dry friction", name.unit, ArrayXd(-rate.sign())}}) {
+      const size_t count = added.size();
+      add(fault, unit, column);
+      if (added.size() > count) added.back().least = 0.0;
+    }
   }
   if (look_for_sines && got.size() >= kFewestOfNoise) {
     Candidate sine = FindSine(got - shape.output, steps.Take(series.time), place, name.unit);
@@ -278,6 +285,12 @@ bool IsWhite(const VectorXd& residual) {
   return residual.cwiseAbs().maxCoeff() < 6.0 * std::sqrt(square / static_cast<double>(count));
 }
 
+/// Whether an output that goes on with this fraction of itself follows, and neither runs away nor ahead.
+bool IsDecay(double decay) {
+  constexpr double kLeast = 1e-6;
+  return decay > kLeast && decay < 1.0 - kLeast;
+}
+
 Fit MakeFit(const SignalSeries& series, const Steps& steps, const Shape& shape, double floor,
             bool look_for_sines) {
   const std::vector<Candidate> added = ListAdded(series, steps, shape, look_for_sines);
@@ -298,10 +311,9 @@ Fit MakeFit(const SignalSeries& series, const Steps& steps, const Shape& shape, 
     fit.faults.push_back(MakeFault(added[term.candidate], term.amplitude, term.error, decay, time_step));
     std::vector<Fault>& same = fit.same.emplace_back();
     for (const auto& [other, amplitude] : term.same)
-      same.push_back(MakeFault(added[other], amplitude, VectorXd::Zero(amplitude.size()), decay, time_step));
+      if (added[other].fault != "lag" || IsDecay(amplitude[0])) same.push_back(MakeFault(added[other], amplitude, VectorXd::Zero(amplitude.size()), decay, time_step));
   }
-  // A lag follows, and neither runs away nor ahead.
-  if (decay < 0.0 || decay >= 1.0) fit.criterion = std::numeric_limits<double>::infinity();
+  if (decay != 0.0 && !IsDecay(decay)) fit.criterion = std::numeric_limits<double>::infinity();
   const double left = std::sqrt(fit.selection.residual.squaredNorm() / static_cast<double>(y.size()));
   if (left > kLeft * std::sqrt(floor) && IsWhite(fit.selection.residual)) {
     fit.faults.push_back({"noise, standard deviation", place, left * series.noise,
@@ -313,16 +325,10 @@ Fit MakeFit(const SignalSeries& series, const Steps& steps, const Shape& shape, 
   return fit;
 }
 
-std::string TellAll(const std::vector<Fault>& faults) {
-  std::string text;
-  for (const Fault& fault : faults) text += (text.empty() ? "" : " and ") + fault.Tell();
-  return text;
-}
-
 /// Names of a fit's faults: what two explanations may have in common.
 std::string NamesOf(const std::vector<Fault>& faults) {
   std::string text;
-  for (const Fault& fault : faults) text += fault.fault + ";";
+  for (const Fault& fault : faults) text += (text.empty() ? "" : " and ") + fault.fault;
   return text;
 }
 
@@ -334,7 +340,20 @@ struct Verdict {
   std::string rival;
   double log_odds = 0.0;
   bool is_explained = false;
+  double largest_unheard = 0.0;  // of a signal of which nothing came, else 0
 };
+
+/// Of a signal of which nothing came: any dead zone that is wide enough, any step that is large enough.
+void AddSilence(const SignalSeries& series, const ArrayXd& u, Verdict* verdict) {
+  if (verdict->fits.empty() || verdict->fits.front().faults.size() != 1) return;
+  verdict->largest_unheard = u.abs().maxCoeff();
+  const Fault& dead = verdict->fits.front().faults.front();
+  std::vector<Fault>& same = verdict->fits.front().same.front();
+  if (series.name.group == "motors")
+    same.push_back({"dead zone", dead.place, verdict->largest_unheard, 0.0, series.name.unit, "or more"});
+  same.push_back(
+      {"rounding to steps of", dead.place, 2.0 * verdict->largest_unheard, 0.0, series.name.unit, "or more"});
+}
 
 Verdict Judge(const SignalSeries& series, const std::vector<SignalSeries>& others) {
   Verdict verdict;
@@ -366,13 +385,18 @@ Verdict Judge(const SignalSeries& series, const std::vector<SignalSeries>& other
     const std::string name = NamesOf(fit.faults);
     if (std::find(names.begin(), names.end(), name) != names.end()) continue;
     names.push_back(name);
+    // What has more faults has simpler ones as a special case.
+    const bool is_wider = !verdict.fits.empty() && fit.faults.size() > verdict.fits.front().faults.size();
+    if (is_wider && odds < kEqualLogOdds) continue;
     if (verdict.fits.empty() || (odds < kEqualLogOdds && is_good(fit))) {
       verdict.fits.push_back(fit);
     } else if (verdict.rival.empty() && std::isfinite(odds)) {
-      verdict.rival = TellAll(fit.faults);
+      verdict.rival = name;
       verdict.log_odds = odds;
     }
   }
+  if (verdict.is_explained && steps.Take(series.got).abs().maxCoeff() <= series.noise)
+    AddSilence(series, steps.Take(series.expected), &verdict);
   return verdict;
 }
 
@@ -447,9 +471,20 @@ void TellCommon(std::vector<Verdict>* verdicts, const std::map<std::string, int>
     }
   }
   const Common* most = nullptr;
-  for (const auto& [name, commons] : by_name)
-    for (const Common& common : commons)
+  for (auto& [name, commons] : by_name) {
+    for (Common& common : commons) {
+      const bool rounds = common.fault.fault == "rounding to steps of";
+      for (size_t i = 0; i < verdicts->size() && (rounds || common.fault.fault == "dead zone"); ++i) {
+        const double unheard = (*verdicts)[i].largest_unheard;
+        if (!(unheard > 0.0 && unheard <= (rounds ? 0.5 : 1.0) * common.fault.value)) continue;
+        if (std::find(common.members.begin(), common.members.end(), i) != common.members.end()) continue;
+        common.members.push_back(i);
+        ++common.groups[(*verdicts)[i].series->name.group];
+      }
+      std::sort(common.members.begin(), common.members.end());
       if (most == nullptr || common.members.size() > most->members.size()) most = &common;
+    }
+  }
   constexpr size_t kSeveral = 3;
   if (most == nullptr || most->members.size() < kSeveral) return;
   int could = 0;
@@ -469,10 +504,16 @@ void TellCommon(std::vector<Verdict>* verdicts, const std::map<std::string, int>
     one.to = std::max(one.to, verdict.steps.to);
     one.ends = one.ends && verdict.steps.ends;
   }
+  // Of an orientation the change is kept, which shows no delay of its own.
+  const bool is_late = most->fault.fault == "delay" && most->groups.size() > 2;
+  std::vector<Verdict> others;
+  for (size_t i = 0; i < verdicts->size(); ++i) {
+    const bool is_member = std::find(most->members.begin(), most->members.end(), i) != most->members.end();
+    if (is_member || (is_late && (*verdicts)[i].series->name.group == "object orientation")) continue;
+    others.push_back(std::move((*verdicts)[i]));
+  }
   causes->push_back(one);
-  const std::vector<size_t> members = most->members;
-  for (auto i = members.rbegin(); i != members.rend(); ++i)
-    verdicts->erase(verdicts->begin() + static_cast<std::ptrdiff_t>(*i));
+  *verdicts = std::move(others);
 }
 
 void ExplainChannel(const StepStore& store, bool motors, Causes* causes) {

@@ -1,6 +1,7 @@
 #include "harness/diagnosis/step_store.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "harness/checks/check_table.h"
 
@@ -29,7 +30,7 @@ StepStore::StepStore(const Setup& setup, const JudgedLaw* law)
   const Eigen::Index n = model.num_velocities(), m = CountOf(readings_);
   const Eigen::Index parts = law_ == nullptr ? 0 : law_->CountParts();
   const Eigen::Index sizes[kSignalCount] = {1, n, n, model.num_positions(), n, n, m,         m, n, 6,
-                                            12, 12, 2, n, 1, n * parts};
+                                            12, 12, n, 2, n, 1, n * parts};
   for (int i = 0; i < kSignalCount; ++i) offsets_[i + 1] = offsets_[i] + sizes[i];
   before_.resize(offsets_[kSignalCount], kHistory);
   data_.resize(offsets_[kSignalCount], kCapacity);  // its pages are used only when something differs
@@ -139,12 +140,24 @@ void StepStore::Pack(const StepRecord& step, const StepAnalysis& now, bool answe
   PackReading(step.measured, declared.measured, at(kReading));
   at(kRobotResidual).setZero();
   at(kNoise).setZero();
+  at(kDryFriction).setZero();
   if (answered && now.mass_factor != nullptr) {
     // What motors did not give is theirs, and no force of its own.
     force_ = step.drive.tau - response.motor_torques;
     actuation_.CalcForce(force_, force_);
     at(kRobotResidual) = now.robot_residual + force_;
-    at(kNoise) << 1e-6 * now.balanced + now.uneven_force, 1e-9 * std::max(now.findings.f_c.norm(), 1e-3);
+    if (response.dry_friction.size() == at(kDryFriction).size()) {
+      at(kDryFriction) = response.dry_friction;
+      for (int k = 0; k < setup_->model().num_dofs(); ++k) {
+        const double declared =
+            setup_->model().joints()[static_cast<size_t>(setup_->model().joint_of_dof(k))].dry_friction;
+        double& force = at(kDryFriction)[setup_->model().num_base_velocities() + k];
+        force -= std::clamp(force, -declared, declared);
+      }
+    }
+    // As the bounds of the inverse dynamics have it, an entry.
+    at(kNoise) << (1e-6 * now.balanced + now.uneven_force) / std::sqrt(static_cast<double>(force_.size())),
+        1e-9 * std::max(now.findings.f_c.norm(), 1e-3) / std::sqrt(6.0);
   }
   at(kObjectResidual) = answered ? now.object_residual : Vector6d(Vector6d::Zero());
   const Pose& X_Bo = step.reading.state.X_Bo;

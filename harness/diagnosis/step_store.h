@@ -41,6 +41,7 @@ class StepStore {
     kObjectResidual,     ///< 6, of (19).
     kObjectPose,         ///< 12: rotation by columns, position.
     kObjectMotion,       ///< 12: V_Bo and V_Bo_dot.
+    kDryFriction,        ///< n: what the plant says of it, beyond the declared; 0 where it says nothing.
     kNoise,              ///< 2: of the robot's residual, in |.|_M^-1, and of the object's, N.
     kLawDifference,      ///< n, E_bar' (tau' - tau'_printed).
     kLawNoise,           ///< Of that, in |.|_M^-1; 0 where the law is right or not known.
