@@ -20,7 +20,7 @@ class Search {
 
   CauseSelection Run() {
     double criterion = Score(y_.squaredNorm(), 0.0);
-    while (chosen_.size() < options_.most_terms) {
+    while (chosen_.size() < options_.most_terms && !IsNoise(chosen_)) {
       const Best next = FindBest(chosen_);
       if (!(next.criterion < criterion)) break;
       chosen_.push_back(next.candidate);
@@ -37,6 +37,12 @@ class Search {
 
   [[nodiscard]] double Score(double squares, double parameters) const {
     return rows_ * std::log(options_.floor + squares / rows_) + parameters * std::log(rows_);
+  }
+
+  /// Whether what these leave over is no more than noise.
+  [[nodiscard]] bool IsNoise(const std::vector<size_t>& set) const {
+    const MatrixXd Q = CalcRange(set);
+    return (y_ - Q * (Q.transpose() * y_)).squaredNorm() <= options_.floor * rows_;
   }
 
   [[nodiscard]] double CountParameters(const std::vector<size_t>& set) const {
@@ -127,7 +133,7 @@ class Search {
         const MatrixXd Q = CalcRange(others);
         const double alone = Score((y_ - Q * (Q.transpose() * y_)).squaredNorm(), CountParameters(others));
         const Best best = FindBest(others);
-        if (alone <= criterion && alone <= best.criterion) {
+        if (IsNoise(others) || (alone <= criterion && alone <= best.criterion)) {
           chosen_ = others;
           criterion = alone;
           improved = true;

@@ -7,7 +7,8 @@
 //
 //   N log(floor + |y - C_S a|^2 / N) + p_S log N                    (Bayesian information criterion)
 //
-// by orthogonal matching pursuit, in which every choice is looked at again after each that follows it.
+// by orthogonal matching pursuit, in which every choice is looked at again after each that follows it, and
+// which ends where no more than noise is left.
 
 #include <limits>
 #include <span>

@@ -69,6 +69,15 @@ Causes ExplainLaw(const StepStore& store) {
     for (const Place& place : places)
       candidates.push_back({std::string(name.name) + " (" + name.symbol + "), factor", place.name, "", 1.0,
                             MatrixXd::Zero(n * used, 1), 0});
+  // What a controller of another's may add.
+  for (Index i = 0; i < n; ++i) {
+    const std::string& place = places[places.size() - static_cast<size_t>(n - i)].name;
+    const std::string& unit = store.motors()[static_cast<size_t>(i)].unit;
+    for (const char* fault : {"torque", "viscous friction", "dry friction"}) {
+      candidates.push_back({fault, place, unit, 0.0, MatrixXd::Zero(n * used, 1), 0});
+      if (std::string_view(fault) != "torque") candidates.back().least = 0.0;
+    }
+  }
   VectorXd y(n * used);
   for (Index k = 0; k < used; ++k) {
     const Index step = steps[static_cast<size_t>(used == 1 ? 0 : k * (count - 1) / (used - 1))];
@@ -96,6 +105,14 @@ Causes ExplainLaw(const StepStore& store) {
         actuation.CalcForce(own, own);
         candidates[candidate++].columns.col(0).segment(k * n, n) = whiten(own);
       }
+    }
+    for (Index i = 0; i < n; ++i) {
+      VectorXd own(n);
+      actuation.CalcForce(VectorXd::Unit(n, i), own);
+      own = whiten(own);
+      const double rate = terms.velocity()[i];
+      for (const double size : {1.0, -rate, rate > 0.0 ? -1.0 : rate < 0.0 ? 1.0 : 0.0})
+        candidates[candidate++].columns.col(0).segment(k * n, n) = size * own;
     }
   }
   // Sums are told where no single summand does: a list's first of two equals is kept.
