@@ -43,7 +43,7 @@ struct RenderOptions {
   /// for a panel.
   double shift_right = 0.0;
   std::string translucent_body;  ///< Its geoms are seen through; none when empty.
-  std::optional<Ghost> ghost;  ///< What it points at must outlive the renderer.
+  std::optional<Ghost> ghost;    ///< What it points at must outlive the renderer.
 };
 
 /// Names of the cameras of a model, in its order.

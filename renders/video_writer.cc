@@ -49,9 +49,8 @@ std::vector<std::string> ListArguments(const EncodingOptions& options, VideoForm
                                         "1"};
   if (format == VideoFormat::kMp4) {
     // Otherwise x264 picks code by processor, and its AVX-512 code gives varying bytes for the same frames.
-    arguments.insert(arguments.end(),
-                     {"-c:v", "libx264", "-preset", "veryfast", "-crf", "21", "-x264-params",
-                      "cpu-independent=1", "-movflags", "+faststart", "-f", "mp4"});
+    arguments.insert(arguments.end(), {"-c:v", "libx264", "-preset", "veryfast", "-crf", "21", "-x264-params",
+                                       "cpu-independent=1", "-movflags", "+faststart", "-f", "mp4"});
   } else {
     // Looks as the MP4 does: VP9's scale goes to 63.
     arguments.insert(arguments.end(), {"-c:v", "libvpx-vp9", "-b:v", "0", "-crf", "31", "-deadline", "good",

@@ -17,7 +17,8 @@ std::string DescribeVelocity(int coordinate, const RobotModel& model, int base_v
 }  // namespace
 
 const char* NameOf(CheckCategory kind) {
-  static constexpr const char* kNames[] = {"model", "inverse_dynamics", "forward_dynamics", "assumption", "law"};
+  static constexpr const char* kNames[] = {"model", "inverse_dynamics", "forward_dynamics", "assumption",
+                                           "law"};
   return kNames[static_cast<size_t>(kind)];
 }
 

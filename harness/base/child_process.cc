@@ -110,9 +110,7 @@ ChildProcess::ChildProcess(const std::string& what, const Program& program) : is
 ChildProcess::~ChildProcess() { Release(); }
 
 ChildProcess::ChildProcess(ChildProcess&& other) noexcept
-    : pid_(std::exchange(other.pid_, -1)),
-      channel_(std::move(other.channel_)),
-      is_group_(other.is_group_) {}
+    : pid_(std::exchange(other.pid_, -1)), channel_(std::move(other.channel_)), is_group_(other.is_group_) {}
 
 ChildProcess& ChildProcess::operator=(ChildProcess&& other) noexcept {
   if (this == &other) return *this;

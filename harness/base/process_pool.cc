@@ -194,7 +194,8 @@ size_t RunJobs(const std::string& what, size_t count, int size,
     if (!ended) continue;
     if (!ended->result) throw Error(what + ": " + ended->failure);
     early.emplace(ended->number, std::move(*ended->result));
-    for (auto next = early.find(taken); next != early.end() && !is_interrupted(); next = early.find(++taken)) {
+    for (auto next = early.find(taken); next != early.end() && !is_interrupted();
+         next = early.find(++taken)) {
       bool is_done = false;
       std::string result;
       UnpackBytes(next->second, &is_done, &result);

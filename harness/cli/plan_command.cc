@@ -279,7 +279,9 @@ void AddPlanCommand(Command app) {
       .TypeName("X Y Z")
       .Takes(3)
       .Required();
-  command.AddOption("--object-zyz-deg", &request->zyz_deg, "Orientation of the object, ZYZ angles (default 0 0 0)")
+  command
+      .AddOption("--object-zyz-deg", &request->zyz_deg,
+                 "Orientation of the object, ZYZ angles (default 0 0 0)")
       .TypeName("A B C")
       .Takes(3);
   Option hand = command.AddOption("--hand", &request->hand, "Hand of the assistant robot that holds")
@@ -291,7 +293,9 @@ void AddPlanCommand(Command app) {
                  "Frame of a palm, whose z points at what it takes; its fingertips are those on its link")
       .TypeName("FRAME")
       .Excludes(hand);
-  command.AddOption("--mu", &request->options.mu, "Friction coefficient that the plan counts on").TypeName("MU").ShowDefault();
+  command.AddOption("--mu", &request->options.mu, "Friction coefficient that the plan counts on")
+      .TypeName("MU")
+      .ShowDefault();
   command
       .AddOption("--support-height", &request->support_height,
                  "Height of the table that the object lies on, m: the hand comes from above")
@@ -313,7 +317,9 @@ void AddPlanCommand(Command app) {
       .AddOption("--lift", &request->lift, "Displacement, m, that the arm must be able to make while holding")
       .TypeName("X Y Z")
       .Takes(3);
-  command.AddOption("--joint-margin", &request->options.joint_margin, "Least distance of joints from the ends of their ranges, rad or m")
+  command
+      .AddOption("--joint-margin", &request->options.joint_margin,
+                 "Least distance of joints from the ends of their ranges, rad or m")
       .TypeName("MARGIN")
       .ShowDefault();
   command

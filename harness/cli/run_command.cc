@@ -16,6 +16,7 @@
 #include "harness/base/interrupts.h"
 #include "harness/base/shell.h"
 #include "harness/cli/commands.h"
+#include "harness/cli/comparison_options.h"
 #include "harness/cli/make_video.h"
 #include "harness/cli/output_file.h"
 #include "harness/cli/progress_bar.h"
@@ -23,7 +24,6 @@
 #include "harness/cli/run_report.h"
 #include "harness/cli/shipped_files.h"
 #include "harness/cli/terminal.h"
-#include "harness/cli/comparison_options.h"
 #include "harness/engine/machine.h"
 #include "harness/report/run_data.h"
 #include "harness/report/write_report.h"
@@ -264,8 +264,9 @@ void AddRunCommand(Command app, const std::string& command_line) {
               "of controller_protocol.h; --replay of its runs needs it again")
           .TypeName("LIBRARY.so|COMMAND");
   command
-      .AddOption("--controller-time-limit", &request->controller_time_limit,
-                 "Time limit for each answer of the controller, s (1 by default); ten times that for its start")
+      .AddOption(
+          "--controller-time-limit", &request->controller_time_limit,
+          "Time limit for each answer of the controller, s (1 by default); ten times that for its start")
       .TypeName("SECONDS")
       .Check(PositiveNumber())
       .Needs(controller);

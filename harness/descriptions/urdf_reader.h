@@ -22,9 +22,10 @@ struct UrdfOptions {
   bool keep_impossible = false;
 };
 
-/// Reads a URDF's text, for which `source` stands in messages: links joined by fixed joints are one body, named by the link that the moving joint carries;
-/// the others become frames. Joints come depth first in the file's order. The link's own frames are kept
-/// (DescribedJoint::X_iL); frame i has its z axis along the joint's.
+/// Reads a URDF's text, for which `source` stands in messages: links joined by fixed joints are one body,
+/// named by the link that the moving joint carries; the others become frames. Joints come depth first in the
+/// file's order. The link's own frames are kept (DescribedJoint::X_iL); frame i has its z axis along the
+/// joint's.
 /// @throws InputError, one line that names file, line, part and value.
 RobotDescription ParseUrdf(std::string_view text, const std::string& source, const UrdfOptions& options = {});
 

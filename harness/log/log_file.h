@@ -1,7 +1,7 @@
 #pragma once
 
-// The log as bytes in a file. HDF5 writes everything but the numbers once and closes the file; after that only
-// these are written, in place, so that a process that dies cannot leave a file that HDF5 does not open.
+// The log as bytes in a file. HDF5 writes everything but the numbers once and closes the file; after that
+// only these are written, in place, so that a process that dies cannot leave a file that HDF5 does not open.
 
 #include <cstddef>
 #include <cstdint>

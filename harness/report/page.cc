@@ -69,7 +69,8 @@ class Page {
                  {"pictures", MakePictures()},
                  {"inputs", MakeInputs()},
                  {"files", Json::array()}};
-    for (const CheckCategory category : kCheckCategories) json["categories"].push_back(MakeCategory(category));
+    for (const CheckCategory category : kCheckCategories)
+      json["categories"].push_back(MakeCategory(category));
     AddFile("scenario.toml", "Scenario", true, &json["files"]);
     AddFile("robot/" + Text("robot"), "Parameters of the model: " + Text("robot"), false, &json["files"]);
     AddFile("mjcf/" + Text("mjcf"), "MJCF: " + Text("mjcf"), false, &json["files"]);
@@ -117,7 +118,9 @@ class Page {
     Json json = {{"name", NameOf(category)},
                  {"title", TitleOf(category)},
                  {"explanation", run_.Explain(category)},
-                 {"tone", !status.is_asked() ? "open" : status.failed > 0 ? "fail" : "pass"},
+                 {"tone", !status.is_asked()  ? "open"
+                          : status.failed > 0 ? "fail"
+                                              : "pass"},
                  {"word", !status.is_asked()  ? "not asked"
                           : status.failed > 0 ? fmt::format("{} of {} fail", status.failed, status.checks)
                                               : "holds"},

@@ -5,7 +5,7 @@
 namespace dexcheck {
 
 extern const char* const kPageCss;
-extern const char* const kDomJs;   ///< What the other scripts make elements with.
+extern const char* const kDomJs;  ///< What the other scripts make elements with.
 extern const char* const kPageHtml;
 extern const char* const kRunJs;
 extern const char* const kComparisonJs;

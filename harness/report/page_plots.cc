@@ -35,11 +35,9 @@ std::string EmbedPlots(const std::vector<Figure>& figures, const VectorXd& time)
   int series = 0;
   for (const Figure& figure : figures) {
     nlohmann::ordered_json plot = {
-        {"name", figure.name},   {"panel", figure.panel},
-        {"title", figure.title}, {"note", figure.note},
-        {"label", figure.label}, {"right", figure.right_label},
-        {"log", figure.log},     {"bound", nullptr},
-        {"range", CalcAxisRange(figure, false)}};
+        {"name", figure.name}, {"panel", figure.panel}, {"title", figure.title},
+        {"note", figure.note}, {"label", figure.label}, {"right", figure.right_label},
+        {"log", figure.log},   {"bound", nullptr},      {"range", CalcAxisRange(figure, false)}};
     if (!figure.right_label.empty()) plot["right_range"] = CalcAxisRange(figure, true);
     if (figure.bound) plot["bound"] = *figure.bound;
     for (const Curve& curve : figure.curves) {

@@ -25,7 +25,7 @@ struct LoopParts {
   const PickAndPlaceController* task = nullptr;    ///< The controller, when it does a task.
   const TrajectoryController* follower = nullptr;  ///< The controller, when it follows its contacts by (40).
   bool knows_law = true;                           ///< Whether the controller's law is the scenario's.
-  int threads = 1;  ///< 2: checks have a thread of their own.
+  int threads = 1;                                 ///< 2: checks have a thread of their own.
   SensingOptions sensing;
   ActuationOptions actuation;
   std::vector<DisturbanceOptions> disturbances;

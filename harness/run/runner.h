@@ -25,8 +25,8 @@ class Runner {
   void Disturb(const DisturbanceOptions& disturbance) { loop_.Disturb(disturbance); }
 
   /// Settles, steps to the end or to a failure, and judges.
-  /// @param after_step called with each step's record once its checks are made (ClosedLoop::SetObserver), also
-  /// after one that failed; its time counts as recording.
+  /// @param after_step called with each step's record once its checks are made (ClosedLoop::SetObserver),
+  /// also after one that failed; its time counts as recording.
   /// @param should_stop asked before each step, of settling too; true ends the run as interrupted.
   template <typename AfterStep, typename ShouldStop>
   const RunResult& Run(const AfterStep& after_step, const ShouldStop& should_stop) {

@@ -14,7 +14,6 @@ std::string QuoteField(const std::string& text) {
   return quoted + "\"";
 }
 
-
 void WriteStudyCsv(const StudyStore& store, const std::function<void(std::string_view)>& write) {
   const Study& study = store.study();
   std::string line = "trial,seed";
@@ -29,7 +28,8 @@ void WriteStudyCsv(const StudyStore& store, const std::function<void(std::string
       line += "," + (study.variations[i].labels.empty() ? value : QuoteField(value));
     }
     line += std::string(",") + NameOf(row.result.outcome) + "," + QuoteField(row.result.failure);
-    for (const double metric : row.result.metrics) line += "," + (std::isfinite(metric) ? FormatNumber(metric) : "");
+    for (const double metric : row.result.metrics)
+      line += "," + (std::isfinite(metric) ? FormatNumber(metric) : "");
     write(line + "," + QuoteField(row.machine) + "\n");
   });
 }

@@ -23,8 +23,8 @@ std::string MakePage(const std::string& title, const char* html, const std::stri
 std::string MakeStudyPage(const StudySummary& summary, double renew) {
   const auto name = summary.json.at("name").get<std::string>();
   return MakePage(name + " – study", kStudyHtml,
-                  EmbedJson("study-data", summary.json) + EmbedBytes("study-values", summary.values), kStudyJs,
-                  renew);
+                  EmbedJson("study-data", summary.json) + EmbedBytes("study-values", summary.values),
+                  kStudyJs, renew);
 }
 
 std::string MakeBudgetPage(const ErrorBudget& budget) {

@@ -10,8 +10,8 @@
 #include <set>
 #include <string>
 
-#include "harness/report/page_text.h"
 #include "harness/report/page_assets.h"
+#include "harness/report/page_text.h"
 #include "harness/report/simplify_mesh.h"
 #include "tests/harness/report/replay_run.h"
 

@@ -158,8 +158,7 @@ TEST_F(WriteReportTest, NothingOfTheLogIsMarkup) {
   EXPECT_THAT(page, Not(HasSubstr("<script>alert")));
   EXPECT_THAT(page, Not(HasSubstr("<i>'sample'")));
   EXPECT_EQ(ReadData(page)["scenario"], run.scenario);
-  EXPECT_THAT(ReadData(page)["description"].get<std::string>(),
-              HasSubstr("made <by> hand & \"quoted\""));
+  EXPECT_THAT(ReadData(page)["description"].get<std::string>(), HasSubstr("made <by> hand & \"quoted\""));
 }
 
 TEST_F(WriteReportTest, IsTheSameWhenMadeAgain) {
