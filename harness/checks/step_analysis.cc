@@ -83,8 +83,11 @@ void StepAnalyzer::CompareMeasurement() {
   apart = std::max(apart, (a.X_Bo.matrix() - b.X_Bo.matrix()).cwiseAbs().maxCoeff());
   apart = std::max(apart, (a.V_Bo - b.V_Bo).lpNorm<Eigen::Infinity>());
   for (size_t i = 0; i < b.kappa.size(); ++i) {
-    apart = std::max({apart, std::abs(a.kappa[i].alpha_o.u - b.kappa[i].alpha_o.u),
-                      std::abs(a.kappa[i].alpha_o.v - b.kappa[i].alpha_o.v)});
+    const ContactCoordinates &x = a.kappa[i], &y = b.kappa[i];
+    apart = std::max({apart, (x.CalcVector() - y.CalcVector()).lpNorm<Eigen::Infinity>(),
+                      std::abs(a.overlap[i] - b.overlap[i])});
+    if (x.alpha_f.chart != y.alpha_f.chart || x.alpha_o.chart != y.alpha_o.chart)
+      apart = std::numeric_limits<double>::infinity();
   }
   now_.measurement_error = apart;
 }

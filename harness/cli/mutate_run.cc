@@ -42,6 +42,18 @@ CampaignFault Describe(const RunMutant& mutant) {
   fault.cause_right = counts && mutant.has_right_cause();
   if (counts && !mutant.part.empty()) fault.part_named = fault.cause_right && mutant.names_part;
   fault.exception = DescribeException(mutant);
+  if (!mutant.truth.empty()) {
+    const NamingScore& score = mutant.score;
+    const bool all = score.right == static_cast<int>(mutant.truth.size()) && score.wrong == 0;
+    fault.cause_right = counts && all;
+    fault.part_named.reset();
+    if (counts && mutant.killed)
+      fault.exception = all ? "" : fmt::format("{}: {}: {}", mutant.name,
+                                               score.wrong > 0      ? "WRONG NAME"
+                                               : score.in_class > 0 ? "class"
+                                                                    : "not explained",
+                                               mutant.causes);
+  }
   fault.details = {{"expected_cause", NameOf(mutant.expected)},
                    {"cause", NameOf(mutant.cause)},
                    {"expected_part", mutant.part},
@@ -49,8 +61,29 @@ CampaignFault Describe(const RunMutant& mutant) {
                    {"evidence", mutant.evidence},
                    {"failure", mutant.failure},
                    {"failed_checks", mutant.failed_checks},
-                   {"position_error_max_m", mutant.position_error}};
+                   {"position_error_max_m", mutant.position_error},
+                   {"causes", mutant.causes},
+                   {"right", mutant.score.right},
+                   {"in_class", mutant.score.in_class},
+                   {"not_explained", mutant.score.not_explained},
+                   {"wrong", mutant.score.wrong}};
   return fault;
+}
+
+/// Of drawn faults: how many are named, up to a class, or not, and how many names are wrong.
+void PrintScores(const Campaign& campaign) {
+  int right = 0, in_class = 0, not_explained = 0, wrong = 0, sets = 0;
+  for (const CampaignFault& fault : campaign.faults) {
+    if (fault.outcome != MutantOutcome::kKilled) continue;
+    ++sets;
+    right += fault.details["right"].get<int>();
+    in_class += fault.details["in_class"].get<int>();
+    not_explained += fault.details["not_explained"].get<int>();
+    wrong += fault.details["wrong"].get<int>();
+  }
+  const int all = right + in_class + not_explained;
+  fmt::print("{} sets found; of their {} faults {} named, {} up to a class, {} not explained; {} wrong names.\n",
+             sets, all, right, in_class, not_explained, wrong);
 }
 
 }  // namespace
@@ -76,6 +109,7 @@ int MutateRun(const MutateRunRequest& request) {
                                  {"scale", request.options.scale}}));
   }
   if (request.json_file != "-") campaign.Print(request.quiet);
+  if (request.json_file != "-" && request.options.draws > 0) PrintScores(campaign);
   return campaign.ToExitCode();
 }
 

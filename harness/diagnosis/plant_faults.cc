@@ -456,9 +456,9 @@ void AddWheelFaults(const Roles& roles, std::vector<PlantFault>* faults) {
 
 void AddWorldFaults(const Roles& roles, std::vector<PlantFault>* faults) {
   const auto add = [&](PlantFault fault) { faults->push_back(std::move(fault)); };
-  add(World("floor: rises by 0.05 degrees ahead", "floor", Cause::kSlope, "0.05 deg",
+  add(World("floor: rises by 0.05 degrees ahead", "floor", Cause::kSlope, "slope 0.05",
             [](const Setup&, mjModel* m) { Tilt(m, DegToRad(0.05), 0.0); }));
-  add(World("floor: falls by 0.1 degrees to the left", "floor", Cause::kSlope, "0.1 deg",
+  add(World("floor: falls by 0.1 degrees to the left", "floor", Cause::kSlope, "slope 0.1",
             [](const Setup&, mjModel* m) { Tilt(m, 0.0, DegToRad(0.1)); }));
   add(World("gravity: 0.1 % stronger", "floor", Cause::kUnmodelledForce, "gravity",
             [](const Setup&, mjModel* m) { m->opt.gravity[2] *= 1.001; }));

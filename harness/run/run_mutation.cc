@@ -96,6 +96,15 @@ void RunCampaign::MakeSetups() {
 
 void RunCampaign::ListFaults() {
   const RobotModel& model = setup_->model();
+  if (options_.draws > 0) {
+    for (const DrawnFaults& drawn :
+         DrawFaults(*setup_, static_cast<size_t>(options_.draws), static_cast<size_t>(options_.together),
+                    options_.seed, options_.duration)) {
+      plants_.push_back(drawn.fault);
+      mutants_.push_back({.kind = drawn.fault.kind, .name = drawn.fault.name, .truth = drawn.truth});
+    }
+    return;
+  }
   if (options_.parameters > 0) {
     const std::vector<Parameter> numbers = ListParameters(model.spec());
     const size_t count = std::min(numbers.size(), static_cast<size_t>(options_.parameters));
@@ -195,6 +204,9 @@ bool RunCampaign::RunLoop(const Setup& setup, LoopParts parts, RunMutant* mutant
   mutant->killed = result.verdict != Verdict::kPass;
   mutant->cause = result.attribution.cause;
   mutant->evidence = result.attribution.evidence;
+  mutant->score = ScoreNames(mutant->truth, result.causes);
+  for (const Explanation& one : result.causes)
+    mutant->causes += (mutant->causes.empty() ? "" : "; ") + one.Tell();
   mutant->names_part = mutant->evidence.find(mutant->part) != std::string::npos;
   mutant->failure = result.failure;
   mutant->failed_checks = JoinFailed(runner.loop().checks());

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "harness/diagnosis/drawn_faults.h"
 #include "harness/diagnosis/faulty_law.h"
 #include "harness/diagnosis/parameters.h"
 #include "harness/diagnosis/plant_faults.h"
@@ -23,6 +24,7 @@ struct RunMutant {
   std::string name;
   Cause expected = Cause::kNone;
   std::string part;  ///< What the evidence should name; empty for nothing.
+  std::vector<Fault> truth;  ///< Of drawn faults: how they should be told.
 
   bool refused = false;  ///< There is no such robot, or the scenario cannot be run with it.
   bool killed = false;   ///< The verdict is not "pass".
@@ -32,6 +34,8 @@ struct RunMutant {
   Cause cause = Cause::kNone;
   bool names_part = false;  ///< The evidence has `part` in it.
   std::string evidence;
+  NamingScore score;    ///< Of drawn faults.
+  std::string causes;   ///< All explanations, in words.
   std::string failure;          ///< Why the run ended early; empty when it did not.
   std::string failed_checks;    ///< Names, separated by blanks.
   double position_error = 0.0;  ///< Largest of the object, m.
