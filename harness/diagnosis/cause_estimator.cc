@@ -16,7 +16,7 @@ constexpr double kIndependent = 1e-7;
 class Search {
  public:
   Search(const VectorXd& y, std::span<const Candidate> candidates, const CauseOptions& options)
-      : y_(y), candidates_(candidates), options_(options), rows_(static_cast<double>(y.size())) {}
+      : y_(y), candidates_(candidates), options_(options), rows_(static_cast<double>(y.size())), samples_(rows_ / options.alike) {}
 
   CauseSelection Run() {
     double criterion = Score(y_.squaredNorm(), 0.0);
@@ -36,7 +36,7 @@ class Search {
   };
 
   [[nodiscard]] double Score(double squares, double parameters) const {
-    return rows_ * std::log(options_.floor + squares / rows_) + parameters * std::log(rows_);
+    return samples_ * std::log(options_.floor + squares / rows_) + parameters * std::log(samples_);
   }
 
   /// Whether what these leave over is no more than noise.
@@ -167,7 +167,8 @@ class Search {
       const VectorXd a = qr.solve(y_).cwiseQuotient(size);
       result.residual = y_ - C * a;
       const double freedom = std::max(1.0, rows_ - static_cast<double>(width));
-      const double variance = std::max(options_.floor, result.residual.squaredNorm() / freedom);
+      const double variance =
+          std::max(options_.floor, result.residual.squaredNorm() / freedom) * options_.alike;
       const MatrixXd covariance =
           (scaled.transpose() * scaled).completeOrthogonalDecomposition().pseudoInverse() * variance;
       width = 0;
@@ -201,10 +202,11 @@ class Search {
     for (size_t i = 0; i < scores.size(); ++i) {
       if (i == term->candidate) continue;
       // The criterion is twice the negative logarithm of the likelihood.
-      const double odds = 0.5 * (scores[i] - criterion);
+      double odds = 0.5 * (scores[i] - criterion);
       // One with more columns has simpler ones as a special case.
-      const bool is_wider = candidates_[i].columns.cols() > candidates_[term->candidate].columns.cols();
-      if (odds < kEqualLogOdds && is_wider) continue;
+      const double more = CountParameters({i}) - CountParameters({term->candidate});
+      if (more > 0.0 && candidates_[i].is_ordinary) odds -= 0.5 * more * std::log(samples_);
+      if (odds < kEqualLogOdds && more > 0.0 && !candidates_[i].is_ordinary) continue;
       if (odds < kEqualLogOdds) {
         const MatrixXd& C = candidates_[i].columns;
         const MatrixXd own = C - Q * (Q.transpose() * C);
@@ -220,7 +222,7 @@ class Search {
   const VectorXd& y_;
   std::span<const Candidate> candidates_;
   CauseOptions options_;
-  double rows_;
+  double rows_, samples_;
   std::vector<size_t> chosen_;
 };
 

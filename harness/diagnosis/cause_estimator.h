@@ -5,7 +5,7 @@
 // A residual y (N) is whitened, so that its noise is 1. Each candidate has columns C (N x p) that a fault of
 // amplitude 1 would leave in it. Sought is the set S of candidates that minimises
 //
-//   N log(floor + |y - C_S a|^2 / N) + p_S log N                    (Bayesian information criterion)
+//   n log(floor + |y - C_S a|^2 / N) + p_S log n                    (Bayesian information criterion)
 //
 // by orthogonal matching pursuit, in which every choice is looked at again after each that follows it, and
 // which ends where no more than noise is left.
@@ -30,6 +30,8 @@ struct Candidate {
   int parameters = 0;    ///< That were fitted beforehand, besides the amplitudes.
   /// Least amplitude that can be, where there is one column: no friction or mass is negative.
   double least = -std::numeric_limits<double>::infinity();
+  /// Whether it is as likely as a simpler one that explains no less: a spring that does not move is a torque.
+  bool is_ordinary = false;
 };
 
 /// A candidate that is part of the explanation.
@@ -56,6 +58,8 @@ struct CauseOptions {
   size_t most_terms = 6;
   /// Mean square of what no explanation need explain: noise, and what the columns are off themselves.
   double floor = 1.0;
+  /// Rows whose noise is one and the same: 1 where each has its own. N / alike are counted then.
+  double alike = 1.0;
 };
 
 /// Candidates whose likelihoods differ by less than this factor are told as equals, natural logarithm.

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 #include <optional>
+#include <cstdio>
+#include <cstdlib>
 
 #include "controller/common/text.h"
 #include "controller/dynamics/tree_factor.h"
@@ -209,7 +211,9 @@ void StepForces::AddJoints(std::vector<Candidate>* candidates) {
     if (joint == nullptr || joint->type == JointType::kBall) continue;
     MatrixXd spring(n_, 2);
     spring << -q[model_.position_index(model_.joint_of_dof(dof))] * f, f;
-    AddRobot(&Next(candidates, "spring", place, force + "/" + length, 0.0, 2), spring);
+    Candidate& candidate = Next(candidates, "spring", place, force + "/" + length, 0.0, 2);
+    candidate.is_ordinary = true;
+    AddRobot(&candidate, spring);
   }
 }
 
@@ -375,12 +379,33 @@ class Problem {
     }
     steps_ = used;
     floor_ = 1.0 + kAccuracy * kAccuracy * y_.squaredNorm() / static_cast<double>(y_.size());
+    if (const char* name = getenv("DEXDBG")) {  // DEBUG
+      FILE* f = fopen(name, "ab");
+      const long header[4] = {y_.size(), steps_, forces->rows(), (long)candidates_.size()};
+      fwrite(header, 8, 4, f);
+      fwrite(y_.data(), 8, (size_t)y_.size(), f);
+      for (auto& c : candidates_) {
+        std::string n = c.place + ": " + c.fault;
+        n.resize(64);
+        fwrite(n.data(), 1, 64, f);
+        long w = c.columns.cols();
+        fwrite(&w, 8, 1, f);
+        fwrite(c.columns.data(), 8, (size_t)c.columns.size(), f);
+      }
+      fclose(f);
+    }
+  }
+
+  /// Whether what is left is noise, or next to nothing beside what there was.
+  [[nodiscard]] bool IsExplained(double fraction, double left) const {
+    if (left <= std::sqrt(floor_)) return fraction > 0.0;
+    return fraction >= kExplains && left <= kLeft * std::sqrt(floor_);
   }
 
   /// Faults that do not change.
   bool ExplainConstant(const Segment& segment, Causes* causes) const {
-    const CauseSelection selection = SelectCauses(y_, candidates_, {6, floor_});
-    if (selection.fraction < kExplains || !(selection.left <= kLeft * std::sqrt(floor_))) return false;
+    const CauseSelection selection = SelectCauses(y_, candidates_, {6, floor_, static_cast<double>(steps_)});
+    if (!IsExplained(selection.fraction, selection.left)) return false;
     if (ExplainJoint(segment, selection, causes)) return true;
     for (const CauseTerm& term : selection.terms) {
       Explanation one = Start(segment);
@@ -455,7 +480,7 @@ class Problem {
     Explanation one = Start(segment);
     one.fraction = 1.0 - all.front().left / y_.squaredNorm();
     one.left = std::sqrt(all.front().left / rows);
-    const bool explained = one.fraction >= kExplains && one.left <= kLeft * std::sqrt(floor_);
+    const bool explained = IsExplained(one.fraction, one.left);
     for (const Free& free : all) {
       const Candidate& candidate = candidates_[free.candidate];
       const double odds = 0.5 * (free.criterion - all.front().criterion);

@@ -304,10 +304,17 @@ Fit MakeFit(const SignalSeries& series, const Steps& steps, const Shape& shape, 
   if (!shape.fault.empty()) fit.faults.push_back({shape.fault, place, shape.value, 0.0, shape.unit, shape.detail});
   fit.same.resize(fit.faults.size());
   const double time_step = series.time.size() > 1 ? series.time[1] - series.time[0] : 1.0;
-  double decay = 0.0;
-  for (const CauseTerm& term : fit.selection.terms)
-    if (added[term.candidate].fault == "lag") decay = term.amplitude[0];
+  const auto find = [&](std::string_view fault) {
+    for (const CauseTerm& term : fit.selection.terms)
+      if (added[term.candidate].fault == fault) return term.amplitude[0];
+    return 0.0;
+  };
+  const double decay = find("lag");
+  // A drift that began since the step before has come so far at the first.
+  const double drifted = find("offset") / find("drift");
+  const bool began_between = drifted > 0.0 && drifted <= (1.0 + kAccuracy) * time_step;
   for (const CauseTerm& term : fit.selection.terms) {
+    if (began_between && added[term.candidate].fault == "offset") continue;
     fit.faults.push_back(MakeFault(added[term.candidate], term.amplitude, term.error, decay, time_step));
     std::vector<Fault>& same = fit.same.emplace_back();
     for (const auto& [other, amplitude] : term.same)

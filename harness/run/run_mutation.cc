@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <stdexcept>
 #include <utility>
 
@@ -100,6 +101,7 @@ void RunCampaign::ListFaults() {
     for (const DrawnFaults& drawn :
          DrawFaults(*setup_, static_cast<size_t>(options_.draws), static_cast<size_t>(options_.together),
                     options_.seed, options_.duration)) {
+      if (getenv("DEXONLY") && drawn.fault.name.find(getenv("DEXONLY")) == std::string::npos) continue;  // DEBUG
       plants_.push_back(drawn.fault);
       mutants_.push_back({.kind = drawn.fault.kind, .name = drawn.fault.name, .truth = drawn.truth});
     }
