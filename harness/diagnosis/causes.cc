@@ -34,6 +34,19 @@ std::string Fault::Tell() const {
          (detail.empty() ? "" : " " + detail);
 }
 
+void Explanation::SetOutcome() {
+  for (size_t i = 1; i < faults.size();) {
+    const bool again = std::any_of(faults.begin(), faults.begin() + static_cast<std::ptrdiff_t>(i),
+                                   [&](const Fault& one) { return one.IsLike(faults[i]); });
+    if (again) {
+      faults.erase(faults.begin() + static_cast<std::ptrdiff_t>(i));
+    } else {
+      ++i;
+    }
+  }
+  outcome = faults.size() > 1 ? CauseOutcome::kNamedClass : CauseOutcome::kNamed;
+}
+
 std::string Explanation::Tell() const {
   std::string text;
   if (outcome == CauseOutcome::kNotExplained) {

@@ -17,6 +17,8 @@ struct Fault {
   std::string unit;    ///< Empty for a factor.
   std::string detail;  ///< Its direction, or what else belongs to it; empty for nothing.
 
+  /// Whether it is the same kind at the same place.
+  [[nodiscard]] bool IsLike(const Fault& other) const { return fault == other.fault && place == other.place; }
   /// "motor r_elbow: torque gain 0.99 +- 1e-12".
   [[nodiscard]] std::string Tell() const;
 };
@@ -44,6 +46,8 @@ struct Explanation {
   std::string rival;            ///< The nearest fault that explains it worse; empty for none.
   double log_odds = 0.0;        ///< Against the rival, natural logarithm.
 
+  /// One fault is named once, and whether there are several.
+  void SetOutcome();
   /// In a line.
   [[nodiscard]] std::string Tell() const;
 };

@@ -336,10 +336,6 @@ void Join(const PlantFault& more, PlantFault* fault) {
                         }));
 }
 
-bool IsOf(const Fault& truth, const Fault& fault) {
-  return fault.fault == truth.fault && fault.place == truth.place;
-}
-
 }  // namespace
 
 std::vector<DrawnFaults> DrawFaults(const Setup& setup, size_t count, size_t together, std::uint64_t seed,
@@ -373,18 +369,18 @@ NamingScore ScoreNames(const std::vector<Fault>& truth, const Causes& causes) {
     for (const Explanation& explanation : causes) {
       if (explanation.outcome == CauseOutcome::kNotExplained) continue;
       const Fault& first = explanation.faults.front();
-      right = right || (explanation.outcome == CauseOutcome::kNamed && IsOf(one, first) &&
+      right = right || (explanation.outcome == CauseOutcome::kNamed && one.IsLike(first) &&
                         std::abs(first.value - one.value) <= std::max(kNear * one.error, 3.0 * first.error));
       in_class = in_class || (explanation.outcome == CauseOutcome::kNamedClass &&
                               std::any_of(explanation.faults.begin(), explanation.faults.end(),
-                                          [&](const Fault& fault) { return IsOf(one, fault); }));
+                                          [&](const Fault& fault) { return one.IsLike(fault); }));
     }
     ++(right ? score.right : in_class ? score.in_class : score.not_explained);
   }
   for (const Explanation& explanation : causes) {
     if (explanation.outcome != CauseOutcome::kNamed) continue;
     const Fault& first = explanation.faults.front();
-    const auto of = std::find_if(truth.begin(), truth.end(), [&](const Fault& one) { return IsOf(one, first); });
+    const auto of = std::find_if(truth.begin(), truth.end(), [&](const Fault& one) { return one.IsLike(first); });
     if (of == truth.end() ||
         std::abs(first.value - of->value) > std::max(kNear * of->error, 3.0 * first.error))
       ++score.wrong;

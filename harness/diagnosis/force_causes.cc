@@ -31,6 +31,10 @@ constexpr double kJump = 0.3;
 constexpr double kTilted = 0.2;
 
 constexpr const char* kBearing = "dry friction of the bearing";
+constexpr const char* kForce = "force at its centre of mass";
+constexpr const char* kForceInAxes = "force at its centre of mass, in its axes";
+constexpr const char* kMomentInAxes = "moment, in its axes";
+constexpr const char* kMassWithInertia = "mass and inertia";
 
 Matrix3d Cross(const Vector3d& a) {
   Matrix3d A;
@@ -233,11 +237,11 @@ void StepForces::AddLink(int link, std::vector<Candidate>* candidates) {
   const BodyWrench wrench(a, w, V_dot.tail<3>());
   const MatrixXd J_T = J.transpose();
   const MatrixXd forces = J_T.leftCols<3>(), moments = J_T.rightCols<3>();
-  AddRobot(&Next(candidates, "force at its centre of mass", place, "N", 0.0, 3),
+  AddRobot(&Next(candidates, kForce, place, "N", 0.0, 3),
            MatrixXd(forces * R.transpose()));
-  AddRobot(&Next(candidates, "force in its axes", place, "N", 0.0, 3), forces);
+  AddRobot(&Next(candidates, kForceInAxes, place, "N", 0.0, 3), forces);
   AddRobot(&Next(candidates, "moment", place, "N m", 0.0, 3), MatrixXd(moments * R.transpose()));
-  AddRobot(&Next(candidates, "moment in its axes", place, "N m", 0.0, 3), moments);
+  AddRobot(&Next(candidates, kMomentInAxes, place, "N m", 0.0, 3), moments);
   MatrixXd both(n_, 6);
   both << forces * R.transpose(), moments * R.transpose();
   AddRobot(&Next(candidates, "force and moment", place, "N", 0.0, 6), both);
@@ -249,7 +253,7 @@ void StepForces::AddLink(int link, std::vector<Candidate>* candidates) {
   I << body.inertia(0, 0), body.inertia(1, 1), body.inertia(2, 2), body.inertia(0, 1), body.inertia(0, 2),
       body.inertia(1, 2);
   const VectorXd scaled = -J_T * (wrench.mass * body.mass + wrench.inertia * I);
-  AddRobot(&Next(candidates, "mass and inertia, factor", place, "", 1.0, 1), scaled);
+  AddRobot(&Next(candidates, kMassWithInertia, place, "kg", body.mass, 1), VectorXd(scaled / body.mass));
   const MatrixXd inertia = -J_T * wrench.inertia;
   AddRobot(&Next(candidates, "inertia", place, "kg m^2", 0.0, 6), inertia);
   // Another centre of mass changes the inertia about the old one.
@@ -275,10 +279,10 @@ void StepForces::AddObjectForces(std::vector<Candidate>* candidates) {
     columns << force, moment;
     return columns;
   };
-  AddObject(&Next(candidates, "force at its centre of mass", place, "N", 0.0, 3), stack(R_T, zero));
-  AddObject(&Next(candidates, "force in its axes", place, "N", 0.0, 3), stack(Matrix3d::Identity(), zero));
+  AddObject(&Next(candidates, kForce, place, "N", 0.0, 3), stack(R_T, zero));
+  AddObject(&Next(candidates, kForceInAxes, place, "N", 0.0, 3), stack(Matrix3d::Identity(), zero));
   AddObject(&Next(candidates, "moment", place, "N m", 0.0, 3), stack(zero, R_T));
-  AddObject(&Next(candidates, "moment in its axes", place, "N m", 0.0, 3), stack(zero, Matrix3d::Identity()));
+  AddObject(&Next(candidates, kMomentInAxes, place, "N m", 0.0, 3), stack(zero, Matrix3d::Identity()));
   Matrix6d both = Matrix6d::Zero();
   both.topLeftCorner<3, 3>() = both.bottomRightCorner<3, 3>() = R_T;
   AddObject(&Next(candidates, "force and moment", place, "N", 0.0, 6), both);
@@ -344,6 +348,13 @@ Fault MakeFault(const Candidate& candidate, const VectorXd& a, const VectorXd& e
     if (error.size() >= size) fault.error = error.head(size).norm();
     fault.detail = TellVector(a.head(size));
     if (candidate.fault == "force and moment") fault.detail += " and " + TellVector(a.tail<3>()) + " N m";
+  }
+  if (candidate.fault == kForceInAxes || candidate.fault == kMomentInAxes) {
+    fault.fault = candidate.fault == kForceInAxes ? kForce : "moment";
+    fault.detail += " in its axes";
+  } else if (candidate.fault == kMassWithInertia) {
+    fault.fault = "mass";
+    fault.detail = "and its inertia by the same factor";
   }
   if (candidate.fault != "gravity off by") return fault;
   const Vector3d change = a;
@@ -415,7 +426,7 @@ class Problem {
       one.faults.push_back(MakeFault(candidates_[term.candidate], term.amplitude, term.error, gravity));
       for (const auto& [same, amplitude] : term.same)
         one.faults.push_back(MakeFault(candidates_[same], amplitude, {}, gravity));
-      if (one.faults.size() > 1) one.outcome = CauseOutcome::kNamedClass;
+      one.SetOutcome();
       if (term.rival != SIZE_MAX) {
         one.rival = candidates_[term.rival].place + ": " + candidates_[term.rival].fault;
         one.log_odds = term.log_odds;
@@ -457,7 +468,7 @@ class Problem {
     const double rows = static_cast<double>(y_.size());
     for (size_t i = 0; i < candidates_.size(); ++i) {
       const Candidate& candidate = candidates_[i];
-      if (candidate.fault != "torque" && candidate.fault != "force at its centre of mass" &&
+      if (candidate.fault != "torque" && candidate.fault != kForce &&
           candidate.fault != "moment" && candidate.fault != "force and moment")
         continue;
       Free free{.candidate = i, .left = 0.0};
@@ -492,8 +503,8 @@ class Problem {
       one.faults.push_back(
           {candidate.fault + " that changes, up to", candidate.place, free.largest, 0.0, candidate.unit, ""});
     }
-    one.outcome = !explained ? CauseOutcome::kNotExplained
-                  : one.faults.size() > 1 ? CauseOutcome::kNamedClass : CauseOutcome::kNamed;
+    one.SetOutcome();
+    if (!explained) one.outcome = CauseOutcome::kNotExplained;
     causes->push_back(one);
   }
 

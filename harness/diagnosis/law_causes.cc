@@ -145,7 +145,7 @@ Causes ExplainLaw(const StepStore& store) {
     if (selection.terms.size() > 1) one.fraction = term.fraction;
     one.faults.push_back(make(term.candidate, term.amplitude[0], term.error[0]));
     for (const auto& [same, amplitude] : term.same) one.faults.push_back(make(same, amplitude[0], 0.0));
-    if (one.faults.size() > 1) one.outcome = CauseOutcome::kNamedClass;
+    one.SetOutcome();
     if (term.rival != SIZE_MAX) {
       one.rival = candidates[term.rival].place + ": " + candidates[term.rival].fault;
       one.log_odds = term.log_odds;

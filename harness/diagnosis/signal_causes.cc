@@ -446,8 +446,7 @@ void Tell(const Verdict& verdict, CauseChannel channel, Causes* causes) {
       for (size_t k = 0; k < (single ? std::min<size_t>(1, others.size()) : others.size()); ++k)
         one.faults.push_back(others[k]);
     }
-    // What the columns of the chosen fit have in common.
-    one.outcome = one.faults.size() > 1 ? CauseOutcome::kNamedClass : CauseOutcome::kNamed;
+    one.SetOutcome();
     causes->push_back(one);
   }
 }
