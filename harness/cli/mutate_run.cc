@@ -1,5 +1,6 @@
 #include "harness/cli/mutate_run.h"
 
+#include <map>
 #include <fmt/format.h>
 
 #include <optional>
@@ -70,20 +71,28 @@ CampaignFault Describe(const RunMutant& mutant) {
   return fault;
 }
 
-/// Of drawn faults: how many are named, up to a class, or not, and how many names are wrong.
+/// Of drawn faults, by the number of those of a set that are found alone: how many are named.
 void PrintScores(const Campaign& campaign) {
-  int right = 0, in_class = 0, not_explained = 0, wrong = 0, sets = 0;
+  struct Count {
+    int sets = 0, all_right = 0, right = 0, in_class = 0, not_explained = 0, wrong = 0;
+  };
+  std::map<int, Count> counts;
   for (const CampaignFault& fault : campaign.faults) {
     if (fault.outcome != MutantOutcome::kKilled) continue;
-    ++sets;
-    right += fault.details["right"].get<int>();
-    in_class += fault.details["in_class"].get<int>();
-    not_explained += fault.details["not_explained"].get<int>();
-    wrong += fault.details["wrong"].get<int>();
+    const int right = fault.details["right"].get<int>();
+    const int in_class = fault.details["in_class"].get<int>();
+    const int not_explained = fault.details["not_explained"].get<int>();
+    Count& count = counts[right + in_class + not_explained];
+    ++count.sets;
+    count.all_right += static_cast<int>(in_class + not_explained == 0);
+    count.right += right;
+    count.in_class += in_class;
+    count.not_explained += not_explained;
+    count.wrong += fault.details["wrong"].get<int>();
   }
-  const int all = right + in_class + not_explained;
-  fmt::print("{} sets found; of their {} faults {} named, {} up to a class, {} not explained; {} wrong names.\n",
-             sets, all, right, in_class, not_explained, wrong);
+  for (const auto& [size, one] : counts)
+    fmt::print("{} sets of {}: all named in {}; of their faults {} named, {} up to a class, {} not explained; {} wrong names.\n",
+               one.sets, size, one.all_right, one.right, one.in_class, one.not_explained, one.wrong);
 }
 
 }  // namespace

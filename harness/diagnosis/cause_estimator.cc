@@ -19,7 +19,7 @@ class Search {
       : y_(y), candidates_(candidates), options_(options), rows_(static_cast<double>(y.size())), samples_(rows_ / options.alike) {}
 
   CauseSelection Run() {
-    double criterion = Score(y_.squaredNorm(), 0.0);
+    double criterion = Score(y_.squaredNorm(), 0.0, 0);
     while (chosen_.size() < options_.most_terms && !IsNoise(chosen_)) {
       const Best next = FindBest(chosen_);
       if (!(next.criterion < criterion)) break;
@@ -35,8 +35,9 @@ class Search {
     double criterion = kInfinity;
   };
 
-  [[nodiscard]] double Score(double squares, double parameters) const {
-    return samples_ * std::log(options_.floor + squares / rows_) + parameters * std::log(samples_);
+  [[nodiscard]] double Score(double squares, double parameters, size_t terms) const {
+    return samples_ * std::log(options_.floor + squares / rows_) + parameters * std::log(samples_) +
+           2.0 * static_cast<double>(terms) * std::log(static_cast<double>(candidates_.size()));
   }
 
   /// Whether what these leave over is no more than noise.
@@ -83,7 +84,8 @@ class Search {
       if (C.cols() == 0 || std::find(beside.begin(), beside.end(), i) != beside.end()) continue;
       const double explained = CalcExplained(C, Q, r);
       if (!(explained > 0.0) || !IsPossible(candidates_[i], Q, r)) continue;
-      scores[i] = Score(std::max(0.0, r.squaredNorm() - explained), parameters + CountParameters({i}));
+      scores[i] = Score(std::max(0.0, r.squaredNorm() - explained), parameters + CountParameters({i}),
+                        beside.size() + 1);
     }
     return scores;
   }
@@ -131,7 +133,7 @@ class Search {
       for (size_t place = 0; place < chosen_.size() && chosen_.size() > 1; ++place) {
         const std::vector<size_t> others = Without(place);
         const MatrixXd Q = CalcRange(others);
-        const double alone = Score((y_ - Q * (Q.transpose() * y_)).squaredNorm(), CountParameters(others));
+        const double alone = Score((y_ - Q * (Q.transpose() * y_)).squaredNorm(), CountParameters(others), others.size());
         const Best best = FindBest(others);
         if (IsNoise(others) || (alone <= criterion && alone <= best.criterion)) {
           chosen_ = others;

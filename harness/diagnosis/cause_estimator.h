@@ -5,7 +5,9 @@
 // A residual y (N) is whitened, so that its noise is 1. Each candidate has columns C (N x p) that a fault of
 // amplitude 1 would leave in it. Sought is the set S of candidates that minimises
 //
-//   n log(floor + |y - C_S a|^2 / N) + p_S log n                    (Bayesian information criterion)
+//   n log(floor + |y - C_S a|^2 / N) + p_S log n + 2 |S| log m
+//
+// (the extended Bayesian information criterion of n samples and m candidates, of which p_S amplitudes are fitted)
 //
 // by orthogonal matching pursuit, in which every choice is looked at again after each that follows it, and
 // which ends where no more than noise is left.

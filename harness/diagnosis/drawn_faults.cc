@@ -201,6 +201,25 @@ int FindId(const mjModel& m, mjtObj kind, const std::string& name) {
   return id;
 }
 
+/// A force or torque between the joint's body and the one that carries it.
+void PushJoint(const mjModel& m, int joint, double size, mjData* d) {
+  const int body = m.jnt_bodyid[joint], parent = m.body_parentid[body];
+  const Vector3d push = size * Eigen::Map<const Vector3d>(d->xaxis + 3 * joint);
+  const bool slides = m.jnt_type[joint] == mjJNT_SLIDE;
+  const Vector3d arm = Eigen::Map<const Vector3d>(d->xipos + 3 * body) -
+                       Eigen::Map<const Vector3d>(d->xipos + 3 * parent);
+  Vector6d wrench = Vector6d::Zero();
+  if (slides) {
+    wrench << push, Vector3d::Zero();
+  } else {
+    wrench << Vector3d::Zero(), push;
+  }
+  Eigen::Map<Vector6d>(d->xfrc_applied + 6 * body) += wrench;
+  if (parent == 0) return;
+  wrench.tail<3>() += arm.cross(wrench.head<3>());
+  Eigen::Map<Vector6d>(d->xfrc_applied + 6 * parent) -= wrench;
+}
+
 One DrawJoint(const Setup& setup, Draw* draw) {
   const RobotModel& model = setup.model();
   const Joint& joint = model.joints()[draw->Index(static_cast<size_t>(model.num_joints()))];
@@ -225,7 +244,7 @@ One DrawJoint(const Setup& setup, Draw* draw) {
       One one = change("torque", 0.0, size, {});
       one.fault.engine = {};
       one.fault.forces = [name = joint.name, size](const mjModel& m, double, mjData* d) {
-        d->qfrc_applied[m.jnt_dofadr[FindId(m, mjOBJ_JOINT, name)]] = size;
+        PushJoint(m, FindId(m, mjOBJ_JOINT, name), size, d);
       };
       return one;
     }
@@ -263,7 +282,7 @@ One DrawBody(const Setup& setup, Draw* draw, double duration) {
   One one = MakeOne("body", place, moment ? "moment" : "force at its centre of mass", size, size);
   one.fault.forces = [=](const mjModel& m, double t, mjData* d) {
     mjtNum* const wrench = d->xfrc_applied + 6 * FindId(m, mjOBJ_BODY, body) + (moment ? 3 : 0);
-    for (int k = 0; k < 3; ++k) wrench[k] = begin <= t && t < end ? size * direction[k] : 0.0;
+    for (int k = 0; k < 3 && begin <= t && t < end; ++k) wrench[k] += size * direction[k];
   };
   return one;
 }
@@ -355,6 +374,7 @@ std::vector<DrawnFaults> DrawFaults(const Setup& setup, size_t count, size_t tog
       } else {
         Join(one.fault, &faults.fault);
       }
+      faults.each.push_back(one.fault);
       faults.truth.push_back(one.truth);
     }
   }

@@ -15,6 +15,7 @@ namespace dexcheck {
 /// Faults that are there at once.
 struct DrawnFaults {
   PlantFault fault;          ///< All of them.
+  std::vector<PlantFault> each;
   std::vector<Fault> truth;  ///< Each as it should be told; `error` is by how much it changes its value.
 };
 

@@ -562,8 +562,12 @@ void FaultyPlant::EndStep(const Eigen::Ref<const VectorXd>& tau) {
   EngineSimulation& simulation = plant_->simulation();
   tau_ = tau;
   if (motors_) motors_(time_, &tau_);
+  const int size = 6 * simulation.model().nbody;
+  mjtNum* const forces = simulation.data().xfrc_applied;
+  const std::vector<mjtNum> declared(forces, forces + size);
   if (forces_) forces_(simulation.model(), time_, &simulation.data());
   plant_->EndStep(tau_);
+  std::copy(declared.begin(), declared.end(), forces);
   time_ += time_step();
 }
 

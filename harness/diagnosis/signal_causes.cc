@@ -65,12 +65,14 @@ struct Shape {
   int parameters = 0;
   ArrayXd output;
   bool has_gain = true;
+  Index tried = 1;  ///< Out of how many this one is the best.
 };
 
 /// g = a u_k + b u_(k+1) + c of the whole delay k that fits best, a + b = 1.
 void AddDelay(const ArrayXd& got, const SignalSeries& series, const Steps& steps, std::vector<Shape>* shapes) {
   double least = std::numeric_limits<double>::infinity();
-  Shape best{.fault = "delay", .unit = "steps", .detail = "", .parameters = 1, .output = {}};
+  Shape best{.fault = "delay", .unit = "steps", .detail = "", .parameters = 1, .output = {},
+             .tried = StepStore::kHistory};
   for (Index k = 1; k <= StepStore::kHistory; ++k) {
     const ArrayXd late = steps.Take(series.expected, k);
     const double left = SquaredNorm((got - late) - (got - late).mean());
@@ -148,6 +150,7 @@ void AddExchange(const ArrayXd& got, const SignalSeries& series, const Steps& st
                  (other.name.place == series.name.place ? " " + other.name.what : std::string()) + ", gain";
     best.value = 1.0;
     best.output = signal;
+    best.tried = static_cast<Index>(others.size());
   }
   if (!best.fault.empty()) shapes->push_back(best);
 }
@@ -298,7 +301,8 @@ Fit MakeFit(const SignalSeries& series, const Steps& steps, const Shape& shape, 
   Fit fit;
   fit.size = ((steps.Take(series.got) - steps.Take(series.expected)) / series.noise).matrix().norm();
   fit.selection = SelectCauses(y, added, {kMostTerms, floor});
-  fit.criterion = fit.selection.criterion + shape.parameters * std::log(static_cast<double>(y.size()));
+  fit.criterion = fit.selection.criterion + shape.parameters * std::log(static_cast<double>(y.size())) +
+                  2.0 * std::log(static_cast<double>(shape.tried));
   const std::string place =
       series.name.group == "motors" ? series.name.place : series.name.place + ", " + series.name.what;
   if (!shape.fault.empty()) fit.faults.push_back({shape.fault, place, shape.value, 0.0, shape.unit, shape.detail});

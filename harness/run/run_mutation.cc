@@ -103,6 +103,7 @@ void RunCampaign::ListFaults() {
                     options_.seed, options_.duration)) {
       if (getenv("DEXONLY") && drawn.fault.name.find(getenv("DEXONLY")) == std::string::npos) continue;  // DEBUG
       plants_.push_back(drawn.fault);
+      singles_.push_back(drawn.each);
       mutants_.push_back({.kind = drawn.fault.kind, .name = drawn.fault.name, .truth = drawn.truth});
     }
     return;
@@ -235,6 +236,20 @@ bool RunCampaign::RunPlant(const PlantFault& fault, RunMutant* mutant, VectorXd*
   return RunLoop(setup, std::move(parts), mutant, end, should_stop);
 }
 
+bool RunCampaign::KeepFound(const std::vector<PlantFault>& each, RunMutant* mutant,
+                            const std::function<bool()>& should_stop) {
+  if (each.size() < 2) return true;
+  std::vector<Fault> found;
+  for (size_t i = 0; i < each.size(); ++i) {
+    RunMutant alone;
+    VectorXd end;
+    if (!RunPlant(each[i], &alone, &end, should_stop)) return false;
+    if (alone.killed) found.push_back(mutant->truth[i]);
+  }
+  mutant->truth = found;
+  return true;
+}
+
 bool RunCampaign::Run(size_t index, const std::function<bool()>& should_stop) {
   RunMutant& mutant = mutants_[index];
   VectorXd end;
@@ -259,8 +274,11 @@ bool RunCampaign::RunFault(size_t index, VectorXd* end, const std::function<bool
     index -= parameters_.size();
     if (!is_law) index -= laws_.size();
     const bool is_equation = !is_law && index < equations_.size();
-    if (!is_law && !is_equation)
-      return RunPlant(plants_[index - equations_.size()], &mutant, end, should_stop);
+    if (!is_law && !is_equation) {
+      index -= equations_.size();
+      if (!singles_.empty() && !KeepFound(singles_[index], &mutant, should_stop)) return false;
+      return RunPlant(plants_[index], &mutant, end, should_stop);
+    }
     const Setup& setup = is_law ? *offsetd_ : *setup_;
     LoopParts parts = MakeLoopParts(setup);
     GoToStart(parts);

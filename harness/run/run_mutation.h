@@ -72,6 +72,9 @@ class RunCampaign {
                const std::function<bool()>& should_stop);
   bool RunPlant(const PlantFault& fault, RunMutant* mutant, VectorXd* end,
                 const std::function<bool()>& should_stop);
+  /// Of a drawn set's truth keeps what is found where it is alone: the rest has no effect. @returns as Run.
+  bool KeepFound(const std::vector<PlantFault>& each, RunMutant* mutant,
+                 const std::function<bool()>& should_stop);
   /// Of the fault with this index. @returns as Run.
   bool RunFault(size_t index, VectorXd* end, const std::function<bool()>& should_stop);
   [[nodiscard]] bool IsLaw(size_t index) const {
@@ -91,6 +94,7 @@ class RunCampaign {
   std::vector<LawFault> laws_;
   std::vector<EquationFault> equations_;
   std::vector<PlantFault> plants_;
+  std::vector<std::vector<PlantFault>> singles_;  // of drawn sets, each alone
   std::vector<RunMutant> mutants_;
 };
 
