@@ -1,5 +1,6 @@
 #include "harness/diagnosis/cause_estimator.h"
 
+#include <Eigen/Eigenvalues>
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
@@ -8,23 +9,71 @@
 namespace dexcheck {
 namespace {
 
+using Eigen::Index;
+
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 // A column of which less is left beside the others says nothing of its own.
 constexpr double kIndependent = 1e-7;
+constexpr double kImplausible = 10.0;  // times the plausible size
+constexpr size_t kRestarts = 8;        // other first choices that are tried where the first led nowhere
+
+/// What of a candidate shows above the noise: amplitudes are basis * a.
+struct Visible {
+  MatrixXd columns;  // N x r
+  MatrixXd basis;    // p x r
+};
+
+/// @param noise of the sum over all rows.
+Visible Reduce(const Candidate& candidate, double noise) {
+  const MatrixXd& C = candidate.columns;
+  const VectorXd scale = candidate.scale.size() > 0 ? candidate.scale : VectorXd(VectorXd::Ones(C.cols()));
+  const bool is_bounded = candidate.scale.size() > 0;
+  if (C.cols() == 1) {
+    const double size = C.norm();
+    if (!(size > 0.0) || (is_bounded && size * scale[0] < noise)) return {};
+    return {C, MatrixXd::Identity(1, 1)};
+  }
+  // Of C diag(scale) = U S V^T those with S above the noise.
+  const VectorXd size = C.colwise().norm().transpose();
+  const VectorXd unit = is_bounded ? scale : VectorXd(size.unaryExpr([](double s) { return s > 0.0 ? 1.0 / s : 0.0; }));
+  const MatrixXd scaled = C * unit.asDiagonal();
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(scaled.transpose() * scaled);
+  const double largest = eigen.eigenvalues().tail<1>()[0];
+  const double least = std::max(is_bounded ? noise * noise : 0.0, kIndependent * kIndependent * largest);
+  Index visible = 0;
+  while (visible < C.cols() && eigen.eigenvalues()[C.cols() - 1 - visible] > least) ++visible;
+  Visible result;
+  result.basis = unit.asDiagonal() * eigen.eigenvectors().rightCols(visible);
+  result.columns = C * result.basis;
+  return result;
+}
 
 /// The search for one residual.
 class Search {
  public:
   Search(const VectorXd& y, std::span<const Candidate> candidates, const CauseOptions& options)
-      : y_(y), candidates_(candidates), options_(options), rows_(static_cast<double>(y.size())), samples_(rows_ / options.alike) {}
+      : y_(y),
+        candidates_(candidates),
+        options_(options),
+        rows_(static_cast<double>(y.size())),
+        samples_(rows_ / options.alike) {
+    for (const Candidate& one : candidates)
+      visible_.push_back(Reduce(one, std::sqrt(options.floor * options.alike)));
+  }
 
   CauseSelection Run() {
-    double criterion = Score(y_.squaredNorm(), 0.0, 0);
-    while (chosen_.size() < options_.most_terms && !IsNoise(chosen_)) {
-      const Best next = FindBest(chosen_);
-      if (!(next.criterion < criterion)) break;
-      chosen_.push_back(next.candidate);
-      criterion = Exchange(next.criterion);
+    const double nothing = Score(y_.squaredNorm(), 0.0, 0);
+    std::vector<Best> firsts = {FindBest({})};
+    double criterion = nothing;
+    if (!IsNoise({}) && firsts.front().criterion < nothing) criterion = Grow(firsts.front());
+    // What was the best alone need not be part of the best set.
+    if (!chosen_.empty() && !IsNoise(chosen_)) {
+      std::vector<size_t> best = chosen_;
+      for (const Best& first : FindFirsts(best)) {
+        const double other = Grow(first);
+        if (other < criterion) best = chosen_, criterion = other;
+      }
+      chosen_ = best;
     }
     return Finish(criterion);
   }
@@ -34,6 +83,38 @@ class Search {
     size_t candidate = SIZE_MAX;
     double criterion = kInfinity;
   };
+
+  /// Adds one after another. @returns the criterion.
+  double Grow(const Best& first) {
+    chosen_ = {first.candidate};
+    double criterion = first.criterion;
+    while (chosen_.size() < options_.most_terms && !IsNoise(chosen_)) {
+      const Best next = FindBest(chosen_);
+      if (!(next.criterion < criterion)) break;
+      chosen_.push_back(next.candidate);
+      criterion = Exchange(next.criterion);
+    }
+    return criterion;
+  }
+
+  /// The most likely first choices that have no place in common with what was found.
+  [[nodiscard]] std::vector<Best> FindFirsts(const std::vector<size_t>& found) const {
+    const std::vector<double> scores = ScoreAll({});
+    std::vector<Best> all;
+    for (size_t i = 0; i < scores.size(); ++i)
+      if (std::isfinite(scores[i]) && std::find(found.begin(), found.end(), i) == found.end()) all.push_back({i, scores[i]});
+    std::sort(all.begin(), all.end(), [](const Best& a, const Best& b) { return a.criterion < b.criterion; });
+    std::vector<Best> firsts;
+    std::vector<std::string> places;
+    for (const Best& one : all) {
+      const std::string& place = candidates_[one.candidate].place;
+      if (firsts.size() == kRestarts) break;
+      if (std::find(places.begin(), places.end(), place) != places.end() || !CanBe(one.candidate, {})) continue;
+      places.push_back(place);
+      firsts.push_back(one);
+    }
+    return firsts;
+  }
 
   [[nodiscard]] double Score(double squares, double parameters, size_t terms) const {
     return samples_ * std::log(options_.floor + squares / rows_) + parameters * std::log(samples_) +
@@ -49,19 +130,19 @@ class Search {
   [[nodiscard]] double CountParameters(const std::vector<size_t>& set) const {
     double count = 0.0;
     for (const size_t i : set)
-      count += static_cast<double>(candidates_[i].columns.cols() + candidates_[i].parameters);
+      count += static_cast<double>(visible_[i].columns.cols() + candidates_[i].parameters);
     return count;
   }
 
   /// Orthonormal columns of the range of what these candidates have.
   [[nodiscard]] MatrixXd CalcRange(const std::vector<size_t>& set) const {
-    Eigen::Index width = 0;
-    for (const size_t i : set) width += candidates_[i].columns.cols();
+    Index width = 0;
+    for (const size_t i : set) width += visible_[i].columns.cols();
     MatrixXd Q(y_.size(), width);
-    Eigen::Index used = 0;
+    Index used = 0;
     for (const size_t i : set) {
-      const MatrixXd& C = candidates_[i].columns;
-      for (Eigen::Index k = 0; k < C.cols(); ++k) {
+      const MatrixXd& C = visible_[i].columns;
+      for (Index k = 0; k < C.cols(); ++k) {
         VectorXd column = C.col(k);
         const double size = column.norm();
         for (int twice = 0; twice < 2; ++twice)
@@ -80,10 +161,10 @@ class Search {
     const double parameters = CountParameters(beside);
     std::vector<double> scores(candidates_.size(), kInfinity);
     for (size_t i = 0; i < candidates_.size(); ++i) {
-      const MatrixXd& C = candidates_[i].columns;
+      const MatrixXd& C = visible_[i].columns;
       if (C.cols() == 0 || std::find(beside.begin(), beside.end(), i) != beside.end()) continue;
       const double explained = CalcExplained(C, Q, r);
-      if (!(explained > 0.0) || !IsPossible(candidates_[i], Q, r)) continue;
+      if (!(explained > 0.0)) continue;
       scores[i] = Score(std::max(0.0, r.squaredNorm() - explained), parameters + CountParameters({i}),
                         beside.size() + 1);
     }
@@ -94,30 +175,45 @@ class Search {
   static double CalcExplained(const MatrixXd& C, const MatrixXd& Q, const VectorXd& r) {
     MatrixXd own = C - Q * (Q.transpose() * C);
     double explained = 0.0;
-    for (Eigen::Index k = 0; k < own.cols(); ++k) {
+    for (Index k = 0; k < own.cols(); ++k) {
       const double size = own.col(k).norm();
       if (!(size > kIndependent * C.col(k).norm())) continue;
       own.col(k) /= size;
       const double along = own.col(k).dot(r);
       explained += along * along;
-      for (Eigen::Index j = k + 1; j < own.cols(); ++j)
+      for (Index j = k + 1; j < own.cols(); ++j)
         own.col(j) -= own.col(k).dot(own.col(j)) * own.col(k);
     }
     return explained;
   }
 
-  static bool IsPossible(const Candidate& candidate, const MatrixXd& Q, const VectorXd& r) {
-    if (candidate.columns.cols() != 1 || !std::isfinite(candidate.least)) return true;
-    const VectorXd own = candidate.columns.col(0) - Q * (Q.transpose() * candidate.columns.col(0));
-    constexpr double kRounding = 1e-6;
-    return own.dot(r) >= (candidate.least - kRounding * std::abs(candidate.least)) * own.squaredNorm();
+  /// Its amplitudes beside those; zero where they have all of it.
+  [[nodiscard]] VectorXd CalcAmplitude(size_t candidate, const std::vector<size_t>& beside) const {
+    const Visible& one = visible_[candidate];
+    const MatrixXd Q = CalcRange(beside);
+    const MatrixXd own = one.columns - Q * (Q.transpose() * one.columns);
+    Eigen::CompleteOrthogonalDecomposition<MatrixXd> decomposition;
+    decomposition.setThreshold(kIndependent);
+    return one.basis * decomposition.compute(own).solve(VectorXd(y_ - Q * (Q.transpose() * y_)));
+  }
+
+  [[nodiscard]] bool CanBe(size_t candidate, const std::vector<size_t>& beside) const {
+    const Candidate& one = candidates_[candidate];
+    if (!one.is_possible && one.scale.size() == 0) return true;
+    const VectorXd a = CalcAmplitude(candidate, beside);
+    if (one.scale.size() > 0 && (a.array().abs() > kImplausible * one.scale.array()).any()) return false;
+    return !one.is_possible || one.is_possible(a);
   }
 
   [[nodiscard]] Best FindBest(const std::vector<size_t>& beside) const {
-    const std::vector<double> scores = ScoreAll(beside);
-    const auto best = std::min_element(scores.begin(), scores.end());
-    if (best == scores.end()) return {};
-    return {static_cast<size_t>(best - scores.begin()), *best};
+    std::vector<double> scores = ScoreAll(beside);
+    for (;;) {
+      const auto best = std::min_element(scores.begin(), scores.end());
+      if (best == scores.end() || !std::isfinite(*best)) return {};
+      const auto candidate = static_cast<size_t>(best - scores.begin());
+      if (CanBe(candidate, beside)) return {candidate, *best};
+      *best = kInfinity;
+    }
   }
 
   [[nodiscard]] std::vector<size_t> Without(size_t place) const {
@@ -133,7 +229,8 @@ class Search {
       for (size_t place = 0; place < chosen_.size() && chosen_.size() > 1; ++place) {
         const std::vector<size_t> others = Without(place);
         const MatrixXd Q = CalcRange(others);
-        const double alone = Score((y_ - Q * (Q.transpose() * y_)).squaredNorm(), CountParameters(others), others.size());
+        const double alone =
+            Score((y_ - Q * (Q.transpose() * y_)).squaredNorm(), CountParameters(others), others.size());
         const Best best = FindBest(others);
         if (IsNoise(others) || (alone <= criterion && alone <= best.criterion)) {
           chosen_ = others;
@@ -155,13 +252,13 @@ class Search {
     result.residual = y_;
     const double all = y_.squaredNorm();
     if (!chosen_.empty()) {
-      Eigen::Index width = 0;
-      for (const size_t i : chosen_) width += candidates_[i].columns.cols();
+      Index width = 0;
+      for (const size_t i : chosen_) width += visible_[i].columns.cols();
       MatrixXd C(y_.size(), width);
       width = 0;
       for (const size_t i : chosen_) {
-        C.middleCols(width, candidates_[i].columns.cols()) = candidates_[i].columns;
-        width += candidates_[i].columns.cols();
+        C.middleCols(width, visible_[i].columns.cols()) = visible_[i].columns;
+        width += visible_[i].columns.cols();
       }
       const VectorXd size = C.colwise().norm().cwiseMax(std::numeric_limits<double>::min());
       const MatrixXd scaled = C * size.cwiseInverse().asDiagonal();
@@ -172,17 +269,19 @@ class Search {
       const double variance =
           std::max(options_.floor, result.residual.squaredNorm() / freedom) * options_.alike;
       const MatrixXd covariance =
-          (scaled.transpose() * scaled).completeOrthogonalDecomposition().pseudoInverse() * variance;
+          size.cwiseInverse().asDiagonal() *
+          (scaled.transpose() * scaled).completeOrthogonalDecomposition().pseudoInverse() *
+          size.cwiseInverse().asDiagonal() * variance;
       width = 0;
       for (size_t place = 0; place < chosen_.size(); ++place) {
-        const Eigen::Index p = candidates_[chosen_[place]].columns.cols();
+        const Visible& visible = visible_[chosen_[place]];
+        const Index r = visible.columns.cols();
         CauseTerm term;
         term.candidate = chosen_[place];
-        term.amplitude = a.segment(width, p);
-        term.error =
-            covariance.diagonal().segment(width, p).cwiseMax(0.0).cwiseSqrt().cwiseQuotient(size.segment(width, p));
+        term.amplitude = visible.basis * a.segment(width, r);
+        term.error = CalcErrors(visible, covariance.block(width, width, r, r));
         Compare(place, criterion, all, &term);
-        width += p;
+        width += r;
         result.terms.push_back(std::move(term));
       }
     }
@@ -191,6 +290,20 @@ class Search {
     result.fraction = all > 0.0 ? 1.0 - result.residual.squaredNorm() / all : 1.0;
     result.left = std::sqrt(result.residual.squaredNorm() / std::max(1.0, rows_));
     return result;
+  }
+
+  /// Of the amplitudes, infinite for those that the visible ones do not tell.
+  static VectorXd CalcErrors(const Visible& visible, const MatrixXd& covariance) {
+    const MatrixXd& B = visible.basis;
+    VectorXd error = (B * covariance * B.transpose()).diagonal().cwiseMax(0.0).cwiseSqrt();
+    if (B.rows() == B.cols()) return error;
+    const VectorXd unit = B.rowwise().norm().cwiseMax(std::numeric_limits<double>::min());
+    const MatrixXd scaled = unit.cwiseInverse().asDiagonal() * B;
+    const MatrixXd known = scaled * scaled.completeOrthogonalDecomposition().pseudoInverse();
+    constexpr double kKnown = 0.99;
+    for (Index i = 0; i < B.rows(); ++i)
+      if (known(i, i) < kKnown) error[i] = kInfinity;
+    return error;
   }
 
   /// What would do in its place.
@@ -202,18 +315,17 @@ class Search {
     const std::vector<double> scores = ScoreAll(others);
     double best = kInfinity;
     for (size_t i = 0; i < scores.size(); ++i) {
-      if (i == term->candidate) continue;
+      if (i == term->candidate || !std::isfinite(scores[i])) continue;
       // The criterion is twice the negative logarithm of the likelihood.
       double odds = 0.5 * (scores[i] - criterion);
       // One with more columns has simpler ones as a special case.
       const double more = CountParameters({i}) - CountParameters({term->candidate});
       if (more > 0.0 && candidates_[i].is_ordinary) odds -= 0.5 * more * std::log(samples_);
       if (odds < kEqualLogOdds && more > 0.0 && !candidates_[i].is_ordinary) continue;
+      if ((odds >= kEqualLogOdds && odds >= best) || !CanBe(i, others)) continue;
       if (odds < kEqualLogOdds) {
-        const MatrixXd& C = candidates_[i].columns;
-        const MatrixXd own = C - Q * (Q.transpose() * C);
-        term->same.emplace_back(i, own.colPivHouseholderQr().solve(r));
-      } else if (odds < best) {
+        term->same.emplace_back(i, CalcAmplitude(i, others));
+      } else {
         best = odds;
         term->rival = i;
         term->log_odds = odds;
@@ -225,6 +337,7 @@ class Search {
   std::span<const Candidate> candidates_;
   CauseOptions options_;
   double rows_, samples_;
+  std::vector<Visible> visible_;  // of each candidate
   std::vector<size_t> chosen_;
 };
 

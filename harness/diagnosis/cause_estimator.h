@@ -12,6 +12,7 @@
 // by orthogonal matching pursuit, in which every choice is looked at again after each that follows it, and
 // which ends where no more than noise is left.
 
+#include <functional>
 #include <limits>
 #include <span>
 #include <string>
@@ -30,8 +31,11 @@ struct Candidate {
   double nominal = 0.0;  ///< The value without the fault: the amplitude is added to it.
   MatrixXd columns;      ///< N x p.
   int parameters = 0;    ///< That were fitted beforehand, besides the amplitudes.
-  /// Least amplitude that can be, where there is one column: no friction or mass is negative.
-  double least = -std::numeric_limits<double>::infinity();
+  /// How large each amplitude may plausibly be (p); empty for any size. What less than that does not show
+  /// above the noise is not estimated.
+  VectorXd scale;
+  /// Whether an amplitude can be: no friction or mass is negative. Empty for all.
+  std::function<bool(const VectorXd&)> is_possible;
   /// Whether it is as likely as a simpler one that explains no less: a spring that does not move is a torque.
   bool is_ordinary = false;
 };
@@ -39,7 +43,7 @@ struct Candidate {
 /// A candidate that is part of the explanation.
 struct CauseTerm {
   size_t candidate = 0;
-  VectorXd amplitude, error;   ///< p, with standard errors.
+  VectorXd amplitude, error;   ///< p, with standard errors: infinite where nothing is known of it.
   double fraction = 0.0;       ///< Of |y|^2 that is left over without it.
   /// Candidates that would do as well in its place with no more columns, and their amplitudes there: not
   /// isolable from it.

@@ -381,7 +381,7 @@ std::vector<DrawnFaults> DrawFaults(const Setup& setup, size_t count, size_t tog
   return drawn;
 }
 
-NamingScore ScoreNames(const std::vector<Fault>& truth, const Causes& causes) {
+NamingScore ScoreNames(const std::vector<Fault>& truth, const std::vector<Fault>& all, const Causes& causes) {
   constexpr double kNear = 0.05;
   NamingScore score;
   for (const Fault& one : truth) {
@@ -390,8 +390,9 @@ NamingScore ScoreNames(const std::vector<Fault>& truth, const Causes& causes) {
       if (explanation.outcome == CauseOutcome::kNotExplained) continue;
       const Fault& first = explanation.faults.front();
       right = right || (explanation.outcome == CauseOutcome::kNamed && one.IsLike(first) &&
+                        std::isfinite(first.error) &&
                         std::abs(first.value - one.value) <= std::max(kNear * one.error, 3.0 * first.error));
-      in_class = in_class || (explanation.outcome == CauseOutcome::kNamedClass &&
+      in_class = in_class || ((explanation.outcome == CauseOutcome::kNamedClass || std::isinf(first.error)) &&
                               std::any_of(explanation.faults.begin(), explanation.faults.end(),
                                           [&](const Fault& fault) { return one.IsLike(fault); }));
     }
@@ -400,8 +401,8 @@ NamingScore ScoreNames(const std::vector<Fault>& truth, const Causes& causes) {
   for (const Explanation& explanation : causes) {
     if (explanation.outcome != CauseOutcome::kNamed) continue;
     const Fault& first = explanation.faults.front();
-    const auto of = std::find_if(truth.begin(), truth.end(), [&](const Fault& one) { return one.IsLike(first); });
-    if (of == truth.end() ||
+    const auto of = std::find_if(all.begin(), all.end(), [&](const Fault& one) { return one.IsLike(first); });
+    if (of == all.end() ||
         std::abs(first.value - of->value) > std::max(kNear * of->error, 3.0 * first.error))
       ++score.wrong;
   }

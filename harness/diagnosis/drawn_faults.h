@@ -30,6 +30,7 @@ struct NamingScore {
   int not_explained = 0;
   int wrong = 0;          ///< Single names, or values, of what was not so.
 };
-NamingScore ScoreNames(const std::vector<Fault>& truth, const Causes& causes);
+/// @param truth what should be named. @param all what may be, besides: too small to be seen alone.
+NamingScore ScoreNames(const std::vector<Fault>& truth, const std::vector<Fault>& all, const Causes& causes);
 
 }  // namespace dexcheck

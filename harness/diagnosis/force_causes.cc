@@ -87,7 +87,13 @@ class StepForces {
         terms_(model_),
         factor_(model_),
         actuation_(model_),
-        n_(model_.num_velocities()) {}
+        n_(model_.num_velocities()) {
+    if (model_.base().type != BaseType::kFixed) mass_ = model_.base_with_wheels().mass;
+    for (const Joint& joint : model_.joints()) mass_ += joint.body.mass;
+    if (store.setup().has_object()) mass_ += store.setup().declared_object().body.mass;
+    constexpr double kEarth = 10.0;  // m/s^2
+    weight_ = kEarth * mass_;
+  }
 
   [[nodiscard]] Index rows() const { return n_ + 6; }
   [[nodiscard]] const RobotModel& model() const { return model_; }
@@ -124,16 +130,35 @@ class StepForces {
   void AddColumns(Index begin, Index steps, std::vector<Candidate>* candidates);
 
  private:
-  /// The next candidate of the list, made at the first step.
+  /// The next candidate of the list, made at the first step. @param scale plausible sizes.
   Candidate& Next(std::vector<Candidate>* candidates, const char* fault, const std::string& place,
-                  const std::string& unit, double nominal, Index width) {
+                  const std::string& unit, double nominal, const VectorXd& scale) {
     if (next_ == candidates->size()) {
-      candidates->push_back(
-          {fault, place, unit, nominal, MatrixXd::Zero(rows() * steps_, width), 0});
+      candidates->push_back({.fault = fault,
+                             .place = place,
+                             .unit = unit,
+                             .nominal = nominal,
+                             .columns = MatrixXd::Zero(rows() * steps_, scale.size()),
+                             .scale = scale});
       // Masses, frictions and the like are not negative.
-      if (width == 1 && std::string_view(fault) != "torque") candidates->back().least = -nominal;
+      constexpr double kRounding = 1e-6;
+      if (scale.size() == 1 && std::string_view(fault) != "torque")
+        candidates->back().is_possible = [=](const VectorXd& a) { return a[0] >= -nominal * (1.0 + kRounding); };
     }
     return (*candidates)[next_++];
+  }
+  /// Plausible sizes of `count` amplitudes: that times the weight or mass of all.
+  [[nodiscard]] VectorXd Weights(Index count, double times = 1.0) const {
+    return VectorXd::Constant(count, times * weight_);
+  }
+  /// Of a centre of mass, and of the inertia about the old one.
+  [[nodiscard]] VectorXd Moved() const {
+    VectorXd scale = Masses(9);
+    scale.head<3>().setOnes();
+    return scale;
+  }
+  [[nodiscard]] VectorXd Masses(Index count, double times = 1.0) const {
+    return VectorXd::Constant(count, times * mass_);
   }
   template <typename Columns>
   void AddRobot(Candidate* candidate, const Columns& f) {
@@ -160,6 +185,7 @@ class StepForces {
   size_t next_ = 0;
   Vector2d noise_ = Vector2d::Ones();
   double arm_ = 1.0;
+  double mass_ = 0.0, weight_ = 0.0;  // of all, kg and N
 };
 
 void StepForces::AddColumns(Index begin, Index steps, std::vector<Candidate>* candidates) {
@@ -195,28 +221,30 @@ void StepForces::AddJoints(std::vector<Candidate>* candidates) {
                                      : model_.dof_name(dof));
     VectorXd f(n_);
     actuation_.CalcForce(VectorXd::Unit(n_, i), f);
-    AddRobot(&Next(candidates, "torque", place, force, 0.0, 1), f);
+    AddRobot(&Next(candidates, "torque", place, force, 0.0, Weights(1)), f);
     AddRobot(&Next(candidates, "armature", place, slides ? "kg" : "kg m^2",
-                   joint == nullptr ? base.wheel.armature : joint->armature, 1),
+                   joint == nullptr ? base.wheel.armature : joint->armature, Masses(1)),
              VectorXd(-acceleration[i] * f));
     AddRobot(&Next(candidates, "viscous friction", place, force + " s/" + length,
-                   joint == nullptr ? base.wheel.damping : joint->damping, 1),
+                   joint == nullptr ? base.wheel.damping : joint->damping, Weights(1)),
              VectorXd(-rate[i] * f));
     const double sign = rate[i] > 0.0 ? 1.0 : rate[i] < 0.0 ? -1.0 : 0.0;
     if (joint != nullptr) {
       // Where the plant says it, also of a joint that sticks. The largest is told.
       const double known = store_.Get(StepStore::kDryFriction)(i, step_);
-      Candidate& bearing = Next(candidates, kBearing, place, force, 0.0, 1);
+      Candidate& bearing = Next(candidates, kBearing, place, force, 0.0, VectorXd::Ones(1));
       bearing.nominal = std::max(bearing.nominal, std::abs(known));
       AddRobot(&bearing, VectorXd(known * f));
     }
-    AddRobot(&Next(candidates, "dry friction", place, force, joint == nullptr ? 0.0 : joint->dry_friction, 1),
+    AddRobot(&Next(candidates, "dry friction", place, force, joint == nullptr ? 0.0 : joint->dry_friction, Weights(1)),
              VectorXd(-sign * f));
     if (joint == nullptr || joint->type == JointType::kBall) continue;
     MatrixXd spring(n_, 2);
     spring << -q[model_.position_index(model_.joint_of_dof(dof))] * f, f;
-    Candidate& candidate = Next(candidates, "spring", place, force + "/" + length, 0.0, 2);
+    Candidate& candidate = Next(candidates, "spring", place, force + "/" + length, 0.0, Weights(2));
     candidate.is_ordinary = true;
+    constexpr double kFarthest = 10.0;  // rad or m
+    candidate.is_possible = [](const VectorXd& a) { return a[0] > 0.0 && std::abs(a[1]) <= kFarthest * a[0]; };
     AddRobot(&candidate, spring);
   }
 }
@@ -237,32 +265,32 @@ void StepForces::AddLink(int link, std::vector<Candidate>* candidates) {
   const BodyWrench wrench(a, w, V_dot.tail<3>());
   const MatrixXd J_T = J.transpose();
   const MatrixXd forces = J_T.leftCols<3>(), moments = J_T.rightCols<3>();
-  AddRobot(&Next(candidates, kForce, place, "N", 0.0, 3),
+  AddRobot(&Next(candidates, kForce, place, "N", 0.0, Weights(3)),
            MatrixXd(forces * R.transpose()));
-  AddRobot(&Next(candidates, kForceInAxes, place, "N", 0.0, 3), forces);
-  AddRobot(&Next(candidates, "moment", place, "N m", 0.0, 3), MatrixXd(moments * R.transpose()));
-  AddRobot(&Next(candidates, kMomentInAxes, place, "N m", 0.0, 3), moments);
+  AddRobot(&Next(candidates, kForceInAxes, place, "N", 0.0, Weights(3)), forces);
+  AddRobot(&Next(candidates, "moment", place, "N m", 0.0, Weights(3)), MatrixXd(moments * R.transpose()));
+  AddRobot(&Next(candidates, kMomentInAxes, place, "N m", 0.0, Weights(3)), moments);
   MatrixXd both(n_, 6);
   both << forces * R.transpose(), moments * R.transpose();
-  AddRobot(&Next(candidates, "force and moment", place, "N", 0.0, 6), both);
+  AddRobot(&Next(candidates, "force and moment", place, "N", 0.0, Weights(6)), both);
   if (!(body.mass > 0.0)) return;
   const VectorXd mass = -J_T * wrench.mass;
-  AddRobot(&Next(candidates, "mass", place, "kg", body.mass, 1), mass);
+  AddRobot(&Next(candidates, "mass", place, "kg", body.mass, Masses(1)), mass);
   // The whole body times a factor.
   Eigen::Matrix<double, 6, 1> I;
   I << body.inertia(0, 0), body.inertia(1, 1), body.inertia(2, 2), body.inertia(0, 1), body.inertia(0, 2),
       body.inertia(1, 2);
   const VectorXd scaled = -J_T * (wrench.mass * body.mass + wrench.inertia * I);
-  AddRobot(&Next(candidates, kMassWithInertia, place, "kg", body.mass, 1), VectorXd(scaled / body.mass));
+  AddRobot(&Next(candidates, kMassWithInertia, place, "kg", body.mass, Masses(1)), VectorXd(scaled / body.mass));
   const MatrixXd inertia = -J_T * wrench.inertia;
-  AddRobot(&Next(candidates, "inertia", place, "kg m^2", 0.0, 6), inertia);
+  AddRobot(&Next(candidates, "inertia", place, "kg m^2", 0.0, Masses(6)), inertia);
   // Another centre of mass changes the inertia about the old one.
   MatrixXd com(n_, 9);
   com << -J_T * wrench.first_moment * body.mass, inertia;
-  AddRobot(&Next(candidates, "centre of mass off by", place, "m", 0.0, 9), com);
+  AddRobot(&Next(candidates, "centre of mass off by", place, "m", 0.0, Moved()), com);
   MatrixXd payload(n_, 10);
   payload << mass, -J_T * wrench.first_moment, inertia;
-  AddRobot(&Next(candidates, "payload", place, "kg", 0.0, 10), payload);
+  AddRobot(&Next(candidates, "payload", place, "kg", 0.0, Masses(10)), payload);
 }
 
 void StepForces::AddObjectForces(std::vector<Candidate>* candidates) {
@@ -279,27 +307,27 @@ void StepForces::AddObjectForces(std::vector<Candidate>* candidates) {
     columns << force, moment;
     return columns;
   };
-  AddObject(&Next(candidates, kForce, place, "N", 0.0, 3), stack(R_T, zero));
-  AddObject(&Next(candidates, kForceInAxes, place, "N", 0.0, 3), stack(Matrix3d::Identity(), zero));
-  AddObject(&Next(candidates, "moment", place, "N m", 0.0, 3), stack(zero, R_T));
-  AddObject(&Next(candidates, kMomentInAxes, place, "N m", 0.0, 3), stack(zero, Matrix3d::Identity()));
+  AddObject(&Next(candidates, kForce, place, "N", 0.0, Weights(3)), stack(R_T, zero));
+  AddObject(&Next(candidates, kForceInAxes, place, "N", 0.0, Weights(3)), stack(Matrix3d::Identity(), zero));
+  AddObject(&Next(candidates, "moment", place, "N m", 0.0, Weights(3)), stack(zero, R_T));
+  AddObject(&Next(candidates, kMomentInAxes, place, "N m", 0.0, Weights(3)), stack(zero, Matrix3d::Identity()));
   Matrix6d both = Matrix6d::Zero();
   both.topLeftCorner<3, 3>() = both.bottomRightCorner<3, 3>() = R_T;
-  AddObject(&Next(candidates, "force and moment", place, "N", 0.0, 6), both);
+  AddObject(&Next(candidates, "force and moment", place, "N", 0.0, Weights(6)), both);
   const Vector3d w = V.tail<3>();
   const BodyWrench wrench(V_dot.head<3>() + w.cross(V.head<3>()) - R_T * model_.gravity(), w, V_dot.tail<3>());
-  AddObject(&Next(candidates, "mass", place, "kg", object.body.mass, 1), Vector6d(-wrench.mass));
+  AddObject(&Next(candidates, "mass", place, "kg", object.body.mass, Masses(1)), Vector6d(-wrench.mass));
   const Matrix6d inertia = -wrench.inertia;
-  AddObject(&Next(candidates, "inertia", place, "kg m^2", 0.0, 6), inertia);
+  AddObject(&Next(candidates, "inertia", place, "kg m^2", 0.0, Masses(6)), inertia);
   Matrix6Xd com(6, 9);
   com << -wrench.first_moment * object.body.mass, inertia;
-  AddObject(&Next(candidates, "centre of mass off by", place, "m", 0.0, 9), com);
+  AddObject(&Next(candidates, "centre of mass off by", place, "m", 0.0, Moved()), com);
   Vector6d drag = Vector6d::Zero();
   drag.head<3>() = -V.head<3>();
-  AddObject(&Next(candidates, "drag", place, "N s/m", 0.0, 1), drag);
+  AddObject(&Next(candidates, "drag", place, "N s/m", 0.0, Weights(1)), drag);
   Matrix6Xd tether = Matrix6Xd::Zero(6, 4);
   tether.topRows<3>() << -R_T * p, R_T;
-  AddObject(&Next(candidates, "tether", place, "N/m", 0.0, 4), tether);
+  AddObject(&Next(candidates, "tether", place, "N/m", 0.0, Weights(4)), tether);
 }
 
 void StepForces::AddGravity(std::vector<Candidate>* candidates) {
@@ -318,7 +346,7 @@ void StepForces::AddGravity(std::vector<Candidate>* candidates) {
   const VectorXd pose = store_.Get(StepStore::kObjectPose).col(step_);
   if (store_.setup().has_object())
     object.topRows<3>() = store_.setup().declared_object().body.mass * pose.head<9>().reshaped(3, 3).transpose();
-  Candidate& gravity = Next(candidates, "gravity off by", "world", "m/s^2", 0.0, 3);
+  Candidate& gravity = Next(candidates, "gravity off by", "world", "m/s^2", 0.0, VectorXd::Constant(3, 20.0));
   for (Index k = 0; k < 3; ++k)
     gravity.columns.col(k).segment(begin_, rows()) = Whiten(weights.col(k), Vector6d(object.col(k)));
 }

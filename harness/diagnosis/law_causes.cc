@@ -67,15 +67,19 @@ Causes ExplainLaw(const StepStore& store) {
   std::vector<Candidate> candidates;
   for (const LawPartName& name : names)
     for (const Place& place : places)
-      candidates.push_back({std::string(name.name) + " (" + name.symbol + "), factor", place.name, "", 1.0,
-                            MatrixXd::Zero(n * used, 1), 0});
+      candidates.push_back({.fault = std::string(name.name) + " (" + name.symbol + "), factor",
+                            .place = place.name,
+                            .nominal = 1.0,
+                            .columns = MatrixXd::Zero(n * used, 1)});
   // What a controller of another's may add.
   for (Index i = 0; i < n; ++i) {
     const std::string& place = places[places.size() - static_cast<size_t>(n - i)].name;
     const std::string& unit = store.motors()[static_cast<size_t>(i)].unit;
     for (const char* fault : {"torque", "viscous friction", "dry friction"}) {
-      candidates.push_back({fault, place, unit, 0.0, MatrixXd::Zero(n * used, 1), 0});
-      if (std::string_view(fault) != "torque") candidates.back().least = 0.0;
+      candidates.push_back(
+          {.fault = fault, .place = place, .unit = unit, .columns = MatrixXd::Zero(n * used, 1)});
+      if (std::string_view(fault) != "torque")
+        candidates.back().is_possible = [](const VectorXd& a) { return a[0] >= 0.0; };
     }
   }
   VectorXd y(n * used);

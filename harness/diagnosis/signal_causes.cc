@@ -211,7 +211,7 @@ std::vector<Candidate> ListAdded(const SignalSeries& series, const Steps& steps,
   std::vector<Candidate> added;
   const auto add = [&](const char* fault, const std::string& unit, const ArrayXd& column, double nominal = 0.0) {
     if (!(column.abs().maxCoeff() > 0.0)) return;
-    added.push_back({fault, place, unit, nominal, column.matrix() / series.noise, 0});
+    added.push_back({.fault = fault, .place = place, .unit = unit, .nominal = nominal, .columns = column.matrix() / series.noise});
   };
   const ArrayXd got = steps.Take(series.got);
   const ArrayXd since = steps.Take(series.time) - steps.from;
@@ -225,7 +225,7 @@ std::vector<Candidate> ListAdded(const SignalSeries& series, const Steps& steps,
     add("lag", "s", before);
     MatrixXd both(got.size(), 2);
     both << before.matrix() / series.noise, (steps.Take(series.expected, 1) - shape.output).matrix() / series.noise;
-    added.push_back({"lag", place, "s", 0.0, both, 0});
+    added.push_back({.fault = "lag", .place = place, .unit = "s", .columns = both});
   }
   if (series.rate.size() > 0) {
     const ArrayXd rate = steps.Take(series.rate);
@@ -234,7 +234,7 @@ std::vector<Candidate> ListAdded(const SignalSeries& series, const Steps& steps,
           std::tuple{"dry friction", name.unit, ArrayXd(-rate.sign())}}) {
       const size_t count = added.size();
       add(fault, unit, column);
-      if (added.size() > count) added.back().least = 0.0;
+      if (added.size() > count) added.back().is_possible = [](const VectorXd& a) { return a[0] >= 0.0; };
     }
   }
   if (look_for_sines && got.size() >= kFewestOfNoise) {

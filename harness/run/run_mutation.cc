@@ -104,7 +104,7 @@ void RunCampaign::ListFaults() {
       if (getenv("DEXONLY") && drawn.fault.name.find(getenv("DEXONLY")) == std::string::npos) continue;  // DEBUG
       plants_.push_back(drawn.fault);
       singles_.push_back(drawn.each);
-      mutants_.push_back({.kind = drawn.fault.kind, .name = drawn.fault.name, .truth = drawn.truth});
+      mutants_.push_back({.kind = drawn.fault.kind, .name = drawn.fault.name, .truth = drawn.truth, .injected = drawn.truth});
     }
     return;
   }
@@ -207,7 +207,7 @@ bool RunCampaign::RunLoop(const Setup& setup, LoopParts parts, RunMutant* mutant
   mutant->killed = result.verdict != Verdict::kPass;
   mutant->cause = result.attribution.cause;
   mutant->evidence = result.attribution.evidence;
-  mutant->score = ScoreNames(mutant->truth, result.causes);
+  mutant->score = ScoreNames(mutant->truth, mutant->injected, result.causes);
   for (const Explanation& one : result.causes)
     mutant->causes += (mutant->causes.empty() ? "" : "; ") + one.Tell();
   mutant->names_part = mutant->evidence.find(mutant->part) != std::string::npos;

@@ -24,7 +24,8 @@ struct RunMutant {
   std::string name;
   Cause expected = Cause::kNone;
   std::string part;  ///< What the evidence should name; empty for nothing.
-  std::vector<Fault> truth;  ///< Of drawn faults: how they should be told.
+  std::vector<Fault> truth;     ///< Of drawn faults that are found alone: how they should be told.
+  std::vector<Fault> injected;  ///< The others likewise.
 
   bool refused = false;  ///< There is no such robot, or the scenario cannot be run with it.
   bool killed = false;   ///< The verdict is not "pass".
