@@ -25,12 +25,14 @@ constexpr double kLeft = 3.0;
 constexpr double kExplains = 0.99;
 constexpr Index kMostSteps = 40;  // that are looked at
 constexpr size_t kMostSegments = 8;
-// Residuals that change by this fraction from one step to the next have begun, or ended.
-constexpr double kJump = 0.3;
+// Residuals that change by more than this from one step to the next, in units of noise, and by this many
+// times what they change in the steps around, have begun, or ended.
+constexpr double kJumpNoise = 1.0, kJump = 5.0;
 // Gravity whose size differs by less than this fraction of its change only points elsewhere.
 constexpr double kTilted = 0.2;
 
 constexpr const char* kBearing = "dry friction of the bearing";
+constexpr const char* kWorld = "world";
 constexpr const char* kForce = "force at its centre of mass";
 constexpr const char* kForceInAxes = "force at its centre of mass, in its axes";
 constexpr const char* kMomentInAxes = "moment, in its axes";
@@ -91,12 +93,15 @@ class StepForces {
     if (model_.base().type != BaseType::kFixed) mass_ = model_.base_with_wheels().mass;
     for (const Joint& joint : model_.joints()) mass_ += joint.body.mass;
     if (store.setup().has_object()) mass_ += store.setup().declared_object().body.mass;
+    gravity_ = model_.gravity();
     constexpr double kEarth = 10.0;  // m/s^2
     weight_ = kEarth * mass_;
   }
 
   [[nodiscard]] Index rows() const { return n_ + 6; }
   [[nodiscard]] const RobotModel& model() const { return model_; }
+  /// In which masses that differ fall, m/s^2; the model's at first.
+  void SetGravity(const Vector3d& gravity) { gravity_ = gravity; }
 
   void SetStep(Index step) {
     step_ = step;
@@ -186,6 +191,7 @@ class StepForces {
   Vector2d noise_ = Vector2d::Ones();
   double arm_ = 1.0;
   double mass_ = 0.0, weight_ = 0.0;  // of all, kg and N
+  Vector3d gravity_;
 };
 
 void StepForces::AddColumns(Index begin, Index steps, std::vector<Candidate>* candidates) {
@@ -261,7 +267,7 @@ void StepForces::AddLink(int link, std::vector<Candidate>* candidates) {
   const Vector6d V = J * terms_.velocity();
   const Vector6d V_dot = J * xi_dot + J_dot * terms_.velocity();
   const Vector3d w = V.tail<3>();
-  const Vector3d a = V_dot.head<3>() + w.cross(V.head<3>()) - R.transpose() * model_.gravity();
+  const Vector3d a = V_dot.head<3>() + w.cross(V.head<3>()) - R.transpose() * gravity_;
   const BodyWrench wrench(a, w, V_dot.tail<3>());
   const MatrixXd J_T = J.transpose();
   const MatrixXd forces = J_T.leftCols<3>(), moments = J_T.rightCols<3>();
@@ -315,7 +321,7 @@ void StepForces::AddObjectForces(std::vector<Candidate>* candidates) {
   both.topLeftCorner<3, 3>() = both.bottomRightCorner<3, 3>() = R_T;
   AddObject(&Next(candidates, "force and moment", place, "N", 0.0, Weights(6)), both);
   const Vector3d w = V.tail<3>();
-  const BodyWrench wrench(V_dot.head<3>() + w.cross(V.head<3>()) - R_T * model_.gravity(), w, V_dot.tail<3>());
+  const BodyWrench wrench(V_dot.head<3>() + w.cross(V.head<3>()) - R_T * gravity_, w, V_dot.tail<3>());
   AddObject(&Next(candidates, "mass", place, "kg", object.body.mass, Masses(1)), Vector6d(-wrench.mass));
   const Matrix6d inertia = -wrench.inertia;
   AddObject(&Next(candidates, "inertia", place, "kg m^2", 0.0, Masses(6)), inertia);
@@ -346,7 +352,7 @@ void StepForces::AddGravity(std::vector<Candidate>* candidates) {
   const VectorXd pose = store_.Get(StepStore::kObjectPose).col(step_);
   if (store_.setup().has_object())
     object.topRows<3>() = store_.setup().declared_object().body.mass * pose.head<9>().reshaped(3, 3).transpose();
-  Candidate& gravity = Next(candidates, "gravity off by", "world", "m/s^2", 0.0, VectorXd::Constant(3, 20.0));
+  Candidate& gravity = Next(candidates, "gravity off by", kWorld, "m/s^2", 0.0, VectorXd::Constant(3, 20.0));
   for (Index k = 0; k < 3; ++k)
     gravity.columns.col(k).segment(begin_, rows()) = Whiten(weights.col(k), Vector6d(object.col(k)));
 }
@@ -408,42 +414,22 @@ class Problem {
  public:
   Problem(const StepStore& store, StepForces* forces, const Segment& segment) : store_(store), forces_(forces) {
     const auto count = static_cast<Index>(segment.steps.size());
-    const Index used = std::min(count, kMostSteps);
-    y_.resize(forces->rows() * used);
-    for (Index i = 0; i < used; ++i) {
-      const Index step = segment.steps[static_cast<size_t>(used == 1 ? 0 : i * (count - 1) / (used - 1))];
-      forces->SetStep(step);
-      y_.segment(i * forces->rows(), forces->rows()) = forces->CalcResidual();
-      forces->AddColumns(i * forces->rows(), used, &candidates_);
-    }
-    steps_ = used;
-    floor_ = 1.0 + kAccuracy * kAccuracy * y_.squaredNorm() / static_cast<double>(y_.size());
-    if (const char* name = getenv("DEXDBG")) {  // DEBUG
-      FILE* f = fopen(name, "ab");
-      const long header[4] = {y_.size(), steps_, forces->rows(), (long)candidates_.size()};
-      fwrite(header, 8, 4, f);
-      fwrite(y_.data(), 8, (size_t)y_.size(), f);
-      for (auto& c : candidates_) {
-        std::string n = c.place + ": " + c.fault;
-        n.resize(64);
-        fwrite(n.data(), 1, 64, f);
-        long w = c.columns.cols();
-        fwrite(&w, 8, 1, f);
-        fwrite(c.columns.data(), 8, (size_t)c.columns.size(), f);
-      }
-      fclose(f);
-    }
+    steps_ = std::min(count, kMostSteps);
+    for (Index i = 0; i < steps_; ++i)
+      used_.push_back(segment.steps[static_cast<size_t>(steps_ == 1 ? 0 : i * (count - 1) / (steps_ - 1))]);
+    forces->SetGravity(forces->model().gravity());
+    Build();
   }
 
   /// Whether what is left is noise, or next to nothing beside what there was.
   [[nodiscard]] bool IsExplained(double fraction, double left) const {
-    if (left <= std::sqrt(floor_)) return fraction > 0.0;
-    return fraction >= kExplains && left <= kLeft * std::sqrt(floor_);
+    if (left <= 1.0) return fraction > 0.0;
+    return fraction >= kExplains && left <= kLeft;
   }
 
   /// Faults that do not change.
-  bool ExplainConstant(const Segment& segment, Causes* causes) const {
-    const CauseSelection selection = SelectCauses(y_, candidates_, {6, floor_, static_cast<double>(steps_)});
+  bool ExplainConstant(const Segment& segment, Causes* causes) {
+    const CauseSelection selection = Select();
     if (!IsExplained(selection.fraction, selection.left)) return false;
     if (ExplainJoint(segment, selection, causes)) return true;
     for (const CauseTerm& term : selection.terms) {
@@ -511,7 +497,7 @@ class Problem {
         free.largest = std::max(free.largest, a.head(std::min<Index>(3, a.size())).norm());
       }
       const double parameters = static_cast<double>(candidate.columns.cols() * steps_);
-      free.criterion = rows * std::log(floor_ + free.left / rows) + parameters * std::log(rows);
+      free.criterion = rows * std::log(1.0 + free.left / rows) + parameters * std::log(rows);
       all.push_back(free);
     }
     std::sort(all.begin(), all.end(), [](const Free& a, const Free& b) { return a.criterion < b.criterion; });
@@ -557,36 +543,92 @@ class Problem {
     return one;
   }
 
+  void Build() {
+    const Index rows = forces_->rows();
+    y_.resize(rows * steps_);
+    candidates_.clear();
+    for (Index i = 0; i < steps_; ++i) {
+      forces_->SetStep(used_[static_cast<size_t>(i)]);
+      y_.segment(i * rows, rows) = forces_->CalcResidual();
+      forces_->AddColumns(i * rows, steps_, &candidates_);
+    }
+    // What the columns are off hides what is smaller in the same block, and in no other.
+    ScaleBlock(0, rows - 6);
+    ScaleBlock(rows - 6, 6);
+  }
+
+  [[nodiscard]] CauseSelection Select() {
+    const CauseOptions options{6, 1.0, static_cast<double>(steps_)};
+    CauseSelection selection = SelectCauses(y_, candidates_, options);
+    for (const CauseTerm& term : selection.terms) {
+      if (candidates_[term.candidate].place != kWorld || selection.terms.size() == 1) continue;
+      // Masses that differ fall as all do.
+      forces_->SetGravity(forces_->model().gravity() + Vector3d(term.amplitude));
+      Build();
+      return SelectCauses(y_, candidates_, options);
+    }
+    return selection;
+  }
+
+  /// Rows `first` ... of each step, in units of noise and of what their columns are off.
+  void ScaleBlock(Index first, Index count) {
+    const Index rows = forces_->rows();
+    double square = 0.0;
+    for (Index k = 0; k < steps_; ++k) square += y_.segment(k * rows + first, count).squaredNorm();
+    const double unit = 1.0 / std::sqrt(1.0 + kAccuracy * kAccuracy * square / static_cast<double>(count * steps_));
+    for (Index k = 0; k < steps_; ++k) {
+      y_.segment(k * rows + first, count) *= unit;
+      for (Candidate& one : candidates_) one.columns.middleRows(k * rows + first, count) *= unit;
+    }
+  }
+
   const StepStore& store_;
   StepForces* forces_;
   std::vector<Candidate> candidates_;
   VectorXd y_;
+  std::vector<Index> used_;  // steps of the store
   Index steps_ = 0;
-  double floor_ = 1.0;
 };
 
 /// All steps that differ, and the same in parts that begin or end with a jump.
 void FindSegments(const StepStore& store, StepForces* forces, Segment* whole, std::vector<Segment>* parts) {
+  struct Step {
+    Index index;
+    bool follows;
+    double robot, object;  // by how much each differs from the step before
+  };
+  std::vector<Step> steps;
   VectorXd before;
-  Index last = -2;
   for (Index i = 0; i < store.size(); ++i) {
     if (!(store.Get(StepStore::kNoise)(0, i) > 0.0)) continue;
     forces->SetStep(i);
     const VectorXd y = forces->CalcResidual();
-    const bool differs = y.head(y.size() - 6).squaredNorm() > static_cast<double>(y.size() - 6) ||
-                         y.tail<6>().squaredNorm() > 6.0;
+    const Index n = y.size() - 6;
+    const bool differs = y.head(n).squaredNorm() > static_cast<double>(n) || y.tail<6>().squaredNorm() > 6.0;
     if (differs) {
-      const double time = store.Get(StepStore::kTime)(0, i);
-      const bool begins = i != last + 1 || (y - before).norm() > kJump * std::max(y.norm(), before.norm());
-      if (begins) parts->push_back({{}, time, time});
-      for (Segment* segment : {whole, &parts->back()}) {
-        if (segment->steps.empty()) segment->from = time;
-        segment->steps.push_back(i);
-        segment->to = time;
+      const bool follows = !steps.empty() && steps.back().index == i - 1;
+      steps.push_back({i, follows, 0.0, 0.0});
+      if (follows) {
+        steps.back().robot = (y - before).head(n).norm() / std::sqrt(static_cast<double>(n));
+        steps.back().object = (y - before).tail<6>().norm() / std::sqrt(6.0);
       }
-      last = i;
     }
     before = y;
+  }
+  const auto jumps = [&](size_t k, double Step::* size) {
+    double around = k > 0 ? steps[k - 1].*size : 0.0;
+    if (k + 1 < steps.size()) around = std::max(around, steps[k + 1].*size);
+    return steps[k].*size > std::max(kJumpNoise, kJump * around);
+  };
+  for (size_t k = 0; k < steps.size(); ++k) {
+    const double time = store.Get(StepStore::kTime)(0, steps[k].index);
+    if (!steps[k].follows || jumps(k, &Step::robot) || jumps(k, &Step::object))
+      parts->push_back({{}, time, time});
+    for (Segment* segment : {whole, &parts->back()}) {
+      if (segment->steps.empty()) segment->from = time;
+      segment->steps.push_back(steps[k].index);
+      segment->to = time;
+    }
   }
 }
 
@@ -609,8 +651,10 @@ Causes ExplainForces(const StepStore& store) {
   std::vector<Segment> parts;
   FindSegments(store, &forces, &whole, &parts);
   if (whole.steps.empty()) return causes;
-  const Problem problem(store, &forces, whole);
+  Problem problem(store, &forces, whole);
   if (problem.ExplainConstant(whole, &causes)) return causes;
+  if (getenv("DEXDBG"))
+    for (FILE* f = fopen("/tmp/parts.txt", "a"); auto& x : parts) fprintf(f, "part %g %g n=%zu\n", x.from, x.to, x.steps.size()), fflush(f);
   if (parts.size() > 1 && parts.size() <= kMostSegments) {
     Causes found;
     bool all = true;
