@@ -14,7 +14,7 @@ using Eigen::Index;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 // A column of which less is left beside the others says nothing of its own.
 constexpr double kIndependent = 1e-7;
-constexpr double kImplausible = 10.0;  // times the plausible size
+constexpr double kImplausible = 3.0;  // times the plausible size
 constexpr size_t kRestarts = 8;        // other first choices that are tried where the first led nowhere
 
 /// What of a candidate shows above the noise: amplitudes are basis * a.
@@ -197,12 +197,39 @@ class Search {
     return one.basis * decomposition.compute(own).solve(VectorXd(y_ - Q * (Q.transpose() * y_)));
   }
 
-  [[nodiscard]] bool CanBe(size_t candidate, const std::vector<size_t>& beside) const {
-    const Candidate& one = candidates_[candidate];
-    if (!one.is_possible && one.scale.size() == 0) return true;
-    const VectorXd a = CalcAmplitude(candidate, beside);
-    if (one.scale.size() > 0 && (a.array().abs() > kImplausible * one.scale.array()).any()) return false;
-    return !one.is_possible || one.is_possible(a);
+  /// Whether it and those can be, all at once.
+  [[nodiscard]] bool CanBe(size_t candidate, std::vector<size_t> set) const {
+    set.push_back(candidate);
+    const auto is_free = [&](size_t i) { return !candidates_[i].is_possible && candidates_[i].scale.size() == 0; };
+    if (std::all_of(set.begin(), set.end(), is_free)) return true;
+    const VectorXd a = Solve(Collect(set));
+    Index width = 0;
+    for (const size_t i : set) {
+      const Candidate& one = candidates_[i];
+      const Index r = visible_[i].columns.cols();
+      const VectorXd amplitude = visible_[i].basis * a.segment(width, r);
+      width += r;
+      if (one.scale.size() > 0 && (amplitude.array().abs() > kImplausible * one.scale.array()).any()) return false;
+      if (one.is_possible && !one.is_possible(amplitude)) return false;
+    }
+    return true;
+  }
+
+  [[nodiscard]] MatrixXd Collect(const std::vector<size_t>& set) const {
+    Index width = 0;
+    for (const size_t i : set) width += visible_[i].columns.cols();
+    MatrixXd C(y_.size(), width);
+    width = 0;
+    for (const size_t i : set) {
+      C.middleCols(width, visible_[i].columns.cols()) = visible_[i].columns;
+      width += visible_[i].columns.cols();
+    }
+    return C;
+  }
+
+  [[nodiscard]] VectorXd Solve(const MatrixXd& C) const {
+    const VectorXd size = C.colwise().norm().cwiseMax(std::numeric_limits<double>::min());
+    return (C * size.cwiseInverse().asDiagonal()).colPivHouseholderQr().solve(y_).cwiseQuotient(size);
   }
 
   [[nodiscard]] Best FindBest(const std::vector<size_t>& beside) const {
@@ -252,18 +279,11 @@ class Search {
     result.residual = y_;
     const double all = y_.squaredNorm();
     if (!chosen_.empty()) {
-      Index width = 0;
-      for (const size_t i : chosen_) width += visible_[i].columns.cols();
-      MatrixXd C(y_.size(), width);
-      width = 0;
-      for (const size_t i : chosen_) {
-        C.middleCols(width, visible_[i].columns.cols()) = visible_[i].columns;
-        width += visible_[i].columns.cols();
-      }
+      const MatrixXd C = Collect(chosen_);
+      const Index width = C.cols();
       const VectorXd size = C.colwise().norm().cwiseMax(std::numeric_limits<double>::min());
       const MatrixXd scaled = C * size.cwiseInverse().asDiagonal();
-      const Eigen::ColPivHouseholderQR<MatrixXd> qr(scaled);
-      const VectorXd a = qr.solve(y_).cwiseQuotient(size);
+      const VectorXd a = Solve(C);
       result.residual = y_ - C * a;
       const double freedom = std::max(1.0, rows_ - static_cast<double>(width));
       const double variance =
@@ -272,16 +292,16 @@ class Search {
           size.cwiseInverse().asDiagonal() *
           (scaled.transpose() * scaled).completeOrthogonalDecomposition().pseudoInverse() *
           size.cwiseInverse().asDiagonal() * variance;
-      width = 0;
+      Index begin = 0;
       for (size_t place = 0; place < chosen_.size(); ++place) {
         const Visible& visible = visible_[chosen_[place]];
         const Index r = visible.columns.cols();
         CauseTerm term;
         term.candidate = chosen_[place];
-        term.amplitude = visible.basis * a.segment(width, r);
-        term.error = CalcErrors(visible, covariance.block(width, width, r, r));
+        term.amplitude = visible.basis * a.segment(begin, r);
+        term.error = CalcErrors(visible, covariance.block(begin, begin, r, r));
         Compare(place, criterion, all, &term);
-        width += r;
+        begin += r;
         result.terms.push_back(std::move(term));
       }
     }

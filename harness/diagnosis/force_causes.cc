@@ -31,6 +31,7 @@ constexpr double kJumpNoise = 1.0, kJump = 5.0;
 // Gravity whose size differs by less than this fraction of its change only points elsewhere.
 constexpr double kTilted = 0.2;
 
+constexpr double kFarthest = 10.0;  // rad or m: where springs relax, and loads are
 constexpr const char* kBearing = "dry friction of the bearing";
 constexpr const char* kWorld = "world";
 constexpr const char* kForce = "force at its centre of mass";
@@ -249,7 +250,6 @@ void StepForces::AddJoints(std::vector<Candidate>* candidates) {
     spring << -q[model_.position_index(model_.joint_of_dof(dof))] * f, f;
     Candidate& candidate = Next(candidates, "spring", place, force + "/" + length, 0.0, Weights(2));
     candidate.is_ordinary = true;
-    constexpr double kFarthest = 10.0;  // rad or m
     candidate.is_possible = [](const VectorXd& a) { return a[0] > 0.0 && std::abs(a[1]) <= kFarthest * a[0]; };
     AddRobot(&candidate, spring);
   }
@@ -296,7 +296,9 @@ void StepForces::AddLink(int link, std::vector<Candidate>* candidates) {
   AddRobot(&Next(candidates, "centre of mass off by", place, "m", 0.0, Moved()), com);
   MatrixXd payload(n_, 10);
   payload << mass, -J_T * wrench.first_moment, inertia;
-  AddRobot(&Next(candidates, "payload", place, "kg", 0.0, Masses(10)), payload);
+  Candidate& load = Next(candidates, "payload", place, "kg", 0.0, Masses(10));
+  load.is_possible = [](const VectorXd& a) { return a.segment<3>(1).norm() <= kFarthest * std::abs(a[0]); };
+  AddRobot(&load, payload);
 }
 
 void StepForces::AddObjectForces(std::vector<Candidate>* candidates) {
