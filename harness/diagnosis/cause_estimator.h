@@ -69,7 +69,7 @@ struct CauseOptions {
 };
 
 /// Candidates whose likelihoods differ by less than this factor are told as equals, natural logarithm.
-inline constexpr double kEqualLogOdds = 3.0;
+inline constexpr double kEqualLogOdds = 5.0;
 
 /// See above. @param y (N). @param candidates each with N rows.
 CauseSelection SelectCauses(const VectorXd& y, std::span<const Candidate> candidates,

@@ -260,7 +260,15 @@ One DrawJoint(const Setup& setup, Draw* draw) {
 One DrawBody(const Setup& setup, Draw* draw, double duration) {
   const RobotModel& model = setup.model();
   const bool on_object = setup.has_object() && !setup.fingertips().empty() && draw->Index(4) == 0;
-  const size_t link = draw->Index(static_cast<size_t>(model.num_joints()));
+  // The engine's body may be one of several that the model has as one.
+  std::vector<size_t> links;
+  for (size_t i = 0; i < model.joints().size(); ++i) {
+    const MassProperties& own = model.joints()[i].body;
+    const int id = FindId(setup.engine(), mjOBJ_BODY, model.joints()[i].link);
+    constexpr double kSame = 1e-6;
+    if (own.mass > 0.0 && std::abs(setup.engine().body_mass[id] - own.mass) <= kSame * own.mass) links.push_back(i);
+  }
+  const size_t link = links[draw->Index(links.size())];
   const std::string body = on_object ? setup.object().name : model.joints()[link].link;
   const std::string place = (on_object ? "object " : "link ") + body;
   const size_t which = draw->Index(4);

@@ -606,6 +606,11 @@ void FindSegments(const StepStore& store, StepForces* forces, Segment* whole, st
     forces->SetStep(i);
     const VectorXd y = forces->CalcResidual();
     const Index n = y.size() - 6;
+    if (getenv("DEXDBG")) {
+      FILE* f = fopen("/tmp/parts.txt", "a");
+      fprintf(f, "step %ld noise %g %g y %g %g\n", i, store.Get(StepStore::kNoise)(0, i), store.Get(StepStore::kNoise)(1, i), y.head(n).norm(), y.tail<6>().norm());
+      fclose(f);
+    }
     const bool differs = y.head(n).squaredNorm() > static_cast<double>(n) || y.tail<6>().squaredNorm() > 6.0;
     if (differs) {
       const bool follows = !steps.empty() && steps.back().index == i - 1;

@@ -21,6 +21,7 @@ constexpr double kAccuracy = 1e-6;
 constexpr double kLeft = 30.0;
 // Autocorrelation of noise that is white, times the root of the number of steps.
 constexpr double kWhite = 4.0;
+constexpr double kFaint = 1e3;       // times the noise; of less rounding says what it is
 constexpr Index kFewest = 3;         // steps that say anything
 constexpr Index kFewestOfNoise = 20;  // and of noise
 constexpr size_t kMostTerms = 3;
@@ -32,6 +33,7 @@ struct Steps {
   std::vector<Index> rows;
   double from = 0.0, to = 0.0;  // s
   bool ends = false;            // before the series does
+  bool was_before = false;      // whether it may have begun before the series does
 
   [[nodiscard]] Index size() const { return static_cast<Index>(rows.size()); }
   /// The signal `back` steps before each of them.
@@ -51,6 +53,12 @@ Steps FindSteps(const SignalSeries& series) {
   for (Index i = first; i <= last; ++i)
     if (series.has_history[static_cast<size_t>(i)]) steps.rows.push_back(i);
   if (first > last) return steps;
+  // What is over so soon is looked at all the same, and what came before was as it is at the first.
+  if (static_cast<Index>(steps.rows.size()) < kFewest) {
+    steps.rows.clear();
+    for (Index i = first; i <= last; ++i) steps.rows.push_back(i);
+  }
+  steps.was_before = first == 0;
   steps.from = series.time[first];
   steps.to = series.time[last];
   steps.ends = last + StepStore::kHistory < difference.size();
@@ -193,7 +201,7 @@ Candidate FindSine(const ArrayXd& y, const ArrayXd& t, const std::string& place,
   double width = grid;
   for (int i = 0; i < 60; ++i, width *= 0.7) {
     for (const double to : {best - width, best + width}) {
-      if (!(to > 0.0)) continue;
+      if (!(to > grid)) continue;
       const double left = set(2.0 * kPi * to);
       if (left < least) least = left, best = to;
     }
@@ -302,7 +310,8 @@ Fit MakeFit(const SignalSeries& series, const Steps& steps, const Shape& shape, 
   fit.size = ((steps.Take(series.got) - steps.Take(series.expected)) / series.noise).matrix().norm();
   fit.selection = SelectCauses(y, added, {kMostTerms, floor});
   fit.criterion = fit.selection.criterion + shape.parameters * std::log(static_cast<double>(y.size())) +
-                  2.0 * std::log(static_cast<double>(shape.tried));
+                  (shape.fault.empty() ? 0.0 : 2.0 * std::log(static_cast<double>(shape.tried) *
+                                                              static_cast<double>(added.size())));
   const std::string place =
       series.name.group == "motors" ? series.name.place : series.name.place + ", " + series.name.what;
   if (!shape.fault.empty()) fit.faults.push_back({shape.fault, place, shape.value, 0.0, shape.unit, shape.detail});
@@ -316,7 +325,7 @@ Fit MakeFit(const SignalSeries& series, const Steps& steps, const Shape& shape, 
   const double decay = find("lag");
   // A drift that began since the step before has come so far at the first.
   const double drifted = find("offset") / find("drift");
-  const bool began_between = drifted > 0.0 && drifted <= (1.0 + kAccuracy) * time_step;
+  const bool began_between = drifted > 0.0 && (steps.was_before || drifted <= (1.0 + kAccuracy) * time_step);
   for (const CauseTerm& term : fit.selection.terms) {
     if (began_between && added[term.candidate].fault == "offset") continue;
     fit.faults.push_back(MakeFault(added[term.candidate], term.amplitude, term.error, decay, time_step));
@@ -388,7 +397,9 @@ Verdict Judge(const SignalSeries& series, const std::vector<SignalSeries>& other
     // Sines fit much: they are looked for where nothing else explains it.
     if (is_good(fits.front()) && !fits.front().is_noise) break;
   }
-  verdict.is_explained = steps.size() >= kFewest && is_good(fits.front());
+  const double largest = (steps.Take(series.got) - steps.Take(series.expected)).abs().maxCoeff();
+  verdict.is_explained =
+      steps.size() >= kFewest && largest >= kFaint * series.noise && is_good(fits.front());
   std::vector<std::string> names;
   for (Fit& fit : fits) {
     if (!fit.is_possible()) continue;

@@ -205,8 +205,8 @@ void StepStore::Keep(Eigen::Index block, const Eigen::Ref<const VectorXd>& row) 
 }
 
 bool StepStore::HasHistory(Eigen::Index step) const {
-  // Before the first of all steps everything was as it is there.
-  const Eigen::Index first = std::max<Eigen::Index>(0, step - kHistory);
+  if (step < kHistory) return false;
+  const Eigen::Index first = step - kHistory;
   return block_[static_cast<size_t>(step)] - block_[static_cast<size_t>(first)] <= 1 &&
          (stride_ == 1 || block_[static_cast<size_t>(step)] == block_[static_cast<size_t>(first)]);
 }
