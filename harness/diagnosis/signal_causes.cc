@@ -325,7 +325,7 @@ Fit MakeFit(const SignalSeries& series, const Steps& steps, const Shape& shape, 
   const double decay = find("lag");
   // A drift that began since the step before has come so far at the first.
   const double drifted = find("offset") / find("drift");
-  const bool began_between = drifted > 0.0 && (steps.was_before || drifted <= (1.0 + kAccuracy) * time_step);
+  const bool began_between = drifted > 0.0 && std::isfinite(drifted) && (steps.was_before || drifted <= (1.0 + kAccuracy) * time_step);
   for (const CauseTerm& term : fit.selection.terms) {
     if (began_between && added[term.candidate].fault == "offset") continue;
     fit.faults.push_back(MakeFault(added[term.candidate], term.amplitude, term.error, decay, time_step));
