@@ -17,8 +17,7 @@ RunChecks::RunChecks(const Setup& setup, std::span<const Motor> motors, bool kno
       law_(MakeJudgedLaw(setup, knows_law)),
       law_terms_(setup.model().num_positions(), setup.model().num_velocities(),
                  3 * static_cast<int>(setup.fingertips().size())),
-      judges_(MakeChecks(setup, law_.get())),
-      wheels_(setup.model().base()) {
+      judges_(MakeChecks(setup, law_.get())) {
   if (!setup.start().bonds.empty()) model_.LeaveOutContacts();
   model_.RaiseBounds(setup.scenario().tolerance);
   for (const Judge& judge : judges_) records_.push_back(judge.record);
@@ -119,14 +118,12 @@ void RunChecks::JudgeModel(const StepRecord& step) {
 void RunChecks::JudgeSettling(const StepRecord& step) {
   Analyze(step);
   Evaluate(CheckInfo::kSettling, step.time);
-  KeepEvidence(step);
 }
 
 void RunChecks::JudgeStep(const StepRecord& step) {
   Analyze(step);
   if (law_ && law_->IsComputed(step.command)) CompareLaw(step);
   Evaluate(CheckInfo::kRunning, step.time);
-  KeepEvidence(step);
 }
 
 void RunChecks::JudgeUnsent(const StepRecord& step) {
@@ -163,14 +160,8 @@ void RunChecks::CompareLaw(const StepRecord& step) {
   orientation_by_law_ = std::max(orientation_by_law_, errors.orientation_by_law);
 }
 
-void RunChecks::KeepEvidence(const StepRecord& step) {
-  if (step.response.wheels.size() == 2 && Exceeds("rolling"))
-    wheels_.Add(step.reading.state.xi, analysis().wheel_rates);
-}
-
 MeasuredCauses RunChecks::Tell() const {
   MeasuredCauses measured;
-  measured.wheels = wheels_.Tell();
   measured.position_by_law = position_by_law_;
   measured.orientation_by_law = orientation_by_law_;
   measured.is_ideal = declared_.is_ideal();

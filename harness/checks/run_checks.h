@@ -13,7 +13,6 @@
 #include "harness/checks/make_checks.h"
 #include "harness/checks/step_analysis.h"
 #include "harness/checks/step_model_check.h"
-#include "harness/checks/wheel_evidence.h"
 
 namespace dexcheck {
 
@@ -81,7 +80,6 @@ class RunChecks {
   /// The law's terms, of the engine at the measured state.
   const LawTerms& ReadLawTerms(const StepRecord& step);
   void CompareLaw(const StepRecord& step);
-  void KeepEvidence(const StepRecord& step);
 
   const Setup* setup_;
   StepModelCheck model_;
@@ -98,7 +96,6 @@ class RunChecks {
   std::vector<CheckRecord> records_;  // of judges_
   std::vector<CheckRecord> settling_failures_;
   double position_by_law_ = -1.0, orientation_by_law_ = -1.0;  // largest; see MeasuredCauses
-  WheelEvidence wheels_;
   bool differs_ = false;
 };
 

@@ -6,6 +6,8 @@
 #include <string_view>
 #include <vector>
 
+#include "harness/diagnosis/cause_estimator.h"
+
 namespace dexcheck {
 
 /// A fault with its size.
@@ -24,8 +26,8 @@ struct Fault {
 };
 
 /// Where residuals are compared: what one of them shows, the others do not.
-enum class CauseChannel { kMeasurement, kActuation, kLaw, kBalance };
-/// "measurement", "actuation", "law", "balance".
+enum class CauseChannel { kMeasurement, kActuation, kLaw, kRolling, kBalance };
+/// "measurement", "actuation", "law", "rolling", "balance".
 const char* NameOf(CauseChannel channel);
 
 enum class CauseOutcome {
@@ -46,6 +48,10 @@ struct Explanation {
   std::string rival;            ///< The nearest fault that explains it worse; empty for none.
   double log_odds = 0.0;        ///< Against the rival, natural logarithm.
 
+  void SetRival(const Candidate& candidate, double odds) {
+    rival = candidate.place + ": " + candidate.fault;
+    log_odds = odds;
+  }
   /// One fault is named once, and whether there are several.
   void SetOutcome();
   /// In a line.

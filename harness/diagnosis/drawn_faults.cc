@@ -48,15 +48,19 @@ One MakeOne(const char* kind, const std::string& place, const std::string& name,
 
 using Give = std::function<double(double sent, double t)>;
 
+/// Entry of tau' of a motor.
+int DrawEntry(const Setup& setup, Draw* draw) {
+  const bool wheels = setup.model().base().type == BaseType::kDifferentialDrive;
+  const size_t count = static_cast<size_t>(setup.model().num_dofs() + (wheels ? 2 : 0));
+  return static_cast<int>(draw->Index(count)) + (wheels ? 0 : setup.model().num_base_velocities());
+}
+
 /// @param make the function of a fresh run.
-One Motor(const Setup& setup, Draw* draw, const std::string& name, double value, double change,
+One Motor(const Setup& setup, int entry, const std::string& name, double value, double change,
           const std::function<Give()>& make) {
   const RobotModel& model = setup.model();
   const Base& base = model.base();
-  const bool wheels = base.type == BaseType::kDifferentialDrive;
   const int offset = model.num_base_velocities();
-  const size_t count = static_cast<size_t>(model.num_dofs() + (wheels ? 2 : 0));
-  const auto entry = static_cast<int>(draw->Index(count)) + (wheels ? 0 : offset);
   const std::string joint = entry >= offset ? model.dof_name(entry - offset)
                             : entry == 0   ? base.wheel_joint_right
                                            : base.wheel_joint_left;
@@ -67,22 +71,25 @@ One Motor(const Setup& setup, Draw* draw, const std::string& name, double value,
   return one;
 }
 
-One DrawMotor(const Setup& setup, Draw* draw, double duration) {
+One DrawMotor(const Setup& setup, Draw* draw, const DrawOptions& options) {
+  const double duration = options.duration;
+  const int entry = DrawEntry(setup, draw);
+  const double torque = std::max(std::abs(options.tau[entry]), 1e-6);
   const double dt = setup.scenario().plant.time_step;
   switch (draw->Index(9)) {
     case 0: {
       const double gain = 1.0 + draw->Size(0.005, 0.2);
-      return Motor(setup, draw, "gain", gain, gain - 1.0,
+      return Motor(setup, entry, "gain", gain, gain - 1.0,
                    [gain] { return [gain](double u, double) { return gain * u; }; });
     }
     case 1: {
       const double offset = draw->Size(1e-3, 0.1);
-      return Motor(setup, draw, "offset", offset, offset,
+      return Motor(setup, entry, "offset", offset, offset,
                    [offset] { return [offset](double u, double) { return u + offset; }; });
     }
     case 2: {
       const auto steps = 1 + draw->Index(8);
-      return Motor(setup, draw, "delay", static_cast<double>(steps), static_cast<double>(steps), [steps] {
+      return Motor(setup, entry, "delay", static_cast<double>(steps), static_cast<double>(steps), [steps] {
         return [steps, sent = std::deque<double>()](double u, double) mutable {
           sent.push_back(u);
           if (sent.size() > steps + 1) sent.pop_front();
@@ -92,7 +99,7 @@ One DrawMotor(const Setup& setup, Draw* draw, double duration) {
     }
     case 3: {
       const double time = draw->Uniform(1.0, 20.0) * dt;
-      return Motor(setup, draw, "lag", time, time, [time, dt] {
+      return Motor(setup, entry, "lag", time, time, [time, dt] {
         return [time, dt, given = std::nan("")](double u, double) mutable {
           if (std::isnan(given)) given = u;
           given += (1.0 - std::exp(-dt / time)) * (u - given);
@@ -101,33 +108,33 @@ One DrawMotor(const Setup& setup, Draw* draw, double duration) {
       });
     }
     case 4: {
-      const double zone = std::abs(draw->Size(1e-4, 1e-2));
-      return Motor(setup, draw, "dead zone", zone, zone, [zone] {
+      const double zone = std::abs(draw->Size(0.02, 0.8)) * torque;
+      return Motor(setup, entry, "dead zone", zone, zone, [zone] {
         return [zone](double u, double) { return std::abs(u) > zone ? u - std::copysign(zone, u) : 0.0; };
       });
     }
     case 5: {
-      const double step = std::abs(draw->Size(1e-3, 1e-1));
-      return Motor(setup, draw, "rounding to steps of", step, step,
+      const double step = std::abs(draw->Size(1e-3, 0.2)) * torque;
+      return Motor(setup, entry, "rounding to steps of", step, step,
                    [step] { return [step](double u, double) { return step * std::round(u / step); }; });
     }
     case 6: {
       const double rate = draw->Size(0.01, 1.0);
       const double begin = draw->Uniform(0.0, 0.3 * duration);
-      return Motor(setup, draw, "drift", rate, rate, [rate, begin] {
+      return Motor(setup, entry, "drift", rate, rate, [rate, begin] {
         return [rate, begin](double u, double t) { return u + rate * std::max(0.0, t - begin); };
       });
     }
     case 7: {
       const double offset = draw->Size(1e-3, 0.1);
       const double begin = draw->Uniform(0.0, 0.5 * duration), end = begin + 0.3 * duration;
-      return Motor(setup, draw, "offset", offset, offset, [=] {
+      return Motor(setup, entry, "offset", offset, offset, [=] {
         return [=](double u, double t) { return begin <= t && t < end ? u + offset : u; };
       });
     }
     default: {
       const double size = std::abs(draw->Size(1e-4, 1e-2));
-      return Motor(setup, draw, "noise, standard deviation", size, 5.0 * size, [size] {
+      return Motor(setup, entry, "noise, standard deviation", size, 5.0 * size, [size] {
         return [size, random = std::mt19937_64(7)](double u, double) mutable {
           // Of twelve even ones the sum has variance 1.
           double sum = -6.0;
@@ -295,6 +302,24 @@ One DrawBody(const Setup& setup, Draw* draw, double duration) {
   return one;
 }
 
+/// Another radius of one wheel or both, or another distance, from before the robot settles.
+One DrawWheels(const Setup& setup, Draw* draw) {
+  const Base& base = setup.model().base();
+  const size_t which = draw->Index(4);
+  const double change = draw->Size(1e-3, 2e-2) * (which == 3 ? base.wheel_distance : base.wheel_radius);
+  One one = which < 2 ? MakeOne("wheels", "wheel " + (which == 0 ? base.wheel_joint_right : base.wheel_joint_left),
+                                "radius", base.wheel_radius + change, change)
+            : which == 2 ? MakeOne("wheels", "wheels", "radius", base.wheel_radius + change, change)
+                         : MakeOne("wheels", "wheels", "distance", base.wheel_distance + change, change);
+  one.fault.from_start = true;
+  one.fault.engine = [which, change](const Setup& own, mjModel* m) {
+    if (which == 3) MoveWheels(own, m, change);
+    for (const size_t wheel : {size_t{0}, size_t{1}})
+      if (which == wheel || which == 2) ScaleWheel(own, m, wheel, change);
+  };
+  return one;
+}
+
 One DrawWorld(Draw* draw) {
   const double slope = std::abs(draw->Size(0.02, 0.3));
   const double heading = draw->Uniform(0.0, 2.0 * kPi);
@@ -308,13 +333,15 @@ One DrawWorld(Draw* draw) {
   return one;
 }
 
-One DrawOne(const Setup& setup, Draw* draw, double duration) {
-  switch (draw->Index(13)) {
+One DrawOne(const Setup& setup, Draw* draw, const DrawOptions& options) {
+  const double duration = options.duration;
+  const bool rolls = setup.model().base().type == BaseType::kDifferentialDrive;
+  switch (draw->Index(rolls ? 14 : 13)) {
     case 0:
     case 1:
     case 2:
     case 3:
-      return DrawMotor(setup, draw, duration);
+      return DrawMotor(setup, draw, options);
     case 4:
     case 5:
     case 6:
@@ -324,6 +351,8 @@ One DrawOne(const Setup& setup, Draw* draw, double duration) {
       return DrawJoint(setup, draw);
     case 12:
       return DrawWorld(draw);
+    case 13:
+      return DrawWheels(setup, draw);
     default:
       return DrawBody(setup, draw, duration);
   }
@@ -339,6 +368,7 @@ void Join(const PlantFault& more, PlantFault* fault) {
   const PlantFault first = *fault;
   fault->name += "; " + more.name;
   fault->kind += " + " + more.kind;
+  fault->from_start = first.from_start || more.from_start;
   fault->engine = Join(first.engine, more.engine, decltype(first.engine)([=](const Setup& setup, mjModel* m) {
                          first.engine(setup, m);
                          more.engine(setup, m);
@@ -365,14 +395,13 @@ void Join(const PlantFault& more, PlantFault* fault) {
 
 }  // namespace
 
-std::vector<DrawnFaults> DrawFaults(const Setup& setup, size_t count, size_t together, std::uint64_t seed,
-                                    double duration) {
+std::vector<DrawnFaults> DrawFaults(const Setup& setup, const DrawOptions& options) {
   std::vector<DrawnFaults> drawn;
-  for (size_t i = 0; i < count; ++i) {
-    Draw draw(seed * 1000003 + i);
+  for (size_t i = 0; i < options.count; ++i) {
+    Draw draw(options.seed * 1000003 + i);
     DrawnFaults& faults = drawn.emplace_back();
-    while (faults.truth.size() < together) {
-      const One one = DrawOne(setup, &draw, duration);
+    while (faults.truth.size() < options.together) {
+      const One one = DrawOne(setup, &draw, options);
       // One place has one fault.
       const bool taken = std::any_of(faults.truth.begin(), faults.truth.end(),
                                      [&](const Fault& other) { return other.place == one.truth.place; });

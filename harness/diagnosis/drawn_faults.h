@@ -19,9 +19,14 @@ struct DrawnFaults {
   std::vector<Fault> truth;  ///< Each as it should be told; `error` is by how much it changes its value.
 };
 
-/// @param count of sets. @param together faults in each.
-std::vector<DrawnFaults> DrawFaults(const Setup& setup, size_t count, size_t together, std::uint64_t seed,
-                                    double duration);
+struct DrawOptions {
+  size_t count = 0;     ///< Of sets.
+  size_t together = 1;  ///< Faults in each.
+  std::uint64_t seed = 1;
+  double duration = 0.0;  ///< Of the run, s.
+  VectorXd tau;           ///< Torques of the right run, which dead zones and steps are relative to.
+};
+std::vector<DrawnFaults> DrawFaults(const Setup& setup, const DrawOptions& options);
 
 /// How the explanations of a run compare with what was wrong in it.
 struct NamingScore {

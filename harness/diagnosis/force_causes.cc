@@ -443,10 +443,7 @@ class Problem {
       for (const auto& [same, amplitude] : term.same)
         one.faults.push_back(MakeFault(candidates_[same], amplitude, {}, gravity));
       one.SetOutcome();
-      if (term.rival != SIZE_MAX) {
-        one.rival = candidates_[term.rival].place + ": " + candidates_[term.rival].fault;
-        one.log_odds = term.log_odds;
-      }
+      if (term.rival != SIZE_MAX) one.SetRival(candidates_[term.rival], term.log_odds);
       causes->push_back(one);
     }
     return true;

@@ -150,10 +150,7 @@ Causes ExplainLaw(const StepStore& store) {
     one.faults.push_back(make(term.candidate, term.amplitude[0], term.error[0]));
     for (const auto& [same, amplitude] : term.same) one.faults.push_back(make(same, amplitude[0], 0.0));
     one.SetOutcome();
-    if (term.rival != SIZE_MAX) {
-      one.rival = candidates[term.rival].place + ": " + candidates[term.rival].fault;
-      one.log_odds = term.log_odds;
-    }
+    if (term.rival != SIZE_MAX) one.SetRival(candidates[term.rival], term.log_odds);
     causes.push_back(one);
   }
   return causes;

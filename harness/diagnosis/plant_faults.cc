@@ -402,15 +402,6 @@ int WheelBody(const Setup& setup, const mjModel& m, size_t wheel) {
   return m.jnt_bodyid[setup.adapter().wheels()[wheel].joint];
 }
 
-/// What of a wheel touches the floor.
-void ScaleWheel(const Setup& setup, mjModel* m, size_t wheel, double by) {
-  const int body = WheelBody(setup, *m, wheel);
-  for (int i = 0; i < m->body_geomnum[body]; ++i) {
-    const int geom = m->body_geomadr[body] + i;
-    if (CanTouch(*m, geom)) m->geom_size[3 * geom] += by;
-  }
-}
-
 /// Pairs of the floor, or of the object.
 void ChangePairs(mjModel* m, bool floor, const std::function<void(int pair)>& change) {
   for (int pair = 0; pair < m->npair; ++pair) {
@@ -446,8 +437,7 @@ void AddWheelFaults(const Roles& roles, std::vector<PlantFault>* faults) {
   add(World(
       "wheels: 2 mm farther apart", "wheels", Cause::kWheelGeometry, "wheel",
       [](const Setup& setup, mjModel* m) {
-        m->body_pos[3 * WheelBody(setup, *m, 0) + 1] -= 1e-3;
-        m->body_pos[3 * WheelBody(setup, *m, 1) + 1] += 1e-3;
+        MoveWheels(setup, m, 2e-3);
       },
       true));
   add(World("contacts: wheels slide, mu = 0.002", "contacts", Cause::kWheelSlip, "",
@@ -539,6 +529,19 @@ void AddSensorFaults(const Roles& roles, std::vector<PlantFault>* faults) {
 }
 
 }  // namespace
+
+void ScaleWheel(const Setup& setup, mjModel* m, size_t wheel, double by) {
+  const int body = WheelBody(setup, *m, wheel);
+  for (int i = 0; i < m->body_geomnum[body]; ++i) {
+    const int geom = m->body_geomadr[body] + i;
+    if (CanTouch(*m, geom)) m->geom_size[3 * geom] += by;
+  }
+}
+
+void MoveWheels(const Setup& setup, mjModel* m, double by) {
+  m->body_pos[3 * WheelBody(setup, *m, 0) + 1] -= 0.5 * by;
+  m->body_pos[3 * WheelBody(setup, *m, 1) + 1] += 0.5 * by;
+}
 
 std::vector<PlantFault> ListPlantFaults(const Setup& setup) {
   const Roles roles(setup);

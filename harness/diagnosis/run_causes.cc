@@ -4,13 +4,14 @@
 
 #include "harness/diagnosis/force_causes.h"
 #include "harness/diagnosis/law_causes.h"
+#include "harness/diagnosis/rolling_causes.h"
 #include "harness/diagnosis/signal_causes.h"
 
 namespace dexcheck {
 
 Causes ExplainRun(const StepStore& store) {
   Causes causes;
-  for (const auto explain : {ExplainSignals, ExplainLaw, ExplainForces}) {
+  for (const auto explain : {ExplainSignals, ExplainLaw, ExplainRolling, ExplainForces}) {
     Causes found = explain(store);
     std::move(found.begin(), found.end(), std::back_inserter(causes));
   }

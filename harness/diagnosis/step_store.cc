@@ -16,6 +16,8 @@ constexpr const char* kContactEntries[][2] = {{"contact u on the object", "rad"}
 constexpr Eigen::Index kContactSize = std::size(kContactEntries);
 constexpr Eigen::Index kObjectSize = 12, kTouchSize = 2;
 
+constexpr double kSpeedNoise = 1e-9;  // m/s
+
 template <typename Range>
 Eigen::Index CountOf(const Range& range) {
   return static_cast<Eigen::Index>(range.size());
@@ -30,7 +32,7 @@ StepStore::StepStore(const Setup& setup, const JudgedLaw* law)
   const Eigen::Index n = model.num_velocities(), m = CountOf(readings_);
   const Eigen::Index parts = law_ == nullptr ? 0 : law_->CountParts();
   const Eigen::Index sizes[kSignalCount] = {1, n, n, model.num_positions(), n, n, m,         m, n, 6,
-                                            12, 12, n, 2, n, 1, n * parts};
+                                            12, 12, n, 2, 2, 2, 2, n, 1, n * parts};
   for (int i = 0; i < kSignalCount; ++i) offsets_[i + 1] = offsets_[i] + sizes[i];
   before_.resize(offsets_[kSignalCount], kHistory);
   data_.resize(offsets_[kSignalCount], kCapacity);  // its pages are used only when something differs
@@ -164,6 +166,12 @@ void StepStore::Pack(const StepRecord& step, const StepAnalysis& now, bool answe
   at(kObjectPose).head<9>() = X_Bo.linear().reshaped();
   at(kObjectPose).tail<3>() = X_Bo.translation();
   at(kObjectMotion) << step.reading.state.V_Bo, response.V_Bo_dot;
+  at(kWheelRates) = now.wheel_rates;
+  at(kWheelMismatch) = now.wheel_mismatch;
+  at(kWheelNoise).setZero();
+  // Speeds that are compared are rounded, too.
+  if (answered && response.wheels.size() == 2)
+    at(kWheelNoise) = (now.wheel_slip.array() + now.sinking).max(kSpeedNoise);
   at(kLawNoise)[0] = 0.0;
   if (now.law == nullptr || law_ == nullptr || !law_->differs()) return;
   at(kLawNoise)[0] = kLawTorqueBound * law_->noise_scale();

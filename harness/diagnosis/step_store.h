@@ -43,6 +43,9 @@ class StepStore {
     kObjectMotion,       ///< 12: V_Bo and V_Bo_dot.
     kDryFriction,        ///< n: what the plant says of it, beyond the declared; 0 where it says nothing.
     kNoise,              ///< 2: of the robot's residual, in |.|_M^-1, and of the object's, N.
+    kWheelRates,         ///< 2, right and left, rad/s.
+    kWheelMismatch,      ///< 2, CalcRollingMismatch, m/s.
+    kWheelNoise,         ///< 2: what of that slipping and sinking may be, m/s; 0 without wheels.
     kLawDifference,      ///< n, E_bar' (tau' - tau'_printed).
     kLawNoise,           ///< Of that, in |.|_M^-1; 0 where the law is right or not known.
     kLawParts,           ///< n times their number: the summands, where the law differs.

@@ -75,9 +75,10 @@ RunCampaign::RunCampaign(const Scenario& scenario, std::filesystem::path robot, 
   if (scenario.plant.type == PlantType::kRigid)
     throw InputError(scenario.source + ": plant.type: faults are made in a run of the engine's plant");
   MakeSetups();
-  ListFaults();
   if (scenario.joint_task() == nullptr) MoveToStart(should_stop);
-  if (!should_stop()) RequireNoFaultToPass(should_stop);
+  if (should_stop()) return;
+  RequireNoFaultToPass(should_stop);
+  if (!should_stop()) ListFaults();
 }
 
 void RunCampaign::MakeSetups() {
@@ -99,8 +100,8 @@ void RunCampaign::ListFaults() {
   const RobotModel& model = setup_->model();
   if (options_.draws > 0) {
     for (const DrawnFaults& drawn :
-         DrawFaults(*setup_, static_cast<size_t>(options_.draws), static_cast<size_t>(options_.together),
-                    options_.seed, options_.duration)) {
+         DrawFaults(*setup_, {static_cast<size_t>(options_.draws), static_cast<size_t>(options_.together),
+                              options_.seed, options_.duration, tau_})) {
       if (getenv("DEXONLY") && drawn.fault.name.find(getenv("DEXONLY")) == std::string::npos) continue;  // DEBUG
       plants_.push_back(drawn.fault);
       singles_.push_back(drawn.each);
@@ -204,6 +205,7 @@ bool RunCampaign::RunLoop(const Setup& setup, LoopParts parts, RunMutant* mutant
   const PlantReading& reading = runner.loop().record().reading;
   end->resize(reading.qpos.size() + reading.qvel.size());
   *end << reading.qpos, reading.qvel;
+  if (tau_.size() == 0) tau_ = runner.loop().record().drive.tau;
   mutant->killed = result.verdict != Verdict::kPass;
   mutant->cause = result.attribution.cause;
   mutant->evidence = result.attribution.evidence;

@@ -91,6 +91,7 @@ class RunCampaign {
   std::unique_ptr<Setup> setup_;       // of the right robot, from the start
   std::unique_ptr<Setup> offsetd_;     // the same with an error that feedback has to answer
   VectorXd end_, offsetd_end_;         // where they come to without a fault
+  VectorXd tau_;                       // that they end with, in the first of both
   std::vector<Parameter> parameters_;  // by mutant, those of numbers first
   std::vector<LawFault> laws_;
   std::vector<EquationFault> equations_;
