@@ -306,7 +306,7 @@ One DrawBody(const Setup& setup, Draw* draw, double duration) {
 One DrawWheels(const Setup& setup, Draw* draw) {
   const Base& base = setup.model().base();
   const size_t which = draw->Index(4);
-  const double change = draw->Size(1e-3, 2e-2) * (which == 3 ? base.wheel_distance : base.wheel_radius);
+  const double change = draw->Size(2e-4, 2e-3) * (which == 3 ? 5.0 * base.wheel_distance : base.wheel_radius);
   One one = which < 2 ? MakeOne("wheels", "wheel " + (which == 0 ? base.wheel_joint_right : base.wheel_joint_left),
                                 "radius", base.wheel_radius + change, change)
             : which == 2 ? MakeOne("wheels", "wheels", "radius", base.wheel_radius + change, change)

@@ -1,5 +1,8 @@
 #include "harness/diagnosis/rolling_causes.h"
 
+#include <algorithm>
+#include <tuple>
+
 #include "harness/checks/wheel_rolling.h"
 #include "harness/diagnosis/cause_estimator.h"
 
@@ -51,8 +54,9 @@ Causes ExplainRolling(const StepStore& store) {
       candidates[static_cast<size_t>(2 + wheel)].columns(row, 0) = rate;
     }
   }
-  // Slip has one cause at all steps.
-  const CauseSelection selection = SelectCauses(y, candidates, {2, 1.0, static_cast<double>(count)});
+  // Slip and sinking change with the load, in some steps.
+  constexpr double kAlike = 8.0;
+  const CauseSelection selection = SelectCauses(y, candidates, {2, 1.0, std::min(kAlike, static_cast<double>(count))});
   if (y.squaredNorm() <= static_cast<double>(y.size())) return {};
   const auto name = [&](size_t i, const VectorXd& amplitude, double error) {
     const Candidate& one = candidates[i];

@@ -124,20 +124,25 @@ void AddLimits(const ArrayXd& u, const ArrayXd& got, const std::string& unit, bo
   shapes->push_back({"dead zone", unit, "", zone, 1, u.sign() * (u.abs() - zone).max(0.0), false});
 }
 
-/// Whole multiples of a step: the least that differs between two values, made better by all of them.
+/// Whole multiples of a step: the largest that divides all, made better by all of them.
 void AddSteps(const ArrayXd& u, const ArrayXd& got, const std::string& unit, std::vector<Shape>* shapes) {
-  std::vector<double> values(got.begin(), got.end());
-  std::sort(values.begin(), values.end());
-  const double rounding = 1e-9 * std::max(got.abs().maxCoeff(), std::numeric_limits<double>::min());
-  double step = std::numeric_limits<double>::infinity();
-  for (size_t i = 1; i < values.size(); ++i)
-    if (values[i] - values[i - 1] > rounding) step = std::min(step, values[i] - values[i - 1]);
-  if (!std::isfinite(step)) step = got.abs().maxCoeff();  // one value alone
-  if (!(step > 0.0)) return;
+  const double rounding = 1e-11 * got.abs().maxCoeff();
+  double step = 0.0;
+  for (double value : got) {
+    // By Euclid's algorithm, in which a remainder of rounding is none.
+    value = std::abs(value);
+    while (value > rounding) {
+      const double rest = step > 0.0 ? std::abs(std::remainder(value, step)) : 0.0;
+      if (step == 0.0) step = value;
+      if (!(rest > rounding)) break;
+      value = step;
+      step = rest;
+    }
+  }
+  // Multiples of what is hardly more than rounding are any values.
+  if (!(step > 1e3 * rounding)) return;
   const ArrayXd counts = (got / step).round();
-  const double square = SquaredNorm(counts);
-  if (!(square > 0.0)) return;
-  step = (counts * got).sum() / square;
+  step = (counts * got).sum() / SquaredNorm(counts);
   shapes->push_back({"rounding to steps of", unit, "", step, 1, step * (u / step).round(), false});
 }
 
@@ -458,8 +463,11 @@ void Tell(const Verdict& verdict, CauseChannel channel, Causes* causes) {
     for (size_t i = 1; i < verdict.fits.size(); ++i) {
       // Of several faults that are replaced together, the first of the others stands for all.
       const std::vector<Fault>& others = verdict.fits[i].faults;
-      for (size_t k = 0; k < (single ? std::min<size_t>(1, others.size()) : others.size()); ++k)
+      for (size_t k = 0; k < (single ? std::min<size_t>(1, others.size()) : others.size()); ++k) {
         one.faults.push_back(others[k]);
+        const std::vector<Fault>& same = verdict.fits[i].same[k];
+        one.faults.insert(one.faults.end(), same.begin(), same.end());
+      }
     }
     one.SetOutcome();
     causes->push_back(one);
