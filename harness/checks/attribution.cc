@@ -66,8 +66,9 @@ Cause AttributeExpectation(const CheckRecord& check, const MeasuredCauses& measu
   if (by_law < 0.0) return other;
   *evidence += "; (57) by itself leaves " + FormatNumber(by_law, 3) + " " + check.unit;
   if (by_law >= 0.5 * check.worst) return Cause::kControlLaw;
-  *evidence += measured.is_ideal ? ", contacts that give the rest"
-                                 : ", contacts that give and what the scenario declares of the plant the rest";
+  *evidence += measured.is_ideal
+                   ? ", contacts that give the rest"
+                   : ", contacts that give and what the scenario declares of the plant the rest";
   return measured.is_ideal ? Cause::kContactSoftness : Cause::kDeclared;
 }
 

@@ -150,9 +150,8 @@ const LawTerms& RunChecks::ReadLawTerms(const StepRecord& step) {
 }
 
 void RunChecks::CompareLaw(const StepRecord& step) {
-  const bool as_commanded =
-      declared_.is_ideal() && declared_step_->is_measured_right && step.drive.tau == step.command.tau &&
-      step.response.stop_force.size() == 0;
+  const bool as_commanded = declared_.is_ideal() && declared_step_->is_measured_right &&
+                            step.drive.tau == step.command.tau && step.response.stop_force.size() == 0;
   const LawErrors& errors = law_->Compare(step, ReadLawTerms(step), analysis(), as_commanded);
   analyzer_.SetLaw(&errors);
   if (!law_->follows_error() || step.time < setup_->scenario().expect.from) return;

@@ -118,7 +118,8 @@ void StepAnalyzer::Analyze() {
     const std::vector<EngineWheel>& wheels = setup_->adapter().wheels();
     now_.wheel_rates = {wheels[0].axis.y() * step.reading.qvel[wheels[0].dof],
                         wheels[1].axis.y() * step.reading.qvel[wheels[1].dof]};
-    now_.wheel_mismatch = CalcRollingMismatch(setup_->model().base(), step.reading.state.xi, now_.wheel_rates);
+    now_.wheel_mismatch =
+        CalcRollingMismatch(setup_->model().base(), step.reading.state.xi, now_.wheel_rates);
     // A tyre that gives rolls on a radius that is smaller by as much.
     for (Eigen::Index k = 0; k < 2; ++k) {
       const BodyContact& wheel = step.response.wheels[static_cast<size_t>(k)];
@@ -256,8 +257,9 @@ double StepAnalyzer::CalcUnevenForce() {
   const StepRecord& step = *now_.step;
   double slip = 0.0;
   for (const BodyContact& wheel : step.response.wheels) slip = std::max(slip, wheel.slip.norm());
-  const double turn =
-      step.response.wheels.empty() ? 0.0 : std::abs(CalcRollingTwist(setup_->model().base(), step.reading.state.xi)[1]);
+  const double turn = step.response.wheels.empty()
+                          ? 0.0
+                          : std::abs(CalcRollingTwist(setup_->model().base(), step.reading.state.xi)[1]);
   const double g = setup_->model().gravity().norm();
   // Traction acts in the middle of how far a tyre has sunk, and not at the whole radius: f_t / r times half
   // of that, with the robot's weight on a floor of mu <= 1.

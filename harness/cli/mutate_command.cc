@@ -150,15 +150,15 @@ void AddMutateCommand(Command app) {
                       .Check(WholeNumber(0, 100000))
                       .Needs(run)
                       .ShowDefault();
-  Option draws = command
-                     .AddOption("--draws", &request->run.options.draws,
-                                "In a run: sets of faults whose places, sizes and times are drawn, and whether "
-                                "they are named, in the place of the others")
-                     .TypeName("N")
-                     .Check(WholeNumber(1, 100000))
-                     .Needs(run);
-  command
-      .AddOption("--together", &request->run.options.together, "With --draws: faults at once")
+  Option draws =
+      command
+          .AddOption("--draws", &request->run.options.draws,
+                     "In a run: sets of faults whose places, sizes and times are drawn, and whether "
+                     "they are named, in the place of the others")
+          .TypeName("N")
+          .Check(WholeNumber(1, 100000))
+          .Needs(run);
+  command.AddOption("--together", &request->run.options.together, "With --draws: faults at once")
       .TypeName("N")
       .Check(WholeNumber(1, 5))
       .Needs(draws)

@@ -1,8 +1,8 @@
 #include "harness/cli/mutate_run.h"
 
-#include <map>
 #include <fmt/format.h>
 
+#include <map>
 #include <optional>
 
 #include "harness/base/interrupts.h"
@@ -49,11 +49,12 @@ CampaignFault Describe(const RunMutant& mutant) {
     fault.cause_right = counts && all;
     fault.part_named.reset();
     if (counts && mutant.killed)
-      fault.exception = all ? "" : fmt::format("{}: {}: {}", mutant.name,
-                                               score.wrong > 0      ? "WRONG NAME"
-                                               : score.in_class > 0 ? "class"
-                                                                    : "not explained",
-                                               mutant.causes);
+      fault.exception = all ? ""
+                            : fmt::format("{}: {}: {}", mutant.name,
+                                          score.wrong > 0      ? "WRONG NAME"
+                                          : score.in_class > 0 ? "class"
+                                                               : "not explained",
+                                          mutant.causes);
   }
   fault.details = {{"expected_cause", NameOf(mutant.expected)},
                    {"cause", NameOf(mutant.cause)},
@@ -91,8 +92,10 @@ void PrintScores(const Campaign& campaign) {
     count.wrong += fault.details["wrong"].get<int>();
   }
   for (const auto& [size, one] : counts)
-    fmt::print("{} sets of {}: all named in {}; of their faults {} named, {} up to a class, {} not explained; {} wrong names.\n",
-               one.sets, size, one.all_right, one.right, one.in_class, one.not_explained, one.wrong);
+    fmt::print(
+        "{} sets of {}: all named in {}; of their faults {} named, {} up to a class, {} not explained; {} "
+        "wrong names.\n",
+        one.sets, size, one.all_right, one.right, one.in_class, one.not_explained, one.wrong);
 }
 
 }  // namespace

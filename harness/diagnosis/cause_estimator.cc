@@ -15,7 +15,7 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 // A column of which less is left beside the others says nothing of its own.
 constexpr double kIndependent = 1e-7;
 constexpr double kImplausible = 3.0;  // times the plausible size
-constexpr size_t kRestarts = 8;        // other first choices that are tried where the first led nowhere
+constexpr size_t kRestarts = 8;       // other first choices that are tried where the first led nowhere
 
 /// What of a candidate shows above the noise: amplitudes are basis * a.
 struct Visible {
@@ -35,7 +35,8 @@ Visible Reduce(const Candidate& candidate, double noise) {
   }
   // Of C diag(scale) = U S V^T those with S above the noise.
   const VectorXd size = C.colwise().norm().transpose();
-  const VectorXd unit = is_bounded ? scale : VectorXd(size.unaryExpr([](double s) { return s > 0.0 ? 1.0 / s : 0.0; }));
+  const VectorXd unit =
+      is_bounded ? scale : VectorXd(size.unaryExpr([](double s) { return s > 0.0 ? 1.0 / s : 0.0; }));
   const MatrixXd scaled = C * unit.asDiagonal();
   const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(scaled.transpose() * scaled);
   const double largest = eigen.eigenvalues().tail<1>()[0];
@@ -102,14 +103,16 @@ class Search {
     const std::vector<double> scores = ScoreAll({});
     std::vector<Best> all;
     for (size_t i = 0; i < scores.size(); ++i)
-      if (std::isfinite(scores[i]) && std::find(found.begin(), found.end(), i) == found.end()) all.push_back({i, scores[i]});
+      if (std::isfinite(scores[i]) && std::find(found.begin(), found.end(), i) == found.end())
+        all.push_back({i, scores[i]});
     std::sort(all.begin(), all.end(), [](const Best& a, const Best& b) { return a.criterion < b.criterion; });
     std::vector<Best> firsts;
     std::vector<std::string> places;
     for (const Best& one : all) {
       const std::string& place = candidates_[one.candidate].place;
       if (firsts.size() == kRestarts) break;
-      if (std::find(places.begin(), places.end(), place) != places.end() || !CanBe(one.candidate, {})) continue;
+      if (std::find(places.begin(), places.end(), place) != places.end() || !CanBe(one.candidate, {}))
+        continue;
       places.push_back(place);
       firsts.push_back(one);
     }
@@ -181,8 +184,7 @@ class Search {
       own.col(k) /= size;
       const double along = own.col(k).dot(r);
       explained += along * along;
-      for (Index j = k + 1; j < own.cols(); ++j)
-        own.col(j) -= own.col(k).dot(own.col(j)) * own.col(k);
+      for (Index j = k + 1; j < own.cols(); ++j) own.col(j) -= own.col(k).dot(own.col(j)) * own.col(k);
     }
     return explained;
   }
@@ -200,7 +202,9 @@ class Search {
   /// Whether it and those can be, all at once.
   [[nodiscard]] bool CanBe(size_t candidate, std::vector<size_t> set) const {
     set.push_back(candidate);
-    const auto is_free = [&](size_t i) { return !candidates_[i].is_possible && candidates_[i].scale.size() == 0; };
+    const auto is_free = [&](size_t i) {
+      return !candidates_[i].is_possible && candidates_[i].scale.size() == 0;
+    };
     if (std::all_of(set.begin(), set.end(), is_free)) return true;
     const VectorXd a = Solve(Collect(set));
     Index width = 0;
@@ -209,7 +213,8 @@ class Search {
       const Index r = visible_[i].columns.cols();
       const VectorXd amplitude = visible_[i].basis * a.segment(width, r);
       width += r;
-      if (one.scale.size() > 0 && (amplitude.array().abs() > kImplausible * one.scale.array()).any()) return false;
+      if (one.scale.size() > 0 && (amplitude.array().abs() > kImplausible * one.scale.array()).any())
+        return false;
       if (one.is_possible && !one.is_possible(amplitude)) return false;
     }
     return true;

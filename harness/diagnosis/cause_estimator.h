@@ -7,7 +7,8 @@
 //
 //   n log(floor + |y - C_S a|^2 / N) + p_S log n + 2 |S| log m
 //
-// (the extended Bayesian information criterion of n samples and m candidates, of which p_S amplitudes are fitted)
+// (the extended Bayesian information criterion of n samples and m candidates, of which p_S amplitudes are
+// fitted)
 //
 // by orthogonal matching pursuit, in which every choice is looked at again after each that follows it, and
 // which ends where no more than noise is left.
@@ -43,13 +44,13 @@ struct Candidate {
 /// A candidate that is part of the explanation.
 struct CauseTerm {
   size_t candidate = 0;
-  VectorXd amplitude, error;   ///< p, with standard errors: infinite where nothing is known of it.
-  double fraction = 0.0;       ///< Of |y|^2 that is left over without it.
+  VectorXd amplitude, error;  ///< p, with standard errors: infinite where nothing is known of it.
+  double fraction = 0.0;      ///< Of |y|^2 that is left over without it.
   /// Candidates that would do as well in its place with no more columns, and their amplitudes there: not
   /// isolable from it.
   std::vector<std::pair<size_t, VectorXd>> same;
-  size_t rival = SIZE_MAX;     ///< The next best in its place; SIZE_MAX for none.
-  double log_odds = 0.0;       ///< Against the rival, natural logarithm.
+  size_t rival = SIZE_MAX;  ///< The next best in its place; SIZE_MAX for none.
+  double log_odds = 0.0;    ///< Against the rival, natural logarithm.
 };
 
 struct CauseSelection {
@@ -57,7 +58,7 @@ struct CauseSelection {
   double fraction = 0.0;         ///< Of |y|^2 that they explain.
   double left = 0.0;             ///< Root mean square of what is left over, in units of noise.
   double criterion = 0.0;
-  VectorXd residual;             ///< What is left over (N).
+  VectorXd residual;  ///< What is left over (N).
 };
 
 struct CauseOptions {

@@ -40,7 +40,7 @@ enum class CauseOutcome {
 struct Explanation {
   CauseChannel channel = CauseChannel::kActuation;
   CauseOutcome outcome = CauseOutcome::kNamed;
-  std::vector<Fault> faults;  ///< The most likely first; where nothing explains it, the nearest.
+  std::vector<Fault> faults;    ///< The most likely first; where nothing explains it, the nearest.
   double from = 0.0, to = 0.0;  ///< When it was seen, s.
   bool ends = false;            ///< Whether it was over before the run was.
   double fraction = 0.0;        ///< Of its channel's residual there, squared.

@@ -38,7 +38,8 @@ struct One {
   Fault truth;
 };
 
-One MakeOne(const char* kind, const std::string& place, const std::string& name, double value, double change) {
+One MakeOne(const char* kind, const std::string& place, const std::string& name, double value,
+            double change) {
   One one;
   one.fault.name = place + ": " + name + " " + FormatNumber(value, 4);
   one.fault.kind = kind;
@@ -62,8 +63,8 @@ One Motor(const Setup& setup, int entry, const std::string& name, double value, 
   const Base& base = model.base();
   const int offset = model.num_base_velocities();
   const std::string joint = entry >= offset ? model.dof_name(entry - offset)
-                            : entry == 0   ? base.wheel_joint_right
-                                           : base.wheel_joint_left;
+                            : entry == 0    ? base.wheel_joint_right
+                                            : base.wheel_joint_left;
   One one = MakeOne("motor", "motor " + joint, name, value, change);
   one.fault.motors = [entry, make](const Setup&) -> MotorFault {
     return [entry, give = make()](double t, VectorXd* tau) { (*tau)[entry] = give((*tau)[entry], t); };
@@ -213,8 +214,8 @@ void PushJoint(const mjModel& m, int joint, double size, mjData* d) {
   const int body = m.jnt_bodyid[joint], parent = m.body_parentid[body];
   const Vector3d push = size * Eigen::Map<const Vector3d>(d->xaxis + 3 * joint);
   const bool slides = m.jnt_type[joint] == mjJNT_SLIDE;
-  const Vector3d arm = Eigen::Map<const Vector3d>(d->xipos + 3 * body) -
-                       Eigen::Map<const Vector3d>(d->xipos + 3 * parent);
+  const Vector3d arm =
+      Eigen::Map<const Vector3d>(d->xipos + 3 * body) - Eigen::Map<const Vector3d>(d->xipos + 3 * parent);
   Vector6d wrench = Vector6d::Zero();
   if (slides) {
     wrench << push, Vector3d::Zero();
@@ -273,7 +274,8 @@ One DrawBody(const Setup& setup, Draw* draw, double duration) {
     const MassProperties& own = model.joints()[i].body;
     const int id = FindId(setup.engine(), mjOBJ_BODY, model.joints()[i].link);
     constexpr double kSame = 1e-6;
-    if (own.mass > 0.0 && std::abs(setup.engine().body_mass[id] - own.mass) <= kSame * own.mass) links.push_back(i);
+    if (own.mass > 0.0 && std::abs(setup.engine().body_mass[id] - own.mass) <= kSame * own.mass)
+      links.push_back(i);
   }
   const size_t link = links[draw->Index(links.size())];
   const std::string body = on_object ? setup.object().name : model.joints()[link].link;
@@ -289,7 +291,8 @@ One DrawBody(const Setup& setup, Draw* draw, double duration) {
     return one;
   }
   const bool moment = which == 1;
-  const double size = std::abs(draw->Size(on_object ? 1e-3 : 1e-2, on_object ? 0.1 : 2.0)) * (moment ? 0.1 : 1.0);
+  const double size =
+      std::abs(draw->Size(on_object ? 1e-3 : 1e-2, on_object ? 0.1 : 2.0)) * (moment ? 0.1 : 1.0);
   const bool burst = draw->Index(3) == 0;
   const double begin = burst ? draw->Uniform(0.0, 0.5 * duration) : 0.0;
   const double end = burst ? begin + 0.3 * duration : 1e9;
@@ -307,8 +310,9 @@ One DrawWheels(const Setup& setup, Draw* draw) {
   const Base& base = setup.model().base();
   const size_t which = draw->Index(4);
   const double change = draw->Size(2e-4, 2e-3) * (which == 3 ? 5.0 * base.wheel_distance : base.wheel_radius);
-  One one = which < 2 ? MakeOne("wheels", "wheel " + (which == 0 ? base.wheel_joint_right : base.wheel_joint_left),
-                                "radius", base.wheel_radius + change, change)
+  One one = which < 2
+                ? MakeOne("wheels", "wheel " + (which == 0 ? base.wheel_joint_right : base.wheel_joint_left),
+                          "radius", base.wheel_radius + change, change)
             : which == 2 ? MakeOne("wheels", "wheels", "radius", base.wheel_radius + change, change)
                          : MakeOne("wheels", "wheels", "distance", base.wheel_distance + change, change);
   one.fault.from_start = true;
@@ -373,24 +377,25 @@ void Join(const PlantFault& more, PlantFault* fault) {
                          first.engine(setup, m);
                          more.engine(setup, m);
                        }));
-  fault->forces = Join(first.forces, more.forces,
-                       decltype(first.forces)([=](const mjModel& m, double t, mjData* d) {
-                         first.forces(m, t, d);
-                         more.forces(m, t, d);
-                       }));
-  fault->motors = Join(first.motors, more.motors, decltype(first.motors)([=](const Setup& setup) -> MotorFault {
-                         return [a = first.motors(setup), b = more.motors(setup)](double t, VectorXd* tau) {
-                           a(t, tau);
-                           b(t, tau);
-                         };
-                       }));
-  fault->sensors = Join(first.sensors, more.sensors,
-                        decltype(first.sensors)([=](const Setup& setup) -> SensorFault {
-                          return [a = first.sensors(setup), b = more.sensors(setup)](double t, MeasuredState* told) {
-                            a(t, told);
-                            b(t, told);
-                          };
-                        }));
+  fault->forces =
+      Join(first.forces, more.forces, decltype(first.forces)([=](const mjModel& m, double t, mjData* d) {
+             first.forces(m, t, d);
+             more.forces(m, t, d);
+           }));
+  fault->motors =
+      Join(first.motors, more.motors, decltype(first.motors)([=](const Setup& setup) -> MotorFault {
+             return [a = first.motors(setup), b = more.motors(setup)](double t, VectorXd* tau) {
+               a(t, tau);
+               b(t, tau);
+             };
+           }));
+  fault->sensors =
+      Join(first.sensors, more.sensors, decltype(first.sensors)([=](const Setup& setup) -> SensorFault {
+             return [a = first.sensors(setup), b = more.sensors(setup)](double t, MeasuredState* told) {
+               a(t, told);
+               b(t, told);
+             };
+           }));
 }
 
 }  // namespace
@@ -439,8 +444,7 @@ NamingScore ScoreNames(const std::vector<Fault>& truth, const std::vector<Fault>
     if (explanation.outcome != CauseOutcome::kNamed) continue;
     const Fault& first = explanation.faults.front();
     const auto of = std::find_if(all.begin(), all.end(), [&](const Fault& one) { return one.IsLike(first); });
-    if (of == all.end() ||
-        std::abs(first.value - of->value) > std::max(kNear * of->error, 3.0 * first.error))
+    if (of == all.end() || std::abs(first.value - of->value) > std::max(kNear * of->error, 3.0 * first.error))
       ++score.wrong;
   }
   return score;

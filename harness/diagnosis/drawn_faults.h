@@ -14,7 +14,7 @@ namespace dexcheck {
 
 /// Faults that are there at once.
 struct DrawnFaults {
-  PlantFault fault;          ///< All of them.
+  PlantFault fault;  ///< All of them.
   std::vector<PlantFault> each;
   std::vector<Fault> truth;  ///< Each as it should be told; `error` is by how much it changes its value.
 };
@@ -30,10 +30,10 @@ std::vector<DrawnFaults> DrawFaults(const Setup& setup, const DrawOptions& optio
 
 /// How the explanations of a run compare with what was wrong in it.
 struct NamingScore {
-  int right = 0;          ///< Named: kind, place, and value within 5 % of the change or 3 standard errors.
-  int in_class = 0;       ///< Named with others that this motion does not tell apart.
+  int right = 0;     ///< Named: kind, place, and value within 5 % of the change or 3 standard errors.
+  int in_class = 0;  ///< Named with others that this motion does not tell apart.
   int not_explained = 0;
-  int wrong = 0;          ///< Single names, or values, of what was not so.
+  int wrong = 0;  ///< Single names, or values, of what was not so.
 };
 /// @param truth what should be named. @param all what may be, besides: too small to be seen alone.
 NamingScore ScoreNames(const std::vector<Fault>& truth, const std::vector<Fault>& all, const Causes& causes);

@@ -4,8 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <optional>
-#include <cstdio>
-#include <cstdlib>
+#include <tuple>
 
 #include "controller/common/text.h"
 #include "controller/dynamics/tree_factor.h"
@@ -55,8 +54,8 @@ Eigen::Matrix<double, 3, 6> InertiaTimes(const Vector3d& a) {
 /// Wrench [force; moment] about a body's centre of mass, in its axes, that its inertia takes, by its mass,
 /// centre of mass and inertia.
 struct BodyWrench {
-  Vector6d mass;                                 // of 1 kg more at the centre of mass
-  Eigen::Matrix<double, 6, 3> first_moment;      // of 1 kg m
+  Vector6d mass;                             // of 1 kg more at the centre of mass
+  Eigen::Matrix<double, 6, 3> first_moment;  // of 1 kg m
   Eigen::Matrix<double, 6, 6> inertia;
 
   /// @param a acceleration of the centre of mass less gravity. All in the body's axes.
@@ -149,7 +148,9 @@ class StepForces {
       // Masses, frictions and the like are not negative.
       constexpr double kRounding = 1e-6;
       if (scale.size() == 1 && std::string_view(fault) != "torque")
-        candidates->back().is_possible = [=](const VectorXd& a) { return a[0] >= -nominal * (1.0 + kRounding); };
+        candidates->back().is_possible = [=](const VectorXd& a) {
+          return a[0] >= -nominal * (1.0 + kRounding);
+        };
     }
     return (*candidates)[next_++];
   }
@@ -180,6 +181,7 @@ class StepForces {
   void AddLink(int link, std::vector<Candidate>* candidates);
   void AddObjectForces(std::vector<Candidate>* candidates);
   void AddGravity(std::vector<Candidate>* candidates);
+  void AddWheels(std::vector<Candidate>* candidates);
 
   const StepStore& store_;
   RobotModel model_;
@@ -204,6 +206,37 @@ void StepForces::AddColumns(Index begin, Index steps, std::vector<Candidate>* ca
   for (int link = is_fixed ? 0 : -1; link < model_.num_joints(); ++link) AddLink(link, candidates);
   if (store_.setup().has_object()) AddObjectForces(candidates);
   AddGravity(candidates);
+  if (model_.base().type == BaseType::kDifferentialDrive && model_.base().velocity == DriveVelocity::kTwist)
+    AddWheels(candidates);
+}
+
+void StepForces::AddWheels(std::vector<Candidate>* candidates) {
+  // Net torques of the wheels push the platform by W^T, and wheels that are farther apart turn with it.
+  const Base& base = model_.base();
+  const Vector2d tau = store_.Get(StepStore::kTauReceived).col(step_).head<2>();
+  const Vector2d v = store_.Get(StepStore::kVelocity).col(step_).head<2>();
+  const Vector2d v_dot = store_.Get(StepStore::kAcceleration).col(step_).head<2>();
+  const auto push = [&](const Vector3d& r_r_l_b) {
+    Matrix2d W;
+    W << 1.0 / r_r_l_b[0], 0.5 * r_r_l_b[2] / r_r_l_b[0], 1.0 / r_r_l_b[1], -0.5 * r_r_l_b[2] / r_r_l_b[1];
+    const WheelProperties& wheel = base.wheel;
+    Vector2d f =
+        W.transpose() * (tau - (wheel.spin_inertia + wheel.armature) * (W * v_dot) - wheel.damping * (W * v));
+    f[1] -= 0.5 * wheel.mass * r_r_l_b[2] * r_r_l_b[2] * v_dot[1];
+    return f;
+  };
+  const Vector3d nominal(base.wheel_radius, base.wheel_radius, base.wheel_distance);
+  constexpr double kStep = 1e-6;  // m, of the difference quotient
+  for (const auto& [fault, place, direction] :
+       {std::tuple{"radius", std::string("wheels"), Vector3d(1, 1, 0)},
+        {"radius", "wheel " + base.wheel_joint_right, Vector3d(1, 0, 0)},
+        {"radius", "wheel " + base.wheel_joint_left, Vector3d(0, 1, 0)},
+        {"distance", std::string("wheels"), Vector3d(0, 0, 1)}}) {
+    VectorXd f = VectorXd::Zero(n_);
+    f.head<2>() = (push(nominal + kStep * direction) - push(nominal - kStep * direction)) / (2.0 * kStep);
+    const double size = direction[2] > 0.0 ? base.wheel_distance : base.wheel_radius;
+    AddRobot(&Next(candidates, fault, place, "m", size, VectorXd::Constant(1, size)), f);
+  }
 }
 
 void StepForces::AddJoints(std::vector<Candidate>* candidates) {
@@ -219,13 +252,12 @@ void StepForces::AddJoints(std::vector<Candidate>* candidates) {
   }
   for (Index i = wheels ? 0 : offset; i < n_; ++i) {
     const int dof = static_cast<int>(i) - offset;
-    const Joint* joint =
-        dof < 0 ? nullptr : &model_.joints()[static_cast<size_t>(model_.joint_of_dof(dof))];
+    const Joint* joint = dof < 0 ? nullptr : &model_.joints()[static_cast<size_t>(model_.joint_of_dof(dof))];
     const bool slides = joint != nullptr && joint->type == JointType::kPrismatic;
     const std::string force = slides ? "N" : "N m", length = slides ? "m" : "rad";
     const std::string place =
-        "joint " + (joint == nullptr ? (i == 0 ? base.wheel_joint_right : base.wheel_joint_left)
-                                     : model_.dof_name(dof));
+        "joint " +
+        (joint == nullptr ? (i == 0 ? base.wheel_joint_right : base.wheel_joint_left) : model_.dof_name(dof));
     VectorXd f(n_);
     actuation_.CalcForce(VectorXd::Unit(n_, i), f);
     AddRobot(&Next(candidates, "torque", place, force, 0.0, Weights(1)), f);
@@ -243,14 +275,17 @@ void StepForces::AddJoints(std::vector<Candidate>* candidates) {
       bearing.nominal = std::max(bearing.nominal, std::abs(known));
       AddRobot(&bearing, VectorXd(known * f));
     }
-    AddRobot(&Next(candidates, "dry friction", place, force, joint == nullptr ? 0.0 : joint->dry_friction, Weights(1)),
+    AddRobot(&Next(candidates, "dry friction", place, force, joint == nullptr ? 0.0 : joint->dry_friction,
+                   Weights(1)),
              VectorXd(-sign * f));
     if (joint == nullptr || joint->type == JointType::kBall) continue;
     MatrixXd spring(n_, 2);
     spring << -q[model_.position_index(model_.joint_of_dof(dof))] * f, f;
     Candidate& candidate = Next(candidates, "spring", place, force + "/" + length, 0.0, Weights(2));
     candidate.is_ordinary = true;
-    candidate.is_possible = [](const VectorXd& a) { return a[0] > 0.0 && std::abs(a[1]) <= kFarthest * a[0]; };
+    candidate.is_possible = [](const VectorXd& a) {
+      return a[0] > 0.0 && std::abs(a[1]) <= kFarthest * a[0];
+    };
     AddRobot(&candidate, spring);
   }
 }
@@ -271,8 +306,7 @@ void StepForces::AddLink(int link, std::vector<Candidate>* candidates) {
   const BodyWrench wrench(a, w, V_dot.tail<3>());
   const MatrixXd J_T = J.transpose();
   const MatrixXd forces = J_T.leftCols<3>(), moments = J_T.rightCols<3>();
-  AddRobot(&Next(candidates, kForce, place, "N", 0.0, Weights(3)),
-           MatrixXd(forces * R.transpose()));
+  AddRobot(&Next(candidates, kForce, place, "N", 0.0, Weights(3)), MatrixXd(forces * R.transpose()));
   AddRobot(&Next(candidates, kForceInAxes, place, "N", 0.0, Weights(3)), forces);
   AddRobot(&Next(candidates, "moment", place, "N m", 0.0, Weights(3)), MatrixXd(moments * R.transpose()));
   AddRobot(&Next(candidates, kMomentInAxes, place, "N m", 0.0, Weights(3)), moments);
@@ -287,7 +321,8 @@ void StepForces::AddLink(int link, std::vector<Candidate>* candidates) {
   I << body.inertia(0, 0), body.inertia(1, 1), body.inertia(2, 2), body.inertia(0, 1), body.inertia(0, 2),
       body.inertia(1, 2);
   const VectorXd scaled = -J_T * (wrench.mass * body.mass + wrench.inertia * I);
-  AddRobot(&Next(candidates, kMassWithInertia, place, "kg", body.mass, Masses(1)), VectorXd(scaled / body.mass));
+  AddRobot(&Next(candidates, kMassWithInertia, place, "kg", body.mass, Masses(1)),
+           VectorXd(scaled / body.mass));
   const MatrixXd inertia = -J_T * wrench.inertia;
   AddRobot(&Next(candidates, "inertia", place, "kg m^2", 0.0, Masses(6)), inertia);
   // Another centre of mass changes the inertia about the old one.
@@ -318,7 +353,8 @@ void StepForces::AddObjectForces(std::vector<Candidate>* candidates) {
   AddObject(&Next(candidates, kForce, place, "N", 0.0, Weights(3)), stack(R_T, zero));
   AddObject(&Next(candidates, kForceInAxes, place, "N", 0.0, Weights(3)), stack(Matrix3d::Identity(), zero));
   AddObject(&Next(candidates, "moment", place, "N m", 0.0, Weights(3)), stack(zero, R_T));
-  AddObject(&Next(candidates, kMomentInAxes, place, "N m", 0.0, Weights(3)), stack(zero, Matrix3d::Identity()));
+  AddObject(&Next(candidates, kMomentInAxes, place, "N m", 0.0, Weights(3)),
+            stack(zero, Matrix3d::Identity()));
   Matrix6d both = Matrix6d::Zero();
   both.topLeftCorner<3, 3>() = both.bottomRightCorner<3, 3>() = R_T;
   AddObject(&Next(candidates, "force and moment", place, "N", 0.0, Weights(6)), both);
@@ -353,7 +389,8 @@ void StepForces::AddGravity(std::vector<Candidate>* candidates) {
   Eigen::Matrix<double, 6, 3> object = Eigen::Matrix<double, 6, 3>::Zero();
   const VectorXd pose = store_.Get(StepStore::kObjectPose).col(step_);
   if (store_.setup().has_object())
-    object.topRows<3>() = store_.setup().declared_object().body.mass * pose.head<9>().reshaped(3, 3).transpose();
+    object.topRows<3>() =
+        store_.setup().declared_object().body.mass * pose.head<9>().reshaped(3, 3).transpose();
   Candidate& gravity = Next(candidates, "gravity off by", kWorld, "m/s^2", 0.0, VectorXd::Constant(3, 20.0));
   for (Index k = 0; k < 3; ++k)
     gravity.columns.col(k).segment(begin_, rows()) = Whiten(weights.col(k), Vector6d(object.col(k)));
@@ -365,9 +402,11 @@ std::string TellVector(const Eigen::Ref<const VectorXd>& v) {
   return text + ")";
 }
 
-Fault MakeFault(const Candidate& candidate, const VectorXd& a, const VectorXd& error, const Vector3d& gravity) {
-  Fault fault{candidate.fault, candidate.place, candidate.nominal + a[0], error.size() > 0 ? error[0] : 0.0,
-              candidate.unit, ""};
+Fault MakeFault(const Candidate& candidate, const VectorXd& a, const VectorXd& error,
+                const Vector3d& gravity) {
+  Fault fault{candidate.fault,          candidate.place,
+              candidate.nominal + a[0], error.size() > 0 ? error[0] : 0.0,
+              candidate.unit,           ""};
   if (candidate.fault == kBearing) {
     fault.fault = "dry friction";
     fault.value = candidate.nominal * a[0];
@@ -414,7 +453,8 @@ struct Segment {
 /// One residual and what explains it.
 class Problem {
  public:
-  Problem(const StepStore& store, StepForces* forces, const Segment& segment) : store_(store), forces_(forces) {
+  Problem(const StepStore& store, StepForces* forces, const Segment& segment)
+      : store_(store), forces_(forces) {
     const auto count = static_cast<Index>(segment.steps.size());
     steps_ = std::min(count, kMostSteps);
     for (Index i = 0; i < steps_; ++i)
@@ -481,8 +521,8 @@ class Problem {
     const double rows = static_cast<double>(y_.size());
     for (size_t i = 0; i < candidates_.size(); ++i) {
       const Candidate& candidate = candidates_[i];
-      if (candidate.fault != "torque" && candidate.fault != kForce &&
-          candidate.fault != "moment" && candidate.fault != "force and moment")
+      if (candidate.fault != "torque" && candidate.fault != kForce && candidate.fault != "moment" &&
+          candidate.fault != "force and moment")
         continue;
       Free free{.candidate = i, .left = 0.0};
       for (Index k = 0; k < steps_; ++k) {
@@ -574,7 +614,8 @@ class Problem {
     const Index rows = forces_->rows();
     double square = 0.0;
     for (Index k = 0; k < steps_; ++k) square += y_.segment(k * rows + first, count).squaredNorm();
-    const double unit = 1.0 / std::sqrt(1.0 + kAccuracy * kAccuracy * square / static_cast<double>(count * steps_));
+    const double unit =
+        1.0 / std::sqrt(1.0 + kAccuracy * kAccuracy * square / static_cast<double>(count * steps_));
     for (Index k = 0; k < steps_; ++k) {
       y_.segment(k * rows + first, count) *= unit;
       for (Candidate& one : candidates_) one.columns.middleRows(k * rows + first, count) *= unit;
@@ -603,11 +644,6 @@ void FindSegments(const StepStore& store, StepForces* forces, Segment* whole, st
     forces->SetStep(i);
     const VectorXd y = forces->CalcResidual();
     const Index n = y.size() - 6;
-    if (getenv("DEXDBG")) {
-      FILE* f = fopen("/tmp/parts.txt", "a");
-      fprintf(f, "step %ld noise %g %g y %g %g\n", i, store.Get(StepStore::kNoise)(0, i), store.Get(StepStore::kNoise)(1, i), y.head(n).norm(), y.tail<6>().norm());
-      fclose(f);
-    }
     const bool differs = y.head(n).squaredNorm() > static_cast<double>(n) || y.tail<6>().squaredNorm() > 6.0;
     if (differs) {
       const bool follows = !steps.empty() && steps.back().index == i - 1;
@@ -619,7 +655,7 @@ void FindSegments(const StepStore& store, StepForces* forces, Segment* whole, st
     }
     before = y;
   }
-  const auto jumps = [&](size_t k, double Step::* size) {
+  const auto jumps = [&](size_t k, double Step::*size) {
     double around = k > 0 ? steps[k - 1].*size : 0.0;
     if (k + 1 < steps.size()) around = std::max(around, steps[k + 1].*size);
     return steps[k].*size > std::max(kJumpNoise, kJump * around);
@@ -657,8 +693,6 @@ Causes ExplainForces(const StepStore& store) {
   if (whole.steps.empty()) return causes;
   Problem problem(store, &forces, whole);
   if (problem.ExplainConstant(whole, &causes)) return causes;
-  if (getenv("DEXDBG"))
-    for (FILE* f = fopen("/tmp/parts.txt", "a"); auto& x : parts) fprintf(f, "part %g %g n=%zu\n", x.from, x.to, x.steps.size()), fflush(f);
   if (parts.size() > 1 && parts.size() <= kMostSegments) {
     Causes found;
     bool all = true;

@@ -40,7 +40,8 @@ std::vector<Place> ListPlaces(const StepStore& store) {
     if (finger.entries.size() > 1) places.push_back(finger);
   }
   for (Index i = 0; i < model.num_velocities(); ++i)
-    places.push_back({"law of " + store.motors()[static_cast<size_t>(i)].place.substr(sizeof("motor ") - 1), {i}});
+    places.push_back(
+        {"law of " + store.motors()[static_cast<size_t>(i)].place.substr(sizeof("motor ") - 1), {i}});
   return places;
 }
 

@@ -436,10 +436,7 @@ void AddWheelFaults(const Roles& roles, std::vector<PlantFault>* faults) {
       [](const Setup& setup, mjModel* m) { ScaleWheel(setup, m, 1, -5e-5); }, true));
   add(World(
       "wheels: 2 mm farther apart", "wheels", Cause::kWheelGeometry, "wheel",
-      [](const Setup& setup, mjModel* m) {
-        MoveWheels(setup, m, 2e-3);
-      },
-      true));
+      [](const Setup& setup, mjModel* m) { MoveWheels(setup, m, 2e-3); }, true));
   add(World("contacts: wheels slide, mu = 0.002", "contacts", Cause::kWheelSlip, "",
             [](const Setup&, mjModel* m) { SetFriction(m, true, 0.002); }));
 }
@@ -534,8 +531,12 @@ void ScaleWheel(const Setup& setup, mjModel* m, size_t wheel, double by) {
   const int body = WheelBody(setup, *m, wheel);
   for (int i = 0; i < m->body_geomnum[body]; ++i) {
     const int geom = m->body_geomadr[body] + i;
-    if (CanTouch(*m, geom)) m->geom_size[3 * geom] += by;
+    if (!CanTouch(*m, geom)) continue;
+    m->geom_size[3 * geom] += by;
+    m->geom_rbound[geom] += by;
   }
+  // The floor stays where it is touched.
+  m->body_pos[3 * body + 2] += by;
 }
 
 void MoveWheels(const Setup& setup, mjModel* m, double by) {

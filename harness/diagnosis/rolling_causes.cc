@@ -29,10 +29,10 @@ Causes ExplainRolling(const StepStore& store) {
   const auto count = static_cast<Index>(steps.size());
   VectorXd y(2 * count);
   std::vector<Candidate> candidates;
-  for (const auto& [fault, place, nominal] :
-       {std::tuple{"radius", "wheels", base.wheel_radius}, {"distance", "wheels", base.wheel_distance},
-        {"radius", base.wheel_joint_right.c_str(), base.wheel_radius},
-        {"radius", base.wheel_joint_left.c_str(), base.wheel_radius}}) {
+  for (const auto& [fault, place, nominal] : {std::tuple{"radius", "wheels", base.wheel_radius},
+                                              {"distance", "wheels", base.wheel_distance},
+                                              {"radius", base.wheel_joint_right.c_str(), base.wheel_radius},
+                                              {"radius", base.wheel_joint_left.c_str(), base.wheel_radius}}) {
     const bool is_one = std::string_view(place) != "wheels";
     candidates.push_back({.fault = fault,
                           .place = is_one ? std::string("wheel ") + place : place,
@@ -56,7 +56,8 @@ Causes ExplainRolling(const StepStore& store) {
   }
   // Slip and sinking change with the load, in some steps.
   constexpr double kAlike = 8.0;
-  const CauseSelection selection = SelectCauses(y, candidates, {2, 1.0, std::min(kAlike, static_cast<double>(count))});
+  const CauseSelection selection =
+      SelectCauses(y, candidates, {2, 1.0, std::min(kAlike, static_cast<double>(count))});
   if (y.squaredNorm() <= static_cast<double>(y.size())) return {};
   const auto name = [&](size_t i, const VectorXd& amplitude, double error) {
     const Candidate& one = candidates[i];
@@ -75,7 +76,8 @@ Causes ExplainRolling(const StepStore& store) {
     one.faults.push_back(name(term.candidate, term.amplitude, term.error[0]));
     for (const auto& [same, amplitude] : term.same) one.faults.push_back(name(same, amplitude, 0.0));
     one.SetOutcome();
-    if (!(selection.left <= 1.0 || selection.fraction >= kExplains)) one.outcome = CauseOutcome::kNotExplained;
+    if (!(selection.left <= 1.0 || selection.fraction >= kExplains))
+      one.outcome = CauseOutcome::kNotExplained;
     if (term.rival != SIZE_MAX) one.SetRival(candidates[term.rival], term.log_odds);
     causes.push_back(one);
   }

@@ -17,10 +17,13 @@ void DropConsequences(const StepStore& store, Causes* causes) {
   };
   if (std::none_of(causes->begin(), causes->end(), rolls)) return;
   const Base& base = store.setup().model().base();
-  const std::string places[] = {"link " + base.link, "joint " + base.wheel_joint_right, "joint " + base.wheel_joint_left};
+  const std::string places[] = {"link " + base.link, "joint " + base.wheel_joint_right,
+                                "joint " + base.wheel_joint_left};
   std::erase_if(*causes, [&](const Explanation& one) {
     if (one.channel != CauseChannel::kBalance) return false;
-    return std::find(std::begin(places), std::end(places), one.faults.front().place) != std::end(places);
+    const std::string& place = one.faults.front().place;
+    return place.starts_with("wheel") ||
+           std::find(std::begin(places), std::end(places), place) != std::end(places);
   });
 }
 

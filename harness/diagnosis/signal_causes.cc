@@ -21,8 +21,8 @@ constexpr double kAccuracy = 1e-6;
 constexpr double kLeft = 30.0;
 // Autocorrelation of noise that is white, times the root of the number of steps.
 constexpr double kWhite = 4.0;
-constexpr double kFaint = 1e3;       // times the noise; of less rounding says what it is
-constexpr Index kFewest = 3;         // steps that say anything
+constexpr double kFaint = 1e3;        // times the noise; of less rounding says what it is
+constexpr Index kFewest = 3;          // steps that say anything
 constexpr Index kFewestOfNoise = 20;  // and of noise
 constexpr size_t kMostTerms = 3;
 
@@ -39,7 +39,8 @@ struct Steps {
   /// The signal `back` steps before each of them.
   [[nodiscard]] ArrayXd Take(const VectorXd& signal, Index back = 0) const {
     ArrayXd taken(size());
-    for (Index i = 0; i < size(); ++i) taken[i] = signal[std::max<Index>(0, rows[static_cast<size_t>(i)] - back)];
+    for (Index i = 0; i < size(); ++i)
+      taken[i] = signal[std::max<Index>(0, rows[static_cast<size_t>(i)] - back)];
     return taken;
   }
 };
@@ -77,9 +78,14 @@ struct Shape {
 };
 
 /// g = a u_k + b u_(k+1) + c of the whole delay k that fits best, a + b = 1.
-void AddDelay(const ArrayXd& got, const SignalSeries& series, const Steps& steps, std::vector<Shape>* shapes) {
+void AddDelay(const ArrayXd& got, const SignalSeries& series, const Steps& steps,
+              std::vector<Shape>* shapes) {
   double least = std::numeric_limits<double>::infinity();
-  Shape best{.fault = "delay", .unit = "steps", .detail = "", .parameters = 1, .output = {},
+  Shape best{.fault = "delay",
+             .unit = "steps",
+             .detail = "",
+             .parameters = 1,
+             .output = {},
              .tried = StepStore::kHistory};
   for (Index k = 1; k <= StepStore::kHistory; ++k) {
     const ArrayXd late = steps.Take(series.expected, k);
@@ -179,14 +185,15 @@ std::vector<Shape> ListShapes(const SignalSeries& series, const Steps& steps,
   AddExchange(got, series, steps, others, &shapes);
   const bool is_still = (got - got.mean()).abs().maxCoeff() <= series.noise;
   if (is_still && std::abs(got.mean()) > kLeft * series.noise)
-    shapes.push_back({"stuck at", series.name.unit, "", got.mean(), 1,
-                      ArrayXd::Constant(u.size(), got.mean()), false});
+    shapes.push_back(
+        {"stuck at", series.name.unit, "", got.mean(), 1, ArrayXd::Constant(u.size(), got.mean()), false});
   return shapes;
 }
 
 /// A sine of the frequency that explains most of y: parts of its amplitude as columns.
 Candidate FindSine(const ArrayXd& y, const ArrayXd& t, const std::string& place, const std::string& unit) {
-  Candidate sine{.fault = "ripple", .place = place, .unit = unit, .columns = MatrixXd(y.size(), 2), .parameters = 1};
+  Candidate sine{
+      .fault = "ripple", .place = place, .unit = unit, .columns = MatrixXd(y.size(), 2), .parameters = 1};
   const auto set = [&](double w) {
     sine.columns.col(0) = (w * (t - t[0])).sin();
     sine.columns.col(1) = (w * (t - t[0])).cos();
@@ -222,9 +229,14 @@ std::vector<Candidate> ListAdded(const SignalSeries& series, const Steps& steps,
   const SignalName& name = series.name;
   const std::string place = name.group == "motors" ? name.place : name.place + ", " + name.what;
   std::vector<Candidate> added;
-  const auto add = [&](const char* fault, const std::string& unit, const ArrayXd& column, double nominal = 0.0) {
+  const auto add = [&](const char* fault, const std::string& unit, const ArrayXd& column,
+                       double nominal = 0.0) {
     if (!(column.abs().maxCoeff() > 0.0)) return;
-    added.push_back({.fault = fault, .place = place, .unit = unit, .nominal = nominal, .columns = column.matrix() / series.noise});
+    added.push_back({.fault = fault,
+                     .place = place,
+                     .unit = unit,
+                     .nominal = nominal,
+                     .columns = column.matrix() / series.noise});
   };
   const ArrayXd got = steps.Take(series.got);
   const ArrayXd since = steps.Take(series.time) - steps.from;
@@ -237,7 +249,8 @@ std::vector<Candidate> ListAdded(const SignalSeries& series, const Steps& steps,
     const ArrayXd before = steps.Take(series.got, 1) - shape.output;
     add("lag", "s", before);
     MatrixXd both(got.size(), 2);
-    both << before.matrix() / series.noise, (steps.Take(series.expected, 1) - shape.output).matrix() / series.noise;
+    both << before.matrix() / series.noise,
+        (steps.Take(series.expected, 1) - shape.output).matrix() / series.noise;
     added.push_back({.fault = "lag", .place = place, .unit = "s", .columns = both});
   }
   if (series.rate.size() > 0) {
@@ -260,7 +273,8 @@ std::vector<Candidate> ListAdded(const SignalSeries& series, const Steps& steps,
 
 Fault MakeFault(const Candidate& candidate, const VectorXd& amplitude, const VectorXd& error, double decay,
                 double time_step) {
-  Fault fault{candidate.fault, candidate.place, candidate.nominal + amplitude[0], error[0], candidate.unit, ""};
+  Fault fault{candidate.fault, candidate.place, candidate.nominal + amplitude[0],
+              error[0],        candidate.unit,  ""};
   if (candidate.fault == "lag") {
     fault.value = -time_step / std::log(std::clamp(decay, 1e-9, 1.0 - 1e-9));
     fault.error *= fault.value * fault.value / time_step / decay;
@@ -314,12 +328,15 @@ Fit MakeFit(const SignalSeries& series, const Steps& steps, const Shape& shape, 
   Fit fit;
   fit.size = ((steps.Take(series.got) - steps.Take(series.expected)) / series.noise).matrix().norm();
   fit.selection = SelectCauses(y, added, {kMostTerms, floor});
-  fit.criterion = fit.selection.criterion + shape.parameters * std::log(static_cast<double>(y.size())) +
-                  (shape.fault.empty() ? 0.0 : 2.0 * std::log(static_cast<double>(shape.tried) *
-                                                              static_cast<double>(added.size())));
+  fit.criterion =
+      fit.selection.criterion + shape.parameters * std::log(static_cast<double>(y.size())) +
+      (shape.fault.empty()
+           ? 0.0
+           : 2.0 * std::log(static_cast<double>(shape.tried) * static_cast<double>(added.size())));
   const std::string place =
       series.name.group == "motors" ? series.name.place : series.name.place + ", " + series.name.what;
-  if (!shape.fault.empty()) fit.faults.push_back({shape.fault, place, shape.value, 0.0, shape.unit, shape.detail});
+  if (!shape.fault.empty())
+    fit.faults.push_back({shape.fault, place, shape.value, 0.0, shape.unit, shape.detail});
   fit.same.resize(fit.faults.size());
   const double time_step = series.time.size() > 1 ? series.time[1] - series.time[0] : 1.0;
   const auto find = [&](std::string_view fault) {
@@ -330,13 +347,16 @@ Fit MakeFit(const SignalSeries& series, const Steps& steps, const Shape& shape, 
   const double decay = find("lag");
   // A drift that began since the step before has come so far at the first.
   const double drifted = find("offset") / find("drift");
-  const bool began_between = drifted > 0.0 && std::isfinite(drifted) && (steps.was_before || drifted <= (1.0 + kAccuracy) * time_step);
+  const bool began_between = drifted > 0.0 && std::isfinite(drifted) &&
+                             (steps.was_before || drifted <= (1.0 + kAccuracy) * time_step);
   for (const CauseTerm& term : fit.selection.terms) {
     if (began_between && added[term.candidate].fault == "offset") continue;
     fit.faults.push_back(MakeFault(added[term.candidate], term.amplitude, term.error, decay, time_step));
     std::vector<Fault>& same = fit.same.emplace_back();
     for (const auto& [other, amplitude] : term.same)
-      if (added[other].fault != "lag" || IsDecay(amplitude[0])) same.push_back(MakeFault(added[other], amplitude, VectorXd::Zero(amplitude.size()), decay, time_step));
+      if (added[other].fault != "lag" || IsDecay(amplitude[0]))
+        same.push_back(
+            MakeFault(added[other], amplitude, VectorXd::Zero(amplitude.size()), decay, time_step));
   }
   if (decay != 0.0 && !IsDecay(decay)) fit.criterion = std::numeric_limits<double>::infinity();
   const double left = std::sqrt(fit.selection.residual.squaredNorm() / static_cast<double>(y.size()));
@@ -386,9 +406,8 @@ Verdict Judge(const SignalSeries& series, const std::vector<SignalSeries>& other
   verdict.steps = FindSteps(series);
   const Steps& steps = verdict.steps;
   if (steps.rows.empty()) return verdict;
-  const double square =
-      SquaredNorm((steps.Take(series.got) - steps.Take(series.expected)) / series.noise) /
-      static_cast<double>(steps.size());
+  const double square = SquaredNorm((steps.Take(series.got) - steps.Take(series.expected)) / series.noise) /
+                        static_cast<double>(steps.size());
   const double floor = 1.0 + kAccuracy * kAccuracy * square;
   const auto is_good = [&](const Fit& fit) {
     return fit.is_possible() && (fit.is_noise || fit.selection.left <= kLeft * std::sqrt(floor));
@@ -403,8 +422,7 @@ Verdict Judge(const SignalSeries& series, const std::vector<SignalSeries>& other
     if (is_good(fits.front()) && !fits.front().is_noise) break;
   }
   const double largest = (steps.Take(series.got) - steps.Take(series.expected)).abs().maxCoeff();
-  verdict.is_explained =
-      steps.size() >= kFewest && largest >= kFaint * series.noise && is_good(fits.front());
+  verdict.is_explained = steps.size() >= kFewest && largest >= kFaint * series.noise && is_good(fits.front());
   std::vector<std::string> names;
   for (Fit& fit : fits) {
     if (!fit.is_possible()) continue;
@@ -450,7 +468,8 @@ void Tell(const Verdict& verdict, CauseChannel channel, Causes* causes) {
   if (!verdict.is_explained || verdict.fits.empty()) {
     whole.outcome = CauseOutcome::kNotExplained;
     if (!verdict.fits.empty()) whole.faults = verdict.fits.front().faults;
-    if (whole.faults.empty()) whole.faults.push_back({"differs", verdict.series->name.place, 0.0, 0.0, "", ""});
+    if (whole.faults.empty())
+      whole.faults.push_back({"differs", verdict.series->name.place, 0.0, 0.0, "", ""});
     causes->push_back(whole);
     return;
   }

@@ -13,11 +13,11 @@ namespace dexcheck {
 /// One motor or one entry of a reading, step by step.
 struct SignalSeries {
   SignalName name;
-  VectorXd time;           ///< s
-  VectorXd expected, got;  ///< What it should be, and what it was.
-  VectorXd rate;           ///< Of what it moves; empty for none.
+  VectorXd time;                  ///< s
+  VectorXd expected, got;         ///< What it should be, and what it was.
+  VectorXd rate;                  ///< Of what it moves; empty for none.
   std::vector<bool> has_history;  ///< Whether the steps before each are those before it here.
-  double noise = 0.0;      ///< Rounding of got - expected.
+  double noise = 0.0;             ///< Rounding of got - expected.
 };
 
 /// What explains got - expected: a transmission (none, a delay, a limit, a dead zone, steps, the signal of

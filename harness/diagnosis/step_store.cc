@@ -9,14 +9,12 @@ namespace dexcheck {
 namespace {
 
 /// What one fingertip's contact adds to a reading.
-constexpr const char* kContactEntries[][2] = {{"contact u on the object", "rad"}, {"contact v on the object", "rad"},
-                                              {"contact u on the fingertip", "rad"},
-                                              {"contact v on the fingertip", "rad"},
-                                              {"contact angle psi", "rad"},       {"overlap", "m"}};
+constexpr const char* kContactEntries[][2] = {
+    {"contact u on the object", "rad"},    {"contact v on the object", "rad"},
+    {"contact u on the fingertip", "rad"}, {"contact v on the fingertip", "rad"},
+    {"contact angle psi", "rad"},          {"overlap", "m"}};
 constexpr Eigen::Index kContactSize = std::size(kContactEntries);
 constexpr Eigen::Index kObjectSize = 12, kTouchSize = 2;
-
-constexpr double kSpeedNoise = 1e-9;  // m/s
 
 template <typename Range>
 Eigen::Index CountOf(const Range& range) {
@@ -25,14 +23,14 @@ Eigen::Index CountOf(const Range& range) {
 
 }  // namespace
 
-StepStore::StepStore(const Setup& setup, const JudgedLaw* law)
-    : setup_(&setup), law_(law), actuation_(setup.model()) {
+StepStore::StepStore(const Setup& setup, const JudgedLaw* law, double rolling_bound)
+    : setup_(&setup), law_(law), rolling_bound_(rolling_bound), actuation_(setup.model()) {
   NameReadings();
   const RobotModel& model = setup.model();
   const Eigen::Index n = model.num_velocities(), m = CountOf(readings_);
   const Eigen::Index parts = law_ == nullptr ? 0 : law_->CountParts();
-  const Eigen::Index sizes[kSignalCount] = {1, n, n, model.num_positions(), n, n, m,         m, n, 6,
-                                            12, 12, n, 2, 2, 2, 2, n, 1, n * parts};
+  const Eigen::Index sizes[kSignalCount] = {
+      1, n, n, model.num_positions(), n, n, m, m, n, 6, 12, 12, n, 2, 2, 2, 2, n, 1, n * parts};
   for (int i = 0; i < kSignalCount; ++i) offsets_[i + 1] = offsets_[i] + sizes[i];
   before_.resize(offsets_[kSignalCount], kHistory);
   data_.resize(offsets_[kSignalCount], kCapacity);  // its pages are used only when something differs
@@ -45,7 +43,9 @@ void StepStore::NameReadings() {
   const RobotModel& model = setup_->model();
   const Base& base = model.base();
   const auto add = [&](const std::string& place, const std::string& what, const char* unit,
-                       const std::string& group) { readings_.push_back({place, what, unit, group}); };
+                       const std::string& group) {
+    readings_.push_back({place, what, unit, group});
+  };
   const std::string platform = "base " + base.link;
   constexpr const char* kAxes[] = {"x", "y", "z"};
   for (int i = 0; i < model.num_base_positions(); ++i) {
@@ -59,11 +59,15 @@ void StepStore::NameReadings() {
     const int count = joint.type == JointType::kBall ? 4 : 1;
     for (int k = 0; k < count; ++k)
       add("joint " + joint.name, count == 1 ? "position" : "quaternion " + std::to_string(k),
-          joint.type == JointType::kPrismatic ? "m" : count == 1 ? "rad" : "", "joint positions");
+          joint.type == JointType::kPrismatic ? "m"
+          : count == 1                        ? "rad"
+                                              : "",
+          "joint positions");
   }
   for (int i = 0; i < model.num_base_velocities(); ++i) {
-    add(platform, turns ? (i == 0 ? "rate of " + base.wheel_joint_right : "rate of " + base.wheel_joint_left)
-                        : "velocity " + std::to_string(i),
+    add(platform,
+        turns ? (i == 0 ? "rate of " + base.wheel_joint_right : "rate of " + base.wheel_joint_left)
+              : "velocity " + std::to_string(i),
         turns || i > 0 ? "rad/s" : "m/s", "base velocities");
   }
   for (int k = 0; k < model.num_dofs(); ++k) {
@@ -86,8 +90,9 @@ void StepStore::NameReadings() {
 
   for (int i = 0; i < model.num_base_velocities(); ++i) {
     const bool wheels = base.type == BaseType::kDifferentialDrive;
-    motors_.push_back({"motor " + (wheels ? (i == 0 ? base.wheel_joint_right : base.wheel_joint_left) : base.link),
-                       "torque", "N m", "motors"});
+    motors_.push_back(
+        {"motor " + (wheels ? (i == 0 ? base.wheel_joint_right : base.wheel_joint_left) : base.link),
+         "torque", "N m", "motors"});
   }
   for (int k = 0; k < model.num_dofs(); ++k) {
     const bool slides =
@@ -169,9 +174,8 @@ void StepStore::Pack(const StepRecord& step, const StepAnalysis& now, bool answe
   at(kWheelRates) = now.wheel_rates;
   at(kWheelMismatch) = now.wheel_mismatch;
   at(kWheelNoise).setZero();
-  // Speeds that are compared are rounded, too.
   if (answered && response.wheels.size() == 2)
-    at(kWheelNoise) = (now.wheel_slip.array() + now.sinking).max(kSpeedNoise);
+    at(kWheelNoise) = now.wheel_slip.array() + now.sinking + rolling_bound_;
   at(kLawNoise)[0] = 0.0;
   if (now.law == nullptr || law_ == nullptr || !law_->differs()) return;
   at(kLawNoise)[0] = kLawTorqueBound * law_->noise_scale();

@@ -30,30 +30,30 @@ class StepStore {
   /// Signals of a step, and their sizes: n of xi, m of a reading.
   enum Signal {
     kTime,
-    kTauDeclared,        ///< n, N m: what the declared motors make of the command.
-    kTauReceived,        ///< n, N m
-    kPosition,           ///< q', as it is.
-    kVelocity,           ///< n, xi likewise.
-    kAcceleration,       ///< n
-    kDeclaredReading,    ///< m, what the declared sensing makes of the truth.
-    kReading,            ///< m, what was measured.
-    kRobotResidual,      ///< n, of (48) with the torques that were received.
-    kObjectResidual,     ///< 6, of (19).
-    kObjectPose,         ///< 12: rotation by columns, position.
-    kObjectMotion,       ///< 12: V_Bo and V_Bo_dot.
-    kDryFriction,        ///< n: what the plant says of it, beyond the declared; 0 where it says nothing.
-    kNoise,              ///< 2: of the robot's residual, in |.|_M^-1, and of the object's, N.
-    kWheelRates,         ///< 2, right and left, rad/s.
-    kWheelMismatch,      ///< 2, CalcRollingMismatch, m/s.
-    kWheelNoise,         ///< 2: what of that slipping and sinking may be, m/s; 0 without wheels.
-    kLawDifference,      ///< n, E_bar' (tau' - tau'_printed).
-    kLawNoise,           ///< Of that, in |.|_M^-1; 0 where the law is right or not known.
-    kLawParts,           ///< n times their number: the summands, where the law differs.
+    kTauDeclared,      ///< n, N m: what the declared motors make of the command.
+    kTauReceived,      ///< n, N m
+    kPosition,         ///< q', as it is.
+    kVelocity,         ///< n, xi likewise.
+    kAcceleration,     ///< n
+    kDeclaredReading,  ///< m, what the declared sensing makes of the truth.
+    kReading,          ///< m, what was measured.
+    kRobotResidual,    ///< n, of (48) with the torques that were received.
+    kObjectResidual,   ///< 6, of (19).
+    kObjectPose,       ///< 12: rotation by columns, position.
+    kObjectMotion,     ///< 12: V_Bo and V_Bo_dot.
+    kDryFriction,      ///< n: what the plant says of it, beyond the declared; 0 where it says nothing.
+    kNoise,            ///< 2: of the robot's residual, in |.|_M^-1, and of the object's, N.
+    kWheelRates,       ///< 2, right and left, rad/s.
+    kWheelMismatch,    ///< 2, CalcRollingMismatch, m/s.
+    kWheelNoise,       ///< 2: what of that slipping and sinking may be, m/s; 0 without wheels.
+    kLawDifference,    ///< n, E_bar' (tau' - tau'_printed).
+    kLawNoise,         ///< Of that, in |.|_M^-1; 0 where the law is right or not known.
+    kLawParts,         ///< n times their number: the summands, where the law differs.
     kSignalCount
   };
 
-  /// @param law of MakeJudgedLaw; null where none is known.
-  StepStore(const Setup& setup, const JudgedLaw* law);
+  /// @param law of MakeJudgedLaw; null where none is known. @param rolling_bound of the check `rolling`, m/s.
+  StepStore(const Setup& setup, const JudgedLaw* law, double rolling_bound);
 
   /// @param differs whether a check fails at this step. @param answered whether the plant was driven: not
   /// where a motor refuses.
@@ -86,16 +86,17 @@ class StepStore {
 
   const Setup* setup_;
   const JudgedLaw* law_;
+  double rolling_bound_;
   ActuationMap actuation_;
   std::vector<SignalName> readings_, motors_;
   Eigen::Index offsets_[kSignalCount + 1] = {};
-  MatrixXd before_;              // ring of the last steps, before anything differed
+  MatrixXd before_;  // ring of the last steps, before anything differed
   MatrixXd data_;
   std::vector<Eigen::Index> block_;  // of each step that is kept
   VectorXd row_, force_;
-  Eigen::Index seen_ = 0;        // steps in the ring
+  Eigen::Index seen_ = 0;  // steps in the ring
   Eigen::Index size_ = 0, added_ = 0;
-  Eigen::Index stride_ = 1;      // of blocks that are kept
+  Eigen::Index stride_ = 1;  // of blocks that are kept
   bool has_begun_ = false;
   double last_time_ = 0.0;
 };

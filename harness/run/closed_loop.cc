@@ -40,7 +40,8 @@ ClosedLoop::ClosedLoop(const Setup& setup, bool check, LoopParts parts)
   const Scenario& scenario = setup.scenario();
   RequireKnownBounds(scenario);
   if (check) checks_.emplace(setup, plant_->motors(), parts.knows_law);
-  if (check) store_.emplace(setup, checks_->law());
+  if (check)
+    store_.emplace(setup, checks_->law(), checks_->Has("rolling") ? checks_->Find("rolling").bound : 0.0);
   record_.model = record_.true_model = &controller_->model();
   record_.command.tau.setZero(setup.model().num_velocities());
   record_.reading.qvel.setZero(setup.engine().nv);

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <stdexcept>
 #include <utility>
 
@@ -102,10 +101,12 @@ void RunCampaign::ListFaults() {
     for (const DrawnFaults& drawn :
          DrawFaults(*setup_, {static_cast<size_t>(options_.draws), static_cast<size_t>(options_.together),
                               options_.seed, options_.duration, tau_})) {
-      if (getenv("DEXONLY") && drawn.fault.name.find(getenv("DEXONLY")) == std::string::npos) continue;  // DEBUG
       plants_.push_back(drawn.fault);
       singles_.push_back(drawn.each);
-      mutants_.push_back({.kind = drawn.fault.kind, .name = drawn.fault.name, .truth = drawn.truth, .injected = drawn.truth});
+      mutants_.push_back({.kind = drawn.fault.kind,
+                          .name = drawn.fault.name,
+                          .truth = drawn.truth,
+                          .injected = drawn.truth});
     }
     return;
   }

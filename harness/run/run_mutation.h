@@ -23,7 +23,7 @@ struct RunMutant {
   std::string kind;  ///< "law", "motor", "sensor", ...: what a table sums up by.
   std::string name;
   Cause expected = Cause::kNone;
-  std::string part;  ///< What the evidence should name; empty for nothing.
+  std::string part;             ///< What the evidence should name; empty for nothing.
   std::vector<Fault> truth;     ///< Of drawn faults that are found alone: how they should be told.
   std::vector<Fault> injected;  ///< The others likewise.
 
@@ -35,8 +35,8 @@ struct RunMutant {
   Cause cause = Cause::kNone;
   bool names_part = false;  ///< The evidence has `part` in it.
   std::string evidence;
-  NamingScore score;    ///< Of drawn faults.
-  std::string causes;   ///< All explanations, in words.
+  NamingScore score;            ///< Of drawn faults.
+  std::string causes;           ///< All explanations, in words.
   std::string failure;          ///< Why the run ended early; empty when it did not.
   std::string failed_checks;    ///< Names, separated by blanks.
   double position_error = 0.0;  ///< Largest of the object, m.

@@ -111,8 +111,8 @@ void Judge(const Setup& setup, const ClosedLoop& loop, RunResult* result) {
     measured.wheels = TellCauses(result->causes, CauseChannel::kRolling);
     measured.force = TellCauses(result->causes, CauseChannel::kBalance);
     measured.is_slope = Names(result->causes, "slope");
-    result->attribution = Attribute(setup.constants(), loop.checks().model_checks(),
-                                    loop.checks().motion_checks(), measured);
+    result->attribution =
+        Attribute(setup.constants(), loop.checks().model_checks(), loop.checks().motion_checks(), measured);
   }
   const bool disagrees = result->attribution.cause != Cause::kNone;
   result->verdict = disagrees ? Verdict::kDisagreement : Verdict::kPass;
