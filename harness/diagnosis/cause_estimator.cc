@@ -21,6 +21,7 @@ constexpr size_t kRestarts = 8;        // other first choices that are tried whe
 struct Visible {
   MatrixXd columns;  // N x r
   MatrixXd basis;    // p x r
+  VectorXd unit;     // p, of the amplitudes: diag(unit)^-1 basis is orthonormal
 };
 
 /// @param noise of the sum over all rows.
@@ -31,7 +32,7 @@ Visible Reduce(const Candidate& candidate, double noise) {
   if (C.cols() == 1) {
     const double size = C.norm();
     if (!(size > 0.0) || (is_bounded && size * scale[0] < noise)) return {};
-    return {C, MatrixXd::Identity(1, 1)};
+    return {C, MatrixXd::Identity(1, 1), VectorXd::Ones(1)};
   }
   // Of C diag(scale) = U S V^T those with S above the noise.
   const VectorXd size = C.colwise().norm().transpose();
@@ -45,6 +46,7 @@ Visible Reduce(const Candidate& candidate, double noise) {
   Visible result;
   result.basis = unit.asDiagonal() * eigen.eigenvectors().rightCols(visible);
   result.columns = C * result.basis;
+  result.unit = unit;
   return result;
 }
 
@@ -317,12 +319,12 @@ class Search {
     const MatrixXd& B = visible.basis;
     VectorXd error = (B * covariance * B.transpose()).diagonal().cwiseMax(0.0).cwiseSqrt();
     if (B.rows() == B.cols()) return error;
-    const VectorXd unit = B.rowwise().norm().cwiseMax(std::numeric_limits<double>::min());
-    const MatrixXd scaled = unit.cwiseInverse().asDiagonal() * B;
-    const MatrixXd known = scaled * scaled.completeOrthogonalDecomposition().pseudoInverse();
+    // The fraction of each amplitude, squared, that is a combination of those.
+    const VectorXd unit = visible.unit.cwiseMax(std::numeric_limits<double>::min());
+    const VectorXd known = (unit.cwiseInverse().asDiagonal() * B).rowwise().squaredNorm();
     constexpr double kKnown = 0.99;
     for (Index i = 0; i < B.rows(); ++i)
-      if (known(i, i) < kKnown) error[i] = kInfinity;
+      if (known[i] < kKnown) error[i] = kInfinity;
     return error;
   }
 
