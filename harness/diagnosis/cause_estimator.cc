@@ -156,6 +156,14 @@ class Search {
     return Q.leftCols(used);
   }
 
+  /// Whether those have all of what it has.
+  [[nodiscard]] bool AddsNothing(size_t candidate, const std::vector<size_t>& beside) const {
+    const MatrixXd& C = visible_[candidate].columns;
+    const MatrixXd Q = CalcRange(beside);
+    const MatrixXd own = C - Q * (Q.transpose() * C);
+    return (own.colwise().norm().array() <= kIndependent * C.colwise().norm().array()).all();
+  }
+
   /// The criterion of `beside` and each candidate; infinite where it adds nothing.
   [[nodiscard]] std::vector<double> ScoreAll(const std::vector<size_t>& beside) const {
     const MatrixXd Q = CalcRange(beside);
@@ -199,11 +207,17 @@ class Search {
     return one.basis * decomposition.compute(own).solve(VectorXd(y_ - Q * (Q.transpose() * y_)));
   }
 
-  /// Whether it and those can be, all at once.
-  [[nodiscard]] bool CanBe(size_t candidate, std::vector<size_t> set) const {
+  /// Whether it and those can be, all at once; of those, the ones that add nothing to it are no longer needed.
+  [[nodiscard]] bool CanBe(size_t candidate, const std::vector<size_t>& beside) const {
+    std::vector<size_t> set = beside;
     set.push_back(candidate);
     const auto is_free = [&](size_t i) { return !candidates_[i].is_possible && candidates_[i].scale.size() == 0; };
     if (std::all_of(set.begin(), set.end(), is_free)) return true;
+    for (const size_t other : beside) {
+      std::vector<size_t> rest = set;
+      rest.erase(std::find(rest.begin(), rest.end(), other));
+      if (AddsNothing(other, rest)) set = rest;
+    }
     const VectorXd a = Solve(Collect(set));
     Index width = 0;
     for (const size_t i : set) {

@@ -211,6 +211,12 @@ Candidate FindSine(const ArrayXd& y, const ArrayXd& t, const std::string& place,
   return sine;
 }
 
+/// Whether an output that goes on with this fraction of itself follows, and neither runs away nor ahead.
+bool IsDecay(double decay) {
+  constexpr double kLeast = 1e-6;
+  return decay > kLeast && decay < 1.0 - kLeast;
+}
+
 /// What may be added to a transmission's output.
 std::vector<Candidate> ListAdded(const SignalSeries& series, const Steps& steps, const Shape& shape,
                                  bool look_for_sines) {
@@ -230,10 +236,13 @@ std::vector<Candidate> ListAdded(const SignalSeries& series, const Steps& steps,
     add("drift of the gain", "1/s", since * shape.output);
     // g_t - u_t = d (g_(t-1) - u_t) [+ c (u_(t-1) - u_t)]
     const ArrayXd before = steps.Take(series.got, 1) - shape.output;
+    const auto is_lag = [](const VectorXd& a) { return IsDecay(a[0]); };
     add("lag", "s", before);
+    if (!added.empty() && added.back().fault == "lag") added.back().is_possible = is_lag;
     MatrixXd both(got.size(), 2);
     both << before.matrix() / series.noise, (steps.Take(series.expected, 1) - shape.output).matrix() / series.noise;
-    added.push_back({.fault = "lag", .place = place, .unit = "s", .columns = both});
+    // Of any gain and offset, got_t - u_t = 1 (got_(t-1) - u_t) - gain (u_(t-1) - u_t).
+    added.push_back({.fault = "lag", .place = place, .unit = "s", .columns = both, .is_possible = is_lag});
   }
   if (series.rate.size() > 0) {
     const ArrayXd rate = steps.Take(series.rate);
@@ -294,12 +303,6 @@ bool IsWhite(const VectorXd& residual) {
   }
   // Noise has no few values that all the rest is beside.
   return residual.cwiseAbs().maxCoeff() < 6.0 * std::sqrt(square / static_cast<double>(count));
-}
-
-/// Whether an output that goes on with this fraction of itself follows, and neither runs away nor ahead.
-bool IsDecay(double decay) {
-  constexpr double kLeast = 1e-6;
-  return decay > kLeast && decay < 1.0 - kLeast;
 }
 
 Fit MakeFit(const SignalSeries& series, const Steps& steps, const Shape& shape, double floor,
