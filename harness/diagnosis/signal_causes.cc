@@ -327,10 +327,16 @@ Fit MakeFit(const SignalSeries& series, const Steps& steps, const Shape& shape, 
   };
   const double decay = find("lag");
   // A drift that began since the step before has come so far at the first.
-  const double drifted = find("offset") / find("drift");
-  const bool began_between = drifted > 0.0 && std::isfinite(drifted) && (steps.was_before || drifted <= (1.0 + kAccuracy) * time_step);
+  const auto has_come_to = [&](const char* fault, const char* drift) {
+    const double since = find(fault) / find(drift);
+    return since > 0.0 && std::isfinite(since) &&
+           (steps.was_before || since <= (1.0 + kAccuracy) * time_step);
+  };
+  const bool drifts_to_offset = has_come_to("offset", "drift");
+  const bool drifts_to_gain = has_come_to("gain", "drift of the gain");
   for (const CauseTerm& term : fit.selection.terms) {
-    if (began_between && added[term.candidate].fault == "offset") continue;
+    const std::string& name = added[term.candidate].fault;
+    if ((drifts_to_offset && name == "offset") || (drifts_to_gain && name == "gain")) continue;
     fit.faults.push_back(MakeFault(added[term.candidate], term.amplitude, term.error, decay, time_step));
     std::vector<Fault>& same = fit.same.emplace_back();
     for (const auto& [other, amplitude] : term.same)
