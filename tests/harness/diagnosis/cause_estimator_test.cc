@@ -8,6 +8,7 @@
 #include <cmath>
 #include <random>
 
+#include "tests/common/linear_algebra.h"
 #include "tests/common/matrix_near.h"
 
 namespace dexcheck::testing::cause_estimator_test {
@@ -22,6 +23,11 @@ constexpr double kErrors = 4.0;
 // Sums over 200 rows, whose terms are of size 1: their rounding.
 constexpr double kRounding = 1e-10;
 
+/// What columns of full rank leave over of x: x - C (C^T C)^-1 C^T x.
+VectorXd CalcLeftOver(const VectorXd& x, const MatrixXd& C) {
+  return x - C * SolveDense(C.transpose() * C, C.transpose() * x);
+}
+
 /// What is drawn; every test has one of its own.
 class Random {
  public:
@@ -35,8 +41,7 @@ class Random {
   VectorXd Beside(const std::vector<VectorXd>& others) {
     MatrixXd all(kRows, static_cast<Index>(others.size()));
     for (size_t i = 0; i < others.size(); ++i) all.col(static_cast<Index>(i)) = others[i];
-    const VectorXd x = Normal();
-    return x - all * all.householderQr().solve(x);
+    return CalcLeftOver(Normal(), all);
   }
   /// Columns of standard normal numbers: an amplitude of 1 is sqrt(N) = 14 standard errors.
   std::vector<Candidate> Candidates(size_t count = kCandidates) {
@@ -89,14 +94,12 @@ void ExpectAmplitude(const CauseTerm& term, double amplitude, double length) {
 }
 
 /// Sum of squares that is left over beside the best amplitudes.
-double CalcLeft(const VectorXd& y, const MatrixXd& columns) {
-  return (y - columns * columns.householderQr().solve(y)).squaredNorm();
-}
+double CalcLeft(const VectorXd& y, const MatrixXd& columns) { return CalcLeftOver(y, columns).squaredNorm(); }
 
 class Recovery : public ::testing::TestWithParam<size_t> {};
 
 TEST_P(Recovery, FaultsAreNamedWithTheirAmplitudes) {
-  for (unsigned seed = 0; seed < 5; ++seed) {
+  for (unsigned seed = 0; seed < 10; ++seed) {
     SCOPED_TRACE(seed);
     Random random(100 + seed);
     const std::vector<Candidate> candidates = random.Candidates();
@@ -134,7 +137,7 @@ TEST(CauseEstimator, FractionsAndResidualAreThoseOfTheFit) {
   ASSERT_EQ(ChosenOf(selection), (std::vector<size_t>{3, 4}));
   MatrixXd both(kRows, 2);
   both << a, b;
-  const VectorXd left = y - both * both.householderQr().solve(y);
+  const VectorXd left = CalcLeftOver(y, both);
   EXPECT_TRUE(MatrixNear(selection.residual, left, kRounding));
   EXPECT_NEAR(selection.fraction, 1.0 - left.squaredNorm() / y.squaredNorm(), kRounding);
   EXPECT_NEAR(selection.left, std::sqrt(left.squaredNorm() / kRows), kRounding);
@@ -206,18 +209,17 @@ TEST(CauseEstimator, WiderCandidateIsOfTheClassWhereItIsOrdinary) {
 }
 
 TEST(CauseEstimator, NoiseIsNotExplained) {
-  constexpr unsigned kSeeds = 200, kSeedsOfFault = 20;
+  constexpr unsigned kSeeds = 200;
   unsigned named = 0, found = 0;
   const std::vector<Candidate> candidates = Random(5).Candidates();
   for (unsigned seed = 0; seed < kSeeds; ++seed) {
     const VectorXd noise = Random(1000 + seed).Normal();
     named += Select(noise, candidates).terms.empty() ? 0 : 1;
     // The same noise hides no fault that there is.
-    if (seed >= kSeedsOfFault) continue;
     found += ChosenOf(Select(noise + candidates[5].columns, candidates)) == std::vector<size_t>{5} ? 1 : 0;
   }
   EXPECT_LE(named, kSeeds / 100);
-  EXPECT_EQ(found, kSeedsOfFault);
+  EXPECT_GE(found, kSeeds - kSeeds / 100);
 }
 
 TEST(CauseEstimator, ZeroIsNotExplained) {
@@ -244,6 +246,23 @@ TEST(CauseEstimator, NoFrictionIsNegative) {
   ExpectAmplitude(negative, -2.0, candidates[20].columns.norm());
   EXPECT_TRUE(negative.same.empty());
   EXPECT_NE(negative.rival, 10u);
+}
+
+// Beside the first column alone, the two that contain it share their amplitude with it as they like.
+TEST(CauseEstimator, WhatCannotBeIsNotPossibleBesideAPartOfIt) {
+  Random random(13);
+  std::vector<Candidate> candidates = random.Candidates();
+  const VectorXd a = candidates[10].columns, b = 0.5 * a + random.Normal();
+  candidates[20].columns.resize(kRows, 2);
+  candidates[20].columns << a, b;
+  const auto is_less = [](const VectorXd& x) { return x[0] < 1.1; };
+  candidates[10].is_possible = candidates[20].is_possible = is_less;
+  const VectorXd noise = random.Normal();
+  EXPECT_EQ(ChosenOf(Select(0.7 * a - 0.8 * b + noise, candidates)), std::vector<size_t>{20});
+  for (const CauseTerm& term : Select(1.4 * a - 0.8 * b + noise, candidates).terms) {
+    EXPECT_NE(term.candidate, 20u);
+    if (term.candidate == 10) EXPECT_LT(term.amplitude[0], 1.1);
+  }
 }
 
 TEST(CauseEstimator, WhatIsTooFaintToShowIsNotEstimated) {
