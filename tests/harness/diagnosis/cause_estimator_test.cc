@@ -252,16 +252,16 @@ TEST(CauseEstimator, NoFrictionIsNegative) {
 TEST(CauseEstimator, WhatCannotBeIsNotPossibleBesideAPartOfIt) {
   Random random(13);
   std::vector<Candidate> candidates = random.Candidates();
-  const VectorXd a = candidates[10].columns, b = 0.5 * a + random.Normal();
+  const VectorXd a = candidates[10].columns, b = random.Normal() - 0.5 * a;
   candidates[20].columns.resize(kRows, 2);
   candidates[20].columns << a, b;
-  const auto is_less = [](const VectorXd& x) { return x[0] < 1.1; };
+  const auto is_less = [](const VectorXd& x) { return x[0] < 0.9; };
   candidates[10].is_possible = candidates[20].is_possible = is_less;
   const VectorXd noise = random.Normal();
-  EXPECT_EQ(ChosenOf(Select(0.7 * a - 0.8 * b + noise, candidates)), std::vector<size_t>{20});
-  for (const CauseTerm& term : Select(1.4 * a - 0.8 * b + noise, candidates).terms) {
+  EXPECT_EQ(ChosenOf(Select(0.5 * a + 0.8 * b + noise, candidates)), std::vector<size_t>{20});
+  for (const CauseTerm& term : Select(a + 0.8 * b + noise, candidates).terms) {
     EXPECT_NE(term.candidate, 20u);
-    if (term.candidate == 10) EXPECT_LT(term.amplitude[0], 1.1);
+    if (term.candidate == 10) EXPECT_LT(term.amplitude[0], 0.9);
   }
 }
 
