@@ -99,23 +99,25 @@ class Search {
     return criterion;
   }
 
-  /// The most likely first choices that have no place in common with what was found.
+  /// The most likely first choices besides what was found: one at each place, and then more of them.
   [[nodiscard]] std::vector<Best> FindFirsts(const std::vector<size_t>& found) const {
     const std::vector<double> scores = ScoreAll({});
     std::vector<Best> all;
     for (size_t i = 0; i < scores.size(); ++i)
       if (std::isfinite(scores[i]) && std::find(found.begin(), found.end(), i) == found.end()) all.push_back({i, scores[i]});
     std::sort(all.begin(), all.end(), [](const Best& a, const Best& b) { return a.criterion < b.criterion; });
-    std::vector<Best> firsts;
     std::vector<std::string> places;
-    for (const Best& one : all) {
+    const auto is_new = [&](const Best& one) {
       const std::string& place = candidates_[one.candidate].place;
-      if (firsts.size() == kRestarts) break;
-      if (std::find(places.begin(), places.end(), place) != places.end() || !CanBe(one.candidate, {})) continue;
+      if (std::find(places.begin(), places.end(), place) != places.end()) return false;
       places.push_back(place);
-      firsts.push_back(one);
-    }
-    return firsts;
+      return true;
+    };
+    const auto is_impossible = [&](const Best& one) { return !CanBe(one.candidate, {}); };
+    all.erase(std::remove_if(all.begin(), all.end(), is_impossible), all.end());
+    std::stable_partition(all.begin(), all.end(), is_new);
+    all.resize(std::min(all.size(), kRestarts));
+    return all;
   }
 
   [[nodiscard]] double Score(double squares, double parameters, size_t terms) const {
