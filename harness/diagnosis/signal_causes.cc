@@ -181,7 +181,9 @@ std::vector<Shape> ListShapes(const SignalSeries& series, const Steps& steps,
 
 /// A sine of the frequency that explains most of y: parts of its amplitude as columns.
 Candidate FindSine(const ArrayXd& y, const ArrayXd& t, const std::string& place, const std::string& unit) {
-  Candidate sine{.fault = "ripple", .place = place, .unit = unit, .columns = MatrixXd(y.size(), 2), .parameters = 1};
+  // The frequency is one; it is the best of as many as there are steps, which weighs 2 log n as two more would.
+  constexpr int kParameters = 3;
+  Candidate sine{.fault = "ripple", .place = place, .unit = unit, .columns = MatrixXd(y.size(), 2), .parameters = kParameters};
   const auto set = [&](double w) {
     sine.columns.col(0) = (w * (t - t[0])).sin();
     sine.columns.col(1) = (w * (t - t[0])).cos();
