@@ -357,6 +357,19 @@ TEST(CauseEstimator, WhatIsBestAloneGivesWayToTheBestPair) {
   }
 }
 
+// All faults of a signal are at one place.
+TEST(CauseEstimator, SearchBeginsAgainAtTheSamePlace) {
+  Random random(11);
+  std::vector<Candidate> candidates = random.Candidates();
+  for (Candidate& one : candidates) one.place = "joint";
+  const VectorXd c1 = candidates[10].columns, c2 = random.Beside({c1});
+  candidates[20].columns = c2;
+  candidates[30].columns = c1 + c2 + 0.7 * random.Beside({c1, c2});
+  candidates[31].columns = -2.0 * candidates[30].columns;
+  const CauseSelection selection = Select(c1 + c2 + random.Normal(), candidates);
+  EXPECT_EQ(ChosenOf(selection), (std::vector<size_t>{10, 20}));
+}
+
 TEST(CauseEstimator, NoMoreTermsThanAreAskedFor) {
   Random random(12);
   const std::vector<Candidate> candidates = random.Candidates();
