@@ -21,6 +21,7 @@ constexpr size_t kRestarts = 8;       // other first choices that are tried wher
 struct Visible {
   MatrixXd columns;  // N x r
   MatrixXd basis;    // p x r
+  VectorXd unit;     // p, of the amplitudes: diag(unit)^-1 basis is orthonormal
 };
 
 /// @param noise of the sum over all rows.
@@ -31,7 +32,7 @@ Visible Reduce(const Candidate& candidate, double noise) {
   if (C.cols() == 1) {
     const double size = C.norm();
     if (!(size > 0.0) || (is_bounded && size * scale[0] < noise)) return {};
-    return {C, MatrixXd::Identity(1, 1)};
+    return {C, MatrixXd::Identity(1, 1), VectorXd::Ones(1)};
   }
   // Of C diag(scale) = U S V^T those with S above the noise.
   const VectorXd size = C.colwise().norm().transpose();
@@ -46,6 +47,7 @@ Visible Reduce(const Candidate& candidate, double noise) {
   Visible result;
   result.basis = unit.asDiagonal() * eigen.eigenvectors().rightCols(visible);
   result.columns = C * result.basis;
+  result.unit = unit;
   return result;
 }
 
@@ -98,7 +100,7 @@ class Search {
     return criterion;
   }
 
-  /// The most likely first choices that have no place in common with what was found.
+  /// The most likely first choices besides what was found: one at each place, and then more of them.
   [[nodiscard]] std::vector<Best> FindFirsts(const std::vector<size_t>& found) const {
     const std::vector<double> scores = ScoreAll({});
     std::vector<Best> all;
@@ -106,17 +108,18 @@ class Search {
       if (std::isfinite(scores[i]) && std::find(found.begin(), found.end(), i) == found.end())
         all.push_back({i, scores[i]});
     std::sort(all.begin(), all.end(), [](const Best& a, const Best& b) { return a.criterion < b.criterion; });
-    std::vector<Best> firsts;
     std::vector<std::string> places;
-    for (const Best& one : all) {
+    const auto is_new = [&](const Best& one) {
       const std::string& place = candidates_[one.candidate].place;
-      if (firsts.size() == kRestarts) break;
-      if (std::find(places.begin(), places.end(), place) != places.end() || !CanBe(one.candidate, {}))
-        continue;
+      if (std::find(places.begin(), places.end(), place) != places.end()) return false;
       places.push_back(place);
-      firsts.push_back(one);
-    }
-    return firsts;
+      return true;
+    };
+    const auto is_impossible = [&](const Best& one) { return !CanBe(one.candidate, {}); };
+    all.erase(std::remove_if(all.begin(), all.end(), is_impossible), all.end());
+    std::stable_partition(all.begin(), all.end(), is_new);
+    all.resize(std::min(all.size(), kRestarts));
+    return all;
   }
 
   [[nodiscard]] double Score(double squares, double parameters, size_t terms) const {
@@ -155,6 +158,14 @@ class Search {
       }
     }
     return Q.leftCols(used);
+  }
+
+  /// Whether those have all of what it has.
+  [[nodiscard]] bool AddsNothing(size_t candidate, const std::vector<size_t>& beside) const {
+    const MatrixXd& C = visible_[candidate].columns;
+    const MatrixXd Q = CalcRange(beside);
+    const MatrixXd own = C - Q * (Q.transpose() * C);
+    return (own.colwise().norm().array() <= kIndependent * C.colwise().norm().array()).all();
   }
 
   /// The criterion of `beside` and each candidate; infinite where it adds nothing.
@@ -199,13 +210,20 @@ class Search {
     return one.basis * decomposition.compute(own).solve(VectorXd(y_ - Q * (Q.transpose() * y_)));
   }
 
-  /// Whether it and those can be, all at once.
-  [[nodiscard]] bool CanBe(size_t candidate, std::vector<size_t> set) const {
+  /// Whether it and those can be, all at once; of those, the ones that add nothing to it are no longer
+  /// needed.
+  [[nodiscard]] bool CanBe(size_t candidate, const std::vector<size_t>& beside) const {
+    std::vector<size_t> set = beside;
     set.push_back(candidate);
     const auto is_free = [&](size_t i) {
       return !candidates_[i].is_possible && candidates_[i].scale.size() == 0;
     };
     if (std::all_of(set.begin(), set.end(), is_free)) return true;
+    for (const size_t other : beside) {
+      std::vector<size_t> rest = set;
+      rest.erase(std::find(rest.begin(), rest.end(), other));
+      if (AddsNothing(other, rest)) set = rest;
+    }
     const VectorXd a = Solve(Collect(set));
     Index width = 0;
     for (const size_t i : set) {
@@ -322,12 +340,12 @@ class Search {
     const MatrixXd& B = visible.basis;
     VectorXd error = (B * covariance * B.transpose()).diagonal().cwiseMax(0.0).cwiseSqrt();
     if (B.rows() == B.cols()) return error;
-    const VectorXd unit = B.rowwise().norm().cwiseMax(std::numeric_limits<double>::min());
-    const MatrixXd scaled = unit.cwiseInverse().asDiagonal() * B;
-    const MatrixXd known = scaled * scaled.completeOrthogonalDecomposition().pseudoInverse();
+    // The fraction of each amplitude, squared, that is a combination of those.
+    const VectorXd unit = visible.unit.cwiseMax(std::numeric_limits<double>::min());
+    const VectorXd known = (unit.cwiseInverse().asDiagonal() * B).rowwise().squaredNorm();
     constexpr double kKnown = 0.99;
     for (Index i = 0; i < B.rows(); ++i)
-      if (known(i, i) < kKnown) error[i] = kInfinity;
+      if (known[i] < kKnown) error[i] = kInfinity;
     return error;
   }
 

@@ -192,8 +192,14 @@ std::vector<Shape> ListShapes(const SignalSeries& series, const Steps& steps,
 
 /// A sine of the frequency that explains most of y: parts of its amplitude as columns.
 Candidate FindSine(const ArrayXd& y, const ArrayXd& t, const std::string& place, const std::string& unit) {
-  Candidate sine{
-      .fault = "ripple", .place = place, .unit = unit, .columns = MatrixXd(y.size(), 2), .parameters = 1};
+  // The frequency is one; it is the best of as many as there are steps, which weighs 2 log n as two more
+  // would.
+  constexpr int kParameters = 3;
+  Candidate sine{.fault = "ripple",
+                 .place = place,
+                 .unit = unit,
+                 .columns = MatrixXd(y.size(), 2),
+                 .parameters = kParameters};
   const auto set = [&](double w) {
     sine.columns.col(0) = (w * (t - t[0])).sin();
     sine.columns.col(1) = (w * (t - t[0])).cos();
@@ -223,6 +229,12 @@ Candidate FindSine(const ArrayXd& y, const ArrayXd& t, const std::string& place,
   return sine;
 }
 
+/// Whether an output that goes on with this fraction of itself follows, and neither runs away nor ahead.
+bool IsDecay(double decay) {
+  constexpr double kLeast = 1e-6;
+  return decay > kLeast && decay < 1.0 - kLeast;
+}
+
 /// What may be added to a transmission's output.
 std::vector<Candidate> ListAdded(const SignalSeries& series, const Steps& steps, const Shape& shape,
                                  bool look_for_sines) {
@@ -247,11 +259,14 @@ std::vector<Candidate> ListAdded(const SignalSeries& series, const Steps& steps,
     add("drift of the gain", "1/s", since * shape.output);
     // g_t - u_t = d (g_(t-1) - u_t) [+ c (u_(t-1) - u_t)]
     const ArrayXd before = steps.Take(series.got, 1) - shape.output;
+    const auto is_lag = [](const VectorXd& a) { return IsDecay(a[0]); };
     add("lag", "s", before);
+    if (!added.empty() && added.back().fault == "lag") added.back().is_possible = is_lag;
     MatrixXd both(got.size(), 2);
     both << before.matrix() / series.noise,
         (steps.Take(series.expected, 1) - shape.output).matrix() / series.noise;
-    added.push_back({.fault = "lag", .place = place, .unit = "s", .columns = both});
+    // Of any gain and offset, got_t - u_t = 1 (got_(t-1) - u_t) - gain (u_(t-1) - u_t).
+    added.push_back({.fault = "lag", .place = place, .unit = "s", .columns = both, .is_possible = is_lag});
   }
   if (series.rate.size() > 0) {
     const ArrayXd rate = steps.Take(series.rate);
@@ -315,12 +330,6 @@ bool IsWhite(const VectorXd& residual) {
   return residual.cwiseAbs().maxCoeff() < 6.0 * std::sqrt(square / static_cast<double>(count));
 }
 
-/// Whether an output that goes on with this fraction of itself follows, and neither runs away nor ahead.
-bool IsDecay(double decay) {
-  constexpr double kLeast = 1e-6;
-  return decay > kLeast && decay < 1.0 - kLeast;
-}
-
 Fit MakeFit(const SignalSeries& series, const Steps& steps, const Shape& shape, double floor,
             bool look_for_sines) {
   const std::vector<Candidate> added = ListAdded(series, steps, shape, look_for_sines);
@@ -346,11 +355,16 @@ Fit MakeFit(const SignalSeries& series, const Steps& steps, const Shape& shape, 
   };
   const double decay = find("lag");
   // A drift that began since the step before has come so far at the first.
-  const double drifted = find("offset") / find("drift");
-  const bool began_between = drifted > 0.0 && std::isfinite(drifted) &&
-                             (steps.was_before || drifted <= (1.0 + kAccuracy) * time_step);
+  const auto has_come_to = [&](const char* fault, const char* drift) {
+    const double since = find(fault) / find(drift);
+    return since > 0.0 && std::isfinite(since) &&
+           (steps.was_before || since <= (1.0 + kAccuracy) * time_step);
+  };
+  const bool drifts_to_offset = has_come_to("offset", "drift");
+  const bool drifts_to_gain = has_come_to("gain", "drift of the gain");
   for (const CauseTerm& term : fit.selection.terms) {
-    if (began_between && added[term.candidate].fault == "offset") continue;
+    const std::string& name = added[term.candidate].fault;
+    if ((drifts_to_offset && name == "offset") || (drifts_to_gain && name == "gain")) continue;
     fit.faults.push_back(MakeFault(added[term.candidate], term.amplitude, term.error, decay, time_step));
     std::vector<Fault>& same = fit.same.emplace_back();
     for (const auto& [other, amplitude] : term.same)
