@@ -302,7 +302,7 @@ TEST_F(VideoTest, LostContactsAreNotDrawn) {
   EXPECT_NO_THROW(VideoPainter({&view_, 1}, options).Paint(0.5));
 }
 
-TEST_F(VideoTest, TellsItsProgressAndStopsWhenTold) {
+TEST_F(VideoTest, ReportsItsProgressAndStopsOnRequest) {
   std::vector<long> told;
   EXPECT_TRUE(Video(folder_.path() / "a.mp4", {&view_, 1}, MakeOptions(), [&](long done, long total) {
     EXPECT_EQ(total, 5);

@@ -37,7 +37,7 @@ TEST_F(TwoDescriptions, ReportWhatOneLacksAndWhatDiffers) {
 }
 
 // Published numbers are rounded: 1.5708 for pi / 2 is 3.7e-6 off.
-TEST_F(TwoDescriptions, AreJudgedByDigitsWhereThatIsAskedFor) {
+TEST_F(TwoDescriptions, AreJudgedByDigitsOnRequest) {
   std::string rounded = MakePandaUrdf();
   const std::string right_angle = "1.5707963267948966";
   for (size_t at = rounded.find(right_angle); at != std::string::npos; at = rounded.find(right_angle))

@@ -41,7 +41,7 @@ class Quickstart : public ::testing::Test {
   testing::TempFolder folder_;
 };
 
-TEST_F(Quickstart, RunsThePapersExperimentUnlessToldOtherwise) {
+TEST_F(Quickstart, RunsThePapersExperimentByDefault) {
   EXPECT_EQ(Run({}), "run paper\n");
   EXPECT_EQ(Run({"--set", "duration=1"}), "run paper --set duration=1\n");
   EXPECT_EQ(Run({"--quiet", "--out", "folder", "--seed", "3"}), "run paper --quiet --out folder --seed 3\n");

@@ -74,7 +74,7 @@ TEST(SolidDistance, IsThatOfTheWorkedCases) {
               kAccuracy);
 }
 
-TEST(SolidDistance, TellsHowDeepBodiesOverlap) {
+TEST(SolidDistance, ReportsHowDeepBodiesOverlap) {
   // Far from the middle of a wide thin top, where its nearest face is above.
   for (const double x : {0.0, 0.7, 1.2, 1.35}) {
     for (const double z : {0.025, 0.015, 0.002}) {

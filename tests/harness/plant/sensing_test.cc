@@ -46,7 +46,7 @@ class SensingTest : public ::testing::Test {
   Reading measured_;
 };
 
-TEST_F(SensingTest, WithoutFaultsTheTruthIsTold) {
+TEST_F(SensingTest, WithoutFaultsTheTrueStateIsMeasured) {
   Sensing sensing = Make({});
   Measure(sensing);
   EXPECT_EQ(measured_.state.q, truth_.state.q);

@@ -62,7 +62,7 @@ TEST(ReadScenario, ReadsWhatIsNotIdeal) {
   EXPECT_TRUE(ReadShippedScenario("curve").imperfections.is_ideal());
 }
 
-TEST(Scenario, AllMissingKeysAreToldAtOnce) {
+TEST(Scenario, AllMissingKeysAreReportedAtOnce) {
   const auto problem = [](const std::string& text) {
     try {
       ParseScenario(text, "new.toml", "", {});
