@@ -14,7 +14,7 @@ namespace dexcheck {
 /// Which of the harness's five categories a check belongs to.
 enum class CheckCategory { kModel, kInverseDynamics, kForwardDynamics, kAssumption, kLaw };
 
-/// "model", "law", "balance", "prediction" or "assumption".
+/// "model", "law", "inverse_dynamics", "forward_dynamics" or "assumption".
 const char* NameOf(CheckCategory kind);
 
 /// The part of the robot that a compared number belongs to.

@@ -104,7 +104,7 @@ TEST_F(TwoDescriptions, ACopyForAnOlderEngineFindsItsFilesFromAnotherFolder) {
   }
 }
 
-// What is included is copied too, and told by its own file and line.
+// What is included is copied too, and named by its own file and line.
 TEST_F(TwoDescriptions, ACopyIsOfOnePiece) {
   const auto write = [&](const std::string& name, const std::string& text) {
     Write(name, "<mujoco>\n" + text + "</mujoco>");

@@ -218,7 +218,7 @@ TEST(BallJoints, FaultsAreFound) {
     change(&spec);
     return testing::ListFailures(CompareWithEngine(RobotModel(spec), *engine));
   };
-  // The frame in whose axes the velocity is told, the point about which the link turns, damping, range.
+  // The frame in whose axes the velocity is written, the point about which the link turns, damping, range.
   const auto turn = [](RobotSpec* spec) {
     const Matrix3d R = Eigen::AngleAxisd(0.5, Vector3d::UnitZ()).toRotationMatrix();
     Pose X = Pose::Identity();

@@ -74,7 +74,7 @@ TEST(Scenario, AllMissingKeysAreReportedAtOnce) {
   EXPECT_EQ(problem("description = \"mine\""),
             "new.toml:1: missing key \"name\", \"duration\", \"start\", \"grasp\", \"control\", "
             "\"trajectory\"");
-  // A value that is wrong as well is told when nothing is missing any more.
+  // A value that is wrong as well is reported when nothing is missing any more.
   EXPECT_EQ(problem("name = \"mine\"\nsettle = 1e9"), "new.toml:1: missing key \"duration\", \"start\"");
 }
 
