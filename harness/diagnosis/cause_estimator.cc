@@ -70,7 +70,10 @@ class Search {
     double criterion = nothing;
     if (!IsNoise({}) && firsts.front().criterion < nothing) criterion = Grow(firsts.front());
     // What was the best alone need not be part of the best set.
-    if (!chosen_.empty() && !IsNoise(chosen_)) {
+    // Of many candidates that takes long.
+    constexpr size_t kFew = 100;
+    const bool may_be_fewer = chosen_.size() > 1 && candidates_.size() < kFew;
+    if (!chosen_.empty() && (may_be_fewer || !IsNoise(chosen_))) {
       std::vector<size_t> best = chosen_;
       for (const Best& first : FindFirsts(best)) {
         const double other = Grow(first);

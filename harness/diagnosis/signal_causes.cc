@@ -132,7 +132,7 @@ void AddLimits(const ArrayXd& u, const ArrayXd& got, const std::string& unit, bo
 
 /// Whole multiples of a step: the largest that divides all, made better by all of them.
 void AddSteps(const ArrayXd& u, const ArrayXd& got, const std::string& unit, std::vector<Shape>* shapes) {
-  const double rounding = 1e-11 * got.abs().maxCoeff();
+  const double rounding = 1e-12 * got.abs().maxCoeff();
   double step = 0.0;
   for (double value : got) {
     // By Euclid's algorithm, in which a remainder of rounding is none.
@@ -146,7 +146,7 @@ void AddSteps(const ArrayXd& u, const ArrayXd& got, const std::string& unit, std
     }
   }
   // Multiples of what is hardly more than rounding are any values.
-  if (!(step > 1e3 * rounding)) return;
+  if (!(step > 1e2 * rounding)) return;
   const ArrayXd counts = (got / step).round();
   step = (counts * got).sum() / SquaredNorm(counts);
   shapes->push_back({"rounding to steps of", unit, "", step, 1, step * (u / step).round(), false});
