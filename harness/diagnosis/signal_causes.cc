@@ -147,8 +147,16 @@ void AddSteps(const ArrayXd& u, const ArrayXd& got, const std::string& unit, std
   }
   // Multiples of what is hardly more than rounding are any values.
   if (!(step > 1e2 * rounding)) return;
-  const ArrayXd counts = (got / step).round();
-  step = (counts * got).sum() / SquaredNorm(counts);
+  // From few multiples to many, so that each is counted right.
+  ArrayXd sorted = got.abs();
+  std::sort(sorted.begin(), sorted.end());
+  double along = 0.0, square = 0.0;
+  for (const double value : sorted) {
+    const double count = std::round(value / step);
+    along += count * value;
+    square += count * count;
+    if (square > 0.0) step = along / square;
+  }
   shapes->push_back({"rounding to steps of", unit, "", step, 1, step * (u / step).round(), false});
 }
 

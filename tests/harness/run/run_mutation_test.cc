@@ -74,7 +74,7 @@ TEST(RunCampaign, FindsEveryWrongLawAndNamesThePart) {
 // not tell apart, and no other cause is.
 TEST(RunCampaign, NamesFaultsThatAreDrawn) {
   for (const int together : {1, 2}) {
-    for (const char* scenario : {"curve", "hand-curve"}) {
+    for (const char* scenario : {"curve", "hold"}) {
       RunMutationOptions options;
       options.draws = 30;
       options.together = together;
