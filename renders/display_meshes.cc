@@ -72,7 +72,7 @@ int DisplayMeshes::AddTube(std::span<const Vector3d> points, double radius) {
     Vector3d along = points[std::min(i + 1, points.size() - 1)] - points[i == 0 ? 0 : i - 1];
     if (along.isZero()) along = Vector3d::UnitZ();
     along.normalize();
-    // The last ring's direction, turned as little as the path's bend asks for.
+    // The last ring's direction, turned as little as the path's bend requires.
     x -= along.dot(x) * along;
     x = x.norm() > 0.1 ? x.normalized() : along.unitOrthogonal();
     const Vector3d y = along.cross(x);

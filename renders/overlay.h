@@ -1,6 +1,6 @@
 #pragma once
 
-// The panel that tells on each frame how the run stands: scenario, time, tracking error, and the five
+// The panel that shows on each frame how the run stands: scenario, time, tracking error, and the five
 // categories of the cross-check.
 
 #include <string>
@@ -52,7 +52,7 @@ class Overlay {
   /// How much of a picture of this size the panel may cover from the left, in pixels.
   static double CalcCoveredWidth(int width, int height);
 
-  /// Draws the panel into the upper left corner, as large as the picture's size asks for.
+  /// Draws the panel into the upper left corner, as large as the picture's size allows.
   void Draw(const OverlayState& state, Image* image);
 
  private:

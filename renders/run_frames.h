@@ -53,7 +53,7 @@ struct RunFrames {
 /// model and is finite, times increase, and the run lasts longer than an instant.
 void CheckRunFrames(const mjModel& model, const RunFrames& run);
 
-/// Worst residuals up to each row, so that a video can tell at any time which check stands worst.
+/// Worst residuals up to each row, so that a video can show at any time which check stands worst.
 class CheckHistory {
  public:
   explicit CheckHistory(const RunFrames& run);

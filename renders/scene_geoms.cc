@@ -18,7 +18,7 @@ class GeomAdder {
     const Vector3d along = arrow.to - arrow.from;
     if (along.norm() <= arrow.radius) return;
     mjvGeom& geom = Add(mjGEOM_ARROW, arrow.color);
-    // The engine draws arrows half as long as it is told.
+    // The engine draws arrows half as long as their given length.
     const Vector3d end = arrow.from + 2.0 * along;
     MakeConnector(mjGEOM_ARROW, arrow.radius, arrow.from.data(), end.data(), &geom);
   }

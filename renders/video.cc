@@ -243,7 +243,7 @@ class VideoPainter::RunPainter {
   const mjModel& model_;
   std::unique_ptr<GhostRun> ghost_;
   std::optional<double> apart_;  // objects of the two runs, m
-  double bearing_ = 0.0;         // of views that the run's way asks for, rad
+  double bearing_ = 0.0;         // of views that the run's way determines, rad
   int object_ = -1;              // body; for cameras that look at it
   Vector3d object_start_ = Vector3d::Zero();
   const RunFrames& run_;

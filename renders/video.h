@@ -81,7 +81,7 @@ long CountFrames(std::span<const RunView> runs, int fps);
 /// Draws all frames, in processes that options.workers counts, and writes them to `video` in order, without
 /// finishing it. The frames do not depend on the number of processes. Threads would wait for each other:
 /// OSMesa has one rasterizer for all contexts of a process and locks it for each picture.
-/// @param progress told after each frame how many of how many are written; false stops the work.
+/// @param progress called after each frame with how many of how many are written; false stops the work.
 /// @return whether all frames were written.
 bool RenderVideo(std::span<const RunView> runs, const VideoOptions& options, VideoWriter* video,
                  const std::function<bool(long done, long total)>& progress = {});

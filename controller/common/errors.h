@@ -1,7 +1,8 @@
 #pragma once
 
 // The errors that the library throws. A caller's fault is std::invalid_argument (through Require);
-// everything else derives from Error, so that a program can tell input errors from simulation failures.
+// everything else derives from Error, so that a program can distinguish input errors from
+// simulation failures.
 
 #include <cmath>
 #include <stdexcept>

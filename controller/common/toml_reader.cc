@@ -61,7 +61,7 @@ std::string Format(const toml::node& node) {
 }  // namespace
 
 void TomlContext::RejectMissing() const {
-  constexpr size_t kMostTables = 20;  // that one line tells of
+  constexpr size_t kMostTables = 20;  // that one line names
   if (missing.empty()) return;
   // In the file's order; what does not come from the file is last.
   std::vector<MissingKeys> sorted = missing;
@@ -254,7 +254,7 @@ TomlValue TomlTable::MakeValue(std::string_view key, const toml::node& node) con
 }
 
 std::optional<TomlValue> TomlTable::Find(std::string_view key) {
-  asked_.emplace(key);
+  requested_.emplace(key);
   const toml::node* node = table_->get(key);
   if (node == nullptr) return std::nullopt;
   return MakeValue(key, *node);
@@ -277,7 +277,7 @@ std::vector<std::pair<std::string, TomlValue>> TomlTable::GetEntries() {
   std::vector<std::pair<std::string, TomlValue>> entries = ListInFileOrder();
   for (const auto& [key, value] : entries) {
     if (!IsKey(key)) value.Reject("must have " + std::string(kKeyRule));
-    asked_.insert(key);
+    requested_.insert(key);
   }
   return entries;
 }
@@ -296,7 +296,7 @@ double TomlTable::GetAngle(const std::string& key) {
 void TomlTable::RejectUnknown(const TomlValue& value, const std::string& nearest) const {
   if (!nearest.empty()) value.Reject("unknown key, did you mean " + Quote(nearest) + "?");
   std::string known;
-  for (const std::string& key : asked_) known += (known.empty() ? "" : ", ") + key;
+  for (const std::string& key : requested_) known += (known.empty() ? "" : ", ") + key;
   value.Reject("unknown key, known here are " + known);
 }
 
@@ -311,12 +311,13 @@ void TomlTable::RejectTogether(std::string_view key, std::initializer_list<std::
 
 void TomlTable::RejectUnused() const {
   for (const auto& [key, value] : ListInFileOrder()) {
-    if (!asked_.contains(key)) RejectUnknown(value, FindNearest(key, {asked_.begin(), asked_.end()}));
+    if (!requested_.contains(key))
+      RejectUnknown(value, FindNearest(key, {requested_.begin(), requested_.end()}));
   }
 }
 
 void TomlTable::RejectOthersThan(std::initializer_list<std::string_view> keys) {
-  asked_.insert(keys.begin(), keys.end());
+  requested_.insert(keys.begin(), keys.end());
   RejectUnused();
 }
 
@@ -325,9 +326,9 @@ TomlValue TomlTable::Miss(std::string_view key) {
   TomlValue stand_in = TomlValue::StandIn(*context_, *table_, MakePath(key));
   if (is_missing_) return stand_in;
   for (const auto& [unused, value] : ListInFileOrder()) {
-    if (asked_.contains(unused) || FindNearest(unused, {missing}).empty()) continue;
+    if (requested_.contains(unused) || FindNearest(unused, {missing}).empty()) continue;
     value.NoteMisspelt(missing);
-    asked_.insert(unused);
+    requested_.insert(unused);
     return stand_in;
   }
   self_.NoteMissing(missing);

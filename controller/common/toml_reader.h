@@ -5,10 +5,10 @@
 //   TomlDocument document(text, "robot.toml");
 //   TomlTable root = document.Open();
 //   const double radius = root.Get("radius").AsPositive();
-//   root.RejectUnused();  // A key that nobody asked for is misspelt.
+//   root.RejectUnused();  // A key that nobody requested is misspelt.
 //
 // A key that is missing does not end the reading: something stands in for it, so that TomlDocument::Read can
-// tell all that are missing at once.
+// report all that are missing at once.
 
 #include <toml++/toml.h>
 
@@ -32,7 +32,7 @@ struct MissingKeys {
   std::string where;               ///< "FILE:LINE".
   int line = 0;                    ///< 0 for what does not come from the file.
   std::string path;                ///< Of the table; empty at the top.
-  std::vector<std::string> names;  ///< Empty for a misspelt key, of which `problem` tells.
+  std::vector<std::string> names;  ///< Empty for a misspelt key, which `problem` describes.
   std::string problem;
 };
 
@@ -50,7 +50,7 @@ class TomlTable;
 
 /// One value of a file and the dotted path that leads to it. Lives as long as its document.
 /// Every function that cannot deliver throws InputError, one line "FILE:LINE: PATH: what, got VALUE"; when
-/// keys have been found missing before, the line tells of those instead.
+/// keys have been found missing before, the line names those instead.
 class TomlValue {
  public:
   TomlValue(const TomlContext& context, const toml::node& node, std::string path);
@@ -134,7 +134,7 @@ class TomlValue {
   bool is_missing_ = false;
 };
 
-/// A table that keeps track of the keys that were asked for.
+/// A table that keeps track of the keys that were requested.
 class TomlTable {
  public:
   /// @param is_missing the table is not there, so that nothing is missing in it.
@@ -161,7 +161,7 @@ class TomlTable {
 
   /// Throws when a key stands in the table together with one of those that would say the same in another way.
   void RejectTogether(std::string_view key, std::initializer_list<std::string_view> others) const;
-  /// Throws at the first key that was never asked for, with the nearest that was.
+  /// Throws at the first key that was never requested, with the nearest that was.
   void RejectUnused() const;
   /// Throws at the first key that is not one of these.
   void RejectOthersThan(std::initializer_list<std::string_view> keys);
@@ -179,7 +179,7 @@ class TomlTable {
   TomlValue self_;
   const toml::table* table_;
   bool is_missing_;
-  std::set<std::string, std::less<>> asked_;
+  std::set<std::string, std::less<>> requested_;
 };
 
 /// A parsed file.

@@ -26,14 +26,14 @@ struct Reading {
   Touch touch;
 };
 
-/// What a step's contacts are meant to be.
+/// What a step's contacts are commanded to be.
 struct Handling {
   bool partial = false;     ///< Contacts come and go, and the object may lie on something: a task.
   bool holding = true;      ///< All fingertips should touch the object.
   ContactSet contacts = 0;  ///< Of a task: fingertips that the law lets push.
 };
 
-/// What a law means to happen under its torques: the rigid constrained system (46), (48) answers with it.
+/// What a law commands by its torques: what the rigid constrained system (46), (48) does under them.
 struct LawDemand {
   Vector6d V_Bo_dot = Vector6d::Zero();  ///< Of the object's body velocity, Sigma_o, m/s^2, rad/s^2.
   VectorXd xi_dot;                       ///< xi_dot_d (n) of (47).
@@ -47,7 +47,7 @@ struct TaskProgress {
   double weight = 0.0;  ///< Part of the object's stated weight that the hand bears.
 };
 
-/// What a controller sends at one instant, and what it meant by it.
+/// What a controller sends at one instant, and what it demands by that.
 struct Command {
   VectorXd tau;           ///< tau' (n), N m: of the right and left wheel, then of the joints.
   DesiredMotion desired;  ///< Of the object; where it is, when it need not move.
@@ -73,7 +73,7 @@ class Controller {
   virtual void Follow(const Trajectory& motion) = 0;
 
   /// The run begins at time t, s. @param reading of the last step before.
-  /// @throws InputError when what is asked for cannot be done.
+  /// @throws InputError when what is requested cannot be done.
   virtual void Begin(double t, const Reading& reading) = 0;
 
   /// Decides what to do at time t, s. Nothing allocates, except where a task says so.

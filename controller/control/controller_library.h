@@ -38,8 +38,8 @@ struct ControllerContext {
 /// Number of the interface: it changes with what the classes mean.
 inline constexpr int kControllerInterface = 2;
 
-/// What both sides must have in common, as text: the interface, and how the compiler lays out what is handed
-/// over.
+/// What program and library must have in common, as text: the interface, and how the compiler lays out what
+/// is handed over.
 static inline std::string DescribeControllerInterface() {
   char text[160];
   std::snprintf(text, sizeof(text),

@@ -9,10 +9,10 @@
  *
  *   dexcheck  hello, the parameter file's text, the scenario's text
  *   dexcheck  K_p, K_v                   only without contacts: n doubles each, gains of the joints
- *   program   answer to it: what it wants and tells
+ *   program   reply to it: what it wants and reports
  *   dexcheck  message STEP, doubles      |
  *   program   message STEP, doubles      | at each time step
- *   dexcheck  message BEGIN              once, between the steps at rest and the run; no answer
+ *   dexcheck  message BEGIN              once, between the steps at rest and the run; no reply
  *   dexcheck  message END                once; the program ends (also when its standard input does)
  *
  * Doubles of STEP from dexcheck; p positions, n velocities, N contacts, k = 3 N; matrices row by row, SI

@@ -4,20 +4,11 @@
 #include "controller/object/euler_zyz.h"
 
 namespace dexcheck {
-namespace {
-
-GraspModelOptions WithoutCoordinates() {
-  GraspModelOptions options;
-  options.orientation = OrientationFeedback::kRotation;
-  return options;
-}
-
-}  // namespace
 
 JointController::JointController(const RobotModel& model, const MassProperties& object,
                                  const Surface& surface, ControlLaw law, const JointGains& gains,
                                  const JointMotion& motion, const Sampling& sampling)
-    : model_(model, {}, object, surface, WithoutCoordinates()),
+    : model_(model, {}, object, surface, {.orientation = OrientationFeedback::kRotation}),
       law_(model, law, gains),
       demand_(motion, sampling.time_step),
       sampling_(sampling) {

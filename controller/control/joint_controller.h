@@ -8,7 +8,7 @@
 
 namespace dexcheck {
 
-/// What a motion of joints asks of a controller: the start until Begin, then q_d(t).
+/// What a motion of joints demands of a controller: the start until Begin, then q_d(t).
 class JointDemand {
  public:
   /// @param motion outlives this.

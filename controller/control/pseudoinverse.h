@@ -30,7 +30,7 @@ class Pseudoinverse {
   /// Factors J (k x n) with W = 1.
   /// @param columns those that can differ from zero, ascending: no other is looked at. All when empty.
   /// @throws std::invalid_argument when the shape differs, SingularityError with the condition number when J
-  /// has not full row rank, as far as double precision can tell.
+  /// has not full row rank, as far as double precision can distinguish.
   void Factor(const Eigen::Ref<const MatrixXd>& J, std::span<const int> columns = {});
   /// The same with W = diag(w). @throws std::invalid_argument also unless every entry of w (n) is positive.
   void FactorDiagonal(const Eigen::Ref<const MatrixXd>& J, const Eigen::Ref<const VectorXd>& w,

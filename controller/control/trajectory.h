@@ -21,7 +21,7 @@ struct ScalarMotion {
 ScalarMotion CalcMinJerk(double t, double duration);
 
 /// The same with least snap: s = 35 u^4 - 84 u^5 + 70 u^6 - 20 u^7. Its jerk does not jump at the ends
-/// either, which soft contacts answer with vibration.
+/// either: that would make soft contacts vibrate.
 ScalarMotion CalcMinSnap(double t, double duration);
 
 /// Motion whose speed rises from 0 to 1 in `duration` s like CalcMinJerk and stays there; s(0) = 0. Without

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Computed torque for an arm that holds nothing, in NumPy, as a program that dexcheck asks at each step."""
+"""Computed torque for an arm that holds nothing, in NumPy, as a program that dexcheck queries at each step."""
 
 import sys
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The paper's law (55) in NumPy, as a program that dexcheck asks at each step (controller_protocol.h)."""
+"""The paper's law (55) in NumPy, as a program that dexcheck queries at each step (controller_protocol.h)."""
 
 import sys
 

@@ -1,9 +1,9 @@
-"""How a program talks with dexcheck, which asks it at each step (controller_protocol.h): for the laws beside it."""
+"""How a program talks with dexcheck, which queries it at each step (controller_protocol.h): for the laws beside it."""
 
 import struct
 import sys
 
-TERMS, TELLS_F_N = 1, 2  # what a law needs, and what it tells
+TERMS, TELLS_F_N = 1, 2  # what a law needs, and what it reports
 MAGIC, PROTOCOL = b"DEXCTRL\0", 1
 STEP, BEGIN, END = 1, 2, 3
 HELLO = struct.Struct("=8s6I17d")
@@ -35,7 +35,7 @@ def answer_hello(flags):
 
 
 def states():
-    """The states that dexcheck asks torques for, one after the other, as bytes of doubles."""
+    """The states for which dexcheck requests torques, one after the other, as bytes of doubles."""
     while True:
         kind, doubles = struct.unpack("=II", read(8))
         if kind == END:
@@ -45,6 +45,6 @@ def states():
 
 
 def answer(*arrays):
-    """Torques, and F_N when it is told."""
+    """Torques, and F_N when it is reported."""
     data = b"".join(array.tobytes() for array in arrays)
     write(struct.pack("=II", STEP, len(data) // 8) + data)

@@ -33,8 +33,8 @@ inline Lanes CalcInverseConeStep(const Lanes3& x, const Lanes& inv_det, const La
 }
 
 /// Bounds lower <= v <= upper on one scalar of each contact: the slacks v - lower and upper - v, their
-/// multipliers, and the part of the search direction that belongs to them. Complementarity asks slack_lower *
-/// z_lower = slack_upper * z_upper = target.
+/// multipliers, and the part of the search direction that belongs to them. Complementarity requires
+/// slack_lower * z_lower = slack_upper * z_upper = target.
 class Bounds {
  public:
   Lanes slack_lower, slack_upper;

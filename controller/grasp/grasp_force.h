@@ -64,7 +64,7 @@ enum class GraspForceStatus {
 struct GraspForceResult {
   GraspForceStatus status = GraspForceStatus::kNotConverged;
   VectorXd f_c;  ///< Contact forces (49), 3N, N, contact frames. Zero unless kOptimal.
-  /// Multipliers, 6. kInfeasible: the direction, in the space of wrenches, along which F_o asks for more than
+  /// Multipliers, 6. kInfeasible: the direction, in the space of wrenches, along which F_o needs more than
   /// the contacts can give: y^T F_o exceeds y^T G f_c of all admissible f_c (Farkas). |y|_max is then 1.
   VectorXd y;
   double objective = 0.0;  ///< sum_i f_i3, N.

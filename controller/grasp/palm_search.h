@@ -44,7 +44,7 @@ class PalmSearch {
   /// The same palm pose nearer to the object and farther from it.
   std::vector<PalmPose> ListOtherDistances(const PalmPose& pose);
 
-  /// Whether the arm can make all displacements that the options ask for.
+  /// Whether the arm can make all displacements that the options demand.
   [[nodiscard]] bool ReachesBeyond(const PalmPose& pose) const;
 
  private:

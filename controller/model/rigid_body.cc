@@ -68,6 +68,10 @@ MassProperties CalcMassProperties(const Shape& shape, double mass, const Pose& X
   return {mass, X_BS.translation(), R_BS * CalcUniformInertia(shape, mass) * R_BS.transpose()};
 }
 
+Matrix3d CalcPointInertia(double mass, const Vector3d& c) {
+  return mass * (c.squaredNorm() * Matrix3d::Identity() - c * c.transpose());
+}
+
 MassProperties Combine(const std::vector<MassProperties>& parts) {
   MassProperties whole;
   for (const MassProperties& part : parts) {

@@ -48,6 +48,10 @@ Matrix3d CalcUniformInertia(const Shape& shape, double mass);
 /// Mass properties of a uniform solid whose frame stands at X_BS in the body's frame B.
 MassProperties CalcMassProperties(const Shape& shape, double mass, const Pose& X_BS);
 
+/// Rotational inertia of a point mass at c about the frame's origin, m (c^2 1 - c c^T), kg m^2: what a body's
+/// has there besides that about its centre of mass.
+Matrix3d CalcPointInertia(double mass, const Vector3d& c);
+
 /// Mass properties of several bodies that move as one, all given in one frame.
 MassProperties Combine(const std::vector<MassProperties>& parts);
 

@@ -8,7 +8,7 @@
 
 namespace dexcheck {
 
-/// Most joints, and most frames, that a file may describe: templates make it easy to ask for millions.
+/// Most joints, and most frames, that a file may describe: templates make it easy to describe millions.
 inline constexpr size_t kMaxJoints = 1000;
 
 /// Reads the keys `chain`, `template` and `frame` of a parameter file into the specification's joints and

@@ -11,10 +11,10 @@
 
 namespace dexcheck {
 
-/// Which of the harness's five questions a check answers.
+/// Which of the harness's five categories a check belongs to.
 enum class CheckCategory { kModel, kInverseDynamics, kForwardDynamics, kAssumption, kLaw };
 
-/// "model", "law", "balance", "prediction" or "assumption".
+/// "model", "law", "inverse_dynamics", "forward_dynamics" or "assumption".
 const char* NameOf(CheckCategory kind);
 
 /// The part of the robot that a compared number belongs to.
@@ -32,20 +32,20 @@ struct Location {
 /// @param velocities number of the base's velocity coordinates that precede the joints'.
 std::string Describe(const Location& where, const RobotModel& model, int base_velocities);
 
-/// One check: what is asked, and what went worst over the steps of a run or the samples of a comparison.
-/// Every question of the harness keeps its results in this record, and everything that prints, stores or
+/// One check: what is checked, and what went worst over the steps of a run or the samples of a comparison.
+/// Every category of the harness keeps its results in this record, and everything that prints, stores or
 /// judges results reads it.
 ///
-/// A check has one number each step, which Add takes, or many numbers on two sides. Those are given to
+/// A check has one number each step, which Add takes, or many numbers of two providers. Those are given to
 /// Compare one by one, or, where they are formed in bulk, to a ComparedTerm, which keeps the record.
 struct CheckRecord {
-  // What is asked.
+  // What is checked.
   std::string name;  ///< As in the log and in summary.json; of terms, as in NOTATION.md.
   CheckCategory kind = CheckCategory::kModel;
   std::string unit = "1";
   std::string description;  ///< What is measured, and against what: one line for log and report.
   double bound = 0.0;       ///< Largest value that passes.
-  bool applies = true;      ///< Whether this run asks it at all; otherwise Add does nothing.
+  bool applies = true;      ///< Whether this run evaluates it at all; otherwise Add does nothing.
 
   // What came of it. "When" is the time in s of a step of a run, the number of a sample elsewhere.
   double last = 0.0;   ///< Value of the last step.

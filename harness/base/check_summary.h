@@ -22,11 +22,11 @@ const char* TitleOf(CheckCategory category);
 double CalcFraction(double value, double bound);
 inline double CalcFraction(const CheckRecord& check) { return CalcFraction(check.worst, check.bound); }
 
-/// Whether a check was asked at each step, and not once, as a constant is.
+/// Whether a check was evaluated at each step, and not once, as a constant is.
 inline bool IsTimed(const CheckRecord& check) { return check.count > 0; }
 
 /// As summaries and pages have it: kind, max, bound, unit, pass, where, description; and of a check that was
-/// asked at each step (`timed`) rms, at_time_s and failed_at_s.
+/// evaluated at each step (`timed`) rms, at_time_s and failed_at_s.
 nlohmann::ordered_json ToJson(const CheckRecord& record, bool timed);
 /// The same back; JSON has no infinity, which is written as null. @throws nlohmann::json::exception.
 CheckRecord ReadCheck(const std::string& name, const nlohmann::json& json);

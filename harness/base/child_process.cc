@@ -30,7 +30,7 @@ namespace {
   bool succeeded = false;
   try {
     succeeded = work(channel);
-  } catch (...) {  // who wants to tell of it catches it
+  } catch (...) {  // who wants to report it catches it
   }
   ::_exit(succeeded ? EXIT_SUCCESS : EXIT_FAILURE);
 }

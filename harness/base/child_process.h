@@ -90,10 +90,10 @@ class ChildProcess {
   bool is_group_ = false;
 };
 
-/// Sends all bytes; false when the other side has ended.
+/// Sends all bytes; false when the other process has ended.
 bool Send(int channel, std::string_view bytes);
 
-/// At most `size` bytes; none when the other side has ended.
+/// At most `size` bytes; none when the other process has ended.
 std::string Receive(int channel, std::size_t size);
 
 }  // namespace dexcheck

@@ -70,7 +70,7 @@ int CountProcessors();
 
 /// Does jobs 0 to `count` - 1, `size` at a time, and calls `take` with each result, in the jobs' order.
 /// @param run called in a job's process.
-/// @param is_interrupted asked often; once true, the jobs that run are ended.
+/// @param is_interrupted called often; once true, the jobs that run are ended.
 /// @returns how many were taken: `count`, unless interrupted.
 /// @throws InputError that a job threw; Error "WHAT: why" when a job's process ended without a result.
 size_t RunJobs(const std::string& what, size_t count, int size,

@@ -62,13 +62,14 @@ const CheckRecord* FindEvidence(std::span<const CheckRecord> steps) {
 Cause AttributeExpectation(const CheckRecord& check, const MeasuredCauses& measured, std::string* evidence) {
   const bool position = check.name == "expect_position";
   const double by_law = position ? measured.position_by_law : measured.orientation_by_law;
-  if (by_law < 0.0) return Cause::kControlLaw;
+  const Cause other = measured.is_ideal ? Cause::kControlLaw : Cause::kDeclared;
+  if (by_law < 0.0) return other;
   *evidence += "; (57) by itself leaves " + FormatNumber(by_law, 3) + " " + check.unit;
   if (by_law >= 0.5 * check.worst) return Cause::kControlLaw;
   *evidence += measured.is_ideal
                    ? ", contacts that give the rest"
-                   : ", contacts that give and what the scenario asks for of the plant the rest";
-  return measured.is_ideal ? Cause::kContactSoftness : Cause::kControlLaw;
+                   : ", contacts that give and what the scenario declares of the plant the rest";
+  return measured.is_ideal ? Cause::kContactSoftness : Cause::kDeclared;
 }
 
 Cause AttributeOne(const CheckRecord& check, Cause run, std::span<const CheckRecord> steps) {
@@ -115,7 +116,7 @@ const char* NameOf(Cause cause) {
     case Cause::kActuatorLimit:
       return "actuator limit";
     case Cause::kJointLimit:
-      return "joint stop";
+      return "joint limit";
     case Cause::kFingertipSlip:
       return "fingertip slip";
     case Cause::kWheelSlip:
@@ -138,6 +139,8 @@ const char* NameOf(Cause cause) {
       return "collision";
     case Cause::kFingertipRim:
       return "fingertip rim";
+    case Cause::kDeclared:
+      return "declared imperfections";
     case Cause::kUnexplained:
       return "unexplained";
   }

@@ -29,7 +29,7 @@ struct MeasuredCauses {
   /// Largest errors of the object that (57) by itself would leave while the expectations are asked, m and
   /// rad: below zero where it is not integrated.
   double position_by_law = -1.0, orientation_by_law = -1.0;
-  bool is_ideal = true;  ///< The scenario asks for no imperfection of the plant.
+  bool is_ideal = true;  ///< The scenario declares no imperfection of the plant.
 };
 
 struct AttributionResult {

@@ -138,7 +138,6 @@ PredictionCompliance::PredictionCompliance(const Setup& setup)
 
 PredictionCompliance::PredictionCompliance(const Setup& setup, const ContactSoftness& softness)
     : setup_(&setup),
-      wheels_(setup.model().base()),
       mass_(setup.model().base_with_wheels().mass),
       force_(setup.scenario().plant, softness.fraction, softness.tangential_fraction),
       f_c_(setup.scenario().plant, softness.object_fraction, softness.object_tangential_fraction),
@@ -160,8 +159,8 @@ void PredictionCompliance::Follow(const StepRecord& step, const DeclaredStep& de
   tips_.Add(contact_bias);
   if (!step.response.wheels.empty()) {
     const VectorXd& xi = step.reading.state.xi;
-    const double turn = std::abs(wheels_.CalcTurn(xi));
-    const double forward = std::abs(wheels_.CalcMismatch(xi, Vector2d::Zero()).mean());
+    const double turn = std::abs(CalcRollingTwist(setup_->model().base(), xi)[1]);
+    const double forward = std::abs(CalcRollingTwist(setup_->model().base(), xi)[0]);
     // v w of the platform, and w^2 b / 2 of each wheel about its middle
     sideways_[0] = turn * (forward + 0.5 * setup_->model().base().wheel_distance * turn);
     tyres_.Add(sideways_);

@@ -7,7 +7,7 @@
 #include "controller/common/types.h"
 #include "harness/checks/declared_plant.h"
 #include "harness/checks/step_record.h"
-#include "harness/checks/wheel_evidence.h"
+#include "harness/checks/wheel_rolling.h"
 #include "harness/engine/contact_softness.h"
 #include "harness/scenario/setup.h"
 
@@ -117,7 +117,6 @@ class PredictionCompliance {
   PredictionCompliance(const Setup& setup, const ContactSoftness& softness);
 
   const Setup* setup_;
-  WheelEvidence wheels_;
   double mass_ = 0.0;  // of the robot, kg
   /// Of the force on the robot (n), of f_c (3N), and, of a plant that declares anything, of pushes (3) and of
   /// J_B'^T f_c (n).

@@ -15,6 +15,15 @@ bool IsIdeal(const Setup& setup) {
                       [](const Joint& joint) { return joint.dry_friction > 0.0; });
 }
 
+/// Whether the measured state is the declared one, from which the terms of both are the same.
+bool IsSame(const MeasuredState& a, const MeasuredState& b) {
+  bool same = a.q == b.q && a.xi == b.xi && a.X_Bo.matrix() == b.X_Bo.matrix() && a.V_Bo == b.V_Bo &&
+              a.overlap == b.overlap;
+  for (size_t i = 0; same && i < b.kappa.size(); ++i)
+    same = a.kappa[i].CalcVector() == b.kappa[i].CalcVector();
+  return same;
+}
+
 }  // namespace
 
 DeclaredPlant::DeclaredPlant(const Setup& setup, std::span<const Motor> motors)
@@ -37,7 +46,8 @@ const DeclaredStep& DeclaredPlant::Follow(const StepRecord& step) {
   sensing_.Measure(step.reading, &step_.measured);
   drive_.Drive(step.command.tau, state.xi, &step_.tau);
   step_.model = step.model;
-  if (step_.is_ideal) return step_;
+  step_.is_measured_right = IsSame(step.measured.state, step_.measured.state);
+  if (step_.is_ideal && step_.is_measured_right) return step_;
   model_.SetState(state);
   step_.model = &model_;
   step_.force.setZero();

@@ -18,6 +18,7 @@ namespace dexcheck {
 struct DeclaredStep {
   bool is_ideal = true;               ///< Nothing is declared.
   Reading measured;                   ///< What the declared sensing makes of the true state.
+  bool is_measured_right = true;      ///< Whether that is what was measured.
   VectorXd tau;                       ///< What the declared motors make of the command, tau' (n), N m.
   const GraspModel* model = nullptr;  ///< Terms of the plant's declared masses, at the true state.
   VectorXd force;                     ///< Declared pushes on the robot, as forces on xi (n).

@@ -23,6 +23,7 @@ enum class Cause {
   kWheelGeometry,    ///< The wheels' radius or distance is another.
   kCollision,        ///< Two bodies touch that are not meant to.
   kFingertipRim,     ///< A contact has rolled past the rim of a hemispherical fingertip.
+  kDeclared,         ///< What the scenario declares of plant, motors and sensors.
   kUnexplained,      ///< None of these was seen.
 };
 

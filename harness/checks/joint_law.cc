@@ -2,7 +2,6 @@
 
 #include "controller/control/joint_law.h"
 
-#include "controller/common/text.h"
 #include "controller/control/joint_controller.h"
 #include "controller/control/joint_motion.h"
 #include "harness/checks/judged_law.h"
@@ -14,11 +13,10 @@ class JudgedJointLaw final : public JudgedLaw {
  public:
   explicit JudgedJointLaw(const Setup& setup)
       : JudgedLaw(setup),
-        model_(&setup.model()),
         law_(setup.scenario().control.law),
         gains_(setup.joints()->gains),
         motion_(&setup.joints()->motion) {
-    for (VectorXd* vector : {&force_, &demand_, &true_demand_, &differed_})
+    for (VectorXd* vector : {&force_, &demand_, &true_demand_})
       vector->setZero(setup.model().num_velocities());
   }
 
@@ -49,13 +47,8 @@ class JudgedJointLaw final : public JudgedLaw {
     return errors_;
   }
 
-  [[nodiscard]] std::string Tell() const override {
-    Eigen::Index joint = 0;
-    const double largest = differed_.size() > 0 ? differed_.maxCoeff(&joint) : 0.0;
-    if (!(largest > 0.0)) return {};
-    return "the torque of joint " + model_->joints()[static_cast<size_t>(joint)].name + " is up to " +
-           FormatNumber(largest, 4) + " N m off the law's";
-  }
+  [[nodiscard]] int CountParts() const override { return kPartCount; }
+  [[nodiscard]] std::span<const LawPartName> ListParts() const override { return kParts; }
 
  protected:
   bool Evaluate(const StepRecord& step, const LawTerms& terms) override {
@@ -81,11 +74,35 @@ class JudgedJointLaw final : public JudgedLaw {
   [[nodiscard]] const VectorXd& force() const override { return force_; }
   /// What the law sends may be much more than what it balances, and is rounded as that.
   [[nodiscard]] double CalcScale(double balanced) override { return std::max(balanced, Norm(force_)); }
-  void Explain(const StepRecord& /*step*/, const LawTerms& /*terms*/) override {
-    differed_ = differed_.cwiseMax(difference_.cwiseAbs());
+  void CalcParts(const StepRecord& /*step*/, const LawTerms& terms) override {
+    const bool computed = law_ == ControlLaw::kComputedTorque;
+    const bool moves = law_ != ControlLaw::kPdGravity;
+    const VectorXd& D = computed ? gains_.K_v : gains_.D;
+    const VectorXd& K = computed ? gains_.K_p : gains_.K;
+    const VectorXd rate = D.cwiseProduct(desired_.q_dot - terms.xi);
+    const VectorXd position = K.cwiseProduct(desired_.q - terms.q);
+    parts_.setZero(terms.xi.size(), kPartCount);
+    if (moves) parts_.col(0) = terms.M * desired_.q_ddot;
+    parts_.col(1) = computed ? VectorXd(terms.M * rate) : rate;
+    parts_.col(2) = computed ? VectorXd(terms.M * position) : position;
+    if (moves) parts_.col(3) = terms.C_xi;
+    if (moves && !computed) parts_.col(3) += *terms.C * (desired_.q_dot - terms.xi);
+    parts_.col(4) = terms.gravity;
+    if (moves) parts_.col(5) = terms.friction;
   }
 
  private:
+  static constexpr int kPartCount = 6;
+  static constexpr LawPartName kParts[] = {{"M_bar' q_d_ddot", "feed-forward acceleration", 1U},
+                                           {"K_v e_dot", "velocity feedback", 2U},
+                                           {"K_p e", "position feedback", 4U},
+                                           {"C_bar' q_dot", "Coriolis forces", 8U},
+                                           {"F_bar' (gravity)", "gravity", 16U},
+                                           {"F_bar' (friction)", "friction", 32U},
+                                           {"K_v e_dot + K_p e", "feedback of both gains", 6U},
+                                           {"F_bar'", "gravity and friction", 48U},
+                                           {"tau'", "all torques", 63U}};
+
   /// K_v e_dot + K_p e + q_d_ddot.
   void CalcDemand(const VectorXd& q, const VectorXd& xi, VectorXd* xi_dot) const {
     *xi_dot = desired_.q_ddot;
@@ -112,13 +129,11 @@ class JudgedJointLaw final : public JudgedLaw {
     q_ += time_step_ * xi_;
   }
 
-  const RobotModel* model_;
   ControlLaw law_;
   JointGains gains_;
   const JointMotion* motion_;
   DesiredJoints desired_, half_step_;
   VectorXd force_, demand_, true_demand_;  // n
-  VectorXd differed_;                      // n, N m
   VectorXd q_, xi_;                        // where the error dynamics have the joints; empty at first
 };
 

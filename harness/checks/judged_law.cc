@@ -43,7 +43,8 @@ double JudgedLaw::CalcTorqueError(const StepRecord& step, const LawTerms& terms,
   difference_ -= force();
   const double error = Norm(difference_) / scale_ / condition_number();
   // Less is rounding, which says nothing.
-  if (error > kLawTorqueBound) Explain(step, terms);
+  differs_ = error > kLawTorqueBound;
+  if (differs_) CalcParts(step, terms);
   return error;
 }
 

@@ -5,7 +5,7 @@
 #include <limits>
 #include <memory>
 #include <optional>
-#include <string>
+#include <span>
 
 #include "controller/control/actuation.h"
 #include "controller/control/constrained_dynamics.h"
@@ -48,8 +48,21 @@ class JudgedLaw {
                                    bool as_commanded) = 0;
   /// The torques alone, for a step that the motors refuse: nothing is known of what they would do.
   double CompareTorque(const StepRecord& step, const LawTerms& terms);
-  /// Which part of the law differs, in words, over all steps whose torques did; empty for none.
-  [[nodiscard]] virtual std::string Tell() const = 0;
+
+  // Of the last step that was compared.
+
+  /// Whether its torques are not the law's.
+  [[nodiscard]] bool differs() const { return differs_; }
+  /// E_bar' (tau' - tau'_printed) (n), where they differ.
+  [[nodiscard]] const VectorXd& difference() const { return difference_; }
+  /// What rounding of that, times the bound of `law_torque`, is relative to, in |.|_M^-1.
+  [[nodiscard]] double noise_scale() const { return scale_ * condition_number(); }
+  /// The summands of E_bar' tau'_printed (n x CountParts()), where they differ.
+  [[nodiscard]] const MatrixXd& parts() const { return parts_; }
+  /// Number of summands.
+  [[nodiscard]] virtual int CountParts() const = 0;
+  /// Which summands, or several that are one thing, have a name.
+  [[nodiscard]] virtual std::span<const LawPartName> ListParts() const = 0;
 
  protected:
   explicit JudgedLaw(const Setup& setup);
@@ -59,8 +72,8 @@ class JudgedLaw {
   /// What the torques' error is relative to. @param balanced |C_bar' xi + F_bar'|_M^-1.
   [[nodiscard]] virtual double CalcScale(double balanced) { return balanced; }
   [[nodiscard]] virtual double condition_number() const { return 1.0; }
-  /// Keeps what differs, of a step whose torques do.
-  virtual void Explain(const StepRecord& step, const LawTerms& terms) = 0;
+  /// `parts_`, of a step whose torques differ; after Evaluate.
+  virtual void CalcParts(const StepRecord& step, const LawTerms& terms) = 0;
   /// LawErrors::torque, after Evaluate, and `scale_`. @param factor of M_bar' = L^T L.
   double CalcTorqueError(const StepRecord& step, const LawTerms& terms, const TreeFactor& factor);
   /// |f|_M^-1 = |L^-T f|
@@ -75,10 +88,12 @@ class JudgedLaw {
   TreeFactor own_factor_;          // of the terms' M_bar'
   const TreeFactor* factor_ = nullptr;
   VectorXd difference_;  // n, E_bar' (tau' - tau'_printed)
+  MatrixXd parts_;
   double scale_ = 1.0;
   LawErrors errors_;
 
  private:
+  bool differs_ = false;
   VectorXd balanced_, work_;  // n
 };
 

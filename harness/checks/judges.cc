@@ -39,16 +39,9 @@ Evaluation EvaluateRobotDynamics(const StepAnalysis& step) {
 }
 
 Evaluation EvaluateRolling(const StepAnalysis& step) {
-  const std::vector<BodyContact>& wheels = step.step->response.wheels;
-  if (wheels.size() != 2) return std::nullopt;
-  double beyond = 0.0;
-  for (size_t k = 0; k < 2; ++k) {
-    const auto i = static_cast<Eigen::Index>(k);
-    // A tyre that gives rolls on a radius that is smaller by as much.
-    const double sunk = std::max(0.0, -wheels[k].distance) * std::abs(step.wheel_rates[i]);
-    beyond = std::max(beyond, std::abs(step.wheel_mismatch[i]) - wheels[k].slip.norm() - sunk);
-  }
-  // So does one whose platform sinks or tilts while the tyres give to a force that changes.
+  if (step.step->response.wheels.size() != 2) return std::nullopt;
+  const double beyond = (step.wheel_mismatch.cwiseAbs() - step.wheel_slip).maxCoeff();
+  // A wheel rolls on another radius also while its platform sinks or tilts under a force that changes.
   return CheckValue{std::max(0.0, beyond - step.sinking)};
 }
 

@@ -8,7 +8,6 @@
 #include "harness/checks/baseline_reference.h"
 #include "harness/checks/check_table.h"
 #include "harness/checks/judged_law.h"
-#include "harness/checks/law_attribution.h"
 #include "harness/checks/object_error_dynamics.h"
 
 namespace dexcheck {
@@ -73,7 +72,8 @@ class JudgedObjectLaw final : public JudgedLaw {
     return errors_;
   }
 
-  [[nodiscard]] std::string Tell() const override { return attribution_.Tell(); }
+  [[nodiscard]] int CountParts() const override { return kLawPartCount; }
+  [[nodiscard]] std::span<const LawPartName> ListParts() const override { return ListLawParts(); }
 
  protected:
   bool Evaluate(const StepRecord& step, const LawTerms& terms) override {
@@ -89,10 +89,9 @@ class JudgedObjectLaw final : public JudgedLaw {
     return baseline_ ? baseline_->force() : reference_.force();
   }
   [[nodiscard]] double condition_number() const override { return reference_.condition_number(); }
-  /// Only the printed law is known summand by summand.
-  void Explain(const StepRecord& step, const LawTerms& terms) override {
-    if (baseline_) return;
-    attribution_.Add(difference_, reference_.CalcParts(terms, step.command.demand.F_N), 1.0 / scale_);
+  /// Of another law than the printed one only those that it shares.
+  void CalcParts(const StepRecord& step, const LawTerms& terms) override {
+    parts_ = reference_.CalcParts(terms, step.command.demand.F_N);
   }
 
  private:
@@ -165,7 +164,6 @@ class JudgedObjectLaw final : public JudgedLaw {
   std::optional<BaselineReference> baseline_;  // none for the paper's law
   ObjectErrorDynamics error_;
   DesiredMotion desired_;
-  LawAttribution attribution_;
   VectorXd work_n_, work_k_;
 };
 

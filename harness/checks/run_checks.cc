@@ -17,11 +17,7 @@ RunChecks::RunChecks(const Setup& setup, std::span<const Motor> motors, bool kno
       law_(MakeJudgedLaw(setup, knows_law)),
       law_terms_(setup.model().num_positions(), setup.model().num_velocities(),
                  3 * static_cast<int>(setup.fingertips().size())),
-      judges_(MakeChecks(setup, law_.get())),
-      motors_(setup.model(), setup.scenario().plant.time_step),
-      sensors_(setup.model(), setup.fingertips(), setup.scenario().plant.time_step),
-      forces_(setup.model()),
-      wheels_(setup.model().base()) {
+      judges_(MakeChecks(setup, law_.get())) {
   if (!setup.start().bonds.empty()) model_.LeaveOutContacts();
   model_.RaiseBounds(setup.scenario().tolerance);
   for (const Judge& judge : judges_) records_.push_back(judge.record);
@@ -47,6 +43,7 @@ void RunChecks::Expect(const DisturbanceOptions& disturbance) {
 
 const GraspModel& RunChecks::Follow(const StepRecord& step) {
   declared_step_ = &declared_.Follow(step);
+  if (!declared_step_->is_measured_right && !controller_) CheckMeasuredState();
   return *declared_step_->model;
 }
 
@@ -96,6 +93,7 @@ void RunChecks::Add(const Judge& judge, CheckRecord* record, double time) {
   if (judge.info->describe != nullptr && !record->failed && !(value <= record->bound))
     record->part = judge.info->describe(analysis(), found->part);
   record->Add(value, time);
+  differs_ = differs_ || !(value <= record->bound);
 }
 
 void RunChecks::JudgeEffort(const StepRecord& step, double time) {
@@ -120,28 +118,26 @@ void RunChecks::JudgeModel(const StepRecord& step) {
 void RunChecks::JudgeSettling(const StepRecord& step) {
   Analyze(step);
   Evaluate(CheckInfo::kSettling, step.time);
-  KeepEvidence(step);
 }
 
 void RunChecks::JudgeStep(const StepRecord& step) {
   Analyze(step);
   if (law_ && law_->IsComputed(step.command)) CompareLaw(step);
   Evaluate(CheckInfo::kRunning, step.time);
-  KeepEvidence(step);
-  sensors_.Add(step.measured.state, declared_step_->measured.state);
 }
 
 void RunChecks::JudgeUnsent(const StepRecord& step) {
   if (!law_ || !law_->IsComputed(step.command)) return;
   JudgeModel(step);
+  differs_ = false;
   analyzer_.Begin(step, *declared_step_);
-  sensors_.Add(step.measured.state, declared_step_->measured.state);
   unsent_.torque = law_->CompareTorque(step, ReadLawTerms(step));
   analyzer_.SetLaw(&unsent_);
   Evaluate(CheckInfo::kUnsent, step.time);
 }
 
 void RunChecks::Analyze(const StepRecord& step) {
+  differs_ = false;
   analyzer_.Begin(step, *declared_step_);
   analyzer_.Analyze();
 }
@@ -154,8 +150,8 @@ const LawTerms& RunChecks::ReadLawTerms(const StepRecord& step) {
 }
 
 void RunChecks::CompareLaw(const StepRecord& step) {
-  const bool as_commanded =
-      declared_.is_ideal() && step.drive.tau == step.command.tau && step.response.stop_force.size() == 0;
+  const bool as_commanded = declared_.is_ideal() && declared_step_->is_measured_right &&
+                            step.drive.tau == step.command.tau && step.response.stop_force.size() == 0;
   const LawErrors& errors = law_->Compare(step, ReadLawTerms(step), analysis(), as_commanded);
   analyzer_.SetLaw(&errors);
   if (!law_->follows_error() || step.time < setup_->scenario().expect.from) return;
@@ -163,28 +159,11 @@ void RunChecks::CompareLaw(const StepRecord& step) {
   orientation_by_law_ = std::max(orientation_by_law_, errors.orientation_by_law);
 }
 
-void RunChecks::KeepEvidence(const StepRecord& step) {
-  const StepAnalysis& now = analysis();
-  motors_.Add(declared_step_->tau, step.response.motor_torques, step.reading.state.xi);
-  if (step.response.wheels.size() == 2 && Exceeds("rolling"))
-    wheels_.Add(step.reading.state.xi, now.wheel_rates);
-  if (now.mass_factor != nullptr && (Exceeds("inverse_dynamics_robot") || Exceeds("inverse_dynamics_object")))
-    forces_.Add(now.robot_residual, now.object_residual, *declared_step_->model, step.reading.state.q,
-                *now.mass_factor, now.balanced);
-}
-
 MeasuredCauses RunChecks::Tell() const {
   MeasuredCauses measured;
-  if (law_) measured.law = law_->Tell();
-  measured.motors = motors_.Tell();
-  measured.sensors = sensors_.Tell();
-  measured.wheels = wheels_.Tell();
   measured.position_by_law = position_by_law_;
   measured.orientation_by_law = orientation_by_law_;
   measured.is_ideal = declared_.is_ideal();
-  if (!forces_.has_any()) return measured;
-  measured.force = forces_.Tell();
-  measured.is_slope = ForceEvidence::IsSlope(forces_.Find(), setup_->model().gravity());
   return measured;
 }
 

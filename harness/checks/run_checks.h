@@ -9,13 +9,10 @@
 
 #include "harness/checks/attribution.h"
 #include "harness/checks/declared_plant.h"
-#include "harness/checks/force_evidence.h"
 #include "harness/checks/judged_law.h"
 #include "harness/checks/make_checks.h"
-#include "harness/checks/signal_evidence.h"
 #include "harness/checks/step_analysis.h"
 #include "harness/checks/step_model_check.h"
-#include "harness/checks/wheel_evidence.h"
 
 namespace dexcheck {
 
@@ -63,8 +60,12 @@ class RunChecks {
   [[nodiscard]] const CheckRecord& Find(std::string_view name) const;
   /// Checks of the motion that failed before the last Reset, while everything settled, in that order.
   [[nodiscard]] std::span<const CheckRecord> settling_failures() const { return settling_failures_; }
-  /// What was measured of each cause, in words.
+  /// What was measured of causes beside the checks.
   [[nodiscard]] MeasuredCauses Tell() const;
+  /// Whether a check of the motion failed at the last step.
+  [[nodiscard]] bool differs() const { return differs_; }
+  /// The law that torques are compared with; null where none is known.
+  [[nodiscard]] const JudgedLaw* law() const { return law_.get(); }
   /// Of the last step.
   [[nodiscard]] const StepAnalysis& analysis() const { return analyzer_.analysis(); }
 
@@ -79,7 +80,6 @@ class RunChecks {
   /// The law's terms, of the engine at the measured state.
   const LawTerms& ReadLawTerms(const StepRecord& step);
   void CompareLaw(const StepRecord& step);
-  void KeepEvidence(const StepRecord& step);
 
   const Setup* setup_;
   StepModelCheck model_;
@@ -96,10 +96,7 @@ class RunChecks {
   std::vector<CheckRecord> records_;  // of judges_
   std::vector<CheckRecord> settling_failures_;
   double position_by_law_ = -1.0, orientation_by_law_ = -1.0;  // largest; see MeasuredCauses
-  MotorEvidence motors_;
-  SensorEvidence sensors_;
-  ForceEvidence forces_;
-  WheelEvidence wheels_;
+  bool differs_ = false;
 };
 
 }  // namespace dexcheck

@@ -28,7 +28,6 @@ StepAnalyzer::StepAnalyzer(const Setup& setup)
       clearance_(setup.engine(), setup.plant_adapter(), setup.robots().solids, setup.robots().watched_pairs),
       kinematics_(MakeData(setup.engine())),
       actuation_(setup.model()),
-      wheel_geometry_(setup.model().base()),
       dynamics_(setup.model(), static_cast<int>(setup.fingertips().size())),
       compliance_(setup) {
   const Eigen::Index n = setup.model().num_velocities();
@@ -83,8 +82,11 @@ void StepAnalyzer::CompareMeasurement() {
   apart = std::max(apart, (a.X_Bo.matrix() - b.X_Bo.matrix()).cwiseAbs().maxCoeff());
   apart = std::max(apart, (a.V_Bo - b.V_Bo).lpNorm<Eigen::Infinity>());
   for (size_t i = 0; i < b.kappa.size(); ++i) {
-    apart = std::max({apart, std::abs(a.kappa[i].alpha_o.u - b.kappa[i].alpha_o.u),
-                      std::abs(a.kappa[i].alpha_o.v - b.kappa[i].alpha_o.v)});
+    const ContactCoordinates &x = a.kappa[i], &y = b.kappa[i];
+    apart = std::max({apart, (x.CalcVector() - y.CalcVector()).lpNorm<Eigen::Infinity>(),
+                      std::abs(a.overlap[i] - b.overlap[i])});
+    if (x.alpha_f.chart != y.alpha_f.chart || x.alpha_o.chart != y.alpha_o.chart)
+      apart = std::numeric_limits<double>::infinity();
   }
   now_.measurement_error = apart;
 }
@@ -116,7 +118,13 @@ void StepAnalyzer::Analyze() {
     const std::vector<EngineWheel>& wheels = setup_->adapter().wheels();
     now_.wheel_rates = {wheels[0].axis.y() * step.reading.qvel[wheels[0].dof],
                         wheels[1].axis.y() * step.reading.qvel[wheels[1].dof]};
-    now_.wheel_mismatch = wheel_geometry_.CalcMismatch(step.reading.state.xi, now_.wheel_rates);
+    now_.wheel_mismatch =
+        CalcRollingMismatch(setup_->model().base(), step.reading.state.xi, now_.wheel_rates);
+    // A tyre that gives rolls on a radius that is smaller by as much.
+    for (Eigen::Index k = 0; k < 2; ++k) {
+      const BodyContact& wheel = step.response.wheels[static_cast<size_t>(k)];
+      now_.wheel_slip[k] = wheel.slip.norm() + std::max(0.0, -wheel.distance) * std::abs(now_.wheel_rates[k]);
+    }
   }
   CalcContactBias(*setup_, step, *now_.declared->model, &now_.contact_bias);
   CalcAppliedForce();
@@ -249,8 +257,9 @@ double StepAnalyzer::CalcUnevenForce() {
   const StepRecord& step = *now_.step;
   double slip = 0.0;
   for (const BodyContact& wheel : step.response.wheels) slip = std::max(slip, wheel.slip.norm());
-  const double turn =
-      step.response.wheels.empty() ? 0.0 : std::abs(wheel_geometry_.CalcTurn(step.reading.state.xi));
+  const double turn = step.response.wheels.empty()
+                          ? 0.0
+                          : std::abs(CalcRollingTwist(setup_->model().base(), step.reading.state.xi)[1]);
   const double g = setup_->model().gravity().norm();
   // Traction acts in the middle of how far a tyre has sunk, and not at the whole radius: f_t / r times half
   // of that, with the robot's weight on a floor of mu <= 1.

@@ -17,7 +17,7 @@
 #include "harness/checks/contact_compliance.h"
 #include "harness/checks/declared_plant.h"
 #include "harness/checks/step_record.h"
-#include "harness/checks/wheel_evidence.h"
+#include "harness/checks/wheel_rolling.h"
 #include "harness/engine/clearance.h"
 #include "harness/scenario/setup.h"
 
@@ -82,7 +82,8 @@ struct StepAnalysis {
 
   // Wheels.
   Vector2d wheel_rates = Vector2d::Zero();     ///< Of the right and left wheel, rad/s.
-  Vector2d wheel_mismatch = Vector2d::Zero();  ///< WheelEvidence::CalcMismatch, m/s.
+  Vector2d wheel_mismatch = Vector2d::Zero();  ///< CalcRollingMismatch, m/s.
+  Vector2d wheel_slip = Vector2d::Zero();      ///< What of that slipping and sinking may be, m/s.
 
   // Dynamics: (48) and (19) with the plant's accelerations and contact forces.
   VectorXd applied_force;  ///< E_bar' tau' + pushes that are declared + dry friction and joint limits (n).
@@ -183,7 +184,6 @@ class StepAnalyzer {
   Clearance clearance_;
   MjDataPtr kinematics_;  // of a plant that has no bodies of the engine's
   ActuationMap actuation_;
-  WheelEvidence wheel_geometry_;
   ConstrainedDynamics dynamics_;
   std::map<ContactSet, std::unique_ptr<PartialDynamics>> parts_;
   PredictionCompliance compliance_;

@@ -111,8 +111,6 @@ Option& Option::ShowDefault() {
   return *this;
 }
 
-bool Option::is_given() const { return option_->count() > 0; }
-
 template <typename Value>
 Option Command::AddOption(const std::string& name, Value* value, const std::string& help) {
   return Option(app_->add_option(name, *value, help));

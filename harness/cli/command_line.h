@@ -63,10 +63,9 @@ class Option {
   Option& Repeatable();
   /// Values may be separated by this character.
   Option& Delimiter(char delimiter);
-  /// The help tells the value that the variable has now.
+  /// The help prints the value that the variable has now.
   Option& ShowDefault();
   /// Whether the user gave it.
-  [[nodiscard]] bool is_given() const;
 
  private:
   friend class Command;

@@ -35,8 +35,9 @@ Option AddJUnitOption(Command command, std::string* file) {
 
 Option AddIgnoreOption(Command command, std::vector<std::string>* ignore) {
   return command
-      .AddOption("--ignore", ignore,
-                 "What the two need not share of joints: armature, damping, friction, coupling to others")
+      .AddOption(
+          "--ignore", ignore,
+          "Constants of joints in which the two may differ: armature, damping, friction, coupling to others")
       .TypeName("WORD,...")
       .Delimiter(',')
       .OneOf({kIgnorable[0], kIgnorable[1], kIgnorable[2], kIgnorable[3]});

@@ -18,7 +18,7 @@ namespace {
 
 /// Puts A and B where --robot and --mjcf would stand.
 void TakeFiles(ConsistencyRequest* request) {
-  if (!request->has_answers()) return request->TakeFiles("consistency");
+  if (!request->has_results()) return request->TakeFiles("consistency");
   if (request->a.empty() || !request->b.empty()) {
     throw InputError("consistency: one file must be given beside --program or --answers, got " +
                      std::string(request->a.empty() ? "none" : "two"));
@@ -38,13 +38,13 @@ int Run(ConsistencyRequest request) {
   };
   const RobotFiles& files = request.files;
   Comparison comparison =
-      request.has_answers()
+      request.has_results()
           ? CompareAnswers(files.robot, request.source, request.urdf, request.options, progress)
           : CompareFiles(files.robot, files.mjcf, request.urdf, request.options, progress);
   bar.Finish();
   if (const std::optional<double> tolerance = request.judging.Find())
     JudgeByTolerance(*tolerance, &comparison.result);
-  if (!request.has_answers()) ExplainComparison(&comparison, request.judging.Find().value_or(0.0));
+  if (!request.has_results()) ExplainComparison(&comparison, request.judging.Find().value_or(0.0));
   const ConsistencyResult& result = comparison.result;
   ExitCode code = request.IsWhole(result) ? kSuccess : kFailure;
   if (!result.Agrees()) code = kDisagreement;
@@ -72,18 +72,19 @@ void AddConsistencyCommand(Command app) {
                  "The other one", request.get());
   const Option program =
       command
-          .AddOption("--program", &request->source.program,
-                     "Command of a program that answers terms, instead of B (harness/descriptions/README.md)")
+          .AddOption(
+              "--program", &request->source.program,
+              "Command of a program that provides terms, instead of B (harness/descriptions/README.md)")
           .TypeName("CMD");
   command
       .AddOption(
           "--answers", &request->source.answers,
-          "Folder with states as dexcheck states writes them and NumPy arrays of answers, instead of B")
+          "Folder with states as dexcheck states writes them and NumPy arrays of results, instead of B")
       .TypeName("FOLDER")
       .Excludes(program);
   command
       .AddOption("--time-limit", &request->source.program_options.seconds,
-                 "For each answer of the program, s")
+                 "For each result of the program, s")
       .TypeName("S")
       .Check(PositiveNumber("must be a number above 0"))
       .ShowDefault();

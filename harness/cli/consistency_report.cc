@@ -95,7 +95,7 @@ void PrintTable(const ConsistencyRequest& request, const Comparison& comparison)
                                  ? "bounds are those of rounding or the tolerance given, whichever is wider"
                                  : "bounds follow from rounding";
   fmt::print("\n{}\n", Wrap("Errors are relative to each term's own scale; " + bounds +
-                                " (README.md). --json tells where each is worst.",
+                                " (README.md). --json says where each is worst.",
                             0));
 }
 
@@ -112,7 +112,7 @@ void PrintVerdict(const ConsistencyRequest& request, const Comparison& compariso
   if (result.Agrees()) {
     fmt::print("AGREE: {} agree to {} in all {} terms{}.\n",
                comparison.with_engine  ? "the analytic model and MuJoCo"
-               : request.has_answers() ? "the description and the answers"
+               : request.has_results() ? "the description and the results"
                                        : "the two descriptions",
                request.DescribeTolerance(), result.terms.size(), left_out);
     return;

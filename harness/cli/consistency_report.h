@@ -13,12 +13,12 @@ namespace dexcheck::cli {
 
 /// What is compared, at how many states.
 struct ConsistencyRequest : ComparisonRequest {
-  AnswersSource source;  ///< What stands for B and answers terms.
+  AnswersSource source;  ///< What stands for B and provides terms.
   ConsistencyOptions options;
 
-  /// What stands for B answers terms, and is no description.
-  [[nodiscard]] bool has_answers() const { return !source.program.empty() || !source.answers.empty(); }
-  /// Whether all states were compared; answers in files have their own.
+  /// What stands for B provides terms, and is no description.
+  [[nodiscard]] bool has_results() const { return !source.program.empty() || !source.answers.empty(); }
+  /// Whether all states were compared; results in files have their own.
   [[nodiscard]] bool IsWhole(const ConsistencyResult& result) const {
     return result.samples >= options.samples || !source.answers.empty();
   }

@@ -221,7 +221,7 @@ void AddEngineComparisonCommand(Command app) {
       .Delimiter(',');
   command
       .AddOption("--engine", &request->options.programs,
-                 "One more: a program of your own that answers terms (harness/descriptions/README.md)")
+                 "One more: a program of your own that provides terms (harness/descriptions/README.md)")
       .TypeName("NAME=CMD")
       .Repeatable();
   command.AddOption("--mjcf", &request->options.mjcf, "What MuJoCo reads instead of ROBOT")

@@ -15,7 +15,7 @@ namespace dexcheck::cli {
 /// Adds "law": J_B_pinv, N, xi_c, V_o_dot, xi_dot_d (47), F_o, F_N, f_c (49), tau (55), A (56).
 /// @param terms with CalcDynamics done. @param state with object, contacts and law. @param kappa of its
 /// contacts.
-/// @throws InputError where the law has no answer: singular J_B' or G, no contact forces in the cones.
+/// @throws InputError where the law has no solution: singular J_B' or G, no contact forces in the cones.
 void AddLawTerms(const ModelTerms& terms, const State& state, const Surface& surface,
                  std::span<const ContactCoordinates> kappa, Json* out);
 

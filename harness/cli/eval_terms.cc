@@ -118,7 +118,7 @@ void AddPinocchioTerms(const ModelTerms& terms, const State& state, Json* out) {
   convention.position = BaseConvention::Position::kXyzXyzw;
   convention.linear_in_base = true;
   const BaseConversion conversion(convention);
-  AnsweredTerms converted;
+  TermResults converted;
   converted.M = terms.M();
   converted.gravity = terms.gravity();
   converted.bias = terms.C() * state.xi + terms.gravity();

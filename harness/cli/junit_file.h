@@ -11,7 +11,7 @@ namespace dexcheck::cli {
 
 /// One check as a test case.
 struct JUnitCase {
-  std::string group;    ///< "constant", "term", "balance": its class.
+  std::string group;    ///< "constant", "term", "inverse_dynamics": its class.
   std::string name;     ///< "M_bar"
   std::string failure;  ///< What is wrong, in one or more lines; empty when nothing is.
   std::string output;   ///< What is worth knowing anyway.

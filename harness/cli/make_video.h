@@ -8,7 +8,7 @@
 
 namespace dexcheck::cli {
 
-/// Processes that draw unless told otherwise: one for each processor, at most 8.
+/// Processes that draw by default: one for each processor, at most 8.
 int CountDrawers();
 
 /// Reads "1280x720". @throws InputError unless both are even numbers that a picture can have.

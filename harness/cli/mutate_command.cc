@@ -150,6 +150,24 @@ void AddMutateCommand(Command app) {
                       .Check(WholeNumber(0, 100000))
                       .Needs(run)
                       .ShowDefault();
+  Option draws =
+      command
+          .AddOption("--draws", &request->run.options.draws,
+                     "In a run: sets of faults whose places, sizes and times are drawn, and whether "
+                     "they are named, in the place of the others")
+          .TypeName("N")
+          .Check(WholeNumber(1, 100000))
+          .Needs(run);
+  command.AddOption("--together", &request->run.options.together, "With --draws: faults at once")
+      .TypeName("N")
+      .Check(WholeNumber(1, 5))
+      .Needs(draws)
+      .ShowDefault();
+  command.AddOption("--draw-seed", &request->run.options.seed, "With --draws: what is drawn")
+      .TypeName("N")
+      .Check(WholeNumber(0, 1000000))
+      .Needs(draws)
+      .ShowDefault();
   const auto states = AddSampleOptions(command, 1000, &request->options.samples, &request->options.seed);
   Option no_diagnosis = command.AddFlag("--no-diagnosis", &request->no_diagnosis,
                                         "Only whether each is found, not what is named");
@@ -159,7 +177,7 @@ void AddMutateCommand(Command app) {
       "In a run: how small an error of each number balance, prediction and law find, and how well it moves "
       "everything");
   smallest.Needs(run);
-  for (Option option : {from, duration, faults, scale}) option.Excludes(smallest);
+  for (Option option : {from, duration, faults, scale, draws}) option.Excludes(smallest);
   for (Option option : states) option.Excludes(run);
   no_diagnosis.Excludes(run);
   AddJobsOption(command, "Faults", &request->run.jobs).Excludes(smallest);

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <map>
 #include <optional>
 
 #include "harness/base/interrupts.h"
@@ -42,6 +43,19 @@ CampaignFault Describe(const RunMutant& mutant) {
   fault.cause_right = counts && mutant.has_right_cause();
   if (counts && !mutant.part.empty()) fault.part_named = fault.cause_right && mutant.names_part;
   fault.exception = DescribeException(mutant);
+  if (!mutant.truth.empty()) {
+    const NamingScore& score = mutant.score;
+    const bool all = score.right == static_cast<int>(mutant.truth.size()) && score.wrong == 0;
+    fault.cause_right = counts && all;
+    fault.part_named.reset();
+    if (counts && mutant.killed)
+      fault.exception = all ? ""
+                            : fmt::format("{}: {}: {}", mutant.name,
+                                          score.wrong > 0      ? "WRONG NAME"
+                                          : score.in_class > 0 ? "class"
+                                                               : "not explained",
+                                          mutant.causes);
+  }
   fault.details = {{"expected_cause", NameOf(mutant.expected)},
                    {"cause", NameOf(mutant.cause)},
                    {"expected_part", mutant.part},
@@ -49,8 +63,39 @@ CampaignFault Describe(const RunMutant& mutant) {
                    {"evidence", mutant.evidence},
                    {"failure", mutant.failure},
                    {"failed_checks", mutant.failed_checks},
-                   {"position_error_max_m", mutant.position_error}};
+                   {"position_error_max_m", mutant.position_error},
+                   {"causes", mutant.causes},
+                   {"right", mutant.score.right},
+                   {"in_class", mutant.score.in_class},
+                   {"not_explained", mutant.score.not_explained},
+                   {"wrong", mutant.score.wrong}};
   return fault;
+}
+
+/// Of drawn faults, by the number of those of a set that are found alone: how many are named.
+void PrintScores(const Campaign& campaign) {
+  struct Count {
+    int sets = 0, all_right = 0, right = 0, in_class = 0, not_explained = 0, wrong = 0;
+  };
+  std::map<int, Count> counts;
+  for (const CampaignFault& fault : campaign.faults) {
+    if (fault.outcome != MutantOutcome::kKilled) continue;
+    const int right = fault.details["right"].get<int>();
+    const int in_class = fault.details["in_class"].get<int>();
+    const int not_explained = fault.details["not_explained"].get<int>();
+    Count& count = counts[right + in_class + not_explained];
+    ++count.sets;
+    count.all_right += static_cast<int>(in_class + not_explained == 0);
+    count.right += right;
+    count.in_class += in_class;
+    count.not_explained += not_explained;
+    count.wrong += fault.details["wrong"].get<int>();
+  }
+  for (const auto& [size, one] : counts)
+    fmt::print(
+        "{} sets of {}: all named in {}; of their faults {} named, {} up to a class, {} not explained; {} "
+        "wrong names.\n",
+        one.sets, size, one.all_right, one.right, one.in_class, one.not_explained, one.wrong);
 }
 
 }  // namespace
@@ -76,6 +121,7 @@ int MutateRun(const MutateRunRequest& request) {
                                  {"scale", request.options.scale}}));
   }
   if (request.json_file != "-") campaign.Print(request.quiet);
+  if (request.json_file != "-" && request.options.draws > 0) PrintScores(campaign);
   return campaign.ToExitCode();
 }
 

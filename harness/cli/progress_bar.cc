@@ -12,7 +12,7 @@
 namespace dexcheck::cli {
 namespace {
 
-constexpr int kUsualColumns = 80;  // of a terminal that does not tell
+constexpr int kUsualColumns = 80;  // of a terminal that does not report them
 constexpr int kWidestBar = 40;
 constexpr int kNarrowestBar = 8;
 constexpr std::chrono::milliseconds kRedrawEvery(100);

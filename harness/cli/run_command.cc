@@ -71,7 +71,7 @@ void TryToMake(const char* what, const Make& make) {
   }
 }
 
-/// Draws what was asked for into the run's folder, after the verdict.
+/// Draws what was requested into the run's folder, after the verdict.
 void DrawRun(const RunRequest& request, const std::filesystem::path& folder, ExitCode verdict) {
   const bool quiet = request.quiet || request.json_file == "-";
   if (request.video) {
@@ -266,7 +266,7 @@ void AddRunCommand(Command app, const std::string& command_line) {
   command
       .AddOption(
           "--controller-time-limit", &request->controller_time_limit,
-          "Time limit for each answer of the controller, s (1 by default); ten times that for its start")
+          "Time limit for each reply of the controller, s (1 by default); ten times that for its start")
       .TypeName("SECONDS")
       .Check(PositiveNumber())
       .Needs(controller);

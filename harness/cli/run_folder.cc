@@ -80,7 +80,7 @@ std::vector<std::string> Supersede(const std::filesystem::path& file, std::vecto
   return overrides;
 }
 
-/// What a scenario asks for. @throws InputError that names the scenario and its key, when it is not there.
+/// What a scenario needs. @throws InputError that names the scenario and its key, when it is not there.
 void RequireFile(const Scenario& scenario, const char* key, const std::string& file) {
   if (file.empty() || ::access(file.c_str(), R_OK) == 0) return;
   throw InputError(

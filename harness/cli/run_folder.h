@@ -1,6 +1,6 @@
 #pragma once
 
-// Folders and files of runs: which scenario is meant, where results go, what a recorded run was.
+// Folders and files of runs: which scenario is named, where results go, what a recorded run was.
 
 #include <cstdint>
 #include <filesystem>
@@ -70,7 +70,7 @@ class RecordedRun {
   [[nodiscard]] const ScenarioFiles& files() const { return files_; }
   [[nodiscard]] long rows() const { return log_.rows(); }
   [[nodiscard]] bool was_checked() const;
-  /// What the bits depended on, as DescribeMachine says; empty when the log does not tell.
+  /// What the bits depended on, as DescribeMachine says; empty when the log does not have it.
   [[nodiscard]] std::string machine() const { return log_.FindText("machine"); }
   /// The controller that the user brought along; empty for the scenario's.
   [[nodiscard]] std::string controller() const { return log_.FindText("controller"); }

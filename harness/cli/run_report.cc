@@ -126,6 +126,15 @@ void PrintSpeed(const ClosedLoop& loop, const RunResult& result) {
       scale * times.controller, scale * times.cross_check, scale * result.recording_seconds);
 }
 
+/// What explains the residuals, numbered; those that nothing explains last.
+void PrintCauses(const Causes& causes) {
+  if (causes.empty()) return;
+  fmt::print("  causes\n");
+  int number = 0;
+  for (const Explanation& one : causes)
+    fmt::print("{}\n", Wrap(fmt::format("    {}  {}: {}", ++number, NameOf(one.channel), one.Tell()), 7));
+}
+
 }  // namespace
 
 bool WasClosed(const RunResult& result) { return result.interrupted && !IsInterrupted(); }
@@ -180,6 +189,7 @@ void PrintRunReport(const Setup& setup, const ClosedLoop& loop, const RunResult&
   }
   if (result.attribution.cause == Cause::kNone) return;
   fmt::print("  cause: {} ({})\n", NameOf(result.attribution.cause), result.attribution.evidence);
+  PrintCauses(result.causes);
   for (const ConstantFinding& finding : setup.constants().findings) {
     fmt::print("  {}: {}: {:.12g} in the model, {:.12g} in the MJCF\n", finding.check, finding.where,
                finding.model, finding.engine);

@@ -15,7 +15,7 @@ std::filesystem::path FindShippedFile(const std::filesystem::path& name);
 struct ShippedKind {
   const char* name;    ///< "scenario".
   const char* folder;  ///< As FindShippedFile takes it.
-  const char* listed;  ///< Where their names are told; the names themselves are when empty.
+  const char* listed;  ///< What a message points to for their names; the names themselves when empty.
 
   /// In alphabetic order. None is read.
   [[nodiscard]] std::vector<std::string> ListNames() const;

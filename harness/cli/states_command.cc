@@ -45,7 +45,7 @@ void AddStatesCommand(Command app) {
   constexpr long kMaxCount = 1000000;
   const auto request = std::make_shared<StatesRequest>();
   Command command = app.AddCommand(
-      "states", "Write random states of a robot, for a program whose answers consistency --answers reads");
+      "states", "Write random states of a robot, for a program whose results consistency --answers reads");
   command.AddOption("ROBOT", &request->robot, "Parameter file (TOML), URDF or MJCF")
       .TypeName("FILE")
       .Required();

@@ -7,7 +7,7 @@
 
 namespace dexcheck::cli {
 
-/// Columns of the terminal that a descriptor leads to, now; 0 when it is none or does not tell.
+/// Columns of the terminal that a descriptor leads to, now; 0 when it is none or does not report them.
 int CountColumns(int descriptor);
 
 /// What every line of a table, and of text without long paths, fits.

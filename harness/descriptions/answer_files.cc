@@ -27,9 +27,9 @@ Eigen::Map<const VectorXd> MapRow(const NpyArray& array, long sample) {
   return {array.values.data() + static_cast<size_t>(sample) * width, static_cast<Eigen::Index>(width)};
 }
 
-AnswerLayout ReadLayout(const std::filesystem::path& path, const RobotDescription& robot) {
-  if (!std::filesystem::exists(path)) return AnswerLayout(robot);
-  const std::optional<Json> json = ParseAnswer(ReadBytes(path));
+ProgramLayout ReadLayout(const std::filesystem::path& path, const RobotDescription& robot) {
+  if (!std::filesystem::exists(path)) return ProgramLayout(robot);
+  const std::optional<Json> json = ParseResult(ReadBytes(path));
   if (!json) throw InputError(path.string() + ": must be a JSON object");
   return {robot, *json, path.string()};
 }
@@ -69,7 +69,7 @@ std::string WriteStateLines(const StateTable& states) {
 }
 
 std::string WriteLayout(const RobotDescription& robot, const std::string& origin) {
-  const AnswerLayout layout(robot);
+  const ProgramLayout layout(robot);
   OrderedJson json = layout.ToJson();
   const Vector3d& g = robot.spec.gravity;
   json["robot"] = robot.spec.name;
@@ -102,7 +102,7 @@ AnswerFiles::AnswerFiles(const std::filesystem::path& folder, const RobotDescrip
   if (!terms_.empty()) return;
   throw InputError(
       folder.string() +
-      ": must have answers: M.npy, C.npy, c.npy, g.npy, h.npy, friction.npy, kinetic_energy.npy, "
+      ": must have results: M.npy, C.npy, c.npy, g.npy, h.npy, friction.npy, kinetic_energy.npy, "
       "potential_energy.npy or answers.jsonl, got none");
 }
 
@@ -114,7 +114,7 @@ void AnswerFiles::ReadLines(const std::filesystem::path& path) {
   for (std::string line; std::getline(text, line);) {
     const std::string source = path.string() + ":" + std::to_string(++number);
     if (line.find_first_not_of(" \t\r") == std::string::npos) continue;
-    const std::optional<Json> parsed = ParseAnswer(line);
+    const std::optional<Json> parsed = ParseResult(line);
     if (!parsed) throw InputError(source + ": must be a JSON object (NaN and Infinity are none)");
     const Json& json = *parsed;
     // Without ids the lines are in the order of the states.
@@ -126,7 +126,7 @@ void AnswerFiles::ReadLines(const std::filesystem::path& path) {
     const auto sample = id.get<size_t>();
     const auto state = static_cast<long>(sample);
     lines_[sample] =
-        ReadAnswer(json, layout(), layout().WriteVelocities(Row(q_, state), Row(v_, state)), source);
+        ReadResult(json, layout(), layout().WriteVelocities(Row(q_, state), Row(v_, state)), source);
     seen[sample] = true;
   }
   const auto missing = std::find(seen.begin(), seen.end(), false);
@@ -168,8 +168,8 @@ VectorXd AnswerFiles::FindRow(const std::string& term, long sample) const {
   return found == terms_.end() ? VectorXd() : Row(found->second, sample);
 }
 
-AnsweredTerms AnswerFiles::Evaluate(long sample, const VectorXd& q, const VectorXd& xi) {
-  AnsweredTerms terms;
+TermResults AnswerFiles::Evaluate(long sample, const VectorXd& q, const VectorXd& xi) {
+  TermResults terms;
   if (!lines_.empty()) {
     terms = lines_[static_cast<size_t>(sample)];
     layout().ReadTerms(q, xi, &terms);

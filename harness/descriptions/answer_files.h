@@ -1,6 +1,6 @@
 #pragma once
 
-// States written for a program that runs elsewhere, and its answers read back.
+// States written for a program that runs elsewhere, and its results read back.
 
 #include <filesystem>
 #include <map>
@@ -24,14 +24,14 @@ StateTable DrawStates(const RobotDescription& robot, long count, const StateRang
 /// A line {"id":0,"q":[...],"v":[...]} for each state.
 std::string WriteStateLines(const StateTable& states);
 
-/// What layout.json says: the robot, and in which layout states are written and answers are expected.
+/// What layout.json says: the robot, and in which layout states are written and results are expected.
 std::string WriteLayout(const RobotDescription& robot, const std::string& origin);
 
-/// Answers in a folder beside the states they belong to: q.npy (N x num_positions) and v.npy (N x n) in the
+/// Results in a folder beside the states they belong to: q.npy (N x num_positions) and v.npy (N x n) in the
 /// robot's own layout; M.npy, C.npy (N x n x n), c.npy, g.npy, h.npy, friction.npy (N x n),
 /// kinetic_energy.npy, potential_energy.npy (N), each of which may be missing, in the layout of layout.json,
-/// or in the robot's own without such a file. Instead of them the answers may stand in
-/// answers.jsonl, a line for each state as a program gives it.
+/// or in the robot's own without such a file. Instead of them the results may stand in
+/// answers.jsonl, a line for each state as a program writes it.
 class AnswerFiles : public AnsweringProvider {
  public:
   /// @throws InputError, one line that names the file.
@@ -41,7 +41,7 @@ class AnswerFiles : public AnsweringProvider {
 
   /// The state of a sample; false when there is none.
   bool ReadState(DynamicsState* state) const;
-  AnsweredTerms Evaluate(long sample, const VectorXd& q, const VectorXd& xi) override;
+  TermResults Evaluate(long sample, const VectorXd& q, const VectorXd& xi) override;
 
  private:
   [[nodiscard]] NpyArray ReadArray(const std::string& file, const std::vector<size_t>& shape) const;
@@ -56,7 +56,7 @@ class AnswerFiles : public AnsweringProvider {
   long count_ = 0;
   NpyArray q_, v_;
   std::map<std::string, NpyArray> terms_;
-  std::vector<AnsweredTerms> lines_;  // of answers.jsonl, by state
+  std::vector<TermResults> lines_;  // of answers.jsonl, by state
 };
 
 }  // namespace dexcheck

@@ -92,7 +92,7 @@ double ReadNumber(const Json& value, const std::string& key, const std::string& 
 
 }  // namespace
 
-AnswerLayout::AnswerLayout(const RobotDescription& robot)
+ProgramLayout::ProgramLayout(const RobotDescription& robot)
     : base_(robot.spec.base.type == BaseType::kFloating ? 6 : 0), base_positions_(base_ > 0 ? 7 : 0) {
   if (base_ == 0 && robot.spec.base.type != BaseType::kFixed) {
     throw InputError(robot.spec.source + ": base: must be fixed or floating to be compared with a program");
@@ -108,7 +108,7 @@ AnswerLayout::AnswerLayout(const RobotDescription& robot)
   SetJoints(std::move(all));
 }
 
-void AnswerLayout::SetJoints(std::vector<int> joints) {
+void ProgramLayout::SetJoints(std::vector<int> joints) {
   joints_ = std::move(joints);
   velocities_.clear();
   num_positions_ = base_positions_;
@@ -124,8 +124,8 @@ void AnswerLayout::SetJoints(std::vector<int> joints) {
   });
 }
 
-AnswerLayout::AnswerLayout(const RobotDescription& robot, const Json& json, const std::string& source)
-    : AnswerLayout(robot) {
+ProgramLayout::ProgramLayout(const RobotDescription& robot, const Json& json, const std::string& source)
+    : ProgramLayout(robot) {
   if (json.contains("base")) {
     if (base_ == 0) Fail(source, "base", "must not be given, the base is fixed");
     convention_ = ReadConvention(json.at("base"), source);
@@ -170,7 +170,7 @@ AnswerLayout::AnswerLayout(const RobotDescription& robot, const Json& json, cons
   }
 }
 
-nlohmann::ordered_json AnswerLayout::ToJson() const {
+nlohmann::ordered_json ProgramLayout::ToJson() const {
   nlohmann::ordered_json json;
   json["joints"] = nlohmann::ordered_json::array();
   for (const int joint : joints_) json["joints"].push_back(robot_joints_[static_cast<size_t>(joint)].name);
@@ -194,7 +194,7 @@ nlohmann::ordered_json AnswerLayout::ToJson() const {
   return json;
 }
 
-VectorXd AnswerLayout::WritePositions(const VectorXd& q) const {
+VectorXd ProgramLayout::WritePositions(const VectorXd& q) const {
   VectorXd written(num_positions());
   if (base_ > 0) written.head<7>() = BaseConversion(convention_).ConvertPositions(q).head<7>();
   Eigen::Index at = base_positions_;
@@ -206,7 +206,7 @@ VectorXd AnswerLayout::WritePositions(const VectorXd& q) const {
   return written;
 }
 
-VectorXd AnswerLayout::WriteVelocities(const VectorXd& q, const VectorXd& xi) const {
+VectorXd ProgramLayout::WriteVelocities(const VectorXd& q, const VectorXd& xi) const {
   VectorXd written(size());
   if (base_ > 0) written.head<6>() = BaseConversion(convention_).ConvertVelocities(q, xi).head<6>();
   for (size_t i = 0; i < velocities_.size(); ++i)
@@ -214,7 +214,7 @@ VectorXd AnswerLayout::WriteVelocities(const VectorXd& q, const VectorXd& xi) co
   return written;
 }
 
-void AnswerLayout::ReadTerms(const VectorXd& q, const VectorXd& xi, AnsweredTerms* terms) const {
+void ProgramLayout::ReadTerms(const VectorXd& q, const VectorXd& xi, TermResults* terms) const {
   std::vector<Eigen::Index> from;
   for (int i = 0; i < base_; ++i) from.push_back(i);
   for (const int place : places_) from.push_back(base_ + place);
@@ -229,23 +229,23 @@ void AnswerLayout::ReadTerms(const VectorXd& q, const VectorXd& xi, AnsweredTerm
   BaseConversion(convention_).Restore(q, own, terms);
 }
 
-std::optional<Json> ParseAnswer(std::string_view text) {
-  // Answers have three brackets inside each other; what nests deeper would be freed by recursion.
+std::optional<Json> ParseResult(std::string_view text) {
+  // Results have three brackets inside each other; what nests deeper would be freed by recursion.
   constexpr int kMaxDepth = 32;
   bool is_deep = false;
   const auto check = [&](int depth, Json::parse_event_t, const Json&) {
     is_deep = is_deep || depth > kMaxDepth;
     return !is_deep;
   };
-  Json answer = Json::parse(text, check, /*allow_exceptions=*/false);
-  if (is_deep || !answer.is_object()) return std::nullopt;
-  return answer;
+  Json result = Json::parse(text, check, /*allow_exceptions=*/false);
+  if (is_deep || !result.is_object()) return std::nullopt;
+  return result;
 }
 
-AnsweredTerms ReadAnswer(const Json& json, const AnswerLayout& layout, const VectorXd& v,
-                         const std::string& source) {
+TermResults ReadResult(const Json& json, const ProgramLayout& layout, const VectorXd& v,
+                       const std::string& source) {
   const Eigen::Index n = layout.size();
-  AnsweredTerms terms;
+  TermResults terms;
   const auto find = [&](const char* key) { return json.contains(key) ? &json.at(key) : nullptr; };
   if (const Json* M = find("M")) terms.M = ReadMatrix(*M, n, "M", source);
   if (const Json* C = find("C")) terms.coriolis = ReadMatrix(*C, n, "C", source) * v;

@@ -16,17 +16,17 @@ namespace dexcheck {
 
 /// How a program writes q', xi and terms. Coordinates are the base's, if it floats, then one for each joint;
 /// a ball joint has a quaternion qw qx qy qz in q' and three entries in xi, in the robot's own convention.
-class AnswerLayout {
+class ProgramLayout {
  public:
   /// The robot's own: all joints, in its order.
-  explicit AnswerLayout(const RobotDescription& robot);
+  explicit ProgramLayout(const RobotDescription& robot);
 
   /// From the keys `joints` (names in the program's order; all joints, or all that follow no other) and
   /// `base` (of a floating base: {"position": "xyz_wxyz" | "xyz_xyzw" | "wxyz_xyz", "velocity":
   /// "linear_angular" | "angular_linear", "linear_axes": "world" | "base", "angular_axes": "base" |
   /// "world"}), each of which may be missing.
   /// @param source who says so, for messages. @throws InputError "SOURCE: KEY: what, got VALUE".
-  AnswerLayout(const RobotDescription& robot, const nlohmann::json& json, const std::string& source);
+  ProgramLayout(const RobotDescription& robot, const nlohmann::json& json, const std::string& source);
 
   /// The keys that the constructor reads, of this layout.
   [[nodiscard]] nlohmann::ordered_json ToJson() const;
@@ -45,7 +45,7 @@ class AnswerLayout {
   [[nodiscard]] VectorXd WriteVelocities(const VectorXd& q, const VectorXd& xi) const;
   /// Terms as the program wrote them, in the robot's own coordinates; without the joints that follow when it
   /// is reduced.
-  void ReadTerms(const VectorXd& q, const VectorXd& xi, AnsweredTerms* terms) const;
+  void ReadTerms(const VectorXd& q, const VectorXd& xi, TermResults* terms) const;
 
  private:
   /// A joint as files have it: a ball's entries are one.
@@ -68,31 +68,31 @@ class AnswerLayout {
   BaseConvention convention_;
 };
 
-/// A provider that answers in a layout of its own.
-class AnsweringProvider : public AnsweredProvider {
+/// A provider whose results have a layout of its own.
+class AnsweringProvider : public ResultProvider {
  public:
   [[nodiscard]] bool is_reduced() const override { return layout_.is_reduced(); }
-  [[nodiscard]] const AnswerLayout& layout() const { return layout_; }
+  [[nodiscard]] const ProgramLayout& layout() const { return layout_; }
   /// Takes its words for another convention of the base than the one it said.
   void set_convention(const BaseConvention& convention) { layout_.set_convention(convention); }
 
  protected:
-  explicit AnsweringProvider(AnswerLayout layout) : layout_(std::move(layout)) {}
-  void set_layout(AnswerLayout layout) { layout_ = std::move(layout); }
+  explicit AnsweringProvider(ProgramLayout layout) : layout_(std::move(layout)) {}
+  void set_layout(ProgramLayout layout) { layout_ = std::move(layout); }
 
  private:
-  AnswerLayout layout_;
+  ProgramLayout layout_;
 };
 
-/// A program's answer, which is one JSON object; none where the text is anything else or nests deeper than
-/// answers do.
-std::optional<nlohmann::json> ParseAnswer(std::string_view text);
+/// A program's result, which is one JSON object; none where the text is anything else or nests deeper than
+/// results do.
+std::optional<nlohmann::json> ParseResult(std::string_view text);
 
 /// Terms from the keys M (n x n), C (n x n) or c = C v (n), g (n), h = c + g (n), friction (n),
 /// kinetic_energy, potential_energy; at least one. n is the layout's size, v the velocity as the program has
 /// it.
 /// @throws InputError "SOURCE: KEY: what, got VALUE" for sizes that differ and what is no number.
-AnsweredTerms ReadAnswer(const nlohmann::json& json, const AnswerLayout& layout, const VectorXd& v,
-                         const std::string& source);
+TermResults ReadResult(const nlohmann::json& json, const ProgramLayout& layout, const VectorXd& v,
+                       const std::string& source);
 
 }  // namespace dexcheck

@@ -10,6 +10,7 @@
 
 #include "controller/common/text.h"
 #include "controller/dynamics/model_terms.h"
+#include "controller/model/rigid_body.h"
 #include "harness/descriptions/alike_names.h"
 #include "harness/descriptions/random_states.h"
 
@@ -140,8 +141,7 @@ class JointAudit {
 
   /// About an axis through the frame's origin, the one about which it is least, kg m^2.
   static double CalcLeastInertia(const MassProperties& body) {
-    const Matrix3d about_origin = body.inertia + body.mass * (body.com.squaredNorm() * Matrix3d::Identity() -
-                                                              body.com * body.com.transpose());
+    const Matrix3d about_origin = body.inertia + CalcPointInertia(body.mass, body.com);
     return Eigen::SelfAdjointEigenSolver<Matrix3d>(about_origin, Eigen::EigenvaluesOnly)
         .eigenvalues()
         .minCoeff();

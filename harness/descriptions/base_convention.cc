@@ -64,7 +64,7 @@ VectorXd BaseConversion::CalcRate(const VectorXd& q, const VectorXd& xi) const {
   return rate;
 }
 
-void BaseConversion::Restore(const VectorXd& q, const VectorXd& xi, AnsweredTerms* terms) const {
+void BaseConversion::Restore(const VectorXd& q, const VectorXd& xi, TermResults* terms) const {
   const Matrix6d B = CalcB(q);
   const VectorXd rate = CalcRate(q, xi);
   for (VectorXd* force : {&terms->coriolis, &terms->bias}) {
@@ -83,7 +83,7 @@ void BaseConversion::Restore(const VectorXd& q, const VectorXd& xi, AnsweredTerm
   terms->M.leftCols<6>() = (terms->M.leftCols<6>() * B).eval();
 }
 
-void BaseConversion::Apply(const VectorXd& q, const VectorXd& xi, AnsweredTerms* terms) const {
+void BaseConversion::Apply(const VectorXd& q, const VectorXd& xi, TermResults* terms) const {
   // B is made of rotations: B^-1 = B^T.
   const Matrix6d B = CalcB(q);
   terms->M.topRows<6>() = (B * terms->M.topRows<6>()).eval();

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "harness/descriptions/answered_terms.h"
+#include "harness/descriptions/term_results.h"
 
 namespace dexcheck {
 
@@ -45,11 +45,11 @@ class BaseConversion {
   /// Terms that were given in the convention at this state, in the default one. With xi' = B xi,
   ///   M = B^T M' B,  gravity = B^T gravity',  coriolis = B^T (coriolis' + M' B_dot xi),
   /// where B_dot xi = [-omega x v; 0] when the linear velocity is along the base's axes, and zero otherwise.
-  /// A provider that gives forces with velocities in them and no M cannot be converted then: they are left
+  /// A provider that has forces with velocities in them and no M cannot be converted then: they are left
   /// out.
-  void Restore(const VectorXd& q, const VectorXd& xi, AnsweredTerms* terms) const;
+  void Restore(const VectorXd& q, const VectorXd& xi, TermResults* terms) const;
   /// The other way: whole terms of the default convention in this one.
-  void Apply(const VectorXd& q, const VectorXd& xi, AnsweredTerms* terms) const;
+  void Apply(const VectorXd& q, const VectorXd& xi, TermResults* terms) const;
 
  private:
   [[nodiscard]] Matrix6d CalcB(const VectorXd& q) const;

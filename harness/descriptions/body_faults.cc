@@ -27,11 +27,11 @@ void AddInertiaFaults(std::vector<BodyFault>* faults) {
     faults->push_back({"inertia", "inertias", text, undo});
   };
   add("as if given about the link's origin instead of the centre of mass", [](const ComparedBody& body) {
-    return WithInertia(body, body.given.inertia - CalcOffset(body.given));
+    return WithInertia(body, body.given.inertia - CalcPointInertia(body.given.mass, body.given.com));
   });
   add("as if moved from the link's origin to the centre of mass once too often",
       [](const ComparedBody& body) {
-        return WithInertia(body, body.given.inertia + CalcOffset(body.given));
+        return WithInertia(body, body.given.inertia + CalcPointInertia(body.given.mass, body.given.com));
       });
   add("as if its frame were turned the other way (the rotation transposed)", [](const ComparedBody& body) {
     const Matrix3d R = body.R_LC;
@@ -126,7 +126,7 @@ void AddComFaults(std::vector<BodyFault>* faults) {
   add("as if given along the parent's axes", [](const ComparedBody& body) {
     return WithCom(body, body.X_PL.linear().transpose() * body.given.com);
   });
-  add("as if given in the link's frame, though the parent's is meant",
+  add("as if given in the link's frame, though the parent's is expected",
       [](const ComparedBody& body) { return WithCom(body, body.X_PL * body.given.com); });
   add("with its sign turned around", [](const ComparedBody& body) { return WithCom(body, -body.given.com); });
   for (int axis = 0; axis < 3; ++axis) {
@@ -181,11 +181,6 @@ std::vector<BodyFault> ListBodyFaults() {
   AddComFaults(&faults);
   AddMassFaults(&faults);
   return faults;
-}
-
-Matrix3d CalcOffset(const MassProperties& body) {
-  const Vector3d& c = body.com;
-  return body.mass * (c.squaredNorm() * Matrix3d::Identity() - c * c.transpose());
 }
 
 BodyDifference CompareBodies(const MassProperties& a, const MassProperties& b, double length) {

@@ -24,9 +24,6 @@ struct BodyDifference {
 /// Places are compared relative to `length`, m.
 BodyDifference CompareBodies(const MassProperties& a, const MassProperties& b, double length);
 
-/// I about the origin of a body whose centre of mass is c, without that about c: m (c^2 1 - c c^T).
-Matrix3d CalcOffset(const MassProperties& body);
-
 /// The body with the fault undone, as far as it can have been made there.
 using UndoBodyFault = std::function<std::optional<MassProperties>(const ComparedBody&)>;
 

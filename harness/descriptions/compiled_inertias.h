@@ -1,6 +1,6 @@
 #pragma once
 
-// What MuJoCo's compiler makes of the inertias that an MJCF gives as fullinertia.
+// What MuJoCo's compiler makes of the inertias that an MJCF states as fullinertia.
 
 #include <mujoco/mujoco.h>
 

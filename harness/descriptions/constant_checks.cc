@@ -386,7 +386,7 @@ class EngineConstants : public ConstantComparison {
   }
 
   /// Joints that carry the base or the object: nothing holds or drives them. And springs, dry friction and
-  /// stops where the analytic model has none; and a fluid.
+  /// limits where the analytic model has none; and a fluid.
   void FindJointsOwn() {
     const size_t first_finding = result_.findings.size();
     const std::vector<OwnedJoint> joints = ListJoints();

@@ -16,7 +16,7 @@ namespace dexcheck {
 /// Two readers of decimal numbers form at most short sums and products of them.
 inline constexpr double kConstantRounding = 64.0 * std::numeric_limits<double>::epsilon();
 
-/// One constant that the parameter file and the MJCF give differently.
+/// One constant in which the parameter file and the MJCF differ.
 struct ConstantFinding {
   std::string check;  ///< Name of the check, such as "link_mass".
   std::string where;  ///< Part of the robot, such as "link r_forearm".

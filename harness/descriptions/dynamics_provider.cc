@@ -21,29 +21,32 @@ bool MechanismProvider::HasValue(Term term) const {
 }
 
 bool MechanismProvider::ReadValues(Term term, Eigen::Ref<MatrixXd> out) const {
-  const auto each_contact = [&](const auto& member) {
+  const auto put = [&](const auto& values) {
+    out = values.reshaped();
+    return true;
+  };
+  const auto put_number = [&](double value) {
+    out(0, 0) = value;
+    return true;
+  };
+  const auto put_each = [&](const auto& member) {
     for (size_t i = 0; i < contacts_.size(); ++i)
       out.col(static_cast<Eigen::Index>(i)) = (contacts_[i].*member).reshaped();
+    return true;
   };
   switch (term) {
     case Term::kKineticEnergy:
-      out(0, 0) = energy_.kinetic;
-      return true;
+      return put_number(energy_.kinetic);
     case Term::kPotentialEnergy:
-      out(0, 0) = energy_.potential;
-      return true;
+      return put_number(energy_.potential);
     case Term::kLinearMomentum:
-      out = energy_.linear_momentum;
-      return true;
+      return put(energy_.linear_momentum);
     case Term::kAngularMomentum:
-      out = energy_.angular_momentum;
-      return true;
+      return put(energy_.angular_momentum);
     case Term::kContactFrame:
-      each_contact(&ContactValues::frame);
-      return true;
+      return put_each(&ContactValues::frame);
     case Term::kG:
-      each_contact(&ContactValues::G);
-      return true;
+      return put_each(&ContactValues::G);
     case Term::kJB:
       for (size_t i = 0; i < contacts_.size(); ++i) {
         const Eigen::Index n = contacts_[i].J_B.cols();
@@ -51,41 +54,29 @@ bool MechanismProvider::ReadValues(Term term, Eigen::Ref<MatrixXd> out) const {
       }
       return true;
     case Term::kKappaDot:
-      each_contact(&ContactValues::relative_twist);
-      return true;
+      return put_each(&ContactValues::relative_twist);
     case Term::kJBDotXi:
-      each_contact(&ContactValues::J_B_dot_xi);
-      return true;
+      return put_each(&ContactValues::J_B_dot_xi);
     case Term::kGDotTV:
-      each_contact(&ContactValues::G_dot_T_V);
-      return true;
+      return put_each(&ContactValues::G_dot_T_V);
     case Term::kObjectPose:
-      out = object_.pose.reshaped();
-      return true;
+      return put(object_.pose);
     case Term::kVBo:
-      out = object_.V_Bo;
-      return true;
+      return put(object_.V_Bo);
     case Term::kMHat:
-      out = object_.M_hat.reshaped();
-      return true;
+      return put(object_.M_hat);
     case Term::kCHatV:
-      out = object_.C_hat_V;
-      return true;
+      return put(object_.C_hat_V);
     case Term::kNo:
-      out = object_.N_o;
-      return true;
+      return put(object_.N_o);
     case Term::kObjectKineticEnergy:
-      out(0, 0) = object_.kinetic;
-      return true;
+      return put_number(object_.kinetic);
     case Term::kObjectPotentialEnergy:
-      out(0, 0) = object_.potential;
-      return true;
+      return put_number(object_.potential);
     case Term::kMo:
-      out = object_.M_o.reshaped();
-      return true;
+      return put(object_.M_o);
     case Term::kCoXoDot:
-      out = object_.C_o_X_o_dot;
-      return true;
+      return put(object_.C_o_X_o_dot);
     default:
       return false;
   }

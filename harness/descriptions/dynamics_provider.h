@@ -1,7 +1,7 @@
 #pragma once
 
 // Whatever has the terms of a robot's dynamics at a state: an analytic model, the engine, a program,
-// answers in files.
+// results in files.
 
 #include <optional>
 #include <string>

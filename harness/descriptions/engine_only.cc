@@ -146,9 +146,10 @@ class EngineOnly {
           meshes.insert(own);
         const bool hard = (IsFingertip(own) && IsObject(other)) || (IsWheel(own) && IsWorld(other));
         if (hard) Expect("contact_dimension", where, kHardContact, dim);
-        const bool rubs =
+        const bool has_friction =
             IsWorld(other) && !IsWorld(own) && !IsObject(own) && !IsWheel(own) && !IsFingertip(own);
-        if (rubs) Expect("contact_rubbing", where, 0.0, dim > 1 ? std::max(friction[0], friction[1]) : 0.0);
+        if (has_friction)
+          Expect("contact_rubbing", where, 0.0, dim > 1 ? std::max(friction[0], friction[1]) : 0.0);
       }
       Note("contact_pair",
            fmt::format("{}: {} and {}: dimension {}, friction {}, margin {:.17g}, gap {:.17g}", where,

@@ -18,39 +18,6 @@ EngineTerms MakeTerms(const Adapter& adapter, std::span<const int> fingertips) {
   return fingertips.empty() ? EngineTerms(adapter, Coordinates::kReduced) : EngineTerms(adapter, fingertips);
 }
 
-/// Pose and body velocity of the object at X_o, X_o_dot by the engine's quaternions.
-struct EngineObjectState {
-  Pose X_Bo = Pose::Identity();
-  Vector6d V_Bo = Vector6d::Zero();
-};
-
-EngineObjectState CalcEngineObjectState(const Vector6d& X_o, const Vector6d& X_o_dot) {
-  // Quaternion z(alpha) y(beta) z(gamma); each angle's rate turns about its axis as the later rotations leave
-  // it.
-  const mjtNum axes[3][3] = {{0, 0, 1}, {0, 1, 0}, {0, 0, 1}};
-  mjtNum rotation[4] = {1, 0, 0, 0};
-  Vector3d omega = Vector3d::Zero();  // in the frame reached so far
-  for (int k = 0; k < 3; ++k) {
-    mjtNum step[4];
-    mjtNum inverse[4];
-    mjtNum turned[3];
-    mju_axisAngle2Quat(step, axes[k], X_o[3 + k]);
-    mju_mulQuat(rotation, rotation, step);
-    mju_negQuat(inverse, step);
-    mju_rotVecQuat(turned, omega.data(), inverse);
-    omega = Vector3d(turned[0], turned[1], turned[2]) +
-            X_o_dot[3 + k] * Vector3d(axes[k][0], axes[k][1], axes[k][2]);
-  }
-  mju_normalize4(rotation);
-  Eigen::Matrix<double, 3, 3, Eigen::RowMajor> R;
-  mju_quat2Mat(R.data(), rotation);
-  EngineObjectState state;
-  state.X_Bo.linear() = R;
-  state.X_Bo.translation() = X_o.head<3>();
-  state.V_Bo << R.transpose() * X_o_dot.head<3>(), omega;
-  return state;
-}
-
 }  // namespace
 
 struct EngineProvider::OwnModel {
@@ -106,7 +73,7 @@ void EngineProvider::PrepareFrames(std::span<const int> frames, bool contacts) {
 
 void EngineProvider::SetState(const DynamicsState& state) {
   const ObjectCoordinates coordinates{state.X_o, state.X_o_dot};
-  const EngineObjectState object = CalcEngineObjectState(state.X_o, state.X_o_dot);
+  const ObjectRates object = CalcObjectRates(state.X_o, state.X_o_dot);
   SetState(state.q, state.xi, object.X_Bo, object.V_Bo, &coordinates);
   w_ = state.w;
   if (unreduced_ != nullptr) unreduced_->SetState(state.q, unreduced_velocity_);

@@ -14,8 +14,8 @@ void FunctionProvider::CheckSize(const char* term, Eigen::Index rows, Eigen::Ind
                    ", got " + describe(rows, cols));
 }
 
-AnsweredTerms FunctionProvider::Evaluate(long, const VectorXd& q, const VectorXd& xi) {
-  AnsweredTerms terms;
+TermResults FunctionProvider::Evaluate(long, const VectorXd& q, const VectorXd& xi) {
+  TermResults terms;
   if (functions_.M) {
     terms.M = functions_.M(q);
     CheckSize("M", terms.M.rows(), terms.M.cols(), size_);

@@ -1,11 +1,11 @@
 #pragma once
 
-// Somebody's own terms, as functions in the same program: compared as a program's answers are.
+// Somebody's own terms, as functions in the same program: compared as a program's results are.
 
 #include <functional>
 #include <string>
 
-#include "harness/descriptions/answered_terms.h"
+#include "harness/descriptions/term_results.h"
 
 namespace dexcheck {
 
@@ -21,12 +21,12 @@ struct TermFunctions {
 };
 
 /// The functions as a provider.
-class FunctionProvider : public AnsweredProvider {
+class FunctionProvider : public ResultProvider {
  public:
   FunctionProvider(TermFunctions functions, int size) : functions_(std::move(functions)), size_(size) {}
   [[nodiscard]] const std::string& name() const override { return functions_.name; }
   /// @throws InputError "NAME: TERM: must have n entries, got m".
-  AnsweredTerms Evaluate(long sample, const VectorXd& q, const VectorXd& xi) override;
+  TermResults Evaluate(long sample, const VectorXd& q, const VectorXd& xi) override;
 
  private:
   void CheckSize(const char* term, Eigen::Index rows, Eigen::Index cols, Eigen::Index expected_cols) const;

@@ -30,14 +30,19 @@ ObjectRates CalcObjectRates(const Vector6d& X_o, const Vector6d& X_o_dot) {
     omega_dot = turn(omega_dot) - X_o_dot[3 + k] * axis.cross(omega);
     omega += X_o_dot[3 + k] * axis;
   }
-  mjtNum matrix[9];
-  mju_quat2Mat(matrix, rotation);
-  const Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> R(matrix);
+  Eigen::Matrix<double, 3, 3, Eigen::RowMajor> R;
+  mju_quat2Mat(R.data(), rotation);
   ObjectRates rates;
   rates.P_inv.topLeftCorner<3, 3>() = R.transpose();
   rates.P_inv.bottomRightCorner<3, 3>() = W;
   const Vector3d v = R.transpose() * X_o_dot.head<3>();
   rates.bias << -omega.cross(v), omega_dot;
+  // Of pose and velocity rounding is taken out of the quaternion first.
+  mju_normalize4(rotation);
+  mju_quat2Mat(R.data(), rotation);
+  rates.X_Bo.linear() = R;
+  rates.X_Bo.translation() = X_o.head<3>();
+  rates.V_Bo << R.transpose() * X_o_dot.head<3>(), omega;
   return rates;
 }
 

@@ -1,6 +1,6 @@
 #pragma once
 
-// Velocity of the object by its coordinates X_o, from the engine's quaternion algebra: P^-1 and its
+// Pose and velocity of the object by its coordinates X_o, from the engine's quaternion algebra: P^-1 and its
 // rate as the checks have them, which share no formula with the model's.
 
 #include "controller/common/types.h"
@@ -9,6 +9,8 @@ namespace dexcheck {
 
 /// V_Bo = P_inv X_o_dot, and what V_Bo_dot is at constant X_o_dot.
 struct ObjectRates {
+  Pose X_Bo = Pose::Identity();
+  Vector6d V_Bo = Vector6d::Zero();
   Matrix6d P_inv = Matrix6d::Zero();
   Vector6d bias = Vector6d::Zero();  ///< d/dt (P^-1) X_o_dot, m/s^2 and rad/s^2.
 };

@@ -23,7 +23,8 @@ std::optional<MassProperties> Subtract(const MassProperties& whole, const MassPr
   rest.mass = whole.mass - others.mass;
   if (!(rest.mass > kLeastFraction * whole.mass)) return std::nullopt;
   rest.com = (whole.mass * whole.com - others.mass * others.com) / rest.mass;
-  rest.inertia = whole.inertia + CalcOffset(whole) - others.inertia - CalcOffset(others) - CalcOffset(rest);
+  rest.inertia = whole.inertia + CalcPointInertia(whole.mass, whole.com) - others.inertia -
+                 CalcPointInertia(others.mass, others.com) - CalcPointInertia(rest.mass, rest.com);
   return rest;
 }
 
@@ -40,7 +41,7 @@ MassProperties CombineOthers(const std::vector<DescribedPart>& parts, size_t lef
 void AddParts(const ComparedBody& link, bool of_given, std::vector<ComparedPart>* list) {
   const std::vector<DescribedPart>& parts = of_given ? link.given_parts : link.parts;
   if (parts.size() < 2) return;
-  // Parts tell of the body only while they are what it was made of.
+  // Parts describe the body only while they are what it was made of.
   constexpr double kRounding = 1e-9;
   const MassProperties whole = CombineOthers(parts, parts.size());
   if (CompareBodies(whole, of_given ? link.given : link.right, 1.0).largest() > kRounding) return;
@@ -72,7 +73,7 @@ std::vector<BodyFault> ListPartFaults() {
   faults.push_back({"inertia", "inertias", "as if given about the origin of the link that carries it",
                     [](const ComparedBody& body) {
                       MassProperties in_link = ExpressIn(body.given, body.X_PL);
-                      in_link.inertia -= CalcOffset(in_link);
+                      in_link.inertia -= CalcPointInertia(in_link.mass, in_link.com);
                       return ExpressIn(in_link, body.X_PL.inverse());
                     }});
   return faults;

@@ -17,7 +17,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 // A mass matrix of a thousand joints is 20 MB of text.
-constexpr size_t kLongestAnswer = size_t{1} << 26;
+constexpr size_t kLongestResult = size_t{1} << 26;
 // Of standard error: enough for the last line of a traceback.
 constexpr size_t kKeptMessages = 4096;
 
@@ -76,10 +76,10 @@ void ProgramProcess::FailEnded() {
   ReadMessages();
   const std::string key = "program " + Quote(command_) + ": ";
   const std::string after =
-      answers_ == 0 ? " before its first answer" : " after " + std::to_string(answers_) + " answers";
+      results_ == 0 ? " before its first result" : " after " + std::to_string(results_) + " results";
   if (!end) throw ProgramError(key + "closed its standard output" + after + LastWords());
   constexpr int kCannotRun = 126;
-  if (answers_ == 0 && (end->exit_code == kCannotRun || end->exit_code == kNotFoundExitCode)) {
+  if (results_ == 0 && (end->exit_code == kCannotRun || end->exit_code == kNotFoundExitCode)) {
     throw InputError(key + "cannot be run" + LastWords());
   }
   throw ProgramError(key + end->Describe() + after + LastWords());
@@ -89,7 +89,7 @@ void ProgramProcess::Write(const std::string& text, size_t* written) {
   const ssize_t count =
       ::send(input_, text.data() + *written, text.size() - *written, MSG_NOSIGNAL | MSG_DONTWAIT);
   if (count > 0) *written += static_cast<size_t>(count);
-  // A program that reads no more may still have answered: its output says what became of it.
+  // A program that reads no more may still have written: its output says what became of it.
   if (count < 0 && errno != EAGAIN && errno != EINTR) *written = text.size();
 }
 
@@ -114,7 +114,7 @@ void ProgramProcess::ReadMessages() {
   }
 }
 
-std::string ProgramProcess::Ask(const std::string& line) {
+std::string ProgramProcess::Query(const std::string& line) {
   const std::string text = line + "\n";
   size_t written = 0;
   size_t searched = 0;
@@ -123,22 +123,22 @@ std::string ProgramProcess::Ask(const std::string& line) {
   while (true) {
     const size_t end = written == text.size() ? pending_.find('\n', searched) : std::string::npos;
     if (end != std::string::npos) {
-      std::string answer = pending_.substr(0, end);
+      std::string result = pending_.substr(0, end);
       pending_.erase(0, end + 1);
-      if (!answer.empty() && answer.back() == '\r') answer.pop_back();
-      ++answers_;
-      return answer;
+      if (!result.empty() && result.back() == '\r') result.pop_back();
+      ++results_;
+      return result;
     }
     searched = written == text.size() ? pending_.size() : 0;
     const std::string key = "program " + Quote(command_) + ": ";
-    if (pending_.size() > kLongestAnswer) {
-      throw ProgramError(key + "answers without end, more than " + std::to_string(kLongestAnswer >> 20) +
+    if (pending_.size() > kLongestResult) {
+      throw ProgramError(key + "writes without end, more than " + std::to_string(kLongestResult >> 20) +
                          " MB without an end of line");
     }
     const double left = std::chrono::duration<double>(deadline - Clock::now()).count();
     if (left <= 0.0) {
       ReadMessages();
-      throw ProgramError(key + "gave no answer within " + FormatNumber(seconds_) + " s (--time-limit)" +
+      throw ProgramError(key + "wrote no result within " + FormatNumber(seconds_) + " s (--time-limit)" +
                          LastWords());
     }
     pollfd ends[3] = {{output_, POLLIN, 0}, {messages_, POLLIN, 0}, {input_, POLLOUT, 0}};

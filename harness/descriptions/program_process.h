@@ -1,6 +1,6 @@
 #pragma once
 
-// A user's program that answers lines with lines.
+// A user's program that replies to each line with a line.
 
 #include <optional>
 #include <string>
@@ -10,7 +10,7 @@
 
 namespace dexcheck {
 
-/// A program that ended, hangs, or says something that is no answer. One line that names its command.
+/// A program that ended, hangs, or writes something that is no result. One line that names its command.
 class ProgramError : public Error {
  public:
   using Error::Error;
@@ -20,7 +20,7 @@ class ProgramError : public Error {
 /// is killed with all that it started.
 class ProgramProcess {
  public:
-  /// @param seconds within which each answer must come.
+  /// @param seconds within which each result must come.
   /// @throws ProgramError when no process can be made.
   ProgramProcess(std::string command, double seconds);
   ~ProgramProcess();
@@ -28,9 +28,9 @@ class ProgramProcess {
   ProgramProcess& operator=(const ProgramProcess&) = delete;
 
   /// Sends a line and returns the next line of standard output, without its end.
-  /// @throws ProgramError when the program ends, hangs or answers without end, InputError when the shell
+  /// @throws ProgramError when the program ends, hangs or writes without end, InputError when the shell
   /// knows no such command.
-  std::string Ask(const std::string& line);
+  std::string Query(const std::string& line);
 
   [[nodiscard]] const std::string& command() const { return command_; }
 
@@ -49,7 +49,7 @@ class ProgramProcess {
   int messages_ = -1;  // standard error
   std::string pending_;
   std::string said_;  // the end of standard error
-  long answers_ = 0;
+  long results_ = 0;
 };
 
 }  // namespace dexcheck

@@ -10,7 +10,7 @@ using OrderedJson = nlohmann::ordered_json;
 
 OrderedJson ToList(const VectorXd& values) { return std::vector<double>(values.begin(), values.end()); }
 
-OrderedJson MakeHello(const RobotDescription& robot, const AnswerLayout& layout) {
+OrderedJson MakeHello(const RobotDescription& robot, const ProgramLayout& layout) {
   OrderedJson joints = OrderedJson::array();
   for (size_t i = 0; i < robot.spec.joints.size(); ++i) {
     const Joint& joint = robot.spec.joints[i];
@@ -37,51 +37,51 @@ OrderedJson MakeHello(const RobotDescription& robot, const AnswerLayout& layout)
 
 ProgramProvider::ProgramProvider(const std::string& command, const RobotDescription& robot,
                                  const ProgramOptions& options)
-    : AnsweringProvider(AnswerLayout(robot)),
+    : AnsweringProvider(ProgramLayout(robot)),
       robot_(robot),
       process_(command, options.seconds),
       source_("program " + Quote(command)),
       name_(command) {
-  const Json answer = Ask(MakeHello(robot, layout()));
-  if (!answer.contains("dexcheck_protocol") || answer.at("dexcheck_protocol") != kProgramProtocol) {
+  const Json result = Query(MakeHello(robot, layout()));
+  if (!result.contains("dexcheck_protocol") || result.at("dexcheck_protocol") != kProgramProtocol) {
     throw InputError(
         source_ + ": dexcheck_protocol: must be " + std::to_string(kProgramProtocol) + ", got " +
-        (answer.contains("dexcheck_protocol") ? Abbreviate(answer.at("dexcheck_protocol").dump()) : "none"));
+        (result.contains("dexcheck_protocol") ? Abbreviate(result.at("dexcheck_protocol").dump()) : "none"));
   }
-  if (answer.contains("name") && answer.at("name").is_string()) {
-    name_ = Abbreviate(answer.at("name").get<std::string>());
+  if (result.contains("name") && result.at("name").is_string()) {
+    name_ = Abbreviate(result.at("name").get<std::string>());
   }
-  set_layout(AnswerLayout(robot_, answer, source_));
+  set_layout(ProgramLayout(robot_, result, source_));
 }
 
-Json ProgramProvider::Ask(const OrderedJson& request) {
-  const std::string line = process_.Ask(request.dump(-1, ' ', false, OrderedJson::error_handler_t::replace));
-  const std::optional<Json> parsed = ParseAnswer(line);
+Json ProgramProvider::Query(const OrderedJson& request) {
+  const std::string line =
+      process_.Query(request.dump(-1, ' ', false, OrderedJson::error_handler_t::replace));
+  const std::optional<Json> parsed = ParseResult(line);
   if (!parsed) {
-    throw InputError(source_ +
-                     ": must answer with a JSON object on one line (NaN and Infinity are none), got " +
+    throw InputError(source_ + ": must write a JSON object on one line (NaN and Infinity are none), got " +
                      Quote(line));
   }
-  const Json& answer = *parsed;
-  if (answer.contains("error")) {
-    const Json& error = answer.at("error");
+  const Json& result = *parsed;
+  if (result.contains("error")) {
+    const Json& error = result.at("error");
     throw ProgramError(source_ +
                        ": says: " + Abbreviate(error.is_string() ? error.get<std::string>() : error.dump()));
   }
-  return answer;
+  return result;
 }
 
-AnsweredTerms ProgramProvider::Evaluate(long sample, const VectorXd& q, const VectorXd& xi) {
+TermResults ProgramProvider::Evaluate(long sample, const VectorXd& q, const VectorXd& xi) {
   const VectorXd positions = layout().WritePositions(q);
   const VectorXd velocities = layout().WriteVelocities(q, xi);
-  const Json answer =
-      Ask({{"request", "terms"}, {"id", sample}, {"q", ToList(positions)}, {"v", ToList(velocities)}});
+  const Json result =
+      Query({{"request", "terms"}, {"id", sample}, {"q", ToList(positions)}, {"v", ToList(velocities)}});
   const std::string source = source_ + ": state " + std::to_string(sample);
-  if (!answer.contains("id") || answer.at("id") != sample) {
+  if (!result.contains("id") || result.at("id") != sample) {
     throw InputError(source + ": id: must be " + std::to_string(sample) + ", got " +
-                     (answer.contains("id") ? Abbreviate(answer.at("id").dump()) : "none"));
+                     (result.contains("id") ? Abbreviate(result.at("id").dump()) : "none"));
   }
-  AnsweredTerms terms = ReadAnswer(answer, layout(), velocities, source);
+  TermResults terms = ReadResult(result, layout(), velocities, source);
   layout().ReadTerms(q, xi, &terms);
   return terms;
 }

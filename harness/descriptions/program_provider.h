@@ -1,6 +1,6 @@
 #pragma once
 
-// A program of the user's that answers terms at states: the protocol is in README.md.
+// A program of the user's that computes terms at states: the protocol is in README.md.
 
 #include <memory>
 #include <string>
@@ -14,23 +14,23 @@ namespace dexcheck {
 inline constexpr int kProgramProtocol = 1;
 
 struct ProgramOptions {
-  double seconds = 10.0;  ///< Within which each answer must come.
+  double seconds = 10.0;  ///< Within which each result must come.
 };
 
 /// A running program as a provider.
 class ProgramProvider : public AnsweringProvider {
  public:
   /// Starts it and says hello. @param robot outlives this.
-  /// @throws ProgramError when it dies or hangs, InputError for what it says that is no answer; one line.
+  /// @throws ProgramError when it dies or hangs, InputError for what it writes that is no result; one line.
   ProgramProvider(const std::string& command, const RobotDescription& robot,
                   const ProgramOptions& options = {});
 
   /// As it calls itself, or its command.
   [[nodiscard]] const std::string& name() const override { return name_; }
-  AnsweredTerms Evaluate(long sample, const VectorXd& q, const VectorXd& xi) override;
+  TermResults Evaluate(long sample, const VectorXd& q, const VectorXd& xi) override;
 
  private:
-  nlohmann::json Ask(const nlohmann::ordered_json& request);
+  nlohmann::json Query(const nlohmann::ordered_json& request);
 
   const RobotDescription& robot_;
   ProgramProcess process_;

@@ -328,7 +328,7 @@ class UrdfReader {
         const MassProperties& whole =
             part.joint < 0 ? robot_.spec.base.body : robot_.spec.joints[static_cast<size_t>(part.joint)].body;
         if (!FindUndefinedDynamics(whole).empty()) FailInertial(*part.link, part.problem);
-        if (!FindPhysicalInconsistency(whole).empty()) continue;  // a note on bodies tells
+        if (!FindPhysicalInconsistency(whole).empty()) continue;  // a note on bodies says so
       }
       names.push_back(part.link->name);
     }

@@ -402,15 +402,6 @@ int WheelBody(const Setup& setup, const mjModel& m, size_t wheel) {
   return m.jnt_bodyid[setup.adapter().wheels()[wheel].joint];
 }
 
-/// What of a wheel touches the floor.
-void ScaleWheel(const Setup& setup, mjModel* m, size_t wheel, double by) {
-  const int body = WheelBody(setup, *m, wheel);
-  for (int i = 0; i < m->body_geomnum[body]; ++i) {
-    const int geom = m->body_geomadr[body] + i;
-    if (CanTouch(*m, geom)) m->geom_size[3 * geom] += by;
-  }
-}
-
 /// Pairs of the floor, or of the object.
 void ChangePairs(mjModel* m, bool floor, const std::function<void(int pair)>& change) {
   for (int pair = 0; pair < m->npair; ++pair) {
@@ -445,20 +436,16 @@ void AddWheelFaults(const Roles& roles, std::vector<PlantFault>* faults) {
       [](const Setup& setup, mjModel* m) { ScaleWheel(setup, m, 1, -5e-5); }, true));
   add(World(
       "wheels: 2 mm farther apart", "wheels", Cause::kWheelGeometry, "wheel",
-      [](const Setup& setup, mjModel* m) {
-        m->body_pos[3 * WheelBody(setup, *m, 0) + 1] -= 1e-3;
-        m->body_pos[3 * WheelBody(setup, *m, 1) + 1] += 1e-3;
-      },
-      true));
+      [](const Setup& setup, mjModel* m) { MoveWheels(setup, m, 2e-3); }, true));
   add(World("contacts: wheels slide, mu = 0.002", "contacts", Cause::kWheelSlip, "",
             [](const Setup&, mjModel* m) { SetFriction(m, true, 0.002); }));
 }
 
 void AddWorldFaults(const Roles& roles, std::vector<PlantFault>* faults) {
   const auto add = [&](PlantFault fault) { faults->push_back(std::move(fault)); };
-  add(World("floor: rises by 0.05 degrees ahead", "floor", Cause::kSlope, "0.05 deg",
+  add(World("floor: rises by 0.05 degrees ahead", "floor", Cause::kSlope, "slope 0.05",
             [](const Setup&, mjModel* m) { Tilt(m, DegToRad(0.05), 0.0); }));
-  add(World("floor: falls by 0.1 degrees to the left", "floor", Cause::kSlope, "0.1 deg",
+  add(World("floor: falls by 0.1 degrees to the left", "floor", Cause::kSlope, "slope 0.1",
             [](const Setup&, mjModel* m) { Tilt(m, 0.0, DegToRad(0.1)); }));
   add(World("gravity: 0.1 % stronger", "floor", Cause::kUnmodelledForce, "gravity",
             [](const Setup&, mjModel* m) { m->opt.gravity[2] *= 1.001; }));
@@ -540,6 +527,23 @@ void AddSensorFaults(const Roles& roles, std::vector<PlantFault>* faults) {
 
 }  // namespace
 
+void ScaleWheel(const Setup& setup, mjModel* m, size_t wheel, double by) {
+  const int body = WheelBody(setup, *m, wheel);
+  for (int i = 0; i < m->body_geomnum[body]; ++i) {
+    const int geom = m->body_geomadr[body] + i;
+    if (!CanTouch(*m, geom)) continue;
+    m->geom_size[3 * geom] += by;
+    m->geom_rbound[geom] += by;
+  }
+  // The floor stays where it is touched.
+  m->body_pos[3 * body + 2] += by;
+}
+
+void MoveWheels(const Setup& setup, mjModel* m, double by) {
+  m->body_pos[3 * WheelBody(setup, *m, 0) + 1] -= 0.5 * by;
+  m->body_pos[3 * WheelBody(setup, *m, 1) + 1] += 0.5 * by;
+}
+
 std::vector<PlantFault> ListPlantFaults(const Setup& setup) {
   const Roles roles(setup);
   std::vector<PlantFault> faults;
@@ -562,8 +566,12 @@ void FaultyPlant::EndStep(const Eigen::Ref<const VectorXd>& tau) {
   EngineSimulation& simulation = plant_->simulation();
   tau_ = tau;
   if (motors_) motors_(time_, &tau_);
+  const int size = 6 * simulation.model().nbody;
+  mjtNum* const forces = simulation.data().xfrc_applied;
+  const std::vector<mjtNum> declared(forces, forces + size);
   if (forces_) forces_(simulation.model(), time_, &simulation.data());
   plant_->EndStep(tau_);
+  std::copy(declared.begin(), declared.end(), forces);
   time_ += time_step();
 }
 

@@ -37,6 +37,11 @@ struct PlantFault {
 /// solver: those that there can be of the scenario's robot, at joints and links along its arm and fingers.
 std::vector<PlantFault> ListPlantFaults(const Setup& setup);
 
+/// What of a wheel, 0 the right one or 1, touches the floor gets a radius that is larger by `by`, m.
+void ScaleWheel(const Setup& setup, mjModel* m, size_t wheel, double by);
+/// Wheels that are farther apart by `by`, m.
+void MoveWheels(const Setup& setup, mjModel* m, double by);
+
 /// The engine's simulation with a fault.
 class FaultyPlant final : public Plant {
  public:

@@ -100,7 +100,7 @@ void Adapter::MatchJoints(const std::string& engine_source) {
   const mjModel& engine = *engine_;
   const auto fail = [&](const std::string& problem) { throw InputError(engine_source + ": " + problem); };
 
-  // First what is missing on either side, in one line.
+  // First what is missing in either description, in one line.
   std::vector<std::string> only_in_model;
   std::set<int> known = ListBaseJoints(*model_, engine);
   const auto need = [&](mjtObj type, const std::string& kind, const std::string& name) {

@@ -34,8 +34,8 @@ struct EngineWheel {
 /// has dense base columns and one entry per joint.
 class Adapter {
  public:
-  /// @throws InputError that lists the joints, bodies and sites that the other side lacks (the first few of
-  /// many), or names one whose kind differs.
+  /// @throws InputError that lists the joints, bodies and sites that the other description lacks (the first
+  /// few of many), or names one whose kind differs.
   Adapter(const RobotModel& model, const mjModel& engine, const std::string& engine_source);
 
   [[nodiscard]] const RobotModel& model() const { return *model_; }

@@ -36,9 +36,10 @@ MjModelPtr AddContactPairs(const mjModel& model, std::span<const std::pair<int, 
     throw InputError("MJCF: option collision: must be \"predefined\" for plant.collide");
   }
   const auto first = static_cast<int>(model.npair);
-  MjModelPtr grown = MakeResizedCopy(model, [&](mjModel* m) { m->npair += static_cast<int>(geoms.size()); });
-  for (size_t k = 0; k < geoms.size(); ++k) FillPair(grown.get(), first + static_cast<int>(k), geoms[k]);
-  return grown;
+  MjModelPtr resized =
+      MakeResizedCopy(model, [&](mjModel* m) { m->npair += static_cast<int>(geoms.size()); });
+  for (size_t k = 0; k < geoms.size(); ++k) FillPair(resized.get(), first + static_cast<int>(k), geoms[k]);
+  return resized;
 }
 
 }  // namespace dexcheck

@@ -1,6 +1,6 @@
 #pragma once
 
-// Which bodies come near to each other that nobody meant to touch.
+// Which bodies come near to each other that should not touch.
 
 #include <array>
 #include <limits>
@@ -26,7 +26,7 @@ inline constexpr int kPairClassCount = 5;
 /// "robot_itself", ...
 const char* NameOf(PairClass pairs);
 
-/// Two solids of bodies that are not meant to touch.
+/// Two solids of bodies that should not touch.
 struct WatchedPair {
   int a = 0, b = 0;  ///< Indices of the solids, a < b.
   PairClass pairs = PairClass::kRobotItself;

@@ -7,11 +7,11 @@
 namespace dexcheck {
 
 /// Fractions of a change of forces that soft contacts hold back at first. A smooth force F on the robot and
-/// what it holds gives contact forces (A + R) f = -J M^-1 F + ... with A = J M^-1 J^T and the engine's R,
+/// what it holds causes contact forces (A + R) f = -J M^-1 F + ... with A = J M^-1 J^T and the engine's R,
 /// where rigid contacts have R = 0. In |.|_M the accelerations differ by the matrix (1 + J^T R^-1 J)^-1 on
 /// the range of J^T (M = 1 in that metric), whose largest eigenvalue is
 ///
-///   share = 1 / (1 + s),   s the smallest eigenvalue of R^-1/2 A R^-1/2 that is not zero:
+///   fraction = 1 / (1 + s),   s the smallest eigenvalue of R^-1/2 A R^-1/2 that is not zero:
 ///
 /// directions that contacts hold twice have zeros there, and nothing moves along them.
 struct ContactSoftness {

@@ -130,7 +130,7 @@ MjModelPtr LoadAdapted(MjcfFile* mjcf, const Load& load) {
     try {
       return load();
     } catch (const InputError& error) {
-      // A range without "limited", which this release asks about.
+      // A range without "limited", which this release requires.
       if (std::strstr(error.what(), "autolimits") == nullptr) throw;
     }
   }

@@ -1,5 +1,6 @@
 // What the engine has at the state set: poses, Jacobians, motions, object, contacts.
 
+#include "controller/model/rigid_body.h"
 #include "harness/engine/engine_terms.h"
 #include "harness/engine/map_vector.h"
 #include "harness/engine/mujoco_release.h"
@@ -66,7 +67,7 @@ std::vector<LinkInWorld> EngineTerms::links() const {
       const RotationMap R(d->ximat + 9 * body);
       const Vector3d arm = MapVector(d->xipos + 3 * body) - link.com;
       link.inertia += R * MapVector(m->body_inertia + 3 * body).asDiagonal() * R.transpose() +
-                      m->body_mass[body] * (arm.squaredNorm() * Matrix3d::Identity() - arm * arm.transpose());
+                      CalcPointInertia(m->body_mass[body], arm);
     }
   }
   return links;

@@ -185,7 +185,7 @@ class EngineTerms {
 
   std::vector<int> robot_bodies_;
   std::vector<int> moving_bodies_;  // those whose accelerations are needed, parents first
-  std::vector<Chain> chains_;       // by frame; empty unless asked for
+  std::vector<Chain> chains_;       // by frame; empty unless requested
 
   int object_body_;
   bool has_object_ = false;

@@ -17,7 +17,7 @@
 namespace dexcheck {
 namespace {
 
-/// Those that libm's selectors of code ask for (ifunc-avx-fma4.h, ifunc-fma.h, ifunc-fma4.h, ifunc-sse4_1.h),
+/// Those that libm's selectors of code check (ifunc-avx-fma4.h, ifunc-fma.h, ifunc-fma4.h, ifunc-sse4_1.h),
 /// as far as they are in use: the processor may have them and the system, or GLIBC_TUNABLES, not allow them.
 std::string DescribeProcessor() {
 #if defined(__x86_64__)

@@ -52,7 +52,7 @@ class MjcfFile {
 
   /// The element `mujoco`.
   [[nodiscard]] tinyxml2::XMLElement* root() const { return root_; }
-  /// Whether it has a `worldbody`: parts that are meant for `include` have none.
+  /// Whether it has a `worldbody`: parts for `include` have none.
   [[nodiscard]] bool HasWorld() const;
   /// Whether it is no MJCF but a URDF, which the engine reads too.
   [[nodiscard]] bool IsUrdf() const;

@@ -33,7 +33,7 @@ void StateNewDefaults(MjcfFile* mjcf);
 
 /// Puts one torque motor for each joint of the robot in the place of all of an MJCF's actuators, as a run
 /// needs them: servos, muscles and tendons are what a controller here replaces. A motor's limit is what the
-/// joint's actuator could give; sensors of actuators and the controls of key frames go with them.
+/// joint's actuator could deliver; sensors of actuators and the controls of key frames go with them.
 /// @throws InputError when the engine cannot load it, or a joint has no name.
 void AddMotors(MjcfFile* mjcf);
 

@@ -81,7 +81,7 @@ class Downgrade {
 
   void Run() {
     static const Schema schema;
-    Walk(mjcf_.root(), schema.root());
+    Check(mjcf_.root(), schema.root());
   }
 
  private:
@@ -98,14 +98,14 @@ class Downgrade {
     return "left out: " + std::string(NameOf(word.effect)) + ", since MuJoCo " + std::string(word.since);
   }
 
-  void Walk(XMLElement* element, const SchemaElement& schema) {
+  void Check(XMLElement* element, const SchemaElement& schema) {
     ReplaceValues(element);
     RemoveAttributes(element, schema);
     for (XMLElement* child : ListChildren(element)) {
       const std::string name = child->Name();
       const auto known = schema.children.find(name);
       if (known != schema.children.end()) {
-        Walk(child, *known->second);
+        Check(child, *known->second);
         continue;
       }
       const NewerWord* newer = FindNewerWord(element->Name() + ("/" + name), "");

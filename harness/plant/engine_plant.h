@@ -24,7 +24,7 @@ class EnginePlant final : public Plant {
     observer_.SetBonds(kappa, constraints);
   }
 
-  /// Geoms that are not meant to touch, and that do push: what they push with is read.
+  /// Geoms that should not touch, and that do push: what they push with is read.
   void WatchCollisions(std::span<const std::pair<int, int>> geoms);
 
   [[nodiscard]] double time_step() const override { return simulation_.time_step(); }

@@ -33,7 +33,7 @@ inline constexpr long kMaxDelaySteps = 1000;
 /// Number of whole steps in a time that ParseScenario has accepted.
 inline long CountSteps(double time, double time_step) { return std::lround(time / time_step); }
 
-/// How a velocity becomes known.
+/// How a velocity is measured.
 enum class VelocitySource {
   kMeasured,     ///< By a sensor of its own.
   kDifferenced,  ///< Change of the measured position, filtered.
@@ -78,7 +78,7 @@ struct ActuationOptions {
   ByName backlash;                  ///< Free play, rad.
   double stribeck_velocity = 0.05;  ///< Rate at which stribeck has fallen to 1/e, rad/s.
   double delay = 0.0;               ///< s.
-  bool saturate = false;            ///< A motor gives its limit when more is commanded.
+  bool saturate = false;            ///< A motor delivers its limit when more is commanded.
 
   [[nodiscard]] bool is_exact() const;
 };

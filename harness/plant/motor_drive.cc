@@ -88,13 +88,13 @@ void MotorDrive::Delay(VectorXd* tau) {
   }
 }
 
-void MotorDrive::Drive(const VectorXd& tau, const VectorXd& xi, VectorXd* given) {
-  *given = tau;
+void MotorDrive::Drive(const VectorXd& tau, const VectorXd& xi, VectorXd* delivered) {
+  *delivered = tau;
   if (is_exact_) return;
   ReadRates(xi);
-  if (options_.delay > 0.0) Delay(given);
-  for (Eigen::Index i = 0; i < given->size(); ++i) {
-    double& u = (*given)[i];
+  if (options_.delay > 0.0) Delay(delivered);
+  for (Eigen::Index i = 0; i < delivered->size(); ++i) {
+    double& u = (*delivered)[i];
     if (step_[i] > 0.0) u = step_[i] * std::round(u / step_[i]);
     u *= gain_[i];
     if (lag_[i] > 0.0) {

@@ -9,7 +9,7 @@
 
 namespace dexcheck {
 
-/// Torques as the motors give them.
+/// Torques as the motors deliver them.
 struct DriveOutput {
   VectorXd tau;           ///< tau' (n), N m.
   double effort = 0.0;    ///< Largest |tau'| / limit of the commanded torques.
@@ -17,11 +17,11 @@ struct DriveOutput {
 };
 
 /// Stands between the controller and the plant: what the motors make of the torques that are sent, in this
-/// order, each part of it absent unless the options ask for it:
+/// order, each part of it absent unless the options have it:
 ///
-///   delay      the torques of `delay` ago; a fraction of a step mixes two of them as their times share the
+///   delay      the torques of `delay` ago; a fraction of a step mixes two of them as their times divide the
 ///   step step       whole multiples of torque_step gain       times 1 + gain_error lag        1 / (1 + lag
-///   s); what is given is its mean over the step, so that the impulse is right limit      not above the
+///   s); what is delivered is its mean over the step, so that the impulse is right limit      not above the
 ///   motor's backlash   nothing while the rotor, of the joint's armature, crosses the play friction   less
 ///   (coulomb + stribeck exp(-(w / stribeck_velocity)^2)) sign(w)
 ///
@@ -34,12 +34,12 @@ class MotorDrive {
   /// joint without armature.
   MotorDrive(std::span<const Motor> motors, const ActuationOptions& options, const PartContext& context);
 
-  /// Requires torques that can be given, then drives. Once at each step.
+  /// Requires torques that can be delivered, then drives. Once at each step.
   /// @param xi velocities of the plant (n). @param output its effort is set before anything is thrown.
   /// @throws RunFailure when a torque is not finite, or a motor is at its limit and may not saturate.
   void Apply(const VectorXd& tau, const VectorXd& xi, DriveOutput* output);
   /// Drives without any requirement.
-  void Drive(const VectorXd& tau, const VectorXd& xi, VectorXd* given);
+  void Drive(const VectorXd& tau, const VectorXd& xi, VectorXd* delivered);
 
   /// Largest |tau'| / limit over the motors, and the motor.
   [[nodiscard]] double CalcEffort(const VectorXd& tau, int* busiest) const;

@@ -37,22 +37,22 @@ ObjectSensor::ObjectSensor(const SensingOptions& options, double time_step, std:
   orientation_gains_ = KalmanGains(options.object_acceleration, orientation * orientation, time_step);
 }
 
-ObjectMotion ObjectSensor::Sample(const ObjectMotion& truth, std::uint64_t k) const {
-  ObjectMotion seen = truth;
+ObjectMotion ObjectSensor::Sample(const ObjectMotion& true_motion, std::uint64_t k) const {
+  ObjectMotion seen = true_motion;
   if (options_.object_position_noise > 0.0) {
     seen.X_Bo.translation() += options_.object_position_noise * DrawNormal(position_noise_, k);
   }
   if (options_.object_orientation_noise > 0.0) {
-    seen.X_Bo.linear() =
-        truth.X_Bo.linear() * ExpSo3(options_.object_orientation_noise * DrawNormal(orientation_noise_, k));
+    seen.X_Bo.linear() = true_motion.X_Bo.linear() *
+                         ExpSo3(options_.object_orientation_noise * DrawNormal(orientation_noise_, k));
   }
   return seen;
 }
 
-ObjectMotion ObjectSensor::Measure(const ObjectMotion& truth, std::uint64_t k) {
+ObjectMotion ObjectSensor::Measure(const ObjectMotion& true_motion, std::uint64_t k) {
   const bool is_first = !has_seen_;
   const auto period = static_cast<std::uint64_t>(period_);
-  if (is_first || k % period == 0) seen_ = Sample(truth, k);
+  if (is_first || k % period == 0) seen_ = Sample(true_motion, k);
   if (is_first) Start();
   const std::uint64_t age = delayed_.size() - 1;  // steps
   delayed_[k % delayed_.size()] = seen_;

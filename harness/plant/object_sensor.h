@@ -22,7 +22,7 @@ class ObjectSensor {
 
   [[nodiscard]] bool is_exact() const { return is_exact_; }
   /// What is measured of the true motion at step k = 0, 1, ...
-  ObjectMotion Measure(const ObjectMotion& truth, std::uint64_t k);
+  ObjectMotion Measure(const ObjectMotion& true_motion, std::uint64_t k);
   /// Everything is elsewhere from now on, by `way` (m, world).
   void Translate(const Vector3d& way);
   /// The object moves at `v` (m/s, world) more from step k on: what is remembered becomes as if it always
@@ -32,7 +32,7 @@ class ObjectSensor {
   [[nodiscard]] double FindAge(std::uint64_t k) const;
 
  private:
-  [[nodiscard]] ObjectMotion Sample(const ObjectMotion& truth, std::uint64_t k) const;
+  [[nodiscard]] ObjectMotion Sample(const ObjectMotion& true_motion, std::uint64_t k) const;
   void Start();
   void Difference(const ObjectMotion& seen);
   void Filter(const Pose& seen, bool is_new);

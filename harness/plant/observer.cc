@@ -112,7 +112,7 @@ void Observer::Read(const EngineSimulation& simulation, PlantResponse* response)
   response->support_force = (X_Bo_.linear() * response->support_wrench.head<3>()).z();
   map_.SetState(q_, xi_);
   ReadDryFriction(d, &response->dry_friction);
-  ReadStops(m, d, &response->stop_force);
+  ReadJointLimits(m, d, &response->stop_force);
   ReadSolverResidual(m, d, response);
   ReadDeparture(m, d, response);
 }
@@ -278,7 +278,7 @@ void Observer::ReadDryFriction(const mjData& d, VectorXd* friction) const {
   }
 }
 
-void Observer::ReadStops(const mjModel& m, const mjData& d, VectorXd* force) const {
+void Observer::ReadJointLimits(const mjModel& m, const mjData& d, VectorXd* force) const {
   force->resize(0);
   // Limits come behind friction, and before contacts.
   for (int row = d.ne + d.nf; row < d.nefc && d.efc_type[row] <= mjCNSTR_LIMIT_TENDON; ++row) {

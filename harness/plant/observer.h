@@ -45,7 +45,7 @@ class Observer {
   void ReadBonds(const mjModel& m, const mjData& d, std::vector<PlantContact>* contacts) const;
   [[nodiscard]] Vector6d ReadSupportWrench(const mjModel& m, const mjData& d) const;
   void ReadDryFriction(const mjData& d, VectorXd* friction) const;
-  void ReadStops(const mjModel& m, const mjData& d, VectorXd* force) const;
+  void ReadJointLimits(const mjModel& m, const mjData& d, VectorXd* force) const;
   /// Where xi has the joint of a degree of freedom; -1 when it is none of the robot's.
   [[nodiscard]] Eigen::Index FindEntry(int dof) const;
   void ReadSolverResidual(const mjModel& m, const mjData& d, PlantResponse* response);

@@ -1,6 +1,6 @@
 #pragma once
 
-// The ground truth: robot and object, driven by torques.
+// The simulated plant: robot and object, driven by torques.
 
 #include <span>
 #include <string>
@@ -58,7 +58,7 @@ class Plant {
   /// @param tau tau' (n), N m: of the right and left wheel, then of the joints.
   /// @throws DivergenceError when there is no state afterwards.
   virtual void EndStep(const Eigen::Ref<const VectorXd>& tau) = 0;
-  /// How it answered; after EndStep, of a step whose reading was read.
+  /// How it responded; after EndStep, of a step whose reading was read.
   virtual void Read(PlantResponse* response) = 0;
 
   // Between steps.

@@ -1,6 +1,6 @@
 #pragma once
 
-// What is read of a plant in one step: what it is before it is driven, and how it answered.
+// What is read of a plant in one step: its true state before it is driven, and its response.
 
 #include <vector>
 
@@ -17,7 +17,7 @@ struct BaseDeparture {
   double height = 0.0;  ///< Of Sigma_0's origin against the model's, m.
 };
 
-/// The truth at the beginning of a step.
+/// The true state at the beginning of a step.
 struct PlantReading {
   /// In the paper's coordinates: tilt and height of the base, which q' does not have, are dropped; kappa is
   /// where the plant's fingertips touch. Of a fingertip that is far from the object, kappa is the nearest
@@ -44,7 +44,7 @@ struct PlantContact {
   Vector3d force = Vector3d::Zero();     ///< World, N, of finger on object.
 };
 
-/// What two bodies push each other with that are not meant to touch.
+/// What two bodies push each other with that should not touch.
 struct Collision {
   double force = 0.0;          ///< N
   int geom1 = -1, geom2 = -1;  ///< The engine's.
@@ -64,7 +64,7 @@ struct PlantResponse {
   Vector6d solver_residual = Vector6d::Zero();
   Collision collision;     ///< The largest; of a plant whose bodies push, see Clearance.
   VectorXd motor_torques;  ///< n, N m: what wheels and joints received from their motors, as tau'.
-  /// n, N and N m, as forces on xi, empty where there are none: dry friction of the joints, and their stops.
+  /// n, N and N m, as forces on xi, empty where there are none: dry friction of the joints, and their limits.
   VectorXd dry_friction, stop_force;
   /// n, N and N m: T^T M (qacc - T xi_dot - T_dot xi), the inertia of what xi_dot leaves out, a platform that
   /// tilts or sinks and wheels that slip, on soft contacts. Empty for a plant that has nothing of the kind.

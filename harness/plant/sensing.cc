@@ -63,14 +63,14 @@ Sensing::Sensing(const SensingOptions& options, const PartContext& context)
   if (latency > 0) delayed_.assign(static_cast<size_t>(latency) + 1, MakeReading(context));
 }
 
-void Sensing::Measure(const PlantReading& truth, Reading* measured) {
-  measured->state = truth.state;
-  measured->touch = truth.touch;
+void Sensing::Measure(const PlantReading& true_reading, Reading* measured) {
+  measured->state = true_reading.state;
+  measured->touch = true_reading.touch;
   if (is_exact_) return;
   MeasureJoints(&measured->state);
-  MeasureBase(truth.state, &measured->state);
+  MeasureBase(true_reading.state, &measured->state);
   if (!object_.is_exact()) {
-    const ObjectMotion object = object_.Measure({truth.state.X_Bo, truth.state.V_Bo}, k_);
+    const ObjectMotion object = object_.Measure({true_reading.state.X_Bo, true_reading.state.V_Bo}, k_);
     measured->state.X_Bo = object.X_Bo;
     measured->state.V_Bo = object.V_Bo;
   }
@@ -125,7 +125,7 @@ void Sensing::MeasureJoints(MeasuredState* measured) {
   }
 }
 
-void Sensing::MeasureBase(const MeasuredState& truth, MeasuredState* measured) {
+void Sensing::MeasureBase(const MeasuredState& true_state, MeasuredState* measured) {
   if (base_positions_ == 0) return;
   if (base_.type == BaseType::kDifferentialDrive) {
     Vector2d noise = Vector2d::Zero();  // of the wheels' rates
@@ -138,7 +138,7 @@ void Sensing::MeasureBase(const MeasuredState& truth, MeasuredState* measured) {
   }
   if (!options_.odometry) return;
   if (k_ == 0) {
-    odometry_ = truth.q.head<3>();
+    odometry_ = true_state.q.head<3>();
   } else if (base_.type == BaseType::kPlanar) {
     odometry_ += time_step_ * measured->xi.head<3>();
   } else {

@@ -23,7 +23,7 @@ class Sensing {
   Sensing(const SensingOptions& options, const PartContext& context);
 
   /// What is measured of the true state; once at each step, from the first one on.
-  void Measure(const PlantReading& truth, Reading* measured);
+  void Measure(const PlantReading& true_reading, Reading* measured);
   /// Robot and object are elsewhere from now on, by `way` (m, world): what is remembered moves along.
   void Translate(const Vector3d& way);
   /// Platform and object move at `v` (m/s, world) more from now on, as a run that starts moving does: what is
@@ -32,7 +32,7 @@ class Sensing {
 
  private:
   void MeasureJoints(MeasuredState* measured);
-  void MeasureBase(const MeasuredState& truth, MeasuredState* measured);
+  void MeasureBase(const MeasuredState& true_state, MeasuredState* measured);
   void MeasureVelocity(int joint, double position, double* rate);
 
   SensingOptions options_;

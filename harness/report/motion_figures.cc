@@ -141,7 +141,7 @@ class MotionFigures {
          .printed = true});
   }
 
-  /// Whether it is one of the fingers that hold the object. They are told apart by what stands before the
+  /// Whether it is one of the fingers that hold the object. They are distinguished by what stands before the
   /// underscore; another robot's, if that is not the same of all fingertips.
   [[nodiscard]] bool Grasps(const std::string& joint) const {
     const SignalInfo* const contacts = run_.Find("contact/overlap");

@@ -121,7 +121,7 @@ class Page {
                  {"tone", !status.is_asked()  ? "open"
                           : status.failed > 0 ? "fail"
                                               : "pass"},
-                 {"word", !status.is_asked()  ? "not asked"
+                 {"word", !status.is_asked()  ? "not checked"
                           : status.failed > 0 ? fmt::format("{} of {} fail", status.failed, status.checks)
                                               : "holds"},
                  {"extent", ""},
@@ -174,7 +174,7 @@ class Page {
       if (check.name == "cone_use")
         add(FormatFraction(check.worst), "of the fingertips' friction used, at most");
     }
-    // By class of bodies that are not meant to touch.
+    // By class of bodies that should not touch.
     for (const auto& [pairs, nearest] : run_.summary().value("clearance", nlohmann::json::object()).items()) {
       std::string name = pairs;
       std::replace(name.begin(), name.end(), '_', ' ');

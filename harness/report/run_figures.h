@@ -13,7 +13,8 @@ namespace dexcheck {
 /// object's error, the other torques, how far friction is used.
 std::vector<Figure> MakeMotionFigures(const RunData& run);
 
-/// One figure for each category of checks that was asked: its checks' values as fractions of their bounds.
+/// One figure for each category of checks that was evaluated: its checks' values as fractions of their
+/// bounds.
 std::vector<Figure> MakeResidualFigures(const RunData& run);
 
 }  // namespace dexcheck

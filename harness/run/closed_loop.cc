@@ -40,6 +40,8 @@ ClosedLoop::ClosedLoop(const Setup& setup, bool check, LoopParts parts)
   const Scenario& scenario = setup.scenario();
   RequireKnownBounds(scenario);
   if (check) checks_.emplace(setup, plant_->motors(), parts.knows_law);
+  if (check)
+    store_.emplace(setup, checks_->law(), checks_->Has("rolling") ? checks_->Find("rolling").bound : 0.0);
   record_.model = record_.true_model = &controller_->model();
   record_.command.tau.setZero(setup.model().num_velocities());
   record_.reading.qvel.setZero(setup.engine().nv);
@@ -71,7 +73,7 @@ bool ClosedLoop::Settle(const std::function<bool()>& should_stop) {
   if (trajectory_) controller_->Follow(*trajectory_);
   BeginRun();
   times_ = LoopTimes{};
-  if (checks_) checks_->Reset();
+  ForgetSteps();
   is_running_ = true;
   return true;
 }
@@ -93,7 +95,7 @@ bool ClosedLoop::SettleOn(const Trajectory& motion, double duration,
   const long count = std::lround(duration / dt);
   const long grip = std::lround(kFindsGrip / dt);
   controller_->Follow(motion);
-  if (checks_) checks_->Reset();
+  ForgetSteps();
   for (long i = 0; i < count; ++i) {
     if (should_stop()) return false;
     const double t = static_cast<double>(i) * dt;
@@ -102,8 +104,14 @@ bool ClosedLoop::SettleOn(const Trajectory& motion, double duration,
     if (checks_) checks_->JudgeEffort(record_, t);
     if (checks_) record_.true_model = &checks_->Follow(record_);
     // The first contact is rough; what goes wrong later has a cause that the checks should tell.
-    if (checks_ && i == grip) checks_->Forget();
-    if (checks_ && t >= kRoughTime) checks_->JudgeSettling(record_);
+    if (checks_ && i == grip) {
+      checks_->Forget();
+      store_->Reset();
+    }
+    if (checks_ && t >= kRoughTime) {
+      checks_->JudgeSettling(record_);
+      store_->Add(record_, checks_->analysis(), checks_->differs());
+    }
     try {
       CheckGrasp();
     } catch (const RunFailure&) {
@@ -130,6 +138,12 @@ bool ClosedLoop::StartMoving(const Vector3d& v, const std::function<bool()>& sho
   sensing_.Translate(-way);
   if (checks_) checks_->Translate(-way);
   return true;
+}
+
+void ClosedLoop::ForgetSteps() {
+  if (!checks_) return;
+  checks_->Reset();
+  store_->Reset();
 }
 
 void ClosedLoop::ControlStep(double t) {
@@ -164,7 +178,10 @@ void ClosedLoop::DriveMotors(double t) {
     if (checks_) record_.true_model = &checks_->Follow(record_);
     // Torques that are too large may be those of no law. While everything settles they follow another
     // trajectory.
-    if (checks_ && is_running_) checks_->JudgeUnsent(record_);
+    if (checks_ && is_running_) {
+      checks_->JudgeUnsent(record_);
+      store_->Add(record_, checks_->analysis(), checks_->differs(), /*answered=*/false);
+    }
     throw;
   }
   is_driven_ = true;
@@ -189,6 +206,7 @@ void ClosedLoop::Judge(StepRecord* step) {
   checks_->JudgeModel(*step);
   checks_->JudgeStep(*step);
   step->findings = checks_->analysis().findings;
+  store_->Add(*step, checks_->analysis(), checks_->differs());
   times_.cross_check += Seconds(begin, Clock::now());
 }
 

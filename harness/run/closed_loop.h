@@ -11,6 +11,7 @@
 #include "controller/control/trajectory.h"
 #include "harness/checks/run_checks.h"
 #include "harness/checks/step_record.h"
+#include "harness/diagnosis/step_store.h"
 #include "harness/plant/disturbances.h"
 #include "harness/plant/motor_drive.h"
 #include "harness/plant/plant.h"
@@ -84,6 +85,8 @@ class ClosedLoop {
   [[nodiscard]] bool is_checking() const { return checks_.has_value(); }
   /// Only when checking.
   [[nodiscard]] const RunChecks& checks() const { return checks_.value(); }
+  /// The steps that differ, likewise.
+  [[nodiscard]] const StepStore& store() const { return store_.value(); }
   /// The controller of a task; null unless the scenario is one.
   [[nodiscard]] const PickAndPlaceController* task() const { return task_; }
   [[nodiscard]] const LoopTimes& times() const { return times_; }
@@ -98,6 +101,7 @@ class ClosedLoop {
   /// ControlStep as far as it comes.
   void MakeStep(double t);
   /// The checks of the step, in this thread.
+  void ForgetSteps();
   void Check();
   /// All checks of a step of the run.
   void Judge(StepRecord* step);
@@ -118,6 +122,7 @@ class ClosedLoop {
   MotorDrive drive_;
   Disturbances disturbances_;
   std::optional<RunChecks> checks_;
+  std::optional<StepStore> store_;
   std::unique_ptr<Trajectory> trajectory_;  // null for a task or a motion of joints
   StepRecord record_;
   std::function<void(const StepRecord&)> observe_;

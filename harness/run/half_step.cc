@@ -31,6 +31,8 @@ void LookForIntegrator(const Setup& setup, const ClosedLoop& loop, const std::fi
                        RunResult* result) {
   AttributionResult& attribution = result->attribution;
   const CheckInfo* const info = FindCheck(attribution.check);
+  // Noise and encoders that are declared are other ones at another step.
+  if (attribution.cause == Cause::kDeclared) return;
   if (!loop.is_checking() || info == nullptr || info->meaning.rank != Rank::kResidual) return;
   const CheckRecord& check = loop.checks().Find(attribution.check);
   if (!std::isfinite(check.worst)) return;

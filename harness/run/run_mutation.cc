@@ -74,9 +74,10 @@ RunCampaign::RunCampaign(const Scenario& scenario, std::filesystem::path robot, 
   if (scenario.plant.type == PlantType::kRigid)
     throw InputError(scenario.source + ": plant.type: faults are made in a run of the engine's plant");
   MakeSetups();
-  ListFaults();
   if (scenario.joint_task() == nullptr) MoveToStart(should_stop);
-  if (!should_stop()) RequireNoFaultToPass(should_stop);
+  if (should_stop()) return;
+  RequireNoFaultToPass(should_stop);
+  if (!should_stop()) ListFaults();
 }
 
 void RunCampaign::MakeSetups() {
@@ -96,6 +97,19 @@ void RunCampaign::MakeSetups() {
 
 void RunCampaign::ListFaults() {
   const RobotModel& model = setup_->model();
+  if (options_.draws > 0) {
+    for (const DrawnFaults& drawn :
+         DrawFaults(*setup_, {static_cast<size_t>(options_.draws), static_cast<size_t>(options_.together),
+                              options_.seed, options_.duration, tau_})) {
+      plants_.push_back(drawn.fault);
+      singles_.push_back(drawn.each);
+      mutants_.push_back({.kind = drawn.fault.kind,
+                          .name = drawn.fault.name,
+                          .truth = drawn.truth,
+                          .injected = drawn.truth});
+    }
+    return;
+  }
   if (options_.parameters > 0) {
     const std::vector<Parameter> numbers = ListParameters(model.spec());
     const size_t count = std::min(numbers.size(), static_cast<size_t>(options_.parameters));
@@ -192,9 +206,13 @@ bool RunCampaign::RunLoop(const Setup& setup, LoopParts parts, RunMutant* mutant
   const PlantReading& reading = runner.loop().record().reading;
   end->resize(reading.qpos.size() + reading.qvel.size());
   *end << reading.qpos, reading.qvel;
+  if (tau_.size() == 0) tau_ = runner.loop().record().drive.tau;
   mutant->killed = result.verdict != Verdict::kPass;
   mutant->cause = result.attribution.cause;
   mutant->evidence = result.attribution.evidence;
+  mutant->score = ScoreNames(mutant->truth, mutant->injected, result.causes);
+  for (const Explanation& one : result.causes)
+    mutant->causes += (mutant->causes.empty() ? "" : "; ") + one.Tell();
   mutant->names_part = mutant->evidence.find(mutant->part) != std::string::npos;
   mutant->failure = result.failure;
   mutant->failed_checks = JoinFailed(runner.loop().checks());
@@ -221,6 +239,20 @@ bool RunCampaign::RunPlant(const PlantFault& fault, RunMutant* mutant, VectorXd*
   return RunLoop(setup, std::move(parts), mutant, end, should_stop);
 }
 
+bool RunCampaign::KeepFound(const std::vector<PlantFault>& each, RunMutant* mutant,
+                            const std::function<bool()>& should_stop) {
+  if (each.size() < 2) return true;
+  std::vector<Fault> found;
+  for (size_t i = 0; i < each.size(); ++i) {
+    RunMutant alone;
+    VectorXd end;
+    if (!RunPlant(each[i], &alone, &end, should_stop)) return false;
+    if (alone.killed) found.push_back(mutant->truth[i]);
+  }
+  mutant->truth = found;
+  return true;
+}
+
 bool RunCampaign::Run(size_t index, const std::function<bool()>& should_stop) {
   RunMutant& mutant = mutants_[index];
   VectorXd end;
@@ -245,8 +277,11 @@ bool RunCampaign::RunFault(size_t index, VectorXd* end, const std::function<bool
     index -= parameters_.size();
     if (!is_law) index -= laws_.size();
     const bool is_equation = !is_law && index < equations_.size();
-    if (!is_law && !is_equation)
-      return RunPlant(plants_[index - equations_.size()], &mutant, end, should_stop);
+    if (!is_law && !is_equation) {
+      index -= equations_.size();
+      if (!singles_.empty() && !KeepFound(singles_[index], &mutant, should_stop)) return false;
+      return RunPlant(plants_[index], &mutant, end, should_stop);
+    }
     const Setup& setup = is_law ? *offsetd_ : *setup_;
     LoopParts parts = MakeLoopParts(setup);
     GoToStart(parts);

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "harness/diagnosis/drawn_faults.h"
 #include "harness/diagnosis/faulty_law.h"
 #include "harness/diagnosis/parameters.h"
 #include "harness/diagnosis/plant_faults.h"
@@ -22,7 +23,9 @@ struct RunMutant {
   std::string kind;  ///< "law", "motor", "sensor", ...: what a table sums up by.
   std::string name;
   Cause expected = Cause::kNone;
-  std::string part;  ///< What the evidence should name; empty for nothing.
+  std::string part;             ///< What the evidence should name; empty for nothing.
+  std::vector<Fault> truth;     ///< Of drawn faults that are found alone: how they should be told.
+  std::vector<Fault> injected;  ///< The others likewise.
 
   bool refused = false;  ///< There is no such robot, or the scenario cannot be run with it.
   bool killed = false;   ///< The verdict is not "pass".
@@ -32,6 +35,8 @@ struct RunMutant {
   Cause cause = Cause::kNone;
   bool names_part = false;  ///< The evidence has `part` in it.
   std::string evidence;
+  NamingScore score;            ///< Of drawn faults.
+  std::string causes;           ///< All explanations, in words.
   std::string failure;          ///< Why the run ended early; empty when it did not.
   std::string failed_checks;    ///< Names, separated by blanks.
   double position_error = 0.0;  ///< Largest of the object, m.
@@ -68,6 +73,9 @@ class RunCampaign {
                const std::function<bool()>& should_stop);
   bool RunPlant(const PlantFault& fault, RunMutant* mutant, VectorXd* end,
                 const std::function<bool()>& should_stop);
+  /// Of a drawn set's truth keeps what is found where it is alone: the rest has no effect. @returns as Run.
+  bool KeepFound(const std::vector<PlantFault>& each, RunMutant* mutant,
+                 const std::function<bool()>& should_stop);
   /// Of the fault with this index. @returns as Run.
   bool RunFault(size_t index, VectorXd* end, const std::function<bool()>& should_stop);
   [[nodiscard]] bool IsLaw(size_t index) const {
@@ -83,10 +91,12 @@ class RunCampaign {
   std::unique_ptr<Setup> setup_;       // of the right robot, from the start
   std::unique_ptr<Setup> offsetd_;     // the same with an error that feedback has to answer
   VectorXd end_, offsetd_end_;         // where they come to without a fault
+  VectorXd tau_;                       // that they end with, in the first of both
   std::vector<Parameter> parameters_;  // by mutant, those of numbers first
   std::vector<LawFault> laws_;
   std::vector<EquationFault> equations_;
   std::vector<PlantFault> plants_;
+  std::vector<std::vector<PlantFault>> singles_;  // of drawn sets, each alone
   std::vector<RunMutant> mutants_;
 };
 

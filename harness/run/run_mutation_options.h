@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cstdint>
+
 namespace dexcheck {
 
 /// Which faults are made in a run, and how long each is looked at.
@@ -13,6 +15,10 @@ struct RunMutationOptions {
   bool laws = true;
   bool equations = true;
   bool plants = true;
+  /// Sets of faults whose places, sizes and times are drawn, in the place of all of these; 0 for none.
+  int draws = 0;
+  int together = 1;  ///< Faults of a set.
+  std::uint64_t seed = 1;
 };
 
 }  // namespace dexcheck

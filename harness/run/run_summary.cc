@@ -5,6 +5,7 @@
 
 #include "harness/base/check_summary.h"
 #include "harness/base/version.h"
+#include "harness/diagnosis/run_causes.h"
 #include "harness/engine/machine.h"
 
 namespace dexcheck {
@@ -56,6 +57,29 @@ Json ClearanceToJson(const Clearance& clearance) {
   return json;
 }
 
+Json ToJson(const Explanation& one) {
+  constexpr const char* kOutcomes[] = {"named", "named up to a class", "not explained"};
+  Json json = {{"channel", NameOf(one.channel)},
+               {"outcome", kOutcomes[static_cast<int>(one.outcome)]},
+               {"faults", Json::array()},
+               {"from_s", one.from},
+               {"to_s", one.to},
+               {"ends", one.ends},
+               {"fraction", one.fraction},
+               {"left", one.left},
+               {"rival", one.rival},
+               {"log_odds", one.log_odds}};
+  for (const Fault& fault : one.faults) {
+    json["faults"].push_back({{"fault", fault.fault},
+                              {"place", fault.place},
+                              {"value", fault.value},
+                              {"standard_error", fault.error},
+                              {"unit", fault.unit},
+                              {"detail", fault.detail}});
+  }
+  return json;
+}
+
 }  // namespace
 
 const char* NameOf(Verdict verdict) {
@@ -79,8 +103,16 @@ double TrackingStatistics::joints_rms() const { return Rms(joints_squares_, coun
 
 void Judge(const Setup& setup, const ClosedLoop& loop, RunResult* result) {
   if (loop.is_checking()) {
-    result->attribution = Attribute(setup.constants(), loop.checks().model_checks(),
-                                    loop.checks().motion_checks(), loop.checks().Tell());
+    result->causes = ExplainRun(loop.store());
+    MeasuredCauses measured = loop.checks().Tell();
+    measured.law = TellCauses(result->causes, CauseChannel::kLaw);
+    measured.motors = TellCauses(result->causes, CauseChannel::kActuation);
+    measured.sensors = TellCauses(result->causes, CauseChannel::kMeasurement);
+    measured.wheels = TellCauses(result->causes, CauseChannel::kRolling);
+    measured.force = TellCauses(result->causes, CauseChannel::kBalance);
+    measured.is_slope = Names(result->causes, "slope");
+    result->attribution =
+        Attribute(setup.constants(), loop.checks().model_checks(), loop.checks().motion_checks(), measured);
   }
   const bool disagrees = result->attribution.cause != Cause::kNone;
   result->verdict = disagrees ? Verdict::kDisagreement : Verdict::kPass;
@@ -113,6 +145,8 @@ Json MakeSummary(const Setup& setup, const ClosedLoop& loop, const RunResult& re
   for (const Attribution& one : result.attribution.attributions) {
     json["attribution"]["checks"][one.check] = NameOf(one.cause);
   }
+  json["causes"] = Json::array();
+  for (const Explanation& one : result.causes) json["causes"].push_back(ToJson(one));
   json["checks"] = Json::object();
   if (loop.is_checking()) {
     for (const CheckRecord& record : setup.constants().records)

@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include "harness/checks/attribution.h"
+#include "harness/diagnosis/causes.h"
 #include "harness/run/closed_loop.h"
 
 namespace dexcheck {
@@ -46,6 +47,7 @@ struct RunResult {
   bool grasp_lost = false;   ///< It ended because a fingertip left the object.
   TrackingStatistics tracking;
   AttributionResult attribution;
+  Causes causes;  ///< What explains the residuals.
   double recording_seconds = 0.0;
   double wall_seconds = 0.0;  ///< Of all steps, recording included.
 };

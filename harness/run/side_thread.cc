@@ -20,10 +20,12 @@ void SideThread::Wait() {
 }
 
 void SideThread::AwaitChange(State from) const {
-  // Sleeping and waking takes longer than a step: awake for some of them.
-  constexpr int kSpins = 1000000;
-  for (int i = 0; i < kSpins; ++i)
+  // Sleeping and waking takes longer than a step: awake for some of them, but in nobody else's way.
+  constexpr int kSpins = 5000, kAlone = 200;
+  for (int i = 0; i < kSpins; ++i) {
     if (state_.load(std::memory_order_acquire) != from) return;
+    if (i >= kAlone) std::this_thread::yield();
+  }
   state_.wait(from, std::memory_order_acquire);
 }
 

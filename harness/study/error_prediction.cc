@@ -6,13 +6,9 @@ namespace dexcheck {
 namespace {
 
 GraspModelOptions MakeModelOptions(const Setup& setup) {
-  if (setup.joints() == nullptr) {
-    const GraspControllerOptions controller = setup.MakeControllerOptions();
-    return static_cast<const GraspModelOptions&>(controller);
-  }
-  GraspModelOptions options;
-  options.orientation = OrientationFeedback::kRotation;
-  return options;
+  if (setup.joints() != nullptr) return {.orientation = OrientationFeedback::kRotation};
+  const GraspControllerOptions controller = setup.MakeControllerOptions();
+  return static_cast<const GraspModelOptions&>(controller);
 }
 
 }  // namespace

@@ -31,9 +31,10 @@ struct Errors {
 };
 
 /// What a plant that is not ideal makes of the tracking error, to first order: along the run of an ideal one
-/// it computes at each step what would be measured, what the law would send then, what the motors would give,
-/// and how the rigid system (19), (46), (48) with the plant's own masses and pushes would accelerate. That
-/// acceleration less the ideal one, d, drives the error. Of the object's position, with the gains of (57),
+/// it computes at each step what would be measured, what the law would send then, what the motors would
+/// deliver, and how the rigid system (19), (46), (48) with the plant's own masses and pushes would
+/// accelerate. That acceleration less the ideal one, d, drives the error. Of the object's position, with the
+/// gains of (57),
 ///
 ///   e_ddot + K_v e_dot + K_p e = -d,   e = X_d - X_o
 ///

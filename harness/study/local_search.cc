@@ -22,13 +22,13 @@ struct Descent {
 struct Replay {
   const Descent* descent;
   size_t next = 0;
-  UnitPoint asked;  ///< Empty until a point without a value comes.
+  UnitPoint queried;  ///< Empty until a point without a value comes.
 };
 
 double Evaluate(const std::vector<double>& x, std::vector<double>& /*gradient*/, void* data) {
   Replay& replay = *static_cast<Replay*>(data);
   if (replay.next < replay.descent->values.size()) return replay.descent->values[replay.next++];
-  replay.asked = x;
+  replay.queried = x;
   throw nlopt::forced_stop();
 }
 
@@ -43,14 +43,14 @@ class LocalSearcher : public Searcher {
   }
 
   std::vector<UnitPoint> Ask() override {
-    asked_.clear();
+    queried_.clear();
     std::vector<UnitPoint> points;
     for (Descent& descent : descents_) {
       if (descent.is_over) continue;
       const UnitPoint point = FindNext(descent);
       descent.is_over = point.empty();
       if (descent.is_over) continue;
-      asked_.push_back(&descent);
+      queried_.push_back(&descent);
       points.push_back(point);
     }
     return points;
@@ -58,7 +58,7 @@ class LocalSearcher : public Searcher {
 
   void Tell(const std::vector<Judgement>& judgements) override {
     for (size_t i = 0; i < judgements.size(); ++i) {
-      Descent& descent = *asked_[i];
+      Descent& descent = *queried_[i];
       descent.values.push_back(FindValue(descent, judgements[i]));
     }
   }
@@ -78,7 +78,7 @@ class LocalSearcher : public Searcher {
     } catch (const nlopt::forced_stop&) {
     } catch (const nlopt::roundoff_limited&) {  // as near as it gets
     }
-    return MirrorIntoUnit(replay.asked);
+    return MirrorIntoUnit(replay.queried);
   }
 
   /// A feasible point's objective; else a little worse than all that this search has seen.
@@ -90,7 +90,7 @@ class LocalSearcher : public Searcher {
 
   Search search_;
   std::vector<Descent> descents_;
-  std::vector<Descent*> asked_;
+  std::vector<Descent*> queried_;
 };
 
 }  // namespace

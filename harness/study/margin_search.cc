@@ -70,12 +70,12 @@ bool MarginSearcher::IsOpen(const Margin& margin) const {
 }
 
 std::vector<UnitPoint> MarginSearcher::Ask() {
-  asked_.clear();
+  queried_.clear();
   if (phase_ == Phase::kStart) return {start_};
   std::vector<UnitPoint> points;
   for (Margin& margin : margins_) {
     if (phase_ == Phase::kEnds ? !(margin.at_most > 0.0) : !IsOpen(margin)) continue;
-    asked_.push_back(&margin);
+    queried_.push_back(&margin);
     points.push_back(
         PointAt(margin, phase_ == Phase::kEnds ? margin.at_most : 0.5 * (margin.distance + margin.at_most)));
   }
@@ -88,8 +88,8 @@ void MarginSearcher::Tell(const std::vector<Judgement>& judgements) {
     if (phase_ == Phase::kOver) margins_.clear();
     return;
   }
-  for (size_t i = 0; i < asked_.size(); ++i) {
-    Margin& margin = *asked_[i];
+  for (size_t i = 0; i < queried_.size(); ++i) {
+    Margin& margin = *queried_[i];
     const double distance =
         phase_ == Phase::kEnds ? margin.at_most : 0.5 * (margin.distance + margin.at_most);
     const bool good = judgements[i].is_feasible();

@@ -45,7 +45,7 @@ class MarginSearcher : public Searcher {
   UnitPoint start_;
   Phase phase_ = Phase::kStart;
   std::vector<Margin> margins_;
-  std::vector<Margin*> asked_;
+  std::vector<Margin*> queried_;
 };
 
 /// The margins that the points of such a search show, in the order of their numbers.

@@ -82,9 +82,9 @@ class PopulationSearcher : public Searcher {
       std::visit([&](const auto& algorithm) { static_cast<void>(algorithm.evolve(population_)); }, copy);
     } catch (const GenerationIsNamed&) {
     }
-    std::vector<UnitPoint> asked = generation.points;
-    for (UnitPoint& point : asked) point = MirrorIntoUnit(std::move(point));
-    return asked;
+    std::vector<UnitPoint> queried = generation.points;
+    for (UnitPoint& point : queried) point = MirrorIntoUnit(std::move(point));
+    return queried;
   }
 
   void Tell(const std::vector<Judgement>& judgements) override {

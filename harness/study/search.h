@@ -1,6 +1,7 @@
 #pragma once
 
-// Searches by ask and tell: which points of the unit cube come next, and what the last ones came to.
+// Searches with an ask-and-tell interface: which points of the unit cube come next, and what the last ones
+// came to.
 
 #include <memory>
 #include <vector>
@@ -11,7 +12,7 @@
 
 namespace dexcheck {
 
-/// A search. What it asks depends on its settings and on what it was told, and on nothing else.
+/// A search. Its next points depend on its settings and on the judgements so far, and on nothing else.
 class Searcher {
  public:
   Searcher() = default;

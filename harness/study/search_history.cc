@@ -35,7 +35,7 @@ void SearchHistory::Add(const TrialRow& row) {
 }
 
 void SearchHistory::TellWhatIsDone() {
-  // A batch that the limit cut short is not told: the search is over.
+  // A batch that the limit cut short is not judged: the search is over.
   while (!batch_.empty()) {
     std::vector<JudgedPoint> judged;
     for (const std::vector<double>& values : batch_) {
@@ -102,25 +102,29 @@ std::vector<JudgedPoint> JudgePoints(const Study& study, const std::vector<Trial
   return points;
 }
 
-std::vector<const JudgedPoint*> SortFeasible(const std::vector<JudgedPoint>& points) {
+namespace {
+
+template <typename IsBefore>
+std::vector<const JudgedPoint*> SortFeasibleBy(const std::vector<JudgedPoint>& points, IsBefore is_before) {
   std::vector<const JudgedPoint*> sorted;
   for (const JudgedPoint& point : points) {
     if (point.judgement.is_feasible()) sorted.push_back(&point);
   }
-  std::stable_sort(sorted.begin(), sorted.end(), [](const JudgedPoint* a, const JudgedPoint* b) {
-    return IsBetter(a->judgement, b->judgement);
+  std::stable_sort(sorted.begin(), sorted.end(), [&](const JudgedPoint* a, const JudgedPoint* b) {
+    return is_before(a->judgement, b->judgement);
   });
   return sorted;
 }
 
+}  // namespace
+
+std::vector<const JudgedPoint*> SortFeasible(const std::vector<JudgedPoint>& points) {
+  return SortFeasibleBy(points, IsBetter);
+}
+
 std::vector<const JudgedPoint*> FindFront(const std::vector<JudgedPoint>& points) {
-  std::vector<const JudgedPoint*> sorted;
-  for (const JudgedPoint& point : points) {
-    if (point.judgement.is_feasible()) sorted.push_back(&point);
-  }
-  std::stable_sort(sorted.begin(), sorted.end(), [](const JudgedPoint* a, const JudgedPoint* b) {
-    return a->judgement.objectives < b->judgement.objectives;
-  });
+  const std::vector<const JudgedPoint*> sorted = SortFeasibleBy(
+      points, [](const Judgement& a, const Judgement& b) { return a.objectives < b.objectives; });
   // In this order only a point before another one can dominate it.
   std::vector<const JudgedPoint*> front;
   for (const JudgedPoint* point : sorted) {

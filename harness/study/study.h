@@ -103,7 +103,7 @@ long CountTrials(const Study& study);
 long CountTrialsOfPoint(const Study& study);
 
 /// The trials of a point: point `number` has those from number * CountTrialsOfPoint on.
-/// @param draws of the nested keys, as ListDraws gives them.
+/// @param draws of the nested keys, as ListDraws returns them.
 std::vector<Trial> ListTrialsOfPoint(const Study& study, long number, const std::vector<double>& point,
                                      const std::vector<std::vector<double>>& draws);
 
@@ -112,7 +112,7 @@ std::vector<std::vector<double>> ListDraws(const Study& study);
 
 /// A value of a range, or of a list of values: 0 is its beginning, 1 its end. @param fraction in [0, 1].
 double ValueAt(const Variation& variation, double fraction);
-/// The fraction at which ValueAt gives this value; of a list the middle of its part.
+/// The fraction at which ValueAt returns this value; of a list the middle of its part.
 double FractionOf(const Variation& variation, double value);
 
 /// Values of a point at these fractions.

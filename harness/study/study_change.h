@@ -23,7 +23,7 @@ struct StudyChange {
 /// points.
 std::string FindDifference(const Study& before, const Study& now);
 
-/// Whether both ask for the same trials under the same numbers.
+/// Whether both list the same trials under the same numbers.
 bool HasSameTrials(const Study& before, const Study& now);
 
 /// Finds the rows' places in the study as it is now. The two must not differ (FindDifference).

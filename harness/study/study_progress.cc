@@ -20,10 +20,10 @@ StudyProgress FindProgress(const StudyStore& store) {
                               study.is_search() ? "at most " : "", progress.total, store.name()) +
                   outcomes;
   progress.is_over = progress.done >= progress.total;
-  const bool asks = study.is_search() || !study.objectives.empty() || !study.constraints.empty() ||
-                    study.sample.method == SamplingMethod::kSaltelli ||
-                    study.sample.method == SamplingMethod::kMorris;
-  if (!asks) return progress;
+  const bool has_question = study.is_search() || !study.objectives.empty() || !study.constraints.empty() ||
+                            study.sample.method == SamplingMethod::kSaltelli ||
+                            study.sample.method == SamplingMethod::kMorris;
+  if (!has_question) return progress;
   const std::vector<TrialRow> rows = store.ReadRows(0, /*with_machine=*/false);
   for (const std::string& answer : AnswerStudy(study, rows)) progress.text += answer + "\n";
   if (study.is_search()) {

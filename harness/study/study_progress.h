@@ -12,7 +12,7 @@ struct StudyProgress {
   long done = 0;
   long total = 0;        ///< Of a search at most.
   bool is_over = false;  ///< Nothing is left to be made.
-  std::string text;      ///< Lines: how far, outcomes, what is answered so far.
+  std::string text;      ///< Lines: how far, outcomes, what is found so far.
 };
 
 StudyProgress FindProgress(const StudyStore& store);

@@ -20,7 +20,7 @@
 namespace dexcheck {
 namespace {
 
-constexpr int kApplicationId = 0x44584353;  // "DXCS", tells a study from other databases
+constexpr int kApplicationId = 0x44584353;  // "DXCS", distinguishes a study from other databases
 /// Others hold the lock for some rows; on a slow disk or network that may take a while.
 constexpr int kBusyTimeout = 60000;  // ms
 /// For reading too the file has to be written: what a killed process left half done must be undone.

@@ -64,7 +64,7 @@ class StudyStore {
   /// Opens a study's database, or makes it when there is none. A study that was edited keeps the rows that it
   /// still has, and sets the others aside (ChangeStudy); another revision of this program goes on with the
   /// rows when it makes the same ones.
-  /// @param makes_same_rows asked when the file was written by another revision; none for that it does not.
+  /// @param makes_same_rows called when the file was written by another revision; none for that it does not.
   /// @throws InputError, also when the file holds another study.
   static StudyStore OpenOrCreate(const std::filesystem::path& path, const StudyIdentity& identity,
                                  const Study& study, const MakesSameRows& makes_same_rows = {});

@@ -28,7 +28,7 @@ TrialMonitor::TrialMonitor(const Setup& setup, long num_steps)
 }
 
 void TrialMonitor::Record(const StepRecord& step) {
-  // A step that ended before the plant answered has no slip of its own.
+  // A step that ended before the plant responded has no slip of its own.
   const bool is_complete = step.step > steps_;
   steps_ = step.step;
   RecordError(step);

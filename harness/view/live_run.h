@@ -1,6 +1,6 @@
 #pragma once
 
-// A run that goes on in a thread of its own, at the pace that the window asks for.
+// A run that goes on in a thread of its own, at the pace that the window requests.
 
 #include <condition_variable>
 #include <deque>

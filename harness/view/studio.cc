@@ -18,7 +18,7 @@ Studio::~Studio() {
   thread_.join();
 }
 
-void Studio::Ask(const Order& order) {
+void Studio::Request(const Order& order) {
   const std::lock_guard lock(mutex_);
   order_ = order;
 }

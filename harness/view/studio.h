@@ -15,7 +15,7 @@
 
 namespace dexcheck {
 
-/// Of the pictures that it was asked for, the newest one is what counts.
+/// Of the pictures that were requested, the newest one is what counts.
 class Studio {
  public:
   /// @param source must outlive it. @param width, height in pixels.
@@ -29,7 +29,7 @@ class Studio {
     SceneLook look;
     ControlsState controls;
   };
-  void Ask(const Order& order);
+  void Request(const Order& order);
   /// None when there is none since the last call. @throws what drawing threw.
   std::optional<Image> Take();
 

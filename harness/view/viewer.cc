@@ -83,7 +83,7 @@ class Viewer {
     const ViewFrame frame = source_.Read(row_);
     if (spring_) UpdateForce(frame);
     Studio::Order order{row_, {camera_.view(), state_.forces, MeasureForces(frame), arrow_}, state_};
-    studio_.Ask(order);
+    studio_.Request(order);
   }
 
   void Go(long row) {

@@ -23,7 +23,7 @@ using LiveRunMaker = std::function<std::unique_ptr<LiveRun>(const std::vector<st
 void ViewRecording(const FrameSource& recording, const std::string& title, const ViewerOptions& options);
 
 /// Shows a run that goes on. Sliders start it anew with other gains.
-/// @param save writes the run's scenario, its pulls included, and tells where.
+/// @param save writes the run's scenario, its mouse forces included, and says where.
 /// @returns the last of the runs, finished.
 std::unique_ptr<LiveRun> ViewLive(const LiveRunMaker& make, const std::string& title,
                                   const ViewerOptions& options,

@@ -43,7 +43,7 @@ std::string TellError() {
 struct Window::Impl {
   GLFWwindow* window = nullptr;
   std::vector<InputEvent> events;
-  // Where the mouse was told to be last: asked now, it would be where it is after events that are still to
+  // Where the mouse was reported last: queried now, it would be where it is after events that are still to
   // come.
   double cursor_x = 0.0;
   double cursor_y = 0.0;

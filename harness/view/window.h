@@ -1,6 +1,6 @@
 #pragma once
 
-// A window that shows pictures and tells what mouse and keyboard do.
+// A window that shows pictures and reports what mouse and keyboard do.
 
 #include <memory>
 #include <string>

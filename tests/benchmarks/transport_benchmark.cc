@@ -43,9 +43,9 @@ int main() {
   parts.plant->Read(&reading);
   const auto rest = MakeLineTrajectory(setup.start().X_o, Vector6d::Zero(), 0.0);
   parts.controller->Follow(*rest);
-  const Reading told{reading.state, reading.touch};
+  const Reading measured{reading.state, reading.touch};
   Command command;
-  const double step = Measure([&] { parts.controller->Step(told, 0.0, &command); });
+  const double step = Measure([&] { parts.controller->Step(measured, 0.0, &command); });
   GraspModel model(setup.model(), setup.fingertips(), setup.object().body, setup.surface(),
                    setup.MakeControllerOptions());
   const double terms = Measure([&] { model.SetState(reading.state); });

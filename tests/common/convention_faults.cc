@@ -89,7 +89,7 @@ void AddCentres(std::vector<ConventionFault>* list) {
   add("as if given in the parent's frame", [](const StatedLink& r) { return Vector3d(r.X_PL * r.body.com); });
   add("as if given along the parent's axes",
       [](const StatedLink& r) { return Vector3d(r.X_PL.linear() * r.body.com); });
-  add("though the parent's is meant",
+  add("though the parent's is expected",
       [](const StatedLink& r) { return Vector3d(r.X_PL.inverse() * r.body.com); });
   add("with its sign turned around", [](const StatedLink& r) { return Vector3d(-r.body.com); });
   for (const int axis : {0, 1, 2}) {

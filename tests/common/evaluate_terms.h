@@ -1,11 +1,11 @@
 #pragma once
 
-#include "harness/descriptions/answered_terms.h"
+#include "harness/descriptions/term_results.h"
 
 namespace dexcheck::testing {
 
-/// All that a program could answer, of a provider at one state.
-inline AnsweredTerms EvaluateTerms(DynamicsProvider* provider, const VectorXd& q, const VectorXd& xi) {
+/// All that a program could provide, of a provider at one state.
+inline TermResults EvaluateTerms(DynamicsProvider* provider, const VectorXd& q, const VectorXd& xi) {
   provider->SetState({.q = q, .xi = xi, .w = {}});
   const Eigen::Index n = xi.size();
   const auto read = [&](Term term, Eigen::Index rows, Eigen::Index cols) {

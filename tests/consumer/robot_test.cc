@@ -36,7 +36,7 @@ TEST(Robot, CodeAgrees) {
   EXPECT_THAT(MakeTerms(1e-6), dexcheck::testing::AgreesWith(ArgumentAt(2), {.samples = 50, .digits = 4}));
 }
 
-TEST(Robot, AFaultIsTold) {
+TEST(Robot, AFaultIsReported) {
   EXPECT_THAT(MakeTerms(0.1), Not(dexcheck::testing::AgreesWith(ArgumentAt(2), {.samples = 50})));
   ::testing::StringMatchResultListener listener;
   EXPECT_FALSE(::testing::ExplainMatchResult(dexcheck::testing::AgreesWith(ArgumentAt(2), {.samples = 50}),

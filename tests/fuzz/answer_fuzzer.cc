@@ -1,4 +1,4 @@
-// What programs answer: any bytes are arrays, terms of the right sizes, or an InputError that names the file.
+// What programs write: any bytes are arrays, terms of the right sizes, or an InputError that names the file.
 
 #include "harness/descriptions/answer_layout.h"
 #include "harness/descriptions/npy_file.h"
@@ -22,11 +22,11 @@ void ExpectWhole(const NpyArray& array) {
 
 void ReadTerms(std::string_view text) {
   static const RobotDescription robot = ParseUrdf(kArm, "arm.urdf");
-  const std::optional<nlohmann::json> answer = ParseAnswer(text);
+  const std::optional<nlohmann::json> answer = ParseResult(text);
   if (!answer) return;
   Try("answer:", [&] {
-    const AnswerLayout layout(robot, *answer, "answer");
-    AnsweredTerms terms = ReadAnswer(*answer, layout, VectorXd::Ones(layout.size()), "answer");
+    const ProgramLayout layout(robot, *answer, "answer");
+    TermResults terms = ReadResult(*answer, layout, VectorXd::Ones(layout.size()), "answer");
     layout.ReadTerms(VectorXd::Zero(2), VectorXd::Zero(2), &terms);
     Expect(terms.M.size() == 0 || (terms.M.rows() == 2 && terms.M.cols() == 2), "M");
     for (const VectorXd* force : {&terms.coriolis, &terms.gravity, &terms.bias, &terms.friction})

@@ -198,7 +198,7 @@ TEST_F(VideoTest, TheGhostOfAnotherRunStandsWhereThatRunIs) {
   EXPECT_NEAR(right_end(seen), right_end(moved), 3.0);
   EXPECT_LT(right_end(pixels(here, coincident)), right_end(moved) - 5.0)
       << "not beside a run that is the same";
-  // Still where it was, and told how far apart.
+  // Still where it was, and the panel shows how far apart.
   EXPECT_NEAR((FindTorus(ghost) - FindTorus(here)).head<2>().norm(), 0.0, 3.0);
   EXPECT_EQ(ghost.width, kWidth);
 }
@@ -302,14 +302,14 @@ TEST_F(VideoTest, LostContactsAreNotDrawn) {
   EXPECT_NO_THROW(VideoPainter({&view_, 1}, options).Paint(0.5));
 }
 
-TEST_F(VideoTest, TellsItsProgressAndStopsWhenTold) {
-  std::vector<long> told;
+TEST_F(VideoTest, ReportsItsProgressAndStopsOnRequest) {
+  std::vector<long> reported;
   EXPECT_TRUE(Video(folder_.path() / "a.mp4", {&view_, 1}, MakeOptions(), [&](long done, long total) {
     EXPECT_EQ(total, 5);
-    told.push_back(done);
+    reported.push_back(done);
     return true;
   }));
-  EXPECT_EQ(told, (std::vector<long>{1, 2, 3, 4, 5}));
+  EXPECT_EQ(reported, (std::vector<long>{1, 2, 3, 4, 5}));
   EXPECT_FALSE(
       Video(folder_.path() / "b.mp4", {&view_, 1}, MakeOptions(), [](long done, long) { return done < 2; }));
   EXPECT_EQ(std::distance(fs::directory_iterator(folder_.path()), {}), 1) << "nothing of the stopped video";

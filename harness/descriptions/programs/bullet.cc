@@ -62,7 +62,7 @@ class BulletRobot : public EngineRobot {
     const Eigen::VectorXd moving = CalcAccelerations(v, /*with_gravity=*/false);
     SetState(q, Eigen::VectorXd::Zero(n));
     const Eigen::VectorXd falling = CalcAccelerations(v, /*with_gravity=*/true);
-    // M^-1: Bullet's answers to unit forces; a fixed base has six entries of its own that stay zero.
+    // M^-1: Bullet's accelerations under unit forces; a fixed base has six entries of its own that stay zero.
     const Eigen::Index first = floats_ ? 0 : kBase;
     Eigen::MatrixXd inverse(n, n);
     for (Eigen::Index col = 0; col < n; ++col) {

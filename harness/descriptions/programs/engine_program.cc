@@ -38,13 +38,13 @@ std::string FindJointWithoutMass(const std::vector<UrdfBody>& bodies) {
   return {};
 }
 
-/// The robot that the first request speaks of, and the first answer.
+/// The robot that the first request describes, and the first result.
 class Session {
  public:
   Session(const std::string& path, std::string name, MakeRobot make)
       : bodies_(ReadUrdfTree(path)), name_(std::move(name)), make_(std::move(make)) {}
 
-  Json Answer(const Json& request) {
+  Json Reply(const Json& request) {
     return request.at("request") == "hello" ? Greet(request) : Evaluate(request);
   }
 
@@ -55,15 +55,15 @@ class Session {
     facts.floats = robot.at("base") == "floating";
     facts.gravity = ReadVector(robot.at("gravity"));
     robot_ = make_(bodies_, facts);
-    Json answer = {{"dexcheck_protocol", 1}, {"name", name_}, {"joints", Json::array()}};
-    for (size_t i = 1; i < bodies_.size(); ++i) answer["joints"].push_back(bodies_[i].joint);
+    Json result = {{"dexcheck_protocol", 1}, {"name", name_}, {"joints", Json::array()}};
+    for (size_t i = 1; i < bodies_.size(); ++i) result["joints"].push_back(bodies_[i].joint);
     if (facts.floats) {
-      answer["base"] = {{"position", "wxyz_xyz"},
+      result["base"] = {{"position", "wxyz_xyz"},
                         {"velocity", "angular_linear"},
                         {"linear_axes", "world"},
                         {"angular_axes", "world"}};
     }
-    return answer;
+    return result;
   }
 
   Json Evaluate(const Json& request) {
@@ -76,13 +76,13 @@ class Session {
           (joint.empty() ? "; a joint may move no inertia" : "; joint " + joint + " moves no mass") +
           " (dexcheck audit ROBOT lists such joints)");
     }
-    Json answer = {{"id", request.at("id")}};
-    if (terms.M.size() > 0) answer["M"] = ToJson(terms.M);
-    if (terms.c.size() > 0) answer["c"] = ToJson(terms.c);
-    if (terms.g.size() > 0) answer["g"] = ToJson(terms.g);
-    if (terms.kinetic) answer["kinetic_energy"] = *terms.kinetic;
-    if (terms.potential) answer["potential_energy"] = *terms.potential;
-    return answer;
+    Json result = {{"id", request.at("id")}};
+    if (terms.M.size() > 0) result["M"] = ToJson(terms.M);
+    if (terms.c.size() > 0) result["c"] = ToJson(terms.c);
+    if (terms.g.size() > 0) result["g"] = ToJson(terms.g);
+    if (terms.kinetic) result["kinetic_energy"] = *terms.kinetic;
+    if (terms.potential) result["potential_energy"] = *terms.potential;
+    return result;
   }
 
   std::vector<UrdfBody> bodies_;
@@ -101,14 +101,14 @@ int RunEngine(int argc, char** argv, const std::string& name, const MakeRobot& m
   std::unique_ptr<Session> session;
   std::string line;
   while (std::getline(std::cin, line)) {
-    Json answer;
+    Json result;
     try {
       if (!session) session = std::make_unique<Session>(argv[1], name, make);
-      answer = session->Answer(Json::parse(line));
+      result = session->Reply(Json::parse(line));
     } catch (const std::exception& error) {
-      answer = {{"error", error.what()}};
+      result = {{"error", error.what()}};
     }
-    std::cout << answer.dump(-1, ' ', false, Json::error_handler_t::replace) << std::endl;
+    std::cout << result.dump(-1, ' ', false, Json::error_handler_t::replace) << std::endl;
   }
   return 0;
 }

@@ -20,7 +20,7 @@ struct RobotFacts {
   Eigen::Vector3d gravity = Eigen::Vector3d::Zero();  ///< m/s^2, world axes.
 };
 
-/// Terms at a state; what is empty is not answered. M includes no armature, since a URDF has none.
+/// Terms at a state; what is empty is not provided. M includes no armature, since a URDF has none.
 struct EngineTerms {
   Eigen::MatrixXd M;
   Eigen::VectorXd c;  ///< C v
@@ -46,7 +46,7 @@ class EngineRobot {
 using MakeRobot =
     std::function<std::unique_ptr<EngineRobot>(const std::vector<UrdfBody>&, const RobotFacts&)>;
 
-/// Answers requests from standard input until it ends. @return the program's exit code.
+/// Serves requests from standard input until it ends. @return the program's exit code.
 int RunEngine(int argc, char** argv, const std::string& name, const MakeRobot& make);
 
 }  // namespace dexcheck::engines

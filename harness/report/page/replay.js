@@ -283,8 +283,8 @@
       if (times[middle] <= t) low = middle; else high = middle - 1;
     }
     const next = Math.min(low + 1, count - 1);
-    const share = next === low ? 0 : Math.min(Math.max((t - times[low]) / (times[next] - times[low]), 0), 1);
-    return [low, next, share];
+    const fraction = next === low ? 0 : Math.min(Math.max((t - times[low]) / (times[next] - times[low]), 0), 1);
+    return [low, next, fraction];
   };
 
   const showForces = frame => {
@@ -309,17 +309,17 @@
   };
 
   const pose = t => {
-    const [frame, next, share] = findFrame(t);
+    const [frame, next, fraction] = findFrame(t);
     for (let part = 1; part < scene3d.parts; ++part) {
-      bones[part].position.copy(partPosition(frame, part)).lerp(partPosition(next, part), share);
-      bones[part].quaternion.copy(partQuaternion(frame, part)).slerp(partQuaternion(next, part), share);
+      bones[part].position.copy(partPosition(frame, part)).lerp(partPosition(next, part), fraction);
+      bones[part].quaternion.copy(partQuaternion(frame, part)).slerp(partQuaternion(next, part), fraction);
     }
-    const nearest = share < 0.5 ? frame : next;
+    const nearest = fraction < 0.5 ? frame : next;
     if (contacts) showForces(nearest);
     if (turned) {
-      groups.ghost.position.copy(point(desired, frame, 0, 1)).lerp(point(desired, next, 0, 1), share);
+      groups.ghost.position.copy(point(desired, frame, 0, 1)).lerp(point(desired, next, 0, 1), fraction);
       const turn = at => toQuaternion(turned.slice(4 * at, 4 * at + 4));
-      groups.ghost.quaternion.copy(turn(frame)).slerp(turn(next), share);
+      groups.ghost.quaternion.copy(turn(frame)).slerp(turn(next), fraction);
       // Where the object is in its place, the two would only flicker.
       const bone = bones[object.part];
       groups.ghost.children[0].visible = groups.ghost.position.distanceTo(bone.position) > 0.0005 ||

@@ -1,4 +1,4 @@
-// What Chart.js is told of a study's charts: bars with intervals, scatter plots, maps of cells. Every point and cell can
+// What Chart.js gets of a study's charts: bars with intervals, scatter plots, maps of cells. Every point and cell can
 // lead to a trial.
 'use strict';
 const MakeCharts = () => {
@@ -45,7 +45,7 @@ const MakeCharts = () => {
     // Later, for charts are drawn anew by it: this one still has the event to finish.
     if (point) setTimeout(() => choose(point.row));
   };
-  const Tip = tell => ({callbacks: {title: () => '', label: item => tell(item.raw)}});
+  const Tip = describe => ({callbacks: {title: () => '', label: item => describe(item.raw)}});
 
   // Bars along labels: sets of {label, values, color, thin}; a value may be [from, to].
   const Bars = (canvas, {labels, sets, unit = '', log = false, least, most}) => {
@@ -61,8 +61,8 @@ const MakeCharts = () => {
     });
   };
 
-  // Points {x, y, row, color} and lines {label, points, color, dash}. tell(point): text beside a point.
-  const Scatter = (canvas, {x, y, points, lines = [], chosen, choose, tell}) => Draw(canvas, {
+  // Points {x, y, row, color} and lines {label, points, color, dash}. describe(point): text beside a point.
+  const Scatter = (canvas, {x, y, points, lines = [], chosen, choose, describe}) => Draw(canvas, {
     type: 'scatter',
     data: {datasets: [
       {label: 'chosen', data: points.filter(p => p.row === chosen), pointRadius: 7, pointBorderWidth: 2, pointHitRadius: 0, order: 0,
@@ -72,12 +72,12 @@ const MakeCharts = () => {
         order: line.rings ? 3 : 1})),
       {label: 'trials', data: points, order: 2, backgroundColor: points.map(p => p.color), pointRadius: points.length > 3000 ? 1.5 : 3.5}]},
     options: {onClick: Choose(choose), plugins: {legend: {...Legend(lines.length > 0),
-      labels: {boxWidth: 14, filter: item => lines.some(line => line.label === item.text)}}, tooltip: Tip(tell)},
+      labels: {boxWidth: 14, filter: item => lines.some(line => line.label === item.text)}}, tooltip: Tip(describe)},
       scales: {x: MakeAxis(x), y: MakeAxis(y)}}
   });
 
   // Cells {x: [from, to], y: [from, to], row, color, edge}.
-  const Cells = (canvas, {x, y, cells, chosen, choose, tell}) => {
+  const Cells = (canvas, {x, y, cells, chosen, choose, describe}) => {
     const ends = (of, i) => cells.reduce((best, c) => (i ? Math.max : Math.min)(best, c[of][i]), i ? -Infinity : Infinity);
     const middle = ([from, to], axis) => axis.log ? Math.sqrt(from * to) : (from + to) / 2;
     const rectangles = {id: 'cells', beforeDatasetsDraw: ({ctx, scales}) => {
@@ -97,7 +97,7 @@ const MakeCharts = () => {
       data: {datasets: [{data: cells.map(cell => ({...cell, x: middle(cell.x, x), y: middle(cell.y, y)})),
         pointStyle: cells.map(cell => cell.mark ? 'crossRot' : 'circle'), pointRadius: cells.map(cell => cell.mark ? 5 : 0),
         borderColor: '#000', pointHitRadius: 12}]},
-      options: {onClick: Choose(choose), plugins: {legend: Legend(false), tooltip: Tip(tell)},
+      options: {onClick: Choose(choose), plugins: {legend: Legend(false), tooltip: Tip(describe)},
         interaction: {mode: 'nearest', intersect: false},
         scales: {x: MakeAxis(x, ends('x', 0), ends('x', 1)), y: MakeAxis(y, ends('y', 0), ends('y', 1))}}
     });

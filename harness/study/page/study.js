@@ -18,7 +18,7 @@
     return !Number.isFinite(x) ? '–' : column <= kSeed ? String(x) : String(Number(x.toPrecision(5)));
   };
   const ShowCell = cell => cell === null ? '–' : typeof cell === 'number' ? Short(cell) : cell;
-  const Tell = row => row === undefined ? '' : ['trial ' + value(row, kNumber), ...study.keys.map((key, i) =>
+  const Describe = row => row === undefined ? '' : ['trial ' + value(row, kNumber), ...study.keys.map((key, i) =>
     key + ' = ' + Show(value(row, kFirstKey + i), kFirstKey + i)), Show(value(row, kOutcome), kOutcome)].join(', ');
   const ShowTable = (heads, rows) => Table(heads, rows.map(row => row.map(cell => cell instanceof Node ? cell : ShowCell(cell))));
   const Link = number => Make('a', String(number), {href: '#trial-' + number});
@@ -144,7 +144,7 @@
     const predicted = theory < 0 ? [] : good.filter(row => Number.isFinite(value(row, theory)));
     if (predicted.length) lines.push({label: 'by (57)', rings: true, color: '#005f73', points: predicted.map(row => ({x: value(row, x), y: value(row, theory)}))});
     Scatter(canvas, {x: AxisOf(x, good), y: AxisOf(y, good), points: good.filter((row, i) => i % every === 0 || row === chosen).map(At), lines, chosen,
-      choose: Choose, tell: p => Tell(p.row) + `; ${columns[y].name} ${Show(p.y, y)}`});
+      choose: Choose, describe: p => Describe(p.row) + `; ${columns[y].name} ${Show(p.y, y)}`});
   };
 
   // Edges of cells along a key: between its values where these are few, else even ones.
@@ -183,7 +183,7 @@
       cell.color = z === kOutcome ? study.outcomes[cell.z].color
         : Number.isFinite(cell.z) ? ColorOf(most > least ? (f(cell.z) - f(least)) / (f(most) - f(least)) : 0) : '#e8e8e8';
     }
-    Cells(canvas, {x: AxisOf(x), y: AxisOf(y), cells, chosen, choose: Choose, tell: p => Tell(p.row) + (z === kOutcome ? '' : `; ${columns[z].name} ${Show(p.z, z)}`)});
+    Cells(canvas, {x: AxisOf(x), y: AxisOf(y), cells, chosen, choose: Choose, describe: p => Describe(p.row) + (z === kOutcome ? '' : `; ${columns[z].name} ${Show(p.z, z)}`)});
     text.textContent = z === kOutcome ? 'The worst outcome of each cell.' + (cells.some(cell => cell.mark) ? ' Crosses: unstable by (57).' : '')
       : finite.length ? `From ${Short(least)} (pale) to ${Short(most)} (dark)${f === Math.log ? ', by the logarithm' : ''}; grey: no value.` : 'No value.';
   };
@@ -199,7 +199,7 @@
     const values = good.map(p => p.y);
     Scatter(byId('history'), {x: {label: 'point'}, y: {label: 'objective', log: IsWide(Math.min(...values), Math.max(...values))}, chosen, choose: Choose,
       points: good.map(p => ({...p, row: byNumber.get(p.number), color: '#8a9a9a'})), lines: [{label: 'best until then', points: line, color: style('--accent')}],
-      tell: p => `point ${p.x}: ${Short(p.y)}`});
+      describe: p => `point ${p.x}: ${Short(p.y)}`});
   };
 
   // How a quantity goes with each key: the correlation of ranks.

@@ -74,7 +74,7 @@ TEST(Expression, BoundsItsRecursion) {
   EXPECT_EQ(EvaluateExpression(std::string(1000000, '-') + "1", {}), 1.0);
 }
 
-TEST(Expression, TellsWhatCanNameASymbol) {
+TEST(Expression, IdentifiesWhatCanNameASymbol) {
   for (const char* name : {"L_1", "h_f1", "_", "Pi"}) EXPECT_TRUE(IsSymbolName(name)) << name;
   for (const char* name : {"", "1a", "a-b", "a b", "pi"}) EXPECT_FALSE(IsSymbolName(name)) << name;
 }

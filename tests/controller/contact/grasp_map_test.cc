@@ -114,10 +114,10 @@ TEST(GraspMapTest, WrenchIsForceAndMomentArm) {
 
 TEST(GraspMapTest, OpposedNormalForcesAreInternal) {
   const std::vector<Contact> contacts = MakeTorusGrasp({0.0, 180.0});
-  VectorXd squeeze = VectorXd::Zero(6);
-  squeeze(2) = squeeze(5) = 5.0;
+  VectorXd internal_force = VectorXd::Zero(6);
+  internal_force(2) = internal_force(5) = 5.0;
   // sin(pi) is 1.2e-16, not 0
-  EXPECT_TRUE(MatrixNear(CalcG(contacts) * squeeze, Vector6d::Zero(), kRounding));
+  EXPECT_TRUE(MatrixNear(CalcG(contacts) * internal_force, Vector6d::Zero(), kRounding));
 }
 
 TEST(GraspMapTest, RateMatchesDifferencesForMovingContacts) {

@@ -136,7 +136,7 @@ TEST_F(BaselineLawTest, AtRestWithoutErrorEveryLawHoldsTheWeight) {
 }
 
 // At rest, pushed away: Lambda V_dot = W.
-TEST_F(BaselineLawTest, TheObjectAnswersWithItsStiffnessOverTheAugmentedInertia) {
+TEST_F(BaselineLawTest, TheObjectRespondsWithItsStiffnessOverTheAugmentedInertia) {
   const Vector6d offset = DrawVector(6, 0.02, &random_);
   const DesiredMotion desired{scene_.X_o + offset, Vector6d::Zero(), Vector6d::Zero()};
   const VectorXd none = VectorXd::Zero(scene_.robot.size());

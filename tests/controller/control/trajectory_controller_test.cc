@@ -76,7 +76,7 @@ TEST_F(TrajectoryControllerTest, SendsTheLawsTorquesWithTheVelocityOfHalfAStepBe
 }
 
 // (56) to (57): the rigid system under the torques does what the demand says.
-TEST_F(TrajectoryControllerTest, TheRigidSystemAnswersWithTheDemand) {
+TEST_F(TrajectoryControllerTest, TheRigidSystemFollowsTheDemand) {
   TrajectoryController controller = Make({.time_step = 1e-3});
   controller.Follow(*motion_);
   controller.Step(reading_, 0.5, &command_);
@@ -121,7 +121,7 @@ TEST_F(TrajectoryControllerTest, HoldsTorquesUntilTheNextAreDue) {
   EXPECT_EQ(count_solves(7), 3);
 }
 
-TEST_F(TrajectoryControllerTest, TellsWhatItKnewWhenTheLawFails) {
+TEST_F(TrajectoryControllerTest, ReportsWhatItKnewWhenTheLawFails) {
   TrajectoryController controller = Make({});
   controller.Follow(*motion_);
   controller.Step(reading_, 0.0, &command_);

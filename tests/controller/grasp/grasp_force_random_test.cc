@@ -32,7 +32,7 @@ void ExpectAdmissible(const GraspForceProblem& problem, const VectorXd& f_c) {
 
 class RandomGrasps : public ::testing::TestWithParam<int> {};
 
-TEST_P(RandomGrasps, EveryAnswerIsProved) {
+TEST_P(RandomGrasps, EveryResultIsProved) {
   std::mt19937_64 random(20);
   GraspForceOptions options;
   options.warm_start = false;

@@ -128,7 +128,7 @@ TEST_F(HandlingControllerTest, FingertipsThatTouchPushAsTheyShould) {
   }
 }
 
-TEST_F(HandlingControllerTest, BearsThePartOfTheWeightThatIsAskedFor) {
+TEST_F(HandlingControllerTest, BearsThePartOfTheWeightThatIsDemanded) {
   SetState(/*object_rests=*/true);
   demand_.grip = 1.0;
   for (const double weight : {0.0, 0.4, 1.3}) {

@@ -322,7 +322,7 @@ TEST(ParameterTexts, OfExcessiveSizeOrDepthAreRefused) {
             "robot.toml:1: missing key \"gravity\", \"base\", \"chain\"");
 }
 
-TEST(ParameterTexts, AllMissingKeysAreToldAtOnce) {
+TEST(ParameterTexts, AllMissingKeysAreReportedAtOnce) {
   std::string text = ShippedText();
   const auto change = [&](const std::string& from, const std::string& to) {
     ASSERT_NE(text.find(from), std::string::npos) << from;

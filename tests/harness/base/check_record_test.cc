@@ -126,7 +126,7 @@ TEST(CheckRecord, AnInfiniteBoundStillRefusesWhatIsNotANumber) {
   EXPECT_EQ(check.failed_at, 0.2);
 }
 
-TEST(CheckRecord, WhatDoesNotApplyIsNotAsked) {
+TEST(CheckRecord, WhatDoesNotApplyIsNotEvaluated) {
   CheckRecord check = MakeRecord(1.0);
   check.applies = false;
   check.Add(5.0, 0.1);

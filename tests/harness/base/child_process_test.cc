@@ -1,4 +1,4 @@
-// Work in another process: what it tells arrives, and however it ends, this process goes on and knows how.
+// Work in another process: what it reports arrives, and however it ends, this process goes on and knows how.
 
 #include "harness/base/child_process.h"
 
@@ -62,7 +62,7 @@ TEST(ChildProcess, RunsPrograms) {
   EXPECT_EQ(run({"sh", "-c", "exit 4"}).Describe(), "ended with exit code 4");
   EXPECT_EQ(run({"sh", "-c", "kill -9 $$"}).Describe(), "was killed by signal 9");
   EXPECT_EQ(run({"no_such_program_of_anybody"}).exit_code, kNotFoundExitCode);
-  // With all that it has started, and what is known of its end is told once.
+  // With all that it has started, and what is known of its end is reported once.
   {
     ChildProcess process("it", Program{.words = {"sh", "-c", "sleep 60 & wait"}, .output = ends[1]});
     EXPECT_FALSE(process.WaitFor(0.0).has_value());

@@ -96,7 +96,7 @@ TEST(ProcessPool, MessagesBelongToTheirJob) {
   EXPECT_THAT(RunAll(&pool, 2).at(1).failure, Not(HasSubstr("long ago")));
 }
 
-TEST(ProcessPool, TellsWhatWasKilledFromOutside) {
+TEST(ProcessPool, ReportsWhatWasKilledFromOutside) {
   for (const int signal : {SIGKILL, SIGTERM, SIGHUP, SIGABRT}) {
     ProcessPool pool("it", 1, 0.0, [&](const std::string& request) {
       std::signal(signal, SIG_DFL);

@@ -86,7 +86,7 @@ with open("answers.jsonl", "w") as file:
   Write("states/answers.jsonl", lines.substr(0, lines.size() / 2));
   EXPECT_TRUE(Refused(command, {"answers.jsonl"}));
   std::filesystem::remove(Path("states/answers.jsonl"));
-  EXPECT_TRUE(Refused(command, {"must have answers"}));
+  EXPECT_TRUE(Refused(command, {"must have results"}));
 }
 
 TEST_F(Answers, AuditExitsByWhatItFinds) {

@@ -109,7 +109,7 @@ TEST_F(CompareFiles, AJointThatFollowsAnotherIsADisagreementUnlessItIsIgnored) {
 }
 
 // Both ways to name two files, in both orders, are one.
-TEST_F(CompareFiles, OneWayLeadsToEachAnswer) {
+TEST_F(CompareFiles, OneWayLeadsToEachResult) {
   Expect(0, "import a.urdf --out a.toml");
   const std::vector<std::string> files = {"a.urdf", "b.xml", "a.toml"};
   for (const std::string& a : files) {

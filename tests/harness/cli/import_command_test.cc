@@ -37,7 +37,7 @@ TEST_F(TwoDescriptions, ReportWhatOneLacksAndWhatDiffers) {
 }
 
 // Published numbers are rounded: 1.5708 for pi / 2 is 3.7e-6 off.
-TEST_F(TwoDescriptions, AreJudgedByDigitsWhereThatIsAskedFor) {
+TEST_F(TwoDescriptions, AreJudgedByDigitsOnRequest) {
   std::string rounded = MakePandaUrdf();
   const std::string right_angle = "1.5707963267948966";
   for (size_t at = rounded.find(right_angle); at != std::string::npos; at = rounded.find(right_angle))
@@ -104,7 +104,7 @@ TEST_F(TwoDescriptions, ACopyForAnOlderEngineFindsItsFilesFromAnotherFolder) {
   }
 }
 
-// What is included is copied too, and told by its own file and line.
+// What is included is copied too, and named by its own file and line.
 TEST_F(TwoDescriptions, ACopyIsOfOnePiece) {
   const auto write = [&](const std::string& name, const std::string& text) {
     Write(name, "<mujoco>\n" + text + "</mujoco>");

@@ -102,7 +102,7 @@ INSTANTIATE_TEST_SUITE_P(
          2000},
         {"RunSettling", "run hold --set settle=100 --out run", SIGINT, "run/summary.json", "/speed/steps", 0,
          1000},
-        // It settles twice, the second time while it moves: as short before as the test can tell.
+        // It settles twice, the second time while it moves: as short before as the test can distinguish.
         {"RunMovingOff",
          "run paper --set settle=0.01 --set plant.time_step=1e-5 --set duration=1e-3 --out run", SIGINT,
          "run/summary.json", "/speed/steps", 0, 1000}}),

@@ -84,7 +84,7 @@ TEST_F(OwnController, AJointLawIsNoneForAGrasp) {
   EXPECT_TRUE(HasFailed(RunWith(JOINT_LAW_LIBRARY), "[joint_motion]"));
 }
 
-TEST_F(OwnController, AnUnknownLawIsNotAsked) {
+TEST_F(OwnController, AnUnknownLawIsNotChecked) {
   EXPECT_EQ(RunWith(PAPER_LAW_LIBRARY).exit_code, 0);
   const Json checks = ReadChecks();
   for (const char* check : {"law_torque", "law_demand", "grasp_null_space", "grasp_cone", "grasp_optimality",

@@ -87,7 +87,7 @@ TEST_F(PlanCommand, SaysWhyThereIsNoPlan) {
 }
 
 // The hand comes from above onto a table, and through one that is 10 cm higher.
-TEST_F(PlanCommand, TellsWhichBodiesMeet) {
+TEST_F(PlanCommand, ReportsWhichBodiesMeet) {
   std::filesystem::copy(SourcePath("/mjcf"), Path("mjcf"), std::filesystem::copy_options::recursive);
   const std::string scene = "mjcf/bench_scene.xml";
   const Words request = "0.3 -0.5 0.631 --support-height 0.62 --mjcf mjcf/bench_scene.xml";

@@ -1,4 +1,5 @@
-// What harness/quickstart.sh asks of dexcheck, with a build and a program that only say what they were told.
+// What harness/quickstart.sh requests of dexcheck, with a build and a program that only print their
+// arguments.
 
 #include <gtest/gtest.h>
 
@@ -19,7 +20,7 @@ class Quickstart : public ::testing::Test {
     WriteScript("build/release/bin/dexcheck", "#!/bin/sh\necho \"$@\"\n");
   }
 
-  /// What dexcheck is told.
+  /// The arguments of dexcheck.
   [[nodiscard]] std::string Run(const std::vector<std::string>& arguments) const {
     std::vector<std::string> command = {folder_.path() / "harness/quickstart.sh"};
     command.insert(command.end(), arguments.begin(), arguments.end());
@@ -41,7 +42,7 @@ class Quickstart : public ::testing::Test {
   testing::TempFolder folder_;
 };
 
-TEST_F(Quickstart, RunsThePapersExperimentUnlessToldOtherwise) {
+TEST_F(Quickstart, RunsThePapersExperimentByDefault) {
   EXPECT_EQ(Run({}), "run paper\n");
   EXPECT_EQ(Run({"--set", "duration=1"}), "run paper --set duration=1\n");
   EXPECT_EQ(Run({"--quiet", "--out", "folder", "--seed", "3"}), "run paper --quiet --out folder --seed 3\n");

@@ -39,7 +39,7 @@ TEST_F(RunCommand, SaysThatARunWithoutStepsHasNoVideo) {
   EXPECT_FALSE(Has("run/report.html"));
 }
 
-TEST_F(RunCommand, WritesAFolderThatTellsAll) {
+TEST_F(RunCommand, WritesAFolderThatHoldsAll) {
   Expect(0, "run curve --set duration=0.2 --out run --seed 3");
   const Json summary = ReadSummary();
   EXPECT_EQ(summary["scenario"], "curve");
@@ -111,7 +111,7 @@ void CopyLog(const std::filesystem::path& from, const std::filesystem::path& to,
   copy.Close();
 }
 
-TEST_F(RunCommand, WhatWasCutOffIsToldAndComparedByItsLength) {
+TEST_F(RunCommand, WhatWasCutOffIsReportedAndComparedByItsLength) {
   Expect(0, "run hold --set duration=0.02 --set settle=0.1 --no-report --out whole");
   for (const long lost : {5, 10}) {
     const std::string cut = "cut" + std::to_string(lost);
@@ -165,7 +165,7 @@ TEST_F(RunCommand, AReplayLeavesOutASignalThatWasReplaced) {
 }
 
 // The C library's mathematics without fused multiply-add has other last bits: another machine.
-TEST_F(RunCommand, AReplayTellsAnotherMachineFromAnotherRun) {
+TEST_F(RunCommand, AReplayDistinguishesAnotherMachineFromAnotherRun) {
   Expect(0, "run hold --set duration=0.05 --set settle=0.2 --no-report --out run");
   const std::string machine = ReadLog().ReadText("machine");
   EXPECT_EQ(ReadSummary()["machine"], machine);

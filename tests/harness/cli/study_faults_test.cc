@@ -34,7 +34,7 @@ TEST_F(StudyCommand, ATrialThatIsAlwaysKilledEndsNoStudyAndCanBeRetried) {
   EXPECT_EQ(rows[1].result.outcome, Outcome::kTracked);
   const std::string before = Dump(Path("a.sqlite"));
   EXPECT_EQ(RunDexcheck(RunArguments("a.sqlite")).exit_code, 0);
-  EXPECT_EQ(Dump(Path("a.sqlite")), before) << "not unless told";
+  EXPECT_EQ(Dump(Path("a.sqlite")), before) << "not unless requested";
   const ProgramResult retried = RunDexcheck(RunArguments("a.sqlite", {"--retry-failed"}));
   EXPECT_EQ(retried.exit_code, 0) << retried.err;
   rows = StudyStore::Open(Path("a.sqlite")).ReadRows();

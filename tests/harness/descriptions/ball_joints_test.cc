@@ -218,7 +218,7 @@ TEST(BallJoints, FaultsAreFound) {
     change(&spec);
     return testing::ListFailures(CompareWithEngine(RobotModel(spec), *engine));
   };
-  // The frame in whose axes the velocity is told, the point about which the link turns, damping, range.
+  // The frame in whose axes the velocity is written, the point about which the link turns, damping, range.
   const auto turn = [](RobotSpec* spec) {
     const Matrix3d R = Eigen::AngleAxisd(0.5, Vector3d::UnitZ()).toRotationMatrix();
     Pose X = Pose::Identity();
@@ -245,7 +245,7 @@ TEST(BallJoints, FaultsAreFound) {
 TEST(BallJoints, ALayoutHasFourPositionsAndThreeVelocities) {
   const RobotDescription robot = ReadMjcfDescription(*LoadMjcfText(kArm, "arm.xml"), "arm.xml");
   const nlohmann::json json = {{"joints", {"wrist", "reach", "elbow", "shoulder"}}};
-  const AnswerLayout layout(robot, json, "program");
+  const ProgramLayout layout(robot, json, "program");
   EXPECT_EQ(layout.num_positions(), 10);
   EXPECT_EQ(layout.size(), 8);
   VectorXd q(10), xi(8);
@@ -253,7 +253,7 @@ TEST(BallJoints, ALayoutHasFourPositionsAndThreeVelocities) {
   xi << 1, 2, 3, 4, 5, 6, 7, 8;
   EXPECT_THAT(layout.WritePositions(q), ElementsAre(7, 8, 9, 10, 6, 5, 1, 2, 3, 4));
   EXPECT_THAT(layout.WriteVelocities(q, xi), ElementsAre(6, 7, 8, 5, 4, 1, 2, 3));
-  AnsweredTerms terms;
+  TermResults terms;
   terms.gravity = layout.WriteVelocities(q, xi);
   layout.ReadTerms(q, xi, &terms);
   EXPECT_EQ(terms.gravity, xi);

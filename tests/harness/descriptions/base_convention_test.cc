@@ -68,7 +68,7 @@ TEST(BaseConvention, ForcesAreThoseOfTheMotion) {
   VectorXd q, xi;
   DrawState(robot, &q, &xi);
   AnalyticProvider model(robot.spec, "model");
-  const AnsweredTerms terms = EvaluateTerms(&model, q, xi);
+  const TermResults terms = EvaluateTerms(&model, q, xi);
   const VectorXd xi_dot = VectorXd::LinSpaced(xi.size(), -1.0, 2.0);
   const VectorXd force = terms.M * xi_dot + terms.bias;
   const auto move = [&](double h) {
@@ -86,9 +86,9 @@ TEST(BaseConvention, ForcesAreThoseOfTheMotion) {
     const VectorXd rate = (conversion.ConvertVelocities(move(kStep), xi + kStep * xi_dot) -
                            conversion.ConvertVelocities(move(-kStep), xi - kStep * xi_dot)) /
                           (2.0 * kStep);
-    AnsweredTerms other = terms;
+    TermResults other = terms;
     conversion.Apply(q, xi, &other);
-    AnsweredTerms of_force;
+    TermResults of_force;
     of_force.M = terms.M;
     of_force.gravity = force;  // led over as a force
     conversion.Apply(q, xi, &of_force);
@@ -112,10 +112,10 @@ TEST(BaseConvention, ForcesAreThoseOfTheMotion) {
 class Stubborn : public AnsweringProvider {
  public:
   Stubborn(const RobotDescription& robot, const BaseConvention& spoken)
-      : AnsweringProvider(AnswerLayout(robot)), model_(robot.spec, "model"), spoken_(spoken) {}
+      : AnsweringProvider(ProgramLayout(robot)), model_(robot.spec, "model"), spoken_(spoken) {}
   [[nodiscard]] const std::string& name() const override { return model_.name(); }
 
-  AnsweredTerms Evaluate(long, const VectorXd& q, const VectorXd& xi) override {
+  TermResults Evaluate(long, const VectorXd& q, const VectorXd& xi) override {
     // What reaches it are numbers as the convention that it is taken to speak has them.
     const VectorXd positions = layout().WritePositions(q);
     const VectorXd velocities = layout().WriteVelocities(q, xi);
@@ -133,7 +133,7 @@ class Stubborn : public AnsweringProvider {
     if (spoken_.angular_in_world) angular = R.transpose() * angular;
     VectorXd own_xi = velocities;
     own_xi.head<6>() << linear, angular;
-    AnsweredTerms terms = EvaluateTerms(&model_, own_q, own_xi);
+    TermResults terms = EvaluateTerms(&model_, own_q, own_xi);
     BaseConversion(spoken_).Apply(own_q, own_xi, &terms);
     layout().ReadTerms(q, xi, &terms);
     return terms;

@@ -186,7 +186,7 @@ TEST(ConstantComparison, RaisesNoFalseAlarm) {
 }
 
 // The larger ring agrees with what its scenario says of it, and not with the torus of the parameter file.
-TEST(ConstantComparison, TellsTheRingFromTheTorus) {
+TEST(ConstantComparison, DistinguishesTheRingFromTheTorus) {
   const Scenario scenario = testing::ReadShippedScenario("two-hands");
   const std::string robot = kParameters + "assistant_robot.toml";
   ExpectNoFindings(ParseRobotModel(ReadText(robot), robot, scenario.model_overrides), scenario.mjcf_file);

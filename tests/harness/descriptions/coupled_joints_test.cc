@@ -140,10 +140,10 @@ TEST(CoupledJoints, TablesAgreeWithTheMjcf) {
 class ReducedGripper : public AnsweringProvider {
  public:
   explicit ReducedGripper(const RobotDescription& robot)
-      : AnsweringProvider(AnswerLayout(robot, nlohmann::json{{"joints", {"wrist"}}}, "the program")),
+      : AnsweringProvider(ProgramLayout(robot, nlohmann::json{{"joints", {"wrist"}}}, "the program")),
         whole_(robot.spec, "gripper") {}
   [[nodiscard]] const std::string& name() const override { return whole_.name(); }
-  AnsweredTerms Evaluate(long, const VectorXd& q, const VectorXd& xi) override {
+  TermResults Evaluate(long, const VectorXd& q, const VectorXd& xi) override {
     const double wrist = layout().WritePositions(q)[0];
     const double rate = layout().WriteVelocities(q, xi)[0];
     constexpr double kStep = 1e-5;
@@ -152,7 +152,7 @@ class ReducedGripper : public AnsweringProvider {
     const double slope = (mass(wrist + kStep) - mass(wrist - kStep)) / (2.0 * kStep);
     const double weight =
         (*Whole(wrist + kStep, 0.0).potential - *Whole(wrist - kStep, 0.0).potential) / (2.0 * kStep);
-    AnsweredTerms terms;
+    TermResults terms;
     terms.M = MatrixXd::Constant(1, 1, m);
     terms.coriolis = VectorXd::Constant(1, 0.5 * slope * rate * rate);  // d/dt (m v) - dT/dq at constant v
     terms.gravity = VectorXd::Constant(1, weight);
@@ -160,7 +160,7 @@ class ReducedGripper : public AnsweringProvider {
   }
 
  private:
-  AnsweredTerms Whole(double wrist, double rate) {
+  TermResults Whole(double wrist, double rate) {
     return EvaluateTerms(&whole_, Vector3d(wrist, -2.0 * wrist - 0.3, 2.0 * wrist + 0.4),
                          Vector3d(rate, -2.0 * rate, 2.0 * rate));
   }

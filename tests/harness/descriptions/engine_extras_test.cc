@@ -117,7 +117,7 @@ INSTANTIATE_TEST_SUITE_P(
               "gravity=\"0 0 -9.81\" density=\"1.3\"/>", "fluid"}),
     [](const auto& info) { return info.param.name; });
 
-// A coefficient of a tendon's path, told apart although its stiffness is the same.
+// A coefficient of a tendon's path, distinguished although its stiffness is the same.
 TEST_F(TwoMjcfs, CompareTheWayOfATendon) {
   const std::string text = std::string("<tendon><fixed name='t' stiffness='300'>") +
                            "<joint joint='elbow' coef='1'/></fixed></tendon></mujoco>";

@@ -86,10 +86,10 @@ TEST_P(LeggedRobots, UrdfMjcfAndTableAgree) {
   EXPECT_EQ(CompareBoth(urdf, ReadMjcfDescription(*engine_, "robot.xml")), "");
   UrdfOptions floating;
   floating.floating = true;
-  RobotDescription told = ParseUrdf(urdf_, "robot.urdf", floating);
-  told.spec.gravity = Vector3d(0.0, 0.0, -9.81);
-  EXPECT_TRUE(told.states_base);
-  EXPECT_EQ(CompareBoth(ReadTable(WriteParameters(told, "robot.urdf")), told), "");
+  RobotDescription floats = ParseUrdf(urdf_, "robot.urdf", floating);
+  floats.spec.gravity = Vector3d(0.0, 0.0, -9.81);
+  EXPECT_TRUE(floats.states_base);
+  EXPECT_EQ(CompareBoth(ReadTable(WriteParameters(floats, "robot.urdf")), floats), "");
 }
 
 TEST_P(LeggedRobots, FaultsOfTheBaseAreFound) {

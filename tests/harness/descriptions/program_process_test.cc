@@ -35,7 +35,7 @@ TEST(ProgramProcess, LeavesNoDescriptorWhenItCannotStart) {
     ASSERT_EQ(::setrlimit(RLIMIT_NOFILE, &limit), 0);
     EXPECT_EQ(CountDescriptors(), before) << room;
   }
-  EXPECT_EQ(ProgramProcess("cat", 60.0).Ask("line"), "line");
+  EXPECT_EQ(ProgramProcess("cat", 60.0).Query("line"), "line");
   EXPECT_EQ(CountDescriptors(), before);
 }
 

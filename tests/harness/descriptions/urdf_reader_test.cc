@@ -281,7 +281,7 @@ TEST(Urdf, FollowsAFollowerToItsLeader) {
   EXPECT_DOUBLE_EQ(hand.spec.joints[3].coupling->offset, 1.2);
 }
 
-TEST(Urdf, LooksForMeshesWhenToldWhere) {
+TEST(Urdf, LooksForMeshesWhereAFolderIsNamed) {
   const testing::TempFolder folder;
   UrdfOptions options;
   options.packages.push_back(folder.path());

@@ -74,7 +74,7 @@ TEST(SolidDistance, IsThatOfTheWorkedCases) {
               kAccuracy);
 }
 
-TEST(SolidDistance, TellsHowDeepBodiesOverlap) {
+TEST(SolidDistance, ReportsHowDeepBodiesOverlap) {
   // Far from the middle of a wide thin top, where its nearest face is above.
   for (const double x : {0.0, 0.7, 1.2, 1.35}) {
     for (const double z : {0.025, 0.015, 0.002}) {
@@ -219,9 +219,9 @@ TEST_F(ClearanceTest, MissesNoOverlapAndMeasuresFew) {
       deepest = std::max(deepest, -distance);
     }
     overlapped += deepest > 0.0 ? 1 : 0;
-    const double told = clearance.FindDeepest().first;
-    EXPECT_NEAR(told, deepest, Clearance::kResolution + kAccuracy) << step;
-    if (deepest > kAccuracy) EXPECT_GT(told, 0.0) << step;
+    const double reported = clearance.FindDeepest().first;
+    EXPECT_NEAR(reported, deepest, Clearance::kResolution + kAccuracy) << step;
+    if (deepest > kAccuracy) EXPECT_GT(reported, 0.0) << step;
     for (int i = 0; i < kPairClassCount; ++i) {
       const double found = clearance.nearest(static_cast<PairClass>(i)).distance;
       EXPECT_LE(found, smallest[static_cast<size_t>(i)] + Clearance::kResolution) << step;

@@ -64,7 +64,7 @@ TEST(CylinderCollision, FindsTheNearestPointsOutsideAndIn) {
   for (const int count : {inside, side, end, rim}) EXPECT_GT(count, 100);
 }
 
-TEST(CylinderCollision, HasAnAnswerOnTheAxisAndAtTheRim) {
+TEST(CylinderCollision, HasAResultOnTheAxisAndAtTheRim) {
   for (const Vector3d& center :
        {Vector3d(0.0, 0.0, 0.0), Vector3d(0.0, 0.0, kHalfLength), Vector3d(kRadius, 0.0, kHalfLength)}) {
     const ExactContact contact = CollideSphereCylinder(center, kBall, kRadius, kHalfLength);

@@ -71,7 +71,7 @@ TEST_F(EnginePlantTest, MotorsGiveWhatIsSentToThem) {
 
 // Accelerations are those of the step: v(t + dt) = v(t) + dt a. V_Bo is in axes that turn meanwhile, and
 // contacts have just begun: what is left is of the order of dt, measured 4e-3.
-TEST_F(EnginePlantTest, AnswersWithTheAccelerationsOfTheStep) {
+TEST_F(EnginePlantTest, RespondsWithTheAccelerationsOfTheStep) {
   tau_.setConstant(0.05);
   Step();
   const PlantReading before = reading_;
@@ -109,7 +109,7 @@ TEST_F(EnginePlantTest, ReadsWithoutAllocation) {
   EXPECT_EQ(counter.count(), 0);
 }
 
-TEST_F(EnginePlantTest, TheControllerIsToldTheTruthUnlessAskedOtherwise) {
+TEST_F(EnginePlantTest, TheControllerMeasuresTheTrueStateUnlessDeclaredOtherwise) {
   Step();
   Reading measured;
   Sensing({}, setup_.MakePartContext()).Measure(reading_, &measured);

@@ -114,7 +114,7 @@ TEST_F(MotorDriveTest, StepsAndGainErrors) {
   EXPECT_EQ(output_.tau[kJoint + 1], 1.0);
 }
 
-TEST_F(MotorDriveTest, ASaturatingMotorGivesItsLimitAndTells) {
+TEST_F(MotorDriveTest, ASaturatingMotorDeliversItsLimitAndReportsIt) {
   MotorDrive drive = Make({.saturate = true});
   EXPECT_EQ(Give(drive, 50.0), kLimit);
   EXPECT_EQ(output_.effort, 50.0 / kLimit);

@@ -163,7 +163,7 @@ TEST_F(RigidPlantTest, ContactsStayClosedAndRoll) {
   }
 }
 
-TEST_F(RigidPlantTest, AnswersWithTheForcesThatBalanceTheObject) {
+TEST_F(RigidPlantTest, RespondsWithTheForcesThatBalanceTheObject) {
   const std::unique_ptr<RigidPlant> plant = MakePlant(1e-3);
   PlantReading reading;
   PlantResponse response;

@@ -1,4 +1,4 @@
-// What sensing tells against what its keys mean: variances, transfer functions, delays, innovations.
+// What sensing measures against what its keys mean: variances, transfer functions, delays, innovations.
 
 #include "harness/plant/sensing.h"
 
@@ -16,7 +16,7 @@ namespace {
 
 constexpr double kDt = 1e-3;
 
-/// One robot's sensing, told the same truth again and again or a moving one.
+/// One robot's sensing of the same true state again and again, or of a moving one.
 class SensingTest : public ::testing::Test {
  protected:
   SensingTest() : model_(ReadPaperRobot()) {
@@ -46,7 +46,7 @@ class SensingTest : public ::testing::Test {
   Reading measured_;
 };
 
-TEST_F(SensingTest, WithoutFaultsTheTruthIsTold) {
+TEST_F(SensingTest, WithoutFaultsTheTrueStateIsMeasured) {
   Sensing sensing = Make({});
   Measure(sensing);
   EXPECT_EQ(measured_.state.q, truth_.state.q);

@@ -172,7 +172,7 @@ TEST_F(ReplayBrowserTest, DrawsWhatTheOffscreenRendererDrawsAndCostsAPhoneLittle
   EXPECT_GT(std::abs(last - first), 50.0) << "the object moved in the picture";
 }
 
-TEST_F(ReplayBrowserTest, FractionsItsTimeWithThePlots) {
+TEST_F(ReplayBrowserTest, SharesItsTimeWithThePlots) {
   // A click on the failing check shows its moment, in the replay and in the plots.
   Ask("document.documentElement.style.scrollBehavior = 'auto'; "
       "document.getElementById('plots').scrollIntoView();");

@@ -19,7 +19,7 @@ inline constexpr double kReportStep = 1e-3;  // s
 struct ReportRun {
   long rows = 400;
   bool has_summary = true;
-  bool has_law = false;  ///< Whether it tells the forces that the law commands.
+  bool has_law = false;  ///< Whether it reports the forces that the law commands.
   std::string verdict = "disagreement";
   std::string scenario = "sample";
   std::string description = "made <by> hand & \"quoted\"";

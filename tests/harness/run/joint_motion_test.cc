@@ -101,7 +101,7 @@ TEST(JointMotionRun, AWrongTorqueIsTheLawsFault) {
   const std::unique_ptr<Runner> runner = RunParts(run.setup(), std::move(parts));
   const RunResult& result = runner->result();
   EXPECT_EQ(result.attribution.cause, Cause::kControlLaw) << result.attribution.evidence;
-  EXPECT_NE(result.attribution.evidence.find("panda_joint5 is up to 0.001 N m"), std::string::npos)
+  EXPECT_NE(result.attribution.evidence.find("law of panda_joint5: torque 0.001"), std::string::npos)
       << result.attribution.evidence;
 }
 

@@ -70,6 +70,35 @@ TEST(RunCampaign, FindsEveryWrongLawAndNamesThePart) {
   }
 }
 
+// Faults whose places, sizes and times are drawn: their causes are named, or a class is that this motion does
+// not tell apart, and no other cause is.
+TEST(RunCampaign, NamesFaultsThatAreDrawn) {
+  for (const int together : {1, 2}) {
+    for (const char* scenario : {"curve", "hold"}) {
+      RunMutationOptions options;
+      options.draws = 30;
+      options.together = together;
+      options.seed = 7;
+      RunCampaign campaign = MakeCampaign(options, scenario);
+      ASSERT_EQ(campaign.mutants().size(), 30);
+      int all = 0, named = 0, in_class = 0;
+      for (size_t i = 0; i < campaign.mutants().size(); ++i) {
+        EXPECT_TRUE(campaign.Run(i, kGoOn));
+        const RunMutant& mutant = campaign.mutants()[i];
+        EXPECT_EQ(mutant.score.wrong, 0) << mutant.name << ": " << mutant.causes;
+        if (!mutant.killed) continue;
+        all += static_cast<int>(mutant.truth.size());
+        named += mutant.score.right;
+        in_class += mutant.score.in_class;
+      }
+      SCOPED_TRACE(fmt::format("{}, {} at once: {} of {} named, {} in a class", scenario, together, named,
+                               all, in_class));
+      EXPECT_GE(named, 0.75 * all);
+      EXPECT_GE(named + in_class, 0.95 * all);
+    }
+  }
+}
+
 TEST(RunCampaign, FindsEveryWrongEquationAndNamesTheTerm) {
   RunMutationOptions options;
   options.from = 1.0;

@@ -62,7 +62,7 @@ TEST(ReadScenario, ReadsWhatIsNotIdeal) {
   EXPECT_TRUE(ReadShippedScenario("curve").imperfections.is_ideal());
 }
 
-TEST(Scenario, AllMissingKeysAreToldAtOnce) {
+TEST(Scenario, AllMissingKeysAreReportedAtOnce) {
   const auto problem = [](const std::string& text) {
     try {
       ParseScenario(text, "new.toml", "", {});
@@ -74,7 +74,7 @@ TEST(Scenario, AllMissingKeysAreToldAtOnce) {
   EXPECT_EQ(problem("description = \"mine\""),
             "new.toml:1: missing key \"name\", \"duration\", \"start\", \"grasp\", \"control\", "
             "\"trajectory\"");
-  // A value that is wrong as well is told when nothing is missing any more.
+  // A value that is wrong as well is reported when nothing is missing any more.
   EXPECT_EQ(problem("name = \"mine\"\nsettle = 1e9"), "new.toml:1: missing key \"duration\", \"start\"");
 }
 

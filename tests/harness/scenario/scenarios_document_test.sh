@@ -31,7 +31,7 @@ list_keys() {
 }
 
 # What the program says to these keys. The scene that is given last does not exist, and nothing after the scenario is
-# read: exit code 2 either way, and the message tells which it was.
+# read: exit code 2 either way, and the message says which it was.
 ask() {
   local base=$1
   shift
@@ -114,7 +114,7 @@ done
 
 for section in "${!sections[@]}"; do
   all_known_keys "${section%%|*}" "${section#*|}" >known
-  [[ -s known ]] || fail "the reader tells no keys of [${section%%|*}]"
+  [[ -s known ]] || fail "the reader lists no keys of [${section%%|*}]"
   sort -u <<<"${sections[$section]%$'\n'}" | diff - known >difference ||
     fail "[${section%%|*}] has other keys in $document (<) and in the reader (>):"$'\n'"$(cat difference)"
 done

@@ -68,7 +68,7 @@ StableRange CalcStableRange(const SampledLoop& loop, double K_p) {
 }
 
 TEST(SampledStability, TheRangeEndsWhereTheRadiusIsOne) {
-  constexpr double kStep = 1e-6;  // relative; far above rounding, so that both sides are told apart
+  constexpr double kStep = 1e-6;  // relative; far above rounding, so that both sides are distinguished
   for (const SampledLoop loop : {SampledLoop{1e-3, 1}, SampledLoop{5e-4, 1}, SampledLoop{1e-3, 10}}) {
     for (const double p : {0.1, 0.5, 1.0}) {
       const double K_p = p / (loop.period() * loop.period());
@@ -114,7 +114,7 @@ TEST(SampledStability, CriticalDampingIsFastest) {
 
 constexpr double kCutoff = 60.0;  // Hz, of the object's rate
 
-/// Torques three steps late and a filtered rate; half a step and two told late; motors that lag.
+/// Torques three steps late and a filtered rate; half a step and two measured late; motors that lag.
 std::vector<SampledLoop> MakeLateLoops() {
   const double low_pass = CalcLowPassGain(kCutoff, 1e-3);
   return {
@@ -266,7 +266,7 @@ TEST(SampledStability, TheRobotRespondsAsPredicted) {
   EXPECT_LT(MeasureDeparture({5e-4, 1}, {400, 40}, {5e-4, 1}), kAtEveryStep);
   EXPECT_LT(MeasureDeparture({1e-3, 4}, {400, 40}, {1e-3, 4}), kHeld);
   EXPECT_LT(MeasureDeparture({1e-3, 10}, {400, 40}, {1e-3, 10}), kHeld);
-  // Other samplings are told apart.
+  // Other samplings are distinguished.
   EXPECT_GT(MeasureDeparture({1e-3, 1}, {1e4, 50}, {1e-3, 2}), 100.0 * kAtEveryStep);
   EXPECT_GT(MeasureDeparture({1e-3, 10}, {400, 40}, {1e-3, 9}), 3.0 * kHeld);
 }
@@ -327,7 +327,7 @@ TEST(SampledStability, TheRobotIsDampedCriticallyWhereItIsPredicted) {
       EXPECT_NEAR(measured, predicted, one.tolerance) << one.K_p << ", " << fraction;
       if (fraction == 1.0) continue;
       EXPECT_EQ(measured > 0.0, fraction > 1.0) << measured;
-      EXPECT_GT(std::abs(predicted), 10.0 * one.tolerance) << "too near to tell";
+      EXPECT_GT(std::abs(predicted), 10.0 * one.tolerance) << "too near to distinguish";
     }
   }
 }

@@ -118,7 +118,7 @@ TEST(StudySummary, ATrialHasTheCommandThatRepeatsIt) {
   EXPECT_EQ(json["metrics"]["energy"], 0.1);
 }
 
-TEST(StudyAnswer, TellsTheSpreadOfWhatHasNoOrder) {
+TEST(StudyAnswer, ReportsTheSpreadOfWhatHasNoOrder) {
   const Study study = Parse(
       "seeds = [1, 2, 3, 4]\nmetrics = ['position_error_rms']\n"
       "[[vary]]\nkey = 'control.law'\nvalues = ['computed_torque', 'pd_gravity']\n");
@@ -140,7 +140,7 @@ TEST(StudyAnswer, TellsTheSpreadOfWhatHasNoOrder) {
 }
 
 // The best of a search that presses against its range, in the quantity's unit.
-TEST(StudyAnswer, TellsWhatIsWantedWithItsUnitAndItsEdge) {
+TEST(StudyAnswer, ReportsWhatIsWantedWithItsUnitAndItsEdge) {
   const Study study = Parse(
       "[[objective]]\nminimize = 'settling_time'\n[search]\nmethod = 'cma_es'\ncount = 24\npopulation = "
       "8\nseed = 1\n[[vary]]\nkey = 'control.K_p'\nfrom = 1\nto = 100\n[[vary]]\nkey = 'control.K_v'\nfrom = "

@@ -1,0 +1,397 @@
+#include "harness/diagnosis/cause_estimator.h"
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace dexcheck {
+namespace {
+
+using Eigen::Index;
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+// A column of which less is left beside the others says nothing of its own.
+constexpr double kIndependent = 1e-7;
+constexpr double kImplausible = 3.0;  // times the plausible size
+constexpr size_t kRestarts = 8;       // other first choices that are tried where the first led nowhere
+
+/// What of a candidate shows above the noise: amplitudes are basis * a.
+struct Visible {
+  MatrixXd columns;  // N x r
+  MatrixXd basis;    // p x r
+  VectorXd unit;     // p, of the amplitudes: diag(unit)^-1 basis is orthonormal
+};
+
+/// @param noise of the sum over all rows.
+Visible Reduce(const Candidate& candidate, double noise) {
+  const MatrixXd& C = candidate.columns;
+  const VectorXd scale = candidate.scale.size() > 0 ? candidate.scale : VectorXd(VectorXd::Ones(C.cols()));
+  const bool is_bounded = candidate.scale.size() > 0;
+  if (C.cols() == 1) {
+    const double size = C.norm();
+    if (!(size > 0.0) || (is_bounded && size * scale[0] < noise)) return {};
+    return {C, MatrixXd::Identity(1, 1), VectorXd::Ones(1)};
+  }
+  // Of C diag(scale) = U S V^T those with S above the noise.
+  const VectorXd size = C.colwise().norm().transpose();
+  const VectorXd unit =
+      is_bounded ? scale : VectorXd(size.unaryExpr([](double s) { return s > 0.0 ? 1.0 / s : 0.0; }));
+  const MatrixXd scaled = C * unit.asDiagonal();
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(scaled.transpose() * scaled);
+  const double largest = eigen.eigenvalues().tail<1>()[0];
+  const double least = std::max(is_bounded ? noise * noise : 0.0, kIndependent * kIndependent * largest);
+  Index visible = 0;
+  while (visible < C.cols() && eigen.eigenvalues()[C.cols() - 1 - visible] > least) ++visible;
+  Visible result;
+  result.basis = unit.asDiagonal() * eigen.eigenvectors().rightCols(visible);
+  result.columns = C * result.basis;
+  result.unit = unit;
+  return result;
+}
+
+/// The search for one residual.
+class Search {
+ public:
+  Search(const VectorXd& y, std::span<const Candidate> candidates, const CauseOptions& options)
+      : y_(y),
+        candidates_(candidates),
+        options_(options),
+        rows_(static_cast<double>(y.size())),
+        samples_(rows_ / options.alike) {
+    for (const Candidate& one : candidates)
+      visible_.push_back(Reduce(one, std::sqrt(options.floor * options.alike)));
+  }
+
+  CauseSelection Run() {
+    const double nothing = Score(y_.squaredNorm(), 0.0, 0);
+    std::vector<Best> firsts = {FindBest({})};
+    double criterion = nothing;
+    if (!IsNoise({}) && firsts.front().criterion < nothing) criterion = Grow(firsts.front());
+    // What was the best alone need not be part of the best set.
+    // Of many candidates that takes long.
+    constexpr size_t kFew = 100;
+    const bool may_be_fewer = chosen_.size() > 1 && candidates_.size() < kFew;
+    if (!chosen_.empty() && (may_be_fewer || !IsNoise(chosen_))) {
+      std::vector<size_t> best = chosen_;
+      for (const Best& first : FindFirsts(best)) {
+        const double other = Grow(first);
+        if (other < criterion) best = chosen_, criterion = other;
+      }
+      chosen_ = best;
+    }
+    return Finish(criterion);
+  }
+
+ private:
+  struct Best {
+    size_t candidate = SIZE_MAX;
+    double criterion = kInfinity;
+  };
+
+  /// Adds one after another. @returns the criterion.
+  double Grow(const Best& first) {
+    chosen_ = {first.candidate};
+    double criterion = first.criterion;
+    while (chosen_.size() < options_.most_terms && !IsNoise(chosen_)) {
+      const Best next = FindBest(chosen_);
+      if (!(next.criterion < criterion)) break;
+      chosen_.push_back(next.candidate);
+      criterion = Exchange(next.criterion);
+    }
+    return criterion;
+  }
+
+  /// The most likely first choices besides what was found: one at each place, and then more of them.
+  [[nodiscard]] std::vector<Best> FindFirsts(const std::vector<size_t>& found) const {
+    const std::vector<double> scores = ScoreAll({});
+    std::vector<Best> all;
+    for (size_t i = 0; i < scores.size(); ++i)
+      if (std::isfinite(scores[i]) && std::find(found.begin(), found.end(), i) == found.end())
+        all.push_back({i, scores[i]});
+    std::sort(all.begin(), all.end(), [](const Best& a, const Best& b) { return a.criterion < b.criterion; });
+    std::vector<std::string> places;
+    const auto is_new = [&](const Best& one) {
+      const std::string& place = candidates_[one.candidate].place;
+      if (std::find(places.begin(), places.end(), place) != places.end()) return false;
+      places.push_back(place);
+      return true;
+    };
+    const auto is_impossible = [&](const Best& one) { return !CanBe(one.candidate, {}); };
+    all.erase(std::remove_if(all.begin(), all.end(), is_impossible), all.end());
+    std::stable_partition(all.begin(), all.end(), is_new);
+    all.resize(std::min(all.size(), kRestarts));
+    return all;
+  }
+
+  [[nodiscard]] double Score(double squares, double parameters, size_t terms) const {
+    return samples_ * std::log(options_.floor + squares / rows_) + parameters * std::log(samples_) +
+           2.0 * static_cast<double>(terms) * std::log(static_cast<double>(candidates_.size()));
+  }
+
+  /// Whether what these leave over is no more than noise.
+  [[nodiscard]] bool IsNoise(const std::vector<size_t>& set) const {
+    const MatrixXd Q = CalcRange(set);
+    return (y_ - Q * (Q.transpose() * y_)).squaredNorm() <= options_.floor * rows_;
+  }
+
+  [[nodiscard]] double CountParameters(const std::vector<size_t>& set) const {
+    double count = 0.0;
+    for (const size_t i : set)
+      count += static_cast<double>(visible_[i].columns.cols() + candidates_[i].parameters);
+    return count;
+  }
+
+  /// Orthonormal columns of the range of what these candidates have.
+  [[nodiscard]] MatrixXd CalcRange(const std::vector<size_t>& set) const {
+    Index width = 0;
+    for (const size_t i : set) width += visible_[i].columns.cols();
+    MatrixXd Q(y_.size(), width);
+    Index used = 0;
+    for (const size_t i : set) {
+      const MatrixXd& C = visible_[i].columns;
+      for (Index k = 0; k < C.cols(); ++k) {
+        VectorXd column = C.col(k);
+        const double size = column.norm();
+        for (int twice = 0; twice < 2; ++twice)
+          column -= Q.leftCols(used) * (Q.leftCols(used).transpose() * column);
+        if (!(column.norm() > kIndependent * size)) continue;
+        Q.col(used++) = column.normalized();
+      }
+    }
+    return Q.leftCols(used);
+  }
+
+  /// Whether those have all of what it has.
+  [[nodiscard]] bool AddsNothing(size_t candidate, const std::vector<size_t>& beside) const {
+    const MatrixXd& C = visible_[candidate].columns;
+    const MatrixXd Q = CalcRange(beside);
+    const MatrixXd own = C - Q * (Q.transpose() * C);
+    return (own.colwise().norm().array() <= kIndependent * C.colwise().norm().array()).all();
+  }
+
+  /// The criterion of `beside` and each candidate; infinite where it adds nothing.
+  [[nodiscard]] std::vector<double> ScoreAll(const std::vector<size_t>& beside) const {
+    const MatrixXd Q = CalcRange(beside);
+    const VectorXd r = y_ - Q * (Q.transpose() * y_);
+    const double parameters = CountParameters(beside);
+    std::vector<double> scores(candidates_.size(), kInfinity);
+    for (size_t i = 0; i < candidates_.size(); ++i) {
+      const MatrixXd& C = visible_[i].columns;
+      if (C.cols() == 0 || std::find(beside.begin(), beside.end(), i) != beside.end()) continue;
+      const double explained = CalcExplained(C, Q, r);
+      if (!(explained > 0.0)) continue;
+      scores[i] = Score(std::max(0.0, r.squaredNorm() - explained), parameters + CountParameters({i}),
+                        beside.size() + 1);
+    }
+    return scores;
+  }
+
+  /// Square of r's projection on what C has beside Q.
+  static double CalcExplained(const MatrixXd& C, const MatrixXd& Q, const VectorXd& r) {
+    MatrixXd own = C - Q * (Q.transpose() * C);
+    double explained = 0.0;
+    for (Index k = 0; k < own.cols(); ++k) {
+      const double size = own.col(k).norm();
+      if (!(size > kIndependent * C.col(k).norm())) continue;
+      own.col(k) /= size;
+      const double along = own.col(k).dot(r);
+      explained += along * along;
+      for (Index j = k + 1; j < own.cols(); ++j) own.col(j) -= own.col(k).dot(own.col(j)) * own.col(k);
+    }
+    return explained;
+  }
+
+  /// Its amplitudes beside those; zero where they have all of it.
+  [[nodiscard]] VectorXd CalcAmplitude(size_t candidate, const std::vector<size_t>& beside) const {
+    const Visible& one = visible_[candidate];
+    const MatrixXd Q = CalcRange(beside);
+    const MatrixXd own = one.columns - Q * (Q.transpose() * one.columns);
+    Eigen::CompleteOrthogonalDecomposition<MatrixXd> decomposition;
+    decomposition.setThreshold(kIndependent);
+    return one.basis * decomposition.compute(own).solve(VectorXd(y_ - Q * (Q.transpose() * y_)));
+  }
+
+  /// Whether it and those can be, all at once; of those, the ones that add nothing to it are no longer
+  /// needed.
+  [[nodiscard]] bool CanBe(size_t candidate, const std::vector<size_t>& beside) const {
+    std::vector<size_t> set = beside;
+    set.push_back(candidate);
+    const auto is_free = [&](size_t i) {
+      return !candidates_[i].is_possible && candidates_[i].scale.size() == 0;
+    };
+    if (std::all_of(set.begin(), set.end(), is_free)) return true;
+    for (const size_t other : beside) {
+      std::vector<size_t> rest = set;
+      rest.erase(std::find(rest.begin(), rest.end(), other));
+      if (AddsNothing(other, rest)) set = rest;
+    }
+    const VectorXd a = Solve(Collect(set));
+    Index width = 0;
+    for (const size_t i : set) {
+      const Candidate& one = candidates_[i];
+      const Index r = visible_[i].columns.cols();
+      const VectorXd amplitude = visible_[i].basis * a.segment(width, r);
+      width += r;
+      if (one.scale.size() > 0 && (amplitude.array().abs() > kImplausible * one.scale.array()).any())
+        return false;
+      if (one.is_possible && !one.is_possible(amplitude)) return false;
+    }
+    return true;
+  }
+
+  [[nodiscard]] MatrixXd Collect(const std::vector<size_t>& set) const {
+    Index width = 0;
+    for (const size_t i : set) width += visible_[i].columns.cols();
+    MatrixXd C(y_.size(), width);
+    width = 0;
+    for (const size_t i : set) {
+      C.middleCols(width, visible_[i].columns.cols()) = visible_[i].columns;
+      width += visible_[i].columns.cols();
+    }
+    return C;
+  }
+
+  [[nodiscard]] VectorXd Solve(const MatrixXd& C) const {
+    const VectorXd size = C.colwise().norm().cwiseMax(std::numeric_limits<double>::min());
+    return (C * size.cwiseInverse().asDiagonal()).colPivHouseholderQr().solve(y_).cwiseQuotient(size);
+  }
+
+  [[nodiscard]] Best FindBest(const std::vector<size_t>& beside) const {
+    std::vector<double> scores = ScoreAll(beside);
+    for (;;) {
+      const auto best = std::min_element(scores.begin(), scores.end());
+      if (best == scores.end() || !std::isfinite(*best)) return {};
+      const auto candidate = static_cast<size_t>(best - scores.begin());
+      if (CanBe(candidate, beside)) return {candidate, *best};
+      *best = kInfinity;
+    }
+  }
+
+  [[nodiscard]] std::vector<size_t> Without(size_t place) const {
+    std::vector<size_t> others = chosen_;
+    others.erase(others.begin() + static_cast<std::ptrdiff_t>(place));
+    return others;
+  }
+
+  /// Exchanges and drops what others make worse than something else, or needless. @returns the criterion.
+  double Exchange(double criterion) {
+    for (bool improved = true; improved;) {
+      improved = false;
+      for (size_t place = 0; place < chosen_.size() && chosen_.size() > 1; ++place) {
+        const std::vector<size_t> others = Without(place);
+        const MatrixXd Q = CalcRange(others);
+        const double alone =
+            Score((y_ - Q * (Q.transpose() * y_)).squaredNorm(), CountParameters(others), others.size());
+        const Best best = FindBest(others);
+        if (IsNoise(others) || (alone <= criterion && alone <= best.criterion)) {
+          chosen_ = others;
+          criterion = alone;
+          improved = true;
+        } else if (best.criterion < criterion - kEqualLogOdds * 1e-3 && best.candidate != chosen_[place]) {
+          chosen_[place] = best.candidate;
+          criterion = best.criterion;
+          improved = true;
+        }
+      }
+    }
+    return criterion;
+  }
+
+  CauseSelection Finish(double criterion) {
+    CauseSelection result;
+    result.criterion = criterion;
+    result.residual = y_;
+    const double all = y_.squaredNorm();
+    if (!chosen_.empty()) {
+      const MatrixXd C = Collect(chosen_);
+      const Index width = C.cols();
+      const VectorXd size = C.colwise().norm().cwiseMax(std::numeric_limits<double>::min());
+      const MatrixXd scaled = C * size.cwiseInverse().asDiagonal();
+      const VectorXd a = Solve(C);
+      result.residual = y_ - C * a;
+      const double freedom = std::max(1.0, rows_ - static_cast<double>(width));
+      const double variance =
+          std::max(options_.floor, result.residual.squaredNorm() / freedom) * options_.alike;
+      const MatrixXd covariance =
+          size.cwiseInverse().asDiagonal() *
+          (scaled.transpose() * scaled).completeOrthogonalDecomposition().pseudoInverse() *
+          size.cwiseInverse().asDiagonal() * variance;
+      Index begin = 0;
+      for (size_t place = 0; place < chosen_.size(); ++place) {
+        const Visible& visible = visible_[chosen_[place]];
+        const Index r = visible.columns.cols();
+        CauseTerm term;
+        term.candidate = chosen_[place];
+        term.amplitude = visible.basis * a.segment(begin, r);
+        term.error = CalcErrors(visible, covariance.block(begin, begin, r, r));
+        Compare(place, criterion, all, &term);
+        begin += r;
+        result.terms.push_back(std::move(term));
+      }
+    }
+    std::sort(result.terms.begin(), result.terms.end(),
+              [](const CauseTerm& a, const CauseTerm& b) { return a.fraction > b.fraction; });
+    result.fraction = all > 0.0 ? 1.0 - result.residual.squaredNorm() / all : 1.0;
+    result.left = std::sqrt(result.residual.squaredNorm() / std::max(1.0, rows_));
+    return result;
+  }
+
+  /// Of the amplitudes, infinite for those that the visible ones do not tell.
+  static VectorXd CalcErrors(const Visible& visible, const MatrixXd& covariance) {
+    const MatrixXd& B = visible.basis;
+    VectorXd error = (B * covariance * B.transpose()).diagonal().cwiseMax(0.0).cwiseSqrt();
+    if (B.rows() == B.cols()) return error;
+    // The fraction of each amplitude, squared, that is a combination of those.
+    const VectorXd unit = visible.unit.cwiseMax(std::numeric_limits<double>::min());
+    const VectorXd known = (unit.cwiseInverse().asDiagonal() * B).rowwise().squaredNorm();
+    constexpr double kKnown = 0.99;
+    for (Index i = 0; i < B.rows(); ++i)
+      if (known[i] < kKnown) error[i] = kInfinity;
+    return error;
+  }
+
+  /// What would do in its place.
+  void Compare(size_t place, double criterion, double all, CauseTerm* term) const {
+    const std::vector<size_t> others = Without(place);
+    const MatrixXd Q = CalcRange(others);
+    const VectorXd r = y_ - Q * (Q.transpose() * y_);
+    term->fraction = all > 0.0 ? r.squaredNorm() / all : 0.0;
+    const std::vector<double> scores = ScoreAll(others);
+    double best = kInfinity;
+    for (size_t i = 0; i < scores.size(); ++i) {
+      if (i == term->candidate || !std::isfinite(scores[i])) continue;
+      // The criterion is twice the negative logarithm of the likelihood.
+      double odds = 0.5 * (scores[i] - criterion);
+      // One with more columns has simpler ones as a special case.
+      const double more = CountParameters({i}) - CountParameters({term->candidate});
+      if (more > 0.0 && candidates_[i].is_ordinary) odds -= 0.5 * more * std::log(samples_);
+      if (odds < kEqualLogOdds && more > 0.0 && !candidates_[i].is_ordinary) continue;
+      if ((odds >= kEqualLogOdds && odds >= best) || !CanBe(i, others)) continue;
+      if (odds < kEqualLogOdds) {
+        term->same.emplace_back(i, CalcAmplitude(i, others));
+      } else {
+        best = odds;
+        term->rival = i;
+        term->log_odds = odds;
+      }
+    }
+  }
+
+  const VectorXd& y_;
+  std::span<const Candidate> candidates_;
+  CauseOptions options_;
+  double rows_, samples_;
+  std::vector<Visible> visible_;  // of each candidate
+  std::vector<size_t> chosen_;
+};
+
+}  // namespace
+
+CauseSelection SelectCauses(const VectorXd& y, std::span<const Candidate> candidates,
+                            const CauseOptions& options) {
+  return Search(y, candidates, options).Run();
+}
+
+}  // namespace dexcheck

@@ -1,0 +1,79 @@
+#pragma once
+
+// Which of many possible faults explain a residual, several at once, and how sure that is.
+//
+// A residual y (N) is whitened, so that its noise is 1. Each candidate has columns C (N x p) that a fault of
+// amplitude 1 would leave in it. Sought is the set S of candidates that minimises
+//
+//   n log(floor + |y - C_S a|^2 / N) + p_S log n + 2 |S| log m
+//
+// (the extended Bayesian information criterion of n samples and m candidates, of which p_S amplitudes are
+// fitted)
+//
+// by orthogonal matching pursuit, in which every choice is looked at again after each that follows it, and
+// which ends where no more than noise is left.
+
+#include <functional>
+#include <limits>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "controller/common/types.h"
+
+namespace dexcheck {
+
+/// A fault at a place.
+struct Candidate {
+  std::string fault;     ///< "torque gain".
+  std::string place;     ///< "motor r_elbow".
+  std::string unit;      ///< Of the value; empty for a factor.
+  double nominal = 0.0;  ///< The value without the fault: the amplitude is added to it.
+  MatrixXd columns;      ///< N x p.
+  int parameters = 0;    ///< That were fitted beforehand, besides the amplitudes.
+  /// How large each amplitude may plausibly be (p); empty for any size. What less than that does not show
+  /// above the noise is not estimated.
+  VectorXd scale;
+  /// Whether an amplitude can be: no friction or mass is negative. Empty for all.
+  std::function<bool(const VectorXd&)> is_possible;
+  /// Whether it is as likely as a simpler one that explains no less: a spring that does not move is a torque.
+  bool is_ordinary = false;
+};
+
+/// A candidate that is part of the explanation.
+struct CauseTerm {
+  size_t candidate = 0;
+  VectorXd amplitude, error;  ///< p, with standard errors: infinite where nothing is known of it.
+  double fraction = 0.0;      ///< Of |y|^2 that is left over without it.
+  /// Candidates that would do as well in its place with no more columns, and their amplitudes there: not
+  /// isolable from it.
+  std::vector<std::pair<size_t, VectorXd>> same;
+  size_t rival = SIZE_MAX;  ///< The next best in its place; SIZE_MAX for none.
+  double log_odds = 0.0;    ///< Against the rival, natural logarithm.
+};
+
+struct CauseSelection {
+  std::vector<CauseTerm> terms;  ///< The one that explains most first.
+  double fraction = 0.0;         ///< Of |y|^2 that they explain.
+  double left = 0.0;             ///< Root mean square of what is left over, in units of noise.
+  double criterion = 0.0;
+  VectorXd residual;  ///< What is left over (N).
+};
+
+struct CauseOptions {
+  size_t most_terms = 6;
+  /// Mean square of what no explanation need explain: noise, and what the columns are off themselves.
+  double floor = 1.0;
+  /// Rows whose noise is one and the same: 1 where each has its own. N / alike are counted then.
+  double alike = 1.0;
+};
+
+/// Candidates whose likelihoods differ by less than this factor are told as equals, natural logarithm.
+inline constexpr double kEqualLogOdds = 5.0;
+
+/// See above. @param y (N). @param candidates each with N rows.
+CauseSelection SelectCauses(const VectorXd& y, std::span<const Candidate> candidates,
+                            const CauseOptions& options);
+
+}  // namespace dexcheck

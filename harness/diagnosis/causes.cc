@@ -1,0 +1,85 @@
+#include "harness/diagnosis/causes.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "controller/common/text.h"
+
+namespace dexcheck {
+namespace {
+
+constexpr size_t kMostTold = 4;
+
+std::string Unit(const std::string& unit) { return unit.empty() ? "" : " " + unit; }
+
+}  // namespace
+
+const char* NameOf(CauseChannel channel) {
+  switch (channel) {
+    case CauseChannel::kMeasurement:
+      return "measurement";
+    case CauseChannel::kActuation:
+      return "actuation";
+    case CauseChannel::kLaw:
+      return "law";
+    case CauseChannel::kRolling:
+      return "rolling";
+    case CauseChannel::kBalance:
+      return "balance";
+  }
+  return "";
+}
+
+std::string Fault::Tell() const {
+  return place + ": " + fault + " " + FormatNumber(value, 6) +
+         (error > 0.0 ? " +- " + FormatNumber(error, 2) : "") + Unit(unit) +
+         (detail.empty() ? "" : " " + detail);
+}
+
+void Explanation::SetOutcome() {
+  for (size_t i = 1; i < faults.size();) {
+    const bool again = std::any_of(faults.begin(), faults.begin() + static_cast<std::ptrdiff_t>(i),
+                                   [&](const Fault& one) { return one.IsLike(faults[i]); });
+    if (again) {
+      faults.erase(faults.begin() + static_cast<std::ptrdiff_t>(i));
+    } else {
+      ++i;
+    }
+  }
+  outcome = faults.size() > 1 ? CauseOutcome::kNamedClass : CauseOutcome::kNamed;
+}
+
+std::string Explanation::Tell() const {
+  std::string text;
+  if (outcome == CauseOutcome::kNotExplained) {
+    text = "not explained" + (faults.empty() ? std::string() : "; nearest: " + faults.front().Tell()) + " (" +
+           FormatNumber(100.0 * fraction, 3) + " %, " + FormatNumber(left, 3) + " times the noise is left)";
+  } else {
+    for (size_t i = 0; i < std::min(faults.size(), kMostTold); ++i)
+      text += (i == 0 ? "" : " or ") + faults[i].Tell();
+    if (faults.size() > kMostTold) text += " or " + std::to_string(faults.size() - kMostTold) + " more";
+    if (faults.size() > 1) text += ": not isolable from each other on this motion";
+  }
+  text += ends ? ", " + FormatNumber(from, 4) + " to " + FormatNumber(to, 4) + " s"
+               : ", from " + FormatNumber(from, 4) + " s";
+  if (rival.empty()) return text;
+  // Beyond this many digits a likelihood ratio says no more.
+  constexpr double kCertain = 20.0;
+  const double digits = std::min(log_odds / std::log(10.0), kCertain);
+  return text + "; rival: " + rival + ", 1e" + std::to_string(std::lround(digits)) + " times less likely";
+}
+
+bool Names(const Causes& causes, std::string_view fault) {
+  return std::any_of(causes.begin(), causes.end(), [&](const Explanation& one) {
+    return one.outcome != CauseOutcome::kNotExplained && one.faults.front().fault == fault;
+  });
+}
+
+std::string TellCauses(const Causes& causes, CauseChannel channel) {
+  std::string text;
+  for (const Explanation& one : causes)
+    if (one.channel == channel) text += (text.empty() ? "" : "; ") + one.Tell();
+  return text;
+}
+
+}  // namespace dexcheck

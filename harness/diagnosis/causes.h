@@ -1,0 +1,69 @@
+#pragma once
+
+// What a run's residuals are explained by.
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "harness/diagnosis/cause_estimator.h"
+
+namespace dexcheck {
+
+/// A fault with its size.
+struct Fault {
+  std::string fault;   ///< "torque gain".
+  std::string place;   ///< "motor r_elbow".
+  double value = 0.0;  ///< With the fault; of a vector its length.
+  double error = 0.0;  ///< Standard error.
+  std::string unit;    ///< Empty for a factor.
+  std::string detail;  ///< Its direction, or what else belongs to it; empty for nothing.
+
+  /// Whether it is the same kind at the same place.
+  [[nodiscard]] bool IsLike(const Fault& other) const { return fault == other.fault && place == other.place; }
+  /// "motor r_elbow: torque gain 0.99 +- 1e-12".
+  [[nodiscard]] std::string Tell() const;
+};
+
+/// Where residuals are compared: what one of them shows, the others do not.
+enum class CauseChannel { kMeasurement, kActuation, kLaw, kRolling, kBalance };
+/// "measurement", "actuation", "law", "rolling", "balance".
+const char* NameOf(CauseChannel channel);
+
+enum class CauseOutcome {
+  kNamed,         ///< One fault explains it, and no other one does.
+  kNamedClass,    ///< Several do, which this motion does not tell apart.
+  kNotExplained,  ///< None does.
+};
+
+/// One fault, or several that are not isolable from each other.
+struct Explanation {
+  CauseChannel channel = CauseChannel::kActuation;
+  CauseOutcome outcome = CauseOutcome::kNamed;
+  std::vector<Fault> faults;    ///< The most likely first; where nothing explains it, the nearest.
+  double from = 0.0, to = 0.0;  ///< When it was seen, s.
+  bool ends = false;            ///< Whether it was over before the run was.
+  double fraction = 0.0;        ///< Of its channel's residual there, squared.
+  double left = 0.0;            ///< What is left of that, in units of noise.
+  std::string rival;            ///< The nearest fault that explains it worse; empty for none.
+  double log_odds = 0.0;        ///< Against the rival, natural logarithm.
+
+  void SetRival(const Candidate& candidate, double odds) {
+    rival = candidate.place + ": " + candidate.fault;
+    log_odds = odds;
+  }
+  /// One fault is named once, and whether there are several.
+  void SetOutcome();
+  /// In a line.
+  [[nodiscard]] std::string Tell() const;
+};
+
+/// All of a run, those that explain most of each channel first.
+using Causes = std::vector<Explanation>;
+
+/// Whether the first fault of one of them is called so.
+bool Names(const Causes& causes, std::string_view fault);
+/// Of one channel, in words; empty for none.
+std::string TellCauses(const Causes& causes, CauseChannel channel);
+
+}  // namespace dexcheck

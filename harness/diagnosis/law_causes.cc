@@ -1,0 +1,160 @@
+#include "harness/diagnosis/law_causes.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "controller/dynamics/tree_factor.h"
+#include "harness/diagnosis/cause_estimator.h"
+
+namespace dexcheck {
+namespace {
+
+using Eigen::Index;
+
+// Summands agree with what a wrong law has of them to this fraction: it is computed from the same numbers.
+constexpr double kAccuracy = 1e-6;
+// What is left over may be this many times the noise and is explained all the same.
+constexpr double kLeft = 30.0;
+constexpr Index kMostSteps = 48;  // that are looked at
+constexpr double kZero = 1e-6;    // a factor nearer to zero than this is one of a part that is missing
+
+/// Entries of tau' that belong together.
+struct Place {
+  std::string name;
+  std::vector<Index> entries;
+};
+
+std::vector<Place> ListPlaces(const StepStore& store) {
+  const Setup& setup = store.setup();
+  const RobotModel& model = setup.model();
+  const int offset = model.num_base_velocities();
+  std::vector<Place> places = {{"law", {}}};
+  for (Index i = 0; i < model.num_velocities(); ++i) places.front().entries.push_back(i);
+  std::vector<bool> carries(static_cast<size_t>(model.num_joints()), false);
+  for (const int joint : setup.hold().arm_joints) carries[static_cast<size_t>(joint)] = true;
+  for (const int tip : setup.fingertips()) {
+    const Frame& frame = model.frames()[static_cast<size_t>(tip)];
+    Place finger{"law of the finger of " + frame.name, {}};
+    for (int joint = frame.link; joint >= 0; joint = model.joints()[static_cast<size_t>(joint)].parent)
+      if (!carries[static_cast<size_t>(joint)]) finger.entries.push_back(offset + model.dof(joint));
+    if (finger.entries.size() > 1) places.push_back(finger);
+  }
+  for (Index i = 0; i < model.num_velocities(); ++i)
+    places.push_back(
+        {"law of " + store.motors()[static_cast<size_t>(i)].place.substr(sizeof("motor ") - 1), {i}});
+  return places;
+}
+
+}  // namespace
+
+Causes ExplainLaw(const StepStore& store) {
+  Causes causes;
+  if (store.size() == 0 || store.law() == nullptr) return causes;
+  const auto noise = store.Get(StepStore::kLawNoise);
+  std::vector<Index> steps;
+  for (Index i = 0; i < store.size(); ++i)
+    if (noise(0, i) > 0.0) steps.push_back(i);
+  if (steps.empty()) return causes;
+  const auto count = static_cast<Index>(steps.size());
+  const Index used = std::min(count, kMostSteps);
+
+  const RobotModel& model = store.setup().model();
+  const Index n = model.num_velocities();
+  const ActuationMap actuation(model);
+  ModelTerms terms(model);
+  TreeFactor factor(model);
+  const std::vector<Place> places = ListPlaces(store);
+  const std::span<const LawPartName> names = store.law()->ListParts();
+  std::vector<Candidate> candidates;
+  for (const LawPartName& name : names)
+    for (const Place& place : places)
+      candidates.push_back({.fault = std::string(name.name) + " (" + name.symbol + "), factor",
+                            .place = place.name,
+                            .nominal = 1.0,
+                            .columns = MatrixXd::Zero(n * used, 1)});
+  // What a controller of another's may add.
+  for (Index i = 0; i < n; ++i) {
+    const std::string& place = places[places.size() - static_cast<size_t>(n - i)].name;
+    const std::string& unit = store.motors()[static_cast<size_t>(i)].unit;
+    for (const char* fault : {"torque", "viscous friction", "dry friction"}) {
+      candidates.push_back(
+          {.fault = fault, .place = place, .unit = unit, .columns = MatrixXd::Zero(n * used, 1)});
+      if (std::string_view(fault) != "torque")
+        candidates.back().is_possible = [](const VectorXd& a) { return a[0] >= 0.0; };
+    }
+  }
+  VectorXd y(n * used);
+  for (Index k = 0; k < used; ++k) {
+    const Index step = steps[static_cast<size_t>(used == 1 ? 0 : k * (count - 1) / (used - 1))];
+    const VectorXd reading = store.Get(StepStore::kReading).col(step);
+    terms.SetState(reading.head(model.num_positions()), reading.segment(model.num_positions(), n));
+    terms.CalcDynamics();
+    factor.Compute(terms.M());
+    const auto whiten = [&](VectorXd f) {
+      factor.SolveTransposed(f);
+      return VectorXd(f / noise(0, step));
+    };
+    y.segment(k * n, n) = whiten(store.Get(StepStore::kLawDifference).col(step));
+    const VectorXd flat = store.Get(StepStore::kLawParts).col(step);
+    const MatrixXd parts = flat.reshaped(n, store.law()->CountParts());
+    size_t candidate = 0;
+    for (const LawPartName& name : names) {
+      VectorXd sum = VectorXd::Zero(n);
+      for (Index i = 0; i < parts.cols(); ++i)
+        if ((name.parts >> i & 1U) != 0) sum += parts.col(i);
+      VectorXd tau(n);
+      actuation.CalcTorque(sum, tau);
+      for (const Place& place : places) {
+        VectorXd own = VectorXd::Zero(n);
+        for (const Index entry : place.entries) own[entry] = tau[entry];
+        actuation.CalcForce(own, own);
+        candidates[candidate++].columns.col(0).segment(k * n, n) = whiten(own);
+      }
+    }
+    for (Index i = 0; i < n; ++i) {
+      VectorXd own(n);
+      actuation.CalcForce(VectorXd::Unit(n, i), own);
+      own = whiten(own);
+      const double rate = terms.velocity()[i];
+      for (const double size : {1.0, -rate, rate > 0.0 ? -1.0 : rate < 0.0 ? 1.0 : 0.0})
+        candidates[candidate++].columns.col(0).segment(k * n, n) = size * own;
+    }
+  }
+  // Sums are told where no single summand does: a list's first of two equals is kept.
+  const double floor = 1.0 + kAccuracy * kAccuracy * y.squaredNorm() / static_cast<double>(y.size());
+  const CauseSelection selection = SelectCauses(y, candidates, {6, floor});
+  Explanation start;
+  start.channel = CauseChannel::kLaw;
+  start.from = store.Get(StepStore::kTime)(0, steps.front());
+  start.to = store.Get(StepStore::kTime)(0, steps.back());
+  start.ends = steps.back() + 2 < store.size();
+  start.left = selection.left;
+  start.fraction = selection.fraction;
+  const bool explained = selection.left <= kLeft * std::sqrt(floor);
+  const auto make = [&](size_t i, double amplitude, double error) {
+    const Candidate& one = candidates[i];
+    const double value = one.nominal + amplitude;
+    return Fault{one.fault, one.place, std::abs(value) < kZero ? 0.0 : value, error, one.unit, ""};
+  };
+  if (!explained) {
+    start.outcome = CauseOutcome::kNotExplained;
+    for (const CauseTerm& term : selection.terms) {
+      start.faults.push_back(make(term.candidate, term.amplitude[0], term.error[0]));
+      break;
+    }
+    causes.push_back(start);
+    return causes;
+  }
+  for (const CauseTerm& term : selection.terms) {
+    Explanation one = start;
+    if (selection.terms.size() > 1) one.fraction = term.fraction;
+    one.faults.push_back(make(term.candidate, term.amplitude[0], term.error[0]));
+    for (const auto& [same, amplitude] : term.same) one.faults.push_back(make(same, amplitude[0], 0.0));
+    one.SetOutcome();
+    if (term.rival != SIZE_MAX) one.SetRival(candidates[term.rival], term.log_odds);
+    causes.push_back(one);
+  }
+  return causes;
+}
+
+}  // namespace dexcheck

@@ -1,0 +1,87 @@
+#include "harness/diagnosis/rolling_causes.h"
+
+#include <algorithm>
+#include <tuple>
+
+#include "harness/checks/wheel_rolling.h"
+#include "harness/diagnosis/cause_estimator.h"
+
+namespace dexcheck {
+namespace {
+
+using Eigen::Index;
+
+// What is left may be this fraction of what there was: wheels that slip do so with the load.
+constexpr double kExplains = 0.99;
+
+}  // namespace
+
+Causes ExplainRolling(const StepStore& store) {
+  const Base& base = store.setup().model().base();
+  if (base.type != BaseType::kDifferentialDrive) return {};
+  const auto mismatch = store.Get(StepStore::kWheelMismatch);
+  const auto rates = store.Get(StepStore::kWheelRates);
+  const auto noise = store.Get(StepStore::kWheelNoise);
+  std::vector<Index> steps;
+  for (Index i = 0; i < store.size(); ++i)
+    if (noise(0, i) > 0.0 && noise(1, i) > 0.0) steps.push_back(i);
+  if (steps.empty()) return {};
+  const auto count = static_cast<Index>(steps.size());
+  VectorXd y(2 * count);
+  std::vector<Candidate> candidates;
+  for (const auto& [fault, place, nominal] : {std::tuple{"radius", "wheels", base.wheel_radius},
+                                              {"distance", "wheels", base.wheel_distance},
+                                              {"radius", base.wheel_joint_right.c_str(), base.wheel_radius},
+                                              {"radius", base.wheel_joint_left.c_str(), base.wheel_radius}}) {
+    const bool is_one = std::string_view(place) != "wheels";
+    candidates.push_back({.fault = fault,
+                          .place = is_one ? std::string("wheel ") + place : place,
+                          .unit = "m",
+                          .nominal = nominal,
+                          .columns = MatrixXd::Zero(2 * count, 1),
+                          .scale = VectorXd::Constant(1, nominal)});
+  }
+  for (Index k = 0; k < count; ++k) {
+    const Index step = steps[static_cast<size_t>(k)];
+    const double turn = CalcRollingTwist(base, store.Get(StepStore::kVelocity).col(step))[1];
+    for (const Index wheel : {0, 1}) {
+      const Index row = 2 * k + wheel;
+      const double unit = 1.0 / noise(wheel, step);
+      const double rate = rates(wheel, step) * unit;
+      y[row] = mismatch(wheel, step) * unit;
+      candidates[0].columns(row, 0) = rate;
+      candidates[1].columns(row, 0) = (wheel == 0 ? -0.5 : 0.5) * turn * unit;
+      candidates[static_cast<size_t>(2 + wheel)].columns(row, 0) = rate;
+    }
+  }
+  // Slip and sinking change with the load, in some steps.
+  constexpr double kAlike = 8.0;
+  const CauseSelection selection =
+      SelectCauses(y, candidates, {2, 1.0, std::min(kAlike, static_cast<double>(count))});
+  if (y.squaredNorm() <= static_cast<double>(y.size())) return {};
+  const auto name = [&](size_t i, const VectorXd& amplitude, double error) {
+    const Candidate& one = candidates[i];
+    return Fault{one.fault, one.place, one.nominal + amplitude[0], error, one.unit, ""};
+  };
+  Explanation start;
+  start.channel = CauseChannel::kRolling;
+  start.from = store.Get(StepStore::kTime)(0, steps.front());
+  start.to = store.Get(StepStore::kTime)(0, steps.back());
+  start.ends = steps.back() + 2 < store.size();
+  start.fraction = selection.fraction;
+  start.left = selection.left;
+  Causes causes;
+  for (const CauseTerm& term : selection.terms) {
+    Explanation one = start;
+    one.faults.push_back(name(term.candidate, term.amplitude, term.error[0]));
+    for (const auto& [same, amplitude] : term.same) one.faults.push_back(name(same, amplitude, 0.0));
+    one.SetOutcome();
+    if (!(selection.left <= 1.0 || selection.fraction >= kExplains))
+      one.outcome = CauseOutcome::kNotExplained;
+    if (term.rival != SIZE_MAX) one.SetRival(candidates[term.rival], term.log_odds);
+    causes.push_back(one);
+  }
+  return causes;
+}
+
+}  // namespace dexcheck

@@ -1,0 +1,32 @@
+#pragma once
+
+// How what arrived differs from what should have: torques that motors gave, readings that were measured.
+
+#include <string>
+#include <vector>
+
+#include "harness/diagnosis/causes.h"
+#include "harness/diagnosis/step_store.h"
+
+namespace dexcheck {
+
+/// One motor or one entry of a reading, step by step.
+struct SignalSeries {
+  SignalName name;
+  VectorXd time;                  ///< s
+  VectorXd expected, got;         ///< What it should be, and what it was.
+  VectorXd rate;                  ///< Of what it moves; empty for none.
+  std::vector<bool> has_history;  ///< Whether the steps before each are those before it here.
+  double noise = 0.0;             ///< Rounding of got - expected.
+};
+
+/// What explains got - expected: a transmission (none, a delay, a limit, a dead zone, steps, the signal of
+/// another one, a stuck value), with gain, offset, friction, drift or lag of its result, or noise.
+/// @param others series whose signal this one may have got; it is one of them itself.
+/// @returns one for each fault; none where nothing differs.
+Causes ExplainSignal(const SignalSeries& series, const std::vector<SignalSeries>& others);
+
+/// All motors, and all readings. Where several have the same, it is told once.
+Causes ExplainSignals(const StepStore& store);
+
+}  // namespace dexcheck

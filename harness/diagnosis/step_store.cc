@@ -1,0 +1,226 @@
+#include "harness/diagnosis/step_store.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "harness/checks/check_table.h"
+
+namespace dexcheck {
+namespace {
+
+/// What one fingertip's contact adds to a reading.
+constexpr const char* kContactEntries[][2] = {
+    {"contact u on the object", "rad"},    {"contact v on the object", "rad"},
+    {"contact u on the fingertip", "rad"}, {"contact v on the fingertip", "rad"},
+    {"contact angle psi", "rad"},          {"overlap", "m"}};
+constexpr Eigen::Index kContactSize = std::size(kContactEntries);
+constexpr Eigen::Index kObjectSize = 12, kTouchSize = 2;
+
+template <typename Range>
+Eigen::Index CountOf(const Range& range) {
+  return static_cast<Eigen::Index>(range.size());
+}
+
+}  // namespace
+
+StepStore::StepStore(const Setup& setup, const JudgedLaw* law, double rolling_bound)
+    : setup_(&setup), law_(law), rolling_bound_(rolling_bound), actuation_(setup.model()) {
+  NameReadings();
+  const RobotModel& model = setup.model();
+  const Eigen::Index n = model.num_velocities(), m = CountOf(readings_);
+  const Eigen::Index parts = law_ == nullptr ? 0 : law_->CountParts();
+  const Eigen::Index sizes[kSignalCount] = {
+      1, n, n, model.num_positions(), n, n, m, m, n, 6, 12, 12, n, 2, 2, 2, 2, n, 1, n * parts};
+  for (int i = 0; i < kSignalCount; ++i) offsets_[i + 1] = offsets_[i] + sizes[i];
+  before_.resize(offsets_[kSignalCount], kHistory);
+  data_.resize(offsets_[kSignalCount], kCapacity);  // its pages are used only when something differs
+  block_.resize(kCapacity);
+  row_.resize(offsets_[kSignalCount]);
+  force_.resize(n);
+}
+
+void StepStore::NameReadings() {
+  const RobotModel& model = setup_->model();
+  const Base& base = model.base();
+  const auto add = [&](const std::string& place, const std::string& what, const char* unit,
+                       const std::string& group) {
+    readings_.push_back({place, what, unit, group});
+  };
+  const std::string platform = "base " + base.link;
+  constexpr const char* kAxes[] = {"x", "y", "z"};
+  for (int i = 0; i < model.num_base_positions(); ++i) {
+    constexpr const char* kPlanar[] = {"x", "y", "heading"};
+    add(platform, model.num_base_positions() == 3 ? kPlanar[i] : "coordinate " + std::to_string(i),
+        i == 2 ? "rad" : "m", "base positions");
+  }
+  const bool turns = base.type == BaseType::kDifferentialDrive && base.velocity == DriveVelocity::kWheelRates;
+  for (size_t j = 0; j < model.joints().size(); ++j) {
+    const Joint& joint = model.joints()[j];
+    const int count = joint.type == JointType::kBall ? 4 : 1;
+    for (int k = 0; k < count; ++k)
+      add("joint " + joint.name, count == 1 ? "position" : "quaternion " + std::to_string(k),
+          joint.type == JointType::kPrismatic ? "m"
+          : count == 1                        ? "rad"
+                                              : "",
+          "joint positions");
+  }
+  for (int i = 0; i < model.num_base_velocities(); ++i) {
+    add(platform,
+        turns ? (i == 0 ? "rate of " + base.wheel_joint_right : "rate of " + base.wheel_joint_left)
+              : "velocity " + std::to_string(i),
+        turns || i > 0 ? "rad/s" : "m/s", "base velocities");
+  }
+  for (int k = 0; k < model.num_dofs(); ++k) {
+    const bool slides =
+        model.joints()[static_cast<size_t>(model.joint_of_dof(k))].type == JointType::kPrismatic;
+    add("joint " + model.dof_name(k), "rate", slides ? "m/s" : "rad/s", "joint rates");
+  }
+  const std::string object = "object " + (setup_->has_object() ? setup_->object().name : std::string());
+  for (const char* axis : kAxes) add(object, std::string("position ") + axis, "m", "object position");
+  for (const char* axis : kAxes) add(object, std::string("orientation ") + axis, "rad", "object orientation");
+  for (const char* axis : kAxes) add(object, std::string("velocity ") + axis, "m/s", "object velocity");
+  for (const char* axis : kAxes)
+    add(object, std::string("angular velocity ") + axis, "rad/s", "object velocity");
+  for (const int tip : setup_->fingertips()) {
+    for (const auto& [what, unit] : kContactEntries)
+      add("fingertip " + model.frames()[static_cast<size_t>(tip)].name, what, unit, what);
+  }
+  add("hand", "support force", "N", "support force");
+  add("hand", "set of touching fingertips", "", "touch");
+
+  for (int i = 0; i < model.num_base_velocities(); ++i) {
+    const bool wheels = base.type == BaseType::kDifferentialDrive;
+    motors_.push_back(
+        {"motor " + (wheels ? (i == 0 ? base.wheel_joint_right : base.wheel_joint_left) : base.link),
+         "torque", "N m", "motors"});
+  }
+  for (int k = 0; k < model.num_dofs(); ++k) {
+    const bool slides =
+        model.joints()[static_cast<size_t>(model.joint_of_dof(k))].type == JointType::kPrismatic;
+    motors_.push_back({"motor " + model.dof_name(k), "torque", slides ? "N" : "N m", "motors"});
+  }
+}
+
+void StepStore::Reset() { seen_ = size_ = added_ = 0, stride_ = 1, has_begun_ = false; }
+
+void StepStore::PackReading(const Reading& reading, const Reading& declared,
+                            Eigen::Ref<VectorXd> entries) const {
+  const MeasuredState& state = reading.state;
+  const Eigen::Index p = state.q.size(), n = state.xi.size();
+  entries.setZero();
+  entries.head(p) = state.q;
+  entries.segment(p, n) = state.xi;
+  // Of the orientation, the rotation from the declared one: log(R_declared^T R).
+  const Matrix3d R = declared.state.X_Bo.linear().transpose() * state.X_Bo.linear();
+  entries.segment<kObjectSize>(p + n) << state.X_Bo.translation(), 0.5 * (R(2, 1) - R(1, 2)),
+      0.5 * (R(0, 2) - R(2, 0)), 0.5 * (R(1, 0) - R(0, 1)), state.V_Bo;
+  Eigen::Index row = p + n + kObjectSize;
+  for (size_t i = 0; i < setup_->fingertips().size(); ++i, row += kContactSize) {
+    if (i >= state.kappa.size() || i >= state.overlap.size()) continue;
+    const ContactCoordinates& kappa = state.kappa[i];
+    entries.segment<kContactSize>(row) << kappa.alpha_o.u, kappa.alpha_o.v, kappa.alpha_f.u, kappa.alpha_f.v,
+        kappa.psi, state.overlap[i];
+  }
+  entries.segment<kTouchSize>(row) << reading.touch.support_force,
+      static_cast<double>(reading.touch.fingertips);
+}
+
+void StepStore::Pack(const StepRecord& step, const StepAnalysis& now, bool answered,
+                     Eigen::Ref<VectorXd> row) {
+  const auto at = [&](Signal signal) {
+    return row.segment(offsets_[signal], offsets_[signal + 1] - offsets_[signal]);
+  };
+  const DeclaredStep& declared = *now.declared;
+  const PlantResponse& response = step.response;
+  at(kTime)[0] = step.time;
+  at(kTauDeclared) = declared.tau;
+  if (answered) {
+    at(kTauReceived) = response.motor_torques;
+    at(kAcceleration) = response.xi_dot;
+  } else {
+    at(kTauReceived) = declared.tau;
+    at(kAcceleration).setZero();
+  }
+  at(kPosition) = step.reading.state.q;
+  at(kVelocity) = step.reading.state.xi;
+  PackReading(declared.measured, declared.measured, at(kDeclaredReading));
+  PackReading(step.measured, declared.measured, at(kReading));
+  at(kRobotResidual).setZero();
+  at(kNoise).setZero();
+  at(kDryFriction).setZero();
+  if (answered && now.mass_factor != nullptr) {
+    // What motors did not give is theirs, and no force of its own.
+    force_ = step.drive.tau - response.motor_torques;
+    actuation_.CalcForce(force_, force_);
+    at(kRobotResidual) = now.robot_residual + force_;
+    if (response.dry_friction.size() == at(kDryFriction).size()) {
+      at(kDryFriction) = response.dry_friction;
+      for (int k = 0; k < setup_->model().num_dofs(); ++k) {
+        const double declared =
+            setup_->model().joints()[static_cast<size_t>(setup_->model().joint_of_dof(k))].dry_friction;
+        double& force = at(kDryFriction)[setup_->model().num_base_velocities() + k];
+        force -= std::clamp(force, -declared, declared);
+      }
+    }
+    // As the bounds of the inverse dynamics have it, an entry.
+    at(kNoise) << (1e-6 * now.balanced + now.uneven_force) / std::sqrt(static_cast<double>(force_.size())),
+        1e-9 * std::max(now.findings.f_c.norm(), 1e-3) / std::sqrt(6.0);
+  }
+  at(kObjectResidual) = answered ? now.object_residual : Vector6d(Vector6d::Zero());
+  const Pose& X_Bo = step.reading.state.X_Bo;
+  at(kObjectPose).head<9>() = X_Bo.linear().reshaped();
+  at(kObjectPose).tail<3>() = X_Bo.translation();
+  at(kObjectMotion) << step.reading.state.V_Bo, response.V_Bo_dot;
+  at(kWheelRates) = now.wheel_rates;
+  at(kWheelMismatch) = now.wheel_mismatch;
+  at(kWheelNoise).setZero();
+  if (answered && response.wheels.size() == 2)
+    at(kWheelNoise) = now.wheel_slip.array() + now.sinking + rolling_bound_;
+  at(kLawNoise)[0] = 0.0;
+  if (now.law == nullptr || law_ == nullptr || !law_->differs()) return;
+  at(kLawNoise)[0] = kLawTorqueBound * law_->noise_scale();
+  at(kLawDifference) = law_->difference();
+  at(kLawParts) = law_->parts().reshaped();
+}
+
+void StepStore::Add(const StepRecord& step, const StepAnalysis& analysis, bool differs, bool answered) {
+  last_time_ = step.time;
+  if (!has_begun_ && !differs) {
+    Pack(step, analysis, answered, before_.col(seen_++ % kHistory));
+    return;
+  }
+  if (!has_begun_) {
+    has_begun_ = true;
+    for (Eigen::Index i = std::max<Eigen::Index>(0, seen_ - kHistory); i < seen_; ++i)
+      Keep(added_++ / kBlock, before_.col(i % kHistory));
+  }
+  const Eigen::Index block = added_++ / kBlock;
+  if (block % stride_ != 0) return;
+  Pack(step, analysis, answered, row_);
+  Keep(block, row_);
+}
+
+void StepStore::Keep(Eigen::Index block, const Eigen::Ref<const VectorXd>& row) {
+  if (size_ == kCapacity) {
+    stride_ *= 2;
+    Eigen::Index kept = 0;
+    for (Eigen::Index i = 0; i < size_; ++i) {
+      if (block_[static_cast<size_t>(i)] % stride_ != 0) continue;
+      if (kept != i) data_.col(kept) = data_.col(i);
+      block_[static_cast<size_t>(kept++)] = block_[static_cast<size_t>(i)];
+    }
+    size_ = kept;
+    if (block % stride_ != 0) return;
+  }
+  block_[static_cast<size_t>(size_)] = block;
+  data_.col(size_++) = row;
+}
+
+bool StepStore::HasHistory(Eigen::Index step) const {
+  if (step < kHistory) return false;
+  const Eigen::Index first = step - kHistory;
+  return block_[static_cast<size_t>(step)] - block_[static_cast<size_t>(first)] <= 1 &&
+         (stride_ == 1 || block_[static_cast<size_t>(step)] == block_[static_cast<size_t>(first)]);
+}
+
+}  // namespace dexcheck

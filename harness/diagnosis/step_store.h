@@ -1,0 +1,104 @@
+#pragma once
+
+// The signals of the steps that are to be explained, from a little before the first that differs.
+
+#include <string>
+#include <vector>
+
+#include "controller/control/actuation.h"
+#include "harness/checks/judged_law.h"
+#include "harness/checks/step_analysis.h"
+#include "harness/scenario/setup.h"
+
+namespace dexcheck {
+
+/// Entry of a reading, or a motor.
+struct SignalName {
+  std::string place;  ///< "joint r_elbow".
+  std::string what;   ///< "position".
+  std::string unit;
+  std::string group;  ///< What a fault may have in common: "joint positions".
+};
+
+/// Nothing allocates after construction. As long as there is room every step is kept, and then every second
+/// block of kBlock consecutive steps, every fourth, ...
+class StepStore {
+ public:
+  /// Steps that a block has at the most, and of those the first whose predecessors may be missing.
+  static constexpr Eigen::Index kBlock = 64, kHistory = 16;
+
+  /// Signals of a step, and their sizes: n of xi, m of a reading.
+  enum Signal {
+    kTime,
+    kTauDeclared,      ///< n, N m: what the declared motors make of the command.
+    kTauReceived,      ///< n, N m
+    kPosition,         ///< q', as it is.
+    kVelocity,         ///< n, xi likewise.
+    kAcceleration,     ///< n
+    kDeclaredReading,  ///< m, what the declared sensing makes of the truth.
+    kReading,          ///< m, what was measured.
+    kRobotResidual,    ///< n, of (48) with the torques that were received.
+    kObjectResidual,   ///< 6, of (19).
+    kObjectPose,       ///< 12: rotation by columns, position.
+    kObjectMotion,     ///< 12: V_Bo and V_Bo_dot.
+    kDryFriction,      ///< n: what the plant says of it, beyond the declared; 0 where it says nothing.
+    kNoise,            ///< 2: of the robot's residual, in |.|_M^-1, and of the object's, N.
+    kWheelRates,       ///< 2, right and left, rad/s.
+    kWheelMismatch,    ///< 2, CalcRollingMismatch, m/s.
+    kWheelNoise,       ///< 2: what of that slipping and sinking may be, m/s; 0 without wheels.
+    kLawDifference,    ///< n, E_bar' (tau' - tau'_printed).
+    kLawNoise,         ///< Of that, in |.|_M^-1; 0 where the law is right or not known.
+    kLawParts,         ///< n times their number: the summands, where the law differs.
+    kSignalCount
+  };
+
+  /// @param law of MakeJudgedLaw; null where none is known. @param rolling_bound of the check `rolling`, m/s.
+  StepStore(const Setup& setup, const JudgedLaw* law, double rolling_bound);
+
+  /// @param differs whether a check fails at this step. @param answered whether the plant was driven: not
+  /// where a motor refuses.
+  void Add(const StepRecord& step, const StepAnalysis& analysis, bool differs, bool answered = true);
+  /// Time begins anew.
+  void Reset();
+
+  /// Number of steps that are kept; 0 where nothing differed.
+  [[nodiscard]] Eigen::Index size() const { return size_; }
+  /// Entries (rows) by steps (columns).
+  [[nodiscard]] auto Get(Signal signal) const {
+    return data_.block(offsets_[signal], 0, offsets_[signal + 1] - offsets_[signal], size_);
+  }
+  /// Whether the step's predecessors are those before it in the store.
+  [[nodiscard]] bool HasHistory(Eigen::Index step) const;
+  /// Time of the last step that was added, s.
+  [[nodiscard]] double last_time() const { return last_time_; }
+  [[nodiscard]] const Setup& setup() const { return *setup_; }
+  [[nodiscard]] const JudgedLaw* law() const { return law_; }
+  [[nodiscard]] const std::vector<SignalName>& readings() const { return readings_; }
+  [[nodiscard]] const std::vector<SignalName>& motors() const { return motors_; }
+
+ private:
+  static constexpr Eigen::Index kCapacity = 16 * kBlock;
+
+  void NameReadings();
+  void PackReading(const Reading& reading, const Reading& declared, Eigen::Ref<VectorXd> entries) const;
+  void Pack(const StepRecord& step, const StepAnalysis& analysis, bool answered, Eigen::Ref<VectorXd> row);
+  void Keep(Eigen::Index block, const Eigen::Ref<const VectorXd>& row);
+
+  const Setup* setup_;
+  const JudgedLaw* law_;
+  double rolling_bound_;
+  ActuationMap actuation_;
+  std::vector<SignalName> readings_, motors_;
+  Eigen::Index offsets_[kSignalCount + 1] = {};
+  MatrixXd before_;  // ring of the last steps, before anything differed
+  MatrixXd data_;
+  std::vector<Eigen::Index> block_;  // of each step that is kept
+  VectorXd row_, force_;
+  Eigen::Index seen_ = 0;  // steps in the ring
+  Eigen::Index size_ = 0, added_ = 0;
+  Eigen::Index stride_ = 1;  // of blocks that are kept
+  bool has_begun_ = false;
+  double last_time_ = 0.0;
+};
+
+}  // namespace dexcheck

@@ -1,0 +1,205 @@
+// How causes are worded, and how what is named compares with what was wrong.
+
+#include "harness/diagnosis/causes.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <limits>
+
+#include "harness/diagnosis/drawn_faults.h"
+#include "tests/common/matchers.h"
+
+namespace dexcheck::testing::causes_test {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+Fault MakeGain(double value = 0.99, double error = 0.001) {
+  return {"gain", "motor r_elbow", value, error, "", ""};
+}
+
+Fault MakeOffset(double value = -0.05, double error = 0.0) {
+  return {"offset", "motor r_elbow", value, error, "N m", ""};
+}
+
+Explanation MakeExplanation(std::vector<Fault> faults) {
+  Explanation one;
+  one.faults = std::move(faults);
+  one.from = 0.25;
+  one.to = 1.5;
+  one.SetOutcome();
+  return one;
+}
+
+Explanation MakeNotExplained(std::vector<Fault> nearest) {
+  Explanation one = MakeExplanation(std::move(nearest));
+  one.outcome = CauseOutcome::kNotExplained;
+  one.fraction = 0.5;
+  one.left = 40.0;
+  return one;
+}
+
+TEST(FaultTest, IsToldWithErrorUnitAndDetail) {
+  EXPECT_EQ(MakeGain().Tell(), "motor r_elbow: gain 0.99 +- 0.001");
+  EXPECT_EQ(MakeOffset().Tell(), "motor r_elbow: offset -0.05 N m");
+  Fault ripple = {"ripple", "motor r_elbow", 0.061234567, 0.00123456, "N m", "at 41.3 Hz"};
+  EXPECT_EQ(ripple.Tell(), "motor r_elbow: ripple 0.0612346 +- 0.0012 N m at 41.3 Hz");
+}
+
+TEST(FaultTest, KindAndPlaceMakeItLike) {
+  EXPECT_TRUE(MakeGain(0.9).IsLike(MakeGain(1.1)));
+  EXPECT_FALSE(MakeGain().IsLike(MakeOffset()));
+  Fault other = MakeGain();
+  other.place = "motor l_elbow";
+  EXPECT_FALSE(MakeGain().IsLike(other));
+}
+
+TEST(ExplanationTest, OneNameIsNamedAndSeveralAreAClass) {
+  EXPECT_EQ(MakeExplanation({MakeGain()}).outcome, CauseOutcome::kNamed);
+  const Explanation two = MakeExplanation({MakeGain(), MakeOffset()});
+  EXPECT_EQ(two.outcome, CauseOutcome::kNamedClass);
+  EXPECT_EQ(two.faults.size(), 2u);
+}
+
+TEST(ExplanationTest, SameKindAndPlaceIsOneName) {
+  const Explanation one = MakeExplanation({MakeGain(0.99), MakeGain(0.98), MakeGain(0.97)});
+  EXPECT_EQ(one.outcome, CauseOutcome::kNamed);
+  ASSERT_EQ(one.faults.size(), 1u);
+  EXPECT_EQ(one.faults.front().value, 0.99);  // the most likely
+  const Explanation two = MakeExplanation({MakeGain(0.99), MakeOffset(), MakeGain(0.98), MakeOffset(0.1)});
+  EXPECT_EQ(two.outcome, CauseOutcome::kNamedClass);
+  ASSERT_EQ(two.faults.size(), 2u);
+  EXPECT_TRUE(two.faults[0].IsLike(MakeGain()));
+  EXPECT_TRUE(two.faults[1].IsLike(MakeOffset()));
+  EXPECT_EQ(two.faults[1].value, MakeOffset().value);
+}
+
+TEST(ExplanationTest, IsToldInALine) {
+  Explanation one = MakeExplanation({MakeGain()});
+  EXPECT_EQ(one.Tell(), "motor r_elbow: gain 0.99 +- 0.001, from 0.25 s");
+  one.ends = true;
+  EXPECT_EQ(one.Tell(), "motor r_elbow: gain 0.99 +- 0.001, 0.25 to 1.5 s");
+  one.rival = "delay";
+  one.log_odds = 16.118;  // log(1e7)
+  EXPECT_EQ(one.Tell(),
+            "motor r_elbow: gain 0.99 +- 0.001, 0.25 to 1.5 s; rival: delay, 1e7 times less likely");
+  one.log_odds = 1e6;
+  EXPECT_THAT(one.Tell(), EndsWith("1e20 times less likely"));
+}
+
+TEST(ExplanationTest, ClassIsToldByItsFirstFour) {
+  std::vector<Fault> faults = {MakeGain(), MakeOffset()};
+  EXPECT_EQ(
+      MakeExplanation(faults).Tell(),
+      "motor r_elbow: gain 0.99 +- 0.001 or motor r_elbow: offset -0.05 N m: not isolable from each other on "
+      "this motion, from 0.25 s");
+  for (const char* name : {"drift", "lag", "delay", "limit"})
+    faults.push_back({name, "motor r_elbow", 1.0, 0.0, "", ""});
+  const std::string text = MakeExplanation(faults).Tell();
+  EXPECT_THAT(text, HasSubstr("lag 1 or 2 more: not isolable"));
+  EXPECT_THAT(text, Not(HasSubstr("delay")));
+}
+
+TEST(ExplanationTest, NotExplainedIsToldWithTheNearest) {
+  EXPECT_EQ(MakeNotExplained({MakeOffset()}).Tell(),
+            "not explained; nearest: motor r_elbow: offset -0.05 N m (50 %, 40 times the noise is left), "
+            "from 0.25 s");
+  EXPECT_EQ(MakeNotExplained({}).Tell(), "not explained (50 %, 40 times the noise is left), from 0.25 s");
+}
+
+TEST(CausesTest, NamesIsOfTheFirstFaultOfWhatIsExplained) {
+  const Causes causes = {MakeExplanation({MakeGain(), MakeOffset()}),
+                         MakeNotExplained({{"lag", "", 0, 0, "", ""}}), MakeNotExplained({})};
+  EXPECT_TRUE(Names(causes, "gain"));
+  EXPECT_FALSE(Names(causes, "offset"));  // its second
+  EXPECT_FALSE(Names(causes, "lag"));     // the nearest of what is not explained
+  EXPECT_FALSE(Names({}, "gain"));
+}
+
+TEST(CausesTest, AreToldByChannel) {
+  Causes causes = {MakeExplanation({MakeGain()}), MakeExplanation({MakeOffset()}), MakeNotExplained({})};
+  causes[1].channel = CauseChannel::kMeasurement;
+  EXPECT_EQ(TellCauses(causes, CauseChannel::kActuation), causes[0].Tell() + "; " + causes[2].Tell());
+  EXPECT_EQ(TellCauses(causes, CauseChannel::kMeasurement), causes[1].Tell());
+  EXPECT_EQ(TellCauses(causes, CauseChannel::kLaw), "");
+}
+
+TEST(CausesTest, ChannelsHaveNames) {
+  EXPECT_STREQ(NameOf(CauseChannel::kMeasurement), "measurement");
+  EXPECT_STREQ(NameOf(CauseChannel::kActuation), "actuation");
+  EXPECT_STREQ(NameOf(CauseChannel::kLaw), "law");
+  EXPECT_STREQ(NameOf(CauseChannel::kBalance), "balance");
+}
+
+/// A gain of 0.9: its error is the change, so that 5 % of it are 0.005.
+std::vector<Fault> MakeTruth() { return {MakeGain(0.9, 0.1)}; }
+
+/// Right, in a class, not explained, wrong.
+::testing::Matcher<NamingScore> IsScore(int right, int in_class, int not_explained, int wrong) {
+  return AllOf(Field("right", &NamingScore::right, right),
+               Field("in_class", &NamingScore::in_class, in_class),
+               Field("not_explained", &NamingScore::not_explained, not_explained),
+               Field("wrong", &NamingScore::wrong, wrong));
+}
+
+NamingScore Score(const Causes& causes) { return ScoreNames(MakeTruth(), MakeTruth(), causes); }
+
+TEST(ScoreNamesTest, RightIsWithinAFractionOfTheChangeOrStandardErrors) {
+  EXPECT_THAT(Score({MakeExplanation({MakeGain(0.904, 0.0)})}), IsScore(1, 0, 0, 0));
+  EXPECT_THAT(Score({MakeExplanation({MakeGain(0.906, 0.0)})}), IsScore(0, 0, 1, 1));
+  EXPECT_THAT(Score({MakeExplanation({MakeGain(0.929, 0.01)})}), IsScore(1, 0, 0, 0));
+  EXPECT_THAT(Score({MakeExplanation({MakeGain(0.931, 0.01)})}), IsScore(0, 0, 1, 1));
+}
+
+TEST(ScoreNamesTest, ClassHasTheFaultAmongOthers) {
+  EXPECT_THAT(Score({MakeExplanation({MakeOffset(), MakeGain(0.9)})}), IsScore(0, 1, 0, 0));
+  EXPECT_THAT(Score({MakeExplanation({MakeGain(0.9), MakeOffset()})}), IsScore(0, 1, 0, 0));
+  // A class without it is no name of it, and nothing wrong either.
+  const Fault drift = {"drift", "motor r_elbow", 1.0, 0.0, "N m/s", ""};
+  EXPECT_THAT(Score({MakeExplanation({drift, MakeOffset()})}), IsScore(0, 0, 1, 0));
+}
+
+// Of a place that the motion does not show, any size is as good.
+TEST(ScoreNamesTest, UnknownSizeIsAClass) {
+  EXPECT_THAT(Score({MakeExplanation({MakeGain(0.3, kInfinity)})}), IsScore(0, 1, 0, 0));
+}
+
+TEST(ScoreNamesTest, NotExplainedNamesNothing) {
+  EXPECT_THAT(Score({}), IsScore(0, 0, 1, 0));
+  EXPECT_THAT(Score({MakeNotExplained({MakeGain(0.9)})}), IsScore(0, 0, 1, 0));
+  EXPECT_THAT(Score({MakeNotExplained({MakeOffset()})}), IsScore(0, 0, 1, 0));
+  EXPECT_THAT(Score({MakeNotExplained({})}), IsScore(0, 0, 1, 0));
+}
+
+TEST(ScoreNamesTest, WhatWasNotSoIsWrong) {
+  EXPECT_THAT(Score({MakeExplanation({MakeGain(0.9)}), MakeExplanation({MakeOffset()})}),
+              IsScore(1, 0, 0, 1));
+  Fault elsewhere = MakeGain(0.9);
+  elsewhere.place = "motor l_elbow";
+  EXPECT_THAT(Score({MakeExplanation({elsewhere})}), IsScore(0, 0, 1, 1));
+}
+
+TEST(ScoreNamesTest, FaultThatIsTooSmallAloneMayBeNamed) {
+  const Fault small = MakeOffset(0.001, 0.001);
+  const std::vector<Fault> truth = MakeTruth(), all = {truth.front(), small};
+  const Explanation named = MakeExplanation({MakeGain(0.9)});
+  EXPECT_THAT(ScoreNames(truth, all, {named, MakeExplanation({small})}), IsScore(1, 0, 0, 0));
+  EXPECT_THAT(ScoreNames(truth, all, {named}), IsScore(1, 0, 0, 0));
+  // With its own value, that is.
+  EXPECT_THAT(ScoreNames(truth, all, {named, MakeExplanation({MakeOffset(0.002)})}), IsScore(1, 0, 0, 1));
+}
+
+TEST(ScoreNamesTest, EachOfSeveralFaultsCounts) {
+  const Fault delay = {"delay", "motor l_elbow", 3.0, 3.0, "steps", ""};
+  const Fault drift = {"drift", "motor r_hip", 0.3, 0.3, "N m/s", ""};
+  const std::vector<Fault> truth = {MakeGain(0.9, 0.1), delay, drift};
+  EXPECT_THAT(ScoreNames(truth, truth,
+                         {MakeExplanation({MakeGain(0.9)}), MakeExplanation({MakeOffset(), delay}),
+                          MakeNotExplained({drift})}),
+              IsScore(1, 1, 1, 0));
+  EXPECT_THAT(ScoreNames({}, {}, {}), IsScore(0, 0, 0, 0));
+}
+
+}  // namespace
+}  // namespace dexcheck::testing::causes_test

@@ -1,0 +1,382 @@
+// Made series of one motor or reading with a known fault: its name, its size, when it was there, and what is
+// left open where the signal does not tell faults apart.
+
+#include "harness/diagnosis/signal_causes.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <random>
+
+#include "controller/common/types.h"
+#include "tests/common/matchers.h"
+#include "tests/common/matrix_near.h"
+
+namespace dexcheck::testing::signal_causes_test {
+namespace {
+
+using Eigen::ArrayXd;
+using Eigen::Index;
+
+constexpr Index kSteps = 200;
+constexpr double kTimeStep = 1e-3;   // s
+constexpr double kRelative = 0.01;   // of a value
+constexpr double kErrors = 3.0;      // standard errors of a value
+constexpr double kRounding = 1e-14;  // of a torque, relative to the largest
+
+ArrayXd CalcTime() { return kTimeStep * ArrayXd::LinSpaced(kSteps, 0.0, static_cast<double>(kSteps - 1)); }
+
+/// A torque that crosses zero, N m.
+ArrayXd CalcTorque() {
+  const ArrayXd t = CalcTime();
+  return 2.0 * (2.0 * kPi * 12.0 * t + 0.4).sin() + 0.8 * (2.0 * kPi * 29.0 * t + 1.0).sin() + 0.1;
+}
+
+/// Of one sign.
+ArrayXd CalcPositiveTorque() { return 4.0 + CalcTorque(); }
+
+/// That of another motor, which is unlike.
+ArrayXd CalcOtherTorque() { return 1.5 * (2.0 * kPi * 19.0 * CalcTime() + 2.0).cos() - 0.3; }
+
+/// rad/s, of both signs and no multiple of the torque.
+ArrayXd CalcRate() { return 0.7 * (2.0 * kPi * 15.0 * CalcTime() - 0.5).cos(); }
+
+SignalSeries MakeSeries(const ArrayXd& expected, const ArrayXd& got) {
+  SignalSeries series;
+  series.name = {"motor elbow", "torque", "N m", "motors"};
+  series.time = CalcTime();
+  series.expected = expected;
+  series.got = got;
+  series.has_history.assign(kSteps, true);
+  std::fill_n(series.has_history.begin(), StepStore::kHistory, false);
+  series.noise = kRounding * expected.abs().maxCoeff();
+  return series;
+}
+
+SignalSeries MakeSeries(const ArrayXd& got) { return MakeSeries(CalcTorque(), got); }
+
+std::string TextOf(const Causes& causes) { return TellCauses(causes, CauseChannel::kActuation); }
+
+Causes Explain(const SignalSeries& series) {
+  SignalSeries other = series;
+  other.name.place = "motor wrist";
+  other.expected = other.got = CalcOtherTorque();
+  return ExplainSignal(series, {series, other});
+}
+
+/// What a motor gives that does this: `got` as a function of the step.
+ArrayXd MakeEach(const std::function<double(Index)>& got) {
+  ArrayXd all(kSteps);
+  for (Index i = 0; i < kSteps; ++i) all[i] = got(i);
+  return all;
+}
+
+/// The torque `back` steps before; the first, where there is none.
+double Back(const ArrayXd& u, Index i, Index back) { return u[std::max<Index>(0, i - back)]; }
+
+/// d = e^(-dt / time).
+ArrayXd MakeLag(const ArrayXd& sent, double time) {
+  ArrayXd given = sent;
+  const double d = std::exp(-kTimeStep / time);
+  for (Index i = 1; i < kSteps; ++i) given[i] = d * given[i - 1] + (1.0 - d) * sent[i];
+  return given;
+}
+
+ArrayXd MakeNoise(double deviation, unsigned seed) {
+  std::mt19937 random(seed);
+  std::normal_distribution<double> normal(0.0, deviation);
+  return MakeEach([&](Index) { return normal(random); });
+}
+
+bool HasValue(const Fault& fault, double value) {
+  return std::abs(fault.value - value) <=
+         std::max(kRelative * std::abs(value), kErrors * fault.error) * TolScale();
+}
+
+/// That these faults are named, each alone, and nothing else is.
+void ExpectNamed(const Causes& causes, const std::vector<Fault>& faults) {
+  SCOPED_TRACE(TextOf(causes));
+  EXPECT_EQ(causes.size(), faults.size());
+  for (const Fault& fault : faults) {
+    const auto named = std::find_if(causes.begin(), causes.end(), [&](const Explanation& one) {
+      return one.outcome == CauseOutcome::kNamed && one.faults.front().IsLike(fault);
+    });
+    if (named == causes.end()) {
+      ADD_FAILURE() << fault.Tell() << " is not named";
+      continue;
+    }
+    const Fault& told = named->faults.front();
+    EXPECT_EQ(named->faults.size(), 1u);
+    EXPECT_TRUE(HasValue(told, fault.value)) << told.Tell() << " against " << fault.value;
+    EXPECT_EQ(told.unit, fault.unit);
+    // An error that is as large as the value would let anything pass.
+    EXPECT_LE(told.error, 0.2 * std::abs(told.value));
+    EXPECT_FALSE(named->ends);
+    EXPECT_GT(named->fraction, 0.99 - (fault.fault.substr(0, 5) == "noise" ? 1.0 : 0.0));
+  }
+}
+
+std::vector<std::string> NamesOf(const Explanation& explanation) {
+  std::vector<std::string> names;
+  for (const Fault& fault : explanation.faults) names.push_back(fault.fault);
+  return names;
+}
+
+/// Of the class; NaN where it is no member.
+double ValueOf(const Explanation& explanation, const std::string& name) {
+  for (const Fault& fault : explanation.faults)
+    if (fault.fault == name) return fault.value;
+  return std::nan("");
+}
+
+struct Case {
+  std::string name;
+  std::function<SignalSeries()> make;
+  std::vector<Fault> faults;
+};
+
+Fault OfMotor(const std::string& fault, double value, const std::string& unit = "") {
+  return {fault, "motor elbow", value, 0.0, unit, ""};
+}
+
+Case MakeCase(const std::string& name, std::vector<Fault> faults,
+              const std::function<double(const ArrayXd& u, Index i)>& got) {
+  return {name,
+          [got] {
+            const ArrayXd u = CalcTorque();
+            return MakeSeries(MakeEach([&](Index i) { return got(u, i); }));
+          },
+          std::move(faults)};
+}
+
+/// Of what moves with CalcRate().
+Case MakeFriction(const std::string& name, const Fault& fault, const std::function<double(double)>& force) {
+  return {name,
+          [force] {
+            const ArrayXd rate = CalcRate();
+            SignalSeries series =
+                MakeSeries(CalcTorque() - MakeEach([&](Index i) { return force(rate[i]); }));
+            series.rate = rate;
+            return series;
+          },
+          {fault}};
+}
+
+double TimeOf(Index step) { return kTimeStep * static_cast<double>(step); }
+
+class OneMotor : public ::testing::TestWithParam<Case> {};
+
+TEST_P(OneMotor, FaultIsNamedWithItsValue) {
+  const SignalSeries series = GetParam().make();
+  ASSERT_GT((series.got - series.expected).norm(), 0.0);
+  ExpectNamed(Explain(series), GetParam().faults);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Faults, OneMotor,
+    ::testing::Values(
+        MakeCase("Gain", {OfMotor("gain", 0.97)}, [](const ArrayXd& u, Index i) { return 0.97 * u[i]; }),
+        MakeCase("GainNearOne", {OfMotor("gain", 1.0 + 1e-6)},
+                 [](const ArrayXd& u, Index i) { return (1.0 + 1e-6) * u[i]; }),
+        MakeCase("ReversedSign", {OfMotor("gain", -1.0)}, [](const ArrayXd& u, Index i) { return -u[i]; }),
+        MakeCase("Offset", {OfMotor("offset", -0.05, "N m")},
+                 [](const ArrayXd& u, Index i) { return u[i] - 0.05; }),
+        MakeCase("GainAndOffset", {OfMotor("gain", 1.1), OfMotor("offset", 0.2, "N m")},
+                 [](const ArrayXd& u, Index i) { return 1.1 * u[i] + 0.2; }),
+        MakeCase("DelayOfOneStep", {OfMotor("delay", 1.0, "steps")},
+                 [](const ArrayXd& u, Index i) { return Back(u, i, 1); }),
+        MakeCase("DelayOfSixSteps", {OfMotor("delay", 6.0, "steps")},
+                 [](const ArrayXd& u, Index i) { return Back(u, i, 6); }),
+        MakeCase("DelayBetweenSteps", {OfMotor("delay", 2.4, "steps")},
+                 [](const ArrayXd& u, Index i) { return 0.6 * Back(u, i, 2) + 0.4 * Back(u, i, 3); }),
+        MakeCase("DelayOfLessThanAStep", {OfMotor("delay", 0.3, "steps")},
+                 [](const ArrayXd& u, Index i) { return 0.7 * u[i] + 0.3 * Back(u, i, 1); }),
+        MakeCase("GainAndDelay", {OfMotor("delay", 3.0, "steps"), OfMotor("gain", 0.8)},
+                 [](const ArrayXd& u, Index i) { return 0.8 * Back(u, i, 3); }),
+        MakeCase("OffsetAndDelay", {OfMotor("delay", 3.0, "steps"), OfMotor("offset", 0.1, "N m")},
+                 [](const ArrayXd& u, Index i) { return Back(u, i, 3) + 0.1; }),
+        MakeCase("DriftOfTheGain", {OfMotor("drift of the gain", -0.3, "1/s")},
+                 [](const ArrayXd& u, Index i) { return u[i] * (1.0 - 0.3 * TimeOf(i)); }),
+        MakeCase("Ripple", {OfMotor("ripple", 0.06, "N m")},
+                 [](const ArrayXd& u, Index i) {
+                   return u[i] + 0.06 * std::sin(2.0 * kPi * 41.3 * TimeOf(i) + 0.7);
+                 }),
+        MakeCase("GainFromStep80", {OfMotor("gain", 0.97)},
+                 [](const ArrayXd& u, Index i) { return (i < 80 ? 1.0 : 0.97) * u[i]; }),
+        MakeCase("LagFromStep80", {OfMotor("lag", 5e-3, "s")},
+                 [](const ArrayXd& u, Index i) {
+                   double g = u[79];
+                   for (Index k = 80; k <= i; ++k) g += (1.0 - std::exp(-0.2)) * (u[k] - g);
+                   return i < 80 ? u[i] : g;
+                 }),
+        MakeCase("DelayFromStep80", {OfMotor("delay", 4.0, "steps")},
+                 [](const ArrayXd& u, Index i) { return i < 80 ? u[i] : Back(u, i, 4); }),
+        MakeCase("OffsetForFiveSteps", {OfMotor("offset", 0.05, "N m")},
+                 [](const ArrayXd& u, Index i) { return i >= kSteps - 5 ? u[i] + 0.05 : u[i]; }),
+        Case{"Lag", [] { return MakeSeries(MakeLag(CalcTorque(), 5e-3)); }, {OfMotor("lag", 5e-3, "s")}},
+        Case{"LagOfLessThanAStep",
+             [] { return MakeSeries(MakeLag(CalcTorque(), 0.4e-3)); },
+             {OfMotor("lag", 0.4e-3, "s")}},
+        Case{"GainAndLag",
+             [] { return MakeSeries(MakeLag(1.2 * CalcTorque(), 5e-3)); },
+             {OfMotor("gain", 1.2), OfMotor("lag", 5e-3, "s")}},
+        Case{"OffsetAndLag",
+             [] { return MakeSeries(MakeLag(CalcTorque() + 0.3, 5e-3)); },
+             {OfMotor("offset", 0.3, "N m"), OfMotor("lag", 5e-3, "s")}},
+        MakeCase("DeadZone", {OfMotor("dead zone", 0.15, "N m")},
+                 [](const ArrayXd& u, Index i) {
+                   return std::abs(u[i]) > 0.15 ? u[i] - std::copysign(0.15, u[i]) : 0.0;
+                 }),
+        MakeCase("RoundingToSteps", {OfMotor("rounding to steps of", 0.04, "N m")},
+                 [](const ArrayXd& u, Index i) { return 0.04 * std::round(u[i] / 0.04); }),
+        MakeCase("RoundingToLargeSteps", {OfMotor("rounding to steps of", 1.5, "N m")},
+                 [](const ArrayXd& u, Index i) { return 1.5 * std::round(u[i] / 1.5); }),
+        MakeCase("DriftFromTheFirstStep", {OfMotor("drift", 0.3, "N m/s")},
+                 [](const ArrayXd& u, Index i) { return u[i] + 0.3 * TimeOf(i); }),
+        MakeCase("DriftThatBeginsBetweenSteps", {OfMotor("drift", -0.3, "N m/s")},
+                 [](const ArrayXd& u, Index i) { return u[i] - 0.3 * std::max(0.0, TimeOf(i) - 50.4e-3); }),
+        MakeCase("DriftThatBeganBefore", {OfMotor("drift", 0.3, "N m/s")},
+                 [](const ArrayXd& u, Index i) { return u[i] + 0.3 * (TimeOf(i) + 0.5); }),
+        MakeCase("Limit", {OfMotor("limit", 1.2, "N m")},
+                 [](const ArrayXd& u, Index i) { return std::clamp(u[i], -1.2, 1.2); }),
+        MakeCase("Stuck", {OfMotor("stuck at", 0.7, "N m")}, [](const ArrayXd&, Index) { return 0.7; }),
+        MakeFriction("DryFriction", OfMotor("dry friction", 0.06, "N m"),
+                     [](double rate) { return std::copysign(0.06, rate); }),
+        MakeFriction("ViscousFriction", OfMotor("viscous friction", 0.08, "N m s/rad"),
+                     [](double rate) { return 0.08 * rate; }),
+        MakeCase("GainAndOffsetFromStep97", {OfMotor("gain", 0.92), OfMotor("offset", -0.066, "N m")},
+                 [](const ArrayXd& u, Index i) { return i < 97 ? u[i] : 0.92 * u[i] - 0.066; }),
+        Case{"Noise",
+             [] { return MakeSeries(CalcTorque() + MakeNoise(0.05, 1)); },
+             {OfMotor("noise, standard deviation", 0.05, "N m")}},
+        Case{"SignalOfAnotherMotor",
+             [] { return MakeSeries(CalcOtherTorque()); },
+             {OfMotor("signal of motor wrist, gain", 1.0)}}),
+    [](const ::testing::TestParamInfo<Case>& info) { return info.param.name; });
+
+// Friction brakes.
+TEST(SignalCauses, NoFrictionDrives) {
+  SignalSeries series = MakeSeries(CalcTorque() + 0.06 * CalcRate().sign());
+  series.rate = CalcRate();
+  const Causes causes = Explain(series);
+  EXPECT_FALSE(Names(causes, "dry friction")) << TextOf(causes);
+}
+
+// The last of the seeds have a frequency that explains more than chance would, were it the only one.
+TEST(SignalCauses, NoiseIsNamedWithItsDeviation) {
+  for (const unsigned seed : {2u, 3u, 4u, 5u, 118u, 128u, 160u, 168u, 250u}) {
+    SCOPED_TRACE(seed);
+    ExpectNamed(Explain(MakeSeries(CalcTorque() + MakeNoise(0.02, seed))),
+                {OfMotor("noise, standard deviation", 0.02, "N m")});
+  }
+}
+
+TEST(SignalCauses, EntryOfAReadingIsNamed) {
+  SignalSeries series = MakeSeries(CalcTorque() + 0.01);
+  series.name = {"joint elbow", "position", "rad", "joint positions"};
+  ExpectNamed(Explain(series), {{"offset", "joint elbow, position", 0.01, 0.0, "rad", ""}});
+}
+
+// A torque that has one sign has none to tell an offset from a dead zone by.
+TEST(SignalCauses, OffsetOrDeadZoneOfOneSignAreAClass) {
+  const ArrayXd u = CalcPositiveTorque();
+  ASSERT_GT(u.minCoeff(), 0.1);
+  const Causes causes = Explain(MakeSeries(u, u - 0.1));
+  SCOPED_TRACE(TextOf(causes));
+  ASSERT_EQ(causes.size(), 1u);
+  EXPECT_EQ(causes.front().outcome, CauseOutcome::kNamedClass);
+  EXPECT_THAT(NamesOf(causes.front()), ::testing::UnorderedElementsAre("offset", "dead zone"));
+  EXPECT_NEAR(ValueOf(causes.front(), "offset"), -0.1, 1e-3);
+  EXPECT_NEAR(ValueOf(causes.front(), "dead zone"), 0.1, 1e-3);
+}
+
+TEST(SignalCauses, SilenceIsAClass) {
+  const ArrayXd u = 0.1 * CalcTorque();
+  const Causes causes = Explain(MakeSeries(u, ArrayXd::Zero(kSteps)));
+  SCOPED_TRACE(TextOf(causes));
+  ASSERT_EQ(causes.size(), 1u);
+  EXPECT_EQ(causes.front().outcome, CauseOutcome::kNamedClass);
+  EXPECT_THAT(NamesOf(causes.front()),
+              ::testing::UnorderedElementsAre("gain", "dead zone", "rounding to steps of"));
+  // From step 16 on, before which steps have no history.
+  const double largest = u.tail(kSteps - StepStore::kHistory).abs().maxCoeff();
+  EXPECT_NEAR(ValueOf(causes.front(), "gain"), 0.0, 1e-9);
+  EXPECT_NEAR(ValueOf(causes.front(), "dead zone"), largest, 1e-9);
+  EXPECT_NEAR(ValueOf(causes.front(), "rounding to steps of"), 2.0 * largest, 1e-9);
+}
+
+TEST(SignalCauses, RoundingIsNeverNamed) {
+  const ArrayXd u = CalcTorque();
+  const double noise = MakeSeries(u).noise;
+  const std::vector<ArrayXd> patterns = {ArrayXd::Ones(kSteps), u / u.abs().maxCoeff(), MakeNoise(0.3, 8),
+                                         MakeEach([&](Index i) { return Back(u, i, 1) - u[i]; }),
+                                         CalcTime() / TimeOf(kSteps - 1)};
+  for (size_t i = 0; i < patterns.size(); ++i) {
+    for (const double size : {0.5, 30.0, 300.0}) {
+      const ArrayXd change = size * noise / patterns[i].abs().maxCoeff() * patterns[i];
+      const Causes causes = Explain(MakeSeries(u, u + change));
+      SCOPED_TRACE(std::to_string(i) + ", " + std::to_string(size) + ": " + TextOf(causes));
+      // What is smaller than rounding is nothing at all.
+      EXPECT_EQ(causes.size(), size < 1.0 ? 0u : 1u);
+      for (const Explanation& one : causes) EXPECT_EQ(one.outcome, CauseOutcome::kNotExplained);
+    }
+    // The same pattern is named where it is a fault.
+    const Causes causes = Explain(MakeSeries(u, u + 0.1 * patterns[i]));
+    ASSERT_EQ(causes.size(), 1u);
+    EXPECT_NE(causes.front().outcome, CauseOutcome::kNotExplained) << i << ": " << TextOf(causes);
+  }
+}
+
+TEST(SignalCauses, NothingDiffers) {
+  const Causes causes = Explain(MakeSeries(CalcTorque()));
+  EXPECT_TRUE(causes.empty()) << TextOf(causes);
+}
+
+// Neither an offset nor a gain nor white: a chirp.
+TEST(SignalCauses, WhatIsNoneOfTheFaultsIsNotExplained) {
+  const ArrayXd t = CalcTime();
+  const Causes causes =
+      Explain(MakeSeries(CalcTorque() + 0.1 * (2.0 * kPi * (10.0 * t + 600.0 * t.square())).sin()));
+  SCOPED_TRACE(TextOf(causes));
+  ASSERT_EQ(causes.size(), 1u);
+  EXPECT_EQ(causes.front().outcome, CauseOutcome::kNotExplained);
+}
+
+TEST(SignalCauses, OffsetIsToldFromWhenItWasToWhenItWas) {
+  struct Span {
+    Index first, last;
+    bool ends;
+  };
+  for (const Span& span : {Span{40, 79, true}, Span{0, 79, true}, Span{40, kSteps - 1, false},
+                           Span{0, kSteps - 1, false}, Span{40, kSteps - 5, false}}) {
+    SCOPED_TRACE(span.first);
+    const Causes causes = Explain(MakeSeries(
+        CalcTorque() + MakeEach([&](Index i) { return span.first <= i && i <= span.last ? 0.05 : 0.0; })));
+    SCOPED_TRACE(TextOf(causes));
+    ASSERT_EQ(causes.size(), 1u);
+    const Explanation& one = causes.front();
+    EXPECT_EQ(one.outcome, CauseOutcome::kNamed);
+    EXPECT_TRUE(one.faults.front().IsLike(OfMotor("offset", 0.0)));
+    EXPECT_NEAR(one.faults.front().value, 0.05, 1e-6);
+    EXPECT_EQ(one.from, CalcTime()[span.first]);
+    EXPECT_EQ(one.to, CalcTime()[span.last]);
+    EXPECT_EQ(one.ends, span.ends);
+  }
+}
+
+// Steps are missing before step 60: what came just before it is not known there.
+TEST(SignalCauses, StepsWithoutHistoryAreLeftOut) {
+  const ArrayXd u = CalcTorque();
+  ArrayXd got = MakeEach([&](Index i) { return Back(u, i, 3); });
+  got.segment(60, StepStore::kHistory).setConstant(0.5);
+  SignalSeries series = MakeSeries(got);
+  EXPECT_FALSE(Names(Explain(series), "delay"));
+  std::fill_n(series.has_history.begin() + 60, StepStore::kHistory, false);
+  ExpectNamed(Explain(series), {OfMotor("delay", 3.0, "steps")});
+}
+
+}  // namespace
+}  // namespace dexcheck::testing::signal_causes_test
