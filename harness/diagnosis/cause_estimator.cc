@@ -15,7 +15,6 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 // A column of which less is left beside the others says nothing of its own.
 constexpr double kIndependent = 1e-7;
 constexpr double kImplausible = 3.0;  // times the plausible size
-constexpr size_t kRestarts = 8;       // other first choices that are tried where the first led nowhere
 
 /// What of a candidate shows above the noise: amplitudes are basis * a.
 struct Visible {
@@ -73,7 +72,7 @@ class Search {
     // Of many candidates that takes long.
     constexpr size_t kFew = 100;
     const bool may_be_fewer = chosen_.size() > 1 && candidates_.size() < kFew;
-    if (!chosen_.empty() && (may_be_fewer || !IsNoise(chosen_))) {
+    if (options_.restarts > 0 && !chosen_.empty() && (may_be_fewer || !IsNoise(chosen_))) {
       std::vector<size_t> best = chosen_;
       for (const Best& first : FindFirsts(best)) {
         const double other = Grow(first);
@@ -121,7 +120,7 @@ class Search {
     const auto is_impossible = [&](const Best& one) { return !CanBe(one.candidate, {}); };
     all.erase(std::remove_if(all.begin(), all.end(), is_impossible), all.end());
     std::stable_partition(all.begin(), all.end(), is_new);
-    all.resize(std::min(all.size(), kRestarts));
+    all.resize(std::min(all.size(), options_.restarts));
     return all;
   }
 

@@ -22,7 +22,7 @@ constexpr double kAccuracy = 1e-4;
 constexpr double kLeft = 3.0;
 // And of what there is to explain, squared, at least this fraction.
 constexpr double kExplains = 0.99;
-constexpr Index kMostSteps = 40;  // that are looked at
+constexpr Index kMostSteps = 20;  // that are looked at
 constexpr size_t kMostSegments = 8;
 // Residuals that change by more than this from one step to the next, in units of noise, and by this many
 // times what they change in the steps around, have begun, or ended.
@@ -597,7 +597,7 @@ class Problem {
   }
 
   [[nodiscard]] CauseSelection Select() {
-    const CauseOptions options{6, 1.0, static_cast<double>(steps_)};
+    const CauseOptions options{.alike = static_cast<double>(steps_)};
     CauseSelection selection = SelectCauses(y_, candidates_, options);
     for (const CauseTerm& term : selection.terms) {
       if (candidates_[term.candidate].place != kWorld || selection.terms.size() == 1) continue;

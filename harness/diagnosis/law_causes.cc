@@ -15,7 +15,7 @@ using Eigen::Index;
 constexpr double kAccuracy = 1e-6;
 // What is left over may be this many times the noise and is explained all the same.
 constexpr double kLeft = 30.0;
-constexpr Index kMostSteps = 48;  // that are looked at
+constexpr Index kMostSteps = 20;  // that are looked at
 constexpr double kZero = 1e-6;    // a factor nearer to zero than this is one of a part that is missing
 
 /// Entries of tau' that belong together.
@@ -122,7 +122,8 @@ Causes ExplainLaw(const StepStore& store) {
   }
   // Sums are told where no single summand does: a list's first of two equals is kept.
   const double floor = 1.0 + kAccuracy * kAccuracy * y.squaredNorm() / static_cast<double>(y.size());
-  const CauseSelection selection = SelectCauses(y, candidates, {6, floor});
+  const CauseSelection selection =
+      SelectCauses(y, candidates, {.most_terms = 4, .restarts = 0, .floor = floor});
   Explanation start;
   start.channel = CauseChannel::kLaw;
   start.from = store.Get(StepStore::kTime)(0, steps.front());

@@ -57,7 +57,7 @@ Causes ExplainRolling(const StepStore& store) {
   // Slip and sinking change with the load, in some steps.
   constexpr double kAlike = 8.0;
   const CauseSelection selection =
-      SelectCauses(y, candidates, {2, 1.0, std::min(kAlike, static_cast<double>(count))});
+      SelectCauses(y, candidates, {.most_terms = 2, .alike = std::min(kAlike, static_cast<double>(count))});
   if (y.squaredNorm() <= static_cast<double>(y.size())) return {};
   const auto name = [&](size_t i, const VectorXd& amplitude, double error) {
     const Candidate& one = candidates[i];

@@ -344,7 +344,7 @@ Fit MakeFit(const SignalSeries& series, const Steps& steps, const Shape& shape, 
   const VectorXd y = ((steps.Take(series.got) - shape.output) / series.noise).matrix();
   Fit fit;
   fit.size = ((steps.Take(series.got) - steps.Take(series.expected)) / series.noise).matrix().norm();
-  fit.selection = SelectCauses(y, added, {kMostTerms, floor});
+  fit.selection = SelectCauses(y, added, {.most_terms = kMostTerms, .restarts = 8, .floor = floor});
   fit.criterion =
       fit.selection.criterion + shape.parameters * std::log(static_cast<double>(y.size())) +
       (shape.fault.empty()

@@ -40,7 +40,7 @@ TEST(Usage, AnOptionMeansOneThing) {
       {"--junit", R"(FILE\.xml.*as a test case of JUnit's XML to this file)"},
       {"--samples", "N=.*Number of random states"},
       {"--out", R"((DIR|FILE)[ .=].*)"},
-      {"--ignore", "WORD,.*What the two need not share of joints.*"},
+      {"--ignore", "WORD,.*Constants of joints in which the two may differ.*"},
       {"--floating", "The root of a URDF floats"},
       {"--digits", "N.*"},
       {"--tolerance", ".*REL.*"}};
