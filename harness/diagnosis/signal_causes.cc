@@ -133,10 +133,10 @@ void AddLimits(const ArrayXd& u, const ArrayXd& got, const std::string& unit, bo
 /// Whole multiples of a step: the largest that divides all, made better by all of them.
 void AddSteps(const ArrayXd& u, const ArrayXd& got, const std::string& unit, std::vector<Shape>* shapes) {
   const double rounding = 1e-12 * got.abs().maxCoeff();
-  double step = 0.0;
-  for (double value : got) {
+  const ArrayXd apart = (got - got[0]).abs();
+  double step = apart.maxCoeff() > rounding ? 0.0 : std::abs(got[0]);
+  for (double value : apart) {
     // By Euclid's algorithm, in which a remainder of rounding is none.
-    value = std::abs(value);
     while (value > rounding) {
       const double rest = step > 0.0 ? std::abs(std::remainder(value, step)) : 0.0;
       if (step == 0.0) step = value;
@@ -148,7 +148,8 @@ void AddSteps(const ArrayXd& u, const ArrayXd& got, const std::string& unit, std
   // Multiples of what is hardly more than rounding are any values.
   if (!(step > 1e2 * rounding)) return;
   // From few multiples to many, so that each is counted right.
-  ArrayXd sorted = got.abs();
+  ArrayXd sorted(2 * got.size());
+  sorted << apart, got.abs();
   std::sort(sorted.begin(), sorted.end());
   double along = 0.0, square = 0.0;
   for (const double value : sorted) {

@@ -75,9 +75,9 @@ RunCampaign::RunCampaign(const Scenario& scenario, std::filesystem::path robot, 
     throw InputError(scenario.source + ": plant.type: faults are made in a run of the engine's plant");
   MakeSetups();
   if (scenario.joint_task() == nullptr) MoveToStart(should_stop);
-  if (should_stop()) return;
-  RequireNoFaultToPass(should_stop);
-  if (!should_stop()) ListFaults();
+  if (!should_stop()) RequireNoFaultToPass(should_stop);
+  if (tau_.size() == 0) tau_.setOnes(setup_->model().num_velocities());
+  ListFaults();
 }
 
 void RunCampaign::MakeSetups() {

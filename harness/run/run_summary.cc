@@ -113,6 +113,9 @@ void Judge(const Setup& setup, const ClosedLoop& loop, RunResult* result) {
     measured.is_slope = Names(result->causes, "slope");
     result->attribution =
         Attribute(setup.constants(), loop.checks().model_checks(), loop.checks().motion_checks(), measured);
+    // The law is judged by the engine's terms, and goes by the model's.
+    if (result->attribution.cause == Cause::kModel)
+      std::erase_if(result->causes, [](const Explanation& one) { return one.channel == CauseChannel::kLaw; });
   }
   const bool disagrees = result->attribution.cause != Cause::kNone;
   result->verdict = disagrees ? Verdict::kDisagreement : Verdict::kPass;
