@@ -254,7 +254,7 @@ void StepForces::AddJoints(std::vector<Candidate>* candidates) {
     const int dof = static_cast<int>(i) - offset;
     const Joint* joint = dof < 0 ? nullptr : &model_.joints()[static_cast<size_t>(model_.joint_of_dof(dof))];
     const bool slides = joint != nullptr && joint->type == JointType::kPrismatic;
-    const std::string force = slides ? "N" : "N m", length = slides ? "m" : "rad";
+    const std::string force = slides ? "N" : "N m";
     const std::string place =
         "joint " +
         (joint == nullptr ? (i == 0 ? base.wheel_joint_right : base.wheel_joint_left) : model_.dof_name(dof));
@@ -264,7 +264,7 @@ void StepForces::AddJoints(std::vector<Candidate>* candidates) {
     AddRobot(&Next(candidates, "armature", place, slides ? "kg" : "kg m^2",
                    joint == nullptr ? base.wheel.armature : joint->armature, Masses(1)),
              VectorXd(-acceleration[i] * f));
-    AddRobot(&Next(candidates, "viscous friction", place, force + " s/" + length,
+    AddRobot(&Next(candidates, "viscous friction", place, slides ? "N s/m" : "N m s/rad",
                    joint == nullptr ? base.wheel.damping : joint->damping, Weights(1)),
              VectorXd(-rate[i] * f));
     const double sign = rate[i] > 0.0 ? 1.0 : rate[i] < 0.0 ? -1.0 : 0.0;
@@ -281,7 +281,7 @@ void StepForces::AddJoints(std::vector<Candidate>* candidates) {
     if (joint == nullptr || joint->type == JointType::kBall) continue;
     MatrixXd spring(n_, 2);
     spring << -q[model_.position_index(model_.joint_of_dof(dof))] * f, f;
-    Candidate& candidate = Next(candidates, "spring", place, force + "/" + length, 0.0, Weights(2));
+    Candidate& candidate = Next(candidates, "spring", place, slides ? "N/m" : "N m/rad", 0.0, Weights(2));
     candidate.is_ordinary = true;
     candidate.is_possible = [](const VectorXd& a) {
       return a[0] > 0.0 && std::abs(a[1]) <= kFarthest * a[0];
