@@ -72,10 +72,6 @@ const CheckRecord& RunChecks::Find(std::string_view name) const {
   throw std::invalid_argument("no check " + Quote(name));
 }
 
-bool RunChecks::Exceeds(std::string_view name) const {
-  return Has(name) && !(Find(name).last <= Find(name).bound);
-}
-
 void RunChecks::Evaluate(CheckInfo::Moment moment, double time) {
   for (size_t i = 0; i < judges_.size(); ++i) {
     if ((judges_[i].info->moments & moment) != 0) Add(judges_[i], &records_[i], time);

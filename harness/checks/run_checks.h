@@ -75,8 +75,6 @@ class RunChecks {
   /// Evaluates the checks of that moment.
   void Evaluate(CheckInfo::Moment moment, double time);
   void Add(const Judge& judge, CheckRecord* record, double time);
-  /// Whether a check fails at this step.
-  [[nodiscard]] bool Exceeds(std::string_view name) const;
   /// The law's terms, of the engine at the measured state.
   const LawTerms& ReadLawTerms(const StepRecord& step);
   void CompareLaw(const StepRecord& step);

@@ -100,8 +100,9 @@ class ClosedLoop {
   void BeginRun();
   /// ControlStep as far as it comes.
   void MakeStep(double t);
-  /// The checks of the step, in this thread.
+  /// Time begins anew for checks and causes.
   void ForgetSteps();
+  /// The checks of the step, in this thread.
   void Check();
   /// All checks of a step of the run.
   void Judge(StepRecord* step);
