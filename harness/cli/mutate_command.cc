@@ -163,11 +163,18 @@ void AddMutateCommand(Command app) {
       .Check(WholeNumber(1, 5))
       .Needs(draws)
       .ShowDefault();
-  command.AddOption("--draw-seed", &request->run.options.seed, "With --draws: what is drawn")
+  command.AddOption("--draw-seed", &request->run.options.seed, "In a run: what is drawn")
       .TypeName("N")
       .Check(WholeNumber(0, 1000000))
-      .Needs(draws)
+      .Needs(run)
       .ShowDefault();
+  command
+      .AddOption("--kinds", &request->run.options.kinds,
+                 "In a run: out of which kinds of faults is drawn: motor, sensor, joint, body, floor, wheels, "
+                 "contact, solver, law (default: all)")
+      .TypeName("KIND,...")
+      .Delimiter(',')
+      .Needs(run);
   const auto states = AddSampleOptions(command, 1000, &request->options.samples, &request->options.seed);
   Option no_diagnosis = command.AddFlag("--no-diagnosis", &request->no_diagnosis,
                                         "Only whether each is found, not what is named");

@@ -15,51 +15,44 @@
 namespace dexcheck::cli {
 namespace {
 
-/// What the table does not say: that a fault was not found, or that its cause or part is another.
+/// What the table does not say: that a fault was not found, or that its cause or name is another.
 std::string DescribeException(const RunMutant& mutant) {
-  if (mutant.refused) return fmt::format("refused: {}: {}", mutant.name, mutant.failure);
-  if (mutant.no_effect) return "no effect: " + mutant.name;
+  const std::string& name = mutant.all.name;
+  if (mutant.refused) return fmt::format("refused: {}: {}", name, mutant.failure);
+  if (mutant.no_effect) return "no effect: " + name;
   if (!mutant.killed) {
     const std::string off = mutant.is_as_expected
                                 ? ""
                                 : fmt::format(", though the object is {:.1e} m off", mutant.position_error);
-    return fmt::format("survived: {}{}", mutant.name, off);
+    return fmt::format("survived: {}{}", name, off);
   }
-  if (!mutant.has_right_cause()) {
-    return fmt::format("cause: {}: expected {}, named {} ({})", mutant.name, NameOf(mutant.expected),
+  if (mutant.faults.size() == 1 && !mutant.has_right_cause()) {
+    return fmt::format("cause: {}: expected {}, named {} ({})", name, NameOf(mutant.all.cause),
                        NameOf(mutant.cause), mutant.evidence);
   }
-  if (mutant.names_part) return "";
-  return fmt::format("part: {}: expected {}, named {}", mutant.name, mutant.part, mutant.evidence);
+  if (mutant.is_named()) return "";
+  if (mutant.all.truth.empty())
+    return fmt::format("part: {}: expected {}, named {}", name, mutant.all.part, mutant.evidence);
+  const char* const outcome = mutant.score.wrong > 0      ? "WRONG NAME"
+                              : mutant.score.in_class > 0 ? "class"
+                                                          : "not explained";
+  return fmt::format("{}: {}: {}", outcome, name, mutant.causes);
 }
 
 CampaignFault Describe(const RunMutant& mutant) {
-  CampaignFault fault{.kind = mutant.kind, .name = mutant.name};
+  CampaignFault fault{.kind = mutant.all.kind, .name = mutant.all.name};
   fault.outcome = mutant.refused     ? MutantOutcome::kRefused
                   : mutant.no_effect ? MutantOutcome::kNoEffect
                   : mutant.killed    ? MutantOutcome::kKilled
                                      : MutantOutcome::kSurvived;
   const bool counts = !mutant.refused && !mutant.no_effect;
-  fault.cause_right = counts && mutant.has_right_cause();
-  if (counts && !mutant.part.empty()) fault.part_named = fault.cause_right && mutant.names_part;
+  fault.cause_right = counts && (mutant.faults.size() > 1 ? mutant.is_named() : mutant.has_right_cause());
+  if (counts && !(mutant.all.truth.empty() && mutant.all.part.empty())) fault.part_named = mutant.is_named();
   fault.exception = DescribeException(mutant);
-  if (!mutant.truth.empty()) {
-    const NamingScore& score = mutant.score;
-    const bool all = score.right == static_cast<int>(mutant.truth.size()) && score.wrong == 0;
-    fault.cause_right = counts && all;
-    fault.part_named.reset();
-    if (counts && mutant.killed)
-      fault.exception = all ? ""
-                            : fmt::format("{}: {}: {}", mutant.name,
-                                          score.wrong > 0      ? "WRONG NAME"
-                                          : score.in_class > 0 ? "class"
-                                                               : "not explained",
-                                          mutant.causes);
-  }
-  fault.details = {{"expected_cause", NameOf(mutant.expected)},
+  fault.details = {{"expected_cause", NameOf(mutant.all.cause)},
                    {"cause", NameOf(mutant.cause)},
-                   {"expected_part", mutant.part},
-                   {"part_named", mutant.names_part},
+                   {"expected_part", mutant.all.part},
+                   {"part_named", mutant.is_named()},
                    {"evidence", mutant.evidence},
                    {"failure", mutant.failure},
                    {"failed_checks", mutant.failed_checks},

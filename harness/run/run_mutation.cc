@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "controller/common/text.h"
+#include "harness/diagnosis/injection/listed_faults.h"
 
 namespace dexcheck {
 namespace {
@@ -44,10 +45,14 @@ EnginePlant* FindEngine(const LoopParts& parts) {
   return plant;
 }
 
-void InjectFault(const Setup& setup, const PlantFault& fault, LoopParts* parts) {
+void InjectFault(const Setup& setup, const InjectedFault& fault, LoopParts* parts) {
   EnginePlant* const engine = FindEngine(*parts);
   parts->plant.release();
   parts->plant = std::make_unique<FaultyPlant>(setup, std::unique_ptr<EnginePlant>(engine), fault);
+  if (fault.sensors) parts->hidden_sensor_fault = fault.sensors(setup);
+  if (!fault.controller) return;
+  parts->controller = fault.controller(setup, std::move(parts->controller));
+  parts->follower = nullptr;
 }
 
 std::string JoinFailed(const RunChecks& checks) {
@@ -60,7 +65,19 @@ std::string JoinFailed(const RunChecks& checks) {
   return names;
 }
 
+InjectedFault JoinAll(const FaultSet& set) {
+  InjectedFault all = set.front();
+  for (size_t i = 1; i < set.size(); ++i) all = Join(all, set[i]);
+  return all;
+}
+
 }  // namespace
+
+bool RunMutant::is_named() const {
+  if (all.truth.empty())
+    return has_right_cause() && (evidence + " " + failed_checks).find(all.part) != std::string::npos;
+  return killed && score.right == static_cast<int>(truth.size()) && score.wrong == 0;
+}
 
 RunCampaign::RunCampaign(const Scenario& scenario, std::filesystem::path robot, std::filesystem::path mjcf,
                          const RunMutationOptions& options, const std::function<bool()>& should_stop)
@@ -92,55 +109,34 @@ void RunCampaign::MakeSetups() {
   // Even a run that is looked at from its beginning starts settled, one step in.
   options_.from = std::max(options_.from, scenario_.plant.time_step);
   setup_ = MakeSetup(MakeScenario(options_.from, options_.duration, 0.0), nullptr);
-  offsetd_ = MakeSetup(MakeScenario(options_.from, options_.duration, kOffset), nullptr);
+  offset_setup_ = MakeSetup(MakeScenario(options_.from, options_.duration, kOffset), nullptr);
 }
 
 void RunCampaign::ListFaults() {
-  const RobotModel& model = setup_->model();
+  const auto add = [&](std::vector<FaultSet> sets) {
+    for (FaultSet& set : sets) {
+      InjectedFault all = JoinAll(set);
+      mutants_.push_back({.faults = std::move(set), .all = std::move(all)});
+    }
+  };
+  DrawOptions draw{.together = static_cast<size_t>(options_.together),
+                   .seed = options_.seed,
+                   .duration = options_.duration,
+                   .tau = tau_,
+                   .kinds = options_.kinds};
   if (options_.draws > 0) {
-    for (const DrawnFaults& drawn :
-         DrawFaults(*setup_, {static_cast<size_t>(options_.draws), static_cast<size_t>(options_.together),
-                              options_.seed, options_.duration, tau_})) {
-      plants_.push_back(drawn.fault);
-      singles_.push_back(drawn.each);
-      mutants_.push_back({.kind = drawn.fault.kind,
-                          .name = drawn.fault.name,
-                          .truth = drawn.truth,
-                          .injected = drawn.truth});
-    }
-    return;
+    draw.count = static_cast<size_t>(options_.draws);
+    return add(DrawFaults(*setup_, draw));
   }
-  if (options_.parameters > 0) {
-    const std::vector<Parameter> numbers = ListParameters(model.spec());
-    const size_t count = std::min(numbers.size(), static_cast<size_t>(options_.parameters));
-    for (size_t i = 0; i < count; ++i) {
-      parameters_.push_back(numbers[i * numbers.size() / count]);
-      mutants_.push_back({.kind = "number",
-                          .name = DescribePart(model.spec(), parameters_.back()) + ": " +
-                                  DescribeQuantity(parameters_.back()),
-                          .expected = Cause::kModel});
-    }
-  }
+  add(ListNumberFaults(*setup_, static_cast<size_t>(options_.parameters), options_.scale));
   // Those of another law are not known.
-  const bool knows_law =
+  const bool is_paper_law =
       scenario_.control.law == ControlLaw::kComputedTorque && scenario_.joint_task() == nullptr;
-  if (options_.laws && knows_law) laws_ = ListLawFaults(!setup_->adapter().wheels().empty());
-  for (const LawFault& law : laws_) {
-    mutants_.push_back({.kind = law.part == SIZE_MAX ? "law, otherwise" : "law, one part",
-                        .name = law.name,
-                        .expected = Cause::kControlLaw,
-                        .part = law.part == SIZE_MAX ? "" : ListLawParts()[law.part].name});
-  }
-  if (options_.equations && knows_law) {
-    equations_ = ListEquationFaults(model, scenario_.control.orientation == OrientationFeedback::kAngles);
-  }
-  for (const EquationFault& equation : equations_) {
-    mutants_.push_back(
-        {.kind = "equation", .name = equation.name, .expected = Cause::kModel, .part = equation.check});
-  }
-  if (options_.plants) plants_ = ListPlantFaults(*setup_);
-  for (const PlantFault& fault : plants_)
-    mutants_.push_back({.kind = fault.kind, .name = fault.name, .expected = fault.cause, .part = fault.part});
+  if (options_.laws && is_paper_law) add(ListLawFaults(*setup_));
+  if (options_.equations && is_paper_law) add(ListEquationFaults(*setup_));
+  if (!options_.plants) return;
+  draw.count = 1;
+  add(DrawEachKind(*setup_, draw));
 }
 
 std::unique_ptr<Setup> RunCampaign::MakeSetup(const Scenario& scenario, const RobotModel* model) const {
@@ -180,16 +176,16 @@ void RunCampaign::MoveToStart(const std::function<bool()>& should_stop) {
 }
 
 void RunCampaign::RequireNoFaultToPass(const std::function<bool()>& should_stop) {
-  for (const Setup* setup : {setup_.get(), offsetd_.get()}) {
+  for (const Setup* setup : {setup_.get(), offset_setup_.get()}) {
     if (setup == nullptr) continue;
     RunMutant none;
     // With the injector in place, and nothing injected.
-    PlantFault nothing;
+    InjectedFault nothing;
     nothing.engine = [](const Setup&, mjModel*) {};
     LoopParts parts = MakeLoopParts(*setup);
     GoToStart(parts);
     InjectFault(*setup, nothing, &parts);
-    VectorXd* const end = setup == setup_.get() ? &end_ : &offsetd_end_;
+    VectorXd* const end = setup == setup_.get() ? &end_ : &offset_end_;
     if (!RunLoop(*setup, std::move(parts), &none, end, should_stop)) return;
     if (!none.killed) continue;
     throw InputError(
@@ -210,10 +206,9 @@ bool RunCampaign::RunLoop(const Setup& setup, LoopParts parts, RunMutant* mutant
   mutant->killed = result.verdict != Verdict::kPass;
   mutant->cause = result.attribution.cause;
   mutant->evidence = result.attribution.evidence;
-  mutant->score = ScoreNames(mutant->truth, mutant->injected, result.causes);
+  mutant->score = ScoreNames(mutant->truth, mutant->all.truth, result.causes);
   for (const Explanation& one : result.causes)
     mutant->causes += (mutant->causes.empty() ? "" : "; ") + one.Tell();
-  mutant->names_part = mutant->evidence.find(mutant->part) != std::string::npos;
   mutant->failure = result.failure;
   mutant->failed_checks = JoinFailed(runner.loop().checks());
   mutant->position_error = result.tracking.position_max();
@@ -223,79 +218,55 @@ bool RunCampaign::RunLoop(const Setup& setup, LoopParts parts, RunMutant* mutant
   return true;
 }
 
-bool RunCampaign::RunPlant(const PlantFault& fault, RunMutant* mutant, VectorXd* end,
+bool RunCampaign::RunFault(const InjectedFault& fault, RunMutant* mutant, VectorXd* end,
                            const std::function<bool()>& should_stop) {
-  std::unique_ptr<Setup> whole;
+  const bool needs_error = fault.needs_error && offset_setup_ != nullptr;
+  const Setup* setup = needs_error ? offset_setup_.get() : setup_.get();
+  std::unique_ptr<Setup> own;
   if (fault.from_start) {
     Scenario scenario = MakeScenario(0.0, options_.from + options_.duration, 0.0);
     scenario.settle = std::min(scenario.settle, kSettle);
-    whole = MakeSetup(scenario, nullptr);
+    own = MakeSetup(scenario, nullptr);
+    setup = own.get();
   }
-  const Setup& setup = fault.from_start ? *whole : *setup_;
-  LoopParts parts = MakeLoopParts(setup);
+  if (fault.model) {
+    const RobotModel model = fault.model(setup->model());
+    own = MakeSetup(setup->scenario(), &model);
+    setup = own.get();
+  }
+  LoopParts parts = MakeLoopParts(*setup);
   if (!fault.from_start) GoToStart(parts);
-  InjectFault(setup, fault, &parts);
-  if (fault.sensors) parts.hidden_sensor_fault = fault.sensors(setup);
-  return RunLoop(setup, std::move(parts), mutant, end, should_stop);
+  InjectFault(*setup, fault, &parts);
+  return RunLoop(*setup, std::move(parts), mutant, end, should_stop);
 }
 
-bool RunCampaign::KeepFound(const std::vector<PlantFault>& each, RunMutant* mutant,
-                            const std::function<bool()>& should_stop) {
-  if (each.size() < 2) return true;
-  std::vector<Fault> found;
-  for (size_t i = 0; i < each.size(); ++i) {
+bool RunCampaign::FindTruth(RunMutant* mutant, const std::function<bool()>& should_stop) {
+  mutant->truth = mutant->all.truth;
+  if (mutant->faults.size() < 2) return true;
+  mutant->truth.clear();
+  for (const InjectedFault& one : mutant->faults) {
     RunMutant alone;
     VectorXd end;
-    if (!RunPlant(each[i], &alone, &end, should_stop)) return false;
-    if (alone.killed) found.push_back(mutant->truth[i]);
+    if (!RunFault(one, &alone, &end, should_stop)) return false;
+    if (alone.killed) mutant->truth.insert(mutant->truth.end(), one.truth.begin(), one.truth.end());
   }
-  mutant->truth = found;
   return true;
 }
 
 bool RunCampaign::Run(size_t index, const std::function<bool()>& should_stop) {
   RunMutant& mutant = mutants_[index];
   VectorXd end;
-  if (!RunFault(index, &end, should_stop)) return false;
-  const VectorXd& right = IsLaw(index) ? offsetd_end_ : end_;
-  mutant.no_effect = !mutant.killed && end.size() == right.size() && right.size() > 0 &&
-                     (end - right).lpNorm<Eigen::Infinity>() < kSameMotion;
-  return true;
-}
-
-bool RunCampaign::RunFault(size_t index, VectorXd* end, const std::function<bool()>& should_stop) {
-  RunMutant& mutant = mutants_[index];
   try {
-    if (index < parameters_.size()) {
-      const RobotModel model = ChangeNumber(setup_->model().spec(), parameters_[index], options_.scale);
-      const std::unique_ptr<Setup> setup = MakeSetup(setup_->scenario(), &model);
-      LoopParts parts = MakeLoopParts(*setup);
-      GoToStart(parts);
-      return RunLoop(*setup, std::move(parts), &mutant, end, should_stop);
-    }
-    const bool is_law = IsLaw(index);
-    index -= parameters_.size();
-    if (!is_law) index -= laws_.size();
-    const bool is_equation = !is_law && index < equations_.size();
-    if (!is_law && !is_equation) {
-      index -= equations_.size();
-      if (!singles_.empty() && !KeepFound(singles_[index], &mutant, should_stop)) return false;
-      return RunPlant(plants_[index], &mutant, end, should_stop);
-    }
-    const Setup& setup = is_law ? *offsetd_ : *setup_;
-    LoopParts parts = MakeLoopParts(setup);
-    GoToStart(parts);
-    if (is_law) {
-      parts.controller = std::make_unique<FaultyLaw>(setup, laws_[index]);
-    } else {
-      parts.controller = std::make_unique<FaultyLaw>(setup, equations_[index]);
-    }
-    return RunLoop(setup, std::move(parts), &mutant, end, should_stop);
+    if (!FindTruth(&mutant, should_stop) || !RunFault(mutant.all, &mutant, &end, should_stop)) return false;
   } catch (const InputError& error) {
     mutant.refused = true;
     mutant.failure = error.what();
     return true;
   }
+  const VectorXd& right = mutant.all.needs_error && offset_end_.size() > 0 ? offset_end_ : end_;
+  mutant.no_effect = !mutant.killed && end.size() == right.size() && right.size() > 0 &&
+                     (end - right).lpNorm<Eigen::Infinity>() < kSameMotion;
+  return true;
 }
 
 }  // namespace dexcheck

@@ -9,23 +9,18 @@
 #include <string>
 #include <vector>
 
-#include "harness/diagnosis/drawn_faults.h"
-#include "harness/diagnosis/faulty_law.h"
-#include "harness/diagnosis/parameters.h"
-#include "harness/diagnosis/plant_faults.h"
+#include "harness/diagnosis/injection/drawn_faults.h"
 #include "harness/run/run_mutation_options.h"
 #include "harness/run/runner.h"
 
 namespace dexcheck {
 
-/// One fault, and what a run with it came to.
+/// Faults that are made at once, and what a run with them came to.
 struct RunMutant {
-  std::string kind;  ///< "law", "motor", "sensor", ...: what a table sums up by.
-  std::string name;
-  Cause expected = Cause::kNone;
-  std::string part;             ///< What the evidence should name; empty for nothing.
-  std::vector<Fault> truth;     ///< Of drawn faults that are found alone: how they should be told.
-  std::vector<Fault> injected;  ///< The others likewise.
+  FaultSet faults;    ///< Each by itself.
+  InjectedFault all;  ///< Together.
+  /// How those should be named that are found where they are alone: the others have no effect.
+  std::vector<Fault> truth = {};
 
   bool refused = false;  ///< There is no such robot, or the scenario cannot be run with it.
   bool killed = false;   ///< The verdict is not "pass".
@@ -33,16 +28,18 @@ struct RunMutant {
   /// hold, a number that no motion shows.
   bool no_effect = false;
   Cause cause = Cause::kNone;
-  bool names_part = false;  ///< The evidence has `part` in it.
-  std::string evidence;
-  NamingScore score;            ///< Of drawn faults.
-  std::string causes;           ///< All explanations, in words.
-  std::string failure;          ///< Why the run ended early; empty when it did not.
-  std::string failed_checks;    ///< Names, separated by blanks.
-  double position_error = 0.0;  ///< Largest of the object, m.
-  bool is_as_expected = true;   ///< Whether the object was where [expect] wants it.
+  std::string evidence = {};
+  NamingScore score = {};          ///< Of faults with a size.
+  std::string causes = {};         ///< All explanations, in words.
+  std::string failure = {};        ///< Why the run ended early; empty when it did not.
+  std::string failed_checks = {};  ///< Names, separated by blanks.
+  double position_error = 0.0;     ///< Largest of the object, m.
+  bool is_as_expected = true;      ///< Whether the object was where [expect] wants it.
 
-  [[nodiscard]] bool has_right_cause() const { return killed && cause == expected; }
+  [[nodiscard]] bool has_right_cause() const { return killed && cause == all.cause; }
+  /// Whether all of `truth` is named, with its values, and nothing else; of faults without a size, whether
+  /// the evidence has their part.
+  [[nodiscard]] bool is_named() const;
 };
 
 /// All runs of one scenario. The right robot settles and moves up to options.from once; every fault starts
@@ -68,35 +65,24 @@ class RunCampaign {
   /// @param offset by which X_d jumps at the beginning, m and rad.
   [[nodiscard]] Scenario MakeScenario(double from, double duration, double offset) const;
   [[nodiscard]] std::unique_ptr<Setup> MakeSetup(const Scenario& scenario, const RobotModel* model) const;
-  /// @param end gets the engine's positions and rates at the end.
   bool RunLoop(const Setup& setup, LoopParts parts, RunMutant* mutant, VectorXd* end,
                const std::function<bool()>& should_stop);
-  bool RunPlant(const PlantFault& fault, RunMutant* mutant, VectorXd* end,
+  /// @param end gets the engine's positions and rates at the end. @returns as Run.
+  bool RunFault(const InjectedFault& fault, RunMutant* mutant, VectorXd* end,
                 const std::function<bool()>& should_stop);
-  /// Of a drawn set's truth keeps what is found where it is alone: the rest has no effect. @returns as Run.
-  bool KeepFound(const std::vector<PlantFault>& each, RunMutant* mutant,
-                 const std::function<bool()>& should_stop);
-  /// Of the fault with this index. @returns as Run.
-  bool RunFault(size_t index, VectorXd* end, const std::function<bool()>& should_stop);
-  [[nodiscard]] bool IsLaw(size_t index) const {
-    return index >= parameters_.size() && index < parameters_.size() + laws_.size();
-  }
+  /// Fills `truth`. @returns as Run.
+  bool FindTruth(RunMutant* mutant, const std::function<bool()>& should_stop);
   void RequireNoFaultToPass(const std::function<bool()>& should_stop);
 
   Scenario scenario_;
   std::filesystem::path robot_, mjcf_;
   RunMutationOptions options_;
   MjModelPtr compiled_;
-  std::optional<EngineState> start_;   // of a trajectory; joints begin at their beginning
-  std::unique_ptr<Setup> setup_;       // of the right robot, from the start
-  std::unique_ptr<Setup> offsetd_;     // the same with an error that feedback has to answer
-  VectorXd end_, offsetd_end_;         // where they come to without a fault
-  VectorXd tau_;                       // that they end with, in the first of both
-  std::vector<Parameter> parameters_;  // by mutant, those of numbers first
-  std::vector<LawFault> laws_;
-  std::vector<EquationFault> equations_;
-  std::vector<PlantFault> plants_;
-  std::vector<std::vector<PlantFault>> singles_;  // of drawn sets, each alone
+  std::optional<EngineState> start_;     // of a trajectory; joints begin at their beginning
+  std::unique_ptr<Setup> setup_;         // of the right robot, from the start
+  std::unique_ptr<Setup> offset_setup_;  // the same with an error that feedback has to answer
+  VectorXd end_, offset_end_;            // where they come to without a fault
+  VectorXd tau_;                         // that they end with, in the first of both
   std::vector<RunMutant> mutants_;
 };
 

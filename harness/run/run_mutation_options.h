@@ -1,6 +1,8 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
+#include <vector>
 
 namespace dexcheck {
 
@@ -14,7 +16,9 @@ struct RunMutationOptions {
   double scale = 1e-3;    ///< By how much, relative to GetScale.
   bool laws = true;
   bool equations = true;
-  bool plants = true;
+  bool plants =
+      true;  ///< One fault of each kind in plant, motors, sensors and law, its place and size drawn.
+  std::vector<std::string> kinds = {};  ///< Of FaultKind::kind, out of which is drawn; empty for all.
   /// Sets of faults whose places, sizes and times are drawn, in the place of all of these; 0 for none.
   int draws = 0;
   int together = 1;  ///< Faults of a set.

@@ -1,4 +1,4 @@
-#include "harness/diagnosis/faulty_law.h"
+#include "harness/diagnosis/injection/faulty_law.h"
 
 #include <cmath>
 #include <string_view>
@@ -146,6 +146,18 @@ void FaultyLaw::Step(const Reading& reading, double t, Command* command) {
 }
 
 void FaultyLaw::CalcTorque(const MeasuredState& state, double t, Command* command) {
+  is_wrong_ = has_begun_ && fault_.entries.empty();
+  CalcTorque(state, t, /*chooses=*/true, command);
+  if (!has_begun_ || fault_.entries.empty()) return;
+  // The fault is in some entries alone, with the internal force of all others.
+  right_ = command->tau;
+  is_wrong_ = true;
+  CalcTorque(state, t, /*chooses=*/false, command);
+  for (const Eigen::Index entry : fault_.entries) right_[entry] = command->tau[entry];
+  command->tau = right_;
+}
+
+void FaultyLaw::CalcTorque(const MeasuredState& state, double t, bool chooses, Command* command) {
   DesiredMotion desired = command->desired;
   if (Has(LawFaultKind::kLate)) {
     desired = TrajectoryController::EvaluateDesired(*motion_, t - time_step_, time_step_);
@@ -155,7 +167,7 @@ void FaultyLaw::CalcTorque(const MeasuredState& state, double t, Command* comman
   const Vector6d V_Bo_dot = factor(AllParts().demand) * CalcObjectAcceleration(desired);
   FactorJacobian();
   SetMotion(state, V_Bo_dot);
-  SolveForces(V_Bo_dot);
+  SolveForces(V_Bo_dot, chooses);
   SendTorques(command);
   command->demand.V_Bo_dot = V_Bo_dot;
   command->demand.xi_dot = xi_dot_d_;
@@ -224,7 +236,7 @@ void FaultyLaw::SetMotion(const MeasuredState& state, const Vector6d& V_Bo_dot) 
   xi_dot_d_ += factor(part.sigma) * sigma_prime_;
 }
 
-void FaultyLaw::SolveForces(const Vector6d& V_Bo_dot) {
+void FaultyLaw::SolveForces(const Vector6d& V_Bo_dot, bool chooses) {
   const Parts& part = AllParts();
   const GraspTerms& grasp = model_.grasp();
   const ObjectBodyTerms& body = grasp.body();
@@ -232,13 +244,15 @@ void FaultyLaw::SolveForces(const Vector6d& V_Bo_dot) {
   // F_o = M_hat V_dot + C_hat V + N_o
   F_o_ = factor(part.F_o) * (factor(part.M_o) * (body.M_hat * V_Bo_dot) +
                              factor(part.C_o) * (body.C_hat * grasp.V_Bo()) + factor(part.N_o) * body.N_o);
-  problem_.G = grasp.G();
-  problem_.F_o = F_o_;
-  const GraspForceResult& result = solver_.Solve(problem_);
-  RequireGraspForce(result);
-  // F_N = f_c - G^+ F_o
   G_pinv_.Apply(F_o_, f_c_);
-  F_N_ = result.f_c - f_c_;
+  if (chooses) {
+    problem_.G = grasp.G();
+    problem_.F_o = F_o_;
+    const GraspForceResult& result = solver_.Solve(problem_);
+    RequireGraspForce(result);
+    // F_N = f_c - G^+ F_o
+    F_N_ = result.f_c - f_c_;
+  }
   if (Has(LawFaultKind::kGraspTransposed)) f_c_.noalias() = grasp.G().transpose() * F_o_;
   f_c_ += factor(part.F_N) * F_N_;
   if (!Has(LawFaultKind::kForceAxes)) return;

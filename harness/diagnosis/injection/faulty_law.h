@@ -41,6 +41,7 @@ struct LawFault {
   size_t part = SIZE_MAX;  ///< In ListLawParts; its name is what the evidence should say.
   double factor = 1.0;     ///< Of that part: 0 leaves it out.
   LawFaultKind kind = LawFaultKind::kNone;
+  std::vector<Eigen::Index> entries = {};  ///< Of tau' that have it; empty for all.
 };
 
 /// Each part of the law a thousandth too large and left out, then gravity upside down and the other kinds,
@@ -66,16 +67,18 @@ class FaultyLaw final : public Controller {
   [[nodiscard]] const GraspModel& model() const override { return model_; }
 
  private:
-  [[nodiscard]] bool Has(LawFaultKind kind) const { return has_begun_ && fault_.kind == kind; }
+  [[nodiscard]] bool Has(LawFaultKind kind) const { return is_wrong_ && fault_.kind == kind; }
   /// Of a part by its number in ListLawParts.
   [[nodiscard]] double factor(size_t part) const {
-    return has_begun_ && fault_.part == part ? fault_.factor : 1.0;
+    return is_wrong_ && fault_.part == part ? fault_.factor : 1.0;
   }
   void CalcTorque(const MeasuredState& state, double t, Command* command);
+  /// @param chooses whether F_N is chosen, and not that of before.
+  void CalcTorque(const MeasuredState& state, double t, bool chooses, Command* command);
   [[nodiscard]] Vector6d CalcObjectAcceleration(const DesiredMotion& desired) const;
   void FactorJacobian();
   void SetMotion(const MeasuredState& state, const Vector6d& V_Bo_dot);
-  void SolveForces(const Vector6d& V_Bo_dot);
+  void SolveForces(const Vector6d& V_Bo_dot, bool chooses);
   void SendTorques(Command* command);
 
   GraspControllerOptions options_;
@@ -91,7 +94,8 @@ class FaultyLaw final : public Controller {
   long steps_until_due_ = 0;
   int exchanged_ = 0;  // entry of tau'
   const Trajectory* motion_ = nullptr;
-  bool has_begun_ = false;
+  bool has_begun_ = false, is_wrong_ = false;
+  VectorXd right_;  // n, torques without the fault
   Vector6d F_o_ = Vector6d::Zero();
   VectorXd xi_c_, xi_dot_d_, sigma_prime_, force_, work_;  // n
   VectorXd f_c_, F_N_, rates_;                             // 3N

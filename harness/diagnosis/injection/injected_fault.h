@@ -1,7 +1,8 @@
 #pragma once
 
-// Plants that are wrong on purpose: what stands between controller and engine, or acts on the engine's
-// bodies, without the judge being told. Do the checks find it, and measure what it is?
+// Faults that are made in a run on purpose: in what stands between controller and engine, in what acts on the
+// engine's bodies, in the controller and its model, without the judge being told. Do the checks find them,
+// and are they named? Nothing in this folder knows the signatures that they are recognised by.
 
 #include <functional>
 #include <memory>
@@ -9,43 +10,45 @@
 #include <vector>
 
 #include "harness/checks/failure_cause.h"
+#include "harness/diagnosis/causes.h"
 #include "harness/plant/engine_plant.h"
 #include "harness/scenario/setup.h"
 
 namespace dexcheck {
 
-/// Changes what the motors give: tau' (n) at time t, s.
+/// Changes the motors' torques: tau' (n) at time t, s.
 using MotorFault = std::function<void(double t, VectorXd* tau)>;
-/// Changes what the controller is told at time t, s.
-using SensorFault = std::function<void(double t, MeasuredState* told)>;
+/// Changes the measured state at time t, s.
+using SensorFault = std::function<void(double t, MeasuredState* measured)>;
 
-/// One fault. Its members are called for each run anew, so that none remembers another's.
-struct PlantFault {
+/// One fault, or several at once. Its members are called for each run anew, so that none remembers another's.
+struct InjectedFault {
   std::string name;            ///< "motor r_elbow: gain 0.99".
   std::string kind;            ///< "motor": what a table sums up by.
   Cause cause = Cause::kNone;  ///< That the verdict should have.
-  std::string part = {};       ///< What the evidence should name; empty for nothing.
+  std::string part = {};       ///< What evidence or failed checks should name; empty for nothing.
+  /// How it should be named; `error` is by how much it changes its value. Empty for what has no size.
+  std::vector<Fault> truth = {};
   /// Whether it is there before the robot settles: a step of the contacts' geometry would throw it.
   bool from_start = false;
+  /// Whether it shows only where feedback has something to correct.
+  bool needs_error = false;
   std::function<void(const Setup&, mjModel*)> engine = {};             ///< Changes bodies and constraints.
-  std::function<void(const mjModel&, double t, mjData*)> forces = {};  ///< Sets xfrc_applied.
+  std::function<void(const mjModel&, double t, mjData*)> forces = {};  ///< Adds to xfrc_applied.
   std::function<MotorFault(const Setup&)> motors = {};
   std::function<SensorFault(const Setup&)> sensors = {};
+  /// In the place of the right one, or around it.
+  std::function<std::unique_ptr<Controller>(const Setup&, std::unique_ptr<Controller> right)> controller = {};
+  std::function<RobotModel(const RobotModel&)> model = {};  ///< That the controller goes by.
 };
 
-/// Faults of motors, of joints, links and object, of floor, wheels and contacts, of sensors and of the
-/// solver: those that there can be of the scenario's robot, at joints and links along its arm and fingers.
-std::vector<PlantFault> ListPlantFaults(const Setup& setup);
-
-/// What of a wheel, 0 the right one or 1, touches the floor gets a radius that is larger by `by`, m.
-void ScaleWheel(const Setup& setup, mjModel* m, size_t wheel, double by);
-/// Wheels that are farther apart by `by`, m.
-void MoveWheels(const Setup& setup, mjModel* m, double by);
+/// Both at once. At most one of them has a controller, and one a model.
+InjectedFault Join(const InjectedFault& first, const InjectedFault& second);
 
 /// The engine's simulation with a fault.
 class FaultyPlant final : public Plant {
  public:
-  FaultyPlant(const Setup& setup, std::unique_ptr<EnginePlant> plant, const PlantFault& fault);
+  FaultyPlant(const Setup& setup, std::unique_ptr<EnginePlant> plant, const InjectedFault& fault);
 
   [[nodiscard]] double time_step() const override { return plant_->time_step(); }
   [[nodiscard]] std::span<const Motor> motors() const override { return plant_->motors(); }

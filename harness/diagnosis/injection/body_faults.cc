@@ -1,0 +1,253 @@
+// Joints, links and objects that are not as they are described, and what pulls at them.
+
+#include <cmath>
+
+#include "harness/diagnosis/injection/fault_kinds.h"
+
+namespace dexcheck {
+namespace {
+
+// Joints.
+
+InjectedFault ChangeJoint(const Joint& joint, const char* name, double nominal, double more,
+                          const std::function<void(mjModel*, int id, int dof)>& change) {
+  InjectedFault fault = FaultAt("joint " + joint.name, name, nominal + more, more);
+  fault.engine = [change, name = joint.name](const Setup&, mjModel* m) {
+    const int id = FindId(*m, mjOBJ_JOINT, name);
+    change(m, id, m->jnt_dofadr[id]);
+  };
+  return fault;
+}
+
+double DrawForce(const FaultContext& context) { return context.draw->Positive(2e-3, 0.1); }
+
+InjectedFault Armature(const FaultContext& context) {
+  const Joint& joint = context.DrawJoint();
+  const double size = DrawForce(context);
+  return ChangeJoint(joint, "armature", joint.armature, size,
+                     [size](mjModel* m, int, int dof) { m->dof_armature[dof] += size; });
+}
+
+InjectedFault Damping(const FaultContext& context) {
+  const Joint& joint = context.DrawJoint();
+  const double size = DrawForce(context);
+  return ChangeJoint(joint, "viscous friction", joint.damping, size,
+                     [size](mjModel* m, int, int dof) { m->dof_damping[dof] += size; });
+}
+
+InjectedFault DryFriction(const FaultContext& context) {
+  const Joint& joint = context.DrawJoint();
+  const double size = DrawForce(context);
+  return ChangeJoint(joint, "dry friction", joint.dry_friction, size,
+                     [size](mjModel* m, int, int dof) { m->dof_frictionloss[dof] += size; });
+}
+
+InjectedFault Spring(const FaultContext& context) {
+  const double size = DrawForce(context);
+  const double relaxed = context.draw->Uniform(0.1, 0.5);
+  return ChangeJoint(context.DrawJoint(), "spring", 0.0, size, [=](mjModel* m, int id, int) {
+    m->jnt_stiffness[id] = size;
+    m->qpos_spring[m->jnt_qposadr[id]] = relaxed;
+  });
+}
+
+/// A range that ends a little before where the joint begins.
+InjectedFault HiddenLimit(const FaultContext& context) {
+  const Joint& joint = context.DrawJoint();
+  InjectedFault fault =
+      FaultAt("joint " + joint.name + ": a hidden limit", Cause::kUnmodelledForce, joint.name);
+  const int row = context.model().num_base_positions() + context.model().FindJoint(joint.name);
+  fault.engine = [q = context.setup.start().q[row], name = joint.name](const Setup&, mjModel* m) {
+    constexpr double kBeyond = 0.0085, kRange = 1.6;  // rad or m
+    const int id = FindId(*m, mjOBJ_JOINT, name);
+    m->jnt_limited[id] = 1;
+    m->jnt_range[2 * id] = q - kRange;
+    m->jnt_range[2 * id + 1] = q - kBeyond;
+    m->jnt_solref[mjNREF * id] = 0.2;
+  };
+  return fault;
+}
+
+/// A force or torque between the joint's body and the one that carries it.
+void PushJoint(const mjModel& m, int joint, double size, mjData* d) {
+  const int body = m.jnt_bodyid[joint], parent = m.body_parentid[body];
+  const Vector3d push = size * Eigen::Map<const Vector3d>(d->xaxis + 3 * joint);
+  const bool slides = m.jnt_type[joint] == mjJNT_SLIDE;
+  const Vector3d arm =
+      Eigen::Map<const Vector3d>(d->xipos + 3 * body) - Eigen::Map<const Vector3d>(d->xipos + 3 * parent);
+  Vector6d wrench = Vector6d::Zero();
+  if (slides) {
+    wrench << push, Vector3d::Zero();
+  } else {
+    wrench << Vector3d::Zero(), push;
+  }
+  Eigen::Map<Vector6d>(d->xfrc_applied + 6 * body) += wrench;
+  if (parent == 0) return;
+  wrench.tail<3>() += arm.cross(wrench.head<3>());
+  Eigen::Map<Vector6d>(d->xfrc_applied + 6 * parent) -= wrench;
+}
+
+InjectedFault Torque(const FaultContext& context) {
+  const Joint& joint = context.DrawJoint();
+  const double size = DrawForce(context);
+  InjectedFault fault = FaultAt("joint " + joint.name, "torque", size, size);
+  fault.forces = [name = joint.name, size](const mjModel& m, double, mjData* d) {
+    PushJoint(m, FindId(m, mjOBJ_JOINT, name), size, d);
+  };
+  return fault;
+}
+
+// Links and object.
+
+/// A body that the model has as one, too: the engine's may be one of several.
+struct Body {
+  std::string place, name;
+  const MassProperties* mass;
+  bool is_object;
+};
+
+Body ObjectBody(const FaultContext& context) {
+  const std::string& name = context.setup.object().name;
+  return {"object " + name, name, &context.setup.object().body, true};
+}
+
+Body DrawLink(const FaultContext& context) {
+  std::vector<const Joint*> links;
+  for (const Joint& joint : context.model().joints()) {
+    const int id = FindId(context.setup.engine(), mjOBJ_BODY, joint.link);
+    constexpr double kSame = 1e-6;
+    if (joint.body.mass > 0.0 &&
+        std::abs(context.setup.engine().body_mass[id] - joint.body.mass) <= kSame * joint.body.mass)
+      links.push_back(&joint);
+  }
+  const Joint& link = *links[context.draw->Index(links.size())];
+  return {"link " + link.link, link.link, &link.body, false};
+}
+
+Body DrawBody(const FaultContext& context) {
+  return context.holds() && context.setup.has_object() && context.draw->Index(4) == 0 ? ObjectBody(context)
+                                                                                      : DrawLink(context);
+}
+
+InjectedFault Mass(const FaultContext& context) {
+  const Body body = DrawBody(context);
+  const double factor = 1.0 + context.draw->Positive(0.01, 0.2);
+  InjectedFault fault =
+      FaultAt(body.place, "mass", factor * body.mass->mass, (factor - 1.0) * body.mass->mass);
+  fault.engine = [name = body.name, factor](const Setup&, mjModel* m) {
+    m->body_mass[FindId(*m, mjOBJ_BODY, name)] *= factor;
+  };
+  return fault;
+}
+
+InjectedFault CenterOfMass(const FaultContext& context) {
+  const Body body = DrawLink(context);
+  const double size = context.draw->Positive(1e-3, 2e-2);
+  const Vector3d way = size * context.draw->Direction();
+  InjectedFault fault = FaultAt(body.place, "centre of mass off by", size, size);
+  fault.engine = [name = body.name, way](const Setup&, mjModel* m) {
+    const int id = FindId(*m, mjOBJ_BODY, name);
+    for (int k = 0; k < 3; ++k) m->body_ipos[3 * id + k] += way[k];
+  };
+  return fault;
+}
+
+InjectedFault Inertia(const FaultContext& context) {
+  const Body body = ObjectBody(context);
+  const double factor = 1.0 + context.draw->Positive(0.05, 1.0);
+  Eigen::Matrix<double, 6, 1> entries;
+  const Matrix3d& I = body.mass->inertia;
+  entries << I(0, 0), I(1, 1), I(2, 2), I(0, 1), I(0, 2), I(1, 2);
+  const double change = (factor - 1.0) * entries.norm();
+  InjectedFault fault = FaultAt(body.place, "inertia", change, change);
+  fault.engine = [name = body.name, factor](const Setup&, mjModel* m) {
+    const int id = FindId(*m, mjOBJ_BODY, name);
+    for (int k = 0; k < 3; ++k) m->body_inertia[3 * id + k] *= factor;
+  };
+  return fault;
+}
+
+/// A force, or moment, on a body from `begin` to `end`, s, in a drawn direction of the world.
+InjectedFault Push(const FaultContext& context, bool is_moment, double begin, double end) {
+  const Body body = DrawBody(context);
+  const double size = context.draw->Positive(body.is_object ? 1e-3 : 1e-2, body.is_object ? 0.1 : 2.0) *
+                      (is_moment ? 0.1 : 1.0);
+  const Vector3d push = size * context.draw->Direction();
+  InjectedFault fault = FaultAt(body.place, is_moment ? "moment" : "force at its centre of mass", size, size);
+  fault.forces = [=, name = body.name](const mjModel& m, double t, mjData* d) {
+    if (t < begin || t >= end) return;
+    Eigen::Map<Vector3d>(d->xfrc_applied + 6 * FindId(m, mjOBJ_BODY, name) + (is_moment ? 3 : 0)) += push;
+  };
+  return fault;
+}
+
+constexpr double kAlways = 1e9;  // s
+
+InjectedFault Force(const FaultContext& context) { return Push(context, false, 0.0, kAlways); }
+InjectedFault Moment(const FaultContext& context) { return Push(context, true, 0.0, kAlways); }
+InjectedFault ForceForAWhile(const FaultContext& context) {
+  const double begin = context.draw->Uniform(0.0, 0.5 * context.duration);
+  return Push(context, false, begin, begin + 0.3 * context.duration);
+}
+InjectedFault MomentForAWhile(const FaultContext& context) {
+  const double begin = context.draw->Uniform(0.0, 0.5 * context.duration);
+  return Push(context, true, begin, begin + 0.3 * context.duration);
+}
+
+InjectedFault Tether(const FaultContext& context) {
+  const Body body = ObjectBody(context);
+  const double stiffness = context.draw->Positive(0.1, 2.0);
+  const Vector3d fixed = context.setup.start().X_Bo.translation() + 0.12 * context.draw->Direction();
+  InjectedFault fault = FaultAt(body.place, "tether", stiffness, stiffness);
+  fault.forces = [=, name = body.name](const mjModel& m, double, mjData* d) {
+    const int id = FindId(m, mjOBJ_BODY, name);
+    Eigen::Map<Vector3d>(d->xfrc_applied + 6 * id) +=
+        stiffness * (fixed - Eigen::Map<const Vector3d>(d->xpos + 3 * id));
+  };
+  return fault;
+}
+
+InjectedFault Drag(const FaultContext& context) {
+  const Body body = ObjectBody(context);
+  const double drag = context.draw->Positive(0.02, 0.5);
+  InjectedFault fault = FaultAt(body.place, "drag", drag, drag);
+  fault.forces = [=, name = body.name](const mjModel& m, double, mjData* d) {
+    const int id = FindId(m, mjOBJ_BODY, name);
+    Eigen::Map<Vector3d>(d->xfrc_applied + 6 * id) -=
+        drag * Eigen::Map<const Vector3d>(d->qvel + m.jnt_dofadr[m.body_jntadr[id]]);
+  };
+  return fault;
+}
+
+bool HasObject(const FaultContext& context) { return context.holds() && context.setup.has_object(); }
+/// Whether the object moves: still things have no inertia or drag that shows.
+bool MovesObject(const FaultContext& context) {
+  const std::unique_ptr<Trajectory> way = HasObject(context) ? context.setup.MakeTrajectory() : nullptr;
+  return way != nullptr && way->Evaluate(0.5 * context.duration).X_d_dot.norm() > 1e-3;
+}
+
+constexpr const char* kJoint = "joint";
+constexpr const char* kBody = "body";
+constexpr FaultKind kKinds[] = {
+    {kJoint, "armature", Armature},
+    {kJoint, "viscous friction", Damping},
+    {kJoint, "dry friction", DryFriction},
+    {kJoint, "spring", Spring},
+    {kJoint, "torque", Torque},
+    {kJoint, "hidden limit", HiddenLimit},
+    {kBody, "mass", Mass},
+    {kBody, "centre of mass", CenterOfMass},
+    {kBody, "inertia", Inertia, MovesObject},
+    {kBody, "force", Force},
+    {kBody, "moment", Moment},
+    {kBody, "force for a while", ForceForAWhile},
+    {kBody, "moment for a while", MomentForAWhile},
+    {kBody, "tether", Tether, HasObject},
+    {kBody, "drag", Drag, MovesObject},
+};
+
+}  // namespace
+
+std::span<const FaultKind> ListBodyFaultKinds() { return kKinds; }
+
+}  // namespace dexcheck

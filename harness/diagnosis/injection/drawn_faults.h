@@ -1,0 +1,42 @@
+#pragma once
+
+// Sets of faults whose kinds, places, sizes and times are drawn, and whether they are named.
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "harness/diagnosis/injection/fault_kinds.h"
+
+namespace dexcheck {
+
+struct DrawOptions {
+  size_t count = 0;     ///< Of sets.
+  size_t together = 1;  ///< Faults in each.
+  std::uint64_t seed = 1;
+  double duration = 0.0;           ///< Of the run, s.
+  VectorXd tau;                    ///< tau' (n) of the right run.
+  std::vector<std::string> kinds;  ///< Of FaultKind::kind, out of which is drawn; empty for all.
+};
+
+/// Kinds that apply to the run. @throws InputError when there are none.
+std::vector<FaultKind> ListFaultKinds(const Setup& setup, const DrawOptions& options);
+
+/// Faults that are there at once, each by itself.
+using FaultSet = std::vector<InjectedFault>;
+/// Sets of kinds that are drawn; no two faults of a set at the same place.
+std::vector<FaultSet> DrawFaults(const Setup& setup, const DrawOptions& options);
+/// One fault of each kind, `count` times.
+std::vector<FaultSet> DrawEachKind(const Setup& setup, const DrawOptions& options);
+
+/// How the explanations of a run compare with what was wrong in it.
+struct NamingScore {
+  int right = 0;     ///< Named: kind, place, and value within 5 % of the change or 3 standard errors.
+  int in_class = 0;  ///< Named with others that this motion does not tell apart.
+  int not_explained = 0;
+  int wrong = 0;  ///< Single names, or values, of what was not so.
+};
+/// @param truth what should be named. @param all what may be, besides: too small to be seen alone.
+NamingScore ScoreNames(const std::vector<Fault>& truth, const std::vector<Fault>& all, const Causes& causes);
+
+}  // namespace dexcheck

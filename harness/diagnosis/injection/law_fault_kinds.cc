@@ -1,0 +1,221 @@
+// Laws whose torques are not those that they should be: of all joints, or of one joint, wheel or finger.
+
+#include <algorithm>
+#include <cmath>
+
+#include "controller/control/joint_controller.h"
+#include "controller/control/trajectory_controller.h"
+#include "harness/diagnosis/injection/fault_kinds.h"
+#include "harness/diagnosis/injection/faulty_law.h"
+
+namespace dexcheck {
+namespace {
+
+/// Entries of tau' that belong together.
+struct Place {
+  std::string name;
+  std::vector<Eigen::Index> entries;  ///< Empty for all.
+};
+
+Place OneJoint(const FaultContext& context) {
+  const Joint& joint = context.DrawJoint();
+  return {"law of " + joint.name,
+          {context.model().num_base_velocities() + context.model().FindJoint(joint.name)}};
+}
+
+Place OneFinger(const FaultContext& context) {
+  const std::vector<int>& tips = context.setup.fingertips();
+  const Frame& frame = context.model().frames()[static_cast<size_t>(tips[context.draw->Index(tips.size())])];
+  Place finger{"law of the finger of " + frame.name, {}};
+  const std::vector<int>& arm = context.setup.hold().arm_joints;
+  for (int joint = frame.link; joint >= 0;
+       joint = context.model().joints()[static_cast<size_t>(joint)].parent)
+    if (std::find(arm.begin(), arm.end(), joint) == arm.end())
+      finger.entries.push_back(context.model().num_base_velocities() + context.model().dof(joint));
+  return finger;
+}
+
+Place DrawPlace(const FaultContext& context) {
+  const Base& base = context.model().base();
+  switch (context.draw->Index(context.rolls() ? 4 : context.holds() ? 3 : 2)) {
+    case 0:
+      return {"law", {}};
+    case 1:
+      return OneJoint(context);
+    case 2:
+      return OneFinger(context);
+    default:
+      return context.draw->Index(2) == 0 ? Place{"law of " + base.wheel_joint_right, {0}}
+                                         : Place{"law of " + base.wheel_joint_left, {1}};
+  }
+}
+
+double DrawFactor(const FaultContext& context) {
+  constexpr double kWhole[] = {0.0, -1.0, 2.0};
+  const size_t which = context.draw->Index(6);
+  return which < std::size(kWhole) ? kWhole[which] : 1.0 + context.draw->Size(1e-3, 0.3);
+}
+
+InjectedFault LawFaultAt(const Place& place, const std::string& fault, double value, double nominal) {
+  InjectedFault one = FaultAt(place.name, fault, value, value - nominal);
+  one.needs_error = true;
+  return one;
+}
+
+bool IsOfJoints(const Setup& setup) { return setup.scenario().joint_task() != nullptr; }
+bool IsPaperLaw(const FaultContext& context) {
+  return !IsOfJoints(context.setup) && context.setup.scenario().control.law == ControlLaw::kComputedTorque;
+}
+bool KnowsMotion(const FaultContext& context) {
+  return context.setup.scenario().control.law != ControlLaw::kPdGravity;
+}
+
+InjectedFault Summand(const FaultContext& context) {
+  const std::span<const LawPartName> parts = ListLawParts();
+  const size_t part = context.draw->Index(parts.size());
+  const Place place = DrawPlace(context);
+  const double factor = DrawFactor(context);
+  InjectedFault one =
+      LawFaultAt(place, std::string(parts[part].name) + " (" + parts[part].symbol + "), factor", factor, 1.0);
+  one.controller = [fault =
+                        LawFault{.name = one.name, .part = part, .factor = factor, .entries = place.entries}](
+                       const Setup& setup, std::unique_ptr<Controller> /*right*/) {
+    return std::make_unique<FaultyLaw>(setup, fault);
+  };
+  return one;
+}
+
+/// A right law of any kind, with something added to its torques.
+class ChangedLaw final : public Controller {
+ public:
+  /// Adds to tau' (n). @param model as the controller evaluated it.
+  using Change = std::function<void(const Reading& reading, const GraspModel& model, VectorXd* tau)>;
+  ChangedLaw(std::unique_ptr<Controller> right, Change change)
+      : right_(std::move(right)), change_(std::move(change)) {}
+
+  void Follow(const Trajectory& motion) override { right_->Follow(motion); }
+  void Begin(double t, const Reading& reading) override {
+    right_->Begin(t, reading);
+    has_begun_ = true;
+  }
+  void Step(const Reading& reading, double t, Command* command) override {
+    right_->Step(reading, t, command);
+    if (has_begun_) change_(reading, right_->model(), &command->tau);
+  }
+  [[nodiscard]] const GraspModel& model() const override { return right_->model(); }
+
+ private:
+  std::unique_ptr<Controller> right_;
+  Change change_;
+  bool has_begun_ = false;
+};
+
+/// A summand of F_bar' times a factor. @param get the summand (n), by the controller's own model.
+InjectedFault PartOfF(const FaultContext& context, const std::string& name,
+                      const VectorXd& (*get)(const ModelTerms&)) {
+  const Place place = DrawPlace(context);
+  const double factor = DrawFactor(context);
+  InjectedFault one = LawFaultAt(
+      place, (IsOfJoints(context.setup) ? name : name + " in F_bar'") + " (F_bar' (" + name + ")), factor",
+      factor, 1.0);
+  one.controller = [=](const Setup& setup, std::unique_ptr<Controller> right) {
+    return std::make_unique<ChangedLaw>(
+        std::move(right),
+        [=, actuation = ActuationMap(setup.model())](const Reading&, const GraspModel& model, VectorXd* tau) {
+          VectorXd part = get(model.robot());
+          actuation.CalcTorque(part, part);
+          if (place.entries.empty()) *tau += (factor - 1.0) * part;
+          for (const Eigen::Index entry : place.entries) (*tau)[entry] += (factor - 1.0) * part[entry];
+        });
+  };
+  return one;
+}
+
+InjectedFault GravityPart(const FaultContext& context) {
+  return PartOfF(context, "gravity",
+                 [](const ModelTerms& terms) -> const VectorXd& { return terms.gravity(); });
+}
+InjectedFault FrictionPart(const FaultContext& context) {
+  return PartOfF(context, "friction",
+                 [](const ModelTerms& terms) -> const VectorXd& { return terms.friction(); });
+}
+
+InjectedFault AddedTorque(const FaultContext& context) {
+  const Place place = OneJoint(context);
+  const double torque = context.draw->Size(1e-3, 0.1);
+  InjectedFault one = LawFaultAt(place, "torque", torque, 0.0);
+  one.controller = [=, entry = place.entries.front()](const Setup&, std::unique_ptr<Controller> right) {
+    return std::make_unique<ChangedLaw>(
+        std::move(right), [=](const Reading&, const GraspModel&, VectorXd* tau) { (*tau)[entry] += torque; });
+  };
+  return one;
+}
+
+InjectedFault AddedFriction(const FaultContext& context) {
+  const Place place = OneJoint(context);
+  const double friction = context.draw->Positive(1e-2, 1.0);
+  InjectedFault one = LawFaultAt(place, "viscous friction", friction, 0.0);
+  one.controller = [=, entry = place.entries.front()](const Setup&, std::unique_ptr<Controller> right) {
+    return std::make_unique<ChangedLaw>(std::move(right),
+                                        [=](const Reading& reading, const GraspModel&, VectorXd* tau) {
+                                          (*tau)[entry] -= friction * reading.state.xi[entry];
+                                        });
+  };
+  return one;
+}
+
+/// All gains of position, or of velocity, times a factor.
+InjectedFault Gains(const FaultContext& context, bool of_velocity) {
+  const double factor = 1.0 + context.draw->Size(1e-3, 0.3);
+  const bool joints = IsOfJoints(context.setup);
+  const size_t part = of_velocity ? 1 : 2;  // in both lists of parts
+  const std::string name =
+      joints ? (of_velocity ? "velocity feedback (K_v e_dot), factor" : "position feedback (K_p e), factor")
+             : std::string(ListLawParts()[part].name) + " (" + ListLawParts()[part].symbol + "), factor";
+  InjectedFault one = LawFaultAt({"law", {}}, name, factor, 1.0);
+  one.controller = [=](const Setup& setup, std::unique_ptr<Controller>) -> std::unique_ptr<Controller> {
+    const Scenario& scenario = setup.scenario();
+    const Sampling sampling{
+        .time_step = 2.0 * scenario.plant.velocity_age(),
+        .hold = std::max(1L, std::lround(scenario.plant.control_step / scenario.plant.time_step))};
+    if (const JointPlan* const plan = setup.joints()) {
+      JointGains gains = plan->gains;
+      for (VectorXd* gain : of_velocity ? std::array{&gains.K_v, &gains.D} : std::array{&gains.K_p, &gains.K})
+        *gain *= factor;
+      return std::make_unique<JointController>(setup.model(), setup.object().body, setup.surface(),
+                                               scenario.control.law, gains, plan->motion, sampling);
+    }
+    GraspControllerOptions options = setup.MakeControllerOptions();
+    (of_velocity ? options.gains.K_v : options.gains.K_p) *= factor;
+    (of_velocity ? options.stiffness.D : options.stiffness.K) *= factor;
+    // D of an impedance follows from K.
+    if (of_velocity) options.stiffness.damping_ratio *= factor;
+    return std::make_unique<TrajectoryController>(setup.model(), setup.fingertips(), setup.object().body,
+                                                  setup.surface(), options, sampling);
+  };
+  return one;
+}
+
+InjectedFault GainsOfPosition(const FaultContext& context) { return Gains(context, false); }
+InjectedFault GainsOfVelocity(const FaultContext& context) { return Gains(context, true); }
+/// With an impedance another stiffness is another damping, too.
+bool HasOwnStiffness(const FaultContext& context) {
+  return IsOfJoints(context.setup) || context.setup.scenario().control.law != ControlLaw::kImpedance;
+}
+
+constexpr const char* kLaw = "law";
+constexpr FaultKind kKinds[] = {
+    {kLaw, "summand", Summand, IsPaperLaw},
+    {kLaw, "gravity", GravityPart},
+    {kLaw, "friction", FrictionPart, KnowsMotion},
+    {kLaw, "torque", AddedTorque},
+    {kLaw, "viscous friction", AddedFriction},
+    {kLaw, "gains of position", GainsOfPosition, HasOwnStiffness},
+    {kLaw, "gains of velocity", GainsOfVelocity},
+};
+
+}  // namespace
+
+std::span<const FaultKind> ListLawFaultKinds() { return kKinds; }
+
+}  // namespace dexcheck

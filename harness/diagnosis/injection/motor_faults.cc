@@ -1,0 +1,259 @@
+// Motors whose torques are not what they were sent.
+
+#include <algorithm>
+#include <cmath>
+#include <deque>
+
+#include "harness/diagnosis/injection/fault_kinds.h"
+
+namespace dexcheck {
+namespace {
+
+/// The torque of a motor that is sent u at time t.
+using Transmit = std::function<double(double u, double t)>;
+
+/// Entry of tau' of a motor that is drawn.
+int DrawEntry(const FaultContext& context) {
+  const int offset = context.model().num_base_velocities();
+  const size_t wheels = context.rolls() ? 2 : 0;
+  const size_t drawn = context.draw->Index(static_cast<size_t>(context.model().num_dofs()) + wheels);
+  return static_cast<int>(drawn) + (context.rolls() ? 0 : offset);
+}
+
+std::string NameMotor(const FaultContext& context, int entry) {
+  const int offset = context.model().num_base_velocities();
+  const Base& base = context.model().base();
+  return "motor " + (entry >= offset ? context.model().dof_name(entry - offset)
+                     : entry == 0    ? base.wheel_joint_right
+                                     : base.wheel_joint_left);
+}
+
+double TorqueOf(const FaultContext& context, int entry) {
+  return std::max(std::abs(context.tau[entry]), 1e-6);
+}
+
+/// @param make a transmission that remembers nothing yet.
+InjectedFault OneMotor(const FaultContext& context, int entry, const std::string& name, double value,
+                       double change, const std::function<Transmit()>& make) {
+  InjectedFault fault = FaultAt(NameMotor(context, entry), name, value, change);
+  fault.motors = [entry, make](const Setup&) -> MotorFault {
+    return
+        [entry, transmit = make()](double t, VectorXd* tau) { (*tau)[entry] = transmit((*tau)[entry], t); };
+  };
+  return fault;
+}
+
+InjectedFault AllMotors(const std::string& name, double value, double change,
+                        const std::function<Transmit()>& make) {
+  InjectedFault fault = FaultAt("all motors", name, value, change);
+  fault.motors = [make](const Setup&) -> MotorFault {
+    return [make, all = std::vector<Transmit>()](double t, VectorXd* tau) mutable {
+      while (all.size() < static_cast<size_t>(tau->size())) all.push_back(make());
+      for (Eigen::Index i = 0; i < tau->size(); ++i) (*tau)[i] = all[static_cast<size_t>(i)]((*tau)[i], t);
+    };
+  };
+  return fault;
+}
+
+// Transmissions.
+
+std::function<Transmit()> Pure(const Transmit& transmit) {
+  return [transmit] { return transmit; };
+}
+
+std::function<Transmit()> Late(size_t steps) {
+  return [steps]() -> Transmit {
+    return [steps, sent = std::deque<double>()](double u, double) mutable {
+      sent.push_back(u);
+      if (sent.size() > steps + 1) sent.pop_front();
+      return sent.front();
+    };
+  };
+}
+
+/// a' = (u - a) / time.
+std::function<Transmit()> Lag(double time, double time_step) {
+  return [time, time_step]() -> Transmit {
+    return [time, time_step, output = std::nan("")](double u, double) mutable {
+      if (std::isnan(output)) output = u;
+      output += (1.0 - std::exp(-time_step / time)) * (u - output);
+      return output;
+    };
+  };
+}
+
+std::function<Transmit()> Noise(double size) {
+  return [size]() -> Transmit {
+    return [size, random = std::mt19937_64(7)](double u, double) mutable {
+      // Of twelve even ones the sum has variance 1.
+      double sum = -6.0;
+      for (int i = 0; i < 12; ++i) sum += static_cast<double>(random() >> 11) * 0x1p-53;
+      return u + size * sum;
+    };
+  };
+}
+
+Transmit Round(double step) {
+  return [step](double u, double) { return step * std::round(u / step); };
+}
+
+// Kinds.
+
+InjectedFault Gain(const FaultContext& context) {
+  const double gain = 1.0 + context.draw->Size(0.005, 0.2);
+  return OneMotor(context, DrawEntry(context), "gain", gain, gain - 1.0,
+                  Pure([gain](double u, double) { return gain * u; }));
+}
+
+/// Of the engine's own actuator, after all that is sent.
+InjectedFault EngineGain(const FaultContext& context) {
+  const double gain = 1.0 + context.draw->Size(0.005, 0.2);
+  const std::string joint = context.DrawJoint().name;
+  InjectedFault fault = FaultAt("motor " + joint, "gain", gain, gain - 1.0);
+  fault.engine = [joint, gain](const Setup&, mjModel* m) {
+    const int id = FindId(*m, mjOBJ_JOINT, joint);
+    for (int i = 0; i < m->nu; ++i)
+      if (m->actuator_trntype[i] == mjTRN_JOINT && m->actuator_trnid[2 * i] == id)
+        m->actuator_gainprm[mjNGAIN * i] *= gain;
+  };
+  return fault;
+}
+
+InjectedFault Offset(const FaultContext& context) {
+  const double offset = context.draw->Size(1e-3, 0.1);
+  return OneMotor(context, DrawEntry(context), "offset", offset, offset,
+                  Pure([offset](double u, double) { return u + offset; }));
+}
+
+InjectedFault Burst(const FaultContext& context) {
+  const double offset = context.draw->Size(1e-3, 0.1);
+  const double begin = context.draw->Uniform(0.0, 0.5 * context.duration);
+  const double end = begin + 0.3 * context.duration;
+  return OneMotor(context, DrawEntry(context), "offset", offset, offset,
+                  Pure([=](double u, double t) { return begin <= t && t < end ? u + offset : u; }));
+}
+
+InjectedFault Drift(const FaultContext& context) {
+  const double rate = context.draw->Size(0.01, 1.0);
+  const double begin = context.draw->Uniform(0.0, 0.3 * context.duration);
+  return OneMotor(context, DrawEntry(context), "drift", rate, rate,
+                  Pure([=](double u, double t) { return u + rate * std::max(0.0, t - begin); }));
+}
+
+InjectedFault Ripple(const FaultContext& context) {
+  const double size = context.draw->Positive(1e-3, 0.1);
+  const double frequency = context.draw->Uniform(3.0, 15.0) / context.duration;
+  return OneMotor(context, DrawEntry(context), "ripple", size, size,
+                  Pure([=](double u, double t) { return u + size * std::sin(2.0 * kPi * frequency * t); }));
+}
+
+InjectedFault Delay(const FaultContext& context) {
+  const size_t steps = 1 + context.draw->Index(8);
+  const auto value = static_cast<double>(steps);
+  return OneMotor(context, DrawEntry(context), "delay", value, value, Late(steps));
+}
+
+InjectedFault LagOfOne(const FaultContext& context) {
+  const double time = context.draw->Uniform(1.0, 20.0) * context.time_step();
+  return OneMotor(context, DrawEntry(context), "lag", time, time, Lag(time, context.time_step()));
+}
+
+InjectedFault DeadZone(const FaultContext& context) {
+  const int entry = DrawEntry(context);
+  const double zone = context.draw->Positive(0.02, 0.8) * TorqueOf(context, entry);
+  return OneMotor(context, entry, "dead zone", zone, zone, Pure([zone](double u, double) {
+                    return std::abs(u) > zone ? u - std::copysign(zone, u) : 0.0;
+                  }));
+}
+
+InjectedFault Rounding(const FaultContext& context) {
+  const int entry = DrawEntry(context);
+  const double step = context.draw->Positive(1e-3, 0.2) * TorqueOf(context, entry);
+  return OneMotor(context, entry, "rounding to steps of", step, step, Pure(Round(step)));
+}
+
+InjectedFault Limit(const FaultContext& context) {
+  const int entry = DrawEntry(context);
+  const double most = context.draw->Uniform(0.3, 0.95) * TorqueOf(context, entry);
+  return OneMotor(context, entry, "limit", most, TorqueOf(context, entry) - most,
+                  Pure([most](double u, double) { return std::clamp(u, -most, most); }));
+}
+
+InjectedFault Stuck(const FaultContext& context) {
+  const int entry = DrawEntry(context);
+  const double torque = context.draw->Uniform(-0.9, 0.9) * context.tau[entry];
+  return OneMotor(context, entry, "stuck at", torque, torque - context.tau[entry],
+                  Pure([torque](double, double) { return torque; }));
+}
+
+InjectedFault NoiseOfOne(const FaultContext& context) {
+  const double size = context.draw->Positive(1e-4, 1e-2);
+  // A sample's standard deviation scatters.
+  return OneMotor(context, DrawEntry(context), "noise, standard deviation", size, 5.0 * size, Noise(size));
+}
+
+InjectedFault Exchange(const FaultContext& context) {
+  const int a = DrawEntry(context);
+  int b = DrawEntry(context);
+  while (b == a) b = DrawEntry(context);
+  InjectedFault fault;
+  for (const auto& [i, j] : {std::pair{a, b}, std::pair{b, a}}) {
+    const InjectedFault one =
+        FaultAt(NameMotor(context, i), "signal of " + NameMotor(context, j) + ", gain", 1.0, 1.0);
+    fault.truth.push_back(one.truth.front());
+  }
+  fault.name = NameMotor(context, a) + " and " + NameMotor(context, b) + " exchanged";
+  fault.motors = [a, b](const Setup&) -> MotorFault {
+    return [a, b](double, VectorXd* tau) { std::swap((*tau)[a], (*tau)[b]); };
+  };
+  return fault;
+}
+
+InjectedFault GainOfAll(const FaultContext& context) {
+  const double gain = 1.0 + context.draw->Size(1e-4, 1e-2);
+  return AllMotors("gain", gain, gain - 1.0, Pure([gain](double u, double) { return gain * u; }));
+}
+
+InjectedFault DelayOfAll(const FaultContext& context) {
+  const size_t steps = 1 + context.draw->Index(4);
+  const auto value = static_cast<double>(steps);
+  return AllMotors("delay", value, value, Late(steps));
+}
+
+InjectedFault LagOfAll(const FaultContext& context) {
+  const double time = context.draw->Uniform(1.0, 10.0) * context.time_step();
+  return AllMotors("lag", time, time, Lag(time, context.time_step()));
+}
+
+InjectedFault RoundingOfAll(const FaultContext& context) {
+  const double step = context.draw->Positive(1e-3, 1e-2);
+  return AllMotors("rounding to steps of", step, step, Pure(Round(step)));
+}
+
+constexpr const char* kMotor = "motor";
+constexpr FaultKind kKinds[] = {
+    {kMotor, "gain", Gain},
+    {kMotor, "gain in the engine", EngineGain},
+    {kMotor, "offset", Offset},
+    {kMotor, "offset for a while", Burst},
+    {kMotor, "drift", Drift},
+    {kMotor, "ripple", Ripple},
+    {kMotor, "delay", Delay},
+    {kMotor, "lag", LagOfOne},
+    {kMotor, "dead zone", DeadZone},
+    {kMotor, "rounding", Rounding},
+    {kMotor, "limit", Limit},
+    {kMotor, "stuck", Stuck},
+    {kMotor, "noise", NoiseOfOne},
+    {kMotor, "exchange", Exchange},
+    {kMotor, "gain of all", GainOfAll},
+    {kMotor, "delay of all", DelayOfAll},
+    {kMotor, "lag of all", LagOfAll},
+    {kMotor, "rounding of all", RoundingOfAll},
+};
+
+}  // namespace
+
+std::span<const FaultKind> ListMotorFaultKinds() { return kKinds; }
+
+}  // namespace dexcheck

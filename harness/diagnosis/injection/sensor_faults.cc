@@ -1,0 +1,168 @@
+// Measured states that are not what is so.
+
+#include <cmath>
+
+#include "harness/diagnosis/injection/fault_kinds.h"
+
+namespace dexcheck {
+namespace {
+
+/// A joint's entries of the measured state.
+struct JointEntry {
+  std::string name;  ///< "joint r_elbow".
+  int q, xi;
+};
+
+JointEntry DrawEntry(const FaultContext& context) {
+  const RobotModel& model = context.model();
+  const auto joint = static_cast<int>(context.draw->Index(static_cast<size_t>(model.num_joints())));
+  return {"joint " + model.joints()[static_cast<size_t>(joint)].name, model.position_index(joint),
+          model.num_base_velocities() + model.dof(joint)};
+}
+
+InjectedFault Sensor(const std::string& place, const std::string& name, double value, double change,
+                     const SensorFault& change_state) {
+  InjectedFault fault = FaultAt(place, name, value, change);
+  fault.sensors = [change_state](const Setup&) { return change_state; };
+  return fault;
+}
+
+/// Of an encoder: rad or m.
+double DrawOffset(const FaultContext& context) { return context.draw->Size(1e-5, 1e-3); }
+
+InjectedFault Offset(const FaultContext& context) {
+  const JointEntry joint = DrawEntry(context);
+  const double offset = DrawOffset(context);
+  return Sensor(joint.name + ", position", "offset", offset, offset,
+                [i = joint.q, offset](double, MeasuredState* state) { state->q[i] += offset; });
+}
+
+InjectedFault Gain(const FaultContext& context) {
+  const JointEntry joint = DrawEntry(context);
+  const double gain = 1.0 + context.draw->Size(1e-3, 2e-2);
+  return Sensor(joint.name + ", position", "gain", gain, gain - 1.0,
+                [i = joint.q, gain](double, MeasuredState* state) { state->q[i] *= gain; });
+}
+
+InjectedFault GainOfRate(const FaultContext& context) {
+  const JointEntry joint = DrawEntry(context);
+  const double gain = 1.0 + context.draw->Size(1e-3, 2e-2);
+  return Sensor(joint.name + ", rate", "gain", gain, gain - 1.0,
+                [i = joint.xi, gain](double, MeasuredState* state) { state->xi[i] *= gain; });
+}
+
+InjectedFault Drift(const FaultContext& context) {
+  const JointEntry joint = DrawEntry(context);
+  const double rate = DrawOffset(context) / context.duration;
+  return Sensor(joint.name + ", position", "drift", rate, rate,
+                [i = joint.q, rate](double t, MeasuredState* state) { state->q[i] += rate * t; });
+}
+
+InjectedFault Noise(const FaultContext& context) {
+  const JointEntry joint = DrawEntry(context);
+  const double most = context.draw->Positive(1e-6, 1e-4);
+  const double deviation = most / std::sqrt(3.0);
+  InjectedFault fault =
+      FaultAt(joint.name + ", position", "noise, standard deviation", deviation, 5.0 * deviation);
+  fault.sensors = [i = joint.q, most](const Setup&) -> SensorFault {
+    return [i, most, random = std::mt19937_64(5)](double, MeasuredState* state) mutable {
+      state->q[i] += most * (2.0 * static_cast<double>(random() >> 11) * 0x1p-53 - 1.0);
+    };
+  };
+  return fault;
+}
+
+InjectedFault Rounding(const FaultContext& context) {
+  const JointEntry joint = DrawEntry(context);
+  const double step = context.draw->Positive(1e-5, 1e-3);
+  return Sensor(joint.name + ", position", "rounding to steps of", step, step,
+                [i = joint.q, step](double, MeasuredState* state) {
+                  state->q[i] = step * std::round(state->q[i] / step);
+                });
+}
+
+InjectedFault Stuck(const FaultContext& context) {
+  const JointEntry joint = DrawEntry(context);
+  const double value = context.setup.start().q[joint.q] + DrawOffset(context);
+  return Sensor(joint.name + ", position", "stuck at", value, DrawOffset(context),
+                [i = joint.q, value](double, MeasuredState* state) { state->q[i] = value; });
+}
+
+InjectedFault DelayOfAll(const FaultContext& context) {
+  const size_t steps = 1 + context.draw->Index(3);
+  const auto value = static_cast<double>(steps);
+  InjectedFault fault = FaultAt("everything that is measured", "delay", value, value);
+  fault.sensors = [steps](const Setup&) -> SensorFault {
+    return [steps, before = std::vector<MeasuredState>()](double, MeasuredState* state) mutable {
+      before.push_back(*state);
+      if (before.size() > steps + 1) before.erase(before.begin());
+      *state = before.front();
+    };
+  };
+  return fault;
+}
+
+InjectedFault Heading(const FaultContext& context) {
+  const double offset = DrawOffset(context);
+  return Sensor("base " + context.model().base().link + ", heading", "offset", offset, offset,
+                [offset](double, MeasuredState* state) { state->q[2] += offset; });
+}
+
+std::string ObjectPlace(const FaultContext& context) { return "object " + context.setup.object().name; }
+
+InjectedFault ObjectPosition(const FaultContext& context) {
+  const double offset = DrawOffset(context);
+  const size_t axis = context.draw->Index(3);
+  return Sensor(ObjectPlace(context) + ", position " + "xyz"[axis], "offset", offset, offset,
+                [axis, offset](double, MeasuredState* state) {
+                  state->X_Bo.translation()[static_cast<Eigen::Index>(axis)] += offset;
+                });
+}
+
+InjectedFault ObjectVelocity(const FaultContext& context) {
+  const double offset = DrawOffset(context);
+  const size_t axis = context.draw->Index(3);
+  return Sensor(ObjectPlace(context) + ", velocity " + "xyz"[axis], "offset", offset, offset,
+                [axis, offset](double, MeasuredState* state) {
+                  state->V_Bo[static_cast<Eigen::Index>(axis)] += offset;
+                });
+}
+
+/// What is measured of one fingertip's contact.
+InjectedFault Contact(const FaultContext& context) {
+  const double offset = DrawOffset(context);
+  const size_t tip = context.draw->Index(context.setup.fingertips().size());
+  const Frame& frame = context.model().frames()[static_cast<size_t>(context.setup.fingertips()[tip])];
+  const size_t which = context.draw->Index(3);
+  constexpr const char* kEntries[] = {", contact u on the object", ", contact u on the fingertip",
+                                      ", contact angle psi"};
+  return Sensor("fingertip " + frame.name + kEntries[which], "offset", offset, offset,
+                [=](double, MeasuredState* state) {
+                  ContactCoordinates& kappa = state->kappa[tip];
+                  (which == 0 ? kappa.alpha_o.u : which == 1 ? kappa.alpha_f.u : kappa.psi) += offset;
+                });
+}
+
+bool Holds(const FaultContext& context) { return context.holds(); }
+
+constexpr const char* kSensor = "sensor";
+constexpr FaultKind kKinds[] = {
+    {kSensor, "offset", Offset},
+    {kSensor, "gain", Gain},
+    {kSensor, "gain of a rate", GainOfRate},
+    {kSensor, "drift", Drift},
+    {kSensor, "noise", Noise},
+    {kSensor, "rounding", Rounding},
+    {kSensor, "stuck", Stuck},
+    {kSensor, "delay of all", DelayOfAll},
+    {kSensor, "heading", Heading, [](const FaultContext& context) { return context.rolls(); }},
+    {kSensor, "object's position", ObjectPosition, Holds},
+    {kSensor, "object's velocity", ObjectVelocity, Holds},
+    {kSensor, "contact coordinates", Contact, Holds},
+};
+
+}  // namespace
+
+std::span<const FaultKind> ListSensorFaultKinds() { return kKinds; }
+
+}  // namespace dexcheck
