@@ -70,12 +70,14 @@ Vector6d BaselineReference::CalcWrench(const LawTerms& terms) const {
     return K;
   };
   const Matrix6d K = turn(stiffness_.K);
-  if (law_ != ControlLaw::kImpedance) return K * e_ + turn(stiffness_.D) * V_e_;
+  const Vector6d stiff = position_factor_ * (K * e_);
+  if (law_ != ControlLaw::kImpedance) return stiff + velocity_factor_ * (turn(stiffness_.D) * V_e_);
   // K v = k Lambda v with v^T Lambda v = 1: Q = Lambda [v1 .. v6]
   const Eigen::GeneralizedSelfAdjointEigenSolver<Matrix6d> modes(K, Lambda_);
   const Matrix6d Q = Lambda_ * modes.eigenvectors();
   const Vector6d roots = modes.eigenvalues().cwiseMax(0.0).cwiseSqrt();
-  return K * e_ + 2.0 * stiffness_.damping_ratio * (Q * roots.cwiseProduct(Q.transpose() * V_e_));
+  return stiff +
+         velocity_factor_ * 2.0 * stiffness_.damping_ratio * (Q * roots.cwiseProduct(Q.transpose() * V_e_));
 }
 
 bool BaselineReference::Evaluate(const LawSpec& spec, const LawReference& plain, const LawTerms& terms,
@@ -128,6 +130,34 @@ bool BaselineReference::Evaluate(const LawSpec& spec, const LawReference& plain,
   plain.AddLeastForces(F_o, &f_c_);
   force_.noalias() += terms.J.transpose() * f_c_;
   return true;
+}
+
+void BaselineReference::CalcParts(const LawSpec& spec, const LawReference& plain, const LawTerms& terms,
+                                  const Matrix6Xd& G_dot, const DesiredMotion& desired,
+                                  const Eigen::Ref<const VectorXd>& F_N, MatrixXd* parts) {
+  if (law_ == ControlLaw::kOperationalSpace) return;
+  const VectorXd whole = force_;
+  const auto find = [&](double position, double velocity, const DesiredMotion& motion) {
+    position_factor_ = position;
+    velocity_factor_ = velocity;
+    Evaluate(spec, plain, terms, G_dot, motion, F_N);
+    return VectorXd(whole - force_);
+  };
+  const auto column = [&](LawPart part) { return parts->col(static_cast<int>(part)); };
+  DesiredMotion steady = desired;
+  steady.X_d_ddot.setZero();
+  for (const LawPart part : {LawPart::kCoordinateRate, LawPart::kGraspMapRate, LawPart::kJacobianRate,
+                             LawPart::kInertiaOfFeedForward, LawPart::kInertiaOfVelocity,
+                             LawPart::kInertiaOfPosition, LawPart::kInertiaOfRate})
+    column(part).setZero();
+  if (law_ == ControlLaw::kPdGravity)
+    for (const LawPart part : {LawPart::kCoriolis, LawPart::kFriction, LawPart::kObjectCoriolis})
+      column(part).setZero();
+  column(LawPart::kPositionFeedback) = find(0.0, 1.0, desired);
+  column(LawPart::kVelocityFeedback) = find(1.0, 0.0, desired);
+  column(LawPart::kFeedForward) = find(1.0, 1.0, steady);
+  find(1.0, 1.0, desired);
+  column(LawPart::kCoordinateRate) = whole - parts->rowwise().sum();
 }
 
 }  // namespace dexcheck

@@ -26,6 +26,12 @@ class BaselineReference {
   bool Evaluate(const LawSpec& spec, const LawReference& plain, const LawTerms& terms, const Matrix6Xd& G_dot,
                 const DesiredMotion& desired, const Eigen::Ref<const VectorXd>& F_N);
 
+  /// Splits E_bar' tau' of the last Evaluate, whose arguments these are. @param parts n x kLawPartCount, of
+  /// (55): those that the law does not share with it get its own, and kCoordinateRate what is left.
+  void CalcParts(const LawSpec& spec, const LawReference& plain, const LawTerms& terms,
+                 const Matrix6Xd& G_dot, const DesiredMotion& desired, const Eigen::Ref<const VectorXd>& F_N,
+                 MatrixXd* parts);
+
   /// E_bar' tau' (n) and f_c (k).
   [[nodiscard]] const VectorXd& force() const { return force_; }
   [[nodiscard]] const VectorXd& f_c() const { return f_c_; }
@@ -37,6 +43,7 @@ class BaselineReference {
 
   ControlLaw law_;
   ObjectStiffness stiffness_;
+  double position_factor_ = 1.0, velocity_factor_ = 1.0;  // of K e and D V_e
   Eigen::LLT<MatrixXd> M_llt_, Lambda_c_llt_;
   MatrixXd M_inv_J_T_;                // n x k
   MatrixXd Lambda_c_inv_, Lambda_c_;  // k x k

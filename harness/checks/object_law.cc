@@ -89,9 +89,11 @@ class JudgedObjectLaw final : public JudgedLaw {
     return baseline_ ? baseline_->force() : reference_.force();
   }
   [[nodiscard]] double condition_number() const override { return reference_.condition_number(); }
-  /// Of another law than the printed one only those that it shares.
   void CalcParts(const StepRecord& step, const LawTerms& terms) override {
-    parts_ = reference_.CalcParts(terms, step.command.demand.F_N);
+    const VectorXd& F_N = step.command.demand.F_N;
+    parts_ = reference_.CalcParts(terms, F_N);
+    if (baseline_)
+      baseline_->CalcParts(spec_, reference_, terms, step.model->grasp().G_dot(), desired_, F_N, &parts_);
   }
 
  private:

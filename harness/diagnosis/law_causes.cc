@@ -45,6 +45,28 @@ std::vector<Place> ListPlaces(const StepStore& store) {
   return places;
 }
 
+/// A sum of which all but one summand vanish, and friction that the law has anyway, are no candidates besides
+/// those. @param parts of each candidate, bits by summand; 0 for what is added.
+void DropRepeated(const std::vector<unsigned>& parts, std::vector<Candidate>* candidates) {
+  const auto repeats = [&](size_t i, size_t of) {
+    const Candidate &a = (*candidates)[of], &b = (*candidates)[i];
+    const bool is_sum = parts[of] != 0 && (parts[i] & parts[of]) == parts[of];
+    const bool is_friction = b.fault == "viscous friction" && a.fault.starts_with("friction");
+    if (a.place != b.place || !(is_sum || is_friction)) return false;
+    constexpr double kSame = 1e-10;
+    const double product = a.columns.col(0).dot(b.columns.col(0));
+    return product * product > (1.0 - kSame) * a.columns.squaredNorm() * b.columns.squaredNorm();
+  };
+  std::vector<size_t> kept;
+  for (size_t i = 0; i < candidates->size(); ++i) {
+    if (!((*candidates)[i].columns.squaredNorm() > 0.0)) continue;
+    if (std::none_of(kept.begin(), kept.end(), [&](size_t of) { return repeats(i, of); })) kept.push_back(i);
+  }
+  for (size_t k = 0; k < kept.size(); ++k)
+    if (kept[k] != k) (*candidates)[k] = std::move((*candidates)[kept[k]]);
+  candidates->resize(kept.size());
+}
+
 }  // namespace
 
 Causes ExplainLaw(const StepStore& store) {
@@ -66,12 +88,16 @@ Causes ExplainLaw(const StepStore& store) {
   const std::vector<Place> places = ListPlaces(store);
   const std::span<const LawPartName> names = store.law()->ListParts();
   std::vector<Candidate> candidates;
-  for (const LawPartName& name : names)
-    for (const Place& place : places)
+  std::vector<unsigned> parts_of;
+  for (const LawPartName& name : names) {
+    for (const Place& place : places) {
+      parts_of.push_back(name.parts);
       candidates.push_back({.fault = std::string(name.name) + " (" + name.symbol + "), factor",
                             .place = place.name,
                             .nominal = 1.0,
                             .columns = MatrixXd::Zero(n * used, 1)});
+    }
+  }
   // What a controller of another's may add.
   for (Index i = 0; i < n; ++i) {
     const std::string& place = places[places.size() - static_cast<size_t>(n - i)].name;
@@ -79,6 +105,7 @@ Causes ExplainLaw(const StepStore& store) {
     for (const char* fault : {"torque", "viscous friction", "dry friction"}) {
       candidates.push_back(
           {.fault = fault, .place = place, .unit = unit, .columns = MatrixXd::Zero(n * used, 1)});
+      parts_of.push_back(0);
       if (std::string_view(fault) != "torque")
         candidates.back().is_possible = [](const VectorXd& a) { return a[0] >= 0.0; };
     }
@@ -92,7 +119,8 @@ Causes ExplainLaw(const StepStore& store) {
     factor.Compute(terms.M());
     const auto whiten = [&](VectorXd f) {
       factor.SolveTransposed(f);
-      return VectorXd(f / noise(0, step));
+      // The bound is one of the norm.
+      return VectorXd(f * (std::sqrt(static_cast<double>(n)) / noise(0, step)));
     };
     y.segment(k * n, n) = whiten(store.Get(StepStore::kLawDifference).col(step));
     const VectorXd flat = store.Get(StepStore::kLawParts).col(step);
@@ -120,7 +148,7 @@ Causes ExplainLaw(const StepStore& store) {
         candidates[candidate++].columns.col(0).segment(k * n, n) = size * own;
     }
   }
-  // Sums are told where no single summand does: a list's first of two equals is kept.
+  DropRepeated(parts_of, &candidates);
   const double floor = 1.0 + kAccuracy * kAccuracy * y.squaredNorm() / static_cast<double>(y.size());
   const CauseSelection selection =
       SelectCauses(y, candidates, {.most_terms = 4, .restarts = 0, .floor = floor});

@@ -151,6 +151,7 @@ InjectedFault AddedTorque(const FaultContext& context) {
   return one;
 }
 
+/// Where the law has friction it would be a part of that.
 InjectedFault AddedFriction(const FaultContext& context) {
   const Place place = OneJoint(context);
   const double friction = context.draw->Positive(1e-2, 1.0);
@@ -209,7 +210,8 @@ constexpr FaultKind kKinds[] = {
     {kLaw, "gravity", GravityPart},
     {kLaw, "friction", FrictionPart, KnowsMotion},
     {kLaw, "torque", AddedTorque},
-    {kLaw, "viscous friction", AddedFriction},
+    {kLaw, "viscous friction", AddedFriction,
+     [](const FaultContext& context) { return !KnowsMotion(context); }},
     {kLaw, "gains of position", GainsOfPosition, HasOwnStiffness},
     {kLaw, "gains of velocity", GainsOfVelocity},
 };
