@@ -17,20 +17,20 @@ namespace {
 constexpr double kOffset = 1e-5;
 constexpr double kOffsetTime = 5e-3;  // s
 
-/// A trajectory that begins later, and goes a little off.
+/// A trajectory that begins later, and goes a little off from a time on.
 class LaterTrajectory final : public Trajectory {
  public:
-  LaterTrajectory(std::unique_ptr<Trajectory> whole, double from, double offset)
-      : whole_(std::move(whole)), from_(from), offset_(offset) {}
+  LaterTrajectory(std::unique_ptr<Trajectory> whole, double later, double offset, double begin)
+      : whole_(std::move(whole)), later_(later), offset_(offset), begin_(begin) {}
   [[nodiscard]] DesiredMotion Evaluate(double t) const override {
-    DesiredMotion motion = whole_->Evaluate(t + from_);
-    motion.X_d.array() += offset_ * CalcMinJerk(t, kOffsetTime).s;
+    DesiredMotion motion = whole_->Evaluate(t + later_);
+    motion.X_d.array() += offset_ * CalcMinJerk(t - begin_, kOffsetTime).s;
     return motion;
   }
 
  private:
   std::unique_ptr<Trajectory> whole_;
-  double from_, offset_;
+  double later_, offset_, begin_;
 };
 
 // Positions and rates that differ by less are the same, m, rad and s.
@@ -45,14 +45,29 @@ EnginePlant* FindEngine(const LoopParts& parts) {
   return plant;
 }
 
-void InjectFault(const Setup& setup, const InjectedFault& fault, LoopParts* parts) {
+/// @param begin when the fault begins, s.
+void InjectFault(const Setup& setup, const InjectedFault& fault, double begin, LoopParts* parts) {
+  const auto clock = std::make_shared<RunClock>();
   EnginePlant* const engine = FindEngine(*parts);
   parts->plant.release();
-  parts->plant = std::make_unique<FaultyPlant>(setup, std::unique_ptr<EnginePlant>(engine), fault);
-  if (fault.sensors) parts->hidden_sensor_fault = fault.sensors(setup);
-  if (!fault.controller) return;
-  parts->controller = fault.controller(setup, std::move(parts->controller));
-  parts->follower = nullptr;
+  parts->plant =
+      std::make_unique<FaultyPlant>(setup, std::unique_ptr<EnginePlant>(engine), fault, clock, begin);
+  if (fault.sensors) {
+    // What remembers knows what was before it began.
+    parts->hidden_sensor_fault = [clock, change = fault.sensors(setup), begin, wrong = MeasuredState()](
+                                     double t, MeasuredState* state) mutable {
+      wrong = *state;
+      const double since = clock->Since(begin, t);
+      change(since, &wrong);
+      if (since >= 0.0) *state = wrong;
+    };
+  }
+  if (fault.controller) {
+    parts->controller = fault.controller(setup, std::move(parts->controller),
+                                         [clock, begin] { return clock->Since(begin, clock->time) >= 0.0; });
+    parts->follower = nullptr;
+  }
+  parts->controller = std::make_unique<ClockedController>(std::move(parts->controller), clock);
 }
 
 std::string JoinFailed(const RunChecks& checks) {
@@ -91,7 +106,7 @@ RunCampaign::RunCampaign(const Scenario& scenario, std::filesystem::path robot, 
   if (scenario.plant.type == PlantType::kRigid)
     throw InputError(scenario.source + ": plant.type: faults are made in a run of the engine's plant");
   MakeSetups();
-  if (scenario.joint_task() == nullptr) MoveToStart(should_stop);
+  if (scenario.joint_task() == nullptr && begin_ == 0.0) MoveToStart(should_stop);
   if (!should_stop()) RequireNoFaultToPass(should_stop);
   if (tau_.size() == 0) tau_.setOnes(setup_->model().num_velocities());
   ListFaults();
@@ -108,6 +123,8 @@ void RunCampaign::MakeSetups() {
   }
   // Even a run that is looked at from its beginning starts settled, one step in.
   options_.from = std::max(options_.from, scenario_.plant.time_step);
+  // What sensors and motors remember is no part of the plant's state.
+  if (!scenario_.imperfections.is_ideal()) begin_ = options_.from;
   setup_ = MakeSetup(MakeScenario(options_.from, options_.duration, 0.0), nullptr);
   offset_setup_ = MakeSetup(MakeScenario(options_.from, options_.duration, kOffset), nullptr);
 }
@@ -147,14 +164,17 @@ std::unique_ptr<Setup> RunCampaign::MakeSetup(const Scenario& scenario, const Ro
 
 Scenario RunCampaign::MakeScenario(double from, double duration, double offset) const {
   Scenario scenario = scenario_;
-  scenario.duration = duration;
+  scenario.duration = duration + begin_;
   if (!(from > 0.0)) return scenario;
-  scenario.start = Start::kRest;
-  scenario.settle = 0.0;
-  scenario.expect.from = std::max(0.0, scenario_.expect.from - from);
+  const double later = from - begin_;
+  if (later > 0.0) {
+    scenario.start = Start::kRest;
+    scenario.settle = 0.0;
+    scenario.expect.from = std::max(0.0, scenario_.expect.from - from);
+  }
   auto& task = std::get<TrajectoryTask>(scenario.task);
-  task.trajectory = [whole = task.trajectory, from, offset](const Vector6d& X_start) {
-    return std::make_unique<LaterTrajectory>(whole(X_start), from, offset);
+  task.trajectory = [whole = task.trajectory, later, offset, begin = begin_](const Vector6d& X_start) {
+    return std::make_unique<LaterTrajectory>(whole(X_start), later, offset, begin);
   };
   if (offset != 0.0) scenario.expect = {};
   return scenario;
@@ -184,7 +204,7 @@ void RunCampaign::RequireNoFaultToPass(const std::function<bool()>& should_stop)
     nothing.engine = [](const Setup&, mjModel*) {};
     LoopParts parts = MakeLoopParts(*setup);
     GoToStart(parts);
-    InjectFault(*setup, nothing, &parts);
+    InjectFault(*setup, nothing, begin_, &parts);
     VectorXd* const end = setup == setup_.get() ? &end_ : &offset_end_;
     if (!RunLoop(*setup, std::move(parts), &none, end, should_stop)) return;
     if (!none.killed) continue;
@@ -223,11 +243,13 @@ bool RunCampaign::RunFault(const InjectedFault& fault, RunMutant* mutant, Vector
   const bool needs_error = fault.needs_error && offset_setup_ != nullptr;
   const Setup* setup = needs_error ? offset_setup_.get() : setup_.get();
   std::unique_ptr<Setup> own;
+  double begin = begin_;
   if (fault.from_start) {
-    Scenario scenario = MakeScenario(0.0, options_.from + options_.duration, 0.0);
+    Scenario scenario = MakeScenario(0.0, options_.from + options_.duration - begin_, 0.0);
     scenario.settle = std::min(scenario.settle, kSettle);
     own = MakeSetup(scenario, nullptr);
     setup = own.get();
+    if (scenario_.joint_task() == nullptr) begin = options_.from;
   }
   if (fault.model) {
     const RobotModel model = fault.model(setup->model());
@@ -236,7 +258,7 @@ bool RunCampaign::RunFault(const InjectedFault& fault, RunMutant* mutant, Vector
   }
   LoopParts parts = MakeLoopParts(*setup);
   if (!fault.from_start) GoToStart(parts);
-  InjectFault(*setup, fault, &parts);
+  InjectFault(*setup, fault, begin, &parts);
   return RunLoop(*setup, std::move(parts), mutant, end, should_stop);
 }
 

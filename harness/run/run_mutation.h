@@ -78,6 +78,7 @@ class RunCampaign {
   std::filesystem::path robot_, mjcf_;
   RunMutationOptions options_;
   MjModelPtr compiled_;
+  double begin_ = 0.0;                   // of the fault in a run, s; 0 where runs go on from `start_`
   std::optional<EngineState> start_;     // of a trajectory; joints begin at their beginning
   std::unique_ptr<Setup> setup_;         // of the right robot, from the start
   std::unique_ptr<Setup> offset_setup_;  // the same with an error that feedback has to answer

@@ -107,13 +107,13 @@ struct Body {
 };
 
 Body ObjectBody(const FaultContext& context) {
-  const std::string& name = context.setup.object().name;
-  return {"object " + name, name, &context.setup.object().body, true};
+  const std::string& name = context.setup.declared_object().name;
+  return {"object " + name, name, &context.setup.declared_object().body, true};
 }
 
 Body DrawLink(const FaultContext& context) {
   std::vector<const Joint*> links;
-  for (const Joint& joint : context.model().joints()) {
+  for (const Joint& joint : context.setup.declared_model().joints()) {
     const int id = FindId(context.setup.engine(), mjOBJ_BODY, joint.link);
     constexpr double kSame = 1e-6;
     if (joint.body.mass > 0.0 &&

@@ -95,9 +95,10 @@ std::vector<LawFault> ListLawFaults(bool has_wheels) {
   return faults;
 }
 
-FaultyLaw::FaultyLaw(const Setup& setup, LawFault fault)
+FaultyLaw::FaultyLaw(const Setup& setup, LawFault fault, std::function<bool()> is_on)
     : options_(ChangeOptions(setup.MakeControllerOptions(), fault.kind)),
       fault_(std::move(fault)),
+      is_on_(is_on ? std::move(is_on) : [this] { return has_begun_; }),
       model_(setup.model(), setup.fingertips(), setup.object().body, setup.surface(), options_),
       actuation_(setup.model()),
       J_pinv_("J_B'", 3 * static_cast<Eigen::Index>(setup.fingertips().size()),
@@ -131,7 +132,7 @@ void FaultyLaw::Step(const Reading& reading, double t, Command* command) {
   command->force_solves = 0;
   command->desired = TrajectoryController::EvaluateDesired(*motion_, t, time_step_);
   model_.SetState(reading.state);
-  if (has_begun_ && change_) {
+  if (is_on_() && change_) {
     const FaultyTerms terms(&model_, reading.state);
     change_(terms);
     terms.Finish();
@@ -146,9 +147,9 @@ void FaultyLaw::Step(const Reading& reading, double t, Command* command) {
 }
 
 void FaultyLaw::CalcTorque(const MeasuredState& state, double t, Command* command) {
-  is_wrong_ = has_begun_ && fault_.entries.empty();
+  is_wrong_ = is_on_() && fault_.entries.empty();
   CalcTorque(state, t, /*chooses=*/true, command);
-  if (!has_begun_ || fault_.entries.empty()) return;
+  if (!is_on_() || fault_.entries.empty()) return;
   // The fault is in some entries alone, with the internal force of all others.
   right_ = command->tau;
   is_wrong_ = true;

@@ -55,9 +55,11 @@ std::vector<LawFault> ListLawFaults(bool has_wheels);
 class FaultyLaw final : public Controller {
  public:
   /// @param setup of a scenario that is no task; outlives this.
-  FaultyLaw(const Setup& setup, LawFault fault);
+  /// @param is_on whether the fault is there; empty for from Begin on.
+  FaultyLaw(const Setup& setup, LawFault fault, std::function<bool()> is_on = {});
   /// The right law, from terms of which one equation is wrong.
-  FaultyLaw(const Setup& setup, const EquationFault& fault) : FaultyLaw(setup, LawFault{}) {
+  FaultyLaw(const Setup& setup, const EquationFault& fault, std::function<bool()> is_on = {})
+      : FaultyLaw(setup, LawFault{}, std::move(is_on)) {
     change_ = fault.apply;
   }
 
@@ -83,6 +85,7 @@ class FaultyLaw final : public Controller {
 
   GraspControllerOptions options_;
   LawFault fault_;
+  std::function<bool()> is_on_;
   std::function<void(const FaultyTerms&)> change_;
   GraspModel model_;
   ActuationMap actuation_;

@@ -45,23 +45,35 @@ InjectedFault Join(const InjectedFault& first, const InjectedFault& second) {
   return both;
 }
 
-FaultyPlant::FaultyPlant(const Setup& setup, std::unique_ptr<EnginePlant> plant, const InjectedFault& fault)
-    : plant_(std::move(plant)), forces_(fault.forces) {
-  if (fault.engine) plant_->simulation().Change([&](mjModel* m) { fault.engine(setup, m); });
+FaultyPlant::FaultyPlant(const Setup& setup, std::unique_ptr<EnginePlant> plant, const InjectedFault& fault,
+                         std::shared_ptr<const RunClock> clock, double begin)
+    : plant_(std::move(plant)), clock_(std::move(clock)), begin_(begin), forces_(fault.forces) {
+  if (fault.engine) change_ = [&setup, change = fault.engine](mjModel* m) { change(setup, m); };
+  if (change_ && (fault.from_start || begin <= 0.0))
+    plant_->simulation().Change(std::exchange(change_, nullptr));
   if (fault.motors) motors_ = fault.motors(setup);
+}
+
+void FaultyPlant::BeginStep() {
+  // The time is that of the step before.
+  if (change_ && clock_->Since(begin_, clock_->time + 1.5 * time_step()) >= 0.0)
+    plant_->simulation().Change(std::exchange(change_, nullptr));
+  plant_->BeginStep();
 }
 
 void FaultyPlant::EndStep(const Eigen::Ref<const VectorXd>& tau) {
   EngineSimulation& simulation = plant_->simulation();
+  const double since = clock_->Since(begin_, clock_->time);
+  // What remembers knows what was before it began.
   tau_ = tau;
-  if (motors_) motors_(time_, &tau_);
+  if (motors_) motors_(since, &tau_);
+  if (!(since >= 0.0)) return plant_->EndStep(tau);
   const int size = 6 * simulation.model().nbody;
   mjtNum* const forces = simulation.data().xfrc_applied;
   const std::vector<mjtNum> declared(forces, forces + size);
-  if (forces_) forces_(simulation.model(), time_, &simulation.data());
+  if (forces_) forces_(simulation.model(), since, &simulation.data());
   plant_->EndStep(tau_);
   std::copy(declared.begin(), declared.end(), forces);
-  time_ += time_step();
 }
 
 }  // namespace dexcheck

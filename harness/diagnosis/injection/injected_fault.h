@@ -5,6 +5,7 @@
 // and are they named? Nothing in this folder knows the signatures that they are recognised by.
 
 #include <functional>
+#include <limits>
 #include <memory>
 #include <string>
 #include <vector>
@@ -20,6 +21,12 @@ namespace dexcheck {
 using MotorFault = std::function<void(double t, VectorXd* tau)>;
 /// Changes the measured state at time t, s.
 using SensorFault = std::function<void(double t, MeasuredState* measured)>;
+
+/// Whether the fault is there.
+using IsOn = std::function<bool()>;
+/// A controller in the place of the right one, which it may have.
+using ControllerFault =
+    std::function<std::unique_ptr<Controller>(const Setup&, std::unique_ptr<Controller> right, const IsOn&)>;
 
 /// One fault, or several at once. Its members are called for each run anew, so that none remembers another's.
 struct InjectedFault {
@@ -37,23 +44,37 @@ struct InjectedFault {
   std::function<void(const mjModel&, double t, mjData*)> forces = {};  ///< Adds to xfrc_applied.
   std::function<MotorFault(const Setup&)> motors = {};
   std::function<SensorFault(const Setup&)> sensors = {};
-  /// In the place of the right one, or around it.
-  std::function<std::unique_ptr<Controller>(const Setup&, std::unique_ptr<Controller> right)> controller = {};
+  ControllerFault controller = {};                          ///< In the place of the right one.
   std::function<RobotModel(const RobotModel&)> model = {};  ///< That the controller goes by.
 };
 
 /// Both at once. At most one of them has a controller, and one a model.
 InjectedFault Join(const InjectedFault& first, const InjectedFault& second);
 
-/// The engine's simulation with a fault.
+/// Time of a run, s, as its controller knows it.
+struct RunClock {
+  bool has_begun = false;  ///< Whether all has come to rest.
+  double time = 0.0;       ///< Of the last step.
+  /// How long a fault is there at time t that begins at `begin`, s; endless time before it where the run has
+  /// not begun.
+  [[nodiscard]] double Since(double begin, double t) const {
+    return has_begun ? t - begin : -std::numeric_limits<double>::infinity();
+  }
+};
+
+/// The engine's simulation with a fault that is there from a time of the run on.
 class FaultyPlant final : public Plant {
  public:
-  FaultyPlant(const Setup& setup, std::unique_ptr<EnginePlant> plant, const InjectedFault& fault);
+  /// @param clock of the run. @param begin of the fault, s; one that is there from the start changes bodies
+  /// at once.
+  FaultyPlant(const Setup& setup, std::unique_ptr<EnginePlant> plant, const InjectedFault& fault,
+              std::shared_ptr<const RunClock> clock, double begin);
 
   [[nodiscard]] double time_step() const override { return plant_->time_step(); }
   [[nodiscard]] std::span<const Motor> motors() const override { return plant_->motors(); }
-  void BeginStep() override { plant_->BeginStep(); }
+  void BeginStep() override;
   void Read(PlantReading* reading) override { plant_->Read(reading); }
+  void Push(std::span<const Wrench> wrenches) override { plant_->Push(wrenches); }
   void EndStep(const Eigen::Ref<const VectorXd>& tau) override;
   void Read(PlantResponse* response) override { plant_->Read(response); }
   void Place(const Eigen::Ref<const VectorXd>& q, const Pose& X_Bo) override { plant_->Place(q, X_Bo); }
@@ -62,10 +83,34 @@ class FaultyPlant final : public Plant {
 
  private:
   std::unique_ptr<EnginePlant> plant_;
+  std::shared_ptr<const RunClock> clock_;
+  double begin_;
   MotorFault motors_;
   std::function<void(const mjModel&, double, mjData*)> forces_;
-  double time_ = 0.0;
+  std::function<void(mjModel*)> change_;  // that is yet to be made
   VectorXd tau_;
+};
+
+/// A controller that tells the time.
+class ClockedController final : public Controller {
+ public:
+  ClockedController(std::unique_ptr<Controller> controller, std::shared_ptr<RunClock> clock)
+      : controller_(std::move(controller)), clock_(std::move(clock)) {}
+
+  void Follow(const Trajectory& motion) override { controller_->Follow(motion); }
+  void Begin(double t, const Reading& reading) override {
+    controller_->Begin(t, reading);
+    clock_->has_begun = true;
+  }
+  void Step(const Reading& reading, double t, Command* command) override {
+    clock_->time = t;
+    controller_->Step(reading, t, command);
+  }
+  [[nodiscard]] const GraspModel& model() const override { return controller_->model(); }
+
+ private:
+  std::unique_ptr<Controller> controller_;
+  std::shared_ptr<RunClock> clock_;
 };
 
 }  // namespace dexcheck

@@ -79,8 +79,8 @@ InjectedFault Summand(const FaultContext& context) {
       LawFaultAt(place, std::string(parts[part].name) + " (" + parts[part].symbol + "), factor", factor, 1.0);
   one.controller = [fault =
                         LawFault{.name = one.name, .part = part, .factor = factor, .entries = place.entries}](
-                       const Setup& setup, std::unique_ptr<Controller> /*right*/) {
-    return std::make_unique<FaultyLaw>(setup, fault);
+                       const Setup& setup, std::unique_ptr<Controller> /*right*/, const IsOn& is_on) {
+    return std::make_unique<FaultyLaw>(setup, fault, is_on);
   };
   return one;
 }
@@ -90,24 +90,21 @@ class ChangedLaw final : public Controller {
  public:
   /// Adds to tau' (n). @param model as the controller evaluated it.
   using Change = std::function<void(const Reading& reading, const GraspModel& model, VectorXd* tau)>;
-  ChangedLaw(std::unique_ptr<Controller> right, Change change)
-      : right_(std::move(right)), change_(std::move(change)) {}
+  ChangedLaw(std::unique_ptr<Controller> right, IsOn is_on, Change change)
+      : right_(std::move(right)), is_on_(std::move(is_on)), change_(std::move(change)) {}
 
   void Follow(const Trajectory& motion) override { right_->Follow(motion); }
-  void Begin(double t, const Reading& reading) override {
-    right_->Begin(t, reading);
-    has_begun_ = true;
-  }
+  void Begin(double t, const Reading& reading) override { right_->Begin(t, reading); }
   void Step(const Reading& reading, double t, Command* command) override {
     right_->Step(reading, t, command);
-    if (has_begun_) change_(reading, right_->model(), &command->tau);
+    if (is_on_()) change_(reading, right_->model(), &command->tau);
   }
   [[nodiscard]] const GraspModel& model() const override { return right_->model(); }
 
  private:
   std::unique_ptr<Controller> right_;
+  IsOn is_on_;
   Change change_;
-  bool has_begun_ = false;
 };
 
 /// A summand of F_bar' times a factor. @param get the summand (n), by the controller's own model.
@@ -118,9 +115,9 @@ InjectedFault PartOfF(const FaultContext& context, const std::string& name,
   InjectedFault one = LawFaultAt(
       place, (IsOfJoints(context.setup) ? name : name + " in F_bar'") + " (F_bar' (" + name + ")), factor",
       factor, 1.0);
-  one.controller = [=](const Setup& setup, std::unique_ptr<Controller> right) {
+  one.controller = [=](const Setup& setup, std::unique_ptr<Controller> right, const IsOn& is_on) {
     return std::make_unique<ChangedLaw>(
-        std::move(right),
+        std::move(right), is_on,
         [=, actuation = ActuationMap(setup.model())](const Reading&, const GraspModel& model, VectorXd* tau) {
           VectorXd part = get(model.robot());
           actuation.CalcTorque(part, part);
@@ -144,9 +141,11 @@ InjectedFault AddedTorque(const FaultContext& context) {
   const Place place = OneJoint(context);
   const double torque = context.draw->Size(1e-3, 0.1);
   InjectedFault one = LawFaultAt(place, "torque", torque, 0.0);
-  one.controller = [=, entry = place.entries.front()](const Setup&, std::unique_ptr<Controller> right) {
+  one.controller = [=, entry = place.entries.front()](const Setup&, std::unique_ptr<Controller> right,
+                                                      const IsOn& is_on) {
     return std::make_unique<ChangedLaw>(
-        std::move(right), [=](const Reading&, const GraspModel&, VectorXd* tau) { (*tau)[entry] += torque; });
+        std::move(right), is_on,
+        [=](const Reading&, const GraspModel&, VectorXd* tau) { (*tau)[entry] += torque; });
   };
   return one;
 }
@@ -156,8 +155,9 @@ InjectedFault AddedFriction(const FaultContext& context) {
   const Place place = OneJoint(context);
   const double friction = context.draw->Positive(1e-2, 1.0);
   InjectedFault one = LawFaultAt(place, "viscous friction", friction, 0.0);
-  one.controller = [=, entry = place.entries.front()](const Setup&, std::unique_ptr<Controller> right) {
-    return std::make_unique<ChangedLaw>(std::move(right),
+  one.controller = [=, entry = place.entries.front()](const Setup&, std::unique_ptr<Controller> right,
+                                                      const IsOn& is_on) {
+    return std::make_unique<ChangedLaw>(std::move(right), is_on,
                                         [=](const Reading& reading, const GraspModel&, VectorXd* tau) {
                                           (*tau)[entry] -= friction * reading.state.xi[entry];
                                         });
@@ -174,7 +174,8 @@ InjectedFault Gains(const FaultContext& context, bool of_velocity) {
       joints ? (of_velocity ? "velocity feedback (K_v e_dot), factor" : "position feedback (K_p e), factor")
              : std::string(ListLawParts()[part].name) + " (" + ListLawParts()[part].symbol + "), factor";
   InjectedFault one = LawFaultAt({"law", {}}, name, factor, 1.0);
-  one.controller = [=](const Setup& setup, std::unique_ptr<Controller>) -> std::unique_ptr<Controller> {
+  one.controller = [=](const Setup& setup, std::unique_ptr<Controller>,
+                       const IsOn&) -> std::unique_ptr<Controller> {
     const Scenario& scenario = setup.scenario();
     const Sampling sampling{
         .time_step = 2.0 * scenario.plant.velocity_age(),

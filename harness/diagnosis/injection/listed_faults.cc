@@ -38,8 +38,8 @@ std::vector<FaultSet> ListLawFaults(const Setup& setup) {
                       std::abs(law.factor - 1.0), "", ""}};
     }
     fault.needs_error = true;
-    fault.controller = [law](const Setup& own, std::unique_ptr<Controller> /*right*/) {
-      return std::make_unique<FaultyLaw>(own, law);
+    fault.controller = [law](const Setup& own, std::unique_ptr<Controller> /*right*/, const IsOn& is_on) {
+      return std::make_unique<FaultyLaw>(own, law, is_on);
     };
     sets.push_back({fault});
   }
@@ -52,8 +52,9 @@ std::vector<FaultSet> ListEquationFaults(const Setup& setup) {
   for (const EquationFault& equation : ListEquationFaults(setup.model(), has_coordinates)) {
     InjectedFault fault = FaultAt(equation.name, Cause::kModel, equation.check);
     fault.kind = "equation";
-    fault.controller = [equation](const Setup& own, std::unique_ptr<Controller> /*right*/) {
-      return std::make_unique<FaultyLaw>(own, equation);
+    fault.controller = [equation](const Setup& own, std::unique_ptr<Controller> /*right*/,
+                                  const IsOn& is_on) {
+      return std::make_unique<FaultyLaw>(own, equation, is_on);
     };
     sets.push_back({fault});
   }

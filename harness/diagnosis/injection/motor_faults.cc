@@ -74,8 +74,9 @@ std::function<Transmit()> Late(size_t steps) {
 /// a' = (u - a) / time.
 std::function<Transmit()> Lag(double time, double time_step) {
   return [time, time_step]() -> Transmit {
-    return [time, time_step, output = std::nan("")](double u, double) mutable {
-      if (std::isnan(output)) output = u;
+    return [time, time_step, output = std::nan("")](double u, double t) mutable {
+      // Until it begins it keeps up.
+      if (std::isnan(output) || t < 0.0) output = u;
       output += (1.0 - std::exp(-time_step / time)) * (u - output);
       return output;
     };

@@ -103,26 +103,67 @@ Options ReadOptions(int argc, char** argv) {
   return options;
 }
 
-/// What a scenario may ask for of sensing, motors and plant without breaking the paper's assumptions. Those
-/// of the object last.
-const std::vector<std::vector<std::string>> kAsked = {
-    {"sensing.joint_counts=65536"},
-    {"sensing.joint_counts=1048576", "sensing.velocity=kalman", "sensing.kalman_acceleration=20"},
-    {"sensing.joint_noise=1e-6", "sensing.velocity=differenced", "sensing.velocity_cutoff=50"},
-    {"sensing.velocity_noise=1e-4"},
-    {"sensing.latency=0.002"},
-    {"actuation.torque_step=1e-3"},
-    {"actuation.gain_error=0.005"},
-    {"actuation.delay=0.0015"},
-    {"mismatch.mass_within=0.02"},
-    {"mismatch.damping=1.2"},
-    {"actuation.coulomb=0.02"},
+/// What a scenario may declare of sensing, motors and plant without breaking the paper's assumptions: of
+/// "<a..b>" a number is drawn, evenly over decades, of "<a|b>" one of both. Those of the object last.
+const std::vector<std::vector<std::string>> kDeclared = {
+    {"sensing.joint_counts=<16384|65536|1048576>"},
+    {"sensing.joint_counts=<65536|1048576>", "sensing.velocity=kalman",
+     "sensing.kalman_acceleration=<5..50>"},
+    {"sensing.joint_noise=<1e-7..1e-5>", "sensing.velocity=differenced", "sensing.velocity_cutoff=<20..80>"},
+    {"sensing.joint_noise=<1e-8..1e-6>"},
+    {"sensing.velocity_noise=<1e-6..3e-4>"},
+    {"sensing.latency=<0.002|0.004>"},
+    {"actuation.torque_step=<1e-5..3e-3>"},
+    {"actuation.gain_error=<1e-4..1e-2>"},
+    {"actuation.delay=<0.0005|0.0015|0.002>"},
+    {"actuation.lag=<5e-4..3e-3>"},
+    {"actuation.coulomb=<1e-3..3e-2>"},
+    {"actuation.coulomb=<1e-3..1e-2>", "actuation.stribeck=<1e-2..3e-2>",
+     "actuation.stribeck_velocity=<0.01..0.1>"},
+    {"actuation.backlash=<1e-5..1e-3>"},
+    {"mismatch.mass_within=<1e-3..3e-2>"},
+    {"mismatch.mass=<0.97|1.01|1.03>"},
+    {"mismatch.damping=<0.8|1.2|1.5>"},
+    {"mismatch.armature=<0.9|1.2>"},
+    {"disturbance=[{ type = 'slope', slope = [<1e-4..3e-3>, <1e-4..3e-3>] }]"},
     {"control.kappa=integrated"},
-    {"sensing.object_position_noise=1e-5", "sensing.object_velocity=kalman", "sensing.object_acceleration=5"},
-    {"sensing.object_rate=250", "sensing.object_latency=0.004", "sensing.object_velocity=differenced"},
-    {"disturbance=[{ type = 'pulse', body = 'object', force = [0, 0, 0.5], begin = 0.05, duration = 0.1 }]"},
+    {"sensing.object_position_noise=<1e-6..3e-5>", "sensing.object_velocity=kalman",
+     "sensing.object_acceleration=<2..10>"},
+    {"sensing.object_orientation_noise=<1e-6..1e-4>", "sensing.object_velocity=kalman",
+     "sensing.object_acceleration=<2..10>"},
+    {"sensing.object_rate=250", "sensing.object_latency=<0.004|0.008>",
+     "sensing.object_velocity=differenced"},
+    {"sensing.contact_force_noise=<1e-4..1e-2>"},
+    {"disturbance=[{ type = 'pulse', body = 'object', force = [0, 0, <0.05..1>], begin = 0.05, duration = "
+     "0.1 }]"},
+    {"disturbance=[{ type = 'step', body = 'object', force = [<0.01..0.3>, 0, 0], begin = 0.03 }]"},
+    {"disturbance=[{ type = 'sine', body = 'object', torque = [0, 0, <1e-4..1e-2>], frequency = <3..30> }]"},
+    {"disturbance=[{ type = 'noise', body = 'object', force = [<1e-3..3e-2>, <1e-3..3e-2>, 0], frequency = "
+     "<5..50> }]"},
 };
-constexpr size_t kOfJoints = 10;  // of them, those that every robot can have
+constexpr size_t kOfJoints = 18;  // of them, those that every robot can have
+
+/// The text with its sizes drawn.
+std::string DrawSizes(std::string text, std::mt19937_64* random) {
+  for (size_t begin = text.find('<'); begin != std::string::npos; begin = text.find('<')) {
+    const size_t end = text.find('>', begin);
+    const std::string inside = text.substr(begin + 1, end - begin - 1);
+    const size_t dots = inside.find("..");
+    std::string drawn;
+    if (dots == std::string::npos) {
+      std::vector<std::string> choices;
+      std::istringstream stream(inside);
+      for (std::string one; std::getline(stream, one, '|');) choices.push_back(one);
+      drawn = choices[(*random)() % choices.size()];
+    } else {
+      const double low = std::stod(inside.substr(0, dots)), high = std::stod(inside.substr(dots + 2));
+      const double part = static_cast<double>((*random)() >> 11) * 0x1p-53;
+      drawn = fmt::format("{:.4g}", low * std::pow(high / low, part));
+    }
+    text.replace(begin, end - begin + 1, drawn);
+  }
+  return text;
+}
 
 /// The run of this number.
 Choice Draw(int number, const Options& options) {
@@ -151,8 +192,8 @@ Choice Draw(int number, const Options& options) {
   }
   const bool is_real = !scenario.imperfections.is_ideal();
   for (auto count = is_real || scenario.pick_task() != nullptr ? 0 : random() % 3; count > 0; --count) {
-    const auto& asked = kAsked[random() % (moves_joints ? kOfJoints : kAsked.size())];
-    choice.overrides.insert(choice.overrides.end(), asked.begin(), asked.end());
+    for (const std::string& one : kDeclared[random() % (moves_joints ? kOfJoints : kDeclared.size())])
+      choice.overrides.push_back(DrawSizes(one, &random));
     is_as_written = false;
   }
   if (!is_as_written) choice.overrides.emplace_back("expect={}");
@@ -189,6 +230,8 @@ bool Try(const Choice& choice, std::map<std::string, Largest>* largest) {
   const bool cut = run.loop().task() != nullptr;  // a task that is cut short has failed, and nothing is wrong
   const bool right = expected == kExpectedCause.end() ? cause == "none" && (cut || result.failure.empty())
                                                       : cause == expected->second;
+  for (const Explanation& one : expected == kExpectedCause.end() ? result.causes : Causes())
+    fmt::print("CAUSE {}: {}\n", choice.Describe(), one.Tell());
   if (!right) {
     fmt::print("ALARM {}: {}: {} {}\n", choice.Describe(), cause, result.attribution.evidence,
                result.failure);
@@ -204,7 +247,7 @@ bool Try(const Choice& choice, std::map<std::string, Largest>* largest) {
   if (!right || (!told.empty() && expected == kExpectedCause.end()))
     fmt::print("  {}:{}\n", choice.Describe(), told);
   std::cout.flush();
-  return right;
+  return right && (result.causes.empty() || expected != kExpectedCause.end());
 }
 
 int RunCampaign(const Options& options) {

@@ -40,13 +40,13 @@ Count RunSome(RunCampaign* campaign, const Choose& choose) {
     ++count.made;
     count.killed += mutant.killed ? 1 : 0;
     count.cause += mutant.has_right_cause() ? 1 : 0;
-    if (!mutant.killed || !mutant.has_right_cause() || !mutant.names_part) {
-      std::cout << mutant.name << ": " << (mutant.killed ? NameOf(mutant.cause) : "survived") << ": "
+    if (!mutant.killed || !mutant.has_right_cause() || !mutant.is_named()) {
+      std::cout << mutant.all.name << ": " << (mutant.killed ? NameOf(mutant.cause) : "survived") << ": "
                 << mutant.evidence << " " << mutant.failure << "\n";
     }
-    if (mutant.part.empty()) continue;
+    if (mutant.all.part.empty() && mutant.all.truth.empty()) continue;
     ++count.with_part;
-    count.part += mutant.has_right_cause() && mutant.names_part ? 1 : 0;
+    count.part += mutant.is_named() ? 1 : 0;
   }
   return count;
 }
@@ -85,7 +85,7 @@ TEST(RunCampaign, NamesFaultsThatAreDrawn) {
       for (size_t i = 0; i < campaign.mutants().size(); ++i) {
         EXPECT_TRUE(campaign.Run(i, kGoOn));
         const RunMutant& mutant = campaign.mutants()[i];
-        EXPECT_EQ(mutant.score.wrong, 0) << mutant.name << ": " << mutant.causes;
+        EXPECT_EQ(mutant.score.wrong, 0) << mutant.all.name << ": " << mutant.causes;
         if (!mutant.killed) continue;
         all += static_cast<int>(mutant.truth.size());
         named += mutant.score.right;
@@ -127,13 +127,14 @@ TEST(RunCampaign, FindsFaultsOfPlantsAndTheirCauses) {
   options.equations = false;
   RunCampaign campaign = MakeCampaign(options);
   // Those that are there from the beginning take longest.
-  const Count faults = RunSome(&campaign, [](const RunMutant& mutant) { return mutant.kind != "wheels"; });
+  const Count faults =
+      RunSome(&campaign, [](const RunMutant& mutant) { return mutant.all.kind != "wheels"; });
   EXPECT_GE(faults.made, 60);
   EXPECT_GE(20 * faults.killed, 19 * faults.made);
   EXPECT_GE(20 * faults.cause, 19 * faults.made);
   EXPECT_GE(20 * faults.part, 19 * faults.with_part);
   for (const RunMutant& mutant : campaign.mutants())
-    EXPECT_NE(mutant.cause, Cause::kIntegrator) << mutant.name;
+    EXPECT_NE(mutant.cause, Cause::kIntegrator) << mutant.all.name;
 }
 
 // A hand on the Panda that holds a ball, and the Panda with nothing: what can be wrong is looked for in the
@@ -146,7 +147,8 @@ TEST(RunCampaign, MakesItsFaultsInOtherRobotsToo) {
     const Scenario scenario = ReadShippedScenario(name);
     RunCampaign campaign(scenario, scenario.model_file, scenario.mjcf_file, options, kGoOn);
     const auto is_of_plant = [](const RunMutant& mutant) {
-      return mutant.kind != "equation" && mutant.kind != "law, one part" && mutant.kind != "law, otherwise";
+      return mutant.all.kind != "equation" && mutant.all.kind != "law, one part" &&
+             mutant.all.kind != "law, otherwise";
     };
     const Count faults = RunSome(&campaign, is_of_plant);
     EXPECT_GE(faults.made, 40);
@@ -154,9 +156,9 @@ TEST(RunCampaign, MakesItsFaultsInOtherRobotsToo) {
     bool has_laws = false;
     for (const RunMutant& mutant : campaign.mutants()) {
       if (!is_of_plant(mutant)) has_laws = true;
-      EXPECT_FALSE(mutant.refused) << mutant.name << ": " << mutant.failure;
-      if (is_of_plant(mutant)) EXPECT_TRUE(mutant.killed || mutant.no_effect) << mutant.name;
-      EXPECT_EQ(mutant.name.find("wheel"), std::string::npos) << mutant.name;
+      EXPECT_FALSE(mutant.refused) << mutant.all.name << ": " << mutant.failure;
+      if (is_of_plant(mutant)) EXPECT_TRUE(mutant.killed || mutant.no_effect) << mutant.all.name;
+      EXPECT_EQ(mutant.all.name.find("wheel"), std::string::npos) << mutant.all.name;
     }
     EXPECT_EQ(has_laws, scenario.joint_task() == nullptr);
   }
@@ -172,11 +174,12 @@ TEST(RunCampaign, AnUprightAxisHoldsWhatPushesAlongIt) {
   int without = 0;
   for (size_t i = 0; i < campaign.mutants().size(); ++i) {
     const RunMutant& mutant = campaign.mutants()[i];
-    const bool shows_never = mutant.name == "link panda_link1: Ixx" || mutant.name == "link panda_link1: Ixy";
-    if (!shows_never && mutant.name != "link panda_link2: mass") continue;
+    const bool shows_never =
+        mutant.all.name == "link panda_link1: Ixx" || mutant.all.name == "link panda_link1: Ixy";
+    if (!shows_never && mutant.all.name != "link panda_link2: mass") continue;
     ASSERT_TRUE(campaign.Run(i, kGoOn));
-    EXPECT_EQ(mutant.no_effect, shows_never) << mutant.name;
-    EXPECT_EQ(mutant.killed, !shows_never) << mutant.name;
+    EXPECT_EQ(mutant.no_effect, shows_never) << mutant.all.name;
+    EXPECT_EQ(mutant.killed, !shows_never) << mutant.all.name;
     without += mutant.no_effect ? 1 : 0;
   }
   EXPECT_EQ(without, 2);
@@ -190,7 +193,8 @@ TEST(RunCampaign, NothingInjectedChangesNothing) {
   options.parameters = 0;
   options.laws = options.equations = false;
   RunCampaign campaign = MakeCampaign(options, "bonded");
-  const Count objects = RunSome(&campaign, [](const RunMutant& mutant) { return mutant.kind == "object"; });
+  const Count objects =
+      RunSome(&campaign, [](const RunMutant& mutant) { return mutant.all.kind == "object"; });
   EXPECT_GE(objects.made, 7);
   EXPECT_GE(objects.cause, objects.made - 1);  // one pushes later than the run lasts
 }
