@@ -169,9 +169,10 @@ void AddMutateCommand(Command app) {
       .Needs(run)
       .ShowDefault();
   command
-      .AddOption("--kinds", &request->run.options.kinds,
-                 "In a run: out of which kinds of faults is drawn: motor, sensor, joint, body, floor, wheels, "
-                 "contact, solver, law (default: all)")
+      .AddOption(
+          "--kinds", &request->run.options.kinds,
+          "In a run: out of which kinds of faults is drawn: motor, sensor, joint, body, floor, wheels, "
+          "contact, solver, law (default: all)")
       .TypeName("KIND,...")
       .Delimiter(',')
       .Needs(run);
@@ -187,6 +188,12 @@ void AddMutateCommand(Command app) {
   for (Option option : {from, duration, faults, scale, draws}) option.Excludes(smallest);
   for (Option option : states) option.Excludes(run);
   no_diagnosis.Excludes(run);
+  command
+      .AddOption("--page", &request->run.page_file,
+                 "In a run: an HTML page with what was made, what was found, and how it was named")
+      .TypeName("FILE")
+      .Needs(run)
+      .Excludes(smallest);
   AddJobsOption(command, "Faults", &request->run.jobs).Excludes(smallest);
   AddJsonOption(command, "the results", &request->json_file);
   command.AddFlag("--quiet", &request->quiet, "Print the verdict only");

@@ -10,6 +10,7 @@
 #include "harness/cli/output_file.h"
 #include "harness/cli/progress_bar.h"
 #include "harness/cli/run_folder.h"
+#include "harness/report/campaign_page.h"
 #include "harness/run/run_mutation.h"
 
 namespace dexcheck::cli {
@@ -62,6 +63,10 @@ CampaignFault Describe(const RunMutant& mutant) {
                    {"in_class", mutant.score.in_class},
                    {"not_explained", mutant.score.not_explained},
                    {"wrong", mutant.score.wrong}};
+  for (size_t i = 0; i < mutant.truth.size(); ++i)
+    fault.details["names"].push_back({{"injected", mutant.truth[i].fault},
+                                      {"place", mutant.truth[i].place},
+                                      {"named", mutant.score.named_as[i]}});
   return fault;
 }
 
@@ -98,6 +103,8 @@ int MutateRun(const MutateRunRequest& request) {
   CatchInterrupts();
   std::optional<OutputFile> json;
   if (!request.json_file.empty()) json.emplace(request.json_file);
+  std::optional<OutputFile> page;
+  if (!request.page_file.empty()) page.emplace(request.page_file);
   RunCampaign runs(files.scenario, files.robot, files.mjcf, request.options, IsInterrupted);
   Campaign campaign{.faults = {}, .total = runs.mutants().size()};
   ProgressBar bar("changing", static_cast<long>(campaign.total), request.quiet || request.json_file == "-");
@@ -106,12 +113,14 @@ int MutateRun(const MutateRunRequest& request) {
     return Describe(runs.mutants()[i]);
   });
   bar.Finish();
-  if (json) {
-    json->Write(campaign.ToText({{"scenario", request.scenario},
-                                 {"overrides", request.overrides.List()},
-                                 {"from_s", request.options.from},
-                                 {"duration_s", request.options.duration},
-                                 {"scale", request.options.scale}}));
+  if (json || page) {
+    const std::string text = campaign.ToText({{"scenario", request.scenario},
+                                              {"overrides", request.overrides.List()},
+                                              {"from_s", request.options.from},
+                                              {"duration_s", request.options.duration},
+                                              {"scale", request.options.scale}});
+    if (json) json->Write(text);
+    if (page) page->Write(MakeCampaignPage(Json::parse(text)));
   }
   if (request.json_file != "-") campaign.Print(request.quiet);
   if (request.json_file != "-" && request.options.draws > 0) PrintScores(campaign);

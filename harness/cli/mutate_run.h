@@ -15,6 +15,7 @@ struct MutateRunRequest {
   std::string scenario;
   Overrides overrides;
   RunMutationOptions options;
+  std::string page_file;  ///< Empty for none.
   std::string json_file;
   std::uint64_t jobs = 0;  ///< Runs at a time; 0 for one on each processor.
   bool quiet = false;

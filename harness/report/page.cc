@@ -63,6 +63,7 @@ class Page {
                  {"description", run_.FindSummaryText("/description")},
                  {"version", Text("dexcheck_version")},
                  {"verdict", MakeVerdict()},
+                 {"causes", run_.summary().value("causes", Json::array())},
                  {"categories", Json::array()},
                  {"tiles", MakeTiles()},
                  {"video", MakeVideo()},

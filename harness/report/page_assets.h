@@ -8,6 +8,7 @@ extern const char* const kPageCss;
 extern const char* const kDomJs;  ///< What the other scripts make elements with.
 extern const char* const kPageHtml;
 extern const char* const kRunJs;
+extern const char* const kCampaignJs;
 extern const char* const kComparisonJs;
 extern const char* const kPageJs;  ///< Needs dygraphs.
 extern const char* const kReplayHtml;

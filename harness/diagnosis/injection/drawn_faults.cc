@@ -97,29 +97,49 @@ std::vector<FaultSet> DrawEachKind(const Setup& setup, const DrawOptions& option
   return sets;
 }
 
+namespace {
+
+constexpr double kNear = 0.05;
+
+/// Whether the value is right: an error that is infinite or no number says nothing of it.
+bool HasValue(const Fault& named, const Fault& truth) {
+  return std::abs(named.value - truth.value) <= std::max(kNear * truth.error, 3.0 * named.error);
+}
+
+bool NamesInClass(const Explanation& one, const Fault& truth) {
+  const bool is_class = one.outcome == CauseOutcome::kNamedClass || !std::isfinite(one.faults.front().error);
+  return is_class && std::any_of(one.faults.begin(), one.faults.end(),
+                                 [&](const Fault& fault) { return truth.IsLike(fault); });
+}
+
+}  // namespace
+
 NamingScore ScoreNames(const std::vector<Fault>& truth, const std::vector<Fault>& all, const Causes& causes) {
-  constexpr double kNear = 0.05;
   NamingScore score;
-  for (const Fault& one : truth) {
-    bool right = false, in_class = false;
-    for (const Explanation& explanation : causes) {
-      if (explanation.outcome == CauseOutcome::kNotExplained) continue;
-      const Fault& first = explanation.faults.front();
-      right = right || (explanation.outcome == CauseOutcome::kNamed && one.IsLike(first) &&
-                        std::isfinite(first.error) &&
-                        std::abs(first.value - one.value) <= std::max(kNear * one.error, 3.0 * first.error));
-      in_class = in_class || ((explanation.outcome == CauseOutcome::kNamedClass || std::isinf(first.error)) &&
-                              std::any_of(explanation.faults.begin(), explanation.faults.end(),
-                                          [&](const Fault& fault) { return one.IsLike(fault); }));
-    }
-    ++(right ? score.right : in_class ? score.in_class : score.not_explained);
+  std::string wrong;  // one of them
+  for (const Explanation& one : causes) {
+    if (one.outcome != CauseOutcome::kNamed) continue;
+    const Fault& first = one.faults.front();
+    const auto of =
+        std::find_if(all.begin(), all.end(), [&](const Fault& fault) { return fault.IsLike(first); });
+    if (of != all.end() && HasValue(first, *of)) continue;
+    ++score.wrong;
+    wrong = of == all.end() ? first.fault : "another value";
   }
-  for (const Explanation& explanation : causes) {
-    if (explanation.outcome != CauseOutcome::kNamed) continue;
-    const Fault& first = explanation.faults.front();
-    const auto of = std::find_if(all.begin(), all.end(), [&](const Fault& one) { return one.IsLike(first); });
-    if (of == all.end() || std::abs(first.value - of->value) > std::max(kNear * of->error, 3.0 * first.error))
-      ++score.wrong;
+  for (const Fault& fault : truth) {
+    bool is_right = false, is_in_class = false;
+    for (const Explanation& one : causes) {
+      if (one.outcome == CauseOutcome::kNotExplained) continue;
+      const Fault& first = one.faults.front();
+      is_right = is_right || (one.outcome == CauseOutcome::kNamed && fault.IsLike(first) &&
+                              std::isfinite(first.error) && HasValue(first, fault));
+      is_in_class = is_in_class || NamesInClass(one, fault);
+    }
+    ++(is_right ? score.right : is_in_class ? score.in_class : score.not_explained);
+    score.named_as.push_back(is_right         ? fault.fault
+                             : is_in_class    ? "a class"
+                             : !wrong.empty() ? wrong
+                                              : "nothing");
   }
   return score;
 }
