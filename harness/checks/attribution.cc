@@ -94,6 +94,8 @@ const std::string& FindMeasured(Cause cause, const MeasuredCauses& measured) {
     case Cause::kUnmodelledForce:
     case Cause::kSlope:
       return measured.force;
+    case Cause::kContactGeometry:
+      return measured.contacts;
     case Cause::kWheelGeometry:
       return measured.wheels;
     default:
@@ -133,6 +135,8 @@ const char* NameOf(Cause cause) {
       return "integrator";
     case Cause::kSlope:
       return "slope";
+    case Cause::kContactGeometry:
+      return "contact geometry";
     case Cause::kWheelGeometry:
       return "wheel geometry";
     case Cause::kCollision:

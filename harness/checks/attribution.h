@@ -25,6 +25,7 @@ struct MeasuredCauses {
   std::string sensors;    ///< Which reading, and how much.
   std::string force;      ///< On which joint or body, and how large.
   std::string wheels;     ///< Which radius or distance.
+  std::string contacts;   ///< Which radius.
   bool is_slope = false;  ///< The force is gravity's, which does not point down.
   /// Largest errors of the object that (57) by itself would leave while the expectations are asked, m and
   /// rad: below zero where it is not integrated.

@@ -287,6 +287,13 @@ const CheckInfo kChecks[] = {
      "overlap of fingertip and object",
      {Cause::kContactSoftness, 5, Rank::kAssumption, kOwn},
      [](const Analysis& a) { return When(true, a.penetration); }},
+    {{"contact_distance", kAssumption, "m"},
+     {1e-10, "rounding of two ways to the same distance, some 1e-16 of 1 m, and where FindContact stops"},
+     "distance of a fingertip and the object: the plant's against that of the declared shapes",
+     {Cause::kContactGeometry, -2, Rank::kDecisive, kOwn},
+     EvaluateContactDistance,
+     kAlways,
+     DescribeFingertip},
     // For the shipped step of 1 ms: the error of the trapezoidal rule, (rate dt)^2 / 12 of the way. Measured
     // 3e-9 at most in the shipped scenarios.
     {{"kappa", kAssumption, "m"},

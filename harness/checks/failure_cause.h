@@ -20,6 +20,7 @@ enum class Cause {
   kUnmodelledForce,  ///< A force acts that neither the model nor the engine's description has.
   kIntegrator,       ///< What time stepping leaves: half the step leaves less.
   kSlope,            ///< The floor is not level: gravity points elsewhere.
+  kContactGeometry,  ///< A fingertip or the object has another shape.
   kWheelGeometry,    ///< The wheels' radius or distance is another.
   kCollision,        ///< Two bodies touch that are not meant to.
   kFingertipRim,     ///< A contact has rolled past the rim of a hemispherical fingertip.

@@ -45,6 +45,13 @@ Evaluation EvaluateRolling(const StepAnalysis& step) {
   return CheckValue{std::max(0.0, beyond - step.sinking)};
 }
 
+Evaluation EvaluateContactDistance(const StepAnalysis& step) {
+  if (step.contact_mismatch.size() == 0) return std::nullopt;
+  Eigen::Index part = 0;
+  const double worst = step.contact_mismatch.cwiseAbs().maxCoeff(&part);
+  return CheckValue{worst, static_cast<int>(part)};
+}
+
 Evaluation EvaluateRim(const StepAnalysis& step) {
   if (!step.step->command.handling.holding) return std::nullopt;
   const Vector3d& pole = *step.setup->scenario().grasp.hemisphere;

@@ -34,6 +34,7 @@ StepAnalyzer::StepAnalyzer(const Setup& setup)
   for (VectorXd* vector : {&now_.applied_force, &now_.bias, &now_.robot_residual, &now_.findings.xi_dot_model,
                            &spin_force_, &held_force_, &moving_, &momentum_, &acceleration_error_})
     vector->setZero(n);
+  now_.contact_mismatch.setZero(static_cast<Eigen::Index>(setup.fingertips().size()));
   now_.setup = &setup;
   now_.clearance = &clearance_;
   now_.findings.f_c.setZero(3 * static_cast<Eigen::Index>(setup.fingertips().size()));

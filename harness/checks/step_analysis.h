@@ -77,6 +77,8 @@ struct StepAnalysis {
   bool is_window_end = false;  ///< Whether the window that distances are judged over moves on after the step.
   int contacts_missing = 0;    ///< Fingertips that do not touch.
   double penetration = 0.0;    ///< Deepest overlap of a fingertip and the object, m.
+  /// Distance of each fingertip that touches, by the plant less by the declared shapes (N), m; else 0.
+  VectorXd contact_mismatch;
   VectorXd contact_bias;       ///< CalcContactBias (3N).
   SlipSummary fingertips, wheels;
 

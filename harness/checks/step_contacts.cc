@@ -31,11 +31,16 @@ void StepAnalyzer::FindContacts() {
   const std::vector<PlantContact>& contacts = step.response.contacts;
   now_.contacts_missing = 0;
   now_.penetration = 0.0;
+  now_.contact_mismatch.setZero();
   for (size_t i = 0; i < contacts.size(); ++i) {
     const Matrix3d R_B_cf =
         step.reading.state.X_Bo.linear() * now_.grasp->contacts()[i].geometry.g_o_cf.linear();
     findings.f_c.segment<3>(3 * static_cast<Eigen::Index>(i)) = R_B_cf.transpose() * contacts[i].force;
     if (!contacts[i].touching) ++now_.contacts_missing;
+    // Bonds join points, whatever the shapes.
+    if (contacts[i].touching && setup_->start().bonds.empty())
+      now_.contact_mismatch[static_cast<Eigen::Index>(i)] =
+          contacts[i].distance + step.reading.state.overlap[i];
     if (step.command.handling.holding && !contacts[i].touching && findings.fingertip_slip[i].touching)
       ++findings.contacts_lost;
     now_.penetration = std::max(now_.penetration, -contacts[i].distance);

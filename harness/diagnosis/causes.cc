@@ -22,6 +22,8 @@ const char* NameOf(CauseChannel channel) {
       return "actuation";
     case CauseChannel::kLaw:
       return "law";
+    case CauseChannel::kContact:
+      return "contact";
     case CauseChannel::kRolling:
       return "rolling";
     case CauseChannel::kBalance:

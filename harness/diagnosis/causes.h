@@ -26,8 +26,8 @@ struct Fault {
 };
 
 /// Where residuals are compared: what one of them shows, the others do not.
-enum class CauseChannel { kMeasurement, kActuation, kLaw, kRolling, kBalance };
-/// "measurement", "actuation", "law", "rolling", "balance".
+enum class CauseChannel { kMeasurement, kActuation, kLaw, kContact, kRolling, kBalance };
+/// "measurement", "actuation", "law", "contact", "rolling", "balance".
 const char* NameOf(CauseChannel channel);
 
 enum class CauseOutcome {

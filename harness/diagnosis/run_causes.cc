@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "harness/diagnosis/contact_causes.h"
 #include "harness/diagnosis/force_causes.h"
 #include "harness/diagnosis/law_causes.h"
 #include "harness/diagnosis/rolling_causes.h"
@@ -10,12 +11,28 @@
 namespace dexcheck {
 namespace {
 
+bool Explains(const Causes& causes, CauseChannel channel) {
+  return std::any_of(causes.begin(), causes.end(), [&](const Explanation& one) {
+    return one.channel == channel && one.outcome != CauseOutcome::kNotExplained;
+  });
+}
+
+/// Contacts that are elsewhere make object and fingers move as if something else acted on them.
+void DropConsequencesOfShapes(const StepStore& store, Causes* causes) {
+  if (!Explains(*causes, CauseChannel::kContact)) return;
+  const RobotModel& model = store.setup().model();
+  std::vector<std::string> places = {"object " + store.setup().object().name};
+  for (const int tip : store.setup().fingertips())
+    places.push_back("link " + model.link_name(model.frames()[static_cast<size_t>(tip)].link));
+  std::erase_if(*causes, [&](const Explanation& one) {
+    return one.channel == CauseChannel::kBalance &&
+           std::find(places.begin(), places.end(), one.faults.front().place) != places.end();
+  });
+}
+
 /// Wheels that roll otherwise make platform and wheels move as if something else acted on them.
 void DropConsequences(const StepStore& store, Causes* causes) {
-  const auto rolls = [](const Explanation& one) {
-    return one.channel == CauseChannel::kRolling && one.outcome != CauseOutcome::kNotExplained;
-  };
-  if (std::none_of(causes->begin(), causes->end(), rolls)) return;
+  if (!Explains(*causes, CauseChannel::kRolling)) return;
   const Base& base = store.setup().model().base();
   const std::string places[] = {"link " + base.link, "joint " + base.wheel_joint_right,
                                 "joint " + base.wheel_joint_left};
@@ -31,10 +48,11 @@ void DropConsequences(const StepStore& store, Causes* causes) {
 
 Causes ExplainRun(const StepStore& store) {
   Causes causes;
-  for (const auto explain : {ExplainSignals, ExplainLaw, ExplainRolling, ExplainForces}) {
+  for (const auto explain : {ExplainSignals, ExplainLaw, ExplainContacts, ExplainRolling, ExplainForces}) {
     Causes found = explain(store);
     std::move(found.begin(), found.end(), std::back_inserter(causes));
   }
+  DropConsequencesOfShapes(store, &causes);
   DropConsequences(store, &causes);
   std::stable_sort(causes.begin(), causes.end(),
                    [](const Explanation& a, const Explanation& b) { return a.channel < b.channel; });

@@ -30,7 +30,8 @@ StepStore::StepStore(const Setup& setup, const JudgedLaw* law, double rolling_bo
   const Eigen::Index n = model.num_velocities(), m = CountOf(readings_);
   const Eigen::Index parts = law_ == nullptr ? 0 : law_->CountParts();
   const Eigen::Index sizes[kSignalCount] = {
-      1, n, n, model.num_positions(), n, n, m, m, n, 6, 12, 12, n, 2, 2, 2, 2, n, 1, n * parts};
+      1, n, n, model.num_positions(),       n, n, m,        m, n, 6, 12, 12, n, 2,
+      2, 2, 2, CountOf(setup.fingertips()), n, 1, n * parts};
   for (int i = 0; i < kSignalCount; ++i) offsets_[i + 1] = offsets_[i] + sizes[i];
   before_.resize(offsets_[kSignalCount], kHistory);
   data_.resize(offsets_[kSignalCount], kCapacity);  // its pages are used only when something differs
@@ -176,6 +177,7 @@ void StepStore::Pack(const StepRecord& step, const StepAnalysis& now, bool answe
   at(kWheelNoise).setZero();
   if (answered && response.wheels.size() == 2)
     at(kWheelNoise) = now.wheel_slip.array() + now.sinking + rolling_bound_;
+  at(kContactMismatch) = now.contact_mismatch;
   at(kLawNoise)[0] = 0.0;
   if (now.law == nullptr || law_ == nullptr || !law_->differs()) return;
   at(kLawNoise)[0] = kLawTorqueBound * law_->noise_scale();

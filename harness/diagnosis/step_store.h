@@ -46,6 +46,7 @@ class StepStore {
     kWheelRates,       ///< 2, right and left, rad/s.
     kWheelMismatch,    ///< 2, CalcRollingMismatch, m/s.
     kWheelNoise,       ///< 2: what of that slipping and sinking may be, m/s; 0 without wheels.
+    kContactMismatch,  ///< N: StepAnalysis::contact_mismatch, m.
     kLawDifference,    ///< n, E_bar' (tau' - tau'_printed).
     kLawNoise,         ///< Of that, in |.|_M^-1; 0 where the law is right or not known.
     kLawParts,         ///< n times their number: the summands, where the law differs.

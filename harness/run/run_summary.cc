@@ -108,6 +108,7 @@ void Judge(const Setup& setup, const ClosedLoop& loop, RunResult* result) {
     measured.law = TellCauses(result->causes, CauseChannel::kLaw);
     measured.motors = TellCauses(result->causes, CauseChannel::kActuation);
     measured.sensors = TellCauses(result->causes, CauseChannel::kMeasurement);
+    measured.contacts = TellCauses(result->causes, CauseChannel::kContact);
     measured.wheels = TellCauses(result->causes, CauseChannel::kRolling);
     measured.force = TellCauses(result->causes, CauseChannel::kBalance);
     measured.is_slope = Names(result->causes, "slope");

@@ -107,7 +107,7 @@ InjectedFault SlipperyFloor(const FaultContext& context) {
 }
 
 InjectedFault SlipperyFingertips(const FaultContext& context) {
-  const double mu = context.draw->Uniform(0.12, 0.18);
+  const double mu = context.draw->Uniform(0.05, 0.1);
   return Slippery("fingertips slide", Cause::kFingertipSlip, false, mu);
 }
 
@@ -136,7 +136,9 @@ InjectedFault FingertipRadius(const FaultContext& context) {
   const int tip = tips[context.draw->Index(tips.size())];
   const std::string& name = context.model().frames()[static_cast<size_t>(tip)].name;
   const double factor = 1.0 + context.draw->Size(2e-3, 2e-2);
-  InjectedFault fault = FaultAt("fingertip " + name + ": another radius", Cause::kModel);
+  const double radius = context.model().tip_radius(tip);
+  InjectedFault fault = FaultAt("fingertip " + name, "radius", factor * radius, (factor - 1.0) * radius);
+  fault.cause = Cause::kContactGeometry;
   fault.from_start = true;
   fault.engine = [=](const Setup& setup, mjModel* m) {
     const int site = setup.adapter().frame_sites()[static_cast<size_t>(tip)];

@@ -194,7 +194,7 @@ TEST(RunCampaign, NothingInjectedChangesNothing) {
   options.laws = options.equations = false;
   RunCampaign campaign = MakeCampaign(options, "bonded");
   const Count objects =
-      RunSome(&campaign, [](const RunMutant& mutant) { return mutant.all.kind == "object"; });
+      RunSome(&campaign, [](const RunMutant& mutant) { return mutant.all.kind == "body"; });
   EXPECT_GE(objects.made, 7);
   EXPECT_GE(objects.cause, objects.made - 1);  // one pushes later than the run lasts
 }

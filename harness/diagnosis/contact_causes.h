@@ -1,0 +1,12 @@
+#pragma once
+
+// Which shapes of fingertips and object explain that they touch at another distance than the declared ones.
+
+#include "harness/diagnosis/causes.h"
+#include "harness/diagnosis/step_store.h"
+
+namespace dexcheck {
+
+Causes ExplainContacts(const StepStore& store);
+
+}  // namespace dexcheck
