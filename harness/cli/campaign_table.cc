@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <fstream>
 
 #include "harness/base/byte_archive.h"
 #include "harness/base/interrupts.h"
@@ -51,7 +52,41 @@ const char* NameOf(MutantOutcome outcome) {
   return outcome == MutantOutcome::kNoEffect ? "no effect" : "survived";
 }
 
+constexpr const char* kOwnKeys[] = {"kind", "name", "outcome", "cause_right", "part_named", "remark"};
+
+MutantOutcome OutcomeOf(const Json& name) {
+  for (const MutantOutcome outcome :
+       {MutantOutcome::kKilled, MutantOutcome::kRefused, MutantOutcome::kNoEffect})
+    if (name == NameOf(outcome)) return outcome;
+  return MutantOutcome::kSurvived;
+}
+
+CampaignFault ReadFault(const Json& json) {
+  CampaignFault fault{.kind = json.at("kind"), .name = json.at("name")};
+  fault.outcome = OutcomeOf(json.at("outcome"));
+  fault.cause_right = json.at("cause_right");
+  if (json.contains("part_named")) fault.part_named = json["part_named"].get<bool>();
+  fault.exception = json.at("remark");
+  fault.details = json;
+  for (const char* key : kOwnKeys) fault.details.erase(key);
+  return fault;
+}
+
 }  // namespace
+
+void Campaign::Resume(const std::string& json_file) {
+  std::ifstream file(json_file);
+  if (json_file.empty() || !file) return;
+  const Json json = Json::parse(file, nullptr, /*allow_exceptions=*/false);
+  if (!json.is_object() || json.value("complete", true)) return;
+  for (const auto& [key, value] : head.items())
+    if (!json.contains(key) || json[key] != value) return;
+  try {
+    for (const Json& fault : json.at("faults")) faults.push_back(ReadFault(fault));
+  } catch (const Json::exception&) {
+    faults.clear();
+  }
+}
 
 void Campaign::Make(std::uint64_t jobs, ProgressBar* bar,
                     const std::function<CampaignFault(size_t fault)>& make) {
@@ -60,15 +95,17 @@ void Campaign::Make(std::uint64_t jobs, ProgressBar* bar,
     return PackBytes(fault.kind, fault.name, fault.outcome, fault.cause_right, fault.part_named,
                      fault.exception, fault.details.dump());
   };
-  const auto take = [&](size_t i, const std::string& result) {
+  const auto take = [&](size_t /*i*/, const std::string& result) {
     CampaignFault& fault = faults.emplace_back();
     std::string details;
     UnpackBytes(result, &fault.kind, &fault.name, &fault.outcome, &fault.cause_right, &fault.part_named,
                 &fault.exception, &details);
     fault.details = Json::parse(details);
-    bar->Update(static_cast<long>(i + 1));
+    bar->Update(static_cast<long>(faults.size()));
   };
-  RunJobs("a fault", total, CountJobs(jobs), run, take, IsInterrupted);
+  const size_t done = faults.size();
+  RunJobs(
+      "a fault", total - done, CountJobs(jobs), [&](size_t i) { return run(done + i); }, take, IsInterrupted);
 }
 
 void Campaign::Print(bool quiet) const {
@@ -98,26 +135,28 @@ void Campaign::Print(bool quiet) const {
   fmt::print("{}\n", Wrap(verdict + ".", 2));
 }
 
-std::string Campaign::ToText(Json head) const {
-  head["complete"] = faults.size() == total;
-  head["kinds"] = Json::object();
+std::string Campaign::ToText() const {
+  Json json = head;
+  json["complete"] = faults.size() == total;
+  json["kinds"] = Json::object();
   for (const Row& row : SumUp(faults)) {
-    head["kinds"][row.kind] = {{"faults", row.faults},         {"found", row.found},
+    json["kinds"][row.kind] = {{"faults", row.faults},         {"found", row.found},
                                {"refused", row.refused},       {"no_effect", row.no_effect},
                                {"survived", row.survived},     {"cause_right", row.cause_right},
                                {"part_named", row.part_named}, {"with_a_part", row.with_part}};
   }
-  head["faults"] = Json::array();
+  json["faults"] = Json::array();
   for (const CampaignFault& fault : faults) {
     Json one = {{"kind", fault.kind},
                 {"name", fault.name},
                 {"outcome", NameOf(fault.outcome)},
-                {"cause_right", fault.cause_right}};
+                {"cause_right", fault.cause_right},
+                {"remark", fault.exception}};
     if (fault.part_named) one["part_named"] = *fault.part_named;
     one.update(fault.details);
-    head["faults"].push_back(one);
+    json["faults"].push_back(one);
   }
-  return head.dump(2) + "\n";
+  return json.dump(2) + "\n";
 }
 
 ExitCode Campaign::ToExitCode() const {

@@ -33,13 +33,18 @@ struct Campaign {
   size_t total = 0;                   ///< To be made.
   bool names_causes = true;           ///< Whether causes were looked for.
 
-  /// Makes all faults, so many at a time as CountJobs says, until the user interrupts.
+  Json head = Json::object();  ///< Of the JSON: what the campaign was asked for.
+
+  /// Takes what an interrupted campaign that was asked for the same left in a file; nothing where there is
+  /// none.
+  void Resume(const std::string& json_file);
+  /// Makes the others, so many at a time as CountJobs says, until the user interrupts.
   /// @param make makes one in a process of its own. @throws Error when such a process dies.
   void Make(std::uint64_t jobs, ProgressBar* bar, const std::function<CampaignFault(size_t fault)>& make);
   /// Prints a line for each kind of fault, the exceptions, and the verdict; the verdict alone when quiet.
   void Print(bool quiet) const;
-  /// Adds "complete", "kinds" and "faults". @returns the text of a file.
-  [[nodiscard]] std::string ToText(Json head) const;
+  /// The text of a file: `head`, "complete", "kinds" and "faults".
+  [[nodiscard]] std::string ToText() const;
   /// 3 when not all were made, which is said on standard error; else 1 when one survived.
   [[nodiscard]] ExitCode ToExitCode() const;
 };

@@ -86,8 +86,16 @@ int Run(MutateRequest request) {
 
   std::vector<Mutant> mutants = ListMutants(model.spec(), request.options.scale);
   std::vector<FormulaMutant> formulas = ListFormulaMutants(model);
-  Campaign campaign{
-      .faults = {}, .total = mutants.size() + formulas.size(), .names_causes = request.options.diagnose};
+  Campaign campaign{.faults = {},
+                    .total = mutants.size() + formulas.size(),
+                    .names_causes = request.options.diagnose,
+                    .head = {{"robot", request.files.robot.string()},
+                             {"mjcf", request.files.mjcf.string()},
+                             {"mujoco", mj_versionString()},
+                             {"scale", request.options.scale},
+                             {"samples", request.options.samples},
+                             {"seed", request.options.seed}}};
+  campaign.Resume(request.json_file);
   ProgressBar bar("changing", static_cast<long>(campaign.total), request.quiet);
   campaign.Make(request.run.jobs, &bar, [&](size_t i) {
     if (i < formulas.size()) {
@@ -99,14 +107,7 @@ int Run(MutateRequest request) {
     return Describe(mutant, request.options.diagnose);
   });
   bar.Finish();
-  if (json) {
-    json->Write(campaign.ToText({{"robot", request.files.robot.string()},
-                                 {"mjcf", request.files.mjcf.string()},
-                                 {"mujoco", mj_versionString()},
-                                 {"scale", request.options.scale},
-                                 {"samples", request.options.samples},
-                                 {"seed", request.options.seed}}));
-  }
+  if (json) json->Write(campaign.ToText());
   if (request.json_file != "-") campaign.Print(request.quiet);
   return campaign.ToExitCode();
 }
@@ -195,7 +196,7 @@ void AddMutateCommand(Command app) {
       .Needs(run)
       .Excludes(smallest);
   AddJobsOption(command, "Faults", &request->run.jobs).Excludes(smallest);
-  AddJsonOption(command, "the results", &request->json_file);
+  AddJsonOption(command, "the results; an interrupted campaign goes on from them", &request->json_file);
   command.AddFlag("--quiet", &request->quiet, "Print the verdict only");
   command.SetAction([=] { return Run(*request); });
 }

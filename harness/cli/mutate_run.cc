@@ -106,22 +106,28 @@ int MutateRun(const MutateRunRequest& request) {
   std::optional<OutputFile> page;
   if (!request.page_file.empty()) page.emplace(request.page_file);
   RunCampaign runs(files.scenario, files.robot, files.mjcf, request.options, IsInterrupted);
-  Campaign campaign{.faults = {}, .total = runs.mutants().size()};
+  const RunMutationOptions& options = request.options;
+  Campaign campaign{.faults = {},
+                    .total = runs.mutants().size(),
+                    .head = {{"scenario", request.scenario},
+                             {"overrides", request.overrides.List()},
+                             {"from_s", options.from},
+                             {"duration_s", options.duration},
+                             {"scale", options.scale},
+                             {"numbers", options.parameters},
+                             {"kinds_drawn", options.kinds},
+                             {"draws", options.draws},
+                             {"together", options.together},
+                             {"draw_seed", options.seed}}};
+  campaign.Resume(request.json_file);
   ProgressBar bar("changing", static_cast<long>(campaign.total), request.quiet || request.json_file == "-");
   campaign.Make(request.jobs, &bar, [&](size_t i) {
     runs.Run(i, [] { return false; });
     return Describe(runs.mutants()[i]);
   });
   bar.Finish();
-  if (json || page) {
-    const std::string text = campaign.ToText({{"scenario", request.scenario},
-                                              {"overrides", request.overrides.List()},
-                                              {"from_s", request.options.from},
-                                              {"duration_s", request.options.duration},
-                                              {"scale", request.options.scale}});
-    if (json) json->Write(text);
-    if (page) page->Write(MakeCampaignPage(Json::parse(text)));
-  }
+  if (json) json->Write(campaign.ToText());
+  if (page) page->Write(MakeCampaignPage(Json::parse(campaign.ToText())));
   if (request.json_file != "-") campaign.Print(request.quiet);
   if (request.json_file != "-" && request.options.draws > 0) PrintScores(campaign);
   return campaign.ToExitCode();

@@ -133,6 +133,10 @@ void PrintCauses(const Causes& causes) {
   int number = 0;
   for (const Explanation& one : causes)
     fmt::print("{}\n", Wrap(fmt::format("    {}  {}: {}", ++number, NameOf(one.channel), one.Tell()), 7));
+  const bool has_class = std::any_of(causes.begin(), causes.end(), [](const Explanation& one) {
+    return one.outcome == CauseOutcome::kNamedClass;
+  });
+  if (has_class) fmt::print("    (what is not isolable here may be on another motion: dexcheck excite)\n");
 }
 
 }  // namespace
