@@ -290,7 +290,7 @@ const CheckInfo kChecks[] = {
     {{"contact_distance", kAssumption, "m"},
      {1e-10, "rounding of two ways to the same distance, some 1e-16 of 1 m, and where FindContact stops"},
      "distance of a fingertip and the object: the plant's against that of the declared shapes",
-     {Cause::kContactGeometry, -2, Rank::kDecisive, kOwn},
+     {Cause::kContactGeometry, -2, Rank::kObjectBalance, kOwn},
      EvaluateContactDistance,
      kAlways,
      DescribeFingertip},

@@ -53,7 +53,6 @@ CampaignFault Describe(const RunMutant& mutant) {
   fault.details = {{"expected_cause", NameOf(mutant.all.cause)},
                    {"cause", NameOf(mutant.cause)},
                    {"expected_part", mutant.all.part},
-                   {"part_named", mutant.is_named()},
                    {"evidence", mutant.evidence},
                    {"failure", mutant.failure},
                    {"failed_checks", mutant.failed_checks},
