@@ -70,10 +70,18 @@ bool KnowsMotion(const FaultContext& context) {
   return context.setup.scenario().control.law != ControlLaw::kPdGravity;
 }
 
+/// Whether it is several parts: at one joint all but one of them may vanish, and then it is that one.
+bool IsSum(const LawPartName& part) {
+  return std::any_of(ListLawParts().begin(), ListLawParts().end(), [&](const LawPartName& other) {
+    return other.parts != part.parts && (other.parts & part.parts) == other.parts;
+  });
+}
+
 InjectedFault Summand(const FaultContext& context) {
   const std::span<const LawPartName> parts = ListLawParts();
-  const size_t part = context.draw->Index(parts.size());
   const Place place = DrawPlace(context);
+  size_t part = context.draw->Index(parts.size());
+  while (!place.entries.empty() && IsSum(parts[part])) part = context.draw->Index(parts.size());
   const double factor = DrawFactor(context);
   InjectedFault one =
       LawFaultAt(place, std::string(parts[part].name) + " (" + parts[part].symbol + "), factor", factor, 1.0);
