@@ -5,6 +5,7 @@
 #include "harness/diagnosis/injection/fault_kinds.h"
 
 namespace dexcheck {
+namespace body_faults {
 namespace {
 
 // Joints.
@@ -247,7 +248,8 @@ constexpr FaultKind kKinds[] = {
 };
 
 }  // namespace
+}  // namespace body_faults
 
-std::span<const FaultKind> ListBodyFaultKinds() { return kKinds; }
+std::span<const FaultKind> ListBodyFaultKinds() { return body_faults::kKinds; }
 
 }  // namespace dexcheck

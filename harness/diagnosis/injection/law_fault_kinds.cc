@@ -9,6 +9,7 @@
 #include "harness/diagnosis/injection/faulty_law.h"
 
 namespace dexcheck {
+namespace law_faults {
 namespace {
 
 /// Entries of tau' that belong together.
@@ -226,7 +227,8 @@ constexpr FaultKind kKinds[] = {
 };
 
 }  // namespace
+}  // namespace law_faults
 
-std::span<const FaultKind> ListLawFaultKinds() { return kKinds; }
+std::span<const FaultKind> ListLawFaultKinds() { return law_faults::kKinds; }
 
 }  // namespace dexcheck

@@ -7,6 +7,7 @@
 #include "harness/diagnosis/injection/fault_kinds.h"
 
 namespace dexcheck {
+namespace motor_faults {
 namespace {
 
 /// The torque of a motor that is sent u at time t.
@@ -254,7 +255,8 @@ constexpr FaultKind kKinds[] = {
 };
 
 }  // namespace
+}  // namespace motor_faults
 
-std::span<const FaultKind> ListMotorFaultKinds() { return kKinds; }
+std::span<const FaultKind> ListMotorFaultKinds() { return motor_faults::kKinds; }
 
 }  // namespace dexcheck

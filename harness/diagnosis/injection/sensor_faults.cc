@@ -5,6 +5,7 @@
 #include "harness/diagnosis/injection/fault_kinds.h"
 
 namespace dexcheck {
+namespace sensor_faults {
 namespace {
 
 /// A joint's entries of the measured state.
@@ -162,7 +163,8 @@ constexpr FaultKind kKinds[] = {
 };
 
 }  // namespace
+}  // namespace sensor_faults
 
-std::span<const FaultKind> ListSensorFaultKinds() { return kKinds; }
+std::span<const FaultKind> ListSensorFaultKinds() { return sensor_faults::kKinds; }
 
 }  // namespace dexcheck

@@ -6,6 +6,7 @@
 #include "harness/engine/engine.h"
 
 namespace dexcheck {
+namespace world_faults {
 namespace {
 
 InjectedFault Slope(const FaultContext& context) {
@@ -184,7 +185,8 @@ constexpr FaultKind kKinds[] = {
 };
 
 }  // namespace
+}  // namespace world_faults
 
-std::span<const FaultKind> ListWorldFaultKinds() { return kKinds; }
+std::span<const FaultKind> ListWorldFaultKinds() { return world_faults::kKinds; }
 
 }  // namespace dexcheck
