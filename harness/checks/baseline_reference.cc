@@ -70,14 +70,14 @@ Vector6d BaselineReference::CalcWrench(const LawTerms& terms) const {
     return K;
   };
   const Matrix6d K = turn(stiffness_.K);
-  const Vector6d stiff = position_factor_ * (K * e_);
-  if (law_ != ControlLaw::kImpedance) return stiff + velocity_factor_ * (turn(stiffness_.D) * V_e_);
+  const Vector6d stiff = turn(stiffness_.K.cwiseProduct(position_factor_)) * e_;
+  if (law_ != ControlLaw::kImpedance) return stiff + turn(stiffness_.D.cwiseProduct(velocity_factor_)) * V_e_;
   // K v = k Lambda v with v^T Lambda v = 1: Q = Lambda [v1 .. v6]
   const Eigen::GeneralizedSelfAdjointEigenSolver<Matrix6d> modes(K, Lambda_);
   const Matrix6d Q = Lambda_ * modes.eigenvectors();
   const Vector6d roots = modes.eigenvalues().cwiseMax(0.0).cwiseSqrt();
-  return stiff +
-         velocity_factor_ * 2.0 * stiffness_.damping_ratio * (Q * roots.cwiseProduct(Q.transpose() * V_e_));
+  return stiff + velocity_factor_[0] * 2.0 * stiffness_.damping_ratio *
+                     (Q * roots.cwiseProduct(Q.transpose() * V_e_));
 }
 
 bool BaselineReference::Evaluate(const LawSpec& spec, const LawReference& plain, const LawTerms& terms,
@@ -137,7 +137,8 @@ void BaselineReference::CalcParts(const LawSpec& spec, const LawReference& plain
                                   const Eigen::Ref<const VectorXd>& F_N, MatrixXd* parts) {
   if (law_ == ControlLaw::kOperationalSpace) return;
   const VectorXd whole = force_;
-  const auto find = [&](double position, double velocity, const DesiredMotion& motion) {
+  const Vector6d one = Vector6d::Ones(), none = Vector6d::Zero();
+  const auto find = [&](const Vector6d& position, const Vector6d& velocity, const DesiredMotion& motion) {
     position_factor_ = position;
     velocity_factor_ = velocity;
     Evaluate(spec, plain, terms, G_dot, motion, F_N);
@@ -153,11 +154,17 @@ void BaselineReference::CalcParts(const LawSpec& spec, const LawReference& plain
   if (law_ == ControlLaw::kPdGravity)
     for (const LawPart part : {LawPart::kCoriolis, LawPart::kFriction, LawPart::kObjectCoriolis})
       column(part).setZero();
-  column(LawPart::kPositionFeedback) = find(0.0, 1.0, desired);
-  column(LawPart::kVelocityFeedback) = find(1.0, 0.0, desired);
-  column(LawPart::kFeedForward) = find(1.0, 1.0, steady);
-  find(1.0, 1.0, desired);
-  column(LawPart::kCoordinateRate) = whole - parts->rowwise().sum();
+  column(LawPart::kPositionFeedback) = find(none, one, desired);
+  column(LawPart::kVelocityFeedback) = find(one, none, desired);
+  column(LawPart::kFeedForward) = find(one, one, steady);
+  column(LawPart::kCoordinateRate) = whole - parts->leftCols(kLawPartCount).rowwise().sum();
+  for (int i = 0; i < 6; ++i) {
+    const Vector6d others = one - Vector6d::Unit(i);
+    const bool is_own = law_ != ControlLaw::kImpedance;
+    parts->col(kLawPartCount + i) = is_own ? find(one, others, desired) : VectorXd::Zero(whole.size());
+    parts->col(kLawPartCount + 6 + i) = find(others, one, desired);
+  }
+  find(one, one, desired);
 }
 
 }  // namespace dexcheck

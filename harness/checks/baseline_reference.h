@@ -27,7 +27,8 @@ class BaselineReference {
                 const DesiredMotion& desired, const Eigen::Ref<const VectorXd>& F_N);
 
   /// Splits E_bar' tau' of the last Evaluate, whose arguments these are. @param parts n x kLawPartCount, of
-  /// (55): those that the law does not share with it get its own, and kCoordinateRate what is left.
+  /// (55): those that the law does not share with it get its own, and kCoordinateRate what is left. Then of
+  /// each entry of D and of K; an impedance has no D of its own.
   void CalcParts(const LawSpec& spec, const LawReference& plain, const LawTerms& terms,
                  const Matrix6Xd& G_dot, const DesiredMotion& desired, const Eigen::Ref<const VectorXd>& F_N,
                  MatrixXd* parts);
@@ -43,7 +44,8 @@ class BaselineReference {
 
   ControlLaw law_;
   ObjectStiffness stiffness_;
-  double position_factor_ = 1.0, velocity_factor_ = 1.0;  // of K e and D V_e
+  Vector6d position_factor_ = Vector6d::Ones();  // of K
+  Vector6d velocity_factor_ = Vector6d::Ones();  // of D, or its first entry of an impedance's
   Eigen::LLT<MatrixXd> M_llt_, Lambda_c_llt_;
   MatrixXd M_inv_J_T_;                // n x k
   MatrixXd Lambda_c_inv_, Lambda_c_;  // k x k

@@ -18,6 +18,11 @@ class JudgedJointLaw final : public JudgedLaw {
         motion_(&setup.joints()->motion) {
     for (VectorXd* vector : {&force_, &demand_, &true_demand_})
       vector->setZero(setup.model().num_velocities());
+    // Of the other laws the gain of a joint is the feedback in its torque.
+    if (law_ != ControlLaw::kComputedTorque) return;
+    for (const char* gain : {"K_v", "K_p"})
+      for (int i = 0; i < setup.model().num_dofs(); ++i)
+        gain_names_.push_back(std::string(gain) + " of " + setup.model().dof_name(i));
   }
 
   [[nodiscard]] std::optional<double> CalcSpectralRadius() const override {
@@ -81,7 +86,7 @@ class JudgedJointLaw final : public JudgedLaw {
     const VectorXd& K = computed ? gains_.K_p : gains_.K;
     const VectorXd rate = D.cwiseProduct(desired_.q_dot - terms.xi);
     const VectorXd position = K.cwiseProduct(desired_.q - terms.q);
-    parts_.setZero(terms.xi.size(), kPartCount);
+    parts_.setZero(terms.xi.size(), CountColumns());
     if (moves) parts_.col(0) = terms.M * desired_.q_ddot;
     parts_.col(1) = computed ? VectorXd(terms.M * rate) : rate;
     parts_.col(2) = computed ? VectorXd(terms.M * position) : position;
@@ -89,6 +94,10 @@ class JudgedJointLaw final : public JudgedLaw {
     if (moves && !computed) parts_.col(3) += *terms.C * (desired_.q_dot - terms.xi);
     parts_.col(4) = terms.gravity;
     if (moves) parts_.col(5) = terms.friction;
+    if (!computed) return;
+    const Eigen::Index n = rate.size();
+    parts_.middleCols(kPartCount, n) = terms.M * rate.asDiagonal();
+    parts_.rightCols(n) = terms.M * position.asDiagonal();
   }
 
  private:

@@ -57,8 +57,12 @@ class JudgedLaw {
   [[nodiscard]] const VectorXd& difference() const { return difference_; }
   /// What rounding of that, times the bound of `law_torque`, is relative to, in |.|_M^-1.
   [[nodiscard]] double noise_scale() const { return scale_ * condition_number(); }
-  /// The summands of E_bar' tau'_printed (n x CountParts()), where they differ.
+  /// The summands of E_bar' tau'_printed and what each gain by itself makes of it (n x CountColumns()), where
+  /// they differ.
   [[nodiscard]] const MatrixXd& parts() const { return parts_; }
+  [[nodiscard]] int CountColumns() const { return CountParts() + static_cast<int>(gain_names_.size()); }
+  /// "K_p of x": the gains of the last columns.
+  [[nodiscard]] const std::vector<std::string>& gains() const { return gain_names_; }
   /// Number of summands.
   [[nodiscard]] virtual int CountParts() const = 0;
   /// Which summands, or several that are one thing, have a name.
@@ -89,6 +93,7 @@ class JudgedLaw {
   const TreeFactor* factor_ = nullptr;
   VectorXd difference_;  // n, E_bar' (tau' - tau'_printed)
   MatrixXd parts_;
+  std::vector<std::string> gain_names_;
   double scale_ = 1.0;
   LawErrors errors_;
 

@@ -258,4 +258,21 @@ const MatrixXd& LawReference::CalcParts(const LawTerms& terms, const Eigen::Ref<
   return parts_;
 }
 
+void LawReference::CalcGainParts(const LawSpec& spec, const LawTerms& terms, const DesiredMotion& desired,
+                                 Eigen::Ref<MatrixXd> parts) {
+  for (Eigen::Index i = 0; i < 12; ++i) {
+    LawSpec one = spec;
+    one.gains.K_v = i < 6 ? Vector6d(spec.gains.K_v[i] * Vector6d::Unit(i)) : Vector6d::Zero();
+    one.gains.K_p = i < 6 ? Vector6d::Zero() : Vector6d(spec.gains.K_p[i - 6] * Vector6d::Unit(i - 6));
+    const Demand demand = CalcObjectAcceleration(one, {terms.X_Bo, terms.V_Bo, terms.X_o}, desired);
+    const Vector6d V_dot = demand[i < 6 ? 1 : 2];
+    rates_.noalias() = terms.G.transpose() * V_dot;
+    ApplyPseudoinverse(&rates_, &motion_);
+    parts.col(i).noalias() = terms.M * motion_;
+    rates_.setZero();
+    AddLeastForces(terms.M_hat * V_dot, &rates_);
+    parts.col(i).noalias() += terms.J.transpose() * rates_;
+  }
+}
+
 }  // namespace dexcheck

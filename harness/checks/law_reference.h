@@ -124,6 +124,11 @@ class LawReference {
   /// The summands of E_bar' tau' (n x kLawPartCount) of the last Evaluate. @param terms, F_N the same again.
   const MatrixXd& CalcParts(const LawTerms& terms, const Eigen::Ref<const VectorXd>& F_N);
 
+  /// What each entry of K_v, then of K_p, makes of E_bar' tau' of the last Evaluate, whose arguments these
+  /// are (n x 12).
+  void CalcGainParts(const LawSpec& spec, const LawTerms& terms, const DesiredMotion& desired,
+                     Eigen::Ref<MatrixXd> parts);
+
   /// E_bar' tau' (n).
   [[nodiscard]] const VectorXd& force() const { return force_; }
   [[nodiscard]] const Vector6d& V_Bo_dot() const { return V_Bo_dot_; }

@@ -39,6 +39,10 @@ class JudgedObjectLaw final : public JudgedLaw {
       baseline_.emplace(options_.law, options_.stiffness, n, k);
     work_n_.setZero(n);
     work_k_.setZero(k);
+    parts_.setZero(n, kLawPartCount + 12);
+    for (const char* gain : {baseline_ ? "D" : "K_v", baseline_ ? "K" : "K_p"})
+      for (const char* axis : {"x", "y", "z", "rotation 1", "rotation 2", "rotation 3"})
+        gain_names_.push_back(std::string(gain) + " of " + axis);
   }
 
   /// Of (57): of the paper's law, and by algebra of that of operational space.
@@ -91,7 +95,8 @@ class JudgedObjectLaw final : public JudgedLaw {
   [[nodiscard]] double condition_number() const override { return reference_.condition_number(); }
   void CalcParts(const StepRecord& step, const LawTerms& terms) override {
     const VectorXd& F_N = step.command.demand.F_N;
-    parts_ = reference_.CalcParts(terms, F_N);
+    parts_.leftCols(kLawPartCount) = reference_.CalcParts(terms, F_N);
+    reference_.CalcGainParts(spec_, terms, desired_, parts_.rightCols(12));
     if (baseline_)
       baseline_->CalcParts(spec_, reference_, terms, step.model->grasp().G_dot(), desired_, F_N, &parts_);
   }

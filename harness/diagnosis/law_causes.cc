@@ -98,6 +98,13 @@ Causes ExplainLaw(const StepStore& store) {
                             .columns = MatrixXd::Zero(n * used, 1)});
     }
   }
+  for (const std::string& gain : store.law()->gains()) {
+    parts_of.push_back(0);
+    candidates.push_back({.fault = "gain " + gain + ", factor",
+                          .place = places.front().name,
+                          .nominal = 1.0,
+                          .columns = MatrixXd::Zero(n * used, 1)});
+  }
   // What a controller of another's may add.
   for (Index i = 0; i < n; ++i) {
     const std::string& place = places[places.size() - static_cast<size_t>(n - i)].name;
@@ -124,11 +131,11 @@ Causes ExplainLaw(const StepStore& store) {
     };
     y.segment(k * n, n) = whiten(store.Get(StepStore::kLawDifference).col(step));
     const VectorXd flat = store.Get(StepStore::kLawParts).col(step);
-    const MatrixXd parts = flat.reshaped(n, store.law()->CountParts());
+    const MatrixXd parts = flat.reshaped(n, store.law()->CountColumns());
     size_t candidate = 0;
     for (const LawPartName& name : names) {
       VectorXd sum = VectorXd::Zero(n);
-      for (Index i = 0; i < parts.cols(); ++i)
+      for (Index i = 0; i < store.law()->CountParts(); ++i)
         if ((name.parts >> i & 1U) != 0) sum += parts.col(i);
       VectorXd tau(n);
       actuation.CalcTorque(sum, tau);
@@ -139,6 +146,8 @@ Causes ExplainLaw(const StepStore& store) {
         candidates[candidate++].columns.col(0).segment(k * n, n) = whiten(own);
       }
     }
+    for (Index i = store.law()->CountParts(); i < parts.cols(); ++i)
+      candidates[candidate++].columns.col(0).segment(k * n, n) = whiten(parts.col(i));
     for (Index i = 0; i < n; ++i) {
       VectorXd own(n);
       actuation.CalcForce(VectorXd::Unit(n, i), own);

@@ -28,7 +28,7 @@ StepStore::StepStore(const Setup& setup, const JudgedLaw* law, double rolling_bo
   NameReadings();
   const RobotModel& model = setup.model();
   const Eigen::Index n = model.num_velocities(), m = CountOf(readings_);
-  const Eigen::Index parts = law_ == nullptr ? 0 : law_->CountParts();
+  const Eigen::Index parts = law_ == nullptr ? 0 : law_->CountColumns();
   const Eigen::Index sizes[kSignalCount] = {
       1, n, n, model.num_positions(),       n, n, m,        m, n, 6, 12, 12, n, 2,
       2, 2, 2, CountOf(setup.fingertips()), n, 1, n * parts};

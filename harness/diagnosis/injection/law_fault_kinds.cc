@@ -174,15 +174,34 @@ InjectedFault AddedFriction(const FaultContext& context) {
   return one;
 }
 
-/// All gains of position, or of velocity, times a factor.
-InjectedFault Gains(const FaultContext& context, bool of_velocity) {
+/// All gains of position, or of velocity, times a factor, or one of them.
+InjectedFault Gains(const FaultContext& context, bool of_velocity, bool is_one) {
   const double factor = 1.0 + context.draw->Size(1e-3, 0.3);
   const bool joints = IsOfJoints(context.setup);
+  const size_t axis = context.draw->Index(joints ? static_cast<size_t>(context.model().num_dofs()) : 6);
+  const auto change = [=](auto* gains) {
+    if (is_one) {
+      (*gains)[static_cast<Eigen::Index>(axis)] *= factor;
+    } else {
+      *gains *= factor;
+    }
+  };
   const size_t part = of_velocity ? 1 : 2;  // in both lists of parts
   const std::string name =
       joints ? (of_velocity ? "velocity feedback (K_v e_dot), factor" : "position feedback (K_p e), factor")
              : std::string(ListLawParts()[part].name) + " (" + ListLawParts()[part].symbol + "), factor";
-  InjectedFault one = LawFaultAt({"law", {}}, name, factor, 1.0);
+  const bool computed = context.setup.scenario().control.law == ControlLaw::kComputedTorque;
+  constexpr const char* kAxes[] = {"x", "y", "z", "rotation 1", "rotation 2", "rotation 3"};
+  const std::string one_name = std::string("gain ") +
+                               (of_velocity ? (computed ? "K_v" : "D") : (computed ? "K_p" : "K")) + " of " +
+                               (joints     ? context.model().dof_name(static_cast<int>(axis))
+                                : axis < 6 ? kAxes[axis]
+                                           : "") +
+                               ", factor";
+  InjectedFault one = LawFaultAt({"law", {}}, is_one ? one_name : name, factor, 1.0);
+  // Without the mass matrix it is the feedback in the torque of one joint.
+  if (is_one && joints && !computed)
+    one = LawFaultAt({"law of " + context.model().dof_name(static_cast<int>(axis)), {}}, name, factor, 1.0);
   one.controller = [=](const Setup& setup, std::unique_ptr<Controller>,
                        const IsOn&) -> std::unique_ptr<Controller> {
     const Scenario& scenario = setup.scenario();
@@ -192,13 +211,13 @@ InjectedFault Gains(const FaultContext& context, bool of_velocity) {
     if (const JointPlan* const plan = setup.joints()) {
       JointGains gains = plan->gains;
       for (VectorXd* gain : of_velocity ? std::array{&gains.K_v, &gains.D} : std::array{&gains.K_p, &gains.K})
-        *gain *= factor;
+        change(gain);
       return std::make_unique<JointController>(setup.model(), setup.object().body, setup.surface(),
                                                scenario.control.law, gains, plan->motion, sampling);
     }
     GraspControllerOptions options = setup.MakeControllerOptions();
-    (of_velocity ? options.gains.K_v : options.gains.K_p) *= factor;
-    (of_velocity ? options.stiffness.D : options.stiffness.K) *= factor;
+    change(of_velocity ? &options.gains.K_v : &options.gains.K_p);
+    change(of_velocity ? &options.stiffness.D : &options.stiffness.K);
     // D of an impedance follows from K.
     if (of_velocity) options.stiffness.damping_ratio *= factor;
     return std::make_unique<TrajectoryController>(setup.model(), setup.fingertips(), setup.object().body,
@@ -207,8 +226,10 @@ InjectedFault Gains(const FaultContext& context, bool of_velocity) {
   return one;
 }
 
-InjectedFault GainsOfPosition(const FaultContext& context) { return Gains(context, false); }
-InjectedFault GainsOfVelocity(const FaultContext& context) { return Gains(context, true); }
+InjectedFault GainsOfPosition(const FaultContext& context) { return Gains(context, false, false); }
+InjectedFault GainsOfVelocity(const FaultContext& context) { return Gains(context, true, false); }
+InjectedFault GainOfPosition(const FaultContext& context) { return Gains(context, false, true); }
+InjectedFault GainOfVelocity(const FaultContext& context) { return Gains(context, true, true); }
 /// With an impedance another stiffness is another damping, too.
 bool HasOwnStiffness(const FaultContext& context) {
   return IsOfJoints(context.setup) || context.setup.scenario().control.law != ControlLaw::kImpedance;
@@ -224,6 +245,8 @@ constexpr FaultKind kKinds[] = {
      [](const FaultContext& context) { return !KnowsMotion(context); }},
     {kLaw, "gains of position", GainsOfPosition, HasOwnStiffness},
     {kLaw, "gains of velocity", GainsOfVelocity},
+    {kLaw, "one gain of position", GainOfPosition, HasOwnStiffness},
+    {kLaw, "one gain of velocity", GainOfVelocity, HasOwnStiffness},
 };
 
 }  // namespace
