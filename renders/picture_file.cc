@@ -5,9 +5,8 @@
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
 #include "harness/base/files.h"
-#include "harness/base/partial_file.h"
 #include "renders/cairo_surface.h"
-#include "renders/ffmpeg.h"
+#include "renders/video_writer.h"
 
 namespace dexcheck {
 namespace {

@@ -98,4 +98,9 @@ class Renderer {
   std::vector<std::uint8_t> pixels_;
 };
 
+/// Adds decorations to a scene.
+/// @param meshes gets the shapes that the engine does not have, which must outlive the drawing of the scene.
+/// @throws std::invalid_argument when the scene has no room for them.
+void AddDecorations(std::span<const Decoration> decorations, DisplayMeshes* meshes, mjvScene* scene);
+
 }  // namespace dexcheck

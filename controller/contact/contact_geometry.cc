@@ -6,6 +6,7 @@
 #include "controller/contact/adjoint.h"
 
 namespace dexcheck {
+
 namespace {
 
 // R_co_cf = [R_psi 0; 0 -1]
@@ -76,6 +77,11 @@ Vector6d CalcFrameTwistOnObject(const ContactGeometry& contact, const Vector5d& 
   V << R_cf_co * V_o_co.head<3>(), R_cf_co * V_o_co.tail<3>();
   V(5) += kappa_dot(4);
   return V;
+}
+
+double CalcRimDistance(double radius, const Vector3d& pole, const Vector3d& p) {
+  // pi/2 - angle, of the height above the rim's plane and the distance from the axis
+  return radius * std::atan2(pole.dot(p), pole.cross(p).norm());
 }
 
 }  // namespace dexcheck

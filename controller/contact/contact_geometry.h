@@ -61,4 +61,11 @@ Vector6d CalcFrameTwistOnFingertip(const ContactGeometry& contact, const Vector5
 /// Body twist V_o_cf^cf (6x1) of Sigma_cf relative to the object at kappa_dot (5x1).
 Vector6d CalcFrameTwistOnObject(const ContactGeometry& contact, const Vector5d& kappa_dot);
 
+// Hemispherical fingertips, as the paper has them: the chart of a sphere, and the rim where it ends.
+
+/// Length over a fingertip of this radius (m) from its point p (3x1, m, fingertip frame) to the rim of the
+/// hemisphere around `pole` (3x1, any length, same frame): rho (pi/2 - angle between p and the pole), m.
+/// Negative past the rim.
+double CalcRimDistance(double radius, const Vector3d& pole, const Vector3d& p);
+
 }  // namespace dexcheck

@@ -5,7 +5,6 @@
 #include <string>
 
 #include "controller/common/types.h"
-#include "controller/control/desired_motion.h"
 #include "controller/control/joint_motion.h"
 #include "controller/control/measured_state.h"
 #include "controller/control/trajectory.h"

@@ -6,7 +6,6 @@
 #include <memory>
 #include <vector>
 
-#include "controller/contact/contact_jacobian.h"
 #include "controller/contact/grasp_map.h"
 #include "controller/contact/rolling.h"
 #include "controller/contact/shapes.h"

@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "controller/common/text.h"
-#include "harness/base/check_summary.h"
+#include "harness/base/check_record.h"
 #include "harness/checks/tolerance.h"
 #include "harness/cli/junit_file.h"
 #include "harness/cli/terminal.h"

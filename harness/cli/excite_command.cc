@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "harness/base/console.h"
 #include "harness/base/interrupts.h"
-#include "harness/base/shell.h"
 #include "harness/cli/commands.h"
 #include "harness/cli/json_matrix.h"
 #include "harness/cli/output_file.h"

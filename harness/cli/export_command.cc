@@ -17,7 +17,7 @@
 #include "harness/cli/terminal.h"
 #include "harness/log/log_reader.h"
 #include "harness/log/mcap_writer.h"
-#include "harness/study/study_csv.h"
+#include "harness/study/study_summary.h"
 
 namespace dexcheck::cli {
 namespace {

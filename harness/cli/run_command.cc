@@ -14,7 +14,6 @@
 #include "controller/common/text.h"
 #include "harness/base/console.h"
 #include "harness/base/interrupts.h"
-#include "harness/base/shell.h"
 #include "harness/cli/commands.h"
 #include "harness/cli/comparison_options.h"
 #include "harness/cli/make_video.h"

@@ -18,8 +18,8 @@
 #include "harness/cli/progress_bar.h"
 #include "harness/cli/run_folder.h"
 #include "harness/cli/run_report.h"
+#include "harness/view/gain_sliders.h"
 #include "harness/view/recording.h"
-#include "harness/view/save_scenario.h"
 #include "harness/view/viewer.h"
 
 namespace dexcheck::cli {

@@ -14,7 +14,7 @@
 
 #include "controller/common/errors.h"
 #include "harness/base/console.h"
-#include "harness/base/temporary_path.h"
+#include "harness/base/files.h"
 #include "harness/engine/exact_collision.h"
 #include "harness/engine/finite_check.h"
 #include "harness/engine/mjcf_passes.h"

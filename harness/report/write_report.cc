@@ -12,8 +12,6 @@
 #include "controller/common/errors.h"
 #include "harness/base/files.h"
 #include "harness/base/interrupts.h"
-#include "harness/base/partial_file.h"
-#include "harness/base/temporary_path.h"
 #include "harness/report/run_figures.h"
 
 namespace dexcheck {

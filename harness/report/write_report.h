@@ -6,7 +6,6 @@
 #include <functional>
 
 #include "harness/report/page.h"
-#include "harness/report/run_scene.h"
 
 namespace dexcheck {
 

@@ -12,7 +12,7 @@
 #include "controller/contact/object_surface.h"
 #include "controller/control/computed_torque.h"
 #include "controller/control/constrained_dynamics.h"
-#include "controller/control/joint_law.h"
+#include "controller/control/joint_controller.h"
 #include "harness/checks/check_table.h"
 #include "harness/engine/engine.h"
 

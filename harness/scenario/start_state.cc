@@ -6,8 +6,8 @@
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
+#include "controller/contact/contact_geometry.h"
 #include "controller/contact/find_contact.h"
-#include "controller/contact/fingertip_rim.h"
 #include "controller/contact/object_surface.h"
 #include "controller/contact/shapes.h"
 #include "controller/grasp/finger_placement.h"

@@ -5,7 +5,6 @@
 #include <vector>
 
 #include "harness/study/search.h"
-#include "harness/study/search_history.h"
 
 namespace dexcheck {
 

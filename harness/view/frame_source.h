@@ -6,7 +6,7 @@
 
 #include <vector>
 
-#include "harness/base/check_summary.h"
+#include "harness/base/check_record.h"
 #include "renders/run_frames.h"
 
 namespace dexcheck {

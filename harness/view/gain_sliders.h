@@ -16,4 +16,10 @@ std::vector<Slider> MakeGainSliders(const Scenario& scenario);
 /// Assignments that multiply a scenario's gains. @param sliders as MakeGainSliders made them, moved since.
 std::vector<std::string> MakeGainOverrides(const Scenario& scenario, const std::vector<Slider>& sliders);
 
+/// A scenario as a file that stands anywhere: its text with assignments made in it, files with their whole
+/// paths, and a name of its own.
+/// @throws InputError when the assignments do not fit.
+std::string MakeScenarioText(const Scenario& scenario, const std::vector<std::string>& overrides,
+                             const std::string& name);
+
 }  // namespace dexcheck

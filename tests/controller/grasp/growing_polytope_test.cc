@@ -1,5 +1,3 @@
-#include "controller/grasp/growing_polytope.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -7,6 +5,7 @@
 #include <random>
 #include <vector>
 
+#include "controller/grasp/force_closure.h"
 #include "tests/common/matrix_near.h"
 
 namespace dexcheck::grasp_internal::growing_polytope_test {

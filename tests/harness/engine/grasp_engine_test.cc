@@ -4,7 +4,6 @@
 
 #include <random>
 
-#include "controller/contact/contact_jacobian.h"
 #include "controller/contact/find_contact.h"
 #include "controller/contact/grasp_map.h"
 #include "controller/contact/rolling.h"

@@ -10,7 +10,6 @@
 #include "harness/study/margin_search.h"
 #include "harness/study/sampled_stability.h"
 #include "harness/study/study_answer.h"
-#include "harness/study/study_sensitivity.h"
 
 namespace dexcheck::testing::sensitivity_test {
 namespace {
