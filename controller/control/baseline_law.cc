@@ -11,13 +11,6 @@
 
 namespace dexcheck {
 
-namespace {
-
-// Smallest pivot of Lambda_c^-1, against its diagonal entry, that counts as regular; as ConstrainedDynamics.
-constexpr double kMinPivotRatio = 1e-8;
-
-}  // namespace
-
 ObjectSpaceInertia::ObjectSpaceInertia(const RobotModel& model, int num_contacts) : factor_(model) {
   Require(num_contacts > 0, "number of contacts", "must be positive", num_contacts);
   const Eigen::Index k = Eigen::Index{3} * num_contacts;
@@ -42,6 +35,8 @@ void ObjectSpaceInertia::Compute(const ModelTerms& robot, const GraspTerms& gras
     const double pivot = inverse_llt_.matrixLLT()(i, i);
     smallest = std::min(smallest, pivot * pivot / inverse_(i, i));
   }
+  // Of Lambda_c^-1, against its diagonal entry, the pivot that counts as regular; as ConstrainedDynamics.
+  constexpr double kMinPivotRatio = 1e-8;
   if (!(smallest > kMinPivotRatio)) {
     throw SingularityError("J_B' has not full row rank, smallest independent part " + FormatNumber(smallest),
                            smallest);

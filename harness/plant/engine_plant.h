@@ -1,76 +1,14 @@
 #pragma once
 
-#include <functional>
 #include <span>
 #include <utility>
 #include <vector>
 
-#include "controller/common/types.h"
-#include "harness/engine/adapter.h"
-#include "harness/engine/engine.h"
+#include "harness/plant/engine_simulation.h"
 #include "harness/plant/observer.h"
 #include "harness/plant/plant.h"
 
 namespace dexcheck {
-
-// The engine's simulation of robot and object, stepped by torques.
-
-/// Engine state that determines everything after it.
-struct EngineState {
-  VectorXd qpos, qvel, act, qacc_warmstart;
-  double time = 0.0;
-};
-
-/// One simulation. A step has two halves, so that a controller can be put between them:
-///
-///   BeginStep   positions, velocities, contacts at time()
-///   (read the state, set torques)
-///   EndStep     accelerations and forces for these torques, then the state at time() + dt
-///
-/// After EndStep, data() still has accelerations, contacts and forces of the step, at the state before it.
-class EngineSimulation {
- public:
-  /// @param implicit_damping integrate as the MJCF says, and joint damping as the engine's Euler does, which
-  /// changes velocities by other than dt qacc; otherwise by Euler with explicit forces, as in (48).
-  /// @throws InputError when a joint or wheel has no motor or several.
-  EngineSimulation(const Adapter& adapter, bool implicit_damping);
-
-  [[nodiscard]] const Adapter& adapter() const { return *adapter_; }
-  [[nodiscard]] const mjModel& model() const { return *model_; }
-  [[nodiscard]] const mjData& data() const { return *data_; }
-  [[nodiscard]] mjData& data() { return *data_; }
-  [[nodiscard]] double time() const { return data_->time; }
-  [[nodiscard]] double time_step() const { return model_->opt.timestep; }
-
-  void BeginStep();
-  /// tau' (n), N m: of the right and left wheel, then of the joints.
-  void SetTorques(const Eigen::Ref<const VectorXd>& tau);
-  /// Forces and torques on bodies, instead of those before.
-  void Push(std::span<const Wrench> wrenches);
-  /// The torques that wheels and joints received in the last step, as tau' (n), N m.
-  void ReadMotorTorques(VectorXd* tau) const;
-  /// By entry of tau'.
-  [[nodiscard]] std::vector<Motor> ListMotors() const;
-  /// @throws DivergenceError when the engine warned or the state is not finite.
-  void EndStep();
-
-  /// Changes the model that is simulated, which is this simulation's own, and what the engine derives of it.
-  void Change(const std::function<void(mjModel*)>& change);
-
-  [[nodiscard]] EngineState GetState() const;
-  void SetState(const EngineState& state);
-
- private:
-  void CheckHealth(double expected_time) const;
-
-  const Adapter* adapter_;
-  MjModelPtr model_;  // the adapter's, but for the damping
-  MjDataPtr data_;
-  bool is_pushed_ = false;
-  VectorXd damping_;         // nv, N m s/rad; what is not integrated implicitly
-  std::vector<int> motors_;  // by entry of tau'
-  std::vector<int> dofs_;    // likewise
-};
 
 /// The engine's simulation as plant. Nothing allocates in a step, once the values that are read into have
 /// their sizes.

@@ -8,7 +8,7 @@
 #include "controller/contact/contact_geometry.h"
 #include "controller/contact/shapes.h"
 #include "harness/engine/velocity_map.h"
-#include "harness/plant/engine_plant.h"
+#include "harness/plant/engine_simulation.h"
 #include "harness/plant/plant_reading.h"
 
 namespace dexcheck {

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "harness/engine/clearance.h"
-#include "harness/plant/engine_plant.h"
+#include "harness/plant/engine_simulation.h"
 #include "tests/harness/checks/step_check_scene.h"
 #include "tests/harness/run/shipped_run.h"
 

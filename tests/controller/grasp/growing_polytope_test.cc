@@ -1,3 +1,5 @@
+#include "controller/grasp/growing_polytope.h"
+
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -5,7 +7,6 @@
 #include <random>
 #include <vector>
 
-#include "controller/grasp/force_closure.h"
 #include "tests/common/matrix_near.h"
 
 namespace dexcheck::grasp_internal::growing_polytope_test {

@@ -10,7 +10,7 @@
 #include <limits>
 #include <set>
 
-#include "harness/plant/engine_plant.h"
+#include "harness/plant/engine_simulation.h"
 #include "harness/plant/observer.h"
 #include "tests/common/allocation_counter.h"
 #include "tests/common/paths.h"
