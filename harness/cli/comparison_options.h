@@ -28,13 +28,11 @@ struct ToleranceOptions {
 inline std::array<Option, 2> AddToleranceOptions(Command command, ToleranceOptions* options) {
   constexpr int kMostDigits = 15;
   const Option digits = command
-                            .AddOption("--digits", &options->digits,
+                            .AddOption("--digits N", &options->digits,
                                        "Agreement to this many digits of a term's scale is enough")
-                            .TypeName("N")
                             .Check(WholeNumber(1, kMostDigits));
   const Option tolerance =
-      command.AddOption("--tolerance", &options->tolerance, "The same as a relative tolerance")
-          .TypeName("REL")
+      command.AddOption("--tolerance REL", &options->tolerance, "The same as a relative tolerance")
           .Check(Fraction())
           .Excludes(digits);
   return {digits, tolerance};

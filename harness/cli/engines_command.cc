@@ -215,25 +215,20 @@ void AddEngineComparisonCommand(Command app) {
   for (const EngineComparisonEngine& engine : ListEngineComparisonEngines())
     names += (names.empty() ? "" : ", ") + engine.name;
   command
-      .AddOption("--engines", &request->options.engines,
+      .AddOption("--engines NAME,...", &request->options.engines,
                  "Which of " + names + "; all that are there when none is named")
-      .TypeName("NAME,...")
       .Delimiter(',');
   command
-      .AddOption("--engine", &request->options.programs,
+      .AddOption("--engine NAME=CMD", &request->options.programs,
                  "One more: a program of your own that provides terms (harness/descriptions/README.md)")
-      .TypeName("NAME=CMD")
       .Repeatable();
-  command.AddOption("--mjcf", &request->options.mjcf, "What MuJoCo reads instead of ROBOT")
-      .TypeName("FILE.xml");
-  command
-      .AddOption("--node-modules", &request->options.node_modules,
-                 "Folder where npm installed @mujoco/mujoco")
-      .TypeName("FOLDER");
+  command.AddOption("--mjcf FILE.xml", &request->options.mjcf, "What MuJoCo reads instead of ROBOT");
+  command.AddOption("--node-modules FOLDER", &request->options.node_modules,
+                    "Folder where npm installed @mujoco/mujoco");
   command.AddFlag("--floating", &request->urdf.floating, "The root of a URDF floats");
   AddSampleOptions(command, kMaxSamples, &request->options.states.samples, &request->options.states.seed);
-  command.AddOption("--digits", &request->digits, "Agreement to this many digits of a term's scale is enough")
-      .TypeName("N")
+  command
+      .AddOption("--digits N", &request->digits, "Agreement to this many digits of a term's scale is enough")
       .Check(WholeNumber(1, kMostDigits))
       .ShowDefault();
   AddJsonOption(command, "the results", &request->json_file);

@@ -44,20 +44,17 @@ int Run(const EvalRequest& request) {
 void AddEvalCommand(Command app) {
   const auto request = std::make_shared<EvalRequest>();
   Command command = app.AddCommand("eval", "Print every term at one state, as JSON");
-  Option robot = command.AddOption("--robot", &request->robot, "Parameter file (TOML) of the analytic model")
-                     .TypeName("FILE.toml");
+  Option robot =
+      command.AddOption("--robot FILE.toml", &request->robot, "Parameter file (TOML) of the analytic model");
   command
-      .AddOption("--mjcf", &request->mjcf,
+      .AddOption("--mjcf FILE.xml", &request->mjcf,
                  "The same robot for the engine: adds the engine's values of the terms as \"engine\"")
-      .TypeName("FILE.xml")
       .Needs(robot);
   command
-      .AddOption("--state", &request->state_file,
+      .AddOption("--state STATE.json", &request->state_file,
                  "JSON with q, xi; optionally object, kappa or contact_points, fingers, mu, law")
-      .TypeName("STATE.json")
       .Required();
-  Option out = command.AddOption("--out", &request->out, "File to write (- for standard output)")
-                   .TypeName("FILE.json")
+  Option out = command.AddOption("--out FILE.json", &request->out, "File to write (- for standard output)")
                    .ShowDefault();
   AddJsonOption(command, "the terms", &request->out).Excludes(out);
   command.SetAction([=] { return Run(*request); });

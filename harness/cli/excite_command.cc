@@ -1,7 +1,6 @@
 #include <fmt/format.h>
 
 #include <memory>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -63,8 +62,7 @@ std::string ToText(const Scenario& scenario, const ExcitingMotion& motion, bool 
 int Run(const ExciteRequest& request) {
   const ScenarioFiles files = FindScenario(request.scenario, request.overrides.List(), /*seed=*/0);
   CatchInterrupts();
-  std::optional<OutputFile> json;
-  if (!request.json_file.empty()) json.emplace(request.json_file);
+  ResultFile json(request.json_file);
   ProgressBar bar("running", request.options.runs, request.quiet);
   const ExcitingMotion motion =
       FindExcitingMotion(files.scenario, files.robot, files.mjcf, request.options, [&](int runs) {
@@ -73,8 +71,8 @@ int Run(const ExciteRequest& request) {
       });
   bar.Finish();
   const bool complete = !IsInterrupted();
-  if (json) json->Write(ToText(files.scenario, motion, complete));
-  if (request.json_file != "-") {
+  json.Write([&] { return ToText(files.scenario, motion, complete); });
+  if (!json.TakesStdout()) {
     if (!request.quiet) Print(files.scenario, motion);
     fmt::print("{}{}: smallest singular value {:.2e}, {:.3g} times the given motion's.\n",
                request.quiet ? "" : "\n", complete ? "FOUND" : "INTERRUPTED, so far", motion.found.smallest,
@@ -90,14 +88,12 @@ void AddExciteCommand(Command app) {
   Command command = app.AddCommand(
       "excite", "Change a scenario's oscillations so that the model's numbers show best within all limits");
   AddScenarioOptions(command, request.get());
-  command.AddOption("--runs", &request->options.runs, "How many runs to make")
-      .TypeName("N")
+  command.AddOption("--runs N", &request->options.runs, "How many runs to make")
       .Check(WholeNumber(1, 100000))
       .ShowDefault();
   command
-      .AddOption("--fraction", &request->options.fraction,
+      .AddOption("--fraction X", &request->options.fraction,
                  "What each check may take of its bound, or as much as before where that is more")
-      .TypeName("X")
       .Check(PositiveNumber())
       .ShowDefault();
   AddResultOptions(command, "the results", request.get());

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <chrono>
 #include <cmath>
 #include <memory>
@@ -94,16 +93,12 @@ VectorXd MakeNominalPosture(const RobotModel& model, const Hand& hand, const Pla
   for (const std::string& assignment : request.joints_deg) {
     const size_t equals = assignment.find('=');
     if (equals == std::string::npos) Fail("--joints-deg", "must be NAME=DEGREES, got " + Quote(assignment));
-    const char* const begin = assignment.data() + equals + 1;
-    const char* const end = assignment.data() + assignment.size();
-    double degrees = 0.0;
-    const std::from_chars_result result = std::from_chars(begin, end, degrees);
-    if (result.ec != std::errc() || result.ptr != end || !std::isfinite(degrees)) {
+    const auto degrees = ParseNumber<double>(assignment.substr(equals + 1));
+    if (!degrees || !std::isfinite(*degrees))
       Fail("--joints-deg", "must be NAME=DEGREES, got " + Quote(assignment));
-    }
     const int index = FindJoint(model, "--joints-deg", assignment.substr(0, equals));
     const Joint& joint = model.joints()[static_cast<size_t>(index)];
-    const double position = DegToRad(degrees);
+    const double position = DegToRad(*degrees);
     if (position < joint.lower || position > joint.upper) {
       Fail("--joints-deg", assignment + " is outside of the range from " +
                                FormatNumber(RadToDeg(joint.lower)) + " to " +
@@ -248,8 +243,7 @@ int Run(PlanRequest request) {
   }
   Vector6d X_o;
   X_o << ToVector3("--object-xyz", request.xyz), kPi / 180.0 * ToVector3("--object-zyz-deg", request.zyz_deg);
-  std::optional<OutputFile> json;
-  if (!request.json_file.empty()) json.emplace(request.json_file);
+  ResultFile json(request.json_file);
 
   const auto start = std::chrono::steady_clock::now();
   const ContactPlan plan = PlanContacts(model, hand, *surface, CalcObjectPose(X_o), nominal, request.options);
@@ -262,9 +256,9 @@ int Run(PlanRequest request) {
       clearances = FindPlanClearance(model, request.mjcf, CalcObjectPose(X_o), plan.q, plan.q_open);
     }
   }
-  if (json) json->Write(ToText(request, plan, grasp, clearances, seconds));
+  json.Write([&] { return ToText(request, plan, grasp, clearances, seconds); });
   if (!plan.found) throw Error("no plan: " + plan.problem);
-  if (request.json_file != "-") PrintText(request, plan, grasp, clearances, seconds);
+  if (!json.TakesStdout()) PrintText(request, plan, grasp, clearances, seconds);
   const PlanClearance* nearest = clearances ? FindSmallest(*clearances) : nullptr;
   return nearest != nullptr && nearest->distance < 0.0 ? kDisagreement : kSuccess;
 }
@@ -275,68 +269,55 @@ void AddPlanCommand(Command app) {
   const auto request = std::make_shared<PlanRequest>();
   Command command = app.AddCommand("plan", "Choose where a hand should hold the object");
   command.AddFlag("--contacts", "Contact points, posture and margin, as a scenario's [grasp]").Required();
-  command.AddOption("--object-xyz", &request->xyz, "Position of the object in the world, m")
-      .TypeName("X Y Z")
+  command.AddOption("--object-xyz X Y Z", &request->xyz, "Position of the object in the world, m")
       .Takes(3)
       .Required();
   command
-      .AddOption("--object-zyz-deg", &request->zyz_deg,
+      .AddOption("--object-zyz-deg A B C", &request->zyz_deg,
                  "Orientation of the object, ZYZ angles (default 0 0 0)")
-      .TypeName("A B C")
       .Takes(3);
-  Option hand = command.AddOption("--hand", &request->hand, "Hand of the assistant robot that holds")
-                    .TypeName("right|left")
-                    .OneOf({"right", "left"})
-                    .ShowDefault();
+  Option hand =
+      command.AddOption("--hand right|left", &request->hand, "Hand of the assistant robot that holds")
+          .OneOf({"right", "left"})
+          .ShowDefault();
   command
-      .AddOption("--palm", &request->palm,
+      .AddOption("--palm FRAME", &request->palm,
                  "Frame of a palm, whose z points at what it takes; its fingertips are those on its link")
-      .TypeName("FRAME")
       .Excludes(hand);
-  command.AddOption("--mu", &request->options.mu, "Friction coefficient that the plan counts on")
-      .TypeName("MU")
+  command.AddOption("--mu MU", &request->options.mu, "Friction coefficient that the plan counts on")
       .ShowDefault();
-  command
-      .AddOption("--support-height", &request->support_height,
-                 "Height of the table that the object lies on, m: the hand comes from above")
-      .TypeName("Z");
+  command.AddOption("--support-height Z", &request->support_height,
+                    "Height of the table that the object lies on, m: the hand comes from above");
   command
       .AddOption(
-          "--hemisphere", &request->hemisphere,
+          "--hemisphere X Y Z", &request->hemisphere,
           "Fingertips are hemispheres around this direction of their frames: contacts within their rims")
-      .TypeName("X Y Z")
       .Takes(3);
   command
       .AddOption(
-          "--hold-at", &request->hold_at,
+          "--hold-at X Y Z", &request->hold_at,
           "Where in the palm's frame the object is held, m: the search begins there; before the fingers "
           "when not given")
-      .TypeName("X Y Z")
       .Takes(3);
   command
-      .AddOption("--lift", &request->lift, "Displacement, m, that the arm must be able to make while holding")
-      .TypeName("X Y Z")
+      .AddOption("--lift X Y Z", &request->lift,
+                 "Displacement, m, that the arm must be able to make while holding")
       .Takes(3);
   command
-      .AddOption("--joint-margin", &request->options.joint_margin,
+      .AddOption("--joint-margin MARGIN", &request->options.joint_margin,
                  "Least distance of joints from the ends of their ranges, rad or m")
-      .TypeName("MARGIN")
       .ShowDefault();
-  command
-      .AddOption("--joints-deg", &request->joints_deg,
-                 "Posture to stay near to; arm joints are otherwise in the middle of their ranges, others 0")
-      .TypeName("NAME=DEGREES");
-  command
-      .AddOption("--arm-joints", &request->arm_joints,
-                 "Joints that may move the palm (default: those that move no other fingertips)")
-      .TypeName("NAME");
-  command.AddOption("--robot", &request->robot, "Parameter file (TOML) with fingertips and an object")
-      .TypeName("FILE.toml");
-  command
-      .AddOption("--mjcf", &request->mjcf,
-                 "Scene in which the robot's bodies must be clear of each other, the object and what stands "
-                 "there (default: the shipped one for the shipped robot)")
-      .TypeName("FILE.xml");
+  command.AddOption(
+      "--joints-deg NAME=DEGREES", &request->joints_deg,
+      "Posture to stay near to; arm joints are otherwise in the middle of their ranges, others 0");
+  command.AddOption("--arm-joints NAME", &request->arm_joints,
+                    "Joints that may move the palm (default: those that move no other fingertips)");
+  command.AddOption("--robot FILE.toml", &request->robot,
+                    "Parameter file (TOML) with fingertips and an object");
+  command.AddOption(
+      "--mjcf FILE.xml", &request->mjcf,
+      "Scene in which the robot's bodies must be clear of each other, the object and what stands "
+      "there (default: the shipped one for the shipped robot)");
   AddJsonOption(command, "the plan", &request->json_file);
   command.SetAction([=] {
     try {

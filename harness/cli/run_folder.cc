@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <bit>
 #include <cerrno>
-#include <charconv>
 #include <cmath>
 #include <cstring>
 #include <optional>
@@ -17,6 +16,8 @@
 #include "controller/common/text.h"
 #include "controller/common/toml_reader.h"
 #include "harness/base/console.h"
+#include "harness/base/interrupts.h"
+#include "harness/cli/progress_bar.h"
 #include "harness/cli/shipped_files.h"
 #include "harness/engine/machine.h"
 #include "harness/report/recorded_frames.h"
@@ -41,12 +42,7 @@ ScenarioFiles Open(const std::filesystem::path& path, const std::vector<std::str
 
 std::uint64_t ReadSeed(const LogReader& log, const std::filesystem::path& path) {
   const std::string text = log.ReadText("seed");
-  std::uint64_t seed = 0;
-  const char* const end = text.data() + text.size();
-  if (const auto result = std::from_chars(text.data(), end, seed);
-      result.ec == std::errc() && result.ptr == end) {
-    return seed;
-  }
+  if (const auto seed = ParseNumber<std::uint64_t>(text)) return *seed;
   throw InputError(path.string() + ": seed: must be a whole number, got " + Quote(text));
 }
 
@@ -138,6 +134,19 @@ RunFolder::RunFolder(const std::string& path, const std::string& name) : path_(p
   if (!std::filesystem::is_empty(path_, error) || error) {
     throw InputError(path_.string() + ": already holds files; give a new folder with --out");
   }
+}
+
+long RunWithProgress(const std::string& label, long rows, bool quiet, Runner* runner, RunRecorder* recorder) {
+  ProgressBar bar(label, rows, quiet);
+  long done = 0;
+  runner->Run(
+      [&](const StepRecord& step) {
+        if (done++ >= rows) return;  // steps are made while the one before is checked
+        if (recorder != nullptr) recorder->Record(step);
+        bar.Update(done);
+      },
+      [&] { return IsInterrupted() || done >= rows; });
+  return std::min(done, rows);
 }
 
 void WarnOfCut(const std::filesystem::path& run_folder, const LogReader& log) {

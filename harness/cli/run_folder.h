@@ -11,6 +11,8 @@
 #include "harness/base/files.h"
 #include "harness/log/log_reader.h"
 #include "harness/log/old_names.h"
+#include "harness/run/run_recorder.h"
+#include "harness/run/runner.h"
 #include "harness/scenario/scenario.h"
 
 namespace dexcheck::cli {
@@ -46,6 +48,10 @@ class RunFolder {
  private:
   std::filesystem::path path_;
 };
+
+/// Makes a run, or its first `rows` steps, with a progress bar, until the user interrupts it.
+/// @param recorder gets the steps; null for none. @returns how many those are.
+long RunWithProgress(const std::string& label, long rows, bool quiet, Runner* runner, RunRecorder* recorder);
 
 /// The first number in which two logs differ; no signal when they do not.
 struct ReplayDifference {

@@ -38,10 +38,9 @@ std::filesystem::path ShippedKind::Find(const std::string& name_or_file) const {
   const std::vector<std::string> known = ListNames();
   if (std::find(known.begin(), known.end(), name_or_file) != known.end())
     return FindShippedFile(folder) / (name_or_file + ".toml");
-  const std::string nearest = FindNearest(name_or_file, known);
   const std::string where = *listed != '\0' ? listed : fmt::format("{}", fmt::join(known, ", "));
   throw InputError(fmt::format("{} {}: is neither shipped ({}) nor a TOML file{}", name, Quote(name_or_file),
-                               where, nearest.empty() ? "" : ", did you mean " + Quote(nearest) + "?"));
+                               where, SuggestNearest(name_or_file, known)));
 }
 
 bool IsTomlFile(const std::string& name) {

@@ -1,7 +1,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 #include <filesystem>
 #include <map>
 #include <memory>
@@ -37,13 +36,11 @@ struct StudyRequest {
 /// The trials of the shard "I/N"; "" is all.
 std::vector<Trial> SelectShard(std::vector<Trial> trials, const std::string& text) {
   if (text.empty()) return trials;
-  long index = 0;
-  long count = 0;
-  const char* const end = text.data() + text.size();
-  const auto [slash, error] = std::from_chars(text.data(), end, index);
-  const bool good = error == std::errc() && slash != end && *slash == '/' &&
-                    std::from_chars(slash + 1, end, count).ptr == end && 1 <= index && index <= count;
-  if (!good) throw InputError("--shard: must be I/N with 1 <= I <= N, got " + Quote(text));
+  const size_t slash = std::min(text.find('/'), text.size() - 1);
+  const long index = ParseNumber<long>(std::string_view(text).substr(0, slash)).value_or(0);
+  const long count = ParseNumber<long>(std::string_view(text).substr(slash + 1)).value_or(0);
+  if (index < 1 || index > count)
+    throw InputError("--shard: must be I/N with 1 <= I <= N, got " + Quote(text));
   std::erase_if(trials, [&](const Trial& trial) { return trial.number % count != index - 1; });
   return trials;
 }
@@ -210,11 +207,11 @@ void AddStudyCommand(Command app) {
 
   Command run = study.AddCommand("run", "Make the trials that are missing in the database");
   run.AddOption("STUDY", &request->study, "Name of a shipped study, or a TOML file").Required();
-  run.AddOption("--db", &request->database, "The study's database (SQLite), made when there is none")
-      .TypeName("FILE.sqlite")
+  run.AddOption("--db FILE.sqlite", &request->database,
+                "The study's database (SQLite), made when there is none")
       .Required();
   AddJobsOption(run, "Trials", &request->jobs);
-  run.AddOption("--shard", &request->shard, "Only the I-th of N parts of the study").TypeName("I/N");
+  run.AddOption("--shard I/N", &request->shard, "Only the I-th of N parts of the study");
   run.AddFlag("--retry-failed", &request->retry_failed, "Make trials again that crashed or timed out");
   add_quiet(run);
   run.SetAction([=] { return RunStudy(*request); });
@@ -230,25 +227,21 @@ void AddStudyCommand(Command app) {
   Command slurm = study.AddCommand("slurm", "Print an array job for Slurm that makes the study");
   slurm.AddOption("STUDY", &request->study, "Name of a shipped study, or a TOML file").Required();
   const auto job = std::make_shared<SlurmJob>();
-  slurm.AddOption("--tasks", &job->tasks, "Parts of the study, each with a database of its own")
-      .TypeName("N")
+  slurm.AddOption("--tasks N", &job->tasks, "Parts of the study, each with a database of its own")
       .Required()
       .Check(whole);
   slurm
-      .AddOption("--array-size", &job->array_size,
+      .AddOption("--array-size N", &job->array_size,
                  "Most elements of the array (1000, as Slurm's MaxArraySize of 1001 allows); of more parts "
                  "each makes several")
-      .TypeName("N")
       .Check(whole);
-  slurm.AddOption("--cpus", &job->cpus, "Processors of an element (1)").TypeName("N").Check(whole);
-  slurm.AddOption("--throttle", &job->throttle, "Elements that run at a time").TypeName("N").Check(whole);
+  slurm.AddOption("--cpus N", &job->cpus, "Processors of an element (1)").Check(whole);
+  slurm.AddOption("--throttle N", &job->throttle, "Elements that run at a time").Check(whole);
   slurm
-      .AddOption("--time", &job->time,
+      .AddOption("--time TIME", &job->time,
                  "Time limit of an element: MIN, MIN:SEC, HOURS:MIN:SEC or DAYS-HOURS[:MIN[:SEC]]")
-      .TypeName("TIME")
       .Check(CheckSlurmTime);
-  slurm.AddOption("--memory", &job->memory, "Memory of an element, as 500M or 2G")
-      .TypeName("SIZE")
+  slurm.AddOption("--memory SIZE", &job->memory, "Memory of an element, as 500M or 2G")
       .Check(CheckSlurmMemory);
   slurm.SetAction([=] {
     StudyInputs inputs = FindStudy(request->study);

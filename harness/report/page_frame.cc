@@ -94,10 +94,9 @@ std::string AssemblePlotPage(const std::string& title, const char* script, const
                              const std::vector<Figure>& figures, const VectorXd& time,
                              const ReplayData* replay) {
   PageParts parts{.title = title,
-                  .styles = {kDygraphCss},
                   .markup = {kPageHtml},
                   .data = data + EmbedPlots(figures, time),
-                  .scripts = {script, kDygraphJs, kPageJs}};
+                  .scripts = {script, kChartJs, kChartsJs, kPageJs}};
   if (replay != nullptr) {
     parts.markup.push_back(kReplayHtml);
     parts.data += EmbedJson("replay-scene", replay->json) + EmbedBytes("replay-values", replay->values);

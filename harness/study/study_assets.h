@@ -5,7 +5,6 @@
 namespace dexcheck {
 
 extern const char* const kStudyCss;
-extern const char* const kChartsJs;  ///< Needs Chart.js.
 extern const char* const kStudyHtml;
 extern const char* const kStudyJs;
 extern const char* const kBudgetHtml;

@@ -1,4 +1,4 @@
-// What Chart.js gets of a study's charts: bars with intervals, scatter plots, maps of cells. Every point and cell can
+// What Chart.js gets of a page's charts: axes, and of a study's bars with intervals, scatter plots, maps of cells. Every point and cell can
 // lead to a trial.
 'use strict';
 const MakeCharts = () => {
@@ -6,9 +6,10 @@ const MakeCharts = () => {
   const charts = new Map();  // by canvas
   Chart.defaults.animation = false;
   Chart.defaults.maintainAspectRatio = false;
-  Chart.defaults.color = style('--soft');
-  Chart.defaults.borderColor = style('--line');
   Chart.defaults.font.family = 'system-ui, "DejaVu Sans", sans-serif';
+  // As the page has them, light or dark.
+  const SetColors = () => Object.assign(Chart.defaults, {color: style('--soft'), borderColor: style('--line')});
+  SetColors();
   const Draw = (canvas, config) => {
     charts.get(canvas)?.destroy();
     charts.set(canvas, new Chart(canvas, config));
@@ -103,5 +104,5 @@ const MakeCharts = () => {
     });
   };
 
-  return {style, Short, IsWide, ColorOf, Bars, Scatter, Cells};
+  return {style, SetColors, Short, IsWide, ColorOf, MakeAxis, Bars, Scatter, Cells};
 };
