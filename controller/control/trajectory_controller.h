@@ -7,7 +7,7 @@
 #include "controller/contact/shapes.h"
 #include "controller/control/controller.h"
 #include "controller/control/grasp_controller.h"
-#include "controller/control/measured_state.h"
+#include "controller/control/grasp_model.h"
 #include "controller/dynamics/model_terms.h"
 
 namespace dexcheck {

@@ -5,8 +5,8 @@
 #include <span>
 #include <vector>
 
+#include "controller/control/grasp_model.h"
 #include "controller/control/grasp_terms.h"
-#include "controller/control/measured_state.h"
 
 namespace dexcheck {
 

@@ -3,8 +3,8 @@
 #include <vector>
 
 #include "controller/common/toml_reader.h"
+#include "controller/model/parameter_reader.h"
 #include "controller/model/robot_model.h"
-#include "controller/model/written_row.h"
 
 namespace dexcheck {
 

@@ -3,12 +3,15 @@
 // Files as bytes, and folders for a while.
 
 #include <sys/types.h>
+#include <unistd.h>
 
+#include <cerrno>
 #include <cstddef>
 #include <filesystem>
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 
 namespace dexcheck {
 
@@ -97,6 +100,29 @@ class PartialFile {
   std::filesystem::path target_;   // links followed
   std::filesystem::path partial_;  // empty once committed or removed
   std::optional<TemporaryPath> protection_;
+};
+
+/// An owned file descriptor.
+class FileDescriptor {
+ public:
+  explicit FileDescriptor(int descriptor = -1) : descriptor_(descriptor) {}
+  ~FileDescriptor() { Close(); }
+  FileDescriptor(FileDescriptor&& other) noexcept : descriptor_(std::exchange(other.descriptor_, -1)) {}
+  FileDescriptor& operator=(FileDescriptor&& other) noexcept {
+    std::swap(descriptor_, other.descriptor_);
+    return *this;
+  }
+
+  [[nodiscard]] int get() const { return descriptor_; }
+  [[nodiscard]] bool is_open() const { return descriptor_ >= 0; }
+  /// 0, or the system's error number.
+  int Close() {
+    if (!is_open()) return 0;
+    return ::close(std::exchange(descriptor_, -1)) == 0 ? 0 : errno;
+  }
+
+ private:
+  int descriptor_;
 };
 
 }  // namespace dexcheck

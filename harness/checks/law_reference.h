@@ -22,7 +22,6 @@
 #include "controller/control/computed_torque.h"
 #include "controller/control/grasp_controller.h"
 #include "controller/control/object_tracking.h"
-#include "controller/control/posture_task.h"
 #include "controller/control/trajectory.h"
 
 namespace dexcheck {

@@ -101,6 +101,8 @@ void AddStatesCommand(Command app);
 /// @param line is described when the command runs.
 void AddHelpCommands(Command app, const CommandLine& line);
 void AddStudyCommand(Command app);
+/// Those of its commands that read a study's database: report, show, export, watch.
+void AddStudyReadCommands(Command study);
 void AddViewCommand(Command app, const std::string& command_line);
 
 }  // namespace dexcheck::cli

@@ -7,7 +7,6 @@
 #include "controller/common/errors.h"
 #include "controller/contact/find_contact.h"
 #include "controller/contact/grasp_map.h"
-#include "controller/contact/object_surface.h"
 #include "controller/contact/rolling.h"
 #include "controller/contact/shapes.h"
 #include "controller/control/grasp_controller.h"

@@ -4,6 +4,7 @@
 #include <array>
 #include <chrono>
 #include <cmath>
+#include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -12,18 +13,59 @@
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
-#include "controller/contact/object_surface.h"
+#include "controller/contact/shapes.h"
 #include "controller/grasp/contact_plan.h"
 #include "controller/model/parameter_reader.h"
+#include "controller/model/robot_model.h"
 #include "controller/object/euler_zyz.h"
 #include "harness/cli/commands.h"
 #include "harness/cli/json_matrix.h"
 #include "harness/cli/output_file.h"
-#include "harness/cli/plan_clearance.h"
 #include "harness/cli/shipped_files.h"
+#include "harness/engine/clearance.h"
+#include "harness/engine/engine.h"
 
 namespace dexcheck::cli {
 namespace {
+
+/// The smallest distance of a class of pairs over the postures of a plan.
+struct PlanClearance {
+  double distance = std::numeric_limits<double>::infinity();  ///< m
+  std::string bodies;                                         ///< Empty when there is no such pair.
+};
+
+/// How far bodies that should not touch are apart in an MJCF's scene, with the hand open and closed
+/// around the object. @param q, q_open positions q'. @throws InputError as LoadMjcf and Adapter.
+std::array<PlanClearance, kPairClassCount> FindPlanClearance(const RobotModel& model,
+                                                             const std::filesystem::path& mjcf,
+                                                             const Pose& X_Bo, const VectorXd& q,
+                                                             const VectorXd& q_open) {
+  const MjModelPtr engine = LoadMjcf(mjcf);
+  const Adapter adapter(model, *engine, mjcf.string());
+  const Solids solids = ListSolids(*engine);
+  const std::vector<WatchedPair> pairs = ListWatchedPairs(*engine, adapter, solids, {}, mjcf.string());
+  const MjDataPtr data = MakeData(*engine);
+  if (const int body = adapter.object_body(); body >= 0 && engine->body_jntnum[body] == 1) {
+    mjtNum* const place = data->qpos + engine->jnt_qposadr[engine->body_jntadr[body]];
+    const Eigen::Quaterniond turn(X_Bo.linear());
+    std::copy_n(X_Bo.translation().data(), 3, place);
+    const double quaternion[4] = {turn.w(), turn.x(), turn.y(), turn.z()};
+    std::copy_n(quaternion, 4, place + 3);
+  }
+  std::array<PlanClearance, kPairClassCount> smallest;
+  for (const VectorXd* posture : {&q, &q_open}) {
+    adapter.SetPositions(*posture, data->qpos);
+    mj_kinematics(engine.get(), data.get());
+    Clearance clearance(*engine, adapter, solids, pairs);
+    clearance.Update({data->xpos, data->xmat}, 0.0);
+    for (size_t i = 0; i < smallest.size(); ++i) {
+      const Clearance::Nearest& nearest = clearance.nearest(static_cast<PairClass>(i));
+      if (nearest.pair < 0 || nearest.distance >= smallest[i].distance) continue;
+      smallest[i] = {nearest.distance, clearance.Describe(nearest.pair)};
+    }
+  }
+  return smallest;
+}
 
 struct PlanRequest {
   std::filesystem::path robot = FindShippedFile("controller/parameters/assistant_robot.toml");

@@ -1,4 +1,3 @@
-#include "harness/cli/study_read_commands.h"
 
 #include <fmt/format.h>
 

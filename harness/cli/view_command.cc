@@ -17,8 +17,8 @@
 #include "harness/cli/output_file.h"
 #include "harness/cli/run_folder.h"
 #include "harness/cli/run_report.h"
+#include "harness/view/frame_source.h"
 #include "harness/view/gain_sliders.h"
-#include "harness/view/recording.h"
 #include "harness/view/viewer.h"
 
 namespace dexcheck::cli {

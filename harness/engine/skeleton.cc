@@ -4,8 +4,8 @@
 #include <cmath>
 #include <vector>
 
+#include "harness/engine/compiled_model.h"
 #include "harness/engine/map_vector.h"
-#include "harness/engine/resized_copy.h"
 
 namespace dexcheck {
 namespace {

@@ -2,15 +2,25 @@
 
 // The simulated plant: robot and object, driven by torques.
 
+#include <cstdint>
 #include <span>
 #include <string>
 
 #include "controller/common/errors.h"
 #include "controller/common/types.h"
+#include "controller/model/robot_model.h"
 #include "harness/plant/plant_reading.h"
-#include "harness/plant/wrench.h"
 
 namespace dexcheck {
+
+/// A force and a torque that act on one body, in world axes.
+struct Wrench {
+  static constexpr int kObject = -2;
+  int body = kObject;                  ///< Index of the joint that moves the link; -1 is the base.
+  Vector3d point = Vector3d::Zero();   ///< Where the force acts, m.
+  Vector3d force = Vector3d::Zero();   ///< N.
+  Vector3d torque = Vector3d::Zero();  ///< N m.
+};
 
 /// The simulation left the region where its numbers mean anything.
 class DivergenceError : public Error {
@@ -73,6 +83,24 @@ class Plant {
 
  protected:
   Plant() = default;
+};
+
+/// What every part of a loop is made with that must make the same numbers again.
+struct PartContext {
+  const RobotModel* model = nullptr;
+  size_t num_contacts = 0;
+  double time_step = 0.0;  ///< s.
+  std::uint64_t seed = 0;
+  std::string source;  ///< The scenario's file, for messages.
+};
+
+/// How the rigid plant steps.
+enum class Integrator {
+  kRungeKutta4,  ///< Four evaluations, fourth order for the torques given; velocities and positions of one
+                 ///< time.
+  /// One evaluation: new velocities, then positions by them. Velocities belong to the middle of the step
+  /// before, as the engine's.
+  kSemiImplicitEuler,
 };
 
 }  // namespace dexcheck

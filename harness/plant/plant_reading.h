@@ -6,8 +6,7 @@
 
 #include "controller/common/types.h"
 #include "controller/control/controller.h"
-#include "controller/control/measured_state.h"
-#include "harness/plant/body_contact.h"
+#include "controller/control/grasp_model.h"
 
 namespace dexcheck {
 
@@ -48,6 +47,15 @@ struct PlantContact {
 struct Collision {
   double force = 0.0;          ///< N
   int geom1 = -1, geom2 = -1;  ///< The engine's.
+};
+
+/// How the engine has two bodies touch; the deepest contact when there are several.
+struct BodyContact {
+  bool touching = false;
+  double distance = 0.0;             ///< m, negative when the bodies overlap.
+  Vector3d slip = Vector3d::Zero();  ///< Tangential velocity of `body` against the other, world, m/s.
+  double cone_use = 0.0;             ///< |tangential force| / (mu normal force); 1 slides.
+  double cone_margin = 0.0;          ///< mu normal force - |tangential force|, N.
 };
 
 /// Accelerations and forces of the same step, for the torques that were applied.

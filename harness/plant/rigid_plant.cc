@@ -5,7 +5,6 @@
 
 #include "controller/common/text.h"
 #include "controller/contact/find_contact.h"
-#include "controller/contact/object_surface.h"
 #include "controller/contact/rolling.h"
 #include "controller/contact/shapes.h"
 #include "controller/model/platform.h"

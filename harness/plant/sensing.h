@@ -6,7 +6,7 @@
 
 #include "controller/control/controller.h"
 #include "harness/plant/imperfections.h"
-#include "harness/plant/part_context.h"
+#include "harness/plant/plant.h"
 #include "harness/plant/plant_reading.h"
 #include "harness/plant/random_stream.h"
 #include "harness/plant/velocity_filter.h"

@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "controller/common/text.h"
-#include "controller/contact/object_surface.h"
+#include "controller/contact/shapes.h"
 #include "controller/control/computed_torque.h"
 #include "controller/control/constrained_dynamics.h"
 #include "controller/control/joint_controller.h"

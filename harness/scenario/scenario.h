@@ -22,7 +22,7 @@
 #include "controller/control/trajectory_reader.h"
 #include "controller/handling/pick_and_place.h"
 #include "harness/plant/imperfections.h"
-#include "harness/plant/integrator.h"
+#include "harness/plant/plant.h"
 
 namespace dexcheck {
 

@@ -6,7 +6,6 @@
 
 #include "controller/common/toml_reader.h"
 #include "harness/base/files.h"
-#include "harness/base/git_revision.h"
 #include "harness/base/version.h"
 #include "harness/engine/engine.h"
 #include "harness/engine/machine.h"

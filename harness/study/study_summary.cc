@@ -10,10 +10,10 @@
 #include "controller/common/text.h"
 #include "harness/base/console.h"
 #include "harness/study/margin_search.h"
+#include "harness/study/sampled_stability.h"
 #include "harness/study/search.h"
 #include "harness/study/sensitivity.h"
 #include "harness/study/study_answer.h"
-#include "harness/study/study_theory.h"
 
 namespace dexcheck {
 

@@ -8,8 +8,8 @@
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
 #include "controller/model/parameter_reader.h"
+#include "harness/engine/compiled_model.h"
 #include "harness/engine/engine.h"
-#include "harness/engine/remove_looks.h"
 #include "harness/run/runner.h"
 #include "harness/study/trial_monitor.h"
 

@@ -6,7 +6,7 @@
 #include <filesystem>
 
 #include "controller/common/text.h"
-#include "controller/common/toml_overrides.h"
+#include "controller/common/toml_reader.h"
 
 namespace dexcheck {
 

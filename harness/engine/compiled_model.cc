@@ -1,15 +1,22 @@
-#include "harness/engine/remove_looks.h"
+#include "harness/engine/compiled_model.h"
+
+#include <mujoco/mjxmacro.h>
+#include <mujoco/mujoco.h>
 
 #include <algorithm>
+#include <cstddef>
 #include <cstring>
+#include <new>
+#include <string_view>
 #include <type_traits>
 #include <vector>
 
+#include "controller/common/errors.h"
 #include "harness/engine/engine.h"
-#include "harness/engine/model_arrays.h"
-#include "harness/engine/resized_copy.h"
+#include "harness/engine/mujoco_release.h"
 
 namespace dexcheck {
+
 namespace {
 
 /// Calls visit(id) for each reference that an element other than a pair makes to a geom.
@@ -98,6 +105,81 @@ size_t RemovePictures(MjModelPtr* model) {
     }
   });
   return before - static_cast<size_t>((*model)->nbuffer);
+}
+
+namespace {
+
+struct Rows {
+  const void* data;
+  size_t bytes;
+};
+
+}  // namespace
+
+MjModelPtr MakeResizedCopy(const mjModel& model, const std::function<void(mjModel*)>& resize) {
+  auto* m = static_cast<mjModel*>(mju_malloc(sizeof(mjModel)));
+  if (m == nullptr) throw std::bad_alloc();
+  *m = model;
+  std::vector<Rows> old;
+  ForEachArray(m, [&](auto* array, size_t rows, size_t columns, bool) {
+    old.push_back({array, sizeof(*array) * rows * columns});
+  });
+  resize(m);
+  size_t bytes = 0;
+  ForEachArray(m, [&](auto* array, size_t rows, size_t columns, bool) {
+    bytes = AlignArray(bytes) + sizeof(*array) * rows * columns;
+  });
+  m->buffer = mju_malloc(bytes);
+  m->nbuffer = static_cast<decltype(m->nbuffer)>(bytes);
+  MjModelPtr resized(m);
+  if (m->buffer == nullptr) throw std::bad_alloc();
+  size_t offset = 0;
+  size_t i = 0;
+  ForEachArray(m, [&]<typename Number>(Number*& array, size_t rows, size_t columns, bool) {
+    offset = AlignArray(offset);
+    const size_t size = sizeof(Number) * rows * columns;
+    array = reinterpret_cast<Number*>(static_cast<char*>(m->buffer) + offset);
+    std::memset(array, 0, size);
+    if (const size_t kept = std::min(size, old[i].bytes); kept > 0) std::memcpy(array, old[i].data, kept);
+    offset += size;
+    ++i;
+  });
+  return resized;
+}
+
+namespace {
+
+void FillPair(mjModel* m, int pair, const std::pair<int, int>& geoms) {
+  const auto [a, b] = geoms;
+  m->name_pairadr[pair] = static_cast<int>(m->nnames - 1);  // no name
+  m->pair_dim[pair] = 3;
+  m->pair_geom1[pair] = a;
+  m->pair_geom2[pair] = b;
+  m->pair_signature[pair] = MakeSignature(m->geom_bodyid[a], m->geom_bodyid[b]);
+  m->pair_margin[pair] = 0.0;
+  m->pair_gap[pair] = 0.0;
+  const mjtNum solref[mjNREF] = {0.02, 1.0};
+  const mjtNum solimp[mjNIMP] = {0.9, 0.95, 0.001, 0.5, 2.0};
+  std::copy_n(solref, mjNREF, m->pair_solref + mjNREF * pair);
+  std::copy_n(solimp, mjNIMP, m->pair_solimp + mjNIMP * pair);
+  constexpr int kOfGeom[5] = {0, 0, 1, 2, 2};  // sliding twice, torsional, rolling twice
+  for (int k = 0; k < 5; ++k) {
+    m->pair_friction[5 * pair + k] =
+        std::max(m->geom_friction[3 * a + kOfGeom[k]], m->geom_friction[3 * b + kOfGeom[k]]);
+  }
+}
+
+}  // namespace
+
+MjModelPtr AddContactPairs(const mjModel& model, std::span<const std::pair<int, int>> geoms) {
+  if (CollidesByType(model)) {
+    throw InputError("MJCF: option collision: must be \"predefined\" for plant.collide");
+  }
+  const auto first = static_cast<int>(model.npair);
+  MjModelPtr resized =
+      MakeResizedCopy(model, [&](mjModel* m) { m->npair += static_cast<int>(geoms.size()); });
+  for (size_t k = 0; k < geoms.size(); ++k) FillPair(resized.get(), first + static_cast<int>(k), geoms[k]);
+  return resized;
 }
 
 }  // namespace dexcheck

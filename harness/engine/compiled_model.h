@@ -3,7 +3,9 @@
 #include <mujoco/mujoco.h>
 
 #include <cstddef>
+#include <functional>
 #include <span>
+#include <utility>
 
 #include "harness/engine/engine.h"
 
@@ -20,5 +22,17 @@ int RemoveLooks(MjModelPtr* model, std::span<const int> wanted = {});
 /// Removes the pictures on a compiled model's surfaces, most of its bytes, which only drawing reads. A robot
 /// that is copied for each of many runs then costs less to copy. @return the bytes removed.
 size_t RemovePictures(MjModelPtr* model);
+
+/// A copy of a compiled model whose arrays have more rows or fewer.
+/// @param resize changes sizes of the model (npair, ngeom) that it is given. Rows that are dropped are the
+/// last ones; new ones come last and are zero.
+MjModelPtr MakeResizedCopy(const mjModel& model, const std::function<void(mjModel*)>& resize);
+
+/// A copy of a compiled model in which these geoms touch as well, as if the MJCF had a <pair> of three
+/// dimensions for each: sliding friction is the larger one of the two geoms', as the engine mixes it, and
+/// stiffness the default's.
+/// @throws InputError when the model lets geoms touch by contype and conaffinity, whose order the engine
+/// needs.
+MjModelPtr AddContactPairs(const mjModel& model, std::span<const std::pair<int, int>> geoms);
 
 }  // namespace dexcheck

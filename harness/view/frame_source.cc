@@ -1,4 +1,4 @@
-#include "harness/view/recording.h"
+#include "harness/view/frame_source.h"
 
 namespace dexcheck {
 
