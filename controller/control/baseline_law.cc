@@ -5,8 +5,8 @@
 #include <array>
 #include <cmath>
 
+#include "controller/common/block_cholesky.h"
 #include "controller/common/errors.h"
-#include "controller/common/gram_matrix.h"
 #include "controller/common/text.h"
 
 namespace dexcheck {

@@ -3,9 +3,11 @@
 // Desired trajectories X_d(t) of the object for (55). Every trajectory starts at X_start (6: m, rad) at t = 0
 // and may be evaluated at any t; before 0 it continues as its formula says. Evaluation does not allocate.
 
+#include <functional>
 #include <memory>
 #include <vector>
 
+#include "controller/common/toml_reader.h"
 #include "controller/common/types.h"
 
 namespace dexcheck {
@@ -112,5 +114,24 @@ std::unique_ptr<Trajectory> MakeWayPointTrajectory(const Vector6d& X_start,
 /// @param parts each with X_start = 0. @throws std::invalid_argument without parts.
 std::unique_ptr<Trajectory> MakeSumTrajectory(const Vector6d& X_start,
                                               std::vector<std::unique_ptr<Trajectory>> parts);
+
+/// Makes a trajectory that starts at X_start.
+using TrajectoryMaker = std::function<std::unique_ptr<Trajectory>(const Vector6d& X_start)>;
+
+/// Reads a trajectory from a table; where it starts is not in it. Keys by `type`; SI units, angles also as
+/// KEY_deg:
+///
+///   line            velocity = [3], turning = [3] (rates of the ZYZ angles), ramp_time
+///   point_to_point  xyz = [3], zyz = [3], duration
+///   oscillation     xyz = [3], zyz = [3], frequency, ramp_time
+///   weave           heading, speed, ramp_time, amplitude, wavelength
+///   circle          heading, speed, ramp_time, radius
+///   way_points      points = [{ time, xyz = [3], zyz = [3] }, ..]
+///   sum             parts = [{ type, .. }, ..], whose displacements add
+///
+/// xyz and zyz are displacements or amplitudes against X_start. Optional: velocity, turning, xyz, zyz,
+/// heading and ramp_time, 0 unless given.
+/// @throws InputError, one line that names file, line, key and value.
+TrajectoryMaker ReadTrajectory(TomlTable& table);
 
 }  // namespace dexcheck

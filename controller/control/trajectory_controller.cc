@@ -3,7 +3,7 @@
 #include <stdexcept>
 
 #include "controller/common/errors.h"
-#include "controller/contact/rolling.h"
+#include "controller/contact/contact_geometry.h"
 
 namespace dexcheck {
 

@@ -9,7 +9,6 @@
 #include "harness/base/interrupts.h"
 #include "harness/cli/commands.h"
 #include "harness/cli/output_file.h"
-#include "harness/cli/progress_bar.h"
 #include "harness/cli/run_folder.h"
 #include "harness/cli/terminal.h"
 #include "harness/study/study_page.h"

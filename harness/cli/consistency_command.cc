@@ -11,7 +11,7 @@
 #include "harness/cli/commands.h"
 #include "harness/cli/consistency_report.h"
 #include "harness/cli/output_file.h"
-#include "harness/cli/progress_bar.h"
+#include "harness/cli/terminal.h"
 
 namespace dexcheck::cli {
 namespace {

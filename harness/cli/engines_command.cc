@@ -13,7 +13,6 @@
 #include "harness/cli/consistency_report.h"
 #include "harness/cli/junit_file.h"
 #include "harness/cli/output_file.h"
-#include "harness/cli/progress_bar.h"
 #include "harness/cli/terminal.h"
 #include "harness/descriptions/join_names.h"
 #include "harness/descriptions/read_description.h"

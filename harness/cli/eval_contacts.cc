@@ -5,9 +5,8 @@
 #include <vector>
 
 #include "controller/common/errors.h"
-#include "controller/contact/find_contact.h"
+#include "controller/contact/contact_geometry.h"
 #include "controller/contact/grasp_map.h"
-#include "controller/contact/rolling.h"
 #include "controller/contact/shapes.h"
 #include "controller/control/grasp_controller.h"
 #include "controller/grasp/force_closure.h"

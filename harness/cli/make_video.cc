@@ -11,7 +11,7 @@
 #include "controller/common/text.h"
 #include "harness/base/console.h"
 #include "harness/base/interrupts.h"
-#include "harness/cli/progress_bar.h"
+#include "harness/cli/terminal.h"
 #include "harness/report/recorded_frames.h"
 
 namespace dexcheck::cli {

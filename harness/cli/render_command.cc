@@ -19,7 +19,6 @@
 #include "harness/cli/output_file.h"
 #include "harness/cli/run_folder.h"
 #include "harness/report/recorded_frames.h"
-#include "renders/picture_file.h"
 #include "renders/video.h"
 #include "renders/video_writer.h"
 

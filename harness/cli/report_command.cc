@@ -7,7 +7,7 @@
 
 #include "harness/cli/commands.h"
 #include "harness/cli/output_file.h"
-#include "harness/report/write_report.h"
+#include "harness/report/page.h"
 
 namespace dexcheck::cli {
 namespace {

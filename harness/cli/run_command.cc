@@ -23,8 +23,8 @@
 #include "harness/cli/shipped_files.h"
 #include "harness/cli/terminal.h"
 #include "harness/engine/machine.h"
+#include "harness/report/page.h"
 #include "harness/report/run_data.h"
-#include "harness/report/write_report.h"
 #include "harness/run/half_step.h"
 
 namespace dexcheck::cli {

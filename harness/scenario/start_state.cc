@@ -7,7 +7,6 @@
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
 #include "controller/contact/contact_geometry.h"
-#include "controller/contact/find_contact.h"
 #include "controller/contact/shapes.h"
 #include "controller/grasp/finger_placement.h"
 #include "controller/object/euler_zyz.h"

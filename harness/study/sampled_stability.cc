@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "harness/plant/velocity_filter.h"
-#include "harness/study/trial_monitor.h"
+#include "harness/study/trial.h"
 
 namespace dexcheck {
 

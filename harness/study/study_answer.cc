@@ -6,9 +6,8 @@
 #include <array>
 #include <cmath>
 
-#include "harness/study/margin_search.h"
+#include "harness/study/sampling.h"
 #include "harness/study/search.h"
-#include "harness/study/sensitivity.h"
 
 namespace dexcheck {
 

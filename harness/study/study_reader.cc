@@ -7,8 +7,8 @@
 
 #include "controller/common/text.h"
 #include "controller/common/toml_reader.h"
-#include "harness/study/margin_search.h"
 #include "harness/study/sampling.h"
+#include "harness/study/search.h"
 #include "harness/study/study.h"
 
 namespace dexcheck {

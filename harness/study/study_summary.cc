@@ -9,10 +9,9 @@
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
 #include "harness/base/console.h"
-#include "harness/study/margin_search.h"
 #include "harness/study/sampled_stability.h"
+#include "harness/study/sampling.h"
 #include "harness/study/search.h"
-#include "harness/study/sensitivity.h"
 #include "harness/study/study_answer.h"
 
 namespace dexcheck {

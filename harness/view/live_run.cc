@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "controller/handling/pick_and_place.h"
-#include "harness/engine/skeleton.h"
+#include "harness/engine/compiled_model.h"
 
 namespace dexcheck {
 namespace {

@@ -10,7 +10,6 @@
 #include <random>
 
 #include "controller/contact/contact_geometry.h"
-#include "controller/contact/find_contact.h"
 #include "controller/contact/grasp_map.h"
 #include "controller/contact/shapes.h"
 #include "controller/dynamics/model_terms.h"

@@ -8,10 +8,9 @@
 #include <fstream>
 #include <string>
 
-#include "harness/report/comparison_page.h"
+#include "harness/report/page.h"
 #include "harness/report/run_comparison.h"
 #include "harness/report/run_data.h"
-#include "harness/report/write_report.h"
 #include "renders/video_writer.h"
 #include "tests/common/browser.h"
 #include "tests/common/files.h"

@@ -7,10 +7,10 @@
 #include <cmath>
 #include <string>
 
-#include "harness/report/write_report.h"
-#include "renders/picture_file.h"
+#include "harness/report/page.h"
 #include "renders/renderer.h"
 #include "renders/run_decorations.h"
+#include "renders/video_writer.h"
 #include "tests/common/browser.h"
 #include "tests/common/matchers.h"
 #include "tests/harness/report/replay_run.h"

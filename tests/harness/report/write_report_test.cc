@@ -1,7 +1,5 @@
 // What a report's files hold.
 
-#include "harness/report/write_report.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -13,6 +11,7 @@
 #include <string>
 
 #include "controller/common/errors.h"
+#include "harness/report/page.h"
 #include "harness/report/run_data.h"
 #include "harness/report/run_figures.h"
 #include "tests/common/files.h"
