@@ -77,14 +77,13 @@ void PrintTable(const EnginesRequest& request, const RobotModel& model,
   constexpr size_t kPairsInARow = 6;
   for (size_t begin = 0; begin < result.pairs.size(); begin += kPairsInARow) {
     const size_t end = std::min(begin + kPairsInARow, result.pairs.size());
-    fmt::print("\n{:<18}", "worst difference");
-    for (size_t i = begin; i < end; ++i) fmt::print("{:>10}", name(result.pairs[i]) + " ");
-    fmt::print("\n");
+    std::vector<TableRow> rows = {{}, {{"worst difference"}}};
+    for (size_t i = begin; i < end; ++i) rows.back().cells.push_back(name(result.pairs[i]) + " ");
     for (const std::string& term : terms) {
-      fmt::print("{:<18}", term);
-      for (size_t i = begin; i < end; ++i) fmt::print("{:>10}", FormatCell(result.pairs[i], term));
-      fmt::print("\n");
+      rows.push_back({{term}});
+      for (size_t i = begin; i < end; ++i) rows.back().cells.push_back(FormatCell(result.pairs[i], term));
     }
+    fmt::print("{}", FormatTable("<>>>>>>", rows));
   }
   fmt::print("\nwhere it is worst\n");
   const int base = model.num_base_velocities();

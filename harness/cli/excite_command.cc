@@ -26,14 +26,10 @@ std::string Head(const ExcitingMotion& motion) {
 }
 
 void Print(const Scenario& scenario, const ExcitingMotion& motion) {
-  fmt::print("{}: {}\n\n{:<44}{:>12}{:>12}\n", scenario.name, Head(motion), "regressor of (48) along the run",
-             "given", "found");
-  const auto row = [](const std::string& what, const std::string& given, const std::string& found) {
-    fmt::print("{:<44}{:>12}{:>12}\n", what, given, found);
-  };
+  std::vector<TableRow> rows = {{{"regressor of (48) along the run", "given", "found"}}};
   const auto both = [&](const std::string& what, const char* format, const auto& calc) {
-    row(what, fmt::format(fmt::runtime(format), calc(motion.given)),
-        fmt::format(fmt::runtime(format), calc(motion.found)));
+    rows.push_back({{what, fmt::format(fmt::runtime(format), calc(motion.given)),
+                     fmt::format(fmt::runtime(format), calc(motion.found))}});
   };
   both("largest singular value", "{:.3e}", [](const JudgedMotion& m) { return m.singular_values[0]; });
   both(fmt::format("smallest of {} that show", motion.rank), "{:.3e}",
@@ -41,6 +37,7 @@ void Print(const Scenario& scenario, const ExcitingMotion& motion) {
   both("condition number of these", "{:.3e}", [](const JudgedMotion& m) { return m.condition(); });
   both(fmt::format("combinations above the floor of {:.0e}", motion.floor), "{}",
        [&](const JudgedMotion& m) { return CountAbove(m.singular_values, motion.floor); });
+  fmt::print("{}: {}\n\n{}", scenario.name, Head(motion), FormatTable("<>>", rows));
   fmt::print("nearest to what it may take: {}\n\n", motion.found.nearest);
   for (const std::string& setting : motion.overrides) fmt::print("--set {}\n", QuoteForShell(setting));
 }

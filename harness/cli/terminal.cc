@@ -54,6 +54,25 @@ std::string Wrap(std::string_view text, size_t indent) {
   }
 }
 
+std::string FormatTable(std::string_view align, const std::vector<TableRow>& rows) {
+  std::vector<size_t> widths(align.size(), 0);
+  for (const TableRow& row : rows) {
+    for (size_t i = 0; i < row.cells.size(); ++i) widths[i] = std::max(widths[i], row.cells[i].size());
+  }
+  std::string table;
+  for (const TableRow& row : rows) {
+    std::string line;
+    for (size_t i = 0; i < row.cells.size(); ++i) {
+      const std::string gap(widths[i] - row.cells[i].size(), ' ');
+      line += (i == 0 ? "" : "  ") + (align[i] == '<' ? row.cells[i] + gap : gap + row.cells[i]);
+    }
+    line.erase(line.find_last_not_of(' ') + 1);
+    if (!row.cells.empty() || row.note.empty()) table += line + "\n";
+    if (!row.note.empty()) table += Wrap(row.note, 6) + "\n";
+  }
+  return table;
+}
+
 std::string Paint(Tone tone, std::string_view text) {
   if (!TakesColors()) return std::string(text);
   const char* const code = tone == Tone::kGood      ? "32"

@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace dexcheck::cli {
 
@@ -18,6 +19,15 @@ inline constexpr size_t kColumns = 80;
 /// Lines of at most kColumns, broken at blanks; those after the first of each are indented. A word that is
 /// longer stays whole.
 std::string Wrap(std::string_view text, size_t indent);
+
+/// A line of a table.
+struct TableRow {
+  std::vector<std::string> cells;  ///< None for an empty line.
+  std::string note = {};           ///< What is said below it, wrapped.
+};
+/// Columns as wide as their widest cells, two blanks apart. @param align of each column: '<' to the left, '>'
+/// to the right.
+std::string FormatTable(std::string_view align, const std::vector<TableRow>& rows);
 
 enum class Tone { kGood, kBad, kWarning, kFaint };
 
