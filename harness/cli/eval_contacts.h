@@ -5,7 +5,6 @@
 #include "controller/contact/contact_geometry.h"
 #include "controller/contact/surface.h"
 #include "controller/dynamics/model_terms.h"
-#include "harness/cli/eval_terms.h"
 #include "harness/cli/json_matrix.h"
 #include "harness/scenario/state_file.h"
 

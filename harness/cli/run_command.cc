@@ -15,7 +15,6 @@
 #include "harness/base/console.h"
 #include "harness/base/interrupts.h"
 #include "harness/cli/commands.h"
-#include "harness/cli/comparison_options.h"
 #include "harness/cli/make_video.h"
 #include "harness/cli/output_file.h"
 #include "harness/cli/run_folder.h"

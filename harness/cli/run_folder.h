@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "harness/base/files.h"
+#include "harness/log/log_content.h"
 #include "harness/log/log_reader.h"
-#include "harness/log/old_names.h"
 #include "harness/run/run_recorder.h"
 #include "harness/run/runner.h"
 #include "harness/scenario/scenario.h"

@@ -18,7 +18,7 @@
 #include "harness/cli/run_folder.h"
 #include "harness/cli/run_report.h"
 #include "harness/view/frame_source.h"
-#include "harness/view/gain_sliders.h"
+#include "harness/view/live_run.h"
 #include "harness/view/viewer.h"
 
 namespace dexcheck::cli {

@@ -19,8 +19,8 @@
 #include "controller/common/text.h"
 #include "harness/base/child_process.h"
 #include "harness/log/hdf5_handle.h"
+#include "harness/log/log_content.h"
 #include "harness/log/log_file.h"
-#include "harness/log/old_names.h"
 
 namespace dexcheck {
 namespace {

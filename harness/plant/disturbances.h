@@ -9,7 +9,6 @@
 #include "controller/dynamics/model_terms.h"
 #include "harness/plant/imperfections.h"
 #include "harness/plant/plant.h"
-#include "harness/plant/plant_reading.h"
 #include "harness/plant/random_stream.h"
 
 namespace dexcheck {

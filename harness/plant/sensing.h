@@ -7,7 +7,6 @@
 #include "controller/control/controller.h"
 #include "harness/plant/imperfections.h"
 #include "harness/plant/plant.h"
-#include "harness/plant/plant_reading.h"
 #include "harness/plant/random_stream.h"
 #include "harness/plant/velocity_filter.h"
 

@@ -19,7 +19,6 @@
 #include "harness/report/page_assets.h"
 #include "harness/report/page_frame.h"
 #include "harness/report/recorded_frames.h"
-#include "harness/report/run_figures.h"
 #include "renders/renderer.h"
 #include "renders/video.h"
 #include "renders/video_writer.h"

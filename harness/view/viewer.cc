@@ -11,7 +11,7 @@
 
 #include "harness/base/interrupts.h"
 #include "harness/view/controls.h"
-#include "harness/view/gain_sliders.h"
+#include "harness/view/live_run.h"
 #include "harness/view/pointer.h"
 #include "harness/view/studio.h"
 #include "harness/view/window.h"

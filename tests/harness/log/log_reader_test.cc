@@ -9,7 +9,7 @@
 #include <random>
 
 #include "controller/common/errors.h"
-#include "harness/log/old_names.h"
+#include "harness/log/log_content.h"
 #include "tests/common/files.h"
 #include "tests/common/matchers.h"
 #include "tests/common/paths.h"
