@@ -211,19 +211,19 @@ std::vector<std::string> LiveRun::ListOverrides() const {
 namespace {
 
 /// Ten digits: 0.6 for 3 times 0.2, and not 0.6000000000000001.
-std::string Print(double number) { return FormatNumber(number, 10); }
+std::string PrintGain(double number) { return FormatNumber(number, 10); }
 
-std::string Print(const Vector6d& v) {
-  return fmt::format("[{}, {}, {}, {}, {}, {}]", Print(v[0]), Print(v[1]), Print(v[2]), Print(v[3]),
-                     Print(v[4]), Print(v[5]));
+std::string PrintGain(const Vector6d& v) {
+  return fmt::format("[{}, {}, {}, {}, {}, {}]", PrintGain(v[0]), PrintGain(v[1]), PrintGain(v[2]),
+                     PrintGain(v[3]), PrintGain(v[4]), PrintGain(v[5]));
 }
 
 /// A key with numbers by joint, each times a factor; nothing when the scenario does not have it.
 void Multiply(const ByName& numbers, double factor, std::vector<std::string>* overrides) {
   if (numbers.key.empty() || factor == 1.0) return;
-  std::string text = std::isnan(numbers.all) ? "" : ", all = " + Print(factor * numbers.all);
+  std::string text = std::isnan(numbers.all) ? "" : ", all = " + PrintGain(factor * numbers.all);
   for (const auto& [name, number] : numbers.groups) {
-    text += ", " + Quote(name) + " = " + Print(factor * number);
+    text += ", " + Quote(name) + " = " + PrintGain(factor * number);
   }
   overrides->push_back(numbers.key + "={" + text.substr(1) + " }");
 }
@@ -255,15 +255,15 @@ std::vector<std::string> MakeGainOverrides(const Scenario& scenario, const std::
     const bool has_frequency = scenario.text.find("natural_frequency") != std::string::npos;
     if (has_frequency) {
       const Vector6d omega = K_p.cwiseSqrt();
-      overrides.push_back("control.natural_frequency=" + Print(omega));
-      overrides.push_back("control.damping_ratio=" + Print(0.5 * K_v.cwiseQuotient(omega)));
+      overrides.push_back("control.natural_frequency=" + PrintGain(omega));
+      overrides.push_back("control.damping_ratio=" + PrintGain(0.5 * K_v.cwiseQuotient(omega)));
     } else {
-      overrides.push_back("control.K_p=" + Print(K_p));
-      overrides.push_back("control.K_v=" + Print(K_v));
+      overrides.push_back("control.K_p=" + PrintGain(K_p));
+      overrides.push_back("control.K_v=" + PrintGain(K_v));
     }
   }
   if (sliders[2].factor != 1.0) {
-    overrides.push_back("control.f_min=" + Print(sliders[2].factor * scenario.control.f_min));
+    overrides.push_back("control.f_min=" + PrintGain(sliders[2].factor * scenario.control.f_min));
   }
   return overrides;
 }
