@@ -5,7 +5,7 @@
 #include "controller/common/text.h"
 #include "harness/base/process_pool.h"
 #include "harness/checks/consistency.h"
-#include "harness/cli/shipped_files.h"
+#include "harness/cli/run_folder.h"
 
 namespace dexcheck::cli {
 

@@ -11,7 +11,7 @@
 #include "harness/cli/eval_contacts.h"
 #include "harness/cli/json_matrix.h"
 #include "harness/cli/output_file.h"
-#include "harness/cli/shipped_files.h"
+#include "harness/cli/run_folder.h"
 #include "harness/descriptions/analytic_provider.h"
 #include "harness/descriptions/base_convention.h"
 #include "harness/descriptions/engine_provider.h"

@@ -21,7 +21,7 @@
 #include "harness/cli/commands.h"
 #include "harness/cli/json_matrix.h"
 #include "harness/cli/output_file.h"
-#include "harness/cli/shipped_files.h"
+#include "harness/cli/run_folder.h"
 #include "harness/engine/clearance.h"
 #include "harness/engine/engine.h"
 

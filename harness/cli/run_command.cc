@@ -19,7 +19,6 @@
 #include "harness/cli/output_file.h"
 #include "harness/cli/run_folder.h"
 #include "harness/cli/run_report.h"
-#include "harness/cli/shipped_files.h"
 #include "harness/cli/terminal.h"
 #include "harness/engine/machine.h"
 #include "harness/report/page.h"

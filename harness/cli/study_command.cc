@@ -17,7 +17,6 @@
 #include "harness/base/interrupts.h"
 #include "harness/cli/commands.h"
 #include "harness/cli/run_folder.h"
-#include "harness/cli/shipped_files.h"
 #include "harness/cli/terminal.h"
 #include "harness/study/study_answer.h"
 #include "harness/study/study_runner.h"
