@@ -140,10 +140,10 @@ TEST_F(LogReaderTest, EveryTruncationIsNoticed) {
 }
 
 /// Bits flipped, bytes put in or replaced, at random: one line, or a log that is read.
-TEST_F(LogReaderTest, RandomDamageIsOneLine) {
+void ReadRandomDamage(const std::filesystem::path& path) {
   constexpr int kTrials = 200;
-  WriteSampleLog(path_, 20, 20);
-  const std::string good = ReadText(path_);
+  WriteSampleLog(path, 20, 20);
+  const std::string good = ReadText(path);
   std::mt19937 random(5);
   int refused = 0;
   for (int trial = 0; trial < kTrials; ++trial) {
@@ -154,19 +154,28 @@ TEST_F(LogReaderTest, RandomDamageIsOneLine) {
       if (trial % 3 == 1) damaged.insert(at, 1, static_cast<char>(random()));
       if (trial % 3 == 2) damaged[at] = static_cast<char>(random());
     }
-    WriteText(path_, damaged);
+    WriteText(path, damaged);
     const std::string message = MessageOf<InputError>([&] {
-      const LogReader log(path_);
+      const LogReader log(path);
       for (const SignalInfo& signal : log.signals()) (void)log.ReadSignal(signal.name);
       for (const std::string& text : log.ListTexts()) (void)log.ReadText(text);
       for (const std::string& file : log.ListFiles("inputs")) (void)log.ReadFile("inputs", file);
     });
     if (message == "accepted") continue;
     ++refused;
-    EXPECT_THAT(message, StartsWith(path_.string() + ": "));
+    EXPECT_THAT(message, StartsWith(path.string() + ": "));
     EXPECT_EQ(message.find('\n'), std::string::npos);
   }
   EXPECT_GE(refused, kTrials / 2);
+}
+
+TEST_F(LogReaderTest, RandomDamageIsOneLine) {
+  // In a process of its own: HDF5 leaves a damaged heap to one that has read some of these.
+  const auto read = [&] {
+    ReadRandomDamage(path_);
+    std::_Exit(HasFailure() ? 1 : 0);
+  };
+  EXPECT_EXIT(read(), ::testing::ExitedWithCode(0), "");
 }
 
 TEST_F(LogReaderTest, WrongAndMissingPartsAreNamed) {
