@@ -24,7 +24,7 @@ packages=(
   pkg-config libosmesa6-dev libcairo2-dev ffmpeg
   fonts-dejavu-core
   # pages: their plots, charts and replay, and the run's figures
-  gnuplot-nox libjs-dygraphs libjs-chart.js libjs-three
+  gnuplot-nox libjs-chart.js libjs-three
   # the live window
   libglfw3-dev
 )

@@ -6,8 +6,6 @@
 #include <array>
 #include <cmath>
 
-#include "renders/panel_colors.h"
-
 namespace dexcheck {
 namespace {
 

@@ -1,14 +1,111 @@
 #include "renders/renderer.h"
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <mutex>
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
 #include "harness/engine/engine.h"
-#include "renders/scene_geoms.h"
+#include "harness/engine/mujoco_release.h"
+#include "renders/mesa.h"
 
 namespace dexcheck {
+
+namespace {
+
+constexpr int kConeSides = 48;
+constexpr int kTubeSides = 8;
+
+unsigned BeginList() {
+  const unsigned list = LoadMesa().glGenLists(1);
+  if (list == 0) throw Error("OpenGL: cannot make a display list");
+  LoadMesa().glNewList(list, GL_COMPILE);
+  return list;
+}
+
+/// Seen from both sides.
+unsigned MakeCone() {
+  const unsigned list = BeginList();
+  LoadMesa().glBegin(GL_TRIANGLES);
+  for (const bool outside : {true, false}) {
+    const float sign = outside ? 1.0F : -1.0F;
+    for (int k = 0; k < kConeSides; ++k) {
+      const auto vertex = [&](int i, float z) {
+        const double angle = 2.0 * kPi * i / kConeSides;
+        const auto c = static_cast<float>(std::cos(angle));
+        const auto s = static_cast<float>(std::sin(angle));
+        LoadMesa().glNormal3f(sign * c, sign * s, -sign);
+        LoadMesa().glVertex3f(z * c, z * s, z);
+      };
+      vertex(k, 0.0F);
+      vertex(outside ? k + 1 : k, 1.0F);
+      vertex(outside ? k : k + 1, 1.0F);
+    }
+  }
+  LoadMesa().glEnd();
+  LoadMesa().glEndList();
+  return list;
+}
+
+}  // namespace
+
+DisplayMeshes::DisplayMeshes(const mjrContext& context) : context_(context), cone_(MakeCone()) {}
+
+DisplayMeshes::~DisplayMeshes() {
+  ClearTubes();
+  LoadMesa().glDeleteLists(cone_, 1);
+}
+
+int DisplayMeshes::ToMesh(unsigned list) const {
+  return static_cast<int>(list) - static_cast<int>(context_.baseMesh);
+}
+
+void DisplayMeshes::ClearTubes() {
+  for (const unsigned list : tubes_) LoadMesa().glDeleteLists(list, 1);
+  tubes_.clear();
+}
+
+int DisplayMeshes::AddTube(std::span<const Vector3d> points, double radius) {
+  Require(points.size() >= 2, "points of a tube", "must be at least two", static_cast<double>(points.size()));
+  const unsigned list = BeginList();
+  tubes_.push_back(list);
+  std::array<Vector3d, kTubeSides> previous;
+  Vector3d x = Vector3d::Zero();
+  for (size_t i = 0; i < points.size(); ++i) {
+    Vector3d along = points[std::min(i + 1, points.size() - 1)] - points[i == 0 ? 0 : i - 1];
+    if (along.isZero()) along = Vector3d::UnitZ();
+    along.normalize();
+    // The last ring's direction, turned as little as the path's bend requires.
+    x -= along.dot(x) * along;
+    x = x.norm() > 0.1 ? x.normalized() : along.unitOrthogonal();
+    const Vector3d y = along.cross(x);
+    std::array<Vector3d, kTubeSides> outward;
+    for (int k = 0; k < kTubeSides; ++k) {
+      const double angle = 2.0 * kPi * k / kTubeSides;
+      outward[static_cast<size_t>(k)] = std::cos(angle) * x + std::sin(angle) * y;
+    }
+    if (i > 0) {
+      const auto vertex = [&](size_t point, const Vector3d& normal) {
+        const Vector3d p = points[point] + radius * normal;
+        LoadMesa().glNormal3dv(normal.data());
+        LoadMesa().glVertex3dv(p.data());
+      };
+      LoadMesa().glBegin(GL_TRIANGLE_STRIP);
+      for (int k = 0; k <= kTubeSides; ++k) {
+        const auto side = static_cast<size_t>(k % kTubeSides);
+        vertex(i, outward[side]);
+        vertex(i - 1, previous[side]);
+      }
+      LoadMesa().glEnd();
+    }
+    previous = outward;
+  }
+  LoadMesa().glEndList();
+  return ToMesh(list);
+}
+
 namespace {
 
 constexpr int kLargestWidth = 3840;
@@ -189,6 +286,96 @@ void Renderer::AddGhost(const Ghost& ghost) {
     geom.texid = -1;
     geom.reflectance = 0.0F;
   }
+}
+
+namespace {
+
+constexpr float kGlow = 0.35F;  // emission, so that colours stay recognisable in shadow
+
+class GeomAdder {
+ public:
+  GeomAdder(DisplayMeshes* meshes, mjvScene* scene) : meshes_(*meshes), scene_(*scene) {}
+
+  void operator()(const Arrow& arrow) {
+    const Vector3d along = arrow.to - arrow.from;
+    if (along.norm() <= arrow.radius) return;
+    mjvGeom& geom = Add(mjGEOM_ARROW, arrow.color);
+    // The engine draws arrows half as long as their given length.
+    const Vector3d end = arrow.from + 2.0 * along;
+    MakeConnector(mjGEOM_ARROW, arrow.radius, arrow.from.data(), end.data(), &geom);
+  }
+
+  void operator()(const Cone& cone) {
+    mjvGeom& geom = Add(mjGEOM_MESH, cone.color);
+    geom.dataid = meshes_.cone();
+    const Vector3d x = cone.axis.unitOrthogonal();
+    const Vector3d y = cone.axis.cross(x);
+    const double radius = cone.height * std::tan(cone.half_angle);
+    Matrix3d scaled;
+    scaled << radius * x, radius * y, cone.height * cone.axis;
+    Place(cone.apex, scaled, &geom);
+  }
+
+  void operator()(const Polyline& line) {
+    if (line.points.size() < 2) return;
+    mjvGeom& geom = Add(mjGEOM_MESH, line.color);
+    // Near the camera in floats: relative to the path's first point.
+    const Vector3d origin = line.points.front();
+    std::vector<Vector3d> points;
+    for (const Vector3d& point : line.points) points.push_back(point - origin);
+    geom.dataid = meshes_.AddTube(points, line.radius);
+    Place(origin, Matrix3d::Identity(), &geom);
+  }
+
+  void operator()(const Axes& axes) {
+    constexpr double kSlimness = 0.03;
+    for (int k = 0; k < 3; ++k) {
+      Color color = {0.15F, 0.15F, 0.15F, 1.0F};
+      color[static_cast<size_t>(k)] = 0.9F;
+      const Vector3d origin = axes.X_WF.translation();
+      (*this)(
+          Arrow{origin, origin + axes.length * axes.X_WF.linear().col(k), kSlimness * axes.length, color});
+    }
+  }
+
+  void operator()(const Dot& dot) {
+    mjvGeom& geom = Add(mjGEOM_SPHERE, dot.color);
+    for (float& size : geom.size) size = static_cast<float>(dot.radius);
+    Place(dot.center, Matrix3d::Identity(), &geom);
+  }
+
+ private:
+  mjvGeom& Add(int type, const Color& color) {
+    Require(scene_.ngeom < scene_.maxgeom, "decorations", "must fit into the scene's number of geoms",
+            scene_.maxgeom);
+    mjvGeom& geom = scene_.geoms[scene_.ngeom++];
+    // mjv_initGeom leaves some members, such as what transparent geoms are sorted by, as they were.
+    geom = mjvGeom{};
+    mjv_initGeom(&geom, type, nullptr, nullptr, nullptr, color.data());
+    geom.category = mjCAT_DECOR;
+    geom.emission = kGlow;
+    geom.specular = 0.3F;
+    geom.shininess = 0.4F;
+    return geom;
+  }
+
+  /// @param scaled rotation whose columns carry the shape's sizes.
+  static void Place(const Vector3d& p, const Matrix3d& scaled, mjvGeom* geom) {
+    for (int i = 0; i < 3; ++i) {
+      geom->pos[i] = static_cast<float>(p[i]);
+      for (int j = 0; j < 3; ++j) geom->mat[3 * i + j] = static_cast<float>(scaled(i, j));
+    }
+  }
+
+  DisplayMeshes& meshes_;
+  mjvScene& scene_;
+};
+
+}  // namespace
+
+void AddDecorations(std::span<const Decoration> decorations, DisplayMeshes* meshes, mjvScene* scene) {
+  GeomAdder adder(meshes, scene);
+  for (const Decoration& decoration : decorations) std::visit(adder, decoration);
 }
 
 }  // namespace dexcheck

@@ -8,13 +8,38 @@
 #include <string>
 #include <vector>
 
+#include "controller/common/types.h"
 #include "renders/decoration.h"
-#include "renders/display_meshes.h"
 #include "renders/image.h"
 #include "renders/offscreen_context.h"
 #include "renders/viewpoint.h"
 
 namespace dexcheck {
+
+/// Shapes that MuJoCo's scenes lack, as OpenGL display lists. mjr_render draws a mesh by calling the list of
+/// its number, counted from the first mesh, so that such a shape is a geom of type mjGEOM_MESH with one of
+/// these numbers as its dataid. The context must be current in all calls.
+class DisplayMeshes {
+ public:
+  explicit DisplayMeshes(const mjrContext& context);
+  ~DisplayMeshes();
+  DisplayMeshes(const DisplayMeshes&) = delete;
+  DisplayMeshes& operator=(const DisplayMeshes&) = delete;
+
+  /// Shell of a cone about z that opens from the origin: height 1, radius 1 at its end.
+  [[nodiscard]] int cone() const { return ToMesh(cone_); }
+
+  /// A tube along a path. @param points at least two, m; @param radius m.
+  int AddTube(std::span<const Vector3d> points, double radius);
+  void ClearTubes();
+
+ private:
+  [[nodiscard]] int ToMesh(unsigned list) const;
+
+  const mjrContext& context_;
+  unsigned cone_;
+  std::vector<unsigned> tubes_;
+};
 
 /// A camera that stands still where RenderOptions::course says; an MJCF's camera of this name comes first.
 inline constexpr const char* kCourseCamera = "course";
@@ -97,5 +122,10 @@ class Renderer {
   std::optional<DisplayMeshes> meshes_;
   std::vector<std::uint8_t> pixels_;
 };
+
+/// Adds decorations to a scene.
+/// @param meshes gets the shapes that the engine does not have, which must outlive the drawing of the scene.
+/// @throws std::invalid_argument when the scene has no room for them.
+void AddDecorations(std::span<const Decoration> decorations, DisplayMeshes* meshes, mjvScene* scene);
 
 }  // namespace dexcheck

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "controller/common/types.h"
-#include "harness/base/check_summary.h"
+#include "harness/base/check_record.h"
 
 namespace dexcheck {
 

@@ -10,11 +10,11 @@
 #include "harness/base/process_pool.h"
 #include "harness/engine/engine.h"
 #include "renders/canvas.h"
-#include "renders/compose.h"
-#include "renders/course.h"
+#include "renders/image.h"
 #include "renders/overlay.h"
 #include "renders/renderer.h"
 #include "renders/run_decorations.h"
+#include "renders/viewpoint.h"
 
 namespace dexcheck {
 namespace {

@@ -1,13 +1,66 @@
 #include "renders/video_writer.h"
 
+#include <sys/socket.h>
+#include <unistd.h>
+
 #include <algorithm>
 #include <array>
+#include <cerrno>
+#include <cstring>
+#include <string>
 #include <vector>
 
 #include "controller/common/errors.h"
+#include "controller/common/text.h"
 #include "harness/base/files.h"
+#include "renders/cairo_surface.h"
 
 namespace dexcheck {
+
+Ffmpeg::Ffmpeg(const PartialFile& file, int width, int height, int fps,
+               const std::vector<std::string>& encoding)
+    : file_(file) {
+  int ends[2];
+  if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends) != 0) file_.Fail(std::strerror(errno));
+  input_ = FileDescriptor(ends[0]);
+  std::vector<std::string> words = {"ffmpeg", "-v", "error", "-f", "rawvideo", "-pix_fmt", "rgb24", "-s"};
+  words.push_back(std::to_string(width) + "x" + std::to_string(height));
+  words.insert(words.end(), {"-r", std::to_string(fps), "-i", "pipe:0"});
+  words.insert(words.end(), encoding.begin(), encoding.end());
+  // The same pictures give the same bytes.
+  words.insert(words.end(), {"-fflags", "+bitexact", "-flags:v", "+bitexact", "-map_metadata", "-1"});
+  words.insert(words.end(), {"-y", "file:" + file_.partial().string()});
+  process_.emplace("ffmpeg", Program{words, ends[1], messages_.descriptor(), messages_.descriptor()});
+  ::close(ends[1]);
+}
+
+Ffmpeg::~Ffmpeg() { CloseInput(); }
+
+void Ffmpeg::CloseInput() {
+  // Also of copies that processes forked meanwhile have.
+  if (input_.is_open()) ::shutdown(input_.get(), SHUT_RDWR);
+  input_.Close();
+}
+
+void Ffmpeg::Write(const Image& image) {
+  const std::string_view bytes(reinterpret_cast<const char*>(image.rgb.data()), image.rgb.size());
+  if (!Send(input_.get(), bytes)) Fail();
+}
+
+void Ffmpeg::Finish() {
+  CloseInput();
+  const ProcessEnd end = process_->Wait();
+  if (end.has_succeeded()) return;
+  std::string reason = messages_.ReadLastLine();
+  if (end.exit_code == kNotFoundExitCode) reason = "ffmpeg cannot be run (Debian's package ffmpeg has it)";
+  file_.Fail(end.signal != 0 ? end.Describe("") : reason.empty() ? "ffmpeg failed" : "ffmpeg: " + reason);
+}
+
+void Ffmpeg::Fail() {
+  Finish();
+  file_.Fail("ffmpeg ended too early");
+}
+
 namespace {
 
 /// By VideoFormat.
@@ -84,6 +137,57 @@ void VideoWriter::Finish() {
   if (frames_ == 0) file_.Fail("there are no frames");
   ffmpeg_.Finish();
   file_.Commit();
+}
+
+namespace {
+
+bool IsJpeg(const std::filesystem::path& path) {
+  const std::string extension = ExtensionOf(path);
+  return extension == ".jpg" || extension == ".jpeg";
+}
+
+std::string EncodePng(const Image& image, const PartialFile& file) {
+  const auto append = [](void* bytes, const unsigned char* data, unsigned count) {
+    static_cast<std::string*>(bytes)->append(reinterpret_cast<const char*>(data), count);
+    return CAIRO_STATUS_SUCCESS;
+  };
+  std::string bytes;
+  const cairo_status_t status = cairo_surface_write_to_png_stream(ToSurface(image).get(), append, &bytes);
+  if (status != CAIRO_STATUS_SUCCESS) file.Fail(cairo_status_to_string(status));
+  return bytes;
+}
+
+}  // namespace
+
+void RequirePictureName(const std::filesystem::path& path) {
+  if (ExtensionOf(path) == ".png" || IsJpeg(path)) return;
+  throw InputError(path.string() + ": cannot be written: a picture's name must end in .png, .jpg or .jpeg");
+}
+
+void WritePicture(const std::filesystem::path& path, const Image& image) {
+  RequirePictureName(path);
+  PartialFile file(path);
+  if (IsJpeg(path)) {
+    constexpr const char* kQuality = "2";  // 1 best, 31 worst
+    Ffmpeg ffmpeg(
+        file, image.width, image.height, 1,
+        {"-frames:v", "1", "-pix_fmt", "yuvj444p", "-q:v", kQuality, "-c:v", "mjpeg", "-f", "mjpeg"});
+    ffmpeg.Write(image);
+    ffmpeg.Finish();
+  } else {
+    file.Write(EncodePng(image, file));
+  }
+  file.Commit();
+}
+
+Image ReadPng(const std::filesystem::path& path) {
+  const SurfacePtr surface(cairo_image_surface_create_from_png(path.c_str()));
+  const cairo_status_t status = cairo_surface_status(surface.get());
+  if (status != CAIRO_STATUS_SUCCESS)
+    throw InputError(path.string() + ": cannot be read: " + cairo_status_to_string(status));
+  Image image(cairo_image_surface_get_width(surface.get()), cairo_image_surface_get_height(surface.get()));
+  CopySurface(surface.get(), &image);
+  return image;
 }
 
 }  // namespace dexcheck

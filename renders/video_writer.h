@@ -3,11 +3,39 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <vector>
 
-#include "renders/ffmpeg.h"
+#include "harness/base/child_process.h"
+#include "harness/base/files.h"
 #include "renders/image.h"
 
 namespace dexcheck {
+
+// The program ffmpeg, which encodes pictures and videos.
+
+/// Takes pictures and writes them into a file.
+class Ffmpeg {
+ public:
+  /// @param fps pictures a second. @param encoding ffmpeg's arguments between input and output.
+  /// @param file that is written; it must outlive this and is committed by the caller.
+  Ffmpeg(const PartialFile& file, int width, int height, int fps, const std::vector<std::string>& encoding);
+  ~Ffmpeg();
+  Ffmpeg(const Ffmpeg&) = delete;
+  Ffmpeg& operator=(const Ffmpeg&) = delete;
+
+  /// @throws InputError "PATH: cannot be written: reason"; as Finish.
+  void Write(const Image& image);
+  void Finish();
+
+ private:
+  [[noreturn]] void Fail();
+  void CloseInput();
+
+  const PartialFile& file_;
+  FileDescriptor input_;  // this end of what ffmpeg reads
+  MessageFile messages_;
+  std::optional<ChildProcess> process_;
+};
 
 struct EncodingOptions {
   int width = 1280;  ///< Even.
@@ -47,5 +75,15 @@ class VideoWriter {
   Ffmpeg ffmpeg_;
   long frames_ = 0;
 };
+
+/// @throws InputError unless the name ends in .png, .jpg or .jpeg, in small or capital letters.
+void RequirePictureName(const std::filesystem::path& path);
+
+/// Writes a PNG or a JPEG (4:4:4, quality about 95), as the name says. The file appears whole or not at all.
+/// @throws InputError "PATH: cannot be written: reason", or as RequirePictureName.
+void WritePicture(const std::filesystem::path& path, const Image& image);
+
+/// @throws InputError "PATH: cannot be read: reason".
+Image ReadPng(const std::filesystem::path& path);
 
 }  // namespace dexcheck

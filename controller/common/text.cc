@@ -72,4 +72,9 @@ std::string FindNearest(std::string_view word, const std::vector<std::string>& c
   return nearest;
 }
 
+std::string SuggestNearest(std::string_view word, const std::vector<std::string>& candidates) {
+  const std::string nearest = FindNearest(word, candidates);
+  return nearest.empty() ? "" : ", did you mean " + Quote(nearest) + "?";
+}
+
 }  // namespace dexcheck

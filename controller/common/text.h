@@ -2,8 +2,11 @@
 
 // Text for messages.
 
+#include <charconv>
+#include <optional>
 #include <string>
 #include <string_view>
+#include <system_error>
 #include <vector>
 
 namespace dexcheck {
@@ -33,5 +36,16 @@ std::string Quote(std::string_view text);
 /// The candidate closest to a misspelt word by edit distance; empty when none is close (a third of the
 /// letters).
 std::string FindNearest(std::string_view word, const std::vector<std::string>& candidates);
+/// ", did you mean "WORD"?" of that candidate; empty when none is close.
+std::string SuggestNearest(std::string_view word, const std::vector<std::string>& candidates);
+
+/// The number that the whole text is; none when it is not one, or does not fit.
+template <typename Number>
+std::optional<Number> ParseNumber(std::string_view text) {
+  Number number{};
+  const std::from_chars_result result = std::from_chars(text.data(), text.data() + text.size(), number);
+  const bool is_whole = result.ec == std::errc() && result.ptr == text.data() + text.size();
+  return is_whole ? std::optional(number) : std::nullopt;
+}
 
 }  // namespace dexcheck

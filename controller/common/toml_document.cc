@@ -13,7 +13,6 @@
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
-#include "controller/common/toml_overrides.h"
 #include "controller/common/toml_reader.h"
 
 namespace dexcheck {

@@ -61,4 +61,74 @@ Vector6d CalcFrameTwistOnFingertip(const ContactGeometry& contact, const Vector5
 /// Body twist V_o_cf^cf (6x1) of Sigma_cf relative to the object at kappa_dot (5x1).
 Vector6d CalcFrameTwistOnObject(const ContactGeometry& contact, const Vector5d& kappa_dot);
 
+// Hemispherical fingertips, as the paper has them: the chart of a sphere, and the rim where it ends.
+
+/// Length over a fingertip of this radius (m) from its point p (3x1, m, fingertip frame) to the rim of the
+/// hemisphere around `pole` (3x1, any length, same frame): rho (pi/2 - angle between p and the pole), m.
+/// Negative past the rim.
+double CalcRimDistance(double radius, const Vector3d& pole, const Vector3d& p);
+
+// Rolling contact (section 4.3 (c)): the rates of the contact coordinates, their integration, change of
+// charts.
+
+/// Rates kappa_dot (5x1, order of (39)) from the relative twist V = V_co_cf^cf (6x1, in Sigma_cf, m/s,
+/// rad/s): (40) with the spin omega_z and the slip v_x, v_y that print leaves out; v_z does not enter. Throws
+/// SingularityError when K_f + R_psi K_o R_psi is not positive definite: the surfaces then do not touch at an
+/// isolated point (two planes, or a fingertip flatter than the hollow it is in).
+Vector5d CalcKappaDot(const ContactGeometry& contact, const Vector6d& V);
+
+/// The same contact in well-conditioned charts: both alphas normalized (Surface::Normalize), psi turned with
+/// the Gauss frames when a chart changes, and in [-pi, pi].
+ContactCoordinates NormalizeContact(const Surface& fingertip, const Surface& object,
+                                    const ContactCoordinates& kappa);
+
+/// The same contact in given charts, psi turned with the Gauss frames. Throws std::invalid_argument for an
+/// unknown chart.
+ContactCoordinates ChangeCharts(const Surface& fingertip, const Surface& object,
+                                const ContactCoordinates& kappa, int fingertip_chart, int object_chart);
+
+/// kappa displaced by `change` (5x1, order of (39)) within its charts.
+ContactCoordinates Displace(const ContactCoordinates& kappa, const Vector5d& change);
+
+/// Integrates (40) over one step dt (s) from time t with the classical fourth-order Runge-Kutta method.
+/// `twist(t, contact)` returns V_co_cf^cf (6x1) at time t for the ContactGeometry given. The result is
+/// normalized. Throws what CalcKappaDot and CalcContactGeometry throw. FindContact removes the drift.
+template <typename TwistFunction>
+ContactCoordinates IntegrateKappa(const Surface& fingertip, const Surface& object,
+                                  const ContactCoordinates& kappa, double t, double dt,
+                                  const TwistFunction& twist) {
+  const auto rate = [&](double time, const ContactCoordinates& at) -> Vector5d {
+    const ContactGeometry contact = CalcContactGeometry(fingertip, object, at);
+    return CalcKappaDot(contact, twist(time, contact));
+  };
+  const Vector5d k1 = rate(t, kappa);
+  const Vector5d k2 = rate(t + dt / 2.0, Displace(kappa, dt / 2.0 * k1));
+  const Vector5d k3 = rate(t + dt / 2.0, Displace(kappa, dt / 2.0 * k2));
+  const Vector5d k4 = rate(t + dt, Displace(kappa, dt * k3));
+  const Vector5d change = dt / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4);
+  return NormalizeContact(fingertip, object, Displace(kappa, change));
+}
+
+// The contact of two posed bodies: the pair of points where the surfaces are closest (or overlap deepest).
+
+/// Misalignment of the normals (rad), and offset relative to the lengths involved, at which FindContact
+/// stops: a few hundred rounding errors.
+inline constexpr double kContactConvergence = 1e-13;
+
+/// Where two surfaces meet.
+struct FoundContact {
+  ContactCoordinates kappa;  ///< normalized
+  double gap = 0.0;          ///< m along the common normal; negative where the bodies overlap
+};
+
+/// Contact coordinates (39) of two bodies by geometry: the points whose normals oppose each other and whose
+/// connection is along them, found by Newton's method from `guess`. X_OF is the pose of the fingertip frame
+/// in the object frame. With the integrated kappa as the guess, this projects it back onto the constraint.
+/// Throws SingularityError, with the remaining misalignment in rad, when it finds no such pair.
+FoundContact FindContact(const Surface& fingertip, const Surface& object, const Pose& X_OF,
+                         const ContactCoordinates& guess);
+
+/// As above without a guess: starts at the object's point closest to the fingertip frame's origin.
+FoundContact FindContact(const Surface& fingertip, const Surface& object, const Pose& X_OF);
+
 }  // namespace dexcheck

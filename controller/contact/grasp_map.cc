@@ -4,6 +4,7 @@
 #include "controller/contact/adjoint.h"
 
 namespace dexcheck {
+
 namespace {
 
 void RequireGraspShape(std::span<const Contact> contacts, Eigen::Index columns) {
@@ -35,6 +36,53 @@ void CalcGraspMapDot(std::span<const Contact> contacts, Eigen::Ref<Matrix6Xd> G_
     G_dot.middleCols<3>(column) = rate.leftCols<3>();
     column += 3;
   }
+}
+
+namespace {
+
+using Matrix36 = Eigen::Matrix<double, 3, 6>;
+
+void RequireRowsShape(Eigen::Index columns, Eigen::Ref<MatrixXd> rows) {
+  Require(rows.rows() == 3, "rows of the contact Jacobian", "must be three", rows.rows());
+  Require(rows.cols() == columns, "columns of the contact Jacobian",
+          "must equal those of the fingertip Jacobian", rows.cols());
+}
+
+/// Calls visit(i) for the columns of each run, or for all columns when there are no runs.
+template <typename Visit>
+void ForEachColumn(std::span<const ColumnRun> columns, Eigen::Index all, const Visit& visit) {
+  const ColumnRun whole{0, all};
+  if (columns.empty()) columns = {&whole, 1};
+  for (const ColumnRun& run : columns) {
+    for (Eigen::Index i = run.begin; i < run.begin + run.count; ++i) visit(i);
+  }
+}
+
+}  // namespace
+
+void CalcContactJacobian(const Contact& contact, const Eigen::Ref<const Matrix6Xd>& J_f,
+                         Eigen::Ref<MatrixXd> rows, std::span<const ColumnRun> columns) {
+  RequireRowsShape(J_f.cols(), rows);
+  // B_c^T Ad_{g_cf_f} J_f
+  const Matrix36 A = CalcAdjointInverse(contact.geometry.g_f_cf).topRows<3>();
+  auto J = rows.topRows<3>();
+  ForEachColumn(columns, J_f.cols(), [&](Eigen::Index i) { J.col(i).noalias() = A * J_f.col(i); });
+}
+
+void CalcContactJacobianDot(const Contact& contact, const Eigen::Ref<const Matrix6Xd>& J_f,
+                            const Eigen::Ref<const Matrix6Xd>& J_f_dot, Eigen::Ref<MatrixXd> rows_dot,
+                            std::span<const ColumnRun> columns) {
+  RequireRowsShape(J_f.cols(), rows_dot);
+  Require(J_f_dot.cols() == J_f.cols(), "columns of J_f_dot", "must equal those of J_f", J_f_dot.cols());
+  // d/dt (Ad_{g_cf_f} J_f) = Ad_{g_cf_f} J_f_dot - ad_V Ad_{g_cf_f} J_f with V = V_f_cf^cf
+  const Matrix6d Ad = CalcAdjointInverse(contact.geometry.g_f_cf);
+  const Matrix6d Ad_dot =
+      -CalcTwistCross(CalcFrameTwistOnFingertip(contact.geometry, contact.kappa_dot)) * Ad;
+  const Matrix36 A = Ad.topRows<3>();
+  const Matrix36 A_dot = Ad_dot.topRows<3>();
+  auto J_dot = rows_dot.topRows<3>();
+  ForEachColumn(columns, J_f.cols(),
+                [&](Eigen::Index i) { J_dot.col(i).noalias() = A * J_f_dot.col(i) + A_dot * J_f.col(i); });
 }
 
 }  // namespace dexcheck

@@ -2,8 +2,8 @@
 
 #include <algorithm>
 
+#include "controller/common/block_cholesky.h"
 #include "controller/common/errors.h"
-#include "controller/common/gram_matrix.h"
 #include "controller/common/text.h"
 
 namespace dexcheck {

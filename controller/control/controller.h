@@ -5,9 +5,8 @@
 #include <string>
 
 #include "controller/common/types.h"
-#include "controller/control/desired_motion.h"
+#include "controller/control/grasp_model.h"
 #include "controller/control/joint_motion.h"
-#include "controller/control/measured_state.h"
 #include "controller/control/trajectory.h"
 
 namespace dexcheck {

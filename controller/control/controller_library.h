@@ -15,7 +15,7 @@
 
 #include "controller/control/controller.h"
 #include "controller/control/grasp_controller.h"
-#include "controller/control/joint_law.h"
+#include "controller/control/joint_controller.h"
 #include "controller/control/trajectory_controller.h"
 
 namespace dexcheck {

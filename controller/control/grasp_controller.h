@@ -11,7 +11,6 @@
 #include "controller/control/computed_torque.h"
 #include "controller/control/grasp_model.h"
 #include "controller/control/object_tracking.h"
-#include "controller/control/posture_task.h"
 #include "controller/grasp/grasp_force.h"
 
 namespace dexcheck {

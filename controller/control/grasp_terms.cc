@@ -4,7 +4,7 @@
 #include <stdexcept>
 
 #include "controller/common/errors.h"
-#include "controller/contact/rolling.h"
+#include "controller/contact/contact_geometry.h"
 #include "controller/object/euler_zyz.h"
 
 namespace dexcheck {

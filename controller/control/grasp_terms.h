@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "controller/common/types.h"
-#include "controller/contact/contact_jacobian.h"
 #include "controller/contact/grasp_map.h"
 #include "controller/contact/shapes.h"
 #include "controller/dynamics/model_terms.h"

@@ -1,12 +1,63 @@
 #pragma once
 
+#include "controller/common/types.h"
+#include "controller/control/actuation.h"
+#include "controller/control/baseline_law.h"
 #include "controller/control/controller.h"
 #include "controller/control/grasp_model.h"
-#include "controller/control/joint_law.h"
 #include "controller/control/joint_motion.h"
 #include "controller/control/trajectory_controller.h"
+#include "controller/dynamics/model_terms.h"
 
 namespace dexcheck {
+
+// Laws for the joints of a robot that holds nothing, on a fixed base. e = q_d - q, e_dot = q_d_dot - q_dot;
+// K_p, K_v, K and D are diagonal.
+//
+// kComputedTorque [Luh, Walker, Paul 1980; Craig 1989, 10.4], (18) inverted:
+//   tau' = M_bar' (q_d_ddot + K_v e_dot + K_p e) + C_bar' q_dot + F_bar'
+// so that e_ddot + K_v e_dot + K_p e = 0.
+//
+// kPdGravity [Takegaki, Arimoto 1981]: springs and dampers against the weight, nothing that moves is known.
+//   tau' = K e + D e_dot + g
+//
+// kFeedforwardPd [Paden, Panja 1988, "PD+"]: the same, and what the desired motion takes.
+//   tau' = M_bar' q_d_ddot + C_bar' q_d_dot + F_bar' + K e + D e_dot
+
+/// Gains of the joints, one entry for each.
+struct JointGains {
+  VectorXd K_p;  ///< 1/s^2: kComputedTorque.
+  VectorXd K_v;  ///< 1/s: kComputedTorque.
+  VectorXd K;    ///< N m/rad, N/m: the others.
+  VectorXd D;    ///< N m s/rad, N s/m: the others.
+};
+
+/// Whether the law is one for joints: kComputedTorque, kPdGravity, kFeedforwardPd.
+[[nodiscard]] bool IsJointLaw(ControlLaw law);
+
+/// One of them. Nothing allocates after construction.
+class JointLaw {
+ public:
+  /// @throws std::invalid_argument unless the base is fixed, the law is one for joints, and its gains have an
+  /// entry for each joint.
+  JointLaw(const RobotModel& model, ControlLaw law, const JointGains& gains);
+
+  /// tau' (n), N m or N. @param robot CalcDynamics done, reduced. @param q, xi the state that it is at.
+  const VectorXd& CalcTorque(const ModelTerms& robot, const Eigen::Ref<const VectorXd>& q,
+                             const Eigen::Ref<const VectorXd>& xi, const DesiredJoints& desired);
+
+  /// xi_dot that the last torques mean to have: of computed torque q_d_ddot + K_v e_dot + K_p e, of the
+  /// others q_d_ddot.
+  [[nodiscard]] const VectorXd& xi_dot_d() const { return xi_dot_d_; }
+  [[nodiscard]] ControlLaw law() const { return law_; }
+  [[nodiscard]] const JointGains& gains() const { return gains_; }
+
+ private:
+  ControlLaw law_;
+  JointGains gains_;
+  ActuationMap actuation_;
+  VectorXd xi_dot_d_, force_, tau_;  // n
+};
 
 /// What a motion of joints demands of a controller: the start until Begin, then q_d(t).
 class JointDemand {

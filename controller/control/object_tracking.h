@@ -4,8 +4,8 @@
 // E_ddot + K_v E_dot + K_p E = 0.
 
 #include "controller/common/types.h"
-#include "controller/control/desired_motion.h"
 #include "controller/control/grasp_terms.h"
+#include "controller/control/trajectory.h"
 
 namespace dexcheck {
 

@@ -6,8 +6,8 @@
 #include <numeric>
 #include <utility>
 
+#include "controller/common/block_cholesky.h"
 #include "controller/common/errors.h"
-#include "controller/common/gram_matrix.h"
 #include "controller/common/text.h"
 
 namespace dexcheck {

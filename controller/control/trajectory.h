@@ -3,13 +3,33 @@
 // Desired trajectories X_d(t) of the object for (55). Every trajectory starts at X_start (6: m, rad) at t = 0
 // and may be evaluated at any t; before 0 it continues as its formula says. Evaluation does not allocate.
 
+#include <functional>
 #include <memory>
 #include <vector>
 
+#include "controller/common/toml_reader.h"
 #include "controller/common/types.h"
-#include "controller/control/desired_motion.h"
 
 namespace dexcheck {
+
+// What the object should do at one instant: in X_o, as the paper has it, and as a pose.
+
+/// X_d of (55) and its derivatives: [position in the world, m; ZYZ angles, rad].
+struct DesiredMotion {
+  Vector6d X_d = Vector6d::Zero();
+  Vector6d X_d_dot = Vector6d::Zero();
+  Vector6d X_d_ddot = Vector6d::Zero();
+};
+
+/// The same without angles: of the desired frame d against the world B.
+struct DesiredPose {
+  Vector3d p_Bd, p_Bd_dot, p_Bd_ddot;  ///< m, m/s, m/s^2, in the world.
+  Matrix3d R_Bd;
+  Vector3d omega_d, omega_d_dot;  ///< Body angular velocity and acceleration, axes of d, rad/s, rad/s^2.
+};
+
+/// The pose that X_d means; regular at every X_d.
+DesiredPose CalcDesiredPose(const DesiredMotion& desired);
 
 /// A function of time and its first two derivatives.
 struct ScalarMotion {
@@ -94,5 +114,24 @@ std::unique_ptr<Trajectory> MakeWayPointTrajectory(const Vector6d& X_start,
 /// @param parts each with X_start = 0. @throws std::invalid_argument without parts.
 std::unique_ptr<Trajectory> MakeSumTrajectory(const Vector6d& X_start,
                                               std::vector<std::unique_ptr<Trajectory>> parts);
+
+/// Makes a trajectory that starts at X_start.
+using TrajectoryMaker = std::function<std::unique_ptr<Trajectory>(const Vector6d& X_start)>;
+
+/// Reads a trajectory from a table; where it starts is not in it. Keys by `type`; SI units, angles also as
+/// KEY_deg:
+///
+///   line            velocity = [3], turning = [3] (rates of the ZYZ angles), ramp_time
+///   point_to_point  xyz = [3], zyz = [3], duration
+///   oscillation     xyz = [3], zyz = [3], frequency, ramp_time
+///   weave           heading, speed, ramp_time, amplitude, wavelength
+///   circle          heading, speed, ramp_time, radius
+///   way_points      points = [{ time, xyz = [3], zyz = [3] }, ..]
+///   sum             parts = [{ type, .. }, ..], whose displacements add
+///
+/// xyz and zyz are displacements or amplitudes against X_start. Optional: velocity, turning, xyz, zyz,
+/// heading and ramp_time, 0 unless given.
+/// @throws InputError, one line that names file, line, key and value.
+TrajectoryMaker ReadTrajectory(TomlTable& table);
 
 }  // namespace dexcheck

@@ -37,4 +37,34 @@ FingerPlacement SolveFingerPlacement(const RobotModel& model, std::span<const in
                                      const Eigen::Ref<const VectorXd>& q,
                                      const FingerPlacementOptions& options = {});
 
+// Inverse kinematics of an arm: joints that bring a frame of the robot to a pose.
+
+struct FramePlacementOptions {
+  double tolerance = 1e-13;   ///< Largest distance, m, and largest angle, rad, from the pose.
+  int max_iterations = 100;   ///< From each start.
+  int num_starts = 64;        ///< q itself, q_nominal, then postures spread over the ranges; at least 1.
+  double joint_margin = 0.0;  ///< Distance that the joints keep from the ends of their ranges, rad or m.
+  double length = 0.2;        ///< While searching, an error of one radian counts as this many m.
+};
+
+struct FramePlacement {
+  VectorXd q;                         ///< q' with `joints` solved, the others as given.
+  double position_residual = 0.0;     ///< Distance of the frame's origin from its place, m.
+  double orientation_residual = 0.0;  ///< Angle between the frame and its pose, rad.
+  double joint_margin = 0.0;          ///< Smallest distance of one of the joints from the ends of its range.
+  bool reached = false;               ///< Within the tolerance and the joint margin.
+};
+
+/// Moves some joints until a frame of the model is at a pose, six equations. With more joints than needed the
+/// posture is pulled towards q_nominal. Of the starts the first that arrives counts, so that the posture
+/// nearest to `q` is preferred; when none does, the nearest miss is returned. Deterministic.
+/// @param frame of the model. @param X_BF where it should be, in the world. @param joints on the chain from
+/// the base to the frame. @param q q' to start from. @param q_nominal q' to stay near to.
+/// @throws std::invalid_argument when a joint does not move the frame, a size differs, X_BF is no pose, or
+/// the margin leaves a joint no range.
+FramePlacement SolveFramePlacement(const RobotModel& model, int frame, const Pose& X_BF,
+                                   std::span<const int> joints, const Eigen::Ref<const VectorXd>& q,
+                                   const Eigen::Ref<const VectorXd>& q_nominal,
+                                   const FramePlacementOptions& options = {});
+
 }  // namespace dexcheck

@@ -7,7 +7,7 @@
 #include <stdexcept>
 
 #include "controller/common/errors.h"
-#include "controller/contact/fingertip_rim.h"
+#include "controller/contact/contact_geometry.h"
 
 namespace dexcheck::grasp_internal {
 namespace {

@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "controller/control/computed_torque.h"
 #include "controller/control/controller.h"
-#include "controller/control/posture_task.h"
 #include "controller/control/trajectory.h"
 #include "controller/handling/handling_controller.h"
 #include "controller/handling/pick_plan.h"

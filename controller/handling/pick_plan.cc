@@ -7,7 +7,7 @@
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
 #include "controller/dynamics/model_terms.h"
-#include "controller/grasp/frame_placement.h"
+#include "controller/grasp/finger_placement.h"
 
 namespace dexcheck {
 namespace {

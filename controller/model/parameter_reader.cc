@@ -6,7 +6,6 @@
 #include "controller/common/toml_reader.h"
 #include "controller/model/body_reader.h"
 #include "controller/model/segment_reader.h"
-#include "controller/model/tree_reader.h"
 
 namespace dexcheck {
 namespace {

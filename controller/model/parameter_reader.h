@@ -6,10 +6,17 @@
 #include <string_view>
 #include <vector>
 
+#include "controller/common/types.h"
 #include "controller/model/robot_model.h"
-#include "controller/model/written_row.h"
 
 namespace dexcheck {
+
+/// How a joint's row stands in its parameter file, as far as the specification does not say it.
+struct WrittenRow {
+  /// The link's own frame L, in which the file gives its mass and what hangs on it, in frame i.
+  Pose X_iL = Pose::Identity();
+  bool is_plain = false;  ///< A plain transform (xyz, rpy, axis), not Denavit-Hartenberg parameters.
+};
 
 class TomlDocument;
 

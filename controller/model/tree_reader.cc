@@ -1,5 +1,3 @@
-#include "controller/model/tree_reader.h"
-
 #include <map>
 #include <set>
 #include <string>

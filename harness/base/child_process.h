@@ -14,7 +14,7 @@
 #include <string_view>
 #include <vector>
 
-#include "harness/base/file_descriptor.h"
+#include "harness/base/files.h"
 
 namespace dexcheck {
 

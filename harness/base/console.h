@@ -17,4 +17,7 @@ void Warn(const std::string& text);
 /// Writes what was printed. @throws InputError "standard output: cannot be written: reason".
 void FlushOutput();
 
+/// The text as one word of a POSIX shell: in single quotes, unless it needs none.
+std::string QuoteForShell(const std::string& text);
+
 }  // namespace dexcheck

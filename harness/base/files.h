@@ -2,14 +2,48 @@
 
 // Files as bytes, and folders for a while.
 
+#include <sys/types.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstddef>
 #include <filesystem>
 #include <optional>
 #include <string>
 #include <string_view>
-
-#include "harness/base/temporary_path.h"
+#include <utility>
 
 namespace dexcheck {
+
+// What must not outlive the program when a signal ends it: files and folders under construction, and the
+// processes that write them.
+
+/// While it lives, the file or folder of this name is removed when a signal ends the program; otherwise its
+/// owner removes or renames it. Only this process removes it, no child that it forks.
+class TemporaryPath {
+ public:
+  /// @param path with all that is in it, when it is a folder. A path too long for the system, or one more
+  /// than the program's table holds, is not protected.
+  explicit TemporaryPath(const std::filesystem::path& path);
+  ~TemporaryPath();
+  TemporaryPath(const TemporaryPath&) = delete;
+  TemporaryPath& operator=(const TemporaryPath&) = delete;
+
+ private:
+  size_t slot_;
+};
+
+/// While it lives, this child is killed before the temporary paths are removed. One at a time.
+class TemporaryChild {
+ public:
+  explicit TemporaryChild(pid_t child);
+  ~TemporaryChild();
+  TemporaryChild(const TemporaryChild&) = delete;
+  TemporaryChild& operator=(const TemporaryChild&) = delete;
+};
+
+/// Ends the child and removes the paths. Calls only what a signal's handler may call.
+void RemoveTemporaryPaths();
 
 /// @throws InputError "PATH: cannot be read: reason".
 std::string ReadBytes(const std::filesystem::path& path);
@@ -34,6 +68,61 @@ class TemporaryFolder {
  private:
   std::filesystem::path path_;
   std::optional<TemporaryPath> protection_;
+};
+
+/// A file that is written under a temporary name beside its target and takes the target's name when it is
+/// complete. Destroyed before that, it leaves nothing behind; nor does a signal that ends the program.
+class PartialFile {
+ public:
+  /// Creates the temporary file, so that a bad path is known before long work starts.
+  /// @throws InputError "PATH: cannot be written: reason".
+  explicit PartialFile(const std::filesystem::path& target);
+  ~PartialFile();
+  PartialFile(const PartialFile&) = delete;
+  PartialFile& operator=(const PartialFile&) = delete;
+
+  /// Where to write.
+  [[nodiscard]] const std::filesystem::path& partial() const { return partial_; }
+
+  /// Puts these bytes into it, in the place of what was there. @throws InputError as the constructor.
+  void Write(std::string_view bytes) const;
+
+  /// Gives the file its name. @throws InputError as the constructor.
+  void Commit();
+  /// Removes the temporary file.
+  void Abort();
+
+  /// @throws InputError "PATH: cannot be written: reason".
+  [[noreturn]] void Fail(const std::string& reason) const;
+
+ private:
+  std::filesystem::path path_;     // as given, for messages
+  std::filesystem::path target_;   // links followed
+  std::filesystem::path partial_;  // empty once committed or removed
+  std::optional<TemporaryPath> protection_;
+};
+
+/// An owned file descriptor.
+class FileDescriptor {
+ public:
+  explicit FileDescriptor(int descriptor = -1) : descriptor_(descriptor) {}
+  ~FileDescriptor() { Close(); }
+  FileDescriptor(FileDescriptor&& other) noexcept : descriptor_(std::exchange(other.descriptor_, -1)) {}
+  FileDescriptor& operator=(FileDescriptor&& other) noexcept {
+    std::swap(descriptor_, other.descriptor_);
+    return *this;
+  }
+
+  [[nodiscard]] int get() const { return descriptor_; }
+  [[nodiscard]] bool is_open() const { return descriptor_ >= 0; }
+  /// 0, or the system's error number.
+  int Close() {
+    if (!is_open()) return 0;
+    return ::close(std::exchange(descriptor_, -1)) == 0 ? 0 : errno;
+  }
+
+ private:
+  int descriptor_;
 };
 
 }  // namespace dexcheck

@@ -5,7 +5,7 @@ if(git AND EXISTS ${SOURCE}/.git)
   execute_process(COMMAND ${git} -C ${SOURCE} describe --always --dirty --abbrev=12 --exclude=*
     OUTPUT_VARIABLE revision OUTPUT_STRIP_TRAILING_WHITESPACE ERROR_QUIET)
 endif()
-file(CONFIGURE OUTPUT ${OUT} CONTENT [[#include "harness/base/git_revision.h"
+file(CONFIGURE OUTPUT ${OUT} CONTENT [[#include "harness/base/version.h"
 
 namespace dexcheck {
 const char* const kGitRevision = "@revision@";

@@ -7,7 +7,7 @@
 #include <csignal>
 #include <string_view>
 
-#include "harness/base/temporary_path.h"
+#include "harness/base/files.h"
 
 namespace dexcheck {
 namespace {

@@ -9,7 +9,7 @@
 
 #include "controller/common/types.h"
 #include "controller/control/baseline_law.h"
-#include "controller/control/desired_motion.h"
+#include "controller/control/trajectory.h"
 #include "harness/checks/law_reference.h"
 
 namespace dexcheck {

@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "controller/common/errors.h"
-#include "controller/contact/object_surface.h"
+#include "controller/contact/shapes.h"
 #include "harness/checks/contact_terms.h"
 
 namespace dexcheck {

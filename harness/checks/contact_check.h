@@ -6,9 +6,8 @@
 #include <memory>
 #include <vector>
 
-#include "controller/contact/contact_jacobian.h"
+#include "controller/contact/contact_geometry.h"
 #include "controller/contact/grasp_map.h"
-#include "controller/contact/rolling.h"
 #include "controller/contact/shapes.h"
 #include "harness/checks/term_comparison.h"
 #include "harness/descriptions/engine_provider.h"

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "controller/contact/rolling.h"
+#include "controller/contact/contact_geometry.h"
 
 namespace dexcheck {
 

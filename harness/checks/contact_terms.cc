@@ -3,8 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "controller/contact/find_contact.h"
-#include "controller/contact/rolling.h"
+#include "controller/contact/contact_geometry.h"
 
 namespace dexcheck {
 namespace {

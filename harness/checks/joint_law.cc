@@ -1,7 +1,5 @@
 // The law of a robot that holds nothing and follows a motion of its joints.
 
-#include "controller/control/joint_law.h"
-
 #include "controller/control/joint_controller.h"
 #include "controller/control/joint_motion.h"
 #include "harness/checks/judged_law.h"

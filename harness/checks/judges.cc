@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "controller/common/text.h"
-#include "controller/contact/fingertip_rim.h"
+#include "controller/contact/contact_geometry.h"
 
 namespace dexcheck {
 namespace {

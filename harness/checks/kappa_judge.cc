@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "controller/contact/rolling.h"
+#include "controller/contact/contact_geometry.h"
 #include "harness/checks/contact_drift.h"
 #include "harness/checks/judges.h"
 

@@ -20,10 +20,9 @@
 
 #include "controller/common/types.h"
 #include "controller/control/computed_torque.h"
-#include "controller/control/desired_motion.h"
 #include "controller/control/grasp_controller.h"
 #include "controller/control/object_tracking.h"
-#include "controller/control/posture_task.h"
+#include "controller/control/trajectory.h"
 
 namespace dexcheck {
 

@@ -13,7 +13,7 @@
 
 #include "controller/control/actuation.h"
 #include "controller/control/constrained_dynamics.h"
-#include "controller/handling/partial_grasp.h"
+#include "controller/handling/handling_controller.h"
 #include "harness/checks/contact_compliance.h"
 #include "harness/checks/declared_plant.h"
 #include "harness/checks/step_record.h"

@@ -9,7 +9,7 @@
 #include "controller/control/grasp_model.h"
 #include "harness/checks/contact_drift.h"
 #include "harness/plant/motor_drive.h"
-#include "harness/plant/plant_reading.h"
+#include "harness/plant/plant.h"
 
 namespace dexcheck {
 

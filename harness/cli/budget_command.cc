@@ -9,7 +9,6 @@
 #include "harness/base/interrupts.h"
 #include "harness/cli/commands.h"
 #include "harness/cli/output_file.h"
-#include "harness/cli/progress_bar.h"
 #include "harness/cli/run_folder.h"
 #include "harness/cli/terminal.h"
 #include "harness/study/study_page.h"
@@ -49,12 +48,8 @@ void Print(const ErrorBudget& budget) {
 int Run(const BudgetRequest& request) {
   const ScenarioFiles files = FindScenario(request.scenario, request.overrides.List(), request.seed);
   CatchInterrupts();
-  std::optional<OutputFile> json, page;
-  if (!request.json_file.empty()) json.emplace(request.json_file);
-  if (!request.page.empty()) {
-    RequirePageName(request.page);
-    page.emplace(request.page);
-  }
+  RequirePageName(request.page);
+  ResultFile json(request.json_file), page(request.page);
   std::unique_ptr<ProgressBar> bar;
   const auto progress = [&](long done, long total) {
     if (!bar) bar = std::make_unique<ProgressBar>("running", total, request.quiet);
@@ -64,10 +59,9 @@ int Run(const BudgetRequest& request) {
   const ErrorBudget budget =
       CalcErrorBudget(files.scenario, files.robot, files.mjcf, CountJobs(request.jobs), progress);
   if (bar) bar->Finish();
-  if (json) json->Write(ToJson(budget).dump(2) + "\n");
-  if (page) page->Write(MakeBudgetPage(budget));
-  const bool to_stdout = request.json_file == "-" || request.page == "-";
-  if (!to_stdout) {
+  json.Write([&] { return ToJson(budget).dump(2) + "\n"; });
+  page.Write([&] { return MakeBudgetPage(budget); });
+  if (!json.TakesStdout() && !page.TakesStdout()) {
     if (!request.quiet) Print(budget);
     if (budget.is_complete()) {
       fmt::print("{} sources: their errors add up to {:.2e} {}, all together make {:.2e} {}.\n",
@@ -88,7 +82,7 @@ void AddBudgetCommand(Command app) {
       "budget", "Which part of a plant that is not ideal costs the accuracy: each alone, all but each, all");
   AddScenarioOptions(command, request.get());
   AddSeedOption(command, &request->seed, "Seed of all that is random");
-  command.AddOption("--page", &request->page, "Write table and bar chart as a page").TypeName("FILE.html");
+  command.AddOption("--page FILE.html", &request->page, "Write table and bar chart as a page");
   AddJobsOption(command, "Runs", &request->jobs);
   AddResultOptions(command, "the budget", request.get());
   command.SetAction([=] { return Run(*request); });

@@ -11,7 +11,7 @@
 
 #include "harness/cli/command_line.h"
 #include "harness/cli/json_matrix.h"
-#include "harness/cli/progress_bar.h"
+#include "harness/cli/terminal.h"
 #include "harness/diagnosis/mutation.h"
 
 namespace dexcheck::cli {

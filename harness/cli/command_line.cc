@@ -1,12 +1,9 @@
 #include "harness/cli/command_line.h"
 
 #include <CLI/CLI.hpp>
-#include <charconv>
 #include <cmath>
 #include <cstdio>
-#include <limits>
 #include <sstream>
-#include <system_error>
 
 #include "controller/common/text.h"
 #include "harness/base/console.h"
@@ -16,37 +13,23 @@ namespace dexcheck::cli {
 
 ValueCheck WholeNumber(std::uint64_t least, std::uint64_t most) {
   return [least, most](const std::string& text) -> std::string {
-    std::uint64_t value = 0;
-    const char* const end = text.data() + text.size();
-    const std::from_chars_result result = std::from_chars(text.data(), end, value);
-    if (result.ec == std::errc() && result.ptr == end && least <= value && value <= most) return {};
+    const auto value = ParseNumber<std::uint64_t>(text);
+    if (value && least <= *value && *value <= most) return {};
     return "must be a whole number from " + std::to_string(least) + " to " + std::to_string(most) + ", got " +
            Quote(text);
   };
 }
 
-namespace {
-
-/// The number that the whole text is; not finite when it is none.
-double ReadNumber(const std::string& text) {
-  double value = 0.0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  const bool is_number = error == std::errc() && end == text.data() + text.size();
-  return is_number ? value : std::numeric_limits<double>::quiet_NaN();
-}
-
-}  // namespace
-
 ValueCheck PositiveNumber(const std::string& demand) {
   return [demand](const std::string& text) {
-    const double value = ReadNumber(text);
+    const double value = ParseNumber<double>(text).value_or(std::nan(""));
     return std::isfinite(value) && value > 0.0 ? std::string() : demand + ", got " + Quote(text);
   };
 }
 
 ValueCheck NumberFrom(double least, double most) {
   return [least, most](const std::string& text) {
-    const double value = ReadNumber(text);
+    const double value = ParseNumber<double>(text).value_or(std::nan(""));
     if (least <= value && value <= most) return std::string();
     return "must be a number from " + FormatNumber(least) + " to " + FormatNumber(most) + ", got " +
            Quote(text);
@@ -55,7 +38,7 @@ ValueCheck NumberFrom(double least, double most) {
 
 ValueCheck Fraction() {
   return [](const std::string& text) {
-    const double value = ReadNumber(text);
+    const double value = ParseNumber<double>(text).value_or(std::nan(""));
     if (0.0 < value && value < 1.0) return std::string();
     return "must be a number above 0 and below 1, got " + Quote(text);
   };
@@ -113,7 +96,9 @@ Option& Option::ShowDefault() {
 
 template <typename Value>
 Option Command::AddOption(const std::string& name, Value* value, const std::string& help) {
-  return Option(app_->add_option(name, *value, help));
+  const size_t blank = name.find(' ');
+  Option option(app_->add_option(name.substr(0, blank), *value, help));
+  return blank == std::string::npos ? option : option.TypeName(name.substr(blank + 1));
 }
 
 Option Command::AddFlag(const std::string& name, bool* value, const std::string& help) {
@@ -275,10 +260,8 @@ std::string CommandLine::Explain(const std::string& what) const {
       known.push_back(command->get_name());
     }
   }
-  const std::string nearest = FindNearest(word, known);
   const std::string kind = is_option ? "option" : known.empty() ? "argument" : "command";
-  return "unknown " + kind + " " + Quote(word) +
-         (nearest.empty() ? "" : ", did you mean " + Quote(nearest) + "?");
+  return "unknown " + kind + " " + Quote(word) + SuggestNearest(word, known);
 }
 
 template Option Command::AddOption(const std::string&, std::string*, const std::string&);

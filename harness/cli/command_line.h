@@ -76,9 +76,10 @@ class Option {
 /// A command with its options, or the program with its commands. A handle: copies are the same command.
 class Command {
  public:
-  /// @param name of an option with its dashes, of a positional argument without. @param value lives as long
-  /// as the command; what it holds is the default.
-  /// Its type is one of those at the end of command_line.cc: texts, paths, numbers and lists of them.
+  /// @param name of an option with its dashes and, as the help shows it, the name of its value, "--out DIR";
+  /// of a positional argument its name alone. @param value lives as long as the command; what it holds is the
+  /// default. Its type is one of those at the end of command_line.cc: texts, paths, numbers and lists of
+  /// them.
   template <typename Value>
   Option AddOption(const std::string& name, Value* value, const std::string& help);
   Option AddFlag(const std::string& name, bool* value, const std::string& help);

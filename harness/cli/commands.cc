@@ -5,47 +5,45 @@
 #include "controller/common/text.h"
 #include "harness/base/process_pool.h"
 #include "harness/checks/consistency.h"
-#include "harness/cli/shipped_files.h"
+#include "harness/cli/run_folder.h"
 
 namespace dexcheck::cli {
 
 Option AddRobotOptions(Command command, RobotFiles* files) {
   files->robot = FindShippedFile("controller/parameters/assistant_robot.toml");
   files->mjcf = FindShippedFile("mjcf/scene.xml");
-  Option robot = command.AddOption("--robot", &files->robot, "Parameter file (TOML) of the analytic model")
-                     .TypeName("FILE.toml");
-  Option mjcf =
-      command.AddOption("--mjcf", &files->mjcf, "The same robot for the engine").TypeName("FILE.xml");
+  Option robot =
+      command.AddOption("--robot FILE.toml", &files->robot, "Parameter file (TOML) of the analytic model");
+  Option mjcf = command.AddOption("--mjcf FILE.xml", &files->mjcf, "The same robot for the engine");
   robot.Needs(mjcf);
   mjcf.Needs(robot);
   return robot;
 }
 
 Option AddJsonOption(Command command, const std::string& what, std::string* file) {
-  return command
-      .AddOption("--json", file,
-                 "Write " + what + " to this file; without one, or with -, print them and nothing else")
-      .TypeName("[FILE.json]");
+  return command.AddOption(
+      "--json [FILE.json]", file,
+      "Write " + what + " to this file; without one, or with -, print them and nothing else");
 }
 
 Option AddJUnitOption(Command command, std::string* file) {
-  return command.AddOption("--junit", file, "Write each check as a test case of JUnit's XML to this file")
-      .TypeName("FILE.xml");
+  return command.AddOption("--junit FILE.xml", file,
+                           "Write each check as a test case of JUnit's XML to this file");
 }
 
 Option AddIgnoreOption(Command command, std::vector<std::string>* ignore) {
   return command
       .AddOption(
-          "--ignore", ignore,
+          "--ignore WORD,...", ignore,
           "Constants of joints in which the two may differ: armature, damping, friction, coupling to others")
-      .TypeName("WORD,...")
       .Delimiter(',')
       .OneOf({kIgnorable[0], kIgnorable[1], kIgnorable[2], kIgnorable[3]});
 }
 
 void AddUrdfOptions(Command command, UrdfOptions* options) {
-  command.AddOption("--package", &options->packages, "Folder of a URDF's packages; its meshes are looked for")
-      .TypeName("PATH")
+  command
+      .AddOption("--package PATH", &options->packages,
+                 "Folder of a URDF's packages; its meshes are looked for")
       .Repeatable();
   command.AddFlag("--floating", &options->floating, "The root of a URDF floats");
 }
@@ -63,14 +61,13 @@ std::array<Option, 2> AddOverrideOptions(Command command, Overrides* overrides) 
   };
   const Option set =
       command
-          .AddOption("--set", &overrides->set,
+          .AddOption("--set KEY=VALUE", &overrides->set,
                      "Set a key of the scenario, or with model. before it one of the parameter file")
-          .TypeName("KEY=VALUE")
           .Repeatable();
-  const Option unset = command.AddOption("--unset", &overrides->unset, "Remove such a key, before any is set")
-                           .TypeName("KEY")
-                           .Check(is_key)
-                           .Repeatable();
+  const Option unset =
+      command.AddOption("--unset KEY", &overrides->unset, "Remove such a key, before any is set")
+          .Check(is_key)
+          .Repeatable();
   return {set, unset};
 }
 
@@ -85,16 +82,14 @@ void AddResultOptions(Command command, const std::string& what, ScenarioRequest*
 }
 
 Option AddJobsOption(Command command, const std::string& what, std::uint64_t* jobs) {
-  return command.AddOption("--jobs", jobs, what + " at a time (all processors by default)")
-      .TypeName("N")
+  return command.AddOption("--jobs N", jobs, what + " at a time (all processors by default)")
       .Check(WholeNumber(1, 1000000));
 }
 
 int CountJobs(std::uint64_t jobs) { return jobs > 0 ? static_cast<int>(jobs) : CountProcessors(); }
 
 Option AddSeedOption(Command command, std::uint64_t* seed, const std::string& help) {
-  return command.AddOption("--seed", seed, help)
-      .TypeName("N")
+  return command.AddOption("--seed N", seed, help)
       .Check(WholeNumber(0, std::numeric_limits<std::uint64_t>::max()));
 }
 

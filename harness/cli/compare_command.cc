@@ -14,9 +14,9 @@
 #include "harness/cli/make_video.h"
 #include "harness/cli/output_file.h"
 #include "harness/cli/terminal.h"
-#include "harness/report/comparison_page.h"
-#include "harness/report/page_text.h"
+#include "harness/report/page_frame.h"
 #include "harness/report/recorded_frames.h"
+#include "harness/report/run_comparison.h"
 #include "renders/video_writer.h"
 
 namespace dexcheck::cli {
@@ -141,15 +141,10 @@ int Run(const CompareRequest& request) {
     runs.push_back(std::make_unique<RunData>(folder));
     pointers.push_back(runs.back().get());
   }
-  std::optional<OutputFile> page;
-  std::optional<OutputFile> json;
-  if (!request.page.empty()) {
-    RequirePageName(request.page);
-    page.emplace(request.page);
-  }
-  if (!request.json.empty()) json.emplace(request.json);
+  RequirePageName(request.page);
+  ResultFile json(request.json), page(request.page);
   const RunComparison comparison = CompareRuns(pointers, request.options);
-  const bool prints = !json || !json->is_stdout();
+  const bool prints = !json.TakesStdout();
   if (!request.video.empty()) {
     VideoOptions options;
     options.ghost = true;
@@ -164,11 +159,9 @@ int Run(const CompareRequest& request) {
   if (prints)
     fmt::print("{}{}\n", request.quiet ? "" : "\n",
                DescribeComparison(comparison, request.options.tolerance));
-  if (json) json->Write(ToJson(request, comparison).dump(1) + "\n");
-  if (page) {
-    page->Write(MakeComparisonPage(pointers, request.run_folders, comparison));
-    if (prints && !request.quiet) fmt::print("page: {}\n", request.page);
-  }
+  json.Write([&] { return ToJson(request, comparison).dump(1) + "\n"; });
+  page.Write([&] { return MakeComparisonPage(pointers, request.run_folders, comparison); });
+  if (!request.page.empty() && prints && !request.quiet) fmt::print("page: {}\n", request.page);
   if (!request.tolerance || comparison.IsSame()) return kSuccess;
   if (comparison.signals.empty()) throw InputError("--tolerance: no signal was compared");
   return kDisagreement;
@@ -184,23 +177,18 @@ void AddCompareCommand(Command app) {
                  "Folders of runs; the first is what the others are compared with")
       .Required()
       .TypeName("RUN_DIR...");
+  command.AddOption(
+      "--tolerance REL", &request->tolerance,
+      "Exit with 1 when a signal differs by more than this fraction of its size, or a verdict differs");
   command
-      .AddOption(
-          "--tolerance", &request->tolerance,
-          "Exit with 1 when a signal differs by more than this fraction of its size, or a verdict differs")
-      .TypeName("REL");
-  command
-      .AddOption("--signals", &request->options.patterns,
+      .AddOption("--signals A,B,...", &request->options.patterns,
                  "Only these signals; * stands for any text: object/*,tau")
-      .TypeName("A,B,...")
       .Delimiter(',')
       .Repeatable();
-  command.AddOption("--out", &request->page, "Write a page with the signals overlaid and subtracted")
-      .TypeName("FILE.html");
-  command
-      .AddOption("--video", &request->video,
-                 "Draw both runs in one scene, the second as a ghost (.mp4, .webm or .gif)")
-      .TypeName("FILE");
+  command.AddOption("--out FILE.html", &request->page,
+                    "Write a page with the signals overlaid and subtracted");
+  command.AddOption("--video FILE", &request->video,
+                    "Draw both runs in one scene, the second as a ghost (.mp4, .webm or .gif)");
   AddJsonOption(command, "the numbers", &request->json);
   command.AddFlag("--all", &request->all, "Print all checks and signals");
   command.AddFlag("--quiet", &request->quiet, "Print the last line only");

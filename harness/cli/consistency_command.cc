@@ -11,7 +11,7 @@
 #include "harness/cli/commands.h"
 #include "harness/cli/consistency_report.h"
 #include "harness/cli/output_file.h"
-#include "harness/cli/progress_bar.h"
+#include "harness/cli/terminal.h"
 
 namespace dexcheck::cli {
 namespace {
@@ -70,22 +70,17 @@ void AddConsistencyCommand(Command app) {
                  "One of two descriptions of a robot, instead of --robot and --mjcf: parameter file (TOML), "
                  "URDF or MJCF",
                  "The other one", request.get());
-  const Option program =
-      command
-          .AddOption(
-              "--program", &request->source.program,
-              "Command of a program that provides terms, instead of B (harness/descriptions/README.md)")
-          .TypeName("CMD");
+  const Option program = command.AddOption(
+      "--program CMD", &request->source.program,
+      "Command of a program that provides terms, instead of B (harness/descriptions/README.md)");
   command
       .AddOption(
-          "--answers", &request->source.answers,
+          "--answers FOLDER", &request->source.answers,
           "Folder with states as dexcheck states writes them and NumPy arrays of results, instead of B")
-      .TypeName("FOLDER")
       .Excludes(program);
   command
-      .AddOption("--time-limit", &request->source.program_options.seconds,
+      .AddOption("--time-limit S", &request->source.program_options.seconds,
                  "For each result of the program, s")
-      .TypeName("S")
       .Check(PositiveNumber("must be a number above 0"))
       .ShowDefault();
   AddUrdfOptions(command, &request->urdf);

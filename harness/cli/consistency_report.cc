@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "controller/common/text.h"
-#include "harness/base/check_summary.h"
+#include "harness/base/check_record.h"
 #include "harness/checks/tolerance.h"
 #include "harness/cli/junit_file.h"
 #include "harness/cli/terminal.h"
@@ -23,15 +23,16 @@ const char* Judge(ExitCode code) {
 }
 
 /// One line for each; below what differs, where.
-void PrintRecords(const char* title, const std::vector<CheckRecord>& records, const RobotModel* places) {
-  fmt::print("{:<24}{:>9}  {:>12}  {:>9}  {:>6}\n", title, "compared", "worst error", "bound", "digits");
+void AddRecords(const char* title, const std::vector<CheckRecord>& records, const RobotModel* places,
+                std::vector<TableRow>* rows) {
+  rows->push_back({{title, "compared", "worst error", "bound", "digits", ""}});
   for (const CheckRecord& record : records) {
-    fmt::print("{:<24}{:>9}  {:>12.2e}  {:>9.1e}  {:>6}  {}\n", record.name, record.comparisons, record.worst,
-               record.bound, CountDigits(record.worst), record.failed ? "DIFFERS" : "ok");
+    rows->push_back({{record.name, std::to_string(record.comparisons), fmt::format("{:.2e}", record.worst),
+                      fmt::format("{:.1e}", record.bound), std::to_string(CountDigits(record.worst)),
+                      record.failed ? "DIFFERS" : "ok"}});
     if (!record.failed || places == nullptr) continue;
     const std::string where = Describe(record.where, *places, places->num_base_velocities());
-    fmt::print("{}\n",
-               Wrap(fmt::format("    worst at {}, sample {}", where, static_cast<long>(record.at)), 6));
+    rows->back().note = fmt::format("    worst at {}, sample {}", where, static_cast<long>(record.at));
   }
 }
 
@@ -84,13 +85,16 @@ void PrintTable(const ConsistencyRequest& request, const Comparison& comparison)
   };
   list("not compared", comparison.not_compared);
   list("worth knowing", comparison.notes);
-  PrintRecords("constant", result.constants.records, nullptr);
+  std::vector<TableRow> rows;
+  AddRecords("constant", result.constants.records, nullptr, &rows);
   if (!result.constants.notes.empty()) {
-    fmt::print("{} notes on what only a run has (contacts, solver, motors' limits): --json\n",
-               result.constants.notes.size());
+    rows.push_back({{},
+                    fmt::format("{} notes on what only a run has (contacts, solver, motors' limits): --json",
+                                result.constants.notes.size())});
   }
-  fmt::print("\n");
-  PrintRecords("term", result.terms, &model);
+  rows.emplace_back();
+  AddRecords("term", result.terms, &model, &rows);
+  fmt::print("{}", FormatTable("<>>>><", rows));
   const std::string bounds = request.judging.Find()
                                  ? "bounds are those of rounding or the tolerance given, whichever is wider"
                                  : "bounds follow from rounding";

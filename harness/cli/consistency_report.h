@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "harness/checks/file_comparison.h"
-#include "harness/cli/comparison_options.h"
+#include "harness/cli/commands.h"
 
 namespace dexcheck::cli {
 

@@ -11,7 +11,6 @@
 #include "harness/cli/consistency_report.h"
 #include "harness/cli/json_matrix.h"
 #include "harness/cli/output_file.h"
-#include "harness/cli/progress_bar.h"
 #include "harness/cli/terminal.h"
 #include "harness/descriptions/compiled_inertias.h"
 #include "harness/descriptions/description_match.h"

@@ -13,7 +13,6 @@
 #include "harness/cli/consistency_report.h"
 #include "harness/cli/junit_file.h"
 #include "harness/cli/output_file.h"
-#include "harness/cli/progress_bar.h"
 #include "harness/cli/terminal.h"
 #include "harness/descriptions/join_names.h"
 #include "harness/descriptions/read_description.h"
@@ -78,14 +77,13 @@ void PrintTable(const EnginesRequest& request, const RobotModel& model,
   constexpr size_t kPairsInARow = 6;
   for (size_t begin = 0; begin < result.pairs.size(); begin += kPairsInARow) {
     const size_t end = std::min(begin + kPairsInARow, result.pairs.size());
-    fmt::print("\n{:<18}", "worst difference");
-    for (size_t i = begin; i < end; ++i) fmt::print("{:>10}", name(result.pairs[i]) + " ");
-    fmt::print("\n");
+    std::vector<TableRow> rows = {{}, {{"worst difference"}}};
+    for (size_t i = begin; i < end; ++i) rows.back().cells.push_back(name(result.pairs[i]) + " ");
     for (const std::string& term : terms) {
-      fmt::print("{:<18}", term);
-      for (size_t i = begin; i < end; ++i) fmt::print("{:>10}", FormatCell(result.pairs[i], term));
-      fmt::print("\n");
+      rows.push_back({{term}});
+      for (size_t i = begin; i < end; ++i) rows.back().cells.push_back(FormatCell(result.pairs[i], term));
     }
+    fmt::print("{}", FormatTable("<>>>>>>", rows));
   }
   fmt::print("\nwhere it is worst\n");
   const int base = model.num_base_velocities();
@@ -215,25 +213,20 @@ void AddEngineComparisonCommand(Command app) {
   for (const EngineComparisonEngine& engine : ListEngineComparisonEngines())
     names += (names.empty() ? "" : ", ") + engine.name;
   command
-      .AddOption("--engines", &request->options.engines,
+      .AddOption("--engines NAME,...", &request->options.engines,
                  "Which of " + names + "; all that are there when none is named")
-      .TypeName("NAME,...")
       .Delimiter(',');
   command
-      .AddOption("--engine", &request->options.programs,
+      .AddOption("--engine NAME=CMD", &request->options.programs,
                  "One more: a program of your own that provides terms (harness/descriptions/README.md)")
-      .TypeName("NAME=CMD")
       .Repeatable();
-  command.AddOption("--mjcf", &request->options.mjcf, "What MuJoCo reads instead of ROBOT")
-      .TypeName("FILE.xml");
-  command
-      .AddOption("--node-modules", &request->options.node_modules,
-                 "Folder where npm installed @mujoco/mujoco")
-      .TypeName("FOLDER");
+  command.AddOption("--mjcf FILE.xml", &request->options.mjcf, "What MuJoCo reads instead of ROBOT");
+  command.AddOption("--node-modules FOLDER", &request->options.node_modules,
+                    "Folder where npm installed @mujoco/mujoco");
   command.AddFlag("--floating", &request->urdf.floating, "The root of a URDF floats");
   AddSampleOptions(command, kMaxSamples, &request->options.states.samples, &request->options.states.seed);
-  command.AddOption("--digits", &request->digits, "Agreement to this many digits of a term's scale is enough")
-      .TypeName("N")
+  command
+      .AddOption("--digits N", &request->digits, "Agreement to this many digits of a term's scale is enough")
       .Check(WholeNumber(1, kMostDigits))
       .ShowDefault();
   AddJsonOption(command, "the results", &request->json_file);

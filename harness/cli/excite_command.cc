@@ -1,17 +1,16 @@
 #include <fmt/format.h>
 
 #include <memory>
-#include <optional>
 #include <string>
 #include <vector>
 
+#include "harness/base/console.h"
 #include "harness/base/interrupts.h"
-#include "harness/base/shell.h"
 #include "harness/cli/commands.h"
 #include "harness/cli/json_matrix.h"
 #include "harness/cli/output_file.h"
-#include "harness/cli/progress_bar.h"
 #include "harness/cli/run_folder.h"
+#include "harness/cli/terminal.h"
 #include "harness/run/excitation.h"
 #include "harness/study/exciting_motion.h"
 
@@ -27,14 +26,10 @@ std::string Head(const ExcitingMotion& motion) {
 }
 
 void Print(const Scenario& scenario, const ExcitingMotion& motion) {
-  fmt::print("{}: {}\n\n{:<44}{:>12}{:>12}\n", scenario.name, Head(motion), "regressor of (48) along the run",
-             "given", "found");
-  const auto row = [](const std::string& what, const std::string& given, const std::string& found) {
-    fmt::print("{:<44}{:>12}{:>12}\n", what, given, found);
-  };
+  std::vector<TableRow> rows = {{{"regressor of (48) along the run", "given", "found"}}};
   const auto both = [&](const std::string& what, const char* format, const auto& calc) {
-    row(what, fmt::format(fmt::runtime(format), calc(motion.given)),
-        fmt::format(fmt::runtime(format), calc(motion.found)));
+    rows.push_back({{what, fmt::format(fmt::runtime(format), calc(motion.given)),
+                     fmt::format(fmt::runtime(format), calc(motion.found))}});
   };
   both("largest singular value", "{:.3e}", [](const JudgedMotion& m) { return m.singular_values[0]; });
   both(fmt::format("smallest of {} that show", motion.rank), "{:.3e}",
@@ -42,6 +37,7 @@ void Print(const Scenario& scenario, const ExcitingMotion& motion) {
   both("condition number of these", "{:.3e}", [](const JudgedMotion& m) { return m.condition(); });
   both(fmt::format("combinations above the floor of {:.0e}", motion.floor), "{}",
        [&](const JudgedMotion& m) { return CountAbove(m.singular_values, motion.floor); });
+  fmt::print("{}: {}\n\n{}", scenario.name, Head(motion), FormatTable("<>>", rows));
   fmt::print("nearest to what it may take: {}\n\n", motion.found.nearest);
   for (const std::string& setting : motion.overrides) fmt::print("--set {}\n", QuoteForShell(setting));
 }
@@ -63,8 +59,7 @@ std::string ToText(const Scenario& scenario, const ExcitingMotion& motion, bool 
 int Run(const ExciteRequest& request) {
   const ScenarioFiles files = FindScenario(request.scenario, request.overrides.List(), /*seed=*/0);
   CatchInterrupts();
-  std::optional<OutputFile> json;
-  if (!request.json_file.empty()) json.emplace(request.json_file);
+  ResultFile json(request.json_file);
   ProgressBar bar("running", request.options.runs, request.quiet);
   const ExcitingMotion motion =
       FindExcitingMotion(files.scenario, files.robot, files.mjcf, request.options, [&](int runs) {
@@ -73,8 +68,8 @@ int Run(const ExciteRequest& request) {
       });
   bar.Finish();
   const bool complete = !IsInterrupted();
-  if (json) json->Write(ToText(files.scenario, motion, complete));
-  if (request.json_file != "-") {
+  json.Write([&] { return ToText(files.scenario, motion, complete); });
+  if (!json.TakesStdout()) {
     if (!request.quiet) Print(files.scenario, motion);
     fmt::print("{}{}: smallest singular value {:.2e}, {:.3g} times the given motion's.\n",
                request.quiet ? "" : "\n", complete ? "FOUND" : "INTERRUPTED, so far", motion.found.smallest,
@@ -90,14 +85,12 @@ void AddExciteCommand(Command app) {
   Command command = app.AddCommand(
       "excite", "Change a scenario's oscillations so that the model's numbers show best within all limits");
   AddScenarioOptions(command, request.get());
-  command.AddOption("--runs", &request->options.runs, "How many runs to make")
-      .TypeName("N")
+  command.AddOption("--runs N", &request->options.runs, "How many runs to make")
       .Check(WholeNumber(1, 100000))
       .ShowDefault();
   command
-      .AddOption("--fraction", &request->options.fraction,
+      .AddOption("--fraction X", &request->options.fraction,
                  "What each check may take of its bound, or as much as before where that is more")
-      .TypeName("X")
       .Check(PositiveNumber())
       .ShowDefault();
   AddResultOptions(command, "the results", request.get());

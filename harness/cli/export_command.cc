@@ -17,7 +17,7 @@
 #include "harness/cli/terminal.h"
 #include "harness/log/log_reader.h"
 #include "harness/log/mcap_writer.h"
-#include "harness/study/study_csv.h"
+#include "harness/study/study_summary.h"
 
 namespace dexcheck::cli {
 namespace {
@@ -201,20 +201,16 @@ void AddExportCommand(Command app) {
   Command command =
       app.AddCommand("export", "Write a run's log as a table of numbers (CSV) or as messages (MCAP)");
   command.AddOption("RUN_DIR", &request->run_folder, "Folder of the run, with its log.h5").Required();
-  Option csv = command.AddOption("--csv", &request->csv_file, "File to write (- for standard output)")
-                   .TypeName("FILE.csv");
-  Option mcap = command
-                    .AddOption("--mcap", &request->mcap_file,
-                               "File of messages for Foxglove or PlotJuggler, a topic for each signal")
-                    .TypeName("FILE.mcap");
+  Option csv =
+      command.AddOption("--csv FILE.csv", &request->csv_file, "File to write (- for standard output)");
+  Option mcap = command.AddOption("--mcap FILE.mcap", &request->mcap_file,
+                                  "File of messages for Foxglove or PlotJuggler, a topic for each signal");
   command
-      .AddOption("--signals", &request->patterns,
+      .AddOption("--signals A,B,...", &request->patterns,
                  "Only time and these signals; * stands for any text: time,object/*,check/M_bar")
-      .TypeName("A,B,...")
       .Delimiter(',')
       .Repeatable();
-  command.AddOption("--every", &request->every, "Only the first of every N rows")
-      .TypeName("N")
+  command.AddOption("--every N", &request->every, "Only the first of every N rows")
       .Check(WholeNumber(1, std::numeric_limits<int>::max()))
       .ShowDefault();
   command.AddFlag("--list", &request->list, "Print the signals, their units and descriptions")

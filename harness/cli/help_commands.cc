@@ -7,10 +7,10 @@
 #include <utility>
 #include <vector>
 
-#include "harness/base/shell.h"
+#include "harness/base/console.h"
 #include "harness/base/version.h"
 #include "harness/cli/commands.h"
-#include "harness/cli/shipped_files.h"
+#include "harness/cli/run_folder.h"
 
 namespace dexcheck::cli {
 namespace {

@@ -101,9 +101,7 @@ void AddImportCommand(Command app) {
   Command command =
       app.AddCommand("import", "Write a parameter file (TOML) from a URDF or an MJCF, to start from");
   command.AddOption("FILE", &request->source, "URDF or MJCF").Required();
-  command.AddOption("--out", &request->out, "File to write (- for standard output)")
-      .TypeName("FILE.toml")
-      .ShowDefault();
+  command.AddOption("--out FILE.toml", &request->out, "File to write (- for standard output)").ShowDefault();
   AddUrdfOptions(command, &request->urdf);
   command.AddFlag(
       "--downgrade", &request->downgrade,

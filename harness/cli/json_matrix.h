@@ -1,6 +1,7 @@
 #pragma once
 
 #include <nlohmann/json.hpp>
+#include <vector>
 
 #include "controller/common/types.h"
 
@@ -8,10 +9,16 @@ namespace dexcheck::cli {
 
 using Json = nlohmann::ordered_json;
 
-/// A matrix as a list of rows.
-Json ToRows(const Eigen::Ref<const MatrixXd>& matrix);
-
 /// A vector as a list.
-Json ToList(const Eigen::Ref<const VectorXd>& vector);
+inline Json ToList(const Eigen::Ref<const VectorXd>& vector) {
+  return std::vector<double>(vector.begin(), vector.end());
+}
+
+/// A matrix as a list of rows.
+inline Json ToRows(const Eigen::Ref<const MatrixXd>& matrix) {
+  Json rows = Json::array();
+  for (Eigen::Index i = 0; i < matrix.rows(); ++i) rows.push_back(ToList(matrix.row(i).transpose()));
+  return rows;
+}
 
 }  // namespace dexcheck::cli

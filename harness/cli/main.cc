@@ -10,7 +10,6 @@
 #include "controller/common/errors.h"
 #include "harness/base/console.h"
 #include "harness/base/interrupts.h"
-#include "harness/base/shell.h"
 #include "harness/base/version.h"
 #include "harness/cli/commands.h"
 

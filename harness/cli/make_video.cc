@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 #include <chrono>
 #include <system_error>
 #include <thread>
@@ -12,7 +11,7 @@
 #include "controller/common/text.h"
 #include "harness/base/console.h"
 #include "harness/base/interrupts.h"
-#include "harness/cli/progress_bar.h"
+#include "harness/cli/terminal.h"
 #include "harness/report/recorded_frames.h"
 
 namespace dexcheck::cli {
@@ -20,15 +19,16 @@ namespace dexcheck::cli {
 int CountDrawers() { return std::clamp(static_cast<int>(std::thread::hardware_concurrency()), 1, 8); }
 
 void ReadSize(const std::string& text, int* width, int* height) {
-  const char* const end = text.data() + text.size();
-  const std::from_chars_result first = std::from_chars(text.data(), end, *width);
-  if (first.ec == std::errc() && first.ptr != end && *first.ptr == 'x') {
-    const std::from_chars_result second = std::from_chars(first.ptr + 1, end, *height);
-    const auto is_size = [](int value, int most) { return value >= 32 && value <= most && value % 2 == 0; };
-    if (second.ec == std::errc() && second.ptr == end && is_size(*width, 3840) && is_size(*height, 2160))
-      return;
-  }
-  throw InputError("--size: must be WIDTHxHEIGHT, even numbers from 32x32 to 3840x2160, got " + Quote(text));
+  const auto read = [](std::string_view part, int most) {
+    const int size = ParseNumber<int>(part).value_or(0);
+    return size >= 32 && size <= most && size % 2 == 0 ? size : 0;
+  };
+  const size_t x = std::min(text.find('x'), text.size());
+  *width = read(std::string_view(text).substr(0, x), 3840);
+  *height = read(std::string_view(text).substr(std::min(x + 1, text.size())), 2160);
+  if (*width == 0 || *height == 0)
+    throw InputError("--size: must be WIDTHxHEIGHT, even numbers from 32x32 to 3840x2160, got " +
+                     Quote(text));
 }
 
 bool WriteVideo(const std::vector<RunView>& views, const VideoOptions& options, const std::string& out,

@@ -12,7 +12,7 @@
 #include "harness/cli/commands.h"
 #include "harness/cli/mutate_run.h"
 #include "harness/cli/output_file.h"
-#include "harness/cli/progress_bar.h"
+#include "harness/cli/terminal.h"
 #include "harness/diagnosis/formula_mutants.h"
 #include "harness/engine/engine.h"
 

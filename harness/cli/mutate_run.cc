@@ -8,8 +8,8 @@
 #include "harness/base/interrupts.h"
 #include "harness/cli/campaign_table.h"
 #include "harness/cli/output_file.h"
-#include "harness/cli/progress_bar.h"
 #include "harness/cli/run_folder.h"
+#include "harness/cli/terminal.h"
 #include "harness/report/campaign_page.h"
 #include "harness/run/run_mutation.h"
 

@@ -10,8 +10,8 @@
 #include "harness/cli/json_matrix.h"
 #include "harness/cli/mutate_run.h"
 #include "harness/cli/output_file.h"
-#include "harness/cli/progress_bar.h"
 #include "harness/cli/run_folder.h"
+#include "harness/cli/terminal.h"
 #include "harness/run/detectability.h"
 
 namespace dexcheck::cli {

@@ -5,7 +5,7 @@
 #include <optional>
 #include <string>
 
-#include "harness/base/partial_file.h"
+#include "harness/base/files.h"
 
 namespace dexcheck::cli {
 

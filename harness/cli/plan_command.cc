@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <chrono>
 #include <cmath>
+#include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -13,18 +13,59 @@
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
-#include "controller/contact/object_surface.h"
+#include "controller/contact/shapes.h"
 #include "controller/grasp/contact_plan.h"
 #include "controller/model/parameter_reader.h"
+#include "controller/model/robot_model.h"
 #include "controller/object/euler_zyz.h"
 #include "harness/cli/commands.h"
 #include "harness/cli/json_matrix.h"
 #include "harness/cli/output_file.h"
-#include "harness/cli/plan_clearance.h"
-#include "harness/cli/shipped_files.h"
+#include "harness/cli/run_folder.h"
+#include "harness/engine/clearance.h"
+#include "harness/engine/engine.h"
 
 namespace dexcheck::cli {
 namespace {
+
+/// The smallest distance of a class of pairs over the postures of a plan.
+struct PlanClearance {
+  double distance = std::numeric_limits<double>::infinity();  ///< m
+  std::string bodies;                                         ///< Empty when there is no such pair.
+};
+
+/// How far bodies that should not touch are apart in an MJCF's scene, with the hand open and closed
+/// around the object. @param q, q_open positions q'. @throws InputError as LoadMjcf and Adapter.
+std::array<PlanClearance, kPairClassCount> FindPlanClearance(const RobotModel& model,
+                                                             const std::filesystem::path& mjcf,
+                                                             const Pose& X_Bo, const VectorXd& q,
+                                                             const VectorXd& q_open) {
+  const MjModelPtr engine = LoadMjcf(mjcf);
+  const Adapter adapter(model, *engine, mjcf.string());
+  const Solids solids = ListSolids(*engine);
+  const std::vector<WatchedPair> pairs = ListWatchedPairs(*engine, adapter, solids, {}, mjcf.string());
+  const MjDataPtr data = MakeData(*engine);
+  if (const int body = adapter.object_body(); body >= 0 && engine->body_jntnum[body] == 1) {
+    mjtNum* const place = data->qpos + engine->jnt_qposadr[engine->body_jntadr[body]];
+    const Eigen::Quaterniond turn(X_Bo.linear());
+    std::copy_n(X_Bo.translation().data(), 3, place);
+    const double quaternion[4] = {turn.w(), turn.x(), turn.y(), turn.z()};
+    std::copy_n(quaternion, 4, place + 3);
+  }
+  std::array<PlanClearance, kPairClassCount> smallest;
+  for (const VectorXd* posture : {&q, &q_open}) {
+    adapter.SetPositions(*posture, data->qpos);
+    mj_kinematics(engine.get(), data.get());
+    Clearance clearance(*engine, adapter, solids, pairs);
+    clearance.Update({data->xpos, data->xmat}, 0.0);
+    for (size_t i = 0; i < smallest.size(); ++i) {
+      const Clearance::Nearest& nearest = clearance.nearest(static_cast<PairClass>(i));
+      if (nearest.pair < 0 || nearest.distance >= smallest[i].distance) continue;
+      smallest[i] = {nearest.distance, clearance.Describe(nearest.pair)};
+    }
+  }
+  return smallest;
+}
 
 struct PlanRequest {
   std::filesystem::path robot = FindShippedFile("controller/parameters/assistant_robot.toml");
@@ -94,16 +135,12 @@ VectorXd MakeNominalPosture(const RobotModel& model, const Hand& hand, const Pla
   for (const std::string& assignment : request.joints_deg) {
     const size_t equals = assignment.find('=');
     if (equals == std::string::npos) Fail("--joints-deg", "must be NAME=DEGREES, got " + Quote(assignment));
-    const char* const begin = assignment.data() + equals + 1;
-    const char* const end = assignment.data() + assignment.size();
-    double degrees = 0.0;
-    const std::from_chars_result result = std::from_chars(begin, end, degrees);
-    if (result.ec != std::errc() || result.ptr != end || !std::isfinite(degrees)) {
+    const auto degrees = ParseNumber<double>(assignment.substr(equals + 1));
+    if (!degrees || !std::isfinite(*degrees))
       Fail("--joints-deg", "must be NAME=DEGREES, got " + Quote(assignment));
-    }
     const int index = FindJoint(model, "--joints-deg", assignment.substr(0, equals));
     const Joint& joint = model.joints()[static_cast<size_t>(index)];
-    const double position = DegToRad(degrees);
+    const double position = DegToRad(*degrees);
     if (position < joint.lower || position > joint.upper) {
       Fail("--joints-deg", assignment + " is outside of the range from " +
                                FormatNumber(RadToDeg(joint.lower)) + " to " +
@@ -248,8 +285,7 @@ int Run(PlanRequest request) {
   }
   Vector6d X_o;
   X_o << ToVector3("--object-xyz", request.xyz), kPi / 180.0 * ToVector3("--object-zyz-deg", request.zyz_deg);
-  std::optional<OutputFile> json;
-  if (!request.json_file.empty()) json.emplace(request.json_file);
+  ResultFile json(request.json_file);
 
   const auto start = std::chrono::steady_clock::now();
   const ContactPlan plan = PlanContacts(model, hand, *surface, CalcObjectPose(X_o), nominal, request.options);
@@ -262,9 +298,9 @@ int Run(PlanRequest request) {
       clearances = FindPlanClearance(model, request.mjcf, CalcObjectPose(X_o), plan.q, plan.q_open);
     }
   }
-  if (json) json->Write(ToText(request, plan, grasp, clearances, seconds));
+  json.Write([&] { return ToText(request, plan, grasp, clearances, seconds); });
   if (!plan.found) throw Error("no plan: " + plan.problem);
-  if (request.json_file != "-") PrintText(request, plan, grasp, clearances, seconds);
+  if (!json.TakesStdout()) PrintText(request, plan, grasp, clearances, seconds);
   const PlanClearance* nearest = clearances ? FindSmallest(*clearances) : nullptr;
   return nearest != nullptr && nearest->distance < 0.0 ? kDisagreement : kSuccess;
 }
@@ -275,68 +311,55 @@ void AddPlanCommand(Command app) {
   const auto request = std::make_shared<PlanRequest>();
   Command command = app.AddCommand("plan", "Choose where a hand should hold the object");
   command.AddFlag("--contacts", "Contact points, posture and margin, as a scenario's [grasp]").Required();
-  command.AddOption("--object-xyz", &request->xyz, "Position of the object in the world, m")
-      .TypeName("X Y Z")
+  command.AddOption("--object-xyz X Y Z", &request->xyz, "Position of the object in the world, m")
       .Takes(3)
       .Required();
   command
-      .AddOption("--object-zyz-deg", &request->zyz_deg,
+      .AddOption("--object-zyz-deg A B C", &request->zyz_deg,
                  "Orientation of the object, ZYZ angles (default 0 0 0)")
-      .TypeName("A B C")
       .Takes(3);
-  Option hand = command.AddOption("--hand", &request->hand, "Hand of the assistant robot that holds")
-                    .TypeName("right|left")
-                    .OneOf({"right", "left"})
-                    .ShowDefault();
+  Option hand =
+      command.AddOption("--hand right|left", &request->hand, "Hand of the assistant robot that holds")
+          .OneOf({"right", "left"})
+          .ShowDefault();
   command
-      .AddOption("--palm", &request->palm,
+      .AddOption("--palm FRAME", &request->palm,
                  "Frame of a palm, whose z points at what it takes; its fingertips are those on its link")
-      .TypeName("FRAME")
       .Excludes(hand);
-  command.AddOption("--mu", &request->options.mu, "Friction coefficient that the plan counts on")
-      .TypeName("MU")
+  command.AddOption("--mu MU", &request->options.mu, "Friction coefficient that the plan counts on")
       .ShowDefault();
-  command
-      .AddOption("--support-height", &request->support_height,
-                 "Height of the table that the object lies on, m: the hand comes from above")
-      .TypeName("Z");
+  command.AddOption("--support-height Z", &request->support_height,
+                    "Height of the table that the object lies on, m: the hand comes from above");
   command
       .AddOption(
-          "--hemisphere", &request->hemisphere,
+          "--hemisphere X Y Z", &request->hemisphere,
           "Fingertips are hemispheres around this direction of their frames: contacts within their rims")
-      .TypeName("X Y Z")
       .Takes(3);
   command
       .AddOption(
-          "--hold-at", &request->hold_at,
+          "--hold-at X Y Z", &request->hold_at,
           "Where in the palm's frame the object is held, m: the search begins there; before the fingers "
           "when not given")
-      .TypeName("X Y Z")
       .Takes(3);
   command
-      .AddOption("--lift", &request->lift, "Displacement, m, that the arm must be able to make while holding")
-      .TypeName("X Y Z")
+      .AddOption("--lift X Y Z", &request->lift,
+                 "Displacement, m, that the arm must be able to make while holding")
       .Takes(3);
   command
-      .AddOption("--joint-margin", &request->options.joint_margin,
+      .AddOption("--joint-margin MARGIN", &request->options.joint_margin,
                  "Least distance of joints from the ends of their ranges, rad or m")
-      .TypeName("MARGIN")
       .ShowDefault();
-  command
-      .AddOption("--joints-deg", &request->joints_deg,
-                 "Posture to stay near to; arm joints are otherwise in the middle of their ranges, others 0")
-      .TypeName("NAME=DEGREES");
-  command
-      .AddOption("--arm-joints", &request->arm_joints,
-                 "Joints that may move the palm (default: those that move no other fingertips)")
-      .TypeName("NAME");
-  command.AddOption("--robot", &request->robot, "Parameter file (TOML) with fingertips and an object")
-      .TypeName("FILE.toml");
-  command
-      .AddOption("--mjcf", &request->mjcf,
-                 "Scene in which the robot's bodies must be clear of each other, the object and what stands "
-                 "there (default: the shipped one for the shipped robot)")
-      .TypeName("FILE.xml");
+  command.AddOption(
+      "--joints-deg NAME=DEGREES", &request->joints_deg,
+      "Posture to stay near to; arm joints are otherwise in the middle of their ranges, others 0");
+  command.AddOption("--arm-joints NAME", &request->arm_joints,
+                    "Joints that may move the palm (default: those that move no other fingertips)");
+  command.AddOption("--robot FILE.toml", &request->robot,
+                    "Parameter file (TOML) with fingertips and an object");
+  command.AddOption(
+      "--mjcf FILE.xml", &request->mjcf,
+      "Scene in which the robot's bodies must be clear of each other, the object and what stands "
+      "there (default: the shipped one for the shipped robot)");
   AddJsonOption(command, "the plan", &request->json_file);
   command.SetAction([=] {
     try {

@@ -19,7 +19,6 @@
 #include "harness/cli/output_file.h"
 #include "harness/cli/run_folder.h"
 #include "harness/report/recorded_frames.h"
-#include "renders/picture_file.h"
 #include "renders/video.h"
 #include "renders/video_writer.h"
 
@@ -144,49 +143,40 @@ void AddRenderCommand(Command app) {
   request->video.workers = CountDrawers();
   Command command = app.AddCommand("render", "Draw a recorded run as a video, or one instant of it");
   command.AddOption("RUN_DIR", &request->run_folder, "Folder of the run").Required().TypeName("");
-  command
-      .AddOption("--out", &request->out,
-                 "A video .mp4, .webm or .gif, or a picture .png or .jpg (default: video.mp4 or still.png in "
-                 "RUN_DIR)")
-      .TypeName("FILE");
-  command.AddOption("--still", &request->still, "One picture at this time of the run, s").TypeName("T");
-  Option camera = command
-                      .AddOption("--camera", &request->video.camera,
-                                 "overview (the default), follow, grasp, top, or another of the MJCF's; "
-                                 "robot and object are near "
-                                 "to those; course stands still and sees the whole way")
-                      .TypeName("NAME");
+  command.AddOption(
+      "--out FILE", &request->out,
+      "A video .mp4, .webm or .gif, or a picture .png or .jpg (default: video.mp4 or still.png in "
+      "RUN_DIR)");
+  command.AddOption("--still T", &request->still, "One picture at this time of the run, s");
+  Option camera = command.AddOption("--camera NAME", &request->video.camera,
+                                    "overview (the default), follow, grasp, top, or another of the MJCF's; "
+                                    "robot and object are near "
+                                    "to those; course stands still and sees the whole way");
   Option from =
-      command.AddOption("--from", &request->from, "Where a camera of your own stands at the beginning, m")
-          .TypeName("X,Y,Z")
+      command
+          .AddOption("--from X,Y,Z", &request->from, "Where a camera of your own stands at the beginning, m")
           .Delimiter(',')
           .Takes(3)
           .Excludes(camera);
   command
-      .AddOption("--look-at", &request->look_at,
+      .AddOption("--look-at X,Y,Z", &request->look_at,
                  "What that camera looks at: object, or a point, m (object by default)")
-      .TypeName("X,Y,Z")
       .Needs(from);
   command.AddFlag("--follow", &request->follow, "That camera moves along with the object").Needs(from);
-  command.AddOption("--orbit", &request->orbit, "That camera turns about what it looks at, degrees a second")
-      .TypeName("DEG")
+  command
+      .AddOption("--orbit DEG", &request->orbit, "That camera turns about what it looks at, degrees a second")
       .Needs(from);
-  command.AddOption("--inset", &request->video.inset, "A second camera in the lower right corner")
-      .TypeName("NAME");
-  Option beside =
-      command.AddOption("--beside", &request->beside, "Another run, shown at the right").TypeName("RUN_DIR");
-  command.AddOption("--ghost", &request->ghost, "Another run, as a ghost in the same scene")
-      .TypeName("RUN_DIR")
+  command.AddOption("--inset NAME", &request->video.inset, "A second camera in the lower right corner");
+  Option beside = command.AddOption("--beside RUN_DIR", &request->beside, "Another run, shown at the right");
+  command.AddOption("--ghost RUN_DIR", &request->ghost, "Another run, as a ghost in the same scene")
       .Excludes(beside);
-  command.AddOption("--size", &request->size, "Size of the picture in pixels").TypeName("WxH").ShowDefault();
-  command.AddOption("--fps", &request->video.fps, "Frames a second")
-      .TypeName("N")
+  command.AddOption("--size WxH", &request->size, "Size of the picture in pixels").ShowDefault();
+  command.AddOption("--fps N", &request->video.fps, "Frames a second")
       .Check(WholeNumber(1, kMostFramesPerSecond))
       .ShowDefault();
   command
-      .AddOption("--jobs", &request->video.workers,
+      .AddOption("--jobs N", &request->video.workers,
                  "Processes that draw; default: one for each processor, at most 8")
-      .TypeName("N")
       .Check(WholeNumber(1, kMostJobs));
   command.AddFlag("--forces", &request->video.forces, "Draw contact forces and friction cones");
   command.AddFlag("--tracks", &request->video.tracks, "Draw the contacts' tracks and the object's path");

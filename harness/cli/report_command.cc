@@ -7,7 +7,7 @@
 
 #include "harness/cli/commands.h"
 #include "harness/cli/output_file.h"
-#include "harness/report/write_report.h"
+#include "harness/report/page.h"
 
 namespace dexcheck::cli {
 namespace {
@@ -33,10 +33,8 @@ void AddReportCommand(Command app) {
   const auto request = std::make_shared<ReportRequest>();
   Command command = app.AddCommand("report", "Write a recorded run's report: one page and its figures");
   command.AddOption("RUN_DIR", &request->run_folder, "Folder of the run").Required().TypeName("");
-  command
-      .AddOption("--out", &request->out,
-                 "Write only the page, here (default: report.html and figures/ in RUN_DIR)")
-      .TypeName("FILE.html");
+  command.AddOption("--out FILE.html", &request->out,
+                    "Write only the page, here (default: report.html and figures/ in RUN_DIR)");
   command.AddFlag("--no-replay", &request->no_replay, "Leave out the replay in three dimensions");
   command.AddFlag("--quiet", &request->quiet, "Print nothing");
   AddJsonOption(command, "where page and figures are", &request->json_file);

@@ -14,22 +14,16 @@
 #include "controller/common/text.h"
 #include "harness/base/console.h"
 #include "harness/base/interrupts.h"
-#include "harness/base/shell.h"
 #include "harness/cli/commands.h"
-#include "harness/cli/comparison_options.h"
 #include "harness/cli/make_video.h"
 #include "harness/cli/output_file.h"
-#include "harness/cli/progress_bar.h"
 #include "harness/cli/run_folder.h"
 #include "harness/cli/run_report.h"
-#include "harness/cli/shipped_files.h"
 #include "harness/cli/terminal.h"
 #include "harness/engine/machine.h"
+#include "harness/report/page.h"
 #include "harness/report/run_data.h"
-#include "harness/report/write_report.h"
 #include "harness/run/half_step.h"
-#include "harness/run/run_recorder.h"
-#include "harness/run/runner.h"
 
 namespace dexcheck::cli {
 namespace {
@@ -101,8 +95,7 @@ int RunScenario(const RunRequest& request) {
     overrides.push_back("tolerance=" + FormatNumber(*tolerance));
   }
   const ScenarioFiles files = FindScenario(request.scenario, overrides, request.seed);
-  std::optional<OutputFile> junit;
-  if (!request.junit_file.empty()) junit.emplace(request.junit_file);
+  ResultFile junit(request.junit_file);
   const Setup setup(files.scenario, files.robot, files.mjcf);
   CatchInterrupts();
   Runner runner(setup, !request.no_check, MakeParts(request, setup, files.robot));
@@ -113,14 +106,8 @@ int RunScenario(const RunRequest& request) {
     recorder.emplace(folder->path() / "log.h5", runner.loop(), setup,
                      RunInputs{files.robot, files.mjcf, request.command, request.controller});
   }
-  ProgressBar bar(setup.scenario().name, runner.loop().num_steps(), quiet);
-  runner.Run(
-      [&](const StepRecord& step) {
-        if (recorder) recorder->Record(step);
-        bar.Update(step.step);
-      },
-      IsInterrupted);
-  bar.Finish();
+  RunWithProgress(setup.scenario().name, runner.loop().num_steps(), quiet, &runner,
+                  recorder ? &*recorder : nullptr);
   RunResult result = runner.result();
   if (request.controller.empty()) {
     LookForIntegrator(setup, runner.loop(), files.robot, files.mjcf, IsInterrupted, &result);
@@ -129,7 +116,7 @@ int RunScenario(const RunRequest& request) {
   const std::string summary = MakeSummary(setup, runner.loop(), result).dump(2) + "\n";
   if (recorder) recorder->Close(summary);
   if (folder) OutputFile(folder->path() / "summary.json").Write(summary);
-  if (junit) junit->Write(WriteJUnit(setup, runner.loop(), result));
+  junit.Write([&] { return WriteJUnit(setup, runner.loop(), result); });
   const ExitCode verdict = ToExitCode(result);
   std::exception_ptr unprinted;
   try {
@@ -172,15 +159,7 @@ int ReplayRun(const RunRequest& request) {
   const std::filesystem::path log = scratch.path() / "log.h5";
   RunRecorder recorder(log, runner.loop(), setup,
                        RunInputs{recorded.files().robot, recorded.files().mjcf, "", ""});
-  ProgressBar bar("replaying", recorded.rows(), request.quiet);
-  long rows = 0;
-  runner.Run(
-      [&](const StepRecord& step) {
-        if (rows++ < recorded.rows()) recorder.Record(step);
-        bar.Update(rows);
-      },
-      [&] { return IsInterrupted() || rows >= recorded.rows(); });
-  bar.Finish();
+  const long rows = RunWithProgress("replaying", recorded.rows(), request.quiet, &runner, &recorder);
   if (IsInterrupted() && rows < recorded.rows()) {
     throw Error(fmt::format("interrupted after {} of {} steps; nothing was compared", rows, recorded.rows()));
   }
@@ -239,35 +218,26 @@ void AddRunCommand(Command app, const std::string& command_line) {
   Option scenario = command.AddOption("SCENARIO", &request->scenario,
                                       "Name of a shipped scenario (--list), or a TOML file");
   Option list = command.AddFlag("--list", &request->list, "List the shipped scenarios");
-  Option replay = command
-                      .AddOption("--replay", &request->replay,
-                                 "Repeat a recorded run and compare every number bit for bit")
-                      .TypeName("RUN_DIR");
-  Option out = command
-                   .AddOption("--out", &request->out,
-                              "Folder for the results, made by the run (runs/SCENARIO by default)")
-                   .TypeName("DIR");
+  Option replay = command.AddOption("--replay RUN_DIR", &request->replay,
+                                    "Repeat a recorded run and compare every number bit for bit");
+  Option out = command.AddOption("--out DIR", &request->out,
+                                 "Folder for the results, made by the run (runs/SCENARIO by default)");
   const auto [set, unset] = AddOverrideOptions(command, &request->overrides);
   const std::array<Option, 2> judging = AddToleranceOptions(command, &request->judging);
   Option seed = AddSeedOption(command, &request->seed);
   command
       .AddOption(
-          "--threads", &request->threads,
+          "--threads N", &request->threads,
           "2 (where there are two processors): checks have a thread of their own; the numbers are the same")
-      .TypeName("N")
       .Check(WholeNumber(1, 2));
-  Option controller =
-      command
-          .AddOption(
-              "--controller", &request->controller,
-              "A controller of your own: a shared library (.so), or a command that speaks the protocol "
-              "of controller_protocol.h; --replay of its runs needs it again")
-          .TypeName("LIBRARY.so|COMMAND");
+  Option controller = command.AddOption(
+      "--controller LIBRARY.so|COMMAND", &request->controller,
+      "A controller of your own: a shared library (.so), or a command that speaks the protocol "
+      "of controller_protocol.h; --replay of its runs needs it again");
   command
       .AddOption(
-          "--controller-time-limit", &request->controller_time_limit,
+          "--controller-time-limit SECONDS", &request->controller_time_limit,
           "Time limit for each reply of the controller, s (1 by default); ten times that for its start")
-      .TypeName("SECONDS")
       .Check(PositiveNumber())
       .Needs(controller);
   Option no_check = command.AddFlag("--no-check", &request->no_check, "Simulate without cross-checks");

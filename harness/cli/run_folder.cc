@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <bit>
 #include <cerrno>
-#include <charconv>
 #include <cmath>
 #include <cstring>
 #include <optional>
@@ -17,12 +16,14 @@
 #include "controller/common/text.h"
 #include "controller/common/toml_reader.h"
 #include "harness/base/console.h"
-#include "harness/cli/shipped_files.h"
+#include "harness/base/interrupts.h"
+#include "harness/cli/terminal.h"
 #include "harness/engine/machine.h"
 #include "harness/report/recorded_frames.h"
 #include "harness/report/run_data.h"
 
 namespace dexcheck::cli {
+
 namespace {
 
 std::filesystem::path OrShipped(const std::string& file, const char* shipped) {
@@ -41,12 +42,7 @@ ScenarioFiles Open(const std::filesystem::path& path, const std::vector<std::str
 
 std::uint64_t ReadSeed(const LogReader& log, const std::filesystem::path& path) {
   const std::string text = log.ReadText("seed");
-  std::uint64_t seed = 0;
-  const char* const end = text.data() + text.size();
-  if (const auto result = std::from_chars(text.data(), end, seed);
-      result.ec == std::errc() && result.ptr == end) {
-    return seed;
-  }
+  if (const auto seed = ParseNumber<std::uint64_t>(text)) return *seed;
   throw InputError(path.string() + ": seed: must be a whole number, got " + Quote(text));
 }
 
@@ -140,6 +136,19 @@ RunFolder::RunFolder(const std::string& path, const std::string& name) : path_(p
   }
 }
 
+long RunWithProgress(const std::string& label, long rows, bool quiet, Runner* runner, RunRecorder* recorder) {
+  ProgressBar bar(label, rows, quiet);
+  long done = 0;
+  runner->Run(
+      [&](const StepRecord& step) {
+        if (done++ >= rows) return;  // steps are made while the one before is checked
+        if (recorder != nullptr) recorder->Record(step);
+        bar.Update(done);
+      },
+      [&] { return IsInterrupted() || done >= rows; });
+  return std::min(done, rows);
+}
+
 void WarnOfCut(const std::filesystem::path& run_folder, const LogReader& log) {
   if (const std::string cut = DescribeCut(log); !cut.empty())
     Warn("note: " + run_folder.string() + ": " + cut);
@@ -199,6 +208,43 @@ ReplayDifference RecordedRun::Compare(const std::filesystem::path& other_log) co
     }
   }
   return first;
+}
+
+std::filesystem::path FindShippedFile(const std::filesystem::path& name) {
+  std::error_code error;
+  const std::filesystem::path program = std::filesystem::read_symlink("/proc/self/exe", error);
+  std::filesystem::path installed = program.parent_path().parent_path() / "share/dexcheck" / name;
+  if (!error && std::filesystem::exists(installed, error)) return installed;
+  std::filesystem::path source = std::filesystem::path(DEXCHECK_DATA_DIR) / name;
+  if (!std::filesystem::exists(source, error)) {
+    throw InputError(source.string() + ": does not exist, nor does " + installed.string() +
+                     ": this program's shipped files are missing");
+  }
+  return source;
+}
+
+std::vector<std::string> ShippedKind::ListNames() const {
+  std::vector<std::string> names;
+  for (const std::filesystem::directory_entry& entry :
+       std::filesystem::directory_iterator(FindShippedFile(folder))) {
+    if (entry.path().extension() == ".toml") names.push_back(entry.path().stem().string());
+  }
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
+std::filesystem::path ShippedKind::Find(const std::string& name_or_file) const {
+  if (IsTomlFile(name_or_file)) return name_or_file;
+  const std::vector<std::string> known = ListNames();
+  if (std::find(known.begin(), known.end(), name_or_file) != known.end())
+    return FindShippedFile(folder) / (name_or_file + ".toml");
+  const std::string where = *listed != '\0' ? listed : fmt::format("{}", fmt::join(known, ", "));
+  throw InputError(fmt::format("{} {}: is neither shipped ({}) nor a TOML file{}", name, Quote(name_or_file),
+                               where, SuggestNearest(name_or_file, known)));
+}
+
+bool IsTomlFile(const std::string& name) {
+  return name.ends_with(".toml") || name.find('/') != std::string::npos;
 }
 
 }  // namespace dexcheck::cli

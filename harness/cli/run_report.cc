@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "harness/base/check_summary.h"
+#include "harness/base/check_record.h"
 #include "harness/base/interrupts.h"
 #include "harness/cli/junit_file.h"
 #include "harness/cli/terminal.h"

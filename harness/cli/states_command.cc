@@ -49,8 +49,7 @@ void AddStatesCommand(Command app) {
   command.AddOption("ROBOT", &request->robot, "Parameter file (TOML), URDF or MJCF")
       .TypeName("FILE")
       .Required();
-  command.AddOption("--out", &request->out, "Folder for layout.json, states.jsonl, q.npy and v.npy")
-      .TypeName("DIR")
+  command.AddOption("--out DIR", &request->out, "Folder for layout.json, states.jsonl, q.npy and v.npy")
       .Required();
   AddSampleOptions(command, kMaxCount, &request->count, &request->seed, "--samples,--count");
   command.AddFlag("--floating", &request->urdf.floating, "The root of a URDF floats");

@@ -1,31 +1,113 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
+#include <cstdint>
 #include <filesystem>
 #include <map>
 #include <memory>
+#include <regex>
 #include <string>
 #include <vector>
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
 #include "controller/common/toml_reader.h"
+#include "harness/base/console.h"
+#include "harness/base/files.h"
 #include "harness/base/interrupts.h"
-#include "harness/base/partial_file.h"
 #include "harness/cli/commands.h"
-#include "harness/cli/progress_bar.h"
-#include "harness/cli/slurm_script.h"
-#include "harness/cli/study_files.h"
-#include "harness/cli/study_read_commands.h"
+#include "harness/cli/run_folder.h"
 #include "harness/cli/terminal.h"
 #include "harness/study/study_answer.h"
-#include "harness/study/study_progress.h"
 #include "harness/study/study_runner.h"
 #include "harness/study/study_store.h"
+#include "harness/study/trial.h"
 
 namespace dexcheck::cli {
 namespace {
+
+/// A study's array job.
+struct SlurmJob {
+  std::uint64_t tasks = 1;  ///< Parts of the study.
+  /// Most elements of the array. Slurm's MaxArraySize, 1001 unless configured, is one more than the largest
+  /// index.
+  std::uint64_t array_size = 1000;
+  std::uint64_t cpus = 1;      ///< Processors of an element, each for a trial at a time.
+  std::uint64_t throttle = 0;  ///< Elements at a time; 0 for any.
+  std::string time;            ///< As sbatch --time; empty for the partition's.
+  std::string memory;          ///< As sbatch --mem; empty for the partition's.
+};
+
+/// A shipped study by name, or a TOML file, with its scenario. @throws InputError.
+StudyInputs FindStudy(const std::string& name_or_file) {
+  const std::filesystem::path path = kStudies.Find(name_or_file);
+  StudyInputs inputs;
+  inputs.study = ParseStudy(ReadTextFile(path.string()), path.string());
+  const std::string& scenario = inputs.study.scenario;
+  const std::string file = IsTomlFile(scenario) ? (path.parent_path() / scenario).string() : scenario;
+  const ScenarioFiles files = FindScenario(file, inputs.study.overrides, 0);
+  inputs.scenario_text = files.scenario.text;
+  inputs.scenario_source = scenario;
+  inputs.scenario_folder = std::filesystem::path(files.scenario.source).parent_path();
+  inputs.robot = files.robot;
+  inputs.mjcf = files.mjcf;
+  return inputs;
+}
+
+bool Matches(const std::string& text, const char* pattern) {
+  return std::regex_match(text, std::regex(pattern));
+}
+
+/// What is wrong with a text as sbatch's --time and --mem; empty when nothing is.
+std::string CheckSlurmTime(const std::string& text) {
+  if (Matches(text, "\\d{1,9}(-\\d{1,9})?(:\\d{1,9}){0,2}")) return {};
+  return "must be MIN, MIN:SEC, HOURS:MIN:SEC or DAYS-HOURS[:MIN[:SEC]], got " + Quote(text);
+}
+
+std::string CheckSlurmMemory(const std::string& text) {
+  if (Matches(text, "\\d{1,9}[KMGT]?")) return {};
+  return "must be a whole number with K, M, G or T, got " + Quote(text);
+}
+
+/// The text of a batch script whose array makes the study, a shard for each task; killed and requeued
+/// elements go on where they were.
+/// @param name_or_file as typed.
+std::string MakeSlurmScript(const StudyInputs& inputs, const std::string& name_or_file, const SlurmJob& job) {
+  const std::string program = std::filesystem::read_symlink("/proc/self/exe").string();
+  const std::string study = IsTomlFile(name_or_file)
+                                ? std::filesystem::absolute(name_or_file).lexically_normal().string()
+                                : name_or_file;
+  const std::string& name = inputs.study.name;
+  std::string more;
+  if (!job.time.empty()) more += "#SBATCH --time=" + job.time + "\n";
+  if (!job.memory.empty()) more += "#SBATCH --mem=" + job.memory + "\n";
+  return fmt::format(
+      R"(#!/bin/bash
+# Makes the study {name} in {tasks} tasks: sbatch THIS_FILE. Each task writes a database into the folder that the job
+# is submitted from; a task that was killed goes on where it was when it is requeued. When all are done:
+#   {program} study merge {name}.sqlite {name}-*-of-{tasks}.sqlite
+#SBATCH --job-name={name}
+#SBATCH --array=1-{elements}{throttle}
+#SBATCH --ntasks=1
+#SBATCH --cpus-per-task={cpus}
+{more}#SBATCH --requeue
+#SBATCH --open-mode=append
+#SBATCH --output={name}-%a-of-{elements}.log
+# The array has {elements} elements; each makes every {elements}th task, from the one of its own number on.
+code=0
+for ((task = SLURM_ARRAY_TASK_ID; task <= {tasks}; task += {elements})); do
+  {program} study run {study} --quiet --jobs "${{SLURM_CPUS_PER_TASK:-1}}" \
+    {shard}--db "{name}-$task-of-{tasks}.sqlite" || code=$?
+done
+exit $code
+)",
+      fmt::arg("name", name), fmt::arg("tasks", job.tasks),
+      fmt::arg("elements", std::min(job.tasks, job.array_size)),
+      fmt::arg("throttle", job.throttle > 0 ? "%" + std::to_string(job.throttle) : ""),
+      fmt::arg("cpus", job.cpus), fmt::arg("more", more),
+      fmt::arg("shard", inputs.study.is_search() ? "" : fmt::format("--shard \"$task/{}\" ", job.tasks)),
+      fmt::arg("program", QuoteForShell(program)), fmt::arg("study", QuoteForShell(study)));
+}
 
 struct StudyRequest {
   std::string study;
@@ -39,13 +121,11 @@ struct StudyRequest {
 /// The trials of the shard "I/N"; "" is all.
 std::vector<Trial> SelectShard(std::vector<Trial> trials, const std::string& text) {
   if (text.empty()) return trials;
-  long index = 0;
-  long count = 0;
-  const char* const end = text.data() + text.size();
-  const auto [slash, error] = std::from_chars(text.data(), end, index);
-  const bool good = error == std::errc() && slash != end && *slash == '/' &&
-                    std::from_chars(slash + 1, end, count).ptr == end && 1 <= index && index <= count;
-  if (!good) throw InputError("--shard: must be I/N with 1 <= I <= N, got " + Quote(text));
+  const size_t slash = std::min(text.find('/'), text.size() - 1);
+  const long index = ParseNumber<long>(std::string_view(text).substr(0, slash)).value_or(0);
+  const long count = ParseNumber<long>(std::string_view(text).substr(slash + 1)).value_or(0);
+  if (index < 1 || index > count)
+    throw InputError("--shard: must be I/N with 1 <= I <= N, got " + Quote(text));
   std::erase_if(trials, [&](const Trial& trial) { return trial.number % count != index - 1; });
   return trials;
 }
@@ -212,11 +292,11 @@ void AddStudyCommand(Command app) {
 
   Command run = study.AddCommand("run", "Make the trials that are missing in the database");
   run.AddOption("STUDY", &request->study, "Name of a shipped study, or a TOML file").Required();
-  run.AddOption("--db", &request->database, "The study's database (SQLite), made when there is none")
-      .TypeName("FILE.sqlite")
+  run.AddOption("--db FILE.sqlite", &request->database,
+                "The study's database (SQLite), made when there is none")
       .Required();
   AddJobsOption(run, "Trials", &request->jobs);
-  run.AddOption("--shard", &request->shard, "Only the I-th of N parts of the study").TypeName("I/N");
+  run.AddOption("--shard I/N", &request->shard, "Only the I-th of N parts of the study");
   run.AddFlag("--retry-failed", &request->retry_failed, "Make trials again that crashed or timed out");
   add_quiet(run);
   run.SetAction([=] { return RunStudy(*request); });
@@ -232,25 +312,21 @@ void AddStudyCommand(Command app) {
   Command slurm = study.AddCommand("slurm", "Print an array job for Slurm that makes the study");
   slurm.AddOption("STUDY", &request->study, "Name of a shipped study, or a TOML file").Required();
   const auto job = std::make_shared<SlurmJob>();
-  slurm.AddOption("--tasks", &job->tasks, "Parts of the study, each with a database of its own")
-      .TypeName("N")
+  slurm.AddOption("--tasks N", &job->tasks, "Parts of the study, each with a database of its own")
       .Required()
       .Check(whole);
   slurm
-      .AddOption("--array-size", &job->array_size,
+      .AddOption("--array-size N", &job->array_size,
                  "Most elements of the array (1000, as Slurm's MaxArraySize of 1001 allows); of more parts "
                  "each makes several")
-      .TypeName("N")
       .Check(whole);
-  slurm.AddOption("--cpus", &job->cpus, "Processors of an element (1)").TypeName("N").Check(whole);
-  slurm.AddOption("--throttle", &job->throttle, "Elements that run at a time").TypeName("N").Check(whole);
+  slurm.AddOption("--cpus N", &job->cpus, "Processors of an element (1)").Check(whole);
+  slurm.AddOption("--throttle N", &job->throttle, "Elements that run at a time").Check(whole);
   slurm
-      .AddOption("--time", &job->time,
+      .AddOption("--time TIME", &job->time,
                  "Time limit of an element: MIN, MIN:SEC, HOURS:MIN:SEC or DAYS-HOURS[:MIN[:SEC]]")
-      .TypeName("TIME")
       .Check(CheckSlurmTime);
-  slurm.AddOption("--memory", &job->memory, "Memory of an element, as 500M or 2G")
-      .TypeName("SIZE")
+  slurm.AddOption("--memory SIZE", &job->memory, "Memory of an element, as 500M or 2G")
       .Check(CheckSlurmMemory);
   slurm.SetAction([=] {
     StudyInputs inputs = FindStudy(request->study);

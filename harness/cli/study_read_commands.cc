@@ -1,10 +1,8 @@
-#include "harness/cli/study_read_commands.h"
 
 #include <fmt/format.h>
 
 #include <chrono>
 #include <cmath>
-#include <cstdlib>
 #include <memory>
 #include <optional>
 #include <string>
@@ -17,22 +15,13 @@
 #include "harness/cli/commands.h"
 #include "harness/cli/output_file.h"
 #include "harness/cli/terminal.h"
-#include "harness/study/study_csv.h"
+#include "harness/study/study_answer.h"
 #include "harness/study/study_page.h"
-#include "harness/study/study_progress.h"
 #include "harness/study/study_store.h"
+#include "harness/study/study_summary.h"
 
 namespace dexcheck::cli {
 namespace {
-
-std::string CheckInterval(const std::string& text) {
-  constexpr double kLeast = 0.1;
-  constexpr double kMost = 86400.0;
-  char* end = nullptr;
-  const double seconds = std::strtod(text.c_str(), &end);
-  const bool good = end != text.c_str() && *end == 0 && seconds >= kLeast && seconds <= kMost;
-  return good ? "" : "must be from 0.1 to 86400 s, got " + Quote(text);
-}
 
 void WriteJson(const std::string& file, const nlohmann::ordered_json& json) {
   if (!file.empty()) OutputFile(file).Write(json.dump(2) + "\n");
@@ -92,8 +81,7 @@ void AddStudyReadCommands(Command study) {
 
   Command report = study.AddCommand("report", "Write an HTML page of a study's results");
   add_database(report);
-  report.AddOption("--out", out.get(), "The page (DB.html by default); - for standard output")
-      .TypeName("FILE.html");
+  report.AddOption("--out FILE.html", out.get(), "The page (DB.html by default); - for standard output");
   const auto json = std::make_shared<std::string>();
   AddJsonOption(report, "the same data", json.get());
   report.SetAction([=] {
@@ -114,8 +102,7 @@ void AddStudyReadCommands(Command study) {
 
   Command csv = study.AddCommand("export", "Write all trials as CSV");
   add_database(csv);
-  csv.AddOption("--out", out.get(), "The file (DB.csv by default); - for standard output")
-      .TypeName("FILE.csv");
+  csv.AddOption("--out FILE.csv", out.get(), "The file (DB.csv by default); - for standard output");
   csv.SetAction([=] {
     const StudyStore store = StudyStore::Open(*database);
     OutputFile file(out->empty() ? *database + ".csv" : *out);
@@ -127,12 +114,10 @@ void AddStudyReadCommands(Command study) {
   Command watch = study.AddCommand("watch", "Print how far a study has come, until it is done");
   add_database(watch);
   const auto interval = std::make_shared<double>(5.0);
-  watch.AddOption("--interval", interval.get(), "Seconds between two looks")
-      .TypeName("S")
-      .Check(CheckInterval)
+  watch.AddOption("--interval S", interval.get(), "Seconds between two looks")
+      .Check(NumberFrom(0.1, 86400.0))
       .ShowDefault();
-  watch.AddOption("--page", out.get(), "Write the study's page at each look; it renews itself")
-      .TypeName("FILE.html");
+  watch.AddOption("--page FILE.html", out.get(), "Write the study's page at each look; it renews itself");
   watch.SetAction([=] {
     RequirePageName(*out);
     return WatchStudy(*database, *interval, *out);

@@ -1,11 +1,16 @@
 #include "harness/cli/terminal.h"
 
+#include <fmt/format.h>
 #include <sys/ioctl.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <cstdio>
 #include <cstdlib>
+#include <utility>
 
 namespace dexcheck::cli {
+
 namespace {
 
 bool TakesColors() {
@@ -49,6 +54,25 @@ std::string Wrap(std::string_view text, size_t indent) {
   }
 }
 
+std::string FormatTable(std::string_view align, const std::vector<TableRow>& rows) {
+  std::vector<size_t> widths(align.size(), 0);
+  for (const TableRow& row : rows) {
+    for (size_t i = 0; i < row.cells.size(); ++i) widths[i] = std::max(widths[i], row.cells[i].size());
+  }
+  std::string table;
+  for (const TableRow& row : rows) {
+    std::string line;
+    for (size_t i = 0; i < row.cells.size(); ++i) {
+      const std::string gap(widths[i] - row.cells[i].size(), ' ');
+      line += (i == 0 ? "" : "  ") + (align[i] == '<' ? row.cells[i] + gap : gap + row.cells[i]);
+    }
+    line.erase(line.find_last_not_of(' ') + 1);
+    if (!row.cells.empty() || row.note.empty()) table += line + "\n";
+    if (!row.note.empty()) table += Wrap(row.note, 6) + "\n";
+  }
+  return table;
+}
+
 std::string Paint(Tone tone, std::string_view text) {
   if (!TakesColors()) return std::string(text);
   const char* const code = tone == Tone::kGood      ? "32"
@@ -56,6 +80,73 @@ std::string Paint(Tone tone, std::string_view text) {
                            : tone == Tone::kWarning ? "33"
                                                     : "2";
   return "\033[" + std::string(code) + "m" + std::string(text) + "\033[0m";
+}
+
+namespace {
+
+constexpr int kUsualColumns = 80;  // of a terminal that does not report them
+constexpr int kWidestBar = 40;
+constexpr int kNarrowestBar = 8;
+constexpr std::chrono::milliseconds kRedrawEvery(100);
+// Before, what is left is not estimated: the first steps touch memory for the first time.
+constexpr double kLeastElapsed = 0.5;  // s
+
+}  // namespace
+
+ProgressBar::ProgressBar(std::string label, long total, bool quiet)
+    : label_(std::move(label)), total_(total), visible_(!quiet && ::isatty(STDERR_FILENO) != 0) {}
+
+std::string ProgressBar::MakeLine(long done, Clock::time_point now) const {
+  const int reported = CountColumns(STDERR_FILENO);
+  // The last column stays free: some terminals wrap when it is written.
+  const int columns = (reported > 0 ? reported : kUsualColumns) - 1;
+  const double fraction =
+      total_ > 0 ? std::clamp(static_cast<double>(done) / static_cast<double>(total_), 0.0, 1.0) : 1.0;
+  const double elapsed = std::chrono::duration<double>(now - *first_time_).count();
+  std::string end = fmt::format(" {:3.0f} %", 100.0 * fraction);
+  const std::string count = fmt::format(" ({} of {})", done, total_);
+  std::string left;
+  if (elapsed >= kLeastElapsed && done > first_done_) {
+    const double rate = static_cast<double>(done - first_done_) / elapsed;
+    left = fmt::format(", {:.0f} s left", static_cast<double>(total_ - done) / rate);
+  }
+  // What matters least goes first: the count, then the label's end, then the bar.
+  const auto room = [&](size_t used) { return columns - static_cast<int>(used) - 3; };  // " [" and "]"
+  std::string label = label_;
+  if (room(label.size() + end.size() + count.size() + left.size()) >= kNarrowestBar) end += count;
+  end += left;
+  if (room(label.size() + end.size()) < kNarrowestBar) {
+    const int shorter = static_cast<int>(label.size()) + room(label.size() + end.size()) - kNarrowestBar;
+    label.resize(static_cast<size_t>(std::max(shorter, 0)));
+  }
+  const int width = std::min(room(label.size() + end.size()), kWidestBar);
+  if (width < kNarrowestBar) return end.substr(0, static_cast<size_t>(std::max(columns, 0)));
+  const int filled = static_cast<int>(fraction * width);
+  return fmt::format("{} [{}{}]{}", label, std::string(static_cast<size_t>(filled), '#'),
+                     std::string(static_cast<size_t>(width - filled), '.'), end);
+}
+
+void ProgressBar::Update(long done) {
+  if (!visible_) return;
+  const Clock::time_point now = Clock::now();
+  if (!first_time_) {
+    first_time_ = now;
+    first_done_ = done;
+  }
+  if (drawn_ && now - last_drawn_ < kRedrawEvery) return;
+  last_drawn_ = now;
+  drawn_ = true;
+  // Without the rest of an earlier, longer line.
+  std::fputs(("\r" + MakeLine(done, now) + "\033[K").c_str(),
+             stderr);  // a terminal that has gone does not matter
+  std::fflush(stderr);
+}
+
+void ProgressBar::Finish() {
+  if (!drawn_) return;
+  drawn_ = false;
+  std::fputs("\r\033[K", stderr);
+  std::fflush(stderr);
 }
 
 }  // namespace dexcheck::cli

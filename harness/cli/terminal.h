@@ -2,8 +2,11 @@
 
 // What standard output and standard error are: terminals, how wide, and whether they take colours.
 
+#include <chrono>
+#include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace dexcheck::cli {
 
@@ -17,10 +20,46 @@ inline constexpr size_t kColumns = 80;
 /// longer stays whole.
 std::string Wrap(std::string_view text, size_t indent);
 
+/// A line of a table.
+struct TableRow {
+  std::vector<std::string> cells;  ///< None for an empty line.
+  std::string note = {};           ///< What is said below it, wrapped.
+};
+/// Columns as wide as their widest cells, two blanks apart. @param align of each column: '<' to the left, '>'
+/// to the right.
+std::string FormatTable(std::string_view align, const std::vector<TableRow>& rows);
+
 enum class Tone { kGood, kBad, kWarning, kFaint };
 
 /// The text in a colour when standard output is a terminal and the environment has no NO_COLOR (no-color.org)
 /// and no TERM=dumb; otherwise as it is.
 std::string Paint(Tone tone, std::string_view text);
+
+/// A line on standard error that shows how far long work has come, never wider than the terminal; silent when
+/// standard error is no terminal.
+class ProgressBar {
+ public:
+  ProgressBar(std::string label, long total, bool quiet);
+  ~ProgressBar() { Finish(); }
+  ProgressBar(const ProgressBar&) = delete;
+  ProgressBar& operator=(const ProgressBar&) = delete;
+
+  void Update(long done);
+  /// Clears the line.
+  void Finish();
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  [[nodiscard]] std::string MakeLine(long done, Clock::time_point now) const;
+
+  std::string label_;
+  long total_;
+  bool visible_;
+  bool drawn_ = false;
+  // The first update: what came before, such as coming to rest, says nothing of the speed.
+  std::optional<Clock::time_point> first_time_;
+  long first_done_ = 0;
+  Clock::time_point last_drawn_{};
+};
 
 }  // namespace dexcheck::cli

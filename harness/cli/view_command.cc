@@ -15,11 +15,10 @@
 #include "harness/cli/commands.h"
 #include "harness/cli/make_video.h"
 #include "harness/cli/output_file.h"
-#include "harness/cli/progress_bar.h"
 #include "harness/cli/run_folder.h"
 #include "harness/cli/run_report.h"
-#include "harness/view/recording.h"
-#include "harness/view/save_scenario.h"
+#include "harness/view/frame_source.h"
+#include "harness/view/live_run.h"
 #include "harness/view/viewer.h"
 
 namespace dexcheck::cli {
@@ -45,40 +44,6 @@ ExitCode ToExitCode(const Runner& runner) {
   return result.attribution.cause == Cause::kNone ? kSuccess : kDisagreement;
 }
 
-/// The part of a scenario that a session went through, once more and without a window: with the forces of the
-/// mouse in the scenario from the beginning, log and verdict are those of `dexcheck run`.
-class Rerun {
- public:
-  Rerun(const ViewRequest& request, const std::vector<std::string>& overrides,
-        const std::filesystem::path& folder, long rows)
-      : files_(FindScenario(request.what, overrides, request.seed)),
-        setup_(files_.scenario, files_.robot, files_.mjcf),
-        runner_(setup_, /*check=*/true) {
-    const std::filesystem::path log = folder / "log.h5";
-    std::error_code ignored;
-    std::filesystem::remove(log, ignored);  // of the session, in which forces came as they came
-    RunRecorder recorder(log, runner_.loop(), setup_,
-                         RunInputs{files_.robot, files_.mjcf, request.command, ""});
-    ProgressBar bar("recording", rows, /*quiet=*/false);
-    long done = 0;
-    runner_.Run(
-        [&](const StepRecord& step) {
-          recorder.Record(step);
-          bar.Update(++done);
-        },
-        [&] { return IsInterrupted() || done >= rows; });
-    bar.Finish();
-    recorder.Close(MakeSummary(setup_, runner_.loop(), runner_.result()).dump(2) + "\n");
-  }
-  [[nodiscard]] const Setup& setup() const { return setup_; }
-  [[nodiscard]] const Runner& runner() const { return runner_; }
-
- private:
-  ScenarioFiles files_;
-  Setup setup_;
-  Runner runner_;
-};
-
 /// Prints and writes what a session came to.
 ExitCode Conclude(const Setup& setup, const Runner& runner, const std::filesystem::path& folder) {
   if (!folder.empty()) {
@@ -89,6 +54,22 @@ ExitCode Conclude(const Setup& setup, const Runner& runner, const std::filesyste
     PrintRunReport(setup, runner.loop(), runner.result(), folder.string(), Detail::kCategories);
   }
   return ToExitCode(runner);
+}
+
+/// The part of a scenario that a session went through, once more and without a window: with the forces of the
+/// mouse in the scenario from the beginning, log and verdict are those of `dexcheck run`.
+ExitCode RunAgain(const ViewRequest& request, const std::vector<std::string>& overrides,
+                  const std::filesystem::path& folder, long rows) {
+  const ScenarioFiles files = FindScenario(request.what, overrides, request.seed);
+  const Setup setup(files.scenario, files.robot, files.mjcf);
+  Runner runner(setup, /*check=*/true);
+  const std::filesystem::path log = folder / "log.h5";
+  std::error_code ignored;
+  std::filesystem::remove(log, ignored);  // of the session, in which forces came as they came
+  RunRecorder recorder(log, runner.loop(), setup, RunInputs{files.robot, files.mjcf, request.command, ""});
+  RunWithProgress("recording", rows, /*quiet=*/false, &runner, &recorder);
+  recorder.Close(MakeSummary(setup, runner.loop(), runner.result()).dump(2) + "\n");
+  return Conclude(setup, runner, folder);
 }
 
 int ViewScenario(const ViewRequest& request) {
@@ -121,8 +102,7 @@ int ViewScenario(const ViewRequest& request) {
   if (!folder || !run->was_disturbed()) {
     return Conclude(run->setup(), run->runner(), folder ? folder->path() : std::filesystem::path());
   }
-  const Rerun again(request, run->ListOverrides(), folder->path(), run->rows());
-  return Conclude(again.setup(), again.runner(), folder->path());
+  return RunAgain(request, run->ListOverrides(), folder->path(), run->rows());
 }
 
 int View(const ViewRequest& request) {
@@ -148,19 +128,17 @@ void AddViewCommand(Command app, const std::string& command_line) {
   command.AddOption("SCENARIO|RUN_DIR", &request->what, "Scenario to run, or folder of a recorded run")
       .Required()
       .TypeName("");
-  command.AddOption("--out", &request->out, "Folder for log and summary, made by the run (none by default)")
-      .TypeName("DIR");
+  command.AddOption("--out DIR", &request->out,
+                    "Folder for log and summary, made by the run (none by default)");
   AddOverrideOptions(command, &request->overrides);
   AddSeedOption(command, &request->seed);
+  command.AddOption("--save FILE.toml", &request->save,
+                    "Where S saves the run as a scenario (SCENARIO-live.toml by default)");
   command
-      .AddOption("--save", &request->save,
-                 "Where S saves the run as a scenario (SCENARIO-live.toml by default)")
-      .TypeName("FILE.toml");
-  command.AddOption("--speed", &request->viewer.speed, "Simulated time against real time (1 by default)")
-      .TypeName("FACTOR")
+      .AddOption("--speed FACTOR", &request->viewer.speed, "Simulated time against real time (1 by default)")
       .Check(PositiveNumber());
   command.AddFlag("--paused", &request->viewer.paused, "Begin paused, after the first step");
-  command.AddOption("--size", &request->size, "Size of the picture in pixels").TypeName("WxH").ShowDefault();
+  command.AddOption("--size WxH", &request->size, "Size of the picture in pixels").ShowDefault();
   command.SetAction([=] {
     ReadSize(request->size, &request->viewer.width, &request->viewer.height);
     return View(*request);

@@ -15,7 +15,7 @@
 #include "harness/engine/engine.h"
 #include "harness/engine/exact_collision.h"
 #include "harness/engine/map_vector.h"
-#include "harness/engine/wheel_inertia.h"
+#include "harness/engine/robot_tree.h"
 
 namespace dexcheck {
 namespace {

@@ -10,7 +10,6 @@
 #include <string>
 
 #include "harness/descriptions/constant_table.h"
-#include "harness/engine/data_without_contacts.h"
 #include "harness/engine/engine.h"
 #include "harness/engine/exact_collision.h"
 #include "harness/engine/mujoco_release.h"

@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "controller/model/parameter_reader.h"
 #include "controller/model/robot_model.h"
-#include "controller/model/written_row.h"
 
 namespace dexcheck {
 

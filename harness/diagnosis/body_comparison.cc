@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "harness/engine/wheel_inertia.h"
+#include "harness/engine/robot_tree.h"
 
 namespace dexcheck {
 namespace {

@@ -4,7 +4,7 @@
 #include <utility>
 
 #include "controller/contact/adjoint.h"
-#include "controller/contact/rolling.h"
+#include "controller/contact/contact_geometry.h"
 #include "controller/model/platform.h"
 
 namespace dexcheck {

@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "controller/model/body_frame.h"
-#include "controller/model/mdh.h"
+#include "controller/model/robot_model.h"
 
 namespace dexcheck {
 namespace {

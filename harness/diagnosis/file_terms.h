@@ -4,7 +4,7 @@
 
 #include <vector>
 
-#include "controller/model/written_row.h"
+#include "controller/model/parameter_reader.h"
 #include "harness/diagnosis/repair.h"
 
 namespace dexcheck {

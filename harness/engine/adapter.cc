@@ -7,7 +7,6 @@
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
-#include "harness/engine/data_without_contacts.h"
 #include "harness/engine/engine.h"
 #include "harness/engine/map_vector.h"
 #include "harness/engine/robot_tree.h"

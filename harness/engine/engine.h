@@ -44,4 +44,19 @@ int FindByName(const mjModel& model, mjtObj type, const std::string& name);
 /// Whether a geom takes part in contacts at all: by an explicit pair, or by its contype or conaffinity.
 bool CanTouch(const mjModel& model, int geom);
 
+/// Data for what comes before contacts and constraints (mj_kinematics, mj_comPos, mj_rne, ...), without
+/// memory for those: in 2.2.2 the engine sets all of it to zero, which costs more than placing all bodies;
+/// later releases take it when contacts are found. @throws std::bad_alloc as MakeData.
+inline MjDataPtr MakeDataWithoutContacts(const mjModel& model) {
+  mjModel sizes = model;  // the arrays stay the model's
+  sizes.njmax = 0;
+  sizes.nconmax = 0;
+  return MakeData(sizes);
+}
+
+/// The engine compiles numbers that are not finite into its model and warns at most. This throws instead.
+/// @throws InputError "SOURCE: body "NAME": mass must be finite, got nan" for the first such number of the
+/// MJCF's options, bodies, joints, geoms, sites and contact pairs, and for a nan anywhere else.
+void CheckFinite(const mjModel& model, const std::string& source);
+
 }  // namespace dexcheck

@@ -5,13 +5,23 @@
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
-#include "harness/engine/data_without_contacts.h"
+#include "harness/engine/engine.h"
 #include "harness/engine/map_vector.h"
 #include "harness/engine/mujoco_release.h"
-#include "harness/engine/passive_forces.h"
 
 namespace dexcheck {
 namespace {
+
+/// qfrc_passive, those of tendons included, after positions (mj_comPos) and velocities (mj_comVel): springs,
+/// damping, fluid. The engine's mj_passive alone takes the tendons' lengths and rates as they happen to
+/// stand.
+void CalcPassiveForces(const mjModel& model, mjData* data) {
+  if (model.ntendon > 0) {
+    mj_tendon(&model, data);
+    CalcTendonVelocities(model, data);
+  }
+  mj_passive(&model, data);
+}
 
 std::vector<int> ListAll(size_t count) {
   std::vector<int> all(count);

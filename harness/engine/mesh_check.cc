@@ -1,4 +1,4 @@
-#include "harness/engine/mesh_check.h"
+#include "harness/engine/mjcf_passes.h"
 
 #include <strings.h>
 

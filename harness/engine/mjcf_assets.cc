@@ -4,7 +4,6 @@
 #include <system_error>
 
 #include "controller/common/text.h"
-#include "harness/engine/mesh_check.h"
 #include "harness/engine/mjcf_passes.h"
 #include "harness/engine/xml.h"
 

@@ -2,7 +2,9 @@
 
 // Passes over an MJCF, each of which changes it, notes what it did (MjcfFile::changes), or refuses it.
 
+#include <filesystem>
 #include <span>
+#include <string>
 #include <string_view>
 
 #include "harness/engine/mjcf_file.h"
@@ -42,5 +44,9 @@ tinyxml2::XMLElement* RequireCompiler(tinyxml2::XMLElement* root);
 
 /// Attributes of an element of that name (mesh, hfield, skin, texture) that name files; empty for others.
 std::span<const char* const> ListAssetAttributes(std::string_view element);
+
+/// What the engine cannot read of a mesh's file (STL, OBJ or MSH): "does not exist", "face 12 has vertex 900
+/// of 60". Empty when it can. The engine's own readers follow indices without looking at them.
+std::string FindMeshFault(const std::filesystem::path& file);
 
 }  // namespace dexcheck

@@ -19,7 +19,7 @@
 // | 3.10  | mj_fullM(m, d, M) |
 // | 3.11  | qM is gone: M has compressed rows of the lower triangle |
 //
-// What an MJCF says in another way since a release (limits by default, ...) stands in newer_mjcf_words.h.
+// What an MJCF says in another way since a release (limits by default, ...) stands in newer_mjcf.cc.
 
 #include <mujoco/mujoco.h>
 

@@ -8,6 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "harness/engine/adapter.h"
+
 namespace dexcheck {
 
 /// What carries the robot of a model.
@@ -26,5 +28,13 @@ RobotTree FindRobotTree(const mjModel& engine, const std::string& source);
 
 /// The floating body that carries a joint; 0 when the world does.
 int FindTree(const mjModel& engine, int joint);
+
+/// Moments of inertia of a wheel's body, kg m^2.
+struct WheelInertia {
+  double spin = 0.0;        ///< About its hinge.
+  double transverse = 0.0;  ///< Mean of those square to it.
+};
+
+WheelInertia CalcWheelInertia(const mjModel& engine, const EngineWheel& wheel);
 
 }  // namespace dexcheck

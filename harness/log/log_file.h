@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "harness/base/file_descriptor.h"
+#include "harness/base/files.h"
 #include "harness/log/log_content.h"
 
 namespace dexcheck {

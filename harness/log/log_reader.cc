@@ -19,8 +19,8 @@
 #include "controller/common/text.h"
 #include "harness/base/child_process.h"
 #include "harness/log/hdf5_handle.h"
+#include "harness/log/log_content.h"
 #include "harness/log/log_file.h"
-#include "harness/log/old_names.h"
 
 namespace dexcheck {
 namespace {
@@ -248,9 +248,7 @@ auto Guard(const std::filesystem::path& path, const Work& work) {
 
 [[noreturn]] void FailToFind(const std::filesystem::path& path, const std::string& kind,
                              const std::string& name, const std::vector<std::string>& known) {
-  const std::string nearest = FindNearest(name, known);
-  throw InputError(path.string() + ": no " + kind + " " + Quote(name) +
-                   (nearest.empty() ? "" : ", did you mean " + Quote(nearest) + "?"));
+  throw InputError(path.string() + ": no " + kind + " " + Quote(name) + SuggestNearest(name, known));
 }
 
 }  // namespace
@@ -354,10 +352,9 @@ std::vector<SignalInfo> ChooseSignals(const LogReader& log, const std::vector<st
   for (const std::string& pattern : patterns) {
     if (std::any_of(names.begin(), names.end(), [&](const auto& name) { return matches(pattern, name); }))
       continue;
-    const std::string nearest = FindNearest(pattern, names);
+    const std::string nearest = SuggestNearest(pattern, names);
     throw InputError("--signals: no signal matches " + Quote(pattern) +
-                     (nearest.empty() ? " (dexcheck export --list names them)"
-                                      : ", did you mean " + Quote(nearest) + "?"));
+                     (nearest.empty() ? " (dexcheck export --list names them)" : nearest));
   }
   std::vector<SignalInfo> chosen;
   for (const SignalInfo& signal : log.signals()) {

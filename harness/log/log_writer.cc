@@ -13,7 +13,7 @@
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
-#include "harness/base/partial_file.h"
+#include "harness/base/files.h"
 
 namespace dexcheck {
 namespace {

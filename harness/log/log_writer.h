@@ -10,7 +10,7 @@
 #include <string_view>
 #include <vector>
 
-#include "harness/base/partial_file.h"
+#include "harness/base/files.h"
 #include "harness/log/log_content.h"
 #include "harness/log/log_file.h"
 

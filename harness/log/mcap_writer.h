@@ -11,7 +11,7 @@
 #include <string_view>
 #include <vector>
 
-#include "harness/base/partial_file.h"
+#include "harness/base/files.h"
 
 namespace dexcheck {
 

@@ -5,13 +5,11 @@
 #include <string>
 #include <vector>
 
-#include "controller/control/measured_state.h"
+#include "controller/control/grasp_model.h"
 #include "controller/dynamics/model_terms.h"
 #include "harness/plant/imperfections.h"
-#include "harness/plant/part_context.h"
-#include "harness/plant/plant_reading.h"
+#include "harness/plant/plant.h"
 #include "harness/plant/random_stream.h"
-#include "harness/plant/wrench.h"
 
 namespace dexcheck {
 

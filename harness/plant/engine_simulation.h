@@ -69,4 +69,7 @@ class EngineSimulation {
   std::vector<int> dofs_;    // likewise
 };
 
+/// The contact of `body` with `other`, after the step's forces are known.
+BodyContact ReadBodyContact(const mjModel& m, const mjData& d, int body, int other);
+
 }  // namespace dexcheck

@@ -4,7 +4,6 @@
 #include <vector>
 
 #include "harness/plant/imperfections.h"
-#include "harness/plant/part_context.h"
 #include "harness/plant/plant.h"
 
 namespace dexcheck {

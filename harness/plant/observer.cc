@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "controller/common/text.h"
-#include "controller/contact/find_contact.h"
+#include "controller/contact/contact_geometry.h"
 #include "controller/model/platform.h"
 #include "harness/engine/map_vector.h"
 #include "harness/engine/mujoco_release.h"

@@ -9,7 +9,7 @@
 #include "controller/contact/shapes.h"
 #include "harness/engine/velocity_map.h"
 #include "harness/plant/engine_simulation.h"
-#include "harness/plant/plant_reading.h"
+#include "harness/plant/plant.h"
 
 namespace dexcheck {
 

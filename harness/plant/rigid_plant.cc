@@ -4,9 +4,7 @@
 #include <cmath>
 
 #include "controller/common/text.h"
-#include "controller/contact/find_contact.h"
-#include "controller/contact/object_surface.h"
-#include "controller/contact/rolling.h"
+#include "controller/contact/contact_geometry.h"
 #include "controller/contact/shapes.h"
 #include "controller/model/platform.h"
 #include "controller/object/object_dynamics.h"

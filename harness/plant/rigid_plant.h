@@ -24,7 +24,6 @@
 #include "controller/control/grasp_terms.h"
 #include "controller/dynamics/model_terms.h"
 #include "harness/engine/velocity_map.h"
-#include "harness/plant/integrator.h"
 #include "harness/plant/plant.h"
 
 namespace dexcheck {

@@ -4,15 +4,62 @@
 
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <cmath>
+#include <cstring>
+#include <iterator>
+#include <memory>
+#include <optional>
 #include <system_error>
+#include <utility>
 
 #include "controller/common/errors.h"
 #include "harness/base/files.h"
+#include "harness/base/interrupts.h"
 #include "harness/report/page_assets.h"
 #include "harness/report/page_frame.h"
+#include "harness/report/recorded_frames.h"
+#include "renders/renderer.h"
+#include "renders/video.h"
+#include "renders/video_writer.h"
+#include "renders/viewpoint.h"
 
 namespace dexcheck {
+
+namespace {
+
+/// @param holds whether an object, as in the paper's figures.
+std::vector<Picture> DrawConfigurations(const RecordedFrames& run, bool holds,
+                                        const std::filesystem::path& folder) {
+  const std::array<RunView, 1> views = {{{run.model.get(), &run.frames}}};
+  VideoOptions options;
+  options.width = 960;
+  options.height = 600;
+  options.camera = kRobotCamera;
+  constexpr double kLongWay = 1.0;  // m, on which one wants to see how far it came
+  const MjDataPtr data = MakeData(*run.model);
+  if (FindWay(*run.model, run.frames, data.get()).length > kLongWay) options.inset = kCourseCamera;
+  options.tracks = true;
+  options.panel = false;
+  VideoPainter painter(views, options);
+  const std::string who = holds ? "Robot and object" : "Robot";
+  const std::array<Picture, 2> pictures = {
+      {{folder / "fig11a.png", holds ? "11 (a)" : "", who + " at the beginning"},
+       {folder / "fig11b.png", holds ? "11 (b)" : "", who + " at the end"}}};
+  WritePicture(pictures[0].file, painter.Paint(0.0));
+  WritePicture(pictures[1].file, painter.Paint(run.frames.duration()));
+  return {pictures.begin(), pictures.end()};
+}
+
+}  // namespace
+
+RunScene MakeRunScene(const RunData& run, const std::filesystem::path& folder) {
+  if (run.Find("engine/qpos") == nullptr) return {};
+  const RecordedFrames frames = ReadRecordedFrames(run.log());
+  return {DrawConfigurations(frames, !run.moves_joints(), folder),
+          MakeReplayData(*frames.model, frames.frames)};
+}
+
 namespace {
 
 using Json = nlohmann::ordered_json;
@@ -242,6 +289,98 @@ std::string MakePage(const RunData& run, const PageContent& content) {
   } catch (const nlohmann::json::exception& error) {
     throw InputError(run.log().path().string() + ": summary: " + error.what());
   }
+}
+
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Copies pictures into a folder, which it makes when it is not there. Destroyed before Commit, it leaves
+/// nothing.
+class FigureFolder {
+ public:
+  explicit FigureFolder(fs::path folder) : folder_(std::move(folder)) {
+    const HeldSignals until_protected;
+    std::error_code error;
+    made_ = fs::create_directory(folder_, error);
+    if (error || !fs::is_directory(folder_)) {
+      throw InputError(folder_.string() +
+                       ": cannot be made: " + (error ? error.message() : std::strerror(ENOTDIR)));
+    }
+    if (made_) protection_.emplace(folder_);
+  }
+  ~FigureFolder() {
+    files_.clear();
+    std::error_code ignored;
+    if (made_) fs::remove(folder_, ignored);
+  }
+  FigureFolder(const FigureFolder&) = delete;
+  FigureFolder& operator=(const FigureFolder&) = delete;
+
+  void Add(const fs::path& picture) {
+    files_.push_back(std::make_unique<PartialFile>(folder_ / picture.filename()));
+    std::error_code error;
+    fs::copy_file(picture, files_.back()->partial(), fs::copy_options::overwrite_existing, error);
+    if (error) files_.back()->Fail(error.message());
+  }
+
+  void Commit() {
+    for (const auto& file : files_) file->Commit();
+    made_ = false;
+    protection_.reset();
+  }
+
+ private:
+  fs::path folder_;
+  std::vector<std::unique_ptr<PartialFile>> files_;
+  bool made_ = false;
+  std::optional<TemporaryPath> protection_;  // of a folder that was made
+};
+
+/// The video beside the log, and how the page can link to it.
+void AddVideo(const fs::path& run_dir, const fs::path& page, PageContent* content) {
+  const fs::path video = run_dir / "video.mp4";
+  std::error_code error;
+  if (!fs::is_regular_file(video, error)) return;
+  content->video = video;
+  const fs::path folder = fs::absolute(page).parent_path();
+  content->video_link = fs::proximate(fs::absolute(video), folder, error).generic_string();
+}
+
+}  // namespace
+
+ReportFiles MakeReportFiles(const fs::path& run_dir) {
+  return {run_dir / "report.html", run_dir / "figures"};
+}
+
+void WriteRunReport(const fs::path& run_dir, const ReportFiles& files, const SceneMaker& make_scene) {
+  const RunData run(run_dir);
+  PartialFile page(files.page);
+  std::optional<FigureFolder> folder;
+  if (!files.figures.empty()) folder.emplace(files.figures);
+
+  const TemporaryFolder drawings;
+  PageContent content;
+  content.figures = MakeMotionFigures(run);
+  std::vector<Figure> residuals = MakeResidualFigures(run);
+  std::move(residuals.begin(), residuals.end(), std::back_inserter(content.figures));
+  std::vector<Figure> printed;
+  std::copy_if(content.figures.begin(), content.figures.end(), std::back_inserter(printed),
+               [](const Figure& figure) { return figure.printed; });
+  DrawFigures(printed, run.time(), drawings.path());
+  content.scene = make_scene(run, drawings.path());
+  AddVideo(run_dir, files.page, &content);
+  page.Write(MakePage(run, content));
+
+  if (folder) {
+    for (const Picture& picture : content.scene.pictures) folder->Add(picture.file);
+    for (const Figure& figure : printed) {
+      folder->Add(drawings.path() / (figure.name + ".pdf"));
+      folder->Add(drawings.path() / (figure.name + ".png"));
+    }
+    folder->Commit();
+  }
+  page.Commit();
 }
 
 }  // namespace dexcheck

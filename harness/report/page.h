@@ -3,14 +3,36 @@
 // The page of evidence.
 
 #include <filesystem>
+#include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "harness/report/figure.h"
+#include "harness/report/replay.h"
 #include "harness/report/run_data.h"
-#include "harness/report/run_scene.h"
 
 namespace dexcheck {
+
+// What of a run is seen in space: pictures and the replay of its page.
+
+/// A picture of the run.
+struct Picture {
+  std::filesystem::path file;  ///< PNG.
+  std::string panel;           ///< Number in the paper, "11 (a)"; or empty.
+  std::string title;
+};
+
+struct RunScene {
+  std::vector<Picture> pictures;
+  std::optional<ReplayData> replay;
+};
+
+/// The paper's Figure 11, robot and object at the run's beginning and end, and the replay. Empty when the log
+/// has no positions of the engine.
+/// @param folder gets the pictures' files.
+/// @throws InputError that names the log and what is wrong with it.
+RunScene MakeRunScene(const RunData& run, const std::filesystem::path& folder);
 
 /// What stands in the page besides the run.
 struct PageContent {
@@ -24,5 +46,35 @@ struct PageContent {
 /// inputs.
 /// @throws InputError that names the log when its summary is none.
 std::string MakePage(const RunData& run, const PageContent& content);
+
+// The report of a recorded run: a page and its figures.
+
+/// Where a report goes.
+struct ReportFiles {
+  std::filesystem::path page;
+  std::filesystem::path figures;  ///< Folder for the figures' PDF and PNG files; empty for none.
+};
+
+/// Makes pictures and replay of a run, as MakeRunScene.
+using SceneMaker = std::function<RunScene(const RunData& run, const std::filesystem::path& folder)>;
+
+/// RUN_DIR/report.html and RUN_DIR/figures.
+ReportFiles MakeReportFiles(const std::filesystem::path& run_dir);
+
+/// Writes the report, all of it or nothing. The page holds all that it shows; RUN_DIR/video.mp4, if it is
+/// there, is embedded up to 20 MB.
+/// @param run_dir folder with the run's log.h5.
+/// @param make_scene called with a folder to put pictures in, from which they go to the figures' folder.
+/// @throws InputError, one line, when there is no log, or one without rows, or a file cannot be written.
+void WriteRunReport(const std::filesystem::path& run_dir, const ReportFiles& files,
+                    const SceneMaker& make_scene = MakeRunScene);
+
+/// Panels of the paper's Figures 12 and 13, as far as the log has their signals, and plots beside them: the
+/// object's error, the other torques, how far friction is used.
+std::vector<Figure> MakeMotionFigures(const RunData& run);
+
+/// One figure for each category of checks that was evaluated: its checks' values as fractions of their
+/// bounds.
+std::vector<Figure> MakeResidualFigures(const RunData& run);
 
 }  // namespace dexcheck

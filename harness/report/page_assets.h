@@ -10,12 +10,11 @@ extern const char* const kPageHtml;
 extern const char* const kRunJs;
 extern const char* const kCampaignJs;
 extern const char* const kComparisonJs;
-extern const char* const kPageJs;  ///< Needs dygraphs.
+extern const char* const kPageJs;  ///< Needs kChartsJs.
 extern const char* const kReplayHtml;
 extern const char* const kReplayJs;
 extern const char* const kThreeJs;
 extern const char* const kChartJs;  ///< Chart.js: window.Chart.
-extern const char* const kDygraphCss;
-extern const char* const kDygraphJs;
+extern const char* const kChartsJs;  ///< What it gets of a page's charts.
 
 }  // namespace dexcheck

@@ -2,12 +2,65 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
+#include <bit>
 #include <cmath>
+#include <cstdint>
+#include <nlohmann/json.hpp>
 
+#include "harness/report/figure.h"
 #include "harness/report/page_assets.h"
-#include "harness/report/page_plots.h"
 
 namespace dexcheck {
+
+std::string EncodeBase64(std::string_view bytes) {
+  static constexpr std::string_view kDigits =
+      "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string text;
+  text.reserve((bytes.size() + 2) / 3 * 4);
+  for (size_t i = 0; i < bytes.size(); i += 3) {
+    std::uint32_t group = 0;
+    for (size_t k = 0; k < 3; ++k) {
+      group = group << 8U | (i + k < bytes.size() ? static_cast<unsigned char>(bytes[i + k]) : 0U);
+    }
+    for (size_t k = 0; k < 4; ++k) {
+      text += i + k > bytes.size() ? '=' : kDigits[group >> (18U - 6U * k) & 63U];
+    }
+  }
+  return text;
+}
+
+// Outside strings JSON has no "<", and in them it may be written so.
+std::string EmbedJson(const std::string& id, const nlohmann::ordered_json& json) {
+  std::string text = json.dump(-1, ' ', /*ensure_ascii=*/false, nlohmann::json::error_handler_t::replace);
+  for (size_t at = text.find('<'); at != std::string::npos; at = text.find('<', at))
+    text.replace(at, 1, "\\u003c");
+  return fmt::format("<script type=\"application/json\" id=\"{}\">{}</script>\n", id, text);
+}
+
+std::string EmbedBytes(const std::string& id, std::string_view bytes) {
+  return fmt::format("<script type=\"text/plain\" id=\"{}\">{}</script>\n", id, EncodeBase64(bytes));
+}
+
+std::string FormatShort(double value) {
+  if (!std::isfinite(value)) return "infinite";
+  if (value == 0.0) return "0";
+  const double size = std::abs(value);
+  return size >= 0.01 && size < 1e4 ? fmt::format("{:.3g}", value) : fmt::format("{:.1e}", value);
+}
+
+std::string FormatFraction(double fraction) {
+  if (!std::isfinite(fraction)) return "beyond any bound";
+  if (fraction == 0.0) return "0";
+  if (fraction > 10.0) return FormatShort(fraction) + " ×";
+  const double percent = 100.0 * fraction;
+  if (percent < 0.01) return "< 0.01 %";
+  // Two digits, but 99.7 % is not yet the whole bound, and 150 % is no power of ten.
+  if (percent >= 99.5) return fmt::format("{:.{}f} %", percent, percent < 100.0 ? 1 : 0);
+  return fmt::format("{:.2g} %", percent);
+}
+
 namespace {
 
 constexpr const char* kContentPolicy =
@@ -41,16 +94,65 @@ std::string AssemblePlotPage(const std::string& title, const char* script, const
                              const std::vector<Figure>& figures, const VectorXd& time,
                              const ReplayData* replay) {
   PageParts parts{.title = title,
-                  .styles = {kDygraphCss},
                   .markup = {kPageHtml},
                   .data = data + EmbedPlots(figures, time),
-                  .scripts = {script, kDygraphJs, kPageJs}};
+                  .scripts = {script, kChartJs, kChartsJs, kPageJs}};
   if (replay != nullptr) {
     parts.markup.push_back(kReplayHtml);
     parts.data += EmbedJson("replay-scene", replay->json) + EmbedBytes("replay-values", replay->values);
     parts.scripts.insert(parts.scripts.end(), {kThreeJs, kReplayJs});
   }
   return AssemblePage(parts);
+}
+
+namespace {
+
+static_assert(std::endian::native == std::endian::little, "browsers read the numbers in this order");
+
+/// Of all plots together: about 3 MB of base64.
+constexpr long kMostNumbers = 560'000;
+constexpr long kFewestPoints = 1000;
+
+/// Times in microseconds' resolution, which keeps their text short.
+double RoundTime(double time) { return std::round(1e6 * time) / 1e6; }
+
+}  // namespace
+
+std::string EmbedPlots(const std::vector<Figure>& figures, const VectorXd& time) {
+  long curves = 0;
+  for (const Figure& figure : figures) curves += static_cast<long>(figure.curves.size());
+  const Thinning thinning(time, std::max(kMostNumbers / std::max(curves, 1L), kFewestPoints));
+  nlohmann::ordered_json json;
+  std::string bytes;
+  for (const double t : thinning.times()) json["times"].push_back(RoundTime(t));
+  json["points"] = thinning.times().size();
+  json["plots"] = nlohmann::ordered_json::array();
+  int series = 0;
+  for (const Figure& figure : figures) {
+    nlohmann::ordered_json plot = {
+        {"name", figure.name}, {"panel", figure.panel}, {"title", figure.title},
+        {"note", figure.note}, {"label", figure.label}, {"right", figure.right_label},
+        {"log", figure.log},   {"bound", nullptr},      {"range", CalcAxisRange(figure, false)}};
+    if (!figure.right_label.empty()) plot["right_range"] = CalcAxisRange(figure, true);
+    if (figure.bound) plot["bound"] = *figure.bound;
+    for (const Curve& curve : figure.curves) {
+      plot["curves"].push_back({{"id", "s" + std::to_string(series)},
+                                {"label", curve.label},
+                                {"color", FindColor(curve.color)},
+                                {"background", curve.color == kGrey},
+                                {"dashes", FindDashes(curve.dash)},
+                                {"right", curve.right_axis},
+                                {"wide", curve.wide},
+                                {"series", series}});
+      ++series;
+      for (const double value : thinning.Apply(curve.values)) {
+        const auto number = std::bit_cast<std::array<char, 4>>(static_cast<float>(value));
+        bytes.append(number.data(), number.size());
+      }
+    }
+    json["plots"].push_back(plot);
+  }
+  return EmbedJson("run-plots", json) + EmbedBytes("run-values", bytes);
 }
 
 }  // namespace dexcheck

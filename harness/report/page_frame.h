@@ -2,14 +2,32 @@
 
 // How a page is put together: built-in markup and scripts, and the data that the scripts make it of.
 
+#include <nlohmann/json_fwd.hpp>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "harness/report/figure.h"
-#include "harness/report/page_text.h"
 #include "harness/report/replay.h"
 
 namespace dexcheck {
+
+// Data and texts of pages. A page's script makes its elements of them, so that no text can become markup.
+
+std::string EncodeBase64(std::string_view bytes);
+
+/// A script element that holds data. Text that is no UTF-8 is mended, and nothing in it can end the element.
+/// @param id markup already.
+std::string EmbedJson(const std::string& id, const nlohmann::ordered_json& json);
+
+/// A script element that holds bytes as base64.
+std::string EmbedBytes(const std::string& id, std::string_view bytes);
+
+/// "2.6e-15", "0", "infinite".
+std::string FormatShort(double value);
+
+/// "4.5 %", "0", "over 1000 x": a check's value as a fraction of its bound.
+std::string FormatFraction(double fraction);
 
 /// A page that loads nothing.
 struct PageParts {
@@ -29,5 +47,11 @@ std::string AssemblePage(const PageParts& parts);
 std::string AssemblePlotPage(const std::string& title, const char* script, const std::string& data,
                              const std::vector<Figure>& figures, const VectorXd& time,
                              const ReplayData* replay = nullptr);
+
+// The numbers behind the page's plots.
+
+/// In the form that the page's script reads: times, plots, curves, and the curves' values as 4-byte floats,
+/// curve by curve. @param time of the curves' values, s.
+std::string EmbedPlots(const std::vector<Figure>& figures, const VectorXd& time);
 
 }  // namespace dexcheck

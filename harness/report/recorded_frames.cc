@@ -8,8 +8,8 @@
 #include "controller/common/errors.h"
 #include "controller/handling/pick_and_place.h"
 #include "harness/base/files.h"
+#include "harness/engine/compiled_model.h"
 #include "harness/engine/mjcf_file.h"
-#include "harness/engine/skeleton.h"
 #include "harness/report/run_data.h"
 
 namespace dexcheck {

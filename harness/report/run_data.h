@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "harness/base/check_summary.h"
+#include "harness/base/check_record.h"
 #include "harness/log/log_reader.h"
 
 namespace dexcheck {

@@ -9,10 +9,10 @@
 #include <utility>
 
 #include "controller/common/text.h"
-#include "controller/contact/object_surface.h"
+#include "controller/contact/shapes.h"
 #include "controller/control/computed_torque.h"
 #include "controller/control/constrained_dynamics.h"
-#include "controller/control/joint_law.h"
+#include "controller/control/joint_controller.h"
 #include "harness/checks/check_table.h"
 #include "harness/engine/engine.h"
 

@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "harness/base/files.h"
-#include "harness/base/git_revision.h"
 #include "harness/base/version.h"
 #include "harness/engine/machine.h"
 #include "harness/engine/mjcf_file.h"

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "harness/base/check_summary.h"
+#include "harness/base/check_record.h"
 #include "harness/base/version.h"
 #include "harness/diagnosis/run_causes.h"
 #include "harness/engine/machine.h"

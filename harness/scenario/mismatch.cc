@@ -5,7 +5,6 @@
 
 #include "controller/common/errors.h"
 #include "controller/dynamics/model_terms.h"
-#include "harness/engine/data_without_contacts.h"
 #include "harness/engine/engine.h"
 #include "harness/plant/random_stream.h"
 #include "harness/scenario/robot_pair.h"

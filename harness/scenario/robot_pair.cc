@@ -7,8 +7,7 @@
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
 #include "controller/model/parameter_reader.h"
-#include "harness/engine/add_contact_pairs.h"
-#include "harness/engine/remove_looks.h"
+#include "harness/engine/compiled_model.h"
 
 namespace dexcheck {
 namespace {

@@ -19,10 +19,10 @@
 #include "controller/control/baseline_law.h"
 #include "controller/control/computed_torque.h"
 #include "controller/control/object_tracking.h"
-#include "controller/control/trajectory_reader.h"
+#include "controller/control/trajectory.h"
 #include "controller/handling/pick_and_place.h"
 #include "harness/plant/imperfections.h"
-#include "harness/plant/integrator.h"
+#include "harness/plant/plant.h"
 
 namespace dexcheck {
 

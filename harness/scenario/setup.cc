@@ -3,7 +3,6 @@
 #include <utility>
 
 #include "controller/common/errors.h"
-#include "controller/contact/object_surface.h"
 #include "controller/contact/shapes.h"
 #include "controller/model/parameter_reader.h"
 #include "harness/engine/engine.h"

@@ -10,7 +10,6 @@
 #include "controller/control/grasp_controller.h"
 #include "controller/control/trajectory.h"
 #include "controller/model/robot_model.h"
-#include "harness/plant/part_context.h"
 #include "harness/plant/plant.h"
 #include "harness/scenario/robot_pair.h"
 #include "harness/scenario/scenario.h"

@@ -6,13 +6,11 @@
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
-#include "controller/contact/find_contact.h"
-#include "controller/contact/fingertip_rim.h"
-#include "controller/contact/object_surface.h"
+#include "controller/contact/contact_geometry.h"
 #include "controller/contact/shapes.h"
 #include "controller/grasp/finger_placement.h"
 #include "controller/object/euler_zyz.h"
-#include "harness/engine/data_without_contacts.h"
+#include "harness/engine/engine.h"
 #include "harness/engine/mujoco_release.h"
 
 namespace dexcheck {

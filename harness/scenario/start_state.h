@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "controller/contact/surface.h"
-#include "controller/control/joint_law.h"
+#include "controller/control/joint_controller.h"
 #include "controller/control/joint_motion.h"
 #include "controller/grasp/contact_plan.h"
 #include "harness/plant/observer.h"

@@ -29,9 +29,7 @@ Outcome ParseOutcome(const std::string& name) {
   if (const auto outcome = FindOutcome(name)) return *outcome;
   std::vector<std::string> known;
   for (int i = 0; i < kNumOutcomes; ++i) known.emplace_back(NameOf(static_cast<Outcome>(i)));
-  const std::string nearest = FindNearest(name, known);
-  throw std::invalid_argument("no outcome is called " + Quote(name) +
-                              (nearest.empty() ? "" : ", did you mean " + Quote(nearest) + "?"));
+  throw std::invalid_argument("no outcome is called " + Quote(name) + SuggestNearest(name, known));
 }
 
 /// Of trials that were not held, the earlier the larger: from 1 to 2.

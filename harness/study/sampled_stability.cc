@@ -1,11 +1,17 @@
 #include "harness/study/sampled_stability.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
+#include <limits>
 #include <utility>
 
+#include "harness/plant/velocity_filter.h"
+#include "harness/study/trial.h"
+
 namespace dexcheck {
+
 namespace {
 
 /// b = (T^2 + h T) / 2: what e gains from an acceleration that is held.
@@ -156,6 +162,91 @@ std::vector<double> CalcStepResponse(const SampledLoop& loop, const AxisGains& g
     chain.Step(i);
   }
   return errors;
+}
+
+namespace {
+
+/// The faults of sensing and motors that all axes have alike.
+SampledLoop MakeLoop(const Scenario& scenario) {
+  SampledLoop loop;
+  loop.time_step = scenario.plant.time_step;
+  loop.hold = std::max(1L, std::lround(scenario.plant.control_step / scenario.plant.time_step));
+  const SensingOptions& sensing = scenario.imperfections.sensing;
+  const ActuationOptions& actuation = scenario.imperfections.actuation;
+  loop.delay = actuation.delay;
+  loop.latency =
+      CountSteps(sensing.latency, loop.time_step) + CountSteps(sensing.object_latency, loop.time_step);
+  if (sensing.object_velocity == VelocitySource::kDifferenced) {
+    loop.low_pass = CalcLowPassGain(sensing.object_velocity_cutoff, loop.time_step);
+  }
+  if (actuation.lag.groups.empty()) loop.lag = actuation.lag.all;
+  return loop;
+}
+
+AxisGains GainsOf(const Scenario& scenario, int axis) {
+  return {scenario.control.gains.K_p[axis], scenario.control.gains.K_v[axis]};
+}
+
+/// Whether the object's position follows (57), with what MakeLoop takes into account and nothing besides.
+bool FollowsErrorDynamics(const Scenario& scenario) {
+  Imperfections rest = scenario.imperfections;
+  rest.actuation.delay = rest.actuation.lag.all = 0.0;
+  rest.actuation.saturate = false;
+  rest.sensing.latency = rest.sensing.object_latency = 0.0;
+  if (rest.sensing.object_velocity == VelocitySource::kDifferenced) {
+    rest.sensing.object_velocity = VelocitySource::kMeasured;
+    rest.sensing.object_velocity_cutoff = 0.0;
+  }
+  return rest.is_ideal() && scenario.control.law == ControlLaw::kComputedTorque &&
+         scenario.control.contact_error == 0.0 && scenario.trajectory_task() != nullptr &&
+         scenario.start_error().head<3>().norm() > 0.0;
+}
+
+/// Metrics of the object's position, as TrialMonitor has them; of a loop that is stable.
+void PredictMetrics(const Scenario& scenario, const SampledLoop& loop,
+                    std::array<double, kNumMetrics>* metrics) {
+  const auto steps = static_cast<size_t>(std::lround(scenario.duration / loop.time_step));
+  const Vector3d start = scenario.start_error().head<3>();
+  std::vector<Vector3d> errors(steps, Vector3d::Zero());
+  for (int axis = 0; axis < 3; ++axis) {
+    if (start[axis] == 0.0) continue;
+    const std::vector<double> response =
+        CalcStepResponse(loop, GainsOf(scenario, axis), static_cast<long>(steps));
+    for (size_t k = 0; k < steps; ++k) errors[k][axis] = start[axis] * response[k];
+  }
+  double squares = 0.0, largest = 0.0, overshoot = 0.0, settled_since = 0.0;
+  std::array<double, 4> quarters{};
+  bool settled = false;
+  for (size_t k = 0; k < steps; ++k) {
+    const double size = errors[k].norm();
+    squares += size * size;
+    quarters[4 * k / steps] += size * size;
+    largest = std::max(largest, size);
+    overshoot = std::max(overshoot, -errors[k].dot(start) / start.squaredNorm());
+    const bool inside = size <= kSettledFraction * start.norm();
+    if (inside && !settled) settled_since = static_cast<double>(k) * loop.time_step;
+    settled = inside;
+  }
+  (*metrics)[kPositionErrorRms] = std::sqrt(squares / static_cast<double>(steps));
+  (*metrics)[kPositionErrorMax] = largest;
+  if (settled) (*metrics)[kSettlingTime] = settled_since;
+  (*metrics)[kOvershoot] = overshoot;
+  (*metrics)[kErrorGrowth] = std::sqrt(quarters[3] / quarters[0]);
+}
+
+}  // namespace
+
+Theory CalcTheory(const StudyInputs& inputs, const std::vector<double>& parameters) {
+  Theory theory;
+  theory.metrics.fill(std::numeric_limits<double>::quiet_NaN());
+  const Scenario scenario = MakeTrialScenario(inputs, {0, 0, parameters});
+  const SampledLoop loop = MakeLoop(scenario);
+  for (int axis = 0; axis < 6; ++axis) {
+    if (axis > 0 && GainsOf(scenario, axis) == GainsOf(scenario, axis - 1)) continue;
+    theory.radius = std::max(theory.radius, CalcSpectralRadius(loop, GainsOf(scenario, axis)));
+  }
+  if (theory.is_stable() && FollowsErrorDynamics(scenario)) PredictMetrics(scenario, loop, &theory.metrics);
+  return theory;
 }
 
 }  // namespace dexcheck

@@ -21,7 +21,10 @@
 // that lag make a longer chain of states. One period of it is a matrix A, of which column i is what a period
 // makes of the i-th unit state, and its spectral radius is lim |A^n|^(1/n), here with n = 2^40 by squaring.
 
+#include <array>
 #include <vector>
+
+#include "harness/study/trial.h"
 
 namespace dexcheck {
 
@@ -54,5 +57,27 @@ double CalcSpectralRadius(const SampledLoop& loop, const AxisGains& gains);
 
 /// Errors at the beginning of each of `count` steps of h, from e = 1 and e_dot = 0.
 std::vector<double> CalcStepResponse(const SampledLoop& loop, const AxisGains& gains, long count);
+
+// What the sampled error dynamics say of a study's trials.
+
+/// What (57) says of one trial, stepped as the plant steps it.
+struct Theory {
+  double radius = 0.0;  ///< Largest |eigenvalue| of one sample, of all axes.
+  /// Metrics of the object's position as (57) alone makes them of the start error: rms, maximum, settling
+  /// time, overshoot, growth, over the steps of the run. In a loop that is not sampled, and a run of time T
+  /// that is long enough, rms^2 T = sum over the axes of e0^2 (K_v^2 + K_p) / (2 K_v K_p).
+  /// NaN for all other metrics, and for these too where the object does not start beside its place, where
+  /// (57) is unstable, or where more than it moves the object: another law, a plant that is not ideal in
+  /// anything but delay, latency, the filter of the object's velocity and lag.
+  std::array<double, kNumMetrics> metrics{};
+  [[nodiscard]] bool is_stable() const { return radius < 1.0; }
+};
+
+/// @param parameters values of the varied keys. @throws InputError as MakeTrialScenario.
+Theory CalcTheory(const StudyInputs& inputs, const std::vector<double>& parameters);
+
+/// Metrics that CalcTheory knows.
+inline constexpr std::array kPredictedMetrics = {kPositionErrorRms, kPositionErrorMax, kSettlingTime,
+                                                 kOvershoot, kErrorGrowth};
 
 }  // namespace dexcheck

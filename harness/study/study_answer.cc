@@ -6,10 +6,11 @@
 #include <array>
 #include <cmath>
 
-#include "harness/study/margin_search.h"
-#include "harness/study/study_sensitivity.h"
+#include "harness/study/sampling.h"
+#include "harness/study/search.h"
 
 namespace dexcheck {
+
 namespace {
 
 std::string CountPoints(size_t count) { return fmt::format("{} point{}", count, count == 1 ? "" : "s"); }
@@ -199,6 +200,33 @@ std::vector<std::string> AnswerStudy(const Study& study, const std::vector<Trial
                                                    : DescribeFront(study, points));
   }
   return answers;
+}
+
+StudyProgress FindProgress(const StudyStore& store) {
+  const Study& study = store.study();
+  StudyProgress progress;
+  progress.total = CountTrials(study);
+  std::string outcomes;
+  for (const auto& [outcome, count] : store.CountOutcomes()) {
+    progress.done += count;
+    outcomes += fmt::format("  {:<18}{:>7}\n", NameOf(outcome), count);
+  }
+  progress.text = fmt::format("{}: {} of {}{} trials in {}\n", study.name, progress.done,
+                              study.is_search() ? "at most " : "", progress.total, store.name()) +
+                  outcomes;
+  progress.is_over = progress.done >= progress.total;
+  const bool has_question = study.is_search() || !study.objectives.empty() || !study.constraints.empty() ||
+                            study.sample.method == SamplingMethod::kSaltelli ||
+                            study.sample.method == SamplingMethod::kMorris;
+  if (!has_question) return progress;
+  const std::vector<TrialRow> rows = store.ReadRows(0, /*with_machine=*/false);
+  for (const std::string& answer : AnswerStudy(study, rows)) progress.text += answer + "\n";
+  if (study.is_search()) {
+    SearchHistory history(study, FindSearchStart(study));
+    for (const TrialRow& row : rows) history.Add(row);
+    progress.is_over = history.is_over();
+  }
+  return progress;
 }
 
 }  // namespace dexcheck

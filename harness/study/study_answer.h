@@ -5,7 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "harness/study/search_history.h"
+#include "harness/study/search.h"
+#include "harness/study/study_store.h"
 
 namespace dexcheck {
 
@@ -18,5 +19,16 @@ double ShowObjective(const Objective& objective, double value);
 /// What the trials answer to the study's question, one sentence each; empty for a study without one.
 /// @param rows of all trials that are done.
 std::vector<std::string> AnswerStudy(const Study& study, const std::vector<TrialRow>& rows);
+
+// How far a study has come, while it runs or after.
+
+struct StudyProgress {
+  long done = 0;
+  long total = 0;        ///< Of a search at most.
+  bool is_over = false;  ///< Nothing is left to be made.
+  std::string text;      ///< Lines: how far, outcomes, what is found so far.
+};
+
+StudyProgress FindProgress(const StudyStore& store);
 
 }  // namespace dexcheck

@@ -2,7 +2,6 @@
 
 #include "harness/report/page_assets.h"
 #include "harness/report/page_frame.h"
-#include "harness/study/study_assets.h"
 
 namespace dexcheck {
 namespace {

@@ -15,4 +15,11 @@ std::string MakeStudyPage(const StudySummary& summary, double renew = 0.0);
 /// A page with the budget's chart and table.
 std::string MakeBudgetPage(const ErrorBudget& budget);
 
+// Built into the program.
+extern const char* const kStudyCss;
+extern const char* const kStudyHtml;
+extern const char* const kStudyJs;
+extern const char* const kBudgetHtml;
+extern const char* const kBudgetJs;
+
 }  // namespace dexcheck

@@ -7,8 +7,8 @@
 
 #include "controller/common/text.h"
 #include "controller/common/toml_reader.h"
-#include "harness/study/margin_search.h"
 #include "harness/study/sampling.h"
+#include "harness/study/search.h"
 #include "harness/study/study.h"
 
 namespace dexcheck {
@@ -135,11 +135,8 @@ void ReadMetrics(const TomlValue& value, Study* study) {
   for (const MetricInfo& metric : kMetrics) known.emplace_back(metric.name);
   for (const TomlValue& entry : value.AsList()) {
     const std::string name = entry.AsName();
-    if (std::find(known.begin(), known.end(), name) == known.end()) {
-      const std::string nearest = FindNearest(name, known);
-      entry.Reject("no metric is called " + Quote(name) +
-                   (nearest.empty() ? "" : ", did you mean " + Quote(nearest) + "?"));
-    }
+    if (std::find(known.begin(), known.end(), name) == known.end())
+      entry.Reject("no metric is called " + Quote(name) + SuggestNearest(name, known));
     study->metrics.push_back(name);
   }
 }

@@ -3,17 +3,21 @@
 #include <algorithm>
 #include <chrono>
 #include <deque>
+#include <limits>
 #include <map>
 #include <optional>
 #include <set>
 #include <thread>
+#include <utility>
 
 #include "controller/common/errors.h"
+#include "controller/common/text.h"
+#include "harness/base/byte_archive.h"
 #include "harness/engine/machine.h"
-#include "harness/study/search_history.h"
-#include "harness/study/trial_pool.h"
+#include "harness/study/search.h"
 
 namespace dexcheck {
+
 namespace {
 
 /// So often a trial is begun whose process is killed from outside every time.
@@ -170,6 +174,38 @@ void RunSearch(const StudyInputs& inputs, const RunOptions& options, StudyStore*
     read();
     if (made == 0 && !history.is_over()) std::this_thread::sleep_for(kPatience);
   }
+}
+
+TrialPool::TrialPool(int size, double time_limit, const std::function<TrialResult(const Trial&)>& run)
+    : time_limit_(time_limit), pool_("a trial", size, time_limit, [run](const std::string& request) {
+        Trial trial;
+        UnpackBytes(request, &trial.number, &trial.seed, &trial.parameters);
+        const TrialResult result = run(trial);
+        return PackBytes(result.outcome, result.metrics, result.failure);
+      }) {}
+
+void TrialPool::Start(const Trial& trial) {
+  pool_.Start(trial.number, PackBytes(trial.number, trial.seed, trial.parameters));
+  running_[trial.number] = trial;
+}
+
+std::optional<EndedTrial> TrialPool::Wait() {
+  const std::optional<EndedJob> job = pool_.Wait();
+  if (!job) return std::nullopt;
+  EndedTrial ended;
+  ended.killed_from_outside = job->killed_from_outside;
+  ended.row.trial = std::move(running_.extract(job->number).mapped());
+  TrialResult& result = ended.row.result;
+  if (job->result) {
+    UnpackBytes(*job->result, &result.outcome, &result.metrics, &result.failure);
+    return ended;
+  }
+  result.outcome = job->timed_out ? Outcome::kTimedOut : Outcome::kCrashed;
+  result.metrics.fill(std::numeric_limits<double>::quiet_NaN());
+  result.failure = job->timed_out ? "it took more than trial_time_limit, " + FormatNumber(time_limit_) +
+                                        " s of processor time"
+                                  : job->failure;
+  return ended;
 }
 
 }  // namespace dexcheck

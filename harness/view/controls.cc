@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "harness/view/window.h"
-#include "renders/panel_colors.h"
+#include "renders/overlay.h"
 
 namespace dexcheck {
 namespace {

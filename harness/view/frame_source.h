@@ -4,9 +4,11 @@
 
 #include <mujoco/mujoco.h>
 
+#include <filesystem>
 #include <vector>
 
-#include "harness/base/check_summary.h"
+#include "harness/base/check_record.h"
+#include "harness/report/recorded_frames.h"
 #include "renders/run_frames.h"
 
 namespace dexcheck {
@@ -36,6 +38,23 @@ class FrameSource {
 
  protected:
   FrameSource() = default;
+};
+
+/// A recorded run.
+class Recording : public FrameSource {
+ public:
+  /// @throws InputError as ReadRecordedFrames.
+  explicit Recording(const std::filesystem::path& run_dir);
+
+  [[nodiscard]] const mjModel& model() const override { return *run_.model; }
+  [[nodiscard]] long rows() const override { return run_.frames.rows(); }
+  [[nodiscard]] double TimeAt(long row) const override { return run_.frames.times[static_cast<size_t>(row)]; }
+  [[nodiscard]] double end() const override { return run_.frames.times.back(); }
+  [[nodiscard]] ViewFrame Read(long row) const override;
+
+ private:
+  RecordedFrames run_;
+  CheckHistory checks_;
 };
 
 }  // namespace dexcheck

@@ -11,9 +11,8 @@
 
 #include "harness/base/interrupts.h"
 #include "harness/view/controls.h"
-#include "harness/view/gain_sliders.h"
-#include "harness/view/mouse_force.h"
-#include "harness/view/object_camera.h"
+#include "harness/view/live_run.h"
+#include "harness/view/pointer.h"
 #include "harness/view/studio.h"
 #include "harness/view/window.h"
 

@@ -2,9 +2,8 @@
 
 #include <benchmark/benchmark.h>
 
-#include "controller/contact/contact_jacobian.h"
-#include "controller/contact/find_contact.h"
-#include "controller/contact/rolling.h"
+#include "controller/contact/contact_geometry.h"
+#include "controller/contact/grasp_map.h"
 #include "controller/contact/shapes.h"
 
 namespace dexcheck {

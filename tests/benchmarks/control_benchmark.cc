@@ -5,7 +5,6 @@
 #include "controller/control/computed_torque.h"
 #include "controller/control/constrained_dynamics.h"
 #include "controller/control/object_tracking.h"
-#include "controller/control/posture_task.h"
 #include "tests/common/paper_robot.h"
 #include "tests/controller/control/grasp_scene.h"
 

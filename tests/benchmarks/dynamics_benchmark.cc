@@ -75,32 +75,20 @@ void AnalyticTerms(benchmark::State& state) {
 }
 BENCHMARK(AnalyticTerms)->Unit(benchmark::kMicrosecond);
 
-/// Kinematics alone.
-void AnalyticKinematics(benchmark::State& state) {
+/// Kinematics, and with `dynamics` M_bar', C_bar', F_bar', without the Jacobians.
+void AnalyticModel(benchmark::State& state, bool dynamics) {
   Robot& robot = SharedRobot();
   ModelTerms terms(robot.model);
   size_t k = 0;
   for (auto _ : state) {
     terms.SetState(robot.q[k], robot.xi[k]);
+    if (dynamics) terms.CalcDynamics();
     benchmark::ClobberMemory();
     k = (k + 1) % kStates;
   }
 }
-BENCHMARK(AnalyticKinematics)->Unit(benchmark::kMicrosecond);
-
-/// Kinematics and M_bar', C_bar', F_bar', without the Jacobians.
-void AnalyticDynamics(benchmark::State& state) {
-  Robot& robot = SharedRobot();
-  ModelTerms terms(robot.model);
-  size_t k = 0;
-  for (auto _ : state) {
-    terms.SetState(robot.q[k], robot.xi[k]);
-    terms.CalcDynamics();
-    benchmark::ClobberMemory();
-    k = (k + 1) % kStates;
-  }
-}
-BENCHMARK(AnalyticDynamics)->Unit(benchmark::kMicrosecond);
+BENCHMARK_CAPTURE(AnalyticModel, Kinematics, false)->Unit(benchmark::kMicrosecond);
+BENCHMARK_CAPTURE(AnalyticModel, Dynamics, true)->Unit(benchmark::kMicrosecond);
 
 /// The engine's smaller set: M, the bias force, and four Jacobians; no matrix C, no J_dot.
 void EngineTermsMujoco(benchmark::State& state) {

@@ -23,8 +23,8 @@
 
 #include "controller/common/toml_reader.h"
 #include "harness/run/closed_loop.h"
+#include "harness/study/study_runner.h"
 #include "harness/study/study_store.h"
-#include "harness/study/trial_pool.h"
 #include "tests/benchmarks/measured_time.h"
 #include "tests/common/files.h"
 #include "tests/common/paths.h"

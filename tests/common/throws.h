@@ -23,4 +23,15 @@ template <typename ErrorType, typename Function>
   return ::testing::AssertionFailure() << "nothing was thrown";
 }
 
+/// What the exception of this type says that the function throws; "accepted" when it throws none.
+template <typename ErrorType, typename Function>
+std::string MessageOf(const Function& function) {
+  try {
+    static_cast<void>(function());
+  } catch (const ErrorType& error) {
+    return error.what();
+  }
+  return "accepted";
+}
+
 }  // namespace dexcheck::testing

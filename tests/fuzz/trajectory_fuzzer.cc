@@ -2,7 +2,7 @@
 // evaluated.
 
 #include "controller/common/toml_reader.h"
-#include "controller/control/trajectory_reader.h"
+#include "controller/control/trajectory.h"
 #include "tests/fuzz/fuzz_target.h"
 
 int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

@@ -1,10 +1,9 @@
-#include "renders/compose.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <stdexcept>
 
+#include "renders/image.h"
 #include "tests/common/throws.h"
 
 namespace dexcheck::testing::compose_test {

@@ -1,10 +1,9 @@
-#include "renders/picture_file.h"
-
 #include <gtest/gtest.h>
 
 #include <filesystem>
 
 #include "controller/common/errors.h"
+#include "renders/video_writer.h"
 #include "tests/common/files.h"
 #include "tests/common/run_program.h"
 #include "tests/common/throws.h"

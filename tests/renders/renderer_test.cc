@@ -10,9 +10,9 @@
 
 #include "controller/common/errors.h"
 #include "harness/engine/engine.h"
-#include "renders/picture_file.h"
 #include "renders/run_decorations.h"
 #include "renders/video.h"
+#include "renders/video_writer.h"
 #include "tests/common/files.h"
 #include "tests/common/paths.h"
 #include "tests/common/throws.h"

@@ -36,5 +36,5 @@
   })), 2), ...(data.not_compared.length ? [Add(Make('p', 'Not in all runs, or with other columns:', {className: 'soft'}),
     ...data.not_compared.flatMap(name => [' ', Code(name)]))] : [])));
   AddWhole('Plots', Make('section', '', {id: 'plots'}));
-  Add(document.querySelector('footer'), "Made by dexcheck from the runs' logs. Plots by dygraphs (MIT license).");
+  Add(document.querySelector('footer'), "Made by dexcheck from the runs' logs. Plots by Chart.js (MIT license).");
 })();

@@ -7,7 +7,8 @@
   const dark = matchMedia('(prefers-color-scheme: dark)');
   const first = run.times[0];
   const last = Math.max(run.times[count - 1], first + 1e-6);
-  const plots = [];
+  const {MakeAxis, SetColors} = MakeCharts();
+  const charts = new Map();  // with what each shows
   let shown = [first, last];
 
   /** The page's one time: what the line in the plots, their values and the replay show. */
@@ -40,70 +41,141 @@
     return size < 1e-3 || size >= 1e5 ? value.toExponential(2) : String(Number(value.toPrecision(5)));
   };
 
-  /** Rows [t, series...] of a plot; what cannot be drawn is null. */
-  const makeRows = plot => {
-    const rows = new Array(count);
-    for (let i = 0; i < count; ++i) {
-      const row = [run.times[i]];
-      for (const curve of plot.curves) {
-        const value = numbers[curve.series * count + i];
-        row.push(Number.isFinite(value) && !(plot.log && value <= 0) ? value : null);
+  const isDrawn = (plot, value) => Number.isFinite(value) && !(plot.log && value <= 0);
+
+  /** A curve's rows in a range of time; of more than two a pixel the least and the largest, so that no peak is lost. */
+  const makePoints = (plot, curve, [from, to], pixels) => {
+    const valueAt = row => numbers[curve.series * count + row];
+    const begin = Math.max(findRow(from) - 1, 0), end = Math.min(findRow(to) + 2, count);
+    const stride = Math.max(1, Math.ceil((end - begin) / pixels / 2));
+    const points = [];
+    for (let i = begin; i < end; i += stride) {
+      let low = -1, high = -1;
+      for (let row = i; row < Math.min(i + stride, end); ++row) {
+        if (!isDrawn(plot, valueAt(row))) continue;
+        if (low < 0 || valueAt(row) < valueAt(low)) low = row;
+        if (high < 0 || valueAt(row) > valueAt(high)) high = row;
       }
-      rows[i] = row;
+      const rows = low === high ? [low] : [Math.min(low, high), Math.max(low, high)];
+      for (const row of rows) points.push(row < 0 ? {x: run.times[i], y: NaN} : {x: run.times[row], y: valueAt(row)});
     }
-    return rows;
+    return points;
   };
 
-  const showTogether = range => {
-    shown = range;
-    for (const plot of plots) {
-      const window = plot.xAxisRange();
-      if (window[0] !== range[0] || window[1] !== range[1]) plot.updateOptions({dateWindow: range});
-    }
+  const showRange = (chart, plot) => {
+    Object.assign(chart.options.scales.x, {min: shown[0], max: shown[1]});
+    plot.curves.forEach((curve, k) => {
+      chart.data.datasets[k].data = makePoints(plot, curve, shown, chart.chartArea?.width ?? 450);
+    });
+    chart.update();
+  };
+  const showTogether = ([from, to]) => {
+    shown = [Math.max(from, first), Math.min(to, last)];
+    for (const [chart, plot] of charts) showRange(chart, plot);
   };
 
-  const drawBound = plot => (context, area, graph) => {
-    if (plot.bound === null) return;
-    const y = graph.toDomYCoord(plot.bound);
-    if (!(y >= area.y && y <= area.y + area.h)) return;
-    context.save();
-    context.strokeStyle = dark.matches ? '#ff8f85' : '#c02020';
-    context.setLineDash([8, 5]);
-    context.beginPath();
-    context.moveTo(area.x, y);
-    context.lineTo(area.x + area.w, y);
-    context.stroke();
-    context.restore();
-  };
+  /** A dashed line at a plot's bound. */
+  const boundLine = {id: 'bound', beforeDatasetsDraw: ({ctx, chartArea, scales, config}) => {
+    const y = scales.y.getPixelForValue(config.options.bound ?? NaN);
+    if (!(y >= chartArea.top && y <= chartArea.bottom)) return;
+    ctx.save();
+    ctx.strokeStyle = dark.matches ? '#ff8f85' : '#c02020';
+    ctx.setLineDash([8, 5]);
+    ctx.beginPath();
+    ctx.moveTo(chartArea.left, y);
+    ctx.lineTo(chartArea.right, y);
+    ctx.stroke();
+    ctx.restore();
+  }};
 
   /** Ticks of a logarithmic axis: powers of ten, at most one for each 28 pixels; below two decades, 2 and 5 too. */
-  const tickDecades = (low, high, pixels) => {
+  const tickDecades = (low, high) => {
     const from = Math.ceil(Math.log10(low) - 1e-9);
     const to = Math.floor(Math.log10(high) + 1e-9);
-    const stride = Math.max(1, Math.ceil((to - from + 1) * 28 / pixels));
+    const stride = Math.max(1, Math.ceil((to - from + 1) * 28 / 200));
     const ticks = [];
     for (let decade = from - 1; decade <= to; ++decade) {
       for (const digit of to - from < 2 ? [1, 2, 5] : [1]) {
         const value = digit * 10 ** decade;
-        if (value < low || value > high || decade % stride !== 0) continue;
-        ticks.push({v: value, label: decade < -2 || decade > 3 ? `${digit}e${decade}` : format(value)});
+        if (value >= low && value <= high && decade % stride === 0) ticks.push({value});
       }
     }
     return ticks;
   };
 
-  /** One finger scrolls the page; two fingers zoom the plot. */
-  const makeInteraction = () => {
-    const model = Object.assign({}, Dygraph.defaultInteractionModel);
-    const pinch = model.touchstart;
-    model.touchstart = (event, graph, context) => {
-      if (event.touches.length > 1) pinch(event, graph, context);
-    };
-    model.dblclick = () => showAll();
-    return model;
+  /** An axis of a plot's values, as wide as those of the plots above and below. */
+  const makeAxis = (plot, label, range, isRight) => ({
+    ...MakeAxis({label, log: plot.log}, ...range),
+    position: isRight ? 'right' : 'left',
+    grid: {drawOnChartArea: !isRight},
+    afterFit: scale => { scale.width = Math.max(scale.width, 78); },
+    ...(plot.log ? {afterBuildTicks: scale => { scale.ticks = tickDecades(scale.min, scale.max); }} : {}),
+    ticks: {includeBounds: false, autoSkip: !plot.log, maxTicksLimit: 8, callback: value => {
+      const exponent = Math.floor(Math.log10(Math.abs(value)) + 1e-9);
+      return plot.log && (exponent < -2 || exponent > 3) ? `${Math.round(value / 10 ** exponent)}e${exponent}`
+        : format(Number(value.toPrecision(4)));
+    }},
+  });
+
+  /** Drag to zoom, Shift-drag to move, two fingers to zoom; one finger scrolls the page. */
+  const listen = (chart, frame) => {
+    const {canvas} = chart;
+    const timeAt = pixel => chart.scales.x.getValueForPixel(pixel);
+    const isWide = (event, start) => Math.abs(event.offsetX - start.x) >= Math.abs(event.offsetY - start.y);
+    let start = null, pinch = null;
+    canvas.addEventListener('pointerdown', event => {
+      if (event.pointerType === 'touch' || event.button !== 0) return;
+      canvas.setPointerCapture(event.pointerId);
+      start = {x: event.offsetX, y: event.offsetY, moves: event.shiftKey, range: shown, width: chart.chartArea.width};
+    });
+    canvas.addEventListener('pointermove', event => {
+      if (!start) {
+        if (event.pointerType !== 'touch' && !clock.isPlaying()) clock.set(timeAt(event.offsetX));
+      } else if (start.moves) {
+        const by = (start.x - event.offsetX) / start.width * (start.range[1] - start.range[0]);
+        const room = Math.min(Math.max(by, first - start.range[0]), last - start.range[1]);
+        showTogether(start.range.map(time => time + room));
+      } else {
+        const {left, top, width, height} = chart.chartArea, wide = isWide(event, start);
+        frame.hidden = false;
+        frame.style.cssText = wide
+          ? `left: ${Math.min(start.x, event.offsetX)}px; width: ${Math.abs(event.offsetX - start.x)}px; top: ${top}px; height: ${height}px`
+          : `top: ${Math.min(start.y, event.offsetY)}px; height: ${Math.abs(event.offsetY - start.y)}px; left: ${left}px; width: ${width}px`;
+      }
+    });
+    canvas.addEventListener('pointerup', event => {
+      const begun = start;
+      start = null;
+      frame.hidden = true;
+      if (!begun || begun.moves) return;
+      const wide = isWide(event, begun), size = wide ? event.offsetX - begun.x : event.offsetY - begun.y;
+      if (Math.abs(size) < 8) {
+        clock.set(timeAt(event.offsetX));
+      } else if (wide) {
+        showTogether([begun.x, event.offsetX].sort((a, b) => a - b).map(timeAt));
+      } else {
+        for (const [name, scale] of Object.entries(chart.scales)) {
+          if (name === 'x') continue;
+          const [max, min] = [begun.y, event.offsetY].sort((a, b) => a - b).map(y => scale.getValueForPixel(y));
+          Object.assign(chart.options.scales[name], {min, max});
+        }
+        chart.update();
+      }
+    });
+    canvas.addEventListener('dblclick', () => showAll());
+    canvas.addEventListener('touchmove', event => {
+      if (event.touches.length !== 2) return;
+      event.preventDefault();
+      const {left} = canvas.getBoundingClientRect();
+      const [a, b] = [...event.touches].map(touch => touch.clientX - left).sort((p, q) => p - q);
+      pinch ??= [timeAt(a), timeAt(b)];  // stay under the fingers
+      const slope = (pinch[1] - pinch[0]) / Math.max(b - a, 1);
+      showTogether([pinch[0] - (a - chart.chartArea.left) * slope, pinch[1] + (chart.chartArea.right - b) * slope]);
+    }, {passive: false});
+    canvas.addEventListener('touchend', () => { pinch = null; });
   };
 
-  const makeKeys = (plot, box, getGraph) => plot.curves.map((curve, k) => {
+  const makeKeys = (plot, box, chart) => plot.curves.map((curve, k) => {
     const key = document.createElement('button');
     const line = `<svg viewBox="0 0 22 8"><line x1="0" y1="4" x2="22" y2="4" stroke="${curve.color}" ` +
         `stroke-width="${curve.wide ? 7 : 2.5}" stroke-opacity="${curve.wide ? 0.4 : 1}" ` +
@@ -116,8 +188,9 @@
     key.setAttribute('aria-pressed', 'true');
     key.title = 'Show or hide';
     key.addEventListener('click', () => {
-      const visible = !getGraph().visibility()[k];
-      getGraph().setVisibility(k, visible);
+      const visible = !chart.isDatasetVisible(k);
+      chart.setDatasetVisibility(k, visible);
+      chart.update();
       key.setAttribute('aria-pressed', String(visible));
     });
     box.append(key);
@@ -125,79 +198,65 @@
   });
 
   const draw = (box, plot) => {
-    const rows = makeRows(plot);
-    const series = {};
-    plot.curves.forEach(curve => {
-      series[curve.id] = {
-        axis: curve.right ? 'y2' : 'y',
-        color: curve.color + (curve.wide ? '66' : ''),
-        strokePattern: curve.dashes.length > 0 ? curve.dashes : null,
-        strokeWidth: curve.wide ? 6 : curve.background ? 0.8 : 1.5,
-      };
-    });
-    let graph = null;
-    const values = makeKeys(plot, box.querySelector('.keys'), () => graph);
-    const ranges = [plot.range, plot.right_range ?? null];
-    const formatAxis = value => format(Number(value.toPrecision(4)));
-    const axis = {axisLabelFormatter: formatAxis, axisLabelWidth: 62};
-    if (plot.log) axis.ticker = tickDecades;
-    graph = new Dygraph(box.querySelector('.plot'), rows, {
-      labels: ['t'].concat(plot.curves.map(curve => curve.id)),
-      series,
-      axes: {
-        x: {axisLabelFormatter: formatAxis},
-        y: Object.assign({valueRange: ranges[0]}, axis),
-        y2: Object.assign({valueRange: ranges[1], independentTicks: true, drawGrid: false}, axis),
-      },
-      logscale: plot.log,
-      xlabel: 't (s)',
-      ylabel: plot.label,
-      y2label: plot.right || null,
-      dateWindow: shown,
-      legend: 'never',
-      gridLineColor: dark.matches ? '#313a43' : '#e3e7eb',
-      axisLineColor: dark.matches ? '#55616c' : '#9aa3ad',
-      interactionModel: makeInteraction(),
-      underlayCallback: drawBound(plot),
-      highlightCallback: (event, t) => {
-        if (event && !clock.isPlaying()) clock.set(t);
-      },
-      clickCallback: (event, t) => clock.set(t),
-      drawCallback: (drawn, initial) => {
-        if (initial) return;
-        placeLine();
-        const window = drawn.xAxisRange();
-        if (window[0] !== shown[0] || window[1] !== shown[1]) showTogether(window);
-      },
-    });
-    const line = document.createElement('i');
-    line.className = 'now';
-    box.querySelector('.plot').append(line);
-    const placeLine = () => {
-      const area = graph.getArea();
-      const x = graph.toDomXCoord(clock.time);
-      line.hidden = !(x >= area.x && x <= area.x + area.w);
-      line.style.cssText = `left: ${x}px; top: ${area.y}px; height: ${area.h}px`;
+    const place = box.querySelector('.plot');
+    const line = Make('i', '', {className: 'now'}), frame = Make('i', '', {className: 'zoom', hidden: true});
+    const canvas = Make('canvas', '', {role: 'img', ariaLabel: plot.title});
+    Add(place, canvas, line, frame);
+    const placeLine = ({chartArea, scales}) => {
+      const x = scales.x.getPixelForValue(clock.time);
+      line.hidden = !(x >= chartArea.left && x <= chartArea.right);
+      line.style.cssText = `left: ${x}px; top: ${chartArea.top}px; height: ${chartArea.height}px`;
     };
+    const chart = new Chart(canvas, {
+      type: 'line',
+      plugins: [boundLine, {id: 'now', afterUpdate: placeLine}],
+      data: {datasets: plot.curves.map(curve => ({
+        label: curve.label,
+        data: [],
+        yAxisID: curve.right ? 'y2' : 'y',
+        borderColor: curve.color + (curve.wide ? '66' : ''),
+        borderDash: curve.dashes,
+        borderWidth: curve.wide ? 6 : curve.background ? 0.8 : 1.5,
+        pointRadius: 0,
+      }))},
+      options: {
+        bound: plot.bound,
+        parsing: false,
+        normalized: true,
+        events: [],
+        plugins: {legend: {display: false}, tooltip: {enabled: false}},
+        scales: {
+          x: {...MakeAxis({label: 't (s)'}, ...shown), grid: {}, ticks: {includeBounds: false, maxRotation: 0,
+            callback: value => format(Number(value.toPrecision(4)))}},
+          y: makeAxis(plot, plot.label, plot.range, false),
+          ...(plot.right ? {y2: makeAxis(plot, plot.right, plot.right_range, true)} : {}),
+        },
+      },
+    });
+    charts.set(chart, plot);
+    box.chart = chart;
+    showRange(chart, plot);
+    listen(chart, frame);
+    const values = makeKeys(plot, box.querySelector('.keys'), chart);
     const showValues = () => {
-      placeLine();
+      placeLine(chart);
       const row = findRow(clock.time);
-      values.forEach((value, k) => { value.textContent = format(rows[row][k + 1] ?? NaN); });
+      values.forEach((value, k) => {
+        const number = numbers[plot.curves[k].series * count + row];
+        value.textContent = format(isDrawn(plot, number) ? number : NaN);
+      });
       box.querySelector('.time').textContent = `t = ${run.times[row].toFixed(3)} s`;
     };
     clock.listeners.push(showValues);
     showValues();
-    box.graph = graph;
-    box.ranges = ranges;
-    plots.push(graph);
   };
 
   const showAll = () => {
-    showTogether([first, last]);
-    for (const box of boxes) {
-      if (!box.graph) continue;
-      box.graph.updateOptions({axes: {y: {valueRange: box.ranges[0]}, y2: {valueRange: box.ranges[1]}}});
+    for (const [{options}, plot] of charts) {
+      [options.scales.y.min, options.scales.y.max] = plot.range;
+      if (plot.right) [options.scales.y2.min, options.scales.y2.max] = plot.right_range;
     }
+    showTogether([first, last]);
   };
 
   const boxes = run.plots.map((plot, i) => {
@@ -214,14 +273,14 @@
     'switch curves on and off.', {className: 'soft'})), Add(Make('div', '', {className: 'grid'}), ...boxes));
   const watcher = new IntersectionObserver(entries => {
     for (const entry of entries) {
-      if (!entry.isIntersecting || entry.target.graph) continue;
+      if (!entry.isIntersecting || entry.target.chart) continue;
       watcher.unobserve(entry.target);
       draw(entry.target, run.plots[Number(entry.target.dataset.plot)]);
     }
   }, {rootMargin: '400px'});
   for (const box of boxes) watcher.observe(box);
   addEventListener('beforeprint', () => {
-    for (const box of boxes) if (!box.graph) draw(box, run.plots[Number(box.dataset.plot)]);
+    for (const box of boxes) if (!box.chart) draw(box, run.plots[Number(box.dataset.plot)]);
   });
   for (const button of document.querySelectorAll('[data-time]')) {
     button.addEventListener('click', () => {
@@ -236,8 +295,7 @@
   addEventListener('hashchange', unfold);
   unfold();
   dark.addEventListener('change', () => {
-    for (const plot of plots) {
-      plot.updateOptions({gridLineColor: dark.matches ? '#313a43' : '#e3e7eb'});
-    }
+    SetColors();
+    for (const chart of charts.keys()) chart.update();
   });
 })();

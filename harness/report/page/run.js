@@ -100,6 +100,6 @@
   ...run.files.map(({title, text, open}) =>
     Add(Make('details', '', {open}), Make('summary', title), Make('pre', text, {tabIndex: 0})))));
   Add(document.querySelector('footer'), `Made by dexcheck ${run.version} from the run's log, which holds every number, and the inputs to ` +
-    'repeat the run bit for bit: ', Make('code', 'dexcheck run --replay RUN_DIR'), '. Plots by dygraphs, replay by three.js (copyright ' +
+    'repeat the run bit for bit: ', Make('code', 'dexcheck run --replay RUN_DIR'), '. Plots by Chart.js, replay by three.js (copyright ' +
     '2010-2019 three.js authors; both MIT license).');
 })();

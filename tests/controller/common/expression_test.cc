@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "controller/common/types.h"
+#include "tests/common/throws.h"
 
 namespace dexcheck::testing::expression_test {
 namespace {
@@ -18,12 +19,7 @@ const SymbolTable& Symbols() {
 }
 
 std::string CatchProblem(const std::string& text) {
-  try {
-    EvaluateExpression(text, Symbols());
-  } catch (const std::invalid_argument& error) {
-    return error.what();
-  }
-  return "accepted";
+  return MessageOf<std::invalid_argument>([&] { return EvaluateExpression(text, Symbols()); });
 }
 
 TEST(Expression, FollowsPrecedenceAndAssociativity) {

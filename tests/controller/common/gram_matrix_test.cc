@@ -1,5 +1,3 @@
-#include "controller/common/gram_matrix.h"
-
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>

@@ -4,6 +4,7 @@
 
 #include "controller/common/errors.h"
 #include "controller/common/toml_reader.h"
+#include "tests/common/throws.h"
 
 namespace dexcheck::testing::toml_override_test {
 namespace {
@@ -37,15 +38,12 @@ TEST(TomlOverride, ReplacesAddsAndReachesIntoLists) {
 }
 
 std::string TakeMessage(const std::string& assignment, const std::string& key = "") {
-  try {
+  return MessageOf<InputError>([&] {
     TomlDocument document(kText, "file.toml");
     document.Override(assignment);
     TomlTable root = document.Open();
     if (!key.empty()) (void)root.Get(key).AsWhole(0, 5);
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "accepted";
+  });
 }
 
 TEST(TomlOverride, WholeNumbersWithoutAnEqualDoubleAreRounded) {

@@ -1,11 +1,10 @@
-#include "controller/contact/contact_jacobian.h"
-
 #include <gtest/gtest.h>
 
 #include <array>
 #include <vector>
 
 #include "controller/contact/adjoint.h"
+#include "controller/contact/grasp_map.h"
 #include "tests/common/allocation_counter.h"
 #include "tests/common/linear_algebra.h"
 #include "tests/common/matrix_near.h"

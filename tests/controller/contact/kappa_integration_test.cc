@@ -2,8 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "controller/contact/find_contact.h"
-#include "controller/contact/rolling.h"
+#include "controller/contact/contact_geometry.h"
 #include "tests/common/matrix_near.h"
 #include "tests/controller/contact/contact_fixtures.h"
 

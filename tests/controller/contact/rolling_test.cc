@@ -1,8 +1,7 @@
-#include "controller/contact/rolling.h"
-
 #include <gtest/gtest.h>
 
 #include "controller/common/errors.h"
+#include "controller/contact/contact_geometry.h"
 #include "tests/common/matrix_near.h"
 #include "tests/common/throws.h"
 #include "tests/controller/contact/contact_fixtures.h"

@@ -5,9 +5,8 @@
 #include <array>
 
 #include "controller/contact/adjoint.h"
-#include "controller/contact/find_contact.h"
+#include "controller/contact/contact_geometry.h"
 #include "controller/contact/grasp_map.h"
-#include "controller/contact/rolling.h"
 #include "tests/controller/contact/contact_fixtures.h"
 
 namespace dexcheck::testing {

@@ -7,7 +7,6 @@
 
 #include "controller/control/computed_torque.h"
 #include "controller/control/object_tracking.h"
-#include "controller/control/posture_task.h"
 #include "tests/common/matrix_near.h"
 #include "tests/controller/control/ideal_simulation.h"
 #include "tests/controller/control/printed_law.h"

@@ -10,7 +10,6 @@
 #include "controller/common/errors.h"
 #include "controller/control/constrained_dynamics.h"
 #include "controller/control/object_tracking.h"
-#include "controller/control/posture_task.h"
 #include "controller/object/so3.h"
 #include "tests/common/allocation_counter.h"
 #include "tests/common/linear_algebra.h"

@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "controller/contact/find_contact.h"
+#include "controller/contact/contact_geometry.h"
 #include "controller/contact/shapes.h"
 #include "controller/control/grasp_terms.h"
 #include "controller/control/object_tracking.h"

@@ -12,7 +12,7 @@
 #include <stdexcept>
 #include <vector>
 
-#include "controller/contact/rolling.h"
+#include "controller/contact/contact_geometry.h"
 #include "controller/object/euler_zyz.h"
 #include "tests/common/allocation_counter.h"
 #include "tests/common/finite_difference.h"

@@ -5,7 +5,7 @@
 
 #include <utility>
 
-#include "controller/contact/rolling.h"
+#include "controller/contact/contact_geometry.h"
 #include "controller/control/constrained_dynamics.h"
 #include "controller/model/platform.h"
 #include "tests/controller/control/grasp_scene.h"

@@ -1,13 +1,12 @@
 // Laws for the joints of an arm that holds nothing: against what (18) answers, and against a fault.
 
-#include "controller/control/joint_law.h"
-
 #include <gtest/gtest.h>
 
 #include <optional>
 #include <random>
 
 #include "controller/control/constrained_dynamics.h"
+#include "controller/control/joint_controller.h"
 #include "controller/control/joint_motion.h"
 #include "tests/common/allocation_counter.h"
 #include "tests/common/matrix_near.h"

@@ -3,7 +3,7 @@
 // The law (55) as printed, with matrices in X_o, and faulty versions of it.
 
 #include "controller/contact/adjoint.h"
-#include "controller/contact/contact_jacobian.h"
+#include "controller/contact/grasp_map.h"
 #include "controller/control/grasp_terms.h"
 #include "controller/control/object_tracking.h"
 #include "controller/control/pseudoinverse.h"

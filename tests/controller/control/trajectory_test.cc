@@ -10,7 +10,6 @@
 #include <utility>
 
 #include "controller/common/errors.h"
-#include "controller/control/trajectory_reader.h"
 #include "controller/object/euler_zyz.h"
 #include "tests/common/allocation_counter.h"
 #include "tests/common/finite_difference.h"

@@ -9,8 +9,7 @@
 #include <algorithm>
 #include <random>
 
-#include "controller/contact/find_contact.h"
-#include "controller/contact/fingertip_rim.h"
+#include "controller/contact/contact_geometry.h"
 #include "controller/contact/grasp_map.h"
 #include "controller/contact/shapes.h"
 #include "controller/dynamics/model_terms.h"

@@ -1,7 +1,5 @@
 // Inverse kinematics of an arm against the forward kinematics of the robot's terms, an independent route.
 
-#include "controller/grasp/frame_placement.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -10,6 +8,7 @@
 
 #include "controller/dynamics/model_terms.h"
 #include "controller/grasp/contact_plan.h"
+#include "controller/grasp/finger_placement.h"
 #include "tests/common/linear_algebra.h"
 #include "tests/common/matchers.h"
 #include "tests/common/matrix_near.h"

@@ -15,6 +15,7 @@
 #include "controller/model/parameter_reader.h"
 #include "tests/common/matchers.h"
 #include "tests/common/paths.h"
+#include "tests/common/throws.h"
 
 namespace dexcheck::testing::parameter_errors_test {
 namespace {
@@ -34,12 +35,7 @@ std::string FindLine(const std::string& text, const std::string& part) {
 }
 
 std::string CatchProblem(const std::string& text) {
-  try {
-    ParseRobotModel(text, "robot.toml");
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "accepted";
+  return MessageOf<InputError>([&] { return ParseRobotModel(text, "robot.toml"); });
 }
 
 /// A change of one place in the shipped file, and what follows "robot.toml:LINE: " in the message. In the
@@ -288,13 +284,8 @@ INSTANTIATE_TEST_SUITE_P(
     PrintName);
 
 TEST(ParameterFiles, ThatCannotBeReadAreNamed) {
-  const auto read = [](const std::string& path) -> std::string {
-    try {
-      ReadRobotModel(path);
-    } catch (const InputError& error) {
-      return error.what();
-    }
-    return "accepted";
+  const auto read = [](const std::string& path) {
+    return MessageOf<InputError>([&] { return ReadRobotModel(path); });
   };
   EXPECT_EQ(read("no/such/file.toml"), "no/such/file.toml: cannot be read: No such file or directory");
   EXPECT_EQ(read("/"), "/: cannot be read: is a directory");

@@ -9,6 +9,7 @@
 #include "controller/common/errors.h"
 #include "controller/model/parameter_reader.h"
 #include "tests/common/matrix_near.h"
+#include "tests/common/throws.h"
 
 namespace dexcheck::testing::row_forms_test {
 namespace {
@@ -149,12 +150,7 @@ std::string CatchProblem(std::string text, const std::string& original, const st
   const size_t at = text.find(original);
   EXPECT_NE(at, std::string::npos) << original;
   text.replace(at, original.size(), changed);
-  try {
-    Read(text);
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "accepted";
+  return MessageOf<InputError>([&] { return Read(text); });
 }
 
 TEST(OtherForms, AreRefusedInOneLine) {

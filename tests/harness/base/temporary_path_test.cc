@@ -1,7 +1,5 @@
 // What a signal leaves behind: nothing that was under construction, and everything else.
 
-#include "harness/base/temporary_path.h"
-
 #include <gtest/gtest.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -15,7 +13,6 @@
 
 #include "harness/base/files.h"
 #include "harness/base/interrupts.h"
-#include "harness/base/partial_file.h"
 #include "tests/common/files.h"
 
 namespace dexcheck::testing::temporary_path_test {

@@ -3,7 +3,7 @@
 
 #include <cstdlib>
 
-#include "harness/base/shell.h"
+#include "harness/base/console.h"
 #include "tests/common/legged_robots.h"
 #include "tests/harness/cli/dexcheck_program.h"
 #include "tests/harness/descriptions/panda_urdf.h"

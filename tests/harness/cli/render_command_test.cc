@@ -6,7 +6,7 @@
 
 #include "harness/engine/engine.h"
 #include "harness/log/log_writer.h"
-#include "renders/picture_file.h"
+#include "renders/video_writer.h"
 #include "tests/harness/cli/dexcheck_program.h"
 #include "tests/renders/kinematic_run.h"
 

@@ -10,7 +10,7 @@
 #include <random>
 #include <thread>
 
-#include "harness/study/search_history.h"
+#include "harness/study/search.h"
 #include "tests/common/matchers.h"
 #include "tests/harness/cli/study_command.h"
 

@@ -23,6 +23,7 @@
 #include "tests/common/matrix_near.h"
 #include "tests/common/paths.h"
 #include "tests/common/random_robot.h"
+#include "tests/common/throws.h"
 #include "tests/common/urdf_text.h"
 #include "tests/harness/descriptions/panda_urdf.h"
 
@@ -255,12 +256,7 @@ TEST(Urdf, ARefusalOfABodyPointsToTheAudit) {
     std::string text = kHand;
     text.replace(text.find(original), original.size(), changed);
     testing::WriteText(folder.path() / "hand.urdf", text);
-    try {
-      ReadDescription(folder.path() / "hand.urdf");
-    } catch (const InputError& error) {
-      return error.what();
-    }
-    return "accepted";
+    return MessageOf<InputError>([&] { return ReadDescription(folder.path() / "hand.urdf"); });
   };
   const std::string file = (folder.path() / "hand.urdf").string();
   const std::string impossible = read("<mass value=\"0.1\"/>", "<mass value=\"-0.1\"/>");
@@ -303,12 +299,7 @@ struct BadUrdf {
 };
 
 std::string CatchProblem(const std::string& text) {
-  try {
-    ParseUrdf(text, "hand.urdf");
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "accepted";
+  return MessageOf<InputError>([&] { return ParseUrdf(text, "hand.urdf"); });
 }
 
 class BadUrdfs : public ::testing::TestWithParam<BadUrdf> {};

@@ -4,10 +4,8 @@
 
 #include <random>
 
-#include "controller/contact/contact_jacobian.h"
-#include "controller/contact/find_contact.h"
+#include "controller/contact/contact_geometry.h"
 #include "controller/contact/grasp_map.h"
-#include "controller/contact/rolling.h"
 #include "controller/contact/shapes.h"
 #include "controller/dynamics/model_terms.h"
 #include "controller/grasp/finger_placement.h"

@@ -6,7 +6,6 @@
 
 #include "controller/common/errors.h"
 #include "harness/engine/engine.h"
-#include "harness/engine/mesh_check.h"
 #include "harness/engine/mjcf_passes.h"
 #include "tests/common/files.h"
 #include "tests/common/throws.h"

@@ -1,13 +1,12 @@
 // A model without looks moves as the one that is drawn, bit for bit.
 
-#include "harness/engine/remove_looks.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <cstring>
 #include <string>
 
+#include "harness/engine/compiled_model.h"
 #include "harness/engine/engine.h"
 #include "tests/common/paths.h"
 

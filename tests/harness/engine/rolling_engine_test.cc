@@ -4,8 +4,7 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
-#include "controller/contact/find_contact.h"
-#include "controller/contact/rolling.h"
+#include "controller/contact/contact_geometry.h"
 #include "controller/contact/shapes.h"
 #include "controller/object/so3.h"
 #include "harness/engine/engine.h"

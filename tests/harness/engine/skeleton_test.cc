@@ -1,11 +1,10 @@
 // What is drawn of a robot that has no shapes.
 
-#include "harness/engine/skeleton.h"
-
 #include <gtest/gtest.h>
 
 #include <string>
 
+#include "harness/engine/compiled_model.h"
 #include "tests/common/paths.h"
 
 namespace dexcheck::testing::skeleton_test {

@@ -10,33 +10,13 @@
 #include "controller/common/errors.h"
 #include "tests/common/files.h"
 #include "tests/common/matchers.h"
+#include "tests/common/throws.h"
 #include "tests/harness/log/sample_log_check.h"
 
 namespace dexcheck::testing::log_failures_test {
 namespace {
 
-/// What the exception says; fails the test when there is none of this type.
-template <typename Exception, typename Function>
-std::string MessageOf(const Function& function) {
-  try {
-    function();
-  } catch (const Exception& error) {
-    return error.what();
-  }
-  ADD_FAILURE() << "nothing was thrown";
-  return "";
-}
-
-class LogFailures : public ::testing::Test {
- protected:
-  [[nodiscard]] long CountFiles() const {
-    const auto files = std::filesystem::directory_iterator(folder_.path());
-    return std::distance(begin(files), end(files));
-  }
-
-  TempFolder folder_;
-  std::filesystem::path path_ = folder_.path() / "log.h5";
-};
+using LogFailures = LogFileTest;
 
 TEST_F(LogFailures, NothingIsOverwritten) {
   WriteText(path_, "before");

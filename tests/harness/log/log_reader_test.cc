@@ -4,36 +4,29 @@
 #include <sys/stat.h>
 
 #include <cmath>
+#include <cstdlib>
+#include <filesystem>
 #include <functional>
 #include <nlohmann/json.hpp>
 #include <random>
 
 #include "controller/common/errors.h"
-#include "harness/log/old_names.h"
+#include "harness/log/log_content.h"
 #include "tests/common/files.h"
 #include "tests/common/matchers.h"
 #include "tests/common/paths.h"
 #include "tests/common/run_program.h"
+#include "tests/common/throws.h"
 #include "tests/harness/log/change_log.h"
 #include "tests/harness/log/sample_log_check.h"
 
 namespace dexcheck::testing::log_reader_test {
 namespace {
 
-template <typename Function>
-std::string MessageOf(const Function& function) {
-  try {
-    function();
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "nothing was thrown";
-}
-
 class LogReaderTest : public ::testing::Test {
  protected:
   [[nodiscard]] std::string Open() const {
-    return MessageOf([&] { const LogReader log(path_); });
+    return MessageOf<InputError>([&] { const LogReader log(path_); });
   }
 
   TempFolder folder_;
@@ -62,9 +55,9 @@ TEST_F(LogReaderTest, FilesComeBackWithTheirBytes) {
   EXPECT_TRUE(ReadText(folder_.path() / "out/of the log/a/all") == all_bytes);
   EXPECT_EQ(ReadText(folder_.path() / "out/of the log/b/c d/\xc3\xa4.xml"), "<mujoco/>");
   EXPECT_EQ(std::filesystem::file_size(folder_.path() / "out/of the log/a/none"), 0U);
-  EXPECT_EQ(MessageOf([&] { log.ExtractFiles("inputs", folder_.path() / "out/of the log"); }),
+  EXPECT_EQ(MessageOf<InputError>([&] { log.ExtractFiles("inputs", folder_.path() / "out/of the log"); }),
             (folder_.path() / "out/of the log/a/all").string() + ": cannot be written: File exists");
-  EXPECT_THAT(MessageOf([&] { log.ExtractFiles("inputs", path_); }),
+  EXPECT_THAT(MessageOf<InputError>([&] { log.ExtractFiles("inputs", path_); }),
               HasSubstr("log.h5/a: cannot be written: Not a directory"));
 }
 
@@ -72,16 +65,18 @@ TEST_F(LogReaderTest, UnknownNamesAreNamed) {
   WriteSampleLog(path_, 3, 3);
   const LogReader log(path_);
   const std::string file = path_.string() + ": ";
-  EXPECT_EQ(MessageOf([&] { (void)log.ReadSignal("object/X"); }), file +
-                                                                      "no signal \"object/X\", did you mean "
-                                                                      "\"object/X_o\"?");
-  EXPECT_EQ(MessageOf([&] { (void)log.ReadSignal("object"); }), file + "no signal \"object\"");
-  EXPECT_EQ(MessageOf([&] { (void)log.ReadText("scenari"); }),
+  EXPECT_EQ(MessageOf<InputError>([&] { (void)log.ReadSignal("object/X"); }),
+            file +
+                "no signal \"object/X\", did you mean "
+                "\"object/X_o\"?");
+  EXPECT_EQ(MessageOf<InputError>([&] { (void)log.ReadSignal("object"); }), file + "no signal \"object\"");
+  EXPECT_EQ(MessageOf<InputError>([&] { (void)log.ReadText("scenari"); }),
             file + "no text \"scenari\", did you mean \"scenario\"?");
   for (const char* group : {"outputs", "object", "check/M_bar", "inputs/scenario.toml", "meta", ""}) {
-    EXPECT_EQ(MessageOf([&] { (void)log.ListFiles(group); }), file + "no group of files \"" + group + "\"");
+    EXPECT_EQ(MessageOf<InputError>([&] { (void)log.ListFiles(group); }),
+              file + "no group of files \"" + group + "\"");
   }
-  EXPECT_EQ(MessageOf([&] { (void)log.ReadFile("inputs", "mjcf"); }),
+  EXPECT_EQ(MessageOf<InputError>([&] { (void)log.ReadFile("inputs", "mjcf"); }),
             file + "no embedded file \"inputs/mjcf\"");
 }
 
@@ -147,10 +142,10 @@ TEST_F(LogReaderTest, EveryTruncationIsNoticed) {
 }
 
 /// Bits flipped, bytes put in or replaced, at random: one line, or a log that is read.
-TEST_F(LogReaderTest, RandomDamageIsOneLine) {
+void ReadRandomDamage(const std::filesystem::path& path) {
   constexpr int kTrials = 200;
-  WriteSampleLog(path_, 20, 20);
-  const std::string good = ReadText(path_);
+  WriteSampleLog(path, 20, 20);
+  const std::string good = ReadText(path);
   std::mt19937 random(5);
   int refused = 0;
   for (int trial = 0; trial < kTrials; ++trial) {
@@ -161,19 +156,28 @@ TEST_F(LogReaderTest, RandomDamageIsOneLine) {
       if (trial % 3 == 1) damaged.insert(at, 1, static_cast<char>(random()));
       if (trial % 3 == 2) damaged[at] = static_cast<char>(random());
     }
-    WriteText(path_, damaged);
-    const std::string message = MessageOf([&] {
-      const LogReader log(path_);
+    WriteText(path, damaged);
+    const std::string message = MessageOf<InputError>([&] {
+      const LogReader log(path);
       for (const SignalInfo& signal : log.signals()) (void)log.ReadSignal(signal.name);
       for (const std::string& text : log.ListTexts()) (void)log.ReadText(text);
       for (const std::string& file : log.ListFiles("inputs")) (void)log.ReadFile("inputs", file);
     });
-    if (message == "nothing was thrown") continue;
+    if (message == "accepted") continue;
     ++refused;
-    EXPECT_THAT(message, StartsWith(path_.string() + ": "));
+    EXPECT_THAT(message, StartsWith(path.string() + ": "));
     EXPECT_EQ(message.find('\n'), std::string::npos);
   }
   EXPECT_GE(refused, kTrials / 2);
+}
+
+TEST_F(LogReaderTest, RandomDamageIsOneLine) {
+  // In a process of its own: HDF5 leaves a damaged heap to one that has read some of these.
+  const auto read = [&] {
+    ReadRandomDamage(path_);
+    std::_Exit(HasFailure() ? 1 : 0);
+  };
+  EXPECT_EXIT(read(), ::testing::ExitedWithCode(0), "");
 }
 
 TEST_F(LogReaderTest, WrongAndMissingPartsAreNamed) {
@@ -199,7 +203,7 @@ TEST_F(LogReaderTest, WrongAndMissingPartsAreNamed) {
             damaged + "\"inputs/numbers\" is not a file");
   EXPECT_EQ(change([](hid_t file) { AddBytes(file, "meta/numbers", H5T_STD_I32LE); }),
             damaged + "\"meta/numbers\" is not a file");
-  EXPECT_EQ(change([](hid_t file) { H5Arename(file, "format", "form"); }), "nothing was thrown")
+  EXPECT_EQ(change([](hid_t file) { H5Arename(file, "format", "form"); }), "accepted")
       << "as one of format 1";
 }
 

@@ -15,16 +15,7 @@
 namespace dexcheck::testing::log_writer_test {
 namespace {
 
-class LogWriterTest : public ::testing::Test {
- protected:
-  [[nodiscard]] long CountFiles() const {
-    const auto files = std::filesystem::directory_iterator(folder_.path());
-    return std::distance(begin(files), end(files));
-  }
-
-  TempFolder folder_;
-  std::filesystem::path path_ = folder_.path() / "log.h5";
-};
+using LogWriterTest = LogFileTest;
 
 TEST_F(LogWriterTest, RowsComeBackExactly) {
   for (const auto& [rows, max_rows] : {std::pair{50L, 50L}, {49L, 49L}, {1L, 1L}, {3L, 50L}, {0L, 50L}}) {

@@ -2,10 +2,26 @@
 
 #include <gtest/gtest.h>
 
+#include <filesystem>
+#include <iterator>
+
 #include "harness/log/log_reader.h"
+#include "tests/common/files.h"
 #include "tests/harness/log/sample_log.h"
 
 namespace dexcheck::testing {
+
+/// A folder for one log.
+class LogFileTest : public ::testing::Test {
+ protected:
+  [[nodiscard]] long CountFiles() const {
+    const auto files = std::filesystem::directory_iterator(folder_.path());
+    return std::distance(begin(files), end(files));
+  }
+
+  TempFolder folder_;
+  std::filesystem::path path_ = folder_.path() / "log.h5";
+};
 
 /// Success when the log is the sample with this many rows: every number and all that comes with them.
 inline ::testing::AssertionResult IsSample(const LogReader& log, long rows) {

@@ -5,7 +5,7 @@
 
 #include <string>
 
-#include "harness/report/write_report.h"
+#include "harness/report/page.h"
 #include "tests/common/browser.h"
 #include "tests/common/run_program.h"
 #include "tests/harness/report/replay_run.h"

@@ -8,10 +8,9 @@
 #include <fstream>
 #include <string>
 
-#include "harness/report/comparison_page.h"
+#include "harness/report/page.h"
 #include "harness/report/run_comparison.h"
 #include "harness/report/run_data.h"
-#include "harness/report/write_report.h"
 #include "renders/video_writer.h"
 #include "tests/common/browser.h"
 #include "tests/common/files.h"
@@ -28,11 +27,13 @@ constexpr double kFloatTolerance = 1e-6;  // values are 4-byte floats
 
 const char* const kAllDrawn =
     "const boxes = [...document.querySelectorAll('[data-plot]')]; return boxes.length > 0 && boxes.every(b "
-    "=> b.graph);";
+    "=> b.chart);";
 
 /// [from, to] of the plot with this number.
 std::string AskRange(int plot) {
-  return "return document.querySelectorAll('[data-plot]')[" + std::to_string(plot) + "].graph.xAxisRange();";
+  return "const x = document.querySelectorAll('[data-plot]')[" + std::to_string(plot) +
+         "].chart.scales.x;"
+         "return [x.min, x.max];";
 }
 
 class PageBrowserTest : public ::testing::Test {
@@ -75,8 +76,9 @@ class PageBrowserTest : public ::testing::Test {
 
   void ExpectZoomAndReset() {
     const nlohmann::json area = browser_.Run(
-        "const g = document.querySelectorAll('[data-plot]')[0].graph, a = g.getArea(),"
-        "  r = g.graphDiv.getBoundingClientRect(); return [r.x + a.x, r.y + a.y, a.w, a.h].map(Math.round);");
+        "const {canvas, chartArea: a} = document.querySelectorAll('[data-plot]')[0].chart,"
+        "  r = canvas.getBoundingClientRect();"
+        "return [r.x + a.left, r.y + a.top, a.width, a.height].map(Math.round);");
     const int x = area[0];
     const int y = area[1].get<int>() + area[3].get<int>() / 2;
     const int width = area[2];
@@ -84,8 +86,8 @@ class PageBrowserTest : public ::testing::Test {
     ExpectRange(0, 0.0, kEnd);
     browser_.Drag(x + width / 4, y, x + width / 2, y);
     ASSERT_TRUE(
-        browser_.WaitFor("const range = document.querySelectorAll('[data-plot]')[0].graph.xAxisRange();"
-                         "return range[1] - range[0] < 1;"));
+        browser_.WaitFor("const x = document.querySelectorAll('[data-plot]')[0].chart.scales.x;"
+                         "return x.max - x.min < 1;"));
     for (const int plot : {0, 1, 5}) ExpectRange(plot, 0.25 * kEnd, 0.5 * kEnd);
     browser_.DoubleClick(x + width / 2, y);
     for (const int plot : {0, 1, 5}) ExpectRange(plot, 0.0, kEnd);
@@ -100,14 +102,18 @@ TEST_F(PageBrowserTest, ShowsVerdictAndPlotsWithoutErrors) {
   ExpectVerdictInFirstView(1280, 720, false);
   OpenWithAllPlots();
 
-  // The plots have the log's numbers: x actual and desired, at t = 1 s.
-  const nlohmann::json values = browser_.Run(
-      "const g = document.querySelectorAll('[data-plot]')[0].graph;"
-      "return [g.numRows(), g.getValue(1000, 0), g.getValue(1000, 1), g.getValue(1000, 2)];");
-  EXPECT_EQ(values[0], kRows);
-  EXPECT_NEAR(values[1].get<double>(), 1.0, kFloatTolerance);
-  EXPECT_NEAR(values[2].get<double>(), testing::ReportObjectX(1.0), kFloatTolerance);
-  EXPECT_NEAR(values[3].get<double>(), testing::ReportObjectX(1.0) + 1e-3, kFloatTolerance);
+  // The plots have the log's numbers: x actual and desired, near t = 1 s, where a row for each pixel is
+  // drawn.
+  const nlohmann::json points = browser_.Run(
+      "const sets = document.querySelectorAll('[data-plot]')[0].chart.data.datasets;"
+      "return sets.map(set => set.data.find(point => point.x >= 1));");
+  ASSERT_EQ(points.size(), 2);
+  for (size_t k = 0; k < points.size(); ++k) {
+    const double t = points[k]["x"];
+    EXPECT_NEAR(t, 1.0, kPixelTolerance);
+    EXPECT_NEAR(points[k]["y"].get<double>(), testing::ReportObjectX(t) + 1e-3 * static_cast<double>(k),
+                kFloatTolerance);
+  }
   // Something was painted.
   EXPECT_GT(browser_
                 .Run("const c = document.querySelector('.plot canvas');"
@@ -119,7 +125,8 @@ TEST_F(PageBrowserTest, ShowsVerdictAndPlotsWithoutErrors) {
 
   // A name switches its curve off.
   EXPECT_EQ(browser_.Run("const box = document.querySelectorAll('[data-plot]')[0];"
-                         "box.querySelector('.keys button').click(); return box.graph.visibility();"),
+                         "box.querySelector('.keys button').click();"
+                         "return [0, 1].map(k => box.chart.isDatasetVisible(k));"),
             nlohmann::json({false, true}));
   // No id stands twice, and nothing was loaded.
   EXPECT_EQ(browser_.Run("const ids = [...document.querySelectorAll('[id]')].map(e => e.id);"

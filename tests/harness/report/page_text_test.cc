@@ -1,11 +1,11 @@
 // Data in pages, and numbers as pages show them.
 
-#include "harness/report/page_text.h"
-
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>
 #include <string>
+
+#include "harness/report/page_frame.h"
 
 namespace dexcheck::testing::page_text_test {
 namespace {

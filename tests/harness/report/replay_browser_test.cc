@@ -7,10 +7,10 @@
 #include <cmath>
 #include <string>
 
-#include "harness/report/write_report.h"
-#include "renders/picture_file.h"
+#include "harness/report/page.h"
 #include "renders/renderer.h"
 #include "renders/run_decorations.h"
+#include "renders/video_writer.h"
 #include "tests/common/browser.h"
 #include "tests/common/matchers.h"
 #include "tests/harness/report/replay_run.h"
@@ -176,23 +176,23 @@ TEST_F(ReplayBrowserTest, SharesItsTimeWithThePlots) {
   // A click on the failing check shows its moment, in the replay and in the plots.
   Ask("document.documentElement.style.scrollBehavior = 'auto'; "
       "document.getElementById('plots').scrollIntoView();");
-  ASSERT_TRUE(browser_.WaitFor("return document.querySelectorAll('[data-plot]')[0].graph !== undefined;"));
+  ASSERT_TRUE(browser_.WaitFor("return document.querySelectorAll('[data-plot]')[0].chart !== undefined;"));
   EXPECT_EQ(browser_.Run("document.querySelector('#verdict [data-time]').click(); return runClock.time;"),
             0.133);
   EXPECT_EQ(Ask("return [Number(find('time').value), find('clock').textContent];"),
             nlohmann::json({0.133, "t = 0.133 s"}));
   const std::string ask_line =
       "const b = document.querySelectorAll('[data-plot]')[0], i = b.querySelector('.now');"
-      "return b.graph.toDataXCoord(parseFloat(i.style.left));";
+      "return b.chart.scales.x.getValueForPixel(parseFloat(i.style.left));";
   EXPECT_NEAR(browser_.Run(ask_line).get<double>(), 0.133, 1e-3);
   // The slider moves the plots' line, a click into a plot the replay.
   Ask("find('time').value = 0.5; find('time').dispatchEvent(new Event('input'));");
   EXPECT_NEAR(browser_.Run(ask_line).get<double>(), 0.5, 1e-3);
   const nlohmann::json area = browser_.Run(
       "document.querySelectorAll('[data-plot]')[0].scrollIntoView({block: 'center'});"
-      "const g = document.querySelectorAll('[data-plot]')[0].graph, a = g.getArea(),"
-      "  r = g.graphDiv.getBoundingClientRect(); return [r.x + a.x + 0.75 * a.w, r.y + a.y + 0.5 * "
-      "a.h].map(Math.round);");
+      "const {canvas, chartArea: a} = document.querySelectorAll('[data-plot]')[0].chart,"
+      "  r = canvas.getBoundingClientRect();"
+      "return [r.x + a.left + 0.75 * a.width, r.y + a.top + 0.5 * a.height].map(Math.round);");
   browser_.Drag(area[0], area[1], area[0], area[1]);
   EXPECT_NEAR(Ask("return Number(find('time').value);").get<double>(), 0.75 * kEnd, 0.02 * kEnd);
 }

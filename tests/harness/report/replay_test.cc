@@ -11,8 +11,7 @@
 #include <string>
 
 #include "harness/report/page_assets.h"
-#include "harness/report/page_text.h"
-#include "harness/report/simplify_mesh.h"
+#include "harness/report/page_frame.h"
 #include "tests/harness/report/replay_run.h"
 
 namespace dexcheck::testing::replay_test {

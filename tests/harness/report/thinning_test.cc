@@ -1,7 +1,5 @@
 // Fewer points of a series, with its extremes.
 
-#include "harness/report/thinning.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -9,6 +7,7 @@
 #include <cmath>
 #include <limits>
 
+#include "harness/report/figure.h"
 #include "tests/common/matchers.h"
 
 namespace dexcheck::testing::thinning_test {

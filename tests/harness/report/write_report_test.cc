@@ -1,7 +1,5 @@
 // What a report's files hold.
 
-#include "harness/report/write_report.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -13,8 +11,8 @@
 #include <string>
 
 #include "controller/common/errors.h"
+#include "harness/report/page.h"
 #include "harness/report/run_data.h"
-#include "harness/report/run_figures.h"
 #include "tests/common/files.h"
 #include "tests/common/matchers.h"
 #include "tests/harness/report/report_run.h"

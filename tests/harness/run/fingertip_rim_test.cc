@@ -1,7 +1,5 @@
 // Hemispherical fingertips end at a rim: a start past it is refused, a contact that rolls past it is found.
 
-#include "controller/contact/fingertip_rim.h"
-
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -9,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "controller/contact/contact_geometry.h"
 #include "tests/common/matchers.h"
 #include "tests/harness/run/shipped_run.h"
 

@@ -16,7 +16,6 @@
 #include "controller/common/toml_reader.h"
 #include "harness/plant/velocity_filter.h"
 #include "harness/run/runner.h"
-#include "harness/study/study_theory.h"
 #include "harness/study/trial.h"
 #include "tests/common/paths.h"
 

@@ -9,7 +9,7 @@
 #include <memory>
 #include <vector>
 
-#include "harness/study/search_history.h"
+#include "harness/study/search.h"
 
 namespace dexcheck::testing {
 

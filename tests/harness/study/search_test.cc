@@ -1,5 +1,7 @@
 // Searches on functions whose best points are known, and through the rows of a study.
 
+#include "harness/study/search.h"
+
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -9,7 +11,6 @@
 #include <random>
 
 #include "controller/common/errors.h"
-#include "harness/study/search_history.h"
 #include "harness/study/study_answer.h"
 #include "tests/common/throws.h"
 #include "tests/harness/study/search_functions.h"

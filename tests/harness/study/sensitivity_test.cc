@@ -1,16 +1,14 @@
 // Which key matters: functions whose indices are known, through the study's own points and rows.
 
-#include "harness/study/sensitivity.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <functional>
 
-#include "harness/study/margin_search.h"
 #include "harness/study/sampled_stability.h"
+#include "harness/study/sampling.h"
+#include "harness/study/search.h"
 #include "harness/study/study_answer.h"
-#include "harness/study/study_sensitivity.h"
 
 namespace dexcheck::testing::sensitivity_test {
 namespace {

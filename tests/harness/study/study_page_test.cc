@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "harness/study/search_history.h"
+#include "harness/study/search.h"
 #include "tests/common/browser.h"
 #include "tests/common/files.h"
 #include "tests/common/matchers.h"

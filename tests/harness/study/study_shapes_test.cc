@@ -11,10 +11,10 @@
 
 #include "controller/common/errors.h"
 #include "controller/common/toml_reader.h"
-#include "harness/study/search_history.h"
-#include "harness/study/study_csv.h"
+#include "harness/study/search.h"
+#include "harness/study/study_answer.h"
 #include "harness/study/study_page.h"
-#include "harness/study/study_progress.h"
+#include "harness/study/study_summary.h"
 #include "tests/common/files.h"
 #include "tests/common/matchers.h"
 #include "tests/common/paths.h"

@@ -1,0 +1,108 @@
+// What Chart.js gets of a page's charts: axes, and of a study's bars with intervals, scatter plots, maps of cells. Every point and cell can
+// lead to a trial.
+'use strict';
+const MakeCharts = () => {
+  const style = name => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+  const charts = new Map();  // by canvas
+  Chart.defaults.animation = false;
+  Chart.defaults.maintainAspectRatio = false;
+  Chart.defaults.font.family = 'system-ui, "DejaVu Sans", sans-serif';
+  // As the page has them, light or dark.
+  const SetColors = () => Object.assign(Chart.defaults, {color: style('--soft'), borderColor: style('--line')});
+  SetColors();
+  const Draw = (canvas, config) => {
+    charts.get(canvas)?.destroy();
+    charts.set(canvas, new Chart(canvas, config));
+    return charts.get(canvas);
+  };
+  const Short = x => {
+    const rounded = Number(x.toPrecision(3));
+    return rounded !== 0 && (Math.abs(rounded) < 1e-3 || Math.abs(rounded) >= 1e6) ? rounded.toExponential() : String(rounded);
+  };
+  const IsWide = (least, most) => least > 0 && most / least > 30;
+  // From pale yellow over green to dark blue.
+  const ColorOf = fraction => {
+    const mix = (a, b, c) => Math.round(fraction < 0.5 ? a + 2 * fraction * (b - a) : b + (2 * fraction - 1) * (c - b));
+    return `rgb(${mix(255, 65, 8)},${mix(255, 182, 29)},${mix(204, 196, 88)})`;
+  };
+
+  // An axis: {label, labels (texts of 0, 1, ..), log}.
+  const MakeAxis = (axis, least, most) => {
+    const scale = {title: {display: true, text: axis.label}, ticks: {maxRotation: 50}};
+    if (axis.labels) {
+      return {...scale, type: 'linear', min: -0.5, max: axis.labels.length - 0.5, afterBuildTicks: scale => {
+        scale.ticks = axis.labels.map((_, i) => ({value: i}));
+      }, ticks: {...scale.ticks, autoSkip: false, callback: i => axis.labels[i].match(/.{1,14}(?:[_ .,-]|$)|.+/g)}};
+    }
+    if (axis.log) {
+      return {...scale, type: 'logarithmic', min: least, max: most,
+        ticks: {...scale.ticks, callback: (x, i, ticks) => Number.isInteger(Math.log10(x)) || ticks.length < 8 ? Short(x) : null}};
+    }
+    return {...scale, type: 'linear', min: least, max: most, ticks: {...scale.ticks, callback: Short}};
+  };
+  const Legend = shown => ({display: shown, position: 'bottom', labels: {boxWidth: 14}});
+  const Choose = choose => (_, elements, chart) => {
+    const point = elements.map(e => chart.data.datasets[e.datasetIndex].data[e.index]).find(p => p.row !== undefined);
+    // Later, for charts are drawn anew by it: this one still has the event to finish.
+    if (point) setTimeout(() => choose(point.row));
+  };
+  const Tip = describe => ({callbacks: {title: () => '', label: item => describe(item.raw)}});
+
+  // Bars along labels: sets of {label, values, color, thin}; a value may be [from, to].
+  const Bars = (canvas, {labels, sets, unit = '', log = false, least, most}) => {
+    const thin = sets.some(set => set.thin);
+    canvas.parentElement.style.height = 110 + labels.length * (thin ? 24 : 14 * sets.length + 4) + 'px';
+    return Draw(canvas, {
+      type: 'bar',
+      data: {labels, datasets: sets.map(set => ({label: set.label, data: set.values, backgroundColor: set.color, grouped: !thin,
+        barThickness: set.thin ? 3 : thin ? 14 : undefined, order: set.thin ? 0 : 1}))},
+      options: {indexAxis: 'y', plugins: {legend: Legend(sets.length > 1), tooltip: {callbacks: {label: item =>
+        item.dataset.label + ' ' + [item.raw].flat().map(Short).join(' to ') + (unit ? ' ' + unit : '')}}},
+        scales: {x: MakeAxis({label: unit, log}, least, most), y: {ticks: {autoSkip: false}}}}
+    });
+  };
+
+  // Points {x, y, row, color} and lines {label, points, color, dash}. describe(point): text beside a point.
+  const Scatter = (canvas, {x, y, points, lines = [], chosen, choose, describe}) => Draw(canvas, {
+    type: 'scatter',
+    data: {datasets: [
+      {label: 'chosen', data: points.filter(p => p.row === chosen), pointRadius: 7, pointBorderWidth: 2, pointHitRadius: 0, order: 0,
+        backgroundColor: 'transparent', borderColor: style('--accent')},
+      ...lines.map(line => ({label: line.label, data: line.points, showLine: !line.rings, borderColor: line.color,
+        borderDash: line.dash ?? [], backgroundColor: 'transparent', pointRadius: line.rings ? 4 : 0, pointHitRadius: 0, borderWidth: line.rings ? 1 : 1.8,
+        order: line.rings ? 3 : 1})),
+      {label: 'trials', data: points, order: 2, backgroundColor: points.map(p => p.color), pointRadius: points.length > 3000 ? 1.5 : 3.5}]},
+    options: {onClick: Choose(choose), plugins: {legend: {...Legend(lines.length > 0),
+      labels: {boxWidth: 14, filter: item => lines.some(line => line.label === item.text)}}, tooltip: Tip(describe)},
+      scales: {x: MakeAxis(x), y: MakeAxis(y)}}
+  });
+
+  // Cells {x: [from, to], y: [from, to], row, color, edge}.
+  const Cells = (canvas, {x, y, cells, chosen, choose, describe}) => {
+    const ends = (of, i) => cells.reduce((best, c) => (i ? Math.max : Math.min)(best, c[of][i]), i ? -Infinity : Infinity);
+    const middle = ([from, to], axis) => axis.log ? Math.sqrt(from * to) : (from + to) / 2;
+    const rectangles = {id: 'cells', beforeDatasetsDraw: ({ctx, scales}) => {
+      for (const cell of cells) {
+        const [left, right] = cell.x.map(v => scales.x.getPixelForValue(v));
+        const [bottom, top] = cell.y.map(v => scales.y.getPixelForValue(v));
+        ctx.fillStyle = cell.color;
+        ctx.fillRect(left, top, right - left + 0.5, bottom - top + 0.5);
+        if (cell.row !== chosen) continue;
+        ctx.strokeStyle = style('--ink');
+        ctx.lineWidth = 3;
+        ctx.strokeRect(left + 1.5, top + 1.5, right - left - 3, bottom - top - 3);
+      }
+    }};
+    return Draw(canvas, {
+      type: 'scatter', plugins: [rectangles],
+      data: {datasets: [{data: cells.map(cell => ({...cell, x: middle(cell.x, x), y: middle(cell.y, y)})),
+        pointStyle: cells.map(cell => cell.mark ? 'crossRot' : 'circle'), pointRadius: cells.map(cell => cell.mark ? 5 : 0),
+        borderColor: '#000', pointHitRadius: 12}]},
+      options: {onClick: Choose(choose), plugins: {legend: Legend(false), tooltip: Tip(describe)},
+        interaction: {mode: 'nearest', intersect: false},
+        scales: {x: MakeAxis(x, ends('x', 0), ends('x', 1)), y: MakeAxis(y, ends('y', 0), ends('y', 1))}}
+    });
+  };
+
+  return {style, SetColors, Short, IsWide, ColorOf, MakeAxis, Bars, Scatter, Cells};
+};
