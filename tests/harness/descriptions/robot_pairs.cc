@@ -52,6 +52,7 @@ bool SpoilLink(const ConventionFault& fault, size_t i, RobotDescription* robot) 
   const Pose X_PiP =
       joint.parent < 0 ? Pose::Identity() : robot->joints[static_cast<size_t>(joint.parent)].X_iL;
   StatedLink link{ExpressIn(joint.body, X_iL.inverse()), X_PiP.inverse() * joint.X_PB * X_iL};
+  link.axis = X_iL.linear().row(2).transpose();
   const StatedLink right = link;
   fault.make(&link);
   joint.body = ExpressIn(link.body, X_iL);
