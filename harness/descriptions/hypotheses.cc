@@ -1,14 +1,15 @@
 #include "harness/descriptions/hypotheses.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
-#include <cmath>
+#include <map>
+#include <set>
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
 #include "controller/model/body_frame.h"
+#include "harness/descriptions/body_search.h"
 #include "harness/descriptions/description_match.h"
+#include "harness/descriptions/row_search.h"
 
 namespace dexcheck {
 namespace {
@@ -25,158 +26,328 @@ double CalcLength(const std::vector<OwnRow>& rows) {
   return length > 0.0 ? length : 1.0;
 }
 
-std::vector<Hypothesis> FindGravityHypotheses(const RobotDescription& a, const RobotDescription& b,
-                                              double tolerance) {
-  if (!a.states_gravity || !b.states_gravity) return {};
-  const Vector3d& own = a.spec.gravity;
-  const Vector3d& right = b.spec.gravity;
-  const double size = std::max(own.norm(), right.norm());
-  if ((own - right).norm() <= tolerance * size) return {};
-  Hypothesis hypothesis;
-  hypothesis.explained = 1.0;
-  hypothesis.values.push_back("gravity: " + FormatNumbers(own) + "; right would be " + FormatNumbers(right));
-  if ((own + right).norm() <= tolerance * size) {
-    hypothesis.text = "gravity looks turned around (its sign)";
-  } else if (own.isZero(0.0)) {
-    hypothesis.text = "gravity looks forgotten";
-  } else if (own.normalized().cross(right.normalized()).norm() <= tolerance && own.dot(right) > 0.0) {
-    hypothesis.text = "gravity has the right direction and another value";
-  } else if (std::abs(own.norm() - right.norm()) <= tolerance * size) {
-    hypothesis.text = "gravity points along another axis";
-  } else {
-    hypothesis.text = "gravity differs";
-  }
-  return {hypothesis};
+StatedPart StateJoint(const Joint& joint, const OwnRow& row) {
+  StatedPart part;
+  part.body = row.body;
+  part.X_PL = row.X_PL;
+  part.axis = row.axis;
+  part.lower = joint.lower;
+  part.upper = joint.upper;
+  part.damping = joint.damping;
+  part.armature = joint.armature;
+  return part;
 }
 
-/// Constants of joints that a unit explains.
-std::vector<Hypothesis> FindConstantHypotheses(const RobotDescription& a, const RobotDescription& b,
-                                               const std::vector<int>& b_of_a, double tolerance) {
-  struct Constant {
-    const char* text;
-    double factor;
-    bool DescribedJoint::*states;
-    std::vector<double Joint::*> values;
+/// Axes along which a body that is one part is given.
+Matrix3d FindAxes(const std::vector<DescribedPart>& parts) {
+  return parts.size() == 1 ? Matrix3d(parts[0].X_LC.linear()) : Matrix3d(Matrix3d::Identity());
+}
+
+/// @param b_of_a joint of `b` for each of `a`.
+RowProblem MakeProblem(const RobotDescription& a, const RobotDescription& b, const std::vector<int>& b_of_a,
+                       double tolerance) {
+  RowProblem problem;
+  problem.given = ListOwnRows(a);
+  const std::vector<OwnRow> others = ListOwnRows(b);
+  problem.base_is_fixed = a.spec.base.type != BaseType::kFloating;
+  if (problem.base_is_fixed) {
+    problem.X_W0_given = a.spec.base.X_B0;
+    problem.X_W0_right = b.spec.base.X_B0;
+  }
+  const auto add = [&](int joint, int joint_b, const std::string& link, StatedPart given, StatedPart right) {
+    const std::string name = joint < 0 ? "" : a.spec.joints[static_cast<size_t>(joint)].name;
+    LinkBody body{link,
+                  name,
+                  std::move(given),
+                  std::move(right),
+                  ListParts(a, joint, Pose::Identity()),
+                  ListParts(b, joint_b, Pose::Identity())};
+    body.given.R_LC = FindAxes(body.given_parts);
+    body.right.R_LC = FindAxes(body.right_parts);
+    for (size_t k = 0; k < problem.given.size(); ++k) {
+      if (problem.given[k].parent == joint) body.given.X_LD.push_back(problem.given[k].X_PL);
+    }
+    problem.bodies.push_back(std::move(body));
   };
-  constexpr double kDegrees = kPi / 180.0;
-  const Constant constants[] = {
-      {"ranges look as if in degrees",
-       kDegrees,
-       &DescribedJoint::states_range,
-       {&Joint::lower, &Joint::upper}},
-      {"damping looks as if per degree (N m s/deg)",
-       1.0 / kDegrees,
-       &DescribedJoint::states_damping,
-       {&Joint::damping}},
-      {"damping looks as if times pi / 180", kDegrees, &DescribedJoint::states_damping, {&Joint::damping}},
-      {"armature looks as if in g cm^2", 1e-7, &DescribedJoint::states_armature, {&Joint::armature}},
-      {"armature looks as if in kg mm^2", 1e-6, &DescribedJoint::states_armature, {&Joint::armature}}};
-  std::vector<Hypothesis> found;
-  for (const Constant& constant : constants) {
-    std::vector<std::string> joints;
-    for (size_t i = 0; i < b_of_a.size(); ++i) {
-      const auto j = static_cast<size_t>(b_of_a[i]);
-      const Joint& own = a.spec.joints[i];
-      if (!(a.joints[i].*constant.states) || !(b.joints[j].*constant.states)) continue;
-      if (own.type == JointType::kPrismatic) continue;
-      bool explains = false;
-      bool fits = true;
-      for (double Joint::*const value : constant.values) {
-        const double right = b.spec.joints[j].*value;
-        explains = explains || std::abs(own.*value - right) > tolerance * std::abs(right);
-        fits = fits && std::abs(constant.factor * (own.*value) - right) <= tolerance * std::abs(right);
-      }
-      if (explains && fits) joints.push_back(own.name);
-    }
-    if (joints.empty()) continue;
-    Hypothesis hypothesis;
-    hypothesis.text = joints.size() == 1
-                          ? fmt::format("joint {}: {}", joints[0], constant.text)
-                          : fmt::format("{}: {} of {} joints", constant.text, joints.size(), b_of_a.size());
-    hypothesis.explained = 1.0;
-    found.push_back(hypothesis);
+  add(-1, -1, a.spec.base.link, StatedPart{a.spec.base.body}, StatedPart{b.spec.base.body});
+  for (size_t i = 0; i < problem.given.size(); ++i) {
+    const auto j = static_cast<size_t>(b_of_a[i]);
+    problem.right.push_back(others[j]);
+    problem.right.back().parent = problem.given[i].parent;
+    const Joint& joint = a.spec.joints[i];
+    add(static_cast<int>(i), b_of_a[i], joint.link, StateJoint(joint, problem.given[i]),
+        StateJoint(b.spec.joints[j], others[j]));
+    const auto silence = [&](bool DescribedJoint::*states, Quantity quantity) {
+      LinkBody& body = problem.bodies.back();
+      const bool is_turn = joint.type == JointType::kRevolute;
+      if (!(a.joints[i].*states && b.joints[j].*states && is_turn))
+        TakeFrom(body.right, quantity, &body.given);
+    };
+    silence(&DescribedJoint::states_range, Quantity::kRange);
+    silence(&DescribedJoint::states_damping, Quantity::kDamping);
+    silence(&DescribedJoint::states_armature, Quantity::kArmature);
   }
-  return found;
+  problem.close = {CalcLength(problem.right), tolerance};
+  return problem;
 }
 
-/// Parts with mass of a joint's link, in the link's own frame of the other description.
-/// @param X_ab the own frame of `robot` in that of the other description.
-std::vector<DescribedPart> ListParts(const RobotDescription& robot, int joint, const Pose& X_ab) {
-  std::vector<DescribedPart> parts;
-  for (const DescribedPart& part : robot.parts) {
-    if (part.joint != joint || !part.states_inertial) continue;
-    // From the part's own frame by frame i to its row's place, and from there to that of the other.
-    Pose X_RL = part.X_iL;
-    if (joint >= 0) {
-      const Pose& X_iL = robot.joints[static_cast<size_t>(joint)].X_iL;
-      X_RL = Eigen::Translation3d(-X_iL.inverse().translation()) * X_iL.inverse() * part.X_iL;
+/// What is to be said of rows that share a convention, or a number.
+class RowReport {
+ public:
+  RowReport(const RobotDescription& a, const std::vector<RowFinding>& findings) : a_(a), open_(findings) {}
+
+  std::vector<Finding> Run() {
+    while (true) {
+      std::map<std::string, std::vector<size_t>> rows_of;
+      for (size_t i = 0; i < open_.size(); ++i) {
+        for (const std::string& id : ListIds(open_[i])) rows_of[id].push_back(i);
+      }
+      if (rows_of.empty()) return std::move(found_);
+      const auto most = std::max_element(rows_of.begin(), rows_of.end(), [](const auto& x, const auto& y) {
+        return x.second.size() < y.second.size();
+      });
+      Take(rows_of, most->second);
     }
-    DescribedPart& own = parts.emplace_back(part);
-    own.X_iL = X_ab * X_RL;
-    own.body = ExpressIn(part.body, own.X_iL);
-    own.X_LC = own.X_iL * part.X_LC;
   }
-  return parts;
-}
+
+ private:
+  /// Of one convention, or of one number, in each reading that is left.
+  static std::set<std::string> ListIds(const RowFinding& finding) {
+    std::set<std::string> ids;
+    for (const RowReading& reading : finding.readings) {
+      for (const Convention* const convention : reading.conventions) ids.insert(convention->id);
+      if (!reading.number.empty()) ids.insert(reading.number);
+    }
+    return ids;
+  }
+
+  static bool Has(const RowReading& reading, const std::string& id) {
+    return reading.number == id ||
+           std::any_of(reading.conventions.begin(), reading.conventions.end(),
+                       [&](const Convention* convention) { return convention->id == id; });
+  }
+
+  /// One finding of these rows: all ids that explain each of them.
+  void Take(const std::map<std::string, std::vector<size_t>>& rows_of, const std::vector<size_t>& rows) {
+    Finding finding;
+    finding.what = "joint";
+    finding.total = a_.spec.joints.size();
+    std::string taken;
+    for (const auto& entry : rows_of) {
+      const std::string& id = entry.first;
+      if (entry.second != rows) continue;
+      const std::vector<RowReading>& readings = open_[rows[0]].readings;
+      const bool is_beside =
+          !taken.empty() && std::any_of(readings.begin(), readings.end(), [&](const RowReading& reading) {
+            return Has(reading, id) && Has(reading, taken);
+          });
+      if (is_beside) continue;  // both at once are two faults
+      if (taken.empty()) taken = id;
+      finding.ids.push_back(id);
+      finding.one.push_back("its " + Describe(id, open_[rows[0]], false));
+      finding.many.push_back(Describe(id, open_[rows[0]], true));
+    }
+    if (rows.size() == 1 && rows[0] > 0) AddElsewhere(rows[0] - 1, &finding);
+    for (const size_t i : rows) {
+      finding.parts.push_back(i == 0 ? "" : a_.spec.joints[i - 1].name);
+      AddValue(taken, i, rows.size(), &finding);
+      for (RowReading& reading : open_[i].readings) {
+        if (!Has(reading, taken)) reading = RowReading{};
+        std::erase_if(reading.conventions,
+                      [&](const Convention* convention) { return convention->id == taken; });
+        if (reading.number == taken) reading.number.clear();
+      }
+    }
+    finding.cells = rows.size();
+    found_.push_back(std::move(finding));
+  }
+
+  /// What the link that carries a joint would explain as well.
+  void AddElsewhere(size_t joint, Finding* finding) const {
+    const int parent = a_.spec.joints[joint].parent;
+    const RowFinding& carrier = open_[static_cast<size_t>(parent + 1)];
+    const std::string name =
+        parent < 0 ? "the base" : "joint " + a_.spec.joints[static_cast<size_t>(parent)].name;
+    RowFinding one;
+    one.readings = carrier.elsewhere;
+    for (const std::string& id : ListIds(one)) {
+      finding->ids.push_back(id);
+      finding->one.push_back("that of " + name + ": its " + Describe(id, one, false));
+    }
+  }
+
+  static std::string Describe(const std::string& id, const RowFinding& finding, bool many) {
+    for (const RowReading& reading : finding.readings) {
+      for (const Convention* const convention : reading.conventions) {
+        if (convention->id == id) return Say(NameOf(convention->of, many), many, convention->words);
+      }
+      if (reading.number != id) continue;
+      const std::string noun = id.substr(id.find('.') + 1);
+      if (id == "zero.offset") return many ? "zeros look offset" : "zero looks " + reading.words;
+      return many ? noun + (noun == "axis" ? " numbers differ" : "s differ")
+                  : noun + " looks " + reading.words;
+    }
+    return id;
+  }
+  static std::string Say(const std::string& noun, bool many, const std::string& words) {
+    return noun + (many ? " look " : " looks ") + words;
+  }
+
+  void AddValue(const std::string& id, size_t row, size_t rows, Finding* finding) const {
+    if (rows < 2 || id.find('.') == std::string::npos) return;
+    for (const RowReading& reading : open_[row].readings) {
+      if (reading.number == id)
+        finding->values.push_back("joint " + finding->parts.back() + ": its " +
+                                  (id == "zero.offset" ? "zero" : id.substr(id.find('.') + 1)) + " looks " +
+                                  reading.words);
+    }
+  }
+
+  const RobotDescription& a_;
+  std::vector<RowFinding> open_;
+  std::vector<Finding> found_;
+};
+
+class Explaining {
+ public:
+  Explaining(const RobotDescription& a, const RobotDescription& b, double tolerance)
+      : a_(a), b_(b), tolerance_(tolerance) {}
+
+  std::vector<Hypothesis> Run() {
+    const std::vector<int> b_of_a = MatchJoints(a_.spec, b_.spec);
+    if (std::any_of(b_of_a.begin(), b_of_a.end(), [](int j) { return j < 0; })) return {};
+    RowProblem problem = MakeProblem(a_, b_, b_of_a, tolerance_);
+    std::vector<RowFinding> rows = SearchRows(problem);
+    const bool is_misread = std::any_of(rows.begin(), rows.end(), [](const RowFinding& row) {
+      return !row.is_placed || !row.readings.empty();
+    });
+    if (!is_misread || !FindMisreadTable(&problem, &rows)) {
+      for (const Finding& finding : RowReport(a_, rows).Run()) found_.push_back(finding);
+    }
+    FindGravity();
+    for (const Finding& finding : SearchBodies(PlaceBodies(problem, rows), problem.close))
+      found_.push_back(finding);
+    return Report();
+  }
+
+ private:
+  static bool IsRightEverywhere(const std::vector<RowFinding>& rows) {
+    return std::all_of(rows.begin(), rows.end(),
+                       [](const RowFinding& row) { return row.is_placed && row.readings.empty(); });
+  }
+
+  /// Tables of Denavit-Hartenberg rows that were meant in another way.
+  bool FindMisreadTable(RowProblem* problem, std::vector<RowFinding>* rows) {
+    const std::vector<Joint>& joints = a_.spec.joints;
+    if (std::none_of(joints.begin(), joints.end(),
+                     [](const Joint& joint) { return joint.mdh.alpha != 0.0 || joint.mdh.a != 0.0; }))
+      return false;
+    const auto same = [](MdhRow row) { return row; };
+    const auto radians = [](MdhRow row) {
+      return MdhRow{DegToRad(row.alpha), row.a, DegToRad(row.q), row.d};
+    };
+    const auto sign = [](MdhRow row) { return MdhRow{-row.alpha, row.a, row.q, row.d}; };
+    const auto metres = [](MdhRow row) { return MdhRow{row.alpha, 1e-3 * row.a, row.q, 1e-3 * row.d}; };
+    const struct {
+      const char* id;
+      const char* words;
+      std::vector<OwnRow> rows;
+    } readings[] = {
+        {"table.classic",
+         "the rows look like classic (standard) Denavit-Hartenberg parameters, and are read as modified ones",
+         ReadRowsAs(a_, same, true)},
+        {"table.degrees", "alpha and q of the rows look as if in degrees", ReadRowsAs(a_, radians, false)},
+        {"table.alpha_sign", "alpha of all rows looks turned around (its sign)", ReadRowsAs(a_, sign, false)},
+        {"table.mm", "a and d of the rows look as if in mm", ReadRowsAs(a_, metres, false)}};
+    for (const auto& reading : readings) {
+      RowProblem other = *problem;
+      other.given = reading.rows;
+      for (size_t i = 0; i < other.given.size(); ++i) other.bodies[i + 1].given.body = other.given[i].body;
+      const std::vector<RowFinding> found = SearchRows(other);
+      if (!IsRightEverywhere(found)) continue;
+      Finding& finding = found_.emplace_back();
+      finding.ids = {reading.id};
+      finding.one = {std::string(reading.words) + ": " + std::to_string(joints.size()) + " of " +
+                     std::to_string(joints.size()) + " joints"};
+      finding.cells = other.given.size();
+      for (const Joint& joint : joints) finding.parts.push_back(joint.name);
+      *problem = std::move(other);
+      *rows = found;
+      return true;
+    }
+    return false;
+  }
+
+  void FindGravity() {
+    if (!a_.states_gravity || !b_.states_gravity) return;
+    const Vector3d& own = a_.spec.gravity;
+    const Vector3d& right = b_.spec.gravity;
+    const double few = tolerance_ * std::max(own.norm(), right.norm());
+    if ((own - right).norm() <= few) return;
+    Finding finding;
+    finding.cells = 1;
+    finding.parts = {"gravity"};
+    const bool is_along =
+        own.normalized().cross(right.normalized()).norm() <= tolerance_ && own.dot(right) > 0.0;
+    const std::tuple<bool, const char*, const char*> readings[] = {
+        {(own + right).norm() <= few, "gravity.sign", "gravity looks turned around (its sign)"},
+        {own.isZero(0.0), "gravity.missing", "gravity looks forgotten"},
+        {(1e-3 * own - right).norm() <= few, "gravity.mm", "gravity looks as if in mm/s^2"},
+        {is_along, "gravity.value", "gravity has the right direction and another value"},
+        {std::abs(own.norm() - right.norm()) <= few, "gravity.axis", "gravity points along another axis"},
+        {true, "gravity.other", "gravity differs"}};
+    const auto first = std::find_if(std::begin(readings), std::end(readings),
+                                    [](const auto& reading) { return std::get<0>(reading); });
+    finding.ids = {std::get<1>(*first)};
+    finding.one = {std::get<2>(*first)};
+    finding.values.push_back("gravity: " + FormatNumbers(own) + "; right would be " + FormatNumbers(right));
+    found_.push_back(std::move(finding));
+  }
+
+  /// Bodies in the own frames of `a`, where that is known by now.
+  [[nodiscard]] std::vector<LinkBody> PlaceBodies(const RowProblem& problem,
+                                                  const std::vector<RowFinding>& rows) const {
+    std::vector<LinkBody> bodies;
+    for (size_t link = problem.base_is_fixed ? 1 : 0; link < rows.size(); ++link) {
+      LinkBody& body = bodies.emplace_back(PlaceBody(problem, link, rows[link].X_ab));
+      if (!rows[link].readings.empty()) body.given.X_PL = rows[link].readings[0].part.X_PL;
+      if (rows[link].is_placed) continue;
+      for (const Quantity quantity : {Quantity::kCom, Quantity::kInertia})
+        TakeFrom(body.right, quantity, &body.given);
+      body.given_parts.clear();
+    }
+    return bodies;
+  }
+
+  [[nodiscard]] std::vector<Hypothesis> Report() const {
+    size_t cells = 0;
+    bool has_convention = false;
+    for (const Finding& finding : found_) {
+      cells += finding.cells;
+      has_convention = has_convention || !finding.ids[0].starts_with("number.");
+    }
+    std::vector<Hypothesis> hypotheses;
+    if (!has_convention) return hypotheses;
+    for (const Finding& finding : found_) hypotheses.push_back(ToHypothesis(finding, cells));
+    return hypotheses;
+  }
+
+  const RobotDescription& a_;
+  const RobotDescription& b_;
+  double tolerance_;
+  std::vector<Finding> found_;
+};
 
 }  // namespace
 
 std::vector<Hypothesis> ExplainDifference(RobotDescription a, RobotDescription b, double tolerance) {
+  const RobotDescription read = a;
   try {
     CompleteEachOther(&a, &b);
   } catch (const InputError&) {
     return {};
   }
-  return FindHypotheses(a, b, tolerance);
-}
-
-std::vector<Hypothesis> FindHypotheses(const RobotDescription& a, const RobotDescription& b,
-                                       double tolerance) {
-  const std::vector<int> b_of_a = MatchJoints(a.spec, b.spec);
-  if (std::any_of(b_of_a.begin(), b_of_a.end(), [](int j) { return j < 0; })) return {};
-  std::vector<OwnRow> rows = ListOwnRows(a);
-  const std::vector<OwnRow> others = ListOwnRows(b);
-  std::vector<OwnRow> right;
-  for (size_t i = 0; i < rows.size(); ++i) {
-    right.push_back(others[static_cast<size_t>(b_of_a[i])]);
-    right.back().parent = rows[i].parent;
-  }
-  const bool floats = a.spec.base.type == BaseType::kFloating;
-  const Pose X_W0_a = floats ? Pose::Identity() : a.spec.base.X_B0;
-  const Pose X_W0_b = floats ? Pose::Identity() : b.spec.base.X_B0;
-  const double length = CalcLength(right);
-  std::vector<Hypothesis> found = FindJointHypotheses(a, X_W0_a, X_W0_b, right, length, tolerance, &rows);
-  const auto append = [&](const std::vector<Hypothesis>& more) {
-    found.insert(found.end(), more.begin(), more.end());
-  };
-  append(FindGravityHypotheses(a, b, tolerance));
-  append(FindConstantHypotheses(a, b, b_of_a, tolerance));
-
-  // Bodies are compared in the own frames of `a`, where the joints are right by now.
-  const VectorXd home = VectorXd::Zero(static_cast<Eigen::Index>(rows.size()));
-  const std::vector<Pose> poses = CalcOwnPoses(X_W0_a, rows, home);
-  const std::vector<Pose> right_poses = CalcOwnPoses(X_W0_b, right, home);
-  std::vector<ComparedBody> bodies;
-  const auto add = [&](int joint, const std::string& link, const MassProperties& given,
-                       const MassProperties& other, int joint_b) {
-    ComparedBody& body = bodies.emplace_back();
-    const Pose X_ab =
-        poses[static_cast<size_t>(joint + 1)].inverse() * right_poses[static_cast<size_t>(joint + 1)];
-    body.joint = joint;
-    body.link = link;
-    body.given = given;
-    body.right = ExpressIn(other, X_ab);
-    if (joint >= 0) body.X_PL = rows[static_cast<size_t>(joint)].X_PL;
-    body.given_parts = ListParts(a, joint, Pose::Identity());
-    body.parts = ListParts(b, joint_b, X_ab);
-    if (body.given_parts.size() == 1) body.R_LC = body.given_parts[0].X_LC.linear();
-  };
-  if (floats) add(-1, a.spec.base.link, a.spec.base.body, b.spec.base.body, -1);
-  for (size_t i = 0; i < rows.size(); ++i) {
-    add(static_cast<int>(i), a.spec.joints[i].link, rows[i].body, right[i].body, b_of_a[i]);
-  }
-  append(FindBodyHypotheses(bodies, length, tolerance));
-  return found;
+  return Explaining(a, b, tolerance).Run();
 }
 
 }  // namespace dexcheck

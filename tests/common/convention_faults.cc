@@ -130,6 +130,7 @@ void AddInertiaFrames(Faults* list) {
                        const Matrix3d R = make(link->R_LC);
                        const Matrix3d I = link->R_LC.transpose() * link->body.inertia * link->R_LC;
                        link->body.inertia = R * I * R.transpose();
+                       link->R_LC = R;
                      },
                      FaultOf::kBody,
                      {std::string("inertia.frame_") + rotation.id}});
@@ -152,6 +153,7 @@ void AddInertias(Faults* list) {
   AddNumbers(
       "of principal moments without their axes", "no_axes",
       [](const Matrix3d& I) {
+        if (I.isDiagonal(1e-12)) return I;  // nothing is lost, and another order is another fault
         return Matrix3d(Eigen::SelfAdjointEigenSolver<Matrix3d>(I).eigenvalues().asDiagonal());
       },
       list);

@@ -30,15 +30,6 @@ struct Robot {
   std::string urdf;
 };
 
-/// A robot with a fault, the words or ids that would name it, and how many links show it.
-struct Spoilt {
-  std::string urdf;
-  std::vector<std::string> ids;
-  std::string text;
-  std::function<void(RobotDescription*)> more = [](RobotDescription*) {};  ///< What no URDF states.
-  std::function<void(RobotDescription*)> right = [](RobotDescription*) {};
-};
-
 bool IsVisible(const StatedLink& a, const StatedLink& b) {
   constexpr double kVisible = 1e-3;
   const auto differ = [](double x, double y) { return std::abs(x - y) > kVisible * std::abs(y); };
@@ -108,7 +99,7 @@ class Campaign {
       links = {first};
     }
     if (Spoil(fault, links, &urdf) < (all ? 2 : 1)) return;
-    Judge(robot.name + (all ? " all: " : " one: "), fault.name, fault.ids, fault.text, [&] {
+    Judge(robot.name + (all ? " all: " : " one: "), fault.name, ListVisible(fault, robot, urdf), [&] {
       RobotDescription wrong = ParseUrdf(urdf.Write(), "wrong.urdf");
       StateArmatures(urdf, &wrong);
       return ExplainDifference(wrong, right);
@@ -122,25 +113,24 @@ class Campaign {
     for (size_t i = 0; i < read.parts.size(); ++i) {
       if (read.parts[i].moves && read.parts[i].has_body) moving.push_back(i);
     }
-    const auto exchange = [&](const char* name, const char* text, const char* id, size_t i, size_t j,
+    const auto exchange = [&](const char* name, const char* id, size_t i, size_t j,
                               void (*swap)(StatedLink*, StatedLink*)) {
       StatedUrdf urdf(robot.urdf);
       swap(&urdf.parts[i].stated, &urdf.parts[j].stated);
       if (!IsVisible(urdf.parts[i].stated, read.parts[i].stated)) return;
-      JudgeText(robot, name, text, id, urdf.Write(), robot.urdf);
+      JudgeText(robot, name, id, urdf.Write(), robot.urdf);
     };
     if (moving.size() > 2) {
       const size_t i = moving[1], j = moving[2];
-      exchange("links' names exchanged", "bodies look exchanged", "exchange.body", i, j,
-               [](StatedLink* a, StatedLink* b) {
-                 std::swap(a->body, b->body);
-                 std::swap(a->R_LC, b->R_LC);
-               });
-      exchange("masses exchanged", "masses look exchanged", "exchange.mass", i, j,
+      exchange("links' names exchanged", "exchange.body", i, j, [](StatedLink* a, StatedLink* b) {
+        std::swap(a->body, b->body);
+        std::swap(a->R_LC, b->R_LC);
+      });
+      exchange("masses exchanged", "exchange.mass", i, j,
                [](StatedLink* a, StatedLink* b) { std::swap(a->body.mass, b->body.mass); });
-      exchange("centres exchanged", "centres of mass look exchanged", "exchange.com", i, j,
+      exchange("centres exchanged", "exchange.com", i, j,
                [](StatedLink* a, StatedLink* b) { std::swap(a->body.com, b->body.com); });
-      exchange("inertias exchanged", "inertias look exchanged", "exchange.inertia", i, j,
+      exchange("inertias exchanged", "exchange.inertia", i, j,
                [](StatedLink* a, StatedLink* b) { std::swap(a->body.inertia, b->body.inertia); });
       TryJointNames(robot, read, i, j);
       for (size_t k = 0; k < moving.size(); ++k) {
@@ -156,7 +146,7 @@ class Campaign {
   void TryJointNames(const Robot& robot, const StatedUrdf& read, size_t i, size_t j) {
     StatedUrdf urdf(robot.urdf);
     urdf.ExchangeJointNames(read.parts[i].joint, read.parts[j].joint);
-    JudgeText(robot, "joints' names exchanged", "look exchanged", "exchange.joint", urdf.Write(), robot.urdf);
+    JudgeText(robot, "joints' names exchanged", "exchange.joint", urdf.Write(), robot.urdf);
   }
 
   void TryBase(const Robot& robot) {
@@ -176,15 +166,15 @@ class Campaign {
       StatedUrdf right(robot.urdf);
       urdf.MountOn("world", Pose(Eigen::AngleAxisd(turn.angle, turn.axis)));
       right.MountOn("world", Pose::Identity());
-      JudgeText(robot, turn.name, "base", turn.id, urdf.Write(), right.Write());
+      JudgeText(robot, turn.name, turn.id, urdf.Write(), right.Write());
     }
-    const std::tuple<const char*, const char*, const char*, Vector3d> gravities[] = {
-        {"gravity upside down", "turned around", "gravity.sign", {0.0, 0.0, 9.81}},
-        {"gravity along y", "another axis", "gravity.axis", {0.0, -9.81, 0.0}},
-        {"gravity missing", "forgotten", "gravity.missing", {0.0, 0.0, 0.0}},
-        {"gravity in mm/s^2", "mm", "gravity.mm", {0.0, 0.0, -9810.0}}};
-    for (const auto& [name, text, id, gravity] : gravities) {
-      Judge(robot.name + ": ", name, {id}, text, [&, gravity = gravity] {
+    const std::tuple<const char*, const char*, Vector3d> gravities[] = {
+        {"gravity upside down", "gravity.sign", {0.0, 0.0, 9.81}},
+        {"gravity along y", "gravity.axis", {0.0, -9.81, 0.0}},
+        {"gravity missing", "gravity.missing", {0.0, 0.0, 0.0}},
+        {"gravity in mm/s^2", "gravity.mm", {0.0, 0.0, -9810.0}}};
+    for (const auto& [name, id, gravity] : gravities) {
+      Judge(robot.name + ": ", name, {id}, [&, gravity = gravity] {
         RobotDescription right = ParseUrdf(robot.urdf, "right.urdf");
         right.states_gravity = true;
         right.spec.gravity = Vector3d(0.0, 0.0, -9.81);
@@ -205,10 +195,9 @@ class Campaign {
     if (Spoil(b, links, &urdf) < (all_of_b ? 2 : 1)) return;
     std::vector<std::string> ids = a.ids;
     ids.insert(ids.end(), b.ids.begin(), b.ids.end());
-    Judge(robot.name + ": ", "PAIR " + a.name + " + " + b.name + (all_of_b ? "" : " of one"), ids, a.text,
-          [&] {
-            return ExplainDifference(ParseUrdf(urdf.Write(), "wrong.urdf"), ParseUrdf(robot.urdf, "right"));
-          });
+    Judge(robot.name + ": ", "PAIR " + a.name + " + " + b.name + (all_of_b ? "" : " of one"), ids, [&] {
+      return ExplainDifference(ParseUrdf(urdf.Write(), "wrong.urdf"), ParseUrdf(robot.urdf, "right"));
+    });
   }
 
   void Print() const {
@@ -237,6 +226,21 @@ class Campaign {
     sum->wrong += count.wrong;
   }
 
+  /// Of a fault of several quantities, those that show: no unit changes a centre of mass at the origin.
+  static std::vector<std::string> ListVisible(const ConventionFault& fault, const Robot& robot,
+                                              const StatedUrdf& spoilt) {
+    std::vector<std::string> ids = fault.ids;
+    if (ids.size() < 2) return ids;
+    const StatedUrdf right(robot.urdf);
+    const auto is_same = [&](size_t i) {
+      return right.parts[i].stated.body.com == spoilt.parts[i].stated.body.com;
+    };
+    bool all_same = true;
+    for (size_t i = 0; i < right.parts.size(); ++i) all_same = all_same && is_same(i);
+    if (all_same) std::erase_if(ids, [](const std::string& id) { return id.starts_with("com."); });
+    return ids;
+  }
+
   /// A link in the middle that shows the fault.
   static size_t FindLink(const ConventionFault& fault, const StatedUrdf& urdf) {
     const size_t n = urdf.parts.size();
@@ -250,15 +254,15 @@ class Campaign {
     return n;
   }
 
-  void JudgeText(const Robot& robot, const std::string& name, const std::string& text, const std::string& id,
-                 const std::string& wrong, const std::string& right) {
-    Judge(robot.name + ": ", name, {id}, text,
+  void JudgeText(const Robot& robot, const std::string& name, const std::string& id, const std::string& wrong,
+                 const std::string& right) {
+    Judge(robot.name + ": ", name, {id},
           [&] { return ExplainDifference(ParseUrdf(wrong, "wrong.urdf"), ParseUrdf(right, "right.urdf")); });
   }
 
   template <typename Explain>
   void Judge(const std::string& where, const std::string& name, const std::vector<std::string>& ids,
-             const std::string& text, const Explain& explain) {
+             const Explain& explain) {
     std::vector<Hypothesis> found;
     try {
       found = explain();
@@ -266,13 +270,37 @@ class Campaign {
       return;  // the reader refuses it: no such body
     }
     Count& count = counts_[name];
-    const bool is_named = !found.empty() && found[0].text.find(text) != std::string::npos;
-    const bool is_class = false;
-    ++(is_named ? is_class ? count.in_class : count.named : found.empty() ? count.not_named : count.wrong);
-    if (is_named) return;
-    details_ += "\n  " + where + name;
+    const Outcome outcome = Rate(found, ids);
+    int* const counts[] = {&count.named, &count.in_class, &count.not_named, &count.wrong};
+    ++*counts[static_cast<size_t>(outcome)];
+    if (outcome == Outcome::kNamed) return;
+    static constexpr const char* kOutcomes[] = {"", "CLASS", "NONE", "WRONG"};
+    details_ += "\n  " + std::string(kOutcomes[static_cast<size_t>(outcome)]) + " " + where + name;
     for (const Hypothesis& one : found) details_ += "\n    " + one.text;
-    static_cast<void>(ids);
+  }
+
+  enum class Outcome { kNamed, kInClass, kNotNamed, kWrong };
+
+  /// Named when each of the ids is what one explanation says, up to a class when some are among others. Wrong
+  /// when a convention is named that was not injected, unless the right one stands beside it.
+  static Outcome Rate(const std::vector<Hypothesis>& found, const std::vector<std::string>& ids) {
+    bool is_class = false;
+    std::set<std::string> named;
+    for (const Hypothesis& one : found) {
+      const auto fits = std::find_if(ids.begin(), ids.end(), [&](const std::string& id) {
+        return std::find(one.ids.begin(), one.ids.end(), id) != one.ids.end();
+      });
+      if (fits != ids.end()) {
+        is_class = is_class || one.ids.size() > 1;
+        named.insert(*fits);
+      } else if (one.ids[0].starts_with("number.")) {
+        is_class = true;
+      } else {
+        return Outcome::kWrong;
+      }
+    }
+    if (named.size() < ids.size()) return Outcome::kNotNamed;
+    return is_class ? Outcome::kInClass : Outcome::kNamed;
   }
 
   std::map<std::string, Count> counts_;
