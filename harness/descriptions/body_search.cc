@@ -204,24 +204,42 @@ class BodySearch {
     }
   }
 
+  /// A link as a whole, or its own part without what is welded to it.
+  [[nodiscard]] PartView FindOwn(size_t i) const {
+    const BodyUndoing undoing(bodies_[i], close_);
+    for (const PartView& view : undoing.views()) {
+      if (view.is_main) return view;
+    }
+    return {"", 0, true, bodies_[i].given, bodies_[i].right};
+  }
+
   /// All that is wrong of two links is right of each other.
   void FindExchange(size_t i, size_t j) {
-    std::vector<Quantity> wrong;
+    const PartView a = FindOwn(i);
+    const PartView b = FindOwn(j);
+    const auto agree = [&](Quantity quantity, const StatedPart& x, const StatedPart& y) {
+      return AgreesIn(quantity, x, y, close_.length, close_.tolerance);
+    };
+    std::vector<Quantity> exchanged;
+    bool is_whole = true;
     for (const Quantity quantity : kBodyQuantities) {
-      const bool is_wrong = IsWrong(bodies_[i], quantity) || IsWrong(bodies_[j], quantity);
-      if (is_wrong && IsBodyOf(i, j, quantity) && IsBodyOf(j, i, quantity)) wrong.push_back(quantity);
+      const bool is_wrong = !agree(quantity, a.given, a.right) || !agree(quantity, b.given, b.right);
+      const bool is_other = agree(quantity, a.given, b.right) && agree(quantity, b.given, a.right);
+      is_whole = is_whole && is_other;
+      if (!is_wrong) continue;
+      if (!is_other) return;
+      exchanged.push_back(quantity);
     }
-    if (wrong.empty()) return;
-    const bool is_whole = IsBodyOf(i, j) && IsBodyOf(j, i);
+    if (exchanged.empty()) return;
     static constexpr const char* kIds[] = {"exchange.mass", "exchange.com", "exchange.inertia"};
     std::string what;
-    for (const Quantity quantity : wrong)
+    for (const Quantity quantity : exchanged)
       what += (what.empty() ? "" : " and ") + std::string(NameOf(quantity, true));
-    AddSentence(is_whole ? "exchange.body" : kIds[static_cast<size_t>(wrong[0])],
+    AddSentence(is_whole ? "exchange.body" : kIds[static_cast<size_t>(exchanged[0])],
                 "links " + bodies_[i].link + " and " + bodies_[j].link + ": their " +
                     (is_whole ? "bodies" : what) + " look exchanged",
                 {i, j});
-    for (const Quantity quantity : wrong) {
+    for (const Quantity quantity : kBodyQuantities) {
       TakeRight(quantity, i);
       TakeRight(quantity, j);
     }

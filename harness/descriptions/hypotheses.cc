@@ -91,6 +91,46 @@ RowProblem MakeProblem(const RobotDescription& a, const RobotDescription& b, con
   return problem;
 }
 
+/// Of one convention, or of one number, in each reading that is left.
+std::set<std::string> ListIds(const RowFinding& finding) {
+  std::set<std::string> ids;
+  for (const RowReading& reading : finding.readings) {
+    for (const Convention* const convention : reading.conventions) ids.insert(convention->id);
+    if (!reading.number.empty()) ids.insert(reading.number);
+  }
+  return ids;
+}
+
+std::string Say(const std::string& noun, bool many, const std::string& words) {
+  return noun + (many ? " look " : " looks ") + words;
+}
+
+std::string Describe(const std::string& id, const RowFinding& finding, bool many) {
+  for (const RowReading& reading : finding.readings) {
+    for (const Convention* const convention : reading.conventions) {
+      if (convention->id == id) return Say(NameOf(convention->of, many), many, convention->words);
+    }
+    if (reading.number != id) continue;
+    const std::string noun = id.substr(id.find('.') + 1);
+    if (id == "zero.offset") return many ? "zeros look offset" : "zero looks " + reading.words;
+    return many ? noun + (noun == "axis" ? " numbers differ" : "s differ") : noun + " looks " + reading.words;
+  }
+  return id;
+}
+
+/// What the row of another joint, or the base, explains as well. @param joint -1: the base.
+void AddElsewhere(const RobotDescription& robot, const RowFinding& row, int joint, Finding* finding) {
+  if (finding->ids[0].starts_with("number.")) return;
+  RowFinding one;
+  one.readings = row.elsewhere;
+  const std::string name =
+      joint < 0 ? "the base" : "joint " + robot.spec.joints[static_cast<size_t>(joint)].name;
+  for (const std::string& id : ListIds(one)) {
+    finding->ids.push_back(id);
+    finding->one.push_back("that of " + name + ": its " + Describe(id, one, false));
+  }
+}
+
 /// What is to be said of rows that share a convention, or a number.
 class RowReport {
  public:
@@ -111,16 +151,6 @@ class RowReport {
   }
 
  private:
-  /// Of one convention, or of one number, in each reading that is left.
-  static std::set<std::string> ListIds(const RowFinding& finding) {
-    std::set<std::string> ids;
-    for (const RowReading& reading : finding.readings) {
-      for (const Convention* const convention : reading.conventions) ids.insert(convention->id);
-      if (!reading.number.empty()) ids.insert(reading.number);
-    }
-    return ids;
-  }
-
   static bool Has(const RowReading& reading, const std::string& id) {
     return reading.number == id ||
            std::any_of(reading.conventions.begin(), reading.conventions.end(),
@@ -147,7 +177,10 @@ class RowReport {
       finding.one.push_back("its " + Describe(id, open_[rows[0]], false));
       finding.many.push_back(Describe(id, open_[rows[0]], true));
     }
-    if (rows.size() == 1 && rows[0] > 0) AddElsewhere(rows[0] - 1, &finding);
+    if (rows.size() == 1 && rows[0] > 0) {
+      const int parent = a_.spec.joints[rows[0] - 1].parent;
+      AddElsewhere(a_, open_[static_cast<size_t>(parent + 1)], parent, &finding);
+    }
     for (const size_t i : rows) {
       finding.parts.push_back(i == 0 ? "" : a_.spec.joints[i - 1].name);
       AddValue(taken, i, rows.size(), &finding);
@@ -160,37 +193,6 @@ class RowReport {
     }
     finding.cells = rows.size();
     found_.push_back(std::move(finding));
-  }
-
-  /// What the link that carries a joint would explain as well.
-  void AddElsewhere(size_t joint, Finding* finding) const {
-    const int parent = a_.spec.joints[joint].parent;
-    const RowFinding& carrier = open_[static_cast<size_t>(parent + 1)];
-    const std::string name =
-        parent < 0 ? "the base" : "joint " + a_.spec.joints[static_cast<size_t>(parent)].name;
-    RowFinding one;
-    one.readings = carrier.elsewhere;
-    for (const std::string& id : ListIds(one)) {
-      finding->ids.push_back(id);
-      finding->one.push_back("that of " + name + ": its " + Describe(id, one, false));
-    }
-  }
-
-  static std::string Describe(const std::string& id, const RowFinding& finding, bool many) {
-    for (const RowReading& reading : finding.readings) {
-      for (const Convention* const convention : reading.conventions) {
-        if (convention->id == id) return Say(NameOf(convention->of, many), many, convention->words);
-      }
-      if (reading.number != id) continue;
-      const std::string noun = id.substr(id.find('.') + 1);
-      if (id == "zero.offset") return many ? "zeros look offset" : "zero looks " + reading.words;
-      return many ? noun + (noun == "axis" ? " numbers differ" : "s differ")
-                  : noun + " looks " + reading.words;
-    }
-    return id;
-  }
-  static std::string Say(const std::string& noun, bool many, const std::string& words) {
-    return noun + (many ? " look " : " looks ") + words;
   }
 
   void AddValue(const std::string& id, size_t row, size_t rows, Finding* finding) const {
@@ -213,10 +215,21 @@ class Explaining {
   Explaining(const RobotDescription& a, const RobotDescription& b, double tolerance)
       : a_(a), b_(b), tolerance_(tolerance) {}
 
+  /// Whether rows and bodies are the same: of joints of one name, no more is asked here.
+  bool Agrees() {
+    const RowProblem problem = MakeProblem(a_, b_, MatchJoints(a_.spec, b_.spec), tolerance_);
+    std::vector<Pose> X_ab = {problem.X_W0_given.inverse() * problem.X_W0_right};
+    for (size_t i = 0; i < problem.given.size(); ++i) {
+      const Pose& X_ab_P = X_ab[static_cast<size_t>(problem.given[i].parent + 1)];
+      if (!IsAxisRight(problem, i, problem.bodies[i + 1].given, X_ab_P)) return false;
+      X_ab.push_back(problem.given[i].X_PL.inverse() * X_ab_P * problem.right[i].X_PL);
+      if (!IsRight(PlaceBody(problem, i + 1, X_ab.back()), problem.close)) return false;
+    }
+    return true;
+  }
+
   std::vector<Hypothesis> Run() {
-    const std::vector<int> b_of_a = MatchJoints(a_.spec, b_.spec);
-    if (std::any_of(b_of_a.begin(), b_of_a.end(), [](int j) { return j < 0; })) return {};
-    RowProblem problem = MakeProblem(a_, b_, b_of_a, tolerance_);
+    RowProblem problem = MakeProblem(a_, b_, MatchJoints(a_.spec, b_.spec), tolerance_);
     std::vector<RowFinding> rows = SearchRows(problem);
     const bool is_misread = std::any_of(rows.begin(), rows.end(), [](const RowFinding& row) {
       return !row.is_placed || !row.readings.empty();
@@ -225,8 +238,13 @@ class Explaining {
       for (const Finding& finding : RowReport(a_, rows).Run()) found_.push_back(finding);
     }
     FindGravity();
-    for (const Finding& finding : SearchBodies(PlaceBodies(problem, rows), problem.close))
-      found_.push_back(finding);
+    for (Finding finding : SearchBodies(PlaceBodies(problem, rows), problem.close)) {
+      for (size_t i = 0; i < a_.spec.joints.size() && finding.parts.size() == 1; ++i) {
+        if (finding.what == "link" && finding.parts[0] == a_.spec.joints[i].link)
+          AddElsewhere(a_, rows[i + 1], static_cast<int>(i), &finding);
+      }
+      found_.push_back(std::move(finding));
+    }
     return Report();
   }
 
@@ -338,16 +356,47 @@ class Explaining {
   std::vector<Finding> found_;
 };
 
-}  // namespace
-
-std::vector<Hypothesis> ExplainDifference(RobotDescription a, RobotDescription b, double tolerance) {
-  const RobotDescription read = a;
+/// What explains the difference; nothing when they are of two mechanisms.
+std::optional<std::vector<Hypothesis>> TryToExplain(RobotDescription a, RobotDescription b,
+                                                    double tolerance) {
   try {
     CompleteEachOther(&a, &b);
   } catch (const InputError&) {
-    return {};
+    return std::nullopt;
   }
   return Explaining(a, b, tolerance).Run();
+}
+
+/// Two joints that have each other's name: with it exchanged again the two are one mechanism, and agree.
+std::optional<Hypothesis> FindExchangedNames(const RobotDescription& a, const RobotDescription& b,
+                                             double tolerance) {
+  const size_t n = a.spec.joints.size();
+  for (size_t i = 0; i < n; ++i) {
+    for (size_t j = i + 1; j < n; ++j) {
+      RobotDescription exchanged = a;
+      std::swap(exchanged.spec.joints[i].name, exchanged.spec.joints[j].name);
+      RobotDescription other = b;
+      try {
+        CompleteEachOther(&exchanged, &other);
+      } catch (const InputError&) {
+        continue;
+      }
+      if (!Explaining(exchanged, other, tolerance).Agrees()) continue;
+      const std::vector<std::string> names = {a.spec.joints[i].name, a.spec.joints[j].name};
+      return Hypothesis{
+          "joints " + names[0] + " and " + names[1] + " look exchanged", {}, 1.0, {"exchange.joint"}, names};
+    }
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
+std::vector<Hypothesis> ExplainDifference(RobotDescription a, RobotDescription b, double tolerance) {
+  const std::optional<std::vector<Hypothesis>> found = TryToExplain(a, b, tolerance);
+  if (found && found->size() <= 1) return *found;
+  if (const std::optional<Hypothesis> names = FindExchangedNames(a, b, tolerance)) return {*names};
+  return found.value_or(std::vector<Hypothesis>{});
 }
 
 }  // namespace dexcheck

@@ -38,8 +38,8 @@ bool IsRight(const LinkBody& body, const Closeness& close);
 /// A link with a convention undone.
 struct Undone {
   LinkBody body;
-  std::string part;     ///< Of several, the one that it was undone in; empty for the whole link.
-  int right = 0;        ///< Quantities that are right then.
+  std::string part;  ///< Of several, the one that it was undone in; empty for the whole link.
+  int right = 0;     ///< Quantities that are right then.
 };
 
 /// One of several parts of a link: as it is given, and as it should be.

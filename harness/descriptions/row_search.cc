@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <map>
 #include <set>
 
@@ -36,11 +37,99 @@ class RowSearch {
   std::vector<RowFinding> Run() {
     // What is common is known after a first look at all.
     std::vector<RowFinding> findings = Read();
+    if (IsExplainedByOne(findings)) return findings;
+    std::vector<RowFinding> alike = ReadAlike(findings);
+    if (!alike.empty()) return alike;
     CountCommon(findings);
     return common_.empty() ? findings : Read();
   }
 
  private:
+  static bool IsExplainedByOne(const std::vector<RowFinding>& findings) {
+    return std::count_if(findings.begin(), findings.end(), [](const RowFinding& finding) {
+             return !finding.is_placed || !finding.readings.empty();
+           }) <= 1;
+  }
+
+  /// One reading of all rows.
+  using Change = std::function<std::optional<RowReading>(const StatedPart& given, const StatedPart& right)>;
+
+  [[nodiscard]] std::vector<Change> ListChanges(const std::vector<RowFinding>& findings) const {
+    std::vector<Change> changes;
+    for (const Convention& convention : ListConventions()) {
+      if (!IsOfRow(convention.of)) continue;
+      changes.push_back([&](const StatedPart& given, const StatedPart& right) -> std::optional<RowReading> {
+        const std::optional<StatedPart> undone = convention.undo(given, right);
+        if (!undone) return std::nullopt;
+        return RowReading{*undone, kConvention, {&convention}, "", ""};
+      });
+    }
+    std::map<std::string, double> offsets;
+    for (const RowFinding& finding : findings) {
+      for (const RowReading& reading : finding.readings) {
+        if (reading.number == kZero) offsets[reading.words] = reading.offset;
+      }
+    }
+    for (const auto& offset : offsets) {
+      changes.push_back([offset](StatedPart given, const StatedPart&) -> std::optional<RowReading> {
+        given.X_PL = given.X_PL * Eigen::AngleAxisd(offset.second, given.axis);
+        return RowReading{given, kConvention, {}, kZero, offset.first, offset.second};
+      });
+    }
+    return changes;
+  }
+
+  /// Changes of all rows after which all axes are right and least of the bodies is wrong; none when there is
+  /// no such change, or when more is wrong than by row.
+  [[nodiscard]] std::vector<RowFinding> ReadAlike(const std::vector<RowFinding>& by_row) const {
+    double least = CostBodies(by_row);
+    for (const RowFinding& finding : by_row) least += finding.is_placed ? 0.0 : kUnexplained;
+    least += 1e-9;
+    std::vector<RowFinding> best;
+    for (const Change& change : ListChanges(by_row)) {
+      std::vector<RowFinding> findings = Apply(change);
+      if (findings.empty()) continue;
+      const double cost = CostBodies(findings);
+      if (cost > least) continue;
+      if (best.empty() || cost < least - kSameCost) {
+        best = std::move(findings);
+        least = cost;
+        continue;
+      }
+      for (size_t i = 0; i < best.size(); ++i) {
+        best[i].readings.insert(best[i].readings.end(), findings[i].readings.begin(),
+                                findings[i].readings.end());
+      }
+    }
+    return best;
+  }
+
+  [[nodiscard]] double CostBodies(const std::vector<RowFinding>& findings) const {
+    double cost = 0.0;
+    for (size_t link = 0; link < findings.size(); ++link) {
+      if (findings[link].is_placed) cost += CostBody(link, findings[link].X_ab);
+    }
+    return cost;
+  }
+
+  [[nodiscard]] std::vector<RowFinding> Apply(const Change& change) const {
+    std::vector<RowFinding> findings(children_.size());
+    findings[0].X_ab = problem_.X_W0_given.inverse() * problem_.X_W0_right;
+    findings[0].is_placed = true;
+    for (size_t i = 0; i < problem_.given.size(); ++i) {
+      const Pose& X_ab_P = findings[static_cast<size_t>(problem_.given[i].parent + 1)].X_ab;
+      RowReading reading{StateRow(i), 0.0, {}, "", ""};
+      std::optional<RowReading> changed = change(reading.part, StateRight(i, X_ab_P));
+      const bool changes = changed && !IsSame(changed->part, reading.part);
+      if (changes) reading = std::move(*changed);
+      if (!IsAxisRight(reading.part, i, X_ab_P)) return {};
+      findings[i + 1].X_ab = Follow(reading, i, X_ab_P);
+      findings[i + 1].is_placed = true;
+      if (changes) findings[i + 1].readings.push_back(std::move(reading));
+    }
+    return findings;
+  }
+
   std::vector<RowFinding> Read() {
     std::vector<RowFinding> findings(children_.size());
     ReadBase(&findings[0]);
@@ -83,7 +172,7 @@ class RowSearch {
 
   /// A convention that says no more than that the right number is zero costs what a number does.
   [[nodiscard]] double CostOf(const Convention& convention) const {
-    if (convention.id == "rotation.unneeded") return kNumber;
+    if (convention.id == "rotation.unneeded") return kConvention;
     return common_.contains(convention.id) ? kCommonConvention : kConvention;
   }
 
@@ -162,13 +251,7 @@ class RowSearch {
   }
 
   [[nodiscard]] bool IsAxisRight(const StatedPart& part, size_t i, const Pose& X_ab_P) const {
-    const OwnRow& right = problem_.right[i];
-    const Pose X_PR = X_ab_P * right.X_PL;
-    const Vector3d axis = part.X_PL.linear() * part.axis;
-    if ((axis - X_PR.linear() * right.axis).norm() > problem_.close.tolerance) return false;
-    if (!right.is_revolute) return true;
-    const Vector3d apart = X_PR.translation() - part.X_PL.translation();
-    return (apart - axis.dot(apart) * axis).norm() <= problem_.close.tolerance * problem_.close.length;
+    return dexcheck::IsAxisRight(problem_, i, part, X_ab_P);
   }
 
   [[nodiscard]] StatedPart StateRow(size_t i) const {
@@ -289,7 +372,7 @@ class RowSearch {
     if (!turns) {
       part.X_PL = given.X_PL * Eigen::Translation3d(offset * given.axis);
       const std::string metres = FormatNumber(std::round(-offset * kMetreDigits) / kMetreDigits);
-      offer({part, kNumber, {}, kZero, "offset by " + metres + " m"});
+      offer({part, kConvention, {}, kZero, "offset by " + metres + " m"});
       return;
     }
     // What lies near the axis shows an angle to few digits, and people write few.
@@ -297,15 +380,8 @@ class RowSearch {
       const double degrees = std::round(RadToDeg(-offset) * digits) / digits;
       part.X_PL = given.X_PL * Eigen::AngleAxisd(digits == 1e6 ? offset : -DegToRad(degrees), given.axis);
       const std::string words = "offset by " + FormatNumber(degrees == -180.0 ? 180.0 : degrees) + " deg";
-      // Eighths of a turn are what a convention does as well.
-      const bool is_round = std::remainder(degrees, 45.0) == 0.0;
-      offer({part,
-             common_.contains(words) ? kCommonConvention
-             : is_round              ? kConvention
-                                     : kNumber,
-             {},
-             kZero,
-             words});
+      const double angle = digits == 1e6 ? offset : -DegToRad(degrees);
+      offer({part, common_.contains(words) ? kCommonConvention : kConvention, {}, kZero, words, angle});
     }
   }
 
@@ -369,10 +445,21 @@ class RowSearch {
 
 }  // namespace
 
+bool IsAxisRight(const RowProblem& problem, size_t joint, const StatedPart& part, const Pose& X_ab_P) {
+  const OwnRow& right = problem.right[joint];
+  const Pose X_PR = X_ab_P * right.X_PL;
+  const Vector3d axis = part.X_PL.linear() * part.axis;
+  if ((axis - X_PR.linear() * right.axis).norm() > problem.close.tolerance) return false;
+  if (!right.is_revolute) return true;
+  const Vector3d apart = X_PR.translation() - part.X_PL.translation();
+  return (apart - axis.dot(apart) * axis).norm() <= problem.close.tolerance * problem.close.length;
+}
+
 LinkBody PlaceBody(const RowProblem& problem, size_t link, const Pose& X_ab) {
   LinkBody body = problem.bodies[link];
   body.right.body = ExpressIn(body.right.body, X_ab);
-  body.right.R_LC = X_ab.linear() * body.right.R_LC;
+  // Where the file says nothing of axes, none can be missing.
+  if (!body.right.R_LC.isIdentity()) body.right.R_LC = X_ab.linear() * body.right.R_LC;
   for (DescribedPart& part : body.right_parts) {
     part.body = ExpressIn(part.body, X_ab);
     part.X_iL = X_ab * part.X_iL;

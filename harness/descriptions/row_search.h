@@ -17,6 +17,7 @@ struct RowReading {
   std::vector<const Convention*> conventions;  ///< At most two.
   std::string number;                          ///< "zero.offset", "number.origin", ...
   std::string words;                           ///< Of the number: "offset by 30 deg".
+  double offset = 0.0;                         ///< Of a zero, rad: what undoes it.
 };
 
 /// A row as it was read, the base's first, and what explains it: readings that do equally well. None where
@@ -41,6 +42,9 @@ struct RowProblem {
 /// The cheapest reading of each row from the base outward. A reading costs 1 for each convention, more for
 /// numbers, and what it leaves wrong of what the row places: its axis, its body, the joints on its link.
 std::vector<RowFinding> SearchRows(const RowProblem& problem);
+
+/// Whether a joint of the given robot turns about the right axis, when its row is read so.
+bool IsAxisRight(const RowProblem& problem, size_t joint, const StatedPart& part, const Pose& X_ab_P);
 
 /// A body of the problem with its right one in the given frame.
 LinkBody PlaceBody(const RowProblem& problem, size_t link, const Pose& X_ab);
