@@ -214,6 +214,14 @@ void AddFrames(Table* table) {
           part->X_PL = part->X_PL.inverse();
           return true;
         });
+  Add(
+      "place.missing", Quantity::kPlace, "missing",
+      [](StatedPart* part, const StatedPart& right) {
+        if (!part->X_PL.isApprox(Pose::Identity())) return false;
+        part->X_PL = right.X_PL;
+        return true;
+      },
+      table);
   place("axis.parent_axes", Quantity::kAxis, "as if given along the parent's axes", [](StatedPart* part) {
     part->axis = (part->X_PL.linear().transpose() * part->axis).eval();
     return true;

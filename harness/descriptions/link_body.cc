@@ -50,10 +50,15 @@ const DescribedPart* FindByName(const std::vector<DescribedPart>& parts, const s
   return found == parts.end() ? nullptr : &*found;
 }
 
+/// Whether a part is the link's own, which stands first, and is placed by its joint.
+bool IsMain(const std::vector<DescribedPart>& parts, const DescribedPart& part) {
+  return &part == parts.data() && part.X_iL.isApprox(Pose::Identity());
+}
+
 /// A body in the own frame of a part, given in the link's.
-StatedPart StatePart(const DescribedPart& part, const MassProperties& body, const StatedPart& link) {
+StatedPart StatePart(const DescribedPart& part, bool is_main, const MassProperties& body,
+                     const StatedPart& link) {
   StatedPart stated;
-  const bool is_main = part.X_iL.isApprox(Pose::Identity());
   if (is_main) stated = link;
   if (!is_main) stated.X_PL = part.X_iL;
   stated.body = ExpressIn(body, part.X_iL.inverse());
@@ -65,26 +70,27 @@ StatedPart StatePart(const DescribedPart& part, const MassProperties& body, cons
 /// do not have of the whole.
 std::optional<PartView> ViewGiven(const LinkBody& link, size_t k) {
   const DescribedPart& part = link.given_parts[k];
-  PartView view{
-      part.name, k, part.X_iL.isApprox(Pose::Identity()), StatePart(part, part.body, link.given), {}};
+  const bool is_main = IsMain(link.given_parts, part);
+  PartView view{part.name, k, is_main, StatePart(part, is_main, part.body, link.given), {}};
   if (const DescribedPart* const other = FindByName(link.right_parts, part.name)) {
-    view.right = StatePart(*other, other->body, link.right);
+    view.right = StatePart(*other, is_main, other->body, link.right);
     view.right.body = ExpressIn(other->body, part.X_iL.inverse());
     return view;
   }
   const std::optional<MassProperties> rest = Subtract(link.right.body, CombineOthers(link.given_parts, k));
   if (!rest) return std::nullopt;
-  view.right = StatePart(part, *rest, link.given);
+  view.right = StatePart(part, is_main, *rest, link.given);
   return view;
 }
 
 /// A part of the right body, in a given one that is stated as a whole.
 std::optional<PartView> ViewRight(const LinkBody& link, size_t k) {
   const DescribedPart& part = link.right_parts[k];
+  const bool is_main = IsMain(link.right_parts, part);
   const std::optional<MassProperties> rest = Subtract(link.given.body, CombineOthers(link.right_parts, k));
   if (!rest) return std::nullopt;
-  PartView view{part.name, k, false, StatePart(part, *rest, link.given),
-                StatePart(part, part.body, link.right)};
+  PartView view{part.name, k, false, StatePart(part, is_main, *rest, link.given),
+                StatePart(part, is_main, part.body, link.right)};
   view.given.R_LC.setIdentity();
   return view;
 }
@@ -175,14 +181,21 @@ void BodyUndoing::OfferParts(const Convention& convention, const std::vector<Des
 void BodyUndoing::TryAll(const Convention& convention, std::optional<Undone>* best) const {
   const bool of_place = IsOfPlace(convention.of);
   std::vector<DescribedPart> parts = link_.given_parts;
+  int changed = 0;
   for (DescribedPart& part : parts) {
-    const StatedPart given = StatePart(part, part.body, link_.given);
+    const bool is_main = IsMain(parts, part);
+    if (of_place && is_main) continue;
+    const StatedPart given = StatePart(part, is_main, part.body, link_.given);
     const DescribedPart* const other = FindByName(link_.right_parts, part.name);
-    const std::optional<StatedPart> undone =
-        convention.undo(given, other == nullptr ? given : StatePart(*other, other->body, link_.right));
-    if (undone && !(of_place && part.X_iL.isApprox(Pose::Identity()))) part = Move(part, *undone, of_place);
+    const std::optional<StatedPart> undone = convention.undo(
+        given, other == nullptr ? given : StatePart(*other, is_main, other->body, link_.right));
+    if (!undone) continue;
+    constexpr double kVisible = 1e-9;
+    const DescribedPart moved = Move(part, *undone, of_place);
+    changed += CountRight(StatedPart{moved.body}, StatedPart{part.body}, {1.0, kVisible}) < 3 ? 1 : 0;
+    part = moved;
   }
-  OfferParts(convention, parts, "", best);
+  if (changed > 1) OfferParts(convention, parts, "", best);  // one is that part's own
 }
 
 void BodyUndoing::TryPart(const Convention& convention, const PartView& view,

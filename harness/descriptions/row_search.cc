@@ -274,6 +274,8 @@ class RowSearch {
   [[nodiscard]] std::vector<RowReading> ListReadings(size_t i, const Pose& X_ab_P, bool in_pairs) const {
     const StatedPart given = StateRow(i);
     const StatedPart right = StateRight(i, X_ab_P);
+    // Of frames that differ the right row is not known, and what is missing in one is not either.
+    const StatedPart& known = X_ab_P.isApprox(Pose::Identity(), problem_.close.tolerance) ? right : given;
     std::vector<RowReading> readings;
     const auto offer = [&](RowReading reading) {
       if (IsAxisRight(reading.part, i, X_ab_P)) readings.push_back(std::move(reading));
@@ -281,12 +283,12 @@ class RowSearch {
     offer({given, 0.0, {}, "", ""});
     for (const Convention& first : ListConventions()) {
       if (!IsOfRow(first.of)) continue;
-      const std::optional<StatedPart> one = first.undo(given, right);
+      const std::optional<StatedPart> one = first.undo(given, known);
       if (!one || IsSame(*one, given)) continue;
       offer({*one, CostOf(first), {&first}, "", ""});
       for (const Convention& second : ListConventions()) {
         if (!in_pairs || !IsOfRow(second.of) || second.of <= first.of) continue;
-        const std::optional<StatedPart> two = second.undo(*one, right);
+        const std::optional<StatedPart> two = second.undo(*one, known);
         if (!two || IsSame(*two, *one) || IsSame(*two, given)) continue;
         offer({*two, CostOf(first) + CostOf(second) + 0.1, {&first, &second}, "", ""});
       }

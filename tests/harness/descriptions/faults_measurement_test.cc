@@ -6,6 +6,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstdlib>
 #include <regex>
 
@@ -62,7 +63,11 @@ void Try(const testing::RobotPair& pair, const ConventionFault& fault, bool all,
   const std::vector<Hypothesis> found = ExplainDifference(wrong, pair.b);
   std::string lines;
   for (const Hypothesis& hypothesis : found) lines += "\n    " + hypothesis.text;
-  const bool named = lines.find(fault.text) != std::string::npos;
+  const bool named = std::all_of(fault.ids.begin(), fault.ids.end(), [&](const std::string& id) {
+    return std::any_of(found.begin(), found.end(), [&](const Hypothesis& one) {
+      return std::find(one.ids.begin(), one.ids.end(), id) != one.ids.end();
+    });
+  });
   count->named += named ? 1 : 0;
   if (!named) count->missed += "\n  " + pair.name + (all ? " all: " : " one: ") + fault.name + lines;
   for (const Hypothesis& hypothesis : found) {
