@@ -29,7 +29,7 @@ double CalcLength(const std::vector<OwnRow>& rows) {
 StatedPart StateJoint(const Joint& joint, const OwnRow& row) {
   StatedPart part;
   part.body = row.body;
-  part.X_PL = row.X_PL;
+  part.X_PL = row.X_PW.inverse() * row.X_PL;  // as the file has it
   part.axis = row.axis;
   part.lower = joint.lower;
   part.upper = joint.upper;
@@ -221,7 +221,8 @@ class Explaining {
     std::vector<Pose> X_ab = {problem.X_W0_given.inverse() * problem.X_W0_right};
     for (size_t i = 0; i < problem.given.size(); ++i) {
       const Pose& X_ab_P = X_ab[static_cast<size_t>(problem.given[i].parent + 1)];
-      if (!IsAxisRight(problem, i, problem.bodies[i + 1].given, X_ab_P)) return false;
+      const Pose X_ab_W = problem.given[i].X_PW.inverse() * X_ab_P;
+      if (!IsAxisRight(problem, i, problem.bodies[i + 1].given, X_ab_W)) return false;
       X_ab.push_back(problem.given[i].X_PL.inverse() * X_ab_P * problem.right[i].X_PL);
       if (!IsRight(PlaceBody(problem, i + 1, X_ab.back()), problem.close)) return false;
     }

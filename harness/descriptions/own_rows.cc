@@ -29,6 +29,7 @@ std::vector<OwnRow> ListOwnRows(const RobotDescription& robot) {
     row.parent = joint.parent;
     row.is_revolute = joint.type != JointType::kPrismatic;
     row.X_PL = X_jP.inverse() * CalcRow(joint, joint.mdh) * X_iL;
+    row.X_PW = robot.joints[i].X_PW;
     row.axis = X_iL.linear().row(2).transpose();  // one of those that a ball joint turns about
     row.body = ExpressIn(joint.body, X_iL.inverse());
   }

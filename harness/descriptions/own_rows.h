@@ -13,6 +13,7 @@ struct OwnRow {
   int parent = -1;
   bool is_revolute = true;
   Pose X_PL = Pose::Identity();  ///< The link's own frame in its parent's own frame, at q = 0.
+  Pose X_PW = Pose::Identity();  ///< Of what is welded to the parent and carries the joint.
   Vector3d axis = Vector3d::UnitZ();
   MassProperties body;  ///< In the own frame.
 };

@@ -117,7 +117,7 @@ class RowSearch {
     findings[0].X_ab = problem_.X_W0_given.inverse() * problem_.X_W0_right;
     findings[0].is_placed = true;
     for (size_t i = 0; i < problem_.given.size(); ++i) {
-      const Pose& X_ab_P = findings[static_cast<size_t>(problem_.given[i].parent + 1)].X_ab;
+      const Pose X_ab_P = ToCarrier(i, findings[static_cast<size_t>(problem_.given[i].parent + 1)].X_ab);
       RowReading reading{StateRow(i), 0.0, {}, "", ""};
       std::optional<RowReading> changed = change(reading.part, StateRight(i, X_ab_P));
       const bool changes = changed && !IsSame(changed->part, reading.part);
@@ -135,7 +135,7 @@ class RowSearch {
     ReadBase(&findings[0]);
     for (size_t i = 0; i < problem_.given.size(); ++i) {
       const RowFinding& parent = findings[static_cast<size_t>(problem_.given[i].parent + 1)];
-      if (parent.is_placed) ReadRow(i, parent.X_ab, &findings[i + 1]);
+      if (parent.is_placed) ReadRow(i, ToCarrier(i, parent.X_ab), &findings[i + 1]);
     }
     return findings;
   }
@@ -254,9 +254,14 @@ class RowSearch {
     return dexcheck::IsAxisRight(problem_, i, part, X_ab_P);
   }
 
+  /// From here on a row's parent frame is that in which the file places it.
+  [[nodiscard]] Pose ToCarrier(size_t i, const Pose& X_ab) const {
+    return problem_.given[i].X_PW.inverse() * X_ab;
+  }
+
   [[nodiscard]] StatedPart StateRow(size_t i) const {
     StatedPart part = problem_.bodies[i + 1].given;
-    part.X_PL = problem_.given[i].X_PL;
+    part.X_PL = problem_.given[i].X_PW.inverse() * problem_.given[i].X_PL;
     part.axis = problem_.given[i].axis;
     return part;
   }
@@ -275,7 +280,8 @@ class RowSearch {
     const StatedPart given = StateRow(i);
     const StatedPart right = StateRight(i, X_ab_P);
     // Of frames that differ the right row is not known, and what is missing in one is not either.
-    const StatedPart& known = X_ab_P.isApprox(Pose::Identity(), problem_.close.tolerance) ? right : given;
+    const StatedPart& known =
+        X_ab_P.isApprox(problem_.given[i].X_PW.inverse(), problem_.close.tolerance) ? right : given;
     std::vector<RowReading> readings;
     const auto offer = [&](RowReading reading) {
       if (IsAxisRight(reading.part, i, X_ab_P)) readings.push_back(std::move(reading));
@@ -392,7 +398,7 @@ class RowSearch {
   [[nodiscard]] double CostBehind(int joint, const Pose& X_ab, int depth) const {
     double cost = CostBody(static_cast<size_t>(joint + 1), X_ab);
     for (const size_t child : children_[static_cast<size_t>(joint + 1)])
-      cost += CostRow(child, X_ab, depth - 1);
+      cost += CostRow(child, ToCarrier(child, X_ab), depth - 1);
     return cost;
   }
 

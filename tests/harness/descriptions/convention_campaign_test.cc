@@ -226,6 +226,13 @@ class Campaign {
     sum->wrong += count.wrong;
   }
 
+  static bool IsMoved(const StatedUrdf& urdf, size_t part) {
+    for (int i = static_cast<int>(part); i >= 0; i = urdf.parts[static_cast<size_t>(i)].parent) {
+      if (urdf.parts[static_cast<size_t>(i)].moves) return true;
+    }
+    return false;
+  }
+
   /// Of a fault of several quantities, those that show: no unit changes a centre of mass at the origin.
   static std::vector<std::string> ListVisible(const ConventionFault& fault, const Robot& robot,
                                               const StatedUrdf& spoilt) {
@@ -236,7 +243,7 @@ class Campaign {
       return right.parts[i].stated.body.com == spoilt.parts[i].stated.body.com;
     };
     bool all_same = true;
-    for (size_t i = 0; i < right.parts.size(); ++i) all_same = all_same && is_same(i);
+    for (size_t i = 0; i < right.parts.size(); ++i) all_same = all_same && (!IsMoved(right, i) || is_same(i));
     if (all_same) std::erase_if(ids, [](const std::string& id) { return id.starts_with("com."); });
     return ids;
   }
