@@ -142,10 +142,12 @@ BodyUndoing::BodyUndoing(const LinkBody& link, const Closeness& close) : link_(l
 std::optional<Undone> BodyUndoing::Undo(const Convention& convention) const {
   std::optional<Undone> best;
   const bool of_place = IsOfPlace(convention.of);
-  if (of_place ? IsRight(link_, close_) : IsRight(link_, convention.of, close_)) return best;
-  if (!of_place) TryWhole(convention, &best);
+  // What is wrong of parts may balance in one quantity of the whole, and show in the others.
+  const bool is_right = !of_place && IsRight(link_, convention.of, close_);
+  if (of_place || (of_given_ && IsOfBody(convention.of)) ? IsRight(link_, close_) : is_right) return best;
+  if (of_given_ && (of_place || IsOfBody(convention.of))) TryAll(convention, &best);
+  if (!of_place && !is_right) TryWhole(convention, &best);
   if (!IsOfBody(convention.of) && !of_place) return best;
-  if (of_given_) TryAll(convention, &best);
   for (const PartView& view : views_) TryPart(convention, view, &best);
   return best;
 }

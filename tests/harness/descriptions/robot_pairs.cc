@@ -50,7 +50,8 @@ bool SpoilLink(const ConventionFault& fault, size_t i, RobotDescription* robot) 
   Joint& joint = robot->spec.joints[i];
   const Pose X_iL = robot->joints[i].X_iL;
   const Pose X_PiP =
-      joint.parent < 0 ? Pose::Identity() : robot->joints[static_cast<size_t>(joint.parent)].X_iL;
+      (joint.parent < 0 ? Pose::Identity() : robot->joints[static_cast<size_t>(joint.parent)].X_iL) *
+      robot->joints[i].X_PW;
   StatedLink link{ExpressIn(joint.body, X_iL.inverse()), X_PiP.inverse() * joint.X_PB * X_iL};
   link.axis = X_iL.linear().row(2).transpose();
   std::vector<DescribedPart*> parts;
