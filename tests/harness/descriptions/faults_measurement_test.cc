@@ -1,8 +1,6 @@
-// How many faults of conventions and units are named in words: 66 kinds, each on one link and on all, on
-// four robots. What a file would say is made here by other code than that which finds it. A sample is tried;
-// all are with
+// Values that are printed for faults of conventions and units, on one link and on all, on four robots whose
+// two files have other frames. A sample is tried; all are with
 //   DEXCHECK_ALL_MISTAKES=1 build/release/tests/descriptions_test --gtest_filter='Faults.*'
-// (527 cases, of which 514 were named, 97.5 %, and 864 printed bodies, all right).
 
 #include <gtest/gtest.h>
 
