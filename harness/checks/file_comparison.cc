@@ -169,10 +169,18 @@ Comparison CompareFiles(const std::filesystem::path& a, const std::filesystem::p
   comparison.with_engine = second.format() == RobotFormat::kMjcf;
   comparison.read_first = first.TryToDescribe();
   comparison.read_second = second.TryToDescribe();
-  if (comparison.with_engine) {
-    CompareWithEngine(first, second, options, progress, &comparison);
-  } else {
-    CompareTwoDescriptions(first.Describe(), second.Describe(), options, progress, &comparison);
+  try {
+    if (comparison.with_engine) {
+      CompareWithEngine(first, second, options, progress, &comparison);
+    } else {
+      CompareTwoDescriptions(first.Describe(), second.Describe(), options, progress, &comparison);
+    }
+  } catch (const InputError& error) {
+    // Names of joints that were exchanged make another mechanism of one robot.
+    if (!comparison.read_first || !comparison.read_second) throw;
+    const std::vector<Hypothesis> why = ExplainDifference(*comparison.read_first, *comparison.read_second);
+    if (why.empty()) throw;
+    throw InputError(std::string(error.what()) + "; " + why[0].text);
   }
   NoteTermsOfFrames(&comparison);
   return comparison;

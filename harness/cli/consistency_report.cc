@@ -54,8 +54,11 @@ Json DescribeRecord(const CheckRecord& record, const RobotModel& model) {
 Json ListHypotheses(const std::vector<Hypothesis>& hypotheses) {
   Json list = Json::array();
   for (const Hypothesis& hypothesis : hypotheses) {
-    list.push_back(
-        {{"text", hypothesis.text}, {"explained", hypothesis.explained}, {"values", hypothesis.values}});
+    list.push_back({{"text", hypothesis.text},
+                    {"explained", hypothesis.explained},
+                    {"values", hypothesis.values},
+                    {"ids", hypothesis.ids},
+                    {"parts", hypothesis.parts}});
   }
   return list;
 }

@@ -1,14 +1,15 @@
 #include "harness/descriptions/hypotheses.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
-#include <cmath>
+#include <optional>
+#include <tuple>
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
 #include "controller/model/body_frame.h"
+#include "harness/descriptions/body_search.h"
 #include "harness/descriptions/description_match.h"
+#include "harness/descriptions/row_report.h"
 
 namespace dexcheck {
 namespace {
@@ -25,158 +26,275 @@ double CalcLength(const std::vector<OwnRow>& rows) {
   return length > 0.0 ? length : 1.0;
 }
 
-std::vector<Hypothesis> FindGravityHypotheses(const RobotDescription& a, const RobotDescription& b,
-                                              double tolerance) {
-  if (!a.states_gravity || !b.states_gravity) return {};
-  const Vector3d& own = a.spec.gravity;
-  const Vector3d& right = b.spec.gravity;
-  const double size = std::max(own.norm(), right.norm());
-  if ((own - right).norm() <= tolerance * size) return {};
-  Hypothesis hypothesis;
-  hypothesis.explained = 1.0;
-  hypothesis.values.push_back("gravity: " + FormatNumbers(own) + "; right would be " + FormatNumbers(right));
-  if ((own + right).norm() <= tolerance * size) {
-    hypothesis.text = "gravity looks turned around (its sign)";
-  } else if (own.isZero(0.0)) {
-    hypothesis.text = "gravity looks forgotten";
-  } else if (own.normalized().cross(right.normalized()).norm() <= tolerance && own.dot(right) > 0.0) {
-    hypothesis.text = "gravity has the right direction and another value";
-  } else if (std::abs(own.norm() - right.norm()) <= tolerance * size) {
-    hypothesis.text = "gravity points along another axis";
-  } else {
-    hypothesis.text = "gravity differs";
-  }
-  return {hypothesis};
+StatedPart StateJoint(const Joint& joint, const OwnRow& row) {
+  StatedPart part;
+  part.body = row.body;
+  part.X_PL = row.X_PW.inverse() * row.X_PL;  // as the file has it
+  part.axis = row.axis;
+  part.lower = joint.lower;
+  part.upper = joint.upper;
+  part.damping = joint.damping;
+  part.armature = joint.armature;
+  return part;
 }
 
-/// Constants of joints that a unit explains.
-std::vector<Hypothesis> FindConstantHypotheses(const RobotDescription& a, const RobotDescription& b,
-                                               const std::vector<int>& b_of_a, double tolerance) {
-  struct Constant {
-    const char* text;
-    double factor;
-    bool DescribedJoint::*states;
-    std::vector<double Joint::*> values;
+/// Axes along which a body that is one part is given.
+Matrix3d FindAxes(const std::vector<DescribedPart>& parts) {
+  return parts.size() == 1 ? Matrix3d(parts[0].X_LC.linear()) : Matrix3d(Matrix3d::Identity());
+}
+
+/// @param b_of_a joint of `b` for each of `a`.
+RowProblem MakeProblem(const RobotDescription& a, const RobotDescription& b, const std::vector<int>& b_of_a,
+                       double tolerance) {
+  RowProblem problem;
+  problem.given = ListOwnRows(a);
+  const std::vector<OwnRow> others = ListOwnRows(b);
+  problem.base_is_fixed = a.spec.base.type != BaseType::kFloating;
+  if (problem.base_is_fixed) {
+    problem.X_W0_given = a.spec.base.X_B0;
+    problem.X_W0_right = b.spec.base.X_B0;
+  }
+  const auto add = [&](int joint, int joint_b, const std::string& link, StatedPart given, StatedPart right) {
+    const std::string name = joint < 0 ? "" : a.spec.joints[static_cast<size_t>(joint)].name;
+    LinkBody body{link,
+                  name,
+                  std::move(given),
+                  std::move(right),
+                  ListParts(a, joint, Pose::Identity()),
+                  ListParts(b, joint_b, Pose::Identity())};
+    body.given.R_LC = FindAxes(body.given_parts);
+    body.right.R_LC = FindAxes(body.right_parts);
+    for (size_t k = 0; k < problem.given.size(); ++k) {
+      if (problem.given[k].parent == joint) body.given.X_LD.push_back(problem.given[k].X_PL);
+    }
+    problem.bodies.push_back(std::move(body));
   };
-  constexpr double kDegrees = kPi / 180.0;
-  const Constant constants[] = {
-      {"ranges look as if in degrees",
-       kDegrees,
-       &DescribedJoint::states_range,
-       {&Joint::lower, &Joint::upper}},
-      {"damping looks as if per degree (N m s/deg)",
-       1.0 / kDegrees,
-       &DescribedJoint::states_damping,
-       {&Joint::damping}},
-      {"damping looks as if times pi / 180", kDegrees, &DescribedJoint::states_damping, {&Joint::damping}},
-      {"armature looks as if in g cm^2", 1e-7, &DescribedJoint::states_armature, {&Joint::armature}},
-      {"armature looks as if in kg mm^2", 1e-6, &DescribedJoint::states_armature, {&Joint::armature}}};
-  std::vector<Hypothesis> found;
-  for (const Constant& constant : constants) {
-    std::vector<std::string> joints;
-    for (size_t i = 0; i < b_of_a.size(); ++i) {
-      const auto j = static_cast<size_t>(b_of_a[i]);
-      const Joint& own = a.spec.joints[i];
-      if (!(a.joints[i].*constant.states) || !(b.joints[j].*constant.states)) continue;
-      if (own.type == JointType::kPrismatic) continue;
-      bool explains = false;
-      bool fits = true;
-      for (double Joint::*const value : constant.values) {
-        const double right = b.spec.joints[j].*value;
-        explains = explains || std::abs(own.*value - right) > tolerance * std::abs(right);
-        fits = fits && std::abs(constant.factor * (own.*value) - right) <= tolerance * std::abs(right);
-      }
-      if (explains && fits) joints.push_back(own.name);
-    }
-    if (joints.empty()) continue;
-    Hypothesis hypothesis;
-    hypothesis.text = joints.size() == 1
-                          ? fmt::format("joint {}: {}", joints[0], constant.text)
-                          : fmt::format("{}: {} of {} joints", constant.text, joints.size(), b_of_a.size());
-    hypothesis.explained = 1.0;
-    found.push_back(hypothesis);
+  add(-1, -1, a.spec.base.link, StatedPart{a.spec.base.body}, StatedPart{b.spec.base.body});
+  for (size_t i = 0; i < problem.given.size(); ++i) {
+    const auto j = static_cast<size_t>(b_of_a[i]);
+    problem.right.push_back(others[j]);
+    problem.right.back().parent = problem.given[i].parent;
+    const Joint& joint = a.spec.joints[i];
+    add(static_cast<int>(i), b_of_a[i], joint.link, StateJoint(joint, problem.given[i]),
+        StateJoint(b.spec.joints[j], others[j]));
+    const auto silence = [&](bool DescribedJoint::*states, Quantity quantity) {
+      LinkBody& body = problem.bodies.back();
+      const bool is_turn = joint.type == JointType::kRevolute;
+      if (!(a.joints[i].*states && b.joints[j].*states && is_turn))
+        TakeFrom(body.right, quantity, &body.given);
+    };
+    silence(&DescribedJoint::states_range, Quantity::kRange);
+    silence(&DescribedJoint::states_damping, Quantity::kDamping);
+    silence(&DescribedJoint::states_armature, Quantity::kArmature);
   }
-  return found;
+  problem.close = {CalcLength(problem.right), tolerance};
+  return problem;
 }
 
-/// Parts with mass of a joint's link, in the link's own frame of the other description.
-/// @param X_ab the own frame of `robot` in that of the other description.
-std::vector<DescribedPart> ListParts(const RobotDescription& robot, int joint, const Pose& X_ab) {
-  std::vector<DescribedPart> parts;
-  for (const DescribedPart& part : robot.parts) {
-    if (part.joint != joint || !part.states_inertial) continue;
-    // From the part's own frame by frame i to its row's place, and from there to that of the other.
-    Pose X_RL = part.X_iL;
-    if (joint >= 0) {
-      const Pose& X_iL = robot.joints[static_cast<size_t>(joint)].X_iL;
-      X_RL = Eigen::Translation3d(-X_iL.inverse().translation()) * X_iL.inverse() * part.X_iL;
+class Explaining {
+ public:
+  Explaining(const RobotDescription& a, const RobotDescription& b, double tolerance)
+      : a_(a), b_(b), tolerance_(tolerance) {}
+
+  /// Whether rows and bodies are the same: of joints of one name, no more is asked here.
+  bool Agrees() {
+    const RowProblem problem = MakeProblem(a_, b_, MatchJoints(a_.spec, b_.spec), tolerance_);
+    std::vector<Pose> X_ab = {problem.X_W0_given.inverse() * problem.X_W0_right};
+    for (size_t i = 0; i < problem.given.size(); ++i) {
+      const Pose& X_ab_P = X_ab[static_cast<size_t>(problem.given[i].parent + 1)];
+      const Pose X_ab_W = problem.given[i].X_PW.inverse() * X_ab_P;
+      if (!IsAxisRight(problem, i, problem.bodies[i + 1].given, X_ab_W)) return false;
+      X_ab.push_back(problem.given[i].X_PL.inverse() * X_ab_P * problem.right[i].X_PL);
+      if (!IsRight(PlaceBody(problem, i + 1, X_ab.back()), problem.close)) return false;
     }
-    DescribedPart& own = parts.emplace_back(part);
-    own.X_iL = X_ab * X_RL;
-    own.body = ExpressIn(part.body, own.X_iL);
-    own.X_LC = own.X_iL * part.X_LC;
+    return true;
   }
-  return parts;
+
+  std::vector<Hypothesis> Run() {
+    RowProblem problem = MakeProblem(a_, b_, MatchJoints(a_.spec, b_.spec), tolerance_);
+    std::vector<RowFinding> rows = SearchRows(problem);
+    const bool is_misread = std::any_of(rows.begin(), rows.end(), [](const RowFinding& row) {
+      return !row.is_placed || !row.readings.empty();
+    });
+    if (!is_misread || !FindMisreadTable(&problem, &rows)) {
+      for (const Finding& finding : ReportRows(a_, rows)) found_.push_back(finding);
+    }
+    FindGravity();
+    for (Finding finding : SearchBodies(PlaceBodies(problem, rows), problem.close)) {
+      for (size_t i = 0; i < a_.spec.joints.size() && finding.parts.size() == 1; ++i) {
+        if (finding.what == "link" && finding.parts[0] == a_.spec.joints[i].link)
+          AddElsewhere(a_, rows[i + 1], static_cast<int>(i), &finding);
+      }
+      found_.push_back(std::move(finding));
+    }
+    return Report();
+  }
+
+ private:
+  static bool IsRightEverywhere(const std::vector<RowFinding>& rows) {
+    return std::all_of(rows.begin(), rows.end(),
+                       [](const RowFinding& row) { return row.is_placed && row.readings.empty(); });
+  }
+
+  /// Tables of Denavit-Hartenberg rows that were meant in another way.
+  bool FindMisreadTable(RowProblem* problem, std::vector<RowFinding>* rows) {
+    const std::vector<Joint>& joints = a_.spec.joints;
+    if (std::none_of(joints.begin(), joints.end(),
+                     [](const Joint& joint) { return joint.mdh.alpha != 0.0 || joint.mdh.a != 0.0; }))
+      return false;
+    const auto same = [](MdhRow row) { return row; };
+    const auto radians = [](MdhRow row) {
+      return MdhRow{DegToRad(row.alpha), row.a, DegToRad(row.q), row.d};
+    };
+    const auto sign = [](MdhRow row) { return MdhRow{-row.alpha, row.a, row.q, row.d}; };
+    const auto metres = [](MdhRow row) { return MdhRow{row.alpha, 1e-3 * row.a, row.q, 1e-3 * row.d}; };
+    const struct {
+      const char* id;
+      const char* words;
+      std::vector<OwnRow> rows;
+    } readings[] = {
+        {"table.classic",
+         "the rows look like classic (standard) Denavit-Hartenberg parameters, and are read as modified ones",
+         ReadRowsAs(a_, same, true)},
+        {"table.degrees", "alpha and q of the rows look as if in degrees", ReadRowsAs(a_, radians, false)},
+        {"table.alpha_sign", "alpha of all rows looks turned around (its sign)", ReadRowsAs(a_, sign, false)},
+        {"table.mm", "a and d of the rows look as if in mm", ReadRowsAs(a_, metres, false)}};
+    for (const auto& reading : readings) {
+      RowProblem other = *problem;
+      other.given = reading.rows;
+      for (size_t i = 0; i < other.given.size(); ++i) other.bodies[i + 1].given.body = other.given[i].body;
+      const std::vector<RowFinding> found = SearchRows(other);
+      if (!IsRightEverywhere(found)) continue;
+      Finding& finding = found_.emplace_back();
+      finding.ids = {reading.id};
+      finding.one = {std::string(reading.words) + ": " + std::to_string(joints.size()) + " of " +
+                     std::to_string(joints.size()) + " joints"};
+      finding.cells = other.given.size();
+      for (const Joint& joint : joints) finding.parts.push_back(joint.name);
+      *problem = std::move(other);
+      *rows = found;
+      return true;
+    }
+    return false;
+  }
+
+  void FindGravity() {
+    if (!a_.states_gravity || !b_.states_gravity) return;
+    const Vector3d& own = a_.spec.gravity;
+    const Vector3d& right = b_.spec.gravity;
+    const double few = tolerance_ * std::max(own.norm(), right.norm());
+    if ((own - right).norm() <= few) return;
+    Finding finding;
+    finding.cells = 1;
+    finding.parts = {"gravity"};
+    const bool is_along =
+        own.normalized().cross(right.normalized()).norm() <= tolerance_ && own.dot(right) > 0.0;
+    const std::tuple<bool, const char*, const char*> readings[] = {
+        {(own + right).norm() <= few, "gravity.sign", "gravity looks turned around (its sign)"},
+        {own.isZero(0.0), "gravity.missing", "gravity looks forgotten"},
+        {(1e-3 * own - right).norm() <= few, "gravity.mm", "gravity looks as if in mm/s^2"},
+        {is_along, "gravity.value", "gravity has the right direction and another value"},
+        {std::abs(own.norm() - right.norm()) <= few, "gravity.axis", "gravity points along another axis"},
+        {true, "gravity.other", "gravity differs"}};
+    const auto first = std::find_if(std::begin(readings), std::end(readings),
+                                    [](const auto& reading) { return std::get<0>(reading); });
+    finding.ids = {std::get<1>(*first)};
+    finding.one = {std::get<2>(*first)};
+    finding.values.push_back("gravity: " + FormatNumbers(own) + "; right would be " + FormatNumbers(right));
+    found_.push_back(std::move(finding));
+  }
+
+  /// Bodies in the own frames of `a`, where that is known by now.
+  [[nodiscard]] std::vector<LinkBody> PlaceBodies(const RowProblem& problem,
+                                                  const std::vector<RowFinding>& rows) const {
+    std::vector<LinkBody> bodies;
+    for (size_t link = problem.base_is_fixed ? 1 : 0; link < rows.size(); ++link) {
+      LinkBody& body = bodies.emplace_back(PlaceBody(problem, link, rows[link].X_ab));
+      if (!rows[link].readings.empty()) body.given.X_PL = rows[link].readings[0].part.X_PL;
+      if (rows[link].is_placed) continue;
+      for (const Quantity quantity : {Quantity::kCom, Quantity::kInertia})
+        TakeFrom(body.right, quantity, &body.given);
+      body.given_parts.clear();
+    }
+    return bodies;
+  }
+
+  [[nodiscard]] std::vector<Hypothesis> Report() const {
+    size_t cells = 0;
+    bool has_convention = false;
+    for (const Finding& finding : found_) {
+      cells += finding.cells;
+      has_convention = has_convention || !finding.ids[0].starts_with("number.");
+    }
+    std::vector<Hypothesis> hypotheses;
+    if (!has_convention) return hypotheses;
+    for (const Finding& finding : found_) hypotheses.push_back(ToHypothesis(finding, cells));
+    return hypotheses;
+  }
+
+  const RobotDescription& a_;
+  const RobotDescription& b_;
+  double tolerance_;
+  std::vector<Finding> found_;
+};
+
+/// What explains the difference; nothing when they are of two mechanisms.
+std::optional<std::vector<Hypothesis>> TryToExplain(RobotDescription a, RobotDescription b,
+                                                    double tolerance) {
+  try {
+    CompleteEachOther(&a, &b);
+  } catch (const InputError&) {
+    return std::nullopt;
+  }
+  return Explaining(a, b, tolerance).Run();
+}
+
+/// Whether joints of one name hang on joints of one name.
+bool IsSameTree(const RobotSpec& a, const RobotSpec& b) {
+  const std::vector<int> b_of_a = MatchJoints(a, b);
+  for (size_t i = 0; i < b_of_a.size(); ++i) {
+    if (b_of_a[i] < 0) return false;
+    const Joint& other = b.joints[static_cast<size_t>(b_of_a[i])];
+    const int parent = a.joints[i].parent;
+    if (a.joints[i].type != other.type) return false;
+    if (other.parent != (parent < 0 ? -1 : b_of_a[static_cast<size_t>(parent)])) return false;
+  }
+  return a.joints.size() == b.joints.size();
+}
+
+/// Two joints that have each other's name: with it exchanged again the two are one mechanism, and agree.
+std::optional<Hypothesis> FindExchangedNames(const RobotDescription& a, const RobotDescription& b,
+                                             double tolerance) {
+  const size_t n = a.spec.joints.size();
+  for (size_t i = 0; i < n; ++i) {
+    for (size_t j = i + 1; j < n; ++j) {
+      RobotSpec tree = a.spec;
+      std::swap(tree.joints[i].name, tree.joints[j].name);
+      if (!IsSameTree(tree, b.spec)) continue;
+      RobotDescription exchanged = a;
+      exchanged.spec = std::move(tree);
+      RobotDescription other = b;
+      try {
+        CompleteEachOther(&exchanged, &other);
+      } catch (const InputError&) {
+        continue;
+      }
+      if (!Explaining(exchanged, other, tolerance).Agrees()) continue;
+      const std::vector<std::string> names = {a.spec.joints[i].name, a.spec.joints[j].name};
+      return Hypothesis{
+          "joints " + names[0] + " and " + names[1] + " look exchanged", {}, 1.0, {"exchange.joint"}, names};
+    }
+  }
+  return std::nullopt;
 }
 
 }  // namespace
 
 std::vector<Hypothesis> ExplainDifference(RobotDescription a, RobotDescription b, double tolerance) {
-  try {
-    CompleteEachOther(&a, &b);
-  } catch (const InputError&) {
-    return {};
-  }
-  return FindHypotheses(a, b, tolerance);
-}
-
-std::vector<Hypothesis> FindHypotheses(const RobotDescription& a, const RobotDescription& b,
-                                       double tolerance) {
-  const std::vector<int> b_of_a = MatchJoints(a.spec, b.spec);
-  if (std::any_of(b_of_a.begin(), b_of_a.end(), [](int j) { return j < 0; })) return {};
-  std::vector<OwnRow> rows = ListOwnRows(a);
-  const std::vector<OwnRow> others = ListOwnRows(b);
-  std::vector<OwnRow> right;
-  for (size_t i = 0; i < rows.size(); ++i) {
-    right.push_back(others[static_cast<size_t>(b_of_a[i])]);
-    right.back().parent = rows[i].parent;
-  }
-  const bool floats = a.spec.base.type == BaseType::kFloating;
-  const Pose X_W0_a = floats ? Pose::Identity() : a.spec.base.X_B0;
-  const Pose X_W0_b = floats ? Pose::Identity() : b.spec.base.X_B0;
-  const double length = CalcLength(right);
-  std::vector<Hypothesis> found = FindJointHypotheses(a, X_W0_a, X_W0_b, right, length, tolerance, &rows);
-  const auto append = [&](const std::vector<Hypothesis>& more) {
-    found.insert(found.end(), more.begin(), more.end());
-  };
-  append(FindGravityHypotheses(a, b, tolerance));
-  append(FindConstantHypotheses(a, b, b_of_a, tolerance));
-
-  // Bodies are compared in the own frames of `a`, where the joints are right by now.
-  const VectorXd home = VectorXd::Zero(static_cast<Eigen::Index>(rows.size()));
-  const std::vector<Pose> poses = CalcOwnPoses(X_W0_a, rows, home);
-  const std::vector<Pose> right_poses = CalcOwnPoses(X_W0_b, right, home);
-  std::vector<ComparedBody> bodies;
-  const auto add = [&](int joint, const std::string& link, const MassProperties& given,
-                       const MassProperties& other, int joint_b) {
-    ComparedBody& body = bodies.emplace_back();
-    const Pose X_ab =
-        poses[static_cast<size_t>(joint + 1)].inverse() * right_poses[static_cast<size_t>(joint + 1)];
-    body.joint = joint;
-    body.link = link;
-    body.given = given;
-    body.right = ExpressIn(other, X_ab);
-    if (joint >= 0) body.X_PL = rows[static_cast<size_t>(joint)].X_PL;
-    body.given_parts = ListParts(a, joint, Pose::Identity());
-    body.parts = ListParts(b, joint_b, X_ab);
-    if (body.given_parts.size() == 1) body.R_LC = body.given_parts[0].X_LC.linear();
-  };
-  if (floats) add(-1, a.spec.base.link, a.spec.base.body, b.spec.base.body, -1);
-  for (size_t i = 0; i < rows.size(); ++i) {
-    add(static_cast<int>(i), a.spec.joints[i].link, rows[i].body, right[i].body, b_of_a[i]);
-  }
-  append(FindBodyHypotheses(bodies, length, tolerance));
-  return found;
+  const std::optional<std::vector<Hypothesis>> found = TryToExplain(a, b, tolerance);
+  if (found && found->size() <= 1) return *found;
+  if (const std::optional<Hypothesis> names = FindExchangedNames(a, b, tolerance)) return {*names};
+  return found.value_or(std::vector<Hypothesis>{});
 }
 
 }  // namespace dexcheck

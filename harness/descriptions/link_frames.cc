@@ -4,7 +4,7 @@
 #include <set>
 
 #include "harness/descriptions/description_match.h"
-#include "harness/descriptions/hypotheses.h"
+#include "harness/descriptions/own_rows.h"
 
 namespace dexcheck {
 namespace {
@@ -13,8 +13,7 @@ namespace {
 std::vector<Pose> CalcZeroPoses(const RobotDescription& robot) {
   const Base& base = robot.spec.base;
   const Pose X_W0 = base.type == BaseType::kFloating ? Pose::Identity() : base.X_B0;
-  const std::vector<OwnRow> rows = ListOwnRows(robot);
-  return CalcOwnPoses(X_W0, rows, VectorXd::Zero(static_cast<Eigen::Index>(rows.size())));
+  return CalcOwnPoses(X_W0, ListOwnRows(robot));
 }
 
 bool HasParts(const RobotDescription& robot, int joint) {

@@ -21,6 +21,8 @@ struct DescribedJoint : WrittenRow {
   bool states_dry_friction = true;
   bool states_armature = true;
 
+  /// The frame in which the file places the joint, in the parent's own: of a link that is welded to it.
+  Pose X_PW = Pose::Identity();
   int line = 0;              ///< Of the file; 0 when it is not known.
   double axis_length = 1.0;  ///< Of the axis as the file gives it.
 };

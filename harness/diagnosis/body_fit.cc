@@ -64,9 +64,9 @@ bool AreOneThing(const Parameter& a, const Parameter& b) { return a.kind == b.ki
 
 }  // namespace
 
-BodyFit::BodyFit(const RobotSpec& spec, const EngineEvidence& evidence, const mjModel& engine, bool bodies)
-    : spec_(spec), evidence_(&evidence), bodies_(bodies) {
-  SetTarget(engine);
+BodyFit::BodyFit(const RobotSpec& spec, const EngineEvidence& evidence) : spec_(spec), evidence_(&evidence) {
+  const RobotModel model(spec_);
+  target_ = evidence_->CalcForces(model) + evidence_->CalcForceResidual(model);
   candidates_ = ListCandidates();
   MakePads();
 }
@@ -93,84 +93,13 @@ void BodyFit::MakePads() {
     pads_.armature.push_back(joint.armature + joint.body.inertia.trace());
     pads_.damping.push_back(joint.damping + 1.0);
   }
-  pad_rows_ = CalcRows(RobotModel(Add(spec_, pads_))) - CalcRows(RobotModel(spec_));
-}
-
-void BodyFit::SetTarget(const mjModel& engine) {
-  const RobotModel model(spec_);
-  const int joints = model.num_joints();
-  const StateSample& at = evidence_->samples().front();
-  const VectorXd forces = evidence_->CalcForces(model) + evidence_->CalcForceResidual(model);
-  target_ = forces;
-  if (!bodies_) return;
-
-  // Bodies in their links' frames, joint constants and gravity, each by its own size.
-  const Adapter adapter(model, engine, spec_.source);
-  ModelTerms terms(model);
-  terms.SetState(at.q, at.xi);
-  body_scales_.resize(SlotOf(joints));
-  joint_scales_.resize(2 * joints);
-  std::vector<double> rows;
-  for (int link = -1; link < joints; ++link) {
-    const MassProperties& body =
-        link < 0 ? model.base_with_wheels() : model.joints()[static_cast<size_t>(link)].body;
-    const LinkInWorld& there = at.links[SlotOf(link)];
-    BodyScale& scale = body_scales_[SlotOf(link)];
-    scale.mass = Positive(std::max(body.mass, there.mass));
-    scale.inertia = Positive(std::max(body.inertia.trace(), there.inertia.trace()));
-    scale.length = Positive(std::sqrt(scale.inertia / scale.mass));
-    if (link < 0 && model.base().type == BaseType::kFixed) continue;
-    const Pose X_inverse = terms.CalcLinkPose(link).inverse();
-    const Matrix3d inertia = X_inverse.linear() * there.inertia * X_inverse.linear().transpose();
-    const Vector3d com = there.mass > 0.0 ? Vector3d(X_inverse * there.com) : body.com;
-    rows.push_back(there.mass / scale.mass);
-    for (const double entry : com) rows.push_back(entry / scale.length);
-    for (const int entry : {0, 4, 8, 3, 6, 7}) rows.push_back(inertia.data()[entry] / scale.inertia);
-  }
-  for (int i = 0; i < joints; ++i) {
-    const int dof = adapter.joint_dofs()[static_cast<size_t>(i)];
-    const Joint& joint = model.joints()[static_cast<size_t>(i)];
-    joint_scales_[2 * i] = Positive(std::max(joint.damping, engine.dof_damping[dof]));
-    joint_scales_[2 * i + 1] = Positive(std::max(joint.armature, engine.dof_armature[dof]));
-    rows.push_back(engine.dof_damping[dof] / joint_scales_[2 * i]);
-    rows.push_back(engine.dof_armature[dof] / joint_scales_[2 * i + 1]);
-  }
-  const double g = Positive(model.gravity().norm());
-  for (int k = 0; k < 3; ++k) rows.push_back(engine.opt.gravity[k] / g);
-  joint_scales_.conservativeResize(2 * joints + 1);
-  joint_scales_[2 * joints] = g;
-  target_.conservativeResize(forces.size() + static_cast<Eigen::Index>(rows.size()));
-  target_.tail(static_cast<Eigen::Index>(rows.size())) =
-      Eigen::Map<const VectorXd>(rows.data(), static_cast<Eigen::Index>(rows.size()));
-}
-
-VectorXd BodyFit::CalcRows(const RobotModel& model) const {
-  VectorXd forces = evidence_->CalcForces(model);
-  if (!bodies_) return forces;
-  VectorXd rows(target_.size());
-  rows.head(forces.size()) = forces;
-  Eigen::Index row = forces.size();
-  const int joints = model.num_joints();
-  for (int link = model.base().type == BaseType::kFixed ? 0 : -1; link < joints; ++link) {
-    const MassProperties& body =
-        link < 0 ? model.base_with_wheels() : model.joints()[static_cast<size_t>(link)].body;
-    const BodyScale& scale = body_scales_[SlotOf(link)];
-    rows[row++] = body.mass / scale.mass;
-    for (const double entry : body.com) rows[row++] = entry / scale.length;
-    for (const int entry : {0, 4, 8, 3, 6, 7}) rows[row++] = body.inertia.data()[entry] / scale.inertia;
-  }
-  for (int i = 0; i < joints; ++i) {
-    rows[row++] = model.joints()[static_cast<size_t>(i)].damping / joint_scales_[2 * i];
-    rows[row++] = model.joints()[static_cast<size_t>(i)].armature / joint_scales_[2 * i + 1];
-  }
-  for (const double entry : model.gravity()) rows[row++] = entry / joint_scales_[2 * joints];
-  return rows;
+  pad_rows_ = evidence_->CalcForces(RobotModel(Add(spec_, pads_))) - evidence_->CalcForces(RobotModel(spec_));
 }
 
 VectorXd BodyFit::CalcResidual(const RobotSpec& spec) const {
   const std::optional<RobotModel> model = TryModel(Add(spec, pads_));
   if (!model) return VectorXd::Constant(target_.size(), std::numeric_limits<double>::infinity());
-  return target_ - (CalcRows(*model) - pad_rows_);
+  return target_ - (evidence_->CalcForces(*model) - pad_rows_);
 }
 
 MatrixXd BodyFit::CalcColumns(const RobotSpec& spec, const std::vector<Parameter>& parameters) const {
@@ -178,13 +107,13 @@ MatrixXd BodyFit::CalcColumns(const RobotSpec& spec, const std::vector<Parameter
   MatrixXd columns = MatrixXd::Zero(target_.size(), static_cast<Eigen::Index>(parameters.size()));
   const std::optional<RobotModel> here = TryModel(trial);
   if (!here) return columns;
-  const VectorXd rows = CalcRows(*here);
+  const VectorXd rows = evidence_->CalcForces(*here);
   for (size_t i = 0; i < parameters.size(); ++i) {
     const double value = GetValue(trial, parameters[i]);
     const double step = CalcColumnStep(spec, parameters[i]);
     SetValue(&trial, parameters[i], value + step);
     const std::optional<RobotModel> there = TryModel(trial);
-    if (there) columns.col(static_cast<Eigen::Index>(i)) = (CalcRows(*there) - rows) / step;
+    if (there) columns.col(static_cast<Eigen::Index>(i)) = (evidence_->CalcForces(*there) - rows) / step;
     SetValue(&trial, parameters[i], value);
   }
   return columns;
@@ -294,32 +223,7 @@ bool BodyFit::FindSolution(std::vector<Solution>* solutions) {
     sets.push_back(
         {candidates_[static_cast<size_t>(pair.first)], candidates_[static_cast<size_t>(pair.second)]});
   }
-  if (keep_solved(sets)) return true;
-
-  // Whole vectors and tensors, then all that is one link's.
-  std::vector<std::pair<double, std::vector<Parameter>>> groups;
-  const auto add_group = [&](const auto& same) {
-    for (size_t i = 0; i < candidates_.size(); ++i) {
-      std::vector<Parameter> group;
-      std::vector<Eigen::Index> places;
-      for (size_t j = 0; j < candidates_.size(); ++j) {
-        if (!same(candidates_[i], candidates_[j])) continue;
-        group.push_back(candidates_[j]);
-        places.push_back(static_cast<Eigen::Index>(j));
-      }
-      if (group.size() < 2 || !(group.front() == candidates_[i])) continue;
-      const MatrixXd columns = columns_(Eigen::all, places);
-      const VectorXd fitted = columns * columns.colPivHouseholderQr().solve(residual_);
-      groups.emplace_back(fitted.squaredNorm(), group);
-    }
-    std::stable_sort(groups.begin(), groups.end(),
-                     [](const auto& a, const auto& b) { return a.first > b.first; });
-    sets.clear();
-    for (size_t i = 0; i < std::min(groups.size(), size_t{3}); ++i) sets.push_back(groups[i].second);
-    groups.clear();
-    return keep_solved(sets);
-  };
-  return add_group(AreOneThing);
+  return keep_solved(sets);  // otherwise whole vectors and tensors, by Grow
 }
 
 BodyFit::Solution BodyFit::Grow() const {

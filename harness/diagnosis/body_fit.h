@@ -24,11 +24,9 @@ struct BodyPads {
 /// before many.
 class BodyFit {
  public:
+  /// By forces alone: what they do not show stays unknown.
   /// @param spec has the right geometry. @param evidence was taken with it and must outlive this.
-  /// @param bodies whether the engine's masses, centres of mass, inertias and joint constants may be read
-  /// besides the
-  ///   forces that follow from them. Without, what forces do not show stays unknown.
-  BodyFit(const RobotSpec& spec, const EngineEvidence& evidence, const mjModel& engine, bool bodies);
+  BodyFit(const RobotSpec& spec, const EngineEvidence& evidence);
 
   /// Causes, the one that explains most first; none when not all of the disagreement is explained.
   std::vector<Repair> Run();
@@ -45,15 +43,7 @@ class BodyFit {
     double worst = 0.0;  ///< Largest entry of the residual that is left.
     double squared = 0.0;
   };
-  /// What a body's numbers are compared with: mass, trace of the inertia, radius of gyration.
-  struct BodyScale {
-    double mass = 1.0;
-    double inertia = 1.0;
-    double length = 1.0;
-  };
-  void SetTarget(const mjModel& engine);
   void MakePads();
-  [[nodiscard]] VectorXd CalcRows(const RobotModel& model) const;
   [[nodiscard]] VectorXd CalcResidual(const RobotSpec& spec) const;
   [[nodiscard]] MatrixXd CalcColumns(const RobotSpec& spec, const std::vector<Parameter>& parameters) const;
   [[nodiscard]] Solution Solve(const std::vector<Parameter>& parameters) const;
@@ -74,9 +64,6 @@ class BodyFit {
 
   RobotSpec spec_;
   const EngineEvidence* evidence_;
-  bool bodies_;
-  std::vector<BodyScale> body_scales_;  // base first
-  VectorXd joint_scales_;               // damping, armature of each joint; gravity
   VectorXd target_;
   BodyPads pads_;
   VectorXd pad_rows_;

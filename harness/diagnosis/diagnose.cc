@@ -255,7 +255,7 @@ class Diagnostician {
   void FitBodies() {
     const RobotModel model(result_.repaired);
     const EngineEvidence evidence = Collect(model);
-    BodyFit fit(result_.repaired, evidence, *engine_, !options_.by_motion);
+    BodyFit fit(result_.repaired, evidence);
     if (options_.by_motion) {
       Accept(fit.Run());
     } else {

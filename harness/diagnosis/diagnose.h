@@ -29,7 +29,7 @@ struct Diagnosis {
   double explained = 0.0;      ///< Fraction of all residuals, squared and scaled, that they explain together.
   double explained_of_forces = 0.0;
   std::vector<std::pair<Repair, double>>
-      ranking;  ///< Single numbers by the fraction of the bodies' residuals explained.
+      ranking;  ///< Single numbers by the fraction of the forces' residuals explained.
   std::vector<ConstantFinding> remaining_constants;  ///< What disagrees after all repairs.
   std::vector<CheckRecord> remaining_terms;          ///< Failed checks after all repairs.
   RobotSpec repaired;

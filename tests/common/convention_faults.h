@@ -5,6 +5,7 @@
 // them.
 
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -13,20 +14,32 @@
 
 namespace dexcheck::testing {
 
-/// A link as its file states it: the body in the link's own frame, and that frame in its parent's.
+/// A link as its file states it, and the joint that moves it.
 struct StatedLink {
-  MassProperties body;
-  Pose X_PL;
+  MassProperties body;                      ///< In the link's own frame.
+  Pose X_PL;                                ///< That frame in its parent's.
+  Matrix3d R_LC = Matrix3d::Identity();     ///< Axes along which the file gives the inertia.
+  Vector3d axis = Vector3d::UnitZ();        ///< In the link's own frame.
+  std::optional<Pose> X_LD = std::nullopt;  ///< The next joint's frame, where there is one.
+  double lower = 0.0;                       ///< Of the range, rad.
+  double upper = 0.0;
+  double damping = 0.0;
+  double armature = 0.0;
 };
+
+/// What of a file a fault is about.
+enum class FaultOf { kBody, kJoint, kConstant };
 
 struct ConventionFault {
   std::string name;  ///< What is wrong, and how: "inertia halved".
   std::string text;  ///< The words that must name it.
   std::function<void(StatedLink*)> make;
-  bool is_of_joint = false;
+  FaultOf of = FaultOf::kBody;
+  /// How an explanation calls it: all of these, each in one.
+  std::vector<std::string> ids{};
 };
 
-/// 66 kinds, of inertias, centres of mass, masses and joints.
+/// Some 100 kinds, of inertias, centres of mass, masses, joints and their constants.
 const std::vector<ConventionFault>& ListConventionFaults();
 
 /// Throws std::out_of_range without a fault of this name.

@@ -1,0 +1,50 @@
+#pragma once
+
+// Conventions that people take for other ones when they write a robot down: the one table of them.
+
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "controller/model/rigid_body.h"
+
+namespace dexcheck {
+
+/// What of a part a convention is about.
+enum class Quantity { kMass, kCom, kInertia, kOrigin, kRotation, kPlace, kAxis, kRange, kDamping, kArmature };
+
+/// "mass" and "masses"; "place" stands for origin and rotation together.
+const char* NameOf(Quantity quantity, bool many);
+
+/// What a file states of a link, or of a part that is welded to one, and of what places it.
+struct StatedPart {
+  MassProperties body;                   ///< In the part's own frame L.
+  Matrix3d R_LC = Matrix3d::Identity();  ///< Axes along which the file gives the inertia.
+  Pose X_PL = Pose::Identity();          ///< The own frame in the parent's, at q = 0.
+  Vector3d axis = Vector3d::UnitZ();     ///< In L.
+  std::vector<Pose> X_LD{};              ///< Frames of the next joints in L.
+  double lower = 0.0, upper = 0.0, damping = 0.0, armature = 0.0;
+};
+
+/// Whether they agree in a quantity, relative; places relative to `length`, m.
+bool AgreesIn(Quantity quantity, const StatedPart& a, const StatedPart& b, double length, double tolerance);
+/// Gives `part` the quantity of another one.
+void TakeFrom(const StatedPart& other, Quantity quantity, StatedPart* part);
+
+struct Convention {
+  std::string id;  ///< "inertia.about_origin"
+  Quantity of;
+  std::string words;  ///< "as if given about the link's origin"
+  /// The part with the convention undone, as far as it can be wrong so. What was lost by it (products that
+  /// are missing) is taken from the right one.
+  std::function<std::optional<StatedPart>(const StatedPart& given, const StatedPart& right)> undo;
+};
+
+/// In the order in which they are named when several do as well.
+const std::vector<Convention>& ListConventions();
+
+/// How a fixed base may be mounted: `undo` of its X_PL, which is its place in the world.
+const std::vector<Convention>& ListMountings();
+
+}  // namespace dexcheck

@@ -1,0 +1,177 @@
+#include "harness/descriptions/row_reader.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "controller/common/text.h"
+#include "controller/model/body_frame.h"
+#include "harness/descriptions/parameter_writer.h"
+
+namespace dexcheck {
+namespace {
+
+std::string Format(const Vector3d& v) { return FormatNumbers(v + Vector3d::Zero()); }
+std::string DescribeOrigin(const StatedPart& part) {
+  return "another one, " + Format(part.X_PL.translation()) + " would be right";
+}
+
+}  // namespace
+
+bool IsOfRow(Quantity of) {
+  return of == Quantity::kOrigin || of == Quantity::kRotation || of == Quantity::kPlace ||
+         of == Quantity::kAxis;
+}
+
+RowReader::RowReader(const RowProblem& problem) : problem_(problem), children_(problem.bodies.size()) {
+  for (size_t i = 0; i < problem_.given.size(); ++i)
+    children_[static_cast<size_t>(problem_.given[i].parent + 1)].push_back(i);
+}
+
+/// A convention that says no more than that the right number is zero costs what a number does.
+double RowReader::CostOf(const Convention& convention) const {
+  if (convention.id == "rotation.unneeded") return kConvention;
+  return common.contains(convention.id) ? kCommonConvention : kConvention;
+}
+
+bool RowReader::IsSame(const StatedPart& a, const StatedPart& b) const {
+  constexpr double kSame = 1e-9;
+  return (a.X_PL.matrix() - b.X_PL.matrix()).cwiseAbs().maxCoeff() <=
+             kSame * std::max(1.0, problem_.close.length) &&
+         (a.axis - b.axis).norm() <= kSame;
+}
+
+void RowReader::Offer(size_t i, const Pose& X_ab_P, RowReading reading, Readings* readings) const {
+  if (IsAxisRight(problem_, i, reading.part, X_ab_P)) readings->push_back(std::move(reading));
+}
+
+std::vector<RowReading> RowReader::ListReadings(size_t i, const Pose& X_ab_P, bool in_pairs) const {
+  const StatedPart given = StateRow(i);
+  const StatedPart right = StateRight(i, X_ab_P);
+  // Of frames that differ the right row is not known, and what is missing in one is not either.
+  const StatedPart& known =
+      X_ab_P.isApprox(problem_.given[i].X_PW.inverse(), problem_.close.tolerance) ? right : given;
+  std::vector<RowReading> readings;
+  const auto offer = [&](RowReading reading) { Offer(i, X_ab_P, std::move(reading), &readings); };
+  offer({given, 0.0, {}, "", ""});
+  for (const Convention& first : ListConventions()) {
+    if (!IsOfRow(first.of)) continue;
+    const std::optional<StatedPart> one = first.undo(given, known);
+    if (!one || IsSame(*one, given)) continue;
+    offer({*one, CostOf(first), {&first}, "", ""});
+    for (const Convention& second : ListConventions()) {
+      if (!in_pairs || !IsOfRow(second.of) || second.of <= first.of) continue;
+      const std::optional<StatedPart> two = second.undo(*one, known);
+      if (!two || IsSame(*two, *one) || IsSame(*two, given)) continue;
+      offer({*two, CostOf(first) + CostOf(second) + 0.1, {&first, &second}, "", ""});
+    }
+  }
+  AddNumbers(i, X_ab_P, given, right, &readings);
+  return readings;
+}
+
+void RowReader::AddNumbers(size_t i, const Pose& X_ab_P, const StatedPart& given, const StatedPart& right,
+                           Readings* readings) const {
+  const auto offer = [&](RowReading reading) { Offer(i, X_ab_P, std::move(reading), readings); };
+  if (IsAxisRight(problem_, i, given, X_ab_P)) AddOffsets(i, X_ab_P, given, readings);
+  StatedPart turned = given;
+  turned.axis = given.X_PL.linear().transpose() * right.X_PL.linear() * right.axis;
+  offer(
+      {turned, kNumber + 0.2, {}, "number.axis", "another one, " + Format(turned.axis) + " would be right"});
+  for (int k = 0; k < 3; ++k) {
+    StatedPart moved = given;
+    moved.X_PL.translation()[k] = right.X_PL.translation()[k];
+    offer({moved, kNumber, {}, "number.origin", DescribeOrigin(moved)});
+  }
+  const Matrix3d apart = given.X_PL.linear() - right.X_PL.linear();
+  const Vector3d angles = CalcRollPitchYaw(given.X_PL.linear()) - CalcRollPitchYaw(right.X_PL.linear());
+  const Vector3d places = given.X_PL.translation() - right.X_PL.translation();
+  const double few = problem_.close.tolerance;
+  auto numbers = static_cast<double>((places.array().abs() > few * problem_.close.length).count());
+  if (apart.cwiseAbs().maxCoeff() > few) numbers += static_cast<double>((angles.array().abs() > few).count());
+  StatedPart placed = given;
+  placed.X_PL = right.X_PL;
+  offer({placed,
+         std::min(kNumber * numbers, kUnexplained - 0.5),
+         {},
+         "number.place",
+         "another one, [" + Format(right.X_PL.translation()) + "] with roll, pitch, yaw " +
+             Format(CalcRollPitchYaw(right.X_PL.linear())) + " would be right"});
+  placed.axis = right.axis;
+  offer({placed,
+         std::min(kNumber * (numbers + 1.0), kUnexplained - 0.4),
+         {},
+         "number.place",
+         "another one, with its axis"});
+}
+
+/// Another zero, or another place along the axis, by what of the link would then be in place.
+void RowReader::AddOffsets(size_t i, const Pose& X_ab_P, const StatedPart& given, Readings* readings) const {
+  const Pose X_ab = given.X_PL.inverse() * X_ab_P * problem_.right[i].X_PL;
+  const bool turns = problem_.given[i].is_revolute;
+  const auto add = [&](const Vector3d& a, const Vector3d& b) {
+    const double along = given.axis.dot(b - a);
+    const double angle =
+        std::atan2(given.axis.dot(a.cross(b)), a.dot(b) - given.axis.dot(a) * given.axis.dot(b));
+    OfferOffset(i, X_ab_P, given, turns ? angle : along, readings);
+    if (!turns || std::abs(along) <= problem_.close.tolerance * problem_.close.length) return;
+    StatedPart moved = given;
+    moved.X_PL = given.X_PL * Eigen::Translation3d(along * given.axis);
+    Offer(i, X_ab_P, {moved, kNumber, {}, "number.origin", DescribeOrigin(moved)}, readings);
+  };
+  add(problem_.given[i].body.com, X_ab * problem_.right[i].body.com);
+  for (const size_t child : ListChildren(static_cast<int>(i))) {
+    const Pose& X_a = problem_.given[child].X_PL;
+    const Pose X_b = X_ab * problem_.right[child].X_PL;
+    add(X_a.translation(), X_b.translation());
+    if (turns) add(X_a.linear() * problem_.given[child].axis, X_b.linear() * problem_.right[child].axis);
+  }
+}
+
+void RowReader::OfferOffset(size_t i, const Pose& X_ab_P, const StatedPart& given, double offset,
+                            Readings* readings) const {
+  const bool turns = problem_.given[i].is_revolute;
+  const auto offer = [&](RowReading reading) { Offer(i, X_ab_P, std::move(reading), readings); };
+  constexpr double kNone = 1e-12;
+  if (std::abs(offset) < kNone) return;
+  StatedPart part = given;
+  constexpr double kMetreDigits = 1e9;
+  if (!turns) {
+    part.X_PL = given.X_PL * Eigen::Translation3d(offset * given.axis);
+    const std::string metres = FormatNumber(std::round(-offset * kMetreDigits) / kMetreDigits);
+    offer({part, kConvention, {}, kZero, "offset by " + metres + " m"});
+    return;
+  }
+  // What lies near the axis shows an angle to few digits, and people write few.
+  for (const double digits : {1e6, 1e2}) {
+    const double degrees = std::round(RadToDeg(-offset) * digits) / digits;
+    part.X_PL = given.X_PL * Eigen::AngleAxisd(digits == 1e6 ? offset : -DegToRad(degrees), given.axis);
+    const std::string words = "offset by " + FormatNumber(degrees == -180.0 ? 180.0 : degrees) + " deg";
+    const double angle = digits == 1e6 ? offset : -DegToRad(degrees);
+    offer({part, common.contains(words) ? kCommonConvention : kConvention, {}, kZero, words, angle});
+  }
+}
+
+bool IsAxisRight(const RowProblem& problem, size_t joint, const StatedPart& part, const Pose& X_ab_P) {
+  const OwnRow& right = problem.right[joint];
+  const Pose X_PR = X_ab_P * right.X_PL;
+  const Vector3d axis = part.X_PL.linear() * part.axis;
+  if ((axis - X_PR.linear() * right.axis).norm() > problem.close.tolerance) return false;
+  if (!right.is_revolute) return true;
+  const Vector3d apart = X_PR.translation() - part.X_PL.translation();
+  return (apart - axis.dot(apart) * axis).norm() <= problem.close.tolerance * problem.close.length;
+}
+
+LinkBody PlaceBody(const RowProblem& problem, size_t link, const Pose& X_ab) {
+  LinkBody body = problem.bodies[link];
+  body.right.body = ExpressIn(body.right.body, X_ab);
+  // Where the file says nothing of axes, none can be missing.
+  if (!body.right.R_LC.isIdentity()) body.right.R_LC = X_ab.linear() * body.right.R_LC;
+  for (DescribedPart& part : body.right_parts) {
+    part.body = ExpressIn(part.body, X_ab);
+    part.X_iL = X_ab * part.X_iL;
+    part.X_LC = X_ab * part.X_LC;
+  }
+  return body;
+}
+
+}  // namespace dexcheck

@@ -1,0 +1,52 @@
+#pragma once
+
+// Which conventions and numbers of joints' rows explain that axes and bodies stand elsewhere.
+
+#include <string>
+#include <vector>
+
+#include "harness/descriptions/link_body.h"
+#include "harness/descriptions/own_rows.h"
+
+namespace dexcheck {
+
+/// One way to put a row right: conventions of the table, or numbers.
+struct RowReading {
+  StatedPart part;  ///< X_PL and axis; what else conventions need.
+  double cost = 0.0;
+  std::vector<const Convention*> conventions;  ///< At most two.
+  std::string number;                          ///< "zero.offset", "number.origin", ...
+  std::string words;                           ///< Of the number: "offset by 30 deg".
+  double offset = 0.0;                         ///< Of a zero, rad: what undoes it.
+};
+
+/// A row as it was read, the base's first, and what explains it: readings that do equally well. None where
+/// the row is right; one without conventions and number where nothing explains it.
+struct RowFinding {
+  std::vector<RowReading> readings;
+  std::vector<RowReading> elsewhere;  ///< Of a row that is right: what would explain as well what it carries.
+  Pose X_ab = Pose::Identity();       ///< The link's own frame of the other description in this one's.
+  bool is_placed = false;             ///< Whether that is known, since all rows up to here are explained.
+};
+
+struct RowProblem {
+  std::vector<OwnRow> given;
+  std::vector<OwnRow> right;  ///< In the order of `given`.
+  Pose X_W0_given = Pose::Identity();
+  Pose X_W0_right = Pose::Identity();
+  bool base_is_fixed = true;
+  std::vector<LinkBody> bodies;  ///< Of the base, then of each joint, but for the frame of `right`.
+  Closeness close;
+};
+
+/// The cheapest reading of each row from the base outward. A reading costs 1 for each convention, more for
+/// numbers, and what it leaves wrong of what the row places: its axis, its body, the joints on its link.
+std::vector<RowFinding> SearchRows(const RowProblem& problem);
+
+/// Whether a joint of the given robot turns about the right axis, when its row is read so.
+bool IsAxisRight(const RowProblem& problem, size_t joint, const StatedPart& part, const Pose& X_ab_P);
+
+/// A body of the problem with its right one in the given frame.
+LinkBody PlaceBody(const RowProblem& problem, size_t link, const Pose& X_ab);
+
+}  // namespace dexcheck
