@@ -42,7 +42,8 @@ class StepStore {
     kObjectPose,       ///< 12: rotation by columns, position.
     kObjectMotion,     ///< 12: V_Bo and V_Bo_dot.
     kDryFriction,      ///< n: what the plant says of it, beyond the declared; 0 where it says nothing.
-    kNoise,            ///< 2: of the robot's residual, in |.|_M^-1, and of the object's, N.
+    kNoise,            ///< 2: of an entry of the robot's residual, in |.|_M^-1, and of the object's, N.
+    kUneven,           ///< What tilt, slip and sinking of the platform can make of the robot's, in |.|_M^-1.
     kWheelRates,       ///< 2, right and left, rad/s.
     kWheelMismatch,    ///< 2, CalcRollingMismatch, m/s.
     kWheelNoise,       ///< 2: what of that slipping and sinking may be, m/s; 0 without wheels.
