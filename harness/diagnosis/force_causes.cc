@@ -316,8 +316,7 @@ void FindSegments(const StepStore& store, StepForces* forces, Segment* whole, st
     forces->SetStep(i);
     const VectorXd y = forces->CalcResidual();
     const Index n = y.size() - 6;
-    const bool differs = y.head(n).squaredNorm() > static_cast<double>(n) || y.tail<6>().squaredNorm() > 6.0;
-    if (differs) {
+    if (forces->Differs(y)) {
       const bool follows = !steps.empty() && steps.back().index == i - 1;
       steps.push_back({i, follows, 0.0, 0.0});
       if (follows) {

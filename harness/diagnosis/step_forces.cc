@@ -93,6 +93,14 @@ void StepForces::CalcUneven() {
   uneven_shrink_ = (1.0 + svd.singularValues().array().square()).rsqrt() - 1.0;
 }
 
+bool StepForces::Differs(const VectorXd& residual) const {
+  VectorXd robot = store_.Get(StepStore::kRobotResidual).col(step_);
+  factor_.SolveTransposed(robot);
+  const double root = std::sqrt(static_cast<double>(n_));
+  return robot.norm() > root * noise_[0] + store_.Get(StepStore::kUneven)(0, step_) ||
+         residual.head(n_).norm() > root || residual.tail<6>().norm() > std::sqrt(6.0);
+}
+
 VectorXd StepForces::Whiten(const VectorXd& f, const Vector6d& w) const {
   VectorXd y = VectorXd::Zero(rows());
   VectorXd robot = f;

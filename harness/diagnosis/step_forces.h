@@ -44,6 +44,8 @@ class StepForces {
   [[nodiscard]] const MatrixXd& uneven() const { return uneven_; }
 
   void SetStep(Eigen::Index step);
+  /// Whether the checks of the balances fail, or what is left is more than noise.
+  [[nodiscard]] bool Differs(const VectorXd& residual) const;
   [[nodiscard]] VectorXd CalcResidual() const {
     return Whiten(store_.Get(StepStore::kRobotResidual).col(step_),
                   store_.Get(StepStore::kObjectResidual).col(step_));

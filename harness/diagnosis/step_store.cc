@@ -16,6 +16,9 @@ constexpr const char* kContactEntries[][2] = {
 constexpr Eigen::Index kContactSize = std::size(kContactEntries);
 constexpr Eigen::Index kObjectSize = 12, kTouchSize = 2;
 
+/// Wheels of right runs roll to this fraction of the check's bound, and what slipping and sinking are.
+constexpr double kRollingRounding = 0.01;
+
 template <typename Range>
 Eigen::Index CountOf(const Range& range) {
   return static_cast<Eigen::Index>(range.size());
@@ -177,7 +180,7 @@ void StepStore::Pack(const StepRecord& step, const StepAnalysis& now, bool answe
   at(kWheelMismatch) = now.wheel_mismatch;
   at(kWheelNoise).setZero();
   if (answered && response.wheels.size() == 2)
-    at(kWheelNoise) = now.wheel_slip.array() + now.sinking + rolling_bound_;
+    at(kWheelNoise) = now.wheel_slip.array() + now.sinking + kRollingRounding * rolling_bound_;
   at(kLawNoise)[0] = 0.0;
   if (now.law == nullptr || law_ == nullptr || !law_->differs()) return;
   at(kLawNoise)[0] = kLawTorqueBound * law_->noise_scale();

@@ -46,7 +46,7 @@ class StepStore {
     kUneven,           ///< What tilt, slip and sinking of the platform can make of the robot's, in |.|_M^-1.
     kWheelRates,       ///< 2, right and left, rad/s.
     kWheelMismatch,    ///< 2, CalcRollingMismatch, m/s.
-    kWheelNoise,       ///< 2: what of that slipping and sinking may be, m/s; 0 without wheels.
+    kWheelNoise,       ///< 2: what of that slipping and sinking are, and rounding, m/s; 0 without wheels.
     kLawDifference,    ///< n, E_bar' (tau' - tau'_printed).
     kLawNoise,         ///< Of that, in |.|_M^-1; 0 where the law is right or not known.
     kLawParts,         ///< n times their number: the summands, where the law differs.
@@ -73,6 +73,8 @@ class StepStore {
   /// Time of the last step that was added, s.
   [[nodiscard]] double last_time() const { return last_time_; }
   [[nodiscard]] const Setup& setup() const { return *setup_; }
+  /// Of the check `rolling`, m/s.
+  [[nodiscard]] double rolling_bound() const { return rolling_bound_; }
   [[nodiscard]] const JudgedLaw* law() const { return law_; }
   [[nodiscard]] const std::vector<SignalName>& readings() const { return readings_; }
   [[nodiscard]] const std::vector<SignalName>& motors() const { return motors_; }
