@@ -6,6 +6,7 @@
 
 #include "controller/common/text.h"
 #include "harness/diagnosis/step_forces.h"
+#include "harness/diagnosis/telling.h"
 
 namespace dexcheck {
 namespace {
@@ -81,21 +82,17 @@ Fault MakeFault(const Candidate& candidate, const VectorXd& a, const VectorXd& e
   return fault;
 }
 
-/// The steps from `first` to `last` of those that differ.
-struct Segment {
-  std::vector<Index> steps;
-  double from = 0.0, to = 0.0;
-};
+using Segment = std::vector<Index>;  // of steps that differ
 
 /// One residual and what explains it.
 class Problem {
  public:
   Problem(const StepStore& store, StepForces* forces, const Segment& segment)
       : store_(store), forces_(forces) {
-    const auto count = static_cast<Index>(segment.steps.size());
+    const auto count = static_cast<Index>(segment.size());
     steps_ = std::min(count, kMostSteps);
     for (Index i = 0; i < steps_; ++i)
-      used_.push_back(segment.steps[static_cast<size_t>(steps_ == 1 ? 0 : i * (count - 1) / (steps_ - 1))]);
+      used_.push_back(segment[static_cast<size_t>(steps_ == 1 ? 0 : i * (count - 1) / (steps_ - 1))]);
     forces->SetGravity(forces->model().gravity());
     // What the columns are off hides what is smaller on the same side, robot or object.
     level_.setOnes();
@@ -115,18 +112,11 @@ class Problem {
     const CauseSelection selection = Select();
     if (!IsExplained(selection.fraction, selection.left)) return false;
     if (ExplainJoint(segment, selection, causes)) return true;
-    for (const CauseTerm& term : selection.terms) {
-      Explanation one = Start(segment);
-      one.fraction = selection.terms.size() == 1 ? selection.fraction : term.fraction;
-      one.left = selection.left;
-      const Vector3d& gravity = forces_->model().gravity();
-      one.faults.push_back(MakeFault(candidates_[term.candidate], term.amplitude, term.error, gravity));
-      for (const auto& [same, amplitude] : term.same)
-        one.faults.push_back(MakeFault(candidates_[same], amplitude, {}, gravity));
-      one.SetOutcome();
-      if (term.rival != SIZE_MAX) one.SetRival(candidates_[term.rival], term.log_odds);
-      causes->push_back(one);
-    }
+    Causes told = TellSelection(Start(segment), selection, candidates_,
+                                [&](const Candidate& one, const VectorXd& amplitude, const VectorXd& error) {
+                                  return MakeFault(one, amplitude, error, forces_->model().gravity());
+                                });
+    std::move(told.begin(), told.end(), std::back_inserter(*causes));
     return true;
   }
 
@@ -214,13 +204,7 @@ class Problem {
   }
 
   [[nodiscard]] Explanation Start(const Segment& segment) const {
-    Explanation one;
-    one.channel = CauseChannel::kBalance;
-    one.from = segment.from;
-    one.to = segment.to;
-    const VectorXd time = store_.Get(StepStore::kTime).row(0);
-    one.ends = segment.steps.back() + 2 < store_.size();
-    return one;
+    return StartExplanation(store_, CauseChannel::kBalance, segment);
   }
 
   void Build() {
@@ -332,14 +316,9 @@ void FindSegments(const StepStore& store, StepForces* forces, Segment* whole, st
     return steps[k].*size > std::max(kJumpNoise, kJump * around);
   };
   for (size_t k = 0; k < steps.size(); ++k) {
-    const double time = store.Get(StepStore::kTime)(0, steps[k].index);
-    if (!steps[k].follows || jumps(k, &Step::robot) || jumps(k, &Step::object))
-      parts->push_back({{}, time, time});
-    for (Segment* segment : {whole, &parts->back()}) {
-      if (segment->steps.empty()) segment->from = time;
-      segment->steps.push_back(steps[k].index);
-      segment->to = time;
-    }
+    if (!steps[k].follows || jumps(k, &Step::robot) || jumps(k, &Step::object)) parts->emplace_back();
+    whole->push_back(steps[k].index);
+    parts->back().push_back(steps[k].index);
   }
 }
 
@@ -361,7 +340,7 @@ Causes ExplainForces(const StepStore& store) {
   Segment whole;
   std::vector<Segment> parts;
   FindSegments(store, &forces, &whole, &parts);
-  if (whole.steps.empty()) return causes;
+  if (whole.empty()) return causes;
   Problem problem(store, &forces, whole);
   if (problem.ExplainConstant(whole, &causes)) return causes;
   if (parts.size() > 1 && parts.size() <= kMostSegments) {

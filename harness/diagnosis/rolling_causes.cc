@@ -5,7 +5,7 @@
 #include <tuple>
 
 #include "harness/checks/wheel_rolling.h"
-#include "harness/diagnosis/cause_estimator.h"
+#include "harness/diagnosis/telling.h"
 
 namespace dexcheck {
 namespace {
@@ -71,27 +71,14 @@ Causes ExplainRolling(const StepStore& store) {
     for (Candidate& one : candidates) one.columns /= level;
     selection = SelectCauses(y, candidates, options);
   }
-  const auto name = [&](size_t i, const VectorXd& amplitude, double error) {
-    const Candidate& one = candidates[i];
-    return Fault{one.fault, one.place, one.nominal + amplitude[0], error, one.unit, ""};
-  };
-  Explanation start;
-  start.channel = CauseChannel::kRolling;
-  start.from = store.Get(StepStore::kTime)(0, steps.front());
-  start.to = store.Get(StepStore::kTime)(0, steps.back());
-  start.ends = steps.back() + 2 < store.size();
-  start.fraction = selection.fraction;
-  start.left = selection.left;
-  Causes causes;
-  for (const CauseTerm& term : selection.terms) {
-    Explanation one = start;
-    one.faults.push_back(name(term.candidate, term.amplitude, term.error[0]));
-    for (const auto& [same, amplitude] : term.same) one.faults.push_back(name(same, amplitude, 0.0));
-    one.SetOutcome();
+  Causes causes = TellSelection(
+      StartExplanation(store, CauseChannel::kRolling, steps), selection, candidates,
+      [](const Candidate& one, const VectorXd& amplitude, const VectorXd& error) {
+        return Fault{one.fault, one.place, one.nominal + amplitude[0], error.size() > 0 ? error[0] : 0.0,
+                     one.unit,  ""};
+      });
+  for (Explanation& one : causes)
     if (!explained) one.outcome = CauseOutcome::kNotExplained;
-    if (term.rival != SIZE_MAX) one.SetRival(candidates[term.rival], term.log_odds);
-    causes.push_back(one);
-  }
   return causes;
 }
 
