@@ -24,6 +24,7 @@ constexpr double kExplains = 0.99;
 // and to what columns are known to; found anew so often.
 constexpr double kLevel = 5.0, kRounding = 1e-4, kExact = 1e-7;
 constexpr int kMostLevels = 4;
+constexpr double kFaint = 0.03;   // noise where the checks of the balances hold, in their bounds
 constexpr Index kMostSteps = 20;  // that are looked at
 constexpr size_t kMostSegments = 8;
 // Residuals that change by more than this from one step to the next, in units of noise, and by this many
@@ -87,23 +88,24 @@ using Segment = std::vector<Index>;  // of steps that differ
 /// One residual and what explains it.
 class Problem {
  public:
-  Problem(const StepStore& store, StepForces* forces, const Segment& segment)
-      : store_(store), forces_(forces) {
+  /// @param level of the noise, in bounds of the checks.
+  Problem(const StepStore& store, StepForces* forces, const Segment& segment, double level = 1.0)
+      : store_(store), forces_(forces), is_faint_(level < 1.0) {
     const auto count = static_cast<Index>(segment.size());
     steps_ = std::min(count, kMostSteps);
     for (Index i = 0; i < steps_; ++i)
       used_.push_back(segment[static_cast<size_t>(steps_ == 1 ? 0 : i * (count - 1) / (steps_ - 1))]);
     forces->SetGravity(forces->model().gravity());
     // What the columns are off hides what is smaller on the same side, robot or object.
-    level_.setOnes();
+    level_.setConstant(level);
     Build();
-    level_ = first_level_ = (1.0 + (kAccuracy * CalcSizes(y_)).array().square()).sqrt();
+    level_ = first_level_ = level * (1.0 + (kAccuracy * CalcSizes(y_)).array().square()).sqrt();
     Build();
   }
 
   /// Whether what is left is noise, or next to nothing beside what there was.
   [[nodiscard]] bool IsExplained(double fraction, double left) const {
-    if (left <= 1.0) return fraction > 0.0;
+    if (left <= 1.0 && !is_faint_) return fraction > 0.0;
     return fraction >= kExplains && left <= kLeft;
   }
 
@@ -278,6 +280,7 @@ class Problem {
 
   const StepStore& store_;
   StepForces* forces_;
+  bool is_faint_;  // whether the checks of the balances hold
   std::vector<Candidate> candidates_;
   VectorXd y_;
   std::vector<Index> used_;  // steps of the store
@@ -286,8 +289,9 @@ class Problem {
   std::vector<MatrixXd> uneven_;  // of each step
 };
 
-/// All steps that differ, and the same in parts that begin or end with a jump.
-void FindSegments(const StepStore& store, StepForces* forces, Segment* whole, std::vector<Segment>* parts) {
+/// All steps that differ, and the same in parts that begin or end with a jump. @param level of the noise.
+void FindSegments(const StepStore& store, StepForces* forces, double level, Segment* whole,
+                  std::vector<Segment>* parts) {
   struct Step {
     Index index;
     bool follows;
@@ -295,6 +299,7 @@ void FindSegments(const StepStore& store, StepForces* forces, Segment* whole, st
   };
   std::vector<Step> steps;
   VectorXd before;
+  forces->SetLevel(Vector2d::Constant(level));
   for (Index i = 0; i < store.size(); ++i) {
     if (!(store.Get(StepStore::kNoise)(0, i) > 0.0)) continue;
     forces->SetStep(i);
@@ -339,8 +344,13 @@ Causes ExplainForces(const StepStore& store) {
   StepForces forces(store);
   Segment whole;
   std::vector<Segment> parts;
-  FindSegments(store, &forces, &whole, &parts);
-  if (whole.empty()) return causes;
+  FindSegments(store, &forces, 1.0, &whole, &parts);
+  if (whole.empty()) {
+    // Predictions fail by what is less than the bounds of the balances.
+    FindSegments(store, &forces, kFaint, &whole, &parts);
+    if (!whole.empty()) Problem(store, &forces, whole, kFaint).ExplainConstant(whole, &causes);
+    return causes;
+  }
   Problem problem(store, &forces, whole);
   if (problem.ExplainConstant(whole, &causes)) return causes;
   if (parts.size() > 1 && parts.size() <= kMostSegments) {
