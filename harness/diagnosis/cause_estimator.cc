@@ -179,27 +179,25 @@ class Search {
     for (size_t i = 0; i < candidates_.size(); ++i) {
       const MatrixXd& C = visible_[i].columns;
       if (C.cols() == 0 || std::find(beside.begin(), beside.end(), i) != beside.end()) continue;
-      const double explained = CalcExplained(C, Q, r);
-      if (!(explained > 0.0)) continue;
-      scores[i] = Score(std::max(0.0, r.squaredNorm() - explained), parameters + CountParameters({i}),
-                        beside.size() + 1);
+      const double left = CalcLeft(C, Q, r);
+      if (!(left < r.squaredNorm())) continue;
+      scores[i] = Score(left, parameters + CountParameters({i}), beside.size() + 1);
     }
     return scores;
   }
 
-  /// Square of r's projection on what C has beside Q.
-  static double CalcExplained(const MatrixXd& C, const MatrixXd& Q, const VectorXd& r) {
+  /// Square of what is left of r without what C has beside Q.
+  static double CalcLeft(const MatrixXd& C, const MatrixXd& Q, VectorXd r) {
     MatrixXd own = C - Q * (Q.transpose() * C);
-    double explained = 0.0;
     for (Index k = 0; k < own.cols(); ++k) {
       const double size = own.col(k).norm();
       if (!(size > kIndependent * C.col(k).norm())) continue;
       own.col(k) /= size;
-      const double along = own.col(k).dot(r);
-      explained += along * along;
+      // By subtraction, since squares that nearly cancel say nothing of what is left.
+      r -= own.col(k).dot(r) * own.col(k);
       for (Index j = k + 1; j < own.cols(); ++j) own.col(j) -= own.col(k).dot(own.col(j)) * own.col(k);
     }
-    return explained;
+    return r.squaredNorm();
   }
 
   /// Its amplitudes beside those; zero where they have all of it.

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "controller/dynamics/tree_factor.h"
-#include "harness/diagnosis/cause_estimator.h"
+#include "harness/diagnosis/telling.h"
 
 namespace dexcheck {
 namespace {
@@ -161,37 +161,23 @@ Causes ExplainLaw(const StepStore& store) {
   const double floor = 1.0 + kAccuracy * kAccuracy * y.squaredNorm() / static_cast<double>(y.size());
   const CauseSelection selection =
       SelectCauses(y, candidates, {.most_terms = 4, .restarts = 0, .floor = floor});
-  Explanation start;
-  start.channel = CauseChannel::kLaw;
-  start.from = store.Get(StepStore::kTime)(0, steps.front());
-  start.to = store.Get(StepStore::kTime)(0, steps.back());
-  start.ends = steps.back() + 2 < store.size();
-  start.left = selection.left;
-  start.fraction = selection.fraction;
-  const bool explained = selection.left <= kLeft * std::sqrt(floor);
-  const auto make = [&](size_t i, double amplitude, double error) {
-    const Candidate& one = candidates[i];
-    const double value = one.nominal + amplitude;
-    return Fault{one.fault, one.place, std::abs(value) < kZero ? 0.0 : value, error, one.unit, ""};
-  };
-  if (!explained) {
-    start.outcome = CauseOutcome::kNotExplained;
-    for (const CauseTerm& term : selection.terms) {
-      start.faults.push_back(make(term.candidate, term.amplitude[0], term.error[0]));
-      break;
-    }
-    causes.push_back(start);
-    return causes;
-  }
-  for (const CauseTerm& term : selection.terms) {
-    Explanation one = start;
-    if (selection.terms.size() > 1) one.fraction = term.fraction;
-    one.faults.push_back(make(term.candidate, term.amplitude[0], term.error[0]));
-    for (const auto& [same, amplitude] : term.same) one.faults.push_back(make(same, amplitude[0], 0.0));
-    one.SetOutcome();
-    if (term.rival != SIZE_MAX) one.SetRival(candidates[term.rival], term.log_odds);
-    causes.push_back(one);
-  }
+  causes = TellSelection(
+      StartExplanation(store, CauseChannel::kLaw, steps), selection, candidates,
+      [](const Candidate& one, const VectorXd& amplitude, const VectorXd& error) {
+        const double value = one.nominal + amplitude[0];
+        return Fault{
+            one.fault, one.place, std::abs(value) < kZero ? 0.0 : value, error.size() > 0 ? error[0] : 0.0,
+            one.unit,  ""};
+      });
+  if (selection.left <= kLeft * std::sqrt(floor)) return causes;
+  // The nearest stands for all.
+  causes.resize(std::min<size_t>(causes.size(), 1));
+  if (causes.empty()) causes.push_back(StartExplanation(store, CauseChannel::kLaw, steps));
+  causes.front().outcome = CauseOutcome::kNotExplained;
+  causes.front().faults.resize(std::min<size_t>(causes.front().faults.size(), 1));
+  causes.front().rival.clear();
+  causes.front().fraction = selection.fraction;
+  causes.front().left = selection.left;
   return causes;
 }
 

@@ -1,10 +1,11 @@
 #include "harness/diagnosis/rolling_causes.h"
 
 #include <algorithm>
+#include <cmath>
 #include <tuple>
 
 #include "harness/checks/wheel_rolling.h"
-#include "harness/diagnosis/cause_estimator.h"
+#include "harness/diagnosis/telling.h"
 
 namespace dexcheck {
 namespace {
@@ -13,6 +14,8 @@ using Eigen::Index;
 
 // What is left may be this fraction of what there was: wheels that slip do so with the load.
 constexpr double kExplains = 0.99;
+// Noise is taken for this many times what the explanation leaves.
+constexpr double kLevel = 5.0;
 
 }  // namespace
 
@@ -28,6 +31,7 @@ Causes ExplainRolling(const StepStore& store) {
   if (steps.empty()) return {};
   const auto count = static_cast<Index>(steps.size());
   VectorXd y(2 * count);
+  bool fails = false;  // the check
   std::vector<Candidate> candidates;
   for (const auto& [fault, place, nominal] : {std::tuple{"radius", "wheels", base.wheel_radius},
                                               {"distance", "wheels", base.wheel_distance},
@@ -49,6 +53,7 @@ Causes ExplainRolling(const StepStore& store) {
       const double unit = 1.0 / noise(wheel, step);
       const double rate = rates(wheel, step) * unit;
       y[row] = mismatch(wheel, step) * unit;
+      fails = fails || std::abs(mismatch(wheel, step)) > noise(wheel, step) + store.rolling_bound();
       candidates[0].columns(row, 0) = rate;
       candidates[1].columns(row, 0) = (wheel == 0 ? -0.5 : 0.5) * turn * unit;
       candidates[static_cast<size_t>(2 + wheel)].columns(row, 0) = rate;
@@ -56,31 +61,24 @@ Causes ExplainRolling(const StepStore& store) {
   }
   // Slip and sinking change with the load, in some steps.
   constexpr double kAlike = 8.0;
-  const CauseSelection selection =
-      SelectCauses(y, candidates, {.most_terms = 2, .alike = std::min(kAlike, static_cast<double>(count))});
   if (y.squaredNorm() <= static_cast<double>(y.size())) return {};
-  const auto name = [&](size_t i, const VectorXd& amplitude, double error) {
-    const Candidate& one = candidates[i];
-    return Fault{one.fault, one.place, one.nominal + amplitude[0], error, one.unit, ""};
-  };
-  Explanation start;
-  start.channel = CauseChannel::kRolling;
-  start.from = store.Get(StepStore::kTime)(0, steps.front());
-  start.to = store.Get(StepStore::kTime)(0, steps.back());
-  start.ends = steps.back() + 2 < store.size();
-  start.fraction = selection.fraction;
-  start.left = selection.left;
-  Causes causes;
-  for (const CauseTerm& term : selection.terms) {
-    Explanation one = start;
-    one.faults.push_back(name(term.candidate, term.amplitude, term.error[0]));
-    for (const auto& [same, amplitude] : term.same) one.faults.push_back(name(same, amplitude, 0.0));
-    one.SetOutcome();
-    if (!(selection.left <= 1.0 || selection.fraction >= kExplains))
-      one.outcome = CauseOutcome::kNotExplained;
-    if (term.rival != SIZE_MAX) one.SetRival(candidates[term.rival], term.log_odds);
-    causes.push_back(one);
+  const CauseOptions options{.most_terms = 2, .alike = std::min(kAlike, static_cast<double>(count))};
+  CauseSelection selection = SelectCauses(y, candidates, options);
+  const bool explained = selection.fraction >= kExplains;
+  if (!explained && !fails) return {};
+  if (const double level = kLevel * selection.left; explained && level < 1.0) {
+    y /= level;
+    for (Candidate& one : candidates) one.columns /= level;
+    selection = SelectCauses(y, candidates, options);
   }
+  Causes causes = TellSelection(
+      StartExplanation(store, CauseChannel::kRolling, steps), selection, candidates,
+      [](const Candidate& one, const VectorXd& amplitude, const VectorXd& error) {
+        return Fault{one.fault, one.place, one.nominal + amplitude[0], error.size() > 0 ? error[0] : 0.0,
+                     one.unit,  ""};
+      });
+  for (Explanation& one : causes)
+    if (!explained) one.outcome = CauseOutcome::kNotExplained;
   return causes;
 }
 

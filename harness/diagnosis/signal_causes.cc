@@ -16,7 +16,9 @@ using Eigen::ArrayXd;
 using Eigen::Index;
 
 // Columns agree with what a fault does to this fraction: it is computed from the same numbers.
-constexpr double kAccuracy = 1e-6;
+constexpr double kAccuracy = 1e-9;
+// A drift that began since the step before has come so far, beside rounding, at the first.
+constexpr double kSinceStep = 1e-6;
 // What is left over may be this many times the noise and is explained all the same.
 constexpr double kLeft = 30.0;
 // Autocorrelation of noise that is white, times the root of the number of steps.
@@ -113,8 +115,17 @@ void AddDelay(const ArrayXd& got, const SignalSeries& series, const Steps& steps
   }
 }
 
-void AddLimits(const ArrayXd& u, const ArrayXd& got, const std::string& unit, bool is_motor,
+/// Whether what has this output for good is over when it would still show.
+bool IsRefuted(const SignalSeries& series, const Steps& steps, const VectorXd& output) {
+  if (!steps.ends) return false;
+  const Index first = static_cast<Index>(steps.rows.back()) + 1, count = output.size() - first;
+  return ((output - series.expected).tail(count).array().abs() > kFaint * series.noise).any();
+}
+
+void AddLimits(const ArrayXd& u, const ArrayXd& got, const SignalSeries& series, const Steps& steps,
                std::vector<Shape>* shapes) {
+  const std::string& unit = series.name.unit;
+  const bool is_motor = series.name.group == "motors";
   const double most = got.abs().maxCoeff();
   if (most > 0.0 && most < u.abs().maxCoeff())
     shapes->push_back({"limit", unit, "", most, 1, u.min(most).max(-most), false});
@@ -127,6 +138,8 @@ void AddLimits(const ArrayXd& u, const ArrayXd& got, const std::string& unit, bo
   std::nth_element(less.begin(), less.begin() + static_cast<std::ptrdiff_t>(less.size() / 2), less.end());
   const double zone = less[less.size() / 2];
   if (!(zone > 0.0)) return;
+  const ArrayXd all = series.expected.array();
+  if (IsRefuted(series, steps, (all.sign() * (all.abs() - zone).max(0.0)).matrix())) return;
   shapes->push_back({"dead zone", unit, "", zone, 1, u.sign() * (u.abs() - zone).max(0.0), false});
 }
 
@@ -189,7 +202,7 @@ std::vector<Shape> ListShapes(const SignalSeries& series, const Steps& steps,
   std::vector<Shape> shapes;
   shapes.push_back({.fault = "", .unit = "", .detail = "", .output = u});
   AddDelay(got, series, steps, &shapes);
-  AddLimits(u, got, series.name.unit, series.name.group == "motors", &shapes);
+  AddLimits(u, got, series, steps, &shapes);
   AddSteps(u, got, series.name.unit, &shapes);
   AddExchange(got, series, steps, others, &shapes);
   const bool is_still = (got - got.mean()).abs().maxCoeff() <= series.noise;
@@ -283,6 +296,7 @@ std::vector<Candidate> ListAdded(const SignalSeries& series, const Steps& steps,
          {std::tuple{"viscous friction", name.unit + " s/rad", ArrayXd(-rate)},
           std::tuple{"dry friction", name.unit, ArrayXd(-rate.sign())}}) {
       const size_t count = added.size();
+      if (IsRefuted(series, steps, series.expected + series.rate)) continue;
       add(fault, unit, column);
       if (added.size() > count) added.back().is_possible = [](const VectorXd& a) { return a[0] >= 0.0; };
     }
@@ -300,8 +314,9 @@ Fault MakeFault(const Candidate& candidate, const VectorXd& amplitude, const Vec
   Fault fault{candidate.fault, candidate.place, candidate.nominal + amplitude[0],
               error[0],        candidate.unit,  ""};
   if (candidate.fault == "lag") {
-    fault.value = -time_step / std::log(std::clamp(decay, 1e-9, 1.0 - 1e-9));
-    fault.error *= fault.value * fault.value / time_step / decay;
+    const double own = std::clamp(amplitude[0], 1e-9, 1.0 - 1e-9);
+    fault.value = -time_step / std::log(own);
+    fault.error *= fault.value * fault.value / time_step / own;
   } else if (candidate.fault == "ripple") {
     fault.value = amplitude.norm();
     fault.error = error.norm();
@@ -367,7 +382,7 @@ Fit MakeFit(const SignalSeries& series, const Steps& steps, const Shape& shape, 
   const auto has_come_to = [&](const char* fault, const char* drift) {
     const double since = find(fault) / find(drift);
     return since > 0.0 && std::isfinite(since) &&
-           (steps.was_before || since <= (1.0 + kAccuracy) * time_step);
+           (steps.was_before || since <= (1.0 + kSinceStep) * time_step);
   };
   const bool drifts_to_offset = has_come_to("offset", "drift");
   const bool drifts_to_gain = has_come_to("gain", "drift of the gain");

@@ -16,6 +16,9 @@ constexpr const char* kContactEntries[][2] = {
 constexpr Eigen::Index kContactSize = std::size(kContactEntries);
 constexpr Eigen::Index kObjectSize = 12, kTouchSize = 2;
 
+/// Wheels of right runs roll to this fraction of the check's bound, and what slipping and sinking are.
+constexpr double kRollingRounding = 0.01;
+
 template <typename Range>
 Eigen::Index CountOf(const Range& range) {
   return static_cast<Eigen::Index>(range.size());
@@ -30,8 +33,8 @@ StepStore::StepStore(const Setup& setup, const JudgedLaw* law, double rolling_bo
   const Eigen::Index n = model.num_velocities(), m = CountOf(readings_);
   const Eigen::Index parts = law_ == nullptr ? 0 : law_->CountColumns();
   const Eigen::Index sizes[kSignalCount] = {
-      1, n, n, model.num_positions(),       n, n, m,        m, n, 6, 12, 12, n, 2,
-      2, 2, 2, CountOf(setup.fingertips()), n, 1, n * parts};
+      1, n, n, model.num_positions(), n, n, m, m, n, 6, 12, 12, n, 2, 1, 2, 2, 2, CountOf(setup.fingertips()),
+      n, 1, n * parts};
   for (int i = 0; i < kSignalCount; ++i) offsets_[i + 1] = offsets_[i] + sizes[i];
   before_.resize(offsets_[kSignalCount], kHistory);
   data_.resize(offsets_[kSignalCount], kCapacity);  // its pages are used only when something differs
@@ -148,6 +151,7 @@ void StepStore::Pack(const StepRecord& step, const StepAnalysis& now, bool answe
   PackReading(step.measured, declared.measured, at(kReading));
   at(kRobotResidual).setZero();
   at(kNoise).setZero();
+  at(kUneven).setZero();
   at(kDryFriction).setZero();
   if (answered && now.mass_factor != nullptr) {
     // What motors did not give is theirs, and no force of its own.
@@ -164,8 +168,9 @@ void StepStore::Pack(const StepRecord& step, const StepAnalysis& now, bool answe
       }
     }
     // As the bounds of the inverse dynamics have it, an entry.
-    at(kNoise) << (1e-6 * now.balanced + now.uneven_force) / std::sqrt(static_cast<double>(force_.size())),
+    at(kNoise) << 1e-6 * now.balanced / std::sqrt(static_cast<double>(force_.size())),
         1e-9 * std::max(now.findings.f_c.norm(), 1e-3) / std::sqrt(6.0);
+    at(kUneven)[0] = now.uneven_force;
   }
   at(kObjectResidual) = answered ? now.object_residual : Vector6d(Vector6d::Zero());
   const Pose& X_Bo = step.reading.state.X_Bo;
@@ -176,7 +181,7 @@ void StepStore::Pack(const StepRecord& step, const StepAnalysis& now, bool answe
   at(kWheelMismatch) = now.wheel_mismatch;
   at(kWheelNoise).setZero();
   if (answered && response.wheels.size() == 2)
-    at(kWheelNoise) = now.wheel_slip.array() + now.sinking + rolling_bound_;
+    at(kWheelNoise) = now.wheel_slip.array() + now.sinking + kRollingRounding * rolling_bound_;
   at(kContactMismatch) = now.contact_mismatch;
   at(kLawNoise)[0] = 0.0;
   if (now.law == nullptr || law_ == nullptr || !law_->differs()) return;

@@ -42,10 +42,11 @@ class StepStore {
     kObjectPose,       ///< 12: rotation by columns, position.
     kObjectMotion,     ///< 12: V_Bo and V_Bo_dot.
     kDryFriction,      ///< n: what the plant says of it, beyond the declared; 0 where it says nothing.
-    kNoise,            ///< 2: of the robot's residual, in |.|_M^-1, and of the object's, N.
+    kNoise,            ///< 2: of an entry of the robot's residual, in |.|_M^-1, and of the object's, N.
+    kUneven,           ///< What tilt, slip and sinking of the platform can make of the robot's, in |.|_M^-1.
     kWheelRates,       ///< 2, right and left, rad/s.
     kWheelMismatch,    ///< 2, CalcRollingMismatch, m/s.
-    kWheelNoise,       ///< 2: what of that slipping and sinking may be, m/s; 0 without wheels.
+    kWheelNoise,       ///< 2: what of that slipping and sinking are, and rounding, m/s; 0 without wheels.
     kContactMismatch,  ///< N: StepAnalysis::contact_mismatch, m.
     kLawDifference,    ///< n, E_bar' (tau' - tau'_printed).
     kLawNoise,         ///< Of that, in |.|_M^-1; 0 where the law is right or not known.
@@ -73,6 +74,8 @@ class StepStore {
   /// Time of the last step that was added, s.
   [[nodiscard]] double last_time() const { return last_time_; }
   [[nodiscard]] const Setup& setup() const { return *setup_; }
+  /// Of the check `rolling`, m/s.
+  [[nodiscard]] double rolling_bound() const { return rolling_bound_; }
   [[nodiscard]] const JudgedLaw* law() const { return law_; }
   [[nodiscard]] const std::vector<SignalName>& readings() const { return readings_; }
   [[nodiscard]] const std::vector<SignalName>& motors() const { return motors_; }

@@ -162,6 +162,19 @@ TEST(CauseEstimator, CollinearCandidatesAreOneClass) {
 }
 
 // log odds = N/2 (log(1 + |r_other|^2 / N) - log(1 + |r|^2 / N)), where both have one amplitude.
+// |y|^2 is 1e28: what is left of it, 1e4, is less than its rounding.
+TEST(CauseEstimator, WhatIsLeftOfLargeResidualsIsNotTheirRounding) {
+  Random random(20);
+  std::vector<Candidate> candidates = random.Candidates();
+  const VectorXd y = 1e13 * candidates[7].columns.col(0) + 5.0 * random.Normal();
+  const CauseSelection selection = Select(y, candidates, {.floor = 100.0});
+  ASSERT_EQ(ChosenOf(selection), std::vector<size_t>{7});
+  const double expected = kRows * std::log(100.0 + selection.residual.squaredNorm() / kRows) +
+                          std::log(static_cast<double>(kRows)) +
+                          2.0 * std::log(static_cast<double>(candidates.size()));
+  EXPECT_NEAR(selection.criterion, expected, 1.0);
+}
+
 TEST(CauseEstimator, WhatExplainsItWorseIsTheRival) {
   for (const double apart : {0.05, 0.2, 0.35, 0.5, 1.0}) {
     SCOPED_TRACE(apart);

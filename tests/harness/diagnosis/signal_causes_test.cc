@@ -293,6 +293,29 @@ TEST(SignalCauses, OffsetOrDeadZoneOfOneSignAreAClass) {
   EXPECT_NEAR(ValueOf(causes.front(), "dead zone"), 0.1, 1e-3);
 }
 
+// A dead zone is there for good: the torque after step 79 would show it.
+TEST(SignalCauses, DeadZoneIsNotOver) {
+  const ArrayXd u = CalcPositiveTorque();
+  const Causes causes =
+      Explain(MakeSeries(u, u - MakeEach([](Index i) { return 40 <= i && i <= 79 ? 0.1 : 0.0; })));
+  SCOPED_TRACE(TextOf(causes));
+  ASSERT_EQ(causes.size(), 1u);
+  EXPECT_TRUE(causes.front().ends);
+  EXPECT_EQ(causes.front().outcome, CauseOutcome::kNamed);
+  EXPECT_TRUE(causes.front().faults.front().IsLike(OfMotor("offset", -0.1)));
+}
+
+// Of a torque that hardly changes, a gain leaves a millionth of what an offset does, which is far more than
+// rounding.
+TEST(SignalCauses, OffsetOfWhatHardlyChangesIsNoGain) {
+  const ArrayXd u = 1.0 + 1e-6 * CalcTorque();
+  const Causes causes = Explain(MakeSeries(u, u + 0.01));
+  SCOPED_TRACE(TextOf(causes));
+  ASSERT_EQ(causes.size(), 1u);
+  EXPECT_THAT(NamesOf(causes.front()), ::testing::Contains("offset"));
+  EXPECT_THAT(NamesOf(causes.front()), ::testing::Not(::testing::Contains("gain")));
+}
+
 TEST(SignalCauses, SilenceIsAClass) {
   const ArrayXd u = 0.1 * CalcTorque();
   const Causes causes = Explain(MakeSeries(u, ArrayXd::Zero(kSteps)));

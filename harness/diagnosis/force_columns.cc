@@ -1,0 +1,270 @@
+#include <cmath>
+#include <tuple>
+
+#include "controller/model/platform.h"
+#include "harness/diagnosis/step_forces.h"
+
+namespace dexcheck {
+namespace {
+
+using Eigen::Index;
+using namespace force_fault;
+
+constexpr double kFarthest = 10.0;  // rad or m: where springs relax, and loads are
+constexpr const char* kWorld = "world";
+
+Matrix3d Cross(const Vector3d& a) {
+  Matrix3d A;
+  A << 0.0, -a.z(), a.y(), a.z(), 0.0, -a.x(), -a.y(), a.x(), 0.0;
+  return A;
+}
+
+/// I a by the six entries Ixx, Iyy, Izz, Ixy, Ixz, Iyz of I.
+Eigen::Matrix<double, 3, 6> InertiaTimes(const Vector3d& a) {
+  Eigen::Matrix<double, 3, 6> columns;
+  columns << a.x(), 0, 0, a.y(), a.z(), 0, 0, a.y(), 0, a.x(), 0, a.z(), 0, 0, a.z(), 0, a.x(), a.y();
+  return columns;
+}
+
+/// Wrench [force; moment] about a body's centre of mass, in its axes, that its inertia takes, by its mass,
+/// centre of mass and inertia.
+struct BodyWrench {
+  Vector6d mass;                             // of 1 kg more at the centre of mass
+  Eigen::Matrix<double, 6, 3> first_moment;  // of 1 kg m
+  Eigen::Matrix<double, 6, 6> inertia;
+
+  /// @param a acceleration of the centre of mass less gravity. All in the body's axes.
+  BodyWrench(const Vector3d& a, const Vector3d& w, const Vector3d& w_dot) {
+    mass << a, Vector3d::Zero();
+    first_moment << Cross(w_dot) + Cross(w) * Cross(w), -Cross(a);
+    inertia << Eigen::Matrix<double, 3, 6>::Zero(), InertiaTimes(w_dot) + Cross(w) * InertiaTimes(w);
+  }
+};
+
+}  // namespace
+
+Candidate& StepForces::Next(std::vector<Candidate>* candidates, const char* fault, const std::string& place,
+                            const std::string& unit, double nominal, const VectorXd& scale) {
+  if (next_ == candidates->size()) {
+    candidates->push_back({.fault = fault,
+                           .place = place,
+                           .unit = unit,
+                           .nominal = nominal,
+                           .columns = MatrixXd::Zero(rows() * steps_, scale.size()),
+                           .scale = scale});
+    // Masses, frictions and the like are not negative.
+    constexpr double kRounding = 1e-6;
+    if (scale.size() == 1 && std::string_view(fault) != "torque")
+      candidates->back().is_possible = [=](const VectorXd& a) {
+        return a[0] >= -nominal * (1.0 + kRounding);
+      };
+  }
+  return (*candidates)[next_++];
+}
+
+VectorXd StepForces::Moved() const {
+  VectorXd scale = Masses(9);
+  scale.head<3>().setOnes();
+  return scale;
+}
+
+void StepForces::AddRobot(Candidate* candidate, const MatrixXd& f) const {
+  for (Index k = 0; k < f.cols(); ++k)
+    candidate->columns.col(k).segment(begin_, rows()) = Whiten(f.col(k), Vector6d::Zero());
+}
+
+void StepForces::AddObject(Candidate* candidate, const Matrix6Xd& w) const {
+  for (Index k = 0; k < w.cols(); ++k)
+    candidate->columns.col(k).segment(begin_, rows()) = Whiten(VectorXd::Zero(n_), w.col(k));
+}
+
+void StepForces::AddColumns(Index begin, Index steps, std::vector<Candidate>* candidates) {
+  begin_ = begin;
+  steps_ = steps;
+  next_ = 0;
+  AddJoints(candidates);
+  for (int link = first_link_; link < model_.num_joints(); ++link) AddLink(link, candidates);
+  if (store_.setup().has_object()) AddObjectForces(candidates);
+  AddGravity(candidates);
+  if (model_.base().type == BaseType::kDifferentialDrive && model_.base().velocity == DriveVelocity::kTwist)
+    AddWheels(candidates);
+}
+
+void StepForces::AddWheels(std::vector<Candidate>* candidates) {
+  // Net torques of the wheels push the platform by W^T, and wheels that are farther apart turn with it.
+  const Base& base = model_.base();
+  const Vector2d tau = store_.Get(StepStore::kTauReceived).col(step_).head<2>();
+  const Vector2d v = store_.Get(StepStore::kVelocity).col(step_).head<2>();
+  const Vector2d v_dot = store_.Get(StepStore::kAcceleration).col(step_).head<2>();
+  const auto push = [&](const Vector3d& r_r_l_b) {
+    Matrix2d W;
+    W << 1.0 / r_r_l_b[0], 0.5 * r_r_l_b[2] / r_r_l_b[0], 1.0 / r_r_l_b[1], -0.5 * r_r_l_b[2] / r_r_l_b[1];
+    const WheelProperties& wheel = base.wheel;
+    Vector2d f =
+        W.transpose() * (tau - (wheel.spin_inertia + wheel.armature) * (W * v_dot) - wheel.damping * (W * v));
+    f[1] -= 0.5 * wheel.mass * r_r_l_b[2] * r_r_l_b[2] * v_dot[1];
+    return f;
+  };
+  const Vector3d nominal(base.wheel_radius, base.wheel_radius, base.wheel_distance);
+  constexpr double kStep = 1e-6;  // m, of the difference quotient
+  for (const auto& [fault, place, direction] :
+       {std::tuple{"radius", std::string("wheels"), Vector3d(1, 1, 0)},
+        {"radius", "wheel " + base.wheel_joint_right, Vector3d(1, 0, 0)},
+        {"radius", "wheel " + base.wheel_joint_left, Vector3d(0, 1, 0)},
+        {"distance", std::string("wheels"), Vector3d(0, 0, 1)}}) {
+    VectorXd f = VectorXd::Zero(n_);
+    f.head<2>() = (push(nominal + kStep * direction) - push(nominal - kStep * direction)) / (2.0 * kStep);
+    const double size = direction[2] > 0.0 ? base.wheel_distance : base.wheel_radius;
+    AddRobot(&Next(candidates, fault, place, "m", size, VectorXd::Constant(1, size)), f);
+  }
+}
+
+void StepForces::AddJoints(std::vector<Candidate>* candidates) {
+  const VectorXd q = store_.Get(StepStore::kPosition).col(step_);
+  VectorXd rate = terms_.velocity();
+  VectorXd acceleration = store_.Get(StepStore::kAcceleration).col(step_);
+  const Base& base = model_.base();
+  const int offset = model_.num_base_velocities();
+  const bool wheels = base.type == BaseType::kDifferentialDrive;
+  if (wheels) {
+    rate.head<2>() = CalcWheelRates(base, rate.head<2>());
+    acceleration.head<2>() = CalcWheelRates(base, acceleration.head<2>());
+  }
+  for (Index i = wheels ? 0 : offset; i < n_; ++i) {
+    const int dof = static_cast<int>(i) - offset;
+    const Joint* joint = dof < 0 ? nullptr : &model_.joints()[static_cast<size_t>(model_.joint_of_dof(dof))];
+    const bool slides = joint != nullptr && joint->type == JointType::kPrismatic;
+    const std::string force = slides ? "N" : "N m";
+    const std::string place =
+        "joint " +
+        (joint == nullptr ? (i == 0 ? base.wheel_joint_right : base.wheel_joint_left) : model_.dof_name(dof));
+    VectorXd f(n_);
+    actuation_.CalcForce(VectorXd::Unit(n_, i), f);
+    AddRobot(&Next(candidates, "torque", place, force, 0.0, Weights(1)), f);
+    AddRobot(&Next(candidates, "armature", place, slides ? "kg" : "kg m^2",
+                   joint == nullptr ? base.wheel.armature : joint->armature, Masses(1)),
+             VectorXd(-acceleration[i] * f));
+    AddRobot(&Next(candidates, "viscous friction", place, slides ? "N s/m" : "N m s/rad",
+                   joint == nullptr ? base.wheel.damping : joint->damping, Weights(1)),
+             VectorXd(-rate[i] * f));
+    const double sign = rate[i] > 0.0 ? 1.0 : rate[i] < 0.0 ? -1.0 : 0.0;
+    if (joint != nullptr) {
+      // Where the plant says it, also of a joint that sticks. The largest is told.
+      const double known = store_.Get(StepStore::kDryFriction)(i, step_);
+      Candidate& bearing = Next(candidates, kBearing, place, force, 0.0, VectorXd::Ones(1));
+      bearing.nominal = std::max(bearing.nominal, std::abs(known));
+      AddRobot(&bearing, VectorXd(known * f));
+    }
+    AddRobot(&Next(candidates, "dry friction", place, force, joint == nullptr ? 0.0 : joint->dry_friction,
+                   Weights(1)),
+             VectorXd(-sign * f));
+    if (joint == nullptr || joint->type == JointType::kBall) continue;
+    MatrixXd spring(n_, 2);
+    spring << -q[model_.position_index(model_.joint_of_dof(dof))] * f, f;
+    Candidate& candidate = Next(candidates, "spring", place, slides ? "N/m" : "N m/rad", 0.0, Weights(2));
+    candidate.is_ordinary = true;
+    candidate.is_possible = [](const VectorXd& a) {
+      return a[0] > 0.0 && std::abs(a[1]) <= kFarthest * a[0];
+    };
+    AddRobot(&candidate, spring);
+  }
+}
+
+void StepForces::AddLink(int index, std::vector<Candidate>* candidates) {
+  const Link& link = links_[static_cast<size_t>(index - first_link_)];
+  const MassProperties& body = *link.body;
+  const std::string place = "link " + model_.link_name(index);
+  const Matrix6Xd& J = link.J;
+  const Matrix3d R = link.X.linear();
+  const VectorXd xi_dot = store_.Get(StepStore::kAcceleration).col(step_);
+  const Vector6d V = J * terms_.velocity();
+  const Vector6d V_dot = J * xi_dot + link.J_dot * terms_.velocity();
+  const Vector3d w = V.tail<3>();
+  const Vector3d a = V_dot.head<3>() + w.cross(V.head<3>()) - R.transpose() * gravity_;
+  const BodyWrench wrench(a, w, V_dot.tail<3>());
+  const MatrixXd J_T = J.transpose();
+  const MatrixXd forces = J_T.leftCols<3>(), moments = J_T.rightCols<3>();
+  AddRobot(&Next(candidates, kForce, place, "N", 0.0, Weights(3)), MatrixXd(forces * R.transpose()));
+  AddRobot(&Next(candidates, kForceInAxes, place, "N", 0.0, Weights(3)), forces);
+  AddRobot(&Next(candidates, "moment", place, "N m", 0.0, Weights(3)), MatrixXd(moments * R.transpose()));
+  AddRobot(&Next(candidates, kMomentInAxes, place, "N m", 0.0, Weights(3)), moments);
+  MatrixXd both(n_, 6);
+  both << forces * R.transpose(), moments * R.transpose();
+  AddRobot(&Next(candidates, "force and moment", place, "N", 0.0, Weights(6)), both);
+  if (!(body.mass > 0.0)) return;
+  const VectorXd mass = -J_T * wrench.mass;
+  AddRobot(&Next(candidates, "mass", place, "kg", body.mass, Masses(1)), mass);
+  // The whole body times a factor.
+  Eigen::Matrix<double, 6, 1> I;
+  I << body.inertia(0, 0), body.inertia(1, 1), body.inertia(2, 2), body.inertia(0, 1), body.inertia(0, 2),
+      body.inertia(1, 2);
+  const VectorXd scaled = -J_T * (wrench.mass * body.mass + wrench.inertia * I);
+  AddRobot(&Next(candidates, kMassWithInertia, place, "kg", body.mass, Masses(1)),
+           VectorXd(scaled / body.mass));
+  const MatrixXd inertia = -J_T * wrench.inertia;
+  AddRobot(&Next(candidates, "inertia", place, "kg m^2", 0.0, Masses(6)), inertia);
+  // Another centre of mass changes the inertia about the old one.
+  MatrixXd com(n_, 9);
+  com << -J_T * wrench.first_moment * body.mass, inertia;
+  AddRobot(&Next(candidates, "centre of mass off by", place, "m", 0.0, Moved()), com);
+  MatrixXd payload(n_, 10);
+  payload << mass, -J_T * wrench.first_moment, inertia;
+  Candidate& load = Next(candidates, "payload", place, "kg", 0.0, Masses(10));
+  load.is_possible = [](const VectorXd& a) { return a.segment<3>(1).norm() <= kFarthest * std::abs(a[0]); };
+  AddRobot(&load, payload);
+}
+
+void StepForces::AddObjectForces(std::vector<Candidate>* candidates) {
+  const VectorXd pose = store_.Get(StepStore::kObjectPose).col(step_);
+  const Vector6d V = store_.Get(StepStore::kObjectMotion).col(step_).head<6>();
+  const Vector6d V_dot = store_.Get(StepStore::kObjectMotion).col(step_).tail<6>();
+  const Matrix3d R = pose.head<9>().reshaped(3, 3);
+  const Vector3d p = pose.tail<3>();
+  const ObjectModel& object = store_.setup().declared_object();
+  const std::string place = "object " + object.name;
+  const Matrix3d R_T = R.transpose(), zero = Matrix3d::Zero();
+  const auto stack = [](const Matrix3d& force, const Matrix3d& moment) {
+    Eigen::Matrix<double, 6, 3> columns;
+    columns << force, moment;
+    return columns;
+  };
+  AddObject(&Next(candidates, kForce, place, "N", 0.0, Weights(3)), stack(R_T, zero));
+  AddObject(&Next(candidates, kForceInAxes, place, "N", 0.0, Weights(3)), stack(Matrix3d::Identity(), zero));
+  AddObject(&Next(candidates, "moment", place, "N m", 0.0, Weights(3)), stack(zero, R_T));
+  AddObject(&Next(candidates, kMomentInAxes, place, "N m", 0.0, Weights(3)),
+            stack(zero, Matrix3d::Identity()));
+  Matrix6d both = Matrix6d::Zero();
+  both.topLeftCorner<3, 3>() = both.bottomRightCorner<3, 3>() = R_T;
+  AddObject(&Next(candidates, "force and moment", place, "N", 0.0, Weights(6)), both);
+  const Vector3d w = V.tail<3>();
+  const BodyWrench wrench(V_dot.head<3>() + w.cross(V.head<3>()) - R_T * gravity_, w, V_dot.tail<3>());
+  AddObject(&Next(candidates, "mass", place, "kg", object.body.mass, Masses(1)), Vector6d(-wrench.mass));
+  const Matrix6d inertia = -wrench.inertia;
+  AddObject(&Next(candidates, "inertia", place, "kg m^2", 0.0, Masses(6)), inertia);
+  Matrix6Xd com(6, 9);
+  com << -wrench.first_moment * object.body.mass, inertia;
+  AddObject(&Next(candidates, "centre of mass off by", place, "m", 0.0, Moved()), com);
+  Vector6d drag = Vector6d::Zero();
+  drag.head<3>() = -V.head<3>();
+  AddObject(&Next(candidates, "drag", place, "N s/m", 0.0, Weights(1)), drag);
+  Matrix6Xd tether = Matrix6Xd::Zero(6, 4);
+  tether.topRows<3>() << -R_T * p, R_T;
+  AddObject(&Next(candidates, "tether", place, "N/m", 0.0, Weights(4)), tether);
+}
+
+void StepForces::AddGravity(std::vector<Candidate>* candidates) {
+  // f = sum_b m_b J_b^T dg, w = [m R^T dg; 0]
+  MatrixXd weights = MatrixXd::Zero(n_, 3);
+  for (const Link& link : links_)
+    weights += link.body->mass * link.J.topRows<3>().transpose() * link.X.linear().transpose();
+  Eigen::Matrix<double, 6, 3> object = Eigen::Matrix<double, 6, 3>::Zero();
+  const VectorXd pose = store_.Get(StepStore::kObjectPose).col(step_);
+  if (store_.setup().has_object())
+    object.topRows<3>() =
+        store_.setup().declared_object().body.mass * pose.head<9>().reshaped(3, 3).transpose();
+  Candidate& gravity = Next(candidates, kGravity, kWorld, "m/s^2", 0.0, VectorXd::Constant(3, 20.0));
+  for (Index k = 0; k < 3; ++k)
+    gravity.columns.col(k).segment(begin_, rows()) = Whiten(weights.col(k), Vector6d(object.col(k)));
+}
+
+}  // namespace dexcheck

@@ -1,0 +1,100 @@
+#pragma once
+
+// What a step leaves of the balances, and what faults of size 1 would leave, both whitened.
+
+#include <string>
+#include <vector>
+
+#include "controller/control/actuation.h"
+#include "controller/dynamics/model_terms.h"
+#include "controller/dynamics/tree_factor.h"
+#include "harness/diagnosis/cause_estimator.h"
+#include "harness/diagnosis/step_store.h"
+
+namespace dexcheck {
+
+/// Faults that are told otherwise than their candidates are called.
+namespace force_fault {
+inline constexpr const char* kBearing = "dry friction of the bearing";
+inline constexpr const char* kForce = "force at its centre of mass";
+inline constexpr const char* kForceInAxes = "force at its centre of mass, in its axes";
+inline constexpr const char* kMomentInAxes = "moment, in its axes";
+inline constexpr const char* kMassWithInertia = "mass and inertia";
+inline constexpr const char* kGravity = "gravity off by";
+}  // namespace force_fault
+
+/// Residual and columns of one step. The robot's are whitened by
+///
+///   M' (s^2 1 + U U^T) M,  M = L^T of the inertia's factor
+///
+/// s is rounding, and U has what a platform leaves that tilts, sinks and slips: the inertial forces of all
+/// links when it accelerates in six ways, and torques of its wheels, each as large as the check's bound.
+class StepForces {
+ public:
+  explicit StepForces(const StepStore& store);
+
+  [[nodiscard]] Eigen::Index rows() const { return n_ + 6; }
+  [[nodiscard]] const RobotModel& model() const { return model_; }
+  /// In which masses that differ fall, m/s^2; the model's at first.
+  void SetGravity(const Vector3d& gravity) { gravity_ = gravity; }
+  /// Noise of robot and object, times the bound of their checks: 1 at first.
+  void SetLevel(const Vector2d& level) { level_ = level; }
+
+  /// Orthonormal columns of U.
+  [[nodiscard]] const MatrixXd& uneven() const { return uneven_; }
+
+  void SetStep(Eigen::Index step);
+  /// Whether the checks of the balances fail, or what is left is more than noise.
+  [[nodiscard]] bool Differs(const VectorXd& residual) const;
+  [[nodiscard]] VectorXd CalcResidual() const {
+    return Whiten(store_.Get(StepStore::kRobotResidual).col(step_),
+                  store_.Get(StepStore::kObjectResidual).col(step_));
+  }
+  /// Adds this step's rows to each candidate: `begin` is the first of them.
+  void AddColumns(Eigen::Index begin, Eigen::Index steps, std::vector<Candidate>* candidates);
+
+ private:
+  struct Link {
+    Matrix6Xd J, J_dot;  // of its centre of mass, in its axes
+    Pose X;
+    const MassProperties* body;
+  };
+
+  /// Robot's force and object's wrench, whitened.
+  [[nodiscard]] VectorXd Whiten(const VectorXd& f, const Vector6d& w) const;
+  void CalcUneven();
+  /// The next candidate of the list, made at the first step. @param scale plausible sizes.
+  Candidate& Next(std::vector<Candidate>* candidates, const char* fault, const std::string& place,
+                  const std::string& unit, double nominal, const VectorXd& scale);
+  /// Plausible sizes of `count` amplitudes: that times the weight or mass of all.
+  [[nodiscard]] VectorXd Weights(Eigen::Index count) const { return VectorXd::Constant(count, weight_); }
+  [[nodiscard]] VectorXd Masses(Eigen::Index count) const { return VectorXd::Constant(count, mass_); }
+  /// Of a centre of mass, and of the inertia about the old one.
+  [[nodiscard]] VectorXd Moved() const;
+  void AddRobot(Candidate* candidate, const MatrixXd& f) const;
+  void AddObject(Candidate* candidate, const Matrix6Xd& w) const;
+  void AddJoints(std::vector<Candidate>* candidates);
+  void AddLink(int link, std::vector<Candidate>* candidates);
+  void AddObjectForces(std::vector<Candidate>* candidates);
+  void AddGravity(std::vector<Candidate>* candidates);
+  void AddWheels(std::vector<Candidate>* candidates);
+
+  const StepStore& store_;
+  RobotModel model_;  // with a frame at each link's centre of mass, after its own
+  ModelTerms terms_;
+  TreeFactor factor_;
+  ActuationMap actuation_;
+  Eigen::Index n_;
+  int first_link_ = 0;
+  std::vector<Link> links_;
+  Eigen::Index step_ = 0, begin_ = 0, steps_ = 1;
+  size_t next_ = 0;
+  Vector2d noise_ = Vector2d::Ones(), level_ = Vector2d::Ones();
+  MatrixXd uneven_;                   // orthonormal columns
+  VectorXd uneven_shrink_;            // what is left of each by whitening, less 1
+  double arm_ = 1.0;                  // of the object's inertia, m
+  double mass_ = 0.0, weight_ = 0.0;  // of all, kg and N
+  Vector3d gravity_;
+};
+
+}  // namespace dexcheck

@@ -1,0 +1,27 @@
+#pragma once
+
+// How explanations of all channels begin, and how what was selected is told.
+
+#include <functional>
+#include <span>
+#include <vector>
+
+#include "harness/diagnosis/cause_estimator.h"
+#include "harness/diagnosis/causes.h"
+#include "harness/diagnosis/step_store.h"
+
+namespace dexcheck {
+
+/// An explanation of these steps of the store, in order and at least one, without faults.
+Explanation StartExplanation(const StepStore& store, CauseChannel channel,
+                             const std::vector<Eigen::Index>& steps);
+
+/// How a candidate with this amplitude is told. @param error empty where it is not known.
+using TellCandidate =
+    std::function<Fault(const Candidate& candidate, const VectorXd& amplitude, const VectorXd& error)>;
+
+/// As `start`, an explanation for each candidate that is chosen, with what would do in its place.
+Causes TellSelection(const Explanation& start, const CauseSelection& selection,
+                     std::span<const Candidate> candidates, const TellCandidate& tell);
+
+}  // namespace dexcheck
