@@ -1,5 +1,3 @@
-#include "harness/engine/mjcf_passes.h"
-
 #include <strings.h>
 
 #include <Eigen/Core>
@@ -16,6 +14,7 @@
 
 #include "controller/common/errors.h"
 #include "harness/base/files.h"
+#include "harness/engine/mjcf_passes.h"
 
 namespace dexcheck {
 namespace {

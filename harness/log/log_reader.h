@@ -11,8 +11,8 @@
 namespace dexcheck {
 
 /// Reads logs that LogWriter wrote, also unfinished ones: of a killed run, or of one that still goes on. A
-/// log of format 1 is read as if it had today's names (log_content.h). Every member throws InputError, one line
-/// that names the file and says what is wrong.
+/// log of format 1 is read as if it had today's names (log_content.h). Every member throws InputError, one
+/// line that names the file and says what is wrong.
 class LogReader {
  public:
   /// Opens the log. A child process reads its structure first, since HDF5 1.10 crashes on some damaged files.

@@ -14,7 +14,7 @@ extern const char* const kPageJs;  ///< Needs kChartsJs.
 extern const char* const kReplayHtml;
 extern const char* const kReplayJs;
 extern const char* const kThreeJs;
-extern const char* const kChartJs;  ///< Chart.js: window.Chart.
+extern const char* const kChartJs;   ///< Chart.js: window.Chart.
 extern const char* const kChartsJs;  ///< What it gets of a page's charts.
 
 }  // namespace dexcheck
