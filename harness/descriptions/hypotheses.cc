@@ -290,7 +290,8 @@ std::optional<Hypothesis> FindExchangedNames(const RobotDescription& a, const Ro
 
 }  // namespace
 
-std::vector<Hypothesis> ExplainDifference(RobotDescription a, RobotDescription b, double tolerance) {
+std::vector<Hypothesis> ExplainDifference(const RobotDescription& a, const RobotDescription& b,
+                                          double tolerance) {
   const std::optional<std::vector<Hypothesis>> found = TryToExplain(a, b, tolerance);
   if (found && found->size() <= 1) return *found;
   if (const std::optional<Hypothesis> names = FindExchangedNames(a, b, tolerance)) return {*names};

@@ -33,7 +33,7 @@ inline constexpr double kHypothesisTolerance = 1e-6;
 /// (relative) with the fault undone, and did not before; when several do equally well, all of them.
 /// @param a, b as they were read; `a` is the one that may be wrong.
 /// @return nothing when no convention explains any of it, or when they are of two mechanisms.
-std::vector<Hypothesis> ExplainDifference(RobotDescription a, RobotDescription b,
+std::vector<Hypothesis> ExplainDifference(const RobotDescription& a, const RobotDescription& b,
                                           double tolerance = kHypothesisTolerance);
 
 }  // namespace dexcheck

@@ -48,8 +48,10 @@ std::vector<RowReading> RowReader::ListReadings(size_t i, const Pose& X_ab_P, bo
   const StatedPart given = StateRow(i);
   const StatedPart right = StateRight(i, X_ab_P);
   // Of frames that differ the right row is not known, and what is missing in one is not either.
-  const StatedPart& known =
-      X_ab_P.isApprox(problem_.given[i].X_PW.inverse(), problem_.close.tolerance) ? right : given;
+  const StatedPart weld{{}, Matrix3d::Identity(), problem_.given[i].X_PW};
+  const StatedPart right_weld{{}, Matrix3d::Identity(), problem_.right[i].X_PW};
+  const bool is_known = X_ab_P.isApprox(weld.X_PL.inverse(), problem_.close.tolerance);
+  const StatedPart& known = is_known && IsSame(weld, right_weld) ? right : given;
   std::vector<RowReading> readings;
   const auto offer = [&](RowReading reading) { Offer(i, X_ab_P, std::move(reading), &readings); };
   offer({given, 0.0, {}, "", ""});
@@ -64,6 +66,15 @@ std::vector<RowReading> RowReader::ListReadings(size_t i, const Pose& X_ab_P, bo
       if (!two || IsSame(*two, *one) || IsSame(*two, given)) continue;
       offer({*two, CostOf(first) + CostOf(second) + 0.1, {&first, &second}, "", ""});
     }
+  }
+  // What is welded to the parent may be placed by another convention.
+  for (const Convention& convention : ListConventions()) {
+    if (!IsOfRow(convention.of) || convention.of == Quantity::kAxis) continue;
+    const std::optional<StatedPart> undone = convention.undo(weld, is_known ? right_weld : weld);
+    if (!undone || IsSame(*undone, weld)) continue;
+    StatedPart moved = given;
+    moved.X_PL = weld.X_PL.inverse() * undone->X_PL * given.X_PL;
+    offer({moved, CostOf(convention), {&convention}, "", ""});
   }
   AddNumbers(i, X_ab_P, given, right, &readings);
   return readings;

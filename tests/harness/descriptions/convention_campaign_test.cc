@@ -341,6 +341,12 @@ std::vector<Robot> ListRobots() {
 TEST(ConventionCampaign, FaultsAreNamedOrLeftOpen) {
   const bool everything = std::getenv("DEXCHECK_CAMPAIGN") != nullptr;
   constexpr size_t kSample = 4;
+  constexpr std::pair<const char*, const char*> kPairs[] = {
+      {"joint's rotation in degrees", "mass as if in g"},
+      {"mass as if in lb", "inertia with the products' sign turned around"},
+      {"inertia as if given about the link's origin", "centre as if in mm"},
+      {"joint as if in mm", "joint's rotation turned the other way"},
+      {"joint's axis turned around", "centre with y and z exchanged"}};
   Campaign campaign;
   size_t number = 0;
   for (const Robot& robot : ListRobots()) {
@@ -350,6 +356,10 @@ TEST(ConventionCampaign, FaultsAreNamedOrLeftOpen) {
       }
     }
     campaign.TryStructure(robot);
+    for (const auto& [first, second] : kPairs) {
+      for (const bool all : {false, true})
+        campaign.TryPair(robot, FindConventionFault(first), FindConventionFault(second), all);
+    }
     ++number;
   }
   campaign.Print();
