@@ -24,7 +24,7 @@ constexpr double kExplains = 0.99;
 // and to what columns are known to; found anew so often.
 constexpr double kLevel = 5.0, kRounding = 1e-4, kExact = 1e-7;
 constexpr int kMostLevels = 4;
-constexpr double kFaint = 0.03;   // noise where the checks of the balances hold, in their bounds
+constexpr double kFaint = 0.01;   // noise where the checks of the balances hold, in their bounds
 constexpr Index kMostSteps = 20;  // that are looked at
 constexpr size_t kMostSegments = 8;
 // Residuals that change by more than this from one step to the next, in units of noise, and by this many

@@ -305,10 +305,10 @@ TEST(SignalCauses, DeadZoneIsNotOver) {
   EXPECT_TRUE(causes.front().faults.front().IsLike(OfMotor("offset", -0.1)));
 }
 
-// Of a torque that hardly changes, a gain leaves a millionth of what an offset does, which is far more than
+// Of a torque that hardly changes, a gain leaves 1e-7 of what an offset does, which is far more than
 // rounding.
 TEST(SignalCauses, OffsetOfWhatHardlyChangesIsNoGain) {
-  const ArrayXd u = 1.0 + 1e-6 * CalcTorque();
+  const ArrayXd u = 1.0 + 3e-8 * CalcTorque();
   const Causes causes = Explain(MakeSeries(u, u + 0.01));
   SCOPED_TRACE(TextOf(causes));
   ASSERT_EQ(causes.size(), 1u);

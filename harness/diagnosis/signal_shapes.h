@@ -1,0 +1,59 @@
+#pragma once
+
+// What a motor or a sensor may make of its signal: candidates for what it gave.
+
+#include <string>
+#include <vector>
+
+#include "harness/diagnosis/cause_estimator.h"
+#include "harness/diagnosis/signal_causes.h"
+
+namespace dexcheck {
+
+inline constexpr double kSignalLeft = 30.0;         // times the noise may be left of what is explained
+inline constexpr double kSignalFaint = 1e3;         // times the noise; of less rounding says what it is
+inline constexpr Eigen::Index kFewestSteps = 3;     // that say anything
+inline constexpr Eigen::Index kFewestOfNoise = 20;  // and of noise
+
+/// The steps in which a series differs, and the signal's past there.
+struct SignalSteps {
+  std::vector<Eigen::Index> rows;
+  double from = 0.0, to = 0.0;  // s
+  bool ends = false;            // before the series does
+  bool was_before = false;      // whether it may have begun before the series does
+
+  [[nodiscard]] Eigen::Index size() const { return static_cast<Eigen::Index>(rows.size()); }
+  /// The signal `back` steps before each of them.
+  [[nodiscard]] Eigen::ArrayXd Take(const VectorXd& signal, Eigen::Index back = 0) const {
+    Eigen::ArrayXd taken(size());
+    for (Eigen::Index i = 0; i < size(); ++i)
+      taken[i] = signal[std::max<Eigen::Index>(0, rows[static_cast<size_t>(i)] - back)];
+    return taken;
+  }
+};
+
+SignalSteps FindSteps(const SignalSeries& series);
+
+/// What a transmission makes of the signal, before gain and offset.
+struct SignalShape {
+  std::string fault;  // empty for the signal itself
+  std::string unit, detail;
+  double value = 0.0;
+  int parameters = 0;
+  Eigen::ArrayXd output;
+  bool has_gain = true;
+  Eigen::Index tried = 1;  ///< Out of how many this one is the best.
+};
+
+std::vector<SignalShape> ListShapes(const SignalSeries& series, const SignalSteps& steps,
+                                    const std::vector<SignalSeries>& others);
+
+/// "motor r_elbow", "joint r_elbow, position".
+std::string PlaceOf(const SignalName& name);
+/// Whether an output that goes on with this fraction of itself follows, and neither runs away nor ahead.
+bool IsDecay(double decay);
+/// What may be added to a transmission's output.
+std::vector<Candidate> ListAdded(const SignalSeries& series, const SignalSteps& steps,
+                                 const SignalShape& shape, bool look_for_sines);
+
+}  // namespace dexcheck
