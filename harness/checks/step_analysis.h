@@ -79,7 +79,7 @@ struct StepAnalysis {
   double penetration = 0.0;    ///< Deepest overlap of a fingertip and the object, m.
   /// Distance of each fingertip that touches, by the plant less by the declared shapes (N), m; else 0.
   VectorXd contact_mismatch;
-  VectorXd contact_bias;       ///< CalcContactBias (3N).
+  VectorXd contact_bias;  ///< CalcContactBias (3N).
   SlipSummary fingertips, wheels;
 
   // Wheels.

@@ -46,10 +46,12 @@ Fault MakeFault(const Candidate& candidate, const VectorXd& a, const VectorXd& e
   Fault fault{candidate.fault,          candidate.place,
               candidate.nominal + a[0], error.size() > 0 ? error[0] : 0.0,
               candidate.unit,           ""};
-  if (candidate.fault == kBearing) {
+  const bool sticks = candidate.fault == kStuckBearing;
+  if (sticks || candidate.fault == kBearing) {
     fault.fault = "dry friction";
     fault.value = candidate.nominal * a[0];
-    fault.error *= candidate.nominal;
+    fault.error = sticks ? std::numeric_limits<double>::infinity() : fault.error * candidate.nominal;
+    if (sticks) fault.detail = "or more: the joint sticks";
   } else if (candidate.fault == "spring") {
     if (a[0] != 0.0) fault.detail = "relaxed at " + FormatNumber(a[1] / a[0], 4);
   } else if (candidate.fault == "tether") {
@@ -113,7 +115,8 @@ class Problem {
   bool ExplainConstant(const Segment& segment, Causes* causes) {
     const CauseSelection selection = Select();
     if (!IsExplained(selection.fraction, selection.left)) return false;
-    if (ExplainJoint(segment, selection, causes)) return true;
+    if (ExplainJoint(segment, selection, causes) || ExplainBetweenLinks(segment, selection, causes))
+      return true;
     Causes told = TellSelection(Start(segment), selection, candidates_,
                                 [&](const Candidate& one, const VectorXd& amplitude, const VectorXd& error) {
                                   return MakeFault(one, amplitude, error, forces_->model().gravity());
@@ -126,22 +129,48 @@ class Problem {
   bool ExplainJoint(const Segment& segment, const CauseSelection& selection, Causes* causes) const {
     if (selection.terms.size() < 2) return false;
     const std::string& place = candidates_[selection.terms.front().candidate].place;
+    for (const CauseTerm& term : selection.terms)
+      if (candidates_[term.candidate].place != place || !place.starts_with("joint ")) return false;
+    causes->push_back(StartChanging(segment, selection, place));
+    return true;
+  }
+
+  /// Opposite moments on the links that a joint joins are a torque of that joint: what is across its axis
+  /// does no work, and the axis turns with the robot, so that it changes.
+  bool ExplainBetweenLinks(const Segment& segment, const CauseSelection& selection, Causes* causes) const {
+    if (selection.terms.size() != 2) return false;
+    const CauseTerm &a = selection.terms[0], &b = selection.terms[1];
+    const Candidate &x = candidates_[a.candidate], &y = candidates_[b.candidate];
+    constexpr double kOpposite = 0.02;
+    if (x.fault != "moment" || y.fault != "moment" ||
+        (a.amplitude + b.amplitude).norm() > kOpposite * a.amplitude.norm())
+      return false;
+    const RobotModel& model = forces_->model();
+    for (const Joint& joint : model.joints()) {
+      const std::string own = "link " + joint.link, carrier = "link " + model.link_name(joint.parent);
+      if ((x.place != own || y.place != carrier) && (x.place != carrier || y.place != own)) continue;
+      causes->push_back(StartChanging(segment, selection, "joint " + joint.name));
+      return true;
+    }
+    return false;
+  }
+
+  /// A class of what was selected and a torque of that joint that changes.
+  [[nodiscard]] Explanation StartChanging(const Segment& segment, const CauseSelection& selection,
+                                          const std::string& joint) const {
     Explanation one = Start(segment);
     one.outcome = CauseOutcome::kNamedClass;
     one.fraction = selection.fraction;
     one.left = selection.left;
-    one.faults.push_back({"torque that changes", place, 0.0, 0.0, "", ""});
-    for (const CauseTerm& term : selection.terms) {
-      const Candidate& candidate = candidates_[term.candidate];
-      if (candidate.place != place || !place.starts_with("joint ")) return false;
-      one.faults.push_back(MakeFault(candidate, term.amplitude, term.error, forces_->model().gravity()));
-    }
+    one.faults.push_back({"torque that changes", joint, 0.0, 0.0, "", ""});
+    for (const CauseTerm& term : selection.terms)
+      one.faults.push_back(
+          MakeFault(candidates_[term.candidate], term.amplitude, term.error, forces_->model().gravity()));
     for (Index k = 0; k < steps_; ++k) {
       const VectorXd y = y_.segment(k * forces_->rows(), forces_->rows());
-      one.faults.front().value = std::max(one.faults.front().value, CalcTorque(place, k, y));
+      one.faults.front().value = std::max(one.faults.front().value, CalcTorque(joint, k, y));
     }
-    causes->push_back(one);
-    return true;
+    return one;
   }
 
   /// One force that changes in time, free at each step.
@@ -220,6 +249,25 @@ class Problem {
       uneven_.push_back(forces_->uneven());
       y_.segment(i * rows, rows) = forces_->CalcResidual();
       forces_->AddColumns(i * rows, steps_, &candidates_);
+    }
+    NameStuckBearings();
+  }
+
+  /// A joint that does not slide shows how much friction holds it, and not how much could.
+  void NameStuckBearings() {
+    const RobotModel& model = forces_->model();
+    for (Candidate& one : candidates_) {
+      if (one.fault != kBearing) continue;
+      Index row = model.num_base_velocities();
+      while (one.place != "joint " + model.dof_name(static_cast<int>(row) - model.num_base_velocities()))
+        ++row;
+      constexpr double kSlides = 1e-4, kLargest = 0.99;  // rad/s or m/s, and of the largest friction
+      int sliding = 0;
+      for (const Index step : used_)
+        sliding += static_cast<int>(std::abs(store_.Get(StepStore::kVelocity)(row, step)) > kSlides &&
+                                    std::abs(store_.Get(StepStore::kDryFriction)(row, step)) >=
+                                        kLargest * one.nominal);
+      if (sliding == 0) one.fault = kStuckBearing;
     }
   }
 

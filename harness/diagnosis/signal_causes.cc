@@ -161,7 +161,10 @@ Verdict Judge(const SignalSeries& series, const std::vector<SignalSeries>& other
       static_cast<double>(steps.size());
   const double floor = 1.0 + kAccuracy * kAccuracy * square;
   const auto is_good = [&](const Fit& fit) {
-    return fit.is_possible() && (fit.is_noise || fit.selection.left <= kSignalLeft * std::sqrt(floor));
+    // Noise beside several other faults is what they do not explain.
+    constexpr size_t kMostWithNoise = 2;
+    return fit.is_possible() && (fit.is_noise ? fit.faults.size() <= kMostWithNoise
+                                              : fit.selection.left <= kSignalLeft * std::sqrt(floor));
   };
   std::vector<Fit> fits;
   for (const bool sines : {false, true}) {

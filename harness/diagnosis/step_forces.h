@@ -16,6 +16,7 @@ namespace dexcheck {
 /// Faults that are told otherwise than their candidates are called.
 namespace force_fault {
 inline constexpr const char* kBearing = "dry friction of the bearing";
+inline constexpr const char* kStuckBearing = "dry friction of a bearing that sticks";
 inline constexpr const char* kForce = "force at its centre of mass";
 inline constexpr const char* kForceInAxes = "force at its centre of mass, in its axes";
 inline constexpr const char* kMomentInAxes = "moment, in its axes";

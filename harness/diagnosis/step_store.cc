@@ -33,8 +33,8 @@ StepStore::StepStore(const Setup& setup, const JudgedLaw* law, double rolling_bo
   const Eigen::Index n = model.num_velocities(), m = CountOf(readings_);
   const Eigen::Index parts = law_ == nullptr ? 0 : law_->CountColumns();
   const Eigen::Index sizes[kSignalCount] = {
-      1, n, n, model.num_positions(), n, n, m, m, n, 6, 12, 12, n, 2, 1, 2, 2, 2, CountOf(setup.fingertips()),
-      n, 1, n * parts};
+      1, n, n, model.num_positions(),       n, n, m,        m, n, 6, 12, 12, n, 2, 1,
+      2, 2, 2, CountOf(setup.fingertips()), n, 1, n * parts};
   for (int i = 0; i < kSignalCount; ++i) offsets_[i + 1] = offsets_[i] + sizes[i];
   before_.resize(offsets_[kSignalCount], kHistory);
   data_.resize(offsets_[kSignalCount], kCapacity);  // its pages are used only when something differs

@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "controller/common/text.h"
-#include "harness/diagnosis/injection/listed_faults.h"
+#include "harness/injection/listed_faults.h"
 
 namespace dexcheck {
 namespace {

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "harness/diagnosis/injection/drawn_faults.h"
+#include "harness/injection/drawn_faults.h"
 #include "harness/run/run_mutation_options.h"
 #include "harness/run/runner.h"
 

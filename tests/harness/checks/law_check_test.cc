@@ -5,7 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "harness/checks/law_terms.h"
-#include "harness/diagnosis/injection/faulty_law.h"
+#include "harness/injection/faulty_law.h"
 #include "tests/common/matchers.h"
 #include "tests/harness/run/changed_parts.h"
 #include "tests/harness/run/shipped_run.h"

@@ -7,7 +7,7 @@
 
 #include <limits>
 
-#include "harness/diagnosis/injection/drawn_faults.h"
+#include "harness/injection/drawn_faults.h"
 #include "tests/common/matchers.h"
 
 namespace dexcheck::testing::causes_test {

@@ -47,6 +47,13 @@ void ThickenLeftFingers(mjModel* m) {
   }
 }
 
+/// One fingertip is 1 % larger.
+void ThickenFingertip(mjModel* m) {
+  const int body = mj_name2id(m, mjOBJ_BODY, "rf1_phalanx_4");
+  for (int geom = 0; geom < m->ngeom; ++geom)
+    if (m->geom_bodyid[geom] == body && m->geom_type[geom] == mjGEOM_SPHERE) m->geom_size[3 * geom] *= 1.01;
+}
+
 const std::vector<std::string> kSoft = {"duration=0.02", "plant.contact_time_constant=0.05",
                                         "plant.contact_impedance=0.5"};
 const std::vector<std::string> kSlippery = {"duration=0.1", "plant.finger_friction=0.15"};
@@ -57,6 +64,7 @@ const CheckFault kFaults[] = {
      "hold",
      {"duration=0.02", "model.template.arm.links.forearm.shapes.0.mass=1.5"}},
     {"inverse_dynamics_object", "hold", {"duration=0.02", "model.object.mass=0.21"}},
+    {"contact_distance", "hold", {"duration=0.02"}, ThickenFingertip},
     {"reduced_acceleration", "hold", kSoft},
     {"contact_force", "hold", kSoft},
     {"fingertip_slip", "hold", kSlippery},

@@ -4,7 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "harness/diagnosis/injection/faulty_law.h"
+#include "harness/injection/faulty_law.h"
 #include "harness/run/runner.h"
 #include "tests/harness/run/shipped_run.h"
 

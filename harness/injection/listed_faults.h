@@ -4,7 +4,7 @@
 
 #include <vector>
 
-#include "harness/diagnosis/injection/drawn_faults.h"
+#include "harness/injection/drawn_faults.h"
 
 namespace dexcheck {
 

@@ -5,8 +5,8 @@
 
 #include "controller/control/joint_controller.h"
 #include "controller/control/trajectory_controller.h"
-#include "harness/diagnosis/injection/fault_kinds.h"
-#include "harness/diagnosis/injection/faulty_law.h"
+#include "harness/injection/fault_kinds.h"
+#include "harness/injection/faulty_law.h"
 
 namespace dexcheck {
 namespace law_faults {

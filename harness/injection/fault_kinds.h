@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "harness/diagnosis/injection/injected_fault.h"
+#include "harness/injection/injected_fault.h"
 
 namespace dexcheck {
 

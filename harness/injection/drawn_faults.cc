@@ -1,4 +1,4 @@
-#include "harness/diagnosis/injection/drawn_faults.h"
+#include "harness/injection/drawn_faults.h"
 
 #include <algorithm>
 #include <cmath>

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <deque>
 
-#include "harness/diagnosis/injection/fault_kinds.h"
+#include "harness/injection/fault_kinds.h"
 
 namespace dexcheck {
 namespace motor_faults {

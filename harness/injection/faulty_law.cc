@@ -1,4 +1,4 @@
-#include "harness/diagnosis/injection/faulty_law.h"
+#include "harness/injection/faulty_law.h"
 
 #include <cmath>
 #include <string_view>

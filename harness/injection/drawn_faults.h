@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "harness/diagnosis/injection/fault_kinds.h"
+#include "harness/injection/fault_kinds.h"
 
 namespace dexcheck {
 

@@ -1,4 +1,4 @@
-#include "harness/diagnosis/injection/injected_fault.h"
+#include "harness/injection/injected_fault.h"
 
 #include <algorithm>
 #include <utility>

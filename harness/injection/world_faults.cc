@@ -2,8 +2,8 @@
 
 #include <cmath>
 
-#include "harness/diagnosis/injection/fault_kinds.h"
 #include "harness/engine/engine.h"
+#include "harness/injection/fault_kinds.h"
 
 namespace dexcheck {
 namespace world_faults {

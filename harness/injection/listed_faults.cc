@@ -1,10 +1,10 @@
-#include "harness/diagnosis/injection/listed_faults.h"
+#include "harness/injection/listed_faults.h"
 
 #include <algorithm>
 
 #include "harness/diagnosis/equation_faults.h"
-#include "harness/diagnosis/injection/faulty_law.h"
 #include "harness/diagnosis/parameters.h"
+#include "harness/injection/faulty_law.h"
 
 namespace dexcheck {
 

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "harness/diagnosis/injection/fault_kinds.h"
+#include "harness/injection/fault_kinds.h"
 
 namespace dexcheck {
 namespace body_faults {
