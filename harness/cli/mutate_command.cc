@@ -196,7 +196,7 @@ void AddMutateCommand(Command app) {
       .Needs(run)
       .Excludes(smallest);
   AddJobsOption(command, "Faults", &request->run.jobs).Excludes(smallest);
-  AddJsonOption(command, "the results; an interrupted campaign goes on from them", &request->json_file);
+  AddJsonOption(command, "the results, from which an interrupted campaign goes on,", &request->json_file);
   command.AddFlag("--quiet", &request->quiet, "Print the verdict only");
   command.SetAction([=] { return Run(*request); });
 }

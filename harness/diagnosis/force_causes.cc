@@ -267,7 +267,7 @@ class Problem {
         sliding += static_cast<int>(std::abs(store_.Get(StepStore::kVelocity)(row, step)) > kSlides &&
                                     std::abs(store_.Get(StepStore::kDryFriction)(row, step)) >=
                                         kLargest * one.nominal);
-      if (sliding == 0) one.fault = kStuckBearing;
+      if (4 * sliding < steps_) one.fault = kStuckBearing;
     }
   }
 

@@ -106,6 +106,11 @@ bool HasValue(const Fault& named, const Fault& truth) {
   return std::abs(named.value - truth.value) <= std::max(kNear * truth.error, 3.0 * named.error);
 }
 
+/// What all have, each of them has.
+bool IsOfAll(const Fault& fault) {
+  return fault.place.starts_with("all ") || fault.place.starts_with("everything ");
+}
+
 bool NamesInClass(const Explanation& one, const Fault& truth) {
   const bool is_class = one.outcome == CauseOutcome::kNamedClass || !std::isfinite(one.faults.front().error);
   return is_class && std::any_of(one.faults.begin(), one.faults.end(),
@@ -120,8 +125,9 @@ NamingScore ScoreNames(const std::vector<Fault>& truth, const std::vector<Fault>
   for (const Explanation& one : causes) {
     if (one.outcome != CauseOutcome::kNamed) continue;
     const Fault& first = one.faults.front();
-    const auto of =
-        std::find_if(all.begin(), all.end(), [&](const Fault& fault) { return fault.IsLike(first); });
+    const auto of = std::find_if(all.begin(), all.end(), [&](const Fault& fault) {
+      return fault.IsLike(first) || (fault.fault == first.fault && IsOfAll(fault));
+    });
     if (of != all.end() && HasValue(first, *of)) continue;
     ++score.wrong;
     wrong = of == all.end() ? first.fault : "another value";
