@@ -73,6 +73,7 @@ TEST(RunCampaign, FindsEveryWrongLawAndNamesThePart) {
 // Faults whose places, sizes and times are drawn: their causes are named, or a class is that this motion does
 // not tell apart, and no other cause is.
 TEST(RunCampaign, NamesFaultsThatAreDrawn) {
+  int all = 0, named = 0, in_class = 0, wrong = 0;
   for (const int together : {1, 2}) {
     for (const char* scenario : {"curve", "hold"}) {
       RunMutationOptions options;
@@ -81,7 +82,6 @@ TEST(RunCampaign, NamesFaultsThatAreDrawn) {
       options.seed = 7;
       RunCampaign campaign = MakeCampaign(options, scenario);
       ASSERT_EQ(campaign.mutants().size(), static_cast<size_t>(options.draws));
-      int all = 0, named = 0, in_class = 0, wrong = 0;
       for (size_t i = 0; i < campaign.mutants().size(); ++i) {
         EXPECT_TRUE(campaign.Run(i, kGoOn));
         const RunMutant& mutant = campaign.mutants()[i];
@@ -92,14 +92,15 @@ TEST(RunCampaign, NamesFaultsThatAreDrawn) {
         named += mutant.score.right;
         in_class += mutant.score.in_class;
       }
-      SCOPED_TRACE(fmt::format("{}, {} at once: {} of {} named, {} in a class", scenario, together, named,
-                               all, in_class));
-      // Measured over many draws: harness/diagnosis/README.md. Some 40 of them scatter by 6 %.
-      EXPECT_GE(named, 0.75 * all);
-      EXPECT_GE(named + in_class, 0.9 * all);
-      EXPECT_LE(wrong, 0.05 * all);
     }
   }
+  SCOPED_TRACE(fmt::format("{} of {} named, {} in a class, {} wrong names", named, all, in_class, wrong));
+  EXPECT_GE(all, 100);
+  // Measured over many more: harness/diagnosis/README.md. Of 110 faults the part that is named scatters by 3
+  // %.
+  EXPECT_GE(named, 0.8 * all);
+  EXPECT_GE(named + in_class, 0.93 * all);
+  EXPECT_LE(wrong, 0.04 * all);
 }
 
 /// Of drawn faults of these kinds.
