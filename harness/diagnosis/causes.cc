@@ -48,7 +48,9 @@ void Explanation::SetOutcome() {
       ++i;
     }
   }
-  outcome = faults.size() > 1 ? CauseOutcome::kNamedClass : CauseOutcome::kNamed;
+  // A size that nothing shows is no name.
+  const bool has_size = faults.empty() || !std::isinf(faults.front().error);
+  outcome = faults.size() > 1 || !has_size ? CauseOutcome::kNamedClass : CauseOutcome::kNamed;
 }
 
 std::string Explanation::Tell() const {

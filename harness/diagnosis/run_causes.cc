@@ -22,8 +22,13 @@ void DropConsequencesOfShapes(const StepStore& store, Causes* causes) {
   if (!Explains(*causes, CauseChannel::kContact)) return;
   const RobotModel& model = store.setup().model();
   std::vector<std::string> places = {"object " + store.setup().object().name};
-  for (const int tip : store.setup().fingertips())
-    places.push_back("link " + model.link_name(model.frames()[static_cast<size_t>(tip)].link));
+  const std::vector<int>& arm = store.setup().hold().arm_joints;
+  for (const int tip : store.setup().fingertips()) {
+    int link = model.frames()[static_cast<size_t>(tip)].link;
+    for (; link >= 0; link = model.joints()[static_cast<size_t>(link)].parent)
+      if (std::find(arm.begin(), arm.end(), link) == arm.end())
+        places.push_back("link " + model.link_name(link));
+  }
   std::erase_if(*causes, [&](const Explanation& one) {
     return one.channel == CauseChannel::kBalance &&
            std::find(places.begin(), places.end(), one.faults.front().place) != places.end();

@@ -248,6 +248,14 @@ void Tell(const Verdict& verdict, CauseChannel channel, Causes* causes) {
   }
 }
 
+/// Whether noise is as large as rounding to these steps makes it: evenly spread, so step / sqrt(12).
+bool IsRoundingNoise(const Verdict& verdict, double step) {
+  if (verdict.fits.empty() || !verdict.fits.front().is_noise) return false;
+  constexpr double kScatter = 0.3;
+  const double expected = step / std::sqrt(12.0);
+  return std::abs(verdict.fits.front().faults.back().value - expected) <= kScatter * expected;
+}
+
 /// A fault that most of a group have, with the same value: told once.
 void TellCommon(std::vector<Verdict>* verdicts, const std::map<std::string, int>& sizes, CauseChannel channel,
                 Causes* causes) {
@@ -279,7 +287,8 @@ void TellCommon(std::vector<Verdict>* verdicts, const std::map<std::string, int>
       const bool rounds = common.fault.fault == "rounding to steps of";
       for (size_t i = 0; i < verdicts->size() && (rounds || common.fault.fault == "dead zone"); ++i) {
         const double unheard = (*verdicts)[i].largest_unheard;
-        if (!(unheard > 0.0 && unheard <= (rounds ? 0.5 : 1.0) * common.fault.value)) continue;
+        const bool is_too_small = unheard > 0.0 && unheard <= (rounds ? 0.5 : 1.0) * common.fault.value;
+        if (!is_too_small && !(rounds && IsRoundingNoise((*verdicts)[i], common.fault.value))) continue;
         if (std::find(common.members.begin(), common.members.end(), i) != common.members.end()) continue;
         common.members.push_back(i);
         ++common.groups[(*verdicts)[i].series->name.group];
