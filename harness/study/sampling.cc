@@ -129,7 +129,7 @@ Estimate MakeEstimate(double value, std::vector<double> sample) {
 /// f at one block of Saltelli's design.
 struct Block {
   double A, B;
-  std::span<const double> AB;
+  std::span<const double> A_B;
 };
 
 /// Indices from some blocks, by number. @return first and total, key by key; empty when f does not vary.
@@ -149,7 +149,7 @@ std::vector<std::pair<double, double>> CalcIndices(const std::vector<Block>& blo
   for (const size_t j : chosen) {
     const Block& block = blocks[j];
     for (size_t i = 0; i < dimensions; ++i) {
-      const double step = block.AB[i] - block.A;
+      const double step = block.A_B[i] - block.A;
       indices[i].first += (block.B - mean) * step / (count * variance);
       indices[i].second += 0.5 * step * step / (count * variance);
     }
