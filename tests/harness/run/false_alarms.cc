@@ -134,7 +134,7 @@ const std::vector<std::vector<std::string>> kDeclared = {
     {"sensing.object_rate=250", "sensing.object_latency=<0.004|0.008>",
      "sensing.object_velocity=differenced"},
     {"sensing.contact_force_noise=<1e-4..1e-2>"},
-    {"disturbance=[{ type = 'pulse', body = 'object', force = [0, 0, <0.05..1>], begin = 0.05, duration = "
+    {"disturbance=[{ type = 'pulse', body = 'object', force = [0, 0, <0.05..0.5>], begin = 0.05, duration = "
      "0.1 }]"},
     {"disturbance=[{ type = 'step', body = 'object', force = [<0.01..0.3>, 0, 0], begin = 0.03 }]"},
     {"disturbance=[{ type = 'sine', body = 'object', torque = [0, 0, <1e-4..1e-2>], frequency = <3..30> }]"},
