@@ -288,7 +288,7 @@ const CheckInfo kChecks[] = {
      {Cause::kContactSoftness, 5, Rank::kAssumption, kOwn},
      [](const Analysis& a) { return When(true, a.penetration); }},
     {{"contact_distance", kAssumption, "m"},
-     {1e-10, "rounding of two ways to the same distance, some 1e-16 of 1 m, and where FindContact stops"},
+     {1e-12, "ten times where FindContact stops, 1e-13 rad over lengths of 1 m; rounding is some 1e-16"},
      "distance of a fingertip and the object: the plant's against that of the declared shapes",
      {Cause::kContactGeometry, -2, Rank::kObjectBalance, kOwn},
      EvaluateContactDistance,

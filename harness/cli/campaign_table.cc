@@ -5,9 +5,11 @@
 #include <algorithm>
 #include <fstream>
 
+#include "controller/common/toml_reader.h"
 #include "harness/base/byte_archive.h"
 #include "harness/base/interrupts.h"
 #include "harness/base/process_pool.h"
+#include "harness/base/version.h"
 #include "harness/cli/commands.h"
 #include "harness/cli/terminal.h"
 
@@ -74,9 +76,13 @@ CampaignFault ReadFault(const Json& json) {
 
 }  // namespace
 
-void Campaign::Resume(const std::string& json_file) {
+void Campaign::Resume(const std::string& json_file, const std::vector<std::filesystem::path>& inputs) {
+  std::string texts;
+  for (const std::filesystem::path& input : inputs) texts += ReadTextFile(input.string());
+  head["dexcheck_version"] = Version();
+  head["inputs_hash"] = std::hash<std::string>()(texts);
+  if (json_file.empty() || json_file == "-") return;
   std::ifstream file(json_file);
-  if (json_file.empty() || !file) return;
   const Json json = Json::parse(file, nullptr, /*allow_exceptions=*/false);
   if (!json.is_object() || json.value("complete", true)) return;
   for (const auto& [key, value] : head.items())
@@ -86,6 +92,8 @@ void Campaign::Resume(const std::string& json_file) {
   } catch (const Json::exception&) {
     faults.clear();
   }
+  if (!faults.empty())
+    fmt::print(stderr, "{} of {} faults are in {} already\n", faults.size(), total, json_file);
 }
 
 void Campaign::Make(std::uint64_t jobs, ProgressBar* bar,

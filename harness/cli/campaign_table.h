@@ -4,6 +4,7 @@
 // of descriptions or of a run.
 
 #include <cstdint>
+#include <filesystem>
 #include <functional>
 #include <optional>
 #include <string>
@@ -35,9 +36,9 @@ struct Campaign {
 
   Json head = Json::object();  ///< Of the JSON: what the campaign was asked for.
 
-  /// Takes what an interrupted campaign that was asked for the same left in a file; nothing where there is
-  /// none.
-  void Resume(const std::string& json_file);
+  /// Takes what an interrupted campaign of this program that was asked for the same left in a file, and says
+  /// so on standard error; nothing where there is none. @param inputs files whose texts have to be the same.
+  void Resume(const std::string& json_file, const std::vector<std::filesystem::path>& inputs);
   /// Makes the others, so many at a time as CountJobs says, until the user interrupts.
   /// @param make makes one in a process of its own. @throws Error when such a process dies.
   void Make(std::uint64_t jobs, ProgressBar* bar, const std::function<CampaignFault(size_t fault)>& make);

@@ -94,8 +94,9 @@ int Run(MutateRequest request) {
                              {"mujoco", mj_versionString()},
                              {"scale", request.options.scale},
                              {"samples", request.options.samples},
+                             {"diagnosed", request.options.diagnose},
                              {"seed", request.options.seed}}};
-  campaign.Resume(request.json_file);
+  campaign.Resume(request.json_file, {request.files.robot, request.files.mjcf});
   ProgressBar bar("changing", static_cast<long>(campaign.total), request.quiet);
   campaign.Make(request.run.jobs, &bar, [&](size_t i) {
     if (i < formulas.size()) {

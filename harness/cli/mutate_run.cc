@@ -118,7 +118,7 @@ int MutateRun(const MutateRunRequest& request) {
                              {"draws", options.draws},
                              {"together", options.together},
                              {"draw_seed", options.seed}}};
-  campaign.Resume(request.json_file);
+  campaign.Resume(request.json_file, {files.scenario.source, files.robot, files.mjcf});
   ProgressBar bar("changing", static_cast<long>(campaign.total), request.quiet || request.json_file == "-");
   campaign.Make(request.jobs, &bar, [&](size_t i) {
     runs.Run(i, [] { return false; });

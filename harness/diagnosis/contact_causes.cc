@@ -1,23 +1,20 @@
 #include "harness/diagnosis/contact_causes.h"
 
-#include <algorithm>
+#include <numeric>
 
-#include "harness/diagnosis/cause_estimator.h"
+#include "harness/diagnosis/telling.h"
 
 namespace dexcheck {
 namespace {
 
 using Eigen::Index;
 
-// Of a distance, m, and of how the point that is nearest moves when a radius changes.
-constexpr double kDistanceNoise = 1e-12;
+// Of a distance, m, and of how the point that is nearest moves when a radius changes. What is hardly more says
+// nothing.
+constexpr double kDistanceNoise = 1e-14, kFaintest = 1e-12;
 constexpr double kRadiusAccuracy = 1e-4;
 // What is left may be this fraction of what there was.
 constexpr double kExplainsDistance = 0.99;
-
-Fault MakeShapeFault(const Candidate& one, double amplitude, double error) {
-  return {one.fault, one.place, one.nominal + amplitude, error, one.unit, ""};
-}
 
 /// What is nearer by d when it is larger by d: a fingertip, or the object for all of them.
 std::vector<Candidate> ListShapes(const Setup& setup, Index tips, Index steps, double noise) {
@@ -43,30 +40,28 @@ std::vector<Candidate> ListShapes(const Setup& setup, Index tips, Index steps, d
 
 Causes ExplainContacts(const StepStore& store) {
   const auto mismatch = store.Get(StepStore::kContactMismatch);
-  const Index tips = mismatch.rows(), steps = mismatch.cols();
-  const double size = mismatch.size() == 0 ? 0.0 : mismatch.cwiseAbs().maxCoeff();
-  if (!(size > 1e2 * kDistanceNoise)) return {};
+  if (mismatch.size() == 0) return {};
+  const double size = mismatch.cwiseAbs().maxCoeff();
+  if (!(size > kFaintest)) return {};
   const double noise = kDistanceNoise + kRadiusAccuracy * size;
-  const std::vector<Candidate> candidates = ListShapes(store.setup(), tips, steps, noise);
+  const std::vector<Candidate> candidates =
+      ListShapes(store.setup(), mismatch.rows(), mismatch.cols(), noise);
   const VectorXd y = (mismatch / noise).reshaped();
-  const CauseSelection selection = SelectCauses(y, candidates, {.alike = static_cast<double>(steps)});
-  Causes causes;
-  for (const CauseTerm& term : selection.terms) {
-    Explanation one;
-    one.channel = CauseChannel::kContact;
-    one.from = store.Get(StepStore::kTime)(0, 0);
-    one.to = store.Get(StepStore::kTime)(0, steps - 1);
-    one.fraction = term.fraction;
-    one.left = selection.left;
-    one.faults.push_back(MakeShapeFault(candidates[term.candidate], term.amplitude[0], term.error[0]));
-    for (const auto& [same, amplitude] : term.same)
-      one.faults.push_back(MakeShapeFault(candidates[same], amplitude[0], 0.0));
-    one.SetOutcome();
-    if (selection.left > 1.0 && selection.fraction < kExplainsDistance)
-      one.outcome = CauseOutcome::kNotExplained;
-    if (term.rival != SIZE_MAX) one.SetRival(candidates[term.rival], term.log_odds);
-    causes.push_back(one);
-  }
+  const CauseSelection selection =
+      SelectCauses(y, candidates, {.alike = static_cast<double>(mismatch.cols())});
+  std::vector<Index> steps(static_cast<size_t>(mismatch.cols()));
+  std::iota(steps.begin(), steps.end(), 0);
+  Causes causes = TellSelection(StartExplanation(store, CauseChannel::kContact, steps), selection, candidates,
+                                [](const Candidate& one, const VectorXd& amplitude, const VectorXd& error) {
+                                  return Fault{one.fault,
+                                               one.place,
+                                               one.nominal + amplitude[0],
+                                               error.size() > 0 ? error[0] : 0.0,
+                                               one.unit,
+                                               ""};
+                                });
+  if (selection.left > 1.0 && selection.fraction < kExplainsDistance)
+    for (Explanation& one : causes) one.outcome = CauseOutcome::kNotExplained;
   return causes;
 }
 

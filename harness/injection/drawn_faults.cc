@@ -63,7 +63,11 @@ std::vector<FaultKind> ListFaultKinds(const Setup& setup, const DrawOptions& opt
       kinds.push_back(kind);
     }
   }
-  if (kinds.empty()) throw InputError("--kinds: no fault of these kinds can be made in this scenario");
+  for (const std::string& wanted : options.kinds) {
+    const bool is_there =
+        std::any_of(kinds.begin(), kinds.end(), [&](const FaultKind& kind) { return kind.kind == wanted; });
+    if (!is_there) throw InputError("--kinds: no fault " + Quote(wanted) + " can be made in this scenario");
+  }
   return kinds;
 }
 

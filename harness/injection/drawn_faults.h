@@ -19,7 +19,7 @@ struct DrawOptions {
   std::vector<std::string> kinds;  ///< Of FaultKind::kind, out of which is drawn; empty for all.
 };
 
-/// Kinds that apply to the run. @throws InputError when there are none.
+/// Kinds that apply to the run. @throws InputError for a kind that there is not, or not in this run.
 std::vector<FaultKind> ListFaultKinds(const Setup& setup, const DrawOptions& options);
 
 /// Faults that are there at once, each by itself.

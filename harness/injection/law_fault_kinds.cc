@@ -146,32 +146,30 @@ InjectedFault FrictionPart(const FaultContext& context) {
                  [](const ModelTerms& terms) -> const VectorXd& { return terms.friction(); });
 }
 
-InjectedFault AddedTorque(const FaultContext& context) {
+/// A torque of one joint that is added. @param get it, by the joint's measured rate.
+InjectedFault Added(const FaultContext& context, const char* name, double size,
+                    const std::function<double(double rate)>& get) {
   const Place place = OneJoint(context);
-  const double torque = context.draw->Size(1e-3, 0.1);
-  InjectedFault one = LawFaultAt(place, "torque", torque, 0.0);
-  one.controller = [=, entry = place.entries.front()](const Setup&, std::unique_ptr<Controller> right,
-                                                      const IsOn& is_on) {
-    return std::make_unique<ChangedLaw>(
-        std::move(right), is_on,
-        [=](const Reading&, const GraspModel&, VectorXd* tau) { (*tau)[entry] += torque; });
+  InjectedFault one = LawFaultAt(place, name, size, 0.0);
+  one.controller = [get, entry = place.entries.front()](const Setup&, std::unique_ptr<Controller> right,
+                                                        const IsOn& is_on) {
+    return std::make_unique<ChangedLaw>(std::move(right), is_on,
+                                        [=](const Reading& reading, const GraspModel&, VectorXd* tau) {
+                                          (*tau)[entry] += get(reading.state.xi[entry]);
+                                        });
   };
   return one;
 }
 
+InjectedFault AddedTorque(const FaultContext& context) {
+  const double torque = context.draw->Size(1e-3, 0.1);
+  return Added(context, "torque", torque, [torque](double) { return torque; });
+}
+
 /// Where the law has friction it would be a part of that.
 InjectedFault AddedFriction(const FaultContext& context) {
-  const Place place = OneJoint(context);
   const double friction = context.draw->Positive(1e-2, 1.0);
-  InjectedFault one = LawFaultAt(place, "viscous friction", friction, 0.0);
-  one.controller = [=, entry = place.entries.front()](const Setup&, std::unique_ptr<Controller> right,
-                                                      const IsOn& is_on) {
-    return std::make_unique<ChangedLaw>(std::move(right), is_on,
-                                        [=](const Reading& reading, const GraspModel&, VectorXd* tau) {
-                                          (*tau)[entry] -= friction * reading.state.xi[entry];
-                                        });
-  };
-  return one;
+  return Added(context, "viscous friction", friction, [friction](double rate) { return -friction * rate; });
 }
 
 /// All gains of position, or of velocity, times a factor, or one of them.

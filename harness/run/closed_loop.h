@@ -116,7 +116,7 @@ class ClosedLoop {
   const Setup* setup_;
   std::unique_ptr<Plant> plant_;
   Sensing sensing_;
-  std::function<void(double t, MeasuredState* told)> hidden_sensor_fault_;
+  std::function<void(double t, MeasuredState* measured)> hidden_sensor_fault_;
   std::unique_ptr<Controller> controller_;
   const PickAndPlaceController* task_ = nullptr;    // is controller_, or null
   const TrajectoryController* follower_ = nullptr;  // likewise

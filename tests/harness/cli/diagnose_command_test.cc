@@ -197,5 +197,32 @@ TEST_F(MutateCommand, CountsWhatIsFoundInARun) {
   EXPECT_EQ(json["faults"].size(), json["kinds"]["all"]["faults"].get<size_t>());
 }
 
+// What an interrupted campaign left is taken, by one that was asked for the same.
+TEST_F(MutateCommand, GoesOnFromWhatAnInterruptedCampaignLeft) {
+  const std::string command =
+      "mutate --run hold --set settle=0.2 --from 0.01 --duration 0.01 --kinds body --draws 6 --json out.json";
+  ASSERT_LE(Run(command).exit_code, 1);
+  const Json whole = Json::parse(Read("out.json"));
+  Json part = whole;
+  part["complete"] = false;
+  part["faults"].erase(part["faults"].begin() + 3, part["faults"].end());
+  part["faults"][0]["remark"] = "taken";
+  Write("out.json", part.dump());
+  EXPECT_THAT(Run(command).err, ::testing::HasSubstr("3 of 6 faults"));
+  Json again = Json::parse(Read("out.json"));
+  EXPECT_EQ(again["faults"][0]["remark"], "taken");
+  again["faults"][0]["remark"] = whole["faults"][0]["remark"];
+  EXPECT_EQ(again, whole);
+  // Asked for something else it begins anew.
+  Write("out.json", part.dump());
+  ASSERT_LE(Run(command + " --draw-seed 2").exit_code, 1);
+  EXPECT_NE(Json::parse(Read("out.json"))["faults"][0]["remark"], "taken");
+}
+
+TEST_F(MutateCommand, NamesAKindOfFaultThatThereIsNot) {
+  EXPECT_TRUE(Refused("mutate --run hold --set settle=0.2 --from 0.01 --kinds motor,wings --draws 1",
+                      {"--kinds", "\"wings\""}));
+}
+
 }  // namespace
 }  // namespace dexcheck::testing::diagnose_command_test

@@ -8,6 +8,7 @@
 #include <fstream>
 #include <string>
 
+#include "harness/report/campaign_page.h"
 #include "harness/report/page.h"
 #include "harness/report/run_comparison.h"
 #include "harness/report/run_data.h"
@@ -192,6 +193,31 @@ TEST_F(PageBrowserTest, AComparisonsTablesStayInTheirCards) {
   }
   EXPECT_GE(browser_.Run("return document.querySelectorAll('#checks + .card details tr').length;"), 2)
       << "constants that agree are folded";
+}
+
+// The confusion matrix counts what each fault was named.
+TEST_F(PageBrowserTest, ACampaignsPageHasItsMatrix) {
+  const auto fault = [](const char* outcome, const char* injected, const char* named) {
+    nlohmann::ordered_json one = {{"kind", "motor"},
+                                  {"name", injected},
+                                  {"outcome", outcome},
+                                  {"cause_right", true},
+                                  {"causes", "</script>"}};
+    if (*named != '\0') one["names"] = {{{"injected", injected}, {"place", "motor a"}, {"named", named}}};
+    return one;
+  };
+  const nlohmann::ordered_json campaign = {
+      {"scenario", "curve"},
+      {"faults",
+       {fault("found", "gain", "gain"), fault("found", "gain", "a class"),
+        fault("found", "signal of motor b, gain", "lag"), fault("survived", "offset", "")}}};
+  const std::filesystem::path file = folder_.path() / "campaign.html";
+  std::ofstream(file) << MakeCampaignPage(campaign);
+  browser_.Open(file);
+  EXPECT_EQ(browser_.Run("return document.querySelector('#verdict strong').textContent;"), "SURVIVORS");
+  EXPECT_EQ(browser_.Run("return [...document.querySelectorAll('.matrix tr')].map(row => "
+                         "[...row.children].map(cell => cell.textContent).join('|'));"),
+            nlohmann::json({"injected|gain|lag|a class|all", "gain|1||1|2", "signal of another one||1||1"}));
 }
 
 TEST_F(PageBrowserTest, PlaysTheVideo) {
