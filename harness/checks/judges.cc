@@ -46,7 +46,6 @@ Evaluation EvaluateRolling(const StepAnalysis& step) {
 }
 
 Evaluation EvaluateContactDistance(const StepAnalysis& step) {
-  // Bonds join points, whatever the shapes.
   if (step.touching == 0 || !step.setup->start().bonds.empty()) return std::nullopt;
   Eigen::Index part = 0;
   const double worst = step.contact_mismatch.cwiseAbs().maxCoeff(&part);

@@ -37,7 +37,8 @@ void StepAnalyzer::FindContacts() {
         step.reading.state.X_Bo.linear() * now_.grasp->contacts()[i].geometry.g_o_cf.linear();
     findings.f_c.segment<3>(3 * static_cast<Eigen::Index>(i)) = R_B_cf.transpose() * contacts[i].force;
     if (!contacts[i].touching) ++now_.contacts_missing;
-    if (contacts[i].touching)
+    // Bonds join points, whatever the shapes.
+    if (contacts[i].touching && setup_->start().bonds.empty())
       now_.contact_mismatch[static_cast<Eigen::Index>(i)] =
           contacts[i].distance + step.reading.state.overlap[i];
     if (step.command.handling.holding && !contacts[i].touching && findings.fingertip_slip[i].touching)

@@ -271,6 +271,8 @@ TEST(RunCampaign, NothingInjectedChangesNothing) {
   const Count objects = RunSome(&campaign, [](const RunMutant& mutant) { return mutant.all.kind == "body"; });
   EXPECT_GE(objects.made, 7);
   EXPECT_GE(objects.cause, objects.made - 1);  // one pushes later than the run lasts
+  for (const RunMutant& mutant : campaign.mutants())
+    if (mutant.killed) EXPECT_EQ(mutant.causes.find("fingertip"), std::string::npos) << mutant.causes;
 }
 
 TEST(RunCampaign, ARunThatDoesNotPassIsNoPlaceForFaults) {
