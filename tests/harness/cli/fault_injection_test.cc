@@ -220,9 +220,17 @@ class DamagedLogs : public FaultInjection {
       const ProgramResult result = Run(command);
       // 1: a replay that differs.
       EXPECT_THAT(result.exit_code, ::testing::AnyOf(0, 1, 2)) << command << ": " << result.err;
-      EXPECT_LE(CountLines(result.err), 1) << result.err;
+      EXPECT_LE(CountErrors(result.err), 1) << result.err;
       count += result.exit_code == exit_code ? 1 : 0;
     }
+    return count;
+  }
+
+  /// @return the number of lines that are not notes on what a damaged scene or mesh cannot give.
+  [[nodiscard]] static int CountErrors(const std::string& lines) {
+    std::istringstream stream(lines);
+    int count = 0;
+    for (std::string line; std::getline(stream, line);) count += line.find(": left out") == std::string::npos;
     return count;
   }
 
