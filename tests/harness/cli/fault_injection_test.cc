@@ -22,8 +22,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-long CountLines(const std::string& text) { return std::count(text.begin(), text.end(), '\n'); }
-
 class FaultInjection : public CommandTest {
  protected:
   [[nodiscard]] std::vector<std::string> ListFiles() const {
