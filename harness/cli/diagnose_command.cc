@@ -18,7 +18,6 @@
 #include "harness/descriptions/join_names.h"
 #include "harness/descriptions/read_description.h"
 #include "harness/diagnosis/diagnose.h"
-#include "harness/diagnosis/file_terms.h"
 #include "harness/engine/mjcf_file.h"
 
 namespace dexcheck::cli {
@@ -48,21 +47,21 @@ void PrintRemaining(const DiagnoseRequest& request, const RobotModel& model, con
 
 /// Causes that a rounded number explains, when they are several and there are others: these come first to a
 /// reader.
-std::vector<const Repair*> FindRounded(const Diagnosis& diagnosis, const RobotSpec& written) {
+std::vector<const Repair*> FindRounded(const Diagnosis& diagnosis) {
   constexpr size_t kSeveral = 3;
   std::vector<const Repair*> rounded;
   for (const Repair& cause : diagnosis.causes) {
     const bool stands_alone = cause.kind == RepairKind::kParameters || cause.kind == RepairKind::kEngineOnly;
     if (!stands_alone) return {};  // numbers are as they were before this one
-    if (LooksRounded(cause, written)) rounded.push_back(&cause);
+    if (LooksRounded(cause, diagnosis.written)) rounded.push_back(&cause);
   }
   if (rounded.size() < kSeveral || rounded.size() == diagnosis.causes.size()) return {};
   return rounded;
 }
 
-/// @param written the model's numbers as they stand in its file.
-void Print(const DiagnoseRequest& request, const RobotModel& model, const RobotSpec& written,
-           const Diagnosis& diagnosis, const std::vector<Hypothesis>& hypotheses) {
+void Print(const DiagnoseRequest& request, const RobotModel& model, const Diagnosis& diagnosis,
+           const std::vector<Hypothesis>& hypotheses) {
+  const RobotSpec& written = diagnosis.written;
   const std::string file = request.files.robot.filename().string();
   if (diagnosis.agrees) {
     fmt::print("{}\n",
@@ -75,7 +74,7 @@ void Print(const DiagnoseRequest& request, const RobotModel& model, const RobotS
   fmt::print("DISAGREE: {} against {}.\n", file, request.files.mjcf.filename().string());
   PrintHypotheses(hypotheses);
   if (diagnosis.causes.empty()) fmt::print("No change of single numbers explains it.\n");
-  const std::vector<const Repair*> rounded = FindRounded(diagnosis, written);
+  const std::vector<const Repair*> rounded = FindRounded(diagnosis);
   int number = 0;
   for (const Repair& cause : diagnosis.causes) {
     if (std::find(rounded.begin(), rounded.end(), &cause) != rounded.end()) continue;
@@ -128,7 +127,7 @@ Json ToJson(const Repair& cause, const RobotSpec& spec, const std::string& file)
   return json;
 }
 
-std::string ToText(const DiagnoseRequest& request, const RobotSpec& written, const Diagnosis& diagnosis,
+std::string ToText(const DiagnoseRequest& request, const Diagnosis& diagnosis,
                    const std::vector<Hypothesis>& hypotheses, const std::vector<std::string>& notes) {
   const std::string file = request.files.robot.filename().string();
   Json json = {
@@ -141,7 +140,8 @@ std::string ToText(const DiagnoseRequest& request, const RobotSpec& written, con
   for (const std::string& note : notes) json["notes"].push_back(note);
   json["hypotheses"] = ListHypotheses(hypotheses);
   json["causes"] = Json::array();
-  for (const Repair& cause : diagnosis.causes) json["causes"].push_back(ToJson(cause, written, file));
+  for (const Repair& cause : diagnosis.causes)
+    json["causes"].push_back(ToJson(cause, diagnosis.written, file));
   json["remaining"] = Json::array();
   for (const ConstantFinding& finding : diagnosis.remaining_constants)
     json["remaining"].push_back(finding.check);
@@ -190,28 +190,26 @@ int Run(DiagnoseRequest request) {
   constexpr long kStages = 4;
   long stage = 0;
   ProgressBar bar("diagnosing", kStages, request.quiet);
-  Diagnosis diagnosis =
-      Diagnose(model, *engine, request.files.mjcf.string(), request.options, [&](const char*) {
-        bar.Update(stage++);
-        return !IsInterrupted();
-      });
+  const auto progress = [&](const char*) {
+    bar.Update(stage++);
+    return !IsInterrupted();
+  };
+  const Diagnosis diagnosis = Diagnose(model, *engine, request.files.mjcf.string(), request.options, progress,
+                                       {robot.joints.begin(), robot.joints.end()});
   bar.Finish();
-  const FileTerms terms(model.spec(), {robot.joints.begin(), robot.joints.end()});
-  diagnosis.causes = terms.Convert(diagnosis.causes);
-  for (auto& [cause, fraction] : diagnosis.ranking) cause = terms.ConvertPart(cause);
   // Faults of conventions first; what can only be moved shows no bodies to compare.
   const bool is_open = !diagnosis.agrees && !request.options.by_motion;
   std::vector<Hypothesis> hypotheses;
   const std::optional<RobotDescription> right = mjcf.TryToDescribe();
   if (is_open && right)
     hypotheses = ExplainDifference(robot, *right, std::max(request.options.tolerance, kHypothesisTolerance));
-  json.Write([&] { return ToText(request, terms.written(), diagnosis, hypotheses, notes); });
+  json.Write([&] { return ToText(request, diagnosis, hypotheses, notes); });
   if (!json.TakesStdout()) {
     if (!request.quiet) {
       for (const std::string& note : notes) fmt::print("{}\n", note);
     }
     if (IsInterrupted()) fmt::print("INTERRUPTED. So far:\n");
-    Print(request, model, terms.written(), diagnosis, hypotheses);
+    Print(request, model, diagnosis, hypotheses);
   }
   if (IsInterrupted()) return ReportFailure("interrupted");
   return diagnosis.agrees ? kSuccess : kDisagreement;

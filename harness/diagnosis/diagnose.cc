@@ -5,32 +5,20 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <memory>
+#include <numeric>
 #include <optional>
 
-#include "controller/common/errors.h"
 #include "harness/checks/tolerance.h"
-#include "harness/diagnosis/body_comparison.h"
-#include "harness/diagnosis/body_fit.h"
+#include "harness/diagnosis/force_fit.h"
 #include "harness/diagnosis/geometry_walk.h"
-#include "harness/diagnosis/repair_check.h"
+#include "harness/diagnosis/trial.h"
 
 namespace dexcheck {
 namespace {
 
-using Kind = ParameterKind;
-
 // Solved numbers that no person would have written have some twelve digits.
 constexpr double kSolved = 1e-11;
-
-/// Whether motion shows the constant, so that it need not be read.
-bool MovesTheRobot(Kind kind) {
-  return kind == Kind::kWheelMass || kind == Kind::kWheelSpinInertia || kind == Kind::kWheelDamping ||
-         kind == Kind::kWheelArmature;
-}
-
-bool IsOfBothWheels(Kind kind) {
-  return MovesTheRobot(kind) || kind == Kind::kWheelRadius || kind == Kind::kWheelDistance;
-}
 
 /// "dry friction" of the check "joint_dry_friction": what a finding of something that only the MJCF has is
 /// about.
@@ -102,25 +90,137 @@ void ForgetNumbers(const std::vector<Parameter>& numbers, Repair* cause) {
 class Diagnostician {
  public:
   Diagnostician(const RobotModel& model, const mjModel& engine, const std::string& source,
-                const DiagnosisOptions& options)
-      : model_(model), engine_(mj_copyModel(nullptr, &engine)), source_(source), options_(options) {
-    result_.repaired = model.spec();
+                const DiagnosisOptions& options, FileTerms terms)
+      : model_(model),
+        engine_(mj_copyModel(nullptr, &engine)),
+        setup_{*engine_, source, options, std::move(terms)},
+        file_(setup_.terms.Write(model.spec())) {
+    result_.written = result_.repaired = file_;
   }
 
   Diagnosis Run(const std::function<bool(const char*)>& progress) {
     const ConsistencyResult before = Compare(model_);
     result_.agrees = before.Agrees();
     if (result_.agrees) return std::move(result_);
-    for (const Repair& cause :
-         Neutralise(Adapter(model_, *engine_, source_), before.constants, engine_.get()))
-      result_.causes.push_back(cause);
-    if (progress("constants")) ReadConstants(before.constants);
+    result_.causes = Neutralise(Adapter(model_, *engine_, setup_.source), before.constants, engine_.get());
+    if (progress("constants")) Accept(Trial(result_.repaired, setup_).ReadConstants());
     if (progress("geometry")) WalkGeometry();
     if (progress("bodies")) FitBodies();
     progress("verdict");
-    WithdrawWhatFails();
-    const ConsistencyResult after = Compare(RobotModel(result_.repaired));
-    const double solved = std::max(kSolved, options_.tolerance);
+    KeepWhatRepairs();
+    ListRemaining();
+    Weigh();
+    return std::move(result_);
+  }
+
+ private:
+  [[nodiscard]] ConsistencyResult Compare(const RobotModel& model) const {
+    ConsistencyOptions options;
+    options.samples = setup_.options.samples;
+    options.seed = setup_.options.seed;
+    ConsistencyResult result =
+        CheckConsistency(Adapter(model, *engine_, setup_.source), options, [](long) { return true; });
+    if (setup_.options.tolerance > 0.0) JudgeByTolerance(setup_.options.tolerance, &result);
+    return result;
+  }
+
+  /// Takes repairs with values as they will be printed, unless the result cannot be a robot; another repair
+  /// may have to come first then. A value that is printed like the file's repairs nothing.
+  void Accept(std::vector<Repair> causes) {
+    while (std::erase_if(causes, [&](const Repair& cause) { return TryAccept(cause); }) > 0) {
+    }
+  }
+
+  bool TryAccept(Repair cause) {
+    Repair printed = cause;
+    printed.parameters.clear();
+    printed.values.clear();
+    for (size_t i = 0; i < cause.parameters.size(); ++i) {
+      const Parameter& parameter = cause.parameters[i];
+      const double value = RoundPrinted(parameter, cause.values[i]);
+      if (value != ReadBackPrinted(file_, parameter, GetValue(result_.repaired, parameter)))
+        printed.Add(parameter, value);
+    }
+    if (printed.parameters.empty() && !cause.parameters.empty()) return true;
+    for (Repair& equal : printed.equivalents) {
+      for (size_t i = 0; i < equal.parameters.size(); ++i)
+        equal.values[i] = RoundPrinted(equal.parameters[i], equal.values[i]);
+    }
+    RobotSpec repaired = result_.repaired;
+    Apply(printed, &repaired);
+    if (!TryModel(setup_.terms.Read(repaired)) || MakesImpossible(file_, repaired)) return false;
+    result_.repaired = std::move(repaired);
+    // Of a number that is repaired again, the last value holds, in whatever order the repairs are printed.
+    for (Repair& earlier : result_.causes) ForgetNumbers(printed.parameters, &earlier);
+    std::erase_if(result_.causes, [](const Repair& earlier) {
+      return earlier.kind == RepairKind::kParameters && earlier.parameters.empty();
+    });
+    result_.causes.push_back(std::move(printed));
+    return true;
+  }
+
+  /// As a person would have written it, unless that is another number; in the precision printed.
+  [[nodiscard]] double RoundPrinted(const Parameter& parameter, double value) const {
+    const double rounded = RoundSolved(result_.repaired, parameter, value);
+    const bool same = rounded == 0.0 || std::abs(rounded - value) <= kSolved * std::abs(value);
+    return ReadBackPrinted(file_, parameter, same ? rounded : value);
+  }
+
+  void WalkGeometry() {
+    const Trial trial(result_.repaired, setup_);
+    const auto force_error = [&](const RobotSpec& written) {
+      const std::optional<RobotModel> model = TryModel(setup_.terms.Read(written));
+      return model ? trial.evidence().CalcForceResidual(*model).norm()
+                   : std::numeric_limits<double>::infinity();
+    };
+    for (const Repair& cause : dexcheck::WalkGeometry(trial.placement(), force_error)) Accept({cause});
+  }
+
+  void FitBodies() {
+    const Trial trial(result_.repaired, setup_);
+    const ForceFit fit(trial.written(), setup_.terms, trial.evidence());
+    result_.ranking = fit.Rank();
+    Accept(setup_.options.by_motion ? fit.Run() : trial.ReadBodies());
+  }
+
+  /// The file with repairs made, in their order, at other states too; none when that is no robot.
+  [[nodiscard]] std::unique_ptr<Trial> Try(const std::vector<Repair>& causes) const {
+    RobotSpec written = file_;
+    for (const Repair& cause : causes) Apply(cause, &written);
+    if (!TryModel(setup_.terms.Read(written))) return nullptr;
+    return std::make_unique<Trial>(std::move(written), setup_);
+  }
+
+  /// Withdraws causes whose part (joint row, frame, body, constant) does not agree after all of them are
+  /// applied, until all that stay do, and equivalents that do not do as well: nothing wrong is printed,
+  /// however many numbers are wrong at once.
+  void KeepWhatRepairs() {
+    std::vector<Repair>& causes = result_.causes;
+    for (size_t dropped = 1; dropped > 0 && !causes.empty();) {
+      const std::unique_ptr<Trial> trial = Try(causes);
+      dropped = 1;
+      if (trial) {
+        dropped = std::erase_if(causes, [&](const Repair& cause) { return !trial->IsRepairedBy(cause); });
+      } else {
+        causes.pop_back();
+      }
+    }
+    for (size_t i = 0; i < causes.size(); ++i) {
+      std::vector<Repair> others = causes;
+      std::erase_if(causes[i].equivalents, [&](const Repair& equivalent) {
+        others[i] = equivalent;
+        const std::unique_ptr<Trial> trial = Try(others);
+        return !trial || !std::all_of(others.begin(), others.end(),
+                                      [&](const Repair& cause) { return trial->IsRepairedBy(cause); });
+      });
+    }
+    result_.repaired = file_;
+    for (const Repair& cause : causes) Apply(cause, &result_.repaired);
+  }
+
+  void ListRemaining() {
+    const ConsistencyResult after = Compare(RobotModel(setup_.terms.Read(result_.repaired)));
+    const double solved = std::max(kSolved, setup_.options.tolerance);
     std::copy_if(after.constants.findings.begin(), after.constants.findings.end(),
                  std::back_inserter(result_.remaining_constants), [&](const ConstantFinding& finding) {
                    if (finding.engine_only) return false;  // named already
@@ -129,149 +229,6 @@ class Diagnostician {
                  });
     std::copy_if(after.terms.begin(), after.terms.end(), std::back_inserter(result_.remaining_terms),
                  [&](const CheckRecord& record) { return record.failed && !(record.worst <= solved); });
-    Weigh();
-    return std::move(result_);
-  }
-
- private:
-  [[nodiscard]] ConsistencyResult Compare(const RobotModel& model) const {
-    ConsistencyOptions options;
-    options.samples = options_.samples;
-    options.seed = options_.seed;
-    ConsistencyResult result =
-        CheckConsistency(Adapter(model, *engine_, source_), options, [](long) { return true; });
-    if (options_.tolerance > 0.0) JudgeByTolerance(options_.tolerance, &result);
-    return result;
-  }
-
-  [[nodiscard]] EngineEvidence Collect(const RobotModel& model) const {
-    return {model, *engine_, source_, options_.samples, options_.seed, options_.tolerance};
-  }
-
-  /// Takes repairs with values as they will be printed, unless the result cannot be a robot; another repair
-  /// may have to come first then. A value that is printed like the file's repairs nothing.
-  void Accept(std::vector<Repair> causes) {
-    for (size_t before = causes.size() + 1; !causes.empty() && causes.size() < before;) {
-      before = causes.size();
-      std::erase_if(causes, [&](const Repair& cause) { return TryAccept(cause); });
-    }
-  }
-
-  bool TryAccept(Repair cause) {
-    std::vector<Parameter> changed;
-    std::vector<double> values;
-    for (size_t i = 0; i < cause.parameters.size(); ++i) {
-      const Parameter& parameter = cause.parameters[i];
-      const double value = RoundPrinted(parameter, cause.values[i]);
-      const RobotSpec& file = model_.spec();
-      if (value == ReadBackPrinted(file, parameter, GetValue(result_.repaired, parameter))) continue;
-      changed.push_back(parameter);
-      values.push_back(value);
-    }
-    if (changed.empty() && !cause.parameters.empty()) return true;
-    cause.parameters = std::move(changed);
-    cause.values = std::move(values);
-    for (Repair& equal : cause.equivalents) {
-      for (size_t i = 0; i < equal.parameters.size(); ++i)
-        equal.values[i] = RoundPrinted(equal.parameters[i], equal.values[i]);
-    }
-    RobotSpec repaired = result_.repaired;
-    Apply(cause, &repaired);
-    try {
-      static_cast<void>(RobotModel(repaired));
-    } catch (const InputError&) {
-      return false;
-    }
-    if (MakesImpossible(model_.spec(), repaired)) return false;
-    result_.repaired = std::move(repaired);
-    // Of a number that is repaired again, the last value holds, in whatever order the repairs are printed.
-    for (Repair& earlier : result_.causes) ForgetNumbers(cause.parameters, &earlier);
-    std::erase_if(result_.causes, [](const Repair& earlier) {
-      return earlier.kind == RepairKind::kParameters && earlier.parameters.empty();
-    });
-    result_.causes.push_back(std::move(cause));
-    return true;
-  }
-
-  /// As a person would have written it, unless that is another number; in the precision printed.
-  [[nodiscard]] double RoundPrinted(const Parameter& parameter, double value) const {
-    const double rounded = RoundSolved(result_.repaired, parameter, value);
-    const bool same = rounded == 0.0 || std::abs(rounded - value) <= kSolved * std::abs(value);
-    return ReadBackPrinted(model_.spec(), parameter, same ? rounded : value);
-  }
-
-  void ReadConstants(const ConstantChecks& constants) {
-    struct Reading {
-      Parameter parameter;
-      double value;
-      int count;
-      bool agreed;
-    };
-    std::vector<Reading> readings;
-    constexpr double kSame = 1e-12;
-    for (const ConstantFinding& finding : constants.findings) {
-      const std::optional<Parameter> parameter = FindParameter(result_.repaired, finding);
-      if (!parameter || !std::isfinite(finding.engine)) continue;
-      if (options_.by_motion && MovesTheRobot(parameter->kind)) continue;
-      const auto again = std::find_if(readings.begin(), readings.end(), [&](const Reading& reading) {
-        return reading.parameter == *parameter;
-      });
-      if (again == readings.end()) {
-        readings.push_back({*parameter, finding.engine, 1, true});
-      } else {
-        ++again->count;
-        if (std::abs(again->value - finding.engine) > kSame * std::abs(again->value)) again->agreed = false;
-      }
-    }
-    // A vector or a tensor is one cause. When the two wheels disagree, something else is wrong.
-    std::vector<Repair> causes;
-    for (const Reading& reading : readings) {
-      if (!reading.agreed || (IsOfBothWheels(reading.parameter.kind) && reading.count < 2)) continue;
-      auto same = std::find_if(causes.begin(), causes.end(), [&](const Repair& cause) {
-        return cause.parameters[0].kind == reading.parameter.kind &&
-               cause.parameters[0].index == reading.parameter.index;
-      });
-      if (same == causes.end()) same = causes.insert(causes.end(), Repair{});
-      same->parameters.push_back(reading.parameter);
-      same->values.push_back(reading.value);
-    }
-    Accept(std::move(causes));
-  }
-
-  void WalkGeometry() {
-    const RobotModel model(result_.repaired);
-    const EngineEvidence evidence = Collect(model);
-    const auto force_error = [&](const RobotSpec& spec) {
-      try {
-        return evidence.CalcForceResidual(RobotModel(spec)).norm();
-      } catch (const InputError&) {
-        return std::numeric_limits<double>::infinity();
-      }
-    };
-    GeometryWalk walk(result_.repaired, evidence, !options_.by_motion, force_error);
-    for (const Repair& cause : walk.Run()) Accept({cause});
-  }
-
-  void FitBodies() {
-    const RobotModel model(result_.repaired);
-    const EngineEvidence evidence = Collect(model);
-    BodyFit fit(result_.repaired, evidence);
-    if (options_.by_motion) {
-      Accept(fit.Run());
-    } else {
-      fit.Rank();
-      Accept(BodyComparison(result_.repaired, evidence, *engine_).Run());
-    }
-    result_.ranking = fit.ranking();
-  }
-
-  /// Withdraws what does not repair: nothing wrong is printed, however many numbers are wrong at once.
-  void WithdrawWhatFails() {
-    const RepairCheck check(model_.spec(), *engine_, source_, options_.samples, options_.seed,
-                            !options_.by_motion, options_.tolerance);
-    check.KeepWhatRepairs(&result_.causes);
-    result_.repaired = model_.spec();
-    for (const Repair& cause : result_.causes) Apply(cause, &result_.repaired);
   }
 
   struct Size {
@@ -280,36 +237,32 @@ class Diagnostician {
   };
 
   /// Squared residuals of geometry, bodies, joint constants and forces, each by its own scale.
-  [[nodiscard]] Size Measure(const RobotSpec& spec) const {
-    const RobotModel model(spec);
-    const EngineEvidence evidence = Collect(model);
-    const Placement placement(spec, evidence, true);
+  [[nodiscard]] Size Measure(const RobotSpec& written) const {
+    const Trial trial(written, setup_);
     Size size;
-    size.forces = evidence.CalcForceResidual(model).squaredNorm();
-    std::vector<double> rows;
-    for (size_t item = 0; item < placement.items().size(); ++item)
-      placement.AppendResidual(static_cast<int>(item), &rows);
-    for (const double row : rows) size.all += row * row;
-    for (const ConstantFinding& finding : CheckConstants(Adapter(model, *engine_, source_)).findings) {
+    size.forces = trial.evidence().CalcForceResidual(trial.model()).squaredNorm();
+    std::vector<int> items(trial.placement().items().size());
+    std::iota(items.begin(), items.end(), 0);
+    size.all = size.forces + trial.placement().CalcResidual(items).squaredNorm();
+    for (const ConstantFinding& finding : trial.constants().findings) {
       if (finding.engine_only) continue;
       const double larger = std::max(std::abs(finding.model), std::abs(finding.engine));
       const double apart = (finding.model - finding.engine) / larger;
       if (std::isfinite(apart)) size.all += apart * apart;
     }
-    size.all += size.forces;
     return size;
   }
 
   /// What each cause explains after those before it; the largest first.
   void Weigh() {
-    RobotSpec spec = model_.spec();
-    const Size before = Measure(spec);
+    RobotSpec written = file_;
+    const Size before = Measure(written);
     Size last = before;
     const auto fraction = [](double from, double to, double of) { return of > 0.0 ? (from - to) / of : 0.0; };
     for (Repair& cause : result_.causes) {
       if (cause.kind == RepairKind::kEngineOnly) continue;
-      Apply(cause, &spec);
-      const Size now = Measure(spec);
+      Apply(cause, &written);
+      const Size now = Measure(written);
       cause.explained = fraction(last.all, now.all, before.all);
       cause.explained_of_forces = fraction(last.forces, now.forces, before.forces);
       last = now;
@@ -318,26 +271,26 @@ class Diagnostician {
     result_.explained_of_forces =
         before.forces > 0.0 ? fraction(before.forces, last.forces, before.forces) : 1.0;
     // Rows and axes that were exchanged or turned must be repaired in the order found.
-    const bool ordered = std::any_of(result_.causes.begin(), result_.causes.end(), [](const Repair& cause) {
-      return cause.kind != RepairKind::kParameters && cause.kind != RepairKind::kEngineOnly;
-    });
-    if (ordered) return;
+    if (std::any_of(result_.causes.begin(), result_.causes.end(),
+                    [](const Repair& cause) { return cause.joint >= 0; }))
+      return;
     std::stable_sort(result_.causes.begin(), result_.causes.end(),
                      [](const Repair& a, const Repair& b) { return a.explained > b.explained; });
   }
 
   const RobotModel& model_;
   MjModelPtr engine_;
-  std::string source_;
-  DiagnosisOptions options_;
+  TrialSetup setup_;
+  RobotSpec file_;
   Diagnosis result_;
 };
 
 }  // namespace
 
 Diagnosis Diagnose(const RobotModel& model, const mjModel& engine, const std::string& engine_source,
-                   const DiagnosisOptions& options, const std::function<bool(const char*)>& progress) {
-  return Diagnostician(model, engine, engine_source, options).Run(progress);
+                   const DiagnosisOptions& options, const std::function<bool(const char*)>& progress,
+                   std::vector<WrittenRow> rows) {
+  return Diagnostician(model, engine, engine_source, options, FileTerms(std::move(rows))).Run(progress);
 }
 
 }  // namespace dexcheck

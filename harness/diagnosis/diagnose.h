@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "controller/model/parameter_reader.h"
 #include "harness/checks/consistency.h"
 #include "harness/diagnosis/repair.h"
 
@@ -32,14 +33,17 @@ struct Diagnosis {
       ranking;  ///< Single numbers by the fraction of the forces' residuals explained.
   std::vector<ConstantFinding> remaining_constants;  ///< What disagrees after all repairs.
   std::vector<CheckRecord> remaining_terms;          ///< Failed checks after all repairs.
-  RobotSpec repaired;
+  RobotSpec written;   ///< The model's numbers as they stand in its file, which is what the causes change;
+  RobotSpec repaired;  ///< and with them repaired.
 };
 
 /// Compares, and explains what differs. Stages, each with what was found before repaired: what only the MJCF
 /// has; constants that no motion shows (ranges, radii, the object); geometry from the base outward; bodies,
 /// joint constants and gravity by regression. @throws InputError when model and engine do not match.
+/// @param rows how the model's rows are written in its file; none stands for modified parameters.
 /// @param progress called between stages with what follows; its false ends the work with what there is.
 Diagnosis Diagnose(const RobotModel& model, const mjModel& engine, const std::string& engine_source,
-                   const DiagnosisOptions& options, const std::function<bool(const char*)>& progress);
+                   const DiagnosisOptions& options, const std::function<bool(const char*)>& progress,
+                   std::vector<WrittenRow> rows = {});
 
 }  // namespace dexcheck

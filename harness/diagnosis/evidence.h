@@ -21,7 +21,6 @@ struct StateSample {
   std::vector<Vector3d> anchors;  ///< A point on it, m, world.
   std::vector<Pose> frames;       ///< Of each named frame, world.
   std::vector<LinkInWorld> links;
-  VectorXd forces;  ///< As CalcForces, unscaled.
 };
 
 /// StateSamples at random states, and the analytic model's forces in the same order and scale.
@@ -45,20 +44,24 @@ class EngineEvidence {
   /// Forces that a variant of the model needs at the states: for each, M times the probes, C xi, gravity,
   /// friction. Each is divided by the root of the engine's M_ii and by the block's size, friction by the
   /// joint's own: of order 1 for finger and platform alike.
-  [[nodiscard]] VectorXd CalcForces(const RobotModel& variant) const;
+  [[nodiscard]] VectorXd CalcForces(const RobotModel& variant) const {
+    return (CalcRawForces(variant).array() * scale_.array()).reshaped();
+  }
   /// The engine's forces in the same scale minus the variant's.
-  [[nodiscard]] VectorXd CalcForceResidual(const RobotModel& variant) const;
+  [[nodiscard]] VectorXd CalcForceResidual(const RobotModel& variant) const {
+    return engine_forces_ - CalcForces(variant);
+  }
 
  private:
-  static VectorXd CollectForces(const MatrixXd& M, const StateSample& at, const VectorXd& coriolis,
-                                const VectorXd& gravity, const VectorXd& friction);
-  [[nodiscard]] VectorXd CalcRawForces(const RobotModel& variant) const;
-  void CalcScales(const RobotModel& model);
+  void AddSample(const VectorXd& q, const VectorXd& xi, const Adapter& adapter, EngineTerms* terms);
+  /// By coordinate, block after block; a column for each sample.
+  [[nodiscard]] MatrixXd CalcRawForces(const RobotModel& variant) const;
+  /// @param roots of the engine's M_ii; a column for each sample.
+  void CalcScales(const RobotModel& model, const MatrixXd& roots, const MatrixXd& engine_forces);
 
   std::vector<StateSample> samples_;
-  std::vector<VectorXd> mass_roots_;  // roots of the engine's M_ii at each sample
-  VectorXd engine_forces_;            // scaled
-  VectorXd scale_;                    // what CalcRawForces is multiplied by
+  VectorXd engine_forces_;  // scaled
+  MatrixXd scale_;          // what CalcRawForces is multiplied by
   double length_ = 0.0;
   double tolerance_ = 0.0;
 };

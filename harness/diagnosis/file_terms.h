@@ -1,41 +1,45 @@
 #pragma once
 
-// Repairs in the terms of the parameter file.
+// A robot in the terms of its parameter file.
 
+#include <utility>
 #include <vector>
 
 #include "controller/model/parameter_reader.h"
-#include "harness/diagnosis/repair.h"
 
 namespace dexcheck {
 
-/// Says repairs by the numbers that stand in the parameter file.
+/// Turns a specification into the numbers that stand in the file, and back.
 ///
 /// A specification has bodies, places and frames in frame i, whose z axis is the joint's. A plain row of the
-/// file (xyz, rpy, axis) has them in the link's own frame L, and no Denavit-Hartenberg parameters: what is
-/// alpha of the specification is a roll of the file. Rows of modified parameters stay as they are.
+/// file (xyz, rpy, axis) has them in the link's own frame L, and no Denavit-Hartenberg parameters. Rows of
+/// modified parameters stay as they are.
 class FileTerms {
  public:
   /// @param rows how the joints' rows are written, by joint; none stands for rows of modified parameters.
-  FileTerms(RobotSpec spec, std::vector<WrittenRow> rows);
+  explicit FileTerms(std::vector<WrittenRow> rows) : rows_(std::move(rows)) {}
 
-  /// Numbers as they stand in the file; no robot can be made of it.
-  [[nodiscard]] const RobotSpec& written() const { return written_; }
-  /// Each of the repairs as numbers of written(). They must be in the order in which they are to be made.
-  [[nodiscard]] std::vector<Repair> Convert(const std::vector<Repair>& causes) const;
-  /// Which number of the file, or vector of it, a single number of the specification is.
-  [[nodiscard]] Repair ConvertPart(const Repair& cause) const;
+  [[nodiscard]] bool IsPlain(int joint) const {
+    return joint >= 0 && static_cast<size_t>(joint) < rows_.size() &&
+           rows_[static_cast<size_t>(joint)].is_plain;
+  }
+  /// The specification's numbers as they stand in the file; no robot can be made of them.
+  [[nodiscard]] RobotSpec Write(RobotSpec spec) const;
+  /// The specification of a file with such numbers. In a plain row, alpha = pi stands for an axis that is
+  /// turned around.
+  [[nodiscard]] RobotSpec Read(RobotSpec written) const;
+  /// Frame i in the link's frame of the file.
+  [[nodiscard]] Pose AxisFrame(const Joint& written, int joint) const;
+  /// The link's frame of the file in its parent's. @param q of the joint, rad or m.
+  [[nodiscard]] Pose CalcPlace(const Joint& written, int joint, double q) const;
 
  private:
-  [[nodiscard]] bool IsWritten(const Parameter& parameter) const;
-  [[nodiscard]] static RobotSpec Write(const RobotSpec& spec, const std::vector<WrittenRow>& rows);
-  [[nodiscard]] Repair ConvertFrom(const RobotSpec& before, const std::vector<WrittenRow>& rows,
-                                   const Repair& cause) const;
+  /// The link's frame of the file in frame i of the specification, or in Sigma_0 (-1).
+  [[nodiscard]] Pose OwnFrame(int joint) const {
+    return IsPlain(joint) ? rows_[static_cast<size_t>(joint)].X_iL : Pose::Identity();
+  }
 
-  RobotSpec spec_;
   std::vector<WrittenRow> rows_;
-  bool is_plain_ = false;  // anywhere
-  RobotSpec written_;
 };
 
 }  // namespace dexcheck

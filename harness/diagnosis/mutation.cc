@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <optional>
 #include <utility>
 
@@ -99,7 +100,7 @@ class MutantList {
 
   /// A solid taken for one of a tenth more mass.
   void AddScaledBody(int link) {
-    if (!(ReadBody(link).mass > 0.0)) return;
+    if (!(BodyOf(spec_, link).mass > 0.0)) return;
     std::vector<Parameter> numbers = {{Kind::kMass, link, 0}, {Kind::kInertia, link, 0}};
     Add("solid of another mass", numbers).change = [link](RobotSpec* spec) {
       constexpr double kRatio = 1.1;
@@ -108,12 +109,8 @@ class MutantList {
     };
   }
 
-  [[nodiscard]] MassProperties ReadBody(int link) const {
-    return link < 0 ? spec_.base.body : spec_.joints[static_cast<size_t>(link)].body;
-  }
-
   void AddBody(const std::string& kind, int link, void (*change)(MassProperties*)) {
-    MassProperties changed = ReadBody(link);
+    MassProperties changed = BodyOf(spec_, link);
     const Matrix3d before = changed.inertia;
     change(&changed);
     constexpr double kSame = 1e-9;  // of the trace: a tensor that the fault leaves as it is
@@ -160,18 +157,12 @@ bool HasEffect(const RobotModel& model, const RobotModel& changed, const EngineE
   constexpr double kRounding = 1e-13;  // of each quantity's own size
   if ((evidence.CalcForces(model) - evidence.CalcForces(changed)).cwiseAbs().maxCoeff() > kRounding)
     return true;
-  const Placement a(model.spec(), evidence, true);
-  const Placement b(changed.spec(), evidence, true);
-  std::vector<double> rows_a;
-  std::vector<double> rows_b;
-  for (size_t item = 0; item < a.items().size(); ++item) {
-    a.AppendResidual(static_cast<int>(item), &rows_a);
-    b.AppendResidual(static_cast<int>(item), &rows_b);
-  }
-  for (size_t i = 0; i < rows_a.size(); ++i) {
-    if (std::abs(rows_a[i] - rows_b[i]) > kRounding) return true;
-  }
-  return false;
+  const FileTerms terms({});
+  const Placement a(model.spec(), terms, evidence, true);
+  const Placement b(changed.spec(), terms, evidence, true);
+  std::vector<int> all(a.items().size());
+  std::iota(all.begin(), all.end(), 0);
+  return (a.CalcResidual(all) - b.CalcResidual(all)).cwiseAbs().maxCoeff() > kRounding;
 }
 
 }  // namespace

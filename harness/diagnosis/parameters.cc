@@ -248,6 +248,10 @@ void SetValue(RobotSpec* spec, const Parameter& parameter, double value) {
 
 Joint& JointOf(RobotSpec* spec, int joint) { return spec->joints[static_cast<size_t>(joint)]; }
 
+const MassProperties& BodyOf(const RobotSpec& spec, int link) {
+  return link < 0 ? spec.base.body : spec.joints[static_cast<size_t>(link)].body;
+}
+
 std::optional<RobotModel> TryModel(const RobotSpec& spec) {
   try {
     return RobotModel(spec);
@@ -263,16 +267,18 @@ bool IsAngle(const RobotSpec& spec, const Parameter& parameter) {
          (is_limit && spec.joints[static_cast<size_t>(parameter.index)].type == JointType::kRevolute);
 }
 
-bool IsOfRow(ParameterKind kind) { return EntryFor(kind).part == ParameterTable::kRow; }
 bool IsGeometric(ParameterKind kind) { return EntryFor(kind).effect == ParameterTable::kPlaces; }
+bool IsRotation(ParameterKind kind) {
+  const ParameterTable::Form form = EntryFor(kind).form;
+  return IsGeometric(kind) && (form == ParameterTable::kAngle || form == ParameterTable::kRotation);
+}
 bool IsDynamic(ParameterKind kind) { return EntryFor(kind).effect == ParameterTable::kForces; }
 
 double GetScale(const RobotSpec& spec, const Parameter& p) {
   const double size = std::abs(GetValue(spec, p));
   if (IsTensor(p)) {
-    const Matrix3d& tensor = p.kind == Kind::kObjectInertia ? spec.object->body.inertia
-                             : p.index < 0                  ? spec.base.body.inertia
-                                           : spec.joints[static_cast<size_t>(p.index)].body.inertia;
+    const Matrix3d& tensor =
+        p.kind == Kind::kObjectInertia ? spec.object->body.inertia : BodyOf(spec, p.index).inertia;
     return size > 0.0 ? size : tensor.trace() > 0.0 ? tensor.trace() : 1.0;
   }
   if (size > 0.0) return size;

@@ -52,6 +52,10 @@ struct Parameter {
   int component = 0;  ///< Of a vector, of roll, pitch, yaw, or of the six entries of a tensor.
 
   bool operator==(const Parameter&) const = default;
+  /// Whether they are of one vector or tensor.
+  [[nodiscard]] bool IsBeside(const Parameter& other) const {
+    return kind == other.kind && index == other.index;
+  }
 };
 
 /// All of them: joints first, in the file's order. What the model ignores (the body of a fixed base, the
@@ -69,15 +73,17 @@ void SetValue(RobotSpec* spec, const Parameter& parameter, double value);
 
 /// The joint of a specification that is changed.
 Joint& JointOf(RobotSpec* spec, int joint);
+/// The body of a link, by its joint; -1: of the base.
+const MassProperties& BodyOf(const RobotSpec& spec, int link);
 /// The model of a changed specification; none when there is no such robot.
 std::optional<RobotModel> TryModel(const RobotSpec& spec);
 
 /// Whether the value is an angle, which is printed in degrees.
 bool IsAngle(const RobotSpec& spec, const Parameter& parameter);
-/// Whether it is a number of the row that places a joint on its parent.
-bool IsOfRow(ParameterKind kind);
 /// Whether it moves links or frames.
 bool IsGeometric(ParameterKind kind);
+/// Whether it turns them.
+bool IsRotation(ParameterKind kind);
 /// Whether it changes forces and moves nothing: of bodies, joints, wheels, gravity; not of the object.
 bool IsDynamic(ParameterKind kind);
 

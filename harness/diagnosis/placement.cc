@@ -6,6 +6,8 @@
 namespace dexcheck {
 namespace {
 
+using ItemKind = PlacedItem::Kind;
+
 // Three states tell a wrong place from a right one that is seen along its axis.
 constexpr size_t kStateSamples = 3;
 
@@ -15,46 +17,34 @@ constexpr double kPlaceRounding = 1e-11;
 
 size_t At(int link) { return static_cast<size_t>(link + 1); }
 
+bool IsOfFrame(const Parameter& parameter) {
+  return parameter.kind == ParameterKind::kFramePosition || parameter.kind == ParameterKind::kFrameRotation;
+}
+
 }  // namespace
 
 int CarrierOf(const RobotSpec& spec, const Parameter& parameter) {
-  if (parameter.kind == ParameterKind::kFramePosition || parameter.kind == ParameterKind::kFrameRotation)
-    return spec.frames[static_cast<size_t>(parameter.index)].link;
-  return parameter.index;
+  return IsOfFrame(parameter) ? spec.frames[static_cast<size_t>(parameter.index)].link : parameter.index;
 }
 
-Placement::Placement(const RobotSpec& spec, const EngineEvidence& evidence, bool bodies)
-    : trial_(spec),
-      base_origin_(spec.base.X_B0.translation()),
-      evidence_(&evidence),
-      used_(std::min(kStateSamples, evidence.samples().size())) {
-  const int joints = static_cast<int>(spec.joints.size());
-  subtree_.resize(At(joints));
-  for (int i = 0; i < joints; ++i) {
-    for (int j = i; j >= 0; j = spec.joints[static_cast<size_t>(j)].parent) subtree_[At(j)].push_back(i);
-    subtree_[0].push_back(i);
+Placement::Placement(const RobotSpec& written, const FileTerms& terms, const EngineEvidence& evidence,
+                     bool bodies)
+    : base_origin_(written.base.X_B0.translation()), terms_(&terms), evidence_(&evidence) {
+  for (int i = 0; i < static_cast<int>(written.joints.size()); ++i) {
+    const Joint& joint = written.joints[static_cast<size_t>(i)];
+    items_.push_back({ItemKind::kAxisDirection, i, i});
+    if (joint.type == JointType::kRevolute) items_.push_back({ItemKind::kAxisLine, i, i});
+    if (bodies && joint.body.mass > 0.0) items_.push_back({ItemKind::kCom, i, i});
+    if (bodies && joint.body.inertia.trace() > 0.0) items_.push_back({ItemKind::kInertia, i, i});
   }
-  poses_.assign(used_, std::vector<Pose>(At(joints), Pose::Identity()));
-  rows_ = poses_;
-  for (int i = 0; i < joints; ++i) {
-    const Joint& joint = spec.joints[static_cast<size_t>(i)];
-    items_.push_back({PlacedItem::Kind::kAxisDirection, i, i});
-    if (joint.type == JointType::kRevolute) items_.push_back({PlacedItem::Kind::kAxisLine, i, i});
-    if (!bodies) continue;
-    if (joint.body.mass > 0.0) items_.push_back({PlacedItem::Kind::kCom, i, i});
-    if (joint.body.inertia.trace() > 0.0) items_.push_back({PlacedItem::Kind::kInertia, i, i});
+  for (size_t i = 0; i < written.frames.size(); ++i) {
+    for (const ItemKind kind : {ItemKind::kFramePosition, ItemKind::kFrameRotation})
+      items_.push_back({kind, static_cast<int>(i), written.frames[i].link});
   }
-  for (size_t i = 0; i < spec.frames.size(); ++i) {
-    items_.push_back({PlacedItem::Kind::kFramePosition, static_cast<int>(i), spec.frames[i].link});
-    items_.push_back({PlacedItem::Kind::kFrameRotation, static_cast<int>(i), spec.frames[i].link});
-  }
-  beyond_.resize(At(joints));
-  for (size_t item = 0; item < items_.size(); ++item) {
-    beyond_[0].push_back(static_cast<int>(item));
-    for (int j = items_[item].link; j >= 0; j = spec.joints[static_cast<size_t>(j)].parent)
-      beyond_[At(j)].push_back(static_cast<int>(item));
-  }
-  UpdateAll();
+  rows_.assign(std::min(kStateSamples, evidence.samples().size()),
+               std::vector<Pose>(written.joints.size() + 1, Pose::Identity()));
+  poses_ = rows_;
+  Replace(written);
 }
 
 bool Placement::Carries(int inner, int outer) const {
@@ -77,152 +67,121 @@ Pose Placement::CalcBasePose(const VectorXd& q) const {
   return X;
 }
 
-void Placement::UpdateRow(int i) {
-  const int offset = trial_.base.type == BaseType::kFixed      ? 0
-                     : trial_.base.type == BaseType::kFloating ? 7
-                                                               : 3;
-  const Joint& joint = trial_.joints[static_cast<size_t>(i)];
-  const bool revolute = joint.type == JointType::kRevolute;
-  for (size_t sample = 0; sample < used_; ++sample) {
-    const double q_i = evidence_->samples()[sample].q[offset + i];
-    rows_[sample][At(i)] =
-        joint.X_PB * CalcMdhTransform(joint.mdh.alpha, joint.mdh.a, joint.mdh.q + (revolute ? q_i : 0.0),
-                                      joint.mdh.d + (revolute ? 0.0 : q_i));
+void Placement::UpdateRow(int joint) {
+  for (size_t sample = 0; sample < rows_.size(); ++sample) {
+    const VectorXd& q = evidence_->samples()[sample].q;
+    const Eigen::Index first = q.size() - static_cast<Eigen::Index>(trial_.joints.size());
+    rows_[sample][At(joint)] =
+        terms_->CalcPlace(trial_.joints[static_cast<size_t>(joint)], joint, q[first + joint]);
   }
 }
 
 void Placement::UpdateFrom(int from) {
-  for (size_t sample = 0; sample < used_; ++sample) {
+  for (size_t sample = 0; sample < rows_.size(); ++sample) {
     std::vector<Pose>& poses = poses_[sample];
     if (from < 0) poses[0] = CalcBasePose(evidence_->samples()[sample].q);
-    for (const int i : subtree_[At(from)]) {
-      if (!focus_.empty() && !focus_[At(i)]) continue;
-      poses[At(i)] = poses[At(trial_.joints[static_cast<size_t>(i)].parent)] * rows_[sample][At(i)];
+    for (int i = std::max(from, 0); i < static_cast<int>(trial_.joints.size()); ++i) {
+      if (from < 0 || Carries(from, i))
+        poses[At(i)] = poses[At(trial_.joints[static_cast<size_t>(i)].parent)] * rows_[sample][At(i)];
     }
   }
 }
 
-void Placement::UpdateAll() {
-  for (int i = 0; i < static_cast<int>(trial_.joints.size()); ++i) UpdateRow(i);
-  UpdateFrom(-1);
-}
-
-void Placement::Focus(const std::vector<int>& items) {
-  focus_.assign(subtree_.size(), false);
-  for (const int item : items) {
-    for (int j = items_[static_cast<size_t>(item)].link; j >= 0;
-         j = trial_.joints[static_cast<size_t>(j)].parent)
-      focus_[At(j)] = true;
-  }
-}
-
-void Placement::Unfocus() { focus_.clear(); }
-
-void Placement::Follow() { UpdateFrom(-1); }
-
 void Placement::Set(const Parameter& parameter, double value) {
   SetValue(&trial_, parameter, value);
-  const bool frame =
-      parameter.kind == ParameterKind::kFramePosition || parameter.kind == ParameterKind::kFrameRotation;
-  if (frame) return;
-  const int carrier = CarrierOf(trial_, parameter);
-  if (carrier >= 0) UpdateRow(carrier);
-  UpdateFrom(carrier);
+  if (IsOfFrame(parameter)) return;
+  if (parameter.index >= 0) UpdateRow(parameter.index);
+  UpdateFrom(parameter.index);
 }
 
 void Placement::Replace(const RobotSpec& spec) {
   trial_ = spec;
-  UpdateAll();
+  for (int i = 0; i < static_cast<int>(trial_.joints.size()); ++i) UpdateRow(i);
+  UpdateFrom(-1);
 }
 
 void Placement::Restore(const RobotSpec& spec, const Parameter& parameter) {
-  const int joint = CarrierOf(spec, parameter);
-  const bool frame =
-      parameter.kind == ParameterKind::kFramePosition || parameter.kind == ParameterKind::kFrameRotation;
-  if (frame) {
-    const size_t i = static_cast<size_t>(parameter.index);
+  const auto i = static_cast<size_t>(parameter.index);
+  if (IsOfFrame(parameter)) {
     trial_.frames[i].X_LF = spec.frames[i].X_LF;
     return;
   }
-  if (joint < 0) {
+  if (parameter.index < 0) {
     trial_.base.X_B0 = spec.base.X_B0;
   } else {
-    const size_t i = static_cast<size_t>(joint);
     trial_.joints[i].X_PB = spec.joints[i].X_PB;
     trial_.joints[i].mdh = spec.joints[i].mdh;
-    UpdateRow(joint);
+    UpdateRow(parameter.index);
   }
-  UpdateFrom(joint);
+  UpdateFrom(parameter.index);
 }
 
-void Placement::AppendResidual(int index, std::vector<double>* rows) const {
-  const PlacedItem& item = items_[static_cast<size_t>(index)];
-  const size_t i = static_cast<size_t>(item.index);
+Placement::Difference Placement::CalcDifference(const PlacedItem& item, size_t sample) const {
+  const auto i = static_cast<size_t>(item.index);
+  const StateSample& engine = evidence_->samples()[sample];
+  const Pose& X = poses_[sample][At(item.link)];
   const double length = evidence_->length();
-  const auto append = [&](const auto& difference) {
-    for (const double entry : difference.reshaped()) rows->push_back(entry);
-  };
-  for (size_t sample = 0; sample < used_; ++sample) {
-    const StateSample& engine = evidence_->samples()[sample];
-    const Pose& X = poses_[sample][At(item.link)];
-    switch (item.kind) {
-      case PlacedItem::Kind::kAxisDirection:
-        append(engine.axes[i] - X.linear().col(2));
-        break;
-      case PlacedItem::Kind::kAxisLine: {
-        // Where along the axis the anchor stands is a choice of frames.
-        const Vector3d apart = engine.anchors[i] - X.translation();
-        append(((apart - engine.axes[i].dot(apart) * engine.axes[i]) / length).eval());
-        break;
-      }
-      case PlacedItem::Kind::kFramePosition:
-        append(((engine.frames[i].translation() - X * trial_.frames[i].X_LF.translation()) / length).eval());
-        break;
-      case PlacedItem::Kind::kFrameRotation:
-        append((engine.frames[i].linear() - X.linear() * trial_.frames[i].X_LF.linear()).eval());
-        break;
-      case PlacedItem::Kind::kCom:
-        append(((engine.links[i + 1].com - X * trial_.joints[i].body.com) / length).eval());
-        break;
-      case PlacedItem::Kind::kInertia: {
-        const Matrix3d& inertia = trial_.joints[i].body.inertia;
-        append(
-            ((engine.links[i + 1].inertia - X.linear() * inertia * X.linear().transpose()) / inertia.trace())
-                .eval());
-        break;
-      }
+  switch (item.kind) {
+    case ItemKind::kAxisDirection:
+      return engine.axes[i] - X.linear() * terms_->AxisFrame(trial_.joints[i], item.index).linear().col(2);
+    case ItemKind::kAxisLine: {
+      // Where along the axis the anchor stands is a choice of frames.
+      const Vector3d apart =
+          engine.anchors[i] - X * terms_->AxisFrame(trial_.joints[i], item.index).translation();
+      return (apart - engine.axes[i].dot(apart) * engine.axes[i]) / length;
+    }
+    case ItemKind::kFramePosition:
+      return (engine.frames[i].translation() - X * trial_.frames[i].X_LF.translation()) / length;
+    case ItemKind::kFrameRotation:
+      return engine.frames[i].linear() - X.linear() * trial_.frames[i].X_LF.linear();
+    case ItemKind::kCom:
+      return (engine.links[i + 1].com - X * trial_.joints[i].body.com) / length;
+    case ItemKind::kInertia:
+      break;
+  }
+  const Matrix3d& inertia = trial_.joints[i].body.inertia;
+  return (engine.links[i + 1].inertia - X.linear() * inertia * X.linear().transpose()) / inertia.trace();
+}
+
+VectorXd Placement::CalcResidual(const std::vector<int>& items) const {
+  std::vector<double> rows;
+  for (const int item : items) {
+    for (size_t sample = 0; sample < rows_.size(); ++sample) {
+      const Difference difference = CalcDifference(items_[static_cast<size_t>(item)], sample);
+      rows.insert(rows.end(), difference.data(), difference.data() + difference.size());
     }
   }
+  return Eigen::Map<const VectorXd>(rows.data(), static_cast<Eigen::Index>(rows.size()));
 }
 
-double Placement::CalcError(int item) const {
-  scratch_.clear();
-  AppendResidual(item, &scratch_);
-  double error = 0.0;
-  for (const double entry : scratch_) error = std::max(error, std::abs(entry));
-  return error;
+bool Placement::Fails(int item) const {
+  for (size_t sample = 0; sample < rows_.size(); ++sample) {
+    const Difference difference = CalcDifference(items_[static_cast<size_t>(item)], sample);
+    if (!(difference.cwiseAbs().maxCoeff() <= evidence_->Widen(kPlaceRounding))) return true;
+  }
+  return false;
 }
 
 int Placement::CountWrongNumbers(int index) const {
   if (!Fails(index)) return 0;
   const PlacedItem& item = items_[static_cast<size_t>(index)];
-  if (item.kind != PlacedItem::Kind::kCom && item.kind != PlacedItem::Kind::kInertia) return 3;
-  const Pose& X = poses_[0][At(item.link)];
-  const MassProperties& body = trial_.joints[static_cast<size_t>(item.index)].body;
-  const LinkInWorld& engine = evidence_->samples()[0].links[static_cast<size_t>(item.index + 1)];
-  const double rounding = evidence_->Widen(kPlaceRounding);
-  int wrong = 0;
-  if (item.kind == PlacedItem::Kind::kCom) {
-    const Vector3d difference = X.inverse() * engine.com - body.com;
-    for (const double entry : difference) wrong += std::abs(entry) > rounding * evidence_->length() ? 1 : 0;
-  } else {
-    const Matrix3d difference = X.linear().transpose() * engine.inertia * X.linear() - body.inertia;
-    for (const int entry : {0, 3, 6, 4, 7, 8})
-      wrong += std::abs(difference.data()[entry]) > rounding * body.inertia.trace() ? 1 : 0;
-  }
-  return std::max(wrong, 1);
+  if (!item.IsBody()) return 3;
+  const Matrix3d R_LW = poses_[0][At(item.link)].linear().transpose();
+  Difference own = R_LW * CalcDifference(item, 0);
+  if (item.kind == ItemKind::kInertia) own = Matrix3d(own * R_LW.transpose()).triangularView<Eigen::Lower>();
+  return std::max(1, static_cast<int>((own.array().abs() > evidence_->Widen(kPlaceRounding)).count()));
 }
 
-bool Placement::Fails(int item) const { return !(CalcError(item) <= evidence_->Widen(kPlaceRounding)); }
+bool Placement::IsPlaced(int link) const {
+  for (size_t i = 0; i < items_.size(); ++i) {
+    const PlacedItem& item = items_[i];
+    if (item.IsBody()) continue;
+    const bool carried =
+        item.IsAxis() ? trial_.joints[static_cast<size_t>(item.index)].parent == link : item.link == link;
+    const bool carries = item.IsAxis() && link >= 0 && Carries(item.index, link);
+    if ((carried || carries) && Fails(static_cast<int>(i))) return false;
+  }
+  return true;
+}
 
 }  // namespace dexcheck

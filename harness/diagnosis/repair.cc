@@ -82,12 +82,39 @@ void ReverseAxis(RobotSpec* spec, int joint) {
   }
 }
 
-void SwapRows(RobotSpec* spec, int joint, int other) {
-  std::swap(JointOf(spec, joint).mdh, JointOf(spec, other).mdh);
+std::vector<Repair> SplitByVector(const Repair& cause) {
+  if (cause.kind != RepairKind::kParameters || cause.parameters.size() == 1) return {cause};
+  std::vector<Repair> parts;
+  for (size_t i = 0; i < cause.parameters.size(); ++i) {
+    const Parameter& parameter = cause.parameters[i];
+    auto same = std::find_if(parts.begin(), parts.end(),
+                             [&](const Repair& part) { return part.parameters[0].IsBeside(parameter); });
+    if (same == parts.end()) same = parts.insert(parts.end(), Repair{});
+    same->Add(parameter, cause.values[i]);
+  }
+  return parts;
 }
 
-void SwapPoses(RobotSpec* spec, int joint, int other) {
-  std::swap(JointOf(spec, joint).X_PB, JointOf(spec, other).X_PB);
+void MergeScaledBodies(const RobotSpec& spec, double same, std::vector<Repair>* causes) {
+  for (size_t i = 0; i < causes->size(); ++i) {
+    const Parameter mass = (*causes)[i].parameters[0];
+    if (mass.kind != ParameterKind::kMass || !(GetValue(spec, mass) > 0.0)) continue;
+    const auto inertia = std::find_if(causes->begin(), causes->end(), [&](const Repair& cause) {
+      return cause.parameters[0].IsBeside({ParameterKind::kInertia, mass.index, 0});
+    });
+    if (inertia == causes->end()) continue;
+    RobotSpec scaled = spec;
+    Apply(*inertia, &scaled);
+    const Matrix3d expected =
+        (*causes)[i].values[0] / GetValue(spec, mass) * BodyOf(spec, mass.index).inertia;
+    if ((BodyOf(scaled, mass.index).inertia - expected).norm() > same * expected.norm()) continue;
+    Repair whole = (*causes)[i];
+    for (size_t k = 0; k < inertia->parameters.size(); ++k)
+      whole.Add(inertia->parameters[k], inertia->values[k]);
+    (*causes)[i] = whole;
+    if (static_cast<size_t>(inertia - causes->begin()) < i) --i;
+    causes->erase(inertia);
+  }
 }
 
 void Apply(const Repair& cause, RobotSpec* spec) {
@@ -97,11 +124,13 @@ void Apply(const Repair& cause, RobotSpec* spec) {
         SetValue(spec, cause.parameters[i], cause.values[i]);
       return;
     case RepairKind::kAxisReversed:
-      return ReverseAxis(spec, cause.joint);
+      if (!cause.is_plain) return ReverseAxis(spec, cause.joint);
+      JointOf(spec, cause.joint).mdh.alpha = JointOf(spec, cause.joint).mdh.alpha == 0.0 ? kPi : 0.0;
+      return;
     case RepairKind::kRowsSwapped:
-      return SwapRows(spec, cause.joint, cause.other);
+      return std::swap(JointOf(spec, cause.joint).mdh, JointOf(spec, cause.other).mdh);
     case RepairKind::kPosesSwapped:
-      return SwapPoses(spec, cause.joint, cause.other);
+      return std::swap(JointOf(spec, cause.joint).X_PB, JointOf(spec, cause.other).X_PB);
     case RepairKind::kEngineOnly:
       return;
   }

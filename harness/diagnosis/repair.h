@@ -24,11 +24,17 @@ struct Repair {
   std::vector<double> values;  ///< and the values that repair it.
   int joint = -1;              ///< kAxisReversed and the swaps.
   int other = -1;              ///< The swaps.
+  bool is_plain = false;       ///< kAxisReversed: of a row whose link's frame stays where it is.
   std::string note;            ///< kEngineOnly, in words.
 
   double explained = 0.0;  ///< Fraction of all residuals that the repair removes, after the causes before it.
   double explained_of_forces = 0.0;  ///< The same of the forces alone.
   std::vector<Repair> equivalents;   ///< Other repairs that remove just as much.
+
+  void Add(const Parameter& parameter, double value) {
+    parameters.push_back(parameter);
+    values.push_back(value);
+  }
 };
 
 /// The repair.
@@ -39,10 +45,13 @@ std::string Describe(const Repair& cause, const RobotSpec& spec, const std::stri
 /// "link r_forearm: mass".
 std::string DescribeShort(const Repair& cause, const RobotSpec& spec);
 
+/// A repair for each vector or tensor of which it changes numbers.
+std::vector<Repair> SplitByVector(const Repair& cause);
+/// Makes one repair of a mass and an inertia that grow alike, to `same`: a solid of another mass.
+void MergeScaledBodies(const RobotSpec& spec, double same, std::vector<Repair>* causes);
+
 /// The joint turns the other way: q_i becomes -q_i, and at q_i = 0 nothing moves.
 void ReverseAxis(RobotSpec* spec, int joint);
-void SwapRows(RobotSpec* spec, int joint, int other);
-void SwapPoses(RobotSpec* spec, int joint, int other);
 
 /// Decimal digits that the value needs, in the units of a parameter file; 0 for zero. People write few.
 int CountDigits(const RobotSpec& spec, const Parameter& parameter, double value);

@@ -61,16 +61,17 @@ void ExpectNamed(const std::string& text, const mjModel& engine, const std::stri
   SCOPED_TRACE(part + ": " + quantity);
   std::vector<WrittenRow> rows;
   const RobotModel model = ParseRobotModel(text, "robot.toml", {}, &rows);
-  const Diagnosis diagnosis = Diagnose(model, engine, "robot.xml", options, [](const char*) { return true; });
+  const Diagnosis diagnosis = Diagnose(
+      model, engine, "robot.xml", options, [](const char*) { return true; }, rows);
   EXPECT_FALSE(diagnosis.agrees);
   EXPECT_TRUE(diagnosis.remaining_constants.empty());
   EXPECT_TRUE(diagnosis.remaining_terms.empty());
-  const FileTerms terms(model.spec(), rows);
-  const std::vector<Repair> causes = terms.Convert(diagnosis.causes);
-  ASSERT_EQ(causes.size(), 1U) << Describe(causes.back(), terms.written(), "FILE");
-  ASSERT_EQ(causes[0].parameters.size(), 1U) << Describe(causes[0], terms.written(), "FILE");
-  EXPECT_EQ(DescribeShort(causes[0], terms.written()), part + ": " + quantity);
-  const bool is_angle = IsAngle(terms.written(), causes[0].parameters[0]);
+  const std::vector<Repair>& causes = diagnosis.causes;
+  const RobotSpec& written = diagnosis.written;
+  ASSERT_EQ(causes.size(), 1U) << Describe(causes.back(), written, "FILE");
+  ASSERT_EQ(causes[0].parameters.size(), 1U) << Describe(causes[0], written, "FILE");
+  EXPECT_EQ(DescribeShort(causes[0], written), part + ": " + quantity);
+  const bool is_angle = IsAngle(written, causes[0].parameters[0]);
   // Thirteen digits are printed, of angles in degrees.
   EXPECT_NEAR(causes[0].values[0], right, (is_angle ? 1e-12 : 1e-13) * std::max(1.0, std::abs(right)));
 }
@@ -182,17 +183,28 @@ TEST(FileTermsTest, SlantedAxesAreTurnedBack) {
   expect({"name = \"tip\"", "xyz = [", 2}, 0.03, "frame tip", "position z");
 }
 
-// Rows of modified parameters stand in the file as in the specification.
-TEST(FileTermsTest, RowsOfModifiedParametersStay) {
+// Rows of modified parameters stand in the file as in the specification; plain ones are read back.
+TEST(FileTermsTest, NumbersAreReadAsTheyAreWritten) {
   std::mt19937 random(12);
   const RobotSpec spec = MakeRandomRobot({}, &random);
-  const FileTerms terms(spec, {});
-  Repair cause;
-  cause.parameters = {{ParameterKind::kAlpha, 1, 0}};
-  cause.values = {0.1};
-  EXPECT_EQ(terms.Convert({cause}).at(0).parameters, cause.parameters);
+  const RobotSpec written = FileTerms({}).Write(spec);
   for (const Parameter& parameter : ListParameters(spec))
-    EXPECT_EQ(GetValue(terms.written(), parameter), GetValue(spec, parameter));
+    EXPECT_EQ(GetValue(written, parameter), GetValue(spec, parameter));
+  std::vector<WrittenRow> rows(spec.joints.size());
+  for (size_t i = 0; i < rows.size(); i += 2) {
+    rows[i].is_plain = true;
+    rows[i].X_iL.linear() = Eigen::AngleAxisd(0.3 + static_cast<double>(i), Vector3d(1, 2, 2) / 3.0).matrix();
+  }
+  const FileTerms terms(rows);
+  const RobotModel before(spec);
+  const RobotModel after(terms.Read(terms.Write(spec)));
+  ModelTerms a(before);
+  ModelTerms b(after);
+  const VectorXd q = DrawPositions(before, &random);
+  a.SetState(q, VectorXd::Zero(a.size()));
+  b.SetState(q, VectorXd::Zero(b.size()));
+  for (int i = 0; i < static_cast<int>(spec.frames.size()); ++i)
+    EXPECT_LT((a.CalcFramePose(i).matrix() - b.CalcFramePose(i).matrix()).norm(), 1e-13);
 }
 
 }  // namespace
