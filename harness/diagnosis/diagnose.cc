@@ -148,7 +148,7 @@ class Diagnostician {
     }
     RobotSpec repaired = result_.repaired;
     Apply(printed, &repaired);
-    if (!TryModel(setup_.terms.Read(repaired)) || MakesImpossible(file_, repaired)) return false;
+    if (!setup_.TryModel(repaired) || MakesImpossible(file_, repaired)) return false;
     result_.repaired = std::move(repaired);
     // Of a number that is repaired again, the last value holds, in whatever order the repairs are printed.
     for (Repair& earlier : result_.causes) ForgetNumbers(printed.parameters, &earlier);
@@ -169,7 +169,7 @@ class Diagnostician {
   void WalkGeometry() {
     const Trial trial(result_.repaired, setup_);
     const auto force_error = [&](const RobotSpec& written) {
-      const std::optional<RobotModel> model = TryModel(setup_.terms.Read(written));
+      const std::optional<RobotModel> model = setup_.TryModel(written);
       return model ? trial.evidence().CalcForceResidual(*model).norm()
                    : std::numeric_limits<double>::infinity();
     };
@@ -178,16 +178,15 @@ class Diagnostician {
 
   void FitBodies() {
     const Trial trial(result_.repaired, setup_);
-    const ForceFit fit(trial.written(), setup_.terms, trial.evidence());
-    result_.ranking = fit.Rank();
-    Accept(setup_.options.by_motion ? fit.Run() : trial.ReadBodies());
+    result_.ranking = RankByForces(trial);
+    Accept(setup_.options.by_motion ? FitForces(trial) : trial.ReadBodies());
   }
 
-  /// The file with repairs made, in their order, at other states too; none when that is no robot.
+  /// The file with repairs made, in their order; none when that is no robot.
   [[nodiscard]] std::unique_ptr<Trial> Try(const std::vector<Repair>& causes) const {
     RobotSpec written = file_;
     for (const Repair& cause : causes) Apply(cause, &written);
-    if (!TryModel(setup_.terms.Read(written))) return nullptr;
+    if (!setup_.TryModel(written)) return nullptr;
     return std::make_unique<Trial>(std::move(written), setup_);
   }
 

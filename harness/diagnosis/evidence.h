@@ -53,7 +53,6 @@ class EngineEvidence {
   }
 
  private:
-  void AddSample(const VectorXd& q, const VectorXd& xi, const Adapter& adapter, EngineTerms* terms);
   /// By coordinate, block after block; a column for each sample.
   [[nodiscard]] MatrixXd CalcRawForces(const RobotModel& variant) const;
   /// @param roots of the engine's M_ii; a column for each sample.

@@ -10,9 +10,10 @@ namespace dexcheck {
 namespace {
 
 using Kind = ParameterKind;
+using Numbers = std::vector<Parameter>;
 
 // Residuals are relative to their own sizes. Rounding leaves some 1e-12 of a finger's forces.
-constexpr double kRounding = 1e-10;
+constexpr double kForceRounding = 1e-10;
 
 /// The robot with larger inertias, in which the forces are linear: one that is possible whichever number
 /// changes.
@@ -36,178 +37,177 @@ double CalcStep(const RobotSpec& spec, const Parameter& number) {
   return kLinear * GetScale(spec, number);
 }
 
-VectorXd GetScales(const RobotSpec& spec, const std::vector<Parameter>& numbers) {
-  VectorXd scales(static_cast<Eigen::Index>(numbers.size()));
-  for (size_t i = 0; i < numbers.size(); ++i)
-    scales[static_cast<Eigen::Index>(i)] = GetScale(spec, numbers[i]);
-  return scales;
-}
+class ForceFit {
+ public:
+  explicit ForceFit(const Trial& trial)
+      : trial_(trial), evidence_(trial.evidence()), start_{{}, trial.written(), CalcResidual(trial.model())} {
+    for (const Parameter& number : ListParameters(spec())) {
+      const bool needs_mass = number.kind == Kind::kCom || number.kind == Kind::kInertia;
+      if (IsDynamic(number.kind) && (!needs_mass || BodyOf(spec(), number.index).mass > 0.0))
+        candidates_.push_back(number);
+    }
+    if (!IsSolved(start_)) columns_ = CalcColumns(spec(), candidates_);
+    for (Eigen::Index i = 0; i < columns_.cols(); ++i) {
+      const double size = columns_.col(i).norm();
+      if (size > 0.0) ranking_.emplace_back(std::abs(columns_.col(i).dot(start_.residual)) / size, i);
+    }
+    std::stable_sort(ranking_.begin(), ranking_.end(),
+                     [](const auto& a, const auto& b) { return a.first > b.first; });
+  }
+
+  [[nodiscard]] std::vector<std::pair<Repair, double>> Rank() const {
+    constexpr size_t kRanked = 5;
+    std::vector<std::pair<Repair, double>> ranking;
+    for (const auto& [gain, i] : ranking_) {
+      if (!(gain > 0.0) || ranking.size() == kRanked) break;
+      const Parameter& number = candidates_[static_cast<size_t>(i)];
+      ranking.emplace_back(Repair{}, gain * gain / start_.residual.squaredNorm());
+      ranking.back().first.Add(number, GetValue(spec(), number));
+    }
+    return ranking;
+  }
+
+  [[nodiscard]] std::vector<Repair> Run() const {
+    constexpr size_t kSingles = 8;
+    std::vector<Repair> whole;
+    const auto add_solved = [&](const Solution& solution) {
+      if (IsSolved(solution) && !solution.numbers.empty()) whole.push_back(ToCause(solution));
+    };
+    for (size_t k = 0; k < std::min(kSingles, ranking_.size()); ++k)
+      add_solved(Solve({candidates_[static_cast<size_t>(ranking_[k].second)]}));
+    if (whole.empty() && columns_.size() > 0) add_solved(Select());
+    if (whole.empty()) return {};
+    std::stable_sort(whole.begin(), whole.end(),
+                     [&](const Repair& a, const Repair& b) { return IsLikelier(a, b, spec()); });
+    std::vector<Repair> causes = SplitByVector(whole.front());
+    MergeScaledBodies(spec(), evidence_.Widen(1e-8), &causes);
+    if (causes.size() == 1) causes.front().equivalents.assign(whole.begin() + 1, whole.end());
+    return causes;
+  }
+
+ private:
+  /// The file when only these numbers change.
+  struct Solution {
+    Numbers numbers;
+    RobotSpec repaired;
+    VectorXd residual;
+  };
+  [[nodiscard]] const RobotSpec& spec() const { return trial_.written(); }
+  [[nodiscard]] VectorXd CalcResidual(const RobotModel& model) const {
+    return evidence_.CalcForceResidual(model);
+  }
+  [[nodiscard]] bool IsSolved(const Solution& solution) const {
+    return solution.residual.cwiseAbs().maxCoeff() <= evidence_.Widen(kForceRounding);
+  }
+
+  /// What each number does to the forces, by its scale.
+  [[nodiscard]] MatrixXd CalcColumns(const RobotSpec& at, const Numbers& numbers) const {
+    MatrixXd columns = MatrixXd::Zero(start_.residual.size(), static_cast<Eigen::Index>(numbers.size()));
+    RobotSpec trial = Pad(at);
+    const std::optional<RobotModel> here = trial_.setup().TryModel(trial);
+    if (!here) return columns;
+    const VectorXd before = CalcResidual(*here);
+    for (size_t i = 0; i < numbers.size(); ++i) {
+      const double value = GetValue(trial, numbers[i]);
+      const double step = CalcStep(trial, numbers[i]);
+      SetValue(&trial, numbers[i], value + step);
+      if (const std::optional<RobotModel> there = trial_.setup().TryModel(trial))
+        columns.col(static_cast<Eigen::Index>(i)) =
+            (before - CalcResidual(*there)) * (GetScale(spec(), numbers[i]) / step);
+      SetValue(&trial, numbers[i], value);
+    }
+    return columns;
+  }
+
+  /// By Gauss-Newton steps; without numbers that stay as they were.
+  [[nodiscard]] Solution Solve(const Numbers& numbers) const {
+    constexpr int kMaxIterations = 8;
+    constexpr double kConverged = 1e-13;
+    constexpr double kNothing = 1e-9;  // what should be zero must not become a negative mass
+    Solution solution = start_;
+    for (int iteration = 0; iteration < kMaxIterations; ++iteration) {
+      const VectorXd step =
+          CalcColumns(solution.repaired, numbers).completeOrthogonalDecomposition().solve(solution.residual);
+      RobotSpec next = solution.repaired;
+      for (size_t i = 0; i < numbers.size(); ++i) {
+        const double scale = GetScale(spec(), numbers[i]);
+        const double value = GetValue(next, numbers[i]) + step[static_cast<Eigen::Index>(i)] * scale;
+        SetValue(&next, numbers[i], std::abs(value) < kNothing * scale ? 0.0 : value);
+      }
+      const std::optional<RobotModel> model = trial_.setup().TryModel(next);
+      if (!model) break;
+      const VectorXd residual = CalcResidual(*model);
+      if (!(residual.squaredNorm() <= solution.residual.squaredNorm())) break;
+      solution = {{}, std::move(next), residual};
+      if (step.cwiseAbs().maxCoeff() < kConverged) break;
+    }
+    const double few = evidence_.Widen(1e-9);
+    for (const Parameter& number : numbers) {
+      const double change = GetValue(solution.repaired, number) - GetValue(spec(), number);
+      const double size = number.kind == Kind::kInertia ? BodyOf(spec(), number.index).inertia.trace()
+                                                        : GetScale(spec(), number);
+      if (std::abs(change) > few * size) solution.numbers.push_back(number);
+    }
+    return solution;
+  }
+
+  /// Numbers, vectors and tensors by the estimator, which is asked again where the columns are others.
+  [[nodiscard]] Solution Select() const {
+    constexpr int kRounds = 4;
+    CauseOptions options;
+    options.most_terms = 8;
+    options.restarts = 0;
+    Solution solution = start_;
+    for (int round = 0; round < kRounds && !IsSolved(solution); ++round) {
+      const MatrixXd columns = CalcColumns(solution.repaired, candidates_);
+      std::vector<Candidate> candidates;
+      std::vector<Numbers> sets;
+      const auto add = [&](size_t begin, size_t end) {
+        sets.emplace_back(candidates_.begin() + static_cast<std::ptrdiff_t>(begin),
+                          candidates_.begin() + static_cast<std::ptrdiff_t>(end));
+        candidates.emplace_back().columns =
+            columns.middleCols(static_cast<Eigen::Index>(begin), static_cast<Eigen::Index>(end - begin));
+      };
+      for (size_t begin = 0, i = 0; i < candidates_.size(); ++i) {
+        add(i, i + 1);
+        const bool ends = i + 1 == candidates_.size() || !candidates_[i + 1].IsBeside(candidates_[i]);
+        if (ends && begin < i) add(begin, i + 1);
+        if (ends) begin = i + 1;
+      }
+      Numbers chosen = solution.numbers;
+      const CauseSelection selection =
+          SelectCauses(solution.residual / evidence_.Widen(kForceRounding), candidates, options);
+      for (const CauseTerm& term : selection.terms) {
+        for (const Parameter& number : sets[term.candidate]) {
+          if (std::find(chosen.begin(), chosen.end(), number) == chosen.end()) chosen.push_back(number);
+        }
+      }
+      if (chosen.size() == solution.numbers.size()) break;
+      solution = Solve(chosen);
+    }
+    return solution;
+  }
+
+  [[nodiscard]] Repair ToCause(const Solution& solution) const {
+    Repair cause;
+    for (const Parameter& number : solution.numbers) {
+      const double value = GetValue(solution.repaired, number);
+      cause.Add(number, RoundWithin(spec(), number, value, evidence_.CalcSolvedDigits()));
+    }
+    return cause;
+  }
+
+  const Trial& trial_;
+  const EngineEvidence& evidence_;
+  Solution start_;
+  Numbers candidates_;
+  MatrixXd columns_;                                      // at the start, of all candidates
+  std::vector<std::pair<double, Eigen::Index>> ranking_;  // of columns: what each takes from the residual
+};
 
 }  // namespace
 
-ForceFit::ForceFit(const RobotSpec& written, const FileTerms& terms, const EngineEvidence& evidence)
-    : spec_(written), terms_(terms), evidence_(evidence) {
-  residual_ = evidence.CalcForceResidual(RobotModel(terms.Read(written)));
-  for (const Parameter& number : ListParameters(written)) {
-    const bool needs_mass = number.kind == Kind::kCom || number.kind == Kind::kInertia;
-    if (IsDynamic(number.kind) && (!needs_mass || BodyOf(written, number.index).mass > 0.0))
-      candidates_.push_back(number);
-  }
-  if (!IsSolved(residual_)) columns_ = CalcColumns(written, candidates_);
-}
-
-bool ForceFit::IsSolved(const VectorXd& residual) const {
-  return residual.cwiseAbs().maxCoeff() <= evidence_.Widen(kRounding);
-}
-
-MatrixXd ForceFit::CalcColumns(const RobotSpec& at, const Numbers& numbers) const {
-  MatrixXd columns = MatrixXd::Zero(residual_.size(), static_cast<Eigen::Index>(numbers.size()));
-  RobotSpec trial = Pad(at);
-  const std::optional<RobotModel> here = TryModel(terms_.Read(trial));
-  if (!here) return columns;
-  const VectorXd forces = evidence_.CalcForces(*here);
-  for (size_t i = 0; i < numbers.size(); ++i) {
-    const double value = GetValue(trial, numbers[i]);
-    const double step = CalcStep(trial, numbers[i]);
-    SetValue(&trial, numbers[i], value + step);
-    if (const std::optional<RobotModel> there = TryModel(terms_.Read(trial)))
-      columns.col(static_cast<Eigen::Index>(i)) =
-          (evidence_.CalcForces(*there) - forces) * (GetScale(spec_, numbers[i]) / step);
-    SetValue(&trial, numbers[i], value);
-  }
-  return columns;
-}
-
-std::vector<std::pair<double, size_t>> ForceFit::SortByGain() const {
-  std::vector<std::pair<double, size_t>> gains;
-  for (Eigen::Index i = 0; i < columns_.cols(); ++i) {
-    const double size = columns_.col(i).norm();
-    if (size > 0.0)
-      gains.emplace_back(std::abs(columns_.col(i).dot(residual_)) / size, static_cast<size_t>(i));
-  }
-  std::stable_sort(gains.begin(), gains.end(),
-                   [](const auto& a, const auto& b) { return a.first > b.first; });
-  return gains;
-}
-
-std::vector<std::pair<Repair, double>> ForceFit::Rank() const {
-  constexpr size_t kRanked = 5;
-  std::vector<std::pair<Repair, double>> ranking;
-  for (const auto& [gain, candidate] : SortByGain()) {
-    if (!(gain > 0.0) || ranking.size() == kRanked) break;
-    Repair cause;
-    cause.Add(candidates_[candidate], GetValue(spec_, candidates_[candidate]));
-    ranking.emplace_back(cause, gain * gain / residual_.squaredNorm());
-  }
-  return ranking;
-}
-
-ForceFit::Solution ForceFit::Solve(const Numbers& numbers) const {
-  constexpr int kMaxIterations = 8;
-  constexpr double kConverged = 1e-13;
-  constexpr double kNothing = 1e-9;  // what should be zero must not become a negative mass
-  const VectorXd scales = GetScales(spec_, numbers);
-  Solution solution{numbers, spec_, residual_};
-  for (int iteration = 0; iteration < kMaxIterations; ++iteration) {
-    const VectorXd step =
-        CalcColumns(solution.repaired, numbers).completeOrthogonalDecomposition().solve(solution.residual);
-    RobotSpec next = solution.repaired;
-    for (size_t i = 0; i < numbers.size(); ++i) {
-      const double scale = scales[static_cast<Eigen::Index>(i)];
-      const double value = GetValue(next, numbers[i]) + step[static_cast<Eigen::Index>(i)] * scale;
-      SetValue(&next, numbers[i], std::abs(value) < kNothing * scale ? 0.0 : value);
-    }
-    const std::optional<RobotModel> model = TryModel(terms_.Read(next));
-    if (!model) break;
-    const VectorXd residual = evidence_.CalcForceResidual(*model);
-    if (!(residual.squaredNorm() <= solution.residual.squaredNorm())) break;
-    solution.repaired = std::move(next);
-    solution.residual = residual;
-    if (step.cwiseAbs().maxCoeff() < kConverged) break;
-  }
-  // Numbers that stay as they were.
-  const double few = evidence_.Widen(1e-9);
-  std::erase_if(solution.numbers, [&](const Parameter& number) {
-    const double change = GetValue(solution.repaired, number) - GetValue(spec_, number);
-    const double size =
-        number.kind == Kind::kInertia ? BodyOf(spec_, number.index).inertia.trace() : GetScale(spec_, number);
-    return std::abs(change) <= few * size;
-  });
-  return solution;
-}
-
-std::vector<ForceFit::Solution> ForceFit::SolveSingly() const {
-  constexpr size_t kTried = 8;
-  std::vector<Solution> solved;
-  const std::vector<std::pair<double, size_t>> gains = SortByGain();
-  for (size_t i = 0; i < std::min(kTried, gains.size()); ++i) {
-    Solution solution = Solve({candidates_[gains[i].second]});
-    if (IsSolved(solution.residual) && !solution.numbers.empty()) solved.push_back(std::move(solution));
-  }
-  return solved;
-}
-
-/// Numbers, vectors and tensors by the estimator, which is asked again where the columns are others.
-ForceFit::Solution ForceFit::Select() const {
-  constexpr int kRounds = 4;
-  CauseOptions options;
-  options.most_terms = 8;
-  options.restarts = 0;
-  Solution solution{{}, spec_, residual_};
-  for (int round = 0; round < kRounds && !IsSolved(solution.residual); ++round) {
-    const MatrixXd columns = round == 0 ? columns_ : CalcColumns(solution.repaired, candidates_);
-    std::vector<Candidate> candidates;
-    std::vector<Numbers> numbers;
-    for (size_t i = 0; i < candidates_.size();) {
-      Numbers whole;
-      const size_t first = i;
-      for (; i < candidates_.size() && candidates_[i].IsBeside(candidates_[first]); ++i) {
-        whole.push_back(candidates_[i]);
-        candidates.emplace_back().columns = columns.col(static_cast<Eigen::Index>(i));
-        numbers.push_back({candidates_[i]});
-      }
-      if (whole.size() == 1) continue;
-      candidates.emplace_back().columns =
-          columns.middleCols(static_cast<Eigen::Index>(first), static_cast<Eigen::Index>(whole.size()));
-      numbers.push_back(whole);
-    }
-    const CauseSelection selection =
-        SelectCauses(solution.residual / evidence_.Widen(kRounding), candidates, options);
-    Numbers chosen = solution.numbers;
-    for (const CauseTerm& term : selection.terms) {
-      for (const Parameter& number : numbers[term.candidate]) {
-        if (std::find(chosen.begin(), chosen.end(), number) == chosen.end()) chosen.push_back(number);
-      }
-    }
-    if (chosen.size() == solution.numbers.size()) break;
-    solution = Solve(chosen);
-  }
-  return solution;
-}
-
-Repair ForceFit::ToCause(const Solution& solution) const {
-  Repair cause;
-  for (const Parameter& number : solution.numbers)
-    cause.Add(number,
-              RoundWithin(spec_, number, GetValue(solution.repaired, number), evidence_.CalcSolvedDigits()));
-  return cause;
-}
-
-std::vector<Repair> ForceFit::Run() const {
-  if (columns_.size() == 0) return {};
-  std::vector<Repair> whole;
-  for (const Solution& solution : SolveSingly()) whole.push_back(ToCause(solution));
-  if (whole.empty()) {
-    const Solution solution = Select();
-    if (!IsSolved(solution.residual) || solution.numbers.empty()) return {};
-    whole.push_back(ToCause(solution));
-  }
-  std::stable_sort(whole.begin(), whole.end(),
-                   [&](const Repair& a, const Repair& b) { return IsLikelier(a, b, spec_); });
-  std::vector<Repair> causes = SplitByVector(whole.front());
-  MergeScaledBodies(spec_, evidence_.Widen(1e-8), &causes);
-  if (causes.size() == 1) causes.front().equivalents.assign(whole.begin() + 1, whole.end());
-  return causes;
-}
+std::vector<std::pair<Repair, double>> RankByForces(const Trial& trial) { return ForceFit(trial).Rank(); }
+std::vector<Repair> FitForces(const Trial& trial) { return ForceFit(trial).Run(); }
 
 }  // namespace dexcheck

@@ -18,6 +18,10 @@ struct TrialSetup {
   std::string source;  ///< Of the engine's model.
   DiagnosisOptions options;
   FileTerms terms;
+
+  [[nodiscard]] std::optional<RobotModel> TryModel(const RobotSpec& written) const {
+    return dexcheck::TryModel(terms.Read(written));
+  }
 };
 
 class Trial {
@@ -28,6 +32,7 @@ class Trial {
   Trial(const Trial&) = delete;
   Trial& operator=(const Trial&) = delete;
 
+  [[nodiscard]] const TrialSetup& setup() const { return *setup_; }
   [[nodiscard]] const RobotSpec& written() const { return written_; }
   [[nodiscard]] const RobotModel& model() const { return model_; }
   [[nodiscard]] const EngineEvidence& evidence() const { return evidence_; }
