@@ -96,11 +96,6 @@ void Print(const DiagnoseRequest& request, const RobotModel& model, const Diagno
     number += static_cast<int>(rounded.size());
   }
   if (number > 1) fmt::print("Together: {:.4g} %.\n", 100.0 * diagnosis.explained);
-  if (!request.quiet && diagnosis.causes.size() > 1 && diagnosis.ranking.size() > 1) {
-    fmt::print("One number alone (masses, inertias, joint constants, gravity) would explain at most:\n");
-    for (const auto& [cause, fraction] : diagnosis.ranking)
-      fmt::print("  {:5.2g} %  {}\n", 100.0 * fraction, DescribeShort(cause, written));
-  }
   if (IsRepairedWholly(diagnosis)) {
     fmt::print("With {} the two agree to {}.\n", number == 1 ? "it repaired" : "these repaired",
                request.DescribeTolerance());

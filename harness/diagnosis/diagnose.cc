@@ -178,7 +178,6 @@ class Diagnostician {
 
   void FitBodies() {
     const Trial trial(result_.repaired, setup_);
-    result_.ranking = RankByForces(trial);
     Accept(setup_.options.by_motion ? FitForces(trial) : trial.ReadBodies());
   }
 

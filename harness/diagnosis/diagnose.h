@@ -4,7 +4,6 @@
 
 #include <functional>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "controller/model/parameter_reader.h"
@@ -29,8 +28,6 @@ struct Diagnosis {
   std::vector<Repair> causes;  ///< The one that explains most first.
   double explained = 0.0;      ///< Fraction of all residuals, squared and scaled, that they explain together.
   double explained_of_forces = 0.0;
-  std::vector<std::pair<Repair, double>>
-      ranking;  ///< Single numbers by the fraction of the forces' residuals explained.
   std::vector<ConstantFinding> remaining_constants;  ///< What disagrees after all repairs.
   std::vector<CheckRecord> remaining_terms;          ///< Failed checks after all repairs.
   RobotSpec written;   ///< The model's numbers as they stand in its file, which is what the causes change;

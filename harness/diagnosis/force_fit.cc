@@ -46,36 +46,16 @@ class ForceFit {
       if (IsDynamic(number.kind) && (!needs_mass || BodyOf(spec(), number.index).mass > 0.0))
         candidates_.push_back(number);
     }
-    if (!IsSolved(start_)) columns_ = CalcColumns(spec(), candidates_);
-    for (Eigen::Index i = 0; i < columns_.cols(); ++i) {
-      const double size = columns_.col(i).norm();
-      if (size > 0.0) ranking_.emplace_back(std::abs(columns_.col(i).dot(start_.residual)) / size, i);
-    }
-    std::stable_sort(ranking_.begin(), ranking_.end(),
-                     [](const auto& a, const auto& b) { return a.first > b.first; });
-  }
-
-  [[nodiscard]] std::vector<std::pair<Repair, double>> Rank() const {
-    constexpr size_t kRanked = 5;
-    std::vector<std::pair<Repair, double>> ranking;
-    for (const auto& [gain, i] : ranking_) {
-      if (!(gain > 0.0) || ranking.size() == kRanked) break;
-      const Parameter& number = candidates_[static_cast<size_t>(i)];
-      ranking.emplace_back(Repair{}, gain * gain / start_.residual.squaredNorm());
-      ranking.back().first.Add(number, GetValue(spec(), number));
-    }
-    return ranking;
   }
 
   [[nodiscard]] std::vector<Repair> Run() const {
-    constexpr size_t kSingles = 8;
+    if (IsSolved(start_)) return {};
     std::vector<Repair> whole;
     const auto add_solved = [&](const Solution& solution) {
       if (IsSolved(solution) && !solution.numbers.empty()) whole.push_back(ToCause(solution));
     };
-    for (size_t k = 0; k < std::min(kSingles, ranking_.size()); ++k)
-      add_solved(Solve({candidates_[static_cast<size_t>(ranking_[k].second)]}));
-    if (whole.empty() && columns_.size() > 0) add_solved(Select());
+    for (const Parameter& number : ListLikeliest()) add_solved(Solve({number}));
+    if (whole.empty()) add_solved(Select());
     if (whole.empty()) return {};
     std::stable_sort(whole.begin(), whole.end(),
                      [&](const Repair& a, const Repair& b) { return IsLikelier(a, b, spec()); });
@@ -117,6 +97,23 @@ class ForceFit {
       SetValue(&trial, numbers[i], value);
     }
     return columns;
+  }
+
+  /// Numbers that explain most by themselves.
+  [[nodiscard]] Numbers ListLikeliest() const {
+    constexpr size_t kLikeliest = 8;
+    const MatrixXd columns = CalcColumns(spec(), candidates_);
+    std::vector<std::pair<double, Parameter>> gains;
+    for (size_t i = 0; i < candidates_.size(); ++i) {
+      const auto column = columns.col(static_cast<Eigen::Index>(i));
+      if (column.norm() > 0.0)
+        gains.emplace_back(std::abs(column.dot(start_.residual)) / column.norm(), candidates_[i]);
+    }
+    std::stable_sort(gains.begin(), gains.end(),
+                     [](const auto& a, const auto& b) { return a.first > b.first; });
+    Numbers likeliest;
+    for (size_t i = 0; i < std::min(kLikeliest, gains.size()); ++i) likeliest.push_back(gains[i].second);
+    return likeliest;
   }
 
   /// By Gauss-Newton steps; without numbers that stay as they were.
@@ -201,13 +198,10 @@ class ForceFit {
   const EngineEvidence& evidence_;
   Solution start_;
   Numbers candidates_;
-  MatrixXd columns_;                                      // at the start, of all candidates
-  std::vector<std::pair<double, Eigen::Index>> ranking_;  // of columns: what each takes from the residual
 };
 
 }  // namespace
 
-std::vector<std::pair<Repair, double>> RankByForces(const Trial& trial) { return ForceFit(trial).Rank(); }
 std::vector<Repair> FitForces(const Trial& trial) { return ForceFit(trial).Run(); }
 
 }  // namespace dexcheck

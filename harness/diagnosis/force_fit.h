@@ -3,15 +3,11 @@
 // Errors of masses, centres of mass, inertias, armature, damping and gravity, solved for by what the forces
 // disagree in: what these do not show stays unknown.
 
-#include <utility>
 #include <vector>
 
 #include "harness/diagnosis/trial.h"
 
 namespace dexcheck {
-
-/// Single numbers by the fraction of the forces' disagreement that each explains by itself, the first few.
-std::vector<std::pair<Repair, double>> RankByForces(const Trial& trial);
 
 /// The fewest causes, a single number before others; none when not all of the disagreement is explained.
 /// @param trial has the right geometry.
