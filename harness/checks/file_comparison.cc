@@ -16,8 +16,8 @@
 #include "harness/descriptions/engine_extras.h"
 #include "harness/descriptions/engine_provider.h"
 #include "harness/descriptions/join_names.h"
-#include "harness/descriptions/link_frames.h"
 #include "harness/descriptions/mjcf_reader.h"
+#include "harness/descriptions/own_rows.h"
 #include "harness/descriptions/read_description.h"
 #include "harness/engine/engine.h"
 

@@ -1,11 +1,10 @@
-#include "harness/descriptions/body_search.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <map>
 
 #include "controller/common/text.h"
+#include "harness/descriptions/finding.h"
 
 namespace dexcheck {
 namespace {

@@ -10,8 +10,8 @@
 
 #include "controller/model/body_frame.h"
 #include "harness/descriptions/join_names.h"
-#include "harness/descriptions/link_frames.h"
 #include "harness/descriptions/mjcf_reader.h"
+#include "harness/descriptions/own_rows.h"
 #include "harness/engine/engine.h"
 #include "harness/engine/mjcf_file.h"
 #include "harness/engine/xml.h"

@@ -10,7 +10,7 @@
 
 #include "harness/descriptions/constant_table.h"
 #include "harness/descriptions/description_match.h"
-#include "harness/descriptions/engine_only.h"
+#include "harness/descriptions/engine_extras.h"
 #include "harness/descriptions/join_names.h"
 #include "harness/engine/engine.h"
 #include "harness/engine/exact_collision.h"

@@ -37,4 +37,10 @@ Extras CompareExtras(const RobotDescription& first, MjModelPtr first_engine, con
 /// only the first one's finds is a difference the other way round.
 void AddExtras(const Extras& extras, ConstantChecks* constants);
 
+/// Adds to `result` what the MJCF has and the analytic model has no number for: tendons' forces, equality
+/// constraints, motors that are no plain torque sources, flags, contacts with friction, distance or a floor
+/// that the model does not know. Anything but the neutral value is a finding. What a run of the plant
+/// overrides or judges (contacts, solver, motors' limits) becomes a note.
+void FindEngineOnly(const Adapter& adapter, ConstantChecks* result);
+
 }  // namespace dexcheck

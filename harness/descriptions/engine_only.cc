@@ -1,5 +1,3 @@
-#include "harness/descriptions/engine_only.h"
-
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -10,6 +8,7 @@
 #include <string>
 
 #include "harness/descriptions/constant_table.h"
+#include "harness/descriptions/engine_extras.h"
 #include "harness/engine/engine.h"
 #include "harness/engine/exact_collision.h"
 #include "harness/engine/mujoco_release.h"

@@ -1,11 +1,11 @@
 #pragma once
 
-// What was found of a difference, before it is put into words.
+// What was found of a difference, before it is put into words, in bodies and in rows.
 
 #include <string>
 #include <vector>
 
-#include "harness/descriptions/hypotheses.h"
+#include "harness/descriptions/row_search.h"
 
 namespace dexcheck {
 
@@ -21,6 +21,13 @@ struct Finding {
   size_t cells = 0;  ///< Quantities of parts that it explains.
 };
 
-Hypothesis ToHypothesis(const Finding& finding, size_t all_cells);
+/// Conventions that many links share first, then bodies that are exchanged or shifted by one in the list,
+/// then what single links have; at last the numbers that nothing explains.
+std::vector<Finding> SearchBodies(std::vector<LinkBody> bodies, const Closeness& close);
+
+std::vector<Finding> ReportRows(const RobotDescription& robot, const std::vector<RowFinding>& rows);
+
+/// Adds what the row of another joint explains as well. @param joint -1: the base.
+void AddElsewhere(const RobotDescription& robot, const RowFinding& row, int joint, Finding* finding);
 
 }  // namespace dexcheck

@@ -1,6 +1,7 @@
 #pragma once
 
-// A robot joint by joint as its file has it: each link in its own frame, placed in its parent's.
+// A robot joint by joint as its file has it: each link in its own frame, placed in its parent's. Where the
+// links of two descriptions are in each other, and a frame on each link that has no common one.
 
 #include <vector>
 
@@ -31,5 +32,21 @@ std::vector<OwnRow> ReadRowsAs(const RobotDescription& robot, MdhRow (*change)(M
 /// @param joint that moves it; -1 for the base. @param X_ab the link's own frame in that of the other
 /// description. @return `body`, X_LC and, as X_iL, the part's own frame, all in that frame.
 std::vector<DescribedPart> ListParts(const RobotDescription& robot, int joint, const Pose& X_ab);
+
+/// A link of two descriptions: which frame it has is each description's own choice.
+struct LinkPlace {
+  int a = -1;  ///< Its joint in `a`; -1 the base.
+  int b = -1;
+  Pose X_ab = Pose::Identity();  ///< Frame i of `b` in that of `a`: they coincide so with all joints at zero.
+};
+
+/// The joints' links and a floating base, as far as `b` has parts of them.
+/// @param a, b as CompleteEachOther left them; without places when their joints do not match.
+std::vector<LinkPlace> PlaceLinks(const RobotDescription& a, const RobotDescription& b);
+
+/// Adds to both descriptions a frame of the link's name on each link that joints move and on which they have
+/// none in common, so that how links move is compared: the link's own frame of `b`, and in `a` where it is
+/// with all joints at zero. @return whether there is such a link.
+bool AddLinkFrames(RobotDescription* a, RobotDescription* b);
 
 }  // namespace dexcheck

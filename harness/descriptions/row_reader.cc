@@ -1,11 +1,10 @@
-#include "harness/descriptions/row_reader.h"
-
 #include <algorithm>
 #include <cmath>
 
 #include "controller/common/text.h"
 #include "controller/model/body_frame.h"
 #include "harness/descriptions/parameter_writer.h"
+#include "harness/descriptions/row_search.h"
 
 namespace dexcheck {
 namespace {

@@ -1,8 +1,8 @@
-#include "harness/descriptions/row_report.h"
-
 #include <algorithm>
 #include <map>
 #include <set>
+
+#include "harness/descriptions/finding.h"
 
 namespace dexcheck {
 namespace {

@@ -5,8 +5,6 @@
 #include <map>
 #include <set>
 
-#include "harness/descriptions/row_reader.h"
-
 namespace dexcheck {
 namespace {
 

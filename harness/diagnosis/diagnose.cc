@@ -4,14 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <memory>
 #include <numeric>
 #include <optional>
 
 #include "harness/checks/tolerance.h"
-#include "harness/diagnosis/force_fit.h"
-#include "harness/diagnosis/geometry_walk.h"
 #include "harness/diagnosis/trial.h"
 
 namespace dexcheck {
@@ -104,7 +101,9 @@ class Diagnostician {
     if (result_.agrees) return std::move(result_);
     result_.causes = Neutralise(Adapter(model_, *engine_, setup_.source), before.constants, engine_.get());
     if (progress("constants")) Accept(Trial(result_.repaired, setup_).ReadConstants());
-    if (progress("geometry")) WalkGeometry();
+    if (progress("geometry")) {
+      for (const Repair& cause : WalkGeometry(Trial(result_.repaired, setup_))) Accept({cause});
+    }
     if (progress("bodies")) FitBodies();
     progress("verdict");
     KeepWhatRepairs();
@@ -164,16 +163,6 @@ class Diagnostician {
     const double rounded = RoundSolved(result_.repaired, parameter, value);
     const bool same = rounded == 0.0 || std::abs(rounded - value) <= kSolved * std::abs(value);
     return ReadBackPrinted(file_, parameter, same ? rounded : value);
-  }
-
-  void WalkGeometry() {
-    const Trial trial(result_.repaired, setup_);
-    const auto force_error = [&](const RobotSpec& written) {
-      const std::optional<RobotModel> model = setup_.TryModel(written);
-      return model ? trial.evidence().CalcForceResidual(*model).norm()
-                   : std::numeric_limits<double>::infinity();
-    };
-    for (const Repair& cause : dexcheck::WalkGeometry(trial.placement(), force_error)) Accept({cause});
   }
 
   void FitBodies() {

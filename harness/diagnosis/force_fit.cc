@@ -1,10 +1,9 @@
-#include "harness/diagnosis/force_fit.h"
-
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 
 #include "harness/diagnosis/cause_estimator.h"
+#include "harness/diagnosis/trial.h"
 
 namespace dexcheck {
 namespace {

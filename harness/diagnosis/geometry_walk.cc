@@ -1,8 +1,9 @@
-#include "harness/diagnosis/geometry_walk.h"
-
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
+#include <limits>
+
+#include "harness/diagnosis/trial.h"
 
 namespace dexcheck {
 namespace {
@@ -27,8 +28,11 @@ struct TriedRepair {
 
 class GeometryWalk {
  public:
-  GeometryWalk(const Placement& start, const std::function<double(const RobotSpec&)>& force_error)
-      : spec_(start.trial()), placement_(start), force_error_(force_error), left_(start.items().size()) {}
+  explicit GeometryWalk(const Trial& trial)
+      : trial_(trial),
+        spec_(trial.written()),
+        placement_(trial.placement()),
+        left_(placement_.items().size()) {}
 
   std::vector<Repair> Run() {
     std::vector<Repair> causes;
@@ -136,11 +140,13 @@ class GeometryWalk {
     for (const Repair& one : *equal) {
       RobotSpec repaired = spec_;
       Apply(one, &repaired);
-      errors.push_back(force_error_(repaired));
+      const std::optional<RobotModel> model = trial_.setup().TryModel(repaired);
+      errors.push_back(model ? trial_.evidence().CalcForceResidual(*model).norm()
+                             : std::numeric_limits<double>::infinity());
     }
     constexpr double kSame = 1.0 + 1e-6;
     const double most =
-        *std::min_element(errors.begin(), errors.end()) * kSame + placement_.evidence().Widen(1e-9);
+        *std::min_element(errors.begin(), errors.end()) * kSame + trial_.evidence().Widen(1e-9);
     for (size_t i = errors.size(); i-- > 0;) {
       if (errors[i] > most) equal->erase(equal->begin() + static_cast<std::ptrdiff_t>(i));
     }
@@ -155,7 +161,7 @@ class GeometryWalk {
       }
     };
     for (int joint = link_; joint >= 0; joint = ParentOf(joint)) {
-      if (!placement_.terms().IsPlain(joint)) {
+      if (!trial_.setup().terms.IsPlain(joint)) {
         for (const Kind kind : {Kind::kAlpha, Kind::kA, Kind::kHomeAngle, Kind::kD}) add(kind, joint, 1);
       }
       for (const Kind kind : {Kind::kPosition, Kind::kRotation}) add(kind, joint, 3);
@@ -216,12 +222,12 @@ class GeometryWalk {
     constexpr int kMaxIterations = 30;
     constexpr double kStep = 1e-6;
     constexpr double kConverged = 1e-14;
-    constexpr double kExplained = 1e-3;                     // of the residual, by a step
-    constexpr double kFar = 10.0;                           // of the robot's size: no length is that long
-    constexpr double kLongestTurn = 0.7;                    // rad; where the linearisation means something
-    constexpr double kMovesNothing = 1e-9;                  // of the target
-    const double zero = placement_.evidence().Widen(1e-9);  // far above rounding, far below any fault
-    const double longest = kFar * placement_.evidence().length();
+    constexpr double kExplained = 1e-3;                 // of the residual, by a step
+    constexpr double kFar = 10.0;                       // of the robot's size: no length is that long
+    constexpr double kLongestTurn = 0.7;                // rad; where the linearisation means something
+    constexpr double kMovesNothing = 1e-9;              // of the target
+    const double zero = trial_.evidence().Widen(1e-9);  // far above rounding, far below any fault
+    const double longest = kFar * trial_.evidence().length();
     for (size_t i = 0; i < parameters.size(); ++i) placement_.Set(parameters[i], values[i]);
     for (int iteration = 0; iteration < kMaxIterations; ++iteration) {
       const VectorXd residual = placement_.CalcResidual(target);
@@ -309,7 +315,7 @@ class GeometryWalk {
     for (size_t i = 0; i < parameters.size(); ++i) {
       double& value = best.cause.values[i];
       if (IsRotation(parameters[i].kind)) value = std::remainder(value, 2.0 * kPi);
-      value = RoundWithin(spec_, parameters[i], value, placement_.evidence().CalcSolvedDigits());
+      value = RoundWithin(spec_, parameters[i], value, trial_.evidence().CalcSolvedDigits());
     }
     candidates_.push_back(std::move(best));
   }
@@ -320,7 +326,7 @@ class GeometryWalk {
       candidate.cause.kind = kind;
       candidate.cause.joint = joint;
       candidate.cause.other = other;
-      candidate.cause.is_plain = placement_.terms().IsPlain(joint);
+      candidate.cause.is_plain = trial_.setup().terms.IsPlain(joint);
       candidate.cost = CalcCostAfter(candidate.cause);
       candidates_.push_back(std::move(candidate));
     };
@@ -331,16 +337,16 @@ class GeometryWalk {
     for (int other = 0; other < static_cast<int>(spec_.joints.size()); ++other) {
       const int above = ParentOf(other);
       if (other == link_ || (above != link_ && above != parent)) continue;
-      const bool is_plain = placement_.terms().IsPlain(link_) && placement_.terms().IsPlain(other);
+      const bool is_plain = trial_.setup().terms.IsPlain(link_) && trial_.setup().terms.IsPlain(other);
       if (!is_plain) attempt(RepairKind::kRowsSwapped, std::min(link_, other), std::max(link_, other));
       if (above == parent || is_plain)
         attempt(RepairKind::kPosesSwapped, std::min(link_, other), std::max(link_, other));
     }
   }
 
+  const Trial& trial_;
   RobotSpec spec_;
   Placement placement_;
-  const std::function<double(const RobotSpec&)>& force_error_;
   std::vector<bool> left_;   // items that no geometry explains
   Items failing_;            // of the others
   int link_ = -1;            // the first of them
@@ -350,9 +356,6 @@ class GeometryWalk {
 
 }  // namespace
 
-std::vector<Repair> WalkGeometry(const Placement& start,
-                                 const std::function<double(const RobotSpec& written)>& force_error) {
-  return GeometryWalk(start, force_error).Run();
-}
+std::vector<Repair> WalkGeometry(const Trial& trial) { return GeometryWalk(trial).Run(); }
 
 }  // namespace dexcheck

@@ -1,6 +1,5 @@
 #include "harness/diagnosis/parameters.h"
 
-#include <array>
 #include <cmath>
 #include <iterator>
 
@@ -11,9 +10,34 @@ namespace {
 
 using Kind = ParameterKind;
 
+/// Where a specification has a number, or the first of a vector, tensor or pose.
+struct NumberPlace {
+  template <typename Place>
+  constexpr NumberPlace(Place place) : read(place), write(place) {}
+  const double* (*read)(const RobotSpec& spec, int index);
+  double* (*write)(RobotSpec& spec, int index);
+};
+
+template <typename Spec>
+auto& JointAt(Spec& spec, int index) {
+  return spec.joints[static_cast<size_t>(index)];
+}
+template <typename Spec>
+auto& BodyAt(Spec& spec, int link) {
+  return link < 0 ? spec.base.body : JointAt(spec, link).body;
+}
+template <typename Spec>
+auto& FrameAt(Spec& spec, int index) {
+  return spec.frames[static_cast<size_t>(index)];
+}
+template <typename Spec>
+auto& TorusOf(Spec& spec) {
+  return std::get<SolidTorus>(spec.object->shape);
+}
+
 struct ParameterTable {
   enum Part { kRow, kJoint, kLink, kFrame, kBase, kRobot, kObject };  ///< What a number belongs to.
-  enum Form { kNumber, kAngle, kVector, kRotation, kTensor };
+  enum Form { kNumber, kAngle, kVector, kPosition, kRotation, kTensor };
   enum Effect { kPlaces, kForces, kNeither };  ///< What it changes.
   struct Entry {
     const char* name;
@@ -21,6 +45,7 @@ struct ParameterTable {
     Part part;
     Form form;
     Effect effect;
+    NumberPlace place;
     const char* check = nullptr;  ///< The check of constants that reads it,
     int entry = 0;                ///< and which of that check's numbers it is.
   };
@@ -29,38 +54,55 @@ struct ParameterTable {
 
 /// In the order of the enumeration.
 constexpr ParameterTable::Entry ParameterTable::kEntries[] = {
-    {"alpha", "deg", kRow, kAngle, kPlaces},
-    {"a", "m", kRow, kNumber, kPlaces},
-    {"q (home angle)", "deg", kRow, kAngle, kPlaces},
-    {"d", "m", kRow, kNumber, kPlaces},
-    {"position", "m", kRow, kVector, kPlaces},
-    {"rotation", "deg", kRow, kRotation, kPlaces},
-    {"damping", "N m s/rad", kJoint, kNumber, kForces},
-    {"armature", "kg m^2", kJoint, kNumber, kForces},
-    {"dry friction", "N m", kJoint, kNumber, kNeither, "joint_dry_friction"},
-    {"lower limit", "m", kJoint, kNumber, kNeither, "joint_range", 0},
-    {"upper limit", "m", kJoint, kNumber, kNeither, "joint_range", 1},
-    {"mass", "kg", kLink, kNumber, kForces},
-    {"centre of mass", "m", kLink, kVector, kForces},
-    {"inertia", "kg m^2", kLink, kTensor, kForces},
-    {"position", "m", kFrame, kVector, kPlaces},
-    {"rotation", "deg", kFrame, kRotation, kPlaces},
-    {"fingertip radius", "m", kFrame, kNumber, kNeither, "fingertip_radius"},
-    {"position", "m", kBase, kVector, kPlaces},
-    {"rotation", "deg", kBase, kRotation, kPlaces},
-    {"wheel radius", "m", kBase, kNumber, kNeither, "wheel_radius"},
-    {"wheel distance", "m", kBase, kNumber, kNeither, "wheel_distance"},
-    {"wheel mass", "kg", kBase, kNumber, kForces, "wheel_mass"},
-    {"wheel spin inertia", "kg m^2", kBase, kNumber, kForces, "wheel_spin_inertia"},
-    {"wheel transverse inertia", "kg m^2", kBase, kNumber, kForces},
-    {"wheel armature", "kg m^2", kBase, kNumber, kForces, "wheel_armature"},
-    {"wheel damping", "N m s/rad", kBase, kNumber, kForces, "wheel_damping"},
-    {"gravity", "m/s^2", kRobot, kVector, kForces},
-    {"mass", "kg", kObject, kNumber, kNeither, "object_mass"},
-    {"inertia", "kg m^2", kObject, kTensor, kNeither, "object_inertia"},
-    {"friction", "", kObject, kNumber, kNeither, "contact_friction"},
-    {"ring radius", "m", kObject, kNumber, kNeither, "object_shape", 0},
-    {"tube radius", "m", kObject, kNumber, kNeither, "object_shape", 1},
+    {"alpha", "deg", kRow, kAngle, kPlaces, [](auto& s, int i) { return &JointAt(s, i).mdh.alpha; }},
+    {"a", "m", kRow, kNumber, kPlaces, [](auto& s, int i) { return &JointAt(s, i).mdh.a; }},
+    {"q (home angle)", "deg", kRow, kAngle, kPlaces, [](auto& s, int i) { return &JointAt(s, i).mdh.q; }},
+    {"d", "m", kRow, kNumber, kPlaces, [](auto& s, int i) { return &JointAt(s, i).mdh.d; }},
+    {"position", "m", kRow, kPosition, kPlaces, [](auto& s, int i) { return JointAt(s, i).X_PB.data(); }},
+    {"rotation", "deg", kRow, kRotation, kPlaces, [](auto& s, int i) { return JointAt(s, i).X_PB.data(); }},
+    {"damping", "N m s/rad", kJoint, kNumber, kForces, [](auto& s, int i) { return &JointAt(s, i).damping; }},
+    {"armature", "kg m^2", kJoint, kNumber, kForces, [](auto& s, int i) { return &JointAt(s, i).armature; }},
+    {"dry friction", "N m", kJoint, kNumber, kNeither,
+     [](auto& s, int i) { return &JointAt(s, i).dry_friction; }, "joint_dry_friction"},
+    {"lower limit", "m", kJoint, kNumber, kNeither, [](auto& s, int i) { return &JointAt(s, i).lower; },
+     "joint_range", 0},
+    {"upper limit", "m", kJoint, kNumber, kNeither, [](auto& s, int i) { return &JointAt(s, i).upper; },
+     "joint_range", 1},
+    {"mass", "kg", kLink, kNumber, kForces, [](auto& s, int i) { return &BodyAt(s, i).mass; }},
+    {"centre of mass", "m", kLink, kVector, kForces, [](auto& s, int i) { return BodyAt(s, i).com.data(); }},
+    {"inertia", "kg m^2", kLink, kTensor, kForces,
+     [](auto& s, int i) { return BodyAt(s, i).inertia.data(); }},
+    {"position", "m", kFrame, kPosition, kPlaces, [](auto& s, int i) { return FrameAt(s, i).X_LF.data(); }},
+    {"rotation", "deg", kFrame, kRotation, kPlaces, [](auto& s, int i) { return FrameAt(s, i).X_LF.data(); }},
+    {"fingertip radius", "m", kFrame, kNumber, kNeither,
+     [](auto& s, int i) { return &*FrameAt(s, i).sphere_radius; }, "fingertip_radius"},
+    {"position", "m", kBase, kPosition, kPlaces, [](auto& s, int) { return s.base.X_B0.data(); }},
+    {"rotation", "deg", kBase, kRotation, kPlaces, [](auto& s, int) { return s.base.X_B0.data(); }},
+    {"wheel radius", "m", kBase, kNumber, kNeither, [](auto& s, int) { return &s.base.wheel_radius; },
+     "wheel_radius"},
+    {"wheel distance", "m", kBase, kNumber, kNeither, [](auto& s, int) { return &s.base.wheel_distance; },
+     "wheel_distance"},
+    {"wheel mass", "kg", kBase, kNumber, kForces, [](auto& s, int) { return &s.base.wheel.mass; },
+     "wheel_mass"},
+    {"wheel spin inertia", "kg m^2", kBase, kNumber, kForces,
+     [](auto& s, int) { return &s.base.wheel.spin_inertia; }, "wheel_spin_inertia"},
+    {"wheel transverse inertia", "kg m^2", kBase, kNumber, kForces,
+     [](auto& s, int) { return &s.base.wheel.transverse_inertia; }},
+    {"wheel armature", "kg m^2", kBase, kNumber, kForces, [](auto& s, int) { return &s.base.wheel.armature; },
+     "wheel_armature"},
+    {"wheel damping", "N m s/rad", kBase, kNumber, kForces,
+     [](auto& s, int) { return &s.base.wheel.damping; }, "wheel_damping"},
+    {"gravity", "m/s^2", kRobot, kVector, kForces, [](auto& s, int) { return s.gravity.data(); }},
+    {"mass", "kg", kObject, kNumber, kNeither, [](auto& s, int) { return &s.object->body.mass; },
+     "object_mass"},
+    {"inertia", "kg m^2", kObject, kTensor, kNeither,
+     [](auto& s, int) { return s.object->body.inertia.data(); }, "object_inertia"},
+    {"friction", "", kObject, kNumber, kNeither, [](auto& s, int) { return &s.object->friction; },
+     "contact_friction"},
+    {"ring radius", "m", kObject, kNumber, kNeither, [](auto& s, int) { return &TorusOf(s).ring_radius; },
+     "object_shape", 0},
+    {"tube radius", "m", kObject, kNumber, kNeither, [](auto& s, int) { return &TorusOf(s).tube_radius; },
+     "object_shape", 1},
 };
 static_assert(std::size(ParameterTable::kEntries) == static_cast<size_t>(Kind::kObjectTubeRadius) + 1);
 
@@ -70,18 +112,20 @@ const ParameterTable::Entry& EntryFor(Kind kind) {
 
 int CountComponents(Kind kind) {
   const ParameterTable::Form form = EntryFor(kind).form;
-  return form == ParameterTable::kTensor                                        ? 6
-         : form == ParameterTable::kVector || form == ParameterTable::kRotation ? 3
-                                                                                : 1;
+  return form == ParameterTable::kTensor ? 6 : form >= ParameterTable::kVector ? 3 : 1;
 }
 
-/// Place of Ixx, Iyy, Izz, Ixy, Ixz, Iyz in a 3x3 matrix; and of its mirror image.
-int EntryOf(const Parameter& p) { return std::array{0, 4, 8, 3, 6, 7}[static_cast<size_t>(p.component)]; }
-int MirrorEntryOf(const Parameter& p) {
-  return std::array{0, 4, 8, 1, 2, 5}[static_cast<size_t>(p.component)];
+/// Of Ixx, Iyy, Izz, Ixy, Ixz, Iyz in a 3x3 matrix, of x, y, z of a vector or in a pose's 4x4 matrix.
+size_t OffsetOf(const Parameter& p) {
+  static constexpr size_t kEntries[] = {0, 4, 8, 3, 6, 7};
+  const auto k = static_cast<size_t>(p.component);
+  const ParameterTable::Form form = EntryFor(p.kind).form;
+  return form == ParameterTable::kTensor ? kEntries[k] : form == ParameterTable::kPosition ? 12 + k : k;
 }
 
 bool IsTensor(const Parameter& p) { return EntryFor(p.kind).form == ParameterTable::kTensor; }
+/// Rotations are not kept as angles.
+bool IsOfRotation(const Parameter& p) { return EntryFor(p.kind).form == ParameterTable::kRotation; }
 
 /// Roll, pitch, yaw of R = Rot(z, yaw) Rot(y, pitch) Rot(x, roll).
 Vector3d ToRpy(const Matrix3d& R) {
@@ -95,86 +139,6 @@ Matrix3d FromRpy(const Vector3d& rpy) {
   return (Eigen::AngleAxisd(rpy.z(), Vector3d::UnitZ()) * Eigen::AngleAxisd(rpy.y(), Vector3d::UnitY()) *
           Eigen::AngleAxisd(rpy.x(), Vector3d::UnitX()))
       .toRotationMatrix();
-}
-
-/// The number itself; null for rotations, which are not kept as angles.
-template <typename Spec>
-auto FindNumber(Spec& spec, const Parameter& p) -> decltype(&spec.base.wheel_radius) {
-  const auto joint = [&]() -> auto& { return spec.joints[static_cast<size_t>(p.index)]; };
-  const auto body = [&]() -> auto& { return p.index < 0 ? spec.base.body : joint().body; };
-  const auto frame = [&]() -> auto& { return spec.frames[static_cast<size_t>(p.index)]; };
-  switch (p.kind) {
-    case Kind::kAlpha:
-      return &joint().mdh.alpha;
-    case Kind::kA:
-      return &joint().mdh.a;
-    case Kind::kHomeAngle:
-      return &joint().mdh.q;
-    case Kind::kD:
-      return &joint().mdh.d;
-    case Kind::kPosition:
-      return joint().X_PB.matrix().col(3).data() + p.component;
-    case Kind::kDamping:
-      return &joint().damping;
-    case Kind::kArmature:
-      return &joint().armature;
-    case Kind::kDryFriction:
-      return &joint().dry_friction;
-    case Kind::kLowerLimit:
-      return &joint().lower;
-    case Kind::kUpperLimit:
-      return &joint().upper;
-    case Kind::kMass:
-      return &body().mass;
-    case Kind::kCom:
-      return body().com.data() + p.component;
-    case Kind::kInertia:
-      return body().inertia.data() + EntryOf(p);
-    case Kind::kFramePosition:
-      return frame().X_LF.matrix().col(3).data() + p.component;
-    case Kind::kSphereRadius:
-      return &*frame().sphere_radius;
-    case Kind::kBasePosition:
-      return spec.base.X_B0.matrix().col(3).data() + p.component;
-    case Kind::kWheelRadius:
-      return &spec.base.wheel_radius;
-    case Kind::kWheelDistance:
-      return &spec.base.wheel_distance;
-    case Kind::kWheelMass:
-      return &spec.base.wheel.mass;
-    case Kind::kWheelSpinInertia:
-      return &spec.base.wheel.spin_inertia;
-    case Kind::kWheelTransverseInertia:
-      return &spec.base.wheel.transverse_inertia;
-    case Kind::kWheelArmature:
-      return &spec.base.wheel.armature;
-    case Kind::kWheelDamping:
-      return &spec.base.wheel.damping;
-    case Kind::kGravity:
-      return spec.gravity.data() + p.component;
-    case Kind::kObjectMass:
-      return &spec.object->body.mass;
-    case Kind::kObjectInertia:
-      return spec.object->body.inertia.data() + EntryOf(p);
-    case Kind::kObjectFriction:
-      return &spec.object->friction;
-    case Kind::kObjectRingRadius:
-      return &std::get<SolidTorus>(spec.object->shape).ring_radius;
-    case Kind::kObjectTubeRadius:
-      return &std::get<SolidTorus>(spec.object->shape).tube_radius;
-    case Kind::kRotation:
-    case Kind::kFrameRotation:
-    case Kind::kBaseRotation:
-      break;
-  }
-  return nullptr;
-}
-
-template <typename Spec>
-auto& RotationOf(Spec& spec, const Parameter& p) {
-  if (p.kind == Kind::kBaseRotation) return spec.base.X_B0;
-  if (p.kind == Kind::kFrameRotation) return spec.frames[static_cast<size_t>(p.index)].X_LF;
-  return spec.joints[static_cast<size_t>(p.index)].X_PB;
 }
 
 }  // namespace
@@ -230,20 +194,23 @@ std::optional<Parameter> FindParameter(const RobotSpec& spec, const std::string&
 }
 
 double GetValue(const RobotSpec& spec, const Parameter& parameter) {
-  if (const double* number = FindNumber(spec, parameter)) return *number;
-  return ToRpy(RotationOf(spec, parameter).linear())[parameter.component];
+  const double* const place = EntryFor(parameter.kind).place.read(spec, parameter.index);
+  if (!IsOfRotation(parameter)) return place[OffsetOf(parameter)];
+  return ToRpy(Eigen::Map<const Eigen::Matrix4d>(place).topLeftCorner<3, 3>())[parameter.component];
 }
 
 void SetValue(RobotSpec* spec, const Parameter& parameter, double value) {
-  if (double* number = FindNumber(*spec, parameter)) {
-    *number = value;
-    if (IsTensor(parameter)) number[MirrorEntryOf(parameter) - EntryOf(parameter)] = value;
+  double* const place = EntryFor(parameter.kind).place.write(*spec, parameter.index);
+  if (IsOfRotation(parameter)) {
+    auto R = Eigen::Map<Eigen::Matrix4d>(place).topLeftCorner<3, 3>();
+    Vector3d rpy = ToRpy(R);
+    rpy[parameter.component] = value;
+    R = FromRpy(rpy);
     return;
   }
-  Pose& X = RotationOf(*spec, parameter);
-  Vector3d rpy = ToRpy(X.linear());
-  rpy[parameter.component] = value;
-  X.linear() = FromRpy(rpy);
+  const size_t offset = OffsetOf(parameter);
+  place[offset] = value;
+  if (IsTensor(parameter)) place[offset / 3 + 3 * (offset % 3)] = value;
 }
 
 Joint& JointOf(RobotSpec* spec, int joint) { return spec->joints[static_cast<size_t>(joint)]; }
@@ -314,6 +281,7 @@ std::string DescribeQuantity(const Parameter& p) {
   static constexpr const char* kEntries[] = {"Ixx", "Iyy", "Izz", "Ixy", "Ixz", "Iyz"};
   switch (EntryFor(p.kind).form) {
     case ParameterTable::kVector:
+    case ParameterTable::kPosition:
       return DescribeGroup(p) + kAxes[p.component];
     case ParameterTable::kRotation:
       return kTurns[p.component];

@@ -32,8 +32,6 @@ class Placement {
 
   [[nodiscard]] const std::vector<PlacedItem>& items() const { return items_; }
   [[nodiscard]] const RobotSpec& trial() const { return trial_; }
-  [[nodiscard]] const FileTerms& terms() const { return *terms_; }
-  [[nodiscard]] const EngineEvidence& evidence() const { return *evidence_; }
   /// Of a link's frame of the file at the first sample, world.
   [[nodiscard]] const Pose& PoseOf(int link) const { return poses_[0][static_cast<size_t>(link + 1)]; }
   /// Whether link `inner` carries `outer` or is it; -1 carries all.

@@ -73,4 +73,20 @@ class Trial {
   bool axle_right_ = true;  // what the base's numbers are relative to
 };
 
+/// Explains misplaced axes, frames and bodies by changes of rows, of the places where chains and frames
+/// start, of the sign of an axis, or of two joints' order.
+///
+/// Always the misplaced link nearest the base is taken: what carries it is right, so what is wrong is its own
+/// joint or one that moves nothing else that is compared. Each number there is solved for by itself, and the
+/// one after whose repair the fewest things are misplaced is taken; then the walk goes on.
+/// @return causes in the order found, each to be repaired after those before it.
+std::vector<Repair> WalkGeometry(const Trial& trial);
+
+/// Errors of masses, centres of mass, inertias, armature, damping and gravity, solved for by what the forces
+/// disagree in: what these do not show stays unknown.
+/// @param trial has the right geometry.
+/// @return the fewest causes, a single number before others; none when not all of the disagreement is
+/// explained.
+std::vector<Repair> FitForces(const Trial& trial);
+
 }  // namespace dexcheck
