@@ -28,35 +28,37 @@ struct MutateRequest {
   bool quiet = false;
 };
 
-CampaignFault Describe(const Mutant& mutant, bool diagnosed) {
+CampaignFault Describe(const TriedFault& tried) {
   CampaignFault fault{
-      .kind = mutant.kind, .name = mutant.name, .outcome = mutant.outcome, .cause_right = mutant.named_first};
-  if (mutant.outcome == MutantOutcome::kSurvived) fault.exception = "survived: " + mutant.name;
-  if (mutant.outcome == MutantOutcome::kNoEffect) fault.exception = "no effect: " + mutant.name;
-  if (diagnosed && mutant.outcome == MutantOutcome::kKilled && !mutant.named_first) {
+      .kind = tried.kind, .name = tried.name, .outcome = tried.outcome, .cause_right = tried.named_first};
+  if (tried.outcome == MutantOutcome::kSurvived) fault.exception = "survived: " + tried.name;
+  if (tried.outcome == MutantOutcome::kNoEffect) fault.exception = "no effect: " + tried.name;
+  fault.details = {{"failed_checks", tried.failed_checks}};
+  return fault;
+}
+
+bool IsMissed(const TriedFault& tried) {
+  return tried.outcome == MutantOutcome::kKilled && !tried.named_first;
+}
+
+CampaignFault Describe(const Mutant& mutant, bool diagnosed) {
+  CampaignFault fault = Describe(static_cast<const TriedFault&>(mutant));
+  if (diagnosed && IsMissed(mutant)) {
     fault.exception = fmt::format("cause: {} ({}): named {}{}", mutant.name, mutant.kind,
                                   mutant.named.empty() ? "nothing" : mutant.named,
                                   mutant.named_equal ? ", which is listed as equal" : "");
   }
-  fault.details = {{"failed_checks", mutant.failed_checks},
-                   {"named", mutant.named},
-                   {"named_equal", mutant.named_equal},
-                   {"explained", mutant.explained}};
+  fault.details["named"] = mutant.named;
+  fault.details["named_equal"] = mutant.named_equal;
+  fault.details["explained"] = mutant.explained;
   return fault;
 }
 
 CampaignFault Describe(const FormulaMutant& mutant) {
-  CampaignFault fault{.kind = "wrong equation",
-                      .name = mutant.name,
-                      .outcome = mutant.outcome,
-                      .cause_right = mutant.localised};
-  if (mutant.outcome == MutantOutcome::kSurvived) fault.exception = "survived: " + mutant.name;
-  if (mutant.outcome == MutantOutcome::kNoEffect) fault.exception = "no effect: " + mutant.name;
-  if (mutant.outcome == MutantOutcome::kKilled && !mutant.localised) {
+  CampaignFault fault = Describe(static_cast<const TriedFault&>(mutant));
+  if (IsMissed(mutant))
     fault.exception =
         fmt::format("cause: {}: expected {}, failed {}", mutant.name, mutant.first, mutant.failed_checks);
-  }
-  fault.details = {{"failed_checks", mutant.failed_checks}};
   return fault;
 }
 

@@ -1,5 +1,6 @@
 #include "harness/diagnosis/formula_mutants.h"
 
+#include <algorithm>
 #include <memory>
 #include <utility>
 
@@ -242,6 +243,7 @@ class MutantTable {
   FormulaMutant& Add(const std::string& name, const std::string& first) {
     FormulaMutant& mutant = mutants_.emplace_back();
     mutant.name = name;
+    mutant.kind = "wrong equation";
     mutant.first = first;
     return mutant;
   }
@@ -265,52 +267,6 @@ class MutantTable {
   const RobotModel& model_;
   std::vector<FormulaMutant> mutants_;
 };
-
-/// Everything that a view shows at one state, and its size.
-VectorXd CollectTerms(const ModelView& view) {
-  std::vector<double> all;
-  const auto append = [&](const MatrixXd& terms) {
-    all.insert(all.end(), terms.data(), terms.data() + terms.size());
-  };
-  append(view.M());
-  append(view.C());
-  append(view.gravity());
-  append(view.friction());
-  for (int link = -1; link < view.model().num_joints(); ++link) append(view.CalcLinkPose(link).matrix());
-  Matrix6Xd J(6, view.size());
-  Matrix6Xd J_dot(6, view.size());
-  for (size_t frame = 0; frame < view.model().frames().size(); ++frame) {
-    append(view.CalcFramePose(static_cast<int>(frame)).matrix());
-    view.CalcFrameJacobian(static_cast<int>(frame), J, J_dot);
-    append(J);
-    append(J_dot);
-  }
-  const EnergyAndMomentum energies = view.CalcEnergyAndMomentum();
-  append(Vector2d(energies.kinetic, energies.potential));
-  append(energies.linear_momentum);
-  append(energies.angular_momentum);
-  return Eigen::Map<const VectorXd>(all.data(), static_cast<Eigen::Index>(all.size()));
-}
-
-/// Whether the fault changes anything at the states by more than rounding.
-bool HasEffect(const RobotModel& model, const ModelViewFactory& make_view, int samples, std::uint64_t seed) {
-  constexpr double kRounding = 1e-14;
-  StateSource source(model, {}, seed);
-  const std::unique_ptr<ModelView> right = MakeModelView(model, Coordinates::kReduced);
-  const std::unique_ptr<ModelView> wrong = make_view(model, Coordinates::kReduced);
-  VectorXd q = VectorXd::Zero(model.num_positions());
-  VectorXd xi = VectorXd::Zero(model.num_velocities());
-  for (int sample = 0; sample < samples; ++sample) {
-    source.DrawPositions(&q);
-    source.DrawVelocity(&xi);
-    right->SetState(q, xi);
-    wrong->SetState(q, xi);
-    const VectorXd terms = CollectTerms(*right);
-    const double size = 1.0 + terms.cwiseAbs().maxCoeff();
-    if ((CollectTerms(*wrong) - terms).cwiseAbs().maxCoeff() > kRounding * size) return true;
-  }
-  return false;
-}
 
 }  // namespace
 
@@ -346,14 +302,14 @@ void RunFormulaMutant(const Adapter& adapter, int samples, FormulaMutant* mutant
     mutant->options.samples = samples;
     records = CheckConsistency(adapter, mutant->options, [](long) { return true; }).terms;
   }
-  for (const CheckRecord& record : records) {
-    if (!record.failed) continue;
-    mutant->failed_checks += (mutant->failed_checks.empty() ? "" : " ") + record.name;
-    mutant->localised = mutant->localised || record.name == mutant->first;
-  }
+  mutant->AddFailed(records);
+  mutant->named_first = std::any_of(records.begin(), records.end(), [&](const CheckRecord& record) {
+    return record.failed && record.name == mutant->first;
+  });
   mutant->outcome = mutant->failed_checks.empty() ? MutantOutcome::kSurvived : MutantOutcome::kKilled;
   if (mutant->outcome == MutantOutcome::kSurvived && mutant->of_model &&
-      !HasEffect(adapter.model(), mutant->options.make_view, samples, mutant->options.seed))
+      !HasEffect(adapter.model(), mutant->options.make_view(adapter.model(), Coordinates::kReduced).get(),
+                 samples, mutant->options.seed))
     mutant->outcome = MutantOutcome::kNoEffect;
 }
 

@@ -12,17 +12,13 @@
 
 namespace dexcheck {
 
-/// A wrong equation, and which checks found it.
-struct FormulaMutant {
-  std::string name;            ///< "Coriolis terms dropped".
+/// A wrong equation; what is named is the check that it fails.
+struct FormulaMutant : TriedFault {
   std::string first;           ///< The check that a fault of this kind should fail.
   ConsistencyOptions options;  ///< With the fault in make_view or object.
   ContactFormulas contact;     ///< Or here,
   bool of_contact = false;     ///< and then only the contact check is run.
   bool of_model = false;       ///< The fault is in make_view.
-  MutantOutcome outcome = MutantOutcome::kSurvived;
-  std::string failed_checks;  ///< Names, separated by blanks.
-  bool localised = false;     ///< `first` is among them, or is the first of them in the table.
 };
 
 /// All that apply to the model: those of the object and of contacts need an object and fingertips.

@@ -2,22 +2,17 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
+#include <memory>
 #include <optional>
 #include <utility>
 
 #include "controller/common/errors.h"
-#include "harness/diagnosis/placement.h"
+#include "harness/descriptions/random_states.h"
 
 namespace dexcheck {
 namespace {
 
 using Kind = ParameterKind;
-
-/// The body of a link, by its joint; -1: of the base.
-MassProperties& LinkBody(RobotSpec* spec, int link) {
-  return link < 0 ? spec->base.body : JointOf(spec, link).body;
-}
 
 class MutantList {
  public:
@@ -104,8 +99,8 @@ class MutantList {
     std::vector<Parameter> numbers = {{Kind::kMass, link, 0}, {Kind::kInertia, link, 0}};
     Add("solid of another mass", numbers).change = [link](RobotSpec* spec) {
       constexpr double kRatio = 1.1;
-      LinkBody(spec, link).mass *= kRatio;
-      LinkBody(spec, link).inertia *= kRatio;
+      BodyOf(spec, link).mass *= kRatio;
+      BodyOf(spec, link).inertia *= kRatio;
     };
   }
 
@@ -119,7 +114,7 @@ class MutantList {
     entries.reserve(6);
     for (int k = 0; k < 6; ++k) entries.push_back({Kind::kInertia, link, k});
     Mutant& mutant = Add(kind, entries);
-    mutant.change = [link, change](RobotSpec* spec) { change(&LinkBody(spec, link)); };
+    mutant.change = [link, change](RobotSpec* spec) { change(&BodyOf(spec, link)); };
   }
 
   void AddStructural(const std::string& kind, RepairKind cause_kind, int joint, int other) {
@@ -152,20 +147,57 @@ class MutantList {
   std::vector<Mutant> mutants_;
 };
 
-/// Whether anything that is compared differs between two models at the evidence's states.
-bool HasEffect(const RobotModel& model, const RobotModel& changed, const EngineEvidence& evidence) {
-  constexpr double kRounding = 1e-13;  // of each quantity's own size
-  if ((evidence.CalcForces(model) - evidence.CalcForces(changed)).cwiseAbs().maxCoeff() > kRounding)
-    return true;
-  const FileTerms terms({});
-  const Placement a(model.spec(), terms, evidence, true);
-  const Placement b(changed.spec(), terms, evidence, true);
-  std::vector<int> all(a.items().size());
-  std::iota(all.begin(), all.end(), 0);
-  return (a.CalcResidual(all) - b.CalcResidual(all)).cwiseAbs().maxCoeff() > kRounding;
+/// Everything that a view shows at one state.
+VectorXd CollectTerms(const ModelView& view) {
+  std::vector<double> all;
+  const auto append = [&](const MatrixXd& terms) {
+    all.insert(all.end(), terms.data(), terms.data() + terms.size());
+  };
+  append(view.M());
+  append(view.C());
+  append(view.gravity());
+  append(view.friction());
+  for (int link = -1; link < view.model().num_joints(); ++link) append(view.CalcLinkPose(link).matrix());
+  Matrix6Xd J(6, view.size());
+  Matrix6Xd J_dot(6, view.size());
+  for (size_t frame = 0; frame < view.model().frames().size(); ++frame) {
+    append(view.CalcFramePose(static_cast<int>(frame)).matrix());
+    view.CalcFrameJacobian(static_cast<int>(frame), J, J_dot);
+    append(J);
+    append(J_dot);
+  }
+  const EnergyAndMomentum energies = view.CalcEnergyAndMomentum();
+  append(Vector2d(energies.kinetic, energies.potential));
+  append(energies.linear_momentum);
+  append(energies.angular_momentum);
+  return Eigen::Map<const VectorXd>(all.data(), static_cast<Eigen::Index>(all.size()));
 }
 
 }  // namespace
+
+void TriedFault::AddFailed(const std::vector<CheckRecord>& records) {
+  for (const CheckRecord& record : records) {
+    if (record.failed) failed_checks += (failed_checks.empty() ? "" : " ") + record.name;
+  }
+}
+
+bool HasEffect(const RobotModel& model, ModelView* other, int samples, std::uint64_t seed) {
+  constexpr double kRounding = 1e-14;
+  StateSource source(model, {}, seed);
+  const std::unique_ptr<ModelView> right = MakeModelView(model, Coordinates::kReduced);
+  VectorXd q = VectorXd::Zero(model.num_positions());
+  VectorXd xi = VectorXd::Zero(model.num_velocities());
+  for (int sample = 0; sample < samples; ++sample) {
+    source.DrawPositions(&q);
+    source.DrawVelocity(&xi);
+    right->SetState(q, xi);
+    other->SetState(q, xi);
+    const VectorXd terms = CollectTerms(*right);
+    const double size = 1.0 + terms.cwiseAbs().maxCoeff();
+    if ((CollectTerms(*other) - terms).cwiseAbs().maxCoeff() > kRounding * size) return true;
+  }
+  return false;
+}
 
 std::vector<Mutant> ListMutants(const RobotSpec& spec, double scale) {
   MutantList list(spec);
@@ -201,21 +233,17 @@ void TryMutant(const RobotModel& model, const mjModel& engine, const std::string
   check.seed = options.seed;
   const ConsistencyResult result =
       CheckConsistency(Adapter(*changed, engine, engine_source), check, [](long) { return true; });
-  for (const std::vector<CheckRecord>* records : {&result.constants.records, &result.terms}) {
-    for (const CheckRecord& record : *records) {
-      if (record.failed) mutant->failed_checks += (mutant->failed_checks.empty() ? "" : " ") + record.name;
-    }
-  }
+  mutant->AddFailed(result.constants.records);
+  mutant->AddFailed(result.terms);
   if (result.Agrees()) {
-    const EngineEvidence evidence(model, engine, engine_source, options.samples, options.seed);
-    mutant->outcome =
-        HasEffect(model, *changed, evidence) ? MutantOutcome::kSurvived : MutantOutcome::kNoEffect;
+    const std::unique_ptr<ModelView> view = MakeModelView(*changed, Coordinates::kReduced);
+    const bool has_effect = HasEffect(model, view.get(), options.samples, options.seed);
+    mutant->outcome = has_effect ? MutantOutcome::kSurvived : MutantOutcome::kNoEffect;
     return;
   }
   mutant->outcome = MutantOutcome::kKilled;
   if (!options.diagnose) return;
   const Diagnosis diagnosis = Diagnose(*changed, engine, engine_source, {}, [](const char*) { return true; });
-  mutant->causes = static_cast<int>(diagnosis.causes.size());
   mutant->explained = diagnosis.explained;
   if (diagnosis.causes.empty()) return;
   const Repair& first = diagnosis.causes.front();

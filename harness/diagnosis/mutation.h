@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "harness/descriptions/model_view.h"
 #include "harness/diagnosis/diagnose.h"
 
 namespace dexcheck {
@@ -18,20 +19,24 @@ enum class MutantOutcome {
   kSurvived,  ///< The checks agree, but a term changed.
 };
 
-/// A wrong model, and what became of it.
-struct Mutant {
+/// A fault that was made, and what became of it.
+struct TriedFault {
   std::string name;  ///< "link r_forearm: mass".
   std::string kind;  ///< "mass": what the table sums up by.
-  std::function<void(RobotSpec*)> change;
-  Repair expected;  ///< What the diagnosis should name, without values.
-
   MutantOutcome outcome = MutantOutcome::kSurvived;
   std::string failed_checks;  ///< Names, separated by blanks.
-  // What the diagnosis says; for killed mutants.
+  bool named_first = false;   ///< What is named first is the fault.
+
+  void AddFailed(const std::vector<CheckRecord>& records);
+};
+
+/// A wrong model.
+struct Mutant : TriedFault {
+  std::function<void(RobotSpec*)> change;
+  Repair expected;  ///< What the diagnosis should name, without values.
+  // What it says; for killed mutants.
   std::string named;         ///< Its first cause, in short.
-  bool named_first = false;  ///< The first cause is the change, and repairs it.
   bool named_equal = false;  ///< The change is listed as an equal repair of the first cause.
-  int causes = 0;
   double explained = 0.0;
 };
 
@@ -53,6 +58,9 @@ std::vector<Mutant> ListMutants(const RobotSpec& spec, double scale);
 /// Whether a cause names what was changed: the same number, or any numbers of the same vector or tensor when
 /// several were changed; the same joints for changes of structure.
 bool IsNamedBy(const Mutant& mutant, const Repair& cause);
+
+/// Whether another view of a robot shows anything else than the model's at random states.
+bool HasEffect(const RobotModel& model, ModelView* other, int samples, std::uint64_t seed);
 
 /// Runs the checks, and the diagnosis, on a mutant.
 void TryMutant(const RobotModel& model, const mjModel& engine, const std::string& engine_source,

@@ -215,9 +215,8 @@ void SetValue(RobotSpec* spec, const Parameter& parameter, double value) {
 
 Joint& JointOf(RobotSpec* spec, int joint) { return spec->joints[static_cast<size_t>(joint)]; }
 
-const MassProperties& BodyOf(const RobotSpec& spec, int link) {
-  return link < 0 ? spec.base.body : spec.joints[static_cast<size_t>(link)].body;
-}
+const MassProperties& BodyOf(const RobotSpec& spec, int link) { return BodyAt(spec, link); }
+MassProperties& BodyOf(RobotSpec* spec, int link) { return BodyAt(*spec, link); }
 
 std::optional<RobotModel> TryModel(const RobotSpec& spec) {
   try {

@@ -75,6 +75,7 @@ void SetValue(RobotSpec* spec, const Parameter& parameter, double value);
 Joint& JointOf(RobotSpec* spec, int joint);
 /// The body of a link, by its joint; -1: of the base.
 const MassProperties& BodyOf(const RobotSpec& spec, int link);
+MassProperties& BodyOf(RobotSpec* spec, int link);
 /// The model of a changed specification; none when there is no such robot.
 std::optional<RobotModel> TryModel(const RobotSpec& spec);
 

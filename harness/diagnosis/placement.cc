@@ -41,9 +41,8 @@ Placement::Placement(const RobotSpec& written, const FileTerms& terms, const Eng
     for (const ItemKind kind : {ItemKind::kFramePosition, ItemKind::kFrameRotation})
       items_.push_back({kind, static_cast<int>(i), written.frames[i].link});
   }
-  rows_.assign(std::min(kStateSamples, evidence.samples().size()),
-               std::vector<Pose>(written.joints.size() + 1, Pose::Identity()));
-  poses_ = rows_;
+  poses_.assign(std::min(kStateSamples, evidence.samples().size()),
+                std::vector<Pose>(written.joints.size() + 1, Pose::Identity()));
   Replace(written);
 }
 
@@ -67,36 +66,27 @@ Pose Placement::CalcBasePose(const VectorXd& q) const {
   return X;
 }
 
-void Placement::UpdateRow(int joint) {
-  for (size_t sample = 0; sample < rows_.size(); ++sample) {
+void Placement::UpdateFrom(int from) {
+  for (size_t sample = 0; sample < poses_.size(); ++sample) {
     const VectorXd& q = evidence_->samples()[sample].q;
     const Eigen::Index first = q.size() - static_cast<Eigen::Index>(trial_.joints.size());
-    rows_[sample][At(joint)] =
-        terms_->CalcPlace(trial_.joints[static_cast<size_t>(joint)], joint, q[first + joint]);
-  }
-}
-
-void Placement::UpdateFrom(int from) {
-  for (size_t sample = 0; sample < rows_.size(); ++sample) {
     std::vector<Pose>& poses = poses_[sample];
-    if (from < 0) poses[0] = CalcBasePose(evidence_->samples()[sample].q);
+    if (from < 0) poses[0] = CalcBasePose(q);
     for (int i = std::max(from, 0); i < static_cast<int>(trial_.joints.size()); ++i) {
-      if (from < 0 || Carries(from, i))
-        poses[At(i)] = poses[At(trial_.joints[static_cast<size_t>(i)].parent)] * rows_[sample][At(i)];
+      if (from >= 0 && !Carries(from, i)) continue;
+      const Joint& joint = trial_.joints[static_cast<size_t>(i)];
+      poses[At(i)] = poses[At(joint.parent)] * terms_->CalcPlace(joint, i, q[first + i]);
     }
   }
 }
 
 void Placement::Set(const Parameter& parameter, double value) {
   SetValue(&trial_, parameter, value);
-  if (IsOfFrame(parameter)) return;
-  if (parameter.index >= 0) UpdateRow(parameter.index);
-  UpdateFrom(parameter.index);
+  if (!IsOfFrame(parameter)) UpdateFrom(parameter.index);
 }
 
 void Placement::Replace(const RobotSpec& spec) {
   trial_ = spec;
-  for (int i = 0; i < static_cast<int>(trial_.joints.size()); ++i) UpdateRow(i);
   UpdateFrom(-1);
 }
 
@@ -104,16 +94,14 @@ void Placement::Restore(const RobotSpec& spec, const Parameter& parameter) {
   const auto i = static_cast<size_t>(parameter.index);
   if (IsOfFrame(parameter)) {
     trial_.frames[i].X_LF = spec.frames[i].X_LF;
-    return;
-  }
-  if (parameter.index < 0) {
+  } else if (parameter.index < 0) {
     trial_.base.X_B0 = spec.base.X_B0;
+    UpdateFrom(-1);
   } else {
     trial_.joints[i].X_PB = spec.joints[i].X_PB;
     trial_.joints[i].mdh = spec.joints[i].mdh;
-    UpdateRow(parameter.index);
+    UpdateFrom(parameter.index);
   }
-  UpdateFrom(parameter.index);
 }
 
 Placement::Difference Placement::CalcDifference(const PlacedItem& item, size_t sample) const {
@@ -146,7 +134,7 @@ Placement::Difference Placement::CalcDifference(const PlacedItem& item, size_t s
 VectorXd Placement::CalcResidual(const std::vector<int>& items) const {
   std::vector<double> rows;
   for (const int item : items) {
-    for (size_t sample = 0; sample < rows_.size(); ++sample) {
+    for (size_t sample = 0; sample < poses_.size(); ++sample) {
       const Difference difference = CalcDifference(items_[static_cast<size_t>(item)], sample);
       rows.insert(rows.end(), difference.data(), difference.data() + difference.size());
     }
@@ -155,7 +143,7 @@ VectorXd Placement::CalcResidual(const std::vector<int>& items) const {
 }
 
 bool Placement::Fails(int item) const {
-  for (size_t sample = 0; sample < rows_.size(); ++sample) {
+  for (size_t sample = 0; sample < poses_.size(); ++sample) {
     const Difference difference = CalcDifference(items_[static_cast<size_t>(item)], sample);
     if (!(difference.cwiseAbs().maxCoeff() <= evidence_->Widen(kPlaceRounding))) return true;
   }

@@ -61,7 +61,6 @@ class Placement {
   [[nodiscard]] Difference CalcDifference(const PlacedItem& item, size_t sample) const;
   /// Poses of what a joint carries; -1: all.
   void UpdateFrom(int joint);
-  void UpdateRow(int joint);
   [[nodiscard]] Pose CalcBasePose(const VectorXd& q) const;
 
   RobotSpec trial_;
@@ -69,7 +68,6 @@ class Placement {
   const FileTerms* terms_;
   const EngineEvidence* evidence_;
   std::vector<PlacedItem> items_;
-  std::vector<std::vector<Pose>> rows_;   // from parent to link, by sample
   std::vector<std::vector<Pose>> poses_;  // of the links' frames of the file, by sample, base first
 };
 

@@ -37,7 +37,7 @@ TEST_P(WrongEquations, AreAllFoundByTheCheckThatTheyBelongTo) {
   for (FormulaMutant& mutant : mutants) {
     RunFormulaMutant(adapter, kSamples, &mutant);
     EXPECT_EQ(mutant.outcome, MutantOutcome::kKilled) << mutant.name;
-    EXPECT_TRUE(mutant.localised) << mutant.name << ": " << mutant.failed_checks;
+    EXPECT_TRUE(mutant.named_first) << mutant.name << ": " << mutant.failed_checks;
   }
 }
 
