@@ -14,26 +14,13 @@ using Numbers = std::vector<Parameter>;
 // Residuals are relative to their own sizes. Rounding leaves some 1e-12 of a finger's forces.
 constexpr double kForceRounding = 1e-10;
 
-/// The robot with larger inertias, in which the forces are linear: one that is possible whichever number
-/// changes.
-RobotSpec Pad(RobotSpec spec) {
-  constexpr double kSmall = 1e-4;  // m^2
-  const auto pad = [](MassProperties* body) {
-    const double trace = body->inertia.trace();
-    body->inertia += (trace > 0.0 ? trace : kSmall * body->mass) * Matrix3d::Identity();
-  };
-  pad(&spec.base.body);
-  for (Joint& joint : spec.joints) pad(&joint.body);
-  return spec;
-}
-
 /// For the difference quotient: any of what the forces are linear in, small for centres of mass.
 double CalcStep(const RobotSpec& spec, const Parameter& number) {
   constexpr double kLinear = 1e-3;
   constexpr double kQuadratic = 1e-6;  // m
   if (number.kind == Kind::kCom) return kQuadratic;
-  if (number.kind == Kind::kInertia) return kLinear * BodyOf(spec, number.index).inertia.trace();
-  return kLinear * GetScale(spec, number);
+  const double trace = number.kind == Kind::kInertia ? BodyOf(spec, number.index).inertia.trace() : 0.0;
+  return kLinear * (trace > 0.0 ? trace : GetScale(spec, number));
 }
 
 class ForceFit {
@@ -80,20 +67,14 @@ class ForceFit {
   }
 
   /// What each number does to the forces, by its scale.
-  [[nodiscard]] MatrixXd CalcColumns(const RobotSpec& at, const Numbers& numbers) const {
-    MatrixXd columns = MatrixXd::Zero(start_.residual.size(), static_cast<Eigen::Index>(numbers.size()));
-    RobotSpec trial = Pad(at);
-    const std::optional<RobotModel> here = trial_.setup().TryModel(trial);
-    if (!here) return columns;
-    const VectorXd before = CalcResidual(*here);
+  [[nodiscard]] MatrixXd CalcColumns(const Solution& at, const Numbers& numbers) const {
+    MatrixXd columns = MatrixXd::Zero(at.residual.size(), static_cast<Eigen::Index>(numbers.size()));
+    const auto make = [&](const RobotSpec& written) { return trial_.setup().TryModel(written); };
     for (size_t i = 0; i < numbers.size(); ++i) {
-      const double value = GetValue(trial, numbers[i]);
-      const double step = CalcStep(trial, numbers[i]);
-      SetValue(&trial, numbers[i], value + step);
-      if (const std::optional<RobotModel> there = trial_.setup().TryModel(trial))
+      double step = CalcStep(at.repaired, numbers[i]);
+      if (const std::optional<RobotModel> there = TryChange(at.repaired, numbers[i], &step, make))
         columns.col(static_cast<Eigen::Index>(i)) =
-            (before - CalcResidual(*there)) * (GetScale(spec(), numbers[i]) / step);
-      SetValue(&trial, numbers[i], value);
+            (at.residual - CalcResidual(*there)) * (GetScale(spec(), numbers[i]) / step);
     }
     return columns;
   }
@@ -101,7 +82,7 @@ class ForceFit {
   /// Numbers that explain most by themselves.
   [[nodiscard]] Numbers ListLikeliest() const {
     constexpr size_t kLikeliest = 8;
-    const MatrixXd columns = CalcColumns(spec(), candidates_);
+    const MatrixXd columns = CalcColumns(start_, candidates_);
     std::vector<std::pair<double, Parameter>> gains;
     for (size_t i = 0; i < candidates_.size(); ++i) {
       const auto column = columns.col(static_cast<Eigen::Index>(i));
@@ -123,7 +104,7 @@ class ForceFit {
     Solution solution = start_;
     for (int iteration = 0; iteration < kMaxIterations; ++iteration) {
       const VectorXd step =
-          CalcColumns(solution.repaired, numbers).completeOrthogonalDecomposition().solve(solution.residual);
+          CalcColumns(solution, numbers).completeOrthogonalDecomposition().solve(solution.residual);
       RobotSpec next = solution.repaired;
       for (size_t i = 0; i < numbers.size(); ++i) {
         const double scale = GetScale(spec(), numbers[i]);
@@ -155,7 +136,7 @@ class ForceFit {
     options.restarts = 0;
     Solution solution = start_;
     for (int round = 0; round < kRounds && !IsSolved(solution); ++round) {
-      const MatrixXd columns = CalcColumns(solution.repaired, candidates_);
+      const MatrixXd columns = CalcColumns(solution, candidates_);
       std::vector<Candidate> candidates;
       std::vector<Numbers> sets;
       const auto add = [&](size_t begin, size_t end) {

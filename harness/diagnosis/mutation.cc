@@ -23,12 +23,7 @@ class MutantList {
       const double value = GetValue(spec_, parameter);
       double change = scale * GetScale(spec_, parameter);
       // An inertia at the edge of what is possible may be changed to one side only.
-      const auto changed_by = [&](double by) {
-        RobotSpec changed = spec_;
-        SetValue(&changed, parameter, value + by);
-        return changed;
-      };
-      if (!TryModel(changed_by(change)) && TryModel(changed_by(-change))) change = -change;
+      TryChange(spec_, parameter, &change);
       Mutant& mutant = Add(DescribeGroup(parameter), {parameter});
       mutant.change = [parameter, value, change](RobotSpec* spec) {
         SetValue(spec, parameter, value + change);

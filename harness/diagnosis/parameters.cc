@@ -306,16 +306,22 @@ double ToPrinted(const RobotSpec& spec, const Parameter& parameter, double value
   return IsAngle(spec, parameter) ? RadToDeg(value) : value;
 }
 
-RobotModel ChangeNumber(RobotSpec spec, const Parameter& number, double scale) {
-  const double value = GetValue(spec, number);
-  const double change = scale * GetScale(spec, number);
-  SetValue(&spec, number, value + change);
-  try {
-    return RobotModel(spec);
-  } catch (const InputError&) {
-    SetValue(&spec, number, value - change);
-    return RobotModel(spec);
+std::optional<RobotModel> TryChange(const RobotSpec& spec, const Parameter& number, double* change,
+                                    const std::function<std::optional<RobotModel>(const RobotSpec&)>& make) {
+  for (int side = 0; side < 2; ++side) {
+    RobotSpec changed = spec;
+    SetValue(&changed, number, GetValue(spec, number) + *change);
+    if (std::optional<RobotModel> model = make(changed)) return model;
+    *change = -*change;
   }
+  return std::nullopt;
+}
+
+RobotModel ChangeNumber(RobotSpec spec, const Parameter& number, double scale) {
+  double change = scale * GetScale(spec, number);
+  if (const std::optional<RobotModel> changed = TryChange(spec, number, &change)) return *changed;
+  SetValue(&spec, number, GetValue(spec, number) + change);
+  return RobotModel(spec);
 }
 
 }  // namespace dexcheck

@@ -2,6 +2,7 @@
 
 // Every scalar parameter of the analytic model by itself: to change it, to compare it, to name it.
 
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -91,6 +92,13 @@ bool IsDynamic(ParameterKind kind);
 /// A length or quantity that a change of the value can be compared with, positive: the value itself, or for a
 /// value of zero what stands beside it (the tensor's trace, the link's length, a radian).
 double GetScale(const RobotSpec& spec, const Parameter& parameter);
+
+/// The robot with a number changed by `change`, or by as much the other way, which is then the change; none
+/// where there is no such robot.
+/// @param make of a specification.
+std::optional<RobotModel> TryChange(
+    const RobotSpec& spec, const Parameter& number, double* change,
+    const std::function<std::optional<RobotModel>(const RobotSpec&)>& make = TryModel);
 
 /// The robot with a number changed by `scale` times GetScale, or by as much less where there is no such
 /// robot.

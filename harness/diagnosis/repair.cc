@@ -137,47 +137,29 @@ void Apply(const Repair& cause, RobotSpec* spec) {
 }
 
 std::string DescribeShort(const Repair& cause, const RobotSpec& spec) {
+  if (cause.kind == RepairKind::kEngineOnly) return cause.note;
+  if (cause.kind == RepairKind::kParameters)
+    return DescribePart(spec, cause.parameters[0]) + ": " + DescribeWhat(cause);
   const auto name = [&](int joint) { return spec.joints[static_cast<size_t>(joint)].name; };
-  switch (cause.kind) {
-    case RepairKind::kParameters:
-      return DescribePart(spec, cause.parameters[0]) + ": " + DescribeWhat(cause);
-    case RepairKind::kAxisReversed:
-      return "joint " + name(cause.joint) + ": sign of the axis";
-    case RepairKind::kRowsSwapped:
-      return "joints " + name(cause.joint) + " and " + name(cause.other) + ": rows exchanged";
-    case RepairKind::kPosesSwapped:
-      return "joints " + name(cause.joint) + " and " + name(cause.other) + ": places exchanged";
-    case RepairKind::kEngineOnly:
-      break;
-  }
-  return cause.note;
+  if (cause.kind == RepairKind::kAxisReversed) return "joint " + name(cause.joint) + ": sign of the axis";
+  return "joints " + name(cause.joint) + " and " + name(cause.other) +
+         (cause.kind == RepairKind::kRowsSwapped ? ": rows exchanged" : ": places exchanged");
 }
 
 std::string Describe(const Repair& cause, const RobotSpec& spec, const std::string& file) {
-  switch (cause.kind) {
-    case RepairKind::kParameters: {
-      if (IsBodyScaled(cause)) {
-        const Parameter& mass = cause.parameters[0];
-        return fmt::format("{} {} in {}, {} repairs it, with the inertia in proportion",
-                           DescribeShort(cause, spec), FormatValue(spec, mass, GetValue(spec, mass)), file,
-                           FormatValue(spec, mass, cause.values[0]));
-      }
-      std::vector<double> found;
-      for (const Parameter& parameter : cause.parameters) found.push_back(GetValue(spec, parameter));
-      return fmt::format("{} {} in {}, {} repairs it", DescribeShort(cause, spec),
-                         FormatValues(spec, cause.parameters, found), file,
-                         FormatValues(spec, cause.parameters, cause.values));
-    }
-    case RepairKind::kAxisReversed:
-      return fmt::format("{}: turns the other way in {}; its axis reversed repairs it",
-                         DescribeShort(cause, spec), file);
-    case RepairKind::kRowsSwapped:
-    case RepairKind::kPosesSwapped:
-      return fmt::format("{} in {}; exchanging them repairs it", DescribeShort(cause, spec), file);
-    case RepairKind::kEngineOnly:
-      break;
-  }
-  return cause.note;
+  const std::string what = DescribeShort(cause, spec);
+  if (cause.kind == RepairKind::kEngineOnly) return what;
+  if (cause.kind == RepairKind::kAxisReversed)
+    return fmt::format("{}: turns the other way in {}; its axis reversed repairs it", what, file);
+  if (cause.kind != RepairKind::kParameters)
+    return fmt::format("{} in {}; exchanging them repairs it", what, file);
+  const std::vector<Parameter> numbers =
+      IsBodyScaled(cause) ? std::vector<Parameter>{cause.parameters[0]} : cause.parameters;
+  std::vector<double> found;
+  for (const Parameter& parameter : numbers) found.push_back(GetValue(spec, parameter));
+  return fmt::format("{} {} in {}, {} repairs it{}", what, FormatValues(spec, numbers, found), file,
+                     FormatValues(spec, numbers, cause.values),
+                     IsBodyScaled(cause) ? ", with the inertia in proportion" : "");
 }
 
 namespace {

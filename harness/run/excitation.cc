@@ -4,7 +4,6 @@
 #include <cmath>
 #include <limits>
 #include <optional>
-#include <utility>
 
 #include "controller/dynamics/model_terms.h"
 #include "harness/diagnosis/parameters.h"
@@ -21,17 +20,6 @@ VectorXd CalcForce(const MotionSample& sample, ModelTerms* terms) {
   terms->SetState(sample.q, sample.xi);
   terms->CalcDynamics();
   return terms->M() * sample.xi_dot + terms->C() * sample.xi + terms->gravity() + terms->friction();
-}
-
-/// The robot with a number changed by `change`, or by as much the other way where there is no such robot.
-std::optional<RobotModel> Change(const RobotSpec& robot, const Parameter& number, double* change) {
-  for (int side = 0; side < 2; ++side) {
-    RobotSpec changed = robot;
-    SetValue(&changed, number, GetValue(robot, number) + *change);
-    if (std::optional<RobotModel> model = TryModel(changed)) return model;
-    *change = -*change;
-  }
-  return std::nullopt;
 }
 
 }  // namespace
@@ -67,7 +55,7 @@ VectorXd CalcSingularValues(const RobotSpec& robot, const std::vector<MotionSamp
   for (size_t k = 0; k < numbers.size(); ++k) {
     const double size = GetScale(robot, numbers[k]);
     double change = kDifference * size;
-    const std::optional<RobotModel> changed = Change(robot, numbers[k], &change);
+    const std::optional<RobotModel> changed = TryChange(robot, numbers[k], &change);
     if (!changed) continue;
     ModelTerms wrong(*changed);
     for (size_t i = 0; i < samples.size(); ++i) {
