@@ -10,7 +10,6 @@
 
 #include "controller/common/text.h"
 #include "controller/model/body_frame.h"
-#include "harness/descriptions/rotation_faults.h"
 
 namespace dexcheck {
 namespace {

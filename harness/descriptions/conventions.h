@@ -4,6 +4,7 @@
 
 #include <functional>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -46,5 +47,20 @@ const std::vector<Convention>& ListConventions();
 
 /// How a fixed base may be mounted: `undo` of its X_PL, which is its place in the world.
 const std::vector<Convention>& ListMountings();
+
+/// A rotation that is written in another convention, of angles or a quaternion.
+/// What makes the given rotation right, or what makes a right one so: one of the two may be unknown, and
+/// angles are not unique where the pitch is a quarter turn.
+struct RotationFault {
+  const char* id;
+  const char* words;
+  Matrix3d (*undo)(const Matrix3d& given);
+  Matrix3d (*apply)(const Matrix3d& right);
+};
+
+std::span<const RotationFault> ListRotationFaults();
+
+/// The rotation with the fault undone, as far as it is known.
+std::optional<Matrix3d> Undo(const RotationFault& fault, const Matrix3d& given, const Matrix3d& right);
 
 }  // namespace dexcheck

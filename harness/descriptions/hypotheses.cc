@@ -33,11 +33,6 @@ std::string Describe(const Finding& finding) {
          "s" + (finding.is_all ? "" : " (" + JoinNames(finding.parts) + ")");
 }
 
-Hypothesis ToHypothesis(const Finding& finding, size_t all_cells) {
-  return {Describe(finding), finding.values,
-          static_cast<double>(finding.cells) / static_cast<double>(all_cells), finding.ids, finding.parts};
-}
-
 /// Farthest that axes and bodies can be from the base.
 double CalcLength(const std::vector<OwnRow>& rows) {
   std::vector<double> reach;
@@ -251,8 +246,12 @@ class Explaining {
       has_convention = has_convention || !finding.ids[0].starts_with("number.");
     }
     std::vector<Hypothesis> hypotheses;
-    if (!has_convention) return hypotheses;
-    for (const Finding& finding : found_) hypotheses.push_back(ToHypothesis(finding, cells));
+    for (const Finding& finding : found_) {
+      if (!has_convention) break;
+      Hypothesis& hypothesis = hypotheses.emplace_back(finding);
+      hypothesis.text = Describe(finding);
+      hypothesis.explained = static_cast<double>(finding.cells) / static_cast<double>(cells);
+    }
     return hypotheses;
   }
 

@@ -1,6 +1,5 @@
-#include "harness/descriptions/rotation_faults.h"
-
 #include "controller/common/text.h"
+#include "harness/descriptions/conventions.h"
 #include "harness/descriptions/parameter_writer.h"
 
 namespace dexcheck {

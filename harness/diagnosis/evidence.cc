@@ -84,27 +84,18 @@ MatrixXd EngineEvidence::CalcRawForces(const RobotModel& variant) const {
 }
 
 void EngineEvidence::CalcScales(const RobotModel& model, const MatrixXd& roots, const MatrixXd& forces) {
-  // Coriolis forces or gravity that vanish but for rounding must not be blown up.
-  constexpr double kSmall = 1e-4;
-  double mass = 0.0;
-  for (const LinkInWorld& link : samples_.front().links) mass += link.mass;
-  double natural[kBlocks] = {};
-  natural[kProbes + 1] = kSmall * model.gravity().norm() * std::sqrt(mass);
-  for (size_t sample = 0; sample < samples_.size(); ++sample) {
-    const auto xi = samples_[sample].xi.array().abs();
-    const auto momentum = roots.col(static_cast<Eigen::Index>(sample)).array() * xi;
-    natural[kProbes] = std::max(natural[kProbes], kSmall * momentum.maxCoeff() * xi.maxCoeff());
-  }
   // Sizes over all samples, of model and engine, so that what one side lacks is measured by the other.
   scale_ = roots.cwiseInverse().replicate(kBlocks, 1);
   const MatrixXd sizes = (CalcRawForces(model).cwiseAbs().cwiseMax(forces.cwiseAbs())).cwiseProduct(scale_);
+  // Coriolis forces or gravity that vanish but for rounding must not be blown up.
+  constexpr double kSmall = 1e-4;
   const Eigen::Index n = roots.rows();
-  for (Eigen::Index block = 0; block < kBlocks; ++block) {
-    const VectorXd by_joint = sizes.middleRows(block * n, n).rowwise().maxCoeff();
-    for (Eigen::Index i = 0; i < n; ++i) {
-      const double size = block == kBlocks - 1 ? by_joint[i] : std::max(natural[block], by_joint.maxCoeff());
-      if (size > 0.0) scale_.row(block * n + i) /= size;
-    }
+  const double least = kSmall * sizes.topRows((kBlocks - 1) * n).maxCoeff();
+  for (Eigen::Index row = 0; row < sizes.rows(); ++row) {
+    const Eigen::Index block = row / n;
+    const double size = block == kBlocks - 1 ? sizes.row(row).maxCoeff()
+                                             : std::max(least, sizes.middleRows(block * n, n).maxCoeff());
+    if (size > 0.0) scale_.row(row) /= size;
   }
   engine_forces_ = forces.cwiseProduct(scale_).reshaped();
 }
