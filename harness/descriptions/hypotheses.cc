@@ -14,21 +14,21 @@
 namespace dexcheck {
 namespace {
 
-std::string JoinAlternatives(const std::vector<std::string>& clauses, const char* between) {
+std::string JoinAlternatives(const std::vector<std::string>& clauses) {
   std::string text;
-  for (const std::string& clause : clauses) text += (text.empty() ? "" : between) + clause;
+  for (const std::string& clause : clauses) text += (text.empty() ? "" : ", or ") + clause;
   return text;
 }
 
 std::string Describe(const Finding& finding) {
   const std::string open = finding.ids.size() > 1 ? " (these two files cannot tell which)" : "";
-  if (finding.what.empty()) return JoinAlternatives(finding.one, ", or ") + open;
+  if (finding.what.empty()) return JoinAlternatives(finding.one) + open;
   if (finding.parts.size() == 1) {
     const bool is_base = finding.what == "joint" && finding.parts[0].empty();
-    return (is_base ? "base" : finding.what + " " + finding.parts[0]) + ": " +
-           JoinAlternatives(finding.one, ", or ") + open;
+    return (is_base ? "base" : finding.what + " " + finding.parts[0]) + ": " + JoinAlternatives(finding.one) +
+           open;
   }
-  return (finding.is_all ? "all " : "") + JoinAlternatives(finding.many, ", or ") + open + ": " +
+  return (finding.is_all ? "all " : "") + JoinAlternatives(finding.many) + open + ": " +
          std::to_string(finding.parts.size()) + " of " + std::to_string(finding.total) + " " + finding.what +
          "s" + (finding.is_all ? "" : " (" + JoinNames(finding.parts) + ")");
 }

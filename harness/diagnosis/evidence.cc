@@ -40,17 +40,15 @@ double CalcReach(const RobotModel& model, const StateSample& at) {
 
 }  // namespace
 
-EngineEvidence::EngineEvidence(const RobotModel& model, const mjModel& engine,
-                               const std::string& engine_source, int samples, std::uint64_t seed,
-                               double tolerance)
-    : tolerance_(tolerance) {
-  const Adapter adapter(model, engine, engine_source);
+EngineEvidence::EngineEvidence(const Adapter& adapter, const DiagnosisOptions& options)
+    : tolerance_(options.tolerance) {
+  const RobotModel& model = adapter.model();
   EngineTerms terms(adapter, Coordinates::kReduced);
-  StateSource source(model, {}, seed);
+  StateSource source(model, {}, options.seed);
   const int n = terms.size();
-  MatrixXd roots(n, samples);
-  MatrixXd forces(kBlocks * n, samples);
-  for (int sample = 0; sample < samples; ++sample) {
+  MatrixXd roots(n, options.samples);
+  MatrixXd forces(kBlocks * n, options.samples);
+  for (int sample = 0; sample < options.samples; ++sample) {
     StateSample& at = samples_.emplace_back();
     at.q.setZero(model.num_positions());
     at.xi.setZero(n);

@@ -4,10 +4,9 @@
 // can be held against it.
 
 #include <algorithm>
-#include <cstdint>
-#include <string>
 #include <vector>
 
+#include "harness/diagnosis/diagnose.h"
 #include "harness/engine/engine_terms.h"
 
 namespace dexcheck {
@@ -26,10 +25,7 @@ struct StateSample {
 /// StateSamples at random states, and the analytic model's forces in the same order and scale.
 class EngineEvidence {
  public:
-  /// @param tolerance relative difference that is no fault: of published numbers, which are rounded.
-  /// @throws InputError when model and engine do not match.
-  EngineEvidence(const RobotModel& model, const mjModel& engine, const std::string& engine_source,
-                 int samples, std::uint64_t seed, double tolerance = 0.0);
+  EngineEvidence(const Adapter& adapter, const DiagnosisOptions& options);
 
   [[nodiscard]] const std::vector<StateSample>& samples() const { return samples_; }
   /// Largest distance of a point of the robot from its base, m.

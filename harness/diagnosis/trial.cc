@@ -51,8 +51,7 @@ Trial::Trial(RobotSpec written, const TrialSetup& setup)
       setup_(&setup),
       model_(setup.terms.Read(written_)),
       adapter_(model_, setup.engine, setup.source),
-      evidence_(model_, setup.engine, setup.source, setup.options.samples, setup.options.seed,
-                setup.options.tolerance),
+      evidence_(adapter_, setup.options),
       placement_(written_, setup.terms, evidence_, !setup.options.by_motion),
       constants_(CheckConstants(adapter_)) {
   for (const ConstantFinding& finding : constants_.findings) {
