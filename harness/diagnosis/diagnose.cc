@@ -20,10 +20,7 @@ constexpr double kSolved = 1e-11;
 /// "dry friction" of the check "joint_dry_friction": what a finding of something that only the MJCF has is
 /// about.
 std::string InWords(const std::string& check) {
-  for (const char* part : {"joint_", "tendon_"}) {
-    if (check.starts_with(part)) return InWords(check.substr(std::string(part).size()));
-  }
-  std::string words = check;
+  std::string words = check.substr(check.starts_with("joint_") ? 6 : check.starts_with("tendon_") ? 7 : 0);
   std::replace(words.begin(), words.end(), '_', ' ');
   return words;
 }
@@ -31,17 +28,14 @@ std::string InWords(const std::string& check) {
 /// Takes from the engine's model what the analytic model cannot have, and says what it was.
 std::vector<Repair> Neutralise(const Adapter& adapter, const ConstantChecks& constants, mjModel* engine) {
   std::vector<Repair> causes;
-  const auto report = [&](const std::string& note) {
-    Repair cause;
-    cause.kind = RepairKind::kEngineOnly;
-    cause.note = note + " only in the MJCF: the analytic model has none";
-    causes.push_back(cause);
-  };
   for (const ConstantFinding& finding : constants.findings) {
     if (!finding.engine_only) continue;
-    report(fmt::format("{}: {} of {:.9g}", finding.where, InWords(finding.check), finding.engine));
+    Repair& cause = causes.emplace_back();
+    cause.kind = RepairKind::kEngineOnly;
+    cause.note = fmt::format("{}: {} of {:.9g} only in the MJCF: the analytic model has none", finding.where,
+                             InWords(finding.check), finding.engine);
     if (finding.where.starts_with("free joint of "))
-      causes.back().note += " (<joint type=\"free\"> takes the defaults of <joint>, <freejoint> does not)";
+      cause.note += " (<joint type=\"free\"> takes the defaults of <joint>, <freejoint> does not)";
   }
   if (causes.empty()) return causes;
   std::vector<int> joints = adapter.joint_ids();

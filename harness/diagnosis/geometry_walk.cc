@@ -195,7 +195,7 @@ class GeometryWalk {
     placement_.Set(parameter, GetValue(spec_, parameter) + kOffset);
     const bool keeps =
         std::none_of(right.begin(), right.end(), [&](int item) { return placement_.Fails(item); });
-    placement_.Restore(spec_, parameter);
+    placement_.Replace(spec_);
     return keeps;
   }
 
@@ -310,7 +310,7 @@ class GeometryWalk {
           std::any_of(turned.begin(), turned.end(), [&](double turn) { return attempt(target, turn); }));
       if (is_found() && best.cost <= static_cast<double>(parameters.size())) break;
     }
-    for (const Parameter& parameter : parameters) placement_.Restore(spec_, parameter);
+    placement_.Replace(spec_);
     if (!is_found()) return;
     for (size_t i = 0; i < parameters.size(); ++i) {
       double& value = best.cause.values[i];

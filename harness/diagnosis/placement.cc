@@ -90,20 +90,6 @@ void Placement::Replace(const RobotSpec& spec) {
   UpdateFrom(-1);
 }
 
-void Placement::Restore(const RobotSpec& spec, const Parameter& parameter) {
-  const auto i = static_cast<size_t>(parameter.index);
-  if (IsOfFrame(parameter)) {
-    trial_.frames[i].X_LF = spec.frames[i].X_LF;
-  } else if (parameter.index < 0) {
-    trial_.base.X_B0 = spec.base.X_B0;
-    UpdateFrom(-1);
-  } else {
-    trial_.joints[i].X_PB = spec.joints[i].X_PB;
-    trial_.joints[i].mdh = spec.joints[i].mdh;
-    UpdateFrom(parameter.index);
-  }
-}
-
 Placement::Difference Placement::CalcDifference(const PlacedItem& item, size_t sample) const {
   const auto i = static_cast<size_t>(item.index);
   const StateSample& engine = evidence_->samples()[sample];

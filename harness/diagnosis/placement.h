@@ -39,8 +39,6 @@ class Placement {
 
   /// Changes a number of the trial.
   void Set(const Parameter& parameter, double value);
-  /// Puts the geometry that has the parameter back to that of `spec`.
-  void Restore(const RobotSpec& spec, const Parameter& parameter);
   /// Replaces the whole trial; the tree must be the same.
   void Replace(const RobotSpec& spec);
 
