@@ -127,7 +127,7 @@ class Diagnostician {
   bool TryAccept(Repair cause) {
     Repair printed = cause;
     printed.parameters.clear();
-    printed.values.clear();
+    if (cause.kind == RepairKind::kParameters) printed.values.clear();
     for (size_t i = 0; i < cause.parameters.size(); ++i) {
       const Parameter& parameter = cause.parameters[i];
       const double value = RoundPrinted(parameter, cause.values[i]);

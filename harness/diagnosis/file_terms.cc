@@ -69,7 +69,8 @@ RobotSpec FileTerms::Read(RobotSpec written) const {
   };
   for (size_t i = 0; i < written.joints.size(); ++i) {
     Joint& joint = written.joints[i];
-    joint.X_PB = Chain(own_frame(joint.parent), Chain(joint.X_PB, OwnFrame(static_cast<int>(i)).inverse()));
+    joint.X_PB = Chain(own_frame(joint.parent), Chain(joint.X_PB, X_iL[i].inverse()));
+    if (IsPlain(static_cast<int>(i))) joint.mdh = MdhRow{};
     if (!IsIdentity(X_iL[i])) joint.body = ExpressIn(joint.body, X_iL[i]);
   }
   for (Frame& frame : written.frames) frame.X_LF = Chain(own_frame(frame.link), frame.X_LF);
@@ -79,15 +80,20 @@ RobotSpec FileTerms::Read(RobotSpec written) const {
 Pose FileTerms::AxisFrame(const Joint& written, int joint) const {
   if (!IsPlain(joint)) return Pose::Identity();
   const Pose X_Li = OwnFrame(joint).inverse();
-  return written.mdh.alpha == 0.0 ? X_Li : X_Li * Eigen::AngleAxisd(written.mdh.alpha, Vector3d::UnitX());
+  const MdhRow& turn = written.mdh;
+  if (turn.alpha == 0.0 && turn.q == 0.0) return X_Li;
+  return X_Li * Eigen::AngleAxisd(turn.q, Vector3d::UnitZ()) *
+         Eigen::AngleAxisd(turn.alpha, Vector3d::UnitX());
 }
 
 Pose FileTerms::CalcPlace(const Joint& written, int joint, double q) const {
-  const MdhRow& mdh = written.mdh;
+  const bool is_plain = IsPlain(joint);
+  const MdhRow mdh = is_plain ? MdhRow{} : written.mdh;
   const bool turns = written.type == JointType::kRevolute;
   const Pose X = CalcMdhTransform(mdh.alpha, mdh.a, mdh.q + (turns ? q : 0.0), mdh.d + (turns ? 0.0 : q));
-  if (!IsPlain(joint)) return written.X_PB * X;
-  return written.X_PB * OwnFrame(joint).inverse() * X * AxisFrame(written, joint).inverse();
+  if (!is_plain) return written.X_PB * X;
+  const Pose X_Li = AxisFrame(written, joint);
+  return written.X_PB * X_Li * X * X_Li.inverse();
 }
 
 }  // namespace dexcheck

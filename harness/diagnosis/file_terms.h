@@ -25,20 +25,19 @@ class FileTerms {
   }
   /// The specification's numbers as they stand in the file; no robot can be made of them.
   [[nodiscard]] RobotSpec Write(RobotSpec spec) const;
-  /// The specification of a file with such numbers. In a plain row, alpha = pi stands for an axis that is
-  /// turned around.
+  /// The specification of a file with such numbers. In a plain row, q and alpha stand for another axis than
+  /// the file's: Rot(z, q) Rot(x, alpha) in the frame in which that is z.
   [[nodiscard]] RobotSpec Read(RobotSpec written) const;
+  /// The link's frame of the file in frame i of the specification, or in Sigma_0 (-1).
+  [[nodiscard]] Pose OwnFrame(int joint) const {
+    return IsPlain(joint) ? rows_[static_cast<size_t>(joint)].X_iL : Pose::Identity();
+  }
   /// Frame i in the link's frame of the file.
   [[nodiscard]] Pose AxisFrame(const Joint& written, int joint) const;
   /// The link's frame of the file in its parent's. @param q of the joint, rad or m.
   [[nodiscard]] Pose CalcPlace(const Joint& written, int joint, double q) const;
 
  private:
-  /// The link's frame of the file in frame i of the specification, or in Sigma_0 (-1).
-  [[nodiscard]] Pose OwnFrame(int joint) const {
-    return IsPlain(joint) ? rows_[static_cast<size_t>(joint)].X_iL : Pose::Identity();
-  }
-
   std::vector<WrittenRow> rows_;
 };
 

@@ -85,7 +85,7 @@ class ForceFit {
     const MatrixXd columns = CalcColumns(start_, candidates_);
     std::vector<std::pair<double, Parameter>> gains;
     for (size_t i = 0; i < candidates_.size(); ++i) {
-      const auto column = columns.col(static_cast<Eigen::Index>(i));
+      const VectorXd column = columns.col(static_cast<Eigen::Index>(i));
       if (column.norm() > 0.0)
         gains.emplace_back(std::abs(column.dot(start_.residual)) / column.norm(), candidates_[i]);
     }

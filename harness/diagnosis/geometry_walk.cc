@@ -3,6 +3,7 @@
 #include <cmath>
 #include <limits>
 
+#include "controller/common/text.h"
 #include "harness/diagnosis/trial.h"
 
 namespace dexcheck {
@@ -276,7 +277,7 @@ class GeometryWalk {
     RobotSpec changed = spec_;
     Apply(cause, &changed);
     placement_.Replace(changed);
-    const double cost = CalcCost(std::max(cause.parameters.size(), size_t{1}));
+    const double cost = CalcCost(std::max(cause.values.size(), size_t{1}));
     placement_.Replace(spec_);
     return cost;
   }
@@ -320,6 +321,23 @@ class GeometryWalk {
     candidates_.push_back(std::move(best));
   }
 
+  /// The engine's axis, as two numbers, in the place of the one that a plain row says.
+  void TryAxis() {
+    const auto i = static_cast<size_t>(link_);
+    const Pose X_WL = placement_.PoseOf(ParentOf(link_)) * spec_.joints[i].X_PB;  // with the joint at zero
+    Vector3d axis = X_WL.linear().transpose() * trial_.evidence().samples()[0].axes[i];
+    constexpr double kRounding = 1e-14;
+    for (double& entry : axis) entry = std::abs(entry) < kRounding ? 0.0 : entry;
+    const Vector3d z = trial_.setup().terms.OwnFrame(link_).linear() * axis;
+    TriedRepair tried;
+    tried.cause.kind = RepairKind::kAxisTurned;
+    tried.cause.joint = link_;
+    tried.cause.values = {std::atan2(z.x(), -z.y()), std::atan2(std::hypot(z.x(), z.y()), z.z())};
+    tried.cause.note = FormatNumbers(axis);
+    tried.cost = CalcCostAfter(tried.cause);
+    candidates_.push_back(std::move(tried));
+  }
+
   void TryStructure() {
     const auto attempt = [&](RepairKind kind, int joint, int other) {
       TriedRepair candidate;
@@ -331,6 +349,7 @@ class GeometryWalk {
       candidates_.push_back(std::move(candidate));
     };
     if (link_ < 0) return;
+    if (trial_.setup().terms.IsPlain(link_)) TryAxis();
     const int parent = ParentOf(link_);
     attempt(RepairKind::kAxisReversed, link_, -1);
     if (parent >= 0) attempt(RepairKind::kAxisReversed, parent, -1);

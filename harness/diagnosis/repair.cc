@@ -125,7 +125,11 @@ void Apply(const Repair& cause, RobotSpec* spec) {
       return;
     case RepairKind::kAxisReversed:
       if (!cause.is_plain) return ReverseAxis(spec, cause.joint);
-      JointOf(spec, cause.joint).mdh.alpha = JointOf(spec, cause.joint).mdh.alpha == 0.0 ? kPi : 0.0;
+      JointOf(spec, cause.joint).mdh.alpha += JointOf(spec, cause.joint).mdh.alpha > 0.0 ? -kPi : kPi;
+      return;
+    case RepairKind::kAxisTurned:
+      JointOf(spec, cause.joint).mdh.q = cause.values[0];
+      JointOf(spec, cause.joint).mdh.alpha = cause.values[1];
       return;
     case RepairKind::kRowsSwapped:
       return std::swap(JointOf(spec, cause.joint).mdh, JointOf(spec, cause.other).mdh);
@@ -142,6 +146,7 @@ std::string DescribeShort(const Repair& cause, const RobotSpec& spec) {
     return DescribePart(spec, cause.parameters[0]) + ": " + DescribeWhat(cause);
   const auto name = [&](int joint) { return spec.joints[static_cast<size_t>(joint)].name; };
   if (cause.kind == RepairKind::kAxisReversed) return "joint " + name(cause.joint) + ": sign of the axis";
+  if (cause.kind == RepairKind::kAxisTurned) return "joint " + name(cause.joint) + ": axis";
   return "joints " + name(cause.joint) + " and " + name(cause.other) +
          (cause.kind == RepairKind::kRowsSwapped ? ": rows exchanged" : ": places exchanged");
 }
@@ -151,6 +156,8 @@ std::string Describe(const Repair& cause, const RobotSpec& spec, const std::stri
   if (cause.kind == RepairKind::kEngineOnly) return what;
   if (cause.kind == RepairKind::kAxisReversed)
     return fmt::format("{}: turns the other way in {}; its axis reversed repairs it", what, file);
+  if (cause.kind == RepairKind::kAxisTurned)
+    return fmt::format("{} is another one than in {}; {} repairs it", what, file, cause.note);
   if (cause.kind != RepairKind::kParameters)
     return fmt::format("{} in {}; exchanging them repairs it", what, file);
   const std::vector<Parameter> numbers =

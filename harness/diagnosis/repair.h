@@ -12,6 +12,7 @@ namespace dexcheck {
 enum class RepairKind {
   kParameters,    ///< One number, or several of one vector or tensor.
   kAxisReversed,  ///< A joint turns (or slides) the other way.
+  kAxisTurned,    ///< It turns about, or slides along, another axis than a plain row says.
   kRowsSwapped,   ///< The MDH rows of two joints are exchanged.
   kPosesSwapped,  ///< The places where two joints start on their parents are exchanged.
   kEngineOnly,    ///< The MJCF has something that the analytic model cannot have.
@@ -21,11 +22,12 @@ struct Repair {
   RepairKind kind = RepairKind::kParameters;
   std::vector<Parameter>
       parameters;  ///< kParameters: what to change (a mass first when its inertia scales with it),
-  std::vector<double> values;  ///< and the values that repair it.
-  int joint = -1;              ///< kAxisReversed and the swaps.
-  int other = -1;              ///< The swaps.
-  bool is_plain = false;       ///< kAxisReversed: of a row whose link's frame stays where it is.
-  std::string note;            ///< kEngineOnly, in words.
+  std::vector<double>
+      values;      ///< and the values that repair it; of kAxisTurned q and alpha, as FileTerms has them.
+  int joint = -1;  ///< Of all but numbers.
+  int other = -1;  ///< The swaps.
+  bool is_plain = false;  ///< kAxisReversed: of a row whose link's frame stays where it is.
+  std::string note;       ///< kEngineOnly, in words; of kAxisTurned the right axis.
 
   double explained = 0.0;  ///< Fraction of all residuals that the repair removes, after the causes before it.
   double explained_of_forces = 0.0;  ///< The same of the forces alone.

@@ -183,6 +183,29 @@ TEST(FileTermsTest, SlantedAxesAreTurnedBack) {
   expect({"name = \"tip\"", "xyz = [", 2}, 0.03, "frame tip", "position z");
 }
 
+// The axis of a plain row is no number of its place.
+TEST(FileTermsTest, AnotherAxisIsNamedWithTheRightOne) {
+  std::vector<LeggedLink> links = ListQuadruped();
+  const MjModelPtr engine = LoadMjcfText(WriteLeggedMjcf("quadruped", links), "robot.xml");
+  const std::string text = WriteParameters(ReadMjcfDescription(*engine, "robot.xml"), "robot.xml");
+  for (const char* const axis : {"[0, 0, 1]", "[0.6, 0, 0.8]", "[0, -0.6, 0.8]"}) {
+    const std::string key = "axis = [";
+    const size_t begin = text.find(key) + key.size() - 1;
+    const size_t end = text.find(']', begin) + 1;
+    const std::string right = text.substr(begin, end - begin);
+    ASSERT_NE(right, axis);
+    std::vector<WrittenRow> rows;
+    const RobotModel model =
+        ParseRobotModel(text.substr(0, begin) + axis + text.substr(end), "robot.toml", {}, &rows);
+    const Diagnosis diagnosis = Diagnose(
+        model, *engine, "robot.xml", {}, [](const char*) { return true; }, rows);
+    ASSERT_EQ(diagnosis.causes.size(), 1U);
+    EXPECT_EQ(diagnosis.causes[0].kind, RepairKind::kAxisTurned);
+    EXPECT_THAT(Describe(diagnosis.causes[0], diagnosis.written, "FILE"), ::testing::HasSubstr("; " + right + " repairs it"));
+    EXPECT_TRUE(diagnosis.remaining_constants.empty() && diagnosis.remaining_terms.empty());
+  }
+}
+
 // Rows of modified parameters stand in the file as in the specification; plain ones are read back.
 TEST(FileTermsTest, NumbersAreReadAsTheyAreWritten) {
   std::mt19937 random(12);
