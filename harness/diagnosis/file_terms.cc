@@ -79,7 +79,7 @@ RobotSpec FileTerms::Read(RobotSpec written) const {
 
 Pose FileTerms::AxisFrame(const Joint& written, int joint) const {
   if (!IsPlain(joint)) return Pose::Identity();
-  const Pose X_Li = OwnFrame(joint).inverse();
+  Pose X_Li = OwnFrame(joint).inverse();
   const MdhRow& turn = written.mdh;
   if (turn.alpha == 0.0 && turn.q == 0.0) return X_Li;
   return X_Li * Eigen::AngleAxisd(turn.q, Vector3d::UnitZ()) *

@@ -152,7 +152,7 @@ std::string DescribeShort(const Repair& cause, const RobotSpec& spec) {
 }
 
 std::string Describe(const Repair& cause, const RobotSpec& spec, const std::string& file) {
-  const std::string what = DescribeShort(cause, spec);
+  std::string what = DescribeShort(cause, spec);
   if (cause.kind == RepairKind::kEngineOnly) return what;
   if (cause.kind == RepairKind::kAxisReversed)
     return fmt::format("{}: turns the other way in {}; its axis reversed repairs it", what, file);
@@ -163,6 +163,7 @@ std::string Describe(const Repair& cause, const RobotSpec& spec, const std::stri
   const std::vector<Parameter> numbers =
       IsBodyScaled(cause) ? std::vector<Parameter>{cause.parameters[0]} : cause.parameters;
   std::vector<double> found;
+  found.reserve(numbers.size());
   for (const Parameter& parameter : numbers) found.push_back(GetValue(spec, parameter));
   return fmt::format("{} {} in {}, {} repairs it{}", what, FormatValues(spec, numbers, found), file,
                      FormatValues(spec, numbers, cause.values),

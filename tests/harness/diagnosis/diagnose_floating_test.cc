@@ -201,7 +201,8 @@ TEST(FileTermsTest, AnotherAxisIsNamedWithTheRightOne) {
         model, *engine, "robot.xml", {}, [](const char*) { return true; }, rows);
     ASSERT_EQ(diagnosis.causes.size(), 1U);
     EXPECT_EQ(diagnosis.causes[0].kind, RepairKind::kAxisTurned);
-    EXPECT_THAT(Describe(diagnosis.causes[0], diagnosis.written, "FILE"), ::testing::HasSubstr("; " + right + " repairs it"));
+    EXPECT_THAT(Describe(diagnosis.causes[0], diagnosis.written, "FILE"),
+                ::testing::HasSubstr("; " + right + " repairs it"));
     EXPECT_TRUE(diagnosis.remaining_constants.empty() && diagnosis.remaining_terms.empty());
   }
 }
