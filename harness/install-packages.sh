@@ -14,8 +14,8 @@ packages=(
   libmujoco-dev libgl-dev libqhull-dev
   # robots described by URDFs, the files that an MJCF names
   liburdfdom-dev libtinyxml2-dev
-  # the run's log
-  libhdf5-dev
+  # the run's log, recordings of others
+  libhdf5-dev libzip-dev liblz4-dev libzstd-dev
   # studies: databases, searches, samples (Boost.Random)
   libsqlite3-dev libsqlitecpp-dev libpagmo-dev libnlopt-dev libnlopt-cxx-dev libboost-dev
   # the command line

@@ -86,6 +86,7 @@ void AddUrdfOptions(Command command, UrdfOptions* options);
 
 /// Each adds its command to `app`.
 void AddAuditCommand(Command app);
+void AddJudgeCommand(Command app);
 void AddConsistencyCommand(Command app);
 void AddDiagnoseCommand(Command app);
 void AddMutateCommand(Command app);

@@ -11,6 +11,7 @@
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
 #include "harness/cli/commands.h"
+#include "harness/cli/judge_command.h"
 #include "harness/cli/make_video.h"
 #include "harness/cli/output_file.h"
 #include "harness/cli/terminal.h"
@@ -34,6 +35,7 @@ struct CompareRequest {
   std::string page;
   std::string json;
   std::string video;
+  std::filesystem::path model, columns;  ///< Of recordings that are no runs.
 };
 
 std::string Show(const std::optional<double>& value) { return value ? FormatShort(*value) : "-"; }
@@ -127,6 +129,11 @@ nlohmann::ordered_json ToJson(const CompareRequest& request, const RunComparison
 }
 
 int Run(const CompareRequest& request) {
+  if (!request.model.empty()) {
+    if (request.run_folders.size() != 2) throw InputError("--model: needs two recordings");
+    return CompareTwoRecordings({request.model, request.run_folders[0], request.run_folders[1],
+                                 request.columns, request.json, request.quiet});
+  }
   if (request.tolerance && !(*request.tolerance >= 0.0 && std::isfinite(*request.tolerance)))
     throw InputError("--tolerance: must not be negative, got " + FormatNumber(*request.tolerance));
   if (request.run_folders.size() < 2) throw InputError("compare: at least two runs are needed");
@@ -171,10 +178,12 @@ int Run(const CompareRequest& request) {
 
 void AddCompareCommand(Command app) {
   const auto request = std::make_shared<CompareRequest>();
-  Command command = app.AddCommand("compare", "Compare recorded runs: inputs, results, checks and signals");
+  Command command = app.AddCommand(
+      "compare",
+      "Compare runs: inputs, results, checks and signals; or, with --model, recordings of a robot");
   command
       .AddOption("RUN_DIR", &request->run_folders,
-                 "Folders of runs; the first is what the others are compared with")
+                 "Folders of runs, or recordings; the first is what the others are compared with")
       .Required()
       .TypeName("RUN_DIR...");
   command.AddOption(
@@ -189,6 +198,11 @@ void AddCompareCommand(Command app) {
                     "Write a page with the signals overlaid and subtracted");
   command.AddOption("--video FILE", &request->video,
                     "Draw both runs in one scene, the second as a ghost (.mp4, .webm or .gif)");
+  const Option model =
+      command.AddOption("--model MODEL", &request->model,
+                        "Parameter file, URDF or MJCF of the robot of two recordings: what differs is named");
+  command.AddOption("--columns FILE.toml", &request->columns, "Which column of the recordings is what")
+      .Needs(model);
   AddJsonOption(command, "the numbers", &request->json);
   command.AddFlag("--all", &request->all, "Print all checks and signals");
   command.AddFlag("--quiet", &request->quiet, "Print the last line only");

@@ -55,6 +55,7 @@ int RunCommandLine(int argc, char** argv) {
   AddRenderCommand(running);
   AddExportCommand(running);
   AddCompareCommand(running);
+  AddJudgeCommand(running);
   const Command studying = app.Under("Study");
   AddStudyCommand(studying);
   AddBudgetCommand(studying);

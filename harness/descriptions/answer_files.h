@@ -7,7 +7,7 @@
 #include <string>
 
 #include "harness/descriptions/answer_layout.h"
-#include "harness/descriptions/npy_file.h"
+#include "harness/log/npy_file.h"
 #include "harness/descriptions/random_states.h"
 
 namespace dexcheck {

@@ -57,7 +57,7 @@ class Search {
       : y_(y),
         candidates_(candidates),
         options_(options),
-        rows_(static_cast<double>(y.size())),
+        rows_(options.rows > 0.0 ? options.rows : static_cast<double>(y.size())),
         samples_(rows_ / options.alike) {
     for (const Candidate& one : candidates)
       visible_.push_back(Reduce(one, std::sqrt(options.floor * options.alike)));

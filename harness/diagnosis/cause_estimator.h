@@ -68,6 +68,8 @@ struct CauseOptions {
   double floor = 1.0;
   /// Rows whose noise is one and the same: 1 where each has its own. N / alike are counted then.
   double alike = 1.0;
+  /// Of which y and the columns are sums with the same products; 0 for those of y.
+  double rows = 0.0;
 };
 
 /// Candidates whose likelihoods differ by less than this factor are told as equals, natural logarithm.

@@ -64,7 +64,8 @@ std::string Explanation::Tell() const {
     if (faults.size() > kMostTold) text += " or " + std::to_string(faults.size() - kMostTold) + " more";
     if (faults.size() > 1) text += ": not isolable from each other on this motion";
   }
-  text += ends ? ", " + FormatNumber(from, 4) + " to " + FormatNumber(to, 4) + " s"
+  // What holds all the time has no begin.
+  if (std::isfinite(from)) text += ends ? ", " + FormatNumber(from, 4) + " to " + FormatNumber(to, 4) + " s"
                : ", from " + FormatNumber(from, 4) + " s";
   if (rival.empty()) return text;
   // Beyond this many digits a likelihood ratio says no more.

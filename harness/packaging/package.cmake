@@ -28,7 +28,8 @@ set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_SECTION libdevel)
 set(CPACK_COMPONENT_DEVELOPMENT_DESCRIPTION "analytic robot models against MuJoCo: libraries and headers")
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_DEPENDS "libeigen3-dev, libtomlplusplus-dev")
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_SUGGESTS "libmujoco-dev, libgl-dev, libqhull-dev, libhdf5-dev, \
-libfmt-dev, nlohmann-json3-dev, liburdfdom-dev, libtinyxml2-dev")
+libfmt-dev, nlohmann-json3-dev, liburdfdom-dev, libtinyxml2-dev, libsqlite3-dev, libsqlitecpp-dev, \
+libzip-dev, liblz4-dev, libzstd-dev, pkg-config")
 if(DEXCHECK_BUILD_RENDERS)
   list(APPEND CPACK_COMPONENTS_ALL program)
   install(FILES ${PROJECT_SOURCE_DIR}/LICENSE DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/dexcheck RENAME copyright

@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -24,6 +25,7 @@
 #include "harness/checks/tolerance.h"
 #include "harness/descriptions/audit.h"
 #include "harness/descriptions/read_description.h"
+#include "harness/python/judge.h"
 
 namespace py = pybind11;
 
@@ -277,6 +279,11 @@ PYBIND11_MODULE(dexcheck, m) {
       py::arg("file"), py::arg("floating") = false,
       py::arg("packages") = std::vector<std::filesystem::path>(),
       "Reads a parameter file (TOML), a URDF or an MJCF.");
+
+  AddJudge(&m, [](const py::object& model, const std::function<void(const RobotModel&)>& use) {
+    if (py::isinstance<Robot>(model)) return use(model.cast<const Robot&>().model());
+    use(RobotModel(ReadDescription(model.cast<std::filesystem::path>()).spec));
+  });
 }
 
 }  // namespace dexcheck

@@ -56,6 +56,7 @@ std::array<double, 2> FindRange(const Figure& figure, bool right_axis) {
     if (curve.right_axis == right_axis) std::for_each(curve.values.begin(), curve.values.end(), include);
   }
   if (figure.bound && !right_axis) include(*figure.bound);
+  if (figure.band && !right_axis) include(*figure.band), include(-*figure.band);
   return range;
 }
 

@@ -41,6 +41,8 @@ struct Figure {
   bool log = false;              ///< Values up to 0 are gaps.
   double least_span = 0.0;       ///< Axes show at least this much, so that rounding errors don't fill them.
   std::optional<double> bound = {};  ///< A dashed line at this value.
+  std::optional<double> band = {};   ///< What lies this far from 0 is shaded; on pages only.
+  bool below = false;                ///< Stands below the figure before it, of the same thing; on pages only.
   std::vector<Curve> curves = {};
   std::string note = {};  ///< What the reader has to know; may be empty.
   bool printed = false;   ///< Drawn as a picture for print, too.

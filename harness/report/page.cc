@@ -122,8 +122,9 @@ class Page {
     AddFile("scenario.toml", "Scenario", true, &json["files"]);
     AddFile("robot/" + Text("robot"), "Parameters of the model: " + Text("robot"), false, &json["files"]);
     AddFile("mjcf/" + Text("mjcf"), "MJCF: " + Text("mjcf"), false, &json["files"]);
+    const PlotGroup plots = {"", content_.figures, run_.time()};
     return AssemblePlotPage(fmt::format("{}: {}", FindHeadline(run_).word, Text("scenario")), kRunJs,
-                            EmbedJson("run-page", json) + media_, content_.figures, run_.time(),
+                            EmbedJson("run-page", json) + media_, {&plots, 1},
                             content_.scene.replay ? &*content_.scene.replay : nullptr);
   }
 

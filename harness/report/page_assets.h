@@ -10,6 +10,7 @@ extern const char* const kPageHtml;
 extern const char* const kRunJs;
 extern const char* const kCampaignJs;
 extern const char* const kComparisonJs;
+extern const char* const kJudgeJs;
 extern const char* const kPageJs;  ///< Needs kChartsJs.
 extern const char* const kReplayHtml;
 extern const char* const kReplayJs;

@@ -91,11 +91,10 @@ std::string AssemblePage(const PageParts& parts) {
 }
 
 std::string AssemblePlotPage(const std::string& title, const char* script, const std::string& data,
-                             const std::vector<Figure>& figures, const VectorXd& time,
-                             const ReplayData* replay) {
+                             std::span<const PlotGroup> groups, const ReplayData* replay) {
   PageParts parts{.title = title,
                   .markup = {kPageHtml},
-                  .data = data + EmbedPlots(figures, time),
+                  .data = data + EmbedPlots(groups),
                   .scripts = {script, kChartJs, kChartsJs, kPageJs}};
   if (replay != nullptr) {
     parts.markup.push_back(kReplayHtml);
@@ -118,39 +117,50 @@ double RoundTime(double time) { return std::round(1e6 * time) / 1e6; }
 
 }  // namespace
 
-std::string EmbedPlots(const std::vector<Figure>& figures, const VectorXd& time) {
+std::string EmbedPlots(std::span<const PlotGroup> groups) {
   long curves = 0;
-  for (const Figure& figure : figures) curves += static_cast<long>(figure.curves.size());
-  const Thinning thinning(time, std::max(kMostNumbers / std::max(curves, 1L), kFewestPoints));
-  nlohmann::ordered_json json;
+  for (const PlotGroup& group : groups)
+    for (const Figure& figure : group.figures) curves += static_cast<long>(figure.curves.size());
+  const long most = std::max(kMostNumbers / std::max(curves, 1L), kFewestPoints);
+  nlohmann::ordered_json json = nlohmann::ordered_json::array();
   std::string bytes;
-  for (const double t : thinning.times()) json["times"].push_back(RoundTime(t));
-  json["points"] = thinning.times().size();
-  json["plots"] = nlohmann::ordered_json::array();
-  int series = 0;
-  for (const Figure& figure : figures) {
-    nlohmann::ordered_json plot = {
-        {"name", figure.name}, {"panel", figure.panel}, {"title", figure.title},
-        {"note", figure.note}, {"label", figure.label}, {"right", figure.right_label},
-        {"log", figure.log},   {"bound", nullptr},      {"range", CalcAxisRange(figure, false)}};
-    if (!figure.right_label.empty()) plot["right_range"] = CalcAxisRange(figure, true);
-    if (figure.bound) plot["bound"] = *figure.bound;
-    for (const Curve& curve : figure.curves) {
-      plot["curves"].push_back({{"id", "s" + std::to_string(series)},
-                                {"label", curve.label},
-                                {"color", FindColor(curve.color)},
-                                {"background", curve.color == kGrey},
-                                {"dashes", FindDashes(curve.dash)},
-                                {"right", curve.right_axis},
-                                {"wide", curve.wide},
-                                {"series", series}});
-      ++series;
-      for (const double value : thinning.Apply(curve.values)) {
-        const auto number = std::bit_cast<std::array<char, 4>>(static_cast<float>(value));
-        bytes.append(number.data(), number.size());
+  for (const PlotGroup& group : groups) {
+    const Thinning thinning(group.time, most);
+    nlohmann::ordered_json& one = json.emplace_back();
+    one["title"] = group.title;
+    one["times"] = nlohmann::ordered_json::array();
+    for (const double t : thinning.times()) one["times"].push_back(RoundTime(t));
+    one["plots"] = nlohmann::ordered_json::array();
+    for (const Figure& figure : group.figures) {
+      nlohmann::ordered_json plot = {{"name", figure.name},
+                                     {"panel", figure.panel},
+                                     {"title", figure.title},
+                                     {"note", figure.note},
+                                     {"label", figure.label},
+                                     {"right", figure.right_label},
+                                     {"log", figure.log},
+                                     {"bound", nullptr},
+                                     {"band", nullptr},
+                                     {"below", figure.below},
+                                     {"range", CalcAxisRange(figure, false)}};
+      if (!figure.right_label.empty()) plot["right_range"] = CalcAxisRange(figure, true);
+      if (figure.bound) plot["bound"] = *figure.bound;
+      if (figure.band) plot["band"] = *figure.band;
+      for (const Curve& curve : figure.curves) {
+        plot["curves"].push_back({{"label", curve.label},
+                                  {"color", FindColor(curve.color)},
+                                  {"background", curve.color == kGrey},
+                                  {"dashes", FindDashes(curve.dash)},
+                                  {"right", curve.right_axis},
+                                  {"wide", curve.wide},
+                                  {"begin", bytes.size() / sizeof(float)}});
+        for (const double value : thinning.Apply(curve.values)) {
+          const auto number = std::bit_cast<std::array<char, 4>>(static_cast<float>(value));
+          bytes.append(number.data(), number.size());
+        }
       }
+      one["plots"].push_back(plot);
     }
-    json["plots"].push_back(plot);
   }
   return EmbedJson("run-plots", json) + EmbedBytes("run-values", bytes);
 }

@@ -3,6 +3,7 @@
 // How a page is put together: built-in markup and scripts, and the data that the scripts make it of.
 
 #include <nlohmann/json_fwd.hpp>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -42,16 +43,22 @@ struct PageParts {
 /// The whole document.
 std::string AssemblePage(const PageParts& parts);
 
+/// Plots over one time.
+struct PlotGroup {
+  std::string title;  ///< Empty where it is the only one.
+  std::span<const Figure> figures;
+  VectorXd time;  ///< Of the curves' values, s.
+};
+
 /// A page with plots, and a replay where there is one. @param script makes what else is in it.
-/// @param data that this script takes. @param time of the curves' values, s.
+/// @param data that this script takes.
 std::string AssemblePlotPage(const std::string& title, const char* script, const std::string& data,
-                             const std::vector<Figure>& figures, const VectorXd& time,
-                             const ReplayData* replay = nullptr);
+                             std::span<const PlotGroup> groups, const ReplayData* replay = nullptr);
 
 // The numbers behind the page's plots.
 
-/// In the form that the page's script reads: times, plots, curves, and the curves' values as 4-byte floats,
-/// curve by curve. @param time of the curves' values, s.
-std::string EmbedPlots(const std::vector<Figure>& figures, const VectorXd& time);
+/// In the form that the page's script reads: groups with times, plots, curves, and the curves' values as
+/// 4-byte floats, curve by curve.
+std::string EmbedPlots(std::span<const PlotGroup> groups);
 
 }  // namespace dexcheck

@@ -278,8 +278,10 @@ class ComparisonPage {
                                  {"fraction", FormatShort(signal.fraction())},
                                  {"at", signal.at_time}});
     }
+    const std::vector<Figure> figures = MakeFigures();
+    const PlotGroup plots = {"", figures, runs_[0]->time()};
     return AssemblePlotPage(fmt::format("Comparison of {}", fmt::join(names_, ", ")), kComparisonJs,
-                            EmbedJson("comparison", json), MakeFigures(), runs_[0]->time());
+                            EmbedJson("comparison", json), {&plots, 1});
   }
 
  private:

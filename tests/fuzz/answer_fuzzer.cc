@@ -1,7 +1,7 @@
 // What programs write: any bytes are arrays, terms of the right sizes, or an InputError that names the file.
 
 #include "harness/descriptions/answer_layout.h"
-#include "harness/descriptions/npy_file.h"
+#include "harness/log/npy_file.h"
 #include "harness/descriptions/urdf_reader.h"
 #include "tests/fuzz/fuzz_target.h"
 

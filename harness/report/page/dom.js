@@ -13,6 +13,53 @@ const ReadText = id => document.getElementById(id).textContent;
 const ReadJson = id => JSON.parse(ReadText(id));
 const ReadBytes = id => Uint8Array.from(atob(ReadText(id)), c => c.charCodeAt(0)).buffer;
 
+/** A value as its standard error lets it be told: null is any size. */
+const TellValue = (value, error, unit = '') => {
+  const tail = unit ? ' ' + unit : '';
+  if (error === null || value === null) return 'of any size';
+  const digits = error > 0 ? Math.floor(Math.log10(Math.abs(value) || error)) - Math.floor(Math.log10(error)) + 2 : 6;
+  const Short = (x, digits) => String(Number(x.toPrecision(Math.min(Math.max(digits, 1), 6))));
+  return Short(value, digits) + (error > 0 ? ` ± ${Short(error, 2)}` : '') + tail;
+};
+const TellOdds = odds => odds > 46 ? 'more than 1e20' : Number(Math.exp(odds).toPrecision(1)).toLocaleString('en', {maximumFractionDigits: 0, notation: odds > 12 ? 'scientific' : 'standard'}).replace('E', 'e');
+/** Causes with their faults, which one motion does not tell apart, rivals and times: {outcome, faults, rival, log_odds, when, parts}.
+    @param columns [[head, cause => cell]] besides. */
+const CauseTable = (causes, columns = []) => {
+  const Fault = (fault, parts) => Add(Make('div'), Make('b', `${fault.place}: ${fault.fault}`),
+    ...(parts || (fault.value === 0 && !fault.error) ? [] : [' ', Make('span', TellValue(fault.value, fault.error, fault.unit), {className: 'number'})]),
+    parts ? '' : fault.detail ? ' ' + fault.detail : '');
+  const Parts = parts => {
+    const joints = [...new Set(parts.map(part => part.joint))], kinds = [...new Set(parts.map(part => part.fault))];
+    const unit = kind => parts.find(part => part.fault === kind).unit;
+    // From 0, with a whisker of the standard error on either side.
+    const Interval = part => {
+      const all = parts.filter(({fault}) => fault === part.fault).map(({value, error}) => [value - error, value + error, 0]).flat().filter(Number.isFinite);
+      const low = Math.min(...all), span = Math.max(...all) - low || 1, At = x => `${(100 * (x - low) / span).toFixed(1)}%`;
+      const Bar = (tag, from, to) => Make(tag, '', {style: `left: ${At(from)}; width: ${(100 * (to - from) / span).toFixed(1)}%`});
+      return Add(Make('span', '', {className: 'interval'}), Bar('i', Math.min(part.value, 0), Math.max(part.value, 0)),
+        ...(part.error === null ? [] : [Bar('b', part.value - part.error, part.value + part.error)]));
+    };
+    const Cell = part => part ? Add(Make('div'), TellValue(part.value, part.error), Interval(part)) : '';
+    return Add(Make('div', '', {className: 'parts'}), Table(['joint', ...kinds.map(kind => `${kind}, ${unit(kind)}`)], joints.map(joint => [joint,
+      ...kinds.map(kind => Cell(parts.find(part => part.joint === joint && part.fault === kind)))])));
+  };
+  /** A button that brings the page there. */
+  const When = ([from, to]) => {
+    const button = Make('button', `${from.toFixed(3)} to ${to === null ? 'the end' : to.toFixed(3)}`, {type: 'button', title: 'Show it'});
+    button.dataset.time = from;
+    return button;
+  };
+  const has_time = causes.some(({when}) => when);
+  return Table(['#', 'fault', ...columns.map(([head]) => head), 'nearest other', ...(has_time ? ['when, s'] : [])], causes.map((cause, i) => ({
+    className: cause.outcome === 'named' ? '' : 'open', cells: [String(i + 1),
+      Add(Make('div', '', {className: 'faults'}), ...(cause.outcome === 'named' ? [] : [Make('small', cause.outcome === 'not explained' ? 'not explained; nearest:' :
+        cause.faults.length > 1 ? 'one of, not isolable from each other:' : 'of a size that this motion does not tell:')]),
+        ...cause.faults.map((fault, k) => Fault(fault, k === 0 && cause.parts)), ...(cause.parts ? [Parts(cause.parts)] : [])),
+      ...columns.map(([, Cell]) => Cell(cause)),
+      Make('small', cause.rival ? `${cause.rival}, ${TellOdds(cause.log_odds)} times less likely` : ''),
+      ...(has_time ? [cause.when ? When(cause.when) : 'always'] : [])]})), 99);
+};
+
 /** Of pages with plots: verdict and sections, which the navigation leads to. */
 const MakeSections = () => {
   const main = document.querySelector('main'), links = document.querySelector('nav > div');

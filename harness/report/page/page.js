@@ -1,12 +1,12 @@
 // The report's plots: zoomed together, drawn when they come into view.
 (() => {
   'use strict';
-  const run = ReadJson('run-plots');
+  const groups = ReadJson('run-plots');
   const numbers = new Float32Array(ReadBytes('run-values'));
-  const count = run.points;
+  const plots = groups.flatMap(({times, plots}) => plots.map(plot => ({...plot, times})));
   const dark = matchMedia('(prefers-color-scheme: dark)');
-  const first = run.times[0];
-  const last = Math.max(run.times[count - 1], first + 1e-6);
+  const first = Math.min(...groups.map(({times}) => times[0]));
+  const last = Math.max(first + 1e-6, ...groups.map(({times}) => times.at(-1)));
   const {MakeAxis, SetColors} = MakeCharts();
   const charts = new Map();  // with what each shows
   let shown = [first, last];
@@ -24,14 +24,14 @@
   window.runClock = clock;
 
   /** The row nearest a time. */
-  const findRow = time => {
+  const findRow = ({times}, time) => {
     let low = 0;
-    let high = count - 1;
+    let high = times.length - 1;
     while (high - low > 1) {
       const middle = (low + high) >> 1;
-      if (run.times[middle] <= time) low = middle; else high = middle;
+      if (times[middle] <= time) low = middle; else high = middle;
     }
-    return time - run.times[low] <= run.times[high] - time ? low : high;
+    return time - times[low] <= times[high] - time ? low : high;
   };
 
   const format = value => {
@@ -45,8 +45,8 @@
 
   /** A curve's rows in a range of time; of more than two a pixel the least and the largest, so that no peak is lost. */
   const makePoints = (plot, curve, [from, to], pixels) => {
-    const valueAt = row => numbers[curve.series * count + row];
-    const begin = Math.max(findRow(from) - 1, 0), end = Math.min(findRow(to) + 2, count);
+    const {times} = plot, valueAt = row => numbers[curve.begin + row];
+    const begin = Math.max(findRow(plot, from) - 1, 0), end = Math.min(findRow(plot, to) + 2, times.length);
     const stride = Math.max(1, Math.ceil((end - begin) / pixels / 2));
     const points = [];
     for (let i = begin; i < end; i += stride) {
@@ -57,7 +57,7 @@
         if (high < 0 || valueAt(row) > valueAt(high)) high = row;
       }
       const rows = low === high ? [low] : [Math.min(low, high), Math.max(low, high)];
-      for (const row of rows) points.push(row < 0 ? {x: run.times[i], y: NaN} : {x: run.times[row], y: valueAt(row)});
+      for (const row of rows) points.push(row < 0 ? {x: times[i], y: NaN} : {x: times[row], y: valueAt(row)});
     }
     return points;
   };
@@ -73,6 +73,16 @@
     shown = [Math.max(from, first), Math.min(to, last)];
     for (const [chart, plot] of charts) showRange(chart, plot);
   };
+
+  /** What lies within a plot's band. */
+  const band = {id: 'band', beforeDatasetsDraw: ({ctx, chartArea: {left, top, width, bottom}, scales, config}) => {
+    const [high, low] = [1, -1].map(side => Math.min(Math.max(scales.y.getPixelForValue(side * config.options.band), top), bottom));
+    if (!(low > high)) return;
+    ctx.save();
+    ctx.fillStyle = dark.matches ? '#5fd3a540' : '#0c735030';
+    ctx.fillRect(left, high, width, low - high);
+    ctx.restore();
+  }};
 
   /** A dashed line at a plot's bound. */
   const boundLine = {id: 'bound', beforeDatasetsDraw: ({ctx, chartArea, scales, config}) => {
@@ -209,7 +219,7 @@
     };
     const chart = new Chart(canvas, {
       type: 'line',
-      plugins: [boundLine, {id: 'now', afterUpdate: placeLine}],
+      plugins: [band, boundLine, {id: 'now', afterUpdate: placeLine}],
       data: {datasets: plot.curves.map(curve => ({
         label: curve.label,
         data: [],
@@ -221,6 +231,7 @@
       }))},
       options: {
         bound: plot.bound,
+        band: plot.band ?? NaN,
         parsing: false,
         normalized: true,
         events: [],
@@ -240,12 +251,12 @@
     const values = makeKeys(plot, box.querySelector('.keys'), chart);
     const showValues = () => {
       placeLine(chart);
-      const row = findRow(clock.time);
+      const row = findRow(plot, clock.time);
       values.forEach((value, k) => {
-        const number = numbers[plot.curves[k].series * count + row];
+        const number = numbers[plot.curves[k].begin + row];
         value.textContent = format(isDrawn(plot, number) ? number : NaN);
       });
-      box.querySelector('.time').textContent = `t = ${run.times[row].toFixed(3)} s`;
+      box.querySelector('.time').textContent = `t = ${plot.times[row].toFixed(3)} s`;
     };
     clock.listeners.push(showValues);
     showValues();
@@ -259,9 +270,11 @@
     showTogether([first, last]);
   };
 
-  const boxes = run.plots.map((plot, i) => {
-    const box = Make('section', '', {className: 'card'});
+  let card;
+  const boxes = plots.map((plot, i) => {
+    const box = Make('section', '', {className: plot.below ? 'below' : 'card'});
     box.dataset.plot = i;
+    if (plot.below) card.append(box); else card = box;
     Add(box, Add(Make('h3'), ...(plot.panel ? [Make('span', 'Figure ' + plot.panel, {className: 'panel'}), ' '] : []), plot.title + ' ',
       Make('span', '', {className: 'soft number time'})), Make('div', '', {className: 'keys'}), Make('div', '', {className: 'plot'}));
     if (plot.note) Add(box, Add(Make('p', '', {className: 'soft'}), Make('small', plot.note)));
@@ -270,17 +283,19 @@
   const whole = Make('button', 'Show the whole run', {type: 'button', onclick: () => showAll()});
   Add(document.getElementById('plots'), Make('h2', 'Plots'), Add(Make('div', '', {className: 'tools'}), whole, Make('span',
     'Drag to zoom (all plots follow), Shift-drag to move, double-click for the whole run; on a touch screen use two fingers. Names ' +
-    'switch curves on and off.', {className: 'soft'})), Add(Make('div', '', {className: 'grid'}), ...boxes));
+    'switch curves on and off.', {className: 'soft'})), ...groups.flatMap(group => [
+    ...(group.title ? [Make('h3', group.title, {className: 'group'})] : []),
+    Add(Make('div', '', {className: 'grid'}), ...boxes.filter((box, i) => plots[i].times === group.times && !plots[i].below))]));
   const watcher = new IntersectionObserver(entries => {
     for (const entry of entries) {
       if (!entry.isIntersecting || entry.target.chart) continue;
       watcher.unobserve(entry.target);
-      draw(entry.target, run.plots[Number(entry.target.dataset.plot)]);
+      draw(entry.target, plots[Number(entry.target.dataset.plot)]);
     }
   }, {rootMargin: '400px'});
   for (const box of boxes) watcher.observe(box);
   addEventListener('beforeprint', () => {
-    for (const box of boxes) if (!box.chart) draw(box, run.plots[Number(box.dataset.plot)]);
+    for (const box of boxes) if (!box.chart) draw(box, plots[Number(box.dataset.plot)]);
   });
   for (const button of document.querySelectorAll('[data-time]')) {
     button.addEventListener('click', () => {

@@ -32,16 +32,9 @@
 
   // What explains the residuals. Faults of one row are not told apart by this motion.
   if (run.causes.length) {
-    const Short = value => value === null ? 'any' : String(Number(value.toPrecision(6)));
-    const Size = fault => fault.value === 0 && !fault.standard_error ? '' : `${Short(fault.value)} ${fault.unit}`;
-    const Error = fault => fault.standard_error === null ? ' (of any size)' : fault.standard_error ? ` ± ${Short(Number(fault.standard_error.toPrecision(2)))}` : '';
-    const Fault = fault => Add(Make('div'), Make('b', `${fault.place}: ${fault.fault}`), ` ${Size(fault)}${Error(fault)}${fault.detail ? ` ${fault.detail}` : ''}`);
-    AddSection('Causes', Add(Make('div', '', {className: 'card scroll'}), Table(['', 'where seen', 'fault', 'explained', 'nearest other', 'when, s'],
-      run.causes.map((cause, i) => ({className: cause.outcome === 'named' ? '' : 'open', cells: [String(i + 1), cause.channel,
-        Add(Make('div'), ...(cause.outcome === 'named' ? [] : [Make('small', cause.outcome === 'not explained' ? 'not explained; nearest:' : 'one of, not isolable from each other:')]), ...cause.faults.map(Fault)),
-        `${Short(Number((100 * cause.fraction).toPrecision(3)))} %`,
-        Make('small', cause.rival ? `${cause.rival}, ${cause.log_odds > 46 ? 'more than 1e20' : Math.exp(cause.log_odds).toPrecision(1)} times less likely` : ''),
-        `${cause.from_s.toFixed(3)} to ${cause.ends ? cause.to_s.toFixed(3) : 'the end'}`]})), 6)));
+    AddSection('Causes', Card('scroll', CauseTable(run.causes.map(cause => ({...cause, when: [cause.from_s, cause.ends ? cause.to_s : null],
+      faults: cause.faults.map(fault => ({...fault, error: fault.standard_error}))})), [['where seen', cause => cause.channel],
+      ['explained', cause => `${Number((100 * cause.fraction).toPrecision(3))} %`]])));
   }
 
   const replay = document.getElementById('replay-html');

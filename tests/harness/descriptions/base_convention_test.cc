@@ -8,7 +8,7 @@
 
 #include "controller/common/errors.h"
 #include "harness/checks/consistency.h"
-#include "harness/descriptions/npy_file.h"
+#include "harness/log/npy_file.h"
 #include "harness/descriptions/urdf_reader.h"
 #include "tests/common/evaluate_terms.h"
 #include "tests/common/legged_robots.h"

@@ -3,11 +3,15 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <filesystem>
+#include <random>
 #include <string>
 
 #include "harness/report/page.h"
 #include "tests/common/browser.h"
+#include "tests/common/paths.h"
 #include "tests/common/run_program.h"
+#include "tests/harness/recordings/recorded_robot.h"
 #include "tests/harness/report/replay_run.h"
 
 namespace dexcheck::testing::accessibility_test {
@@ -31,6 +35,19 @@ class AccessibilityBrowserTest : public ::testing::Test {
     const std::filesystem::path script = folder_.path() / "node_modules/axe-core/axe.min.js";
     return result.exit_code == 0 && std::filesystem::exists(script) ? testing::ReadText(script) : "";
   }
+  /// Light and dark.
+  static void ExpectNothingFound(const std::string& axe, const std::filesystem::path& page,
+                                 Browser* browser) {
+    browser->SetViewport(900, 420);
+    for (const bool dark : {false, true}) {
+      browser->SetDark(dark);
+      browser->Open(page);
+      (void)browser->Run(axe + "; return 0;");
+      (void)browser->Run(kAsk);
+      ASSERT_TRUE(browser->WaitFor("return window.found !== null;", 60.0));
+      EXPECT_EQ(browser->Run("return window.found;"), nlohmann::json::array()) << (dark ? "dark" : "light");
+    }
+  }
   testing::TempFolder folder_;
 };
 
@@ -40,15 +57,7 @@ TEST_F(AccessibilityBrowserTest, AxeFindsNothingInThePageOfARun) {
   testing::WriteReplayRun(folder_.path(), 0.3);
   WriteRunReport(folder_.path(), MakeReportFiles(folder_.path()));
   Browser browser;
-  browser.SetViewport(900, 420);
-  for (const bool dark : {false, true}) {
-    browser.SetDark(dark);
-    browser.Open(folder_.path() / "report.html");
-    (void)browser.Run(axe + "; return 0;");
-    (void)browser.Run(kAsk);
-    ASSERT_TRUE(browser.WaitFor("return window.found !== null;", 60.0));
-    EXPECT_EQ(browser.Run("return window.found;"), nlohmann::json::array()) << (dark ? "dark" : "light");
-  }
+  ExpectNothingFound(axe, folder_.path() / "report.html", &browser);
   // It can find something: a picture without a text, grey on grey.
   (void)browser.Run(
       "document.body.insertAdjacentHTML('beforeend', '<img src=\"data:,\"><p style=\"color: #777; "
@@ -59,6 +68,25 @@ TEST_F(AccessibilityBrowserTest, AxeFindsNothingInThePageOfARun) {
   const std::string found = browser.Run("return window.found;").dump();
   EXPECT_THAT(found,
               ::testing::AllOf(::testing::HasSubstr("image-alt"), ::testing::HasSubstr("color-contrast")));
+}
+
+TEST_F(AccessibilityBrowserTest, AxeFindsNothingInThePageOfARecording) {
+  const std::string axe = FetchAxe();
+  if (axe.empty()) GTEST_SKIP() << "axe-core cannot be fetched from the npm registry";
+  std::mt19937 random(6);
+  RecordingOptions options;
+  options.duration = 10.0;
+  const RecordedFault friction = {"dry friction", "joint panda_joint4", 2.0,
+                                  [](mjModel* robot) { robot->dof_frictionloss[3] = 2.0; }};
+  const std::filesystem::path recording = folder_.path() / "recording.csv",
+                              page = folder_.path() / "judged.html";
+  WriteCsv(RecordRobot("mjcf/panda.xml", {friction}, options, &random), recording);
+  const ProgramResult result =
+      RunProgram({ProgramPath(), "judge", SourcePath("/controller/parameters/panda.toml"), recording.string(),
+                  "--page", page.string()});
+  ASSERT_EQ(result.exit_code, 1) << result.err;
+  Browser browser;
+  ExpectNothingFound(axe, page, &browser);
 }
 
 }  // namespace

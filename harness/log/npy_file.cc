@@ -1,4 +1,4 @@
-#include "harness/descriptions/npy_file.h"
+#include "harness/log/npy_file.h"
 
 #include <bit>
 #include <charconv>

@@ -1,0 +1,306 @@
+#include "harness/cli/judge_command.h"
+
+#include <fmt/format.h>
+
+#include <chrono>
+#include <cmath>
+#include <memory>
+#include <optional>
+
+#include "controller/common/errors.h"
+#include "harness/base/interrupts.h"
+#include "harness/cli/commands.h"
+#include "harness/cli/json_matrix.h"
+#include "harness/cli/output_file.h"
+#include "harness/cli/terminal.h"
+#include "harness/descriptions/read_description.h"
+#include "harness/recordings/compare_recordings.h"
+#include "harness/recordings/write_corrections.h"
+#include "harness/report/judge_page.h"
+#include "harness/report/judge_replay.h"
+
+namespace dexcheck::cli {
+namespace {
+
+struct JudgeRequest {
+  std::filesystem::path model, recording;
+  std::vector<std::filesystem::path> more;  // recordings
+  std::filesystem::path columns, corrected;
+  UrdfOptions urdf;
+  std::string json_file;
+  std::filesystem::path page_file;
+  bool describe = false, quiet = false;
+};
+
+std::string Number(double value) { return fmt::format("{:.3g}", value); }
+
+void PrintBalances(const RobotModel& model, const RecordingJudgement& judgement,
+                   const std::vector<Recording>& recordings) {
+  const bool has_several = recordings.size() > 1;
+  const bool has_gains = judgement.balances.front().drive_gain != 0.0;
+  std::vector<TableRow> rows = {
+      {{"torque, rms", "measured", "unexplained", "beyond causes", "noise", "held out"}}};
+  if (has_gains) rows[0].cells.push_back("N m/A");
+  std::string align = has_gains ? "<>>>>>>" : "<>>>>>";
+  for (const JointJudgement& one : judgement.balances) {
+    TableRow& row = rows.emplace_back();
+    row.cells = {(has_several ? recordings[static_cast<size_t>(one.recording)].name + " " : "") +
+                     model.joint(one.joint).name,
+                 Number(one.torque),
+                 Number(one.residual),
+                 Number(one.left),
+                 Number(one.noise),
+                 Number(one.held_left)};
+    if (has_gains) row.cells.push_back(Number(one.drive_gain));
+  }
+  fmt::print("{}\n", FormatTable(align, rows));
+}
+
+void Print(const JudgeRequest& request, const RobotModel& model, const RecordingJudgement& judgement,
+           const std::vector<Recording>& recordings) {
+  if (!request.quiet) {
+    for (const std::string& note : judgement.notes) fmt::print("{}\n", Wrap(note, 2));
+    fmt::print("\n");
+    PrintBalances(model, judgement, recordings);
+  }
+  if (!judgement.causes.empty()) {
+    fmt::print(
+        "{}\n",
+        Wrap(fmt::format(
+                 "causes (explain {:.4g} % of what the model does not; {:.3g} times the noise is left)",
+                 100.0 * judgement.explained, judgement.left),
+             2));
+    int number = 0;
+    for (const Explanation& one : judgement.causes)
+      fmt::print("{}\n", Wrap(fmt::format("  {:2}  {}", ++number, one.Tell()), 6));
+    fmt::print("\n");
+  }
+  const std::string& name =
+      recordings.size() == 1 ? recordings.front().name : std::to_string(recordings.size()) + " recordings";
+  if (judgement.Agrees()) {
+    fmt::print("{}: {} explains {}: what is left is noise.\n", Paint(Tone::kGood, "EXPLAINED"), model.name(),
+               name);
+  } else if (judgement.causes.empty()) {
+    fmt::print("{}: {} does not explain {}, and no cause that is known does.\n",
+               Paint(Tone::kBad, "NOT EXPLAINED"), model.name(), name);
+  } else {
+    fmt::print("{}: {} does not explain {}; {} cause{} do{}.\n", Paint(Tone::kBad, "DIFFERS"), model.name(),
+               name, judgement.causes.size(), judgement.causes.size() == 1 ? "" : "s",
+               judgement.causes.size() == 1 ? "es" : "");
+  }
+}
+
+Json ToJson(const Fault& fault) {
+  Json json = {{"fault", fault.fault},
+               {"place", fault.place},
+               {"value", fault.value},
+               {"error", fault.error},
+               {"unit", fault.unit}};
+  if (!fault.detail.empty()) json["detail"] = fault.detail;
+  return json;
+}
+
+std::string ToText(const RobotModel& model, const RecordingJudgement& judgement,
+                   const std::vector<Recording>& recordings) {
+  Json json = {{"model", model.spec().source},
+               {"verdict", judgement.Agrees()         ? "explained"
+                           : judgement.causes.empty() ? "not explained"
+                                                      : "differs"},
+               {"rows", judgement.rows},
+               {"explained", judgement.explained},
+               {"left", judgement.left}};
+  json["recordings"] = Json::array();
+  for (const Recording& one : recordings) json["recordings"].push_back(one.name);
+  json["joints"] = Json::array();
+  for (const JointJudgement& one : judgement.balances) {
+    json["joints"].push_back({{"joint", model.joint(one.joint).name},
+                              {"recording", one.recording},
+                              {"samples", one.samples},
+                              {"torque", one.torque},
+                              {"residual", one.residual},
+                              {"left", one.left},
+                              {"noise", one.noise},
+                              {"held_residual", one.held_residual},
+                              {"held_left", one.held_left}});
+    if (one.drive_gain != 0.0) json["joints"].back()["drive_gain"] = one.drive_gain;
+  }
+  json["causes"] = Json::array();
+  for (const Explanation& one : judgement.causes) {
+    Json cause = {{"text", one.Tell()},
+                  {"outcome", one.outcome == CauseOutcome::kNamed        ? "named"
+                              : one.outcome == CauseOutcome::kNamedClass ? "class"
+                                                                         : "not explained"},
+                  {"fraction", one.fraction}};
+    if (!one.rival.empty()) cause["rival"] = one.rival, cause["log_odds"] = one.log_odds;
+    if (std::isfinite(one.from)) cause["from"] = one.from, cause["to"] = one.to;
+    cause["faults"] = Json::array();
+    for (const Fault& fault : one.faults) cause["faults"].push_back(ToJson(fault));
+    json["causes"].push_back(cause);
+  }
+  json["notes"] = judgement.notes;
+  return json.dump(2) + "\n";
+}
+
+/// Writes the model's file with what was found.
+void Correct(const RobotDescription& robot, const RecordingJudgement& judgement, const JudgeRequest& request,
+             bool says, OutputFile* file) {
+  const CorrectedFile corrected = WriteCorrections(robot, ReadBytes(request.model), judgement);
+  file->Write(corrected.text);
+  if (!says || file->is_stdout()) return;
+  fmt::print("{}: {} of {} causes are put right\n", request.corrected.string(), corrected.written.size(),
+             judgement.found.size());
+  for (const std::string& one : corrected.left) fmt::print("  not in it: {}\n", one);
+  fmt::print("\n");
+}
+
+int Run(JudgeRequest request) {
+  if (request.describe && request.recording.empty()) std::swap(request.model, request.recording);
+  if (request.recording.empty()) throw UsageError("judge: RECORDING is missing");
+  constexpr int kManyJoints = 64;
+  std::optional<RobotDescription> description;
+  if (!request.model.empty()) description = ReadDescription(request.model, request.urdf);
+  const RobotModel model = !description ? MakeUnknownRobot(kManyJoints) : RobotModel(description->spec);
+  std::vector<std::filesystem::path> paths = {request.recording};
+  paths.insert(paths.end(), request.more.begin(), request.more.end());
+  std::vector<Recording> recordings;
+  for (const std::filesystem::path& path : paths)
+    recordings.push_back(OpenRecordingOf(model, path, request.columns, !request.describe));
+  if (request.describe) {
+    for (const Recording& one : recordings) fmt::print("{}", DescribeColumns(model, one));
+    return kSuccess;
+  }
+  CatchInterrupts();
+  ResultFile json(request.json_file);
+  std::optional<OutputFile> corrected;
+  if (!request.corrected.empty()) corrected.emplace(request.corrected);
+  if (!request.page_file.empty()) RequirePageName(request.page_file);
+  ResultFile page(request.page_file);
+  ProgressBar bar("rows", 0, request.quiet);
+  JudgeOptions options;
+  const bool is_live = request.recording == "-";
+  if (is_live) {
+    // What comes in as it is recorded is told as it comes.
+    constexpr size_t kAhead = 1000;
+    options.ahead = kAhead;
+    if (!request.quiet && !json.TakesStdout())
+      options.on_second = [&model, has_head = false](double time, const std::vector<int>& joints,
+                                                     const VectorXd& residual) mutable {
+        if (!has_head) {
+          fmt::print("what the model does not explain, rms by second:\n{:>9}", "s");
+          for (const int joint : joints) fmt::print(" {:>12}", model.joint(joint).name.substr(0, 12));
+          fmt::print("\n");
+        }
+        has_head = true;
+        fmt::print("{:9.2f}", time);
+        for (const double value : residual) fmt::print(" {:12.3g}", value);
+        fmt::print("\n");
+        std::fflush(stdout);
+      };
+  }
+  const RecordingJudgement judgement = JudgeRecordings(model, &recordings, options, [&](long rows) {
+    bar.Update(rows);
+    return !IsInterrupted();
+  });
+  bar.Finish();
+  if (!IsInterrupted() && corrected)
+    Correct(*description, judgement, request, !request.quiet && !json.TakesStdout(), &*corrected);
+  json.Write([&] { return ToText(model, judgement, recordings); });
+  page.Write([&] {
+    const std::optional<ReplayData> replay = MakeMotionReplay(model, request.model, judgement);
+    return MakeJudgePage(model, judgement, Json::parse(ToText(model, judgement, recordings)),
+                         replay ? &*replay : nullptr);
+  });
+  if (!json.TakesStdout()) Print(request, model, judgement, recordings);
+  if (IsInterrupted()) return ReportFailure("interrupted");
+  return judgement.Agrees() ? kSuccess : kDisagreement;
+}
+
+Json ToJson(const RobotModel& model, const RecordingPair& pair, const RecordingComparison& comparison) {
+  Json json = {{"model", pair.model.string()},
+               {"recordings", {pair.first.string(), pair.second.string()}},
+               {"verdict", comparison.causes.empty() ? "same" : "differ"},
+               {"same_motion", comparison.is_same_motion}};
+  if (comparison.is_same_motion) json["delay"] = comparison.delay;
+  json["joints"] = Json::array();
+  for (const JointDifference& one : comparison.joints)
+    json["joints"].push_back(
+        {{"joint", model.joint(one.joint).name}, {"position", one.position}, {"torque", one.torque}});
+  json["causes"] = Json::array();
+  for (const CauseDifference& one : comparison.causes) {
+    Json cause = {{"text", one.Tell()}};
+    if (one.first) cause["first"] = ToJson(*one.first);
+    if (one.second) cause["second"] = ToJson(*one.second);
+    json["causes"].push_back(cause);
+  }
+  return json;
+}
+
+void Print(const RobotModel& model, const RecordingPair& pair, const RecordingComparison& comparison) {
+  const std::string first = pair.first.filename().string(), second = pair.second.filename().string();
+  if (!pair.quiet && comparison.is_same_motion) {
+    fmt::print("{} is {:.4g} s after {}.\n\n", second, comparison.delay, first);
+    std::vector<TableRow> rows = {{{"difference, rms", "position", "torque"}}};
+    for (const JointDifference& one : comparison.joints)
+      rows.push_back({{model.joint(one.joint).name, Number(one.position), Number(one.torque)}});
+    fmt::print("{}\n", FormatTable("<>>", rows));
+  } else if (!pair.quiet) {
+    fmt::print("The motions are not the same: only what explains them is compared.\n\n");
+  }
+  int number = 0;
+  for (const CauseDifference& one : comparison.causes)
+    fmt::print("{}\n", Wrap(fmt::format("  {:2}  {}", ++number, one.Tell()), 6));
+  if (comparison.causes.empty()) {
+    fmt::print("{}: what {} does not explain is the same in both.\n", Paint(Tone::kGood, "SAME"),
+               model.name());
+  } else {
+    fmt::print("{}{}: {} and {} are of robots that differ.\n", pair.quiet ? "" : "\n",
+               Paint(Tone::kBad, "DIFFER"), first, second);
+  }
+}
+
+}  // namespace
+
+int CompareTwoRecordings(const RecordingPair& pair) {
+  const RobotModel model(ReadDescription(pair.model).spec);
+  std::vector<Recording> recordings;
+  for (const std::filesystem::path& path : {pair.first, pair.second})
+    recordings.push_back(OpenRecordingOf(model, path, pair.columns));
+  CatchInterrupts();
+  ResultFile json(pair.json_file);
+  ProgressBar bar("rows", 0, pair.quiet);
+  const RecordingComparison comparison = CompareRecordings(model, &recordings, {}, [&](long rows) {
+    bar.Update(rows);
+    return !IsInterrupted();
+  });
+  bar.Finish();
+  if (IsInterrupted()) return ReportFailure("interrupted");
+  json.Write([&] { return ToJson(model, pair, comparison).dump(2) + "\n"; });
+  if (!json.TakesStdout()) Print(model, pair, comparison);
+  return comparison.causes.empty() ? kSuccess : kDisagreement;
+}
+
+void AddJudgeCommand(Command app) {
+  const auto request = std::make_shared<JudgeRequest>();
+  Command command =
+      app.AddCommand("judge", "Say whether a model explains a recording of a robot, and what is missing");
+  command.AddOption("MODEL", &request->model, "Parameter file, URDF or MJCF").Required();
+  command.AddOption(
+      "RECORDING", &request->recording,
+      "CSV or text, MCAP, ROS 2 bag, HDF5, NumPy, a run's log, a file of columns that names files, or - "
+      "for standard input");
+  command.AddOption("--recording FILE", &request->more, "A further recording of the same robot").Repeatable();
+  command.AddOption("--columns FILE.toml", &request->columns,
+                    "Which column is what; --describe writes one to start from");
+  command.AddFlag("--describe", &request->describe,
+                  "Print what the recording's columns are taken for, as a file of columns");
+  command.AddOption("--write FILE", &request->corrected,
+                    "Write a copy of MODEL in which what was found is put right");
+  AddUrdfOptions(command, &request->urdf);
+  AddJsonOption(command, "the judgement", &request->json_file);
+  command.AddOption("--page FILE.html", &request->page_file,
+                    "Write a page that loads nothing: torques and what is left of them, causes");
+  command.AddFlag("--quiet", &request->quiet, "No progress, and causes and verdict only");
+  command.SetAction([=] { return Run(*request); });
+}
+
+}  // namespace dexcheck::cli

@@ -1,0 +1,179 @@
+// Recordings as arrays: NumPy's .npy and .npz, HDF5, and the logs of runs.
+
+#include <zip.h>
+
+#include <algorithm>
+#include <limits>
+#include <optional>
+
+#include "controller/common/errors.h"
+#include "controller/common/text.h"
+#include "harness/base/byte_archive.h"
+#include "harness/base/child_process.h"
+#include "harness/base/files.h"
+#include "harness/log/hdf5_handle.h"
+#include "harness/log/log_reader.h"
+#include "harness/log/npy_file.h"
+#include "harness/log/recording_reader.h"
+
+namespace dexcheck {
+namespace {
+
+using Columns = std::vector<std::vector<double>>;
+
+/// An array with its rows along the first index.
+struct NamedArray {
+  std::string name;
+  std::vector<std::uint64_t> shape;
+  std::vector<double> values;
+};
+
+[[noreturn]] void Fail(const std::filesystem::path& path, const std::string& problem) {
+  throw InputError(path.string() + ": " + problem);
+}
+
+/// Arrays with as many rows as most of them; "q[3]" of one with several columns.
+std::unique_ptr<RecordingReader> MakeReader(const std::filesystem::path& path, const std::string& format,
+                                            const std::vector<NamedArray>& arrays) {
+  std::map<std::uint64_t, int> lengths;
+  for (const NamedArray& array : arrays) ++lengths[array.shape.front()];
+  if (lengths.empty()) Fail(path, "has no arrays of numbers");
+  const std::uint64_t rows =
+      std::max_element(lengths.begin(), lengths.end(), [](const auto& a, const auto& b) {
+        return std::pair(a.second, a.first) < std::pair(b.second, b.first);
+      })->first;
+  std::vector<std::string> names;
+  Columns columns;
+  for (const NamedArray& array : arrays) {
+    if (array.shape.front() != rows) continue;
+    const size_t width = rows == 0 ? 0 : array.values.size() / rows;
+    for (size_t k = 0; k < width; ++k) {
+      names.push_back(array.shape.size() == 1 ? array.name : array.name + "[" + std::to_string(k) + "]");
+      std::vector<double>& column = columns.emplace_back(rows);
+      for (size_t row = 0; row < rows; ++row) column[row] = array.values[row * width + k];
+    }
+  }
+  if (columns.empty()) Fail(path, "has no rows");
+  return std::make_unique<TableReader>(path.string(), format, names, columns);
+}
+
+NamedArray ToArray(const std::string& name, const std::filesystem::path& path, std::string_view bytes) {
+  const NpyArray npy = ParseNpy(bytes, path.string() + (name.empty() ? "" : ": " + name));
+  return {name, {npy.shape.begin(), npy.shape.end()}, npy.values};
+}
+
+std::vector<NamedArray> ReadZip(const std::filesystem::path& path) {
+  int error = 0;
+  const std::unique_ptr<zip_t, int (*)(zip_t*)> archive(zip_open(path.c_str(), ZIP_RDONLY, &error),
+                                                        &zip_close);
+  if (!archive) Fail(path, "is no .npz that can be opened");
+  std::vector<NamedArray> arrays;
+  for (zip_uint64_t i = 0; i < static_cast<zip_uint64_t>(zip_get_num_entries(archive.get(), 0)); ++i) {
+    zip_stat_t stat;
+    const std::unique_ptr<zip_file_t, int (*)(zip_file_t*)> file(zip_fopen_index(archive.get(), i, 0),
+                                                                 &zip_fclose);
+    if (zip_stat_index(archive.get(), i, 0, &stat) != 0 || !file)
+      Fail(path, "has an entry that cannot be read");
+    constexpr zip_uint64_t kMost = zip_uint64_t{1} << 33U;
+    if (stat.size > kMost) Fail(path, std::string(stat.name) + ": is too long");
+    std::string bytes(stat.size, '\0');
+    if (zip_fread(file.get(), bytes.data(), stat.size) != static_cast<zip_int64_t>(stat.size))
+      Fail(path, std::string(stat.name) + ": cannot be read to its end");
+    NamedArray array = ToArray(std::filesystem::path(stat.name).stem(), path, bytes);
+    if (!array.shape.empty()) arrays.push_back(std::move(array));
+  }
+  return arrays;
+}
+
+/// All datasets of numbers with one or two indices.
+std::vector<NamedArray> ListArrays(const std::filesystem::path& path) {
+  const hdf5::SilencedErrors silenced;
+  const hdf5::File file(H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT));
+  std::vector<std::string> names;
+  const auto visit = [](hid_t, const char* name, const H5O_info_t* info, void* out) noexcept -> herr_t {
+    if (info->type == H5O_TYPE_DATASET) static_cast<std::vector<std::string>*>(out)->emplace_back(name);
+    return 0;
+  };
+  hdf5::Check(H5Ovisit2(file.id(), H5_INDEX_NAME, H5_ITER_INC, visit, &names, H5O_INFO_BASIC));
+  std::vector<NamedArray> arrays;
+  for (const std::string& name : names) {
+    const hdf5::Dataset set(H5Dopen2(file.id(), name.c_str(), H5P_DEFAULT));
+    const hdf5::Datatype type(H5Dget_type(set.id()));
+    const hdf5::Dataspace space(H5Dget_space(set.id()));
+    const H5T_class_t kind = H5Tget_class(type.id());
+    const int rank = H5Sget_simple_extent_ndims(space.id());
+    if ((kind != H5T_FLOAT && kind != H5T_INTEGER) || rank < 1 || rank > 2) continue;
+    hsize_t extents[2] = {0, 1};
+    hdf5::Check(H5Sget_simple_extent_dims(space.id(), extents, nullptr));
+    NamedArray array = {name, {extents[0]}, std::vector<double>(extents[0] * extents[1])};
+    if (rank == 2) array.shape.push_back(extents[1]);
+    hdf5::Check(H5Dread(set.id(), H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, array.values.data()));
+    arrays.push_back(std::move(array));
+  }
+  return arrays;
+}
+
+/// In a process of its own, since HDF5 1.10 crashes on some damaged files.
+std::vector<NamedArray> ReadHdf5(const std::filesystem::path& path) {
+  ChildProcess child("reading " + path.string(), [&](int channel) {
+    std::vector<std::string> names;
+    std::vector<std::vector<std::uint64_t>> shapes;
+    Columns values;
+    for (NamedArray& array : ListArrays(path)) {
+      names.push_back(array.name);
+      shapes.push_back(array.shape);
+      values.push_back(std::move(array.values));
+    }
+    return Send(channel, PackBytes(names, shapes, values));
+  });
+  constexpr size_t kPart = size_t{1} << 20U;
+  std::string bytes;
+  for (std::string part = Receive(child.channel(), kPart); !part.empty();
+       part = Receive(child.channel(), kPart))
+    bytes += part;
+  if (!child.Wait().has_succeeded()) Fail(path, "cannot be read: a damaged HDF5 file");
+  std::vector<std::string> names;
+  std::vector<std::vector<std::uint64_t>> shapes;
+  Columns values;
+  UnpackBytes(bytes, &names, &shapes, &values);
+  std::vector<NamedArray> arrays;
+  for (size_t i = 0; i < names.size(); ++i) arrays.push_back({names[i], shapes[i], std::move(values[i])});
+  return arrays;
+}
+
+/// The signals of a run's log, by their names.
+std::unique_ptr<RecordingReader> OpenRunLog(const std::filesystem::path& path, const LogReader& log) {
+  std::vector<std::string> names;
+  Columns columns;
+  for (const SignalInfo& signal : log.signals()) {
+    const RowMatrixXd rows = log.ReadSignal(signal.name);
+    for (Eigen::Index k = 0; k < rows.cols(); ++k) {
+      const auto i = static_cast<size_t>(k);
+      names.push_back(signal.width == 1
+                          ? signal.name
+                          : signal.name + "." +
+                                (i < signal.columns.size() ? signal.columns[i] : std::to_string(i)));
+      columns.emplace_back(rows.col(k).begin(), rows.col(k).end());
+    }
+  }
+  return std::make_unique<TableReader>(path.string(), "log of a run", names, columns);
+}
+
+}  // namespace
+
+std::unique_ptr<RecordingReader> OpenNumpyRecording(const std::filesystem::path& path) {
+  if (ReadBytes(path).starts_with("PK")) return MakeReader(path, "NumPy (.npz)", ReadZip(path));
+  const NamedArray array = ToArray("", path, ReadBytes(path));
+  if (array.shape.size() != 2)
+    Fail(path, "must have two indices, of rows and columns, has " + std::to_string(array.shape.size()));
+  return MakeReader(path, "NumPy (.npy)", {array});
+}
+
+std::unique_ptr<RecordingReader> OpenHdf5Recording(const std::filesystem::path& path) {
+  std::vector<NamedArray> arrays = ReadHdf5(path);
+  const auto is_run = [](const NamedArray& array) { return array.name.starts_with("check/"); };
+  if (std::any_of(arrays.begin(), arrays.end(), is_run)) return OpenRunLog(path, LogReader(path));
+  return MakeReader(path, "HDF5", arrays);
+}
+
+}  // namespace dexcheck

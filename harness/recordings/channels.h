@@ -1,0 +1,68 @@
+#pragma once
+
+// Which column of a recording is which quantity of which joint.
+
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "controller/model/robot_model.h"
+#include "harness/log/recording_reader.h"
+
+namespace dexcheck {
+
+enum class Quantity { kTime, kPosition, kVelocity, kAcceleration, kTorque, kCurrent };
+/// "t", "q", "qd", "qdd", "tau", "current": as a file of columns names them.
+const char* NameOf(Quantity quantity);
+
+/// A column that is used: quantity = scale * number + offset, in rad, m, s, N m, N, A.
+struct Channel {
+  Quantity quantity = Quantity::kTime;
+  int joint = -1;
+  size_t column = 0;
+  double scale = 1.0;
+  double offset = 0.0;
+};
+
+/// A body that is declared to be attached in one recording.
+struct DeclaredPayload {
+  int link = -1;
+  double mass = 0.0;                ///< kg
+  Vector3d com = Vector3d::Zero();  ///< In the link's frame, m.
+};
+
+/// A recording that is open, and what its columns are.
+struct Recording {
+  std::string name;
+  std::unique_ptr<RecordingReader> reader;
+  std::vector<Channel> channels;
+  std::optional<DeclaredPayload> payload;
+  std::function<Recording()> reopen;  ///< From its begin; empty where that cannot be.
+
+  /// -1 where it has none.
+  [[nodiscard]] int FindColumn(Quantity quantity, int joint) const;
+  [[nodiscard]] bool Has(Quantity quantity) const;
+};
+
+/// Opens a recording. Columns are found by a header's words and the joints' names or numbers; a file of
+/// columns (TOML) says it otherwise, and may name the files itself.
+/// @param columns a file of columns; empty for none.
+/// @throws InputError, one line, for columns that cannot be told, that are missing, or that two quantities
+/// share.
+/// @param is_complete whether time, positions and torques or currents must be there.
+Recording OpenRecordingOf(const RobotModel& model, const std::filesystem::path& path,
+                          const std::filesystem::path& columns, bool is_complete = true);
+
+/// A robot of which nothing is known but that it has joints: to see what a recording has.
+RobotModel MakeUnknownRobot(int joints);
+
+/// A file of columns that says what was found, to start from; where nothing was found, all that it may say.
+std::string DescribeColumns(const RobotModel& model, const Recording& recording);
+
+/// Columns by their names alone; those that are not known are left out.
+std::vector<Channel> GuessChannels(const RobotModel& model, const std::vector<std::string>& names);
+
+}  // namespace dexcheck

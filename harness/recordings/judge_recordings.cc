@@ -1,0 +1,275 @@
+#include "harness/recordings/judge_recordings.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "controller/common/errors.h"
+#include "controller/common/text.h"
+#include "harness/recordings/position_faults.h"
+#include "harness/recordings/torque_estimator.h"
+
+namespace dexcheck {
+namespace {
+
+using Eigen::Index;
+
+/// A fault of the recording itself, that holds all the time.
+Explanation MakeCause(const Fault& fault) {
+  Explanation one;
+  one.channel = CauseChannel::kMeasurement;
+  one.from = one.to = std::numeric_limits<double>::quiet_NaN();
+  one.faults = {fault};
+  return one;
+}
+
+/// One judgement, put into words.
+class Judge {
+ public:
+  Judge(const RobotModel& model, std::vector<Recording>* recordings, const JudgeOptions& options,
+        const std::function<bool(long)>& on_rows)
+      : model_(model),
+        recordings_(*recordings),
+        set_(model, recordings, options, on_rows),
+        estimator_(&set_, options.most_causes) {}
+
+  RecordingJudgement Run() {
+    result_.joints = set_.joints();
+    result_.rows = set_.rows();
+    result_.notes = set_.notes();
+    for (const Fault& fault : set_.faults()) result_.causes.push_back(MakeCause(fault));
+    Tell();
+    return std::move(result_);
+  }
+
+ private:
+  void Tell() {
+    const CauseSelection& selection = estimator_.selection();
+    const VectorXd amplitudes = estimator_.CalcAmplitudes(selection.terms);
+    const VectorXd before = estimator_.CalcLeft({}), after = estimator_.CalcLeft(selection.terms);
+    const double squares = CalcSquares(after);
+    result_.explained = 1.0 - squares / std::max(CalcSquares(before), std::numeric_limits<double>::min());
+    result_.left = std::sqrt(squares / std::max(1.0, estimator_.rows().samples));
+    const TorqueRows held = MakeTorqueRows(set_, estimator_.faults(), /*is_held=*/true);
+    const Index width = held.rows.cols() - 1;
+    VectorXd nothing = VectorXd::Zero(width);
+    nothing.head(CountForced(set_)) = estimator_.CalcAmplitudes({}).head(CountForced(set_));
+    const VectorXd held_before = held.rows.col(width) - held.rows.leftCols(width) * nothing;
+    const VectorXd held_after = held.rows.col(width) - held.rows.leftCols(width) * amplitudes;
+    for (size_t i = 0; i < estimator_.rows().parts.size(); ++i) {
+      const TorqueRows::Part& part = estimator_.rows().parts[i];
+      const TorqueRows::Part& other = held.parts[i];
+      const double noise = set_[part.recording].weight[static_cast<Index>(part.place)];
+      const auto rms = [&](const VectorXd& rows, const TorqueRows::Part& of) {
+        return noise * rows.segment(of.begin, of.size).norm() / std::sqrt(std::max(1.0, of.samples));
+      };
+      JointJudgement& joint = result_.balances.emplace_back();
+      joint.recording = static_cast<int>(part.recording);
+      joint.joint = set_.joints()[part.place];
+      joint.samples = part.samples + other.samples;
+      joint.noise = set_[part.recording].noise[static_cast<Index>(part.place)];
+      joint.residual = rms(before, part);
+      joint.left = rms(after, part);
+      joint.held_residual = rms(held_before, other);
+      joint.held_left = rms(held_after, other);
+      if (set_.has_currents())
+        joint.drive_gain = set_.gain(part.place) / (1.0 + amplitudes[static_cast<Index>(part.place)]);
+      joint.torque = CalcMeasured(part);
+      AddTraces(part, before, after);
+    }
+    for (const CauseTerm& term : selection.terms) Name(term);
+  }
+
+  /// Of rows, in units of noise.
+  [[nodiscard]] double CalcSquares(const VectorXd& rows) const {
+    double squares = 0.0;
+    for (const TorqueRows::Part& part : estimator_.rows().parts) {
+      const auto place = static_cast<Index>(part.place);
+      const double unit = set_[part.recording].weight[place] / set_[part.recording].noise[place];
+      squares += unit * unit * rows.segment(part.begin, part.size).squaredNorm();
+    }
+    return squares;
+  }
+
+  /// Root mean square of the measured torque.
+  double CalcMeasured(const TorqueRows::Part& part) const {
+    const TorqueBalance& balance = *set_[part.recording].fit;
+    const VectorXd b = MeasuredOf(part);
+    return std::sqrt(std::max(0.0, b.dot(balance.products(part.place) * b)) / std::max(1.0, part.samples));
+  }
+
+  /// The measured torque as a sum of columns: y, the model's torque and friction.
+  [[nodiscard]] VectorXd MeasuredOf(const TorqueRows::Part& part) const {
+    const TorqueBalance& balance = *set_[part.recording].fit;
+    const int joint = set_.joints()[part.place];
+    VectorXd b = ModelledOf(part);
+    if (set_.has_currents()) {
+      b.setZero();
+      b[balance.Find(part.place, {TorqueColumn::kCurrent, joint})] = set_.gain(part.place);
+    } else {
+      b[b.size() - 1] = 1.0;
+    }
+    return b;
+  }
+
+  [[nodiscard]] VectorXd ModelledOf(const TorqueRows::Part& part) const {
+    const TorqueBalance& balance = *set_[part.recording].fit;
+    const int joint = set_.joints()[part.place];
+    VectorXd b = VectorXd::Zero(balance.products(part.place).cols());
+    b[balance.Find(part.place, {TorqueColumn::kTorque, joint})] = 1.0;
+    return b;
+  }
+
+  void AddTraces(const TorqueRows::Part& part, const VectorXd& before, const VectorXd& after) {
+    const std::vector<TorqueBalance::Block>& blocks = set_[part.recording].fit->blocks();
+    const VectorXd modelled = ModelledOf(part);
+    const double noise = set_[part.recording].weight[static_cast<Index>(part.place)];
+    const auto n = static_cast<Index>(set_.joints().size());
+    if (part.place == 0) {
+      for (const TorqueBalance::Block& block : blocks) {
+        TorqueTrace& trace = result_.traces.emplace_back();
+        trace.recording = static_cast<int>(part.recording);
+        trace.time = 0.5 * (block.from + block.to);
+        trace.q = block.q / block.samples;
+        for (VectorXd* vector : {&trace.measured, &trace.modelled, &trace.explained, &trace.left})
+          vector->setConstant(n, std::numeric_limits<double>::quiet_NaN());
+      }
+    }
+    const size_t first = result_.traces.size() - blocks.size();
+    for (size_t b = 0; b < blocks.size(); ++b) {
+      const double count = blocks[b].counts[part.place];
+      if (!(count > 0.0)) continue;
+      TorqueTrace& trace = result_.traces[first + b];
+      const auto place = static_cast<Index>(part.place);
+      const Index row = part.begin + part.within + static_cast<Index>(b);
+      trace.modelled[place] = modelled.dot(blocks[b].sums[part.place]) / count;
+      trace.left[place] = noise * after[row] / std::sqrt(count);
+      trace.measured[place] = trace.modelled[place] + noise * before[row] / std::sqrt(count);
+      trace.explained[place] = trace.measured[place] - trace.left[place];
+    }
+  }
+
+  void Name(const CauseTerm& term) {
+    const TorqueFault& fault = estimator_.faults()[term.candidate];
+    const bool is_nuisance =
+        fault.kind == TorqueFault::kDelay && std::abs(term.amplitude[0]) <= 1.5 * set_.step();
+    if (is_nuisance && fault.index < 0) {
+      result_.notes.push_back(
+          fmt::format("the torques are {:.2g} s late, less than two rows: no cause", term.amplitude[0]));
+      return;
+    }
+    Explanation one;
+    one.channel = CauseChannel::kBalance;
+    one.from = one.to = std::numeric_limits<double>::quiet_NaN();
+    if (fault.kind == TorqueFault::kPush) one.from = fault.push.from, one.to = fault.push.to, one.ends = true;
+    one.faults.push_back(Describe(fault, term.amplitude, term.error));
+    for (const auto& [candidate, amplitude] : term.same)
+      one.faults.push_back(Describe(estimator_.faults()[candidate], amplitude, {}));
+    one.fraction = term.fraction;
+    one.left = result_.left;
+    if (term.rival != SIZE_MAX) {
+      one.rival = estimator_.faults()[term.rival].place + ": " + estimator_.faults()[term.rival].fault;
+      one.log_odds = term.log_odds;
+    }
+    one.SetOutcome();
+    result_.causes.push_back(std::move(one));
+    result_.found.push_back({fault, term.amplitude, term.error});
+  }
+
+  [[nodiscard]] Fault Describe(const TorqueFault& fault, const VectorXd& a, const VectorXd& error) const {
+    Fault one;
+    one.fault = fault.fault;
+    one.place = fault.place;
+    one.unit = fault.unit;
+    const bool is_number = a.size() == 1 || fault.kind == TorqueFault::kDelay;
+    one.value = is_number ? fault.nominal + a[0] : a.norm();
+    one.error = error.size() == 0 ? 0.0 : is_number ? error[0] : error.norm();
+    const auto vector = [](const VectorXd& v) {
+      std::string text = "(";
+      for (Index i = 0; i < v.size(); ++i) text += (i == 0 ? "" : ", ") + FormatNumber(v[i], 3);
+      return text + ")";
+    };
+    using enum TorqueFault::Kind;
+    if (fault.kind == kPayload) {
+      one.value = a[0];
+      one.error = error.size() == 0 ? 0.0 : error[0];
+      one.detail = "at " + vector(a.segment<3>(1) / a[0]) + " m in its frame";
+    } else if (fault.kind == kGravity) {
+      const Vector3d now = model_.gravity() + a.head<3>();
+      const double turned = std::atan2(now.cross(model_.gravity()).norm(), now.dot(model_.gravity()));
+      one.value = now.norm();
+      one.detail = vector(now) + ", turned by " + FormatNumber(RadToDeg(turned), 3) + " deg";
+    } else if (fault.kind == kTorqueGain && std::abs(one.value + 1.0) < 0.2) {
+      one.detail = "(the other sign)";
+    } else if (!is_number) {
+      one.detail = vector(a);
+    }
+    if (fault.recording >= 0 && recordings_.size() > 1)
+      one.detail += " in " + recordings_[static_cast<size_t>(fault.recording)].name;
+    return one;
+  }
+
+  const RobotModel& model_;
+  const std::vector<Recording>& recordings_;
+  RecordingSet set_;
+  TorqueEstimator estimator_;
+  RecordingJudgement result_;
+};
+
+}  // namespace
+
+bool RecordingJudgement::IsWhole() const {
+  return std::all_of(balances.begin(), balances.end(),
+                     [](const JointJudgement& one) { return one.left <= kMostNoise * one.noise; });
+}
+
+bool RecordingJudgement::Agrees() const { return causes.empty() && IsWhole(); }
+
+namespace {
+
+/// Opens all of them again, with a change of their channels; false where that cannot be.
+bool Reopen(std::vector<Recording>* recordings, const std::function<void(Recording*)>& change) {
+  for (Recording& one : *recordings) {
+    if (!one.reopen) return false;
+    one = one.reopen();
+    change(&one);
+  }
+  return true;
+}
+
+/// Positions that are off by more than a little, rad or m: what that changes is no longer in proportion, and
+/// is judged again as what it is.
+std::map<int, double> TakeOffsets(const RecordingJudgement& judgement) {
+  constexpr double kLittle = 0.01;
+  std::map<int, double> offsets;
+  for (const FoundFault& one : judgement.found)
+    if (one.fault.kind == TorqueFault::kZero && std::abs(one.amplitude[0]) > kLittle)
+      offsets[one.fault.index] = one.amplitude[0];
+  return offsets;
+}
+
+}  // namespace
+
+RecordingJudgement JudgeRecordings(const RobotModel& model, std::vector<Recording>* recordings,
+                                   const JudgeOptions& options,
+                                   const std::function<bool(long rows)>& on_rows) {
+  RecordingJudgement judgement = Judge(model, recordings, options, on_rows).Run();
+  constexpr double kWell = 0.95;
+  std::optional<PositionFault> fault;
+  const bool is_poor = !judgement.IsWhole() && (judgement.explained < kWell || judgement.causes.size() > 3);
+  if (is_poor && options.tries_positions) fault = FindPositionFault(model, recordings->front());
+  const auto undo = [&](Recording* one) {
+    if (fault) fault->undo(one);
+  };
+  if (fault && Reopen(recordings, undo)) judgement = Judge(model, recordings, options, on_rows).Run();
+  JudgeOptions second = options;
+  second.offsets = TakeOffsets(judgement);
+  if (!second.offsets.empty() && Reopen(recordings, undo))
+    judgement = Judge(model, recordings, second, on_rows).Run();
+  if (fault) judgement.causes.insert(judgement.causes.begin(), MakeCause(fault->fault));
+  return judgement;
+}
+
+}  // namespace dexcheck

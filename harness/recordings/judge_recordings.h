@@ -1,0 +1,72 @@
+#pragma once
+
+// Whether a model explains what a robot did, and if not, what is missing.
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "harness/diagnosis/causes.h"
+#include "harness/recordings/channels.h"
+#include "harness/recordings/read_recordings.h"
+#include "harness/recordings/torque_candidates.h"
+
+namespace dexcheck {
+
+/// Root mean squares over a recording, of one joint, in N m or N.
+struct JointJudgement {
+  int recording = 0;
+  int joint = -1;
+  double samples = 0.0;
+  double torque = 0.0;                          ///< Measured.
+  double residual = 0.0;                        ///< Measured less the model's.
+  double left = 0.0;                            ///< Of that, beyond the causes.
+  double noise = 0.0;                           ///< What noise and derivatives make of it.
+  double held_residual = 0.0, held_left = 0.0;  ///< The same in the quarter that no cause was found with.
+  double drive_gain = 0.0;                      ///< N m/A, where currents were recorded; otherwise 0.
+};
+
+/// A cause with its size.
+struct FoundFault {
+  TorqueFault fault;
+  VectorXd amplitude, error;
+};
+
+/// Means over a block of time, for pictures. By judged joint.
+struct TorqueTrace {
+  int recording = 0;
+  double time = 0.0;  ///< s
+  VectorXd q;         ///< All joints.
+  VectorXd measured, modelled, explained, left;
+};
+
+struct RecordingJudgement {
+  std::vector<int> joints;  ///< That were judged.
+  std::vector<JointJudgement> balances;
+  Causes causes;
+  std::vector<FoundFault> found;  ///< The same.
+  double explained = 0.0;         ///< Fraction of the residual, squared.
+  double left = 0.0;              ///< Root mean square of the rest, in units of noise.
+  std::vector<TorqueTrace> traces;
+  std::vector<std::string> notes;
+  long rows = 0;
+
+  /// Beside the causes no more than noise is left.
+  [[nodiscard]] bool IsWhole() const;
+  /// What is left is noise, with no cause.
+  [[nodiscard]] bool Agrees() const;
+};
+
+struct JudgeOptions : ReadOptions {
+  size_t most_causes = 30;
+  bool tries_positions = true;  ///< Other signs, units and orders of positions, where little is explained.
+};
+
+/// @param recordings of one robot; each is read once.
+/// @param on_rows called with the number of rows so far; ends the reading by returning false.
+/// @throws InputError, one line, for data that cannot be understood.
+RecordingJudgement JudgeRecordings(const RobotModel& model, std::vector<Recording>* recordings,
+                                   const JudgeOptions& options,
+                                   const std::function<bool(long rows)>& on_rows = {});
+
+}  // namespace dexcheck

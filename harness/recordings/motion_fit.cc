@@ -1,0 +1,453 @@
+#include "harness/recordings/motion_fit.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "controller/common/errors.h"
+#include "controller/common/text.h"
+
+namespace dexcheck {
+namespace {
+
+constexpr int kOrder = 4, kHigherOrder = 6;
+constexpr size_t kMostCentres = 300;  // at which noise is measured
+constexpr size_t kHalves[] = {3, 4, 6, 8, 11, 16, 23, 32, 45, 64, 90, 128};
+constexpr long kHeld = 5;      // rows that repeat one another; more of them are a robot at rest
+constexpr double kGap = 10.0;  // times the usual step
+
+double Median(std::vector<double> values) {
+  if (values.empty()) return 0.0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+double Square(double x) { return x * x; }
+
+}  // namespace
+
+MotionFit::MotionFit(const RobotModel& model, Recording* recording, size_t ahead)
+    : model_(&model), recording_(recording), regressor_(model), part_(std::max<size_t>(1, ahead / 8)) {
+  has_currents_ = !recording->Has(Quantity::kTorque);
+  const Quantity effort = has_currents_ ? Quantity::kCurrent : Quantity::kTorque;
+  for (int joint = 0; joint < model.num_joints(); ++joint)
+    if (recording->FindColumn(effort, joint) >= 0) judged_.push_back(joint);
+  while (rows_ahead_.size() < ahead && Fill()) {
+  }
+  Analyse();
+}
+
+int MotionFit::ChannelOf(Quantity quantity, int joint) const {
+  for (size_t i = 0; i < recording_->channels.size(); ++i)
+    if (recording_->channels[i].quantity == quantity && recording_->channels[i].joint == joint)
+      return static_cast<int>(i);
+  return -1;
+}
+
+bool MotionFit::ReadRow(Row* row) {
+  while (recording_->reader->Next(&numbers_)) {
+    ++rows_;
+    size_t missing = 0;
+    for (size_t i = 0; i < recording_->channels.size(); ++i) {
+      const Channel& channel = recording_->channels[i];
+      const double number = numbers_[channel.column];
+      (*row)[static_cast<Eigen::Index>(i)] = channel.scale * number + channel.offset;
+      if (!std::isfinite(number) && channel.quantity != Quantity::kTime) ++missing;
+    }
+    // Messages of other joints.
+    if (missing + 1 == recording_->channels.size()) {
+      ++empty_;
+      continue;
+    }
+    for (const Channel& channel : recording_->channels) {
+      const double number = numbers_[channel.column];
+      if (std::isfinite(number)) continue;
+      const std::string& name = recording_->reader->names()[channel.column];
+      throw InputError(fmt::format("{}: column {}: must be a finite number, {}", recording_->reader->Where(),
+                                   name.empty() ? std::to_string(channel.column + 1) : name,
+                                   std::isnan(number) ? "is missing" : "got " + std::to_string(number)));
+    }
+    return true;
+  }
+  return false;
+}
+
+/// Appends the next row that says something new; false at the end.
+bool MotionFit::Fill() {
+  const int time = ChannelOf(Quantity::kTime, -1);
+  Row row(static_cast<Eigen::Index>(recording_->channels.size()));
+  while (!has_ended_) {
+    if (!ReadRow(&row)) {
+      has_ended_ = true;
+      break;
+    }
+    if (last_.size() > 0) {
+      const double passed = row[time] - last_[time];
+      if (passed < 0.0)
+        throw InputError(fmt::format("{}: time goes back from {:.9g} to {:.9g} s",
+                                     recording_->reader->Where(), last_[time], row[time]));
+      if (passed == 0.0) {
+        ++doubled_;
+        continue;
+      }
+      bool is_same = true;
+      for (Eigen::Index i = 0; i < row.size(); ++i) is_same = is_same && (i == time || row[i] == last_[i]);
+      held_run_ = is_same ? held_run_ + 1 : 0;
+      if (is_same && held_run_ < kHeld) {
+        ++held_;
+        continue;
+      }
+      if (step_ > 0.0 && passed > kGap * step_) ++segment_, ++gaps_;
+    }
+    last_ = row;
+    rows_ahead_.push_back(row);
+    segments_.push_back(segment_);
+    return true;
+  }
+  return false;
+}
+
+bool MotionFit::IsWhole(size_t centre, size_t half) const {
+  return centre >= half && centre + half < rows_ahead_.size() &&
+         segments_[centre - half] == segments_[centre + half];
+}
+
+MatrixXd MotionFit::GetWindow(size_t centre, size_t half) const {
+  MatrixXd window(static_cast<Eigen::Index>(2 * half + 1), last_.size());
+  for (size_t k = 0; k <= 2 * half; ++k)
+    window.row(static_cast<Eigen::Index>(k)) = rows_ahead_[centre - half + k].transpose();
+  return window;
+}
+
+MatrixXd MotionFit::CalcCoefficients(size_t centre, size_t half, int order) const {
+  const int time = ChannelOf(Quantity::kTime, -1);
+  const double t = rows_ahead_[centre][time];
+  const auto m = static_cast<Eigen::Index>(2 * half + 1);
+  const double scale = static_cast<double>(half) * step_;
+  // Of rows that are equally far apart it is the same everywhere.
+  constexpr double kEven = 1e-3;
+  bool is_even = true;
+  for (size_t k = 0; k <= 2 * half && is_even; ++k) {
+    const double expected = (static_cast<double>(k) - static_cast<double>(half)) * step_;
+    is_even = std::abs(rows_ahead_[centre - half + k][time] - t - expected) < kEven * step_;
+  }
+  MatrixXd& even = even_[{half, order}];
+  if (is_even && even.size() > 0) return even;
+  MatrixXd V(m, order + 1);
+  for (Eigen::Index k = 0; k < m; ++k) {
+    const double u = (rows_ahead_[centre - half + static_cast<size_t>(k)][time] - t) / scale;
+    double power = 1.0;
+    for (int p = 0; p <= order; ++p, power *= u) V(k, p) = power;
+  }
+  MatrixXd C = V.householderQr().solve(MatrixXd::Identity(m, m));
+  double unit = 1.0;
+  for (int p = 0; p <= order; ++p, unit /= scale) C.row(p) *= unit;
+  if (is_even) even = C;
+  return C;
+}
+
+std::vector<size_t> MotionFit::ListCentres(size_t half) const {
+  std::vector<size_t> centres;
+  const size_t every = std::max<size_t>(1, rows_ahead_.size() / kMostCentres);
+  for (size_t i = half; i + half < rows_ahead_.size(); i += every)
+    if (IsWhole(i, half)) centres.push_back(i);
+  return centres;
+}
+
+double MotionFit::FindQuantum(Eigen::Index channel) const {
+  double least = std::numeric_limits<double>::infinity();
+  double largest = 0.0;
+  for (size_t i = 1; i < rows_ahead_.size(); ++i) {
+    const double change = std::abs(rows_ahead_[i][channel] - rows_ahead_[i - 1][channel]);
+    largest = std::max(largest, std::abs(rows_ahead_[i][channel]));
+    if (change > 1e-12 * largest) least = std::min(least, change);
+  }
+  if (!std::isfinite(least)) return 0.0;
+  size_t whole = 0;
+  for (size_t i = 1; i < rows_ahead_.size(); ++i) {
+    const double steps = (rows_ahead_[i][channel] - rows_ahead_[i - 1][channel]) / least;
+    constexpr double kMost = 1e4;  // beyond it any number is nearly whole
+    whole += std::abs(steps) < kMost && std::abs(steps - std::round(steps)) < 0.02 ? 1 : 0;
+  }
+  constexpr double kNearlyAll = 0.95;
+  return static_cast<double>(whole) > kNearlyAll * static_cast<double>(rows_ahead_.size() - 1) ? least : 0.0;
+}
+
+void MotionFit::Analyse() {
+  const std::string& name = recording_->name;
+  constexpr size_t kFewest = 16;
+  if (rows_ahead_.size() < kFewest) {
+    throw InputError(
+        fmt::format("{}: has {} rows that differ, fewer than {}", name, rows_ahead_.size(), kFewest));
+  }
+  const int time = ChannelOf(Quantity::kTime, -1);
+  std::vector<double> steps;
+  for (size_t i = 1; i < rows_ahead_.size(); ++i)
+    steps.push_back(rows_ahead_[i][time] - rows_ahead_[i - 1][time]);
+  step_ = Median(steps);
+  for (size_t i = 1; i < rows_ahead_.size(); ++i) {
+    if (steps[i - 1] > kGap * step_) ++segment_, ++gaps_;
+    segments_[i] = segment_;
+  }
+  const Eigen::Index n = model_->num_joints();
+  for (VectorXd* vector :
+       {&noise_.position, &noise_.velocity, &noise_.torque, &noise_.smooth_position, &noise_.smooth_torque,
+        &noise_.acceleration, &noise_.rest, &sample_.q, &sample_.qd, &sample_.qdd, &sample_.torque,
+        &sample_.torque_rate, &sample_.torque_curvature, &sample_.direction})
+    *vector = VectorXd::Zero(n);
+  // Noise of each channel: what a polynomial over a short window leaves.
+  constexpr size_t kShort = 8;
+  const size_t half = std::min(kShort, (rows_ahead_.size() - 1) / 2);
+  const std::vector<size_t> centres = ListCentres(half);
+  if (centres.empty())
+    throw InputError(name + ": has gaps everywhere: no " + std::to_string(2 * half + 1) +
+                     " rows follow each other");
+  VectorXd sigma(last_.size());
+  std::vector<std::vector<double>> left(static_cast<size_t>(last_.size()));
+  for (const size_t centre : centres) {
+    const MatrixXd window = GetWindow(centre, half);
+    const MatrixXd C = CalcCoefficients(centre, half, kOrder);
+    const double t = rows_ahead_[centre][time];
+    MatrixXd V(window.rows(), kOrder + 1);
+    for (Eigen::Index k = 0; k < V.rows(); ++k)
+      for (int p = 0; p <= kOrder; ++p) V(k, p) = std::pow(window(k, time) - t, p);
+    const MatrixXd rest = window - V * (C * window);
+    for (Eigen::Index i = 0; i < rest.cols(); ++i)
+      left[static_cast<size_t>(i)].push_back(rest.col(i).squaredNorm() /
+                                             std::max(1.0, static_cast<double>(rest.rows() - kOrder - 1)));
+  }
+  for (Eigen::Index i = 0; i < sigma.size(); ++i) {
+    constexpr double kMedianToMean = 1.06;  // of chi^2 with twelve degrees of freedom
+    sigma[i] = std::sqrt(
+        std::max(kMedianToMean * Median(left[static_cast<size_t>(i)]), Square(FindQuantum(i)) / 12.0));
+  }
+  for (int joint = 0; joint < n; ++joint) {
+    const auto get = [&](Quantity quantity) {
+      const int channel = ChannelOf(quantity, joint);
+      return channel < 0 ? 0.0 : sigma[channel];
+    };
+    noise_.position[joint] = get(Quantity::kPosition);
+    noise_.velocity[joint] = get(Quantity::kVelocity);
+    noise_.torque[joint] = get(has_currents_ ? Quantity::kCurrent : Quantity::kTorque);
+  }
+  CheckVelocities(centres, half);
+  inertia_ = CalcInertia(centres);
+  ChooseWindow(centres);
+  CalcSpeeds();
+}
+
+void MotionFit::CheckVelocities(const std::vector<size_t>& centres, size_t half) {
+  constexpr double kOff = 0.1, kShows = 5.0;
+  for (int joint = 0; joint < model_->num_joints(); ++joint) {
+    const int position = ChannelOf(Quantity::kPosition, joint),
+              velocity = ChannelOf(Quantity::kVelocity, joint);
+    if (position < 0 || velocity < 0) continue;
+    double squares = 0.0, product = 0.0, noise = 0.0;
+    for (const size_t centre : centres) {
+      const MatrixXd window = GetWindow(centre, half);
+      const MatrixXd C = CalcCoefficients(centre, half, kOrder);
+      const double rate = C.row(1).dot(window.col(position));
+      squares += rate * rate;
+      product += rate * C.row(0).dot(window.col(velocity));
+      noise += Square(noise_.position[joint]) * C.row(1).squaredNorm();
+    }
+    // Noise makes the derivative's square too large.
+    if (!(squares > kShows * noise)) continue;
+    const double gain = product / (squares - noise);
+    if (std::abs(gain - 1.0) < kOff) continue;
+    faults_.push_back({"velocity gain", "joint " + model_->joint(joint).name, gain, 0.0, "",
+                       std::abs(gain + 1.0) < kOff ? "(the other sign)" : ""});
+  }
+  if (faults_.empty()) return;
+  std::vector<Channel> kept;
+  std::vector<Eigen::Index> columns;
+  for (size_t i = 0; i < recording_->channels.size(); ++i) {
+    if (recording_->channels[i].quantity == Quantity::kVelocity) continue;
+    kept.push_back(recording_->channels[i]);
+    columns.push_back(static_cast<Eigen::Index>(i));
+  }
+  recording_->channels = kept;
+  for (Row& row : rows_ahead_) row = Row(row(columns));
+  last_ = Row(last_(columns));
+  noise_.velocity.setZero();
+}
+
+MatrixXd MotionFit::CalcInertia(const std::vector<size_t>& centres) {
+  const Eigen::Index n = model_->num_joints();
+  MatrixXd squares = MatrixXd::Zero(n, n);
+  VectorXd q = VectorXd::Zero(n), zero = VectorXd::Zero(n), rest(n), moved(n);
+  const size_t every = std::max<size_t>(1, centres.size() / 20);
+  double count = 0.0;
+  for (size_t i = 0; i < centres.size(); i += every, count += 1.0) {
+    for (int joint = 0; joint < n; ++joint)
+      if (const int channel = ChannelOf(Quantity::kPosition, joint); channel >= 0)
+        q[joint] = rows_ahead_[centres[i]][channel];
+    regressor_.SetMotion(q, zero, zero);
+    regressor_.CalcTorques(rest);
+    for (Eigen::Index k = 0; k < n; ++k) {
+      regressor_.SetMotion(q, zero, VectorXd::Unit(n, k));
+      regressor_.CalcTorques(moved);
+      squares.col(k) += (moved - rest).cwiseAbs2();
+    }
+  }
+  return (squares / count).cwiseSqrt();
+}
+
+void MotionFit::ChooseWindow(const std::vector<size_t>& all) {
+  // What accelerations are derived from, and how often.
+  const bool has_acceleration = recording_->Has(Quantity::kAcceleration);
+  const bool has_velocity = recording_->Has(Quantity::kVelocity);
+  const Quantity source = has_acceleration ? Quantity::kAcceleration
+                          : has_velocity   ? Quantity::kVelocity
+                                           : Quantity::kPosition;
+  const int derivative = has_acceleration ? 0 : has_velocity ? 1 : 2;
+  const double factorial = derivative == 2 ? 2.0 : 1.0;
+  double best = std::numeric_limits<double>::infinity();
+  for (const size_t half : kHalves) {
+    const std::vector<size_t> centres = ListCentres(half);
+    if (2 * half + 1 > rows_ahead_.size() / 4 || centres.size() < all.size() / 2) break;
+    const Eigen::Index n = model_->num_joints();
+    VectorXd variance = VectorXd::Zero(n), bias = VectorXd::Zero(n);
+    double value = 0.0, rate = 0.0;
+    for (const size_t centre : centres) {
+      const MatrixXd window = GetWindow(centre, half);
+      const MatrixXd C = CalcCoefficients(centre, half, kOrder);
+      const MatrixXd higher = CalcCoefficients(centre, half, kHigherOrder);
+      value += C.row(0).squaredNorm();
+      rate += C.row(1).squaredNorm();
+      for (int joint = 0; joint < n; ++joint) {
+        const int channel = ChannelOf(source, joint);
+        if (channel < 0) continue;
+        const double sigma = source == Quantity::kPosition   ? noise_.position[joint]
+                             : source == Quantity::kVelocity ? noise_.velocity[joint]
+                                                             : 0.0;
+        variance[joint] += Square(factorial * sigma) * C.row(derivative).squaredNorm();
+        bias[joint] += Square(factorial) *
+                       (Square((C.row(derivative) - higher.row(derivative)).dot(window.col(channel))) -
+                        Square(sigma) * (C.row(derivative) - higher.row(derivative)).squaredNorm());
+      }
+    }
+    const double count = static_cast<double>(centres.size());
+    const VectorXd squares = (variance + bias.cwiseMax(0.0)) / count;
+    const double score = (inertia_.array().square().matrix() * squares).sum();
+    if (!(score < best)) continue;
+    best = score;
+    half_ = half;
+    noise_.acceleration = squares.cwiseSqrt();
+    noise_.smooth_position = std::sqrt(value / count) * noise_.position;
+    noise_.smooth_torque = std::sqrt(value / count) * noise_.torque;
+    const VectorXd velocity = has_velocity ? VectorXd(std::sqrt(value / count) * noise_.velocity)
+                                           : VectorXd(std::sqrt(rate / count) * noise_.position);
+    noise_.rest = 3.0 * velocity;
+  }
+  if (!std::isfinite(best))
+    throw InputError(recording_->name + ": is too short to derive accelerations from");
+  stride_ = std::max<size_t>(1, half_ / 2);
+}
+
+bool MotionFit::Emit(size_t centre, const Receiver& receive) {
+  const MatrixXd window = GetWindow(centre, half_);
+  const MatrixXd C = CalcCoefficients(centre, half_, kOrder);
+  const MatrixXd fitted = C * window;
+  const int time = ChannelOf(Quantity::kTime, -1);
+  sample_.time = rows_ahead_[centre][time];
+  const Quantity effort = has_currents_ ? Quantity::kCurrent : Quantity::kTorque;
+  for (int joint = 0; joint < model_->num_joints(); ++joint) {
+    const int position = ChannelOf(Quantity::kPosition, joint);
+    if (position < 0) continue;
+    const int velocity = ChannelOf(Quantity::kVelocity, joint);
+    const int acceleration = ChannelOf(Quantity::kAcceleration, joint);
+    sample_.q[joint] = fitted(0, position);
+    sample_.qd[joint] = velocity >= 0 ? fitted(0, velocity) : fitted(1, position);
+    sample_.qdd[joint] = acceleration >= 0 ? fitted(0, acceleration)
+                         : velocity >= 0   ? fitted(1, velocity)
+                                           : 2.0 * fitted(2, position);
+    // The sign, averaged as the torque is.
+    double direction = 0.0;
+    for (Eigen::Index k = 0; k < window.rows(); ++k) {
+      const double t = window(k, time) - sample_.time;
+      double rate = 0.0;
+      if (velocity >= 0) {
+        rate = fitted(0, velocity) +
+               t * (fitted(1, velocity) +
+                    t * (fitted(2, velocity) + t * (fitted(3, velocity) + t * fitted(4, velocity))));
+      } else {
+        rate = fitted(1, position) + t * (2.0 * fitted(2, position) +
+                                          t * (3.0 * fitted(3, position) + t * 4.0 * fitted(4, position)));
+      }
+      direction += C(0, k) * (rate > 0.0 ? 1.0 : rate < 0.0 ? -1.0 : 0.0);
+    }
+    sample_.direction[joint] = std::abs(sample_.qd[joint]) < noise_.rest[joint] ? 0.0 : direction;
+    const int torque = ChannelOf(effort, joint);
+    if (torque < 0) continue;
+    sample_.torque[joint] = fitted(0, torque);
+    sample_.torque_rate[joint] = fitted(1, torque);
+    sample_.torque_curvature[joint] = 2.0 * fitted(2, torque);
+  }
+  return receive(sample_);
+}
+
+void MotionFit::CalcSpeeds() {
+  const Eigen::Index n = model_->num_joints();
+  speeds_ = VectorXd::Zero(n);
+  VectorXd moving = VectorXd::Zero(n);
+  double count = 0.0;
+  for (const size_t centre : ListCentres(half_)) {
+    Emit(centre, [&](const RecordedSample& sample) {
+      speeds_ += sample.qd.cwiseAbs2();
+      moving += sample.direction.unaryExpr([](double s) { return s != 0.0 ? 1.0 : 0.0; });
+      return true;
+    });
+    count += 1.0;
+  }
+  speeds_ = (speeds_ / std::max(1.0, count)).cwiseSqrt();
+  constexpr double kSlow = 2e-3, kMoving = 0.2;
+  noise_.rest = noise_.rest.cwiseMax(kSlow * speeds_);
+  for (Eigen::Index joint = 0; joint < n; ++joint) moves_.push_back(moving[joint] > kMoving * count);
+}
+
+std::vector<bool> MotionFit::IsJudged(const RecordedSample& sample) const {
+  std::vector<bool> judged(moves_.size());
+  for (size_t joint = 0; joint < judged.size(); ++joint)
+    judged[joint] = !moves_[joint] || sample.direction[static_cast<Eigen::Index>(joint)] != 0.0;
+  return judged;
+}
+
+void MotionFit::Run(const Receiver& receive) {
+  size_t next = half_;
+  for (;;) {
+    for (; next + half_ < rows_ahead_.size(); next += stride_)
+      if (IsWhole(next, half_) && !Emit(next, receive)) return;
+    // What no window needs any more makes room.
+    while (next > half_ && !rows_ahead_.empty()) {
+      rows_ahead_.pop_front();
+      segments_.pop_front();
+      --next;
+    }
+    bool has_more = false;
+    for (size_t i = 0; i < part_ && Fill(); ++i) has_more = true;
+    if (!has_more) return;
+  }
+}
+
+std::vector<std::string> MotionFit::ListNotes() const {
+  std::vector<std::string> notes;
+  const auto note = [&](long count, const std::string& what) {
+    if (count > 0) notes.push_back(fmt::format("{}: {} {}", recording_->name, count, what));
+  };
+  note(doubled_, "rows have the time of the row before: left out");
+  note(held_, "rows repeat the row before: left out");
+  note(empty_, "rows have no numbers of these joints: left out");
+  note(gaps_, fmt::format("gaps longer than {:.3g} s: nothing is smoothed across them", kGap * step_));
+  notes.push_back(
+      fmt::format("{}: {} from {} by polynomials over {:.3g} s (a row every {:.3g} s)", recording_->name,
+                  recording_->Has(Quantity::kVelocity) ? "accelerations" : "velocities and accelerations",
+                  recording_->Has(Quantity::kVelocity) ? "velocities" : "positions", window(), step_));
+  return notes;
+}
+
+}  // namespace dexcheck

@@ -1,0 +1,114 @@
+#pragma once
+
+// The motion of a recording: positions, velocities and accelerations by local polynomials, with their errors.
+
+#include <deque>
+#include <functional>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "controller/dynamics/torque_regressor.h"
+#include "harness/diagnosis/causes.h"
+#include "harness/recordings/channels.h"
+
+namespace dexcheck {
+
+/// A row after smoothing. Entries by joint, in the model's order; those of joints that were not recorded are
+/// zero.
+struct RecordedSample {
+  double time = 0.0;
+  VectorXd q, qd, qdd;
+  VectorXd torque;            ///< Measured, or the current; smoothed like the motion.
+  VectorXd torque_rate;       ///< Per s.
+  VectorXd torque_curvature;  ///< Per s^2.
+  VectorXd direction;         ///< Sign of the velocity, averaged as the torque is; 0 at rest.
+};
+
+/// Standard deviations, by joint.
+struct MotionNoise {
+  VectorXd position, velocity, torque;  ///< Of a single number.
+  VectorXd smooth_position, smooth_torque,
+      acceleration;  ///< Of a sample, the last with what smoothing leaves out.
+  VectorXd rest;     ///< Velocity below which a joint is at rest.
+};
+
+/// Reads a recording once, in constant memory. Rows whose times are doubled are left out, so are those that
+/// repeat the row before (a logger faster than the robot), and nothing is smoothed across a gap.
+class MotionFit {
+ public:
+  /// Returns false to end the reading.
+  using Receiver = std::function<bool(const RecordedSample&)>;
+
+  /// Reads ahead to see noise and sampling. Velocities that are not the positions' derivatives are not used.
+  /// @param ahead rows. @throws InputError, one line that names file, row and column.
+  MotionFit(const RobotModel& model, Recording* recording, size_t ahead = 20'000);
+
+  /// All samples, in time.
+  void Run(const Receiver& receive);
+
+  /// Velocities that are wrong: "velocity gain" of joints, -1 for the other sign.
+  [[nodiscard]] const std::vector<Fault>& faults() const { return faults_; }
+  [[nodiscard]] const MotionNoise& noise() const { return noise_; }
+  /// Joints with a position and a torque or current.
+  [[nodiscard]] const std::vector<int>& joints() const { return judged_; }
+  /// By joint: whether a sample says what moves it. Where friction holds a joint that moves at other times,
+  /// it does not.
+  [[nodiscard]] std::vector<bool> IsJudged(const RecordedSample& sample) const;
+  /// Root mean square of the velocities, by joint.
+  [[nodiscard]] const VectorXd& speeds() const { return speeds_; }
+  /// Root mean square of the entries of M_bar'.
+  [[nodiscard]] const MatrixXd& inertia() const { return inertia_; }
+  [[nodiscard]] bool has_currents() const { return has_currents_; }
+  [[nodiscard]] double step() const { return step_; }  ///< Median time between rows, s.
+  [[nodiscard]] double window() const {
+    return 2.0 * static_cast<double>(half_) * step_;
+  }  ///< That is smoothed over, s.
+  [[nodiscard]] long rows() const { return rows_; }
+  /// What was done with the rows, for the report.
+  [[nodiscard]] std::vector<std::string> ListNotes() const;
+
+ private:
+  /// One row: time, then each channel's numbers in SI units.
+  using Row = VectorXd;
+
+  bool ReadRow(Row* row);
+  bool Fill();
+  void Analyse();
+  void ChooseWindow(const std::vector<size_t>& centres);
+  void CalcSpeeds();
+  void CheckVelocities(const std::vector<size_t>& centres, size_t half);
+  [[nodiscard]] std::vector<size_t> ListCentres(size_t half) const;
+  /// (order + 1) x rows of the window: of the polynomial about the centre, in powers of the time.
+  [[nodiscard]] MatrixXd CalcCoefficients(size_t centre, size_t half, int order) const;
+  [[nodiscard]] MatrixXd GetWindow(size_t centre, size_t half) const;
+  [[nodiscard]] bool IsWhole(size_t centre, size_t half) const;
+  [[nodiscard]] int ChannelOf(Quantity quantity, int joint) const;
+  [[nodiscard]] double FindQuantum(Eigen::Index channel) const;
+  bool Emit(size_t centre, const Receiver& receive);
+  [[nodiscard]] MatrixXd CalcInertia(const std::vector<size_t>& centres);
+
+  const RobotModel* model_;
+  Recording* recording_;
+  TorqueRegressor regressor_;
+  size_t part_;  // rows that are read at once
+  std::vector<int> judged_;
+  std::vector<Fault> faults_;
+  bool has_currents_ = false;
+  std::deque<Row> rows_ahead_;
+  std::deque<long> segments_;  // of each row ahead
+  std::vector<double> numbers_;
+  Row last_;
+  long segment_ = 0, rows_ = 0, held_ = 0, held_run_ = 0, doubled_ = 0, empty_ = 0, gaps_ = 0;
+  bool has_ended_ = false;
+  double step_ = 0.0;
+  mutable std::map<std::pair<size_t, int>, MatrixXd> even_;  // of CalcCoefficients, by half and order
+  size_t half_ = 2, stride_ = 1;
+  VectorXd speeds_;
+  std::vector<bool> moves_;
+  MatrixXd inertia_;
+  MotionNoise noise_;
+  RecordedSample sample_;
+};
+
+}  // namespace dexcheck

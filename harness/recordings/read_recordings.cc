@@ -1,0 +1,180 @@
+#include "harness/recordings/read_recordings.h"
+
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "controller/common/errors.h"
+
+namespace dexcheck {
+namespace {
+
+using Eigen::Index;
+
+double Squared(double x) { return x * x; }
+
+/// The model with what is declared to be attached to it.
+RobotModel AddPayload(const RobotModel& model, const std::optional<DeclaredPayload>& payload) {
+  RobotSpec spec = model.spec();
+  if (payload) {
+    MassProperties& body = spec.joints[static_cast<size_t>(payload->link)].body;
+    body = Combine({body, {payload->mass, payload->com, Matrix3d::Zero()}});
+  }
+  return RobotModel(spec);
+}
+
+}  // namespace
+
+RecordingSet::RecordingSet(const RobotModel& model, std::vector<Recording>* recordings,
+                           const ReadOptions& options, const std::function<bool(long rows)>& on_rows)
+    : model_(&model), first_name_(recordings->front().name) {
+  for (Recording& recording : *recordings) Read(&recording, options, on_rows);
+  EstimateGains();
+  first_gains_ = gains_;
+  MeasureNoise();
+}
+
+std::vector<int> RecordingSet::ListJudged() const {
+  std::vector<int> judged;
+  for (size_t place = 0; place < joints_.size(); ++place)
+    if (IsJudged(place)) judged.push_back(joints_[place]);
+  return judged;
+}
+
+void RecordingSet::DivideGains(const Eigen::Ref<const VectorXd>& factors) {
+  gains_ = gains_.cwiseQuotient(factors);
+  MeasureNoise();
+}
+
+void RecordingSet::ResetWeights() {
+  for (ReadRecording& one : read_) one.weight = one.noise;
+}
+
+void RecordingSet::Read(Recording* recording, const ReadOptions& options,
+                        const std::function<bool(long rows)>& on_rows) {
+  ReadRecording& one = read_.emplace_back();
+  one.model = std::make_unique<RobotModel>(AddPayload(*model_, recording->payload));
+  MotionFit motion(*one.model, recording, options.ahead);
+  if (read_.size() == 1) {
+    joints_ = motion.joints();
+    has_currents_ = motion.has_currents();
+    if (joints_.empty()) throw InputError(recording->name + ": has no torques of the model's joints");
+  } else if (joints_ != motion.joints() || has_currents_ != motion.has_currents()) {
+    throw InputError(recording->name + ": must have the quantities of " + first_name_);
+  }
+  step_ = std::max(step_, motion.step());
+  one.fit = std::make_unique<TorqueBalance>(*one.model, joints_, motion.speeds(), has_currents_);
+  one.held = std::make_unique<TorqueBalance>(*one.model, joints_, motion.speeds(), has_currents_);
+  for (const auto& [joint, offset] : options.offsets)
+    for (TorqueBalance* balance : {one.fit.get(), one.held.get()}) balance->SetPositionStep(joint, -offset);
+  long samples = 0;
+  motion.Run([&](const RecordedSample& sample) {
+    constexpr long kStretch = 64, kEvery = 4;
+    TorqueBalance& balance = (samples / kStretch) % kEvery == kEvery - 1 ? *one.held : *one.fit;
+    balance.Add(sample, motion.IsJudged(sample));
+    TellSecond(options, sample.time, balance.residual());
+    ++samples;
+    return samples % 1024 != 0 || !on_rows || on_rows(rows_ + motion.rows());
+  });
+  rows_ += motion.rows();
+  one.fit->Finish();
+  one.held->Finish();
+  for (const std::string& note : motion.ListNotes()) notes_.push_back(note);
+  for (const Fault& fault : motion.faults()) faults_.push_back(fault);
+  one.motion = motion.noise();
+  one.inertia = motion.inertia();
+  one.step = motion.step();
+}
+
+void RecordingSet::TellSecond(const ReadOptions& options, double time, const VectorXd& residual) {
+  if (!options.on_second) return;
+  if (second_samples_ == 0) second_ = VectorXd::Zero(residual.size()), second_begin_ = time;
+  second_ += residual.cwiseAbs2();
+  ++second_samples_;
+  if (time - second_begin_ < 1.0) return;
+  options.on_second(time, joints_, (second_ / second_samples_).cwiseSqrt());
+  second_samples_ = 0;
+}
+
+double RecordingSet::CalcNoise(const ReadRecording& one, size_t place) const {
+  const TorqueBalance& balance = *one.fit;
+  const int joint = joints_[place];
+  const double samples = std::max(1.0, balance.samples(place));
+  const auto mean_square = [&](const TorqueColumn& column) {
+    const Index at = balance.Find(place, column);
+    return at < 0 ? 0.0 : balance.products(place)(at, at) / samples;
+  };
+  double variance = Squared(one.motion.smooth_torque[joint] * gains_[static_cast<Index>(place)]);
+  for (int other = 0; other < model_->num_joints(); ++other) {
+    variance += Squared(one.inertia(joint, other) * one.motion.acceleration[other]);
+    variance += mean_square({TorqueColumn::kPosition, other}) * Squared(one.motion.smooth_position[other]);
+  }
+  // When a torque acted is known to a row's time.
+  variance += mean_square({TorqueColumn::kRate, joint}) *
+              Squared(gains_[static_cast<Index>(place)] * one.step) / 12.0;
+  constexpr double kRounding = 1e-7;
+  return std::sqrt(variance + Squared(kRounding) * mean_square({TorqueColumn::kTorque, joint}) +
+                   std::numeric_limits<double>::min());
+}
+
+void RecordingSet::MeasureNoise() {
+  for (ReadRecording& one : read_) {
+    one.noise.resize(static_cast<Index>(joints_.size()));
+    for (size_t place = 0; place < joints_.size(); ++place)
+      one.noise[static_cast<Index>(place)] = CalcNoise(one, place);
+    if (one.weight.size() == 0) one.weight = one.noise;
+  }
+}
+
+void RecordingSet::EstimateGains() {
+  gains_ = VectorXd::Ones(static_cast<Index>(joints_.size()));
+  for (size_t place = 0; has_currents_ && place < joints_.size(); ++place) {
+    const TorqueBalance& first = *read_.front().fit;
+    std::vector<Index> at;
+    for (const auto kind :
+         {TorqueColumn::kTorque, TorqueColumn::kOffset, TorqueColumn::kDry, TorqueColumn::kViscous})
+      at.push_back(first.Find(place, {kind, joints_[place]}));
+    const Index current = first.Find(place, {TorqueColumn::kCurrent, joints_[place]});
+    MatrixXd G = MatrixXd::Zero(first.products(place).rows(), first.products(place).cols());
+    for (const ReadRecording& one : read_) G += one.fit->products(place);
+    // Of the current by the model's torque, where that shows beside friction.
+    const auto solve = [&](const std::vector<Index>& columns) {
+      return VectorXd(MatrixXd(G(columns, columns))
+                          .completeOrthogonalDecomposition()
+                          .solve(VectorXd(G(columns, current))));
+    };
+    const auto left = [&](const std::vector<Index>& columns) {
+      return G(current, current) - solve(columns).dot(VectorXd(G(columns, current)));
+    };
+    const double inverse = solve(at)[0];
+    // What the model's torque explains of the current: of what friction leaves, and of all.
+    constexpr double kShows = 0.5, kLeastOfAll = 0.03;
+    const double without = left({at.begin() + 1, at.end()}), with = left(at);
+    const bool is_told = inverse > 0.0 && without > (1.0 + kShows) * with &&
+                         without - with > kLeastOfAll * G(current, current);
+    gains_[static_cast<Index>(place)] = is_told ? 1.0 / inverse : 0.0;
+    if (!is_told) NoteUnknownGain(joints_[place]);
+  }
+}
+
+bool RecordingSet::DropUnknownGains() {
+  constexpr double kFar = 3.0;
+  bool has_any = false;
+  for (size_t place = 0; place < joints_.size(); ++place) {
+    double& gain = gains_[static_cast<Index>(place)];
+    const double first = first_gains_[static_cast<Index>(place)];
+    if (gain == 0.0 || (gain > first / kFar && gain < first * kFar)) continue;
+    gain = 0.0;
+    has_any = true;
+    NoteUnknownGain(joints_[place]);
+  }
+  return has_any;
+}
+
+void RecordingSet::NoteUnknownGain(int joint) {
+  notes_.push_back("joint " + model_->joint(joint).name +
+                   " is not judged: its motion does not tell its drive's gain beside its friction");
+}
+
+}  // namespace dexcheck

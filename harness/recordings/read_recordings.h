@@ -1,0 +1,91 @@
+#pragma once
+
+// Recordings of one robot that have been read: their balances, noise and drives' gains.
+
+#include <functional>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "harness/recordings/torque_balance.h"
+
+namespace dexcheck {
+
+struct ReadOptions {
+  /// Called for every second of a recording: root mean squares of what the model does not explain of these
+  /// joints' torques, N m or N, since the call before.
+  std::function<void(double time, const std::vector<int>& joints, const VectorXd& residual)> on_second;
+  size_t ahead = 20'000;          ///< Rows that are read before the first is judged.
+  std::map<int, double> offsets;  ///< Of joints' positions, as far as they are known, rad or m.
+};
+
+/// One recording: a quarter of it, in stretches, is kept for the end.
+struct ReadRecording {
+  std::unique_ptr<RobotModel> model;
+  std::unique_ptr<TorqueBalance> fit, held;
+  MotionNoise motion;
+  MatrixXd inertia;
+  double step = 0.0;  ///< Between rows, s.
+  VectorXd noise;     ///< Of a sample's balance, by judged joint, N m or N.
+  VectorXd weight;    ///< Likewise: noise, or what no cause explains.
+};
+
+class RecordingSet {
+ public:
+  /// Reads them. @param on_rows called with the number of rows so far; ends the reading by returning false.
+  /// @throws InputError, one line, for data that cannot be understood.
+  RecordingSet(const RobotModel& model, std::vector<Recording>* recordings, const ReadOptions& options,
+               const std::function<bool(long rows)>& on_rows);
+
+  [[nodiscard]] const RobotModel& model() const { return *model_; }
+  [[nodiscard]] size_t size() const { return read_.size(); }
+  [[nodiscard]] const ReadRecording& operator[](size_t recording) const { return read_[recording]; }
+  /// What the next search takes for noise.
+  [[nodiscard]] double& weight(size_t recording, size_t place) {
+    return read_[recording].weight[static_cast<Eigen::Index>(place)];
+  }
+  void ResetWeights();
+
+  [[nodiscard]] const std::vector<int>& joints() const { return joints_; }
+  [[nodiscard]] bool has_currents() const { return has_currents_; }
+  /// Joints whose drives' gains are known.
+  [[nodiscard]] std::vector<int> ListJudged() const;
+  [[nodiscard]] bool IsJudged(size_t place) const { return gain(place) != 0.0; }
+  /// N m/A of a joint's drive, 1 of torques; 0 where the motion does not tell it.
+  [[nodiscard]] double gain(size_t place) const { return gains_[static_cast<Eigen::Index>(place)]; }
+  void DivideGains(const Eigen::Ref<const VectorXd>& factors);
+  /// Gains that became others than were estimated are not known. @return whether there are any.
+  bool DropUnknownGains();
+
+  [[nodiscard]] double step() const { return step_; }  ///< The longest between rows, s.
+  [[nodiscard]] long rows() const { return rows_; }
+  [[nodiscard]] const std::vector<std::string>& notes() const { return notes_; }
+  /// Of the recordings themselves: velocities that are not the positions' derivatives.
+  [[nodiscard]] const std::vector<Fault>& faults() const { return faults_; }
+
+ private:
+  void Read(Recording* recording, const ReadOptions& options, const std::function<bool(long rows)>& on_rows);
+  void TellSecond(const ReadOptions& options, double time, const VectorXd& residual);
+  [[nodiscard]] double CalcNoise(const ReadRecording& one, size_t place) const;
+  void MeasureNoise();
+  /// From all recordings, with friction and an offset beside them.
+  void EstimateGains();
+  void NoteUnknownGain(int joint);
+
+  const RobotModel* model_;
+  std::string first_name_;
+  std::vector<ReadRecording> read_;
+  std::vector<int> joints_;
+  bool has_currents_ = false;
+  double step_ = 0.0;
+  VectorXd gains_, first_gains_;  // by place
+  long rows_ = 0;
+  std::vector<std::string> notes_;
+  std::vector<Fault> faults_;
+  VectorXd second_;  // squares since a time
+  double second_begin_ = 0.0;
+  int second_samples_ = 0;
+};
+
+}  // namespace dexcheck

@@ -1,0 +1,228 @@
+#include "harness/recordings/torque_balance.h"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+
+namespace dexcheck {
+
+using Eigen::Index;
+
+TorqueBalance::TorqueBalance(const RobotModel& model, const std::vector<int>& joints, const VectorXd& speeds,
+                             bool has_currents)
+    : model_(&model), regressor_(model), joints_(joints), speeds_(speeds), has_currents_(has_currents) {
+  const Index n = model.num_joints();
+  bodies_.resize(n, TorqueRegressor::kBody * n);
+  gravity_.resize(n, 3);
+  forces_.resize(n, 6);
+  by_position_.resize(n, n);
+  torques_.resize(n);
+  moved_.resize(n);
+  q_.resize(n);
+  residual_ = VectorXd::Zero(static_cast<Index>(joints.size()));
+  constexpr double kStep = 1e-6;
+  steps_ = VectorXd::Constant(n, kStep);
+  ListColumns(has_currents);
+  for (const std::vector<TorqueColumn>& columns : columns_) {
+    const auto width = static_cast<Index>(columns.size()) + 1;
+    products_.push_back(MatrixXd::Zero(width, width));
+    parts_.push_back(MatrixXd::Zero(width, kPart));
+  }
+  used_.assign(joints_.size(), 0);
+  counts_.assign(joints_.size(), 0.0);
+}
+
+void TorqueBalance::ListColumns(bool has_currents) {
+  for (const int joint : joints_) {
+    std::vector<TorqueColumn>& columns = columns_.emplace_back();
+    for (int link = 0; link < model_->num_joints(); ++link) {
+      const std::vector<int> chain = model_->ListChain(link);
+      const bool is_moved = std::find(chain.begin(), chain.end(), joint) != chain.end();
+      for (int k = 0; is_moved && k < TorqueRegressor::kBody; ++k)
+        columns.push_back({TorqueColumn::kBody, link, k});
+    }
+    for (const int other : joints_) columns.push_back({TorqueColumn::kTorque, other});
+    for (int other = 0; other < model_->num_joints(); ++other)
+      columns.push_back({TorqueColumn::kPosition, other});
+    for (int k = 0; k < 3; ++k) columns.push_back({TorqueColumn::kGravity, 0, k});
+    if (has_currents) columns.push_back({TorqueColumn::kCurrent, joint});
+    for (const auto kind :
+         {TorqueColumn::kRate, TorqueColumn::kCurvature, TorqueColumn::kOffset, TorqueColumn::kDry,
+          TorqueColumn::kViscous, TorqueColumn::kAcceleration, TorqueColumn::kLoad})
+      columns.push_back({kind, joint});
+    for (const int tenths : {1, 3, 10}) columns.push_back({TorqueColumn::kSmooth, joint, tenths});
+    for (const int tenths : {0, 2}) columns.push_back({TorqueColumn::kSlow, joint, tenths});
+    std::map<TorqueColumn, Index>& places = places_.emplace_back();
+    for (const TorqueColumn& column : columns) places.emplace(column, static_cast<Index>(places.size()));
+  }
+}
+
+Index TorqueBalance::Find(size_t place, const TorqueColumn& column) const {
+  const auto found = places_[place].find(column);
+  return found == places_[place].end() ? -1 : found->second;
+}
+
+double TorqueBalance::CalcFriction(int joint, const RecordedSample& sample) const {
+  const Joint& modelled = model_->joint(joint);
+  return modelled.damping * sample.qd[joint] + modelled.dry_friction * sample.direction[joint];
+}
+
+void TorqueBalance::FillRow(size_t place, const RecordedSample& sample, Eigen::Ref<VectorXd> row) const {
+  const int joint = joints_[place];
+  const double direction = sample.direction[joint];
+  const double rate = sample.qd[joint];
+  for (size_t i = 0; i < columns_[place].size(); ++i) {
+    const TorqueColumn& column = columns_[place][i];
+    double& entry = row[static_cast<Index>(i)];
+    switch (column.kind) {
+      case TorqueColumn::kBody:
+        entry = bodies_(joint, TorqueRegressor::kBody * column.index + column.component);
+        break;
+      case TorqueColumn::kTorque:
+        entry = torques_[column.index] + CalcFriction(column.index, sample);
+        break;
+      case TorqueColumn::kPosition:
+        entry = by_position_(joint, column.index);
+        break;
+      case TorqueColumn::kGravity:
+        entry = gravity_(joint, column.component);
+        break;
+      case TorqueColumn::kRate:
+        entry = sample.torque_rate[joint];
+        break;
+      case TorqueColumn::kCurvature:
+        entry = sample.torque_curvature[joint];
+        break;
+      case TorqueColumn::kCurrent:
+        entry = sample.torque[joint];
+        break;
+      case TorqueColumn::kOffset:
+        entry = 1.0;
+        break;
+      case TorqueColumn::kDry:
+        entry = direction;
+        break;
+      case TorqueColumn::kViscous:
+        entry = rate;
+        break;
+      case TorqueColumn::kAcceleration:
+        entry = sample.qdd[joint];
+        break;
+      case TorqueColumn::kSlow: {
+        const double slow = 0.1 * (column.component + 1) * speeds_[joint];
+        entry = slow > 0.0 ? direction * std::exp(-rate * rate / (slow * slow)) : 0.0;
+        break;
+      }
+      case TorqueColumn::kSmooth: {
+        const double slow = 0.1 * column.component * speeds_[joint];
+        entry = slow > 0.0 ? std::tanh(rate / slow) : 0.0;
+        break;
+      }
+      case TorqueColumn::kLoad:
+        entry = direction * std::abs(torques_[joint]);
+        break;
+    }
+  }
+  row[row.size() - 1] =
+      (has_currents_ ? 0.0 : sample.torque[joint]) - torques_[joint] - CalcFriction(joint, sample);
+}
+
+void TorqueBalance::Add(const RecordedSample& sample, const std::vector<bool>& is_judged) {
+  q_ = sample.q;
+  for (Index k = 0; k < q_.size(); ++k) {
+    q_[k] += steps_[k];
+    regressor_.SetMotion(q_, sample.qd, sample.qdd);
+    regressor_.CalcTorques(by_position_.col(k));
+    q_[k] = sample.q[k];
+  }
+  regressor_.SetMotion(sample.q, sample.qd, sample.qdd);
+  regressor_.CalcTorques(torques_);
+  regressor_.CalcBodyColumns(bodies_);
+  regressor_.CalcGravityColumns(gravity_);
+  by_position_ = (by_position_.colwise() - torques_) * steps_.cwiseInverse().asDiagonal();
+
+  if (blocks_.empty() || blocks_.back().samples >= block_samples_) {
+    if (blocks_.size() == kMostBlocks) MergeBlocks();
+    Block& block = blocks_.emplace_back();
+    block.from = sample.time;
+    for (const MatrixXd& products : products_) block.sums.push_back(VectorXd::Zero(products.rows()));
+    block.counts.assign(joints_.size(), 0.0);
+    block.forces = MatrixXd::Zero(static_cast<Index>(joints_.size()), 6 * model_->num_joints());
+    block.q = VectorXd::Zero(model_->num_joints());
+  }
+  Block& block = blocks_.back();
+  block.to = sample.time;
+  block.samples += 1.0;
+  block.q += sample.q;
+  for (int link = 0; link < model_->num_joints(); ++link) {
+    regressor_.CalcForceColumns(link, forces_);
+    for (size_t place = 0; place < joints_.size(); ++place)
+      block.forces.block<1, 6>(static_cast<Index>(place), 6 * link) += forces_.row(joints_[place]);
+  }
+  residual_.setZero();
+  for (size_t place = 0; place < joints_.size(); ++place) {
+    if (!is_judged[static_cast<size_t>(joints_[place])]) continue;
+    auto row = parts_[place].col(used_[place]);
+    FillRow(place, sample, row);
+    residual_[static_cast<Index>(place)] = row[row.size() - 1];
+    block.sums[place] += row;
+    block.counts[place] += 1.0;
+    counts_[place] += 1.0;
+    if (++used_[place] == kPart) Flush(place);
+  }
+}
+
+void TorqueBalance::Flush(size_t place) {
+  if (used_[place] == 0) return;
+  products_[place].selfadjointView<Eigen::Lower>().rankUpdate(parts_[place].leftCols(used_[place]));
+  used_[place] = 0;
+}
+
+void TorqueBalance::Finish() {
+  for (size_t place = 0; place < joints_.size(); ++place) {
+    Flush(place);
+    products_[place].triangularView<Eigen::StrictlyUpper>() = products_[place].transpose();
+  }
+}
+
+void TorqueBalance::MergeBlocks() {
+  std::vector<Block> merged;
+  for (size_t i = 0; i < blocks_.size(); i += 2) {
+    Block& block = merged.emplace_back(std::move(blocks_[i]));
+    if (i + 1 == blocks_.size()) break;
+    const Block& next = blocks_[i + 1];
+    block.to = next.to;
+    block.forces += next.forces;
+    block.q += next.q;
+    block.samples += next.samples;
+    for (size_t place = 0; place < joints_.size(); ++place) {
+      block.sums[place] += next.sums[place];
+      block.counts[place] += next.counts[place];
+    }
+  }
+  blocks_ = std::move(merged);
+  block_samples_ *= 2.0;
+}
+
+MatrixXd TorqueBalance::CalcRows(size_t place) const {
+  MatrixXd within = products_[place];
+  MatrixXd of_blocks = MatrixXd::Zero(static_cast<Index>(blocks_.size()), within.cols());
+  for (size_t b = 0; b < blocks_.size(); ++b) {
+    if (!(blocks_[b].counts[place] > 0.0)) continue;
+    of_blocks.row(static_cast<Index>(b)) =
+        blocks_[b].sums[place].transpose() / std::sqrt(blocks_[b].counts[place]);
+  }
+  within -= of_blocks.transpose() * of_blocks;
+  // A factor of what may be singular, with columns of one size.
+  const VectorXd size =
+      products_[place].diagonal().cwiseSqrt().unaryExpr([](double s) { return s > 0.0 ? s : 1.0; });
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(size.cwiseInverse().asDiagonal() * within *
+                                                      size.cwiseInverse().asDiagonal());
+  MatrixXd rows(within.rows() + of_blocks.rows(), within.cols());
+  rows.topRows(within.rows()) = eigen.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal() *
+                                eigen.eigenvectors().transpose() * size.asDiagonal();
+  rows.bottomRows(of_blocks.rows()) = of_blocks;
+  return rows;
+}
+
+}  // namespace dexcheck

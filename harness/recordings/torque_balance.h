@@ -1,0 +1,109 @@
+#pragma once
+
+// Measured torques less the model's, along a recording, with what faults would leave in them.
+//
+// Each judged joint i has a row at each sample: y_i = tau_i - tau_model,i, and columns c_i. Kept are, in
+// constant memory, sum c c^T over all samples and sum c over each of a few hundred blocks of time; so
+// products of columns with one another, and with anything that is constant over blocks, are those of all
+// samples.
+
+#include <map>
+#include <vector>
+
+#include "controller/dynamics/torque_regressor.h"
+#include "harness/recordings/motion_fit.h"
+
+namespace dexcheck {
+
+/// A column of a joint's row.
+struct TorqueColumn {
+  enum Kind {
+    kBody,      ///< By a link's BodyVector: index is the link, component 0 to 9.
+    kTorque,    ///< The model's torque of joint index, with its friction.
+    kPosition,  ///< By the position of joint index.
+    kGravity,   ///< By component of gravity.
+    kRate,      ///< Of the measured torque.
+    kCurvature,
+    kCurrent,  ///< Measured.
+    kOffset,   ///< 1
+    kDry,      ///< Direction of motion.
+    kViscous,  ///< Velocity.
+    kAcceleration,
+    kSlow,    ///< Direction, where the velocity is below component + 1 tenths of its usual size.
+    kSmooth,  ///< tanh of the velocity over component tenths of its usual size.
+    kLoad,    ///< Direction times the size of the model's torque.
+  };
+  Kind kind;
+  int index = 0;
+  int component = 0;
+  auto operator<=>(const TorqueColumn&) const = default;
+};
+
+class TorqueBalance {
+ public:
+  /// @param joints that are judged. @param speeds usual size of each joint's velocity, at which kSlow ends.
+  TorqueBalance(const RobotModel& model, const std::vector<int>& joints, const VectorXd& speeds,
+                bool has_currents);
+
+  /// How much positions are thought to be off, rad or m, by joint: kPosition is the secant over it.
+  void SetPositionStep(int joint, double step) { steps_[joint] = step; }
+
+  /// @param is_judged by joint: not where friction holds it.
+  void Add(const RecordedSample& sample, const std::vector<bool>& is_judged);
+  /// y of the last sample, by place; 0 where it was not judged.
+  [[nodiscard]] const VectorXd& residual() const { return residual_; }
+  /// To be called once, after the last sample.
+  void Finish();
+
+  /// A stretch of time. Sums over its samples.
+  struct Block {
+    double from = 0.0, to = 0.0;  ///< s
+    std::vector<VectorXd> sums;   ///< By judged joint: its columns, y last.
+    std::vector<double> counts;   ///< Of its samples.
+    MatrixXd forces;              ///< Judged joints x 6 links: CalcForceColumns of each link.
+    VectorXd q;                   ///< All joints.
+    double samples = 0.0;
+  };
+
+  [[nodiscard]] const std::vector<int>& joints() const { return joints_; }
+  [[nodiscard]] const std::vector<Block>& blocks() const { return blocks_; }
+  /// Of a judged joint (by its place among these), its columns; y stands behind them.
+  [[nodiscard]] const std::vector<TorqueColumn>& columns(size_t place) const { return columns_[place]; }
+  /// -1 where its row has none.
+  [[nodiscard]] Eigen::Index Find(size_t place, const TorqueColumn& column) const;
+  /// sum c c^T, y last.
+  [[nodiscard]] const MatrixXd& products(size_t place) const { return products_[place]; }
+  [[nodiscard]] double samples(size_t place) const { return counts_[place]; }
+  /// Rows with the same products: a factor of those within blocks, then one of each block, sum / sqrt(count).
+  [[nodiscard]] MatrixXd CalcRows(size_t place) const;
+
+ private:
+  static constexpr Eigen::Index kPart = 128;  // rows that are multiplied at once
+  static constexpr size_t kMostBlocks = 512;
+
+  void ListColumns(bool has_currents);
+  /// The model's, at a joint.
+  [[nodiscard]] double CalcFriction(int joint, const RecordedSample& sample) const;
+  void FillRow(size_t place, const RecordedSample& sample, Eigen::Ref<VectorXd> row) const;
+  void Flush(size_t place);
+  void MergeBlocks();
+
+  const RobotModel* model_;
+  TorqueRegressor regressor_;
+  std::vector<int> joints_;
+  VectorXd speeds_;
+  bool has_currents_;
+  std::vector<std::vector<TorqueColumn>> columns_;
+  std::vector<std::map<TorqueColumn, Eigen::Index>> places_;
+  std::vector<MatrixXd> products_;
+  std::vector<MatrixXd> parts_;  // columns x kPart
+  std::vector<Eigen::Index> used_;
+  std::vector<double> counts_;
+  std::vector<Block> blocks_;
+  double block_samples_ = 1.0;
+  // at the sample
+  MatrixXd bodies_, gravity_, forces_, by_position_;
+  VectorXd torques_, moved_, q_, steps_, residual_;
+};
+
+}  // namespace dexcheck

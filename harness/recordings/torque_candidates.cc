@@ -1,0 +1,307 @@
+#include "harness/recordings/torque_candidates.h"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+
+namespace dexcheck {
+namespace {
+
+using BodyVector = TorqueRegressor::BodyVector;
+using Parts = std::vector<ColumnPart>;
+
+/// The columns of a link by a change of its BodyVector.
+Parts BodyParts(int link, const BodyVector& change, int recording = -1) {
+  Parts parts;
+  for (int k = 0; k < TorqueRegressor::kBody; ++k)
+    if (change[k] != 0.0) parts.push_back({{TorqueColumn::kBody, link, k}, -1, change[k], recording});
+  return parts;
+}
+
+/// d BodyVector / d com of a body.
+BodyVector CentreColumn(const MassProperties& body, int k) {
+  const Vector3d& c = body.com;
+  const Vector3d e = Vector3d::Unit(k);
+  const Matrix3d I =
+      body.mass * (2.0 * c.dot(e) * Matrix3d::Identity() - e * c.transpose() - c * e.transpose());
+  BodyVector change;
+  change << 0.0, body.mass * e, I(0, 0), I(1, 1), I(2, 2), I(0, 1), I(0, 2), I(1, 2);
+  return change;
+}
+
+class FaultList {
+ public:
+  FaultList(const RobotModel& model, const std::vector<int>& joints, int recordings)
+      : model_(model), joints_(joints), recordings_(recordings) {}
+
+  std::vector<TorqueFault> Make() {
+    for (const int joint : joints_) AddJoint(joint);
+    for (const int joint : joints_)
+      for (const int other : joints_)
+        if (joint < other) AddExchange(joint, other);
+    for (int link = 0; link < model_.num_joints(); ++link) AddLink(link);
+    AddAll();
+    return std::move(faults_);
+  }
+
+ private:
+  TorqueFault& Add(TorqueFault::Kind kind, int index, const std::string& fault, const std::string& place,
+                   const std::string& unit, std::vector<Parts> columns, double nominal = 0.0) {
+    TorqueFault& one = faults_.emplace_back();
+    one.kind = kind;
+    one.index = index;
+    one.fault = fault;
+    one.place = place;
+    one.unit = unit;
+    one.nominal = nominal;
+    one.columns = std::move(columns);
+    return one;
+  }
+  /// Of one joint's row alone; of which the sum with the nominal value is not negative.
+  TorqueFault& AddAtJoint(TorqueFault::Kind kind, int joint, const std::string& fault,
+                          const std::string& unit, TorqueColumn column, double nominal, bool is_positive) {
+    TorqueFault& one =
+        Add(kind, joint, fault, "joint " + model_.joint(joint).name, unit, {{{column, joint}}}, nominal);
+    if (is_positive) one.is_possible = [nominal](const VectorXd& a) { return nominal + a[0] >= 0.0; };
+    return one;
+  }
+
+  void AddJoint(int joint) {
+    const Joint& modelled = model_.joint(joint);
+    const bool turns = modelled.type == JointType::kRevolute;
+    const std::string torque = turns ? "N m" : "N";
+    const std::string rate = turns ? "N m s/rad" : "N s/m";
+    using enum TorqueFault::Kind;
+    AddAtJoint(kDryFriction, joint, "dry friction", torque, {TorqueColumn::kDry, joint},
+               modelled.dry_friction, true);
+    AddAtJoint(kViscousFriction, joint, "viscous friction", rate, {TorqueColumn::kViscous, joint},
+               modelled.damping, true);
+    for (const int tenths : {1, 3, 10})
+      AddAtJoint(kDryFriction, joint, "dry friction", torque, {TorqueColumn::kSmooth, joint, tenths},
+                 modelled.dry_friction, true)
+          .parameters = 1;
+    for (const int tenths : {0, 2})
+      AddAtJoint(kSlowFriction, joint, "friction at low speed", torque, {TorqueColumn::kSlow, joint, tenths},
+                 0.0, false)
+          .parameters = 1;
+    AddAtJoint(kLoadFriction, joint, "friction that grows with the load", "", {TorqueColumn::kLoad, joint},
+               0.0, true);
+    AddAtJoint(kOffset, joint, "torque offset", torque, {TorqueColumn::kOffset, joint}, 0.0, false);
+    AddAtJoint(kArmature, joint, "armature", turns ? "kg m^2" : "kg", {TorqueColumn::kAcceleration, joint},
+               modelled.armature, true);
+    AddAtJoint(kTorqueGain, joint, "torque gain", "", {TorqueColumn::kTorque, joint}, 1.0, false)
+        .is_possible = IsGain;
+    // tau(t + d) = tau(t) + d tau'(t) + d^2/2 tau''(t)
+    TorqueFault& delay =
+        AddAtJoint(kDelay, joint, "delay of the torque", "s", {TorqueColumn::kRate, joint}, 0.0, false);
+    delay.columns[0][0].factor = -1.0;
+    delay.columns.push_back({{{TorqueColumn::kCurvature, joint}, joint, -1.0}});
+    delay.scale = DelayScale();
+    Add(kZero, joint, "position offset", "joint " + modelled.name, turns ? "rad" : "m",
+        {{{{TorqueColumn::kPosition, joint}, -1, -1.0}}});
+  }
+
+  void AddExchange(int joint, int other) {
+    const Parts parts = {{{TorqueColumn::kTorque, other}, joint, 1.0},
+                         {{TorqueColumn::kTorque, joint}, joint, -1.0},
+                         {{TorqueColumn::kTorque, joint}, other, 1.0},
+                         {{TorqueColumn::kTorque, other}, other, -1.0}};
+    TorqueFault& one =
+        Add(TorqueFault::kExchange, joint, "torque exchanged with that of " + model_.joint(other).name,
+            "joint " + model_.joint(joint).name, "", {parts});
+    one.other = other;
+    constexpr double kWhole = 0.2;
+    one.is_possible = [](const VectorXd& a) { return std::abs(a[0] - 1.0) < kWhole; };
+  }
+
+  void AddLink(int link) {
+    const MassProperties& body = model_.joint(link).body;
+    const BodyVector vector = TorqueRegressor::Pack(body);
+    const std::string place = "link " + model_.link_name(link);
+    const bool is_real = IsBody(vector);
+    const auto can_be = [vector, is_real](const std::vector<BodyVector>& changes) {
+      return [vector, is_real, changes](const VectorXd& a) {
+        BodyVector changed = vector;
+        for (size_t k = 0; k < changes.size(); ++k) changed += a[static_cast<Eigen::Index>(k)] * changes[k];
+        return !is_real || IsBody(changed);
+      };
+    };
+    using enum TorqueFault::Kind;
+    if (body.mass > 0.0) {
+      TorqueFault& mass =
+          Add(kMass, link, "mass", place, "kg", {BodyParts(link, vector / body.mass)}, body.mass);
+      constexpr double kMostTimes = 10.0;
+      mass.is_possible = [m = body.mass](const VectorXd& a) {
+        return m + a[0] > 0.0 && m + a[0] < kMostTimes * m;
+      };
+      std::vector<BodyVector> changes;
+      std::vector<Parts> columns;
+      for (int k = 0; k < 3; ++k)
+        columns.push_back(BodyParts(link, changes.emplace_back(CentreColumn(body, k))));
+      TorqueFault& centre = Add(kCentre, link, "centre of mass", place, "m", columns);
+      constexpr double kLength = 0.05;
+      centre.scale = VectorXd::Constant(3, kLength);
+      centre.is_ordinary = true;
+      TorqueFault& inertia = Add(kInertia, link, "inertia", place, "kg m^2", {});
+      changes.clear();
+      for (int k = 4; k < TorqueRegressor::kBody; ++k) {
+        changes.emplace_back(BodyVector::Unit(k));
+        inertia.columns.push_back(BodyParts(link, changes.back()));
+      }
+      inertia.scale = VectorXd::Constant(6, body.mass * kLength * kLength);
+      inertia.is_possible = can_be(changes);
+    }
+    AddPayload(link);
+  }
+
+  /// What the model does not have at a link that carries no other one.
+  void AddPayload(int link) {
+    for (int joint = 0; joint < model_.num_joints(); ++joint)
+      if (model_.joint(joint).parent == link) return;
+    constexpr double kMass = 5.0, kMoment = 0.5;
+    const auto is_near = [](const VectorXd& a) {
+      constexpr double kFarthest = 0.5;  // m
+      return a[0] > 0.0 && a.segment<3>(1).norm() < kFarthest * a[0];
+    };
+    const int first = recordings_ > 1 ? 0 : -1;
+    for (int recording = first; recording < first + recordings_; ++recording) {
+      // A point, and a body with an inertia of its own.
+      for (const int width : {4, TorqueRegressor::kBody}) {
+        TorqueFault& one =
+            Add(TorqueFault::kPayload, link, "payload", "link " + model_.link_name(link), "kg", {});
+        one.recording = recording;
+        for (int k = 0; k < width; ++k)
+          one.columns.push_back(BodyParts(link, BodyVector::Unit(k), recording));
+        one.scale = VectorXd::Constant(width, kMoment);
+        one.scale[0] = kMass;
+        one.is_possible = is_near;
+        one.is_ordinary = width == 4;
+      }
+    }
+  }
+
+  void AddAll() {
+    using enum TorqueFault::Kind;
+    Parts delay, curvature, gain;
+    for (const int joint : joints_) {
+      delay.push_back({{TorqueColumn::kRate, joint}, joint, -1.0});
+      curvature.push_back({{TorqueColumn::kCurvature, joint}, joint, -1.0});
+      gain.push_back({{TorqueColumn::kTorque, joint}, joint, 1.0});
+    }
+    if (joints_.size() > 1) {
+      AddInAll(kAllDry, "dry friction", {TorqueColumn::kDry});
+      AddInAll(kAllFriction, "dry and viscous friction", {TorqueColumn::kDry, TorqueColumn::kViscous});
+      AddInAll(kAllOffsets, "torque offset", {TorqueColumn::kOffset}).is_possible = nullptr;
+      Add(kDelay, -1, "delay of the torques", "all joints", "s", {delay, curvature}).scale = DelayScale();
+      Add(kTorqueGain, -1, "torque gain", "all joints", "", {gain}, 1.0).is_possible = IsGain;
+    }
+    TorqueFault& gravity = Add(kGravity, -1, "gravity", "world", "m/s^2", {});
+    for (int k = 0; k < 3; ++k) gravity.columns.push_back({{{TorqueColumn::kGravity, 0, k}, -1, 1.0}});
+    const double g = std::max(model_.gravity().norm(), 1.0);
+    gravity.scale = VectorXd::Constant(3, g);
+    gravity.is_ordinary = true;
+  }
+
+  /// A torque that has nothing to do with the model's is no gain.
+  static bool IsGain(const VectorXd& a) {
+    constexpr double kLeast = 0.05;
+    return std::abs(1.0 + a[0]) > kLeast;
+  }
+  /// Of a delay and half its square.
+  static VectorXd DelayScale() {
+    constexpr double kDelay = 0.05;  // s
+    return Vector2d(kDelay, 0.5 * kDelay * kDelay);
+  }
+
+  /// In every joint.
+  TorqueFault& AddInAll(TorqueFault::Kind kind, const std::string& name,
+                        const std::vector<TorqueColumn::Kind>& columns) {
+    TorqueFault& one = Add(kind, -1, name, "all joints", "N m", {});
+    for (const TorqueColumn::Kind column : columns)
+      for (const int joint : joints_) one.columns.push_back({{{column, joint}, joint}});
+    one.is_possible = [](const VectorXd& a) { return (a.array() >= 0.0).all(); };
+    return one;
+  }
+
+  const RobotModel& model_;
+  const std::vector<int>& joints_;
+  int recordings_;
+  std::vector<TorqueFault> faults_;
+};
+
+}  // namespace
+
+bool IsBody(const BodyVector& body) {
+  // Of second moments: half the trace of I less I.
+  Matrix3d I;
+  // clang-format off
+  I << body[4], body[7], body[8],
+       body[7], body[5], body[9],
+       body[8], body[9], body[6];
+  // clang-format on
+  Eigen::Matrix4d pseudo;
+  pseudo.topLeftCorner<3, 3>() = 0.5 * I.trace() * Matrix3d::Identity() - I;
+  pseudo.topRightCorner<3, 1>() = body.segment<3>(1);
+  pseudo.bottomLeftCorner<1, 3>() = body.segment<3>(1).transpose();
+  pseudo(3, 3) = body[0];
+  const Eigen::Vector4d eigenvalues = pseudo.selfadjointView<Eigen::Lower>().eigenvalues();
+  constexpr double kRounding = 1e-9;
+  return body[0] > 0.0 && eigenvalues.minCoeff() >= -kRounding * pseudo.trace();
+}
+
+std::vector<TorqueFault> ListTorqueFaults(const RobotModel& model, const std::vector<int>& joints,
+                                          int recordings) {
+  return FaultList(model, joints, recordings).Make();
+}
+
+void ShiftCentre(const RobotModel& model, const Vector3d& shift, TorqueFault* centre) {
+  MassProperties body = model.joint(centre->index).body;
+  body.com += 0.5 * shift;
+  for (int k = 0; k < 3; ++k)
+    centre->columns[static_cast<size_t>(k)] = BodyParts(centre->index, CentreColumn(body, k));
+}
+
+void PlacePayload(double mass, const Vector3d& h, TorqueFault* payload) {
+  if (payload->columns.size() != 4 || !(mass > 0.0)) return;
+  // I(m, h) = (h^2 1 - h h^T) / m has degree one, so that its derivatives times m and h are I itself.
+  const auto column = [&](int k) {
+    const Vector3d e = k > 0 ? Vector3d(Vector3d::Unit(k - 1)) : Vector3d(Vector3d::Zero());
+    const Matrix3d I =
+        k == 0 ? Matrix3d(-CalcPointInertia(1.0 / (mass * mass), h))
+               : Matrix3d((2.0 * h.dot(e) * Matrix3d::Identity() - e * h.transpose() - h * e.transpose()) /
+                          mass);
+    BodyVector change;
+    change << (k == 0 ? 1.0 : 0.0), e, I(0, 0), I(1, 1), I(2, 2), I(0, 1), I(0, 2), I(1, 2);
+    return change;
+  };
+  for (int k = 0; k < 4; ++k)
+    payload->columns[static_cast<size_t>(k)] = BodyParts(payload->index, column(k), payload->recording);
+}
+
+std::vector<TorqueFault> ListPushes(const RobotModel& model, const std::vector<int>& joints,
+                                    const Push& when) {
+  std::vector<TorqueFault> faults;
+  const auto add = [&](const std::string& fault, const std::string& place,
+                       const std::string& unit) -> TorqueFault& {
+    TorqueFault& one = faults.emplace_back();
+    one.kind = TorqueFault::kPush;
+    one.fault = fault;
+    one.place = place;
+    one.unit = unit;
+    one.push = when;
+    one.recording = when.recording;
+    one.parameters = 2;  // when it begins and ends
+    constexpr double kForce = 100.0;
+    one.scale = VectorXd::Constant(unit == "N" && place.starts_with("link") ? 3 : 1, kForce);
+    return one;
+  };
+  for (int link = 0; link < model.num_joints(); ++link)
+    add("force", "link " + model.link_name(link), "N").push.link = link;
+  for (const int joint : joints)
+    add("torque", "joint " + model.joint(joint).name,
+        model.joint(joint).type == JointType::kRevolute ? "N m" : "N")
+        .push.joint = joint;
+  return faults;
+}
+
+}  // namespace dexcheck

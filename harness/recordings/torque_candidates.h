@@ -1,0 +1,86 @@
+#pragma once
+
+// What may be wrong with a model of a recorded robot, and the columns that it leaves.
+
+#include <string>
+#include <vector>
+
+#include "harness/diagnosis/cause_estimator.h"
+#include "harness/recordings/torque_balance.h"
+
+namespace dexcheck {
+
+/// One of a fault's columns: the sum of these columns of torque balances, times a factor.
+struct ColumnPart {
+  TorqueColumn column;
+  int joint = -1;  ///< In whose row; -1 for all that have it.
+  double factor = 1.0;
+  int recording = -1;  ///< -1 for all.
+};
+
+/// A force on a link (three columns, world axes, at its centre of mass) or a torque at a joint, for a time.
+struct Push {
+  int recording = 0;
+  double from = 0.0, to = 0.0;  ///< s
+  int link = -1;
+  int joint = -1;
+};
+
+/// A fault of the model at a place.
+struct TorqueFault {
+  enum Kind {
+    kDryFriction,
+    kAllDry,
+    kAllFriction,
+    kAllOffsets,
+    kViscousFriction,
+    kSlowFriction,
+    kLoadFriction,
+    kOffset,
+    kArmature,
+    kTorqueGain,
+    kExchange,
+    kDelay,
+    kZero,
+    kMass,
+    kCentre,
+    kInertia,
+    kPayload,
+    kGravity,
+    kPush,
+  };
+  Kind kind;
+  int index = -1;  ///< Joint or link; -1 for all.
+  int other = -1;  ///< That is exchanged with it.
+  int recording = -1;
+  std::string fault, place, unit;
+  double nominal = 0.0;
+  std::vector<std::vector<ColumnPart>> columns;  ///< None of a push.
+  VectorXd scale;                                ///< As Candidate's.
+  int parameters = 0;
+  std::function<bool(const VectorXd&)> is_possible;
+  bool is_ordinary = false;  ///< As Candidate's.
+  Push push = {};
+};
+
+/// All that are tried of a model's recordings.
+/// @param joints that are judged. @param recordings their number.
+std::vector<TorqueFault> ListTorqueFaults(const RobotModel& model, const std::vector<int>& joints,
+                                          int recordings);
+
+/// Gives a payload's columns, of its mass (kg) and mass times place (kg m), the inertia of a point near such
+/// a one; a payload of ten columns stays as it is.
+void PlacePayload(double mass, const Vector3d& moment, TorqueFault* payload);
+
+/// Gives a centre of mass the columns with which a shift (m) of this size leaves what it leaves: its inertia
+/// about the link's origin grows with the square.
+void ShiftCentre(const RobotModel& model, const Vector3d& shift, TorqueFault* centre);
+
+/// Pushes during one stretch of time.
+std::vector<TorqueFault> ListPushes(const RobotModel& model, const std::vector<int>& joints,
+                                    const Push& when);
+
+/// Whether there is a body of such mass, centre and inertia: its pseudo-inertia is positive.
+bool IsBody(const TorqueRegressor::BodyVector& body);
+
+}  // namespace dexcheck

@@ -1,0 +1,311 @@
+#include "harness/recordings/torque_estimator.h"
+
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "controller/common/errors.h"
+
+namespace dexcheck {
+namespace {
+
+using Eigen::Index;
+
+double Squared(double x) { return x * x; }
+
+/// To where half of the push is there: smoothing spreads its begin and end.
+void TrimWindow(const VectorXd& squares, Index* first, Index* last) {
+  std::vector<double> within(squares.begin() + *first, squares.begin() + *last + 1);
+  std::nth_element(within.begin(), within.begin() + static_cast<std::ptrdiff_t>(within.size() / 2),
+                   within.end());
+  const double half = 0.25 * within[within.size() / 2];
+  while (*first < *last && squares[*first] < half) ++*first;
+  while (*last > *first && squares[*last] < half) --*last;
+}
+
+/// The few stretches that stand out most.
+std::vector<std::pair<size_t, size_t>> FindWindows(const VectorXd& squares) {
+  constexpr size_t kMost = 3;
+  constexpr double kStandsOut = 12.0, kStays = 4.0;
+  std::vector<double> sorted(squares.begin(), squares.end());
+  if (sorted.size() < 16) return {};
+  std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2),
+                   sorted.end());
+  const double usual = std::max(sorted[sorted.size() / 2], std::numeric_limits<double>::min());
+  VectorXd rest = squares;
+  std::vector<std::pair<size_t, size_t>> windows;
+  while (windows.size() < kMost) {
+    Index peak = 0;
+    if (!(rest.maxCoeff(&peak) > kStandsOut * usual)) break;
+    Index first = peak, last = peak;
+    // A block in between may be small by chance.
+    const auto stays = [&](Index at) { return at >= 0 && at < rest.size() && rest[at] > kStays * usual; };
+    while (stays(first - 1) || stays(first - 2)) --first;
+    while (stays(last + 1) || stays(last + 2)) ++last;
+    TrimWindow(rest, &first, &last);
+    rest.segment(first, last - first + 1).setZero();
+    // What stands out half of the time is no push.
+    if (last - first > squares.size() / 2) break;
+    windows.emplace_back(first, last);
+  }
+  return windows;
+}
+
+}  // namespace
+
+TorqueEstimator::TorqueEstimator(RecordingSet* recordings, size_t most_causes)
+    : recordings_(recordings), most_causes_(most_causes) {
+  do {
+    ListFaults();
+    selection_ = Select();
+  } while (recordings_->DropUnknownGains());
+  if (AddPushes()) {
+    barred_.resize(faults_.size(), false);
+    selection_ = Select();
+  }
+  while (BarSecondPushes() || BarWeakBodies()) selection_ = Select();
+}
+
+void TorqueEstimator::ListFaults() {
+  const std::vector<int> judged = recordings_->ListJudged();
+  if (judged.empty()) throw InputError("the recordings tell no joint's drive gain: nothing can be judged");
+  faults_ = ListTorqueFaults(recordings_->model(), judged, static_cast<int>(recordings_->size()));
+  if (recordings_->has_currents())
+    std::erase_if(faults_, [](const TorqueFault& one) { return one.kind == TorqueFault::kTorqueGain; });
+  barred_.assign(faults_.size(), false);
+}
+
+CauseSelection TorqueEstimator::Select() {
+  CauseSelection selection;
+  double alike = 0.0;
+  recordings_->ResetWeights();
+  constexpr int kRounds = 6;
+  constexpr double kLeastGain = 0.9;  // of what was estimated before, taken away at once
+  for (int round = 0; round < kRounds; ++round) {
+    rows_ = MakeTorqueRows(*recordings_, faults_, /*is_held=*/false);
+    Compress();
+    const double now = CalcAlike(round == 0 ? CalcUsual() : CalcLeft(selection.terms));
+    const bool is_settled = round > 1 && std::abs(now - alike) < 0.2 * alike;
+    alike = now;
+    selection = SelectAmong(alike);
+    if (is_settled) break;
+    if (round + 1 == kRounds) break;
+    Relinearise(selection);
+    Weigh(CalcLeft(selection.terms));
+    if (recordings_->has_currents()) {
+      const VectorXd off = CalcAmplitudes(selection.terms).head(CountForced(*recordings_));
+      recordings_->DivideGains(VectorXd(1.0 + off.array().max(-kLeastGain)));
+    }
+  }
+  return selection;
+}
+
+void TorqueEstimator::Relinearise(const CauseSelection& selection) {
+  for (const CauseTerm& term : selection.terms) {
+    TorqueFault& found = faults_[term.candidate];
+    if (found.kind == TorqueFault::kCentre) ShiftCentre(recordings_->model(), term.amplitude, &found);
+    for (TorqueFault& one : faults_) {
+      // A payload's inertia is that of a point: it grows with the square of the distance.
+      if (found.kind == TorqueFault::kPayload && one.kind == TorqueFault::kPayload &&
+          one.index == found.index && one.recording == found.recording)
+        PlacePayload(term.amplitude[0], term.amplitude.segment<3>(1), &one);
+    }
+  }
+  for (TorqueFault& one : faults_)
+    if (one.kind == TorqueFault::kTorqueGain && one.index >= 0) ScaleWhole(selection, &one);
+}
+
+void TorqueEstimator::ScaleWhole(const CauseSelection& selection, TorqueFault* gain) const {
+  std::vector<ColumnPart>& parts = gain->columns.front();
+  parts.resize(1);
+  for (const CauseTerm& term : selection.terms) {
+    const TorqueFault& found = faults_[term.candidate];
+    const bool is_recorded = found.kind == TorqueFault::kTorqueGain || found.kind == TorqueFault::kExchange ||
+                             found.kind == TorqueFault::kOffset || found.kind == TorqueFault::kAllOffsets ||
+                             found.kind == TorqueFault::kDelay || found.kind == TorqueFault::kPush;
+    if (is_recorded) continue;
+    for (size_t k = 0; k < found.columns.size(); ++k)
+      for (ColumnPart part : found.columns[k]) {
+        if (part.joint >= 0 && part.joint != gain->index) continue;
+        part.joint = gain->index;
+        part.factor *= term.amplitude[static_cast<Index>(k)];
+        parts.push_back(part);
+      }
+  }
+}
+
+void TorqueEstimator::Weigh(const VectorXd& left) {
+  for (const TorqueRows::Part& part : rows_.parts) {
+    double& weight = recordings_->weight(part.recording, part.place);
+    const double rms =
+        weight * left.segment(part.begin, part.size).norm() / std::sqrt(std::max(1.0, part.samples));
+    weight = std::max((*recordings_)[part.recording].noise[static_cast<Index>(part.place)], rms);
+  }
+}
+
+void TorqueEstimator::Compress() {
+  const Index width = rows_.rows.cols();
+  if (rows_.rows.rows() < width) {
+    const Index missing = width - rows_.rows.rows();
+    rows_.rows.conservativeResize(width, Eigen::NoChange);
+    rows_.rows.bottomRows(missing).setZero();
+  }
+  const Eigen::HouseholderQR<MatrixXd> qr(rows_.rows);
+  R_ = qr.matrixQR().topRows(width).triangularView<Eigen::Upper>();
+}
+
+CauseSelection TorqueEstimator::SelectAmong(double alike) const {
+  const Index width = R_.cols();
+  const Index forced = CountForced(*recordings_);
+  std::vector<Candidate> candidates;
+  Index at = forced;
+  for (const TorqueFault& fault : faults_) {
+    Candidate& one = candidates.emplace_back();
+    one.fault = fault.fault;
+    one.place = fault.place;
+    one.unit = fault.unit;
+    one.nominal = fault.nominal;
+    one.columns = R_.block(forced, at, width - forced, CountColumns(fault));
+    if (barred_[candidates.size() - 1]) one.columns.setZero();
+    one.scale = fault.scale;
+    one.is_possible = fault.is_possible;
+    one.parameters = fault.parameters;
+    one.is_ordinary = fault.is_ordinary;
+    at += CountColumns(fault);
+  }
+  CauseOptions options;
+  options.most_terms = most_causes_;
+  options.restarts = 0;
+  options.rows = rows_.samples;
+  options.alike = alike;
+  return SelectCauses(R_.col(width - 1).tail(width - forced), candidates, options);
+}
+
+std::vector<Index> TorqueEstimator::ListFirstColumns() const {
+  std::vector<Index> first;
+  Index at = CountForced(*recordings_);
+  for (const TorqueFault& fault : faults_) {
+    first.push_back(at);
+    at += CountColumns(fault);
+  }
+  return first;
+}
+
+VectorXd TorqueEstimator::CalcAmplitudes(const std::vector<CauseTerm>& terms) const {
+  const Index width = R_.cols() - 1;
+  VectorXd a = VectorXd::Zero(width);
+  const std::vector<Index> first = ListFirstColumns();
+  for (const CauseTerm& term : terms)
+    a.segment(first[term.candidate], term.amplitude.size()) = term.amplitude;
+  const Index forced = CountForced(*recordings_);
+  const VectorXd right =
+      R_.col(width).head(forced) - R_.block(0, forced, forced, width - forced) * a.tail(width - forced);
+  if (forced > 0)
+    a.head(forced) = R_.topLeftCorner(forced, forced).completeOrthogonalDecomposition().solve(right);
+  return a;
+}
+
+VectorXd TorqueEstimator::CalcLeft(const std::vector<CauseTerm>& terms) const {
+  const Index width = rows_.rows.cols() - 1;
+  return rows_.rows.col(width) - rows_.rows.leftCols(width) * CalcAmplitudes(terms);
+}
+
+bool TorqueEstimator::BarSecondPushes() {
+  bool has_any = false;
+  std::vector<std::pair<int, double>> seen;
+  for (const CauseTerm& term : selection_.terms) {
+    const TorqueFault& one = faults_[term.candidate];
+    if (one.kind != TorqueFault::kPush) continue;
+    const std::pair<int, double> when(one.push.recording, one.push.from);
+    if (std::find(seen.begin(), seen.end(), when) == seen.end()) {
+      seen.push_back(when);
+    } else {
+      barred_[term.candidate] = has_any = true;
+    }
+  }
+  return has_any;
+}
+
+bool TorqueEstimator::BarWeakBodies() {
+  const VectorXd left = CalcLeft(selection_.terms);
+  double squares = 0.0;
+  for (const TorqueRows::Part& part : rows_.parts) {
+    const ReadRecording& one = (*recordings_)[part.recording];
+    const auto place = static_cast<Index>(part.place);
+    squares +=
+        left.segment(part.begin, part.size).squaredNorm() * Squared(one.weight[place] / one.noise[place]);
+  }
+  if (squares <= Squared(kMostNoise) * rows_.samples) return false;
+  constexpr double kMuch = 0.05;
+  bool has_any = false;
+  for (const CauseTerm& term : selection_.terms) {
+    const TorqueFault::Kind kind = faults_[term.candidate].kind;
+    const bool is_body = kind == TorqueFault::kMass || kind == TorqueFault::kCentre ||
+                         kind == TorqueFault::kInertia || kind == TorqueFault::kPayload ||
+                         kind == TorqueFault::kGravity || kind == TorqueFault::kZero;
+    if (!is_body || term.fraction - (1.0 - selection_.fraction) >= kMuch) continue;
+    barred_[term.candidate] = true;
+    has_any = true;
+  }
+  return has_any;
+}
+
+VectorXd TorqueEstimator::CalcUsual() const {
+  const std::vector<Index> first = ListFirstColumns();
+  std::vector<Index> columns;
+  for (Index i = 0; i < CountForced(*recordings_); ++i) columns.push_back(i);
+  for (size_t i = 0; i < faults_.size(); ++i) {
+    const TorqueFault::Kind kind = faults_[i].kind;
+    const bool is_usual = kind == TorqueFault::kDryFriction || kind == TorqueFault::kViscousFriction ||
+                          kind == TorqueFault::kOffset;
+    if (is_usual) columns.push_back(first[i]);
+  }
+  const Index y = rows_.rows.cols() - 1;
+  constexpr double kIndependent = 1e-6;
+  Eigen::ColPivHouseholderQR<MatrixXd> qr;
+  qr.setThreshold(kIndependent);
+  qr.compute(MatrixXd(R_(Eigen::all, columns)));
+  return rows_.rows.col(y) - rows_.rows(Eigen::all, columns) * qr.solve(R_.col(y));
+}
+
+double TorqueEstimator::CalcAlike(const VectorXd& left) const {
+  double blocks = 0.0, of_blocks = 0.0, next = 0.0;
+  for (const TorqueRows::Part& part : rows_.parts) {
+    const auto values = left.segment(part.begin + part.within, part.size - part.within);
+    blocks += static_cast<double>(values.size());
+    of_blocks += values.squaredNorm();
+    next += values.head(std::max<Index>(values.size() - 1, 0))
+                .dot(values.tail(std::max<Index>(values.size() - 1, 0)));
+  }
+  const double all = left.squaredNorm() / std::max(1.0, rows_.samples);
+  if (!(all > 0.0) || !(blocks > 0.0)) return 1.0;
+  const double within = std::max(1.0, of_blocks / blocks / all);
+  constexpr double kMostAlike = 0.98;
+  const double correlation =
+      std::clamp(next / std::max(of_blocks, std::numeric_limits<double>::min()), 0.0, kMostAlike);
+  constexpr double kFewest = 100.0;
+  return std::clamp(within * (1.0 + correlation) / (1.0 - correlation), 1.0,
+                    std::max(1.0, rows_.samples / kFewest));
+}
+
+bool TorqueEstimator::AddPushes() {
+  const VectorXd left = CalcLeft(selection_.terms);
+  bool has_any = false;
+  for (size_t r = 0; r < recordings_->size(); ++r) {
+    const std::vector<TorqueBalance::Block>& blocks = (*recordings_)[r].fit->blocks();
+    VectorXd squares = VectorXd::Zero(static_cast<Index>(blocks.size()));
+    for (const TorqueRows::Part& part : rows_.parts)
+      if (part.recording == r)
+        squares += left.segment(part.begin + part.within, part.size - part.within).cwiseAbs2();
+    for (const auto& [first, last] : FindWindows(squares)) {
+      const Push when = {static_cast<int>(r), blocks[first].from, blocks[last].to};
+      for (TorqueFault& one : ListPushes(recordings_->model(), recordings_->joints(), when))
+        faults_.push_back(std::move(one));
+      has_any = true;
+    }
+  }
+  return has_any;
+}
+
+}  // namespace dexcheck

@@ -1,0 +1,34 @@
+#pragma once
+
+// The rows of a regression: balances of all recordings and joints in units of noise, and what each fault
+// leaves in them.
+
+#include <vector>
+
+#include "harness/recordings/read_recordings.h"
+#include "harness/recordings/torque_candidates.h"
+
+namespace dexcheck {
+
+struct TorqueRows {
+  /// Those of a joint in a recording.
+  struct Part {
+    size_t recording, place;
+    Eigen::Index begin, within,
+        size;        ///< The first; how many are those within blocks, before the blocks'; all.
+    double samples;  ///< That they stand for.
+  };
+  std::vector<Part> parts;
+  MatrixXd rows;  ///< Columns that are part of every explanation, then the faults', y last.
+  double samples = 0.0;
+};
+
+/// @param is_held the quarter that is kept for the end.
+TorqueRows MakeTorqueRows(const RecordingSet& recordings, const std::vector<TorqueFault>& faults,
+                          bool is_held);
+
+/// Columns of the errors of drives' gains, one for each joint where currents were recorded.
+Eigen::Index CountForced(const RecordingSet& recordings);
+Eigen::Index CountColumns(const TorqueFault& fault);
+
+}  // namespace dexcheck

@@ -1,0 +1,27 @@
+#pragma once
+
+// A copy of a model's file in which what a recording says of the robot is put right.
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "harness/descriptions/robot_description.h"
+#include "harness/recordings/judge_recordings.h"
+
+namespace dexcheck {
+
+struct CorrectedFile {
+  std::string text;
+  std::vector<std::string> written;  ///< "joint elbow: dry friction 0.3".
+  std::vector<std::string>
+      left;  ///< Causes that are none of the model's, or that the format has no place for.
+};
+
+/// Friction, armature, bodies and gravity, as found, in the file's own numbers; comments stay.
+/// @param robot what the file says. @param text of the file.
+/// @throws InputError "FILE: ..." where a number stands in no place of its own, as in a template.
+CorrectedFile WriteCorrections(const RobotDescription& robot, const std::string& text,
+                               const RecordingJudgement& judgement);
+
+}  // namespace dexcheck

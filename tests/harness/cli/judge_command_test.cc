@@ -1,0 +1,118 @@
+// judge and compare of recordings as a user types them: exit codes, JSON, one line for what is wrong.
+
+#include <cmath>
+#include <fstream>
+#include <sstream>
+
+#include "tests/harness/cli/dexcheck_program.h"
+
+namespace dexcheck::testing::judge_command_test {
+namespace {
+
+using ::testing::HasSubstr;
+
+class JudgeCommand : public CommandTest {
+ protected:
+  JudgeCommand() {
+    Expect(0, Words{"run", "panda-reach", "--no-report", "--quiet", "--set", "duration=3", "--out", "run"});
+    Expect(0, Words{"export", "run", "--csv", "right.csv", "--signals", "time,q,xi,tau"});
+    WriteFaulty();
+  }
+
+  /// Dry friction of 0.5 N m in joint 4.
+  void WriteFaulty() const {
+    std::istringstream lines(Read("right.csv"));
+    std::ostringstream faulty;
+    std::string line;
+    std::getline(lines, line);
+    const Words names = Split(line);
+    faulty << line << "\n";
+    const auto find = [&](const std::string& name) {
+      return static_cast<size_t>(std::find(names.begin(), names.end(), name) - names.begin());
+    };
+    const size_t rate = find("xi.panda_joint4 [rad/s]"), torque = find("tau.panda_joint4 [N m]");
+    while (std::getline(lines, line)) {
+      Words cells = Split(line);
+      const double direction = std::copysign(1.0, std::stod(cells.at(rate)));
+      std::ostringstream changed;
+      changed.precision(17);
+      changed << std::stod(cells.at(torque)) + 0.5 * direction;
+      cells[torque] = changed.str();
+      for (size_t i = 0; i < cells.size(); ++i) faulty << (i == 0 ? "" : ",") << cells[i];
+      faulty << "\n";
+    }
+    Write("faulty.csv", faulty.str());
+  }
+  static Words Split(const std::string& line) {
+    Words cells({});
+    std::istringstream stream(line);
+    for (std::string cell; std::getline(stream, cell, ',');) cells.push_back(cell);
+    return cells;
+  }
+  [[nodiscard]] static Words With(const std::string& command, const std::string& rest) {
+    return Words{command, SourcePath("/controller/parameters/panda.toml")} + Words(rest);
+  }
+};
+
+TEST_F(JudgeCommand, ExplainsWhatTheModelDoes) {
+  for (const char* recording : {"right.csv", "run", "run/log.h5"}) {
+    const Json json = Json::parse(Expect(0, With("judge", std::string(recording) + " --json")).out);
+    EXPECT_EQ(json["verdict"], "explained");
+    EXPECT_TRUE(json["causes"].empty());
+    EXPECT_EQ(json["joints"].size(), 7U);
+  }
+}
+
+TEST_F(JudgeCommand, NamesWhatIsMissingAndWritesIt) {
+  const Json json = Json::parse(Expect(1, With("judge", "faulty.csv --json --write right.toml")).out);
+  ASSERT_EQ(json["causes"].size(), 1U);
+  const Json& fault = json["causes"][0]["faults"][0];
+  EXPECT_EQ(fault["fault"], "dry friction");
+  EXPECT_EQ(fault["place"], "joint panda_joint4");
+  EXPECT_NEAR(fault["value"], 0.5, 0.01);
+  Expect(0, "judge right.toml faulty.csv --quiet");
+  EXPECT_THAT(Read("right.toml"), HasSubstr("# The Franka Emika Panda arm")) << "comments stay";
+}
+
+TEST_F(JudgeCommand, ReadsStandardInputAsItComes) {
+  const std::string model = SourcePath("/controller/parameters/panda.toml");
+  const ProgramResult result =
+      RunProgram({"sh", "-c", "'" + ProgramPath() + "' judge '" + model + "' - < faulty.csv"},
+                 {.folder = folder_.path()});
+  EXPECT_EQ(result.exit_code, 1) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("what the model does not explain, rms by second"));
+  EXPECT_THAT(result.out, HasSubstr("joint panda_joint4: dry friction 0.5"));
+}
+
+TEST_F(JudgeCommand, DescribesColumnsAsAFileThatReadsThem) {
+  Write("columns.toml", Expect(0, With("judge", "right.csv --describe")).out);
+  Expect(0, With("judge", "right.csv --columns columns.toml --quiet"));
+  EXPECT_THAT(Expect(0, "judge right.csv --describe").out, HasSubstr("# CSV: 22 columns"));
+}
+
+TEST_F(JudgeCommand, ComparesTwoRecordings) {
+  const Words model = {"--model", SourcePath("/controller/parameters/panda.toml")};
+  Expect(0, Words("compare right.csv right.csv") + model);
+  const Json json = Json::parse(Expect(1, Words("compare right.csv faulty.csv --json") + model).out);
+  EXPECT_TRUE(json["same_motion"]);
+  ASSERT_EQ(json["causes"].size(), 1U);
+  EXPECT_EQ(json["causes"][0]["second"]["place"], "joint panda_joint4");
+}
+
+TEST_F(JudgeCommand, RefusesWhatItCannotUnderstand) {
+  const auto refused = [&](const std::string& text, const std::vector<std::string>& parts) {
+    Write("bad.csv", text);
+    EXPECT_TRUE(IsRefused(Run(With("judge", "bad.csv")), parts));
+  };
+  refused("", {"bad.csv: is empty"});
+  refused("time,q1\n0,1\n", {"bad.csv: has no column that is known as a joint's torque"});
+  refused("a,b\n0,1\n", {"bad.csv: has no column of time"});
+  refused("time,q1,tau1\n0,1,2\n1,2\n", {"bad.csv:3: must have 3 numbers as the rows before, got 2"});
+  refused("time,q1,tau1\n0,1,2\n1,x,2\n", {"bad.csv:3: column q1: must be a number, got \"x\""});
+  EXPECT_TRUE(Refused("judge none.toml right.csv", {"none.toml: ", "No such file"}));
+  EXPECT_TRUE(IsRefused(Run(With("judge", "none.csv")), {"none.csv: cannot be read"}));
+  EXPECT_TRUE(IsRefused(Run(With("judge", "right.csv --columns none.toml")), {"none.toml"}));
+}
+
+}  // namespace
+}  // namespace dexcheck::testing::judge_command_test

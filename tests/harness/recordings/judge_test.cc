@@ -1,0 +1,273 @@
+// Recordings of a robot that MuJoCo moves, judged by the analytic model: right ones agree, faults are named.
+//
+// DEXCHECK_RECORDINGS=100 draws so many faults and prints what they were named.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdlib>
+#include <fstream>
+#include <iostream>
+
+#include "controller/common/errors.h"
+#include "harness/base/files.h"
+#include "harness/descriptions/read_description.h"
+#include "harness/recordings/compare_recordings.h"
+#include "harness/recordings/write_corrections.h"
+#include "tests/common/paths.h"
+#include "tests/common/throws.h"
+#include "tests/harness/recordings/recorded_robot.h"
+
+namespace dexcheck::testing::judge_test {
+namespace {
+
+constexpr const char* kMjcf = "mjcf/panda.xml";
+
+const RobotModel& Panda() {
+  static const RobotModel model(ReadDescription(SourcePath("/controller/parameters/panda.toml")).spec);
+  return model;
+}
+
+RecordingJudgement Judge(const RecordedTable& table) {
+  std::vector<Recording> recordings;
+  recordings.push_back(ToRecording(Panda(), table));
+  return JudgeRecordings(Panda(), &recordings, {});
+}
+
+std::string Tell(const RecordingJudgement& judgement) {
+  std::string text;
+  for (const Explanation& one : judgement.causes) text += "\n    " + one.Tell();
+  return text.empty() ? (judgement.Agrees() ? " explained" : " not explained") : text;
+}
+
+enum class Score { kNamed, kClass, kMissed, kWrong };
+
+/// Named: the first cause, alone or with others that are right; a class that has it; wrong: another name.
+Score ScoreOf(const RecordingJudgement& judgement, const std::vector<RecordedFault>& faults) {
+  bool all_named = true, all_found = true, has_wrong = false;
+  for (const RecordedFault& fault : faults) {
+    bool is_named = false, is_found = false;
+    for (const Explanation& one : judgement.causes)
+      for (const Fault& candidate : one.faults) {
+        if (candidate.fault != fault.fault || candidate.place != fault.place) continue;
+        is_found = true;
+        const double off = std::abs(candidate.value - fault.value);
+        is_named |=
+            one.outcome == CauseOutcome::kNamed &&
+            (std::isnan(fault.value) || off <= std::max(0.05 * std::abs(fault.value), 3.0 * candidate.error));
+      }
+    all_named &= is_named;
+    all_found &= is_found;
+  }
+  for (const Explanation& one : judgement.causes) {
+    bool is_right = one.outcome != CauseOutcome::kNamed;
+    for (const RecordedFault& fault : faults)
+      is_right |= one.faults.front().fault == fault.fault && one.faults.front().place == fault.place;
+    has_wrong |= !is_right;
+  }
+  if (has_wrong) return Score::kWrong;
+  return all_named ? Score::kNamed : all_found ? Score::kClass : Score::kMissed;
+}
+
+TEST(Judge, RightRecordingsAreExplained) {
+  std::mt19937 random(1);
+  for (int i = 0; i < 6; ++i) {
+    RecordingOptions options;
+    options.has_velocities = i % 2 == 1;
+    options.encoder_bits = i < 4 ? 12 : 0;
+    options.torque_noise = i < 4 ? 0.02 : 0.0;
+    options.velocity_noise = i < 4 ? 0.005 : 0.0;
+    const RecordingJudgement judgement = Judge(RecordRobot(kMjcf, {}, options, &random));
+    EXPECT_TRUE(judgement.Agrees()) << i << Tell(judgement);
+  }
+}
+
+/// A recording with faults, all else by default.
+RecordedTable Record(const std::vector<RecordedFault>& faults, bool has_velocities = false,
+                     unsigned seed = 3) {
+  std::mt19937 random(seed);
+  RecordingOptions options;
+  options.has_velocities = has_velocities;
+  return RecordRobot(kMjcf, faults, options, &random);
+}
+
+void ScaleColumns(const std::string& begin, double factor, RecordedTable* table) {
+  for (const std::string& name : table->names)
+    if (name.starts_with(begin))
+      for (double& value : table->Get(name)) value *= factor;
+}
+
+/// The only cause is this one, and is named.
+::testing::AssertionResult NamesOnly(const RecordingJudgement& judgement, const std::string& fault,
+                                     const std::string& place, double value) {
+  const bool is_named = judgement.causes.size() == 1 && judgement.causes[0].outcome == CauseOutcome::kNamed &&
+                        judgement.causes[0].faults[0].fault == fault &&
+                        judgement.causes[0].faults[0].place == place &&
+                        std::abs(judgement.causes[0].faults[0].value - value) < 0.05 * std::abs(value);
+  return is_named ? ::testing::AssertionSuccess() : ::testing::AssertionFailure() << Tell(judgement);
+}
+
+RecordedFault DryFriction(int joint, double value) {
+  return {"dry friction", "joint panda_joint" + std::to_string(joint + 1), value,
+          [=](mjModel* robot) { robot->dof_frictionloss[joint] = value; }};
+}
+
+TEST(Judge, VelocitiesOfAnotherSignAreSaidAndNotUsed) {
+  RecordedTable table = Record({}, /*has_velocities=*/true);
+  ScaleColumns("qd.panda_joint3", -1.0, &table);
+  EXPECT_TRUE(NamesOnly(Judge(table), "velocity gain", "joint panda_joint3", -1.0));
+}
+
+TEST(Judge, PositionsInDegreesAreSaid) {
+  RecordedTable table = Record({}, /*has_velocities=*/true);
+  ScaleColumns("q.", 180.0 / kPi, &table);
+  ScaleColumns("qd.", 180.0 / kPi, &table);
+  EXPECT_TRUE(NamesOnly(Judge(table), "unit of the positions", "all joints", 180.0 / kPi));
+}
+
+TEST(Judge, RepeatedAndDoubledRowsAreLeftOut) {
+  const RecordedTable once = Record({DryFriction(1, 1.5)});
+  RecordedTable table = once;
+  for (std::vector<double>& column : table.columns) {
+    std::vector<double> held;
+    for (const double value : column) held.insert(held.end(), {value, value});
+    column = held;
+  }
+  // Half of the rows with the time of the row before, half a little later.
+  std::vector<double>& time = table.columns[0];
+  for (size_t i = 1; i < time.size(); i += 4) time[i] += 1e-3;
+  const RecordingJudgement judgement = Judge(table);
+  EXPECT_TRUE(NamesOnly(judgement, "dry friction", "joint panda_joint2", 1.5));
+  EXPECT_EQ(judgement.rows, 2 * static_cast<long>(once.rows()));
+  EXPECT_GE(judgement.notes.size(), 3U);
+}
+
+TEST(Judge, GapsAreNotSmoothedOver) {
+  RecordedTable table = Record({DryFriction(1, 1.5)});
+  for (size_t i = table.rows() / 3; i < table.rows(); ++i) table.columns[0][i] += 5.0;
+  EXPECT_TRUE(NamesOnly(Judge(table), "dry friction", "joint panda_joint2", 1.5));
+}
+
+TEST(Judge, CurrentsGiveDriveGainsAndThePayload) {
+  std::mt19937 random(5);
+  RecordedFault payload;
+  do payload = DrawRecordedFault(kMjcf, PayloadKind(), &random);
+  while (payload.value < 1.0);
+  std::vector<Recording> recordings;
+  std::vector<RecordedTable> tables = {Record({DryFriction(1, 3.0)}, false, 1),
+                                       Record({DryFriction(1, 3.0), payload}, false, 2)};
+  for (RecordedTable& table : tables) {
+    for (std::string& name : table.names)
+      if (name.starts_with("tau.")) name.replace(0, 3, "current");
+    ScaleColumns("current.", 1.0 / 8.0, &table);
+    recordings.push_back(ToRecording(Panda(), table));
+  }
+  const RecordingJudgement judgement = JudgeRecordings(Panda(), &recordings, {});
+  for (const JointJudgement& one : judgement.balances) EXPECT_NEAR(one.drive_gain, 8.0, 0.4) << one.joint;
+  bool has_payload = false;
+  for (const Explanation& one : judgement.causes)
+    has_payload |= one.faults[0].fault == "payload" &&
+                   std::abs(one.faults[0].value - payload.value) < 0.1 * payload.value;
+  EXPECT_TRUE(has_payload) << payload.value << Tell(judgement);
+}
+
+/// What --write makes of a model's file explains the recording.
+void ExpectCorrected(const std::string& file, const RecordedTable& table) {
+  const RobotDescription robot = ReadDescription(SourcePath("/" + file));
+  const RobotModel model(robot.spec);
+  std::vector<Recording> recordings;
+  recordings.push_back(ToRecording(model, table));
+  const RecordingJudgement judgement = JudgeRecordings(model, &recordings, {});
+  EXPECT_FALSE(judgement.Agrees());
+  const std::string text = ReadBytes(SourcePath("/" + file));
+  const CorrectedFile corrected = WriteCorrections(robot, text, judgement);
+  EXPECT_TRUE(corrected.left.empty());
+  const TemporaryFolder folder;
+  const std::filesystem::path path =
+      folder.path() / ("copy" + std::filesystem::path(file).extension().string());
+  std::ofstream(path) << corrected.text;
+  const RobotModel right(ReadDescription(path).spec);
+  std::vector<Recording> again;
+  again.push_back(ToRecording(right, table));
+  const RecordingJudgement second = JudgeRecordings(right, &again, {});
+  EXPECT_TRUE(second.Agrees()) << Tell(second);
+  EXPECT_NE(corrected.text.find("Gaz, M"), text.find("Gaz, M") == std::string::npos ? 0 : std::string::npos)
+      << "comments stay";
+}
+
+TEST(Judge, WritesWhatItFoundIntoACopyOfTheModel) {
+  std::mt19937 random(11);
+  const RecordedFault payload = DrawRecordedFault(kMjcf, PayloadKind(), &random);
+  const RecordedTable table = Record({DryFriction(2, 1.0), payload});
+  ExpectCorrected("controller/parameters/panda.toml", table);
+  ExpectCorrected("mjcf/panda.xml", table);
+}
+
+TEST(Judge, TwoRecordingsDifferByWhatOneRobotHas) {
+  const RecordedTable first = Record({DryFriction(1, 2.0)});
+  RecordedTable second = Record({DryFriction(1, 2.0), DryFriction(3, 1.0)});
+  for (double& time : second.columns[0]) time += 3.7;
+  std::vector<Recording> recordings;
+  for (const RecordedTable* table : {&first, static_cast<const RecordedTable*>(&second)})
+    recordings.push_back(ToRecording(Panda(), *table));
+  const RecordingComparison comparison = CompareRecordings(Panda(), &recordings, {});
+  EXPECT_TRUE(comparison.is_same_motion);
+  EXPECT_NEAR(comparison.delay, 3.7, 0.01);
+  ASSERT_EQ(comparison.causes.size(), 1U);
+  EXPECT_FALSE(comparison.causes[0].first.has_value());
+  EXPECT_EQ(comparison.causes[0].second->place, "joint panda_joint4");
+}
+
+TEST(Judge, WhatCannotBeUnderstoodIsNotJudged) {
+  const auto problem = [](RecordedTable table) {
+    return MessageOf<InputError>([&] { return Judge(table); });
+  };
+  const RecordedTable table = Record({});
+  RecordedTable bad = table;
+  bad.columns[3][20] = std::nan("");
+  EXPECT_THAT(problem(bad),
+              ::testing::HasSubstr("drawn: row 21: column q.panda_joint3: must be a finite number"));
+  bad = table;
+  bad.columns[0][30] = -1.0;
+  EXPECT_THAT(problem(bad), ::testing::HasSubstr("drawn: row 31: time goes back from 0.058 to -1 s"));
+  bad = table;
+  for (std::vector<double>& column : bad.columns) column.resize(9);
+  EXPECT_THAT(problem(bad), ::testing::HasSubstr("drawn: has 9 rows that differ, fewer than 16"));
+}
+
+TEST(JudgeCampaign, NamesDrawnFaults) {
+  const char* asked = std::getenv("DEXCHECK_RECORDINGS");
+  const int draws = asked == nullptr ? CountRecordedFaultKinds() : std::atoi(asked);
+  const char* several = std::getenv("DEXCHECK_TOGETHER");
+  const int together = several == nullptr ? 1 : std::atoi(several);
+  std::mt19937 random(7);
+  int counts[4] = {};
+  for (int i = 0; i < draws; ++i) {
+    std::vector<RecordedFault> faults = {DrawRecordedFault(kMjcf, i % CountRecordedFaultKinds(), &random)};
+    while (static_cast<int>(faults.size()) < together) {
+      const int kind = std::uniform_int_distribution<>(0, CountRecordedFaultKinds() - 1)(random);
+      faults.push_back(DrawRecordedFault(kMjcf, kind, &random));
+    }
+    RecordingOptions options;
+    options.has_velocities = std::bernoulli_distribution()(random);
+    const RecordingJudgement judgement = Judge(RecordRobot(kMjcf, faults, options, &random));
+    const Score score = ScoreOf(judgement, faults);
+    ++counts[static_cast<int>(score)];
+    constexpr const char* kNames[] = {"named", "class", "missed", "WRONG"};
+    if (score != Score::kNamed || asked != nullptr)
+      std::cout << i << " " << kNames[static_cast<int>(score)] << ":";
+    if (score != Score::kNamed || asked != nullptr) {
+      for (const RecordedFault& fault : faults)
+        std::cout << " " << fault.place << ": " << fault.fault << " " << fault.value << ";";
+      std::cout << Tell(judgement) << "\n";
+    }
+  }
+  std::cout << "named " << counts[0] << " class " << counts[1] << " missed " << counts[2] << " wrong "
+            << counts[3] << "\n";
+  EXPECT_GE(counts[0] + counts[1], 9 * draws / 10);
+  EXPECT_LE(counts[3], draws / 50);
+}
+
+}  // namespace
+}  // namespace dexcheck::testing::judge_test
