@@ -12,6 +12,7 @@
 #include "harness/descriptions/analytic_provider.h"
 #include "harness/descriptions/answer_layout.h"
 #include "harness/descriptions/constant_checks.h"
+#include "harness/descriptions/robot_part.h"
 #include "harness/engine/adapter.h"
 
 namespace dexcheck {
@@ -26,6 +27,9 @@ struct ConsistencyOptions {
   ModelViewFactory make_view = MakeModelView;  ///< What stands for the model.
   ObjectFormulas object;                       ///< What stands for the object's equations.
   std::vector<std::string> ignore;             ///< What two files need not share: kIgnorable.
+  RobotPart part;                              ///< Of two files; all of it when it is empty.
+  /// Whether two files agree that differ by no more than the digits that they print leave open.
+  bool within_digits = false;
 };
 
 struct ConsistencyResult {

@@ -57,13 +57,13 @@ void NoteTermsOfFrames(Comparison* comparison) {
 ///   the decomposition into three angles (one more product), and their composition when it is read (two), six
 ///   rotations in all; and the angles as short decimals, each within 8 pi eps (FormatTidy).
 /// - A link's frame is placed by both chains at zero, as many roundings again.
-void CountRoundings(int imported, bool has_link_frames, std::vector<CheckRecord>* records) {
+void CountRoundings(int imported, bool has_link_frames, std::vector<CheckRecord>* records, int held = 0) {
   constexpr double kStep = 16.0;
   constexpr double kRotation = 8.0;
   constexpr double kImport = 6.0 * kRotation + 3.0 * 8.0 * kPi;
   for (CheckRecord& record : *records) {
     record.bound *=
-        (1.0 + imported * kImport / kStep) * (has_link_frames && IsOfFrames(record.name) ? 2.0 : 1.0);
+        (1.0 + held + imported * kImport / kStep) * (has_link_frames && IsOfFrames(record.name) ? 2.0 : 1.0);
     record.failed = !(record.worst <= record.bound);
   }
 }
@@ -101,7 +101,7 @@ EngineCompletion Complete(const ConsistencyOptions& options, const MjcfFile& mjc
 }
 
 /// A description against the engine.
-void CompareWithEngine(const DescriptionFile& first, const DescriptionFile& second,
+void CompareWithEngine(const DescriptionFile& first, const DescriptionFile& second, const UrdfOptions& urdf,
                        const ConsistencyOptions& options, const Progress& progress, Comparison* comparison) {
   const std::string file = comparison->second.filename().string();
   const RobotDescription written = first.Describe();
@@ -137,11 +137,24 @@ void CompareWithEngine(const DescriptionFile& first, const DescriptionFile& seco
   for (const auto& notes : {completion.notes, DescribeCoordinates(robot)})
     AppendTo(&comparison->notes, notes);
   NoteOthers(adapter, comparison);
+  AnalyticProvider model(adapter.model(), "model", options.make_view, options.object);
+  EngineProvider of_engine(adapter, "engine");
+  comparison->digits = JudgeByDigits({&first, &second}, urdf, options, &model, &of_engine, *comparison->model,
+                                     {}, &comparison->result);
 }
 
 /// Two descriptions without the engine.
-void CompareTwoDescriptions(RobotDescription a, RobotDescription b, const ConsistencyOptions& options,
+void CompareTwoDescriptions(const DescriptionFile& first, const DescriptionFile& second,
+                            const UrdfOptions& urdf, const ConsistencyOptions& options, const RobotPart& part,
                             const Progress& progress, Comparison* comparison) {
+  RobotDescription a = first.Describe();
+  RobotDescription b = second.Describe();
+  int held = 0;
+  if (!part.empty()) {
+    AppendTo(&comparison->not_compared, TakePart(part, &a, &b, &held));
+    comparison->read_first = a;
+    comparison->read_second = b;
+  }
   const Completion completion = CompleteEachOther(&a, &b, options.ignore);
   for (const auto& notes : {a.notes, b.notes, completion.notes, DescribeCoordinates(a)}) {
     AppendTo(&comparison->notes, notes);
@@ -150,9 +163,27 @@ void CompareTwoDescriptions(RobotDescription a, RobotDescription b, const Consis
   const bool has_link_frames = AddLinkFrames(&a, &b);
   comparison->model.emplace(a.spec);
   comparison->result = CompareDescriptions(a, b, options, progress);
+  // A held joint is a step of its chain that the model has no more.
   CountRoundings((a.is_imported ? 1 : 0) + (b.is_imported ? 1 : 0), has_link_frames,
-                 &comparison->result.terms);
+                 &comparison->result.terms, held);
   AddOneSided(*comparison->model, completion.one_sided, &comparison->result.constants);
+  const RobotModel other(b.spec);
+  AnalyticProvider of_a(*comparison->model, a.spec.source);
+  AnalyticProvider of_b(other, b.spec.source, *comparison->model);
+  comparison->digits = JudgeByDigits({&first, &second}, urdf, options, &of_a, &of_b, *comparison->model, part,
+                                     &comparison->result);
+}
+
+/// Part of two robots. Of an MJCF, the terms are those of what MuJoCo compiled, by the analytic model.
+void ComparePart(const DescriptionFile& first, const DescriptionFile& second, const UrdfOptions& urdf,
+                 const ConsistencyOptions& options, const RobotPart& part, const Progress& progress,
+                 Comparison* comparison) {
+  comparison->with_engine = false;
+  if (second.format() == RobotFormat::kMjcf)
+    comparison->notes.push_back("part of a robot: the terms of " + second.path().filename().string() +
+                                " are those of what MuJoCo compiled, by the analytic model; what an MJCF has "
+                                "besides the mechanism is not compared");
+  CompareTwoDescriptions(first, second, urdf, options, part, progress, comparison);
 }
 
 }  // namespace
@@ -170,17 +201,23 @@ Comparison CompareFiles(const std::filesystem::path& a, const std::filesystem::p
   comparison.read_first = first.TryToDescribe();
   comparison.read_second = second.TryToDescribe();
   try {
-    if (comparison.with_engine) {
-      CompareWithEngine(first, second, options, progress, &comparison);
+    if (!options.part.empty()) {
+      ComparePart(first, second, urdf, options, options.part, progress, &comparison);
+    } else if (comparison.with_engine) {
+      CompareWithEngine(first, second, urdf, options, progress, &comparison);
     } else {
-      CompareTwoDescriptions(first.Describe(), second.Describe(), options, progress, &comparison);
+      CompareTwoDescriptions(first, second, urdf, options, {}, progress, &comparison);
     }
   } catch (const InputError& error) {
     // Names of joints that were exchanged make another mechanism of one robot.
-    if (!comparison.read_first || !comparison.read_second) throw;
+    if (!comparison.read_first || !comparison.read_second || !options.part.empty()) throw;
     const std::vector<Hypothesis> why = ExplainDifference(*comparison.read_first, *comparison.read_second);
-    if (why.empty()) throw;
-    throw InputError(std::string(error.what()) + "; " + why[0].text);
+    if (!why.empty()) throw InputError(std::string(error.what()) + "; " + why[0].text);
+    const std::optional<RobotPart> common = FindCommonPart(*comparison.read_first, *comparison.read_second);
+    if (!common) throw;
+    comparison.notes.clear();
+    comparison.not_compared.clear();
+    ComparePart(first, second, urdf, options, *common, progress, &comparison);
   }
   NoteTermsOfFrames(&comparison);
   return comparison;
@@ -271,8 +308,14 @@ Comparison CompareFunctions(const std::filesystem::path& file, const TermFunctio
 
 void ExplainComparison(Comparison* comparison, double tolerance) {
   if (comparison->result.Agrees() || !comparison->read_first || !comparison->read_second) return;
+  if (comparison->digits) tolerance = std::max(tolerance, comparison->digits->largest_within);
   comparison->hypotheses = ExplainDifference(*comparison->read_first, *comparison->read_second,
                                              std::max(tolerance, kHypothesisTolerance));
+  if (comparison->digits) {
+    std::erase_if(comparison->hypotheses, [&](const Hypothesis& hypothesis) {
+      return !comparison->digits->Concerns(hypothesis.ids, hypothesis.parts);
+    });
+  }
 }
 
 Differences SortDifferences(const Comparison& comparison) {
@@ -282,6 +325,10 @@ Differences SortDifferences(const Comparison& comparison) {
   const std::string second = comparison.second.filename().string();
   const std::vector<CheckRecord>& checks = comparison.result.constants.records;
   Differences differences;
+  if (comparison.digits) {
+    differences.real = ListExcesses(*comparison.digits, first, second);
+    return differences;
+  }
   const auto add = [&](double error, std::string line) {
     const int digits = CountDigits(error);
     const bool is_rounded = digits >= kDigitsOfRoundedInput;

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "harness/checks/consistency.h"
+#include "harness/checks/digit_judgement.h"
 #include "harness/descriptions/function_provider.h"
 #include "harness/descriptions/hypotheses.h"
 #include "harness/descriptions/program_provider.h"
@@ -24,6 +25,8 @@ struct Comparison {
   std::vector<std::string> notes;         ///< What its reader may not expect.
   std::vector<std::string> not_compared;  ///< What only one of them has and no term depends on.
   ConsistencyResult result;
+  /// Where the two do not agree to rounding and were judged by their digits, which `result` then is.
+  std::optional<DigitVerdict> digits;
   std::vector<Hypothesis> hypotheses;  ///< Faults that would explain what differs.
   /// As they were read; none of an MJCF that can be no description (with several free bodies).
   std::optional<RobotDescription> read_first, read_second;

@@ -101,6 +101,26 @@ bool TermComparison::Shares(const TermEntry& entry, size_t a, size_t b) const {
   return both_have(entry.term) && (entry.instead_of == Term::kTermCount || !both_have(entry.instead_of));
 }
 
+void TermComparison::CompareWithin(const std::vector<Spread>& spreads) {
+  const auto add = [&](const std::vector<Copy>& copies) {
+    for (const Copy& copy : copies) providers_.insert(providers_.end(), {copy.first, copy.second});
+    return providers_.size();
+  };
+  for (const Spread& spread : spreads) {
+    const size_t nominal = providers_.size();
+    add({spread.nominal});
+    const size_t first_other = add(spread.draws);
+    spreads_.push_back({nominal, first_other, add(spread.others)});
+  }
+  first_potential_.resize(providers_.size());
+  pairs_.resize(1);
+  for (AskedTerm& term : terms_) {
+    term.numbers.resize(providers_.size(), term.numbers[0]);
+    term.is_read.resize(providers_.size(), false);
+  }
+  for (CheckRecord& record : pairs_[0].terms) record.bound = 1.0;
+}
+
 bool TermComparison::needs_second_velocity() const {
   return std::any_of(terms_.begin(), terms_.end(),
                      [](const AskedTerm& term) { return term.entry->term == Term::kCBarProduct; });
@@ -163,6 +183,39 @@ void TermComparison::Weigh(AskedTerm* term) {
   if (is_first) term->count = (term->weight.array() != 0.0).count();
 }
 
+MatrixXd TermComparison::CalcDifference(AskedTerm* term, size_t copy) const {
+  if (term->entry->term == Term::kJointAxis)
+    MoveAlongAxes(model(), term->numbers[copy + 1], &term->numbers[copy]);
+  return term->numbers[copy] - term->numbers[copy + 1];
+}
+
+void TermComparison::WidenByDraws(AskedTerm* term) const {
+  constexpr double kCoverage =
+      3.0;  // of the root mean square of draws at both ends of each number's interval
+  MatrixXd U = CalcBound(*term->entry, model().max_depth()) * term->scale;
+  for (const SpreadRange& spread : spreads_) {
+    const MatrixXd nominal = CalcDifference(term, spread.nominal);
+    const size_t first_draw = spread.nominal + 2;
+    MatrixXd squares = MatrixXd::Zero(nominal.rows(), nominal.cols());
+    for (size_t i = first_draw; i < spread.first_other; i += 2)
+      squares += (CalcDifference(term, i) - nominal).cwiseAbs2();
+    U += kCoverage / std::sqrt(0.5 * static_cast<double>(spread.first_other - first_draw)) *
+         squares.cwiseSqrt();
+    for (size_t i = spread.first_other; i < spread.end; i += 2)
+      U += (CalcDifference(term, i) - nominal).cwiseAbs();
+  }
+  term->weight = U.cwiseInverse();  // 0 of what is not compared, whose scale is infinite
+}
+
+void TermComparison::NoteExcess(size_t term, const Location& where, double units, double first, double second,
+                                double when) {
+  if (spreads_.empty() || units <= 1.0) return;
+  auto known = std::find_if(excesses_.begin(), excesses_.end(),
+                            [&](const Excess& one) { return one.term == term && one.where == where; });
+  if (known == excesses_.end()) known = excesses_.insert(known, Excess{term, where});
+  if (units > known->units) *known = {term, where, units, first, second, when};
+}
+
 Location TermComparison::Locate(const TermEntry& entry, Eigen::Index row, Eigen::Index col) const {
   if (!is_reduced_ || !IsVelocity(entry.parts)) return FindLocation(entry, scales_, row, col);
   const int second = entry.parts == TermParts::kVelocity ? 0 : free_[static_cast<size_t>(col)];
@@ -183,14 +236,16 @@ void TermComparison::ComparePair(size_t index, double when, ComparedPair* pair) 
     error = ((first - second).array().abs() * term.weight.array()).maxCoeff<Eigen::PropagateNaN>();
   if (!(error < std::numeric_limits<double>::infinity())) error = std::numeric_limits<double>::infinity();
   const bool failed_before = record.failed;
-  const bool is_worst = error > record.worst || record.comparisons == 0;
+  const bool is_worst = error > record.worst || record.comparisons == 0 || (!spreads_.empty() && error > 1.0);
   if (is_worst || (!(error <= record.bound) && !failed_before)) {
     for (Eigen::Index col = 0; col < first.cols(); ++col) {
       for (Eigen::Index row = 0; row < first.rows(); ++row) {
         const double weight = term.weight(row, col);
         if (weight == 0.0) continue;
-        record.CompareError(std::abs(first(row, col) - second(row, col)) * weight, first(row, col),
-                            second(row, col), Locate(entry, row, col), when);
+        const double its_error = std::abs(first(row, col) - second(row, col)) * weight;
+        const Location where = Locate(entry, row, col);
+        record.CompareError(its_error, first(row, col), second(row, col), where, when);
+        NoteExcess(index, where, its_error, first(row, col), second(row, col), when);
       }
     }
   } else {
@@ -207,6 +262,7 @@ void TermComparison::Compare(double when, bool contacts) {
     if (!contacts && IsOfContacts(*term.entry)) continue;
     for (size_t provider = 0; provider < providers_.size(); ++provider) Read(&term, provider);
     Weigh(&term);
+    if (!spreads_.empty()) WidenByDraws(&term);
     for (ComparedPair& pair : pairs_) ComparePair(i, when, &pair);
   }
 }

@@ -21,6 +21,15 @@ struct ComparedPair {
   std::vector<CheckRecord> terms;
 };
 
+/// A number of the first pair that differs by more than what other providers leave open.
+struct Excess {
+  size_t term = 0;  ///< Its record's index.
+  Location where;
+  double units = 0.0;  ///< Of what is left open, the bound included.
+  double first = 0.0, second = 0.0;
+  double when = 0.0;
+};
+
 /// Keeps each term's numbers by each provider, and their records. Two providers are compared in all terms
 /// that both have. Bounds and scales are those of the analytic model's terms (rounding_scales.h). If one
 /// provider is reduced, all are: by T of CalcCouplingMap, at states in which the followers follow.
@@ -32,6 +41,26 @@ class TermComparison {
                  std::vector<int> frames, size_t contacts = 0);
   /// Of all frames of the model.
   TermComparison(const RobotModel& model, Asker asker, std::vector<DynamicsProvider*> providers);
+
+  /// The first pair's robots again, by other providers.
+  struct Copy {
+    DynamicsProvider* first;
+    DynamicsProvider* second;
+  };
+  /// Copies of robots whose numbers are known to some digits: one with the nominal numbers, `draws` with
+  /// those of one robot moved at random within what is left open, and `others`, which are as good as the
+  /// nominal one.
+  struct Spread {
+    Copy nominal;
+    std::vector<Copy> draws;
+    std::vector<Copy> others;
+  };
+  /// From now on the first pair's errors are relative to U = scale * bound + sum over the spreads of (3 root
+  /// mean square of d - d_nominal over the draws + sum |d - d_nominal| over the others), with d = first -
+  /// second of a copy, and its bounds are 1.
+  void CompareWithin(const std::vector<Spread>& spreads);
+  /// The worst of each place whose error is above 1; none before CompareWithin.
+  [[nodiscard]] const std::vector<Excess>& excesses() const { return excesses_; }
 
   /// What scales are formed of. Nothing else is known of the state.
   [[nodiscard]] ScaleContext& scales() { return scales_; }
@@ -71,10 +100,20 @@ class TermComparison {
   [[nodiscard]] bool Shares(const TermEntry& entry, size_t a, size_t b) const;
   void Read(AskedTerm* term, size_t provider);
   void Weigh(AskedTerm* term);
+  [[nodiscard]] MatrixXd CalcDifference(AskedTerm* term, size_t copy) const;
+  void WidenByDraws(AskedTerm* term) const;
+  void NoteExcess(size_t term, const Location& where, double units, double first, double second, double when);
   void ComparePair(size_t term, double when, ComparedPair* pair);
   [[nodiscard]] Location Locate(const TermEntry& entry, Eigen::Index row, Eigen::Index col) const;
 
+  /// Indices of providers.
+  struct SpreadRange {
+    size_t nominal, first_other, end;  ///< Two for each copy; draws stand behind the nominal one.
+  };
+
   std::vector<DynamicsProvider*> providers_;
+  std::vector<SpreadRange> spreads_;
+  std::vector<Excess> excesses_;
   ScaleContext scales_;
   std::vector<AskedTerm> terms_;
   std::vector<ComparedPair> pairs_;

@@ -92,6 +92,7 @@ void AddDiagnoseCommand(Command app);
 void AddMutateCommand(Command app);
 void AddEvalCommand(Command app);
 void AddImportCommand(Command app);
+void AddInitCommand(Command app);
 void AddPlanCommand(Command app);
 /// @param command_line as typed, to be kept in the log.
 void AddRunCommand(Command app, const std::string& command_line);

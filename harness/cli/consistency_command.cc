@@ -1,5 +1,7 @@
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -28,6 +30,15 @@ void TakeFiles(ConsistencyRequest* request) {
 
 int Run(ConsistencyRequest request) {
   TakeFiles(&request);
+  request.options.within_digits = !request.exact && !request.judging.Find();
+  for (const std::string& joint : request.lock) AddHeldJoint(joint, &request.options.part);
+  for (const std::string& name : request.ignore) {
+    const bool is_word =
+        std::find(std::begin(kIgnorable), std::end(kIgnorable), name) != std::end(kIgnorable);
+    (is_word ? request.options.ignore : request.options.part.left_out).push_back(name);
+  }
+  if (request.has_results() && !request.options.part.empty())
+    throw InputError("consistency: --only, --lock and --ignore BODY must have two files");
   CatchInterrupts();
   ResultFile json(request.json_file);
   ResultFile junit(request.junit_file);
@@ -87,8 +98,23 @@ void AddConsistencyCommand(Command app) {
   AddSampleOptions(command, kMaxSamples, &request->options.samples, &request->options.seed);
   AddJsonOption(command, "the results", &request->json_file);
   AddJUnitOption(command, &request->junit_file);
-  AddToleranceOptions(command, &request->judging);
-  AddIgnoreOption(command, &request->options.ignore);
+  const std::array<Option, 2> tolerance = AddToleranceOptions(command, &request->judging);
+  command
+      .AddFlag("--exact", &request->exact,
+               "Two files must agree to rounding, not only within the digits that they print")
+      .Excludes(tolerance[0])
+      .Excludes(tolerance[1]);
+  command
+      .AddOption("--ignore WORD,...", &request->ignore,
+                 "Constants of joints in which the two may differ: armature, damping, friction, coupling to "
+                 "others; or links to leave out with all that they carry")
+      .Delimiter(',');
+  command.AddOption("--only LINK", &request->options.part.only,
+                    "Compare this link or joint and what it carries; all else is held");
+  command
+      .AddOption("--lock JOINT[=VALUE]", &request->lock,
+                 "Hold a joint at a value (0), rad or m; may be given again")
+      .Repeatable();
   command.AddFlag("--quiet", &request->quiet, "Print the verdict only");
   command.SetAction([=] { return Run(*request); });
 }

@@ -22,18 +22,62 @@ const char* Judge(ExitCode code) {
   return code == kDisagreement ? "disagreement" : "failed";
 }
 
+/// How two descriptions agree, or that they do not.
+const char* NameOutcome(const ConsistencyRequest& request, const Comparison& comparison) {
+  if (!comparison.result.Agrees()) return "differ";
+  if (comparison.digits) return "digits";
+  return request.judging.Find() ? "tolerance" : "rounding";
+}
+
+/// "arm.urdf: 4 to 8 digits, arm.xml: exact"
+std::string DescribeDigits(const DigitVerdict& verdict) {
+  std::string text;
+  for (const PrintedDigits& file : verdict.files) {
+    text += (text.empty() ? "" : ", ") + file.file + ": ";
+    if (file.count == 0) {
+      text += "exact";
+    } else if (file.fewest == file.most) {
+      text += fmt::format("{} digit{}", file.most, file.most == 1 ? "" : "s");
+    } else {
+      text += fmt::format("{} to {} digits", file.fewest, file.most);
+    }
+  }
+  return text;
+}
+
 /// One line for each; below what differs, where.
-void AddRecords(const char* title, const std::vector<CheckRecord>& records, const RobotModel* places,
-                std::vector<TableRow>* rows) {
+void AddRecords(const char* title, const std::vector<CheckRecord>& records, const Comparison& comparison,
+                const RobotModel* places, std::vector<TableRow>* rows) {
   rows->push_back({{title, "compared", "worst error", "bound", "digits", ""}});
   for (const CheckRecord& record : records) {
     rows->push_back({{record.name, std::to_string(record.comparisons), fmt::format("{:.2e}", record.worst),
                       fmt::format("{:.1e}", record.bound), std::to_string(CountDigits(record.worst)),
-                      record.failed ? "DIFFERS" : "ok"}});
+                      record.failed                                                         ? "DIFFERS"
+                      : comparison.digits && comparison.digits->units.contains(record.name) ? "within digits"
+                                                                                            : "ok"}});
     if (!record.failed || places == nullptr) continue;
     const std::string where = Describe(record.where, *places, places->num_base_velocities());
     rows->back().note = fmt::format("    worst at {}, sample {}", where, static_cast<long>(record.at));
   }
+}
+
+Json ToJson(const DigitVerdict& verdict) {
+  Json json = {{"states", verdict.states},
+               {"files", Json::array()},
+               {"units", Json::object()},
+               {"exceeds", Json::array()}};
+  for (const PrintedDigits& file : verdict.files)
+    json["files"].push_back(
+        {{"file", file.file}, {"numbers", file.count}, {"fewest", file.fewest}, {"most", file.most}});
+  for (const auto& [check, units] : verdict.units) json["units"][check] = units;
+  for (const DigitExcess& excess : verdict.excesses) {
+    json["exceeds"].push_back({{"check", excess.check},
+                               {"where", excess.where},
+                               {"units", excess.units},
+                               {"model", excess.first},
+                               {"engine", excess.second}});
+  }
+  return json;
 }
 
 }  // namespace
@@ -89,20 +133,25 @@ void PrintTable(const ConsistencyRequest& request, const Comparison& comparison)
   list("not compared", comparison.not_compared);
   list("worth knowing", comparison.notes);
   std::vector<TableRow> rows;
-  AddRecords("constant", result.constants.records, nullptr, &rows);
+  AddRecords("constant", result.constants.records, comparison, nullptr, &rows);
   if (!result.constants.notes.empty()) {
     rows.push_back({{},
                     fmt::format("{} notes on what only a run has (contacts, solver, motors' limits): --json",
                                 result.constants.notes.size())});
   }
   rows.emplace_back();
-  AddRecords("term", result.terms, &model, &rows);
+  AddRecords("term", result.terms, comparison, &model, &rows);
   fmt::print("{}", FormatTable("<>>>><", rows));
   const std::string bounds = request.judging.Find()
                                  ? "bounds are those of rounding or the tolerance given, whichever is wider"
                                  : "bounds follow from rounding";
-  fmt::print("\n{}\n", Wrap("Errors are relative to each term's own scale; " + bounds +
-                                " (README.md). --json says where each is worst.",
+  const std::string digits =
+      comparison.digits
+          ? fmt::format(" What is above them was judged by the digits that the files print, at {} states.",
+                        comparison.digits->states)
+          : "";
+  fmt::print("\n{}\n", Wrap("Errors are relative to each term's own scale; " + bounds + " (README.md)." +
+                                digits + " --json says where each is worst.",
                             0));
 }
 
@@ -117,6 +166,16 @@ void PrintVerdict(const ConsistencyRequest& request, const Comparison& compariso
   if (!left_out.empty())
     left_out = fmt::format("; {} not compared ({})", comparison.not_compared.size(), Abbreviate(left_out));
   if (result.Agrees()) {
+    if (comparison.digits) {
+      double most = 0.0;
+      for (const auto& [check, units] : comparison.digits->units) most = std::max(most, units);
+      fmt::print(
+          "AGREE within the digits that the files print ({}) in all {} terms, up to {:.2g} of what these "
+          "leave "
+          "open; --exact asks for rounding alone{}.\n",
+          DescribeDigits(*comparison.digits), result.terms.size(), most, left_out);
+      return;
+    }
     fmt::print("AGREE: {} agree to {} in all {} terms{}.\n",
                comparison.with_engine  ? "the analytic model and MuJoCo"
                : request.has_results() ? "the description and the results"
@@ -124,6 +183,7 @@ void PrintVerdict(const ConsistencyRequest& request, const Comparison& compariso
                request.DescribeTolerance(), result.terms.size(), left_out);
     return;
   }
+  constexpr size_t kMostShown = 10;
   const Differences differences = SortDifferences(comparison);
   const std::string to_digits = fmt::format("agrees to {} digits", differences.digits);
   if (differences.real.empty()) {
@@ -132,13 +192,17 @@ void PrintVerdict(const ConsistencyRequest& request, const Comparison& compariso
   } else {
     fmt::print("DISAGREE: {}", differences.real.front());
     if (differences.real.size() > 1) fmt::print("; and in {} more", differences.real.size() - 1);
-    fmt::print("; everything else {}{}.\n",
-               differences.rounded.empty() ? "agrees to " + request.DescribeTolerance() : to_digits,
-               left_out);
-    for (size_t i = 1; i < differences.real.size(); ++i) fmt::print("  {}\n", differences.real[i]);
+    const std::string within = comparison.digits ? "agrees within the digits that the files print (" +
+                                                       DescribeDigits(*comparison.digits) + ")"
+                                                 : "agrees to " + request.DescribeTolerance();
+    fmt::print("; everything else {}{}.\n", differences.rounded.empty() ? within : to_digits, left_out);
+    const size_t shown =
+        comparison.digits ? std::min(differences.real.size(), kMostShown) : differences.real.size();
+    for (size_t i = 1; i < shown; ++i) fmt::print("  {}\n", differences.real[i]);
+    if (shown < differences.real.size())
+      fmt::print("  and {} more (--json)\n", differences.real.size() - shown);
   }
   PrintHypotheses(comparison.hypotheses);
-  constexpr size_t kMostShown = 10;
   const size_t shown = std::min(differences.rounded.size(), kMostShown);
   if (shown > 0 && !differences.real.empty())
     fmt::print("To {} digits agree {} more:\n", differences.digits, differences.rounded.size());
@@ -157,7 +221,8 @@ std::string ToText(const ConsistencyRequest& request, const Comparison& comparis
                {"samples_requested", request.options.samples},
                {"seed", request.options.seed},
                {"seconds", result.seconds},
-               {"verdict", Judge(code)}};
+               {"verdict", Judge(code)},
+               {"outcome", NameOutcome(request, comparison)}};
   json["notes"] = comparison.notes;
   for (const std::string& note : comparison.not_compared) json["notes"].push_back(note);
   json["not_compared"] = comparison.not_compared;
@@ -166,6 +231,7 @@ std::string ToText(const ConsistencyRequest& request, const Comparison& comparis
   for (const auto* records : {&result.constants.records, &result.terms}) {
     for (const CheckRecord& record : *records) json["checks"][record.name] = DescribeRecord(record, model);
   }
+  if (comparison.digits) json["digits"] = ToJson(*comparison.digits);
   json["findings"] = Json::array();
   for (const ConstantFinding& finding : result.constants.findings) {
     json["findings"].push_back({{"check", finding.check},

@@ -15,6 +15,9 @@ namespace dexcheck::cli {
 struct ConsistencyRequest : ComparisonRequest {
   AnswersSource source;  ///< What stands for B and provides terms.
   ConsistencyOptions options;
+  std::vector<std::string> lock;    ///< "JOINT" or "JOINT=VALUE".
+  std::vector<std::string> ignore;  ///< Words of kIgnorable, and links.
+  bool exact = false;               ///< Two files agree to rounding only, whatever digits they print.
 
   /// What stands for B provides terms, and is no description.
   [[nodiscard]] bool has_results() const { return !source.program.empty() || !source.answers.empty(); }

@@ -11,6 +11,7 @@
 #include "harness/base/version.h"
 #include "harness/cli/commands.h"
 #include "harness/cli/run_folder.h"
+#include "harness/engine/mujoco_release.h"
 
 namespace dexcheck::cli {
 namespace {
@@ -198,6 +199,12 @@ void AddHelpCommands(Command app, const CommandLine& line) {
       app.AddCommand("man", "Print the manual page, made from the help (dexcheck man | man -l -)");
   manual.SetAction([&line] {
     fmt::print("{}", MakeManualPage(line.Describe()));
+    return kSuccess;
+  });
+  Command version = app.AddCommand("version", "Print the versions of dexcheck and of its engine");
+  version.SetAction([] {
+    fmt::print("dexcheck {}\nMuJoCo {} (compiled with the headers of {})\n", Version(),
+               FormatRelease(mj_version()), FormatRelease(mjVERSION_HEADER));
     return kSuccess;
   });
 }

@@ -62,7 +62,9 @@ int RunCommandLine(int argc, char** argv) {
   AddMutateCommand(studying);
   AddExciteCommand(studying);
   AddPlanCommand(studying);
-  AddHelpCommands(app.Under("Set up"), line);
+  const Command setting_up = app.Under("Set up");
+  AddInitCommand(setting_up);
+  AddHelpCommands(setting_up, line);
   return line.Run(argc, argv);
 }
 

@@ -82,7 +82,10 @@ RobotFormat FindFormat(std::string_view text, const std::filesystem::path& path)
 }
 
 DescriptionFile::DescriptionFile(std::filesystem::path path, const UrdfOptions& options)
-    : path_(std::move(path)), text_(ReadBytes(path_)), format_(FindFormat(text_, path_)) {
+    : DescriptionFile(path, ReadBytes(path), options) {}
+
+DescriptionFile::DescriptionFile(std::filesystem::path path, std::string text, const UrdfOptions& options)
+    : path_(std::move(path)), text_(std::move(text)), format_(FindFormat(text_, path_)) {
   switch (format_) {
     case RobotFormat::kUrdf:
       description_ = ParseUrdf(text_, path_.string(), options);

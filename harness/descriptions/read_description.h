@@ -25,6 +25,8 @@ class DescriptionFile {
  public:
   /// @throws InputError for a file that cannot be read; also for a URDF or a parameter file that is none.
   explicit DescriptionFile(std::filesystem::path path, const UrdfOptions& options = {});
+  /// The same of a text that stands for the file's.
+  DescriptionFile(std::filesystem::path path, std::string text, const UrdfOptions& options);
 
   [[nodiscard]] const std::filesystem::path& path() const { return path_; }
   [[nodiscard]] RobotFormat format() const { return format_; }

@@ -14,7 +14,7 @@ using ::testing::HasSubstr;
 class JudgeCommand : public CommandTest {
  protected:
   JudgeCommand() {
-    Expect(0, Words{"run", "panda-reach", "--no-report", "--quiet", "--set", "duration=3", "--out", "run"});
+    Expect(0, Words{"run", "panda-reach", "--no-report", "--quiet", "--out", "run"});
     Expect(0, Words{"export", "run", "--csv", "right.csv", "--signals", "time,q,xi,tau"});
     WriteFaulty();
   }

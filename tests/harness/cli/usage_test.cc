@@ -80,6 +80,9 @@ TEST(Usage, TwoRobotsAreComparedWithoutTheWordForIt) {
 
 TEST(Usage, TheVersionIsThreeNumbers) {
   EXPECT_THAT(RunDexcheck("--version").out, ::testing::MatchesRegex("[0-9]+\\.[0-9]+\\.[0-9]+\n"));
+  const std::string both = RunDexcheck("version").out;
+  EXPECT_THAT(both, HasSubstr("dexcheck " + RunDexcheck("--version").out));
+  EXPECT_THAT(both, HasSubstr("MuJoCo 2.2.2"));
 }
 
 // What a terminal shows of 80 columns. Names of files may be longer.

@@ -6,6 +6,7 @@
 #include <fstream>
 #include <limits>
 
+#include "harness/engine/mujoco_release.h"
 #include "tests/common/paths.h"
 
 namespace dexcheck::testing {
@@ -83,7 +84,7 @@ RecordedTable RecordRobot(const std::string& mjcf, const std::vector<RecordedFau
     mju_copy(own->qpos, data->qpos, n);
     mju_copy(own->qvel, data->qvel, n);
     mj_forward(model.get(), own.get());
-    mj_fullM(model.get(), M.data(), own->qM);
+    ExpandMass(*model, *own, M.data());
     VectorXd wanted(n);
     for (int i = 0; i < n; ++i) {
       double q = 0.0, qd = 0.0, qdd = 0.0;

@@ -1,0 +1,430 @@
+#include "harness/descriptions/printed_digits.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <functional>
+#include <map>
+#include <memory>
+#include <random>
+
+#include "controller/common/errors.h"
+#include "controller/common/text.h"
+#include "harness/descriptions/mjcf_reader.h"
+#include "harness/engine/xml.h"
+
+namespace dexcheck {
+namespace {
+
+using Element = tinyxml2::XMLElement;
+
+/// A number of a file, and whether it is of a body: its mass, centre of mass or inertia.
+struct FileNumber : PrintedNumber {
+  bool is_of_body = false;
+};
+
+/// What is printed in the place of a number.
+using Replace = std::function<std::string(const FileNumber&, std::string_view text)>;
+
+/// Attributes of URDFs and MJCFs whose numbers describe the mechanism. Inertias of an MJCF are not among
+/// them: its compiler refuses those that no body has, and moved numbers of a slender body may be such.
+constexpr std::string_view kAttributes[] = {
+    "xyz",  "rpy",   "value",  "ixx",     "ixy",       "ixz",        "iyy",          "iyz",
+    "izz",  "lower", "upper",  "damping", "friction",  "multiplier", "offset",       "pos",
+    "quat", "euler", "xyaxes", "zaxis",   "axisangle", "fromto",     "mass",         "density",
+    "size", "axis",  "range",  "ref",     "gravity",   "armature",   "frictionloss", "polycoef"};
+
+bool IsSeparator(char c) { return c == ' ' || c == '\t' || c == '\n' || c == '\r' || c == ','; }
+
+/// A list of numbers with each replaced.
+std::string ReplaceNumbers(std::string_view list, bool is_of_body, const Replace& replace) {
+  std::string result;
+  while (!list.empty()) {
+    const bool is_gap = IsSeparator(list.front());
+    const size_t length = static_cast<size_t>(
+        std::find_if(list.begin(), list.end(), [&](char c) { return IsSeparator(c) != is_gap; }) -
+        list.begin());
+    const std::string_view word = list.substr(0, length);
+    const std::optional<PrintedNumber> number = is_gap ? std::nullopt : ReadPrinted(word);
+    result += number ? replace({*number, is_of_body}, word) : std::string(word);
+    list.remove_prefix(length);
+  }
+  return result;
+}
+
+/// Whether an element is one of these names or stands in one.
+bool IsIn(const Element* element, std::initializer_list<std::string_view> names) {
+  for (; element != nullptr; element = element->Parent()->ToElement()) {
+    if (std::find(names.begin(), names.end(), element->Name()) != names.end()) return true;
+  }
+  return false;
+}
+
+void ReplaceInXml(Element* root, const Replace& replace) {
+  VisitElements(root, [&](Element* element) {
+    if (IsIn(element, {"visual", "collision"})) return;
+    const bool is_of_body = IsIn(element, {"inertial", "geom"});
+    for (const tinyxml2::XMLAttribute* at = element->FirstAttribute(); at != nullptr; at = at->Next()) {
+      if (std::find(std::begin(kAttributes), std::end(kAttributes), at->Name()) == std::end(kAttributes))
+        continue;
+      element->SetAttribute(at->Name(), ReplaceNumbers(at->Value(), is_of_body, replace).c_str());
+    }
+  });
+}
+
+/// The numbers of a TOML text: neither in strings nor in comments, nor parts of names.
+std::string ReplaceInToml(std::string_view text, const Replace& replace) {
+  constexpr std::string_view kWord = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_+-.";
+  constexpr std::string_view kOfBody[] = {"mass", "com", "inertia"};
+  std::string result;
+  bool is_of_body = false;
+  while (!text.empty()) {
+    size_t length = 1;
+    const char first = text.front();
+    if (first == '#' || first == '"' || first == '\'') {
+      const size_t end = text.find(first == '#' ? '\n' : first, 1);
+      length = std::min(end, text.size() - 1) + 1;
+    } else if (kWord.find(first) != std::string_view::npos) {
+      length = std::min(text.find_first_not_of(kWord), text.size());
+    }
+    const std::string_view word = text.substr(0, length);
+    const std::optional<PrintedNumber> number = ReadPrinted(word);
+    result += number ? replace({*number, is_of_body}, word) : std::string(word);
+    text.remove_prefix(length);
+    // The key that stands before its numbers.
+    if (!number && std::isalpha(static_cast<unsigned char>(first)) != 0)
+      is_of_body = std::find(std::begin(kOfBody), std::end(kOfBody), word) != std::end(kOfBody);
+  }
+  return result;
+}
+
+/// Absolute values of numbers, and how often each stands in a file.
+using Values = std::map<double, int>;
+
+/// @param exact places that stand in the other file, too.
+bool IsExact(const FileNumber& number, const Values& exact) {
+  return number.half_unit == 0.0 || (!number.is_of_body && exact.contains(std::abs(number.value)));
+}
+
+/// Moves numbers up or down at random, the same way for the same seed.
+class Mover {
+ public:
+  /// @param exact numbers that stay as they are.
+  Mover(unsigned seed, const Values& exact) : random_(seed), exact_(exact) {}
+  /// By how much this number is moved.
+  double Draw(const FileNumber& number) {
+    const double sign = (random_() & 1U) != 0 ? 1.0 : -1.0;
+    return IsExact(number, exact_) ? 0.0 : sign * number.half_unit;
+  }
+  Replace AsReplace() {
+    return [this](const FileNumber& number, std::string_view text) {
+      const double change = Draw(number);
+      return change == 0.0 ? std::string(text) : FormatNumber(number.value + change, 17);
+    };
+  }
+
+ private:
+  std::mt19937 random_;
+  const Values& exact_;
+};
+
+/// One file's numbers.
+class NumberedFile {
+ public:
+  virtual ~NumberedFile() = default;
+  [[nodiscard]] virtual PrintedSpread Draw(int count, const Values& exact) const = 0;
+
+  [[nodiscard]] Values ListValues() const {
+    Values values;
+    Visit([&](const FileNumber& number) {
+      if (!number.is_of_body) ++values[std::abs(number.value)];
+    });
+    return values;
+  }
+
+ protected:
+  /// All numbers that describe the mechanism.
+  virtual void Visit(const std::function<void(const FileNumber&)>& visit) const = 0;
+
+  [[nodiscard]] PrintedDigits CountDigits(const Values& exact) const {
+    PrintedDigits digits;
+    Visit([&](const FileNumber& number) {
+      if (IsExact(number, exact)) return;
+      digits.fewest = digits.count == 0 ? number.digits : std::min(digits.fewest, number.digits);
+      digits.most = std::max(digits.most, number.digits);
+      ++digits.count;
+    });
+    return digits;
+  }
+};
+
+/// A replacement that replaces nothing.
+Replace AsReplace(const std::function<void(const FileNumber&)>& visit) {
+  return [&visit](const FileNumber& number, std::string_view text) {
+    visit(number);
+    return std::string(text);
+  };
+}
+
+/// The inertial elements of an MJCF by the engine's body, depth first; empty where elements make bodies of
+/// their own.
+std::vector<const Element*> ListInertials(const MjcfFile& mjcf, const mjModel& engine) {
+  std::vector<const Element*> inertials = {nullptr};
+  for (const Element* world : ListChildren(static_cast<const Element*>(mjcf.root()), "worldbody")) {
+    VisitElements(world, [&](const Element* element) {
+      if (std::string_view(element->Name()) == "body")
+        inertials.push_back(element->FirstChildElement("inertial"));
+    });
+  }
+  if (static_cast<int>(inertials.size()) != engine.nbody) inertials.clear();
+  return inertials;
+}
+
+/// An MJCF with nothing that has no effect on the mechanism.
+std::string Reduce(const MjcfFile& mjcf) {
+  MjcfFile reduced(mjcf.PrintFor(std::filesystem::current_path()), mjcf.source());
+  Element* const root = reduced.root();
+  const auto keeps = [](std::string_view name, std::initializer_list<std::string_view> kept) {
+    return std::find(kept.begin(), kept.end(), name) != kept.end();
+  };
+  bool uses_geoms = false;
+  for (Element* child : ListChildren(root)) {
+    const std::string_view name = child->Name();
+    if (name == "compiler") uses_geoms = uses_geoms || ReadAttribute(*child, "inertiafromgeom") == "true";
+    if (!keeps(name, {"compiler", "option", "size", "default", "asset", "worldbody", "equality"}))
+      root->DeleteChild(child);
+  }
+  for (Element* equality : ListChildren(root, "equality")) {
+    for (Element* child : ListChildren(equality)) {
+      if (std::string_view(child->Name()) != "joint") equality->DeleteChild(child);
+    }
+  }
+  bool has_mesh = false;
+  for (Element* world : ListChildren(root, "worldbody")) {
+    VisitElements(world, [&](Element* body) {
+      const bool is_world = body == world;
+      if (!is_world && std::string_view(body->Name()) != "body") return;
+      const bool drops_geoms = is_world || (!uses_geoms && body->FirstChildElement("inertial") != nullptr);
+      for (Element* child : ListChildren(body)) {
+        const std::string_view name = child->Name();
+        if (name == "camera" || name == "light" || (drops_geoms && name == "geom")) {
+          body->DeleteChild(child);
+        } else if (name == "geom") {
+          has_mesh = true;
+        }
+      }
+    });
+  }
+  VisitElements(root, [&](Element* element) {
+    element->DeleteAttribute("material");
+    element->DeleteAttribute("rgba");
+  });
+  for (Element* asset : ListChildren(root, "asset")) {
+    for (Element* child : ListChildren(asset)) {
+      if (!has_mesh || std::string_view(child->Name()) != "mesh") asset->DeleteChild(child);
+    }
+  }
+  return reduced.Print();
+}
+
+/// Changes the parts of a description; bodies are those of the parts again.
+template <typename Change>
+void ChangeParts(const mjModel& engine, const std::vector<const Element*>& inertials, RobotDescription* robot,
+                 const Change& change) {
+  for (size_t body = 1; body < inertials.size(); ++body) {
+    const std::string name = NameOf(engine, mjOBJ_BODY, static_cast<int>(body));
+    for (DescribedPart& part : robot->parts) {
+      if (inertials[body] != nullptr && part.name == name) change(*inertials[body], &part);
+    }
+  }
+  FuseParts(robot);
+}
+
+/// The six numbers of a fullinertia or the three of a diaginertia.
+std::vector<FileNumber> ReadNumbers(const Element& inertial, const char* attribute) {
+  std::vector<FileNumber> numbers;
+  ReplaceNumbers(ReadAttribute(inertial, attribute), true, [&](const FileNumber& number, std::string_view) {
+    numbers.push_back(number);
+    return std::string();
+  });
+  return numbers;
+}
+
+/// By (row, column) in the order of fullinertia, of which diaginertia has the first three.
+constexpr std::pair<int, int> kEntries[] = {{0, 0}, {1, 1}, {2, 2}, {0, 1}, {0, 2}, {1, 2}};
+
+template <typename Value>
+Matrix3d MakeTensor(const std::vector<FileNumber>& numbers, const Value& value) {
+  Matrix3d tensor = Matrix3d::Zero();
+  for (size_t k = 0; k < std::min(numbers.size(), std::size(kEntries)); ++k) {
+    const auto [row, col] = kEntries[k];
+    tensor(row, col) = tensor(col, row) = value(numbers[k]);
+  }
+  return tensor;
+}
+
+class NumberedMjcf : public NumberedFile {
+ public:
+  explicit NumberedMjcf(const DescriptionFile& file)
+      : source_(file.path().string()), text_(Reduce(file.document())) {}
+
+  [[nodiscard]] PrintedSpread Draw(int count, const Values& exact) const override {
+    PrintedSpread spread;
+    spread.digits = CountDigits(exact);
+    spread.nominal = ReadNominal(&spread.undiagonalized);
+    for (int k = 0; k < count; ++k) spread.draws.push_back(ReadMoved(Mover(static_cast<unsigned>(k), exact)));
+    return spread;
+  }
+
+ protected:
+  void Visit(const std::function<void(const FileNumber&)>& visit) const override {
+    const MjcfFile mjcf(text_, source_);
+    VisitElements(mjcf.root(), [&](Element* element) {
+      for (const char* attribute : {"diaginertia", "fullinertia"})
+        ReplaceNumbers(ReadAttribute(*element, attribute), true, AsReplace(visit));
+    });
+    ReplaceInXml(mjcf.root(), AsReplace(visit));
+  }
+
+ private:
+  [[nodiscard]] RobotDescription ReadNominal(std::optional<RobotDescription>* undiagonalized) const {
+    const MjcfFile mjcf(text_, source_);
+    const MjModelPtr engine = LoadMjcfText(text_, source_);
+    RobotDescription robot = ReadMjcfDescription(*engine, source_);
+    RobotDescription stated = robot;
+    bool has_tensor = false;
+    ChangeParts(
+        *engine, ListInertials(mjcf, *engine), &stated, [&](const Element& inertial, DescribedPart* part) {
+          const std::vector<FileNumber> numbers = ReadNumbers(inertial, "fullinertia");
+          if (numbers.size() != std::size(kEntries)) return;
+          has_tensor = true;
+          part->body.inertia = MakeTensor(numbers, [](const FileNumber& number) { return number.value; });
+        });
+    if (has_tensor) *undiagonalized = std::move(stated);
+    return robot;
+  }
+
+  [[nodiscard]] RobotDescription ReadMoved(Mover mover) const {
+    const MjcfFile mjcf(text_, source_);
+    ReplaceInXml(mjcf.root(), mover.AsReplace());
+    const MjModelPtr engine = LoadMjcfText(mjcf.Print(), source_);
+    RobotDescription robot = ReadMjcfDescription(*engine, source_);
+    ChangeParts(
+        *engine, ListInertials(mjcf, *engine), &robot, [&](const Element& inertial, DescribedPart* part) {
+          const auto move = [&](const FileNumber& number) { return mover.Draw(number); };
+          const Matrix3d R = part->X_LC.linear();
+          part->body.inertia += R * MakeTensor(ReadNumbers(inertial, "diaginertia"), move) * R.transpose() +
+                                MakeTensor(ReadNumbers(inertial, "fullinertia"), move);
+        });
+    return robot;
+  }
+
+  std::string source_;
+  std::string text_;
+};
+
+/// A URDF or a parameter file, read as it stands.
+class NumberedText : public NumberedFile {
+ public:
+  NumberedText(const DescriptionFile& file, const UrdfOptions& options) : file_(file), options_(options) {
+    options_.keep_impossible = true;
+  }
+
+  [[nodiscard]] PrintedSpread Draw(int count, const Values& exact) const override {
+    PrintedSpread spread;
+    spread.digits = CountDigits(exact);
+    spread.nominal = file_.Describe();
+    for (int k = 0; k < count; ++k) {
+      Mover mover(static_cast<unsigned>(k), exact);
+      try {
+        spread.draws.push_back(
+            DescriptionFile(file_.path(), ReplaceAll(mover.AsReplace()), options_).Describe());
+      } catch (const InputError&) {
+        // A parameter file's bodies must be some: of a slender one that may fail.
+      }
+    }
+    return spread;
+  }
+
+ protected:
+  void Visit(const std::function<void(const FileNumber&)>& visit) const override {
+    static_cast<void>(ReplaceAll(AsReplace(visit)));
+  }
+
+ private:
+  [[nodiscard]] std::string ReplaceAll(const Replace& replace) const {
+    if (file_.format() == RobotFormat::kToml) return ReplaceInToml(file_.text(), replace);
+    tinyxml2::XMLDocument document;
+    ParseXml(file_.text(), file_.path().string(), &document);
+    ReplaceInXml(document.RootElement(), replace);
+    return PrintXml(document);
+  }
+
+  const DescriptionFile& file_;
+  UrdfOptions options_;
+};
+
+std::unique_ptr<NumberedFile> MakeNumbered(const DescriptionFile& file, const UrdfOptions& options) {
+  if (file.format() == RobotFormat::kMjcf) return std::make_unique<NumberedMjcf>(file);
+  return std::make_unique<NumberedText>(file, options);
+}
+
+}  // namespace
+
+std::optional<PrintedNumber> ReadPrinted(std::string_view text) {
+  constexpr int kFewestDigits = 3;
+  constexpr int kFewestDecimals = 4;
+  if (text.starts_with('+')) text.remove_prefix(1);
+  PrintedNumber number;
+  const char* const end = text.data() + text.size();
+  const auto [stop, error] = std::from_chars(text.data(), end, number.value);
+  if (error != std::errc() || stop != end || !std::isfinite(number.value)) return std::nullopt;
+  const size_t exponent = std::min(text.find_first_of("eE"), text.size());
+  const std::string_view mantissa = text.substr(0, exponent);
+  const size_t point = std::min(mantissa.find('.'), mantissa.size());
+  int power = 0;
+  if (exponent < text.size()) {
+    std::string_view rest = text.substr(exponent + 1);
+    if (rest.starts_with('+')) rest.remove_prefix(1);
+    std::from_chars(rest.data(), end, power);
+  }
+  int decimals = -power;
+  for (size_t i = 0; i < mantissa.size(); ++i) {
+    if (std::isdigit(static_cast<unsigned char>(mantissa[i])) == 0) continue;
+    if (i > point) ++decimals;
+    if (number.digits > 0 || mantissa[i] != '0') ++number.digits;
+  }
+  if (number.value == std::floor(number.value) && decimals < kFewestDecimals) return number;
+  if (decimals < kFewestDecimals) decimals += std::max(kFewestDigits - number.digits, 0);
+  number.half_unit = 0.5 * std::pow(10.0, -decimals);
+  return number;
+}
+
+std::optional<std::array<PrintedSpread, 2>> DrawWithinDigits(
+    const std::array<const DescriptionFile*, 2>& files, const UrdfOptions& options, int count) {
+  std::array<PrintedSpread, 2> spreads;
+  try {
+    std::array<std::unique_ptr<NumberedFile>, 2> numbered;
+    std::array<Values, 2> values;
+    for (size_t i = 0; i < 2; ++i) {
+      numbered[i] = MakeNumbered(*files[i], options);
+      values[i] = numbered[i]->ListValues();
+    }
+    for (size_t i = 0; i < 2; ++i) {
+      // Those that stand in the other file as often at least.
+      Values exact = values[i];
+      std::erase_if(exact, [&](const auto& value) {
+        const auto other = values[1 - i].find(value.first);
+        return other == values[1 - i].end() || other->second < value.second;
+      });
+      spreads[i] = numbered[i]->Draw(count, exact);
+      spreads[i].digits.file = files[i]->path().filename().string();
+      if (spreads[i].draws.empty()) return std::nullopt;
+    }
+  } catch (const InputError&) {
+    return std::nullopt;
+  }
+  return spreads;
+}
+
+}  // namespace dexcheck

@@ -1,0 +1,282 @@
+#include "harness/descriptions/robot_part.h"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "controller/common/errors.h"
+#include "controller/common/text.h"
+#include "harness/descriptions/alike_names.h"
+#include "harness/descriptions/description_match.h"
+#include "harness/descriptions/join_names.h"
+
+namespace dexcheck {
+namespace {
+
+int FindJoint(const RobotSpec& spec, const std::string& name) {
+  const auto found = std::find_if(spec.joints.begin(), spec.joints.end(),
+                                  [&](const Joint& joint) { return joint.name == name; });
+  return found == spec.joints.end() ? -1 : static_cast<int>(found - spec.joints.begin());
+}
+
+/// The joint that moves the link of that name as its own; -1.
+int FindJointOfLink(const RobotSpec& spec, const std::string& link) {
+  const auto found = std::find_if(spec.joints.begin(), spec.joints.end(),
+                                  [&](const Joint& joint) { return joint.link == link; });
+  return found == spec.joints.end() ? -1 : static_cast<int>(found - spec.joints.begin());
+}
+
+/// Of each joint, whether it is `root` or hangs on it.
+std::vector<bool> ListSubtree(const RobotSpec& spec, int root) {
+  std::vector<bool> is_in(spec.joints.size(), false);
+  for (size_t i = 0; i < spec.joints.size(); ++i) {
+    const int parent = spec.joints[i].parent;
+    is_in[i] = static_cast<int>(i) == root || (parent >= 0 && is_in[static_cast<size_t>(parent)]);
+  }
+  return is_in;
+}
+
+/// Takes a joint out; nothing hangs on it any more.
+void EraseJoint(int index, RobotDescription* robot) {
+  const auto shift = [&](int* joint) {
+    if (*joint > index) --*joint;
+  };
+  robot->spec.joints.erase(robot->spec.joints.begin() + index);
+  robot->joints.erase(robot->joints.begin() + index);
+  for (Joint& joint : robot->spec.joints) {
+    shift(&joint.parent);
+    if (joint.coupling) shift(&joint.coupling->leader);
+  }
+  for (Frame& frame : robot->spec.frames) shift(&frame.link);
+  for (DescribedPart& part : robot->parts) shift(&part.joint);
+}
+
+/// Welds a joint's link to what carries it.
+void HoldJoint(int index, double value, RobotDescription* robot) {
+  RobotSpec& spec = robot->spec;
+  const Joint joint = spec.joints[static_cast<size_t>(index)];
+  if (joint.type == JointType::kBall)
+    throw InputError(spec.source + ": joint " + Quote(joint.name) + ": a ball cannot be held");
+  const bool slides = joint.type == JointType::kPrismatic;
+  const Pose X_Pi =
+      joint.X_PB * CalcMdhTransform(joint.mdh.alpha, joint.mdh.a, joint.mdh.q + (slides ? 0.0 : value),
+                                    joint.mdh.d + (slides ? value : 0.0));
+  const auto weld = [&](int* carrier, Pose* X) {
+    if (*carrier != index) return;
+    *carrier = joint.parent;
+    *X = X_Pi * *X;
+  };
+  for (size_t i = 0; i < spec.joints.size(); ++i) {
+    // A joint that follows this one is held with it, and was before.
+    if (spec.joints[i].coupling && spec.joints[i].coupling->leader == index) spec.joints[i].coupling.reset();
+    if (spec.joints[i].parent == index) robot->joints[i].X_PW = X_Pi * robot->joints[i].X_PW;
+    weld(&spec.joints[i].parent, &spec.joints[i].X_PB);
+  }
+  for (Frame& frame : spec.frames) weld(&frame.link, &frame.X_LF);
+  for (DescribedPart& part : robot->parts) weld(&part.joint, &part.X_iL);
+  EraseJoint(index, robot);
+}
+
+/// Leaves a link out with all that it carries; false when there is none.
+bool LeaveOut(const std::string& link, RobotDescription* robot) {
+  const int root = FindJointOfLink(robot->spec, link);
+  if (root < 0) {
+    return std::erase_if(robot->parts, [&](const DescribedPart& part) { return part.name == link; }) > 0;
+  }
+  const std::vector<bool> is_in = ListSubtree(robot->spec, root);
+  const auto is_gone = [&](int joint) { return joint >= 0 && is_in[static_cast<size_t>(joint)]; };
+  std::erase_if(robot->parts, [&](const DescribedPart& part) { return is_gone(part.joint); });
+  std::erase_if(robot->spec.frames, [&](const Frame& frame) { return is_gone(frame.link); });
+  for (Joint& joint : robot->spec.joints) {
+    if (joint.coupling && is_gone(joint.coupling->leader)) joint.coupling.reset();
+  }
+  for (int i = static_cast<int>(is_in.size()) - 1; i >= 0; --i) {
+    if (is_gone(i)) EraseJoint(i, robot);
+  }
+  return true;
+}
+
+/// Where the other robot has the link of a base that floats here, in its world.
+void FixBase(const RobotDescription& other, RobotDescription* robot) {
+  Base& base = robot->spec.base;
+  if (base.type != BaseType::kFloating) return;
+  base.type = BaseType::kFixed;
+  base.X_B0 = Pose::Identity();
+  if (other.spec.base.type != BaseType::kFixed) return;
+  base.X_B0 = other.spec.base.X_B0;
+  for (const DescribedPart& part : other.parts) {
+    if (part.joint < 0 && part.name == base.link) base.X_B0 = other.spec.base.X_B0 * part.X_iL;
+  }
+}
+
+/// Those that only `only` keeps: all joints that are not below it.
+void HoldOthers(const std::string& only, const RobotDescription& robot, std::map<std::string, double>* held) {
+  int root = FindJointOfLink(robot.spec, only);
+  if (root < 0) root = FindJoint(robot.spec, only);
+  if (root < 0) return;
+  const std::vector<bool> is_kept = ListSubtree(robot.spec, root);
+  for (size_t i = 0; i < is_kept.size(); ++i) {
+    if (!is_kept[i]) held->emplace(robot.spec.joints[i].name, 0.0);
+  }
+}
+
+/// Joints that follow held ones are held where these put them.
+void HoldFollowers(const RobotSpec& spec, std::map<std::string, double>* held) {
+  for (const Joint& joint : spec.joints) {
+    if (!joint.coupling) continue;
+    const auto leader = held->find(spec.joints[static_cast<size_t>(joint.coupling->leader)].name);
+    if (leader != held->end())
+      held->emplace(joint.name, joint.coupling->multiplier * leader->second + joint.coupling->offset);
+  }
+}
+
+bool HasLink(const RobotDescription& robot, const std::string& name) {
+  return FindJointOfLink(robot.spec, name) >= 0 ||
+         std::any_of(robot.parts.begin(), robot.parts.end(),
+                     [&](const DescribedPart& part) { return part.name == name; });
+}
+
+double SumMasses(const RobotDescription& robot, const std::vector<bool>& is_in) {
+  double mass = 0.0;
+  for (size_t i = 0; i < is_in.size(); ++i) mass += is_in[i] ? robot.spec.joints[i].body.mass : 0.0;
+  return mass;
+}
+
+/// Whether what carries a joint that only `robot` has weighs, in `other`, what it does here without its
+/// subtree.
+bool LacksMass(const RobotDescription& robot, int joint, const RobotDescription& other) {
+  int carrier = robot.spec.joints[static_cast<size_t>(joint)].parent;
+  const auto mass_of = [](const RobotDescription& one, int link) {
+    return link < 0 ? one.spec.base.body.mass : one.spec.joints[static_cast<size_t>(link)].body.mass;
+  };
+  int there = -1;
+  for (; carrier >= 0; carrier = robot.spec.joints[static_cast<size_t>(carrier)].parent) {
+    there = FindJoint(other.spec, robot.spec.joints[static_cast<size_t>(carrier)].name);
+    if (there >= 0) break;
+  }
+  const double subtree = SumMasses(robot, ListSubtree(robot.spec, joint));
+  const double without = mass_of(other, there) - mass_of(robot, carrier);
+  return std::abs(without) < std::abs(without - subtree);
+}
+
+}  // namespace
+
+void AddHeldJoint(const std::string& text, RobotPart* part) {
+  const size_t at = text.find('=');
+  double value = 0.0;
+  if (at != std::string::npos) {
+    const std::optional<double> number = ParseNumber<double>(text.substr(at + 1));
+    if (!number || !std::isfinite(*number))
+      throw InputError("--lock: must be JOINT or JOINT=VALUE with a number, got " + Quote(text));
+    value = *number;
+  }
+  part->held[text.substr(0, at)] = value;
+}
+
+std::vector<std::string> TakePart(const RobotPart& part, RobotDescription* a, RobotDescription* b,
+                                  int* held) {
+  std::vector<std::string> names;
+  for (const Joint& joint : a->spec.joints) names.push_back(joint.name);
+  std::vector<std::string> of_b;
+  for (const Joint& joint : b->spec.joints) of_b.push_back(joint.name);
+  std::vector<std::string> notes = TakeJointNames(names, a->spec.source, b);
+  // What one of the two calls a joint is as good as what the other calls it.
+  const auto translate = [&](const std::string& name) {
+    const auto found = std::find(of_b.begin(), of_b.end(), name);
+    return found == of_b.end() ? name : b->spec.joints[static_cast<size_t>(found - of_b.begin())].name;
+  };
+  const auto require = [&](bool is_there, const std::string& name, const char* option) {
+    if (!is_there)
+      throw InputError(std::string(option) + " of " + a->spec.source + " or " + b->spec.source + ", got " +
+                       Quote(name));
+  };
+  std::map<std::string, double> all_held;
+  for (const auto& [name, value] : part.held) {
+    const std::string joint = translate(name);
+    require(FindJoint(a->spec, joint) >= 0 || FindJoint(b->spec, joint) >= 0, name,
+            "--lock: must be a joint");
+    all_held.emplace(joint, value);
+  }
+  for (const std::string& link : part.left_out)
+    require(HasLink(*a, link) || HasLink(*b, link), link,
+            "--ignore: must be armature, damping, friction, coupling, or a link");
+  if (!part.only.empty()) {
+    const std::string only = translate(part.only);
+    const auto has = [&](const RobotDescription& robot) {
+      return FindJointOfLink(robot.spec, only) >= 0 || FindJoint(robot.spec, only) >= 0;
+    };
+    require(has(*a) || has(*b), part.only, "--only: must be a link or joint");
+    for (const RobotDescription* robot : {a, b}) HoldOthers(only, *robot, &all_held);
+  }
+  if (part.fixes_base || !part.only.empty()) {
+    FixBase(*b, a);
+    FixBase(*a, b);
+    notes.push_back("base: held where it is");
+  }
+  std::vector<std::string> done;
+  for (RobotDescription* robot : {a, b}) {
+    for (const std::string& link : part.left_out) {
+      if (LeaveOut(link, robot)) done.push_back(Quote(link) + " of " + robot->spec.source);
+    }
+    std::map<std::string, double> own = all_held;
+    HoldFollowers(robot->spec, &own);
+    for (const auto& [joint, value] : own) {
+      const int index = FindJoint(robot->spec, joint);
+      if (index < 0) continue;
+      HoldJoint(index, value, robot);
+      ++*held;
+    }
+    FuseParts(robot);
+    if (robot->spec.joints.empty() && robot->spec.base.type != BaseType::kFloating)
+      throw InputError(robot->spec.source + ": nothing is left that moves");
+  }
+  if (!all_held.empty()) {
+    std::vector<std::string> list;
+    for (const auto& [joint, value] : all_held) list.push_back(joint + " at " + FormatNumber(value));
+    notes.push_back("joints that are held: " + JoinNames(list));
+  }
+  if (!done.empty()) notes.push_back("left out: " + JoinNames(done));
+  return notes;
+}
+
+std::optional<RobotPart> FindCommonPart(const RobotDescription& a, const RobotDescription& b) {
+  RobotDescription renamed = b;
+  std::vector<std::string> names;
+  for (const Joint& joint : a.spec.joints) names.push_back(joint.name);
+  TakeJointNames(names, a.spec.source, &renamed);
+  for (const RobotDescription* robot : {&a, &b}) {
+    const BaseType type = robot->spec.base.type;
+    if ((type != BaseType::kFixed && type != BaseType::kFloating) || robot->spec.object ||
+        robot->format == RobotFormat::kToml)
+      return std::nullopt;
+  }
+  RobotPart part;
+  const BaseType types[] = {a.spec.base.type, renamed.spec.base.type};
+  part.fixes_base = types[0] != types[1] && a.states_base && renamed.states_base &&
+                    (types[0] == BaseType::kFloating || types[1] == BaseType::kFloating);
+  const auto find = [&](const RobotDescription& robot, const RobotDescription& other) {
+    const std::vector<int> match = MatchJoints(robot.spec, other.spec);
+    const auto missing = std::count(match.begin(), match.end(), -1);
+    std::vector<bool> is_gone(match.size(), false);
+    for (size_t i = 0; i < match.size(); ++i) {
+      if (match[i] >= 0 || is_gone[i]) continue;
+      const std::vector<bool> subtree = ListSubtree(robot.spec, static_cast<int>(i));
+      bool is_whole = true;  // nothing that hangs on it is both's
+      for (size_t k = 0; k < match.size(); ++k) is_whole = is_whole && (!subtree[k] || match[k] < 0);
+      if (is_whole && LacksMass(robot, static_cast<int>(i), other)) {
+        part.left_out.push_back(robot.spec.joints[i].link);
+        for (size_t k = 0; k < match.size(); ++k) is_gone[k] = is_gone[k] || subtree[k];
+      } else {
+        part.held.emplace(robot.spec.joints[i].name, 0.0);
+      }
+    }
+    return missing;
+  };
+  const std::ptrdiff_t of_a = find(a, renamed);
+  const std::ptrdiff_t of_b = find(renamed, a);
+  const bool is_most = 2 * of_a <= std::ssize(a.spec.joints) && 2 * of_b <= std::ssize(renamed.spec.joints);
+  if (part.empty() || (of_a > 0 && of_b > 0) || !is_most) return std::nullopt;
+  return part;
+}
+
+}  // namespace dexcheck

@@ -1,0 +1,117 @@
+// dexcheck consistency of published files: what their digits leave open is no difference, and hides none.
+
+#include <fmt/format.h>
+
+#include <regex>
+
+#include "tests/harness/cli/dexcheck_program.h"
+#include "tests/harness/descriptions/panda_urdf.h"
+
+namespace dexcheck::testing::digits_test {
+namespace {
+
+/// The text with each number printed with at most so many significant digits.
+std::string RoundNumbers(const std::string& text, int digits) {
+  static const std::regex number(R"(-?\d*\.\d+(e-?\d+)?)");
+  std::string rounded;
+  std::string rest = text;
+  for (std::smatch match; std::regex_search(rest, match, number); rest = match.suffix())
+    rounded += match.prefix().str() + fmt::format("{:.{}g}", std::stod(match.str()), digits);
+  return rounded + rest;
+}
+
+class Digits : public CommandTest {
+ protected:
+  Json Compare(int exit_code, const std::string& a, const std::string& b,
+               const Words& more = "--seed 1") const {
+    return RunJson(exit_code, Words{"consistency", a, b, "--samples", "100"} + more);
+  }
+  const std::string kPanda = MakePandaUrdf();
+};
+
+// A URDF with few digits and an MJCF with more: of any number of digits, nothing is said to differ.
+TEST_F(Digits, WhatTheyLeaveOpenIsNoDifference) {
+  for (int digits = 4; digits <= 12; ++digits) {
+    SCOPED_TRACE(digits);
+    Write("rounded.urdf", RoundNumbers(kPanda, digits));
+    const Json results = Compare(0, "rounded.urdf", kPandaXml);
+    EXPECT_EQ(results.at("verdict"), "pass");
+    EXPECT_EQ(results.at("outcome"), "digits");
+    EXPECT_TRUE(results.at("digits").at("exceeds").empty());
+    EXPECT_EQ(results.at("digits").at("files").at(0).at("file"), "rounded.urdf");
+    EXPECT_LE(results.at("digits").at("files").at(0).at("most"), digits);
+    // Not for want of judgement: what differs uses a part of what is open.
+    double most = 0.0;
+    for (const auto& [check, units] : results.at("digits").at("units").items())
+      most = std::max(most, units.get<double>());
+    EXPECT_GT(most, 0.01);
+    EXPECT_LE(most, 1.0 + 1e-6);
+    const Json exact = Compare(1, "rounded.urdf", kPandaXml, "--exact");
+    EXPECT_EQ(exact.at("outcome"), "differ");
+    EXPECT_FALSE(exact.contains("digits"));
+  }
+  Write("same.urdf", kPanda);
+  EXPECT_EQ(Compare(0, "same.urdf", kPandaXml).at("outcome"), "rounding");
+  EXPECT_EQ(Compare(0, "rounded.urdf", kPandaXml, "--digits 3").at("outcome"), "tolerance");
+  EXPECT_TRUE(Refused("consistency rounded.urdf same.urdf --exact --digits 3", {"--exact"}));
+}
+
+// Frames of links are placed by both files: a turn that one of them rounds moves both.
+TEST_F(Digits, FramesOfLinksMoveWithBothFiles) {
+  const std::string turned = ReplaceOnce(ReadFixture("pair.urdf"), "<origin xyz=\"0 0 0.1\"/>",
+                                         "<origin xyz=\"0 0 0.1\" rpy=\"-0.08726646255 0.123456789 0\"/>");
+  Write("turned.urdf", turned);
+  for (const int digits : {4, 6, 8}) {
+    Write("rounded.urdf", RoundNumbers(turned, digits));
+    EXPECT_EQ(Compare(0, "turned.urdf", "rounded.urdf").at("outcome"), "digits") << digits;
+    EXPECT_EQ(Compare(0, "rounded.urdf", "turned.urdf").at("outcome"), "digits") << digits;
+  }
+}
+
+// One number in the middle of a robot whose others are all rounded.
+TEST_F(Digits, AMistakeIsOnTheFirstLine) {
+  const std::string rounded = RoundNumbers(kPanda, 5);
+  const std::string mass = "<mass value=\"3.2286\"/>";
+  const size_t link = rounded.find(mass);
+  ASSERT_NE(link, std::string::npos);
+  const size_t com = rounded.rfind("<origin xyz=\"", link) + 13;
+  struct Case {
+    const char* check;
+    std::string text;
+  };
+  const double x = std::stod(rounded.substr(com));
+  for (const Case& one : {Case{"link_mass", ReplaceOnce(rounded, mass, "<mass value=\"3.2609\"/>")},  // 1 %
+                          {"link_com", std::string(rounded).replace(com, rounded.find(' ', com) - com,
+                                                                    fmt::format("{:.5g}", x + 0.001))}}) {
+    SCOPED_TRACE(one.check);
+    Write("wrong.urdf", one.text);
+    const Json results = Compare(1, "wrong.urdf", kPandaXml);
+    EXPECT_EQ(results.at("outcome"), "differ");
+    const Json& exceeds = results.at("digits").at("exceeds");
+    ASSERT_FALSE(exceeds.empty());
+    EXPECT_EQ(exceeds.at(0).at("check"), one.check);
+    EXPECT_THAT(exceeds.at(0).at("where"), HasSubstr("panda_link3"));
+    EXPECT_GT(exceeds.at(0).at("units"), 5.0);
+    // Other links are not blamed.
+    for (const Json& excess : exceeds) {
+      if (excess.at("check") == "link_mass" || excess.at("check") == "link_com" ||
+          excess.at("check") == "link_inertia")
+        EXPECT_THAT(excess.at("where"), HasSubstr("panda_link3"));
+    }
+    const std::string out = Expect(1, "consistency wrong.urdf " + kPandaXml + " --samples 50 --quiet").out;
+    EXPECT_THAT(out.substr(0, out.find('\n')), AllOf(HasSubstr(one.check), HasSubstr("panda_link3")));
+    EXPECT_LE(std::count(out.begin(), out.end(), '\n'), 24);
+  }
+}
+
+// A slender body, whose axes the engine finds to some digits only: these are its own.
+TEST_F(Digits, TheEnginesOwnDiagonalisationIsOpenToo) {
+  Copy("pair.urdf");
+  WriteChanged("pair.xml", ReadFixture("pair.xml"), "mass=\"1.5\"", "mass=\"1.5\"");
+  // One number that the other file has not, so that the tensor is not the one that the MJCF states.
+  WriteChanged("digits.urdf", ReadFixture("pair.urdf"), "ixy=\"0.001\"", "ixy=\"0.00100000000001\"");
+  EXPECT_EQ(Compare(0, "digits.urdf", "pair.xml").at("outcome"), "digits");
+}
+
+}  // namespace
+}  // namespace dexcheck::testing::digits_test

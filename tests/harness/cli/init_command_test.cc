@@ -1,0 +1,84 @@
+// dexcheck init: a folder that runs at once.
+
+#include "tests/harness/cli/dexcheck_program.h"
+
+namespace dexcheck::testing::init_command_test {
+namespace {
+
+class InitCommand : public CommandTest {
+ protected:
+  /// The folder's motion, shortened.
+  [[nodiscard]] Json RunMotion(int exit_code, const std::string& folder) const {
+    return RunJson(exit_code, {"run", folder + "/motion.toml", "--no-log", "--set", "settle=0.1"});
+  }
+};
+
+TEST_F(InitCommand, MakesAFolderOfAUrdfThatRuns) {
+  Copy("pair.urdf");
+  Expect(0, "init pair.urdf");
+  for (const char* file :
+       {"robot.toml", "robot.xml", "motion.toml", "gains.toml", ".github/workflows/dexcheck.yml"})
+    EXPECT_TRUE(Has(std::string("pair/") + file)) << file;
+  const Json run = RunMotion(0, "pair");
+  EXPECT_EQ(run.at("verdict"), "pass");
+  EXPECT_GT(run.at("tracking").at("joint_error_max_rad").get<double>(), 0.0);
+  // The MJCF is the URDF to rounding, and an independent one agrees with it.
+  for (const char* other : {"pair.urdf", "pair/robot.toml"})
+    EXPECT_EQ(
+        RunJson(0, {"consistency", other, "pair/robot.xml", "--exact", "--samples", "50"}).at("outcome"),
+        "rounding");
+  EXPECT_THAT(Expect(0, "study run pair/gains.toml --db gains.db").out, HasSubstr("18 of 18"));
+  // What is there is not written over.
+  EXPECT_TRUE(Refused("init pair.urdf", {"pair", "--out"}));
+}
+
+TEST_F(InitCommand, TakesTheUsersMjcfWithMotors) {
+  Copy("pair.urdf");
+  Copy("pair.xml");
+  Expect(0, "init pair.urdf pair.xml --out both");
+  EXPECT_THAT(Read("both/robot.xml"), HasSubstr("<motor"));
+  EXPECT_EQ(RunMotion(0, "both").at("verdict"), "pass");
+  // Of an MJCF alone, too.
+  Expect(0, "init pair.xml --out alone");
+  EXPECT_EQ(RunMotion(0, "alone").at("verdict"), "pass");
+  // Few digits in one of the two are a tolerance of the run.
+  WriteChanged("short.urdf", ReadFixture("pair.urdf"), "value=\"0.8\"", "value=\"0.80004\"");
+  Expect(0, "init short.urdf pair.xml --out short");
+  EXPECT_THAT(Read("short/motion.toml"), HasSubstr("tolerance"));
+  EXPECT_EQ(RunMotion(0, "short").at("verdict"), "pass");
+  // A difference is said, and found by the run.
+  WriteChanged("wrong.urdf", ReadFixture("pair.urdf"), "value=\"0.8\"", "value=\"0.9\"");
+  EXPECT_THAT(Expect(0, "init wrong.urdf pair.xml --out wrong").out, HasSubstr("dexcheck consistency"));
+  EXPECT_EQ(RunMotion(1, "wrong").at("checks").at("link_mass").at("pass"), false);
+}
+
+TEST_F(InitCommand, CopiesShippedScenarios) {
+  for (const std::string name : {"paper", "panda-reach", "two-hands"}) {
+    SCOPED_TRACE(name);
+    Expect(0, {"init", "--from", name});
+    EXPECT_EQ(RunJson(0, {"run", name + "/" + name + ".toml", "--no-log", "--set", "duration=0.02", "--set",
+                          "settle=0.1", "--unset", "expect"})
+                  .at("verdict"),
+              "pass");
+    // Its files are the folder's.
+    EXPECT_THAT(Read(name + "/" + name + ".toml"), Not(HasSubstr("../")));
+  }
+}
+
+TEST_F(InitCommand, RefusesInOneLine) {
+  Copy("two.toml");
+  Copy("pair.xml");
+  EXPECT_TRUE(Refused("init", {"init", "--from"}));
+  EXPECT_TRUE(Refused("init two.toml", {"two.toml", "URDF"}));
+  EXPECT_TRUE(Refused("init pair.xml pair.xml", {"pair.xml", "two MJCFs"}));
+  EXPECT_TRUE(Refused("init nothing.urdf", {"nothing.urdf"}));
+  EXPECT_TRUE(Refused("init --from papr", {"papr", "paper"}));
+  Write("floats.urdf", R"(<robot name="r"><link name="world"/><link name="l"><inertial><mass value="1"/>
+<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<joint name="j" type="floating"><parent link="world"/><child link="l"/></joint></robot>)");
+  EXPECT_TRUE(Refused("init floats.urdf", {"floats.urdf", "base", "floats"}));
+  EXPECT_FALSE(Has("floats"));
+}
+
+}  // namespace
+}  // namespace dexcheck::testing::init_command_test
