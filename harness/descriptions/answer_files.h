@@ -7,8 +7,8 @@
 #include <string>
 
 #include "harness/descriptions/answer_layout.h"
-#include "harness/log/npy_file.h"
 #include "harness/descriptions/random_states.h"
+#include "harness/log/npy_file.h"
 
 namespace dexcheck {
 

@@ -65,8 +65,9 @@ std::string Explanation::Tell() const {
     if (faults.size() > 1) text += ": not isolable from each other on this motion";
   }
   // What holds all the time has no begin.
-  if (std::isfinite(from)) text += ends ? ", " + FormatNumber(from, 4) + " to " + FormatNumber(to, 4) + " s"
-               : ", from " + FormatNumber(from, 4) + " s";
+  if (std::isfinite(from))
+    text += ends ? ", " + FormatNumber(from, 4) + " to " + FormatNumber(to, 4) + " s"
+                 : ", from " + FormatNumber(from, 4) + " s";
   if (rival.empty()) return text;
   // Beyond this many digits a likelihood ratio says no more.
   constexpr double kCertain = 20.0;

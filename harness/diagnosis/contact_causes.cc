@@ -9,8 +9,8 @@ namespace {
 
 using Eigen::Index;
 
-// Of a distance, m, and of how the point that is nearest moves when a radius changes. What is hardly more says
-// nothing.
+// Of a distance, m, and of how the point that is nearest moves when a radius changes. What is hardly more
+// says nothing.
 constexpr double kDistanceNoise = 1e-14, kFaintest = 1e-12;
 constexpr double kRadiusAccuracy = 1e-4;
 // What is left may be this fraction of what there was.
@@ -51,15 +51,12 @@ Causes ExplainContacts(const StepStore& store) {
       SelectCauses(y, candidates, {.alike = static_cast<double>(mismatch.cols())});
   std::vector<Index> steps(static_cast<size_t>(mismatch.cols()));
   std::iota(steps.begin(), steps.end(), 0);
-  Causes causes = TellSelection(StartExplanation(store, CauseChannel::kContact, steps), selection, candidates,
-                                [](const Candidate& one, const VectorXd& amplitude, const VectorXd& error) {
-                                  return Fault{one.fault,
-                                               one.place,
-                                               one.nominal + amplitude[0],
-                                               error.size() > 0 ? error[0] : 0.0,
-                                               one.unit,
-                                               ""};
-                                });
+  Causes causes = TellSelection(
+      StartExplanation(store, CauseChannel::kContact, steps), selection, candidates,
+      [](const Candidate& one, const VectorXd& amplitude, const VectorXd& error) {
+        return Fault{one.fault, one.place, one.nominal + amplitude[0], error.size() > 0 ? error[0] : 0.0,
+                     one.unit,  ""};
+      });
   if (selection.left > 1.0 && selection.fraction < kExplainsDistance)
     for (Explanation& one : causes) one.outcome = CauseOutcome::kNotExplained;
   return causes;

@@ -8,8 +8,8 @@
 
 #include "controller/common/errors.h"
 #include "harness/checks/consistency.h"
-#include "harness/log/npy_file.h"
 #include "harness/descriptions/urdf_reader.h"
+#include "harness/log/npy_file.h"
 #include "tests/common/evaluate_terms.h"
 #include "tests/common/legged_robots.h"
 #include "tests/common/matrix_near.h"
