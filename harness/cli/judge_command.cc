@@ -163,6 +163,7 @@ int Run(JudgeRequest request) {
   std::vector<std::filesystem::path> paths = {request.recording};
   paths.insert(paths.end(), request.more.begin(), request.more.end());
   std::vector<Recording> recordings;
+  recordings.reserve(paths.size());
   for (const std::filesystem::path& path : paths)
     recordings.push_back(OpenRecordingOf(model, path, request.columns, !request.describe));
   if (request.describe) {

@@ -97,7 +97,7 @@ const Unit* FindUnit(std::string name, Quantity quantity) {
   std::transform(name.begin(), name.end(), name.begin(), [](unsigned char c) { return std::tolower(c); });
   std::erase_if(name, [](char c) { return c == ' ' || c == '*' || c == '.'; });
   // "rad/s", "deg/s^2"
-  name = name.substr(0, name.find('/'));
+  if (const size_t slash = name.find('/'); slash != std::string::npos) name.resize(slash);
   if (quantity == Quantity::kVelocity || quantity == Quantity::kAcceleration) quantity = Quantity::kPosition;
   const auto found = std::find_if(std::begin(kUnits), std::end(kUnits), [&](const Unit& unit) {
     return unit.name == name && unit.quantity == quantity;
@@ -447,7 +447,7 @@ RobotModel MakeUnknownRobot(int joints) {
 Recording OpenRecordingOf(const RobotModel& model, const fs::path& path, const fs::path& columns,
                           bool is_complete) {
   Recording recording;
-  const bool names_files = path.extension() == ".toml" && columns.empty();
+  const bool names_files = path.extension() == ".toml";
   if (names_files || !columns.empty()) {
     recording = ColumnsFile(model, names_files ? path : columns).Open(names_files ? fs::path() : path);
   } else {

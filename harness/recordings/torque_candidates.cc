@@ -135,10 +135,8 @@ class FaultList {
         return m + a[0] > 0.0 && m + a[0] < kMostTimes * m;
       };
       std::vector<BodyVector> changes;
-      std::vector<Parts> columns;
-      for (int k = 0; k < 3; ++k)
-        columns.push_back(BodyParts(link, changes.emplace_back(CentreColumn(body, k))));
-      TorqueFault& centre = Add(kCentre, link, "centre of mass", place, "m", columns);
+      TorqueFault& centre = Add(kCentre, link, "centre of mass", place, "m", std::vector<Parts>(3));
+      ShiftCentre(model_, Vector3d::Zero(), &centre);
       constexpr double kLength = 0.05;
       centre.scale = VectorXd::Constant(3, kLength);
       centre.is_ordinary = true;
