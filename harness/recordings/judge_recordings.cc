@@ -58,6 +58,11 @@ class Judge {
     nothing.head(CountForced(set_)) = estimator_.CalcAmplitudes({}).head(CountForced(set_));
     const VectorXd held_before = held.rows.col(width) - held.rows.leftCols(width) * nothing;
     const VectorXd held_after = held.rows.col(width) - held.rows.leftCols(width) * amplitudes;
+    std::vector<size_t> first_fit, first_held;
+    for (size_t recording = 0; recording < set_.size(); ++recording) {
+      first_fit.push_back(MakeTraces(recording, *set_[recording].fit));
+      first_held.push_back(MakeTraces(recording, *set_[recording].held));
+    }
     for (size_t i = 0; i < estimator_.rows().parts.size(); ++i) {
       const TorqueRows::Part& part = estimator_.rows().parts[i];
       const TorqueRows::Part& other = held.parts[i];
@@ -77,8 +82,13 @@ class Judge {
       if (set_.has_currents())
         joint.drive_gain = set_.gain(part.place) / (1.0 + amplitudes[static_cast<Index>(part.place)]);
       joint.torque = CalcMeasured(part);
-      AddTraces(part, before, after);
+      const ReadRecording& recording = set_[part.recording];
+      FillTraces(part, *recording.fit, first_fit[part.recording], before, after);
+      FillTraces(other, *recording.held, first_held[part.recording], held_before, held_after);
     }
+    std::sort(result_.traces.begin(), result_.traces.end(), [](const TorqueTrace& a, const TorqueTrace& b) {
+      return std::pair(a.recording, a.time) < std::pair(b.recording, b.time);
+    });
     for (const CauseTerm& term : selection.terms) Name(term);
   }
 
@@ -122,29 +132,33 @@ class Judge {
     return b;
   }
 
-  void AddTraces(const TorqueRows::Part& part, const VectorXd& before, const VectorXd& after) {
-    const std::vector<TorqueBalance::Block>& blocks = set_[part.recording].fit->blocks();
-    const VectorXd modelled = ModelledOf(part);
-    const double noise = set_[part.recording].weight[static_cast<Index>(part.place)];
-    const auto n = static_cast<Index>(set_.joints().size());
-    if (part.place == 0) {
-      for (const TorqueBalance::Block& block : blocks) {
-        TorqueTrace& trace = result_.traces.emplace_back();
-        trace.recording = static_cast<int>(part.recording);
-        trace.time = 0.5 * (block.from + block.to);
-        trace.q = block.q / block.samples;
-        for (VectorXd* vector : {&trace.measured, &trace.modelled, &trace.explained, &trace.left})
-          vector->setConstant(n, std::numeric_limits<double>::quiet_NaN());
-      }
+  /// Traces of a balance's blocks, to be filled joint by joint. @return the place of the first.
+  size_t MakeTraces(size_t recording, const TorqueBalance& balance) {
+    const size_t first = result_.traces.size();
+    for (const TorqueBalance::Block& block : balance.blocks()) {
+      TorqueTrace& trace = result_.traces.emplace_back();
+      trace.recording = static_cast<int>(recording);
+      trace.time = 0.5 * (block.from + block.to);
+      trace.q = block.q / block.samples;
+      for (VectorXd* vector : {&trace.measured, &trace.modelled, &trace.explained, &trace.left})
+        vector->setConstant(static_cast<Index>(set_.joints().size()),
+                            std::numeric_limits<double>::quiet_NaN());
     }
-    const size_t first = result_.traces.size() - blocks.size();
-    for (size_t b = 0; b < blocks.size(); ++b) {
-      const double count = blocks[b].counts[part.place];
+    return first;
+  }
+
+  void FillTraces(const TorqueRows::Part& part, const TorqueBalance& balance, size_t first,
+                  const VectorXd& before, const VectorXd& after) {
+    const VectorXd modelled = ModelledOf(part);
+    const auto place = static_cast<Index>(part.place);
+    const double noise = set_[part.recording].weight[place];
+    for (size_t b = 0; b < balance.blocks().size(); ++b) {
+      const TorqueBalance::Block& block = balance.blocks()[b];
+      const double count = block.counts[part.place];
       if (!(count > 0.0)) continue;
       TorqueTrace& trace = result_.traces[first + b];
-      const auto place = static_cast<Index>(part.place);
       const Index row = part.begin + part.within + static_cast<Index>(b);
-      trace.modelled[place] = modelled.dot(blocks[b].sums[part.place]) / count;
+      trace.modelled[place] = modelled.dot(block.sums[part.place]) / count;
       trace.left[place] = noise * after[row] / std::sqrt(count);
       trace.measured[place] = trace.modelled[place] + noise * before[row] / std::sqrt(count);
       trace.explained[place] = trace.measured[place] - trace.left[place];

@@ -82,7 +82,7 @@
   if (replay) AddWhole('Replay', replay.content);
   AddWhole('Plots', Make('section', '', {id: 'plots'}));
   AddSection('Notes', Card('', Add(Make('ul'), ...data.notes.map(note => Make('li', note)),
-    Make('li', 'Plots show means over short stretches of time, without pauses and without the quarter that is held out; the shaded band is twice the noise of one sample.'),
+    Make('li', 'Plots show means over short stretches of time, without pauses; the shaded band is twice the noise of one sample.'),
     ...data.begins.flatMap((begin, i) => begin ? [Make('li', `${data.recordings[i]}: times are from ${begin.toFixed(3)} s of its clock.`)] : []),
     Add(Make('li', 'Model: '), Make('code', data.model), '.'))));
   Add(document.querySelector('footer'), "Made by dexcheck judge. Plots by Chart.js (MIT license)" + (replay ? ', scene by three.js (MIT license).' : '.'));
