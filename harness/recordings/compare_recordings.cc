@@ -61,9 +61,10 @@ double FindDelay(const Traces& first, const Traces& second, Eigen::Index joints)
     const double misfit = CalcMisfit(first, second, joints, delay);
     if (misfit < least) least = misfit, best = delay;
   };
-  for (double delay = begin - 0.5 * length; delay <= begin + 0.5 * length; delay += step) try_delay(delay);
-  constexpr double kFine = 1e-3;
-  for (; step > kFine * length / static_cast<double>(first.size()); step /= 2.0) {
+  const int half = static_cast<int>(first.size() / 2);
+  for (int i = -half; i <= half; ++i) try_delay(begin + i * step);
+  constexpr int kHalvings = 10;
+  for (int i = 0; i < kHalvings; ++i, step /= 2.0) {
     const double centre = best;
     try_delay(centre - 0.5 * step);
     try_delay(centre + 0.5 * step);
