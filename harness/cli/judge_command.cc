@@ -36,24 +36,20 @@ std::string Number(double value) { return fmt::format("{:.3g}", value); }
 
 void PrintBalances(const RobotModel& model, const RecordingJudgement& judgement,
                    const std::vector<Recording>& recordings) {
-  const bool has_several = recordings.size() > 1;
   const bool has_gains = judgement.balances.front().drive_gain != 0.0;
-  std::vector<TableRow> rows = {
-      {{"torque, rms", "measured", "unexplained", "beyond causes", "noise", "held out"}}};
-  if (has_gains) rows[0].cells.push_back("N m/A");
-  std::string align = has_gains ? "<>>>>>>" : "<>>>>>";
-  for (const JointJudgement& one : judgement.balances) {
-    TableRow& row = rows.emplace_back();
-    row.cells = {(has_several ? recordings[static_cast<size_t>(one.recording)].name + " " : "") +
-                     model.joint(one.joint).name,
-                 Number(one.torque),
-                 Number(one.residual),
-                 Number(one.left),
-                 Number(one.noise),
-                 Number(one.held_left)};
-    if (has_gains) row.cells.push_back(Number(one.drive_gain));
+  for (size_t recording = 0; recording < recordings.size(); ++recording) {
+    if (recordings.size() > 1) fmt::print("{}\n", recordings[recording].name);
+    std::vector<TableRow> rows = {{{"torque, rms", "measured", "unexplained", "left", "noise", "held out"}}};
+    if (has_gains) rows[0].cells.push_back("N m/A");
+    for (const JointJudgement& one : judgement.balances) {
+      if (one.recording != static_cast<int>(recording)) continue;
+      TableRow& row = rows.emplace_back();
+      row.cells = {model.joint(one.joint).name, Number(one.torque),   Number(one.residual), Number(one.left),
+                   Number(one.noise),           Number(one.held_left)};
+      if (has_gains) row.cells.push_back(Number(one.drive_gain));
+    }
+    fmt::print("{}\n", FormatTable(has_gains ? "<>>>>>>" : "<>>>>>", rows));
   }
-  fmt::print("{}\n", FormatTable(align, rows));
 }
 
 void Print(const JudgeRequest& request, const RobotModel& model, const RecordingJudgement& judgement,
