@@ -80,9 +80,12 @@ void Print(const JudgeRequest& request, const RobotModel& model, const Recording
     fmt::print("{}: {} does not explain {}, and no cause that is known does.\n",
                Paint(Tone::kBad, "NOT EXPLAINED"), model.name(), name);
   } else {
-    fmt::print("{}: {} does not explain {}; {} cause{} do{}.\n", Paint(Tone::kBad, "DIFFERS"), model.name(),
-               name, judgement.causes.size(), judgement.causes.size() == 1 ? "" : "s",
-               judgement.causes.size() == 1 ? "es" : "");
+    const size_t count = judgement.causes.size();
+    fmt::print("{}: {} does not explain {}; {} cause{}{}.\n", Paint(Tone::kBad, "DIFFERS"), model.name(),
+               name, count, count == 1 ? " does" : "s do",
+               judgement.IsWhole()
+                   ? ""
+                   : fmt::format(" by {:.3g} %, and more than noise is left", 100.0 * judgement.explained));
   }
 }
 
@@ -104,7 +107,8 @@ std::string ToText(const RobotModel& model, const RecordingJudgement& judgement,
                                                       : "differs"},
                {"rows", judgement.rows},
                {"explained", judgement.explained},
-               {"left", judgement.left}};
+               {"left", judgement.left},
+               {"rest_is_noise", judgement.IsWhole()}};
   json["recordings"] = Json::array();
   for (const Recording& one : recordings) json["recordings"].push_back(one.name);
   json["joints"] = Json::array();
@@ -207,7 +211,10 @@ int Run(JudgeRequest request) {
     return MakeJudgePage(model, judgement, Json::parse(ToText(model, judgement, recordings)),
                          replay ? &*replay : nullptr);
   });
-  if (!json.TakesStdout()) Print(request, model, judgement, recordings);
+  if (!json.TakesStdout()) {
+    if (IsInterrupted()) fmt::print("INTERRUPTED. So far:\n");
+    Print(request, model, judgement, recordings);
+  }
   if (IsInterrupted()) return ReportFailure("interrupted");
   return judgement.Agrees() ? kSuccess : kDisagreement;
 }

@@ -100,8 +100,9 @@ std::string ProgressBar::MakeLine(long done, Clock::time_point now) const {
   const int reported = CountColumns(STDERR_FILENO);
   // The last column stays free: some terminals wrap when it is written.
   const int columns = (reported > 0 ? reported : kUsualColumns) - 1;
-  const double fraction =
-      total_ > 0 ? std::clamp(static_cast<double>(done) / static_cast<double>(total_), 0.0, 1.0) : 1.0;
+  if (total_ <= 0)
+    return fmt::format("{}: {}", label_, done).substr(0, static_cast<size_t>(std::max(columns, 0)));
+  const double fraction = std::clamp(static_cast<double>(done) / static_cast<double>(total_), 0.0, 1.0);
   const double elapsed = std::chrono::duration<double>(now - *first_time_).count();
   std::string end = fmt::format(" {:3.0f} %", 100.0 * fraction);
   const std::string count = fmt::format(" ({} of {})", done, total_);

@@ -39,6 +39,7 @@ std::string Paint(Tone tone, std::string_view text);
 /// standard error is no terminal.
 class ProgressBar {
  public:
+  /// @param total 0 where it is not known: what is done is counted then.
   ProgressBar(std::string label, long total, bool quiet);
   ~ProgressBar() { Finish(); }
   ProgressBar(const ProgressBar&) = delete;

@@ -189,7 +189,8 @@ class Judge {
     }
     one.SetOutcome();
     result_.causes.push_back(std::move(one));
-    result_.found.push_back({fault, term.amplitude, term.error});
+    result_.found.push_back(
+        {fault, term.amplitude, term.error, result_.causes.back().outcome == CauseOutcome::kNamed});
   }
 
   [[nodiscard]] Fault Describe(const TorqueFault& fault, const VectorXd& a, const VectorXd& error) const {
@@ -269,7 +270,10 @@ std::map<int, double> TakeOffsets(const RecordingJudgement& judgement) {
 RecordingJudgement JudgeRecordings(const RobotModel& model, std::vector<Recording>* recordings,
                                    const JudgeOptions& options,
                                    const std::function<bool(long rows)>& on_rows) {
-  RecordingJudgement judgement = Judge(model, recordings, options, on_rows).Run();
+  bool goes_on = true;
+  const auto count = [&](long rows) { return goes_on = !on_rows || on_rows(rows); };
+  RecordingJudgement judgement = Judge(model, recordings, options, count).Run();
+  if (!goes_on) return judgement;
   constexpr double kWell = 0.95;
   std::optional<PositionFault> fault;
   const bool is_poor = !judgement.IsWhole() && (judgement.explained < kWell || judgement.causes.size() > 3);
@@ -277,11 +281,11 @@ RecordingJudgement JudgeRecordings(const RobotModel& model, std::vector<Recordin
   const auto undo = [&](Recording* one) {
     if (fault) fault->undo(one);
   };
-  if (fault && Reopen(recordings, undo)) judgement = Judge(model, recordings, options, on_rows).Run();
+  if (fault && Reopen(recordings, undo)) judgement = Judge(model, recordings, options, count).Run();
   JudgeOptions second = options;
   second.offsets = TakeOffsets(judgement);
   if (!second.offsets.empty() && Reopen(recordings, undo))
-    judgement = Judge(model, recordings, second, on_rows).Run();
+    judgement = Judge(model, recordings, second, count).Run();
   if (fault) judgement.causes.insert(judgement.causes.begin(), MakeCause(fault->fault));
   return judgement;
 }

@@ -30,6 +30,7 @@ struct JointJudgement {
 struct FoundFault {
   TorqueFault fault;
   VectorXd amplitude, error;
+  bool is_named = true;  ///< No other cause explains the same.
 };
 
 /// Means over a block of time, for pictures. By judged joint.

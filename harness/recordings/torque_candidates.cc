@@ -157,6 +157,7 @@ class FaultList {
     for (int joint = 0; joint < model_.num_joints(); ++joint)
       if (model_.joint(joint).parent == link) return;
     constexpr double kMass = 5.0, kMoment = 0.5;
+    const BodyVector own = TorqueRegressor::Pack(model_.joint(link).body);
     const auto is_near = [](const VectorXd& a) {
       constexpr double kFarthest = 0.5;  // m
       return a[0] > 0.0 && a.segment<3>(1).norm() < kFarthest * a[0];
@@ -173,6 +174,9 @@ class FaultList {
         one.scale = VectorXd::Constant(width, kMoment);
         one.scale[0] = kMass;
         one.is_possible = is_near;
+        // What the two are together can be.
+        if (width == TorqueRegressor::kBody && IsBody(own))
+          one.is_possible = [=](const VectorXd& a) { return is_near(a) && IsBody(own + BodyVector(a)); };
         one.is_ordinary = width == 4;
       }
     }

@@ -36,27 +36,34 @@ Corrections Collect(const RobotModel& model, const RecordingJudgement& judgement
           body[part.column.component] += part.factor * a[static_cast<Eigen::Index>(k)];
     };
     const auto n = static_cast<Eigen::Index>(judgement.joints.size());
+    const auto add = [&](std::map<int, double>* values, int joint, double before, double change) {
+      values->emplace(joint, before).first->second += change;
+    };
+    if (!judgement.found[i].is_named) {
+      file->left.push_back(fault.place + ": " + fault.fault + ", or another cause");
+      continue;
+    }
     bool is_written = fault.recording < 0;
     switch (fault.kind) {
       case TorqueFault::kDryFriction:
-        corrections.dry[fault.index] = fault.nominal + a[0];
+        add(&corrections.dry, fault.index, fault.nominal, a[0]);
         break;
       case TorqueFault::kViscousFriction:
-        corrections.viscous[fault.index] = fault.nominal + a[0];
+        add(&corrections.viscous, fault.index, fault.nominal, a[0]);
         break;
       case TorqueFault::kAllDry:
       case TorqueFault::kAllFriction:
         for (Eigen::Index k = 0; k < a.size(); ++k) {
           const int joint = fault.columns[static_cast<size_t>(k)].front().column.index;
           if (k < n) {
-            corrections.dry[joint] = model.joint(joint).dry_friction + a[k];
+            add(&corrections.dry, joint, model.joint(joint).dry_friction, a[k]);
           } else {
-            corrections.viscous[joint] = model.joint(joint).damping + a[k];
+            add(&corrections.viscous, joint, model.joint(joint).damping, a[k]);
           }
         }
         break;
       case TorqueFault::kArmature:
-        corrections.armature[fault.index] = fault.nominal + a[0];
+        add(&corrections.armature, fault.index, fault.nominal, a[0]);
         break;
       case TorqueFault::kMass:
       case TorqueFault::kCentre:
