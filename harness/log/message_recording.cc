@@ -165,7 +165,7 @@ class McapRecording : public MessageRecording {
       : MessageRecording(path.string()), topic_(std::move(topic)), file_(path, std::ios::binary) {
     file_.seekg(8);
     ReadNames();
-    format_ = "MCAP, topic " + (topic_.empty() ? "of all" : topic_);
+    format_ = topic_.empty() ? "MCAP, all topics" : "MCAP, topic " + topic_;
   }
 
  protected:

@@ -378,6 +378,11 @@ void Require(const RobotModel& model, const Recording& recording, const std::str
   for (const Channel& one : recording.channels)
     if (one.quantity != Quantity::kTime && recording.FindColumn(Quantity::kPosition, one.joint) < 0)
       fail("joint " + model.joint(one.joint).name + " has " + NameOf(one.quantity) + " and no position");
+  std::set<std::pair<Quantity, int>> seen;
+  for (const Channel& one : recording.channels)
+    if (!seen.emplace(one.quantity, one.joint).second && one.joint >= 0)
+      fail(std::string("has two columns of ") + NameOf(one.quantity) + " of joint " +
+           model.joint(one.joint).name);
   std::map<size_t, const Channel*> owners;
   for (const Channel& one : recording.channels)
     if (!owners.emplace(one.column, &one).second)
@@ -478,9 +483,9 @@ std::string DescribeColumns(const RobotModel& model, const Recording& recording)
       used.insert(one.column);
       scale = one.scale;
       const std::string separator = columns.empty() ? "" : ", ";
-      columns += separator +
-                 (names[one.column].empty() ? std::to_string(one.column + 1) : '"' + names[one.column] + '"');
-      if (one.joint >= 0) joints += separator + '"' + model.joint(one.joint).name + '"';
+      columns +=
+          separator + (names[one.column].empty() ? std::to_string(one.column + 1) : Quote(names[one.column]));
+      if (one.joint >= 0) joints += separator + Quote(model.joint(one.joint).name);
     }
     if (columns.empty()) {
       text += fmt::format("\n# [{}]\n# columns = []\n", NameOf(quantity));

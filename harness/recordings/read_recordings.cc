@@ -29,7 +29,8 @@ RobotModel AddPayload(const RobotModel& model, const std::optional<DeclaredPaylo
 RecordingSet::RecordingSet(const RobotModel& model, std::vector<Recording>* recordings,
                            const ReadOptions& options, const std::function<bool(long rows)>& on_rows)
     : model_(&model), first_name_(recordings->front().name) {
-  if (model.base().type != BaseType::kFixed) notes_.push_back("the base is taken to stand still and upright");
+  if (model.base().type != BaseType::kFixed)
+    throw InputError(model.spec().source + ": base: must be fixed where recordings are judged, moves");
   for (Recording& recording : *recordings) Read(&recording, options, on_rows);
   EstimateGains();
   first_gains_ = gains_;

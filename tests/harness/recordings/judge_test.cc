@@ -173,7 +173,7 @@ TEST(Judge, CurrentsGiveDriveGainsAndThePayload) {
 }
 
 /// What --write makes of a model's file explains the recording.
-void ExpectCorrected(const std::string& file, const RecordedTable& table) {
+void ExpectCorrected(const std::string& file, const std::string& comment, const RecordedTable& table) {
   const RobotDescription robot = ReadDescription(SourcePath("/" + file));
   const RobotModel model(robot.spec);
   std::vector<Recording> recordings;
@@ -192,16 +192,15 @@ void ExpectCorrected(const std::string& file, const RecordedTable& table) {
   again.push_back(ToRecording(right, table));
   const RecordingJudgement second = JudgeRecordings(right, &again, {});
   EXPECT_TRUE(second.Agrees()) << Tell(second);
-  EXPECT_NE(corrected.text.find("Gaz, M"), text.find("Gaz, M") == std::string::npos ? 0 : std::string::npos)
-      << "comments stay";
+  EXPECT_NE(corrected.text.find(comment), std::string::npos) << "comments stay";
 }
 
 TEST(Judge, WritesWhatItFoundIntoACopyOfTheModel) {
   std::mt19937 random(11);
   const RecordedFault payload = DrawRecordedFault(kMjcf, PayloadKind(), &random);
   const RecordedTable table = Record({DryFriction(2, 1.0), payload});
-  ExpectCorrected("controller/parameters/panda.toml", table);
-  ExpectCorrected("mjcf/panda.xml", table);
+  ExpectCorrected("controller/parameters/panda.toml", "# Inertial parameters: C. Gaz", table);
+  ExpectCorrected("mjcf/panda.xml", "Franka Emika Panda, fixed base.", table);
 }
 
 TEST(Judge, TwoRecordingsDifferByWhatOneRobotHas) {
