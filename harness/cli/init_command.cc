@@ -228,6 +228,8 @@ int InitRobot(const InitRequest& request) {
     throw InputError(request.mjcf.string() + ": must stand beside a URDF, got two MJCFs");
   if (robot.spec.base.type != BaseType::kFixed)
     throw InputError(request.robot.string() + ": base: must be fixed to be run, floats");
+  // What cannot be an MJCF is refused before there is a folder.
+  if (robot.format == RobotFormat::kUrdf && request.mjcf.empty()) MakeMjcf(request, robot, {});
   const RunFolder folder(request.out.empty() ? request.robot.stem().string() : request.out, "");
   const fs::path mjcf = folder.path() / "robot.xml";
   WriteFile(mjcf, MakeMjcf(request, robot, folder.path()));
