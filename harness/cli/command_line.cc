@@ -49,8 +49,8 @@ Option& Option::TypeName(const std::string& name) {
   return *this;
 }
 
-Option& Option::Required() {
-  option_->required();
+Option& Option::Required(bool is_required) {
+  option_->required(is_required);
   return *this;
 }
 

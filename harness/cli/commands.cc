@@ -71,9 +71,11 @@ std::array<Option, 2> AddOverrideOptions(Command command, Overrides* overrides) 
   return {set, unset};
 }
 
-void AddScenarioOptions(Command command, ScenarioRequest* request) {
-  command.AddOption("SCENARIO", &request->scenario, "Name of a shipped scenario, or a TOML file").Required();
+Option AddScenarioOptions(Command command, ScenarioRequest* request) {
+  Option scenario =
+      command.AddOption("SCENARIO", &request->scenario, "Name of a shipped scenario, or a TOML file").Required();
   AddOverrideOptions(command, &request->overrides);
+  return scenario;
 }
 
 void AddResultOptions(Command command, const std::string& what, ScenarioRequest* request) {

@@ -46,8 +46,8 @@ struct ScenarioRequest {
   bool quiet = false;
 };
 
-/// Adds SCENARIO, --set and --unset.
-void AddScenarioOptions(Command command, ScenarioRequest* request);
+/// Adds SCENARIO, --set and --unset. @return SCENARIO, which is required.
+Option AddScenarioOptions(Command command, ScenarioRequest* request);
 /// Adds --json and --quiet. @param what the file gets: "the budget".
 void AddResultOptions(Command command, const std::string& what, ScenarioRequest* request);
 

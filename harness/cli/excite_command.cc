@@ -7,6 +7,7 @@
 #include "harness/base/console.h"
 #include "harness/base/interrupts.h"
 #include "harness/cli/commands.h"
+#include "harness/cli/excite_model.h"
 #include "harness/cli/json_matrix.h"
 #include "harness/cli/output_file.h"
 #include "harness/cli/run_folder.h"
@@ -17,8 +18,12 @@
 namespace dexcheck::cli {
 namespace {
 
+// A motion of a model alone takes some milliseconds, a run a second.
+constexpr int kMotionsPerRun = 10;
+
 struct ExciteRequest : ScenarioRequest {
   ExcitingMotionOptions options;
+  MotionRequest of_model;
 };
 
 std::string Head(const ExcitingMotion& motion) {
@@ -57,6 +62,15 @@ std::string ToText(const Scenario& scenario, const ExcitingMotion& motion, bool 
 }
 
 int Run(const ExciteRequest& request) {
+  if (!request.of_model.model.empty()) {
+    if (!request.scenario.empty()) throw UsageError("excite: SCENARIO and --model exclude each other");
+    MotionRequest of_model = request.of_model;
+    of_model.options.evaluations = request.options.runs * kMotionsPerRun;
+    of_model.json_file = request.json_file;
+    of_model.quiet = request.quiet;
+    return DesignMotionOfModel(of_model);
+  }
+  if (request.scenario.empty()) throw UsageError("excite: SCENARIO or --model is required");
   const ScenarioFiles files = FindScenario(request.scenario, request.overrides.List(), /*seed=*/0);
   CatchInterrupts();
   ResultFile json(request.json_file);
@@ -84,8 +98,10 @@ void AddExciteCommand(Command app) {
   const auto request = std::make_shared<ExciteRequest>();
   Command command = app.AddCommand(
       "excite", "Change a scenario's oscillations so that the model's numbers show best within all limits");
-  AddScenarioOptions(command, request.get());
-  command.AddOption("--runs N", &request->options.runs, "How many runs to make")
+  AddScenarioOptions(command, request.get()).Required(false);
+  command
+      .AddOption("--runs N", &request->options.runs,
+                 "How many runs to make; of a model, ten motions for each")
       .Check(WholeNumber(1, 100000))
       .ShowDefault();
   command
@@ -94,6 +110,7 @@ void AddExciteCommand(Command app) {
       .Check(PositiveNumber())
       .ShowDefault();
   AddResultOptions(command, "the results", request.get());
+  AddMotionOptions(command, &request->of_model);
   command.SetAction([=] { return Run(*request); });
 }
 

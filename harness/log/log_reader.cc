@@ -75,12 +75,12 @@ std::vector<std::string> ListDatasets(hid_t file) {
   return names;
 }
 
-struct Shape {
+struct DatasetShape {
   hdf5::Datatype type;
   std::vector<hsize_t> extents;  // none of a single value
 };
 
-Shape GetShape(const hdf5::Dataset& dataset) {
+DatasetShape GetShape(const hdf5::Dataset& dataset) {
   const hdf5::Dataspace space(H5Dget_space(dataset.id()));
   std::vector<hsize_t> extents(static_cast<size_t>(Check(H5Sget_simple_extent_ndims(space.id()))));
   Check(H5Sget_simple_extent_dims(space.id(), extents.data(), nullptr));
@@ -92,7 +92,7 @@ hdf5::Dataset Open(hid_t file, const std::string& name) {
 }
 
 SignalInfo ReadInfo(const hdf5::Dataset& dataset, const std::string& name) {
-  const Shape shape = GetShape(dataset);
+  const DatasetShape shape = GetShape(dataset);
   if (Check(H5Tequal(shape.type.id(), H5T_IEEE_F64LE)) == 0 || shape.extents.empty() ||
       shape.extents.size() > 2) {
     RefusePart(name, "is not rows of numbers");
@@ -208,7 +208,7 @@ class LogReader::File {
     if (std::any_of(signals_.begin(), signals_.end(), [&](const SignalInfo& s) { return s.name == name; }))
       return;
     if (!IsPlainPath(name)) RefusePart(name, "is not a plain relative path");
-    const Shape shape = GetShape(Open(file_.id(), name));
+    const DatasetShape shape = GetShape(Open(file_.id(), name));
     if (Check(H5Tequal(shape.type.id(), H5T_STD_U8LE)) == 0 || shape.extents.size() != 1)
       RefusePart(name, "is not a file");
     files_.push_back(name);

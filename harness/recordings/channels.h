@@ -15,6 +15,8 @@
 namespace dexcheck {
 
 enum class Quantity { kTime, kPosition, kVelocity, kAcceleration, kTorque, kCurrent };
+inline constexpr Quantity kQuantities[] = {Quantity::kTime,         Quantity::kPosition, Quantity::kVelocity,
+                                           Quantity::kAcceleration, Quantity::kTorque,   Quantity::kCurrent};
 /// "t", "q", "qd", "qdd", "tau", "current": as a file of columns names them.
 const char* NameOf(Quantity quantity);
 
@@ -61,8 +63,5 @@ RobotModel MakeUnknownRobot(int joints);
 
 /// A file of columns that says what was found, to start from; where nothing was found, all that it may say.
 std::string DescribeColumns(const RobotModel& model, const Recording& recording);
-
-/// Columns by their names alone; those that are not known are left out.
-std::vector<Channel> GuessChannels(const RobotModel& model, const std::vector<std::string>& names);
 
 }  // namespace dexcheck

@@ -5,7 +5,6 @@
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
@@ -13,20 +12,8 @@
 namespace dexcheck {
 namespace {
 
-constexpr int kOrder = 4, kHigherOrder = 6;
 constexpr size_t kMostCentres = 300;  // at which noise is measured
-constexpr size_t kHalves[] = {3, 4, 6, 8, 11, 16, 23, 32, 45, 64, 90, 128};
-constexpr long kHeld = 5;      // rows that repeat one another; more of them are a robot at rest
-constexpr double kGap = 10.0;  // times the usual step
-
-double Median(std::vector<double> values) {
-  if (values.empty()) return 0.0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
-double Square(double x) { return x * x; }
+constexpr long kHeld = 5;             // rows that repeat one another; more of them are a robot at rest
 
 }  // namespace
 
@@ -156,197 +143,6 @@ std::vector<size_t> MotionFit::ListCentres(size_t half) const {
   for (size_t i = half; i + half < rows_ahead_.size(); i += every)
     if (IsWhole(i, half)) centres.push_back(i);
   return centres;
-}
-
-double MotionFit::FindQuantum(Eigen::Index channel) const {
-  double least = std::numeric_limits<double>::infinity();
-  double largest = 0.0;
-  for (size_t i = 1; i < rows_ahead_.size(); ++i) {
-    const double change = std::abs(rows_ahead_[i][channel] - rows_ahead_[i - 1][channel]);
-    largest = std::max(largest, std::abs(rows_ahead_[i][channel]));
-    if (change > 1e-12 * largest) least = std::min(least, change);
-  }
-  if (!std::isfinite(least)) return 0.0;
-  size_t whole = 0;
-  for (size_t i = 1; i < rows_ahead_.size(); ++i) {
-    const double steps = (rows_ahead_[i][channel] - rows_ahead_[i - 1][channel]) / least;
-    constexpr double kMost = 1e4;  // beyond it any number is nearly whole
-    whole += std::abs(steps) < kMost && std::abs(steps - std::round(steps)) < 0.02 ? 1 : 0;
-  }
-  constexpr double kNearlyAll = 0.95;
-  return static_cast<double>(whole) > kNearlyAll * static_cast<double>(rows_ahead_.size() - 1) ? least : 0.0;
-}
-
-void MotionFit::Analyse() {
-  const std::string& name = recording_->name;
-  constexpr size_t kFewest = 16;
-  if (rows_ahead_.size() < kFewest) {
-    throw InputError(
-        fmt::format("{}: has {} rows that differ, fewer than {}", name, rows_ahead_.size(), kFewest));
-  }
-  const int time = ChannelOf(Quantity::kTime, -1);
-  std::vector<double> steps;
-  for (size_t i = 1; i < rows_ahead_.size(); ++i)
-    steps.push_back(rows_ahead_[i][time] - rows_ahead_[i - 1][time]);
-  step_ = Median(steps);
-  for (size_t i = 1; i < rows_ahead_.size(); ++i) {
-    if (steps[i - 1] > kGap * step_) ++segment_, ++gaps_;
-    segments_[i] = segment_;
-  }
-  const Eigen::Index n = model_->num_joints();
-  for (VectorXd* vector :
-       {&noise_.position, &noise_.velocity, &noise_.torque, &noise_.smooth_position, &noise_.smooth_torque,
-        &noise_.acceleration, &noise_.rest, &sample_.q, &sample_.qd, &sample_.qdd, &sample_.torque,
-        &sample_.torque_rate, &sample_.torque_curvature, &sample_.direction})
-    *vector = VectorXd::Zero(n);
-  // Noise of each channel: what a polynomial over a short window leaves.
-  constexpr size_t kShort = 8;
-  const size_t half = std::min(kShort, (rows_ahead_.size() - 1) / 2);
-  const std::vector<size_t> centres = ListCentres(half);
-  if (centres.empty())
-    throw InputError(name + ": has gaps everywhere: no " + std::to_string(2 * half + 1) +
-                     " rows follow each other");
-  VectorXd sigma(last_.size());
-  std::vector<std::vector<double>> left(static_cast<size_t>(last_.size()));
-  for (const size_t centre : centres) {
-    const MatrixXd window = GetWindow(centre, half);
-    const MatrixXd C = CalcCoefficients(centre, half, kOrder);
-    const double t = rows_ahead_[centre][time];
-    MatrixXd V(window.rows(), kOrder + 1);
-    for (Eigen::Index k = 0; k < V.rows(); ++k)
-      for (int p = 0; p <= kOrder; ++p) V(k, p) = std::pow(window(k, time) - t, p);
-    const MatrixXd rest = window - V * (C * window);
-    for (Eigen::Index i = 0; i < rest.cols(); ++i)
-      left[static_cast<size_t>(i)].push_back(rest.col(i).squaredNorm() /
-                                             std::max(1.0, static_cast<double>(rest.rows() - kOrder - 1)));
-  }
-  for (Eigen::Index i = 0; i < sigma.size(); ++i) {
-    constexpr double kMedianToMean = 1.06;  // of chi^2 with twelve degrees of freedom
-    sigma[i] = std::sqrt(
-        std::max(kMedianToMean * Median(left[static_cast<size_t>(i)]), Square(FindQuantum(i)) / 12.0));
-  }
-  for (int joint = 0; joint < n; ++joint) {
-    const auto get = [&](Quantity quantity) {
-      const int channel = ChannelOf(quantity, joint);
-      return channel < 0 ? 0.0 : sigma[channel];
-    };
-    noise_.position[joint] = get(Quantity::kPosition);
-    noise_.velocity[joint] = get(Quantity::kVelocity);
-    noise_.torque[joint] = get(has_currents_ ? Quantity::kCurrent : Quantity::kTorque);
-  }
-  CheckVelocities(centres, half);
-  inertia_ = CalcInertia(centres);
-  ChooseWindow(centres);
-  CalcSpeeds();
-}
-
-void MotionFit::CheckVelocities(const std::vector<size_t>& centres, size_t half) {
-  constexpr double kOff = 0.1, kShows = 5.0;
-  for (int joint = 0; joint < model_->num_joints(); ++joint) {
-    const int position = ChannelOf(Quantity::kPosition, joint),
-              velocity = ChannelOf(Quantity::kVelocity, joint);
-    if (position < 0 || velocity < 0) continue;
-    double squares = 0.0, product = 0.0, noise = 0.0;
-    for (const size_t centre : centres) {
-      const MatrixXd window = GetWindow(centre, half);
-      const MatrixXd C = CalcCoefficients(centre, half, kOrder);
-      const double rate = C.row(1).dot(window.col(position));
-      squares += rate * rate;
-      product += rate * C.row(0).dot(window.col(velocity));
-      noise += Square(noise_.position[joint]) * C.row(1).squaredNorm();
-    }
-    // Noise makes the derivative's square too large.
-    if (!(squares > kShows * noise)) continue;
-    const double gain = product / (squares - noise);
-    if (std::abs(gain - 1.0) < kOff) continue;
-    faults_.push_back({"velocity gain", "joint " + model_->joint(joint).name, gain, 0.0, "",
-                       std::abs(gain + 1.0) < kOff ? "(the other sign)" : ""});
-  }
-  if (faults_.empty()) return;
-  std::vector<Channel> kept;
-  std::vector<Eigen::Index> columns;
-  for (size_t i = 0; i < recording_->channels.size(); ++i) {
-    if (recording_->channels[i].quantity == Quantity::kVelocity) continue;
-    kept.push_back(recording_->channels[i]);
-    columns.push_back(static_cast<Eigen::Index>(i));
-  }
-  recording_->channels = kept;
-  for (Row& row : rows_ahead_) row = Row(row(columns));
-  last_ = Row(last_(columns));
-  noise_.velocity.setZero();
-}
-
-MatrixXd MotionFit::CalcInertia(const std::vector<size_t>& centres) {
-  const Eigen::Index n = model_->num_joints();
-  MatrixXd squares = MatrixXd::Zero(n, n);
-  VectorXd q = VectorXd::Zero(n), zero = VectorXd::Zero(n), rest(n), moved(n);
-  const size_t every = std::max<size_t>(1, centres.size() / 20);
-  double count = 0.0;
-  for (size_t i = 0; i < centres.size(); i += every, count += 1.0) {
-    for (int joint = 0; joint < n; ++joint)
-      if (const int channel = ChannelOf(Quantity::kPosition, joint); channel >= 0)
-        q[joint] = rows_ahead_[centres[i]][channel];
-    regressor_.SetMotion(q, zero, zero);
-    regressor_.CalcTorques(rest);
-    for (Eigen::Index k = 0; k < n; ++k) {
-      regressor_.SetMotion(q, zero, VectorXd::Unit(n, k));
-      regressor_.CalcTorques(moved);
-      squares.col(k) += (moved - rest).cwiseAbs2();
-    }
-  }
-  return (squares / count).cwiseSqrt();
-}
-
-void MotionFit::ChooseWindow(const std::vector<size_t>& all) {
-  // What accelerations are derived from, and how often.
-  const bool has_acceleration = recording_->Has(Quantity::kAcceleration);
-  const bool has_velocity = recording_->Has(Quantity::kVelocity);
-  const Quantity source = has_acceleration ? Quantity::kAcceleration
-                          : has_velocity   ? Quantity::kVelocity
-                                           : Quantity::kPosition;
-  const int derivative = has_acceleration ? 0 : has_velocity ? 1 : 2;
-  const double factorial = derivative == 2 ? 2.0 : 1.0;
-  double best = std::numeric_limits<double>::infinity();
-  for (const size_t half : kHalves) {
-    const std::vector<size_t> centres = ListCentres(half);
-    if (2 * half + 1 > rows_ahead_.size() / 4 || centres.size() < all.size() / 2) break;
-    const Eigen::Index n = model_->num_joints();
-    VectorXd variance = VectorXd::Zero(n), bias = VectorXd::Zero(n);
-    double value = 0.0, rate = 0.0;
-    for (const size_t centre : centres) {
-      const MatrixXd window = GetWindow(centre, half);
-      const MatrixXd C = CalcCoefficients(centre, half, kOrder);
-      const MatrixXd higher = CalcCoefficients(centre, half, kHigherOrder);
-      value += C.row(0).squaredNorm();
-      rate += C.row(1).squaredNorm();
-      for (int joint = 0; joint < n; ++joint) {
-        const int channel = ChannelOf(source, joint);
-        if (channel < 0) continue;
-        const double sigma = source == Quantity::kPosition   ? noise_.position[joint]
-                             : source == Quantity::kVelocity ? noise_.velocity[joint]
-                                                             : 0.0;
-        variance[joint] += Square(factorial * sigma) * C.row(derivative).squaredNorm();
-        bias[joint] += Square(factorial) *
-                       (Square((C.row(derivative) - higher.row(derivative)).dot(window.col(channel))) -
-                        Square(sigma) * (C.row(derivative) - higher.row(derivative)).squaredNorm());
-      }
-    }
-    const double count = static_cast<double>(centres.size());
-    const VectorXd squares = (variance + bias.cwiseMax(0.0)) / count;
-    const double score = (inertia_.array().square().matrix() * squares).sum();
-    if (!(score < best)) continue;
-    best = score;
-    half_ = half;
-    noise_.acceleration = squares.cwiseSqrt();
-    noise_.smooth_position = std::sqrt(value / count) * noise_.position;
-    noise_.smooth_torque = std::sqrt(value / count) * noise_.torque;
-    const VectorXd velocity = has_velocity ? VectorXd(std::sqrt(value / count) * noise_.velocity)
-                                           : VectorXd(std::sqrt(rate / count) * noise_.position);
-    noise_.rest = 3.0 * velocity;
-  }
-  if (!std::isfinite(best))
-    throw InputError(recording_->name + ": is too short to derive accelerations from");
-  stride_ = std::max<size_t>(1, half_ / 2);
 }
 
 bool MotionFit::Emit(size_t centre, const Receiver& receive) {

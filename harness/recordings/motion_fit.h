@@ -14,6 +14,8 @@
 
 namespace dexcheck {
 
+inline double Square(double x) { return x * x; }
+
 /// A row after smoothing. Entries by joint, in the model's order; those of joints that were not recorded are
 /// zero.
 struct RecordedSample {
@@ -69,6 +71,8 @@ class MotionFit {
   [[nodiscard]] std::vector<std::string> ListNotes() const;
 
  private:
+  static constexpr int kOrder = 4;      // of the polynomials
+  static constexpr double kGap = 10.0;  // times the usual step
   /// One row: time, then each channel's numbers in SI units.
   using Row = VectorXd;
 

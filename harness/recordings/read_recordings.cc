@@ -12,8 +12,6 @@ namespace {
 
 using Eigen::Index;
 
-double Squared(double x) { return x * x; }
-
 /// The model with what is declared to be attached to it.
 RobotModel AddPayload(const RobotModel& model, const std::optional<DeclaredPayload>& payload) {
   RobotSpec spec = model.spec();
@@ -107,16 +105,16 @@ double RecordingSet::CalcNoise(const ReadRecording& one, size_t place) const {
     const Index at = balance.Find(place, column);
     return at < 0 ? 0.0 : balance.products(place)(at, at) / samples;
   };
-  double variance = Squared(one.motion.smooth_torque[joint] * gains_[static_cast<Index>(place)]);
+  double variance = Square(one.motion.smooth_torque[joint] * gains_[static_cast<Index>(place)]);
   for (int other = 0; other < model_->num_joints(); ++other) {
-    variance += Squared(one.inertia(joint, other) * one.motion.acceleration[other]);
-    variance += mean_square({TorqueColumn::kPosition, other}) * Squared(one.motion.smooth_position[other]);
+    variance += Square(one.inertia(joint, other) * one.motion.acceleration[other]);
+    variance += mean_square({TorqueColumn::kPosition, other}) * Square(one.motion.smooth_position[other]);
   }
   // When a torque acted is known to a row's time.
-  variance += mean_square({TorqueColumn::kRate, joint}) *
-              Squared(gains_[static_cast<Index>(place)] * one.step) / 12.0;
+  variance +=
+      mean_square({TorqueColumn::kRate, joint}) * Square(gains_[static_cast<Index>(place)] * one.step) / 12.0;
   constexpr double kRounding = 1e-7;
-  return std::sqrt(variance + Squared(kRounding) * mean_square({TorqueColumn::kTorque, joint}) +
+  return std::sqrt(variance + Square(kRounding) * mean_square({TorqueColumn::kTorque, joint}) +
                    std::numeric_limits<double>::min());
 }
 

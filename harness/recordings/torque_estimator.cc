@@ -12,8 +12,6 @@ namespace {
 
 using Eigen::Index;
 
-double Squared(double x) { return x * x; }
-
 /// To where half of the push is there: smoothing spreads its begin and end.
 void TrimWindow(const VectorXd& squares, Index* first, Index* last) {
   std::vector<double> within(squares.begin() + *first, squares.begin() + *last + 1);
@@ -234,9 +232,9 @@ bool TorqueEstimator::BarWeakBodies() {
     const ReadRecording& one = (*recordings_)[part.recording];
     const auto place = static_cast<Index>(part.place);
     squares +=
-        left.segment(part.begin, part.size).squaredNorm() * Squared(one.weight[place] / one.noise[place]);
+        left.segment(part.begin, part.size).squaredNorm() * Square(one.weight[place] / one.noise[place]);
   }
-  if (squares <= Squared(kMostNoise) * rows_.samples) return false;
+  if (squares <= Square(kMostNoise) * rows_.samples) return false;
   constexpr double kMuch = 0.05;
   bool has_any = false;
   for (const CauseTerm& term : selection_.terms) {

@@ -15,6 +15,32 @@ Index CountColumns(const TorqueFault& fault) {
   return static_cast<Index>(fault.columns.size());
 }
 
+Index CountColumns(const std::vector<TorqueFault>& faults) {
+  Index count = 0;
+  for (const TorqueFault& fault : faults) count += CountColumns(fault);
+  return count;
+}
+
+Eigen::SparseMatrix<double> MapColumns(const TorqueBalance& balance, size_t place, size_t recording,
+                                       const std::vector<TorqueFault>& faults) {
+  const int joint = balance.joints()[place];
+  std::vector<Eigen::Triplet<double>> entries;
+  Index at = 0;
+  for (const TorqueFault& fault : faults) {
+    for (size_t k = 0; k < fault.columns.size(); ++k)
+      for (const ColumnPart& one : fault.columns[k]) {
+        const bool is_here = (one.recording < 0 || static_cast<size_t>(one.recording) == recording) &&
+                             (one.joint < 0 || one.joint == joint);
+        const Index column = is_here ? balance.Find(place, one.column) : -1;
+        if (column >= 0) entries.emplace_back(column, at + static_cast<Index>(k), one.factor);
+      }
+    at += CountColumns(fault);
+  }
+  Eigen::SparseMatrix<double> map(static_cast<Index>(balance.columns(place).size()) + 1, at);
+  map.setFromTriplets(entries.begin(), entries.end());
+  return map;
+}
+
 namespace {
 
 template <typename Rows>
@@ -51,18 +77,10 @@ void FillPart(const RecordingSet& recordings, const std::vector<TorqueFault>& fa
         rows.col(balance.Find(part.place, {TorqueColumn::kTorque, joint}));
   }
   Index at = CountForced(recordings);
+  target.middleCols(at, CountColumns(faults)) +=
+      rows * MapColumns(balance, part.place, part.recording, faults);
   for (const TorqueFault& fault : faults) {
-    if (fault.kind == TorqueFault::kPush) {
-      FillPush(recordings, fault.push, part, balance, at, target);
-    } else {
-      for (size_t k = 0; k < fault.columns.size(); ++k)
-        for (const ColumnPart& one : fault.columns[k]) {
-          const bool is_here = (one.recording < 0 || static_cast<size_t>(one.recording) == part.recording) &&
-                               (one.joint < 0 || one.joint == joint);
-          const Index column = is_here ? balance.Find(part.place, one.column) : -1;
-          if (column >= 0) target.col(at + static_cast<Index>(k)) += one.factor * rows.col(column);
-        }
-    }
+    if (fault.kind == TorqueFault::kPush) FillPush(recordings, fault.push, part, balance, at, target);
     at += CountColumns(fault);
   }
 }
@@ -86,9 +104,7 @@ TorqueRows MakeTorqueRows(const RecordingSet& recordings, const std::vector<Torq
       height += size;
     }
   }
-  Index width = CountForced(recordings);
-  for (const TorqueFault& fault : faults) width += CountColumns(fault);
-  all.rows = MatrixXd::Zero(height, width + 1);
+  all.rows = MatrixXd::Zero(height, CountForced(recordings) + CountColumns(faults) + 1);
   for (size_t i = 0; i < rows.size(); ++i)
     FillPart(recordings, faults, all.parts[i], rows[i], is_held, &all.rows);
   return all;

@@ -3,6 +3,7 @@
 // The rows of a regression: balances of all recordings and joints in units of noise, and what each fault
 // leaves in them.
 
+#include <Eigen/SparseCore>
 #include <vector>
 
 #include "harness/recordings/read_recordings.h"
@@ -27,8 +28,15 @@ struct TorqueRows {
 TorqueRows MakeTorqueRows(const RecordingSet& recordings, const std::vector<TorqueFault>& faults,
                           bool is_held);
 
+/// What faults leave in a joint's row, but for pushes, by the columns of its balance, y last: rows times this
+/// are their columns.
+Eigen::SparseMatrix<double> MapColumns(const TorqueBalance& balance, size_t place, size_t recording,
+                                       const std::vector<TorqueFault>& faults);
+
 /// Columns of the errors of drives' gains, one for each joint where currents were recorded.
 Eigen::Index CountForced(const RecordingSet& recordings);
 Eigen::Index CountColumns(const TorqueFault& fault);
+/// Of all of them.
+Eigen::Index CountColumns(const std::vector<TorqueFault>& faults);
 
 }  // namespace dexcheck

@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "harness/engine/mujoco_release.h"
+#include "harness/recordings/column_names.h"
 #include "tests/common/paths.h"
 
 namespace dexcheck::testing {
@@ -65,8 +66,16 @@ RecordedTable RecordRobot(const std::string& mjcf, const std::vector<RecordedFau
       one.frequency[k] = Draw(random, 0.1, 0.2) * (k + 1);
       one.phase[k] = Draw(random, 0.0, 2.0 * kPi);
     }
-    one.Calc(0.0, &data->qpos[i], &data->qvel[i], &data->qacc[i]);
   }
+  const auto calc = [&](double t, VectorXd* q, VectorXd* qd, VectorXd* qdd) {
+    for (VectorXd* const each : {q, qd, qdd}) each->resize(n);
+    if (options.motion) return options.motion(t, q, qd, qdd);
+    for (int i = 0; i < n; ++i) motion[static_cast<size_t>(i)].Calc(t, &(*q)[i], &(*qd)[i], &(*qdd)[i]);
+  };
+  VectorXd q, qd, qdd;
+  calc(0.0, &q, &qd, &qdd);
+  mju_copy(data->qpos, q.data(), n);
+  mju_copy(data->qvel, qd.data(), n);
   RecordedTable table;
   table.names.push_back("time");
   for (int i = 0; i < n; ++i) table.names.push_back("q." + JointName(*model, i));
@@ -86,12 +95,10 @@ RecordedTable RecordRobot(const std::string& mjcf, const std::vector<RecordedFau
     mj_forward(model.get(), own.get());
     ExpandMass(*model, *own, M.data());
     VectorXd wanted(n);
-    for (int i = 0; i < n; ++i) {
-      double q = 0.0, qd = 0.0, qdd = 0.0;
-      motion[static_cast<size_t>(i)].Calc(t, &q, &qd, &qdd);
-      constexpr double kStiffness = 100.0, kDamping = 20.0;
-      wanted[i] = qdd + kStiffness * (q - data->qpos[i]) + kDamping * (qd - data->qvel[i]);
-    }
+    calc(t, &q, &qd, &qdd);
+    constexpr double kStiffness = 100.0, kDamping = 20.0;
+    for (int i = 0; i < n; ++i)
+      wanted[i] = qdd[i] + kStiffness * (q[i] - data->qpos[i]) + kDamping * (qd[i] - data->qvel[i]);
     torque = M * wanted;
     for (int i = 0; i < n; ++i) torque[i] += own->qfrc_bias[i] - own->qfrc_passive[i];
     if (step % every == 0) {

@@ -39,6 +39,8 @@ struct RecordingOptions {
   double torque_noise = 0.02;  ///< Of each joint's usual torque.
   bool has_velocities = false;
   double velocity_noise = 0.005;  ///< rad/s
+  /// Of all joints at a time; empty for sines that are drawn.
+  std::function<void(double t, VectorXd* q, VectorXd* qd, VectorXd* qdd)> motion = {};
 };
 
 /// A motion of sines about a posture under computed torque of the engine's own, drawn from `random`.

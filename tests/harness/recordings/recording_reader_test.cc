@@ -17,6 +17,7 @@
 #include "harness/log/mcap_writer.h"
 #include "harness/log/npy_file.h"
 #include "harness/recordings/channels.h"
+#include "harness/recordings/column_names.h"
 #include "tests/common/paths.h"
 #include "tests/common/throws.h"
 

@@ -1,0 +1,190 @@
+#include "harness/recordings/column_names.h"
+
+#include <algorithm>
+#include <cctype>
+#include <optional>
+#include <set>
+
+namespace dexcheck {
+namespace {
+
+/// Words that logs use for a quantity.
+struct Word {
+  std::string_view word;
+  Quantity quantity;
+};
+constexpr Word kWords[] = {
+    {"t", Quantity::kTime},
+    {"time", Quantity::kTime},
+    {"timestamp", Quantity::kTime},
+    {"stamp", Quantity::kTime},
+    {"secs", Quantity::kTime},
+    {"seconds", Quantity::kTime},
+    {"q", Quantity::kPosition},
+    {"pos", Quantity::kPosition},
+    {"position", Quantity::kPosition},
+    {"positions", Quantity::kPosition},
+    {"angle", Quantity::kPosition},
+    {"qpos", Quantity::kPosition},
+    {"theta", Quantity::kPosition},
+    {"qd", Quantity::kVelocity},
+    {"dq", Quantity::kVelocity},
+    {"vel", Quantity::kVelocity},
+    {"velocity", Quantity::kVelocity},
+    {"velocities", Quantity::kVelocity},
+    {"qvel", Quantity::kVelocity},
+    {"qdot", Quantity::kVelocity},
+    {"speed", Quantity::kVelocity},
+    {"xi", Quantity::kVelocity},
+    {"qdd", Quantity::kAcceleration},
+    {"ddq", Quantity::kAcceleration},
+    {"acc", Quantity::kAcceleration},
+    {"acceleration", Quantity::kAcceleration},
+    {"qacc", Quantity::kAcceleration},
+    {"qddot", Quantity::kAcceleration},
+    {"tau", Quantity::kTorque},
+    {"torque", Quantity::kTorque},
+    {"torques", Quantity::kTorque},
+    {"effort", Quantity::kTorque},
+    {"efforts", Quantity::kTorque},
+    {"trq", Quantity::kTorque},
+    {"force", Quantity::kTorque},
+    {"current", Quantity::kCurrent},
+    {"currents", Quantity::kCurrent},
+    {"amps", Quantity::kCurrent},
+    {"i", Quantity::kCurrent},
+};
+/// What is commanded is no measurement.
+constexpr std::string_view kCommanded[] = {"cmd",      "command", "commanded", "des", "desired", "target",
+                                           "setpoint", "ref",     "reference", "d",   "error",   "ext"};
+
+constexpr Unit kUnits[] = {
+    {"s", Quantity::kTime, 1.0},
+    {"ms", Quantity::kTime, 1e-3},
+    {"us", Quantity::kTime, 1e-6},
+    {"ns", Quantity::kTime, 1e-9},
+    {"rad", Quantity::kPosition, 1.0},
+    {"deg", Quantity::kPosition, kPi / 180.0},
+    {"m", Quantity::kPosition, 1.0},
+    {"mm", Quantity::kPosition, 1e-3},
+    {"turn", Quantity::kPosition, 2.0 * kPi},
+    {"nm", Quantity::kTorque, 1.0},
+    {"n", Quantity::kTorque, 1.0},
+    {"mnm", Quantity::kTorque, 1e-3},
+    {"a", Quantity::kCurrent, 1.0},
+    {"ma", Quantity::kCurrent, 1e-3},
+};
+
+bool IsLetter(char c) { return std::isalpha(static_cast<unsigned char>(c)) != 0; }
+bool IsDigit(char c) { return std::isdigit(static_cast<unsigned char>(c)) != 0; }
+
+std::string ToLower(std::string text) {
+  std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return std::tolower(c); });
+  return text;
+}
+
+/// Words and numbers of a name.
+std::vector<std::string> SplitWords(const std::string& name) {
+  std::vector<std::string> words;
+  for (size_t i = 0; i < name.size(); ++i) {
+    const bool is_letter = IsLetter(name[i]), is_digit = IsDigit(name[i]);
+    if (!is_letter && !is_digit) continue;
+    const bool goes_on =
+        i > 0 && !words.empty() && (is_letter ? IsLetter(name[i - 1]) : IsDigit(name[i - 1]));
+    if (goes_on) {
+      words.back() += name[i];
+    } else {
+      words.emplace_back(1, name[i]);
+    }
+  }
+  return words;
+}
+
+/// What a column's name says.
+struct NamedColumn {
+  std::optional<Quantity> quantity;
+  int joint = -1;
+  int number = -1;  // instead of a joint's name
+  double scale = 1.0;
+  bool is_commanded = false;
+};
+
+NamedColumn ReadName(const RobotModel& model, const std::string& written) {
+  NamedColumn column;
+  std::string name = ToLower(written);
+  size_t longest = 0, at = 0;
+  for (int joint = 0; joint < model.num_joints(); ++joint) {
+    const std::string own = ToLower(model.joint(joint).name);
+    const size_t found = name.rfind(own);
+    if (found == std::string::npos || own.size() <= longest) continue;
+    const size_t end = found + own.size();
+    if ((found > 0 && (IsLetter(name[found - 1]) || IsDigit(name[found - 1]))) ||
+        (end < name.size() && IsDigit(name[end]) && IsDigit(own.back())))
+      continue;
+    longest = own.size();
+    at = found;
+    column.joint = joint;
+  }
+  if (column.joint >= 0) name.replace(at, longest, "/");
+  const std::vector<std::string> words = SplitWords(name);
+  for (const std::string& word : words) {
+    const auto quantity =
+        std::find_if(std::begin(kWords), std::end(kWords), [&](const Word& one) { return one.word == word; });
+    const bool is_unit = column.quantity && FindUnit(word, *column.quantity) != nullptr;
+    if (std::find(std::begin(kCommanded), std::end(kCommanded), word) != std::end(kCommanded)) {
+      column.is_commanded = true;
+    } else if (is_unit) {
+      column.scale = FindUnit(word, *column.quantity)->scale;
+    } else if (quantity != std::end(kWords) && !(word == "t" && words.size() > 2)) {
+      column.quantity = quantity->quantity;
+    } else if (IsDigit(word[0]) && word.size() < 4) {
+      column.number = std::stoi(word);
+    }
+  }
+  return column;
+}
+
+}  // namespace
+
+std::span<const Unit> ListUnits() { return kUnits; }
+
+/// The unit of a quantity; positions' units serve their rates, too.
+const Unit* FindUnit(std::string name, Quantity quantity) {
+  std::transform(name.begin(), name.end(), name.begin(), [](unsigned char c) { return std::tolower(c); });
+  std::erase_if(name, [](char c) { return c == ' ' || c == '*' || c == '.'; });
+  // "rad/s", "deg/s^2"
+  if (const size_t slash = name.find('/'); slash != std::string::npos) name.resize(slash);
+  if (quantity == Quantity::kVelocity || quantity == Quantity::kAcceleration) quantity = Quantity::kPosition;
+  const auto found = std::find_if(std::begin(kUnits), std::end(kUnits), [&](const Unit& unit) {
+    return unit.name == name && unit.quantity == quantity;
+  });
+  return found == std::end(kUnits) ? nullptr : found;
+}
+
+std::vector<Channel> GuessChannels(const RobotModel& model, const std::vector<std::string>& names) {
+  std::vector<NamedColumn> columns;
+  int least = 1;  // numbers count from 0 or from 1
+  for (const std::string& name : names) {
+    const NamedColumn& column = columns.emplace_back(ReadName(model, name));
+    if (column.quantity && column.number >= 0) least = std::min(least, column.number);
+  }
+  std::vector<Channel> channels;
+  std::set<std::pair<Quantity, int>> seen;
+  for (size_t i = 0; i < columns.size(); ++i) {
+    const NamedColumn& column = columns[i];
+    if (!column.quantity || column.is_commanded) continue;
+    int joint = -1;
+    if (*column.quantity != Quantity::kTime) {
+      joint = column.joint;
+      if (joint < 0 && column.number >= 0) joint = column.number - least;
+      // A robot of one joint needs no number.
+      if (joint < 0 && model.num_joints() == 1) joint = 0;
+      if (joint < 0 || joint >= model.num_joints()) continue;
+    }
+    if (seen.emplace(*column.quantity, joint).second)
+      channels.push_back({*column.quantity, joint, i, column.scale});
+  }
+  return channels;
+}
+
+}  // namespace dexcheck

@@ -1,0 +1,15 @@
+#pragma once
+
+#include <filesystem>
+
+#include "harness/recordings/channels.h"
+
+namespace dexcheck {
+
+/// Opens a recording by a file of columns (TOML).
+/// @param columns the file of columns. @param recording its file; empty where the file of columns names it.
+/// @throws InputError, one line.
+Recording OpenByColumns(const RobotModel& model, const std::filesystem::path& columns,
+                        const std::filesystem::path& recording);
+
+}  // namespace dexcheck
