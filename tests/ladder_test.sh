@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Fails when folders of the sources include one another in a cycle, or when a folder of harness/ includes a header of one
-# that harness/CMakeLists.txt adds later, or when sources or tests use what differs between MuJoCo's releases by
-# themselves: ladder_test.sh ROOT
+# that harness/CMakeLists.txt adds later, or when two headers define types of one name in one namespace, or when sources or
+# tests use what differs between MuJoCo's releases by themselves: ladder_test.sh ROOT
 # Exit code: 0 a ladder, 1 not, 2 nothing to look at.
 set -euo pipefail
 
@@ -24,6 +24,15 @@ list_faults() {
     $2 in height && $1 in height && height[$2] > height[$1] { print $3 ": includes a header of " $2 ", which is above" }
     $1 ~ /^controller\// && $2 !~ /^controller\// { print $3 ": includes a header of " $2 }' \
     <(printf '%s\n' "$order") - <<<"$includes"
+}
+
+# Prints types that two headers of ROOT define in one namespace: of their members the linker keeps one.
+list_twins() {
+  (cd "$1" && find controller harness renders -name '*.h' -exec awk '
+    FNR == 1 { space = "" }
+    /^namespace [A-Za-z_:]+ \{/ { space = $2 }
+    /^(struct|class|enum class) [A-Z][A-Za-z0-9]*[^;]*$/ { print space "::" ($1 == "enum" ? $3 : $2), FILENAME }' {} +) |
+    sed 's/:* / /2; s/{//' | sort -u | awk '$1 == last { print file " and " $2 " both define " $1 } { last = $1; file = $2 }'
 }
 
 # Prints the lines of the tree ROOT that use what another release of MuJoCo says otherwise, but for the one header that
@@ -53,6 +62,9 @@ mkdir "$scratch/tests"
 echo 'mj_fullM(m, M, d->qM);' >"$scratch/tests/terms_test.cc"
 [[ $(list_releases "$scratch" | wc -l) -eq 1 ]] || { echo "what differs between releases is not found"; exit 1; }
 
-faults=$(list_faults "$root"; list_releases "$root")
+printf 'namespace a {\nstruct Twin {\n' | tee "$scratch/harness/base/one.h" >"$scratch/harness/log/other.h"
+[[ $(list_twins "$scratch" | wc -l) -eq 1 ]] || { echo "two types of one name are not found"; exit 1; }
+
+faults=$(list_faults "$root"; list_twins "$root"; list_releases "$root")
 [[ -z $faults ]] || { echo "$faults"; exit 1; }
 echo "$(list_includes "$root" | wc -l) includes between folders, no cycle"

@@ -111,7 +111,7 @@ int View(const ViewRequest& request) {
       throw UsageError("--out, --set, --seed and --save belong to a scenario; " + Quote(request.what) +
                        " is a recorded run");
     }
-    const Recording recording(request.what);
+    const RecordedRun recording(request.what);
     CatchInterrupts();
     ViewRecording(recording, "dexcheck " + request.what, request.viewer);
     return kSuccess;

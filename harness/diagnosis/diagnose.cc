@@ -9,7 +9,7 @@
 #include <optional>
 
 #include "harness/checks/tolerance.h"
-#include "harness/diagnosis/trial.h"
+#include "harness/diagnosis/repair_trial.h"
 
 namespace dexcheck {
 namespace {
@@ -94,9 +94,9 @@ class Diagnostician {
     result_.agrees = before.Agrees();
     if (result_.agrees) return std::move(result_);
     result_.causes = Neutralise(Adapter(model_, *engine_, setup_.source), before.constants, engine_.get());
-    if (progress("constants")) Accept(Trial(result_.repaired, setup_).ReadConstants());
+    if (progress("constants")) Accept(RepairTrial(result_.repaired, setup_).ReadConstants());
     if (progress("geometry")) {
-      for (const Repair& cause : WalkGeometry(Trial(result_.repaired, setup_))) Accept({cause});
+      for (const Repair& cause : WalkGeometry(RepairTrial(result_.repaired, setup_))) Accept({cause});
     }
     if (progress("bodies")) FitBodies();
     progress("verdict");
@@ -160,16 +160,16 @@ class Diagnostician {
   }
 
   void FitBodies() {
-    const Trial trial(result_.repaired, setup_);
+    const RepairTrial trial(result_.repaired, setup_);
     Accept(setup_.options.by_motion ? FitForces(trial) : trial.ReadBodies());
   }
 
   /// The file with repairs made, in their order; none when that is no robot.
-  [[nodiscard]] std::unique_ptr<Trial> Try(const std::vector<Repair>& causes) const {
+  [[nodiscard]] std::unique_ptr<RepairTrial> Try(const std::vector<Repair>& causes) const {
     RobotSpec written = file_;
     for (const Repair& cause : causes) Apply(cause, &written);
     if (!setup_.TryModel(written)) return nullptr;
-    return std::make_unique<Trial>(std::move(written), setup_);
+    return std::make_unique<RepairTrial>(std::move(written), setup_);
   }
 
   /// Withdraws causes whose part (joint row, frame, body, constant) does not agree after all of them are
@@ -178,7 +178,7 @@ class Diagnostician {
   void KeepWhatRepairs() {
     std::vector<Repair>& causes = result_.causes;
     for (size_t dropped = 1; dropped > 0 && !causes.empty();) {
-      const std::unique_ptr<Trial> trial = Try(causes);
+      const std::unique_ptr<RepairTrial> trial = Try(causes);
       dropped = 1;
       if (trial) {
         dropped = std::erase_if(causes, [&](const Repair& cause) { return !trial->IsRepairedBy(cause); });
@@ -190,7 +190,7 @@ class Diagnostician {
       std::vector<Repair> others = causes;
       std::erase_if(causes[i].equivalents, [&](const Repair& equivalent) {
         others[i] = equivalent;
-        const std::unique_ptr<Trial> trial = Try(others);
+        const std::unique_ptr<RepairTrial> trial = Try(others);
         return !trial || !std::all_of(others.begin(), others.end(),
                                       [&](const Repair& cause) { return trial->IsRepairedBy(cause); });
       });
@@ -219,7 +219,7 @@ class Diagnostician {
 
   /// Squared residuals of geometry, bodies, joint constants and forces, each by its own scale.
   [[nodiscard]] Size Measure(const RobotSpec& written) const {
-    const Trial trial(written, setup_);
+    const RepairTrial trial(written, setup_);
     Size size;
     size.forces = trial.evidence().CalcForceResidual(trial.model()).squaredNorm();
     std::vector<int> items(trial.placement().items().size());

@@ -3,7 +3,7 @@
 #include <cmath>
 
 #include "harness/diagnosis/cause_estimator.h"
-#include "harness/diagnosis/trial.h"
+#include "harness/diagnosis/repair_trial.h"
 
 namespace dexcheck {
 namespace {
@@ -25,7 +25,7 @@ double CalcStep(const RobotSpec& spec, const Parameter& number) {
 
 class ForceFit {
  public:
-  explicit ForceFit(const Trial& trial)
+  explicit ForceFit(const RepairTrial& trial)
       : trial_(trial), evidence_(trial.evidence()), start_{{}, trial.written(), CalcResidual(trial.model())} {
     for (const Parameter& number : ListParameters(spec())) {
       const bool needs_mass = number.kind == Kind::kCom || number.kind == Kind::kInertia;
@@ -174,7 +174,7 @@ class ForceFit {
     return cause;
   }
 
-  const Trial& trial_;
+  const RepairTrial& trial_;
   const EngineEvidence& evidence_;
   Solution start_;
   Numbers candidates_;
@@ -182,6 +182,6 @@ class ForceFit {
 
 }  // namespace
 
-std::vector<Repair> FitForces(const Trial& trial) { return ForceFit(trial).Run(); }
+std::vector<Repair> FitForces(const RepairTrial& trial) { return ForceFit(trial).Run(); }
 
 }  // namespace dexcheck

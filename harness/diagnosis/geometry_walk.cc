@@ -4,7 +4,7 @@
 #include <limits>
 
 #include "controller/common/text.h"
-#include "harness/diagnosis/trial.h"
+#include "harness/diagnosis/repair_trial.h"
 
 namespace dexcheck {
 namespace {
@@ -29,7 +29,7 @@ struct TriedRepair {
 
 class GeometryWalk {
  public:
-  explicit GeometryWalk(const Trial& trial)
+  explicit GeometryWalk(const RepairTrial& trial)
       : trial_(trial),
         spec_(trial.written()),
         placement_(trial.placement()),
@@ -363,7 +363,7 @@ class GeometryWalk {
     }
   }
 
-  const Trial& trial_;
+  const RepairTrial& trial_;
   RobotSpec spec_;
   Placement placement_;
   std::vector<bool> left_;   // items that no geometry explains
@@ -375,6 +375,6 @@ class GeometryWalk {
 
 }  // namespace
 
-std::vector<Repair> WalkGeometry(const Trial& trial) { return GeometryWalk(trial).Run(); }
+std::vector<Repair> WalkGeometry(const RepairTrial& trial) { return GeometryWalk(trial).Run(); }
 
 }  // namespace dexcheck

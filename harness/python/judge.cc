@@ -79,10 +79,10 @@ class ArrayRecording {
       }
     }
     if (rows_ == 0) throw InputError("t: must not be empty");
-    AddColumn(Quantity::kTime, -1, t);
+    AddColumn(RecordedQuantity::kTime, -1, t);
   }
 
-  void Add(Quantity quantity, const Columns& values) {
+  void Add(RecordedQuantity quantity, const Columns& values) {
     if (!values) return;
     const auto width = static_cast<Eigen::Index>(joints_.size());
     if (values->rows() != rows_ || values->cols() != width)
@@ -102,7 +102,7 @@ class ArrayRecording {
   }
 
  private:
-  void AddColumn(Quantity quantity, int joint, const VectorXd& values) {
+  void AddColumn(RecordedQuantity quantity, int joint, const VectorXd& values) {
     channels_.push_back({quantity, joint, columns_.size()});
     names_.push_back(fmt::format("{}.{}", NameOf(quantity), joint));
     columns_.emplace_back(values.begin(), values.end());
@@ -175,11 +175,11 @@ void AddJudge(py::module_* module, const ModelFinder& with_model) {
         JudgementResult result;
         with_model(model, [&](const RobotModel& robot) {
           ArrayRecording arrays(robot, joints, t);
-          arrays.Add(Quantity::kPosition, q);
-          arrays.Add(Quantity::kVelocity, qd);
-          arrays.Add(Quantity::kAcceleration, qdd);
-          arrays.Add(Quantity::kTorque, tau);
-          arrays.Add(Quantity::kCurrent, current);
+          arrays.Add(RecordedQuantity::kPosition, q);
+          arrays.Add(RecordedQuantity::kVelocity, qd);
+          arrays.Add(RecordedQuantity::kAcceleration, qdd);
+          arrays.Add(RecordedQuantity::kTorque, tau);
+          arrays.Add(RecordedQuantity::kCurrent, current);
           if (!tau == !current) throw InputError("judge: must have one of tau and current");
           std::vector<Recording> recordings;
           recordings.push_back(arrays.Make());

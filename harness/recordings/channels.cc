@@ -28,18 +28,19 @@ std::string Describe(const RecordingReader& reader, size_t column) {
 
 void Require(const RobotModel& model, const Recording& recording, const std::string& source) {
   const auto fail = [&](const std::string& problem) { throw InputError(source + ": " + problem); };
-  if (!recording.Has(Quantity::kTime))
+  if (!recording.Has(RecordedQuantity::kTime))
     fail("has no column of time; a file of --columns can name it (judge --describe writes one)");
-  if (!recording.Has(Quantity::kPosition))
+  if (!recording.Has(RecordedQuantity::kPosition))
     fail(
         "has no column that is known as a joint's position; a file of --columns can name them (judge "
         "--describe writes one)");
-  if (!recording.Has(Quantity::kTorque) && !recording.Has(Quantity::kCurrent))
+  if (!recording.Has(RecordedQuantity::kTorque) && !recording.Has(RecordedQuantity::kCurrent))
     fail("has no column that is known as a joint's torque or current; a file of --columns can name them");
   for (const Channel& one : recording.channels)
-    if (one.quantity != Quantity::kTime && recording.FindColumn(Quantity::kPosition, one.joint) < 0)
+    if (one.quantity != RecordedQuantity::kTime &&
+        recording.FindColumn(RecordedQuantity::kPosition, one.joint) < 0)
       fail("joint " + model.joint(one.joint).name + " has " + NameOf(one.quantity) + " and no position");
-  std::set<std::pair<Quantity, int>> seen;
+  std::set<std::pair<RecordedQuantity, int>> seen;
   for (const Channel& one : recording.channels)
     if (!seen.emplace(one.quantity, one.joint).second && one.joint >= 0)
       fail(std::string("has two columns of ") + NameOf(one.quantity) + " of joint " +
@@ -53,18 +54,18 @@ void Require(const RobotModel& model, const Recording& recording, const std::str
 
 }  // namespace
 
-const char* NameOf(Quantity quantity) {
+const char* NameOf(RecordedQuantity quantity) {
   constexpr const char* kNames[] = {"t", "q", "qd", "qdd", "tau", "current"};
   return kNames[static_cast<size_t>(quantity)];
 }
 
-int Recording::FindColumn(Quantity quantity, int joint) const {
+int Recording::FindColumn(RecordedQuantity quantity, int joint) const {
   for (const Channel& one : channels)
     if (one.quantity == quantity && one.joint == joint) return static_cast<int>(one.column);
   return -1;
 }
 
-bool Recording::Has(Quantity quantity) const {
+bool Recording::Has(RecordedQuantity quantity) const {
   return std::any_of(channels.begin(), channels.end(),
                      [&](const Channel& one) { return one.quantity == quantity; });
 }
@@ -110,7 +111,7 @@ std::string DescribeColumns(const RobotModel& model, const Recording& recording)
       "\n# Numbers count columns from 1. unit: s, ms, us, ns; rad, deg, turn, m, mm; N m, mN m; A, mA.\n"
       "# Each may have: joints = [...], sign = [...], ratio = [...], offset = [...], file = \"...\".\n";
   std::set<size_t> used;
-  for (const Quantity quantity : kQuantities) {
+  for (const RecordedQuantity quantity : kQuantities) {
     std::string columns, joints;
     double scale = 1.0;
     for (const Channel& one : recording.channels) {

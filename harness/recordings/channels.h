@@ -14,15 +14,16 @@
 
 namespace dexcheck {
 
-enum class Quantity { kTime, kPosition, kVelocity, kAcceleration, kTorque, kCurrent };
-inline constexpr Quantity kQuantities[] = {Quantity::kTime,         Quantity::kPosition, Quantity::kVelocity,
-                                           Quantity::kAcceleration, Quantity::kTorque,   Quantity::kCurrent};
+enum class RecordedQuantity { kTime, kPosition, kVelocity, kAcceleration, kTorque, kCurrent };
+inline constexpr RecordedQuantity kQuantities[] = {
+    RecordedQuantity::kTime,         RecordedQuantity::kPosition, RecordedQuantity::kVelocity,
+    RecordedQuantity::kAcceleration, RecordedQuantity::kTorque,   RecordedQuantity::kCurrent};
 /// "t", "q", "qd", "qdd", "tau", "current": as a file of columns names them.
-const char* NameOf(Quantity quantity);
+const char* NameOf(RecordedQuantity quantity);
 
 /// A column that is used: quantity = scale * number + offset, in rad, m, s, N m, N, A.
 struct Channel {
-  Quantity quantity = Quantity::kTime;
+  RecordedQuantity quantity = RecordedQuantity::kTime;
   int joint = -1;
   size_t column = 0;
   double scale = 1.0;
@@ -45,8 +46,8 @@ struct Recording {
   std::function<Recording()> reopen;  ///< From its begin; empty where that cannot be.
 
   /// -1 where it has none.
-  [[nodiscard]] int FindColumn(Quantity quantity, int joint) const;
-  [[nodiscard]] bool Has(Quantity quantity) const;
+  [[nodiscard]] int FindColumn(RecordedQuantity quantity, int joint) const;
+  [[nodiscard]] bool Has(RecordedQuantity quantity) const;
 };
 
 /// Opens a recording. Columns are found by a header's words and the joints' names or numbers; a file of

@@ -11,68 +11,68 @@ namespace {
 /// Words that logs use for a quantity.
 struct Word {
   std::string_view word;
-  Quantity quantity;
+  RecordedQuantity quantity;
 };
 constexpr Word kWords[] = {
-    {"t", Quantity::kTime},
-    {"time", Quantity::kTime},
-    {"timestamp", Quantity::kTime},
-    {"stamp", Quantity::kTime},
-    {"secs", Quantity::kTime},
-    {"seconds", Quantity::kTime},
-    {"q", Quantity::kPosition},
-    {"pos", Quantity::kPosition},
-    {"position", Quantity::kPosition},
-    {"positions", Quantity::kPosition},
-    {"angle", Quantity::kPosition},
-    {"qpos", Quantity::kPosition},
-    {"theta", Quantity::kPosition},
-    {"qd", Quantity::kVelocity},
-    {"dq", Quantity::kVelocity},
-    {"vel", Quantity::kVelocity},
-    {"velocity", Quantity::kVelocity},
-    {"velocities", Quantity::kVelocity},
-    {"qvel", Quantity::kVelocity},
-    {"qdot", Quantity::kVelocity},
-    {"speed", Quantity::kVelocity},
-    {"xi", Quantity::kVelocity},
-    {"qdd", Quantity::kAcceleration},
-    {"ddq", Quantity::kAcceleration},
-    {"acc", Quantity::kAcceleration},
-    {"acceleration", Quantity::kAcceleration},
-    {"qacc", Quantity::kAcceleration},
-    {"qddot", Quantity::kAcceleration},
-    {"tau", Quantity::kTorque},
-    {"torque", Quantity::kTorque},
-    {"torques", Quantity::kTorque},
-    {"effort", Quantity::kTorque},
-    {"efforts", Quantity::kTorque},
-    {"trq", Quantity::kTorque},
-    {"force", Quantity::kTorque},
-    {"current", Quantity::kCurrent},
-    {"currents", Quantity::kCurrent},
-    {"amps", Quantity::kCurrent},
-    {"i", Quantity::kCurrent},
+    {"t", RecordedQuantity::kTime},
+    {"time", RecordedQuantity::kTime},
+    {"timestamp", RecordedQuantity::kTime},
+    {"stamp", RecordedQuantity::kTime},
+    {"secs", RecordedQuantity::kTime},
+    {"seconds", RecordedQuantity::kTime},
+    {"q", RecordedQuantity::kPosition},
+    {"pos", RecordedQuantity::kPosition},
+    {"position", RecordedQuantity::kPosition},
+    {"positions", RecordedQuantity::kPosition},
+    {"angle", RecordedQuantity::kPosition},
+    {"qpos", RecordedQuantity::kPosition},
+    {"theta", RecordedQuantity::kPosition},
+    {"qd", RecordedQuantity::kVelocity},
+    {"dq", RecordedQuantity::kVelocity},
+    {"vel", RecordedQuantity::kVelocity},
+    {"velocity", RecordedQuantity::kVelocity},
+    {"velocities", RecordedQuantity::kVelocity},
+    {"qvel", RecordedQuantity::kVelocity},
+    {"qdot", RecordedQuantity::kVelocity},
+    {"speed", RecordedQuantity::kVelocity},
+    {"xi", RecordedQuantity::kVelocity},
+    {"qdd", RecordedQuantity::kAcceleration},
+    {"ddq", RecordedQuantity::kAcceleration},
+    {"acc", RecordedQuantity::kAcceleration},
+    {"acceleration", RecordedQuantity::kAcceleration},
+    {"qacc", RecordedQuantity::kAcceleration},
+    {"qddot", RecordedQuantity::kAcceleration},
+    {"tau", RecordedQuantity::kTorque},
+    {"torque", RecordedQuantity::kTorque},
+    {"torques", RecordedQuantity::kTorque},
+    {"effort", RecordedQuantity::kTorque},
+    {"efforts", RecordedQuantity::kTorque},
+    {"trq", RecordedQuantity::kTorque},
+    {"force", RecordedQuantity::kTorque},
+    {"current", RecordedQuantity::kCurrent},
+    {"currents", RecordedQuantity::kCurrent},
+    {"amps", RecordedQuantity::kCurrent},
+    {"i", RecordedQuantity::kCurrent},
 };
 /// What is commanded is no measurement.
 constexpr std::string_view kCommanded[] = {"cmd",      "command", "commanded", "des", "desired", "target",
                                            "setpoint", "ref",     "reference", "d",   "error",   "ext"};
 
 constexpr Unit kUnits[] = {
-    {"s", Quantity::kTime, 1.0},
-    {"ms", Quantity::kTime, 1e-3},
-    {"us", Quantity::kTime, 1e-6},
-    {"ns", Quantity::kTime, 1e-9},
-    {"rad", Quantity::kPosition, 1.0},
-    {"deg", Quantity::kPosition, kPi / 180.0},
-    {"m", Quantity::kPosition, 1.0},
-    {"mm", Quantity::kPosition, 1e-3},
-    {"turn", Quantity::kPosition, 2.0 * kPi},
-    {"nm", Quantity::kTorque, 1.0},
-    {"n", Quantity::kTorque, 1.0},
-    {"mnm", Quantity::kTorque, 1e-3},
-    {"a", Quantity::kCurrent, 1.0},
-    {"ma", Quantity::kCurrent, 1e-3},
+    {"s", RecordedQuantity::kTime, 1.0},
+    {"ms", RecordedQuantity::kTime, 1e-3},
+    {"us", RecordedQuantity::kTime, 1e-6},
+    {"ns", RecordedQuantity::kTime, 1e-9},
+    {"rad", RecordedQuantity::kPosition, 1.0},
+    {"deg", RecordedQuantity::kPosition, kPi / 180.0},
+    {"m", RecordedQuantity::kPosition, 1.0},
+    {"mm", RecordedQuantity::kPosition, 1e-3},
+    {"turn", RecordedQuantity::kPosition, 2.0 * kPi},
+    {"nm", RecordedQuantity::kTorque, 1.0},
+    {"n", RecordedQuantity::kTorque, 1.0},
+    {"mnm", RecordedQuantity::kTorque, 1e-3},
+    {"a", RecordedQuantity::kCurrent, 1.0},
+    {"ma", RecordedQuantity::kCurrent, 1e-3},
 };
 
 bool IsLetter(char c) { return std::isalpha(static_cast<unsigned char>(c)) != 0; }
@@ -102,7 +102,7 @@ std::vector<std::string> SplitWords(const std::string& name) {
 
 /// What a column's name says.
 struct NamedColumn {
-  std::optional<Quantity> quantity;
+  std::optional<RecordedQuantity> quantity;
   int joint = -1;
   int number = -1;  // instead of a joint's name
   double scale = 1.0;
@@ -149,12 +149,13 @@ NamedColumn ReadName(const RobotModel& model, const std::string& written) {
 std::span<const Unit> ListUnits() { return kUnits; }
 
 /// The unit of a quantity; positions' units serve their rates, too.
-const Unit* FindUnit(std::string name, Quantity quantity) {
+const Unit* FindUnit(std::string name, RecordedQuantity quantity) {
   std::transform(name.begin(), name.end(), name.begin(), [](unsigned char c) { return std::tolower(c); });
   std::erase_if(name, [](char c) { return c == ' ' || c == '*' || c == '.'; });
   // "rad/s", "deg/s^2"
   if (const size_t slash = name.find('/'); slash != std::string::npos) name.resize(slash);
-  if (quantity == Quantity::kVelocity || quantity == Quantity::kAcceleration) quantity = Quantity::kPosition;
+  if (quantity == RecordedQuantity::kVelocity || quantity == RecordedQuantity::kAcceleration)
+    quantity = RecordedQuantity::kPosition;
   const auto found = std::find_if(std::begin(kUnits), std::end(kUnits), [&](const Unit& unit) {
     return unit.name == name && unit.quantity == quantity;
   });
@@ -169,12 +170,12 @@ std::vector<Channel> GuessChannels(const RobotModel& model, const std::vector<st
     if (column.quantity && column.number >= 0) least = std::min(least, column.number);
   }
   std::vector<Channel> channels;
-  std::set<std::pair<Quantity, int>> seen;
+  std::set<std::pair<RecordedQuantity, int>> seen;
   for (size_t i = 0; i < columns.size(); ++i) {
     const NamedColumn& column = columns[i];
     if (!column.quantity || column.is_commanded) continue;
     int joint = -1;
-    if (*column.quantity != Quantity::kTime) {
+    if (*column.quantity != RecordedQuantity::kTime) {
       joint = column.joint;
       if (joint < 0 && column.number >= 0) joint = column.number - least;
       // A robot of one joint needs no number.

@@ -13,13 +13,13 @@ namespace dexcheck {
 
 struct Unit {
   std::string_view name;
-  Quantity quantity;
+  RecordedQuantity quantity;
   double scale;  ///< What one of it is in rad, m, s, N m, N or A.
 };
 std::span<const Unit> ListUnits();
 
 /// The unit of a quantity; positions' units serve their rates, too. Null where there is none of such a name.
-const Unit* FindUnit(std::string name, Quantity quantity);
+const Unit* FindUnit(std::string name, RecordedQuantity quantity);
 
 /// Columns by their names alone; those that are not known are left out.
 std::vector<Channel> GuessChannels(const RobotModel& model, const std::vector<std::string>& names);

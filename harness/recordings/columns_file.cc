@@ -59,7 +59,7 @@ class ColumnsFile {
       auto joined = std::make_unique<JoinedRecording>();
       joined_ = joined.get();
       if (!recording.empty()) Add(recording, 0);
-      for (const Quantity quantity : kQuantities)
+      for (const RecordedQuantity quantity : kQuantities)
         if (auto value = root.Find(NameOf(quantity))) ReadQuantity(quantity, *value, &result.channels);
       if (auto payload = root.Find("payload")) result.payload = ReadPayload(payload->AsTable());
       root.RejectUnused();
@@ -77,7 +77,7 @@ class ColumnsFile {
   }
 
   /// "q = [2, 3]", or a table.
-  void ReadQuantity(Quantity quantity, const TomlValue& value, std::vector<Channel>* channels) {
+  void ReadQuantity(RecordedQuantity quantity, const TomlValue& value, std::vector<Channel>* channels) {
     if (!value.IsTable()) {
       ReadColumns(quantity, value, 0, {}, channels);
       return;
@@ -129,15 +129,15 @@ class ColumnsFile {
     return joint;
   }
 
-  void ReadColumns(Quantity quantity, const TomlValue& value, size_t first, const std::vector<int>& joints,
-                   std::vector<Channel>* channels) {
+  void ReadColumns(RecordedQuantity quantity, const TomlValue& value, size_t first,
+                   const std::vector<int>& joints, std::vector<Channel>* channels) {
     std::vector<size_t> columns;
     if (IsList(value)) {
       for (const TomlValue& one : value.AsList()) columns.push_back(first + FindColumn(one, first));
     } else {
       columns.push_back(first + FindColumn(value, first));
     }
-    if (quantity == Quantity::kTime) {
+    if (quantity == RecordedQuantity::kTime) {
       if (columns.size() != 1) value.Fail("must be one column");
       channels->push_back({quantity, -1, columns.front()});
       return;
@@ -149,16 +149,18 @@ class ColumnsFile {
       channels->push_back({quantity, joints.empty() ? static_cast<int>(i) : joints[i], columns[i]});
   }
   /// All columns of its file.
-  void AddAll(Quantity quantity, const TomlValue& value, size_t first, const std::vector<int>& joints,
+  void AddAll(RecordedQuantity quantity, const TomlValue& value, size_t first, const std::vector<int>& joints,
               std::vector<Channel>* channels) const {
     const size_t count = joined_->names().size() - first;
-    const size_t most = quantity == Quantity::kTime ? 1
-                        : joints.empty()            ? static_cast<size_t>(model_.num_joints())
-                                                    : joints.size();
+    const size_t most = quantity == RecordedQuantity::kTime ? 1
+                        : joints.empty()                    ? static_cast<size_t>(model_.num_joints())
+                                                            : joints.size();
     if (count == 0 || count > most)
       value.Fail("columns: must say which of " + std::to_string(count) + " columns");
     for (size_t i = 0; i < count; ++i) {
-      const int joint = quantity == Quantity::kTime ? -1 : joints.empty() ? static_cast<int>(i) : joints[i];
+      const int joint = quantity == RecordedQuantity::kTime ? -1
+                        : joints.empty()                    ? static_cast<int>(i)
+                                                            : joints[i];
       channels->push_back({quantity, joint, first + i});
     }
   }

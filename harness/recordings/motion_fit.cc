@@ -19,8 +19,8 @@ constexpr long kHeld = 5;             // rows that repeat one another; more of t
 
 MotionFit::MotionFit(const RobotModel& model, Recording* recording, size_t ahead)
     : model_(&model), recording_(recording), regressor_(model), part_(std::max<size_t>(1, ahead / 8)) {
-  has_currents_ = !recording->Has(Quantity::kTorque);
-  const Quantity effort = has_currents_ ? Quantity::kCurrent : Quantity::kTorque;
+  has_currents_ = !recording->Has(RecordedQuantity::kTorque);
+  const RecordedQuantity effort = has_currents_ ? RecordedQuantity::kCurrent : RecordedQuantity::kTorque;
   for (int joint = 0; joint < model.num_joints(); ++joint)
     if (recording->FindColumn(effort, joint) >= 0) judged_.push_back(joint);
   while (rows_ahead_.size() < ahead && Fill()) {
@@ -28,7 +28,7 @@ MotionFit::MotionFit(const RobotModel& model, Recording* recording, size_t ahead
   Analyse();
 }
 
-int MotionFit::ChannelOf(Quantity quantity, int joint) const {
+int MotionFit::ChannelOf(RecordedQuantity quantity, int joint) const {
   for (size_t i = 0; i < recording_->channels.size(); ++i)
     if (recording_->channels[i].quantity == quantity && recording_->channels[i].joint == joint)
       return static_cast<int>(i);
@@ -43,7 +43,7 @@ bool MotionFit::ReadRow(Row* row) {
       const Channel& channel = recording_->channels[i];
       const double number = numbers_[channel.column];
       (*row)[static_cast<Eigen::Index>(i)] = channel.scale * number + channel.offset;
-      if (!std::isfinite(number) && channel.quantity != Quantity::kTime) ++missing;
+      if (!std::isfinite(number) && channel.quantity != RecordedQuantity::kTime) ++missing;
     }
     // Messages of other joints.
     if (missing + 1 == recording_->channels.size()) {
@@ -65,7 +65,7 @@ bool MotionFit::ReadRow(Row* row) {
 
 /// Appends the next row that says something new; false at the end.
 bool MotionFit::Fill() {
-  const int time = ChannelOf(Quantity::kTime, -1);
+  const int time = ChannelOf(RecordedQuantity::kTime, -1);
   Row row(static_cast<Eigen::Index>(recording_->channels.size()));
   while (!has_ended_) {
     if (!ReadRow(&row)) {
@@ -111,7 +111,7 @@ MatrixXd MotionFit::GetWindow(size_t centre, size_t half) const {
 }
 
 MatrixXd MotionFit::CalcCoefficients(size_t centre, size_t half, int order) const {
-  const int time = ChannelOf(Quantity::kTime, -1);
+  const int time = ChannelOf(RecordedQuantity::kTime, -1);
   const double t = rows_ahead_[centre][time];
   const auto m = static_cast<Eigen::Index>(2 * half + 1);
   const double scale = static_cast<double>(half) * step_;
@@ -149,14 +149,14 @@ bool MotionFit::Emit(size_t centre, const Receiver& receive) {
   const MatrixXd window = GetWindow(centre, half_);
   const MatrixXd C = CalcCoefficients(centre, half_, kOrder);
   const MatrixXd fitted = C * window;
-  const int time = ChannelOf(Quantity::kTime, -1);
+  const int time = ChannelOf(RecordedQuantity::kTime, -1);
   sample_.time = rows_ahead_[centre][time];
-  const Quantity effort = has_currents_ ? Quantity::kCurrent : Quantity::kTorque;
+  const RecordedQuantity effort = has_currents_ ? RecordedQuantity::kCurrent : RecordedQuantity::kTorque;
   for (int joint = 0; joint < model_->num_joints(); ++joint) {
-    const int position = ChannelOf(Quantity::kPosition, joint);
+    const int position = ChannelOf(RecordedQuantity::kPosition, joint);
     if (position < 0) continue;
-    const int velocity = ChannelOf(Quantity::kVelocity, joint);
-    const int acceleration = ChannelOf(Quantity::kAcceleration, joint);
+    const int velocity = ChannelOf(RecordedQuantity::kVelocity, joint);
+    const int acceleration = ChannelOf(RecordedQuantity::kAcceleration, joint);
     sample_.q[joint] = fitted(0, position);
     sample_.qd[joint] = velocity >= 0 ? fitted(0, velocity) : fitted(1, position);
     sample_.qdd[joint] = acceleration >= 0 ? fitted(0, acceleration)
@@ -239,10 +239,10 @@ std::vector<std::string> MotionFit::ListNotes() const {
   note(held_, "rows repeat the row before: left out");
   note(empty_, "rows have no numbers of these joints: left out");
   note(gaps_, fmt::format("gaps longer than {:.3g} s: nothing is smoothed across them", kGap * step_));
-  notes.push_back(
-      fmt::format("{}: {} from {} by polynomials over {:.3g} s (a row every {:.3g} s)", recording_->name,
-                  recording_->Has(Quantity::kVelocity) ? "accelerations" : "velocities and accelerations",
-                  recording_->Has(Quantity::kVelocity) ? "velocities" : "positions", window(), step_));
+  notes.push_back(fmt::format(
+      "{}: {} from {} by polynomials over {:.3g} s (a row every {:.3g} s)", recording_->name,
+      recording_->Has(RecordedQuantity::kVelocity) ? "accelerations" : "velocities and accelerations",
+      recording_->Has(RecordedQuantity::kVelocity) ? "velocities" : "positions", window(), step_));
   return notes;
 }
 

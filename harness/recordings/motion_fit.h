@@ -87,7 +87,7 @@ class MotionFit {
   [[nodiscard]] MatrixXd CalcCoefficients(size_t centre, size_t half, int order) const;
   [[nodiscard]] MatrixXd GetWindow(size_t centre, size_t half) const;
   [[nodiscard]] bool IsWhole(size_t centre, size_t half) const;
-  [[nodiscard]] int ChannelOf(Quantity quantity, int joint) const;
+  [[nodiscard]] int ChannelOf(RecordedQuantity quantity, int joint) const;
   [[nodiscard]] double FindQuantum(Eigen::Index channel) const;
   bool Emit(size_t centre, const Receiver& receive);
   [[nodiscard]] MatrixXd CalcInertia(const std::vector<size_t>& centres);

@@ -51,7 +51,7 @@ void MotionFit::Analyse() {
     throw InputError(
         fmt::format("{}: has {} rows that differ, fewer than {}", name, rows_ahead_.size(), kFewest));
   }
-  const int time = ChannelOf(Quantity::kTime, -1);
+  const int time = ChannelOf(RecordedQuantity::kTime, -1);
   std::vector<double> steps;
   for (size_t i = 1; i < rows_ahead_.size(); ++i)
     steps.push_back(rows_ahead_[i][time] - rows_ahead_[i - 1][time]);
@@ -93,13 +93,13 @@ void MotionFit::Analyse() {
         std::max(kMedianToMean * Median(left[static_cast<size_t>(i)]), Square(FindQuantum(i)) / 12.0));
   }
   for (int joint = 0; joint < n; ++joint) {
-    const auto get = [&](Quantity quantity) {
+    const auto get = [&](RecordedQuantity quantity) {
       const int channel = ChannelOf(quantity, joint);
       return channel < 0 ? 0.0 : sigma[channel];
     };
-    noise_.position[joint] = get(Quantity::kPosition);
-    noise_.velocity[joint] = get(Quantity::kVelocity);
-    noise_.torque[joint] = get(has_currents_ ? Quantity::kCurrent : Quantity::kTorque);
+    noise_.position[joint] = get(RecordedQuantity::kPosition);
+    noise_.velocity[joint] = get(RecordedQuantity::kVelocity);
+    noise_.torque[joint] = get(has_currents_ ? RecordedQuantity::kCurrent : RecordedQuantity::kTorque);
   }
   CheckVelocities(centres, half);
   inertia_ = CalcInertia(centres);
@@ -110,8 +110,8 @@ void MotionFit::Analyse() {
 void MotionFit::CheckVelocities(const std::vector<size_t>& centres, size_t half) {
   constexpr double kOff = 0.1, kShows = 5.0;
   for (int joint = 0; joint < model_->num_joints(); ++joint) {
-    const int position = ChannelOf(Quantity::kPosition, joint),
-              velocity = ChannelOf(Quantity::kVelocity, joint);
+    const int position = ChannelOf(RecordedQuantity::kPosition, joint),
+              velocity = ChannelOf(RecordedQuantity::kVelocity, joint);
     if (position < 0 || velocity < 0) continue;
     double squares = 0.0, product = 0.0, noise = 0.0;
     for (const size_t centre : centres) {
@@ -133,7 +133,7 @@ void MotionFit::CheckVelocities(const std::vector<size_t>& centres, size_t half)
   std::vector<Channel> kept;
   std::vector<Eigen::Index> columns;
   for (size_t i = 0; i < recording_->channels.size(); ++i) {
-    if (recording_->channels[i].quantity == Quantity::kVelocity) continue;
+    if (recording_->channels[i].quantity == RecordedQuantity::kVelocity) continue;
     kept.push_back(recording_->channels[i]);
     columns.push_back(static_cast<Eigen::Index>(i));
   }
@@ -151,7 +151,7 @@ MatrixXd MotionFit::CalcInertia(const std::vector<size_t>& centres) {
   double count = 0.0;
   for (size_t i = 0; i < centres.size(); i += every, count += 1.0) {
     for (int joint = 0; joint < n; ++joint)
-      if (const int channel = ChannelOf(Quantity::kPosition, joint); channel >= 0)
+      if (const int channel = ChannelOf(RecordedQuantity::kPosition, joint); channel >= 0)
         q[joint] = rows_ahead_[centres[i]][channel];
     regressor_.SetMotion(q, zero, zero);
     regressor_.CalcTorques(rest);
@@ -166,11 +166,11 @@ MatrixXd MotionFit::CalcInertia(const std::vector<size_t>& centres) {
 
 void MotionFit::ChooseWindow(const std::vector<size_t>& all) {
   // What accelerations are derived from, and how often.
-  const bool has_acceleration = recording_->Has(Quantity::kAcceleration);
-  const bool has_velocity = recording_->Has(Quantity::kVelocity);
-  const Quantity source = has_acceleration ? Quantity::kAcceleration
-                          : has_velocity   ? Quantity::kVelocity
-                                           : Quantity::kPosition;
+  const bool has_acceleration = recording_->Has(RecordedQuantity::kAcceleration);
+  const bool has_velocity = recording_->Has(RecordedQuantity::kVelocity);
+  const RecordedQuantity source = has_acceleration ? RecordedQuantity::kAcceleration
+                                  : has_velocity   ? RecordedQuantity::kVelocity
+                                                   : RecordedQuantity::kPosition;
   const int derivative = has_acceleration ? 0 : has_velocity ? 1 : 2;
   const double factorial = derivative == 2 ? 2.0 : 1.0;
   double best = std::numeric_limits<double>::infinity();
@@ -189,9 +189,9 @@ void MotionFit::ChooseWindow(const std::vector<size_t>& all) {
       for (int joint = 0; joint < n; ++joint) {
         const int channel = ChannelOf(source, joint);
         if (channel < 0) continue;
-        const double sigma = source == Quantity::kPosition   ? noise_.position[joint]
-                             : source == Quantity::kVelocity ? noise_.velocity[joint]
-                                                             : 0.0;
+        const double sigma = source == RecordedQuantity::kPosition   ? noise_.position[joint]
+                             : source == RecordedQuantity::kVelocity ? noise_.velocity[joint]
+                                                                     : 0.0;
         variance[joint] += Square(factorial * sigma) * C.row(derivative).squaredNorm();
         bias[joint] += Square(factorial) *
                        (Square((C.row(derivative) - higher.row(derivative)).dot(window.col(channel))) -

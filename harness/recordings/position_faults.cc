@@ -13,8 +13,8 @@ namespace {
 using Eigen::Index;
 
 bool IsMotion(const Channel& channel) {
-  return channel.quantity == Quantity::kPosition || channel.quantity == Quantity::kVelocity ||
-         channel.quantity == Quantity::kAcceleration;
+  return channel.quantity == RecordedQuantity::kPosition || channel.quantity == RecordedQuantity::kVelocity ||
+         channel.quantity == RecordedQuantity::kAcceleration;
 }
 
 /// How far the model's torques are off beside gains' signs, friction and offsets: the sum over joints of the
@@ -62,11 +62,11 @@ std::vector<PositionFault> ListPositionFaults(const RobotModel& model, const Rec
   faults.push_back(
       {{"unit of the positions", "all joints", 180.0 / kPi, 0.0, "", "(degrees)"}, scale(kPi / 180.0, -1)});
   for (int joint = 0; joint < model.num_joints(); ++joint) {
-    if (recording.FindColumn(Quantity::kPosition, joint) < 0) continue;
+    if (recording.FindColumn(RecordedQuantity::kPosition, joint) < 0) continue;
     const std::string place = "joint " + model.joint(joint).name;
     faults.push_back({{"position gain", place, -1.0, 0.0, "", "(the other sign)"}, scale(-1.0, joint)});
     for (int other = joint + 1; other < model.num_joints(); ++other) {
-      if (recording.FindColumn(Quantity::kPosition, other) < 0) continue;
+      if (recording.FindColumn(RecordedQuantity::kPosition, other) < 0) continue;
       const auto exchange = [=](Recording* changed) {
         for (Channel& one : changed->channels)
           if (IsMotion(one) && (one.joint == joint || one.joint == other))

@@ -2,10 +2,10 @@
 
 namespace dexcheck {
 
-Recording::Recording(const std::filesystem::path& run_dir)
+RecordedRun::RecordedRun(const std::filesystem::path& run_dir)
     : run_(ReadRecordedFrames(run_dir)), checks_(run_.frames) {}
 
-ViewFrame Recording::Read(long row) const {
+ViewFrame RecordedRun::Read(long row) const {
   const RunFrames& all = run_.frames;
   const auto at = static_cast<size_t>(row);
   ViewFrame view;

@@ -41,10 +41,10 @@ class FrameSource {
 };
 
 /// A recorded run.
-class Recording : public FrameSource {
+class RecordedRun : public FrameSource {
  public:
   /// @throws InputError as ReadRecordedFrames.
-  explicit Recording(const std::filesystem::path& run_dir);
+  explicit RecordedRun(const std::filesystem::path& run_dir);
 
   [[nodiscard]] const mjModel& model() const override { return *run_.model; }
   [[nodiscard]] long rows() const override { return run_.frames.rows(); }

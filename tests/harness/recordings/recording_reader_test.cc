@@ -274,7 +274,7 @@ TEST_F(Formats, ColumnsAreNamedInAFile) {
       "offset = 0.5 }\ntau = [4, 5]\n");
   ASSERT_EQ(recording.channels.size(), 5U);
   EXPECT_DOUBLE_EQ(recording.channels[0].scale, 1e-3);
-  EXPECT_EQ(recording.FindColumn(Quantity::kPosition, 0), 2);
+  EXPECT_EQ(recording.FindColumn(RecordedQuantity::kPosition, 0), 2);
   EXPECT_DOUBLE_EQ(recording.channels[2].scale, -kPi / 180.0);
   EXPECT_DOUBLE_EQ(recording.channels[2].offset, 0.5);
   const auto problem = [&](const std::string& toml) {

@@ -24,13 +24,13 @@ struct TrialSetup {
   }
 };
 
-class Trial {
+class RepairTrial {
  public:
   /// @param written numbers as they stand in the file. @param setup must outlive this.
   /// @throws InputError when they are no robot.
-  Trial(RobotSpec written, const TrialSetup& setup);
-  Trial(const Trial&) = delete;
-  Trial& operator=(const Trial&) = delete;
+  RepairTrial(RobotSpec written, const TrialSetup& setup);
+  RepairTrial(const RepairTrial&) = delete;
+  RepairTrial& operator=(const RepairTrial&) = delete;
 
   [[nodiscard]] const TrialSetup& setup() const { return *setup_; }
   [[nodiscard]] const RobotSpec& written() const { return written_; }
@@ -80,13 +80,13 @@ class Trial {
 /// joint or one that moves nothing else that is compared. Each number there is solved for by itself, and the
 /// one after whose repair the fewest things are misplaced is taken; then the walk goes on.
 /// @return causes in the order found, each to be repaired after those before it.
-std::vector<Repair> WalkGeometry(const Trial& trial);
+std::vector<Repair> WalkGeometry(const RepairTrial& trial);
 
 /// Errors of masses, centres of mass, inertias, armature, damping and gravity, solved for by what the forces
 /// disagree in: what these do not show stays unknown.
 /// @param trial has the right geometry.
 /// @return the fewest causes, a single number before others; none when not all of the disagreement is
 /// explained.
-std::vector<Repair> FitForces(const Trial& trial);
+std::vector<Repair> FitForces(const RepairTrial& trial);
 
 }  // namespace dexcheck

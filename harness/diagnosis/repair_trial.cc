@@ -1,4 +1,4 @@
-#include "harness/diagnosis/trial.h"
+#include "harness/diagnosis/repair_trial.h"
 
 #include <algorithm>
 #include <cmath>
@@ -46,7 +46,7 @@ bool IsAxleRight(const Adapter& adapter, double rounding) {
 
 }  // namespace
 
-Trial::Trial(RobotSpec written, const TrialSetup& setup)
+RepairTrial::RepairTrial(RobotSpec written, const TrialSetup& setup)
     : written_(std::move(written)),
       setup_(&setup),
       model_(setup.terms.Read(written_)),
@@ -67,17 +67,17 @@ Trial::Trial(RobotSpec written, const TrialSetup& setup)
   axle_right_ = IsAxleRight(adapter_, evidence_.Widen(kSame) * evidence_.length());
 }
 
-std::optional<Parameter> Trial::FindNumber(const ConstantFinding& finding) const {
+std::optional<Parameter> RepairTrial::FindNumber(const ConstantFinding& finding) const {
   if (finding.engine_only) return std::nullopt;
   return FindParameter(written_, finding.check, finding.location.first, finding.entry);
 }
 
-bool Trial::Differs(double value, double there, double scale) const {
+bool RepairTrial::Differs(double value, double there, double scale) const {
   const double size = scale > 0.0 ? scale : std::max(std::abs(value), std::abs(there));
   return !(std::abs(value - there) <= evidence_.Widen(kSame) * size);
 }
 
-std::vector<Repair> Trial::ReadConstants() const {
+std::vector<Repair> RepairTrial::ReadConstants() const {
   constexpr double kSameConstant = 1e-12;
   ConstantChecks constants = constants_;
   if (setup_->options.tolerance > 0.0) JudgeByTolerance(setup_->options.tolerance, &constants);
@@ -108,11 +108,11 @@ std::vector<Repair> Trial::ReadConstants() const {
   return causes;
 }
 
-void Trial::Compare(const Parameter& parameter, double value, double scale, Repair* read) const {
+void RepairTrial::Compare(const Parameter& parameter, double value, double scale, Repair* read) const {
   if (Differs(GetValue(written_, parameter), value, scale)) read->Add(parameter, value);
 }
 
-MassProperties Trial::FindBody(int link) const {
+MassProperties RepairTrial::FindBody(int link) const {
   if (link >= 0 || adapter_.wheels().empty()) {
     const LinkInWorld& there = evidence_.samples().front().links[static_cast<size_t>(link + 1)];
     const Pose X = placement_.PoseOf(link).inverse();
@@ -135,7 +135,7 @@ MassProperties Trial::FindBody(int link) const {
   return Combine(parts);
 }
 
-void Trial::ReadBody(int link, Repair* read) const {
+void RepairTrial::ReadBody(int link, Repair* read) const {
   const MassProperties there = FindBody(link);
   const MassProperties& here = BodyOf(written_, link);
   Compare({Kind::kMass, link, 0}, there.mass, 0.0, read);
@@ -148,7 +148,7 @@ void Trial::ReadBody(int link, Repair* read) const {
     Compare({Kind::kInertia, link, k}, there.inertia.data()[kEntries[k]], trace, read);
 }
 
-std::vector<Repair> Trial::ReadBodies() const {
+std::vector<Repair> RepairTrial::ReadBodies() const {
   Repair read;
   for (int link = written_.base.type == BaseType::kFixed ? 0 : -1; link < model_.num_joints(); ++link)
     ReadBody(link, &read);
@@ -173,7 +173,7 @@ std::vector<Repair> Trial::ReadBodies() const {
   return causes;
 }
 
-bool Trial::IsLinkRight(int link) const {
+bool RepairTrial::IsLinkRight(int link) const {
   if (!placement_.IsPlaced(link)) return false;
   for (size_t i = 0; i < placement_.items().size(); ++i) {
     if (placement_.items()[i].link == link && placement_.Fails(static_cast<int>(i))) return false;
@@ -181,7 +181,7 @@ bool Trial::IsLinkRight(int link) const {
   return true;
 }
 
-bool Trial::IsNumberRight(const Parameter& parameter) const {
+bool RepairTrial::IsNumberRight(const Parameter& parameter) const {
   const bool is_of_body = parameter.kind == Kind::kCom || parameter.kind == Kind::kInertia;
   if (parameter.index < 0 && !axle_right_ && (IsGeometric(parameter.kind) || is_of_body)) return false;
   if (IsGeometric(parameter.kind)) return IsLinkRight(CarrierOf(written_, parameter));
@@ -190,7 +190,7 @@ bool Trial::IsNumberRight(const Parameter& parameter) const {
   return !differs && (!is_of_body || placement_.IsPlaced(parameter.index));
 }
 
-bool Trial::IsRepairedBy(const Repair& cause) const {
+bool RepairTrial::IsRepairedBy(const Repair& cause) const {
   if (cause.joint >= 0 && !IsLinkRight(cause.joint)) return false;
   if (cause.other >= 0 && !IsLinkRight(cause.other)) return false;
   return std::all_of(cause.parameters.begin(), cause.parameters.end(),
