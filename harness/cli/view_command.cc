@@ -111,7 +111,7 @@ int View(const ViewRequest& request) {
       throw UsageError("--out, --set, --seed and --save belong to a scenario; " + Quote(request.what) +
                        " is a recorded run");
     }
-    const RecordedRun recording(request.what);
+    const RecordedFrameSource recording(request.what);
     CatchInterrupts();
     ViewRecording(recording, "dexcheck " + request.what, request.viewer);
     return kSuccess;

@@ -2,10 +2,10 @@
 
 namespace dexcheck {
 
-RecordedRun::RecordedRun(const std::filesystem::path& run_dir)
+RecordedFrameSource::RecordedFrameSource(const std::filesystem::path& run_dir)
     : run_(ReadRecordedFrames(run_dir)), checks_(run_.frames) {}
 
-ViewFrame RecordedRun::Read(long row) const {
+ViewFrame RecordedFrameSource::Read(long row) const {
   const RunFrames& all = run_.frames;
   const auto at = static_cast<size_t>(row);
   ViewFrame view;

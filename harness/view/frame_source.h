@@ -41,10 +41,10 @@ class FrameSource {
 };
 
 /// A recorded run.
-class RecordedRun : public FrameSource {
+class RecordedFrameSource : public FrameSource {
  public:
   /// @throws InputError as ReadRecordedFrames.
-  explicit RecordedRun(const std::filesystem::path& run_dir);
+  explicit RecordedFrameSource(const std::filesystem::path& run_dir);
 
   [[nodiscard]] const mjModel& model() const override { return *run_.model; }
   [[nodiscard]] long rows() const override { return run_.frames.rows(); }
