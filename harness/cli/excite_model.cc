@@ -31,13 +31,12 @@ std::string WriteMotion(const RobotModel& model, const SeriesMotion& motion, dou
     for (const std::string& name : ListJointNames(model)) text += fmt::format(",{}.{}", quantity, name);
   text += "\n";
   TorqueRegressor regressor(model);
-  VectorXd q, qd, qdd, torque(model.num_joints());
+  VectorXd q, qd, qdd;
   const auto rows = static_cast<long>(std::floor(motion.duration() * rate));
   for (long row = 0; row <= rows; ++row) {
     const double time = static_cast<double>(row) / rate;
     motion.Calc(time, &q, &qd, &qdd);
-    regressor.SetMotion(q, qd, qdd);
-    regressor.CalcTorques(torque);
+    VectorXd torque = CalcMotionTorques(q, qd, qdd, &regressor);
     text += FormatNumber(time);
     for (const VectorXd* const values : {&q, &qd, &qdd, &torque})
       for (const double value : *values) text += fmt::format(",{:.9g}", value);

@@ -157,15 +157,13 @@ class MotionDesigner {
     constexpr size_t kEvery = 4;
     RecordedSample sample;
     sample.torque_rate = sample.torque_curvature = VectorXd::Zero(model_.num_joints());
-    sample.torque.resize(model_.num_joints());
     VectorXd largest = VectorXd::Zero(model_.num_joints());
     const std::vector<bool> all(joints_.size(), true);
     for (size_t g = 0; g < times_.size(); g += kEvery) {
       sample.time = times_[g];
       motion.Calc(times_[g], &sample.q, &sample.qd, &sample.qdd);
       sample.direction = sample.qd.cwiseSign();
-      regressor_.SetMotion(sample.q, sample.qd, sample.qdd);
-      regressor_.CalcTorques(sample.torque);
+      sample.torque = CalcMotionTorques(sample.q, sample.qd, sample.qdd, &regressor_);
       largest = largest.cwiseMax(sample.torque.cwiseAbs());
       if (squares != nullptr)
         *squares += sample.torque.cwiseAbs2() / static_cast<double>(times_.size() / kEvery);
@@ -350,6 +348,19 @@ void SeriesMotion::Calc(double time, VectorXd* q, VectorXd* qd, VectorXd* qdd) c
   *q = centre_ + moved.col(0);
   *qd = moved.col(1);
   *qdd = moved.col(2);
+}
+
+VectorXd CalcMotionTorques(const VectorXd& q, const VectorXd& qd, const VectorXd& qdd,
+                           TorqueRegressor* regressor) {
+  VectorXd torques(regressor->size());
+  regressor->SetMotion(q, qd, qdd);
+  regressor->CalcTorques(torques);
+  for (int i = 0; i < regressor->size(); ++i) {
+    const Joint& joint = regressor->model().joint(i);
+    const double direction = qd[i] == 0.0 ? 0.0 : std::copysign(1.0, qd[i]);
+    torques[i] += joint.damping * qd[i] + joint.dry_friction * direction;
+  }
+  return torques;
 }
 
 MotionDesign DesignMotion(const RobotModel& model, const MotionLimits& limits,

@@ -68,6 +68,10 @@ struct MotionDesign {
   int evaluations = 0;
 };
 
+/// What the model says that a motion takes, with friction, N m or N. @param q, qd, qdd by joint.
+VectorXd CalcMotionTorques(const VectorXd& q, const VectorXd& qd, const VectorXd& qdd,
+                           TorqueRegressor* regressor);
+
 /// Maximises log det(1 + S W^T W S) over the motions within limits: W are the columns that faults leave in
 /// the joints' balances in units of noise, those of `recorded` included, and S the sizes that are plausible.
 /// By SBPLX (T. Rowan 1990; NLopt's) from the best of motions drawn at random.

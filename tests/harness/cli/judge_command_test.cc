@@ -4,6 +4,7 @@
 #include <fstream>
 #include <sstream>
 
+#include "tests/common/refused_text.h"
 #include "tests/harness/cli/dexcheck_program.h"
 
 namespace dexcheck::testing::judge_command_test {
@@ -112,6 +113,26 @@ TEST_F(JudgeCommand, RefusesWhatItCannotUnderstand) {
   EXPECT_TRUE(Refused("judge none.toml right.csv", {"none.toml: ", "No such file"}));
   EXPECT_TRUE(IsRefused(Run(With("judge", "none.csv")), {"none.csv: cannot be read"}));
   EXPECT_TRUE(IsRefused(Run(With("judge", "right.csv --columns none.toml")), {"none.toml"}));
+}
+
+TEST_F(JudgeCommand, MakesAMotionToRecordThatTheModelExplains) {
+  const std::string panda = SourcePath("/mjcf/panda.xml");
+  const Words excite = Words{"excite", "--model", panda, "--runs", "10"};
+  const Json json = Json::parse(Expect(0, excite + Words("--out motion.csv --duration 8 --json")).out);
+  EXPECT_EQ(json["motions"], 100);
+  EXPECT_GT(json["known_after"], json["known_before"]);
+  const std::string motion = Read("motion.csv");
+  EXPECT_EQ(std::count(motion.begin(), motion.end(), '\n'), 802);
+  EXPECT_EQ(Json::parse(Expect(0, Words{"judge", panda} + Words("motion.csv --json")).out)["verdict"],
+            "explained");
+
+  Write("limits.toml", "[joints.elbow]\nvelocity = 1\n");
+  for (const auto& [words, parts] : std::initializer_list<std::pair<Words, std::vector<std::string>>>{
+           {excite + Words("--limits limits.toml"), {"limits.toml:1", "joints.elbow", "is no joint of"}},
+           {excite + Words("--limits none.toml"), {"none.toml", "cannot be read"}},
+           {excite + Words("paper"), {"SCENARIO and --model exclude each other"}},
+           {excite + Words{"--mjcf", SourcePath("/mjcf/torus.xml")}, {"torus.xml", "panda_joint1"}}})
+    EXPECT_TRUE(IsOneLineWith(Expect(2, words).err, parts));
 }
 
 }  // namespace
