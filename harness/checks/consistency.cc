@@ -76,20 +76,20 @@ bool AgreeAtFirst(const RobotModel& model, DynamicsProvider* a, DynamicsProvider
 }
 
 std::optional<BaseConvention> FindOtherConvention(const RobotModel& model, DynamicsProvider* reference,
-                                                  AnsweringProvider* answering,
+                                                  LayoutProvider* provider,
                                                   const std::function<StateFeed()>& make_feed) {
-  const BaseConvention spoken = answering->layout().convention();
+  const BaseConvention spoken = provider->layout().convention();
   std::optional<BaseConvention> found;
   for (const BaseConvention& convention : ListBaseConventions()) {
     if (convention == spoken || found) continue;
-    answering->set_convention(convention);
+    provider->set_convention(convention);
     try {
-      if (AgreeAtFirst(model, reference, answering, make_feed())) found = convention;
+      if (AgreeAtFirst(model, reference, provider, make_feed())) found = convention;
     } catch (const Error&) {
       break;  // a program may not bear what it did not request
     }
   }
-  answering->set_convention(spoken);
+  provider->set_convention(spoken);
   return found;
 }
 

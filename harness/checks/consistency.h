@@ -10,8 +10,8 @@
 
 #include "harness/checks/term_comparison.h"
 #include "harness/descriptions/analytic_provider.h"
-#include "harness/descriptions/answer_layout.h"
 #include "harness/descriptions/constant_checks.h"
+#include "harness/descriptions/program_layout.h"
 #include "harness/descriptions/robot_part.h"
 #include "harness/engine/adapter.h"
 
@@ -55,7 +55,7 @@ ConsistencyResult CheckConsistency(const Adapter& adapter, const ConsistencyOpti
 ConsistencyResult CompareDescriptions(const RobotDescription& a, const RobotDescription& b,
                                       const ConsistencyOptions& options, const Progress& progress);
 
-/// What a program, answers in files or functions have, against a description.
+/// What a program, results in files or functions have, against a description.
 /// @param feed gives the states. @param asker whose terms are compared.
 ConsistencyResult CompareProviders(const RobotModel& model, DynamicsProvider* first, DynamicsProvider* second,
                                    const StateFeed& feed, const Progress& progress);
@@ -74,7 +74,7 @@ bool AgreeAtFirst(const RobotModel& model, DynamicsProvider* a, DynamicsProvider
 /// disagrees would agree in all its terms.
 /// @param make_feed states to compare at; the first few are used.
 std::optional<BaseConvention> FindOtherConvention(const RobotModel& model, DynamicsProvider* reference,
-                                                  AnsweringProvider* answering,
+                                                  LayoutProvider* provider,
                                                   const std::function<StateFeed()>& make_feed);
 
 }  // namespace dexcheck

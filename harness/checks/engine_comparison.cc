@@ -270,9 +270,9 @@ class EngineComparisonRun {
       if (AgreeAtFirst(model_, &model, provider, make_feed(), options_.tolerance)) continue;
       std::optional<std::string> setting =
           FindSetting(robot_, provider, make_feed, options_.tolerance, others_);
-      auto* const answering = dynamic_cast<AnsweringProvider*>(provider);
-      if (!setting && answering != nullptr && answering->layout().is_floating()) {
-        const std::optional<BaseConvention> other = FindOtherConvention(model_, &model, answering, make_feed);
+      auto* const by_layout = dynamic_cast<LayoutProvider*>(provider);
+      if (!setting && by_layout != nullptr && by_layout->layout().is_floating()) {
+        const std::optional<BaseConvention> other = FindOtherConvention(model_, &model, by_layout, make_feed);
         if (other) setting = "as with its base in " + Describe(*other);
       }
       const bool is_mujoco = dynamic_cast<EngineProvider*>(provider) != nullptr;

@@ -10,7 +10,6 @@
 
 #include "controller/common/errors.h"
 #include "harness/checks/tolerance.h"
-#include "harness/descriptions/answer_files.h"
 #include "harness/descriptions/compiled_inertias.h"
 #include "harness/descriptions/description_match.h"
 #include "harness/descriptions/engine_extras.h"
@@ -19,6 +18,7 @@
 #include "harness/descriptions/mjcf_reader.h"
 #include "harness/descriptions/own_rows.h"
 #include "harness/descriptions/read_description.h"
+#include "harness/descriptions/result_files.h"
 #include "harness/engine/engine.h"
 
 namespace dexcheck {
@@ -243,14 +243,14 @@ struct Reference {
 };
 
 /// What is worth knowing of a base whose convention is the other side's.
-void NoteConvention(const Reference& reference, AnsweringProvider* answering,
+void NoteConvention(const Reference& reference, LayoutProvider* provider,
                     const std::function<StateFeed()>& make_feed, Comparison* comparison) {
-  if (!answering->layout().is_floating()) return;
+  if (!provider->layout().is_floating()) return;
   comparison->notes.push_back("the other side's base is taken as " +
-                              Describe(answering->layout().convention()));
+                              Describe(provider->layout().convention()));
   if (comparison->result.Agrees()) return;
   const std::optional<BaseConvention> other =
-      FindOtherConvention(*comparison->model, reference.provider.get(), answering, make_feed);
+      FindOtherConvention(*comparison->model, reference.provider.get(), provider, make_feed);
   if (!other) return;
   comparison->notes.push_back("all its terms agree with its base taken as " + Describe(*other) +
                               ": this is its convention, and its key \"base\" can say so");
@@ -258,36 +258,35 @@ void NoteConvention(const Reference& reference, AnsweringProvider* answering,
 
 }  // namespace
 
-Comparison CompareAnswers(const std::filesystem::path& file, const AnswersSource& source,
+Comparison CompareResults(const std::filesystem::path& file, const ResultsSource& source,
                           const UrdfOptions& urdf, const ConsistencyOptions& options,
                           const Progress& progress) {
   Comparison comparison;
   const Reference reference(DescriptionFile(file, urdf), &comparison);
-  std::unique_ptr<AnsweringProvider> answering;
+  std::unique_ptr<LayoutProvider> provider;
   std::function<StateFeed()> make_feed = [&] { return FeedRandomStates(*comparison.model, options); };
-  if (source.answers.empty()) {
+  if (source.results.empty()) {
     comparison.second = "the program";
-    answering = std::make_unique<ProgramProvider>(source.program, reference.robot, source.program_options);
+    provider = std::make_unique<ProgramProvider>(source.program, reference.robot, source.program_options);
   } else {
-    comparison.second = source.answers;
-    auto answers = std::make_unique<AnswerFiles>(source.answers, reference.robot);
-    make_feed = [&read = *answers] {
+    comparison.second = source.results;
+    auto results = std::make_unique<ResultFiles>(source.results, reference.robot);
+    make_feed = [&read = *results] {
       return [&read](DynamicsState* state) { return read.ReadState(state); };
     };
-    answering = std::move(answers);
+    provider = std::move(results);
   }
   AppendTo(&comparison.notes, DescribeCoordinates(reference.robot));
   comparison.result =
-      CompareProviders(*comparison.model, reference.provider.get(), answering.get(), make_feed(), progress);
+      CompareProviders(*comparison.model, reference.provider.get(), provider.get(), make_feed(), progress);
   if (!comparison.result.not_compared.empty())
-    comparison.not_compared.push_back("terms that are not answered: " +
-                                      JoinNames(comparison.result.not_compared));
-  if (answering->is_reduced()) {
+    comparison.not_compared.push_back("terms without results: " + JoinNames(comparison.result.not_compared));
+  if (provider->is_reduced()) {
     comparison.notes.push_back(
         "joints that follow others have no coordinate there: compared are T^T M T and T^T of the "
         "forces, with xi = T xi_free");
   }
-  NoteConvention(reference, answering.get(), make_feed, &comparison);
+  NoteConvention(reference, provider.get(), make_feed, &comparison);
   return comparison;
 }
 

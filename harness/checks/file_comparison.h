@@ -39,16 +39,16 @@ Comparison CompareFiles(
     const std::filesystem::path& a, const std::filesystem::path& b, const UrdfOptions& urdf,
     const ConsistencyOptions& options, const Progress& progress = [](long) { return true; });
 
-/// What stands against a description: a program's command, or a folder with answers.
-struct AnswersSource {
+/// What stands against a description: a program's command, or a folder with results.
+struct ResultsSource {
   std::string program;
-  std::filesystem::path answers;
+  std::filesystem::path results;
   ProgramOptions program_options;
 };
 
-/// Compares a description with what a program answers, or has answered; of an MJCF the engine's terms. Of a
-/// floating base whose terms disagree, the other conventions are tried.
-Comparison CompareAnswers(const std::filesystem::path& file, const AnswersSource& source,
+/// Compares a description with the results of a program, as it runs or in files; of an MJCF the engine's
+/// terms. Of a floating base whose terms disagree, the other conventions are tried.
+Comparison CompareResults(const std::filesystem::path& file, const ResultsSource& source,
                           const UrdfOptions& urdf, const ConsistencyOptions& options,
                           const Progress& progress);
 

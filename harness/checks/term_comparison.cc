@@ -55,7 +55,7 @@ TermComparison::TermComparison(const RobotModel& model, Asker asker, std::vector
   if (is_reduced_) FormCoupling();
   for (const TermEntry& entry : ListTerms()) {
     if ((entry.askers & asker) == 0) continue;
-    // What a program has is known at its first answer.
+    // What a program has is known at its first result.
     bool is_shared = asker == kAskedOfPrograms;
     for (size_t b = 1; b < providers_.size(); ++b) is_shared = is_shared || Shares(entry, 0, b);
     if (!is_shared) continue;

@@ -17,7 +17,7 @@ enum Asker : unsigned {
   kAskedByRun = 1,          ///< Every step, of what the controller has evaluated.
   kAskedByConsistency = 2,  ///< Two descriptions, at random states of robot and object.
   kAskedByContacts = 4,     ///< Random contacts of one fingertip.
-  kAskedOfPrograms = 8,     ///< What the protocol of programs, answers in files and other engines have.
+  kAskedOfPrograms = 8,     ///< What the protocol of programs, results in files and other engines have.
 };
 
 /// What the columns of a term's matrix belong to; its rows are the numbers of each.

@@ -22,7 +22,7 @@ namespace {
 void TakeFiles(ConsistencyRequest* request) {
   if (!request->has_results()) return request->TakeFiles("consistency");
   if (request->a.empty() || !request->b.empty()) {
-    throw InputError("consistency: one file must be given beside --program or --answers, got " +
+    throw InputError("consistency: one file must be given beside --program or --results, got " +
                      std::string(request->a.empty() ? "none" : "two"));
   }
   request->files.robot = request->a;
@@ -50,7 +50,7 @@ int Run(ConsistencyRequest request) {
   const RobotFiles& files = request.files;
   Comparison comparison =
       request.has_results()
-          ? CompareAnswers(files.robot, request.source, request.urdf, request.options, progress)
+          ? CompareResults(files.robot, request.source, request.urdf, request.options, progress)
           : CompareFiles(files.robot, files.mjcf, request.urdf, request.options, progress);
   bar.Finish();
   if (const std::optional<double> tolerance = request.judging.Find())
@@ -86,7 +86,7 @@ void AddConsistencyCommand(Command app) {
       "Command of a program that provides terms, instead of B (harness/descriptions/README.md)");
   command
       .AddOption(
-          "--answers FOLDER", &request->source.answers,
+          "--results FOLDER", &request->source.results,
           "Folder with states as dexcheck states writes them and NumPy arrays of results, instead of B")
       .Excludes(program);
   command

@@ -13,17 +13,17 @@ namespace dexcheck::cli {
 
 /// What is compared, at how many states.
 struct ConsistencyRequest : ComparisonRequest {
-  AnswersSource source;  ///< What stands for B and provides terms.
+  ResultsSource source;  ///< What stands for B and provides terms.
   ConsistencyOptions options;
   std::vector<std::string> lock;    ///< "JOINT" or "JOINT=VALUE".
   std::vector<std::string> ignore;  ///< Words of kIgnorable, and links.
   bool exact = false;               ///< Two files agree to rounding only, whatever digits they print.
 
   /// What stands for B provides terms, and is no description.
-  [[nodiscard]] bool has_results() const { return !source.program.empty() || !source.answers.empty(); }
+  [[nodiscard]] bool has_results() const { return !source.program.empty() || !source.results.empty(); }
   /// Whether all states were compared; results in files have their own.
   [[nodiscard]] bool IsWhole(const ConsistencyResult& result) const {
-    return result.samples >= options.samples || !source.answers.empty();
+    return result.samples >= options.samples || !source.results.empty();
   }
 };
 

@@ -8,8 +8,8 @@
 #include "controller/common/errors.h"
 #include "harness/cli/commands.h"
 #include "harness/cli/output_file.h"
-#include "harness/descriptions/answer_files.h"
 #include "harness/descriptions/read_description.h"
+#include "harness/descriptions/result_files.h"
 
 namespace dexcheck::cli {
 namespace {
@@ -45,7 +45,7 @@ void AddStatesCommand(Command app) {
   constexpr long kMaxCount = 1000000;
   const auto request = std::make_shared<StatesRequest>();
   Command command = app.AddCommand(
-      "states", "Write random states of a robot, for a program whose results consistency --answers reads");
+      "states", "Write random states of a robot, for a program whose results consistency --results reads");
   command.AddOption("ROBOT", &request->robot, "Parameter file (TOML), URDF or MJCF")
       .TypeName("FILE")
       .Required();

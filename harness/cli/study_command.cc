@@ -18,7 +18,7 @@
 #include "harness/cli/commands.h"
 #include "harness/cli/run_folder.h"
 #include "harness/cli/terminal.h"
-#include "harness/study/study_answer.h"
+#include "harness/study/study_findings.h"
 #include "harness/study/study_runner.h"
 #include "harness/study/study_store.h"
 #include "harness/study/trial.h"

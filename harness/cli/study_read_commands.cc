@@ -15,7 +15,7 @@
 #include "harness/cli/commands.h"
 #include "harness/cli/output_file.h"
 #include "harness/cli/terminal.h"
-#include "harness/study/study_answer.h"
+#include "harness/study/study_findings.h"
 #include "harness/study/study_page.h"
 #include "harness/study/study_store.h"
 #include "harness/study/study_summary.h"

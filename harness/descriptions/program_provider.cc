@@ -37,7 +37,7 @@ OrderedJson MakeHello(const RobotDescription& robot, const ProgramLayout& layout
 
 ProgramProvider::ProgramProvider(const std::string& command, const RobotDescription& robot,
                                  const ProgramOptions& options)
-    : AnsweringProvider(ProgramLayout(robot)),
+    : LayoutProvider(ProgramLayout(robot)),
       robot_(robot),
       process_(command, options.seconds),
       source_("program " + Quote(command)),

@@ -5,7 +5,7 @@
 #include <memory>
 #include <string>
 
-#include "harness/descriptions/answer_layout.h"
+#include "harness/descriptions/program_layout.h"
 #include "harness/descriptions/program_process.h"
 
 namespace dexcheck {
@@ -18,7 +18,7 @@ struct ProgramOptions {
 };
 
 /// A running program as a provider.
-class ProgramProvider : public AnsweringProvider {
+class ProgramProvider : public LayoutProvider {
  public:
   /// Starts it and says hello. @param robot outlives this.
   /// @throws ProgramError when it dies or hangs, InputError for what it writes that is no result; one line.

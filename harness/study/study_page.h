@@ -7,7 +7,7 @@
 
 namespace dexcheck {
 
-/// One HTML page that loads nothing else: what the study answers, outcomes and metrics over the varied keys,
+/// One HTML page that loads nothing else: what the study finds, outcomes and metrics over the varied keys,
 /// the best trials, and the command that repeats each.
 /// @param renew seconds after which a browser loads the page again; 0 for never.
 std::string MakeStudyPage(const StudySummary& summary, double renew = 0.0);

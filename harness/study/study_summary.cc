@@ -12,7 +12,7 @@
 #include "harness/study/sampled_stability.h"
 #include "harness/study/sampling.h"
 #include "harness/study/search.h"
-#include "harness/study/study_answer.h"
+#include "harness/study/study_findings.h"
 
 namespace dexcheck {
 
@@ -79,7 +79,7 @@ class Summary {
             {"total", CountTrials(study_)},
             {"error", kMetrics[error_].name}};
     json["outcomes"] = ListOutcomes();
-    json["answers"] = AnswerStudy(study_, rows_);
+    json["findings"] = ListFindings(study_, rows_);
     json["best"] = rows_.empty() ? Json(nullptr) : ListBest();
     json["margins"] = ListMargins();
     json["sensitivity"] = ListSensitivity();

@@ -15,7 +15,7 @@ namespace dexcheck {
 constexpr size_t kMostShown = 20000;
 
 struct StudySummary {
-  /// What the study is, how far it has come, outcomes, answers, the best points, margins, sensitivities, and
+  /// What the study is, how far it has come, outcomes, findings, the best points, margins, sensitivities, and
   /// how (57) agrees. Its keys are in the README.
   nlohmann::ordered_json json;
   /// Doubles, row by row, of the trials that are shown: the numbers of json["columns"].

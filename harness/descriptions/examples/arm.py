@@ -7,7 +7,7 @@ or, without a running program, over files:
 
     dexcheck states arm.urdf --count 1000 --out states
     python3 arm.py states
-    dexcheck consistency arm.urdf --answers states
+    dexcheck consistency arm.urdf --results states
 """
 
 import json
@@ -68,7 +68,7 @@ def terms(q, v):
     return M, c, g
 
 
-def answer_lines():
+def write_lines():
     for line in sys.stdin:
         request = json.loads(line)
         if request["request"] == "hello":
@@ -79,7 +79,7 @@ def answer_lines():
         print(json.dumps(reply), flush=True)
 
 
-def answer_files(folder):
+def write_files(folder):
     states = zip(np.load(folder / "q.npy"), np.load(folder / "v.npy"))
     M, c, g = zip(*(terms(q, v) for q, v in states))
     np.save(folder / "M.npy", np.array(M))
@@ -89,6 +89,6 @@ def answer_files(folder):
 
 if __name__ == "__main__":
     if len(sys.argv) > 1:
-        answer_files(Path(sys.argv[1]))
+        write_files(Path(sys.argv[1]))
     else:
-        answer_lines()
+        write_lines()

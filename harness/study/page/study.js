@@ -1,4 +1,4 @@
-// A study's page: its answers, tables and charts, each place of which leads to its trial.
+// A study's page: its findings, tables and charts, each place of which leads to its trial.
 'use strict';
 (() => {
   const study = ReadJson('study-data');
@@ -33,7 +33,7 @@
       [tracked, 'tracked to their end, without slip']]) {
       Add(get('study-tiles'), Add(Make('div', '', {className: 'card'}), Make('b', String(number)), Make('span', text)));
     }
-    Add(get('answers'), ...study.answers.map(answer => Make('p', answer)));
+    Add(get('findings'), ...study.findings.map(finding => Make('p', finding)));
     const {dexcheck_version, git_revision, mujoco_version} = study.versions;
     get('study-footer').textContent = `dexcheck ${dexcheck_version}${git_revision ? ', revision ' + git_revision : ''}, MuJoCo ${mujoco_version}.`;
     Add(get('outcome-table'), ShowTable(['outcome', 'trials'], study.outcomes.filter(o => o.count > 0).map(o => [
@@ -305,7 +305,7 @@
 
   ShowSummary();
   const drop = (id, gone) => { if (gone) get(id).remove(); };
-  drop('answers', !study.answers.length);
+  drop('findings', !study.findings.length);
   drop('margins', !study.margins.length);
   drop('effects', !study.sensitivity.length);
   drop('departures', !study.theory);

@@ -109,10 +109,10 @@ TEST(BaseConvention, ForcesAreThoseOfTheMotion) {
 }
 
 /// A program that speaks one convention, whatever it says.
-class Stubborn : public AnsweringProvider {
+class Stubborn : public LayoutProvider {
  public:
   Stubborn(const RobotDescription& robot, const BaseConvention& spoken)
-      : AnsweringProvider(ProgramLayout(robot)), model_(robot.spec, "model"), spoken_(spoken) {}
+      : LayoutProvider(ProgramLayout(robot)), model_(robot.spec, "model"), spoken_(spoken) {}
   [[nodiscard]] const std::string& name() const override { return model_.name(); }
 
   TermResults Evaluate(long, const VectorXd& q, const VectorXd& xi) override {

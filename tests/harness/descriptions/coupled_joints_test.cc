@@ -137,10 +137,10 @@ TEST(CoupledJoints, TablesAgreeWithTheMjcf) {
 
 /// A program that knows the free joint alone, with the equations of the whole gripper on its constraint:
 /// energies and their derivatives by a route of its own, T(xi) = 1/2 m(q) v^2.
-class ReducedGripper : public AnsweringProvider {
+class ReducedGripper : public LayoutProvider {
  public:
   explicit ReducedGripper(const RobotDescription& robot)
-      : AnsweringProvider(ProgramLayout(robot, nlohmann::json{{"joints", {"wrist"}}}, "the program")),
+      : LayoutProvider(ProgramLayout(robot, nlohmann::json{{"joints", {"wrist"}}}, "the program")),
         whole_(robot.spec, "gripper") {}
   [[nodiscard]] const std::string& name() const override { return whole_.name(); }
   TermResults Evaluate(long, const VectorXd& q, const VectorXd& xi) override {

@@ -11,7 +11,7 @@
 #include <random>
 
 #include "controller/common/errors.h"
-#include "harness/study/study_answer.h"
+#include "harness/study/study_findings.h"
 #include "tests/common/throws.h"
 #include "tests/harness/study/search_functions.h"
 

@@ -8,7 +8,7 @@
 #include "harness/study/sampled_stability.h"
 #include "harness/study/sampling.h"
 #include "harness/study/search.h"
-#include "harness/study/study_answer.h"
+#include "harness/study/study_findings.h"
 
 namespace dexcheck::testing::sensitivity_test {
 namespace {
@@ -214,7 +214,7 @@ TEST(Probability, IsMeasuredOfASampleWithConstraints) {
   const Estimate estimate = CalcProbability(failures, 1000);
   EXPECT_LT(estimate.low, 0.1);
   EXPECT_GT(estimate.high, 0.1);
-  const std::vector<std::string> answers = AnswerStudy(study, rows);
+  const std::vector<std::string> answers = ListFindings(study, rows);
   ASSERT_FALSE(answers.empty());
   EXPECT_NE(answers[0].find(std::to_string(failures) + " of 1000 trials"), std::string::npos) << answers[0];
 }

@@ -12,7 +12,7 @@
 #include "controller/common/errors.h"
 #include "controller/common/toml_reader.h"
 #include "harness/study/search.h"
-#include "harness/study/study_answer.h"
+#include "harness/study/study_findings.h"
 #include "harness/study/study_page.h"
 #include "harness/study/study_summary.h"
 #include "tests/common/files.h"

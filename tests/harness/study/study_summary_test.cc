@@ -10,7 +10,7 @@
 #include <string>
 #include <utility>
 
-#include "harness/study/study_answer.h"
+#include "harness/study/study_findings.h"
 #include "harness/study/study_page.h"
 #include "tests/common/files.h"
 #include "tests/common/matchers.h"
@@ -118,7 +118,7 @@ TEST(StudySummary, ATrialHasTheCommandThatRepeatsIt) {
   EXPECT_EQ(json["metrics"]["energy"], 0.1);
 }
 
-TEST(StudyAnswer, ReportsTheSpreadOfWhatHasNoOrder) {
+TEST(StudyFindings, ReportsTheSpreadOfWhatHasNoOrder) {
   const Study study = Parse(
       "seeds = [1, 2, 3, 4]\nmetrics = ['position_error_rms']\n"
       "[[vary]]\nkey = 'control.law'\nvalues = ['computed_torque', 'pd_gravity']\n");
@@ -132,7 +132,7 @@ TEST(StudyAnswer, ReportsTheSpreadOfWhatHasNoOrder) {
     rows.push_back(row);
   }
   ASSERT_EQ(rows.size(), 8U);
-  EXPECT_THAT(AnswerStudy(study, rows),
+  EXPECT_THAT(ListFindings(study, rows),
               ::testing::ElementsAre("control.law = computed_torque: held in 4 of 4 trials; "
                                      "position_error_rms 6.5 (1 to 16) m, medians and ranges.",
                                      "control.law = pd_gravity: held in 1 of 4 trials; "
@@ -140,7 +140,7 @@ TEST(StudyAnswer, ReportsTheSpreadOfWhatHasNoOrder) {
 }
 
 // The best of a search that presses against its range, in the quantity's unit.
-TEST(StudyAnswer, ReportsWhatIsWantedWithItsUnitAndItsEdge) {
+TEST(StudyFindings, ReportsWhatIsWantedWithItsUnitAndItsEdge) {
   const Study study = Parse(
       "[[objective]]\nminimize = 'settling_time'\n[search]\nmethod = 'cma_es'\ncount = 24\npopulation = "
       "8\nseed = 1\n[[vary]]\nkey = 'control.K_p'\nfrom = 1\nto = 100\n[[vary]]\nkey = 'control.K_v'\nfrom = "
@@ -153,7 +153,7 @@ TEST(StudyAnswer, ReportsWhatIsWantedWithItsUnitAndItsEdge) {
     row.result.metrics[kSettlingTime] = i == 0 ? std::nan("") : 0.01 * static_cast<double>(i);
     rows.push_back(row);
   }
-  EXPECT_THAT(AnswerStudy(study, rows),
+  EXPECT_THAT(ListFindings(study, rows),
               ::testing::ElementsAre(
                   "The least settling_time of 3 points is 0.01 s, at control.K_p = 100, control.K_v = 30 "
                   "(trial 1). The search began where it has no value. At an end of its range is control.K_p: "

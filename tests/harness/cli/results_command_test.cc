@@ -3,15 +3,15 @@
 #include "tests/common/legged_robots.h"
 #include "tests/harness/cli/dexcheck_program.h"
 
-namespace dexcheck::testing::answers_command_test {
+namespace dexcheck::testing::results_command_test {
 namespace {
 
 const std::string kExamples = SourcePath("/harness/descriptions/examples/");
 const std::string kPython = DEXCHECK_PYTHON;
 
-class Answers : public CommandTest {
+class Results : public CommandTest {
  protected:
-  /// All terms that the answers have agree, each in so many numbers at least.
+  /// All terms that the results have agree, each in so many numbers at least.
   static void ExpectAgreement(const Json& results, long numbers) {
     EXPECT_EQ(results.at("verdict"), "pass");
     for (const char* term : {"M_bar", "C_bar_xi", "gravity", "bias"}) {
@@ -26,11 +26,11 @@ class Answers : public CommandTest {
   std::string urdf_ = kExamples + "arm.urdf";
 };
 
-TEST_F(Answers, OfAnArmInNumPyAgree) {
+TEST_F(Results, OfAnArmInNumPyAgree) {
   ExpectAgreement(RunJson(0, WithProgram(kExamples + "arm.py") + "--samples 100"), 300);
 }
 
-TEST_F(Answers, FaultsOfTheProgramAreFound) {
+TEST_F(Results, FaultsOfTheProgramAreFound) {
   const std::string program = ReadText(kExamples + "arm.py");
   const auto expect = [&](const Edit& edit, const std::string& found, const std::string& right) {
     WriteChanged("wrong.py", program, edit.from, edit.to);
@@ -43,14 +43,14 @@ TEST_F(Answers, FaultsOfTheProgramAreFound) {
   expect({"R @ inertia @ R.T", "inertia"}, "M_bar", "gravity");
 }
 
-TEST_F(Answers, OfFilesAgree) {
+TEST_F(Results, OfFilesAgree) {
   Expect(0, {"states", urdf_, "--count", "50", "--out", "states"});
   EXPECT_EQ(ReadJson("states/layout.json").at("joints"), Json({"yaw", "shoulder", "elbow"}));
   const std::string lines = Read("states/states.jsonl");
   EXPECT_EQ(std::count(lines.begin(), lines.end(), '\n'), 50);
   EXPECT_EQ(Json::parse(lines.substr(0, lines.find('\n'))).at("v").size(), 3U);
 
-  const Words command = {"consistency", urdf_, "--answers", "states"};
+  const Words command = {"consistency", urdf_, "--results", "states"};
   EXPECT_THAT(Run(command).err, HasSubstr("M.npy"));
   ASSERT_EQ(RunProgram({kPython, kExamples + "arm.py", "states"}, {folder_.path()}).exit_code, 0);
   const Json results = RunJson(0, command);
@@ -66,8 +66,8 @@ TEST_F(Answers, OfFilesAgree) {
   EXPECT_TRUE(Refused(command, {"states/M.npy", "50 x 3 x 3", "50 x 3"}));
 }
 
-/// The same answers as lines of JSON in any order; an archive is refused with what to do.
-TEST_F(Answers, OfLinesAgreeAndOfAnArchiveAreRefused) {
+/// The same results as lines of JSON in any order; an archive is refused with what to do.
+TEST_F(Results, OfLinesAgreeAndOfAnArchiveAreRefused) {
   Expect(0, {"states", urdf_, "--count", "20", "--out", "states"});
   ASSERT_EQ(RunProgram({kPython, kExamples + "arm.py", "states"}, {folder_.path()}).exit_code, 0);
   const std::string script = R"(
@@ -75,21 +75,21 @@ import json, os, numpy as np
 os.chdir("states")
 terms = {name: np.load(name + ".npy") for name in ("M", "c", "g")}
 for name in terms: os.remove(name + ".npy")
-with open("answers.jsonl", "w") as file:
+with open("results.jsonl", "w") as file:
   for i in reversed(range(20)):
     file.write(json.dumps({"id": i, **{name: term[i].tolist() for name, term in terms.items()}}) + "\n")
 )";
   ASSERT_EQ(RunProgram({kPython, "-c", script}, {folder_.path()}).exit_code, 0);
-  const Words command = {"consistency", urdf_, "--answers", "states"};
+  const Words command = {"consistency", urdf_, "--results", "states"};
   ExpectAgreement(RunJson(0, command), 60);
-  const std::string lines = Read("states/answers.jsonl");
-  Write("states/answers.jsonl", lines.substr(0, lines.size() / 2));
-  EXPECT_TRUE(Refused(command, {"answers.jsonl"}));
-  std::filesystem::remove(Path("states/answers.jsonl"));
+  const std::string lines = Read("states/results.jsonl");
+  Write("states/results.jsonl", lines.substr(0, lines.size() / 2));
+  EXPECT_TRUE(Refused(command, {"results.jsonl"}));
+  std::filesystem::remove(Path("states/results.jsonl"));
   EXPECT_TRUE(Refused(command, {"must have results"}));
 }
 
-TEST_F(Answers, AuditExitsByWhatItFinds) {
+TEST_F(Results, AuditExitsByWhatItFinds) {
   EXPECT_EQ(RunJson(0, {"audit", urdf_}).at("verdict"), "pass");
   EXPECT_EQ(RunJson(0, {"audit", kPandaToml}).at("verdict"), "pass");
   WriteChanged("odd.urdf", ReadText(urdf_), "izz=\"0.008\"", "izz=\"0.8\"");
@@ -107,7 +107,7 @@ TEST_F(Answers, AuditExitsByWhatItFinds) {
   })) << findings;
 }
 
-TEST_F(Answers, FloatingBasesSayTheirConvention) {
+TEST_F(Results, FloatingBasesSayTheirConvention) {
   const std::vector<LeggedLink> links = ListQuadruped();
   Write("robot.urdf", testing::WriteLeggedUrdf("quadruped", links));
   Write("robot.xml", testing::WriteLeggedMjcf("quadruped", links));
@@ -138,7 +138,7 @@ TEST_F(Answers, FloatingBasesSayTheirConvention) {
 
 // A body on a ball joint at the world's origin, as a program and as files: M = I - m c x c x, C w = w x M w
 // and gravity -c x R^T m g along the body's axes.
-TEST_F(Answers, OfABallJointAgree) {
+TEST_F(Results, OfABallJointAgree) {
   Write("top.xml", R"(<mujoco model="top"><worldbody><body name="stand"><body name="top">
 <joint name="pivot" type="ball"/><inertial pos="0.1 0.2 0.3" mass="2" diaginertia="0.04 0.05 0.06"/>
 </body></body></worldbody></mujoco>)");
@@ -152,7 +152,7 @@ def answer(q, v):
   momentum = [sum(M[i][j]*v[j] for j in range(3)) for i in range(3)]
   return {"M": M, "c": cross(v, momentum), "g": [-f for f in cross(c, down)]}
 if len(sys.argv) > 1:
-  with open(sys.argv[1] + "/states.jsonl") as states, open(sys.argv[1] + "/answers.jsonl", "w") as answers:
+  with open(sys.argv[1] + "/states.jsonl") as states, open(sys.argv[1] + "/results.jsonl", "w") as answers:
     for line in states:
       state = json.loads(line)
       answers.write(json.dumps({"id": state["id"], **answer(state["q"], state["v"])}) + "\n")
@@ -172,7 +172,7 @@ for line in sys.stdin:
   Expect(0, "states top.xml --count 20 --out states");
   EXPECT_EQ(ReadJson("states/layout.json").at("balls"), Json({"pivot"}));
   ASSERT_EQ(RunProgram({kPython, "top.py", "states"}, {folder_.path()}).exit_code, 0);
-  Expect(0, "consistency top.xml --answers states");
+  Expect(0, "consistency top.xml --results states");
 
   // The angular velocity along the parent's axes is what others have.
   WriteChanged("top.py", program, "2*(x*z - w*y)", "2*(x*z + w*y)");
@@ -183,4 +183,4 @@ for line in sys.stdin:
 }
 
 }  // namespace
-}  // namespace dexcheck::testing::answers_command_test
+}  // namespace dexcheck::testing::results_command_test

@@ -1,4 +1,4 @@
-#include "harness/descriptions/answer_files.h"
+#include "harness/descriptions/result_files.h"
 
 #include <algorithm>
 #include <cmath>
@@ -78,8 +78,8 @@ std::string WriteLayout(const RobotDescription& robot, const std::string& origin
   return json.dump(2, ' ', false, OrderedJson::error_handler_t::replace) + "\n";
 }
 
-AnswerFiles::AnswerFiles(const std::filesystem::path& folder, const RobotDescription& robot)
-    : AnsweringProvider(ReadLayout(folder / "layout.json", robot)), folder_(folder), name_(folder.string()) {
+ResultFiles::ResultFiles(const std::filesystem::path& folder, const RobotDescription& robot)
+    : LayoutProvider(ReadLayout(folder / "layout.json", robot)), folder_(folder), name_(folder.string()) {
   const RobotModel model(robot.spec);
   q_ = ParseNpy(ReadBytes(folder / "q.npy"), (folder / "q.npy").string());
   const size_t count = q_.shape.empty() ? 0 : q_.shape[0];
@@ -87,8 +87,8 @@ AnswerFiles::AnswerFiles(const std::filesystem::path& folder, const RobotDescrip
   if (count == 0) throw InputError((folder / "q.npy").string() + ": must have states, got none");
   q_ = ReadArray("q.npy", {count, static_cast<size_t>(model.num_positions())});
   v_ = ReadArray("v.npy", {count, static_cast<size_t>(model.num_velocities())});
-  if (std::filesystem::exists(folder_ / "answers.jsonl")) {
-    ReadLines(folder_ / "answers.jsonl");
+  if (std::filesystem::exists(folder_ / "results.jsonl")) {
+    ReadLines(folder_ / "results.jsonl");
     return;
   }
   const auto n = static_cast<size_t>(layout().size());
@@ -103,10 +103,10 @@ AnswerFiles::AnswerFiles(const std::filesystem::path& folder, const RobotDescrip
   throw InputError(
       folder.string() +
       ": must have results: M.npy, C.npy, c.npy, g.npy, h.npy, friction.npy, kinetic_energy.npy, "
-      "potential_energy.npy or answers.jsonl, got none");
+      "potential_energy.npy or results.jsonl, got none");
 }
 
-void AnswerFiles::ReadLines(const std::filesystem::path& path) {
+void ResultFiles::ReadLines(const std::filesystem::path& path) {
   lines_.resize(static_cast<size_t>(count_));
   std::vector<bool> seen(lines_.size(), false);
   std::istringstream text(ReadBytes(path));
@@ -135,14 +135,14 @@ void AnswerFiles::ReadLines(const std::filesystem::path& path) {
                    std::to_string(missing - seen.begin()));
 }
 
-bool AnswerFiles::ReadState(DynamicsState* state) const {
+bool ResultFiles::ReadState(DynamicsState* state) const {
   if (state->sample >= count_) return false;
   state->q = Row(q_, state->sample);
   state->xi = Row(v_, state->sample);
   return true;
 }
 
-NpyArray AnswerFiles::ReadArray(const std::string& file, const std::vector<size_t>& shape) const {
+NpyArray ResultFiles::ReadArray(const std::string& file, const std::vector<size_t>& shape) const {
   const std::string source = (folder_ / file).string();
   NpyArray array = Check(ParseNpy(ReadBytes(folder_ / file), source), source, shape);
   if (file != "q.npy" && file != "v.npy") return array;
@@ -154,21 +154,21 @@ NpyArray AnswerFiles::ReadArray(const std::string& file, const std::vector<size_
   return array;
 }
 
-NpyArray AnswerFiles::Check(NpyArray array, const std::string& source, const std::vector<size_t>& shape) {
+NpyArray ResultFiles::Check(NpyArray array, const std::string& source, const std::vector<size_t>& shape) {
   if (array.shape != shape) {
     throw InputError(source + ": must be " + DescribeShape(shape) + ", got " + DescribeShape(array.shape));
   }
   return array;
 }
 
-VectorXd AnswerFiles::Row(const NpyArray& array, long sample) { return MapRow(array, sample); }
+VectorXd ResultFiles::Row(const NpyArray& array, long sample) { return MapRow(array, sample); }
 
-VectorXd AnswerFiles::FindRow(const std::string& term, long sample) const {
+VectorXd ResultFiles::FindRow(const std::string& term, long sample) const {
   const auto found = terms_.find(term);
   return found == terms_.end() ? VectorXd() : Row(found->second, sample);
 }
 
-TermResults AnswerFiles::Evaluate(long sample, const VectorXd& q, const VectorXd& xi) {
+TermResults ResultFiles::Evaluate(long sample, const VectorXd& q, const VectorXd& xi) {
   TermResults terms;
   if (!lines_.empty()) {
     terms = lines_[static_cast<size_t>(sample)];

@@ -69,7 +69,7 @@ class ProgramLayout {
 };
 
 /// A provider whose results have a layout of its own.
-class AnsweringProvider : public ResultProvider {
+class LayoutProvider : public ResultProvider {
  public:
   [[nodiscard]] bool is_reduced() const override { return layout_.is_reduced(); }
   [[nodiscard]] const ProgramLayout& layout() const { return layout_; }
@@ -77,7 +77,7 @@ class AnsweringProvider : public ResultProvider {
   void set_convention(const BaseConvention& convention) { layout_.set_convention(convention); }
 
  protected:
-  explicit AnsweringProvider(ProgramLayout layout) : layout_(std::move(layout)) {}
+  explicit LayoutProvider(ProgramLayout layout) : layout_(std::move(layout)) {}
   void set_layout(ProgramLayout layout) { layout_ = std::move(layout); }
 
  private:

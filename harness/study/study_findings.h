@@ -1,6 +1,6 @@
 #pragma once
 
-// What a study answers, in sentences.
+// What a study finds, in sentences.
 
 #include <string>
 #include <vector>
@@ -16,9 +16,9 @@ std::string DescribeValues(const Study& study, const std::vector<double>& values
 /// The value of an objective as the user wrote it: of `maximize` with its own sign again.
 double ShowObjective(const Objective& objective, double value);
 
-/// What the trials answer to the study's question, one sentence each; empty for a study without one.
+/// What the trials say to the study's question, one sentence each; empty for a study without one.
 /// @param rows of all trials that are done.
-std::vector<std::string> AnswerStudy(const Study& study, const std::vector<TrialRow>& rows);
+std::vector<std::string> ListFindings(const Study& study, const std::vector<TrialRow>& rows);
 
 // How far a study has come, while it runs or after.
 

@@ -6,7 +6,7 @@
 #include <map>
 #include <string>
 
-#include "harness/descriptions/answer_layout.h"
+#include "harness/descriptions/program_layout.h"
 #include "harness/descriptions/random_states.h"
 #include "harness/log/npy_file.h"
 
@@ -31,11 +31,11 @@ std::string WriteLayout(const RobotDescription& robot, const std::string& origin
 /// robot's own layout; M.npy, C.npy (N x n x n), c.npy, g.npy, h.npy, friction.npy (N x n),
 /// kinetic_energy.npy, potential_energy.npy (N), each of which may be missing, in the layout of layout.json,
 /// or in the robot's own without such a file. Instead of them the results may stand in
-/// answers.jsonl, a line for each state as a program writes it.
-class AnswerFiles : public AnsweringProvider {
+/// results.jsonl, a line for each state as a program writes it.
+class ResultFiles : public LayoutProvider {
  public:
   /// @throws InputError, one line that names the file.
-  AnswerFiles(const std::filesystem::path& folder, const RobotDescription& robot);
+  ResultFiles(const std::filesystem::path& folder, const RobotDescription& robot);
 
   [[nodiscard]] const std::string& name() const override { return name_; }
 
@@ -56,7 +56,7 @@ class AnswerFiles : public AnsweringProvider {
   long count_ = 0;
   NpyArray q_, v_;
   std::map<std::string, NpyArray> terms_;
-  std::vector<TermResults> lines_;  // of answers.jsonl, by state
+  std::vector<TermResults> lines_;  // of results.jsonl, by state
 };
 
 }  // namespace dexcheck

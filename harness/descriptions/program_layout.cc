@@ -1,4 +1,4 @@
-#include "harness/descriptions/answer_layout.h"
+#include "harness/descriptions/program_layout.h"
 
 #include <algorithm>
 #include <cmath>

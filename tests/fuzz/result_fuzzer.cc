@@ -1,6 +1,6 @@
 // What programs write: any bytes are arrays, terms of the right sizes, or an InputError that names the file.
 
-#include "harness/descriptions/answer_layout.h"
+#include "harness/descriptions/program_layout.h"
 #include "harness/descriptions/urdf_reader.h"
 #include "harness/log/npy_file.h"
 #include "tests/fuzz/fuzz_target.h"

@@ -1,4 +1,4 @@
-#include "harness/study/study_answer.h"
+#include "harness/study/study_findings.h"
 
 #include <fmt/format.h>
 
@@ -82,7 +82,7 @@ std::string ShowKey(const Variation& variation, const UnitPoint& point, size_t k
 std::vector<std::string> DescribeMargins(const Study& study, const std::vector<JudgedPoint>& points) {
   const std::vector<Margin> margins = FindMargins(study, points);
   if (margins.empty()) return {"At the start itself a constraint does not hold: there is no margin."};
-  std::vector<std::string> answers;
+  std::vector<std::string> findings;
   const auto go = [&](const Margin& margin, size_t key) {
     if (margin.bad.empty()) return std::string("to the end of its range");
     const Variation& variation = study.variations[key];
@@ -90,22 +90,22 @@ std::vector<std::string> DescribeMargins(const Study& study, const std::vector<J
                        ShowKey(variation, margin.bad, key));
   };
   for (size_t i = 0; i < study.num_keys(); ++i) {
-    answers.push_back(fmt::format("{} can go from {:.4g} down {}, and up {}.", study.variations[i].key,
-                                  points[0].values[i], go(margins[2 * i], i), go(margins[2 * i + 1], i)));
+    findings.push_back(fmt::format("{} can go from {:.4g} down {}, and up {}.", study.variations[i].key,
+                                   points[0].values[i], go(margins[2 * i], i), go(margins[2 * i + 1], i)));
   }
   const Margin* nearest = nullptr;
   for (const Margin& margin : margins) {
     if (!margin.bad.empty() && (nearest == nullptr || margin.at_most < nearest->at_most)) nearest = &margin;
   }
   if (nearest == nullptr) {
-    answers.push_back(
+    findings.push_back(
         fmt::format("In none of {} directions a constraint turns within the ranges.", margins.size()));
-    return answers;
+    return findings;
   }
   const std::vector<double> values = ValuesAt(study.keys(), nearest->bad);
-  answers.push_back(fmt::format("Of {} directions the nearest failure is {:.3g} of the ranges away, at {}.",
-                                margins.size(), nearest->at_most, DescribeValues(study, values)));
-  return answers;
+  findings.push_back(fmt::format("Of {} directions the nearest failure is {:.3g} of the ranges away, at {}.",
+                                 margins.size(), nearest->at_most, DescribeValues(study, values)));
+  return findings;
 }
 
 /// "0.000302 (0.00029 to 0.00034)": the median and the range. @param values not empty.
@@ -118,8 +118,8 @@ std::string ShowSpread(std::vector<double> values) {
 
 /// Of a study that compares what has no order, laws for example, each in several trials: what came of each.
 std::vector<std::string> DescribeSpreads(const Study& study, const std::vector<TrialRow>& rows) {
-  std::vector<std::string> answers;
-  if (study.is_search() || study.num_keys() != 1 || CountTrialsOfPoint(study) < 2) return answers;
+  std::vector<std::string> findings;
+  if (study.is_search() || study.num_keys() != 1 || CountTrialsOfPoint(study) < 2) return findings;
   for (size_t i = 0; i < study.variations.front().labels.size(); ++i) {
     long all = 0, held = 0;
     std::array<std::vector<double>, kNumMetrics> metrics;
@@ -140,9 +140,9 @@ std::vector<std::string> DescribeSpreads(const Study& study, const std::vector<T
           text += fmt::format("; {} {}{}", name, ShowSpread(metrics[k]), ShowUnit(name));
       }
     }
-    answers.push_back(text + (held > 0 ? ", medians and ranges." : "."));
+    findings.push_back(text + (held > 0 ? ", medians and ranges." : "."));
   }
-  return answers;
+  return findings;
 }
 
 /// Of a sample with constraints: how probable a failure is.
@@ -176,30 +176,30 @@ std::string DescribeValues(const Study& study, const std::vector<double>& values
 
 double ShowObjective(const Objective& objective, double value) { return objective.maximize ? -value : value; }
 
-std::vector<std::string> AnswerStudy(const Study& study, const std::vector<TrialRow>& rows) {
-  std::vector<std::string> answers;
-  if (rows.empty()) return answers;
+std::vector<std::string> ListFindings(const Study& study, const std::vector<TrialRow>& rows) {
+  std::vector<std::string> findings;
+  if (rows.empty()) return findings;
   if (study.search.method == SearchMethod::kMargins) return DescribeMargins(study, JudgePoints(study, rows));
-  answers = DescribeSpreads(study, rows);
+  findings = DescribeSpreads(study, rows);
   const SamplingMethod method = study.sample.method;
   if (method == SamplingMethod::kSaltelli || method == SamplingMethod::kMorris) {
     for (const std::string& quantity : ListQuantities(study, rows)) {
-      answers.push_back(Describe(study, AnalyseSensitivity(study, rows, quantity)));
+      findings.push_back(Describe(study, AnalyseSensitivity(study, rows, quantity)));
     }
-    return answers;
+    return findings;
   }
   if (method != SamplingMethod::kGrid && !study.constraints.empty())
-    answers.push_back(DescribeFailures(study, rows));
-  if (study.objectives.empty()) return answers;
+    findings.push_back(DescribeFailures(study, rows));
+  if (study.objectives.empty()) return findings;
   const std::vector<JudgedPoint> points = JudgePoints(study, rows);
-  if (points.empty()) return answers;
+  if (points.empty()) return findings;
   if (SortFeasible(points).empty()) {
-    answers.push_back(fmt::format("At none of {} all constraints hold.", CountPoints(points.size())));
+    findings.push_back(fmt::format("At none of {} all constraints hold.", CountPoints(points.size())));
   } else {
-    answers.push_back(study.objectives.size() == 1 ? DescribeBest(study, points)
-                                                   : DescribeFront(study, points));
+    findings.push_back(study.objectives.size() == 1 ? DescribeBest(study, points)
+                                                    : DescribeFront(study, points));
   }
-  return answers;
+  return findings;
 }
 
 StudyProgress FindProgress(const StudyStore& store) {
@@ -220,7 +220,7 @@ StudyProgress FindProgress(const StudyStore& store) {
                             study.sample.method == SamplingMethod::kMorris;
   if (!has_question) return progress;
   const std::vector<TrialRow> rows = store.ReadRows(0, /*with_machine=*/false);
-  for (const std::string& answer : AnswerStudy(study, rows)) progress.text += answer + "\n";
+  for (const std::string& finding : ListFindings(study, rows)) progress.text += finding + "\n";
   if (study.is_search()) {
     SearchHistory history(study, FindSearchStart(study));
     for (const TrialRow& row : rows) history.Add(row);
