@@ -80,7 +80,8 @@ void AddLimits(const ArrayXd& u, const ArrayXd& got, const SignalSeries& series,
 /// Whole multiples of a step: the largest that divides all, made better by all of them.
 void AddSteps(const ArrayXd& u, const ArrayXd& got, const std::string& unit,
               std::vector<SignalShape>* shapes) {
-  const double rounding = 1e-12 * got.abs().maxCoeff();
+  // Remainders of remainders have the rounding of all quotients before them.
+  const double rounding = 1e-10 * got.abs().maxCoeff();
   const ArrayXd apart = (got - got[0]).abs();
   double step = apart.maxCoeff() > rounding ? 0.0 : std::abs(got[0]);
   for (double value : apart) {
