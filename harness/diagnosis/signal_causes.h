@@ -18,6 +18,9 @@ struct SignalSeries {
   VectorXd rate;                  ///< Of what it moves; empty for none.
   std::vector<bool> has_history;  ///< Whether the steps before each are those before it here.
   double noise = 0.0;             ///< Rounding of got - expected.
+  /// What is less than `faint` times the noise says nothing, and `left` times it may be left of what is
+  /// explained.
+  double faint = 1e3, left = 30.0;
 };
 
 /// What explains got - expected: a transmission (none, a delay, a limit, a dead zone, steps, the signal of

@@ -146,6 +146,9 @@ NamingScore ScoreNames(const std::vector<Fault>& truth, const std::vector<Fault>
       is_in_class = is_in_class || NamesInClass(one, fault);
     }
     ++(is_right ? score.right : is_in_class ? score.in_class : score.not_explained);
+    score.outcomes.push_back(is_right      ? CauseOutcome::kNamed
+                             : is_in_class ? CauseOutcome::kNamedClass
+                                           : CauseOutcome::kNotExplained);
     score.named_as.push_back(is_right         ? fault.fault
                              : is_in_class    ? "a class"
                              : !wrong.empty() ? wrong
