@@ -45,7 +45,7 @@ std::optional<SignalSeries> UndoFault(const SignalSeries& series, const CommonFa
   if (fault.fault == "rounding to steps of") {
     before.noise = (0.5 + 1e-9) * value;
     before.left = 1.0;
-    before.faint = 4.0;
+    before.faint = 2.0;
     return before;
   }
   const auto undo = [&](double by) -> VectorXd {
@@ -84,16 +84,18 @@ class SignalGroup {
     }
   }
 
-  void Explain(Causes* causes) const {
+  [[nodiscard]] Causes Explain() const {
+    Causes causes;
     const std::optional<CommonFault> common = FindCommon();
-    if (common) causes->push_back(TellCommon(*common));
+    if (common) causes.push_back(TellCommon(*common));
     for (size_t i = 0; i < series_.size(); ++i) {
       if (!common) {
-        TellVerdict(verdicts_[i], channel_, causes);
+        TellVerdict(verdicts_[i], channel_, &causes);
       } else if (!Has(common->members, i) && !IsLateOrientation(*common, i)) {
-        TellVerdict(JudgeBeside(i, *common), channel_, causes);
+        TellVerdict(JudgeBeside(i, *common), channel_, &causes);
       }
     }
+    return causes;
   }
 
  private:
@@ -207,7 +209,7 @@ class SignalGroup {
   std::map<std::string, size_t> sizes_, moving_;
 };
 
-void ExplainChannel(const StepStore& store, bool motors, Causes* causes) {
+std::vector<SignalSeries> ListSeries(const StepStore& store, bool motors) {
   const auto expected = store.Get(motors ? StepStore::kTauDeclared : StepStore::kDeclaredReading);
   const auto got = store.Get(motors ? StepStore::kTauReceived : StepStore::kReading);
   const auto rates = store.Get(StepStore::kVelocity);
@@ -233,8 +235,7 @@ void ExplainChannel(const StepStore& store, bool motors, Causes* causes) {
     const double size = std::max({one.expected.cwiseAbs().maxCoeff(), 1e-3 * largest, 1e-3});
     one.noise = (motors ? 1e-14 : 1e-15) * size;
   }
-  SignalGroup(std::move(series), motors ? CauseChannel::kActuation : CauseChannel::kMeasurement)
-      .Explain(causes);
+  return series;
 }
 
 }  // namespace
@@ -245,10 +246,15 @@ Causes ExplainSignal(const SignalSeries& series, const std::vector<SignalSeries>
   return causes;
 }
 
+Causes ExplainSignals(std::vector<SignalSeries> series, CauseChannel channel) {
+  return SignalGroup(std::move(series), channel).Explain();
+}
+
 Causes ExplainSignals(const StepStore& store) {
-  Causes causes;
-  if (store.size() == 0) return causes;
-  for (const bool motors : {true, false}) ExplainChannel(store, motors, &causes);
+  if (store.size() == 0) return {};
+  Causes causes = ExplainSignals(ListSeries(store, /*motors=*/true), CauseChannel::kActuation);
+  Causes readings = ExplainSignals(ListSeries(store, /*motors=*/false), CauseChannel::kMeasurement);
+  std::move(readings.begin(), readings.end(), std::back_inserter(causes));
   return causes;
 }
 

@@ -29,7 +29,10 @@ struct SignalSeries {
 /// @returns one for each fault; none where nothing differs.
 Causes ExplainSignal(const SignalSeries& series, const std::vector<SignalSeries>& others);
 
-/// All motors, and all readings. Where several have the same, it is told once.
+/// Those of one channel. What several have with the same value is told once, and each is judged beside that:
+/// one gain of all motors, and another one of one of them.
+Causes ExplainSignals(std::vector<SignalSeries> series, CauseChannel channel);
+/// All motors, and all readings.
 Causes ExplainSignals(const StepStore& store);
 
 }  // namespace dexcheck

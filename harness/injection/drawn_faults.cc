@@ -129,12 +129,14 @@ NamingScore ScoreNames(const std::vector<Fault>& truth, const std::vector<Fault>
   for (const Explanation& one : causes) {
     if (one.outcome != CauseOutcome::kNamed) continue;
     const Fault& first = one.faults.front();
-    const auto of = std::find_if(all.begin(), all.end(), [&](const Fault& fault) {
-      return fault.IsLike(first) || (fault.fault == first.fault && IsOfAll(fault));
-    });
-    if (of != all.end() && HasValue(first, *of)) continue;
+    const auto is_so = [&](const Fault& fault) {
+      const bool is_of_it = fault.IsLike(first) || (fault.fault == first.fault && IsOfAll(fault));
+      return is_of_it && HasValue(first, fault);
+    };
+    if (std::any_of(all.begin(), all.end(), is_so)) continue;
     ++score.wrong;
-    wrong = of == all.end() ? first.fault : "another value";
+    const auto is_like = [&](const Fault& fault) { return fault.IsLike(first); };
+    wrong = std::any_of(all.begin(), all.end(), is_like) ? "another value" : first.fault;
   }
   for (const Fault& fault : truth) {
     bool is_right = false, is_in_class = false;
