@@ -210,17 +210,22 @@ class SignalGroup {
 };
 
 std::vector<SignalSeries> ListSeries(const StepStore& store, bool motors) {
-  const auto expected = store.Get(motors ? StepStore::kTauDeclared : StepStore::kDeclaredReading);
-  const auto got = store.Get(motors ? StepStore::kTauReceived : StepStore::kReading);
-  const auto rates = store.Get(StepStore::kVelocity);
+  // A step that a motor refuses has no torques.
+  const bool is_refused =
+      motors && store.size() > 1 && store.Get(StepStore::kNoise)(0, store.size() - 1) == 0.0;
+  const Index count = store.size() - (is_refused ? 1 : 0);
+  const auto get = [&](StepStore::Signal signal) { return store.Get(signal).leftCols(count); };
+  const auto expected = get(motors ? StepStore::kTauDeclared : StepStore::kDeclaredReading);
+  const auto got = get(motors ? StepStore::kTauReceived : StepStore::kReading);
+  const auto rates = get(StepStore::kVelocity);
   const std::vector<SignalName>& names = motors ? store.motors() : store.readings();
-  const VectorXd time = store.Get(StepStore::kTime).row(0);
+  const VectorXd time = get(StepStore::kTime).row(0);
   const Base& base = store.setup().model().base();
   MatrixXd motor_rates = rates;
   if (motors && base.type == BaseType::kDifferentialDrive)
     motor_rates.topRows<2>() = CalcWheelRateMap(base) * rates.topRows(2);
-  std::vector<bool> history(static_cast<size_t>(store.size()));
-  for (Index i = 0; i < store.size(); ++i) history[static_cast<size_t>(i)] = store.HasHistory(i);
+  std::vector<bool> history(static_cast<size_t>(count));
+  for (Index i = 0; i < count; ++i) history[static_cast<size_t>(i)] = store.HasHistory(i);
   // Torques pass a gear once and back, relative to the largest of them; readings are copied.
   const double largest = motors ? expected.cwiseAbs().maxCoeff() : 0.0;
   std::vector<SignalSeries> series;

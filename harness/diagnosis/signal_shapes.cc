@@ -92,34 +92,29 @@ class ShapeList {
 
   /// Whole multiples of a step: the largest that divides all, made better by all of them.
   void AddSteps() {
-    // Remainders of remainders have the rounding of all quotients before them.
     const double rounding = 1e-10 * got_.abs().maxCoeff();
-    const ArrayXd apart = (got_ - got_[0]).abs();
-    if (!(apart.maxCoeff() > rounding)) return AddOneStep();
+    const Index count = got_.size() - 1;
+    if (!((got_ - got_[0]).abs().maxCoeff() > rounding)) return AddOneStep();
+    // From few multiples to many, so that each is counted right, and the step is known better with each.
+    ArrayXd apart(2 * count);
+    apart << (got_.tail(count) - got_[0]).abs(), (got_.tail(count) - got_.head(count)).abs();
+    std::sort(apart.begin(), apart.end());
     double step = 0.0;
-    for (double value : apart) {
+    for (const double whole : apart) {
       // By Euclid's algorithm, in which a remainder of rounding is none.
-      while (value > rounding) {
+      for (double value = whole; value > rounding;) {
         const double rest = step > 0.0 ? std::abs(std::remainder(value, step)) : 0.0;
         if (step == 0.0) step = value;
         if (!(rest > rounding)) break;
         value = step;
         step = rest;
       }
+      if (whole > rounding) step = whole / std::round(whole / step);
     }
     // Multiples of what is hardly more than rounding are any values.
     if (!(step > 1e2 * rounding)) return;
-    // From few multiples to many, so that each is counted right.
-    ArrayXd sorted(2 * got_.size());
-    sorted << apart, got_.abs();
-    std::sort(sorted.begin(), sorted.end());
-    double along = 0.0, square = 0.0;
-    for (const double value : sorted) {
-      const double count = std::round(value / step);
-      along += count * value;
-      square += count * count;
-      if (square > 0.0) step = along / square;
-    }
+    const double largest = got_.abs().maxCoeff();
+    step = largest / std::round(largest / step);
     Add("rounding to steps of", series_.name.unit, step, false);
   }
 

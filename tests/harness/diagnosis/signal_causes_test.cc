@@ -292,7 +292,7 @@ TEST(SignalCauses, LimitOfARisingTorqueIsNotStuck) {
 TEST(SignalCauses, EncoderOfOneValueIsStuckWhereItsStepsWouldBeTooCoarse) {
   for (const bool is_far : {false, true}) {
     SCOPED_TRACE(is_far);
-    const ArrayXd u = 1.2 + (is_far ? 0.4 : 0.01) * CalcTime() / TimeOf(kSteps - 1);
+    const ArrayXd u = 1.2 - (is_far ? 0.4 : 0.01) * CalcTime() / TimeOf(kSteps - 1);
     SignalSeries series = MakeSeries(u, ArrayXd::Constant(kSteps, 1.2001));
     series.name = {"joint elbow", "position", "rad", "joint positions"};
     const Causes causes = Explain(series);
