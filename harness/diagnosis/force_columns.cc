@@ -208,9 +208,7 @@ void StepForces::AddLink(int index, std::vector<Candidate>* candidates) {
   // Another centre of mass changes the inertia about the old one.
   MatrixXd com(n_, 9);
   com << -J_T * wrench.first_moment * body.mass, inertia;
-  Candidate& moved = Next(candidates, "centre of mass off by", place, "m", 0.0, Moved());
-  moved.is_ordinary = true;
-  AddRobot(&moved, com);
+  AddRobot(&Next(candidates, "centre of mass off by", place, "m", 0.0, Moved()), com);
   MatrixXd payload(n_, 10);
   payload << mass, -J_T * wrench.first_moment, inertia;
   Candidate& load = Next(candidates, "payload", place, "kg", 0.0, Masses(10));
