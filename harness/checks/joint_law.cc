@@ -14,7 +14,7 @@ class JudgedJointLaw final : public JudgedLaw {
         law_(setup.scenario().control.law),
         gains_(setup.joints()->gains),
         motion_(&setup.joints()->motion) {
-    for (VectorXd* vector : {&force_, &demand_, &true_demand_})
+    for (VectorXd* vector : {&force_, &demand_, &true_demand_, &commanded_force_})
       vector->setZero(setup.model().num_velocities());
     // Of the other laws the gain of a joint is the feedback in its torque.
     if (law_ != ControlLaw::kComputedTorque) return;
@@ -43,8 +43,8 @@ class JudgedJointLaw final : public JudgedLaw {
     if (!follows_error()) return errors_;
     const VectorXd* predicted = &plant.findings.xi_dot_model;
     if (!as_commanded) {
-      actuation_.CalcForce(step.command.tau, difference_);
-      predicted = &commanded_.PredictFree(step.model->robot(), difference_).xi_dot;
+      actuation_.CalcForce(step.command.tau, commanded_force_);
+      predicted = &commanded_.PredictFree(step.model->robot(), commanded_force_).xi_dot;
     }
     FollowError(step, plant.declared->is_ideal ? predicted : nullptr);
     return errors_;
@@ -140,7 +140,7 @@ class JudgedJointLaw final : public JudgedLaw {
   JointGains gains_;
   const JointMotion* motion_;
   DesiredJoints desired_, half_step_;
-  VectorXd force_, demand_, true_demand_;  // n
+  VectorXd force_, demand_, true_demand_, commanded_force_;  // n
   VectorXd q_, xi_;                        // where the error dynamics have the joints; empty at first
 };
 

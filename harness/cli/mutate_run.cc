@@ -61,7 +61,8 @@ CampaignFault Describe(const RunMutant& mutant) {
                    {"right", mutant.score.right},
                    {"in_class", mutant.score.in_class},
                    {"not_explained", mutant.score.not_explained},
-                   {"wrong", mutant.score.wrong}};
+                   {"wrong", mutant.score.wrong},
+                   {"as_alone", mutant.is_as_alone()}};
   for (size_t i = 0; i < mutant.truth.size(); ++i)
     fault.details["names"].push_back({{"injected", mutant.truth[i].fault},
                                       {"place", mutant.truth[i].place},
@@ -69,10 +70,11 @@ CampaignFault Describe(const RunMutant& mutant) {
   return fault;
 }
 
-/// Of drawn faults, by the number of those of a set that are found alone: how many are named.
-void PrintScores(const Campaign& campaign) {
+/// Of drawn faults, by the number of those of a set that are found alone: how many are named, and in how many
+/// sets each is named as well as when it is alone.
+void PrintScores(const Campaign& campaign, int together) {
   struct Count {
-    int sets = 0, all_right = 0, right = 0, in_class = 0, not_explained = 0, wrong = 0;
+    int sets = 0, all_right = 0, as_alone = 0, right = 0, in_class = 0, not_explained = 0, wrong = 0;
   };
   std::map<int, Count> counts;
   for (const CampaignFault& fault : campaign.faults) {
@@ -82,17 +84,21 @@ void PrintScores(const Campaign& campaign) {
     const int not_explained = fault.details["not_explained"].get<int>();
     Count& count = counts[right + in_class + not_explained];
     ++count.sets;
-    count.all_right += static_cast<int>(in_class + not_explained == 0);
+    const int wrong = fault.details["wrong"].get<int>();
+    count.all_right += static_cast<int>(in_class + not_explained + wrong == 0);
+    count.as_alone += static_cast<int>(fault.details["as_alone"].get<bool>());
     count.right += right;
     count.in_class += in_class;
     count.not_explained += not_explained;
-    count.wrong += fault.details["wrong"].get<int>();
+    count.wrong += wrong;
   }
-  for (const auto& [size, one] : counts)
+  for (const auto& [size, one] : counts) {
+    const std::string alone = together > 1 ? fmt::format(", each as well as alone in {}", one.as_alone) : "";
     fmt::print(
-        "{} sets of {}: all named in {}; of their faults {} named, {} up to a class, {} not explained; {} "
+        "{} sets of {}: all named in {}{}; of their faults {} named, {} up to a class, {} not explained; {} "
         "wrong names.\n",
-        one.sets, size, one.all_right, one.right, one.in_class, one.not_explained, one.wrong);
+        one.sets, size, one.all_right, alone, one.right, one.in_class, one.not_explained, one.wrong);
+  }
 }
 
 }  // namespace
@@ -128,7 +134,7 @@ int MutateRun(const MutateRunRequest& request) {
   if (json) json->Write(campaign.ToText());
   if (page) page->Write(MakeCampaignPage(Json::parse(campaign.ToText())));
   if (request.json_file != "-") campaign.Print(request.quiet);
-  if (request.json_file != "-" && request.options.draws > 0) PrintScores(campaign);
+  if (request.json_file != "-" && request.options.draws > 0) PrintScores(campaign, request.options.together);
   return campaign.ToExitCode();
 }
 

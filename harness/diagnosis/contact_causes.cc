@@ -38,11 +38,15 @@ std::vector<Candidate> ListShapes(const Setup& setup, Index tips, Index steps, d
 
 }  // namespace
 
-Causes ExplainContacts(const StepStore& store) {
+bool HasOtherShapes(const StepStore& store) {
   const auto mismatch = store.Get(StepStore::kContactMismatch);
-  if (mismatch.size() == 0) return {};
+  return mismatch.size() > 0 && mismatch.cwiseAbs().maxCoeff() > kFaintest;
+}
+
+Causes ExplainContacts(const StepStore& store) {
+  if (!HasOtherShapes(store)) return {};
+  const auto mismatch = store.Get(StepStore::kContactMismatch);
   const double size = mismatch.cwiseAbs().maxCoeff();
-  if (!(size > kFaintest)) return {};
   const double noise = kDistanceNoise + kRadiusAccuracy * size;
   const std::vector<Candidate> candidates =
       ListShapes(store.setup(), mismatch.rows(), mismatch.cols(), noise);

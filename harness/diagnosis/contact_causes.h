@@ -7,6 +7,9 @@
 
 namespace dexcheck {
 
+/// Whether they touch at another distance.
+bool HasOtherShapes(const StepStore& store);
+
 Causes ExplainContacts(const StepStore& store);
 
 }  // namespace dexcheck

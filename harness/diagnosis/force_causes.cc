@@ -261,7 +261,8 @@ class Problem {
       Index row = model.num_base_velocities();
       while (one.place != "joint " + model.dof_name(static_cast<int>(row) - model.num_base_velocities()))
         ++row;
-      constexpr double kSlides = 1e-4, kLargest = 0.99;  // rad/s or m/s, and of the largest friction
+      // rad/s or m/s, and of the largest friction, which is one and the same wherever it slides
+      constexpr double kSlides = 1e-4, kLargest = 1.0 - 1e-9;
       int sliding = 0;
       for (const Index step : used_)
         sliding += static_cast<int>(std::abs(store_.Get(StepStore::kVelocity)(row, step)) > kSlides &&

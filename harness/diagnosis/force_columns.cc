@@ -2,6 +2,7 @@
 #include <tuple>
 
 #include "controller/model/platform.h"
+#include "harness/diagnosis/contact_causes.h"
 #include "harness/diagnosis/step_forces.h"
 
 namespace dexcheck {
@@ -10,7 +11,7 @@ namespace {
 using Eigen::Index;
 using namespace force_fault;
 
-constexpr double kFarthest = 10.0;  // rad or m: where springs relax, and loads are
+constexpr double kFarthest = 10.0;  // rad or m: where springs relax
 constexpr const char* kWorld = "world";
 
 Matrix3d Cross(const Vector3d& a) {
@@ -86,6 +87,7 @@ void StepForces::AddColumns(Index begin, Index steps, std::vector<Candidate>* ca
   for (int link = first_link_; link < model_.num_joints(); ++link) AddLink(link, candidates);
   if (store_.setup().has_object()) AddObjectForces(candidates);
   AddGravity(candidates);
+  if (HasOtherShapes(store_)) AddContacts(candidates);
   if (model_.base().type == BaseType::kDifferentialDrive && model_.base().velocity == DriveVelocity::kTwist)
     AddWheels(candidates);
 }
@@ -210,7 +212,9 @@ void StepForces::AddLink(int index, std::vector<Candidate>* candidates) {
   MatrixXd payload(n_, 10);
   payload << mass, -J_T * wrench.first_moment, inertia;
   Candidate& load = Next(candidates, "payload", place, "kg", 0.0, Masses(10));
-  load.is_possible = [](const VectorXd& a) { return a.segment<3>(1).norm() <= kFarthest * std::abs(a[0]); };
+  load.is_possible = [reach = reach_](const VectorXd& a) {
+    return a.segment<3>(1).norm() <= reach * std::abs(a[0]);
+  };
   AddRobot(&load, payload);
 }
 
@@ -250,6 +254,22 @@ void StepForces::AddObjectForces(std::vector<Candidate>* candidates) {
   Matrix6Xd tether = Matrix6Xd::Zero(6, 4);
   tether.topRows<3>() << -R_T * p, R_T;
   AddObject(&Next(candidates, "tether", place, "N/m", 0.0, Weights(4)), tether);
+}
+
+void StepForces::AddContacts(std::vector<Candidate>* candidates) {
+  const Matrix3d R_T = store_.Get(StepStore::kObjectPose).col(step_).head<9>().reshaped(3, 3).transpose();
+  const std::vector<int>& tips = store_.setup().fingertips();
+  for (size_t i = 0; i < tips.size(); ++i) {
+    const Frame& frame = model_.frames()[static_cast<size_t>(tips[i])];
+    const Link& link = links_[static_cast<size_t>(frame.link - first_link_)];
+    const Vector3d m = store_.Get(StepStore::kContactMoment).col(step_).segment<3>(3 * static_cast<Index>(i));
+    Candidate& contact = Next(candidates, kContact, "fingertip " + frame.name, "m", 0.0, VectorXd::Ones(1));
+    contact.is_possible = nullptr;
+    Vector6d w;
+    w << Vector3d::Zero(), R_T * m;
+    contact.columns.col(0).segment(begin_, rows()) =
+        Whiten(-link.J.bottomRows<3>().transpose() * (link.X.linear().transpose() * m), w);
+  }
 }
 
 void StepForces::AddGravity(std::vector<Candidate>* candidates) {

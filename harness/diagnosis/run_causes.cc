@@ -7,6 +7,7 @@
 #include "harness/diagnosis/law_causes.h"
 #include "harness/diagnosis/rolling_causes.h"
 #include "harness/diagnosis/signal_causes.h"
+#include "harness/diagnosis/step_forces.h"
 
 namespace dexcheck {
 namespace {
@@ -17,21 +18,11 @@ bool Explains(const Causes& causes, CauseChannel channel) {
   });
 }
 
-/// Contacts that are elsewhere make object and fingers move as if something else acted on them.
-void DropConsequencesOfShapes(const StepStore& store, Causes* causes) {
-  if (!Explains(*causes, CauseChannel::kContact)) return;
-  const RobotModel& model = store.setup().model();
-  std::vector<std::string> places = {"object " + store.setup().object().name};
-  const std::vector<int>& arm = store.setup().hold().arm_joints;
-  for (const int tip : store.setup().fingertips()) {
-    int link = model.frames()[static_cast<size_t>(tip)].link;
-    for (; link >= 0; link = model.joints()[static_cast<size_t>(link)].parent)
-      if (std::find(arm.begin(), arm.end(), link) == arm.end())
-        places.push_back("link " + model.link_name(link));
-  }
-  std::erase_if(*causes, [&](const Explanation& one) {
-    return one.channel == CauseChannel::kBalance &&
-           std::find(places.begin(), places.end(), one.faults.front().place) != places.end();
+/// Contacts that are elsewhere are told by their shapes.
+void DropConsequencesOfShapes(Causes* causes) {
+  std::erase_if(*causes, [](const Explanation& one) {
+    return one.channel == CauseChannel::kBalance && !one.faults.empty() &&
+           one.faults.front().fault == force_fault::kContact;
   });
 }
 
@@ -57,7 +48,7 @@ Causes ExplainRun(const StepStore& store) {
     Causes found = explain(store);
     std::move(found.begin(), found.end(), std::back_inserter(causes));
   }
-  DropConsequencesOfShapes(store, &causes);
+  DropConsequencesOfShapes(&causes);
   DropConsequences(store, &causes);
   std::stable_sort(causes.begin(), causes.end(),
                    [](const Explanation& a, const Explanation& b) { return a.channel < b.channel; });

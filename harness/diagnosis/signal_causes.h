@@ -18,6 +18,9 @@ struct SignalSeries {
   VectorXd rate;                  ///< Of what it moves; empty for none.
   std::vector<bool> has_history;  ///< Whether the steps before each are those before it here.
   double noise = 0.0;             ///< Rounding of got - expected.
+  /// What is less than `faint` times the noise says nothing, and `left` times it may be left of what is
+  /// explained.
+  double faint = 1e3, left = 30.0;
 };
 
 /// What explains got - expected: a transmission (none, a delay, a limit, a dead zone, steps, the signal of
@@ -26,7 +29,10 @@ struct SignalSeries {
 /// @returns one for each fault; none where nothing differs.
 Causes ExplainSignal(const SignalSeries& series, const std::vector<SignalSeries>& others);
 
-/// All motors, and all readings. Where several have the same, it is told once.
+/// Those of one channel. What several have with the same value is told once, and each is judged beside that:
+/// one gain of all motors, and another one of one of them.
+Causes ExplainSignals(std::vector<SignalSeries> series, CauseChannel channel);
+/// All motors, and all readings.
 Causes ExplainSignals(const StepStore& store);
 
 }  // namespace dexcheck

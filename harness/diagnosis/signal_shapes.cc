@@ -16,120 +16,162 @@ double SquaredNorm(const ArrayXd& x) { return x.square().sum(); }
 /// Whether what has this output for good is over when it would still show.
 bool IsRefuted(const SignalSeries& series, const SignalSteps& steps, const VectorXd& output) {
   if (!steps.ends) return false;
-  const Index first = static_cast<Index>(steps.rows.back()) + 1, count = output.size() - first;
-  return ((output - series.expected).tail(count).array().abs() > kSignalFaint * series.noise).any();
+  const Index count = output.size() - 1 - steps.last;
+  return ((output - series.expected).tail(count).array().abs() > series.faint * series.noise).any();
 }
 
-/// g = a u_k + b u_(k+1) + c of the whole delay k that fits best, a + b = 1.
-void AddDelay(const ArrayXd& got, const SignalSeries& series, const SignalSteps& steps,
-              std::vector<SignalShape>* shapes) {
-  double least = std::numeric_limits<double>::infinity();
-  SignalShape best{.fault = "delay",
-                   .unit = "steps",
-                   .detail = "",
-                   .parameters = 1,
-                   .output = {},
-                   .tried = StepStore::kHistory};
-  for (Index k = 1; k <= StepStore::kHistory; ++k) {
-    const ArrayXd late = steps.Take(series.expected, k);
-    const double left = SquaredNorm((got - late) - (got - late).mean());
-    if (!(left < least)) continue;
-    least = left;
-    best.value = static_cast<double>(k);
-    best.output = late;
+/// The signal so many steps before; the first where there is none.
+VectorXd Shift(const VectorXd& signal, Index back) {
+  VectorXd late = signal;
+  late.tail(signal.size() - back) = signal.head(signal.size() - back);
+  late.head(back).setConstant(signal[0]);
+  return late;
+}
+
+class ShapeList {
+ public:
+  ShapeList(const SignalSeries& series, const SignalSteps& steps)
+      : series_(series), steps_(steps), u_(steps.Take(series.expected)), got_(steps.Take(series.got)) {}
+
+  void Add(SignalShape shape) {
+    shape.changes = CountChanges(shape);
+    shapes_.push_back(std::move(shape));
   }
-  shapes->push_back(best);
-  // Between two steps: g - u_k = f (u_(k+1) - u_k).
-  for (const Index k : {static_cast<Index>(best.value) - 1, static_cast<Index>(best.value)}) {
-    const ArrayXd late = steps.Take(series.expected, k);
-    const ArrayXd later = steps.Take(series.expected, k + 1);
-    const double square = SquaredNorm(later - late);
-    if (!(square > 0.0) || k >= StepStore::kHistory) continue;
-    const double f = ((got - late) * (later - late)).sum() / square;
-    constexpr double kWhole = 1e-6;
-    if (!(f > kWhole && f < 1.0 - kWhole)) continue;
-    SignalShape between = best;
-    between.value = static_cast<double>(k) + f;
-    between.output = late + f * (later - late);
-    between.parameters = 2;
-    shapes->push_back(between);
+
+  /// A fault that Transmit knows.
+  void Add(const char* fault, const std::string& unit, double value, bool has_gain, int parameters = 1,
+           Index tried = 1, const char* detail = "") {
+    Add({.fault = fault,
+         .unit = unit,
+         .detail = detail,
+         .value = value,
+         .parameters = parameters,
+         .output = Transmit({fault, "", value, 0.0, "", ""}, series_),
+         .has_gain = has_gain,
+         .tried = tried});
   }
-}
 
-void AddLimits(const ArrayXd& u, const ArrayXd& got, const SignalSeries& series, const SignalSteps& steps,
-               std::vector<SignalShape>* shapes) {
-  const std::string& unit = series.name.unit;
-  const bool is_motor = series.name.group == "motors";
-  const double most = got.abs().maxCoeff();
-  if (most > 0.0 && most < u.abs().maxCoeff())
-    shapes->push_back({"limit", unit, "", most, 1, u.min(most).max(-most), false});
-  if (!is_motor) return;
-  // Outside of a dead zone |u| - |g| is its half width.
-  std::vector<double> less;
-  for (Index i = 0; i < u.size(); ++i)
-    if (got[i] != 0.0 && got[i] * u[i] > 0.0) less.push_back(std::abs(u[i]) - std::abs(got[i]));
-  if (less.empty()) return;
-  std::nth_element(less.begin(), less.begin() + static_cast<std::ptrdiff_t>(less.size() / 2), less.end());
-  const double zone = less[less.size() / 2];
-  if (!(zone > 0.0)) return;
-  const ArrayXd all = series.expected.array();
-  if (IsRefuted(series, steps, (all.sign() * (all.abs() - zone).max(0.0)).matrix())) return;
-  shapes->push_back({"dead zone", unit, "", zone, 1, u.sign() * (u.abs() - zone).max(0.0), false});
-}
-
-/// Whole multiples of a step: the largest that divides all, made better by all of them.
-void AddSteps(const ArrayXd& u, const ArrayXd& got, const std::string& unit,
-              std::vector<SignalShape>* shapes) {
-  const double rounding = 1e-12 * got.abs().maxCoeff();
-  const ArrayXd apart = (got - got[0]).abs();
-  double step = apart.maxCoeff() > rounding ? 0.0 : std::abs(got[0]);
-  for (double value : apart) {
-    // By Euclid's algorithm, in which a remainder of rounding is none.
-    while (value > rounding) {
-      const double rest = step > 0.0 ? std::abs(std::remainder(value, step)) : 0.0;
-      if (step == 0.0) step = value;
-      if (!(rest > rounding)) break;
-      value = step;
-      step = rest;
+  /// g = a u_k + b u_(k+1) + c of the whole delay k that fits best, a + b = 1.
+  void AddDelay() {
+    double least = std::numeric_limits<double>::infinity();
+    Index best = 1;
+    for (Index k = 1; k <= StepStore::kHistory; ++k) {
+      const ArrayXd off = got_ - steps_.Take(series_.expected, k);
+      const double left = SquaredNorm(off - off.mean());
+      if (left < least) least = left, best = k;
+    }
+    Add("delay", "steps", static_cast<double>(best), true, 1, StepStore::kHistory);
+    // Between two steps: g - u_k = f (u_(k+1) - u_k).
+    for (const Index k : {best - 1, best}) {
+      const ArrayXd late = steps_.Take(series_.expected, k);
+      const ArrayXd later = steps_.Take(series_.expected, k + 1);
+      const double square = SquaredNorm(later - late);
+      if (!(square > 0.0) || k >= StepStore::kHistory) continue;
+      const double f = ((got_ - late) * (later - late)).sum() / square;
+      constexpr double kWhole = 1e-6;
+      if (f > kWhole && f < 1.0 - kWhole)
+        Add("delay", "steps", static_cast<double>(k) + f, true, 2, StepStore::kHistory);
     }
   }
-  // Multiples of what is hardly more than rounding are any values.
-  if (!(step > 1e2 * rounding)) return;
-  // From few multiples to many, so that each is counted right.
-  ArrayXd sorted(2 * got.size());
-  sorted << apart, got.abs();
-  std::sort(sorted.begin(), sorted.end());
-  double along = 0.0, square = 0.0;
-  for (const double value : sorted) {
-    const double count = std::round(value / step);
-    along += count * value;
-    square += count * count;
-    if (square > 0.0) step = along / square;
-  }
-  shapes->push_back({"rounding to steps of", unit, "", step, 1, step * (u / step).round(), false});
-}
 
-/// The other one of the same kind whose signal this one has.
-void AddExchange(const ArrayXd& got, const SignalSeries& series, const SignalSteps& steps,
-                 const std::vector<SignalSeries>& others, std::vector<SignalShape>* shapes) {
-  double least = 0.05 * SquaredNorm(got - steps.Take(series.expected));
-  SignalShape best{.fault = "", .unit = "", .detail = "", .parameters = 2, .output = {}, .has_gain = false};
-  for (const SignalSeries& other : others) {
-    if (other.name.group != series.name.group ||
-        (other.name.place == series.name.place && other.name.what == series.name.what))
-      continue;
-    const ArrayXd signal = steps.Take(other.expected);
-    const double left = SquaredNorm(got - signal);
-    if (!(left < least)) continue;
-    least = left;
-    best.fault = "signal of " + other.name.place +
-                 (other.name.place == series.name.place ? " " + other.name.what : std::string()) + ", gain";
-    best.value = 1.0;
-    best.output = signal;
-    best.tried = static_cast<Index>(others.size());
+  void AddLimits() {
+    const std::string& unit = series_.name.unit;
+    const double most = got_.abs().maxCoeff();
+    if (most > 0.0 && most < u_.abs().maxCoeff()) Add("limit", unit, most, false);
+    if (series_.name.group != "motors") return;
+    // Outside of a dead zone |u| - |g| is its half width.
+    std::vector<double> less;
+    for (Index i = 0; i < u_.size(); ++i)
+      if (got_[i] != 0.0 && got_[i] * u_[i] > 0.0) less.push_back(std::abs(u_[i]) - std::abs(got_[i]));
+    if (less.empty()) return;
+    std::nth_element(less.begin(), less.begin() + static_cast<std::ptrdiff_t>(less.size() / 2), less.end());
+    const double zone = less[less.size() / 2];
+    if (zone > 0.0 && !IsRefuted(series_, steps_, Transmit({"dead zone", "", zone, 0.0, "", ""}, series_)))
+      Add("dead zone", unit, zone, false);
   }
-  if (!best.fault.empty()) shapes->push_back(best);
-}
+
+  /// Whole multiples of a step: the largest that divides all, made better by all of them.
+  void AddSteps() {
+    const double rounding = 1e-10 * got_.abs().maxCoeff();
+    const Index count = got_.size() - 1;
+    if (!((got_ - got_[0]).abs().maxCoeff() > rounding)) return AddOneStep();
+    // From few multiples to many, so that each is counted right, and the step is known better with each.
+    ArrayXd apart(2 * count);
+    apart << (got_.tail(count) - got_[0]).abs(), (got_.tail(count) - got_.head(count)).abs();
+    std::sort(apart.begin(), apart.end());
+    double step = 0.0;
+    for (const double whole : apart) {
+      // By Euclid's algorithm, in which a remainder of rounding is none.
+      for (double value = whole; value > rounding;) {
+        const double rest = step > 0.0 ? std::abs(std::remainder(value, step)) : 0.0;
+        if (step == 0.0) step = value;
+        if (!(rest > rounding)) break;
+        value = step;
+        step = rest;
+      }
+      if (whole > rounding) step = whole / std::round(whole / step);
+    }
+    // Multiples of what is hardly more than rounding are any values.
+    if (!(step > 1e2 * rounding)) return;
+    const double largest = got_.abs().maxCoeff();
+    step = largest / std::round(largest / step);
+    Add("rounding to steps of", series_.name.unit, step, false);
+  }
+
+  /// The other one of the same kind whose signal this one has.
+  void AddExchange(const std::vector<SignalSeries>& others) {
+    double least = 0.05 * SquaredNorm(got_ - u_);
+    SignalShape best{.parameters = 2, .has_gain = false};
+    for (const SignalSeries& other : others) {
+      if (other.name.group != series_.name.group ||
+          (other.name.place == series_.name.place && other.name.what == series_.name.what))
+        continue;
+      const double left = SquaredNorm(got_ - steps_.Take(other.expected));
+      if (!(left < least)) continue;
+      least = left;
+      best.fault = "signal of " + other.name.place +
+                   (other.name.place == series_.name.place ? " " + other.name.what : std::string()) +
+                   ", gain";
+      best.value = 1.0;
+      best.output = other.expected;
+      best.tried = static_cast<Index>(others.size());
+    }
+    if (!best.fault.empty()) Add(best);
+  }
+
+  void AddStuck() {
+    const bool is_still = got_.maxCoeff() - got_.minCoeff() <= series_.noise;
+    if (is_still && std::abs(got_[0]) > series_.left * series_.noise)
+      Add("stuck at", series_.name.unit, got_[0], false);
+  }
+
+  [[nodiscard]] std::vector<SignalShape> Take() { return std::move(shapes_); }
+
+ private:
+  /// Of what has only one value: of any step that is large enough and divides it, the largest.
+  void AddOneStep() {
+    constexpr double kCoarsest = 0.05;  // rad or m, of an encoder: 1/128 of a turn
+    const double least = 2.0 * (got_ - u_).abs().maxCoeff();
+    if (std::abs(got_[0]) < least || (series_.name.group == "joint positions" && least > kCoarsest)) return;
+    Add("rounding to steps of", series_.name.unit, std::abs(got_[0]), false);
+  }
+
+  [[nodiscard]] int CountChanges(const SignalShape& shape) const {
+    const auto differs = [&](Index begin, Index end) {
+      for (Index i = begin; i < end; ++i)
+        if (series_.has_history[static_cast<size_t>(i)] &&
+            std::abs(shape.output[i] - series_.got[i]) > series_.left * series_.noise)
+          return 1;
+      return 0;
+    };
+    return differs(0, steps_.first) + (steps_.ends ? differs(steps_.last + 1, series_.got.size()) : 0);
+  }
+
+  const SignalSeries& series_;
+  const SignalSteps& steps_;
+  ArrayXd u_, got_;
+  std::vector<SignalShape> shapes_;
+};
 
 /// A sine of the frequency that explains most of y: parts of its amplitude as columns.
 Candidate FindSine(const ArrayXd& y, const ArrayXd& t, const std::string& place, const std::string& unit) {
@@ -172,6 +214,45 @@ Candidate FindSine(const ArrayXd& y, const ArrayXd& t, const std::string& place,
 
 }  // namespace
 
+namespace {
+
+VectorXd TransmitAlways(const Fault& fault, const SignalSeries& series) {
+  const VectorXd& u = series.expected;
+  const ArrayXd size = u.array().abs();
+  const double value = fault.value;
+  if (fault.fault == "gain") return value * u;
+  if (fault.fault == "offset") return u.array() + value;
+  if (fault.fault == "stuck at") return VectorXd::Constant(u.size(), value);
+  if (fault.fault == "limit") return u.cwiseMin(value).cwiseMax(-value);
+  if (fault.fault == "dead zone") return u.array().sign() * (size - value).max(0.0);
+  if (fault.fault == "rounding to steps of") return value * (u.array() / value).round();
+  if (fault.fault != "delay") return {};
+  const Index last = u.size() - 1, whole = std::min(static_cast<Index>(value), last);
+  const VectorXd late = Shift(u, whole);
+  return late + (value - std::floor(value)) * (Shift(u, std::min(whole + 1, last)) - late);
+}
+
+}  // namespace
+
+VectorXd Transmit(const Fault& fault, const SignalSeries& series, Index begin) {
+  const VectorXd& u = series.expected;
+  const bool is_lag = fault.fault == "lag" && u.size() > 1;
+  VectorXd output = is_lag ? u : TransmitAlways(fault, series);
+  if (output.size() == 0) return output;
+  output.head(begin) = u.head(begin);
+  if (!is_lag) return output;
+  // Until it begins it keeps up.
+  const double decay = CalcDecay(fault, series);
+  if (begin == 0) output[0] = series.got[0];
+  for (Index i = std::max<Index>(begin, 1); i < u.size(); ++i)
+    output[i] = decay * output[i - 1] + (1.0 - decay) * u[i];
+  return output;
+}
+
+double CalcDecay(const Fault& lag, const SignalSeries& series) {
+  return std::exp(-(series.time[1] - series.time[0]) / lag.value);
+}
+
 SignalSteps FindSteps(const SignalSeries& series) {
   SignalSteps steps;
   const ArrayXd difference = (series.got - series.expected).array().abs();
@@ -186,6 +267,8 @@ SignalSteps FindSteps(const SignalSeries& series) {
     steps.rows.clear();
     for (Index i = first; i <= last; ++i) steps.rows.push_back(i);
   }
+  steps.first = first;
+  steps.last = last;
   steps.was_before = first == 0;
   steps.from = series.time[first];
   steps.to = series.time[last];
@@ -195,18 +278,14 @@ SignalSteps FindSteps(const SignalSeries& series) {
 
 std::vector<SignalShape> ListShapes(const SignalSeries& series, const SignalSteps& steps,
                                     const std::vector<SignalSeries>& others) {
-  const ArrayXd u = steps.Take(series.expected), got = steps.Take(series.got);
-  std::vector<SignalShape> shapes;
-  shapes.push_back({.fault = "", .unit = "", .detail = "", .output = u});
-  AddDelay(got, series, steps, &shapes);
-  AddLimits(u, got, series, steps, &shapes);
-  AddSteps(u, got, series.name.unit, &shapes);
-  AddExchange(got, series, steps, others, &shapes);
-  const bool is_still = (got - got.mean()).abs().maxCoeff() <= series.noise;
-  if (is_still && std::abs(got.mean()) > kSignalLeft * series.noise)
-    shapes.push_back(
-        {"stuck at", series.name.unit, "", got.mean(), 1, ArrayXd::Constant(u.size(), got.mean()), false});
-  return shapes;
+  ShapeList shapes(series, steps);
+  shapes.Add({.output = series.expected});
+  shapes.AddDelay();
+  shapes.AddLimits();
+  shapes.AddSteps();
+  shapes.AddExchange(others);
+  shapes.AddStuck();
+  return shapes.Take();
 }
 
 std::string PlaceOf(const SignalName& name) {
@@ -232,21 +311,20 @@ std::vector<Candidate> ListAdded(const SignalSeries& series, const SignalSteps& 
                      .nominal = nominal,
                      .columns = column.matrix() / series.noise});
   };
-  const ArrayXd got = steps.Take(series.got);
+  const ArrayXd got = steps.Take(series.got), output = steps.Take(shape.output);
   const ArrayXd since = steps.Take(series.time) - steps.from;
-  if (shape.has_gain) add("gain", "", shape.output, 1.0);
+  if (shape.has_gain) add("gain", "", output, 1.0);
   add("offset", name.unit, ArrayXd::Ones(got.size()));
   add("drift", name.unit + "/s", since);
   if (shape.fault.empty()) {
-    add("drift of the gain", "1/s", since * shape.output);
+    add("drift of the gain", "1/s", since * output);
     // g_t - u_t = d (g_(t-1) - u_t) [+ c (u_(t-1) - u_t)]
-    const ArrayXd before = steps.Take(series.got, 1) - shape.output;
+    const ArrayXd before = steps.Take(series.got, 1) - output;
     const auto is_lag = [](const VectorXd& a) { return IsDecay(a[0]); };
     add("lag", "s", before);
     if (!added.empty() && added.back().fault == "lag") added.back().is_possible = is_lag;
     MatrixXd both(got.size(), 2);
-    both << before.matrix() / series.noise,
-        (steps.Take(series.expected, 1) - shape.output).matrix() / series.noise;
+    both << before.matrix() / series.noise, (steps.Take(series.expected, 1) - output).matrix() / series.noise;
     // Of any gain and offset, got_t - u_t = 1 (got_(t-1) - u_t) - gain (u_(t-1) - u_t).
     added.push_back({.fault = "lag", .place = place, .unit = "s", .columns = both, .is_possible = is_lag});
   }
@@ -262,7 +340,7 @@ std::vector<Candidate> ListAdded(const SignalSeries& series, const SignalSteps& 
     }
   }
   if (look_for_sines && got.size() >= kFewestOfNoise) {
-    Candidate sine = FindSine(got - shape.output, steps.Take(series.time), place, name.unit);
+    Candidate sine = FindSine(got - output, steps.Take(series.time), place, name.unit);
     sine.columns /= series.noise;
     added.push_back(sine);
   }

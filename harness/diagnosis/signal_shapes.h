@@ -10,21 +10,20 @@
 
 namespace dexcheck {
 
-inline constexpr double kSignalLeft = 30.0;         // times the noise may be left of what is explained
-inline constexpr double kSignalFaint = 1e3;         // times the noise; of less rounding says what it is
 inline constexpr Eigen::Index kFewestSteps = 3;     // that say anything
 inline constexpr Eigen::Index kFewestOfNoise = 20;  // and of noise
 
 /// The steps in which a series differs, and the signal's past there.
 struct SignalSteps {
   std::vector<Eigen::Index> rows;
-  double from = 0.0, to = 0.0;  // s
-  bool ends = false;            // before the series does
-  bool was_before = false;      // whether it may have begun before the series does
+  Eigen::Index first = 0, last = -1;  // that differ, of all
+  double from = 0.0, to = 0.0;        // s
+  bool ends = false;                  // before the series does
+  bool was_before = false;            // whether it may have begun before the series does
 
   [[nodiscard]] Eigen::Index size() const { return static_cast<Eigen::Index>(rows.size()); }
   /// The signal `back` steps before each of them.
-  [[nodiscard]] Eigen::ArrayXd Take(const VectorXd& signal, Eigen::Index back = 0) const {
+  [[nodiscard]] Eigen::ArrayXd Take(const Eigen::Ref<const VectorXd>& signal, Eigen::Index back = 0) const {
     Eigen::ArrayXd taken(size());
     for (Eigen::Index i = 0; i < size(); ++i)
       taken[i] = signal[std::max<Eigen::Index>(0, rows[static_cast<size_t>(i)] - back)];
@@ -40,10 +39,18 @@ struct SignalShape {
   std::string unit, detail;
   double value = 0.0;
   int parameters = 0;
-  Eigen::ArrayXd output;
+  VectorXd output = {};  ///< At all steps.
   bool has_gain = true;
   Eigen::Index tried = 1;  ///< Out of how many this one is the best.
+  /// How often it has to change: begin where it would have shown before, end where it would show after.
+  int changes = 0;
 };
+
+/// What this fault alone makes of a series from a step on, at all steps; empty for one that no signal follows
+/// from.
+VectorXd Transmit(const Fault& fault, const SignalSeries& series, Eigen::Index begin = 0);
+/// e^(-step / time) of a lag, of the step of a series.
+double CalcDecay(const Fault& lag, const SignalSeries& series);
 
 std::vector<SignalShape> ListShapes(const SignalSeries& series, const SignalSteps& steps,
                                     const std::vector<SignalSeries>& others);

@@ -54,6 +54,8 @@ void StepForces::SetStep(Index step) {
     const int frame = first_frame + static_cast<int>(i);
     terms_.CalcFrameJacobian(frame, links_[i].J, links_[i].J_dot);
     links_[i].X = terms_.CalcFramePose(frame);
+    for (size_t k = 0; k < i; ++k)
+      reach_ = std::max(reach_, (links_[i].X.translation() - links_[k].X.translation()).norm());
   }
   noise_ = level_.cwiseProduct(store_.Get(StepStore::kNoise).col(step))
                .cwiseMax(std::numeric_limits<double>::min());

@@ -22,6 +22,7 @@ inline constexpr const char* kForceInAxes = "force at its centre of mass, in its
 inline constexpr const char* kMomentInAxes = "moment, in its axes";
 inline constexpr const char* kMassWithInertia = "mass and inertia";
 inline constexpr const char* kGravity = "gravity off by";
+inline constexpr const char* kContact = "contact further along the normal by";
 }  // namespace force_fault
 
 /// Residual and columns of one step. The robot's are whitened by
@@ -79,6 +80,8 @@ class StepForces {
   void AddObjectForces(std::vector<Candidate>* candidates);
   void AddGravity(std::vector<Candidate>* candidates);
   void AddWheels(std::vector<Candidate>* candidates);
+  /// What contacts do that are not where they are declared to be: n x f on object and finger.
+  void AddContacts(std::vector<Candidate>* candidates);
 
   const StepStore& store_;
   RobotModel model_;  // with a frame at each link's centre of mass, after its own
@@ -95,6 +98,7 @@ class StepForces {
   VectorXd uneven_shrink_;            // what is left of each by whitening, less 1
   double arm_ = 1.0;                  // of the object's inertia, m
   double mass_ = 0.0, weight_ = 0.0;  // of all, kg and N
+  double reach_ = 0.0;                // how far links are apart at the most, m: where loads may be
   Vector3d gravity_;
 };
 

@@ -32,9 +32,10 @@ StepStore::StepStore(const Setup& setup, const JudgedLaw* law, double rolling_bo
   const RobotModel& model = setup.model();
   const Eigen::Index n = model.num_velocities(), m = CountOf(readings_);
   const Eigen::Index parts = law_ == nullptr ? 0 : law_->CountColumns();
+  const Eigen::Index tips = CountOf(setup.fingertips());
   const Eigen::Index sizes[kSignalCount] = {
-      1, n, n, model.num_positions(),       n, n, m,        m, n, 6, 12, 12, n, 2, 1,
-      2, 2, 2, CountOf(setup.fingertips()), n, 1, n * parts};
+      1, n, n,        model.num_positions(), n, n, m, m, n, 6, 12, 12, n, 2, 1, 2, 2, 2, tips, 3 * tips,
+      n, 1, n * parts};
   for (int i = 0; i < kSignalCount; ++i) offsets_[i + 1] = offsets_[i] + sizes[i];
   before_.resize(offsets_[kSignalCount], kHistory);
   data_.resize(offsets_[kSignalCount], kCapacity);  // its pages are used only when something differs
@@ -183,6 +184,11 @@ void StepStore::Pack(const StepRecord& step, const StepAnalysis& now, bool answe
   if (answered && response.wheels.size() == 2)
     at(kWheelNoise) = now.wheel_slip.array() + now.sinking + kRollingRounding * rolling_bound_;
   at(kContactMismatch) = now.contact_mismatch;
+  at(kContactMoment).setZero();
+  for (size_t i = 0; i < std::min(response.contacts.size(), setup_->fingertips().size()); ++i) {
+    const PlantContact& contact = response.contacts[i];
+    at(kContactMoment).segment<3>(3 * static_cast<Eigen::Index>(i)) = contact.normal.cross(contact.force);
+  }
   at(kLawNoise)[0] = 0.0;
   if (now.law == nullptr || law_ == nullptr || !law_->differs()) return;
   at(kLawNoise)[0] = kLawTorqueBound * law_->noise_scale();

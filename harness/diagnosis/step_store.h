@@ -48,6 +48,7 @@ class StepStore {
     kWheelMismatch,    ///< 2, CalcRollingMismatch, m/s.
     kWheelNoise,       ///< 2: what of that slipping and sinking are, and rounding, m/s; 0 without wheels.
     kContactMismatch,  ///< N: StepAnalysis::contact_mismatch, m.
+    kContactMoment,    ///< 3N: n x f of the normal into the object and the force on it, world, N.
     kLawDifference,    ///< n, E_bar' (tau' - tau'_printed).
     kLawNoise,         ///< Of that, in |.|_M^-1; 0 where the law is right or not known.
     kLawParts,         ///< n times their number: the summands, where the law differs.

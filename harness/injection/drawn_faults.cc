@@ -129,12 +129,14 @@ NamingScore ScoreNames(const std::vector<Fault>& truth, const std::vector<Fault>
   for (const Explanation& one : causes) {
     if (one.outcome != CauseOutcome::kNamed) continue;
     const Fault& first = one.faults.front();
-    const auto of = std::find_if(all.begin(), all.end(), [&](const Fault& fault) {
-      return fault.IsLike(first) || (fault.fault == first.fault && IsOfAll(fault));
-    });
-    if (of != all.end() && HasValue(first, *of)) continue;
+    const auto is_so = [&](const Fault& fault) {
+      const bool is_of_it = fault.IsLike(first) || (fault.fault == first.fault && IsOfAll(fault));
+      return is_of_it && HasValue(first, fault);
+    };
+    if (std::any_of(all.begin(), all.end(), is_so)) continue;
     ++score.wrong;
-    wrong = of == all.end() ? first.fault : "another value";
+    const auto is_like = [&](const Fault& fault) { return fault.IsLike(first); };
+    wrong = std::any_of(all.begin(), all.end(), is_like) ? "another value" : first.fault;
   }
   for (const Fault& fault : truth) {
     bool is_right = false, is_in_class = false;
@@ -146,6 +148,9 @@ NamingScore ScoreNames(const std::vector<Fault>& truth, const std::vector<Fault>
       is_in_class = is_in_class || NamesInClass(one, fault);
     }
     ++(is_right ? score.right : is_in_class ? score.in_class : score.not_explained);
+    score.outcomes.push_back(is_right      ? CauseOutcome::kNamed
+                             : is_in_class ? CauseOutcome::kNamedClass
+                                           : CauseOutcome::kNotExplained);
     score.named_as.push_back(is_right         ? fault.fault
                              : is_in_class    ? "a class"
                              : !wrong.empty() ? wrong

@@ -37,6 +37,7 @@ struct NamingScore {
   int wrong = 0;  ///< Single names, or values, of what was not so.
   /// Of each fault: itself, "a class", another one by its single name, or "nothing".
   std::vector<std::string> named_as = {};
+  std::vector<CauseOutcome> outcomes = {};  ///< Of each fault.
 };
 /// @param truth what should be named. @param all what may be, besides: too small to be seen alone.
 NamingScore ScoreNames(const std::vector<Fault>& truth, const std::vector<Fault>& all, const Causes& causes);

@@ -94,6 +94,12 @@ bool RunMutant::is_named() const {
   return killed && score.right == static_cast<int>(truth.size()) && score.wrong == 0;
 }
 
+bool RunMutant::is_as_alone() const {
+  if (!killed || score.wrong > 0 || score.outcomes.size() != alone.size()) return false;
+  return std::equal(alone.begin(), alone.end(), score.outcomes.begin(),
+                    [](CauseOutcome by_itself, CauseOutcome here) { return here <= by_itself; });
+}
+
 RunCampaign::RunCampaign(const Scenario& scenario, std::filesystem::path robot, std::filesystem::path mjcf,
                          const RunMutationOptions& options, const std::function<bool()>& should_stop)
     : scenario_(scenario),
@@ -267,10 +273,13 @@ bool RunCampaign::FindTruth(RunMutant* mutant, const std::function<bool()>& shou
   if (mutant->faults.size() < 2) return true;
   mutant->truth.clear();
   for (const InjectedFault& one : mutant->faults) {
-    RunMutant alone;
+    RunMutant alone{.faults = {}, .all = one, .truth = one.truth};
     VectorXd end;
     if (!RunFault(one, &alone, &end, should_stop)) return false;
-    if (alone.killed) mutant->truth.insert(mutant->truth.end(), one.truth.begin(), one.truth.end());
+    if (!alone.killed) continue;
+    mutant->truth.insert(mutant->truth.end(), one.truth.begin(), one.truth.end());
+    const std::vector<CauseOutcome>& outcomes = alone.score.outcomes;
+    mutant->alone.insert(mutant->alone.end(), outcomes.begin(), outcomes.end());
   }
   return true;
 }

@@ -21,6 +21,7 @@ struct RunMutant {
   InjectedFault all;  ///< Together.
   /// How those should be named that are found where they are alone: the others have no effect.
   std::vector<Fault> truth = {};
+  std::vector<CauseOutcome> alone = {};  ///< How each of them is named where it is alone.
 
   bool refused = false;  ///< There is no such robot, or the scenario cannot be run with it.
   bool killed = false;   ///< The verdict is not "pass".
@@ -40,6 +41,8 @@ struct RunMutant {
   /// Whether all of `truth` is named, with its values, and nothing else; of faults without a size, whether
   /// the evidence has their part.
   [[nodiscard]] bool is_named() const;
+  /// Whether each of `truth` is named as well as it is alone, and nothing else is.
+  [[nodiscard]] bool is_as_alone() const;
 };
 
 /// All runs of one scenario. The right robot settles and moves up to options.from once; every fault starts
@@ -70,7 +73,7 @@ class RunCampaign {
   /// @param end gets the engine's positions and rates at the end. @returns as Run.
   bool RunFault(const InjectedFault& fault, RunMutant* mutant, VectorXd* end,
                 const std::function<bool()>& should_stop);
-  /// Fills `truth`. @returns as Run.
+  /// Fills `truth` and `alone`. @returns as Run.
   bool FindTruth(RunMutant* mutant, const std::function<bool()>& should_stop);
   void RequireNoFaultToPass(const std::function<bool()>& should_stop);
 

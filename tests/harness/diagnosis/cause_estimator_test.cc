@@ -383,6 +383,22 @@ TEST(CauseEstimator, SearchBeginsAgainAtTheSamePlace) {
   EXPECT_EQ(ChosenOf(selection), (std::vector<size_t>{10, 20}));
 }
 
+// c1 + c2 is c3 less c4 as well, of which c3 is the best alone; c4 has been fitted beforehand, and neither c1
+// nor c2 does in the place of one of the two.
+TEST(CauseEstimator, TwoAreExchangedAtOnce) {
+  Random random(13);
+  std::vector<Candidate> candidates = random.Candidates(200);
+  const VectorXd c1 = candidates[10].columns, c2 = random.Beside({c1}), c4 = random.Beside({c1, c2});
+  candidates[20].columns = c2;
+  candidates[30].columns = c1 + c2 + 0.5 * c4;
+  candidates[40].columns = c4;
+  candidates[40].parameters = 6;
+  const VectorXd y = 3.0 * (c1 + c2) + random.Normal();
+  ASSERT_EQ(ChosenOf(Select(y, {candidates[10], candidates[30], candidates[40]})),
+            (std::vector<size_t>{1, 2}));
+  EXPECT_EQ(ChosenOf(Select(y, candidates)), (std::vector<size_t>{10, 20}));
+}
+
 TEST(CauseEstimator, NoMoreTermsThanAreAskedFor) {
   Random random(12);
   const std::vector<Candidate> candidates = random.Candidates();

@@ -190,6 +190,23 @@ TEST(ScoreNamesTest, FaultThatIsTooSmallAloneMayBeNamed) {
   EXPECT_THAT(ScoreNames(truth, all, {named, MakeExplanation({MakeOffset(0.002)})}), IsScore(1, 0, 0, 1));
 }
 
+TEST(ScoreNamesTest, OneOfThoseThatAllHaveMayHaveItsOwnBesides) {
+  const Fault all = {"gain", "all motors", 0.99, 0.01, "", ""};
+  const std::vector<Fault> truth = {all, MakeGain(0.9, 0.1)};
+  const Explanation common = MakeExplanation({all});
+  EXPECT_THAT(ScoreNames(truth, truth, {common, MakeExplanation({MakeGain(0.9)})}), IsScore(2, 0, 0, 0));
+  // Named by itself, one that all have is not wrong; neither value is.
+  EXPECT_THAT(ScoreNames(truth, truth, {common, MakeExplanation({MakeGain(0.8)})}), IsScore(1, 0, 1, 1));
+}
+
+TEST(ScoreNamesTest, OutcomesAreOfEachFault) {
+  const std::vector<Fault> truth = {MakeGain(0.9, 0.1), MakeOffset(), {"lag", "motor a", 1.0, 1.0, "s", ""}};
+  const NamingScore score =
+      ScoreNames(truth, truth, {MakeExplanation({MakeGain(0.9)}), MakeExplanation({MakeOffset(), truth[2]})});
+  EXPECT_THAT(score.outcomes, ::testing::ElementsAre(CauseOutcome::kNamed, CauseOutcome::kNamedClass,
+                                                     CauseOutcome::kNamedClass));
+}
+
 TEST(ScoreNamesTest, EachOfSeveralFaultsCounts) {
   const Fault delay = {"delay", "motor l_elbow", 3.0, 3.0, "steps", ""};
   const Fault drift = {"drift", "motor r_hip", 0.3, 0.3, "N m/s", ""};

@@ -3,144 +3,22 @@
 
 #include "harness/diagnosis/signal_causes.h"
 
-#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
 #include <functional>
-#include <random>
 
-#include "controller/common/types.h"
-#include "tests/common/matchers.h"
-#include "tests/common/matrix_near.h"
+#include "tests/harness/diagnosis/made_signals.h"
 
 namespace dexcheck::testing::signal_causes_test {
 namespace {
-
-using Eigen::ArrayXd;
-using Eigen::Index;
-
-constexpr Index kSteps = 200;
-constexpr double kTimeStep = 1e-3;   // s
-constexpr double kRelative = 0.01;   // of a value
-constexpr double kErrors = 3.0;      // standard errors of a value
-constexpr double kRounding = 1e-14;  // of a torque, relative to the largest
-
-ArrayXd CalcTime() { return kTimeStep * ArrayXd::LinSpaced(kSteps, 0.0, static_cast<double>(kSteps - 1)); }
-
-/// A torque that crosses zero, N m.
-ArrayXd CalcTorque() {
-  const ArrayXd t = CalcTime();
-  return 2.0 * (2.0 * kPi * 12.0 * t + 0.4).sin() + 0.8 * (2.0 * kPi * 29.0 * t + 1.0).sin() + 0.1;
-}
-
-/// Of one sign.
-ArrayXd CalcPositiveTorque() { return 4.0 + CalcTorque(); }
-
-/// That of another motor, which is unlike.
-ArrayXd CalcOtherTorque() { return 1.5 * (2.0 * kPi * 19.0 * CalcTime() + 2.0).cos() - 0.3; }
-
-/// rad/s, of both signs and no multiple of the torque.
-ArrayXd CalcRate() { return 0.7 * (2.0 * kPi * 15.0 * CalcTime() - 0.5).cos(); }
-
-SignalSeries MakeSeries(const ArrayXd& expected, const ArrayXd& got) {
-  SignalSeries series;
-  series.name = {"motor elbow", "torque", "N m", "motors"};
-  series.time = CalcTime();
-  series.expected = expected;
-  series.got = got;
-  series.has_history.assign(kSteps, true);
-  std::fill_n(series.has_history.begin(), StepStore::kHistory, false);
-  series.noise = kRounding * expected.abs().maxCoeff();
-  return series;
-}
-
-SignalSeries MakeSeries(const ArrayXd& got) { return MakeSeries(CalcTorque(), got); }
-
-std::string TextOf(const Causes& causes) { return TellCauses(causes, CauseChannel::kActuation); }
-
-Causes Explain(const SignalSeries& series) {
-  SignalSeries other = series;
-  other.name.place = "motor wrist";
-  other.expected = other.got = CalcOtherTorque();
-  return ExplainSignal(series, {series, other});
-}
-
-/// What a motor gives that does this: `got` as a function of the step.
-ArrayXd MakeEach(const std::function<double(Index)>& got) {
-  ArrayXd all(kSteps);
-  for (Index i = 0; i < kSteps; ++i) all[i] = got(i);
-  return all;
-}
-
-/// The torque `back` steps before; the first, where there is none.
-double Back(const ArrayXd& u, Index i, Index back) { return u[std::max<Index>(0, i - back)]; }
-
-/// d = e^(-dt / time).
-ArrayXd MakeLag(const ArrayXd& sent, double time) {
-  ArrayXd given = sent;
-  const double d = std::exp(-kTimeStep / time);
-  for (Index i = 1; i < kSteps; ++i) given[i] = d * given[i - 1] + (1.0 - d) * sent[i];
-  return given;
-}
-
-ArrayXd MakeNoise(double deviation, unsigned seed) {
-  std::mt19937 random(seed);
-  std::normal_distribution<double> normal(0.0, deviation);
-  return MakeEach([&](Index) { return normal(random); });
-}
-
-bool HasValue(const Fault& fault, double value) {
-  return std::abs(fault.value - value) <=
-         std::max(kRelative * std::abs(value), kErrors * fault.error) * TolScale();
-}
-
-/// That these faults are named, each alone, and nothing else is.
-void ExpectNamed(const Causes& causes, const std::vector<Fault>& faults) {
-  SCOPED_TRACE(TextOf(causes));
-  EXPECT_EQ(causes.size(), faults.size());
-  for (const Fault& fault : faults) {
-    const auto named = std::find_if(causes.begin(), causes.end(), [&](const Explanation& one) {
-      return one.outcome == CauseOutcome::kNamed && one.faults.front().IsLike(fault);
-    });
-    if (named == causes.end()) {
-      ADD_FAILURE() << fault.Tell() << " is not named";
-      continue;
-    }
-    const Fault& told = named->faults.front();
-    EXPECT_EQ(named->faults.size(), 1u);
-    EXPECT_TRUE(HasValue(told, fault.value)) << told.Tell() << " against " << fault.value;
-    EXPECT_EQ(told.unit, fault.unit);
-    // An error that is as large as the value would let anything pass.
-    EXPECT_LE(told.error, 0.2 * std::abs(told.value));
-    EXPECT_FALSE(named->ends);
-    EXPECT_GT(named->fraction, 0.99 - (fault.fault.substr(0, 5) == "noise" ? 1.0 : 0.0));
-  }
-}
-
-std::vector<std::string> NamesOf(const Explanation& explanation) {
-  std::vector<std::string> names;
-  for (const Fault& fault : explanation.faults) names.push_back(fault.fault);
-  return names;
-}
-
-/// Of the class; NaN where it is no member.
-double ValueOf(const Explanation& explanation, const std::string& name) {
-  for (const Fault& fault : explanation.faults)
-    if (fault.fault == name) return fault.value;
-  return std::nan("");
-}
 
 struct Case {
   std::string name;
   std::function<SignalSeries()> make;
   std::vector<Fault> faults;
 };
-
-Fault OfMotor(const std::string& fault, double value, const std::string& unit = "") {
-  return {fault, "motor elbow", value, 0.0, unit, ""};
-}
 
 Case MakeCase(const std::string& name, std::vector<Fault> faults,
               const std::function<double(const ArrayXd& u, Index i)>& got) {
@@ -164,8 +42,6 @@ Case MakeFriction(const std::string& name, const Fault& fault, const std::functi
           },
           {fault}};
 }
-
-double TimeOf(Index step) { return kTimeStep * static_cast<double>(step); }
 
 class OneMotor : public ::testing::TestWithParam<Case> {};
 
@@ -399,6 +275,40 @@ TEST(SignalCauses, StepsWithoutHistoryAreLeftOut) {
   EXPECT_FALSE(Names(Explain(series), "delay"));
   std::fill_n(series.has_history.begin() + 60, StepStore::kHistory, false);
   ExpectNamed(Explain(series), {OfMotor("delay", 3.0, "steps")});
+}
+
+// A limit holds before the torque comes up to it; one that is stuck has to begin there.
+TEST(SignalCauses, LimitOfARisingTorqueIsNotStuck) {
+  const ArrayXd u = 4.0 + 2.0 * CalcTime() / TimeOf(kSteps - 1);
+  const Causes limited = Explain(MakeSeries(u, u.min(5.0)));
+  ExpectNamed(limited, {OfMotor("limit", 5.0, "N m")});
+  // From the first step on nothing tells them apart.
+  const Causes causes = Explain(MakeSeries(u, ArrayXd::Constant(kSteps, 3.9)));
+  ASSERT_EQ(causes.size(), 1u);
+  EXPECT_THAT(NamesOf(causes.front()), ::testing::IsSupersetOf({"limit", "stuck at"}));
+}
+
+// 1/128 of a turn is coarser than any encoder.
+TEST(SignalCauses, EncoderOfOneValueIsStuckWhereItsStepsWouldBeTooCoarse) {
+  for (const bool is_far : {false, true}) {
+    SCOPED_TRACE(is_far);
+    const ArrayXd u = 1.2 - (is_far ? 0.4 : 0.01) * CalcTime() / TimeOf(kSteps - 1);
+    SignalSeries series = MakeSeries(u, ArrayXd::Constant(kSteps, 1.2001));
+    series.name = {"joint elbow", "position", "rad", "joint positions"};
+    const Causes causes = Explain(series);
+    SCOPED_TRACE(TextOf(causes));
+    ASSERT_EQ(causes.size(), 1u);
+    EXPECT_EQ(causes.front().outcome, is_far ? CauseOutcome::kNamed : CauseOutcome::kNamedClass);
+    EXPECT_NEAR(ValueOf(causes.front(), "stuck at"), 1.2001, 1e-9);
+  }
+}
+
+// Remainders by Euclid's algorithm are rounded once more with each quotient.
+TEST(SignalCauses, FineStepsOfALargeSignalAreFound) {
+  const double step = 2.4419e-5;
+  ExpectNamed(
+      Explain(MakeSeries(MakeEach([&](Index i) { return step * std::round(CalcTorque()[i] / step); }))),
+      {OfMotor("rounding to steps of", step, "N m")});
 }
 
 }  // namespace

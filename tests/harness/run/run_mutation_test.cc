@@ -149,6 +149,48 @@ TEST(RunCampaign, NamesTheWrongSummandOfEveryLaw) {
   EXPECT_GE(named, 0.93 * all);
 }
 
+// What is measured otherwise is none of the law's.
+TEST(RunCampaign, NamesLawsOfJointsBesideWrongSensors) {
+  RunMutationOptions options;
+  options.draws = 12;
+  options.together = 2;
+  options.kinds = {"law", "sensor"};
+  const Scenario read = ReadShippedScenario("panda-reach", {});
+  RunCampaign campaign(read, read.model_file, read.mjcf_file, options, kGoOn);
+  int of_both = 0;
+  for (size_t i = 0; i < campaign.mutants().size(); ++i) {
+    EXPECT_TRUE(campaign.Run(i, kGoOn));
+    const RunMutant& mutant = campaign.mutants()[i];
+    of_both += mutant.all.kind.find("law") != std::string::npos &&
+               mutant.all.kind.find("sensor") != std::string::npos;
+    EXPECT_EQ(mutant.truth.size(), mutant.alone.size());
+    EXPECT_TRUE(mutant.is_as_alone()) << mutant.all.name << ": " << mutant.causes;
+  }
+  EXPECT_GE(of_both, 4);
+}
+
+// Contacts that are elsewhere do not hide what else acts on object and fingers.
+TEST(RunCampaign, NamesForcesBesideOtherShapes) {
+  RunMutationOptions options;
+  options.draws = 24;
+  options.together = 2;
+  options.kinds = {"contact", "joint"};
+  RunCampaign campaign = MakeCampaign(options);
+  int made = 0, as_alone = 0;
+  for (size_t i = 0; i < campaign.mutants().size(); ++i) {
+    const RunMutant& mutant = campaign.mutants()[i];
+    const auto is_shape = [](const Fault& fault) { return fault.place.starts_with("fingertip"); };
+    if (std::none_of(mutant.all.truth.begin(), mutant.all.truth.end(), is_shape)) continue;
+    EXPECT_TRUE(campaign.Run(i, kGoOn));
+    if (mutant.truth.size() < 2) continue;
+    ++made;
+    as_alone += mutant.is_as_alone();
+    if (!mutant.is_as_alone()) std::cout << mutant.all.name << ": " << mutant.causes << "\n";
+  }
+  EXPECT_GE(made, 5);
+  EXPECT_GE(as_alone, made - 1);
+}
+
 // Contacts that slide, give or have another shape.
 TEST(RunCampaign, NamesWhatIsWrongWithContacts) {
   RunMutationOptions options;
