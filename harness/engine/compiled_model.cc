@@ -174,7 +174,8 @@ void FillNameTable(mjModel* m) {
     std::fill_n(table, slots, -1);
     for (size_t i = 0; i < count; ++i) {
       const char* const name = m->names + addresses[i];
-      if (*name == '\0') continue;
+      const bool is_new = addresses[i] == 0;  // where the model's own name stands
+      if (is_new || *name == '\0') continue;
       size_t slot = HashName(name, slots);
       while (table[slot] >= 0) slot = (slot + 1) % slots;
       table[slot] = static_cast<int>(i);
@@ -194,6 +195,9 @@ MjModelPtr MakeResizedCopy(const mjModel& model, const std::function<void(mjMode
     old.push_back({array, sizeof(*array) * rows * columns});
   });
   resize(m);
+  size_t names = 0;
+  ForEachKindOfName(m, [&](const int*, size_t count) { names += count; });
+  SetNameSlots(names, m);
   size_t bytes = 0;
   ForEachArray(m, [&](auto* array, size_t rows, size_t columns, const ArrayName&) {
     bytes = AlignArray(bytes) + sizeof(*array) * rows * columns;
