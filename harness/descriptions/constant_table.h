@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "harness/descriptions/robot_description.h"
+#include "harness/engine/mujoco_release.h"
 
 namespace dexcheck {
 
@@ -43,7 +44,7 @@ struct Constant {
   const char* check;
   EnginePart part;
   const char* name;  ///< As an MJCF writes it, or what it is.
-  std::variant<mjtNum * mjModel::*, int * mjModel::*, mjtByte * mjModel::*> array;
+  std::variant<mjtNum * mjModel::*, int * mjModel::*, EngineFlag * mjModel::*> array;
   enum class Index { kPart, kPosition, kDof } index = Index::kPart;  ///< What the array is by.
   int count = 1;                                                     ///< Numbers of each part.
   std::optional<double> neutral = {};  ///< With it the part does nothing; of several numbers the first.

@@ -170,19 +170,15 @@ class ExtrasComparison {
     MakeIdle(kind, b, role, &b_);
   }
 
-  [[nodiscard]] static EngineSize CountOf(const mjModel& m, mjtObj type) {
-    return type == mjOBJ_ACTUATOR ? m.nu : type == mjOBJ_TENDON ? m.ntendon : m.neq;
-  }
-
   /// Parts of one kind that both have; those without a name by their number. Not couplings of joints.
   void CompareByName(EnginePart kind, mjtObj type, const std::string& word) {
     const auto is_coupling = [&](const mjModel& m, int id) {
       return kind == EnginePart::kConstraint && m.eq_type[id] == mjEQ_JOINT &&
              FindCouplingConstraint(m, m.eq_obj1id[id]) == id;
     };
-    for (int a = 0; a < CountOf(a_, type); ++a) {
+    for (int a = 0; a < CountElements(a_, type); ++a) {
       const std::string name = NameOf(a_, type, a);
-      for (int b = 0; b < CountOf(b_, type); ++b) {
+      for (int b = 0; b < CountElements(b_, type); ++b) {
         if (NameOf(b_, type, b) != name) continue;
         if (!is_coupling(a_, a) && !is_coupling(b_, b))
           CompareParts(word + " " + name, kind, a, b, kRobotJoint);

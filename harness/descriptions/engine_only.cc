@@ -34,6 +34,7 @@ class EngineOnly {
     FindParts(EnginePart::kTendon, mjOBJ_TENDON, "tendon", engine_.ntendon);
     FindParts(EnginePart::kConstraint, mjOBJ_EQUALITY, "constraint", engine_.neq);
     FindMotors();
+    FindNewerForces();
     FindFlags();
     ComparePairs();
     if (!adapter_.wheels().empty()) CompareFloor();
@@ -85,6 +86,19 @@ class EngineOnly {
         Note("motor_limit",
              fmt::format("{}: force from {}", where, List(engine_.actuator_forcerange + 2 * i, 2)));
     }
+  }
+
+  /// What later releases of the engine add to the mechanism's forces and inertias.
+  void FindNewerForces() {
+    for (const NewerForce& force : kNewerForces) {
+      const mjtNum* const values = engine_.*force.values;
+      for (int i = 0; i < CountElements(engine_, force.type) * force.columns; ++i) {
+        const std::string element = NameOf(engine_, force.type, i / force.columns);
+        Expect(force.check, element + ": " + force.name, 0.0, values[i]);
+      }
+    }
+    for (const NewerPart& part : kNewerParts)
+      Expect("newer_part", part.name, 0.0, static_cast<double>(engine_.*part.count));
   }
 
   void FindFlags() {

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <cstring>
 #include <new>
 #include <string_view>
@@ -23,13 +24,18 @@ namespace {
 
 // The arrays of an mjModel stand one after the other in its one buffer.
 
-// visit(array, rows, columns, whether there is one row for each geom) for all arrays, as the engine lists
-// them; `array` is a reference to the model's pointer.
+/// What an array's row belongs to: "name_bodyadr" has "nbody" rows.
+struct ArrayName {
+  std::string_view name;
+  std::string_view rows;
+};
+
+// visit(array, rows, columns, its name) for all arrays, as the engine lists them; `array` is a reference to
+// the model's pointer.
 #undef MJ_M
 #define MJ_M(size) m->size
-#define DEXCHECK_VISIT(type, name, rows, columns)                            \
-  visit(m->name, static_cast<size_t>(m->rows), static_cast<size_t>(columns), \
-        std::string_view(#rows) == "ngeom");
+#define DEXCHECK_VISIT(type, name, rows, columns) \
+  visit(m->name, static_cast<size_t>(m->rows), static_cast<size_t>(columns), ArrayName{#name, #rows});
 template <typename Visit>
 void ForEachArray(mjModel* m, const Visit& visit) {
 #define X DEXCHECK_VISIT
@@ -102,11 +108,12 @@ int RemoveLooks(MjModelPtr* model, std::span<const int> wanted) {
     renumber(m->pair_geom1 + pair);
     renumber(m->pair_geom2 + pair);
   }
-  ForEachArray(m, [&]<typename Number>(Number*& array, size_t, size_t columns, bool of_geoms) {
-    if (of_geoms) KeepRows(stay, columns, array);
+  ForEachArray(m, [&]<typename Number>(Number*& array, size_t, size_t columns, const ArrayName& array_name) {
+    if (array_name.rows == "ngeom") KeepRows(stay, columns, array);
   });
   *model = MakeResizedCopy(*m, [&](mjModel* smaller) { smaller->ngeom = static_cast<int>(stay.size()); });
   m = model->get();
+  DropGeomTrees(m);
 
   int next = 0;
   for (int body = 0; body < m->nbody; ++body) {
@@ -124,11 +131,12 @@ size_t RemovePictures(MjModelPtr* model) {
   const auto before = static_cast<size_t>(m.nbuffer);
   *model = MakeResizedCopy(m, [](mjModel* smaller) { smaller->ntex = smaller->ntexdata = 0; });
   // In later releases a material has several.
-  ForEachArray(model->get(), [&]<typename Number>(Number*& array, size_t rows, size_t columns, bool) {
-    if constexpr (std::is_same_v<Number, int>) {
-      if (array == (*model)->mat_texid) std::fill_n(array, rows * columns, -1);
-    }
-  });
+  ForEachArray(model->get(),
+               [&]<typename Number>(Number*& array, size_t rows, size_t columns, const ArrayName&) {
+                 if constexpr (std::is_same_v<Number, int>) {
+                   if (array == (*model)->mat_texid) std::fill_n(array, rows * columns, -1);
+                 }
+               });
   return before - static_cast<size_t>((*model)->nbuffer);
 }
 
@@ -139,6 +147,43 @@ struct Rows {
   size_t bytes;
 };
 
+/// visit(addresses of names, how many) for each kind of element that can have a name, in the order in which
+/// the engine's table has their slots.
+template <typename Visit>
+void ForEachKindOfName(mjModel* m, const Visit& visit) {
+  ForEachArray(m, [&](const auto* array, size_t rows, size_t, const ArrayName& array_name) {
+    if constexpr (std::is_same_v<decltype(array), const int*>) {
+      if (array_name.name.starts_with("name_")) visit(array, rows);
+    }
+  });
+}
+
+/// Where the engine first looks for a name. @param slots of its kind.
+size_t HashName(const char* name, size_t slots) {
+  uint64_t hash = 5381;
+  for (; *name != '\0'; ++name) hash = (hash * 33) ^ static_cast<uint64_t>(*name);
+  return hash % slots;
+}
+
+/// The table by which the engine finds names, for sizes that changed.
+void FillNameTable(mjModel* m) {
+  int* table = GetNameSlots(*m);
+  if (table == nullptr) return;
+  ForEachKindOfName(m, [&](const int* addresses, size_t count) {
+    const size_t slots = 2 * count;
+    std::fill_n(table, slots, -1);
+    for (size_t i = 0; i < count; ++i) {
+      const char* const name = m->names + addresses[i];
+      const bool is_new = addresses[i] == 0;  // where the model's own name stands
+      if (is_new || *name == '\0') continue;
+      size_t slot = HashName(name, slots);
+      while (table[slot] >= 0) slot = (slot + 1) % slots;
+      table[slot] = static_cast<int>(i);
+    }
+    table += slots;
+  });
+}
+
 }  // namespace
 
 MjModelPtr MakeResizedCopy(const mjModel& model, const std::function<void(mjModel*)>& resize) {
@@ -146,12 +191,15 @@ MjModelPtr MakeResizedCopy(const mjModel& model, const std::function<void(mjMode
   if (m == nullptr) throw std::bad_alloc();
   *m = model;
   std::vector<Rows> old;
-  ForEachArray(m, [&](auto* array, size_t rows, size_t columns, bool) {
+  ForEachArray(m, [&](auto* array, size_t rows, size_t columns, const ArrayName&) {
     old.push_back({array, sizeof(*array) * rows * columns});
   });
   resize(m);
+  size_t names = 0;
+  ForEachKindOfName(m, [&](const int*, size_t count) { names += count; });
+  SetNameSlots(names, m);
   size_t bytes = 0;
-  ForEachArray(m, [&](auto* array, size_t rows, size_t columns, bool) {
+  ForEachArray(m, [&](auto* array, size_t rows, size_t columns, const ArrayName&) {
     bytes = AlignArray(bytes) + sizeof(*array) * rows * columns;
   });
   m->buffer = mju_malloc(bytes);
@@ -160,7 +208,7 @@ MjModelPtr MakeResizedCopy(const mjModel& model, const std::function<void(mjMode
   if (m->buffer == nullptr) throw std::bad_alloc();
   size_t offset = 0;
   size_t i = 0;
-  ForEachArray(m, [&]<typename Number>(Number*& array, size_t rows, size_t columns, bool) {
+  ForEachArray(m, [&]<typename Number>(Number*& array, size_t rows, size_t columns, const ArrayName&) {
     offset = AlignArray(offset);
     const size_t size = sizeof(Number) * rows * columns;
     array = reinterpret_cast<Number*>(static_cast<char*>(m->buffer) + offset);
@@ -169,6 +217,7 @@ MjModelPtr MakeResizedCopy(const mjModel& model, const std::function<void(mjMode
     offset += size;
     ++i;
   });
+  FillNameTable(m);
   return resized;
 }
 
@@ -296,6 +345,7 @@ void FillGeom(mjModel* m, int geom, const Bone& bone, double unit) {
   m->geom_type[geom] = is_rod ? mjGEOM_CAPSULE : mjGEOM_SPHERE;
   m->geom_bodyid[geom] = bone.body;
   m->geom_dataid[geom] = m->geom_matid[geom] = -1;
+  DetachPlugin(geom, m);
   const double radius = (is_rod ? kRodRadius : kBallRadius) * unit;
   m->geom_size[3 * geom] = radius;
   m->geom_size[3 * geom + 1] = 0.5 * bone.length();

@@ -107,6 +107,10 @@ MjModelPtr Load(const std::string& path, const mjVFS* vfs, const std::string& so
     throw InputError(source + ": not a valid MJCF model: " + OneLine(message) + Advise(message));
   }
   CheckFinite(*model, source);
+  if (const int wide = FindWideActuator(*model); wide >= 0) {
+    throw InputError(source + ": actuator " + Quote(NameOf(*model, mjOBJ_ACTUATOR, wide)) +
+                     ": must have one control and one force");
+  }
   if (message[0] != '\0') WarnOnce(source + ": " + OneLine(message));
   return model;
 }
@@ -130,10 +134,20 @@ MjModelPtr LoadDocument(const MjcfFile& mjcf) {
   return LoadText(mjcf.PrintFor(std::filesystem::current_path()), mjcf.source());
 }
 
+/// Entries of M that are zero as the bodies stand may not be left out of it: their masses may be moved.
+void LeaveBodiesGeneral(MjcfFile* mjcf) {
+  if (!kHasSimpleBodies) return;
+  VisitElements(mjcf->root(), [](tinyxml2::XMLElement* element) {
+    if (std::string_view(element->Name()) == "body" && element->Attribute("simple") == nullptr)
+      element->SetAttribute("simple", "false");
+  });
+}
+
 /// @param load what loads it when nothing need be changed.
 template <typename Load>
 MjModelPtr LoadAdapted(MjcfFile* mjcf, const Load& load) {
   AdaptMjcf(mjcf);
+  LeaveBodiesGeneral(mjcf);
   if (mjcf->changes().empty()) {
     try {
       return load();
@@ -175,8 +189,8 @@ MjModelPtr LoadMjcf(MjcfFile* document) {
 MjModelPtr LoadMjcfText(const std::string& text, const std::string& source) {
   PrepareEngine();
   MjcfFile mjcf(text, source);
-  const auto load = [&] { return LoadText(text, source); };
-  return mjcf.IsUrdf() ? load() : LoadAdapted(&mjcf, load);
+  if (mjcf.IsUrdf()) return LoadText(text, source);
+  return LoadAdapted(&mjcf, [&] { return kHasSimpleBodies ? LoadDocument(mjcf) : LoadText(text, source); });
 }
 
 std::vector<std::string> ListLoadNotes() {
@@ -196,22 +210,29 @@ std::string NameOf(const mjModel& model, mjtObj type, int id) {
   return name == nullptr || *name == '\0' ? "#" + std::to_string(id) : name;
 }
 
-namespace {
-
-EngineSize CountElements(const mjModel& model, mjtObj type) {
-  switch (type) {
-    case mjOBJ_BODY:
-      return model.nbody;
-    case mjOBJ_JOINT:
-      return model.njnt;
-    case mjOBJ_SITE:
-      return model.nsite;
-    default:
-      return 0;
-  }
+int CountElements(const mjModel& model, mjtObj type) {
+  const auto count = [&]() -> EngineSize {
+    switch (type) {
+      case mjOBJ_BODY:
+        return model.nbody;
+      case mjOBJ_JOINT:
+        return model.njnt;
+      case mjOBJ_DOF:
+        return model.nv;
+      case mjOBJ_SITE:
+        return model.nsite;
+      case mjOBJ_EQUALITY:
+        return model.neq;
+      case mjOBJ_TENDON:
+        return model.ntendon;
+      case mjOBJ_ACTUATOR:
+        return model.nu;
+      default:
+        return 0;
+    }
+  };
+  return static_cast<int>(count());
 }
-
-}  // namespace
 
 int FindByName(const mjModel& model, mjtObj type, const std::string& name) {
   const int id = mj_name2id(&model, type, name.c_str());

@@ -35,6 +35,9 @@ MjModelPtr LoadMjcfText(const std::string& text, const std::string& source);
 /// @throws std::bad_alloc when the engine cannot allocate.
 MjDataPtr MakeData(const mjModel& model);
 
+/// How many bodies, joints, dofs, sites, tendons, actuators or equality constraints a model has.
+int CountElements(const mjModel& model, mjtObj type);
+
 /// Name of an element, or "#ID" when it has none.
 std::string NameOf(const mjModel& model, mjtObj type, int id);
 

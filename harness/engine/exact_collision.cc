@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <mutex>
+#include <span>
 #include <utility>
 
 #include "harness/engine/map_vector.h"
@@ -24,11 +25,20 @@ Pose TorusPose(const mjModel& m, const mjData& d, int geom) {
   return MapPose(d.xmat + 9 * body, d.xpos + 3 * body);
 }
 
-/// @param X where the contact's numbers stand in the world.
-void PlaceContact(const Pose& X, const ExactContact& contact, CollisionContact* found) {
-  const Vector3d position = X * contact.position;
-  const Vector3d normal = X.linear() * contact.normal;
-  FillContact(contact.distance, position.data(), normal.data(), found);
+/// The deepest contacts, as many as there is room for. @param X where their numbers stand in the world.
+/// @return how many.
+int PlaceContacts(const Pose& X, std::span<ExactContact> contacts, int room, CollisionContact* found) {
+  const auto is_deeper = [](const ExactContact& a, const ExactContact& b) { return a.distance < b.distance; };
+  if (static_cast<int>(contacts.size()) > room) {
+    std::stable_sort(contacts.begin(), contacts.end(), is_deeper);
+    contacts = contacts.first(static_cast<size_t>(room));
+  }
+  for (const ExactContact& contact : contacts) {
+    const Vector3d position = X * contact.position;
+    const Vector3d normal = X.linear() * contact.normal;
+    FillContact(contact.distance, position.data(), normal.data(), found++);
+  }
+  return static_cast<int>(contacts.size());
 }
 
 /// Collides the sphere g1 with the geom g2 in the geom's frame. @return the number of contacts, 0 or 1.
@@ -78,8 +88,8 @@ int CollideSphereMesh(const mjModel* m, CollisionData* d, CollisionContact* con,
   ExactContact contacts[2];
   const int count =
       CollideSphereTorus(center, m->geom_size[3 * g1], ring_radius, tube_radius, margin, contacts);
-  for (int i = 0; i < count; ++i) PlaceContact(X_BT, contacts[i], con + i);
-  return count;
+  return PlaceContacts(X_BT, {contacts, static_cast<size_t>(count)}, CountMostContacts(*m, g1, g2, margin),
+                       con);
 }
 
 int CollideBoxMesh(const mjModel* m, CollisionData* d, CollisionContact* con, int g1, int g2, mjtNum margin) {
@@ -91,8 +101,8 @@ int CollideBoxMesh(const mjModel* m, CollisionData* d, CollisionContact* con, in
   ExactContact contacts[kRingPlaces];
   const Pose X_BT = X_WB.inverse(Eigen::Isometry) * TorusPose(*m, *d, g2);
   const int count = CollideBoxTorus(X_BT, ring_radius, tube_radius, half_size, margin, contacts);
-  for (int i = 0; i < count; ++i) PlaceContact(X_WB, contacts[i], con + i);
-  return count;
+  return PlaceContacts(X_WB, {contacts, static_cast<size_t>(count)}, CountMostContacts(*m, g1, g2, margin),
+                       con);
 }
 
 /// Distance of a point from a box's surface, negative inside, and the outward normal there.

@@ -6,6 +6,10 @@
 #include <bit>
 #include <cmath>
 #include <cstdint>
+#include <span>
+
+#include "controller/common/text.h"
+#include "harness/engine/mujoco_release.h"
 #if defined(__x86_64__)
 #define _Bool bool  // The header is written for C. NOLINT(bugprone-reserved-identifier)
 #include <sys/platform/x86.h>
@@ -62,6 +66,38 @@ std::string DescribeBuild() {
 std::string DescribeMachine() {
   return DescribeProcessor() + "; glibc " + gnu_get_libc_version() + "; MuJoCo " + mj_versionString() + "; " +
          DescribeBuild();
+}
+
+std::string DescribeSettings(const mjModel& model, int integrator) {
+  const mjOption& option = model.opt;
+  std::string text;
+  const auto add = [&](const std::string& name, const std::string& value) {
+    text += name + ": " + value + "\n";
+  };
+  const auto list = [](std::span<const char* const> names, int flags) {
+    std::string acting;
+    for (size_t i = 0; i < names.size(); ++i) {
+      if (((flags >> i) & 1) != 0) acting += (acting.empty() ? "" : " ") + std::string(names[i]);
+    }
+    return acting;
+  };
+  constexpr const char* kIntegrators[] = {"Euler", "RK4", "implicit", "implicitfast"};
+  constexpr const char* kCones[] = {"pyramidal", "elliptic"};
+  constexpr const char* kSolvers[] = {"PGS", "CG", "Newton"};
+  add("time step", FormatNumber(option.timestep) + " s");
+  add("integrator", kIntegrators[integrator]);
+  add("cone", kCones[option.cone]);
+  add("solver", kSolvers[option.solver]);
+  add("iterations", std::to_string(option.iterations));
+  add("tolerance", FormatNumber(option.tolerance));
+  add("noslip iterations", std::to_string(option.noslip_iterations));
+  add("impratio", FormatNumber(option.impratio));
+  add("constraint Jacobian", mj_isSparse(&model) != 0 ? "sparse" : "dense");
+  add("collider of convex bodies", std::to_string(GetColliderIterations(option)) + " iterations, tolerance " +
+                                       FormatNumber(GetColliderTolerance(option)));
+  add("features", list({mjDISABLESTRING, mjNDISABLE}, ~option.disableflags));
+  add("further features", list({mjENABLESTRING, mjNENABLE}, option.enableflags));
+  return text;
 }
 
 bool IsSameWithin(double tolerance, double a, double b, double scale) {

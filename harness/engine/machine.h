@@ -2,6 +2,8 @@
 
 // What the bits of a deterministic computation depend on besides its inputs.
 
+#include <mujoco/mujoco.h>
+
 #include <string>
 
 namespace dexcheck {
@@ -10,6 +12,11 @@ namespace dexcheck {
 /// as "x86_64 AVX AVX2 FMA; glibc 2.36; MuJoCo 2.2.2; compiled by ...". The same inputs give the same bits
 /// where this text is the same. With fused multiply-add, sines and exponentials differ in their last bits.
 std::string DescribeMachine();
+
+/// How the engine integrates, solves and collides, a line each: "integrator: Euler", "cone: elliptic",
+/// "features: constraint equality ...", which are those of the release that are not switched off.
+/// @param integrator mjtIntegrator, the model's or another.
+std::string DescribeSettings(const mjModel& model, int integrator);
 
 /// Whether two results of one computation on different machines differ by no more than rounding does.
 /// @param scale size of the values that both were made from.

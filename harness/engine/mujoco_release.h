@@ -1,12 +1,13 @@
 #pragma once
 
 // What differs between MuJoCo's releases, as far as dexcheck's code touches it: everything that must be
-// written in two ways stands here. dexcheck is built and tested with 2.2.2, which Debian 12 has. The other
-// branches are written for 3.x: those of 3.12.1's public headers are compiled, and nothing was linked or run.
+// written in two ways stands here. Debian 12 has 2.2.2.
 //
 // | since | what |
 // |---|---|
+// | 2.3   | names are found by a table whose size follows from the model's; geoms may be of plugins |
 // | 3.0   | option collision is gone; eq_active is what acts now, eq_active0 what acts at first |
+// | 3.0   | bodies have trees of their geoms; signatures of pairs count bodies from 0 |
 // | 3.2   | files in memory by mj_addBufferVFS; mj_makeEmptyFileVFS and the tables of mjVFS are gone |
 // | 3.2   | (or before) mjv_connector takes points; sensors have no noise |
 // | 3.2.3 | mpr_iterations, mpr_tolerance are ccd_iterations, ccd_tolerance |
@@ -15,16 +16,22 @@
 // | 3.5   | mj_ray gives the normal of what it meets |
 // | 3.6   | the tendons' Jacobian is sparse in any case, and its rows are the model's |
 // | 3.7   | collision functions get data that they may write |
+// | 3.8   | there is room for mj_maxContact of them, 1 of a sphere, in the place of mjMAXCONPAIR |
 // | 3.9   | they fill mjPreContact (distance, position, normal, tangent) in the place of mjContact |
 // | 3.10  | mj_fullM(m, d, M) |
 // | 3.11  | qM is gone: M has compressed rows of the lower triangle |
+// | 3.11  | of bodies whose frame is their inertial frame, the attribute simple leaves entries out of M |
+// | 3.11  | actuators may have several controls and forces |
 //
-// What an MJCF says in another way since a release (limits by default, ...) stands in newer_mjcf.cc.
+// What an MJCF says in another way since a release (limits by default, ...) stands in newer_words.cc and
+// newer_mjcf.cc.
 
 #include <mujoco/mujoco.h>
 
 #include <algorithm>
+#include <array>
 #include <string>
+#include <type_traits>
 #include <utility>
 
 namespace dexcheck {
@@ -38,6 +45,9 @@ using EngineSize = mjtSize;
 #else
 using EngineSize = int;
 #endif
+
+/// Whether something acts: jnt_limited, actuator_ctrllimited. A byte, or in later releases a bool.
+using EngineFlag = std::remove_pointer_t<decltype(mjModel::jnt_limited)>;
 
 /// Whether geoms may collide by their masks (contype, conaffinity), and whether those of <pair>s may. An
 /// option of 2.2.2 excludes one of them; in 3.x both may, and geoms whose masks are zero do not collide.
@@ -117,10 +127,94 @@ inline void AddFile(const char* name, const std::string& text, mjVFS* vfs) {
 }
 
 /// How pairs and exclusions name their two bodies, which 2.2.2 counts from 1.
-inline int MakeSignature(int body1, int body2) { return ((body1 + 1) << 16) + body2 + 1; }
+inline constexpr int kFirstBody = mjVERSION_HEADER >= 300 ? 0 : 1;
+inline int MakeSignature(int body1, int body2) { return ((body1 + kFirstBody) << 16) + body2 + kFirstBody; }
 inline std::pair<int, int> ReadSignature(int signature) {
-  return {(signature >> 16) - 1, (signature & 0xffff) - 1};
+  return {(signature >> 16) - kFirstBody, (signature & 0xffff) - kFirstBody};
 }
+
+/// The table by which names are found: two slots for each element of the model, -1 in those that are free;
+/// none in 2.2.2. @param elements all that can have a name.
+inline void SetNameSlots([[maybe_unused]] size_t elements, [[maybe_unused]] mjModel* m) {
+#if mjVERSION_HEADER >= 320
+  m->nnames_map = static_cast<EngineSize>(2 * elements);
+#endif
+}
+inline int* GetNameSlots([[maybe_unused]] const mjModel& m) {
+#if mjVERSION_HEADER >= 320
+  return m.names_map;
+#else
+  return nullptr;
+#endif
+}
+
+/// Of geom_sameframe, site_sameframe: whether it stands in its body's inertial frame, or (3.2) along its
+/// axes.
+inline bool IsInertialFrame(int sameframe) { return sameframe == 2 || sameframe == 4; }
+
+/// Of a geom that is no plugin's.
+inline void DetachPlugin([[maybe_unused]] int geom, [[maybe_unused]] mjModel* m) {
+#if mjVERSION_HEADER >= 320
+  m->geom_plugin[geom] = -1;
+#endif
+}
+
+/// Lets geoms that may touch be found without the bodies' trees of geoms, which fit those of the compiler.
+inline void DropGeomTrees([[maybe_unused]] mjModel* m) {
+#if mjVERSION_HEADER >= 320
+  std::fill_n(m->body_bvhadr, m->nbody, -1);
+  std::fill_n(m->body_bvhnum, m->nbody, 0);
+#endif
+}
+
+/// The first actuator that has not one control and one force, as all have in 2.2.2; -1 when there is none.
+inline int FindWideActuator([[maybe_unused]] const mjModel& m) {
+#if mjVERSION_HEADER >= 3011000
+  for (int i = 0; i < m.nactuator; ++i) {
+    if (m.actuator_ctrlnum[i] != 1 || m.actuator_outnum[i] != 1) return i;
+  }
+#endif
+  return -1;
+}
+
+/// What an MJCF may say.
+inline constexpr bool kHasImplicitFast = mjVERSION_HEADER >= 300;
+inline constexpr bool kHasPolynomials = mjVERSION_HEADER >= 3007000;
+inline constexpr bool kHasSimpleBodies = mjVERSION_HEADER >= 3011000;
+
+/// Forces and inertias that 2.2.2 does not have; zero where a model has none.
+struct NewerForce {
+  const char* check;
+  const char* name;
+  mjtObj type;
+  mjtNum* mjModel::*values;
+  int columns;
+};
+struct NewerPart {
+  const char* name;
+  EngineSize mjModel::*count;
+};
+#if mjVERSION_HEADER >= 320
+inline constexpr NewerForce kNewerForces[] = {
+    {"gravity_compensation", "gravcomp", mjOBJ_BODY, &mjModel::body_gravcomp, 1},
+#if mjVERSION_HEADER >= 331
+    {"tendon_armature", "armature", mjOBJ_TENDON, &mjModel::tendon_armature, 1},
+#endif
+#if mjVERSION_HEADER >= 3007000
+    {"joint_spring", "stiffness (polynomial)", mjOBJ_JOINT, &mjModel::jnt_stiffnesspoly, mjNPOLY},
+    {"joint_damping", "damping (polynomial)", mjOBJ_DOF, &mjModel::dof_dampingpoly, mjNPOLY},
+    {"tendon_spring", "stiffness (polynomial)", mjOBJ_TENDON, &mjModel::tendon_stiffnesspoly, mjNPOLY},
+    {"tendon_damping", "damping (polynomial)", mjOBJ_TENDON, &mjModel::tendon_dampingpoly, mjNPOLY},
+    {"motor_damping", "damping", mjOBJ_ACTUATOR, &mjModel::actuator_damping, 1},
+    {"motor_damping", "damping (polynomial)", mjOBJ_ACTUATOR, &mjModel::actuator_dampingpoly, mjNPOLY},
+    {"motor_armature", "armature", mjOBJ_ACTUATOR, &mjModel::actuator_armature, 1},
+#endif
+};
+inline constexpr NewerPart kNewerParts[] = {{"flex", &mjModel::nflex}, {"plugin", &mjModel::nplugin}};
+#else
+inline constexpr std::array<NewerForce, 0> kNewerForces = {};
+inline constexpr std::array<NewerPart, 0> kNewerParts = {};
+#endif
 
 /// The mass matrix at the positions that mj_kinematics and mj_comPos have placed.
 inline void MakeMass(const mjModel& m, mjData* d) {
@@ -211,6 +305,16 @@ using CollisionContact = mjContact;
 inline mjtNum* NormalOf(CollisionContact* contact) { return contact->frame; }
 inline mjtNum* TangentOf(CollisionContact* contact) { return contact->frame + 3; }
 #endif
+
+/// How many contacts a collision function may fill for two geoms.
+inline int CountMostContacts([[maybe_unused]] const mjModel& m, [[maybe_unused]] int geom1,
+                             [[maybe_unused]] int geom2, [[maybe_unused]] mjtNum margin) {
+#if mjVERSION_HEADER >= 3008000
+  return mj_maxContact(&m, geom1, geom2, margin > 0.0 ? 1 : 0);
+#else
+  return mjMAXCONPAIR;
+#endif
+}
 
 /// Fills what a collision function says of a contact; the engine completes the tangents.
 /// @param position, normal x, y, z in the world; the normal points from the first geom to the second.

@@ -68,7 +68,7 @@ void FaultyPlant::EndStep(const Eigen::Ref<const VectorXd>& tau) {
   tau_ = tau;
   if (motors_) motors_(since, &tau_);
   if (!(since >= 0.0)) return plant_->EndStep(tau);
-  const int size = 6 * simulation.model().nbody;
+  const auto size = 6 * simulation.model().nbody;
   mjtNum* const forces = simulation.data().xfrc_applied;
   const std::vector<mjtNum> declared(forces, forces + size);
   if (forces_) forces_(simulation.model(), since, &simulation.data());

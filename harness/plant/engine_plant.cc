@@ -33,6 +33,8 @@ void EnginePlant::Read(PlantResponse* response) {
   observer_.Read(simulation_, response);
   simulation_.ReadMotorTorques(&response->motor_torques);
   support_force_ = response->support_force;
+  response->contact_count = static_cast<int>(simulation_.data().ncon);
+  response->constraint_rows = static_cast<int>(simulation_.data().nefc);
   response->collision = FindCollision();
 }
 

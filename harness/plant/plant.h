@@ -77,6 +77,8 @@ struct PlantResponse {
   double support_force = 0.0;  ///< Its upward part, N.
   /// What the plant's solver left over of its own equation of motion of the object, as such a wrench.
   Vector6d solver_residual = Vector6d::Zero();
+  /// Of the engine; 0 of a plant that has none.
+  int contact_count = 0, constraint_rows = 0;
   Collision collision;     ///< The largest; of a plant whose bodies push, see Clearance.
   VectorXd motor_torques;  ///< n, N m: what wheels and joints received from their motors, as tau'.
   /// n, N and N m, as forces on xi, empty where there are none: dry friction of the joints, and their limits.

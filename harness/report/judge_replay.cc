@@ -63,7 +63,7 @@ void PlaceFloor(const RunFrames& frames, mjModel* scene) {
   const MjDataPtr data = MakeDataWithoutContacts(*scene);
   double lowest = 0.0;
   for (long row = 0; row < frames.rows(); ++row) {
-    mju_copy(data->qpos, frames.qpos.row(row).data(), scene->nq);
+    mju_copy(data->qpos, frames.qpos.row(row).data(), static_cast<int>(scene->nq));
     mj_kinematics(scene, data.get());
     for (int geom = 0; geom < scene->ngeom; ++geom)
       if (geom != floor) lowest = std::min(lowest, data->geom_xpos[3 * geom + 2] - scene->geom_rbound[geom]);

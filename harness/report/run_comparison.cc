@@ -7,6 +7,7 @@
 #include <limits>
 #include <map>
 #include <set>
+#include <sstream>
 
 #include "harness/base/files.h"
 #include "harness/report/page_assets.h"
@@ -51,6 +52,22 @@ bool AllEqual(const std::vector<Value>& values) {
   return std::all_of(values.begin(), values.end(), [&](const Value& value) { return value == values[0]; });
 }
 
+/// The engine's settings, each by its name.
+template <typename Compare>
+void CompareSettings(const std::vector<const RunData*>& runs, const Compare& compare) {
+  std::istringstream lines(runs[0]->FindText("engine_settings"));
+  for (std::string line; std::getline(lines, line);) {
+    const std::string name = line.substr(0, line.find(": "));
+    compare("engine, " + name, [&](const RunData& run) {
+      const std::string text = "\n" + run.FindText("engine_settings");
+      const size_t found = text.find("\n" + name + ": ");
+      if (found == std::string::npos) return std::string();
+      const size_t begin = found + name.size() + 3;
+      return text.substr(begin, text.find('\n', begin) - begin);
+    });
+  }
+}
+
 std::vector<InputDifference> CompareInputs(const std::vector<const RunData*>& runs) {
   std::vector<InputDifference> differences;
   const auto compare = [&](const std::string& name, const auto& read) {
@@ -66,6 +83,7 @@ std::vector<InputDifference> CompareInputs(const std::vector<const RunData*>& ru
       return text;
     });
   }
+  CompareSettings(runs, compare);
   std::set<std::string> files;
   for (const RunData* run : runs) {
     for (const std::string& file : run->log().ListFiles("inputs")) files.insert(file);
@@ -93,6 +111,16 @@ std::vector<ComparedNumber> CompareResults(const std::vector<const RunData*>& ru
     }
     const auto has_value = [](const std::optional<double>& value) { return value.has_value(); };
     if (std::any_of(number.values.begin(), number.values.end(), has_value)) numbers.push_back(number);
+  }
+  for (const auto& [signal, name] : {std::pair("engine/contacts", "contacts of the engine, mean"),
+                                     std::pair("engine/constraint_rows", "its constraint rows, mean")}) {
+    ComparedNumber number{name, "1", {}, std::vector<bool>(runs.size(), false)};
+    for (const RunData* run : runs) {
+      const bool has_signal = run->Find(signal) != nullptr;
+      number.values.push_back(has_signal ? std::optional(run->log().ReadSignal(signal).mean())
+                                         : std::nullopt);
+    }
+    if (number.values[0]) numbers.push_back(number);
   }
   return numbers;
 }

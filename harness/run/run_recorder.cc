@@ -102,6 +102,9 @@ RunRecorder::RunRecorder(const std::filesystem::path& path, const ClosedLoop& lo
   const int object = setup.adapter().object_body();
   log_.SetText("object_body", object >= 0 ? NameOf(setup.engine(), mjOBJ_BODY, object) : "");
   log_.SetText("mujoco_version", mj_versionString());
+  log_.SetText("engine_settings", DescribeSettings(setup.engine(), scenario.plant.implicit_damping
+                                                                       ? setup.engine().opt.integrator
+                                                                       : mjINT_EULER));
   log_.SetText("dexcheck_version", Version());
   log_.SetText("git_revision", kGitRevision);
   log_.SetText("check_kinds", "0 model, 1 inverse_dynamics, 2 forward_dynamics, 3 assumption, 4 law");
@@ -203,6 +206,11 @@ void RunRecorder::AddStateSignals() {
   AddNumber("base/height", "m", "height of the axle's midpoint against the model's",
             Number([](const StepRecord& step) { return step.reading.departure.height; }));
   if (checks_ == nullptr) return;
+  AddNumber("engine/contacts", "1", "contacts of the engine",
+            Number([](const StepRecord& step) { return step.response.contact_count; }));
+  AddNumber("engine/constraint_rows", "1",
+            "rows of the engine's constraints: contacts, limits, bonds, dry friction",
+            Number([](const StepRecord& step) { return step.response.constraint_rows; }));
   Add("engine/xi_dot", xi_dot_units, "reduced acceleration of the plant", n, xi_names,
       Vector([](const StepRecord& step) -> const auto& { return step.response.xi_dot; }));
   Add("model/xi_dot", xi_dot_units,

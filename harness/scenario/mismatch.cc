@@ -6,6 +6,7 @@
 #include "controller/common/errors.h"
 #include "controller/dynamics/model_terms.h"
 #include "harness/engine/engine.h"
+#include "harness/engine/mujoco_release.h"
 #include "harness/plant/random_stream.h"
 #include "harness/scenario/robot_pair.h"
 
@@ -95,19 +96,15 @@ class Bodies {
  private:
   /// The body's inertial frame is no longer where it was: nothing may be taken to stand there.
   void ForgetSameFrame(int id) {
-    constexpr mjtByte kInertialFrame = 2;
     engine_->body_simple[id] = 0;
     engine_->body_sameframe[id] = 0;
-    for (int g = 0; g < engine_->ngeom; ++g) {
-      if (engine_->geom_bodyid[g] == id && engine_->geom_sameframe[g] == kInertialFrame) {
-        engine_->geom_sameframe[g] = 0;
+    const auto forget = [id](EngineSize count, const int* bodies, mjtByte* frames) {
+      for (int i = 0; i < count; ++i) {
+        if (bodies[i] == id && IsInertialFrame(frames[i])) frames[i] = 0;
       }
-    }
-    for (int s = 0; s < engine_->nsite; ++s) {
-      if (engine_->site_bodyid[s] == id && engine_->site_sameframe[s] == kInertialFrame) {
-        engine_->site_sameframe[s] = 0;
-      }
-    }
+    };
+    forget(engine_->ngeom, engine_->geom_bodyid, engine_->geom_sameframe);
+    forget(engine_->nsite, engine_->site_bodyid, engine_->site_sameframe);
   }
   [[nodiscard]] bool IsObject(size_t body) const {
     return plant_->object.has_value() && body == names_.size() - 1;

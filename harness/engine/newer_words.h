@@ -1,0 +1,33 @@
+#pragma once
+
+// What MJCFs say since releases of MuJoCo after 2.2.2.
+
+#include <string_view>
+
+namespace dexcheck {
+
+/// What a newer element or attribute acts on.
+enum class MjcfEffect {
+  kNone,       ///< Looks, sensors, memory, names.
+  kContacts,   ///< Contacts, solver, integration in time: no term of the free robot.
+  kActuators,  ///< Forces of motors.
+  kDynamics,   ///< M, C v, gravity, friction, or the mechanism itself.
+};
+
+/// An element (`attribute` is empty) or an attribute that 2.2.2 does not have.
+struct NewerWord {
+  std::string_view element;  ///< Or "PARENT/ELEMENT".
+  std::string_view attribute;
+  std::string_view since;  ///< Release, "3.1.4".
+  MjcfEffect effect;
+  std::string_view neutral;  ///< Value with which it acts on nothing; empty: none is known.
+  std::string_view advice;   ///< What to do, when it acts on the dynamics.
+};
+
+/// The word's entry; nullptr when it is not known. @param attribute empty for the element itself.
+const NewerWord* FindNewerWord(std::string_view element, std::string_view attribute);
+
+/// "looks, sensors or memory", "contacts, solver or time steps", "forces of actuators", "dynamics".
+const char* NameOf(MjcfEffect effect);
+
+}  // namespace dexcheck
