@@ -85,6 +85,23 @@ void ReadExpectation(const TomlValue& value, bool of_joints, Expectation* expect
   table.RejectUnused();
 }
 
+void ReadController(const TomlValue& value, const std::filesystem::path& folder,
+                    OwnControllerOptions* controller) {
+  TomlTable table = value.AsTable();
+  controller->run = table.Get("run").AsText();
+  if (controller->run.empty())
+    table.Get("run").Fail("must be a library (.so), a Python file (.py) or a command");
+  const std::string own_folder = ReadPath(table, "folder", folder);
+  controller->folder =
+      std::filesystem::absolute(own_folder.empty() ? folder : std::filesystem::path(own_folder));
+  using Options = OwnControllerOptions;
+  ReadKeys<Options>(table, {POSITIVE_KEY(time_limit)}, controller);
+  for (const auto& [name, number] : table.GetEntries()) {
+    if (name != "run" && name != "folder" && name != "time_limit")
+      controller->parameters.emplace_back(name, number.AsNumber());
+  }
+}
+
 /// The file by itself; null when it needs overrides to be a scenario.
 std::shared_ptr<const Scenario> ReadWritten(const std::string& text, const std::string& source,
                                             const std::filesystem::path& folder) {
@@ -107,10 +124,10 @@ void RequireFewSteps(TomlTable& root, const Scenario& scenario) {
 /// @param scenario text, source and overrides.
 Scenario ReadScenario(TomlTable& root, const std::filesystem::path& folder,
                       const std::vector<std::string>& model_overrides, Scenario scenario) {
-  root.RejectOthersThan({"name",        "description", "duration",     "settle",  "start",
-                         "start_error", "tolerance",   "model",        "plant",   "grasp",
-                         "task",        "trajectory",  "joint_motion", "control", "sensing",
-                         "actuation",   "disturbance", "mismatch",     "bounds",  "expect"});
+  root.RejectOthersThan({"name",         "description", "duration",   "settle",  "start",     "start_error",
+                         "tolerance",    "model",       "plant",      "grasp",   "task",      "trajectory",
+                         "joint_motion", "control",     "controller", "sensing", "actuation", "disturbance",
+                         "mismatch",     "bounds",      "expect"});
   scenario.name = root.Get("name").AsName();
   if (const auto description = root.Find("description")) scenario.description = description->AsText();
   scenario.duration = root.Get("duration").AsPositive();
@@ -124,6 +141,8 @@ Scenario ReadScenario(TomlTable& root, const std::filesystem::path& folder,
                                   model_overrides.end());
   if (const auto plant = root.Find("plant")) ReadPlant(*plant, folder, &scenario);
   ReadTask(root, &scenario);
+  if (const auto controller = root.Find("controller"))
+    ReadController(*controller, folder, &scenario.controller);
   scenario.imperfections = ReadImperfections(root, scenario.plant.time_step);
   if (const auto bounds = root.Find("bounds")) {
     for (const auto& [name, value] : bounds->AsTable().GetEntries()) {
@@ -139,6 +158,12 @@ Scenario ReadScenario(TomlTable& root, const std::filesystem::path& folder,
 }
 
 }  // namespace
+
+std::vector<std::string> NameController(const std::string& run, const std::filesystem::path& folder) {
+  const auto quote = [](const std::string& text) { return "'''" + text + "'''"; };
+  return {"controller.run=" + quote(run),
+          "controller.folder=" + quote(std::filesystem::absolute(folder).string())};
+}
 
 bool IsOfModel(std::string_view assignment) {
   return assignment.starts_with("model.") && !assignment.starts_with("model.file=") &&
