@@ -2,6 +2,8 @@
 
 #include <unistd.h>
 
+#include <cstdlib>
+
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
 #include "controller/common/toml_reader.h"
@@ -44,8 +46,10 @@ std::unique_ptr<ControllerPeer> StartProgram(const OwnControllerSetup& setup) {
                                          std::vector<std::string>{"/bin/sh", "-c", "exec " + setup.own.run});
   if (::access(file.c_str(), R_OK) != 0)
     throw InputError(setup.name + ": " + file.string() + ": cannot be read");
+  const char* const python = std::getenv("DEXCHECK_PYTHON");
   return std::make_unique<ProgramPeer>(
-      setup, std::vector<std::string>{"python3", FindPythonMain(setup.name).string(), file.string()});
+      setup, std::vector<std::string>{python == nullptr ? "python3" : python,
+                                      FindPythonMain(setup.name).string(), file.string()});
 }
 
 }  // namespace

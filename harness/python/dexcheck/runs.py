@@ -9,6 +9,7 @@ import shutil
 import signal
 import socket
 import subprocess
+import sys
 import tempfile
 from pathlib import Path
 
@@ -70,7 +71,8 @@ def _execute(words, controller=None, apart=False):
             server = _Server(controller, apart, folder)
             words = [*words, "--controller", "unix:" + server.path]
         try:
-            process = subprocess.Popen([_find_program(), *map(str, words)], stdin=subprocess.DEVNULL, stdout=out, stderr=err)
+            process = subprocess.Popen([_find_program(), *map(str, words)], stdin=subprocess.DEVNULL, stdout=out, stderr=err,
+                                       env={"DEXCHECK_PYTHON": sys.executable, **os.environ})
         except OSError as error:
             raise RunError(f"{_find_program()}: {error.strerror}") from None
         try:

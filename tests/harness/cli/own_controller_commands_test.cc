@@ -1,6 +1,6 @@
 // Controllers that the user brings along in every command that makes runs, and their own parameters.
 
-#include <algorithm>
+#include <cstdlib>
 
 #include "tests/harness/cli/dexcheck_program.h"
 
@@ -14,6 +14,7 @@ class OwnControllerCommands : public CommandTest {
  protected:
   void SetUp() override {
     CommandTest::SetUp();
+    ::setenv("DEXCHECK_PYTHON", "/usr/bin/python3", /*replace=*/1);
     WriteScenario("own.toml", JOINT_LAW_LIBRARY, "");
   }
 

@@ -1,5 +1,7 @@
 // Controllers that the user brings along: a library and programs, sound ones and each way to fail.
 
+#include <cstdlib>
+
 #include "tests/harness/cli/dexcheck_program.h"
 
 namespace dexcheck::testing::own_controller_test {
@@ -8,6 +10,8 @@ namespace {
 /// Runs of 0.3 s with a controller of the user's own.
 class OwnController : public CommandTest {
  protected:
+  OwnController() { ::setenv("DEXCHECK_PYTHON", "/usr/bin/python3", /*replace=*/1); }
+
   [[nodiscard]] ProgramResult RunWith(const std::string& controller, const Words& more = "--out run",
                                       const ProgramOptions& options = {}) const {
     return Run(Words("run curve --no-report --set duration=0.3 --set settle=0.2 --controller") +
@@ -212,8 +216,8 @@ TEST_F(OwnController, ProgramsThatDoNotSpeakAreRefusedAtOnce) {
   std::string text = ReadBytes(Path("law.py"));
   text.replace(text.find("0\", 1, 0)"), sizeof("0\", 1, 0)") - 1, "0\", 7, 0)");
   WriteText(Path("law.py"), text);
-  EXPECT_TRUE(IsRefused(RunWith("python3 law.py", "--no-log"),
-                        {"controller python3 law.py", "protocol 7", "this program 1"}));
+  EXPECT_TRUE(IsRefused(RunWith("/usr/bin/python3 law.py", "--no-log"),
+                        {"controller /usr/bin/python3 law.py", "protocol 7", "this program 1"}));
   EXPECT_TRUE(HasFailed(RunWith("sh -c 'echo I know nothing of your protocol; sleep 9'"), "protocol"));
   EXPECT_TRUE(HasFailed(RunWith("sleep 9", "--controller-time-limit 0.2 --out run"), "within 2 s"));
 }
