@@ -1,6 +1,6 @@
-/* A controller of one's own in C, for an arm that holds nothing: springs and dampers at the joints, with the weight
- * carried. Its parameters are controller.stiffness, N m/rad, and controller.damping, N m s/rad. README.md says how it is
- * compiled and run. */
+/* A controller of one's own in C, for an arm that holds nothing: springs and dampers at the joints, weighted
+ * by the inertia, with the weight carried. Its parameters are controller.stiffness, 1/s^2, and
+ * controller.damping, 1/s. README.md says how it is compiled and run. */
 
 #include <stdlib.h>
 #include <string.h>
@@ -19,7 +19,7 @@ void* dexcheck_open(const struct dexcheck_hello* hello, const char* robot, const
   (void)robot, (void)scenario;
   if (joint_gains == NULL) return NULL; /* there are contacts: no motion of joints */
   struct law* law = malloc(sizeof(*law));
-  *law = (struct law){hello->velocities, 600.0, 60.0};
+  *law = (struct law){hello->velocities, 400.0, 40.0};
   *flags = DEXCHECK_TERMS;
   return law;
 }
@@ -41,11 +41,15 @@ const char* dexcheck_step(void* controller, const double* state, double* torques
   const size_t n = law->n;
   const double* q = state + 19;
   const double* q_dot = q + n;
-  const double* q_d = q_dot + n + 25; /* after the object's pose, velocity and coordinates, and the support's force */
+  const double* q_d =
+      q_dot + n + 25; /* after the object's pose, velocity and coordinates, and the support's force */
   const double* q_d_dot = q_d + n;
-  const double* gravity = q_d + 3 * n + 2 * n * n; /* after M and C */
-  for (size_t i = 0; i < n; ++i) {
-    torques[i] = gravity[i] + law->stiffness * (q_d[i] - q[i]) + law->damping * (q_d_dot[i] - q_dot[i]);
+  const double* M = q_d + 3 * n;
+  const double* gravity = M + 2 * n * n; /* after C */
+  for (size_t i = 0; i < n; ++i) torques[i] = gravity[i];
+  for (size_t j = 0; j < n; ++j) {
+    const double feedback = law->stiffness * (q_d[j] - q[j]) + law->damping * (q_d_dot[j] - q_dot[j]);
+    for (size_t i = 0; i < n; ++i) torques[i] += M[i * n + j] * feedback;
   }
   return NULL;
 }

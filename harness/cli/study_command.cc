@@ -97,7 +97,8 @@ std::string MakeSlurmScript(const StudyInputs& inputs, const StudyRequest& reque
                                         ? std::filesystem::absolute(request.study).lexically_normal().string()
                                         : request.study);
   if (const std::string& own = request.controller.run; !own.empty()) {
-    const std::filesystem::path file = FindControllerFile({own, std::filesystem::current_path()});
+    const std::filesystem::path file =
+        FindControllerFile({.run = own, .folder = std::filesystem::current_path(), .parameters = {}});
     study += " --controller " + QuoteForShell(file.empty() ? own : file.string());
   }
   const std::string& name = inputs.study.name;

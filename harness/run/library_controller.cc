@@ -23,8 +23,17 @@ LibraryController::LibraryController(std::unique_ptr<ForeignLibrary> library, co
                                   setup_.sampling,
                                   setup_.joints != nullptr ? &setup_.joints->gains : nullptr,
                                   &parameters_};
-  library_->Guard([&] { controller_.reset(make(&context)); }, ForeignLibrary::kPatience);
-  if (controller_ == nullptr) throw ControllerFailure(setup_.name + ": made no controller");
+  std::string refusal = "made no controller";
+  library_->Guard(
+      [&] {
+        try {
+          controller_.reset(make(&context));
+        } catch (const std::exception& error) {
+          refusal = error.what();
+        }
+      },
+      ForeignLibrary::kPatience);
+  if (controller_ == nullptr) throw InputError(setup_.name + ": " + refusal);
   const std::vector<std::string>& asked = parameters_.asked();
   for (const auto& [parameter, value] : parameters_.given()) {
     if (std::find(asked.begin(), asked.end(), parameter) == asked.end())

@@ -15,8 +15,8 @@ namespace dexcheck {
 /// a call that does not return in time and a torque of the wrong size likewise.
 class LibraryController final : public Controller {
  public:
-  /// @throws InputError when the library names no controller, was built for another interface, or asks for
-  /// none of a parameter; ControllerFailure when its controller cannot be made.
+  /// @throws InputError when the library names no controller, was built for another interface, makes no
+  /// controller, or asks for none of a parameter.
   LibraryController(std::unique_ptr<ForeignLibrary> library, const OwnControllerSetup& setup);
   ~LibraryController() override;
 

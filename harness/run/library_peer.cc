@@ -13,7 +13,8 @@ LibraryPeer::LibraryPeer(std::unique_ptr<ForeignLibrary> library, const OwnContr
 
 LibraryPeer::~LibraryPeer() {
   const auto close = library_->Find<void(void*)>("dexcheck_close");
-  if (library_->is_broken() || controller_ == nullptr || close == nullptr) return KeepForEver(controller_);
+  if (library_->is_broken() || close == nullptr) KeepForEver(std::exchange(controller_, nullptr));
+  if (controller_ == nullptr) return;
   try {
     library_->Guard([&] { close(controller_); });
   } catch (const ControllerFailure&) {
@@ -41,7 +42,7 @@ uint32_t LibraryPeer::Greet(const dexcheck_hello& hello, std::span<const double>
                            joint_gains_.empty() ? nullptr : joint_gains_.data(), &flags);
       },
       ForeignLibrary::kPatience);
-  if (controller_ == nullptr) throw ControllerFailure(setup_.name + ": made no controller");
+  if (controller_ == nullptr) throw InputError(setup_.name + ": made no controller");
   const bool takes_parameters = library_->Find<void>("dexcheck_set_parameter") != nullptr;
   return takes_parameters ? flags | DEXCHECK_PARAMETERS : flags & ~uint32_t{DEXCHECK_PARAMETERS};
 }

@@ -15,6 +15,11 @@ constexpr double kMaxSteps = 1e8;
 /// task; whatever has not come to rest by then, never will.
 constexpr double kMaxSettle = 100.0;
 
+/// An empty one is the current folder.
+std::filesystem::path MakeAbsolute(const std::filesystem::path& folder) {
+  return (std::filesystem::current_path() / folder).lexically_normal();
+}
+
 std::string ReadPath(TomlTable& table, std::string_view key, const std::filesystem::path& folder) {
   const auto value = table.Find(key);
   return value ? (folder / value->AsText()).lexically_normal().string() : "";
@@ -88,12 +93,12 @@ void ReadExpectation(const TomlValue& value, bool of_joints, Expectation* expect
 void ReadController(const TomlValue& value, const std::filesystem::path& folder,
                     OwnControllerOptions* controller) {
   TomlTable table = value.AsTable();
-  controller->run = table.Get("run").AsText();
-  if (controller->run.empty())
-    table.Get("run").Fail("must be a library (.so), a Python file (.py) or a command");
-  const std::string own_folder = ReadPath(table, "folder", folder);
-  controller->folder =
-      std::filesystem::absolute(own_folder.empty() ? folder : std::filesystem::path(own_folder));
+  const auto run = table.Find("run");
+  if (!run) value.Reject("needs \"run\": a library (.so), a Python file (.py) or a command");
+  controller->run = run->AsText();
+  if (controller->run.empty()) run->Fail("must be a library (.so), a Python file (.py) or a command");
+  const auto own_folder = table.Find("folder");
+  controller->folder = MakeAbsolute(own_folder ? folder / own_folder->AsText() : folder);
   using Options = OwnControllerOptions;
   ReadKeys<Options>(table, {POSITIVE_KEY(time_limit)}, controller);
   for (const auto& [name, number] : table.GetEntries()) {
@@ -161,8 +166,7 @@ Scenario ReadScenario(TomlTable& root, const std::filesystem::path& folder,
 
 std::vector<std::string> NameController(const std::string& run, const std::filesystem::path& folder) {
   const auto quote = [](const std::string& text) { return "'''" + text + "'''"; };
-  return {"controller.run=" + quote(run),
-          "controller.folder=" + quote(std::filesystem::absolute(folder).string())};
+  return {"controller.run=" + quote(run), "controller.folder=" + quote(MakeAbsolute(folder).string())};
 }
 
 bool IsOfModel(std::string_view assignment) {

@@ -80,10 +80,10 @@ def test_an_exception_ends_the_run_in_one_line():
 
 
 def test_a_study_varies_the_parameters_of_a_function():
-    def pd(s, stiffness=600.0, damping=60.0):
-        return s.gravity + stiffness * (s.q_d - s.q) + damping * (s.v_d - s.v)
+    def pd(s, stiffness=400.0, damping=40.0):
+        return s.gravity + s.M @ (stiffness * (s.q_d - s.q) + damping * (s.v_d - s.v))
 
-    study = dexcheck.study("panda-reach", pd, vary={"controller.stiffness": [100, 400], "controller.damping": [20, 80]},
+    study = dexcheck.study("panda-reach", pd, vary={"controller.stiffness": [100, 400], "controller.damping": [20, 40]},
                            set={**SHORT, "duration": 0.5}, jobs=2)
     assert len(study) == 4 and set(study["outcome"]) == {"tracked"}
     error = study["joint_error_max"]
@@ -97,7 +97,7 @@ def test_a_law_that_fails_costs_its_trial_alone():
     def law(s, danger=0.0):
         if danger and s.t > 0.01:
             raise ValueError("too dangerous")
-        return s.gravity + 600 * (s.q_d - s.q) + 60 * (s.v_d - s.v)
+        return s.gravity + s.M @ (400 * (s.q_d - s.q) + 40 * (s.v_d - s.v))
 
     study = dexcheck.study("panda-reach", law, vary={"controller.danger": [0, 1, 0]}, set=SHORT)
     assert list(study["outcome"]) == ["tracked", "crashed", "tracked"]
