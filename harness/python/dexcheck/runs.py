@@ -70,11 +70,8 @@ def _execute(words, controller=None, apart=False):
         elif controller is not None:
             server = _Server(controller, apart, folder)
             words = [*words, "--controller", "unix:" + server.path]
-        try:
-            process = subprocess.Popen([_find_program(), *map(str, words)], stdin=subprocess.DEVNULL, stdout=out, stderr=err,
-                                       env={"DEXCHECK_PYTHON": sys.executable, **os.environ})
-        except OSError as error:
-            raise RunError(f"{_find_program()}: {error.strerror}") from None
+        process = subprocess.Popen([_find_program(), *map(str, words)], stdin=subprocess.DEVNULL, stdout=out, stderr=err,
+                                   env={"DEXCHECK_PYTHON": sys.executable, **os.environ})
         try:
             if server is not None:
                 _serve_until_end(process, server)
@@ -112,43 +109,25 @@ def _serve_until_end(process, server):
 
 def _assignments(values):
     """A dictionary as KEY=VALUE of TOML."""
-    def show(value):
-        if isinstance(value, str):
-            return value
-        return json.dumps(value.tolist() if isinstance(value, (np.ndarray, np.generic)) else value)
-    return [f"{key}={show(value)}" for key, value in (values or {}).items()]
+    return [f"{key}={value if isinstance(value, str) else json.dumps(np.asarray(value).tolist())}"
+            for key, value in (values or {}).items()]
 
 
 class Run:
     """A run that came to its end; true when it passed. verdict, summary (the keys of summary.json), checks, causes,
     log["q"]: signals as arrays, folder."""
 
-    def __init__(self, folder, text="", keep=None):
-        self.folder, self._keep = Path(folder), keep
+    def __init__(self, folder, text, keep):
+        self.folder, self._text, self._keep = Path(folder), text, keep
         self.summary = json.loads((self.folder / "summary.json").read_text())
-        self._text = text
+        self.verdict, self.checks, self.causes = (self.summary.get(key) for key in ("verdict", "checks", "causes"))
+        self.log = Log(self.folder / "log.h5")
 
     def __bool__(self):
         return self.verdict == "pass"
 
-    @property
-    def verdict(self):
-        return self.summary["verdict"]
-
-    @property
-    def checks(self):
-        return self.summary["checks"]
-
-    @property
-    def causes(self):
-        return self.summary["causes"]
-
-    @property
-    def log(self):
-        return Log(self.folder / "log.h5")
-
     def __repr__(self):
-        return self._text or f"{self.verdict}: {self.folder}"
+        return self._text
 
 
 def run(scenario, controller=None, *, set=None, seed=0, check=True, out=None, time_limit=None):
