@@ -8,9 +8,11 @@
 // The library is compiled with the headers and the compiler's options of the program that loads it; the
 // program refuses one that differs. What the library calls of controller/ is the program's.
 
+#include <algorithm>
 #include <cstdio>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "controller/control/controller.h"
@@ -19,6 +21,30 @@
 #include "controller/control/trajectory_controller.h"
 
 namespace dexcheck {
+
+/// The parameters that a run gives its controller: "controller.NAME" of the scenario.
+class ControllerParameters {
+ public:
+  explicit ControllerParameters(std::vector<std::pair<std::string, double>> given)
+      : given_(std::move(given)) {}
+
+  /// The number under this name; `otherwise` where the run gives none. A run that gives a number for which
+  /// its controller never asks is refused.
+  [[nodiscard]] double Get(const std::string& name, double otherwise) const {
+    asked_.push_back(name);
+    const auto found =
+        std::find_if(given_.begin(), given_.end(), [&](const auto& one) { return one.first == name; });
+    return found == given_.end() ? otherwise : found->second;
+  }
+
+  [[nodiscard]] const std::vector<std::pair<std::string, double>>& given() const { return given_; }
+  /// The names that were asked for so far.
+  [[nodiscard]] const std::vector<std::string>& asked() const { return asked_; }
+
+ private:
+  std::vector<std::pair<std::string, double>> given_;
+  mutable std::vector<std::string> asked_;
+};
 
 /// What a controller may know before the run. References outlive the controller.
 struct ControllerContext {
@@ -33,19 +59,22 @@ struct ControllerContext {
   /// fingertips, an object that stands for none, no coordinates of it, and no motion of it that Follow could
   /// mean. What the joints should do is in command->joints when Step is called.
   const JointGains* joint_gains = nullptr;
+  const ControllerParameters* parameters = nullptr;  ///< From interface 3 on; never null there.
 };
 
-/// Number of the interface: it changes with what the classes mean.
-inline constexpr int kControllerInterface = 2;
+/// Number of the interface: it changes with what the classes mean. A library of interface 2, which knows no
+/// parameters, is still loaded.
+inline constexpr int kControllerInterface = 3;
+inline constexpr int kOldestControllerInterface = 2;
 
 /// What program and library must have in common, as text: the interface, and how the compiler lays out what
 /// is handed over.
-static inline std::string DescribeControllerInterface() {
+static inline std::string DescribeControllerInterface(int interface = kControllerInterface) {
   char text[160];
   std::snprintf(text, sizeof(text),
-                "%d, Eigen %d.%d.%d aligned to %d, Reading %zu, Command %zu, options %zu bytes",
-                kControllerInterface, EIGEN_WORLD_VERSION, EIGEN_MAJOR_VERSION, EIGEN_MINOR_VERSION,
-                EIGEN_MAX_ALIGN_BYTES, sizeof(Reading), sizeof(Command), sizeof(GraspControllerOptions));
+                "%d, Eigen %d.%d.%d aligned to %d, Reading %zu, Command %zu, options %zu bytes", interface,
+                EIGEN_WORLD_VERSION, EIGEN_MAJOR_VERSION, EIGEN_MINOR_VERSION, EIGEN_MAX_ALIGN_BYTES,
+                sizeof(Reading), sizeof(Command), sizeof(GraspControllerOptions));
   return text;
 }
 

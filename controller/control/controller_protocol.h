@@ -1,7 +1,8 @@
 #ifndef DEXCHECK_CONTROLLER_PROTOCOL_H_
 #define DEXCHECK_CONTROLLER_PROTOCOL_H_
 
-/* How dexcheck talks to a controller that is a program of its own (C, or any language that reads bytes).
+/* How dexcheck talks to a controller that is a program of its own (C, or any language that reads bytes), or a
+ * shared library in C, which is below.
  *
  * dexcheck writes to the program's standard input and reads from its standard output; standard error is the
  * user's. Numbers are of the machine: IEEE doubles and 32-bit integers in its byte order. Both sides take
@@ -10,10 +11,16 @@
  *   dexcheck  hello, the parameter file's text, the scenario's text
  *   dexcheck  K_p, K_v                   only without contacts: n doubles each, gains of the joints
  *   program   reply to it: what it wants and reports
+ *   dexcheck  message SET_PARAMETERS     | only to one that wants DEXCHECK_PARAMETERS
+ *   program   message SET_PARAMETERS     | without a text
  *   dexcheck  message STEP, doubles      |
  *   program   message STEP, doubles      | at each time step
  *   dexcheck  message BEGIN              once, between the steps at rest and the run; no reply
  *   dexcheck  message END                once; the program ends (also when its standard input does)
+ *
+ * The text of SET_PARAMETERS has a line "NAME VALUE" for each number that the run gives its controller
+ * (controller.NAME of the scenario). In the place of any message the program may send ERROR, with a text that
+ * says in one line why it does not go on: in reply to SET_PARAMETERS for example that it knows no such name.
  *
  * Doubles of STEP from dexcheck; p positions, n velocities, N contacts, k = 3 N; matrices row by row, SI
  * units:
@@ -53,8 +60,10 @@
 #define DEXCHECK_MAGIC "DEXCTRL"
 #define DEXCHECK_PROTOCOL 1
 
-enum { DEXCHECK_TERMS = 1, DEXCHECK_TELLS_F_N = 2 };
-enum { DEXCHECK_STEP = 1, DEXCHECK_BEGIN = 2, DEXCHECK_END = 3 };
+/* What a controller wants and reports. */
+enum { DEXCHECK_TERMS = 1, DEXCHECK_TELLS_F_N = 2, DEXCHECK_PARAMETERS = 4 };
+/* Types of messages. */
+enum { DEXCHECK_STEP = 1, DEXCHECK_BEGIN = 2, DEXCHECK_END = 3, DEXCHECK_SET_PARAMETERS = 4, DEXCHECK_ERROR = 5 };
 
 struct dexcheck_hello {
   char magic[8]; /* DEXCHECK_MAGIC */
@@ -70,12 +79,29 @@ struct dexcheck_hello {
 struct dexcheck_hello_answer {
   char magic[8];
   uint32_t protocol;
-  uint32_t flags; /* DEXCHECK_TERMS | DEXCHECK_TELLS_F_N */
+  uint32_t flags; /* DEXCHECK_TERMS | DEXCHECK_TELLS_F_N | DEXCHECK_PARAMETERS */
 };
 
 struct dexcheck_message {
   uint32_t type;
-  uint32_t doubles; /* that follow */
+  uint32_t doubles; /* that follow; of SET_PARAMETERS and ERROR: bytes of text */
 };
+
+/* The same for a shared library in C, which needs this header and nothing else. It defines these functions; in C++ they
+ * are extern "C". What it returns as text is a line that says why it does not go on, and lives until the next call; null
+ * when all is well. Without dexcheck_set_parameter it takes no parameters; dexcheck_begin and dexcheck_close may be
+ * missing.
+ *
+ *   uint32_t dexcheck_protocol(void);        returns DEXCHECK_PROTOCOL
+ *   void* dexcheck_open(const struct dexcheck_hello* hello, const char* robot, const char* scenario,
+ *                       const double* joint_gains, uint32_t* flags);
+ *                                            a controller, or null; flags are what it wants and reports; joint_gains are
+ *                                            K_p, K_v (n each), null with contacts. What it is given lives as long as it.
+ *   const char* dexcheck_set_parameter(void* controller, const char* name, double value);
+ *   void dexcheck_begin(void* controller);
+ *   const char* dexcheck_step(void* controller, const double* state, double* torques);
+ *                                            state and torques as the doubles of STEP
+ *   void dexcheck_close(void* controller);
+ */
 
 #endif

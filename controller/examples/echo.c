@@ -29,7 +29,8 @@ static void WriteAll(const void* data, size_t size) {
 int main(void) {
   struct dexcheck_hello hello;
   ReadAll(&hello, sizeof(hello));
-  const size_t texts = (size_t)hello.robot_bytes + hello.scenario_bytes;
+  size_t texts = (size_t)hello.robot_bytes + hello.scenario_bytes;
+  if (hello.contacts == 0) texts += 2 * hello.velocities * sizeof(double); /* K_p, K_v of joints */
   char* text = malloc(texts + 1);
   ReadAll(text, texts);
   free(text);

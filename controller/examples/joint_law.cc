@@ -14,7 +14,14 @@ class JointComputedTorque final : public Controller {
  public:
   explicit JointComputedTorque(const ControllerContext& context)
       : gains_(*context.joint_gains),
-        model_(context.model, context.fingertips, context.object, context.surface, context.options) {}
+        model_(context.model, context.fingertips, context.object, context.surface, context.options) {
+    // A number of its own, which a run or a study may set: controller.natural_frequency, rad/s.
+    const double omega = context.parameters->Get("natural_frequency", 0.0);
+    if (omega > 0.0) {
+      gains_.K_p.setConstant(omega * omega);
+      gains_.K_v.setConstant(2.0 * omega);
+    }
+  }
 
   void Follow(const Trajectory& /*motion*/) override {}
   void Begin(double /*t*/, const Reading& /*reading*/) override {}

@@ -1,34 +1,21 @@
-#!/usr/bin/env python3
-"""Computed torque for an arm that holds nothing, in NumPy, as a program that dexcheck queries at each step."""
+"""Computed torque for an arm that holds nothing, in NumPy: dexcheck run panda-reach --controller numpy_joint_law.py"""
 
-import sys
-
-import numpy as np
-
-sys.dont_write_bytecode = True
-from protocol import TERMS, answer, answer_hello, read, read_hello, states  # noqa: E402
+import dexcheck
 
 
-def main():
-    (p, n, contacts, robot_bytes, scenario_bytes), _ = read_hello()
-    if contacts > 0:
-        sys.exit("this law is for a [joint_motion]")
-    read(robot_bytes), read(scenario_bytes)
-    K_p, K_v = np.frombuffer(read(16 * n)).reshape(2, n)
-    answer_hello(TERMS)
+class JointComputedTorque(dexcheck.Controller):
+    # Numbers of its own, which a run or a study may set (controller.natural_frequency): rad/s, 1. At 0 it has the scenario's gains.
+    parameters = {"natural_frequency": 0.0, "damping_ratio": 1.0}
 
-    for state in states():
-        s = np.frombuffer(state)
-        q, xi = s[19:19 + p], s[19 + p:19 + p + n]
-        joints = 19 + p + n + 25  # after the object's pose, velocity, coordinates and the support's force
-        q_d, q_d_dot, q_d_ddot = s[joints:joints + 3 * n].reshape(3, n)
-        terms = joints + 3 * n
-        M, C = s[terms:terms + 2 * n * n].reshape(2, n, n)
-        gravity, friction = s[terms + 2 * n * n:terms + 2 * n * n + 2 * n].reshape(2, n)
+    def start(self, robot):
+        if robot.N > 0:
+            raise ValueError("this law is for a [joint_motion]")
+        self.K_p, self.K_v = robot.K_p, robot.K_v
+        if self.natural_frequency > 0:
+            self.K_p = self.natural_frequency**2
+            self.K_v = 2 * self.damping_ratio * self.natural_frequency
+
+    def step(self, s):
         # (18) with q_ddot = q_d_ddot + K_v e_dot + K_p e
-        q_ddot = q_d_ddot + K_v * (q_d_dot - xi) + K_p * (q_d - q)
-        tau = M @ q_ddot + C @ xi + gravity + friction
-        answer(tau)
-
-
-main()
+        q_ddot = s.a_d + self.K_v * (s.v_d - s.v) + self.K_p * (s.q_d - s.q)
+        return s.M @ q_ddot + s.C @ s.v + s.gravity + s.friction

@@ -1,24 +1,7 @@
-#!/usr/bin/env python3
-"""The paper's law (55) in NumPy, as a program that dexcheck queries at each step (controller_protocol.h)."""
+"""The paper's law (55) in NumPy: dexcheck run curve --controller numpy_law.py --set control.law=computed_torque"""
 
-import sys
-
+import dexcheck
 import numpy as np
-
-sys.dont_write_bytecode = True
-from protocol import TELLS_F_N, TERMS, answer, answer_hello, read, read_hello, states  # noqa: E402
-
-
-class Fields:
-    """Takes one array after the other from a message."""
-
-    def __init__(self, data):
-        self.data, self.at = np.frombuffer(data), 0
-
-    def take(self, *shape):
-        count = int(np.prod(shape))
-        self.at += count
-        return self.data[self.at - count:self.at].reshape(shape)
 
 
 def angle_map(angles, rates):
@@ -63,46 +46,32 @@ def grasp_force(G, F_o, mu, f_min, f_max, rho, f):
     return f
 
 
-def main():
-    (p, n, N, robot_bytes, scenario_bytes), numbers = read_hello()
-    K_v, K_p = np.array(numbers[1:7]), np.array(numbers[7:13])
-    mu, f_min, f_max, rho = numbers[13:17]
-    read(robot_bytes), read(scenario_bytes)
-    answer_hello(TERMS | TELLS_F_N)
-    k = 3 * N
-    f_c = np.tile([0.0, 0.0, min(f_min + 5.0, 0.5 * (f_min + f_max))], N)
+class PaperLaw(dexcheck.Controller):
+    reports_F_N = True
 
-    for state in states():
-        s = Fields(state)
-        t = s.take(1)[0]
-        X_d, X_d_dot, X_d_ddot = s.take(6), s.take(6), s.take(6)
-        q, xi = s.take(p), s.take(n)
-        R, p_o, V, X_o = s.take(3, 3), s.take(3), s.take(6), s.take(6)
-        s.take(5 * N), s.take(N), s.take(N), s.take(1)
-        M, C, gravity, friction = s.take(n, n), s.take(n, n), s.take(n), s.take(n)
-        J, J_dot, G, G_dot = s.take(k, n), s.take(k, n), s.take(6, k), s.take(6, k)
-        M_hat, C_hat_V, N_o, sigma_prime = s.take(6, 6), s.take(6), s.take(6), s.take(n)
-        E_inv = s.take(2, 2)
+    def start(self, robot):
+        self.robot = robot
+        self.f_c = np.tile([0.0, 0.0, min(robot.f_min + 5.0, 0.5 * (robot.f_min + robot.f_max))], robot.N)
 
+    def step(self, s):
         # the last bracket of (55), and V_dot = P^-1 X_o_ddot + d/dt(P^-1) X_o_dot
+        robot, V = self.robot, s.V_Bo
         v, omega = V[:3], V[3:]
-        B, _ = angle_map(X_o[3:], np.zeros(3))
+        B, _ = angle_map(s.X_o[3:], np.zeros(3))
         rates = np.linalg.solve(B, omega)
-        B, B_dot = angle_map(X_o[3:], rates)
-        X_o_dot = np.concatenate([R @ v, rates])
-        command = X_d_ddot + K_v * (X_d_dot - X_o_dot) + K_p * (X_d - X_o)
-        V_dot = np.concatenate([R.T @ command[:3] - np.cross(omega, v), B @ command[3:] + B_dot @ rates])
+        B, B_dot = angle_map(s.X_o[3:], rates)
+        X_o_dot = np.concatenate([s.R_Bo @ v, rates])
+        command = s.X_d_ddot + robot.K_v * (s.X_d_dot - X_o_dot) + robot.K_p * (s.X_d - s.X_o)
+        V_dot = np.concatenate([s.R_Bo.T @ command[:3] - np.cross(omega, v), B @ command[3:] + B_dot @ rates])
         # (47)
+        J, G = s.J_B, s.G
         J_plus = np.linalg.solve(J @ J.T, J).T
-        xi_c = xi - J_plus @ (J @ xi - G.T @ V)
-        xi_dot_d = J_plus @ (G_dot.T @ V + G.T @ V_dot - J_dot @ xi_c - J @ sigma_prime) + sigma_prime
+        xi_c = s.v - J_plus @ (J @ s.v - G.T @ V)
+        xi_dot_d = J_plus @ (s.G_dot.T @ V + G.T @ V_dot - s.J_B_dot @ xi_c - J @ s.sigma_prime) + s.sigma_prime
         # (49), (55)
-        F_o = M_hat @ V_dot + C_hat_V + N_o
-        f_c = grasp_force(G, F_o, mu, f_min, f_max, rho, f_c)
-        F_N = f_c - G.T @ np.linalg.solve(G @ G.T, F_o)
-        tau = M @ xi_dot_d + C @ xi_c + gravity + friction + J.T @ f_c
-        tau[:2] = E_inv @ tau[:2]
-        answer(tau, F_N)
-
-
-main()
+        F_o = s.M_hat @ V_dot + s.C_hat_V + s.N_o
+        self.f_c = grasp_force(G, F_o, robot.mu, robot.f_min, robot.f_max, robot.barrier_weight, self.f_c)
+        F_N = self.f_c - G.T @ np.linalg.solve(G @ G.T, F_o)
+        tau = s.M @ xi_dot_d + s.C @ xi_c + s.gravity + s.friction + J.T @ self.f_c
+        tau[:2] = s.E_bar_inverse @ tau[:2]
+        return tau, F_N

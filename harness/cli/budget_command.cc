@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <cmath>
 #include <cstdint>
 #include <limits>
 #include <memory>
@@ -22,6 +23,11 @@ struct BudgetRequest : ScenarioRequest {
   std::string page;
 };
 
+/// Of a law that is not known there is none.
+std::string ShowPredicted(const ErrorSize& size) {
+  return std::isfinite(size.rms) ? fmt::format("{:.2e}", size.rms) : "-";
+}
+
 void Print(const ErrorBudget& budget) {
   fmt::print("{}: RMS and largest {}, {}\n\n", budget.scenario,
              budget.of_joints ? "error of a joint" : "position error of the object", budget.unit);
@@ -32,15 +38,15 @@ void Print(const ErrorBudget& budget) {
       fmt::print("  {:<27}{}\n", e.name, e.failure);
       continue;
     }
-    fmt::print("  {:<27}{:>9.2e}{:>9.2e}{:>10.2e}{:>11.2e}{:>9.0f} %{}\n", e.name, e.alone.rms, e.alone.max,
-               e.predicted.rms, e.without.rms, 100.0 * e.interaction, e.interacts() ? "!" : "");
+    fmt::print("  {:<27}{:>9.2e}{:>9.2e}{:>10}{:>11.2e}{:>9.0f} %{}\n", e.name, e.alone.rms, e.alone.max,
+               ShowPredicted(e.predicted), e.without.rms, 100.0 * e.interaction, e.interacts() ? "!" : "");
   }
   const auto row = [](const char* name, const ErrorSize& size) {
     fmt::print("  {:<27}{:>9.2e}{:>9.2e}\n", name, size.rms, size.max);
   };
   row("none of them", budget.ideal);
-  fmt::print("  {:<27}{:>9.2e}{:>9.2e}{:>10.2e}\n", "sum of the above", budget.sum.rms, budget.sum.max,
-             budget.predicted.rms);
+  fmt::print("  {:<27}{:>9.2e}{:>9.2e}{:>10}\n", "sum of the above", budget.sum.rms, budget.sum.max,
+             ShowPredicted(budget.predicted));
   row("all together", budget.all);
   fmt::print("\n");
 }

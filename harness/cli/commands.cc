@@ -52,10 +52,33 @@ std::vector<std::string> Overrides::List() const {
   std::vector<std::string> list;
   for (const std::string& key : unset) list.push_back(key + "-=");
   list.insert(list.end(), set.begin(), set.end());
+  const std::vector<std::string> own = controller.List();
+  list.insert(list.end(), own.begin(), own.end());
   return list;
 }
 
-std::array<Option, 2> AddOverrideOptions(Command command, Overrides* overrides) {
+std::vector<std::string> OwnController::List() const {
+  if (run.empty()) return {};
+  std::vector<std::string> list = NameController(run, std::filesystem::current_path());
+  if (time_limit > 0.0) list.push_back("controller.time_limit=" + FormatNumber(time_limit));
+  return list;
+}
+
+Option AddControllerOptions(Command command, OwnController* controller) {
+  const Option option = command.AddOption(
+      "--controller FILE|COMMAND", &controller->run,
+      "A controller of your own: a shared library (.so), a Python file (.py), or a command that "
+      "speaks the protocol of controller_protocol.h");
+  command
+      .AddOption(
+          "--controller-time-limit SECONDS", &controller->time_limit,
+          "Time limit for each reply of the controller, s (1 by default); ten times that for its start")
+      .Check(PositiveNumber())
+      .Needs(option);
+  return option;
+}
+
+std::array<Option, 3> AddOverrideOptions(Command command, Overrides* overrides) {
   const auto is_key = [](const std::string& text) {
     return text.find('=') == std::string::npos ? std::string() : "must be a key, got " + Quote(text);
   };
@@ -68,7 +91,7 @@ std::array<Option, 2> AddOverrideOptions(Command command, Overrides* overrides) 
       command.AddOption("--unset KEY", &overrides->unset, "Remove such a key, before any is set")
           .Check(is_key)
           .Repeatable();
-  return {set, unset};
+  return {set, unset, AddControllerOptions(command, &overrides->controller)};
 }
 
 Option AddScenarioOptions(Command command, ScenarioRequest* request) {

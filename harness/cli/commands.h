@@ -26,17 +26,29 @@ struct RobotFiles {
 /// Adds --robot and --mjcf, both or neither. @return the first of them.
 Option AddRobotOptions(Command command, RobotFiles* files);
 
+/// A controller of the user's own in the place of a scenario's.
+struct OwnController {
+  std::string run;          ///< As the scenario's key controller.run, in the current folder; empty for none.
+  double time_limit = 0.0;  ///< s; 0 for the scenario's.
+  /// As ParseScenario takes it. @returns none without a controller.
+  [[nodiscard]] std::vector<std::string> List() const;
+};
+
+/// Adds --controller and --controller-time-limit. @returns the first.
+Option AddControllerOptions(Command command, OwnController* controller);
+
 /// What is changed in a scenario.
 struct Overrides {
   std::vector<std::string> set;    ///< "KEY=VALUE"
   std::vector<std::string> unset;  ///< "KEY"
-  [[nodiscard]] bool empty() const { return set.empty() && unset.empty(); }
+  OwnController controller;
+  [[nodiscard]] bool empty() const { return set.empty() && unset.empty() && controller.run.empty(); }
   /// As ParseScenario takes them: what is removed first.
   [[nodiscard]] std::vector<std::string> List() const;
 };
 
-/// Adds --set and --unset. @returns them.
-std::array<Option, 2> AddOverrideOptions(Command command, Overrides* overrides);
+/// Adds --set and --unset, and AddControllerOptions. @returns the three, without the time limit.
+std::array<Option, 3> AddOverrideOptions(Command command, Overrides* overrides);
 
 /// What commands need that make many runs of one scenario and print one result.
 struct ScenarioRequest {
@@ -46,7 +58,7 @@ struct ScenarioRequest {
   bool quiet = false;
 };
 
-/// Adds SCENARIO, --set and --unset. @return SCENARIO, which is required.
+/// Adds SCENARIO and AddOverrideOptions. @return SCENARIO, which is required.
 Option AddScenarioOptions(Command command, ScenarioRequest* request);
 /// Adds --json and --quiet. @param what the file gets: "the budget".
 void AddResultOptions(Command command, const std::string& what, ScenarioRequest* request);

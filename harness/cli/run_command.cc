@@ -45,8 +45,6 @@ struct RunRequest {
   bool list = false;
   std::string replay;
   std::string junit_file;
-  std::string controller;  // of the user's own
-  double controller_time_limit = 1.0;
   std::string command;  // as typed
 };
 
@@ -80,10 +78,8 @@ void DrawRun(const RunRequest& request, const std::filesystem::path& folder, Exi
   });
 }
 
-LoopParts MakeParts(const RunRequest& request, const Setup& setup, const std::filesystem::path& robot) {
-  LoopParts parts = request.controller.empty()
-                        ? MakeLoopParts(setup)
-                        : MakeLoopParts(setup, request.controller, robot, request.controller_time_limit);
+LoopParts MakeParts(const RunRequest& request, const Setup& setup) {
+  LoopParts parts = MakeLoopParts(setup);
   parts.threads = request.threads;
   return parts;
 }
@@ -98,20 +94,18 @@ int RunScenario(const RunRequest& request) {
   ResultFile junit(request.junit_file);
   const Setup setup(files.scenario, files.robot, files.mjcf);
   CatchInterrupts();
-  Runner runner(setup, !request.no_check, MakeParts(request, setup, files.robot));
+  Runner runner(setup, !request.no_check, MakeParts(request, setup));
   std::optional<RunFolder> folder;
   if (!request.no_log) folder.emplace(request.out, setup.scenario().name);
   std::optional<RunRecorder> recorder;
   if (folder) {
     recorder.emplace(folder->path() / "log.h5", runner.loop(), setup,
-                     RunInputs{files.robot, files.mjcf, request.command, request.controller});
+                     RunInputs{files.robot, files.mjcf, request.command});
   }
   RunWithProgress(setup.scenario().name, runner.loop().num_steps(), quiet, &runner,
                   recorder ? &*recorder : nullptr);
   RunResult result = runner.result();
-  if (request.controller.empty()) {
-    LookForIntegrator(setup, runner.loop(), files.robot, files.mjcf, IsInterrupted, &result);
-  }
+  LookForIntegrator(setup, runner.loop(), files.robot, files.mjcf, IsInterrupted, &result);
 
   const std::string summary = MakeSummary(setup, runner.loop(), result).dump(2) + "\n";
   if (recorder) recorder->Close(summary);
@@ -142,23 +136,26 @@ int RunScenario(const RunRequest& request) {
   return verdict == kFailure ? ReportFailure(result.failure) : verdict;
 }
 
+/// A line on standard error when the run's own controller is another file now.
+void WarnOfController(const LogReader& log, const OwnControllerOptions& own) {
+  const std::string hash = log.FindText("controller_hash");
+  if (own.exists() && !hash.empty() && hash != HashController(own))
+    Warn("note: controller " + own.run + " is not the file that made the run");
+}
+
 /// Repeats a recorded run from what its log keeps, and compares every number bit for bit.
 int ReplayRun(const RunRequest& request) {
-  const RecordedRun recorded(request.replay);
+  const RecordedRun recorded(request.replay, request.overrides.controller.List());
   const std::string cut = DescribeCut(recorded.log());
   if (recorded.rows() == 0) throw InputError(request.replay + "/log.h5: nothing to compare: " + cut);
-  const std::string controller = recorded.controller();
-  if (!controller.empty() && request.controller.empty()) {
-    throw InputError(request.replay + ": its controller is not in the log; give it again: --controller " +
-                     Quote(controller));
-  }
   const Setup setup(recorded.files().scenario, recorded.files().robot, recorded.files().mjcf);
+  WarnOfController(recorded.log(), setup.scenario().controller);
   CatchInterrupts();
-  Runner runner(setup, recorded.was_checked(), MakeParts(request, setup, recorded.files().robot));
+  Runner runner(setup, recorded.was_checked(), MakeParts(request, setup));
   const TemporaryFolder scratch;
   const std::filesystem::path log = scratch.path() / "log.h5";
   RunRecorder recorder(log, runner.loop(), setup,
-                       RunInputs{recorded.files().robot, recorded.files().mjcf, "", ""});
+                       RunInputs{recorded.files().robot, recorded.files().mjcf, ""});
   const long rows = RunWithProgress("replaying", recorded.rows(), request.quiet, &runner, &recorder);
   if (IsInterrupted() && rows < recorded.rows()) {
     throw Error(fmt::format("interrupted after {} of {} steps; nothing was compared", rows, recorded.rows()));
@@ -222,7 +219,7 @@ void AddRunCommand(Command app, const std::string& command_line) {
                                     "Repeat a recorded run and compare every number bit for bit");
   Option out = command.AddOption("--out DIR", &request->out,
                                  "Folder for the results, made by the run (runs/SCENARIO by default)");
-  const auto [set, unset] = AddOverrideOptions(command, &request->overrides);
+  const auto [set, unset, controller] = AddOverrideOptions(command, &request->overrides);
   const std::array<Option, 2> judging = AddToleranceOptions(command, &request->judging);
   Option seed = AddSeedOption(command, &request->seed);
   command
@@ -230,16 +227,6 @@ void AddRunCommand(Command app, const std::string& command_line) {
           "--threads N", &request->threads,
           "2 (where there are two processors): checks have a thread of their own; the numbers are the same")
       .Check(WholeNumber(1, 2));
-  Option controller = command.AddOption(
-      "--controller LIBRARY.so|COMMAND", &request->controller,
-      "A controller of your own: a shared library (.so), or a command that speaks the protocol "
-      "of controller_protocol.h; --replay of its runs needs it again");
-  command
-      .AddOption(
-          "--controller-time-limit SECONDS", &request->controller_time_limit,
-          "Time limit for each reply of the controller, s (1 by default); ten times that for its start")
-      .Check(PositiveNumber())
-      .Needs(controller);
   Option no_check = command.AddFlag("--no-check", &request->no_check, "Simulate without cross-checks");
   Option video = command.AddFlag("--video", &request->video, "Draw the run as a video, video.mp4");
   Option no_report =
@@ -249,7 +236,7 @@ void AddRunCommand(Command app, const std::string& command_line) {
   Option quiet = command.AddFlag("--quiet", &request->quiet, "Print the verdict only");
   Option all = command.AddFlag("--all", &request->all, "Print each check, not only a line for each category");
   Option json = AddJsonOption(command, "the summary", &request->json_file);
-  controller.Excludes(list);
+  Option(controller).Excludes(list);
   scenario.Excludes(list).Excludes(replay);
   list.Excludes(replay);
   // What would be ignored is refused.

@@ -71,19 +71,22 @@ void WarnOfCut(const std::filesystem::path& run_folder, const LogReader& log);
 /// A run as its log keeps it, unpacked.
 class RecordedRun {
  public:
+  /// @param controller in the place of the one that the log names; "PATH=VALUE" each, as NameController has
+  /// them.
   /// @throws InputError when the folder holds no log that can be repeated.
-  explicit RecordedRun(const std::filesystem::path& folder);
+  RecordedRun(const std::filesystem::path& folder, const std::vector<std::string>& controller);
   [[nodiscard]] const ScenarioFiles& files() const { return files_; }
   [[nodiscard]] long rows() const { return log_.rows(); }
   [[nodiscard]] bool was_checked() const;
   /// What the bits depended on, as DescribeMachine says; empty when the log does not have it.
   [[nodiscard]] std::string machine() const { return log_.FindText("machine"); }
-  /// The controller that the user brought along; empty for the scenario's.
-  [[nodiscard]] std::string controller() const { return log_.FindText("controller"); }
   [[nodiscard]] ReplayDifference Compare(const std::filesystem::path& other_log) const;
   [[nodiscard]] const LogReader& log() const { return log_; }
 
  private:
+  /// Those of the log's own controller.
+  [[nodiscard]] std::vector<std::string> ListController(const std::filesystem::path& folder) const;
+
   LogReader log_;
   TemporaryFolder unpacked_;
   ScenarioFiles files_;

@@ -18,6 +18,7 @@
 #include "harness/cli/commands.h"
 #include "harness/cli/run_folder.h"
 #include "harness/cli/terminal.h"
+#include "harness/run/own_controller.h"
 #include "harness/study/study_findings.h"
 #include "harness/study/study_runner.h"
 #include "harness/study/study_store.h"
@@ -25,6 +26,16 @@
 
 namespace dexcheck::cli {
 namespace {
+
+struct StudyRequest {
+  std::string study;
+  std::string database;
+  std::string shard;
+  OwnController controller;
+  std::uint64_t jobs = 0;
+  bool retry_failed = false;
+  bool quiet = false;
+};
 
 /// A study's array job.
 struct SlurmJob {
@@ -38,14 +49,23 @@ struct SlurmJob {
   std::string memory;          ///< As sbatch --mem; empty for the partition's.
 };
 
-/// A shipped study by name, or a TOML file, with its scenario. @throws InputError.
-StudyInputs FindStudy(const std::string& name_or_file) {
+/// A shipped study by name, or a TOML file, with its scenario. @param controller in the place of the study's.
+/// @throws InputError.
+StudyInputs FindStudy(const std::string& name_or_file, const OwnController& controller) {
   const std::filesystem::path path = kStudies.Find(name_or_file);
   StudyInputs inputs;
-  inputs.study = ParseStudy(ReadTextFile(path.string()), path.string());
+  std::string text = ReadTextFile(path.string());
+  if (!controller.run.empty())
+    text = ApplyOverrides(text, path.string(), {"controller='''" + controller.run + "'''"});
+  inputs.study = ParseStudy(text, path.string());
+  inputs.controller = controller.List();
+  if (controller.run.empty() && !inputs.study.controller.empty())
+    inputs.controller = NameController(inputs.study.controller, path.parent_path());
   const std::string& scenario = inputs.study.scenario;
   const std::string file = IsTomlFile(scenario) ? (path.parent_path() / scenario).string() : scenario;
-  const ScenarioFiles files = FindScenario(file, inputs.study.overrides, 0);
+  std::vector<std::string> overrides = inputs.controller;
+  overrides.insert(overrides.end(), inputs.study.overrides.begin(), inputs.study.overrides.end());
+  const ScenarioFiles files = FindScenario(file, overrides, 0);
   inputs.scenario_text = files.scenario.text;
   inputs.scenario_source = scenario;
   inputs.scenario_folder = std::filesystem::path(files.scenario.source).parent_path();
@@ -71,12 +91,16 @@ std::string CheckSlurmMemory(const std::string& text) {
 
 /// The text of a batch script whose array makes the study, a shard for each task; killed and requeued
 /// elements go on where they were.
-/// @param name_or_file as typed.
-std::string MakeSlurmScript(const StudyInputs& inputs, const std::string& name_or_file, const SlurmJob& job) {
+std::string MakeSlurmScript(const StudyInputs& inputs, const StudyRequest& request, const SlurmJob& job) {
   const std::string program = std::filesystem::read_symlink("/proc/self/exe").string();
-  const std::string study = IsTomlFile(name_or_file)
-                                ? std::filesystem::absolute(name_or_file).lexically_normal().string()
-                                : name_or_file;
+  std::string study = QuoteForShell(IsTomlFile(request.study)
+                                        ? std::filesystem::absolute(request.study).lexically_normal().string()
+                                        : request.study);
+  if (const std::string& own = request.controller.run; !own.empty()) {
+    const std::filesystem::path file =
+        FindControllerFile({.run = own, .folder = std::filesystem::current_path(), .parameters = {}});
+    study += " --controller " + QuoteForShell(file.empty() ? own : file.string());
+  }
   const std::string& name = inputs.study.name;
   std::string more;
   if (!job.time.empty()) more += "#SBATCH --time=" + job.time + "\n";
@@ -106,17 +130,8 @@ exit $code
       fmt::arg("throttle", job.throttle > 0 ? "%" + std::to_string(job.throttle) : ""),
       fmt::arg("cpus", job.cpus), fmt::arg("more", more),
       fmt::arg("shard", inputs.study.is_search() ? "" : fmt::format("--shard \"$task/{}\" ", job.tasks)),
-      fmt::arg("program", QuoteForShell(program)), fmt::arg("study", QuoteForShell(study)));
+      fmt::arg("program", QuoteForShell(program)), fmt::arg("study", study));
 }
-
-struct StudyRequest {
-  std::string study;
-  std::string database;
-  std::string shard;
-  std::uint64_t jobs = 0;
-  bool retry_failed = false;
-  bool quiet = false;
-};
 
 /// The trials of the shard "I/N"; "" is all.
 std::vector<Trial> SelectShard(std::vector<Trial> trials, const std::string& text) {
@@ -211,7 +226,7 @@ StudyStore OpenDatabase(const StudyInputs& inputs, const StudyRequest& request) 
 }
 
 int RunStudy(const StudyRequest& request) {
-  StudyInputs inputs = FindStudy(request.study);
+  StudyInputs inputs = FindStudy(request.study, request.controller);
   const Study& study = inputs.study;
   if (study.is_search() && !request.shard.empty())
     throw InputError("--shard: the trials of a search follow from one another: it is made by one command");
@@ -295,6 +310,7 @@ void AddStudyCommand(Command app) {
   run.AddOption("--db FILE.sqlite", &request->database,
                 "The study's database (SQLite), made when there is none")
       .Required();
+  AddControllerOptions(run, &request->controller);
   AddJobsOption(run, "Trials", &request->jobs);
   run.AddOption("--shard I/N", &request->shard, "Only the I-th of N parts of the study");
   run.AddFlag("--retry-failed", &request->retry_failed, "Make trials again that crashed or timed out");
@@ -312,6 +328,7 @@ void AddStudyCommand(Command app) {
   Command slurm = study.AddCommand("slurm", "Print an array job for Slurm that makes the study");
   slurm.AddOption("STUDY", &request->study, "Name of a shipped study, or a TOML file").Required();
   const auto job = std::make_shared<SlurmJob>();
+  AddControllerOptions(slurm, &request->controller);
   slurm.AddOption("--tasks N", &job->tasks, "Parts of the study, each with a database of its own")
       .Required()
       .Check(whole);
@@ -329,11 +346,11 @@ void AddStudyCommand(Command app) {
   slurm.AddOption("--memory SIZE", &job->memory, "Memory of an element, as 500M or 2G")
       .Check(CheckSlurmMemory);
   slurm.SetAction([=] {
-    StudyInputs inputs = FindStudy(request->study);
+    StudyInputs inputs = FindStudy(request->study, request->controller);
     if (inputs.study.is_search() && job->tasks > 1)
       throw InputError("--tasks: the trials of a search follow from one another: it is one task");
     CheckTrials(&inputs);  // what study run would refuse, must not be queued
-    fmt::print("{}", MakeSlurmScript(inputs, request->study, *job));
+    fmt::print("{}", MakeSlurmScript(inputs, *request, *job));
     return kSuccess;
   });
 }

@@ -66,7 +66,7 @@ ExitCode RunAgain(const ViewRequest& request, const std::vector<std::string>& ov
   const std::filesystem::path log = folder / "log.h5";
   std::error_code ignored;
   std::filesystem::remove(log, ignored);  // of the session, in which forces came as they came
-  RunRecorder recorder(log, runner.loop(), setup, RunInputs{files.robot, files.mjcf, request.command, ""});
+  RunRecorder recorder(log, runner.loop(), setup, RunInputs{files.robot, files.mjcf, request.command});
   RunWithProgress("recording", rows, /*quiet=*/false, &runner, &recorder);
   recorder.Close(MakeSummary(setup, runner.loop(), runner.result()).dump(2) + "\n");
   return Conclude(setup, runner, folder);
@@ -83,8 +83,8 @@ int ViewScenario(const ViewRequest& request) {
     const std::filesystem::path log = folder ? folder->path() / "log.h5" : std::filesystem::path();
     std::error_code ignored;
     if (folder) std::filesystem::remove(log, ignored);  // of the run before sliders were moved
-    return std::make_unique<LiveRun>(
-        std::move(setup), RunInputs{files.robot, files.mjcf, request.command, ""}, log, request.viewer.speed);
+    return std::make_unique<LiveRun>(std::move(setup), RunInputs{files.robot, files.mjcf, request.command},
+                                     log, request.viewer.speed);
   };
   const auto save = [&](const LiveRun& run) -> std::string {
     const std::string name = run.setup().scenario().name + "-live";
@@ -108,8 +108,8 @@ int ViewScenario(const ViewRequest& request) {
 int View(const ViewRequest& request) {
   if (std::filesystem::exists(std::filesystem::path(request.what) / "log.h5")) {
     if (!request.out.empty() || !request.overrides.empty() || !request.save.empty() || request.seed != 0) {
-      throw UsageError("--out, --set, --seed and --save belong to a scenario; " + Quote(request.what) +
-                       " is a recorded run");
+      throw UsageError("--out, --set, --controller, --seed and --save belong to a scenario; " +
+                       Quote(request.what) + " is a recorded run");
     }
     const RecordedFrameSource recording(request.what);
     CatchInterrupts();

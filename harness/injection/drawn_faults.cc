@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string_view>
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
@@ -58,7 +59,8 @@ std::vector<FaultKind> ListFaultKinds(const Setup& setup, const DrawOptions& opt
     for (FaultKind kind : list) {
       const bool is_wanted = options.kinds.empty() || std::find(options.kinds.begin(), options.kinds.end(),
                                                                 kind.kind) != options.kinds.end();
-      if (!is_wanted || (kind.applies != nullptr && !kind.applies(context))) continue;
+      const bool is_known = setup.scenario().knows_law() || kind.kind != std::string_view("law");
+      if (!is_wanted || !is_known || (kind.applies != nullptr && !kind.applies(context))) continue;
       kind.cause = cause;
       kinds.push_back(kind);
     }

@@ -25,6 +25,7 @@
 #include "harness/checks/tolerance.h"
 #include "harness/descriptions/audit.h"
 #include "harness/descriptions/read_description.h"
+#include "harness/log/log_reader.h"
 #include "harness/python/judge.h"
 
 namespace py = pybind11;
@@ -208,9 +209,15 @@ class Robot {
   VectorXd still_;
 };
 
+const SignalInfo& FindSignal(const LogReader& log, const std::string& name) {
+  const SignalInfo* const signal = log.Find(name);
+  if (signal == nullptr) throw py::key_error(name);
+  return *signal;
+}
+
 }  // namespace
 
-PYBIND11_MODULE(dexcheck, m) {
+PYBIND11_MODULE(_dexcheck, m) {
   m.doc() =
       "Robots from parameter files, URDFs and MJCFs: their terms as NumPy arrays, and whether two of them "
       "agree.";
@@ -279,6 +286,37 @@ PYBIND11_MODULE(dexcheck, m) {
       py::arg("file"), py::arg("floating") = false,
       py::arg("packages") = std::vector<std::filesystem::path>(),
       "Reads a parameter file (TOML), a URDF or an MJCF.");
+
+  py::class_<LogReader>(m, "Log", "The signals of a run's log.h5, by name.")
+      .def(py::init<std::filesystem::path>(), py::arg("file"))
+      .def("keys",
+           [](const LogReader& log) {
+             std::vector<std::string> names;
+             for (const SignalInfo& signal : log.signals()) names.push_back(signal.name);
+             return names;
+           })
+      .def("__len__", [](const LogReader& log) { return log.signals().size(); })
+      .def("__contains__",
+           [](const LogReader& log, const std::string& name) { return log.Find(name) != nullptr; })
+      .def(
+          "__getitem__",
+          [](const LogReader& log, const std::string& name) -> py::object {
+            const SignalInfo& signal = FindSignal(log, name);
+            py::object values = py::cast(log.ReadSignal(name));
+            return signal.width == 1 ? py::object(values.attr("ravel")()) : values;
+          },
+          py::arg("name"), "Of one number a step (steps), of several (steps, numbers), in the signal's unit.")
+      .def(
+          "unit", [](const LogReader& log, const std::string& name) { return FindSignal(log, name).unit; },
+          py::arg("name"))
+      .def(
+          "columns",
+          [](const LogReader& log, const std::string& name) { return FindSignal(log, name).columns; },
+          py::arg("name"), "Names of its numbers; none when it is a single one.")
+      .def("__repr__", [](const LogReader& log) {
+        return fmt::format("<dexcheck.Log {}: {} signals of {} steps>", log.path().string(),
+                           log.signals().size(), log.rows());
+      });
 
   AddJudge(&m, [](const py::object& model, const std::function<void(const RobotModel&)>& use) {
     if (py::isinstance<Robot>(model)) return use(model.cast<const Robot&>().model());

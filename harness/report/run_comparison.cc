@@ -19,8 +19,9 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 /// Texts of a log that say what went into the run, in the order of the table.
-constexpr const char* kInputTexts[] = {"scenario",         "seed",           "overrides", "robot", "mjcf",
-                                       "dexcheck_version", "mujoco_version", "machine"};
+constexpr const char* kInputTexts[] = {"scenario",        "seed",   "overrides", "controller",
+                                       "controller_hash", "robot",  "mjcf",      "dexcheck_version",
+                                       "mujoco_version",  "machine"};
 
 constexpr const char* kSimulated = "simulated";
 

@@ -30,10 +30,15 @@ Handlers handlers;
 /// The one that made the last call. Handlers have no other way to it.
 ForeignCode* the_one = nullptr;
 
+/// The stack is a thread's own.
+void UseStack(stack_t* old) {
+  const stack_t stack{.ss_sp = handlers.stack.data(), .ss_flags = 0, .ss_size = handlers.stack.size()};
+  ::sigaltstack(&stack, old);
+}
+
 void InstallHandlers(void (*handle)(int)) {
   if (handlers.users++ > 0) return;
-  const stack_t stack{.ss_sp = handlers.stack.data(), .ss_flags = 0, .ss_size = handlers.stack.size()};
-  ::sigaltstack(&stack, &handlers.old_stack);
+  UseStack(&handlers.old_stack);
   struct sigaction action {};
   action.sa_handler = handle;
   action.sa_flags = SA_ONSTACK | SA_NODEFER;  // since a handler may never return
@@ -66,6 +71,10 @@ ForeignCode::~ForeignCode() {
 
 void ForeignCode::Enter(int patience) {
   the_one = this;
+  if (const pthread_t self = ::pthread_self(); ::pthread_equal(self, caller_) == 0) {
+    caller_ = self;
+    UseStack(nullptr);
+  }
   patience_.store(patience, std::memory_order_relaxed);
   call_.fetch_add(1, std::memory_order_release);
 }

@@ -16,7 +16,7 @@ namespace dexcheck {
 /// While one exists, SIGSEGV and its like, and SIGALRM, are taken; those that do not come from a call go
 /// where they went before. After a call that crashed or hung nothing of what was called may be used again,
 /// not even its destructor: it was left in the middle, with its locks and its half-made objects. Calls are
-/// made by the thread that made the object, one at a time in a process, and cost some 20 ns.
+/// made one at a time in a process, and cost some 20 ns.
 class ForeignCode {
  public:
   /// @param time_limit of a call, s.
@@ -52,7 +52,7 @@ class ForeignCode {
   double time_limit_;
   sigjmp_buf return_{};
   volatile sig_atomic_t signal_ = 0;  // that ended the call
-  pthread_t caller_;
+  std::atomic<pthread_t> caller_;
 
   std::atomic<long> call_{0};   // 1, 3, ... while one is made
   std::atomic<long> stuck_{0};  // the call that takes too long

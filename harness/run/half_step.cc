@@ -29,6 +29,7 @@ Interval FindInterval(const CheckRecord& check, double time_step) {
 void LookForIntegrator(const Setup& setup, const ClosedLoop& loop, const std::filesystem::path& robot,
                        const std::filesystem::path& mjcf, const std::function<bool()>& should_stop,
                        RunResult* result) {
+  if (setup.scenario().controller.exists()) return;  // its own gains may be those of one step
   AttributionResult& attribution = result->attribution;
   const CheckInfo* const info = FindCheck(attribution.check);
   // Noise and encoders that are declared are other ones at another step.

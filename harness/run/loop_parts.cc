@@ -70,7 +70,7 @@ Sampling MakeSampling(const Setup& setup) {
 }
 
 /// The controller of the scenario's task.
-void MakeController(const Setup& setup, LoopParts* parts) {
+void MakeBuiltInController(const Setup& setup, LoopParts* parts) {
   const Scenario& scenario = setup.scenario();
   const RobotModel& model = setup.model();
   const MassProperties& object = setup.object().body;
@@ -95,40 +95,27 @@ void MakeController(const Setup& setup, LoopParts* parts) {
 
 }  // namespace
 
+std::unique_ptr<Controller> MakeScenarioLaw(const Setup& setup) {
+  LoopParts parts;
+  MakeBuiltInController(setup, &parts);
+  return std::move(parts.controller);
+}
+
 LoopParts MakeLoopParts(const Setup& setup) {
   LoopParts parts;
   parts.plant = MakePlant(setup);
-  MakeController(setup, &parts);
+  if (setup.scenario().controller.exists()) {
+    parts.controller = MakeOwnController(setup, MakeSampling(setup));
+    parts.knows_law = setup.scenario().knows_law();
+  } else {
+    MakeBuiltInController(setup, &parts);
+  }
   const Imperfections& imperfections = setup.scenario().imperfections;
   parts.sensing = imperfections.sensing;
   parts.actuation = imperfections.actuation;
   parts.disturbances = imperfections.disturbances;
   // A fault to be found: the checks do not know of it.
   parts.sensing.contact_error = setup.scenario().control.contact_error;
-  return parts;
-}
-
-LoopParts MakeLoopParts(const Setup& setup, const std::string& what, const std::filesystem::path& robot,
-                        double time_limit) {
-  const Scenario& scenario = setup.scenario();
-  if (scenario.pick_task() != nullptr)
-    throw InputError(scenario.source + ": task: is done by no other controller");
-  if (scenario.control.kappa == ContactSource::kIntegrated) {
-    throw InputError(scenario.source + ": control.kappa: other controllers get measured contacts");
-  }
-  LoopParts parts = MakeLoopParts(setup);
-  const OwnControllerSetup own{&setup.model(),
-                               setup.fingertips(),
-                               setup.object().body,
-                               &setup.surface(),
-                               setup.MakeControllerOptions(),
-                               MakeSampling(setup),
-                               setup.joints(),
-                               ReadTextFile(robot.string()),
-                               scenario.text,
-                               time_limit};
-  parts.controller = MakeOwnController(what, own);
-  parts.knows_law = scenario.control.names_law;
   return parts;
 }
 

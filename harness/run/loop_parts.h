@@ -34,13 +34,11 @@ struct LoopParts {
 };
 
 /// The parts that the scenario names, robot and object where it starts.
-/// @throws InputError as EnginePlant; what the controllers' constructors throw.
+/// A controller of the user's own has the scenario's law when the scenario names one.
+/// @throws InputError as EnginePlant and MakeOwnController; what the controllers' constructors throw.
 LoopParts MakeLoopParts(const Setup& setup);
 
-/// The same with a controller of the user's own. Its law is the scenario's when the scenario names one.
-/// @param what, time_limit as MakeOwnController. @param robot the parameter file.
-/// @throws also InputError for a task, and as MakeOwnController.
-LoopParts MakeLoopParts(const Setup& setup, const std::string& what, const std::filesystem::path& robot,
-                        double time_limit);
+/// The controller of the scenario's law or task, also where a user's own takes its place.
+std::unique_ptr<Controller> MakeScenarioLaw(const Setup& setup);
 
 }  // namespace dexcheck

@@ -153,8 +153,9 @@ void RunCampaign::ListFaults() {
   }
   add(ListNumberFaults(*setup_, static_cast<size_t>(options_.parameters), options_.scale));
   // Those of another law are not known.
-  const bool is_paper_law =
-      scenario_.control.law == ControlLaw::kComputedTorque && scenario_.joint_task() == nullptr;
+  const bool is_paper_law = !scenario_.controller.exists() &&
+                            scenario_.control.law == ControlLaw::kComputedTorque &&
+                            scenario_.joint_task() == nullptr;
   if (options_.laws && is_paper_law) add(ListLawFaults(*setup_));
   if (options_.equations && is_paper_law) add(ListEquationFaults(*setup_));
   if (!options_.plants) return;

@@ -93,7 +93,11 @@ RunRecorder::RunRecorder(const std::filesystem::path& path, const ClosedLoop& lo
   std::string overrides;
   for (const std::string& assignment : scenario.overrides) overrides += assignment + "\n";
   log_.SetText("command", inputs.command);
-  if (!inputs.controller.empty()) log_.SetText("controller", inputs.controller);
+  if (const OwnControllerOptions& own = scenario.controller; own.exists()) {
+    log_.SetText("controller", own.run);
+    log_.SetText("controller_folder", own.folder.string());
+    log_.SetText("controller_hash", HashController(own));
+  }
   log_.SetText("scenario", scenario.name);
   log_.SetText("overrides", overrides);
   log_.SetText("seed", std::to_string(scenario.seed));

@@ -17,8 +17,7 @@ namespace dexcheck {
 struct RunInputs {
   std::filesystem::path robot;
   std::filesystem::path mjcf;
-  std::string command;     ///< As it was typed.
-  std::string controller;  ///< The user's own; empty for the scenario's.
+  std::string command;  ///< As it was typed.
 };
 
 /// Writes log.h5 of one run.

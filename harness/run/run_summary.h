@@ -42,9 +42,10 @@ class TrackingStatistics {
 /// A finished run, or as far as it came.
 struct RunResult {
   Verdict verdict = Verdict::kPass;
-  std::string failure;       ///< Why it ended early; empty when it did not.
-  bool interrupted = false;  ///< By the user.
-  bool grasp_lost = false;   ///< It ended because a fingertip left the object.
+  std::string failure;             ///< Why it ended early; empty when it did not.
+  bool interrupted = false;        ///< By the user.
+  bool grasp_lost = false;         ///< It ended because a fingertip left the object.
+  bool controller_failed = false;  ///< It ended because a controller of the user's own failed.
   TrackingStatistics tracking;
   AttributionResult attribution;
   Causes causes;  ///< What explains the residuals.

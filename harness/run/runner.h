@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "controller/common/text.h"
+#include "harness/run/own_controller.h"
 #include "harness/run/run_summary.h"
 
 namespace dexcheck {
@@ -73,6 +74,7 @@ class Runner {
     } catch (const InputError&) {
       throw;
     } catch (const Error& error) {
+      result_.controller_failed = dynamic_cast<const ControllerFailure*>(&error) != nullptr;
       result_.grasp_lost = dynamic_cast<const GraspLost*>(&error) != nullptr;
       result_.failure = error.what() + (settling ? " while settling"
                                                  : " at t = " + FormatNumber(loop_.record().time) + " s");

@@ -15,6 +15,11 @@ constexpr double kMaxSteps = 1e8;
 /// task; whatever has not come to rest by then, never will.
 constexpr double kMaxSettle = 100.0;
 
+/// An empty one is the current folder.
+std::filesystem::path MakeAbsolute(const std::filesystem::path& folder) {
+  return (std::filesystem::current_path() / folder).lexically_normal();
+}
+
 std::string ReadPath(TomlTable& table, std::string_view key, const std::filesystem::path& folder) {
   const auto value = table.Find(key);
   return value ? (folder / value->AsText()).lexically_normal().string() : "";
@@ -85,6 +90,23 @@ void ReadExpectation(const TomlValue& value, bool of_joints, Expectation* expect
   table.RejectUnused();
 }
 
+void ReadController(const TomlValue& value, const std::filesystem::path& folder,
+                    OwnControllerOptions* controller) {
+  TomlTable table = value.AsTable();
+  const auto run = table.Find("run");
+  if (!run) value.Reject("needs \"run\": a library (.so), a Python file (.py) or a command");
+  controller->run = run->AsText();
+  if (controller->run.empty()) run->Fail("must be a library (.so), a Python file (.py) or a command");
+  const auto own_folder = table.Find("folder");
+  controller->folder = MakeAbsolute(own_folder ? folder / own_folder->AsText() : folder);
+  using Options = OwnControllerOptions;
+  ReadKeys<Options>(table, {POSITIVE_KEY(time_limit)}, controller);
+  for (const auto& [name, number] : table.GetEntries()) {
+    if (name != "run" && name != "folder" && name != "time_limit")
+      controller->parameters.emplace_back(name, number.AsNumber());
+  }
+}
+
 /// The file by itself; null when it needs overrides to be a scenario.
 std::shared_ptr<const Scenario> ReadWritten(const std::string& text, const std::string& source,
                                             const std::filesystem::path& folder) {
@@ -107,10 +129,10 @@ void RequireFewSteps(TomlTable& root, const Scenario& scenario) {
 /// @param scenario text, source and overrides.
 Scenario ReadScenario(TomlTable& root, const std::filesystem::path& folder,
                       const std::vector<std::string>& model_overrides, Scenario scenario) {
-  root.RejectOthersThan({"name",        "description", "duration",     "settle",  "start",
-                         "start_error", "tolerance",   "model",        "plant",   "grasp",
-                         "task",        "trajectory",  "joint_motion", "control", "sensing",
-                         "actuation",   "disturbance", "mismatch",     "bounds",  "expect"});
+  root.RejectOthersThan({"name",         "description", "duration",   "settle",  "start",     "start_error",
+                         "tolerance",    "model",       "plant",      "grasp",   "task",      "trajectory",
+                         "joint_motion", "control",     "controller", "sensing", "actuation", "disturbance",
+                         "mismatch",     "bounds",      "expect"});
   scenario.name = root.Get("name").AsName();
   if (const auto description = root.Find("description")) scenario.description = description->AsText();
   scenario.duration = root.Get("duration").AsPositive();
@@ -124,6 +146,8 @@ Scenario ReadScenario(TomlTable& root, const std::filesystem::path& folder,
                                   model_overrides.end());
   if (const auto plant = root.Find("plant")) ReadPlant(*plant, folder, &scenario);
   ReadTask(root, &scenario);
+  if (const auto controller = root.Find("controller"))
+    ReadController(*controller, folder, &scenario.controller);
   scenario.imperfections = ReadImperfections(root, scenario.plant.time_step);
   if (const auto bounds = root.Find("bounds")) {
     for (const auto& [name, value] : bounds->AsTable().GetEntries()) {
@@ -139,6 +163,11 @@ Scenario ReadScenario(TomlTable& root, const std::filesystem::path& folder,
 }
 
 }  // namespace
+
+std::vector<std::string> NameController(const std::string& run, const std::filesystem::path& folder) {
+  const auto quote = [](const std::string& text) { return "'''" + text + "'''"; };
+  return {"controller.run=" + quote(run), "controller.folder=" + quote(MakeAbsolute(folder).string())};
+}
 
 bool IsOfModel(std::string_view assignment) {
   return assignment.starts_with("model.") && !assignment.starts_with("model.file=") &&

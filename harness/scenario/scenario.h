@@ -99,6 +99,16 @@ struct ControlOptions {
   double contact_error = 0.0;  ///< By how much the measured kappa is wrong, rad: a fault to be found.
 };
 
+/// A controller of the user's own in the place of the scenario's law.
+struct OwnControllerOptions {
+  std::string run;               ///< A library (.so), a Python file (.py) or a command; empty for none.
+  std::filesystem::path folder;  ///< Absolute: where relative paths start, and where a command runs.
+  double time_limit = 1.0;       ///< For each reply, s; ten times that to start.
+  std::vector<std::pair<std::string, double>> parameters;  ///< Of its own.
+
+  [[nodiscard]] bool exists() const { return !run.empty(); }
+};
+
 /// The object follows a trajectory, held at the contacts of the grasp.
 struct TrajectoryTask {
   TrajectoryMaker trajectory;
@@ -173,6 +183,7 @@ struct Scenario {
   std::variant<TrajectoryTask, PickTask, JointTask> task;
   GraspOptions grasp;  ///< Not of a JointTask.
   ControlOptions control;
+  OwnControllerOptions controller;
   Imperfections imperfections;
   std::vector<BoundOverride> bounds;
   /// The file without overrides, whose plant and gains its bounds were stated for; null where it has none, or
@@ -185,6 +196,8 @@ struct Scenario {
   std::string source;                  ///< Its name, for messages.
   std::vector<std::string> overrides;  ///< "PATH=VALUE" of the scenario.
 
+  /// Whether the law that is made is known: the scenario's own, or one of the user's that it names.
+  [[nodiscard]] bool knows_law() const { return !controller.exists() || control.names_law; }
   // The task, where it is of this kind; null otherwise.
   [[nodiscard]] const TrajectoryTask* trajectory_task() const { return std::get_if<TrajectoryTask>(&task); }
   [[nodiscard]] const PickTask* pick_task() const { return std::get_if<PickTask>(&task); }
@@ -194,6 +207,10 @@ struct Scenario {
     return trajectory_task() == nullptr ? Vector6d::Zero() : trajectory_task()->start_error;
   }
 };
+
+/// What makes a controller of one's own the scenario's: "PATH=VALUE" each.
+/// @param run, folder as OwnControllerOptions has them.
+std::vector<std::string> NameController(const std::string& run, const std::filesystem::path& folder);
 
 /// Whether "PATH=VALUE" belongs to the robot's parameter file: it begins with "model.", and is none of
 /// [model].

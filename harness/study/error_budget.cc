@@ -16,6 +16,9 @@ namespace dexcheck {
 
 namespace {
 
+constexpr ErrorSize kNoPrediction{std::numeric_limits<double>::quiet_NaN(),
+                                  std::numeric_limits<double>::quiet_NaN()};
+
 /// Of one run, by step: of the object's position, or of each joint that follows a motion of its own.
 struct Measured {
   Errors errors;
@@ -249,11 +252,13 @@ ErrorBudget CalcErrorBudget(const Scenario& scenario, const std::filesystem::pat
 
   // Run 0 is the ideal one, along which all predictions are made, run 1 that with all sources; then come for
   // each source that with it alone and that with all others.
+  const bool knows_law = scenario.knows_law();
   const auto only = [&](size_t source) { return without([&](size_t other) { return other != source; }); };
   const auto run = [&](size_t job) {
     std::vector<std::unique_ptr<Setup>> alone;
     std::vector<std::unique_ptr<ErrorPrediction>> predictions;
-    for (size_t i = 0; job == 0 && i < sources.size(); ++i) {
+    // Without the law nobody knows what it would send.
+    for (size_t i = 0; job == 0 && knows_law && i < sources.size(); ++i) {
       alone.push_back(only(i));
       predictions.push_back(std::make_unique<ErrorPrediction>(*alone[i], sources[i].acts_at_rest));
     }
@@ -291,16 +296,19 @@ ErrorBudget CalcErrorBudget(const Scenario& scenario, const std::filesystem::pat
     entry.failure = one.failure.empty() ? others.failure : one.failure;
     entry.alone = size_of(one.errors);
     entry.without = size_of(others.errors);
-    const Errors prediction{ideal.predicted[i], ideal.errors.size};
-    entry.predicted = size_of(prediction);
+    entry.predicted = kNoPrediction;
+    if (knows_law) {
+      const Errors prediction{ideal.predicted[i], ideal.errors.size};
+      entry.predicted = size_of(prediction);
+      predicted = Add(std::move(predicted), 1.0, prediction);
+    }
     const Errors alone_added = Add(one.errors, -1.0, ideal.errors);
     entry.interaction = size_of(Add(Add(all.errors, -1.0, others.errors), -1.0, alone_added)).rms / scale;
     sum = Add(std::move(sum), 1.0, alone_added);
-    predicted = Add(std::move(predicted), 1.0, prediction);
     budget.entries.push_back(entry);
   }
   budget.sum = size_of(sum);
-  budget.predicted = size_of(predicted);
+  budget.predicted = knows_law ? size_of(predicted) : kNoPrediction;
   return budget;
 }
 
@@ -319,7 +327,7 @@ ErrorPrediction::ErrorPrediction(const Setup& setup, bool acts_at_rest)
       drive_(MakeLoopParts(setup).plant->motors(), setup.scenario().imperfections.actuation,
              setup.MakePartContext()),
       disturbances_(setup.scenario().imperfections.disturbances, setup.MakePartContext()),
-      controller_(MakeLoopParts(setup).controller),
+      controller_(MakeScenarioLaw(setup)),
       model_(setup.declared_model(), setup.fingertips(), setup.declared_object().body, setup.surface(),
              MakeModelOptions(setup)),
       dynamics_(setup.declared_model(), static_cast<int>(setup.fingertips().size())),

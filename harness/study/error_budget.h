@@ -46,7 +46,7 @@ struct BudgetEntry {
   std::string name;
   ErrorSize alone;      ///< With this source only.
   ErrorSize without;    ///< With all others.
-  ErrorSize predicted;  ///< To first order, see ErrorPrediction.
+  ErrorSize predicted;  ///< To first order, see ErrorPrediction; not a number of a law that is not known.
   /// RMS of what it adds in company less what it adds alone, relative to the RMS of all.
   double interaction = 0.0;
   std::string failure;  ///< Why one of its two runs ended early; empty when none did.

@@ -57,6 +57,7 @@ struct Study {
   std::string name;
   std::string description;
   std::string scenario;                ///< Shipped name, or file relative to the study's.
+  std::string controller;              ///< Of the user's own, as controller.run; empty for the scenario's.
   std::vector<std::string> overrides;  ///< "PATH=VALUE", the same for all trials.
   std::vector<Variation> variations;   ///< The last varies fastest; behind a point's own, those of its draws.
   size_t num_nested = 0;  ///< Of the variations at the end: every point is tried with the same draws.

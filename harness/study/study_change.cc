@@ -74,6 +74,7 @@ std::vector<std::string> ListKeys(const Study& study) {
 
 std::string FindDifference(const Study& before, const Study& now) {
   if (before.scenario != now.scenario) return "scenario";
+  if (before.controller != now.controller) return "controller";
   if (before.overrides != now.overrides) return "set";
   if (before.check != now.check) return "check";
   if (before.stop_error != now.stop_error) return "stop_error";
@@ -177,6 +178,7 @@ StudyIdentity IdentifyStudy(const StudyInputs& inputs) {
           {"scenario", inputs.scenario_text},
           {"robot", ReadTextFile(inputs.robot.string())},
           {"mjcf_hash", HashMjcf(inputs.mjcf)},
+          {"controller_hash", inputs.controller_hash},
           {"dexcheck_version", Version()},
           {"git_revision", kGitRevision},
           {"mujoco_version", mj_versionString()}};

@@ -296,12 +296,13 @@ void RequireFewTrials(const TomlValue& where, const Study& study) {
 
 /// @param study with its text and source.
 Study ReadStudy(TomlTable& root, Study study) {
-  root.RejectOthersThan({"name", "description", "scenario", "set", "seeds", "check", "trial_time_limit",
-                         "stop_error", "metrics", "sample", "search", "objective", "constraints", "vary",
-                         "nested"});
+  root.RejectOthersThan({"name", "description", "scenario", "controller", "set", "seeds", "check",
+                         "trial_time_limit", "stop_error", "metrics", "sample", "search", "objective",
+                         "constraints", "vary", "nested"});
   study.name = root.Get("name").AsName();
   if (const auto description = root.Find("description")) study.description = description->AsText();
   study.scenario = root.Get("scenario").AsText();
+  if (const auto controller = root.Find("controller")) study.controller = controller->AsText();
   if (const auto list = root.Find("set")) {
     for (const TomlValue& entry : list->AsList()) {
       study.overrides.push_back(entry.AsText());

@@ -142,36 +142,44 @@ void StudyStore::Load() {
   if (database_->execAndGet("PRAGMA application_id").getInt() != kApplicationId) {
     throw InputError(name_ + ": is not the database of a study");
   }
+  AddMissingColumns();
   identity_.clear();
-  for (const char* column : {"layout", "name", "study", "scenario", "robot", "mjcf_hash", "dexcheck_version",
-                             "git_revision", "mujoco_version"}) {
+  for (const char* column : {"layout", "name", "study", "scenario", "robot", "mjcf_hash", "controller_hash",
+                             "dexcheck_version", "git_revision", "mujoco_version"}) {
     identity_.emplace_back(column,
                            database_->execAndGet(fmt::format("SELECT {} FROM study", column)).getString());
   }
   std::string& layout = identity_.front().second;
   if (layout != kStudyLayout && layout != "1")  // which does not say which machine made a trial
     throw InputError(name_ + ": was written by another version of dexcheck");
-  AddMissingColumns();
   if (layout != kStudyLayout) Update("layout", kStudyLayout);
   study_ = ParseStudy(Identify("study"), name_);
 }
 
 void StudyStore::AddMissingColumns() {
-  const auto list_missing = [&] {
+  const auto list_columns = [&](const char* table) {
     std::set<std::string> there;
-    SQLite::Statement columns(*database_, "SELECT name FROM pragma_table_info('trials')");
+    SQLite::Statement columns(*database_, fmt::format("SELECT name FROM pragma_table_info('{}')", table));
     while (columns.executeStep()) there.insert(columns.getColumn(0));
+    return there;
+  };
+  const auto list_missing = [&] {
+    const std::set<std::string> there = list_columns("trials");
     std::vector<std::string> missing;
     for (const MetricInfo& metric : kMetrics) {
-      if (!there.contains(metric.name)) missing.push_back(std::string(metric.name) + " REAL");
+      if (!there.contains(metric.name))
+        missing.push_back("trials ADD COLUMN " + std::string(metric.name) + " REAL");
     }
-    if (!there.contains("machine")) missing.emplace_back("machine TEXT NOT NULL DEFAULT ''");
+    if (!there.contains("machine"))
+      missing.emplace_back("trials ADD COLUMN machine TEXT NOT NULL DEFAULT ''");
+    if (!list_columns("study").contains("controller_hash"))
+      missing.emplace_back("study ADD COLUMN controller_hash TEXT NOT NULL DEFAULT ''");
     return missing;
   };
   if (list_missing().empty()) return;
   Transaction transaction(database_.get());
   // Another process may have been faster.
-  for (const std::string& column : list_missing()) database_->exec("ALTER TABLE trials ADD COLUMN " + column);
+  for (const std::string& column : list_missing()) database_->exec("ALTER TABLE " + column);
   transaction.commit();
 }
 

@@ -407,6 +407,7 @@ Json ToJson(const Study& study, const TrialRow& row) {
 
 std::string MakeReplayCommand(const Study& study, const Trial& trial) {
   std::string command = "dexcheck run " + QuoteForShell(study.scenario);
+  if (!study.controller.empty()) command += " --controller " + QuoteForShell(study.controller);
   for (const std::string& setting : ListOverrides(study, trial))
     command += " --set " + QuoteForShell(setting);
   if (trial.seed != 0) command += fmt::format(" --seed {}", trial.seed);

@@ -57,8 +57,11 @@ void SetKeys(const Study& study, const Trial& trial, bool of_model, Document* do
 
 /// The scenario and the robot from their texts: messages name their lines.
 Scenario ParseTrialScenario(const StudyInputs& inputs, const Trial& trial) {
-  Scenario scenario = ParseScenario(inputs.scenario_text, inputs.scenario_source, inputs.scenario_folder,
-                                    ListOverrides(inputs.study, trial));
+  std::vector<std::string> overrides = inputs.controller;
+  for (std::string& assignment : ListOverrides(inputs.study, trial))
+    overrides.push_back(std::move(assignment));
+  Scenario scenario =
+      ParseScenario(inputs.scenario_text, inputs.scenario_source, inputs.scenario_folder, overrides);
   scenario.seed = trial.seed;
   return scenario;
 }
@@ -101,6 +104,7 @@ Outcome Classify(const Setup& setup, const RunResult& run, const TrialResult& re
 
 void StudyInputs::OpenScenario() {
   ScenarioDocument document(scenario_text, scenario_source, scenario_folder);
+  for (const std::string& assignment : controller) document.Override(assignment);
   for (const std::string& assignment : study.overrides) document.Override(assignment);
   scenario_document = std::make_shared<const ScenarioDocument>(std::move(document));
 }
@@ -128,6 +132,7 @@ TrialResult RunTrial(const StudyInputs& inputs, const Trial& trial) {
     const double limit = inputs.study.stop_error;
     const auto is_lost = [&] { return limit > 0.0 && monitor.error() > limit; };
     const RunResult& run = runner.Run([&](const StepRecord& step) { monitor.Record(step); }, is_lost);
+    if (run.controller_failed) throw Error(run.failure);
     result.failure = run.failure;
     if (run.interrupted) {
       const bool of_joints = setup.joints() != nullptr;
@@ -157,6 +162,7 @@ void CheckTrials(StudyInputs* inputs) {
   }
   inputs->OpenScenario();
   const Scenario first = MakeTrialScenario(*inputs, trial);
+  inputs->controller_hash = HashController(first.controller);
   MjModelPtr engine = LoadMjcf(inputs->mjcf);
   RemovePictures(&engine);
   inputs->engine = std::move(engine);

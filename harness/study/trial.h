@@ -25,6 +25,9 @@ struct StudyInputs {
   std::filesystem::path scenario_folder;
   std::filesystem::path robot;
   std::filesystem::path mjcf;
+  /// What makes the study's controller, if it names one, the scenario's: as NameController has it.
+  std::vector<std::string> controller;
+  std::string controller_hash;  ///< As HashController has it; set by CheckTrials.
   // What all trials have, made once by CheckTrials; without it each trial makes its own.
   std::shared_ptr<const mjModel> engine;                      ///< The MJCF compiled.
   std::shared_ptr<const ScenarioDocument> scenario_document;  ///< With the study's overrides.
@@ -45,6 +48,7 @@ constexpr double kLostTrackOfJoints = 0.1;
 Scenario MakeTrialScenario(const StudyInputs& inputs, const Trial& trial);
 
 /// Makes one run. Values that make no run give Outcome::kRefused. Deterministic.
+/// @throws Error when a controller of the user's own fails: its process is of no use any more.
 TrialResult RunTrial(const StudyInputs& inputs, const Trial& trial);
 
 /// Parses what the ends of all ranges make of the scenario, and sets up the first trial, so that a fault is

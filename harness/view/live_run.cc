@@ -287,6 +287,7 @@ std::string MakeScenarioText(const Scenario& scenario, const std::vector<std::st
   };
   add_file("model.file", scenario.model_file);
   add_file("plant.mjcf", scenario.mjcf_file);
+  if (scenario.controller.exists()) add_file("controller.folder", scenario.controller.folder.string());
   std::string text =
       "# Saved by dexcheck view.\n" + ApplyOverrides(scenario.text, scenario.source, assignments);
   (void)ParseScenario(text, name + ".toml", "", {});

@@ -1,10 +1,12 @@
-// What it takes to ask a controller that is a program: a step of ProgramController with a program that
-// answers at once, less the model that is evaluated in it.
+// What a controller of one's own costs a step beyond its law: a step of each kind, less the model that is
+// evaluated in it. The laws are those of controller/examples, or do nothing, so that what is left is what
+// they compute and the way there and back.
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <chrono>
+#include <string>
 #include <vector>
 
 #include "controller/control/trajectory.h"
@@ -31,13 +33,12 @@ double Measure(const Work& work) {
   return times[kCalls / 2];
 }
 
-}  // namespace
-
-int main() {
-  const dexcheck::testing::ShippedRun run("curve");
-  const Setup& setup = run.setup();
-  LoopParts parts = MakeLoopParts(
-      setup, ECHO_PROGRAM, dexcheck::testing::SourcePath("/controller/parameters/assistant_robot.toml"), 1.0);
+void MeasureController(const std::string& scenario, const std::string& run, const std::string& what) {
+  std::vector<std::string> overrides;
+  if (!run.empty()) overrides = NameController(run, std::filesystem::current_path());
+  const dexcheck::testing::ShippedRun shipped(scenario, overrides);
+  const Setup& setup = shipped.setup();
+  LoopParts parts = MakeLoopParts(setup);
   PlantReading reading;
   parts.plant->BeginStep();
   parts.plant->Read(&reading);
@@ -49,7 +50,23 @@ int main() {
   GraspModel model(setup.model(), setup.fingertips(), setup.object().body, setup.surface(),
                    setup.MakeControllerOptions());
   const double terms = Measure([&] { model.SetState(reading.state); });
-  fmt::print("a step {:.1f} us, of which the model {:.1f} us; transport {:.1f} us\n", step, terms,
-             step - terms);
+  fmt::print("{:<12} {:<34} step {:7.1f} us, model {:6.1f} us, beyond it {:7.1f} us\n", scenario, what, step,
+             terms, step - terms);
+}
+
+}  // namespace
+
+int main() {
+  const std::string examples = dexcheck::testing::SourcePath("/controller/examples/");
+  MeasureController("panda-reach", "", "built in");
+  MeasureController("panda-reach", JOINT_LAW_LIBRARY, "library in C++, the same law");
+  MeasureController("panda-reach", JOINT_PD_LIBRARY, "library in C, PD with gravity");
+  MeasureController("panda-reach", ECHO_PROGRAM, "program in C, no law");
+  MeasureController("panda-reach", examples + "numpy_joint_law.py", "Python, the same law");
+  MeasureController("panda-reach", SILENT_LAW, "Python, no law");
+  MeasureController("curve", "", "built in");
+  MeasureController("curve", PAPER_LAW_LIBRARY, "library in C++, the same law");
+  MeasureController("curve", ECHO_PROGRAM, "program in C, no law");
+  MeasureController("curve", SILENT_LAW, "Python, no law");
   return 0;
 }

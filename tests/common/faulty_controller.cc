@@ -65,6 +65,14 @@ extern "C" const char* dexcheck_controller_interface() { return "0, of another t
 extern "C" dexcheck::Controller* dexcheck_make_controller(const dexcheck::ControllerContext* context) {
   return Make(*context).release();
 }
+#elif defined(OLD_INTERFACE)
+extern "C" const char* dexcheck_controller_interface() {
+  static const std::string text = DescribeControllerInterface(kOldestControllerInterface);
+  return text.c_str();
+}
+extern "C" dexcheck::Controller* dexcheck_make_controller(const dexcheck::ControllerContext* context) {
+  return Make(*context).release();
+}
 #else
 DEXCHECK_CONTROLLER(Make)
 #endif

@@ -14,7 +14,7 @@
   const least = 10 ** Math.floor(Math.log10(Math.min(...values))), most = 10 ** Math.ceil(Math.log10(Math.max(...values)));
   Bars(get('budget-chart'), {labels: all.map(s => s.name), unit, log: true, least, most, sets: [
     {label: 'measured', values: all.map(s => rms(s.alone)), color: all.map(s => s.interacts ? '#c2571a' : style('--accent'))},
-    {label: 'predicted', values: all.map(s => rms(s.predicted)), color: style('--soft')}]});
+    {label: 'predicted', values: all.map(s => rms(s.predicted)), color: style('--soft')}].filter(set => set.values.some(x => x > 0))});
   const Add = cells => {
     const tr = get('budget-table').insertRow();
     cells.forEach((cell, i) => Object.assign(tr.insertCell(), {textContent: typeof cell === 'number' ? Short(cell) : cell ?? '', className: i ? 'value' : ''}));

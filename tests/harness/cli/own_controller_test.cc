@@ -1,5 +1,7 @@
 // Controllers that the user brings along: a library and programs, sound ones and each way to fail.
 
+#include <cstdlib>
+
 #include "tests/harness/cli/dexcheck_program.h"
 
 namespace dexcheck::testing::own_controller_test {
@@ -8,6 +10,8 @@ namespace {
 /// Runs of 0.3 s with a controller of the user's own.
 class OwnController : public CommandTest {
  protected:
+  OwnController() { ::setenv("DEXCHECK_PYTHON", "/usr/bin/python3", /*replace=*/1); }
+
   [[nodiscard]] ProgramResult RunWith(const std::string& controller, const Words& more = "--out run",
                                       const ProgramOptions& options = {}) const {
     return Run(Words("run curve --no-report --set duration=0.3 --set settle=0.2 --controller") +
@@ -52,7 +56,7 @@ class OwnController : public CommandTest {
 TEST_F(OwnController, TheLawRewrittenAsALibraryIsTheLaw) { ExpectThePapersLaw(PAPER_LAW_LIBRARY); }
 
 TEST_F(OwnController, TheLawRewrittenInNumPyIsTheLaw) {
-  ExpectThePapersLaw("/usr/bin/python3 " + SourcePath("/controller/examples/numpy_law.py"));
+  ExpectThePapersLaw(SourcePath("/controller/examples/numpy_law.py"));
 }
 
 /// The law of the joints rewritten outside, with gains that differ from joint to joint.
@@ -76,12 +80,11 @@ TEST_P(OwnJointLaw, IsTheLaw) {
 
 INSTANTIATE_TEST_SUITE_P(OwnController, OwnJointLaw,
                          ::testing::Values(JOINT_LAW_LIBRARY,
-                                           "/usr/bin/python3 " +
-                                               SourcePath("/controller/examples/numpy_joint_law.py")),
+                                           SourcePath("/controller/examples/numpy_joint_law.py")),
                          [](const auto& info) { return info.index == 0 ? "Library" : "NumPy"; });
 
 TEST_F(OwnController, AJointLawIsNoneForAGrasp) {
-  EXPECT_TRUE(HasFailed(RunWith(JOINT_LAW_LIBRARY), "[joint_motion]"));
+  EXPECT_TRUE(IsRefused(RunWith(JOINT_LAW_LIBRARY), {"joint_law.so", "[joint_motion]"}));
 }
 
 TEST_F(OwnController, AnUnknownLawIsNotChecked) {
@@ -93,9 +96,8 @@ TEST_F(OwnController, AnUnknownLawIsNotChecked) {
   for (const char* check :
        {"measurement", "torque_applied", "expect_position", "inverse_dynamics_robot", "contact_force"})
     EXPECT_TRUE(checks.contains(check)) << check;
-  // The log does not hold the library.
-  EXPECT_TRUE(Refused("run --replay run", {"--controller", "paper_law"}));
-  Expect(0, {"run", "--replay", "run", "--controller", PAPER_LAW_LIBRARY});
+  // The log knows where it was.
+  Expect(0, "run --replay run");
 }
 
 // A log that ends before it, and nothing else, is left.
@@ -123,7 +125,47 @@ TEST_F(OwnController, WhatALibraryDoesWrongEndsTheRunInOneLine) {
 TEST_F(OwnController, LibrariesThatAreNoneAreRefused) {
   EXPECT_TRUE(IsRefused(RunWith(OTHER_INTERFACE_LIBRARY), {"interface", "0, of another time"}));
   EXPECT_TRUE(IsRefused(RunWith(NO_CONTROLLER_LIBRARY), {"no controller"}));
+  // Of the interface before there were parameters: it works, without them.
+  EXPECT_EQ(RunWith(OLD_INTERFACE_LIBRARY).exit_code, 0);
+  EXPECT_TRUE(IsRefused(RunWith(OLD_INTERFACE_LIBRARY, "--no-log --set controller.gain=3"),
+                        {"old_interface.so", "controller.gain", "asks for no parameters"}));
   EXPECT_TRUE(Refused({"run", "lift", "--no-log", "--controller", PAPER_LAW_LIBRARY}, {"task"}));
+}
+
+/// A Python file with this law, in a class or as it is.
+class OwnPythonFile : public OwnController {
+ protected:
+  [[nodiscard]] ProgramResult RunLaw(const std::string& text) const {
+    WriteText(Path("law.py"), text);
+    return Run(
+        "run panda-reach --no-report --set duration=0.1 --set settle=0.1 --controller law.py "
+        "--controller-time-limit 0.5 --out run");
+  }
+  [[nodiscard]] ProgramResult RunStep(const std::string& body) const {
+    return RunLaw(
+        "import os, time\nimport dexcheck\nimport numpy as np\nclass Law(dexcheck.Controller):\n"
+        "  def step(self, s):\n    if s.t < 0.01: return s.gravity\n    " +
+        body + "\n");
+  }
+};
+
+TEST_F(OwnPythonFile, EachFailureIsOneClearLine) {
+  EXPECT_TRUE(
+      HasFailed(RunStep("raise KeyError('cheese')"), "controller law.py: KeyError: 'cheese' (law.py:7)"));
+  EXPECT_TRUE(HasFailed(RunStep("return np.zeros(3)"),
+                        "ValueError: step must return 7 torques, got an array of shape (3,)"));
+  EXPECT_TRUE(HasFailed(RunStep("return s.q[99]"), "IndexError: index 99 is out of bounds"));
+  EXPECT_TRUE(HasFailed(RunStep("return None"), "step must return 7 torques"));
+  EXPECT_TRUE(HasFailed(RunStep("return np.full(7, np.nan)"), "not a number"));
+  EXPECT_TRUE(HasFailed(RunStep("time.sleep(9)"), "within 0.5 s"));
+  EXPECT_TRUE(HasFailed(RunStep("os._exit(4)"), "exit code 4"));
+}
+
+TEST_F(OwnPythonFile, WithoutAControllerIsRefused) {
+  EXPECT_TRUE(IsRefused(RunLaw("x = 3\n"), {"law.py", "dexcheck.Controller", "step(state)"}));
+  EXPECT_TRUE(IsRefused(RunLaw("def step(s:\n"), {"law.py", "SyntaxError"}));
+  EXPECT_TRUE(IsRefused(RunLaw("import no_such_module\n"), {"law.py", "no_such_module", "(law.py:1)"}));
+  EXPECT_TRUE(IsRefused(RunWith("none.py", "--no-log"), {"controller none.py", "cannot be read"}));
 }
 
 /// A program in Python without NumPy: it greets, answers `good` steps with torques of zero, and then does
@@ -170,6 +212,14 @@ TEST_F(OwnController, EachFailureOfAProgramIsOneClearLine) {
 
 TEST_F(OwnController, ProgramsThatDoNotSpeakAreRefusedAtOnce) {
   EXPECT_TRUE(HasFailed(RunWith("/nowhere/law"), "exit code 127"));
+  EXPECT_TRUE(IsRefused(RunWith(ECHO_PROGRAM, "--no-log --set controller.gain=3"),
+                        {"controller.gain", "takes none"}));
+  WriteProgram(Path("law.py"), 5, "pass");
+  std::string text = Read("law.py");
+  text.replace(text.find("0\", 1, 0)"), sizeof("0\", 1, 0)") - 1, "0\", 7, 0)");
+  WriteText(Path("law.py"), text);
+  EXPECT_TRUE(IsRefused(RunWith("/usr/bin/python3 law.py", "--no-log"),
+                        {"controller /usr/bin/python3 law.py", "protocol 7", "this program 1"}));
   EXPECT_TRUE(HasFailed(RunWith("sh -c 'echo I know nothing of your protocol; sleep 9'"), "protocol"));
   EXPECT_TRUE(HasFailed(RunWith("sleep 9", "--controller-time-limit 0.2 --out run"), "within 2 s"));
 }

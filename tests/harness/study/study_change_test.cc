@@ -38,9 +38,10 @@ class StudyChangeTest : public ::testing::Test {
                   const MakesSameRows& same = {}) {
     const Study study = ParseStudy(text, "study.toml");
     const StudyIdentity identity = {
-        {"layout", "2"},           {"name", study.name},       {"study", text},
-        {"scenario", "text"},      {"robot", "text"},          {"mjcf_hash", "0"},
-        {"dexcheck_version", "1"}, {"git_revision", revision}, {"mujoco_version", "2"}};
+        {"layout", "2"},          {"name", study.name},      {"study", text},
+        {"scenario", "text"},     {"robot", "text"},         {"mjcf_hash", "0"},
+        {"controller_hash", "0"}, {"dexcheck_version", "1"}, {"git_revision", revision},
+        {"mujoco_version", "2"}};
     return StudyStore::OpenOrCreate(folder_.path() / "s.sqlite", identity, study, same);
   }
 

@@ -25,9 +25,10 @@ class StudyStoreTest : public ::testing::Test {
  protected:
   StudyStoreTest() {
     study_ = ParseStudy(kText, "study.toml");
-    identity_ = {{"layout", "2"},           {"name", "s"},        {"study", study_.text},
-                 {"scenario", "text"},      {"robot", "text"},    {"mjcf_hash", "0"},
-                 {"dexcheck_version", "1"}, {"git_revision", ""}, {"mujoco_version", "2"}};
+    identity_ = {
+        {"layout", "2"},      {"name", "s"},          {"study", study_.text},   {"scenario", "text"},
+        {"robot", "text"},    {"mjcf_hash", "0"},     {"controller_hash", "0"}, {"dexcheck_version", "1"},
+        {"git_revision", ""}, {"mujoco_version", "2"}};
   }
 
   [[nodiscard]] StudyStore Open() const {

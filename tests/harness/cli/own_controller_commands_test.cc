@@ -1,0 +1,194 @@
+// Controllers that the user brings along in every command that makes runs, and their own parameters.
+
+#include <cstdlib>
+
+#include "tests/harness/cli/dexcheck_program.h"
+
+namespace dexcheck::testing::own_controller_commands_test {
+namespace {
+
+const std::string kNumPyLaw = SourcePath("/controller/examples/numpy_joint_law.py");
+
+/// A scenario of an arm with the controller in it, in a folder of its own.
+class OwnControllerCommands : public CommandTest {
+ protected:
+  void SetUp() override {
+    CommandTest::SetUp();
+    ::setenv("DEXCHECK_PYTHON", "/usr/bin/python3", /*replace=*/1);
+    WriteScenario("own.toml", JOINT_LAW_LIBRARY, "");
+  }
+
+  void WriteScenario(const std::string& file, const std::string& run, const std::string& parameters) const {
+    const std::string source = SourcePath("");
+    WriteText(Path(file),
+              "name = \"own\"\nduration = 0.5\nsettle = 0.1\nstart = \"rest\"\n[model]\nfile = \"" + source +
+                  "/controller/parameters/panda.toml\"\n[plant]\nmjcf = \"" + source +
+                  "/mjcf/panda_scene.xml\"\n" + kRest + "[controller]\nrun = '" + run + "'\n" + parameters);
+  }
+
+  [[nodiscard]] double RunError(const Words& more) const {
+    return RunJson(0, Words("run own.toml --no-log") + more)["tracking"]["joint_error_max_rad"].get<double>();
+  }
+
+  static constexpr const char* kRest = R"(
+[joint_motion]
+start_deg = { panda_joint2 = -45, panda_joint4 = -135, panda_joint6 = 90 }
+oscillations = [{ joint = "panda_joint1", amplitude_deg = 2, frequency = 1, ramp_time = 0.3 }]
+[control]
+law = "computed_torque"
+natural_frequency = 20
+damping_ratio = 1
+[sensing]
+joint_counts = 4096
+[actuation]
+delay = 0.001
+[expect]
+joints = 0.1
+)";
+};
+
+/// The controller of a scenario is that of each command, without an option.
+TEST_F(OwnControllerCommands, AScenarioNamesItAndALogKnowsIt) {
+  const Json checks = RunJson(0, "run own.toml --no-report --out run")["checks"];
+  EXPECT_LE(checks["law_torque"]["max"], 1e-13);
+  EXPECT_GT(checks["law_torque"]["max"], 0.0);
+  EXPECT_THAT(Expect(0, "run --replay run").out, ::testing::HasSubstr("IDENTICAL"));
+  // Another one in its place is another run; the same file under another name is not what the log names.
+  std::filesystem::copy_file(JOINT_LAW_LIBRARY, Path("copy.so"));
+  EXPECT_THAT(Expect(0, "run --replay run --controller ./copy.so").out, ::testing::HasSubstr("IDENTICAL"));
+  Expect(1, Words("run --replay run --controller") + Words{JOINT_PD_LIBRARY});
+  // Of two files that are the same only the name differs; of a changed one the hash too.
+  WriteScenario("copied.toml", "copy.so", "");
+  Expect(0, "run copied.toml --no-report --out copied");
+  const std::string same = Expect(0, "compare run copied").out;
+  EXPECT_THAT(same, ::testing::HasSubstr("copy.so"));
+  EXPECT_THAT(same, ::testing::Not(::testing::HasSubstr("controller_hash")));
+  std::filesystem::copy_file(JOINT_PD_LIBRARY, Path("copy.so"),
+                             std::filesystem::copy_options::overwrite_existing);
+  const ProgramResult changed = Run("run --replay copied");
+  EXPECT_EQ(changed.exit_code, 1);
+  EXPECT_THAT(changed.err, ::testing::HasSubstr("is not the file that made the run"));
+  std::filesystem::remove(Path("copy.so"));
+  EXPECT_TRUE(IsRefused(Run("run --replay copied"), {"copy.so"}));
+}
+
+TEST_F(OwnControllerCommands, ComparedRunsSayWhichControllerTheyHad) {
+  Expect(0, "run own.toml --no-report --out a");
+  Expect(0, Words("run own.toml --no-report --out b --controller") + Words{kNumPyLaw});
+  const std::string out = Expect(0, "compare a b").out;
+  EXPECT_THAT(out, ::testing::HasSubstr("  controller\n"));
+  EXPECT_THAT(out, ::testing::HasSubstr("joint_law.so"));
+  EXPECT_THAT(out, ::testing::HasSubstr("numpy_joint_law.py"));
+}
+
+/// In a budget, an excitation and a campaign the law rewritten outside is the law.
+class OwnLawEverywhere : public OwnControllerCommands, public ::testing::WithParamInterface<std::string> {
+ protected:
+  [[nodiscard]] Words Own() const { return {"--controller", GetParam()}; }
+};
+
+TEST_P(OwnLawEverywhere, HasABudget) {
+  WriteScenario("built-in.toml", "", "");
+  const Json own = RunJson(0, Words("budget own.toml --jobs 2") + Own());
+  const Json right = RunJson(0, "budget built-in.toml --unset controller --jobs 2");
+  ASSERT_EQ(own["sources"].size(), 2U);
+  EXPECT_GT(own["all"]["rms"], 0.0);
+  for (const char* error : {"ideal", "all", "sum", "predicted"})
+    EXPECT_NEAR(own[error]["rms"], right[error]["rms"], 1e-6 * right[error]["rms"].get<double>()) << error;
+  // What a law that nobody names would send is not predicted.
+  const Json unnamed = RunJson(0, Words("budget own.toml --jobs 2 --unset control.law") + Own());
+  EXPECT_TRUE(unnamed["predicted"]["rms"].is_null());
+  EXPECT_NEAR(unnamed["all"]["rms"], own["all"]["rms"], 1e-12);
+  EXPECT_THAT(Expect(0, Words("budget own.toml --jobs 2 --unset control.law") + Own()).out,
+              ::testing::HasSubstr("  - "));
+}
+
+TEST_P(OwnLawEverywhere, IsExcited) {
+  const Json own = RunJson(0, Words("excite own.toml --runs 2 --unset sensing --unset actuation") + Own());
+  const Json right =
+      RunJson(0, "excite own.toml --runs 2 --unset sensing --unset actuation --unset controller");
+  for (const char* motion : {"given", "found"}) {
+    const double expected = right[motion]["smallest_singular_value"];
+    EXPECT_NEAR(own[motion]["smallest_singular_value"], expected, 1e-6 * expected) << motion;
+    EXPECT_GT(expected, 0.0);
+  }
+}
+
+TEST_P(OwnLawEverywhere, IsWhereFaultsAreMade) {
+  const Words mutate =
+      "mutate --run own.toml --duration 0.2 --numbers 2 --jobs 2 --unset sensing --unset actuation";
+  const Json own = RunJson(0, mutate + Own());
+  EXPECT_GT(own["faults"].size(), 2U);
+  const Json unnamed = RunJson(0, mutate + Words("--unset control.law --kinds motor --draws 2") + Own());
+  EXPECT_EQ(unnamed["faults"].size(), 2U);
+  EXPECT_TRUE(IsRefused(Run(mutate + Words("--unset control.law --kinds law --draws 2") + Own()),
+                        {"--kinds", "law"}));
+}
+
+INSTANTIATE_TEST_SUITE_P(OwnControllerCommands, OwnLawEverywhere,
+                         ::testing::Values(JOINT_LAW_LIBRARY, kNumPyLaw),
+                         [](const auto& info) { return info.index == 0 ? "Library" : "NumPy"; });
+
+/// A library in C++, one in C and a Python file, each with a parameter of its own.
+struct OwnParameter {
+  const char* name;
+  std::string controller, parameter;
+  double soft, stiff;
+
+  friend void PrintTo(const OwnParameter& one, std::ostream* out) { *out << one.name; }
+};
+
+class OwnParameters : public OwnControllerCommands, public ::testing::WithParamInterface<OwnParameter> {
+ protected:
+  [[nodiscard]] Words With(double value) const {
+    return Words{"--controller", GetParam().controller,
+                 "--set",        GetParam().parameter + "=" + std::to_string(value),
+                 "--unset",      "control.law",
+                 "--unset",      "sensing",
+                 "--unset",      "actuation"};
+  }
+};
+
+TEST_P(OwnParameters, ReachTheController) {
+  const double soft = RunError(With(GetParam().soft));
+  const double stiff = RunError(With(GetParam().stiff));
+  EXPECT_GT(soft, 2.0 * stiff);
+  EXPECT_GT(stiff, 0.0);
+}
+
+TEST_P(OwnParameters, OfAnUnknownNameAreRefused) {
+  EXPECT_TRUE(IsRefused(Run(Words("run own.toml --no-log --set controller.stifness=3 --controller") +
+                            Words{GetParam().controller}),
+                        {"controller.stifness", GetParam().parameter.substr(sizeof("controller.") - 1)}));
+}
+
+TEST_P(OwnParameters, AreKeysOfAStudy) {
+  WriteText(
+      Path("gains.toml"),
+      "name = \"gains\"\nscenario = \"own.toml\"\nset = [\"sensing-=\", \"actuation-=\"]\ncontroller = '" +
+          GetParam().controller + "'\n[[vary]]\nkey = \"" + GetParam().parameter + "\"\nvalues = [" +
+          std::to_string(GetParam().soft) + ", " + std::to_string(GetParam().stiff) + "]\n");
+  Expect(0, "study run gains.toml --db gains.sqlite --quiet --jobs 2");
+  const Json first = RunJson(0, "study show gains.sqlite 0"), last = RunJson(0, "study show gains.sqlite 1");
+  const double soft = first["metrics"]["joint_error_rms"], stiff = last["metrics"]["joint_error_rms"];
+  EXPECT_GT(soft, 2.0 * stiff);
+  EXPECT_GT(stiff, 0.0);
+  EXPECT_THAT(first["command"].get<std::string>(), ::testing::HasSubstr("--controller"));
+  // The rows belong to this controller: to its name, and to its file.
+  const std::filesystem::path own = GetParam().controller;
+  const std::string copy = "copy" + own.extension().string();
+  std::filesystem::copy_file(own, Path(copy));
+  const Words other = Words("study run gains.toml --db gains.sqlite --controller") + Words{copy};
+  EXPECT_TRUE(IsRefused(Run(other), {"gains.sqlite", "controller"}));
+  Expect(0, "study run gains.toml --db gains.sqlite --quiet");
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    OwnControllerCommands, OwnParameters,
+    ::testing::Values(OwnParameter{"Cpp", JOINT_LAW_LIBRARY, "controller.natural_frequency", 5, 40},
+                      OwnParameter{"C", JOINT_PD_LIBRARY, "controller.stiffness", 400, 4000},
+                      OwnParameter{"Python", kNumPyLaw, "controller.natural_frequency", 5, 40}),
+    [](const auto& info) { return info.param.name; });
+
+}  // namespace
+}  // namespace dexcheck::testing::own_controller_commands_test
