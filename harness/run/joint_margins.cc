@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <sstream>
+#include <utility>
 
 #include "controller/common/text.h"
 #include "harness/plant/velocity_filter.h"
@@ -136,19 +137,17 @@ BestGains FindBestGains(const Setup& setup) {
   };
   constexpr double kMost = 1000.0, kAccuracy = 1.01;
   BestGains best{.limited_by = find_limit(1.0)};
-  const double stride = best.limited_by.empty() ? 2.0 : 0.5;
-  double good = 1.0, bad = 1.0;
-  if (stride > 1.0) {
-    while (best.limited_by.empty() && bad < kMost) {
-      good = bad;
-      best.limited_by = find_limit(bad *= stride);
-    }
-  } else {
-    while (!find_limit(good *= stride).empty()) {
-      if (good < 1.0 / kMost) return best;
-      bad = good;
+  double good = best.limited_by.empty() ? 1.0 : 0.0;
+  for (double factor = 2.0; good == 0.0 && factor < kMost; factor *= 2.0) {
+    if (find_limit(factor).empty()) {
+      good = factor;
+    } else if (find_limit(1.0 / factor).empty()) {
+      good = 1.0 / factor;
     }
   }
+  if (good == 0.0) return best;
+  double bad = 2.0 * good;
+  while (bad < kMost && (best.limited_by = find_limit(bad)).empty()) good = std::exchange(bad, 2.0 * bad);
   while (bad > kAccuracy * good) {
     const double middle = std::sqrt(good * bad);
     const std::string limit = find_limit(middle);
