@@ -10,6 +10,12 @@ bool IsJointLaw(ControlLaw law) {
          law == ControlLaw::kFeedforwardPd;
 }
 
+void AddFrictionCompensation(const JointGains& gains, const VectorXd& q_d_dot, VectorXd* force) {
+  if (gains.coulomb.size() > 0)
+    *force += gains.coulomb.cwiseProduct((q_d_dot / gains.coulomb_velocity).array().tanh().matrix());
+  if (gains.viscous.size() > 0) *force += gains.viscous.cwiseProduct(q_d_dot);
+}
+
 JointLaw::JointLaw(const RobotModel& model, ControlLaw law, const JointGains& gains)
     : law_(law), gains_(gains), actuation_(model) {
   const Eigen::Index n = model.num_velocities();
@@ -19,6 +25,11 @@ JointLaw::JointLaw(const RobotModel& model, ControlLaw law, const JointGains& ga
   for (const VectorXd* gain : {computed ? &gains.K_p : &gains.K, computed ? &gains.K_v : &gains.D}) {
     Require(gain->size() == n, "number of gains", "must be that of the joints", gain->size());
   }
+  for (const VectorXd* friction : {&gains.coulomb, &gains.viscous}) {
+    Require(friction->size() == 0 || friction->size() == n, "number of frictions",
+            "must be that of the joints", friction->size());
+  }
+  Require(gains.coulomb_velocity > 0.0, "coulomb_velocity", "must be positive", gains.coulomb_velocity);
   for (VectorXd* vector : {&xi_dot_d_, &force_, &tau_}) vector->setZero(n);
 }
 
@@ -42,6 +53,7 @@ const VectorXd& JointLaw::CalcTorque(const ModelTerms& robot, const Eigen::Ref<c
       force_.noalias() += robot.C() * desired.q_dot;
     }
   }
+  AddFrictionCompensation(gains_, desired.q_dot, &force_);
   actuation_.CalcTorque(force_, tau_);
   return tau_;
 }

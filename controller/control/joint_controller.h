@@ -23,14 +23,26 @@ namespace dexcheck {
 //
 // kFeedforwardPd [Paden, Panja 1988, "PD+"]: the same, and what the desired motion takes.
 //   tau' = M_bar' q_d_ddot + C_bar' q_d_dot + F_bar' + K e + D e_dot
+//
+// Each of them may compensate friction that its model does not have, of each joint
+//   tau_f = coulomb tanh(q_d_dot / coulomb_velocity) + viscous q_d_dot
+// along the desired rate: the measured one would feed the sign of its noise back [Armstrong-Helouvry, Dupont,
+// Canudas de Wit 1994, 5.3].
 
-/// Gains of the joints, one entry for each.
+/// Gains of the joints, and friction that is compensated; one entry for each.
 struct JointGains {
   VectorXd K_p;  ///< 1/s^2: kComputedTorque.
   VectorXd K_v;  ///< 1/s: kComputedTorque.
   VectorXd K;    ///< N m/rad, N/m: the others.
   VectorXd D;    ///< N m s/rad, N s/m: the others.
+
+  VectorXd coulomb;                ///< N m, N; empty for none.
+  VectorXd viscous;                ///< N m s/rad, N s/m; empty for none.
+  double coulomb_velocity = 0.01;  ///< rad/s, m/s: where tanh smooths the sign.
 };
+
+/// Adds tau_f (n) at a desired rate to a force.
+void AddFrictionCompensation(const JointGains& gains, const VectorXd& q_d_dot, VectorXd* force);
 
 /// Whether the law is one for joints: kComputedTorque, kPdGravity, kFeedforwardPd.
 [[nodiscard]] bool IsJointLaw(ControlLaw law);
@@ -38,8 +50,8 @@ struct JointGains {
 /// One of them. Nothing allocates after construction.
 class JointLaw {
  public:
-  /// @throws std::invalid_argument unless the base is fixed, the law is one for joints, and its gains have an
-  /// entry for each joint.
+  /// @throws std::invalid_argument unless the base is fixed, the law is one for joints, and its gains and
+  /// what it compensates have an entry for each joint.
   JointLaw(const RobotModel& model, ControlLaw law, const JointGains& gains);
 
   /// tau' (n), N m or N. @param robot CalcDynamics done, reduced. @param q, xi the state that it is at.

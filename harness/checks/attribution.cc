@@ -56,6 +56,15 @@ const CheckRecord* FindEvidence(std::span<const CheckRecord> steps) {
                         [&](const CheckRecord& check) { return check.name == "rolling"; });
 }
 
+/// Whether torques that were cut off explain the check. Motions follow from them; forces that do not balance,
+/// or are not the rigid model's, do not: what was delivered is known.
+bool ComesFromLimit(const CheckRecord* first, const MeasuredCauses& measured) {
+  if (!measured.limited || !measured.limited->failed) return false;
+  if (first == nullptr) return true;
+  const bool is_motion = first->kind == CheckCategory::kLaw || first->kind == CheckCategory::kAssumption;
+  return is_motion && TellsMore(*measured.limited, *first);
+}
+
 /// What an expectation that alone fails comes from: the gains, if (57) by itself leaves most of the error,
 /// and what drives it otherwise. By algebra that is what contacts give, or what the scenario asks for of the
 /// plant.
@@ -171,7 +180,9 @@ AttributionResult Attribute(const ConstantChecks& constants, std::span<const Che
     result.cause = Cause::kModel;
     result.evidence = Tell(*first_model);
   } else if (any_step) {
-    if (const CheckRecord* first = FindEvidence(steps)) {
+    const CheckRecord* first = FindEvidence(steps);
+    if (ComesFromLimit(first, measured)) first = &*measured.limited;
+    if (first != nullptr) {
       result.cause = MeaningOf(*first).cause;
       result.evidence = Tell(*first);
       if (result.cause == Cause::kUnmodelledForce && measured.is_slope) result.cause = Cause::kSlope;

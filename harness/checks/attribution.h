@@ -2,6 +2,7 @@
 
 // Why a run's checks failed: the model, or which assumption about the plant.
 
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -31,6 +32,8 @@ struct MeasuredCauses {
   /// rad: below zero where it is not integrated.
   double position_by_law = -1.0, orientation_by_law = -1.0;
   bool is_ideal = true;  ///< The scenario declares no imperfection of the plant.
+  /// `actuator_effort` where the scenario lets torques be cut off: no fault, but what others may come from.
+  std::optional<CheckRecord> limited;
 };
 
 struct AttributionResult {

@@ -1,5 +1,7 @@
 // The law of a robot that holds nothing and follows a motion of its joints.
 
+#include <cmath>
+
 #include "controller/control/joint_controller.h"
 #include "controller/control/joint_motion.h"
 #include "harness/checks/judged_law.h"
@@ -14,7 +16,7 @@ class JudgedJointLaw final : public JudgedLaw {
         law_(setup.scenario().control.law),
         gains_(setup.joints()->gains),
         motion_(&setup.joints()->motion) {
-    for (VectorXd* vector : {&force_, &demand_, &true_demand_, &commanded_force_})
+    for (VectorXd* vector : {&force_, &demand_, &true_demand_, &commanded_force_, &coulomb_, &viscous_})
       vector->setZero(setup.model().num_velocities());
     // Of the other laws the gain of a joint is the feedback in its torque.
     if (law_ != ControlLaw::kComputedTorque) return;
@@ -42,8 +44,10 @@ class JudgedJointLaw final : public JudgedLaw {
     errors_.torque = CompareTorque(step, terms);
     if (!follows_error()) return errors_;
     const VectorXd* predicted = &plant.findings.xi_dot_model;
-    if (!as_commanded) {
+    if (!as_commanded || compensates()) {
       actuation_.CalcForce(step.command.tau, commanded_force_);
+      // The rigid robot has no friction that this would compensate.
+      commanded_force_ -= coulomb_ + viscous_;
       predicted = &commanded_.PredictFree(step.model->robot(), commanded_force_).xi_dot;
     }
     FollowError(step, plant.declared->is_ideal ? predicted : nullptr);
@@ -56,16 +60,17 @@ class JudgedJointLaw final : public JudgedLaw {
  protected:
   bool Evaluate(const StepRecord& step, const LawTerms& terms) override {
     JointDemand::EvaluateDesired(*motion_, step.time, 2.0 * velocity_age_, &desired_, &half_step_);
-    force_ = terms.C_xi + terms.gravity + terms.friction;
+    CalcCompensation();
+    force_ = terms.C_xi + terms.gravity + terms.friction + coulomb_ + viscous_;
     if (law_ == ControlLaw::kComputedTorque) {
-      // M_bar' (q_d_ddot + K_v e_dot + K_p e) + C_bar' q_dot + F_bar'
+      // M_bar' (q_d_ddot + K_v e_dot + K_p e) + C_bar' q_dot + F_bar' + tau_f
       CalcDemand(terms.q, terms.xi, &demand_);
       force_.noalias() += terms.M * demand_;
       return true;
     }
-    // K e + D e_dot + g [+ M_bar' q_d_ddot + C_bar' q_d_dot + friction]
+    // K e + D e_dot + g + tau_f [+ M_bar' q_d_ddot + C_bar' q_d_dot + friction]
     if (law_ == ControlLaw::kPdGravity) {
-      force_ = terms.gravity;
+      force_ = terms.gravity + coulomb_ + viscous_;
     } else {
       force_.noalias() += terms.M * desired_.q_ddot;
       force_.noalias() += *terms.C * (desired_.q_dot - terms.xi);
@@ -92,6 +97,8 @@ class JudgedJointLaw final : public JudgedLaw {
     if (moves && !computed) parts_.col(3) += *terms.C * (desired_.q_dot - terms.xi);
     parts_.col(4) = terms.gravity;
     if (moves) parts_.col(5) = terms.friction;
+    parts_.col(6) = coulomb_;
+    parts_.col(7) = viscous_;
     if (!computed) return;
     const Eigen::Index n = rate.size();
     parts_.middleCols(kPartCount, n) = terms.M * rate.asDiagonal();
@@ -99,16 +106,28 @@ class JudgedJointLaw final : public JudgedLaw {
   }
 
  private:
-  static constexpr int kPartCount = 6;
-  static constexpr LawPartName kParts[] = {{"M_bar' q_d_ddot", "feed-forward acceleration", 1U},
-                                           {"K_v e_dot", "velocity feedback", 2U},
-                                           {"K_p e", "position feedback", 4U},
-                                           {"C_bar' q_dot", "Coriolis forces", 8U},
-                                           {"F_bar' (gravity)", "gravity", 16U},
-                                           {"F_bar' (friction)", "friction", 32U},
-                                           {"K_v e_dot + K_p e", "feedback of both gains", 6U},
-                                           {"F_bar'", "gravity and friction", 48U},
-                                           {"tau'", "all torques", 63U}};
+  static constexpr int kPartCount = 8;
+  static constexpr LawPartName kParts[] = {
+      {"M_bar' q_d_ddot", "feed-forward acceleration", 1U},
+      {"K_v e_dot", "velocity feedback", 2U},
+      {"K_p e", "position feedback", 4U},
+      {"C_bar' q_dot", "Coriolis forces", 8U},
+      {"F_bar' (gravity)", "gravity", 16U},
+      {"F_bar' (friction)", "friction", 32U},
+      {"coulomb tanh(q_d_dot / coulomb_velocity)", "compensation of Coulomb friction", 64U},
+      {"viscous q_d_dot", "compensation of viscous friction", 128U},
+      {"K_v e_dot + K_p e", "feedback of both gains", 6U},
+      {"F_bar'", "gravity and friction", 48U},
+      {"tau_f", "compensation of friction", 192U},
+      {"tau'", "all torques", 255U}};
+
+  [[nodiscard]] bool compensates() const { return gains_.coulomb.size() + gains_.viscous.size() > 0; }
+  void CalcCompensation() {
+    for (Eigen::Index i = 0; i < gains_.coulomb.size(); ++i)
+      coulomb_[i] = gains_.coulomb[i] * std::tanh(desired_.q_dot[i] / gains_.coulomb_velocity);
+    for (Eigen::Index i = 0; i < gains_.viscous.size(); ++i)
+      viscous_[i] = gains_.viscous[i] * desired_.q_dot[i];
+  }
 
   /// K_v e_dot + K_p e + q_d_ddot.
   void CalcDemand(const VectorXd& q, const VectorXd& xi, VectorXd* xi_dot) const {
@@ -141,6 +160,7 @@ class JudgedJointLaw final : public JudgedLaw {
   const JointMotion* motion_;
   DesiredJoints desired_, half_step_;
   VectorXd force_, demand_, true_demand_, commanded_force_;  // n
+  VectorXd coulomb_, viscous_;                               // n, what is compensated
   VectorXd q_, xi_;                        // where the error dynamics have the joints; empty at first
 };
 

@@ -57,7 +57,9 @@ std::set<std::string_view> ListMissing(const Setup& setup, const JudgedLaw* law)
   leave_out(!scenario.plant.collide, {"collision"});
   const mjModel& engine = setup.engine();
   const auto* const limited = engine.actuator_ctrllimited;
-  leave_out(std::none_of(limited, limited + engine.nu, [](auto flag) { return flag != 0; }),
+  // What a scenario lets be cut off is no fault of the run.
+  leave_out(std::none_of(limited, limited + engine.nu, [](auto flag) { return flag != 0; }) ||
+                scenario.imperfections.actuation.saturates(),
             {"actuator_effort"});
   return missing;
 }

@@ -23,6 +23,9 @@ RunChecks::RunChecks(const Setup& setup, std::span<const Motor> motors, bool kno
   for (const Judge& judge : judges_) records_.push_back(judge.record);
   if (law_) analyzer_.SetSpectralRadius(law_->CalcSpectralRadius().value_or(0.0));
   if (!declared_.is_ideal()) CheckMeasuredState();
+  if (!setup.scenario().imperfections.actuation.saturates()) return;
+  const CheckInfo& effort = *FindCheck("actuator_effort");
+  limited_ = CheckRecord{.name = std::string(effort.name), .kind = effort.category, .bound = 1.0};
 }
 
 void RunChecks::CheckMeasuredState() {
@@ -56,6 +59,7 @@ void RunChecks::Reset() {
 
 void RunChecks::Forget() {
   for (CheckRecord& record : records_) record.Reset();
+  if (limited_) limited_->Reset();
   for (const Judge& judge : judges_)
     if (judge.state) judge.state->Reset();
   analyzer_.Reset();
@@ -95,6 +99,7 @@ void RunChecks::Add(const Judge& judge, CheckRecord* record, double time) {
 void RunChecks::JudgeEffort(const StepRecord& step, double time) {
   analyzer_.SetStep(step);
   Evaluate(CheckInfo::kBefore, time);
+  if (limited_) limited_->Add(step.drive.effort, time);
 }
 
 void RunChecks::JudgeModel(const StepRecord& step) {
@@ -160,6 +165,7 @@ MeasuredCauses RunChecks::Tell() const {
   measured.position_by_law = position_by_law_;
   measured.orientation_by_law = orientation_by_law_;
   measured.is_ideal = declared_.is_ideal();
+  measured.limited = limited_;
   return measured;
 }
 

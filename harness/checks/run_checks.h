@@ -93,6 +93,7 @@ class RunChecks {
   std::vector<Judge> judges_;
   std::vector<CheckRecord> records_;  // of judges_
   std::vector<CheckRecord> settling_failures_;
+  std::optional<CheckRecord> limited_;                         // of torques that the scenario lets be cut off
   double position_by_law_ = -1.0, orientation_by_law_ = -1.0;  // largest; see MeasuredCauses
   bool differs_ = false;
 };

@@ -64,11 +64,12 @@ RobotDescription ReadSource(const ImportRequest& request) {
 int WriteCopy(const ImportRequest& request) {
   MjcfFile mjcf(request.source);
   if (mjcf.IsUrdf()) throw InputError(request.source.string() + ": must be an MJCF, got a URDF");
+  const std::map<std::string, double> limits = FindForceRanges(mjcf);
   if (request.downgrade) {
     AdaptMjcf(&mjcf);
     StateNewDefaults(&mjcf);
   }
-  if (request.motors) AddMotors(&mjcf);
+  if (request.motors) AddMotors(&mjcf, limits);
   // What cannot be loaded must not be written.
   LoadMjcfText(mjcf.PrintFor(std::filesystem::current_path()), request.source.string());
   const std::filesystem::path to = std::filesystem::absolute(request.out).parent_path();

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <string>
 #include <vector>
@@ -10,6 +11,7 @@
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
 #include "controller/model/parameter_reader.h"
+#include "harness/base/console.h"
 #include "harness/base/files.h"
 #include "harness/checks/file_comparison.h"
 #include "harness/cli/commands.h"
@@ -20,6 +22,7 @@
 #include "harness/descriptions/mjcf_writer.h"
 #include "harness/descriptions/parameter_writer.h"
 #include "harness/descriptions/read_description.h"
+#include "harness/descriptions/urdf_reader.h"
 #include "harness/engine/engine.h"
 #include "harness/engine/mjcf_passes.h"
 #include "harness/engine/xml.h"
@@ -72,17 +75,25 @@ void TakeAssets(const fs::path& folder, MjcfFile* mjcf) {
 std::string MakeMjcf(const InitRequest& request, const RobotDescription& robot, const fs::path& folder) {
   const fs::path source = robot.format == RobotFormat::kMjcf ? request.robot : request.mjcf;
   const fs::path from_here = fs::current_path();
+  std::map<std::string, double> limits;
+  if (robot.format == RobotFormat::kUrdf)
+    limits = ReadUrdfEfforts(ReadTextFile(request.robot.string()), request.robot.string());
   if (source.empty()) {
     MjcfFile mjcf(WriteMjcf(robot, request.robot.filename().string()),
                   request.robot.string() + " as an MJCF");
-    AddMotors(&mjcf);
+    AddMotors(&mjcf, limits);
     LoadMjcfText(mjcf.PrintFor(from_here), mjcf.source());
     return mjcf.Print();
   }
   MjcfFile mjcf(source);
+  // The MJCF's own come first.
+  std::map<std::string, double> own = FindForceRanges(mjcf);
+  own.merge(limits);
   AdaptMjcf(&mjcf);
   StateNewDefaults(&mjcf);
-  AddMotors(&mjcf);
+  AddMotors(&mjcf, own);
+  for (const std::string& pair : ExcludeBaseContacts(&mjcf))
+    Warn(source.string() + ": contact of " + pair + " left out: neighbours at a joint");
   LoadMjcfText(mjcf.PrintFor(from_here), source.string());
   TakeAssets(folder, &mjcf);
   return mjcf.Print();
@@ -111,7 +122,7 @@ std::string WriteScenario(const RobotDescription& robot, double tolerance) {
   const bool has_friction = std::any_of(robot.spec.joints.begin(), robot.spec.joints.end(),
                                         [](const Joint& joint) { return joint.dry_friction > 0.0; });
   std::vector<JointSpan> spans;
-  std::string start, there, back;
+  std::string start, there, back, friction;
   for (size_t i = 0; i < robot.spec.joints.size(); ++i) {
     const Joint& joint = robot.spec.joints[i];
     JointSpan span = ChooseSpan(joint, robot.joints[i].states_range);
@@ -127,6 +138,7 @@ std::string WriteScenario(const RobotDescription& robot, double tolerance) {
     add(span.start, &start);
     add(span.end, &there);
     add(span.start, &back);
+    add(joint.dry_friction, &friction);
   }
   return fmt::format(
       R"(# A motion of the joints within their ranges, by computed torque, checked at every step.
@@ -153,27 +165,34 @@ points = [
 law = "computed_torque"
 natural_frequency = 10
 damping_ratio = 1
-{})",
+{}{})",
       tolerance > 0.0 ? fmt::format("# Numbers that were rounded when they were printed agree to this.\n"
                                     "tolerance = {}\n",
                                     FormatNumber(tolerance, 1))
                       : "",
       start, there, back,
-      has_friction ? "# Dry friction, for which the law does not make up, leaves errors of the joints.\n"
-                   : "\n[expect]\njoints = 0.01\n");
+      has_friction ? fmt::format("# Dry friction, compensated along the desired rates.\ncoulomb = {{ {} }}\n",
+                                 friction)
+                   : "",
+      has_friction ? "" : "\n[expect]\njoints = 0.01\n");
 }
 
-constexpr const char* kStudy = R"(# Which gains follow the motion best.
+constexpr const char* kStudy = R"(# Which gains follow the motion best, with margins that an arm needs.
 name = "gains"
 description = "natural frequency x damping ratio of the motion"
 scenario = "motion.toml"
 set = ["expect={}"]
-metrics = ["joint_error_rms", "joint_error_max", "peak_effort", "energy"]
+metrics = ["joint_error_rms", "peak_effort", "gain_margin", "phase_margin"]
+# A gain margin of 6 dB and a phase margin of 45 degrees.
+constraints = ["peak_effort < 1", "gain_margin > 2", "phase_margin > 0.785"]
+
+[[objective]]
+minimize = "joint_error_rms"
 
 [[vary]]
 key = "control.natural_frequency"
-from = 2
-to = 50
+from = 5
+to = 500
 count = 6
 spacing = "log"
 
@@ -257,8 +276,10 @@ int InitRobot(const InitRequest& request) {
   if (!tolerance)
     fmt::print("the two differ, and a run will say so: dexcheck consistency {} {}\n", request.robot.string(),
                mjcf.string());
-  fmt::print("next: cd {} && dexcheck run motion.toml\n      dexcheck study run gains.toml --db gains.db\n",
-             folder.path().string());
+  fmt::print(
+      "next: cd {} && dexcheck run motion.toml\n      dexcheck study run gains.toml --db gains.db\n"
+      "      dexcheck budget motion.toml --set actuation.delay=0.002 --set sensing.joint_counts=4096\n",
+      folder.path().string());
   return kSuccess;
 }
 

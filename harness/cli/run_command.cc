@@ -24,6 +24,7 @@
 #include "harness/report/page.h"
 #include "harness/report/run_data.h"
 #include "harness/run/half_step.h"
+#include "harness/run/joint_margins.h"
 
 namespace dexcheck::cli {
 namespace {
@@ -106,10 +107,13 @@ int RunScenario(const RunRequest& request) {
                   recorder ? &*recorder : nullptr);
   RunResult result = runner.result();
   LookForIntegrator(setup, runner.loop(), files.robot, files.mjcf, IsInterrupted, &result);
+  JudgeGains(setup, runner.loop(), &result);
 
   const std::string summary = MakeSummary(setup, runner.loop(), result).dump(2) + "\n";
   if (recorder) recorder->Close(summary);
   if (folder) OutputFile(folder->path() / "summary.json").Write(summary);
+  if (folder && !result.gain_card.empty())
+    OutputFile(folder->path() / "gain_card.toml").Write(result.gain_card);
   junit.Write([&] { return WriteJUnit(setup, runner.loop(), result); });
   const ExitCode verdict = ToExitCode(result);
   std::exception_ptr unprinted;

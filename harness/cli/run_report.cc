@@ -103,6 +103,20 @@ void PrintTracking(const Scenario& scenario, const TrackingStatistics& tracking)
              tracking.position_max(), tracking.position_rms(), tracking.orientation_max());
 }
 
+/// At which motors torques were cut off, and how long; the longest first.
+void PrintLimits(std::span<const Motor> motors, const std::vector<LimitedTorque>& limited) {
+  std::vector<size_t> order;
+  for (size_t i = 0; i < limited.size(); ++i)
+    if (limited[i].time > 0.0) order.push_back(i);
+  std::sort(order.begin(), order.end(),
+            [&](size_t a, size_t b) { return limited[a].time > limited[b].time; });
+  std::string text = "torque limited: ";
+  for (const size_t i : order)
+    text += fmt::format("{}{} for {:.3f} s from {:.3f} s, by up to {:.3g}", i == order.front() ? "" : "; ",
+                        motors[i].name, limited[i].time, limited[i].first, limited[i].most);
+  fmt::print("{}\n", Wrap(order.empty() ? text + "at no joint" : text, 2));
+}
+
 /// Which bodies came nearest to each other that must not touch.
 void PrintClearance(const Clearance& clearance) {
   const Clearance::Nearest* nearest = nullptr;
@@ -162,11 +176,13 @@ void PrintRunReport(const Setup& setup, const ClosedLoop& loop, const RunResult&
           "{:.2e} rad in psi\n",
           drift.object, drift.fingertip, drift.psi);
     }
+    if (scenario.imperfections.actuation.saturates()) PrintLimits(loop.motors(), result.limited);
     if (loop.task() != nullptr) PrintTask(loop);
     if (loop.is_checking()) PrintClearance(*loop.checks().analysis().clearance);
     if (loop.is_checking()) PrintChecks(setup, loop, detail);
     PrintSpeed(loop, result);
     if (!folder.empty()) fmt::print("log and summary in {}\n", folder);
+    if (!result.gain_card.empty()) fmt::print("\n{}", result.gain_card);
     fmt::print("\n");
   }
   switch (result.verdict) {

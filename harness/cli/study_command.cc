@@ -252,6 +252,7 @@ int RunStudy(const StudyRequest& request) {
   if (request.quiet) return kSuccess;
   const StudyStore made = StudyStore::Open(request.database);
   fmt::print("{}\n", Wrap(FindProgress(made).text, 2));
+  fmt::print("{}", MakeGainCard(inputs, made.ReadRows(0, /*with_machine=*/false)));
   const std::map<Outcome, long> outcomes = made.CountOutcomes();
   if (outcomes.count(Outcome::kCrashed) + outcomes.count(Outcome::kTimedOut) > 0) {
     fmt::print("Trials that crashed or timed out are made again with --retry-failed.\n");

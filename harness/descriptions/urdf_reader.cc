@@ -473,4 +473,16 @@ RobotDescription ParseUrdf(std::string_view text, const std::string& source, con
   return robot;
 }
 
+std::map<std::string, double> ReadUrdfEfforts(std::string_view text, const std::string& source) {
+  const UrdfFile file(text, source);
+  std::map<std::string, double> efforts;
+  for (const UrdfJoint& joint : file.joints()) {
+    const tinyxml2::XMLElement* const limit = joint.element->FirstChildElement("limit");
+    if (limit == nullptr) continue;
+    const double effort = file.ReadNumber(*limit, "joint " + Quote(joint.name) + ": ", "effort", 0.0);
+    if (effort > 0.0) efforts[joint.name] = effort;
+  }
+  return efforts;
+}
+
 }  // namespace dexcheck

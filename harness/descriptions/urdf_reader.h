@@ -3,6 +3,7 @@
 // A robot from a URDF, by this project's own code: the engine's importer is itself a suspect.
 
 #include <filesystem>
+#include <map>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -28,5 +29,9 @@ struct UrdfOptions {
 /// joint's.
 /// @throws InputError, one line that names file, line, part and value.
 RobotDescription ParseUrdf(std::string_view text, const std::string& source, const UrdfOptions& options = {});
+
+/// The largest force or torque of each joint that states one (limit effort), N or N m, by name.
+/// @throws as ParseUrdf.
+std::map<std::string, double> ReadUrdfEfforts(std::string_view text, const std::string& source);
 
 }  // namespace dexcheck

@@ -2,13 +2,17 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <optional>
+#include <sstream>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "controller/common/text.h"
 #include "harness/engine/engine.h"
 #include "harness/engine/mjcf_passes.h"
+#include "harness/engine/mujoco_release.h"
 #include "harness/engine/robot_tree.h"
 #include "harness/engine/xml.h"
 
@@ -55,9 +59,68 @@ void DeleteActuators(XMLElement* root) {
   }
 }
 
+constexpr const char* kForceRange = "actuatorfrcrange";
+
+/// Of default classes, by name; a class without one has that around it.
+void ReadClasses(const XMLElement& section, std::string range, std::map<std::string, std::string>* classes) {
+  const XMLElement* const joint = section.FirstChildElement("joint");
+  if (joint != nullptr) range = ReadAttribute(*joint, kForceRange, range);
+  (*classes)[ReadAttribute(section, "class", "main")] = range;
+  for (const XMLElement* inner : ListChildren(&section, "default")) ReadClasses(*inner, range, classes);
+}
+
+void ReadJoints(const XMLElement& body, std::string child_class,
+                const std::map<std::string, std::string>& classes, std::map<std::string, double>* limits) {
+  child_class = ReadAttribute(body, "childclass", child_class);
+  for (const XMLElement* joint : ListChildren(&body, "joint")) {
+    const auto found = classes.find(ReadAttribute(*joint, "class", child_class));
+    std::istringstream range(ReadAttribute(*joint, kForceRange, found == classes.end() ? "" : found->second));
+    double low = 0.0, high = 0.0;
+    if (range >> low >> high) (*limits)[ReadAttribute(*joint, "name")] = std::min(-low, high);
+  }
+  for (const XMLElement* inner : ListChildren(&body, "body"))
+    ReadJoints(*inner, child_class, classes, limits);
+}
+
 }  // namespace
 
-void AddMotors(MjcfFile* mjcf) {
+std::map<std::string, double> FindForceRanges(const MjcfFile& mjcf) {
+  std::map<std::string, std::string> classes;
+  std::map<std::string, double> limits;
+  const XMLElement* const root = mjcf.root();
+  for (const XMLElement* section : ListChildren(root, "default")) ReadClasses(*section, "", &classes);
+  for (const XMLElement* world : ListChildren(root, "worldbody"))
+    ReadJoints(*world, "main", classes, &limits);
+  std::erase_if(limits, [](const auto& limit) { return !(limit.second > 0.0); });
+  return limits;
+}
+
+std::vector<std::string> ExcludeBaseContacts(MjcfFile* mjcf) {
+  const MjModelPtr model = LoadMjcfText(mjcf->PrintFor(std::filesystem::current_path()), mjcf->source());
+  const mjModel& m = *model;
+  std::vector<std::string> pairs;
+  XMLElement* contact = mjcf->root()->FirstChildElement("contact");
+  for (int body = 1; body < m.nbody; ++body) {
+    const int base = m.body_parentid[body];
+    if (base == 0 || m.body_weldid[base] != 0 || m.body_weldid[body] == 0) continue;
+    const char *const first = mj_id2name(&m, mjOBJ_BODY, base), *const second =
+                                                                    mj_id2name(&m, mjOBJ_BODY, body);
+    const bool is_excluded =
+        std::any_of(m.exclude_signature, m.exclude_signature + m.nexclude, [&](int excluded) {
+          return excluded == MakeSignature(base, body) || excluded == MakeSignature(body, base);
+        });
+    const bool can_touch = m.body_geomnum[base] > 0 && m.body_geomnum[body] > 0;
+    if (first == nullptr || second == nullptr || is_excluded || !can_touch) continue;
+    if (contact == nullptr) contact = mjcf->root()->InsertNewChildElement("contact");
+    XMLElement* const exclude = contact->InsertNewChildElement("exclude");
+    exclude->SetAttribute("body1", first);
+    exclude->SetAttribute("body2", second);
+    pairs.push_back(std::string(first) + " and " + second);
+  }
+  return pairs;
+}
+
+void AddMotors(MjcfFile* mjcf, const std::map<std::string, double>& limits) {
   const std::string& source = mjcf->source();
   const MjModelPtr model = LoadMjcfText(mjcf->PrintFor(std::filesystem::current_path()), source);
   const mjModel& m = *model;
@@ -80,7 +143,8 @@ void AddMotors(MjcfFile* mjcf) {
     motor->SetAttribute("joint", name);
     motor->SetAttribute("gear", "1 0 0 0 0 0");
     motor->SetAttribute("forcelimited", "false");
-    const std::optional<double> limit = FindJointLimit(m, joint);
+    std::optional<double> limit = FindJointLimit(m, joint);
+    if (const auto stated = limits.find(name); !limit && stated != limits.end()) limit = stated->second;
     motor->SetAttribute("ctrllimited", limit ? "true" : "false");
     const std::string number = FormatNumber(limit.value_or(0.0));
     if (limit) motor->SetAttribute("ctrlrange", fmt::format("-{0} {0}", number).c_str());

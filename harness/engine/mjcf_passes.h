@@ -3,9 +3,11 @@
 // Passes over an MJCF, each of which changes it, notes what it did (MjcfFile::changes), or refuses it.
 
 #include <filesystem>
+#include <map>
 #include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "harness/engine/mjcf_file.h"
 
@@ -36,8 +38,18 @@ void StateNewDefaults(MjcfFile* mjcf);
 /// Puts one torque motor for each joint of the robot in the place of all of an MJCF's actuators, as a run
 /// needs them: servos, muscles and tendons are what a controller here replaces. A motor's limit is what the
 /// joint's actuator could deliver; sensors of actuators and the controls of key frames go with them.
+/// @param limits of joints whose actuators state none, N m or N, by name.
 /// @throws InputError when the engine cannot load it, or a joint has no name.
-void AddMotors(MjcfFile* mjcf);
+void AddMotors(MjcfFile* mjcf, const std::map<std::string, double>& limits = {});
+
+/// Excludes the contact of a link with the fixed link that it turns on: the engine leaves out neighbours, but
+/// not those of what is welded to the world.
+/// @returns "base_link and link_1" of each that it adds. @throws as AddMotors.
+std::vector<std::string> ExcludeBaseContacts(MjcfFile* mjcf);
+
+/// The largest force that joints themselves allow (actuatorfrcrange, which this program's engine does not
+/// know and AdaptMjcf takes away), by name: their own, or their class's.
+std::map<std::string, double> FindForceRanges(const MjcfFile& mjcf);
 
 /// The element `compiler` of an MJCF's root; a new one when it has none.
 tinyxml2::XMLElement* RequireCompiler(tinyxml2::XMLElement* root);

@@ -172,6 +172,33 @@ InjectedFault AddedFriction(const FaultContext& context) {
   return Added(context, "viscous friction", friction, [friction](double rate) { return -friction * rate; });
 }
 
+/// The law of the setup's joints with other gains.
+std::unique_ptr<Controller> MakeJointController(const Setup& setup, const JointGains& gains) {
+  const PlantOptions& plant = setup.scenario().plant;
+  return std::make_unique<JointController>(
+      setup.model(), setup.object().body, setup.surface(), setup.scenario().control.law, gains,
+      setup.joints()->motion,
+      Sampling{.time_step = 2.0 * plant.velocity_age(),
+               .hold = std::max(1L, std::lround(plant.control_step / plant.time_step))});
+}
+
+bool CompensatesCoulomb(const FaultContext& context) {
+  return IsOfJoints(context.setup) && context.setup.joints()->gains.coulomb.size() > 0;
+}
+
+InjectedFault CoulombCompensation(const FaultContext& context) {
+  const double factor = DrawFactor(context);
+  InjectedFault one = LawFaultAt(
+      {"law", {}}, "compensation of Coulomb friction (coulomb tanh(q_d_dot / coulomb_velocity)), factor",
+      factor, 1.0);
+  one.controller = [factor](const Setup& setup, std::unique_ptr<Controller>, const IsOn&) {
+    JointGains gains = setup.joints()->gains;
+    gains.coulomb *= factor;
+    return MakeJointController(setup, gains);
+  };
+  return one;
+}
+
 /// All gains of position, or of velocity, times a factor, or one of them.
 InjectedFault Gains(const FaultContext& context, bool of_velocity, bool is_one) {
   const double factor = 1.0 + context.draw->Size(1e-3, 0.3);
@@ -202,17 +229,15 @@ InjectedFault Gains(const FaultContext& context, bool of_velocity, bool is_one) 
     one = LawFaultAt({"law of " + context.model().dof_name(static_cast<int>(axis)), {}}, name, factor, 1.0);
   one.controller = [=](const Setup& setup, std::unique_ptr<Controller>,
                        const IsOn&) -> std::unique_ptr<Controller> {
-    const Scenario& scenario = setup.scenario();
-    const Sampling sampling{
-        .time_step = 2.0 * scenario.plant.velocity_age(),
-        .hold = std::max(1L, std::lround(scenario.plant.control_step / scenario.plant.time_step))};
     if (const JointPlan* const plan = setup.joints()) {
       JointGains gains = plan->gains;
       for (VectorXd* gain : of_velocity ? std::array{&gains.K_v, &gains.D} : std::array{&gains.K_p, &gains.K})
         change(gain);
-      return std::make_unique<JointController>(setup.model(), setup.object().body, setup.surface(),
-                                               scenario.control.law, gains, plan->motion, sampling);
+      return MakeJointController(setup, gains);
     }
+    const PlantOptions& plant = setup.scenario().plant;
+    const Sampling sampling{.time_step = 2.0 * plant.velocity_age(),
+                            .hold = std::max(1L, std::lround(plant.control_step / plant.time_step))};
     GraspControllerOptions options = setup.MakeControllerOptions();
     change(of_velocity ? &options.gains.K_v : &options.gains.K_p);
     change(of_velocity ? &options.stiffness.D : &options.stiffness.K);
@@ -238,6 +263,7 @@ constexpr FaultKind kKinds[] = {
     {kLaw, "summand", Summand, IsPaperLaw},
     {kLaw, "gravity", GravityPart},
     {kLaw, "friction", FrictionPart, KnowsMotion},
+    {kLaw, "compensation of Coulomb friction", CoulombCompensation, CompensatesCoulomb},
     {kLaw, "torque", AddedTorque},
     {kLaw, "viscous friction", AddedFriction,
      [](const FaultContext& context) { return !KnowsMotion(context); }},

@@ -40,7 +40,7 @@ bool SensingOptions::is_exact() const {
 
 bool ActuationOptions::is_exact() const {
   return torque_step.Is(0.0) && gain_error.Is(0.0) && lag.Is(0.0) && coulomb.Is(0.0) && stribeck.Is(0.0) &&
-         backlash.Is(0.0) && delay == 0.0 && !saturate;
+         backlash.Is(0.0) && delay == 0.0 && !saturates();
 }
 
 bool MismatchOptions::is_none() const {

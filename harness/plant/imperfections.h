@@ -79,7 +79,10 @@ struct ActuationOptions {
   double stribeck_velocity = 0.05;  ///< Rate at which stribeck has fallen to 1/e, rad/s.
   double delay = 0.0;               ///< s.
   bool saturate = false;            ///< A motor delivers its limit when more is commanded.
+  ByName limit;                     ///< In the place of the motor's own, N m, and saturates; 0 for its own.
 
+  /// Whether torques above a motor's limit are cut off there, and do not end the run.
+  [[nodiscard]] bool saturates() const { return saturate || !limit.Is(0.0); }
   [[nodiscard]] bool is_exact() const;
 };
 

@@ -37,7 +37,11 @@ MotorDrive::MotorDrive(std::span<const Motor> motors, const ActuationOptions& op
   coulomb_ = resolve(options.coulomb);
   stribeck_ = resolve(options.stribeck);
   backlash_ = resolve(options.backlash);
+  const VectorXd limit = resolve(options.limit);
+  for (Eigen::Index i = 0; i < limit.size(); ++i)
+    if (limit[i] > 0.0) motors_[static_cast<size_t>(i)].limit = limit[i];
   if (is_exact_) return;
+  cut_.setZero(step_.size());
   armature_ = ListArmatures(*context.model);
   for (Eigen::Index i = 0; i < armature_.size(); ++i) {
     const bool needs = coulomb_[i] + stribeck_[i] > 0.0 || backlash_[i] > 0.0;
@@ -63,7 +67,8 @@ void MotorDrive::Apply(const VectorXd& tau, const VectorXd& xi, DriveOutput* out
   if (!tau.allFinite()) throw RunFailure("a torque is not a number");
   output->effort = CalcEffort(tau, &output->busiest_motor);
   if (!is_exact_) Drive(tau, xi, &output->tau);
-  if (output->effort <= 1.0 || options_.saturate) return;
+  output->cut = cut_;
+  if (output->effort <= 1.0 || options_.saturates()) return;
   const Motor& motor = motors_[static_cast<size_t>(output->busiest_motor)];
   throw RunFailure("motor " + Quote(motor.name) + " is at its limit, " + FormatNumber(motor.limit) + " N m");
 }
@@ -106,7 +111,8 @@ void MotorDrive::Drive(const VectorXd& tau, const VectorXd& xi, VectorXd* delive
       u += away * (1.0 - decay) * lag_[i] / time_step_;
     }
     const double limit = motors_[static_cast<size_t>(i)].limit;
-    u = std::clamp(u, -limit, limit);
+    cut_[i] = u - std::clamp(u, -limit, limit);
+    u -= cut_[i];
     if (backlash_[i] > 0.0) u = Play(i, u, rates_[i]);
     if (coulomb_[i] + stribeck_[i] > 0.0) u -= CalcFriction(i, rates_[i]);
   }

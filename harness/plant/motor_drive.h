@@ -13,6 +13,7 @@ struct DriveOutput {
   VectorXd tau;           ///< tau' (n), N m.
   double effort = 0.0;    ///< Largest |tau'| / limit of the commanded torques.
   int busiest_motor = 0;  ///< Whose it is, by its entry of tau'.
+  VectorXd cut;           ///< What the limits took off (n), N m; empty where nothing stands between.
 };
 
 /// Stands between the controller and the plant: what the motors make of the torques that are sent, in this
@@ -61,6 +62,7 @@ class MotorDrive {
   VectorXd lagging_;       // n, state of the lag, N m
   VectorXd play_;          // n, rotor against joint, rad
   VectorXd rotor_;         // n, its rate, rad/s
+  VectorXd cut_;           // n, of the last Drive
   std::uint64_t k_ = 0;
 };
 

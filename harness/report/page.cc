@@ -113,6 +113,7 @@ class Page {
                  {"causes", run_.summary().value("causes", Json::array())},
                  {"categories", Json::array()},
                  {"tiles", MakeTiles()},
+                 {"gain_card", run_.FindSummaryText("/gain_card")},
                  {"video", MakeVideo()},
                  {"pictures", MakePictures()},
                  {"inputs", MakeInputs()},
@@ -223,6 +224,9 @@ class Page {
       if (check.name == "cone_use")
         add(FormatFraction(check.worst), "of the fingertips' friction used, at most");
     }
+    for (const nlohmann::json& one : run_.summary().value("torque_limited", nlohmann::json::array()))
+      add(fmt::format("{:.3g} s", one.value("time_s", 0.0)),
+          "torque limited: " + one.value("motor", std::string()));
     // By class of bodies that should not touch.
     for (const auto& [pairs, nearest] : run_.summary().value("clearance", nlohmann::json::object()).items()) {
       std::string name = pairs;

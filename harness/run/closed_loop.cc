@@ -36,6 +36,7 @@ ClosedLoop::ClosedLoop(const Setup& setup, bool check, LoopParts parts)
       follower_(parts.follower),
       drive_(plant_->motors(), parts.actuation, setup.MakePartContext()),
       disturbances_(parts.disturbances, setup.MakePartContext()),
+      knows_law_(parts.knows_law),
       num_steps_(std::lround(setup.scenario().duration / setup.scenario().plant.time_step)) {
   const Scenario& scenario = setup.scenario();
   RequireKnownBounds(scenario);

@@ -90,6 +90,9 @@ class ClosedLoop {
   /// The controller of a task; null unless the scenario is one.
   [[nodiscard]] const PickAndPlaceController* task() const { return task_; }
   [[nodiscard]] const LoopTimes& times() const { return times_; }
+  /// Whether the controller's law is the scenario's.
+  [[nodiscard]] bool knows_law() const { return knows_law_; }
+  [[nodiscard]] std::span<const Motor> motors() const { return plant_->motors(); }
   /// Of a controller that follows its contacts, over all of them and all steps.
   [[nodiscard]] const ContactDrift& largest_drift() const { return largest_drift_; }
 
@@ -127,6 +130,7 @@ class ClosedLoop {
   std::unique_ptr<Trajectory> trajectory_;  // null for a task or a motion of joints
   StepRecord record_;
   std::function<void(const StepRecord&)> observe_;
+  bool knows_law_;
   long num_steps_ = 0;
   bool is_running_ = false;  // all has settled
   long steps_without_grasp_ = 0;

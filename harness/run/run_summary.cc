@@ -57,6 +57,35 @@ Json ClearanceToJson(const Clearance& clearance) {
   return json;
 }
 
+/// Motors whose torque was cut off.
+Json LimitsToJson(std::span<const Motor> motors, const std::vector<LimitedTorque>& limited) {
+  Json json = Json::array();
+  for (size_t i = 0; i < limited.size(); ++i) {
+    if (limited[i].time == 0.0) continue;
+    json.push_back({{"motor", motors[i].name},
+                    {"time_s", limited[i].time},
+                    {"first_s", limited[i].first},
+                    {"most_N_m", limited[i].most}});
+  }
+  return json;
+}
+
+Json ToJson(const StabilityMargins& margins) {
+  return {{"gain", margins.gain},
+          {"least_gain", margins.least_gain},
+          {"phase_rad", margins.phase},
+          {"delay_s", margins.delay}};
+}
+
+Json ToJson(const JointMargins& margins) {
+  Json json = {{"spectral_radius", margins.radius}};
+  if (!margins.is_stable()) return json;
+  json["one_torque"] = ToJson(margins.least);
+  json["one_torque"]["joints"] = {margins.gain_joint, margins.phase_joint, margins.delay_joint};
+  json["all_torques"] = ToJson(margins.together);
+  return json;
+}
+
 Json ToJson(const Explanation& one) {
   constexpr const char* kOutcomes[] = {"named", "named up to a class", "not explained"};
   Json json = {{"channel", NameOf(one.channel)},
@@ -101,6 +130,19 @@ double TrackingStatistics::position_rms() const { return Rms(position_squares_, 
 double TrackingStatistics::orientation_rms() const { return Rms(orientation_squares_, count_); }
 double TrackingStatistics::joints_rms() const { return Rms(joints_squares_, count_); }
 
+void AddLimits(const StepRecord& step, double dt, std::vector<LimitedTorque>* limited) {
+  const VectorXd& cut = step.drive.cut;
+  limited->resize(static_cast<size_t>(cut.size()));
+  for (size_t i = 0; i < limited->size(); ++i) {
+    const double off = std::abs(cut[static_cast<Eigen::Index>(i)]);
+    if (off == 0.0) continue;
+    LimitedTorque& one = (*limited)[i];
+    if (one.time == 0.0) one.first = step.time;
+    one.time += dt;
+    one.most = std::max(one.most, off);
+  }
+}
+
 void Judge(const Setup& setup, const ClosedLoop& loop, RunResult* result) {
   if (loop.is_checking()) {
     result->causes = ExplainRun(loop.store());
@@ -143,6 +185,10 @@ Json MakeSummary(const Setup& setup, const ClosedLoop& loop, const RunResult& re
   }
   if (loop.task() != nullptr) json["task"] = TaskToJson(loop);
   if (!scenario.imperfections.is_ideal()) json["plant_declared"] = scenario.imperfections.declared;
+  if (result.margins) json["margins"] = ToJson(*result.margins);
+  if (!result.gain_card.empty()) json["gain_card"] = result.gain_card;
+  if (scenario.imperfections.actuation.saturates())
+    json["torque_limited"] = LimitsToJson(loop.motors(), result.limited);
   json["attribution"] = {{"cause", NameOf(result.attribution.cause)},
                          {"evidence", result.attribution.evidence},
                          {"checks", Json::object()}};

@@ -3,12 +3,15 @@
 // What a run comes to: verdict, tracking, checks, attribution, speed.
 
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "harness/checks/attribution.h"
 #include "harness/diagnosis/causes.h"
 #include "harness/run/closed_loop.h"
+#include "harness/run/sampled_loop.h"
 
 namespace dexcheck {
 
@@ -39,6 +42,13 @@ class TrackingStatistics {
   long count_ = 0;
 };
 
+/// What a motor's limit took of its torque.
+struct LimitedTorque {
+  double time = 0.0;   ///< How long in all, s.
+  double first = 0.0;  ///< When it began, s.
+  double most = 0.0;   ///< N m, N.
+};
+
 /// A finished run, or as far as it came.
 struct RunResult {
   Verdict verdict = Verdict::kPass;
@@ -47,11 +57,19 @@ struct RunResult {
   bool grasp_lost = false;         ///< It ended because a fingertip left the object.
   bool controller_failed = false;  ///< It ended because a controller of the user's own failed.
   TrackingStatistics tracking;
+  double peak_effort = 0.0;             ///< Largest |tau'| sent over its motor's limit.
+  std::string busiest_motor;            ///< Whose that is.
+  std::vector<LimitedTorque> limited;   ///< By entry of tau'; empty where torques arrive as they are sent.
+  std::optional<JointMargins> margins;  ///< Of a motion of joints, where JudgeGains was asked.
+  std::string gain_card;                ///< Likewise.
   AttributionResult attribution;
   Causes causes;  ///< What explains the residuals.
   double recording_seconds = 0.0;
   double wall_seconds = 0.0;  ///< Of all steps, recording included.
 };
+
+/// Takes in a step of dt (s).
+void AddLimits(const StepRecord& step, double dt, std::vector<LimitedTorque>* limited);
 
 /// The verdict and its attribution. Call when the last step is done.
 void Judge(const Setup& setup, const ClosedLoop& loop, RunResult* result);

@@ -38,6 +38,11 @@ class Runner {
         /*settling=*/true);
     loop_.SetObserver([&](const StepRecord& step) {
       if (step.command.tracks || step.command.joints.q.size() > 0) result_.tracking.Add(step.error);
+      if (step.drive.effort > result_.peak_effort) {
+        result_.peak_effort = step.drive.effort;
+        result_.busiest_motor = loop_.motors()[static_cast<size_t>(step.drive.busiest_motor)].name;
+      }
+      AddLimits(step, setup_->scenario().plant.time_step, &result_.limited);
       const Clock::time_point recording = Clock::now();
       after_step(step);
       result_.recording_seconds += SecondsSince(recording);

@@ -88,6 +88,9 @@ JointGains FindGains(const JointTask& task, const JointReader& joints, const Rob
   gains.D = inertia.cwiseProduct(gains.K_v);
   if (!task.stiffness.key.empty()) gains.K = joints.Resolve(task.stiffness);
   if (!task.damping.key.empty()) gains.D = joints.Resolve(task.damping);
+  if (!task.coulomb.Is(0.0)) gains.coulomb = joints.Resolve(task.coulomb);
+  if (!task.viscous.Is(0.0)) gains.viscous = joints.Resolve(task.viscous);
+  gains.coulomb_velocity = task.coulomb_velocity;
   return gains;
 }
 

@@ -151,6 +151,8 @@ struct JointTask {
   // Gains of its law: by joint, or for all.
   ByName natural_frequency, damping_ratio;  ///< rad/s and 1.
   ByName stiffness, damping;                ///< N m/rad and N m s/rad; without a key, as the gains above.
+  ByName coulomb, viscous;                  ///< Friction that it compensates, N m and N m s/rad.
+  double coulomb_velocity = 0.01;           ///< At which coulomb is smoothed, rad/s.
 };
 
 /// How well the object must follow, which belongs to what the scenario means. From `from` on, s.

@@ -67,7 +67,7 @@ void ReadActuation(const TomlValue& value, double time_step, ActuationOptions* a
   TomlTable table = value.AsTable();
   ReadKeys<Options>(table,
                     {KEY(torque_step), ANY_KEY(gain_error), KEY(lag), KEY(coulomb), KEY(stribeck),
-                     POSITIVE_KEY(stribeck_velocity), KEY(backlash), KEY(saturate)},
+                     POSITIVE_KEY(stribeck_velocity), KEY(backlash), KEY(saturate), KEY(limit)},
                     actuation);
   ReadDelay(table, "delay", time_step, /*whole=*/false, &actuation->delay);
   table.RejectUnused();

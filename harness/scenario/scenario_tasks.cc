@@ -284,7 +284,10 @@ void ReadJointControl(const TomlValue& value, ControlOptions* control, JointTask
     numbers->all = std::numeric_limits<double>::quiet_NaN();
   }
   using Options = JointTask;
-  ReadKeys<Options>(table, {KEY(natural_frequency), KEY(damping_ratio), KEY(stiffness), KEY(damping)}, task);
+  ReadKeys<Options>(table,
+                    {KEY(natural_frequency), KEY(damping_ratio), KEY(stiffness), KEY(damping), KEY(coulomb),
+                     KEY(viscous), POSITIVE_KEY(coulomb_velocity)},
+                    task);
   table.RejectUnused();
 }
 

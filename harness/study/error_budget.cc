@@ -129,6 +129,7 @@ void ListActuation(const Imperfections& all, std::vector<ErrorSource>* list) {
   lister.Add("actuation.torque_step", &A::torque_step);
   lister.Add("actuation.gain_error", &A::gain_error);
   lister.Add("actuation.lag", &A::lag);
+  lister.Add("actuation.limit", &A::limit);
   lister.Add("actuation.backlash", &A::backlash);
   if (all.actuation.coulomb.Is(0.0) && all.actuation.stribeck.Is(0.0)) return;
   list->push_back(

@@ -3,9 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstddef>
 #include <limits>
-#include <utility>
 
 #include "harness/plant/velocity_filter.h"
 #include "harness/study/trial.h"
@@ -17,133 +15,36 @@ namespace {
 /// b = (T^2 + h T) / 2: what e gains from an acceleration that is held.
 double CalcReach(const SampledLoop& loop) { return 0.5 * loop.period() * (loop.period() + loop.time_step); }
 
-/// One axis of the error, stepped as the plant, its sensors and its motors step it. It is linear in its
-/// state.
-class ErrorChain {
- public:
-  ErrorChain(const SampledLoop& loop, const AxisGains& gains) : loop_(loop), gains_(gains) {
-    // As motors mix the torques of two steps where the delay is no whole number of them.
-    constexpr double kRounding = 1e-9;
-    const double steps = loop.delay / loop.time_step;
-    const double whole = std::floor(steps + kRounding * std::max(1.0, steps));
-    fraction_ = std::max(0.0, steps - whole);
-    if (fraction_ < kRounding * std::max(1.0, steps)) fraction_ = 0.0;
-    late_ = static_cast<size_t>(whole);
-    const auto latency = static_cast<size_t>(loop.latency);
-    size_ = kChains + 2 * latency + (loop.is_direct() ? 0 : late_ + 1);
-    state_.assign(size_, 0.0);
-  }
+/// One axis of the error is a plant of mass 1.
+LinearLoop MakeAxis(const SampledLoop& timing, const AxisGains& gains) {
+  const MatrixXd one = MatrixXd::Identity(1, 1);
+  return {
+      .timing = timing, .M = one, .D = 0.0 * one, .G = 0.0 * one, .K = gains.K_p * one, .V = gains.K_v * one};
+}
 
-  [[nodiscard]] size_t size() const { return size_; }
-  [[nodiscard]] std::vector<double>& state() { return state_; }
-  [[nodiscard]] double error() const { return state_[kError]; }
-
-  /// At rest beside the place that it is called to; nothing was sent before.
-  void Start(double error) {
-    std::fill(state_.begin(), state_.end(), 0.0);
-    state_[kError] = state_[kSeen] = error;
-    for (size_t i = 0; i < static_cast<size_t>(loop_.latency); ++i) state_[kChains + 2 * i] = error;
-  }
-
-  /// Step k of the period.
-  void Step(long k) {
-    const double h = loop_.time_step;
-    double& e = state_[kError];
-    double& e_dot = state_[kRate];
-    // The rate is differenced: (e_k - e_{k-1}) / h, which is e_dot where the filter lets all through.
-    state_[kFiltered] += loop_.low_pass * ((e - state_[kSeen]) / h - state_[kFiltered]);
-    state_[kSeen] = e;
-    double measured = e;
-    double measured_rate = loop_.low_pass == 1.0 ? e_dot : state_[kFiltered];
-    for (size_t i = 0; i < static_cast<size_t>(loop_.latency); ++i) {
-      std::swap(measured, state_[kChains + 2 * i]);
-      std::swap(measured_rate, state_[kChains + 2 * i + 1]);
-    }
-    if (k % loop_.hold == 0) state_[kHeld] = -gains_.K_v * measured_rate - gains_.K_p * measured;
-    double a = state_[kHeld];
-    if (!loop_.is_direct()) a = Lag(Delay(a));
-    e_dot += h * a;
-    e += h * e_dot;
-  }
-
- private:
-  enum Place : size_t { kError, kRate, kSeen, kFiltered, kHeld, kLagging, kChains };
-
-  /// The chain of what was sent holds late_ + 1 steps, the newest first.
-  double Delay(double a) {
-    const size_t first = size_ - late_ - 1;
-    double newest = a;
-    for (size_t i = 0; i < late_; ++i) std::swap(newest, state_[first + i]);
-    // `newest` was sent late_ steps ago, the last place holds what was sent one step earlier.
-    const double earlier = state_[first + late_];
-    state_[first + late_] = newest;
-    return (1.0 - fraction_) * newest + fraction_ * earlier;
-  }
-
-  /// y' = (u - y) / lag, its mean over the step.
-  double Lag(double u) {
-    if (!(loop_.lag > 0.0)) {
-      state_[kLagging] = 0.0;  // a state that stays as it is would be an eigenvalue of 1
-      return u;
-    }
-    const double away = state_[kLagging] - u;
-    const double decay = std::exp(-loop_.time_step / loop_.lag);
-    state_[kLagging] = u + away * decay;
-    return u + away * (1.0 - decay) * loop_.lag / loop_.time_step;
-  }
-
-  SampledLoop loop_;
-  AxisGains gains_;
-  size_t late_ = 0;
-  double fraction_ = 0.0;
-  size_t size_ = 0;
-  std::vector<double> state_;
-};
-
-/// lim |A^n|^(1/n) of a matrix by columns; n is doubled until its root no longer moves by more than rounding.
-double CalcSpectralRadiusOf(std::vector<double> A, size_t n) {
+/// lim |A^n|^(1/n); n is doubled until its root no longer moves by more than rounding.
+double CalcSpectralRadiusOf(MatrixXd A) {
   constexpr int kSquarings = 40;
   double logarithm = 0.0;  // of the power's size, divided by the power
   double fraction = 1.0;
-  std::vector<double> square(n * n);
   for (int i = 0; i <= kSquarings; ++i) {
-    double size = 0.0;
-    for (const double entry : A) size = std::max(size, std::abs(entry));
+    const double size = A.cwiseAbs().maxCoeff();
     if (!(size > 0.0)) return 0.0;
     logarithm += fraction * std::log(size);
     fraction *= 0.5;
-    for (double& entry : A) entry /= size;
-    std::fill(square.begin(), square.end(), 0.0);
-    for (size_t column = 0; column < n; ++column) {
-      for (size_t k = 0; k < n; ++k) {
-        const double factor = A[column * n + k];
-        if (factor == 0.0) continue;
-        for (size_t row = 0; row < n; ++row) square[column * n + row] += A[k * n + row] * factor;
-      }
-    }
-    A.swap(square);
+    A /= size;
+    A = (A * A).eval();
   }
   return std::exp(logarithm);
-}
-
-double CalcRadiusOfChain(const SampledLoop& loop, const AxisGains& gains) {
-  ErrorChain chain(loop, gains);
-  const size_t n = chain.size();
-  std::vector<double> A(n * n, 0.0);
-  for (size_t column = 0; column < n; ++column) {
-    chain.state().assign(n, 0.0);
-    chain.state()[column] = 1.0;
-    for (long k = 0; k < loop.hold; ++k) chain.Step(k);
-    std::copy(chain.state().begin(), chain.state().end(),
-              A.begin() + static_cast<std::ptrdiff_t>(column * n));
-  }
-  return CalcSpectralRadiusOf(std::move(A), n);
 }
 
 }  // namespace
 
 double CalcSpectralRadius(const SampledLoop& loop, const AxisGains& gains) {
-  if (!loop.is_direct()) return CalcRadiusOfChain(loop, gains);
+  if (!loop.is_direct()) {
+    const SampledSystem system = CalcSampledSystem(MakeAxis(loop, gains));
+    return CalcSpectralRadiusOf(system.A - system.B * system.C);
+  }
   const double T = loop.period();
   const double b = CalcReach(loop);
   const double trace = 2.0 - T * gains.K_v - b * gains.K_p;
@@ -154,12 +55,17 @@ double CalcSpectralRadius(const SampledLoop& loop, const AxisGains& gains) {
 }
 
 std::vector<double> CalcStepResponse(const SampledLoop& loop, const AxisGains& gains, long count) {
-  ErrorChain chain(loop, gains);
-  chain.Start(1.0);
+  const LoopChain chain(MakeAxis(loop, gains));
+  // At rest beside the place that it is called to; nothing was sent before.
+  MatrixXd x = MatrixXd::Zero(chain.size(), 1), c = MatrixXd::Zero(1, 1);
+  x(0, 0) = 1.0;
+  for (long i = 0; i < loop.latency; ++i) x(4 + 2 * i, 0) = 1.0;
   std::vector<double> errors;
   for (long i = 0; i < count; ++i) {
-    errors.push_back(chain.error());
-    chain.Step(i);
+    errors.push_back(x(0, 0));
+    const MatrixXd law = chain.Measure(&x);
+    if (i % loop.hold == 0) c = -law;
+    chain.Move(c, &x);
   }
   return errors;
 }
@@ -192,6 +98,7 @@ bool FollowsErrorDynamics(const Scenario& scenario) {
   Imperfections rest = scenario.imperfections;
   rest.actuation.delay = rest.actuation.lag.all = 0.0;
   rest.actuation.saturate = false;
+  rest.actuation.limit = {};
   rest.sensing.latency = rest.sensing.object_latency = 0.0;
   if (rest.sensing.object_velocity == VelocitySource::kDifferenced) {
     rest.sensing.object_velocity = VelocitySource::kMeasured;

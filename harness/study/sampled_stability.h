@@ -18,32 +18,16 @@
 // continuous K_v > 0 and K_v = 2 sqrt(K_p).
 //
 // Torques that come late, a state that is measured late, a rate that is differenced and filtered, and motors
-// that lag make a longer chain of states. One period of it is a matrix A, of which column i is what a period
-// makes of the i-th unit state, and its spectral radius is lim |A^n|^(1/n), here with n = 2^40 by squaring.
+// that lag make a longer chain of states (sampled_loop.h). The spectral radius of one period of it, A, is
+// lim |A^n|^(1/n), here with n = 2^40 by squaring.
 
 #include <array>
 #include <vector>
 
+#include "harness/run/sampled_loop.h"
 #include "harness/study/trial.h"
 
 namespace dexcheck {
-
-/// When the law is evaluated.
-struct SampledLoop {
-  double time_step = 1e-3;  ///< h, s.
-  long hold = 1;            ///< m, steps that torques are held.
-  double delay = 0.0;       ///< Of the torques, s.
-  long latency = 0;         ///< Age of the error that is measured, steps.
-  double low_pass =
-      1.0;  ///< Fraction of a rate's change that its filter lets through at each step; 1 for no filter.
-  double lag = 0.0;  ///< Time constant of the motors, s.
-  [[nodiscard]] double period() const { return static_cast<double>(hold) * time_step; }
-  /// Nothing is late and nothing filtered: what the closed forms below are for.
-  [[nodiscard]] bool is_direct() const {
-    return delay == 0.0 && latency == 0 && low_pass == 1.0 && lag == 0.0;
-  }
-  bool operator==(const SampledLoop&) const = default;
-};
 
 /// Gains of one axis: K_v in 1/s, K_p in 1/s^2.
 struct AxisGains {

@@ -5,7 +5,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <map>
 
+#include "harness/run/joint_margins.h"
 #include "harness/study/sampling.h"
 #include "harness/study/search.h"
 
@@ -162,6 +164,63 @@ std::string DescribeFailures(const Study& study, const std::vector<TrialRow>& ro
 }
 
 }  // namespace
+
+namespace {
+
+/// What keeps points that would be better, or came to no end, from being feasible: by how many trials.
+std::string DescribeLimits(const Study& study, const std::vector<TrialRow>& rows,
+                           const std::vector<JudgedPoint>& points, const JudgedPoint& best) {
+  std::map<std::string, int> limits;
+  for (const JudgedPoint& point : points) {
+    const double value = point.judgement.objectives.front();
+    const bool is_better = value < best.judgement.objectives.front() || !std::isfinite(value);
+    if (point.judgement.is_feasible() || !is_better) continue;
+    for (const TrialRow& row : rows) {
+      if (row.trial.number / CountTrialsOfPoint(study) != point.number) continue;
+      if (!IsHeld(row.result.outcome)) ++limits[NameOf(row.result.outcome)];
+      for (const Constraint& constraint : study.constraints)
+        if (IsHeld(row.result.outcome) && CalcViolation(constraint, row.result) > 0.0)
+          ++limits[constraint.text];
+    }
+  }
+  std::string text;
+  for (const auto& [limit, count] : limits)
+    text += fmt::format("{}{} ({} trial{})", text.empty() ? "# limited by " : ", ", limit, count,
+                        count == 1 ? "" : "s");
+  if (!text.empty()) text += "\n";
+  const std::string edges = DescribeEdges(study, best.values);
+  if (!edges.empty()) text += "#" + edges + "\n";
+  return text.empty() ? "# limited by nothing in these ranges but the objective itself\n" : text;
+}
+
+}  // namespace
+
+std::string MakeGainCard(const StudyInputs& inputs, const std::vector<TrialRow>& rows) {
+  const Study& study = inputs.study;
+  if (study.objectives.size() != 1 || study.search.method == SearchMethod::kMargins) return "";
+  const std::vector<JudgedPoint> points = JudgePoints(study, rows);
+  const std::vector<const JudgedPoint*> feasible = SortFeasible(points);
+  if (feasible.empty()) return "";
+  const JudgedPoint& best = *feasible.front();
+  const long number = best.number * CountTrialsOfPoint(study);
+  const TrialRow& row = *std::find_if(rows.begin(), rows.end(),
+                                      [&](const TrialRow& one) { return one.trial.number == number; });
+  const Scenario scenario = MakeTrialScenario(inputs, row.trial);
+  if (scenario.joint_task() == nullptr) return "";
+  const Scenario yours =
+      ParseScenario(inputs.scenario_text, inputs.scenario_source, inputs.scenario_folder, study.overrides);
+  std::string card = "# your gains:\n" + CommentLines(WriteJointControl(yours, 1.0));
+  card += fmt::format("# best of {} points: {} {:.4g}{}\n", points.size(), Describe(study.objectives.front()),
+                      ShowObjective(study.objectives.front(), best.judgement.objectives.front()),
+                      ShowUnit(study.objectives.front().expression));
+  const auto& metrics = row.result.metrics;
+  card += fmt::format(
+      "# margins, one torque at a time: gain {:.3g}, phase {:.3g} degrees, delay {:.3g} ms; largest torque "
+      "{:.3g} of its limit\n",
+      metrics[kGainMargin], RadToDeg(metrics[kPhaseMargin]), 1e3 * metrics[kDelayMargin],
+      metrics[kPeakEffort]);
+  return card + DescribeLimits(study, rows, points, best) + WriteJointControl(scenario, 1.0);
+}
 
 std::string DescribeValues(const Study& study, const std::vector<double>& values) {
   std::string text;

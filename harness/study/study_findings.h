@@ -7,6 +7,7 @@
 
 #include "harness/study/search.h"
 #include "harness/study/study_store.h"
+#include "harness/study/trial.h"
 
 namespace dexcheck {
 
@@ -19,6 +20,11 @@ double ShowObjective(const Objective& objective, double value);
 /// What the trials say to the study's question, one sentence each; empty for a study without one.
 /// @param rows of all trials that are done.
 std::vector<std::string> ListFindings(const Study& study, const std::vector<TrialRow>& rows);
+
+/// Of a study of a motion of joints with one objective: TOML that may take the place of the scenario's
+/// [control], with the best point's gains; your gains, the metrics and what keeps other points from being
+/// better as comments. Empty of another study, and where no point is feasible.
+std::string MakeGainCard(const StudyInputs& inputs, const std::vector<TrialRow>& rows);
 
 // How far a study has come, while it runs or after.
 

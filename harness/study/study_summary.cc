@@ -80,6 +80,7 @@ class Summary {
             {"error", kMetrics[error_].name}};
     json["outcomes"] = ListOutcomes();
     json["findings"] = ListFindings(study_, rows_);
+    json["gain_card"] = MakeGainCard(inputs_, rows_);
     json["best"] = rows_.empty() ? Json(nullptr) : ListBest();
     json["margins"] = ListMargins();
     json["sensitivity"] = ListSensitivity();
@@ -318,7 +319,9 @@ class Summary {
     for (int i = 0; i < kNumMetrics; ++i) {
       const auto metric = static_cast<Metric>(i);
       columns.push_back({{"name", kMetrics[metric].name}, {"label", LabelOf(metric)}});
-      if (metric == kConeMargin || metric == kSimulatedTime) columns.back()["larger_is_better"] = true;
+      if (metric == kConeMargin || metric == kSimulatedTime || metric == kGainMargin ||
+          metric == kPhaseMargin || metric == kDelayMargin)
+        columns.back()["larger_is_better"] = true;
     }
     if (!has_theory()) return columns;
     columns.push_back(

@@ -11,6 +11,7 @@
 #include "controller/model/parameter_reader.h"
 #include "harness/engine/compiled_model.h"
 #include "harness/engine/engine.h"
+#include "harness/run/joint_margins.h"
 #include "harness/run/runner.h"
 
 namespace dexcheck {
@@ -84,6 +85,17 @@ Setup MakeSetup(const StudyInputs& inputs, const Trial& trial, const Scenario& s
   return Setup(scenario, MakeModel(inputs, trial, scenario), inputs.mjcf, MakeEngine(inputs));
 }
 
+/// None of a loop that is not stable: nothing is left.
+void SetMargins(const Setup& setup, std::array<double, kNumMetrics>* metrics) {
+  if (setup.joints() == nullptr) return;
+  const std::optional<JointMargins> margins = CalcJointMargins(setup, setup.joints()->gains);
+  if (!margins) return;
+  const bool stable = margins->is_stable();
+  (*metrics)[kGainMargin] = stable ? margins->least.gain : 1.0;
+  (*metrics)[kPhaseMargin] = stable ? margins->least.phase : 0.0;
+  (*metrics)[kDelayMargin] = stable ? margins->least.delay : 0.0;
+}
+
 bool HasDiverged(const Setup& setup, const TrialResult& result) {
   if (!result.failure.empty()) return true;
   if (setup.scenario().start_error().norm() > 0.0) return !(result.metrics[kErrorGrowth] <= 1.0);
@@ -142,6 +154,7 @@ TrialResult RunTrial(const StudyInputs& inputs, const Trial& trial) {
                        FormatNumber(runner.loop().record().time) + " s";
     }
     result.metrics = monitor.CalcMetrics(run.tracking);
+    SetMargins(setup, &result.metrics);
     result.outcome = Classify(setup, run, result);
   } catch (const InputError& error) {
     result.metrics.fill(std::numeric_limits<double>::quiet_NaN());

@@ -48,6 +48,9 @@ enum Metric {
   kSimulatedTime,
   kJointErrorRms,
   kJointErrorMax,
+  kGainMargin,
+  kPhaseMargin,
+  kDelayMargin,
   kNumMetrics
 };
 
@@ -76,6 +79,10 @@ inline constexpr std::array<MetricInfo, kNumMetrics> kMetrics = {{
     {"joint_error_rms", "rad",
      "of a motion of joints: at each step the joint that is farthest from its place"},
     {"joint_error_max", "rad", "the largest"},
+    {"gain_margin", "1",
+     "of a motion of joints: least factor above 1 of one joint's torque that is unstable"},
+    {"phase_margin", "rad", "likewise, least lag or lead"},
+    {"delay_margin", "s", "likewise, least delay"},
 }};
 
 /// Outcome and metrics; NaN where a metric does not exist.

@@ -60,6 +60,13 @@ const CauseTable = (causes, columns = []) => {
       ...(has_time ? [cause.when ? When(cause.when) : 'always'] : [])]})), 99);
 };
 
+/** Gains as TOML, to be copied. */
+const GainCard = text => {
+  const copy = Make('button', 'Copy', {type: 'button'});
+  copy.addEventListener('click', () => navigator.clipboard.writeText(text));
+  return Add(Make('div', '', {className: 'card gains'}), copy, Make('pre', text, {tabIndex: 0}));
+};
+
 /** Of pages with plots: verdict and sections, which the navigation leads to. */
 const MakeSections = () => {
   const main = document.querySelector('main'), links = document.querySelector('nav > div');

@@ -88,6 +88,8 @@
     Card('', ...run.categories.filter(category => category.checks.length).map(Category)));
   }
 
+  if (run.gain_card) AddSection('Gains', GainCard(run.gain_card));
+
   AddSection('Inputs', Card('', Add(Make('dl'), ...run.inputs.filter(([, text]) => text).flatMap(([term, text, is_code]) =>
     [Make('dt', term), Add(Make('dd'), is_code ? Make('code', text) : text)])),
   ...run.files.map(({title, text, open}) =>

@@ -34,6 +34,7 @@
       Add(get('study-tiles'), Add(Make('div', '', {className: 'card'}), Make('b', String(number)), Make('span', text)));
     }
     Add(get('findings'), ...study.findings.map(finding => Make('p', finding)));
+    if (study.gain_card) get('findings').after(GainCard(study.gain_card));
     const {dexcheck_version, git_revision, mujoco_version} = study.versions;
     get('study-footer').textContent = `dexcheck ${dexcheck_version}${git_revision ? ', revision ' + git_revision : ''}, MuJoCo ${mujoco_version}.`;
     Add(get('outcome-table'), ShowTable(['outcome', 'trials'], study.outcomes.filter(o => o.count > 0).map(o => [

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <optional>
 #include <random>
 
@@ -33,8 +34,12 @@ class JointLawTest : public ::testing::Test {
     q_ = DrawVector(1.0, &random);
     xi_ = DrawVector(1.0, &random);
     desired_ = {q_ + DrawVector(0.1, &random), DrawVector(1.0, &random), DrawVector(3.0, &random)};
-    gains_ = {VectorXd::LinSpaced(7, 100, 400), VectorXd::LinSpaced(7, 20, 40),
-              VectorXd::LinSpaced(7, 50, 500), VectorXd::LinSpaced(7, 5, 50)};
+    gains_ = {VectorXd::LinSpaced(7, 100, 400),
+              VectorXd::LinSpaced(7, 20, 40),
+              VectorXd::LinSpaced(7, 50, 500),
+              VectorXd::LinSpaced(7, 5, 50),
+              {},
+              {}};
     robot_.SetState(q_, xi_);
     robot_.CalcDynamics();
   }
@@ -89,7 +94,24 @@ TEST_F(JointLawTest, FeedforwardFollowsWithoutError) {
   EXPECT_TRUE(MatrixNear(CalcTorque(ControlLaw::kFeedforwardPd, off), expected, kTorqueRounding));
 }
 
+TEST_F(JointLawTest, FrictionIsCompensatedAlongTheDesiredRate) {
+  for (const ControlLaw law :
+       {ControlLaw::kComputedTorque, ControlLaw::kPdGravity, ControlLaw::kFeedforwardPd}) {
+    gains_.coulomb = gains_.viscous = VectorXd();
+    VectorXd expected = CalcTorque(law, desired_);
+    gains_.coulomb = VectorXd::LinSpaced(7, 1, 4);
+    gains_.viscous = VectorXd::LinSpaced(7, 2, 9);
+    gains_.coulomb_velocity = 0.5;
+    for (Eigen::Index i = 0; i < 7; ++i) {
+      const double rate = desired_.q_dot[i];
+      expected[i] += gains_.coulomb[i] * std::tanh(rate / 0.5) + gains_.viscous[i] * rate;
+    }
+    EXPECT_TRUE(MatrixNear(CalcTorque(law, desired_), expected, kTorqueRounding));
+  }
+}
+
 TEST_F(JointLawTest, AllocatesNothing) {
+  gains_.coulomb = gains_.viscous = gains_.D;
   JointLaw law(model_, ControlLaw::kFeedforwardPd, gains_);
   const AllocationCounter counter;
   law.CalcTorque(robot_, q_, xi_, desired_);
@@ -100,6 +122,12 @@ TEST_F(JointLawTest, RefusesWhatItCannotDrive) {
   EXPECT_THROW(JointLaw(testing::ReadPaperRobot(), ControlLaw::kComputedTorque, gains_),
                std::invalid_argument);
   EXPECT_THROW(JointLaw(model_, ControlLaw::kImpedance, gains_), std::invalid_argument);
+  JointGains wrong = gains_;
+  wrong.coulomb.setOnes(6);
+  EXPECT_THROW(JointLaw(model_, ControlLaw::kComputedTorque, wrong), std::invalid_argument);
+  wrong = gains_;
+  wrong.coulomb_velocity = 0.0;
+  EXPECT_THROW(JointLaw(model_, ControlLaw::kComputedTorque, wrong), std::invalid_argument);
   gains_.K_v.resize(6);
   EXPECT_THROW(JointLaw(model_, ControlLaw::kComputedTorque, gains_), std::invalid_argument);
 }

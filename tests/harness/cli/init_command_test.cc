@@ -27,7 +27,19 @@ TEST_F(InitCommand, MakesAFolderOfAUrdfThatRuns) {
     EXPECT_EQ(
         RunJson(0, {"consistency", other, "pair/robot.xml", "--exact", "--samples", "50"}).at("outcome"),
         "rounding");
-  EXPECT_THAT(Expect(0, "study run pair/gains.toml --db gains.db").out, HasSubstr("18 of 18"));
+  // Its gains, and the best of the study, may take the place of the scenario's.
+  EXPECT_TRUE(run.at("margins").at("one_torque").at("phase_rad").get<double>() > 0.5);
+  EXPECT_THAT(run.at("gain_card").get<std::string>(), HasSubstr("[control]\nlaw = \"computed_torque\"\n"));
+  const std::string study = Expect(0, "study run pair/gains.toml --db gains.db").out;
+  EXPECT_THAT(study, HasSubstr("18 of 18"));
+  const std::string motion = Read("pair/motion.toml");
+  const size_t from = motion.find("[control]"), to = motion.find("[expect]");
+  for (const std::string& card :
+       {run.at("gain_card").get<std::string>(), study.substr(study.find("# your gains"))}) {
+    Write("pair/better.toml", motion.substr(0, from) + card + "\n" + motion.substr(to));
+    EXPECT_EQ(RunJson(0, {"run", "pair/better.toml", "--no-log", "--set", "duration=0.5"}).at("verdict"),
+              "pass");
+  }
   // What is there is not written over.
   EXPECT_TRUE(Refused("init pair.urdf", {"pair", "--out"}));
 }
@@ -50,6 +62,46 @@ TEST_F(InitCommand, TakesTheUsersMjcfWithMotors) {
   WriteChanged("wrong.urdf", ReadFixture("pair.urdf"), "value=\"0.8\"", "value=\"0.9\"");
   EXPECT_THAT(Expect(0, "init wrong.urdf pair.xml --out wrong").out, HasSubstr("dexcheck consistency"));
   EXPECT_EQ(RunMotion(1, "wrong").at("checks").at("link_mass").at("pass"), false);
+}
+
+TEST_F(InitCommand, MotorsHaveTheLimitsThatTheFilesState) {
+  const std::string limit = R"(ctrllimited="true" ctrlrange="-1 1")";
+  Copy("pair.urdf");
+  Copy("pair.xml");
+  Expect(0, "init pair.urdf --out alone");
+  EXPECT_THAT(Read("alone/robot.xml"), HasSubstr(limit));
+  Expect(0, "init pair.urdf pair.xml --out both");
+  EXPECT_THAT(Read("both/robot.xml"), HasSubstr(limit));
+  Expect(0, "init pair.xml --out none");
+  EXPECT_THAT(Read("none/robot.xml"), Not(HasSubstr("ctrlrange")));
+  // Of an MJCF for a later release, its own or its class's.
+  WriteChanged(
+      "newer.xml", ReadFixture("pair.xml"), "<worldbody>",
+      "<default><default class='strong'><joint actuatorfrcrange='-7 7'/></default></default><worldbody>");
+  WriteChanged("newer.xml", Read("newer.xml"), "<joint name=\"shoulder\"",
+               "<joint class='strong' name=\"shoulder\"");
+  WriteChanged("newer.xml", Read("newer.xml"), "<joint name=\"elbow\"",
+               "<joint actuatorfrcrange='-3 4' name=\"elbow\"");
+  Expect(0, "init newer.xml --out newer");
+  EXPECT_THAT(Read("newer/robot.xml"), HasSubstr(R"(ctrlrange="-7 7")"));
+  EXPECT_THAT(Read("newer/robot.xml"), HasSubstr(R"(ctrlrange="-3 3")"));
+}
+
+// MuJoCo leaves out contacts of neighbours, but not those of a link on a base that is welded to the world.
+TEST_F(InitCommand, ALinkDoesNotTouchTheBaseThatItTurnsOn) {
+  std::string mjcf = ReadFixture("pair.xml");
+  const auto change = [&](const std::string& from, const std::string& to) {
+    WriteChanged("changed", mjcf, from, to);
+    mjcf = Read("changed");
+  };
+  change("<body name=\"upper\" pos=\"0 0 0.1\">",
+         "<body name=\"stand\"><geom size=\"0.2\"/><body name=\"upper\" pos=\"0 0 0.1\"><geom size=\"0.05\" "
+         "mass=\"0\"/>");
+  change("</worldbody>", "</body></worldbody>");
+  Write("stands.xml", mjcf);
+  Expect(0, "init stands.xml");
+  EXPECT_THAT(Read("stands/robot.xml"), HasSubstr(R"(<exclude body1="stand" body2="upper"/>)"));
+  EXPECT_EQ(RunMotion(0, "stands").at("verdict"), "pass");
 }
 
 TEST_F(InitCommand, CopiesShippedScenarios) {

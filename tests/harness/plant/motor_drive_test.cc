@@ -122,6 +122,17 @@ TEST_F(MotorDriveTest, ASaturatingMotorDeliversItsLimitAndReportsIt) {
   EXPECT_EQ(Give(drive, -50.0), -kLimit);
 }
 
+TEST_F(MotorDriveTest, AStatedLimitTakesTheMotorsPlace) {
+  MotorDrive drive = Make({.limit = {.groups = {{motors_[kJoint].name, 3.0}}, .key = "actuation.limit"}});
+  EXPECT_EQ(Give(drive, 50.0), 3.0);
+  EXPECT_EQ(output_.cut[kJoint], 47.0);
+  EXPECT_EQ(Give(drive, -2.0), -2.0);
+  EXPECT_EQ(output_.cut[kJoint], 0.0);
+  tau_[kJoint + 1] = 2.0 * kLimit;
+  (void)Give(drive, 0.0);
+  EXPECT_EQ(output_.tau[kJoint + 1], kLimit);
+}
+
 TEST_F(MotorDriveTest, FrictionIsCoulombsFarFromRestAndStribecksNearIt) {
   MotorDrive drive = Make({.coulomb = {.all = 0.3}, .stribeck = {.all = 0.2}, .stribeck_velocity = 0.1});
   xi_[kJoint] = 2.0;

@@ -3,7 +3,12 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <utility>
+
 #include "controller/control/joint_controller.h"
+#include "controller/model/parameter_reader.h"
+#include "harness/engine/engine.h"
 #include "tests/harness/run/changed_parts.h"
 #include "tests/harness/run/shipped_run.h"
 
@@ -48,6 +53,93 @@ TEST_P(JointLaws, AreTheirOwnFormulas) {
   EXPECT_EQ(result.verdict, Verdict::kPass) << result.failure << result.attribution.evidence;
   EXPECT_EQ(run.loop().checks().Find("law_torque").count, 1000);
   EXPECT_LE(run.Worst("law_torque"), 1e-12);
+}
+
+/// The Panda with dry friction in its joints, N m, which model and engine state.
+Setup MakeRubbedPanda(double friction, const std::vector<std::string>& overrides) {
+  const Scenario scenario = ReadShippedScenario("panda-reach", overrides);
+  RobotSpec spec = ReadRobotModel(scenario.model_file).spec();
+  for (Joint& joint : spec.joints) joint.dry_friction = friction;
+  MjModelPtr engine = LoadMjcf(scenario.mjcf_file);
+  std::fill_n(engine->dof_frictionloss, engine->nv, friction);
+  return {scenario, RobotModel(spec), scenario.mjcf_file, std::move(engine)};
+}
+
+/// Error of the joints, rms, of a run in which all holds.
+double FindError(double friction, const std::vector<std::string>& overrides) {
+  const Setup setup = MakeRubbedPanda(friction, overrides);
+  const std::unique_ptr<Runner> runner = RunParts(setup, MakeLoopParts(setup));
+  const RunResult& result = runner->result();
+  EXPECT_EQ(result.verdict, Verdict::kPass) << result.failure << result.attribution.evidence;
+  EXPECT_LE(runner->loop().checks().Find("law_torque").worst, 1e-12);
+  return result.tracking.joints_rms();
+}
+
+// Compensation is a summand of the law; on a robot that has the friction it takes most of the error away.
+TEST_P(JointLaws, CompensateFriction) {
+  std::vector<std::string> keys = {"duration=1", "expect={}", std::string("control.law=") + GetParam()};
+  const double without = FindError(0.5, keys);
+  keys.insert(keys.end(), {"control.coulomb=0.5", "control.coulomb_velocity=0.02"});
+  // What pd_gravity does not know of the motion leaves more than friction does.
+  EXPECT_LT(FindError(0.5, keys), (GetParam() == std::string("pd_gravity") ? 1.0 : 0.2) * without);
+  // On a robot without it, it is an error that the law asks for.
+  EXPECT_GT(FindError(0.0, keys), 1e-5);
+}
+
+// What a scenario lets be cut off is told, and no fault; where the arm must follow, it is why it does not.
+TEST(JointMotionRun, LimitedTorquesAreDeclared) {
+  const std::vector<std::string> keys = {"duration=1", "actuation.limit={ panda_joint2 = 11 }"};
+  const auto with = [&](const char* key) {
+    std::vector<std::string> all = keys;
+    all.emplace_back(key);
+    return all;
+  };
+  ShippedRun run("panda-reach", with("expect={}"));
+  double most = 0.0, cut = 0.0;
+  const RunResult& result = run.Run([&] {
+    most = std::max(most, std::abs(run.step().drive.tau[1]));
+    cut = std::max(cut, std::abs(run.step().command.tau[1]) - 11.0);
+  });
+  EXPECT_EQ(result.verdict, Verdict::kPass) << result.failure << result.attribution.evidence;
+  EXPECT_LE(run.Worst("law_torque"), 1e-12);
+  EXPECT_EQ(run.Worst("torque_applied"), 0.0);
+  EXPECT_EQ(most, 11.0);
+  ASSERT_EQ(result.limited.size(), 7U);
+  EXPECT_GT(result.limited[1].time, 0.05);
+  EXPECT_NEAR(result.limited[1].most, cut, 1e-12);
+  EXPECT_EQ(result.limited[3].time, 0.0);
+  ShippedRun asked("panda-reach", with("expect.joints=1e-4"));
+  const RunResult& late = asked.Run();
+  EXPECT_EQ(late.attribution.cause, Cause::kActuatorLimit) << late.attribution.evidence;
+  // Higher than what is sent, it changes nothing.
+  ShippedRun high("panda-reach", {"duration=1", "actuation.limit=1000"});
+  const RunResult& unlimited = high.Run();
+  EXPECT_EQ(unlimited.verdict, Verdict::kPass) << unlimited.attribution.evidence;
+  EXPECT_TRUE(std::all_of(unlimited.limited.begin(), unlimited.limited.end(),
+                          [](const LimitedTorque& one) { return one.time == 0.0; }));
+}
+
+TEST(JointMotionRun, AFaultOfTheCompensationIsNamed) {
+  const std::vector<std::string> keys = {"duration=0.5", "expect={}", "control.coulomb=0.5",
+                                         "control.viscous=0.3"};
+  for (const bool is_coulomb : {true, false}) {
+    ShippedRun run("panda-reach", keys);
+    const auto& setup = run.setup();
+    LoopParts parts = MakeLoopParts(setup);
+    JointGains gains = setup.joints()->gains;
+    (is_coulomb ? gains.coulomb : gains.viscous) *= 0.9;
+    parts.controller = std::make_unique<JointController>(setup.model(), setup.object().body, setup.surface(),
+                                                         ControlLaw::kComputedTorque, gains,
+                                                         setup.joints()->motion, Sampling{.time_step = 1e-3});
+    const std::unique_ptr<Runner> runner = RunParts(setup, std::move(parts));
+    const RunResult& result = runner->result();
+    EXPECT_EQ(result.attribution.cause, Cause::kControlLaw) << result.attribution.evidence;
+    ASSERT_EQ(result.causes.front().faults.size(), 1U);
+    const Fault& fault = result.causes.front().faults.front();
+    EXPECT_NE(fault.fault.find(is_coulomb ? "coulomb tanh" : "viscous q_d_dot"), std::string::npos)
+        << fault.fault;
+    EXPECT_NEAR(fault.value, 0.9, 1e-6);
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(JointMotionRun, JointLaws,

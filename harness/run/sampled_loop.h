@@ -1,0 +1,119 @@
+#pragma once
+
+// A control loop as it is sampled: the linearised plant as its engine steps it, sensors, law and motors.
+//
+// n torques act on M q_ddot + D q_dot + G q = tau, which semi-implicit Euler steps by h:
+//
+//   v <- v + h M^-1 (tau - D v - G q),  q <- q + h v
+//
+// (a plant by Runge-Kutta's method: the same to fourth order, q and v together). Rates may be filtered, and
+// all that is measured late. Every m steps, T = m h, the law sends c = -(K q + V v) of what was measured;
+// motors hold it, are late with it and lag behind it. One period is linear in its state and in c,
+//
+//   x <- A x + B c,  c = -C x
+//
+// with A, B and C found by stepping unit vectors. The loop is stable where all eigenvalues of A - B C lie
+// inside the unit circle. Broken at its torques it has the return ratio L(z) = C (z I - A)^-1 B; broken at
+// torque j alone, the others closed, L_j(z) = 1 / S_jj(z) - 1 with the sensitivity S = (I + L)^-1 =
+// I - C (z I - A + B C)^-1 B [Franklin, Powell, Workman 1998, 7.4; Skogestad, Postlethwaite 2005, 9.2].
+
+#include <complex>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "controller/common/types.h"
+
+namespace dexcheck {
+
+/// When the law is evaluated, and what is late.
+struct SampledLoop {
+  double time_step = 1e-3;  ///< h, s.
+  long hold = 1;            ///< m, steps that torques are held.
+  double delay = 0.0;       ///< Of the torques, s.
+  long latency = 0;         ///< Age of what is measured, steps.
+  double low_pass =
+      1.0;  ///< Fraction of a rate's change that its filter lets through at each step; 1 for no filter.
+  double lag = 0.0;  ///< Time constant of the motors, s.
+  [[nodiscard]] double period() const { return static_cast<double>(hold) * time_step; }
+  /// Nothing is late and nothing filtered.
+  [[nodiscard]] bool is_direct() const {
+    return delay == 0.0 && latency == 0 && low_pass == 1.0 && lag == 0.0;
+  }
+  bool operator==(const SampledLoop&) const = default;
+};
+
+/// Plant and law, n x n. M, D, G as above; K and V are the law's. Units of the joints.
+struct LinearLoop {
+  SampledLoop timing;
+  VectorXd lag;                 ///< Of each motor, s; in the place of that of `timing`. Empty for none.
+  bool steps_together = false;  ///< Runge-Kutta's method.
+  MatrixXd M, D, G;
+  MatrixXd K, V;
+};
+
+/// Steps states of a LinearLoop, several at a time: one in each column.
+class LoopChain {
+ public:
+  explicit LoopChain(const LinearLoop& loop);
+
+  /// Number of entries of a state: q, v, the filtered rate, the lag, what was sent and measured before.
+  [[nodiscard]] Eigen::Index size() const { return size_; }
+  /// Measures, at the beginning of a step. @returns K q + V v of what is measured (n x columns).
+  MatrixXd Measure(MatrixXd* x) const;
+  /// The rest of the step. @param c torques sent (n x columns).
+  void Move(const MatrixXd& c, MatrixXd* x) const;
+
+ private:
+  MatrixXd Delay(const MatrixXd& c, MatrixXd* x) const;
+
+  LinearLoop loop_;
+  Eigen::Index n_, late_ = 0, size_ = 0;
+  double fraction_ = 0.0;  // of a step by which the delay is more than a whole number of them
+  MatrixXd A_, B_;         // of the plant's [q; v]
+};
+
+/// One period: x <- A x + B c, c = -C x.
+struct SampledSystem {
+  MatrixXd A, B, C;
+  double period = 0.0;  ///< s.
+};
+SampledSystem CalcSampledSystem(const LinearLoop& loop);
+
+/// How far a loop is from instability.
+struct StabilityMargins {
+  double gain = std::numeric_limits<double>::infinity();   ///< Least factor above 1 that makes it unstable.
+  double least_gain = 0.0;                                 ///< Largest factor below 1 that does.
+  double phase = kPi;                                      ///< Least lag or lead that does, rad.
+  double delay = std::numeric_limits<double>::infinity();  ///< Least delay that does, s.
+
+  /// The smaller of each.
+  void Narrow(const StabilityMargins& other);
+};
+
+/// Of a stable loop, from its return ratio. @param w ascending, rad/s, close enough that L hardly turns from
+/// one to the next. Between two, log L is linear in log w. @param L at each w.
+StabilityMargins FindMargins(const std::vector<double>& w, const std::vector<std::complex<double>>& L);
+
+/// Margins of a loop.
+struct LoopMargins {
+  double radius = 0.0;                  ///< Largest |eigenvalue| of A - B C.
+  std::vector<StabilityMargins> loops;  ///< Of each torque by itself, the others as they are.
+  StabilityMargins together;            ///< Of all torques by the same factor, angle or delay.
+  [[nodiscard]] bool is_stable() const { return radius < 1.0; }
+};
+/// Without margins where it is not stable.
+LoopMargins CalcMargins(const SampledSystem& system);
+
+/// Margins of a motion of joints, of the loops of all of them, each broken at its torque with the others
+/// closed, in the postures of the start and of the motion's points: the least of each margin, and whose it
+/// is.
+struct JointMargins {
+  double radius = 0.0;        ///< Largest spectral radius; there are no margins from 1 on.
+  StabilityMargins least;     ///< Of one torque at a time.
+  StabilityMargins together;  ///< Of the same factor, angle or delay at all torques.
+  std::string gain_joint, phase_joint, delay_joint;
+  [[nodiscard]] bool is_stable() const { return radius < 1.0; }
+};
+
+}  // namespace dexcheck
