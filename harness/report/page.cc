@@ -224,7 +224,8 @@ class Page {
         add(FormatFraction(check.worst), "of the fingertips' friction used, at most");
     }
     // By class of bodies that should not touch.
-    for (const auto& [pairs, nearest] : run_.summary().value("clearance", nlohmann::json::object()).items()) {
+    const nlohmann::json clearance = run_.summary().value("clearance", nlohmann::json::object());
+    for (const auto& [pairs, nearest] : clearance.items()) {
       std::string name = pairs;
       std::replace(name.begin(), name.end(), '_', ' ');
       add(fmt::format("{:.1f} mm", 1e3 * nearest.value("smallest_m", std::nan(""))),
@@ -376,8 +377,7 @@ void WriteRunReport(const fs::path& run_dir, const ReportFiles& files, const Sce
   if (folder) {
     for (const Picture& picture : content.scene.pictures) folder->Add(picture.file);
     for (const Figure& figure : printed) {
-      folder->Add(drawings.path() / (figure.name + ".pdf"));
-      folder->Add(drawings.path() / (figure.name + ".png"));
+      for (const char* extension : kFigureFiles) folder->Add(drawings.path() / (figure.name + extension));
     }
     folder->Commit();
   }
