@@ -145,9 +145,8 @@ TEST_F(WriteReportTest, FiguresHaveTheirFontsAndTheNumbersThatTheyShow) {
   EXPECT_THAT(ReadText(run_dir() / "figures/fig12a.pdf"), HasSubstr("/FontFile"));
   const std::vector<std::string> lines = SplitLines(ReadText(run_dir() / "figures/fig12a.csv"));
   ASSERT_EQ(lines.size(), 401U);
-  EXPECT_EQ(lines[0], R"(t (s),"x actual, x (m)", "x desired, x (m)")
-  ");
-      EXPECT_EQ(lines[101], "0.1,0.6,0.601");
+  EXPECT_EQ(lines[0], "t (s),\"x actual, x (m)\",\"x desired, x (m)\"");
+  EXPECT_EQ(lines[101], "0.1,0.6,0.601");
   // No logarithm shows a residual of 0.
   EXPECT_THAT(SplitLines(ReadText(run_dir() / "figures/residual_model.csv"))[8], HasSubstr("0.007,NaN"));
 }
