@@ -21,6 +21,7 @@ archive=${1:-}
 if [[ -z $archive ]]; then
   (cd "$repository/build/release" && cpack -G TXZ -B "$scratch/packages" >"$scratch/cpack.txt" 2>&1) ||
     { tail -20 "$scratch/cpack.txt"; exit 1; }
+  ! grep -A 2 Warning "$scratch/cpack.txt" || Fail "cpack warns"
   archive=$(ls "$scratch"/packages/*.tar.xz)
 fi
 size=$(stat --format %s "$archive")
@@ -35,7 +36,9 @@ while IFS= read -r file; do
   path=$(patchelf --print-rpath "$file")
   [[ $path == "\$ORIGIN" || $path == "\$ORIGIN/"*lib/dexcheck ]] || Fail "$file: RUNPATH \"$path\""
 done < <(find "$scratch/unpacked/bin" "$scratch/unpacked/lib/dexcheck" "$scratch/unpacked/libexec" -type f)
-[[ -s $scratch/unpacked/share/doc/dexcheck/licenses/libmujoco* ]] || Fail "MuJoCo's licence is not there"
+for package in ffmpeg libmujoco libosmesa6 libx264; do
+  compgen -G "$scratch/unpacked/share/doc/dexcheck/licenses/$package*" >/dev/null || Fail "the licence of $package is not there"
+done
 
 # What nobody does in each root; $bin is the folder of the program.
 cat >"$scratch/commands.sh" <<'COMMANDS'

@@ -18,7 +18,6 @@ cat >paper.tex <<'TEX'
 \end{document}
 TEX
 "$2" -halt-on-error -interaction=nonstopmode paper.tex >log.txt || { tail -30 log.txt; exit 1; }
-! grep -E '^(!|LaTeX Warning: (Reference|Citation))' log.txt
 if command -v pdftotext >/dev/null; then
   pdftotext -layout paper.pdf
   for word in 'dexcheck run hold' 'position error max' 'cone use' 'law (1' commit '&b#c'; do
