@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Builds, from Debian 12's sources, the two libraries and programs of others that would make the archive too large as Debian
 # has them: Mesa's off-screen rasteriser with the part of LLVM that it calls (14 MB instead of 42), and ffmpeg with the
-# encoders that are used alone (@F@ MB instead of 52). As root on Debian 12, since it installs what they are built with:
+# encoders that are used alone (1 MB instead of 52). As root on Debian 12, since it installs what they are built with:
 #   harness/packaging/bundled.sh PREFIX        then cmake -DDEXCHECK_BUNDLED=PREFIX
 set -euo pipefail
 
