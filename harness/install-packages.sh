@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # Installs the Debian 12 packages that dexcheck needs, and nothing when all are there:
 #   harness/install-packages.sh              to build and run the program
+#   harness/install-packages.sh archive      to make the archive and the Debian packages too (cpack)
 #   harness/install-packages.sh tests        to build and run the tests and benchmarks too
 #   harness/install-packages.sh development  to change it too
 set -euo pipefail
@@ -30,10 +31,13 @@ packages=(
 )
 purpose=${1:-program}
 case $purpose in
-  program | tests | development) ;;
-  *) echo "install-packages: $purpose: must be program, tests or development" >&2; exit 2 ;;
+  program | archive | tests | development) ;;
+  *) echo "install-packages: $purpose: must be program, archive, tests or development" >&2; exit 2 ;;
 esac
-if [[ $purpose != program ]]; then
+if [[ $purpose == archive || $purpose == development ]]; then
+  packages+=(patchelf dpkg-dev git)
+fi
+if [[ $purpose == tests || $purpose == development ]]; then
   # tests and benchmarks, and the programs they take as oracles
   packages+=(
     libgtest-dev libgmock-dev libbenchmark-dev coinor-csdp hdf5-tools
@@ -42,6 +46,8 @@ if [[ $purpose != program ]]; then
     xvfb xdotool imagemagick tmux zsh bash-completion
     # the Python module
     pybind11-dev python3-dev python3-pytest
+    # what is packaged: hooks, the action, figures as PDF
+    pre-commit curl poppler-utils
     # other physics engines
     libbullet-dev liborocos-kdl-dev libsimbody-dev
   )

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "controller/common/errors.h"
+#include "harness/base/files.h"
 #include "renders/cairo_surface.h"
 
 namespace dexcheck {
@@ -62,7 +63,11 @@ Color MakeColor(unsigned rrggbb, float opacity) {
   return {channel(16), channel(8), channel(0), opacity};
 }
 
-std::filesystem::path Font::SystemFolder() { return DEXCHECK_FONT_FOLDER; }
+std::filesystem::path Font::SystemFolder() {
+  std::filesystem::path installed = FindInstalled("share/dexcheck/fonts");
+  std::error_code error;
+  return std::filesystem::exists(installed, error) ? installed : DEXCHECK_FONT_FOLDER;
+}
 
 Font::Font(const std::filesystem::path& path) {
   const std::unique_ptr<FcPattern, decltype(&FcPatternDestroy)> pattern(

@@ -24,7 +24,8 @@ Color MakeColor(unsigned rrggbb, float opacity = 1.0F);
 /// An outline font, drawn smoothly at any size. For one thread.
 class Font {
  public:
-  /// Folder of the system's DejaVu fonts: "DejaVuSans.ttf", "DejaVuSans-Bold.ttf".
+  /// Folder of the DejaVu fonts, those that are installed with the program or the system's: "DejaVuSans.ttf",
+  /// "DejaVuSans-Bold.ttf".
   static std::filesystem::path SystemFolder();
 
   /// @throws InputError "PATH: cannot be used as a font: reason".

@@ -23,7 +23,8 @@ Ffmpeg::Ffmpeg(const PartialFile& file, int width, int height, int fps,
   int ends[2];
   if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends) != 0) file_.Fail(std::strerror(errno));
   input_ = FileDescriptor(ends[0]);
-  std::vector<std::string> words = {"ffmpeg", "-v", "error", "-f", "rawvideo", "-pix_fmt", "rgb24", "-s"};
+  std::vector<std::string> words = {
+      FindProgram("ffmpeg"), "-v", "error", "-f", "rawvideo", "-pix_fmt", "rgb24", "-s"};
   words.push_back(std::to_string(width) + "x" + std::to_string(height));
   words.insert(words.end(), {"-r", std::to_string(fps), "-i", "pipe:0"});
   words.insert(words.end(), encoding.begin(), encoding.end());

@@ -56,6 +56,11 @@ ProcessEnd ReadEnd(int status) {
 
 }  // namespace
 
+std::string FindProgram(const std::string& name) {
+  const std::filesystem::path installed = FindInstalled("libexec/dexcheck/" + name);
+  return ::access(installed.c_str(), X_OK) == 0 ? installed.string() : name;
+}
+
 MessageFile::MessageFile() : file_(::memfd_create("messages", MFD_CLOEXEC)) {
   if (!file_.is_open()) FailToStart("a process", errno);
 }

@@ -42,6 +42,10 @@ struct Program {
 /// Of a program that cannot be run, and of a shell's command that there is not.
 inline constexpr int kNotFoundExitCode = 127;
 
+/// The program of this name that is installed with this one, in libexec/dexcheck; the name alone where there
+/// is none.
+std::string FindProgram(const std::string& name);
+
 /// What a process writes to its standard error: a file in memory.
 class MessageFile {
  public:

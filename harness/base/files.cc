@@ -109,6 +109,12 @@ std::string HashBytes(std::string_view bytes) {
   return digits;
 }
 
+std::filesystem::path FindInstalled(const std::filesystem::path& name) {
+  std::error_code error;
+  const std::filesystem::path program = std::filesystem::read_symlink("/proc/self/exe", error);
+  return std::filesystem::weakly_canonical(program.parent_path().parent_path() / name, error);
+}
+
 std::string ExtensionOf(const std::filesystem::path& path) {
   std::string extension = path.extension().string();
   for (char& c : extension) c = 'A' <= c && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;

@@ -51,6 +51,10 @@ std::string ReadBytes(const std::filesystem::path& path);
 /// FNV-1a of 64 bits, as 16 hexadecimal digits: what a reader sees of bytes that differ.
 std::string HashBytes(std::string_view bytes);
 
+/// Where NAME is that is installed with this program, as seen from the folder above the program's own:
+/// "share/dexcheck". Links are followed; it need not exist.
+std::filesystem::path FindInstalled(const std::filesystem::path& name);
+
 /// ".png" of "Picture.PNG": the extension with its dot, in small letters; "" without one.
 std::string ExtensionOf(const std::filesystem::path& path);
 

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "controller/common/text.h"
+#include "harness/base/files.h"
 #include "harness/base/interrupts.h"
 #include "harness/checks/engine_comparison.h"
 #include "harness/cli/consistency_report.h"
@@ -158,17 +159,10 @@ std::string WriteEnginesJUnit(const EnginesRequest& request, const RobotModel& m
                     result.lacks_requested ? JoinNames(result.absent) : "");
 }
 
-/// What is shipped beside the program: ../libexec/dexcheck, in a build as when installed.
-std::filesystem::path FindProgramsFolder() {
-  std::error_code ignored;
-  const std::filesystem::path program = std::filesystem::read_symlink("/proc/self/exe", ignored);
-  return program.parent_path().parent_path() / "libexec/dexcheck";
-}
-
 int Run(EnginesRequest request) {
   CatchInterrupts();
   request.options.tolerance = std::pow(10.0, -request.digits);
-  request.options.programs_folder = FindProgramsFolder();
+  request.options.programs_folder = FindInstalled("libexec/dexcheck");
   ResultFile json(request.json_file);
   ResultFile junit(request.junit_file);
   const DescriptionFile file(request.robot, request.urdf);

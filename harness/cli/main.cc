@@ -1,7 +1,11 @@
 // dexcheck: is my analytic robot model, and the controller built on it, right?
 
+#include <stdlib.h>
+#include <unistd.h>
+
 #include <cstdio>
 #include <exception>
+#include <filesystem>
 #include <new>
 #include <stdexcept>
 #include <string>
@@ -9,12 +13,19 @@
 
 #include "controller/common/errors.h"
 #include "harness/base/console.h"
+#include "harness/base/files.h"
 #include "harness/base/interrupts.h"
 #include "harness/base/version.h"
 #include "harness/cli/commands.h"
 
 namespace dexcheck::cli {
 namespace {
+
+/// An archive has fonts of its own; without them a bare system has none.
+void UseInstalledFonts() {
+  const std::filesystem::path fonts = FindInstalled("share/dexcheck/fonts/fonts.conf");
+  if (::access(fonts.c_str(), R_OK) == 0) ::setenv("FONTCONFIG_FILE", fonts.c_str(), /*overwrite=*/0);
+}
 
 int Report(const std::string& problem, ExitCode code) {
   std::fflush(stdout);
@@ -94,6 +105,7 @@ int Run(int argc, char** argv) {
 // What a handler of exceptions throws is want of memory. NOLINTNEXTLINE(bugprone-exception-escape)
 int main(int argc, char** argv) {
   dexcheck::OccupyStandardStreams();
+  dexcheck::cli::UseInstalledFonts();
   dexcheck::HandleSignals(dexcheck::cli::kFailure);
   return dexcheck::cli::Run(argc, argv);
 }

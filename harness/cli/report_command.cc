@@ -8,6 +8,7 @@
 #include "harness/cli/commands.h"
 #include "harness/cli/output_file.h"
 #include "harness/report/page.h"
+#include "harness/report/tex_table.h"
 
 namespace dexcheck::cli {
 namespace {
@@ -18,6 +19,7 @@ struct ReportRequest {
   bool no_replay = false;
   bool quiet = false;
   std::string json_file;
+  std::string tex_file;
 };
 
 /// Pictures alone.
@@ -38,17 +40,24 @@ void AddReportCommand(Command app) {
   command.AddFlag("--no-replay", &request->no_replay, "Leave out the replay in three dimensions");
   command.AddFlag("--quiet", &request->quiet, "Print nothing");
   AddJsonOption(command, "where page and figures are", &request->json_file);
+  command.AddOption(
+      "--tex FILE.tex", &request->tex_file,
+      "Write a table of results for LaTeX, too, with the commit and the command (- for standard output)");
   command.SetAction([=] {
+    ResultFile json_file(request->json_file);
+    ResultFile tex_file(request->tex_file);
     RequirePageName(request->out);
     ReportFiles files = MakeReportFiles(request->run_folder);
     if (!request->out.empty()) files = {request->out, {}};
     WriteRunReport(request->run_folder, files, request->no_replay ? MakeStillScene : MakeRunScene);
-    if (!request->json_file.empty()) {
+    json_file.Write([&] {
       const nlohmann::ordered_json json = {{"page", files.page.string()},
                                            {"figures", files.figures.string()}};
-      OutputFile(request->json_file).Write(json.dump(1) + "\n");
-    }
-    if (!request->quiet && request->json_file != "-") fmt::print("{}\n", files.page.string());
+      return json.dump(1) + "\n";
+    });
+    tex_file.Write([&] { return MakeTexTable(RunData(request->run_folder)); });
+    const bool prints = !json_file.TakesStdout() && !tex_file.TakesStdout();
+    if (!request->quiet && prints) fmt::print("{}\n", files.page.string());
     return kSuccess;
   });
 }

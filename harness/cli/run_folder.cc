@@ -16,6 +16,7 @@
 #include "controller/common/text.h"
 #include "controller/common/toml_reader.h"
 #include "harness/base/console.h"
+#include "harness/base/files.h"
 #include "harness/base/interrupts.h"
 #include "harness/cli/terminal.h"
 #include "harness/engine/machine.h"
@@ -225,16 +226,10 @@ ReplayDifference RecordedRun::Compare(const std::filesystem::path& other_log) co
 }
 
 std::filesystem::path FindShippedFile(const std::filesystem::path& name) {
-  std::error_code error;
-  const std::filesystem::path program = std::filesystem::read_symlink("/proc/self/exe", error);
-  std::filesystem::path installed = program.parent_path().parent_path() / "share/dexcheck" / name;
-  if (!error && std::filesystem::exists(installed, error)) return installed;
-  std::filesystem::path source = std::filesystem::path(DEXCHECK_DATA_DIR) / name;
-  if (!std::filesystem::exists(source, error)) {
-    throw InputError(source.string() + ": does not exist, nor does " + installed.string() +
-                     ": this program's shipped files are missing");
-  }
-  return source;
+  std::filesystem::path file = FindInstalled("share/dexcheck" / name);
+  if (std::error_code error; !std::filesystem::exists(file, error))
+    throw InputError(file.string() + ": does not exist: this program's shipped files are missing");
+  return file;
 }
 
 std::vector<std::string> ShippedKind::ListNames() const {

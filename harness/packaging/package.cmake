@@ -1,5 +1,5 @@
-# What find_package(dexcheck) reads, and the Debian packages (cpack in the build folder): dexcheck is the program with its
-# shipped files, libdexcheck-dev the libraries with their headers.
+# What find_package(dexcheck) reads, the Debian packages (cpack in the build folder): dexcheck is the program with its
+# shipped files, libdexcheck-dev the libraries with their headers; and the archive that runs from wherever it is unpacked.
 include(CMakePackageConfigHelpers)
 set(package_folder ${CMAKE_INSTALL_LIBDIR}/cmake/dexcheck)
 configure_package_config_file(${CMAKE_CURRENT_LIST_DIR}/dexcheckConfig.cmake.in
@@ -48,5 +48,16 @@ if(DEXCHECK_ENGINES)
   set(CPACK_COMPONENT_ENGINES_DESCRIPTION "physics engines that dexcheck engines asks")
   set(CPACK_DEBIAN_ENGINES_PACKAGE_SHLIBDEPS ON)
   set(CPACK_DEBIAN_ENGINES_PACKAGE_SUGGESTS "nodejs")
+endif()
+set(DEXCHECK_BUNDLED "" CACHE PATH "Where the archive's ffmpeg and Mesa are (bundled.sh); the system's, which are large, otherwise")
+find_program(DEXCHECK_PATCHELF patchelf)
+if(DEXCHECK_BUILD_RENDERS AND DEXCHECK_PATCHELF)
+  configure_file(${CMAKE_CURRENT_LIST_DIR}/archive.cmake.in ${PROJECT_BINARY_DIR}/archive.cmake @ONLY)
+  install(SCRIPT ${PROJECT_BINARY_DIR}/archive.cmake COMPONENT archive EXCLUDE_FROM_ALL)
+  list(APPEND CPACK_GENERATOR TXZ)
+  set(CPACK_PACKAGE_FILE_NAME dexcheck-${PROJECT_VERSION}-linux-${CMAKE_SYSTEM_PROCESSOR})
+  set(CPACK_PROJECT_CONFIG_FILE ${CMAKE_CURRENT_LIST_DIR}/cpack_project.cmake)
+elseif(DEXCHECK_BUILD_RENDERS)
+  message(STATUS "cpack makes no archive: Debian's patchelf not found")
 endif()
 include(CPack)

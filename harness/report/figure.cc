@@ -65,19 +65,31 @@ std::string SetRange(const Figure& figure, bool right_axis) {
   return fmt::format("set {}range [{:.9g}:{:.9g}]\n", right_axis ? "y2" : "y", range[0], range[1]);
 }
 
-/// The data block $NAME: time, then each curve.
-void WriteData(const Figure& figure, const Thinning& thinning, std::ostream* script) {
+/// A field of a CSV file (RFC 4180).
+std::string QuoteField(const std::string& text) {
+  std::string quoted = "\"";
+  for (const char c : text) quoted += c == '"' ? std::string("\"\"") : std::string(1, c);
+  return quoted + "\"";
+}
+
+/// FOLDER/NAME.csv: time, then each curve, "LABEL, AXIS"; NaN where it has a gap.
+void WriteData(const Figure& figure, const Thinning& thinning, const std::filesystem::path& folder) {
   std::vector<std::vector<double>> columns = {thinning.times()};
-  for (const Curve& curve : figure.curves) columns.push_back(thinning.Apply(curve.values));
-  *script << "$" << figure.name << " << END\n";
-  for (size_t row = 0; row < columns.front().size(); ++row) {
-    for (const std::vector<double>& column : columns) {
-      const bool gap = &column != &columns[0] && !CanBeDrawn(figure, column[row]);
-      *script << (gap ? std::string("NaN ") : fmt::format("{:.7g} ", column[row]));
-    }
-    *script << "\n";
+  std::string text = "t (s)";
+  for (const Curve& curve : figure.curves) {
+    columns.push_back(thinning.Apply(curve.values));
+    text += "," + QuoteField(curve.label + ", " + (curve.right_axis ? figure.right_label : figure.label));
   }
-  *script << "END\n";
+  for (size_t row = 0; row < columns.front().size(); ++row) {
+    text += fmt::format("\n{:.7g}", columns[0][row]);
+    for (size_t i = 1; i < columns.size(); ++i) {
+      const double value = columns[i][row];
+      text += CanBeDrawn(figure, value) ? fmt::format(",{:.7g}", value) : ",NaN";
+    }
+  }
+  PartialFile file(folder / (figure.name + ".csv"));
+  file.Write(text + "\n");
+  file.Commit();
 }
 
 std::string PlotCurves(const Figure& figure) {
@@ -86,8 +98,8 @@ std::string PlotCurves(const Figure& figure) {
     const Curve& curve = figure.curves[i];
     std::string color = FindColor(curve.color);
     if (curve.wide) color.insert(1, "a0");  // gnuplot's transparency stands first
-    plot += fmt::format("{}${} using 1:{} axes x1{} with lines lc rgb '{}' lw {} dt ", i > 0 ? ", " : "",
-                        figure.name, i + 2, curve.right_axis ? "y2" : "y1", color,
+    plot += fmt::format("{}'{}.csv' skip 1 using 1:{} axes x1{} with lines lc rgb '{}' lw {} dt ",
+                        i > 0 ? ", " : "", figure.name, i + 2, curve.right_axis ? "y2" : "y1", color,
                         curve.wide             ? "6"
                         : curve.color == kGrey ? "0.8"
                                                : "1.5");
@@ -101,8 +113,7 @@ std::string PlotCurves(const Figure& figure) {
   return plot + "\n";
 }
 
-void WriteScript(const Figure& figure, const VectorXd& time, const Thinning& thinning, std::ostream* script) {
-  WriteData(figure, thinning, script);
+void WriteScript(const Figure& figure, const VectorXd& time, std::ostream* script) {
   const auto named = std::count_if(figure.curves.begin(), figure.curves.end(),
                                    [](const Curve& curve) { return curve.in_key; });
   const int key_rows = static_cast<int>(named + kKeyEntriesPerRow) / kKeyEntriesPerRow;
@@ -132,7 +143,7 @@ void WriteScript(const Figure& figure, const VectorXd& time, const Thinning& thi
 void RunGnuplot(const std::filesystem::path& folder) {
   const FileDescriptor nothing(::open("/dev/null", O_RDONLY | O_CLOEXEC));
   const MessageFile messages;
-  ChildProcess gnuplot("gnuplot", Program{{"gnuplot", "--default-settings", "figures.gnuplot"},
+  ChildProcess gnuplot("gnuplot", Program{{FindProgram("gnuplot"), "--default-settings", "figures.gnuplot"},
                                           nothing.get(),
                                           messages.descriptor(),
                                           messages.descriptor(),
@@ -184,15 +195,19 @@ void DrawFigures(const std::vector<Figure>& figures, const VectorXd& time,
   const Thinning thinning(time, kPointsPerCurve);
   const std::filesystem::path path = folder / "figures.gnuplot";
   std::ofstream script(path);
-  script << "set encoding utf8\nset grid lw 0.6 lc rgb '#d5dae0'\nset border 3 lw 0.8 lc rgb '#5b6570'\n"
+  script << "set encoding utf8\nset datafile separator comma\nset grid lw 0.6 lc rgb '#d5dae0'\nset border 3 "
+            "lw 0.8 lc rgb '#5b6570'\n"
             "set tics nomirror scale 0.5 textcolor rgb '#30363d'\nset xlabel 't (s)'\nset samples 2\n"
             "set key bmargin center horizontal samplen 2.4 spacing 1.1 width 1\nset lmargin 11\n";
-  for (const Figure& figure : figures) WriteScript(figure, time, thinning, &script);
+  for (const Figure& figure : figures) {
+    WriteData(figure, thinning, folder);
+    WriteScript(figure, time, &script);
+  }
   script.close();
   if (!script) throw InputError(path.string() + ": cannot be written: " + std::strerror(errno));
   RunGnuplot(folder);
   for (const Figure& figure : figures) {
-    for (const char* extension : {".pdf", ".png"}) {
+    for (const char* extension : kFigureFiles) {
       const std::filesystem::path picture = folder / (figure.name + extension);
       std::error_code error;
       if (std::filesystem::file_size(picture, error) == 0 || error) {

@@ -52,7 +52,11 @@ struct Figure {
 /// and those of the right one in the lower half, so that none hides another by chance.
 std::array<double, 2> CalcAxisRange(const Figure& figure, bool right_axis);
 
-/// Draws figures as FOLDER/NAME.pdf and FOLDER/NAME.png, with gnuplot.
+/// Extensions of the files of a printed figure.
+inline constexpr std::array<const char*, 3> kFigureFiles = {".pdf", ".png", ".csv"};
+
+/// Draws figures as FOLDER/NAME.pdf, with its fonts in it, and FOLDER/NAME.png, with gnuplot, from what it
+/// writes as FOLDER/NAME.csv.
 /// @param time of the curves' values, s.
 /// @throws InputError when gnuplot cannot be run, or a file cannot be written.
 void DrawFigures(const std::vector<Figure>& figures, const VectorXd& time,

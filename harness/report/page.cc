@@ -228,7 +228,8 @@ class Page {
       add(fmt::format("{:.3g} s", one.value("time_s", 0.0)),
           "torque limited: " + one.value("motor", std::string()));
     // By class of bodies that should not touch.
-    for (const auto& [pairs, nearest] : run_.summary().value("clearance", nlohmann::json::object()).items()) {
+    const nlohmann::json clearance = run_.summary().value("clearance", nlohmann::json::object());
+    for (const auto& [pairs, nearest] : clearance.items()) {
       std::string name = pairs;
       std::replace(name.begin(), name.end(), '_', ' ');
       add(fmt::format("{:.1f} mm", 1e3 * nearest.value("smallest_m", std::nan(""))),
@@ -380,8 +381,7 @@ void WriteRunReport(const fs::path& run_dir, const ReportFiles& files, const Sce
   if (folder) {
     for (const Picture& picture : content.scene.pictures) folder->Add(picture.file);
     for (const Figure& figure : printed) {
-      folder->Add(drawings.path() / (figure.name + ".pdf"));
-      folder->Add(drawings.path() / (figure.name + ".png"));
+      for (const char* extension : kFigureFiles) folder->Add(drawings.path() / (figure.name + extension));
     }
     folder->Commit();
   }

@@ -212,7 +212,7 @@ std::string DescribeMargins(const JointMargins& margins) {
 }  // namespace
 
 void JudgeGains(const Setup& setup, const ClosedLoop& loop, RunResult* result) {
-  if (!loop.knows_law() || loop.record().step == 0) return;
+  if (setup.joints() == nullptr || !loop.knows_law() || loop.record().step == 0) return;
   result->margins = CalcJointMargins(setup, setup.joints()->gains);
   if (!result->margins) return;
   std::string& card = result->gain_card;

@@ -32,5 +32,22 @@ TEST(InstalledProgram, UsesTheFilesBesideIt) {
   EXPECT_EQ(RunProgram(command).exit_code, 1);
 }
 
+TEST(InstalledProgram, RunsTheProgramsBesideIt) {
+  const TempFolder folder;
+  const std::filesystem::path prefix = folder.path() / "prefix";
+  ASSERT_EQ(RunProgram({DEXCHECK_CMAKE, "--install", BuildPath(), "--component", "program", "--prefix",
+                        prefix.string()})
+                .exit_code,
+            0);
+  const std::filesystem::path gnuplot = prefix / "libexec/dexcheck/gnuplot";
+  std::filesystem::create_directories(gnuplot.parent_path());
+  WriteText(gnuplot, "#!/bin/sh\necho this is no gnuplot >&2\nexit 1\n");
+  std::filesystem::permissions(gnuplot, std::filesystem::perms::owner_all);
+  const ProgramResult result = RunProgram(
+      {prefix / "bin/dexcheck", "run", "hold", "--set", "duration=0.02", "--out", folder.path() / "run"});
+  EXPECT_EQ(result.exit_code, 0);
+  EXPECT_THAT(result.err, HasSubstr("could not draw the figures: this is no gnuplot"));
+}
+
 }  // namespace
 }  // namespace dexcheck::testing::install_test

@@ -25,6 +25,14 @@ TEST_F(ReportCommand, WritesThePageAlone) {
   EXPECT_EQ(CountFiles("run"), 1);
 }
 
+TEST_F(ReportCommand, WritesATableForLatex) {
+  const std::string table = Expect(0, "report run --tex -").out;
+  EXPECT_THAT(table, HasSubstr("\\bottomrule"));
+  EXPECT_EQ(Expect(0, "report run --tex run/table.tex").out, "run/report.html\n");
+  EXPECT_EQ(Read("run/table.tex"), table);
+  EXPECT_TRUE(Refused("report run --tex none/table.tex", {"none/table.tex", "cannot be written"}));
+}
+
 TEST_F(ReportCommand, RefusesARunWithoutSteps) {
   WriteReportRun(Path("empty"), {.rows = 0});
   EXPECT_TRUE(Refused("report empty", {"log.h5", "no steps"}));

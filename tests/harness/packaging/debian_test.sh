@@ -11,7 +11,7 @@ scratch=$(mktemp -d)
 root=$scratch/root
 trap 'umount -q "$root/proc" || true; rm -rf --one-file-system "$scratch"' EXIT
 
-(cd "$build" && cpack -B "$scratch/packages" >"$scratch/cpack.txt") || { tail -20 "$scratch/cpack.txt"; exit 1; }
+(cd "$build" && cpack -G DEB -B "$scratch/packages" >"$scratch/cpack.txt") || { tail -20 "$scratch/cpack.txt"; exit 1; }
 MakeBareRoot "$root"
 cp "$scratch"/packages/dexcheck_*.deb "$root/tmp/"
 chroot "$root" sh -c 'DEBIAN_FRONTEND=noninteractive apt-get --quiet=2 update &&

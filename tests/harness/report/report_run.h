@@ -73,6 +73,7 @@ inline void WriteReportRun(const std::filesystem::path& folder, const ReportRun&
   log.SetText("robot", "robot.toml");
   log.SetText("mjcf", "scene.xml");
   log.SetText("dexcheck_version", "0.0.1");
+  log.SetText("git_revision", "0123abc-dirty");
   log.SetText("mujoco_version", "2.2.2");
   log.EmbedFile("inputs", "scenario.toml", "name = \"sample\"  # </pre><script>alert(1)</script>\n");
   log.EmbedFile("inputs", "robot/robot.toml", "name = \"robot\"\n");

@@ -4,15 +4,19 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cctype>
 #include <filesystem>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <set>
+#include <sstream>
 #include <string>
+#include <vector>
 
 #include "controller/common/errors.h"
 #include "harness/report/page.h"
 #include "harness/report/run_data.h"
+#include "harness/report/tex_table.h"
 #include "tests/common/files.h"
 #include "tests/common/matchers.h"
 #include "tests/harness/report/report_run.h"
@@ -28,6 +32,13 @@ Json ReadData(const std::string& page) {
   const std::string begin = "id=\"run-page\">";
   const size_t at = page.find(begin) + begin.size();
   return Json::parse(page.substr(at, page.find("</script>", at) - at));
+}
+
+std::vector<std::string> SplitLines(const std::string& text) {
+  std::vector<std::string> lines;
+  std::istringstream stream(text);
+  for (std::string line; std::getline(stream, line);) lines.push_back(line);
+  return lines;
 }
 
 class WriteReportTest : public ::testing::Test {
@@ -121,11 +132,68 @@ TEST_F(WriteReportTest, WritesPageAndFiguresAndLeavesNothingElse) {
   for (const char* name :
        {"fig12a", "fig12b", "fig12c", "fig12d", "fig12e", "fig12f", "fig13a", "tracking_error",
         "residual_model", "residual_inverse_dynamics", "residual_forward_dynamics", "residual_assumption"}) {
-    for (const auto& [extension, beginning] : {std::pair(".pdf", "%PDF"), std::pair(".png", "\x89PNG")}) {
+    for (const auto& [extension, beginning] :
+         {std::pair(".pdf", "%PDF"), std::pair(".png", "\x89PNG"), std::pair(".csv", "t (s),\"")}) {
       const fs::path file = run_dir() / "figures" / (std::string(name) + extension);
       EXPECT_THAT(ReadText(file), ::testing::StartsWith(beginning)) << file;
     }
   }
+}
+
+TEST_F(WriteReportTest, FiguresHaveTheirFontsAndTheNumbersThatTheyShow) {
+  Report();
+  EXPECT_THAT(ReadText(run_dir() / "figures/fig12a.pdf"), HasSubstr("/FontFile"));
+  const std::vector<std::string> lines = SplitLines(ReadText(run_dir() / "figures/fig12a.csv"));
+  ASSERT_EQ(lines.size(), 401U);
+  EXPECT_EQ(lines[0], "t (s),\"x actual, x (m)\",\"x desired, x (m)\"");
+  EXPECT_EQ(lines[101], "0.1,0.6,0.601");
+  // No logarithm shows a residual of 0.
+  EXPECT_THAT(SplitLines(ReadText(run_dir() / "figures/residual_model.csv"))[8], HasSubstr("0.007,NaN"));
+}
+
+/// The cells of a table's rows. Fails for braces or environments that do not pair.
+std::vector<std::vector<std::string>> ReadTexRows(const std::string& table) {
+  std::vector<std::string> open;
+  long braces = 0;
+  for (size_t i = 0; i < table.size(); ++i) {
+    if (table[i] == '\\' && !std::isalpha(table[i + 1])) {
+      ++i;
+    } else if (table[i] == '{' || table[i] == '}') {
+      EXPECT_GE(braces += table[i] == '{' ? 1 : -1, 0);
+    }
+  }
+  EXPECT_EQ(braces, 0);
+  std::vector<std::vector<std::string>> rows;
+  for (const std::string& line : SplitLines(table)) {
+    const std::string text = line.substr(std::min(line.find_first_not_of(' '), line.size()));
+    if (text.starts_with("\\begin{")) open.push_back(text.substr(7, text.find('}') - 6));
+    if (text.starts_with("\\end{")) {
+      EXPECT_TRUE(!open.empty() && text.substr(5) == open.back()) << text;
+      open.pop_back();
+    }
+    if (!text.ends_with(" \\\\")) continue;
+    rows.emplace_back();
+    std::istringstream cells(text.substr(0, text.size() - 3));
+    for (std::string cell; std::getline(cells, cell, '&');) rows.back().push_back(cell);
+  }
+  EXPECT_TRUE(open.empty());
+  return rows;
+}
+
+TEST_F(WriteReportTest, TheTableForLatexHasResultsCommitAndCommand) {
+  WriteReportRun(run_dir(), {.scenario = "50%_{of}\\it^2"});
+  const std::string table = MakeTexTable(RunData(run_dir()));
+  const auto rows = ReadTexRows(table);
+  ASSERT_EQ(rows.size(), 7U) << table;
+  for (const auto& row : rows) EXPECT_EQ(row.size(), 5U) << table;
+  EXPECT_THAT(rows[2], ElementsAre("tracking ", " position error max ", " $0.001$ ", "  ", " m"));
+  EXPECT_THAT(rows[3], ElementsAre("model (2) ", " \\texttt{M\\_bar} ", " $1\\times10^{-16}$ ",
+                                   " $1\\times10^{-13}$ ", " 1"));
+  EXPECT_THAT(rows[6][1], HasSubstr("wheel\\_slip} \\textbf{fails}"));
+  EXPECT_THAT(table, HasSubstr("\\texttt{50\\%\\_\\{of\\}\\textbackslash{}it\\textsuperscript 2}"));
+  EXPECT_THAT(table, HasSubstr("disagreement after 400 steps"));
+  EXPECT_THAT(table, HasSubstr("dexcheck run sample --set 'a=<b>'"));
+  EXPECT_THAT(table, HasSubstr("commit \\texttt{0123abc-dirty}"));
 }
 
 TEST_F(WriteReportTest, SaysVerdictCauseAndWhatWasRun) {
