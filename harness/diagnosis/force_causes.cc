@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "controller/common/text.h"
+#include "harness/diagnosis/force_telling.h"
 #include "harness/diagnosis/step_forces.h"
 #include "harness/diagnosis/telling.h"
 
@@ -27,65 +27,7 @@ constexpr int kMostLevels = 4;
 constexpr double kFaint = 0.01;   // noise where the checks of the balances hold, in their bounds
 constexpr Index kMostSteps = 20;  // that are looked at
 constexpr size_t kMostSegments = 8;
-// Residuals that change by more than this from one step to the next, in units of noise, and by this many
-// times what they change in the steps around, have begun, or ended.
-constexpr double kJumpNoise = 1.0, kJump = 5.0;
-// Gravity whose size differs by less than this fraction of its change only points elsewhere.
-constexpr double kTilted = 0.2;
-
 constexpr const char* kWorld = "world";
-
-std::string TellVector(const Eigen::Ref<const VectorXd>& v) {
-  std::string text = "(";
-  for (Index i = 0; i < v.size(); ++i) text += (i > 0 ? ", " : "") + FormatNumber(v[i], 4);
-  return text + ")";
-}
-
-Fault MakeFault(const Candidate& candidate, const VectorXd& a, const VectorXd& error,
-                const Vector3d& gravity) {
-  Fault fault{candidate.fault,          candidate.place,
-              candidate.nominal + a[0], error.size() > 0 ? error[0] : 0.0,
-              candidate.unit,           ""};
-  const bool sticks = candidate.fault == kStuckBearing;
-  if (sticks || candidate.fault == kBearing) {
-    fault.fault = "dry friction";
-    fault.value = candidate.nominal * a[0];
-    fault.error = sticks ? std::numeric_limits<double>::infinity() : fault.error * candidate.nominal;
-    if (sticks) fault.detail = "or more: the joint sticks";
-  } else if (candidate.fault == "spring") {
-    if (a[0] != 0.0) fault.detail = "relaxed at " + FormatNumber(a[1] / a[0], 4);
-  } else if (candidate.fault == "tether") {
-    if (a[0] != 0.0) fault.detail = "to " + TellVector(a.tail<3>() / a[0]) + " m";
-  } else if (candidate.fault == "payload") {
-    if (a[0] != 0.0) fault.detail = "at " + TellVector(a.segment<3>(1) / a[0]) + " m of its centre of mass";
-  } else if (a.size() >= 3) {
-    const Index size = candidate.fault == "inertia" ? 6 : 3;
-    fault.value = a.head(size).norm();
-    if (error.size() >= size) fault.error = error.head(size).norm();
-    fault.detail = TellVector(a.head(size));
-    if (candidate.fault == "force and moment") fault.detail += " and " + TellVector(a.tail<3>()) + " N m";
-  }
-  if (candidate.fault == kForceInAxes || candidate.fault == kMomentInAxes) {
-    fault.fault = candidate.fault == kForceInAxes ? kForce : "moment";
-    fault.detail += " in its axes";
-  } else if (candidate.fault == kMassWithInertia) {
-    fault.fault = "mass";
-    fault.detail = "and its inertia by the same factor";
-  }
-  if (candidate.fault != kGravity) return fault;
-  const Vector3d change = a;
-  if (std::abs(change.dot(gravity.normalized())) < kTilted * change.norm()) {
-    const Vector3d actual = gravity + change;
-    fault.fault = "slope";
-    fault.value = RadToDeg(std::atan2(actual.cross(gravity).norm(), actual.dot(gravity)));
-    fault.error = RadToDeg(fault.error / gravity.norm());
-    fault.unit = "deg";
-    fault.detail = "by " + fault.detail + " m/s^2";
-  }
-  return fault;
-}
-
-using Segment = std::vector<Index>;  // of steps that differ
 
 /// One residual and what explains it.
 class Problem {
@@ -111,15 +53,27 @@ class Problem {
     return fraction >= kExplains && left <= kLeft;
   }
 
+  /// Of the last explanation: what was selected, and how large each is.
+  using Terms = std::vector<std::pair<size_t, VectorXd>>;
+  [[nodiscard]] const Terms& terms() const { return terms_; }
+  /// Faults that are there, as other steps have shown.
+  void Know(const Terms& known) {
+    known_ = known;
+    Build();
+  }
+
   /// Faults that do not change.
   bool ExplainConstant(const Segment& segment, Causes* causes) {
+    terms_.clear();
+    if (!known_.empty() && CalcLeft(y_) <= 1.0) return true;
     const CauseSelection selection = Select();
     if (!IsExplained(selection.fraction, selection.left)) return false;
+    for (const CauseTerm& term : selection.terms) terms_.emplace_back(term.candidate, term.amplitude);
     if (ExplainJoint(segment, selection, causes) || ExplainBetweenLinks(segment, selection, causes))
       return true;
     Causes told = TellSelection(Start(segment), selection, candidates_,
                                 [&](const Candidate& one, const VectorXd& amplitude, const VectorXd& error) {
-                                  return MakeFault(one, amplitude, error, forces_->model().gravity());
+                                  return MakeForceFault(one, amplitude, error, forces_->model().gravity());
                                 });
     std::move(told.begin(), told.end(), std::back_inserter(*causes));
     return true;
@@ -164,8 +118,8 @@ class Problem {
     one.left = selection.left;
     one.faults.push_back({"torque that changes", joint, 0.0, 0.0, "", ""});
     for (const CauseTerm& term : selection.terms)
-      one.faults.push_back(
-          MakeFault(candidates_[term.candidate], term.amplitude, term.error, forces_->model().gravity()));
+      one.faults.push_back(MakeForceFault(candidates_[term.candidate], term.amplitude, term.error,
+                                          forces_->model().gravity()));
     for (Index k = 0; k < steps_; ++k) {
       const VectorXd y = y_.segment(k * forces_->rows(), forces_->rows());
       one.faults.front().value = std::max(one.faults.front().value, CalcTorque(joint, k, y));
@@ -250,6 +204,7 @@ class Problem {
       y_.segment(i * rows, rows) = forces_->CalcResidual();
       forces_->AddColumns(i * rows, steps_, &candidates_);
     }
+    for (const auto& [candidate, amplitude] : known_) y_ -= candidates_[candidate].columns * amplitude;
     NameStuckBearings();
   }
 
@@ -334,47 +289,10 @@ class Problem {
   VectorXd y_;
   std::vector<Index> used_;  // steps of the store
   Index steps_ = 0;
+  Terms known_, terms_;
   Vector2d first_level_, level_;  // StepForces::SetLevel
   std::vector<MatrixXd> uneven_;  // of each step
 };
-
-/// All steps that differ, and the same in parts that begin or end with a jump. @param level of the noise.
-void FindSegments(const StepStore& store, StepForces* forces, double level, Segment* whole,
-                  std::vector<Segment>* parts) {
-  struct Step {
-    Index index;
-    bool follows;
-    double robot, object;  // by how much each differs from the step before
-  };
-  std::vector<Step> steps;
-  VectorXd before;
-  forces->SetLevel(Vector2d::Constant(level));
-  for (Index i = 0; i < store.size(); ++i) {
-    if (!(store.Get(StepStore::kNoise)(0, i) > 0.0)) continue;
-    forces->SetStep(i);
-    const VectorXd y = forces->CalcResidual();
-    const Index n = y.size() - 6;
-    if (forces->Differs(y)) {
-      const bool follows = !steps.empty() && steps.back().index == i - 1;
-      steps.push_back({i, follows, 0.0, 0.0});
-      if (follows) {
-        steps.back().robot = (y - before).head(n).norm() / std::sqrt(static_cast<double>(n));
-        steps.back().object = (y - before).tail<6>().norm() / std::sqrt(6.0);
-      }
-    }
-    before = y;
-  }
-  const auto jumps = [&](size_t k, double Step::*size) {
-    double around = k > 0 ? steps[k - 1].*size : 0.0;
-    if (k + 1 < steps.size()) around = std::max(around, steps[k + 1].*size);
-    return steps[k].*size > std::max(kJumpNoise, kJump * around);
-  };
-  for (size_t k = 0; k < steps.size(); ++k) {
-    if (!steps[k].follows || jumps(k, &Step::robot) || jumps(k, &Step::object)) parts->emplace_back();
-    whole->push_back(steps[k].index);
-    parts->back().push_back(steps[k].index);
-  }
-}
 
 bool IsSame(const Explanation& a, const Explanation& b) {
   if (a.outcome == CauseOutcome::kNotExplained || b.outcome == CauseOutcome::kNotExplained) return false;
@@ -383,6 +301,65 @@ bool IsSame(const Explanation& a, const Explanation& b) {
   constexpr double kSame = 0.02;
   return x.fault == y.fault && x.place == y.place &&
          std::abs(x.value - y.value) <= kSame * std::abs(x.value) + 3.0 * (x.error + y.error);
+}
+
+/// A part of the steps and what explains it.
+struct Part {
+  bool is_explained = false;
+  Problem::Terms terms;
+  Causes causes;
+
+  [[nodiscard]] Index CountAmplitudes() const {
+    Index count = 0;
+    for (const auto& [candidate, amplitude] : terms) count += amplitude.size();
+    return count;
+  }
+};
+
+Part ExplainPart(const StepStore& store, StepForces* forces, const Segment& segment, const Part* known) {
+  Part part;
+  Problem problem(store, forces, segment);
+  if (known != nullptr) problem.Know(known->terms);
+  part.is_explained = problem.ExplainConstant(segment, &part.causes);
+  part.terms = problem.terms();
+  if (known == nullptr) return part;
+  for (Explanation one : known->causes) {
+    const Explanation here = StartExplanation(store, CauseChannel::kBalance, segment);
+    one.from = here.from, one.to = here.to, one.ends = here.ends;
+    part.causes.push_back(one);
+  }
+  return part;
+}
+
+/// Each part by itself, and with what the simplest of them shows; none where a part is not explained.
+Causes ExplainParts(const StepStore& store, StepForces* forces, const std::vector<Segment>& segments) {
+  std::vector<Part> parts;
+  for (const Segment& one : segments) parts.push_back(ExplainPart(store, forces, one, nullptr));
+  const auto is_simpler = [](const Part& a, const Part& b) {
+    if (a.is_explained != b.is_explained) return a.is_explained;
+    return a.CountAmplitudes() < b.CountAmplitudes();
+  };
+  const Part simplest = *std::min_element(parts.begin(), parts.end(), is_simpler);
+  Causes causes;
+  for (size_t i = 0; i < parts.size(); ++i) {
+    if (simplest.is_explained) {
+      const Part beside = ExplainPart(store, forces, segments[i], &simplest);
+      if (is_simpler(beside, parts[i])) parts[i] = beside;
+    }
+    if (!parts[i].is_explained) return {};
+    for (const Explanation& one : parts[i].causes) {
+      const auto same = std::find_if(causes.begin(), causes.end(),
+                                     [&](const Explanation& other) { return IsSame(one, other); });
+      if (same == causes.end()) {
+        causes.push_back(one);
+      } else {
+        same->to = one.to;
+        same->ends = one.ends;
+        if (one.faults.size() < same->faults.size()) same->faults = one.faults, same->outcome = one.outcome;
+      }
+    }
+  }
+  return causes;
 }
 
 }  // namespace
@@ -403,24 +380,8 @@ Causes ExplainForces(const StepStore& store) {
   Problem problem(store, &forces, whole);
   if (problem.ExplainConstant(whole, &causes)) return causes;
   if (parts.size() > 1 && parts.size() <= kMostSegments) {
-    Causes found;
-    bool all = true;
-    for (const Segment& part : parts)
-      all = all && Problem(store, &forces, part).ExplainConstant(part, &found);
-    if (all) {
-      for (const Explanation& one : found) {
-        const auto same = std::find_if(causes.begin(), causes.end(),
-                                       [&](const Explanation& other) { return IsSame(one, other); });
-        if (same == causes.end()) {
-          causes.push_back(one);
-        } else {
-          same->to = one.to;
-          same->ends = one.ends;
-          if (one.faults.size() < same->faults.size()) same->faults = one.faults, same->outcome = one.outcome;
-        }
-      }
-      return causes;
-    }
+    const Causes found = ExplainParts(store, &forces, parts);
+    if (!found.empty()) return found;
   }
   problem.ExplainChanging(whole, &causes);
   return causes;

@@ -191,6 +191,8 @@ class SignalGroup {
       SignalVerdict verdict = JudgeSignal(one, others);
       if (!verdict.is_explained) return;
       const auto count = [](const SignalVerdict& of) { return of.fits.front().faults.size(); };
+      // Of noise that is as large as what all have, several faults explain anything.
+      if (one.left < series_[i].left && count(verdict) > 1) return;
       if (best.is_explained && count(verdict) >= count(best) + (is_beside ? 0 : 1)) return;
       best = std::move(verdict);
       is_beside = true;

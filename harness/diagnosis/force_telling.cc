@@ -1,0 +1,111 @@
+#include "harness/diagnosis/force_telling.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "controller/common/text.h"
+
+namespace dexcheck {
+namespace {
+
+using Eigen::Index;
+using namespace force_fault;
+
+// Gravity whose size differs by less than this fraction of its change only points elsewhere.
+constexpr double kTilted = 0.2;
+
+// Residuals that change by more than this from one step to the next, in units of noise, and by this many
+// times what they change in the steps around, have begun, or ended.
+constexpr double kJumpNoise = 1.0, kJump = 5.0;
+
+std::string TellVector(const Eigen::Ref<const VectorXd>& v) {
+  std::string text = "(";
+  for (Index i = 0; i < v.size(); ++i) text += (i > 0 ? ", " : "") + FormatNumber(v[i], 4);
+  return text + ")";
+}
+
+}  // namespace
+
+Fault MakeForceFault(const Candidate& candidate, const VectorXd& a, const VectorXd& error,
+                     const Vector3d& gravity) {
+  Fault fault{candidate.fault,          candidate.place,
+              candidate.nominal + a[0], error.size() > 0 ? error[0] : 0.0,
+              candidate.unit,           ""};
+  const bool sticks = candidate.fault == kStuckBearing;
+  if (sticks || candidate.fault == kBearing) {
+    fault.fault = "dry friction";
+    fault.value = candidate.nominal * a[0];
+    fault.error = sticks ? std::numeric_limits<double>::infinity() : fault.error * candidate.nominal;
+    if (sticks) fault.detail = "or more: the joint sticks";
+  } else if (candidate.fault == "spring") {
+    if (a[0] != 0.0) fault.detail = "relaxed at " + FormatNumber(a[1] / a[0], 4);
+  } else if (candidate.fault == "tether") {
+    if (a[0] != 0.0) fault.detail = "to " + TellVector(a.tail<3>() / a[0]) + " m";
+  } else if (candidate.fault == "payload") {
+    if (a[0] != 0.0) fault.detail = "at " + TellVector(a.segment<3>(1) / a[0]) + " m of its centre of mass";
+  } else if (a.size() >= 3) {
+    const Index size = candidate.fault == "inertia" ? 6 : 3;
+    fault.value = a.head(size).norm();
+    if (error.size() >= size) fault.error = error.head(size).norm();
+    fault.detail = TellVector(a.head(size));
+    if (candidate.fault == "force and moment") fault.detail += " and " + TellVector(a.tail<3>()) + " N m";
+  }
+  if (candidate.fault == kForceInAxes || candidate.fault == kMomentInAxes) {
+    fault.fault = candidate.fault == kForceInAxes ? kForce : "moment";
+    fault.detail += " in its axes";
+  } else if (candidate.fault == kMassWithInertia) {
+    fault.fault = "mass";
+    fault.detail = "and its inertia by the same factor";
+  }
+  if (candidate.fault != kGravity) return fault;
+  const Vector3d change = a;
+  if (std::abs(change.dot(gravity.normalized())) < kTilted * change.norm()) {
+    const Vector3d actual = gravity + change;
+    fault.fault = "slope";
+    fault.value = RadToDeg(std::atan2(actual.cross(gravity).norm(), actual.dot(gravity)));
+    fault.error = RadToDeg(fault.error / gravity.norm());
+    fault.unit = "deg";
+    fault.detail = "by " + fault.detail + " m/s^2";
+  }
+  return fault;
+}
+
+void FindSegments(const StepStore& store, StepForces* forces, double level, Segment* whole,
+                  std::vector<Segment>* parts) {
+  struct Step {
+    Index index;
+    bool follows;
+    double robot, object;  // by how much each differs from the step before
+  };
+  std::vector<Step> steps;
+  VectorXd before;
+  forces->SetLevel(Vector2d::Constant(level));
+  for (Index i = 0; i < store.size(); ++i) {
+    if (!(store.Get(StepStore::kNoise)(0, i) > 0.0)) continue;
+    forces->SetStep(i);
+    const VectorXd y = forces->CalcResidual();
+    const Index n = y.size() - 6;
+    if (forces->Differs(y)) {
+      const bool follows = !steps.empty() && steps.back().index == i - 1;
+      steps.push_back({i, follows, 0.0, 0.0});
+      if (follows) {
+        steps.back().robot = (y - before).head(n).norm() / std::sqrt(static_cast<double>(n));
+        steps.back().object = (y - before).tail<6>().norm() / std::sqrt(6.0);
+      }
+    }
+    before = y;
+  }
+  const auto jumps = [&](size_t k, double Step::*size) {
+    double around = k > 0 ? steps[k - 1].*size : 0.0;
+    if (k + 1 < steps.size()) around = std::max(around, steps[k + 1].*size);
+    return steps[k].*size > std::max(kJumpNoise, kJump * around);
+  };
+  for (size_t k = 0; k < steps.size(); ++k) {
+    if (!steps[k].follows || jumps(k, &Step::robot) || jumps(k, &Step::object)) parts->emplace_back();
+    whole->push_back(steps[k].index);
+    parts->back().push_back(steps[k].index);
+  }
+}
+
+}  // namespace dexcheck

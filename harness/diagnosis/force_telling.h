@@ -1,0 +1,24 @@
+#pragma once
+
+// Faults of the balances in words, and the steps that they are sought in.
+
+#include <vector>
+
+#include "harness/diagnosis/causes.h"
+#include "harness/diagnosis/step_forces.h"
+
+namespace dexcheck {
+
+/// @param a its amplitudes. @param error their standard errors; empty for none. @param gravity the model's.
+Fault MakeForceFault(const Candidate& candidate, const VectorXd& a, const VectorXd& error,
+                     const Vector3d& gravity);
+
+/// Steps of a store that differ.
+using Segment = std::vector<Eigen::Index>;
+
+/// All steps that differ, and the same in parts that begin or end with a jump. @param level of the noise, in
+/// bounds of the checks.
+void FindSegments(const StepStore& store, StepForces* forces, double level, Segment* whole,
+                  std::vector<Segment>* parts);
+
+}  // namespace dexcheck
