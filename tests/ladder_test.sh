@@ -38,8 +38,8 @@ list_twins() {
 # Prints the lines of the tree ROOT that use what another release of MuJoCo says otherwise, but for the one header that
 # knows the releases, and the list of its fields.
 list_releases() {
-  local members='qM|dof_Madr|eq_active|ten_J|mpr_iterations|mpr_tolerance'
-  local names='mj_fullM|mj_crb|mju_warningText|mj_makeEmptyFileVFS|mj_addBufferVFS|mjv_makeConnector|mjv_connector|mj_ray|mjCOL_[A-Z]+'
+  local members='qM|dof_Madr|eq_active|ten_J|mpr_iterations|mpr_tolerance|n?names_map|body_bvh[a-z]*|geom_plugin|body_gravcomp'
+  local names='mj_fullM|mj_crb|mju_warningText|mj_makeEmptyFileVFS|mj_addBufferVFS|mjv_makeConnector|mjv_connector|mj_ray|mj_maxContact|mjCOL_[A-Z]+'
   (cd "$1" && grep -rnE "(->|\.)($members)\>|opt\.collision|mjENBL_SENSORNOISE|\<($names)\>" harness renders tests \
     --include='*.h' --include='*.cc' | grep -vE '^harness/engine/mujoco_release\.h:|^tests/harness/checks/engine_fields\.h:') || true
 }

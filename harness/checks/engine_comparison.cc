@@ -1,6 +1,7 @@
 #include "harness/checks/engine_comparison.h"
 
 #include <fmt/format.h>
+#include <mujoco/mujoco.h>
 
 #include <algorithm>
 #include <fstream>
@@ -299,7 +300,7 @@ class EngineComparisonRun {
 const std::vector<EngineComparisonEngine>& ListEngineComparisonEngines() {
   static const std::vector<EngineComparisonEngine> engines = {
       {"analytic", "the analytic model of the file"},
-      {"mujoco", "MuJoCo 2.2.2, which is linked into this program"},
+      {"mujoco", "MuJoCo " + std::string(mj_versionString()) + ", which is linked into this program"},
       {"mujoco3", "MuJoCo 3 under Node (npm package @mujoco/mujoco)"},
       {"bullet", "Bullet's btMultiBody"},
       {"kdl", "the Orocos Kinematics and Dynamics Library"},

@@ -25,14 +25,8 @@ Pose TorusPose(const mjModel& m, const mjData& d, int geom) {
   return MapPose(d.xmat + 9 * body, d.xpos + 3 * body);
 }
 
-/// The deepest contacts, as many as there is room for. @param X where their numbers stand in the world.
-/// @return how many.
-int PlaceContacts(const Pose& X, std::span<ExactContact> contacts, int room, CollisionContact* found) {
-  const auto is_deeper = [](const ExactContact& a, const ExactContact& b) { return a.distance < b.distance; };
-  if (static_cast<int>(contacts.size()) > room) {
-    std::stable_sort(contacts.begin(), contacts.end(), is_deeper);
-    contacts = contacts.first(static_cast<size_t>(room));
-  }
+/// @param X where the contacts' numbers stand in the world. @return how many they are.
+int PlaceContacts(const Pose& X, std::span<const ExactContact> contacts, CollisionContact* found) {
   for (const ExactContact& contact : contacts) {
     const Vector3d position = X * contact.position;
     const Vector3d normal = X.linear() * contact.normal;
@@ -86,10 +80,9 @@ int CollideSphereMesh(const mjModel* m, CollisionData* d, CollisionContact* con,
   const Eigen::Map<const Vector3d> sphere(d->geom_xpos + 3 * g1);
   const Vector3d center = X_BT.linear().transpose() * (sphere - X_BT.translation());
   ExactContact contacts[2];
-  const int count =
-      CollideSphereTorus(center, m->geom_size[3 * g1], ring_radius, tube_radius, margin, contacts);
-  return PlaceContacts(X_BT, {contacts, static_cast<size_t>(count)}, CountMostContacts(*m, g1, g2, margin),
-                       con);
+  int count = CollideSphereTorus(center, m->geom_size[3 * g1], ring_radius, tube_radius, margin, contacts);
+  count = std::min(count, CountMostContacts(*m, g1, g2, margin));  // the deeper one is the first
+  return PlaceContacts(X_BT, {contacts, static_cast<size_t>(count)}, con);
 }
 
 int CollideBoxMesh(const mjModel* m, CollisionData* d, CollisionContact* con, int g1, int g2, mjtNum margin) {
@@ -100,9 +93,9 @@ int CollideBoxMesh(const mjModel* m, CollisionData* d, CollisionContact* con, in
   const Eigen::Map<const Vector3d> half_size(m->geom_size + 3 * g1);
   ExactContact contacts[kRingPlaces];
   const Pose X_BT = X_WB.inverse(Eigen::Isometry) * TorusPose(*m, *d, g2);
-  const int count = CollideBoxTorus(X_BT, ring_radius, tube_radius, half_size, margin, contacts);
-  return PlaceContacts(X_WB, {contacts, static_cast<size_t>(count)}, CountMostContacts(*m, g1, g2, margin),
-                       con);
+  const int places = std::min(kRingPlaces, CountMostContacts(*m, g1, g2, margin));
+  const int count = CollideBoxTorus(X_BT, ring_radius, tube_radius, half_size, margin, contacts, places);
+  return PlaceContacts(X_WB, {contacts, static_cast<size_t>(count)}, con);
 }
 
 /// Distance of a point from a box's surface, negative inside, and the outward normal there.
@@ -218,14 +211,14 @@ int CollideSphereTorus(const Vector3d& center, double sphere_radius, double ring
 }
 
 int CollideBoxTorus(const Pose& X_BT, double ring_radius, double tube_radius, const Vector3d& half_size,
-                    double margin, ExactContact contacts[kRingPlaces]) {
+                    double margin, ExactContact contacts[], int places) {
   Vector3d normal;
   MeasureBox(X_BT.translation(), half_size, &normal);
   const Vector3d down = -(X_BT.linear().transpose() * normal);
   const double first = down.head<2>().norm() > kLyingFlat ? std::atan2(down.y(), down.x()) : 0.0;
   int count = 0;
-  for (int i = 0; i < kRingPlaces; ++i) {
-    const double u = first + 2.0 * kPi * i / kRingPlaces;
+  for (int i = 0; i < places; ++i) {
+    const double u = first + 2.0 * kPi * i / places;
     const Vector3d center = X_BT * Vector3d(ring_radius * std::cos(u), ring_radius * std::sin(u), 0.0);
     const double distance = MeasureBox(center, half_size, &normal) - tube_radius;
     if (distance > margin) continue;

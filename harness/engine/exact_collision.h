@@ -39,17 +39,18 @@ ExactContact CollideSphereEllipsoid(const Vector3d& center, double sphere_radius
 int CollideSphereTorus(const Vector3d& center, double sphere_radius, double ring_radius, double tube_radius,
                        double margin, ExactContact contacts[2]);
 
-/// Places of the ring at which a torus is held against a box.
+/// Places of the ring at which a torus is held against a box; fewer where the engine has no room for so many
+/// (MuJoCo 3.8 and newer: 4, or 5 with a margin).
 inline constexpr int kRingPlaces = 8;
 
 /// Contacts nearer than `margin` between a torus and a box. A torus is a ball rolled around its ring: the
-/// ball is collided at kRingPlaces, evenly spread from the place that is deepest in the box, or from the
+/// ball is collided at `places`, evenly spread from the place that is deepest in the box, or from the
 /// torus's x axis when it lies so flat that there is none. Exact for a torus on a face; an edge or corner
 /// between two places is missed.
 /// @param X_BT the torus, about its z axis, in the box's frame. @param half_size of the box, m.
 /// @return how many of `contacts` (in the box's frame) were filled.
 int CollideBoxTorus(const Pose& X_BT, double ring_radius, double tube_radius, const Vector3d& half_size,
-                    double margin, ExactContact contacts[kRingPlaces]);
+                    double margin, ExactContact contacts[], int places = kRingPlaces);
 
 /// Makes the engine collide so, in the whole process; meshes that are no tori keep the engine's own
 /// functions. A mesh geom is a torus about its BODY's origin and z axis when the MJCF gives it

@@ -178,6 +178,7 @@ inline int FindWideActuator([[maybe_unused]] const mjModel& m) {
 }
 
 /// What an MJCF may say.
+inline constexpr bool kHasFrames = mjVERSION_HEADER >= 320;
 inline constexpr bool kHasImplicitFast = mjVERSION_HEADER >= 300;
 inline constexpr bool kHasPolynomials = mjVERSION_HEADER >= 3007000;
 inline constexpr bool kHasSimpleBodies = mjVERSION_HEADER >= 3011000;

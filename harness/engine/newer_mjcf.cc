@@ -68,6 +68,8 @@ class Schema {
       if (is_body) path->back()->children["worldbody"] = element;
     }
     if (is_recursive) element->children[name] = element;
+    // Where bodies may stand, but in no schema that is printed.
+    if (is_body && kHasFrames) element->children["frame"] = element->children["replicate"] = element;
     // Understood by the reader before the schema.
     element->children["include"] = &include_;
     path->push_back(element);
@@ -121,7 +123,8 @@ class Downgrade {
   void Check(XMLElement* element, const SchemaElement& schema) {
     ReplaceOlderWords(element, schema);
     ReplaceValues(element);
-    RemoveAttributes(element, schema);
+    const std::string_view kind = element->Name();
+    if (kind != "frame" && kind != "replicate") RemoveAttributes(element, schema);
     for (XMLElement* child : ListChildren(element)) {
       const std::string name = child->Name();
       const auto known = schema.children.find(name);
@@ -226,6 +229,11 @@ class Downgrade {
         mjcf_.Note(*element, "<option integrator>",
                    std::string(value) + " written as " + other + ", which no term depends on");
       }
+    }
+    if (!kHasImplicitFast && element->Attribute("dyntype", "filterexact") != nullptr) {
+      element->SetAttribute("dyntype", "filter");
+      mjcf_.Note(*element, "<" + std::string(name) + " dyntype>",
+                 "filterexact written as filter, which no term depends on");
     }
     if (name == "joint" && !kHasPolynomials) {
       TakePolynomial(element, "damping");

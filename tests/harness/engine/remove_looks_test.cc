@@ -8,13 +8,14 @@
 
 #include "harness/engine/compiled_model.h"
 #include "harness/engine/engine.h"
+#include "harness/engine/mujoco_release.h"
 #include "tests/common/paths.h"
 
 namespace dexcheck::testing::remove_looks_test {
 namespace {
 
 /// Whether two arrays have the same bits.
-::testing::AssertionResult SameBits(const char* name, const mjtNum* a, const mjtNum* b, int count) {
+::testing::AssertionResult SameBits(const char* name, const mjtNum* a, const mjtNum* b, EngineSize count) {
   for (int i = 0; i < count; ++i) {
     if (std::memcmp(a + i, b + i, sizeof(mjtNum)) != 0)
       return ::testing::AssertionFailure() << name << "[" << i << "]: " << a[i] << " against " << b[i];
