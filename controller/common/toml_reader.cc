@@ -117,7 +117,9 @@ void TomlValue::Fail(std::string_view requirement) const {
 std::string TomlValue::Locate() const {
   // A value that was overridden has its own source, which says where it comes from better than a line does.
   const toml::source_path_ptr& own_source = node_->source().path;
-  return own_source ? *own_source : context_->source + ":" + std::to_string(line());
+  if (own_source) return *own_source;
+  // A table that an override made stands on no line.
+  return line() > 0 ? context_->source + ":" + std::to_string(line()) : context_->source;
 }
 
 void TomlValue::Reject(std::string_view problem) const {

@@ -63,7 +63,13 @@
 /* What a controller wants and reports. */
 enum { DEXCHECK_TERMS = 1, DEXCHECK_TELLS_F_N = 2, DEXCHECK_PARAMETERS = 4 };
 /* Types of messages. */
-enum { DEXCHECK_STEP = 1, DEXCHECK_BEGIN = 2, DEXCHECK_END = 3, DEXCHECK_SET_PARAMETERS = 4, DEXCHECK_ERROR = 5 };
+enum {
+  DEXCHECK_STEP = 1,
+  DEXCHECK_BEGIN = 2,
+  DEXCHECK_END = 3,
+  DEXCHECK_SET_PARAMETERS = 4,
+  DEXCHECK_ERROR = 5
+};
 
 struct dexcheck_hello {
   char magic[8]; /* DEXCHECK_MAGIC */
@@ -87,21 +93,28 @@ struct dexcheck_message {
   uint32_t doubles; /* that follow; of SET_PARAMETERS and ERROR: bytes of text */
 };
 
-/* The same for a shared library in C, which needs this header and nothing else. It defines these functions; in C++ they
- * are extern "C". What it returns as text is a line that says why it does not go on, and lives until the next call; null
- * when all is well. Without dexcheck_set_parameter it takes no parameters; dexcheck_begin and dexcheck_close may be
- * missing.
- *
- *   uint32_t dexcheck_protocol(void);        returns DEXCHECK_PROTOCOL
- *   void* dexcheck_open(const struct dexcheck_hello* hello, const char* robot, const char* scenario,
- *                       const double* joint_gains, uint32_t* flags);
- *                                            a controller, or null; flags are what it wants and reports; joint_gains are
- *                                            K_p, K_v (n each), null with contacts. What it is given lives as long as it.
- *   const char* dexcheck_set_parameter(void* controller, const char* name, double value);
- *   void dexcheck_begin(void* controller);
- *   const char* dexcheck_step(void* controller, const double* state, double* torques);
- *                                            state and torques as the doubles of STEP
- *   void dexcheck_close(void* controller);
- */
+/* The same for a shared library in C, which needs this header and nothing else: it defines these functions. A
+ * text that they return is a line that says why the controller does not go on, and lives until the next call;
+ * null when all is well. Without dexcheck_set_parameter a library takes no parameters; dexcheck_begin and
+ * dexcheck_close may be missing. */
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* DEXCHECK_PROTOCOL. */
+uint32_t dexcheck_protocol(void);
+/* A controller, or null. What it is given lives as long as it: K_p and K_v of the joints (n each), null with
+ * contacts. Its flags are what it wants and reports. */
+void* dexcheck_open(const struct dexcheck_hello* hello, const char* robot, const char* scenario,
+                    const double* joint_gains, uint32_t* flags);
+const char* dexcheck_set_parameter(void* controller, const char* name, double value);
+void dexcheck_begin(void* controller);
+/* State and torques are the doubles of STEP. */
+const char* dexcheck_step(void* controller, const double* state, double* torques);
+void dexcheck_close(void* controller);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -175,7 +175,6 @@ void CheckTrials(StudyInputs* inputs) {
   }
   inputs->OpenScenario();
   const Scenario first = MakeTrialScenario(*inputs, trial);
-  inputs->controller_hash = HashController(first.controller);
   MjModelPtr engine = LoadMjcf(inputs->mjcf);
   RemovePictures(&engine);
   inputs->engine = std::move(engine);
@@ -188,6 +187,7 @@ void CheckTrials(StudyInputs* inputs) {
   if (std::none_of(study.variations.begin(), study.variations.end(), IsModelKey))
     inputs->model = std::make_shared<const RobotModel>(setup.model());
   const Runner runner(setup, study.check);  // sensors and motors know more names than the setup
+  inputs->controller_hash = HashController(first.controller);
   const std::vector<double> parameters = trial.parameters;
   for (size_t i = 0; i < study.variations.size(); ++i) {
     trial.parameters = parameters;

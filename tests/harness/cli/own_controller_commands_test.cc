@@ -129,6 +129,26 @@ INSTANTIATE_TEST_SUITE_P(OwnControllerCommands, OwnLawEverywhere,
                          ::testing::Values(JOINT_LAW_LIBRARY, kNumPyLaw),
                          [](const auto& info) { return info.index == 0 ? "Library" : "NumPy"; });
 
+// In a study what a controller does wrong costs its trial, and no other; its process is of no use any more.
+TEST_F(OwnControllerCommands, AFailureCostsItsTrial) {
+  WriteText(Path("law.py"),
+            "import dexcheck\nclass Law(dexcheck.Controller):\n  parameters = {'danger': 0.0}\n"
+            "  def step(self, s):\n    if self.danger and s.t > 0.01: raise ValueError('ouch')\n"
+            "    return s.gravity\n");
+  WriteText(Path("study.toml"),
+            "name = \"study\"\nscenario = \"own.toml\"\ncontroller = \"law.py\"\n[[vary]]\nkey = "
+            "\"controller.danger\"\nvalues = [0, 1, 0]\n");
+  Expect(0, "study run study.toml --db study.sqlite --quiet --jobs 1");
+  for (const char* trial : {"0", "2"})
+    EXPECT_EQ(RunJson(0, Words("study show study.sqlite") + Words{trial})["failure"], "") << trial;
+  const Json failed = RunJson(0, "study show study.sqlite 1");
+  EXPECT_EQ(failed["outcome"], "crashed");
+  EXPECT_THAT(failed["failure"].get<std::string>(),
+              ::testing::HasSubstr("controller law.py: ValueError: ouch (law.py:5)"));
+  EXPECT_THAT(Expect(0, "study slurm study.toml --tasks 2 --controller law.py").out,
+              ::testing::HasSubstr("--controller " + Path("law.py").string()));
+}
+
 /// A library in C++, one in C and a Python file, each with a parameter of its own.
 struct OwnParameter {
   const char* name;

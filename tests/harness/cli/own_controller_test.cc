@@ -132,6 +132,19 @@ TEST_F(OwnController, LibrariesThatAreNoneAreRefused) {
   EXPECT_TRUE(Refused({"run", "lift", "--no-log", "--controller", PAPER_LAW_LIBRARY}, {"task"}));
 }
 
+TEST_F(OwnController, WhatALibraryInCDoesWrongIsOneLine) {
+  const auto run = [&](const std::string& fault, const Words& more) {
+    return RunWith(FAULTY_C_LIBRARY, more, {.environment = {{"FAULT", fault}}});
+  };
+  EXPECT_TRUE(
+      IsRefused(run("protocol", "--no-log"), {"faulty_c_controller.so", "protocol 7", "this program of 1"}));
+  EXPECT_TRUE(IsRefused(run("open", "--no-log"), {"faulty_c_controller.so", "made no controller"}));
+  EXPECT_TRUE(IsRefused(run("none", "--no-log --set controller.gain=3"), {"controller.gain", "takes none"}));
+  EXPECT_TRUE(HasFailed(run("step", "--out run"), "the widget is out of cheese while settling"));
+  EXPECT_TRUE(HasFailed(run("crash", "--out run"), "crashed (Aborted) while settling"));
+  EXPECT_TRUE(HasFailed(run("none", "--out run"), "while settling"));
+}
+
 /// A Python file with this law, in a class or as it is.
 class OwnPythonFile : public OwnController {
  protected:
