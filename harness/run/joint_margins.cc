@@ -203,8 +203,8 @@ std::string DescribeMargins(const JointMargins& margins) {
     return fmt::format("# margins: none, the loop is not stable: spectral radius {:.6g}\n", margins.radius);
   const StabilityMargins &one = margins.least, &all = margins.together;
   return fmt::format(
-      "# margins, one torque at a time: gain {:.3g} ({}), phase {:.3g} degrees ({}), delay {:.3g} ms ({})\n"
-      "# margins, all torques alike: gain {:.3g}, phase {:.3g} degrees, delay {:.3g} ms\n",
+      "# margins, one torque at a time: gain {:.2f} ({}), phase {:.1f} degrees ({}), delay {:.2f} ms ({})\n"
+      "# margins, all torques alike: gain {:.2f}, phase {:.1f} degrees, delay {:.2f} ms\n",
       one.gain, margins.gain_joint, RadToDeg(one.phase), margins.phase_joint, 1e3 * one.delay,
       margins.delay_joint, all.gain, RadToDeg(all.phase), 1e3 * all.delay);
 }
