@@ -98,13 +98,13 @@ std::optional<LinearLoop> LineariseJoints(const Setup& setup, const JointGains& 
   return loop;
 }
 
-std::optional<JointMargins> CalcJointMargins(const Setup& setup, const JointGains& gains) {
+std::optional<JointMargins> CalcJointMargins(const Setup& setup, const JointGains& gains, bool together) {
   if (setup.joints() == nullptr) return std::nullopt;
   JointMargins all;
   for (const VectorXd& q : ListPostures(setup)) {
     const std::optional<LinearLoop> loop = LineariseJoints(setup, gains, q);
     if (!loop) return std::nullopt;
-    const LoopMargins margins = CalcMargins(CalcSampledSystem(*loop));
+    const LoopMargins margins = CalcMargins(CalcSampledSystem(*loop), together);
     all.radius = std::max(all.radius, margins.radius);
     for (size_t i = 0; i < margins.loops.size(); ++i) {
       const StabilityMargins& one = margins.loops[i];
@@ -128,8 +128,8 @@ JointGains ScaleGains(JointGains gains, double factor) {
 BestGains FindBestGains(const Setup& setup) {
   // Which margin is too small; empty for none.
   const auto find_limit = [&](double factor) -> std::string {
-    const auto margins = CalcJointMargins(setup, ScaleGains(setup.joints()->gains, factor));
-    if (!margins || !margins->is_stable()) return "stability";
+    const auto margins = CalcJointMargins(setup, ScaleGains(setup.joints()->gains, factor), false);
+    if (!margins || !margins->is_stable()) return "loop, which is not stable";
     const double gain = margins->least.gain / BestGains::kGain,
                  phase = margins->least.phase / BestGains::kPhase;
     if (std::min(gain, phase) >= 1.0) return "";
@@ -203,8 +203,8 @@ std::string DescribeMargins(const JointMargins& margins) {
     return fmt::format("# margins: none, the loop is not stable: spectral radius {:.6g}\n", margins.radius);
   const StabilityMargins &one = margins.least, &all = margins.together;
   return fmt::format(
-      "# margins, one torque at a time: gain {:.3g} ({}), phase {:.3g} degrees ({}), delay {:.3g} ms ({})\n"
-      "# margins, all torques alike: gain {:.3g}, phase {:.3g} degrees, delay {:.3g} ms\n",
+      "# margins, one torque at a time: gain {:.2f} ({}), phase {:.1f} degrees ({}), delay {:.2f} ms ({})\n"
+      "# margins, all torques alike: gain {:.2f}, phase {:.1f} degrees, delay {:.2f} ms\n",
       one.gain, margins.gain_joint, RadToDeg(one.phase), margins.phase_joint, 1e3 * one.delay,
       margins.delay_joint, all.gain, RadToDeg(all.phase), 1e3 * all.delay);
 }

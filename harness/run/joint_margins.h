@@ -21,7 +21,9 @@ std::optional<LinearLoop> LineariseJoints(const Setup& setup, const JointGains& 
                                           const Eigen::Ref<const VectorXd>& q);
 
 /// Of the setup's motion with these gains; none as LineariseJoints, or without a motion of joints.
-std::optional<JointMargins> CalcJointMargins(const Setup& setup, const JointGains& gains);
+/// @param together as CalcMargins.
+std::optional<JointMargins> CalcJointMargins(const Setup& setup, const JointGains& gains,
+                                             bool together = true);
 
 /// The natural frequencies times a factor: K_p and K by its square.
 JointGains ScaleGains(JointGains gains, double factor);

@@ -107,8 +107,13 @@ SampledSystem CalcSampledSystem(const LinearLoop& loop) {
     if (k == 0) system.C = law.leftCols(size);
     chain.Move(c, &x);
   }
-  system.A = x.leftCols(size);
-  system.B = x.rightCols(n);
+  // From a delay, a lag or a filter that is not there nothing follows.
+  std::vector<Index> kept;
+  for (Index i = 0; i < size; ++i)
+    if (!x.col(i).isZero(0.0) || !system.C.col(i).isZero(0.0)) kept.push_back(i);
+  system.A = x(kept, kept);
+  system.B = x.rightCols(n)(kept, Eigen::all);
+  system.C = system.C(Eigen::all, kept).eval();
   return system;
 }
 
@@ -156,8 +161,8 @@ StabilityMargins FindMargins(const std::vector<double>& w, const std::vector<Com
 
 namespace {
 
-constexpr int kFrequencies = 700;
-constexpr double kLowest = 1e-5;               // of half the rate of sampling
+constexpr int kFrequencies = 500;
+constexpr double kLowest = 1e-5;  // of half the rate of sampling
 
 std::vector<double> ListFrequencies(double period) {
   std::vector<double> w;
@@ -178,7 +183,7 @@ void Match(const VectorXcd& before, VectorXcd* values) {
 
 }  // namespace
 
-LoopMargins CalcMargins(const SampledSystem& system) {
+LoopMargins CalcMargins(const SampledSystem& system, bool together) {
   // A - B C = U R U^*
   const Eigen::ComplexSchur<MatrixXd> schur(system.A - system.B * system.C);
   const MatrixXcd& R = schur.matrixT();
@@ -188,7 +193,7 @@ LoopMargins CalcMargins(const SampledSystem& system) {
   const MatrixXcd B = schur.matrixU().adjoint() * system.B, C = system.C * schur.matrixU();
   const Index n = system.B.cols();
   const std::vector<double> w = ListFrequencies(system.period);
-  std::vector<std::vector<Complex>> own(static_cast<size_t>(n)), loci(static_cast<size_t>(n));
+  std::vector<std::vector<Complex>> own(static_cast<size_t>(n)), loci(together ? own.size() : 0);
   MatrixXcd shifted;
   const auto evaluate = [&](Complex z) {
     shifted = R;
@@ -203,18 +208,18 @@ LoopMargins CalcMargins(const SampledSystem& system) {
   VectorXcd values;
   for (const double omega : w) {
     const MatrixXcd S = evaluate(std::polar(1.0, omega * system.period));
+    for (Index i = 0; i < n; ++i) own[static_cast<size_t>(i)].push_back(1.0 / S(i, i) - 1.0);
+    if (!together) continue;
     const VectorXcd before = std::exchange(values, find_loci(S));
     if (before.size() > 0) Match(before, &values);
-    for (Index i = 0; i < n; ++i) {
-      own[static_cast<size_t>(i)].push_back(1.0 / S(i, i) - 1.0);
-      loci[static_cast<size_t>(i)].push_back(values[i]);
-    }
+    for (Index i = 0; i < n; ++i) loci[static_cast<size_t>(i)].push_back(values[i]);
   }
   for (const std::vector<Complex>& L : own) margins.loops.push_back(FindMargins(w, L));
   for (const std::vector<Complex>& L : loci) margins.together.Narrow(FindMargins(w, L));
   // What stands still: a spring that is too weak to hold what falls.
   const MatrixXcd S = evaluate(1.0);
   for (Index i = 0; i < n; ++i) AddEnd(1.0 / S(i, i) - 1.0, &margins.loops[static_cast<size_t>(i)]);
+  if (!together) return margins;
   for (const Complex L : find_loci(S)) AddEnd(L, &margins.together);
   return margins;
 }

@@ -102,8 +102,9 @@ struct LoopMargins {
   StabilityMargins together;            ///< Of all torques by the same factor, angle or delay.
   [[nodiscard]] bool is_stable() const { return radius < 1.0; }
 };
-/// Without margins where it is not stable.
-LoopMargins CalcMargins(const SampledSystem& system);
+/// Without margins where it is not stable. @param together whether those of all torques are wanted, most of
+/// the time that it takes.
+LoopMargins CalcMargins(const SampledSystem& system, bool together = true);
 
 /// Margins of a motion of joints, of the loops of all of them, each broken at its torque with the others
 /// closed, in the postures of the start and of the motion's points: the least of each margin, and whose it

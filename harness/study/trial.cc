@@ -88,7 +88,8 @@ Setup MakeSetup(const StudyInputs& inputs, const Trial& trial, const Scenario& s
 /// None of a loop that is not stable: nothing is left.
 void SetMargins(const Setup& setup, std::array<double, kNumMetrics>* metrics) {
   if (setup.joints() == nullptr) return;
-  const std::optional<JointMargins> margins = CalcJointMargins(setup, setup.joints()->gains);
+  const std::optional<JointMargins> margins =
+      CalcJointMargins(setup, setup.joints()->gains, /*together=*/false);
   if (!margins) return;
   const bool stable = margins->is_stable();
   (*metrics)[kGainMargin] = stable ? margins->least.gain : 1.0;
