@@ -121,7 +121,8 @@ std::vector<ComparedNumber> CompareResults(const std::vector<const RunData*>& ru
       number.values.push_back(has_signal ? std::optional(run->log().ReadSignal(signal).mean())
                                          : std::nullopt);
     }
-    if (number.values[0]) numbers.push_back(number);
+    const auto is_some = [](const std::optional<double>& value) { return value.value_or(0.0) != 0.0; };
+    if (std::any_of(number.values.begin(), number.values.end(), is_some)) numbers.push_back(number);
   }
   return numbers;
 }
