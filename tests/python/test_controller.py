@@ -90,7 +90,7 @@ def test_a_study_varies_the_parameters_of_a_function():
     assert error.dtype == float and (error > 0).all()
     soft = study["controller.stiffness"] == 100
     assert error[~soft].max() < error[soft].min()
-    assert "4" in study.answer
+    assert "4" in study.findings
 
 
 def test_a_law_that_fails_costs_its_trial_alone():

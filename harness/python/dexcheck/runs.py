@@ -148,11 +148,11 @@ def run(scenario, controller=None, *, set=None, seed=0, check=True, out=None, ti
 
 class Study:
     """The trials of a study, column by column: study["controller.stiffness"], study["position_error_rms"] are arrays.
-    answer: what the study comes to, in words."""
+    findings: what the study comes to, in words."""
 
-    def __init__(self, text, answer):
+    def __init__(self, text, findings):
         rows = list(csv.reader(io.StringIO(text)))
-        self.answer, self.columns = answer, rows[0]
+        self.findings, self.columns = findings, rows[0]
         self._values = {name: _to_array([row[i] for row in rows[1:]]) for i, name in enumerate(rows[0])}
 
     def __getitem__(self, name):
@@ -162,7 +162,7 @@ class Study:
         return len(self._values["trial"])
 
     def __repr__(self):
-        return self.answer
+        return self.findings
 
 
 def _to_array(texts):
@@ -181,9 +181,9 @@ def study(study, controller=None, *, vary=None, set=None, db=None, jobs=None):
             study = _write_study(study, vary, set, folder)
         database = db or os.path.join(folder, "study.sqlite")
         words = ["study", "run", study, "--db", database] + ([] if jobs is None else ["--jobs", jobs])
-        _, answer = _execute(words, controller, apart=True)
+        _, findings = _execute(words, controller, apart=True)
         _, text = _execute(["study", "export", database, "--out", "-"])
-        return Study(text, answer.strip())
+        return Study(text, findings.strip())
 
 
 def _write_study(scenario, vary, set, folder):
