@@ -74,7 +74,7 @@
   /** The checks of a category, folded unless one fails; constants that agree by themselves. */
   const Category = category => {
     const shown = category.checks.filter(check => !check.is_equal), equal = category.checks.filter(check => check.is_equal);
-    const fold = Add(Make('details', '', {className: 'category ' + category.tone, id: 'checks-' + category.name, open: category.tone === 'fail'}),
+    const fold = Add(Make('details', '', {className: 'check-group ' + category.tone, id: 'checks-' + category.name, open: category.tone === 'fail'}),
       Add(Make('summary'), Make('b', category.title), ' ', Make('span', category.word, {className: 'badge'}),
         ` ${category.explanation}: ${category.extent}`));
     if (shown.length) Add(fold, CheckTable(shown));
