@@ -3,8 +3,8 @@
 # Exit code 77 where there is no other program.
 set -euo pipefail
 
-this=$1
-other=${2:-${DEXCHECK_OTHER_PROGRAM:-}}
+this=$(realpath "$1")
+other=$(realpath -m "${2:-${DEXCHECK_OTHER_PROGRAM:-}}" 2>/dev/null || true)
 [[ -x $other ]] || { echo "DEXCHECK_OTHER_PROGRAM names no program that was built with another release of MuJoCo"; exit 77; }
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT

@@ -304,7 +304,7 @@ TEST_P(AdapterTest, TheProjectionIsTheProductWithTheDenseMap) {
     const MatrixXd T = CalcDenseMap(map);
     ASSERT_EQ(testing::CalcRank(T), map.size());
 
-    const VectorXd force = DrawVelocities(m()->nv);
+    const VectorXd force = DrawVelocities(static_cast<int>(m()->nv));
     VectorXd projected_force(map.size());
     map.ProjectForce(force.data(), projected_force);
     EXPECT_TRUE(MatrixNear(projected_force, T.transpose() * force, kRounding));

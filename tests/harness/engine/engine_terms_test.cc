@@ -157,7 +157,7 @@ class DenseEngine {
         linear_momentum += m->body_mass[body] * Vector3d(velocity[3], velocity[4], velocity[5]);
       }
     }
-    mju_copy(d->qacc, bias.data(), m->nv);
+    mju_copy(d->qacc, bias.data(), static_cast<int>(m->nv));
     mju_zero(model_->opt.gravity, 3);
     mj_rnePostConstraint(m, d);
   }

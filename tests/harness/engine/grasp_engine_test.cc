@@ -186,7 +186,7 @@ class RandomGrasp : public ::testing::Test {
 TEST_F(RandomGrasp, ContactJacobianIsTheEngines) {
   for (int trial = 0; trial < 50; ++trial) {
     ASSERT_TRUE(DrawGrasp());
-    const int nv = engine_->nv;
+    const int nv = static_cast<int>(engine_->nv);
     for (int finger = 0; finger < kFingers; ++finger) {
       const mjContact* contact = FindEngineContact(finger);
       ASSERT_NE(contact, nullptr);
@@ -244,7 +244,7 @@ TEST_F(RandomGrasp, RatesAreTheEnginesAccelerations) {
   for (int trial = 0; trial < 50; ++trial) {
     ASSERT_TRUE(DrawGrasp());
     // Engine accelerations at constant xi and V_o.
-    mju_zero(data_->qacc, engine_->nv);
+    mju_zero(data_->qacc, static_cast<int>(engine_->nv));
     map_.ExpandBias(data_->qacc);
     const Vector3d omega_o_world = X_Bo_.linear() * V_o_.tail<3>();
     const Vector3d turning = omega_o_world.cross(X_Bo_.linear() * V_o_.head<3>());

@@ -52,7 +52,7 @@ TEST(Skeleton, JoinsBodiesOfARobotWithoutShapes) {
   const auto place = [&](const char* name) { return Vector3d(data->xpos + 3 * body(name)); };
   int to_forearm = 0;
   int to_tool = 0;
-  for (int geom = plain->ngeom; geom < model->ngeom; ++geom) {
+  for (int geom = static_cast<int>(plain->ngeom); geom < model->ngeom; ++geom) {
     EXPECT_EQ(model->geom_contype[geom], 0);
     EXPECT_GT(model->geom_rbound[geom], 0.0);
     EXPECT_GE(geom, model->body_geomadr[model->geom_bodyid[geom]]);
