@@ -161,7 +161,7 @@ class JudgedJointLaw final : public JudgedLaw {
   DesiredJoints desired_, half_step_;
   VectorXd force_, demand_, true_demand_, commanded_force_;  // n
   VectorXd coulomb_, viscous_;                               // n, what is compensated
-  VectorXd q_, xi_;                        // where the error dynamics have the joints; empty at first
+  VectorXd q_, xi_;  // where the error dynamics have the joints; empty at first
 };
 
 }  // namespace

@@ -96,7 +96,8 @@ std::array<Option, 3> AddOverrideOptions(Command command, Overrides* overrides) 
 
 Option AddScenarioOptions(Command command, ScenarioRequest* request) {
   Option scenario =
-      command.AddOption("SCENARIO", &request->scenario, "Name of a shipped scenario, or a TOML file").Required();
+      command.AddOption("SCENARIO", &request->scenario, "Name of a shipped scenario, or a TOML file")
+          .Required();
   AddOverrideOptions(command, &request->overrides);
   return scenario;
 }

@@ -54,7 +54,8 @@ void ApplyPlantOptions(const PlantOptions& plant, mjModel* engine) {
     const std::optional<double>& mu = has_floor ? plant.floor_friction : plant.finger_friction;
     if (mu) m.pair_friction[5 * pair] = m.pair_friction[5 * pair + 1] = *mu;
   }
-  // By default dry friction creeps until (1 - d) f tc / (2 M): by radians a second at joints of little inertia.
+  // By default dry friction creeps until (1 - d) f tc / (2 M): by radians a second at joints of little
+  // inertia.
   for (int dof = 0; dof < m.nv; ++dof) {
     if (m.dof_frictionloss[dof] > 0.0)
       SetStiffness(time_constant, plant.contact_impedance, m.dof_solref + mjNREF * dof,
