@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <utility>
 
 namespace dexcheck {
 namespace {
@@ -62,6 +63,16 @@ class Search {
         samples_(rows_ / options.alike) {
     for (const Candidate& one : candidates)
       visible_.push_back(Reduce(one, std::sqrt(options.floor * options.alike)));
+    Index width = 0;
+    for (const Visible& one : visible_) width += one.columns.cols();
+    all_.resize(y.size(), width);
+    sizes_.resize(width);
+    width = 0;
+    for (const Visible& one : visible_) {
+      all_.middleCols(width, one.columns.cols()) = one.columns;
+      width += one.columns.cols();
+    }
+    sizes_ = all_.colwise().norm();
   }
 
   CauseSelection Run() {
@@ -100,7 +111,7 @@ class Search {
       chosen_.push_back(next.candidate);
       criterion = Exchange(next.criterion);
     }
-    return ExchangePairs(criterion);
+    return options_.exchanges_pairs ? ExchangePairs(criterion) : criterion;
   }
 
   /// The most likely first choices besides what was found: one at each place, and then more of them.
@@ -175,24 +186,28 @@ class Search {
   [[nodiscard]] std::vector<double> ScoreAll(const std::vector<size_t>& beside) const {
     const MatrixXd Q = CalcRange(beside);
     const VectorXd r = y_ - Q * (Q.transpose() * y_);
+    MatrixXd own = all_;
+    own.noalias() -= Q * (Q.transpose() * all_);
     const double parameters = CountParameters(beside);
     std::vector<double> scores(candidates_.size(), kInfinity);
+    Index at = 0;
     for (size_t i = 0; i < candidates_.size(); ++i) {
-      const MatrixXd& C = visible_[i].columns;
-      if (C.cols() == 0 || std::find(beside.begin(), beside.end(), i) != beside.end()) continue;
-      const double left = CalcLeft(C, Q, r);
+      const Index width = visible_[i].columns.cols();
+      const Index first = std::exchange(at, at + width);
+      if (width == 0 || std::find(beside.begin(), beside.end(), i) != beside.end()) continue;
+      const double left = CalcLeft(sizes_.segment(first, width), own.middleCols(first, width), r);
       if (!(left < r.squaredNorm())) continue;
       scores[i] = Score(left, parameters + CountParameters({i}), beside.size() + 1);
     }
     return scores;
   }
 
-  /// Square of what is left of r without what C has beside Q.
-  static double CalcLeft(const MatrixXd& C, const MatrixXd& Q, VectorXd r) {
-    MatrixXd own = C - Q * (Q.transpose() * C);
+  /// Square of what is left of r without what some columns have beside others. @param sizes of the columns.
+  /// @param own what they have beside those; spoilt.
+  static double CalcLeft(const Eigen::Ref<const VectorXd>& sizes, Eigen::Ref<MatrixXd> own, VectorXd r) {
     for (Index k = 0; k < own.cols(); ++k) {
       const double size = own.col(k).norm();
-      if (!(size > kIndependent * C.col(k).norm())) continue;
+      if (!(size > kIndependent * sizes[k])) continue;
       own.col(k) /= size;
       // By subtraction, since squares that nearly cancel say nothing of what is left.
       r -= own.col(k).dot(r) * own.col(k);
@@ -418,6 +433,8 @@ class Search {
   CauseOptions options_;
   double rows_, samples_;
   std::vector<Visible> visible_;  // of each candidate
+  MatrixXd all_;                  // their columns, side by side
+  VectorXd sizes_;                // of these
   std::vector<size_t> chosen_;
 };
 

@@ -130,7 +130,9 @@ MatrixXd MotionFit::CalcCoefficients(size_t centre, size_t half, int order) cons
     double power = 1.0;
     for (int p = 0; p <= order; ++p, power *= u) V(k, p) = power;
   }
-  MatrixXd C = V.householderQr().solve(MatrixXd::Identity(m, m));
+  const Eigen::HouseholderQR<MatrixXd> qr(V);
+  const MatrixXd Q = qr.householderQ() * MatrixXd::Identity(m, order + 1);
+  MatrixXd C = qr.matrixQR().topRows(order + 1).triangularView<Eigen::Upper>().solve(Q.transpose());
   double unit = 1.0;
   for (int p = 0; p <= order; ++p, unit /= scale) C.row(p) *= unit;
   if (is_even) even = C;

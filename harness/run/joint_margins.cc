@@ -203,7 +203,8 @@ std::string DescribeMargins(const JointMargins& margins) {
     return fmt::format("# margins: none, the loop is not stable: spectral radius {:.6g}\n", margins.radius);
   const StabilityMargins &one = margins.least, &all = margins.together;
   return fmt::format(
-      "# margins, one torque at a time: gain {:.2f} ({}), phase {:.1f} degrees ({}), delay {:.2f} ms ({})\n"
+      "# margins, one torque at a time:\n#   gain {:.2f} ({})\n#   phase {:.1f} degrees ({})\n"
+      "#   delay {:.2f} ms ({})\n"
       "# margins, all torques alike: gain {:.2f}, phase {:.1f} degrees, delay {:.2f} ms\n",
       one.gain, margins.gain_joint, RadToDeg(one.phase), margins.phase_joint, 1e3 * one.delay,
       margins.delay_joint, all.gain, RadToDeg(all.phase), 1e3 * all.delay);
@@ -219,14 +220,13 @@ void JudgeGains(const Setup& setup, const ClosedLoop& loop, RunResult* result) {
   card = fmt::format("# your gains: largest error of a joint {:.3g}, rms {:.3g}",
                      result->tracking.joints_max(), result->tracking.joints_rms());
   if (result->peak_effort > 0.0)
-    card +=
-        fmt::format("; largest torque {:.3g} of its limit ({})", result->peak_effort, result->busiest_motor);
+    card += fmt::format("\n# largest torque {:.3g} of its limit ({})", result->peak_effort,
+                        result->busiest_motor);
   card += "\n" + CommentLines(WriteJointControl(setup.scenario(), 1.0)) + DescribeMargins(*result->margins);
   const BestGains best = FindBestGains(setup);
   const bool found = best.factor > 0.0;
-  card +=
-      fmt::format("# best gains with a gain margin of {} and a phase margin of {:.0f} degrees at least: {}\n",
-                  BestGains::kGain, RadToDeg(BestGains::kPhase), found ? "below" : "none found");
+  card += fmt::format("# best gains with margins of at least {} (gain) and {:.0f} degrees (phase): {}\n",
+                      BestGains::kGain, RadToDeg(BestGains::kPhase), found ? "below" : "none found");
   if (!best.limited_by.empty()) card += "# limited by the " + best.limited_by + "\n";
   if (result->peak_effort >= 1.0) card += "# limited by the torque limit of " + result->busiest_motor + "\n";
   if (found) card += WriteJointControl(setup.scenario(), best.factor);

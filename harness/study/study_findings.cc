@@ -215,8 +215,8 @@ std::string MakeGainCard(const StudyInputs& inputs, const std::vector<TrialRow>&
                       ShowUnit(study.objectives.front().expression));
   const auto& metrics = row.result.metrics;
   card += fmt::format(
-      "# margins, one torque at a time: gain {:.2f}, phase {:.1f} degrees, delay {:.2f} ms; largest torque "
-      "{:.3g} of its limit\n",
+      "# margins, one torque at a time: gain {:.2f}, phase {:.1f} degrees, delay {:.2f} ms\n"
+      "# largest torque {:.3g} of its limit\n",
       metrics[kGainMargin], RadToDeg(metrics[kPhaseMargin]), 1e3 * metrics[kDelayMargin],
       metrics[kPeakEffort]);
   return card + DescribeLimits(study, rows, points, best) + WriteJointControl(scenario, 1.0);

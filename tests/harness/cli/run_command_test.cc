@@ -226,6 +226,9 @@ TEST_F(RunCommand, ABrokenShippedScenarioStopsNoOther) {
   const std::string shipped = "share/dexcheck/harness/shipped/scenarios/";
   std::filesystem::create_directories(Path("bin"));
   std::filesystem::create_directories(Path(shipped));
+  for (const char* folder : {"controller", "mjcf"})
+    std::filesystem::create_symlink(SourcePath(std::string("/") + folder),
+                                    Path("share/dexcheck/" + std::string(folder)));
   const std::string program = Path("bin/dexcheck");
   std::filesystem::copy_file(ProgramPath(), program);
   Write(shipped + "hold.toml", ReadText(SourcePath("/harness/shipped/scenarios/hold.toml")));
