@@ -1,6 +1,5 @@
 #include "harness/diagnosis/cause_estimator.h"
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
@@ -8,49 +7,15 @@
 #include <numeric>
 #include <utility>
 
+#include "harness/diagnosis/visible_columns.h"
+
 namespace dexcheck {
 namespace {
 
 using Eigen::Index;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-// A column of which less is left beside the others says nothing of its own.
-constexpr double kIndependent = 1e-7;
 constexpr double kImplausible = 3.0;  // times the plausible size
-
-/// What of a candidate shows above the noise: amplitudes are basis * a.
-struct Visible {
-  MatrixXd columns;  // N x r
-  MatrixXd basis;    // p x r
-  VectorXd unit;     // p, of the amplitudes: diag(unit)^-1 basis is orthonormal
-};
-
-/// @param noise of the sum over all rows.
-Visible Reduce(const Candidate& candidate, double noise) {
-  const MatrixXd& C = candidate.columns;
-  const VectorXd scale = candidate.scale.size() > 0 ? candidate.scale : VectorXd(VectorXd::Ones(C.cols()));
-  const bool is_bounded = candidate.scale.size() > 0;
-  if (C.cols() == 1) {
-    const double size = C.norm();
-    if (!(size > 0.0) || (is_bounded && size * scale[0] < noise)) return {};
-    return {C, MatrixXd::Identity(1, 1), VectorXd::Ones(1)};
-  }
-  // Of C diag(scale) = U S V^T those with S above the noise.
-  const VectorXd size = C.colwise().norm().transpose();
-  const VectorXd unit =
-      is_bounded ? scale : VectorXd(size.unaryExpr([](double s) { return s > 0.0 ? 1.0 / s : 0.0; }));
-  const MatrixXd scaled = C * unit.asDiagonal();
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(scaled.transpose() * scaled);
-  const double largest = eigen.eigenvalues().tail<1>()[0];
-  const double least = std::max(is_bounded ? noise * noise : 0.0, kIndependent * kIndependent * largest);
-  Index visible = 0;
-  while (visible < C.cols() && eigen.eigenvalues()[C.cols() - 1 - visible] > least) ++visible;
-  Visible result;
-  result.basis = unit.asDiagonal() * eigen.eigenvectors().rightCols(visible);
-  result.columns = C * result.basis;
-  result.unit = unit;
-  return result;
-}
 
 /// The search for one residual.
 class Search {
@@ -62,7 +27,7 @@ class Search {
         rows_(options.rows > 0.0 ? options.rows : static_cast<double>(y.size())),
         samples_(rows_ / options.alike) {
     for (const Candidate& one : candidates)
-      visible_.push_back(Reduce(one, std::sqrt(options.floor * options.alike)));
+      visible_.push_back(FindVisible(one, std::sqrt(options.floor * options.alike)));
     Index width = 0;
     for (const Visible& one : visible_) width += one.columns.cols();
     all_.resize(y.size(), width);

@@ -1,0 +1,34 @@
+#include "harness/diagnosis/visible_columns.h"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+
+namespace dexcheck {
+
+Visible FindVisible(const Candidate& candidate, double noise) {
+  const MatrixXd& C = candidate.columns;
+  const VectorXd scale = candidate.scale.size() > 0 ? candidate.scale : VectorXd(VectorXd::Ones(C.cols()));
+  const bool is_bounded = candidate.scale.size() > 0;
+  if (C.cols() == 1) {
+    const double size = C.norm();
+    if (!(size > 0.0) || (is_bounded && size * scale[0] < noise)) return {};
+    return {C, MatrixXd::Identity(1, 1), VectorXd::Ones(1)};
+  }
+  // Of C diag(scale) = U S V^T those with S above the noise.
+  const VectorXd size = C.colwise().norm().transpose();
+  const VectorXd unit =
+      is_bounded ? scale : VectorXd(size.unaryExpr([](double s) { return s > 0.0 ? 1.0 / s : 0.0; }));
+  const MatrixXd scaled = C * unit.asDiagonal();
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(scaled.transpose() * scaled);
+  const double largest = eigen.eigenvalues().tail<1>()[0];
+  const double least = std::max(is_bounded ? noise * noise : 0.0, kIndependent * kIndependent * largest);
+  Eigen::Index visible = 0;
+  while (visible < C.cols() && eigen.eigenvalues()[C.cols() - 1 - visible] > least) ++visible;
+  Visible result;
+  result.basis = unit.asDiagonal() * eigen.eigenvectors().rightCols(visible);
+  result.columns = C * result.basis;
+  result.unit = unit;
+  return result;
+}
+
+}  // namespace dexcheck

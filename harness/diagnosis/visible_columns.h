@@ -1,0 +1,20 @@
+#pragma once
+
+#include "harness/diagnosis/cause_estimator.h"
+
+namespace dexcheck {
+
+/// A column of which less is left beside others, relative, says nothing of its own.
+inline constexpr double kIndependent = 1e-7;
+
+/// What of a candidate shows above the noise: amplitudes are basis * a.
+struct Visible {
+  MatrixXd columns;  // N x r
+  MatrixXd basis;    // p x r
+  VectorXd unit;     // p, of the amplitudes: diag(unit)^-1 basis is orthonormal
+};
+
+/// @param noise of the sum over all rows.
+Visible FindVisible(const Candidate& candidate, double noise);
+
+}  // namespace dexcheck
