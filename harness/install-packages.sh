@@ -47,7 +47,7 @@ if [[ $purpose == tests || $purpose == development ]]; then
     # the Python module
     pybind11-dev python3-dev python3-pytest
     # what is packaged: hooks, the action, figures as PDF
-    pre-commit curl poppler-utils
+    pre-commit git curl poppler-utils
     # other physics engines
     libbullet-dev liborocos-kdl-dev libsimbody-dev
   )

@@ -20,6 +20,7 @@ namespace {
 
 std::vector<std::string> ListJointNames(const RobotModel& model) {
   std::vector<std::string> names;
+  names.reserve(static_cast<size_t>(model.num_joints()));
   for (int i = 0; i < model.num_joints(); ++i) names.push_back(model.joint(i).name);
   return names;
 }
@@ -72,7 +73,7 @@ void Print(const MotionRequest& request, const RobotModel& model, const MotionDe
 
 }  // namespace
 
-void AddMotionOptions(Command command, MotionRequest* request) {
+void AddMotionOptions(const Command& command, MotionRequest* request) {
   Command of_model = command.Under("A motion for a robot");
   of_model.AddOption("--model FILE", &request->model,
                      "Instead of a scenario, a parameter file, URDF or MJCF: make a motion to record");

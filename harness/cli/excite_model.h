@@ -18,7 +18,7 @@ struct MotionRequest {
   MotionDesignOptions options;
 };
 
-void AddMotionOptions(Command command, MotionRequest* request);
+void AddMotionOptions(const Command& command, MotionRequest* request);
 /// @return exit code.
 int DesignMotionOfModel(MotionRequest request);
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <nlopt.hpp>
+#include <numeric>
 #include <random>
 
 #include "controller/common/errors.h"
@@ -26,8 +27,8 @@ Vector3d Rise(double s) {
 
 /// Faults whose sizes a motion is to tell: one candidate for each number.
 std::vector<TorqueFault> ListDesignedFaults(const RobotModel& model) {
-  std::vector<int> joints;
-  for (int i = 0; i < model.num_joints(); ++i) joints.push_back(i);
+  std::vector<int> joints(static_cast<size_t>(model.num_joints()));
+  std::iota(joints.begin(), joints.end(), 0);
   std::vector<TorqueFault> faults = ListTorqueFaults(model, joints, 1);
   std::erase_if(faults, [](const TorqueFault& fault) {
     using enum TorqueFault::Kind;
@@ -159,14 +160,14 @@ class MotionDesigner {
     sample.torque_rate = sample.torque_curvature = VectorXd::Zero(model_.num_joints());
     VectorXd largest = VectorXd::Zero(model_.num_joints());
     const std::vector<bool> all(joints_.size(), true);
+    const size_t count = (times_.size() + kEvery - 1) / kEvery;
     for (size_t g = 0; g < times_.size(); g += kEvery) {
       sample.time = times_[g];
       motion.Calc(times_[g], &sample.q, &sample.qd, &sample.qdd);
       sample.direction = sample.qd.cwiseSign();
       sample.torque = CalcMotionTorques(sample.q, sample.qd, sample.qdd, &regressor_);
       largest = largest.cwiseMax(sample.torque.cwiseAbs());
-      if (squares != nullptr)
-        *squares += sample.torque.cwiseAbs2() / static_cast<double>(times_.size() / kEvery);
+      if (squares != nullptr) *squares += sample.torque.cwiseAbs2() / static_cast<double>(count);
       if (balance != nullptr) balance->Add(sample, all);
     }
     return largest;

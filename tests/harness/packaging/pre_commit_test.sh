@@ -2,7 +2,9 @@
 # Commits with the hooks of .pre-commit-hooks.yaml, as a repository with robot descriptions would: pre_commit_test.sh DEXCHECK
 set -euo pipefail
 
-command -v pre-commit >/dev/null || { echo "skipped, not found: pre-commit"; exit 77; }
+for tool in pre-commit git; do
+  command -v "$tool" >/dev/null || { echo "skipped, not found: $tool"; exit 77; }
+done
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/../../.." && pwd)
 scratch=$(mktemp -d)
 trap 'rm -rf "$scratch"' EXIT
