@@ -86,10 +86,10 @@ void AddMotionOptions(const Command& command, MotionRequest* request) {
   of_model.AddOption("--limits FILE.toml", &request->limits, "Ranges, velocities, accelerations and torques");
   of_model.AddOption("--mjcf FILE", &request->mjcf, "The robot's shapes, which must not overlap");
   of_model.AddOption("--duration S", &request->options.duration, "How long the motion takes, s")
-      .Check(PositiveNumber())
+      .Check(NumberFrom(1.0, 3600.0))
       .ShowDefault();
   of_model.AddOption("--rate HZ", &request->options.rate, "Rows per second")
-      .Check(PositiveNumber())
+      .Check(NumberFrom(1.0, 1e5))
       .ShowDefault();
   AddSeedOption(of_model, &request->options.seed, "Of the motions that are drawn at first");
 }

@@ -25,10 +25,14 @@ Vector3d Rise(double s) {
           60.0 * s * (1.0 + s * (2.0 * s - 3.0))};
 }
 
-/// Faults whose sizes a motion is to tell: one candidate for each number.
-std::vector<TorqueFault> ListDesignedFaults(const RobotModel& model) {
+std::vector<int> ListJoints(const RobotModel& model) {
   std::vector<int> joints(static_cast<size_t>(model.num_joints()));
   std::iota(joints.begin(), joints.end(), 0);
+  return joints;
+}
+
+/// Faults whose sizes a motion is to tell: one candidate for each number.
+std::vector<TorqueFault> ListDesignedFaults(const RobotModel& model, const std::vector<int>& joints) {
   std::vector<TorqueFault> faults = ListTorqueFaults(model, joints, 1);
   std::erase_if(faults, [](const TorqueFault& fault) {
     using enum TorqueFault::Kind;
@@ -46,7 +50,8 @@ class MotionDesigner {
       : model_(model),
         limits_(limits),
         options_(options),
-        faults_(ListDesignedFaults(model)),
+        joints_(ListJoints(model)),
+        faults_(ListDesignedFaults(model, joints_)),
         regressor_(model),
         best_{SeriesMotion(0.5 * (limits.lower + limits.upper), options.duration), {}, {}} {
     constexpr double kStep = 0.05;  // s
@@ -55,7 +60,6 @@ class MotionDesigner {
       times_.push_back(options.duration * static_cast<double>(g) / static_cast<double>(count));
       bases_.push_back(best_.motion.CalcBasis(times_.back()));
     }
-    for (int i = 0; i < model.num_joints(); ++i) joints_.push_back(i);
   }
 
   MotionDesign Run() {
@@ -307,6 +311,7 @@ class MotionDesigner {
   const RobotModel& model_;
   const MotionLimits& limits_;
   const MotionDesignOptions& options_;
+  std::vector<int> joints_;
   std::vector<TorqueFault> faults_;
   TorqueRegressor regressor_;
   MotionDesign best_;
@@ -314,10 +319,9 @@ class MotionDesigner {
   MatrixXd information_;  // of the best
   std::vector<double> times_;
   std::vector<Eigen::Matrix<double, 3, kSeries>> bases_;  // at these
-  std::vector<int> joints_;
-  VectorXd noise_;   // of a row, by joint
-  VectorXd scales_;  // plausible sizes, by column
-  MatrixXd known_;   // S W^T W S of what was recorded, and 1
+  VectorXd noise_;                                        // of a row, by joint
+  VectorXd scales_;                                       // plausible sizes, by column
+  MatrixXd known_;                                        // S W^T W S of what was recorded, and 1
 };
 
 }  // namespace

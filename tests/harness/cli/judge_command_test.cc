@@ -130,6 +130,7 @@ TEST_F(JudgeCommand, MakesAMotionToRecordThatTheModelExplains) {
   for (const auto& [words, parts] : std::initializer_list<std::pair<Words, std::vector<std::string>>>{
            {excite + Words("--limits limits.toml"), {"limits.toml:1", "joints.elbow", "is no joint of"}},
            {excite + Words("--limits none.toml"), {"none.toml", "cannot be read"}},
+           {excite + Words("--duration 1e9"), {"--duration", "1e9"}},
            {excite + Words("paper"), {"SCENARIO and --model exclude each other"}},
            {excite + Words{"--mjcf", SourcePath("/mjcf/torus.xml")}, {"torus.xml", "panda_joint1"}}})
     EXPECT_TRUE(IsOneLineWith(Expect(2, words).err, parts));
