@@ -96,8 +96,9 @@ int Run(const ExciteRequest& request) {
 
 void AddExciteCommand(Command app) {
   const auto request = std::make_shared<ExciteRequest>();
-  Command command = app.AddCommand(
-      "excite", "Change a scenario's oscillations so that the model's numbers show best within all limits");
+  Command command = app.AddCommand("excite",
+                                   "Change a scenario's oscillations so that the model's numbers show best "
+                                   "within all limits; or, with --model, make a motion to record");
   AddScenarioOptions(command, request.get()).Required(false);
   command
       .AddOption("--runs N", &request->options.runs,
