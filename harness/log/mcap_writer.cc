@@ -12,7 +12,7 @@ namespace {
 
 static_assert(std::endian::native == std::endian::little, "the format's order");
 
-constexpr std::string_view kMagic("\x89MCAP0\r\n", 8);
+constexpr std::string_view kMcapMagic("\x89MCAP0\r\n", 8);
 constexpr size_t kChunkSize = size_t{1} << 20;
 
 enum Opcode : std::uint8_t {
@@ -65,8 +65,8 @@ constexpr std::uint32_t kNone = 0;  // checksums, attachments, metadata
 McapWriter::McapWriter(const std::filesystem::path& path)
     : file_(path), stream_(file_.partial(), std::ios::binary) {
   if (!stream_) file_.Fail(std::strerror(errno));
-  stream_ << kMagic;
-  position_ = kMagic.size();
+  stream_ << kMcapMagic;
+  position_ = kMcapMagic.size();
   WriteRecord(kHeader, Pack("", "dexcheck"));
 }
 
@@ -144,7 +144,7 @@ void McapWriter::Finish() {
                                   chunk.index_length, "", chunk.size, chunk.size));
   }
   WriteRecord(kFooter, Pack(summary, std::uint64_t{0}, kNone));
-  stream_ << kMagic;
+  stream_ << kMcapMagic;
   stream_.close();
   if (!stream_) file_.Fail(std::strerror(errno));
   file_.Commit();

@@ -10,7 +10,6 @@
 #include <cstring>
 #include <deque>
 #include <fstream>
-#include <limits>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <set>
@@ -24,7 +23,6 @@ namespace {
 
 using AnyJson = nlohmann::json;
 
-constexpr double kMissing = std::numeric_limits<double>::quiet_NaN();
 constexpr double kNanoseconds = 1e-9;
 constexpr const char* kJointState = "sensor_msgs/msg/JointState";
 

@@ -14,7 +14,7 @@ namespace {
 
 static_assert(std::endian::native == std::endian::little, "numbers are copied as they stand in the file");
 
-constexpr std::string_view kMagic = "\x93NUMPY";
+constexpr std::string_view kNpyMagic = "\x93NUMPY";
 constexpr size_t kMostDimensions = 8;
 
 /// The text behind "'key':" in the header, which is a Python dictionary.
@@ -67,10 +67,10 @@ std::string WriteNpy(const NpyArray& array) {
   header += "), }";
   // The numbers begin at a multiple of 64, behind magic, version and the header's length.
   constexpr size_t kAlignment = 64;
-  const size_t before = kMagic.size() + 4;
+  const size_t before = kNpyMagic.size() + 4;
   const size_t padding = kAlignment - (before + header.size() + 1) % kAlignment;
   header += std::string(padding % kAlignment, ' ') + "\n";
-  std::string bytes(kMagic);
+  std::string bytes(kNpyMagic);
   bytes += '\x01';
   bytes += '\x00';
   bytes += static_cast<char>(header.size() & 0xff);
@@ -86,16 +86,17 @@ std::string WriteNpy(const NpyArray& array) {
 
 NpyArray ParseNpy(std::string_view bytes, const std::string& source) {
   const auto fail = [&](const std::string& problem) { throw InputError(source + ": " + problem); };
-  if (!bytes.starts_with(kMagic) || bytes.size() < kMagic.size() + 4) fail("must be a NumPy array (.npy)");
+  if (!bytes.starts_with(kNpyMagic) || bytes.size() < kNpyMagic.size() + 4)
+    fail("must be a NumPy array (.npy)");
   const auto byte = [&](size_t i) { return static_cast<size_t>(static_cast<unsigned char>(bytes[i])); };
-  const size_t version = byte(kMagic.size());
+  const size_t version = byte(kNpyMagic.size());
   const size_t length_size = version == 1 ? 2 : 4;
-  if (version < 1 || version > 3 || bytes.size() < kMagic.size() + 2 + length_size) {
+  if (version < 1 || version > 3 || bytes.size() < kNpyMagic.size() + 2 + length_size) {
     fail("must be a NumPy array of version 1 to 3, got version " + std::to_string(version));
   }
   size_t length = 0;
-  for (size_t i = 0; i < length_size; ++i) length |= byte(kMagic.size() + 2 + i) << (8 * i);
-  const size_t begin = kMagic.size() + 2 + length_size;
+  for (size_t i = 0; i < length_size; ++i) length |= byte(kNpyMagic.size() + 2 + i) << (8 * i);
+  const size_t begin = kNpyMagic.size() + 2 + length_size;
   if (length > bytes.size() - begin) fail("ends within its header");
   const std::string_view header = bytes.substr(begin, length);
   const std::string_view descr = FindValue(header, "descr");

@@ -3,6 +3,7 @@
 // Recordings of anybody's robot: times and signals as rows of numbers, read one after another.
 
 #include <filesystem>
+#include <limits>
 #include <map>
 #include <memory>
 #include <string>
@@ -29,6 +30,9 @@ class RecordingReader {
   [[nodiscard]] virtual std::string Where() const = 0;
 
  protected:
+  static constexpr double kMissing =
+      std::numeric_limits<double>::quiet_NaN();  ///< A number that a row lacks.
+
   std::vector<std::string> names_;
   bool has_names_ = false;
   std::string format_;

@@ -2,7 +2,6 @@
 #include <cmath>
 #include <fstream>
 #include <iostream>
-#include <limits>
 #include <optional>
 
 #include "controller/common/errors.h"
@@ -12,7 +11,6 @@
 namespace dexcheck {
 namespace {
 
-constexpr double kMissing = std::numeric_limits<double>::quiet_NaN();
 constexpr size_t kLongestLine = size_t{1} << 20U;
 
 std::string_view Trim(std::string_view text) {
