@@ -88,24 +88,18 @@ class NaiveDynamics {
   }
 
  private:
-  static Matrix4 RotateX(const T& angle) {
+  /// From axis i towards axis j.
+  static Matrix4 Rotate(int i, int j, const T& angle) {
     using std::cos;
     using std::sin;
     Matrix4 X = Matrix4::Identity();
-    X(1, 1) = X(2, 2) = cos(angle);
-    X(2, 1) = sin(angle);
-    X(1, 2) = -sin(angle);
+    X(i, i) = X(j, j) = cos(angle);
+    X(j, i) = sin(angle);
+    X(i, j) = -sin(angle);
     return X;
   }
-  static Matrix4 RotateZ(const T& angle) {
-    using std::cos;
-    using std::sin;
-    Matrix4 X = Matrix4::Identity();
-    X(0, 0) = X(1, 1) = cos(angle);
-    X(1, 0) = sin(angle);
-    X(0, 1) = -sin(angle);
-    return X;
-  }
+  static Matrix4 RotateX(const T& angle) { return Rotate(1, 2, angle); }
+  static Matrix4 RotateZ(const T& angle) { return Rotate(0, 1, angle); }
   static Matrix4 Translate(const T& x, const T& y, const T& z) {
     Matrix4 X = Matrix4::Identity();
     X(0, 3) = x;

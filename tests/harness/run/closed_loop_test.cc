@@ -112,9 +112,8 @@ TEST(ClosedLoop, IsDeterministic) {
   EXPECT_EQ(first.step().findings.f_c_model, second.step().findings.f_c_model);
 }
 
-TEST(ClosedLoop, StepsWithoutAllocation) {
-  const ShippedRun setup("curve");
-  ClosedLoop loop(setup.setup(), /*check=*/true);
+void ExpectStepsWithoutAllocation(const ShippedRun& run) {
+  ClosedLoop loop(run.setup(), /*check=*/true);
   loop.Settle();
   for (int i = 0; i < 100; ++i) loop.Step();
   const AllocationCounter counter;
@@ -122,16 +121,13 @@ TEST(ClosedLoop, StepsWithoutAllocation) {
   EXPECT_EQ(counter.count(), 0);
 }
 
+TEST(ClosedLoop, StepsWithoutAllocation) { ExpectStepsWithoutAllocation(ShippedRun("curve")); }
+
 TEST(ClosedLoop, StepsOfAPlantThatIsNotIdealAllocateNothing) {
-  const ShippedRun setup("curve-real", {"sensing.latency=0.003", "sensing.object_latency=0.002",
-                                        "sensing.object_velocity=kalman", "sensing.object_acceleration=5",
-                                        "actuation.coulomb=0.001", "actuation.lag=0.001"});
-  ClosedLoop loop(setup.setup(), /*check=*/true);
-  loop.Settle();
-  for (int i = 0; i < 100; ++i) loop.Step();
-  const AllocationCounter counter;
-  for (int i = 0; i < 100; ++i) loop.Step();
-  EXPECT_EQ(counter.count(), 0);
+  ExpectStepsWithoutAllocation(
+      ShippedRun("curve-real",
+                 {"sensing.latency=0.003", "sensing.object_latency=0.002", "sensing.object_velocity=kalman",
+                  "sensing.object_acceleration=5", "actuation.coulomb=0.001", "actuation.lag=0.001"}));
 }
 
 TEST(ClosedLoop, TorquesCanBeHeldForSeveralSteps) {
