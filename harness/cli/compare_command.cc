@@ -15,6 +15,7 @@
 #include "harness/cli/make_video.h"
 #include "harness/cli/output_file.h"
 #include "harness/cli/terminal.h"
+#include "harness/report/comparison_page.h"
 #include "harness/report/page_frame.h"
 #include "harness/report/recorded_frames.h"
 #include "harness/report/run_comparison.h"

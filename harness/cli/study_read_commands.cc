@@ -17,6 +17,7 @@
 #include "harness/cli/terminal.h"
 #include "harness/study/study_findings.h"
 #include "harness/study/study_page.h"
+#include "harness/study/study_rows.h"
 #include "harness/study/study_store.h"
 #include "harness/study/study_summary.h"
 

@@ -13,6 +13,7 @@
 
 #include "controller/common/errors.h"
 #include "harness/base/child_process.h"
+#include "harness/base/csv.h"
 #include "harness/base/files.h"
 
 namespace dexcheck {
@@ -63,13 +64,6 @@ std::array<double, 2> FindRange(const Figure& figure, bool right_axis) {
 std::string SetRange(const Figure& figure, bool right_axis) {
   const std::array<double, 2> range = CalcAxisRange(figure, right_axis);
   return fmt::format("set {}range [{:.9g}:{:.9g}]\n", right_axis ? "y2" : "y", range[0], range[1]);
-}
-
-/// A field of a CSV file (RFC 4180).
-std::string QuoteField(const std::string& text) {
-  std::string quoted = "\"";
-  for (const char c : text) quoted += c == '"' ? std::string("\"\"") : std::string(1, c);
-  return quoted + "\"";
 }
 
 /// FOLDER/NAME.csv: time, then each curve, "LABEL, AXIS"; NaN where it has a gap.

@@ -75,14 +75,6 @@ RunComparison CompareRuns(const std::vector<const RunData*>& runs, const RunComp
 /// Values of a signal's column at the times of another run, by lines between its rows; not-a-number outside.
 VectorXd Resample(const VectorXd& time, const Eigen::Ref<const VectorXd>& values, const VectorXd& at);
 
-// The page of a comparison of runs.
-
-/// A whole HTML document that loads nothing: verdict, inputs that differ, results and checks side by side,
-/// the signals that differ most, overlaid and subtracted.
-/// @param names what the runs are called, such as their folders.
-std::string MakeComparisonPage(const std::vector<const RunData*>& runs, const std::vector<std::string>& names,
-                               const RunComparison& comparison);
-
 /// "SAME ...", or "DIFFERENT ..." with the signal that differs first: one line.
 std::string DescribeComparison(const RunComparison& comparison, double tolerance);
 

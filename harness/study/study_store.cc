@@ -1,6 +1,5 @@
 #include "harness/study/study_store.h"
 
-#include <SQLiteCpp/Transaction.h>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <sqlite3.h>
@@ -9,7 +8,6 @@
 #include <cmath>
 #include <limits>
 #include <set>
-#include <system_error>
 #include <unordered_map>
 
 #include "controller/common/errors.h"
@@ -21,29 +19,8 @@ namespace dexcheck {
 namespace {
 
 constexpr int kApplicationId = 0x44584353;  // "DXCS", distinguishes a study from other databases
-/// Others hold the lock for some rows; on a slow disk or network that may take a while.
-constexpr int kBusyTimeout = 60000;  // ms
 /// For reading too the file has to be written: what a killed process left half done must be undone.
 constexpr int kExisting = SQLITE_OPEN_READWRITE;
-
-std::string Explain(const SQLite::Exception& error) {
-  switch (error.getErrorCode()) {
-    case SQLITE_NOTADB:
-    case SQLITE_CORRUPT:
-      return std::string("is not a usable database: ") + error.what();
-    case SQLITE_CANTOPEN:
-      return "cannot be opened";
-    case SQLITE_READONLY:
-      return "cannot be written: it is read-only";
-    case SQLITE_FULL:
-    case SQLITE_IOERR:
-      return std::string("cannot be written: ") + error.what();
-    case SQLITE_BUSY:
-      return "is locked by another program";
-    default:
-      return error.what();
-  }
-}
 
 std::string QuoteName(const std::string& name) {
   std::string quoted = "\"";
@@ -55,50 +32,15 @@ std::string ListMarks(size_t count) {
   return fmt::format("{}", fmt::join(std::vector<const char*>(count, "?"), ", "));
 }
 
-/// A transaction that may write; undone unless committed.
-class Transaction : public SQLite::Transaction {
- public:
-  explicit Transaction(SQLite::Database* database)
-      : SQLite::Transaction(*database, SQLite::TransactionBehavior::IMMEDIATE) {}
-};
-
 }  // namespace
 
-/// SQLite gives empty names, those that begin with a colon and URIs a meaning of their own: databases in
-/// memory, or temporary ones.
-void RequirePlainFile(const std::string& name) {
-  const auto refuse = [&](const std::string& why) {
-    throw InputError(Quote(name) + ": a database must be a plain file: " + why);
-  };
-  if (name.empty()) refuse("the name is empty");
-  if (name.starts_with(':')) refuse("the name begins with a colon (a file of this name is ./" + name + ")");
-  if (name.starts_with("file:")) refuse("this is a URI (a file of this name is ./" + name + ")");
-  std::error_code error;
-  const std::filesystem::file_status status = std::filesystem::status(name, error);
-  if (std::filesystem::is_directory(status)) refuse("this is a folder");
-  if (std::filesystem::exists(status) && !std::filesystem::is_regular_file(status)) {
-    refuse("this is a device, a pipe or a socket");
-  }
-}
-
-template <typename Function>
-auto StudyStore::Do(const Function& function) const {
-  try {
-    return function();
-  } catch (const SQLite::Exception& error) {
-    throw InputError(name_ + ": " + Explain(error));
-  }
-}
-
-StudyStore::StudyStore(const std::filesystem::path& path, int flags) : name_(path.string()) {
-  RequirePlainFile(name_);
-  Do([&] { database_ = std::make_unique<SQLite::Database>(name_, flags, kBusyTimeout); });
-}
+StudyStore::StudyStore(const std::filesystem::path& path, int flags)
+    : database_(std::make_unique<SqliteFile>(path.string(), flags)) {}
 
 StudyStore StudyStore::OpenOrCreate(const std::filesystem::path& path, const StudyIdentity& identity,
                                     const Study& study, const MakesSameRows& makes_same_rows) {
   StudyStore store(path, kExisting | SQLITE_OPEN_CREATE);
-  store.Do([&] {
+  store.database_->Do([&] {
     store.Create(identity, study);
     store.Load();
     store.Adopt(identity, study, makes_same_rows);
@@ -108,7 +50,7 @@ StudyStore StudyStore::OpenOrCreate(const std::filesystem::path& path, const Stu
 
 StudyStore StudyStore::Open(const std::filesystem::path& path) {
   StudyStore store(path, kExisting);
-  store.Do([&] { store.Load(); });
+  store.database_->Do([&] { store.Load(); });
   return store;
 }
 
@@ -117,7 +59,7 @@ void StudyStore::Create(const StudyIdentity& identity, const Study& study) {
     return database_->execAndGet("SELECT count(*) FROM sqlite_master").getInt() == 0;
   };
   if (!is_empty()) return;
-  Transaction transaction(database_.get());
+  SqliteTransaction transaction(database_.get());
   if (!is_empty()) return;  // another process was faster
   database_->exec("PRAGMA application_id = " + std::to_string(kApplicationId));
   std::vector<std::string> columns;
@@ -140,7 +82,7 @@ void StudyStore::Create(const StudyIdentity& identity, const Study& study) {
 
 void StudyStore::Load() {
   if (database_->execAndGet("PRAGMA application_id").getInt() != kApplicationId) {
-    throw InputError(name_ + ": is not the database of a study");
+    throw InputError(name() + ": is not the database of a study");
   }
   AddMissingColumns();
   identity_.clear();
@@ -151,9 +93,9 @@ void StudyStore::Load() {
   }
   std::string& layout = identity_.front().second;
   if (layout != kStudyLayout && layout != "1")  // which does not say which machine made a trial
-    throw InputError(name_ + ": was written by another version of dexcheck");
+    throw InputError(name() + ": was written by another version of dexcheck");
   if (layout != kStudyLayout) Update("layout", kStudyLayout);
-  study_ = ParseStudy(Identify("study"), name_);
+  study_ = ParseStudy(Identify("study"), name());
 }
 
 void StudyStore::AddMissingColumns() {
@@ -177,7 +119,7 @@ void StudyStore::AddMissingColumns() {
     return missing;
   };
   if (list_missing().empty()) return;
-  Transaction transaction(database_.get());
+  SqliteTransaction transaction(database_.get());
   // Another process may have been faster.
   for (const std::string& column : list_missing()) database_->exec("ALTER TABLE " + column);
   transaction.commit();
@@ -187,7 +129,7 @@ const std::string& StudyStore::Identify(const std::string& column) const {
   for (const auto& [name, value] : identity_) {
     if (name == column) return value;
   }
-  throw InputError(name_ + ": no column " + Quote(column));
+  throw InputError(name() + ": no column " + Quote(column));
 }
 
 bool StudyStore::IsInUse() {
@@ -223,7 +165,7 @@ void StudyStore::Adopt(const StudyIdentity& identity, const Study& study,
   };
   const std::string difference = FindDifference(study_, study);
   if (!difference.empty()) {
-    throw InputError(name_ + ": is of another study: study differs: " + difference +
+    throw InputError(name() + ": is of another study: study differs: " + difference +
                      "; rows made otherwise cannot be kept, take another database");
   }
   if (find("git_revision") != Identify("git_revision")) {
@@ -233,8 +175,8 @@ void StudyStore::Adopt(const StudyIdentity& identity, const Study& study,
   }
   if (study.text == study_.text) return;
   if (!HasSameTrials(study_, study)) {
-    if (IsInUse()) throw InputError(name_ + ": another process makes trials of the study as it was");
-    Transaction transaction(database_.get());
+    if (IsInUse()) throw InputError(name() + ": another process makes trials of the study as it was");
+    SqliteTransaction transaction(database_.get());
     StudyChange changed = ChangeStudy(study_, study, ReadRows(std::numeric_limits<long>::min()));
     database_->exec("DELETE FROM trials");
     study_ = study;
@@ -258,11 +200,11 @@ void StudyStore::RequireSame(const StudyIdentity& other) const {
     const std::string& own = Identify(column);
     if (own == value) continue;
     if (column == "study") {
-      const Study there = ParseStudy(value, name_);
+      const Study there = ParseStudy(value, name());
       if (HasSameTrials(study_, there)) continue;
     }
     const bool is_short = own.size() < kReadable && value.size() < kReadable;
-    throw InputError(name_ + ": is of another study: " + column + " differs" +
+    throw InputError(name() + ": is of another study: " + column + " differs" +
                      (is_short ? ", " + Quote(own) + " there and " + Quote(value) + " here" : ""));
   }
 }
@@ -276,7 +218,7 @@ std::string StudyStore::ListColumns() const {
 }
 
 std::vector<long> StudyStore::ListNumbers() const {
-  return Do([&] {
+  return database_->Do([&] {
     SQLite::Statement select(*database_, "SELECT trial FROM trials WHERE trial >= 0 ORDER BY trial");
     std::vector<long> numbers;
     while (select.executeStep()) numbers.push_back(select.getColumn(0));
@@ -285,7 +227,7 @@ std::vector<long> StudyStore::ListNumbers() const {
 }
 
 std::map<Outcome, long> StudyStore::CountOutcomes() const {
-  return Do([&] {
+  return database_->Do([&] {
     SQLite::Statement select(*database_,
                              "SELECT outcome, count(*) FROM trials WHERE trial >= 0 GROUP BY outcome");
     std::map<Outcome, long> counts;
@@ -299,7 +241,7 @@ std::map<Outcome, long> StudyStore::CountOutcomes() const {
 
 std::vector<TrialRow> StudyStore::ReadRows(long first, bool with_machine) const {
   std::vector<TrialRow> rows;
-  Do([&] {
+  database_->Do([&] {
     // A vector that grows holds its rows twice for a moment.
     SQLite::Statement count(*database_, "SELECT count(*) FROM trials WHERE trial >= ?");
     count.bind(1, first);
@@ -312,7 +254,7 @@ std::vector<TrialRow> StudyStore::ReadRows(long first, bool with_machine) const 
 
 void StudyStore::ForEachRow(const std::function<void(TrialRow&&)>& take, long first,
                             bool with_machine) const {
-  Do([&] {
+  database_->Do([&] {
     SQLite::Statement select(*database_,
                              "SELECT " + ListColumns() + " FROM trials WHERE trial >= ? ORDER BY trial");
     select.bind(1, first);
@@ -327,7 +269,7 @@ TrialRow StudyStore::ReadRow(const SQLite::Statement& select, bool with_machine)
   row.trial.seed = static_cast<std::uint64_t>(select.getColumn(column++).getInt64());
   row.trial.parameters.reserve(study_.variations.size());
   const auto reject = [&](const std::string& key, const std::string& why) {
-    throw InputError(name_ + ": trial " + std::to_string(row.trial.number) + ": " + key + ": " + why +
+    throw InputError(name() + ": trial " + std::to_string(row.trial.number) + ": " + key + ": " + why +
                      ", got " + Quote(select.getColumn(column).getString()));
   };
   const auto is_number = [](const SQLite::Column& value) { return value.isInteger() || value.isFloat(); };
@@ -356,7 +298,7 @@ TrialRow StudyStore::ReadRow(const SQLite::Statement& select, bool with_machine)
 }
 
 std::optional<TrialRow> StudyStore::FindRow(long trial) const {
-  return Do([&] {
+  return database_->Do([&] {
     if (!find_) {
       find_ = std::make_unique<SQLite::Statement>(*database_,
                                                   "SELECT " + ListColumns() + " FROM trials WHERE trial = ?");
@@ -371,7 +313,7 @@ std::optional<TrialRow> StudyStore::FindRow(long trial) const {
 }
 
 bool StudyStore::Has(long trial) const {
-  return Do([&] {
+  return database_->Do([&] {
     SQLite::Statement select(*database_, "SELECT 1 FROM trials WHERE trial = ?");
     select.bind(1, trial);
     return select.executeStep();
@@ -379,8 +321,8 @@ bool StudyStore::Has(long trial) const {
 }
 
 std::vector<long> StudyStore::Claim(const std::vector<long>& trials) {
-  return Do([&] {
-    Transaction transaction(database_.get());
+  return database_->Do([&] {
+    SqliteTransaction transaction(database_.get());
     SQLite::Statement owner(*database_, "SELECT process FROM claims WHERE trial = ?");
     SQLite::Statement claim(*database_, "INSERT OR REPLACE INTO claims VALUES (?, ?)");
     const std::string self = NameThisProcess();
@@ -403,7 +345,7 @@ std::vector<long> StudyStore::Claim(const std::vector<long>& trials) {
 }
 
 void StudyStore::Release(const std::vector<long>& trials) {
-  Do([&] {
+  database_->Do([&] {
     SQLite::Statement release(*database_, "DELETE FROM claims WHERE trial = ? AND process = ?");
     release.bind(2, NameThisProcess());
     for (const long trial : trials) {
@@ -434,8 +376,8 @@ void StudyStore::Insert(const TrialRow& row) {
 }
 
 void StudyStore::Add(const std::vector<TrialRow>& rows) {
-  Do([&] {
-    Transaction transaction(database_.get());
+  database_->Do([&] {
+    SqliteTransaction transaction(database_.get());
     std::vector<long> numbers;
     for (const TrialRow& row : rows) {
       Insert(row);
@@ -447,8 +389,8 @@ void StudyStore::Add(const std::vector<TrialRow>& rows) {
 }
 
 void StudyStore::AddAll(const std::vector<TrialSource>& sources) {
-  Do([&] {
-    Transaction transaction(database_.get());
+  database_->Do([&] {
+    SqliteTransaction transaction(database_.get());
     std::unordered_map<long, const std::string*> added;  // from which source
     for (const TrialSource& source : sources) {
       source.read([&](TrialRow&& row) {
@@ -462,7 +404,7 @@ void StudyStore::AddAll(const std::vector<TrialSource>& sources) {
           } else {
             const auto from = added.find(number);
             throw InputError(source.name + ": trial " + std::to_string(number) +
-                             " has another result than in " + (from == added.end() ? name_ : *from->second));
+                             " has another result than in " + (from == added.end() ? name() : *from->second));
           }
         }
         Insert(row);
@@ -474,11 +416,11 @@ void StudyStore::AddAll(const std::vector<TrialSource>& sources) {
 }
 
 void StudyStore::RemoveFrom(long first) {
-  Do([&] { database_->exec("DELETE FROM trials WHERE trial >= " + std::to_string(first)); });
+  database_->Do([&] { database_->exec("DELETE FROM trials WHERE trial >= " + std::to_string(first)); });
 }
 
 void StudyStore::RemoveFailed() {
-  Do([&] {
+  database_->Do([&] {
     SQLite::Statement remove(*database_, "DELETE FROM trials WHERE trial >= 0 AND outcome IN (?, ?)");
     remove.bind(1, NameOf(Outcome::kCrashed));
     remove.bind(2, NameOf(Outcome::kTimedOut));

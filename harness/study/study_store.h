@@ -3,7 +3,6 @@
 // A study's database: table `study` says what the study is, table `trials` has a row for each finished trial.
 // Each row is one transaction, so that the file is whole whenever a process is killed.
 
-#include <SQLiteCpp/Database.h>
 #include <SQLiteCpp/Statement.h>
 
 #include <filesystem>
@@ -15,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+#include "harness/study/sqlite_file.h"
 #include "harness/study/study.h"
 #include "harness/study/trial.h"
 
@@ -54,10 +54,6 @@ bool IsSame(const TrialRow& a, const TrialRow& b);
 /// Whether this program gives the same rows as the one that made these.
 using MakesSameRows = std::function<bool(const std::vector<TrialRow>&)>;
 
-/// @throws InputError when this cannot be the name of a database file: it must be a regular file, and nothing
-/// else that SQLite would take a name for (nothing that is gone when the process ends).
-void RequirePlainFile(const std::string& name);
-
 /// An open database. Everything that fails throws InputError "FILE: what: why".
 class StudyStore {
  public:
@@ -72,7 +68,7 @@ class StudyStore {
   static StudyStore Open(const std::filesystem::path& path);
 
   /// The file, as it was named.
-  [[nodiscard]] const std::string& name() const { return name_; }
+  [[nodiscard]] const std::string& name() const { return database_->getFilename(); }
   [[nodiscard]] const StudyIdentity& identity() const { return identity_; }
   [[nodiscard]] const std::string& Identify(const std::string& column) const;
   /// As the file has it.
@@ -115,9 +111,6 @@ class StudyStore {
 
  private:
   StudyStore(const std::filesystem::path& path, int flags);
-  /// Calls a function, and makes InputError of what SQLite throws.
-  template <typename Function>
-  auto Do(const Function& function) const;
   void Create(const StudyIdentity& identity, const Study& study);
   /// Columns that the program which wrote the file did not have: metrics, and which machine made a trial.
   void AddMissingColumns();
@@ -129,8 +122,7 @@ class StudyStore {
   [[nodiscard]] TrialRow ReadRow(const SQLite::Statement& select, bool with_machine) const;
   [[nodiscard]] std::string ListColumns() const;
 
-  std::string name_;
-  std::unique_ptr<SQLite::Database> database_;
+  std::unique_ptr<SqliteFile> database_;
   std::unique_ptr<SQLite::Statement> insert_;        // prepared once
   mutable std::unique_ptr<SQLite::Statement> find_;  // likewise
   StudyIdentity identity_;

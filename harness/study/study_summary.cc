@@ -13,6 +13,7 @@
 #include "harness/study/sampling.h"
 #include "harness/study/search.h"
 #include "harness/study/study_findings.h"
+#include "harness/study/study_rows.h"
 
 namespace dexcheck {
 
@@ -35,10 +36,6 @@ std::string WithoutTime(const std::string& failure) {
 std::string LabelOf(Metric metric) {
   const std::string unit = kMetrics[metric].unit;
   return kMetrics[metric].name + (unit == "1" ? "" : ", " + unit);
-}
-
-Json ShowValue(const Variation& variation, double value) {
-  return variation.labels.empty() ? Json(value) : Json(FormatValue(variation, value));
 }
 
 class Summary {
@@ -391,59 +388,6 @@ StudySummary SummariseStudy(const StudyStore& store) {
   for (const char* column : {"dexcheck_version", "git_revision", "mujoco_version"})
     summary.json["versions"][column] = store.Identify(column);
   return summary;
-}
-
-Json ToJson(const Study& study, const TrialRow& row) {
-  Json json = {{"trial", row.trial.number},
-               {"seed", row.trial.seed},
-               {"outcome", NameOf(row.result.outcome)},
-               {"failure", row.result.failure},
-               {"keys", Json::object()},
-               {"metrics", Json::object()},
-               {"machine", row.machine},
-               {"command", MakeReplayCommand(study, row.trial)}};
-  for (size_t i = 0; i < study.variations.size(); ++i)
-    json["keys"][study.variations[i].key] = ShowValue(study.variations[i], row.trial.parameters[i]);
-  for (size_t i = 0; i < kMetrics.size(); ++i) json["metrics"][kMetrics[i].name] = row.result.metrics[i];
-  return json;
-}
-
-std::string MakeReplayCommand(const Study& study, const Trial& trial) {
-  std::string command = "dexcheck run " + QuoteForShell(study.scenario);
-  if (!study.controller.empty()) command += " --controller " + QuoteForShell(study.controller);
-  for (const std::string& setting : ListOverrides(study, trial))
-    command += " --set " + QuoteForShell(setting);
-  if (trial.seed != 0) command += fmt::format(" --seed {}", trial.seed);
-  if (!study.check) command += " --no-check";
-  return command + fmt::format(" --video --out trial-{}", trial.number);
-}
-
-std::string QuoteField(const std::string& text) {
-  const bool is_formula = text.find_first_of("=+-@\t\r") == 0;
-  if (!is_formula && text.find_first_of(",\"\n\r") == std::string::npos) return text;
-  std::string quoted = is_formula ? "\"'" : "\"";
-  for (const char c : text) quoted += c == '"' ? std::string("\"\"") : std::string(1, c);
-  return quoted + "\"";
-}
-
-void WriteStudyCsv(const StudyStore& store, const std::function<void(std::string_view)>& write) {
-  const Study& study = store.study();
-  std::string line = "trial,seed";
-  for (const Variation& variation : study.variations) line += "," + QuoteField(variation.key);
-  line += ",outcome,failure";
-  for (const MetricInfo& metric : kMetrics) line += std::string(",") + metric.name;
-  write(line + ",machine\n");
-  store.ForEachRow([&](const TrialRow& row) {
-    line = std::to_string(row.trial.number) + "," + std::to_string(row.trial.seed);
-    for (size_t i = 0; i < study.variations.size(); ++i) {
-      const std::string value = FormatValue(study.variations[i], row.trial.parameters[i]);
-      line += "," + (study.variations[i].labels.empty() ? value : QuoteField(value));
-    }
-    line += std::string(",") + NameOf(row.result.outcome) + "," + QuoteField(row.result.failure);
-    for (const double metric : row.result.metrics)
-      line += "," + (std::isfinite(metric) ? FormatNumber(metric) : "");
-    write(line + "," + QuoteField(row.machine) + "\n");
-  });
 }
 
 }  // namespace dexcheck

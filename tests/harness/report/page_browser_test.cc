@@ -9,6 +9,7 @@
 #include <string>
 
 #include "harness/report/campaign_page.h"
+#include "harness/report/comparison_page.h"
 #include "harness/report/page.h"
 #include "harness/report/run_comparison.h"
 #include "harness/report/run_data.h"

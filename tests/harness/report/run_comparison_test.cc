@@ -4,6 +4,7 @@
 
 #include <gmock/gmock.h>
 
+#include "harness/report/comparison_page.h"
 #include "tests/common/files.h"
 #include "tests/common/matchers.h"
 #include "tests/harness/report/report_run.h"

@@ -14,6 +14,7 @@
 #include "harness/study/search.h"
 #include "harness/study/study_findings.h"
 #include "harness/study/study_page.h"
+#include "harness/study/study_rows.h"
 #include "harness/study/study_summary.h"
 #include "tests/common/files.h"
 #include "tests/common/matchers.h"

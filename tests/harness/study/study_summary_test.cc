@@ -12,6 +12,7 @@
 
 #include "harness/study/study_findings.h"
 #include "harness/study/study_page.h"
+#include "harness/study/study_rows.h"
 #include "tests/common/files.h"
 #include "tests/common/matchers.h"
 #include "tests/common/paths.h"

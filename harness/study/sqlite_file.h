@@ -1,0 +1,45 @@
+#pragma once
+
+// A database of SQLite in a plain file.
+
+#include <SQLiteCpp/Database.h>
+#include <SQLiteCpp/Exception.h>
+#include <SQLiteCpp/Transaction.h>
+
+#include <string>
+
+#include "controller/common/errors.h"
+
+namespace dexcheck {
+
+/// @throws InputError when this cannot be the name of a database file: it must be a regular file, and nothing
+/// else that SQLite would take a name for (nothing that is gone when the process ends).
+void RequirePlainFile(const std::string& name);
+
+/// "is locked by another program", of what SQLite threw.
+std::string Explain(const SQLite::Exception& error);
+
+/// Everything that fails throws InputError "FILE: what: why".
+class SqliteFile : public SQLite::Database {
+ public:
+  SqliteFile(const std::string& name, int flags);
+
+  /// Calls a function, and makes InputError of what SQLite throws.
+  template <typename Function>
+  auto Do(const Function& function) const {
+    try {
+      return function();
+    } catch (const SQLite::Exception& error) {
+      throw InputError(getFilename() + ": " + Explain(error));
+    }
+  }
+};
+
+/// One that may write; undone unless committed.
+class SqliteTransaction : public SQLite::Transaction {
+ public:
+  explicit SqliteTransaction(SQLite::Database* database)
+      : SQLite::Transaction(*database, SQLite::TransactionBehavior::IMMEDIATE) {}
+};
+
+}  // namespace dexcheck
