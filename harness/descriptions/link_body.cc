@@ -7,11 +7,6 @@
 namespace dexcheck {
 namespace {
 
-bool IsOfPlace(Quantity quantity) {
-  return quantity == Quantity::kOrigin || quantity == Quantity::kRotation || quantity == Quantity::kPlace;
-}
-bool IsOfBody(Quantity quantity) { return quantity <= Quantity::kInertia; }
-
 /// What is left of a body without others that belong to it, all in one frame; nothing where no mass is left.
 std::optional<MassProperties> Subtract(const MassProperties& whole, const MassProperties& others) {
   // Below this fraction of the whole the part is lost in what the other numbers are rounded by.

@@ -12,6 +12,7 @@
 #include "harness/engine/engine.h"
 #include "harness/engine/map_vector.h"
 #include "harness/engine/robot_tree.h"
+#include "harness/engine/xml.h"
 
 namespace dexcheck {
 namespace {
@@ -259,6 +260,52 @@ class MjcfDescriptionReader {
 
 RobotDescription ReadMjcfDescription(const mjModel& engine, const std::string& source) {
   return MjcfDescriptionReader(engine, source).Read();
+}
+
+std::string ReduceToMechanism(const MjcfFile& mjcf) {
+  MjcfFile reduced(mjcf.PrintFor(std::filesystem::current_path()), mjcf.source());
+  tinyxml2::XMLElement* const root = reduced.root();
+  const auto keeps = [](std::string_view name, std::initializer_list<std::string_view> kept) {
+    return std::find(kept.begin(), kept.end(), name) != kept.end();
+  };
+  bool uses_geoms = false;
+  for (tinyxml2::XMLElement* child : ListChildren(root)) {
+    const std::string_view name = child->Name();
+    if (name == "compiler") uses_geoms = uses_geoms || ReadAttribute(*child, "inertiafromgeom") == "true";
+    if (!keeps(name, {"compiler", "option", "size", "default", "asset", "worldbody", "equality"}))
+      root->DeleteChild(child);
+  }
+  for (tinyxml2::XMLElement* equality : ListChildren(root, "equality")) {
+    for (tinyxml2::XMLElement* child : ListChildren(equality)) {
+      if (std::string_view(child->Name()) != "joint") equality->DeleteChild(child);
+    }
+  }
+  bool has_mesh = false;
+  for (tinyxml2::XMLElement* world : ListChildren(root, "worldbody")) {
+    VisitElements(world, [&](tinyxml2::XMLElement* body) {
+      const bool is_world = body == world;
+      if (!is_world && std::string_view(body->Name()) != "body") return;
+      const bool drops_geoms = is_world || (!uses_geoms && body->FirstChildElement("inertial") != nullptr);
+      for (tinyxml2::XMLElement* child : ListChildren(body)) {
+        const std::string_view name = child->Name();
+        if (name == "camera" || name == "light" || (drops_geoms && name == "geom")) {
+          body->DeleteChild(child);
+        } else if (name == "geom") {
+          has_mesh = true;
+        }
+      }
+    });
+  }
+  VisitElements(root, [&](tinyxml2::XMLElement* element) {
+    element->DeleteAttribute("material");
+    element->DeleteAttribute("rgba");
+  });
+  for (tinyxml2::XMLElement* asset : ListChildren(root, "asset")) {
+    for (tinyxml2::XMLElement* child : ListChildren(asset)) {
+      if (!has_mesh || std::string_view(child->Name()) != "mesh") asset->DeleteChild(child);
+    }
+  }
+  return reduced.Print();
 }
 
 }  // namespace dexcheck

@@ -168,9 +168,8 @@ void RunFormulaMutant(const Adapter& adapter, int samples, FormulaMutant* mutant
   const bool is_of_object = std::holds_alternative<ObjectChange>(equation.change) ||
                             std::holds_alternative<ObjectPoseChange>(equation.change);
   if (mutant->outcome == MutantOutcome::kKilled || contact || is_of_object) return;
-  const std::unique_ptr<ModelView> view = options.make_view(adapter.model(), Coordinates::kReduced);
-  if (!HasEffect(adapter.model(), view.get(), samples, options.seed))
-    mutant->outcome = MutantOutcome::kNoEffect;
+  AnalyticProvider faulty(adapter.model(), "faulty", options.make_view);
+  if (!HasEffect(adapter.model(), &faulty, samples, options.seed)) mutant->outcome = MutantOutcome::kNoEffect;
 }
 
 }  // namespace dexcheck

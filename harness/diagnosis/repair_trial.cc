@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "controller/model/body_frame.h"
+#include "harness/engine/map_vector.h"
 #include "harness/engine/robot_tree.h"
 
 namespace dexcheck {
@@ -20,8 +21,6 @@ constexpr double kSame = 1e-11;
 // Of forces that follow from fitted numbers, relative to their size.
 constexpr double kSameForces = 1e-8;
 constexpr double kSameSolid = 1e-8;
-
-Vector3d MapVector(const mjtNum* v) { return {v[0], v[1], v[2]}; }
 
 /// Whether motion shows the constant, so that it need not be read.
 bool MovesTheRobot(Kind kind) {
