@@ -8,6 +8,7 @@
 #include "harness/descriptions/constant_table.h"
 #include "harness/descriptions/engine_extras.h"
 #include "harness/descriptions/join_names.h"
+#include "harness/descriptions/mjcf_reader.h"
 #include "harness/engine/engine.h"
 #include "harness/engine/exact_collision.h"
 #include "harness/engine/map_vector.h"
@@ -36,7 +37,6 @@ class EngineConstants : public ConstantComparison {
     if (!adapter_.wheels().empty()) CompareWheels();
     CompareFingertips();
     if (model_.object()) CompareObject(*model_.object());
-    FindJointsOwn();
     FindEngineOnly(adapter_, &result_);
   }
 
@@ -162,11 +162,7 @@ class EngineConstants : public ConstantComparison {
     for (int k = 0; k < 3; ++k) {
       Compare("object_com", where, object.body.com[k], engine_.body_ipos[3 * body + k], 1.0);
     }
-    mjtNum R[9];
-    mju_quat2Mat(R, engine_.body_iquat + 4 * body);
-    const Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> axes(R);
-    const Matrix3d inertia =
-        axes * MapVector(engine_.body_inertia + 3 * body).asDiagonal() * axes.transpose();
+    const Matrix3d inertia = ReadEngineBody(engine_, body).inertia;
     for (int row = 0; row < 3; ++row) {
       for (int col = 0; col < 3; ++col) {
         Compare("object_inertia", where, object.body.inertia(row, col), inertia(row, col),
@@ -258,66 +254,6 @@ class EngineConstants : public ConstantComparison {
   }
 
   [[nodiscard]] bool IsObject(int geom) const { return engine_.geom_bodyid[geom] == adapter_.object_body(); }
-
-  /// A joint of the engine's model, and what the analytic model knows of it.
-  struct OwnedJoint {
-    int id;
-    Location where;
-    JointRole role;
-  };
-  [[nodiscard]] std::vector<OwnedJoint> ListJoints() const {
-    std::vector<OwnedJoint> joints;
-    for (const int joint : adapter_.base_joints()) joints.push_back({joint, AtLink(-1), kFreeJoint});
-    for (size_t k = 0; k < adapter_.wheels().size(); ++k)
-      joints.push_back(
-          {adapter_.wheels()[k].joint, {Location::Kind::kWheel, static_cast<int>(k), -1}, kWheelJoint});
-    for (int i = 0; i < model_.num_joints(); ++i)
-      joints.push_back({adapter_.joint_ids()[static_cast<size_t>(i)], AtJoint(i), kRobotJoint});
-    const int object = adapter_.object_body();
-    for (int k = 0; object >= 0 && k < engine_.body_jntnum[object]; ++k)
-      joints.push_back({engine_.body_jntadr[object] + k, {Location::Kind::kObject, -1, -1}, kFreeJoint});
-    return joints;
-  }
-
-  /// Joints that carry the base or the object: nothing holds or drives them. And springs, dry friction and
-  /// limits where the analytic model has none; and a fluid.
-  void FindJointsOwn() {
-    const size_t first_finding = result_.findings.size();
-    const std::vector<OwnedJoint> joints = ListJoints();
-    for (const Constant& constant : ListConstants()) {
-      if (constant.part != EnginePart::kJoint || !constant.neutral) continue;
-      for (const OwnedJoint& joint : joints) {
-        if ((constant.roles & joint.role) == 0) continue;
-        if (constant.applies != nullptr && !constant.applies(engine_, joint.id)) continue;
-        for (const double number : ReadConstant(constant, engine_, joint.id))
-          Compare(constant.check, joint.where, *constant.neutral, number);
-      }
-    }
-    Compare("fluid", {}, 0.0, engine_.opt.density);
-    Compare("fluid", {}, 0.0, engine_.opt.viscosity);
-    NameBaseJoints(first_finding);
-    for (size_t i = first_finding; i < result_.findings.size(); ++i) result_.findings[i].engine_only = true;
-  }
-
-  /// Says of findings at the base that they are about the joints that carry it, and says once what the six
-  /// coordinates of a free joint have in common.
-  void NameBaseJoints(size_t first_finding) {
-    if (adapter_.base_joints().empty()) return;
-    const int type = engine_.jnt_type[adapter_.base_joints().front()];
-    const std::string joint = type == mjJNT_FREE ? "free joint of " : "joints of ";
-    std::vector<ConstantFinding> findings;
-    findings.swap(result_.findings);
-    for (size_t i = 0; i < findings.size(); ++i) {
-      ConstantFinding& finding = findings[i];
-      const bool is_of_base = i >= first_finding && finding.location == AtLink(-1);
-      if (is_of_base) finding.where = joint + finding.where;
-      const auto is_same = [&](const ConstantFinding& other) {
-        return other.check == finding.check && other.where == finding.where && other.engine == finding.engine;
-      };
-      if (is_of_base && std::any_of(result_.findings.begin(), result_.findings.end(), is_same)) continue;
-      result_.findings.push_back(finding);
-    }
-  }
 
   const Adapter& adapter_;
   const mjModel& engine_;

@@ -164,8 +164,9 @@ class Explaining {
       return !row.readings.empty() &&
              (!row.readings[0].conventions.empty() || row.readings[0].number == kZero);
     };
+    if (!found_.empty() && found_[0].ids[0].starts_with("table.")) return std::nullopt;
     const std::vector<OwnRow> completed = ListOwnRows(a_);
-    std::vector<OwnRow> rows = ListOwnRows(robot);
+    const std::vector<OwnRow> rows = ListOwnRows(robot);
     if (is_misread(rows_[0])) robot.spec.base.X_B0 = rows_[0].readings[0].part.X_PL;
     for (size_t i = 0; i < rows.size(); ++i) {
       const StatedPart& given = bodies_[i + 1].given;
@@ -177,10 +178,11 @@ class Explaining {
       }
       Joint& joint = robot.spec.joints[i];
       if (!IsSameBody(given.body, rows[i].body)) joint.body = ExpressIn(given.body, robot.joints[i].X_iL);
-      if (robot.joints[i].states_range)
-        std::tie(joint.lower, joint.upper) = std::tie(given.lower, given.upper);
-      if (robot.joints[i].states_damping) joint.damping = given.damping;
-      if (robot.joints[i].states_armature) joint.armature = given.armature;
+      if (joint.type != JointType::kRevolute) continue;  // of others these are not asked for
+      const DescribedJoint& stated = robot.joints[i];
+      if (stated.states_range) std::tie(joint.lower, joint.upper) = std::tie(given.lower, given.upper);
+      if (stated.states_damping) joint.damping = given.damping;
+      if (stated.states_armature) joint.armature = given.armature;
     }
     robot.spec.base.body = bodies_[0].given.body;
     return robot;

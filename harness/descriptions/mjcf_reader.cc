@@ -17,7 +17,7 @@
 namespace dexcheck {
 namespace {
 
-Pose MapPose(const mjtNum* position, const mjtNum* quaternion) {
+Pose ReadPose(const mjtNum* position, const mjtNum* quaternion) {
   Pose X = Pose::Identity();
   X.linear() = Eigen::Quaterniond(quaternion[0], quaternion[1], quaternion[2], quaternion[3])
                    .normalized()
@@ -88,7 +88,7 @@ class MjcfDescriptionReader {
     robot_.spec.base.link = NameOf(engine_, mjOBJ_BODY, base);
     for (int body = base; body > 0; body = engine_.body_parentid[body]) {
       robot_.spec.base.X_B0 =
-          MapPose(engine_.body_pos + 3 * body, engine_.body_quat + 4 * body) * robot_.spec.base.X_B0;
+          ReadPose(engine_.body_pos + 3 * body, engine_.body_quat + 4 * body) * robot_.spec.base.X_B0;
     }
     places_[0].X_iL = robot_.spec.base.X_B0.inverse();
     if (base == 0) places_[0].X_iL.setIdentity();
@@ -98,7 +98,7 @@ class MjcfDescriptionReader {
     if (!IsOfRobot(body)) return;
     const Place& parent = places_[static_cast<size_t>(engine_.body_parentid[body])];
     Place place = {parent.joint,
-                   parent.X_iL * MapPose(engine_.body_pos + 3 * body, engine_.body_quat + 4 * body)};
+                   parent.X_iL * ReadPose(engine_.body_pos + 3 * body, engine_.body_quat + 4 * body)};
     const int first = engine_.body_jntadr[body];
     const int count = engine_.body_jntnum[body];
     if (body == floating_) {
@@ -107,10 +107,8 @@ class MjcfDescriptionReader {
       for (int k = 0; k < count; ++k) place = AddJoint(first + k, k + 1 == count, place);
     }
     places_[static_cast<size_t>(body)] = place;
-    const Vector3d moments = MapVector(engine_.body_inertia + 3 * body);
-    const MassProperties principal{engine_.body_mass[body], Vector3d::Zero(), moments.asDiagonal()};
-    const Pose X_LC = MapPose(engine_.body_ipos + 3 * body, engine_.body_iquat + 4 * body);
-    AddPart(body, place, ExpressIn(principal, X_LC), X_LC);
+    AddPart(body, place, ReadEngineBody(engine_, body),
+            ReadPose(engine_.body_ipos + 3 * body, engine_.body_iquat + 4 * body));
   }
 
   void AddPart(int body, const Place& place, const MassProperties& mass, const Pose& X_LC) {
@@ -158,7 +156,7 @@ class MjcfDescriptionReader {
       default:
         half.setConstant(engine_.geom_rbound[geom]);  // a mesh: around it
     }
-    const Pose X_LG = MapPose(engine_.geom_pos + 3 * geom, engine_.geom_quat + 4 * geom);
+    const Pose X_LG = ReadPose(engine_.geom_pos + 3 * geom, engine_.geom_quat + 4 * geom);
     const Vector3d around = X_LG.linear().cwiseAbs() * half;
     shape.low = X_LG.translation() - around;
     shape.high = X_LG.translation() + around;
@@ -212,7 +210,7 @@ class MjcfDescriptionReader {
       if (engine_.names[engine_.name_siteadr[site]] == '\0') continue;
       if (!IsOfRobot(engine_.site_bodyid[site])) continue;
       const Place& place = places_[static_cast<size_t>(engine_.site_bodyid[site])];
-      const Pose X_LF = MapPose(engine_.site_pos + 3 * site, engine_.site_quat + 4 * site);
+      const Pose X_LF = ReadPose(engine_.site_pos + 3 * site, engine_.site_quat + 4 * site);
       robot_.spec.frames.push_back({NameOf(engine_, mjOBJ_SITE, site), place.joint, place.X_iL * X_LF, {}});
     }
   }
@@ -260,6 +258,12 @@ class MjcfDescriptionReader {
 
 RobotDescription ReadMjcfDescription(const mjModel& engine, const std::string& source) {
   return MjcfDescriptionReader(engine, source).Read();
+}
+
+MassProperties ReadEngineBody(const mjModel& engine, int body) {
+  const Matrix3d moments = MapVector(engine.body_inertia + 3 * body).asDiagonal();
+  return ExpressIn({engine.body_mass[body], Vector3d::Zero(), moments},
+                   ReadPose(engine.body_ipos + 3 * body, engine.body_iquat + 4 * body));
 }
 
 std::string ReduceToMechanism(const MjcfFile& mjcf) {

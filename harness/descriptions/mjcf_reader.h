@@ -19,6 +19,9 @@ namespace dexcheck {
 /// @throws InputError for free joints within it, and where nothing moves.
 RobotDescription ReadMjcfDescription(const mjModel& engine, const std::string& source);
 
+/// What one body of the engine's has, in its own frame.
+MassProperties ReadEngineBody(const mjModel& engine, int body);
+
 /// The text of an MJCF without what has no effect on the mechanism: looks, contacts, actuators.
 std::string ReduceToMechanism(const MjcfFile& mjcf);
 

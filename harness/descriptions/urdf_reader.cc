@@ -11,7 +11,6 @@
 #include "controller/model/body_frame.h"
 #include "harness/descriptions/join_names.h"
 #include "harness/descriptions/urdf_file.h"
-#include "harness/descriptions/urdf_shapes.h"
 #include "harness/engine/xml.h"
 
 namespace dexcheck {
@@ -249,7 +248,7 @@ class UrdfReader {
     part.line = link.line;
     part.joint = place.joint;
     part.X_iL = place.X_iL;
-    part.shapes = ReadShapes(file_, link);
+    part.shapes = file_.ReadShapes(link);
     part.states_inertial = inertial != nullptr;
     if (inertial == nullptr) return;
     const std::string key = KeyOf(link);
@@ -377,7 +376,7 @@ RobotDescription ParseUrdf(std::string_view text, const std::string& source, con
   RobotDescription robot = UrdfReader(file, source, options).Read();
   if (options.packages.empty()) return robot;
   const std::vector<std::string> missing =
-      ListMissingMeshes(file, std::filesystem::path(source).parent_path(), options.packages);
+      file.ListMissingMeshes(std::filesystem::path(source).parent_path(), options.packages);
   if (!missing.empty())
     robot.notes.push_back("meshes that are missing (dynamics need none): " + JoinNames(missing));
   return robot;

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "controller/model/body_frame.h"
+#include "harness/descriptions/mjcf_reader.h"
 #include "harness/engine/map_vector.h"
 #include "harness/engine/robot_tree.h"
 
@@ -13,7 +14,6 @@ namespace dexcheck {
 namespace {
 
 using Kind = ParameterKind;
-using RowMatrix3d = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
 
 // Both sides read decimal numbers; thirteen digits are printed, and a body's are turned into the link's frame
 // by some dozen rotations, each 1e-16 of the robot's size, which may be a thousand times the body's.
@@ -124,12 +124,8 @@ MassProperties RepairTrial::FindBody(int link) const {
   std::vector<MassProperties> parts;
   for (const int b : adapter_.welded_bodies()[0]) {
     if (engine.body_weldid[b] != adapter_.link_bodies()[0]) continue;
-    Pose X_Wb = Pose::Identity();
-    X_Wb.translation() = MapVector(data->xipos + 3 * b);
-    X_Wb.linear() = Eigen::Map<const RowMatrix3d>(data->ximat + 9 * b);
-    const Matrix3d moments = MapVector(engine.body_inertia + 3 * b).asDiagonal();
-    parts.push_back(
-        ExpressIn({engine.body_mass[b], Vector3d::Zero(), moments}, written_.base.X_B0.inverse() * X_Wb));
+    const Pose X_Wb = MapPose(data->xmat + 9 * b, data->xpos + 3 * b);
+    parts.push_back(ExpressIn(ReadEngineBody(engine, b), written_.base.X_B0.inverse() * X_Wb));
   }
   return Combine(parts);
 }
