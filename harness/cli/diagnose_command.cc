@@ -34,28 +34,34 @@ size_t CountRemaining(const Diagnosis& diagnosis) {
 
 /// One list of what is wrong: conventions, then numbers.
 struct Answer {
-  std::vector<Hypothesis> likely;       ///< What explains it besides, and repairs nothing by itself.
+  std::vector<Hypothesis> likely;       ///< What explains it besides.
   std::vector<Hypothesis> conventions;  ///< `explained` is the fraction of the residual.
   Diagnosis numbers;                    ///< Of the file with these conventions undone.
 
   /// Takes conventions out of the file when several parts share one, or when less remains without them.
   /// @param undone what is wrong besides.
-  void TakeConventions(ExplainedDifference why, Diagnosis undone) {
+  void TakeConventions(Diagnosis undone) {
     const auto is_number = [](const Hypothesis& one) { return one.ids[0].starts_with("number."); };
-    const bool is_shared =
-        std::any_of(why.hypotheses.begin(), why.hypotheses.end(),
-                    [&](const Hypothesis& one) { return !is_number(one) && one.parts.size() > 1; });
+    const bool is_shared = std::any_of(likely.begin(), likely.end(), [&](const Hypothesis& one) {
+      return !is_number(one) && one.parts.size() > 1;
+    });
     const size_t remaining = CountRemaining(undone);
-    likely = std::move(why.hypotheses);
     if (remaining >= CountRemaining(numbers) && !(remaining == 0 && is_shared)) return;
     std::erase_if(likely, is_number);
     conventions.swap(likely);
-    const double left = numbers.residual > 0.0 ? undone.residual / numbers.residual : 0.0;
+    // Fractions of what is left, as fractions of all.
+    const auto divide = [](double part, double all) { return all > 0.0 ? part / all : 0.0; };
+    const double left = divide(undone.residual, numbers.residual);
+    const double forces = divide(undone.residual_of_forces, numbers.residual_of_forces);
     double sum = 0.0;
     for (const Hypothesis& one : conventions) sum += one.explained;
     for (Hypothesis& one : conventions) one.explained *= (1.0 - left) / sum;
-    for (Repair& cause : undone.causes) cause.explained *= left;
+    for (Repair& cause : undone.causes) {
+      cause.explained *= left;
+      cause.explained_of_forces *= forces;
+    }
     undone.explained = 1.0 - left + left * undone.explained;
+    undone.explained_of_forces = 1.0 - forces + forces * undone.explained_of_forces;
     undone.agrees = false;
     numbers = std::move(undone);
   }
@@ -242,18 +248,19 @@ int Run(DiagnoseRequest request) {
   const std::optional<RobotDescription> right = mjcf.TryToDescribe();
   if (!answer.numbers.agrees && !request.options.by_motion && right)
     why = Explain(robot, *right, std::max(request.options.tolerance, kHypothesisTolerance));
-  const std::vector<Hypothesis> hypotheses = why.hypotheses;
+  answer.likely = why.hypotheses;
   if (why.undone) {
-    const RobotDescription undone = *why.undone;
-    std::vector<std::string> said;
-    const MjModelPtr other = mjcf.CopyEngine();
-    answer.TakeConventions(std::move(why),
-                           diagnose(Complete(request, mjcf.document(), undone, other.get(), &said), undone));
-  } else {
-    answer.likely = hypotheses;
+    try {
+      std::vector<std::string> said;
+      const MjModelPtr other = mjcf.CopyEngine();
+      const RobotModel undone = Complete(request, mjcf.document(), *why.undone, other.get(), &said);
+      answer.TakeConventions(diagnose(undone, *why.undone));
+    } catch (const InputError&) {
+      // With what other faults leave of it, it is no robot.
+    }
   }
   bar.Finish();
-  json.Write([&] { return ToText(request, answer, hypotheses, notes); });
+  json.Write([&] { return ToText(request, answer, why.hypotheses, notes); });
   if (!json.TakesStdout()) {
     if (!request.quiet) {
       for (const std::string& note : notes) fmt::print("{}\n", note);

@@ -164,7 +164,10 @@ class Explaining {
       return !row.readings.empty() &&
              (!row.readings[0].conventions.empty() || row.readings[0].number == kZero);
     };
-    if (!found_.empty() && found_[0].ids[0].starts_with("table.")) return std::nullopt;
+    for (const Finding& finding : found_) {
+      if (finding.ids[0].starts_with("table.")) return std::nullopt;
+      if (finding.ids[0].starts_with("gravity.")) robot.spec.gravity = b_.spec.gravity;
+    }
     const std::vector<OwnRow> completed = ListOwnRows(a_);
     const std::vector<OwnRow> rows = ListOwnRows(robot);
     if (is_misread(rows_[0])) robot.spec.base.X_B0 = rows_[0].readings[0].part.X_PL;

@@ -234,6 +234,7 @@ class Diagnostician {
     RobotSpec written = file_;
     const Size before = Measure(written);
     result_.residual = before.all;
+    result_.residual_of_forces = before.forces;
     Size last = before;
     const auto fraction = [](double from, double to, double of) { return of > 0.0 ? (from - to) / of : 0.0; };
     for (Repair& cause : result_.causes) {
