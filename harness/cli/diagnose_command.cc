@@ -28,9 +28,44 @@ struct DiagnoseRequest : ComparisonRequest {
   std::vector<std::string> ignore;
 };
 
-bool IsRepairedWholly(const Diagnosis& diagnosis) {
-  return diagnosis.remaining_terms.empty() && diagnosis.remaining_constants.empty();
+size_t CountRemaining(const Diagnosis& diagnosis) {
+  return diagnosis.remaining_terms.size() + diagnosis.remaining_constants.size();
 }
+
+/// One list of what is wrong: conventions, then numbers.
+struct Answer {
+  std::vector<Hypothesis> likely;       ///< What explains it besides.
+  std::vector<Hypothesis> conventions;  ///< `explained` is the fraction of the residual.
+  Diagnosis numbers;                    ///< Of the file with these conventions undone.
+
+  /// Takes conventions out of the file when several parts share one, or when less remains without them.
+  /// @param undone what is wrong besides.
+  void TakeConventions(Diagnosis undone) {
+    const auto is_number = [](const Hypothesis& one) { return one.ids[0].starts_with("number."); };
+    const bool is_shared = std::any_of(likely.begin(), likely.end(), [&](const Hypothesis& one) {
+      return !is_number(one) && one.parts.size() > 1;
+    });
+    const size_t remaining = CountRemaining(undone);
+    if (remaining >= CountRemaining(numbers) && !(remaining == 0 && is_shared)) return;
+    std::erase_if(likely, is_number);
+    conventions.swap(likely);
+    // Fractions of what is left, as fractions of all.
+    const auto divide = [](double part, double all) { return all > 0.0 ? part / all : 0.0; };
+    const double left = divide(undone.residual, numbers.residual);
+    const double forces = divide(undone.residual_of_forces, numbers.residual_of_forces);
+    double sum = 0.0;
+    for (const Hypothesis& one : conventions) sum += one.explained;
+    for (Hypothesis& one : conventions) one.explained *= (1.0 - left) / sum;
+    for (Repair& cause : undone.causes) {
+      cause.explained *= left;
+      cause.explained_of_forces *= forces;
+    }
+    undone.explained = 1.0 - left + left * undone.explained;
+    undone.explained_of_forces = 1.0 - forces + forces * undone.explained_of_forces;
+    undone.agrees = false;
+    numbers = std::move(undone);
+  }
+};
 
 void PrintRemaining(const DiagnoseRequest& request, const RobotModel& model, const Diagnosis& diagnosis) {
   fmt::print("What remains after these repairs:\n");
@@ -59,8 +94,8 @@ std::vector<const Repair*> FindRounded(const Diagnosis& diagnosis) {
   return rounded;
 }
 
-void Print(const DiagnoseRequest& request, const RobotModel& model, const Diagnosis& diagnosis,
-           const std::vector<Hypothesis>& hypotheses) {
+void Print(const DiagnoseRequest& request, const RobotModel& model, const Answer& answer) {
+  const Diagnosis& diagnosis = answer.numbers;
   const RobotSpec& written = diagnosis.written;
   const std::string file = request.files.robot.filename().string();
   if (diagnosis.agrees) {
@@ -72,10 +107,15 @@ void Print(const DiagnoseRequest& request, const RobotModel& model, const Diagno
     return;
   }
   fmt::print("DISAGREE: {} against {}.\n", file, request.files.mjcf.filename().string());
-  PrintHypotheses(hypotheses);
-  if (diagnosis.causes.empty()) fmt::print("No change of single numbers explains it.\n");
+  PrintHypotheses(answer.likely);
+  if (diagnosis.causes.empty() && answer.conventions.empty())
+    fmt::print("No change of single numbers explains it.\n");
   const std::vector<const Repair*> rounded = FindRounded(diagnosis);
   int number = 0;
+  for (const Hypothesis& one : answer.conventions) {
+    fmt::print("{}. {}; explains {:.4g} % of the residual\n", ++number, one.text, 100.0 * one.explained);
+    for (const std::string& value : one.values) fmt::print("   {}\n", value);
+  }
   for (const Repair& cause : diagnosis.causes) {
     if (std::find(rounded.begin(), rounded.end(), &cause) != rounded.end()) continue;
     fmt::print("{}. {}", ++number, Describe(cause, written, file));
@@ -96,7 +136,7 @@ void Print(const DiagnoseRequest& request, const RobotModel& model, const Diagno
     number += static_cast<int>(rounded.size());
   }
   if (number > 1) fmt::print("Together: {:.4g} %.\n", 100.0 * diagnosis.explained);
-  if (IsRepairedWholly(diagnosis)) {
+  if (CountRemaining(diagnosis) == 0) {
     fmt::print("With {} the two agree to {}.\n", number == 1 ? "it repaired" : "these repaired",
                request.DescribeTolerance());
   } else {
@@ -122,8 +162,9 @@ Json ToJson(const Repair& cause, const RobotSpec& spec, const std::string& file)
   return json;
 }
 
-std::string ToText(const DiagnoseRequest& request, const Diagnosis& diagnosis,
+std::string ToText(const DiagnoseRequest& request, const Answer& answer,
                    const std::vector<Hypothesis>& hypotheses, const std::vector<std::string>& notes) {
+  const Diagnosis& diagnosis = answer.numbers;
   const std::string file = request.files.robot.filename().string();
   Json json = {
       {"robot", request.files.robot.string()}, {"mjcf", request.files.mjcf.string()},
@@ -135,6 +176,13 @@ std::string ToText(const DiagnoseRequest& request, const Diagnosis& diagnosis,
   for (const std::string& note : notes) json["notes"].push_back(note);
   json["hypotheses"] = ListHypotheses(hypotheses);
   json["causes"] = Json::array();
+  for (const Hypothesis& one : answer.conventions)
+    json["causes"].push_back({{"text", one.text},
+                              {"ids", one.ids},
+                              {"parts", one.parts},
+                              {"changes", Json::array()},
+                              {"explained", one.explained},
+                              {"equivalents", Json::array()}});
   for (const Repair& cause : diagnosis.causes)
     json["causes"].push_back(ToJson(cause, diagnosis.written, file));
   json["remaining"] = Json::array();
@@ -186,28 +234,42 @@ int Run(DiagnoseRequest request) {
   long stage = 0;
   ProgressBar bar("diagnosing", kStages, request.quiet);
   const auto progress = [&](const char*) {
-    bar.Update(stage++);
+    bar.Update(std::min(stage++, kStages));
     return !IsInterrupted();
   };
-  const Diagnosis diagnosis = Diagnose(model, *engine, request.files.mjcf.string(), request.options, progress,
-                                       {robot.joints.begin(), robot.joints.end()});
-  bar.Finish();
-  // Faults of conventions first; what can only be moved shows no bodies to compare.
-  const bool is_open = !diagnosis.agrees && !request.options.by_motion;
-  std::vector<Hypothesis> hypotheses;
+  const auto diagnose = [&](const RobotModel& own, const RobotDescription& rows) {
+    return Diagnose(own, *engine, request.files.mjcf.string(), request.options, progress,
+                    {rows.joints.begin(), rows.joints.end()});
+  };
+  Answer answer;
+  answer.numbers = diagnose(model, robot);
+  // What can only be moved shows no bodies to compare.
+  ExplainedDifference why;
   const std::optional<RobotDescription> right = mjcf.TryToDescribe();
-  if (is_open && right)
-    hypotheses = ExplainDifference(robot, *right, std::max(request.options.tolerance, kHypothesisTolerance));
-  json.Write([&] { return ToText(request, diagnosis, hypotheses, notes); });
+  if (!answer.numbers.agrees && !request.options.by_motion && right)
+    why = Explain(robot, *right, std::max(request.options.tolerance, kHypothesisTolerance));
+  answer.likely = why.hypotheses;
+  if (why.undone) {
+    try {
+      std::vector<std::string> said;
+      const MjModelPtr other = mjcf.CopyEngine();
+      const RobotModel undone = Complete(request, mjcf.document(), *why.undone, other.get(), &said);
+      answer.TakeConventions(diagnose(undone, *why.undone));
+    } catch (const InputError&) {
+      // With what other faults leave of it, it is no robot.
+    }
+  }
+  bar.Finish();
+  json.Write([&] { return ToText(request, answer, why.hypotheses, notes); });
   if (!json.TakesStdout()) {
     if (!request.quiet) {
       for (const std::string& note : notes) fmt::print("{}\n", note);
     }
     if (IsInterrupted()) fmt::print("INTERRUPTED. So far:\n");
-    Print(request, model, diagnosis, hypotheses);
+    Print(request, model, answer);
   }
   if (IsInterrupted()) return ReportFailure("interrupted");
-  return diagnosis.agrees ? kSuccess : kDisagreement;
+  return answer.numbers.agrees ? kSuccess : kDisagreement;
 }
 
 }  // namespace

@@ -58,7 +58,7 @@ CampaignFault Describe(const FormulaMutant& mutant) {
   CampaignFault fault = Describe(static_cast<const TriedFault&>(mutant));
   if (IsMissed(mutant))
     fault.exception =
-        fmt::format("cause: {}: expected {}, failed {}", mutant.name, mutant.first, mutant.failed_checks);
+        fmt::format("cause: {}: expected {}, failed {}", mutant.name, mutant.equation.term, mutant.failed_checks);
   return fault;
 }
 

@@ -18,15 +18,12 @@ std::string Describe(const MassProperties& body) {
       body.mass, c[0], c[1], c[2], I(0, 0), I(1, 1), I(2, 2), I(0, 1), I(0, 2), I(1, 2));
 }
 
-bool IsOfBody(Quantity quantity) { return quantity <= Quantity::kInertia; }
-bool IsOfPlace(Quantity quantity) { return quantity > Quantity::kInertia && quantity < Quantity::kAxis; }
-
 constexpr size_t kMany = 3;
 
 class BodySearch {
  public:
-  BodySearch(std::vector<LinkBody> bodies, const Closeness& close)
-      : read_(bodies), bodies_(std::move(bodies)), close_(close) {
+  BodySearch(const Closeness& close, std::vector<LinkBody>* bodies)
+      : read_(*bodies), bodies_(*bodies), close_(close) {
     for (const LinkBody& body : bodies_)
       count_ += body.given.body.mass > 0.0 || body.right.body.mass > 0.0 ? 1 : 0;
   }
@@ -47,6 +44,7 @@ class BodySearch {
       TakeNumbers(quantity);
     }
     found_.insert(found_.end(), numbers_.begin(), numbers_.end());
+    for (const auto& [i, quantity] : taken_) TakeFrom(read_[i].given, quantity, &bodies_[i].given);
     return std::move(found_);
   }
 
@@ -270,23 +268,25 @@ class BodySearch {
       finding.parts.push_back(bodies_[i].link);
       AddValue(i, &finding);
       TakeRight(quantity, i);
+      taken_.emplace_back(i, quantity);
     }
     finding.cells = finding.parts.size();
     if (finding.cells > 0) numbers_.push_back(std::move(finding));
   }
 
   const std::vector<LinkBody> read_;
-  std::vector<LinkBody> bodies_;
+  std::vector<LinkBody>& bodies_;
   Closeness close_;
   size_t count_ = 0;  // links with mass
   std::vector<Finding> found_;
   std::vector<Finding> numbers_;
+  std::vector<std::pair<size_t, Quantity>> taken_;  // what these are about
 };
 
 }  // namespace
 
-std::vector<Finding> SearchBodies(std::vector<LinkBody> bodies, const Closeness& close) {
-  return BodySearch(std::move(bodies), close).Run();
+std::vector<Finding> SearchBodies(const Closeness& close, std::vector<LinkBody>* bodies) {
+  return BodySearch(close, bodies).Run();
 }
 
 }  // namespace dexcheck

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <limits>
-#include <map>
 #include <sstream>
 #include <vector>
 
@@ -17,53 +16,32 @@
 #include "harness/engine/xml.h"
 
 namespace dexcheck {
-namespace {
 
 using tinyxml2::XMLElement;
 
-/// The tensors that a file states, by the engine's body: its bodies are numbered as they come, depth first.
-class FullInertias {
- public:
-  FullInertias(const MjcfFile& mjcf, const mjModel& engine) : engine_(engine) {
-    for (const XMLElement* world : ListChildren(mjcf.root(), "worldbody")) Visit(*world);
-    // Elements that make bodies of their own.
-    if (number_ + 1 != engine.nbody) tensors_.clear();
+std::vector<const XMLElement*> ListInertials(const MjcfFile& mjcf, const mjModel& engine) {
+  std::vector<const XMLElement*> inertials = {nullptr};
+  for (const XMLElement* world : ListChildren(static_cast<const XMLElement*>(mjcf.root()), "worldbody")) {
+    VisitElements(world, [&](const XMLElement* element) {
+      if (std::string_view(element->Name()) == "body")
+        inertials.push_back(element->FirstChildElement("inertial"));
+    });
   }
+  if (static_cast<int>(inertials.size()) != engine.nbody) inertials.clear();
+  return inertials;
+}
 
-  /// Of the body of that name, in its own axes.
-  [[nodiscard]] std::optional<Matrix3d> Find(const std::string& name) const {
-    const auto found = tensors_.find(FindByName(engine_, mjOBJ_BODY, name));
-    return found == tensors_.end() ? std::nullopt : std::optional(found->second);
-  }
-
- private:
-  void Visit(const XMLElement& parent) {
-    for (const XMLElement* body : ListChildren(&parent, "body")) {
-      ++number_;
-      const XMLElement* const inertial = body->FirstChildElement("inertial");
-      std::istringstream numbers(inertial == nullptr ? "" : ReadAttribute(*inertial, "fullinertia"));
-      Vector6d I;
-      if (numbers >> I[0] >> I[1] >> I[2] >> I[3] >> I[4] >> I[5]) {
-        // clang-format off
-        tensors_[number_] << I[0], I[3], I[4],
-                             I[3], I[1], I[5],
-                             I[4], I[5], I[2];
-        // clang-format on
-      }
-      Visit(*body);
-    }
-  }
-
-  const mjModel& engine_;
-  int number_ = 0;
-  std::map<int, Matrix3d> tensors_;
-};
-
-}  // namespace
-
+std::optional<Matrix3d> ReadFullInertia(const XMLElement& inertial) {
+  std::istringstream numbers(ReadAttribute(inertial, "fullinertia"));
+  Vector6d I;
+  if (!(numbers >> I[0] >> I[1] >> I[2] >> I[3] >> I[4] >> I[5])) return std::nullopt;
+  Matrix3d tensor;
+  tensor << I[0], I[3], I[4], I[3], I[1], I[5], I[4], I[5], I[2];
+  return tensor;
+}
 std::optional<std::string> TakeCompiledInertias(const MjcfFile& mjcf, const mjModel& engine,
                                                 RobotDescription* robot) {
-  const FullInertias written(mjcf, engine);
+  const std::vector<const XMLElement*> inertials = ListInertials(mjcf, engine);
   const RobotDescription compiled = ReadMjcfDescription(engine, mjcf.source());
   const std::vector<LinkPlace> places = PlaceLinks(*robot, compiled);
   std::vector<std::string> names;
@@ -75,7 +53,9 @@ std::optional<std::string> TakeCompiledInertias(const MjcfFile& mjcf, const mjMo
     // What the compiler changed, along the axes of the description's frame.
     Matrix3d change = Matrix3d::Zero();
     for (const DescribedPart& part : compiled.parts) {
-      const std::optional<Matrix3d> tensor = part.joint == place.b ? written.Find(part.name) : std::nullopt;
+      const auto body = static_cast<size_t>(FindByName(engine, mjOBJ_BODY, part.name));
+      if (part.joint != place.b || body >= inertials.size() || inertials[body] == nullptr) continue;
+      const std::optional<Matrix3d> tensor = ReadFullInertia(*inertials[body]);
       if (!tensor) continue;
       const Matrix3d R = (place.X_ab * part.X_iL).linear();
       change += R * (part.body.inertia - *tensor) * R.transpose();

@@ -117,6 +117,12 @@ void MakeNeutral(const Constant& constant, int part, mjModel* m) {
       constant.array);
 }
 
+void MakeIdle(EnginePart kind, int id, unsigned role, mjModel* m) {
+  for (const Constant& constant : ListConstants()) {
+    if (constant.part == kind && (constant.roles & role) != 0) MakeNeutral(constant, id, m);
+  }
+}
+
 std::array<MotorProperty, 4> ReadMotor(const mjModel& m, int i) {
   const int transmission = m.actuator_trntype[i];
   const bool has_gain = m.actuator_gaintype[i] == mjGAIN_FIXED && m.actuator_gear[6 * i] != 0.0;

@@ -61,6 +61,8 @@ std::span<const DescribedConstant> ListDescribedConstants();
 std::vector<double> ReadConstant(const Constant& constant, const mjModel& engine, int part);
 /// Gives a part the neutral value, if the constant has one.
 void MakeNeutral(const Constant& constant, int part, mjModel* engine);
+/// Gives a part the neutral value of all its constants, of joints of those that belong to the role.
+void MakeIdle(EnginePart kind, int part, unsigned role, mjModel* engine);
 
 /// What an actuator has of what a plain torque on its joint, gear times control, has.
 struct MotorProperty {

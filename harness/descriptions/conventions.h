@@ -15,6 +15,12 @@ namespace dexcheck {
 /// What of a part a convention is about.
 enum class Quantity { kMass, kCom, kInertia, kOrigin, kRotation, kPlace, kAxis, kRange, kDamping, kArmature };
 
+inline bool IsOfBody(Quantity quantity) { return quantity <= Quantity::kInertia; }
+inline bool IsOfPlace(Quantity quantity) {
+  return quantity > Quantity::kInertia && quantity < Quantity::kAxis;
+}
+inline bool IsOfRow(Quantity quantity) { return IsOfPlace(quantity) || quantity == Quantity::kAxis; }
+
 /// "mass" and "masses"; "place" stands for origin and rotation together.
 const char* NameOf(Quantity quantity, bool many);
 

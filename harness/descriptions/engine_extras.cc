@@ -54,12 +54,6 @@ Part ReadPart(const mjModel& m, EnginePart kind, int id, unsigned role) {
   return part;
 }
 
-void MakeIdle(EnginePart kind, int id, unsigned role, mjModel* m) {
-  for (const Constant& constant : ListConstants()) {
-    if (constant.part == kind && (constant.roles & role) != 0) MakeNeutral(constant, id, m);
-  }
-}
-
 std::vector<std::string> ListTargets(const mjModel& m, int actuator) {
   const int* const targets = m.actuator_trnid + 2 * actuator;
   switch (m.actuator_trntype[actuator]) {

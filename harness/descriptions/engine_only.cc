@@ -31,6 +31,9 @@ class EngineOnly {
       : adapter_(adapter), engine_(adapter.engine()), result_(result) {}
 
   void Run() {
+    FindJoints();
+    Expect("fluid", "robot", 0.0, engine_.opt.density);
+    Expect("fluid", "robot", 0.0, engine_.opt.viscosity);
     FindParts(EnginePart::kTendon, mjOBJ_TENDON, "tendon", engine_.ntendon);
     FindParts(EnginePart::kConstraint, mjOBJ_EQUALITY, "constraint", engine_.neq);
     FindMotors();
@@ -45,14 +48,14 @@ class EngineOnly {
  private:
   /// A number that must be `neutral`.
   void Expect(const std::string& check, const std::string& where, double neutral, double engine,
-              double tolerance = 0.0) {
+              double tolerance = 0.0, const Location& at = {}) {
     CheckRecord* const record = result_->Define(check);
     double error = std::abs(engine - neutral);
     if (error <= tolerance) error = 0.0;
     // How large a force may be that should not be there is nothing that a relative tolerance says.
     if (tolerance == 0.0 && error > 0.0) error /= std::max(std::abs(engine), std::abs(neutral));
-    if (!(record->CompareError(error, neutral, engine, {}, -1) <= kConstantRounding))
-      result_->findings.push_back({check, where, neutral, engine, {}, 0, true});
+    if (!(record->CompareError(error, neutral, engine, at, -1) <= kConstantRounding))
+      result_->findings.push_back({check, where, neutral, engine, at, 0, true});
   }
 
   void Note(const std::string& kind, std::string text) { result_->notes.push_back({kind, std::move(text)}); }
@@ -61,6 +64,53 @@ class EngineOnly {
     return std::string(kind) + " " + NameOf(engine_, type, id);
   }
   [[nodiscard]] std::string GeomName(int geom) const { return Name(mjOBJ_GEOM, "geom", geom); }
+
+  /// Joints that carry the base or the object: nothing holds or drives them. And springs, dry friction and
+  /// limits where the analytic model has none.
+  void FindJoints() {
+    struct OwnedJoint {
+      int id;
+      JointRole role;
+      Location at;
+    };
+    std::vector<OwnedJoint> joints;
+    for (const int joint : adapter_.base_joints())
+      joints.push_back({joint, kFreeJoint, {Location::Kind::kLink, -1, -1}});
+    for (int k = 0; k < static_cast<int>(adapter_.wheels().size()); ++k)
+      joints.push_back(
+          {adapter_.wheels()[static_cast<size_t>(k)].joint, kWheelJoint, {Location::Kind::kWheel, k, -1}});
+    for (int i = 0; i < adapter_.model().num_joints(); ++i)
+      joints.push_back(
+          {adapter_.joint_ids()[static_cast<size_t>(i)], kRobotJoint, {Location::Kind::kJoint, i, -1}});
+    const int object = adapter_.object_body();
+    for (int k = 0; object >= 0 && k < engine_.body_jntnum[object]; ++k)
+      joints.push_back({engine_.body_jntadr[object] + k, kFreeJoint, {Location::Kind::kObject, -1, -1}});
+    for (const Constant& constant : ListConstants()) {
+      if (constant.part != EnginePart::kJoint || !constant.neutral) continue;
+      for (const OwnedJoint& joint : joints) {
+        if ((constant.roles & joint.role) != 0) FindJoint(constant, joint.id, joint.at);
+      }
+    }
+  }
+
+  void FindJoint(const Constant& constant, int joint, const Location& at) {
+    if (constant.applies != nullptr && !constant.applies(engine_, joint)) return;
+    std::string where = Describe(at, adapter_.model(), adapter_.model().num_base_velocities());
+    const bool carries_base = at.kind == Location::Kind::kLink;
+    if (carries_base)
+      where = (engine_.jnt_type[joint] == mjJNT_FREE ? "free joint of " : "joints of ") + where;
+    std::vector<ConstantFinding>& findings = result_->findings;
+    for (const double number : ReadConstant(constant, engine_, joint)) {
+      const auto said = static_cast<std::ptrdiff_t>(findings.size());
+      Expect(constant.check, where, *constant.neutral, number, 0.0, at);
+      // What the six coordinates of a free joint have in common is said once.
+      if (carries_base &&
+          std::any_of(findings.begin(), findings.begin() + said, [&](const ConstantFinding& other) {
+            return other.check == constant.check && other.where == where && other.engine == number;
+          }))
+        findings.resize(static_cast<size_t>(said));
+    }
+  }
 
   /// Parts of which each constant must have its neutral value.
   void FindParts(EnginePart part, mjtObj type, const char* kind, EngineSize count) {

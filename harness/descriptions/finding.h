@@ -22,7 +22,8 @@ struct Finding : Hypothesis {
 
 /// Conventions that many links share first, then bodies that are exchanged or shifted by one in the list,
 /// then what single links have; at last the numbers that nothing explains.
-std::vector<Finding> SearchBodies(std::vector<LinkBody> bodies, const Closeness& close);
+/// @param bodies have all but these numbers undone afterwards.
+std::vector<Finding> SearchBodies(const Closeness& close, std::vector<LinkBody>* bodies);
 
 std::vector<Finding> ReportRows(const RobotDescription& robot, const std::vector<RowFinding>& rows);
 

@@ -110,6 +110,10 @@ RowProblem MakeProblem(const RobotDescription& a, const RobotDescription& b, con
   return problem;
 }
 
+bool IsSameBody(const MassProperties& a, const MassProperties& b) {
+  return a.mass == b.mass && a.com == b.com && a.inertia == b.inertia;
+}
+
 class Explaining {
  public:
   Explaining(const RobotDescription& a, const RobotDescription& b, double tolerance)
@@ -139,14 +143,52 @@ class Explaining {
       for (const Finding& finding : ReportRows(a_, rows)) found_.push_back(finding);
     }
     FindGravity();
-    for (Finding finding : SearchBodies(PlaceBodies(problem, rows), problem.close)) {
+    std::vector<LinkBody> bodies = PlaceBodies(problem, rows);
+    for (Finding finding : SearchBodies(problem.close, &bodies)) {
       for (size_t i = 0; i < a_.spec.joints.size() && finding.parts.size() == 1; ++i) {
         if (finding.what == "link" && finding.parts[0] == a_.spec.joints[i].link)
           AddElsewhere(a_, rows[i + 1], static_cast<int>(i), &finding);
       }
       found_.push_back(std::move(finding));
     }
+    bodies_ = std::move(bodies);
+    if (problem.base_is_fixed) bodies_.insert(bodies_.begin(), problem.bodies[0]);
+    rows_ = std::move(rows);
     return Report();
+  }
+
+  /// A description as it was read with the conventions undone that were found; none where its rows cannot be
+  /// written so.
+  [[nodiscard]] std::optional<RobotDescription> Undo(RobotDescription robot) const {
+    const auto is_misread = [](const RowFinding& row) {
+      return !row.readings.empty() &&
+             (!row.readings[0].conventions.empty() || row.readings[0].number == kZero);
+    };
+    for (const Finding& finding : found_) {
+      if (finding.ids[0].starts_with("table.")) return std::nullopt;
+      if (finding.ids[0].starts_with("gravity.")) robot.spec.gravity = b_.spec.gravity;
+    }
+    const std::vector<OwnRow> completed = ListOwnRows(a_);
+    const std::vector<OwnRow> rows = ListOwnRows(robot);
+    if (is_misread(rows_[0])) robot.spec.base.X_B0 = rows_[0].readings[0].part.X_PL;
+    for (size_t i = 0; i < rows.size(); ++i) {
+      const StatedPart& given = bodies_[i + 1].given;
+      if (!rows[i].X_PL.isApprox(completed[i].X_PL)) return std::nullopt;  // from another base
+      if (is_misread(rows_[i + 1])) {
+        if (!robot.joints[i].is_plain) return std::nullopt;
+        const StatedPart& read = rows_[i + 1].readings[0].part;
+        TakeOwnRow(static_cast<int>(i), rows[i].X_PW * read.X_PL, read.axis, &robot);
+      }
+      Joint& joint = robot.spec.joints[i];
+      if (!IsSameBody(given.body, rows[i].body)) joint.body = ExpressIn(given.body, robot.joints[i].X_iL);
+      if (joint.type != JointType::kRevolute) continue;  // of others these are not asked for
+      const DescribedJoint& stated = robot.joints[i];
+      if (stated.states_range) std::tie(joint.lower, joint.upper) = std::tie(given.lower, given.upper);
+      if (stated.states_damping) joint.damping = given.damping;
+      if (stated.states_armature) joint.armature = given.armature;
+    }
+    robot.spec.base.body = bodies_[0].given.body;
+    return robot;
   }
 
  private:
@@ -259,18 +301,9 @@ class Explaining {
   const RobotDescription& b_;
   double tolerance_;
   std::vector<Finding> found_;
+  std::vector<RowFinding> rows_;
+  std::vector<LinkBody> bodies_;  // of the base, then of each joint: with conventions undone
 };
-
-/// What explains the difference; nothing when they are of two mechanisms.
-std::optional<std::vector<Hypothesis>> TryToExplain(RobotDescription a, RobotDescription b,
-                                                    double tolerance) {
-  try {
-    CompleteEachOther(&a, &b);
-  } catch (const InputError&) {
-    return std::nullopt;
-  }
-  return Explaining(a, b, tolerance).Run();
-}
 
 /// Whether joints of one name hang on joints of one name.
 bool IsSameTree(const RobotSpec& a, const RobotSpec& b) {
@@ -313,12 +346,22 @@ std::optional<Hypothesis> FindExchangedNames(const RobotDescription& a, const Ro
 
 }  // namespace
 
-std::vector<Hypothesis> ExplainDifference(const RobotDescription& a, const RobotDescription& b,
-                                          double tolerance) {
-  const std::optional<std::vector<Hypothesis>> found = TryToExplain(a, b, tolerance);
-  if (found && found->size() <= 1) return *found;
-  if (const std::optional<Hypothesis> names = FindExchangedNames(a, b, tolerance)) return {*names};
-  return found.value_or(std::vector<Hypothesis>{});
+ExplainedDifference Explain(const RobotDescription& a, const RobotDescription& b, double tolerance) {
+  ExplainedDifference explanation;
+  RobotDescription own = a;
+  RobotDescription other = b;
+  bool is_one_mechanism = true;
+  try {
+    CompleteEachOther(&own, &other);
+    Explaining search(own, other, tolerance);
+    explanation.hypotheses = search.Run();
+    if (!explanation.hypotheses.empty()) explanation.undone = search.Undo(a);
+  } catch (const InputError&) {
+    is_one_mechanism = false;
+  }
+  if (is_one_mechanism && explanation.hypotheses.size() <= 1) return explanation;
+  if (const std::optional<Hypothesis> names = FindExchangedNames(a, b, tolerance)) return {{*names}, {}};
+  return explanation;
 }
 
 }  // namespace dexcheck

@@ -3,6 +3,7 @@
 // Why two descriptions of one robot differ: which conventions and units, on which parts, would make them
 // agree.
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -24,6 +25,16 @@ struct Hypothesis {
   std::vector<std::string> parts;
 };
 
+/// What explains a difference, and what is left of it.
+struct ExplainedDifference {
+  /// Conventions, and the numbers that remain wrong ("number.mass"); nothing when no convention explains any
+  /// of it, or when they are of two mechanisms.
+  std::vector<Hypothesis> hypotheses;
+  /// The first description with all conventions undone and its numbers as they are; none where nothing was
+  /// undone, or where it is a table of Denavit-Hartenberg rows that would have to be written in another way.
+  std::optional<RobotDescription> undone;
+};
+
 /// To what numbers agree once a fault is undone, relative: published ones have some seven digits.
 inline constexpr double kHypothesisTolerance = 1e-6;
 
@@ -32,8 +43,11 @@ inline constexpr double kHypothesisTolerance = 1e-6;
 /// wrong are listed ("number.mass"). A fault is named only when what it is about agrees to `tolerance`
 /// (relative) with the fault undone, and did not before; when several do equally well, all of them.
 /// @param a, b as they were read; `a` is the one that may be wrong.
-/// @return nothing when no convention explains any of it, or when they are of two mechanisms.
-std::vector<Hypothesis> ExplainDifference(const RobotDescription& a, const RobotDescription& b,
-                                          double tolerance = kHypothesisTolerance);
+ExplainedDifference Explain(const RobotDescription& a, const RobotDescription& b,
+                            double tolerance = kHypothesisTolerance);
+inline std::vector<Hypothesis> ExplainDifference(const RobotDescription& a, const RobotDescription& b,
+                                                 double tolerance = kHypothesisTolerance) {
+  return Explain(a, b, tolerance).hypotheses;
+}
 
 }  // namespace dexcheck

@@ -12,11 +12,12 @@
 #include "harness/engine/engine.h"
 #include "harness/engine/map_vector.h"
 #include "harness/engine/robot_tree.h"
+#include "harness/engine/xml.h"
 
 namespace dexcheck {
 namespace {
 
-Pose MapPose(const mjtNum* position, const mjtNum* quaternion) {
+Pose ReadPose(const mjtNum* position, const mjtNum* quaternion) {
   Pose X = Pose::Identity();
   X.linear() = Eigen::Quaterniond(quaternion[0], quaternion[1], quaternion[2], quaternion[3])
                    .normalized()
@@ -87,7 +88,7 @@ class MjcfDescriptionReader {
     robot_.spec.base.link = NameOf(engine_, mjOBJ_BODY, base);
     for (int body = base; body > 0; body = engine_.body_parentid[body]) {
       robot_.spec.base.X_B0 =
-          MapPose(engine_.body_pos + 3 * body, engine_.body_quat + 4 * body) * robot_.spec.base.X_B0;
+          ReadPose(engine_.body_pos + 3 * body, engine_.body_quat + 4 * body) * robot_.spec.base.X_B0;
     }
     places_[0].X_iL = robot_.spec.base.X_B0.inverse();
     if (base == 0) places_[0].X_iL.setIdentity();
@@ -97,7 +98,7 @@ class MjcfDescriptionReader {
     if (!IsOfRobot(body)) return;
     const Place& parent = places_[static_cast<size_t>(engine_.body_parentid[body])];
     Place place = {parent.joint,
-                   parent.X_iL * MapPose(engine_.body_pos + 3 * body, engine_.body_quat + 4 * body)};
+                   parent.X_iL * ReadPose(engine_.body_pos + 3 * body, engine_.body_quat + 4 * body)};
     const int first = engine_.body_jntadr[body];
     const int count = engine_.body_jntnum[body];
     if (body == floating_) {
@@ -106,10 +107,8 @@ class MjcfDescriptionReader {
       for (int k = 0; k < count; ++k) place = AddJoint(first + k, k + 1 == count, place);
     }
     places_[static_cast<size_t>(body)] = place;
-    const Vector3d moments = MapVector(engine_.body_inertia + 3 * body);
-    const MassProperties principal{engine_.body_mass[body], Vector3d::Zero(), moments.asDiagonal()};
-    const Pose X_LC = MapPose(engine_.body_ipos + 3 * body, engine_.body_iquat + 4 * body);
-    AddPart(body, place, ExpressIn(principal, X_LC), X_LC);
+    AddPart(body, place, ReadEngineBody(engine_, body),
+            ReadPose(engine_.body_ipos + 3 * body, engine_.body_iquat + 4 * body));
   }
 
   void AddPart(int body, const Place& place, const MassProperties& mass, const Pose& X_LC) {
@@ -157,7 +156,7 @@ class MjcfDescriptionReader {
       default:
         half.setConstant(engine_.geom_rbound[geom]);  // a mesh: around it
     }
-    const Pose X_LG = MapPose(engine_.geom_pos + 3 * geom, engine_.geom_quat + 4 * geom);
+    const Pose X_LG = ReadPose(engine_.geom_pos + 3 * geom, engine_.geom_quat + 4 * geom);
     const Vector3d around = X_LG.linear().cwiseAbs() * half;
     shape.low = X_LG.translation() - around;
     shape.high = X_LG.translation() + around;
@@ -211,7 +210,7 @@ class MjcfDescriptionReader {
       if (engine_.names[engine_.name_siteadr[site]] == '\0') continue;
       if (!IsOfRobot(engine_.site_bodyid[site])) continue;
       const Place& place = places_[static_cast<size_t>(engine_.site_bodyid[site])];
-      const Pose X_LF = MapPose(engine_.site_pos + 3 * site, engine_.site_quat + 4 * site);
+      const Pose X_LF = ReadPose(engine_.site_pos + 3 * site, engine_.site_quat + 4 * site);
       robot_.spec.frames.push_back({NameOf(engine_, mjOBJ_SITE, site), place.joint, place.X_iL * X_LF, {}});
     }
   }
@@ -259,6 +258,58 @@ class MjcfDescriptionReader {
 
 RobotDescription ReadMjcfDescription(const mjModel& engine, const std::string& source) {
   return MjcfDescriptionReader(engine, source).Read();
+}
+
+MassProperties ReadEngineBody(const mjModel& engine, int body) {
+  const Matrix3d moments = MapVector(engine.body_inertia + 3 * body).asDiagonal();
+  return ExpressIn({engine.body_mass[body], Vector3d::Zero(), moments},
+                   ReadPose(engine.body_ipos + 3 * body, engine.body_iquat + 4 * body));
+}
+
+std::string ReduceToMechanism(const MjcfFile& mjcf) {
+  MjcfFile reduced(mjcf.PrintFor(std::filesystem::current_path()), mjcf.source());
+  tinyxml2::XMLElement* const root = reduced.root();
+  const auto keeps = [](std::string_view name, std::initializer_list<std::string_view> kept) {
+    return std::find(kept.begin(), kept.end(), name) != kept.end();
+  };
+  bool uses_geoms = false;
+  for (tinyxml2::XMLElement* child : ListChildren(root)) {
+    const std::string_view name = child->Name();
+    if (name == "compiler") uses_geoms = uses_geoms || ReadAttribute(*child, "inertiafromgeom") == "true";
+    if (!keeps(name, {"compiler", "option", "size", "default", "asset", "worldbody", "equality"}))
+      root->DeleteChild(child);
+  }
+  for (tinyxml2::XMLElement* equality : ListChildren(root, "equality")) {
+    for (tinyxml2::XMLElement* child : ListChildren(equality)) {
+      if (std::string_view(child->Name()) != "joint") equality->DeleteChild(child);
+    }
+  }
+  bool has_mesh = false;
+  for (tinyxml2::XMLElement* world : ListChildren(root, "worldbody")) {
+    VisitElements(world, [&](tinyxml2::XMLElement* body) {
+      const bool is_world = body == world;
+      if (!is_world && std::string_view(body->Name()) != "body") return;
+      const bool drops_geoms = is_world || (!uses_geoms && body->FirstChildElement("inertial") != nullptr);
+      for (tinyxml2::XMLElement* child : ListChildren(body)) {
+        const std::string_view name = child->Name();
+        if (name == "camera" || name == "light" || (drops_geoms && name == "geom")) {
+          body->DeleteChild(child);
+        } else if (name == "geom") {
+          has_mesh = true;
+        }
+      }
+    });
+  }
+  VisitElements(root, [&](tinyxml2::XMLElement* element) {
+    element->DeleteAttribute("material");
+    element->DeleteAttribute("rgba");
+  });
+  for (tinyxml2::XMLElement* asset : ListChildren(root, "asset")) {
+    for (tinyxml2::XMLElement* child : ListChildren(asset)) {
+      if (!has_mesh || std::string_view(child->Name()) != "mesh") asset->DeleteChild(child);
+    }
+  }
+  return reduced.Print();
 }
 
 }  // namespace dexcheck

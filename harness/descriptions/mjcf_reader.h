@@ -7,6 +7,7 @@
 #include <string>
 
 #include "harness/descriptions/robot_description.h"
+#include "harness/engine/mjcf_file.h"
 
 namespace dexcheck {
 
@@ -17,5 +18,11 @@ namespace dexcheck {
 /// Of several trees, the robot is the one with the most joints (robot_tree.h).
 /// @throws InputError for free joints within it, and where nothing moves.
 RobotDescription ReadMjcfDescription(const mjModel& engine, const std::string& source);
+
+/// What one body of the engine's has, in its own frame.
+MassProperties ReadEngineBody(const mjModel& engine, int body);
+
+/// The text of an MJCF without what has no effect on the mechanism: looks, contacts, actuators.
+std::string ReduceToMechanism(const MjcfFile& mjcf);
 
 }  // namespace dexcheck

@@ -58,6 +58,25 @@ std::vector<Pose> CalcOwnPoses(const Pose& X_W0, const std::vector<OwnRow>& rows
   return poses;
 }
 
+void TakeOwnRow(int index, const Pose& X_PL, const Vector3d& axis, RobotDescription* robot) {
+  Joint& joint = robot->spec.joints[static_cast<size_t>(index)];
+  Pose& X_iL = robot->joints[static_cast<size_t>(index)].X_iL;
+  const Pose X_Li = X_iL.inverse();
+  if (!X_Li.linear().col(2).isApprox(axis)) X_iL.linear() = MakeRotationFromZ(axis).transpose();
+  Pose X_jP = Pose::Identity();
+  if (joint.parent >= 0) X_jP = robot->joints[static_cast<size_t>(joint.parent)].X_iL;
+  joint.X_PB = X_jP * X_PL * X_iL.inverse();
+  joint.mdh = MdhRow{};
+  const Pose turn = X_iL * X_Li;
+  joint.body = ExpressIn(joint.body, turn);
+  const auto move = [&](int carrier, Pose* X) {
+    if (carrier == index) *X = turn * *X;
+  };
+  for (Joint& child : robot->spec.joints) move(child.parent, &child.X_PB);
+  for (Frame& frame : robot->spec.frames) move(frame.link, &frame.X_LF);
+  for (DescribedPart& part : robot->parts) move(part.joint, &part.X_iL);
+}
+
 std::vector<OwnRow> ReadRowsAs(const RobotDescription& robot, MdhRow (*change)(MdhRow), bool classic) {
   std::vector<OwnRow> rows = ListOwnRows(robot);
   std::vector<Pose> behind(rows.size(), Pose::Identity());  // of a classic row: what stands behind the joint

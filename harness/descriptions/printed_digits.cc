@@ -10,6 +10,7 @@
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
+#include "harness/descriptions/compiled_inertias.h"
 #include "harness/descriptions/mjcf_reader.h"
 #include "harness/engine/xml.h"
 
@@ -166,67 +167,6 @@ Replace AsReplace(const std::function<void(const FileNumber&)>& visit) {
   };
 }
 
-/// The inertial elements of an MJCF by the engine's body, depth first; empty where elements make bodies of
-/// their own.
-std::vector<const Element*> ListInertials(const MjcfFile& mjcf, const mjModel& engine) {
-  std::vector<const Element*> inertials = {nullptr};
-  for (const Element* world : ListChildren(static_cast<const Element*>(mjcf.root()), "worldbody")) {
-    VisitElements(world, [&](const Element* element) {
-      if (std::string_view(element->Name()) == "body")
-        inertials.push_back(element->FirstChildElement("inertial"));
-    });
-  }
-  if (static_cast<int>(inertials.size()) != engine.nbody) inertials.clear();
-  return inertials;
-}
-
-/// An MJCF with nothing that has no effect on the mechanism.
-std::string Reduce(const MjcfFile& mjcf) {
-  MjcfFile reduced(mjcf.PrintFor(std::filesystem::current_path()), mjcf.source());
-  Element* const root = reduced.root();
-  const auto keeps = [](std::string_view name, std::initializer_list<std::string_view> kept) {
-    return std::find(kept.begin(), kept.end(), name) != kept.end();
-  };
-  bool uses_geoms = false;
-  for (Element* child : ListChildren(root)) {
-    const std::string_view name = child->Name();
-    if (name == "compiler") uses_geoms = uses_geoms || ReadAttribute(*child, "inertiafromgeom") == "true";
-    if (!keeps(name, {"compiler", "option", "size", "default", "asset", "worldbody", "equality"}))
-      root->DeleteChild(child);
-  }
-  for (Element* equality : ListChildren(root, "equality")) {
-    for (Element* child : ListChildren(equality)) {
-      if (std::string_view(child->Name()) != "joint") equality->DeleteChild(child);
-    }
-  }
-  bool has_mesh = false;
-  for (Element* world : ListChildren(root, "worldbody")) {
-    VisitElements(world, [&](Element* body) {
-      const bool is_world = body == world;
-      if (!is_world && std::string_view(body->Name()) != "body") return;
-      const bool drops_geoms = is_world || (!uses_geoms && body->FirstChildElement("inertial") != nullptr);
-      for (Element* child : ListChildren(body)) {
-        const std::string_view name = child->Name();
-        if (name == "camera" || name == "light" || (drops_geoms && name == "geom")) {
-          body->DeleteChild(child);
-        } else if (name == "geom") {
-          has_mesh = true;
-        }
-      }
-    });
-  }
-  VisitElements(root, [&](Element* element) {
-    element->DeleteAttribute("material");
-    element->DeleteAttribute("rgba");
-  });
-  for (Element* asset : ListChildren(root, "asset")) {
-    for (Element* child : ListChildren(asset)) {
-      if (!has_mesh || std::string_view(child->Name()) != "mesh") asset->DeleteChild(child);
-    }
-  }
-  return reduced.Print();
-}
-
 /// Changes the parts of a description; bodies are those of the parts again.
 template <typename Change>
 void ChangeParts(const mjModel& engine, const std::vector<const Element*>& inertials, RobotDescription* robot,
@@ -240,33 +180,24 @@ void ChangeParts(const mjModel& engine, const std::vector<const Element*>& inert
   FuseParts(robot);
 }
 
-/// The six numbers of a fullinertia or the three of a diaginertia.
-std::vector<FileNumber> ReadNumbers(const Element& inertial, const char* attribute) {
-  std::vector<FileNumber> numbers;
+/// By how much the six numbers of a fullinertia, or the three of a diaginertia, are moved.
+Matrix3d MoveTensor(const Element& inertial, const char* attribute, Mover* mover) {
+  constexpr std::pair<int, int> kEntries[] = {{0, 0}, {1, 1}, {2, 2}, {0, 1}, {0, 2}, {1, 2}};
+  Matrix3d tensor = Matrix3d::Zero();
+  size_t k = 0;
   ReplaceNumbers(ReadAttribute(inertial, attribute), true, [&](const FileNumber& number, std::string_view) {
-    numbers.push_back(number);
+    if (k == std::size(kEntries)) return std::string();
+    const auto [row, col] = kEntries[k++];
+    tensor(row, col) = tensor(col, row) = mover->Draw(number);
     return std::string();
   });
-  return numbers;
-}
-
-/// By (row, column) in the order of fullinertia, of which diaginertia has the first three.
-constexpr std::pair<int, int> kEntries[] = {{0, 0}, {1, 1}, {2, 2}, {0, 1}, {0, 2}, {1, 2}};
-
-template <typename Value>
-Matrix3d MakeTensor(const std::vector<FileNumber>& numbers, const Value& value) {
-  Matrix3d tensor = Matrix3d::Zero();
-  for (size_t k = 0; k < std::min(numbers.size(), std::size(kEntries)); ++k) {
-    const auto [row, col] = kEntries[k];
-    tensor(row, col) = tensor(col, row) = value(numbers[k]);
-  }
   return tensor;
 }
 
 class NumberedMjcf : public NumberedFile {
  public:
   explicit NumberedMjcf(const DescriptionFile& file)
-      : source_(file.path().string()), text_(Reduce(file.document())) {}
+      : source_(file.path().string()), text_(ReduceToMechanism(file.document())) {}
 
   [[nodiscard]] PrintedSpread Draw(int count, const Values& exact) const override {
     PrintedSpread spread;
@@ -293,13 +224,13 @@ class NumberedMjcf : public NumberedFile {
     RobotDescription robot = ReadMjcfDescription(*engine, source_);
     RobotDescription stated = robot;
     bool has_tensor = false;
-    ChangeParts(
-        *engine, ListInertials(mjcf, *engine), &stated, [&](const Element& inertial, DescribedPart* part) {
-          const std::vector<FileNumber> numbers = ReadNumbers(inertial, "fullinertia");
-          if (numbers.size() != std::size(kEntries)) return;
-          has_tensor = true;
-          part->body.inertia = MakeTensor(numbers, [](const FileNumber& number) { return number.value; });
-        });
+    ChangeParts(*engine, ListInertials(mjcf, *engine), &stated,
+                [&](const Element& inertial, DescribedPart* part) {
+                  const std::optional<Matrix3d> tensor = ReadFullInertia(inertial);
+                  if (!tensor) return;
+                  has_tensor = true;
+                  part->body.inertia = *tensor;
+                });
     if (has_tensor) *undiagonalized = std::move(stated);
     return robot;
   }
@@ -309,13 +240,12 @@ class NumberedMjcf : public NumberedFile {
     ReplaceInXml(mjcf.root(), mover.AsReplace());
     const MjModelPtr engine = LoadMjcfText(mjcf.Print(), source_);
     RobotDescription robot = ReadMjcfDescription(*engine, source_);
-    ChangeParts(
-        *engine, ListInertials(mjcf, *engine), &robot, [&](const Element& inertial, DescribedPart* part) {
-          const auto move = [&](const FileNumber& number) { return mover.Draw(number); };
-          const Matrix3d R = part->X_LC.linear();
-          part->body.inertia += R * MakeTensor(ReadNumbers(inertial, "diaginertia"), move) * R.transpose() +
-                                MakeTensor(ReadNumbers(inertial, "fullinertia"), move);
-        });
+    ChangeParts(*engine, ListInertials(mjcf, *engine), &robot,
+                [&](const Element& inertial, DescribedPart* part) {
+                  const Matrix3d R = part->X_LC.linear();
+                  part->body.inertia += R * MoveTensor(inertial, "diaginertia", &mover) * R.transpose();
+                  part->body.inertia += MoveTensor(inertial, "fullinertia", &mover);
+                });
     return robot;
   }
 

@@ -13,16 +13,10 @@
 namespace dexcheck {
 namespace {
 
-int FindJoint(const RobotSpec& spec, const std::string& name) {
+/// The joint with that name, or that moves the link of that name as its own; -1.
+int FindJoint(const RobotSpec& spec, const std::string& name, std::string Joint::*part = &Joint::name) {
   const auto found = std::find_if(spec.joints.begin(), spec.joints.end(),
-                                  [&](const Joint& joint) { return joint.name == name; });
-  return found == spec.joints.end() ? -1 : static_cast<int>(found - spec.joints.begin());
-}
-
-/// The joint that moves the link of that name as its own; -1.
-int FindJointOfLink(const RobotSpec& spec, const std::string& link) {
-  const auto found = std::find_if(spec.joints.begin(), spec.joints.end(),
-                                  [&](const Joint& joint) { return joint.link == link; });
+                                  [&](const Joint& joint) { return joint.*part == name; });
   return found == spec.joints.end() ? -1 : static_cast<int>(found - spec.joints.begin());
 }
 
@@ -79,7 +73,7 @@ void HoldJoint(int index, double value, RobotDescription* robot) {
 
 /// Leaves a link out with all that it carries; false when there is none.
 bool LeaveOut(const std::string& link, RobotDescription* robot) {
-  const int root = FindJointOfLink(robot->spec, link);
+  const int root = FindJoint(robot->spec, link, &Joint::link);
   if (root < 0) {
     return std::erase_if(robot->parts, [&](const DescribedPart& part) { return part.name == link; }) > 0;
   }
@@ -111,7 +105,7 @@ void FixBase(const RobotDescription& other, RobotDescription* robot) {
 
 /// Those that only `only` keeps: all joints that are not below it.
 void HoldOthers(const std::string& only, const RobotDescription& robot, std::map<std::string, double>* held) {
-  int root = FindJointOfLink(robot.spec, only);
+  int root = FindJoint(robot.spec, only, &Joint::link);
   if (root < 0) root = FindJoint(robot.spec, only);
   if (root < 0) return;
   const std::vector<bool> is_kept = ListSubtree(robot.spec, root);
@@ -131,7 +125,7 @@ void HoldFollowers(const RobotSpec& spec, std::map<std::string, double>* held) {
 }
 
 bool HasLink(const RobotDescription& robot, const std::string& name) {
-  return FindJointOfLink(robot.spec, name) >= 0 ||
+  return FindJoint(robot.spec, name, &Joint::link) >= 0 ||
          std::any_of(robot.parts.begin(), robot.parts.end(),
                      [&](const DescribedPart& part) { return part.name == name; });
 }
@@ -203,7 +197,7 @@ std::vector<std::string> TakePart(const RobotPart& part, RobotDescription* a, Ro
   if (!part.only.empty()) {
     const std::string only = translate(part.only);
     const auto has = [&](const RobotDescription& robot) {
-      return FindJointOfLink(robot.spec, only) >= 0 || FindJoint(robot.spec, only) >= 0;
+      return FindJoint(robot.spec, only, &Joint::link) >= 0 || FindJoint(robot.spec, only) >= 0;
     };
     require(has(*a) || has(*b), part.only, "--only: must be a link or joint");
     for (const RobotDescription* robot : {a, b}) HoldOthers(only, *robot, &all_held);

@@ -16,11 +16,6 @@ std::string DescribeOrigin(const StatedPart& part) {
 
 }  // namespace
 
-bool IsOfRow(Quantity of) {
-  return of == Quantity::kOrigin || of == Quantity::kRotation || of == Quantity::kPlace ||
-         of == Quantity::kAxis;
-}
-
 RowReader::RowReader(const RowProblem& problem) : problem_(problem), children_(problem.bodies.size()) {
   for (size_t i = 0; i < problem_.given.size(); ++i)
     children_[static_cast<size_t>(problem_.given[i].parent + 1)].push_back(i);

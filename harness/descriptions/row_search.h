@@ -58,8 +58,6 @@ inline constexpr double kNumber = 1.3;
 inline constexpr double kUnexplained = 4.0;
 inline constexpr const char* kZero = "zero.offset";
 
-bool IsOfRow(Quantity of);
-
 class RowReader {
  public:
   explicit RowReader(const RowProblem& problem);

@@ -2,12 +2,13 @@
 
 // A URDF as an XML document: its links and joints as a tree, each with its element, and their numbers.
 
+#include <filesystem>
 #include <memory>
 #include <string>
 #include <string_view>
 #include <vector>
 
-#include "controller/common/types.h"
+#include "harness/descriptions/robot_description.h"
 
 namespace tinyxml2 {
 class XMLDocument;
@@ -66,9 +67,18 @@ class UrdfFile {
   /// The pose that the child `origin` of an element gives; the identity without one.
   [[nodiscard]] Pose ReadOrigin(const tinyxml2::XMLElement& element, const std::string& key) const;
 
+  /// Shapes of a link that can touch, or else those that are seen. Dynamics need none: nothing behind a
+  /// broken one is read.
+  [[nodiscard]] std::vector<DescribedShape> ReadShapes(const UrdfLink& link) const;
+  /// Files of the meshes that are in none of the packages, each once. @param folder of the URDF.
+  [[nodiscard]] std::vector<std::string> ListMissingMeshes(
+      const std::filesystem::path& folder, const std::vector<std::filesystem::path>& packages) const;
+
   [[noreturn]] void Fail(int line, const std::string& problem) const;
 
  private:
+  /// Volume and box of a primitive shape; a mesh has no volume here.
+  [[nodiscard]] DescribedShape ReadShape(const tinyxml2::XMLElement& use) const;
   void AddLink(tinyxml2::XMLElement* element);
   void AddJoint(tinyxml2::XMLElement* element);
   [[nodiscard]] int FindEnd(const UrdfJoint& joint, const char* end) const;

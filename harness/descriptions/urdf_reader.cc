@@ -248,7 +248,7 @@ class UrdfReader {
     part.line = link.line;
     part.joint = place.joint;
     part.X_iL = place.X_iL;
-    part.shapes = ReadShapes(link);
+    part.shapes = file_.ReadShapes(link);
     part.states_inertial = inertial != nullptr;
     if (inertial == nullptr) return;
     const std::string key = KeyOf(link);
@@ -268,53 +268,6 @@ class UrdfReader {
     if (!is_usable && !options_.keep_impossible) FailInertial(link, problem);
     if (!problem.empty()) impossible_.push_back({&link, problem, place.joint});
     part.body = ExpressIn(body, part.X_LC);
-  }
-
-  /// What can touch, or else what is seen. Dynamics need no shapes: nothing behind a broken one is read.
-  [[nodiscard]] std::vector<DescribedShape> ReadShapes(const UrdfLink& link) const {
-    std::vector<DescribedShape> seen;
-    std::vector<DescribedShape> touching;
-    try {
-      for (const auto& [use, shapes] : {std::pair("visual", &seen), std::pair("collision", &touching)}) {
-        for (const Element* shape : ListChildren(link.element, use)) shapes->push_back(ReadShape(*shape));
-      }
-    } catch (const InputError&) {
-    }
-    return touching.empty() ? seen : touching;
-  }
-
-  /// Volume and box of a primitive shape; a mesh has no volume here.
-  [[nodiscard]] DescribedShape ReadShape(const Element& use) const {
-    const Pose X_LS = file_.ReadOrigin(use, "");
-    const Element* const geometry = use.FirstChildElement("geometry");
-    const Element* const solid = geometry == nullptr ? nullptr : geometry->FirstChildElement();
-    if (solid == nullptr) file_.Fail(use.GetLineNum(), "geometry: missing");
-    const std::string_view kind = solid->Name();
-    const auto read = [&](const char* attribute) { return file_.ReadNumber(*solid, "", attribute); };
-    DescribedShape shape;
-    Vector3d half = Vector3d::Zero();
-    if (kind == "sphere") {
-      const double r = read("radius");
-      half.setConstant(r);
-      shape.volume = 4.0 / 3.0 * kPi * r * r * r;
-    } else if (kind == "box" && solid->Attribute("size") != nullptr) {
-      const Vector3d size = file_.ReadVector(*solid, "", "size", half);
-      half = 0.5 * size;
-      shape.volume = size.x() * size.y() * size.z();
-    } else if (kind == "cylinder") {
-      const double length = read("length");
-      const double r = read("radius");
-      half << r, r, 0.5 * length;
-      shape.volume = kPi * r * r * length;
-    } else if (kind == "mesh" && solid->Attribute("filename") != nullptr) {
-      file_.ReadVector(*solid, "", "scale", half);
-    } else {
-      file_.Fail(solid->GetLineNum(), "geometry: must be a shape");
-    }
-    const Vector3d around = kind == "sphere" ? half : Vector3d(X_LS.linear().cwiseAbs() * half);
-    shape.low = X_LS.translation() - around;
-    shape.high = X_LS.translation() + around;
-    return shape;
   }
 
   [[noreturn]] void FailInertial(const UrdfLink& link, const std::string& problem) const {
@@ -416,50 +369,6 @@ class UrdfReader {
   std::vector<ImpossiblePart> impossible_;
 };
 
-/// The file of a mesh; empty when it is in none of the packages.
-std::filesystem::path FindMesh(const std::string& name, const std::filesystem::path& folder,
-                               const UrdfOptions& options) {
-  std::vector<std::filesystem::path> candidates;
-  constexpr std::string_view kPackage = "package://";
-  constexpr std::string_view kFile = "file://";
-  if (name.starts_with(kPackage)) {
-    const std::filesystem::path path = name.substr(kPackage.size());
-    const std::filesystem::path package = path.begin() == path.end() ? path : *path.begin();
-    for (const std::filesystem::path& root : options.packages) {
-      candidates.push_back(root / path);
-      if (std::filesystem::absolute(root).lexically_normal().filename() == package) {
-        candidates.push_back(root / path.lexically_relative(package));
-      }
-    }
-  } else {
-    candidates.push_back(folder / (name.starts_with(kFile) ? name.substr(kFile.size()) : name));
-  }
-  for (const std::filesystem::path& path : candidates) {
-    std::error_code ignored;
-    if (std::filesystem::is_regular_file(path, ignored)) return path;
-  }
-  return {};
-}
-
-/// Files of the meshes that are in none of the packages, each once.
-std::vector<std::string> ListMissingMeshes(const UrdfFile& file, const std::filesystem::path& folder,
-                                           const UrdfOptions& options) {
-  std::set<std::string> seen;
-  std::vector<std::string> missing;
-  for (const UrdfLink& link : file.links()) {
-    for (const char* use : {"visual", "collision"}) {
-      for (const Element* shape : ListChildren(link.element, use)) {
-        const Element* const geometry = shape->FirstChildElement("geometry");
-        const Element* const mesh = geometry == nullptr ? nullptr : geometry->FirstChildElement("mesh");
-        const char* const name = mesh == nullptr ? nullptr : mesh->Attribute("filename");
-        if (name == nullptr || !seen.insert(name).second) continue;
-        if (FindMesh(name, folder, options).empty()) missing.emplace_back(name);
-      }
-    }
-  }
-  return missing;
-}
-
 }  // namespace
 
 RobotDescription ParseUrdf(std::string_view text, const std::string& source, const UrdfOptions& options) {
@@ -467,7 +376,7 @@ RobotDescription ParseUrdf(std::string_view text, const std::string& source, con
   RobotDescription robot = UrdfReader(file, source, options).Read();
   if (options.packages.empty()) return robot;
   const std::vector<std::string> missing =
-      ListMissingMeshes(file, std::filesystem::path(source).parent_path(), options);
+      file.ListMissingMeshes(std::filesystem::path(source).parent_path(), options.packages);
   if (!missing.empty())
     robot.notes.push_back("meshes that are missing (dynamics need none): " + JoinNames(missing));
   return robot;

@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "harness/checks/tolerance.h"
+#include "harness/descriptions/constant_table.h"
 #include "harness/diagnosis/repair_trial.h"
 
 namespace dexcheck {
@@ -38,18 +39,12 @@ std::vector<Repair> Neutralise(const Adapter& adapter, const ConstantChecks& con
       cause.note += " (<joint type=\"free\"> takes the defaults of <joint>, <freejoint> does not)";
   }
   if (causes.empty()) return causes;
-  std::vector<int> joints = adapter.joint_ids();
-  joints.insert(joints.end(), adapter.base_joints().begin(), adapter.base_joints().end());
-  for (const EngineWheel& wheel : adapter.wheels()) joints.push_back(wheel.joint);
-  for (const int joint : joints) engine->jnt_stiffness[joint] = 0.0;
-  for (const int joint : adapter.base_joints()) {
-    const int dofs = engine->jnt_type[joint] == mjJNT_FREE ? 6 : 1;
-    for (mjtNum* const values : {engine->dof_damping, engine->dof_armature, engine->dof_frictionloss})
-      mju_zero(values + engine->jnt_dofadr[joint], dofs);
-  }
-  for (const EngineWheel& wheel : adapter.wheels()) engine->dof_frictionloss[wheel.dof] = 0.0;
-  std::fill_n(engine->tendon_stiffness, engine->ntendon, 0.0);
-  std::fill_n(engine->tendon_damping, engine->ntendon, 0.0);
+  for (const int joint : adapter.joint_ids()) MakeIdle(EnginePart::kJoint, joint, kRobotJoint, engine);
+  for (const int joint : adapter.base_joints()) MakeIdle(EnginePart::kJoint, joint, kFreeJoint, engine);
+  for (const EngineWheel& wheel : adapter.wheels())
+    MakeIdle(EnginePart::kJoint, wheel.joint, kWheelJoint, engine);
+  for (int i = 0; i < static_cast<int>(engine->ntendon); ++i)
+    MakeIdle(EnginePart::kTendon, i, kRobotJoint, engine);
   engine->opt.disableflags = 0;
   engine->opt.density = 0.0;
   engine->opt.viscosity = 0.0;
@@ -238,6 +233,8 @@ class Diagnostician {
   void Weigh() {
     RobotSpec written = file_;
     const Size before = Measure(written);
+    result_.residual = before.all;
+    result_.residual_of_forces = before.forces;
     Size last = before;
     const auto fraction = [](double from, double to, double of) { return of > 0.0 ? (from - to) / of : 0.0; };
     for (Repair& cause : result_.causes) {

@@ -28,6 +28,8 @@ struct Diagnosis {
   std::vector<Repair> causes;  ///< The one that explains most first.
   double explained = 0.0;      ///< Fraction of all residuals, squared and scaled, that they explain together.
   double explained_of_forces = 0.0;
+  /// All residuals, squared and scaled, before the repairs; and those of forces alone.
+  double residual = 0.0, residual_of_forces = 0.0;
   std::vector<ConstantFinding> remaining_constants;  ///< What disagrees after all repairs.
   std::vector<CheckRecord> remaining_terms;          ///< Failed checks after all repairs.
   RobotSpec written;   ///< The model's numbers as they stand in its file, which is what the causes change;

@@ -1,11 +1,10 @@
 #pragma once
 
-// Equations that are wrong on purpose, each once: in a comparison of terms (formula_mutants.h) they stand in
-// the place of the model's, in a run the controller goes by them at every step.
+// Equations that are wrong on purpose, the one table of them: in a comparison of terms (formula_mutants.h)
+// they stand in the place of the model's, in a run the controller goes by them at every step.
 
-#include <functional>
-#include <span>
 #include <string>
+#include <variant>
 #include <vector>
 
 #include "controller/control/grasp_model.h"
@@ -23,59 +22,87 @@ struct RobotEquations {
   VectorXd& friction;
 };
 
-/// A wrong equation of one form. @tparam Change a function that makes what is wrong.
-template <typename Change>
-struct WrongEquation {
-  const char* name;   ///< "Coriolis terms dropped".
-  const char* term;   ///< The term that should differ; nullptr when only runs have the fault.
-  const char* check;  ///< The check of a run that should fail; nullptr when only comparisons have the fault.
-  Change change;
-  bool (*applies)(const RobotModel&) = nullptr;  ///< To which robots; nullptr for all.
+// What is wrong of an equation, by what it is of.
+
+struct RobotChange {
+  void (*make)(const RobotEquations&);
+};
+/// Rotations of links, or of frames.
+struct RotationsTransposed {
+  bool of_frames;
+};
+/// J of a frame, from the left, by the frame's pose.
+struct JacobianChange {
+  Matrix6d (*make)(const Pose&);
+};
+/// J_dot, or in a run J_B_dot.
+struct JacobianRate {
+  double factor;
+};
+/// Positions and rates of two joints on their way into the model.
+struct JointsExchanged {
+  int a, b;
+};
+struct EnergyChange {
+  void (*make)(EnergyAndMomentum*);
+};
+struct ObjectPoseChange {
+  void (*make)(const Vector6d& X_o, Pose*);
+};
+/// Of the object's dynamics in X_o.
+struct ObjectChange {
+  void (*make)(ObjectTerms*);
+};
+/// Of the object's dynamics in its body velocity.
+struct ObjectBodyChange {
+  void (*make)(ObjectBodyTerms*);
+};
+struct ContactFrameChange {
+  ContactGeometry (*make)(const Surface& fingertip, const Surface& object, ContactCoordinates);
+};
+/// G_i by another transform of wrenches than Ad^-T of g_o_cf.
+struct GraspMapChange {
+  Matrix6d (*make)(const Pose&);
+};
+/// G_dot.
+struct GraspMapRate {
+  double factor;
+};
+/// Rows of J_B' of a contact, from J_f.
+struct ContactJacobianChange {
+  MatrixXd (*make)(const ContactGeometry&, const Matrix6Xd&);
+};
+/// kappa_dot of a contact, from V_co_cf^cf, by another equation than (40).
+struct RollingChange {
+  Vector5d (*make)(ContactGeometry, Vector6d);
 };
 
-using RobotEquation = WrongEquation<void (*)(const RobotEquations&)>;
-/// G_i by another transform of wrenches than Ad^-T of g_o_cf.
-using GraspMapEquation = WrongEquation<Matrix6d (*)(const Pose&)>;
-/// Rows of J_B' of a contact, from J_f.
-using ContactJacobianEquation = WrongEquation<MatrixXd (*)(const ContactGeometry&, const Matrix6Xd&)>;
-/// kappa_dot of a contact, from V_co_cf^cf, by another equation than (40).
-using RollingEquation = WrongEquation<Vector5d (*)(ContactGeometry, Vector6d)>;
-/// Of the object's dynamics in X_o.
-using ObjectEquation = WrongEquation<void (*)(ObjectTerms*)>;
+using EquationChange =
+    std::variant<RobotChange, RotationsTransposed, JacobianChange, JacobianRate, JointsExchanged,
+                 EnergyChange, ObjectPoseChange, ObjectChange, ObjectBodyChange, ContactFrameChange,
+                 GraspMapChange, GraspMapRate, ContactJacobianChange, RollingChange>;
 
-/// Those of the robot's dynamics that have an effect on this robot.
-std::vector<RobotEquation> ListRobotEquations(const RobotModel& model);
-std::span<const GraspMapEquation> ListGraspMapEquations();
-std::span<const ContactJacobianEquation> ListContactJacobianEquations();
-std::span<const RollingEquation> ListRollingEquations();
-std::span<const ObjectEquation> ListObjectEquations();
+/// A wrong equation.
+struct EquationFault {
+  std::string name;   ///< "Coriolis terms dropped".
+  const char* term;   ///< The term that should differ; nullptr when only runs have the fault.
+  const char* check;  ///< The check of a run that should fail; nullptr when only comparisons have the fault.
+  EquationChange change;
+  bool (*applies)(const RobotModel&) = nullptr;  ///< To which robots besides; nullptr for all.
+};
 
-/// Changes terms after they were evaluated, through the references that the model shows: the model itself is
-/// not const.
+/// All that apply to the model: those of the object and of contacts need an object and fingertips.
+std::vector<EquationFault> ListEquationFaults(const RobotModel& model);
+
+/// Changes the terms of a run after they were evaluated, through the references that the model shows: the
+/// model itself is not const.
 class FaultyTerms {
  public:
   /// @param model evaluated at `state`; both outlive this.
   FaultyTerms(GraspModel* model, const MeasuredState& state) : model_(*model), state_(state) {}
 
-  [[nodiscard]] RobotEquations robot() const;
-  [[nodiscard]] int num_contacts() const { return grasp().num_contacts(); }
-  [[nodiscard]] const ContactGeometry& geometry(int contact) const;
-  [[nodiscard]] auto G(int contact) const { return Open(grasp().G()).middleCols<3>(3 * contact); }
-  [[nodiscard]] auto J_B(int contact) const { return Open(grasp().J_B()).middleRows<3>(3 * contact); }
-  [[nodiscard]] Matrix6Xd& G_dot() const { return Open(grasp().G_dot()); }
-  [[nodiscard]] MatrixXd& J_B_dot() const { return Open(grasp().J_B_dot()); }
-  [[nodiscard]] const Matrix6Xd& J_f(int contact) const { return grasp().J_f(contact); }
-  /// V_co_cf^cf of a contact.
-  [[nodiscard]] Vector6d CalcTwist(int contact) const;
-  /// kappa_dot of a contact is another, and the rates that are taken along it.
-  void SetKappaDot(int contact, const Vector5d& kappa_dot) const;
-
-  [[nodiscard]] ObjectBodyTerms& body() const { return Open(grasp().body()); }
-  /// With X_o as coordinates alone.
-  [[nodiscard]] ObjectTerms& coordinates() const { return Open(grasp().coordinates()); }
-
-  /// What follows from the changed terms: the slip of each contact (45), (46).
-  void Finish() const;
+  /// Makes a fault that has a check, and what follows from it: the slip of each contact (45), (46).
+  void Make(const EquationChange& change) const;
 
  private:
   template <typename T>
@@ -83,20 +110,19 @@ class FaultyTerms {
     return const_cast<T&>(shown);
   }
   [[nodiscard]] const GraspTerms& grasp() const { return model_.grasp(); }
+  [[nodiscard]] const ContactGeometry& geometry(int contact) const;
+
+  void MakeOne(const RobotChange& change) const;
+  void MakeOne(const JacobianRate& change) const { Open(grasp().J_B_dot()) *= change.factor; }
+  void MakeOne(const GraspMapRate& change) const { Open(grasp().G_dot()) *= change.factor; }
+  void MakeOne(const ObjectChange& change) const { change.make(&Open(grasp().coordinates())); }
+  void MakeOne(const ObjectBodyChange& change) const { change.make(&Open(grasp().body())); }
+  void MakeOne(const GraspMapChange& change) const;
+  void MakeOne(const ContactJacobianChange& change) const;
+  void MakeOne(const RollingChange& change) const;
 
   GraspModel& model_;
   const MeasuredState& state_;
 };
-
-/// One wrong equation of a run.
-struct EquationFault {
-  std::string name;
-  std::string check;
-  std::function<void(const FaultyTerms&)> apply;
-};
-
-/// All that apply to the robot, which holds an object. @param coordinates whether the object's terms are
-/// those in X_o.
-std::vector<EquationFault> ListEquationFaults(const RobotModel& model, bool coordinates);
 
 }  // namespace dexcheck

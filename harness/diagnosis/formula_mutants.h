@@ -1,27 +1,22 @@
 #pragma once
 
-// Wrong equations made on purpose, which no parameter can express: put in the checks' way in place of the
+// Wrong equations (equation_faults.h), which no parameter can express: put in the checks' way in place of the
 // model's.
 
-#include <functional>
-#include <string>
 #include <vector>
 
-#include "harness/checks/contact_check.h"
+#include "harness/diagnosis/equation_faults.h"
 #include "harness/diagnosis/mutation.h"
+#include "harness/engine/adapter.h"
 
 namespace dexcheck {
 
-/// A wrong equation; what is named is the check that it fails.
+/// A wrong equation; what is named is the check of its term.
 struct FormulaMutant : TriedFault {
-  std::string first;           ///< The check that a fault of this kind should fail.
-  ConsistencyOptions options;  ///< With the fault in make_view or object.
-  ContactFormulas contact;     ///< Or here,
-  bool of_contact = false;     ///< and then only the contact check is run.
-  bool of_model = false;       ///< The fault is in make_view.
+  EquationFault equation;
 };
 
-/// All that apply to the model: those of the object and of contacts need an object and fingertips.
+/// All that apply to the model and that a comparison of terms can have.
 std::vector<FormulaMutant> ListFormulaMutants(const RobotModel& model);
 
 /// Runs the checks on the wrong equation.

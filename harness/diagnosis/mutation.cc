@@ -2,12 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <memory>
 #include <optional>
 #include <utility>
 
 #include "controller/common/errors.h"
-#include "harness/descriptions/random_states.h"
+#include "harness/descriptions/analytic_provider.h"
 
 namespace dexcheck {
 namespace {
@@ -142,32 +141,6 @@ class MutantList {
   std::vector<Mutant> mutants_;
 };
 
-/// Everything that a view shows at one state.
-VectorXd CollectTerms(const ModelView& view) {
-  std::vector<double> all;
-  const auto append = [&](const MatrixXd& terms) {
-    all.insert(all.end(), terms.data(), terms.data() + terms.size());
-  };
-  append(view.M());
-  append(view.C());
-  append(view.gravity());
-  append(view.friction());
-  for (int link = -1; link < view.model().num_joints(); ++link) append(view.CalcLinkPose(link).matrix());
-  Matrix6Xd J(6, view.size());
-  Matrix6Xd J_dot(6, view.size());
-  for (size_t frame = 0; frame < view.model().frames().size(); ++frame) {
-    append(view.CalcFramePose(static_cast<int>(frame)).matrix());
-    view.CalcFrameJacobian(static_cast<int>(frame), J, J_dot);
-    append(J);
-    append(J_dot);
-  }
-  const EnergyAndMomentum energies = view.CalcEnergyAndMomentum();
-  append(Vector2d(energies.kinetic, energies.potential));
-  append(energies.linear_momentum);
-  append(energies.angular_momentum);
-  return Eigen::Map<const VectorXd>(all.data(), static_cast<Eigen::Index>(all.size()));
-}
-
 }  // namespace
 
 void TriedFault::AddFailed(const std::vector<CheckRecord>& records) {
@@ -176,22 +149,17 @@ void TriedFault::AddFailed(const std::vector<CheckRecord>& records) {
   }
 }
 
-bool HasEffect(const RobotModel& model, ModelView* other, int samples, std::uint64_t seed) {
+bool HasEffect(const RobotModel& model, DynamicsProvider* other, int samples, std::uint64_t seed) {
   constexpr double kRounding = 1e-14;
-  StateSource source(model, {}, seed);
-  const std::unique_ptr<ModelView> right = MakeModelView(model, Coordinates::kReduced);
-  VectorXd q = VectorXd::Zero(model.num_positions());
-  VectorXd xi = VectorXd::Zero(model.num_velocities());
-  for (int sample = 0; sample < samples; ++sample) {
-    source.DrawPositions(&q);
-    source.DrawVelocity(&xi);
-    right->SetState(q, xi);
-    other->SetState(q, xi);
-    const VectorXd terms = CollectTerms(*right);
-    const double size = 1.0 + terms.cwiseAbs().maxCoeff();
-    if ((CollectTerms(*other) - terms).cwiseAbs().maxCoeff() > kRounding * size) return true;
-  }
-  return false;
+  AnalyticProvider right(model, "model");
+  TermComparison comparison(model, kAskedByConsistency, {&right, other});
+  CompareAtStates(
+      FeedRandomStates(model, samples, {}, seed, comparison.needs_second_velocity(),
+                       model.object().has_value()),
+      [](long) { return true; }, &comparison);
+  const std::vector<CheckRecord> terms = comparison.TakePairs().front().terms;
+  return std::any_of(terms.begin(), terms.end(),
+                     [](const CheckRecord& record) { return record.worst > kRounding; });
 }
 
 std::vector<Mutant> ListMutants(const RobotSpec& spec, double scale) {
@@ -231,8 +199,8 @@ void TryMutant(const RobotModel& model, const mjModel& engine, const std::string
   mutant->AddFailed(result.constants.records);
   mutant->AddFailed(result.terms);
   if (result.Agrees()) {
-    const std::unique_ptr<ModelView> view = MakeModelView(*changed, Coordinates::kReduced);
-    const bool has_effect = HasEffect(model, view.get(), options.samples, options.seed);
+    AnalyticProvider other(*changed, "changed", model);
+    const bool has_effect = HasEffect(model, &other, options.samples, options.seed);
     mutant->outcome = has_effect ? MutantOutcome::kSurvived : MutantOutcome::kNoEffect;
     return;
   }

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "harness/descriptions/model_view.h"
+#include "harness/descriptions/dynamics_provider.h"
 #include "harness/diagnosis/diagnose.h"
 
 namespace dexcheck {
@@ -59,8 +59,8 @@ std::vector<Mutant> ListMutants(const RobotSpec& spec, double scale);
 /// several were changed; the same joints for changes of structure.
 bool IsNamedBy(const Mutant& mutant, const Repair& cause);
 
-/// Whether another view of a robot shows anything else than the model's at random states.
-bool HasEffect(const RobotModel& model, ModelView* other, int samples, std::uint64_t seed);
+/// Whether another provider of a robot's terms has any other than the model at random states.
+bool HasEffect(const RobotModel& model, DynamicsProvider* other, int samples, std::uint64_t seed);
 
 /// Runs the checks, and the diagnosis, on a mutant.
 void TryMutant(const RobotModel& model, const mjModel& engine, const std::string& engine_source,

@@ -6,13 +6,14 @@
 #include <utility>
 
 #include "controller/model/body_frame.h"
+#include "harness/descriptions/mjcf_reader.h"
+#include "harness/engine/map_vector.h"
 #include "harness/engine/robot_tree.h"
 
 namespace dexcheck {
 namespace {
 
 using Kind = ParameterKind;
-using RowMatrix3d = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
 
 // Both sides read decimal numbers; thirteen digits are printed, and a body's are turned into the link's frame
 // by some dozen rotations, each 1e-16 of the robot's size, which may be a thousand times the body's.
@@ -20,8 +21,6 @@ constexpr double kSame = 1e-11;
 // Of forces that follow from fitted numbers, relative to their size.
 constexpr double kSameForces = 1e-8;
 constexpr double kSameSolid = 1e-8;
-
-Vector3d MapVector(const mjtNum* v) { return {v[0], v[1], v[2]}; }
 
 /// Whether motion shows the constant, so that it need not be read.
 bool MovesTheRobot(Kind kind) {
@@ -125,12 +124,8 @@ MassProperties RepairTrial::FindBody(int link) const {
   std::vector<MassProperties> parts;
   for (const int b : adapter_.welded_bodies()[0]) {
     if (engine.body_weldid[b] != adapter_.link_bodies()[0]) continue;
-    Pose X_Wb = Pose::Identity();
-    X_Wb.translation() = MapVector(data->xipos + 3 * b);
-    X_Wb.linear() = Eigen::Map<const RowMatrix3d>(data->ximat + 9 * b);
-    const Matrix3d moments = MapVector(engine.body_inertia + 3 * b).asDiagonal();
-    parts.push_back(
-        ExpressIn({engine.body_mass[b], Vector3d::Zero(), moments}, written_.base.X_B0.inverse() * X_Wb));
+    const Pose X_Wb = MapPose(data->xmat + 9 * b, data->xpos + 3 * b);
+    parts.push_back(ExpressIn(ReadEngineBody(engine, b), written_.base.X_B0.inverse() * X_Wb));
   }
   return Combine(parts);
 }

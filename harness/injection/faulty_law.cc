@@ -132,11 +132,7 @@ void FaultyLaw::Step(const Reading& reading, double t, Command* command) {
   command->force_solves = 0;
   command->desired = TrajectoryController::EvaluateDesired(*motion_, t, time_step_);
   model_.SetState(reading.state);
-  if (is_on_() && change_) {
-    const FaultyTerms terms(&model_, reading.state);
-    change_(terms);
-    terms.Finish();
-  }
+  if (is_on_() && change_) FaultyTerms(&model_, reading.state).Make(*change_);
   if (steps_until_due_ > 0) {
     --steps_until_due_;
     return;

@@ -3,6 +3,7 @@
 // Laws that are wrong on purpose: do the checks find them, and name the part?
 
 #include <array>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -60,7 +61,7 @@ class FaultyLaw final : public Controller {
   /// The right law, from terms of which one equation is wrong.
   FaultyLaw(const Setup& setup, const EquationFault& fault, std::function<bool()> is_on = {})
       : FaultyLaw(setup, LawFault{}, std::move(is_on)) {
-    change_ = fault.apply;
+    change_ = fault.change;
   }
 
   void Follow(const Trajectory& motion) override;
@@ -86,7 +87,7 @@ class FaultyLaw final : public Controller {
   GraspControllerOptions options_;
   LawFault fault_;
   std::function<bool()> is_on_;
-  std::function<void(const FaultyTerms&)> change_;
+  std::optional<EquationChange> change_;
   GraspModel model_;
   ActuationMap actuation_;
   Pseudoinverse J_pinv_, G_pinv_;

@@ -49,7 +49,9 @@ std::vector<FaultSet> ListLawFaults(const Setup& setup) {
 std::vector<FaultSet> ListEquationFaults(const Setup& setup) {
   const bool has_coordinates = setup.scenario().control.orientation == OrientationFeedback::kAngles;
   std::vector<FaultSet> sets;
-  for (const EquationFault& equation : ListEquationFaults(setup.model(), has_coordinates)) {
+  for (const EquationFault& equation : ListEquationFaults(setup.model())) {
+    const bool is_of_coordinates = std::holds_alternative<ObjectChange>(equation.change);
+    if (equation.check == nullptr || (is_of_coordinates && !has_coordinates)) continue;
     InjectedFault fault = FaultAt(equation.name, Cause::kModel, equation.check);
     fault.kind = "equation";
     fault.controller = [equation](const Setup& own, std::unique_ptr<Controller> /*right*/,

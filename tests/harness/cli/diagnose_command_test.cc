@@ -117,6 +117,33 @@ TEST_F(DiagnoseCommand, ListsRepairsThatDoAsWell) {
   EXPECT_EQ(results.at("causes").at(0).at("equivalents").at(0).at("what"), "joint panda_joint4: roll");
 }
 
+// One list: conventions that several parts share, then the numbers that are wrong besides.
+TEST_F(DiagnoseCommand, NamesConventionsThenNumbers) {
+  const std::string folder = SourcePath("/harness/descriptions/examples/field_cases");
+  const std::string right = ReadText(folder + "/arm.urdf");
+  std::string text = ReplaceOnce(right, "xyz=\"0 0 0.3\"", "xyz=\"0 0 300\"");
+  text = ReplaceOnce(text, "xyz=\"0.4 0 0\"", "xyz=\"400 0 0\"");
+  Write("arm.urdf", ReplaceOnce(text, "value=\"2.1\"", "value=\"2.2\""));
+  const Json results = Diagnose("arm.urdf", folder + "/arm.xml");
+  EXPECT_TRUE(results.at("remaining").empty()) << results.at("remaining");
+  const Json& causes = results.at("causes");
+  ASSERT_EQ(causes.size(), 2U) << causes;
+  EXPECT_EQ(causes[0].at("ids"), Json({"origin.mm"}));
+  EXPECT_EQ(causes[0].at("parts"), Json({"shoulder", "elbow"}));
+  EXPECT_EQ(causes[1].at("changes").at(0).at("part"), "link upper");
+  EXPECT_EQ(causes[1].at("changes").at(0).at("repair"), 2.1);
+  EXPECT_NEAR(causes[0].at("explained").get<double>() + causes[1].at("explained").get<double>(), 1.0, 1e-9);
+  EXPECT_GT(causes[1].at("explained"), 0.0);
+  // What hangs on an axis stays where it is, so that nothing is left.
+  text = ReplaceOnce(right, "axis xyz=\"0 1 0\"", "axis xyz=\"0 -1 0\"");
+  Write("axes.urdf", ReplaceOnce(text, "axis xyz=\"1 0 0\"", "axis xyz=\"-1 0 0\""));
+  const Json axes = Diagnose("axes.urdf", folder + "/arm.xml");
+  EXPECT_TRUE(axes.at("remaining").empty()) << axes.at("remaining");
+  ASSERT_EQ(axes.at("causes").size(), 1U) << axes.at("causes");
+  EXPECT_EQ(axes.at("causes").at(0).at("ids"), Json({"axis.sign"}));
+  EXPECT_EQ(axes.at("causes").at(0).at("explained"), 1.0);
+}
+
 // A robot whose base floats, as a table that `import` wrote and as a URDF: what is wrong is said as it stands
 // in the file, though the joint's axis is not z.
 constexpr const char* kHopperMjcf = R"(<mujoco model="hopper"><compiler angle="radian"/><worldbody>

@@ -8,6 +8,7 @@
 #include <set>
 #include <sstream>
 
+#include "harness/checks/contact_check.h"
 #include "harness/diagnosis/formula_mutants.h"
 #include "harness/engine/engine.h"
 #include "tests/common/paper_robot.h"
