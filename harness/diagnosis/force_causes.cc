@@ -29,6 +29,11 @@ constexpr Index kMostSteps = 20;  // that are looked at
 constexpr size_t kMostSegments = 8;
 constexpr const char* kWorld = "world";
 
+/// What pushes as it is, whatever moves.
+bool IsPush(const Candidate& one) {
+  return one.fault == "torque" || one.fault == kForce || one.fault == "moment";
+}
+
 /// One residual and what explains it.
 class Problem {
  public:
@@ -137,9 +142,7 @@ class Problem {
     const double rows = static_cast<double>(y_.size());
     for (size_t i = 0; i < candidates_.size(); ++i) {
       const Candidate& candidate = candidates_[i];
-      if (candidate.fault != "torque" && candidate.fault != kForce && candidate.fault != "moment" &&
-          candidate.fault != "force and moment")
-        continue;
+      if (!IsPush(candidate) && candidate.fault != "force and moment") continue;
       Free free{.candidate = i, .left = 0.0};
       for (Index k = 0; k < steps_; ++k) {
         const Index begin = k * forces_->rows();
@@ -204,8 +207,43 @@ class Problem {
       y_.segment(i * rows, rows) = forces_->CalcResidual();
       forces_->AddColumns(i * rows, steps_, &candidates_);
     }
+    AddGrowing();
     for (const auto& [candidate, amplitude] : known_) y_ -= candidates_[candidate].columns * amplitude;
     NameStuckBearings();
+  }
+
+  /// Of each push another one that grows evenly: by so much a second, and what it is when the run ends.
+  void AddGrowing() {
+    const size_t count = candidates_.size();
+    for (size_t i = 0; i < count; ++i) {
+      if (!IsPush(candidates_[i])) continue;
+      Candidate growing = candidates_[i];
+      const Index width = growing.columns.cols();
+      growing.fault += kGrows;
+      growing.unit += "/s";
+      growing.nominal = store_.last_time();
+      growing.scale = candidates_[i].scale.replicate(2, 1);
+      growing.is_possible = [this, end = growing.nominal](const VectorXd& a) {
+        return GrowsFromNothing(a, end);
+      };
+      growing.columns.conservativeResize(Eigen::NoChange, 2 * width);
+      growing.columns.rightCols(width) = candidates_[i].columns;
+      for (Index k = 0; k < steps_; ++k) {
+        const double since = store_.Get(StepStore::kTime)(0, used_[static_cast<size_t>(k)]) - growing.nominal;
+        growing.columns.block(k * forces_->rows(), 0, forces_->rows(), width) *= since;
+      }
+      candidates_.push_back(std::move(growing));
+    }
+  }
+
+  /// Whether it began within what is kept: before the steps of this residual, and after all of it had begun.
+  /// @param a growth a second, and size at time `end`.
+  [[nodiscard]] bool GrowsFromNothing(const VectorXd& a, double end) const {
+    constexpr double kSlack = 0.05;  // of the time that is looked at
+    const auto time = store_.Get(StepStore::kTime);
+    const double first = time(0, used_.front()), slack = kSlack * (time(0, used_.back()) - first);
+    const double since = CalcGrowthBegin(a, end);
+    return since >= time(0, 0) - slack && since <= first + slack;
   }
 
   /// A joint that does not slide shows how much friction holds it, and not how much could.

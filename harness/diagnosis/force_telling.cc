@@ -25,10 +25,30 @@ std::string TellVector(const Eigen::Ref<const VectorXd>& v) {
   return text + ")";
 }
 
+/// A push whose amplitudes are what it grows by a second and what it is at the time `nominal`.
+Fault MakeGrowing(const Candidate& candidate, const VectorXd& a, const VectorXd& error) {
+  const Index size = a.size() / 2;
+  const VectorXd rate = a.head(size);
+  Fault fault{candidate.fault,
+              candidate.place,
+              size == 1 ? rate[0] : rate.norm(),
+              error.size() > 0 ? error.head(size).norm() : 0.0,
+              candidate.unit,
+              size == 1 ? "" : TellVector(rate) + " "};
+  fault.detail += "since " + FormatNumber(CalcGrowthBegin(a, candidate.nominal), 4) + " s";
+  return fault;
+}
+
 }  // namespace
+
+double CalcGrowthBegin(const VectorXd& a, double end) {
+  const Index size = a.size() / 2;
+  return end - a.head(size).dot(a.tail(size)) / a.head(size).squaredNorm();
+}
 
 Fault MakeForceFault(const Candidate& candidate, const VectorXd& a, const VectorXd& error,
                      const Vector3d& gravity) {
+  if (candidate.fault.ends_with(kGrows)) return MakeGrowing(candidate, a, error);
   Fault fault{candidate.fault,          candidate.place,
               candidate.nominal + a[0], error.size() > 0 ? error[0] : 0.0,
               candidate.unit,           ""};

@@ -9,6 +9,9 @@
 
 namespace dexcheck {
 
+/// When a push was nothing, s. @param a what it grows by a second, and its size at time `end`.
+double CalcGrowthBegin(const VectorXd& a, double end);
+
 /// @param a its amplitudes. @param error their standard errors; empty for none. @param gravity the model's.
 Fault MakeForceFault(const Candidate& candidate, const VectorXd& a, const VectorXd& error,
                      const Vector3d& gravity);

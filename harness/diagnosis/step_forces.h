@@ -23,6 +23,8 @@ inline constexpr const char* kMomentInAxes = "moment, in its axes";
 inline constexpr const char* kMassWithInertia = "mass and inertia";
 inline constexpr const char* kGravity = "gravity off by";
 inline constexpr const char* kContact = "contact further along the normal by";
+/// What follows the name of a force, a moment or a torque that grows evenly in time.
+inline constexpr const char* kGrows = " that grows by";
 }  // namespace force_fault
 
 /// Residual and columns of one step. The robot's are whitened by
