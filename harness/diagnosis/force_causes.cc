@@ -407,18 +407,21 @@ Causes ExplainForces(const StepStore& store) {
   if (store.size() == 0) return causes;
   StepForces forces(store);
   Segment whole;
-  std::vector<Segment> parts;
-  FindSegments(store, &forces, 1.0, &whole, &parts);
+  std::vector<Segment> parts, bent;
+  FindSegments(store, &forces, 1.0, &whole, &parts, &bent);
   if (whole.empty()) {
     // Predictions fail by what is less than the bounds of the balances.
-    FindSegments(store, &forces, kFaint, &whole, &parts);
+    FindSegments(store, &forces, kFaint, &whole, &parts, &bent);
     if (!whole.empty()) Problem(store, &forces, whole, kFaint).ExplainConstant(whole, &causes);
     return causes;
   }
   Problem problem(store, &forces, whole);
   if (problem.ExplainConstant(whole, &causes)) return causes;
-  if (parts.size() > 1 && parts.size() <= kMostSegments) {
-    const Causes found = ExplainParts(store, &forces, parts);
+  // Where there are no more bends than jumps, these are the same.
+  if (bent.size() == parts.size()) bent.clear();
+  for (const std::vector<Segment>& segments : {parts, bent}) {
+    if (segments.size() < 2 || segments.size() > kMostSegments) continue;
+    const Causes found = ExplainParts(store, &forces, segments);
     if (!found.empty()) return found;
   }
   problem.ExplainChanging(whole, &causes);
