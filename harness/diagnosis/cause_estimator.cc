@@ -59,6 +59,7 @@ class Search {
       }
       chosen_ = best;
     }
+    if (options_.exchanges_pairs) criterion = ExchangePairs(criterion);
     return Finish(criterion);
   }
 
@@ -78,7 +79,7 @@ class Search {
       chosen_.push_back(next.candidate);
       criterion = Exchange(next.criterion);
     }
-    return options_.exchanges_pairs ? ExchangePairs(criterion) : criterion;
+    return criterion;
   }
 
   /// The most likely first choices besides what was found: one at each place, and then more of them.
