@@ -27,6 +27,13 @@ std::string TellVector(const Eigen::Ref<const VectorXd>& v) {
   return text + ")";
 }
 
+/// What is not so many standard errors away from nothing shows no size.
+void RequireSize(Fault* fault) {
+  constexpr double kErrors = 5.0;
+  if (kErrors * fault->error > std::abs(fault->value))
+    fault->error = std::numeric_limits<double>::infinity();
+}
+
 /// A push whose amplitudes are what it grows by a second and what it is at the time `nominal`.
 Fault MakeGrowing(const Candidate& candidate, const VectorXd& a, const VectorXd& error) {
   const Index size = a.size() / 2;
@@ -37,6 +44,7 @@ Fault MakeGrowing(const Candidate& candidate, const VectorXd& a, const VectorXd&
               error.size() > 0 ? error.head(size).norm() : 0.0,
               candidate.unit,
               size == 1 ? "" : TellVector(rate) + " "};
+  RequireSize(&fault);
   fault.detail += "since " + FormatNumber(CalcGrowthBegin(a, candidate.nominal), 4) + " s";
   return fault;
 }
@@ -82,6 +90,7 @@ Fault MakeForceFault(const Candidate& candidate, const VectorXd& a, const Vector
     fault.fault = "mass";
     fault.detail = "and its inertia by the same factor";
   }
+  if (candidate.nominal == 0.0) RequireSize(&fault);
   if (candidate.fault != kGravity) return fault;
   const Vector3d change = a;
   if (std::abs(change.dot(gravity.normalized())) < kTilted * change.norm()) {
