@@ -25,7 +25,7 @@ constexpr double kLevel = 5.0, kRounding = 1e-4, kExact = 1e-7;
 constexpr int kMostLevels = 4;
 constexpr double kFaint = 0.01;   // noise where the checks of the balances hold, in their bounds
 constexpr Index kMostSteps = 20;  // that are looked at
-constexpr size_t kMostSegments = 8;
+constexpr size_t kMostSegments = 8, kMostBends = 4;
 constexpr const char* kWorld = "world";
 
 /// What pushes as it is, whatever moves.
@@ -449,8 +449,8 @@ Causes ExplainForces(const StepStore& store) {
   }
   Problem problem(store, &forces, whole);
   if (problem.ExplainConstant(whole, &causes)) return causes;
-  // Where there are no more bends than jumps, these are the same.
-  if (bent.size() == parts.size()) bent.clear();
+  // Where there are no more bends than jumps, these are the same; what moves by itself bends all the time.
+  if (bent.size() == parts.size() || bent.size() > kMostBends) bent.clear();
   for (const std::vector<Segment>& segments : {parts, bent}) {
     if (segments.size() < 2 || segments.size() > kMostSegments) continue;
     const Causes found = ExplainParts(store, &forces, segments);

@@ -177,7 +177,7 @@ TEST(RunCampaign, NamesForcesThatGrow) {
     options.together = together;
     options.kinds = {"joint", "body"};
     options.seed = 3;
-    RunCampaign campaign = MakeCampaign(options, "panda-reach");
+    RunCampaign campaign(ReadShippedScenario("panda-reach"), kPanda, kPandaMjcf, options, kGoOn);
     int grow = 0, named = 0, told = 0;
     for (size_t i = 0; i < campaign.mutants().size(); ++i) {
       const RunMutant& mutant = campaign.mutants()[i];
