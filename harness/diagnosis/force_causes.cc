@@ -271,11 +271,10 @@ class Problem {
   /// Whether it began within what is kept: before the steps of this residual, and after all of it had begun.
   /// @param a growth a second, and size at time `end`.
   [[nodiscard]] bool GrowsFromNothing(const VectorXd& a, double end) const {
-    constexpr double kSlack = 0.05;  // of the time that is looked at
     const auto time = store_.Get(StepStore::kTime);
-    const double first = time(0, used_.front()), slack = kSlack * (time(0, used_.back()) - first);
+    const double slack = store_.size() > 1 ? 2.0 * (time(0, 1) - time(0, 0)) : 0.0;
     const double since = CalcGrowthBegin(a, end);
-    return since >= time(0, 0) - slack && since <= first + slack;
+    return since >= time(0, 0) - slack && since <= time(0, used_.front()) + slack;
   }
 
   /// A joint that does not slide shows how much friction holds it, and not how much could.
