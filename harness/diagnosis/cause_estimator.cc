@@ -44,7 +44,9 @@ class Search {
     const double nothing = Score(y_.squaredNorm(), 0.0, 0);
     std::vector<Best> firsts = {FindBest({})};
     double criterion = nothing;
-    if (!IsNoise({}) && firsts.front().criterion < nothing) criterion = Grow(firsts.front());
+    // Two may explain what neither does by itself.
+    if (!IsNoise({}) && std::isfinite(firsts.front().criterion)) criterion = Grow(firsts.front());
+    if (!(criterion < nothing)) chosen_.clear(), criterion = nothing;
     // What was the best alone need not be part of the best set.
     // Of many candidates that takes long.
     constexpr size_t kFew = 100;
@@ -57,6 +59,7 @@ class Search {
       }
       chosen_ = best;
     }
+    if (options_.exchanges_pairs) criterion = ExchangePairs(criterion);
     return Finish(criterion);
   }
 
@@ -76,7 +79,7 @@ class Search {
       chosen_.push_back(next.candidate);
       criterion = Exchange(next.criterion);
     }
-    return options_.exchanges_pairs ? ExchangePairs(criterion) : criterion;
+    return criterion;
   }
 
   /// The most likely first choices besides what was found: one at each place, and then more of them.

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "harness/diagnosis/force_telling.h"
 #include "harness/diagnosis/step_forces.h"
@@ -26,8 +25,13 @@ constexpr double kLevel = 5.0, kRounding = 1e-4, kExact = 1e-7;
 constexpr int kMostLevels = 4;
 constexpr double kFaint = 0.01;   // noise where the checks of the balances hold, in their bounds
 constexpr Index kMostSteps = 20;  // that are looked at
-constexpr size_t kMostSegments = 8;
+constexpr size_t kMostSegments = 8, kMostBends = 4;
 constexpr const char* kWorld = "world";
+
+/// What pushes as it is, whatever moves.
+bool IsPush(const Candidate& one) {
+  return one.fault == "torque" || one.fault == kForce || one.fault == "moment";
+}
 
 /// One residual and what explains it.
 class Problem {
@@ -69,6 +73,7 @@ class Problem {
     const CauseSelection selection = Select();
     if (!IsExplained(selection.fraction, selection.left)) return false;
     for (const CauseTerm& term : selection.terms) terms_.emplace_back(term.candidate, term.amplitude);
+    if (ExplainTorque(segment, selection, causes)) return true;
     if (ExplainJoint(segment, selection, causes) || ExplainBetweenLinks(segment, selection, causes))
       return true;
     Causes told = TellSelection(Start(segment), selection, candidates_,
@@ -129,55 +134,85 @@ class Problem {
 
   /// One force that changes in time, free at each step.
   void ExplainChanging(const Segment& segment, Causes* causes) const {
-    struct Free {
-      size_t candidate = SIZE_MAX;
-      double left = std::numeric_limits<double>::infinity(), criterion = left, largest = 0.0;
-    };
     std::vector<Free> all;
-    const double rows = static_cast<double>(y_.size());
-    for (size_t i = 0; i < candidates_.size(); ++i) {
-      const Candidate& candidate = candidates_[i];
-      if (candidate.fault != "torque" && candidate.fault != kForce && candidate.fault != "moment" &&
-          candidate.fault != "force and moment")
-        continue;
-      Free free{.candidate = i, .left = 0.0};
-      for (Index k = 0; k < steps_; ++k) {
-        const Index begin = k * forces_->rows();
-        const MatrixXd C = candidate.columns.middleRows(begin, forces_->rows());
-        const VectorXd y = y_.segment(begin, forces_->rows());
-        Eigen::CompleteOrthogonalDecomposition<MatrixXd> decomposition;
-        decomposition.setThreshold(1e-3);
-        const VectorXd a = decomposition.compute(C).solve(y);
-        free.left += (y - C * a).squaredNorm();
-        free.largest = std::max(free.largest, a.head(std::min<Index>(3, a.size())).norm());
-      }
-      const double parameters = static_cast<double>(candidate.columns.cols() * steps_);
-      free.criterion = rows * std::log(1.0 + free.left / rows) + parameters * std::log(rows);
-      all.push_back(free);
-    }
+    for (size_t i = 0; i < candidates_.size(); ++i)
+      if (IsPush(candidates_[i]) || candidates_[i].fault == "force and moment") all.push_back(FitFree(i));
     std::sort(all.begin(), all.end(), [](const Free& a, const Free& b) { return a.criterion < b.criterion; });
     if (all.empty()) return;
     Explanation one = Start(segment);
-    one.fraction = 1.0 - all.front().left / y_.squaredNorm();
-    one.left = std::sqrt(all.front().left / rows);
+    one.fraction = 1.0 - all.front().residual.squaredNorm() / y_.squaredNorm();
+    one.left = std::sqrt(all.front().residual.squaredNorm() / static_cast<double>(y_.size()));
     const bool explained = IsExplained(one.fraction, one.left);
     for (const Free& free : all) {
       const Candidate& candidate = candidates_[free.candidate];
       const double odds = 0.5 * (free.criterion - all.front().criterion);
       if (!one.faults.empty() && odds >= kEqualLogOdds) {
-        one.rival = candidate.place + ": " + candidate.fault;
-        one.log_odds = odds;
+        one.SetRival(candidate, odds);
         break;
       }
-      one.faults.push_back(
-          {candidate.fault + " that changes, up to", candidate.place, free.largest, 0.0, candidate.unit, ""});
+      one.faults.push_back(MakeFault(free));
     }
     one.SetOutcome();
     if (!explained) one.outcome = CauseOutcome::kNotExplained;
     causes->push_back(one);
   }
 
+  /// The torque of one joint, free at each step, where that has fewer amplitudes than what was selected: a
+  /// range that ends, a cable.
+  bool ExplainTorque(const Segment& segment, const CauseSelection& selection, Causes* causes) const {
+    Index amplitudes = 0;
+    for (const CauseTerm& term : selection.terms) amplitudes += term.amplitude.size();
+    const auto cost = [&](Index parameters, size_t terms) {
+      return static_cast<double>(parameters) * std::log(static_cast<double>(forces_->rows())) +
+             2.0 * static_cast<double>(terms) * std::log(static_cast<double>(candidates_.size()));
+    };
+    if (cost(amplitudes, selection.terms.size()) <= cost(steps_, 1)) return false;
+    for (size_t i = 0; i < candidates_.size(); ++i) {
+      if (candidates_[i].fault != "torque") continue;
+      const Free free = FitFree(i);
+      Explanation one = Start(segment);
+      one.fraction = 1.0 - free.residual.squaredNorm() / y_.squaredNorm();
+      one.left = CalcLeft(free.residual);
+      if (!IsExplained(one.fraction, one.left)) continue;
+      one.faults.push_back(MakeFault(free));
+      causes->push_back(one);
+      return true;
+    }
+    return false;
+  }
+
  private:
+  /// A candidate whose amplitudes are free at each step.
+  struct Free {
+    size_t candidate = SIZE_MAX;
+    double criterion = 0.0, largest = 0.0;
+    VectorXd residual;
+  };
+
+  [[nodiscard]] Free FitFree(size_t index) const {
+    const Candidate& candidate = candidates_[index];
+    Free free{.candidate = index, .residual = y_};
+    for (Index k = 0; k < steps_; ++k) {
+      const Index begin = k * forces_->rows();
+      const MatrixXd C = candidate.columns.middleRows(begin, forces_->rows());
+      auto left = free.residual.segment(begin, forces_->rows());
+      Eigen::CompleteOrthogonalDecomposition<MatrixXd> decomposition;
+      decomposition.setThreshold(1e-3);
+      const VectorXd a = decomposition.compute(C).solve(VectorXd(left));
+      left -= C * a;
+      free.largest = std::max(free.largest, a.head(std::min<Index>(3, a.size())).norm());
+    }
+    const double rows = static_cast<double>(y_.size());
+    free.criterion = rows * std::log(1.0 + free.residual.squaredNorm() / rows) +
+                     static_cast<double>(candidate.columns.cols() * steps_) * std::log(rows);
+    return free;
+  }
+
+  [[nodiscard]] Fault MakeFault(const Free& free) const {
+    const Candidate& candidate = candidates_[free.candidate];
+    return {candidate.fault + " that changes, up to", candidate.place, free.largest, 0.0, candidate.unit, ""};
+  }
+
   /// Size of the torque of that joint that explains most of y, a step's rows.
   [[nodiscard]] double CalcTorque(const std::string& place, Index step, const VectorXd& y) const {
     for (const Candidate& candidate : candidates_) {
@@ -204,8 +239,42 @@ class Problem {
       y_.segment(i * rows, rows) = forces_->CalcResidual();
       forces_->AddColumns(i * rows, steps_, &candidates_);
     }
+    AddGrowing();
     for (const auto& [candidate, amplitude] : known_) y_ -= candidates_[candidate].columns * amplitude;
     NameStuckBearings();
+  }
+
+  /// Of each push another one that grows evenly: by so much a second, and what it is when the run ends.
+  void AddGrowing() {
+    const size_t count = candidates_.size();
+    for (size_t i = 0; i < count; ++i) {
+      if (!IsPush(candidates_[i])) continue;
+      Candidate growing = candidates_[i];
+      const Index width = growing.columns.cols();
+      growing.fault += kGrows;
+      growing.unit += "/s";
+      growing.nominal = store_.last_time();
+      growing.scale = candidates_[i].scale.replicate(2, 1);
+      growing.is_possible = [this, end = growing.nominal](const VectorXd& a) {
+        return GrowsFromNothing(a, end);
+      };
+      growing.columns.conservativeResize(Eigen::NoChange, 2 * width);
+      growing.columns.rightCols(width) = candidates_[i].columns;
+      for (Index k = 0; k < steps_; ++k) {
+        const double since = store_.Get(StepStore::kTime)(0, used_[static_cast<size_t>(k)]) - growing.nominal;
+        growing.columns.block(k * forces_->rows(), 0, forces_->rows(), width) *= since;
+      }
+      candidates_.push_back(std::move(growing));
+    }
+  }
+
+  /// Whether it began within what is kept: before the steps of this residual, and after all of it had begun.
+  /// @param a growth a second, and size at time `end`.
+  [[nodiscard]] bool GrowsFromNothing(const VectorXd& a, double end) const {
+    const auto time = store_.Get(StepStore::kTime);
+    const double slack = store_.size() > 1 ? 2.0 * (time(0, 1) - time(0, 0)) : 0.0;
+    const double since = CalcGrowthBegin(a, end);
+    return since >= time(0, 0) - slack && since <= time(0, used_.front()) + slack;
   }
 
   /// A joint that does not slide shows how much friction holds it, and not how much could.
@@ -369,18 +438,21 @@ Causes ExplainForces(const StepStore& store) {
   if (store.size() == 0) return causes;
   StepForces forces(store);
   Segment whole;
-  std::vector<Segment> parts;
-  FindSegments(store, &forces, 1.0, &whole, &parts);
+  std::vector<Segment> parts, bent;
+  FindSegments(store, &forces, 1.0, &whole, &parts, &bent);
   if (whole.empty()) {
     // Predictions fail by what is less than the bounds of the balances.
-    FindSegments(store, &forces, kFaint, &whole, &parts);
+    FindSegments(store, &forces, kFaint, &whole, &parts, &bent);
     if (!whole.empty()) Problem(store, &forces, whole, kFaint).ExplainConstant(whole, &causes);
     return causes;
   }
   Problem problem(store, &forces, whole);
   if (problem.ExplainConstant(whole, &causes)) return causes;
-  if (parts.size() > 1 && parts.size() <= kMostSegments) {
-    const Causes found = ExplainParts(store, &forces, parts);
+  // Where there are no more bends than jumps, these are the same; what moves by itself bends all the time.
+  if (bent.size() == parts.size() || bent.size() > kMostBends) bent.clear();
+  for (const std::vector<Segment>& segments : {parts, bent}) {
+    if (segments.size() < 2 || segments.size() > kMostSegments) continue;
+    const Causes found = ExplainParts(store, &forces, segments);
     if (!found.empty()) return found;
   }
   problem.ExplainChanging(whole, &causes);

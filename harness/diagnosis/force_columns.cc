@@ -208,7 +208,8 @@ void StepForces::AddLink(int index, std::vector<Candidate>* candidates) {
   // Another centre of mass changes the inertia about the old one.
   MatrixXd com(n_, 9);
   com << -J_T * wrench.first_moment * body.mass, inertia;
-  AddRobot(&Next(candidates, "centre of mass off by", place, "m", 0.0, Moved()), com);
+  AddRobot(&Next(candidates, kCenterAlone, place, "m", 0.0, VectorXd::Ones(3)), MatrixXd(com.leftCols<3>()));
+  AddRobot(&Next(candidates, kCenter, place, "m", 0.0, Moved()), com);
   MatrixXd payload(n_, 10);
   payload << mass, -J_T * wrench.first_moment, inertia;
   Candidate& load = Next(candidates, "payload", place, "kg", 0.0, Masses(10));
@@ -247,7 +248,8 @@ void StepForces::AddObjectForces(std::vector<Candidate>* candidates) {
   AddObject(&Next(candidates, "inertia", place, "kg m^2", 0.0, Masses(6)), inertia);
   Matrix6Xd com(6, 9);
   com << -wrench.first_moment * object.body.mass, inertia;
-  AddObject(&Next(candidates, "centre of mass off by", place, "m", 0.0, Moved()), com);
+  AddObject(&Next(candidates, kCenterAlone, place, "m", 0.0, VectorXd::Ones(3)), com.leftCols<3>());
+  AddObject(&Next(candidates, kCenter, place, "m", 0.0, Moved()), com);
   Vector6d drag = Vector6d::Zero();
   drag.head<3>() = -V.head<3>();
   AddObject(&Next(candidates, "drag", place, "N s/m", 0.0, Weights(1)), drag);

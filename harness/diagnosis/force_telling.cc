@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <initializer_list>
 #include <limits>
+#include <utility>
 
 #include "controller/common/text.h"
 
@@ -25,10 +27,38 @@ std::string TellVector(const Eigen::Ref<const VectorXd>& v) {
   return text + ")";
 }
 
+/// What is not so many standard errors away from nothing shows no size.
+void RequireSize(Fault* fault) {
+  constexpr double kErrors = 5.0;
+  if (kErrors * fault->error > std::abs(fault->value))
+    fault->error = std::numeric_limits<double>::infinity();
+}
+
+/// A push whose amplitudes are what it grows by a second and what it is at the time `nominal`.
+Fault MakeGrowing(const Candidate& candidate, const VectorXd& a, const VectorXd& error) {
+  const Index size = a.size() / 2;
+  const VectorXd rate = a.head(size);
+  Fault fault{candidate.fault,
+              candidate.place,
+              size == 1 ? rate[0] : rate.norm(),
+              error.size() > 0 ? error.head(size).norm() : 0.0,
+              candidate.unit,
+              size == 1 ? "" : TellVector(rate) + " "};
+  RequireSize(&fault);
+  fault.detail += "since " + FormatNumber(CalcGrowthBegin(a, candidate.nominal), 4) + " s";
+  return fault;
+}
+
 }  // namespace
+
+double CalcGrowthBegin(const VectorXd& a, double end) {
+  const Index size = a.size() / 2;
+  return end - a.head(size).dot(a.tail(size)) / a.head(size).squaredNorm();
+}
 
 Fault MakeForceFault(const Candidate& candidate, const VectorXd& a, const VectorXd& error,
                      const Vector3d& gravity) {
+  if (candidate.fault.ends_with(kGrows)) return MakeGrowing(candidate, a, error);
   Fault fault{candidate.fault,          candidate.place,
               candidate.nominal + a[0], error.size() > 0 ? error[0] : 0.0,
               candidate.unit,           ""};
@@ -54,10 +84,13 @@ Fault MakeForceFault(const Candidate& candidate, const VectorXd& a, const Vector
   if (candidate.fault == kForceInAxes || candidate.fault == kMomentInAxes) {
     fault.fault = candidate.fault == kForceInAxes ? kForce : "moment";
     fault.detail += " in its axes";
+  } else if (candidate.fault == kCenterAlone) {
+    fault.fault = kCenter;
   } else if (candidate.fault == kMassWithInertia) {
     fault.fault = "mass";
     fault.detail = "and its inertia by the same factor";
   }
+  if (candidate.nominal == 0.0) RequireSize(&fault);
   if (candidate.fault != kGravity) return fault;
   const Vector3d change = a;
   if (std::abs(change.dot(gravity.normalized())) < kTilted * change.norm()) {
@@ -71,40 +104,73 @@ Fault MakeForceFault(const Candidate& candidate, const VectorXd& a, const Vector
   return fault;
 }
 
-void FindSegments(const StepStore& store, StepForces* forces, double level, Segment* whole,
-                  std::vector<Segment>* parts) {
-  struct Step {
-    Index index;
-    bool follows;
-    double robot, object;  // by how much each differs from the step before
-  };
-  std::vector<Step> steps;
-  VectorXd before;
-  forces->SetLevel(Vector2d::Constant(level));
+namespace {
+
+/// A step that differs.
+struct DifferingStep {
+  Index index;
+  bool follows;             // the one before
+  double jump[2], bend[2];  // first and second difference of the robot's and the object's residual
+};
+
+/// Of each step's rows, the root mean square of the robot's and of the object's.
+void CalcSizes(const VectorXd& y, double (&sizes)[2]) {
+  const Index n = y.size() - 6;
+  sizes[0] = y.head(n).norm() / std::sqrt(static_cast<double>(n));
+  sizes[1] = y.tail<6>().norm() / std::sqrt(6.0);
+}
+
+std::vector<DifferingStep> ListDiffering(const StepStore& store, StepForces* forces) {
+  std::vector<DifferingStep> steps;
+  VectorXd before, before_that;
   for (Index i = 0; i < store.size(); ++i) {
     if (!(store.Get(StepStore::kNoise)(0, i) > 0.0)) continue;
     forces->SetStep(i);
     const VectorXd y = forces->CalcResidual();
-    const Index n = y.size() - 6;
     if (forces->Differs(y)) {
       const bool follows = !steps.empty() && steps.back().index == i - 1;
-      steps.push_back({i, follows, 0.0, 0.0});
-      if (follows) {
-        steps.back().robot = (y - before).head(n).norm() / std::sqrt(static_cast<double>(n));
-        steps.back().object = (y - before).tail<6>().norm() / std::sqrt(6.0);
-      }
+      const bool both_follow = follows && steps.back().follows;
+      steps.push_back({i, follows, {}, {}});
+      if (follows) CalcSizes(y - before, steps.back().jump);
+      if (both_follow) CalcSizes(y - 2.0 * before + before_that, steps.back().bend);
     }
-    before = y;
+    before_that = std::exchange(before, y);
   }
-  const auto jumps = [&](size_t k, double Step::*size) {
-    double around = k > 0 ? steps[k - 1].*size : 0.0;
-    if (k + 1 < steps.size()) around = std::max(around, steps[k + 1].*size);
-    return steps[k].*size > std::max(kJumpNoise, kJump * around);
-  };
+  return steps;
+}
+
+/// Whether something begins or ends at step k, which its neighbours do not have.
+bool StandsOut(const std::vector<DifferingStep>& steps, size_t k, double (DifferingStep::*sizes)[2],
+               std::initializer_list<std::ptrdiff_t> neighbours) {
+  for (const int side : {0, 1}) {
+    double around = 0.0;
+    for (const std::ptrdiff_t by : neighbours) {
+      const std::ptrdiff_t other = static_cast<std::ptrdiff_t>(k) + by;
+      if (other >= 0 && other < static_cast<std::ptrdiff_t>(steps.size()))
+        around = std::max(around, (steps[static_cast<size_t>(other)].*sizes)[side]);
+    }
+    if ((steps[k].*sizes)[side] > std::max(kJumpNoise, kJump * around)) return true;
+  }
+  return false;
+}
+
+}  // namespace
+
+void FindSegments(const StepStore& store, StepForces* forces, double level, Segment* whole,
+                  std::vector<Segment>* parts, std::vector<Segment>* bent) {
+  forces->SetLevel(Vector2d::Constant(level));
+  const std::vector<DifferingStep> steps = ListDiffering(store, forces);
+  bool was_bent = false;
   for (size_t k = 0; k < steps.size(); ++k) {
-    if (!steps[k].follows || jumps(k, &Step::robot) || jumps(k, &Step::object)) parts->emplace_back();
+    const bool jumps = !steps[k].follows || StandsOut(steps, k, &DifferingStep::jump, {-1, 1});
+    // What begins to grow between two steps bends both.
+    const bool bends = !was_bent && StandsOut(steps, k, &DifferingStep::bend, {-2, -1, 2, 3});
+    was_bent = jumps || bends;
+    if (jumps) parts->emplace_back();
+    if (was_bent) bent->emplace_back();
     whole->push_back(steps[k].index);
     parts->back().push_back(steps[k].index);
+    bent->back().push_back(steps[k].index);
   }
 }
 

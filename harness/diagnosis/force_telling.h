@@ -9,6 +9,9 @@
 
 namespace dexcheck {
 
+/// When a push was nothing, s. @param a what it grows by a second, and its size at time `end`.
+double CalcGrowthBegin(const VectorXd& a, double end);
+
 /// @param a its amplitudes. @param error their standard errors; empty for none. @param gravity the model's.
 Fault MakeForceFault(const Candidate& candidate, const VectorXd& a, const VectorXd& error,
                      const Vector3d& gravity);
@@ -16,9 +19,9 @@ Fault MakeForceFault(const Candidate& candidate, const VectorXd& a, const Vector
 /// Steps of a store that differ.
 using Segment = std::vector<Eigen::Index>;
 
-/// All steps that differ, and the same in parts that begin or end with a jump. @param level of the noise, in
-/// bounds of the checks.
+/// All steps that differ, the same in parts that begin or end with a jump, and in those that begin or end
+/// with a jump or a bend. @param level of the noise, in bounds of the checks.
 void FindSegments(const StepStore& store, StepForces* forces, double level, Segment* whole,
-                  std::vector<Segment>* parts);
+                  std::vector<Segment>* parts, std::vector<Segment>* bent);
 
 }  // namespace dexcheck

@@ -77,7 +77,9 @@ class ShapeList {
   void AddLimits() {
     const std::string& unit = series_.name.unit;
     const double most = got_.abs().maxCoeff();
-    if (most > 0.0 && most < u_.abs().maxCoeff()) Add("limit", unit, most, false);
+    // Where a joint is has no largest size: encoders count on.
+    const bool has_limit = series_.name.group != "joint positions";
+    if (has_limit && most > 0.0 && most < u_.abs().maxCoeff()) Add("limit", unit, most, false);
     if (series_.name.group != "motors") return;
     // Outside of a dead zone |u| - |g| is its half width.
     std::vector<double> less;
@@ -150,16 +152,18 @@ class ShapeList {
  private:
   /// Of what has only one value: of any step that is large enough and divides it, the largest.
   void AddOneStep() {
-    constexpr double kCoarsest = 0.05;  // rad or m, of an encoder: 1/128 of a turn
+    constexpr double kCoarsest = 2.0 * kPi / 1024.0;  // rad or m, of the coarsest encoders of robots' joints
     const double least = 2.0 * (got_ - u_).abs().maxCoeff();
     if (std::abs(got_[0]) < least || (series_.name.group == "joint positions" && least > kCoarsest)) return;
     Add("rounding to steps of", series_.name.unit, std::abs(got_[0]), false);
   }
 
   [[nodiscard]] int CountChanges(const SignalShape& shape) const {
+    // The past of the first steps is not known, and only what is late needs it.
+    const bool is_late = shape.fault == "delay";
     const auto differs = [&](Index begin, Index end) {
       for (Index i = begin; i < end; ++i)
-        if (series_.has_history[static_cast<size_t>(i)] &&
+        if ((!is_late || series_.has_history[static_cast<size_t>(i)]) &&
             std::abs(shape.output[i] - series_.got[i]) > series_.left * series_.noise)
           return 1;
       return 0;

@@ -21,8 +21,13 @@ inline constexpr const char* kForce = "force at its centre of mass";
 inline constexpr const char* kForceInAxes = "force at its centre of mass, in its axes";
 inline constexpr const char* kMomentInAxes = "moment, in its axes";
 inline constexpr const char* kMassWithInertia = "mass and inertia";
+inline constexpr const char* kCenter = "centre of mass off by";
+/// Where what it does to the inertia does not show.
+inline constexpr const char* kCenterAlone = "centre of mass off by, alone";
 inline constexpr const char* kGravity = "gravity off by";
 inline constexpr const char* kContact = "contact further along the normal by";
+/// What follows the name of a force, a moment or a torque that grows evenly in time.
+inline constexpr const char* kGrows = " that grows by";
 }  // namespace force_fault
 
 /// Residual and columns of one step. The robot's are whitened by

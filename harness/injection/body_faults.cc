@@ -168,6 +168,18 @@ InjectedFault Inertia(const FaultContext& context) {
   return fault;
 }
 
+/// A torque that grows evenly from a time on.
+InjectedFault GrowingTorque(const FaultContext& context) {
+  const Joint& joint = context.DrawJoint();
+  const double rate = DrawForce(context) / context.duration;
+  const double begin = context.draw->Uniform(0.0, 0.3 * context.duration);
+  InjectedFault fault = FaultAt("joint " + joint.name, "torque that grows by", rate, rate);
+  fault.forces = [=, name = joint.name](const mjModel& m, double t, mjData* d) {
+    PushJoint(m, FindId(m, mjOBJ_JOINT, name), rate * std::max(0.0, t - begin), d);
+  };
+  return fault;
+}
+
 /// A force, or moment, on a body from `begin` to `end`, s, in a drawn direction of the world.
 InjectedFault Push(const FaultContext& context, bool is_moment, double begin, double end) {
   const Body body = DrawBody(context);
@@ -193,6 +205,21 @@ InjectedFault ForceForAWhile(const FaultContext& context) {
 InjectedFault MomentForAWhile(const FaultContext& context) {
   const double begin = context.draw->Uniform(0.0, 0.5 * context.duration);
   return Push(context, true, begin, begin + 0.3 * context.duration);
+}
+
+/// As strong at the end of the run as others are.
+InjectedFault GrowingForce(const FaultContext& context) {
+  const Body body = DrawBody(context);
+  const double begin = context.draw->Uniform(0.0, 0.3 * context.duration);
+  const double rate =
+      context.draw->Positive(body.is_object ? 1e-3 : 1e-2, body.is_object ? 0.1 : 2.0) / context.duration;
+  const Vector3d growth = rate * context.draw->Direction();
+  InjectedFault fault = FaultAt(body.place, "force at its centre of mass that grows by", rate, rate);
+  fault.forces = [=, name = body.name](const mjModel& m, double t, mjData* d) {
+    Eigen::Map<Vector3d>(d->xfrc_applied + 6 * FindId(m, mjOBJ_BODY, name)) +=
+        std::max(0.0, t - begin) * growth;
+  };
+  return fault;
 }
 
 InjectedFault Tether(const FaultContext& context) {
@@ -236,6 +263,7 @@ constexpr FaultKind kKinds[] = {
     {kJoint, "spring", Spring},
     {kJoint, "torque", Torque},
     {kJoint, "hidden limit", HiddenLimit},
+    {kJoint, "growing torque", GrowingTorque},
     {kBody, "mass", Mass},
     {kBody, "centre of mass", CenterOfMass},
     {kBody, "inertia", Inertia, MovesObject},
@@ -243,6 +271,7 @@ constexpr FaultKind kKinds[] = {
     {kBody, "moment", Moment},
     {kBody, "force for a while", ForceForAWhile},
     {kBody, "moment for a while", MomentForAWhile},
+    {kBody, "growing force", GrowingForce},
     {kBody, "tether", Tether, HasObject},
     {kBody, "drag", Drag, MovesObject},
 };

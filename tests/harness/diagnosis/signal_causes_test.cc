@@ -288,11 +288,11 @@ TEST(SignalCauses, LimitOfARisingTorqueIsNotStuck) {
   EXPECT_THAT(NamesOf(causes.front()), ::testing::IsSupersetOf({"limit", "stuck at"}));
 }
 
-// 1/128 of a turn is coarser than any encoder.
+// Encoders of robots' joints have no less than 1024 counts a turn.
 TEST(SignalCauses, EncoderOfOneValueIsStuckWhereItsStepsWouldBeTooCoarse) {
   for (const bool is_far : {false, true}) {
     SCOPED_TRACE(is_far);
-    const ArrayXd u = 1.2 - (is_far ? 0.4 : 0.01) * CalcTime() / TimeOf(kSteps - 1);
+    const ArrayXd u = 1.2 - (is_far ? 0.02 : 0.002) * CalcTime() / TimeOf(kSteps - 1);
     SignalSeries series = MakeSeries(u, ArrayXd::Constant(kSteps, 1.2001));
     series.name = {"joint elbow", "position", "rad", "joint positions"};
     const Causes causes = Explain(series);
@@ -301,6 +301,31 @@ TEST(SignalCauses, EncoderOfOneValueIsStuckWhereItsStepsWouldBeTooCoarse) {
     EXPECT_EQ(causes.front().outcome, is_far ? CauseOutcome::kNamed : CauseOutcome::kNamedClass);
     EXPECT_NEAR(ValueOf(causes.front(), "stuck at"), 1.2001, 1e-9);
   }
+}
+
+// A reading that rests in one count, and has another value from a step on, may be stuck there or be off by so
+// much. That it was right before costs both a beginning, though the past of those steps is not known.
+TEST(SignalCauses, RestingReadingIsStuckOrOff) {
+  for (const Index first : {Index{8}, Index{40}}) {
+    const ArrayXd u = ArrayXd::Constant(kSteps, 0.5);
+    SignalSeries series = MakeSeries(u, u + MakeEach([&](Index i) { return i < first ? 0.0 : 2e-4; }));
+    series.name = {"joint elbow", "position", "rad", "joint positions"};
+    const Causes causes = Explain(series);
+    SCOPED_TRACE(TextOf(causes));
+    ASSERT_EQ(causes.size(), 1u);
+    EXPECT_EQ(causes.front().outcome, CauseOutcome::kNamedClass);
+    EXPECT_NEAR(ValueOf(causes.front(), "stuck at"), 0.5002, 1e-9);
+    EXPECT_NEAR(ValueOf(causes.front(), "offset"), 2e-4, 1e-9);
+    EXPECT_EQ(causes.front().from, CalcTime()[first]);
+  }
+}
+
+// Of a torque it is a limit as well.
+TEST(SignalCauses, PositionHasNoLimit) {
+  SignalSeries series = MakeSeries(CalcPositiveTorque(), ArrayXd::Constant(kSteps, 0.9));
+  EXPECT_THAT(NamesOf(Explain(series).front()), ::testing::Contains("limit"));
+  series.name = {"joint elbow", "position", "rad", "joint positions"};
+  EXPECT_THAT(NamesOf(Explain(series).front()), ::testing::ElementsAre("stuck at"));
 }
 
 // Remainders by Euclid's algorithm are rounded once more with each quotient.
