@@ -53,11 +53,9 @@ class Judge {
     result_.explained = 1.0 - squares / std::max(CalcSquares(before), std::numeric_limits<double>::min());
     result_.left = std::sqrt(squares / std::max(1.0, estimator_.rows().samples));
     const TorqueRows held = MakeTorqueRows(set_, estimator_.faults(), /*is_held=*/true);
-    const Index width = held.rows.cols() - 1;
-    VectorXd nothing = VectorXd::Zero(width);
+    VectorXd nothing = VectorXd::Zero(held.columns - 1);
     nothing.head(CountForced(set_)) = estimator_.CalcAmplitudes({}).head(CountForced(set_));
-    const VectorXd held_before = held.rows.col(width) - held.rows.leftCols(width) * nothing;
-    const VectorXd held_after = held.rows.col(width) - held.rows.leftCols(width) * amplitudes;
+    const VectorXd held_before = held.CalcLeft(nothing), held_after = held.CalcLeft(amplitudes);
     std::vector<size_t> first_fit, first_held;
     for (size_t recording = 0; recording < set_.size(); ++recording) {
       first_fit.push_back(MakeTraces(recording, *set_[recording].fit));
@@ -279,7 +277,7 @@ RecordingJudgement JudgeRecordings(const RobotModel& model, std::vector<Recordin
   const bool is_poor = !judgement.IsWhole() && (judgement.explained < kWell || judgement.causes.size() > 3);
   if (is_poor && options.tries_positions) fault = FindPositionFault(model, recordings->front());
   const auto undo = [&](Recording* one) {
-    if (fault) fault->undo(one);
+    if (fault) fault->Undo(one);
   };
   if (fault && Reopen(recordings, undo)) judgement = Judge(model, recordings, options, count).Run();
   JudgeOptions second = options;

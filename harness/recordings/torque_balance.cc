@@ -182,6 +182,7 @@ void TorqueBalance::Finish() {
   for (size_t place = 0; place < joints_.size(); ++place) {
     Flush(place);
     products_[place].triangularView<Eigen::StrictlyUpper>() = products_[place].transpose();
+    rows_.push_back(CalcRows(place));
   }
 }
 

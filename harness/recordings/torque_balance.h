@@ -75,7 +75,7 @@ class TorqueBalance {
   [[nodiscard]] const MatrixXd& products(size_t place) const { return products_[place]; }
   [[nodiscard]] double samples(size_t place) const { return counts_[place]; }
   /// Rows with the same products: a factor of those within blocks, then one of each block, sum / sqrt(count).
-  [[nodiscard]] MatrixXd CalcRows(size_t place) const;
+  [[nodiscard]] const MatrixXd& rows(size_t place) const { return rows_[place]; }
 
  private:
   static constexpr Eigen::Index kPart = 128;  // rows that are multiplied at once
@@ -87,6 +87,7 @@ class TorqueBalance {
   void FillRow(size_t place, const RecordedSample& sample, Eigen::Ref<VectorXd> row) const;
   void Flush(size_t place);
   void MergeBlocks();
+  [[nodiscard]] MatrixXd CalcRows(size_t place) const;
 
   const RobotModel* model_;
   TorqueRegressor regressor_;
@@ -95,7 +96,7 @@ class TorqueBalance {
   bool has_currents_;
   std::vector<std::vector<TorqueColumn>> columns_;
   std::vector<std::map<TorqueColumn, Eigen::Index>> places_;
-  std::vector<MatrixXd> products_;
+  std::vector<MatrixXd> products_, rows_;
   std::vector<MatrixXd> parts_;  // columns x kPart
   std::vector<Eigen::Index> used_;
   std::vector<double> counts_;

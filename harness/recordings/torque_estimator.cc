@@ -50,6 +50,31 @@ std::vector<std::pair<size_t, size_t>> FindWindows(const VectorXd& squares) {
   return windows;
 }
 
+/// An upper triangular R, without its rows of zeros, with R^T R = G, which may be singular: Cholesky's, in
+/// blocks, in which a column that adds nothing to those before it has no row.
+MatrixXd CalcFactor(const MatrixXd& G) {
+  constexpr Index kBlock = 48;
+  constexpr double kAddsNothing = 1e-14;
+  const Index n = G.cols();
+  MatrixXd R = MatrixXd::Zero(n, n);
+  Index rank = 0;
+  for (Index begin = 0; begin < n; begin += kBlock) {
+    const Index size = std::min(kBlock, n - begin), rest = n - begin, first = rank;
+    MatrixXd left = G.block(begin, begin, size, rest);
+    left.noalias() -= R.block(0, begin, first, size).transpose() * R.block(0, begin, first, rest);
+    for (Index i = 0; i < size; ++i) {
+      const Index at = begin + i;
+      VectorXd row = left.row(i).tail(rest - i).transpose();
+      row.noalias() -=
+          R.block(first, at, rank - first, rest - i).transpose() * R.block(first, at, rank - first, 1);
+      // y, the last, is kept whatever is left of it.
+      if (!(row[0] > (at + 1 < n ? kAddsNothing * G(at, at) : 0.0))) continue;
+      R.row(rank++).tail(rest - i) = row.transpose() / std::sqrt(row[0]);
+    }
+  }
+  return R.topRows(rank);
+}
+
 }  // namespace
 
 TorqueEstimator::TorqueEstimator(RecordingSet* recordings, size_t most_causes)
@@ -142,29 +167,24 @@ void TorqueEstimator::Weigh(const VectorXd& left) {
   }
 }
 
-void TorqueEstimator::Compress() {
-  const Index width = rows_.rows.cols();
-  if (rows_.rows.rows() < width) {
-    const Index missing = width - rows_.rows.rows();
-    rows_.rows.conservativeResize(width, Eigen::NoChange);
-    rows_.rows.bottomRows(missing).setZero();
-  }
-  const Eigen::HouseholderQR<MatrixXd> qr(rows_.rows);
-  R_ = qr.matrixQR().topRows(width).triangularView<Eigen::Upper>();
+void TorqueEstimator::Compress() { R_ = CalcFactor(rows_.CalcProducts()); }
+
+Index TorqueEstimator::CountForcedRows() const {
+  return (R_.leftCols(CountForced(*recordings_)).array() != 0.0).rowwise().any().count();
 }
 
 CauseSelection TorqueEstimator::SelectAmong(double alike) const {
   const Index width = R_.cols();
-  const Index forced = CountForced(*recordings_);
+  const Index begin = CountForcedRows(), rows = R_.rows() - begin;
   std::vector<Candidate> candidates;
-  Index at = forced;
+  Index at = CountForced(*recordings_);
   for (const TorqueFault& fault : faults_) {
     Candidate& one = candidates.emplace_back();
     one.fault = fault.fault;
     one.place = fault.place;
     one.unit = fault.unit;
     one.nominal = fault.nominal;
-    one.columns = R_.block(forced, at, width - forced, CountColumns(fault));
+    one.columns = R_.block(begin, at, rows, CountColumns(fault));
     if (barred_[candidates.size() - 1]) one.columns.setZero();
     one.scale = fault.scale;
     one.is_possible = fault.is_possible;
@@ -178,7 +198,7 @@ CauseSelection TorqueEstimator::SelectAmong(double alike) const {
   options.exchanges_pairs = false;
   options.rows = rows_.samples;
   options.alike = alike;
-  return SelectCauses(R_.col(width - 1).tail(width - forced), candidates, options);
+  return SelectCauses(R_.col(width - 1).tail(rows), candidates, options);
 }
 
 std::vector<Index> TorqueEstimator::ListFirstColumns() const {
@@ -198,16 +218,16 @@ VectorXd TorqueEstimator::CalcAmplitudes(const std::vector<CauseTerm>& terms) co
   for (const CauseTerm& term : terms)
     a.segment(first[term.candidate], term.amplitude.size()) = term.amplitude;
   const Index forced = CountForced(*recordings_);
+  const Index rows = CountForcedRows();
   const VectorXd right =
-      R_.col(width).head(forced) - R_.block(0, forced, forced, width - forced) * a.tail(width - forced);
-  if (forced > 0)
-    a.head(forced) = R_.topLeftCorner(forced, forced).completeOrthogonalDecomposition().solve(right);
+      R_.col(width).head(rows) - R_.block(0, forced, rows, width - forced) * a.tail(width - forced);
+  if (rows > 0)
+    a.head(forced) = R_.topLeftCorner(rows, forced).completeOrthogonalDecomposition().solve(right);
   return a;
 }
 
 VectorXd TorqueEstimator::CalcLeft(const std::vector<CauseTerm>& terms) const {
-  const Index width = rows_.rows.cols() - 1;
-  return rows_.rows.col(width) - rows_.rows.leftCols(width) * CalcAmplitudes(terms);
+  return rows_.CalcLeft(CalcAmplitudes(terms));
 }
 
 bool TorqueEstimator::BarSecondPushes() {
@@ -260,12 +280,14 @@ VectorXd TorqueEstimator::CalcUsual() const {
                           kind == TorqueFault::kOffset;
     if (is_usual) columns.push_back(first[i]);
   }
-  const Index y = rows_.rows.cols() - 1;
+  const Index y = R_.cols() - 1;
   constexpr double kIndependent = 1e-6;
   Eigen::ColPivHouseholderQR<MatrixXd> qr;
   qr.setThreshold(kIndependent);
   qr.compute(MatrixXd(R_(Eigen::all, columns)));
-  return rows_.rows.col(y) - rows_.rows(Eigen::all, columns) * qr.solve(R_.col(y));
+  VectorXd a = VectorXd::Zero(y);
+  a(columns) = qr.solve(R_.col(y));
+  return rows_.CalcLeft(a);
 }
 
 double TorqueEstimator::CalcAlike(const VectorXd& left) const {

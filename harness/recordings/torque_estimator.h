@@ -39,6 +39,8 @@ class TorqueEstimator {
   void Weigh(const VectorXd& left);
   /// As many rows as there are independent ones.
   void Compress();
+  /// Of these, those that columns which are part of every explanation have.
+  [[nodiscard]] Eigen::Index CountForcedRows() const;
   [[nodiscard]] CauseSelection SelectAmong(double alike) const;
   [[nodiscard]] std::vector<Eigen::Index> ListFirstColumns() const;
   /// One stretch of time has one push: others would share its force.
@@ -59,7 +61,7 @@ class TorqueEstimator {
   std::vector<TorqueFault> faults_;
   std::vector<bool> barred_;  // of these
   TorqueRows rows_;
-  MatrixXd R_;  // of rows_
+  MatrixXd R_;  // with the products of rows_
   CauseSelection selection_;
 };
 
