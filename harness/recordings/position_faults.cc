@@ -44,7 +44,7 @@ class Begin {
     for (size_t i = 0; i < samples_.size(); i += every) {
       RecordedSample sample = samples_[i];
       undone.Undo(&sample);
-      regressor_.SetMotion(sample.q, sample.qd, sample.qdd);
+      regressor_.SetMotion(sample.q, sample.qd, sample.qdd, sample.base);
       regressor_.CalcTorques(torques_);
       for (size_t place = 0; place < joints_.size(); ++place) {
         const int joint = joints_[place];

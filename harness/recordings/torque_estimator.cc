@@ -270,24 +270,38 @@ bool TorqueEstimator::BarWeakBodies() {
   return has_any;
 }
 
-VectorXd TorqueEstimator::CalcUsual() const {
+VectorXd TorqueEstimator::Fit(const std::vector<TorqueFault::Kind>& kinds, Index* rank) const {
   const std::vector<Index> first = ListFirstColumns();
   std::vector<Index> columns;
   for (Index i = 0; i < CountForced(*recordings_); ++i) columns.push_back(i);
   for (size_t i = 0; i < faults_.size(); ++i) {
-    const TorqueFault::Kind kind = faults_[i].kind;
-    const bool is_usual = kind == TorqueFault::kDryFriction || kind == TorqueFault::kViscousFriction ||
-                          kind == TorqueFault::kOffset;
-    if (is_usual) columns.push_back(first[i]);
+    // Of friction's shapes the simplest.
+    const bool is_simple = faults_[i].parameters == 0;
+    if (!is_simple || std::find(kinds.begin(), kinds.end(), faults_[i].kind) == kinds.end()) continue;
+    for (Index k = 0; k < CountColumns(faults_[i]); ++k) columns.push_back(first[i] + k);
   }
   const Index y = R_.cols() - 1;
+  const MatrixXd C = R_(Eigen::all, columns);
+  const VectorXd size = C.colwise().norm().cwiseMax(std::numeric_limits<double>::min());
   constexpr double kIndependent = 1e-6;
   Eigen::ColPivHouseholderQR<MatrixXd> qr;
   qr.setThreshold(kIndependent);
-  qr.compute(MatrixXd(R_(Eigen::all, columns)));
+  qr.compute(C * size.cwiseInverse().asDiagonal());
+  *rank = qr.rank();
   VectorXd a = VectorXd::Zero(y);
-  a(columns) = qr.solve(R_.col(y));
-  return rows_.CalcLeft(a);
+  a(columns) = qr.solve(R_.col(y)).cwiseQuotient(size);
+  return a;
+}
+
+VectorXd TorqueEstimator::FitPlainly(Index* rank) const {
+  using enum TorqueFault::Kind;
+  return Fit({kMass, kCentre, kInertia, kDryFriction, kViscousFriction, kOffset, kArmature}, rank);
+}
+
+VectorXd TorqueEstimator::CalcUsual() const {
+  Index rank = 0;
+  return rows_.CalcLeft(
+      Fit({TorqueFault::kDryFriction, TorqueFault::kViscousFriction, TorqueFault::kOffset}, &rank));
 }
 
 double TorqueEstimator::CalcAlike(const VectorXd& left) const {

@@ -26,6 +26,9 @@ class TorqueEstimator {
   [[nodiscard]] const TorqueRows& rows() const { return rows_; }
   /// Amplitudes of all columns under these terms; those that are part of every explanation follow from them.
   [[nodiscard]] VectorXd CalcAmplitudes(const std::vector<CauseTerm>& terms) const;
+  /// Amplitudes of a plain least-squares fit of all bodies' numbers, friction, offsets and armatures.
+  /// @param rank how many of them the motion tells.
+  [[nodiscard]] VectorXd FitPlainly(Eigen::Index* rank) const;
   /// What these terms leave, by row.
   [[nodiscard]] VectorXd CalcLeft(const std::vector<CauseTerm>& terms) const;
 
@@ -49,6 +52,8 @@ class TorqueEstimator {
   /// explain much: drives have friction of more shapes than are tried, and a wrong mass fits a little of any.
   /// @return whether there are others to be chosen.
   bool BarWeakBodies();
+  /// Amplitudes of a least-squares fit of drives' gains and faults of these kinds.
+  [[nodiscard]] VectorXd Fit(const std::vector<TorqueFault::Kind>& kinds, Eigen::Index* rank) const;
   /// What drives' gains, friction and offsets leave, which no robot is without.
   [[nodiscard]] VectorXd CalcUsual() const;
   /// How many samples say the same, by how alike blocks are that follow one another.
