@@ -50,6 +50,12 @@ std::vector<std::pair<size_t, size_t>> FindWindows(const VectorXd& squares) {
   return windows;
 }
 
+/// Whether an amplitude of plausible size leaves more than rounding. @param size of its column, by the noise.
+bool Shows(const TorqueFault& fault, Index k, double size) {
+  constexpr double kRounding = 1e-3;
+  return size * (fault.scale.size() > 0 ? fault.scale[k] : 1.0) > kRounding;
+}
+
 /// An upper triangular R, without its rows of zeros, with R^T R = G, which may be singular: Cholesky's, in
 /// blocks, in which a column that adds nothing to those before it has no row.
 MatrixXd CalcFactor(const MatrixXd& G) {
@@ -270,15 +276,17 @@ bool TorqueEstimator::BarWeakBodies() {
   return has_any;
 }
 
-VectorXd TorqueEstimator::Fit(const std::vector<TorqueFault::Kind>& kinds, Index* rank) const {
+VectorXd TorqueEstimator::Fit(const std::vector<TorqueFault::Kind>& kinds, bool has_shapes,
+                              Index* rank) const {
   const std::vector<Index> first = ListFirstColumns();
   std::vector<Index> columns;
   for (Index i = 0; i < CountForced(*recordings_); ++i) columns.push_back(i);
   for (size_t i = 0; i < faults_.size(); ++i) {
-    // Of friction's shapes the simplest.
-    const bool is_simple = faults_[i].parameters == 0;
-    if (!is_simple || std::find(kinds.begin(), kinds.end(), faults_[i].kind) == kinds.end()) continue;
-    for (Index k = 0; k < CountColumns(faults_[i]); ++k) columns.push_back(first[i] + k);
+    const bool is_shape = faults_[i].parameters > 0;
+    if ((is_shape && !has_shapes) || std::find(kinds.begin(), kinds.end(), faults_[i].kind) == kinds.end())
+      continue;
+    for (Index k = 0; k < CountColumns(faults_[i]); ++k)
+      if (Shows(faults_[i], k, R_.col(first[i] + k).norm())) columns.push_back(first[i] + k);
   }
   const Index y = R_.cols() - 1;
   const MatrixXd C = R_(Eigen::all, columns);
@@ -295,13 +303,13 @@ VectorXd TorqueEstimator::Fit(const std::vector<TorqueFault::Kind>& kinds, Index
 
 VectorXd TorqueEstimator::FitPlainly(Index* rank) const {
   using enum TorqueFault::Kind;
-  return Fit({kMass, kCentre, kInertia, kDryFriction, kViscousFriction, kOffset, kArmature}, rank);
+  return Fit({kMass, kCentre, kInertia, kDryFriction, kViscousFriction, kOffset, kArmature}, false, rank);
 }
 
 VectorXd TorqueEstimator::CalcUsual() const {
   Index rank = 0;
   return rows_.CalcLeft(
-      Fit({TorqueFault::kDryFriction, TorqueFault::kViscousFriction, TorqueFault::kOffset}, &rank));
+      Fit({TorqueFault::kDryFriction, TorqueFault::kViscousFriction, TorqueFault::kOffset}, true, &rank));
 }
 
 double TorqueEstimator::CalcAlike(const VectorXd& left) const {

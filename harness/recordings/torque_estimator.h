@@ -52,8 +52,10 @@ class TorqueEstimator {
   /// explain much: drives have friction of more shapes than are tried, and a wrong mass fits a little of any.
   /// @return whether there are others to be chosen.
   bool BarWeakBodies();
-  /// Amplitudes of a least-squares fit of drives' gains and faults of these kinds.
-  [[nodiscard]] VectorXd Fit(const std::vector<TorqueFault::Kind>& kinds, Eigen::Index* rank) const;
+  /// Amplitudes of a least-squares fit of drives' gains and faults of these kinds, friction in all its shapes
+  /// or in the simplest.
+  [[nodiscard]] VectorXd Fit(const std::vector<TorqueFault::Kind>& kinds, bool has_shapes,
+                             Eigen::Index* rank) const;
   /// What drives' gains, friction and offsets leave, which no robot is without.
   [[nodiscard]] VectorXd CalcUsual() const;
   /// How many samples say the same, by how alike blocks are that follow one another.

@@ -132,7 +132,12 @@ TEST(Judge, StribeckFrictionIsNamed) {
     const double v = data->qvel[1];
     data->qfrc_applied[1] -= kFriction * std::exp(-v * v / (kVelocity * kVelocity)) * std::tanh(v / 0.02);
   }};
-  const RecordingJudgement judgement = Judge(Record({stribeck}, /*has_velocities=*/true));
+  std::mt19937 random(3);
+  RecordingOptions options;
+  options.has_velocities = true;
+  options.encoder_bits = 16;
+  options.torque_noise = options.velocity_noise = 1e-3;
+  const RecordingJudgement judgement = Judge(RecordRobot(kMjcf, {stribeck}, options, &random));
   ASSERT_FALSE(judgement.causes.empty())
       << judgement.balances[1].residual << " " << judgement.balances[1].noise << Tell(judgement);
   const Fault& first = judgement.causes[0].faults[0];
@@ -347,7 +352,9 @@ TEST(JudgeCampaign, NamesDrawnFaults) {
   const char* several = std::getenv("DEXCHECK_TOGETHER");
   const int together = several == nullptr ? 1 : std::atoi(several);
   std::mt19937 random(7);
-  int counts[4] = {};
+  int counts[4] = {}, worse = 0;
+  double logs = 0.0;
+  long numbers = 0, all_numbers = 0;
   for (int i = 0; i < draws; ++i) {
     std::vector<RecordedFault> faults = {DrawRecordedFault(kMjcf, i % CountRecordedFaultKinds(), &random)};
     while (static_cast<int>(faults.size()) < together) {
@@ -359,6 +366,11 @@ TEST(JudgeCampaign, NamesDrawnFaults) {
     const RecordingJudgement judgement = Judge(RecordRobot(kMjcf, faults, options, &random));
     const Score score = ScoreOf(judgement, faults);
     ++counts[static_cast<int>(score)];
+    const double ratio = judgement.by_causes.held_left / judgement.by_all.held_left;
+    logs += std::log(ratio);
+    worse += ratio > 1.05 ? 1 : 0;
+    numbers += judgement.by_causes.numbers;
+    all_numbers += judgement.by_all.numbers;
     constexpr const char* kNames[] = {"named", "class", "missed", "WRONG"};
     if (score != Score::kNamed || asked != nullptr)
       std::cout << i << " " << kNames[static_cast<int>(score)] << ":";
@@ -369,7 +381,9 @@ TEST(JudgeCampaign, NamesDrawnFaults) {
     }
   }
   std::cout << "named " << counts[0] << " class " << counts[1] << " missed " << counts[2] << " wrong "
-            << counts[3] << "\n";
+            << counts[3] << "\nheld out, left by the causes' numbers (" << numbers / draws
+            << " on average) over that of all (" << all_numbers / draws << "): " << std::exp(logs / draws)
+            << ", more than 1.05 in " << worse << "\n";
   EXPECT_GE(counts[0] + counts[1], 9 * draws / 10);
   EXPECT_LE(counts[3], draws / 50);
 }
