@@ -50,10 +50,9 @@ std::vector<std::pair<size_t, size_t>> FindWindows(const VectorXd& squares) {
   return windows;
 }
 
-/// Whether an amplitude of plausible size leaves more than rounding. @param size of its column, by the noise.
-bool Shows(const TorqueFault& fault, Index k, double size) {
-  constexpr double kRounding = 1e-3;
-  return size * (fault.scale.size() > 0 ? fault.scale[k] : 1.0) > kRounding;
+/// How large a fault's amplitude may plausibly be.
+double CalcPlausible(const TorqueFault& fault, Index k) {
+  return fault.scale.size() > 0 ? fault.scale[k] : std::max(1.0, std::abs(fault.nominal));
 }
 
 /// An upper triangular R, without its rows of zeros, with R^T R = G, which may be singular: Cholesky's, in
@@ -276,40 +275,47 @@ bool TorqueEstimator::BarWeakBodies() {
   return has_any;
 }
 
-VectorXd TorqueEstimator::Fit(const std::vector<TorqueFault::Kind>& kinds, bool has_shapes,
-                              Index* rank) const {
+VectorXd TorqueEstimator::Fit(const std::vector<TorqueFault::Kind>& kinds, bool is_plain, Index* rank) const {
   const std::vector<Index> first = ListFirstColumns();
   std::vector<Index> columns;
-  for (Index i = 0; i < CountForced(*recordings_); ++i) columns.push_back(i);
+  std::vector<double> plausible;
+  for (Index i = 0; i < CountForced(*recordings_); ++i) columns.push_back(i), plausible.push_back(1.0);
   for (size_t i = 0; i < faults_.size(); ++i) {
     const bool is_shape = faults_[i].parameters > 0;
-    if ((is_shape && !has_shapes) || std::find(kinds.begin(), kinds.end(), faults_[i].kind) == kinds.end())
+    if ((is_shape && is_plain) || std::find(kinds.begin(), kinds.end(), faults_[i].kind) == kinds.end())
       continue;
     for (Index k = 0; k < CountColumns(faults_[i]); ++k)
-      if (Shows(faults_[i], k, R_.col(first[i] + k).norm())) columns.push_back(first[i] + k);
+      columns.push_back(first[i] + k), plausible.push_back(CalcPlausible(faults_[i], k));
   }
-  const Index y = R_.cols() - 1;
-  const MatrixXd C = R_(Eigen::all, columns);
-  const VectorXd size = C.colwise().norm().cwiseMax(std::numeric_limits<double>::min());
+  const Index y = R_.cols() - 1, width = static_cast<Index>(columns.size());
+  MatrixXd C = R_(Eigen::all, columns) * Eigen::Map<const VectorXd>(plausible.data(), width).asDiagonal();
   constexpr double kIndependent = 1e-6;
   Eigen::ColPivHouseholderQR<MatrixXd> qr;
   qr.setThreshold(kIndependent);
-  qr.compute(C * size.cwiseInverse().asDiagonal());
-  *rank = qr.rank();
+  *rank = qr.compute(C).rank();
+  VectorXd right = R_.col(y);
+  if (is_plain) {
+    // What the motion hardly tells stays of plausible size.
+    C.conservativeResize(C.rows() + width, Eigen::NoChange);
+    C.bottomRows(width).setIdentity();
+    right.conservativeResize(C.rows());
+    right.tail(width).setZero();
+    qr.compute(C);
+  }
   VectorXd a = VectorXd::Zero(y);
-  a(columns) = qr.solve(R_.col(y)).cwiseQuotient(size);
+  a(columns) = qr.solve(right).cwiseProduct(Eigen::Map<const VectorXd>(plausible.data(), width));
   return a;
 }
 
 VectorXd TorqueEstimator::FitPlainly(Index* rank) const {
   using enum TorqueFault::Kind;
-  return Fit({kMass, kCentre, kInertia, kDryFriction, kViscousFriction, kOffset, kArmature}, false, rank);
+  return Fit({kMass, kCentre, kInertia, kDryFriction, kViscousFriction, kOffset, kArmature}, true, rank);
 }
 
 VectorXd TorqueEstimator::CalcUsual() const {
   Index rank = 0;
   return rows_.CalcLeft(
-      Fit({TorqueFault::kDryFriction, TorqueFault::kViscousFriction, TorqueFault::kOffset}, true, &rank));
+      Fit({TorqueFault::kDryFriction, TorqueFault::kViscousFriction, TorqueFault::kOffset}, false, &rank));
 }
 
 double TorqueEstimator::CalcAlike(const VectorXd& left) const {

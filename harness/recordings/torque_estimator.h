@@ -52,9 +52,9 @@ class TorqueEstimator {
   /// explain much: drives have friction of more shapes than are tried, and a wrong mass fits a little of any.
   /// @return whether there are others to be chosen.
   bool BarWeakBodies();
-  /// Amplitudes of a least-squares fit of drives' gains and faults of these kinds, friction in all its shapes
-  /// or in the simplest.
-  [[nodiscard]] VectorXd Fit(const std::vector<TorqueFault::Kind>& kinds, bool has_shapes,
+  /// Amplitudes of a least-squares fit of drives' gains and faults of these kinds, friction in all its
+  /// shapes; a plain one has the simplest only, and plausible sizes as a prior.
+  [[nodiscard]] VectorXd Fit(const std::vector<TorqueFault::Kind>& kinds, bool is_plain,
                              Eigen::Index* rank) const;
   /// What drives' gains, friction and offsets leave, which no robot is without.
   [[nodiscard]] VectorXd CalcUsual() const;
