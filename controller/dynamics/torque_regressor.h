@@ -45,6 +45,9 @@ class TorqueRegressor {
   /// What balances a force (world axes) at a link's centre of mass and a moment on it: J^T, n x 6.
   void CalcForceColumns(int link, Eigen::Ref<MatrixXd> columns) const;
 
+  /// Axes of a link's frame at that motion, in world axes.
+  [[nodiscard]] const Matrix3d& GetRotation(int link) const { return links_[static_cast<size_t>(link)].R; }
+
   [[nodiscard]] const RobotModel& model() const { return *model_; }
   [[nodiscard]] int size() const { return model_->num_joints(); }
   static BodyVector Pack(const MassProperties& body);

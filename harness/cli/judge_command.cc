@@ -69,6 +69,15 @@ void Print(const JudgeRequest& request, const RobotModel& model, const Recording
     int number = 0;
     for (const Explanation& one : judgement.causes)
       fmt::print("{}\n", Wrap(fmt::format("  {:2}  {}", ++number, one.Tell()), 6));
+    const auto tell = [](const HeldPrediction& one) {
+      return fmt::format("{} number{} {:.3g} times the noise", one.numbers,
+                         one.numbers == 1 ? " leaves" : "s leave", one.held_left);
+    };
+    fmt::print("{}\n",
+               Wrap(fmt::format("held out: the causes' {}; least squares of all that the motion tells "
+                                "of bodies, friction, offsets and armatures: {}",
+                                tell(judgement.by_causes), tell(judgement.by_all)),
+                    2));
     fmt::print("\n");
   }
   const std::string& name =
@@ -89,15 +98,7 @@ void Print(const JudgeRequest& request, const RobotModel& model, const Recording
   }
 }
 
-Json ToJson(const Fault& fault) {
-  Json json = {{"fault", fault.fault},
-               {"place", fault.place},
-               {"value", fault.value},
-               {"error", fault.error},
-               {"unit", fault.unit}};
-  if (!fault.detail.empty()) json["detail"] = fault.detail;
-  return json;
-}
+Json ToJson(const HeldPrediction& one) { return {{"numbers", one.numbers}, {"left", one.held_left}}; }
 
 std::string ToText(const RobotModel& model, const RecordingJudgement& judgement,
                    const std::vector<Recording>& recordings) {
@@ -108,7 +109,8 @@ std::string ToText(const RobotModel& model, const RecordingJudgement& judgement,
                {"rows", judgement.rows},
                {"explained", judgement.explained},
                {"left", judgement.left},
-               {"rest_is_noise", judgement.IsWhole()}};
+               {"rest_is_noise", judgement.IsWhole()},
+               {"held_out", {{"causes", ToJson(judgement.by_causes)}, {"all", ToJson(judgement.by_all)}}}};
   json["recordings"] = Json::array();
   for (const Recording& one : recordings) json["recordings"].push_back(one.name);
   json["joints"] = Json::array();
@@ -125,18 +127,7 @@ std::string ToText(const RobotModel& model, const RecordingJudgement& judgement,
     if (one.drive_gain != 0.0) json["joints"].back()["drive_gain"] = one.drive_gain;
   }
   json["causes"] = Json::array();
-  for (const Explanation& one : judgement.causes) {
-    Json cause = {{"text", one.Tell()},
-                  {"outcome", one.outcome == CauseOutcome::kNamed        ? "named"
-                              : one.outcome == CauseOutcome::kNamedClass ? "class"
-                                                                         : "not explained"},
-                  {"fraction", one.fraction}};
-    if (!one.rival.empty()) cause["rival"] = one.rival, cause["log_odds"] = one.log_odds;
-    if (std::isfinite(one.from)) cause["from"] = one.from, cause["to"] = one.to;
-    cause["faults"] = Json::array();
-    for (const Fault& fault : one.faults) cause["faults"].push_back(ToJson(fault));
-    json["causes"].push_back(cause);
-  }
+  for (const Explanation& one : judgement.causes) json["causes"].push_back(dexcheck::ToJson(one));
   json["notes"] = judgement.notes;
   return json.dump(2) + "\n";
 }
@@ -232,8 +223,8 @@ Json ToJson(const RobotModel& model, const RecordingPair& pair, const RecordingC
   json["causes"] = Json::array();
   for (const CauseDifference& one : comparison.causes) {
     Json cause = {{"text", one.Tell()}};
-    if (one.first) cause["first"] = ToJson(*one.first);
-    if (one.second) cause["second"] = ToJson(*one.second);
+    if (one.first) cause["first"] = dexcheck::ToJson(*one.first);
+    if (one.second) cause["second"] = dexcheck::ToJson(*one.second);
     json["causes"].push_back(cause);
   }
   return json;

@@ -123,29 +123,24 @@ class Search {
   }
 
   /// Orthonormal columns of the range of what these candidates have.
-  [[nodiscard]] MatrixXd CalcRange(const std::vector<size_t>& set) const {
-    Index width = 0;
-    for (const size_t i : set) width += visible_[i].columns.cols();
-    MatrixXd Q(y_.size(), width);
+  [[nodiscard]] MatrixXd CalcRange(const std::vector<size_t>& set) const { return CalcRange(Collect(set)); }
+  static MatrixXd CalcRange(const MatrixXd& C) {
+    MatrixXd Q(C.rows(), C.cols());
     Index used = 0;
-    for (const size_t i : set) {
-      const MatrixXd& C = visible_[i].columns;
-      for (Index k = 0; k < C.cols(); ++k) {
-        VectorXd column = C.col(k);
-        const double size = column.norm();
-        for (int twice = 0; twice < 2; ++twice)
-          column -= Q.leftCols(used) * (Q.leftCols(used).transpose() * column);
-        if (!(column.norm() > kIndependent * size)) continue;
-        Q.col(used++) = column.normalized();
-      }
+    for (Index k = 0; k < C.cols(); ++k) {
+      VectorXd column = C.col(k);
+      const double size = column.norm();
+      for (int twice = 0; twice < 2; ++twice)
+        column -= Q.leftCols(used) * (Q.leftCols(used).transpose() * column);
+      if (!(column.norm() > kIndependent * size)) continue;
+      Q.col(used++) = column.normalized();
     }
     return Q.leftCols(used);
   }
 
-  /// Whether those have all of what it has.
-  [[nodiscard]] bool AddsNothing(size_t candidate, const std::vector<size_t>& beside) const {
-    const MatrixXd& C = visible_[candidate].columns;
-    const MatrixXd Q = CalcRange(beside);
+  /// Whether others have all of what these columns have.
+  static bool AddsNothing(const MatrixXd& C, const MatrixXd& others) {
+    const MatrixXd Q = CalcRange(others);
     const MatrixXd own = C - Q * (Q.transpose() * C);
     return (own.colwise().norm().array() <= kIndependent * C.colwise().norm().array()).all();
   }
@@ -203,12 +198,21 @@ class Search {
       return !candidates_[i].is_possible && candidates_[i].scale.size() == 0;
     };
     if (std::all_of(set.begin(), set.end(), is_free)) return true;
+    // In the range of all their columns and y, which has few dimensions, all is as it is.
+    MatrixXd C = Reduce(Collect(set));
+    Index at = 0;
     for (const size_t other : beside) {
-      std::vector<size_t> rest = set;
-      rest.erase(std::find(rest.begin(), rest.end(), other));
-      if (AddsNothing(other, rest)) set = rest;
+      const Index own = visible_[other].columns.cols();
+      MatrixXd rest(C.rows(), C.cols() - own);
+      rest << C.leftCols(at), C.rightCols(C.cols() - at - own);
+      if (AddsNothing(C.middleCols(at, own), rest.leftCols(rest.cols() - 1))) {
+        C = rest;
+        set.erase(std::find(set.begin(), set.end(), other));
+      } else {
+        at += own;
+      }
     }
-    const VectorXd a = Solve(Collect(set));
+    const VectorXd a = Solve(C.leftCols(C.cols() - 1), C.rightCols(1));
     Index width = 0;
     for (const size_t i : set) {
       const Candidate& one = candidates_[i];
@@ -234,9 +238,18 @@ class Search {
     return C;
   }
 
-  [[nodiscard]] VectorXd Solve(const MatrixXd& C) const {
+  /// As few rows as have the same products with one another and with y, which is put behind them.
+  [[nodiscard]] MatrixXd Reduce(const MatrixXd& C) const {
+    MatrixXd all(C.rows(), C.cols() + 1);
+    all << C, y_;
+    if (all.rows() <= all.cols()) return all;
+    const Eigen::HouseholderQR<MatrixXd> qr(all);
+    return qr.matrixQR().topRows(all.cols()).triangularView<Eigen::Upper>();
+  }
+
+  static VectorXd Solve(const MatrixXd& C, const VectorXd& y) {
     const VectorXd size = C.colwise().norm().cwiseMax(std::numeric_limits<double>::min());
-    return (C * size.cwiseInverse().asDiagonal()).colPivHouseholderQr().solve(y_).cwiseQuotient(size);
+    return (C * size.cwiseInverse().asDiagonal()).colPivHouseholderQr().solve(y).cwiseQuotient(size);
   }
 
   [[nodiscard]] Best FindBest(const std::vector<size_t>& beside) const {
@@ -326,7 +339,7 @@ class Search {
       const Index width = C.cols();
       const VectorXd size = C.colwise().norm().cwiseMax(std::numeric_limits<double>::min());
       const MatrixXd scaled = C * size.cwiseInverse().asDiagonal();
-      const VectorXd a = Solve(C);
+      const VectorXd a = Solve(C, y_);
       result.residual = y_ - C * a;
       const double freedom = std::max(1.0, rows_ - static_cast<double>(width));
       const double variance =

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <nlohmann/json.hpp>
 
 #include "controller/common/text.h"
 
@@ -30,6 +31,11 @@ const char* NameOf(CauseChannel channel) {
       return "balance";
   }
   return "";
+}
+
+const char* NameOf(CauseOutcome outcome) {
+  constexpr const char* kNames[] = {"named", "class", "not explained"};
+  return kNames[static_cast<size_t>(outcome)];
 }
 
 std::string Fault::Tell() const {
@@ -73,6 +79,27 @@ std::string Explanation::Tell() const {
   constexpr double kCertain = 20.0;
   const double digits = std::min(log_odds / std::log(10.0), kCertain);
   return text + "; rival: " + rival + ", 1e" + std::to_string(std::lround(digits)) + " times less likely";
+}
+
+nlohmann::ordered_json ToJson(const Fault& fault) {
+  return {{"fault", fault.fault},          {"place", fault.place}, {"value", fault.value},
+          {"standard_error", fault.error}, {"unit", fault.unit},   {"detail", fault.detail}};
+}
+
+nlohmann::ordered_json ToJson(const Explanation& one) {
+  nlohmann::ordered_json json = {{"text", one.Tell()},
+                                 {"channel", NameOf(one.channel)},
+                                 {"outcome", NameOf(one.outcome)},
+                                 {"faults", nlohmann::ordered_json::array()},
+                                 {"from_s", one.from},
+                                 {"to_s", one.to},
+                                 {"ends", one.ends},
+                                 {"fraction", one.fraction},
+                                 {"left", one.left},
+                                 {"rival", one.rival},
+                                 {"log_odds", one.log_odds}};
+  for (const Fault& fault : one.faults) json["faults"].push_back(ToJson(fault));
+  return json;
 }
 
 bool Names(const Causes& causes, std::string_view fault) {

@@ -2,6 +2,7 @@
 
 // What a run's residuals are explained by.
 
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -35,6 +36,8 @@ enum class CauseOutcome {
   kNamedClass,    ///< Several do, which this motion does not tell apart.
   kNotExplained,  ///< None does.
 };
+/// "named", "class", "not explained".
+const char* NameOf(CauseOutcome outcome);
 
 /// One fault, or several that are not isolable from each other.
 struct Explanation {
@@ -57,6 +60,10 @@ struct Explanation {
   /// In a line.
   [[nodiscard]] std::string Tell() const;
 };
+
+/// As summaries of runs and judgements have them: null for infinite, and for the time of what holds always.
+nlohmann::ordered_json ToJson(const Fault& fault);
+nlohmann::ordered_json ToJson(const Explanation& one);
 
 /// All of a run, those that explain most of each channel first.
 using Causes = std::vector<Explanation>;

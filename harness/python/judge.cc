@@ -58,11 +58,6 @@ struct JudgementResult {
   }
 };
 
-const char* NameOf(CauseOutcome outcome) {
-  constexpr const char* kNames[] = {"named", "class", "not explained"};
-  return kNames[static_cast<size_t>(outcome)];
-}
-
 /// NumPy arrays as a recording's columns.
 class ArrayRecording {
  public:

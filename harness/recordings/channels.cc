@@ -37,14 +37,14 @@ void Require(const RobotModel& model, const Recording& recording, const std::str
   if (!recording.Has(RecordedQuantity::kTorque) && !recording.Has(RecordedQuantity::kCurrent))
     fail("has no column that is known as a joint's torque or current; a file of --columns can name them");
   for (const Channel& one : recording.channels)
-    if (one.quantity != RecordedQuantity::kTime &&
+    if (one.quantity != RecordedQuantity::kTime && CountComponents(one.quantity) == 0 &&
         recording.FindColumn(RecordedQuantity::kPosition, one.joint) < 0)
       fail("joint " + model.joint(one.joint).name + " has " + NameOf(one.quantity) + " and no position");
   std::set<std::pair<RecordedQuantity, int>> seen;
   for (const Channel& one : recording.channels)
     if (!seen.emplace(one.quantity, one.joint).second && one.joint >= 0)
       fail(std::string("has two columns of ") + NameOf(one.quantity) + " of joint " +
-           model.joint(one.joint).name);
+           (CountComponents(one.quantity) > 0 ? std::to_string(one.joint + 1) : model.joint(one.joint).name));
   std::map<size_t, const Channel*> owners;
   for (const Channel& one : recording.channels)
     if (!owners.emplace(one.column, &one).second)
@@ -55,8 +55,12 @@ void Require(const RobotModel& model, const Recording& recording, const std::str
 }  // namespace
 
 const char* NameOf(RecordedQuantity quantity) {
-  constexpr const char* kNames[] = {"t", "q", "qd", "qdd", "tau", "current"};
+  constexpr const char* kNames[] = {"t", "q", "qd", "qdd", "tau", "current", "wrench", "base"};
   return kNames[static_cast<size_t>(quantity)];
+}
+
+int CountComponents(RecordedQuantity quantity) {
+  return quantity == RecordedQuantity::kWrench ? 6 : quantity == RecordedQuantity::kBase ? 7 : 0;
 }
 
 int Recording::FindColumn(RecordedQuantity quantity, int joint) const {
@@ -121,14 +125,18 @@ std::string DescribeColumns(const RobotModel& model, const Recording& recording)
       const std::string separator = columns.empty() ? "" : ", ";
       columns +=
           separator + (names[one.column].empty() ? std::to_string(one.column + 1) : Quote(names[one.column]));
-      if (one.joint >= 0) joints += separator + Quote(model.joint(one.joint).name);
+      if (one.joint >= 0 && CountComponents(quantity) == 0)
+        joints += separator + Quote(model.joint(one.joint).name);
     }
     if (columns.empty()) {
       text += fmt::format("\n# [{}]\n# columns = []\n", NameOf(quantity));
+      if (quantity == RecordedQuantity::kWrench) text += "# link = \"\"\n";
       continue;
     }
     text += fmt::format("\n[{}]\ncolumns = [{}]\n", NameOf(quantity), columns);
     if (!joints.empty()) text += fmt::format("joints = [{}]\n", joints);
+    if (quantity == RecordedQuantity::kWrench)
+      text += fmt::format("link = {}\n", Quote(model.link_name(recording.wrench.link)));
     for (const Unit& unit : ListUnits())
       if (scale != 1.0 && unit.scale == scale && FindUnit(std::string(unit.name), quantity) == &unit)
         text += fmt::format("unit = \"{}\"\n", unit.name);

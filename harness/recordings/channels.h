@@ -14,17 +14,21 @@
 
 namespace dexcheck {
 
-enum class RecordedQuantity { kTime, kPosition, kVelocity, kAcceleration, kTorque, kCurrent };
+enum class RecordedQuantity { kTime, kPosition, kVelocity, kAcceleration, kTorque, kCurrent, kWrench, kBase };
 inline constexpr RecordedQuantity kQuantities[] = {
     RecordedQuantity::kTime,         RecordedQuantity::kPosition, RecordedQuantity::kVelocity,
-    RecordedQuantity::kAcceleration, RecordedQuantity::kTorque,   RecordedQuantity::kCurrent};
-/// "t", "q", "qd", "qdd", "tau", "current": as a file of columns names them.
+    RecordedQuantity::kAcceleration, RecordedQuantity::kTorque,   RecordedQuantity::kCurrent,
+    RecordedQuantity::kWrench,       RecordedQuantity::kBase};
+/// "t", "q", "qd", "qdd", "tau", "current", "wrench", "base": as a file of columns names them.
 const char* NameOf(RecordedQuantity quantity);
+
+/// Force and moment: 6; position and unit quaternion, w first: 7; 0 of what joints have.
+int CountComponents(RecordedQuantity quantity);
 
 /// A column that is used: quantity = scale * number + offset, in rad, m, s, N m, N, A.
 struct Channel {
   RecordedQuantity quantity = RecordedQuantity::kTime;
-  int joint = -1;
+  int joint = -1;  ///< Or the component of a wrench or of the base's pose.
   size_t column = 0;
   double scale = 1.0;
   double offset = 0.0;
@@ -37,12 +41,20 @@ struct DeclaredPayload {
   Vector3d com = Vector3d::Zero();  ///< In the link's frame, m.
 };
 
+/// Where a measured wrench acts on the robot.
+struct WrenchPlace {
+  int link = -1;                      ///< -1 for no wrench.
+  Vector3d point = Vector3d::Zero();  ///< In the link's frame, m: what the moment is about.
+  bool is_world = false;              ///< In world axes; otherwise in the link's.
+};
+
 /// A recording that is open, and what its columns are.
 struct Recording {
   std::string name;
   std::unique_ptr<RecordingReader> reader;
   std::vector<Channel> channels;
   std::optional<DeclaredPayload> payload;
+  WrenchPlace wrench;
   std::function<Recording()> reopen;  ///< From its begin; empty where that cannot be.
 
   /// -1 where it has none.

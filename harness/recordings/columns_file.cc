@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <map>
 #include <memory>
+#include <numeric>
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
@@ -60,7 +61,7 @@ class ColumnsFile {
       joined_ = joined.get();
       if (!recording.empty()) Add(recording, 0);
       for (const RecordedQuantity quantity : kQuantities)
-        if (auto value = root.Find(NameOf(quantity))) ReadQuantity(quantity, *value, &result.channels);
+        if (auto value = root.Find(NameOf(quantity))) ReadQuantity(quantity, *value, &result);
       if (auto payload = root.Find("payload")) result.payload = ReadPayload(payload->AsTable());
       root.RejectUnused();
       if (joined_->names().empty()) throw InputError(path_.string() + ": names no file");
@@ -77,9 +78,11 @@ class ColumnsFile {
   }
 
   /// "q = [2, 3]", or a table.
-  void ReadQuantity(RecordedQuantity quantity, const TomlValue& value, std::vector<Channel>* channels) {
+  void ReadQuantity(RecordedQuantity quantity, const TomlValue& value, Recording* recording) {
+    std::vector<Channel>* channels = &recording->channels;
+    if (quantity == RecordedQuantity::kWrench && !value.IsTable()) value.Fail("must be a table, with a link");
     if (!value.IsTable()) {
-      ReadColumns(quantity, value, 0, {}, channels);
+      ReadColumns(quantity, value, 0, ListComponents(quantity), channels);
       return;
     }
     TomlTable table = value.AsTable();
@@ -87,9 +90,12 @@ class ColumnsFile {
     size_t width = 0;
     if (const auto given = table.Find("width")) width = static_cast<size_t>(given->AsWhole(1, 1000));
     if (const auto file = table.Find("file")) first = Add(path_.parent_path() / file->AsText(), width);
-    std::vector<int> joints;
-    if (const auto list = table.Find("joints"))
+    std::vector<int> joints = ListComponents(quantity);
+    if (quantity == RecordedQuantity::kWrench) recording->wrench = ReadWrenchPlace(&table);
+    const auto list = joints.empty() ? table.Find("joints") : std::nullopt;
+    if (list) {
       for (const TomlValue& one : list->AsList()) joints.push_back(FindJoint(one));
+    }
     const size_t begin = channels->size();
     if (const auto columns = table.Find("columns")) {
       ReadColumns(quantity, *columns, first, joints, channels);
@@ -144,7 +150,8 @@ class ColumnsFile {
     }
     const size_t most = joints.empty() ? static_cast<size_t>(model_.num_joints()) : joints.size();
     if (columns.size() > most || (!joints.empty() && columns.size() != most))
-      value.Fail("must be columns of " + std::to_string(most) + " joints");
+      value.Fail(CountComponents(quantity) > 0 ? "must be " + std::to_string(most) + " columns"
+                                               : "must be columns of " + std::to_string(most) + " joints");
     for (size_t i = 0; i < columns.size(); ++i)
       channels->push_back({quantity, joints.empty() ? static_cast<int>(i) : joints[i], columns[i]});
   }
@@ -155,7 +162,7 @@ class ColumnsFile {
     const size_t most = quantity == RecordedQuantity::kTime ? 1
                         : joints.empty()                    ? static_cast<size_t>(model_.num_joints())
                                                             : joints.size();
-    if (count == 0 || count > most)
+    if (count == 0 || count > most || (CountComponents(quantity) > 0 && count < most))
       value.Fail("columns: must say which of " + std::to_string(count) + " columns");
     for (size_t i = 0; i < count; ++i) {
       const int joint = quantity == RecordedQuantity::kTime ? -1
@@ -176,13 +183,32 @@ class ColumnsFile {
     return static_cast<size_t>(found - names.begin()) - first;
   }
 
+  static std::vector<int> ListComponents(RecordedQuantity quantity) {
+    std::vector<int> components(static_cast<size_t>(CountComponents(quantity)));
+    std::iota(components.begin(), components.end(), 0);
+    return components;
+  }
+
+  [[nodiscard]] int FindLink(const TomlValue& link) const {
+    for (int joint = 0; joint < model_.num_joints(); ++joint)
+      if (model_.link_name(joint) == link.AsText()) return joint;
+    link.Fail("must be a moving link of " + model_.name());
+  }
+
+  [[nodiscard]] WrenchPlace ReadWrenchPlace(TomlTable* table) const {
+    WrenchPlace place;
+    place.link = FindLink(table->Get("link"));
+    if (const auto point = table->Find("point")) place.point = point->AsVector<3>();
+    if (const auto axes = table->Find("axes")) {
+      place.is_world = axes->AsText() == "world";
+      if (!place.is_world && axes->AsText() != "link") axes->Fail("must be \"link\" or \"world\"");
+    }
+    return place;
+  }
+
   [[nodiscard]] DeclaredPayload ReadPayload(TomlTable table) const {
     DeclaredPayload payload;
-    const TomlValue link = table.Get("link");
-    payload.link = -1;
-    for (int joint = 0; joint < model_.num_joints(); ++joint)
-      if (model_.link_name(joint) == link.AsText()) payload.link = joint;
-    if (payload.link < 0) link.Fail("must be a moving link of " + model_.name());
+    payload.link = FindLink(table.Get("link"));
     payload.mass = table.Get("mass").AsPositive();
     if (const auto com = table.Find("com")) payload.com = com->AsVector<3>();
     table.RejectUnused();

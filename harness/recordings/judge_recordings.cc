@@ -49,15 +49,19 @@ class Judge {
     const CauseSelection& selection = estimator_.selection();
     const VectorXd amplitudes = estimator_.CalcAmplitudes(selection.terms);
     const VectorXd before = estimator_.CalcLeft({}), after = estimator_.CalcLeft(selection.terms);
-    const double squares = CalcSquares(after);
-    result_.explained = 1.0 - squares / std::max(CalcSquares(before), std::numeric_limits<double>::min());
-    result_.left = std::sqrt(squares / std::max(1.0, estimator_.rows().samples));
+    result_.left = CalcRms(estimator_.rows(), after);
+    const double all = std::max(CalcRms(estimator_.rows(), before), std::numeric_limits<double>::min());
+    result_.explained = 1.0 - Square(result_.left / all);
     const TorqueRows held = MakeTorqueRows(set_, estimator_.faults(), /*is_held=*/true);
-    const Index width = held.rows.cols() - 1;
-    VectorXd nothing = VectorXd::Zero(width);
+    VectorXd nothing = VectorXd::Zero(held.columns - 1);
     nothing.head(CountForced(set_)) = estimator_.CalcAmplitudes({}).head(CountForced(set_));
-    const VectorXd held_before = held.rows.col(width) - held.rows.leftCols(width) * nothing;
-    const VectorXd held_after = held.rows.col(width) - held.rows.leftCols(width) * amplitudes;
+    Index rank = 0;
+    result_.by_all.held_left = CalcRms(held, held.CalcLeft(estimator_.FitPlainly(&rank)));
+    result_.by_all.numbers = rank;
+    for (const CauseTerm& term : selection.terms) result_.by_causes.numbers += term.amplitude.size();
+    result_.by_causes.numbers += CountForced(set_);
+    result_.by_causes.held_left = CalcRms(held, held.CalcLeft(amplitudes));
+    const VectorXd held_before = held.CalcLeft(nothing), held_after = held.CalcLeft(amplitudes);
     std::vector<size_t> first_fit, first_held;
     for (size_t recording = 0; recording < set_.size(); ++recording) {
       first_fit.push_back(MakeTraces(recording, *set_[recording].fit));
@@ -92,15 +96,15 @@ class Judge {
     for (const CauseTerm& term : selection.terms) Name(term);
   }
 
-  /// Of rows, in units of noise.
-  [[nodiscard]] double CalcSquares(const VectorXd& rows) const {
+  /// Of what is left of such rows, in units of noise.
+  [[nodiscard]] double CalcRms(const TorqueRows& rows, const VectorXd& left) const {
     double squares = 0.0;
-    for (const TorqueRows::Part& part : estimator_.rows().parts) {
+    for (const TorqueRows::Part& part : rows.parts) {
       const auto place = static_cast<Index>(part.place);
       const double unit = set_[part.recording].weight[place] / set_[part.recording].noise[place];
-      squares += unit * unit * rows.segment(part.begin, part.size).squaredNorm();
+      squares += unit * unit * left.segment(part.begin, part.size).squaredNorm();
     }
-    return squares;
+    return std::sqrt(squares / std::max(1.0, rows.samples));
   }
 
   /// Root mean square of the measured torque.
@@ -218,6 +222,9 @@ class Judge {
       one.detail = vector(now) + ", turned by " + FormatNumber(RadToDeg(turned), 3) + " deg";
     } else if (fault.kind == kTorqueGain && std::abs(one.value + 1.0) < 0.2) {
       one.detail = "(the other sign)";
+    } else if (fault.kind == kStribeckFriction) {
+      const TorqueColumn& column = fault.columns.front().front().column;
+      one.detail = "below about " + FormatNumber(set_[0].fit->CalcStribeckVelocity(column), 2) + " per s";
     } else if (!is_number) {
       one.detail = vector(a);
     }
@@ -279,7 +286,7 @@ RecordingJudgement JudgeRecordings(const RobotModel& model, std::vector<Recordin
   const bool is_poor = !judgement.IsWhole() && (judgement.explained < kWell || judgement.causes.size() > 3);
   if (is_poor && options.tries_positions) fault = FindPositionFault(model, recordings->front());
   const auto undo = [&](Recording* one) {
-    if (fault) fault->undo(one);
+    if (fault) fault->Undo(one);
   };
   if (fault && Reopen(recordings, undo)) judgement = Judge(model, recordings, options, count).Run();
   JudgeOptions second = options;

@@ -33,6 +33,12 @@ struct FoundFault {
   bool is_named = true;  ///< No other cause explains the same.
 };
 
+/// How well a set of numbers predicts the quarter that it was not fitted to.
+struct HeldPrediction {
+  long numbers = 0;
+  double held_left = 0.0;  ///< Root mean square of the rest, in units of noise.
+};
+
 /// Means over a block of time, for pictures. By judged joint.
 struct TorqueTrace {
   int recording = 0;
@@ -48,6 +54,9 @@ struct RecordingJudgement {
   std::vector<FoundFault> found;  ///< The same.
   double explained = 0.0;         ///< Fraction of the residual, squared.
   double left = 0.0;              ///< Root mean square of the rest, in units of noise.
+  /// By the causes; by a plain least-squares fit of all bodies' numbers that the motion tells, friction,
+  /// offsets and armatures.
+  HeldPrediction by_causes, by_all;
   std::vector<TorqueTrace> traces;
   std::vector<std::string> notes;
   long rows = 0;

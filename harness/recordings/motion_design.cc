@@ -195,8 +195,8 @@ class MotionDesigner {
     scales_ = Eigen::Map<const VectorXd>(scales.data(), static_cast<Index>(scales.size()));
     known_ = MatrixXd::Identity(scales_.size(), scales_.size());
     if (options_.recorded == nullptr) return;
-    const MatrixXd rows = MakeTorqueRows(*options_.recorded, faults_, false).rows;
-    known_ += Scale(rows.transpose() * rows, CountForced(*options_.recorded));
+    known_ += Scale(MakeTorqueRows(*options_.recorded, faults_, false).CalcProducts(),
+                    CountForced(*options_.recorded));
   }
 
   [[nodiscard]] VectorXd ChooseScale(const TorqueFault& fault, const VectorXd& usual) const {

@@ -72,6 +72,7 @@ bool MotionFit::Fill() {
       has_ended_ = true;
       break;
     }
+    if (recording_->Has(RecordedQuantity::kBase)) CheckBase(&row);
     if (last_.size() > 0) {
       const double passed = row[time] - last_[time];
       if (passed < 0.0)
@@ -147,6 +148,39 @@ std::vector<size_t> MotionFit::ListCentres(size_t half) const {
   return centres;
 }
 
+/// A unit quaternion, of the sign of the row before.
+void MotionFit::CheckBase(Row* row) const {
+  Eigen::Vector4d quaternion, before = Eigen::Vector4d::Zero();
+  for (int k = 0; k < 4; ++k) {
+    const int channel = ChannelOf(RecordedQuantity::kBase, 3 + k);
+    quaternion[k] = (*row)[channel];
+    if (last_.size() > 0) before[k] = last_[channel];
+  }
+  constexpr double kLittle = 0.01;
+  if (std::abs(quaternion.norm() - 1.0) > kLittle)
+    throw InputError(fmt::format("{}: base: must have a unit quaternion, got one of length {:.4g}",
+                                 recording_->reader->Where(), quaternion.norm()));
+  if (quaternion.dot(before) >= 0.0) return;
+  for (int k = 0; k < 4; ++k) (*row)[ChannelOf(RecordedQuantity::kBase, 3 + k)] *= -1.0;
+}
+
+BaseMotion MotionFit::CalcBase(const MatrixXd& fitted) const {
+  MatrixXd pose(3, 7);
+  for (int k = 0; k < 7; ++k) pose.col(k) = fitted.col(ChannelOf(RecordedQuantity::kBase, k)).head(3);
+  const auto quaternion = [&](int order) {
+    return Eigen::Quaterniond(pose(order, 3), pose(order, 4), pose(order, 5), pose(order, 6));
+  };
+  const Eigen::Quaterniond now = quaternion(0).normalized();
+  BaseMotion base;
+  base.R = now.toRotationMatrix();
+  // w = 2 q_dot q^*; the second derivative is twice the polynomial's coefficient.
+  base.w = 2.0 * (quaternion(1) * now.conjugate()).vec();
+  base.w_dot = 4.0 * (quaternion(2) * now.conjugate()).vec();
+  const Vector3d r = base.R * model_->base().X_B0.translation();
+  base.a = 2.0 * pose.row(2).head<3>().transpose() + base.w_dot.cross(r) + base.w.cross(base.w.cross(r));
+  return base;
+}
+
 bool MotionFit::Emit(size_t centre, const Receiver& receive) {
   const MatrixXd window = GetWindow(centre, half_);
   const MatrixXd C = CalcCoefficients(centre, half_, kOrder);
@@ -186,6 +220,9 @@ bool MotionFit::Emit(size_t centre, const Receiver& receive) {
     sample_.torque_rate[joint] = fitted(1, torque);
     sample_.torque_curvature[joint] = 2.0 * fitted(2, torque);
   }
+  if (recording_->Has(RecordedQuantity::kBase)) sample_.base = CalcBase(fitted);
+  for (Eigen::Index k = 0; k < sample_.wrench.size(); ++k)
+    sample_.wrench[k] = fitted(0, ChannelOf(RecordedQuantity::kWrench, static_cast<int>(k)));
   return receive(sample_);
 }
 

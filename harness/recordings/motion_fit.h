@@ -24,6 +24,8 @@ struct RecordedSample {
   VectorXd torque;            ///< Measured, or the current; smoothed like the motion.
   VectorXd torque_rate;       ///< Per s.
   VectorXd torque_curvature;  ///< Per s^2.
+  BaseMotion base;            ///< At rest where it was not recorded.
+  VectorXd wrench;            ///< Measured, on the link, N and N m; empty for none.
   VectorXd direction;         ///< Sign of the velocity, averaged as the torque is; 0 at rest.
 };
 
@@ -31,8 +33,10 @@ struct RecordedSample {
 struct MotionNoise {
   VectorXd position, velocity, torque;  ///< Of a single number.
   VectorXd smooth_position, smooth_torque,
-      acceleration;  ///< Of a sample, the last with what smoothing leaves out.
-  VectorXd rest;     ///< Velocity below which a joint is at rest.
+      acceleration;   ///< Of a sample, the last with what smoothing leaves out.
+  VectorXd wrench;    ///< Of a sample; empty for none.
+  double base = 0.0;  ///< Of a sample: the base's acceleration with gravity, m/s^2.
+  VectorXd rest;      ///< Velocity below which a joint is at rest.
 };
 
 /// Reads a recording once, in constant memory. Rows whose times are doubled are left out, so are those that
@@ -89,6 +93,9 @@ class MotionFit {
   [[nodiscard]] bool IsWhole(size_t centre, size_t half) const;
   [[nodiscard]] int ChannelOf(RecordedQuantity quantity, int joint) const;
   [[nodiscard]] double FindQuantum(Eigen::Index channel) const;
+  /// Of a base whose pose was recorded, by the polynomials.
+  [[nodiscard]] BaseMotion CalcBase(const MatrixXd& fitted) const;
+  void CheckBase(Row* row) const;
   bool Emit(size_t centre, const Receiver& receive);
   [[nodiscard]] MatrixXd CalcInertia(const std::vector<size_t>& centres);
 

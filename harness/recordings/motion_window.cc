@@ -101,9 +101,19 @@ void MotionFit::Analyse() {
     noise_.velocity[joint] = get(RecordedQuantity::kVelocity);
     noise_.torque[joint] = get(has_currents_ ? RecordedQuantity::kCurrent : RecordedQuantity::kTorque);
   }
+  if (recording_->wrench.link >= 0) {
+    noise_.wrench = sample_.wrench = VectorXd::Zero(6);
+    for (int k = 0; k < 6; ++k) noise_.wrench[k] = sigma[ChannelOf(RecordedQuantity::kWrench, k)];
+  }
+  VectorXd base = VectorXd::Zero(2);
+  for (int k = 0; k < 7 && recording_->Has(RecordedQuantity::kBase); ++k)
+    base[k / 3 > 0 ? 1 : 0] += Square(sigma[ChannelOf(RecordedQuantity::kBase, k)]);
   CheckVelocities(centres, half);
   inertia_ = CalcInertia(centres);
   ChooseWindow(centres);
+  const MatrixXd C = CalcCoefficients(ListCentres(half_).front(), half_, kOrder);
+  noise_.base = 2.0 * std::sqrt(base[0] * C.row(2).squaredNorm() +
+                                base[1] * C.row(0).squaredNorm() * model_->gravity().squaredNorm());
   CalcSpeeds();
 }
 
@@ -173,7 +183,7 @@ void MotionFit::ChooseWindow(const std::vector<size_t>& all) {
                                                    : RecordedQuantity::kPosition;
   const int derivative = has_acceleration ? 0 : has_velocity ? 1 : 2;
   const double factorial = derivative == 2 ? 2.0 : 1.0;
-  double best = std::numeric_limits<double>::infinity();
+  double best = std::numeric_limits<double>::infinity(), smoothed = 1.0;
   for (const size_t half : kHalves) {
     const std::vector<size_t> centres = ListCentres(half);
     if (2 * half + 1 > rows_ahead_.size() / 4 || centres.size() < all.size() / 2) break;
@@ -205,15 +215,17 @@ void MotionFit::ChooseWindow(const std::vector<size_t>& all) {
     best = score;
     half_ = half;
     noise_.acceleration = squares.cwiseSqrt();
-    noise_.smooth_position = std::sqrt(value / count) * noise_.position;
-    noise_.smooth_torque = std::sqrt(value / count) * noise_.torque;
-    const VectorXd velocity = has_velocity ? VectorXd(std::sqrt(value / count) * noise_.velocity)
+    smoothed = std::sqrt(value / count);
+    noise_.smooth_position = smoothed * noise_.position;
+    noise_.smooth_torque = smoothed * noise_.torque;
+    const VectorXd velocity = has_velocity ? VectorXd(smoothed * noise_.velocity)
                                            : VectorXd(std::sqrt(rate / count) * noise_.position);
     noise_.rest = 3.0 * velocity;
   }
   if (!std::isfinite(best))
     throw InputError(recording_->name + ": is too short to derive accelerations from");
   stride_ = std::max<size_t>(1, half_ / 2);
+  noise_.wrench *= smoothed;
 }
 
 }  // namespace dexcheck

@@ -1,11 +1,10 @@
 #include "harness/recordings/position_faults.h"
 
 #include <Eigen/QR>
+#include <algorithm>
 #include <cmath>
 #include <limits>
-
-#include "controller/common/errors.h"
-#include "harness/recordings/torque_balance.h"
+#include <utility>
 
 namespace dexcheck {
 namespace {
@@ -17,64 +16,86 @@ bool IsMotion(const Channel& channel) {
          channel.quantity == RecordedQuantity::kAcceleration;
 }
 
-/// How far the model's torques are off beside gains' signs, friction and offsets: the sum over joints of the
-/// logarithm of the residual.
-double CalcMisfit(const RobotModel& model, Recording recording) {
-  constexpr size_t kRows = 3000;
-  MotionFit motion(model, &recording, kRows);
-  TorqueBalance balance(model, motion.joints(), motion.speeds(), motion.has_currents());
-  size_t samples = 0;
-  motion.Run([&](const RecordedSample& sample) {
-    balance.Add(sample, motion.IsJudged(sample));
-    return ++samples < kRows;
-  });
-  balance.Finish();
-  double misfit = 0.0;
-  for (size_t place = 0; place < motion.joints().size(); ++place) {
-    const int joint = motion.joints()[place];
-    const MatrixXd& G = balance.products(place);
-    std::vector<Index> columns;
-    for (const auto kind : {TorqueColumn::kOffset, TorqueColumn::kDry, TorqueColumn::kViscous})
-      columns.push_back(balance.Find(place, {kind, joint}));
-    Index y = G.cols() - 1;
-    if (motion.has_currents()) {
-      // A current's scale is free.
-      columns.push_back(balance.Find(place, {TorqueColumn::kTorque, joint}));
-      y = balance.Find(place, {TorqueColumn::kCurrent, joint});
-    }
-    const VectorXd b = G(columns, y);
-    const double left =
-        G(y, y) - b.dot(MatrixXd(G(columns, columns)).completeOrthogonalDecomposition().solve(b));
-    misfit += 0.5 * std::log(std::max(left, 1e-12 * G(y, y)) / std::max(1.0, balance.samples(place)) +
-                             std::numeric_limits<double>::min());
+/// The begin of a recording, and how well the model explains it.
+class Begin {
+ public:
+  Begin(const RobotModel& model, Recording recording) : regressor_(model), torques_(model.num_joints()) {
+    constexpr size_t kRows = 3000;
+    MotionFit motion(model, &recording, kRows);
+    joints_ = motion.joints();
+    has_currents_ = motion.has_currents();
+    motion.Run([&](const RecordedSample& sample) {
+      samples_.push_back(sample);
+      // Where friction holds a joint, its torque says nothing.
+      const std::vector<bool> judged = motion.IsJudged(sample);
+      for (const int joint : joints_)
+        if (!judged[static_cast<size_t>(joint)])
+          samples_.back().torque[joint] = std::numeric_limits<double>::quiet_NaN();
+      return samples_.size() < kRows;
+    });
   }
-  return misfit;
-}
+
+  [[nodiscard]] size_t size() const { return samples_.size(); }
+
+  /// How far the model's torques are off beside gains' signs, friction and offsets: the sum over joints of
+  /// the logarithm of the residual, at every such sample.
+  double CalcMisfit(const PositionFault& undone, size_t every) {
+    std::vector<Products> products(joints_.size(), Products::Zero());
+    for (size_t i = 0; i < samples_.size(); i += every) {
+      RecordedSample sample = samples_[i];
+      undone.Undo(&sample);
+      regressor_.SetMotion(sample.q, sample.qd, sample.qdd, sample.base);
+      regressor_.CalcTorques(torques_);
+      for (size_t place = 0; place < joints_.size(); ++place) {
+        const int joint = joints_[place];
+        if (std::isnan(sample.torque[joint])) continue;
+        Eigen::Matrix<double, kColumns, 1> row;
+        row << 1.0, sample.direction[joint], sample.qd[joint], torques_[joint], sample.torque[joint];
+        // A current's scale is free.
+        if (!has_currents_) row[4] -= std::exchange(row[3], 0.0);
+        products[place] += row * row.transpose();
+      }
+    }
+    double misfit = 0.0;
+    for (const Products& G : products) misfit += CalcLogResidual(G);
+    return misfit;
+  }
+
+ private:
+  static constexpr int kColumns = 5;  // offset, direction, velocity, the model's torque, the measured one
+  using Products = Eigen::Matrix<double, kColumns, kColumns>;
+
+  static double CalcLogResidual(const Products& G) {
+    const Eigen::Vector4d b = G.topRightCorner<4, 1>();
+    const double y = G(4, 4);
+    const double left =
+        y - b.dot(MatrixXd(G.topLeftCorner<4, 4>()).completeOrthogonalDecomposition().solve(b));
+    constexpr double kRounding = 1e-12;
+    return 0.5 * std::log(std::max(left, kRounding * y) / std::max(1.0, G(0, 0)) +
+                          std::numeric_limits<double>::min());
+  }
+
+  TorqueRegressor regressor_;
+  std::vector<int> joints_;
+  bool has_currents_ = false;
+  std::vector<RecordedSample> samples_;
+  VectorXd torques_;
+};
 
 std::vector<PositionFault> ListPositionFaults(const RobotModel& model, const Recording& recording) {
   std::vector<PositionFault> faults;
-  const auto scale = [](double factor, int joint) {
-    return [=](Recording* changed) {
-      for (Channel& one : changed->channels)
-        if (IsMotion(one) && (joint < 0 || one.joint == joint)) one.scale *= factor, one.offset *= factor;
-    };
-  };
   faults.push_back(
-      {{"unit of the positions", "all joints", 180.0 / kPi, 0.0, "", "(degrees)"}, scale(kPi / 180.0, -1)});
+      {{"unit of the positions", "all joints", 180.0 / kPi, 0.0, "", "(degrees)"}, -1, -1, kPi / 180.0});
   for (int joint = 0; joint < model.num_joints(); ++joint) {
     if (recording.FindColumn(RecordedQuantity::kPosition, joint) < 0) continue;
     const std::string place = "joint " + model.joint(joint).name;
-    faults.push_back({{"position gain", place, -1.0, 0.0, "", "(the other sign)"}, scale(-1.0, joint)});
+    faults.push_back({{"position gain", place, -1.0, 0.0, "", "(the other sign)"}, joint, -1, -1.0});
     for (int other = joint + 1; other < model.num_joints(); ++other) {
       if (recording.FindColumn(RecordedQuantity::kPosition, other) < 0) continue;
-      const auto exchange = [=](Recording* changed) {
-        for (Channel& one : changed->channels)
-          if (IsMotion(one) && (one.joint == joint || one.joint == other))
-            one.joint = joint + other - one.joint;
-      };
       faults.push_back(
           {{"position exchanged with that of " + model.joint(other).name, place, 1.0, 0.0, "", ""},
-           exchange});
+           joint,
+           other});
     }
   }
   return faults;
@@ -82,21 +103,49 @@ std::vector<PositionFault> ListPositionFaults(const RobotModel& model, const Rec
 
 }  // namespace
 
+void PositionFault::Undo(Recording* recording) const {
+  for (Channel& one : recording->channels) {
+    if (!IsMotion(one)) continue;
+    if (other >= 0) {
+      if (one.joint == joint || one.joint == other) one.joint = joint + other - one.joint;
+    } else if (joint < 0 || one.joint == joint) {
+      one.scale *= factor;
+      one.offset *= factor;
+    }
+  }
+}
+
+void PositionFault::Undo(RecordedSample* sample) const {
+  for (VectorXd* const each : {&sample->q, &sample->qd, &sample->qdd, &sample->direction}) {
+    if (other >= 0) {
+      std::swap((*each)[joint], (*each)[other]);
+    } else if (joint >= 0) {
+      (*each)[joint] *= factor;
+    } else if (each != &sample->direction) {
+      *each *= factor;
+    }
+  }
+}
+
 std::optional<PositionFault> FindPositionFault(const RobotModel& model, const Recording& recording) {
   if (!recording.reopen) return std::nullopt;
+  Begin begin(model, recording.reopen());
+  // A few samples say which are worth all of them.
+  constexpr size_t kFewSamples = 100, kFewFaults = 10;
+  std::vector<std::pair<double, PositionFault>> faults;
+  for (PositionFault& one : ListPositionFaults(model, recording)) {
+    const double misfit = begin.CalcMisfit(one, std::max<size_t>(1, begin.size() / kFewSamples));
+    faults.emplace_back(misfit, std::move(one));
+  }
+  std::sort(faults.begin(), faults.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+  faults.resize(std::min(faults.size(), kFewFaults));
   // By a factor of three, of one joint or spread over several.
   constexpr double kMuch = 1.1;
-  double best = CalcMisfit(model, recording.reopen()) - kMuch;
+  double best = begin.CalcMisfit({}, 1) - kMuch;
   std::optional<PositionFault> found;
-  for (PositionFault& fault : ListPositionFaults(model, recording)) {
-    Recording changed = recording.reopen();
-    fault.undo(&changed);
-    try {
-      const double misfit = CalcMisfit(model, std::move(changed));
-      if (misfit < best) best = misfit, found = std::move(fault);
-    } catch (const InputError&) {
-      // Nothing that can be judged.
-    }
+  for (auto& [few, fault] : faults) {
+    const double misfit = begin.CalcMisfit(fault, 1);
+    if (misfit < best) best = misfit, found = std::move(fault);
   }
   return found;
 }

@@ -2,19 +2,23 @@
 
 // Positions of a recording that are not the model's: another sign, another unit, another order.
 
-#include <functional>
 #include <optional>
-#include <vector>
 
 #include "harness/diagnosis/causes.h"
 #include "harness/recordings/channels.h"
+#include "harness/recordings/motion_fit.h"
 
 namespace dexcheck {
 
 /// What was done to positions, and how to undo it.
 struct PositionFault {
   Fault fault;
-  std::function<void(Recording*)> undo;  ///< Changes the channels.
+  int joint = -1;       ///< -1 for all.
+  int other = -1;       ///< That it was exchanged with.
+  double factor = 1.0;  ///< That undoes it.
+
+  void Undo(Recording* recording) const;
+  void Undo(RecordedSample* sample) const;
 };
 
 /// The one that explains most of what gravity, inertia and friction do not, if one explains much.

@@ -27,8 +27,10 @@ RobotModel AddPayload(const RobotModel& model, const std::optional<DeclaredPaylo
 RecordingSet::RecordingSet(const RobotModel& model, std::vector<Recording>* recordings,
                            const ReadOptions& options, const std::function<bool(long rows)>& on_rows)
     : model_(&model), first_name_(recordings->front().name) {
-  if (model.base().type != BaseType::kFixed)
-    throw InputError(model.spec().source + ": base: must be fixed where recordings are judged, moves");
+  for (const Recording& recording : *recordings)
+    if (model.base().type != BaseType::kFixed && !recording.Has(RecordedQuantity::kBase))
+      throw InputError(model.spec().source + ": base: moves; " + recording.name +
+                       " must have its pose: base in a file of --columns");
   for (Recording& recording : *recordings) Read(&recording, options, on_rows);
   EstimateGains();
   first_gains_ = gains_;
@@ -68,6 +70,7 @@ void RecordingSet::Read(Recording* recording, const ReadOptions& options,
   one.held = std::make_unique<TorqueBalance>(*one.model, joints_, motion.speeds(), has_currents_);
   for (const auto& [joint, offset] : options.offsets)
     for (TorqueBalance* balance : {one.fit.get(), one.held.get()}) balance->SetPositionStep(joint, -offset);
+  for (TorqueBalance* balance : {one.fit.get(), one.held.get()}) balance->SetWrenchPlace(recording->wrench);
   long samples = 0;
   motion.Run([&](const RecordedSample& sample) {
     constexpr long kStretch = 64, kEvery = 4;
@@ -110,6 +113,10 @@ double RecordingSet::CalcNoise(const ReadRecording& one, size_t place) const {
     variance += Square(one.inertia(joint, other) * one.motion.acceleration[other]);
     variance += mean_square({TorqueColumn::kPosition, other}) * Square(one.motion.smooth_position[other]);
   }
+  for (int k = 0; k < 3; ++k)
+    variance += mean_square({TorqueColumn::kGravity, 0, k}) * Square(one.motion.base);
+  if (one.motion.wrench.size() > 0)
+    variance += balance.wrench_squares(place).dot(one.motion.wrench.cwiseAbs2()) / samples;
   // When a torque acted is known to a row's time.
   variance +=
       mean_square({TorqueColumn::kRate, joint}) * Square(gains_[static_cast<Index>(place)] * one.step) / 12.0;

@@ -20,6 +20,7 @@ TorqueBalance::TorqueBalance(const RobotModel& model, const std::vector<int>& jo
   moved_.resize(n);
   q_.resize(n);
   residual_ = VectorXd::Zero(static_cast<Index>(joints.size()));
+  wrench_squares_ = MatrixXd::Zero(residual_.size(), 6);
   constexpr double kStep = 1e-6;
   steps_ = VectorXd::Constant(n, kStep);
   ListColumns(has_currents);
@@ -109,7 +110,7 @@ void TorqueBalance::FillRow(size_t place, const RecordedSample& sample, Eigen::R
         entry = sample.qdd[joint];
         break;
       case TorqueColumn::kSlow: {
-        const double slow = 0.1 * (column.component + 1) * speeds_[joint];
+        const double slow = CalcStribeckVelocity(column);
         entry = slow > 0.0 ? direction * std::exp(-rate * rate / (slow * slow)) : 0.0;
         break;
       }
@@ -127,19 +128,35 @@ void TorqueBalance::FillRow(size_t place, const RecordedSample& sample, Eigen::R
       (has_currents_ ? 0.0 : sample.torque[joint]) - torques_[joint] - CalcFriction(joint, sample);
 }
 
+MatrixXd TorqueBalance::CalcWrenchColumns() {
+  const Matrix3d& R = regressor_.GetRotation(wrench_.link);
+  const Matrix3d axes = wrench_.is_world ? Matrix3d(Matrix3d::Identity()) : R;
+  const Vector3d lever = R * (wrench_.point - model_->joint(wrench_.link).body.com);
+  regressor_.CalcForceColumns(wrench_.link, forces_);
+  MatrixXd columns(forces_.rows(), 6);
+  columns << (forces_.leftCols<3>() + forces_.rightCols<3>() * Skew(lever)) * axes,
+      forces_.rightCols<3>() * axes;
+  return columns;
+}
+
 void TorqueBalance::Add(const RecordedSample& sample, const std::vector<bool>& is_judged) {
   q_ = sample.q;
   for (Index k = 0; k < q_.size(); ++k) {
     q_[k] += steps_[k];
-    regressor_.SetMotion(q_, sample.qd, sample.qdd);
+    regressor_.SetMotion(q_, sample.qd, sample.qdd, sample.base);
     regressor_.CalcTorques(by_position_.col(k));
     q_[k] = sample.q[k];
   }
-  regressor_.SetMotion(sample.q, sample.qd, sample.qdd);
+  regressor_.SetMotion(sample.q, sample.qd, sample.qdd, sample.base);
   regressor_.CalcTorques(torques_);
   regressor_.CalcBodyColumns(bodies_);
   regressor_.CalcGravityColumns(gravity_);
   by_position_ = (by_position_.colwise() - torques_) * steps_.cwiseInverse().asDiagonal();
+  if (wrench_.link >= 0) {
+    const MatrixXd columns = CalcWrenchColumns();
+    torques_ += columns * sample.wrench;
+    wrench_squares_ += columns(joints_, Eigen::all).cwiseAbs2();
+  }
 
   if (blocks_.empty() || blocks_.back().samples >= block_samples_) {
     if (blocks_.size() == kMostBlocks) MergeBlocks();
@@ -182,6 +199,7 @@ void TorqueBalance::Finish() {
   for (size_t place = 0; place < joints_.size(); ++place) {
     Flush(place);
     products_[place].triangularView<Eigen::StrictlyUpper>() = products_[place].transpose();
+    rows_.push_back(CalcRows(place));
   }
 }
 

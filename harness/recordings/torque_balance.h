@@ -29,7 +29,7 @@ struct TorqueColumn {
     kDry,      ///< Direction of motion.
     kViscous,  ///< Velocity.
     kAcceleration,
-    kSlow,    ///< Direction, where the velocity is below component + 1 tenths of its usual size.
+    kSlow,    ///< Direction times exp(-(v / v_s)^2); of a Stribeck velocity.
     kSmooth,  ///< tanh of the velocity over component tenths of its usual size.
     kLoad,    ///< Direction times the size of the model's torque.
   };
@@ -45,8 +45,20 @@ class TorqueBalance {
   TorqueBalance(const RobotModel& model, const std::vector<int>& joints, const VectorXd& speeds,
                 bool has_currents);
 
+  /// v_s of kSlow: component + 1 tenths of the velocity's usual size, rad/s or m/s.
+  [[nodiscard]] double CalcStribeckVelocity(const TorqueColumn& column) const {
+    return 0.1 * (column.component + 1) * speeds_[column.index];
+  }
+
   /// How much positions are thought to be off, rad or m, by joint: kPosition is the secant over it.
   void SetPositionStep(int joint, double step) { steps_[joint] = step; }
+
+  /// What measures the samples' wrench.
+  void SetWrenchPlace(const WrenchPlace& place) { wrench_ = place; }
+  /// sum over samples of the squared entries of the columns by which a joint balances the wrench (6).
+  [[nodiscard]] VectorXd wrench_squares(size_t place) const {
+    return wrench_squares_.row(static_cast<Eigen::Index>(place)).transpose();
+  }
 
   /// @param is_judged by joint: not where friction holds it.
   void Add(const RecordedSample& sample, const std::vector<bool>& is_judged);
@@ -75,18 +87,21 @@ class TorqueBalance {
   [[nodiscard]] const MatrixXd& products(size_t place) const { return products_[place]; }
   [[nodiscard]] double samples(size_t place) const { return counts_[place]; }
   /// Rows with the same products: a factor of those within blocks, then one of each block, sum / sqrt(count).
-  [[nodiscard]] MatrixXd CalcRows(size_t place) const;
+  [[nodiscard]] const MatrixXd& rows(size_t place) const { return rows_[place]; }
 
  private:
   static constexpr Eigen::Index kPart = 128;  // rows that are multiplied at once
   static constexpr size_t kMostBlocks = 512;
 
   void ListColumns(bool has_currents);
+  /// What balances a force at the wrench's point and a moment, in its axes: n x 6.
+  [[nodiscard]] MatrixXd CalcWrenchColumns();
   /// The model's, at a joint.
   [[nodiscard]] double CalcFriction(int joint, const RecordedSample& sample) const;
   void FillRow(size_t place, const RecordedSample& sample, Eigen::Ref<VectorXd> row) const;
   void Flush(size_t place);
   void MergeBlocks();
+  [[nodiscard]] MatrixXd CalcRows(size_t place) const;
 
   const RobotModel* model_;
   TorqueRegressor regressor_;
@@ -95,7 +110,7 @@ class TorqueBalance {
   bool has_currents_;
   std::vector<std::vector<TorqueColumn>> columns_;
   std::vector<std::map<TorqueColumn, Eigen::Index>> places_;
-  std::vector<MatrixXd> products_;
+  std::vector<MatrixXd> products_, rows_;
   std::vector<MatrixXd> parts_;  // columns x kPart
   std::vector<Eigen::Index> used_;
   std::vector<double> counts_;
@@ -103,6 +118,8 @@ class TorqueBalance {
   double block_samples_ = 1.0;
   // at the sample
   MatrixXd bodies_, gravity_, forces_, by_position_;
+  WrenchPlace wrench_;
+  MatrixXd wrench_squares_;
   VectorXd torques_, moved_, q_, steps_, residual_;
 };
 

@@ -81,7 +81,7 @@ class FaultList {
                  modelled.dry_friction, true)
           .parameters = 1;
     for (const int tenths : {0, 2})
-      AddAtJoint(kSlowFriction, joint, "friction at low speed", torque, {TorqueColumn::kSlow, joint, tenths},
+      AddAtJoint(kStribeckFriction, joint, "Stribeck friction", torque, {TorqueColumn::kSlow, joint, tenths},
                  0.0, false)
           .parameters = 1;
     AddAtJoint(kLoadFriction, joint, "friction that grows with the load", "", {TorqueColumn::kLoad, joint},
@@ -233,8 +233,10 @@ class FaultList {
 
 }  // namespace
 
-bool IsBody(const BodyVector& body) {
-  // Of second moments: half the trace of I less I.
+namespace {
+
+/// Second moments, mass times centre, mass.
+Eigen::Matrix4d PackPseudoInertia(const BodyVector& body) {
   Matrix3d I;
   // clang-format off
   I << body[4], body[7], body[8],
@@ -242,13 +244,36 @@ bool IsBody(const BodyVector& body) {
        body[8], body[9], body[6];
   // clang-format on
   Eigen::Matrix4d pseudo;
-  pseudo.topLeftCorner<3, 3>() = 0.5 * I.trace() * Matrix3d::Identity() - I;
-  pseudo.topRightCorner<3, 1>() = body.segment<3>(1);
-  pseudo.bottomLeftCorner<1, 3>() = body.segment<3>(1).transpose();
-  pseudo(3, 3) = body[0];
+  // Of second moments: half the trace of I less I.
+  pseudo << 0.5 * I.trace() * Matrix3d::Identity() - I, body.segment<3>(1), body.segment<3>(1).transpose(),
+      body[0];
+  return pseudo;
+}
+
+BodyVector UnpackPseudoInertia(const Eigen::Matrix4d& pseudo) {
+  const Matrix3d moments = pseudo.topLeftCorner<3, 3>();
+  const Matrix3d I = moments.trace() * Matrix3d::Identity() - moments;
+  BodyVector body;
+  body << pseudo(3, 3), pseudo.topRightCorner<3, 1>(), I(0, 0), I(1, 1), I(2, 2), I(0, 1), I(0, 2), I(1, 2);
+  return body;
+}
+
+}  // namespace
+
+bool IsBody(const BodyVector& body) {
+  const Eigen::Matrix4d pseudo = PackPseudoInertia(body);
   const Eigen::Vector4d eigenvalues = pseudo.selfadjointView<Eigen::Lower>().eigenvalues();
   constexpr double kRounding = 1e-9;
   return body[0] > 0.0 && eigenvalues.minCoeff() >= -kRounding * pseudo.trace();
+}
+
+BodyVector FindNearestBody(const BodyVector& body) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix4d> eigen(PackPseudoInertia(body));
+  // No thinner than readers of descriptions take for a body.
+  constexpr double kThinnest = 1e-6;
+  const Eigen::Vector4d possible =
+      eigen.eigenvalues().cwiseMax(kThinnest * eigen.eigenvalues().cwiseAbs().maxCoeff());
+  return UnpackPseudoInertia(eigen.eigenvectors() * possible.asDiagonal() * eigen.eigenvectors().transpose());
 }
 
 std::vector<TorqueFault> ListTorqueFaults(const RobotModel& model, const std::vector<int>& joints,

@@ -34,7 +34,7 @@ struct TorqueFault {
     kAllFriction,
     kAllOffsets,
     kViscousFriction,
-    kSlowFriction,
+    kStribeckFriction,
     kLoadFriction,
     kOffset,
     kArmature,
@@ -82,5 +82,7 @@ std::vector<TorqueFault> ListPushes(const RobotModel& model, const std::vector<i
 
 /// Whether there is a body of such mass, centre and inertia: its pseudo-inertia is positive.
 bool IsBody(const TorqueRegressor::BodyVector& body);
+/// The nearest one that there is: of least distance between pseudo-inertias.
+TorqueRegressor::BodyVector FindNearestBody(const TorqueRegressor::BodyVector& body);
 
 }  // namespace dexcheck

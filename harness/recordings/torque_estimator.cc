@@ -50,6 +50,36 @@ std::vector<std::pair<size_t, size_t>> FindWindows(const VectorXd& squares) {
   return windows;
 }
 
+/// How large a fault's amplitude may plausibly be.
+double CalcPlausible(const TorqueFault& fault, Index k) {
+  return fault.scale.size() > 0 ? fault.scale[k] : std::max(1.0, std::abs(fault.nominal));
+}
+
+/// An upper triangular R, without its rows of zeros, with R^T R = G, which may be singular: Cholesky's, in
+/// blocks, in which a column that adds nothing to those before it has no row.
+MatrixXd CalcFactor(const MatrixXd& G) {
+  constexpr Index kBlock = 48;
+  constexpr double kAddsNothing = 1e-14;
+  const Index n = G.cols();
+  MatrixXd R = MatrixXd::Zero(n, n);
+  Index rank = 0;
+  for (Index begin = 0; begin < n; begin += kBlock) {
+    const Index size = std::min(kBlock, n - begin), rest = n - begin, first = rank;
+    MatrixXd left = G.block(begin, begin, size, rest);
+    left.noalias() -= R.block(0, begin, first, size).transpose() * R.block(0, begin, first, rest);
+    for (Index i = 0; i < size; ++i) {
+      const Index at = begin + i;
+      VectorXd row = left.row(i).tail(rest - i).transpose();
+      row.noalias() -=
+          R.block(first, at, rank - first, rest - i).transpose() * R.block(first, at, rank - first, 1);
+      // y, the last, is kept whatever is left of it.
+      if (!(row[0] > (at + 1 < n ? kAddsNothing * G(at, at) : 0.0))) continue;
+      R.row(rank++).tail(rest - i) = row.transpose() / std::sqrt(row[0]);
+    }
+  }
+  return R.topRows(rank);
+}
+
 }  // namespace
 
 TorqueEstimator::TorqueEstimator(RecordingSet* recordings, size_t most_causes)
@@ -142,29 +172,24 @@ void TorqueEstimator::Weigh(const VectorXd& left) {
   }
 }
 
-void TorqueEstimator::Compress() {
-  const Index width = rows_.rows.cols();
-  if (rows_.rows.rows() < width) {
-    const Index missing = width - rows_.rows.rows();
-    rows_.rows.conservativeResize(width, Eigen::NoChange);
-    rows_.rows.bottomRows(missing).setZero();
-  }
-  const Eigen::HouseholderQR<MatrixXd> qr(rows_.rows);
-  R_ = qr.matrixQR().topRows(width).triangularView<Eigen::Upper>();
+void TorqueEstimator::Compress() { R_ = CalcFactor(rows_.CalcProducts()); }
+
+Index TorqueEstimator::CountForcedRows() const {
+  return (R_.leftCols(CountForced(*recordings_)).array() != 0.0).rowwise().any().count();
 }
 
 CauseSelection TorqueEstimator::SelectAmong(double alike) const {
   const Index width = R_.cols();
-  const Index forced = CountForced(*recordings_);
+  const Index begin = CountForcedRows(), rows = R_.rows() - begin;
   std::vector<Candidate> candidates;
-  Index at = forced;
+  Index at = CountForced(*recordings_);
   for (const TorqueFault& fault : faults_) {
     Candidate& one = candidates.emplace_back();
     one.fault = fault.fault;
     one.place = fault.place;
     one.unit = fault.unit;
     one.nominal = fault.nominal;
-    one.columns = R_.block(forced, at, width - forced, CountColumns(fault));
+    one.columns = R_.block(begin, at, rows, CountColumns(fault));
     if (barred_[candidates.size() - 1]) one.columns.setZero();
     one.scale = fault.scale;
     one.is_possible = fault.is_possible;
@@ -178,7 +203,7 @@ CauseSelection TorqueEstimator::SelectAmong(double alike) const {
   options.exchanges_pairs = false;
   options.rows = rows_.samples;
   options.alike = alike;
-  return SelectCauses(R_.col(width - 1).tail(width - forced), candidates, options);
+  return SelectCauses(R_.col(width - 1).tail(rows), candidates, options);
 }
 
 std::vector<Index> TorqueEstimator::ListFirstColumns() const {
@@ -198,16 +223,16 @@ VectorXd TorqueEstimator::CalcAmplitudes(const std::vector<CauseTerm>& terms) co
   for (const CauseTerm& term : terms)
     a.segment(first[term.candidate], term.amplitude.size()) = term.amplitude;
   const Index forced = CountForced(*recordings_);
+  const Index rows = CountForcedRows();
   const VectorXd right =
-      R_.col(width).head(forced) - R_.block(0, forced, forced, width - forced) * a.tail(width - forced);
-  if (forced > 0)
-    a.head(forced) = R_.topLeftCorner(forced, forced).completeOrthogonalDecomposition().solve(right);
+      R_.col(width).head(rows) - R_.block(0, forced, rows, width - forced) * a.tail(width - forced);
+  if (rows > 0)
+    a.head(forced) = R_.topLeftCorner(rows, forced).completeOrthogonalDecomposition().solve(right);
   return a;
 }
 
 VectorXd TorqueEstimator::CalcLeft(const std::vector<CauseTerm>& terms) const {
-  const Index width = rows_.rows.cols() - 1;
-  return rows_.rows.col(width) - rows_.rows.leftCols(width) * CalcAmplitudes(terms);
+  return rows_.CalcLeft(CalcAmplitudes(terms));
 }
 
 bool TorqueEstimator::BarSecondPushes() {
@@ -250,22 +275,47 @@ bool TorqueEstimator::BarWeakBodies() {
   return has_any;
 }
 
-VectorXd TorqueEstimator::CalcUsual() const {
+VectorXd TorqueEstimator::Fit(const std::vector<TorqueFault::Kind>& kinds, bool is_plain, Index* rank) const {
   const std::vector<Index> first = ListFirstColumns();
   std::vector<Index> columns;
-  for (Index i = 0; i < CountForced(*recordings_); ++i) columns.push_back(i);
+  std::vector<double> plausible;
+  for (Index i = 0; i < CountForced(*recordings_); ++i) columns.push_back(i), plausible.push_back(1.0);
   for (size_t i = 0; i < faults_.size(); ++i) {
-    const TorqueFault::Kind kind = faults_[i].kind;
-    const bool is_usual = kind == TorqueFault::kDryFriction || kind == TorqueFault::kViscousFriction ||
-                          kind == TorqueFault::kOffset;
-    if (is_usual) columns.push_back(first[i]);
+    const bool is_shape = faults_[i].parameters > 0;
+    if ((is_shape && is_plain) || std::find(kinds.begin(), kinds.end(), faults_[i].kind) == kinds.end())
+      continue;
+    for (Index k = 0; k < CountColumns(faults_[i]); ++k)
+      columns.push_back(first[i] + k), plausible.push_back(CalcPlausible(faults_[i], k));
   }
-  const Index y = rows_.rows.cols() - 1;
+  const Index y = R_.cols() - 1, width = static_cast<Index>(columns.size());
+  MatrixXd C = R_(Eigen::all, columns) * Eigen::Map<const VectorXd>(plausible.data(), width).asDiagonal();
   constexpr double kIndependent = 1e-6;
   Eigen::ColPivHouseholderQR<MatrixXd> qr;
   qr.setThreshold(kIndependent);
-  qr.compute(MatrixXd(R_(Eigen::all, columns)));
-  return rows_.rows.col(y) - rows_.rows(Eigen::all, columns) * qr.solve(R_.col(y));
+  *rank = qr.compute(C).rank();
+  VectorXd right = R_.col(y);
+  if (is_plain) {
+    // What the motion hardly tells stays of plausible size.
+    C.conservativeResize(C.rows() + width, Eigen::NoChange);
+    C.bottomRows(width).setIdentity();
+    right.conservativeResize(C.rows());
+    right.tail(width).setZero();
+    qr.compute(C);
+  }
+  VectorXd a = VectorXd::Zero(y);
+  a(columns) = qr.solve(right).cwiseProduct(Eigen::Map<const VectorXd>(plausible.data(), width));
+  return a;
+}
+
+VectorXd TorqueEstimator::FitPlainly(Index* rank) const {
+  using enum TorqueFault::Kind;
+  return Fit({kMass, kCentre, kInertia, kDryFriction, kViscousFriction, kOffset, kArmature}, true, rank);
+}
+
+VectorXd TorqueEstimator::CalcUsual() const {
+  Index rank = 0;
+  return rows_.CalcLeft(
+      Fit({TorqueFault::kDryFriction, TorqueFault::kViscousFriction, TorqueFault::kOffset}, false, &rank));
 }
 
 double TorqueEstimator::CalcAlike(const VectorXd& left) const {

@@ -26,6 +26,9 @@ class TorqueEstimator {
   [[nodiscard]] const TorqueRows& rows() const { return rows_; }
   /// Amplitudes of all columns under these terms; those that are part of every explanation follow from them.
   [[nodiscard]] VectorXd CalcAmplitudes(const std::vector<CauseTerm>& terms) const;
+  /// Amplitudes of a plain least-squares fit of all bodies' numbers, friction, offsets and armatures.
+  /// @param rank how many of them the motion tells.
+  [[nodiscard]] VectorXd FitPlainly(Eigen::Index* rank) const;
   /// What these terms leave, by row.
   [[nodiscard]] VectorXd CalcLeft(const std::vector<CauseTerm>& terms) const;
 
@@ -39,6 +42,8 @@ class TorqueEstimator {
   void Weigh(const VectorXd& left);
   /// As many rows as there are independent ones.
   void Compress();
+  /// Of these, those that columns which are part of every explanation have.
+  [[nodiscard]] Eigen::Index CountForcedRows() const;
   [[nodiscard]] CauseSelection SelectAmong(double alike) const;
   [[nodiscard]] std::vector<Eigen::Index> ListFirstColumns() const;
   /// One stretch of time has one push: others would share its force.
@@ -47,6 +52,10 @@ class TorqueEstimator {
   /// explain much: drives have friction of more shapes than are tried, and a wrong mass fits a little of any.
   /// @return whether there are others to be chosen.
   bool BarWeakBodies();
+  /// Amplitudes of a least-squares fit of drives' gains and faults of these kinds, friction in all its
+  /// shapes; a plain one has the simplest only, and plausible sizes as a prior.
+  [[nodiscard]] VectorXd Fit(const std::vector<TorqueFault::Kind>& kinds, bool is_plain,
+                             Eigen::Index* rank) const;
   /// What drives' gains, friction and offsets leave, which no robot is without.
   [[nodiscard]] VectorXd CalcUsual() const;
   /// How many samples say the same, by how alike blocks are that follow one another.
@@ -59,7 +68,7 @@ class TorqueEstimator {
   std::vector<TorqueFault> faults_;
   std::vector<bool> barred_;  // of these
   TorqueRows rows_;
-  MatrixXd R_;  // of rows_
+  MatrixXd R_;  // with the products of rows_
   CauseSelection selection_;
 };
 

@@ -43,70 +43,123 @@ Eigen::SparseMatrix<double> MapColumns(const TorqueBalance& balance, size_t plac
 
 namespace {
 
-template <typename Rows>
-void FillPush(const RecordingSet& recordings, const Push& push, const TorqueRows::Part& part,
-              const TorqueBalance& balance, Index at, Rows& target) {
+using Entries = std::vector<Eigen::Triplet<double>>;
+
+void AddPush(const RecordingSet& recordings, const Push& push, const TorqueRows::Part& part, Index at,
+             Entries* entries) {
   if (static_cast<size_t>(push.recording) != part.recording) return;
   const double noise = recordings[part.recording].weight[static_cast<Index>(part.place)];
-  for (size_t b = 0; b < balance.blocks().size(); ++b) {
-    const TorqueBalance::Block& block = balance.blocks()[b];
+  for (size_t b = 0; b < part.balance->blocks().size(); ++b) {
+    const TorqueBalance::Block& block = part.balance->blocks()[b];
     if (block.to < push.from || block.from > push.to || !(block.counts[part.place] > 0.0)) continue;
     const Index row = part.within + static_cast<Index>(b);
-    const double count = std::sqrt(block.counts[part.place]);
+    const double count = std::sqrt(block.counts[part.place]) / noise;
     if (push.link >= 0) {
-      target.row(row).segment(at, 3) =
-          block.forces.block<1, 3>(static_cast<Index>(part.place), 6 * push.link) / block.samples * count /
-          noise;
+      for (int k = 0; k < 3; ++k)
+        entries->emplace_back(
+            row, at + k,
+            block.forces(static_cast<Index>(part.place), 6 * push.link + k) / block.samples * count);
     } else if (recordings.joints()[part.place] == push.joint) {
-      target(row, at) = count / noise;
+      entries->emplace_back(row, at, count);
     }
   }
 }
 
-void FillPart(const RecordingSet& recordings, const std::vector<TorqueFault>& faults,
-              const TorqueRows::Part& part, const MatrixXd& rows, bool is_held, MatrixXd* all) {
-  const TorqueBalance& balance = is_held ? *recordings[part.recording].held : *recordings[part.recording].fit;
+/// y and what is part of every explanation.
+void AddForced(const RecordingSet& recordings, const TorqueRows::Part& part, Index y, Entries* entries) {
+  entries->emplace_back(part.map.rows() - 1, y, 1.0);
+  if (!recordings.has_currents()) return;
+  // k i = (1 + a) tau + ...: how much the gain is off is part of every explanation.
   const int joint = recordings.joints()[part.place];
-  auto target = all->middleRows(part.begin, part.size);
-  target.rightCols(1) = rows.rightCols(1);
-  if (recordings.has_currents()) {
-    // k i = (1 + a) tau + ...: how much the gain is off is part of every explanation.
-    target.rightCols(1) +=
-        recordings.gain(part.place) * rows.col(balance.Find(part.place, {TorqueColumn::kCurrent, joint}));
-    target.col(static_cast<Index>(part.place)) =
-        rows.col(balance.Find(part.place, {TorqueColumn::kTorque, joint}));
-  }
-  Index at = CountForced(recordings);
-  target.middleCols(at, CountColumns(faults)) +=
-      rows * MapColumns(balance, part.place, part.recording, faults);
+  const Index current = part.balance->Find(part.place, {TorqueColumn::kCurrent, joint});
+  const Index torque = part.balance->Find(part.place, {TorqueColumn::kTorque, joint});
+  entries->emplace_back(current, y, recordings.gain(part.place));
+  entries->emplace_back(torque, static_cast<Index>(part.place), 1.0);
+}
+
+void FillPart(const RecordingSet& recordings, const std::vector<TorqueFault>& faults, Index columns,
+              TorqueRows::Part* part) {
+  const Index forced = CountForced(recordings);
+  const double weight = recordings[part->recording].weight[static_cast<Index>(part->place)];
+  const Eigen::SparseMatrix<double> map = MapColumns(*part->balance, part->place, part->recording, faults);
+  part->map.resize(map.rows(), columns);
+  Entries entries, pushes;
+  AddForced(recordings, *part, columns - 1, &entries);
+  for (Index column = 0; column < map.cols(); ++column)
+    for (Eigen::SparseMatrix<double>::InnerIterator it(map, column); it; ++it)
+      entries.emplace_back(it.row(), forced + column, it.value());
+  part->map.setFromTriplets(entries.begin(), entries.end());
+  part->map /= weight;
+  Index at = forced;
   for (const TorqueFault& fault : faults) {
-    if (fault.kind == TorqueFault::kPush) FillPush(recordings, fault.push, part, balance, at, target);
+    if (fault.kind == TorqueFault::kPush) AddPush(recordings, fault.push, *part, at, &pushes);
     at += CountColumns(fault);
   }
+  part->pushes.resize(part->size, columns);
+  part->pushes.setFromTriplets(pushes.begin(), pushes.end());
+}
+
+/// Those that have entries.
+std::vector<Index> ListUsed(const Eigen::SparseMatrix<double>& map) {
+  std::vector<Index> used;
+  for (Index column = 0; column < map.cols(); ++column)
+    if (map.outerIndexPtr()[column + 1] > map.outerIndexPtr()[column]) used.push_back(column);
+  return used;
 }
 
 }  // namespace
 
+VectorXd TorqueRows::Multiply(const VectorXd& a) const {
+  VectorXd product(parts.empty() ? 0 : parts.back().begin + parts.back().size);
+  for (const Part& part : parts)
+    product.segment(part.begin, part.size) =
+        part.balance->rows(part.place) * (part.map * a) + part.pushes * a;
+  return product;
+}
+
+VectorXd TorqueRows::CalcLeft(const VectorXd& a) const {
+  VectorXd signs(columns);
+  signs << -a, 1.0;
+  return Multiply(signs);
+}
+
+MatrixXd TorqueRows::CalcProducts() const {
+  MatrixXd products = MatrixXd::Zero(columns, columns);
+  for (const Part& part : parts) {
+    const MatrixXd& rows = part.balance->rows(part.place);
+    const MatrixXd reduced = part.balance->products(part.place) * part.map;
+    const std::vector<Index> used = ListUsed(part.map);
+    products(used, used) += MatrixXd(part.map.transpose() * reduced(Eigen::all, used))(used, Eigen::all);
+    if (part.pushes.nonZeros() == 0) continue;
+    const MatrixXd crossed = (part.pushes.transpose() * rows) * part.map;
+    products += crossed + crossed.transpose() + MatrixXd(part.pushes.transpose() * part.pushes);
+  }
+  return products;
+}
+
 TorqueRows MakeTorqueRows(const RecordingSet& recordings, const std::vector<TorqueFault>& faults,
                           bool is_held) {
   TorqueRows all;
-  std::vector<MatrixXd> rows;
+  all.columns = CountForced(recordings) + CountColumns(faults) + 1;
   Index height = 0;
   for (size_t r = 0; r < recordings.size(); ++r) {
     const TorqueBalance& balance = is_held ? *recordings[r].held : *recordings[r].fit;
     for (size_t place = 0; place < recordings.joints().size(); ++place) {
       if (!recordings.IsJudged(place)) continue;
-      rows.push_back(balance.CalcRows(place) / recordings[r].weight[static_cast<Index>(place)]);
-      const Index size = rows.back().rows();
-      all.parts.push_back({r, place, height, size - static_cast<Index>(balance.blocks().size()), size,
-                           balance.samples(place)});
-      all.samples += balance.samples(place);
+      const Index size = balance.rows(place).rows();
+      TorqueRows::Part& part = all.parts.emplace_back(
+          TorqueRows::Part{.recording = r,
+                           .place = place,
+                           .begin = height,
+                           .within = size - static_cast<Index>(balance.blocks().size()),
+                           .size = size,
+                           .samples = balance.samples(place),
+                           .balance = &balance});
+      FillPart(recordings, faults, all.columns, &part);
+      all.samples += part.samples;
       height += size;
     }
   }
-  all.rows = MatrixXd::Zero(height, CountForced(recordings) + CountColumns(faults) + 1);
-  for (size_t i = 0; i < rows.size(); ++i)
-    FillPart(recordings, faults, all.parts[i], rows[i], is_held, &all.rows);
   return all;
 }
 

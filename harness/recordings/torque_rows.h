@@ -11,6 +11,7 @@
 
 namespace dexcheck {
 
+/// They are kept as factors: a joint's rows are those of its balance times a map of few entries.
 struct TorqueRows {
   /// Those of a joint in a recording.
   struct Part {
@@ -18,10 +19,21 @@ struct TorqueRows {
     Eigen::Index begin, within,
         size;        ///< The first; how many are those within blocks, before the blocks'; all.
     double samples;  ///< That they stand for.
+    const TorqueBalance* balance = nullptr;
+    Eigen::SparseMatrix<double> map = {};     ///< Of the balance's columns to all.
+    Eigen::SparseMatrix<double> pushes = {};  ///< What pushes add to the rows.
   };
   std::vector<Part> parts;
-  MatrixXd rows;  ///< Columns that are part of every explanation, then the faults', y last.
   double samples = 0.0;
+  /// Columns that are part of every explanation, then the faults', y last.
+  Eigen::Index columns = 0;
+
+  /// rows * a.
+  [[nodiscard]] VectorXd Multiply(const VectorXd& a) const;
+  /// y - columns * a.
+  [[nodiscard]] VectorXd CalcLeft(const VectorXd& a) const;
+  /// rows^T rows.
+  [[nodiscard]] MatrixXd CalcProducts() const;
 };
 
 /// @param is_held the quarter that is kept for the end.

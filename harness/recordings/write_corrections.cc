@@ -104,16 +104,23 @@ MassProperties Move(const MassProperties& body, const Pose& X) {
 
 /// A link's body with what is added to it, in the frame of the part of that name.
 MassProperties Correct(const RobotDescription& robot, int link, const TorqueRegressor::BodyVector& change,
-                       bool* is_of_part) {
+                       CorrectedFile* file) {
   const std::string& name = robot.spec.joints[static_cast<size_t>(link)].link;
   const auto part = std::find_if(robot.parts.begin(), robot.parts.end(), [&](const DescribedPart& one) {
     return one.name == name && one.joint == link;
   });
-  *is_of_part = part != robot.parts.end();
-  const Pose X = *is_of_part ? part->X_iL : Pose::Identity();
+  const bool is_of_part = part != robot.parts.end();
+  const Pose X = is_of_part ? part->X_iL : Pose::Identity();
   const MassProperties before =
-      *is_of_part ? Move(part->body, X) : robot.spec.joints[static_cast<size_t>(link)].body;
-  return Move(TorqueRegressor::Unpack(TorqueRegressor::Pack(before) + change), X.inverse());
+      is_of_part ? Move(part->body, X) : robot.spec.joints[static_cast<size_t>(link)].body;
+  TorqueRegressor::BodyVector after = TorqueRegressor::Pack(before) + change;
+  // Each correction is of a body that can be; several together need not be.
+  if (!IsBody(after) && IsBody(TorqueRegressor::Pack(before))) {
+    after = FindNearestBody(after);
+    file->left.push_back("link " + name +
+                         ": what was found is together no body that can be; the nearest one is written");
+  }
+  return Move(TorqueRegressor::Unpack(after), X.inverse());
 }
 
 /// The first element of that kind and name below one.
@@ -165,7 +172,7 @@ class XmlCopy {
         GetChild(document_.RootElement(), "option", true)
             ->SetAttribute("gravity", Join(*corrections.gravity, " ").c_str());
     }
-    for (const auto& [link, change] : corrections.bodies) WriteBody(link, change, is_urdf);
+    for (const auto& [link, change] : corrections.bodies) WriteBody(link, change, is_urdf, file);
     return PrintXml(document_);
   }
 
@@ -183,9 +190,8 @@ class XmlCopy {
     file->left.push_back(what);
   }
 
-  void WriteBody(int link, const TorqueRegressor::BodyVector& change, bool is_urdf) {
-    bool is_of_part = false;
-    const MassProperties body = Correct(robot_, link, change, &is_of_part);
+  void WriteBody(int link, const TorqueRegressor::BodyVector& change, bool is_urdf, CorrectedFile* file) {
+    const MassProperties body = Correct(robot_, link, change, file);
     XMLElement* inertial =
         GetChild(GetElement(is_urdf ? "link" : "body", robot_.spec.joints[static_cast<size_t>(link)].link),
                  "inertial", true);
@@ -221,7 +227,7 @@ class TomlCopy {
       lines_.push_back(at);
   }
 
-  std::string Write(const Corrections& corrections) {
+  std::string Write(const Corrections& corrections, CorrectedFile* file) {
     const auto set = [&](const std::map<int, double>& values, const char* key) {
       for (const auto& [joint, value] : values)
         Set(GetTable("joints", robot_.spec.joints[static_cast<size_t>(joint)].name), key, Show(value));
@@ -230,8 +236,7 @@ class TomlCopy {
     set(corrections.viscous, "damping");
     set(corrections.armature, "armature");
     for (const auto& [link, change] : corrections.bodies) {
-      bool is_of_part = false;
-      const MassProperties body = Correct(robot_, link, change, &is_of_part);
+      const MassProperties body = Correct(robot_, link, change, file);
       const toml::table& table = GetTable("links", robot_.spec.joints[static_cast<size_t>(link)].link);
       Set(table, "mass", Show(body.mass));
       Set(table, "com", "[" + Join(body.com, ", ") + "]");
@@ -297,7 +302,7 @@ CorrectedFile WriteCorrections(const RobotDescription& robot, const std::string&
                                const RecordingJudgement& judgement) {
   CorrectedFile file;
   const Corrections corrections = Collect(RobotModel(robot.spec), judgement, &file);
-  file.text = robot.format == RobotFormat::kToml ? TomlCopy(robot, text).Write(corrections)
+  file.text = robot.format == RobotFormat::kToml ? TomlCopy(robot, text).Write(corrections, &file)
                                                  : XmlCopy(robot, text).Write(corrections, &file);
   return file;
 }

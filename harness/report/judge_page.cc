@@ -28,8 +28,10 @@ class JudgePage {
     json_["robot"] = model_.name();
     const auto recordings = static_cast<int>(json_.at("recordings").size());
     for (int i = 0; i < recordings; ++i) json_["begins"].push_back(FindTimeBegin(judgement_, i));
+    // The recording's own come first: velocities, positions.
+    const size_t own = judgement_.causes.size() - judgement_.found.size();
     for (size_t i = 0; i < judgement_.causes.size(); ++i)
-      AddToCause(judgement_.causes[i], judgement_.found[i], &json_.at("causes")[i]);
+      AddToCause(i < own ? nullptr : &judgement_.found[i - own], &json_.at("causes")[i]);
     std::vector<std::vector<Figure>> figures;
     figures.reserve(static_cast<size_t>(recordings));
     std::vector<PlotGroup> groups;
@@ -45,11 +47,11 @@ class JudgePage {
   }
 
  private:
-  /// Its rival and recording, and what it is at each joint.
-  void AddToCause(const Explanation& cause, const FoundFault& found, Json* json) const {
-    (*json)["rival"] = cause.rival;
-    (*json)["log_odds"] = cause.log_odds;
-    const TorqueFault& fault = found.fault;
+  /// Its recording, and what it is at each joint.
+  void AddToCause(const FoundFault* found, Json* json) const {
+    (*json)["recording"] = -1;
+    if (found == nullptr) return;
+    const TorqueFault& fault = found->fault;
     const int recording = fault.kind == TorqueFault::kPush ? fault.push.recording : fault.recording;
     (*json)["recording"] = recording;
     using enum TorqueFault::Kind;
@@ -67,8 +69,8 @@ class JudgePage {
                        {"fault", is_viscous ? "viscous friction"
                                  : is_dry   ? "dry friction"
                                             : "torque offset"},
-                       {"value", nominal + found.amplitude[at]},
-                       {"error", found.error[at]},
+                       {"value", nominal + found->amplitude[at]},
+                       {"standard_error", found->error[at]},
                        {"unit", is_viscous ? (turns ? "N m s/rad" : "N s/m")
                                 : turns    ? "N m"
                                            : "N"}});

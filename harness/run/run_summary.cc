@@ -86,29 +86,6 @@ Json ToJson(const JointMargins& margins) {
   return json;
 }
 
-Json ToJson(const Explanation& one) {
-  constexpr const char* kOutcomes[] = {"named", "named up to a class", "not explained"};
-  Json json = {{"channel", NameOf(one.channel)},
-               {"outcome", kOutcomes[static_cast<int>(one.outcome)]},
-               {"faults", Json::array()},
-               {"from_s", one.from},
-               {"to_s", one.to},
-               {"ends", one.ends},
-               {"fraction", one.fraction},
-               {"left", one.left},
-               {"rival", one.rival},
-               {"log_odds", one.log_odds}};
-  for (const Fault& fault : one.faults) {
-    json["faults"].push_back({{"fault", fault.fault},
-                              {"place", fault.place},
-                              {"value", fault.value},
-                              {"standard_error", fault.error},
-                              {"unit", fault.unit},
-                              {"detail", fault.detail}});
-  }
-  return json;
-}
-
 }  // namespace
 
 const char* NameOf(Verdict verdict) {

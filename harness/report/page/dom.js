@@ -26,20 +26,20 @@ const TellOdds = odds => odds > 46 ? 'more than 1e20' : Number(Math.exp(odds).to
     @param columns [[head, cause => cell]] besides. */
 const CauseTable = (causes, columns = []) => {
   const Fault = (fault, parts) => Add(Make('div'), Make('b', `${fault.place}: ${fault.fault}`),
-    ...(parts || (fault.value === 0 && !fault.error) ? [] : [' ', Make('span', TellValue(fault.value, fault.error, fault.unit), {className: 'number'})]),
+    ...(parts || (fault.value === 0 && !fault.standard_error) ? [] : [' ', Make('span', TellValue(fault.value, fault.standard_error, fault.unit), {className: 'number'})]),
     parts ? '' : fault.detail ? ' ' + fault.detail : '');
   const Parts = parts => {
     const joints = [...new Set(parts.map(part => part.joint))], kinds = [...new Set(parts.map(part => part.fault))];
     const unit = kind => parts.find(part => part.fault === kind).unit;
     // From 0, with a whisker of the standard error on either side.
     const Interval = part => {
-      const all = parts.filter(({fault}) => fault === part.fault).map(({value, error}) => [value - error, value + error, 0]).flat().filter(Number.isFinite);
+      const all = parts.filter(({fault}) => fault === part.fault).map(({value, standard_error: e}) => [value - e, value + e, 0]).flat().filter(Number.isFinite);
       const low = Math.min(...all), span = Math.max(...all) - low || 1, At = x => `${(100 * (x - low) / span).toFixed(1)}%`;
       const Bar = (tag, from, to) => Make(tag, '', {style: `left: ${At(from)}; width: ${(100 * (to - from) / span).toFixed(1)}%`});
       return Add(Make('span', '', {className: 'interval'}), Bar('i', Math.min(part.value, 0), Math.max(part.value, 0)),
-        ...(part.error === null ? [] : [Bar('b', part.value - part.error, part.value + part.error)]));
+        ...(part.standard_error === null ? [] : [Bar('b', part.value - part.standard_error, part.value + part.standard_error)]));
     };
-    const Cell = part => part ? Add(Make('div'), TellValue(part.value, part.error), Interval(part)) : '';
+    const Cell = part => part ? Add(Make('div'), TellValue(part.value, part.standard_error), Interval(part)) : '';
     return Add(Make('div', '', {className: 'parts'}), Table(['joint', ...kinds.map(kind => `${kind}, ${unit(kind)}`)], joints.map(joint => [joint,
       ...kinds.map(kind => Cell(parts.find(part => part.joint === joint && part.fault === kind)))])));
   };

@@ -37,7 +37,7 @@
         const begin = data.begins[Math.max(cause.recording, 0)];
         const place = several && cause.recording >= 0 ? `in ${data.recordings[cause.recording]}` : '';
         const faults = cause.faults.map(fault => fault.detail?.endsWith(place) ? fault : {...fault, detail: [fault.detail, place].filter(Boolean).join(' ')});
-        return {...cause, faults, when: cause.from === undefined ? null : [cause.from - begin, cause.to - begin]};
+        return {...cause, faults, when: cause.from_s === null ? null : [cause.from_s - begin, cause.to_s - begin]};
       }), [['explains', Meter]])));
   }
 

@@ -32,8 +32,7 @@
 
   // What explains the residuals. Faults of one row are not told apart by this motion.
   if (run.causes.length) {
-    AddSection('Causes', Card('scroll', CauseTable(run.causes.map(cause => ({...cause, when: [cause.from_s, cause.ends ? cause.to_s : null],
-      faults: cause.faults.map(fault => ({...fault, error: fault.standard_error}))})), [['where seen', cause => cause.channel],
+    AddSection('Causes', Card('scroll', CauseTable(run.causes.map(cause => ({...cause, when: [cause.from_s, cause.ends ? cause.to_s : null]})), [['where seen', cause => cause.channel],
       ['explained', cause => `${Number((100 * cause.fraction).toPrecision(3))} %`]])));
   }
 

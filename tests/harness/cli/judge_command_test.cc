@@ -71,6 +71,11 @@ TEST_F(JudgeCommand, NamesWhatIsMissingAndWritesIt) {
   EXPECT_EQ(fault["fault"], "dry friction");
   EXPECT_EQ(fault["place"], "joint panda_joint4");
   EXPECT_NEAR(fault["value"], 0.5, 0.01);
+  EXPECT_LT(fault["standard_error"], 0.01);
+  EXPECT_EQ(json["causes"][0]["outcome"], "named");
+  EXPECT_TRUE(json["causes"][0]["from_s"].is_null()) << "it holds always";
+  EXPECT_EQ(json["held_out"]["causes"]["numbers"], 1);
+  EXPECT_GT(json["held_out"]["all"]["numbers"], 50);
   Expect(0, "judge right.toml faulty.csv --quiet");
   EXPECT_THAT(Read("right.toml"), HasSubstr("# The Franka Emika Panda arm")) << "comments stay";
 }

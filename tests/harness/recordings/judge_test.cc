@@ -126,6 +126,91 @@ TEST(Judge, PositionsInDegreesAreSaid) {
   EXPECT_TRUE(NamesOnly(Judge(table), "unit of the positions", "all joints", 180.0 / kPi));
 }
 
+TEST(Judge, StribeckFrictionIsNamed) {
+  constexpr double kFriction = 3.0, kVelocity = 0.15;
+  const RecordedFault stribeck = {.act = [](double, const mjModel&, mjData* data) {
+    const double v = data->qvel[1];
+    data->qfrc_applied[1] -= kFriction * std::exp(-v * v / (kVelocity * kVelocity)) * std::tanh(v / 0.02);
+  }};
+  std::mt19937 random(3);
+  RecordingOptions options;
+  options.has_velocities = true;
+  options.encoder_bits = 16;
+  options.torque_noise = options.velocity_noise = 1e-3;
+  const RecordingJudgement judgement = Judge(RecordRobot(kMjcf, {stribeck}, options, &random));
+  ASSERT_FALSE(judgement.causes.empty());
+  const Fault& first = judgement.causes[0].faults[0];
+  EXPECT_EQ(first.place + ": " + first.fault, "joint panda_joint2: Stribeck friction") << Tell(judgement);
+  EXPECT_GT(first.value, 0.0);
+  EXPECT_LT(judgement.balances[1].left, 0.5 * judgement.balances[1].residual);
+}
+
+TEST(Judge, AMeasuredWrenchIsNoCause) {
+  constexpr int kLink = 6;
+  const auto calc_force = [](double t, int k) { return 10.0 * std::sin((k + 1.0) * t + k); };
+  const RecordedFault push = {.act = [&](double t, const mjModel& m, mjData* data) {
+    for (int k = 0; k < 3; ++k) data->xfrc_applied[6 * m.jnt_bodyid[kLink] + k] = calc_force(t, k);
+  }};
+  RecordedTable table = Record({push});
+  EXPECT_FALSE(Judge(table).Agrees());
+  const std::vector<double> times = table.columns[0];
+  for (int k = 0; k < 6; ++k) {
+    table.names.push_back("wrench" + std::to_string(k));
+    std::vector<double>& column = table.columns.emplace_back();
+    for (const double t : times) column.push_back(k < 3 ? calc_force(t, k) : 0.0);
+  }
+  std::vector<Recording> recordings;
+  recordings.push_back(ToRecording(Panda(), table));
+  recordings[0].wrench = {kLink, Panda().joint(kLink).body.com, /*is_world=*/true};
+  for (int k = 0; k < 6; ++k)
+    recordings[0].channels.push_back(
+        {RecordedQuantity::kWrench, k, table.names.size() - 6 + static_cast<size_t>(k)});
+  const RecordingJudgement judgement = JudgeRecordings(Panda(), &recordings, {});
+  EXPECT_TRUE(judgement.Agrees()) << Tell(judgement);
+}
+
+TEST(Judge, ARecordedMotionOfTheBaseIsNoCause) {
+  // The base is turned, and moves to and fro: in its axes that is another gravity, and a force on each body.
+  const Eigen::Quaterniond turned(Eigen::AngleAxisd(0.4, Vector3d(1.0, 2.0, 0.5).normalized()));
+  constexpr double kReach = 0.05, kRate = 4.0;
+  const RecordedFault moved = {
+      .change =
+          [&](mjModel* robot) {
+            const Vector3d g = turned.conjugate() * Eigen::Map<Vector3d>(robot->opt.gravity);
+            Eigen::Map<Vector3d>(robot->opt.gravity) = g;
+          },
+      .act =
+          [&](double t, const mjModel& m, mjData* data) {
+            const Vector3d a =
+                turned.conjugate() * Vector3d(-kReach * kRate * kRate * std::sin(kRate * t), 0, 0);
+            for (int body = 1; body < m.nbody; ++body)
+              for (int k = 0; k < 3; ++k) data->xfrc_applied[6 * body + k] = -m.body_mass[body] * a[k];
+          }};
+  RecordedTable table = Record({moved});
+  EXPECT_FALSE(Judge(table).Agrees());
+  const std::vector<double> times = table.columns[0];
+  const double rest[] = {0.0, 0.3, 0.5, turned.w(), turned.x(), turned.y(), turned.z()};
+  for (int k = 0; k < 7; ++k) {
+    table.names.push_back("pose" + std::to_string(k));
+    std::vector<double>& column = table.columns.emplace_back();
+    for (const double t : times) column.push_back(k == 0 ? kReach * std::sin(kRate * t) : rest[k]);
+  }
+  std::vector<Recording> recordings;
+  recordings.push_back(ToRecording(Panda(), table));
+  for (int k = 0; k < 7; ++k)
+    recordings[0].channels.push_back(
+        {RecordedQuantity::kBase, k, table.names.size() - 7 + static_cast<size_t>(k)});
+  const RecordingJudgement judgement = JudgeRecordings(Panda(), &recordings, {});
+  EXPECT_TRUE(judgement.Agrees()) << Tell(judgement);
+}
+
+TEST(Judge, NamedCausesPredictNoWorseThanAllNumbers) {
+  const RecordingJudgement judgement = Judge(Record({DryFriction(1, 1.5), DryFriction(3, 1.0)}));
+  EXPECT_EQ(judgement.by_causes.numbers, 2);
+  EXPECT_GT(judgement.by_all.numbers, 50) << "base parameters, friction, offsets and armatures";
+  EXPECT_LE(judgement.by_causes.held_left, 1.02 * judgement.by_all.held_left);
+}
+
 TEST(Judge, RepeatedAndDoubledRowsAreLeftOut) {
   const RecordedTable once = Record({DryFriction(1, 1.5)});
   RecordedTable table = once;
@@ -203,6 +288,31 @@ TEST(Judge, WritesWhatItFoundIntoACopyOfTheModel) {
   ExpectCorrected("mjcf/panda.xml", "Franka Emika Panda, fixed base.", table);
 }
 
+TEST(Judge, WritesABodyThatCanBe) {
+  const std::string file = SourcePath("/controller/parameters/panda.toml");
+  const RobotDescription robot = ReadDescription(file);
+  constexpr int kLink = 3;
+  RecordingJudgement judgement;
+  for (const TorqueFault& fault : ListTorqueFaults(Panda(), {kLink}, 1)) {
+    if (fault.index != kLink || fault.place != "link " + Panda().link_name(kLink)) continue;
+    VectorXd amplitude = VectorXd::Zero(static_cast<Eigen::Index>(fault.columns.size()));
+    if (fault.kind == TorqueFault::kMass) amplitude[0] = -0.9 * fault.nominal;
+    if (fault.kind == TorqueFault::kInertia) amplitude[0] = -0.5 * Panda().joint(kLink).body.inertia(0, 0);
+    if (amplitude.isZero()) continue;
+    judgement.found.push_back({fault, amplitude, amplitude});
+  }
+  ASSERT_EQ(judgement.found.size(), 2U);
+  const CorrectedFile corrected = WriteCorrections(robot, ReadBytes(file), judgement);
+  ASSERT_EQ(corrected.left.size(), 1U);
+  EXPECT_THAT(corrected.left[0], ::testing::HasSubstr("the nearest one is written"));
+  const TemporaryFolder folder;
+  std::ofstream(folder.path() / "copy.toml") << corrected.text;
+  const RobotModel copy(ReadDescription(folder.path() / "copy.toml").spec);
+  EXPECT_TRUE(IsBody(TorqueRegressor::Pack(copy.joint(kLink).body)));
+  EXPECT_NEAR(copy.joint(kLink).body.mass, 0.1 * Panda().joint(kLink).body.mass,
+              0.05 * Panda().joint(kLink).body.mass);
+}
+
 TEST(Judge, TwoRecordingsDifferByWhatOneRobotHas) {
   const RecordedTable first = Record({DryFriction(1, 2.0)});
   RecordedTable second = Record({DryFriction(1, 2.0), DryFriction(3, 1.0)});
@@ -241,7 +351,9 @@ TEST(JudgeCampaign, NamesDrawnFaults) {
   const char* several = std::getenv("DEXCHECK_TOGETHER");
   const int together = several == nullptr ? 1 : std::atoi(several);
   std::mt19937 random(7);
-  int counts[4] = {};
+  int counts[4] = {}, worse = 0;
+  double logs = 0.0;
+  long numbers = 0, all_numbers = 0;
   for (int i = 0; i < draws; ++i) {
     std::vector<RecordedFault> faults = {DrawRecordedFault(kMjcf, i % CountRecordedFaultKinds(), &random)};
     while (static_cast<int>(faults.size()) < together) {
@@ -253,6 +365,11 @@ TEST(JudgeCampaign, NamesDrawnFaults) {
     const RecordingJudgement judgement = Judge(RecordRobot(kMjcf, faults, options, &random));
     const Score score = ScoreOf(judgement, faults);
     ++counts[static_cast<int>(score)];
+    const double ratio = judgement.by_causes.held_left / judgement.by_all.held_left;
+    logs += std::log(ratio);
+    worse += ratio > 1.05 ? 1 : 0;
+    numbers += judgement.by_causes.numbers;
+    all_numbers += judgement.by_all.numbers;
     constexpr const char* kNames[] = {"named", "class", "missed", "WRONG"};
     if (score != Score::kNamed || asked != nullptr)
       std::cout << i << " " << kNames[static_cast<int>(score)] << ":";
@@ -263,7 +380,9 @@ TEST(JudgeCampaign, NamesDrawnFaults) {
     }
   }
   std::cout << "named " << counts[0] << " class " << counts[1] << " missed " << counts[2] << " wrong "
-            << counts[3] << "\n";
+            << counts[3] << "\nheld out, left by the causes' numbers (" << numbers / draws
+            << " on average) over that of all (" << all_numbers / draws << "): " << std::exp(logs / draws)
+            << ", more than 1.05 in " << worse << "\n";
   EXPECT_GE(counts[0] + counts[1], 9 * draws / 10);
   EXPECT_LE(counts[3], draws / 50);
 }

@@ -289,6 +289,15 @@ TEST_F(Formats, ColumnsAreNamedInAFile) {
   EXPECT_THAT(problem("t = 1\nq = [2]\ntau = [2]\n"), HasSubstr("column 2 is both q and tau"));
   EXPECT_THAT(problem("t = 1\nq = [2]\n"), HasSubstr("has no column that is known as a joint's torque"));
   EXPECT_THAT(problem("t = 1\nq = [2]\ntau = [4]\ntorque = [5]\n"), HasSubstr("torque"));
+  const std::string some = "t = 1\nq = [2]\ntau = [4]\n";
+  EXPECT_THAT(problem(some + "wrench = [3]\n"), HasSubstr("wrench: must be a table, with a link"));
+  EXPECT_THAT(problem(some + "wrench = { columns = [3, 5], link = \"link 2\" }\n"),
+              HasSubstr("wrench.columns: must be 6 columns"));
+  EXPECT_THAT(problem(some + "wrench = { columns = [3], link = \"hand\" }\n"),
+              HasSubstr("wrench.link: must be a moving link of"));
+  EXPECT_THAT(problem(some + "wrench = { columns = [3], link = \"link 2\", axes = \"tool\" }\n"),
+              HasSubstr("wrench.axes: must be \"link\" or \"world\""));
+  EXPECT_THAT(problem(some + "base = [3, 5]\n"), HasSubstr("base: must be 7 columns"));
 }
 
 }  // namespace

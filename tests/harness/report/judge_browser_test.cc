@@ -164,17 +164,7 @@ TEST_F(JudgeBrowserTest, ClassesAndClocksAreTold) {
                             {"left", 0.2},
                             {"noise", 0.1},
                             {"held_left", 0.3}});
-  for (const Explanation& one : judgement.causes) {
-    Json& cause = json["causes"].emplace_back(Json{{"outcome", one.faults.size() > 1 ? "class" : "named"},
-                                                   {"fraction", 0.5},
-                                                   {"faults", Json::array()}});
-    if (std::isfinite(one.from)) cause["from"] = one.from, cause["to"] = one.to;
-    for (const Fault& fault : one.faults)
-      cause["faults"].push_back(
-          {{"fault", fault.fault}, {"place", fault.place}, {"value", fault.value}, {"unit", fault.unit}});
-    for (size_t k = 0; k < one.faults.size(); ++k)
-      cause["faults"][k]["error"] = std::isfinite(one.faults[k].error) ? Json(one.faults[k].error) : Json();
-  }
+  for (const Explanation& one : judgement.causes) json["causes"].push_back(ToJson(one));
   const std::filesystem::path page = folder_.path() / "judged.html";
   std::ofstream(page) << MakeJudgePage(model, judgement, json);
   browser_.SetViewport(1280, 4000);
