@@ -116,6 +116,11 @@ void RunChecks::JudgeModel(const StepRecord& step) {
   model_.Merge(*controller_);
 }
 
+void RunChecks::Look(const StepRecord& step) {
+  differs_ = false;
+  analyzer_.Begin(step, *declared_step_);
+}
+
 void RunChecks::JudgeSettling(const StepRecord& step) {
   Analyze(step);
   Evaluate(CheckInfo::kSettling, step.time);
@@ -130,16 +135,14 @@ void RunChecks::JudgeStep(const StepRecord& step) {
 void RunChecks::JudgeUnsent(const StepRecord& step) {
   if (!law_ || !law_->IsComputed(step.command)) return;
   JudgeModel(step);
-  differs_ = false;
-  analyzer_.Begin(step, *declared_step_);
+  Look(step);
   unsent_.torque = law_->CompareTorque(step, ReadLawTerms(step));
   analyzer_.SetLaw(&unsent_);
   Evaluate(CheckInfo::kUnsent, step.time);
 }
 
 void RunChecks::Analyze(const StepRecord& step) {
-  differs_ = false;
-  analyzer_.Begin(step, *declared_step_);
+  Look(step);
   analyzer_.Analyze();
 }
 

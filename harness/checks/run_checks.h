@@ -39,6 +39,8 @@ class RunChecks {
 
   /// Before a step that the motors may refuse. @param time of the step, s.
   void JudgeEffort(const StepRecord& step, double time);
+  /// Looks at a step that no check judges.
+  void Look(const StepRecord& step);
   /// While everything settles.
   void JudgeSettling(const StepRecord& step);
   /// Are the terms that the controller used the engine's?

@@ -29,6 +29,7 @@ struct Candidate {
   std::string fault;     ///< "torque gain".
   std::string place;     ///< "motor r_elbow".
   std::string unit;      ///< Of the value; empty for a factor.
+  std::string detail;    ///< What else is told of it: "at 4.77 Hz".
   double nominal = 0.0;  ///< The value without the fault: the amplitude is added to it.
   MatrixXd columns;      ///< N x p.
   int parameters = 0;    ///< That were fitted beforehand, besides the amplitudes.

@@ -29,6 +29,7 @@ double CalcRms(const VectorXd& x) { return x.norm() / std::sqrt(static_cast<doub
 /// The series of one that has this fault after whatever else it has: that is expected then.
 SignalSeries ExpectFault(const SignalSeries& series, const CommonFault& common) {
   SignalSeries after = series;
+  after.from = after.to = std::numeric_limits<double>::quiet_NaN();
   after.expected = Transmit(common.fault, series, common.begin);
   Fault off = common.fault;
   off.value += off.error;
@@ -41,6 +42,7 @@ SignalSeries ExpectFault(const SignalSeries& series, const CommonFault& common) 
 std::optional<SignalSeries> UndoFault(const SignalSeries& series, const CommonFault& common) {
   const Fault& fault = common.fault;
   SignalSeries before = series;
+  before.from = before.to = std::numeric_limits<double>::quiet_NaN();
   const double value = fault.value;
   if (fault.fault == "rounding to steps of") {
     before.noise = (0.5 + 1e-9) * value;
@@ -211,6 +213,14 @@ class SignalGroup {
   std::map<std::string, size_t> sizes_, moving_;
 };
 
+/// Of the joint that this velocity moves; empty for one of a ball joint.
+VectorXd FindPositions(const StepStore& store, Index velocity) {
+  const RobotModel& model = store.setup().model();
+  const int joint = model.joint_of_dof(static_cast<int>(velocity) - model.num_base_velocities());
+  if (model.joints()[static_cast<size_t>(joint)].type == JointType::kBall) return {};
+  return store.Get(StepStore::kPosition).row(model.position_index(joint));
+}
+
 std::vector<SignalSeries> ListSeries(const StepStore& store, bool motors) {
   // A step that a motor refuses has no torques.
   const bool is_refused =
@@ -222,7 +232,8 @@ std::vector<SignalSeries> ListSeries(const StepStore& store, bool motors) {
   const auto rates = get(StepStore::kVelocity);
   const std::vector<SignalName>& names = motors ? store.motors() : store.readings();
   const VectorXd time = get(StepStore::kTime).row(0);
-  const Base& base = store.setup().model().base();
+  const RobotModel& model = store.setup().model();
+  const Base& base = model.base();
   MatrixXd motor_rates = rates;
   if (motors && base.type == BaseType::kDifferentialDrive)
     motor_rates.topRows<2>() = CalcWheelRateMap(base) * rates.topRows(2);
@@ -238,9 +249,15 @@ std::vector<SignalSeries> ListSeries(const StepStore& store, bool motors) {
     one.expected = expected.row(i);
     one.got = got.row(i);
     if (motors) one.rate = motor_rates.row(i);
+    if (motors && i >= model.num_base_velocities()) one.position = FindPositions(store, i).head(count);
+    if (one.name.group == "joint positions") one.position = one.expected;
+    const StepStore::Span span =
+        (motors ? store.motor_spans() : store.reading_spans())[static_cast<size_t>(i)];
+    one.from = span.first;
+    one.to = span.last;
     one.has_history = history;
     const double size = std::max({one.expected.cwiseAbs().maxCoeff(), 1e-3 * largest, 1e-3});
-    one.noise = (motors ? 1e-14 : 1e-15) * size;
+    one.noise = (motors ? StepStore::kTorqueRounding : 1e-15) * size;
   }
   return series;
 }

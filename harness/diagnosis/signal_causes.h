@@ -2,6 +2,7 @@
 
 // How what arrived differs from what should have: torques that motors gave, readings that were measured.
 
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -15,9 +16,11 @@ struct SignalSeries {
   SignalName name;
   VectorXd time;                  ///< s
   VectorXd expected, got;         ///< What it should be, and what it was.
-  VectorXd rate;                  ///< Of what it moves; empty for none.
+  VectorXd rate, position;        ///< Of what it moves; empty for none.
   std::vector<bool> has_history;  ///< Whether the steps before each are those before it here.
   double noise = 0.0;             ///< Rounding of got - expected.
+  /// When it differs first and last, of all steps, s; NaN where these steps alone tell.
+  double from = std::numeric_limits<double>::quiet_NaN(), to = from;
   /// What is less than `faint` times the noise says nothing, and `left` times it may be left of what is
   /// explained.
   double faint = 1e3, left = 30.0;

@@ -23,15 +23,14 @@ constexpr size_t kMostTerms = 3;
 Fault MakeFault(const Candidate& candidate, const VectorXd& amplitude, const VectorXd& error, double decay,
                 double time_step) {
   Fault fault{candidate.fault, candidate.place, candidate.nominal + amplitude[0],
-              error[0],        candidate.unit,  ""};
+              error[0],        candidate.unit,  candidate.detail};
   if (candidate.fault == "lag") {
     const double own = std::clamp(amplitude[0], 1e-9, 1.0 - 1e-9);
     fault.value = -time_step / std::log(own);
     fault.error *= fault.value * fault.value / time_step / own;
-  } else if (candidate.fault == "ripple") {
+  } else if (candidate.columns.cols() == 2) {
     fault.value = amplitude.norm();
     fault.error = error.norm();
-    fault.detail = "at " + std::to_string(std::lround(candidate.nominal * 100.0) / 100) + " Hz";
   } else if (decay > 0.0 && (candidate.fault == "gain" || candidate.fault == "offset")) {
     // Of what a lag is sent: its own output has (1 - d) of it.
     fault.value = candidate.nominal + amplitude[0] / (1.0 - decay);
@@ -67,8 +66,8 @@ double CalcCost(const SignalSeries& series, const SignalSteps& steps, const Sign
 }
 
 SignalFit MakeFit(const SignalSeries& series, const SignalSteps& steps, const SignalShape& shape,
-                  double floor, bool look_for_sines) {
-  const std::vector<Candidate> added = ListAdded(series, steps, shape, look_for_sines);
+                  double floor, SignalSearch search, const std::vector<SignalSeries>& others) {
+  const std::vector<Candidate> added = ListAdded(series, steps, shape, search, others);
   const VectorXd y = ((steps.Take(series.got) - steps.Take(shape.output)) / series.noise).matrix();
   SignalFit fit;
   fit.size = ((steps.Take(series.got) - steps.Take(series.expected)) / series.noise).matrix().norm();
@@ -152,13 +151,12 @@ SignalVerdict JudgeSignal(const SignalSeries& series, const std::vector<SignalSe
                                               : fit.selection.left <= series.left * std::sqrt(floor));
   };
   std::vector<SignalFit> fits;
-  for (const bool sines : {false, true}) {
+  for (const SignalSearch search : {SignalSearch::kPlain, SignalSearch::kSines, SignalSearch::kCouplings}) {
     fits.clear();
     for (const SignalShape& shape : ListShapes(series, steps, others))
-      fits.push_back(MakeFit(series, steps, shape, floor, sines));
+      fits.push_back(MakeFit(series, steps, shape, floor, search, others));
     std::sort(fits.begin(), fits.end(),
               [](const SignalFit& a, const SignalFit& b) { return a.criterion < b.criterion; });
-    // Sines fit much: they are looked for where nothing else explains it.
     if (is_good(fits.front()) && !fits.front().is_noise) break;
   }
   const double largest = (steps.Take(series.got) - steps.Take(series.expected)).abs().maxCoeff();

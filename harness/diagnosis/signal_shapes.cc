@@ -1,9 +1,15 @@
 #include "harness/diagnosis/signal_shapes.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <tuple>
+#include <utility>
+
+#include "harness/diagnosis/signal_couplings.h"
+#include "harness/diagnosis/sine_fit.h"
 
 namespace dexcheck {
 namespace {
@@ -147,6 +153,43 @@ class ShapeList {
       Add("stuck at", series_.name.unit, got_[0], false);
   }
 
+  /// What is moved follows at a distance, on both sides.
+  void AddPlay() {
+    const ArrayXd off = got_ - u_;
+    const double half = off.abs().maxCoeff();
+    constexpr double kBothSides = 0.9;
+    if (series_.name.group != "joint positions" || off.maxCoeff() < kBothSides * half ||
+        -off.minCoeff() < kBothSides * half)
+      return;
+    Add("play", series_.name.unit, half, false);
+  }
+
+  /// Now and then nothing arrives: 0 is read, or what was read before.
+  void AddLost() {
+    const ArrayXd off = (series_.got - series_.expected).array().abs();
+    const ArrayXd before = steps_.Take(series_.got, 1);
+    Index lost = 0, changes = 0;
+    bool reads_zero = true, reads_old = true, was_lost = false;
+    for (Index i = 0; i < steps_.size(); ++i) {
+      const bool is_lost = off[steps_.rows[static_cast<size_t>(i)]] > series_.noise;
+      changes += is_lost != was_lost ? 1 : 0;
+      was_lost = is_lost;
+      if (!is_lost) continue;
+      ++lost;
+      reads_zero = reads_zero && got_[i] == 0.0;
+      reads_old = reads_old && got_[i] == before[i];
+    }
+    constexpr Index kFewestChanges = 4;
+    if (changes < kFewestChanges || (!reads_zero && !reads_old)) return;
+    SignalShape shape{.fault = "lost samples, fraction",
+                      .detail = reads_zero ? "read as 0" : "read as the one before",
+                      .value = static_cast<double>(lost) / static_cast<double>(steps_.size()),
+                      .parameters = static_cast<int>(changes),
+                      .has_gain = false};
+    shape.output = (off > series_.noise).select(series_.got.array(), series_.expected.array());
+    Add(shape);
+  }
+
   [[nodiscard]] std::vector<SignalShape> Take() { return std::move(shapes_); }
 
  private:
@@ -177,49 +220,6 @@ class ShapeList {
   std::vector<SignalShape> shapes_;
 };
 
-/// A sine of the frequency that explains most of y: parts of its amplitude as columns.
-Candidate FindSine(const ArrayXd& y, const ArrayXd& t, const std::string& place, const std::string& unit) {
-  // The frequency is one; it is the best of as many as there are steps, which weighs 2 log n as two more
-  // would.
-  constexpr int kParameters = 3;
-  Candidate sine{.fault = "ripple",
-                 .place = place,
-                 .unit = unit,
-                 .columns = MatrixXd(y.size(), 2),
-                 .parameters = kParameters};
-  const auto set = [&](double w) {
-    sine.columns.col(0) = (w * (t - t[0])).sin();
-    sine.columns.col(1) = (w * (t - t[0])).cos();
-    const VectorXd a = sine.columns.householderQr().solve(y.matrix());
-    return (y.matrix() - sine.columns * a).squaredNorm();
-  };
-  // Two a period at most, and half of one at least, four times as dense as periods in all of the time.
-  const double whole = t[t.size() - 1] - t[0];
-  const double densest = 0.4 * static_cast<double>(t.size() - 1) / std::max(whole, 1e-12);
-  const double grid = 0.25 / std::max(whole, 1e-12);
-  const int count = static_cast<int>(std::min(2000.0, densest / grid));
-  double best = 2.0 * grid, least = std::numeric_limits<double>::infinity();
-  for (int i = 2; i < count; ++i) {
-    const double left = set(2.0 * kPi * i * grid);
-    if (left < least) least = left, best = i * grid;
-  }
-  double width = grid;
-  for (int i = 0; i < 60; ++i, width *= 0.7) {
-    for (const double to : {best - width, best + width}) {
-      if (!(to > grid)) continue;
-      const double left = set(2.0 * kPi * to);
-      if (left < least) least = left, best = to;
-    }
-  }
-  set(2.0 * kPi * best);
-  sine.nominal = best;
-  return sine;
-}
-
-}  // namespace
-
-namespace {
-
 VectorXd TransmitAlways(const Fault& fault, const SignalSeries& series) {
   const VectorXd& u = series.expected;
   const ArrayXd size = u.array().abs();
@@ -236,10 +236,24 @@ VectorXd TransmitAlways(const Fault& fault, const SignalSeries& series) {
   return late + (value - std::floor(value)) * (Shift(u, std::min(whole + 1, last)) - late);
 }
 
+/// Whether a step comes long after the one before it.
+bool IsAfterGap(const VectorXd& time, Index step) {
+  return step == 0 || time[step] - time[step - 1] > 1.5 * (time[1] - time[0]);
+}
+
+VectorXd FollowAtDistance(double half, const SignalSeries& series) {
+  VectorXd output = series.got;
+  for (Index i = 1; i < output.size(); ++i)
+    if (!IsAfterGap(series.time, i))
+      output[i] = std::clamp(output[i - 1], series.expected[i] - half, series.expected[i] + half);
+  return output;
+}
+
 }  // namespace
 
 VectorXd Transmit(const Fault& fault, const SignalSeries& series, Index begin) {
   const VectorXd& u = series.expected;
+  if (fault.fault == "play") return FollowAtDistance(fault.value, series);
   const bool is_lag = fault.fault == "lag" && u.size() > 1;
   VectorXd output = is_lag ? u : TransmitAlways(fault, series);
   if (output.size() == 0) return output;
@@ -274,8 +288,8 @@ SignalSteps FindSteps(const SignalSeries& series) {
   steps.first = first;
   steps.last = last;
   steps.was_before = first == 0;
-  steps.from = series.time[first];
-  steps.to = series.time[last];
+  steps.from = std::isnan(series.from) ? series.time[first] : series.from;
+  steps.to = std::isnan(series.to) ? series.time[last] : series.to;
   steps.ends = last + StepStore::kHistory < difference.size();
   return steps;
 }
@@ -289,6 +303,8 @@ std::vector<SignalShape> ListShapes(const SignalSeries& series, const SignalStep
   shapes.AddSteps();
   shapes.AddExchange(others);
   shapes.AddStuck();
+  shapes.AddPlay();
+  shapes.AddLost();
   return shapes.Take();
 }
 
@@ -302,7 +318,8 @@ bool IsDecay(double decay) {
 }
 
 std::vector<Candidate> ListAdded(const SignalSeries& series, const SignalSteps& steps,
-                                 const SignalShape& shape, bool look_for_sines) {
+                                 const SignalShape& shape, SignalSearch search,
+                                 const std::vector<SignalSeries>& others) {
   const SignalName& name = series.name;
   const std::string place = PlaceOf(name);
   std::vector<Candidate> added;
@@ -343,10 +360,18 @@ std::vector<Candidate> ListAdded(const SignalSeries& series, const SignalSteps& 
       if (added.size() > count) added.back().is_possible = [](const VectorXd& a) { return a[0] >= 0.0; };
     }
   }
-  if (look_for_sines && got.size() >= kFewestOfNoise) {
-    Candidate sine = FindSine(got - output, steps.Take(series.time), place, name.unit);
-    sine.columns /= series.noise;
-    added.push_back(sine);
+  if (search == SignalSearch::kCouplings && shape.fault.empty()) {
+    for (Candidate& one : ListCouplings(series, steps, others)) added.push_back(std::move(one));
+  }
+  if (search == SignalSearch::kSines && got.size() >= kFewestOfNoise) {
+    const Sine sine = FindSine(got - output, steps.Take(series.time));
+    // The frequency is the best of as many as there are steps, which weighs 2 log n as two numbers would.
+    added.push_back({.fault = "ripple",
+                     .place = place,
+                     .unit = name.unit,
+                     .detail = fmt::format("at {:.4g} Hz", sine.frequency),
+                     .columns = sine.columns / series.noise,
+                     .parameters = 3});
   }
   return added;
 }

@@ -59,8 +59,12 @@ std::vector<SignalShape> ListShapes(const SignalSeries& series, const SignalStep
 std::string PlaceOf(const SignalName& name);
 /// Whether an output that goes on with this fraction of itself follows, and neither runs away nor ahead.
 bool IsDecay(double decay);
+/// What is looked for, each where what is before it explains nothing: sines fit much, and couplings are many.
+enum class SignalSearch { kPlain, kSines, kCouplings };
+
 /// What may be added to a transmission's output.
 std::vector<Candidate> ListAdded(const SignalSeries& series, const SignalSteps& steps,
-                                 const SignalShape& shape, bool look_for_sines);
+                                 const SignalShape& shape, SignalSearch search,
+                                 const std::vector<SignalSeries>& others);
 
 }  // namespace dexcheck

@@ -42,6 +42,7 @@ StepStore::StepStore(const Setup& setup, const JudgedLaw* law, double rolling_bo
   block_.resize(kCapacity);
   row_.resize(offsets_[kSignalCount]);
   force_.resize(n);
+  Reset();
 }
 
 void StepStore::NameReadings() {
@@ -106,7 +107,12 @@ void StepStore::NameReadings() {
   }
 }
 
-void StepStore::Reset() { seen_ = size_ = added_ = 0, stride_ = 1, has_begun_ = false; }
+void StepStore::Reset() {
+  seen_ = size_ = added_ = 0, stride_ = 1, has_begun_ = false;
+  motor_spans_.assign(motors_.size(), {});
+  reading_spans_.assign(readings_.size(), {});
+  largest_torque_ = 0.0;
+}
 
 void StepStore::PackReading(const Reading& reading, const Reading& declared,
                             Eigen::Ref<VectorXd> entries) const {
@@ -130,11 +136,12 @@ void StepStore::PackReading(const Reading& reading, const Reading& declared,
       static_cast<double>(reading.touch.fingertips);
 }
 
-void StepStore::Pack(const StepRecord& step, const StepAnalysis& now, bool answered,
+void StepStore::Pack(const StepRecord& step, const StepAnalysis& now, Judged judged,
                      Eigen::Ref<VectorXd> row) {
   const auto at = [&](Signal signal) {
     return row.segment(offsets_[signal], offsets_[signal + 1] - offsets_[signal]);
   };
+  const bool answered = judged != Judged::kReadings, has_forces = judged == Judged::kAll;
   const DeclaredStep& declared = *now.declared;
   const PlantResponse& response = step.response;
   at(kTime)[0] = step.time;
@@ -154,7 +161,7 @@ void StepStore::Pack(const StepRecord& step, const StepAnalysis& now, bool answe
   at(kNoise).setZero();
   at(kUneven).setZero();
   at(kDryFriction).setZero();
-  if (answered && now.mass_factor != nullptr) {
+  if (has_forces && now.mass_factor != nullptr) {
     // What motors did not give is theirs, and no force of its own.
     force_ = step.drive.tau - response.motor_torques;
     actuation_.CalcForce(force_, force_);
@@ -173,7 +180,7 @@ void StepStore::Pack(const StepRecord& step, const StepAnalysis& now, bool answe
         1e-9 * std::max(now.findings.f_c.norm(), 1e-3) / std::sqrt(6.0);
     at(kUneven)[0] = now.uneven_force;
   }
-  at(kObjectResidual) = answered ? now.object_residual : Vector6d(Vector6d::Zero());
+  at(kObjectResidual) = has_forces ? now.object_residual : Vector6d(Vector6d::Zero());
   const Pose& X_Bo = step.reading.state.X_Bo;
   at(kObjectPose).head<9>() = X_Bo.linear().reshaped();
   at(kObjectPose).tail<3>() = X_Bo.translation();
@@ -181,7 +188,7 @@ void StepStore::Pack(const StepRecord& step, const StepAnalysis& now, bool answe
   at(kWheelRates) = now.wheel_rates;
   at(kWheelMismatch) = now.wheel_mismatch;
   at(kWheelNoise).setZero();
-  if (answered && response.wheels.size() == 2)
+  if (has_forces && response.wheels.size() == 2)
     at(kWheelNoise) = now.wheel_slip.array() + now.sinking + kRollingRounding * rolling_bound_;
   at(kContactMismatch) = now.contact_mismatch;
   at(kContactMoment).setZero();
@@ -196,10 +203,12 @@ void StepStore::Pack(const StepRecord& step, const StepAnalysis& now, bool answe
   at(kLawParts) = law_->parts().reshaped();
 }
 
-void StepStore::Add(const StepRecord& step, const StepAnalysis& analysis, bool differs, bool answered) {
+void StepStore::Add(const StepRecord& step, const StepAnalysis& analysis, bool differs, Judged judged) {
   last_time_ = step.time;
+  Pack(step, analysis, judged, row_);
+  Watch(row_);
   if (!has_begun_ && !differs) {
-    Pack(step, analysis, answered, before_.col(seen_++ % kHistory));
+    before_.col(seen_++ % kHistory) = row_;
     return;
   }
   if (!has_begun_) {
@@ -208,9 +217,23 @@ void StepStore::Add(const StepRecord& step, const StepAnalysis& analysis, bool d
       Keep(added_++ / kBlock, before_.col(i % kHistory));
   }
   const Eigen::Index block = added_++ / kBlock;
-  if (block % stride_ != 0) return;
-  Pack(step, analysis, answered, row_);
-  Keep(block, row_);
+  if (block % stride_ == 0) Keep(block, row_);
+}
+
+void StepStore::Watch(const Eigen::Ref<const VectorXd>& row) {
+  const auto watch = [&](Signal expected, Signal got, double noise, std::vector<Span>* spans) {
+    for (size_t i = 0; i < spans->size(); ++i) {
+      const Eigen::Index entry = static_cast<Eigen::Index>(i);
+      if (std::abs(row[offsets_[got] + entry] - row[offsets_[expected] + entry]) <= noise) continue;
+      Span& span = (*spans)[i];
+      span.last = row[0];
+      if (std::isnan(span.first)) span.first = row[0];
+    }
+  };
+  const auto torques = row.segment(offsets_[kTauDeclared], offsets_[kTauReceived] - offsets_[kTauDeclared]);
+  largest_torque_ = std::max(largest_torque_, torques.cwiseAbs().maxCoeff());
+  watch(kTauDeclared, kTauReceived, kTorqueRounding * largest_torque_, &motor_spans_);
+  watch(kDeclaredReading, kReading, 0.0, &reading_spans_);
 }
 
 void StepStore::Keep(Eigen::Index block, const Eigen::Ref<const VectorXd>& row) {

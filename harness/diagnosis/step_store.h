@@ -2,6 +2,7 @@
 
 // The signals of the steps that are to be explained, from a little before the first that differs.
 
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -26,6 +27,13 @@ class StepStore {
  public:
   /// Steps that a block has at the most, and of those the first whose predecessors may be missing.
   static constexpr Eigen::Index kBlock = 64, kHistory = 16;
+
+  /// Torques pass a gear once and back.
+  static constexpr double kTorqueRounding = 1e-14;
+
+  /// What of a step can be judged: all; no forces, as of the first contacts; no torques either, which a motor
+  /// refused.
+  enum class Judged { kAll, kSignals, kReadings };
 
   /// Signals of a step, and their sizes: n of xi, m of a reading.
   enum Signal {
@@ -58,9 +66,8 @@ class StepStore {
   /// @param law of MakeJudgedLaw; null where none is known. @param rolling_bound of the check `rolling`, m/s.
   StepStore(const Setup& setup, const JudgedLaw* law, double rolling_bound);
 
-  /// @param differs whether a check fails at this step. @param answered whether the plant was driven: not
-  /// where a motor refuses.
-  void Add(const StepRecord& step, const StepAnalysis& analysis, bool differs, bool answered = true);
+  /// @param differs whether a check fails at this step.
+  void Add(const StepRecord& step, const StepAnalysis& analysis, bool differs, Judged judged = Judged::kAll);
   /// Time begins anew.
   void Reset();
 
@@ -75,6 +82,12 @@ class StepStore {
   /// Time of the last step that was added, s.
   [[nodiscard]] double last_time() const { return last_time_; }
   [[nodiscard]] const Setup& setup() const { return *setup_; }
+  /// When a signal differs from what is declared, of all steps, s; NaN for never.
+  struct Span {
+    double first = std::numeric_limits<double>::quiet_NaN(), last = first;
+  };
+  [[nodiscard]] const std::vector<Span>& motor_spans() const { return motor_spans_; }
+  [[nodiscard]] const std::vector<Span>& reading_spans() const { return reading_spans_; }
   /// Of the check `rolling`, m/s.
   [[nodiscard]] double rolling_bound() const { return rolling_bound_; }
   [[nodiscard]] const JudgedLaw* law() const { return law_; }
@@ -86,7 +99,9 @@ class StepStore {
 
   void NameReadings();
   void PackReading(const Reading& reading, const Reading& declared, Eigen::Ref<VectorXd> entries) const;
-  void Pack(const StepRecord& step, const StepAnalysis& analysis, bool answered, Eigen::Ref<VectorXd> row);
+  void Pack(const StepRecord& step, const StepAnalysis& analysis, Judged judged, Eigen::Ref<VectorXd> row);
+  /// Notes when signals differ.
+  void Watch(const Eigen::Ref<const VectorXd>& row);
   void Keep(Eigen::Index block, const Eigen::Ref<const VectorXd>& row);
 
   const Setup* setup_;
@@ -98,6 +113,8 @@ class StepStore {
   MatrixXd before_;  // ring of the last steps, before anything differed
   MatrixXd data_;
   std::vector<Eigen::Index> block_;  // of each step that is kept
+  std::vector<Span> motor_spans_, reading_spans_;
+  double largest_torque_ = 0.0;  // N m, declared
   VectorXd row_, force_;
   Eigen::Index seen_ = 0;  // steps in the ring
   Eigen::Index size_ = 0, added_ = 0;

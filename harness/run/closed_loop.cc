@@ -112,6 +112,9 @@ bool ClosedLoop::SettleOn(const Trajectory& motion, double duration,
     if (checks_ && t >= kRoughTime) {
       checks_->JudgeSettling(record_);
       store_->Add(record_, checks_->analysis(), checks_->differs());
+    } else if (checks_) {
+      checks_->Look(record_);
+      store_->Add(record_, checks_->analysis(), /*differs=*/false, StepStore::Judged::kSignals);
     }
     try {
       CheckGrasp();
@@ -178,10 +181,15 @@ void ClosedLoop::DriveMotors(double t) {
     if (checks_) checks_->JudgeEffort(record_, t);
     if (checks_) record_.true_model = &checks_->Follow(record_);
     // Torques that are too large may be those of no law. While everything settles they follow another
-    // trajectory.
-    if (checks_ && is_running_) {
-      checks_->JudgeUnsent(record_);
-      store_->Add(record_, checks_->analysis(), checks_->differs(), /*answered=*/false);
+    // trajectory, but motors and sensors can be at fault.
+    if (checks_) {
+      if (is_running_) {
+        checks_->JudgeUnsent(record_);
+      } else {
+        checks_->Look(record_);
+      }
+      store_->Add(record_, checks_->analysis(), !is_running_ || checks_->differs(),
+                  StepStore::Judged::kReadings);
     }
     throw;
   }

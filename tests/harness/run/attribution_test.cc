@@ -2,6 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <functional>
+#include <utility>
+
+#include "harness/diagnosis/signal_causes.h"
 #include "tests/harness/run/shipped_run.h"
 
 namespace dexcheck::testing::attribution_test {
@@ -91,6 +95,44 @@ INSTANTIATE_TEST_SUITE_P(
                 "the grasp is lost"},
         Failure{"no_forces", {"duration=1", "control.f_max=0.3", "control.f_min=0"}, "contact forces"}),
     [](const ::testing::TestParamInfo<Failure>& info) { return info.param.name; });
+
+/// A Panda with a hidden fault of its sensors.
+ClosedLoop MakeSensorFault(const Setup& setup, std::function<void(double t, MeasuredState*)> fault) {
+  LoopParts parts = MakeLoopParts(setup);
+  parts.hidden_sensor_fault = std::move(fault);
+  return {setup, /*check=*/true, std::move(parts)};
+}
+
+// The first torque is above its limit, so that no step is ever judged.
+TEST(HiddenSensorFault, ThatEndsTheRunAtOnceIsToldWhereItIs) {
+  const ShippedRun run("panda-reach");
+  ClosedLoop loop =
+      MakeSensorFault(run.setup(), [](double, MeasuredState* state) { std::swap(state->q[4], state->q[5]); });
+  EXPECT_THROW(loop.Settle(), RunFailure);
+  const Causes causes = ExplainSignals(loop.store());
+  ASSERT_EQ(causes.size(), 2u);
+  EXPECT_EQ(causes[0].faults.front().place, "joint panda_joint5, position");
+  EXPECT_EQ(causes[1].faults.front().place, "joint panda_joint6, position");
+}
+
+// Of a long run not all steps are kept, and still it is known when.
+TEST(HiddenSensorFault, IsToldFromItsFirstStepToItsLast) {
+  const ShippedRun run("panda-reach", {"duration=2.5"});
+  ClosedLoop loop = MakeSensorFault(run.setup(), [](double t, MeasuredState* state) {
+    if (t > 0.1) state->q[1] += 1e-9;
+    if (t > 1.3205 && t < 1.9005) state->q[3] += 1e-4;
+  });
+  loop.Settle();
+  while (!loop.is_finished()) loop.Step();
+  loop.Finish();
+  const Causes causes = ExplainSignals(loop.store());
+  ASSERT_EQ(causes.size(), 2u);
+  const Explanation& late = causes[1];
+  EXPECT_EQ(late.faults.front().place, "joint panda_joint4, position");
+  EXPECT_NEAR(late.from, 1.321, 1e-9);
+  EXPECT_NEAR(late.to, 1.9, 1e-9);
+  EXPECT_TRUE(late.ends);
+}
 
 }  // namespace
 }  // namespace dexcheck::testing::attribution_test
