@@ -33,6 +33,7 @@ struct Candidate {
   double nominal = 0.0;  ///< The value without the fault: the amplitude is added to it.
   MatrixXd columns;      ///< N x p.
   int parameters = 0;    ///< That were fitted beforehand, besides the amplitudes.
+  VectorXd fitted;       ///< These, where they are needed again: a point.
   /// How large each amplitude may plausibly be (p); empty for any size. What less than that does not show
   /// above the noise is not estimated.
   VectorXd scale;

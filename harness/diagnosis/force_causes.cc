@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "harness/diagnosis/force_telling.h"
 #include "harness/diagnosis/step_forces.h"
@@ -57,8 +58,11 @@ class Problem {
     return fraction >= kExplains && left <= kLeft;
   }
 
-  /// Of the last explanation: what was selected, and how large each is.
-  using Terms = std::vector<std::pair<size_t, VectorXd>>;
+  /// Of the last explanation: what was selected, and how large each is; forces at points by themselves.
+  struct Terms {
+    std::vector<std::pair<size_t, VectorXd>> amplitudes;
+    std::vector<ForceAtPoint> points;
+  };
   [[nodiscard]] const Terms& terms() const { return terms_; }
   /// Faults that are there, as other steps have shown.
   void Know(const Terms& known) {
@@ -68,11 +72,18 @@ class Problem {
 
   /// Faults that do not change.
   bool ExplainConstant(const Segment& segment, Causes* causes) {
-    terms_.clear();
-    if (!known_.empty() && CalcLeft(y_) <= 1.0) return true;
+    terms_ = {};
+    if (!known_.amplitudes.empty() && CalcLeft(y_) <= 1.0) return true;
     const CauseSelection selection = Select();
     if (!IsExplained(selection.fraction, selection.left)) return false;
-    for (const CauseTerm& term : selection.terms) terms_.emplace_back(term.candidate, term.amplitude);
+    for (const CauseTerm& term : selection.terms) {
+      const Candidate& one = candidates_[term.candidate];
+      if (one.fault == kForceAtPoint) {
+        terms_.points.push_back({one.place, term.amplitude, one.fitted});
+      } else {
+        terms_.amplitudes.emplace_back(term.candidate, term.amplitude);
+      }
+    }
     if (ExplainTorque(segment, selection, causes)) return true;
     if (ExplainJoint(segment, selection, causes) || ExplainBetweenLinks(segment, selection, causes))
       return true;
@@ -232,15 +243,21 @@ class Problem {
     y_.resize(rows * steps_);
     candidates_.clear();
     uneven_.clear();
+    turns_.clear();
     forces_->SetLevel(level_);
     for (Index i = 0; i < steps_; ++i) {
       forces_->SetStep(used_[static_cast<size_t>(i)]);
       uneven_.push_back(forces_->uneven());
+      turns_.push_back(forces_->ListTurns());
       y_.segment(i * rows, rows) = forces_->CalcResidual();
       forces_->AddColumns(i * rows, steps_, &candidates_);
     }
     AddGrowing();
-    for (const auto& [candidate, amplitude] : known_) y_ -= candidates_[candidate].columns * amplitude;
+    for (const auto& [candidate, amplitude] : known_.amplitudes)
+      y_ -= candidates_[candidate].columns * amplitude;
+    for (const ForceAtPoint& force : known_.points)
+      candidates_.push_back(MakeForceAtPoint(force, turns_, candidates_));
+    AddForcesAtPoints(y_, turns_, forces_->reach(), &candidates_);
     NameStuckBearings();
   }
 
@@ -336,9 +353,33 @@ class Problem {
     return best;
   }
 
+  /// Beside other faults a force acts elsewhere than by itself.
+  bool RefinePoints(const CauseSelection& selection) {
+    if (selection.terms.size() < 2) return false;
+    bool is_refined = false;
+    for (const CauseTerm& term : selection.terms) {
+      Candidate& one = candidates_[term.candidate];
+      if (one.fault != kForceAtPoint) continue;
+      MatrixXd beside(y_.size(), 0);
+      for (const CauseTerm& other : selection.terms) {
+        if (other.candidate == term.candidate) continue;
+        const MatrixXd& columns = candidates_[other.candidate].columns;
+        beside.conservativeResize(Eigen::NoChange, beside.cols() + columns.cols());
+        beside.rightCols(columns.cols()) = columns;
+      }
+      const ForceAtPoint start{one.place, term.amplitude, one.fitted};
+      const auto refined = RefinePoint(y_, turns_, forces_->reach(), start, beside, candidates_);
+      if (!refined) continue;
+      one = MakeForceAtPoint(*refined, turns_, candidates_);
+      is_refined = true;
+    }
+    return is_refined;
+  }
+
   [[nodiscard]] CauseSelection SelectOnce() {
     const CauseOptions options{.alike = static_cast<double>(steps_)};
     CauseSelection selection = SelectCauses(y_, candidates_, options);
+    if (RefinePoints(selection)) selection = SelectCauses(y_, candidates_, options);
     for (const CauseTerm& term : selection.terms) {
       if (candidates_[term.candidate].place != kWorld || selection.terms.size() == 1) continue;
       // Masses that differ fall as all do.
@@ -361,6 +402,7 @@ class Problem {
   Terms known_, terms_;
   Vector2d first_level_, level_;  // StepForces::SetLevel
   std::vector<MatrixXd> uneven_;  // of each step
+  std::vector<Turns> turns_;      // likewise
 };
 
 bool IsSame(const Explanation& a, const Explanation& b) {
@@ -379,8 +421,8 @@ struct Part {
   Causes causes;
 
   [[nodiscard]] Index CountAmplitudes() const {
-    Index count = 0;
-    for (const auto& [candidate, amplitude] : terms) count += amplitude.size();
+    Index count = 3 * static_cast<Index>(terms.points.size());
+    for (const auto& [candidate, amplitude] : terms.amplitudes) count += amplitude.size();
     return count;
   }
 };
@@ -398,6 +440,45 @@ Part ExplainPart(const StepStore& store, StepForces* forces, const Segment& segm
     part.causes.push_back(one);
   }
   return part;
+}
+
+Segment Concatenate(const std::vector<Segment>& parts, size_t begin, size_t count) {
+  Segment whole;
+  for (size_t i = begin; i < begin + count; ++i) whole.insert(whole.end(), parts[i].begin(), parts[i].end());
+  return whole;
+}
+
+/// Of long runs blocks of steps are kept with gaps between them, and what changes there is not seen: parts
+/// that only gaps divide are one as far as the same faults explain them.
+std::vector<Segment> JoinAcrossGaps(const StepStore& store, StepForces* forces,
+                                    const std::vector<Segment>& parts) {
+  const auto is_gap = [&](size_t part) {
+    const auto time = store.Get(StepStore::kTime);
+    const double apart = time(0, parts[part].front()) - time(0, parts[part - 1].back());
+    return apart > 1.5 * store.setup().scenario().plant.time_step;
+  };
+  std::optional<Part> known;
+  const auto explain = [&](size_t begin, size_t count) {
+    const Segment segment = Concatenate(parts, begin, count);
+    Part part = ExplainPart(store, forces, segment, nullptr);
+    if (!part.is_explained && known) part = ExplainPart(store, forces, segment, &*known);
+    return part;
+  };
+  std::vector<Segment> joined;
+  for (size_t begin = 0; begin < parts.size();) {
+    size_t most = 1;
+    while (begin + most < parts.size() && is_gap(begin + most)) ++most;
+    // The most that are explained, by bisection, all of them first.
+    size_t count = 1, fails = most + 1;
+    for (size_t next = most; next > count; next = (count + fails) / 2) {
+      (explain(begin, next).is_explained ? count : fails) = next;
+    }
+    if (!known) known = explain(begin, count);
+    if (!known->is_explained) known.reset();
+    joined.push_back(Concatenate(parts, begin, count));
+    begin += count;
+  }
+  return joined;
 }
 
 /// Each part by itself, and with what the simplest of them shows; none where a part is not explained.
@@ -451,8 +532,10 @@ Causes ExplainForces(const StepStore& store) {
   // Where there are no more bends than jumps, these are the same; what moves by itself bends all the time.
   if (bent.size() == parts.size() || bent.size() > kMostBends) bent.clear();
   for (const std::vector<Segment>& segments : {parts, bent}) {
-    if (segments.size() < 2 || segments.size() > kMostSegments) continue;
-    const Causes found = ExplainParts(store, &forces, segments);
+    if (segments.size() < 2) continue;
+    const std::vector<Segment> joined = JoinAcrossGaps(store, &forces, segments);
+    if (joined.size() < 2 || joined.size() > kMostSegments) continue;
+    const Causes found = ExplainParts(store, &forces, joined);
     if (!found.empty()) return found;
   }
   problem.ExplainChanging(whole, &causes);

@@ -63,6 +63,17 @@ Candidate& StepForces::Next(std::vector<Candidate>* candidates, const char* faul
   return (*candidates)[next_++];
 }
 
+Candidate& StepForces::AddForceAtPoint(std::vector<Candidate>* candidates, const std::string& place) {
+  Candidate& force = Next(candidates, kForceAtPointInAxes, place, "N", 0.0, Weights(6));
+  // Its moment about the centre of mass is across it.
+  force.is_possible = [](const VectorXd& a) {
+    constexpr double kAcross = 1e-3;
+    const Vector3d f = a.head<3>(), moment = a.tail<3>();
+    return std::abs(f.dot(moment)) <= kAcross * f.norm() * moment.norm();
+  };
+  return force;
+}
+
 VectorXd StepForces::Moved() const {
   VectorXd scale = Masses(9);
   scale.head<3>().setOnes();
@@ -191,6 +202,8 @@ void StepForces::AddLink(int index, std::vector<Candidate>* candidates) {
   AddRobot(&Next(candidates, "moment", place, "N m", 0.0, Weights(3)), MatrixXd(moments * R.transpose()));
   AddRobot(&Next(candidates, kMomentInAxes, place, "N m", 0.0, Weights(3)), moments);
   MatrixXd both(n_, 6);
+  both << forces, moments;
+  AddRobot(&AddForceAtPoint(candidates, place), both);
   both << forces * R.transpose(), moments * R.transpose();
   AddRobot(&Next(candidates, "force and moment", place, "N", 0.0, Weights(6)), both);
   if (!(body.mass > 0.0)) return;
@@ -238,6 +251,7 @@ void StepForces::AddObjectForces(std::vector<Candidate>* candidates) {
   AddObject(&Next(candidates, "moment", place, "N m", 0.0, Weights(3)), stack(zero, R_T));
   AddObject(&Next(candidates, kMomentInAxes, place, "N m", 0.0, Weights(3)),
             stack(zero, Matrix3d::Identity()));
+  AddObject(&AddForceAtPoint(candidates, place), Matrix6d::Identity());
   Matrix6d both = Matrix6d::Zero();
   both.topLeftCorner<3, 3>() = both.bottomRightCorner<3, 3>() = R_T;
   AddObject(&Next(candidates, "force and moment", place, "N", 0.0, Weights(6)), both);

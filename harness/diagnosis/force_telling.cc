@@ -30,8 +30,7 @@ std::string TellVector(const Eigen::Ref<const VectorXd>& v) {
 /// What is not so many standard errors away from nothing shows no size.
 void RequireSize(Fault* fault) {
   constexpr double kErrors = 5.0;
-  if (kErrors * fault->error > std::abs(fault->value))
-    fault->error = std::numeric_limits<double>::infinity();
+  if (kErrors * fault->error > std::abs(fault->value)) fault->error = std::numeric_limits<double>::infinity();
 }
 
 /// A push whose amplitudes are what it grows by a second and what it is at the time `nominal`.
@@ -79,6 +78,13 @@ Fault MakeForceFault(const Candidate& candidate, const VectorXd& a, const Vector
     fault.value = a.head(size).norm();
     if (error.size() >= size) fault.error = error.head(size).norm();
     fault.detail = TellVector(a.head(size));
+    if (candidate.fault == kForceAtPoint) fault.detail += " " + candidate.detail;
+    if (candidate.fault == kForceAtPointInAxes) {
+      const Vector3d f = a.head<3>();
+      fault.fault = kForceAtPoint;
+      fault.detail += " in its axes, at " + TellVector(f.cross(Vector3d(a.tail<3>())) / f.squaredNorm()) +
+                      " m of its centre of mass";
+    }
     if (candidate.fault == "force and moment") fault.detail += " and " + TellVector(a.tail<3>()) + " N m";
   }
   if (candidate.fault == kForceInAxes || candidate.fault == kMomentInAxes) {

@@ -64,6 +64,13 @@ void StepForces::SetStep(Index step) {
   CalcUneven();
 }
 
+Turns StepForces::ListTurns() const {
+  Turns turns;
+  for (const Link& link : links_) turns.push_back(link.X.linear());
+  turns.emplace_back(store_.Get(StepStore::kObjectPose).col(step_).head<9>().reshaped(3, 3));
+  return turns;
+}
+
 void StepForces::CalcUneven() {
   const double size = store_.Get(StepStore::kUneven)(0, step_) / noise_[0];
   uneven_.resize(n_, 0);

@@ -9,6 +9,7 @@
 #include "controller/dynamics/model_terms.h"
 #include "controller/dynamics/tree_factor.h"
 #include "harness/diagnosis/cause_estimator.h"
+#include "harness/diagnosis/force_points.h"
 #include "harness/diagnosis/step_store.h"
 
 namespace dexcheck {
@@ -19,6 +20,9 @@ inline constexpr const char* kBearing = "dry friction of the bearing";
 inline constexpr const char* kStuckBearing = "dry friction of a bearing that sticks";
 inline constexpr const char* kForce = "force at its centre of mass";
 inline constexpr const char* kForceInAxes = "force at its centre of mass, in its axes";
+/// Of one direction in the world, and of one that turns with the body.
+inline constexpr const char* kForceAtPoint = "force";
+inline constexpr const char* kForceAtPointInAxes = "force, in its axes";
 inline constexpr const char* kMomentInAxes = "moment, in its axes";
 inline constexpr const char* kMassWithInertia = "mass and inertia";
 inline constexpr const char* kCenter = "centre of mass off by";
@@ -51,6 +55,10 @@ class StepForces {
   [[nodiscard]] const MatrixXd& uneven() const { return uneven_; }
 
   void SetStep(Eigen::Index step);
+  /// How far links were apart at the most, m: where loads may be.
+  [[nodiscard]] double reach() const { return reach_; }
+  /// Which way links and object are turned at that step.
+  [[nodiscard]] Turns ListTurns() const;
   /// Whether the checks of the balances fail, or what is left is more than noise.
   [[nodiscard]] bool Differs(const VectorXd& residual) const;
   [[nodiscard]] VectorXd CalcResidual() const {
@@ -78,6 +86,7 @@ class StepForces {
   [[nodiscard]] VectorXd Masses(Eigen::Index count) const { return VectorXd::Constant(count, mass_); }
   /// Of a centre of mass, and of the inertia about the old one.
   [[nodiscard]] VectorXd Moved() const;
+  Candidate& AddForceAtPoint(std::vector<Candidate>* candidates, const std::string& place);
   void AddRobot(Candidate* candidate, const MatrixXd& f) const;
   void AddObject(Candidate* candidate, const Matrix6Xd& w) const;
   void AddJoints(std::vector<Candidate>* candidates);
@@ -103,7 +112,7 @@ class StepForces {
   VectorXd uneven_shrink_;            // what is left of each by whitening, less 1
   double arm_ = 1.0;                  // of the object's inertia, m
   double mass_ = 0.0, weight_ = 0.0;  // of all, kg and N
-  double reach_ = 0.0;                // how far links are apart at the most, m: where loads may be
+  double reach_ = 0.0;
   Vector3d gravity_;
 };
 

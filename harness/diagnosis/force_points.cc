@@ -1,0 +1,158 @@
+#include "harness/diagnosis/force_points.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/QR>
+#include <algorithm>
+#include <utility>
+
+#include "harness/diagnosis/step_forces.h"
+
+namespace dexcheck {
+namespace {
+
+using Eigen::Index;
+using namespace force_fault;
+
+constexpr size_t kMostBodies = 8;       // that are looked at
+constexpr double kPointExplains = 0.9;  // of |y|^2, by force and moment
+constexpr int kMostIterations = 30;     // of Gauss-Newton
+
+Matrix3d Cross(const Vector3d& a) {
+  Matrix3d A;
+  A << 0.0, -a.z(), a.y(), a.z(), 0.0, -a.x(), -a.y(), a.x(), 0.0;
+  return A;
+}
+
+/// Columns of force and moment of one body, and which way it is turned at each step.
+struct Body {
+  const Candidate *force, *moment;
+  std::vector<Matrix3d> turns;
+
+  /// Effects of moments that `arm` makes of the body's turn, at each step.
+  template <typename Arm>
+  [[nodiscard]] MatrixXd CalcMoments(const Arm& arm) const {
+    MatrixXd columns(moment->columns.rows(), 3);
+    const Index rows = columns.rows() / static_cast<Index>(turns.size());
+    for (size_t k = 0; k < turns.size(); ++k) {
+      const Index begin = static_cast<Index>(k) * rows;
+      columns.middleRows(begin, rows) = moment->columns.middleRows(begin, rows) * arm(turns[k]);
+    }
+    return columns;
+  }
+  /// y by the force, which acts at p: C_F + C_M [R p]x.
+  [[nodiscard]] MatrixXd AtPoint(const Vector3d& p) const {
+    return force->columns + CalcMoments([&](const Matrix3d& R) { return Cross(R * p); });
+  }
+  /// y by the point where F acts: -C_M [F]x R.
+  [[nodiscard]] MatrixXd ByPoint(const Vector3d& F) const {
+    return CalcMoments([&](const Matrix3d& R) { return Matrix3d(-Cross(F) * R); });
+  }
+};
+
+std::vector<Body> ListBodies(const std::vector<Turns>& turns, const std::vector<Candidate>& candidates) {
+  std::vector<Body> bodies;
+  for (const Candidate& force : candidates) {
+    if (force.fault != kForce) continue;
+    const auto moment = std::find_if(candidates.begin(), candidates.end(), [&](const Candidate& one) {
+      return one.fault == "moment" && one.place == force.place;
+    });
+    Body body{&force, &*moment, {}};
+    for (const Turns& step : turns) body.turns.push_back(step[bodies.size()]);
+    bodies.push_back(std::move(body));
+  }
+  return bodies;
+}
+
+const Body* FindBody(const std::vector<Body>& bodies, const std::string& place) {
+  return &*std::find_if(bodies.begin(), bodies.end(),
+                        [&](const Body& one) { return one.force->place == place; });
+}
+
+Candidate MakeCandidate(const Body& body, const Vector3d& p) {
+  Candidate candidate = *body.force;
+  candidate.fault = kForceAtPoint;
+  candidate.detail = fmt::format("at ({:.4g}, {:.4g}, {:.4g}) m of its centre of mass", p.x(), p.y(), p.z());
+  candidate.columns = body.AtPoint(p);
+  candidate.parameters = 3;
+  candidate.fitted = p;
+  return candidate;
+}
+
+/// Where a force acts that explains most of y.
+class PointFit {
+ public:
+  PointFit(const VectorXd& y, const Body& body) : y_(&y), body_(&body) {
+    MatrixXd both(y.size(), 6);
+    both << body.force->columns, body.moment->columns;
+    const VectorXd a = both.completeOrthogonalDecomposition().solve(y);
+    explains_ = 1.0 - (y - both * a).squaredNorm() / y.squaredNorm();
+    F_ = a.head<3>();
+    if (F_.squaredNorm() > 0.0)
+      p_ = body.turns.front().transpose() * F_.cross(Vector3d(a.tail<3>())) / F_.squaredNorm();
+  }
+
+  /// By force and moment, of |y|^2.
+  [[nodiscard]] double explains() const { return explains_; }
+
+  /// From this force on.
+  void Start(const ForceAtPoint& force) { F_ = force.force, p_ = force.point; }
+
+  /// @param beside columns of what else there is. @return whether there is such a point.
+  bool Improve(double reach, const MatrixXd& beside) {
+    constexpr double kExact = 1e-10;  // m
+    for (int i = 0; i < kMostIterations; ++i) {
+      MatrixXd all(y_->size(), 6 + beside.cols());
+      all << body_->AtPoint(p_), body_->ByPoint(F_), beside;
+      const VectorXd a = all.completeOrthogonalDecomposition().solve(*y_);
+      F_ = a.head<3>();
+      p_ += a.segment<3>(3);
+      if (a.segment<3>(3).norm() < kExact) break;
+    }
+    return p_.norm() < reach;
+  }
+
+  [[nodiscard]] ForceAtPoint force() const { return {body_->force->place, F_, p_}; }
+  [[nodiscard]] Candidate Make() const { return MakeCandidate(*body_, p_); }
+
+ private:
+  const VectorXd* y_;
+  const Body* body_;
+  double explains_ = 0.0;
+  Vector3d F_ = Vector3d::Zero(), p_ = Vector3d::Zero();
+};
+
+}  // namespace
+
+void AddForcesAtPoints(const VectorXd& y, const std::vector<Turns>& turns, double reach,
+                       std::vector<Candidate>* candidates) {
+  const std::vector<Body> bodies = ListBodies(turns, *candidates);
+  std::vector<PointFit> fits;
+  for (const Body& body : bodies) fits.emplace_back(y, body);
+  std::stable_sort(fits.begin(), fits.end(),
+                   [](const PointFit& a, const PointFit& b) { return a.explains() > b.explains(); });
+  std::vector<Candidate> added;
+  for (PointFit& fit : fits) {
+    if (added.size() == kMostBodies || fit.explains() < kPointExplains) break;
+    if (fit.Improve(reach, MatrixXd(y.size(), 0))) added.push_back(fit.Make());
+  }
+  std::move(added.begin(), added.end(), std::back_inserter(*candidates));
+}
+
+Candidate MakeForceAtPoint(const ForceAtPoint& force, const std::vector<Turns>& turns,
+                           const std::vector<Candidate>& candidates) {
+  const std::vector<Body> bodies = ListBodies(turns, candidates);
+  return MakeCandidate(*FindBody(bodies, force.place), force.point);
+}
+
+std::optional<ForceAtPoint> RefinePoint(const VectorXd& y, const std::vector<Turns>& turns, double reach,
+                                        const ForceAtPoint& start, const MatrixXd& beside,
+                                        const std::vector<Candidate>& candidates) {
+  const std::vector<Body> bodies = ListBodies(turns, candidates);
+  PointFit fit(y, *FindBody(bodies, start.place));
+  fit.Start(start);
+  if (!fit.Improve(reach, beside)) return std::nullopt;
+  return fit.force();
+}
+
+}  // namespace dexcheck

@@ -1,0 +1,39 @@
+#pragma once
+
+// Forces that act at a point of a body, not at its centre of mass.
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "harness/diagnosis/cause_estimator.h"
+
+namespace dexcheck {
+
+/// Which way bodies are turned at one step: links, then the object, as their candidates follow each other.
+using Turns = std::vector<Matrix3d>;
+
+/// A force (world, N) at a point of a body (its axes, of its centre of mass, m).
+struct ForceAtPoint {
+  std::string place;
+  Vector3d force, point;
+};
+
+/// Adds a force that keeps its direction in the world and acts at a point of a body, for those bodies of
+/// which one explains most of y. The point is where it explains most, found by Gauss-Newton steps.
+/// @param turns of each step. @param reach how far from the centre of mass it may be, m.
+/// @param candidates with force and moment of each body.
+void AddForcesAtPoints(const VectorXd& y, const std::vector<Turns>& turns, double reach,
+                       std::vector<Candidate>* candidates);
+
+/// One of those whose point is known.
+Candidate MakeForceAtPoint(const ForceAtPoint& force, const std::vector<Turns>& turns,
+                           const std::vector<Candidate>& candidates);
+
+/// Where it acts beside other faults. @param start what is known of it. @param beside columns of the others.
+/// @returns none where there is no such point.
+std::optional<ForceAtPoint> RefinePoint(const VectorXd& y, const std::vector<Turns>& turns, double reach,
+                                        const ForceAtPoint& start, const MatrixXd& beside,
+                                        const std::vector<Candidate>& candidates);
+
+}  // namespace dexcheck
