@@ -59,6 +59,21 @@ void Explanation::SetOutcome() {
   outcome = faults.size() > 1 || !has_size ? CauseOutcome::kNamedClass : CauseOutcome::kNamed;
 }
 
+namespace {
+
+/// ", from 0.2 s", ", 0.2 to 0.5 s"; of what is not seen "between 0.2 and 0.3".
+std::string TellWhen(const Explanation& one) {
+  const auto tell = [](double earliest, double latest) {
+    return latest > earliest ? "between " + FormatNumber(earliest, 4) + " and " + FormatNumber(latest, 4)
+                             : FormatNumber(earliest, 4);
+  };
+  const std::string from = tell(one.from - one.unseen_before, one.from);
+  if (!one.ends) return ", from " + from + " s";
+  return ", " + from + " to " + tell(one.to, one.to + one.unseen_after) + " s";
+}
+
+}  // namespace
+
 std::string Explanation::Tell() const {
   std::string text;
   if (outcome == CauseOutcome::kNotExplained) {
@@ -71,9 +86,7 @@ std::string Explanation::Tell() const {
     if (faults.size() > 1) text += ": not isolable from each other on this motion";
   }
   // What holds all the time has no begin.
-  if (std::isfinite(from))
-    text += ends ? ", " + FormatNumber(from, 4) + " to " + FormatNumber(to, 4) + " s"
-                 : ", from " + FormatNumber(from, 4) + " s";
+  if (std::isfinite(from)) text += TellWhen(*this);
   if (rival.empty()) return text;
   // Beyond this many digits a likelihood ratio says no more.
   constexpr double kCertain = 20.0;

@@ -437,6 +437,7 @@ Part ExplainPart(const StepStore& store, StepForces* forces, const Segment& segm
   for (Explanation one : known->causes) {
     const Explanation here = StartExplanation(store, CauseChannel::kBalance, segment);
     one.from = here.from, one.to = here.to, one.ends = here.ends;
+    one.unseen_before = here.unseen_before, one.unseen_after = here.unseen_after;
     part.causes.push_back(one);
   }
   return part;
@@ -505,6 +506,7 @@ Causes ExplainParts(const StepStore& store, StepForces* forces, const std::vecto
       } else {
         same->to = one.to;
         same->ends = one.ends;
+        same->unseen_after = one.unseen_after;
         if (one.faults.size() < same->faults.size()) same->faults = one.faults, same->outcome = one.outcome;
       }
     }

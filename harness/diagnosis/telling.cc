@@ -12,6 +12,14 @@ Explanation StartExplanation(const StepStore& store, CauseChannel channel,
   start.from = time(0, steps.front());
   start.to = time(0, steps.back());
   start.ends = steps.back() + kLast < store.size();
+  const double time_step = store.setup().scenario().plant.time_step;
+  // What lies between two steps that are kept, beside the one that is seen.
+  const auto find_gap = [&](Eigen::Index after) {
+    const double apart = time(0, after) - time(0, after - 1);
+    return apart > 1.5 * time_step ? apart - time_step : 0.0;
+  };
+  if (steps.front() > 0) start.unseen_before = find_gap(steps.front());
+  if (start.ends) start.unseen_after = find_gap(steps.back() + 1);
   return start;
 }
 
