@@ -1,0 +1,37 @@
+#include "controller/contact/ground_contacts.h"
+
+namespace dexcheck {
+
+GroundContacts::GroundContacts(const RobotModel& model, std::span<const int> feet, double height)
+    : feet_(feet.begin(), feet.end()), height_(height), X_WF_(feet.size(), Pose::Identity()) {
+  for (const int foot : feet_) radii_.push_back(model.frame(foot).sphere_radius.value_or(0.0));
+  const auto m = static_cast<Eigen::Index>(feet_.size());
+  J_.setZero(3 * m, model.num_velocities());
+  J_dot_xi_.setZero(3 * m);
+  gap_.setZero(m);
+  J_f_.setZero(6, model.num_velocities());
+  J_f_dot_ = J_f_;
+}
+
+void GroundContacts::SetState(const ModelTerms& robot) {
+  const VectorXd& xi = robot.velocity();
+  for (size_t i = 0; i < feet_.size(); ++i) {
+    const auto row = 3 * static_cast<Eigen::Index>(i);
+    X_WF_[i] = robot.CalcFramePose(feet_[i]);
+    const Matrix3d R = X_WF_[i].linear();
+    robot.CalcFrameJacobian(feet_[i], J_f_, J_f_dot_);
+    // v_F + omega x a, both of which J_f has along the frame's own axes
+    const Vector3d a = -radii_[i] * (R.transpose() * Vector3d::UnitZ());
+    Matrix3d a_cross;
+    a_cross << 0.0, -a.z(), a.y(), a.z(), 0.0, -a.x(), -a.y(), a.x(), 0.0;
+    J_.middleRows<3>(row).noalias() = R * (J_f_.topRows<3>() - a_cross * J_f_.bottomRows<3>());
+    // a_F = R (v_dot + omega x v) of the velocity v along axes that turn
+    const Vector6d V = J_f_ * xi;
+    const Vector6d V_dot = J_f_dot_ * xi;
+    J_dot_xi_.segment<3>(row) =
+        R * (V_dot.head<3>() + V.tail<3>().cross(V.head<3>()) + V_dot.tail<3>().cross(a));
+    gap_[static_cast<Eigen::Index>(i)] = X_WF_[i].translation().z() - radii_[i] - height_;
+  }
+}
+
+}  // namespace dexcheck
