@@ -11,12 +11,14 @@
 
 namespace dexcheck {
 
-/// m feet, each the sphere of its frame; a frame without one is a point. With n the upward normal and a = -r
-/// n from a foot's centre to the ground, the ground holds v_F + omega x a, the velocity of what touches it:
+/// m feet, each the sphere of its frame; a frame without one is a point. With n the upward normal and
+/// a = -(r + gap / 2) n from a foot's centre to the middle of gap or overlap, the ground holds
+/// v_F + omega x a, the velocity of what touches it:
 ///
-///   J xi = 0,   J xi_dot + J_dot xi = 0,   J_dot xi = a_F + alpha x a at xi_dot = 0,
+///   J xi = 0,   J xi_dot + J_dot xi = 0,   J_dot xi = a_F + alpha x a + omega x a_dot at xi_dot = 0,
 ///
-/// since a does not turn. Rows are x, y, z in world axes, foot by foot: the third is d/dt of the gap.
+/// a_dot = -(n . v_F) n / 2, since n does not turn. Rows are x, y, z in world axes, foot by foot: the third
+/// is d/dt of the gap.
 class GroundContacts {
  public:
   /// @param feet frames of the model, which outlives this. @param height of the ground, m.

@@ -61,7 +61,9 @@ void StanceForces::TakeOff(const ModelTerms& robot, Eigen::Ref<VectorXd> force) 
   problem_.G = ground_.J().leftCols<6>().transpose();
   problem_.F_o = force.head<6>();
   const GraspForceResult& result = solver_.Solve(problem_);
-  RequireGraspForce(result);
+  if (result.status != GraspForceStatus::kOptimal)
+    throw GraspForceError(
+        "no forces of the ground inside the friction cones do what the law wants of the robot");
   // The solver leaves 1e-10 of F_b, and a law is exact to rounding.
   const Matrix6d gram = problem_.G * problem_.G.transpose();
   f_ = result.f_c;

@@ -347,6 +347,7 @@ void ReadTask(TomlTable& root, Scenario* scenario) {
   const auto pick = root.Find("task");
   if (pick) scenario->task = ReadPickTask(*pick);
   root.RejectTogether("joint_motion", {"grasp", "task", "trajectory", "start_error"});
+  root.RejectTogether("stance", {"grasp", "task", "trajectory", "start_error"});
   if (const auto motion = root.Find("joint_motion")) {
     JointTask task = ReadJointMotion(*motion);
     ReadJointControl(root.Get("control"), &scenario->control, &task);
@@ -360,8 +361,6 @@ void ReadTask(TomlTable& root, Scenario* scenario) {
          {stands && moves, "joint_motion: joints of a robot that stands follow its body ([stance])"},
          {stands && scenario->plant.type != PlantType::kEngine,
           "plant.type: feet need contacts that hold and slip, which a rigid plant has not"},
-         {stands && !scenario->imperfections.sensing.is_exact(),
-          "sensing: a robot that stands is measured exactly"},
          {scenario->plant.bonded, "plant.bonded: a motion of joints has no contacts"}});
   }
   // All that are missing are named together.

@@ -1,5 +1,5 @@
-// A robot that stands on the ground: contact rows against finite differences, the constrained system by its own
-// equations, what the law asks of the ground, and the motion of its legs.
+// A robot that stands on the ground: contact rows against finite differences, the constrained system by its
+// own equations, what the law asks of the ground, and the motion of its legs.
 
 #include "controller/control/stance.h"
 
@@ -8,8 +8,8 @@
 #include <random>
 
 #include "controller/common/errors.h"
-#include "controller/control/ground_dynamics.h"
 #include "controller/control/grasp_controller.h"
+#include "controller/control/ground_dynamics.h"
 #include "controller/model/parameter_reader.h"
 #include "tests/common/finite_difference.h"
 #include "tests/common/matrix_near.h"
@@ -100,8 +100,8 @@ TEST_F(StanceTest, TheConstrainedSystemFulfilsItsEquations) {
   GroundDynamics dynamics(model_, 4);
   const Prediction& p = dynamics.Predict(robot, ground, force);
   EXPECT_TRUE(dynamics.determines_forces());
-  const VectorXd left = robot.M() * p.xi_dot + robot.C() * robot.velocity() + robot.gravity() + robot.friction() -
-                        force - ground.J().transpose() * p.f_c;
+  const VectorXd left = robot.M() * p.xi_dot + robot.C() * robot.velocity() + robot.gravity() +
+                        robot.friction() - force - ground.J().transpose() * p.f_c;
   ASSERT_GT(p.f_c.norm(), 50.0);
   EXPECT_TRUE(MatrixNear(left, VectorXd::Zero(18), kForceRounding));
   EXPECT_TRUE(MatrixNear(ground.J() * p.xi_dot, -ground.J_dot_xi(), 1e-11));

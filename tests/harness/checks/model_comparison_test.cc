@@ -7,9 +7,9 @@
 #include "controller/common/errors.h"
 #include "harness/checks/consistency.h"
 #include "harness/descriptions/alike_names.h"
-#include "harness/descriptions/structure_match.h"
 #include "harness/descriptions/description_match.h"
 #include "harness/descriptions/read_description.h"
+#include "harness/descriptions/structure_match.h"
 #include "tests/common/list_failures.h"
 #include "tests/common/matchers.h"
 #include "tests/common/paths.h"
@@ -180,7 +180,8 @@ TEST(ModelComparison, RefusesOtherMechanisms) {
       "\"panda_joint1\"");
 }
 
-// Every joint and link renamed, and the humanoid's limbs in another order: by its place each is the one it was.
+// Every joint and link renamed, and the humanoid's limbs in another order: by its place each is the one it
+// was.
 TEST(StructureMatch, FindsTheJointsOfOtherNames) {
   for (const RobotPair& pair : ListRobotPairs()) {
     SCOPED_TRACE(pair.name);

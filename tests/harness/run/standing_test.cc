@@ -39,8 +39,16 @@ TEST_P(StandingLaws, AreTheirOwnFormulas) {
 INSTANTIATE_TEST_SUITE_P(All, StandingLaws, ::testing::Values("pd_gravity", "feedforward_pd"));
 
 TEST(StandingRun, ASlipperyFloorIsFound) {
-  ShippedRun run("stand", {"duration=3", "plant.floor_friction=0.02", "expect={}"});
-  EXPECT_EQ(run.Run().attribution.cause, Cause::kFootSlip) << run.Run().attribution.evidence;
+  const std::vector<std::string> swaying = {
+      "duration=3", "expect={}", "stance.points=[]",
+      "stance.oscillations=[{axis='x',amplitude=0.03,frequency=1.5,ramp_time=1}]"};
+  ShippedRun good("stand", swaying);
+  EXPECT_EQ(good.Run().verdict, Verdict::kPass);
+  std::vector<std::string> slippery = swaying;
+  slippery.emplace_back("plant.floor_friction=0.15");
+  ShippedRun run("stand", slippery);
+  const RunResult& result = run.Run();
+  EXPECT_EQ(result.attribution.cause, Cause::kFootSlip) << result.failure << result.attribution.evidence;
 }
 
 TEST(StandingRun, AWrongMassIsFound) {
