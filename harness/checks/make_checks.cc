@@ -84,7 +84,8 @@ std::map<std::string_view, const char*> ListDescriptions(const Setup& setup) {
          "the forces balanced"},
         {"reduced_acceleration", "xi_dot of the robot on rigid feet that do not slip, against the engine's"},
         {"contact_force",
-         "forces of the feet of that system against the engine's, relative to them; where more feet touch "
+         "forces of the feet of that system against the engine's, relative to them and the weight; where "
+         "more feet touch "
          "than "
          "hold the robot they are not determined, and 0"},
         {"solver", "what the engine's solver left over of its own equations of motion"}};

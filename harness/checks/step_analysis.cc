@@ -322,7 +322,9 @@ void StepAnalyzer::ComparePrediction() {
   if (ground_) {
     // Where the rigid system does not determine the forces of single feet, their sum is xi_dot's.
     const bool has_forces = ground_dynamics_->determines_forces();
-    const double scale = std::max(findings.foot_force.norm(), kTiny);
+    // Of feet that leave the ground, what they should bear.
+    const double weight = mass_ * setup_->model().gravity().norm();
+    const double scale = std::max({findings.foot_force.norm(), weight, kTiny});
     now_.contact_force_error =
         has_forces ? (findings.foot_force_model - findings.foot_force).norm() / scale : 0.0;
     // J^T (f - f_model) is M_bar' times the accelerations' error.

@@ -46,6 +46,7 @@ TEST(StandingRun, ASlipperyFloorIsFound) {
   EXPECT_EQ(good.Run().verdict, Verdict::kPass);
   std::vector<std::string> slippery = swaying;
   slippery.emplace_back("plant.floor_friction=0.15");
+  slippery.emplace_back("duration=0.6");
   ShippedRun run("stand", slippery);
   const RunResult& result = run.Run();
   EXPECT_EQ(result.attribution.cause, Cause::kFootSlip) << result.failure << result.attribution.evidence;
