@@ -8,7 +8,9 @@
 namespace dexcheck {
 
 ActuationMap::ActuationMap(const RobotModel& model)
-    : size_(model.num_velocities()), has_wheels_(model.base().type == BaseType::kDifferentialDrive) {
+    : size_(model.num_velocities()),
+      has_wheels_(model.base().type == BaseType::kDifferentialDrive),
+      floats_(model.base().type == BaseType::kFloating) {
   if (!has_wheels_) return;
   // tau^T thetadot = (S_v^T E_v tau)^T v with thetadot = W v
   S_v_T_E_v_ = CalcWheelRateMap(model.base()).transpose();
@@ -19,6 +21,7 @@ void ActuationMap::Apply(const Matrix2d& wheels, const Eigen::Ref<const VectorXd
                          Eigen::Ref<VectorXd> to) const {
   Require(from.size() == size_ && to.size() == size_, "length of tau'", "must be that of xi", from.size());
   if (to.data() != from.data()) to = from;
+  if (floats_) to.head<6>().setZero();
   if (has_wheels_) to.head<2>() = Vector2d(wheels * to.head<2>());
 }
 

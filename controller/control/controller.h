@@ -36,8 +36,10 @@ struct Handling {
 struct LawDemand {
   Vector6d V_Bo_dot = Vector6d::Zero();  ///< Of the object's body velocity, Sigma_o, m/s^2, rad/s^2.
   VectorXd xi_dot;                       ///< xi_dot_d (n) of (47).
-  VectorXd f_c;                          ///< 3N, N, of finger on object, each in its Sigma_cf; (49).
-  VectorXd F_N;                          ///< 3N, internal part of f_c; zero unless (49) splits it so.
+  /// 3N, N, of finger on object, each in its Sigma_cf; (49). Of a robot that stands, of the ground on its
+  /// feet, world axes.
+  VectorXd f_c;
+  VectorXd F_N;  ///< 3N, internal part of f_c; zero unless (49) splits it so.
 };
 
 /// Where a task is.

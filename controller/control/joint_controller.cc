@@ -19,7 +19,10 @@ void AddFrictionCompensation(const JointGains& gains, const VectorXd& q_d_dot, V
 JointLaw::JointLaw(const RobotModel& model, ControlLaw law, const JointGains& gains)
     : law_(law), gains_(gains), actuation_(model) {
   const Eigen::Index n = model.num_velocities();
-  Require(model.base().type == BaseType::kFixed, "base", "must be fixed", model.num_base_velocities());
+  const bool stands = model.base().type == BaseType::kFloating && gains.stance;
+  Require(model.base().type == BaseType::kFixed || stands, "base", "must be fixed, or stand",
+          model.num_base_velocities());
+  if (stands) stance_ = std::make_unique<StanceForces>(model, *gains.stance);
   Require(IsJointLaw(law), "law", "must be one for joints", law);
   const bool computed = law == ControlLaw::kComputedTorque;
   for (const VectorXd* gain : {computed ? &gains.K_p : &gains.K, computed ? &gains.K_v : &gains.D}) {
@@ -30,22 +33,23 @@ JointLaw::JointLaw(const RobotModel& model, ControlLaw law, const JointGains& ga
             "must be that of the joints", friction->size());
   }
   Require(gains.coulomb_velocity > 0.0, "coulomb_velocity", "must be positive", gains.coulomb_velocity);
-  for (VectorXd* vector : {&xi_dot_d_, &force_, &tau_}) vector->setZero(n);
+  for (VectorXd* vector : {&xi_dot_d_, &force_, &tau_, &error_}) vector->setZero(n);
 }
 
 const VectorXd& JointLaw::CalcTorque(const ModelTerms& robot, const Eigen::Ref<const VectorXd>& q,
                                      const Eigen::Ref<const VectorXd>& xi, const DesiredJoints& desired) {
   xi_dot_d_ = desired.q_ddot;
+  CalcPositionError(stance_ != nullptr, desired.q, q, error_);
   if (law_ == ControlLaw::kComputedTorque) {
     // M_bar' (q_d_ddot + K_v e_dot + K_p e) + C_bar' q_dot + F_bar'
-    xi_dot_d_ += gains_.K_v.cwiseProduct(desired.q_dot - xi) + gains_.K_p.cwiseProduct(desired.q - q);
+    xi_dot_d_ += gains_.K_v.cwiseProduct(desired.q_dot - xi) + gains_.K_p.cwiseProduct(error_);
     force_ = robot.gravity() + robot.friction();
     force_.noalias() += robot.M() * xi_dot_d_;
     force_.noalias() += robot.C() * xi;
   } else {
     // K e + D e_dot + g
     force_ = robot.gravity();
-    force_ += gains_.K.cwiseProduct(desired.q - q) + gains_.D.cwiseProduct(desired.q_dot - xi);
+    force_ += gains_.K.cwiseProduct(error_) + gains_.D.cwiseProduct(desired.q_dot - xi);
     if (law_ == ControlLaw::kFeedforwardPd) {
       // + M_bar' q_d_ddot + C_bar' q_d_dot + friction
       force_ += robot.friction();
@@ -54,6 +58,10 @@ const VectorXd& JointLaw::CalcTorque(const ModelTerms& robot, const Eigen::Ref<c
     }
   }
   AddFrictionCompensation(gains_, desired.q_dot, &force_);
+  if (stance_) {
+    stance_->TakeOff(robot, force_);
+    ground_forces_ = stance_->f();
+  }
   actuation_.CalcTorque(force_, tau_);
   return tau_;
 }
@@ -102,6 +110,7 @@ void JointController::Step(const Reading& reading, double t, Command* command) {
   steps_until_due_ = sampling_.hold - 1;
   command->tau = law_.CalcTorque(model_.robot(), reading.state.q, reading.state.xi, command->joints);
   command->demand.xi_dot = law_.xi_dot_d();
+  command->demand.f_c = law_.ground_forces();
 }
 
 }  // namespace dexcheck

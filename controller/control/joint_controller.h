@@ -1,18 +1,22 @@
 #pragma once
 
+#include <memory>
+#include <optional>
+
 #include "controller/common/types.h"
 #include "controller/control/actuation.h"
 #include "controller/control/baseline_law.h"
 #include "controller/control/controller.h"
 #include "controller/control/grasp_model.h"
 #include "controller/control/joint_motion.h"
+#include "controller/control/stance.h"
 #include "controller/control/trajectory_controller.h"
 #include "controller/dynamics/model_terms.h"
 
 namespace dexcheck {
 
-// Laws for the joints of a robot that holds nothing, on a fixed base. e = q_d - q, e_dot = q_d_dot - q_dot;
-// K_p, K_v, K and D are diagonal.
+// Laws for the joints of a robot that holds nothing, on a fixed base or standing on its feet. e = q_d - q,
+// e_dot = q_d_dot - q_dot; K_p, K_v, K and D are diagonal.
 //
 // kComputedTorque [Luh, Walker, Paul 1980; Craig 1989, 10.4], (18) inverted:
 //   tau' = M_bar' (q_d_ddot + K_v e_dot + K_p e) + C_bar' q_dot + F_bar'
@@ -29,7 +33,12 @@ namespace dexcheck {
 // along the desired rate: the measured one would feed the sign of its noise back [Armstrong-Helouvry, Dupont,
 // Canudas de Wit 1994, 5.3].
 
-/// Gains of the joints, and friction that is compensated; one entry for each.
+// A robot that stands has no motors for its base: e is that of all coordinates, K and D are zero for the
+// base, and of the force F that a law has above the ground gives its part (StanceForces), tau' = (F - J^T
+// f)_joints.
+
+/// Gains of the joints, and friction that is compensated; one entry for each. Of a robot that stands, with
+/// six before for its base.
 struct JointGains {
   VectorXd K_p;  ///< 1/s^2: kComputedTorque.
   VectorXd K_v;  ///< 1/s: kComputedTorque.
@@ -39,6 +48,8 @@ struct JointGains {
   VectorXd coulomb;                ///< N m, N; empty for none.
   VectorXd viscous;                ///< N m s/rad, N s/m; empty for none.
   double coulomb_velocity = 0.01;  ///< rad/s, m/s: where tanh smooths the sign.
+
+  std::optional<Stance> stance{};  ///< Of a robot that stands.
 };
 
 /// Adds tau_f (n) at a desired rate to a force.
@@ -50,8 +61,8 @@ void AddFrictionCompensation(const JointGains& gains, const VectorXd& q_d_dot, V
 /// One of them. Nothing allocates after construction.
 class JointLaw {
  public:
-  /// @throws std::invalid_argument unless the base is fixed, the law is one for joints, and its gains and
-  /// what it compensates have an entry for each joint.
+  /// @throws std::invalid_argument unless the base is fixed or stands, the law is one for joints, and its
+  /// gains and what it compensates have an entry for each joint.
   JointLaw(const RobotModel& model, ControlLaw law, const JointGains& gains);
 
   /// tau' (n), N m or N. @param robot CalcDynamics done, reduced. @param q, xi the state that it is at.
@@ -62,13 +73,18 @@ class JointLaw {
   /// others q_d_ddot.
   [[nodiscard]] const VectorXd& xi_dot_d() const { return xi_dot_d_; }
   [[nodiscard]] ControlLaw law() const { return law_; }
+  /// What the last torques ask of the ground (3m), world axes, N; empty for a base that is fixed.
+  [[nodiscard]] const VectorXd& ground_forces() const { return ground_forces_; }
   [[nodiscard]] const JointGains& gains() const { return gains_; }
 
  private:
   ControlLaw law_;
   JointGains gains_;
   ActuationMap actuation_;
-  VectorXd xi_dot_d_, force_, tau_;  // n
+  std::unique_ptr<StanceForces> stance_;  // null for a base that is fixed
+  VectorXd xi_dot_d_, force_, tau_;       // n
+  VectorXd error_;                        // n, q_d - q
+  VectorXd ground_forces_;
 };
 
 /// What a motion of joints demands of a controller: the start until Begin, then q_d(t).

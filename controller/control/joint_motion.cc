@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "controller/common/errors.h"
+#include "controller/control/stance.h"
 
 namespace dexcheck {
 namespace {
@@ -39,7 +40,14 @@ JointMotion::JointMotion(const VectorXd& q_start, const std::vector<JointWayPoin
   }
 }
 
+JointMotion::JointMotion(std::shared_ptr<const StanceMotion> stance) : stance_(std::move(stance)) {
+  DesiredJoints start;
+  stance_->Evaluate(-1.0, &start);
+  q_start_ = start.q;
+}
+
 void JointMotion::Evaluate(double t, DesiredJoints* desired) const {
+  if (stance_) return stance_->Evaluate(t, desired);
   desired->q = q_start_;
   desired->q_dot.setZero(q_start_.size());
   desired->q_ddot.setZero(q_start_.size());

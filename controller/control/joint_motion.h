@@ -30,6 +30,8 @@ struct JointOscillation {
   double ramp_time = 0.0;  ///< s.
 };
 
+class StanceMotion;
+
 /// q_d(t) of all joints: from where they start through way points, as MakeWayPointTrajectory goes, with
 /// oscillations on top. Before t = 0 it is at rest at the start. Evaluation does not allocate once the result
 /// has its sizes.
@@ -41,10 +43,14 @@ class JointMotion {
   JointMotion(const VectorXd& q_start, const std::vector<JointWayPoint>& points,
               const std::vector<JointOscillation>& oscillations);
 
+  /// Of a robot that stands: all of q_d is what that motion says, q' and xi with those of the base.
+  explicit JointMotion(std::shared_ptr<const StanceMotion> stance);
+
   [[nodiscard]] const VectorXd& q_start() const { return q_start_; }
   void Evaluate(double t, DesiredJoints* desired) const;
 
  private:
+  std::shared_ptr<const StanceMotion> stance_;  // null for a base that is fixed
   VectorXd q_start_;
   /// Displacements of six joints each; of the last, only as many as there are.
   std::vector<std::unique_ptr<Trajectory>> ways_;

@@ -46,7 +46,8 @@ const CheckRecord* FindEvidence(std::span<const CheckRecord> steps) {
   // What slides in the step in which a force shows tells more than the force. Wheels of another size give
   // other forces besides, which show before they have rolled far; wheels that slide do too.
   if (first == nullptr || first->name != "inverse_dynamics_robot") return first;
-  for (const std::string_view slides : {"cone_use", "traction_use", "contacts_lost"}) {
+  for (const std::string_view slides :
+       {"cone_use", "traction_use", "foot_cone_use", "contacts_lost", "feet_lost"}) {
     for (const CheckRecord& check : steps) {
       if (check.name == slides && check.failed && check.failed_at <= first->failed_at) return &check;
     }
@@ -130,6 +131,8 @@ const char* NameOf(Cause cause) {
       return "joint limit";
     case Cause::kFingertipSlip:
       return "fingertip slip";
+    case Cause::kFootSlip:
+      return "foot slip";
     case Cause::kWheelSlip:
       return "wheel slip";
     case Cause::kContactSoftness:

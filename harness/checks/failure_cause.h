@@ -13,6 +13,7 @@ enum class Cause {
   kActuatorLimit,  ///< A motor could not give its torque.
   kJointLimit,     ///< A joint reached the end of its range.
   kFingertipSlip,  ///< A fingertip slides: its force is at the edge of the friction cone.
+  kFootSlip,       ///< A foot slides or leaves the ground.
   kWheelSlip,      ///< A wheel slides: assumption (1), rolling without slipping.
   kContactSoftness,  ///< Contacts give or creep without sliding.
   kTilt,             ///< The platform does not stay level.

@@ -193,7 +193,12 @@ Comparison CompareFiles(const std::filesystem::path& a, const std::filesystem::p
                         const Progress& progress) {
   DescriptionFile first(a, urdf);
   DescriptionFile second(b, urdf);
-  if (first.format() == RobotFormat::kMjcf && second.format() != RobotFormat::kMjcf) std::swap(first, second);
+  // Terms of an MJCF are the engine's; bodies of a table are those that a file was made from.
+  const auto rank = [](const DescriptionFile& file) {
+    return file.format() == RobotFormat::kBodies ? 2 : file.format() == RobotFormat::kMjcf ? 1 : 0;
+  };
+  if (rank(first) > rank(second)) std::swap(first, second);
+  if (second.format() == RobotFormat::kBodies) second.PlaceOn(first.Describe());
   Comparison comparison;
   comparison.first = first.path();
   comparison.second = second.path();

@@ -16,13 +16,17 @@ class JudgedJointLaw final : public JudgedLaw {
         law_(setup.scenario().control.law),
         gains_(setup.joints()->gains),
         motion_(&setup.joints()->motion) {
-    for (VectorXd* vector : {&force_, &demand_, &true_demand_, &commanded_force_, &coulomb_, &viscous_})
+    if (stands_) ground_.emplace(setup.model(), setup.feet(), gains_.stance->height);
+    for (VectorXd* vector :
+         {&force_, &demand_, &true_demand_, &commanded_force_, &coulomb_, &viscous_, &position_error_})
       vector->setZero(setup.model().num_velocities());
     // Of the other laws the gain of a joint is the feedback in its torque.
     if (law_ != ControlLaw::kComputedTorque) return;
     for (const char* gain : {"K_v", "K_p"})
-      for (int i = 0; i < setup.model().num_dofs(); ++i)
-        gain_names_.push_back(std::string(gain) + " of " + setup.model().dof_name(i));
+      for (int i = 0; i < setup.model().num_velocities(); ++i) {
+        const int dof = i - setup.model().num_base_velocities();
+        gain_names_.push_back(std::string(gain) + " of " + (dof < 0 ? "base" : setup.model().dof_name(dof)));
+      }
   }
 
   [[nodiscard]] std::optional<double> CalcSpectralRadius() const override {
@@ -61,10 +65,21 @@ class JudgedJointLaw final : public JudgedLaw {
   bool Evaluate(const StepRecord& step, const LawTerms& terms) override {
     JointDemand::EvaluateDesired(*motion_, step.time, 2.0 * velocity_age_, &desired_, &half_step_);
     CalcCompensation();
+    CalcPositionError(stands_, desired_.q, terms.q, position_error_);
+    const bool has_forces = EvaluateForce(terms);
+    if (ground_ && step.command.demand.f_c.size() == ground_->J().rows()) {
+      // (F - J^T f)_joints, with an f that has to balance F_b
+      ground_->SetState(step.model->robot());
+      force_.noalias() -= ground_->J().transpose() * step.command.demand.f_c;
+    }
+    return has_forces;
+  }
+  bool EvaluateForce(const LawTerms& terms) {
     force_ = terms.C_xi + terms.gravity + terms.friction + coulomb_ + viscous_;
     if (law_ == ControlLaw::kComputedTorque) {
       // M_bar' (q_d_ddot + K_v e_dot + K_p e) + C_bar' q_dot + F_bar' + tau_f
-      CalcDemand(terms.q, terms.xi, &demand_);
+      demand_ = desired_.q_ddot + gains_.K_v.cwiseProduct(desired_.q_dot - terms.xi) +
+                gains_.K_p.cwiseProduct(position_error_);
       force_.noalias() += terms.M * demand_;
       return true;
     }
@@ -75,7 +90,7 @@ class JudgedJointLaw final : public JudgedLaw {
       force_.noalias() += terms.M * desired_.q_ddot;
       force_.noalias() += *terms.C * (desired_.q_dot - terms.xi);
     }
-    force_ += gains_.K.cwiseProduct(desired_.q - terms.q);
+    force_ += gains_.K.cwiseProduct(position_error_);
     force_ += gains_.D.cwiseProduct(desired_.q_dot - terms.xi);
     return true;
   }
@@ -88,7 +103,7 @@ class JudgedJointLaw final : public JudgedLaw {
     const VectorXd& D = computed ? gains_.K_v : gains_.D;
     const VectorXd& K = computed ? gains_.K_p : gains_.K;
     const VectorXd rate = D.cwiseProduct(desired_.q_dot - terms.xi);
-    const VectorXd position = K.cwiseProduct(desired_.q - terms.q);
+    const VectorXd position = K.cwiseProduct(position_error_);
     parts_.setZero(terms.xi.size(), CountColumns());
     if (moves) parts_.col(0) = terms.M * desired_.q_ddot;
     parts_.col(1) = computed ? VectorXd(terms.M * rate) : rate;
@@ -161,6 +176,8 @@ class JudgedJointLaw final : public JudgedLaw {
   DesiredJoints desired_, half_step_;
   VectorXd force_, demand_, true_demand_, commanded_force_;  // n
   VectorXd coulomb_, viscous_;                               // n, what is compensated
+  VectorXd position_error_;                                  // n, q_d - q
+  std::optional<GroundContacts> ground_;                     // of a robot that stands
   VectorXd q_, xi_;  // where the error dynamics have the joints; empty at first
 };
 

@@ -29,6 +29,7 @@ JudgedLaw::JudgedLaw(const Setup& setup)
     : time_step_(setup.scenario().plant.time_step),
       velocity_age_(setup.scenario().plant.velocity_age()),
       hold_(std::max(1L, std::lround(setup.scenario().plant.control_step / time_step_))),
+      stands_(!setup.feet().empty()),
       actuation_(setup.model()),
       commanded_(setup.model(), static_cast<int>(setup.fingertips().size())),
       own_factor_(setup.model()) {

@@ -33,10 +33,11 @@ class JudgedLaw {
   [[nodiscard]] virtual std::optional<double> CalcSpectralRadius() const = 0;
   /// Whether the rigid system answers with what the law demands of it: the paper's does.
   [[nodiscard]] virtual bool has_demand() const { return false; }
-  /// Whether the error dynamics can be integrated beside the run: the controller computes anew at every step,
-  /// in the way that velocities of the middle of the step before need.
+  /// Whether the error dynamics can be integrated beside the run: no foot holds the robot back, and the
+  /// controller computes anew at every step, in the way that velocities of the middle of the step before
+  /// need.
   [[nodiscard]] bool follows_error() const {
-    return CalcSpectralRadius().has_value() && hold_ == 1 && !accelerates_within_step();
+    return CalcSpectralRadius().has_value() && hold_ == 1 && !accelerates_within_step() && !stands_;
   }
   /// Whether these torques were computed at their step, by this law.
   [[nodiscard]] virtual bool IsComputed(const Command& command) const = 0;
@@ -87,6 +88,7 @@ class JudgedLaw {
 
   double time_step_, velocity_age_;  // s
   long hold_;                        // steps
+  bool stands_;                      // the ground takes part in what the errors do
   ActuationMap actuation_;
   ConstrainedDynamics commanded_;  // what the controller's rigid system does under the commanded torques
   TreeFactor own_factor_;          // of the terms' M_bar'

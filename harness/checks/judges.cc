@@ -52,6 +52,16 @@ Evaluation EvaluateContactDistance(const StepAnalysis& step) {
   return CheckValue{worst, static_cast<int>(part)};
 }
 
+Evaluation EvaluateFootDistance(const StepAnalysis& step) {
+  return CheckValue{step.foot_mismatch.first, step.foot_mismatch.second};
+}
+
+std::string DescribeFoot(const StepAnalysis& step, int part) {
+  return part < 0
+             ? ""
+             : "foot " + Quote(step.setup->model().frame(step.setup->feet()[static_cast<size_t>(part)]).name);
+}
+
 Evaluation EvaluateRim(const StepAnalysis& step) {
   if (!step.step->command.handling.holding) return std::nullopt;
   const Vector3d& pole = *step.setup->scenario().grasp.hemisphere;

@@ -11,10 +11,13 @@ namespace dexcheck {
 Evaluation EvaluateRobotDynamics(const StepAnalysis& step);
 /// A wheel's rim against the platform above it, (1), m/s.
 Evaluation EvaluateRolling(const StepAnalysis& step);
+/// Of a foot that touches: the plant's distance to the ground less that of the declared shapes, m.
+Evaluation EvaluateFootDistance(const StepAnalysis& step);
 /// Of a fingertip that touches: the plant's distance less that of the declared shapes, m.
 Evaluation EvaluateContactDistance(const StepAnalysis& step);
 /// Of a hemispherical fingertip, m.
 Evaluation EvaluateRim(const StepAnalysis& step);
+std::string DescribeFoot(const StepAnalysis& step, int part);
 std::string DescribeFingertip(const StepAnalysis& step, int part);
 /// How far a joint is beyond its range, rad or m.
 Evaluation EvaluateJointLimit(const StepAnalysis& step);

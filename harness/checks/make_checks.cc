@@ -39,8 +39,13 @@ std::set<std::string_view> ListMissing(const Setup& setup, const JudgedLaw* law)
   leave_out(!scenario.expect.orientation, {"expect_orientation"});
   leave_out(!scenario.expect.joints, {"expect_joints"});
   leave_out(joints, {"law_demand", "grasp_null_space", "grasp_cone", "grasp_optimality", "error_dynamics",
-                     "orientation_dynamics", "contact_force", "fingertip_slip", "fingertip_slip_rate",
-                     "cone_use", "contacts_lost", "penetration", "kappa"});
+                     "orientation_dynamics", "fingertip_slip", "fingertip_slip_rate", "cone_use",
+                     "contacts_lost", "penetration", "kappa"});
+  const bool stands = !setup.feet().empty();
+  leave_out(joints && !stands, {"contact_force"});
+  leave_out(!stands, {"foot_slip", "foot_slip_rate", "foot_cone_use", "feet_lost", "foot_penetration",
+                      "foot_distance"});
+  leave_out(stands, {"base_tilt"});
   leave_out(!joints, {"joint_dynamics"});
   leave_out(!setup.start().bonds.empty(),
             {"fingertip_slip_rate", "cone_use", "contacts_lost", "penetration", "kappa"});
@@ -66,6 +71,25 @@ std::set<std::string_view> ListMissing(const Setup& setup, const JudgedLaw* law)
 
 /// Descriptions that differ from those of check_table.cc.
 std::map<std::string_view, const char*> ListDescriptions(const Setup& setup) {
+  if (!setup.feet().empty()) {
+    return {
+        {"closed_loop_spectral_radius",
+         "largest eigenvalue of the errors of base and joints under the scenario's gains, sampled as the "
+         "controller does it"},
+        {"law_torque",
+         "torques sent, and forces asked of the ground, against the law computed from the engine's terms, "
+         "relative to the forces balanced"},
+        {"inverse_dynamics_robot",
+         "what is left of the equations of motion with the engine's accelerations and foot forces, against "
+         "the forces balanced"},
+        {"reduced_acceleration", "xi_dot of the robot on rigid feet that do not slip, against the engine's"},
+        {"contact_force",
+         "forces of the feet of that system against the engine's, relative to them and the weight; where "
+         "more feet touch "
+         "than "
+         "hold the robot they are not determined, and 0"},
+        {"solver", "what the engine's solver left over of its own equations of motion"}};
+  }
   if (setup.joints() != nullptr) {
     return {
         {"closed_loop_spectral_radius",

@@ -41,12 +41,21 @@ StepAnalyzer::StepAnalyzer(const Setup& setup)
   now_.findings.f_c_model = now_.findings.f_c;
   now_.findings.fingertip_slip.resize(setup.fingertips().size());
   now_.findings.wheel_slip.resize(setup.adapter().wheels().size());
+  const std::span<const int> feet = setup.feet();
+  now_.findings.foot_slip.resize(feet.size());
+  if (feet.empty()) return;
+  ground_ =
+      std::make_unique<GroundContacts>(setup.declared_model(), feet, setup.joints()->gains.stance->height);
+  ground_dynamics_ = std::make_unique<GroundDynamics>(setup.declared_model(), static_cast<int>(feet.size()));
+  now_.findings.foot_force.setZero(3 * static_cast<Eigen::Index>(feet.size()));
+  now_.findings.foot_force_model = now_.findings.foot_force;
 }
 
 void StepAnalyzer::Reset() {
   StepFindings& findings = now_.findings;
   ForgetSlip();
-  std::fill(findings.wheel_slip.begin(), findings.wheel_slip.end(), SlipState{});
+  for (std::vector<SlipState>* slips : {&findings.wheel_slip, &findings.foot_slip})
+    std::fill(slips->begin(), slips->end(), SlipState{});
   findings.contacts_lost = 0;
   findings.least_cone_margin = std::numeric_limits<double>::infinity();
   findings.excluded_steps = 0;
@@ -115,6 +124,7 @@ void StepAnalyzer::Analyze() {
   CompareMotors();
   FindContacts();
   FindTransient();
+  if (ground_) FindFeet();
   if (step.response.wheels.size() == 2) {
     const std::vector<EngineWheel>& wheels = setup_->adapter().wheels();
     now_.wheel_rates = {wheels[0].axis.y() * step.reading.qvel[wheels[0].dof],
@@ -128,6 +138,8 @@ void StepAnalyzer::Analyze() {
     }
   }
   CalcContactBias(*setup_, step, *now_.declared->model, &now_.contact_bias);
+  // The engine constrains J xi_dot, where the model has J xi_dot + J_dot xi.
+  if (ground_) now_.contact_bias = ground_->J_dot_xi();
   CalcAppliedForce();
   // Soft contacts become only in some milliseconds what rigid ones are at once.
   if (!now_.is_transient) Predict();
@@ -186,6 +198,7 @@ void StepAnalyzer::CalcAppliedForce() {
 }
 
 void StepAnalyzer::Predict() {
+  if (ground_) return PredictStance();
   const bool whole = now_.touching == AllContacts(now_.grasp->num_contacts());
   if (handling_.partial && !whole && now_.touching != 0) return PredictPart();
   const bool holds = now_.grasp->num_contacts() > 0;
@@ -202,6 +215,13 @@ void StepAnalyzer::Predict() {
   now_.findings.V_Bo_dot_model = prediction->V_Bo_dot;
   now_.findings.f_c_model = prediction->f_c;
   now_.mass_factor = &dynamics_.mass_factor();
+}
+
+void StepAnalyzer::PredictStance() {
+  const Prediction& prediction = ground_dynamics_->Predict(*now_.robot, *ground_, now_.applied_force);
+  now_.findings.xi_dot_model = prediction.xi_dot;
+  now_.findings.foot_force_model = prediction.f_c;
+  now_.mass_factor = &ground_dynamics_->mass_factor();
 }
 
 void StepAnalyzer::PredictPart() {
@@ -227,6 +247,7 @@ void StepAnalyzer::CalcRobotResidual() {
   residual = now_.bias - now_.applied_force;
   residual.noalias() += now_.robot->M() * response.xi_dot;
   residual.noalias() += now_.grasp->J_B().transpose() * now_.findings.f_c;
+  if (ground_) residual.noalias() -= ground_->J().transpose() * now_.findings.foot_force;
   if (response.departure_force.size() > 0) residual += response.departure_force;
   if (response.solver_force.size() > 0) residual -= response.solver_force;
   if (response.wheels.size() == 2) {
@@ -298,6 +319,19 @@ void StepAnalyzer::ComparePrediction() {
   acceleration_error_ = findings.xi_dot_model - now_.step->response.xi_dot;
   now_.mass_factor->Multiply(acceleration_error_);
   now_.acceleration_error = acceleration_error_.norm() / now_.balanced;
+  if (ground_) {
+    // Where the rigid system does not determine the forces of single feet, their sum is xi_dot's.
+    const bool has_forces = ground_dynamics_->determines_forces();
+    // Of feet that leave the ground, what they should bear.
+    const double weight = mass_ * setup_->model().gravity().norm();
+    const double scale = std::max({findings.foot_force.norm(), weight, kTiny});
+    now_.contact_force_error =
+        has_forces ? (findings.foot_force_model - findings.foot_force).norm() / scale : 0.0;
+    // J^T (f - f_model) is M_bar' times the accelerations' error.
+    now_.contact_force_compliance =
+        has_forces ? ground_dynamics_->CalcForceGain() * compliance_.motion() / scale : 0.0;
+    return;
+  }
   double scale = std::max(findings.f_c.norm(), kTiny);
   // Fingertips that only touch push with less than what they will bear.
   if (handling_.partial) scale = std::max(scale, CalcWeight());

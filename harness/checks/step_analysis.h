@@ -13,6 +13,7 @@
 
 #include "controller/control/actuation.h"
 #include "controller/control/constrained_dynamics.h"
+#include "controller/control/ground_dynamics.h"
 #include "controller/handling/handling_controller.h"
 #include "harness/checks/contact_compliance.h"
 #include "harness/checks/declared_plant.h"
@@ -80,7 +81,11 @@ struct StepAnalysis {
   /// Distance of each fingertip that touches, by the plant less by the declared shapes (N), m; else 0.
   VectorXd contact_mismatch;
   VectorXd contact_bias;  ///< CalcContactBias (3N).
-  SlipSummary fingertips, wheels;
+  SlipSummary fingertips, wheels, feet;
+  int feet_missing = 0;           ///< Feet of a robot that stands which do not touch the ground.
+  double foot_penetration = 0.0;  ///< Deepest overlap of a foot and the ground, m.
+  /// Largest difference of a foot's distance by the plant and by the declared shapes, m, and whose it is.
+  std::pair<double, int> foot_mismatch;
 
   // Wheels.
   Vector2d wheel_rates = Vector2d::Zero();     ///< Of the right and left wheel, rad/s.
@@ -170,6 +175,8 @@ class StepAnalyzer {
   [[nodiscard]] double CalcSwingForce();
   void ComparePrediction();
   void CalcObjectResidual();
+  void FindFeet();
+  void PredictStance();
   void FollowSlip();
   void ForgetSlip();
   void MoveWindow();
@@ -187,6 +194,8 @@ class StepAnalyzer {
   MjDataPtr kinematics_;  // of a plant that has no bodies of the engine's
   ActuationMap actuation_;
   ConstrainedDynamics dynamics_;
+  std::unique_ptr<GroundContacts> ground_;  // null for a robot that does not stand
+  std::unique_ptr<GroundDynamics> ground_dynamics_;
   std::map<ContactSet, std::unique_ptr<PartialDynamics>> parts_;
   PredictionCompliance compliance_;
   Handling handling_;                                             // of the step before

@@ -47,6 +47,25 @@ void StepAnalyzer::FindContacts() {
   }
 }
 
+void StepAnalyzer::FindFeet() {
+  ground_->SetState(*now_.robot);
+  now_.feet_missing = 0;
+  now_.foot_penetration = 0.0;
+  now_.foot_mismatch = {0.0, -1};
+  const std::vector<GroundContact>& feet = now_.step->response.feet;
+  for (size_t i = 0; i < feet.size(); ++i) {
+    const auto k = static_cast<Eigen::Index>(i);
+    now_.findings.foot_force.segment<3>(3 * k) = feet[i].force;
+    if (!feet[i].touching) {
+      ++now_.feet_missing;
+      continue;
+    }
+    now_.foot_penetration = std::max(now_.foot_penetration, -feet[i].distance);
+    const double mismatch = std::abs(feet[i].distance - ground_->gap()[k]);
+    if (!(mismatch <= now_.foot_mismatch.first)) now_.foot_mismatch = {mismatch, static_cast<int>(i)};
+  }
+}
+
 void StepAnalyzer::ForgetSlip() {
   std::fill(now_.findings.fingertip_slip.begin(), now_.findings.fingertip_slip.end(), SlipState{});
 }
@@ -55,7 +74,8 @@ void StepAnalyzer::MoveWindow() {
   const long half = std::max(1L, std::lround(0.5 * kSlipWindow / time_step_));
   now_.is_window_end = steps_ > 0 && steps_ % half == 0;
   if (!now_.is_window_end) return;
-  for (std::vector<SlipState>* slips : {&now_.findings.fingertip_slip, &now_.findings.wheel_slip}) {
+  for (std::vector<SlipState>* slips :
+       {&now_.findings.fingertip_slip, &now_.findings.wheel_slip, &now_.findings.foot_slip}) {
     for (SlipState& slip : *slips) {
       slip.window = slip.next_window;
       slip.next_window = slip.distance - slip.creep;
@@ -67,7 +87,13 @@ void StepAnalyzer::FollowSlip() {
   const StepRecord& step = *now_.step;
   const MeasuredState& state = step.reading.state;
   StepFindings& findings = now_.findings;
-  now_.fingertips = now_.wheels = SlipSummary{};
+  now_.fingertips = now_.wheels = now_.feet = SlipSummary{};
+  for (size_t i = 0; i < step.response.feet.size(); ++i) {
+    Vector3d creep_rate = time_step_ * ground_->J_dot_xi().segment<3>(3 * static_cast<Eigen::Index>(i));
+    creep_rate.z() = 0.0;
+    Follow(step.response.feet[i], Matrix3d::Identity(), creep_rate, time_step_, &findings.foot_slip[i],
+           &now_.feet);
+  }
   for (size_t i = 0; i < step.response.fingertips.size(); ++i) {
     SlipState& slip = findings.fingertip_slip[i];
     const Matrix3d& R_o_cf = now_.grasp->contacts()[i].geometry.g_o_cf.linear();

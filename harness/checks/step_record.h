@@ -39,7 +39,10 @@ struct StepFindings {
   /// of the last step that was predicted.
   VectorXd xi_dot_model, f_c_model;
   Vector6d V_Bo_dot_model = Vector6d::Zero();  ///< Likewise of the object, Sigma_o.
-  std::vector<SlipState> fingertip_slip, wheel_slip;
+  std::vector<SlipState> fingertip_slip, wheel_slip, foot_slip;
+  /// 3m, N: the ground's forces on the feet of a robot that stands, world axes, by the plant and by the rigid
+  /// system.
+  VectorXd foot_force, foot_force_model;
 
   // Of all steps so far.
   long excluded_steps = 0;  ///< Whose balance and prediction were not judged: contacts had just changed.

@@ -6,6 +6,7 @@
 
 #include "controller/common/text.h"
 #include "harness/descriptions/join_names.h"
+#include "harness/descriptions/structure_match.h"
 
 namespace dexcheck {
 namespace {
@@ -54,6 +55,12 @@ std::string SimplifyName(const std::string& name) {
   return simple;
 }
 
+Names ListJointNames(const RobotDescription& robot) {
+  Names names;
+  for (const Joint& joint : robot.spec.joints) names.push_back(joint.name);
+  return names;
+}
+
 Names FindAlikeNames(const Names& names, const Names& others) {
   if (names.size() != others.size()) return {};
   for (const Names& own : ListVariants(names)) {
@@ -74,11 +81,15 @@ Names FindAlikeNames(const Names& names, const Names& others) {
   return {};
 }
 
-std::vector<std::string> TakeJointNames(const Names& others, const std::string& other_source,
-                                        RobotDescription* robot) {
-  Names names;
-  for (const Joint& joint : robot->spec.joints) names.push_back(joint.name);
-  const Names partners = FindAlikeNames(names, others);
+Names TakeJointNames(const RobotDescription& other, RobotDescription* robot) {
+  const Names names = ListJointNames(*robot);
+  const Names others = ListJointNames(other);
+  Names partners = FindAlikeNames(names, others);
+  const bool is_alike = !partners.empty();
+  if (!is_alike) {
+    for (const int joint : MatchByStructure(*robot, other))
+      partners.push_back(others[static_cast<size_t>(joint)]);
+  }
   Names renamed;
   for (size_t i = 0; i < partners.size(); ++i) {
     if (names[i] == partners[i]) continue;
@@ -86,7 +97,12 @@ std::vector<std::string> TakeJointNames(const Names& others, const std::string& 
     renamed.push_back(Quote(names[i]) + " is " + Quote(partners[i]));
   }
   if (renamed.empty()) return {};
-  return {"joints by other names: " + JoinNames(renamed) + " in " + other_source};
+  const std::string source = " in " + other.spec.source;
+  if (is_alike) return {"joints by other names: " + JoinNames(renamed) + source};
+  // These are for the reader to judge, so all of them are named.
+  std::string pairs = "joints by other names, matched by the tree, then by places, axes, masses and ranges: ";
+  for (const std::string& pair : renamed) pairs += pair + (&pair == &renamed.back() ? source : ", ");
+  return {pairs};
 }
 
 }  // namespace dexcheck

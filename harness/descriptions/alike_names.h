@@ -17,10 +17,11 @@ std::string SimplifyName(const std::string& name);
 std::vector<std::string> FindAlikeNames(const std::vector<std::string>& names,
                                         const std::vector<std::string>& others);
 
-/// Gives the joints of a description the names that another file has for them, when those are alike.
-/// @param others names of the other file's joints. @return a note that lists them; none when nothing was
+std::vector<std::string> ListJointNames(const RobotDescription& robot);
+
+/// Gives the joints of a description the names that another file has for them, when those are alike, or else
+/// when one tree is the other's (structure_match.h). @return a note that lists them; none when nothing was
 /// renamed.
-std::vector<std::string> TakeJointNames(const std::vector<std::string>& others,
-                                        const std::string& other_source, RobotDescription* robot);
+std::vector<std::string> TakeJointNames(const RobotDescription& other, RobotDescription* robot);
 
 }  // namespace dexcheck

@@ -234,9 +234,7 @@ bool Ignores(const std::string& word, const std::vector<std::string>& ignore) {
 
 Completion CompleteEachOther(RobotDescription* a, RobotDescription* b,
                              const std::vector<std::string>& ignore) {
-  std::vector<std::string> names;
-  for (const Joint& joint : a->spec.joints) names.push_back(joint.name);
-  const std::vector<std::string> renamed = TakeJointNames(names, a->spec.source, b);
+  const std::vector<std::string> renamed = TakeJointNames(*a, b);
   Completion completion = Matching(a, b, ignore).Run();
   completion.notes.insert(completion.notes.begin(), renamed.begin(), renamed.end());
   return completion;

@@ -184,6 +184,15 @@ class EngineOnly {
     });
   }
 
+  /// What a floating robot may stand on: shapes on whose body the model has a frame.
+  [[nodiscard]] bool IsFoot(int geom) const {
+    const std::vector<int>& sites = adapter_.frame_sites();
+    return adapter_.model().base().type == BaseType::kFloating &&
+           std::any_of(sites.begin(), sites.end(), [&](int site) {
+             return site >= 0 && engine_.site_bodyid[site] == engine_.geom_bodyid[geom];
+           });
+  }
+
   [[nodiscard]] std::string DescribeGeom(int geom) const {
     return fmt::format("{} (type {}, size {}, pos {}, quat {})", GeomName(geom), engine_.geom_type[geom],
                        List(engine_.geom_size + 3 * geom, 3), List(engine_.geom_pos + 3 * geom, 3),
@@ -191,7 +200,7 @@ class EngineOnly {
   }
 
   /// Explicit contact pairs: nothing acts at a distance, fingers and wheels are hard, and all else of the
-  /// robot that touches the world slides without friction.
+  /// robot but feet that touches the world slides without friction.
   void ComparePairs() {
     std::set<int> meshes;
     for (int pair = 0; pair < engine_.npair; ++pair) {
@@ -208,8 +217,8 @@ class EngineOnly {
           meshes.insert(own);
         const bool hard = (IsFingertip(own) && IsObject(other)) || (IsWheel(own) && IsWorld(other));
         if (hard) Expect("contact_dimension", where, kHardContact, dim);
-        const bool has_friction =
-            IsWorld(other) && !IsWorld(own) && !IsObject(own) && !IsWheel(own) && !IsFingertip(own);
+        const bool has_friction = IsWorld(other) && !IsWorld(own) && !IsObject(own) && !IsWheel(own) &&
+                                  !IsFingertip(own) && !IsFoot(own);
         if (has_friction)
           Expect("contact_rubbing", where, 0.0, dim > 1 ? std::max(friction[0], friction[1]) : 0.0);
       }

@@ -7,6 +7,7 @@
 #include <map>
 #include <memory>
 #include <random>
+#include <sstream>
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
@@ -35,7 +36,7 @@ constexpr std::string_view kAttributes[] = {
     "quat", "euler", "xyaxes", "zaxis",   "axisangle", "fromto",     "mass",         "density",
     "size", "axis",  "range",  "ref",     "gravity",   "armature",   "frictionloss", "polycoef"};
 
-bool IsSeparator(char c) { return c == ' ' || c == '\t' || c == '\n' || c == '\r' || c == ','; }
+bool IsSeparator(char c) { return std::string_view(" \t\n\r,;").find(c) != std::string_view::npos; }
 
 /// A list of numbers with each replaced.
 std::string ReplaceNumbers(std::string_view list, bool is_of_body, const Replace& replace) {
@@ -96,6 +97,15 @@ std::string ReplaceInToml(std::string_view text, const Replace& replace) {
     if (!number && std::isalpha(static_cast<unsigned char>(first)) != 0)
       is_of_body = std::find(std::begin(kOfBody), std::end(kOfBody), word) != std::end(kOfBody);
   }
+  return result;
+}
+
+/// The numbers of a table of bodies, below its header.
+std::string ReplaceInBodies(const std::string& text, const Replace& replace) {
+  std::string result;
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);)
+    result += (line.starts_with('#') ? line : ReplaceNumbers(line, true, replace)) + "\n";
   return result;
 }
 
@@ -267,8 +277,9 @@ class NumberedText : public NumberedFile {
     for (int k = 0; k < count; ++k) {
       Mover mover(static_cast<unsigned>(k), exact);
       try {
-        spread.draws.push_back(
-            DescriptionFile(file_.path(), ReplaceAll(mover.AsReplace()), options_).Describe());
+        DescriptionFile moved(file_.path(), ReplaceAll(mover.AsReplace()), options_);
+        if (file_.carrier()) moved.PlaceOn(*file_.carrier());
+        spread.draws.push_back(moved.Describe());
       } catch (const InputError&) {
         // A parameter file's bodies must be some: of a slender one that may fail.
       }
@@ -284,6 +295,7 @@ class NumberedText : public NumberedFile {
  private:
   [[nodiscard]] std::string ReplaceAll(const Replace& replace) const {
     if (file_.format() == RobotFormat::kToml) return ReplaceInToml(file_.text(), replace);
+    if (file_.format() == RobotFormat::kBodies) return ReplaceInBodies(file_.text(), replace);
     tinyxml2::XMLDocument document;
     ParseXml(file_.text(), file_.path().string(), &document);
     ReplaceInXml(document.RootElement(), replace);

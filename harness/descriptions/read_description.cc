@@ -71,6 +71,7 @@ RobotFormat FindFormat(std::string_view text, const std::filesystem::path& path)
   const std::string_view root = FindRootElement(text);
   if (root == "robot" || (root.empty() && path.extension() == ".urdf")) return RobotFormat::kUrdf;
   if (root == "mujoco" || (root.empty() && path.extension() == ".xml")) return RobotFormat::kMjcf;
+  if (root.empty() && path.extension() == ".csv") return RobotFormat::kBodies;
   if (root.empty()) return RobotFormat::kToml;
   if (root == "mujocoinclude") {
     throw InputError(path.string() +
@@ -96,10 +97,21 @@ DescriptionFile::DescriptionFile(std::filesystem::path path, std::string text, c
       break;
     case RobotFormat::kToml:
       description_ = ReadTable(text_, path_.string());
+      break;
+    case RobotFormat::kBodies:
+      bodies_ = ReadBodyTable(text_, path_.string());
   }
 }
 
+void DescriptionFile::PlaceOn(const RobotDescription& other) {
+  carrier_ = other;
+  description_ = PlaceBodies(bodies_, path_.string(), other);
+}
+
 RobotDescription DescriptionFile::Describe() const {
+  if (format_ == RobotFormat::kBodies && !description_)
+    throw InputError(path_.string() + ": is a table of bodies, which has no joints; dexcheck consistency " +
+                     "compares it with a URDF, an MJCF or a parameter file");
   return description_ ? *description_ : ReadMjcfDescription(*engine_, path_.string());
 }
 

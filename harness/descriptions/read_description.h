@@ -8,6 +8,7 @@
 #include <string>
 #include <string_view>
 
+#include "harness/descriptions/body_table.h"
 #include "harness/descriptions/robot_description.h"
 #include "harness/descriptions/urdf_reader.h"
 #include "harness/engine/engine.h"
@@ -15,12 +16,12 @@
 namespace dexcheck {
 
 /// What kind of description a text holds: XML whose root element is <robot> or <mujoco>, or else a parameter
-/// file. XML without a root element has the format of the name's end, so that an empty .xml is no parameter
-/// file.
+/// file, or a table of bodies when its name ends in .csv. XML without a root element has the format of the
+/// name's end, so that an empty .xml is no parameter file.
 /// @throws InputError "FILE: must be ..." for other XML.
 RobotFormat FindFormat(std::string_view text, const std::filesystem::path& path);
 
-/// A parameter file, a URDF, or an MJCF, which the engine compiles.
+/// A parameter file, a URDF, a table of bodies, or an MJCF, which the engine compiles.
 class DescriptionFile {
  public:
   /// @throws InputError for a file that cannot be read; also for a URDF or a parameter file that is none.
@@ -36,6 +37,10 @@ class DescriptionFile {
   [[nodiscard]] RobotDescription Describe() const;
   /// The same; none of such an MJCF.
   [[nodiscard]] std::optional<RobotDescription> TryToDescribe() const;
+  /// Puts the bodies on another file's robot. @pre the format is kBodies. @throws InputError as PlaceBodies.
+  void PlaceOn(const RobotDescription& other);
+  /// That robot; none before.
+  [[nodiscard]] const std::optional<RobotDescription>& carrier() const { return carrier_; }
   /// The document. @pre the format is kMjcf, here and below.
   [[nodiscard]] const MjcfFile& document() const { return *document_; }
   /// A copy of the engine's model.
@@ -45,7 +50,9 @@ class DescriptionFile {
   std::filesystem::path path_;
   std::string text_;
   RobotFormat format_;
-  std::optional<RobotDescription> description_;  // of a parameter file or URDF
+  std::optional<RobotDescription> description_;  // of a parameter file or URDF, or of bodies once placed
+  std::vector<TabledBody> bodies_;               // of a table of bodies
+  std::optional<RobotDescription> carrier_;      // likewise
   std::unique_ptr<MjcfFile> document_;           // of an MJCF
   MjModelPtr engine_;                            // likewise
 };

@@ -11,7 +11,12 @@
 
 namespace dexcheck {
 
-enum class RobotFormat { kToml, kUrdf, kMjcf };
+enum class RobotFormat {
+  kToml,
+  kUrdf,
+  kMjcf,
+  kBodies,  ///< A table of bodies (body_table.h).
+};
 
 /// What a file says of a joint and its link, beside the specification: how its row is written, too.
 struct DescribedJoint : WrittenRow {

@@ -169,11 +169,8 @@ void AddHeldJoint(const std::string& text, RobotPart* part) {
 
 std::vector<std::string> TakePart(const RobotPart& part, RobotDescription* a, RobotDescription* b,
                                   int* held) {
-  std::vector<std::string> names;
-  for (const Joint& joint : a->spec.joints) names.push_back(joint.name);
-  std::vector<std::string> of_b;
-  for (const Joint& joint : b->spec.joints) of_b.push_back(joint.name);
-  std::vector<std::string> notes = TakeJointNames(names, a->spec.source, b);
+  const std::vector<std::string> of_b = ListJointNames(*b);
+  std::vector<std::string> notes = TakeJointNames(*a, b);
   // What one of the two calls a joint is as good as what the other calls it.
   const auto translate = [&](const std::string& name) {
     const auto found = std::find(of_b.begin(), of_b.end(), name);
@@ -235,9 +232,7 @@ std::vector<std::string> TakePart(const RobotPart& part, RobotDescription* a, Ro
 
 std::optional<RobotPart> FindCommonPart(const RobotDescription& a, const RobotDescription& b) {
   RobotDescription renamed = b;
-  std::vector<std::string> names;
-  for (const Joint& joint : a.spec.joints) names.push_back(joint.name);
-  TakeJointNames(names, a.spec.source, &renamed);
+  TakeJointNames(a, &renamed);
   for (const RobotDescription* robot : {&a, &b}) {
     const BaseType type = robot->spec.base.type;
     if ((type != BaseType::kFixed && type != BaseType::kFloating) || robot->spec.object ||

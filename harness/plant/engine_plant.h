@@ -24,6 +24,9 @@ class EnginePlant final : public Plant {
     observer_.SetBonds(kappa, constraints);
   }
 
+  /// See Observer.
+  void SetFeet(std::span<const int> frames) { observer_.SetFeet(frames); }
+
   /// Geoms that should not touch, and that do push: what they push with is read.
   void WatchCollisions(std::span<const std::pair<int, int>> geoms);
 

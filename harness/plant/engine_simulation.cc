@@ -45,9 +45,11 @@ EngineSimulation::EngineSimulation(const Adapter& adapter, bool implicit_damping
   // Whoever commands torques keeps to the limits; friction comes on top.
   std::fill_n(model_->actuator_ctrllimited, model_->nu, 0);
   std::fill_n(model_->actuator_forcelimited, model_->nu, 0);
+  if (adapter.model().base().type == BaseType::kFloating) motors_.assign(6, -1);
   for (const EngineWheel& wheel : adapter.wheels()) motors_.push_back(FindMotor(*model_, wheel.joint));
   for (const int joint : adapter.joint_ids()) motors_.push_back(FindMotor(*model_, joint));
-  for (const int motor : motors_) dofs_.push_back(model_->jnt_dofadr[model_->actuator_trnid[2 * motor]]);
+  for (const int motor : motors_)
+    dofs_.push_back(motor < 0 ? -1 : model_->jnt_dofadr[model_->actuator_trnid[2 * motor]]);
 }
 
 void EngineSimulation::BeginStep() { mj_step1(model_.get(), data_.get()); }
@@ -56,6 +58,7 @@ void EngineSimulation::SetTorques(const Eigen::Ref<const VectorXd>& tau) {
   Require(tau.size() == static_cast<Eigen::Index>(motors_.size()), "length of tau'", "must be that of xi",
           tau.size());
   for (size_t i = 0; i < motors_.size(); ++i) {
+    if (motors_[i] < 0) continue;
     data_->ctrl[motors_[i]] = tau[static_cast<Eigen::Index>(i)] / model_->actuator_gear[6 * motors_[i]];
   }
 }
@@ -77,13 +80,17 @@ void EngineSimulation::Push(std::span<const Wrench> wrenches) {
 void EngineSimulation::ReadMotorTorques(VectorXd* tau) const {
   tau->resize(static_cast<Eigen::Index>(dofs_.size()));
   for (size_t i = 0; i < dofs_.size(); ++i) {
-    (*tau)[static_cast<Eigen::Index>(i)] = data_->qfrc_actuator[dofs_[i]];
+    (*tau)[static_cast<Eigen::Index>(i)] = dofs_[i] < 0 ? 0.0 : data_->qfrc_actuator[dofs_[i]];
   }
 }
 
 std::vector<Motor> EngineSimulation::ListMotors() const {
   std::vector<Motor> motors;
   for (const int motor : motors_) {
+    if (motor < 0) {
+      motors.push_back({"base", std::numeric_limits<double>::infinity()});
+      continue;
+    }
     const double gear = std::abs(model_->actuator_gear[6 * motor]);
     double limit = std::numeric_limits<double>::infinity();
     // The engine cuts off the control and, of a motor with gain 1, the force alike.
@@ -141,6 +148,24 @@ void EngineSimulation::SetState(const EngineState& state) {
   data_->time = state.time;
 }
 
+BodyContact ReadContact(const mjModel& m, const mjData& d, int contact, bool first) {
+  const mjContact& c = d.contact[contact];
+  BodyContact result;
+  result.touching = true;
+  result.distance = c.dist;
+  // Velocity of the second geom against the first, along the contact's tangents.
+  const RotationMap frame(c.frame);
+  const mjtNum* const velocity = d.efc_vel + c.efc_address;
+  result.slip = (velocity[1] * frame.row(1) + velocity[2] * frame.row(2)).transpose();
+  if (first) result.slip = -result.slip;
+  mjtNum force[6];
+  mj_contactForce(&m, &d, contact, force);
+  const double tangential = std::hypot(force[1] / c.friction[0], force[2] / c.friction[1]);
+  result.cone_use = force[0] > 0.0 ? tangential / force[0] : 0.0;
+  result.cone_margin = c.friction[0] * (force[0] - tangential);
+  return result;
+}
+
 BodyContact ReadBodyContact(const mjModel& m, const mjData& d, int body, int other) {
   BodyContact result;
   for (int i = 0; i < d.ncon; ++i) {
@@ -150,19 +175,7 @@ BodyContact ReadBodyContact(const mjModel& m, const mjData& d, int body, int oth
     const bool first = body1 == body && body2 == other;
     const bool second = body2 == body && body1 == other;
     if ((!first && !second) || c.efc_address < 0 || c.dim < 3) continue;
-    if (result.touching && c.dist >= result.distance) continue;
-    result.touching = true;
-    result.distance = c.dist;
-    // Velocity of the second geom against the first, along the contact's tangents.
-    const RotationMap frame(c.frame);
-    const mjtNum* const velocity = d.efc_vel + c.efc_address;
-    result.slip = (velocity[1] * frame.row(1) + velocity[2] * frame.row(2)).transpose();
-    if (first) result.slip = -result.slip;
-    mjtNum force[6];
-    mj_contactForce(&m, &d, i, force);
-    const double tangential = std::hypot(force[1] / c.friction[0], force[2] / c.friction[1]);
-    result.cone_use = force[0] > 0.0 ? tangential / force[0] : 0.0;
-    result.cone_margin = c.friction[0] * (force[0] - tangential);
+    if (!result.touching || c.dist < result.distance) result = ReadContact(m, d, i, first);
   }
   return result;
 }

@@ -65,10 +65,12 @@ class EngineSimulation {
   MjDataPtr data_;
   bool is_pushed_ = false;
   VectorXd damping_;         // nv, N m s/rad; what is not integrated implicitly
-  std::vector<int> motors_;  // by entry of tau'
+  std::vector<int> motors_;  // by entry of tau'; -1 for those of a floating base
   std::vector<int> dofs_;    // likewise
 };
 
+/// One of the engine's contacts. @param first whether the body whose slip it is stands first in it.
+BodyContact ReadContact(const mjModel& m, const mjData& d, int contact, bool first);
 /// The contact of `body` with `other`, after the step's forces are known.
 BodyContact ReadBodyContact(const mjModel& m, const mjData& d, int body, int other);
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "controller/common/text.h"
 #include "controller/contact/contact_geometry.h"
@@ -74,9 +75,12 @@ void Observer::Read(const EngineSimulation& simulation, PlantReading* reading) {
   qpos_ = Eigen::Map<const VectorXd>(d.qpos, m.nq);
   X_W0_ = adapter_->GetBasePose(d.qpos);
   rates_ = ReadBaseRates(d);
-  const Vector3d up = X_W0_.linear().col(2);
-  reading->departure.tilt = std::atan2(up.head<2>().norm(), up.z());
-  reading->departure.height = X_W0_.translation().z() - adapter_->model().base().X_B0.translation().z();
+  // The coordinates of a floating base leave nothing out.
+  if (adapter_->model().base().type != BaseType::kFloating) {
+    const Vector3d up = X_W0_.linear().col(2);
+    reading->departure.tilt = std::atan2(up.head<2>().norm(), up.z());
+    reading->departure.height = X_W0_.translation().z() - adapter_->model().base().X_B0.translation().z();
+  }
   reading->X_W0 = X_W0_;
   reading->qpos = qpos_;
   reading->qvel = Eigen::Map<const VectorXd>(d.qvel, m.nv);
@@ -108,6 +112,7 @@ void Observer::Read(const EngineSimulation& simulation, PlantResponse* response)
   for (size_t i = 0; i < wheel_bodies_.size(); ++i) {
     response->wheels[i] = ReadBodyContact(m, d, wheel_bodies_[i], kWorldBody);
   }
+  ReadFeet(m, d, &response->feet);
   response->support_wrench = ReadSupportWrench(m, d);
   response->support_force = (X_Bo_.linear() * response->support_wrench.head<3>()).z();
   map_.SetState(q_, xi_);
@@ -123,7 +128,9 @@ void Observer::ReadState(const mjData& data, MeasuredState* state) {
   state->xi.resize(model.num_velocities());
   adapter_->GetPositions(data.qpos, state->q);
   const int base = model.num_base_velocities();
-  if (base == 3) {
+  if (base == 6) {
+    state->xi.head<6>() = Eigen::Map<const Vector6d>(data.qvel + map_.base_dofs().front());
+  } else if (base == 3) {
     state->xi.head<3>() << rates_.velocity.x(), rates_.velocity.y(), rates_.omega.z();
   } else if (base == 2) {
     const Vector3d heading(std::cos(state->q[2]), std::sin(state->q[2]), 0.0);
@@ -175,7 +182,9 @@ void Observer::ReadAccelerations(const mjData& d, PlantResponse* response) const
   const Vector3d arm = X_W0_.linear() * adapter_->anchor();
   // d/dt (v_A - omega x p_0A)
   linear -= angular.cross(arm) + rates_.omega.cross(rates_.omega.cross(arm));
-  if (base == 3) {
+  if (base == 6) {
+    xi_dot.head<6>() = Eigen::Map<const Vector6d>(d.qacc + map_.base_dofs().front());
+  } else if (base == 3) {
     xi_dot.head<3>() << linear.x(), linear.y(), angular.z();
   } else if (base == 2) {
     const Vector3d heading(std::cos(phi_), std::sin(phi_), 0.0);
@@ -216,6 +225,43 @@ void Observer::ReadBonds(const mjModel& m, const mjData& d, std::vector<PlantCon
       contact.force = -MapVector(d.efc_force + row);
       break;
     }
+  }
+}
+
+void Observer::SetFeet(std::span<const int> frames) {
+  for (const int frame : frames) foot_sites_.push_back(adapter_->frame_sites()[static_cast<size_t>(frame)]);
+}
+
+int Observer::FindFoot(const mjModel& m, const mjData& d, int body, const Vector3d& place) const {
+  int found = -1;
+  double nearest = std::numeric_limits<double>::infinity();
+  for (size_t i = 0; i < foot_sites_.size(); ++i) {
+    const int site = foot_sites_[i];
+    if (m.body_weldid[m.site_bodyid[site]] != m.body_weldid[body]) continue;
+    const double distance = (MapVector(d.site_xpos + 3 * site) - place).norm();
+    if (distance >= nearest) continue;
+    nearest = distance;
+    found = static_cast<int>(i);
+  }
+  return found;
+}
+
+void Observer::ReadFeet(const mjModel& m, const mjData& d, std::vector<GroundContact>* feet) const {
+  feet->assign(foot_sites_.size(), GroundContact{});
+  for (int k = 0; k < d.ncon && !feet->empty(); ++k) {
+    const mjContact& c = d.contact[k];
+    if (c.efc_address < 0 || c.dim < 3) continue;
+    const bool first = m.geom_type[c.geom2] == mjGEOM_PLANE;
+    if (!first && m.geom_type[c.geom1] != mjGEOM_PLANE) continue;
+    const int foot = FindFoot(m, d, m.geom_bodyid[first ? c.geom1 : c.geom2], MapVector(c.pos));
+    if (foot < 0) continue;
+    GroundContact& contact = (*feet)[static_cast<size_t>(foot)];
+    const Vector3d others = contact.force;
+    if (!contact.touching || c.dist < contact.distance)
+      static_cast<BodyContact&>(contact) = ReadContact(m, d, k, first);
+    mjtNum force[6];  // on geom2, in the contact's frame
+    mj_contactForce(&m, &d, k, force);
+    contact.force = others + (first ? -1.0 : 1.0) * (RotationMap(c.frame).transpose() * MapVector(force));
   }
 }
 

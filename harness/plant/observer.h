@@ -26,6 +26,9 @@ class Observer {
   /// fingertip.
   void SetBonds(std::span<const ContactCoordinates> kappa, std::span<const int> constraints);
 
+  /// The robot stands on these frames.
+  void SetFeet(std::span<const int> frames);
+
   /// Everything but the support's force; between BeginStep and EndStep.
   void Read(const EngineSimulation& simulation, PlantReading* reading);
 
@@ -33,6 +36,9 @@ class Observer {
   void Read(const EngineSimulation& simulation, PlantResponse* response);
 
  private:
+  void ReadFeet(const mjModel& m, const mjData& d, std::vector<GroundContact>* feet) const;
+  /// Of the feet on that body the one nearest to a place; -1 without one.
+  [[nodiscard]] int FindFoot(const mjModel& m, const mjData& d, int body, const Vector3d& place) const;
   struct BaseRates {
     Vector3d velocity = Vector3d::Zero();  // of Sigma_0's origin, world
     Vector3d omega = Vector3d::Zero();     // world
@@ -57,6 +63,7 @@ class Observer {
   std::vector<int> fingertips_;
   std::vector<Sphere> tips_;
   const Surface* surface_;
+  std::vector<int> foot_sites_;
   std::vector<int> tip_sites_;
   std::vector<int> tip_geoms_;
   std::vector<int> tip_bodies_, wheel_bodies_;

@@ -65,6 +65,11 @@ struct BodyContact {
   double cone_margin = 0.0;          ///< mu normal force - |tangential force|, N.
 };
 
+/// A foot's contact with the ground.
+struct GroundContact : BodyContact {
+  Vector3d force = Vector3d::Zero();  ///< Of the ground on the foot, world, N.
+};
+
 /// Accelerations and forces of the same step, for the torques that were applied.
 struct PlantResponse {
   VectorXd xi_dot;                       ///< n.
@@ -72,6 +77,7 @@ struct PlantResponse {
   std::vector<PlantContact> contacts;    ///< By fingertip.
   std::vector<BodyContact> fingertips;   ///< How the fingertips slip on the object.
   std::vector<BodyContact> wheels;       ///< How the right and left wheel slip on the floor.
+  std::vector<GroundContact> feet;       ///< Of a robot that stands, by foot.
   Vector6d support_wrench =
       Vector6d::Zero();        ///< On the object by all else than fingertips, Sigma_o, N, N m.
   double support_force = 0.0;  ///< Its upward part, N.

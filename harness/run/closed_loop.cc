@@ -22,6 +22,8 @@ constexpr double kLargestSkew = 1e-2;    // rad between the platform's heading a
 constexpr double kSettleMoving = 0.5;    // s
 constexpr double kLargestTilt = 0.2;     // rad, of a robot that still stands
 constexpr double kLargestSink = 0.02;    // m, likewise
+constexpr double kLeastUpright = 0.5;    // cosine of the tilt of a body that stands on feet
+constexpr double kLeastHeight = 0.5;     // of the height at the start, likewise
 constexpr double kGraspTimeout = 0.005;  // s without all fingertips on the object: lost
 
 }  // namespace
@@ -280,6 +282,13 @@ void ClosedLoop::CheckTask() const {
 }
 
 void ClosedLoop::CheckRobot() const {
+  if (!setup_->feet().empty()) {
+    const Vector3d up = record_.reading.X_W0.linear().col(2);
+    const double height = record_.reading.X_W0.translation().z() / setup_->start().q[2];
+    if (up.z() > kLeastUpright && height > kLeastHeight) return;
+    throw RunFailure("the robot fell: its body is at " + FormatNumber(height, 3) +
+                     " of the height that it stood at, upright by " + FormatNumber(up.z(), 3));
+  }
   const BaseDeparture& departure = record_.reading.departure;
   if (departure.tilt < kLargestTilt && std::abs(departure.height) < kLargestSink) return;
   throw RunFailure("the robot fell: tilt " + FormatNumber(departure.tilt) + " rad, height " +

@@ -56,6 +56,7 @@ std::unique_ptr<Plant> MakePlant(const Setup& setup) {
                                              setup.scenario().plant.implicit_damping);
   if (setup.scenario().plant.collide) plant->WatchCollisions(ListGeoms(setup.robots()));
   if (!setup.start().bonds.empty()) plant->SetBonds(setup.start().kappa, setup.start().bond_constraints);
+  plant->SetFeet(setup.feet());
   plant->Place(setup.start().q, setup.start().X_Bo);
   return plant;
 }

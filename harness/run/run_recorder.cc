@@ -155,6 +155,10 @@ void RunRecorder::AddStateSignals() {
                    ? std::vector<std::string>{"v_c", "w_c"}
                    : std::vector<std::string>{"theta_dot_r", "theta_dot_l"};
   }
+  if (model.base().type == BaseType::kFloating) {
+    q_names = {"x", "y", "z", "qw", "qx", "qy", "qz"};
+    xi_names = tau_names = {"v_x", "v_y", "v_z", "w_x", "w_y", "w_z"};
+  }
   for (const EngineWheel& wheel : setup_->adapter().wheels()) {
     tau_names.push_back(NameOf(m, mjOBJ_JOINT, wheel.joint));
   }
@@ -225,15 +229,38 @@ void RunRecorder::AddStateSignals() {
 
 void RunRecorder::AddJointSignals() {
   const RobotModel& model = setup_->model();
-  const int n = model.num_joints();
-  std::vector<std::string> names;
+  const int n = model.num_positions();
+  std::vector<std::string> names, base;
+  if (model.base().type == BaseType::kFloating) {
+    names = {"x", "y", "z", "qw", "qx", "qy", "qz"};
+    base = {"m", "m", "m", "1", "1", "1", "1"};
+  }
   for (const Joint& joint : model.joints()) names.push_back(joint.name);
-  Add("joints/q_d", ListJointUnits(model, {}, ""), "desired positions of the joints", n, names,
+  Add("joints/q_d", ListJointUnits(model, base, ""), "desired positions of the joints", n, names,
       Vector([](const StepRecord& step) -> const auto& { return step.command.joints.q; }));
-  Add("joints/error", ListJointUnits(model, {}, ""), "q_d - q", n, names,
+  Add("joints/error", ListJointUnits(model, base, ""), "q_d - q", n, names,
       [](const StepRecord& step, Row row) { Copy(step.command.joints.q - step.reading.state.q, row); });
   AddNumber("joints/largest_error", "rad, m", "largest of joints/error",
             Number([](const StepRecord& step) { return step.error.joints; }));
+  if (!setup_->feet().empty()) AddFootSignals();
+}
+
+void RunRecorder::AddFootSignals() {
+  const std::vector<std::string>& feet = setup_->scenario().joint_task()->stance->feet;
+  const int count = CountOf(feet);
+  const std::vector<std::string> xyz = Expand(feet, {"x", "y", "z"});
+  Add("law/foot_force", "N", "forces that the law asks of the ground, world axes", 3 * count, xyz,
+      Demand(&LawDemand::f_c));
+  if (checks_ == nullptr) return;
+  Add("foot/force", "N", "forces of the ground on the feet, world axes", 3 * count, xyz,
+      Vector([](const StepRecord& step) -> const auto& { return step.findings.foot_force; }));
+  Add("foot/force_model", "N", "those of the robot on rigid feet", 3 * count, xyz,
+      Vector([](const StepRecord& step) -> const auto& { return step.findings.foot_force_model; }));
+  const auto slips = [](const StepRecord& step) -> const auto& { return step.findings.foot_slip; };
+  Add("foot/slip", "m", "slip of each foot since t = 0", 3 * count, xyz,
+      Each(slips, [](const SlipState& slip) { return slip.distance; }));
+  Add("foot/cone_use", "1", "tangential force over mu times normal force of each foot", count, feet,
+      Each(slips, [](const SlipState& slip) { return slip.cone_use; }));
 }
 
 void RunRecorder::AddObjectSignals() {

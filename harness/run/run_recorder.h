@@ -43,6 +43,7 @@ class RunRecorder {
                  Source source);
   void AddStateSignals();
   void AddJointSignals();
+  void AddFootSignals();
   void AddObjectSignals();
   void AddContactSignals();
   void AddFollowedContacts();

@@ -1,11 +1,13 @@
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <random>
 #include <string>
 #include <vector>
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
+#include "controller/control/stance.h"
 #include "controller/dynamics/model_terms.h"
 #include "harness/scenario/start_state.h"
 
@@ -36,6 +38,19 @@ class JointReader {
     return joint;
   }
 
+  /// Indices of frames. @throws InputError for one that is none.
+  [[nodiscard]] std::vector<int> FindFeet(const std::vector<std::string>& names) const {
+    std::vector<int> feet;
+    for (const std::string& name : names) {
+      try {
+        feet.push_back(model_.FindFrame(name));
+      } catch (const std::invalid_argument&) {
+        throw InputError(source_ + ": stance.feet: " + Quote(name) + " is no frame of the model");
+      }
+    }
+    return feet;
+  }
+
   /// Writes numbers by joint into q.
   void Set(const JointNumbers& numbers, VectorXd* q) const {
     for (const auto& [name, value] : numbers.by_name) {
@@ -57,7 +72,7 @@ class JointReader {
 
   /// The number of each joint.
   [[nodiscard]] VectorXd Resolve(const ByName& numbers) const {
-    std::vector<std::string> names;
+    std::vector<std::string> names(static_cast<size_t>(model_.num_base_velocities()), "base");
     for (const Joint& joint : model_.joints()) names.push_back(joint.name);
     VectorXd values = numbers.Resolve(names, source_);
     for (size_t i = 0; i < names.size(); ++i) {
@@ -90,6 +105,10 @@ JointGains FindGains(const JointTask& task, const JointReader& joints, const Rob
   if (!task.damping.key.empty()) gains.D = joints.Resolve(task.damping);
   if (!task.coulomb.Is(0.0)) gains.coulomb = joints.Resolve(task.coulomb);
   if (!task.viscous.Is(0.0)) gains.viscous = joints.Resolve(task.viscous);
+  // Nothing drives or rubs a base.
+  for (VectorXd* gain : {&gains.K, &gains.D, &gains.coulomb, &gains.viscous}) {
+    if (gain->size() > 0) gain->head(model.num_base_velocities()).setZero();
+  }
   gains.coulomb_velocity = task.coulomb_velocity;
   return gains;
 }
@@ -103,12 +122,55 @@ VectorXd VaryPosture(const RobotModel& model, std::uint64_t seed, VectorXd q) {
   return q;
 }
 
+JointMotion MakeBodyMotion(const StanceTask& task) {
+  std::vector<JointWayPoint> points;
+  for (const StanceTask::Point& point : task.points) {
+    JointWayPoint& to = points.emplace_back(JointWayPoint{point.time, VectorXd::Zero(6)});
+    to.q << point.xyz, point.angles;
+  }
+  std::vector<JointOscillation> oscillations;
+  for (const StanceTask::Oscillation& one : task.oscillations)
+    oscillations.push_back({one.axis, one.amplitude, one.frequency, one.ramp_time});
+  return JointMotion(VectorXd::Zero(6), points, oscillations);
+}
+
+/// A robot that stands: level, on all feet, its joints in the posture that is asked for as far as the ground
+/// lets them. @param q_joints rad or m.
+JointPlan MakeStancePlan(const Scenario& scenario, const RobotModel& model, const JointReader& joints,
+                         const VectorXd& q_joints, StartState* start) {
+  constexpr double kStands = 1e-9;  // m
+  const JointTask& task = *scenario.joint_task();
+  const Stance stance{joints.FindFeet(task.stance->feet), 0.0, task.stance->mu, task.stance->f_min,
+                      task.stance->f_max};
+  VectorXd& q = start->q;
+  q.setZero(model.num_positions());
+  q[3] = 1.0;
+  q.tail(q_joints.size()) = q_joints;
+  ModelTerms robot(model);
+  robot.SetState(q, VectorXd::Zero(model.num_velocities()));
+  GroundContacts ground(model, stance.feet);
+  ground.SetState(robot);
+  q[2] = -ground.gap().mean();
+  if (const double left = PutFeetDown(model, stance, &q); !(left < kStands)) {
+    throw InputError(scenario.source + ": stance.feet: do not all reach the ground from that posture, " +
+                     FormatNumber(left, 3) + " m are left");
+  }
+  joints.RequireInRange("joint_motion.start_deg", q.tail(q_joints.size()));
+  JointPlan plan{
+      JointMotion(std::make_shared<const StanceMotion>(model, stance, q, MakeBodyMotion(*task.stance))),
+      FindGains(task, joints, model, q)};
+  plan.gains.stance = stance;
+  PlaceObject(Pose::Identity(), start);
+  return plan;
+}
+
 }  // namespace
 
 JointPlan MakeJointPlan(const Scenario& scenario, const RobotPair& robots, StartState* start) {
   const RobotModel& model = robots.model;
-  if (model.base().type != BaseType::kFixed) {
-    throw InputError(model.spec().source + ": base.type: must be \"fixed\" for a motion of joints");
+  if (model.base().type != BaseType::kFixed && !scenario.stands()) {
+    throw InputError(model.spec().source +
+                     ": base.type: must be \"fixed\" for a motion of joints, or \"floating\" with [stance]");
   }
   const JointReader joints(scenario, model);
   const JointTask& task = *scenario.joint_task();
@@ -116,6 +178,7 @@ JointPlan MakeJointPlan(const Scenario& scenario, const RobotPair& robots, Start
   joints.Set(task.start, &q);
   joints.RequireInRange(task.start.key.empty() ? "joint_motion.start_deg" : task.start.key, q);
   if (scenario.seed != 0) q = VaryPosture(model, scenario.seed, q);
+  if (scenario.stands()) return MakeStancePlan(scenario, model, joints, q, start);
   start->q = q;
   std::vector<JointWayPoint> points;
   for (const JointTask::Point& point : task.points) {

@@ -21,8 +21,11 @@ void RequireNothingElse(const Adapter& adapter, const std::string& mjcf) {
 
 void RequireUsable(const Scenario& scenario, const RobotModel& model) {
   const std::string& robot = model.spec().source;
-  if (model.base().type == BaseType::kFloating) {
-    throw InputError(robot + ": base.type: must not be \"floating\" in a run, whose law drives the base");
+  if ((model.base().type == BaseType::kFloating) != scenario.stands()) {
+    throw InputError(scenario.stands() ? robot + ": base.type: must be \"floating\" to stand on feet"
+                                       : robot +
+                                             ": base.type: must not be \"floating\" in a run, unless the "
+                                             "robot stands on feet ([stance])");
   }
   RequireNoBalls(model, "in a run, whose law has one number for each joint");
   if (!model.object() && scenario.joint_task() == nullptr) {

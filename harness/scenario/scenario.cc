@@ -129,10 +129,10 @@ void RequireFewSteps(TomlTable& root, const Scenario& scenario) {
 /// @param scenario text, source and overrides.
 Scenario ReadScenario(TomlTable& root, const std::filesystem::path& folder,
                       const std::vector<std::string>& model_overrides, Scenario scenario) {
-  root.RejectOthersThan({"name",         "description", "duration",   "settle",  "start",     "start_error",
-                         "tolerance",    "model",       "plant",      "grasp",   "task",      "trajectory",
-                         "joint_motion", "control",     "controller", "sensing", "actuation", "disturbance",
-                         "mismatch",     "bounds",      "expect"});
+  root.RejectOthersThan({"name",         "description", "duration", "settle",     "start",   "start_error",
+                         "tolerance",    "model",       "plant",    "grasp",      "task",    "trajectory",
+                         "joint_motion", "stance",      "control",  "controller", "sensing", "actuation",
+                         "disturbance",  "mismatch",    "bounds",   "expect"});
   scenario.name = root.Get("name").AsName();
   if (const auto description = root.Find("description")) scenario.description = description->AsText();
   scenario.duration = root.Get("duration").AsPositive();
@@ -149,6 +149,8 @@ Scenario ReadScenario(TomlTable& root, const std::filesystem::path& folder,
   if (const auto controller = root.Find("controller"))
     ReadController(*controller, folder, &scenario.controller);
   scenario.imperfections = ReadImperfections(root, scenario.plant.time_step);
+  if (scenario.stands() && !scenario.imperfections.sensing.is_exact())
+    throw InputError(scenario.source + ": sensing: a robot that stands is measured exactly");
   if (const auto bounds = root.Find("bounds")) {
     for (const auto& [name, value] : bounds->AsTable().GetEntries()) {
       scenario.bounds.emplace_back(name, value.AsNotNegative());

@@ -130,7 +130,28 @@ struct JointNumbers {
   std::string key;                                      ///< For messages.
 };
 
-/// The joints of a robot that holds nothing follow a motion of their own.
+/// What a robot with a floating base stands on, and how its body moves there.
+struct StanceTask {
+  struct Point {
+    double time = 0.0;                   ///< s.
+    Vector3d xyz = Vector3d::Zero();     ///< Displacement of the base since the start, m.
+    Vector3d angles = Vector3d::Zero();  ///< Roll, pitch, yaw since the start, rad.
+  };
+  struct Oscillation {
+    int axis = 0;            ///< x, y, z, roll, pitch, yaw.
+    double amplitude = 0.0;  ///< m or rad.
+    double frequency = 0.0;  ///< 1/s.
+    double ramp_time = 0.0;  ///< s.
+  };
+  std::vector<std::string> feet;  ///< Frames.
+  double mu = 0.0;                ///< Friction that the law counts on.
+  double f_min = 0.0;             ///< Least normal force of a foot, N.
+  double f_max = 0.0;             ///< Largest, N.
+  std::vector<Point> points;
+  std::vector<Oscillation> oscillations;
+};
+
+/// The joints of a robot that holds nothing follow a motion of their own, or that of its body.
 struct JointTask {
   struct Point {
     double time = 0.0;   ///< s.
@@ -147,6 +168,7 @@ struct JointTask {
   JointNumbers start;  ///< Others begin at 0.
   std::vector<Point> points;
   std::vector<Oscillation> oscillations;
+  std::optional<StanceTask> stance;  ///< Of a robot that stands; its joints have no motion of their own then.
 
   // Gains of its law: by joint, or for all.
   ByName natural_frequency, damping_ratio;  ///< rad/s and 1.
@@ -204,6 +226,7 @@ struct Scenario {
   [[nodiscard]] const TrajectoryTask* trajectory_task() const { return std::get_if<TrajectoryTask>(&task); }
   [[nodiscard]] const PickTask* pick_task() const { return std::get_if<PickTask>(&task); }
   [[nodiscard]] const JointTask* joint_task() const { return std::get_if<JointTask>(&task); }
+  [[nodiscard]] bool stands() const { return joint_task() != nullptr && joint_task()->stance.has_value(); }
   /// X_d - X_o at t = 0; zero where nothing is to be followed from there.
   [[nodiscard]] Vector6d start_error() const {
     return trajectory_task() == nullptr ? Vector6d::Zero() : trajectory_task()->start_error;

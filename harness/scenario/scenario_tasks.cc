@@ -263,6 +263,55 @@ JointTask ReadJointMotion(const TomlValue& value) {
   return task;
 }
 
+constexpr std::string_view kAxes[] = {"x", "y", "z", "roll", "pitch", "yaw"};
+
+StanceTask::Oscillation ReadStanceOscillation(const TomlValue& value) {
+  TomlTable table = value.AsTable();
+  StanceTask::Oscillation one;
+  one.axis = table.Get("axis").AsChoice<int>(
+      {{kAxes[0], 0}, {kAxes[1], 1}, {kAxes[2], 2}, {kAxes[3], 3}, {kAxes[4], 4}, {kAxes[5], 5}});
+  auto [amplitude, unit] = table.FindWithAngleUnit("amplitude");
+  if (!amplitude) amplitude = table.Miss(one.axis < 3 ? "amplitude" : "amplitude_deg");
+  if (one.axis < 3 && unit != 1.0) amplitude->Fail("must be in m, under the key without _deg");
+  one.amplitude = unit * amplitude->AsNumber();
+  one.frequency = table.Get("frequency").AsPositive();
+  if (const auto time = table.Find("ramp_time")) one.ramp_time = time->AsNotNegative();
+  table.RejectUnused();
+  return one;
+}
+
+StanceTask ReadStance(const TomlValue& value) {
+  TomlTable table = value.AsTable();
+  StanceTask task;
+  const TomlValue feet = table.Get("feet");
+  ReadValue(feet, Range::kAny, &task.feet);
+  if (task.feet.size() < 3) feet.Reject("needs at least three feet, or corners of feet, to stand on");
+  using Options = StanceTask;
+  (void)table.Get("mu");
+  (void)table.Get("f_max");
+  ReadKeys<Options>(table, {POSITIVE_KEY(mu), KEY(f_min), POSITIVE_KEY(f_max)}, &task);
+  if (task.f_max <= task.f_min) table.Get("f_max").Fail("must be greater than f_min");
+  if (const auto points = table.Find("points")) {
+    for (const TomlValue& entry : points->AsList()) {
+      TomlTable point = entry.AsTable();
+      const double before = task.points.empty() ? 0.0 : task.points.back().time;
+      StanceTask::Point& to = task.points.emplace_back();
+      const TomlValue time = point.Get("time");
+      to.time = time.AsPositive();
+      if (to.time <= before) time.Fail("must be greater than the time before");
+      if (const auto xyz = point.Find("xyz")) to.xyz = xyz->AsVector<3>();
+      if (const auto angles = point.FindAngles<3>("rpy")) to.angles = *angles;
+      point.RejectUnused();
+    }
+  }
+  if (const auto oscillations = table.Find("oscillations")) {
+    for (const TomlValue& entry : oscillations->AsList())
+      task.oscillations.push_back(ReadStanceOscillation(entry));
+  }
+  table.RejectUnused();
+  return task;
+}
+
 void ReadJointControl(const TomlValue& value, ControlOptions* control, JointTask* task) {
   TomlTable table = value.AsTable();
   if (const auto law = table.Find("law")) {
@@ -298,13 +347,21 @@ void ReadTask(TomlTable& root, Scenario* scenario) {
   const auto pick = root.Find("task");
   if (pick) scenario->task = ReadPickTask(*pick);
   root.RejectTogether("joint_motion", {"grasp", "task", "trajectory", "start_error"});
+  root.RejectTogether("stance", {"grasp", "task", "trajectory", "start_error"});
   if (const auto motion = root.Find("joint_motion")) {
     JointTask task = ReadJointMotion(*motion);
     ReadJointControl(root.Get("control"), &scenario->control, &task);
+    if (const auto stance = root.Find("stance")) task.stance = ReadStance(*stance);
+    const bool moves = !task.points.empty() || !task.oscillations.empty();
+    const bool stands = task.stance.has_value();
     scenario->task = std::move(task);
-    return Refuse(*scenario,
-                  {{scenario->start != Start::kRest, "start: must be \"rest\" for a motion of joints"},
-                   {scenario->plant.bonded, "plant.bonded: a motion of joints has no contacts"}});
+    return Refuse(
+        *scenario,
+        {{scenario->start != Start::kRest, "start: must be \"rest\" for a motion of joints"},
+         {stands && moves, "joint_motion: joints of a robot that stands follow its body ([stance])"},
+         {stands && scenario->plant.type != PlantType::kEngine,
+          "plant.type: feet need contacts that hold and slip, which a rigid plant has not"},
+         {scenario->plant.bonded, "plant.bonded: a motion of joints has no contacts"}});
   }
   // All that are missing are named together.
   const TomlValue grasp = root.Get("grasp");

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "controller/control/grasp_controller.h"
@@ -36,6 +37,11 @@ class Setup {
   [[nodiscard]] const StartState& start() const { return start_; }
   /// What the joints of a robot that holds nothing should do; null for other tasks.
   [[nodiscard]] const JointPlan* joints() const { return joints_ ? &*joints_ : nullptr; }
+  /// Frames that a robot with a floating base stands on; none for others.
+  [[nodiscard]] std::span<const int> feet() const {
+    return joints_ && joints_->gains.stance ? std::span<const int>(joints_->gains.stance->feet)
+                                            : std::span<const int>();
+  }
   /// Of the object; of a robot that holds nothing, any.
   [[nodiscard]] const Surface& surface() const { return *surface_; }
 

@@ -9,12 +9,14 @@
 #include "harness/descriptions/alike_names.h"
 #include "harness/descriptions/description_match.h"
 #include "harness/descriptions/read_description.h"
+#include "harness/descriptions/structure_match.h"
 #include "tests/common/list_failures.h"
 #include "tests/common/matchers.h"
 #include "tests/common/paths.h"
 #include "tests/common/random_robot.h"
 #include "tests/common/urdf_text.h"
 #include "tests/harness/descriptions/panda_urdf.h"
+#include "tests/harness/descriptions/robot_pairs.h"
 
 namespace dexcheck::testing::model_comparison_test {
 namespace {
@@ -160,6 +162,7 @@ TEST(ModelComparison, RefusesOtherMechanisms) {
   RobotDescription other = right;
   other.spec.source = "other.urdf";
   other.spec.joints[2].name = "elbow";
+  other.spec.joints[3].type = JointType::kPrismatic;
   EXPECT_EQ(problem(other),
             "other.urdf: does not match panda.urdf; only in panda.urdf: joint \"panda_joint3\"; only in "
             "other.urdf: "
@@ -175,6 +178,35 @@ TEST(ModelComparison, RefusesOtherMechanisms) {
       problem(other),
       "other.urdf: joint \"panda_joint3\": must come after \"panda_joint2\" as in panda.urdf, comes after "
       "\"panda_joint1\"");
+}
+
+// Every joint and link renamed, and the humanoid's limbs in another order: by its place each is the one it
+// was.
+TEST(StructureMatch, FindsTheJointsOfOtherNames) {
+  for (const RobotPair& pair : ListRobotPairs()) {
+    SCOPED_TRACE(pair.name);
+    RobotDescription other = pair.b;
+    for (size_t i = 0; i < other.spec.joints.size(); ++i) {
+      other.spec.joints[i].name = "x" + std::to_string(7 * i % 101);
+      other.spec.joints[i].link = "y" + std::to_string(i);
+    }
+    EXPECT_EQ(MatchByStructure(pair.a, other), MatchJoints(pair.a.spec, pair.b.spec));
+    RobotDescription own = pair.a;
+    EXPECT_THAT(CompleteEachOther(&own, &other).notes, ::testing::Contains(HasSubstr("matched by the tree")));
+  }
+}
+
+TEST(StructureMatch, KeepsNamesThatBothHave) {
+  const RobotDescription right = ParseUrdf(testing::MakePandaUrdf(), "panda.urdf");
+  RobotDescription other = right;
+  other.spec.joints[2].name = "elbow";
+  EXPECT_EQ(MatchByStructure(right, other), std::vector<int>({0, 1, 2, 3, 4, 5, 6}));
+  // A joint of that name is elsewhere.
+  other.spec.joints[4].name = "panda_joint3";
+  EXPECT_TRUE(MatchByStructure(right, other).empty());
+  other = right;
+  other.spec.joints[2].type = JointType::kPrismatic;
+  EXPECT_TRUE(MatchByStructure(right, other).empty());
 }
 
 TEST(AlikeNames, HaveOnePartnerEach) {

@@ -31,7 +31,7 @@ ProgramResult RunThere(const Words& words) { return RunDexcheck(words, {.folder 
 
 TEST(FieldCases, AreFoundByTheirCommands) {
   const std::vector<FieldCase> cases = ReadTable();
-  ASSERT_GE(cases.size(), 13U);
+  ASSERT_GE(cases.size(), 14U);
   for (const FieldCase& one : cases) {
     SCOPED_TRACE(one.command);
     const ProgramResult result = RunThere(Words(one.command) + Words("--json"));
@@ -50,6 +50,45 @@ TEST(FieldCases, AgreeWithoutTheirMistakes) {
   EXPECT_EQ(result.exit_code, 0) << result.err;
   EXPECT_EQ(Json::parse(result.out).at("outcome"), "rounding");
   EXPECT_EQ(RunThere("audit arm.urdf").exit_code, 0);
+  const ProgramResult table = RunThere("consistency cad.csv arm.urdf --json");
+  EXPECT_EQ(table.exit_code, 0) << table.err << table.out;
+  EXPECT_EQ(Json::parse(table.out).at("outcome"), "digits");
+}
+
+class BodyTable : public CommandTest {
+ protected:
+  BodyTable() { Write("arm.urdf", ReadText(kFolder + "/arm.urdf")); }
+  const std::string kTable = ReadText(kFolder + "/cad.csv");
+};
+
+// The same tensors about the links' origins, in SI, between semicolons, and what is no table.
+TEST_F(BodyTable, UnitsAndReferenceAreThoseOfItsHeader) {
+  Write("si.csv",
+        "# inertia: origin\nLink;Mass (kg);X (m);Y;Z;Lxx (kg m2);Lyy;Lzz;Lxy;Lxz;Lyz\n"
+        "tool;0.45;0.02;0.01;0.06;0.002765;0.0027;0.000825;-0.00009;-0.00054;-0.00027\n");
+  const Json results = RunJson(0, "consistency arm.urdf si.csv");
+  EXPECT_THAT(results.at("notes"), Contains(HasSubstr("masses, centres of mass and inertias alone")));
+  WriteChanged("wrong.csv", Read("si.csv"), "0.002765", "0.003765");
+  EXPECT_EQ(RunJson(1, "consistency arm.urdf wrong.csv").at("/digits/exceeds/0/where"_json_pointer),
+            "link lower");
+  WriteChanged("com.csv", Read("si.csv"), "origin", "com");
+  EXPECT_EQ(RunJson(1, "consistency arm.urdf com.csv").at("/hypotheses/0/ids/0"_json_pointer),
+            "inertia.moved_twice");
+}
+
+TEST_F(BodyTable, WhatIsNoneIsRefused) {
+  const auto refused = [&](const std::string& from, const std::string& to, const std::string& problem) {
+    WriteChanged("bad.csv", kTable, from, to);
+    EXPECT_TRUE(IsRefused(Run("consistency arm.urdf bad.csv"), {problem})) << from;
+  };
+  refused("2100", "heavy", "bad.csv:4: mass: must be a number, got \"heavy\"");
+  refused("[g]", "[stone]", "bad.csv:3: mass: has no known unit: \"stone\"");
+  refused("iyz", "", "bad.csv:3: header: lacks column iyz");
+  refused("# inertia: com", "# inertia: middle", "bad.csv:2: inertia: must be origin or com");
+  Write("other.csv", "link,mass,x,y,z,ixx,iyy,izz,ixy,ixz,iyz\nuper,1,0,0,0,1,1,1,0,0,0\n");
+  EXPECT_TRUE(IsRefused(Run("consistency arm.urdf other.csv"), {"has no link of arm.urdf", "did you mean"}));
+  Write("cad.csv", kTable);
+  EXPECT_TRUE(IsRefused(Run("audit cad.csv"), {"is a table of bodies"}));
 }
 
 }  // namespace

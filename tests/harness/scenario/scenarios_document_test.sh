@@ -66,6 +66,7 @@ all_known_keys() {
     -) known_keys - - paper | grep -vxE 'start_error|model|plant|grasp|trajectory|task|joint_motion|control|controller|sensing|actuation|disturbance|mismatch|expect|bounds' ;;
     task) known_keys task - lift ;;
     joint_motion) known_keys joint_motion 'joint_motion={}' panda-reach ;;
+    stance) known_keys stance - stand ;;
     # Keys that begin with model. are the parameter file's.
     model) ask paper --set 'model={ surely_unknown_to_all = 1 }' | told_keys ;;
     control)
@@ -100,6 +101,7 @@ for batch in "${!batches[@]}"; do
   base=paper
   [[ $section != task ]] || base=lift
   [[ $section != joint_motion ]] || base=panda-reach
+  [[ $section != stance ]] || base=stand
   arguments=()
   [[ $start == - ]] || arguments+=(--set "$start")
   # K_p and K_v, and an angle in degrees, stand in the place of what paper.toml has.
