@@ -107,6 +107,8 @@ nlohmann::ordered_json ToJson(const Explanation& one) {
                                  {"from_s", one.from},
                                  {"to_s", one.to},
                                  {"ends", one.ends},
+                                 {"unseen_before_s", one.unseen_before},
+                                 {"unseen_after_s", one.unseen_after},
                                  {"fraction", one.fraction},
                                  {"left", one.left},
                                  {"rival", one.rival},

@@ -66,10 +66,11 @@ Candidate& StepForces::Next(std::vector<Candidate>* candidates, const char* faul
 Candidate& StepForces::AddForceAtPoint(std::vector<Candidate>* candidates, const std::string& place) {
   Candidate& force = Next(candidates, kForceAtPointInAxes, place, "N", 0.0, Weights(6));
   // Its moment about the centre of mass is across it.
-  force.is_possible = [](const VectorXd& a) {
+  force.is_possible = [this](const VectorXd& a) {
     constexpr double kAcross = 1e-3;
     const Vector3d f = a.head<3>(), moment = a.tail<3>();
-    return std::abs(f.dot(moment)) <= kAcross * f.norm() * moment.norm();
+    return std::abs(f.dot(moment)) <= kAcross * f.norm() * moment.norm() &&
+           moment.norm() <= reach_ * f.norm();
   };
   return force;
 }
