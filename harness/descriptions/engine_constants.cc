@@ -17,6 +17,9 @@
 namespace dexcheck {
 namespace {
 
+constexpr double kSamePlace = 1e-9;  // m; two decimal numbers for one point
+
+
 constexpr double kMissing = std::numeric_limits<double>::quiet_NaN();
 
 /// A model and the engine's.
@@ -138,7 +141,6 @@ class EngineConstants : public ConstantComparison {
 
   /// The fingertip's sphere if it is at the frame's site; otherwise -1.
   [[nodiscard]] int FindTipGeom(int frame) const {
-    constexpr double kSamePlace = 1e-9;  // m; two decimal numbers for one point
     const int geom = adapter_.FindTipGeom(frame);
     if (geom < 0) return -1;
     const int site = adapter_.frame_sites()[static_cast<size_t>(frame)];
@@ -146,10 +148,27 @@ class EngineConstants : public ConstantComparison {
     return apart.norm() < kSamePlace ? geom : -1;
   }
 
+  /// A capsule one of whose ends is there, as feet may have them; -1 without one.
+  [[nodiscard]] int FindTipCapsule(int frame) const {
+    const int site = adapter_.frame_sites()[static_cast<size_t>(frame)];
+    if (site < 0) return -1;
+    for (int geom = 0; geom < engine_.ngeom; ++geom) {
+      if (engine_.geom_bodyid[geom] != engine_.site_bodyid[site] || engine_.geom_type[geom] != mjGEOM_CAPSULE)
+        continue;
+      const mjtNum* const q = engine_.geom_quat + 4 * geom;
+      const Vector3d axis = Eigen::Quaterniond(q[0], q[1], q[2], q[3]) * Vector3d::UnitZ();
+      const Vector3d apart = MapVector(engine_.geom_pos + 3 * geom) - MapVector(engine_.site_pos + 3 * site);
+      const double half = engine_.geom_size[3 * geom + 1];
+      if (std::min((apart - half * axis).norm(), (apart + half * axis).norm()) < kSamePlace) return geom;
+    }
+    return -1;
+  }
+
   void CompareFingertips() {
     for (const int frame : model_.fingertips()) {
       const Location where{Location::Kind::kFrame, frame, -1};
-      const int geom = FindTipGeom(frame);
+      int geom = FindTipGeom(frame);
+      if (geom < 0 && model_.base().type == BaseType::kFloating) geom = FindTipCapsule(frame);
       const double radius = geom < 0 ? kMissing : engine_.geom_size[3 * geom];
       Compare("fingertip_radius", where, *model_.frames()[static_cast<size_t>(frame)].sphere_radius, radius);
     }
