@@ -44,9 +44,7 @@ class Search {
     const double nothing = Score(y_.squaredNorm(), 0.0, 0);
     std::vector<Best> firsts = {FindBest({})};
     double criterion = nothing;
-    // Two may explain what neither does by itself.
-    if (!IsNoise({}) && std::isfinite(firsts.front().criterion)) criterion = Grow(firsts.front());
-    if (!(criterion < nothing)) chosen_.clear(), criterion = nothing;
+    if (!IsNoise({}) && firsts.front().criterion < nothing) criterion = Grow(firsts.front());
     // What was the best alone need not be part of the best set.
     // Of many candidates that takes long.
     constexpr size_t kFew = 100;

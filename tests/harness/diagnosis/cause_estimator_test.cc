@@ -399,18 +399,6 @@ TEST(CauseEstimator, TwoAreExchangedAtOnce) {
   EXPECT_EQ(ChosenOf(Select(y, candidates)), (std::vector<size_t>{10, 20}));
 }
 
-// Of four rows a half of what there is would not be worth a name.
-TEST(CauseEstimator, TwoExplainWhatNeitherDoesByItself) {
-  std::vector<Candidate> candidates(4);
-  for (Index i = 0; i < 4; ++i)
-    candidates[static_cast<size_t>(i)] = {.fault = "radius", .columns = VectorXd::Unit(4, i)};
-  VectorXd y = VectorXd::Zero(4);
-  y.head<2>().setConstant(1e4);
-  EXPECT_EQ(ChosenOf(Select(y, candidates)), (std::vector<size_t>{0, 1}));
-  y.setConstant(0.5);
-  EXPECT_TRUE(ChosenOf(Select(y, candidates)).empty());
-}
-
 TEST(CauseEstimator, NoMoreTermsThanAreAskedFor) {
   Random random(12);
   const std::vector<Candidate> candidates = random.Candidates();
