@@ -18,8 +18,6 @@ namespace dexcheck {
 namespace {
 
 constexpr double kSamePlace = 1e-9;  // m; two decimal numbers for one point
-
-
 constexpr double kMissing = std::numeric_limits<double>::quiet_NaN();
 
 /// A model and the engine's.
