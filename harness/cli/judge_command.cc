@@ -73,11 +73,13 @@ void Print(const JudgeRequest& request, const RobotModel& model, const Recording
       return fmt::format("{} number{} {:.3g} times the noise", one.numbers,
                          one.numbers == 1 ? " leaves" : "s leave", one.held_left);
     };
-    fmt::print("{}\n",
-               Wrap(fmt::format("held out: the causes' {}; least squares of all that the motion tells "
-                                "of bodies, friction, offsets and armatures: {}",
-                                tell(judgement.by_causes), tell(judgement.by_all)),
-                    2));
+    // Of a short recording nothing is held out.
+    if (judgement.by_all.held_left > 0.0)
+      fmt::print("{}\n",
+                 Wrap(fmt::format("held out: the causes' {}; least squares of all that the motion tells "
+                                  "of bodies, friction, offsets and armatures: {}",
+                                  tell(judgement.by_causes), tell(judgement.by_all)),
+                      2));
     fmt::print("\n");
   }
   const std::string& name =
