@@ -57,8 +57,8 @@ CampaignFault Describe(const Mutant& mutant, bool diagnosed) {
 CampaignFault Describe(const FormulaMutant& mutant) {
   CampaignFault fault = Describe(static_cast<const TriedFault&>(mutant));
   if (IsMissed(mutant))
-    fault.exception =
-        fmt::format("cause: {}: expected {}, failed {}", mutant.name, mutant.equation.term, mutant.failed_checks);
+    fault.exception = fmt::format("cause: {}: expected {}, failed {}", mutant.name, mutant.equation.term,
+                                  mutant.failed_checks);
   return fault;
 }
 

@@ -48,10 +48,10 @@ struct Explanation {
   bool ends = false;            ///< Whether it was over before the run was.
   /// How much earlier it may have begun, and later have ended, where no steps were kept, s.
   double unseen_before = 0.0, unseen_after = 0.0;
-  double fraction = 0.0;        ///< Of its channel's residual there, squared.
-  double left = 0.0;            ///< What is left of that, in units of noise.
-  std::string rival;            ///< The nearest fault that explains it worse; empty for none.
-  double log_odds = 0.0;        ///< Against the rival, natural logarithm.
+  double fraction = 0.0;  ///< Of its channel's residual there, squared.
+  double left = 0.0;      ///< What is left of that, in units of noise.
+  std::string rival;      ///< The nearest fault that explains it worse; empty for none.
+  double log_odds = 0.0;  ///< Against the rival, natural logarithm.
 
   void SetRival(const Candidate& candidate, double odds) {
     rival = candidate.place + ": " + candidate.fault;
