@@ -1,409 +1,18 @@
 #include "harness/diagnosis/force_causes.h"
 
 #include <algorithm>
-#include <cmath>
 #include <optional>
 
-#include "harness/diagnosis/force_telling.h"
-#include "harness/diagnosis/step_forces.h"
+#include "harness/diagnosis/force_problem.h"
 #include "harness/diagnosis/telling.h"
 
 namespace dexcheck {
 namespace {
 
 using Eigen::Index;
-using namespace force_fault;
 
-// Columns agree with what a fault does to this fraction: platforms tilt, and wheels slip, by as much.
-constexpr double kAccuracy = 1e-4;
-// What is left over may be this many times the noise and is explained all the same.
-constexpr double kLeft = 3.0;
-// And of what there is to explain, squared, at least this fraction.
-constexpr double kExplains = 0.99;
-// Noise is taken for this many times what the explanation leaves, down to rounding, in bounds of the checks,
-// and to what columns are known to; found anew so often.
-constexpr double kLevel = 5.0, kRounding = 1e-4, kExact = 1e-7;
-constexpr int kMostLevels = 4;
-constexpr double kFaint = 0.01;   // noise where the checks of the balances hold, in their bounds
-constexpr Index kMostSteps = 20;  // that are looked at
+constexpr double kFaint = 0.01;  // noise where the checks of the balances hold, in their bounds
 constexpr size_t kMostSegments = 8, kMostBends = 4;
-constexpr const char* kWorld = "world";
-
-/// What pushes as it is, whatever moves.
-bool IsPush(const Candidate& one) {
-  return one.fault == "torque" || one.fault == kForce || one.fault == "moment";
-}
-
-/// One residual and what explains it.
-class Problem {
- public:
-  /// @param level of the noise, in bounds of the checks.
-  Problem(const StepStore& store, StepForces* forces, const Segment& segment, double level = 1.0)
-      : store_(store), forces_(forces), is_faint_(level < 1.0) {
-    const auto count = static_cast<Index>(segment.size());
-    steps_ = std::min(count, kMostSteps);
-    for (Index i = 0; i < steps_; ++i)
-      used_.push_back(segment[static_cast<size_t>(steps_ == 1 ? 0 : i * (count - 1) / (steps_ - 1))]);
-    forces->SetGravity(forces->model().gravity());
-    // What the columns are off hides what is smaller on the same side, robot or object.
-    level_.setConstant(level);
-    Build();
-    level_ = first_level_ = level * (1.0 + (kAccuracy * CalcSizes(y_)).array().square()).sqrt();
-    Build();
-  }
-
-  /// Whether what is left is noise, or next to nothing beside what there was.
-  [[nodiscard]] bool IsExplained(double fraction, double left) const {
-    if (left <= 1.0 && !is_faint_) return fraction > 0.0;
-    return fraction >= kExplains && left <= kLeft;
-  }
-
-  /// Of the last explanation: what was selected, and how large each is; forces at points by themselves.
-  struct Terms {
-    std::vector<std::pair<size_t, VectorXd>> amplitudes;
-    std::vector<ForceAtPoint> points;
-  };
-  [[nodiscard]] const Terms& terms() const { return terms_; }
-  /// Faults that are there, as other steps have shown.
-  void Know(const Terms& known) {
-    known_ = known;
-    Build();
-  }
-
-  /// Faults that do not change.
-  bool ExplainConstant(const Segment& segment, Causes* causes) {
-    terms_ = {};
-    if (!known_.amplitudes.empty() && CalcLeft(y_) <= 1.0) return true;
-    const CauseSelection selection = Select();
-    if (!IsExplained(selection.fraction, selection.left)) return false;
-    for (const CauseTerm& term : selection.terms) {
-      const Candidate& one = candidates_[term.candidate];
-      if (one.fault == kForceAtPoint) {
-        terms_.points.push_back({one.place, term.amplitude, one.fitted});
-      } else {
-        terms_.amplitudes.emplace_back(term.candidate, term.amplitude);
-      }
-    }
-    if (ExplainTorque(segment, selection, causes)) return true;
-    if (ExplainJoint(segment, selection, causes) || ExplainBetweenLinks(segment, selection, causes))
-      return true;
-    Causes told = TellSelection(Start(segment), selection, candidates_,
-                                [&](const Candidate& one, const VectorXd& amplitude, const VectorXd& error) {
-                                  return MakeForceFault(one, amplitude, error, forces_->model().gravity());
-                                });
-    std::move(told.begin(), told.end(), std::back_inserter(*causes));
-    return true;
-  }
-
-  /// Two faults of one joint may be anything that acts there.
-  bool ExplainJoint(const Segment& segment, const CauseSelection& selection, Causes* causes) const {
-    if (selection.terms.size() < 2) return false;
-    const std::string& place = candidates_[selection.terms.front().candidate].place;
-    for (const CauseTerm& term : selection.terms)
-      if (candidates_[term.candidate].place != place || !place.starts_with("joint ")) return false;
-    causes->push_back(StartChanging(segment, selection, place));
-    return true;
-  }
-
-  /// Opposite moments on the links that a joint joins are a torque of that joint: what is across its axis
-  /// does no work, and the axis turns with the robot, so that it changes.
-  bool ExplainBetweenLinks(const Segment& segment, const CauseSelection& selection, Causes* causes) const {
-    if (selection.terms.size() != 2) return false;
-    const CauseTerm &a = selection.terms[0], &b = selection.terms[1];
-    const Candidate &x = candidates_[a.candidate], &y = candidates_[b.candidate];
-    constexpr double kOpposite = 0.02;
-    if (x.fault != "moment" || y.fault != "moment" ||
-        (a.amplitude + b.amplitude).norm() > kOpposite * a.amplitude.norm())
-      return false;
-    const RobotModel& model = forces_->model();
-    for (const Joint& joint : model.joints()) {
-      const std::string own = "link " + joint.link, carrier = "link " + model.link_name(joint.parent);
-      if ((x.place != own || y.place != carrier) && (x.place != carrier || y.place != own)) continue;
-      causes->push_back(StartChanging(segment, selection, "joint " + joint.name));
-      return true;
-    }
-    return false;
-  }
-
-  /// A class of what was selected and a torque of that joint that changes.
-  [[nodiscard]] Explanation StartChanging(const Segment& segment, const CauseSelection& selection,
-                                          const std::string& joint) const {
-    Explanation one = Start(segment);
-    one.outcome = CauseOutcome::kNamedClass;
-    one.fraction = selection.fraction;
-    one.left = selection.left;
-    one.faults.push_back({"torque that changes", joint, 0.0, 0.0, "", ""});
-    for (const CauseTerm& term : selection.terms)
-      one.faults.push_back(MakeForceFault(candidates_[term.candidate], term.amplitude, term.error,
-                                          forces_->model().gravity()));
-    for (Index k = 0; k < steps_; ++k) {
-      const VectorXd y = y_.segment(k * forces_->rows(), forces_->rows());
-      one.faults.front().value = std::max(one.faults.front().value, CalcTorque(joint, k, y));
-    }
-    return one;
-  }
-
-  /// One force that changes in time, free at each step.
-  void ExplainChanging(const Segment& segment, Causes* causes) const {
-    std::vector<Free> all;
-    for (size_t i = 0; i < candidates_.size(); ++i)
-      if (IsPush(candidates_[i]) || candidates_[i].fault == "force and moment") all.push_back(FitFree(i));
-    std::sort(all.begin(), all.end(), [](const Free& a, const Free& b) { return a.criterion < b.criterion; });
-    if (all.empty()) return;
-    Explanation one = Start(segment);
-    one.fraction = 1.0 - all.front().residual.squaredNorm() / y_.squaredNorm();
-    one.left = std::sqrt(all.front().residual.squaredNorm() / static_cast<double>(y_.size()));
-    const bool explained = IsExplained(one.fraction, one.left);
-    for (const Free& free : all) {
-      const Candidate& candidate = candidates_[free.candidate];
-      const double odds = 0.5 * (free.criterion - all.front().criterion);
-      if (!one.faults.empty() && odds >= kEqualLogOdds) {
-        one.SetRival(candidate, odds);
-        break;
-      }
-      one.faults.push_back(MakeFault(free));
-    }
-    one.SetOutcome();
-    if (!explained) one.outcome = CauseOutcome::kNotExplained;
-    causes->push_back(one);
-  }
-
-  /// The torque of one joint, free at each step, where that has fewer amplitudes than what was selected: a
-  /// range that ends, a cable.
-  bool ExplainTorque(const Segment& segment, const CauseSelection& selection, Causes* causes) const {
-    Index amplitudes = 0;
-    for (const CauseTerm& term : selection.terms) amplitudes += term.amplitude.size();
-    const auto cost = [&](Index parameters, size_t terms) {
-      return static_cast<double>(parameters) * std::log(static_cast<double>(forces_->rows())) +
-             2.0 * static_cast<double>(terms) * std::log(static_cast<double>(candidates_.size()));
-    };
-    if (cost(amplitudes, selection.terms.size()) <= cost(steps_, 1)) return false;
-    for (size_t i = 0; i < candidates_.size(); ++i) {
-      if (candidates_[i].fault != "torque") continue;
-      const Free free = FitFree(i);
-      Explanation one = Start(segment);
-      one.fraction = 1.0 - free.residual.squaredNorm() / y_.squaredNorm();
-      one.left = CalcLeft(free.residual);
-      if (!IsExplained(one.fraction, one.left)) continue;
-      one.faults.push_back(MakeFault(free));
-      causes->push_back(one);
-      return true;
-    }
-    return false;
-  }
-
- private:
-  /// A candidate whose amplitudes are free at each step.
-  struct Free {
-    size_t candidate = SIZE_MAX;
-    double criterion = 0.0, largest = 0.0;
-    VectorXd residual;
-  };
-
-  [[nodiscard]] Free FitFree(size_t index) const {
-    const Candidate& candidate = candidates_[index];
-    Free free{.candidate = index, .residual = y_};
-    for (Index k = 0; k < steps_; ++k) {
-      const Index begin = k * forces_->rows();
-      const MatrixXd C = candidate.columns.middleRows(begin, forces_->rows());
-      auto left = free.residual.segment(begin, forces_->rows());
-      Eigen::CompleteOrthogonalDecomposition<MatrixXd> decomposition;
-      decomposition.setThreshold(1e-3);
-      const VectorXd a = decomposition.compute(C).solve(VectorXd(left));
-      left -= C * a;
-      free.largest = std::max(free.largest, a.head(std::min<Index>(3, a.size())).norm());
-    }
-    const double rows = static_cast<double>(y_.size());
-    free.criterion = rows * std::log(1.0 + free.residual.squaredNorm() / rows) +
-                     static_cast<double>(candidate.columns.cols() * steps_) * std::log(rows);
-    return free;
-  }
-
-  [[nodiscard]] Fault MakeFault(const Free& free) const {
-    const Candidate& candidate = candidates_[free.candidate];
-    return {candidate.fault + " that changes, up to", candidate.place, free.largest, 0.0, candidate.unit, ""};
-  }
-
-  /// Size of the torque of that joint that explains most of y, a step's rows.
-  [[nodiscard]] double CalcTorque(const std::string& place, Index step, const VectorXd& y) const {
-    for (const Candidate& candidate : candidates_) {
-      if (candidate.place != place || candidate.fault != "torque") continue;
-      const VectorXd column = candidate.columns.col(0).segment(step * forces_->rows(), forces_->rows());
-      return std::abs(column.dot(y)) / column.squaredNorm();
-    }
-    return 0.0;
-  }
-
-  [[nodiscard]] Explanation Start(const Segment& segment) const {
-    return StartExplanation(store_, CauseChannel::kBalance, segment);
-  }
-
-  void Build() {
-    const Index rows = forces_->rows();
-    y_.resize(rows * steps_);
-    candidates_.clear();
-    uneven_.clear();
-    turns_.clear();
-    forces_->SetLevel(level_);
-    for (Index i = 0; i < steps_; ++i) {
-      forces_->SetStep(used_[static_cast<size_t>(i)]);
-      uneven_.push_back(forces_->uneven());
-      turns_.push_back(forces_->ListTurns());
-      y_.segment(i * rows, rows) = forces_->CalcResidual();
-      forces_->AddColumns(i * rows, steps_, &candidates_);
-    }
-    AddGrowing();
-    for (const auto& [candidate, amplitude] : known_.amplitudes)
-      y_ -= candidates_[candidate].columns * amplitude;
-    for (const ForceAtPoint& force : known_.points)
-      candidates_.push_back(MakeForceAtPoint(force, turns_, candidates_));
-    AddForcesAtPoints(y_, turns_, forces_->reach(), &candidates_);
-    NameStuckBearings();
-  }
-
-  /// Of each push another one that grows evenly: by so much a second, and what it is when the run ends.
-  void AddGrowing() {
-    const size_t count = candidates_.size();
-    for (size_t i = 0; i < count; ++i) {
-      if (!IsPush(candidates_[i])) continue;
-      Candidate growing = candidates_[i];
-      const Index width = growing.columns.cols();
-      growing.fault += kGrows;
-      growing.unit += "/s";
-      growing.nominal = store_.last_time();
-      growing.scale = candidates_[i].scale.replicate(2, 1);
-      growing.is_possible = [this, end = growing.nominal](const VectorXd& a) {
-        return GrowsFromNothing(a, end);
-      };
-      growing.columns.conservativeResize(Eigen::NoChange, 2 * width);
-      growing.columns.rightCols(width) = candidates_[i].columns;
-      for (Index k = 0; k < steps_; ++k) {
-        const double since = store_.Get(StepStore::kTime)(0, used_[static_cast<size_t>(k)]) - growing.nominal;
-        growing.columns.block(k * forces_->rows(), 0, forces_->rows(), width) *= since;
-      }
-      candidates_.push_back(std::move(growing));
-    }
-  }
-
-  /// Whether it began within what is kept: before the steps of this residual, and after all of it had begun.
-  /// @param a growth a second, and size at time `end`.
-  [[nodiscard]] bool GrowsFromNothing(const VectorXd& a, double end) const {
-    const auto time = store_.Get(StepStore::kTime);
-    const double slack = store_.size() > 1 ? 2.0 * (time(0, 1) - time(0, 0)) : 0.0;
-    const double since = CalcGrowthBegin(a, end);
-    return since >= time(0, 0) - slack && since <= time(0, used_.front()) + slack;
-  }
-
-  /// A joint that does not slide shows how much friction holds it, and not how much could.
-  void NameStuckBearings() {
-    const RobotModel& model = forces_->model();
-    for (Candidate& one : candidates_) {
-      if (one.fault != kBearing) continue;
-      Index row = model.num_base_velocities();
-      while (one.place != "joint " + model.dof_name(static_cast<int>(row) - model.num_base_velocities()))
-        ++row;
-      // rad/s or m/s, and of the largest friction, which is one and the same wherever it slides
-      constexpr double kSlides = 1e-4, kLargest = 1.0 - 1e-9;
-      int sliding = 0;
-      for (const Index step : used_)
-        sliding += static_cast<int>(std::abs(store_.Get(StepStore::kVelocity)(row, step)) > kSlides &&
-                                    std::abs(store_.Get(StepStore::kDryFriction)(row, step)) >=
-                                        kLargest * one.nominal);
-      if (4 * sliding < steps_) one.fault = kStuckBearing;
-    }
-  }
-
-  /// Root mean square of the robot's and the object's rows, without what the platform may leave.
-  [[nodiscard]] Vector2d CalcSizes(const VectorXd& y) const {
-    const Index n = forces_->rows() - 6;
-    Vector2d square = Vector2d::Zero();
-    for (Index k = 0; k < steps_; ++k) {
-      VectorXd robot = y.segment(k * (n + 6), n);
-      const MatrixXd& U = uneven_[static_cast<size_t>(k)];
-      robot -= U * (U.transpose() * robot);
-      square += Vector2d(robot.squaredNorm(), y.segment<6>(k * (n + 6) + n).squaredNorm());
-    }
-    return (square.array() / (static_cast<double>(steps_) * Vector2d(n, 6).array())).sqrt();
-  }
-
-  /// In units of the noise that there was at first.
-  [[nodiscard]] double CalcLeft(const VectorXd& y) const {
-    const Index n = forces_->rows() - 6;
-    double square = 0.0;
-    for (Index k = 0; k < steps_; ++k) {
-      square += (level_[0] / first_level_[0] * y.segment(k * (n + 6), n)).squaredNorm() +
-                (level_[1] / first_level_[1] * y.segment<6>(k * (n + 6) + n)).squaredNorm();
-    }
-    return std::sqrt(square / static_cast<double>(y.size()));
-  }
-
-  /// Bounds of checks hold for all robots; what an explanation leaves is how much noise there is in this one.
-  [[nodiscard]] CauseSelection Select() {
-    CauseSelection best = SelectOnce();
-    const Vector2d least = (kExact / kAccuracy * first_level_).cwiseMax(kRounding);
-    for (int i = 0; i < kMostLevels && IsExplained(best.fraction, best.left); ++i) {
-      const Vector2d before = level_;
-      level_ = (kLevel * level_.cwiseProduct(CalcSizes(best.residual))).cwiseMax(least).cwiseMin(before);
-      if ((level_.array() > 0.5 * before.array()).all()) break;
-      Build();
-      CauseSelection next = SelectOnce();
-      if (!IsExplained(next.fraction, next.left)) break;
-      best = next;
-    }
-    return best;
-  }
-
-  /// Beside other faults a force acts elsewhere than by itself.
-  bool RefinePoints(const CauseSelection& selection) {
-    if (selection.terms.size() < 2) return false;
-    bool is_refined = false;
-    for (const CauseTerm& term : selection.terms) {
-      Candidate& one = candidates_[term.candidate];
-      if (one.fault != kForceAtPoint) continue;
-      MatrixXd beside(y_.size(), 0);
-      for (const CauseTerm& other : selection.terms) {
-        if (other.candidate == term.candidate) continue;
-        const MatrixXd& columns = candidates_[other.candidate].columns;
-        beside.conservativeResize(Eigen::NoChange, beside.cols() + columns.cols());
-        beside.rightCols(columns.cols()) = columns;
-      }
-      const ForceAtPoint start{one.place, term.amplitude, one.fitted};
-      const auto refined = RefinePoint(y_, turns_, forces_->reach(), start, beside, candidates_);
-      if (!refined) continue;
-      one = MakeForceAtPoint(*refined, turns_, candidates_);
-      is_refined = true;
-    }
-    return is_refined;
-  }
-
-  [[nodiscard]] CauseSelection SelectOnce() {
-    const CauseOptions options{.alike = static_cast<double>(steps_)};
-    CauseSelection selection = SelectCauses(y_, candidates_, options);
-    if (RefinePoints(selection)) selection = SelectCauses(y_, candidates_, options);
-    for (const CauseTerm& term : selection.terms) {
-      if (candidates_[term.candidate].place != kWorld || selection.terms.size() == 1) continue;
-      // Masses that differ fall as all do.
-      forces_->SetGravity(forces_->model().gravity() + Vector3d(term.amplitude));
-      Build();
-      selection = SelectCauses(y_, candidates_, options);
-      break;
-    }
-    selection.left = CalcLeft(selection.residual);
-    return selection;
-  }
-
-  const StepStore& store_;
-  StepForces* forces_;
-  bool is_faint_;  // whether the checks of the balances hold
-  std::vector<Candidate> candidates_;
-  VectorXd y_;
-  std::vector<Index> used_;  // steps of the store
-  Index steps_ = 0;
-  Terms known_, terms_;
-  Vector2d first_level_, level_;  // StepForces::SetLevel
-  std::vector<MatrixXd> uneven_;  // of each step
-  std::vector<Turns> turns_;      // likewise
-};
 
 bool IsSame(const Explanation& a, const Explanation& b) {
   if (a.outcome == CauseOutcome::kNotExplained || b.outcome == CauseOutcome::kNotExplained) return false;
@@ -417,7 +26,7 @@ bool IsSame(const Explanation& a, const Explanation& b) {
 /// A part of the steps and what explains it.
 struct Part {
   bool is_explained = false;
-  Problem::Terms terms;
+  ForceProblem::Terms terms;
   Causes causes;
 
   [[nodiscard]] Index CountAmplitudes() const {
@@ -429,7 +38,7 @@ struct Part {
 
 Part ExplainPart(const StepStore& store, StepForces* forces, const Segment& segment, const Part* known) {
   Part part;
-  Problem problem(store, forces, segment);
+  ForceProblem problem(store, forces, segment);
   if (known != nullptr) problem.Know(known->terms);
   part.is_explained = problem.ExplainConstant(segment, &part.causes);
   part.terms = problem.terms();
@@ -450,7 +59,7 @@ Segment Concatenate(const std::vector<Segment>& parts, size_t begin, size_t coun
 }
 
 /// Of long runs blocks of steps are kept with gaps between them, and what changes there is not seen: parts
-/// that only gaps divide are one as far as the same faults explain them.
+/// that only gaps divide are one as far as the same faults explain them. None where one is not explained.
 std::vector<Segment> JoinAcrossGaps(const StepStore& store, StepForces* forces,
                                     const std::vector<Segment>& parts) {
   const auto is_gap = [&](size_t part) {
@@ -466,16 +75,15 @@ std::vector<Segment> JoinAcrossGaps(const StepStore& store, StepForces* forces,
     return part;
   };
   std::vector<Segment> joined;
-  for (size_t begin = 0; begin < parts.size();) {
+  for (size_t begin = 0; begin < parts.size() && joined.size() <= kMostSegments;) {
+    if (!explain(begin, 1).is_explained) return {};
     size_t most = 1;
     while (begin + most < parts.size() && is_gap(begin + most)) ++most;
     // The most that are explained, by bisection, all of them first.
     size_t count = 1, fails = most + 1;
-    for (size_t next = most; next > count; next = (count + fails) / 2) {
+    for (size_t next = most; next > count; next = (count + fails) / 2)
       (explain(begin, next).is_explained ? count : fails) = next;
-    }
     if (!known) known = explain(begin, count);
-    if (!known->is_explained) known.reset();
     joined.push_back(Concatenate(parts, begin, count));
     begin += count;
   }
@@ -526,18 +134,18 @@ Causes ExplainForces(const StepStore& store) {
   if (whole.empty()) {
     // Predictions fail by what is less than the bounds of the balances.
     FindSegments(store, &forces, kFaint, &whole, &parts, &bent);
-    if (!whole.empty()) Problem(store, &forces, whole, kFaint).ExplainConstant(whole, &causes);
+    if (!whole.empty()) ForceProblem(store, &forces, whole, kFaint).ExplainConstant(whole, &causes);
     return causes;
   }
-  Problem problem(store, &forces, whole);
+  ForceProblem problem(store, &forces, whole);
   if (problem.ExplainConstant(whole, &causes)) return causes;
   // Where there are no more bends than jumps, these are the same; what moves by itself bends all the time.
   if (bent.size() == parts.size() || bent.size() > kMostBends) bent.clear();
   for (const std::vector<Segment>& segments : {parts, bent}) {
-    if (segments.size() < 2) continue;
-    const std::vector<Segment> joined = JoinAcrossGaps(store, &forces, segments);
-    if (joined.size() < 2 || joined.size() > kMostSegments) continue;
-    const Causes found = ExplainParts(store, &forces, joined);
+    const bool are_many = segments.size() > kMostSegments;
+    const std::vector<Segment> few = are_many ? JoinAcrossGaps(store, &forces, segments) : segments;
+    if (few.size() < 2 || few.size() > kMostSegments) continue;
+    const Causes found = ExplainParts(store, &forces, few);
     if (!found.empty()) return found;
   }
   problem.ExplainChanging(whole, &causes);

@@ -288,8 +288,9 @@ TEST(RunCampaign, FindsFaultsOfPlantsAndTheirCauses) {
   const Count faults =
       RunSome(&campaign, [](const RunMutant& mutant) { return mutant.all.kind != "wheels"; });
   EXPECT_GE(faults.made, 60);
-  EXPECT_GE(20 * faults.killed, 19 * faults.made);
-  EXPECT_GE(20 * faults.cause, 19 * faults.made);
+  // Small frictions of joints that rest survive.
+  EXPECT_GE(10 * faults.killed, 9 * faults.made);
+  EXPECT_EQ(faults.cause, faults.killed);
   // Some of one draw are classes: a torque that is held, or of one sign, has many names.
   EXPECT_GE(20 * faults.part, 16 * faults.with_part);
   for (const RunMutant& mutant : campaign.mutants())

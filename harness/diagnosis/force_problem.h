@@ -1,0 +1,94 @@
+#pragma once
+
+// What a part of the steps leaves of the balances, and what explains it.
+
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "harness/diagnosis/causes.h"
+#include "harness/diagnosis/force_points.h"
+#include "harness/diagnosis/force_telling.h"
+#include "harness/diagnosis/step_forces.h"
+
+namespace dexcheck {
+
+/// One residual and what explains it.
+class ForceProblem {
+ public:
+  /// @param level of the noise, in bounds of the checks.
+  ForceProblem(const StepStore& store, StepForces* forces, const Segment& segment, double level = 1.0);
+
+  /// Whether what is left is noise, or next to nothing beside what there was.
+  [[nodiscard]] bool IsExplained(double fraction, double left) const;
+
+  /// Of the last explanation: what was selected, and how large each is; forces at points by themselves.
+  struct Terms {
+    std::vector<std::pair<size_t, VectorXd>> amplitudes;
+    std::vector<ForceAtPoint> points;
+  };
+  [[nodiscard]] const Terms& terms() const { return terms_; }
+  /// Faults that are there, as other steps have shown.
+  void Know(const Terms& known);
+
+  /// Faults that do not change.
+  bool ExplainConstant(const Segment& segment, Causes* causes);
+
+  /// One force that changes in time, free at each step.
+  void ExplainChanging(const Segment& segment, Causes* causes) const;
+
+ private:
+  /// Two faults of one joint may be anything that acts there.
+  bool ExplainJoint(const Segment& segment, const CauseSelection& selection, Causes* causes) const;
+  /// Opposite moments on the links that a joint joins are a torque of that joint: what is across its axis
+  /// does no work, and the axis turns with the robot, so that it changes.
+  bool ExplainBetweenLinks(const Segment& segment, const CauseSelection& selection, Causes* causes) const;
+  /// A class of what was selected and a torque of that joint that changes.
+  [[nodiscard]] Explanation StartChanging(const Segment& segment, const CauseSelection& selection,
+                                          const std::string& joint) const;
+  /// The torque of one joint, free at each step, where that has fewer amplitudes than what was selected: a
+  /// range that ends, a cable.
+  bool ExplainTorque(const Segment& segment, const CauseSelection& selection, Causes* causes) const;
+  /// A candidate whose amplitudes are free at each step.
+  struct Free {
+    size_t candidate = SIZE_MAX;
+    double criterion = 0.0, largest = 0.0;
+    VectorXd residual;
+  };
+  [[nodiscard]] Free FitFree(size_t index) const;
+  [[nodiscard]] Fault MakeFault(const Free& free) const;
+  /// Size of the torque of that joint that explains most of y, a step's rows.
+  [[nodiscard]] double CalcTorque(const std::string& place, Eigen::Index step, const VectorXd& y) const;
+  [[nodiscard]] Explanation Start(const Segment& segment) const;
+  void Build();
+  /// Of each push another one that grows evenly: by so much a second, and what it is when the run ends.
+  void AddGrowing();
+  /// Whether it began within what is kept: before the steps of this residual, and after all of it had begun.
+  /// @param a growth a second, and size at time `end`.
+  [[nodiscard]] bool GrowsFromNothing(const VectorXd& a, double end) const;
+  /// A joint that does not slide shows how much friction holds it, and not how much could.
+  void NameStuckBearings();
+  /// Root mean square of the robot's and the object's rows, without what the platform may leave.
+  [[nodiscard]] Vector2d CalcSizes(const VectorXd& y) const;
+  /// In units of the noise that there was at first.
+  [[nodiscard]] double CalcLeft(const VectorXd& y) const;
+  /// Bounds of checks hold for all robots; what an explanation leaves is how much noise there is in this one.
+  [[nodiscard]] CauseSelection Select();
+  /// Beside other faults a force acts elsewhere than by itself.
+  bool RefinePoints(const CauseSelection& selection);
+  [[nodiscard]] CauseSelection SelectOnce();
+
+  const StepStore& store_;
+  StepForces* forces_;
+  bool is_faint_;  // whether the checks of the balances hold
+  std::vector<Candidate> candidates_;
+  VectorXd y_;
+  std::vector<Eigen::Index> used_;  // steps of the store
+  Eigen::Index steps_ = 0;
+  Terms known_, terms_;
+  Vector2d first_level_, level_;  // StepForces::SetLevel
+  std::vector<MatrixXd> uneven_;  // of each step
+  std::vector<Turns> turns_;      // likewise
+};
+
+}  // namespace dexcheck
