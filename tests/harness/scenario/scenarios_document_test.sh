@@ -63,7 +63,7 @@ told_keys() { sed -nE 's/.*known here are (.*)$/\1/p' | tr -d ' ' | tr ',' '\n';
 all_known_keys() {
   local section=$1 start=$2
   case $section in
-    -) known_keys - - paper | grep -vxE 'start_error|model|plant|grasp|trajectory|task|joint_motion|control|controller|sensing|actuation|disturbance|mismatch|expect|bounds' ;;
+    -) known_keys - - paper | grep -vxE 'start_error|model|plant|grasp|trajectory|task|joint_motion|stance|control|controller|sensing|actuation|disturbance|mismatch|expect|bounds' ;;
     task) known_keys task - lift ;;
     joint_motion) known_keys joint_motion 'joint_motion={}' panda-reach ;;
     stance) known_keys stance - stand ;;
