@@ -117,7 +117,14 @@ void AddRobotForce(std::span<const Wrench> wrenches, const ModelTerms& robot, Ei
     }
     if (offset == 0) continue;
     const Pose X_B0 = robot.CalcLinkPose(-1);
-    const double moment = (w.torque + (w.point - X_B0.translation()).cross(w.force)).z();
+    const Vector3d moments = w.torque + (w.point - X_B0.translation()).cross(w.force);
+    if (base.type == BaseType::kFloating) {
+      // v along the world's axes, w about the base's.
+      force.head<3>() += w.force;
+      force.segment<3>(3) += X_B0.linear().transpose() * moments;
+      continue;
+    }
+    const double moment = moments.z();
     const double forward = X_B0.linear().col(0).dot(w.force);
     if (base.type == BaseType::kPlanar) {
       force.head<3>() += Vector3d(w.force.x(), w.force.y(), moment);

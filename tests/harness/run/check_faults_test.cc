@@ -54,10 +54,19 @@ void ThickenFingertip(mjModel* m) {
     if (m->geom_bodyid[geom] == body && m->geom_type[geom] == mjGEOM_SPHERE) m->geom_size[3 * geom] *= 1.01;
 }
 
+/// The same of a quadruped's foot.
+void ThickenFoot(mjModel* m) {
+  const int geom = mj_name2id(m, mjOBJ_GEOM, "fl_foot_geom");
+  m->geom_size[3 * geom] *= 1.01;
+}
+
 const std::vector<std::string> kSoft = {"duration=0.02", "plant.contact_time_constant=0.05",
                                         "plant.contact_impedance=0.5"};
 const std::vector<std::string> kSlippery = {"duration=0.1", "plant.finger_friction=0.15"};
 const std::vector<std::string> kShort = {"duration=0.05"};
+const std::vector<std::string> kSwaying = {
+    "duration=0.6", "expect={}", "stance.points=[]", "plant.floor_friction=0.15",
+    "stance.oscillations=[{axis='x',amplitude=0.03,frequency=1.5,ramp_time=1}]"};
 
 const CheckFault kFaults[] = {
     {"inverse_dynamics_robot",
@@ -87,6 +96,14 @@ const CheckFault kFaults[] = {
      "lift",
      {"duration=0.6", "settle=0.01", "task.xyz=[0.25, -0.5, 0.6335]", "plant.contact_time_constant=0.02"},
      RemoveDampingOfObject},
+    {"foot_slip", "stand", kSwaying},
+    {"foot_slip_rate", "stand", kSwaying},
+    {"foot_cone_use", "stand", kSwaying},
+    {"feet_lost", "stand", kSwaying},
+    {"foot_penetration",
+     "stand",
+     {"duration=0.02", "expect={}", "plant.contact_time_constant=0.05", "plant.contact_impedance=0.5"}},
+    {"foot_distance", "stand", {"duration=0.02", "expect={}"}, ThickenFoot},
     {"actuator_effort", "offset", {"duration=0.05", "start_error.xyz=[0, 0, 0.3]"}},
 };
 
@@ -96,7 +113,7 @@ TEST_P(CheckFaults, FailTheirCheck) {
   const CheckFault& fault = GetParam();
   const Scenario scenario = ReadShippedScenario(fault.scenario, fault.overrides);
   const std::string mjcf = scenario.mjcf_file.empty() ? SourcePath("/mjcf/scene.xml") : scenario.mjcf_file;
-  const dexcheck::Setup setup(scenario, kRobot, mjcf);
+  const dexcheck::Setup setup(scenario, scenario.model_file.empty() ? kRobot : scenario.model_file, mjcf);
   LoopParts parts = MakeLoopParts(setup);
   // Of the simulation alone, after the scenario has set what it sets.
   if (fault.change != nullptr) dynamic_cast<EnginePlant&>(*parts.plant).simulation().Change(fault.change);

@@ -20,7 +20,7 @@ TEST(StandingRun, AllChecksPass) {
   }
   for (const char* check : {"wheel_slip", "base_tilt", "fingertip_slip", "kappa", "joint_dynamics"})
     EXPECT_FALSE(run.loop().checks().Has(check)) << check;
-  EXPECT_GT(run.Worst("foot_cone_use"), 0.01);
+  EXPECT_GT(run.Worst("foot_cone_use"), 1e-3);
   EXPECT_GT(run.Worst("contact_force"), 1e-12);
   EXPECT_GT(result.tracking.joints_max(), 1e-9);
   // It moves.
@@ -50,6 +50,18 @@ TEST(StandingRun, ASlipperyFloorIsFound) {
   ShippedRun run("stand", slippery);
   const RunResult& result = run.Run();
   EXPECT_EQ(result.attribution.cause, Cause::kFootSlip) << result.failure << result.attribution.evidence;
+}
+
+// Robot and ground take up what is declared, wherever it acts.
+TEST(StandingRun, DeclaredPushesAreNoCause) {
+  for (const char* body : {"trunk", "fl_shank"}) {
+    ShippedRun run("stand", {"duration=0.2", "expect={}",
+                             "disturbance=[{type='pulse',body='" + std::string(body) +
+                                 "',force=[1,2,3],torque=[0.1,0,0.2],begin=0.05,duration=0.05}]"});
+    const RunResult& result = run.Run();
+    EXPECT_EQ(result.verdict, Verdict::kPass)
+        << body << ": " << result.failure << result.attribution.evidence;
+  }
 }
 
 TEST(StandingRun, AWrongMassIsFound) {
