@@ -33,6 +33,17 @@ class Browser {
   /// Presses the mouse's button at the first place and lets it go at the second, in viewport coordinates.
   void Drag(int from_x, int from_y, int to_x, int to_y) const;
   void DoubleClick(int x, int y) const;
+  /// How many ids stand twice, and how many things the page loaded beside itself.
+  [[nodiscard]] int CountRepeatedIds() const {
+    return Run(
+        "const ids = [...document.querySelectorAll('[id]')].map(e => e.id);"
+        "return ids.length - new Set(ids).size;");
+  }
+  [[nodiscard]] int CountLoaded() const {
+    return Run(
+        "return performance.getEntriesByType('resource')"
+        "  .filter(e => !e.name.startsWith('data:')).length;");
+  }
   /// Errors and warnings since the last call.
   [[nodiscard]] std::vector<std::string> TakeConsole() const;
 

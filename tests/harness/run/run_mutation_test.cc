@@ -24,6 +24,16 @@ RunCampaign MakeCampaign(const RunMutationOptions& options, const char* scenario
   return {ReadShippedScenario(scenario, {"settle=0.2"}), kRobot, kScene, options, kGoOn};
 }
 
+/// A campaign of nothing but what is switched on.
+RunMutationOptions MakeOptions(double from, double duration) {
+  RunMutationOptions options;
+  options.from = from;
+  options.duration = duration;
+  options.parameters = 0;
+  options.laws = options.equations = options.plants = false;
+  return options;
+}
+
 /// How many of the campaign's faults came to what.
 struct Count {
   int made = 0, killed = 0, cause = 0, part = 0, with_part = 0;
@@ -52,12 +62,8 @@ Count RunSome(RunCampaign* campaign, const Choose& choose) {
 }
 
 TEST(RunCampaign, FindsEveryWrongLawAndNamesThePart) {
-  RunMutationOptions options;
-  options.from = 1.0;
-  options.duration = 0.02;
-  options.parameters = 0;
-  options.plants = false;
-  options.equations = false;
+  RunMutationOptions options = MakeOptions(1.0, 0.02);
+  options.laws = true;
   for (const char* scenario : {"curve", "exercise"}) {
     SCOPED_TRACE(scenario);
     RunCampaign campaign = MakeCampaign(options, scenario);
@@ -259,12 +265,8 @@ TEST(RunCampaign, NamesFaultsAmongDeclaredImperfections) {
 }
 
 TEST(RunCampaign, FindsEveryWrongEquationAndNamesTheTerm) {
-  RunMutationOptions options;
-  options.from = 1.0;
-  options.duration = 0.01;
-  options.parameters = 0;
-  options.laws = false;
-  options.plants = false;
+  RunMutationOptions options = MakeOptions(1.0, 0.01);
+  options.equations = true;
   RunCampaign campaign = MakeCampaign(options, "exercise");
   const Count equations = RunSome(&campaign, [](const RunMutant&) { return true; });
   EXPECT_GE(equations.made, 28);
@@ -277,12 +279,9 @@ TEST(RunCampaign, FindsEveryWrongEquationAndNamesTheTerm) {
 }
 
 TEST(RunCampaign, FindsFaultsOfPlantsAndTheirCauses) {
-  RunMutationOptions options;
-  options.from = 0.6;
-  options.duration = 0.05;
+  RunMutationOptions options = MakeOptions(0.6, 0.05);
   options.parameters = 3;
-  options.laws = false;
-  options.equations = false;
+  options.plants = true;
   RunCampaign campaign = MakeCampaign(options);
   // Those that are there from the beginning take longest.
   const Count faults =
