@@ -67,6 +67,9 @@ std::vector<Segment> JoinAcrossGaps(const StepStore& store, StepForces* forces,
     const double apart = time(0, parts[part].front()) - time(0, parts[part - 1].back());
     return apart > 1.5 * store.setup().scenario().plant.time_step;
   };
+  size_t seen = 1;  // parts that are cut where a change was seen: each takes its time
+  for (size_t part = 1; part < parts.size(); ++part) seen += is_gap(part) ? 0 : 1;
+  if (seen > kMostSegments) return {};
   std::optional<Part> known;
   const auto explain = [&](size_t begin, size_t count) {
     const Segment segment = Concatenate(parts, begin, count);
