@@ -25,9 +25,7 @@ void GroundContacts::SetState(const ModelTerms& robot) {
     // v_F + omega x a, both of which J_f has along the frame's own axes
     const Vector3d n = R.transpose() * Vector3d::UnitZ();
     const Vector3d a = -(radii_[i] + 0.5 * gap) * n;
-    Matrix3d a_cross;
-    a_cross << 0.0, -a.z(), a.y(), a.z(), 0.0, -a.x(), -a.y(), a.x(), 0.0;
-    J_.middleRows<3>(row).noalias() = R * (J_f_.topRows<3>() - a_cross * J_f_.bottomRows<3>());
+    J_.middleRows<3>(row).noalias() = R * (J_f_.topRows<3>() - Skew(a) * J_f_.bottomRows<3>());
     // a_F = R (v_dot + omega x v) of the velocity v along axes that turn
     const Vector6d V = J_f_ * xi;
     const Vector6d V_dot = J_f_dot_ * xi;

@@ -14,12 +14,6 @@ using namespace force_fault;
 constexpr double kFarthest = 10.0;  // rad or m: where springs relax
 constexpr const char* kWorld = "world";
 
-Matrix3d Cross(const Vector3d& a) {
-  Matrix3d A;
-  A << 0.0, -a.z(), a.y(), a.z(), 0.0, -a.x(), -a.y(), a.x(), 0.0;
-  return A;
-}
-
 /// I a by the six entries Ixx, Iyy, Izz, Ixy, Ixz, Iyz of I.
 Eigen::Matrix<double, 3, 6> InertiaTimes(const Vector3d& a) {
   Eigen::Matrix<double, 3, 6> columns;
@@ -37,8 +31,8 @@ struct BodyWrench {
   /// @param a acceleration of the centre of mass less gravity. All in the body's axes.
   BodyWrench(const Vector3d& a, const Vector3d& w, const Vector3d& w_dot) {
     mass << a, Vector3d::Zero();
-    first_moment << Cross(w_dot) + Cross(w) * Cross(w), -Cross(a);
-    inertia << Eigen::Matrix<double, 3, 6>::Zero(), InertiaTimes(w_dot) + Cross(w) * InertiaTimes(w);
+    first_moment << Skew(w_dot) + Skew(w) * Skew(w), -Skew(a);
+    inertia << Eigen::Matrix<double, 3, 6>::Zero(), InertiaTimes(w_dot) + Skew(w) * InertiaTimes(w);
   }
 };
 

@@ -18,12 +18,6 @@ constexpr size_t kMostBodies = 8;       // that are looked at
 constexpr double kPointExplains = 0.9;  // of |y|^2, by force and moment
 constexpr int kMostIterations = 30;     // of Gauss-Newton
 
-Matrix3d Cross(const Vector3d& a) {
-  Matrix3d A;
-  A << 0.0, -a.z(), a.y(), a.z(), 0.0, -a.x(), -a.y(), a.x(), 0.0;
-  return A;
-}
-
 /// Columns of force and moment of one body, and which way it is turned at each step.
 struct Body {
   const Candidate *force, *moment;
@@ -42,11 +36,11 @@ struct Body {
   }
   /// y by the force, which acts at p: C_F + C_M [R p]x.
   [[nodiscard]] MatrixXd AtPoint(const Vector3d& p) const {
-    return force->columns + CalcMoments([&](const Matrix3d& R) { return Cross(R * p); });
+    return force->columns + CalcMoments([&](const Matrix3d& R) { return Skew(R * p); });
   }
   /// y by the point where F acts: -C_M [F]x R.
   [[nodiscard]] MatrixXd ByPoint(const Vector3d& F) const {
-    return CalcMoments([&](const Matrix3d& R) { return Matrix3d(-Cross(F) * R); });
+    return CalcMoments([&](const Matrix3d& R) { return Matrix3d(-Skew(F) * R); });
   }
 };
 

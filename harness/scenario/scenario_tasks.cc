@@ -228,22 +228,29 @@ JointTask::Point ReadPoint(const TomlValue& value, double time_before) {
   return point;
 }
 
+/// Amplitude, frequency and ramp. @param missing the amplitude's key, where it has none.
+/// @return the amplitude's unit: 1, or that of degrees.
+template <typename Oscillation>
+double ReadSine(const char* missing, TomlTable* table, Oscillation* one) {
+  auto [amplitude, unit] = table->FindWithAngleUnit("amplitude");
+  if (!amplitude) amplitude = table->Miss(missing);
+  one->amplitude = unit * amplitude->AsNumber();
+  const TomlValue frequency = table->Get("frequency");
+  one->frequency = frequency.AsPositive();
+  // The acceleration has the square of the rate 2 pi f.
+  const double rate = 2.0 * kPi * one->frequency;
+  if (!std::isfinite(one->amplitude * rate * rate)) frequency.Fail("must not be so large");
+  if (const auto time = table->Find("ramp_time")) one->ramp_time = time->AsNotNegative();
+  table->RejectUnused();
+  return unit;
+}
+
 JointTask::Oscillation ReadOscillation(const TomlValue& value) {
   TomlTable table = value.AsTable();
   JointTask::Oscillation one;
   one.joint = table.Get("joint").AsName();
   one.key = value.path();
-  auto [amplitude, unit] = table.FindWithAngleUnit("amplitude");
-  if (!amplitude) amplitude = table.Miss("amplitude_deg");
-  one.amplitude = unit * amplitude->AsNumber();
-  one.in_degrees = unit != 1.0;
-  const TomlValue frequency = table.Get("frequency");
-  one.frequency = frequency.AsPositive();
-  // The acceleration has the square of the rate 2 pi f.
-  const double rate = 2.0 * kPi * one.frequency;
-  if (!std::isfinite(one.amplitude * rate * rate)) frequency.Fail("must not be so large");
-  if (const auto time = table.Find("ramp_time")) one.ramp_time = time->AsNotNegative();
-  table.RejectUnused();
+  one.in_degrees = ReadSine("amplitude_deg", &table, &one) != 1.0;
   return one;
 }
 
@@ -270,13 +277,10 @@ StanceTask::Oscillation ReadStanceOscillation(const TomlValue& value) {
   StanceTask::Oscillation one;
   one.axis = table.Get("axis").AsChoice<int>(
       {{kAxes[0], 0}, {kAxes[1], 1}, {kAxes[2], 2}, {kAxes[3], 3}, {kAxes[4], 4}, {kAxes[5], 5}});
-  auto [amplitude, unit] = table.FindWithAngleUnit("amplitude");
-  if (!amplitude) amplitude = table.Miss(one.axis < 3 ? "amplitude" : "amplitude_deg");
-  if (one.axis < 3 && unit != 1.0) amplitude->Fail("must be in m, under the key without _deg");
-  one.amplitude = unit * amplitude->AsNumber();
-  one.frequency = table.Get("frequency").AsPositive();
-  if (const auto time = table.Find("ramp_time")) one.ramp_time = time->AsNotNegative();
-  table.RejectUnused();
+  const bool turns = one.axis >= 3;
+  if (const auto angle = table.Find("amplitude_deg"); angle && !turns)
+    angle->Fail("must be in m, under the key without _deg");
+  ReadSine(turns ? "amplitude_deg" : "amplitude", &table, &one);
   return one;
 }
 
