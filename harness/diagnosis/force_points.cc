@@ -122,6 +122,7 @@ void AddForcesAtPoints(const VectorXd& y, const std::vector<Turns>& turns, doubl
                        std::vector<Candidate>* candidates) {
   const std::vector<Body> bodies = ListBodies(turns, *candidates);
   std::vector<PointFit> fits;
+  fits.reserve(bodies.size());
   for (const Body& body : bodies) fits.emplace_back(y, body);
   std::stable_sort(fits.begin(), fits.end(),
                    [](const PointFit& a, const PointFit& b) { return a.explains() > b.explains(); });
