@@ -122,6 +122,12 @@ double RoundingScales::CalcMassScale(int row, int col) const {
   return Positive(mass * CalcVelocityScale(row) * CalcVelocityScale(col) + armature);
 }
 
+VectorXd RoundingScales::CalcWeights() const {
+  VectorXd weights(model_->num_velocities());
+  for (int i = 0; i < weights.size(); ++i) weights[i] = CalcGravityScale(i);
+  return weights;
+}
+
 double RoundingScales::CalcGravityScale(int coordinate) const {
   return Positive(GetSubtreeMass(coordinate) * CalcVelocityScale(coordinate) * model_->gravity().norm());
 }

@@ -50,6 +50,8 @@ class RoundingScales {
   [[nodiscard]] double CalcMassScale(int row, int col) const;
   /// Of an entry of gravity.
   [[nodiscard]] double CalcGravityScale(int coordinate) const;
+  /// All of these (n), N m or N: what gravity asks for at full reach.
+  [[nodiscard]] VectorXd CalcWeights() const;
 
   // At the state set.
   /// Of the world coordinates of the robot's points, m.

@@ -7,6 +7,9 @@ namespace dexcheck {
 namespace {
 
 constexpr double kTiny = std::numeric_limits<double>::min();
+/// Of the motors' forces and of the weights' at full reach: an arm that hangs, or moves in a horizontal
+/// plane, has next to no bias.
+constexpr double kLeastBias = 1e-3;
 
 double CalcRobotMass(const RobotModel& model) {
   double mass = model.base_with_wheels().mass;
@@ -35,6 +38,7 @@ StepAnalyzer::StepAnalyzer(const Setup& setup)
                            &spin_force_, &held_force_, &moving_, &momentum_, &acceleration_error_})
     vector->setZero(n);
   now_.contact_mismatch.setZero(static_cast<Eigen::Index>(setup.fingertips().size()));
+  weights_ = RoundingScales(setup.model()).CalcWeights();
   now_.setup = &setup;
   now_.clearance = &clearance_;
   now_.findings.f_c.setZero(3 * static_cast<Eigen::Index>(setup.fingertips().size()));
@@ -262,7 +266,8 @@ void StepAnalyzer::CalcRobotResidual() {
     actuation_.CalcForce(spin_force_, spin_force_);
     residual += spin_force_;
   }
-  now_.balanced = std::max(Norm(now_.bias), kTiny);
+  const double least = kLeastBias * std::max(Norm(now_.applied_force), Norm(weights_));
+  now_.balanced = std::max({Norm(now_.bias), least, kTiny});
   now_.robot_residual_norm = Norm(residual);
   now_.uneven_force = CalcUnevenForce() + CalcSwingForce();
   now_.robot_solver = response.solver_force.size() > 0 ? Norm(response.solver_force) / now_.balanced : 0.0;

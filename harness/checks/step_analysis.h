@@ -204,6 +204,7 @@ class StepAnalyzer {
   double transient_since_ = 0.0;                                  // s
   long steps_ = 0;
   VectorXd spin_force_, held_force_, moving_, momentum_, acceleration_error_;  // n
+  VectorXd weights_;  // n, what gravity asks for at full reach
   VectorXd norm_work_;
 };
 

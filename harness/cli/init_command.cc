@@ -6,6 +6,7 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include "controller/common/errors.h"
@@ -15,10 +16,12 @@
 #include "harness/base/files.h"
 #include "harness/checks/file_comparison.h"
 #include "harness/cli/commands.h"
+#include "harness/cli/init_motion.h"
 #include "harness/cli/output_file.h"
 #include "harness/cli/run_folder.h"
 #include "harness/descriptions/compiled_inertias.h"
 #include "harness/descriptions/description_match.h"
+#include "harness/descriptions/join_names.h"
 #include "harness/descriptions/mjcf_writer.h"
 #include "harness/descriptions/parameter_writer.h"
 #include "harness/descriptions/read_description.h"
@@ -71,110 +74,106 @@ void TakeAssets(const fs::path& folder, MjcfFile* mjcf) {
   }
 }
 
-/// The MJCF with motors, as a run needs it: of the user's, or of the description where there is none.
-std::string MakeMjcf(const InitRequest& request, const RobotDescription& robot, const fs::path& folder) {
-  const fs::path source = robot.format == RobotFormat::kMjcf ? request.robot : request.mjcf;
-  const fs::path from_here = fs::current_path();
-  std::map<std::string, double> limits;
-  if (robot.format == RobotFormat::kUrdf)
-    limits = ReadUrdfEfforts(ReadTextFile(request.robot.string()), request.robot.string());
-  if (source.empty()) {
-    MjcfFile mjcf(WriteMjcf(robot, request.robot.filename().string()),
-                  request.robot.string() + " as an MJCF");
-    AddMotors(&mjcf, limits);
-    LoadMjcfText(mjcf.PrintFor(from_here), mjcf.source());
-    return mjcf.Print();
+/// What the engine refuses, of a description that it is to get: ranges without width, and inertias that no
+/// body has, for which the nearest ones stand.
+void MendForEngine(RobotDescription* robot) {
+  std::vector<std::string> ranges, bodies;
+  for (size_t i = 0; i < robot->spec.joints.size(); ++i) {
+    Joint& joint = robot->spec.joints[i];
+    if (robot->joints[i].states_range && joint.lower >= joint.upper) {
+      robot->joints[i].states_range = false;
+      std::tie(joint.lower, joint.upper) = std::pair(-kPi, kPi);
+      ranges.push_back(joint.name);
+    }
+    const Matrix3d possible = FindNearestInertia(joint.body.inertia);
+    if (possible != joint.body.inertia) bodies.push_back(joint.link);
+    joint.body.inertia = possible;
   }
-  MjcfFile mjcf(source);
-  // The MJCF's own come first.
-  std::map<std::string, double> own = FindForceRanges(mjcf);
-  own.merge(limits);
-  AdaptMjcf(&mjcf);
-  StateNewDefaults(&mjcf);
-  AddMotors(&mjcf, own);
-  for (const std::string& pair : ExcludeBaseContacts(&mjcf))
-    Warn(source.string() + ": contact of " + pair + " left out: neighbours at a joint");
-  LoadMjcfText(mjcf.PrintFor(from_here), source.string());
-  TakeAssets(folder, &mjcf);
-  return mjcf.Print();
+  if (!ranges.empty()) Warn("ranges of no width are left out: " + JoinNames(ranges));
+  if (!bodies.empty())
+    Warn("no body has the inertia that these links state, the nearest that one can have is written: " +
+         JoinNames(bodies));
 }
 
-/// One joint's part of the motion: where it begins and where it goes, well within its range.
-struct JointSpan {
-  double start = 0.0;
-  double end = 0.0;
+/// The user's MJCF with motors, as a run needs it.
+std::unique_ptr<MjcfFile> AdaptForRun(const fs::path& source, std::map<std::string, double> limits) {
+  auto mjcf = std::make_unique<MjcfFile>(source);
+  // The MJCF's own come first.
+  std::map<std::string, double> own = FindForceRanges(*mjcf);
+  own.merge(limits);
+  KeepMechanism(mjcf.get());
+  AdaptMjcf(mjcf.get());
+  StateNewDefaults(mjcf.get());
+  RequireExactSolver(mjcf.get());
+  if (!mjcf->changes().empty()) Warn(mjcf->SummarizeChanges());
+  AddMotors(mjcf.get(), own);
+  for (const std::string& pair : ExcludeBaseContacts(mjcf.get()))
+    Warn(source.string() + ": contact of " + pair + " left out: neighbours at a joint");
+  return mjcf;
+}
+
+/// Robot and MJCF of what was given; the MJCF is made of the description where there is none.
+struct InitSources {
+  RobotDescription robot;
+  std::unique_ptr<MjcfFile> mjcf;
 };
 
-JointSpan ChooseSpan(const Joint& joint, bool states_range) {
-  constexpr double kMargin = 0.2;  // of the range, at either end
-  const double most = joint.type == JointType::kPrismatic ? 0.05 : 0.3;
-  const double width = states_range ? joint.upper - joint.lower : 2.0 * most;
-  const double low = states_range ? joint.lower + kMargin * width : -most;
-  const double high = states_range ? joint.upper - kMargin * width : most;
-  JointSpan span;
-  span.start = std::clamp(0.0, low, high);
-  const double step = std::min(most, 0.5 * (high - low));
-  span.end = span.start + step <= high ? span.start + step : span.start - step;
-  return span;
+InitSources ReadSources(const InitRequest& request) {
+  const std::string text = ReadBytes(request.robot);
+  const RobotFormat format = FindFormat(text, request.robot);
+  InitSources sources;
+  if (format == RobotFormat::kMjcf) {
+    if (!request.mjcf.empty())
+      throw InputError(request.mjcf.string() + ": must stand beside a URDF, got two MJCFs");
+    sources.mjcf = AdaptForRun(request.robot, {});
+    sources.robot = DescriptionFile(request.robot, sources.mjcf->Print(), {}).Describe();
+    return sources;
+  }
+  if (format != RobotFormat::kUrdf)
+    throw InputError(request.robot.string() + ": must be a URDF or an MJCF, is a parameter file");
+  sources.robot = ParseUrdf(text, request.robot.string(), request.urdf);
+  const std::map<std::string, double> limits = ReadUrdfEfforts(text, request.robot.string());
+  if (!request.mjcf.empty()) {
+    sources.mjcf = AdaptForRun(request.mjcf, limits);
+    return sources;
+  }
+  MendForEngine(&sources.robot);
+  sources.mjcf = std::make_unique<MjcfFile>(WriteMjcf(sources.robot, request.robot.filename().string()),
+                                            request.robot.string() + " as an MJCF");
+  AddMotors(sources.mjcf.get(), limits);
+  return sources;
 }
 
-std::string WriteScenario(const RobotDescription& robot, double tolerance) {
-  const bool has_friction = std::any_of(robot.spec.joints.begin(), robot.spec.joints.end(),
-                                        [](const Joint& joint) { return joint.dry_friction > 0.0; });
-  std::vector<JointSpan> spans;
-  std::string start, there, back, friction;
-  for (size_t i = 0; i < robot.spec.joints.size(); ++i) {
-    const Joint& joint = robot.spec.joints[i];
-    JointSpan span = ChooseSpan(joint, robot.joints[i].states_range);
-    if (joint.coupling && joint.coupling->leader < static_cast<int>(i)) {
-      const JointSpan& leader = spans[static_cast<size_t>(joint.coupling->leader)];
-      span = {joint.coupling->multiplier * leader.start + joint.coupling->offset,
-              joint.coupling->multiplier * leader.end + joint.coupling->offset};
-    }
-    spans.push_back(span);
-    const auto add = [&](double value, std::string* list) {
-      *list += fmt::format("{}{} = {}", list->empty() ? "" : ", ", Quote(joint.name), FormatNumber(value, 4));
-    };
-    add(span.start, &start);
-    add(span.end, &there);
-    add(span.start, &back);
-    add(joint.dry_friction, &friction);
+/// Limits of motors by joint, N m or N.
+std::map<std::string, double> ReadMotorLimits(const mjModel& m) {
+  std::map<std::string, double> limits;
+  for (int i = 0; i < m.nu; ++i) {
+    if (m.actuator_ctrllimited[i] != 0)
+      limits[NameOf(m, mjOBJ_ACTUATOR, i)] = m.actuator_ctrlrange[2 * i + 1];
   }
-  return fmt::format(
-      R"(# A motion of the joints within their ranges, by computed torque, checked at every step.
-name = "motion"
-description = "each joint leaves its place and comes back"
-duration = 4.0
-settle = 0.5
-start = "rest"
-{}
-[model]
-file = "robot.toml"
+  return limits;
+}
 
-[plant]
-mjcf = "robot.xml"
+/// Where the first key frame puts joints, rad or m; nowhere without one.
+std::map<std::string, double> ReadHome(const mjModel& m) {
+  std::map<std::string, double> home;
+  for (int joint = 0; m.nkey > 0 && joint < m.njnt; ++joint) {
+    if (m.jnt_type[joint] == mjJNT_HINGE || m.jnt_type[joint] == mjJNT_SLIDE)
+      home[NameOf(m, mjOBJ_JOINT, joint)] = m.key_qpos[m.jnt_qposadr[joint]];
+  }
+  return home;
+}
 
-[joint_motion]
-start = {{ {} }}
-points = [
-  {{ time = 2, joints = {{ {} }} }},
-  {{ time = 4, joints = {{ {} }} }},
-]
-
-[control]
-law = "computed_torque"
-natural_frequency = 10
-damping_ratio = 1
-{}{})",
-      tolerance > 0.0 ? fmt::format("# Numbers that were rounded when they were printed agree to this.\n"
-                                    "tolerance = {}\n",
-                                    FormatNumber(tolerance, 1))
-                      : "",
-      start, there, back,
-      has_friction ? fmt::format("# Dry friction, compensated along the desired rates.\ncoulomb = {{ {} }}\n",
-                                 friction)
-                   : "",
-      has_friction ? "" : "\n[expect]\njoints = 0.01\n");
+/// Takes away the limits of motors that cannot carry the robot.
+void FreeMotors(const std::vector<std::string>& names, MjcfFile* mjcf) {
+  if (names.empty()) return;
+  for (tinyxml2::XMLElement* section : ListChildren(mjcf->root(), "actuator")) {
+    for (tinyxml2::XMLElement* motor : ListChildren(section)) {
+      if (std::find(names.begin(), names.end(), ReadAttribute(*motor, "name")) != names.end())
+        motor->SetAttribute("ctrllimited", "false");
+    }
+  }
+  Warn("motors whose limits do not carry the robot along the motion run without them: " + JoinNames(names));
 }
 
 constexpr const char* kStudy = R"(# Which gains follow the motion best, with margins that an arm needs.
@@ -240,31 +239,32 @@ std::optional<double> FindTolerance(const fs::path& table, const fs::path& mjcf)
 }
 
 int InitRobot(const InitRequest& request) {
-  RobotDescription robot = ReadDescription(request.robot, request.urdf);
-  if (robot.format == RobotFormat::kToml)
-    throw InputError(request.robot.string() + ": must be a URDF or an MJCF, is a parameter file");
-  if (robot.format == RobotFormat::kMjcf && !request.mjcf.empty())
-    throw InputError(request.mjcf.string() + ": must stand beside a URDF, got two MJCFs");
+  InitSources sources = ReadSources(request);
+  RobotDescription& robot = sources.robot;
   if (robot.spec.base.type != BaseType::kFixed)
     throw InputError(request.robot.string() + ": base: must be fixed to be run, floats");
   // What cannot be an MJCF is refused before there is a folder.
-  if (robot.format == RobotFormat::kUrdf && request.mjcf.empty()) MakeMjcf(request, robot, {});
-  const RunFolder folder(request.out.empty() ? request.robot.stem().string() : request.out, "");
-  const fs::path mjcf = folder.path() / "robot.xml";
-  WriteFile(mjcf, MakeMjcf(request, robot, folder.path()));
+  const MjModelPtr engine = LoadMjcfText(sources.mjcf->PrintFor(fs::current_path()), sources.mjcf->source());
   if (!request.mjcf.empty()) {
     // Names are the MJCF's, and what the URDF has no place for.
-    RobotDescription other = ReadDescription(mjcf);
+    RobotDescription other = DescriptionFile(request.mjcf, sources.mjcf->Print(), {}).Describe();
     CompleteEachOther(&other, &robot);
-    const MjcfFile document(mjcf);
-    TakeCompiledInertias(document, *LoadMjcf(mjcf), &robot);
+    TakeCompiledInertias(*sources.mjcf, *engine, &robot);
   }
-  const fs::path table = folder.path() / "robot.toml";
   const std::string parameters = WriteParameters(robot, request.robot.filename().string());
-  ParseRobotModel(parameters, request.robot.string() + " as a parameter file");
+  const RobotModel model = ParseRobotModel(parameters, request.robot.string() + " as a parameter file");
+  const InitMotion motion = PlanInitMotion(robot, model, ReadMotorLimits(*engine), ReadHome(*engine));
+  FreeMotors(motion.weak, sources.mjcf.get());
+  for (const std::string& pair : ExcludeOverlaps(ListPoses(model, motion.spans), sources.mjcf.get()))
+    Warn("contact of " + pair + " left out: they overlap along the motion");
+
+  const RunFolder folder(request.out.empty() ? request.robot.stem().string() : request.out, "");
+  const fs::path table = folder.path() / "robot.toml", mjcf = folder.path() / "robot.xml";
+  TakeAssets(folder.path(), sources.mjcf.get());
+  WriteFile(mjcf, sources.mjcf->Print());
   WriteFile(table, parameters);
   const std::optional<double> tolerance = FindTolerance(table, mjcf);
-  WriteFile(folder.path() / "motion.toml", WriteScenario(robot, tolerance.value_or(0.0)));
+  WriteFile(folder.path() / "motion.toml", WriteInitScenario(robot, motion.spans, tolerance.value_or(0.0)));
   WriteFile(folder.path() / "gains.toml", kStudy);
   fs::create_directories(folder.path() / ".github/workflows");
   WriteFile(folder.path() / ".github/workflows/dexcheck.yml", kWorkflow);

@@ -76,6 +76,7 @@ std::string WriteMjcf(const RobotDescription& robot, const std::string& origin) 
   root->InsertNewChildElement("compiler")->SetAttribute("angle", "radian");
   XMLElement* const option = root->InsertNewChildElement("option");
   option->SetAttribute("timestep", "0.001");
+  option->SetAttribute("tolerance", "1e-14");  // what the solver of dry friction leaves is rounding
   option->SetAttribute("gravity", Join(spec.gravity).c_str());
   XMLElement* const base = root->InsertNewChildElement("worldbody")->InsertNewChildElement("body");
   // The world cannot be the name of a body.

@@ -1,5 +1,6 @@
 #include "harness/descriptions/robot_description.h"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 
@@ -45,6 +46,17 @@ void FuseParts(RobotDescription* robot) {
   const auto fuse = [&](size_t i) { return bodies[i].size() == 1 ? bodies[i][0] : Combine(bodies[i]); };
   robot->spec.base.body = fuse(0);
   for (size_t i = 1; i < bodies.size(); ++i) robot->spec.joints[i - 1].body = fuse(i);
+}
+
+Matrix3d FindNearestInertia(const Matrix3d& inertia) {
+  // Second moments S = tr(I) / 2 1 - I, of which I = tr(S) 1 - S.
+  const Matrix3d S = 0.5 * inertia.trace() * Matrix3d::Identity() - inertia;
+  const Eigen::SelfAdjointEigenSolver<Matrix3d> eigen(S);
+  constexpr double kThinnest = 1e-6;  // no thinner than what readers take for a body
+  if (eigen.eigenvalues().minCoeff() > 0.0) return inertia;
+  const Vector3d moments = eigen.eigenvalues().cwiseMax(kThinnest * eigen.eigenvalues().maxCoeff());
+  const Matrix3d possible = eigen.eigenvectors() * moments.asDiagonal() * eigen.eigenvectors().transpose();
+  return moments.sum() * Matrix3d::Identity() - 0.5 * (possible + possible.transpose());
 }
 
 void NoteImpossibleBodies(RobotDescription* robot) {

@@ -64,6 +64,10 @@ struct RobotDescription {
   bool is_imported = false;         ///< A parameter file that dexcheck import wrote.
 };
 
+/// The nearest inertia about the centre of mass, kg m^2, that a body can have: of which no second moment of
+/// mass is negative; itself where it is one.
+Matrix3d FindNearestInertia(const Matrix3d& inertia);
+
 /// Notes bodies whose principal moments no body can have. Their dynamics are well defined all the same.
 void NoteImpossibleBodies(RobotDescription* robot);
 

@@ -95,31 +95,6 @@ std::map<std::string, double> FindForceRanges(const MjcfFile& mjcf) {
   return limits;
 }
 
-std::vector<std::string> ExcludeBaseContacts(MjcfFile* mjcf) {
-  const MjModelPtr model = LoadMjcfText(mjcf->PrintFor(std::filesystem::current_path()), mjcf->source());
-  const mjModel& m = *model;
-  std::vector<std::string> pairs;
-  XMLElement* contact = mjcf->root()->FirstChildElement("contact");
-  for (int body = 1; body < m.nbody; ++body) {
-    const int base = m.body_parentid[body];
-    if (base == 0 || m.body_weldid[base] != 0 || m.body_weldid[body] == 0) continue;
-    const char *const first = mj_id2name(&m, mjOBJ_BODY, base), *const second =
-                                                                    mj_id2name(&m, mjOBJ_BODY, body);
-    const bool is_excluded =
-        std::any_of(m.exclude_signature, m.exclude_signature + m.nexclude, [&](int excluded) {
-          return excluded == MakeSignature(base, body) || excluded == MakeSignature(body, base);
-        });
-    const bool can_touch = m.body_geomnum[base] > 0 && m.body_geomnum[body] > 0;
-    if (first == nullptr || second == nullptr || is_excluded || !can_touch) continue;
-    if (contact == nullptr) contact = mjcf->root()->InsertNewChildElement("contact");
-    XMLElement* const exclude = contact->InsertNewChildElement("exclude");
-    exclude->SetAttribute("body1", first);
-    exclude->SetAttribute("body2", second);
-    pairs.push_back(std::string(first) + " and " + second);
-  }
-  return pairs;
-}
-
 void AddMotors(MjcfFile* mjcf, const std::map<std::string, double>& limits) {
   const std::string& source = mjcf->source();
   const MjModelPtr model = LoadMjcfText(mjcf->PrintFor(std::filesystem::current_path()), source);

@@ -42,10 +42,23 @@ void StateNewDefaults(MjcfFile* mjcf);
 /// @throws InputError when the engine cannot load it, or a joint has no name.
 void AddMotors(MjcfFile* mjcf, const std::map<std::string, double>& limits = {});
 
+/// Leaves out what acts on joints beside a run's motors, and a run's model has not: constraints, tendons,
+/// springs of joints, and the weight that bodies do not feel (gravcomp).
+void KeepMechanism(MjcfFile* mjcf);
+
+/// States a solver that goes on until rounding: a run's checks see what an early end leaves.
+void RequireExactSolver(MjcfFile* mjcf);
+
 /// Excludes the contact of a link with the fixed link that it turns on: the engine leaves out neighbours, but
 /// not those of what is welded to the world.
 /// @returns "base_link and link_1" of each that it adds. @throws as AddMotors.
 std::vector<std::string> ExcludeBaseContacts(MjcfFile* mjcf);
+
+/// Excludes the contacts of the robot's bodies that lie in each other in any of these poses: meshes and their
+/// hulls often do.
+/// @param poses rad or m, by joint. @returns "link_1 and link_3" of each. @throws as AddMotors.
+std::vector<std::string> ExcludeOverlaps(const std::vector<std::map<std::string, double>>& poses,
+                                         MjcfFile* mjcf);
 
 /// The largest force that joints themselves allow (actuatorfrcrange, which this program's engine does not
 /// know and AdaptMjcf takes away), by name: their own, or their class's.

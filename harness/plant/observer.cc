@@ -75,8 +75,9 @@ void Observer::Read(const EngineSimulation& simulation, PlantReading* reading) {
   qpos_ = Eigen::Map<const VectorXd>(d.qpos, m.nq);
   X_W0_ = adapter_->GetBasePose(d.qpos);
   rates_ = ReadBaseRates(d);
-  // The coordinates of a floating base leave nothing out.
-  if (adapter_->model().base().type != BaseType::kFloating) {
+  // The coordinates of a floating base leave nothing out, and one that is fixed may hang from a ceiling.
+  const BaseType base = adapter_->model().base().type;
+  if (base != BaseType::kFloating && base != BaseType::kFixed) {
     const Vector3d up = X_W0_.linear().col(2);
     reading->departure.tilt = std::atan2(up.head<2>().norm(), up.z());
     reading->departure.height = X_W0_.translation().z() - adapter_->model().base().X_B0.translation().z();

@@ -104,6 +104,53 @@ TEST_F(InitCommand, ALinkDoesNotTouchTheBaseThatItTurnsOn) {
   EXPECT_EQ(RunMotion(0, "stands").at("verdict"), "pass");
 }
 
+// What acts on joints beside motors is no part of a run's model, and is said.
+TEST_F(InitCommand, LeavesOutWhatActsBesideMotors) {
+  WriteChanged("held.xml", ReadFixture("pair.xml"), "<joint name=\"elbow\"",
+               "<joint stiffness=\"3\" name=\"elbow\"");
+  WriteChanged("held.xml", Read("held.xml"), "<body name=\"upper\"", "<body gravcomp=\"1\" name=\"upper\"");
+  WriteChanged("held.xml", Read("held.xml"), "</worldbody>",
+               "</worldbody><equality><joint joint1=\"elbow\" joint2=\"shoulder\"/></equality>"
+               "<tendon><fixed name=\"t\"><joint joint=\"elbow\" coef=\"1\"/></fixed></tendon>"
+               "<actuator><position tendon=\"t\" kp=\"2\"/></actuator>");
+  const std::string said = Expect(0, "init held.xml").err;
+  for (const char* word : {"<joint stiffness>", "<body gravcomp>", "<equality joint>", "<tendon fixed>"})
+    EXPECT_THAT(said, HasSubstr(word));
+  EXPECT_EQ(RunMotion(0, "held").at("verdict"), "pass");
+}
+
+// Published files have them: no engine takes such an inertia, and a range of no width is none.
+TEST_F(InitCommand, MendsWhatTheEngineRefuses) {
+  WriteChanged("thin.urdf", ReadFixture("pair.urdf"), "izz=\"0.022\"", "izz=\"0.04\"");
+  WriteChanged("thin.urdf", Read("thin.urdf"), "lower=\"-2\" upper=\"2\"", "");
+  const std::string said = Expect(0, "init thin.urdf").err;
+  EXPECT_THAT(said, HasSubstr("nearest"));
+  EXPECT_THAT(said, HasSubstr("no width are left out: shoulder"));
+  EXPECT_EQ(RunMotion(0, "thin").at("verdict"), "pass");
+}
+
+// Motors too weak to hold the arm run without their limits; those too weak for the motion get a smaller one.
+TEST_F(InitCommand, MovesAsMotorsCan) {
+  const std::string urdf = ReadFixture("pair.urdf");
+  WriteChanged("weak.urdf", urdf, "upper=\"1\" effort=\"1\"", "upper=\"1\" effort=\"1e-6\"");
+  EXPECT_THAT(Expect(0, "init weak.urdf").err, HasSubstr("run without them"));
+  EXPECT_EQ(RunMotion(0, "weak").at("verdict"), "pass");
+}
+
+// The weight of an arm in a horizontal plane asks for no torque, and one that hangs has a tilt of pi.
+TEST_F(InitCommand, ArmsMayLieOrHang) {
+  const std::string mjcf = ReadFixture("pair.xml");
+  WriteChanged("lies.xml", mjcf, "<worldbody>", "<option gravity=\"0 0 0\"/><worldbody>");
+  WriteChanged("hangs.xml", mjcf, "<body name=\"upper\"",
+               "<body name=\"stand\" quat=\"0 1 0 0\"><body name=\"upper\"");
+  WriteChanged("hangs.xml", Read("hangs.xml"), "</worldbody>", "</body></worldbody>");
+  for (const std::string name : {"lies", "hangs"}) {
+    SCOPED_TRACE(name);
+    Expect(0, "init " + name + ".xml");
+    EXPECT_EQ(RunMotion(0, name).at("verdict"), "pass");
+  }
+}
+
 TEST_F(InitCommand, CopiesShippedScenarios) {
   for (const std::string name : {"paper", "panda-reach", "two-hands"}) {
     SCOPED_TRACE(name);

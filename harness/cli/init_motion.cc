@@ -1,0 +1,196 @@
+#include "harness/cli/init_motion.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "controller/common/text.h"
+#include "controller/dynamics/model_terms.h"
+
+namespace dexcheck::cli {
+namespace {
+
+constexpr double kHalf = 2.0;  // s, there, and as long back
+
+JointSpan ChooseSpan(const Joint& joint, bool states_range, double home) {
+  constexpr double kMargin = 0.2;  // of the range, at either end
+  const double most = joint.type == JointType::kPrismatic ? 0.05 : 0.3;
+  const double width = states_range ? joint.upper - joint.lower : 2.0 * most;
+  if (!states_range) home = std::clamp(home, joint.lower + most, joint.upper - most);
+  const double low = states_range ? joint.lower + kMargin * width : home - most;
+  const double high = states_range ? joint.upper - kMargin * width : home + most;
+  JointSpan span;
+  span.start = std::clamp(home, low, high);
+  const double step = std::min(most, 0.5 * (high - low));
+  span.end = span.start + step <= high ? span.start + step : span.start - step;
+  return span;
+}
+
+/// A coupled joint goes with the one that leads it, unless its own range forbids it.
+JointSpan Follow(const Joint& joint, const JointSpan& leader, const JointSpan& own) {
+  const JointCoupling& coupling = *joint.coupling;
+  const JointSpan led{coupling.multiplier * leader.start + coupling.offset,
+                      coupling.multiplier * leader.end + coupling.offset};
+  const auto is_within = [&](double q) { return q >= joint.lower && q <= joint.upper; };
+  return is_within(led.start) && is_within(led.end) ? led : own;
+}
+
+std::vector<JointSpan> ChooseSpans(const RobotDescription& robot, const std::map<std::string, double>& home) {
+  std::vector<JointSpan> spans;
+  for (size_t i = 0; i < robot.spec.joints.size(); ++i) {
+    const Joint& joint = robot.spec.joints[i];
+    const auto wish = home.find(joint.name);
+    JointSpan span = ChooseSpan(joint, robot.joints[i].states_range, wish == home.end() ? 0.0 : wish->second);
+    if (joint.coupling && joint.coupling->leader < static_cast<int>(i))
+      span = Follow(joint, spans[static_cast<size_t>(joint.coupling->leader)], span);
+    spans.push_back(span);
+  }
+  return spans;
+}
+
+/// What the motion asks of each motor, as a fraction of its limit.
+class MotorUse {
+ public:
+  MotorUse(const RobotModel& model, const std::map<std::string, double>& limits)
+      : model_(model), terms_(model) {
+    for (const Joint& joint : model.joints()) {
+      const auto limit = limits.find(joint.name);
+      limits_.push_back(limit == limits.end() ? std::numeric_limits<double>::infinity() : limit->second);
+    }
+  }
+
+  /// The largest of the motion there; back it is as large.
+  VectorXd CalcMotion(const std::vector<JointSpan>& spans) {
+    VectorXd most = CalcHold(spans);
+    constexpr int kSamples = 20;
+    for (int k = 1; k <= kSamples; ++k) most = most.cwiseMax(CalcAt(spans, double(k) / kSamples));
+    return most;
+  }
+  /// That of holding the robot where the motion begins.
+  VectorXd CalcHold(const std::vector<JointSpan>& spans) { return CalcAt(spans, 0.0); }
+
+ private:
+  /// @param s 0 to 1, by q = start + (end - start) (10 s^3 - 15 s^4 + 6 s^5).
+  VectorXd CalcAt(const std::vector<JointSpan>& spans, double s) {
+    const Eigen::Index n = terms_.size();
+    VectorXd q(n), rate(n), acceleration(n), friction = VectorXd::Zero(n);
+    for (Eigen::Index i = 0; i < n; ++i) {
+      const JointSpan& span = spans[static_cast<size_t>(i)];
+      const double way = span.end - span.start;
+      q[i] = span.start + way * s * s * s * (10.0 - 15.0 * s + 6.0 * s * s);
+      rate[i] = way * 30.0 * s * s * (1.0 - s) * (1.0 - s) / kHalf;
+      acceleration[i] = way * 60.0 * s * (1.0 - s) * (1.0 - 2.0 * s) / (kHalf * kHalf);
+      if (rate[i] != 0.0) friction[i] = model_.joints()[static_cast<size_t>(i)].dry_friction;
+    }
+    terms_.SetState(q, rate);
+    terms_.CalcDynamics();
+    VectorXd use =
+        (terms_.M() * acceleration + terms_.C() * rate + terms_.friction() + terms_.gravity()).cwiseAbs() +
+        friction;
+    for (Eigen::Index i = 0; i < n; ++i) use[i] /= limits_[static_cast<size_t>(i)];
+    return use;
+  }
+
+  const RobotModel& model_;
+  ModelTerms terms_;
+  std::vector<double> limits_;
+};
+
+bool HasBall(const RobotModel& model) {
+  return std::any_of(model.joints().begin(), model.joints().end(),
+                     [](const Joint& joint) { return joint.type == JointType::kBall; });
+}
+
+}  // namespace
+
+InitMotion PlanInitMotion(const RobotDescription& robot, const RobotModel& model,
+                          const std::map<std::string, double>& limits,
+                          const std::map<std::string, double>& home) {
+  InitMotion motion;
+  motion.spans = ChooseSpans(robot, home);
+  if (HasBall(model)) return motion;
+  constexpr double kMostUse = 0.7, kFull = 0.9;
+  constexpr int kHalvings = 4;
+  MotorUse use(model, limits);
+  const VectorXd hold = use.CalcHold(motion.spans);
+  VectorXd most = use.CalcMotion(motion.spans);
+  // A motor that cannot hold the robot is none that a smaller motion helps.
+  const auto too_much = [&] { return (hold.array() < kMostUse && most.array() > kMostUse).any(); };
+  for (int k = 0; k < kHalvings && too_much(); ++k) {
+    for (JointSpan& span : motion.spans) span.end = span.start + 0.5 * (span.end - span.start);
+    most = use.CalcMotion(motion.spans);
+  }
+  for (Eigen::Index i = 0; i < most.size(); ++i) {
+    if (most[i] > kFull) motion.weak.push_back(model.joints()[static_cast<size_t>(i)].name);
+  }
+  return motion;
+}
+
+std::vector<std::map<std::string, double>> ListPoses(const RobotModel& model,
+                                                     const std::vector<JointSpan>& spans) {
+  constexpr int kPoses = 20;
+  std::vector<std::map<std::string, double>> poses(kPoses + 1);
+  for (int k = 0; k <= kPoses; ++k) {
+    for (size_t i = 0; i < spans.size(); ++i)
+      poses[static_cast<size_t>(k)][model.joints()[i].name] =
+          spans[i].start + (spans[i].end - spans[i].start) * k / kPoses;
+  }
+  return poses;
+}
+
+std::string WriteInitScenario(const RobotDescription& robot, const std::vector<JointSpan>& spans,
+                              double tolerance) {
+  const bool has_friction = std::any_of(robot.spec.joints.begin(), robot.spec.joints.end(),
+                                        [](const Joint& joint) { return joint.dry_friction > 0.0; });
+  std::string start, there, back, friction;
+  for (size_t i = 0; i < robot.spec.joints.size(); ++i) {
+    const Joint& joint = robot.spec.joints[i];
+    const JointSpan& span = spans[i];
+    const auto add = [&](double value, std::string* list) {
+      *list += fmt::format("{}{} = {}", list->empty() ? "" : ", ", Quote(joint.name), FormatNumber(value, 4));
+    };
+    add(span.start, &start);
+    add(span.end, &there);
+    add(span.start, &back);
+    add(joint.dry_friction, &friction);
+  }
+  return fmt::format(
+      R"(# A motion of the joints within their ranges, by computed torque, checked at every step.
+name = "motion"
+description = "each joint leaves its place and comes back"
+duration = 4.0
+settle = 0.5
+start = "rest"
+{}
+[model]
+file = "robot.toml"
+
+[plant]
+mjcf = "robot.xml"
+
+[joint_motion]
+start = {{ {} }}
+points = [
+  {{ time = 2, joints = {{ {} }} }},
+  {{ time = 4, joints = {{ {} }} }},
+]
+
+[control]
+law = "computed_torque"
+natural_frequency = 10
+damping_ratio = 1
+{}{})",
+      tolerance > 0.0 ? fmt::format("# Numbers that were rounded when they were printed agree to this.\n"
+                                    "tolerance = {}\n",
+                                    FormatNumber(tolerance, 1))
+                      : "",
+      start, there, back,
+      has_friction ? fmt::format("# Dry friction, compensated along the desired rates.\ncoulomb = {{ {} }}\n",
+                                 friction)
+                   : "",
+      has_friction ? "" : "\n[expect]\njoints = 0.01\n");
+}
+
+}  // namespace dexcheck::cli

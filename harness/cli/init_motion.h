@@ -1,0 +1,40 @@
+#pragma once
+
+// The motion that a new folder begins with: each joint leaves its place and comes back, as its motors can.
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "harness/descriptions/robot_description.h"
+
+namespace dexcheck::cli {
+
+/// One joint's part of the motion: where it begins and where it goes, well within its range; rad or m.
+struct JointSpan {
+  double start = 0.0;
+  double end = 0.0;
+};
+
+/// A motion there and back, and which motors it asks too much of.
+struct InitMotion {
+  std::vector<JointSpan> spans;   ///< One a joint.
+  std::vector<std::string> weak;  ///< Joints whose limit does not even hold the robot, or move it so little.
+};
+
+/// A motion within the joints' ranges, smaller where motors would be at their limits.
+/// @param limits of motors by joint, N m or N. @param home where it had best begin, by joint, rad or m; 0 for
+/// others.
+InitMotion PlanInitMotion(const RobotDescription& robot, const RobotModel& model,
+                          const std::map<std::string, double>& limits,
+                          const std::map<std::string, double>& home);
+
+/// Poses along the motion, by joint, rad or m.
+std::vector<std::map<std::string, double>> ListPoses(const RobotModel& model,
+                                                     const std::vector<JointSpan>& spans);
+
+/// The scenario of that motion. @param tolerance of runs; 0 for rounding.
+std::string WriteInitScenario(const RobotDescription& robot, const std::vector<JointSpan>& spans,
+                              double tolerance);
+
+}  // namespace dexcheck::cli
