@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <tuple>
 #include <vector>
@@ -17,6 +18,7 @@
 #include "harness/checks/file_comparison.h"
 #include "harness/cli/commands.h"
 #include "harness/cli/init_motion.h"
+#include "harness/cli/init_stance.h"
 #include "harness/cli/output_file.h"
 #include "harness/cli/run_folder.h"
 #include "harness/descriptions/compiled_inertias.h"
@@ -176,14 +178,19 @@ void FreeMotors(const std::vector<std::string>& names, MjcfFile* mjcf) {
   Warn("motors whose limits do not carry the robot along the motion run without them: " + JoinNames(names));
 }
 
+// A gain margin of 6 dB and a phase margin of 45 degrees; of a robot on its feet margins are not judged.
+constexpr const char* kMargins =
+    R"(metrics = ["joint_error_rms", "peak_effort", "gain_margin", "phase_margin"]
+constraints = ["peak_effort < 1", "gain_margin > 2", "phase_margin > 0.785"])";
+constexpr const char* kEffort = R"(metrics = ["joint_error_rms", "peak_effort"]
+constraints = ["peak_effort < 1"])";
+
 constexpr const char* kStudy = R"(# Which gains follow the motion best, with margins that an arm needs.
 name = "gains"
 description = "natural frequency x damping ratio of the motion"
 scenario = "motion.toml"
-set = ["expect={}"]
-metrics = ["joint_error_rms", "peak_effort", "gain_margin", "phase_margin"]
-# A gain margin of 6 dB and a phase margin of 45 degrees.
-constraints = ["peak_effort < 1", "gain_margin > 2", "phase_margin > 0.785"]
+set = ["expect={{}}"]
+{}
 
 [[objective]]
 minimize = "joint_error_rms"
@@ -241,22 +248,36 @@ std::optional<double> FindTolerance(const fs::path& table, const fs::path& mjcf)
 int InitRobot(const InitRequest& request) {
   InitSources sources = ReadSources(request);
   RobotDescription& robot = sources.robot;
-  if (robot.spec.base.type != BaseType::kFixed)
-    throw InputError(request.robot.string() + ": base: must be fixed to be run, floats");
   // What cannot be an MJCF is refused before there is a folder.
-  const MjModelPtr engine = LoadMjcfText(sources.mjcf->PrintFor(fs::current_path()), sources.mjcf->source());
+  const auto load = [&] {
+    return LoadMjcfText(sources.mjcf->PrintFor(fs::current_path()), sources.mjcf->source());
+  };
+  MjModelPtr engine = load();
+  std::optional<Stand> stand;
+  if (robot.spec.base.type == BaseType::kFloating) {
+    stand = FindStand(*engine, sources.mjcf->source());
+    PutOnFloor(*engine, *stand, sources.mjcf.get());
+    engine = load();
+    if (request.mjcf.empty()) robot = DescriptionFile(request.robot, sources.mjcf->Print(), {}).Describe();
+  } else if (robot.spec.base.type != BaseType::kFixed) {
+    throw InputError(request.robot.string() + ": base: must be fixed or float to be run, rolls");
+  }
   if (!request.mjcf.empty()) {
     // Names are the MJCF's, and what the URDF has no place for.
     RobotDescription other = DescriptionFile(request.mjcf, sources.mjcf->Print(), {}).Describe();
     CompleteEachOther(&other, &robot);
     TakeCompiledInertias(*sources.mjcf, *engine, &robot);
   }
+  if (stand) AddFeet(*stand, &robot);
   const std::string parameters = WriteParameters(robot, request.robot.filename().string());
   const RobotModel model = ParseRobotModel(parameters, request.robot.string() + " as a parameter file");
-  const InitMotion motion = PlanInitMotion(robot, model, ReadMotorLimits(*engine), ReadHome(*engine));
-  FreeMotors(motion.weak, sources.mjcf.get());
-  for (const std::string& pair : ExcludeOverlaps(ListPoses(model, motion.spans), sources.mjcf.get()))
-    Warn("contact of " + pair + " left out: they overlap along the motion");
+  InitMotion motion;
+  if (!stand) {
+    motion = PlanInitMotion(robot, model, ReadMotorLimits(*engine), ReadHome(*engine));
+    FreeMotors(motion.weak, sources.mjcf.get());
+    for (const std::string& pair : ExcludeOverlaps(ListPoses(model, motion.spans), sources.mjcf.get()))
+      Warn("contact of " + pair + " left out: they overlap along the motion");
+  }
 
   const RunFolder folder(request.out.empty() ? request.robot.stem().string() : request.out, "");
   const fs::path table = folder.path() / "robot.toml", mjcf = folder.path() / "robot.xml";
@@ -264,8 +285,10 @@ int InitRobot(const InitRequest& request) {
   WriteFile(mjcf, sources.mjcf->Print());
   WriteFile(table, parameters);
   const std::optional<double> tolerance = FindTolerance(table, mjcf);
-  WriteFile(folder.path() / "motion.toml", WriteInitScenario(robot, motion.spans, tolerance.value_or(0.0)));
-  WriteFile(folder.path() / "gains.toml", kStudy);
+  const double rounded = tolerance.value_or(0.0);
+  WriteFile(folder.path() / "motion.toml", stand ? WriteStandScenario(robot, *stand, rounded)
+                                                 : WriteInitScenario(robot, motion.spans, rounded));
+  WriteFile(folder.path() / "gains.toml", fmt::format(kStudy, stand ? kEffort : kMargins));
   fs::create_directories(folder.path() / ".github/workflows");
   WriteFile(folder.path() / ".github/workflows/dexcheck.yml", kWorkflow);
   fmt::print("{}: robot.toml, robot.xml, motion.toml, gains.toml, .github/workflows/dexcheck.yml\n",
