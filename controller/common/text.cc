@@ -77,4 +77,17 @@ std::string SuggestNearest(std::string_view word, const std::vector<std::string>
   return nearest.empty() ? "" : ", did you mean " + Quote(nearest) + "?";
 }
 
+std::string_view Trim(std::string_view text, std::string_view blanks) {
+  const size_t begin = text.find_first_not_of(blanks);
+  if (begin == std::string_view::npos) return {};
+  return text.substr(begin, text.find_last_not_of(blanks) - begin + 1);
+}
+
+std::string ToLower(std::string text) {
+  std::transform(text.begin(), text.end(), text.begin(), [](char letter) {
+    return 'A' <= letter && letter <= 'Z' ? char(letter - 'A' + 'a') : letter;
+  });
+  return text;
+}
+
 }  // namespace dexcheck

@@ -39,6 +39,11 @@ std::string FindNearest(std::string_view word, const std::vector<std::string>& c
 /// ", did you mean "WORD"?" of that candidate; empty when none is close.
 std::string SuggestNearest(std::string_view word, const std::vector<std::string>& candidates);
 
+/// The text without these letters before and behind it.
+std::string_view Trim(std::string_view text, std::string_view blanks = " \t\r");
+/// With small letters, of ASCII alone.
+std::string ToLower(std::string text);
+
 /// The number that the whole text is; none when it is not one, or does not fit.
 template <typename Number>
 std::optional<Number> ParseNumber(std::string_view text) {

@@ -78,13 +78,18 @@ DesiredMotion TrajectoryController::EvaluateDesired(const Trajectory& motion, do
   return desired;
 }
 
-void TrajectoryController::Step(const Reading& reading, double t, Command* command) {
-  if (motion_ == nullptr) throw std::logic_error("TrajectoryController: Step before Follow");
+void TrajectoryController::BeginCommand(const Trajectory& motion, double t, double time_step,
+                                        Command* command) {
   command->tracks = true;
   command->handling = Handling{};
   command->force_seconds = 0.0;
   command->force_solves = 0;
-  command->desired = EvaluateDesired(*motion_, t, sampling_.time_step);
+  command->desired = EvaluateDesired(motion, t, time_step);
+}
+
+void TrajectoryController::Step(const Reading& reading, double t, Command* command) {
+  if (motion_ == nullptr) throw std::logic_error("TrajectoryController: Step before Follow");
+  BeginCommand(*motion_, t, sampling_.time_step, command);
   if (follower_ && has_begun_) {
     followed_ = reading.state;
     followed_.kappa = follower_->Follow(reading.state);

@@ -82,6 +82,8 @@ class TrajectoryController final : public Controller {
   /// kappa (39) of each contact that is followed; empty before Begin, and where contacts are measured.
   [[nodiscard]] const std::vector<ContactCoordinates>& followed_kappa() const { return followed_.kappa; }
 
+  /// What a command says at each step of a motion of the object that holds it, before its torques.
+  static void BeginCommand(const Trajectory& motion, double t, double time_step, Command* command);
   /// X_d, X_d_ddot at t, and X_d_dot half a time step before.
   [[nodiscard]] static DesiredMotion EvaluateDesired(const Trajectory& motion, double t, double time_step);
 

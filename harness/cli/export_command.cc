@@ -48,14 +48,8 @@ std::string MakeHeader(const std::vector<SignalInfo>& signals) {
   for (const SignalInfo& signal : signals) {
     const std::vector<std::string> units = ListUnits(signal);
     for (size_t k = 0; k < units.size(); ++k) {
-      std::string name = signal.name;
-      if (!signal.columns.empty()) {
-        name += '.' + signal.columns[k];
-      } else if (units.size() > 1) {
-        name += '.' + std::to_string(k);
-      }
       if (!header.empty()) header += ',';
-      header += QuoteField(name + " [" + units[k] + "]");
+      header += QuoteField(NameColumn(signal, k) + " [" + units[k] + "]");
     }
   }
   return header + '\n';

@@ -187,11 +187,6 @@ constexpr std::array<std::pair<const char*, const char*>, 8> kSides = {{{"left",
                                                                         {"lf", "rf"},
                                                                         {"lh", "rh"}}};
 
-std::string ToLower(std::string text) {
-  for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return text;
-}
-
 /// The name of the part on the other side, for a part on the left: its first word that says so is replaced.
 /// Empty for others. Words end at _ - . : / blanks and where a capital letter follows a small one.
 std::string FindMirrorName(const std::string& name) {

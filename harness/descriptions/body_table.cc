@@ -41,17 +41,13 @@ struct Unit {
 constexpr Unit kMassUnits[] = {{"kg", 1.0}, {"g", 1e-3}, {"lb", 0.45359237}, {"t", 1e3}};
 constexpr Unit kLengthUnits[] = {{"m", 1.0}, {"mm", 1e-3}, {"cm", 1e-2}, {"in", 0.0254}};
 
-std::string Trim(const std::string& text) {
-  const size_t begin = text.find_first_not_of(" \t\r\"");
-  if (begin == std::string::npos) return "";
-  return text.substr(begin, text.find_last_not_of(" \t\r\"") - begin + 1);
-}
+constexpr std::string_view kBlanks = " \t\r\"";
 
 std::vector<std::string> SplitCells(const std::string& line) {
   const char separator = line.find(';') != std::string::npos ? ';' : ',';
   std::vector<std::string> cells;
   std::istringstream stream(line);
-  for (std::string cell; std::getline(stream, cell, separator);) cells.push_back(Trim(cell));
+  for (std::string cell; std::getline(stream, cell, separator);) cells.emplace_back(Trim(cell, kBlanks));
   return cells;
 }
 
@@ -84,7 +80,7 @@ class BodyTableReader {
     std::istringstream lines(text);
     for (std::string line; std::getline(lines, line);) {
       ++line_;
-      line = Trim(line);
+      line = std::string(Trim(line, kBlanks));
       if (line.empty()) continue;
       if (line.starts_with('#')) {
         ReadRemark(line);
@@ -106,7 +102,8 @@ class BodyTableReader {
   void ReadRemark(const std::string& line) {
     const size_t colon = line.find(':');
     if (SimplifyName(line.substr(0, colon)) != "inertia") return;
-    const std::string about = colon == std::string::npos ? "" : Trim(line.substr(colon + 1));
+    const std::string_view about =
+        colon == std::string::npos ? "" : Trim(std::string_view(line).substr(colon + 1), kBlanks);
     if (about != "origin" && about != "com") Fail("inertia: must be origin or com, got " + Quote(about));
     about_origin_ = about == "origin";
   }

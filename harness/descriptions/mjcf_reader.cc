@@ -17,15 +17,6 @@
 namespace dexcheck {
 namespace {
 
-Pose ReadPose(const mjtNum* position, const mjtNum* quaternion) {
-  Pose X = Pose::Identity();
-  X.linear() = Eigen::Quaterniond(quaternion[0], quaternion[1], quaternion[2], quaternion[3])
-                   .normalized()
-                   .toRotationMatrix();
-  X.translation() = MapVector(position);
-  return X;
-}
-
 class MjcfDescriptionReader {
  public:
   MjcfDescriptionReader(const mjModel& engine, std::string source)

@@ -21,12 +21,6 @@ RowReader::RowReader(const RowProblem& problem) : problem_(problem), children_(p
     children_[static_cast<size_t>(problem_.given[i].parent + 1)].push_back(i);
 }
 
-/// A convention that says no more than that the right number is zero costs what a number does.
-double RowReader::CostOf(const Convention& convention) const {
-  if (convention.id == "rotation.unneeded") return kConvention;
-  return common.contains(convention.id) ? kCommonConvention : kConvention;
-}
-
 bool RowReader::IsSame(const StatedPart& a, const StatedPart& b) const {
   constexpr double kSame = 1e-9;
   return (a.X_PL.matrix() - b.X_PL.matrix()).cwiseAbs().maxCoeff() <=
@@ -53,12 +47,12 @@ std::vector<RowReading> RowReader::ListReadings(size_t i, const Pose& X_ab_P, bo
     if (!IsOfRow(first.of)) continue;
     const std::optional<StatedPart> one = first.undo(given, known);
     if (!one || IsSame(*one, given)) continue;
-    offer({*one, CostOf(first), {&first}, "", ""});
+    offer({*one, kConvention, {&first}, "", ""});
     for (const Convention& second : ListConventions()) {
       if (!in_pairs || !IsOfRow(second.of) || second.of <= first.of) continue;
       const std::optional<StatedPart> two = second.undo(*one, known);
       if (!two || IsSame(*two, *one) || IsSame(*two, given)) continue;
-      offer({*two, CostOf(first) + CostOf(second) + 0.1, {&first, &second}, "", ""});
+      offer({*two, 2.0 * kConvention + 0.1, {&first, &second}, "", ""});
     }
   }
   // What is welded to the parent may be placed by another convention.
@@ -68,7 +62,7 @@ std::vector<RowReading> RowReader::ListReadings(size_t i, const Pose& X_ab_P, bo
     if (!undone || IsSame(*undone, weld)) continue;
     StatedPart moved = given;
     moved.X_PL = weld.X_PL.inverse() * undone->X_PL * given.X_PL;
-    offer({moved, CostOf(convention), {&convention}, "", ""});
+    offer({moved, kConvention, {&convention}, "", ""});
   }
   AddNumbers(i, X_ab_P, given, right, &readings);
   return readings;
@@ -152,7 +146,7 @@ void RowReader::OfferOffset(size_t i, const Pose& X_ab_P, const StatedPart& give
     part.X_PL = given.X_PL * Eigen::AngleAxisd(digits == 1e6 ? offset : -DegToRad(degrees), given.axis);
     const std::string words = "offset by " + FormatNumber(degrees == -180.0 ? 180.0 : degrees) + " deg";
     const double angle = digits == 1e6 ? offset : -DegToRad(degrees);
-    offer({part, common.contains(words) ? kCommonConvention : kConvention, {}, kZero, words, angle});
+    offer({part, kConvention, {}, kZero, words, angle});
   }
 }
 

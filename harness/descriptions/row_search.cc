@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <functional>
 #include <map>
-#include <set>
 
 namespace dexcheck {
 namespace {
@@ -15,13 +14,10 @@ class RowSearch {
   explicit RowSearch(const RowProblem& problem) : problem_(problem), reader_(problem) {}
 
   std::vector<RowFinding> Run() {
-    // What is common is known after a first look at all.
     std::vector<RowFinding> findings = Read();
     if (IsExplainedByOne(findings)) return findings;
     std::vector<RowFinding> alike = ReadAlike(findings);
-    if (!alike.empty()) return alike;
-    CountCommon(findings);
-    return reader_.common.empty() ? findings : Read();
+    return alike.empty() ? findings : alike;
   }
 
  private:
@@ -111,7 +107,7 @@ class RowSearch {
     return findings;
   }
 
-  std::vector<RowFinding> Read() {
+  [[nodiscard]] std::vector<RowFinding> Read() const {
     std::vector<RowFinding> findings(problem_.bodies.size());
     ReadBase(&findings[0]);
     for (size_t i = 0; i < problem_.given.size(); ++i) {
@@ -121,39 +117,9 @@ class RowSearch {
     return findings;
   }
 
-  /// What a reading is called by: conventions by their ids, offsets of zeros by their size.
-  static std::vector<std::string> ListKeys(const RowReading& reading) {
-    std::vector<std::string> keys;
-    for (const Convention* const convention : reading.conventions) keys.push_back(convention->id);
-    if (reading.number == kZero) keys.push_back(reading.words);
-    return keys;
-  }
-
-  /// What most rows share is common, then what most of the others do.
-  void CountCommon(const std::vector<RowFinding>& findings) {
-    std::map<std::string, std::set<size_t>> rows_of;
-    for (size_t i = 0; i < findings.size(); ++i) {
-      for (const RowReading& reading : findings[i].readings) {
-        for (const std::string& key : ListKeys(reading)) rows_of[key].insert(i);
-      }
-    }
-    constexpr size_t kCommon = 3;
-    const auto by_size = [](const auto& a, const auto& b) { return a.second.size() < b.second.size(); };
-    while (!rows_of.empty()) {
-      const std::set<size_t> most = std::max_element(rows_of.begin(), rows_of.end(), by_size)->second;
-      if (most.size() < std::min(kCommon, problem_.given.size())) return;
-      for (auto& [key, rows] : rows_of) {
-        if (rows == most) reader_.common.insert(key);
-      }
-      for (auto& [key, rows] : rows_of) {
-        for (const size_t i : most) rows.erase(i);
-      }
-    }
-  }
-
   // The base, of which no axis tells where it stands.
 
-  void ReadBase(RowFinding* finding) {
+  void ReadBase(RowFinding* finding) const {
     StatedPart given;
     given.X_PL = problem_.X_W0_given;
     StatedPart right;
@@ -177,7 +143,7 @@ class RowSearch {
     Keep(std::move(readings), problem_.X_W0_right, finding);
   }
 
-  void ReadRow(size_t i, const Pose& X_ab_P, RowFinding* finding) {
+  void ReadRow(size_t i, const Pose& X_ab_P, RowFinding* finding) const {
     constexpr int kDepth = 2;
     std::vector<RowReading> readings = reader_.ListReadings(i, X_ab_P, false);
     bool is_explained = false;
@@ -235,9 +201,7 @@ class RowSearch {
       least = std::min(least, CostBehind(static_cast<int>(i), Follow(given, i, X_ab_P), depth));
       if (least == 0.0) return least;
     }
-    std::vector<RowReading> readings = reader_.ListReadings(i, X_ab_P, false);
-    if (readings.empty()) readings = reader_.ListReadings(i, X_ab_P, true);
-    for (const RowReading& reading : readings) {
+    for (const RowReading& reading : reader_.ListReadings(i, X_ab_P, false)) {
       if (reading.cost >= least) continue;
       const double behind =
           depth > 0 ? CostBehind(static_cast<int>(i), Follow(reading, i, X_ab_P), depth) : 0.0;

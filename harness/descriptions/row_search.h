@@ -2,7 +2,6 @@
 
 // Which conventions and numbers of joints' rows explain that axes and bodies stand elsewhere.
 
-#include <set>
 #include <string>
 #include <vector>
 
@@ -50,10 +49,8 @@ bool IsAxisRight(const RowProblem& problem, size_t joint, const StatedPart& part
 /// A body of the problem with its right one in the given frame.
 LinkBody PlaceBody(const RowProblem& problem, size_t link, const Pose& X_ab);
 
-// A convention costs 1; one that many joints have explains more of them at once. A number that can take any
-// value explains by chance what a convention does not.
+// A number that can take any value explains by chance what a convention does not.
 inline constexpr double kConvention = 1.0;
-inline constexpr double kCommonConvention = 0.6;
 inline constexpr double kNumber = 1.3;
 inline constexpr double kUnexplained = 4.0;
 inline constexpr const char* kZero = "zero.offset";
@@ -61,9 +58,6 @@ inline constexpr const char* kZero = "zero.offset";
 class RowReader {
  public:
   explicit RowReader(const RowProblem& problem);
-
-  /// Conventions, by their ids, and offsets of zeros, by their words, that many rows have.
-  std::set<std::string> common;
 
   /// Joints on a link; -1: on the base.
   [[nodiscard]] const std::vector<size_t>& ListChildren(int joint) const {
@@ -96,7 +90,6 @@ class RowReader {
 
  private:
   using Readings = std::vector<RowReading>;
-  [[nodiscard]] double CostOf(const Convention& convention) const;
   void Offer(size_t i, const Pose& X_ab_P, RowReading reading, Readings* readings) const;
   void AddNumbers(size_t i, const Pose& X_ab_P, const StatedPart& given, const StatedPart& right,
                   Readings* readings) const;

@@ -71,12 +71,8 @@ Causes ExplainRolling(const StepStore& store) {
     for (Candidate& one : candidates) one.columns /= level;
     selection = SelectCauses(y, candidates, options);
   }
-  Causes causes = TellSelection(
-      StartExplanation(store, CauseChannel::kRolling, steps), selection, candidates,
-      [](const Candidate& one, const VectorXd& amplitude, const VectorXd& error) {
-        return Fault{one.fault, one.place, one.nominal + amplitude[0], error.size() > 0 ? error[0] : 0.0,
-                     one.unit,  ""};
-      });
+  Causes causes = TellSelection(StartExplanation(store, CauseChannel::kRolling, steps), selection, candidates,
+                                TellNumber);
   for (Explanation& one : causes)
     if (!explained) one.outcome = CauseOutcome::kNotExplained;
   return causes;

@@ -23,6 +23,15 @@ Explanation StartExplanation(const StepStore& store, CauseChannel channel,
   return start;
 }
 
+Fault TellNumber(const Candidate& candidate, const VectorXd& amplitude, const VectorXd& error) {
+  return {candidate.fault,
+          candidate.place,
+          candidate.nominal + amplitude[0],
+          error.size() > 0 ? error[0] : 0.0,
+          candidate.unit,
+          ""};
+}
+
 Causes TellSelection(const Explanation& start, const CauseSelection& selection,
                      std::span<const Candidate> candidates, const TellCandidate& tell) {
   Causes causes;

@@ -20,6 +20,9 @@ Explanation StartExplanation(const StepStore& store, CauseChannel channel,
 using TellCandidate =
     std::function<Fault(const Candidate& candidate, const VectorXd& amplitude, const VectorXd& error)>;
 
+/// One number: the nominal value and the amplitude.
+Fault TellNumber(const Candidate& candidate, const VectorXd& amplitude, const VectorXd& error);
+
 /// As `start`, an explanation for each candidate that is chosen, with what would do in its place.
 Causes TellSelection(const Explanation& start, const CauseSelection& selection,
                      std::span<const Candidate> candidates, const TellCandidate& tell);

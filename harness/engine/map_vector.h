@@ -21,13 +21,16 @@ inline Pose MapPose(const mjtNum* rotation, const mjtNum* position) {
   return X;
 }
 
-/// Pose that a free joint's seven entries of qpos mean: origin, then a quaternion of any length.
-inline Pose ReadFreePose(const mjtNum* qpos) {
+/// @param wxyz a quaternion of any length.
+inline Pose ReadPose(const mjtNum* position, const mjtNum* wxyz) {
   Pose X = Pose::Identity();
-  X.linear() = Eigen::Quaterniond(qpos[3], qpos[4], qpos[5], qpos[6]).normalized().toRotationMatrix();
-  X.translation() = MapVector(qpos);
+  X.linear() = Eigen::Quaterniond(wxyz[0], wxyz[1], wxyz[2], wxyz[3]).normalized().toRotationMatrix();
+  X.translation() = MapVector(position);
   return X;
 }
+
+/// Pose that a free joint's seven entries of qpos mean: origin, then a quaternion.
+inline Pose ReadFreePose(const mjtNum* qpos) { return ReadPose(qpos, qpos + 3); }
 
 inline void WriteFreePose(const Pose& X, mjtNum* qpos) {
   const Eigen::Quaterniond rotation(X.linear());

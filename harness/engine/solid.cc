@@ -5,6 +5,7 @@
 
 #include "harness/engine/engine.h"
 #include "harness/engine/exact_collision.h"
+#include "harness/engine/map_vector.h"
 #include "harness/engine/mujoco_release.h"
 
 namespace dexcheck {
@@ -12,15 +13,6 @@ namespace {
 
 /// MJCFs keep the geoms that collide in this group, which viewers do not show.
 constexpr int kCollisionGroup = 3;
-
-/// Pose of a geom in its body.
-Pose ReadPose(const mjModel& m, int geom) {
-  const mjtNum* const q = m.geom_quat + 4 * geom;
-  Pose X = Pose::Identity();
-  X.linear() = Eigen::Quaterniond(q[0], q[1], q[2], q[3]).toRotationMatrix();
-  X.translation() = Eigen::Map<const Vector3d>(m.geom_pos + 3 * geom);
-  return X;
-}
 
 void ReadHull(const mjModel& m, int geom, Solid* solid) {
   const int mesh = m.geom_dataid[geom];
@@ -97,7 +89,7 @@ Solids ListSolids(const mjModel& m) {
                 .body = body,
                 .geom = geom,
                 .size = Eigen::Map<const Vector3d>(m.geom_size + 3 * geom),
-                .X_BG = ReadPose(m, geom)};
+                .X_BG = ReadPose(m.geom_pos + 3 * geom, m.geom_quat + 4 * geom)};
     if (!ReadShape(m, geom, &solid)) continue;
     index[static_cast<size_t>(geom)] = static_cast<int>(solids.list.size());
     solids.list.push_back(std::move(solid));

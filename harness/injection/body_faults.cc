@@ -22,25 +22,23 @@ InjectedFault ChangeJoint(const Joint& joint, const char* name, double nominal, 
 
 double DrawForce(const FaultContext& context) { return context.draw->Positive(2e-3, 0.1); }
 
+/// More of a constant that a joint has.
+InjectedFault AddToJoint(const FaultContext& context, const char* name, double Joint::*constant,
+                         mjtNum* mjModel::*by_dof) {
+  const Joint& joint = context.DrawJoint();
+  const double size = DrawForce(context);
+  return ChangeJoint(joint, name, joint.*constant, size,
+                     [=](mjModel* m, int, int dof) { (m->*by_dof)[dof] += size; });
+}
+
 InjectedFault Armature(const FaultContext& context) {
-  const Joint& joint = context.DrawJoint();
-  const double size = DrawForce(context);
-  return ChangeJoint(joint, "armature", joint.armature, size,
-                     [size](mjModel* m, int, int dof) { m->dof_armature[dof] += size; });
+  return AddToJoint(context, "armature", &Joint::armature, &mjModel::dof_armature);
 }
-
 InjectedFault Damping(const FaultContext& context) {
-  const Joint& joint = context.DrawJoint();
-  const double size = DrawForce(context);
-  return ChangeJoint(joint, "viscous friction", joint.damping, size,
-                     [size](mjModel* m, int, int dof) { m->dof_damping[dof] += size; });
+  return AddToJoint(context, "viscous friction", &Joint::damping, &mjModel::dof_damping);
 }
-
 InjectedFault DryFriction(const FaultContext& context) {
-  const Joint& joint = context.DrawJoint();
-  const double size = DrawForce(context);
-  return ChangeJoint(joint, "dry friction", joint.dry_friction, size,
-                     [size](mjModel* m, int, int dof) { m->dof_frictionloss[dof] += size; });
+  return AddToJoint(context, "dry friction", &Joint::dry_friction, &mjModel::dof_frictionloss);
 }
 
 InjectedFault Spring(const FaultContext& context) {

@@ -126,11 +126,7 @@ void FaultyLaw::Follow(const Trajectory& motion) {
 void FaultyLaw::Begin(double /*t*/, const Reading& /*reading*/) { has_begun_ = true; }
 
 void FaultyLaw::Step(const Reading& reading, double t, Command* command) {
-  command->tracks = true;
-  command->handling = Handling{};
-  command->force_seconds = 0.0;
-  command->force_solves = 0;
-  command->desired = TrajectoryController::EvaluateDesired(*motion_, t, time_step_);
+  TrajectoryController::BeginCommand(*motion_, t, time_step_, command);
   model_.SetState(reading.state);
   if (is_on_() && change_) FaultyTerms(&model_, reading.state).Make(*change_);
   if (steps_until_due_ > 0) {

@@ -174,12 +174,9 @@ InjectedFault AddedFriction(const FaultContext& context) {
 
 /// The law of the setup's joints with other gains.
 std::unique_ptr<Controller> MakeJointController(const Setup& setup, const JointGains& gains) {
-  const PlantOptions& plant = setup.scenario().plant;
-  return std::make_unique<JointController>(
-      setup.model(), setup.object().body, setup.surface(), setup.scenario().control.law, gains,
-      setup.joints()->motion,
-      Sampling{.time_step = 2.0 * plant.velocity_age(),
-               .hold = std::max(1L, std::lround(plant.control_step / plant.time_step))});
+  return std::make_unique<JointController>(setup.model(), setup.object().body, setup.surface(),
+                                           setup.scenario().control.law, gains, setup.joints()->motion,
+                                           setup.MakeSampling());
 }
 
 bool CompensatesCoulomb(const FaultContext& context) {
@@ -235,9 +232,9 @@ InjectedFault Gains(const FaultContext& context, bool of_velocity, bool is_one) 
         change(gain);
       return MakeJointController(setup, gains);
     }
-    const PlantOptions& plant = setup.scenario().plant;
-    const Sampling sampling{.time_step = 2.0 * plant.velocity_age(),
-                            .hold = std::max(1L, std::lround(plant.control_step / plant.time_step))};
+    // Contacts are measured, as the judge takes them to be.
+    Sampling sampling = setup.MakeSampling();
+    sampling.contacts.reset();
     GraspControllerOptions options = setup.MakeControllerOptions();
     change(of_velocity ? &options.gains.K_v : &options.gains.K_p);
     change(of_velocity ? &options.stiffness.D : &options.stiffness.K);

@@ -148,11 +148,7 @@ std::unique_ptr<RecordingReader> OpenRunLog(const std::filesystem::path& path, c
   for (const SignalInfo& signal : log.signals()) {
     const RowMatrixXd rows = log.ReadSignal(signal.name);
     for (Eigen::Index k = 0; k < rows.cols(); ++k) {
-      const auto i = static_cast<size_t>(k);
-      names.push_back(signal.width == 1
-                          ? signal.name
-                          : signal.name + "." +
-                                (i < signal.columns.size() ? signal.columns[i] : std::to_string(i)));
+      names.push_back(NameColumn(signal, static_cast<size_t>(k)));
       columns.emplace_back(rows.col(k).begin(), rows.col(k).end());
     }
   }

@@ -6,6 +6,11 @@
 
 namespace dexcheck {
 
+std::string NameColumn(const SignalInfo& signal, size_t column) {
+  if (signal.columns.empty() && signal.width == 1) return signal.name;
+  return signal.name + "." + (signal.columns.empty() ? std::to_string(column) : signal.columns[column]);
+}
+
 std::vector<std::string> ListUnits(const SignalInfo& signal) {
   constexpr std::string_view kSeparator = ", ";
   std::vector<std::string> units;

@@ -35,6 +35,8 @@ struct LogContent {
 /// The unit of each column, where the signal's unit names one unit or as many as there are columns ("m, m,
 /// rad"); otherwise the whole text for each.
 std::vector<std::string> ListUnits(const SignalInfo& signal);
+/// "object/X_o.x", "tau.0" without names of columns, "time" of one number.
+std::string NameColumn(const SignalInfo& signal, size_t column);
 
 /// Whether a name is a relative path of plain components, which stays below its folder: no empty ones, no "."
 /// or "..", no backslashes or control characters.

@@ -1,4 +1,3 @@
-#include <charconv>
 #include <cmath>
 #include <fstream>
 #include <iostream>
@@ -13,19 +12,9 @@ namespace {
 
 constexpr size_t kLongestLine = size_t{1} << 20U;
 
-std::string_view Trim(std::string_view text) {
-  constexpr const char* kBlank = " \t\r\"'";
-  const size_t begin = text.find_first_not_of(kBlank);
-  if (begin == std::string_view::npos) return {};
-  return text.substr(begin, text.find_last_not_of(kBlank) - begin + 1);
-}
-
-std::optional<double> ParseNumber(std::string_view text) {
-  if (text.starts_with('+')) text.remove_prefix(1);
-  double number = 0.0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
-  if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;
-  return number;
+/// Also of one with a plus.
+std::optional<double> ParseCell(std::string_view text) {
+  return ParseNumber<double>(text.starts_with('+') ? text.substr(1) : text);
 }
 
 /// Cells of a line.
@@ -42,7 +31,7 @@ void Split(std::string_view line, char separator, std::vector<std::string_view>*
   }
   for (;;) {
     const size_t end = line.find(separator);
-    cells->push_back(Trim(line.substr(0, end)));
+    cells->push_back(Trim(line.substr(0, end), " \t\r\"'"));
     if (end == std::string_view::npos) return;
     line.remove_prefix(end + 1);
   }
@@ -109,7 +98,7 @@ class TextRecording : public RecordingReader {
     has_decimal_comma_ = separator_ == ';' && line_.find('.') == std::string::npos;
     Split(line_, separator_, &cells_);
     const bool is_header = std::any_of(cells_.begin(), cells_.end(), [](std::string_view cell) {
-      return !cell.empty() && !ParseNumber(cell) && cell.find(',') == std::string_view::npos;
+      return !cell.empty() && !ParseCell(cell) && cell.find(',') == std::string_view::npos;
     });
     format_ = separator_ == ' ' ? "text" : "CSV";
     if (is_header) {
@@ -133,7 +122,7 @@ class TextRecording : public RecordingReader {
     if (has_decimal_comma_) std::replace(line_.begin(), line_.end(), ',', '.');
     Split(line_, separator_, &cells_);
     for (size_t i = 0; i < cells_.size(); ++i) {
-      const std::optional<double> number = cells_[i].empty() ? kMissing : ParseNumber(cells_[i]);
+      const std::optional<double> number = cells_[i].empty() ? kMissing : ParseCell(cells_[i]);
       if (!number)
         Fail("column " + NameOf(row->size()) + ": must be a number, got " + Quote(std::string(cells_[i])));
       row->push_back(*number);

@@ -5,6 +5,8 @@
 #include <optional>
 #include <set>
 
+#include "controller/common/text.h"
+
 namespace dexcheck {
 namespace {
 
@@ -78,11 +80,6 @@ constexpr Unit kUnits[] = {
 bool IsLetter(char c) { return std::isalpha(static_cast<unsigned char>(c)) != 0; }
 bool IsDigit(char c) { return std::isdigit(static_cast<unsigned char>(c)) != 0; }
 
-std::string ToLower(std::string text) {
-  std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return std::tolower(c); });
-  return text;
-}
-
 /// Words and numbers of a name.
 std::vector<std::string> SplitWords(const std::string& name) {
   std::vector<std::string> words;
@@ -150,7 +147,7 @@ std::span<const Unit> ListUnits() { return kUnits; }
 
 /// The unit of a quantity; positions' units serve their rates, too.
 const Unit* FindUnit(std::string name, RecordedQuantity quantity) {
-  std::transform(name.begin(), name.end(), name.begin(), [](unsigned char c) { return std::tolower(c); });
+  name = ToLower(std::move(name));
   std::erase_if(name, [](char c) { return c == ' ' || c == '*' || c == '.'; });
   // "rad/s", "deg/s^2"
   if (const size_t slash = name.find('/'); slash != std::string::npos) name.resize(slash);

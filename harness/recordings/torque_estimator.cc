@@ -200,7 +200,6 @@ CauseSelection TorqueEstimator::SelectAmong(double alike) const {
   CauseOptions options;
   options.most_terms = most_causes_;
   options.restarts = 0;
-  options.exchanges_pairs = false;
   options.rows = rows_.samples;
   options.alike = alike;
   return SelectCauses(R_.col(width - 1).tail(rows), candidates, options);

@@ -1,6 +1,5 @@
 #include "harness/run/detectability.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -15,6 +14,7 @@
 #include "controller/control/joint_controller.h"
 #include "harness/checks/check_table.h"
 #include "harness/engine/engine.h"
+#include "harness/run/excitation.h"
 
 namespace dexcheck {
 namespace {
@@ -53,12 +53,12 @@ struct Answer {
 class Asked {
  public:
   /// @throws InputError when there is no such robot.
-  Asked(const Setup& setup, RobotSpec spec)
-      : robot_(std::move(spec)),
+  Asked(const Setup& setup, RobotModel robot)
+      : robot_(std::move(robot)),
         surface_(robot_.object() ? MakeSurface(robot_.object()->shape) : nullptr),
         options_(setup.MakeControllerOptions()),
         grasp_(robot_, setup.fingertips(), robot_.object() ? robot_.object()->body : setup.object().body,
-               surface_ ? *surface_ : setup.surface(), MakeOptions(setup)),
+               surface_ ? *surface_ : setup.surface(), setup.MakeModelOptions()),
         dynamics_(robot_, static_cast<int>(setup.fingertips().size())),
         actuation_(robot_) {
     if (setup.joints() != nullptr) {
@@ -103,13 +103,6 @@ class Asked {
   }
 
  private:
-  /// Of a robot that holds nothing, without X_o.
-  static GraspModelOptions MakeOptions(const Setup& setup) {
-    const GraspControllerOptions given = setup.MakeControllerOptions();
-    GraspModelOptions options = static_cast<const GraspModelOptions&>(given);
-    if (setup.joints() != nullptr) options.orientation = OrientationFeedback::kRotation;
-    return options;
-  }
   /// E_bar' tau' (n).
   [[nodiscard]] VectorXd Push(const VectorXd& tau) const {
     VectorXd force(tau.size());
@@ -216,7 +209,7 @@ DetectabilityResult FindDetectability(const Setup& setup, int states,
   const std::vector<Sample> samples = TakeSamples(setup, states);
   const RobotSpec& spec = setup.model().spec();
   const std::vector<Parameter> numbers = ListParameters(spec);
-  Asked right(setup, spec);
+  Asked right(setup, setup.model());
   std::vector<Answer> answers;
   answers.reserve(samples.size());
   for (const Sample& sample : samples) answers.push_back(right.Ask(sample));
@@ -231,39 +224,24 @@ DetectabilityResult FindDetectability(const Setup& setup, int states,
   MatrixXd regressor = MatrixXd::Zero(rows, static_cast<Eigen::Index>(numbers.size()));
   for (size_t k = 0; k < numbers.size(); ++k) {
     if (!go_on(k, numbers.size())) break;
-    const double value = GetValue(spec, numbers[k]);
     double change = kStep * GetScale(spec, numbers[k]);
-    std::unique_ptr<Asked> changed;
-    for (int side = 0; side < 2 && !changed; ++side) {
-      RobotSpec wrong = spec;
-      SetValue(&wrong, numbers[k], value + change);
-      try {
-        changed = std::make_unique<Asked>(setup, std::move(wrong));
-      } catch (const InputError&) {
-        change = -change;
-      }
-    }
-    if (!changed) continue;
+    std::optional<RobotModel> robot = TryChange(spec, numbers[k], &change);
+    if (!robot) continue;
+    Asked changed(setup, *std::move(robot));
     Detectability number{numbers[k], DescribePart(spec, numbers[k]) + ": " + DescribeQuantity(numbers[k]),
                          DescribeGroup(numbers[k])};
     VectorXd left;
     for (size_t i = 0; i < samples.size(); ++i) {
-      LowerAll(samples[i], answers[i], changed->Ask(samples[i]), bounds, kStep, arm, &number, &left);
+      LowerAll(samples[i], answers[i], changed.Ask(samples[i]), bounds, kStep, arm, &number, &left);
       const auto n = left.size();
       regressor.col(static_cast<Eigen::Index>(k)).segment(static_cast<Eigen::Index>(i) * n, n) = left;
     }
     result.numbers.push_back(std::move(number));
   }
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(regressor.transpose() * regressor,
-                                                      Eigen::EigenvaluesOnly);
-  const double largest = std::sqrt(std::max(0.0, eigen.eigenvalues().maxCoeff()));
-  result.largest_singular_value = largest;
-  for (Eigen::Index i = eigen.eigenvalues().size() - 1; i >= 0; --i) {
-    const double value = std::sqrt(std::max(0.0, eigen.eigenvalues()[i]));
-    if (!(value > kRank * largest)) break;
-    result.smallest_singular_value = value;
-    ++result.rank;
-  }
+  const VectorXd values = CalcSingularValues(regressor);
+  result.rank = CountAbove(values, kRank * values[0]);
+  result.largest_singular_value = values[0];
+  if (result.rank > 0) result.smallest_singular_value = values[result.rank - 1];
   return result;
 }
 

@@ -64,6 +64,10 @@ VectorXd CalcSingularValues(const RobotSpec& robot, const std::vector<MotionSamp
     }
   }
   W /= std::sqrt(static_cast<double>(samples.size()));
+  return CalcSingularValues(W);
+}
+
+VectorXd CalcSingularValues(const MatrixXd& W) {
   const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(W.transpose() * W, Eigen::EigenvaluesOnly);
   return eigen.eigenvalues().reverse().cwiseMax(0.0).cwiseSqrt();
 }

@@ -29,6 +29,9 @@ MotionSample TakeMotionSample(const StepRecord& step, TreeFactor* factor);
 /// those of zero are combinations that no force shows. The values are exact to some 1e-8 of the largest.
 VectorXd CalcSingularValues(const RobotSpec& robot, const std::vector<MotionSample>& samples);
 
+/// Singular values of any regressor, the largest first.
+VectorXd CalcSingularValues(const MatrixXd& W);
+
 /// How many of them are above a floor.
 int CountAbove(const VectorXd& singular_values, double floor);
 

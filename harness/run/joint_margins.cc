@@ -33,18 +33,6 @@ MatrixXd Differentiate(VectorXd x, const Function& f) {
   return derivative;
 }
 
-SampledLoop FindTiming(const Scenario& scenario) {
-  const SensingOptions& sensing = scenario.imperfections.sensing;
-  SampledLoop loop;
-  loop.time_step = scenario.plant.time_step;
-  loop.hold = std::max(1L, std::lround(scenario.plant.control_step / loop.time_step));
-  loop.delay = scenario.imperfections.actuation.delay;
-  loop.latency = CountSteps(sensing.latency, loop.time_step);
-  if (sensing.velocity == VelocitySource::kDifferenced)
-    loop.low_pass = CalcLowPassGain(sensing.velocity_cutoff, loop.time_step);
-  return loop;
-}
-
 /// Where the motion is judged.
 std::vector<VectorXd> ListPostures(const Setup& setup) {
   std::vector<VectorXd> postures = {setup.start().q};
@@ -58,18 +46,29 @@ std::vector<VectorXd> ListPostures(const Setup& setup) {
 
 }  // namespace
 
+SampledLoop FindTiming(const Scenario& scenario) {
+  SampledLoop loop;
+  loop.time_step = scenario.plant.time_step;
+  loop.hold = std::max(1L, std::lround(scenario.plant.control_step / loop.time_step));
+  loop.delay = scenario.imperfections.actuation.delay;
+  loop.latency = CountSteps(scenario.imperfections.sensing.latency, loop.time_step);
+  return loop;
+}
+
 std::optional<LinearLoop> LineariseJoints(const Setup& setup, const JointGains& gains,
                                           const Eigen::Ref<const VectorXd>& q) {
   const Scenario& scenario = setup.scenario();
+  const SensingOptions& sensing = scenario.imperfections.sensing;
   const Index n = setup.model().num_velocities();
   LinearLoop loop;
   loop.timing = FindTiming(scenario);
+  if (sensing.velocity == VelocitySource::kDifferenced)
+    loop.timing.low_pass = CalcLowPassGain(sensing.velocity_cutoff, loop.timing.time_step);
   loop.steps_together = scenario.plant.velocity_age() == 0.0;
   const double steps =
       5.0 + static_cast<double>(2 * loop.timing.latency) + loop.timing.delay / loop.timing.time_step;
   const bool is_large = steps * static_cast<double>(n) > static_cast<double>(kLargestState);
-  if (is_large || q.size() != n || scenario.imperfections.sensing.velocity == VelocitySource::kKalman)
-    return std::nullopt;
+  if (is_large || q.size() != n || sensing.velocity == VelocitySource::kKalman) return std::nullopt;
   std::vector<std::string> names;
   for (int i = 0; i < static_cast<int>(n); ++i) names.push_back(setup.model().dof_name(i));
   loop.lag = scenario.imperfections.actuation.lag.Resolve(names, scenario.source);

@@ -61,15 +61,6 @@ std::unique_ptr<Plant> MakePlant(const Setup& setup) {
   return plant;
 }
 
-Sampling MakeSampling(const Setup& setup) {
-  const PlantOptions& plant = setup.scenario().plant;
-  Sampling sampling{.time_step = 2.0 * plant.velocity_age(),
-                    .hold = std::max(1L, std::lround(plant.control_step / plant.time_step))};
-  if (setup.scenario().control.kappa == ContactSource::kIntegrated)
-    sampling.contacts = {plant.time_step, plant.velocity_age()};
-  return sampling;
-}
-
 /// The controller of the scenario's task.
 void MakeBuiltInController(const Setup& setup, LoopParts* parts) {
   const Scenario& scenario = setup.scenario();
@@ -84,11 +75,11 @@ void MakeBuiltInController(const Setup& setup, LoopParts* parts) {
   } else if (const JointPlan* const joints = setup.joints()) {
     parts->controller =
         std::make_unique<JointController>(model, object, setup.surface(), scenario.control.law, joints->gains,
-                                          joints->motion, MakeSampling(setup));
+                                          joints->motion, setup.MakeSampling());
   } else {
     auto controller =
         std::make_unique<TrajectoryController>(model, setup.fingertips(), object, setup.surface(),
-                                               setup.MakeControllerOptions(), MakeSampling(setup));
+                                               setup.MakeControllerOptions(), setup.MakeSampling());
     if (scenario.control.kappa == ContactSource::kIntegrated) parts->follower = controller.get();
     parts->controller = std::move(controller);
   }
@@ -106,7 +97,7 @@ LoopParts MakeLoopParts(const Setup& setup) {
   LoopParts parts;
   parts.plant = MakePlant(setup);
   if (setup.scenario().controller.exists()) {
-    parts.controller = MakeOwnController(setup, MakeSampling(setup));
+    parts.controller = MakeOwnController(setup, setup.MakeSampling());
     parts.knows_law = setup.scenario().knows_law();
   } else {
     MakeBuiltInController(setup, &parts);

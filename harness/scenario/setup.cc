@@ -1,5 +1,6 @@
 #include "harness/scenario/setup.h"
 
+#include <cmath>
 #include <utility>
 
 #include "controller/common/errors.h"
@@ -66,6 +67,20 @@ std::unique_ptr<Trajectory> Setup::MakeTrajectory() const {
 
 PartContext Setup::MakePartContext() const {
   return {&model(), fingertips().size(), scenario_.plant.time_step, scenario_.seed, scenario_.source};
+}
+
+GraspModelOptions Setup::MakeModelOptions() const {
+  if (joints() != nullptr) return {.orientation = OrientationFeedback::kRotation};
+  return MakeControllerOptions();
+}
+
+Sampling Setup::MakeSampling() const {
+  const PlantOptions& plant = scenario_.plant;
+  Sampling sampling{.time_step = 2.0 * plant.velocity_age(),
+                    .hold = std::max(1L, std::lround(plant.control_step / plant.time_step))};
+  if (scenario_.control.kappa == ContactSource::kIntegrated)
+    sampling.contacts = {plant.time_step, plant.velocity_age()};
+  return sampling;
 }
 
 GraspControllerOptions Setup::MakeControllerOptions() const {

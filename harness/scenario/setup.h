@@ -8,8 +8,8 @@
 #include <span>
 #include <vector>
 
-#include "controller/control/grasp_controller.h"
 #include "controller/control/trajectory.h"
+#include "controller/control/trajectory_controller.h"
 #include "controller/model/robot_model.h"
 #include "harness/plant/plant.h"
 #include "harness/scenario/robot_pair.h"
@@ -72,6 +72,10 @@ class Setup {
   [[nodiscard]] std::unique_ptr<Trajectory> MakeTrajectory() const;
   /// For the parts of a loop.
   [[nodiscard]] PartContext MakePartContext() const;
+  /// Of a model of its controller's; of a robot that holds nothing, without X_o.
+  [[nodiscard]] GraspModelOptions MakeModelOptions() const;
+  /// When its controller is evaluated.
+  [[nodiscard]] Sampling MakeSampling() const;
   /// Options of the law, with the posture and the angles' branch of the start.
   [[nodiscard]] GraspControllerOptions MakeControllerOptions() const;
 

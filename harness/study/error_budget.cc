@@ -313,16 +313,6 @@ ErrorBudget CalcErrorBudget(const Scenario& scenario, const std::filesystem::pat
   return budget;
 }
 
-namespace {
-
-GraspModelOptions MakeModelOptions(const Setup& setup) {
-  if (setup.joints() != nullptr) return {.orientation = OrientationFeedback::kRotation};
-  const GraspControllerOptions controller = setup.MakeControllerOptions();
-  return static_cast<const GraspModelOptions&>(controller);
-}
-
-}  // namespace
-
 ErrorPrediction::ErrorPrediction(const Setup& setup, bool acts_at_rest)
     : sensing_(setup.scenario().imperfections.sensing, setup.MakePartContext()),
       drive_(MakeLoopParts(setup).plant->motors(), setup.scenario().imperfections.actuation,
@@ -330,7 +320,7 @@ ErrorPrediction::ErrorPrediction(const Setup& setup, bool acts_at_rest)
       disturbances_(setup.scenario().imperfections.disturbances, setup.MakePartContext()),
       controller_(MakeScenarioLaw(setup)),
       model_(setup.declared_model(), setup.fingertips(), setup.declared_object().body, setup.surface(),
-             MakeModelOptions(setup)),
+             setup.MakeModelOptions()),
       dynamics_(setup.declared_model(), static_cast<int>(setup.fingertips().size())),
       actuation_(setup.model()),
       joint_motion_(setup.joints() == nullptr ? nullptr : &setup.joints()->motion),

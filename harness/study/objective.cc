@@ -13,12 +13,6 @@ namespace {
 
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
 
-std::string Trim(const std::string& text) {
-  const size_t begin = text.find_first_not_of(" \t");
-  if (begin == std::string::npos) return "";
-  return text.substr(begin, text.find_last_not_of(" \t") + 1 - begin);
-}
-
 SymbolTable MakeSymbols(const TrialResult& result) {
   SymbolTable symbols;
   for (size_t i = 0; i < kMetrics.size(); ++i) symbols[kMetrics[i].name] = result.metrics[i];
@@ -75,14 +69,15 @@ std::string ShowUnit(const std::string& expression) {
 
 Constraint ParseConstraint(const std::string& text) {
   Constraint constraint;
-  constraint.text = Trim(text);
+  constraint.text = std::string(Trim(text));
   if (constraint.text == "held") return constraint;
   // Longer signs first, so that "<=" is not taken for "<".
   for (const char* sign : {"<=", ">=", "==", "!=", "<", ">"}) {
     const size_t at = constraint.text.find(sign);
     if (at == std::string::npos) continue;
-    const std::string left = Trim(constraint.text.substr(0, at));
-    const std::string right = Trim(constraint.text.substr(at + std::string(sign).size()));
+    const std::string left(Trim(std::string_view(constraint.text).substr(0, at)));
+    const std::string right(
+        Trim(std::string_view(constraint.text).substr(at + std::string_view(sign).size())));
     const bool equal = sign[0] == '=';
     if (equal || sign[0] == '!') {
       constraint.kind = equal ? Constraint::Kind::kOutcomeIs : Constraint::Kind::kOutcomeIsNot;

@@ -5,15 +5,14 @@
 #include <cmath>
 #include <limits>
 
+#include "harness/checks/judged_law.h"
 #include "harness/plant/velocity_filter.h"
+#include "harness/run/joint_margins.h"
 #include "harness/study/trial.h"
 
 namespace dexcheck {
 
 namespace {
-
-/// b = (T^2 + h T) / 2: what e gains from an acceleration that is held.
-double CalcReach(const SampledLoop& loop) { return 0.5 * loop.period() * (loop.period() + loop.time_step); }
 
 /// One axis of the error is a plant of mass 1.
 LinearLoop MakeAxis(const SampledLoop& timing, const AxisGains& gains) {
@@ -41,17 +40,13 @@ double CalcSpectralRadiusOf(MatrixXd A) {
 }  // namespace
 
 double CalcSpectralRadius(const SampledLoop& loop, const AxisGains& gains) {
-  if (!loop.is_direct()) {
-    const SampledSystem system = CalcSampledSystem(MakeAxis(loop, gains));
-    return CalcSpectralRadiusOf(system.A - system.B * system.C);
+  if (loop.is_direct()) {
+    const ObjectGains alike{Vector6d::Constant(gains.K_v), Vector6d::Constant(gains.K_p)};
+    const double of_step = CalcSampledRadius(alike, loop.time_step, loop.hold, 0.5 * loop.time_step);
+    return std::pow(of_step, static_cast<double>(loop.hold));
   }
-  const double T = loop.period();
-  const double b = CalcReach(loop);
-  const double trace = 2.0 - T * gains.K_v - b * gains.K_p;
-  const double determinant = 1.0 - T * gains.K_v + (T * T - b) * gains.K_p;
-  const double discriminant = 0.25 * trace * trace - determinant;
-  if (discriminant < 0.0) return std::sqrt(determinant);
-  return 0.5 * std::abs(trace) + std::sqrt(discriminant);
+  const SampledSystem system = CalcSampledSystem(MakeAxis(loop, gains));
+  return CalcSpectralRadiusOf(system.A - system.B * system.C);
 }
 
 std::vector<double> CalcStepResponse(const SampledLoop& loop, const AxisGains& gains, long count) {
@@ -74,14 +69,10 @@ namespace {
 
 /// The faults of sensing and motors that all axes have alike.
 SampledLoop MakeLoop(const Scenario& scenario) {
-  SampledLoop loop;
-  loop.time_step = scenario.plant.time_step;
-  loop.hold = std::max(1L, std::lround(scenario.plant.control_step / scenario.plant.time_step));
+  SampledLoop loop = FindTiming(scenario);
   const SensingOptions& sensing = scenario.imperfections.sensing;
   const ActuationOptions& actuation = scenario.imperfections.actuation;
-  loop.delay = actuation.delay;
-  loop.latency =
-      CountSteps(sensing.latency, loop.time_step) + CountSteps(sensing.object_latency, loop.time_step);
+  loop.latency += CountSteps(sensing.object_latency, loop.time_step);
   if (sensing.object_velocity == VelocitySource::kDifferenced) {
     loop.low_pass = CalcLowPassGain(sensing.object_velocity_cutoff, loop.time_step);
   }
