@@ -128,6 +128,47 @@ Names DrawKinds(RunCampaign campaign) {
   return names;
 }
 
+// Facts that are no number are the first answer, and no force is named for what follows from them.
+TEST(RunCampaign, NamesNothingBesideContactsThatSlideAndASolverThatStops) {
+  for (const char* scenario : {"curve", "curve-real"}) {
+    SCOPED_TRACE(scenario);
+    RunMutationOptions options;
+    options.draws = 12;
+    options.kinds = {"contact", "solver"};
+    options.duration = 0.3;
+    RunCampaign campaign = MakeCampaign(options, scenario);
+    int facts = 0;
+    for (size_t i = 0; i < campaign.mutants().size(); ++i) {
+      EXPECT_TRUE(campaign.Run(i, kGoOn));
+      const RunMutant& mutant = campaign.mutants()[i];
+      EXPECT_EQ(mutant.score.wrong, 0) << mutant.all.name << ": " << mutant.causes;
+      if (!mutant.truth.empty()) continue;
+      ++facts;
+      ASSERT_TRUE(mutant.has_right_cause()) << mutant.all.name << ": " << mutant.evidence;
+      EXPECT_THAT(mutant.causes.substr(0, mutant.causes.find(';')), HasSubstr(NameOf(mutant.cause)));
+    }
+    EXPECT_GE(facts, 6);
+  }
+}
+
+// Two wheels that are off by different amounts are two faults.
+TEST(RunCampaign, NamesTheRadiiOfBothWheels) {
+  RunMutationOptions options;
+  options.draws = 8;
+  options.together = 2;
+  options.kinds = {"wheels"};
+  RunCampaign campaign = MakeCampaign(options);
+  int radii = 0;
+  for (size_t i = 0; i < campaign.mutants().size(); ++i) {
+    const std::vector<Fault>& truth = campaign.mutants()[i].all.truth;
+    if (truth[0].fault != "radius" || truth[1].fault != "radius") continue;
+    ++radii;
+    EXPECT_TRUE(campaign.Run(i, kGoOn));
+    EXPECT_TRUE(campaign.mutants()[i].is_named()) << campaign.mutants()[i].causes;
+  }
+  EXPECT_GE(radii, 2);
+}
+
 // Of the paper's law, of those that it is compared with, and of laws of joints: which summand, of which
 // joint, finger or wheel, and its factor.
 TEST(RunCampaign, NamesTheWrongSummandOfEveryLaw) {
