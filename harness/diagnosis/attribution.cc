@@ -202,7 +202,8 @@ bool AttributeModel(const ConstantChecks& constants, std::span<const CheckRecord
   return true;
 }
 
-/// All that checks observed and residuals are explained by, what explains the others first.
+/// All that checks observed and residuals are explained by, what explains the others first. @param steps one
+/// of which failed.
 std::vector<Entry> ListAll(std::span<const CheckRecord> steps, const CheckContext& context,
                            const Causes& causes) {
   std::vector<Entry> entries = ListFaults(causes, steps);
@@ -211,7 +212,6 @@ std::vector<Entry> ListAll(std::span<const CheckRecord> steps, const CheckContex
   std::stable_sort(entries.begin(), entries.end(), TellsMore);
   if (entries.empty()) {
     const auto any = std::find_if(steps.begin(), steps.end(), [](const CheckRecord& c) { return c.failed; });
-    if (any == steps.end()) return entries;
     entries.push_back(MakeFact(*any, {.cause = Cause::kUnexplained}));
   }
   entries.erase(std::remove_if(entries.begin() + 1, entries.end(), Follows), entries.end());
@@ -254,11 +254,12 @@ double FindVoid(std::span<const CheckRecord> steps) {
 AttributionResult Attribute(const ConstantChecks& constants, std::span<const CheckRecord> model,
                             std::span<const CheckRecord> steps, const CheckContext& context, Causes* causes) {
   AttributionResult result;
-  if (!AttributeModel(constants, model, steps, &result, causes)) {
+  const bool any = std::any_of(steps.begin(), steps.end(), [](const CheckRecord& c) { return c.failed; });
+  if (!AttributeModel(constants, model, steps, &result, causes) && any) {
     const std::vector<Entry> entries = ListAll(steps, context, *causes);
     causes->clear();
     for (const Entry& entry : entries) causes->push_back(entry.one);
-    if (!entries.empty()) TellFirst(entries.front(), steps, context, &result, causes);
+    TellFirst(entries.front(), steps, context, &result, causes);
   }
   for (const std::span<const CheckRecord> checks : {model, steps}) {
     for (const CheckRecord& check : checks)
