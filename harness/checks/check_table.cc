@@ -209,7 +209,7 @@ const CheckInfo kChecks[] = {
       kRelative},
      "what is left of (48) with the engine's accelerations and contact forces, less what the platform does "
      "besides and its solver left over, against the forces balanced",
-     {Cause::kUnmodelledForce, -1, Rank::kDecisive},
+     {Cause::kUnmodelledForce, 40, Rank::kDecisive},
      EvaluateRobotDynamics},
     // The object's dynamics have no other unknowns than its inertia and the contacts' geometry, which checks
     // of the model compare: where those hold, a force acts on the object that nobody has.
@@ -377,7 +377,7 @@ const CheckInfo kChecks[] = {
     {{"joint_limit", kAssumption, "rad"},
      {kJointLimitBound, "a limit pushes; less is rounding"},
      "how far a joint is beyond its range, where a limit pushes that the model does not have",
-     {Cause::kJointLimit, 1, Rank::kDecisive, kOwn},
+     {Cause::kJointLimit, 41, Rank::kDecisive, kOwn},
      EvaluateJointLimit,
      kAlways,
      DescribeJoint},

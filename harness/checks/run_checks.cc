@@ -163,13 +163,4 @@ void RunChecks::CompareLaw(const StepRecord& step) {
   orientation_by_law_ = std::max(orientation_by_law_, errors.orientation_by_law);
 }
 
-MeasuredCauses RunChecks::Tell() const {
-  MeasuredCauses measured;
-  measured.position_by_law = position_by_law_;
-  measured.orientation_by_law = orientation_by_law_;
-  measured.is_ideal = declared_.is_ideal();
-  measured.limited = limited_;
-  return measured;
-}
-
 }  // namespace dexcheck

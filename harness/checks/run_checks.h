@@ -7,7 +7,6 @@
 #include <string_view>
 #include <vector>
 
-#include "harness/checks/attribution.h"
 #include "harness/checks/declared_plant.h"
 #include "harness/checks/judged_law.h"
 #include "harness/checks/make_checks.h"
@@ -15,6 +14,16 @@
 #include "harness/checks/step_model_check.h"
 
 namespace dexcheck {
+
+/// What is known beside the checks of why one failed.
+struct CheckContext {
+  /// Largest errors of the object that (57) by itself would leave while the expectations are asked, m and
+  /// rad: below zero where it is not integrated.
+  double position_by_law = -1.0, orientation_by_law = -1.0;
+  bool is_ideal = true;  ///< The scenario declares no imperfection of the plant.
+  /// `actuator_effort` where the scenario lets torques be cut off: no fault, but what others may come from.
+  std::optional<CheckRecord> limited;
+};
 
 /// The checks of one run, with what went worst. Each step is followed first, and judged then. Nothing
 /// allocates in a step, except as StepAnalyzer and where a check of the model fails for the first time.
@@ -62,8 +71,9 @@ class RunChecks {
   [[nodiscard]] const CheckRecord& Find(std::string_view name) const;
   /// Checks of the motion that failed before the last Reset, while everything settled, in that order.
   [[nodiscard]] std::span<const CheckRecord> settling_failures() const { return settling_failures_; }
-  /// What was measured of causes beside the checks.
-  [[nodiscard]] MeasuredCauses Tell() const;
+  [[nodiscard]] CheckContext context() const {
+    return {position_by_law_, orientation_by_law_, declared_.is_ideal(), limited_};
+  }
   /// Whether a check of the motion failed at the last step.
   [[nodiscard]] bool differs() const { return differs_; }
   /// The law that torques are compared with; null where none is known.
@@ -96,7 +106,7 @@ class RunChecks {
   std::vector<CheckRecord> records_;  // of judges_
   std::vector<CheckRecord> settling_failures_;
   std::optional<CheckRecord> limited_;                         // of torques that the scenario lets be cut off
-  double position_by_law_ = -1.0, orientation_by_law_ = -1.0;  // largest; see MeasuredCauses
+  double position_by_law_ = -1.0, orientation_by_law_ = -1.0;  // largest; see CheckContext
   bool differs_ = false;
 };
 

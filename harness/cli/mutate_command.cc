@@ -186,8 +186,8 @@ void AddMutateCommand(Command app) {
   robot.Excludes(run);
   Option smallest = command.AddFlag(
       "--smallest", &request->run.smallest,
-      "In a run: how small an error of each number balance, prediction and law find, and how well it moves "
-      "everything");
+      "In a run: how small each force, and each error of a mass, friction or inertia, may be to be found and "
+      "named by the balances");
   smallest.Needs(run);
   for (Option option : {from, duration, faults, scale, draws}) option.Excludes(smallest);
   for (Option option : states) option.Excludes(run);

@@ -346,10 +346,14 @@ class Search {
       if (i == term->candidate || !std::isfinite(scores[i])) continue;
       // The criterion is twice the negative logarithm of the likelihood.
       double odds = 0.5 * (scores[i] - criterion);
-      // One with more columns has simpler ones as a special case.
+      // One with more columns has simpler ones as a special case; what does not show makes none simpler.
       const double more = CountParameters({i}) - CountParameters({term->candidate});
-      if (more > 0.0 && candidates_[i].is_ordinary) odds -= 0.5 * more * std::log(samples_);
-      if (odds < kEqualLogOdds && more > 0.0 && !candidates_[i].is_ordinary) continue;
+      const Index width = candidates_[term->candidate].columns.cols();
+      const bool hides = visible_[term->candidate].columns.cols() < width;
+      const bool is_ordinary =
+          candidates_[i].is_ordinary || (hides && candidates_[i].columns.cols() == width);
+      if (more > 0.0 && is_ordinary) odds -= 0.5 * more * std::log(samples_);
+      if (odds < kEqualLogOdds && more > 0.0 && !is_ordinary) continue;
       if ((odds >= kEqualLogOdds && odds >= best) || !CanBe(i, others)) continue;
       if (odds < kEqualLogOdds) {
         term->same.emplace_back(i, CalcAmplitude(i, others));

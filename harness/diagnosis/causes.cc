@@ -16,25 +16,13 @@ std::string Unit(const std::string& unit) { return unit.empty() ? "" : " " + uni
 }  // namespace
 
 const char* NameOf(CauseChannel channel) {
-  switch (channel) {
-    case CauseChannel::kMeasurement:
-      return "measurement";
-    case CauseChannel::kActuation:
-      return "actuation";
-    case CauseChannel::kLaw:
-      return "law";
-    case CauseChannel::kContact:
-      return "contact";
-    case CauseChannel::kRolling:
-      return "rolling";
-    case CauseChannel::kBalance:
-      return "balance";
-  }
-  return "";
+  constexpr const char* kNames[] = {"measurement", "actuation", "law",        "contact",
+                                    "rolling",     "balance",   "observation"};
+  return kNames[static_cast<size_t>(channel)];
 }
 
 const char* NameOf(CauseOutcome outcome) {
-  constexpr const char* kNames[] = {"named", "class", "not explained"};
+  constexpr const char* kNames[] = {"named", "class", "not explained", "observed"};
   return kNames[static_cast<size_t>(outcome)];
 }
 

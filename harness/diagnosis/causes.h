@@ -26,17 +26,18 @@ struct Fault {
   [[nodiscard]] std::string Tell() const;
 };
 
-/// Where residuals are compared: what one of them shows, the others do not.
-enum class CauseChannel { kMeasurement, kActuation, kLaw, kContact, kRolling, kBalance };
-/// "measurement", "actuation", "law", "contact", "rolling", "balance".
+/// Where residuals are compared: what one of them shows, the others do not; and what checks observe.
+enum class CauseChannel { kMeasurement, kActuation, kLaw, kContact, kRolling, kBalance, kObservation };
+/// "measurement", "actuation", "law", "contact", "rolling", "balance", "observation".
 const char* NameOf(CauseChannel channel);
 
 enum class CauseOutcome {
   kNamed,         ///< One fault explains it, and no other one does.
   kNamedClass,    ///< Several do, which this motion does not tell apart.
   kNotExplained,  ///< None does.
+  kObserved,      ///< A fact that is no parameter of a fault: a contact slides, a joint is at its limit.
 };
-/// "named", "class", "not explained".
+/// "named", "class", "not explained", "observed".
 const char* NameOf(CauseOutcome outcome);
 
 /// One fault, or several that are not isolable from each other.
@@ -67,7 +68,7 @@ struct Explanation {
 nlohmann::ordered_json ToJson(const Fault& fault);
 nlohmann::ordered_json ToJson(const Explanation& one);
 
-/// All of a run, those that explain most of each channel first.
+/// All of a run, what explains what follows first; of each channel those that explain most of it.
 using Causes = std::vector<Explanation>;
 
 /// Whether the first fault of one of them is called so.

@@ -149,6 +149,8 @@ Causes ExplainForces(const StepStore& store) {
     const std::vector<Segment> few = are_many ? JoinAcrossGaps(store, &forces, segments) : segments;
     if (few.size() < 2 || few.size() > kMostSegments) continue;
     const Causes found = ExplainParts(store, &forces, few);
+    const auto count = static_cast<Index>(found.size());
+    if (problem.ExplainTorque(whole, count, found.size(), &causes)) return causes;
     if (!found.empty()) return found;
   }
   problem.ExplainChanging(whole, &causes);

@@ -68,7 +68,9 @@ bool ForceProblem::ExplainConstant(const Segment& segment, Causes* causes) {
       terms_.amplitudes.emplace_back(term.candidate, term.amplitude);
     }
   }
-  if (ExplainTorque(segment, selection, causes)) return true;
+  Index amplitudes = 0;
+  for (const CauseTerm& term : selection.terms) amplitudes += term.amplitude.size();
+  if (ExplainTorque(segment, amplitudes, selection.terms.size(), causes)) return true;
   if (ExplainJoint(segment, selection, causes) || ExplainBetweenLinks(segment, selection, causes))
     return true;
   Causes told = TellSelection(Start(segment), selection, candidates_,
@@ -149,15 +151,13 @@ void ForceProblem::ExplainChanging(const Segment& segment, Causes* causes) const
   causes->push_back(one);
 }
 
-bool ForceProblem::ExplainTorque(const Segment& segment, const CauseSelection& selection,
+bool ForceProblem::ExplainTorque(const Segment& segment, Index amplitudes, size_t faults,
                                  Causes* causes) const {
-  Index amplitudes = 0;
-  for (const CauseTerm& term : selection.terms) amplitudes += term.amplitude.size();
   const auto cost = [&](Index parameters, size_t terms) {
     return static_cast<double>(parameters) * std::log(static_cast<double>(forces_->rows())) +
            2.0 * static_cast<double>(terms) * std::log(static_cast<double>(candidates_.size()));
   };
-  if (cost(amplitudes, selection.terms.size()) <= cost(steps_, 1)) return false;
+  if (cost(amplitudes, faults) <= cost(steps_, 1)) return false;
   for (size_t i = 0; i < candidates_.size(); ++i) {
     if (candidates_[i].fault != "torque") continue;
     const Free free = FitFree(i);

@@ -37,6 +37,10 @@ class ForceProblem {
   /// One force that changes in time, free at each step.
   void ExplainChanging(const Segment& segment, Causes* causes) const;
 
+  /// The torque of one joint, free at each step, where that has fewer amplitudes than so many faults: a range
+  /// that ends, a cable.
+  bool ExplainTorque(const Segment& segment, Eigen::Index amplitudes, size_t faults, Causes* causes) const;
+
  private:
   /// Two faults of one joint may be anything that acts there.
   bool ExplainJoint(const Segment& segment, const CauseSelection& selection, Causes* causes) const;
@@ -46,9 +50,6 @@ class ForceProblem {
   /// A class of what was selected and a torque of that joint that changes.
   [[nodiscard]] Explanation StartChanging(const Segment& segment, const CauseSelection& selection,
                                           const std::string& joint) const;
-  /// The torque of one joint, free at each step, where that has fewer amplitudes than what was selected: a
-  /// range that ends, a cable.
-  bool ExplainTorque(const Segment& segment, const CauseSelection& selection, Causes* causes) const;
   /// A candidate whose amplitudes are free at each step.
   struct Free {
     size_t candidate = SIZE_MAX;

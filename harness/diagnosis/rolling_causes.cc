@@ -17,6 +17,19 @@ constexpr double kExplains = 0.99;
 // Noise is taken for this many times what the explanation leaves.
 constexpr double kLevel = 5.0;
 
+/// Two wheels that are off by different amounts are two faults, not one that both have and another of one.
+CauseSelection SelectWheels(const VectorXd& y, std::vector<Candidate>* candidates,
+                            const CauseOptions& options) {
+  const CauseSelection selection = SelectCauses(y, *candidates, options);
+  const auto count =
+      std::count_if(selection.terms.begin(), selection.terms.end(), [&](const CauseTerm& term) {
+        return (*candidates)[term.candidate].fault == candidates->front().fault;
+      });
+  if (count < 2) return selection;
+  candidates->erase(candidates->begin());
+  return SelectCauses(y, *candidates, options);
+}
+
 }  // namespace
 
 Causes ExplainRolling(const StepStore& store) {
@@ -38,12 +51,14 @@ Causes ExplainRolling(const StepStore& store) {
                                               {"radius", base.wheel_joint_right.c_str(), base.wheel_radius},
                                               {"radius", base.wheel_joint_left.c_str(), base.wheel_radius}}) {
     const bool is_one = std::string_view(place) != "wheels";
-    candidates.push_back({.fault = fault,
-                          .place = is_one ? std::string("wheel ") + place : place,
-                          .unit = "m",
-                          .nominal = nominal,
-                          .columns = MatrixXd::Zero(2 * count, 1),
-                          .scale = VectorXd::Constant(1, nominal)});
+    candidates.push_back(
+        {.fault = fault,
+         .place = is_one ? std::string("wheel ") + place : place,
+         .unit = "m",
+         .nominal = nominal,
+         .columns = MatrixXd::Zero(2 * count, 1),
+         .scale = VectorXd::Constant(1, nominal),
+         .is_possible = [nominal = nominal](const VectorXd& a) { return nominal + a[0] > 0.0; }});
   }
   for (Index k = 0; k < count; ++k) {
     const Index step = steps[static_cast<size_t>(k)];
@@ -62,14 +77,14 @@ Causes ExplainRolling(const StepStore& store) {
   // Slip and sinking change with the load, in some steps.
   constexpr double kAlike = 8.0;
   if (y.squaredNorm() <= static_cast<double>(y.size())) return {};
-  const CauseOptions options{.most_terms = 2, .alike = std::min(kAlike, static_cast<double>(count))};
-  CauseSelection selection = SelectCauses(y, candidates, options);
+  const CauseOptions options{.most_terms = 3, .alike = std::min(kAlike, static_cast<double>(count))};
+  CauseSelection selection = SelectWheels(y, &candidates, options);
   const bool explained = selection.fraction >= kExplains;
   if (!explained && !fails) return {};
   if (const double level = kLevel * selection.left; explained && level < 1.0) {
     y /= level;
     for (Candidate& one : candidates) one.columns /= level;
-    selection = SelectCauses(y, candidates, options);
+    selection = SelectWheels(y, &candidates, options);
   }
   Causes causes = TellSelection(StartExplanation(store, CauseChannel::kRolling, steps), selection, candidates,
                                 TellNumber);

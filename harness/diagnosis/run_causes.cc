@@ -42,12 +42,15 @@ void DropConsequences(const StepStore& store, Causes* causes) {
 
 }  // namespace
 
-Causes ExplainRun(const StepStore& store) {
+Causes ExplainRun(const StepStore& store, double void_from) {
   Causes causes;
-  for (const auto explain : {ExplainSignals, ExplainLaw, ExplainContacts, ExplainRolling, ExplainForces}) {
-    Causes found = explain(store);
+  const auto add = [&](Causes (*explain)(const StepStore&), const StepStore& from) {
+    Causes found = explain(from);
     std::move(found.begin(), found.end(), std::back_inserter(causes));
-  }
+  };
+  for (const auto explain : {ExplainSignals, ExplainLaw, ExplainContacts}) add(explain, store);
+  const StepStore before = store.GetBefore(void_from);
+  for (const auto explain : {ExplainRolling, ExplainForces}) add(explain, before);
   DropConsequencesOfShapes(&causes);
   DropConsequences(store, &causes);
   std::stable_sort(causes.begin(), causes.end(),

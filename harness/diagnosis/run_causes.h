@@ -7,7 +7,8 @@
 
 namespace dexcheck {
 
-/// By channel: measurement, actuation, law, balance. Empty where nothing differs.
-Causes ExplainRun(const StepStore& store);
+/// By channel: measurement, actuation, law, contact, rolling, balance. Empty where nothing differs.
+/// @param void_from of FindVoid, s: wheels and balances are explained up to then.
+Causes ExplainRun(const StepStore& store, double void_from);
 
 }  // namespace dexcheck

@@ -252,6 +252,13 @@ void StepStore::Keep(Eigen::Index block, const Eigen::Ref<const VectorXd>& row) 
   data_.col(size_++) = row;
 }
 
+StepStore StepStore::GetBefore(double time) const {
+  StepStore before = *this;
+  while (before.size_ > 0 && before.data_(0, before.size_ - 1) >= time) --before.size_;
+  before.last_time_ = std::min(last_time_, time);
+  return before;
+}
+
 bool StepStore::HasHistory(Eigen::Index step) const {
   if (step < kHistory) return false;
   const Eigen::Index first = step - kHistory;

@@ -73,6 +73,8 @@ class StepStore {
 
   /// Number of steps that are kept; 0 where nothing differed.
   [[nodiscard]] Eigen::Index size() const { return size_; }
+  /// A copy without the steps from that time on, s.
+  [[nodiscard]] StepStore GetBefore(double time) const;
   /// Entries (rows) by steps (columns).
   [[nodiscard]] auto Get(Signal signal) const {
     return data_.block(offsets_[signal], 0, offsets_[signal + 1] - offsets_[signal], size_);

@@ -13,12 +13,17 @@ namespace {
 /// Of each set a generator of its own.
 Draw MakeDraw(const DrawOptions& options, size_t set) { return Draw(options.seed * 1000003 + set); }
 
-/// Whether both name the same place, or are both of a law.
+/// Whether both name the same place, are both of a law, or one is of a wheel and the other of both wheels.
 bool IsSamePlace(const InjectedFault& a, const InjectedFault& b) {
   if ((a.controller && b.controller) || (a.model && b.model)) return true;
+  const auto is_of_both = [](const Fault& fault) {
+    return fault.fault == "radius" && fault.place == "wheels";
+  };
   return std::any_of(a.truth.begin(), a.truth.end(), [&](const Fault& one) {
-    return std::any_of(b.truth.begin(), b.truth.end(),
-                       [&](const Fault& other) { return other.place == one.place; });
+    return std::any_of(b.truth.begin(), b.truth.end(), [&](const Fault& other) {
+      const bool is_of_one = one.fault == other.fault && (is_of_both(one) || is_of_both(other));
+      return other.place == one.place || is_of_one;
+    });
   });
 }
 

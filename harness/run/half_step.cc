@@ -57,6 +57,7 @@ void LookForIntegrator(const Setup& setup, const ClosedLoop& loop, const std::fi
     for (Attribution& one : attribution.attributions)
       if (one.cause == attribution.cause) one.cause = Cause::kIntegrator;
     attribution.cause = Cause::kIntegrator;
+    result->causes.front().faults.front().fault = NameOf(Cause::kIntegrator);
   } catch (const InputError&) {
     // Some time of the scenario is no whole number of half steps.
   }

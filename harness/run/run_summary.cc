@@ -122,20 +122,10 @@ void AddLimits(const StepRecord& step, double dt, std::vector<LimitedTorque>* li
 
 void Judge(const Setup& setup, const ClosedLoop& loop, RunResult* result) {
   if (loop.is_checking()) {
-    result->causes = ExplainRun(loop.store());
-    MeasuredCauses measured = loop.checks().Tell();
-    measured.law = TellCauses(result->causes, CauseChannel::kLaw);
-    measured.motors = TellCauses(result->causes, CauseChannel::kActuation);
-    measured.sensors = TellCauses(result->causes, CauseChannel::kMeasurement);
-    measured.contacts = TellCauses(result->causes, CauseChannel::kContact);
-    measured.wheels = TellCauses(result->causes, CauseChannel::kRolling);
-    measured.force = TellCauses(result->causes, CauseChannel::kBalance);
-    measured.is_slope = Names(result->causes, "slope");
-    result->attribution =
-        Attribute(setup.constants(), loop.checks().model_checks(), loop.checks().motion_checks(), measured);
-    // The law is judged by the engine's terms, and goes by the model's.
-    if (result->attribution.cause == Cause::kModel)
-      std::erase_if(result->causes, [](const Explanation& one) { return one.channel == CauseChannel::kLaw; });
+    const std::span<const CheckRecord> steps = loop.checks().motion_checks();
+    result->causes = ExplainRun(loop.store(), FindVoid(steps));
+    result->attribution = Attribute(setup.constants(), loop.checks().model_checks(), steps,
+                                    loop.checks().context(), &result->causes);
   }
   const bool disagrees = result->attribution.cause != Cause::kNone;
   result->verdict = disagrees ? Verdict::kDisagreement : Verdict::kPass;

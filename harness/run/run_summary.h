@@ -8,7 +8,7 @@
 #include <string_view>
 #include <vector>
 
-#include "harness/checks/attribution.h"
+#include "harness/diagnosis/attribution.h"
 #include "harness/diagnosis/causes.h"
 #include "harness/run/closed_loop.h"
 #include "harness/run/sampled_loop.h"
@@ -63,7 +63,7 @@ struct RunResult {
   std::optional<JointMargins> margins;  ///< Of a motion of joints, where JudgeGains was asked.
   std::string gain_card;                ///< Likewise.
   AttributionResult attribution;
-  Causes causes;  ///< What explains the residuals.
+  Causes causes;  ///< What explains the residuals, and the facts that checks observed.
   double recording_seconds = 0.0;
   double wall_seconds = 0.0;  ///< Of all steps, recording included.
 };

@@ -1,11 +1,12 @@
 // Which cause follows from which failed checks.
 
-#include "harness/checks/attribution.h"
+#include "harness/diagnosis/attribution.h"
 
 #include <gmock/gmock.h>
 
 #include <algorithm>
 #include <bit>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -72,9 +73,14 @@ class FakeRun {
     constants_.findings.push_back({name, "link r_forearm", 1.5, 1.25, {}, 0});
     return *this;
   }
-  [[nodiscard]] AttributionResult Explain(const MeasuredCauses& measured = {}) const {
-    return Attribute(constants_, model_, steps_, measured);
+  [[nodiscard]] AttributionResult Explain(const CheckContext& context = {}) const {
+    Causes causes;
+    return Explain(&causes, context);
   }
+  AttributionResult Explain(Causes* causes, const CheckContext& context = {}) const {
+    return Attribute(constants_, model_, steps_, context, causes);
+  }
+  [[nodiscard]] double FindVoid() const { return dexcheck::FindVoid(steps_); }
   CheckRecord& step(const std::string& name) {
     return *std::find_if(steps_.begin(), steps_.end(),
                          [&](const CheckRecord& check) { return check.name == name; });
@@ -98,7 +104,9 @@ TEST(Attribute, FindsNothingWhereNothingFailed) {
   EXPECT_EQ(result.cause, Cause::kNone);
   EXPECT_EQ(result.evidence, "");
   EXPECT_TRUE(result.attributions.empty());
-  EXPECT_EQ(Attribute({}, {}, {}).cause, Cause::kNone);
+  Causes causes;
+  EXPECT_EQ(Attribute({}, {}, {}, {}, &causes).cause, Cause::kNone);
+  EXPECT_TRUE(causes.empty());
 }
 
 TEST(Attribute, BlamesConstantsBeforeAllElse) {
@@ -218,34 +226,88 @@ TEST(Attribute, WheelsThatDoNotRollAsTheyShouldExplainForces) {
   EXPECT_EQ(FakeRun().Fail("traction_use", 0.1).Fail("rolling", 0.2).Explain().cause, Cause::kWheelSlip);
 }
 
-TEST(Attribute, EvidenceEndsWithWhatWasMeasured) {
+/// A fault of the balances.
+Explanation MakeForce(const std::string& fault, double from) {
+  Explanation one{.channel = CauseChannel::kBalance};
+  one.faults.push_back({fault, "joint r_elbow", 0.5, 0.0, "N m", ""});
+  one.from = from;
+  return one;
+}
+
+TEST(Attribute, EvidenceEndsWithWhatExplainsTheResidual) {
   FakeRun run;
   run.Fail("inverse_dynamics_object", 0.1).Fail("inverse_dynamics_robot", 0.1);
-  MeasuredCauses measured;
-  measured.force = "at joint r_elbow";
-  EXPECT_THAT(run.Explain(measured).evidence, HasSubstr("; at joint r_elbow"));
-  measured.is_slope = true;
-  const AttributionResult slope = run.Explain(measured);
+  Causes causes = {MakeForce("torque", 0.1)};
+  EXPECT_THAT(run.Explain(&causes).evidence, HasSubstr("; joint r_elbow: torque 0.5 N m, from 0.1 s"));
+  ASSERT_EQ(causes.size(), 1u);
+  causes = {MakeForce("slope", 0.1)};
+  const AttributionResult slope = run.Explain(&causes);
   EXPECT_EQ(slope.cause, Cause::kSlope);
   EXPECT_EQ(FindCause(slope, "inverse_dynamics_robot"), "slope");
+}
+
+// Facts and faults are one list: what came first of what is decisive explains the others.
+TEST(Attribute, RanksFactsAmongFaults) {
+  for (const bool fact_first : {true, false}) {
+    FakeRun run;
+    run.Fail("cone_use", fact_first ? 0.1 : 0.3)
+        .Fail("inverse_dynamics_robot", 0.2)
+        .Fail("penetration", 0.05);
+    Causes causes = {MakeForce("torque", 0.2)};
+    const AttributionResult result = run.Explain(&causes);
+    ASSERT_EQ(causes.size(), 3u);
+    const Explanation& fact = causes[fact_first ? 0 : 1];
+    EXPECT_EQ(fact.outcome, CauseOutcome::kObserved);
+    EXPECT_EQ(fact.channel, CauseChannel::kObservation);
+    EXPECT_EQ(fact.faults.front().fault, "fingertip slip");
+    EXPECT_EQ(fact.from, fact_first ? 0.1 : 0.3);
+    EXPECT_EQ(causes[fact_first ? 1 : 0].faults.front().fault, "torque");
+    EXPECT_EQ(causes[2].faults.front().fault, "contact softness");
+    EXPECT_EQ(result.cause, fact_first ? Cause::kFingertipSlip : Cause::kUnmodelledForce);
+  }
+}
+
+// What a fact makes void is neither a fault nor a fact of its own.
+TEST(Attribute, AForceAfterWheelsSlideIsTheirs) {
+  FakeRun run;
+  run.Fail("traction_use", 0.1).Fail("inverse_dynamics_robot", 0.2).Fail("rolling", 0.2);
+  run.Fail("wheel_slip_rate", 0.1).Fail("base_tilt", 0.05);
+  EXPECT_EQ(run.FindVoid(), 0.1);
+  Causes causes;
+  EXPECT_EQ(run.Explain(&causes).cause, Cause::kWheelSlip);
+  ASSERT_EQ(causes.size(), 1u);
+  EXPECT_EQ(causes[0].faults.front().fault, "wheel slip");
+  // Fingertips that slide leave the balances as they are: their forces are known.
+  EXPECT_EQ(FakeRun().Fail("cone_use", 0.1).FindVoid(), std::numeric_limits<double>::infinity());
+}
+
+// A fault that bounds allow and predictions show is named before what the prediction alone says.
+TEST(Attribute, AFaultWithinTheBoundsExplainsThePrediction) {
+  FakeRun run;
+  run.Fail("reduced_acceleration", 0.2);
+  Causes causes = {MakeForce("torque", 0.2)};
+  const AttributionResult result = run.Explain(&causes);
+  EXPECT_EQ(result.cause, Cause::kUnmodelledForce);
+  EXPECT_THAT(result.evidence, StartsWith("reduced_acceleration"));
+  EXPECT_EQ(causes.size(), 1u);
 }
 
 // An expectation that alone fails: what (57) by itself leaves are the gains, the rest is what drives it.
 TEST(Attribute, AnExpectationThatFailsHasAMeasuredCause) {
   FakeRun run;
   run.Fail("expect_position", 1.0);
-  MeasuredCauses measured;
-  measured.position_by_law = 1.5;
-  AttributionResult result = run.Explain(measured);
+  CheckContext context;
+  context.position_by_law = 1.5;
+  AttributionResult result = run.Explain(context);
   EXPECT_EQ(result.cause, Cause::kControlLaw);
   EXPECT_EQ(result.check, "expect_position");
   EXPECT_THAT(result.evidence, HasSubstr("(57) by itself leaves 1.5"));
-  measured.position_by_law = 0.1;
-  result = run.Explain(measured);
+  context.position_by_law = 0.1;
+  result = run.Explain(context);
   EXPECT_EQ(result.cause, Cause::kContactSoftness);
   EXPECT_THAT(result.evidence, HasSubstr("contacts that give the rest"));
-  measured.is_ideal = false;
-  result = run.Explain(measured);
+  context.is_ideal = false;
+  result = run.Explain(context);
   EXPECT_EQ(result.cause, Cause::kDeclared);
   // Not known, for a law that is not followed.
   EXPECT_EQ(run.Explain().cause, Cause::kControlLaw);

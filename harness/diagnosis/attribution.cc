@@ -1,0 +1,271 @@
+#include "harness/diagnosis/attribution.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <string_view>
+
+#include "controller/common/text.h"
+#include "harness/checks/check_table.h"
+
+namespace dexcheck {
+namespace {
+
+constexpr double kNever = std::numeric_limits<double>::infinity();
+
+/// A line of the list.
+struct Entry {
+  Explanation one;
+  FailureMeaning meaning;
+  double time = 0.0;                   // when it was first seen, s
+  const CheckRecord* check = nullptr;  // of the steps, that says so; null for none
+};
+
+const CheckRecord* FindFailed(std::span<const CheckRecord> checks, std::string_view name) {
+  for (const CheckRecord& check : checks)
+    if (check.name == name && check.failed) return &check;
+  return nullptr;
+}
+
+/// What the failure of a check means; nothing for one that has no entry.
+FailureMeaning MeaningOf(std::string_view check) {
+  const CheckInfo* info = FindCheck(check);
+  return info == nullptr ? FailureMeaning{} : info->meaning;
+}
+
+std::string Tell(const CheckRecord& check) {
+  return check.name + " " + FormatNumber(check.worst, 3) + (check.unit == "1" ? "" : " " + check.unit) +
+         " (bound " + FormatNumber(check.bound, 3) +
+         "), first above it at t = " + FormatNumber(check.failed_at, 3) + " s" +
+         (check.part.empty() ? "" : ", " + check.part);
+}
+
+/// Whether an entry tells more of the cause than another one: by rank, then by time, then by precedence.
+bool TellsMore(const Entry& a, const Entry& b) {
+  if (a.meaning.rank != b.meaning.rank) return a.meaning.rank < b.meaning.rank;
+  if (a.time != b.time) return a.time < b.time;
+  return a.meaning.precedence < b.meaning.precedence;
+}
+
+Explanation Observe(const std::string& place, const Fault& what, double from) {
+  Explanation one{.channel = CauseChannel::kObservation, .outcome = CauseOutcome::kObserved};
+  one.faults.push_back(what);
+  one.faults.front().place = place;
+  one.from = from;
+  return one;
+}
+
+Entry MakeFact(const CheckRecord& check, const FailureMeaning& meaning) {
+  const std::string place = check.name + (check.part.empty() ? "" : ", " + check.part);
+  const Fault what{NameOf(meaning.cause),
+                   "",
+                   check.worst,
+                   0.0,
+                   check.unit == "1" ? "" : check.unit,
+                   "(bound " + FormatNumber(check.bound, 3) + ")"};
+  return {Observe(place, what, check.failed_at), meaning, check.failed_at, &check};
+}
+
+/// What an explanation of that channel means.
+FailureMeaning MeaningOf(CauseChannel channel) {
+  switch (channel) {
+    case CauseChannel::kMeasurement:
+      return {Cause::kSensing, 0, Rank::kMeasurement};
+    case CauseChannel::kActuation:
+      return {Cause::kActuator, 0, Rank::kActuator};
+    case CauseChannel::kLaw:
+      return {Cause::kControlLaw, 0, Rank::kLaw};
+    case CauseChannel::kContact:
+      return {Cause::kContactGeometry, 0, Rank::kObjectBalance};
+    case CauseChannel::kRolling:
+      return {Cause::kWheelGeometry, 0, Rank::kDecisive};
+    default:
+      return {Cause::kUnmodelledForce, 0, Rank::kDecisive};
+  }
+}
+
+/// Explanations of the residuals, those of a channel in their order.
+std::vector<Entry> ListFaults(const Causes& causes, std::span<const CheckRecord> steps) {
+  std::vector<Entry> entries;
+  for (const Explanation& one : causes) {
+    Entry entry{one, MeaningOf(one.channel), one.from};
+    for (const Explanation& other : causes)
+      if (other.channel == one.channel) entry.time = std::min(entry.time, other.from);
+    for (const CheckRecord& check : steps) {
+      const Entry failed{{}, MeaningOf(check.name), check.failed_at, &check};
+      const bool is_of_it = check.failed && failed.meaning.cause == entry.meaning.cause;
+      if (!is_of_it || failed.meaning.rank > entry.meaning.rank) continue;
+      if (entry.check != nullptr && !TellsMore(failed, entry)) continue;
+      entry.meaning = failed.meaning, entry.time = failed.time, entry.check = failed.check;
+    }
+    // What bounds allow need not be explained.
+    if (entry.check == nullptr && one.outcome == CauseOutcome::kNotExplained)
+      entry.meaning.rank = Rank::kResidual;
+    entries.push_back(entry);
+  }
+  return entries;
+}
+
+/// Adds one fact of each cause that no fault explains; of two checks of one fact the sharper one tells it.
+void AddFacts(std::span<const CheckRecord> steps, std::vector<Entry>* entries) {
+  const double void_from = FindVoid(steps);
+  for (const CheckRecord& check : steps) {
+    const FailureMeaning meaning = MeaningOf(check.name);
+    if (!check.failed || meaning.cause == Cause::kNone || FindFailed(steps, meaning.sharper) != nullptr)
+      continue;
+    const bool is_void = check.name == "inverse_dynamics_robot" || check.name == "rolling";
+    if (is_void && check.failed_at >= void_from) continue;
+    const Entry fact = MakeFact(check, meaning);
+    const auto same = std::find_if(entries->begin(), entries->end(),
+                                   [&](const Entry& other) { return other.meaning.cause == meaning.cause; });
+    if (same == entries->end()) {
+      entries->push_back(fact);
+    } else if (same->one.outcome == CauseOutcome::kObserved && TellsMore(fact, *same)) {
+      *same = fact;
+    }
+  }
+}
+
+/// Whether an entry is a consequence of those before it: what is predicted, and where that leads to; a
+/// failure that is no fact by itself.
+bool Follows(const Entry& entry) {
+  const bool is_fact = entry.one.outcome != CauseOutcome::kObserved || entry.meaning.is_own;
+  return entry.meaning.rank >= Rank::kPrediction || !is_fact;
+}
+
+/// Wheels of another size give other forces besides, which show before they have rolled far.
+void PutWheelsBeforeForces(std::vector<Entry>* entries) {
+  double first = kNever;
+  for (const Entry& entry : *entries)
+    if (entry.meaning.cause == Cause::kUnmodelledForce) first = std::min(first, entry.time);
+  for (Entry& entry : *entries)
+    if (entry.meaning.cause == Cause::kWheelGeometry) entry.time = std::min(entry.time, first);
+}
+
+/// Whether torques that were cut off explain the entry. Motions follow from them; forces that do not balance,
+/// or are not the rigid model's, do not: what was delivered is known.
+bool ComesFrom(const Entry& limit, const Entry& entry) {
+  if (entry.check == nullptr) return false;
+  const bool is_motion =
+      entry.check->kind == CheckCategory::kLaw || entry.check->kind == CheckCategory::kAssumption;
+  return is_motion && TellsMore(limit, entry);
+}
+
+/// What an expectation that alone fails comes from: the gains, if (57) by itself leaves most of the error,
+/// and what drives it otherwise. By algebra that is what contacts give, or what the scenario asks for of the
+/// plant.
+Cause AttributeExpectation(const CheckRecord& check, const CheckContext& context, std::string* evidence) {
+  const bool position = check.name == "expect_position";
+  const double by_law = position ? context.position_by_law : context.orientation_by_law;
+  const Cause other = context.is_ideal ? Cause::kControlLaw : Cause::kDeclared;
+  if (by_law < 0.0) return other;
+  *evidence += "; (57) by itself leaves " + FormatNumber(by_law, 3) + " " + check.unit;
+  if (by_law >= 0.5 * check.worst) return Cause::kControlLaw;
+  *evidence += context.is_ideal ? ", contacts that give the rest"
+                                : ", contacts that give and what the scenario declares of the plant the rest";
+  return context.is_ideal ? Cause::kContactSoftness : Cause::kDeclared;
+}
+
+Cause AttributeOne(const CheckRecord& check, Cause run, std::span<const CheckRecord> steps) {
+  if (run == Cause::kModel || run == Cause::kSensing) return run;
+  if (check.kind == CheckCategory::kModel) return Cause::kModel;
+  const FailureMeaning meaning = MeaningOf(check.name);
+  if (!meaning.is_own) return run;
+  return FindFailed(steps, meaning.sharper) != nullptr ? MeaningOf(meaning.sharper).cause : meaning.cause;
+}
+
+/// Where the model itself is wrong: puts that first.
+bool AttributeModel(const ConstantChecks& constants, std::span<const CheckRecord> model,
+                    std::span<const CheckRecord> steps, AttributionResult* result, Causes* causes) {
+  if (!constants.findings.empty()) {
+    const ConstantFinding& finding = constants.findings.front();
+    result->evidence = finding.check + ": " + finding.where + ": " + FormatNumber(finding.model) +
+                       " in the model, " + FormatNumber(finding.engine) + " in the MJCF";
+    const Fault what{NameOf(Cause::kModel),
+                     "",
+                     finding.model,
+                     0.0,
+                     "",
+                     "(" + FormatNumber(finding.engine) + " in the MJCF)"};
+    causes->insert(causes->begin(), Observe(finding.check + ": " + finding.where, what, -kNever));
+  } else {
+    const CheckRecord* first = nullptr;
+    for (const CheckRecord& check : model)
+      if (check.failed && (first == nullptr || check.failed_at < first->failed_at)) first = &check;
+    if (first == nullptr || FindFailed(steps, "measurement") != nullptr) return false;
+    result->evidence = Tell(*first);
+    causes->insert(causes->begin(), MakeFact(*first, {.cause = Cause::kModel}).one);
+  }
+  // The law is judged by the engine's terms, and goes by the model's.
+  std::erase_if(*causes, [](const Explanation& one) { return one.channel == CauseChannel::kLaw; });
+  result->cause = Cause::kModel;
+  return true;
+}
+
+/// All that checks observed and residuals are explained by, what explains the others first. @param steps one
+/// of which failed.
+std::vector<Entry> ListAll(std::span<const CheckRecord> steps, const CheckContext& context,
+                           const Causes& causes) {
+  std::vector<Entry> entries = ListFaults(causes, steps);
+  AddFacts(steps, &entries);
+  PutWheelsBeforeForces(&entries);
+  std::stable_sort(entries.begin(), entries.end(), TellsMore);
+  if (entries.empty()) {
+    const auto any = std::find_if(steps.begin(), steps.end(), [](const CheckRecord& c) { return c.failed; });
+    entries.push_back(MakeFact(*any, {.cause = Cause::kUnexplained}));
+  }
+  entries.erase(std::remove_if(entries.begin() + 1, entries.end(), Follows), entries.end());
+  if (context.limited && context.limited->failed) {
+    const Entry limit = MakeFact(*context.limited, MeaningOf(context.limited->name));
+    const bool is_unexplained = entries.front().meaning.cause == Cause::kUnexplained;
+    if (is_unexplained || ComesFrom(limit, entries.front())) entries.insert(entries.begin(), limit);
+  }
+  return entries;
+}
+
+/// Of the first entry: which check says so, and what was measured of it.
+void TellFirst(const Entry& first, std::span<const CheckRecord> steps, const CheckContext& context,
+               AttributionResult* result, Causes* causes) {
+  const CheckRecord* check = first.check;
+  for (const CheckRecord& other : steps)  // of a fault that bounds of its own check allow
+    if (check == nullptr && other.failed) check = &other;
+  result->cause = first.meaning.cause;
+  if (result->cause == Cause::kUnmodelledForce && Names(*causes, "slope")) result->cause = Cause::kSlope;
+  if (check == nullptr) return;
+  result->evidence = Tell(*check);
+  result->check = check->name;
+  if (first.one.outcome != CauseOutcome::kObserved) {
+    result->evidence += "; " + TellCauses(*causes, first.one.channel);
+  } else if (first.meaning.rank == Rank::kResidual && first.meaning.cause == Cause::kControlLaw) {
+    result->cause = AttributeExpectation(*check, context, &result->evidence);
+    causes->front().faults.front().fault = NameOf(result->cause);
+  }
+}
+
+}  // namespace
+
+double FindVoid(std::span<const CheckRecord> steps) {
+  double first = kNever;
+  for (const char* name : {"traction_use", "solver", "collision"})
+    if (const CheckRecord* check = FindFailed(steps, name)) first = std::min(first, check->failed_at);
+  return first;
+}
+
+AttributionResult Attribute(const ConstantChecks& constants, std::span<const CheckRecord> model,
+                            std::span<const CheckRecord> steps, const CheckContext& context, Causes* causes) {
+  AttributionResult result;
+  const bool any = std::any_of(steps.begin(), steps.end(), [](const CheckRecord& c) { return c.failed; });
+  if (!AttributeModel(constants, model, steps, &result, causes) && any) {
+    const std::vector<Entry> entries = ListAll(steps, context, *causes);
+    causes->clear();
+    for (const Entry& entry : entries) causes->push_back(entry.one);
+    TellFirst(entries.front(), steps, context, &result, causes);
+  }
+  for (const std::span<const CheckRecord> checks : {model, steps}) {
+    for (const CheckRecord& check : checks)
+      if (check.failed) result.attributions.push_back({check.name, AttributeOne(check, result.cause, steps)});
+  }
+  return result;
+}
+
+}  // namespace dexcheck
