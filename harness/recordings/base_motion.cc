@@ -106,8 +106,8 @@ std::optional<double> FindStep(const RecordingSet& recordings, const TorqueRows&
   double most = kFraction * all.left;
   Matrix3d G = Matrix3d::Zero();
   Vector3d b = Vector3d::Zero();
-  // All of it is gravity.
-  for (size_t i = all.blocks.size(); i-- > 1;) {
+  // What holds nearly all the time is gravity.
+  for (size_t i = all.blocks.size(); i-- > 1 + all.blocks.size() / 10;) {
     G += all.blocks[i].squares;
     b += all.blocks[i].products;
     const double explained = b.dot(G.completeOrthogonalDecomposition().solve(b));

@@ -114,7 +114,20 @@ TorqueEstimator::TorqueEstimator(RecordingSet* recordings, size_t most_causes)
     barred_.resize(faults_.size(), false);
     selection_ = Select();
   }
-  while (BarSecondPushes() || BarWeakBodies()) selection_ = Select();
+  while (BarSecondPushes()) selection_ = Select();
+  // What leaves far more without them was no friction.
+  constexpr double kFarMore = 1.5;
+  std::vector<bool> before = barred_;
+  for (double left = CalcMeanSquare(CalcLeft(selection_.terms)); BarWeakBodies(); before = barred_) {
+    selection_ = Select();
+    const double now = CalcMeanSquare(CalcLeft(selection_.terms));
+    if (now > kFarMore * left) {
+      barred_ = before;
+      selection_ = Select();
+      break;
+    }
+    left = now;
+  }
 }
 
 void TorqueEstimator::ListFaults() {
@@ -138,7 +151,7 @@ CauseSelection TorqueEstimator::Select() {
     Compress();
     // Where no more than noise is left, its likeness says nothing of causes.
     const double now = round == 0 ? CalcAlike(CalcUsual())
-                       : CalcMeanSquare(CalcLeft(selection.terms)) <= 1.0
+                       : CalcMeanSquare(CalcLeft(selection.terms)) <= Square(kMostNoise)
                            ? alike
                            : CalcAlike(CalcLeft(selection.terms));
     const bool is_settled = round > 1 && std::abs(now - alike) < 0.2 * alike;
