@@ -112,7 +112,7 @@ class Search {
 
   /// Orthonormal columns of the range of what these candidates have.
   [[nodiscard]] MatrixXd CalcRange(const std::vector<size_t>& set) const { return CalcRange(Collect(set)); }
-  static MatrixXd CalcRange(const MatrixXd& C) {
+  [[nodiscard]] MatrixXd CalcRange(const MatrixXd& C) const {
     MatrixXd Q(C.rows(), C.cols());
     Index used = 0;
     for (Index k = 0; k < C.cols(); ++k) {
@@ -120,17 +120,17 @@ class Search {
       const double size = column.norm();
       for (int twice = 0; twice < 2; ++twice)
         column -= Q.leftCols(used) * (Q.leftCols(used).transpose() * column);
-      if (!(column.norm() > kIndependent * size)) continue;
+      if (!(column.norm() > options_.independent * size)) continue;
       Q.col(used++) = column.normalized();
     }
     return Q.leftCols(used);
   }
 
   /// Whether others have all of what these columns have.
-  static bool AddsNothing(const MatrixXd& C, const MatrixXd& others) {
+  [[nodiscard]] bool AddsNothing(const MatrixXd& C, const MatrixXd& others) const {
     const MatrixXd Q = CalcRange(others);
     const MatrixXd own = C - Q * (Q.transpose() * C);
-    return (own.colwise().norm().array() <= kIndependent * C.colwise().norm().array()).all();
+    return (own.colwise().norm().array() <= options_.independent * C.colwise().norm().array()).all();
   }
 
   /// The criterion of `beside` and each candidate; infinite where it adds nothing.
@@ -155,10 +155,11 @@ class Search {
 
   /// Square of what is left of r without what some columns have beside others. @param sizes of the columns.
   /// @param own what they have beside those; spoilt.
-  static double CalcLeft(const Eigen::Ref<const VectorXd>& sizes, Eigen::Ref<MatrixXd> own, VectorXd r) {
+  [[nodiscard]] double CalcLeft(const Eigen::Ref<const VectorXd>& sizes, Eigen::Ref<MatrixXd> own,
+                                VectorXd r) const {
     for (Index k = 0; k < own.cols(); ++k) {
       const double size = own.col(k).norm();
-      if (!(size > kIndependent * sizes[k])) continue;
+      if (!(size > options_.independent * sizes[k])) continue;
       own.col(k) /= size;
       // By subtraction, since squares that nearly cancel say nothing of what is left.
       r -= own.col(k).dot(r) * own.col(k);
@@ -173,7 +174,7 @@ class Search {
     const MatrixXd Q = CalcRange(beside);
     const MatrixXd own = one.columns - Q * (Q.transpose() * one.columns);
     Eigen::CompleteOrthogonalDecomposition<MatrixXd> decomposition;
-    decomposition.setThreshold(kIndependent);
+    decomposition.setThreshold(options_.independent);
     return one.basis * decomposition.compute(own).solve(VectorXd(y_ - Q * (Q.transpose() * y_)));
   }
 

@@ -72,6 +72,8 @@ struct CauseOptions {
   double alike = 1.0;
   /// Of which y and the columns are sums with the same products; 0 for those of y.
   double rows = 0.0;
+  /// Part of a column beside others that counts: less is rounding.
+  double independent = 1e-7;
 };
 
 /// Candidates whose likelihoods differ by less than this factor are told as equals, natural logarithm.

@@ -8,6 +8,7 @@
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
+#include "harness/recordings/base_motion.h"
 #include "harness/recordings/position_faults.h"
 #include "harness/recordings/torque_estimator.h"
 
@@ -94,6 +95,25 @@ class Judge {
       return std::pair(a.recording, a.time) < std::pair(b.recording, b.time);
     });
     for (const CauseTerm& term : selection.terms) Name(term);
+    Refine(after);
+  }
+
+  /// Positions that are off by more than a little, rad or m: what that changes is no longer in proportion. Of
+  /// friction at low speed and of a base that shakes, velocity and frequency are sought on what was found.
+  void Refine(const VectorXd& left) {
+    constexpr double kLittle = 0.01;
+    Refinements& next = result_.refinements;
+    for (const FoundFault& one : result_.found) {
+      if (one.fault.kind == TorqueFault::kZero && std::abs(one.amplitude[0]) > kLittle)
+        next.offsets[one.fault.index] = one.amplitude[0];
+      if (one.fault.kind == TorqueFault::kStribeckFriction)
+        next.stribeck[one.fault.index] = StribeckVelocityOf(one.fault);
+    }
+    next.shaking = set_.shaking();
+    if (!result_.IsWhole() && next.shaking == 0.0) next.shaking = FindShaking(set_, estimator_.rows(), left);
+  }
+  [[nodiscard]] double StribeckVelocityOf(const TorqueFault& fault) const {
+    return set_[0].shape_velocities(fault.index, fault.columns.front().front().column.component);
   }
 
   /// Of what is left of such rows, in units of noise.
@@ -171,11 +191,9 @@ class Judge {
 
   void Name(const CauseTerm& term) {
     const TorqueFault& fault = estimator_.faults()[term.candidate];
-    const bool is_nuisance =
-        fault.kind == TorqueFault::kDelay && std::abs(term.amplitude[0]) <= 1.5 * set_.step();
-    if (is_nuisance && fault.index < 0) {
-      result_.notes.push_back(
-          fmt::format("the torques are {:.2g} s late, less than two rows: no cause", term.amplitude[0]));
+    if (fault.kind == TorqueFault::kDelay && std::abs(term.amplitude[0]) <= 1.5 * set_.step()) {
+      result_.notes.push_back(fmt::format("{}: torques are {:.2g} s late, less than two rows: no cause",
+                                          fault.place, term.amplitude[0]));
       return;
     }
     Explanation one;
@@ -202,7 +220,8 @@ class Judge {
     one.fault = fault.fault;
     one.place = fault.place;
     one.unit = fault.unit;
-    const bool is_number = a.size() == 1 || fault.kind == TorqueFault::kDelay;
+    const bool is_number =
+        a.size() == 1 || fault.kind == TorqueFault::kDelay || fault.kind == TorqueFault::kSpring;
     one.value = is_number ? fault.nominal + a[0] : a.norm();
     one.error = error.size() == 0 ? 0.0 : is_number ? error[0] : error.norm();
     const auto vector = [](const VectorXd& v) {
@@ -215,6 +234,22 @@ class Judge {
       one.value = a[0];
       one.error = error.size() == 0 ? 0.0 : error[0];
       one.detail = "at " + vector(a.segment<3>(1) / a[0]) + " m in its frame";
+    } else if (fault.kind == kSpring) {
+      one.detail = "at rest at " + FormatNumber(-a[1] / a[0], 3);
+    } else if (fault.kind == kShaking) {
+      one.value = a.head<6>().norm();
+      one.error = error.size() == 0 ? 0.0 : error.head<6>().norm();
+      const auto size = [&](Index i) { return a.segment<2>(2 * i).norm(); };
+      one.detail = fmt::format("at {} Hz, along its axes {}", FormatNumber(set_.shaking() / (2.0 * kPi), 4),
+                               vector(Vector3d(size(0), size(1), size(2))));
+      if (a.size() > 6) one.detail += ", about them " + vector(Vector3d(size(3), size(4), size(5))) + " rad";
+    } else if (fault.kind == kPush && fault.push.has_moment) {
+      one.value = a.head<3>().norm();
+      one.error = error.size() == 0 ? 0.0 : error.head<3>().norm();
+      one.detail = vector(a.head<3>()) + " N and " + vector(a.tail<3>()) + " N m at its centre of mass";
+    } else if (fault.kind == kPush && fault.push.link < 0 && fault.push.joint < 0) {
+      const double turned = 2.0 * std::asin(std::min(1.0, 0.5 * a.norm() / model_.gravity().norm()));
+      one.detail = vector(a) + ", or tilted by " + FormatNumber(RadToDeg(turned), 3) + " deg";
     } else if (fault.kind == kGravity) {
       const Vector3d now = model_.gravity() + a.head<3>();
       const double turned = std::atan2(now.cross(model_.gravity()).norm(), now.dot(model_.gravity()));
@@ -223,8 +258,7 @@ class Judge {
     } else if (fault.kind == kTorqueGain && std::abs(one.value + 1.0) < 0.2) {
       one.detail = "(the other sign)";
     } else if (fault.kind == kStribeckFriction) {
-      const TorqueColumn& column = fault.columns.front().front().column;
-      one.detail = "below about " + FormatNumber(set_[0].fit->CalcStribeckVelocity(column), 2) + " per s";
+      one.detail = "below about " + FormatNumber(StribeckVelocityOf(fault), 2) + " per s";
     } else if (!is_number) {
       one.detail = vector(a);
     }
@@ -261,17 +295,6 @@ bool Reopen(std::vector<Recording>* recordings, const std::function<void(Recordi
   return true;
 }
 
-/// Positions that are off by more than a little, rad or m: what that changes is no longer in proportion, and
-/// is judged again as what it is.
-std::map<int, double> TakeOffsets(const RecordingJudgement& judgement) {
-  constexpr double kLittle = 0.01;
-  std::map<int, double> offsets;
-  for (const FoundFault& one : judgement.found)
-    if (one.fault.kind == TorqueFault::kZero && std::abs(one.amplitude[0]) > kLittle)
-      offsets[one.fault.index] = one.amplitude[0];
-  return offsets;
-}
-
 }  // namespace
 
 RecordingJudgement JudgeRecordings(const RobotModel& model, std::vector<Recording>* recordings,
@@ -289,10 +312,13 @@ RecordingJudgement JudgeRecordings(const RobotModel& model, std::vector<Recordin
     if (fault) fault->Undo(one);
   };
   if (fault && Reopen(recordings, undo)) judgement = Judge(model, recordings, options, count).Run();
-  JudgeOptions second = options;
-  second.offsets = TakeOffsets(judgement);
-  if (!second.offsets.empty() && Reopen(recordings, undo))
-    judgement = Judge(model, recordings, second, count).Run();
+  constexpr int kReadings = 3;
+  JudgeOptions next = options;
+  for (int i = 1; i < kReadings && goes_on && judgement.refinements != next.refinements; ++i) {
+    next.refinements = judgement.refinements;
+    if (!Reopen(recordings, undo)) break;
+    judgement = Judge(model, recordings, next, count).Run();
+  }
   if (fault) judgement.causes.insert(judgement.causes.begin(), MakeCause(fault->fault));
   return judgement;
 }

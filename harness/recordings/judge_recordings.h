@@ -60,6 +60,7 @@ struct RecordingJudgement {
   std::vector<TorqueTrace> traces;
   std::vector<std::string> notes;
   long rows = 0;
+  Refinements refinements;  ///< With which a further reading would tell more.
 
   /// Beside the causes no more than noise is left.
   [[nodiscard]] bool IsWhole() const;

@@ -162,6 +162,8 @@ class MotionDesigner {
     constexpr size_t kEvery = 4;
     RecordedSample sample;
     sample.torque_rate = sample.torque_curvature = VectorXd::Zero(model_.num_joints());
+    sample.friction.resize(model_.num_joints(), kFrictionShapes);
+    const MatrixXd shape_velocities = ListShapeVelocities(0.5 * limits_.velocity);
     VectorXd largest = VectorXd::Zero(model_.num_joints());
     const std::vector<bool> all(joints_.size(), true);
     const size_t count = (times_.size() + kEvery - 1) / kEvery;
@@ -169,6 +171,8 @@ class MotionDesigner {
       sample.time = times_[g];
       motion.Calc(times_[g], &sample.q, &sample.qd, &sample.qdd);
       sample.direction = sample.qd.cwiseSign();
+      for (int i = 0; i < model_.num_joints(); ++i)
+        sample.friction.row(i) = CalcFrictionShapes(sample.qd[i], shape_velocities.row(i));
       sample.torque = CalcMotionTorques(sample.q, sample.qd, sample.qdd, &regressor_);
       largest = largest.cwiseMax(sample.torque.cwiseAbs());
       if (squares != nullptr) *squares += sample.torque.cwiseAbs2() / static_cast<double>(count);
@@ -248,7 +252,7 @@ class MotionDesigner {
     if (!GoesOn()) throw nlopt::forced_stop();
     ++best_.evaluations;
     const SeriesMotion motion = MakeMotion(x);
-    TorqueBalance balance(model_, joints_, 0.5 * limits_.velocity, false);
+    TorqueBalance balance(model_, joints_, false);
     const VectorXd largest = Follow(motion, &balance, nullptr);
     const double excess = CalcExcess(motion, largest);
     if (excess > 0.0) return -kImpossible * (1.0 + excess);

@@ -17,8 +17,13 @@ constexpr long kHeld = 5;             // rows that repeat one another; more of t
 
 }  // namespace
 
-MotionFit::MotionFit(const RobotModel& model, Recording* recording, size_t ahead)
-    : model_(&model), recording_(recording), regressor_(model), part_(std::max<size_t>(1, ahead / 8)) {
+MotionFit::MotionFit(const RobotModel& model, Recording* recording, size_t ahead,
+                     const Refinements& refinements)
+    : model_(&model),
+      recording_(recording),
+      regressor_(model),
+      refinements_(refinements),
+      part_(std::max<size_t>(1, ahead / 8)) {
   has_currents_ = !recording->Has(RecordedQuantity::kTorque);
   const RecordedQuantity effort = has_currents_ ? RecordedQuantity::kCurrent : RecordedQuantity::kTorque;
   for (int joint = 0; joint < model.num_joints(); ++joint)
@@ -181,12 +186,35 @@ BaseMotion MotionFit::CalcBase(const MatrixXd& fitted) const {
   return base;
 }
 
+void MotionFit::AverageFriction(int joint, const VectorXd& times, const VectorXd& rate,
+                                const VectorXd& weights) {
+  auto shapes = sample_.friction.row(joint);
+  shapes.setZero();
+  double direction = 0.0, slip = 0.0;
+  const bool moves = std::abs(sample_.qd[joint]) >= noise_.rest[joint];
+  for (Eigen::Index k = 0; k < times.size() && moves; ++k) {
+    double v = 0.0;
+    for (Eigen::Index p = rate.size(); p-- > 0;) v = v * times[k] + rate[p];
+    FrictionRow here = CalcFrictionShapes(v, shape_velocities_.row(joint));
+    const double sign = here[kSlipShape];
+    slip = k > 0 ? CalcSlip(sign, slip, std::abs(v) * (times[k] - times[k - 1])) : sign;
+    here[kSlipShape] = slip;
+    direction += weights[k] * sign;
+    shapes += weights[k] * here;
+  }
+  sample_.direction[joint] = direction;
+}
+
 bool MotionFit::Emit(size_t centre, const Receiver& receive) {
   const MatrixXd window = GetWindow(centre, half_);
   const MatrixXd C = CalcCoefficients(centre, half_, kOrder);
   const MatrixXd fitted = C * window;
   const int time = ChannelOf(RecordedQuantity::kTime, -1);
   sample_.time = rows_ahead_[centre][time];
+  const VectorXd times = window.col(time).array() - sample_.time;
+  const VectorXd phases = refinements_.shaking * window.col(time);
+  sample_.swing =
+      C.row(0) * (MatrixXd(phases.size(), 2) << phases.array().sin(), phases.array().cos()).finished();
   const RecordedQuantity effort = has_currents_ ? RecordedQuantity::kCurrent : RecordedQuantity::kTorque;
   for (int joint = 0; joint < model_->num_joints(); ++joint) {
     const int position = ChannelOf(RecordedQuantity::kPosition, joint);
@@ -198,22 +226,11 @@ bool MotionFit::Emit(size_t centre, const Receiver& receive) {
     sample_.qdd[joint] = acceleration >= 0 ? fitted(0, acceleration)
                          : velocity >= 0   ? fitted(1, velocity)
                                            : 2.0 * fitted(2, position);
-    // The sign, averaged as the torque is.
-    double direction = 0.0;
-    for (Eigen::Index k = 0; k < window.rows(); ++k) {
-      const double t = window(k, time) - sample_.time;
-      double rate = 0.0;
-      if (velocity >= 0) {
-        rate = fitted(0, velocity) +
-               t * (fitted(1, velocity) +
-                    t * (fitted(2, velocity) + t * (fitted(3, velocity) + t * fitted(4, velocity))));
-      } else {
-        rate = fitted(1, position) + t * (2.0 * fitted(2, position) +
-                                          t * (3.0 * fitted(3, position) + t * 4.0 * fitted(4, position)));
-      }
-      direction += C(0, k) * (rate > 0.0 ? 1.0 : rate < 0.0 ? -1.0 : 0.0);
-    }
-    sample_.direction[joint] = std::abs(sample_.qd[joint]) < noise_.rest[joint] ? 0.0 : direction;
+    const VectorXd rate =
+        velocity >= 0
+            ? VectorXd(fitted.col(velocity))
+            : VectorXd(fitted.col(position).tail<kOrder>().cwiseProduct(Eigen::Vector4d(1.0, 2.0, 3.0, 4.0)));
+    AverageFriction(joint, times, rate, C.row(0).transpose());
     const int torque = ChannelOf(effort, joint);
     if (torque < 0) continue;
     sample_.torque[joint] = fitted(0, torque);
@@ -228,20 +245,21 @@ bool MotionFit::Emit(size_t centre, const Receiver& receive) {
 
 void MotionFit::CalcSpeeds() {
   const Eigen::Index n = model_->num_joints();
-  speeds_ = VectorXd::Zero(n);
-  VectorXd moving = VectorXd::Zero(n);
+  VectorXd squares = VectorXd::Zero(n), moving = VectorXd::Zero(n);
+  shape_velocities_ = ListShapeVelocities(VectorXd::Ones(n));
   double count = 0.0;
   for (const size_t centre : ListCentres(half_)) {
     Emit(centre, [&](const RecordedSample& sample) {
-      speeds_ += sample.qd.cwiseAbs2();
+      squares += sample.qd.cwiseAbs2();
       moving += sample.direction.unaryExpr([](double s) { return s != 0.0 ? 1.0 : 0.0; });
       return true;
     });
     count += 1.0;
   }
-  speeds_ = (speeds_ / std::max(1.0, count)).cwiseSqrt();
+  const VectorXd speeds = (squares / std::max(1.0, count)).cwiseSqrt();
+  shape_velocities_ = ListShapeVelocities(speeds, refinements_.stribeck);
   constexpr double kSlow = 2e-3, kMoving = 0.2;
-  noise_.rest = noise_.rest.cwiseMax(kSlow * speeds_);
+  noise_.rest = noise_.rest.cwiseMax(kSlow * speeds);
   for (Eigen::Index joint = 0; joint < n; ++joint) moves_.push_back(moving[joint] > kMoving * count);
 }
 

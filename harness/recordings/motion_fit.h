@@ -11,22 +11,33 @@
 #include "controller/dynamics/torque_regressor.h"
 #include "harness/diagnosis/causes.h"
 #include "harness/recordings/channels.h"
+#include "harness/recordings/friction_shapes.h"
 
 namespace dexcheck {
 
 inline double Square(double x) { return x * x; }
+
+/// What a first reading told, so that the next has columns that fit better.
+struct Refinements {
+  std::map<int, double> offsets;   ///< Of joints' positions, rad or m.
+  std::map<int, double> stribeck;  ///< Velocities below which joints have more friction, rad/s or m/s.
+  double shaking = 0.0;            ///< Angular frequency of the base, rad/s; 0 where it rests.
+  bool operator==(const Refinements&) const = default;
+};
 
 /// A row after smoothing. Entries by joint, in the model's order; those of joints that were not recorded are
 /// zero.
 struct RecordedSample {
   double time = 0.0;
   VectorXd q, qd, qdd;
-  VectorXd torque;            ///< Measured, or the current; smoothed like the motion.
-  VectorXd torque_rate;       ///< Per s.
-  VectorXd torque_curvature;  ///< Per s^2.
-  BaseMotion base;            ///< At rest where it was not recorded.
-  VectorXd wrench;            ///< Measured, on the link, N and N m; empty for none.
-  VectorXd direction;         ///< Sign of the velocity, averaged as the torque is; 0 at rest.
+  VectorXd torque;                    ///< Measured, or the current; smoothed like the motion.
+  VectorXd torque_rate;               ///< Per s.
+  VectorXd torque_curvature;          ///< Per s^2.
+  BaseMotion base;                    ///< At rest where it was not recorded.
+  VectorXd wrench;                    ///< Measured, on the link, N and N m; empty for none.
+  VectorXd direction;                 ///< Sign of the velocity, averaged as the torque is; 0 at rest.
+  MatrixXd friction;                  ///< Other shapes of it, n x kFrictionShapes, likewise.
+  Vector2d swing = Vector2d::Zero();  ///< Sine and cosine of a base that shakes, averaged likewise.
 };
 
 /// Standard deviations, by joint.
@@ -48,7 +59,8 @@ class MotionFit {
 
   /// Reads ahead to see noise and sampling. Velocities that are not the positions' derivatives are not used.
   /// @param ahead rows. @throws InputError, one line that names file, row and column.
-  MotionFit(const RobotModel& model, Recording* recording, size_t ahead = 20'000);
+  MotionFit(const RobotModel& model, Recording* recording, size_t ahead = 20'000,
+            const Refinements& refinements = {});
 
   /// All samples, in time.
   void Run(const Receiver& receive);
@@ -61,8 +73,8 @@ class MotionFit {
   /// By joint: whether a sample says what moves it. Where friction holds a joint that moves at other times,
   /// it does not.
   [[nodiscard]] std::vector<bool> IsJudged(const RecordedSample& sample) const;
-  /// Root mean square of the velocities, by joint.
-  [[nodiscard]] const VectorXd& speeds() const { return speeds_; }
+  /// Of shapes of friction, by the root mean square of the joints' velocities.
+  [[nodiscard]] const MatrixXd& shape_velocities() const { return shape_velocities_; }
   /// Root mean square of the entries of M_bar'.
   [[nodiscard]] const MatrixXd& inertia() const { return inertia_; }
   [[nodiscard]] bool has_currents() const { return has_currents_; }
@@ -96,12 +108,16 @@ class MotionFit {
   /// Of a base whose pose was recorded, by the polynomials.
   [[nodiscard]] BaseMotion CalcBase(const MatrixXd& fitted) const;
   void CheckBase(Row* row) const;
+  /// Averages the shapes of a joint's friction over a window. @param rate coefficients of its velocity.
+  void AverageFriction(int joint, const VectorXd& times, const VectorXd& rate, const VectorXd& weights);
   bool Emit(size_t centre, const Receiver& receive);
   [[nodiscard]] MatrixXd CalcInertia(const std::vector<size_t>& centres);
 
   const RobotModel* model_;
   Recording* recording_;
   TorqueRegressor regressor_;
+  Refinements refinements_;
+  MatrixXd shape_velocities_;
   size_t part_;  // rows that are read at once
   std::vector<int> judged_;
   std::vector<Fault> faults_;
@@ -115,7 +131,6 @@ class MotionFit {
   double step_ = 0.0;
   mutable std::map<std::pair<size_t, int>, MatrixXd> even_;  // of CalcCoefficients, by half and order
   size_t half_ = 2, stride_ = 1;
-  VectorXd speeds_;
   std::vector<bool> moves_;
   MatrixXd inertia_;
   MotionNoise noise_;

@@ -66,6 +66,7 @@ void MotionFit::Analyse() {
         &noise_.acceleration, &noise_.rest, &sample_.q, &sample_.qd, &sample_.qdd, &sample_.torque,
         &sample_.torque_rate, &sample_.torque_curvature, &sample_.direction})
     *vector = VectorXd::Zero(n);
+  sample_.friction = MatrixXd::Zero(n, kFrictionShapes);
   // Noise of each channel: what a polynomial over a short window leaves.
   constexpr size_t kShort = 8;
   const size_t half = std::min(kShort, (rows_ahead_.size() - 1) / 2);

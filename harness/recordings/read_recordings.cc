@@ -26,7 +26,7 @@ RobotModel AddPayload(const RobotModel& model, const std::optional<DeclaredPaylo
 
 RecordingSet::RecordingSet(const RobotModel& model, std::vector<Recording>* recordings,
                            const ReadOptions& options, const std::function<bool(long rows)>& on_rows)
-    : model_(&model), first_name_(recordings->front().name) {
+    : model_(&model), first_name_(recordings->front().name), shaking_(options.refinements.shaking) {
   for (const Recording& recording : *recordings)
     if (model.base().type != BaseType::kFixed && !recording.Has(RecordedQuantity::kBase))
       throw InputError(model.spec().source + ": base: moves; " + recording.name +
@@ -57,7 +57,7 @@ void RecordingSet::Read(Recording* recording, const ReadOptions& options,
                         const std::function<bool(long rows)>& on_rows) {
   ReadRecording& one = read_.emplace_back();
   one.model = std::make_unique<RobotModel>(AddPayload(*model_, recording->payload));
-  MotionFit motion(*one.model, recording, options.ahead);
+  MotionFit motion(*one.model, recording, options.ahead, options.refinements);
   if (read_.size() == 1) {
     joints_ = motion.joints();
     has_currents_ = motion.has_currents();
@@ -66,14 +66,13 @@ void RecordingSet::Read(Recording* recording, const ReadOptions& options,
     throw InputError(recording->name + ": must have the quantities of " + first_name_);
   }
   step_ = std::max(step_, motion.step());
-  one.fit = std::make_unique<TorqueBalance>(*one.model, joints_, motion.speeds(), has_currents_);
-  one.held = std::make_unique<TorqueBalance>(*one.model, joints_, motion.speeds(), has_currents_);
-  for (const auto& [joint, offset] : options.offsets)
-    for (TorqueBalance* balance : {one.fit.get(), one.held.get()}) balance->SetPositionStep(joint, -offset);
-  for (TorqueBalance* balance : {one.fit.get(), one.held.get()}) balance->SetWrenchPlace(recording->wrench);
+  for (std::unique_ptr<TorqueBalance>* balance : {&one.fit, &one.held}) {
+    *balance = std::make_unique<TorqueBalance>(*one.model, joints_, has_currents_, options.refinements);
+    (*balance)->SetWrenchPlace(recording->wrench);
+  }
   long samples = 0;
   motion.Run([&](const RecordedSample& sample) {
-    constexpr long kStretch = 64, kEvery = 4;
+    constexpr long kStretch = 16, kEvery = 4;
     TorqueBalance& balance = (samples / kStretch) % kEvery == kEvery - 1 ? *one.held : *one.fit;
     balance.Add(sample, motion.IsJudged(sample));
     TellSecond(options, sample.time, balance.residual());
@@ -88,6 +87,7 @@ void RecordingSet::Read(Recording* recording, const ReadOptions& options,
   one.motion = motion.noise();
   one.inertia = motion.inertia();
   one.step = motion.step();
+  one.shape_velocities = motion.shape_velocities();
 }
 
 void RecordingSet::TellSecond(const ReadOptions& options, double time, const VectorXd& residual) {

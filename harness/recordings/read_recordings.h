@@ -16,8 +16,8 @@ struct ReadOptions {
   /// Called for every second of a recording: root mean squares of what the model does not explain of these
   /// joints' torques, N m or N, since the call before.
   std::function<void(double time, const std::vector<int>& joints, const VectorXd& residual)> on_second;
-  size_t ahead = 20'000;          ///< Rows that are read before the first is judged.
-  std::map<int, double> offsets;  ///< Of joints' positions, as far as they are known, rad or m.
+  size_t ahead = 20'000;  ///< Rows that are read before the first is judged.
+  Refinements refinements;
 };
 
 /// One recording: a quarter of it, in stretches, is kept for the end.
@@ -26,9 +26,10 @@ struct ReadRecording {
   std::unique_ptr<TorqueBalance> fit, held;
   MotionNoise motion;
   MatrixXd inertia;
-  double step = 0.0;  ///< Between rows, s.
-  VectorXd noise;     ///< Of a sample's balance, by judged joint, N m or N.
-  VectorXd weight;    ///< Likewise: noise, or what no cause explains.
+  MatrixXd shape_velocities;  ///< MotionFit's.
+  double step = 0.0;          ///< Between rows, s.
+  VectorXd noise;             ///< Of a sample's balance, by judged joint, N m or N.
+  VectorXd weight;            ///< Likewise: noise, or what no cause explains.
 };
 
 class RecordingSet {
@@ -58,7 +59,8 @@ class RecordingSet {
   /// Gains that became others than were estimated are not known. @return whether there are any.
   bool DropUnknownGains();
 
-  [[nodiscard]] double step() const { return step_; }  ///< The longest between rows, s.
+  [[nodiscard]] double shaking() const { return shaking_; }  ///< Of the base, as was told, rad/s.
+  [[nodiscard]] double step() const { return step_; }        ///< The longest between rows, s.
   [[nodiscard]] long rows() const { return rows_; }
   [[nodiscard]] const std::vector<std::string>& notes() const { return notes_; }
   /// Of the recordings themselves: velocities that are not the positions' derivatives.
@@ -78,7 +80,7 @@ class RecordingSet {
   std::vector<ReadRecording> read_;
   std::vector<int> joints_;
   bool has_currents_ = false;
-  double step_ = 0.0;
+  double step_ = 0.0, shaking_;
   VectorXd gains_, first_gains_;  // by place
   long rows_ = 0;
   std::vector<std::string> notes_;

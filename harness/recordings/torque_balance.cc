@@ -8,14 +8,19 @@ namespace dexcheck {
 
 using Eigen::Index;
 
-TorqueBalance::TorqueBalance(const RobotModel& model, const std::vector<int>& joints, const VectorXd& speeds,
-                             bool has_currents)
-    : model_(&model), regressor_(model), joints_(joints), speeds_(speeds), has_currents_(has_currents) {
+TorqueBalance::TorqueBalance(const RobotModel& model, const std::vector<int>& joints, bool has_currents,
+                             const Refinements& refinements)
+    : model_(&model),
+      regressor_(model),
+      joints_(joints),
+      has_currents_(has_currents),
+      frequency_(refinements.shaking) {
   const Index n = model.num_joints();
   bodies_.resize(n, TorqueRegressor::kBody * n);
   gravity_.resize(n, 3);
   forces_.resize(n, 6);
   by_position_.resize(n, n);
+  shaking_.resize(n, 12);
   torques_.resize(n);
   moved_.resize(n);
   q_.resize(n);
@@ -23,6 +28,7 @@ TorqueBalance::TorqueBalance(const RobotModel& model, const std::vector<int>& jo
   wrench_squares_ = MatrixXd::Zero(residual_.size(), 6);
   constexpr double kStep = 1e-6;
   steps_ = VectorXd::Constant(n, kStep);
+  for (const auto& [joint, offset] : refinements.offsets) steps_[joint] = -offset;
   ListColumns(has_currents);
   for (const std::vector<TorqueColumn>& columns : columns_) {
     const auto width = static_cast<Index>(columns.size()) + 1;
@@ -49,10 +55,11 @@ void TorqueBalance::ListColumns(bool has_currents) {
     if (has_currents) columns.push_back({TorqueColumn::kCurrent, joint});
     for (const auto kind :
          {TorqueColumn::kRate, TorqueColumn::kCurvature, TorqueColumn::kOffset, TorqueColumn::kDry,
-          TorqueColumn::kViscous, TorqueColumn::kAcceleration, TorqueColumn::kLoad})
+          TorqueColumn::kViscous, TorqueColumn::kAcceleration, TorqueColumn::kLoad, TorqueColumn::kAngle})
       columns.push_back({kind, joint});
-    for (const int tenths : {1, 3, 10}) columns.push_back({TorqueColumn::kSmooth, joint, tenths});
-    for (const int tenths : {0, 2}) columns.push_back({TorqueColumn::kSlow, joint, tenths});
+    for (int k = 0; k < kFrictionShapes; ++k) columns.push_back({TorqueColumn::kFriction, joint, k});
+    for (int k = 0; frequency_ > 0.0 && k < shaking_.cols(); ++k)
+      columns.push_back({TorqueColumn::kShaking, 0, k});
     std::map<TorqueColumn, Index>& places = places_.emplace_back();
     for (const TorqueColumn& column : columns) places.emplace(column, static_cast<Index>(places.size()));
   }
@@ -109,16 +116,15 @@ void TorqueBalance::FillRow(size_t place, const RecordedSample& sample, Eigen::R
       case TorqueColumn::kAcceleration:
         entry = sample.qdd[joint];
         break;
-      case TorqueColumn::kSlow: {
-        const double slow = CalcStribeckVelocity(column);
-        entry = slow > 0.0 ? direction * std::exp(-rate * rate / (slow * slow)) : 0.0;
+      case TorqueColumn::kFriction:
+        entry = sample.friction(joint, column.component);
         break;
-      }
-      case TorqueColumn::kSmooth: {
-        const double slow = 0.1 * column.component * speeds_[joint];
-        entry = slow > 0.0 ? std::tanh(rate / slow) : 0.0;
+      case TorqueColumn::kAngle:
+        entry = sample.q[joint];
         break;
-      }
+      case TorqueColumn::kShaking:
+        entry = shaking_(joint, column.component);
+        break;
       case TorqueColumn::kLoad:
         entry = direction * std::abs(torques_[joint]);
         break;
@@ -139,6 +145,23 @@ MatrixXd TorqueBalance::CalcWrenchColumns() {
   return columns;
 }
 
+void TorqueBalance::CalcShakingColumns(const RecordedSample& sample) {
+  constexpr double kStep = 1e-6;  // rad
+  const double w = frequency_;
+  for (int k = 0; k < 3; ++k)
+    for (int phase = 0; phase < 2; ++phase) {
+      const double value = sample.swing[phase];
+      const double rate = phase == 0 ? w * sample.swing[1] : -w * sample.swing[0];
+      const Vector3d turn = kStep * Vector3d::Unit(k);
+      shaking_.col(2 * k + phase) = w * w * value * gravity_.col(k);
+      const Matrix3d R = Eigen::AngleAxisd(kStep * value, Vector3d::Unit(k)).toRotationMatrix();
+      regressor_.SetMotion(sample.q, sample.qd, sample.qdd,
+                           {R, rate * turn, -w * w * value * turn, Vector3d::Zero()});
+      regressor_.CalcTorques(shaking_.col(6 + 2 * k + phase));
+    }
+  shaking_.rightCols<6>() = (shaking_.rightCols<6>().colwise() - torques_).eval() / kStep;
+}
+
 void TorqueBalance::Add(const RecordedSample& sample, const std::vector<bool>& is_judged) {
   q_ = sample.q;
   for (Index k = 0; k < q_.size(); ++k) {
@@ -152,6 +175,10 @@ void TorqueBalance::Add(const RecordedSample& sample, const std::vector<bool>& i
   regressor_.CalcBodyColumns(bodies_);
   regressor_.CalcGravityColumns(gravity_);
   by_position_ = (by_position_.colwise() - torques_) * steps_.cwiseInverse().asDiagonal();
+  if (frequency_ > 0.0) {
+    CalcShakingColumns(sample);
+    regressor_.SetMotion(sample.q, sample.qd, sample.qdd, sample.base);
+  }
   if (wrench_.link >= 0) {
     const MatrixXd columns = CalcWrenchColumns();
     torques_ += columns * sample.wrench;
@@ -165,12 +192,14 @@ void TorqueBalance::Add(const RecordedSample& sample, const std::vector<bool>& i
     for (const MatrixXd& products : products_) block.sums.push_back(VectorXd::Zero(products.rows()));
     block.counts.assign(joints_.size(), 0.0);
     block.forces = MatrixXd::Zero(static_cast<Index>(joints_.size()), 6 * model_->num_joints());
+    block.gravity = MatrixXd::Zero(static_cast<Index>(joints_.size()), 3);
     block.q = VectorXd::Zero(model_->num_joints());
   }
   Block& block = blocks_.back();
   block.to = sample.time;
   block.samples += 1.0;
   block.q += sample.q;
+  block.gravity += gravity_(joints_, Eigen::all);
   for (int link = 0; link < model_->num_joints(); ++link) {
     regressor_.CalcForceColumns(link, forces_);
     for (size_t place = 0; place < joints_.size(); ++place)
@@ -211,6 +240,7 @@ void TorqueBalance::MergeBlocks() {
     const Block& next = blocks_[i + 1];
     block.to = next.to;
     block.forces += next.forces;
+    block.gravity += next.gravity;
     block.q += next.q;
     block.samples += next.samples;
     for (size_t place = 0; place < joints_.size(); ++place) {

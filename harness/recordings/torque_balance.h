@@ -29,9 +29,10 @@ struct TorqueColumn {
     kDry,      ///< Direction of motion.
     kViscous,  ///< Velocity.
     kAcceleration,
-    kSlow,    ///< Direction times exp(-(v / v_s)^2); of a Stribeck velocity.
-    kSmooth,  ///< tanh of the velocity over component tenths of its usual size.
-    kLoad,    ///< Direction times the size of the model's torque.
+    kFriction,  ///< RecordedSample::friction, by component.
+    kLoad,      ///< Direction times the size of the model's torque.
+    kAngle,     ///< Position.
+    kShaking,   ///< By a base that shakes: m along each axis, then rad about it; the sine's and the cosine's.
   };
   Kind kind;
   int index = 0;
@@ -41,17 +42,9 @@ struct TorqueColumn {
 
 class TorqueBalance {
  public:
-  /// @param joints that are judged. @param speeds usual size of each joint's velocity, at which kSlow ends.
-  TorqueBalance(const RobotModel& model, const std::vector<int>& joints, const VectorXd& speeds,
-                bool has_currents);
-
-  /// v_s of kSlow: component + 1 tenths of the velocity's usual size, rad/s or m/s.
-  [[nodiscard]] double CalcStribeckVelocity(const TorqueColumn& column) const {
-    return 0.1 * (column.component + 1) * speeds_[column.index];
-  }
-
-  /// How much positions are thought to be off, rad or m, by joint: kPosition is the secant over it.
-  void SetPositionStep(int joint, double step) { steps_[joint] = step; }
+  /// @param joints that are judged. @param refinements offsets: kPosition is the secant over them; shaking.
+  TorqueBalance(const RobotModel& model, const std::vector<int>& joints, bool has_currents,
+                const Refinements& refinements = {});
 
   /// What measures the samples' wrench.
   void SetWrenchPlace(const WrenchPlace& place) { wrench_ = place; }
@@ -73,6 +66,7 @@ class TorqueBalance {
     std::vector<VectorXd> sums;   ///< By judged joint: its columns, y last.
     std::vector<double> counts;   ///< Of its samples.
     MatrixXd forces;              ///< Judged joints x 6 links: CalcForceColumns of each link.
+    MatrixXd gravity;             ///< Judged joints x 3: CalcGravityColumns.
     VectorXd q;                   ///< All joints.
     double samples = 0.0;
   };
@@ -96,6 +90,7 @@ class TorqueBalance {
   void ListColumns(bool has_currents);
   /// What balances a force at the wrench's point and a moment, in its axes: n x 6.
   [[nodiscard]] MatrixXd CalcWrenchColumns();
+  void CalcShakingColumns(const RecordedSample& sample);
   /// The model's, at a joint.
   [[nodiscard]] double CalcFriction(int joint, const RecordedSample& sample) const;
   void FillRow(size_t place, const RecordedSample& sample, Eigen::Ref<VectorXd> row) const;
@@ -106,8 +101,8 @@ class TorqueBalance {
   const RobotModel* model_;
   TorqueRegressor regressor_;
   std::vector<int> joints_;
-  VectorXd speeds_;
   bool has_currents_;
+  double frequency_;  // of a base that shakes
   std::vector<std::vector<TorqueColumn>> columns_;
   std::vector<std::map<TorqueColumn, Eigen::Index>> places_;
   std::vector<MatrixXd> products_, rows_;
@@ -117,7 +112,7 @@ class TorqueBalance {
   std::vector<Block> blocks_;
   double block_samples_ = 1.0;
   // at the sample
-  MatrixXd bodies_, gravity_, forces_, by_position_;
+  MatrixXd bodies_, gravity_, forces_, by_position_, shaking_;
   WrenchPlace wrench_;
   MatrixXd wrench_squares_;
   VectorXd torques_, moved_, q_, steps_, residual_;

@@ -31,8 +31,8 @@ BodyVector CentreColumn(const MassProperties& body, int k) {
 
 class FaultList {
  public:
-  FaultList(const RobotModel& model, const std::vector<int>& joints, int recordings)
-      : model_(model), joints_(joints), recordings_(recordings) {}
+  FaultList(const RobotModel& model, const std::vector<int>& joints, int recordings, double shaking)
+      : model_(model), joints_(joints), recordings_(recordings), shaking_(shaking) {}
 
   std::vector<TorqueFault> Make() {
     for (const int joint : joints_) AddJoint(joint);
@@ -76,14 +76,17 @@ class FaultList {
                modelled.dry_friction, true);
     AddAtJoint(kViscousFriction, joint, "viscous friction", rate, {TorqueColumn::kViscous, joint},
                modelled.damping, true);
-    for (const int tenths : {1, 3, 10})
-      AddAtJoint(kDryFriction, joint, "dry friction", torque, {TorqueColumn::kSmooth, joint, tenths},
-                 modelled.dry_friction, true)
+    for (int shape = 0; shape < kFrictionShapes; ++shape) {
+      const bool is_stribeck = shape > kSmoothShapes;
+      AddAtJoint(is_stribeck ? kStribeckFriction : kDryFriction, joint,
+                 is_stribeck ? "Stribeck friction" : "dry friction", torque,
+                 {TorqueColumn::kFriction, joint, shape}, is_stribeck ? 0.0 : modelled.dry_friction,
+                 !is_stribeck)
           .parameters = 1;
-    for (const int tenths : {0, 2})
-      AddAtJoint(kStribeckFriction, joint, "Stribeck friction", torque, {TorqueColumn::kSlow, joint, tenths},
-                 0.0, false)
-          .parameters = 1;
+    }
+    TorqueFault& spring = AddAtJoint(kSpring, joint, "spring", turns ? "N m/rad" : "N/m",
+                                     {TorqueColumn::kAngle, joint}, 0.0, true);
+    spring.columns.push_back({{{TorqueColumn::kOffset, joint}, joint}});
     AddAtJoint(kLoadFriction, joint, "friction that grows with the load", "", {TorqueColumn::kLoad, joint},
                0.0, true);
     AddAtJoint(kOffset, joint, "torque offset", torque, {TorqueColumn::kOffset, joint}, 0.0, false);
@@ -191,7 +194,8 @@ class FaultList {
       gain.push_back({{TorqueColumn::kTorque, joint}, joint, 1.0});
     }
     if (joints_.size() > 1) {
-      AddInAll(kAllDry, "dry friction", {TorqueColumn::kDry});
+      for (const auto shape : {TorqueColumn::kDry, TorqueColumn::kFriction})
+        AddInAll(kAllDry, "dry friction", {shape}).parameters = shape == TorqueColumn::kDry ? 0 : 1;
       AddInAll(kAllFriction, "dry and viscous friction", {TorqueColumn::kDry, TorqueColumn::kViscous});
       AddInAll(kAllOffsets, "torque offset", {TorqueColumn::kOffset}).is_possible = nullptr;
       Add(kDelay, -1, "delay of the torques", "all joints", "s", {delay, curvature}).scale = DelayScale();
@@ -202,6 +206,14 @@ class FaultList {
     const double g = std::max(model_.gravity().norm(), 1.0);
     gravity.scale = VectorXd::Constant(3, g);
     gravity.is_ordinary = true;
+    constexpr double kSwing = 0.3;  // m, rad
+    for (const int width : {6, 12}) {
+      if (!(shaking_ > 0.0)) break;
+      TorqueFault& one = Add(kShaking, -1, width == 6 ? "shaking" : "shaking and tilting", "base", "m", {});
+      for (int k = 0; k < width; ++k) one.columns.push_back({{{TorqueColumn::kShaking, 0, k}}});
+      one.scale = VectorXd::Constant(width, kSwing);
+      one.parameters = 1;
+    }
   }
 
   /// A torque that has nothing to do with the model's is no gain.
@@ -228,6 +240,7 @@ class FaultList {
   const RobotModel& model_;
   const std::vector<int>& joints_;
   int recordings_;
+  double shaking_;
   std::vector<TorqueFault> faults_;
 };
 
@@ -277,8 +290,8 @@ BodyVector FindNearestBody(const BodyVector& body) {
 }
 
 std::vector<TorqueFault> ListTorqueFaults(const RobotModel& model, const std::vector<int>& joints,
-                                          int recordings) {
-  return FaultList(model, joints, recordings).Make();
+                                          int recordings, double shaking) {
+  return FaultList(model, joints, recordings, shaking).Make();
 }
 
 void ShiftCentre(const RobotModel& model, const Vector3d& shift, TorqueFault* centre) {
@@ -319,11 +332,18 @@ std::vector<TorqueFault> ListPushes(const RobotModel& model, const std::vector<i
     one.recording = when.recording;
     one.parameters = 2;  // when it begins and ends
     constexpr double kForce = 100.0;
-    one.scale = VectorXd::Constant(unit == "N" && place.starts_with("link") ? 3 : 1, kForce);
+    one.scale = VectorXd::Constant(1, kForce);
     return one;
   };
   for (int link = 0; link < model.num_joints(); ++link)
-    add("force", "link " + model.link_name(link), "N").push.link = link;
+    for (const bool has_moment : {false, true}) {
+      TorqueFault& one = add("force", "link " + model.link_name(link), "N");
+      one.push.link = link;
+      one.push.has_moment = has_moment;
+      one.scale = one.scale.replicate(has_moment ? 6 : 3, 1).eval();
+    }
+  TorqueFault& base = add("acceleration", "base", "m/s^2");
+  base.scale = base.scale.replicate(3, 1).eval();
   for (const int joint : joints)
     add("torque", "joint " + model.joint(joint).name,
         model.joint(joint).type == JointType::kRevolute ? "N m" : "N")

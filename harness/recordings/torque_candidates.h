@@ -18,12 +18,15 @@ struct ColumnPart {
   int recording = -1;  ///< -1 for all.
 };
 
-/// A force on a link (three columns, world axes, at its centre of mass) or a torque at a joint, for a time.
+/// A force on a link (three columns, world axes, at its centre of mass; six with a moment), a torque at a
+/// joint, or an acceleration of the base (three columns), for a time.
 struct Push {
   int recording = 0;
-  double from = 0.0, to = 0.0;  ///< s
+  double from = 0.0, to = 0.0;       ///< s
+  double before = 0.0, after = 0.0;  ///< Part of it that acts in the blocks of time beside these.
   int link = -1;
-  int joint = -1;
+  bool has_moment = false;
+  int joint = -1;  ///< -1 besides no link: the base.
 };
 
 /// A fault of the model at a place.
@@ -36,6 +39,7 @@ struct TorqueFault {
     kViscousFriction,
     kStribeckFriction,
     kLoadFriction,
+    kSpring,
     kOffset,
     kArmature,
     kTorqueGain,
@@ -47,6 +51,7 @@ struct TorqueFault {
     kInertia,
     kPayload,
     kGravity,
+    kShaking,
     kPush,
   };
   Kind kind;
@@ -64,9 +69,10 @@ struct TorqueFault {
 };
 
 /// All that are tried of a model's recordings.
-/// @param joints that are judged. @param recordings their number.
+/// @param joints that are judged. @param recordings their number. @param shaking frequency of the base,
+/// rad/s.
 std::vector<TorqueFault> ListTorqueFaults(const RobotModel& model, const std::vector<int>& joints,
-                                          int recordings);
+                                          int recordings, double shaking = 0.0);
 
 /// Gives a payload's columns, of its mass (kg) and mass times place (kg m), the inertia of a point near such
 /// a one; a payload of ten columns stays as it is.

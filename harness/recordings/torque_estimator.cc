@@ -6,33 +6,54 @@
 #include <limits>
 
 #include "controller/common/errors.h"
+#include "harness/recordings/base_motion.h"
 
 namespace dexcheck {
 namespace {
 
 using Eigen::Index;
 
-/// To where half of the push is there: smoothing spreads its begin and end.
-void TrimWindow(const VectorXd& squares, Index* first, Index* last) {
-  std::vector<double> within(squares.begin() + *first, squares.begin() + *last + 1);
-  std::nth_element(within.begin(), within.begin() + static_cast<std::ptrdiff_t>(within.size() / 2),
-                   within.end());
-  const double half = 0.25 * within[within.size() / 2];
-  while (*first < *last && squares[*first] < half) ++*first;
-  while (*last > *first && squares[*last] < half) --*last;
+double Median(const VectorXd& values) {
+  std::vector<double> sorted(values.begin(), values.end());
+  const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
+  std::nth_element(sorted.begin(), middle, sorted.end());
+  return *middle;
+}
+
+/// A push does not hide behind what it adds to its joint's noise.
+VectorXd InUnitsOfMedian(const VectorXd& squares) {
+  const double usual = squares.size() > 0 ? Median(squares) : 0.0;
+  return usual > 0.0 ? VectorXd(squares / usual) : squares;
+}
+
+/// A stretch that stands out.
+struct Window {
+  Index first = 0, last = 0;         // blocks that are wholly in it
+  double before = 0.0, after = 0.0;  // parts of the blocks beside these
+};
+
+/// Smoothing, and where blocks begin, spread a push's begin and end: the parts of the blocks there are by
+/// what is seen in them. @param usual what blocks have without it.
+Window TrimWindow(const VectorXd& squares, double usual, Index first, Index last) {
+  const double whole = Median(squares.segment(first, last - first + 1));
+  constexpr double kNearlyWhole = 0.64;
+  while (first < last && squares[first] < kNearlyWhole * whole) ++first;
+  while (last > first && squares[last] < kNearlyWhole * whole) --last;
+  const auto part = [&](Index at) {
+    const double square = at < 0 || at >= squares.size() ? 0.0 : squares[at] - usual;
+    return std::sqrt(std::clamp(square / whole, 0.0, 1.0));
+  };
+  return {first, last, part(first - 1), part(last + 1)};
 }
 
 /// The few stretches that stand out most.
-std::vector<std::pair<size_t, size_t>> FindWindows(const VectorXd& squares) {
+std::vector<Window> FindWindows(const VectorXd& squares) {
   constexpr size_t kMost = 3;
   constexpr double kStandsOut = 12.0, kStays = 4.0;
-  std::vector<double> sorted(squares.begin(), squares.end());
-  if (sorted.size() < 16) return {};
-  std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2),
-                   sorted.end());
-  const double usual = std::max(sorted[sorted.size() / 2], std::numeric_limits<double>::min());
+  if (squares.size() < 16) return {};
+  const double usual = std::max(Median(squares), std::numeric_limits<double>::min());
   VectorXd rest = squares;
-  std::vector<std::pair<size_t, size_t>> windows;
+  std::vector<Window> windows;
   while (windows.size() < kMost) {
     Index peak = 0;
     if (!(rest.maxCoeff(&peak) > kStandsOut * usual)) break;
@@ -41,11 +62,9 @@ std::vector<std::pair<size_t, size_t>> FindWindows(const VectorXd& squares) {
     const auto stays = [&](Index at) { return at >= 0 && at < rest.size() && rest[at] > kStays * usual; };
     while (stays(first - 1) || stays(first - 2)) --first;
     while (stays(last + 1) || stays(last + 2)) ++last;
-    TrimWindow(rest, &first, &last);
-    rest.segment(first, last - first + 1).setZero();
     // What stands out half of the time is no push.
-    if (last - first > squares.size() / 2) break;
-    windows.emplace_back(first, last);
+    if (last - first <= squares.size() / 2) windows.push_back(TrimWindow(squares, usual, first, last));
+    rest.segment(first, last - first + 1).setZero();
   }
   return windows;
 }
@@ -55,11 +74,14 @@ double CalcPlausible(const TorqueFault& fault, Index k) {
   return fault.scale.size() > 0 ? fault.scale[k] : std::max(1.0, std::abs(fault.nominal));
 }
 
+/// Rounding of sums of products hides what a column has less of beside others.
+constexpr double kIndependent = 1e-5;
+
 /// An upper triangular R, without its rows of zeros, with R^T R = G, which may be singular: Cholesky's, in
 /// blocks, in which a column that adds nothing to those before it has no row.
 MatrixXd CalcFactor(const MatrixXd& G) {
   constexpr Index kBlock = 48;
-  constexpr double kAddsNothing = 1e-14;
+  constexpr double kAddsNothing = 0.01 * kIndependent * kIndependent;
   const Index n = G.cols();
   MatrixXd R = MatrixXd::Zero(n, n);
   Index rank = 0;
@@ -92,13 +114,27 @@ TorqueEstimator::TorqueEstimator(RecordingSet* recordings, size_t most_causes)
     barred_.resize(faults_.size(), false);
     selection_ = Select();
   }
-  while (BarSecondPushes() || BarWeakBodies()) selection_ = Select();
+  while (BarSecondPushes()) selection_ = Select();
+  // What leaves far more without them was no friction.
+  constexpr double kFarMore = 1.5;
+  std::vector<bool> before = barred_;
+  for (double left = CalcMeanSquare(CalcLeft(selection_.terms)); BarWeakBodies(); before = barred_) {
+    selection_ = Select();
+    const double now = CalcMeanSquare(CalcLeft(selection_.terms));
+    if (now > kFarMore * left) {
+      barred_ = before;
+      selection_ = Select();
+      break;
+    }
+    left = now;
+  }
 }
 
 void TorqueEstimator::ListFaults() {
   const std::vector<int> judged = recordings_->ListJudged();
   if (judged.empty()) throw InputError("the recordings tell no joint's drive gain: nothing can be judged");
-  faults_ = ListTorqueFaults(recordings_->model(), judged, static_cast<int>(recordings_->size()));
+  faults_ = ListTorqueFaults(recordings_->model(), judged, static_cast<int>(recordings_->size()),
+                             recordings_->shaking());
   if (recordings_->has_currents())
     std::erase_if(faults_, [](const TorqueFault& one) { return one.kind == TorqueFault::kTorqueGain; });
   barred_.assign(faults_.size(), false);
@@ -113,7 +149,11 @@ CauseSelection TorqueEstimator::Select() {
   for (int round = 0; round < kRounds; ++round) {
     rows_ = MakeTorqueRows(*recordings_, faults_, /*is_held=*/false);
     Compress();
-    const double now = CalcAlike(round == 0 ? CalcUsual() : CalcLeft(selection.terms));
+    // Where no more than noise is left, its likeness says nothing of causes.
+    const double now = round == 0 ? CalcAlike(CalcUsual())
+                       : CalcMeanSquare(CalcLeft(selection.terms)) <= Square(kMostNoise)
+                           ? alike
+                           : CalcAlike(CalcLeft(selection.terms));
     const bool is_settled = round > 1 && std::abs(now - alike) < 0.2 * alike;
     alike = now;
     selection = SelectAmong(alike);
@@ -179,6 +219,18 @@ Index TorqueEstimator::CountForcedRows() const {
 }
 
 CauseSelection TorqueEstimator::SelectAmong(double alike) const {
+  CauseSelection best = SelectAmong(alike, barred_);
+  // A fault in all joints goes before several single ones, of which the first alone explains less.
+  std::vector<bool> barred = barred_;
+  for (const CauseTerm& term : best.terms)
+    if (faults_[term.candidate].index < 0 && faults_[term.candidate].columns.size() > 3)
+      barred[term.candidate] = true;
+  if (barred == barred_) return best;
+  CauseSelection other = SelectAmong(alike, barred);
+  return other.criterion < best.criterion ? other : best;
+}
+
+CauseSelection TorqueEstimator::SelectAmong(double alike, const std::vector<bool>& barred) const {
   const Index width = R_.cols();
   const Index begin = CountForcedRows(), rows = R_.rows() - begin;
   std::vector<Candidate> candidates;
@@ -190,7 +242,7 @@ CauseSelection TorqueEstimator::SelectAmong(double alike) const {
     one.unit = fault.unit;
     one.nominal = fault.nominal;
     one.columns = R_.block(begin, at, rows, CountColumns(fault));
-    if (barred_[candidates.size() - 1]) one.columns.setZero();
+    if (barred[candidates.size() - 1]) one.columns.setZero();
     one.scale = fault.scale;
     one.is_possible = fault.is_possible;
     one.parameters = fault.parameters;
@@ -202,6 +254,7 @@ CauseSelection TorqueEstimator::SelectAmong(double alike) const {
   options.restarts = 0;
   options.rows = rows_.samples;
   options.alike = alike;
+  options.independent = kIndependent;
   return SelectCauses(R_.col(width - 1).tail(rows), candidates, options);
 }
 
@@ -250,8 +303,7 @@ bool TorqueEstimator::BarSecondPushes() {
   return has_any;
 }
 
-bool TorqueEstimator::BarWeakBodies() {
-  const VectorXd left = CalcLeft(selection_.terms);
+double TorqueEstimator::CalcMeanSquare(const VectorXd& left) const {
   double squares = 0.0;
   for (const TorqueRows::Part& part : rows_.parts) {
     const ReadRecording& one = (*recordings_)[part.recording];
@@ -259,7 +311,11 @@ bool TorqueEstimator::BarWeakBodies() {
     squares +=
         left.segment(part.begin, part.size).squaredNorm() * Square(one.weight[place] / one.noise[place]);
   }
-  if (squares <= Square(kMostNoise) * rows_.samples) return false;
+  return squares / std::max(1.0, rows_.samples);
+}
+
+bool TorqueEstimator::BarWeakBodies() {
+  if (CalcMeanSquare(CalcLeft(selection_.terms)) <= Square(kMostNoise)) return false;
   constexpr double kMuch = 0.05;
   bool has_any = false;
   for (const CauseTerm& term : selection_.terms) {
@@ -288,7 +344,6 @@ VectorXd TorqueEstimator::Fit(const std::vector<TorqueFault::Kind>& kinds, bool 
   }
   const Index y = R_.cols() - 1, width = static_cast<Index>(columns.size());
   MatrixXd C = R_(Eigen::all, columns) * Eigen::Map<const VectorXd>(plausible.data(), width).asDiagonal();
-  constexpr double kIndependent = 1e-6;
   Eigen::ColPivHouseholderQR<MatrixXd> qr;
   qr.setThreshold(kIndependent);
   *rank = qr.compute(C).rank();
@@ -345,9 +400,18 @@ bool TorqueEstimator::AddPushes() {
     VectorXd squares = VectorXd::Zero(static_cast<Index>(blocks.size()));
     for (const TorqueRows::Part& part : rows_.parts)
       if (part.recording == r)
-        squares += left.segment(part.begin + part.within, part.size - part.within).cwiseAbs2();
-    for (const auto& [first, last] : FindWindows(squares)) {
-      const Push when = {static_cast<int>(r), blocks[first].from, blocks[last].to};
+        squares +=
+            InUnitsOfMedian(left.segment(part.begin + part.within, part.size - part.within).cwiseAbs2());
+    std::vector<Push> pushes;
+    for (const Window& one : FindWindows(squares))
+      pushes.push_back({.from = blocks[static_cast<size_t>(one.first)].from,
+                        .to = blocks[static_cast<size_t>(one.last)].to,
+                        .before = one.before,
+                        .after = one.after});
+    if (const std::optional<double> when = FindStep(*recordings_, rows_, left, r))
+      pushes.push_back({.from = *when, .to = blocks.back().to});
+    for (Push& when : pushes) {
+      when.recording = static_cast<int>(r);
       for (TorqueFault& one : ListPushes(recordings_->model(), recordings_->joints(), when))
         faults_.push_back(std::move(one));
       has_any = true;

@@ -40,11 +40,14 @@ class TorqueEstimator {
   /// A gain's column: the torque of the model and of the causes that the robot has besides.
   void ScaleWhole(const CauseSelection& selection, TorqueFault* gain) const;
   void Weigh(const VectorXd& left);
+  /// Of what is left, in units of noise.
+  [[nodiscard]] double CalcMeanSquare(const VectorXd& left) const;
   /// As many rows as there are independent ones.
   void Compress();
   /// Of these, those that columns which are part of every explanation have.
   [[nodiscard]] Eigen::Index CountForcedRows() const;
   [[nodiscard]] CauseSelection SelectAmong(double alike) const;
+  [[nodiscard]] CauseSelection SelectAmong(double alike, const std::vector<bool>& barred) const;
   [[nodiscard]] std::vector<Eigen::Index> ListFirstColumns() const;
   /// One stretch of time has one push: others would share its force.
   bool BarSecondPushes();

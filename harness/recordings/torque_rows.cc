@@ -11,7 +11,7 @@ Index CountForced(const RecordingSet& recordings) {
 }
 
 Index CountColumns(const TorqueFault& fault) {
-  if (fault.kind == TorqueFault::kPush) return fault.push.link >= 0 ? 3 : 1;
+  if (fault.kind == TorqueFault::kPush) return fault.scale.size();
   return static_cast<Index>(fault.columns.size());
 }
 
@@ -45,20 +45,32 @@ namespace {
 
 using Entries = std::vector<Eigen::Triplet<double>>;
 
+/// How much of a push acts in a block.
+double CalcShare(const Push& push, const std::vector<TorqueBalance::Block>& blocks, size_t b) {
+  const auto is_in = [&](size_t i) {
+    return i < blocks.size() && blocks[i].to >= push.from && blocks[i].from <= push.to;
+  };
+  return is_in(b) ? 1.0 : is_in(b + 1) ? push.before : b > 0 && is_in(b - 1) ? push.after : 0.0;
+}
+
 void AddPush(const RecordingSet& recordings, const Push& push, const TorqueRows::Part& part, Index at,
              Entries* entries) {
   if (static_cast<size_t>(push.recording) != part.recording) return;
   const double noise = recordings[part.recording].weight[static_cast<Index>(part.place)];
   for (size_t b = 0; b < part.balance->blocks().size(); ++b) {
     const TorqueBalance::Block& block = part.balance->blocks()[b];
-    if (block.to < push.from || block.from > push.to || !(block.counts[part.place] > 0.0)) continue;
+    const double share = CalcShare(push, part.balance->blocks(), b);
+    if (!(share > 0.0) || !(block.counts[part.place] > 0.0)) continue;
     const Index row = part.within + static_cast<Index>(b);
-    const double count = std::sqrt(block.counts[part.place]) / noise;
+    const double count = share * std::sqrt(block.counts[part.place]) / noise;
+    const auto place = static_cast<Index>(part.place);
     if (push.link >= 0) {
+      for (int k = 0; k < (push.has_moment ? 6 : 3); ++k)
+        entries->emplace_back(row, at + k, block.forces(place, 6 * push.link + k) / block.samples * count);
+    } else if (push.joint < 0) {
+      // To be accelerated is to weigh the other way.
       for (int k = 0; k < 3; ++k)
-        entries->emplace_back(
-            row, at + k,
-            block.forces(static_cast<Index>(part.place), 6 * push.link + k) / block.samples * count);
+        entries->emplace_back(row, at + k, -block.gravity(place, k) / block.samples * count);
     } else if (recordings.joints()[part.place] == push.joint) {
       entries->emplace_back(row, at, count);
     }
@@ -85,9 +97,15 @@ void FillPart(const RecordingSet& recordings, const std::vector<TorqueFault>& fa
   part->map.resize(map.rows(), columns);
   Entries entries, pushes;
   AddForced(recordings, *part, columns - 1, &entries);
+  // Rates are those of what was measured, which may be a current.
+  const int joint = recordings.joints()[part->place];
+  const Index rate = part->balance->Find(part->place, {TorqueColumn::kRate, joint});
+  const Index curvature = part->balance->Find(part->place, {TorqueColumn::kCurvature, joint});
   for (Index column = 0; column < map.cols(); ++column)
-    for (Eigen::SparseMatrix<double>::InnerIterator it(map, column); it; ++it)
-      entries.emplace_back(it.row(), forced + column, it.value());
+    for (Eigen::SparseMatrix<double>::InnerIterator it(map, column); it; ++it) {
+      const double unit = it.row() == rate || it.row() == curvature ? recordings.gain(part->place) : 1.0;
+      entries.emplace_back(it.row(), forced + column, unit * it.value());
+    }
   part->map.setFromTriplets(entries.begin(), entries.end());
   part->map /= weight;
   Index at = forced;

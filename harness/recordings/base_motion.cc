@@ -1,0 +1,119 @@
+#include "harness/recordings/base_motion.h"
+
+#include <Eigen/QR>
+#include <cmath>
+
+namespace dexcheck {
+namespace {
+
+using Eigen::Index;
+
+/// What a constant acceleration of the base leaves in a block: products of its three columns, of all joints,
+/// and with what is left.
+struct BlockProducts {
+  double from = 0.0, to = 0.0;  // s
+  Matrix3d squares = Matrix3d::Zero();
+  Vector3d products = Vector3d::Zero();
+};
+
+struct Blocks {
+  std::vector<BlockProducts> blocks;
+  double left = 0.0;  // squares of all
+};
+
+void AddPart(const TorqueRows::Part& part, double weight, const VectorXd& left, Blocks* all) {
+  for (size_t b = 0; b < all->blocks.size(); ++b) {
+    const TorqueBalance::Block& block = part.balance->blocks()[b];
+    const double count = block.counts[part.place];
+    BlockProducts& one = all->blocks[b];
+    one.from = block.from;
+    one.to = block.to;
+    if (!(count > 0.0)) continue;
+    const Vector3d x = block.gravity.row(static_cast<Index>(part.place)).transpose() *
+                       (std::sqrt(count) / block.samples / weight);
+    const double y = left[part.begin + part.within + static_cast<Index>(b)];
+    one.squares += x * x.transpose();
+    one.products += x * y;
+    all->left += y * y;
+  }
+}
+
+Blocks MakeBlocks(const RecordingSet& recordings, const TorqueRows& rows, const VectorXd& left,
+                  size_t recording) {
+  Blocks all;
+  if (recordings.model().base().type != BaseType::kFixed) return all;
+  all.blocks.resize(recordings[recording].fit->blocks().size());
+  for (const TorqueRows::Part& part : rows.parts)
+    if (part.recording == recording)
+      AddPart(part, recordings[recording].weight[static_cast<Index>(part.place)], left, &all);
+  return all;
+}
+
+/// Squares of what is left that accelerations of this frequency explain.
+double CalcExplained(const std::vector<BlockProducts>& blocks, double frequency) {
+  Matrix6d G = Matrix6d::Zero();
+  Vector6d b = Vector6d::Zero();
+  for (const BlockProducts& one : blocks) {
+    const Vector2d phase(std::sin(0.5 * frequency * (one.from + one.to)),
+                         std::cos(0.5 * frequency * (one.from + one.to)));
+    for (int i = 0; i < 2; ++i) {
+      b.segment<3>(3 * i) += phase[i] * one.products;
+      for (int k = 0; k < 2; ++k) G.block<3, 3>(3 * i, 3 * k) += phase[i] * phase[k] * one.squares;
+    }
+  }
+  return b.dot(G.completeOrthogonalDecomposition().solve(b));
+}
+
+/// Of a grid, then by halving its step.
+double FindBest(const std::vector<BlockProducts>& blocks, double begin, double end, double step) {
+  double best = begin, most = 0.0;
+  const auto try_one = [&](double frequency) {
+    const double explained = CalcExplained(blocks, frequency);
+    if (explained > most) most = explained, best = frequency;
+  };
+  for (double frequency = begin; frequency < end; frequency += step) try_one(frequency);
+  constexpr int kHalvings = 16;
+  for (int i = 0; i < kHalvings; ++i, step *= 0.5) {
+    const double centre = best;
+    try_one(centre - 0.5 * step);
+    try_one(centre + 0.5 * step);
+  }
+  return best;
+}
+
+}  // namespace
+
+constexpr double kFraction = 0.2;  // of what is left, that makes a motion of the base worth a look
+
+double FindShaking(const RecordingSet& recordings, const TorqueRows& rows, const VectorXd& left) {
+  const Blocks all = MakeBlocks(recordings, rows, left, 0);
+  if (all.blocks.empty()) return 0.0;
+  constexpr double kFewestCycles = 3.0, kMostOfCycle = 0.3, kGrid = 0.2;
+  const double length = all.blocks.back().to - all.blocks.front().from;
+  double longest = length / static_cast<double>(all.blocks.size());
+  for (const BlockProducts& one : all.blocks) longest = std::max(longest, one.to - one.from);
+  const double cycle = 2.0 * kPi / length;
+  const double begin = kFewestCycles * cycle, end = kMostOfCycle * 2.0 * kPi / longest;
+  if (!(begin < end)) return 0.0;
+  const double best = FindBest(all.blocks, begin, end, kGrid * cycle);
+  return CalcExplained(all.blocks, best) > kFraction * all.left ? best : 0.0;
+}
+
+std::optional<double> FindStep(const RecordingSet& recordings, const TorqueRows& rows, const VectorXd& left,
+                               size_t recording) {
+  const Blocks all = MakeBlocks(recordings, rows, left, recording);
+  std::optional<double> best;
+  double most = kFraction * all.left;
+  Matrix3d G = Matrix3d::Zero();
+  Vector3d b = Vector3d::Zero();
+  // What holds nearly all the time is gravity.
+  for (size_t i = all.blocks.size(); i-- > 1 + all.blocks.size() / 10;) {
+    G += all.blocks[i].squares;
+    b += all.blocks[i].products;
+    const double explained = b.dot(G.completeOrthogonalDecomposition().solve(b));
+    if (explained > most) most = explained, best = all.blocks[i].from;
+  }
+  return best;
+}
+
+}  // namespace dexcheck

@@ -1,0 +1,40 @@
+#include "harness/recordings/friction_shapes.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace dexcheck {
+
+MatrixXd ListShapeVelocities(const VectorXd& speeds, const std::map<int, double>& stribeck) {
+  constexpr double kSmooth[] = {0.1, 0.3, 1.0}, kSlowest = 0.05, kRatio = 1.8, kFineRatio = 1.2;
+  MatrixXd velocities = MatrixXd::Zero(speeds.size(), kFrictionShapes);
+  for (int joint = 0; joint < speeds.size(); ++joint) {
+    const double speed = std::max(speeds[joint], std::numeric_limits<double>::min());
+    for (int i = 0; i < kSmoothShapes; ++i) velocities(joint, 1 + i) = kSmooth[i] * speed;
+    const auto known = stribeck.find(joint);
+    for (int i = 0; i < kStribeckShapes; ++i)
+      velocities(joint, 1 + kSmoothShapes + i) =
+          known == stribeck.end() ? kSlowest * std::pow(kRatio, i) * speed
+                                  : known->second * std::pow(kFineRatio, i - 0.5 * (kStribeckShapes - 1));
+  }
+  return velocities;
+}
+
+FrictionRow CalcFrictionShapes(double velocity, const FrictionRow& shape_velocities) {
+  const double sign = velocity > 0.0 ? 1.0 : velocity < 0.0 ? -1.0 : 0.0;
+  FrictionRow shapes;
+  shapes[kSlipShape] = sign;
+  for (int i = 1; i < kFrictionShapes; ++i) {
+    const double u = velocity / shape_velocities[i];
+    shapes[i] = i <= kSmoothShapes ? std::tanh(u) : sign * std::exp(-u * u);
+  }
+  return shapes;
+}
+
+double CalcSlip(double sign, double before, double moved) {
+  constexpr double kDistance = 2e-3;
+  return sign + (before - sign) * std::exp(-moved / kDistance);
+}
+
+}  // namespace dexcheck
