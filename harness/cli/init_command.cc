@@ -248,6 +248,7 @@ std::optional<double> FindTolerance(const fs::path& table, const fs::path& mjcf)
 int InitRobot(const InitRequest& request) {
   InitSources sources = ReadSources(request);
   RobotDescription& robot = sources.robot;
+  if (robot.spec.joints.empty()) throw InputError(request.robot.string() + ": has no joint that moves");
   // What cannot be an MJCF is refused before there is a folder.
   const auto load = [&] {
     return LoadMjcfText(sources.mjcf->PrintFor(fs::current_path()), sources.mjcf->source());

@@ -101,6 +101,7 @@ Stand FindStand(const mjModel& m, const std::string& source) {
     double height;
   };
   std::vector<Place> places;
+  std::map<int, double> lowest_of;  // by body
   double lowest = std::numeric_limits<double>::infinity();
   for (int geom = 0; geom < m.ngeom; ++geom) {
     const int body = m.geom_bodyid[geom];
@@ -113,12 +114,15 @@ Stand FindStand(const mjModel& m, const std::string& source) {
       mju_rotVecMat(p_world, p_body.data(), data->xmat + 9 * body);
       const double height = p_world[2] + data->xpos[3 * body + 2] - radius;
       places.push_back({{"", geom, p_body, radius}, height});
+      lowest_of[body] = std::min(height, lowest_of.try_emplace(body, height).first->second);
       lowest = std::min(lowest, height);
     }
   }
-  constexpr double kNear = 0.02;  // m
+  // Feet are bodies that are nearly as low as the lowest; of each, what is lowest.
+  constexpr double kNear = 0.02, kFlat = 0.001;  // m
   for (Place& place : places) {
-    if (place.height > lowest + kNear) continue;
+    const double own = lowest_of[m.geom_bodyid[place.foot.geom]];
+    if (own > lowest + kNear || place.height > own + kFlat) continue;
     place.foot.frame = fmt::format("foot_{}", stand.feet.size() + 1);
     stand.feet.push_back(place.foot);
   }

@@ -40,6 +40,8 @@ class JointReader {
 
   /// Indices of frames. @throws InputError for one that is none.
   [[nodiscard]] std::vector<int> FindFeet(const std::vector<std::string>& names) const {
+    if (model_.num_joints() == 0)
+      throw InputError(source_ + ": stance: the robot must have joints to stand by");
     std::vector<int> feet;
     for (const std::string& name : names) {
       try {
