@@ -114,20 +114,7 @@ TorqueEstimator::TorqueEstimator(RecordingSet* recordings, size_t most_causes)
     barred_.resize(faults_.size(), false);
     selection_ = Select();
   }
-  while (BarSecondPushes()) selection_ = Select();
-  // What leaves far more without them was no friction.
-  constexpr double kFarMore = 1.5;
-  std::vector<bool> before = barred_;
-  for (double left = CalcMeanSquare(CalcLeft(selection_.terms)); BarWeakBodies(); before = barred_) {
-    selection_ = Select();
-    const double now = CalcMeanSquare(CalcLeft(selection_.terms));
-    if (now > kFarMore * left) {
-      barred_ = before;
-      selection_ = Select();
-      break;
-    }
-    left = now;
-  }
+  while (BarSecondPushes() || BarWeakBodies()) selection_ = Select();
 }
 
 void TorqueEstimator::ListFaults() {
