@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <utility>
 
 #include "harness/diagnosis/visible_columns.h"
@@ -56,6 +57,7 @@ class Search {
       }
       chosen_ = best;
     }
+    if (options_.exchanges_pairs) criterion = ExchangePairs(criterion);
     return Finish(criterion);
   }
 
@@ -78,7 +80,7 @@ class Search {
     return criterion;
   }
 
-  /// The most likely first choices besides what was found.
+  /// The most likely first choices besides what was found: one at each place, and then more of them.
   [[nodiscard]] std::vector<Best> FindFirsts(const std::vector<size_t>& found) const {
     const std::vector<double> scores = ScoreAll({});
     std::vector<Best> all;
@@ -86,8 +88,16 @@ class Search {
       if (std::isfinite(scores[i]) && std::find(found.begin(), found.end(), i) == found.end())
         all.push_back({i, scores[i]});
     std::sort(all.begin(), all.end(), [](const Best& a, const Best& b) { return a.criterion < b.criterion; });
+    std::vector<std::string> places;
+    const auto is_new = [&](const Best& one) {
+      const std::string& place = candidates_[one.candidate].place;
+      if (std::find(places.begin(), places.end(), place) != places.end()) return false;
+      places.push_back(place);
+      return true;
+    };
     const auto is_impossible = [&](const Best& one) { return !CanBe(one.candidate, {}); };
     all.erase(std::remove_if(all.begin(), all.end(), is_impossible), all.end());
+    std::stable_partition(all.begin(), all.end(), is_new);
     all.resize(std::min(all.size(), options_.restarts));
     return all;
   }
@@ -282,6 +292,42 @@ class Search {
     return criterion;
   }
 
+  /// Exchanges two at once: what one lacks the other may have. @returns the criterion.
+  double ExchangePairs(double criterion) {
+    constexpr size_t kLikeliest = 12;
+    for (size_t i = 0; i < chosen_.size(); ++i) {
+      for (size_t k = i + 1; k < chosen_.size(); ++k) {
+        std::vector<size_t> others = Without(k);
+        others.erase(others.begin() + static_cast<std::ptrdiff_t>(i));
+        for (const size_t first : FindLikeliest(others, kLikeliest)) {
+          std::vector<size_t> set = others;
+          set.push_back(first);
+          const Best second = FindBest(set);
+          if (!(second.criterion < criterion - kEqualLogOdds * 1e-3)) continue;
+          set.push_back(second.candidate);
+          chosen_ = set;
+          return ExchangePairs(Exchange(second.criterion));
+        }
+      }
+    }
+    return criterion;
+  }
+
+  /// The best to add, two of each place at the most.
+  [[nodiscard]] std::vector<size_t> FindLikeliest(const std::vector<size_t>& beside, size_t count) const {
+    const std::vector<double> scores = ScoreAll(beside);
+    std::vector<size_t> order(scores.size());
+    std::iota(order.begin(), order.end(), size_t{0});
+    std::sort(order.begin(), order.end(), [&](size_t a, size_t b) { return scores[a] < scores[b]; });
+    std::vector<size_t> likeliest;
+    for (const size_t i : order) {
+      if (!std::isfinite(scores[i]) || likeliest.size() == count) break;
+      const auto is_there = [&](size_t other) { return candidates_[other].place == candidates_[i].place; };
+      if (std::count_if(likeliest.begin(), likeliest.end(), is_there) < 2) likeliest.push_back(i);
+    }
+    return likeliest;
+  }
+
   CauseSelection Finish(double criterion) {
     CauseSelection result;
     result.criterion = criterion;
@@ -347,14 +393,10 @@ class Search {
       if (i == term->candidate || !std::isfinite(scores[i])) continue;
       // The criterion is twice the negative logarithm of the likelihood.
       double odds = 0.5 * (scores[i] - criterion);
-      // One with more columns has simpler ones as a special case; what does not show makes none simpler.
+      // One with more columns has simpler ones as a special case.
       const double more = CountParameters({i}) - CountParameters({term->candidate});
-      const Index width = candidates_[term->candidate].columns.cols();
-      const bool hides = visible_[term->candidate].columns.cols() < width;
-      const bool is_ordinary =
-          candidates_[i].is_ordinary || (hides && candidates_[i].columns.cols() == width);
-      if (more > 0.0 && is_ordinary) odds -= 0.5 * more * std::log(samples_);
-      if (odds < kEqualLogOdds && more > 0.0 && !is_ordinary) continue;
+      if (more > 0.0 && candidates_[i].is_ordinary) odds -= 0.5 * more * std::log(samples_);
+      if (odds < kEqualLogOdds && more > 0.0 && !candidates_[i].is_ordinary) continue;
       if ((odds >= kEqualLogOdds && odds >= best) || !CanBe(i, others)) continue;
       if (odds < kEqualLogOdds) {
         term->same.emplace_back(i, CalcAmplitude(i, others));

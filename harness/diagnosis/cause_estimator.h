@@ -66,6 +66,8 @@ struct CauseSelection {
 struct CauseOptions {
   size_t most_terms = 5;
   size_t restarts = 3;  ///< Other first choices that are tried where the first led nowhere.
+  bool exchanges_pairs =
+      true;  ///< Whether two terms are exchanged at once, too; with many of them that takes long.
   /// Mean square of what no explanation need explain: noise, and what the columns are off themselves.
   double floor = 1.0;
   /// Rows whose noise is one and the same: 1 where each has its own. N / alike are counted then.

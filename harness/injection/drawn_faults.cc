@@ -85,7 +85,13 @@ std::vector<FaultSet> DrawFaults(const Setup& setup, const DrawOptions& options)
     Draw draw = MakeDraw(options, i);
     const FaultContext context{setup, options.duration, options.tau, &draw};
     FaultSet& set = sets.emplace_back();
-    while (set.size() < options.together) {
+    constexpr int kTries = 100, kMost = 100 * kTries;
+    for (int tries = 1; set.size() < options.together; ++tries) {
+      // Nothing may go with what was drawn first.
+      if (tries % kTries == 0) set.clear();
+      if (tries == kMost)
+        throw InputError(setup.scenario().source + ": --together: must be fewer, no " +
+                         std::to_string(options.together) + " of these faults are of different places");
       // What has no size is no part of a set: what would be named of it?
       InjectedFault one = MakeOne(kinds[draw.Index(kinds.size())], context);
       if (options.together > 1 && one.truth.empty()) continue;

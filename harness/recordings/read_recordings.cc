@@ -71,9 +71,14 @@ void RecordingSet::Read(Recording* recording, const ReadOptions& options,
     (*balance)->SetWrenchPlace(recording->wrench);
   }
   long samples = 0;
+  double begin = 0.0;
   motion.Run([&](const RecordedSample& sample) {
-    constexpr long kStretch = 16, kEvery = 4;
-    TorqueBalance& balance = (samples / kStretch) % kEvery == kEvery - 1 ? *one.held : *one.fit;
+    // Shorter than most pushes: what is held out tells nothing of when they were.
+    constexpr double kStretch = 0.25;  // s
+    constexpr long kEvery = 4;
+    if (samples == 0) begin = sample.time;
+    const long stretch = std::lround(std::floor((sample.time - begin) / kStretch));
+    TorqueBalance& balance = stretch % kEvery == kEvery - 1 ? *one.held : *one.fit;
     balance.Add(sample, motion.IsJudged(sample));
     TellSecond(options, sample.time, balance.residual());
     ++samples;

@@ -22,8 +22,9 @@ bool TakeSteps(const Setup& setup, int states, const std::function<bool()>& shou
         if (step.step % every == 0) store->Add(step, runner.loop().checks().analysis(), /*differs=*/true);
       },
       should_stop);
+  if (result.interrupted) return false;
   if (!result.failure.empty()) throw InputError(setup.scenario().source + ": " + result.failure);
-  return !result.interrupted;
+  return true;
 }
 
 /// What faults would leave of the balances in all steps. @param residual what is left of them without one.

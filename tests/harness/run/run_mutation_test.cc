@@ -169,6 +169,14 @@ TEST(RunCampaign, NamesTheRadiiOfBothWheels) {
   EXPECT_GE(radii, 2);
 }
 
+TEST(RunCampaign, RefusesMoreFaultsThanThereArePlaces) {
+  RunMutationOptions options;
+  options.draws = 1;
+  options.together = 4;
+  options.kinds = {"wheels"};
+  EXPECT_THROW(MakeCampaign(options), InputError);
+}
+
 // Of the paper's law, of those that it is compared with, and of laws of joints: which summand, of which
 // joint, finger or wheel, and its factor.
 TEST(RunCampaign, NamesTheWrongSummandOfEveryLaw) {
