@@ -30,6 +30,7 @@ std::vector<Vector3d> ListPlaces(const mjModel& m, int geom) {
       return {size[1] * Vector3d::UnitZ(), -size[1] * Vector3d::UnitZ()};
     case mjGEOM_BOX: {
       std::vector<Vector3d> corners;
+      corners.reserve(8);
       for (int k = 0; k < 8; ++k)
         corners.emplace_back(size.cwiseProduct(Vector3d(k & 1 ? 1 : -1, k & 2 ? 1 : -1, k & 4 ? 1 : -1)));
       return corners;

@@ -26,8 +26,8 @@ struct MutateRunRequest {
 /// 3 when it was interrupted. @throws InputError.
 int MutateRun(const MutateRunRequest& request);
 
-/// Prints, for every fault of the balances, how small it may be to be found and named in that run. @returns the
-/// exit code: 3 when it was interrupted. @throws InputError.
+/// Prints, for every fault of the balances, how small it may be to be found and named in that run. @returns
+/// the exit code: 3 when it was interrupted. @throws InputError.
 int PrintSmallestErrors(const MutateRunRequest& request);
 
 }  // namespace dexcheck::cli

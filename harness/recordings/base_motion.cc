@@ -71,7 +71,7 @@ double FindBest(const std::vector<BlockProducts>& blocks, double begin, double e
     const double explained = CalcExplained(blocks, frequency);
     if (explained > most) most = explained, best = frequency;
   };
-  for (double frequency = begin; frequency < end; frequency += step) try_one(frequency);
+  for (int i = 0; begin + i * step < end; ++i) try_one(begin + i * step);
   constexpr int kHalvings = 16;
   for (int i = 0; i < kHalvings; ++i, step *= 0.5) {
     const double centre = best;
@@ -81,9 +81,9 @@ double FindBest(const std::vector<BlockProducts>& blocks, double begin, double e
   return best;
 }
 
-}  // namespace
-
 constexpr double kFraction = 0.2;  // of what is left, that makes a motion of the base worth a look
+
+}  // namespace
 
 double FindShaking(const RecordingSet& recordings, const TorqueRows& rows, const VectorXd& left) {
   const Blocks all = MakeBlocks(recordings, rows, left, 0);
