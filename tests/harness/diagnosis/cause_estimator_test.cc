@@ -442,22 +442,5 @@ TEST(FindSmallestAmplitudes, IsFromWhereOnACandidateIsNamed) {
   }
 }
 
-// Of two vectors that show alike, one of whose entries does not show, neither is simpler.
-TEST(SelectCauses, WhatDoesNotShowMakesNoCandidateSimpler) {
-  std::mt19937_64 random(6);
-  std::normal_distribution<double> normal;
-  std::vector<Candidate> candidates(2);
-  candidates[0].place = "two of three", candidates[1].place = "three";
-  candidates[0].columns = MatrixXd::NullaryExpr(200, 3, [&] { return 100.0 * normal(random); });
-  candidates[1].columns = candidates[0].columns;
-  candidates[0].columns.col(2).setZero();
-  const VectorXd y = candidates[0].columns.leftCols<2>() * Vector2d(1.0, 2.0);
-  const CauseSelection selection = SelectCauses(y, candidates, {});
-  ASSERT_EQ(selection.terms.size(), 1u);
-  EXPECT_EQ(selection.terms[0].candidate, 0u);
-  ASSERT_EQ(selection.terms[0].same.size(), 1u);
-  EXPECT_EQ(selection.terms[0].same[0].first, 1u);
-}
-
 }  // namespace
 }  // namespace dexcheck::testing::cause_estimator_test
