@@ -8,12 +8,6 @@
 #include "harness/checks/rounding_scales.h"
 
 namespace dexcheck {
-namespace {
-
-/// Of the weights' torques at full reach: where links hang or stand upright, these cancel, but to rounding.
-constexpr double kLeastWeight = 1e-2;
-
-}  // namespace
 
 double CalcSampledRadius(const ObjectGains& gains, double time_step, long hold, double velocity_age) {
   const double h = static_cast<double>(hold);
@@ -41,14 +35,13 @@ JudgedLaw::JudgedLaw(const Setup& setup)
       commanded_(setup.model(), static_cast<int>(setup.fingertips().size())),
       own_factor_(setup.model()) {
   difference_.setZero(setup.model().num_velocities());
-  weights_ = RoundingScales(setup.model()).CalcWeights();
+  least_ = RoundingScales(setup.model()).CalcLeastForces();
 }
 
 double JudgedLaw::CalcTorqueError(const StepRecord& step, const LawTerms& terms, const TreeFactor& factor) {
   factor_ = &factor;
   balanced_ = terms.C_xi + terms.gravity + terms.friction;
-  scale_ = std::max(
-      {CalcScale(Norm(balanced_)), kLeastWeight * Norm(weights_), std::numeric_limits<double>::min()});
+  scale_ = std::max({CalcScale(Norm(balanced_)), Norm(least_), std::numeric_limits<double>::min()});
   actuation_.CalcForce(step.command.tau, difference_);
   difference_ -= force();
   const double error = Norm(difference_) / scale_ / condition_number();

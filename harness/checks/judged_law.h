@@ -102,7 +102,7 @@ class JudgedLaw {
  private:
   bool differs_ = false;
   VectorXd balanced_, work_;  // n
-  VectorXd weights_;          // n, what gravity can ask for at most, N m or N
+  VectorXd least_;            // n, RoundingScales::CalcLeastForces
 };
 
 /// The paper's (55), or one of those that it is compared with, by the scenario.

@@ -122,10 +122,11 @@ double RoundingScales::CalcMassScale(int row, int col) const {
   return Positive(mass * CalcVelocityScale(row) * CalcVelocityScale(col) + armature);
 }
 
-VectorXd RoundingScales::CalcWeights() const {
-  VectorXd weights(model_->num_velocities());
-  for (int i = 0; i < weights.size(); ++i) weights[i] = CalcGravityScale(i);
-  return weights;
+VectorXd RoundingScales::CalcLeastForces() const {
+  constexpr double kLeast = 1e-3;
+  VectorXd forces = VectorXd::Zero(model_->num_velocities());
+  for (int i = base_velocities_; i < forces.size(); ++i) forces[i] = kLeast * CalcGravityScale(i);
+  return forces;
 }
 
 double RoundingScales::CalcGravityScale(int coordinate) const {

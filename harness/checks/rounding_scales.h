@@ -50,8 +50,9 @@ class RoundingScales {
   [[nodiscard]] double CalcMassScale(int row, int col) const;
   /// Of an entry of gravity.
   [[nodiscard]] double CalcGravityScale(int coordinate) const;
-  /// All of these (n), N m or N: what gravity asks for at full reach.
-  [[nodiscard]] VectorXd CalcWeights() const;
+  /// A thousandth of that of each joint (n, 0 of the base), N m or N: no smaller are scales of forces where
+  /// weights cancel but to rounding, of links that hang or an arm in a horizontal plane.
+  [[nodiscard]] VectorXd CalcLeastForces() const;
 
   // At the state set.
   /// Of the world coordinates of the robot's points, m.

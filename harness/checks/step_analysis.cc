@@ -7,8 +7,7 @@ namespace dexcheck {
 namespace {
 
 constexpr double kTiny = std::numeric_limits<double>::min();
-/// Of the motors' forces and of the weights' at full reach: an arm that hangs, or moves in a horizontal
-/// plane, has next to no bias.
+/// Of the motors' forces, where gravity does not act.
 constexpr double kLeastBias = 1e-3;
 
 double CalcRobotMass(const RobotModel& model) {
@@ -38,7 +37,7 @@ StepAnalyzer::StepAnalyzer(const Setup& setup)
                            &spin_force_, &held_force_, &moving_, &momentum_, &acceleration_error_})
     vector->setZero(n);
   now_.contact_mismatch.setZero(static_cast<Eigen::Index>(setup.fingertips().size()));
-  weights_ = RoundingScales(setup.model()).CalcWeights();
+  least_ = RoundingScales(setup.model()).CalcLeastForces();
   now_.setup = &setup;
   now_.clearance = &clearance_;
   now_.findings.f_c.setZero(3 * static_cast<Eigen::Index>(setup.fingertips().size()));
@@ -266,7 +265,7 @@ void StepAnalyzer::CalcRobotResidual() {
     actuation_.CalcForce(spin_force_, spin_force_);
     residual += spin_force_;
   }
-  const double least = kLeastBias * std::max(Norm(now_.applied_force), Norm(weights_));
+  const double least = std::max(kLeastBias * Norm(now_.applied_force), Norm(least_));
   now_.balanced = std::max({Norm(now_.bias), least, kTiny});
   now_.robot_residual_norm = Norm(residual);
   now_.uneven_force = CalcUnevenForce() + CalcSwingForce();

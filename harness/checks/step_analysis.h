@@ -97,7 +97,7 @@ struct StepAnalysis {
   VectorXd bias;           ///< C_bar' xi + F_bar' (n).
   /// M_bar' = L^T L, of the last prediction; null before the first, and then nothing of the following is set.
   const TreeFactor* mass_factor = nullptr;
-  double balanced = 1.0;           ///< |bias|_M^-1.
+  double balanced = 1.0;           ///< |bias|_M^-1, at least that of RoundingScales::CalcLeastForces.
   VectorXd robot_residual;         ///< M_bar' xi_dot + bias + J_B'^T f_c - applied_force (n) of (48).
   double robot_residual_norm = 0;  ///< Of that, |.|_M^-1.
   double uneven_force = 0.0;       ///< Largest that tilt, slip and sinking of the platform can make of it.
@@ -204,7 +204,7 @@ class StepAnalyzer {
   double transient_since_ = 0.0;                                  // s
   long steps_ = 0;
   VectorXd spin_force_, held_force_, moving_, momentum_, acceleration_error_;  // n
-  VectorXd weights_;  // n, what gravity asks for at full reach
+  VectorXd least_;  // n, RoundingScales::CalcLeastForces
   VectorXd norm_work_;
 };
 

@@ -249,6 +249,11 @@ int InitRobot(const InitRequest& request) {
   InitSources sources = ReadSources(request);
   RobotDescription& robot = sources.robot;
   if (robot.spec.joints.empty()) throw InputError(request.robot.string() + ": has no joint that moves");
+  for (const Joint& joint : robot.spec.joints) {
+    if (joint.type == JointType::kBall)
+      throw InputError(request.robot.string() + ": joint " + Quote(joint.name) +
+                       ": must not be a ball joint in a run, whose law has one number for each joint");
+  }
   // What cannot be an MJCF is refused before there is a folder.
   const auto load = [&] {
     return LoadMjcfText(sources.mjcf->PrintFor(fs::current_path()), sources.mjcf->source());
@@ -258,6 +263,7 @@ int InitRobot(const InitRequest& request) {
   if (robot.spec.base.type == BaseType::kFloating) {
     stand = FindStand(*engine, sources.mjcf->source());
     PutOnFloor(*engine, *stand, sources.mjcf.get());
+    Warn("contacts other than the feet's with the floor are left out; overlaps are judged by their distance");
     engine = load();
     if (request.mjcf.empty()) robot = DescriptionFile(request.robot, sources.mjcf->Print(), {}).Describe();
   } else if (robot.spec.base.type != BaseType::kFixed) {

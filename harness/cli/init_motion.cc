@@ -98,11 +98,6 @@ class MotorUse {
   std::vector<double> limits_;
 };
 
-bool HasBall(const RobotModel& model) {
-  return std::any_of(model.joints().begin(), model.joints().end(),
-                     [](const Joint& joint) { return joint.type == JointType::kBall; });
-}
-
 }  // namespace
 
 InitMotion PlanInitMotion(const RobotDescription& robot, const RobotModel& model,
@@ -110,7 +105,6 @@ InitMotion PlanInitMotion(const RobotDescription& robot, const RobotModel& model
                           const std::map<std::string, double>& home) {
   InitMotion motion;
   motion.spans = ChooseSpans(robot, home);
-  if (HasBall(model)) return motion;
   constexpr double kMostUse = 0.7, kFull = 0.9;
   constexpr int kHalvings = 4;
   MotorUse use(model, limits);
@@ -140,22 +134,33 @@ std::vector<std::map<std::string, double>> ListPoses(const RobotModel& model,
   return poses;
 }
 
+std::string ListJoints(const RobotDescription& robot, const std::function<double(size_t joint)>& value) {
+  std::string list;
+  for (size_t i = 0; i < robot.spec.joints.size(); ++i)
+    list += fmt::format("{}{} = {}", i == 0 ? "" : ", ", Quote(robot.spec.joints[i].name),
+                        FormatNumber(value(i), 4));
+  return list;
+}
+
+std::string WriteTolerance(double tolerance) {
+  if (!(tolerance > 0.0)) return "";
+  return fmt::format("# Numbers that were rounded when they were printed agree to this.\ntolerance = {}\n",
+                     FormatNumber(tolerance, 1));
+}
+
+std::string WriteCompensation(const RobotDescription& robot) {
+  const std::vector<Joint>& joints = robot.spec.joints;
+  if (std::none_of(joints.begin(), joints.end(), [](const Joint& joint) { return joint.dry_friction > 0.0; }))
+    return "";
+  return fmt::format("# Dry friction, compensated along the desired rates.\ncoulomb = {{ {} }}\n",
+                     ListJoints(robot, [&](size_t i) { return joints[i].dry_friction; }));
+}
+
 std::string WriteInitScenario(const RobotDescription& robot, const std::vector<JointSpan>& spans,
                               double tolerance) {
-  const bool has_friction = std::any_of(robot.spec.joints.begin(), robot.spec.joints.end(),
-                                        [](const Joint& joint) { return joint.dry_friction > 0.0; });
-  std::string start, there, back, friction;
-  for (size_t i = 0; i < robot.spec.joints.size(); ++i) {
-    const Joint& joint = robot.spec.joints[i];
-    const JointSpan& span = spans[i];
-    const auto add = [&](double value, std::string* list) {
-      *list += fmt::format("{}{} = {}", list->empty() ? "" : ", ", Quote(joint.name), FormatNumber(value, 4));
-    };
-    add(span.start, &start);
-    add(span.end, &there);
-    add(span.start, &back);
-    add(joint.dry_friction, &friction);
-  }
+  const std::string start = ListJoints(robot, [&](size_t i) { return spans[i].start; });
+  const std::string end = ListJoints(robot, [&](size_t i) { return spans[i].end; });
+  const std::string compensation = WriteCompensation(robot);
   return fmt::format(
       R"(# A motion of the joints within their ranges, by computed torque, checked at every step.
 name = "motion"
@@ -182,15 +187,8 @@ law = "computed_torque"
 natural_frequency = 10
 damping_ratio = 1
 {}{})",
-      tolerance > 0.0 ? fmt::format("# Numbers that were rounded when they were printed agree to this.\n"
-                                    "tolerance = {}\n",
-                                    FormatNumber(tolerance, 1))
-                      : "",
-      start, there, back,
-      has_friction ? fmt::format("# Dry friction, compensated along the desired rates.\ncoulomb = {{ {} }}\n",
-                                 friction)
-                   : "",
-      has_friction ? "" : "\n[expect]\njoints = 0.01\n");
+      WriteTolerance(tolerance), start, end, start, compensation,
+      compensation.empty() ? "\n[expect]\njoints = 0.01\n" : "");
 }
 
 }  // namespace dexcheck::cli

@@ -2,6 +2,7 @@
 
 // The motion that a new folder begins with: each joint leaves its place and comes back, as its motors can.
 
+#include <functional>
 #include <map>
 #include <string>
 #include <vector>
@@ -32,6 +33,15 @@ InitMotion PlanInitMotion(const RobotDescription& robot, const RobotModel& model
 /// Poses along the motion, by joint, rad or m.
 std::vector<std::map<std::string, double>> ListPoses(const RobotModel& model,
                                                      const std::vector<JointSpan>& spans);
+
+// Parts of a scenario's text.
+
+/// "shoulder" = 0.1, "elbow" = 0: a number of each joint.
+std::string ListJoints(const RobotDescription& robot, const std::function<double(size_t joint)>& value);
+/// `tolerance`; nothing for 0.
+std::string WriteTolerance(double tolerance);
+/// `control.coulomb`; nothing where no joint has dry friction.
+std::string WriteCompensation(const RobotDescription& robot);
 
 /// The scenario of that motion. @param tolerance of runs; 0 for rounding.
 std::string WriteInitScenario(const RobotDescription& robot, const std::vector<JointSpan>& spans,

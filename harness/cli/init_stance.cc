@@ -10,15 +10,15 @@
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
+#include "harness/cli/init_motion.h"
 #include "harness/engine/map_vector.h"
+#include "harness/engine/mjcf_passes.h"
 #include "harness/engine/xml.h"
 
 namespace dexcheck::cli {
 namespace {
 
 using tinyxml2::XMLElement;
-
-constexpr const char* kFloor = "floor";
 
 /// Places of a geom that can touch a plane, in its own frame; none of shapes that a stance does not know.
 std::vector<Vector3d> ListPlaces(const mjModel& m, int geom) {
@@ -64,20 +64,14 @@ std::string NameGeom(const mjModel& m, int geom, MjcfFile* mjcf) {
   return own->Attribute("name");
 }
 
-XMLElement* Require(const char* name, MjcfFile* mjcf) {
-  XMLElement* const found = mjcf->root()->FirstChildElement(name);
-  return found != nullptr ? found : mjcf->root()->InsertNewChildElement(name);
-}
-
-/// The plane that the world has, or a new one.
-std::string RequireFloor(MjcfFile* mjcf) {
-  XMLElement* const world = Require("worldbody", mjcf);
-  for (XMLElement* geom : ListChildren(world, "geom")) {
-    if (ReadAttribute(*geom, "type") != "plane") continue;
-    if (geom->Attribute("name") == nullptr) geom->SetAttribute("name", kFloor);
-    return geom->Attribute("name");
+/// The plane of that name that the world has, or a new one.
+std::string RequireFloor(const mjModel& m, MjcfFile* mjcf) {
+  for (int geom = 0; geom < m.ngeom && m.geom_bodyid[geom] == 0; ++geom) {
+    const char* const name = mj_id2name(&m, mjOBJ_GEOM, geom);
+    if (m.geom_type[geom] == mjGEOM_PLANE && name != nullptr && *name != '\0') return name;
   }
-  XMLElement* const geom = world->InsertNewChildElement("geom");
+  constexpr const char* kFloor = "stance_floor";
+  XMLElement* const geom = RequireSection(mjcf->root(), "worldbody")->InsertNewChildElement("geom");
   geom->SetAttribute("name", kFloor);
   geom->SetAttribute("type", "plane");
   geom->SetAttribute("size", "0 0 1");
@@ -106,7 +100,7 @@ Stand FindStand(const mjModel& m, const std::string& source) {
   double lowest = std::numeric_limits<double>::infinity();
   for (int geom = 0; geom < m.ngeom; ++geom) {
     const int body = m.geom_bodyid[geom];
-    if (m.body_rootid[body] != base || (m.geom_contype[geom] == 0 && m.geom_conaffinity[geom] == 0)) continue;
+    if (m.body_rootid[body] != base || !CanTouch(m, geom)) continue;
     const Pose X_body = ReadPose(m.geom_pos + 3 * geom, m.geom_quat + 4 * geom);
     const double radius = m.geom_type[geom] == mjGEOM_BOX ? 0.0 : m.geom_size[3 * geom];
     for (const Vector3d& p : ListPlaces(m, geom)) {
@@ -148,15 +142,15 @@ void PutOnFloor(const mjModel& m, const Stand& stand, MjcfFile* mjcf) {
                                           FormatNumber(foot.p_body[1]), FormatNumber(foot.p_body[2]))
                                   .c_str());
   }
-  XMLElement* const option = Require("option", mjcf);
+  XMLElement* const option = RequireSection(mjcf->root(), "option");
   for (const auto& [name, value] : {std::pair("timestep", "0.001"),
                                     {"integrator", "Euler"},
                                     {"cone", "elliptic"},
                                     {"impratio", "100"},
                                     {"collision", "predefined"}})
     option->SetAttribute(name, value);
-  const std::string floor = RequireFloor(mjcf);
-  XMLElement* const contact = Require("contact", mjcf);
+  const std::string floor = RequireFloor(m, mjcf);
+  XMLElement* const contact = RequireSection(mjcf->root(), "contact");
   for (XMLElement* pair : ListChildren(contact, "pair")) contact->DeleteChild(pair);
   for (const std::string& geom : geoms) {
     XMLElement* const pair = contact->InsertNewChildElement("pair");
@@ -179,17 +173,14 @@ void AddFeet(const Stand& stand, RobotDescription* robot) {
 }
 
 std::string WriteStandScenario(const RobotDescription& robot, const Stand& stand, double tolerance) {
-  std::string start, friction, feet;
-  const auto add = [](const std::string& name, double value, std::string* list) {
-    *list += fmt::format("{}{} = {}", list->empty() ? "" : ", ", Quote(name), FormatNumber(value, 4));
-  };
-  bool has_friction = false;
-  for (const Joint& joint : robot.spec.joints) {
+  const std::string start = ListJoints(robot, [&](size_t i) {
+    const Joint& joint = robot.spec.joints[i];
     const auto at = stand.pose.find(joint.name);
-    add(joint.name, std::clamp(at == stand.pose.end() ? 0.0 : at->second, joint.lower, joint.upper), &start);
-    add(joint.name, joint.dry_friction, &friction);
-    has_friction = has_friction || joint.dry_friction > 0.0;
-  }
+    // Not at an end, where rounding to the digits printed would put it outside.
+    const double margin = 0.01 * (joint.upper - joint.lower);
+    return std::clamp(at == stand.pose.end() ? 0.0 : at->second, joint.lower + margin, joint.upper - margin);
+  });
+  std::string feet;
   for (const Foot& foot : stand.feet) feet += (feet.empty() ? "" : ", ") + Quote(foot.frame);
   const double way = 0.03 * stand.height;
   return fmt::format(
@@ -217,7 +208,7 @@ f_min = {}
 f_max = {}
 points = [
   {{ time = 2, xyz = [{}, 0, {}], rpy_deg = [0, 2, 0] }},
-  {{ time = 4, xyz = [0, {}, 0], rpy_deg = [2, 0, 2] }},
+  {{ time = 4, xyz = [0, {}, {}], rpy_deg = [2, 0, 2] }},
 ]
 
 [control]
@@ -225,10 +216,10 @@ law = "computed_torque"
 natural_frequency = 20
 damping_ratio = 1
 {})",
-      tolerance > 0.0 ? "tolerance = " + FormatNumber(tolerance, 1) + "\n" : "", start, feet,
+      WriteTolerance(tolerance), start, feet,
       FormatNumber(0.01 * stand.weight / static_cast<double>(stand.feet.size()), 2),
       FormatNumber(std::ceil(stand.weight)), FormatNumber(way, 2), FormatNumber(-way, 2),
-      FormatNumber(way, 2), has_friction ? "coulomb = { " + friction + " }\n" : "");
+      FormatNumber(way, 2), FormatNumber(-way, 2), WriteCompensation(robot));
 }
 
 }  // namespace dexcheck::cli

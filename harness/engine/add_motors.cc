@@ -52,11 +52,7 @@ void DeleteActuators(XMLElement* root) {
       if (sensor->Attribute("actuator") != nullptr) section->DeleteChild(sensor);
     }
   }
-  for (XMLElement* section : ListChildren(root, "keyframe")) {
-    for (XMLElement* key : ListChildren(section)) {
-      for (const char* name : {"ctrl", "act"}) key->DeleteAttribute(name);
-    }
-  }
+  DeleteControls(root);
 }
 
 constexpr const char* kForceRange = "actuatorfrcrange";
@@ -83,6 +79,14 @@ void ReadJoints(const XMLElement& body, std::string child_class,
 }
 
 }  // namespace
+
+void DeleteControls(XMLElement* root) {
+  for (XMLElement* section : ListChildren(root, "keyframe")) {
+    for (XMLElement* key : ListChildren(section)) {
+      for (const char* name : {"ctrl", "act"}) key->DeleteAttribute(name);
+    }
+  }
+}
 
 std::map<std::string, double> FindForceRanges(const MjcfFile& mjcf) {
   std::map<std::string, std::string> classes;

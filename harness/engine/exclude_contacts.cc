@@ -19,13 +19,12 @@ namespace {
 std::vector<std::string> Exclude(const mjModel& m, const std::set<std::pair<int, int>>& pairs,
                                  MjcfFile* mjcf) {
   std::vector<std::string> names;
-  tinyxml2::XMLElement* contact = mjcf->root()->FirstChildElement("contact");
   for (const auto& [one, other] : pairs) {
     const char *const first = mj_id2name(&m, mjOBJ_BODY, one), *const second =
                                                                    mj_id2name(&m, mjOBJ_BODY, other);
     if (first == nullptr || second == nullptr || *first == '\0' || *second == '\0') continue;
-    if (contact == nullptr) contact = mjcf->root()->InsertNewChildElement("contact");
-    tinyxml2::XMLElement* const exclude = contact->InsertNewChildElement("exclude");
+    tinyxml2::XMLElement* const exclude =
+        RequireSection(mjcf->root(), "contact")->InsertNewChildElement("exclude");
     exclude->SetAttribute("body1", first);
     exclude->SetAttribute("body2", second);
     names.push_back(std::string(first) + " and " + second);

@@ -42,12 +42,7 @@ void KeepMechanism(MjcfFile* mjcf) {
   DeleteSections("equality", mjcf);
   DeleteSections("tendon", mjcf);
   DeleteUsers(mjcf);
-  // Controls of actuators that may be gone.
-  for (XMLElement* section : ListChildren(mjcf->root(), "keyframe")) {
-    for (XMLElement* key : ListChildren(section)) {
-      for (const char* name : {"ctrl", "act"}) key->DeleteAttribute(name);
-    }
-  }
+  DeleteControls(mjcf->root());
   VisitElements(mjcf->root(), [&](XMLElement* element) {
     const std::string_view kind = element->Name();
     if (kind == "joint") {
@@ -62,8 +57,7 @@ void KeepMechanism(MjcfFile* mjcf) {
 }
 
 void RequireExactSolver(MjcfFile* mjcf) {
-  XMLElement* option = mjcf->root()->FirstChildElement("option");
-  if (option == nullptr) option = mjcf->root()->InsertNewChildElement("option");
+  XMLElement* const option = RequireSection(mjcf->root(), "option");
   option->SetAttribute("solver", "Newton");
   option->SetAttribute("iterations", "100");
   option->SetAttribute("tolerance", "1e-14");

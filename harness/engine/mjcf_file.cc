@@ -162,7 +162,7 @@ std::string MjcfFile::PrintFor(const std::filesystem::path& folder) const {
       is_stated = true;
     });
     // Without such a folder, files are looked for in the MJCF's own.
-    if (!is_stated) move(RequireCompiler(root), name);
+    if (!is_stated) move(RequireSection(root, "compiler"), name);
   }
   return PrintXml(copy);
 }

@@ -64,8 +64,11 @@ std::vector<std::string> ExcludeOverlaps(const std::vector<std::map<std::string,
 /// know and AdaptMjcf takes away), by name: their own, or their class's.
 std::map<std::string, double> FindForceRanges(const MjcfFile& mjcf);
 
-/// The element `compiler` of an MJCF's root; a new one when it has none.
-tinyxml2::XMLElement* RequireCompiler(tinyxml2::XMLElement* root);
+/// The element of that name of an MJCF's root, the last, which outweighs others; a new one when it has none.
+tinyxml2::XMLElement* RequireSection(tinyxml2::XMLElement* root, const char* name);
+
+/// Takes away controls of key frames, whose actuators are gone.
+void DeleteControls(tinyxml2::XMLElement* root);
 
 /// Attributes of an element of that name (mesh, hfield, skin, texture) that name files; empty for others.
 std::span<const char* const> ListAssetAttributes(std::string_view element);

@@ -267,16 +267,16 @@ class Downgrade {
 
 void LeaveOutNewerWords(MjcfFile* mjcf) { Downgrade(mjcf).Run(); }
 
-XMLElement* RequireCompiler(XMLElement* root) {
-  if (XMLElement* const compiler = root->FirstChildElement("compiler")) return compiler;
-  return root->InsertFirstChild(root->GetDocument()->NewElement("compiler"))->ToElement();
+XMLElement* RequireSection(XMLElement* root, const char* name) {
+  if (XMLElement* const section = root->LastChildElement(name)) return section;
+  return root->InsertFirstChild(root->GetDocument()->NewElement(name))->ToElement();
 }
 
 void StateNewDefaults(MjcfFile* mjcf) {
   for (const XMLElement* compiler : ListChildren(mjcf->root(), "compiler")) {
     if (compiler->Attribute("autolimits") != nullptr) return;
   }
-  XMLElement* const compiler = RequireCompiler(mjcf->root());
+  XMLElement* const compiler = RequireSection(mjcf->root(), "compiler");
   compiler->SetAttribute("autolimits", "true");
   mjcf->Note(*compiler, "<compiler autolimits>", "stated: true by default since MuJoCo 3.0.0");
 }

@@ -33,6 +33,7 @@ FrictionRow CalcFrictionShapes(double velocity, const FrictionRow& shape_velocit
 }
 
 double CalcSlip(double sign, double before, double moved) {
+  // Over which a recorded Panda's friction builds up (marcocognetti/FrankaEmikaPandaDynModel).
   constexpr double kDistance = 2e-3;
   return sign + (before - sign) * std::exp(-moved / kDistance);
 }

@@ -82,7 +82,7 @@ class Runner {
       result_.controller_failed = dynamic_cast<const ControllerFailure*>(&error) != nullptr;
       result_.grasp_lost = dynamic_cast<const GraspLost*>(&error) != nullptr;
       result_.failure = error.what() + (settling ? " while settling"
-                                                 : " at t = " + FormatNumber(loop_.record().time) + " s");
+                                                 : " at t = " + FormatNumber(loop_.record().time, 6) + " s");
     }
   }
 

@@ -137,6 +137,19 @@ TEST_F(InitCommand, MovesAsMotorsCan) {
   EXPECT_EQ(RunMotion(0, "weak").at("verdict"), "pass");
 }
 
+// A floating base stands on what is lowest of the robot and can touch.
+TEST_F(InitCommand, ARobotWithAFloatingBaseStands) {
+  Expect(0, {"init", kMjcf + "quadruped_scene.xml", "--out", "dog"});
+  EXPECT_THAT(Read("dog/motion.toml"), HasSubstr(R"(feet = ["foot_1", "foot_2", "foot_3", "foot_4"])"));
+  const Json run = RunMotion(0, "dog");
+  EXPECT_EQ(run.at("verdict"), "pass");
+  EXPECT_GT(run.at("checks").at("foot_cone_use").at("max").get<double>(), 0.0);
+  // Without places to stand on it is refused.
+  EXPECT_TRUE(
+      Refused({"init", kMjcf + "quadruped.xml", "--out", "none"}, {"quadruped.xml", "floats", "got 0"}));
+  EXPECT_FALSE(Has("none"));
+}
+
 // The weight of an arm in a horizontal plane asks for no torque, and one that hangs has a tilt of pi.
 TEST_F(InitCommand, ArmsMayLieOrHang) {
   const std::string mjcf = ReadFixture("pair.xml");
