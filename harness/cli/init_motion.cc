@@ -18,7 +18,9 @@ JointSpan ChooseSpan(const Joint& joint, bool states_range, double home) {
   constexpr double kMargin = 0.2;  // of the range, at either end
   const double most = joint.type == JointType::kPrismatic ? 0.05 : 0.3;
   const double width = states_range ? joint.upper - joint.lower : 2.0 * most;
-  if (!states_range) home = std::clamp(home, joint.lower + most, joint.upper - most);
+  // All turns are alike; those that are written stay between -pi and pi, as printed, too.
+  constexpr double kTurns = 1.1;
+  if (!states_range) home = std::clamp(home, joint.lower + kTurns * most, joint.upper - kTurns * most);
   const double low = states_range ? joint.lower + kMargin * width : home - most;
   const double high = states_range ? joint.upper - kMargin * width : home + most;
   JointSpan span;
