@@ -268,7 +268,9 @@ class Search {
     return others;
   }
 
-  /// Exchanges and drops what others make worse than something else, or needless. @returns the criterion.
+  /// Exchanges and drops what others make worse than something else, or needless. What leaves no more than
+  /// noise is kept so, whatever the criterion says: else one step would undo the other for ever. @returns the
+  /// criterion.
   double Exchange(double criterion) {
     for (bool improved = true; improved;) {
       improved = false;
@@ -278,12 +280,16 @@ class Search {
         const double alone =
             Score((y_ - Q * (Q.transpose() * y_)).squaredNorm(), CountParameters(others), others.size());
         const Best best = FindBest(others);
-        if (IsNoise(others) || (alone <= criterion && alone <= best.criterion)) {
+        const bool is_noise = IsNoise(chosen_);
+        if (IsNoise(others) || (!is_noise && alone <= criterion && alone <= best.criterion)) {
           chosen_ = others;
           criterion = alone;
           improved = true;
         } else if (best.criterion < criterion - kEqualLogOdds * 1e-3 && best.candidate != chosen_[place]) {
-          chosen_[place] = best.candidate;
+          std::vector<size_t> exchanged = chosen_;
+          exchanged[place] = best.candidate;
+          if (is_noise && !IsNoise(exchanged)) continue;
+          chosen_ = exchanged;
           criterion = best.criterion;
           improved = true;
         }
@@ -305,6 +311,7 @@ class Search {
           const Best second = FindBest(set);
           if (!(second.criterion < criterion - kEqualLogOdds * 1e-3)) continue;
           set.push_back(second.candidate);
+          if (IsNoise(chosen_) && !IsNoise(set)) continue;
           chosen_ = set;
           return ExchangePairs(Exchange(second.criterion));
         }

@@ -385,28 +385,17 @@ bool TorqueEstimator::AddPushes() {
   bool has_any = false;
   for (size_t r = 0; r < recordings_->size(); ++r) {
     const std::vector<TorqueBalance::Block>& blocks = (*recordings_)[r].fit->blocks();
-    // Of all joints alike, where a weak one is pushed; and of all together, where a joint's own noise is
-    // more.
-    VectorXd alike = VectorXd::Zero(static_cast<Index>(blocks.size())), together = alike;
-    for (const TorqueRows::Part& part : rows_.parts) {
-      if (part.recording != r) continue;
-      const VectorXd squares = left.segment(part.begin + part.within, part.size - part.within).cwiseAbs2();
-      alike += InUnitsOfMedian(squares);
-      together += squares;
-    }
+    VectorXd squares = VectorXd::Zero(static_cast<Index>(blocks.size()));
+    for (const TorqueRows::Part& part : rows_.parts)
+      if (part.recording == r)
+        squares +=
+            InUnitsOfMedian(left.segment(part.begin + part.within, part.size - part.within).cwiseAbs2());
     std::vector<Push> pushes;
-    for (const VectorXd& squares : {alike, together}) {
-      for (const Window& one : FindWindows(squares)) {
-        const Push push = {.from = blocks[static_cast<size_t>(one.first)].from,
-                           .to = blocks[static_cast<size_t>(one.last)].to,
-                           .before = one.before,
-                           .after = one.after};
-        const auto is_same = [&](const Push& other) {
-          return other.from == push.from && other.to == push.to;
-        };
-        if (std::none_of(pushes.begin(), pushes.end(), is_same)) pushes.push_back(push);
-      }
-    }
+    for (const Window& one : FindWindows(squares))
+      pushes.push_back({.from = blocks[static_cast<size_t>(one.first)].from,
+                        .to = blocks[static_cast<size_t>(one.last)].to,
+                        .before = one.before,
+                        .after = one.after});
     if (const std::optional<double> when = FindStep(*recordings_, rows_, left, r))
       pushes.push_back({.from = *when, .to = blocks.back().to});
     for (Push& when : pushes) {
