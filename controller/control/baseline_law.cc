@@ -73,6 +73,12 @@ Matrix6d CalcDesignedDamping(const Matrix6d& Lambda, const Matrix6d& K, double z
 
 }  // namespace
 
+Vector6d ObjectSpaceInertia::CalcAcceleration(const Vector6d& W) const { return Lambda_llt_.solve(W); }
+
+void ObjectSpaceInertia::MultiplyContactInertia(Eigen::Ref<VectorXd> y) const {
+  inverse_llt_.solveInPlace(y);
+}
+
 std::string_view NameOf(ControlLaw law) {
   constexpr std::array<std::string_view, 5> kNames = {"computed_torque", "pd_gravity", "feedforward_pd",
                                                       "operational_space", "impedance"};

@@ -71,9 +71,9 @@ class ObjectSpaceInertia {
   /// Lambda, Sigma_o: kg, kg m, kg m^2.
   [[nodiscard]] const Matrix6d& Lambda() const { return Lambda_; }
   /// Lambda^-1 W: the acceleration that a wrench W on the augmented object gives it, both in Sigma_o.
-  [[nodiscard]] Vector6d CalcAcceleration(const Vector6d& W) const { return Lambda_llt_.solve(W); }
+  [[nodiscard]] Vector6d CalcAcceleration(const Vector6d& W) const;
   /// y (k) becomes Lambda_c y: accelerations of the contact points to forces, each in its Sigma_cf.
-  void MultiplyContactInertia(Eigen::Ref<VectorXd> y) const { inverse_llt_.solveInPlace(y); }
+  void MultiplyContactInertia(Eigen::Ref<VectorXd> y) const;
   /// M_bar' = L^T L.
   [[nodiscard]] const TreeFactor& mass_factor() const { return factor_; }
 

@@ -1,7 +1,8 @@
 #include "controller/control/ground_dynamics.h"
 
-#include <Eigen/Eigenvalues>
 #include <cmath>
+
+#include "controller/common/linear_algebra.h"
 
 namespace dexcheck {
 namespace {
@@ -37,8 +38,7 @@ const Prediction& GroundDynamics::Predict(const ModelTerms& robot, const GroundC
 }
 
 double GroundDynamics::CalcForceGain() const {
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> schur(half_.transpose() * half_, Eigen::EigenvaluesOnly);
-  return 1.0 / std::sqrt(schur.eigenvalues().minCoeff());
+  return 1.0 / std::sqrt(CalcSymmetricEigenvalues(half_.transpose() * half_)[0]);
 }
 
 }  // namespace dexcheck

@@ -8,6 +8,7 @@
 #include <map>
 #include <numbers>
 
+#include "controller/common/linear_algebra.h"
 #include "controller/common/text.h"
 #include "controller/dynamics/model_terms.h"
 #include "controller/model/rigid_body.h"
@@ -79,9 +80,9 @@ double CalcCondition(const RobotDescription& robot, const RobotSpec& spec) {
       terms.CalcFrameJacobian(frame, J, J_dot);
       M += J.bottomRows<3>().transpose() * excess * J.bottomRows<3>();
     }
-    const Eigen::SelfAdjointEigenSolver<MatrixXd> solver(T.transpose() * M * T, Eigen::EigenvaluesOnly);
-    const double least = solver.eigenvalues().minCoeff();
-    const double largest = solver.eigenvalues().maxCoeff();
+    const VectorXd eigenvalues = CalcSymmetricEigenvalues(T.transpose() * M * T);
+    const double least = eigenvalues.minCoeff();
+    const double largest = eigenvalues.maxCoeff();
     // Below rounding of the largest, an eigenvalue is zero.
     const bool is_singular =
         least <= largest * static_cast<double>(n) * std::numeric_limits<double>::epsilon();

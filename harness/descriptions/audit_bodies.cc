@@ -11,6 +11,7 @@
 #include <map>
 #include <numbers>
 
+#include "controller/common/linear_algebra.h"
 #include "controller/common/text.h"
 #include "controller/model/body_frame.h"
 #include "harness/descriptions/audit.h"
@@ -35,8 +36,7 @@ double CalcLeastPseudoInertia(const MassProperties& body) {
                           body.mass * body.com * body.com.transpose();
   Eigen::Matrix4d J;
   J << second, body.mass * body.com, body.mass * body.com.transpose(), body.mass;
-  return Eigen::SelfAdjointEigenSolver<Eigen::Matrix4d>(0.5 * (J + J.transpose()), Eigen::EigenvaluesOnly)
-      .eigenvalues()[0];
+  return CalcSymmetricEigenvalues(0.5 * (J + J.transpose()))[0];
 }
 
 class BodyAudit {

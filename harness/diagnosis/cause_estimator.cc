@@ -7,6 +7,7 @@
 #include <numeric>
 #include <utility>
 
+#include "controller/common/linear_algebra.h"
 #include "harness/diagnosis/visible_columns.h"
 
 namespace dexcheck {
@@ -183,9 +184,7 @@ class Search {
     const Visible& one = visible_[candidate];
     const MatrixXd Q = CalcRange(beside);
     const MatrixXd own = one.columns - Q * (Q.transpose() * one.columns);
-    Eigen::CompleteOrthogonalDecomposition<MatrixXd> decomposition;
-    decomposition.setThreshold(options_.independent);
-    return one.basis * decomposition.compute(own).solve(VectorXd(y_ - Q * (Q.transpose() * y_)));
+    return one.basis * SolveLeastSquares(own, y_ - Q * (Q.transpose() * y_), options_.independent);
   }
 
   /// Whether it and those can be, all at once; of those, the ones that add nothing to it are no longer
@@ -350,10 +349,9 @@ class Search {
       const double freedom = std::max(1.0, rows_ - static_cast<double>(width));
       const double variance =
           std::max(options_.floor, result.residual.squaredNorm() / freedom) * options_.alike;
-      const MatrixXd covariance =
-          size.cwiseInverse().asDiagonal() *
-          (scaled.transpose() * scaled).completeOrthogonalDecomposition().pseudoInverse() *
-          size.cwiseInverse().asDiagonal() * variance;
+      const MatrixXd covariance = size.cwiseInverse().asDiagonal() *
+                                  CalcPseudoinverse(scaled.transpose() * scaled) *
+                                  size.cwiseInverse().asDiagonal() * variance;
       Index begin = 0;
       for (size_t place = 0; place < chosen_.size(); ++place) {
         const Visible& visible = visible_[chosen_[place]];

@@ -12,7 +12,6 @@ using Eigen::Index;
 using namespace force_fault;
 
 constexpr double kFarthest = 10.0;  // rad or m: where springs relax
-constexpr const char* kWorld = "world";
 
 /// I a by the six entries Ixx, Iyy, Izz, Ixy, Ixz, Iyz of I.
 Eigen::Matrix<double, 3, 6> InertiaTimes(const Vector3d& a) {

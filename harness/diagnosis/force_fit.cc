@@ -1,7 +1,7 @@
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 
+#include "controller/common/linear_algebra.h"
 #include "harness/diagnosis/cause_estimator.h"
 #include "harness/diagnosis/repair_trial.h"
 
@@ -103,8 +103,7 @@ class ForceFit {
     constexpr double kNothing = 1e-9;  // what should be zero must not become a negative mass
     Solution solution = start_;
     for (int iteration = 0; iteration < kMaxIterations; ++iteration) {
-      const VectorXd step =
-          CalcColumns(solution, numbers).completeOrthogonalDecomposition().solve(solution.residual);
+      const VectorXd step = SolveLeastSquares(CalcColumns(solution, numbers), solution.residual);
       RobotSpec next = solution.repaired;
       for (size_t i = 0; i < numbers.size(); ++i) {
         const double scale = GetScale(spec(), numbers[i]);

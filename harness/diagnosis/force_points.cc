@@ -2,10 +2,10 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/QR>
 #include <algorithm>
 #include <utility>
 
+#include "controller/common/linear_algebra.h"
 #include "harness/diagnosis/step_forces.h"
 
 namespace dexcheck {
@@ -79,7 +79,7 @@ class PointFit {
   PointFit(const VectorXd& y, const Body& body) : y_(&y), body_(&body) {
     MatrixXd both(y.size(), 6);
     both << body.force->columns, body.moment->columns;
-    const VectorXd a = both.completeOrthogonalDecomposition().solve(y);
+    const VectorXd a = SolveLeastSquares(both, y);
     explains_ = 1.0 - (y - both * a).squaredNorm() / y.squaredNorm();
     F_ = a.head<3>();
     if (F_.squaredNorm() > 0.0)
@@ -98,7 +98,7 @@ class PointFit {
     for (int i = 0; i < kMostIterations; ++i) {
       MatrixXd all(y_->size(), 6 + beside.cols());
       all << body_->AtPoint(p_), body_->ByPoint(F_), beside;
-      const VectorXd a = all.completeOrthogonalDecomposition().solve(*y_);
+      const VectorXd a = SolveLeastSquares(all, *y_);
       F_ = a.head<3>();
       p_ += a.segment<3>(3);
       if (a.segment<3>(3).norm() < kExact) break;

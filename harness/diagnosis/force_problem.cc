@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "controller/common/linear_algebra.h"
 #include "harness/diagnosis/telling.h"
 
 namespace dexcheck {
@@ -22,7 +23,6 @@ constexpr double kLeastFraction = 0.99;
 constexpr double kOfLeft = 5.0, kRounding = 1e-4, kExact = 1e-7;
 constexpr int kMostLevels = 4;
 constexpr Index kMostSteps = 20;  // that are looked at
-constexpr const char* kWorld = "world";
 
 /// What pushes as it is, whatever moves.
 bool IsPush(const Candidate& one) {
@@ -179,9 +179,8 @@ ForceProblem::Free ForceProblem::FitFree(size_t index) const {
     const Index begin = k * forces_->rows();
     const MatrixXd C = candidate.columns.middleRows(begin, forces_->rows());
     auto left = free.residual.segment(begin, forces_->rows());
-    Eigen::CompleteOrthogonalDecomposition<MatrixXd> decomposition;
-    decomposition.setThreshold(1e-3);
-    const VectorXd a = decomposition.compute(C).solve(VectorXd(left));
+    constexpr double kIndependent = 1e-3;
+    const VectorXd a = SolveLeastSquares(C, left, kIndependent);
     left -= C * a;
     free.largest = std::max(free.largest, a.head(std::min<Index>(3, a.size())).norm());
   }

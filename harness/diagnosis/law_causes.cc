@@ -12,11 +12,11 @@ namespace {
 using Eigen::Index;
 
 // Summands agree with what a wrong law has of them to this fraction: it is computed from the same numbers.
-constexpr double kAccuracy = 1e-6;
+constexpr double kLawAccuracy = 1e-6;
 // What is left over may be this many times the noise and is explained all the same.
-constexpr double kLeft = 30.0;
-constexpr Index kMostSteps = 20;  // that are looked at
-constexpr double kZero = 1e-6;    // a factor nearer to zero than this is one of a part that is missing
+constexpr double kMostLeft = 30.0;
+constexpr Index kMostLawSteps = 20;  // that are looked at
+constexpr double kZero = 1e-6;       // a factor nearer to zero than this is one of a part that is missing
 
 /// Entries of tau' that belong together.
 struct Place {
@@ -78,7 +78,7 @@ Causes ExplainLaw(const StepStore& store) {
     if (noise(0, i) > 0.0) steps.push_back(i);
   if (steps.empty()) return causes;
   const auto count = static_cast<Index>(steps.size());
-  const Index used = std::min(count, kMostSteps);
+  const Index used = std::min(count, kMostLawSteps);
 
   const RobotModel& model = store.setup().model();
   const Index n = model.num_velocities();
@@ -158,7 +158,7 @@ Causes ExplainLaw(const StepStore& store) {
     }
   }
   DropRepeated(parts_of, &candidates);
-  const double floor = 1.0 + kAccuracy * kAccuracy * y.squaredNorm() / static_cast<double>(y.size());
+  const double floor = 1.0 + kLawAccuracy * kLawAccuracy * y.squaredNorm() / static_cast<double>(y.size());
   const CauseSelection selection =
       SelectCauses(y, candidates, {.most_terms = 4, .restarts = 0, .floor = floor});
   causes = TellSelection(
@@ -169,7 +169,7 @@ Causes ExplainLaw(const StepStore& store) {
             one.fault, one.place, std::abs(value) < kZero ? 0.0 : value, error.size() > 0 ? error[0] : 0.0,
             one.unit,  ""};
       });
-  if (selection.left <= kLeft * std::sqrt(floor)) return causes;
+  if (selection.left <= kMostLeft * std::sqrt(floor)) return causes;
   // The nearest stands for all.
   causes.resize(std::min<size_t>(causes.size(), 1));
   if (causes.empty()) causes.push_back(StartExplanation(store, CauseChannel::kLaw, steps));

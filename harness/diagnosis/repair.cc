@@ -26,7 +26,7 @@ void TurnBody(const Matrix3d& R, MassProperties* body) {
 }
 
 /// "1.9", "-90"; rounding errors of a solved value are not printed.
-std::string FormatNumber(const RobotSpec& spec, const Parameter& parameter, double value) {
+std::string FormatEntry(const RobotSpec& spec, const Parameter& parameter, double value) {
   double printed = ToPrinted(spec, parameter, value);
   if (std::abs(value) < 1e-12 * GetScale(spec, parameter)) printed = 0.0;
   return fmt::format("{:.{}g}", printed, kPrintedDigits);
@@ -35,7 +35,7 @@ std::string FormatNumber(const RobotSpec& spec, const Parameter& parameter, doub
 /// "1.9 kg", "-90 deg".
 std::string FormatValue(const RobotSpec& spec, const Parameter& parameter, double value) {
   const std::string unit = UnitOf(spec, parameter);
-  return FormatNumber(spec, parameter, value) + (unit.empty() ? "" : " ") + unit;
+  return FormatEntry(spec, parameter, value) + (unit.empty() ? "" : " ") + unit;
 }
 
 std::string FormatValues(const RobotSpec& spec, const std::vector<Parameter>& parameters,
@@ -210,7 +210,7 @@ double RoundWithin(const RobotSpec& spec, const Parameter& parameter, double val
 }
 
 double ReadBackPrinted(const RobotSpec& spec, const Parameter& parameter, double value) {
-  const double printed = std::stod(FormatNumber(spec, parameter, value));
+  const double printed = std::stod(FormatEntry(spec, parameter, value));
   return IsAngle(spec, parameter) ? DegToRad(printed) : printed;
 }
 

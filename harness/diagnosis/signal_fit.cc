@@ -13,7 +13,7 @@ using Eigen::ArrayXd;
 using Eigen::Index;
 
 // Columns agree with what a fault does to this fraction: it is computed from the same numbers.
-constexpr double kAccuracy = 1e-9;
+constexpr double kSignalAccuracy = 1e-9;
 // A drift that began since the step before has come so far, beside rounding, at the first.
 constexpr double kSinceStep = 1e-6;
 // Autocorrelation of noise that is white, times the root of the number of steps.
@@ -143,7 +143,7 @@ SignalVerdict JudgeSignal(const SignalSeries& series, const std::vector<SignalSe
   const double square =
       ((steps.Take(series.got) - steps.Take(series.expected)) / series.noise).square().sum() /
       static_cast<double>(steps.size());
-  const double floor = 1.0 + kAccuracy * kAccuracy * square;
+  const double floor = 1.0 + kSignalAccuracy * kSignalAccuracy * square;
   const auto is_good = [&](const SignalFit& fit) {
     // Noise beside several other faults is what they do not explain.
     constexpr size_t kMostWithNoise = 2;

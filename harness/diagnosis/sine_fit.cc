@@ -6,6 +6,8 @@
 #include <utility>
 #include <vector>
 
+#include "controller/common/linear_algebra.h"
+
 namespace dexcheck {
 namespace {
 
@@ -46,7 +48,7 @@ class SineSearch {
     const double w = 2.0 * kPi * frequency;
     columns_.col(0) = (w * x_).sin();
     columns_.col(1) = (w * x_).cos();
-    const VectorXd a = columns_.householderQr().solve(y_.matrix());
+    const VectorXd a = SolveLeastSquares(columns_, y_.matrix());
     return (y_.matrix() - columns_ * a).squaredNorm();
   }
 

@@ -11,7 +11,7 @@ namespace {
 using Eigen::Index;
 
 // Of a square: what is left of products of columns when they cancel.
-constexpr double kRounding = 1e-12;
+constexpr double kCancelled = 1e-12;
 
 /// Columns of all candidates side by side, and what of each shows.
 struct Columns {
@@ -89,7 +89,7 @@ std::vector<SmallestAmplitude> FindSmallestAmplitudes(
       const Index column = columns.begins[one.candidate] + one.component;
       const double square = left[column];
       const double needed = 2.0 * kEqualLogOdds - std::min(0.0, more) * std::log(samples);
-      const double named = square > kRounding * columns.products(column, column)
+      const double named = square > kCancelled * columns.products(column, column)
                                ? solve(needed, square)
                                : std::numeric_limits<double>::infinity();
       const VectorXd there = one.found * (columns.visible[j].basis * amplitudes.col(column));

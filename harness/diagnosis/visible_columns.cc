@@ -1,7 +1,8 @@
 #include "harness/diagnosis/visible_columns.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
+
+#include "controller/common/linear_algebra.h"
 
 namespace dexcheck {
 
@@ -19,13 +20,13 @@ Visible FindVisible(const Candidate& candidate, double noise) {
   const VectorXd unit =
       is_bounded ? scale : VectorXd(size.unaryExpr([](double s) { return s > 0.0 ? 1.0 / s : 0.0; }));
   const MatrixXd scaled = C * unit.asDiagonal();
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(scaled.transpose() * scaled);
-  const double largest = eigen.eigenvalues().tail<1>()[0];
+  const SymmetricEigen eigen = DecomposeSymmetric(scaled.transpose() * scaled);
+  const double largest = eigen.values[C.cols() - 1];
   const double least = std::max(is_bounded ? noise * noise : 0.0, kIndependent * kIndependent * largest);
   Eigen::Index visible = 0;
-  while (visible < C.cols() && eigen.eigenvalues()[C.cols() - 1 - visible] > least) ++visible;
+  while (visible < C.cols() && eigen.values[C.cols() - 1 - visible] > least) ++visible;
   Visible result;
-  result.basis = unit.asDiagonal() * eigen.eigenvectors().rightCols(visible);
+  result.basis = unit.asDiagonal() * eigen.vectors.rightCols(visible);
   result.columns = C * result.basis;
   result.unit = unit;
   return result;

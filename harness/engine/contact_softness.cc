@@ -1,10 +1,10 @@
 #include "harness/engine/contact_softness.h"
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <vector>
 
+#include "controller/common/linear_algebra.h"
 #include "harness/engine/engine.h"
 #include "harness/engine/map_vector.h"
 #include "harness/engine/mujoco_release.h"
@@ -53,7 +53,7 @@ Eigen::RowVectorXd ReadRow(const mjModel& m, const mjData& d, int row) {
 double FindFraction(const MatrixXd& A, const VectorXd& R) {
   const VectorXd scale = R.cwiseSqrt().cwiseInverse();
   const MatrixXd S = scale.asDiagonal() * A * scale.asDiagonal();
-  const VectorXd values = Eigen::SelfAdjointEigenSolver<MatrixXd>(S, Eigen::EigenvaluesOnly).eigenvalues();
+  const VectorXd values = CalcSymmetricEigenvalues(S);
   for (const double value : values) {
     if (value > kNothing * values.maxCoeff()) return 1.0 / (1.0 + value);
   }

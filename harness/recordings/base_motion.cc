@@ -1,7 +1,8 @@
 #include "harness/recordings/base_motion.h"
 
-#include <Eigen/QR>
 #include <cmath>
+
+#include "controller/common/linear_algebra.h"
 
 namespace dexcheck {
 namespace {
@@ -61,7 +62,7 @@ double CalcExplained(const std::vector<BlockProducts>& blocks, double frequency)
       for (int k = 0; k < 2; ++k) G.block<3, 3>(3 * i, 3 * k) += phase[i] * phase[k] * one.squares;
     }
   }
-  return b.dot(G.completeOrthogonalDecomposition().solve(b));
+  return b.dot(SolveLeastSquares(G, b));
 }
 
 /// Of a grid, then by halving its step.
@@ -110,7 +111,7 @@ std::optional<double> FindStep(const RecordingSet& recordings, const TorqueRows&
   for (size_t i = all.blocks.size(); i-- > 1 + all.blocks.size() / 10;) {
     G += all.blocks[i].squares;
     b += all.blocks[i].products;
-    const double explained = b.dot(G.completeOrthogonalDecomposition().solve(b));
+    const double explained = b.dot(SolveLeastSquares(G, b));
     if (explained > most) most = explained, best = all.blocks[i].from;
   }
   return best;

@@ -1,6 +1,6 @@
 #include "harness/recordings/motion_design.h"
 
-#include <Eigen/Eigenvalues>
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <nlopt.hpp>
@@ -8,6 +8,7 @@
 #include <random>
 
 #include "controller/common/errors.h"
+#include "controller/common/linear_algebra.h"
 #include "harness/recordings/torque_rows.h"
 
 namespace dexcheck {
@@ -302,8 +303,7 @@ class MotionDesigner {
 
   static int CountKnown(const MatrixXd& information) {
     constexpr double kThird = 9.0;
-    return static_cast<int>(
-        (information.selfadjointView<Eigen::Lower>().eigenvalues().array() > kThird).count());
+    return static_cast<int>((CalcSymmetricEigenvalues(information).array() > kThird).count());
   }
   static VectorXd CalcErrors(const MatrixXd& information) {
     return information.llt()

@@ -1,10 +1,11 @@
 #include "harness/recordings/position_faults.h"
 
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <utility>
+
+#include "controller/common/linear_algebra.h"
 
 namespace dexcheck {
 namespace {
@@ -68,8 +69,7 @@ class Begin {
   static double CalcLogResidual(const Products& G) {
     const Eigen::Vector4d b = G.topRightCorner<4, 1>();
     const double y = G(4, 4);
-    const double left =
-        y - b.dot(MatrixXd(G.topLeftCorner<4, 4>()).completeOrthogonalDecomposition().solve(b));
+    const double left = y - b.dot(SolveLeastSquares(G.topLeftCorner<4, 4>(), b));
     constexpr double kRounding = 1e-12;
     return 0.5 * std::log(std::max(left, kRounding * y) / std::max(1.0, G(0, 0)) +
                           std::numeric_limits<double>::min());

@@ -1,11 +1,11 @@
 #include "harness/recordings/read_recordings.h"
 
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
 #include "controller/common/errors.h"
+#include "controller/common/linear_algebra.h"
 
 namespace dexcheck {
 namespace {
@@ -152,9 +152,7 @@ void RecordingSet::EstimateGains() {
     for (const ReadRecording& one : read_) G += one.fit->products(place);
     // Of the current by the model's torque, where that shows beside friction.
     const auto solve = [&](const std::vector<Index>& columns) {
-      return VectorXd(MatrixXd(G(columns, columns))
-                          .completeOrthogonalDecomposition()
-                          .solve(VectorXd(G(columns, current))));
+      return SolveLeastSquares(G(columns, columns), VectorXd(G(columns, current)));
     };
     const auto left = [&](const std::vector<Index>& columns) {
       return G(current, current) - solve(columns).dot(VectorXd(G(columns, current)));

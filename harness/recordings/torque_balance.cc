@@ -1,8 +1,9 @@
 #include "harness/recordings/torque_balance.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+
+#include "controller/common/linear_algebra.h"
 
 namespace dexcheck {
 
@@ -264,11 +265,11 @@ MatrixXd TorqueBalance::CalcRows(size_t place) const {
   // A factor of what may be singular, with columns of one size.
   const VectorXd size =
       products_[place].diagonal().cwiseSqrt().unaryExpr([](double s) { return s > 0.0 ? s : 1.0; });
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(size.cwiseInverse().asDiagonal() * within *
-                                                      size.cwiseInverse().asDiagonal());
+  const SymmetricEigen eigen =
+      DecomposeSymmetric(size.cwiseInverse().asDiagonal() * within * size.cwiseInverse().asDiagonal());
   MatrixXd rows(within.rows() + of_blocks.rows(), within.cols());
-  rows.topRows(within.rows()) = eigen.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal() *
-                                eigen.eigenvectors().transpose() * size.asDiagonal();
+  rows.topRows(within.rows()) =
+      eigen.values.cwiseMax(0.0).cwiseSqrt().asDiagonal() * eigen.vectors.transpose() * size.asDiagonal();
   rows.bottomRows(of_blocks.rows()) = of_blocks;
   return rows;
 }

@@ -1,8 +1,9 @@
 #include "harness/recordings/torque_candidates.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+
+#include "controller/common/linear_algebra.h"
 
 namespace dexcheck {
 namespace {
@@ -275,18 +276,16 @@ BodyVector UnpackPseudoInertia(const Eigen::Matrix4d& pseudo) {
 
 bool IsBody(const BodyVector& body) {
   const Eigen::Matrix4d pseudo = PackPseudoInertia(body);
-  const Eigen::Vector4d eigenvalues = pseudo.selfadjointView<Eigen::Lower>().eigenvalues();
   constexpr double kRounding = 1e-9;
-  return body[0] > 0.0 && eigenvalues.minCoeff() >= -kRounding * pseudo.trace();
+  return body[0] > 0.0 && CalcSymmetricEigenvalues(pseudo)[0] >= -kRounding * pseudo.trace();
 }
 
 BodyVector FindNearestBody(const BodyVector& body) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix4d> eigen(PackPseudoInertia(body));
+  const SymmetricEigen eigen = DecomposeSymmetric(PackPseudoInertia(body));
   // No thinner than readers of descriptions take for a body.
   constexpr double kThinnest = 1e-6;
-  const Eigen::Vector4d possible =
-      eigen.eigenvalues().cwiseMax(kThinnest * eigen.eigenvalues().cwiseAbs().maxCoeff());
-  return UnpackPseudoInertia(eigen.eigenvectors() * possible.asDiagonal() * eigen.eigenvectors().transpose());
+  const VectorXd possible = eigen.values.cwiseMax(kThinnest * eigen.values.cwiseAbs().maxCoeff());
+  return UnpackPseudoInertia(eigen.vectors * possible.asDiagonal() * eigen.vectors.transpose());
 }
 
 std::vector<TorqueFault> ListTorqueFaults(const RobotModel& model, const std::vector<int>& joints,

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "controller/common/errors.h"
+#include "controller/common/linear_algebra.h"
 #include "harness/recordings/base_motion.h"
 
 namespace dexcheck {
@@ -266,8 +267,7 @@ VectorXd TorqueEstimator::CalcAmplitudes(const std::vector<CauseTerm>& terms) co
   const Index rows = CountForcedRows();
   const VectorXd right =
       R_.col(width).head(rows) - R_.block(0, forced, rows, width - forced) * a.tail(width - forced);
-  if (rows > 0)
-    a.head(forced) = R_.topLeftCorner(rows, forced).completeOrthogonalDecomposition().solve(right);
+  if (rows > 0) a.head(forced) = SolveLeastSquares(R_.topLeftCorner(rows, forced), right);
   return a;
 }
 

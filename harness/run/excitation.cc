@@ -1,10 +1,10 @@
 #include "harness/run/excitation.h"
 
-#include <Eigen/Eigenvalues>
 #include <cmath>
 #include <limits>
 #include <optional>
 
+#include "controller/common/linear_algebra.h"
 #include "controller/dynamics/model_terms.h"
 #include "harness/diagnosis/parameters.h"
 
@@ -68,8 +68,7 @@ VectorXd CalcSingularValues(const RobotSpec& robot, const std::vector<MotionSamp
 }
 
 VectorXd CalcSingularValues(const MatrixXd& W) {
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(W.transpose() * W, Eigen::EigenvaluesOnly);
-  return eigen.eigenvalues().reverse().cwiseMax(0.0).cwiseSqrt();
+  return CalcSymmetricEigenvalues(W.transpose() * W).reverse().cwiseMax(0.0).cwiseSqrt();
 }
 
 int CountAbove(const VectorXd& singular_values, double floor) {

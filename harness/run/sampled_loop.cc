@@ -185,7 +185,7 @@ void Match(const VectorXcd& before, VectorXcd* values) {
 
 LoopMargins CalcMargins(const SampledSystem& system, bool together) {
   // A - B C = U R U^*
-  const Eigen::ComplexSchur<MatrixXd> schur(system.A - system.B * system.C);
+  const Eigen::ComplexSchur<MatrixXcd> schur((system.A - system.B * system.C).cast<Complex>());
   const MatrixXcd& R = schur.matrixT();
   LoopMargins margins;
   margins.radius = R.diagonal().cwiseAbs().maxCoeff();
@@ -201,7 +201,7 @@ LoopMargins CalcMargins(const SampledSystem& system, bool together) {
     return MatrixXcd(MatrixXcd::Identity(n, n) + C * shifted.triangularView<Eigen::Upper>().solve(B));
   };
   const auto find_loci = [&](const MatrixXcd& S) {
-    VectorXcd values = S.eigenvalues().cwiseInverse();
+    VectorXcd values = Eigen::ComplexSchur<MatrixXcd>(S, false).matrixT().diagonal().cwiseInverse();
     values.array() -= Complex(1.0);
     return values;
   };
