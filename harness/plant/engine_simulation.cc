@@ -116,7 +116,8 @@ void EngineSimulation::CheckHealth(double expected_time) const {
   // After a bad position, velocity or acceleration the engine warns and starts over, at time zero.
   for (int i = 0; i < mjNWARNING; ++i) {
     if (data_->warning[i].number == 0) continue;
-    throw DivergenceError("MuJoCo at t = " + FormatNumber(data_->time, 6) + " s: " + DescribeWarning(*data_, i));
+    throw DivergenceError("MuJoCo at t = " + FormatNumber(data_->time, 6) +
+                          " s: " + DescribeWarning(*data_, i));
   }
   const bool finite = Eigen::Map<const VectorXd>(data_->qpos, model_->nq).allFinite() &&
                       Eigen::Map<const VectorXd>(data_->qvel, model_->nv).allFinite();

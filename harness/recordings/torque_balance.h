@@ -8,6 +8,7 @@
 // samples.
 
 #include <map>
+#include <tuple>
 #include <vector>
 
 #include "controller/dynamics/torque_regressor.h"
@@ -37,7 +38,9 @@ struct TorqueColumn {
   Kind kind;
   int index = 0;
   int component = 0;
-  auto operator<=>(const TorqueColumn&) const = default;
+  bool operator<(const TorqueColumn& other) const {
+    return std::tie(kind, index, component) < std::tie(other.kind, other.index, other.component);
+  }
 };
 
 class TorqueBalance {
