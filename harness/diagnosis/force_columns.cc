@@ -160,6 +160,7 @@ void StepForces::AddJoints(std::vector<Candidate>* candidates) {
       const double known = store_.Get(StepStore::kDryFriction)(i, step_);
       Candidate& bearing = Next(candidates, kBearing, place, force, 0.0, VectorXd::Ones(1));
       bearing.nominal = std::max(bearing.nominal, std::abs(known));
+      bearing.fitted = VectorXd::Constant(1, joint->dry_friction);
       AddRobot(&bearing, VectorXd(known * f));
     }
     AddRobot(&Next(candidates, "dry friction", place, force, joint == nullptr ? 0.0 : joint->dry_friction,
@@ -295,6 +296,10 @@ void StepForces::AddGravity(std::vector<Candidate>* candidates) {
   Candidate& gravity = Next(candidates, kGravity, kWorld, "m/s^2", 0.0, VectorXd::Constant(3, 20.0));
   for (Index k = 0; k < 3; ++k)
     gravity.columns.col(k).segment(begin_, rows()) = Whiten(weights.col(k), Vector6d(object.col(k)));
+  const MatrixXd all = gravity.columns.middleRows(begin_, rows());
+  Candidate& size = Next(candidates, kGravitySize, kWorld, "m/s^2", 0.0, gravity.scale.head(1));
+  size.is_possible = nullptr;
+  size.columns.middleRows(begin_, rows()) = all * model_.gravity().normalized();
 }
 
 }  // namespace dexcheck

@@ -71,8 +71,7 @@ bool ForceProblem::ExplainConstant(const Segment& segment, Causes* causes) {
   Index amplitudes = 0;
   for (const CauseTerm& term : selection.terms) amplitudes += term.amplitude.size();
   if (ExplainTorque(segment, amplitudes, selection.terms.size(), causes)) return true;
-  if (ExplainJoint(segment, selection, causes) || ExplainBetweenLinks(segment, selection, causes))
-    return true;
+  if (ExplainJoint(segment, selection, causes)) return true;
   Causes told = TellSelection(Start(segment), selection, candidates_,
                               [&](const Candidate& one, const VectorXd& amplitude, const VectorXd& error) {
                                 return MakeForceFault(one, amplitude, error, forces_->model().gravity());
@@ -85,45 +84,32 @@ bool ForceProblem::ExplainJoint(const Segment& segment, const CauseSelection& se
                                 Causes* causes) const {
   if (selection.terms.size() < 2) return false;
   const std::string& place = candidates_[selection.terms.front().candidate].place;
-  for (const CauseTerm& term : selection.terms)
-    if (candidates_[term.candidate].place != place || !place.starts_with("joint ")) return false;
-  causes->push_back(StartChanging(segment, selection, place));
-  return true;
-}
-
-bool ForceProblem::ExplainBetweenLinks(const Segment& segment, const CauseSelection& selection,
-                                       Causes* causes) const {
-  if (selection.terms.size() != 2) return false;
-  const CauseTerm &a = selection.terms[0], &b = selection.terms[1];
-  const Candidate &x = candidates_[a.candidate], &y = candidates_[b.candidate];
-  constexpr double kOpposite = 0.02;
-  if (x.fault != "moment" || y.fault != "moment" ||
-      (a.amplitude + b.amplitude).norm() > kOpposite * a.amplitude.norm())
-    return false;
-  const RobotModel& model = forces_->model();
-  for (const Joint& joint : model.joints()) {
-    const std::string own = "link " + joint.link, carrier = "link " + model.link_name(joint.parent);
-    if ((x.place != own || y.place != carrier) && (x.place != carrier || y.place != own)) continue;
-    causes->push_back(StartChanging(segment, selection, "joint " + joint.name));
+  const bool is_of_one =
+      std::all_of(selection.terms.begin(), selection.terms.end(),
+                  [&](const CauseTerm& term) { return candidates_[term.candidate].place == place; });
+  const auto is_joint = [&](size_t i) {
+    if (is_of_one && candidates_[i].place == place) return true;
+    return !is_exact_ && FitFree(i).residual.squaredNorm() <= static_cast<double>(y_.size());
+  };
+  for (size_t i = 0; i < candidates_.size(); ++i) {
+    if (candidates_[i].fault != "torque" || !is_joint(i)) continue;
+    causes->push_back(StartChanging(segment, selection, i));
     return true;
   }
   return false;
 }
 
 Explanation ForceProblem::StartChanging(const Segment& segment, const CauseSelection& selection,
-                                        const std::string& joint) const {
+                                        size_t torque) const {
   Explanation one = Start(segment);
   one.outcome = CauseOutcome::kNamedClass;
   one.fraction = selection.fraction;
   one.left = selection.left;
-  one.faults.push_back({"torque that changes", joint, 0.0, 0.0, "", ""});
+  one.faults.push_back(
+      {"torque that changes", candidates_[torque].place, FitFree(torque).largest, 0.0, "", ""});
   for (const CauseTerm& term : selection.terms)
     one.faults.push_back(
         MakeForceFault(candidates_[term.candidate], term.amplitude, term.error, forces_->model().gravity()));
-  for (Index k = 0; k < steps_; ++k) {
-    const VectorXd y = y_.segment(k * forces_->rows(), forces_->rows());
-    one.faults.front().value = std::max(one.faults.front().value, CalcTorque(joint, k, y));
-  }
   return one;
 }
 
@@ -193,15 +179,6 @@ ForceProblem::Free ForceProblem::FitFree(size_t index) const {
 Fault ForceProblem::MakeFault(const Free& free) const {
   const Candidate& candidate = candidates_[free.candidate];
   return {candidate.fault + " that changes, up to", candidate.place, free.largest, 0.0, candidate.unit, ""};
-}
-
-double ForceProblem::CalcTorque(const std::string& place, Index step, const VectorXd& y) const {
-  for (const Candidate& candidate : candidates_) {
-    if (candidate.place != place || candidate.fault != "torque") continue;
-    const VectorXd column = candidate.columns.col(0).segment(step * forces_->rows(), forces_->rows());
-    return std::abs(column.dot(y)) / column.squaredNorm();
-  }
-  return 0.0;
 }
 
 Explanation ForceProblem::Start(const Segment& segment) const {
@@ -302,10 +279,12 @@ double ForceProblem::CalcLeft(const VectorXd& y) const {
 
 CauseSelection ForceProblem::Select() {
   CauseSelection best = SelectOnce();
+  is_exact_ = false;
   const Vector2d least = (kExact / kAccuracy * first_level_).cwiseMax(kRounding);
   for (int i = 0; i < kMostLevels && IsExplained(best.fraction, best.left); ++i) {
     const Vector2d before = level_;
     level_ = (kOfLeft * level_.cwiseProduct(CalcSizes(best.residual))).cwiseMax(least).cwiseMin(before);
+    is_exact_ = (level_.array() <= least.array()).all();
     if ((level_.array() > 0.5 * before.array()).all()) break;
     Build();
     CauseSelection next = SelectOnce();
@@ -344,7 +323,10 @@ CauseSelection ForceProblem::SelectOnce() {
   for (const CauseTerm& term : selection.terms) {
     if (candidates_[term.candidate].place != kWorld || selection.terms.size() == 1) continue;
     // Masses that differ fall as all do.
-    forces_->SetGravity(forces_->model().gravity() + Vector3d(term.amplitude));
+    const Vector3d& g = forces_->model().gravity();
+    const bool is_size = candidates_[term.candidate].fault == kGravitySize;
+    const Vector3d change = is_size ? Vector3d(term.amplitude[0] * g.normalized()) : Vector3d(term.amplitude);
+    forces_->SetGravity(g + change);
     Build();
     selection = SelectCauses(y_, candidates_, options);
     break;

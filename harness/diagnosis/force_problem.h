@@ -42,14 +42,12 @@ class ForceProblem {
   bool ExplainTorque(const Segment& segment, Eigen::Index amplitudes, size_t faults, Causes* causes) const;
 
  private:
-  /// Two faults of one joint may be anything that acts there.
+  /// Several faults of one joint may be anything that acts there. So may several of other places, where they
+  /// leave more than rounding and a torque of one joint, free at each step, does not.
   bool ExplainJoint(const Segment& segment, const CauseSelection& selection, Causes* causes) const;
-  /// Opposite moments on the links that a joint joins are a torque of that joint: what is across its axis
-  /// does no work, and the axis turns with the robot, so that it changes.
-  bool ExplainBetweenLinks(const Segment& segment, const CauseSelection& selection, Causes* causes) const;
   /// A class of what was selected and a torque of that joint that changes.
   [[nodiscard]] Explanation StartChanging(const Segment& segment, const CauseSelection& selection,
-                                          const std::string& joint) const;
+                                          size_t torque) const;
   /// A candidate whose amplitudes are free at each step.
   struct Free {
     size_t candidate = SIZE_MAX;
@@ -58,8 +56,6 @@ class ForceProblem {
   };
   [[nodiscard]] Free FitFree(size_t index) const;
   [[nodiscard]] Fault MakeFault(const Free& free) const;
-  /// Size of the torque of that joint that explains most of y, a step's rows.
-  [[nodiscard]] double CalcTorque(const std::string& place, Eigen::Index step, const VectorXd& y) const;
   [[nodiscard]] Explanation Start(const Segment& segment) const;
   void Build();
   /// Of each push another one that grows evenly: by so much a second, and what it is when the run ends.
@@ -81,7 +77,8 @@ class ForceProblem {
 
   const StepStore& store_;
   StepForces* forces_;
-  bool is_faint_;  // whether the checks of the balances hold
+  bool is_faint_;          // whether the checks of the balances hold
+  bool is_exact_ = false;  // whether the explanation leaves no more than rounding
   std::vector<Candidate> candidates_;
   VectorXd y_;
   std::vector<Eigen::Index> used_;  // steps of the store

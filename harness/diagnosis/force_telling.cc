@@ -64,7 +64,7 @@ Fault MakeForceFault(const Candidate& candidate, const VectorXd& a, const Vector
   const bool sticks = candidate.fault == kStuckBearing;
   if (sticks || candidate.fault == kBearing) {
     fault.fault = "dry friction";
-    fault.value = candidate.nominal * a[0];
+    fault.value = candidate.fitted[0] + candidate.nominal * a[0];  // beside what is declared
     fault.error = sticks ? std::numeric_limits<double>::infinity() : fault.error * candidate.nominal;
     if (sticks) fault.detail = "or more: the joint sticks";
   } else if (candidate.fault == "spring") {
@@ -92,6 +92,10 @@ Fault MakeForceFault(const Candidate& candidate, const VectorXd& a, const Vector
     fault.detail += " in its axes";
   } else if (candidate.fault == kCenterAlone) {
     fault.fault = kCenter;
+  } else if (candidate.fault == kGravitySize) {
+    fault.fault = kGravity;
+    fault.value = std::abs(a[0]);
+    fault.detail = TellVector(Vector3d::Zero() + a[0] * gravity.normalized());  // no -0
   } else if (candidate.fault == kMassWithInertia) {
     fault.fault = "mass";
     fault.detail = "and its inertia by the same factor";

@@ -22,6 +22,7 @@ constexpr double kZero = 1e-6;       // a factor nearer to zero than this is one
 struct Place {
   std::string name;
   std::vector<Index> entries;
+  bool is_balanced = false;  ///< Whether the ground is asked to balance what the base has of it.
 };
 
 std::vector<Place> ListPlaces(const StepStore& store) {
@@ -30,6 +31,8 @@ std::vector<Place> ListPlaces(const StepStore& store) {
   const int offset = model.num_base_velocities();
   std::vector<Place> places = {{"law", {}}};
   for (Index i = 0; i < model.num_velocities(); ++i) places.front().entries.push_back(i);
+  // Of a robot that stands the law may be wrong before the ground's forces are taken off, or after.
+  if (model.base().type == BaseType::kFloating) places.push_back({"law", {}, true});
   std::vector<bool> carries(static_cast<size_t>(model.num_joints()), false);
   for (const int joint : setup.hold().arm_joints) carries[static_cast<size_t>(joint)] = true;
   for (const int tip : setup.fingertips()) {
@@ -89,32 +92,25 @@ Causes ExplainLaw(const StepStore& store) {
   const std::span<const LawPartName> names = store.law()->ListParts();
   std::vector<Candidate> candidates;
   std::vector<unsigned> parts_of;
-  for (const LawPartName& name : names) {
-    for (const Place& place : places) {
-      parts_of.push_back(name.parts);
-      candidates.push_back({.fault = std::string(name.name) + " (" + name.symbol + "), factor",
-                            .place = place.name,
-                            .nominal = 1.0,
-                            .columns = MatrixXd::Zero(n * used, 1)});
-    }
-  }
-  for (const std::string& gain : store.law()->gains()) {
-    parts_of.push_back(0);
-    candidates.push_back({.fault = "gain " + gain + ", factor",
-                          .place = places.front().name,
-                          .nominal = 1.0,
-                          .columns = MatrixXd::Zero(n * used, 1)});
-  }
+  const auto add = [&](const std::string& fault, const std::string& place, double nominal,
+                       unsigned parts) -> Candidate& {
+    parts_of.push_back(parts);
+    candidates.push_back(
+        {.fault = fault, .place = place, .nominal = nominal, .columns = MatrixXd::Zero(n * used, 1)});
+    return candidates.back();
+  };
+  for (const LawPartName& name : names)
+    for (const Place& place : places)
+      add(std::string(name.name) + " (" + name.symbol + "), factor", place.name, 1.0, name.parts);
+  for (const std::string& gain : store.law()->gains())
+    add("gain " + gain + ", factor", places.front().name, 1.0, 0);
   // What a controller of another's may add.
   for (Index i = 0; i < n; ++i) {
-    const std::string& place = places[places.size() - static_cast<size_t>(n - i)].name;
-    const std::string& unit = store.motors()[static_cast<size_t>(i)].unit;
     for (const char* fault : {"torque", "viscous friction", "dry friction"}) {
-      candidates.push_back(
-          {.fault = fault, .place = place, .unit = unit, .columns = MatrixXd::Zero(n * used, 1)});
-      parts_of.push_back(0);
+      Candidate& one = add(fault, places[places.size() - static_cast<size_t>(n - i)].name, 0.0, 0);
+      one.unit = store.motors()[static_cast<size_t>(i)].unit;
       if (std::string_view(fault) != "torque")
-        candidates.back().is_possible = [](const VectorXd& a) { return a[0] >= 0.0; };
+        one.is_possible = [](const VectorXd& a) { return a[0] >= 0.0; };
     }
   }
   VectorXd y(n * used);
@@ -143,6 +139,7 @@ Causes ExplainLaw(const StepStore& store) {
         VectorXd own = VectorXd::Zero(n);
         for (const Index entry : place.entries) own[entry] = tau[entry];
         actuation.CalcForce(own, own);
+        if (place.is_balanced) own = sum;
         candidates[candidate++].columns.col(0).segment(k * n, n) = whiten(own);
       }
     }

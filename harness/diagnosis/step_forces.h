@@ -29,6 +29,8 @@ inline constexpr const char* kCenter = "centre of mass off by";
 /// Where what it does to the inertia does not show.
 inline constexpr const char* kCenterAlone = "centre of mass off by, alone";
 inline constexpr const char* kGravity = "gravity off by";
+/// Along itself.
+inline constexpr const char* kGravitySize = "size of gravity off by";
 inline constexpr const char* kWorld = "world";  // its place
 inline constexpr const char* kContact = "contact further along the normal by";
 /// What follows the name of a force, a moment or a torque that grows evenly in time.

@@ -200,10 +200,12 @@ InjectedFault CoulombCompensation(const FaultContext& context) {
 InjectedFault Gains(const FaultContext& context, bool of_velocity, bool is_one) {
   const double factor = 1.0 + context.draw->Size(1e-3, 0.3);
   const bool joints = IsOfJoints(context.setup);
-  const size_t axis = context.draw->Index(joints ? static_cast<size_t>(context.model().num_dofs()) : 6);
+  // The last gains are those of the joints; before them stand those of a base that floats.
+  const size_t count = joints ? static_cast<size_t>(context.model().num_dofs()) : 6;
+  const size_t axis = context.draw->Index(count);
   const auto change = [=](auto* gains) {
     if (is_one) {
-      (*gains)[static_cast<Eigen::Index>(axis)] *= factor;
+      (*gains)[gains->size() - static_cast<Eigen::Index>(count - axis)] *= factor;
     } else {
       *gains *= factor;
     }

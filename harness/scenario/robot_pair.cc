@@ -8,6 +8,7 @@
 #include "controller/common/text.h"
 #include "controller/model/parameter_reader.h"
 #include "harness/engine/compiled_model.h"
+#include "harness/engine/mujoco_release.h"
 
 namespace dexcheck {
 namespace {
@@ -66,13 +67,14 @@ void ApplyPlantOptions(const PlantOptions& plant, mjModel* engine) {
   }
 }
 
-/// Lists the pairs, and lets them push when the scenario says so.
+/// Lists the pairs, and lets them push when the scenario says so; some MJCFs do by themselves.
 void WatchBodies(const Scenario& scenario, const std::string& mjcf, RobotPair* robots) {
   const PlantOptions& plant = scenario.plant;
   robots->watched_pairs = ListWatchedPairs(*robots->engine, *robots->adapter, robots->solids,
                                            plant.allowed_collision_pairs, scenario.source);
-  if (!plant.collide) return;
+  if (!plant.collide && !CollidesByType(*robots->engine)) return;
   robots->solids = ListSolids(*robots->engine);  // the same, with the numbers that their geoms have now
+  if (!plant.collide) return;
   robots->engine = AddContactPairs(*robots->engine, ListGeoms(*robots));
   robots->adapter = std::make_unique<Adapter>(robots->model, *robots->engine, mjcf);
 }
@@ -103,7 +105,7 @@ RobotPair::RobotPair(const Scenario& scenario, RobotModel the_model, const std::
   RequireUsable(scenario, model);
   solids = ListSolids(*engine);
   std::vector<int> pushing;
-  if (scenario.plant.collide) {
+  if (scenario.plant.collide || CollidesByType(*engine)) {
     for (const Solid& solid : solids.list) pushing.push_back(solid.geom);
   }
   RemoveLooks(&engine, pushing);

@@ -7,6 +7,7 @@
 
 #include <limits>
 
+#include "harness/diagnosis/force_telling.h"
 #include "harness/injection/drawn_faults.h"
 #include "tests/common/matchers.h"
 
@@ -53,6 +54,14 @@ TEST(FaultTest, KindAndPlaceMakeItLike) {
   Fault other = MakeGain();
   other.place = "motor l_elbow";
   EXPECT_FALSE(MakeGain().IsLike(other));
+}
+
+// Gravity of another size along itself has one amplitude, and the name of one that points elsewhere.
+TEST(ForceFaultTest, SizeOfGravityIsGravity) {
+  const Candidate candidate{.fault = force_fault::kGravitySize, .place = "world", .unit = "m/s^2"};
+  const Fault fault = MakeForceFault(candidate, VectorXd::Constant(1, -0.3), VectorXd::Constant(1, 0.01),
+                                     Vector3d(0.0, 0.0, -9.81));
+  EXPECT_EQ(fault.Tell(), "world: gravity off by 0.3 +- 0.01 m/s^2 (0, 0, 0.3)");
 }
 
 TEST(ExplanationTest, OneNameIsNamedAndSeveralAreAClass) {

@@ -3,6 +3,7 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <memory>
 #include <tuple>
 
@@ -14,10 +15,25 @@ namespace {
 
 const std::string kRobot = SourcePath("/controller/parameters/assistant_robot.toml");
 
+/// Lets a geom and the palm's box, which are what stands for their bodies, collide by their masks, and no
+/// others.
+void CollideByMasks(int top, mjModel* m) {
+#if mjVERSION_HEADER < 300
+  m->opt.collision = mjCOL_ALL;
+#endif
+  const Solids solids = ListSolids(*m);
+  const int palm = mj_name2id(m, mjOBJ_BODY, "r_palm");
+  std::fill_n(m->geom_contype, m->ngeom, 0);
+  std::fill_n(m->geom_conaffinity, m->ngeom, 0);
+  for (const Solid& solid : solids.list)
+    if (solid.geom == top || solid.body == palm)
+      m->geom_contype[solid.geom] = m->geom_conaffinity[solid.geom] = 1;
+}
+
 /// `hold` beside a bench that is a cube of 4 cm, which is as deep in the right palm as asked, from below.
 class HoldAtATable {
  public:
-  explicit HoldAtATable(double depth, std::vector<std::string> overrides = {}) {
+  explicit HoldAtATable(double depth, std::vector<std::string> overrides = {}, bool by_masks = false) {
     overrides.insert(overrides.end(), {"duration=0.02", "settle=0.2"});
     const Scenario scenario = ReadShippedScenario("hold", overrides);
     const std::string mjcf = SourcePath("/mjcf/bench_scene.xml");
@@ -41,6 +57,7 @@ class HoldAtATable {
     const Eigen::Quaterniond turn(X_WP.linear());
     const double quaternion[4] = {turn.w(), turn.x(), turn.y(), turn.z()};
     std::copy_n(quaternion, 4, engine->body_quat + 4 * bench);
+    if (by_masks) CollideByMasks(top, engine.get());
     setup_ = std::make_unique<dexcheck::Setup>(scenario, kRobot, mjcf, std::move(engine));
     runner_ = std::make_unique<Runner>(*setup_, /*check=*/true);
     result_ = &runner_->Run([](const StepRecord&) {}, [] { return false; });
@@ -121,6 +138,16 @@ TEST(ClearanceOfARun, BodiesThatCollidePush) {
   EXPECT_EQ(apart.result().verdict, Verdict::kPass)
       << apart.result().failure << apart.result().attribution.evidence;
   EXPECT_EQ(apart.checks().Find("collision").count, 20);
+}
+
+// MJCFs of others let bodies push by their masks, whatever the scenario says: the run knows that they do, and
+// explains nothing by other forces.
+TEST(ClearanceOfARun, BodiesThatCollideByTheirMasksPush) {
+  const HoldAtATable run(5e-3, {}, /*by_masks=*/true);
+  EXPECT_TRUE(run.checks().Find("collision").failed);
+  EXPECT_EQ(run.result().attribution.cause, Cause::kCollision) << run.result().attribution.evidence;
+  for (const Explanation& one : run.result().causes)
+    EXPECT_NE(one.channel, CauseChannel::kBalance) << one.Tell();
 }
 
 // A ball that lies on the floor, beside an arm that rests: with their declared contact taken away the ball
