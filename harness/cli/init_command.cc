@@ -105,6 +105,12 @@ void MendForEngine(RobotDescription* robot) {
          JoinNames(points));
 }
 
+void LeaveOutBaseContacts(MjcfFile* mjcf) {
+  const std::vector<std::string> pairs = ExcludeBaseContacts(mjcf);
+  if (!pairs.empty())
+    Warn(mjcf->source() + ": contacts of neighbours at a joint left out: " + JoinNames(pairs));
+}
+
 /// The user's MJCF with motors, as a run needs it.
 std::unique_ptr<MjcfFile> AdaptForRun(const fs::path& source, std::map<std::string, double> limits) {
   auto mjcf = std::make_unique<MjcfFile>(source);
@@ -117,8 +123,7 @@ std::unique_ptr<MjcfFile> AdaptForRun(const fs::path& source, std::map<std::stri
   RequireExactSolver(mjcf.get());
   if (!mjcf->changes().empty()) Warn(mjcf->SummarizeChanges());
   AddMotors(mjcf.get(), own);
-  for (const std::string& pair : ExcludeBaseContacts(mjcf.get()))
-    Warn(source.string() + ": contact of " + pair + " left out: neighbours at a joint");
+  LeaveOutBaseContacts(mjcf.get());
   return mjcf;
 }
 
@@ -278,6 +283,7 @@ std::optional<Stand> StandOrHold(const mjModel& engine, const std::map<std::stri
   if (!why.empty()) {
     mjcf = copy();
     HoldBase(engine.stat.extent, mjcf.get());
+    LeaveOutBaseContacts(mjcf.get());
     robot = describe(*mjcf);
   }
   *sources = {std::move(robot), std::move(mjcf)};

@@ -125,6 +125,12 @@ std::string RequireFloor(const mjModel& m, MjcfFile* mjcf) {
 struct Place {
   Foot foot;
   Vector3d p_W;  // of what touches, the base level
+  Vector3d up;   // in the body's frame
+
+  void LowerBy(double way) {
+    p_W.z() -= way;
+    foot.p_body -= way * up;
+  }
 };
 
 /// All places of the robot's geoms that can touch.
@@ -142,23 +148,29 @@ std::vector<Place> ListPlaces(const mjModel& m, const mjData& data, int base) {
     const Vector3d up = X_W.linear().transpose() * Vector3d::UnitZ();
     for (const Vector3d& p : ListPlaces(m, geom)) {
       const Vector3d p_body = X_body * p, lowest = is_known ? p_body - radius * up : p_body;
-      places.push_back({{"", geom, lowest + radius * up, radius, !is_known}, X_W * lowest});
+      places.push_back({{"", geom, lowest + radius * up, radius, !is_known}, X_W * lowest, up});
     }
   }
   return places;
 }
 
-/// Of one body's places the outermost, four at the most.
+/// Of one body's places that lie in a plane the outermost, four at the most.
 std::vector<Place> KeepOutermost(const std::vector<Place>& places) {
-  if (places.size() <= 4) return places;
+  constexpr double kFlat = 1e-6;  // m
   std::vector<Place> kept;
-  for (const Vector3d& way : {Vector3d(1, 1, 0), {1, -1, 0}, {-1, 1, 0}, {-1, -1, 0}}) {
+  const auto from_first = [&](const Place& place) { return Vector3d(place.p_W - kept[0].p_W); };
+  for (const Vector3d& way : {Vector3d(1, 1, -1), {-1, -1, -1}, {1, -1, -1}, {-1, 1, -1}}) {
     const auto is_nearer = [&](const Place& a, const Place& b) { return way.dot(a.p_W) < way.dot(b.p_W); };
     const Place& outermost = *std::max_element(places.begin(), places.end(), is_nearer);
     const auto is_same = [&](const Place& place) {
       return (place.p_W - outermost.p_W).norm() < kAddedRadius;
     };
-    if (std::none_of(kept.begin(), kept.end(), is_same)) kept.push_back(outermost);
+    if (std::any_of(kept.begin(), kept.end(), is_same)) continue;
+    const bool is_in_plane =
+        kept.size() < 3 ||
+        std::abs(from_first(kept[1]).cross(from_first(kept[2])).normalized().dot(from_first(outermost))) <
+            kFlat;
+    if (is_in_plane) kept.push_back(outermost);
   }
   return kept;
 }
@@ -280,12 +292,16 @@ Stand FindStand(const mjModel& m) {
     lowest = std::min(lowest, place.p_W.z());
   }
   // Feet are bodies that are nearly as low as the lowest; of each, what is lowest.
-  constexpr double kNear = 0.02, kFlat = 0.002;  // m
+  constexpr double kNear = 0.02, kFlat = 0.01, kSole = 0.002;  // m
   for (const auto& [body, own] : lowest_of) {
+    if (own > lowest + kNear) continue;
     std::vector<Place> low;
-    for (const Place& place : places) {
-      if (m.geom_bodyid[place.foot.geom] == body && own < lowest + kNear && place.p_W.z() < own + kFlat)
-        low.push_back(place);
+    for (Place place : places) {
+      const double above = place.p_W.z() - own;
+      if (m.geom_bodyid[place.foot.geom] != body || above > (place.foot.is_added ? kSole : kFlat)) continue;
+      // Spheres that are added stand level.
+      if (place.foot.is_added) place.LowerBy(above);
+      low.push_back(place);
     }
     for (Place& place : KeepOutermost(low)) {
       place.foot.frame = fmt::format("foot_{}", stand.feet.size() + 1);

@@ -46,12 +46,17 @@ bool AreNeighbours(const mjModel& m, int one, int other) {
          m.body_weldid[m.body_parentid[other_root]] == root;
 }
 
-/// What the engine lets touch. With the world, or what stands on it, it is a matter of the motion.
+/// Of one robot. With the world, or what stands on it, it is a matter of the motion.
+bool AreOfOneTree(const mjModel& m, int one, int other) {
+  return m.body_rootid[one] == m.body_rootid[other] && (m.body_weldid[one] != 0 || m.body_weldid[other] != 0);
+}
+
+/// What the engine lets touch.
 void AddContacts(const mjModel& m, const mjData& data, std::set<std::pair<int, int>>* pairs) {
   for (int i = 0; i < data.ncon; ++i) {
     const mjContact& contact = data.contact[i];
     const std::pair bodies = std::minmax(m.geom_bodyid[contact.geom1], m.geom_bodyid[contact.geom2]);
-    if (contact.dist <= 0.0 && m.body_weldid[bodies.first] != 0) pairs->insert(bodies);
+    if (contact.dist <= 0.0 && AreOfOneTree(m, bodies.first, bodies.second)) pairs->insert(bodies);
   }
 }
 
@@ -64,10 +69,10 @@ void AddOverlaps(const mjModel& m, const mjData& data, const Solids& solids,
   };
   for (size_t i = 0; i < solids.list.size(); ++i) {
     const Solid& a = solids.list[i];
-    for (size_t k = 0; k < i && m.body_weldid[a.body] != 0; ++k) {
+    for (size_t k = 0; k < i; ++k) {
       const Solid& b = solids.list[k];
       const std::pair bodies = std::minmax(a.body, b.body);
-      if (m.body_weldid[b.body] == 0 || AreNeighbours(m, a.body, b.body) || pairs->count(bodies) > 0)
+      if (!AreOfOneTree(m, a.body, b.body) || AreNeighbours(m, a.body, b.body) || pairs->count(bodies) > 0)
         continue;
       const Pose X_WA = pose(a), X_WB = pose(b);
       if ((X_WA.translation() - X_WB.translation()).norm() > a.reach + b.reach + kNear) continue;
