@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
@@ -12,6 +13,7 @@
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
+#include "controller/dynamics/model_terms.h"
 #include "controller/model/parameter_reader.h"
 #include "harness/base/console.h"
 #include "harness/base/files.h"
@@ -111,6 +113,30 @@ void LeaveOutBaseContacts(MjcfFile* mjcf) {
     Warn(mjcf->source() + ": contacts of neighbours at a joint left out: " + JoinNames(pairs));
 }
 
+/// Friction that stops a joint within less than the engine's step, which leaves its law no time to act, is
+/// reduced to what does so in one; dry friction from 1 rad/s or 1 m/s.
+void ReduceFriction(const std::string& source, RobotDescription* robot) {
+  constexpr double kStep = 1e-3;  // s
+  const RobotModel model = ParseRobotModel(WriteParameters(*robot, source), source);
+  ModelTerms terms(model);
+  VectorXd q = VectorXd::Zero(model.num_positions());
+  if (model.base().type == BaseType::kFloating) q[3] = 1.0;
+  terms.SetState(q, VectorXd::Zero(model.num_velocities()));
+  terms.CalcDynamics();
+  const VectorXd inertia = MatrixXd(terms.M().inverse()).diagonal().cwiseInverse().tail(model.num_joints());
+  std::vector<std::string> names;
+  for (int i = 0; i < model.num_joints(); ++i) {
+    Joint& joint = robot->spec.joints[static_cast<size_t>(i)];
+    const double most = inertia[i] / kStep;
+    if (std::max(joint.damping, joint.dry_friction) <= most) continue;
+    joint.damping = std::min(joint.damping, most);
+    joint.dry_friction = std::min(joint.dry_friction, most);
+    names.push_back(joint.name);
+  }
+  if (!names.empty())
+    Warn("friction that would stop a joint within the time step, 1 ms, is reduced: " + JoinNames(names));
+}
+
 /// The user's MJCF with motors, as a run needs it.
 std::unique_ptr<MjcfFile> AdaptForRun(const fs::path& source, std::map<std::string, double> limits) {
   auto mjcf = std::make_unique<MjcfFile>(source);
@@ -153,6 +179,7 @@ InitSources ReadSources(const InitRequest& request) {
     return sources;
   }
   MendForEngine(&sources.robot);
+  ReduceFriction(request.robot.string(), &sources.robot);
   sources.mjcf = std::make_unique<MjcfFile>(WriteMjcf(sources.robot, request.robot.filename().string()),
                                             request.robot.string() + " as an MJCF");
   AddMotors(sources.mjcf.get(), limits);

@@ -305,6 +305,8 @@ Stand FindStand(const mjModel& m) {
     }
     for (Place& place : KeepOutermost(low)) {
       place.foot.frame = fmt::format("foot_{}", stand.feet.size() + 1);
+      const int joint = m.body_jntadr[body];
+      stand.has_wheels |= place.foot.is_added && joint >= 0 && m.jnt_limited[joint] == 0;
       stand.feet.push_back(place.foot);
     }
   }

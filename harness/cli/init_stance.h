@@ -25,6 +25,7 @@ struct Foot {
 /// How the robot stands, in the posture of its first key frame, or at zero, or as near to it as it can.
 struct Stand {
   std::vector<Foot> feet;
+  bool has_wheels = false;             ///< A foot turns without end.
   double height = 0.0;                 ///< Of the base above the lowest foot, m.
   double weight = 0.0;                 ///< N.
   double sway = 1.0;                   ///< How far it moves: of what a robot on four feet can, 0 to 1.
