@@ -316,6 +316,7 @@ Stand FindStand(const mjModel& m) {
 }
 
 std::string FindPosture(const RobotModel& model, const std::map<std::string, double>& limits, Stand* stand) {
+  if (stand->has_wheels) return "it stands on wheels";
   if (stand->feet.size() < 3) return fmt::format("{} places touch the ground", stand->feet.size());
   StandTrial trial(model, limits, *stand);
   bool settles = false;
