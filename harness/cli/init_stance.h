@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "controller/control/joint_motion.h"
 #include "harness/descriptions/robot_description.h"
 #include "harness/engine/engine.h"
 #include "harness/engine/mjcf_file.h"
@@ -40,6 +41,12 @@ Stand FindStand(const mjModel& m);
 /// Adds a site of each foot, a floor where there is none, and pairs of each foot with it, which alone touch.
 /// @throws InputError when the body of a foot has no name.
 void PutOnFloor(const mjModel& m, const Stand& stand, MjcfFile* mjcf);
+
+/// Least normal force that the scenario's law asks of a foot, N.
+double LeastForce(const Stand& stand);
+
+/// How the base sways: down by 3 % of its height, and turned by 2 degrees.
+std::vector<JointWayPoint> ListWay(const Stand& stand);
 
 /// Finds a posture from which the robot can sway with forces of the ground inside their cones: that of the
 /// stand, or with joints bent and the centre of mass over the feet.
