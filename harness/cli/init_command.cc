@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
@@ -12,6 +13,7 @@
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
+#include "controller/dynamics/model_terms.h"
 #include "controller/model/parameter_reader.h"
 #include "harness/base/console.h"
 #include "harness/base/files.h"
@@ -76,10 +78,11 @@ void TakeAssets(const fs::path& folder, MjcfFile* mjcf) {
   }
 }
 
-/// What the engine refuses, of a description that it is to get: ranges without width, and inertias that no
-/// body has, for which the nearest ones stand.
+/// What the engine refuses, of a description that it is to get: ranges without width, inertias that no body
+/// has, for which the nearest ones stand, and links that move and have no mass.
 void MendForEngine(RobotDescription* robot) {
-  std::vector<std::string> ranges, bodies;
+  constexpr double kLeast = 1e-12;  // kg, kg m^2
+  std::vector<std::string> ranges, bodies, points;
   for (size_t i = 0; i < robot->spec.joints.size(); ++i) {
     Joint& joint = robot->spec.joints[i];
     if (robot->joints[i].states_range && joint.lower >= joint.upper) {
@@ -90,11 +93,48 @@ void MendForEngine(RobotDescription* robot) {
     const Matrix3d possible = FindNearestInertia(joint.body.inertia);
     if (possible != joint.body.inertia) bodies.push_back(joint.link);
     joint.body.inertia = possible;
+    if (joint.body.mass > kLeast && possible.trace() > kLeast) continue;
+    points.push_back(joint.link);
+    joint.body.mass = std::max(joint.body.mass, 1e-3);
+    joint.body.inertia += 1e-6 * Matrix3d::Identity();
   }
   if (!ranges.empty()) Warn("ranges of no width are left out: " + JoinNames(ranges));
   if (!bodies.empty())
     Warn("no body has the inertia that these links state, the nearest that one can have is written: " +
          JoinNames(bodies));
+  if (!points.empty())
+    Warn("joints move these links, which have no mass or no inertia; 1 g and 1e-6 kg m^2 are written: " +
+         JoinNames(points));
+}
+
+void LeaveOutBaseContacts(MjcfFile* mjcf) {
+  const std::vector<std::string> pairs = ExcludeBaseContacts(mjcf);
+  if (!pairs.empty())
+    Warn(mjcf->source() + ": contacts of neighbours at a joint left out: " + JoinNames(pairs));
+}
+
+/// Friction that stops a joint within less than the engine's step, which leaves its law no time to act, is
+/// reduced to what does so in one; dry friction from 1 rad/s or 1 m/s.
+void ReduceFriction(const std::string& source, RobotDescription* robot) {
+  constexpr double kStep = 1e-3;  // s
+  const RobotModel model = ParseRobotModel(WriteParameters(*robot, source), source);
+  ModelTerms terms(model);
+  VectorXd q = VectorXd::Zero(model.num_positions());
+  if (model.base().type == BaseType::kFloating) q[3] = 1.0;
+  terms.SetState(q, VectorXd::Zero(model.num_velocities()));
+  terms.CalcDynamics();
+  const VectorXd inertia = MatrixXd(terms.M().inverse()).diagonal().cwiseInverse().tail(model.num_joints());
+  std::vector<std::string> names;
+  for (int i = 0; i < model.num_joints(); ++i) {
+    Joint& joint = robot->spec.joints[static_cast<size_t>(i)];
+    const double most = inertia[i] / kStep;
+    if (std::max(joint.damping, joint.dry_friction) <= most) continue;
+    joint.damping = std::min(joint.damping, most);
+    joint.dry_friction = std::min(joint.dry_friction, most);
+    names.push_back(joint.name);
+  }
+  if (!names.empty())
+    Warn("friction that would stop a joint within the time step, 1 ms, is reduced: " + JoinNames(names));
 }
 
 /// The user's MJCF with motors, as a run needs it.
@@ -109,8 +149,7 @@ std::unique_ptr<MjcfFile> AdaptForRun(const fs::path& source, std::map<std::stri
   RequireExactSolver(mjcf.get());
   if (!mjcf->changes().empty()) Warn(mjcf->SummarizeChanges());
   AddMotors(mjcf.get(), own);
-  for (const std::string& pair : ExcludeBaseContacts(mjcf.get()))
-    Warn(source.string() + ": contact of " + pair + " left out: neighbours at a joint");
+  LeaveOutBaseContacts(mjcf.get());
   return mjcf;
 }
 
@@ -140,6 +179,7 @@ InitSources ReadSources(const InitRequest& request) {
     return sources;
   }
   MendForEngine(&sources.robot);
+  ReduceFriction(request.robot.string(), &sources.robot);
   sources.mjcf = std::make_unique<MjcfFile>(WriteMjcf(sources.robot, request.robot.filename().string()),
                                             request.robot.string() + " as an MJCF");
   AddMotors(sources.mjcf.get(), limits);
@@ -245,6 +285,43 @@ std::optional<double> FindTolerance(const fs::path& table, const fs::path& mjcf)
   return worst > 0.0 ? std::pow(10.0, std::ceil(std::log10(worst)) + 1.0) : 0.0;
 }
 
+MjModelPtr Load(const MjcfFile& mjcf) {
+  return LoadMjcfText(mjcf.PrintFor(fs::current_path()), mjcf.source());
+}
+
+/// A robot whose base floats stands on its feet, or, where no stance is found, is held above the ground, so
+/// that its joints move all the same.
+std::optional<Stand> StandOrHold(const mjModel& engine, const std::map<std::string, double>& limits,
+                                 InitSources* sources) {
+  const std::string source = sources->mjcf->source();
+  const auto copy = [&] {
+    return std::make_unique<MjcfFile>(sources->mjcf->PrintFor(fs::current_path()), source);
+  };
+  const auto describe = [&](const MjcfFile& mjcf) {
+    return DescriptionFile(source, mjcf.Print(), {}).Describe();
+  };
+  Stand stand = FindStand(engine);
+  std::unique_ptr<MjcfFile> mjcf = copy();
+  PutOnFloor(engine, stand, mjcf.get());
+  RobotDescription robot = describe(*mjcf);
+  AddFeet(stand, &robot);
+  const std::string why =
+      FindPosture(ParseRobotModel(WriteParameters(robot, source), source), limits, &stand);
+  if (!why.empty()) {
+    mjcf = copy();
+    HoldBase(engine.stat.extent, mjcf.get());
+    LeaveOutBaseContacts(mjcf.get());
+    robot = describe(*mjcf);
+  }
+  *sources = {std::move(robot), std::move(mjcf)};
+  if (why.empty()) {
+    Warn("contacts other than the feet's with the floor are left out; overlaps are judged by their distance");
+    return stand;
+  }
+  Warn(source + ": the base is held: no stance was found, because " + why);
+  return std::nullopt;
+}
+
 int InitRobot(const InitRequest& request) {
   InitSources sources = ReadSources(request);
   RobotDescription& robot = sources.robot;
@@ -255,17 +332,12 @@ int InitRobot(const InitRequest& request) {
                        ": must not be a ball joint in a run, whose law has one number for each joint");
   }
   // What cannot be an MJCF is refused before there is a folder.
-  const auto load = [&] {
-    return LoadMjcfText(sources.mjcf->PrintFor(fs::current_path()), sources.mjcf->source());
-  };
-  MjModelPtr engine = load();
+  MjModelPtr engine = Load(*sources.mjcf);
+  const std::map<std::string, double> home = ReadHome(*engine), limits = ReadMotorLimits(*engine);
   std::optional<Stand> stand;
   if (robot.spec.base.type == BaseType::kFloating) {
-    stand = FindStand(*engine, sources.mjcf->source());
-    PutOnFloor(*engine, *stand, sources.mjcf.get());
-    Warn("contacts other than the feet's with the floor are left out; overlaps are judged by their distance");
-    engine = load();
-    if (request.mjcf.empty()) robot = DescriptionFile(request.robot, sources.mjcf->Print(), {}).Describe();
+    stand = StandOrHold(*engine, limits, &sources);
+    engine = Load(*sources.mjcf);
   } else if (robot.spec.base.type != BaseType::kFixed) {
     throw InputError(request.robot.string() + ": base: must be fixed or float to be run, rolls");
   }
@@ -275,16 +347,16 @@ int InitRobot(const InitRequest& request) {
     CompleteEachOther(&other, &robot);
     TakeCompiledInertias(*sources.mjcf, *engine, &robot);
   }
-  if (stand) AddFeet(*stand, &robot);
   const std::string parameters = WriteParameters(robot, request.robot.filename().string());
-  const RobotModel model = ParseRobotModel(parameters, request.robot.string() + " as a parameter file");
   InitMotion motion;
   if (!stand) {
-    motion = PlanInitMotion(robot, model, ReadMotorLimits(*engine), ReadHome(*engine));
-    FreeMotors(motion.weak, sources.mjcf.get());
-    for (const std::string& pair : ExcludeOverlaps(ListPoses(model, motion.spans), sources.mjcf.get()))
-      Warn("contact of " + pair + " left out: they overlap along the motion");
+    const std::string table = request.robot.string() + " as a parameter file";
+    motion = PlanInitMotion(robot, ParseRobotModel(parameters, table), limits, home);
   }
+  FreeMotors(stand ? stand->weak : motion.weak, sources.mjcf.get());
+  const std::vector<std::string> overlaps =
+      ExcludeOverlaps(stand ? stand->poses : motion.poses, sources.mjcf.get());
+  if (!overlaps.empty()) Warn("contacts left out of what overlaps along the motion: " + JoinNames(overlaps));
 
   const RunFolder folder(request.out.empty() ? request.robot.stem().string() : request.out, "");
   const fs::path table = folder.path() / "robot.toml", mjcf = folder.path() / "robot.xml";

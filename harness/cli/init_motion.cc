@@ -100,6 +100,18 @@ class MotorUse {
   std::vector<double> limits_;
 };
 
+std::vector<std::map<std::string, double>> ListPoses(const RobotModel& model,
+                                                     const std::vector<JointSpan>& spans) {
+  constexpr int kPoses = 20;
+  std::vector<std::map<std::string, double>> poses(kPoses + 1);
+  for (int k = 0; k <= kPoses; ++k) {
+    for (size_t i = 0; i < spans.size(); ++i)
+      poses[static_cast<size_t>(k)][model.joints()[i].name] =
+          spans[i].start + (spans[i].end - spans[i].start) * k / kPoses;
+  }
+  return poses;
+}
+
 }  // namespace
 
 InitMotion PlanInitMotion(const RobotDescription& robot, const RobotModel& model,
@@ -121,19 +133,8 @@ InitMotion PlanInitMotion(const RobotDescription& robot, const RobotModel& model
   for (Eigen::Index i = 0; i < most.size(); ++i) {
     if (most[i] > kFull) motion.weak.push_back(model.joints()[static_cast<size_t>(i)].name);
   }
+  motion.poses = ListPoses(model, motion.spans);
   return motion;
-}
-
-std::vector<std::map<std::string, double>> ListPoses(const RobotModel& model,
-                                                     const std::vector<JointSpan>& spans) {
-  constexpr int kPoses = 20;
-  std::vector<std::map<std::string, double>> poses(kPoses + 1);
-  for (int k = 0; k <= kPoses; ++k) {
-    for (size_t i = 0; i < spans.size(); ++i)
-      poses[static_cast<size_t>(k)][model.joints()[i].name] =
-          spans[i].start + (spans[i].end - spans[i].start) * k / kPoses;
-  }
-  return poses;
 }
 
 std::string ListJoints(const RobotDescription& robot, const std::function<double(size_t joint)>& value) {

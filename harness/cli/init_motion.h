@@ -19,7 +19,8 @@ struct JointSpan {
 
 /// A motion there and back, and which motors it asks too much of.
 struct InitMotion {
-  std::vector<JointSpan> spans;   ///< One a joint.
+  std::vector<JointSpan> spans;                      ///< One a joint.
+  std::vector<std::map<std::string, double>> poses;  ///< Along it, by joint, rad or m.
   std::vector<std::string> weak;  ///< Joints whose limit does not even hold the robot, or move it so little.
 };
 
@@ -29,10 +30,6 @@ struct InitMotion {
 InitMotion PlanInitMotion(const RobotDescription& robot, const RobotModel& model,
                           const std::map<std::string, double>& limits,
                           const std::map<std::string, double>& home);
-
-/// Poses along the motion, by joint, rad or m.
-std::vector<std::map<std::string, double>> ListPoses(const RobotModel& model,
-                                                     const std::vector<JointSpan>& spans);
 
 // Parts of a scenario's text.
 

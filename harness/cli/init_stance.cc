@@ -20,7 +20,12 @@ namespace {
 
 using tinyxml2::XMLElement;
 
-/// Places of a geom that can touch a plane, in its own frame; none of shapes that a stance does not know.
+constexpr double kAddedRadius = 0.005;  // m, of spheres that are added to feet
+
+/// Whether a stance knows the shape; of others, spheres are added where they touch.
+bool IsKnown(int type) { return type == mjGEOM_SPHERE || type == mjGEOM_CAPSULE || type == mjGEOM_BOX; }
+
+/// Places of a geom that can touch a plane, in its own frame; none of a shape that has none.
 std::vector<Vector3d> ListPlaces(const mjModel& m, int geom) {
   const Vector3d size = MapVector(m.geom_size + 3 * geom);
   switch (m.geom_type[geom]) {
@@ -34,6 +39,21 @@ std::vector<Vector3d> ListPlaces(const mjModel& m, int geom) {
       for (int k = 0; k < 8; ++k)
         corners.emplace_back(size.cwiseProduct(Vector3d(k & 1 ? 1 : -1, k & 2 ? 1 : -1, k & 4 ? 1 : -1)));
       return corners;
+    }
+    case mjGEOM_CYLINDER: {
+      std::vector<Vector3d> rim;
+      for (int k = 0; k < 16; ++k)
+        rim.emplace_back(size[0] * std::cos(k / 2 * kPi / 4), size[0] * std::sin(k / 2 * kPi / 4),
+                         k % 2 ? size[1] : -size[1]);
+      return rim;
+    }
+    case mjGEOM_MESH: {
+      const int mesh = m.geom_dataid[geom];
+      std::vector<Vector3d> vertices;
+      for (int k = 0; k < m.mesh_vertnum[mesh]; ++k)
+        vertices.push_back(
+            Eigen::Map<const Eigen::Vector3f>(m.mesh_vert + 3 * (m.mesh_vertadr[mesh] + k)).cast<double>());
+      return vertices;
     }
     default:
       return {};
@@ -50,15 +70,19 @@ XMLElement* FindBody(MjcfFile* mjcf, const std::string& name) {
   return found;
 }
 
-/// Gives a geom of the engine's model a name in its file. @throws InputError when its body has none.
+/// @throws InputError when it has no name.
+XMLElement* RequireBody(const mjModel& m, int body, MjcfFile* mjcf) {
+  XMLElement* const element = FindBody(mjcf, NameOf(m, mjOBJ_BODY, body));
+  if (element != nullptr) return element;
+  throw InputError(mjcf->source() + ": body " + NameOf(m, mjOBJ_BODY, body) +
+                   ": must have a name, it is a foot");
+}
+
+/// Gives a geom of the engine's model a name in its file. @throws as RequireBody.
 std::string NameGeom(const mjModel& m, int geom, MjcfFile* mjcf) {
   const int body = m.geom_bodyid[geom];
-  XMLElement* const element = FindBody(mjcf, NameOf(m, mjOBJ_BODY, body));
-  if (element == nullptr)
-    throw InputError(mjcf->source() + ": body " + NameOf(m, mjOBJ_BODY, body) +
-                     ": must have a name, it is a foot");
   // The engine keeps the order of a body's geoms.
-  const std::vector<XMLElement*> geoms = ListChildren(element, "geom");
+  const std::vector<XMLElement*> geoms = ListChildren(RequireBody(m, body, mjcf), "geom");
   XMLElement* const own = geoms.at(static_cast<size_t>(geom - m.body_geomadr[body]));
   if (own->Attribute("name") == nullptr) own->SetAttribute("name", fmt::format("foot_geom_{}", geom).c_str());
   return own->Attribute("name");
@@ -78,69 +102,138 @@ std::string RequireFloor(const mjModel& m, MjcfFile* mjcf) {
   return kFloor;
 }
 
-}  // namespace
+struct Place {
+  Foot foot;
+  Vector3d p_W;  // of what touches, the base level
+  Vector3d up;   // in the body's frame
 
-Stand FindStand(const mjModel& m, const std::string& source) {
-  const MjDataPtr data = MakeData(m);
-  if (m.nkey > 0) mj_resetDataKeyframe(&m, data.get(), 0);
-  mj_kinematics(&m, data.get());
-  Stand stand;
-  int base = 0;
-  for (int joint = 0; joint < m.njnt; ++joint) {
-    if (m.jnt_type[joint] == mjJNT_FREE) base = m.jnt_bodyid[joint];
-    if (m.jnt_type[joint] == mjJNT_HINGE || m.jnt_type[joint] == mjJNT_SLIDE)
-      stand.pose[NameOf(m, mjOBJ_JOINT, joint)] = data->qpos[m.jnt_qposadr[joint]];
+  void LowerBy(double way) {
+    p_W.z() -= way;
+    foot.p_body -= way * up;
   }
-  struct Place {
-    Foot foot;
-    double height;
-  };
+};
+
+/// All places of the robot's geoms that can touch.
+std::vector<Place> ListPlaces(const mjModel& m, const mjData& data, int base) {
   std::vector<Place> places;
-  std::map<int, double> lowest_of;  // by body
-  double lowest = std::numeric_limits<double>::infinity();
   for (int geom = 0; geom < m.ngeom; ++geom) {
     const int body = m.geom_bodyid[geom];
     if (m.body_rootid[body] != base || !CanTouch(m, geom)) continue;
+    const bool is_known = IsKnown(m.geom_type[geom]);
+    const double radius = !is_known                         ? kAddedRadius
+                          : m.geom_type[geom] == mjGEOM_BOX ? 0.0
+                                                            : m.geom_size[3 * geom];
     const Pose X_body = ReadPose(m.geom_pos + 3 * geom, m.geom_quat + 4 * geom);
-    const double radius = m.geom_type[geom] == mjGEOM_BOX ? 0.0 : m.geom_size[3 * geom];
+    const Pose X_W = MapPose(data.xmat + 9 * body, data.xpos + 3 * body);
+    const Vector3d up = X_W.linear().transpose() * Vector3d::UnitZ();
     for (const Vector3d& p : ListPlaces(m, geom)) {
-      const Vector3d p_body = X_body * p;
-      double p_world[3];
-      mju_rotVecMat(p_world, p_body.data(), data->xmat + 9 * body);
-      const double height = p_world[2] + data->xpos[3 * body + 2] - radius;
-      places.push_back({{"", geom, p_body, radius}, height});
-      lowest_of[body] = std::min(height, lowest_of.try_emplace(body, height).first->second);
-      lowest = std::min(lowest, height);
+      const Vector3d p_body = X_body * p, lowest = is_known ? p_body - radius * up : p_body;
+      places.push_back({{"", geom, lowest + radius * up, radius, !is_known}, X_W * lowest, up});
     }
   }
-  // Feet are bodies that are nearly as low as the lowest; of each, what is lowest.
-  constexpr double kNear = 0.02, kFlat = 0.001;  // m
-  for (Place& place : places) {
-    const double own = lowest_of[m.geom_bodyid[place.foot.geom]];
-    if (own > lowest + kNear || place.height > own + kFlat) continue;
-    place.foot.frame = fmt::format("foot_{}", stand.feet.size() + 1);
-    stand.feet.push_back(place.foot);
+  return places;
+}
+
+/// Of one body's places that lie in a plane the outermost, four at the most.
+std::vector<Place> KeepOutermost(const std::vector<Place>& places) {
+  constexpr double kFlat = 1e-6;  // m
+  std::vector<Place> kept;
+  const auto from_first = [&](const Place& place) { return Vector3d(place.p_W - kept[0].p_W); };
+  for (const Vector3d& way : {Vector3d(1, 1, -1), {-1, -1, -1}, {1, -1, -1}, {-1, 1, -1}}) {
+    const auto is_nearer = [&](const Place& a, const Place& b) { return way.dot(a.p_W) < way.dot(b.p_W); };
+    const Place& outermost = *std::max_element(places.begin(), places.end(), is_nearer);
+    const auto is_same = [&](const Place& place) {
+      return (place.p_W - outermost.p_W).norm() < kAddedRadius;
+    };
+    if (std::any_of(kept.begin(), kept.end(), is_same)) continue;
+    const bool is_in_plane =
+        kept.size() < 3 ||
+        std::abs(from_first(kept[1]).cross(from_first(kept[2])).normalized().dot(from_first(outermost))) <
+            kFlat;
+    if (is_in_plane) kept.push_back(outermost);
   }
-  if (stand.feet.size() < 3)
-    throw InputError(
-        fmt::format("{}: base: floats, and must stand on three spheres, ends of capsules or corners of "
-                    "boxes that collide, got {}{}",
-                    source, stand.feet.size(), m.nkey > 0 ? " in its first key frame" : " at zero"));
-  stand.height = data->xpos[3 * base + 2] - lowest;
+  return kept;
+}
+
+}  // namespace
+
+double LeastForce(const Stand& stand) { return 0.01 * stand.weight / static_cast<double>(stand.feet.size()); }
+
+std::vector<JointWayPoint> ListWay(const Stand& stand) {
+  const double way = 0.03 * stand.height * stand.sway, turn = kPi / 90.0 * stand.sway;
+  std::vector<JointWayPoint> points{{2.0, VectorXd::Zero(6)}, {4.0, VectorXd::Zero(6)}};
+  points[0].q << way, 0.0, -way, 0.0, turn, 0.0;
+  points[1].q << 0.0, way, -way, turn, 0.0, turn;
+  return points;
+}
+
+Stand FindStand(const mjModel& m) {
+  const MjDataPtr data = MakeData(m);
+  if (m.nkey > 0) mj_resetDataKeyframe(&m, data.get(), 0);
+  Stand stand;
+  int base = 0;
+  for (int joint = 0; joint < m.njnt; ++joint) {
+    double* const q = data->qpos + m.jnt_qposadr[joint];
+    if (m.jnt_type[joint] == mjJNT_HINGE || m.jnt_type[joint] == mjJNT_SLIDE)
+      stand.pose[NameOf(m, mjOBJ_JOINT, joint)] = *q;
+    if (m.jnt_type[joint] != mjJNT_FREE) continue;
+    base = m.jnt_bodyid[joint];
+    WriteFreePose(Pose::Identity(), q);
+  }
+  mj_kinematics(&m, data.get());
+  const std::vector<Place> places = ListPlaces(m, *data, base);
+  std::map<int, double> lowest_of;  // by body
+  double lowest = std::numeric_limits<double>::infinity();
+  for (const Place& place : places) {
+    const int body = m.geom_bodyid[place.foot.geom];
+    lowest_of[body] = std::min(place.p_W.z(), lowest_of.try_emplace(body, place.p_W.z()).first->second);
+    lowest = std::min(lowest, place.p_W.z());
+  }
+  // Feet are bodies that are nearly as low as the lowest; of each, what is lowest.
+  constexpr double kNear = 0.02, kFlat = 0.01, kSole = 0.002;  // m
+  for (const auto& [body, own] : lowest_of) {
+    if (own > lowest + kNear) continue;
+    std::vector<Place> low;
+    for (Place place : places) {
+      const double above = place.p_W.z() - own;
+      if (m.geom_bodyid[place.foot.geom] != body || above > (place.foot.is_added ? kSole : kFlat)) continue;
+      // Spheres that are added stand level.
+      if (place.foot.is_added) place.LowerBy(above);
+      low.push_back(place);
+    }
+    for (Place& place : KeepOutermost(low)) {
+      place.foot.frame = fmt::format("foot_{}", stand.feet.size() + 1);
+      const int joint = m.body_jntadr[body];
+      stand.has_wheels |= place.foot.is_added && joint >= 0 && m.jnt_limited[joint] == 0;
+      stand.feet.push_back(place.foot);
+    }
+  }
+  stand.height = -lowest;
   stand.weight = mj_getTotalmass(&m) * MapVector(m.opt.gravity).norm();
   return stand;
 }
 
 void PutOnFloor(const mjModel& m, const Stand& stand, MjcfFile* mjcf) {
-  std::set<std::string> geoms;
+  std::set<std::string> geoms, bodies;
   for (const Foot& foot : stand.feet) {
-    geoms.insert(NameGeom(m, foot.geom, mjcf));
-    XMLElement* const body = FindBody(mjcf, NameOf(m, mjOBJ_BODY, m.geom_bodyid[foot.geom]));
-    XMLElement* const site = body->InsertNewChildElement("site");
-    site->SetAttribute("name", foot.frame.c_str());
-    site->SetAttribute("pos", fmt::format("{} {} {}", FormatNumber(foot.p_body[0]),
-                                          FormatNumber(foot.p_body[1]), FormatNumber(foot.p_body[2]))
-                                  .c_str());
+    if (!foot.is_added) geoms.insert(NameGeom(m, foot.geom, mjcf));
+    XMLElement* const body = RequireBody(m, m.geom_bodyid[foot.geom], mjcf);
+    bodies.insert(ReadAttribute(*body, "name"));
+    const auto add = [&](const char* kind) {
+      XMLElement* const element = body->InsertNewChildElement(kind);
+      element->SetAttribute("name", foot.frame.c_str());
+      element->SetAttribute("pos", fmt::format("{} {} {}", FormatNumber(foot.p_body[0]),
+                                               FormatNumber(foot.p_body[1]), FormatNumber(foot.p_body[2]))
+                                       .c_str());
+      return element;
+    };
+    add("site");
+    if (!foot.is_added) continue;
+    XMLElement* const sphere = add("geom");
+    sphere->SetAttribute("type", "sphere");
+    sphere->SetAttribute("size", foot.radius);
+    sphere->SetAttribute("mass", 0);
+    geoms.insert(foot.frame);
   }
   XMLElement* const option = RequireSection(mjcf->root(), "option");
   for (const auto& [name, value] : {std::pair("timestep", "0.001"),
@@ -152,6 +245,12 @@ void PutOnFloor(const mjModel& m, const Stand& stand, MjcfFile* mjcf) {
   const std::string floor = RequireFloor(m, mjcf);
   XMLElement* const contact = RequireSection(mjcf->root(), "contact");
   for (XMLElement* pair : ListChildren(contact, "pair")) contact->DeleteChild(pair);
+  // What else a foot has is not judged by its distance from the ground.
+  for (const std::string& body : bodies) {
+    XMLElement* const exclude = contact->InsertNewChildElement("exclude");
+    exclude->SetAttribute("body1", "world");
+    exclude->SetAttribute("body2", body.c_str());
+  }
   for (const std::string& geom : geoms) {
     XMLElement* const pair = contact->InsertNewChildElement("pair");
     for (const auto& [name, value] : {std::pair<const char*, std::string>("geom1", floor),
@@ -173,16 +272,20 @@ void AddFeet(const Stand& stand, RobotDescription* robot) {
 }
 
 std::string WriteStandScenario(const RobotDescription& robot, const Stand& stand, double tolerance) {
-  const std::string start = ListJoints(robot, [&](size_t i) {
-    const Joint& joint = robot.spec.joints[i];
-    const auto at = stand.pose.find(joint.name);
-    // Not at an end, where rounding to the digits printed would put it outside.
-    const double margin = 0.01 * (joint.upper - joint.lower);
-    return std::clamp(at == stand.pose.end() ? 0.0 : at->second, joint.lower + margin, joint.upper - margin);
-  });
+  const std::string start =
+      ListJoints(robot, [&](size_t i) { return stand.pose.at(robot.spec.joints[i].name); });
   std::string feet;
   for (const Foot& foot : stand.feet) feet += (feet.empty() ? "" : ", ") + Quote(foot.frame);
-  const double way = 0.03 * stand.height;
+  std::string points;
+  for (const JointWayPoint& point : ListWay(stand)) {
+    const auto list = [&](int from, double unit) {
+      return fmt::format("[{}, {}, {}]", FormatNumber(point.q[from] / unit, 2),
+                         FormatNumber(point.q[from + 1] / unit, 2),
+                         FormatNumber(point.q[from + 2] / unit, 2));
+    };
+    points += fmt::format("  {{ time = {}, xyz = {}, rpy_deg = {} }},\n", point.time, list(0, 1.0),
+                          list(3, kPi / 180.0));
+  }
   return fmt::format(
       R"(# The robot stands on its feet and sways over them, by computed torque, checked at every step.
 name = "motion"
@@ -207,19 +310,15 @@ mu = 0.5
 f_min = {}
 f_max = {}
 points = [
-  {{ time = 2, xyz = [{}, 0, {}], rpy_deg = [0, 2, 0] }},
-  {{ time = 4, xyz = [0, {}, {}], rpy_deg = [2, 0, 2] }},
-]
+{}]
 
 [control]
 law = "computed_torque"
 natural_frequency = 20
 damping_ratio = 1
 {})",
-      WriteTolerance(tolerance), start, feet,
-      FormatNumber(0.01 * stand.weight / static_cast<double>(stand.feet.size()), 2),
-      FormatNumber(std::ceil(stand.weight)), FormatNumber(way, 2), FormatNumber(-way, 2),
-      FormatNumber(way, 2), FormatNumber(-way, 2), WriteCompensation(robot));
+      WriteTolerance(tolerance), start, feet, FormatNumber(LeastForce(stand), 2),
+      FormatNumber(std::ceil(stand.weight)), points, WriteCompensation(robot));
 }
 
 }  // namespace dexcheck::cli

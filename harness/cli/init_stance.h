@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "controller/control/joint_motion.h"
 #include "harness/descriptions/robot_description.h"
 #include "harness/engine/engine.h"
 #include "harness/engine/mjcf_file.h"
@@ -13,28 +14,44 @@
 namespace dexcheck::cli {
 
 /// A place of the robot that stands on the ground: a sphere's centre, the end of a capsule, the corner of a
-/// box.
+/// box; of a mesh or a cylinder, the centre of a small sphere that is added there.
 struct Foot {
   std::string frame;    ///< Name of the site that is added there.
   int geom = -1;        ///< Of the engine's model.
   Vector3d p_body;      ///< In the body's frame, m.
   double radius = 0.0;  ///< m; 0 for a corner.
+  bool is_added = false;
 };
 
-/// Where the robot stands when it is as its first key frame says, or at zero.
+/// How the robot stands, in the posture of its first key frame, or at zero, or as near to it as it can.
 struct Stand {
   std::vector<Foot> feet;
+  bool has_wheels = false;             ///< A foot turns without end.
   double height = 0.0;                 ///< Of the base above the lowest foot, m.
   double weight = 0.0;                 ///< N.
+  double sway = 1.0;                   ///< How far it moves: of what a robot on four feet can, 0 to 1.
   std::map<std::string, double> pose;  ///< Of joints, rad or m.
+  std::vector<std::map<std::string, double>> poses;  ///< Likewise, as it sways.
+  std::vector<std::string> weak;                     ///< Joints whose motors' limits are too low for that.
 };
 
-/// Spheres, capsules' ends and boxes' corners that are lowest.
-/// @throws InputError when fewer than three of them are.
-Stand FindStand(const mjModel& m, const std::string& source);
+/// Places that are lowest, of each body four at the most.
+Stand FindStand(const mjModel& m);
 
 /// Adds a site of each foot, a floor where there is none, and pairs of each foot with it, which alone touch.
+/// @throws InputError when the body of a foot has no name.
 void PutOnFloor(const mjModel& m, const Stand& stand, MjcfFile* mjcf);
+
+/// Least normal force that the scenario's law asks of a foot, N.
+double LeastForce(const Stand& stand);
+
+/// How the base sways: down by 3 % of its height, and turned by 2 degrees.
+std::vector<JointWayPoint> ListWay(const Stand& stand);
+
+/// Finds a posture from which the robot can sway with forces of the ground inside their cones: that of the
+/// stand, or with joints bent and the centre of mass over the feet.
+/// @param limits of motors by joint, N m or N. @returns why there is none; empty when there is one.
+std::string FindPosture(const RobotModel& model, const std::map<std::string, double>& limits, Stand* stand);
 
 /// Gives the frames of feet their spheres' radius.
 void AddFeet(const Stand& stand, RobotDescription* robot);

@@ -7,8 +7,10 @@
 #include <vector>
 
 #include "harness/engine/engine.h"
+#include "harness/engine/map_vector.h"
 #include "harness/engine/mjcf_passes.h"
 #include "harness/engine/mujoco_release.h"
+#include "harness/engine/solid.h"
 #include "harness/engine/xml.h"
 
 namespace dexcheck {
@@ -38,6 +40,47 @@ bool IsExcluded(const mjModel& m, int one, int other) {
   });
 }
 
+bool AreNeighbours(const mjModel& m, int one, int other) {
+  const int root = m.body_weldid[one], other_root = m.body_weldid[other];
+  return root == other_root || m.body_weldid[m.body_parentid[root]] == other_root ||
+         m.body_weldid[m.body_parentid[other_root]] == root;
+}
+
+/// Of one robot. With the world, or what stands on it, it is a matter of the motion.
+bool AreOfOneTree(const mjModel& m, int one, int other) {
+  return m.body_rootid[one] == m.body_rootid[other] && (m.body_weldid[one] != 0 || m.body_weldid[other] != 0);
+}
+
+/// What the engine lets touch.
+void AddContacts(const mjModel& m, const mjData& data, std::set<std::pair<int, int>>* pairs) {
+  for (int i = 0; i < data.ncon; ++i) {
+    const mjContact& contact = data.contact[i];
+    const std::pair bodies = std::minmax(m.geom_bodyid[contact.geom1], m.geom_bodyid[contact.geom2]);
+    if (contact.dist <= 0.0 && AreOfOneTree(m, bodies.first, bodies.second)) pairs->insert(bodies);
+  }
+}
+
+/// What a run's clearance is of: shapes that the engine does not let touch, too.
+void AddOverlaps(const mjModel& m, const mjData& data, const Solids& solids,
+                 std::set<std::pair<int, int>>* pairs) {
+  constexpr double kNear = 1e-3;  // m, which a run's motion is off by
+  const auto pose = [&](const Solid& s) {
+    return Pose(MapPose(data.xmat + 9 * s.body, data.xpos + 3 * s.body) * s.X_BG);
+  };
+  for (size_t i = 0; i < solids.list.size(); ++i) {
+    const Solid& a = solids.list[i];
+    for (size_t k = 0; k < i; ++k) {
+      const Solid& b = solids.list[k];
+      const std::pair bodies = std::minmax(a.body, b.body);
+      if (!AreOfOneTree(m, a.body, b.body) || AreNeighbours(m, a.body, b.body) || pairs->count(bodies) > 0)
+        continue;
+      const Pose X_WA = pose(a), X_WB = pose(b);
+      if ((X_WA.translation() - X_WB.translation()).norm() > a.reach + b.reach + kNear) continue;
+      if (CalcDistance(a, X_WA, b, X_WB) < kNear) pairs->insert(bodies);
+    }
+  }
+}
+
 }  // namespace
 
 std::vector<std::string> ExcludeBaseContacts(MjcfFile* mjcf) {
@@ -58,6 +101,7 @@ std::vector<std::string> ExcludeOverlaps(const std::vector<std::map<std::string,
   const MjModelPtr model = LoadMjcfText(mjcf->PrintFor(std::filesystem::current_path()), mjcf->source());
   const mjModel& m = *model;
   const MjDataPtr data = MakeData(m);
+  const Solids solids = ListSolids(m);
   std::set<std::pair<int, int>> pairs;
   for (const std::map<std::string, double>& pose : poses) {
     mj_resetData(&m, data.get());
@@ -68,13 +112,8 @@ std::vector<std::string> ExcludeOverlaps(const std::vector<std::map<std::string,
     mj_kinematics(&m, data.get());
     mj_comPos(&m, data.get());
     mj_collision(&m, data.get());
-    for (int i = 0; i < data->ncon; ++i) {
-      const mjContact& contact = data->contact[i];
-      if (contact.dist > 0.0) continue;
-      const std::pair bodies = std::minmax(m.geom_bodyid[contact.geom1], m.geom_bodyid[contact.geom2]);
-      // With the world, or what stands on it, it is a matter of the motion.
-      if (m.body_weldid[bodies.first] != 0) pairs.insert(bodies);
-    }
+    AddContacts(m, *data, &pairs);
+    AddOverlaps(m, *data, solids, &pairs);
   }
   return Exclude(m, pairs, mjcf);
 }

@@ -1,5 +1,11 @@
-#include <string_view>
+#include <fmt/format.h>
 
+#include <sstream>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "controller/common/types.h"
 #include "harness/engine/mjcf_passes.h"
 #include "harness/engine/xml.h"
 
@@ -36,6 +42,18 @@ void DeleteWord(XMLElement* element, const char* attribute, MjcfFile* mjcf) {
   element->DeleteAttribute(attribute);
 }
 
+/// With it go the key frames, whose numbers are those of all joints, and its sensors.
+void DeleteJoint(XMLElement* joint, MjcfFile* mjcf) {
+  const std::string name = ReadAttribute(*joint, "name");
+  for (XMLElement* section : ListChildren(mjcf->root(), "sensor")) {
+    for (XMLElement* part : ListChildren(section)) {
+      if (!name.empty() && ReadAttribute(*part, "joint") == name) section->DeleteChild(part);
+    }
+  }
+  for (XMLElement* section : ListChildren(mjcf->root(), "keyframe")) mjcf->root()->DeleteChild(section);
+  joint->Parent()->DeleteChild(joint);
+}
+
 }  // namespace
 
 void KeepMechanism(MjcfFile* mjcf) {
@@ -43,9 +61,12 @@ void KeepMechanism(MjcfFile* mjcf) {
   DeleteSections("tendon", mjcf);
   DeleteUsers(mjcf);
   DeleteControls(mjcf->root());
+  std::vector<XMLElement*> balls;
   VisitElements(mjcf->root(), [&](XMLElement* element) {
     const std::string_view kind = element->Name();
-    if (kind == "joint") {
+    if (kind == "joint" && ReadAttribute(*element, "type") == "ball") {
+      balls.push_back(element);
+    } else if (kind == "joint") {
       DeleteWord(element, "stiffness", mjcf);
       DeleteWord(element, "springdamper", mjcf);
     } else if (kind == "body") {
@@ -54,6 +75,26 @@ void KeepMechanism(MjcfFile* mjcf) {
       DeleteWord(element, "multiccd", mjcf);
     }
   });
+  for (XMLElement* ball : balls) {
+    mjcf->Note(*ball, "<joint type=\"ball\">", "held, of which a run's law has no number");
+    DeleteJoint(ball, mjcf);
+  }
+}
+
+void HoldBase(double lift, MjcfFile* mjcf) {
+  std::vector<XMLElement*> joints;
+  VisitElements(mjcf->root(), [&](XMLElement* element) {
+    const std::string_view kind = element->Name();
+    if (kind == "freejoint" || (kind == "joint" && ReadAttribute(*element, "type") == "free"))
+      joints.push_back(element);
+  });
+  for (XMLElement* joint : joints) {
+    XMLElement* const body = joint->Parent()->ToElement();
+    Vector3d p = Vector3d::Zero();
+    std::istringstream(ReadAttribute(*body, "pos", "0 0 0")) >> p[0] >> p[1] >> p[2];
+    body->SetAttribute("pos", fmt::format("{} {} {}", p[0], p[1], p[2] + lift).c_str());
+    DeleteJoint(joint, mjcf);
+  }
 }
 
 void RequireExactSolver(MjcfFile* mjcf) {

@@ -43,8 +43,11 @@ void StateNewDefaults(MjcfFile* mjcf);
 void AddMotors(MjcfFile* mjcf, const std::map<std::string, double>& limits = {});
 
 /// Leaves out what acts on joints beside a run's motors, and a run's model has not: constraints, tendons,
-/// springs of joints, and the weight that bodies do not feel (gravcomp).
+/// springs of joints, and the weight that bodies do not feel (gravcomp). Ball joints are held.
 void KeepMechanism(MjcfFile* mjcf);
+
+/// Welds what floats to the world, higher by `lift`, m: free joints go, and key frames with them.
+void HoldBase(double lift, MjcfFile* mjcf);
 
 /// States a solver that goes on until rounding: a run's checks see what an early end leaves.
 void RequireExactSolver(MjcfFile* mjcf);
@@ -54,8 +57,8 @@ void RequireExactSolver(MjcfFile* mjcf);
 /// @returns "base_link and link_1" of each that it adds. @throws as AddMotors.
 std::vector<std::string> ExcludeBaseContacts(MjcfFile* mjcf);
 
-/// Excludes the contacts of the robot's bodies that lie in each other in any of these poses: meshes and their
-/// hulls often do.
+/// Excludes the contacts of the robot's bodies that lie in each other in any of these poses, as the engine or
+/// a run's clearance has their shapes: meshes and their hulls often do.
 /// @param poses rad or m, by joint. @returns "link_1 and link_3" of each. @throws as AddMotors.
 std::vector<std::string> ExcludeOverlaps(const std::vector<std::map<std::string, double>>& poses,
                                          MjcfFile* mjcf);

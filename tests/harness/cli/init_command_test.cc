@@ -127,6 +127,13 @@ TEST_F(InitCommand, MendsWhatTheEngineRefuses) {
   EXPECT_THAT(said, HasSubstr("nearest"));
   EXPECT_THAT(said, HasSubstr("no width are left out: shoulder"));
   EXPECT_EQ(RunMotion(0, "thin").at("verdict"), "pass");
+  // A link that moves and states no mass.
+  const std::string urdf = ReadFixture("pair.urdf");
+  WriteChanged("empty.urdf", urdf,
+               "<mass value=\"0.8\"/>\n  <inertia ixx=\"0.01\" iyy=\"0.011\" izz=\"0.012\"",
+               "<mass value=\"0\"/>\n  <inertia ixx=\"0\" iyy=\"0\" izz=\"0\"");
+  EXPECT_THAT(Expect(0, "init empty.urdf").err, HasSubstr("1 g and 1e-6 kg m^2 are written: lower"));
+  EXPECT_EQ(RunMotion(0, "empty").at("verdict"), "pass");
 }
 
 // Motors too weak to hold the arm run without their limits; those too weak for the motion get a smaller one.
@@ -144,10 +151,61 @@ TEST_F(InitCommand, ARobotWithAFloatingBaseStands) {
   const Json run = RunMotion(0, "dog");
   EXPECT_EQ(run.at("verdict"), "pass");
   EXPECT_GT(run.at("checks").at("foot_cone_use").at("max").get<double>(), 0.0);
-  // Without places to stand on it is refused.
-  EXPECT_TRUE(
-      Refused({"init", kMjcf + "quadruped.xml", "--out", "none"}, {"quadruped.xml", "floats", "got 0"}));
-  EXPECT_FALSE(Has("none"));
+  // Without places to stand on it is held, and its joints move all the same.
+  EXPECT_THAT(Expect(0, {"init", kMjcf + "quadruped.xml", "--out", "held"}).err,
+              HasSubstr("base is held: no stance was found, because 0 places touch the ground"));
+  EXPECT_THAT(Read("held/robot.xml"), Not(HasSubstr("freejoint")));
+  const Json held = RunMotion(0, "held");
+  EXPECT_EQ(held.at("verdict"), "pass");
+  EXPECT_GT(held.at("tracking").at("joint_error_max_rad").get<double>(), 0.0);
+}
+
+// With straight knees a body can only rise. Soles that are no shape of a stance stand on spheres.
+TEST_F(InitCommand, ABipedBendsItsKneesToStand) {
+  Copy("biped.xml");
+  EXPECT_THAT(Expect(0, "init biped.xml").err, Not(HasSubstr("held")));
+  const std::string motion = Read("biped/motion.toml");
+  EXPECT_THAT(motion, HasSubstr(R"("foot_8"])"));
+  const double knee = std::stod(motion.substr(motion.find("\"left_knee\" = ") + 14));
+  EXPECT_GT(knee, 0.1);
+  const Json run = RunMotion(0, "biped");
+  EXPECT_EQ(run.at("verdict"), "pass");
+  EXPECT_GT(run.at("checks").at("foot_cone_use").at("max").get<double>(), 0.0);
+  // On wheels it would roll away.
+  WriteChanged("rolls.xml", ReadFixture("biped.xml"), "name=\"left_ankle_roll\"",
+               "limited=\"false\" name=\"left_ankle_roll\"");
+  EXPECT_THAT(Expect(0, "init rolls.xml").err, HasSubstr("because it stands on wheels"));
+}
+
+// A run's clearance is of shapes that the engine does not let touch, too.
+TEST_F(InitCommand, WhatOverlapsIsExcluded) {
+  Copy("biped.xml");
+  Expect(0, "init biped.xml");
+  EXPECT_THAT(Read("biped/robot.xml"), HasSubstr(R"(<exclude body1="left_hip" body2="left_thigh"/>)"));
+  EXPECT_THAT(Read("biped/robot.xml"), Not(HasSubstr("body1=\"left_thigh\" body2=\"right_thigh\"")));
+}
+
+// Of a ball joint a run's law has no number.
+TEST_F(InitCommand, HoldsBallJoints) {
+  WriteChanged("balls.xml", ReadFixture("pair.xml"), "<joint name=\"elbow\"",
+               "<joint type=\"ball\"/><joint name=\"elbow\"");
+  const std::string said = Expect(0, "init balls.xml").err;
+  EXPECT_THAT(said, HasSubstr("held, of which a run's law has no number: <joint type=\"ball\">"));
+  EXPECT_THAT(Read("balls/robot.xml"), Not(HasSubstr("ball\"")));
+  EXPECT_EQ(RunMotion(0, "balls").at("verdict"), "pass");
+}
+
+// Friction that stops a joint within a step leaves its law no time to act.
+TEST_F(InitCommand, ReducesFrictionThatAStepCannotCarry) {
+  const std::string urdf = ReadFixture("pair.urdf");
+  WriteChanged("stuck.urdf", urdf, "<limit lower=\"-1\"",
+               "<dynamics damping=\"500\" friction=\"500\"/><limit lower=\"-1\"");
+  EXPECT_THAT(Expect(0, "init stuck.urdf").err,
+              HasSubstr("friction that would stop a joint within the time step, 1 ms, is reduced: elbow"));
+  EXPECT_EQ(RunMotion(0, "stuck").at("verdict"), "pass");
+  WriteChanged("slow.urdf", urdf, "<limit lower=\"-1\"", "<dynamics damping=\"0.5\"/><limit lower=\"-1\"");
+  EXPECT_THAT(Expect(0, "init slow.urdf").err, Not(HasSubstr("reduced")));
+  EXPECT_THAT(Read("slow/robot.xml"), HasSubstr("damping=\"0.5\""));
 }
 
 // The weight of an arm in a horizontal plane asks for no torque, and one that hangs has a tilt of pi.
