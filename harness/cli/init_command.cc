@@ -1,6 +1,5 @@
 #include <fmt/format.h>
 
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
@@ -8,17 +7,17 @@
 #include <memory>
 #include <optional>
 #include <string>
-#include <tuple>
 #include <vector>
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
-#include "controller/dynamics/model_terms.h"
 #include "controller/model/parameter_reader.h"
 #include "harness/base/console.h"
 #include "harness/base/files.h"
 #include "harness/checks/file_comparison.h"
 #include "harness/cli/commands.h"
+#include "harness/cli/copy_scenario.h"
+#include "harness/cli/init_mend.h"
 #include "harness/cli/init_motion.h"
 #include "harness/cli/init_stance.h"
 #include "harness/cli/output_file.h"
@@ -47,13 +46,6 @@ struct InitRequest {
   UrdfOptions urdf;
 };
 
-void WriteFile(const fs::path& path, const std::string& text) { OutputFile(path).Write(text); }
-
-void CopyFile(const fs::path& from, const fs::path& to) {
-  fs::create_directories(to.parent_path());
-  WriteFile(to, ReadBytes(from));
-}
-
 /// Copies meshes, textures and the like into the folder's assets: a log keeps what lies beside the MJCF.
 void TakeAssets(const fs::path& folder, MjcfFile* mjcf) {
   AssetFolders places;
@@ -69,7 +61,7 @@ void TakeAssets(const fs::path& folder, MjcfFile* mjcf) {
       const fs::path from =
           mjcf->folder() / places.Find(kind == "texture" ? places.textures : places.meshes, name);
       const std::string to = fmt::format("assets/{}-{}", ++count, from.filename().string());
-      CopyFile(from, folder / to);
+      CopyInto(from, folder / to);
       element->SetAttribute(attribute, to.c_str());
     }
   });
@@ -78,63 +70,10 @@ void TakeAssets(const fs::path& folder, MjcfFile* mjcf) {
   }
 }
 
-/// What the engine refuses, of a description that it is to get: ranges without width, inertias that no body
-/// has, for which the nearest ones stand, and links that move and have no mass.
-void MendForEngine(RobotDescription* robot) {
-  constexpr double kLeast = 1e-12;  // kg, kg m^2
-  std::vector<std::string> ranges, bodies, points;
-  for (size_t i = 0; i < robot->spec.joints.size(); ++i) {
-    Joint& joint = robot->spec.joints[i];
-    if (robot->joints[i].states_range && joint.lower >= joint.upper) {
-      robot->joints[i].states_range = false;
-      std::tie(joint.lower, joint.upper) = std::pair(-kPi, kPi);
-      ranges.push_back(joint.name);
-    }
-    const Matrix3d possible = FindNearestInertia(joint.body.inertia);
-    if (possible != joint.body.inertia) bodies.push_back(joint.link);
-    joint.body.inertia = possible;
-    if (joint.body.mass > kLeast && possible.trace() > kLeast) continue;
-    points.push_back(joint.link);
-    joint.body.mass = std::max(joint.body.mass, 1e-3);
-    joint.body.inertia += 1e-6 * Matrix3d::Identity();
-  }
-  if (!ranges.empty()) Warn("ranges of no width are left out: " + JoinNames(ranges));
-  if (!bodies.empty())
-    Warn("no body has the inertia that these links state, the nearest that one can have is written: " +
-         JoinNames(bodies));
-  if (!points.empty())
-    Warn("joints move these links, which have no mass or no inertia; 1 g and 1e-6 kg m^2 are written: " +
-         JoinNames(points));
-}
-
 void LeaveOutBaseContacts(MjcfFile* mjcf) {
   const std::vector<std::string> pairs = ExcludeBaseContacts(mjcf);
   if (!pairs.empty())
     Warn(mjcf->source() + ": contacts of neighbours at a joint left out: " + JoinNames(pairs));
-}
-
-/// Friction that stops a joint within less than the engine's step, which leaves its law no time to act, is
-/// reduced to what does so in one; dry friction from 1 rad/s or 1 m/s.
-void ReduceFriction(const std::string& source, RobotDescription* robot) {
-  constexpr double kStep = 1e-3;  // s
-  const RobotModel model = ParseRobotModel(WriteParameters(*robot, source), source);
-  ModelTerms terms(model);
-  VectorXd q = VectorXd::Zero(model.num_positions());
-  if (model.base().type == BaseType::kFloating) q[3] = 1.0;
-  terms.SetState(q, VectorXd::Zero(model.num_velocities()));
-  terms.CalcDynamics();
-  const VectorXd inertia = MatrixXd(terms.M().inverse()).diagonal().cwiseInverse().tail(model.num_joints());
-  std::vector<std::string> names;
-  for (int i = 0; i < model.num_joints(); ++i) {
-    Joint& joint = robot->spec.joints[static_cast<size_t>(i)];
-    const double most = inertia[i] / kStep;
-    if (std::max(joint.damping, joint.dry_friction) <= most) continue;
-    joint.damping = std::min(joint.damping, most);
-    joint.dry_friction = std::min(joint.dry_friction, most);
-    names.push_back(joint.name);
-  }
-  if (!names.empty())
-    Warn("friction that would stop a joint within the time step, 1 ms, is reduced: " + JoinNames(names));
 }
 
 /// The user's MJCF with motors, as a run needs it.
@@ -178,8 +117,7 @@ InitSources ReadSources(const InitRequest& request) {
     sources.mjcf = AdaptForRun(request.mjcf, limits);
     return sources;
   }
-  MendForEngine(&sources.robot);
-  ReduceFriction(request.robot.string(), &sources.robot);
+  MendForRun(request.robot.string(), &sources.robot);
   sources.mjcf = std::make_unique<MjcfFile>(WriteMjcf(sources.robot, request.robot.filename().string()),
                                             request.robot.string() + " as an MJCF");
   AddMotors(sources.mjcf.get(), limits);
@@ -337,6 +275,9 @@ int InitRobot(const InitRequest& request) {
   std::optional<Stand> stand;
   if (robot.spec.base.type == BaseType::kFloating) {
     stand = StandOrHold(*engine, limits, &sources);
+    if (!request.mjcf.empty())
+      Warn("robot.toml is made of " + request.mjcf.string() +
+           ", too, where the base was changed: what is wrong there is wrong in both");
     engine = Load(*sources.mjcf);
   } else if (robot.spec.base.type != BaseType::kFixed) {
     throw InputError(request.robot.string() + ": base: must be fixed or float to be run, rolls");
@@ -385,51 +326,10 @@ int InitRobot(const InitRequest& request) {
   return kSuccess;
 }
 
-/// Puts a key's line into a table of the text; an own table at its end when it has none.
-void InsertKey(const std::string& table, const std::string& line, std::string* text) {
-  const std::string header = "[" + table + "]\n";
-  const size_t at = text->starts_with(header) ? 0 : text->find("\n" + header);
-  if (at == std::string::npos) {
-    *text += "\n" + header + line;
-  } else {
-    text->insert(text->find(header, at) + header.size(), line);
-  }
-}
-
-int InitFrom(const InitRequest& request) {
-  const fs::path source = kScenarios.Find(request.from);
-  const ScenarioFiles files = FindScenario(request.from, {}, 0);
-  const std::vector<std::string> parts = ListMjcfFiles(files.mjcf);
-  const RunFolder folder(request.out.empty() ? source.stem().string() : request.out, "");
-  std::string text = ReadTextFile(source.string());
-  // As the scenario writes the files: from its own folder.
-  const auto refer = [&](const std::string& stated, const char* table, const char* key,
-                         const fs::path& file) {
-    const std::string name = file.filename().string();
-    const std::string written = fs::path(stated).lexically_relative(source.parent_path()).generic_string();
-    const size_t at = stated.empty() ? std::string::npos : text.find('"' + written + '"');
-    if (at == std::string::npos) {
-      InsertKey(table, fmt::format("{} = \"{}\"\n", key, name), &text);
-    } else {
-      text.replace(at + 1, written.size(), name);
-    }
-  };
-  refer(files.scenario.model_file, "model", "file", files.robot);
-  refer(files.scenario.mjcf_file, "plant", "mjcf", files.mjcf);
-  WriteFile(folder.path() / files.robot.filename(), ReadTextFile(files.robot.string()));
-  for (const std::string& part : parts) CopyFile(files.mjcf.parent_path() / part, folder.path() / part);
-  const fs::path scenario = folder.path() / source.filename();
-  WriteFile(scenario, text);
-  FindScenario(scenario.string(), {}, 0);
-  fmt::print("{0}: {1}, {2}, {3}\nnext: cd {0} && dexcheck run {1}\n", folder.path().string(),
-             scenario.filename().string(), files.robot.filename().string(), files.mjcf.filename().string());
-  return kSuccess;
-}
-
 int Run(const InitRequest& request) {
   if (request.from.empty() && request.robot.empty())
     throw UsageError("init: must have a URDF or an MJCF, or --from a shipped scenario");
-  return request.from.empty() ? InitRobot(request) : InitFrom(request);
+  return request.from.empty() ? InitRobot(request) : CopyScenario(request.from, request.out);
 }
 
 }  // namespace
