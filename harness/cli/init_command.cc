@@ -321,8 +321,8 @@ int InitRobot(const InitRequest& request) {
                mjcf.string());
   fmt::print(
       "next: cd {} && dexcheck run motion.toml\n      dexcheck study run gains.toml --db gains.db\n"
-      "      dexcheck budget motion.toml --set actuation.delay=0.002 --set sensing.joint_counts=4096\n",
-      folder.path().string());
+      "      dexcheck budget motion.toml --set actuation.delay=0.002 --set {}\n",
+      folder.path().string(), stand ? "actuation.lag=0.002" : "sensing.joint_counts=4096");
   return kSuccess;
 }
 
