@@ -133,10 +133,10 @@ double PutFeetDown(const RobotModel& model, const Stance& stance, VectorXd* q) {
   for (int k = 0; k < kMostIterations; ++k) {
     robot.SetState(*q, rest);
     ground.SetState(robot);
-    VectorXd way = VectorXd::Zero(ground.J().rows());
-    for (int i = 0; i < ground.count(); ++i) way[3 * i + 2] = ground.gap()[i];
-    if (way.lpNorm<Eigen::Infinity>() < kConverged) break;
-    q->tail(n - 6) -= SolveForJoints(ground.J()).solve(way);
+    if (ground.gap().lpNorm<Eigen::Infinity>() < kConverged) break;
+    // Up and down alone: feet that are to lie flat turn.
+    const MatrixXd J = ground.J()(Eigen::seq(2, Eigen::last, 3), Eigen::all);
+    q->tail(n - 6) -= SolveForJoints(J).solve(VectorXd(ground.gap()));
   }
   return ground.gap().lpNorm<Eigen::Infinity>();
 }

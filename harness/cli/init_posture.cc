@@ -120,7 +120,7 @@ std::string FindPosture(const RobotModel& model, const std::map<std::string, dou
   StandTrial trial(model, limits, *stand);
   bool settles = false;
   // Of the way to the middle of a joint's range, which bends a knee as it can be bent.
-  for (const double bend : {0.0, 0.1, 0.2, 0.3}) {
+  for (const double bend : {0.0, 0.1, 0.2, 0.3, 0.45, 0.6}) {
     VectorXd q = VectorXd::Zero(model.num_positions());
     for (int i = 0; i < model.num_joints(); ++i) {
       const Joint& joint = model.joints()[static_cast<size_t>(i)];

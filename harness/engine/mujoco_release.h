@@ -58,12 +58,14 @@ inline bool CollidesByType(const mjModel& m) {
          std::any_of(m.geom_conaffinity, m.geom_conaffinity + m.ngeom, is_set);
 }
 inline bool CollidesByPair(const mjModel& /*m*/) { return true; }
-/// The option's value; that of "all" where there is none.
+/// The option's value, and how to make it that of "all", which it is where there is none.
 inline int GetCollisionOption(const mjModel& /*m*/) { return 0; }
+inline void LetBothCollide(mjModel* /*m*/) {}
 #else
 inline bool CollidesByType(const mjModel& m) { return m.opt.collision != mjCOL_PAIR; }
 inline bool CollidesByPair(const mjModel& m) { return m.opt.collision != mjCOL_DYNAMIC; }
 inline int GetCollisionOption(const mjModel& m) { return m.opt.collision; }
+inline void LetBothCollide(mjModel* m) { m->opt.collision = mjCOL_ALL; }
 #endif
 
 /// By equality constraint: whether it acts when a run starts.

@@ -7,6 +7,7 @@
 #include <memory>
 #include <tuple>
 
+#include "harness/engine/mujoco_release.h"
 #include "tests/common/matchers.h"
 #include "tests/harness/run/shipped_run.h"
 
@@ -18,9 +19,7 @@ const std::string kRobot = SourcePath("/controller/parameters/assistant_robot.to
 /// Lets a geom and the palm's box, which are what stands for their bodies, collide by their masks, and no
 /// others.
 void CollideByMasks(int top, mjModel* m) {
-#if mjVERSION_HEADER < 300
-  m->opt.collision = mjCOL_ALL;
-#endif
+  LetBothCollide(m);
   const Solids solids = ListSolids(*m);
   const int palm = mj_name2id(m, mjOBJ_BODY, "r_palm");
   std::fill_n(m->geom_contype, m->ngeom, 0);
