@@ -136,15 +136,13 @@ std::vector<Place> ListPlaces(const mjModel& m, const mjData& data, int base) {
 
 /// Of one body's places that lie in a plane the outermost, four at the most.
 std::vector<Place> KeepOutermost(const std::vector<Place>& places) {
-  constexpr double kFlat = 1e-6;  // m
+  constexpr double kFlat = 1e-6, kApart = 0.02;  // m; a smaller sole is a point
   std::vector<Place> kept;
   const auto from_first = [&](const Place& place) { return Vector3d(place.p_W - kept[0].p_W); };
   for (const Vector3d& way : {Vector3d(1, 1, -1), {-1, -1, -1}, {1, -1, -1}, {-1, 1, -1}}) {
     const auto is_nearer = [&](const Place& a, const Place& b) { return way.dot(a.p_W) < way.dot(b.p_W); };
     const Place& outermost = *std::max_element(places.begin(), places.end(), is_nearer);
-    const auto is_same = [&](const Place& place) {
-      return (place.p_W - outermost.p_W).norm() < kAddedRadius;
-    };
+    const auto is_same = [&](const Place& place) { return (place.p_W - outermost.p_W).norm() < kApart; };
     if (std::any_of(kept.begin(), kept.end(), is_same)) continue;
     const bool is_in_plane =
         kept.size() < 3 ||
