@@ -87,11 +87,11 @@ void Print(const JudgeRequest& request, const RobotModel& model, const Recording
   if (judgement.Agrees()) {
     fmt::print("{}: {} explains {}: what is left is noise.\n", Paint(Tone::kGood, "EXPLAINED"), model.name(),
                name);
-  } else if (judgement.causes.empty()) {
+  } else if (judgement.CountExplaining() == 0) {
     fmt::print("{}: {} does not explain {}, and no cause that is known does.\n",
                Paint(Tone::kBad, "NOT EXPLAINED"), model.name(), name);
   } else {
-    const size_t count = judgement.causes.size();
+    const size_t count = judgement.CountExplaining();
     fmt::print("{}: {} does not explain {}; {} cause{}{}.\n", Paint(Tone::kBad, "DIFFERS"), model.name(),
                name, count, count == 1 ? " does" : "s do",
                judgement.IsWhole()
@@ -105,9 +105,9 @@ Json ToJson(const HeldPrediction& one) { return {{"numbers", one.numbers}, {"lef
 std::string ToText(const RobotModel& model, const RecordingJudgement& judgement,
                    const std::vector<Recording>& recordings) {
   Json json = {{"model", model.spec().source},
-               {"verdict", judgement.Agrees()         ? "explained"
-                           : judgement.causes.empty() ? "not explained"
-                                                      : "differs"},
+               {"verdict", judgement.Agrees()                 ? "explained"
+                           : judgement.CountExplaining() == 0 ? "not explained"
+                                                              : "differs"},
                {"rows", judgement.rows},
                {"explained", judgement.explained},
                {"left", judgement.left},

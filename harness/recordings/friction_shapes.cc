@@ -7,16 +7,16 @@
 namespace dexcheck {
 
 MatrixXd ListShapeVelocities(const VectorXd& speeds, const std::map<int, double>& stribeck) {
-  constexpr double kSmooth[] = {0.1, 0.3, 1.0}, kSlowest = 0.05, kRatio = 1.8, kFineRatio = 1.2;
+  constexpr double kSmooth[] = {0.1, 0.3, 1.0}, kSlowest = 0.05, kRatio = 1.8;
   MatrixXd velocities = MatrixXd::Zero(speeds.size(), kFrictionShapes);
   for (int joint = 0; joint < speeds.size(); ++joint) {
     const double speed = std::max(speeds[joint], std::numeric_limits<double>::min());
     for (int i = 0; i < kSmoothShapes; ++i) velocities(joint, 1 + i) = kSmooth[i] * speed;
     const auto known = stribeck.find(joint);
     for (int i = 0; i < kStribeckShapes; ++i)
-      velocities(joint, 1 + kSmoothShapes + i) =
-          known == stribeck.end() ? kSlowest * std::pow(kRatio, i) * speed
-                                  : known->second * std::pow(kFineRatio, i - 0.5 * (kStribeckShapes - 1));
+      velocities(joint, 1 + kSmoothShapes + i) = known == stribeck.end()
+                                                     ? kSlowest * std::pow(kRatio, i) * speed
+                                                     : known->second * std::pow(kFineRatio, i - 0.5);
   }
   return velocities;
 }

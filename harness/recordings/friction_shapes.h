@@ -12,6 +12,8 @@ namespace dexcheck {
 /// exp(-(velocity / v)^2) (Stribeck).
 inline constexpr int kSlipShape = 0, kSmoothShapes = 3, kStribeckShapes = 4,
                      kFrictionShapes = 1 + kSmoothShapes + kStribeckShapes;
+/// Between the first two Stribeck velocities of a joint of which it is roughly known.
+inline constexpr double kFineRatio = 1.1;
 using FrictionRow = Eigen::Matrix<double, 1, kFrictionShapes>;
 
 /// v of each shape, rad/s or m/s: n x kFrictionShapes. @param speeds usual velocities (n). @param stribeck v

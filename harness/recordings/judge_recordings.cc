@@ -17,6 +17,9 @@ namespace {
 
 using Eigen::Index;
 
+/// Times the noise: more than errors of derivatives, known to a factor of two, can be.
+constexpr double kFar = 5.0;
+
 /// A fault of the recording itself, that holds all the time.
 Explanation MakeCause(const Fault& fault) {
   Explanation one;
@@ -107,13 +110,14 @@ class Judge {
       if (one.fault.kind == TorqueFault::kZero && std::abs(one.amplitude[0]) > kLittle)
         next.offsets[one.fault.index] = one.amplitude[0];
       if (one.fault.kind == TorqueFault::kStribeckFriction)
-        next.stribeck[one.fault.index] = StribeckVelocityOf(one.fault);
+        next.stribeck[one.fault.index] = StribeckVelocityOf(one.fault, one.amplitude);
     }
-    next.shaking = set_.shaking();
+    next.shaking = set_.refinements().shaking;
     if (!result_.IsWhole() && next.shaking == 0.0) next.shaking = FindShaking(set_, estimator_.rows(), left);
   }
-  [[nodiscard]] double StribeckVelocityOf(const TorqueFault& fault) const {
-    return set_[0].shape_velocities(fault.index, fault.columns.front().front().column.component);
+  [[nodiscard]] double StribeckVelocityOf(const TorqueFault& fault, const VectorXd& a) const {
+    const double v = set_[0].shape_velocities(fault.index, fault.columns.front().front().column.component);
+    return a.size() == 1 ? v : v * std::sqrt(kFineRatio) * std::exp(a[1] / a[0]);
   }
 
   /// Of what is left of such rows, in units of noise.
@@ -210,9 +214,18 @@ class Judge {
       one.log_odds = term.log_odds;
     }
     one.SetOutcome();
+    if (IsDoubtful(fault, term)) one.outcome = CauseOutcome::kNotExplained;
     result_.causes.push_back(std::move(one));
     result_.found.push_back(
         {fault, term.amplitude, term.error, result_.causes.back().outcome == CauseOutcome::kNamed});
+  }
+
+  /// Whether far more than noise is left beside it, so that something else is at work. Friction and bodies
+  /// are named all the same: drives have more shapes of friction than are tried.
+  [[nodiscard]] bool IsDoubtful(const TorqueFault& fault, const CauseTerm& term) const {
+    constexpr double kMost = 101.0;  // of what is left
+    return result_.left > kFar && !fault.IsFriction() && !fault.IsOfBodies() &&
+           term.fraction <= kMost * (1.0 - estimator_.selection().fraction);
   }
 
   [[nodiscard]] Fault Describe(const TorqueFault& fault, const VectorXd& a, const VectorXd& error) const {
@@ -220,8 +233,8 @@ class Judge {
     one.fault = fault.fault;
     one.place = fault.place;
     one.unit = fault.unit;
-    const bool is_number =
-        a.size() == 1 || fault.kind == TorqueFault::kDelay || fault.kind == TorqueFault::kSpring;
+    const bool is_number = a.size() == 1 || fault.kind == TorqueFault::kDelay ||
+                           fault.kind == TorqueFault::kSpring || fault.kind == TorqueFault::kStribeckFriction;
     one.value = is_number ? fault.nominal + a[0] : a.norm();
     one.error = error.size() == 0 ? 0.0 : is_number ? error[0] : error.norm();
     const auto vector = [](const VectorXd& v) {
@@ -240,7 +253,8 @@ class Judge {
       one.value = a.head<6>().norm();
       one.error = error.size() == 0 ? 0.0 : error.head<6>().norm();
       const auto size = [&](Index i) { return a.segment<2>(2 * i).norm(); };
-      one.detail = fmt::format("at {} Hz, along its axes {}", FormatNumber(set_.shaking() / (2.0 * kPi), 4),
+      one.detail = fmt::format("at {} Hz, along its axes {}",
+                               FormatNumber(set_.refinements().shaking / (2.0 * kPi), 4),
                                vector(Vector3d(size(0), size(1), size(2))));
       if (a.size() > 6) one.detail += ", about them " + vector(Vector3d(size(3), size(4), size(5))) + " rad";
     } else if (fault.kind == kPush && fault.push.has_moment) {
@@ -258,7 +272,7 @@ class Judge {
     } else if (fault.kind == kTorqueGain && std::abs(one.value + 1.0) < 0.2) {
       one.detail = "(the other sign)";
     } else if (fault.kind == kStribeckFriction) {
-      one.detail = "below about " + FormatNumber(StribeckVelocityOf(fault), 2) + " per s";
+      one.detail = "below about " + FormatNumber(StribeckVelocityOf(fault, a), 2) + " per s";
     } else if (!is_number) {
       one.detail = vector(a);
     }
@@ -279,6 +293,12 @@ class Judge {
 bool RecordingJudgement::IsWhole() const {
   return std::all_of(balances.begin(), balances.end(),
                      [](const JointJudgement& one) { return one.left <= kMostNoise * one.noise; });
+}
+
+size_t RecordingJudgement::CountExplaining() const {
+  return static_cast<size_t>(std::count_if(causes.begin(), causes.end(), [](const Explanation& one) {
+    return one.outcome != CauseOutcome::kNotExplained;
+  }));
 }
 
 bool RecordingJudgement::Agrees() const { return causes.empty() && IsWhole(); }
@@ -306,13 +326,14 @@ RecordingJudgement JudgeRecordings(const RobotModel& model, std::vector<Recordin
   if (!goes_on) return judgement;
   constexpr double kWell = 0.95;
   std::optional<PositionFault> fault;
-  const bool is_poor = !judgement.IsWhole() && (judgement.explained < kWell || judgement.causes.size() > 3);
+  const bool is_poor = !judgement.IsWhole() &&
+                       (judgement.explained < kWell || judgement.left > kFar || judgement.causes.size() > 3);
   if (is_poor && options.tries_positions) fault = FindPositionFault(model, recordings->front());
   const auto undo = [&](Recording* one) {
     if (fault) fault->Undo(one);
   };
   if (fault && Reopen(recordings, undo)) judgement = Judge(model, recordings, options, count).Run();
-  constexpr int kReadings = 3;
+  constexpr int kReadings = 5;
   JudgeOptions next = options;
   for (int i = 1; i < kReadings && goes_on && judgement.refinements != next.refinements; ++i) {
     next.refinements = judgement.refinements;

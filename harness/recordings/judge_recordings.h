@@ -62,6 +62,8 @@ struct RecordingJudgement {
   long rows = 0;
   Refinements refinements;  ///< With which a further reading would tell more.
 
+  /// Causes that are more than the nearest that is known.
+  [[nodiscard]] size_t CountExplaining() const;
   /// Beside the causes no more than noise is left.
   [[nodiscard]] bool IsWhole() const;
   /// What is left is noise, with no cause.

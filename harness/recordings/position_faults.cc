@@ -89,7 +89,11 @@ std::vector<PositionFault> ListPositionFaults(const RobotModel& model, const Rec
   for (int joint = 0; joint < model.num_joints(); ++joint) {
     if (recording.FindColumn(RecordedQuantity::kPosition, joint) < 0) continue;
     const std::string place = "joint " + model.joint(joint).name;
-    faults.push_back({{"position gain", place, -1.0, 0.0, "", "(the other sign)"}, joint, -1, -1.0});
+    for (const double gain : {-1.0, 0.5, 0.8, 0.9, 1.1, 1.25, 2.0})
+      faults.push_back({{"position gain", place, gain, 0.0, "", gain < 0.0 ? "(the other sign)" : ""},
+                        joint,
+                        -1,
+                        1.0 / gain});
     for (int other = joint + 1; other < model.num_joints(); ++other) {
       if (recording.FindColumn(RecordedQuantity::kPosition, other) < 0) continue;
       faults.push_back(
@@ -140,13 +144,25 @@ std::optional<PositionFault> FindPositionFault(const RobotModel& model, const Re
   std::sort(faults.begin(), faults.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
   faults.resize(std::min(faults.size(), kFewFaults));
   // By a factor of three, of one joint or spread over several.
-  constexpr double kMuch = 1.1;
-  double best = begin.CalcMisfit({}, 1) - kMuch;
+  constexpr double kMuch = 1.1, kMuchOfRatio = 5.0;
+  const double as_read = begin.CalcMisfit({}, 1);
+  double best = as_read - kMuch;
   std::optional<PositionFault> found;
   for (auto& [few, fault] : faults) {
     const double misfit = begin.CalcMisfit(fault, 1);
     if (misfit < best) best = misfit, found = std::move(fault);
   }
+  // A ratio is anything; a sign, an exchange and a unit are not.
+  const bool is_ratio = found && found->joint >= 0 && found->other < 0 && found->factor > 0.0;
+  for (double step = 0.1; is_ratio && step > 1e-5; step *= 0.5)
+    for (const double change : {1.0 - step, 1.0 + step}) {
+      PositionFault near = *found;
+      near.fault.value = 1.0 / (near.factor *= change);
+      const double misfit = begin.CalcMisfit(near, 1);
+      if (misfit < best) best = misfit, found = std::move(near);
+    }
+  // With a free number something is always explained.
+  if (is_ratio && best > as_read - kMuchOfRatio) found.reset();
   return found;
 }
 

@@ -59,8 +59,8 @@ class RecordingSet {
   /// Gains that became others than were estimated are not known. @return whether there are any.
   bool DropUnknownGains();
 
-  [[nodiscard]] double shaking() const { return shaking_; }  ///< Of the base, as was told, rad/s.
-  [[nodiscard]] double step() const { return step_; }        ///< The longest between rows, s.
+  [[nodiscard]] const Refinements& refinements() const { return refinements_; }  ///< As was told.
+  [[nodiscard]] double step() const { return step_; }  ///< The longest between rows, s.
   [[nodiscard]] long rows() const { return rows_; }
   [[nodiscard]] const std::vector<std::string>& notes() const { return notes_; }
   /// Of the recordings themselves: velocities that are not the positions' derivatives.
@@ -80,7 +80,8 @@ class RecordingSet {
   std::vector<ReadRecording> read_;
   std::vector<int> joints_;
   bool has_currents_ = false;
-  double step_ = 0.0, shaking_;
+  double step_ = 0.0;
+  Refinements refinements_;
   VectorXd gains_, first_gains_;  // by place
   long rows_ = 0;
   std::vector<std::string> notes_;

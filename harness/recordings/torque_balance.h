@@ -72,6 +72,7 @@ class TorqueBalance {
     MatrixXd gravity;             ///< Judged joints x 3: CalcGravityColumns.
     VectorXd q;                   ///< All joints.
     double samples = 0.0;
+    [[nodiscard]] double centre() const { return 0.5 * (from + to); }
   };
 
   [[nodiscard]] const std::vector<int>& joints() const { return joints_; }

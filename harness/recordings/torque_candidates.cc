@@ -32,8 +32,9 @@ BodyVector CentreColumn(const MassProperties& body, int k) {
 
 class FaultList {
  public:
-  FaultList(const RobotModel& model, const std::vector<int>& joints, int recordings, double shaking)
-      : model_(model), joints_(joints), recordings_(recordings), shaking_(shaking) {}
+  FaultList(const RobotModel& model, const std::vector<int>& joints, int recordings,
+            const Refinements& refinements)
+      : model_(model), joints_(joints), recordings_(recordings), refinements_(refinements) {}
 
   std::vector<TorqueFault> Make() {
     for (const int joint : joints_) AddJoint(joint);
@@ -77,12 +78,13 @@ class FaultList {
                modelled.dry_friction, true);
     AddAtJoint(kViscousFriction, joint, "viscous friction", rate, {TorqueColumn::kViscous, joint},
                modelled.damping, true);
-    for (int shape = 0; shape < kFrictionShapes; ++shape) {
+    const bool is_refined = refinements_.stribeck.contains(joint);
+    if (is_refined) AddStribeck(joint, torque);
+    for (int shape = 0; shape < (is_refined ? 1 + kSmoothShapes : kFrictionShapes); ++shape) {
       const bool is_stribeck = shape > kSmoothShapes;
       AddAtJoint(is_stribeck ? kStribeckFriction : kDryFriction, joint,
                  is_stribeck ? "Stribeck friction" : "dry friction", torque,
-                 {TorqueColumn::kFriction, joint, shape}, is_stribeck ? 0.0 : modelled.dry_friction,
-                 !is_stribeck)
+                 {TorqueColumn::kFriction, joint, shape}, is_stribeck ? 0.0 : modelled.dry_friction, true)
           .parameters = 1;
     }
     TorqueFault& spring = AddAtJoint(kSpring, joint, "spring", turns ? "N m/rad" : "N/m",
@@ -103,6 +105,16 @@ class FaultList {
     delay.scale = DelayScale();
     Add(kZero, joint, "position offset", "joint " + modelled.name, turns ? "rad" : "m",
         {{{{TorqueColumn::kPosition, joint}, -1, -1.0}}});
+  }
+
+  /// Of a velocity that is roughly known: the shape there, and what the logarithm of the velocity changes.
+  void AddStribeck(int joint, const std::string& unit) {
+    const TorqueColumn slow{TorqueColumn::kFriction, joint, 1 + kSmoothShapes};
+    const TorqueColumn fast{TorqueColumn::kFriction, joint, 2 + kSmoothShapes};
+    const double slope = 1.0 / std::log(kFineRatio);
+    Add(TorqueFault::kStribeckFriction, joint, "Stribeck friction", "joint " + model_.joint(joint).name, unit,
+        {{{slow, joint, 0.5}, {fast, joint, 0.5}}, {{slow, joint, -slope}, {fast, joint, slope}}})
+        .is_possible = [](const VectorXd& a) { return std::abs(a[1]) < a[0]; };
   }
 
   void AddExchange(int joint, int other) {
@@ -209,7 +221,7 @@ class FaultList {
     gravity.is_ordinary = true;
     constexpr double kSwing = 0.3;  // m, rad
     for (const int width : {6, 12}) {
-      if (!(shaking_ > 0.0)) break;
+      if (!(refinements_.shaking > 0.0)) break;
       TorqueFault& one = Add(kShaking, -1, width == 6 ? "shaking" : "shaking and tilting", "base", "m", {});
       for (int k = 0; k < width; ++k) one.columns.push_back({{{TorqueColumn::kShaking, 0, k}}});
       one.scale = VectorXd::Constant(width, kSwing);
@@ -241,7 +253,7 @@ class FaultList {
   const RobotModel& model_;
   const std::vector<int>& joints_;
   int recordings_;
-  double shaking_;
+  const Refinements& refinements_;
   std::vector<TorqueFault> faults_;
 };
 
@@ -289,8 +301,8 @@ BodyVector FindNearestBody(const BodyVector& body) {
 }
 
 std::vector<TorqueFault> ListTorqueFaults(const RobotModel& model, const std::vector<int>& joints,
-                                          int recordings, double shaking) {
-  return FaultList(model, joints, recordings, shaking).Make();
+                                          int recordings, const Refinements& refinements) {
+  return FaultList(model, joints, recordings, refinements).Make();
 }
 
 void ShiftCentre(const RobotModel& model, const Vector3d& shift, TorqueFault* centre) {

@@ -3,6 +3,7 @@
 // What may be wrong with a model of a recorded robot, and the columns that it leaves.
 
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "harness/diagnosis/cause_estimator.h"
@@ -22,8 +23,8 @@ struct ColumnPart {
 /// joint, or an acceleration of the base (three columns), for a time.
 struct Push {
   int recording = 0;
-  double from = 0.0, to = 0.0;       ///< s
-  double before = 0.0, after = 0.0;  ///< Part of it that acts in the blocks of time beside these.
+  double from = 0.0, to = 0.0;                         ///< s
+  std::vector<std::pair<double, double>> shares = {};  ///< Times, and which part of it acts then.
   int link = -1;
   bool has_moment = false;
   int joint = -1;  ///< -1 besides no link: the base.
@@ -35,10 +36,10 @@ struct TorqueFault {
     kDryFriction,
     kAllDry,
     kAllFriction,
-    kAllOffsets,
     kViscousFriction,
     kStribeckFriction,
     kLoadFriction,
+    kAllOffsets,
     kSpring,
     kOffset,
     kArmature,
@@ -66,13 +67,17 @@ struct TorqueFault {
   std::function<bool(const VectorXd&)> is_possible;
   bool is_ordinary = false;  ///< As Candidate's.
   Push push = {};
+
+  /// Of any shape, in one joint or in all.
+  [[nodiscard]] bool IsFriction() const { return kind <= kLoadFriction; }
+  /// Whether it is a number of bodies, gravity or a position.
+  [[nodiscard]] bool IsOfBodies() const { return kind >= kZero && kind <= kGravity; }
 };
 
 /// All that are tried of a model's recordings.
-/// @param joints that are judged. @param recordings their number. @param shaking frequency of the base,
-/// rad/s.
+/// @param joints that are judged. @param recordings their number.
 std::vector<TorqueFault> ListTorqueFaults(const RobotModel& model, const std::vector<int>& joints,
-                                          int recordings, double shaking = 0.0);
+                                          int recordings, const Refinements& refinements = {});
 
 /// Gives a payload's columns, of its mass (kg) and mass times place (kg m), the inertia of a point near such
 /// a one; a payload of ten columns stays as it is.

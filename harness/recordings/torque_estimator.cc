@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <tuple>
 
 #include "controller/common/errors.h"
 #include "controller/common/linear_algebra.h"
@@ -27,34 +28,32 @@ VectorXd InUnitsOfMedian(const VectorXd& squares) {
   return usual > 0.0 ? VectorXd(squares / usual) : squares;
 }
 
-/// A stretch that stands out.
-struct Window {
-  Index first = 0, last = 0;         // blocks that are wholly in it
-  double before = 0.0, after = 0.0;  // parts of the blocks beside these
-};
-
-/// Smoothing, and where blocks begin, spread a push's begin and end: the parts of the blocks there are by
-/// what is seen in them. @param usual what blocks have without it.
-Window TrimWindow(const VectorXd& squares, double usual, Index first, Index last) {
+/// A stretch that stands out. Smoothing, and where blocks begin, spread a push's begin and end: the parts of
+/// the blocks there are by what is seen in them. @param usual what blocks have without it.
+Push TrimWindow(const VectorXd& squares, double usual, Index first, Index last,
+                const std::vector<TorqueBalance::Block>& blocks) {
   const double whole = Median(squares.segment(first, last - first + 1));
   constexpr double kNearlyWhole = 0.25;  // half of it
+  constexpr Index kBeside = 4;
   while (first < last && squares[first] < kNearlyWhole * whole) ++first;
   while (last > first && squares[last] < kNearlyWhole * whole) --last;
-  const auto part = [&](Index at) {
-    const double square = at < 0 || at >= squares.size() ? 0.0 : squares[at] - usual;
-    return std::sqrt(std::clamp(square / whole, 0.0, 1.0));
-  };
-  return {first, last, part(first - 1), part(last + 1)};
+  Push push{.from = blocks[static_cast<size_t>(first)].from, .to = blocks[static_cast<size_t>(last)].to};
+  for (Index at = std::max<Index>(0, first - kBeside); at <= std::min(squares.size() - 1, last + kBeside);
+       ++at)
+    push.shares.emplace_back(
+        blocks[static_cast<size_t>(at)].centre(),
+        at >= first && at <= last ? 1.0 : std::sqrt(std::clamp((squares[at] - usual) / whole, 0.0, 1.0)));
+  return push;
 }
 
 /// The few stretches that stand out most.
-std::vector<Window> FindWindows(const VectorXd& squares) {
+std::vector<Push> FindWindows(const VectorXd& squares, const std::vector<TorqueBalance::Block>& blocks) {
   constexpr size_t kMost = 3;
   constexpr double kStandsOut = 12.0, kStays = 4.0;
   if (squares.size() < 16) return {};
   const double usual = std::max(Median(squares), std::numeric_limits<double>::min());
   VectorXd rest = squares;
-  std::vector<Window> windows;
+  std::vector<Push> windows;
   while (windows.size() < kMost) {
     Index peak = 0;
     if (!(rest.maxCoeff(&peak) > kStandsOut * usual)) break;
@@ -64,7 +63,8 @@ std::vector<Window> FindWindows(const VectorXd& squares) {
     while (stays(first - 1) || stays(first - 2)) --first;
     while (stays(last + 1) || stays(last + 2)) ++last;
     // What stands out half of the time is no push.
-    if (last - first <= squares.size() / 2) windows.push_back(TrimWindow(squares, usual, first, last));
+    if (last - first <= squares.size() / 2)
+      windows.push_back(TrimWindow(squares, usual, first, last, blocks));
     rest.segment(first, last - first + 1).setZero();
   }
   return windows;
@@ -115,14 +115,14 @@ TorqueEstimator::TorqueEstimator(RecordingSet* recordings, size_t most_causes)
     barred_.resize(faults_.size(), false);
     selection_ = Select();
   }
-  while (BarSecondPushes() || BarWeakBodies()) selection_ = Select();
+  while (BarSeconds() || BarWeakBodies()) selection_ = Select();
 }
 
 void TorqueEstimator::ListFaults() {
   const std::vector<int> judged = recordings_->ListJudged();
   if (judged.empty()) throw InputError("the recordings tell no joint's drive gain: nothing can be judged");
   faults_ = ListTorqueFaults(recordings_->model(), judged, static_cast<int>(recordings_->size()),
-                             recordings_->shaking());
+                             recordings_->refinements());
   if (recordings_->has_currents())
     std::erase_if(faults_, [](const TorqueFault& one) { return one.kind == TorqueFault::kTorqueGain; });
   barred_.assign(faults_.size(), false);
@@ -275,15 +275,16 @@ VectorXd TorqueEstimator::CalcLeft(const std::vector<CauseTerm>& terms) const {
   return rows_.CalcLeft(CalcAmplitudes(terms));
 }
 
-bool TorqueEstimator::BarSecondPushes() {
+bool TorqueEstimator::BarSeconds() {
   bool has_any = false;
-  std::vector<std::pair<int, double>> seen;
+  std::vector<std::tuple<TorqueFault::Kind, int, int, double>> seen;
   for (const CauseTerm& term : selection_.terms) {
     const TorqueFault& one = faults_[term.candidate];
-    if (one.kind != TorqueFault::kPush) continue;
-    const std::pair<int, double> when(one.push.recording, one.push.from);
-    if (std::find(seen.begin(), seen.end(), when) == seen.end()) {
-      seen.push_back(when);
+    const bool is_shape = one.kind == TorqueFault::kDryFriction || one.kind == TorqueFault::kStribeckFriction;
+    if (one.kind != TorqueFault::kPush && !is_shape) continue;
+    const std::tuple what(one.kind, one.index, one.push.recording, one.push.from);
+    if (std::find(seen.begin(), seen.end(), what) == seen.end()) {
+      seen.push_back(what);
     } else {
       barred_[term.candidate] = has_any = true;
     }
@@ -307,11 +308,8 @@ bool TorqueEstimator::BarWeakBodies() {
   constexpr double kMuch = 0.05;
   bool has_any = false;
   for (const CauseTerm& term : selection_.terms) {
-    const TorqueFault::Kind kind = faults_[term.candidate].kind;
-    const bool is_body = kind == TorqueFault::kMass || kind == TorqueFault::kCentre ||
-                         kind == TorqueFault::kInertia || kind == TorqueFault::kPayload ||
-                         kind == TorqueFault::kGravity || kind == TorqueFault::kZero;
-    if (!is_body || term.fraction - (1.0 - selection_.fraction) >= kMuch) continue;
+    if (!faults_[term.candidate].IsOfBodies() || term.fraction - (1.0 - selection_.fraction) >= kMuch)
+      continue;
     barred_[term.candidate] = true;
     has_any = true;
   }
@@ -390,14 +388,9 @@ bool TorqueEstimator::AddPushes() {
       if (part.recording == r)
         squares +=
             InUnitsOfMedian(left.segment(part.begin + part.within, part.size - part.within).cwiseAbs2());
-    std::vector<Push> pushes;
-    for (const Window& one : FindWindows(squares))
-      pushes.push_back({.from = blocks[static_cast<size_t>(one.first)].from,
-                        .to = blocks[static_cast<size_t>(one.last)].to,
-                        .before = one.before,
-                        .after = one.after});
+    std::vector<Push> pushes = FindWindows(squares, blocks);
     if (const std::optional<double> when = FindStep(*recordings_, rows_, left, r))
-      pushes.push_back({.from = *when, .to = blocks.back().to});
+      pushes.push_back({.from = *when, .to = blocks.back().to, .shares = {{*when, 0.0}, {*when, 1.0}}});
     for (Push& when : pushes) {
       when.recording = static_cast<int>(r);
       for (TorqueFault& one : ListPushes(recordings_->model(), recordings_->joints(), when))

@@ -49,8 +49,8 @@ class TorqueEstimator {
   [[nodiscard]] CauseSelection SelectAmong(double alike) const;
   [[nodiscard]] CauseSelection SelectAmong(double alike, const std::vector<bool>& barred) const;
   [[nodiscard]] std::vector<Eigen::Index> ListFirstColumns() const;
-  /// One stretch of time has one push: others would share its force.
-  bool BarSecondPushes();
+  /// One stretch of time has one push, a joint one shape of its dry friction: others would share the force.
+  bool BarSeconds();
   /// Where what is left is no noise, numbers of bodies, gravity and positions are named only when they
   /// explain much: drives have friction of more shapes than are tried, and a wrong mass fits a little of any.
   /// @return whether there are others to be chosen.

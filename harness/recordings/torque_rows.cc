@@ -1,5 +1,6 @@
 #include "harness/recordings/torque_rows.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace dexcheck {
@@ -45,12 +46,15 @@ namespace {
 
 using Entries = std::vector<Eigen::Triplet<double>>;
 
-/// How much of a push acts in a block.
-double CalcShare(const Push& push, const std::vector<TorqueBalance::Block>& blocks, size_t b) {
-  const auto is_in = [&](size_t i) {
-    return i < blocks.size() && blocks[i].to >= push.from && blocks[i].from <= push.to;
-  };
-  return is_in(b) ? 1.0 : is_in(b + 1) ? push.before : b > 0 && is_in(b - 1) ? push.after : 0.0;
+/// How much of a push acts at a time, between those at which it is known.
+double CalcShare(const Push& push, double time) {
+  const auto next = std::upper_bound(push.shares.begin(), push.shares.end(), time,
+                                     [](double t, const auto& one) { return t < one.first; });
+  if (next == push.shares.begin()) return 0.0;
+  if (next == push.shares.end()) return time <= push.to ? push.shares.back().second : 0.0;
+  const auto before = next - 1;
+  const double part = (time - before->first) / (next->first - before->first);
+  return before->second + part * (next->second - before->second);
 }
 
 void AddPush(const RecordingSet& recordings, const Push& push, const TorqueRows::Part& part, Index at,
@@ -59,7 +63,7 @@ void AddPush(const RecordingSet& recordings, const Push& push, const TorqueRows:
   const double noise = recordings[part.recording].weight[static_cast<Index>(part.place)];
   for (size_t b = 0; b < part.balance->blocks().size(); ++b) {
     const TorqueBalance::Block& block = part.balance->blocks()[b];
-    const double share = CalcShare(push, part.balance->blocks(), b);
+    const double share = CalcShare(push, block.centre());
     if (!(share > 0.0) || !(block.counts[part.place] > 0.0)) continue;
     const Index row = part.within + static_cast<Index>(b);
     const double count = share * std::sqrt(block.counts[part.place]) / noise;

@@ -5,6 +5,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <fstream>
@@ -124,6 +125,22 @@ TEST(Judge, PositionsInDegreesAreSaid) {
   ScaleColumns("q.", 180.0 / kPi, &table);
   ScaleColumns("qd.", 180.0 / kPi, &table);
   EXPECT_TRUE(NamesOnly(Judge(table), "unit of the positions", "all joints", 180.0 / kPi));
+}
+
+TEST(Judge, AWrongRatioOfAnEncoderIsNamed) {
+  RecordedTable table = Record({});
+  ScaleColumns("q.panda_joint4", 1.17, &table);
+  EXPECT_TRUE(NamesOnly(Judge(table), "position gain", "joint panda_joint4", 1.17));
+}
+
+TEST(Judge, ATorqueThatWasCutOffHasNoName) {
+  RecordedTable table = Record({});
+  std::vector<double>& torque = table.Get("tau.panda_joint2");
+  const double most = 0.5 * *std::max_element(torque.begin(), torque.end());
+  for (double& value : torque) value = std::clamp(value, -most, most);
+  const RecordingJudgement judgement = Judge(table);
+  EXPECT_FALSE(judgement.Agrees());
+  EXPECT_EQ(judgement.CountExplaining(), 0U) << Tell(judgement);
 }
 
 TEST(Judge, StribeckFrictionIsNamed) {
