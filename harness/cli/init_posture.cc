@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "controller/common/errors.h"
+#include "controller/control/grasp_controller.h"
 #include "controller/control/stance.h"
 #include "controller/dynamics/model_terms.h"
 #include "harness/cli/init_stance.h"

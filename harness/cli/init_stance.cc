@@ -42,14 +42,18 @@ std::vector<Vector3d> ListPlaces(const mjModel& m, int geom) {
     }
     case mjGEOM_CYLINDER: {
       std::vector<Vector3d> rim;
-      for (int k = 0; k < 16; ++k)
-        rim.emplace_back(size[0] * std::cos(k / 2 * kPi / 4), size[0] * std::sin(k / 2 * kPi / 4),
-                         k % 2 ? size[1] : -size[1]);
+      rim.reserve(32);
+      for (int k = 0; k < 16; ++k) {
+        const double angle = 0.125 * kPi * k;
+        rim.emplace_back(size[0] * std::cos(angle), size[0] * std::sin(angle), size[1]);
+        rim.emplace_back(size[0] * std::cos(angle), size[0] * std::sin(angle), -size[1]);
+      }
       return rim;
     }
     case mjGEOM_MESH: {
       const int mesh = m.geom_dataid[geom];
       std::vector<Vector3d> vertices;
+      vertices.reserve(static_cast<size_t>(m.mesh_vertnum[mesh]));
       for (int k = 0; k < m.mesh_vertnum[mesh]; ++k)
         vertices.push_back(
             Eigen::Map<const Eigen::Vector3f>(m.mesh_vert + 3 * (m.mesh_vertadr[mesh] + k)).cast<double>());
