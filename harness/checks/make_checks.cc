@@ -5,8 +5,6 @@
 #include <map>
 #include <set>
 
-#include "harness/engine/mujoco_release.h"
-
 namespace dexcheck {
 namespace {
 
@@ -61,7 +59,7 @@ std::set<std::string_view> ListMissing(const Setup& setup, const JudgedLaw* law)
   // A rigid plant's wheels roll, its base is upright and its equations are solved, whatever happens.
   leave_out(rigid, {"wheel_slip", "rolling", "wheel_slip_rate", "traction_use", "base_tilt", "solver"});
   leave_out(setup.robots().watched_pairs.empty(), {"clearance", "collision"});
-  leave_out(!scenario.plant.collide && !CollidesByType(setup.engine()), {"collision"});
+  leave_out(!LetsBodiesPush(scenario.plant, setup.engine()), {"collision"});
   const mjModel& engine = setup.engine();
   const auto* const limited = engine.actuator_ctrllimited;
   // What a scenario lets be cut off is no fault of the run.

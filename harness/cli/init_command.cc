@@ -339,9 +339,10 @@ void AddInitCommand(Command app) {
   Command command = app.AddCommand(
       "init",
       "Make a folder to start from: parameters, MJCF with motors, a motion, a study of its gains, CI");
-  const Option robot = command.AddOption("ROBOT", &request->robot, "URDF or MJCF of an arm").TypeName("FILE");
+  const Option robot =
+      command.AddOption("ROBOT", &request->robot, "URDF or MJCF of a robot").TypeName("FILE");
   command
-      .AddOption("MJCF", &request->mjcf, "The same arm for the engine; made of a URDF when it is not given")
+      .AddOption("MJCF", &request->mjcf, "The same robot for the engine; made of a URDF when it is not given")
       .TypeName("FILE");
   command
       .AddOption("--from SCENARIO", &request->from,

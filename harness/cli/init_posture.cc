@@ -116,7 +116,7 @@ class StandTrial {
 }  // namespace
 
 std::string FindPosture(const RobotModel& model, const std::map<std::string, double>& limits, Stand* stand) {
-  if (stand->has_wheels) return "it stands on wheels";
+  if (stand->has_wheels) return "a foot turns without end, as wheels do";
   if (stand->feet.size() < 3) return fmt::format("{} places touch the ground", stand->feet.size());
   StandTrial trial(model, limits, *stand);
   bool settles = false;
@@ -138,7 +138,8 @@ std::string FindPosture(const RobotModel& model, const std::map<std::string, dou
       return "";
     }
   }
-  return settles ? "no forces of the ground inside friction cones carry it"
+  return settles ? "in no posture that was tried it sways within its joints' ranges and the ground's "
+                   "friction cones"
                  : "its feet do not all reach the ground";
 }
 

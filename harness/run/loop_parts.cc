@@ -10,7 +10,6 @@
 #include "controller/common/toml_reader.h"
 #include "controller/control/joint_controller.h"
 #include "controller/control/trajectory_controller.h"
-#include "harness/engine/mujoco_release.h"
 #include "harness/plant/engine_plant.h"
 #include "harness/plant/rigid_plant.h"
 #include "harness/run/own_controller.h"
@@ -55,7 +54,7 @@ std::unique_ptr<Plant> MakePlant(const Setup& setup) {
   if (setup.scenario().plant.type == PlantType::kRigid) return MakeRigidPlant(setup);
   auto plant = std::make_unique<EnginePlant>(setup.adapter(), setup.fingertips(), setup.surface(),
                                              setup.scenario().plant.implicit_damping);
-  if (setup.scenario().plant.collide || CollidesByType(setup.engine()))
+  if (LetsBodiesPush(setup.scenario().plant, setup.engine()))
     plant->WatchCollisions(ListGeoms(setup.robots()));
   if (!setup.start().bonds.empty()) plant->SetBonds(setup.start().kappa, setup.start().bond_constraints);
   plant->SetFeet(setup.feet());

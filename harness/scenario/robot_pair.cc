@@ -72,7 +72,7 @@ void WatchBodies(const Scenario& scenario, const std::string& mjcf, RobotPair* r
   const PlantOptions& plant = scenario.plant;
   robots->watched_pairs = ListWatchedPairs(*robots->engine, *robots->adapter, robots->solids,
                                            plant.allowed_collision_pairs, scenario.source);
-  if (!plant.collide && !CollidesByType(*robots->engine)) return;
+  if (!LetsBodiesPush(plant, *robots->engine)) return;
   robots->solids = ListSolids(*robots->engine);  // the same, with the numbers that their geoms have now
   if (!plant.collide) return;
   robots->engine = AddContactPairs(*robots->engine, ListGeoms(*robots));
@@ -86,6 +86,10 @@ void SetStiffness(double time_constant, double impedance, mjtNum* solref, mjtNum
   solref[1] = 1.0;
   const mjtNum constant[mjNIMP] = {impedance, impedance, 0.001, 0.5, 2.0};  // the last three without effect
   std::copy_n(constant, mjNIMP, solimp);
+}
+
+bool LetsBodiesPush(const PlantOptions& plant, const mjModel& engine) {
+  return plant.collide || CollidesByType(engine);
 }
 
 std::vector<std::pair<int, int>> ListGeoms(const RobotPair& robots) {
@@ -105,7 +109,7 @@ RobotPair::RobotPair(const Scenario& scenario, RobotModel the_model, const std::
   RequireUsable(scenario, model);
   solids = ListSolids(*engine);
   std::vector<int> pushing;
-  if (scenario.plant.collide || CollidesByType(*engine)) {
+  if (LetsBodiesPush(scenario.plant, *engine)) {
     for (const Solid& solid : solids.list) pushing.push_back(solid.geom);
   }
   RemoveLooks(&engine, pushing);

@@ -47,6 +47,9 @@ struct RobotPair {
   std::vector<WatchedPair> watched_pairs;  ///< and those pairs that should not touch.
 };
 
+/// Whether bodies that are not meant to touch push each other: as the scenario says, or by the MJCF's masks.
+bool LetsBodiesPush(const PlantOptions& plant, const mjModel& engine);
+
 /// The geoms of the pairs that are watched.
 std::vector<std::pair<int, int>> ListGeoms(const RobotPair& robots);
 

@@ -174,7 +174,7 @@ TEST_F(InitCommand, ABipedBendsItsKneesToStand) {
   // On wheels it would roll away.
   WriteChanged("rolls.xml", ReadFixture("biped.xml"), "name=\"left_ankle_roll\"",
                "limited=\"false\" name=\"left_ankle_roll\"");
-  EXPECT_THAT(Expect(0, "init rolls.xml").err, HasSubstr("because it stands on wheels"));
+  EXPECT_THAT(Expect(0, "init rolls.xml").err, HasSubstr("because a foot turns without end, as wheels do"));
 }
 
 // A run's clearance is of shapes that the engine does not let touch, too.
