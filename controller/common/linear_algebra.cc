@@ -1,7 +1,6 @@
 #include "controller/common/linear_algebra.h"
 
 #include <Eigen/Eigenvalues>
-#include <Eigen/QR>
 
 namespace dexcheck {
 
@@ -14,11 +13,36 @@ VectorXd CalcSymmetricEigenvalues(const Eigen::Ref<const MatrixXd>& S) {
   return Eigen::SelfAdjointEigenSolver<MatrixXd>(S, Eigen::EigenvaluesOnly).eigenvalues();
 }
 
+void DecomposeSymmetric(const Matrix6d& S, Vector6d* values, Matrix6d* vectors) {
+  const Eigen::SelfAdjointEigenSolver<Matrix6d> solver(S);
+  *values = solver.eigenvalues();
+  *vectors = solver.eigenvectors();
+}
+
+void DecomposeGeneralized(const Matrix6d& K, const Matrix6d& Lambda, Vector6d* values, Matrix6d* vectors) {
+  const Eigen::GeneralizedSelfAdjointEigenSolver<Matrix6d> solver(K, Lambda);
+  *values = solver.eigenvalues();
+  *vectors = solver.eigenvectors();
+}
+
+LeastSquares::LeastSquares(double independent) {
+  if (independent > 0.0) decomposition_.setThreshold(independent);
+}
+
+LeastSquares& LeastSquares::Compute(const Eigen::Ref<const MatrixXd>& A) {
+  decomposition_.compute(A);
+  return *this;
+}
+
+VectorXd LeastSquares::Solve(const Eigen::Ref<const VectorXd>& b) const { return decomposition_.solve(b); }
+
+VectorXd LeastSquares::SolveTransposed(const Eigen::Ref<const VectorXd>& b) const {
+  return decomposition_.transpose().solve(b);
+}
+
 VectorXd SolveLeastSquares(const Eigen::Ref<const MatrixXd>& A, const Eigen::Ref<const VectorXd>& b,
                            double independent) {
-  Eigen::CompleteOrthogonalDecomposition<MatrixXd> solver;
-  if (independent > 0.0) solver.setThreshold(independent);
-  return solver.compute(A).solve(b);
+  return LeastSquares(independent).Compute(A).Solve(b);
 }
 
 MatrixXd CalcPseudoinverse(const Eigen::Ref<const MatrixXd>& A) {

@@ -1,7 +1,9 @@
 #pragma once
 
-// Decompositions for what is not done at every step of control: each is compiled once, here, for matrices of
-// any size. They allocate.
+// Decompositions that many need: each is compiled once, here. Those of matrices of any size allocate, and are
+// for what is not done at every step of control.
+
+#include <Eigen/QR>
 
 #include "controller/common/types.h"
 
@@ -18,6 +20,32 @@ SymmetricEigen DecomposeSymmetric(const Eigen::Ref<const MatrixXd>& S);
 
 /// The eigenvalues alone, ascending.
 VectorXd CalcSymmetricEigenvalues(const Eigen::Ref<const MatrixXd>& S);
+
+/// Of a symmetric matrix of six rows, and allocates nothing: eigenvalues ascending, and the eigenvectors.
+void DecomposeSymmetric(const Matrix6d& S, Vector6d* values, Matrix6d* vectors);
+
+/// K v = k Lambda v with v^T Lambda v = 1: k ascending and the v as columns, of K symmetric and Lambda
+/// symmetric and positive definite. Allocates nothing.
+void DecomposeGeneralized(const Matrix6d& K, const Matrix6d& Lambda, Vector6d* values, Matrix6d* vectors);
+
+/// A matrix of any shape and rank, decomposed for several right-hand sides.
+class LeastSquares {
+ public:
+  /// @param independent a pivot below this fraction of the largest counts as zero; 0 stands for what rounding
+  /// explains.
+  explicit LeastSquares(double independent = 0.0);
+
+  LeastSquares& Compute(const Eigen::Ref<const MatrixXd>& A);
+
+  [[nodiscard]] Eigen::Index rank() const { return decomposition_.rank(); }
+  /// The x of least norm among those that make |A x - b| least.
+  [[nodiscard]] VectorXd Solve(const Eigen::Ref<const VectorXd>& b) const;
+  /// As Solve, of A^T.
+  [[nodiscard]] VectorXd SolveTransposed(const Eigen::Ref<const VectorXd>& b) const;
+
+ private:
+  Eigen::CompleteOrthogonalDecomposition<MatrixXd> decomposition_;
+};
 
 /// The x of least norm among those that make |A x - b| least, for A of any shape and rank.
 /// @param independent a pivot below this fraction of the largest counts as zero; 0 stands for what rounding

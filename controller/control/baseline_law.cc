@@ -1,12 +1,12 @@
 #include "controller/control/baseline_law.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <cmath>
 
 #include "controller/common/block_cholesky.h"
 #include "controller/common/errors.h"
+#include "controller/common/linear_algebra.h"
 #include "controller/common/text.h"
 
 namespace dexcheck {
@@ -65,9 +65,11 @@ Matrix6d CalcDesignedDamping(const Matrix6d& Lambda, const Matrix6d& K, double z
   const Eigen::LLT<Matrix6d> llt(Lambda);
   Matrix6d scaled = llt.matrixL().solve(K);
   scaled = llt.matrixL().solve(scaled.transpose().eval()).eval();
-  const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(scaled);
-  const Matrix6d Q = llt.matrixL() * eigen.eigenvectors();
-  const Vector6d roots = eigen.eigenvalues().cwiseMax(0.0).cwiseSqrt();
+  Vector6d k;
+  Matrix6d U;
+  DecomposeSymmetric(scaled, &k, &U);
+  const Matrix6d Q = llt.matrixL() * U;
+  const Vector6d roots = k.cwiseMax(0.0).cwiseSqrt();
   return 2.0 * zeta * Q * roots.asDiagonal() * Q.transpose();
 }
 

@@ -2,8 +2,6 @@
 
 #include <cmath>
 
-#include "controller/common/linear_algebra.h"
-
 namespace dexcheck {
 namespace {
 
@@ -12,9 +10,8 @@ constexpr double kRedundant = 1e-8;
 
 }  // namespace
 
-GroundDynamics::GroundDynamics(const RobotModel& model, int feet) : factor_(model) {
+GroundDynamics::GroundDynamics(const RobotModel& model, int feet) : factor_(model), constraints_(kRedundant) {
   half_.setZero(model.num_velocities(), Eigen::Index{3} * feet);
-  solver_.setThreshold(kRedundant);
 }
 
 const Prediction& GroundDynamics::Predict(const ModelTerms& robot, const GroundContacts& ground,
@@ -26,12 +23,11 @@ const Prediction& GroundDynamics::Predict(const ModelTerms& robot, const GroundC
   factor_.SolveTransposed(y);
   half_ = ground.J().transpose();
   factor_.SolveTransposedColumns(half_);
-  solver_.compute(half_.transpose());
-  rank_ = solver_.rank();
+  constraints_.Compute(half_.transpose());
   VectorXd made = -ground.J_dot_xi();
   made.noalias() -= half_.transpose() * y;
-  const VectorXd change = solver_.solve(made);  // B^T f
-  prediction_.f_c = solver_.transpose().solve(change);
+  const VectorXd change = constraints_.Solve(made);  // B^T f
+  prediction_.f_c = constraints_.SolveTransposed(change);
   prediction_.xi_dot = y + change;
   factor_.Solve(prediction_.xi_dot);
   return prediction_;

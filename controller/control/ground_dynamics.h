@@ -2,8 +2,7 @@
 
 // Dynamics of a robot that stands on the ground, as one constrained system. n entries of xi, m feet.
 
-#include <Eigen/QR>
-
+#include "controller/common/linear_algebra.h"
 #include "controller/contact/ground_contacts.h"
 #include "controller/control/constrained_dynamics.h"
 #include "controller/dynamics/tree_factor.h"
@@ -29,15 +28,14 @@ class GroundDynamics {
   /// M_bar' = L^T L.
   [[nodiscard]] const TreeFactor& mass_factor() const { return factor_; }
   /// Whether the forces of all feet follow from the motion.
-  [[nodiscard]] bool determines_forces() const { return rank_ == half_.cols(); }
+  [[nodiscard]] bool determines_forces() const { return constraints_.rank() == half_.cols(); }
   /// |f| at most this times |a|_M of the acceleration that it makes, sqrt(kg); where forces are determined.
   [[nodiscard]] double CalcForceGain() const;
 
  private:
   TreeFactor factor_;
   RowMatrixXd half_;  // n x 3m, L^-T J^T
-  Eigen::CompleteOrthogonalDecomposition<MatrixXd> solver_;
-  Eigen::Index rank_ = 0;
+  LeastSquares constraints_;
   Prediction prediction_;
 };
 

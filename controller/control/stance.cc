@@ -1,11 +1,11 @@
 #include "controller/control/stance.h"
 
-#include <Eigen/LU>
-#include <Eigen/QR>
+#include <Eigen/Cholesky>
 #include <cmath>
 #include <utility>
 
 #include "controller/common/errors.h"
+#include "controller/common/linear_algebra.h"
 #include "controller/control/grasp_controller.h"
 #include "controller/object/so3.h"
 
@@ -16,16 +16,11 @@ constexpr int kMostIterations = 30;
 constexpr double kConverged = 1e-14;  // m
 constexpr double kDependent = 1e-9;   // of the largest pivot: rows that others have already
 
-using Solver = Eigen::CompleteOrthogonalDecomposition<MatrixXd>;
-
 Eigen::Quaterniond ReadTurn(const Eigen::Ref<const VectorXd>& q) { return {q[3], q[4], q[5], q[6]}; }
 
 /// Of the columns of the joints.
-Solver SolveForJoints(const MatrixXd& J) {
-  Solver solver;
-  solver.setThreshold(kDependent);
-  solver.compute(J.rightCols(J.cols() - 6));
-  return solver;
+LeastSquares SolveForJoints(const MatrixXd& J) {
+  return LeastSquares(kDependent).Compute(J.rightCols(J.cols() - 6));
 }
 
 /// omega = E rates along the turned axes, of R = R_z(yaw) R_y(pitch) R_x(roll), and E_dot.
@@ -67,7 +62,7 @@ void StanceForces::TakeOff(const ModelTerms& robot, Eigen::Ref<VectorXd> force) 
   // The solver leaves 1e-10 of F_b, and a law is exact to rounding.
   const Matrix6d gram = problem_.G * problem_.G.transpose();
   f_ = result.f_c;
-  f_ += problem_.G.transpose() * gram.ldlt().solve(Vector6d(problem_.F_o - problem_.G * result.f_c));
+  f_ += problem_.G.transpose() * gram.llt().solve(Vector6d(problem_.F_o - problem_.G * result.f_c));
   force.noalias() -= ground_.J().transpose() * f_;
 }
 
@@ -112,17 +107,17 @@ void StanceMotion::Evaluate(double t, DesiredJoints* desired) const {
           X.translation() - X_start.translation() - ground.radius(i) * theta.cross(Vector3d::UnitZ());
     }
     if (way.lpNorm<Eigen::Infinity>() < kConverged) break;
-    q.tail(n - 6) -= SolveForJoints(ground.J()).solve(way);
+    q.tail(n - 6) -= SolveForJoints(ground.J()).Solve(way);
   }
-  const Solver joints = SolveForJoints(ground.J());
+  const LeastSquares joints = SolveForJoints(ground.J());
   xi.head<3>() = body.q_dot.head<3>();
   xi.segment<3>(3) = R_start * (E * rates);
-  xi.tail(n - 6) = -joints.solve(ground.J().leftCols<6>() * xi.head<6>());
+  xi.tail(n - 6) = -joints.Solve(ground.J().leftCols<6>() * xi.head<6>());
   xi_dot.head<3>() = body.q_ddot.head<3>();
   xi_dot.segment<3>(3) = R_start * (E * body.q_ddot.tail<3>() + E_dot * rates);
   robot.SetState(q, xi);
   ground.SetState(robot);
-  xi_dot.tail(n - 6) = -joints.solve(ground.J().leftCols<6>() * xi_dot.head<6>() + ground.J_dot_xi());
+  xi_dot.tail(n - 6) = -joints.Solve(ground.J().leftCols<6>() * xi_dot.head<6>() + ground.J_dot_xi());
 }
 
 double PutFeetDown(const RobotModel& model, const Stance& stance, VectorXd* q) {
@@ -136,7 +131,7 @@ double PutFeetDown(const RobotModel& model, const Stance& stance, VectorXd* q) {
     if (ground.gap().lpNorm<Eigen::Infinity>() < kConverged) break;
     // Up and down alone: feet that are to lie flat turn.
     const MatrixXd J = ground.J()(Eigen::seq(2, Eigen::last, 3), Eigen::all);
-    q->tail(n - 6) -= SolveForJoints(J).solve(VectorXd(ground.gap()));
+    q->tail(n - 6) -= SolveForJoints(J).Solve(ground.gap());
   }
   return ground.gap().lpNorm<Eigen::Infinity>();
 }

@@ -1,6 +1,5 @@
 #include "controller/grasp/force_closure.h"
 
-#include <Eigen/QR>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -74,19 +73,18 @@ void RequireValid(const Eigen::Ref<const Matrix6Xd>& G, const Eigen::Ref<const V
 std::array<Vector6d, 7> FindSimplex(const WrenchSet& W) {
   std::array<Vector6d, 7> points;
   points[0] = W.FindFarthest(Vector6d::Ones());
-  Eigen::Matrix<double, 6, 6> edges = Matrix6d::Zero();
-  for (Eigen::Index k = 0; k < 6; ++k) {
-    Vector6d n = Vector6d::Unit(k);
-    if (k > 0) {
-      const Matrix6d Q = edges.leftCols(k).householderQr().householderQ();
-      n = Q.col(k);
-    }
+  Matrix6d across = Matrix6d::Identity();  // projects onto what is normal to the edges so far
+  for (std::size_t k = 1; k <= 6; ++k) {
+    Eigen::Index longest = 0;
+    across.colwise().squaredNorm().maxCoeff(&longest);
+    const Vector6d n = across.col(longest).normalized();
     const Vector6d plus = W.FindFarthest(n);
     const Vector6d minus = W.FindFarthest(-n);
     const double distance_plus = std::abs(n.dot(plus - points[0]));
     const double distance_minus = std::abs(n.dot(minus - points[0]));
-    points[static_cast<std::size_t>(k) + 1] = distance_plus >= distance_minus ? plus : minus;
-    edges.col(k) = points[static_cast<std::size_t>(k) + 1] - points[0];
+    points[k] = distance_plus >= distance_minus ? plus : minus;
+    const Vector6d outward = (across * (points[k] - points[0])).normalized();
+    across -= outward * outward.transpose();
   }
   return points;
 }

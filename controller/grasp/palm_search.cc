@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <optional>
 
 #include "controller/common/errors.h"
@@ -62,7 +63,11 @@ Pose PalmSearch::CalcPalmPose(const Vector3d& direction, double roll) const {
   SerialChain::Poses poses;
   arm_.CalcPoses(nominal_, &poses);
   const Matrix3d R_nominal = poses.frame.linear();
-  const Matrix3d turn = Eigen::Quaterniond::FromTwoVectors(R_nominal.col(2), direction).toRotationMatrix();
+  const Vector3d from = R_nominal.col(2);
+  const Vector3d about = from.cross(direction);
+  const Vector3d axis = about.isZero(0.0) ? from.unitOrthogonal() : about.normalized();
+  const Matrix3d turn =
+      Eigen::AngleAxisd(std::atan2(about.norm(), from.dot(direction)), axis).toRotationMatrix();
   Pose X_BP = Pose::Identity();
   X_BP.linear() = Eigen::AngleAxisd(roll, direction) * turn * R_nominal;
   X_BP.translation() = X_Bo_.translation() - X_BP.linear() * p_Po_;

@@ -1,10 +1,10 @@
 #include "controller/handling/pick_plan.h"
 
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 
 #include "controller/common/errors.h"
+#include "controller/common/linear_algebra.h"
 #include "controller/common/text.h"
 #include "controller/dynamics/model_terms.h"
 #include "controller/grasp/finger_placement.h"
@@ -93,8 +93,7 @@ PosturePath::PosturePath(const std::vector<VectorXd>& knots) {
     for (int power = 0; power < count; ++power) powers(i, power) = std::pow(x, power);
   }
   // knots = coefficients powers^T
-  const MatrixXd inverse = powers.inverse();
-  coefficients_ = (coefficients_ * inverse.transpose()).eval();
+  coefficients_ = (coefficients_ * CalcPseudoinverse(powers).transpose()).eval();
 }
 
 void PosturePath::Evaluate(double s, VectorXd* q, VectorXd* q_s, VectorXd* q_ss) const {

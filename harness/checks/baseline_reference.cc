@@ -1,9 +1,9 @@
 #include "harness/checks/baseline_reference.h"
 
-#include <Eigen/Eigenvalues>
 #include <cmath>
 
 #include "controller/common/errors.h"
+#include "controller/common/linear_algebra.h"
 #include "controller/object/so3.h"
 
 namespace dexcheck {
@@ -73,9 +73,11 @@ Vector6d BaselineReference::CalcWrench(const LawTerms& terms) const {
   const Vector6d stiff = turn(stiffness_.K.cwiseProduct(position_factor_)) * e_;
   if (law_ != ControlLaw::kImpedance) return stiff + turn(stiffness_.D.cwiseProduct(velocity_factor_)) * V_e_;
   // K v = k Lambda v with v^T Lambda v = 1: Q = Lambda [v1 .. v6]
-  const Eigen::GeneralizedSelfAdjointEigenSolver<Matrix6d> modes(K, Lambda_);
-  const Matrix6d Q = Lambda_ * modes.eigenvectors();
-  const Vector6d roots = modes.eigenvalues().cwiseMax(0.0).cwiseSqrt();
+  Vector6d k;
+  Matrix6d V;
+  DecomposeGeneralized(K, Lambda_, &k, &V);
+  const Matrix6d Q = Lambda_ * V;
+  const Vector6d roots = k.cwiseMax(0.0).cwiseSqrt();
   return stiff + velocity_factor_[0] * 2.0 * stiffness_.damping_ratio *
                      (Q * roots.cwiseProduct(Q.transpose() * V_e_));
 }

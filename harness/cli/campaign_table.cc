@@ -48,7 +48,7 @@ std::vector<Row> SumUp(const std::vector<CampaignFault>& faults) {
   return rows;
 }
 
-const char* NameOf(MutantOutcome outcome) {
+const char* NameOutcome(MutantOutcome outcome) {
   if (outcome == MutantOutcome::kKilled) return "found";
   if (outcome == MutantOutcome::kRefused) return "refused";
   return outcome == MutantOutcome::kNoEffect ? "no effect" : "survived";
@@ -59,7 +59,7 @@ constexpr const char* kOwnKeys[] = {"kind", "name", "outcome", "cause_right", "p
 MutantOutcome OutcomeOf(const Json& name) {
   for (const MutantOutcome outcome :
        {MutantOutcome::kKilled, MutantOutcome::kRefused, MutantOutcome::kNoEffect})
-    if (name == NameOf(outcome)) return outcome;
+    if (name == NameOutcome(outcome)) return outcome;
   return MutantOutcome::kSurvived;
 }
 
@@ -157,7 +157,7 @@ std::string Campaign::ToText() const {
   for (const CampaignFault& fault : faults) {
     Json one = {{"kind", fault.kind},
                 {"name", fault.name},
-                {"outcome", NameOf(fault.outcome)},
+                {"outcome", NameOutcome(fault.outcome)},
                 {"cause_right", fault.cause_right},
                 {"remark", fault.exception}};
     if (fault.part_named) one["part_named"] = *fault.part_named;
