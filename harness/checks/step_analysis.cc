@@ -165,10 +165,13 @@ void StepAnalyzer::FindTransient() {
   for (size_t i = 0; i < contacts.size(); ++i) {
     if (contacts[i].touching) touching |= ContactSet{1} << i;
   }
-  const bool is_supported = !now_.step->response.support_wrench.isZero(0.0);
+  const PlantResponse& response = now_.step->response;
+  const bool is_supported = !response.support_wrench.isZero(0.0);
+  // What is put down touches at one point, then at more.
   if (handling.contacts != handling_.contacts || touching != now_.touching ||
-      is_supported != now_.is_supported)
+      is_supported != now_.is_supported || response.contact_count != contact_count_)
     changed_at_ = time;
+  contact_count_ = response.contact_count;
   handling_ = handling;
   now_.touching = touching;
   now_.is_supported = is_supported;

@@ -199,6 +199,7 @@ class StepAnalyzer {
   std::map<ContactSet, std::unique_ptr<PartialDynamics>> parts_;
   PredictionCompliance compliance_;
   Handling handling_;                                             // of the step before
+  int contact_count_ = 0;                                         // likewise, of all of the engine's
   bool was_holding_ = false;                                      // likewise
   double changed_at_ = -std::numeric_limits<double>::infinity();  // the contacts, s
   double transient_since_ = 0.0;                                  // s
