@@ -29,6 +29,12 @@ bool IsPush(const Candidate& one) {
   return one.fault == "torque" || one.fault == kForce || one.fault == "moment";
 }
 
+Index CountAmplitudes(const CauseSelection& selection) {
+  Index count = 0;
+  for (const CauseTerm& term : selection.terms) count += term.amplitude.size();
+  return count;
+}
+
 }  // namespace
 
 ForceProblem::ForceProblem(const StepStore& store, StepForces* forces, const Segment& segment, double level)
@@ -57,9 +63,11 @@ void ForceProblem::Know(const Terms& known) {
 
 bool ForceProblem::ExplainConstant(const Segment& segment, Causes* causes) {
   terms_ = {};
+  is_exact_ = LeavesRounding(y_);
   if (!known_.amplitudes.empty() && CalcLeft(y_) <= 1.0) return true;
   const CauseSelection selection = Select();
   if (!IsExplained(selection.fraction, selection.left)) return false;
+  terms_.count = CountAmplitudes(selection);
   for (const CauseTerm& term : selection.terms) {
     const Candidate& one = candidates_[term.candidate];
     if (one.fault == kForceAtPoint) {
@@ -68,9 +76,7 @@ bool ForceProblem::ExplainConstant(const Segment& segment, Causes* causes) {
       terms_.amplitudes.emplace_back(term.candidate, term.amplitude);
     }
   }
-  Index amplitudes = 0;
-  for (const CauseTerm& term : selection.terms) amplitudes += term.amplitude.size();
-  if (ExplainTorque(segment, amplitudes, selection.terms.size(), causes)) return true;
+  if (ExplainTorque(segment, terms_.count, selection.terms.size(), causes)) return true;
   if (ExplainJoint(segment, selection, causes)) return true;
   Causes told = TellSelection(Start(segment), selection, candidates_,
                               [&](const Candidate& one, const VectorXd& amplitude, const VectorXd& error) {
@@ -139,11 +145,7 @@ void ForceProblem::ExplainChanging(const Segment& segment, Causes* causes) const
 
 bool ForceProblem::ExplainTorque(const Segment& segment, Index amplitudes, size_t faults,
                                  Causes* causes) const {
-  const auto cost = [&](Index parameters, size_t terms) {
-    return static_cast<double>(parameters) * std::log(static_cast<double>(forces_->rows())) +
-           2.0 * static_cast<double>(terms) * std::log(static_cast<double>(candidates_.size()));
-  };
-  if (cost(amplitudes, faults) <= cost(steps_, 1)) return false;
+  if (CalcCost(amplitudes, faults) <= CalcCost(steps_, 1)) return false;
   for (size_t i = 0; i < candidates_.size(); ++i) {
     if (candidates_[i].fault != "torque") continue;
     const Free free = FitFree(i);
@@ -156,6 +158,11 @@ bool ForceProblem::ExplainTorque(const Segment& segment, Index amplitudes, size_
     return true;
   }
   return false;
+}
+
+double ForceProblem::CalcCost(Index amplitudes, size_t faults) const {
+  return static_cast<double>(amplitudes) * std::log(static_cast<double>(forces_->rows())) +
+         2.0 * static_cast<double>(faults) * std::log(static_cast<double>(candidates_.size()));
 }
 
 ForceProblem::Free ForceProblem::FitFree(size_t index) const {
@@ -209,6 +216,8 @@ void ForceProblem::Build() {
 }
 
 void ForceProblem::AddGrowing() {
+  const auto time = store_.Get(StepStore::kTime);
+  const double slack = store_.size() > 1 ? 2.0 * (time(0, 1) - time(0, 0)) : 0.0;
   const size_t count = candidates_.size();
   for (size_t i = 0; i < count; ++i) {
     if (!IsPush(candidates_[i])) continue;
@@ -218,24 +227,20 @@ void ForceProblem::AddGrowing() {
     growing.unit += "/s";
     growing.nominal = store_.last_time();
     growing.scale = candidates_[i].scale.replicate(2, 1);
-    growing.is_possible = [this, end = growing.nominal](const VectorXd& a) {
-      return GrowsFromNothing(a, end);
+    // It began within what is kept: before the steps of this residual, and after all of it had begun.
+    growing.is_possible = [first = time(0, 0) - slack, last = time(0, used_.front()) + slack,
+                           end = growing.nominal](const VectorXd& a) {
+      const double since = CalcGrowthBegin(a, end);
+      return since >= first && since <= last;
     };
     growing.columns.conservativeResize(Eigen::NoChange, 2 * width);
     growing.columns.rightCols(width) = candidates_[i].columns;
     for (Index k = 0; k < steps_; ++k) {
-      const double since = store_.Get(StepStore::kTime)(0, used_[static_cast<size_t>(k)]) - growing.nominal;
+      const double since = time(0, used_[static_cast<size_t>(k)]) - growing.nominal;
       growing.columns.block(k * forces_->rows(), 0, forces_->rows(), width) *= since;
     }
     candidates_.push_back(std::move(growing));
   }
-}
-
-bool ForceProblem::GrowsFromNothing(const VectorXd& a, double end) const {
-  const auto time = store_.Get(StepStore::kTime);
-  const double slack = store_.size() > 1 ? 2.0 * (time(0, 1) - time(0, 0)) : 0.0;
-  const double since = CalcGrowthBegin(a, end);
-  return since >= time(0, 0) - slack && since <= time(0, used_.front()) + slack;
 }
 
 void ForceProblem::NameStuckBearings() {
@@ -277,21 +282,46 @@ double ForceProblem::CalcLeft(const VectorXd& y) const {
   return std::sqrt(square / static_cast<double>(y.size()));
 }
 
+Vector2d ForceProblem::CalcLeastLevel() const {
+  return (kExact / kAccuracy * first_level_).cwiseMax(kRounding);
+}
+
+bool ForceProblem::LeavesRounding(const VectorXd& y) const {
+  return (level_.cwiseProduct(CalcSizes(y)).array() <= CalcLeastLevel().array()).all();
+}
+
 CauseSelection ForceProblem::Select() {
-  CauseSelection best = SelectOnce();
-  is_exact_ = false;
-  const Vector2d least = (kExact / kAccuracy * first_level_).cwiseMax(kRounding);
-  for (int i = 0; i < kMostLevels && IsExplained(best.fraction, best.left); ++i) {
-    const Vector2d before = level_;
-    level_ = (kOfLeft * level_.cwiseProduct(CalcSizes(best.residual))).cwiseMax(least).cwiseMin(before);
-    is_exact_ = (level_.array() <= least.array()).all();
-    if ((level_.array() > 0.5 * before.array()).all()) break;
+  const Vector2d least = CalcLeastLevel();
+  Vector2d level = level_;  // of the best
+  const auto select = [&](const Vector2d& at) {
+    level_ = at;
     Build();
-    CauseSelection next = SelectOnce();
+    CauseSelection selection = SelectOnce();
+    is_exact_ = LeavesRounding(selection.residual);
+    return selection;
+  };
+  CauseSelection best = select(level);
+  if (best.terms.empty()) best = select(level = kFaint * level);
+  for (int i = 0; i < kMostLevels && IsExplained(best.fraction, best.left); ++i) {
+    const Vector2d lower =
+        (kOfLeft * level_.cwiseProduct(CalcSizes(best.residual))).cwiseMax(least).cwiseMin(level_);
+    if ((lower.array() > 0.5 * level_.array()).all()) break;
+    CauseSelection next = select(lower);
     if (!IsExplained(next.fraction, next.left)) break;
     best = next;
+    level = lower;
   }
-  return best;
+  if (!IsExplained(best.fraction, best.left) || is_exact_) return best;
+  // Only what was left has told how much noise there is: more faults that leave but rounding may be likelier.
+  CauseSelection exact = select(least);
+  if (is_exact_ && CalcEvidence(exact) < CalcEvidence(best)) return exact;
+  return select(level);
+}
+
+double ForceProblem::CalcEvidence(const CauseSelection& selection) const {
+  const double samples = static_cast<double>(forces_->rows());
+  return 2.0 * samples * std::log(selection.left) +
+         CalcCost(CountAmplitudes(selection), selection.terms.size());
 }
 
 bool ForceProblem::RefinePoints(const CauseSelection& selection) {

@@ -17,4 +17,8 @@ struct Visible {
 /// @param noise of the sum over all rows.
 Visible FindVisible(const Candidate& candidate, double noise);
 
+/// Standard errors of the amplitudes (p), infinite for those that the visible ones do not tell. @param
+/// covariance of these (r x r).
+VectorXd CalcErrors(const Visible& visible, const MatrixXd& covariance);
+
 }  // namespace dexcheck
