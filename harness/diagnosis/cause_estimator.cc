@@ -36,15 +36,19 @@ class Search {
   }
 
   CauseSelection Run() {
-    const double nothing = Score(y_.squaredNorm(), 0.0, 0);
-    double criterion = nothing;
-    if (const Best first = FindBest({}); !IsNoise({}) && first.criterion < nothing) criterion = Grow(first);
+    double criterion = Score(y_.squaredNorm(), 0.0, 0);
+    if (const Best first = FindBest({}); !IsNoise({}) && first.criterion < criterion) criterion = Grow(first);
     // What was the best alone need not be part of the best set. Of many candidates that takes long.
     constexpr size_t kFew = 100;
     const bool may_be_fewer = chosen_.size() > 1 && candidates_.size() < kFew;
     if (options_.restarts > 0 && !chosen_.empty() && (may_be_fewer || !IsNoise(chosen_))) {
       std::vector<size_t> best = chosen_;
-      for (const Best& first : FindFirsts(best)) {
+      std::vector<Best> firsts = Rank({});
+      std::erase_if(firsts, [&](const Best& one) {
+        return std::find(best.begin(), best.end(), one.candidate) != best.end() || !CanBe(one.candidate, {});
+      });
+      SpreadOut(1, options_.restarts, &firsts);
+      for (const Best& first : firsts) {
         const double other = Grow(first);
         if (other < criterion) best = chosen_, criterion = other;
       }
@@ -92,16 +96,6 @@ class Search {
     };
     std::stable_partition(ranked->begin(), ranked->end(), is_new);
     ranked->resize(std::min(ranked->size(), count));
-  }
-
-  /// The most likely first choices besides what was found: one at each place, and then more of them.
-  [[nodiscard]] std::vector<Best> FindFirsts(const std::vector<size_t>& found) const {
-    std::vector<Best> all = Rank({});
-    std::erase_if(all, [&](const Best& one) {
-      return std::find(found.begin(), found.end(), one.candidate) != found.end() || !CanBe(one.candidate, {});
-    });
-    SpreadOut(1, options_.restarts, &all);
-    return all;
   }
 
   [[nodiscard]] double Score(double squares, double parameters, size_t terms) const {
@@ -362,10 +356,13 @@ class Search {
       if (i == term->candidate || !std::isfinite(scores[i])) continue;
       // The criterion is twice the negative logarithm of the likelihood.
       double odds = 0.5 * (scores[i] - criterion);
-      // One with more columns has simpler ones as a special case.
+      // One with more columns has simpler ones as a special case, unless only fewer of theirs show.
       const double more = CountParameters({i}) - CountParameters({term->candidate});
+      const bool is_wider =
+          candidates_[i].columns.cols() + candidates_[i].parameters >
+          candidates_[term->candidate].columns.cols() + candidates_[term->candidate].parameters;
       if (more > 0.0 && candidates_[i].is_ordinary) odds -= 0.5 * more * std::log(samples_);
-      if (odds < kEqualLogOdds && more > 0.0 && !candidates_[i].is_ordinary) continue;
+      if (odds < kEqualLogOdds && more > 0.0 && is_wider && !candidates_[i].is_ordinary) continue;
       if ((odds >= kEqualLogOdds && odds >= best) || !CanBe(i, others)) continue;
       if (odds < kEqualLogOdds) {
         term->same.emplace_back(i, CalcAmplitude(i, others));

@@ -139,7 +139,9 @@ Causes ExplainForces(const StepStore& store) {
   }
   ForceProblem problem(store, &forces, whole);
   const bool is_explained = problem.ExplainConstant(whole, &causes);
-  if (is_explained && problem.is_exact()) return causes;
+  const bool is_exact = is_explained && problem.is_exact();
+  constexpr size_t kHeap = 3;  // so many faults may be fewer that begin one after another
+  if (is_exact && causes.size() < kHeap) return causes;
   // Where there are no more bends than jumps, these are the same; what moves by itself bends all the time.
   if (bent.size() == parts.size() || bent.size() > kMostBends) bent.clear();
   for (const std::vector<Segment>& segments : {parts, bent}) {
@@ -149,7 +151,7 @@ Causes ExplainForces(const StepStore& store) {
     const Causes found = ExplainParts(store, &forces, few, is_explained);
     const auto count = static_cast<Index>(found.size());
     if (!is_explained && problem.ExplainTorque(whole, count, found.size(), &causes)) return causes;
-    if (!found.empty()) return found;
+    if (!found.empty() && (!is_exact || found.size() < causes.size())) return found;
   }
   if (!is_explained) problem.ExplainChanging(whole, &causes);
   return causes;

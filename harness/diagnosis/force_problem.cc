@@ -29,12 +29,6 @@ bool IsPush(const Candidate& one) {
   return one.fault == "torque" || one.fault == kForce || one.fault == "moment";
 }
 
-Index CountAmplitudes(const CauseSelection& selection) {
-  Index count = 0;
-  for (const CauseTerm& term : selection.terms) count += term.amplitude.size();
-  return count;
-}
-
 }  // namespace
 
 ForceProblem::ForceProblem(const StepStore& store, StepForces* forces, const Segment& segment, double level)
@@ -48,6 +42,7 @@ ForceProblem::ForceProblem(const StepStore& store, StepForces* forces, const Seg
   level_.setConstant(level);
   Build();
   level_ = first_level_ = level * (1.0 + (kAccuracy * CalcSizes(y_)).array().square()).sqrt();
+  least_level_ = (kExact / kAccuracy * first_level_).cwiseMax(kRounding);
   Build();
 }
 
@@ -67,9 +62,9 @@ bool ForceProblem::ExplainConstant(const Segment& segment, Causes* causes) {
   if (!known_.amplitudes.empty() && CalcLeft(y_) <= 1.0) return true;
   const CauseSelection selection = Select();
   if (!IsExplained(selection.fraction, selection.left)) return false;
-  terms_.count = CountAmplitudes(selection);
   for (const CauseTerm& term : selection.terms) {
     const Candidate& one = candidates_[term.candidate];
+    terms_.count += term.amplitude.size();
     if (one.fault == kForceAtPoint) {
       terms_.points.push_back({one.place, term.amplitude, one.fitted});
     } else {
@@ -145,7 +140,11 @@ void ForceProblem::ExplainChanging(const Segment& segment, Causes* causes) const
 
 bool ForceProblem::ExplainTorque(const Segment& segment, Index amplitudes, size_t faults,
                                  Causes* causes) const {
-  if (CalcCost(amplitudes, faults) <= CalcCost(steps_, 1)) return false;
+  const auto cost = [&](Index parameters, size_t terms) {
+    return static_cast<double>(parameters) * std::log(static_cast<double>(forces_->rows())) +
+           2.0 * static_cast<double>(terms) * std::log(static_cast<double>(candidates_.size()));
+  };
+  if (cost(amplitudes, faults) <= cost(steps_, 1)) return false;
   for (size_t i = 0; i < candidates_.size(); ++i) {
     if (candidates_[i].fault != "torque") continue;
     const Free free = FitFree(i);
@@ -158,11 +157,6 @@ bool ForceProblem::ExplainTorque(const Segment& segment, Index amplitudes, size_
     return true;
   }
   return false;
-}
-
-double ForceProblem::CalcCost(Index amplitudes, size_t faults) const {
-  return static_cast<double>(amplitudes) * std::log(static_cast<double>(forces_->rows())) +
-         2.0 * static_cast<double>(faults) * std::log(static_cast<double>(candidates_.size()));
 }
 
 ForceProblem::Free ForceProblem::FitFree(size_t index) const {
@@ -282,29 +276,22 @@ double ForceProblem::CalcLeft(const VectorXd& y) const {
   return std::sqrt(square / static_cast<double>(y.size()));
 }
 
-Vector2d ForceProblem::CalcLeastLevel() const {
-  return (kExact / kAccuracy * first_level_).cwiseMax(kRounding);
-}
-
 bool ForceProblem::LeavesRounding(const VectorXd& y) const {
-  return (level_.cwiseProduct(CalcSizes(y)).array() <= CalcLeastLevel().array()).all();
+  return (level_.cwiseProduct(CalcSizes(y)).array() <= least_level_.array()).all();
 }
 
 CauseSelection ForceProblem::Select() {
-  const Vector2d least = CalcLeastLevel();
   Vector2d level = level_;  // of the best
   const auto select = [&](const Vector2d& at) {
     level_ = at;
     Build();
-    CauseSelection selection = SelectOnce();
-    is_exact_ = LeavesRounding(selection.residual);
-    return selection;
+    return SelectOnce();
   };
   CauseSelection best = select(level);
   if (best.terms.empty()) best = select(level = kFaint * level);
   for (int i = 0; i < kMostLevels && IsExplained(best.fraction, best.left); ++i) {
     const Vector2d lower =
-        (kOfLeft * level_.cwiseProduct(CalcSizes(best.residual))).cwiseMax(least).cwiseMin(level_);
+        (kOfLeft * level_.cwiseProduct(CalcSizes(best.residual))).cwiseMax(least_level_).cwiseMin(level_);
     if ((lower.array() > 0.5 * level_.array()).all()) break;
     CauseSelection next = select(lower);
     if (!IsExplained(next.fraction, next.left)) break;
@@ -312,16 +299,9 @@ CauseSelection ForceProblem::Select() {
     level = lower;
   }
   if (!IsExplained(best.fraction, best.left) || is_exact_) return best;
-  // Only what was left has told how much noise there is: more faults that leave but rounding may be likelier.
-  CauseSelection exact = select(least);
-  if (is_exact_ && CalcEvidence(exact) < CalcEvidence(best)) return exact;
+  // Only what was left has told how much noise there is: more faults that leave but rounding are likelier.
+  if (CauseSelection exact = select(least_level_); is_exact_) return exact;
   return select(level);
-}
-
-double ForceProblem::CalcEvidence(const CauseSelection& selection) const {
-  const double samples = static_cast<double>(forces_->rows());
-  return 2.0 * samples * std::log(selection.left) +
-         CalcCost(CountAmplitudes(selection), selection.terms.size());
 }
 
 bool ForceProblem::RefinePoints(const CauseSelection& selection) {
@@ -362,6 +342,7 @@ CauseSelection ForceProblem::SelectOnce() {
     break;
   }
   selection.left = CalcLeft(selection.residual);
+  is_exact_ = LeavesRounding(selection.residual);
   return selection;
 }
 

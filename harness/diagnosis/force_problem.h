@@ -70,15 +70,9 @@ class ForceProblem {
   void NameStuckBearings();
   /// Root mean square of the robot's and the object's rows, without what the platform may leave.
   [[nodiscard]] Vector2d CalcSizes(const VectorXd& y) const;
-  /// Rounding, and what columns are known to, in bounds of the checks.
-  [[nodiscard]] Vector2d CalcLeastLevel() const;
   [[nodiscard]] bool LeavesRounding(const VectorXd& y) const;
   /// In units of the noise that there was at first.
   [[nodiscard]] double CalcLeft(const VectorXd& y) const;
-  /// What the extended Bayesian information criterion charges for so many.
-  [[nodiscard]] double CalcCost(Eigen::Index amplitudes, size_t faults) const;
-  /// Twice the negative log likelihood where the noise is not known, and that charge.
-  [[nodiscard]] double CalcEvidence(const CauseSelection& selection) const;
   /// Bounds of checks hold for all robots; what an explanation leaves is how much noise there is in this one.
   [[nodiscard]] CauseSelection Select();
   /// Beside other faults a force acts elsewhere than by itself.
@@ -94,9 +88,9 @@ class ForceProblem {
   std::vector<Eigen::Index> used_;  // steps of the store
   Eigen::Index steps_ = 0;
   Terms known_, terms_;
-  Vector2d first_level_, level_;  // StepForces::SetLevel
-  std::vector<MatrixXd> uneven_;  // of each step
-  std::vector<Turns> turns_;      // likewise
+  Vector2d first_level_, level_, least_level_;  // StepForces::SetLevel
+  std::vector<MatrixXd> uneven_;                // of each step
+  std::vector<Turns> turns_;                    // likewise
 };
 
 }  // namespace dexcheck

@@ -7,6 +7,9 @@
 
 namespace dexcheck {
 
+// A column of which less is left beside others, relative, says nothing of its own.
+constexpr double kIndependent = 1e-7;
+
 Visible FindVisible(const Candidate& candidate, double noise) {
   const MatrixXd& C = candidate.columns;
   const VectorXd scale = candidate.scale.size() > 0 ? candidate.scale : VectorXd(VectorXd::Ones(C.cols()));

@@ -4,9 +4,6 @@
 
 namespace dexcheck {
 
-/// A column of which less is left beside others, relative, says nothing of its own.
-inline constexpr double kIndependent = 1e-7;
-
 /// What of a candidate shows above the noise: amplitudes are basis * a.
 struct Visible {
   MatrixXd columns;  // N x r
