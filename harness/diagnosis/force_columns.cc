@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 #include <tuple>
 
@@ -174,10 +175,13 @@ void StepForces::AddJoints(std::vector<Candidate>* candidates) {
     spring << -at * f, f;
     Candidate& candidate = Next(candidates, "spring", place, slides ? "N/m" : "N m/rad", 0.0, Weights(2));
     candidate.is_ordinary = true;
-    // Where the joint hardly moves, only the torque there shows: that any stiffness makes.
-    candidate.is_possible = [at](const VectorXd& a) {
-      const bool is_still = std::abs(a[0] + at * a[1]) <= kStill * a.norm();
-      return is_still || (a[0] > 0.0 && std::abs(a[1]) <= kFarthest * a[0]);
+    if (candidate.fitted.size() == 0) candidate.fitted = Vector2d(at, at);
+    candidate.fitted = Vector2d(std::min(at, candidate.fitted[0]), std::max(at, candidate.fitted[1]));
+    // Where the joint hardly moves, only the torque there may show: that any stiffness makes.
+    const bool is_still = candidate.fitted[1] - candidate.fitted[0] <= kStill;
+    candidate.is_possible = [at, is_still](const VectorXd& a) {
+      const bool is_hidden = is_still && std::abs(a[0] + at * a[1]) <= kStill * a.norm();
+      return is_hidden || (a[0] > 0.0 && std::abs(a[1]) <= kFarthest * a[0]);
     };
     AddRobot(&candidate, spring);
   }

@@ -287,7 +287,7 @@ CauseSelection ForceProblem::Select() {
     Build();
     return SelectOnce();
   };
-  CauseSelection best = select(level);
+  CauseSelection best = SelectOnce();
   if (best.terms.empty()) best = select(level = kFaint * level);
   for (int i = 0; i < kMostLevels && IsExplained(best.fraction, best.left); ++i) {
     const Vector2d lower =
