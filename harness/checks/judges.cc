@@ -98,8 +98,13 @@ std::string DescribeJoint(const StepAnalysis& step, int part) {
 }
 
 std::string DescribeCollision(const StepAnalysis& step, int /*part*/) {
+  const mjModel& m = step.setup->engine();
+  const auto name_of = [&](int geom) {
+    const int body = m.geom_bodyid[geom];
+    return body > 0 ? NameOf(m, mjOBJ_BODY, body) : NameOf(m, mjOBJ_GEOM, geom);
+  };
   const Collision& collision = step.step->response.collision;
-  return step.clearance->DescribeGeoms(collision.geom1, collision.geom2);
+  return name_of(collision.geom1) + " and " + name_of(collision.geom2);
 }
 
 std::unique_ptr<StatefulJudge> MakeIdleJointsJudge(const Setup& setup) {

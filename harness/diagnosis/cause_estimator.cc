@@ -29,30 +29,26 @@ class Search {
         samples_(rows_ / options.alike) {
     for (const Candidate& one : candidates)
       visible_.push_back(FindVisible(one, std::sqrt(options.floor * options.alike)));
-    Index width = 0;
-    for (const Visible& one : visible_) width += one.columns.cols();
-    all_.resize(y.size(), width);
-    sizes_.resize(width);
-    width = 0;
-    for (const Visible& one : visible_) {
-      all_.middleCols(width, one.columns.cols()) = one.columns;
-      width += one.columns.cols();
-    }
+    std::vector<size_t> every(candidates.size());
+    std::iota(every.begin(), every.end(), size_t{0});
+    all_ = Collect(every);
     sizes_ = all_.colwise().norm();
   }
 
   CauseSelection Run() {
-    const double nothing = Score(y_.squaredNorm(), 0.0, 0);
-    std::vector<Best> firsts = {FindBest({})};
-    double criterion = nothing;
-    if (!IsNoise({}) && firsts.front().criterion < nothing) criterion = Grow(firsts.front());
-    // What was the best alone need not be part of the best set.
-    // Of many candidates that takes long.
+    double criterion = Score(y_.squaredNorm(), 0.0, 0);
+    if (const Best first = FindBest({}); !IsNoise({}) && first.criterion < criterion) criterion = Grow(first);
+    // What was the best alone need not be part of the best set. Of many candidates that takes long.
     constexpr size_t kFew = 100;
     const bool may_be_fewer = chosen_.size() > 1 && candidates_.size() < kFew;
     if (options_.restarts > 0 && !chosen_.empty() && (may_be_fewer || !IsNoise(chosen_))) {
       std::vector<size_t> best = chosen_;
-      for (const Best& first : FindFirsts(best)) {
+      std::vector<Best> firsts = Rank({});
+      std::erase_if(firsts, [&](const Best& one) {
+        return std::find(best.begin(), best.end(), one.candidate) != best.end() || !CanBe(one.candidate, {});
+      });
+      SpreadOut(1, options_.restarts, &firsts);
+      for (const Best& first : firsts) {
         const double other = Grow(first);
         if (other < criterion) best = chosen_, criterion = other;
       }
@@ -81,26 +77,25 @@ class Search {
     return criterion;
   }
 
-  /// The most likely first choices besides what was found: one at each place, and then more of them.
-  [[nodiscard]] std::vector<Best> FindFirsts(const std::vector<size_t>& found) const {
-    const std::vector<double> scores = ScoreAll({});
+  /// All that add something to those, the most likely first.
+  [[nodiscard]] std::vector<Best> Rank(const std::vector<size_t>& beside) const {
+    const std::vector<double> scores = ScoreAll(beside);
     std::vector<Best> all;
     for (size_t i = 0; i < scores.size(); ++i)
-      if (std::isfinite(scores[i]) && std::find(found.begin(), found.end(), i) == found.end())
-        all.push_back({i, scores[i]});
+      if (std::isfinite(scores[i])) all.push_back({i, scores[i]});
     std::sort(all.begin(), all.end(), [](const Best& a, const Best& b) { return a.criterion < b.criterion; });
+    return all;
+  }
+
+  /// Puts those first of which so many before them are of their place, and keeps `count`.
+  void SpreadOut(std::ptrdiff_t most, size_t count, std::vector<Best>* ranked) const {
     std::vector<std::string> places;
     const auto is_new = [&](const Best& one) {
-      const std::string& place = candidates_[one.candidate].place;
-      if (std::find(places.begin(), places.end(), place) != places.end()) return false;
-      places.push_back(place);
-      return true;
+      places.push_back(candidates_[one.candidate].place);
+      return std::count(places.begin(), places.end(), places.back()) <= most;
     };
-    const auto is_impossible = [&](const Best& one) { return !CanBe(one.candidate, {}); };
-    all.erase(std::remove_if(all.begin(), all.end(), is_impossible), all.end());
-    std::stable_partition(all.begin(), all.end(), is_new);
-    all.resize(std::min(all.size(), options_.restarts));
-    return all;
+    std::stable_partition(ranked->begin(), ranked->end(), is_new);
+    ranked->resize(std::min(ranked->size(), count));
   }
 
   [[nodiscard]] double Score(double squares, double parameters, size_t terms) const {
@@ -108,10 +103,12 @@ class Search {
            2.0 * static_cast<double>(terms) * std::log(static_cast<double>(candidates_.size()));
   }
 
+  /// What columns leave of y. @param Q of their range.
+  [[nodiscard]] VectorXd CalcResidual(const MatrixXd& Q) const { return y_ - Q * (Q.transpose() * y_); }
+
   /// Whether what these leave over is no more than noise.
   [[nodiscard]] bool IsNoise(const std::vector<size_t>& set) const {
-    const MatrixXd Q = CalcRange(set);
-    return (y_ - Q * (Q.transpose() * y_)).squaredNorm() <= options_.floor * rows_;
+    return CalcResidual(CalcRange(set)).squaredNorm() <= options_.floor * rows_;
   }
 
   [[nodiscard]] double CountParameters(const std::vector<size_t>& set) const {
@@ -147,7 +144,7 @@ class Search {
   /// The criterion of `beside` and each candidate; infinite where it adds nothing.
   [[nodiscard]] std::vector<double> ScoreAll(const std::vector<size_t>& beside) const {
     const MatrixXd Q = CalcRange(beside);
-    const VectorXd r = y_ - Q * (Q.transpose() * y_);
+    const VectorXd r = CalcResidual(Q);
     MatrixXd own = all_;
     own.noalias() -= Q * (Q.transpose() * all_);
     const double parameters = CountParameters(beside);
@@ -184,7 +181,7 @@ class Search {
     const Visible& one = visible_[candidate];
     const MatrixXd Q = CalcRange(beside);
     const MatrixXd own = one.columns - Q * (Q.transpose() * one.columns);
-    return one.basis * SolveLeastSquares(own, y_ - Q * (Q.transpose() * y_), options_.independent);
+    return one.basis * SolveLeastSquares(own, CalcResidual(Q), options_.independent);
   }
 
   /// Whether it and those can be, all at once; of those, the ones that add nothing to it are no longer
@@ -251,14 +248,10 @@ class Search {
   }
 
   [[nodiscard]] Best FindBest(const std::vector<size_t>& beside) const {
-    std::vector<double> scores = ScoreAll(beside);
-    for (;;) {
-      const auto best = std::min_element(scores.begin(), scores.end());
-      if (best == scores.end() || !std::isfinite(*best)) return {};
-      const auto candidate = static_cast<size_t>(best - scores.begin());
-      if (CanBe(candidate, beside)) return {candidate, *best};
-      *best = kInfinity;
-    }
+    const std::vector<Best> all = Rank(beside);
+    const auto best =
+        std::find_if(all.begin(), all.end(), [&](const Best& one) { return CanBe(one.candidate, beside); });
+    return best == all.end() ? Best{} : *best;
   }
 
   [[nodiscard]] std::vector<size_t> Without(size_t place) const {
@@ -275,22 +268,17 @@ class Search {
       improved = false;
       for (size_t place = 0; place < chosen_.size() && chosen_.size() > 1; ++place) {
         const std::vector<size_t> others = Without(place);
-        const MatrixXd Q = CalcRange(others);
         const double alone =
-            Score((y_ - Q * (Q.transpose() * y_)).squaredNorm(), CountParameters(others), others.size());
+            Score(CalcResidual(CalcRange(others)).squaredNorm(), CountParameters(others), others.size());
         const Best best = FindBest(others);
         const bool is_noise = IsNoise(chosen_);
         if (IsNoise(others) || (!is_noise && alone <= criterion && alone <= best.criterion)) {
-          chosen_ = others;
-          criterion = alone;
-          improved = true;
+          chosen_ = others, criterion = alone, improved = true;
         } else if (best.criterion < criterion - kEqualLogOdds * 1e-3 && best.candidate != chosen_[place]) {
           std::vector<size_t> exchanged = chosen_;
           exchanged[place] = best.candidate;
           if (is_noise && !IsNoise(exchanged)) continue;
-          chosen_ = exchanged;
-          criterion = best.criterion;
-          improved = true;
+          chosen_ = exchanged, criterion = best.criterion, improved = true;
         }
       }
     }
@@ -304,9 +292,11 @@ class Search {
       for (size_t k = i + 1; k < chosen_.size(); ++k) {
         std::vector<size_t> others = Without(k);
         others.erase(others.begin() + static_cast<std::ptrdiff_t>(i));
-        for (const size_t first : FindLikeliest(others, kLikeliest)) {
+        std::vector<Best> firsts = Rank(others);
+        SpreadOut(2, kLikeliest, &firsts);
+        for (const Best& first : firsts) {
           std::vector<size_t> set = others;
-          set.push_back(first);
+          set.push_back(first.candidate);
           const Best second = FindBest(set);
           if (!(second.criterion < criterion - kEqualLogOdds * 1e-3)) continue;
           set.push_back(second.candidate);
@@ -319,21 +309,6 @@ class Search {
     return criterion;
   }
 
-  /// The best to add, two of each place at the most.
-  [[nodiscard]] std::vector<size_t> FindLikeliest(const std::vector<size_t>& beside, size_t count) const {
-    const std::vector<double> scores = ScoreAll(beside);
-    std::vector<size_t> order(scores.size());
-    std::iota(order.begin(), order.end(), size_t{0});
-    std::sort(order.begin(), order.end(), [&](size_t a, size_t b) { return scores[a] < scores[b]; });
-    std::vector<size_t> likeliest;
-    for (const size_t i : order) {
-      if (!std::isfinite(scores[i]) || likeliest.size() == count) break;
-      const auto is_there = [&](size_t other) { return candidates_[other].place == candidates_[i].place; };
-      if (std::count_if(likeliest.begin(), likeliest.end(), is_there) < 2) likeliest.push_back(i);
-    }
-    return likeliest;
-  }
-
   CauseSelection Finish(double criterion) {
     CauseSelection result;
     result.criterion = criterion;
@@ -341,12 +316,11 @@ class Search {
     const double all = y_.squaredNorm();
     if (!chosen_.empty()) {
       const MatrixXd C = Collect(chosen_);
-      const Index width = C.cols();
       const VectorXd size = C.colwise().norm().cwiseMax(std::numeric_limits<double>::min());
       const MatrixXd scaled = C * size.cwiseInverse().asDiagonal();
       const VectorXd a = Solve(C, y_);
       result.residual = y_ - C * a;
-      const double freedom = std::max(1.0, rows_ - static_cast<double>(width));
+      const double freedom = std::max(1.0, rows_ - static_cast<double>(C.cols()));
       const double variance =
           std::max(options_.floor, result.residual.squaredNorm() / freedom) * options_.alike;
       const MatrixXd covariance = size.cwiseInverse().asDiagonal() *
@@ -372,36 +346,23 @@ class Search {
     return result;
   }
 
-  /// Of the amplitudes, infinite for those that the visible ones do not tell.
-  static VectorXd CalcErrors(const Visible& visible, const MatrixXd& covariance) {
-    const MatrixXd& B = visible.basis;
-    VectorXd error = (B * covariance * B.transpose()).diagonal().cwiseMax(0.0).cwiseSqrt();
-    if (B.rows() == B.cols()) return error;
-    // The fraction of each amplitude, squared, that is a combination of those.
-    const VectorXd unit = visible.unit.cwiseMax(std::numeric_limits<double>::min());
-    const VectorXd known = (unit.cwiseInverse().asDiagonal() * B).rowwise().squaredNorm();
-    constexpr double kKnown = 0.99;
-    for (Index i = 0; i < B.rows(); ++i)
-      if (known[i] < kKnown) error[i] = kInfinity;
-    return error;
-  }
-
   /// What would do in its place.
   void Compare(size_t place, double criterion, double all, CauseTerm* term) const {
     const std::vector<size_t> others = Without(place);
-    const MatrixXd Q = CalcRange(others);
-    const VectorXd r = y_ - Q * (Q.transpose() * y_);
-    term->fraction = all > 0.0 ? r.squaredNorm() / all : 0.0;
+    term->fraction = all > 0.0 ? CalcResidual(CalcRange(others)).squaredNorm() / all : 0.0;
     const std::vector<double> scores = ScoreAll(others);
     double best = kInfinity;
     for (size_t i = 0; i < scores.size(); ++i) {
       if (i == term->candidate || !std::isfinite(scores[i])) continue;
       // The criterion is twice the negative logarithm of the likelihood.
       double odds = 0.5 * (scores[i] - criterion);
-      // One with more columns has simpler ones as a special case.
+      // One with more columns has simpler ones as a special case, unless only fewer of theirs show.
       const double more = CountParameters({i}) - CountParameters({term->candidate});
+      const bool is_wider =
+          candidates_[i].columns.cols() + candidates_[i].parameters >
+          candidates_[term->candidate].columns.cols() + candidates_[term->candidate].parameters;
       if (more > 0.0 && candidates_[i].is_ordinary) odds -= 0.5 * more * std::log(samples_);
-      if (odds < kEqualLogOdds && more > 0.0 && !candidates_[i].is_ordinary) continue;
+      if (odds < kEqualLogOdds && more > 0.0 && is_wider && !candidates_[i].is_ordinary) continue;
       if ((odds >= kEqualLogOdds && odds >= best) || !CanBe(i, others)) continue;
       if (odds < kEqualLogOdds) {
         term->same.emplace_back(i, CalcAmplitude(i, others));

@@ -11,7 +11,6 @@ namespace {
 
 using Eigen::Index;
 
-constexpr double kFaint = 0.01;  // noise where the checks of the balances hold, in their bounds
 constexpr size_t kMostSegments = 8, kMostBends = 4;
 
 bool IsSame(const Explanation& a, const Explanation& b) {
@@ -25,15 +24,9 @@ bool IsSame(const Explanation& a, const Explanation& b) {
 
 /// A part of the steps and what explains it.
 struct Part {
-  bool is_explained = false;
+  bool is_explained = false, is_exact = false;
   ForceProblem::Terms terms;
   Causes causes;
-
-  [[nodiscard]] Index CountAmplitudes() const {
-    Index count = 3 * static_cast<Index>(terms.points.size());
-    for (const auto& [candidate, amplitude] : terms.amplitudes) count += amplitude.size();
-    return count;
-  }
 };
 
 Part ExplainPart(const StepStore& store, StepForces* forces, const Segment& segment, const Part* known) {
@@ -41,6 +34,7 @@ Part ExplainPart(const StepStore& store, StepForces* forces, const Segment& segm
   ForceProblem problem(store, forces, segment);
   if (known != nullptr) problem.Know(known->terms);
   part.is_explained = problem.ExplainConstant(segment, &part.causes);
+  part.is_exact = problem.is_exact();
   part.terms = problem.terms();
   if (known == nullptr) return part;
   for (Explanation one : known->causes) {
@@ -93,13 +87,16 @@ std::vector<Segment> JoinAcrossGaps(const StepStore& store, StepForces* forces,
   return joined;
 }
 
-/// Each part by itself, and with what the simplest of them shows; none where a part is not explained.
-Causes ExplainParts(const StepStore& store, StepForces* forces, const std::vector<Segment>& segments) {
+/// Each part by itself, and with what the simplest of them shows; none where a part is not explained, or,
+/// where `exactly`, leaves more than rounding.
+Causes ExplainParts(const StepStore& store, StepForces* forces, const std::vector<Segment>& segments,
+                    bool exactly) {
   std::vector<Part> parts;
   for (const Segment& one : segments) parts.push_back(ExplainPart(store, forces, one, nullptr));
   const auto is_simpler = [](const Part& a, const Part& b) {
     if (a.is_explained != b.is_explained) return a.is_explained;
-    return a.CountAmplitudes() < b.CountAmplitudes();
+    if (a.is_exact != b.is_exact) return a.is_exact;
+    return a.terms.count < b.terms.count;
   };
   const Part simplest = *std::min_element(parts.begin(), parts.end(), is_simpler);
   Causes causes;
@@ -108,7 +105,7 @@ Causes ExplainParts(const StepStore& store, StepForces* forces, const std::vecto
       const Part beside = ExplainPart(store, forces, segments[i], &simplest);
       if (is_simpler(beside, parts[i])) parts[i] = beside;
     }
-    if (!parts[i].is_explained) return {};
+    if (!parts[i].is_explained || (exactly && !parts[i].is_exact)) return {};
     for (const Explanation& one : parts[i].causes) {
       const auto same = std::find_if(causes.begin(), causes.end(),
                                      [&](const Explanation& other) { return IsSame(one, other); });
@@ -141,19 +138,22 @@ Causes ExplainForces(const StepStore& store) {
     return causes;
   }
   ForceProblem problem(store, &forces, whole);
-  if (problem.ExplainConstant(whole, &causes)) return causes;
+  const bool is_explained = problem.ExplainConstant(whole, &causes);
+  const bool is_exact = is_explained && problem.is_exact();
+  constexpr size_t kHeap = 3;  // so many faults may be fewer that begin one after another
+  if (is_exact && causes.size() < kHeap) return causes;
   // Where there are no more bends than jumps, these are the same; what moves by itself bends all the time.
   if (bent.size() == parts.size() || bent.size() > kMostBends) bent.clear();
   for (const std::vector<Segment>& segments : {parts, bent}) {
     const bool are_many = segments.size() > kMostSegments;
     const std::vector<Segment> few = are_many ? JoinAcrossGaps(store, &forces, segments) : segments;
     if (few.size() < 2 || few.size() > kMostSegments) continue;
-    const Causes found = ExplainParts(store, &forces, few);
+    const Causes found = ExplainParts(store, &forces, few, is_explained);
     const auto count = static_cast<Index>(found.size());
-    if (problem.ExplainTorque(whole, count, found.size(), &causes)) return causes;
-    if (!found.empty()) return found;
+    if (!is_explained && problem.ExplainTorque(whole, count, found.size(), &causes)) return causes;
+    if (!found.empty() && (!is_exact || found.size() < causes.size())) return found;
   }
-  problem.ExplainChanging(whole, &causes);
+  if (!is_explained) problem.ExplainChanging(whole, &causes);
   return causes;
 }
 

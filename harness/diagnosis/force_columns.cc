@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 #include <tuple>
 
@@ -12,6 +13,7 @@ using Eigen::Index;
 using namespace force_fault;
 
 constexpr double kFarthest = 10.0;  // rad or m: where springs relax
+constexpr double kStill = 1e-3;     // rad or m
 
 /// I a by the six entries Ixx, Iyy, Izz, Ixy, Ixz, Iyz of I.
 Eigen::Matrix<double, 3, 6> InertiaTimes(const Vector3d& a) {
@@ -161,6 +163,7 @@ void StepForces::AddJoints(std::vector<Candidate>* candidates) {
       Candidate& bearing = Next(candidates, kBearing, place, force, 0.0, VectorXd::Ones(1));
       bearing.nominal = std::max(bearing.nominal, std::abs(known));
       bearing.fitted = VectorXd::Constant(1, joint->dry_friction);
+      bearing.parameters = -1;  // its size is known
       AddRobot(&bearing, VectorXd(known * f));
     }
     AddRobot(&Next(candidates, "dry friction", place, force, joint == nullptr ? 0.0 : joint->dry_friction,
@@ -168,11 +171,17 @@ void StepForces::AddJoints(std::vector<Candidate>* candidates) {
              VectorXd(-sign * f));
     if (joint == nullptr || joint->type == JointType::kBall) continue;
     MatrixXd spring(n_, 2);
-    spring << -q[model_.position_index(model_.joint_of_dof(dof))] * f, f;
+    const double at = q[model_.position_index(model_.joint_of_dof(dof))];
+    spring << -at * f, f;
     Candidate& candidate = Next(candidates, "spring", place, slides ? "N/m" : "N m/rad", 0.0, Weights(2));
     candidate.is_ordinary = true;
-    candidate.is_possible = [](const VectorXd& a) {
-      return a[0] > 0.0 && std::abs(a[1]) <= kFarthest * a[0];
+    if (candidate.fitted.size() == 0) candidate.fitted = Vector2d(at, at);
+    candidate.fitted = Vector2d(std::min(at, candidate.fitted[0]), std::max(at, candidate.fitted[1]));
+    // Where the joint hardly moves, only the torque there may show: that any stiffness makes.
+    const bool is_still = candidate.fitted[1] - candidate.fitted[0] <= kStill;
+    candidate.is_possible = [at, is_still](const VectorXd& a) {
+      const bool is_hidden = is_still && std::abs(a[0] + at * a[1]) <= kStill * a.norm();
+      return is_hidden || (a[0] > 0.0 && std::abs(a[1]) <= kFarthest * a[0]);
     };
     AddRobot(&candidate, spring);
   }

@@ -42,6 +42,7 @@ ForceProblem::ForceProblem(const StepStore& store, StepForces* forces, const Seg
   level_.setConstant(level);
   Build();
   level_ = first_level_ = level * (1.0 + (kAccuracy * CalcSizes(y_)).array().square()).sqrt();
+  least_level_ = (kExact / kAccuracy * first_level_).cwiseMax(kRounding);
   Build();
 }
 
@@ -57,20 +58,20 @@ void ForceProblem::Know(const Terms& known) {
 
 bool ForceProblem::ExplainConstant(const Segment& segment, Causes* causes) {
   terms_ = {};
+  is_exact_ = LeavesRounding(y_);
   if (!known_.amplitudes.empty() && CalcLeft(y_) <= 1.0) return true;
   const CauseSelection selection = Select();
   if (!IsExplained(selection.fraction, selection.left)) return false;
   for (const CauseTerm& term : selection.terms) {
     const Candidate& one = candidates_[term.candidate];
+    terms_.count += term.amplitude.size();
     if (one.fault == kForceAtPoint) {
       terms_.points.push_back({one.place, term.amplitude, one.fitted});
     } else {
       terms_.amplitudes.emplace_back(term.candidate, term.amplitude);
     }
   }
-  Index amplitudes = 0;
-  for (const CauseTerm& term : selection.terms) amplitudes += term.amplitude.size();
-  if (ExplainTorque(segment, amplitudes, selection.terms.size(), causes)) return true;
+  if (ExplainTorque(segment, terms_.count, selection.terms.size(), causes)) return true;
   if (ExplainJoint(segment, selection, causes)) return true;
   Causes told = TellSelection(Start(segment), selection, candidates_,
                               [&](const Candidate& one, const VectorXd& amplitude, const VectorXd& error) {
@@ -209,6 +210,8 @@ void ForceProblem::Build() {
 }
 
 void ForceProblem::AddGrowing() {
+  const auto time = store_.Get(StepStore::kTime);
+  const double slack = store_.size() > 1 ? 2.0 * (time(0, 1) - time(0, 0)) : 0.0;
   const size_t count = candidates_.size();
   for (size_t i = 0; i < count; ++i) {
     if (!IsPush(candidates_[i])) continue;
@@ -218,24 +221,20 @@ void ForceProblem::AddGrowing() {
     growing.unit += "/s";
     growing.nominal = store_.last_time();
     growing.scale = candidates_[i].scale.replicate(2, 1);
-    growing.is_possible = [this, end = growing.nominal](const VectorXd& a) {
-      return GrowsFromNothing(a, end);
+    // It began within what is kept: before the steps of this residual, and after all of it had begun.
+    growing.is_possible = [first = time(0, 0) - slack, last = time(0, used_.front()) + slack,
+                           end = growing.nominal](const VectorXd& a) {
+      const double since = CalcGrowthBegin(a, end);
+      return since >= first && since <= last;
     };
     growing.columns.conservativeResize(Eigen::NoChange, 2 * width);
     growing.columns.rightCols(width) = candidates_[i].columns;
     for (Index k = 0; k < steps_; ++k) {
-      const double since = store_.Get(StepStore::kTime)(0, used_[static_cast<size_t>(k)]) - growing.nominal;
+      const double since = time(0, used_[static_cast<size_t>(k)]) - growing.nominal;
       growing.columns.block(k * forces_->rows(), 0, forces_->rows(), width) *= since;
     }
     candidates_.push_back(std::move(growing));
   }
-}
-
-bool ForceProblem::GrowsFromNothing(const VectorXd& a, double end) const {
-  const auto time = store_.Get(StepStore::kTime);
-  const double slack = store_.size() > 1 ? 2.0 * (time(0, 1) - time(0, 0)) : 0.0;
-  const double since = CalcGrowthBegin(a, end);
-  return since >= time(0, 0) - slack && since <= time(0, used_.front()) + slack;
 }
 
 void ForceProblem::NameStuckBearings() {
@@ -277,21 +276,32 @@ double ForceProblem::CalcLeft(const VectorXd& y) const {
   return std::sqrt(square / static_cast<double>(y.size()));
 }
 
+bool ForceProblem::LeavesRounding(const VectorXd& y) const {
+  return (level_.cwiseProduct(CalcSizes(y)).array() <= least_level_.array()).all();
+}
+
 CauseSelection ForceProblem::Select() {
-  CauseSelection best = SelectOnce();
-  is_exact_ = false;
-  const Vector2d least = (kExact / kAccuracy * first_level_).cwiseMax(kRounding);
-  for (int i = 0; i < kMostLevels && IsExplained(best.fraction, best.left); ++i) {
-    const Vector2d before = level_;
-    level_ = (kOfLeft * level_.cwiseProduct(CalcSizes(best.residual))).cwiseMax(least).cwiseMin(before);
-    is_exact_ = (level_.array() <= least.array()).all();
-    if ((level_.array() > 0.5 * before.array()).all()) break;
+  Vector2d level = level_;  // of the best
+  const auto select = [&](const Vector2d& at) {
+    level_ = at;
     Build();
-    CauseSelection next = SelectOnce();
+    return SelectOnce();
+  };
+  CauseSelection best = SelectOnce();
+  if (best.terms.empty()) best = select(level = kFaint * level);
+  for (int i = 0; i < kMostLevels && IsExplained(best.fraction, best.left); ++i) {
+    const Vector2d lower =
+        (kOfLeft * level_.cwiseProduct(CalcSizes(best.residual))).cwiseMax(least_level_).cwiseMin(level_);
+    if ((lower.array() > 0.5 * level_.array()).all()) break;
+    CauseSelection next = select(lower);
     if (!IsExplained(next.fraction, next.left)) break;
     best = next;
+    level = lower;
   }
-  return best;
+  if (!IsExplained(best.fraction, best.left) || is_exact_) return best;
+  // Only what was left has told how much noise there is: more faults that leave but rounding are likelier.
+  if (CauseSelection exact = select(least_level_); is_exact_) return exact;
+  return select(level);
 }
 
 bool ForceProblem::RefinePoints(const CauseSelection& selection) {
@@ -332,6 +342,7 @@ CauseSelection ForceProblem::SelectOnce() {
     break;
   }
   selection.left = CalcLeft(selection.residual);
+  is_exact_ = LeavesRounding(selection.residual);
   return selection;
 }
 

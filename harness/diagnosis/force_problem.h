@@ -13,12 +13,17 @@
 
 namespace dexcheck {
 
+/// Noise where the checks of the balances hold, in their bounds.
+inline constexpr double kFaint = 0.01;
+
 /// One residual and what explains it.
 class ForceProblem {
  public:
   /// @param level of the noise, in bounds of the checks.
   ForceProblem(const StepStore& store, StepForces* forces, const Segment& segment, double level = 1.0);
 
+  /// Whether the last explanation leaves no more than rounding.
+  [[nodiscard]] bool is_exact() const { return is_exact_; }
   /// Whether what is left is noise, or next to nothing beside what there was.
   [[nodiscard]] bool IsExplained(double fraction, double left) const;
 
@@ -26,6 +31,7 @@ class ForceProblem {
   struct Terms {
     std::vector<std::pair<size_t, VectorXd>> amplitudes;
     std::vector<ForceAtPoint> points;
+    Eigen::Index count = 0;  ///< Of amplitudes.
   };
   [[nodiscard]] const Terms& terms() const { return terms_; }
   /// Faults that are there, as other steps have shown.
@@ -60,13 +66,11 @@ class ForceProblem {
   void Build();
   /// Of each push another one that grows evenly: by so much a second, and what it is when the run ends.
   void AddGrowing();
-  /// Whether it began within what is kept: before the steps of this residual, and after all of it had begun.
-  /// @param a growth a second, and size at time `end`.
-  [[nodiscard]] bool GrowsFromNothing(const VectorXd& a, double end) const;
   /// A joint that does not slide shows how much friction holds it, and not how much could.
   void NameStuckBearings();
   /// Root mean square of the robot's and the object's rows, without what the platform may leave.
   [[nodiscard]] Vector2d CalcSizes(const VectorXd& y) const;
+  [[nodiscard]] bool LeavesRounding(const VectorXd& y) const;
   /// In units of the noise that there was at first.
   [[nodiscard]] double CalcLeft(const VectorXd& y) const;
   /// Bounds of checks hold for all robots; what an explanation leaves is how much noise there is in this one.
@@ -77,16 +81,16 @@ class ForceProblem {
 
   const StepStore& store_;
   StepForces* forces_;
-  bool is_faint_;          // whether the checks of the balances hold
-  bool is_exact_ = false;  // whether the explanation leaves no more than rounding
+  bool is_faint_;  // whether the checks of the balances hold
+  bool is_exact_ = false;
   std::vector<Candidate> candidates_;
   VectorXd y_;
   std::vector<Eigen::Index> used_;  // steps of the store
   Eigen::Index steps_ = 0;
   Terms known_, terms_;
-  Vector2d first_level_, level_;  // StepForces::SetLevel
-  std::vector<MatrixXd> uneven_;  // of each step
-  std::vector<Turns> turns_;      // likewise
+  Vector2d first_level_, level_, least_level_;  // StepForces::SetLevel
+  std::vector<MatrixXd> uneven_;                // of each step
+  std::vector<Turns> turns_;                    // likewise
 };
 
 }  // namespace dexcheck

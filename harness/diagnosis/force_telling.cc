@@ -16,10 +16,12 @@ using namespace force_fault;
 
 // Gravity whose size differs by less than this fraction of its change only points elsewhere.
 constexpr double kTilted = 0.2;
+// Of a spring, by its torque: less shows only the torque, 1 / rad or 1 / m.
+constexpr double kSoft = 0.1;
 
 // Residuals that change by more than this from one step to the next, in units of noise, and by this many
 // times what they change in the steps around, have begun, or ended.
-constexpr double kJumpNoise = 1.0, kJump = 5.0;
+constexpr double kJumpNoise = 0.01, kJump = 5.0;
 
 std::string TellVector(const Eigen::Ref<const VectorXd>& v) {
   std::string text = "(";
@@ -68,7 +70,9 @@ Fault MakeForceFault(const Candidate& candidate, const VectorXd& a, const Vector
     fault.error = sticks ? std::numeric_limits<double>::infinity() : fault.error * candidate.nominal;
     if (sticks) fault.detail = "or more: the joint sticks";
   } else if (candidate.fault == "spring") {
-    if (a[0] != 0.0) fault.detail = "relaxed at " + FormatNumber(a[1] / a[0], 4);
+    fault.detail =
+        a[0] > kSoft * std::abs(a[1]) ? "relaxed at " + FormatNumber(a[1] / a[0], 4) : "of any stiffness";
+    fault.value = std::max(0.0, fault.value);
   } else if (candidate.fault == "tether") {
     if (a[0] != 0.0) fault.detail = "to " + TellVector(a.tail<3>() / a[0]) + " m";
   } else if (candidate.fault == "payload") {

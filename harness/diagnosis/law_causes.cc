@@ -15,8 +15,9 @@ using Eigen::Index;
 constexpr double kLawAccuracy = 1e-6;
 // What is left over may be this many times the noise and is explained all the same.
 constexpr double kMostLeft = 30.0;
-constexpr Index kMostLawSteps = 20;  // that are looked at
-constexpr double kZero = 1e-6;       // a factor nearer to zero than this is one of a part that is missing
+constexpr Index kMostLawSteps = 20;   // that are looked at
+constexpr double kPlausible = 300.0;  // of factors, which are units mistaken at the most
+constexpr double kZero = 1e-6;        // a factor nearer to zero than this is one of a part that is missing
 
 /// Entries of tau' that belong together.
 struct Place {
@@ -97,6 +98,7 @@ Causes ExplainLaw(const StepStore& store) {
     parts_of.push_back(parts);
     candidates.push_back(
         {.fault = fault, .place = place, .nominal = nominal, .columns = MatrixXd::Zero(n * used, 1)});
+    if (nominal != 0.0) candidates.back().scale = VectorXd::Constant(1, kPlausible);
     return candidates.back();
   };
   for (const LawPartName& name : names)

@@ -140,9 +140,8 @@ SignalVerdict JudgeSignal(const SignalSeries& series, const std::vector<SignalSe
   verdict.steps = FindSteps(series);
   const SignalSteps& steps = verdict.steps;
   if (steps.rows.empty()) return verdict;
-  const double square =
-      ((steps.Take(series.got) - steps.Take(series.expected)) / series.noise).square().sum() /
-      static_cast<double>(steps.size());
+  const ArrayXd off = steps.Take(series.got) - steps.Take(series.expected);
+  const double square = (off / series.noise).square().sum() / static_cast<double>(steps.size());
   const double floor = 1.0 + kSignalAccuracy * kSignalAccuracy * square;
   const auto is_good = [&](const SignalFit& fit) {
     // Noise beside several other faults is what they do not explain.
@@ -159,9 +158,8 @@ SignalVerdict JudgeSignal(const SignalSeries& series, const std::vector<SignalSe
               [](const SignalFit& a, const SignalFit& b) { return a.criterion < b.criterion; });
     if (is_good(fits.front()) && !fits.front().is_noise) break;
   }
-  const double largest = (steps.Take(series.got) - steps.Take(series.expected)).abs().maxCoeff();
-  verdict.is_explained =
-      steps.size() >= kFewestSteps && largest >= series.faint * series.noise && is_good(fits.front());
+  verdict.is_explained = steps.size() >= kFewestSteps && is_good(fits.front()) &&
+                         off.abs().maxCoeff() >= series.faint * series.noise;
   std::vector<std::string> names;
   for (SignalFit& fit : fits) {
     if (!fit.is_possible()) continue;

@@ -1,10 +1,14 @@
 #include "harness/diagnosis/visible_columns.h"
 
 #include <algorithm>
+#include <limits>
 
 #include "controller/common/linear_algebra.h"
 
 namespace dexcheck {
+
+// A column of which less is left beside others, relative, says nothing of its own.
+constexpr double kIndependent = 1e-7;
 
 Visible FindVisible(const Candidate& candidate, double noise) {
   const MatrixXd& C = candidate.columns;
@@ -30,6 +34,17 @@ Visible FindVisible(const Candidate& candidate, double noise) {
   result.columns = C * result.basis;
   result.unit = unit;
   return result;
+}
+
+VectorXd CalcErrors(const Visible& visible, const MatrixXd& covariance) {
+  const MatrixXd& B = visible.basis;
+  VectorXd error = (B * covariance * B.transpose()).diagonal().cwiseMax(0.0).cwiseSqrt();
+  if (B.rows() == B.cols()) return error;
+  // The fraction of each amplitude, squared, that is a combination of those.
+  const VectorXd unit = visible.unit.cwiseMax(std::numeric_limits<double>::min());
+  const VectorXd known = (unit.cwiseInverse().asDiagonal() * B).rowwise().squaredNorm();
+  constexpr double kKnown = 0.99;
+  return (known.array() < kKnown).select(std::numeric_limits<double>::infinity(), error);
 }
 
 }  // namespace dexcheck

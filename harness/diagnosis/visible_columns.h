@@ -4,9 +4,6 @@
 
 namespace dexcheck {
 
-/// A column of which less is left beside others, relative, says nothing of its own.
-inline constexpr double kIndependent = 1e-7;
-
 /// What of a candidate shows above the noise: amplitudes are basis * a.
 struct Visible {
   MatrixXd columns;  // N x r
@@ -16,5 +13,9 @@ struct Visible {
 
 /// @param noise of the sum over all rows.
 Visible FindVisible(const Candidate& candidate, double noise);
+
+/// Standard errors of the amplitudes (p), infinite for those that the visible ones do not tell. @param
+/// covariance of these (r x r).
+VectorXd CalcErrors(const Visible& visible, const MatrixXd& covariance);
 
 }  // namespace dexcheck

@@ -269,14 +269,4 @@ std::string Clearance::Describe(int index) const {
   return solid(pair.a).name + " and " + solid(pair.b).name;
 }
 
-std::string Clearance::DescribeGeoms(int geom1, int geom2) const {
-  const auto name_of = [&](int geom) {
-    for (const Solid& s : solids_->list) {
-      if (s.geom == geom) return s.name;
-    }
-    return "#" + std::to_string(geom);
-  };
-  return name_of(geom1) + " and " + name_of(geom2);
-}
-
 }  // namespace dexcheck

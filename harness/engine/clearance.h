@@ -89,8 +89,6 @@ class Clearance {
   [[nodiscard]] long looked_at() const { return looked_at_; }
   /// "r_palm and bench".
   [[nodiscard]] std::string Describe(int pair) const;
-  /// The same of the engine's geoms.
-  [[nodiscard]] std::string DescribeGeoms(int geom1, int geom2) const;
 
  private:
   /// In which frame the motion of a pair's bodies is bounded: where the robot itself is concerned, that of

@@ -55,7 +55,7 @@ std::unique_ptr<Plant> MakePlant(const Setup& setup) {
   auto plant = std::make_unique<EnginePlant>(setup.adapter(), setup.fingertips(), setup.surface(),
                                              setup.scenario().plant.implicit_damping);
   if (LetsBodiesPush(setup.scenario().plant, setup.engine()))
-    plant->WatchCollisions(ListGeoms(setup.robots()));
+    plant->WatchCollisions(ListPushingGeoms(setup.robots()));
   if (!setup.start().bonds.empty()) plant->SetBonds(setup.start().kappa, setup.start().bond_constraints);
   plant->SetFeet(setup.feet());
   plant->Place(setup.start().q, setup.start().X_Bo);

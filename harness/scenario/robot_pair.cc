@@ -101,6 +101,26 @@ std::vector<std::pair<int, int>> ListGeoms(const RobotPair& robots) {
   return geoms;
 }
 
+std::vector<std::pair<int, int>> ListPushingGeoms(const RobotPair& robots) {
+  const mjModel& m = *robots.engine;
+  std::vector<bool> is_shape(static_cast<size_t>(m.ngeom), false);
+  for (const Solid& solid : robots.solids.list) is_shape[static_cast<size_t>(solid.geom)] = true;
+  const auto list_geoms = [&](int solid) {
+    const Solid& shape = robots.solids.list[static_cast<size_t>(solid)];
+    std::vector<int> geoms = {shape.geom};
+    for (int i = 0; i < m.body_geomnum[shape.body]; ++i) {
+      const int geom = m.body_geomadr[shape.body] + i;
+      if (!is_shape[static_cast<size_t>(geom)]) geoms.push_back(geom);
+    }
+    return geoms;
+  };
+  std::vector<std::pair<int, int>> pushing;
+  for (const WatchedPair& pair : robots.watched_pairs)
+    for (const int a : list_geoms(pair.a))
+      for (const int b : list_geoms(pair.b)) pushing.emplace_back(a, b);
+  return pushing;
+}
+
 RobotPair::RobotPair(const Scenario& scenario, RobotModel the_model, const std::filesystem::path& mjcf,
                      MjModelPtr the_engine)
     : model(std::move(the_model)),

@@ -53,6 +53,9 @@ bool LetsBodiesPush(const PlantOptions& plant, const mjModel& engine);
 /// The geoms of the pairs that are watched.
 std::vector<std::pair<int, int>> ListGeoms(const RobotPair& robots);
 
+/// These, and what the same bodies have besides their shapes: geoms that are seen may collide, too.
+std::vector<std::pair<int, int>> ListPushingGeoms(const RobotPair& robots);
+
 /// Makes the plant's robot what the scenario declares it to be, if it does.
 /// @throws InputError when a link or joint is not there.
 void DeclareMismatch(const Scenario& scenario, const std::filesystem::path& mjcf, RobotPair* robots);

@@ -16,23 +16,27 @@ namespace {
 
 const std::string kRobot = SourcePath("/controller/parameters/assistant_robot.toml");
 
-/// Lets a geom and the palm's box, which are what stands for their bodies, collide by their masks, and no
-/// others.
-void CollideByMasks(int top, mjModel* m) {
+/// Which geoms of the palm collide with the bench by their masks.
+enum class Masks { kNone, kShape, kLooks };
+
+/// Lets a geom and the palm's box, which are what stands for their bodies, or the palm's shell, which is only
+/// seen, collide by their masks, and no others.
+void CollideByMasks(int top, Masks masks, mjModel* m) {
   LetBothCollide(m);
   const Solids solids = ListSolids(*m);
   const int palm = mj_name2id(m, mjOBJ_BODY, "r_palm");
-  std::fill_n(m->geom_contype, m->ngeom, 0);
-  std::fill_n(m->geom_conaffinity, m->ngeom, 0);
-  for (const Solid& solid : solids.list)
-    if (solid.geom == top || solid.body == palm)
-      m->geom_contype[solid.geom] = m->geom_conaffinity[solid.geom] = 1;
+  for (int geom = 0; geom < m->ngeom; ++geom) {
+    const bool is_shape = std::any_of(solids.list.begin(), solids.list.end(),
+                                      [&](const Solid& solid) { return solid.geom == geom; });
+    const bool is_of_palm = m->geom_bodyid[geom] == palm && is_shape == (masks == Masks::kShape);
+    m->geom_contype[geom] = m->geom_conaffinity[geom] = geom == top || is_of_palm ? 1 : 0;
+  }
 }
 
 /// `hold` beside a bench that is a cube of 4 cm, which is as deep in the right palm as asked, from below.
 class HoldAtATable {
  public:
-  explicit HoldAtATable(double depth, std::vector<std::string> overrides = {}, bool by_masks = false) {
+  explicit HoldAtATable(double depth, std::vector<std::string> overrides = {}, Masks masks = Masks::kNone) {
     overrides.insert(overrides.end(), {"duration=0.02", "settle=0.2"});
     const Scenario scenario = ReadShippedScenario("hold", overrides);
     const std::string mjcf = SourcePath("/mjcf/bench_scene.xml");
@@ -56,7 +60,7 @@ class HoldAtATable {
     const Eigen::Quaterniond turn(X_WP.linear());
     const double quaternion[4] = {turn.w(), turn.x(), turn.y(), turn.z()};
     std::copy_n(quaternion, 4, engine->body_quat + 4 * bench);
-    if (by_masks) CollideByMasks(top, engine.get());
+    if (masks != Masks::kNone) CollideByMasks(top, masks, engine.get());
     setup_ = std::make_unique<dexcheck::Setup>(scenario, kRobot, mjcf, std::move(engine));
     runner_ = std::make_unique<Runner>(*setup_, /*check=*/true);
     result_ = &runner_->Run([](const StepRecord&) {}, [] { return false; });
@@ -142,11 +146,14 @@ TEST(ClearanceOfARun, BodiesThatCollidePush) {
 // MJCFs of others let bodies push by their masks, whatever the scenario says: the run knows that they do, and
 // explains nothing by other forces.
 TEST(ClearanceOfARun, BodiesThatCollideByTheirMasksPush) {
-  const HoldAtATable run(5e-3, {}, /*by_masks=*/true);
-  EXPECT_TRUE(run.checks().Find("collision").failed);
-  EXPECT_EQ(run.result().attribution.cause, Cause::kCollision) << run.result().attribution.evidence;
-  for (const Explanation& one : run.result().causes)
-    EXPECT_NE(one.channel, CauseChannel::kBalance) << one.Tell();
+  for (const Masks masks : {Masks::kShape, Masks::kLooks}) {
+    const HoldAtATable run(5e-3, {}, masks);
+    EXPECT_TRUE(run.checks().Find("collision").failed);
+    EXPECT_EQ(run.checks().Find("collision").part, "r_palm and bench");
+    EXPECT_EQ(run.result().attribution.cause, Cause::kCollision) << run.result().attribution.evidence;
+    for (const Explanation& one : run.result().causes)
+      EXPECT_NE(one.channel, CauseChannel::kBalance) << one.Tell();
+  }
 }
 
 // A ball that lies on the floor, beside an arm that rests: with their declared contact taken away the ball
