@@ -100,7 +100,7 @@ void MotionFit::Analyse() {
     };
     noise_.position[joint] = get(RecordedQuantity::kPosition);
     noise_.velocity[joint] = get(RecordedQuantity::kVelocity);
-    noise_.torque[joint] = get(has_currents_ ? RecordedQuantity::kCurrent : RecordedQuantity::kTorque);
+    noise_.torque[joint] = get(Effort());
   }
   if (recording_->wrench.link >= 0) {
     noise_.wrench = sample_.wrench = VectorXd::Zero(6);

@@ -162,7 +162,8 @@ class FaultList {
         changes.emplace_back(BodyVector::Unit(k));
         inertia.columns.push_back(BodyParts(link, changes.back()));
       }
-      inertia.scale = VectorXd::Constant(6, body.mass * kLength * kLength);
+      constexpr double kGyration = 0.1;
+      inertia.scale = VectorXd::Constant(6, body.mass * kGyration * kGyration);
       inertia.is_possible = can_be(changes);
     }
     AddPayload(link);

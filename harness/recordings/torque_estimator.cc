@@ -63,8 +63,9 @@ std::vector<Push> FindWindows(const VectorXd& squares, const std::vector<TorqueB
     while (stays(first - 1) || stays(first - 2)) --first;
     while (stays(last + 1) || stays(last + 2)) ++last;
     // What stands out half of the time is no push.
-    if (last - first <= squares.size() / 2)
-      windows.push_back(TrimWindow(squares, usual, first, last, blocks));
+    const Push push = TrimWindow(squares, usual, first, last, blocks);
+    // Windows of smoothing overlap, so that what acts shows in more than one sample.
+    if (last - first <= squares.size() / 2 && push.from < push.to) windows.push_back(push);
     rest.segment(first, last - first + 1).setZero();
   }
   return windows;
@@ -160,9 +161,16 @@ CauseSelection TorqueEstimator::Select() {
 }
 
 void TorqueEstimator::Relinearise(const CauseSelection& selection) {
+  const auto shift = [&](size_t fault, const VectorXd& amplitude) {
+    if (faults_[fault].kind == TorqueFault::kCentre)
+      ShiftCentre(recordings_->model(), amplitude, &faults_[fault]);
+  };
+  std::vector<bool> is_found(faults_.size(), false);
   for (const CauseTerm& term : selection.terms) {
-    TorqueFault& found = faults_[term.candidate];
-    if (found.kind == TorqueFault::kCentre) ShiftCentre(recordings_->model(), term.amplitude, &found);
+    const TorqueFault& found = faults_[term.candidate];
+    is_found[term.candidate] = true;
+    shift(term.candidate, term.amplitude);
+    for (const auto& [fault, amplitude] : term.same) shift(fault, amplitude);
     for (TorqueFault& one : faults_) {
       // A payload's inertia is that of a point: it grows with the square of the distance.
       if (found.kind == TorqueFault::kPayload && one.kind == TorqueFault::kPayload &&
@@ -170,14 +178,15 @@ void TorqueEstimator::Relinearise(const CauseSelection& selection) {
         PlacePayload(term.amplitude[0], term.amplitude.segment<3>(1), &one);
     }
   }
-  for (TorqueFault& one : faults_)
-    if (one.kind == TorqueFault::kTorqueGain && one.index >= 0) ScaleWhole(selection, &one);
+  for (size_t i = 0; i < faults_.size(); ++i)
+    if (faults_[i].kind == TorqueFault::kTorqueGain && faults_[i].index >= 0)
+      ScaleWhole(is_found[i] ? selection.terms : std::vector<CauseTerm>(), &faults_[i]);
 }
 
-void TorqueEstimator::ScaleWhole(const CauseSelection& selection, TorqueFault* gain) const {
+void TorqueEstimator::ScaleWhole(const std::vector<CauseTerm>& terms, TorqueFault* gain) const {
   std::vector<ColumnPart>& parts = gain->columns.front();
   parts.resize(1);
-  for (const CauseTerm& term : selection.terms) {
+  for (const CauseTerm& term : terms) {
     const TorqueFault& found = faults_[term.candidate];
     const bool is_recorded = found.kind == TorqueFault::kTorqueGain || found.kind == TorqueFault::kExchange ||
                              found.kind == TorqueFault::kOffset || found.kind == TorqueFault::kAllOffsets ||
