@@ -237,8 +237,8 @@ class Judge {
     one.fault = fault.fault;
     one.place = fault.place;
     one.unit = fault.unit;
-    const bool is_number = a.size() == 1 || fault.kind == TorqueFault::kDelay ||
-                           fault.kind == TorqueFault::kSpring || fault.kind == TorqueFault::kStribeckFriction;
+    const bool is_number =
+        a.size() == 1 || fault.kind == TorqueFault::kSpring || fault.kind == TorqueFault::kStribeckFriction;
     one.value = is_number ? fault.nominal + a[0] : a.norm();
     one.error = error.size() == 0 ? 0.0 : is_number ? error[0] : error.norm();
     const auto vector = [](const VectorXd& v) {

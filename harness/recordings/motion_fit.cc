@@ -210,20 +210,14 @@ size_t MotionFit::CalcReach() const {
   return half_ + static_cast<size_t>(most);
 }
 
-void MotionFit::EmitTorque(int joint, size_t centre, const Eigen::Ref<const VectorXd>& fitted) {
-  sample_.torque[joint] = fitted[0];
-  sample_.torque_rate[joint] = fitted[1];
-  sample_.torque_curvature[joint] = 2.0 * fitted[2];
+double MotionFit::CalcTorqueRate(int joint, size_t centre, const Eigen::Ref<const VectorXd>& fitted) const {
   const auto known = refinements_.delays.find(joint);
-  if (known == refinements_.delays.end() || known->second == 0) return;
-  const auto late = static_cast<size_t>(static_cast<long>(centre) + known->second);
+  if (known == refinements_.delays.end() || known->second == 0) return fitted[1];
+  const size_t late = centre + static_cast<size_t>(known->second);
   const int time = ChannelOf(RecordedQuantity::kTime, -1);
-  const double delay = rows_ahead_[late][time] - rows_ahead_[centre][time];
-  const VectorXd then =
-      CalcCoefficients(late, half_, kOrder) * GetWindow(late, half_).col(ChannelOf(Effort(), joint));
-  // Such that near the delay d, -(d rate + d^2 / 2 curvature) is what it changes, and its derivative.
-  sample_.torque_rate[joint] = (then[0] - fitted[0]) / delay;
-  sample_.torque_curvature[joint] = 2.0 * (then[1] - sample_.torque_rate[joint]) / delay;
+  const MatrixXd C = CalcCoefficients(late, half_, kOrder);
+  const double then = C.row(0).dot(GetWindow(late, half_).col(ChannelOf(Effort(), joint)));
+  return (then - fitted[0]) / (rows_ahead_[late][time] - rows_ahead_[centre][time]);
 }
 
 bool MotionFit::Emit(size_t centre, const Receiver& receive) {
@@ -252,7 +246,9 @@ bool MotionFit::Emit(size_t centre, const Receiver& receive) {
             : VectorXd(fitted.col(position).tail<kOrder>().cwiseProduct(Eigen::Vector4d(1.0, 2.0, 3.0, 4.0)));
     AverageFriction(joint, times, rate, C.row(0).transpose());
     const int torque = ChannelOf(Effort(), joint);
-    if (torque >= 0) EmitTorque(joint, centre, fitted.col(torque));
+    if (torque < 0) continue;
+    sample_.torque[joint] = fitted(0, torque);
+    sample_.torque_rate[joint] = CalcTorqueRate(joint, centre, fitted.col(torque));
   }
   if (recording_->Has(RecordedQuantity::kBase)) sample_.base = CalcBase(fitted);
   for (Eigen::Index k = 0; k < sample_.wrench.size(); ++k)

@@ -32,8 +32,7 @@ struct RecordedSample {
   double time = 0.0;
   VectorXd q, qd, qdd;
   VectorXd torque;                    ///< Measured, or the current; smoothed like the motion.
-  VectorXd torque_rate;               ///< Per s; over a delay that is known, the secant's.
-  VectorXd torque_curvature;          ///< Per s^2, likewise.
+  VectorXd torque_rate;               ///< Per s, the secant's over a delay that is known.
   BaseMotion base;                    ///< At rest where it was not recorded.
   VectorXd wrench;                    ///< Measured, on the link, N and N m; empty for none.
   VectorXd direction;                 ///< Sign of the velocity, averaged as the torque is; 0 at rest.
@@ -115,8 +114,9 @@ class MotionFit {
   /// Averages the shapes of a joint's friction over a window. @param rate coefficients of its velocity.
   void AverageFriction(int joint, const VectorXd& times, const VectorXd& rate, const VectorXd& weights);
   bool Emit(size_t centre, const Receiver& receive);
-  /// A torque and its derivatives. @param fitted the polynomial's coefficients about the centre.
-  void EmitTorque(int joint, size_t centre, const Eigen::Ref<const VectorXd>& fitted);
+  /// @param fitted the torque's polynomial about the centre.
+  [[nodiscard]] double CalcTorqueRate(int joint, size_t centre,
+                                      const Eigen::Ref<const VectorXd>& fitted) const;
   /// Rows on each side that a sample needs.
   [[nodiscard]] size_t CalcReach() const;
   [[nodiscard]] MatrixXd CalcInertia(const std::vector<size_t>& centres);
