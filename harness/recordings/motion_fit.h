@@ -2,7 +2,6 @@
 
 // The motion of a recording: positions, velocities and accelerations by local polynomials, with their errors.
 
-#include <algorithm>
 #include <deque>
 #include <functional>
 #include <map>
@@ -17,16 +16,6 @@
 namespace dexcheck {
 
 inline double Square(double x) { return x * x; }
-
-/// 0 of none.
-template <class Values>
-double Median(const Values& values) {
-  std::vector<double> sorted(values.begin(), values.end());
-  if (sorted.empty()) return 0.0;
-  const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
-  std::nth_element(sorted.begin(), middle, sorted.end());
-  return *middle;
-}
 
 /// What a first reading told, so that the next has columns that fit better.
 struct Refinements {

@@ -16,6 +16,13 @@ namespace {
 constexpr int kHigherOrder = 6;
 constexpr size_t kHalves[] = {3, 4, 6, 8, 11, 16, 23, 32, 45, 64, 90, 128};
 
+double Median(std::vector<double> values) {
+  if (values.empty()) return 0.0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
 }  // namespace
 
 double MotionFit::FindQuantum(Eigen::Index channel) const {

@@ -15,9 +15,16 @@ namespace {
 
 using Eigen::Index;
 
+double Median(const VectorXd& values) {
+  std::vector<double> sorted(values.begin(), values.end());
+  const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
+  std::nth_element(sorted.begin(), middle, sorted.end());
+  return *middle;
+}
+
 /// A push does not hide behind what it adds to its joint's noise.
 VectorXd InUnitsOfMedian(const VectorXd& squares) {
-  const double usual = Median(squares);
+  const double usual = squares.size() > 0 ? Median(squares) : 0.0;
   return usual > 0.0 ? VectorXd(squares / usual) : squares;
 }
 
@@ -211,22 +218,35 @@ Index TorqueEstimator::CountForcedRows() const {
 }
 
 CauseSelection TorqueEstimator::SelectAmong(double alike) const {
+  CauseSelection best = SelectAmong(alike, barred_);
+  // A fault in all joints goes before several single ones, of which the first alone explains less.
+  std::vector<bool> barred = barred_;
+  for (const CauseTerm& term : best.terms)
+    if (faults_[term.candidate].index < 0 && faults_[term.candidate].columns.size() > 3)
+      barred[term.candidate] = true;
+  if (barred == barred_) return best;
+  CauseSelection other = SelectAmong(alike, barred);
+  return other.criterion < best.criterion ? other : best;
+}
+
+CauseSelection TorqueEstimator::SelectAmong(double alike, const std::vector<bool>& barred) const {
   const Index width = R_.cols();
   const Index begin = CountForcedRows(), rows = R_.rows() - begin;
   std::vector<Candidate> candidates;
-  const std::vector<Index> first = ListFirstColumns();
+  Index at = CountForced(*recordings_);
   for (const TorqueFault& fault : faults_) {
     Candidate& one = candidates.emplace_back();
     one.fault = fault.fault;
     one.place = fault.place;
     one.unit = fault.unit;
     one.nominal = fault.nominal;
-    one.columns = R_.block(begin, first[candidates.size() - 1], rows, CountColumns(fault));
-    if (barred_[candidates.size() - 1]) one.columns.setZero();
+    one.columns = R_.block(begin, at, rows, CountColumns(fault));
+    if (barred[candidates.size() - 1]) one.columns.setZero();
     one.scale = fault.scale;
     one.is_possible = fault.is_possible;
     one.parameters = fault.parameters;
     one.is_ordinary = fault.is_ordinary;
+    at += CountColumns(fault);
   }
   CauseOptions options;
   options.most_terms = most_causes_;

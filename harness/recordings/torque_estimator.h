@@ -47,6 +47,7 @@ class TorqueEstimator {
   /// Of these, those that columns which are part of every explanation have.
   [[nodiscard]] Eigen::Index CountForcedRows() const;
   [[nodiscard]] CauseSelection SelectAmong(double alike) const;
+  [[nodiscard]] CauseSelection SelectAmong(double alike, const std::vector<bool>& barred) const;
   [[nodiscard]] std::vector<Eigen::Index> ListFirstColumns() const;
   /// One stretch of time has one push, a joint one shape of its dry friction: others would share the force.
   bool BarSeconds();
