@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 #include <fstream>
 #include <iostream>
@@ -30,7 +31,9 @@ void Split(std::string_view line, char separator, std::vector<std::string_view>*
     return;
   }
   for (;;) {
-    const size_t end = line.find(separator);
+    // A name in quotes may have separators in it.
+    const size_t close = Trim(line).starts_with('"') ? line.find('"', line.find('"') + 1) : 0;
+    const size_t end = line.find(separator, close == std::string_view::npos ? 0 : close);
     cells->push_back(Trim(line.substr(0, end), " \t\r\"'"));
     if (end == std::string_view::npos) return;
     line.remove_prefix(end + 1);
@@ -92,7 +95,9 @@ class TextRecording : public RecordingReader {
 
   void ReadHead() {
     if (!ReadLine()) throw InputError(source_ + ": has no rows");
-    if (line_.find('\0') != std::string::npos) Fail("is no text, and no recording that is known");
+    if (std::any_of(line_.begin(), line_.end(),
+                    [](char c) { return c >= 0 && c < ' ' && c != '\t' && c != '\r'; }))
+      Fail("is no text, and no recording that is known");
     for (const char candidate : {'\t', ';', ','})
       if (separator_ == ' ' && line_.find(candidate) != std::string::npos) separator_ = candidate;
     has_decimal_comma_ = separator_ == ';' && line_.find('.') == std::string::npos;

@@ -1,6 +1,7 @@
 #include "harness/recordings/columns_file.h"
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <memory>
 #include <numeric>
@@ -107,7 +108,11 @@ class ColumnsFile {
       const auto factors = table.Find(key);
       if (!factors) return;
       const std::vector<double> numbers = ReadNumbers(*factors, count);
-      for (size_t i = 0; i < count; ++i) apply(numbers[i], &(*channels)[begin + i]);
+      for (size_t i = 0; i < count; ++i) {
+        if (std::string_view(key) == "ratio" && numbers[i] == 0.0) factors->Fail("must not be 0");
+        if (std::string_view(key) == "sign" && std::abs(numbers[i]) != 1.0) factors->Fail("must be 1 or -1");
+        apply(numbers[i], &(*channels)[begin + i]);
+      }
     };
     if (const auto unit = table.Find("unit")) {
       const Unit* found = FindUnit(unit->AsText(), quantity);
@@ -115,7 +120,7 @@ class ColumnsFile {
       for (size_t i = begin; i < channels->size(); ++i) (*channels)[i].scale = found->scale;
     }
     scale("ratio", [](double x, Channel* channel) { channel->scale *= x; });
-    scale("sign", [](double x, Channel* channel) { channel->scale *= x < 0.0 ? -1.0 : 1.0; });
+    scale("sign", [](double x, Channel* channel) { channel->scale *= x; });
     scale("offset", [](double x, Channel* channel) { channel->offset = x; });
     table.RejectUnused();
   }

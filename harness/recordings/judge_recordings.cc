@@ -111,6 +111,9 @@ class Judge {
         next.offsets[one.fault.index] = one.amplitude[0];
       if (one.fault.kind == TorqueFault::kStribeckFriction)
         next.stribeck[one.fault.index] = StribeckVelocityOf(one.fault, one.amplitude);
+      for (const int joint : one.fault.kind == TorqueFault::kDelay ? set_.joints() : std::vector<int>())
+        if (one.fault.index < 0 || one.fault.index == joint)
+          next.delays[joint] += std::lround(one.amplitude[0] / set_.step());
     }
     next.shaking = set_.refinements().shaking;
     if (!result_.IsWhole() && next.shaking == 0.0) next.shaking = FindShaking(set_, estimator_.rows(), left);
@@ -220,12 +223,12 @@ class Judge {
         {fault, term.amplitude, term.error, result_.causes.back().outcome == CauseOutcome::kNamed});
   }
 
-  /// Whether far more than noise is left beside it, so that something else is at work. Friction and bodies
+  /// Whether far more than noise is left beside it, so that something else is at work. Friction and payloads
   /// are named all the same: drives have more shapes of friction than are tried.
   [[nodiscard]] bool IsDoubtful(const TorqueFault& fault, const CauseTerm& term) const {
     // Measured, no bound: the nearest cause of drawn torques that were cut off explains less.
     constexpr double kMost = 100.0;
-    return result_.left > kFar && !fault.IsFriction() && !fault.IsOfBodies() &&
+    return result_.left > kFar && !fault.IsFriction() && fault.kind != TorqueFault::kPayload &&
            term.fraction <= kMost * (1.0 - estimator_.selection().fraction);
   }
 
@@ -234,8 +237,8 @@ class Judge {
     one.fault = fault.fault;
     one.place = fault.place;
     one.unit = fault.unit;
-    const bool is_number = a.size() == 1 || fault.kind == TorqueFault::kDelay ||
-                           fault.kind == TorqueFault::kSpring || fault.kind == TorqueFault::kStribeckFriction;
+    const bool is_number =
+        a.size() == 1 || fault.kind == TorqueFault::kSpring || fault.kind == TorqueFault::kStribeckFriction;
     one.value = is_number ? fault.nominal + a[0] : a.norm();
     one.error = error.size() == 0 ? 0.0 : is_number ? error[0] : error.norm();
     const auto vector = [](const VectorXd& v) {

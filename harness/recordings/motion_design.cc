@@ -162,7 +162,7 @@ class MotionDesigner {
   VectorXd Follow(const SeriesMotion& motion, TorqueBalance* balance, VectorXd* squares) {
     constexpr size_t kEvery = 4;
     RecordedSample sample;
-    sample.torque_rate = sample.torque_curvature = VectorXd::Zero(model_.num_joints());
+    sample.torque_rate = VectorXd::Zero(model_.num_joints());
     sample.friction.resize(model_.num_joints(), kFrictionShapes);
     const MatrixXd shape_velocities = ListShapeVelocities(0.5 * limits_.velocity);
     VectorXd largest = VectorXd::Zero(model_.num_joints());

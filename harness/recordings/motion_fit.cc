@@ -25,9 +25,8 @@ MotionFit::MotionFit(const RobotModel& model, Recording* recording, size_t ahead
       refinements_(refinements),
       part_(std::max<size_t>(1, ahead / 8)) {
   has_currents_ = !recording->Has(RecordedQuantity::kTorque);
-  const RecordedQuantity effort = has_currents_ ? RecordedQuantity::kCurrent : RecordedQuantity::kTorque;
   for (int joint = 0; joint < model.num_joints(); ++joint)
-    if (recording->FindColumn(effort, joint) >= 0) judged_.push_back(joint);
+    if (recording->FindColumn(Effort(), joint) >= 0) judged_.push_back(joint);
   while (rows_ahead_.size() < ahead && Fill()) {
   }
   Analyse();
@@ -205,6 +204,22 @@ void MotionFit::AverageFriction(int joint, const VectorXd& times, const VectorXd
   sample_.direction[joint] = direction;
 }
 
+size_t MotionFit::CalcReach() const {
+  long most = 0;
+  for (const auto& [joint, delay] : refinements_.delays) most = std::max(most, std::abs(delay));
+  return half_ + static_cast<size_t>(most);
+}
+
+double MotionFit::CalcTorqueRate(int joint, size_t centre, const Eigen::Ref<const VectorXd>& fitted) const {
+  const auto known = refinements_.delays.find(joint);
+  if (known == refinements_.delays.end() || known->second == 0) return fitted[1];
+  const size_t late = centre + static_cast<size_t>(known->second);
+  const int time = ChannelOf(RecordedQuantity::kTime, -1);
+  const MatrixXd C = CalcCoefficients(late, half_, kOrder);
+  const double then = C.row(0).dot(GetWindow(late, half_).col(ChannelOf(Effort(), joint)));
+  return (then - fitted[0]) / (rows_ahead_[late][time] - rows_ahead_[centre][time]);
+}
+
 bool MotionFit::Emit(size_t centre, const Receiver& receive) {
   const MatrixXd window = GetWindow(centre, half_);
   const MatrixXd C = CalcCoefficients(centre, half_, kOrder);
@@ -215,7 +230,6 @@ bool MotionFit::Emit(size_t centre, const Receiver& receive) {
   const VectorXd phases = refinements_.shaking * window.col(time);
   sample_.swing =
       C.row(0) * (MatrixXd(phases.size(), 2) << phases.array().sin(), phases.array().cos()).finished();
-  const RecordedQuantity effort = has_currents_ ? RecordedQuantity::kCurrent : RecordedQuantity::kTorque;
   for (int joint = 0; joint < model_->num_joints(); ++joint) {
     const int position = ChannelOf(RecordedQuantity::kPosition, joint);
     if (position < 0) continue;
@@ -231,11 +245,10 @@ bool MotionFit::Emit(size_t centre, const Receiver& receive) {
             ? VectorXd(fitted.col(velocity))
             : VectorXd(fitted.col(position).tail<kOrder>().cwiseProduct(Eigen::Vector4d(1.0, 2.0, 3.0, 4.0)));
     AverageFriction(joint, times, rate, C.row(0).transpose());
-    const int torque = ChannelOf(effort, joint);
+    const int torque = ChannelOf(Effort(), joint);
     if (torque < 0) continue;
     sample_.torque[joint] = fitted(0, torque);
-    sample_.torque_rate[joint] = fitted(1, torque);
-    sample_.torque_curvature[joint] = 2.0 * fitted(2, torque);
+    sample_.torque_rate[joint] = CalcTorqueRate(joint, centre, fitted.col(torque));
   }
   if (recording_->Has(RecordedQuantity::kBase)) sample_.base = CalcBase(fitted);
   for (Eigen::Index k = 0; k < sample_.wrench.size(); ++k)
@@ -248,7 +261,7 @@ void MotionFit::CalcSpeeds() {
   VectorXd squares = VectorXd::Zero(n), moving = VectorXd::Zero(n);
   shape_velocities_ = ListShapeVelocities(VectorXd::Ones(n));
   double count = 0.0;
-  for (const size_t centre : ListCentres(half_)) {
+  for (const size_t centre : ListCentres(CalcReach())) {
     Emit(centre, [&](const RecordedSample& sample) {
       squares += sample.qd.cwiseAbs2();
       moving += sample.direction.unaryExpr([](double s) { return s != 0.0 ? 1.0 : 0.0; });
@@ -271,12 +284,13 @@ std::vector<bool> MotionFit::IsJudged(const RecordedSample& sample) const {
 }
 
 void MotionFit::Run(const Receiver& receive) {
-  size_t next = half_;
+  const size_t reach = CalcReach();
+  size_t next = reach;
   for (;;) {
-    for (; next + half_ < rows_ahead_.size(); next += stride_)
-      if (IsWhole(next, half_) && !Emit(next, receive)) return;
+    for (; next + reach < rows_ahead_.size(); next += stride_)
+      if (IsWhole(next, reach) && !Emit(next, receive)) return;
     // What no window needs any more makes room.
-    while (next > half_ && !rows_ahead_.empty()) {
+    while (next > reach && !rows_ahead_.empty()) {
       rows_ahead_.pop_front();
       segments_.pop_front();
       --next;

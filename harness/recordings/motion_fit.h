@@ -21,6 +21,7 @@ inline double Square(double x) { return x * x; }
 struct Refinements {
   std::map<int, double> offsets;   ///< Of joints' positions, rad or m.
   std::map<int, double> stribeck;  ///< Velocities below which joints have more friction, rad/s or m/s.
+  std::map<int, long> delays;      ///< Of joints' torques, rows.
   double shaking = 0.0;            ///< Angular frequency of the base, rad/s; 0 where it rests.
   bool operator==(const Refinements&) const = default;
 };
@@ -31,8 +32,7 @@ struct RecordedSample {
   double time = 0.0;
   VectorXd q, qd, qdd;
   VectorXd torque;                    ///< Measured, or the current; smoothed like the motion.
-  VectorXd torque_rate;               ///< Per s.
-  VectorXd torque_curvature;          ///< Per s^2.
+  VectorXd torque_rate;               ///< Per s, the secant's over a delay that is known.
   BaseMotion base;                    ///< At rest where it was not recorded.
   VectorXd wrench;                    ///< Measured, on the link, N and N m; empty for none.
   VectorXd direction;                 ///< Sign of the velocity, averaged as the torque is; 0 at rest.
@@ -92,6 +92,9 @@ class MotionFit {
   /// One row: time, then each channel's numbers in SI units.
   using Row = VectorXd;
 
+  [[nodiscard]] RecordedQuantity Effort() const {
+    return has_currents_ ? RecordedQuantity::kCurrent : RecordedQuantity::kTorque;
+  }
   bool ReadRow(Row* row);
   bool Fill();
   void Analyse();
@@ -111,6 +114,11 @@ class MotionFit {
   /// Averages the shapes of a joint's friction over a window. @param rate coefficients of its velocity.
   void AverageFriction(int joint, const VectorXd& times, const VectorXd& rate, const VectorXd& weights);
   bool Emit(size_t centre, const Receiver& receive);
+  /// @param fitted the torque's polynomial about the centre.
+  [[nodiscard]] double CalcTorqueRate(int joint, size_t centre,
+                                      const Eigen::Ref<const VectorXd>& fitted) const;
+  /// Rows on each side that a sample needs.
+  [[nodiscard]] size_t CalcReach() const;
   [[nodiscard]] MatrixXd CalcInertia(const std::vector<size_t>& centres);
 
   const RobotModel* model_;

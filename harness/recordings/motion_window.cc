@@ -56,15 +56,18 @@ void MotionFit::Analyse() {
   for (size_t i = 1; i < rows_ahead_.size(); ++i)
     steps.push_back(rows_ahead_[i][time] - rows_ahead_[i - 1][time]);
   step_ = Median(steps);
+  constexpr double kLongest = 0.5;
+  if (step_ > kLongest)
+    throw InputError(
+        fmt::format("{}: time: a row every {:.4g} s tells no motion; its unit may be another", name, step_));
   for (size_t i = 1; i < rows_ahead_.size(); ++i) {
     if (steps[i - 1] > kGap * step_) ++segment_, ++gaps_;
     segments_[i] = segment_;
   }
   const Eigen::Index n = model_->num_joints();
-  for (VectorXd* vector :
-       {&noise_.position, &noise_.velocity, &noise_.torque, &noise_.smooth_position, &noise_.smooth_torque,
-        &noise_.acceleration, &noise_.rest, &sample_.q, &sample_.qd, &sample_.qdd, &sample_.torque,
-        &sample_.torque_rate, &sample_.torque_curvature, &sample_.direction})
+  for (VectorXd* vector : {&noise_.position, &noise_.velocity, &noise_.torque, &noise_.smooth_position,
+                           &noise_.smooth_torque, &noise_.acceleration, &noise_.rest, &sample_.q, &sample_.qd,
+                           &sample_.qdd, &sample_.torque, &sample_.torque_rate, &sample_.direction})
     *vector = VectorXd::Zero(n);
   sample_.friction = MatrixXd::Zero(n, kFrictionShapes);
   // Noise of each channel: what a polynomial over a short window leaves.
@@ -100,7 +103,7 @@ void MotionFit::Analyse() {
     };
     noise_.position[joint] = get(RecordedQuantity::kPosition);
     noise_.velocity[joint] = get(RecordedQuantity::kVelocity);
-    noise_.torque[joint] = get(has_currents_ ? RecordedQuantity::kCurrent : RecordedQuantity::kTorque);
+    noise_.torque[joint] = get(Effort());
   }
   if (recording_->wrench.link >= 0) {
     noise_.wrench = sample_.wrench = VectorXd::Zero(6);

@@ -23,7 +23,6 @@ TorqueBalance::TorqueBalance(const RobotModel& model, const std::vector<int>& jo
   by_position_.resize(n, n);
   shaking_.resize(n, 12);
   torques_.resize(n);
-  moved_.resize(n);
   q_.resize(n);
   residual_ = VectorXd::Zero(static_cast<Index>(joints.size()));
   wrench_squares_ = MatrixXd::Zero(residual_.size(), 6);
@@ -55,8 +54,8 @@ void TorqueBalance::ListColumns(bool has_currents) {
     for (int k = 0; k < 3; ++k) columns.push_back({TorqueColumn::kGravity, 0, k});
     if (has_currents) columns.push_back({TorqueColumn::kCurrent, joint});
     for (const auto kind :
-         {TorqueColumn::kRate, TorqueColumn::kCurvature, TorqueColumn::kOffset, TorqueColumn::kDry,
-          TorqueColumn::kViscous, TorqueColumn::kAcceleration, TorqueColumn::kLoad, TorqueColumn::kAngle})
+         {TorqueColumn::kRate, TorqueColumn::kOffset, TorqueColumn::kDry, TorqueColumn::kViscous,
+          TorqueColumn::kAcceleration, TorqueColumn::kLoad, TorqueColumn::kAngle})
       columns.push_back({kind, joint});
     for (int k = 0; k < kFrictionShapes; ++k) columns.push_back({TorqueColumn::kFriction, joint, k});
     for (int k = 0; frequency_ > 0.0 && k < shaking_.cols(); ++k)
@@ -98,9 +97,6 @@ void TorqueBalance::FillRow(size_t place, const RecordedSample& sample, Eigen::R
         break;
       case TorqueColumn::kRate:
         entry = sample.torque_rate[joint];
-        break;
-      case TorqueColumn::kCurvature:
-        entry = sample.torque_curvature[joint];
         break;
       case TorqueColumn::kCurrent:
         entry = sample.torque[joint];

@@ -24,11 +24,10 @@ struct TorqueColumn {
     kPosition,  ///< By the position of joint index.
     kGravity,   ///< By component of gravity.
     kRate,      ///< Of the measured torque.
-    kCurvature,
-    kCurrent,  ///< Measured.
-    kOffset,   ///< 1
-    kDry,      ///< Direction of motion.
-    kViscous,  ///< Velocity.
+    kCurrent,   ///< Measured.
+    kOffset,    ///< 1
+    kDry,       ///< Direction of motion.
+    kViscous,   ///< Velocity.
     kAcceleration,
     kFriction,  ///< RecordedSample::friction, by component.
     kLoad,      ///< Direction times the size of the model's torque.
@@ -119,7 +118,7 @@ class TorqueBalance {
   MatrixXd bodies_, gravity_, forces_, by_position_, shaking_;
   WrenchPlace wrench_;
   MatrixXd wrench_squares_;
-  VectorXd torques_, moved_, q_, steps_, residual_;
+  VectorXd torques_, q_, steps_, residual_;
 };
 
 }  // namespace dexcheck

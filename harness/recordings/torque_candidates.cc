@@ -97,11 +97,9 @@ class FaultList {
                modelled.armature, true);
     AddAtJoint(kTorqueGain, joint, "torque gain", "", {TorqueColumn::kTorque, joint}, 1.0, false)
         .is_possible = IsGain;
-    // tau(t + d) = tau(t) + d tau'(t) + d^2/2 tau''(t)
     TorqueFault& delay =
         AddAtJoint(kDelay, joint, "delay of the torque", "s", {TorqueColumn::kRate, joint}, 0.0, false);
     delay.columns[0][0].factor = -1.0;
-    delay.columns.push_back({{{TorqueColumn::kCurvature, joint}, joint, -1.0}});
     delay.scale = DelayScale();
     Add(kZero, joint, "position offset", "joint " + modelled.name, turns ? "rad" : "m",
         {{{{TorqueColumn::kPosition, joint}, -1, -1.0}}});
@@ -162,7 +160,8 @@ class FaultList {
         changes.emplace_back(BodyVector::Unit(k));
         inertia.columns.push_back(BodyParts(link, changes.back()));
       }
-      inertia.scale = VectorXd::Constant(6, body.mass * kLength * kLength);
+      constexpr double kGyration = 0.1;
+      inertia.scale = VectorXd::Constant(6, body.mass * kGyration * kGyration);
       inertia.is_possible = can_be(changes);
     }
     AddPayload(link);
@@ -200,10 +199,9 @@ class FaultList {
 
   void AddAll() {
     using enum TorqueFault::Kind;
-    Parts delay, curvature, gain;
+    Parts delay, gain;
     for (const int joint : joints_) {
       delay.push_back({{TorqueColumn::kRate, joint}, joint, -1.0});
-      curvature.push_back({{TorqueColumn::kCurvature, joint}, joint, -1.0});
       gain.push_back({{TorqueColumn::kTorque, joint}, joint, 1.0});
     }
     if (joints_.size() > 1) {
@@ -211,7 +209,7 @@ class FaultList {
         AddInAll(kAllDry, "dry friction", {shape}).parameters = shape == TorqueColumn::kDry ? 0 : 1;
       AddInAll(kAllFriction, "dry and viscous friction", {TorqueColumn::kDry, TorqueColumn::kViscous});
       AddInAll(kAllOffsets, "torque offset", {TorqueColumn::kOffset}).is_possible = nullptr;
-      Add(kDelay, -1, "delay of the torques", "all joints", "s", {delay, curvature}).scale = DelayScale();
+      Add(kDelay, -1, "delay of the torques", "all joints", "s", {delay}).scale = DelayScale();
       Add(kTorqueGain, -1, "torque gain", "all joints", "", {gain}, 1.0).is_possible = IsGain;
     }
     TorqueFault& gravity = Add(kGravity, -1, "gravity", "world", "m/s^2", {});
@@ -234,11 +232,7 @@ class FaultList {
     constexpr double kLeast = 0.05;
     return std::abs(1.0 + a[0]) > kLeast;
   }
-  /// Of a delay and half its square.
-  static VectorXd DelayScale() {
-    constexpr double kDelay = 0.05;  // s
-    return Vector2d(kDelay, 0.5 * kDelay * kDelay);
-  }
+  static VectorXd DelayScale() { return VectorXd::Constant(1, 0.05); }  // s
 
   /// In every joint.
   TorqueFault& AddInAll(TorqueFault::Kind kind, const std::string& name,

@@ -63,8 +63,9 @@ std::vector<Push> FindWindows(const VectorXd& squares, const std::vector<TorqueB
     while (stays(first - 1) || stays(first - 2)) --first;
     while (stays(last + 1) || stays(last + 2)) ++last;
     // What stands out half of the time is no push.
-    if (last - first <= squares.size() / 2)
-      windows.push_back(TrimWindow(squares, usual, first, last, blocks));
+    const Push push = TrimWindow(squares, usual, first, last, blocks);
+    // Windows of smoothing overlap, so that what acts shows in more than one sample.
+    if (last - first <= squares.size() / 2 && push.from < push.to) windows.push_back(push);
     rest.segment(first, last - first + 1).setZero();
   }
   return windows;
@@ -78,29 +79,31 @@ double CalcPlausible(const TorqueFault& fault, Index k) {
 /// Rounding of sums of products hides what a column has less of beside others.
 constexpr double kIndependent = 1e-5;
 
-/// An upper triangular R, without its rows of zeros, with R^T R = G, which may be singular: Cholesky's, in
-/// blocks, in which a column that adds nothing to those before it has no row.
-MatrixXd CalcFactor(const MatrixXd& G) {
-  constexpr Index kBlock = 48;
+/// R with R^T R = G, which may be singular, and as many rows as it has independent columns: Cholesky's, of
+/// the columns that add most first. @param first columns come before all others; the last one comes last.
+MatrixXd CalcFactor(const MatrixXd& G, Index first) {
   constexpr double kAddsNothing = 0.01 * kIndependent * kIndependent;
-  const Index n = G.cols();
-  MatrixXd R = MatrixXd::Zero(n, n);
+  const Index n = G.cols(), last = n - 1;
+  const VectorXd size =
+      G.diagonal().unaryExpr([](double s) { return std::max(s, std::numeric_limits<double>::min()); });
+  VectorXd rest = VectorXd::Ones(n);  // 0 of columns that are done
+  VectorXd left = G.diagonal().cwiseQuotient(size);
+  MatrixXd R(n, n);  // its transpose
   Index rank = 0;
-  for (Index begin = 0; begin < n; begin += kBlock) {
-    const Index size = std::min(kBlock, n - begin), rest = n - begin, first = rank;
-    MatrixXd left = G.block(begin, begin, size, rest);
-    left.noalias() -= R.block(0, begin, first, size).transpose() * R.block(0, begin, first, rest);
-    for (Index i = 0; i < size; ++i) {
-      const Index at = begin + i;
-      VectorXd row = left.row(i).tail(rest - i).transpose();
-      row.noalias() -=
-          R.block(first, at, rank - first, rest - i).transpose() * R.block(first, at, rank - first, 1);
-      // y, the last, is kept whatever is left of it.
-      if (!(row[0] > (at + 1 < n ? kAddsNothing * G(at, at) : 0.0))) continue;
-      R.row(rank++).tail(rest - i) = row.transpose() / std::sqrt(row[0]);
-    }
-  }
-  return R.topRows(rank);
+  const auto add = [&](Index pivot) {
+    VectorXd row = G.col(pivot) - R.leftCols(rank) * R.row(pivot).head(rank).transpose();
+    left[pivot] = 0.0;
+    if (!(row[pivot] > 0.0)) return;
+    R.col(rank) = rest.cwiseProduct(row) / std::sqrt(row[pivot]);
+    left -= R.col(rank++).cwiseAbs2().cwiseQuotient(size);
+    rest[pivot] = left[pivot] = left[last] = 0.0;
+  };
+  left[last] = 0.0;
+  for (Index i = 0; i < first; ++i)
+    if (left[i] > kAddsNothing) add(i);
+  for (Index pivot = 0; left.maxCoeff(&pivot) > kAddsNothing;) add(pivot);
+  add(last);
+  return R.leftCols(rank).transpose();
 }
 
 }  // namespace
@@ -158,9 +161,16 @@ CauseSelection TorqueEstimator::Select() {
 }
 
 void TorqueEstimator::Relinearise(const CauseSelection& selection) {
+  const auto shift = [&](size_t fault, const VectorXd& amplitude) {
+    if (faults_[fault].kind == TorqueFault::kCentre)
+      ShiftCentre(recordings_->model(), amplitude, &faults_[fault]);
+  };
+  std::vector<bool> is_found(faults_.size(), false);
   for (const CauseTerm& term : selection.terms) {
-    TorqueFault& found = faults_[term.candidate];
-    if (found.kind == TorqueFault::kCentre) ShiftCentre(recordings_->model(), term.amplitude, &found);
+    const TorqueFault& found = faults_[term.candidate];
+    is_found[term.candidate] = true;
+    shift(term.candidate, term.amplitude);
+    for (const auto& [fault, amplitude] : term.same) shift(fault, amplitude);
     for (TorqueFault& one : faults_) {
       // A payload's inertia is that of a point: it grows with the square of the distance.
       if (found.kind == TorqueFault::kPayload && one.kind == TorqueFault::kPayload &&
@@ -168,14 +178,15 @@ void TorqueEstimator::Relinearise(const CauseSelection& selection) {
         PlacePayload(term.amplitude[0], term.amplitude.segment<3>(1), &one);
     }
   }
-  for (TorqueFault& one : faults_)
-    if (one.kind == TorqueFault::kTorqueGain && one.index >= 0) ScaleWhole(selection, &one);
+  for (size_t i = 0; i < faults_.size(); ++i)
+    if (faults_[i].kind == TorqueFault::kTorqueGain && faults_[i].index >= 0)
+      ScaleWhole(is_found[i] ? selection.terms : std::vector<CauseTerm>(), &faults_[i]);
 }
 
-void TorqueEstimator::ScaleWhole(const CauseSelection& selection, TorqueFault* gain) const {
+void TorqueEstimator::ScaleWhole(const std::vector<CauseTerm>& terms, TorqueFault* gain) const {
   std::vector<ColumnPart>& parts = gain->columns.front();
   parts.resize(1);
-  for (const CauseTerm& term : selection.terms) {
+  for (const CauseTerm& term : terms) {
     const TorqueFault& found = faults_[term.candidate];
     const bool is_recorded = found.kind == TorqueFault::kTorqueGain || found.kind == TorqueFault::kExchange ||
                              found.kind == TorqueFault::kOffset || found.kind == TorqueFault::kAllOffsets ||
@@ -200,7 +211,7 @@ void TorqueEstimator::Weigh(const VectorXd& left) {
   }
 }
 
-void TorqueEstimator::Compress() { R_ = CalcFactor(rows_.CalcProducts()); }
+void TorqueEstimator::Compress() { R_ = CalcFactor(rows_.CalcProducts(), CountForced(*recordings_)); }
 
 Index TorqueEstimator::CountForcedRows() const {
   return (R_.leftCols(CountForced(*recordings_)).array() != 0.0).rowwise().any().count();

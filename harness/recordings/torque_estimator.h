@@ -37,8 +37,8 @@ class TorqueEstimator {
   CauseSelection Select();
   /// What products of faults leave is linear in each once the others are known.
   void Relinearise(const CauseSelection& selection);
-  /// A gain's column: the torque of the model and of the causes that the robot has besides.
-  void ScaleWhole(const CauseSelection& selection, TorqueFault* gain) const;
+  /// A gain's column: the torque of the model and of these causes, where the robot has them.
+  void ScaleWhole(const std::vector<CauseTerm>& terms, TorqueFault* gain) const;
   void Weigh(const VectorXd& left);
   /// Of what is left, in units of noise.
   [[nodiscard]] double CalcMeanSquare(const VectorXd& left) const;

@@ -104,10 +104,9 @@ void FillPart(const RecordingSet& recordings, const std::vector<TorqueFault>& fa
   // Rates are those of what was measured, which may be a current.
   const int joint = recordings.joints()[part->place];
   const Index rate = part->balance->Find(part->place, {TorqueColumn::kRate, joint});
-  const Index curvature = part->balance->Find(part->place, {TorqueColumn::kCurvature, joint});
   for (Index column = 0; column < map.cols(); ++column)
     for (Eigen::SparseMatrix<double>::InnerIterator it(map, column); it; ++it) {
-      const double unit = it.row() == rate || it.row() == curvature ? recordings.gain(part->place) : 1.0;
+      const double unit = it.row() == rate ? recordings.gain(part->place) : 1.0;
       entries.emplace_back(it.row(), forced + column, unit * it.value());
     }
   part->map.setFromTriplets(entries.begin(), entries.end());
