@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "controller/common/errors.h"
@@ -37,6 +38,7 @@ namespace dexcheck::cli {
 namespace {
 
 namespace fs = std::filesystem;
+using tinyxml2::XMLElement;
 
 struct InitRequest {
   fs::path robot;
@@ -49,9 +51,9 @@ struct InitRequest {
 /// Copies meshes, textures and the like into the folder's assets: a log keeps what lies beside the MJCF.
 void TakeAssets(const fs::path& folder, MjcfFile* mjcf) {
   AssetFolders places;
-  for (const tinyxml2::XMLElement* compiler : ListChildren(mjcf->root(), "compiler")) places.Read(*compiler);
+  for (const XMLElement* compiler : ListChildren(mjcf->root(), "compiler")) places.Read(*compiler);
   int count = 0;
-  VisitElements(mjcf->root(), [&](tinyxml2::XMLElement* element) {
+  VisitElements(mjcf->root(), [&](XMLElement* element) {
     const std::string_view kind = element->Name();
     for (const char* attribute : ListAssetAttributes(kind)) {
       const std::string name = ReadAttribute(*element, attribute);
@@ -65,7 +67,7 @@ void TakeAssets(const fs::path& folder, MjcfFile* mjcf) {
       element->SetAttribute(attribute, to.c_str());
     }
   });
-  for (tinyxml2::XMLElement* compiler : ListChildren(mjcf->root(), "compiler")) {
+  for (XMLElement* compiler : ListChildren(mjcf->root(), "compiler")) {
     for (const char* key : {"assetdir", "meshdir", "texturedir", "strippath"}) compiler->DeleteAttribute(key);
   }
 }
@@ -124,6 +126,22 @@ InitSources ReadSources(const InitRequest& request) {
   return sources;
 }
 
+/// The sky of this program's own scenes, where the file has none: pictures have a black one otherwise.
+void AddSky(MjcfFile* mjcf) {
+  XMLElement* const assets = RequireSection(mjcf->root(), "asset");
+  for (const XMLElement* texture : ListChildren(assets, "texture")) {
+    if (ReadAttribute(*texture, "type") == "skybox") return;
+  }
+  XMLElement* const sky = assets->InsertNewChildElement("texture");
+  for (const auto& [name, value] : {std::pair("type", "skybox"),
+                                    {"builtin", "gradient"},
+                                    {"rgb1", "0.90 0.93 0.95"},
+                                    {"rgb2", "0.42 0.55 0.68"},
+                                    {"width", "256"},
+                                    {"height", "1536"}})
+    sky->SetAttribute(name, value);
+}
+
 /// Limits of motors by joint, N m or N.
 std::map<std::string, double> ReadMotorLimits(const mjModel& m) {
   std::map<std::string, double> limits;
@@ -147,8 +165,8 @@ std::map<std::string, double> ReadHome(const mjModel& m) {
 /// Takes away the limits of motors that cannot carry the robot.
 void FreeMotors(const std::vector<std::string>& names, MjcfFile* mjcf) {
   if (names.empty()) return;
-  for (tinyxml2::XMLElement* section : ListChildren(mjcf->root(), "actuator")) {
-    for (tinyxml2::XMLElement* motor : ListChildren(section)) {
+  for (XMLElement* section : ListChildren(mjcf->root(), "actuator")) {
+    for (XMLElement* motor : ListChildren(section)) {
       if (std::find(names.begin(), names.end(), ReadAttribute(*motor, "name")) != names.end())
         motor->SetAttribute("ctrllimited", "false");
     }
@@ -301,6 +319,7 @@ int InitRobot(const InitRequest& request) {
 
   const RunFolder folder(request.out.empty() ? request.robot.stem().string() : request.out, "");
   const fs::path table = folder.path() / "robot.toml", mjcf = folder.path() / "robot.xml";
+  AddSky(sources.mjcf.get());
   TakeAssets(folder.path(), sources.mjcf.get());
   WriteFile(mjcf, sources.mjcf->Print());
   WriteFile(table, parameters);
