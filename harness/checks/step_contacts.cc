@@ -68,8 +68,9 @@ void StepAnalyzer::FindFeet() {
 
 double StepAnalyzer::CalcFootUse() const {
   const std::vector<GroundContact>& contacts = now_.step->response.feet;
-  const std::span<const int> frames = setup_->feet();
-  const auto body = [&](size_t i) { return setup_->model().frames()[static_cast<size_t>(frames[i])].link; };
+  const auto body = [&](size_t i) {
+    return setup_->model().frames()[static_cast<size_t>(setup_->feet()[i])].link;
+  };
   double largest = 0.0;
   for (size_t i = 0; i < contacts.size(); ++i) {
     double friction = 0.0, most = 0.0;

@@ -7,7 +7,7 @@
 #include <memory>
 #include <optional>
 #include <string>
-#include <utility>
+#include <string_view>
 #include <vector>
 
 #include "controller/common/errors.h"
@@ -94,6 +94,18 @@ std::unique_ptr<MjcfFile> AdaptForRun(const fs::path& source, std::map<std::stri
   return mjcf;
 }
 
+/// Writes the friction of joints into their elements, whatever their classes have.
+void StateFriction(const std::vector<Joint>& joints, MjcfFile* mjcf) {
+  VisitElements(mjcf->root(), [&](XMLElement* element) {
+    if (std::string_view(element->Name()) != "joint") return;
+    for (const Joint& joint : joints) {
+      if (ReadAttribute(*element, "name") != joint.name) continue;
+      element->SetAttribute("damping", FormatNumber(joint.damping).c_str());
+      element->SetAttribute("frictionloss", FormatNumber(joint.dry_friction).c_str());
+    }
+  });
+}
+
 /// Robot and MJCF of what was given; the MJCF is made of the description where there is none.
 struct InitSources {
   RobotDescription robot;
@@ -128,18 +140,12 @@ InitSources ReadSources(const InitRequest& request) {
 
 /// The sky of this program's own scenes, where the file has none: pictures have a black one otherwise.
 void AddSky(MjcfFile* mjcf) {
+  if (mjcf->Print().find("\"skybox\"") != std::string::npos) return;
   XMLElement* const assets = RequireSection(mjcf->root(), "asset");
-  for (const XMLElement* texture : ListChildren(assets, "texture")) {
-    if (ReadAttribute(*texture, "type") == "skybox") return;
-  }
-  XMLElement* const sky = assets->InsertNewChildElement("texture");
-  for (const auto& [name, value] : {std::pair("type", "skybox"),
-                                    {"builtin", "gradient"},
-                                    {"rgb1", "0.90 0.93 0.95"},
-                                    {"rgb2", "0.42 0.55 0.68"},
-                                    {"width", "256"},
-                                    {"height", "1536"}})
-    sky->SetAttribute(name, value);
+  tinyxml2::XMLDocument sky;
+  sky.Parse(R"(<texture type="skybox" builtin="gradient" rgb1="0.90 0.93 0.95" rgb2="0.42 0.55 0.68"
+                width="256" height="1536"/>)");
+  assets->InsertEndChild(sky.RootElement()->DeepClone(assets->GetDocument()));
 }
 
 /// Limits of motors by joint, N m or N.
@@ -287,6 +293,8 @@ int InitRobot(const InitRequest& request) {
       throw InputError(request.robot.string() + ": joint " + Quote(joint.name) +
                        ": must not be a ball joint in a run, whose law has one number for each joint");
   }
+  if (robot.format == RobotFormat::kMjcf)
+    StateFriction(ReduceFriction(request.robot.string(), &robot), sources.mjcf.get());
   // What cannot be an MJCF is refused before there is a folder.
   MjModelPtr engine = Load(*sources.mjcf);
   const std::map<std::string, double> home = ReadHome(*engine), limits = ReadMotorLimits(*engine);
@@ -325,8 +333,8 @@ int InitRobot(const InitRequest& request) {
   WriteFile(table, parameters);
   const std::optional<double> tolerance = FindTolerance(table, mjcf);
   const double rounded = tolerance.value_or(0.0);
-  WriteFile(folder.path() / "motion.toml", stand ? WriteStandScenario(robot, *stand, rounded)
-                                                 : WriteInitScenario(robot, motion.spans, rounded));
+  WriteFile(folder.path() / "motion.toml",
+            stand ? WriteStandScenario(robot, *stand, rounded) : WriteInitScenario(robot, motion, rounded));
   WriteFile(folder.path() / "gains.toml", fmt::format(kStudy, stand ? kEffort : kMargins));
   fs::create_directories(folder.path() / ".github/workflows");
   WriteFile(folder.path() / ".github/workflows/dexcheck.yml", kWorkflow);
