@@ -213,11 +213,11 @@ std::string MakeGainCard(const StudyInputs& inputs, const std::vector<TrialRow>&
                       ShowObjective(study.objectives.front(), best.judgement.objectives.front()),
                       ShowUnit(study.objectives.front().expression));
   const auto& metrics = row.result.metrics;
-  card += fmt::format(
-      "# margins, one torque at a time: gain {:.2f}, phase {:.1f} degrees, delay {:.2f} ms\n"
-      "# largest torque {:.3g} of its limit\n",
-      metrics[kGainMargin], RadToDeg(metrics[kPhaseMargin]), 1e3 * metrics[kDelayMargin],
-      metrics[kPeakEffort]);
+  if (std::isfinite(metrics[kGainMargin]))  // of a robot on its feet margins are not judged
+    card +=
+        fmt::format("# margins, one torque at a time: gain {:.2f}, phase {:.1f} degrees, delay {:.2f} ms\n",
+                    metrics[kGainMargin], RadToDeg(metrics[kPhaseMargin]), 1e3 * metrics[kDelayMargin]);
+  card += fmt::format("# largest torque {:.3g} of its limit\n", metrics[kPeakEffort]);
   const std::string limits = DescribeLimits(study, rows, points, best.judgement.objectives.front()),
                     edges = DescribeEdges(study, best.values);
   if (!limits.empty()) card += "# limited by " + limits + "\n";
