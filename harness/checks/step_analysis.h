@@ -82,7 +82,7 @@ struct StepAnalysis {
   VectorXd contact_mismatch;
   VectorXd contact_bias;  ///< CalcContactBias (3N).
   SlipSummary fingertips, wheels, feet;
-  int feet_missing = 0;           ///< Feet of a robot that stands which do not touch the ground.
+  double foot_gap = 0.0;          ///< Largest gap of a foot of a robot that stands and the ground, m.
   double foot_penetration = 0.0;  ///< Deepest overlap of a foot and the ground, m.
   /// Largest difference of a foot's distance by the plant and by the declared shapes, m, and whose it is.
   std::pair<double, int> foot_mismatch;
@@ -176,6 +176,9 @@ class StepAnalyzer {
   void ComparePrediction();
   void CalcObjectResidual();
   void FindFeet();
+  /// The largest, over the bodies that stand, of the friction at their contacts over the most that it can be,
+  /// each contact weighed with its slip: one that bears next to nothing may slide where the body does not.
+  [[nodiscard]] double CalcFootUse() const;
   void PredictStance();
   void FollowSlip();
   void ForgetSlip();

@@ -49,7 +49,7 @@ void StepAnalyzer::FindContacts() {
 
 void StepAnalyzer::FindFeet() {
   ground_->SetState(*now_.robot);
-  now_.feet_missing = 0;
+  now_.foot_gap = 0.0;
   now_.foot_penetration = 0.0;
   now_.foot_mismatch = {0.0, -1};
   const std::vector<GroundContact>& feet = now_.step->response.feet;
@@ -57,13 +57,32 @@ void StepAnalyzer::FindFeet() {
     const auto k = static_cast<Eigen::Index>(i);
     now_.findings.foot_force.segment<3>(3 * k) = feet[i].force;
     if (!feet[i].touching) {
-      ++now_.feet_missing;
+      now_.foot_gap = std::max(now_.foot_gap, ground_->gap()[k]);
       continue;
     }
     now_.foot_penetration = std::max(now_.foot_penetration, -feet[i].distance);
     const double mismatch = std::abs(feet[i].distance - ground_->gap()[k]);
     if (!(mismatch <= now_.foot_mismatch.first)) now_.foot_mismatch = {mismatch, static_cast<int>(i)};
   }
+}
+
+double StepAnalyzer::CalcFootUse() const {
+  const std::vector<GroundContact>& contacts = now_.step->response.feet;
+  const auto body = [&](size_t i) {
+    return setup_->model().frames()[static_cast<size_t>(setup_->feet()[i])].link;
+  };
+  double largest = 0.0;
+  for (size_t i = 0; i < contacts.size(); ++i) {
+    double friction = 0.0, most = 0.0;
+    for (size_t k = 0; k < contacts.size(); ++k) {
+      if (body(k) != body(i)) continue;
+      const double tangential = contacts[k].force.head<2>().norm(), speed = contacts[k].slip.norm();
+      friction += speed * tangential;
+      most += speed * (contacts[k].cone_margin + tangential);
+    }
+    if (most > 0.0) largest = std::max(largest, friction / most);
+  }
+  return largest;
 }
 
 void StepAnalyzer::ForgetSlip() {
@@ -94,6 +113,7 @@ void StepAnalyzer::FollowSlip() {
     Follow(step.response.feet[i], Matrix3d::Identity(), creep_rate, time_step_, &findings.foot_slip[i],
            &now_.feet);
   }
+  now_.feet.cone_use = CalcFootUse();
   for (size_t i = 0; i < step.response.fingertips.size(); ++i) {
     SlipState& slip = findings.fingertip_slip[i];
     const Matrix3d& R_o_cf = now_.grasp->contacts()[i].geometry.g_o_cf.linear();

@@ -45,6 +45,8 @@ void Print(const ErrorBudget& budget) {
     fmt::print("  {:<27}{:>9.2e}{:>9.2e}\n", name, size.rms, size.max);
   };
   row("none of them", budget.ideal);
+  // Errors up to where a run ended early are none of the motion's.
+  if (!budget.is_complete()) return fmt::print("\n");
   fmt::print("  {:<27}{:>9.2e}{:>9.2e}{:>10}\n", "sum of the above", budget.sum.rms, budget.sum.max,
              ShowPredicted(budget.predicted));
   row("all together", budget.all);

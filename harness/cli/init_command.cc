@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "controller/common/errors.h"
@@ -37,6 +38,7 @@ namespace dexcheck::cli {
 namespace {
 
 namespace fs = std::filesystem;
+using tinyxml2::XMLElement;
 
 struct InitRequest {
   fs::path robot;
@@ -49,9 +51,9 @@ struct InitRequest {
 /// Copies meshes, textures and the like into the folder's assets: a log keeps what lies beside the MJCF.
 void TakeAssets(const fs::path& folder, MjcfFile* mjcf) {
   AssetFolders places;
-  for (const tinyxml2::XMLElement* compiler : ListChildren(mjcf->root(), "compiler")) places.Read(*compiler);
+  for (const XMLElement* compiler : ListChildren(mjcf->root(), "compiler")) places.Read(*compiler);
   int count = 0;
-  VisitElements(mjcf->root(), [&](tinyxml2::XMLElement* element) {
+  VisitElements(mjcf->root(), [&](XMLElement* element) {
     const std::string_view kind = element->Name();
     for (const char* attribute : ListAssetAttributes(kind)) {
       const std::string name = ReadAttribute(*element, attribute);
@@ -65,7 +67,7 @@ void TakeAssets(const fs::path& folder, MjcfFile* mjcf) {
       element->SetAttribute(attribute, to.c_str());
     }
   });
-  for (tinyxml2::XMLElement* compiler : ListChildren(mjcf->root(), "compiler")) {
+  for (XMLElement* compiler : ListChildren(mjcf->root(), "compiler")) {
     for (const char* key : {"assetdir", "meshdir", "texturedir", "strippath"}) compiler->DeleteAttribute(key);
   }
 }
@@ -90,6 +92,18 @@ std::unique_ptr<MjcfFile> AdaptForRun(const fs::path& source, std::map<std::stri
   AddMotors(mjcf.get(), own);
   LeaveOutBaseContacts(mjcf.get());
   return mjcf;
+}
+
+/// Writes the friction of joints into their elements, whatever their classes have.
+void StateFriction(const std::vector<Joint>& joints, MjcfFile* mjcf) {
+  VisitElements(mjcf->root(), [&](XMLElement* element) {
+    if (std::string_view(element->Name()) != "joint") return;
+    for (const Joint& joint : joints) {
+      if (ReadAttribute(*element, "name") != joint.name) continue;
+      element->SetAttribute("damping", FormatNumber(joint.damping).c_str());
+      element->SetAttribute("frictionloss", FormatNumber(joint.dry_friction).c_str());
+    }
+  });
 }
 
 /// Robot and MJCF of what was given; the MJCF is made of the description where there is none.
@@ -124,6 +138,16 @@ InitSources ReadSources(const InitRequest& request) {
   return sources;
 }
 
+/// The sky of this program's own scenes, where the file has none: pictures have a black one otherwise.
+void AddSky(MjcfFile* mjcf) {
+  if (mjcf->Print().find("\"skybox\"") != std::string::npos) return;
+  XMLElement* const assets = RequireSection(mjcf->root(), "asset");
+  tinyxml2::XMLDocument sky;
+  sky.Parse(R"(<texture type="skybox" builtin="gradient" rgb1="0.90 0.93 0.95" rgb2="0.42 0.55 0.68"
+                width="256" height="1536"/>)");
+  assets->InsertEndChild(sky.RootElement()->DeepClone(assets->GetDocument()));
+}
+
 /// Limits of motors by joint, N m or N.
 std::map<std::string, double> ReadMotorLimits(const mjModel& m) {
   std::map<std::string, double> limits;
@@ -147,8 +171,8 @@ std::map<std::string, double> ReadHome(const mjModel& m) {
 /// Takes away the limits of motors that cannot carry the robot.
 void FreeMotors(const std::vector<std::string>& names, MjcfFile* mjcf) {
   if (names.empty()) return;
-  for (tinyxml2::XMLElement* section : ListChildren(mjcf->root(), "actuator")) {
-    for (tinyxml2::XMLElement* motor : ListChildren(section)) {
+  for (XMLElement* section : ListChildren(mjcf->root(), "actuator")) {
+    for (XMLElement* motor : ListChildren(section)) {
       if (std::find(names.begin(), names.end(), ReadAttribute(*motor, "name")) != names.end())
         motor->SetAttribute("ctrllimited", "false");
     }
@@ -269,6 +293,8 @@ int InitRobot(const InitRequest& request) {
       throw InputError(request.robot.string() + ": joint " + Quote(joint.name) +
                        ": must not be a ball joint in a run, whose law has one number for each joint");
   }
+  if (robot.format == RobotFormat::kMjcf)
+    StateFriction(ReduceFriction(request.robot.string(), &robot), sources.mjcf.get());
   // What cannot be an MJCF is refused before there is a folder.
   MjModelPtr engine = Load(*sources.mjcf);
   const std::map<std::string, double> home = ReadHome(*engine), limits = ReadMotorLimits(*engine);
@@ -301,13 +327,14 @@ int InitRobot(const InitRequest& request) {
 
   const RunFolder folder(request.out.empty() ? request.robot.stem().string() : request.out, "");
   const fs::path table = folder.path() / "robot.toml", mjcf = folder.path() / "robot.xml";
+  AddSky(sources.mjcf.get());
   TakeAssets(folder.path(), sources.mjcf.get());
   WriteFile(mjcf, sources.mjcf->Print());
   WriteFile(table, parameters);
   const std::optional<double> tolerance = FindTolerance(table, mjcf);
   const double rounded = tolerance.value_or(0.0);
-  WriteFile(folder.path() / "motion.toml", stand ? WriteStandScenario(robot, *stand, rounded)
-                                                 : WriteInitScenario(robot, motion.spans, rounded));
+  WriteFile(folder.path() / "motion.toml",
+            stand ? WriteStandScenario(robot, *stand, rounded) : WriteInitScenario(robot, motion, rounded));
   WriteFile(folder.path() / "gains.toml", fmt::format(kStudy, stand ? kEffort : kMargins));
   fs::create_directories(folder.path() / ".github/workflows");
   WriteFile(folder.path() / ".github/workflows/dexcheck.yml", kWorkflow);

@@ -44,32 +44,36 @@ void MendForEngine(RobotDescription* robot) {
          JoinNames(points));
 }
 
-/// Friction that stops a joint within less than the engine's step, which leaves its law no time to act, is
-/// reduced to what does so in one; dry friction from 1 rad/s or 1 m/s.
-void ReduceFriction(const std::string& source, RobotDescription* robot) {
-  constexpr double kStep = 1e-3;  // s
-  const RobotModel model = ParseRobotModel(WriteParameters(*robot, source), source);
+}  // namespace
+
+VectorXd CalcJointInertias(const RobotModel& model) {
   ModelTerms terms(model);
   VectorXd q = VectorXd::Zero(model.num_positions());
   if (model.base().type == BaseType::kFloating) q[3] = 1.0;
   terms.SetState(q, VectorXd::Zero(model.num_velocities()));
   terms.CalcDynamics();
-  const VectorXd inertia = MatrixXd(terms.M().inverse()).diagonal().cwiseInverse().tail(model.num_joints());
+  return MatrixXd(terms.M().inverse()).diagonal().cwiseInverse().tail(model.num_joints());
+}
+
+std::vector<Joint> ReduceFriction(const std::string& source, RobotDescription* robot) {
+  constexpr double kLeast = 0.01;  // s
+  const RobotModel model = ParseRobotModel(WriteParameters(*robot, source), source);
+  const VectorXd inertia = CalcJointInertias(model);
   std::vector<std::string> names;
+  std::vector<Joint> reduced;
   for (int i = 0; i < model.num_joints(); ++i) {
     Joint& joint = robot->spec.joints[static_cast<size_t>(i)];
-    const double most = inertia[i] / kStep;
+    const double most = inertia[i] / kLeast;
     if (std::max(joint.damping, joint.dry_friction) <= most) continue;
     names.push_back(
         fmt::format("{} ({:.3g} to {:.3g})", joint.name, std::max(joint.damping, joint.dry_friction), most));
     joint.damping = std::min(joint.damping, most);
     joint.dry_friction = std::min(joint.dry_friction, most);
+    reduced.push_back(joint);
   }
-  if (!names.empty())
-    Warn("friction that would stop a joint within the time step, 1 ms, is reduced: " + JoinNames(names));
+  if (!names.empty()) Warn("friction that would stop a joint within 10 ms is reduced: " + JoinNames(names));
+  return reduced;
 }
-
-}  // namespace
 
 void MendForRun(const std::string& source, RobotDescription* robot) {
   MendForEngine(robot);

@@ -8,6 +8,7 @@
 
 #include "controller/common/text.h"
 #include "controller/dynamics/model_terms.h"
+#include "harness/cli/init_mend.h"
 
 namespace dexcheck::cli {
 namespace {
@@ -100,6 +101,14 @@ class MotorUse {
   std::vector<double> limits_;
 };
 
+/// Natural frequency, rad/s, at which feedback damps each joint as its viscous friction does, which the law
+/// takes away: torques may be twice as large before the loop is unstable.
+double ChooseFrequency(const RobotModel& model) {
+  VectorXd rates = CalcJointInertias(model).cwiseInverse();  // 1/s
+  for (Eigen::Index i = 0; i < rates.size(); ++i) rates[i] *= model.joints()[static_cast<size_t>(i)].damping;
+  return std::ceil(std::clamp(0.5 * rates.maxCoeff(), 10.0, 50.0));
+}
+
 std::vector<std::map<std::string, double>> ListPoses(const RobotModel& model,
                                                      const std::vector<JointSpan>& spans) {
   constexpr int kPoses = 20;
@@ -119,6 +128,7 @@ InitMotion PlanInitMotion(const RobotDescription& robot, const RobotModel& model
                           const std::map<std::string, double>& home) {
   InitMotion motion;
   motion.spans = ChooseSpans(robot, home);
+  motion.frequency = ChooseFrequency(model);
   constexpr double kMostUse = 0.7, kFull = 0.9;
   constexpr int kHalvings = 4;
   MotorUse use(model, limits);
@@ -159,10 +169,9 @@ std::string WriteCompensation(const RobotDescription& robot) {
                      ListJoints(robot, [&](size_t i) { return joints[i].dry_friction; }));
 }
 
-std::string WriteInitScenario(const RobotDescription& robot, const std::vector<JointSpan>& spans,
-                              double tolerance) {
-  const std::string start = ListJoints(robot, [&](size_t i) { return spans[i].start; });
-  const std::string end = ListJoints(robot, [&](size_t i) { return spans[i].end; });
+std::string WriteInitScenario(const RobotDescription& robot, const InitMotion& motion, double tolerance) {
+  const std::string start = ListJoints(robot, [&](size_t i) { return motion.spans[i].start; });
+  const std::string end = ListJoints(robot, [&](size_t i) { return motion.spans[i].end; });
   const std::string compensation = WriteCompensation(robot);
   return fmt::format(
       R"(# A motion of the joints within their ranges, by computed torque, checked at every step.
@@ -187,10 +196,10 @@ points = [
 
 [control]
 law = "computed_torque"
-natural_frequency = 10
+natural_frequency = {}
 damping_ratio = 1
 {}{})",
-      WriteTolerance(tolerance), start, end, start, compensation,
+      WriteTolerance(tolerance), start, end, start, motion.frequency, compensation,
       compensation.empty() ? "\n[expect]\njoints = 0.01\n" : "");
 }
 

@@ -21,6 +21,7 @@ struct JointSpan {
 struct InitMotion {
   std::vector<JointSpan> spans;                      ///< One a joint.
   std::vector<std::map<std::string, double>> poses;  ///< Along it, by joint, rad or m.
+  double frequency = 10.0;                           ///< Natural frequency of its law, rad/s.
   std::vector<std::string> weak;  ///< Joints whose limit does not even hold the robot, or move it so little.
 };
 
@@ -41,7 +42,6 @@ std::string WriteTolerance(double tolerance);
 std::string WriteCompensation(const RobotDescription& robot);
 
 /// The scenario of that motion. @param tolerance of runs; 0 for rounding.
-std::string WriteInitScenario(const RobotDescription& robot, const std::vector<JointSpan>& spans,
-                              double tolerance);
+std::string WriteInitScenario(const RobotDescription& robot, const InitMotion& motion, double tolerance);
 
 }  // namespace dexcheck::cli

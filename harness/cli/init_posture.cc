@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <map>
 #include <string>
 #include <vector>
@@ -33,7 +34,7 @@ class StandTrial {
   }
 
   /// Puts the feet on the ground, and then, with the base lower by `sink`, the centre of mass over them.
-  [[nodiscard]] bool Settle(double sink, VectorXd* q) {
+  [[nodiscard]] bool Settle(double sink, bool in_plane, VectorXd* q) {
     GroundContacts ground(model_, stance_.feet);
     (*q)[3] = 1.0;
     SetAtRest(*q);
@@ -46,6 +47,7 @@ class StandTrial {
       VectorXd way = -terms_.CalcEnergyAndMomentum().com;
       for (int i = 0; i < ground.count(); ++i) way += ground.X_WF(i).translation() / ground.count();
       way.conservativeResizeLike(VectorXd::Zero(6));
+      if (in_plane) way[1] = 0.0;
       way[2] = k == 0 ? -sink : 0.0;
       DesiredJoints next;
       StanceMotion(model_, stance_, *q, JointMotion(way, {}, {})).Evaluate(0.0, &next);
@@ -60,13 +62,19 @@ class StandTrial {
     stand->weak.clear();
     StanceForces forces(model_, stance_);
     const StanceMotion motion(model_, stance_, q, JointMotion(VectorXd::Zero(6), ListWay(*stand), {}));
+    GroundContacts ground(model_, stance_.feet);
     DesiredJoints desired;
     constexpr int kSamples = 32;
+    constexpr double kStays = 1e-9;  // m, m/s, of feet
     for (int k = 0; k <= kSamples; ++k) {
       motion.Evaluate(4.0 * k / kSamples, &desired);
       if (!desired.q.allFinite() || !IsInRange(desired.q)) return false;
       terms_.SetState(desired.q, desired.q_dot);
       terms_.CalcDynamics();
+      // Legs with too few joints cannot move the base in all ways.
+      ground.SetState(terms_);
+      const double rate = (ground.J() * desired.q_dot).lpNorm<Eigen::Infinity>();
+      if (!(std::max(rate, ground.gap().lpNorm<Eigen::Infinity>()) < kStays)) return false;
       VectorXd force =
           terms_.M() * desired.q_ddot + terms_.C() * desired.q_dot + terms_.friction() + terms_.gravity();
       try {
@@ -121,7 +129,10 @@ std::string FindPosture(const RobotModel& model, const std::map<std::string, dou
   StandTrial trial(model, limits, *stand);
   bool settles = false;
   // Of the way to the middle of a joint's range, which bends a knee as it can be bent.
-  for (const double bend : {0.0, 0.1, 0.2, 0.3, 0.45, 0.6}) {
+  constexpr double kBends[] = {0.0, 0.1, 0.2, 0.3, 0.45, 0.6};
+  for (size_t k = 0; k < 2 * std::size(kBends); ++k) {
+    const double bend = kBends[k % std::size(kBends)];
+    stand->in_plane = k >= std::size(kBends);
     VectorXd q = VectorXd::Zero(model.num_positions());
     for (int i = 0; i < model.num_joints(); ++i) {
       const Joint& joint = model.joints()[static_cast<size_t>(i)];
@@ -129,7 +140,7 @@ std::string FindPosture(const RobotModel& model, const std::map<std::string, dou
       q[q.size() - model.num_joints() + i] =
           (1.0 - bend) * ClampInside(joint, stand->pose[joint.name]) + bend * middle;
     }
-    if (!trial.Settle(0.1 * bend * stand->height, &q)) continue;
+    if (!trial.Settle(0.1 * bend * stand->height, stand->in_plane, &q)) continue;
     settles = true;
     for (stand->sway = 1.0; stand->sway > 0.2; stand->sway *= 0.5) {
       if (!trial.Sways(q, stand)) continue;

@@ -64,6 +64,13 @@ std::vector<Vector3d> ListPlaces(const mjModel& m, int geom) {
   }
 }
 
+/// Whether the joint turns the geom about its own middle, as it does a wheel.
+bool TurnsAboutMiddle(const mjModel& m, int joint, int geom) {
+  constexpr double kNear = 0.1;  // of the geom's size
+  const Vector3d arm = MapVector(m.geom_pos + 3 * geom) - MapVector(m.jnt_pos + 3 * joint);
+  return arm.cross(MapVector(m.jnt_axis + 3 * joint)).norm() < kNear * m.geom_rbound[geom];
+}
+
 /// The element of that name anywhere in the world.
 XMLElement* FindBody(MjcfFile* mjcf, const std::string& name) {
   XMLElement* found = nullptr;
@@ -165,7 +172,7 @@ std::vector<JointWayPoint> ListWay(const Stand& stand) {
   const double way = 0.03 * stand.height * stand.sway, turn = kPi / 90.0 * stand.sway;
   std::vector<JointWayPoint> points{{2.0, VectorXd::Zero(6)}, {4.0, VectorXd::Zero(6)}};
   points[0].q << way, 0.0, -way, 0.0, turn, 0.0;
-  points[1].q << 0.0, way, -way, turn, 0.0, turn;
+  if (!stand.in_plane) points[1].q << 0.0, way, -way, turn, 0.0, turn;
   return points;
 }
 
@@ -206,7 +213,8 @@ Stand FindStand(const mjModel& m) {
     for (Place& place : KeepOutermost(low)) {
       place.foot.frame = fmt::format("foot_{}", stand.feet.size() + 1);
       const int joint = m.body_jntadr[body];
-      stand.has_wheels |= place.foot.is_added && joint >= 0 && m.jnt_limited[joint] == 0;
+      stand.has_wheels |= place.foot.is_added && joint >= 0 && m.jnt_limited[joint] == 0 &&
+                          TurnsAboutMiddle(m, joint, place.foot.geom);
       stand.feet.push_back(place.foot);
     }
   }

@@ -26,10 +26,11 @@ struct Foot {
 /// How the robot stands, in the posture of its first key frame, or at zero, or as near to it as it can.
 struct Stand {
   std::vector<Foot> feet;
-  bool has_wheels = false;             ///< A foot turns without end.
+  bool has_wheels = false;             ///< A foot turns without end about its own axis.
   double height = 0.0;                 ///< Of the base above the lowest foot, m.
   double weight = 0.0;                 ///< N.
   double sway = 1.0;                   ///< How far it moves: of what a robot on four feet can, 0 to 1.
+  bool in_plane = false;               ///< It moves along x and z, and turns about y, alone.
   std::map<std::string, double> pose;  ///< Of joints, rad or m.
   std::vector<std::map<std::string, double>> poses;  ///< Likewise, as it sways.
   std::vector<std::string> weak;                     ///< Joints whose motors' limits are too low for that.

@@ -130,13 +130,13 @@ size_t RemovePictures(MjModelPtr* model) {
   if (m.ntex == 0) return 0;
   const auto before = static_cast<size_t>(m.nbuffer);
   *model = MakeResizedCopy(m, [](mjModel* smaller) { smaller->ntex = smaller->ntexdata = 0; });
-  // In later releases a material has several.
-  ForEachArray(model->get(),
-               [&]<typename Number>(Number*& array, size_t rows, size_t columns, const ArrayName&) {
-                 if constexpr (std::is_same_v<Number, int>) {
-                   if (array == (*model)->mat_texid) std::fill_n(array, rows * columns, -1);
-                 }
-               });
+  // In later releases a material has several. An empty array lies where the next one begins: names tell them.
+  ForEachArray(model->get(), [&]<typename Number>(Number*& array, size_t rows, size_t columns,
+                                                  const ArrayName& array_name) {
+    if constexpr (std::is_same_v<Number, int>) {
+      if (array_name.name == "mat_texid") std::fill_n(array, rows * columns, -1);
+    }
+  });
   return before - static_cast<size_t>((*model)->nbuffer);
 }
 

@@ -113,10 +113,10 @@ Body ObjectBody(const FaultContext& context) {
 Body DrawLink(const FaultContext& context) {
   std::vector<const Joint*> links;
   for (const Joint& joint : context.setup.declared_model().joints()) {
+    if (!(joint.body.mass > 0.0)) continue;  // the links between several joints of one body have no other
     const int id = FindId(context.setup.engine(), mjOBJ_BODY, joint.link);
     constexpr double kSame = 1e-6;
-    if (joint.body.mass > 0.0 &&
-        std::abs(context.setup.engine().body_mass[id] - joint.body.mass) <= kSame * joint.body.mass)
+    if (std::abs(context.setup.engine().body_mass[id] - joint.body.mass) <= kSame * joint.body.mass)
       links.push_back(&joint);
   }
   const Joint& link = *links[context.draw->Index(links.size())];

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <map>
 
 #include "harness/run/joint_margins.h"
@@ -167,13 +168,14 @@ std::string DescribeFailures(const Study& study, const std::vector<TrialRow>& ro
 
 namespace {
 
-/// What keeps points that would be better, or came to no end, from being feasible: by how many trials.
+/// What keeps points that would be better than `best`, or came to no end, from being feasible: by how many
+/// trials.
 std::string DescribeLimits(const Study& study, const std::vector<TrialRow>& rows,
-                           const std::vector<JudgedPoint>& points, const JudgedPoint& best) {
+                           const std::vector<JudgedPoint>& points, double best) {
   std::map<std::string, int> limits;
   for (const JudgedPoint& point : points) {
     const double value = point.judgement.objectives.front();
-    const bool is_better = value < best.judgement.objectives.front() || !std::isfinite(value);
+    const bool is_better = value < best || !std::isfinite(value);
     if (point.judgement.is_feasible() || !is_better) continue;
     for (const TrialRow& row : rows) {
       if (row.trial.number / CountTrialsOfPoint(study) != point.number) continue;
@@ -185,12 +187,8 @@ std::string DescribeLimits(const Study& study, const std::vector<TrialRow>& rows
   }
   std::string text;
   for (const auto& [limit, count] : limits)
-    text += fmt::format("{}{} ({} trial{})", text.empty() ? "# limited by " : ", ", limit, count,
-                        count == 1 ? "" : "s");
-  if (!text.empty()) text += "\n";
-  const std::string edges = DescribeEdges(study, best.values);
-  if (!edges.empty()) text += "#" + edges + "\n";
-  return text.empty() ? "# limited by nothing in these ranges but the objective itself\n" : text;
+    text += fmt::format("{}{} ({} trial{})", text.empty() ? "" : ", ", limit, count, count == 1 ? "" : "s");
+  return text;
 }
 
 }  // namespace
@@ -206,7 +204,8 @@ std::string MakeGainCard(const StudyInputs& inputs, const std::vector<TrialRow>&
   const TrialRow& row = *std::find_if(rows.begin(), rows.end(),
                                       [&](const TrialRow& one) { return one.trial.number == number; });
   const Scenario scenario = MakeTrialScenario(inputs, row.trial);
-  if (scenario.joint_task() == nullptr) return "";
+  // Of a controller of the user's own the gains are its own.
+  if (scenario.joint_task() == nullptr || scenario.controller.exists()) return "";
   const Scenario yours =
       ParseScenario(inputs.scenario_text, inputs.scenario_source, inputs.scenario_folder, study.overrides);
   std::string card = "# your gains:\n" + CommentLines(WriteJointControl(yours, 1.0));
@@ -214,12 +213,18 @@ std::string MakeGainCard(const StudyInputs& inputs, const std::vector<TrialRow>&
                       ShowObjective(study.objectives.front(), best.judgement.objectives.front()),
                       ShowUnit(study.objectives.front().expression));
   const auto& metrics = row.result.metrics;
-  card += fmt::format(
-      "# margins, one torque at a time: gain {:.2f}, phase {:.1f} degrees, delay {:.2f} ms\n"
-      "# largest torque {:.3g} of its limit\n",
-      metrics[kGainMargin], RadToDeg(metrics[kPhaseMargin]), 1e3 * metrics[kDelayMargin],
-      metrics[kPeakEffort]);
-  return card + DescribeLimits(study, rows, points, best) + WriteJointControl(scenario, 1.0);
+  if (std::isfinite(metrics[kGainMargin]))  // of a robot on its feet margins are not judged
+    card +=
+        fmt::format("# margins, one torque at a time: gain {:.2f}, phase {:.1f} degrees, delay {:.2f} ms\n",
+                    metrics[kGainMargin], RadToDeg(metrics[kPhaseMargin]), 1e3 * metrics[kDelayMargin]);
+  card += fmt::format("# largest torque {:.3g} of its limit\n", metrics[kPeakEffort]);
+  const std::string limits = DescribeLimits(study, rows, points, best.judgement.objectives.front()),
+                    edges = DescribeEdges(study, best.values);
+  if (!limits.empty()) card += "# limited by " + limits + "\n";
+  if (!edges.empty()) card += "#" + edges + "\n";
+  if (limits.empty() && edges.empty())
+    card += "# limited by nothing in these ranges but the objective itself\n";
+  return card + WriteJointControl(scenario, 1.0);
 }
 
 std::string DescribeValues(const Study& study, const std::vector<double>& values) {
@@ -253,7 +258,9 @@ std::vector<std::string> ListFindings(const Study& study, const std::vector<Tria
   const std::vector<JudgedPoint> points = JudgePoints(study, rows);
   if (points.empty()) return findings;
   if (SortFeasible(points).empty()) {
-    findings.push_back(fmt::format("At none of {} all constraints hold.", CountPoints(points.size())));
+    findings.push_back(
+        fmt::format("At none of {} all constraints hold: {}.", CountPoints(points.size()),
+                    DescribeLimits(study, rows, points, std::numeric_limits<double>::infinity())));
   } else {
     findings.push_back(study.objectives.size() == 1 ? DescribeBest(study, points)
                                                     : DescribeFront(study, points));

@@ -85,9 +85,9 @@ Setup MakeSetup(const StudyInputs& inputs, const Trial& trial, const Scenario& s
   return Setup(scenario, MakeModel(inputs, trial, scenario), inputs.mjcf, MakeEngine(inputs));
 }
 
-/// None of a loop that is not stable: nothing is left.
+/// None of a loop that is not stable: nothing is left. Of a law that is not known they are not, either.
 void SetMargins(const Setup& setup, std::array<double, kNumMetrics>* metrics) {
-  if (setup.joints() == nullptr) return;
+  if (setup.joints() == nullptr || !setup.scenario().knows_law()) return;
   const std::optional<JointMargins> margins =
       CalcJointMargins(setup, setup.joints()->gains, /*together=*/false);
   if (!margins) return;

@@ -123,5 +123,20 @@ TEST(RemoveLooks, KeepsWhatAnythingRefersTo) {
   EXPECT_GT(contacts, 0);
 }
 
+// What follows the array of the materials, which has no rows, stays as it is.
+TEST(RemovePictures, OfAModelWithoutMaterialsLeavesItsMotors) {
+  MjModelPtr model = LoadMjcfText(R"(
+    <mujoco>
+      <asset><texture type="skybox" builtin="gradient" width="8" height="48"/></asset>
+      <worldbody><body><joint name="j"/><inertial mass="1" pos="0 0 0" diaginertia="1 1 1"/></body></worldbody>
+      <actuator><motor joint="j"/></actuator>
+    </mujoco>)",
+                                  "text");
+  ASSERT_EQ(model->nmat, 0);
+  EXPECT_GT(RemovePictures(&model), 8U * 48U * 3U);
+  EXPECT_EQ(model->actuator_trntype[0], mjTRN_JOINT);
+  EXPECT_EQ(model->actuator_trnid[0], 0);
+}
+
 }  // namespace
 }  // namespace dexcheck::testing::remove_looks_test
