@@ -140,12 +140,16 @@ InitSources ReadSources(const InitRequest& request) {
 
 /// The sky of this program's own scenes, where the file has none: pictures have a black one otherwise.
 void AddSky(MjcfFile* mjcf) {
-  if (mjcf->Print().find("\"skybox\"") != std::string::npos) return;
-  XMLElement* const assets = RequireSection(mjcf->root(), "asset");
-  tinyxml2::XMLDocument sky;
-  sky.Parse(R"(<texture type="skybox" builtin="gradient" rgb1="0.90 0.93 0.95" rgb2="0.42 0.55 0.68"
-                width="256" height="1536"/>)");
-  assets->InsertEndChild(sky.RootElement()->DeepClone(assets->GetDocument()));
+  bool has_sky = false;
+  VisitElements(mjcf->root(), [&](XMLElement* element) {
+    has_sky |= std::string_view(element->Name()) == "texture" && ReadAttribute(*element, "type") == "skybox";
+  });
+  if (has_sky) return;
+  XMLElement* const sky = RequireSection(mjcf->root(), "asset")->InsertNewChildElement("texture");
+  constexpr const char* kSky[][2] = {{"type", "skybox"},         {"builtin", "gradient"},
+                                     {"rgb1", "0.90 0.93 0.95"}, {"rgb2", "0.42 0.55 0.68"},
+                                     {"width", "256"},           {"height", "1536"}};
+  for (const auto& [attribute, value] : kSky) sky->SetAttribute(attribute, value);
 }
 
 /// Limits of motors by joint, N m or N.
