@@ -75,9 +75,9 @@ class GraspController {
   /// cones holds the object.
   const VectorXd& CalcTorque(const DesiredMotion& desired);
 
-  [[nodiscard]] const GraspModel& model() const { return model_; }
-  [[nodiscard]] const ModelTerms& robot() const { return model_.robot(); }
-  [[nodiscard]] const GraspTerms& grasp() const { return model_.grasp(); }
+  [[nodiscard]] const GraspModel& model() const { return model_.now(); }
+  [[nodiscard]] const ModelTerms& robot() const { return model().robot(); }
+  [[nodiscard]] const GraspTerms& grasp() const { return model().grasp(); }
   [[nodiscard]] const ComputedTorque& law() const { return law_; }
   /// sigma' (n) of the state set, from the posture task.
   [[nodiscard]] const VectorXd& sigma_prime() const { return sigma_prime_; }
@@ -92,7 +92,7 @@ class GraspController {
 
  private:
   GraspControllerOptions options_;
-  GraspModel model_;
+  AlternatingModel model_;
   ComputedTorque law_;
   std::optional<BaselineLaw> baseline_;  // none for computed torque
   GraspForceStage force_;

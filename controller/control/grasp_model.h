@@ -2,6 +2,7 @@
 
 // Everything that the paper's laws need of robot, object and contacts at one state.
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -50,6 +51,9 @@ class GraspModel {
   /// Evaluates all terms at a state. @throws what GraspTerms and CalcP throw.
   void SetState(const MeasuredState& state);
 
+  /// The angles' branch is the one nearest to that of `other` at the next state.
+  void Follow(const GraspModel& other) { X_o_ = other.X_o_; }
+
   [[nodiscard]] const ModelTerms& robot() const { return robot_; }
   [[nodiscard]] const GraspTerms& grasp() const { return grasp_; }
   /// Whether X_o and the terms in it are evaluated.
@@ -60,6 +64,26 @@ class GraspModel {
   ModelTerms robot_;
   GraspTerms grasp_;
   Vector6d X_o_;  // of the last state, to stay on one branch of the angles
+};
+
+/// Two of them by turns: what was evaluated at one step can be read while the next one is evaluated.
+class AlternatingModel {
+ public:
+  explicit AlternatingModel(const GraspModel& model) : models_{model, model} {}
+
+  /// As GraspModel::SetState; the model of the call before stays as it is.
+  void SetState(const MeasuredState& state) {
+    const GraspModel& last = now();
+    now_ = 1 - now_;
+    models_[now_].Follow(last);
+    models_[now_].SetState(state);
+  }
+  /// The one that was evaluated last.
+  [[nodiscard]] const GraspModel& now() const { return models_[now_]; }
+
+ private:
+  std::array<GraspModel, 2> models_;
+  size_t now_ = 0;
 };
 
 }  // namespace dexcheck

@@ -69,7 +69,7 @@ const VectorXd& JointLaw::CalcTorque(const ModelTerms& robot, const Eigen::Ref<c
 JointController::JointController(const RobotModel& model, const MassProperties& object,
                                  const Surface& surface, ControlLaw law, const JointGains& gains,
                                  const JointMotion& motion, const Sampling& sampling)
-    : model_(model, {}, object, surface, {.orientation = OrientationFeedback::kRotation}),
+    : model_(GraspModel(model, {}, object, surface, {.orientation = OrientationFeedback::kRotation})),
       law_(model, law, gains),
       demand_(motion, sampling.time_step),
       sampling_(sampling) {
@@ -108,7 +108,7 @@ void JointController::Step(const Reading& reading, double t, Command* command) {
     return;
   }
   steps_until_due_ = sampling_.hold - 1;
-  command->tau = law_.CalcTorque(model_.robot(), reading.state.q, reading.state.xi, command->joints);
+  command->tau = law_.CalcTorque(model().robot(), reading.state.q, reading.state.xi, command->joints);
   command->demand.xi_dot = law_.xi_dot_d();
   command->demand.f_c = law_.ground_forces();
 }

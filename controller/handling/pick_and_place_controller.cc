@@ -11,7 +11,7 @@ PickAndPlaceController::PickAndPlaceController(const RobotModel& model, const Ha
                                                const GraspControllerOptions& options, const VectorXd& q_start,
                                                const PickAndPlaceOptions& task, double time_step)
     : options_(options),
-      model_(model, hand.fingertips, object, surface, options),
+      model_(GraspModel(model, hand.fingertips, object, surface, options)),
       law_(model, hand.fingertips, object, surface, options),
       task_(model, hand, surface, object, q_start, task, time_step) {
   Require(options.orientation == OrientationFeedback::kRotation, "orientation", "must be kRotation",
@@ -26,7 +26,7 @@ void PickAndPlaceController::Begin(double t, const Reading& reading) {
 }
 
 void PickAndPlaceController::CalcTorque(const Reading& reading) {
-  tau_ = law_.CalcTorque(model_, reading.state, task_.demand(), sigma_prime_);
+  tau_ = law_.CalcTorque(model(), reading.state, task_.demand(), sigma_prime_);
 }
 
 void PickAndPlaceController::Step(const Reading& reading, double t, Command* command) {

@@ -161,6 +161,7 @@ void ClosedLoop::ControlStep(double t) {
   sensing_.Measure(record_.reading, &record_.measured);
   if (hidden_sensor_fault_) hidden_sensor_fault_(t, &record_.measured.state);
   controller_->Step(record_.measured, t, &record_.command);
+  record_.model = record_.true_model = &controller_->model();
   DriveMotors(t);
   if (!disturbances_.empty()) {
     plant_->Push(disturbances_.Evaluate(record_.time, record_.reading));

@@ -3,6 +3,16 @@
 #include <utility>
 
 namespace dexcheck {
+namespace {
+
+/// Lets the other thread of the core go first.
+void Pause() {
+#ifdef __x86_64__
+  __builtin_ia32_pause();
+#endif
+}
+
+}  // namespace
 
 SideThread::SideThread(std::function<void()> work) : work_(std::move(work)), thread_([this] { Run(); }) {}
 
@@ -24,7 +34,10 @@ void SideThread::AwaitChange(State from) const {
   constexpr int kSpins = 5000, kAlone = 200;
   for (int i = 0; i < kSpins; ++i) {
     if (state_.load(std::memory_order_acquire) != from) return;
-    if (i >= kAlone) std::this_thread::yield();
+    if (i >= kAlone)
+      std::this_thread::yield();
+    else
+      Pause();
   }
   state_.wait(from, std::memory_order_acquire);
 }

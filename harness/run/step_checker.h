@@ -7,8 +7,8 @@
 
 namespace dexcheck {
 
-/// Checks of one step at a time in a thread of their own, on a copy of its record and of the controller's
-/// model, so that the next step can go on.
+/// Checks of one step at a time in a thread of their own, on a copy of its record (and of the controller's
+/// model, unless that is at two places by turns), so that the next step can go on.
 class StepChecker {
  public:
   /// @param like a record whose model says what copies look like. @param check makes the checks of a copy.
@@ -26,7 +26,9 @@ class StepChecker {
  private:
   std::function<void(StepRecord*)> check_;
   StepRecord step_;
-  GraspModel model_;
+  GraspModel model_;  // a copy of one that the next step overwrites
+  const GraspModel* last_ = nullptr;
+  const GraspModel* before_last_ = nullptr;
   bool is_pending_ = false;
   SideThread thread_;
 };
