@@ -229,7 +229,7 @@ std::vector<std::string> ListExcesses(const DigitVerdict& verdict, const std::st
   constexpr double kNothingOpen = 1e9;  // the unit is rounding then
   std::vector<std::string> lines;
   std::vector<std::string> following;
-  std::map<std::string, std::pair<size_t, int>> left_out;  // by check: its line, and how many more there are
+  std::map<std::string, std::pair<size_t, int>> alike;  // its line, and how many more there are
   double most = 0.0;
   for (const DigitExcess& excess : verdict.excesses) {
     if (!excess.is_cause) {
@@ -237,23 +237,21 @@ std::vector<std::string> ListExcesses(const DigitVerdict& verdict, const std::st
       RaiseTo(excess.units, &most);
       continue;
     }
-    std::string& line =
-        lines.emplace_back(fmt::format("{}: {}: {:.12g} in {}, {:.12g} in {}; ", excess.check, excess.where,
-                                       excess.first, first, excess.second, second));
-    if (excess.effect.empty()) {
-      line += excess.units < kNothingOpen
-                  ? fmt::format("{:.3g} times what their digits leave open", excess.units)
-                  : "their digits leave nothing open";
-      continue;
-    }
-    // What one file leaves out of a joint it leaves out of most: the worst stands for all.
-    line += excess.effect;
-    const auto [first_line, is_new] = left_out.emplace(excess.check, std::pair(lines.size() - 1, 0));
-    if (is_new) continue;
-    ++first_line->second.second;
-    lines.pop_back();
+    const std::string values =
+        fmt::format("{:.12g} in {}, {:.12g} in {}; ", excess.first, first, excess.second, second);
+    // The same two numbers, or what one file leaves out, are one fault of many joints: the worst stands for
+    // all.
+    const auto [line, is_new] =
+        alike.emplace(excess.check + (excess.effect.empty() ? values : ""), std::pair(lines.size(), 0));
+    line->second.second += is_new ? 0 : 1;
+    if (!is_new) continue;
+    lines.push_back(excess.check + ": " + excess.where + ": " + values);
+    lines.back() += !excess.effect.empty() ? excess.effect
+                    : excess.units < kNothingOpen
+                        ? fmt::format("{:.3g} times what their digits leave open", excess.units)
+                        : "their digits leave nothing open";
   }
-  for (const auto& [check, line] : left_out) {
+  for (const auto& [key, line] : alike) {
     if (line.second > 0) lines[line.first] += fmt::format("; and so at {} more", line.second);
   }
   if (!following.empty())

@@ -9,10 +9,17 @@
 namespace dexcheck {
 namespace {
 
+/// Without -0, and rounding.
+template <typename Matrix>
+Matrix Tidy(const Matrix& values) {
+  const double rounding = 1e-12 * values.cwiseAbs().maxCoeff();
+  return values.unaryExpr([=](double value) { return std::abs(value) > rounding ? value : 0.0; });
+}
+
 /// Seven digits: what a person reads of a body.
 std::string Describe(const MassProperties& body) {
-  const Matrix3d I = body.inertia + Matrix3d::Zero();  // no -0
-  const Vector3d c = body.com + Vector3d::Zero();
+  const Matrix3d I = Tidy(body.inertia);
+  const Vector3d c = Tidy(body.com);
   return fmt::format(
       "mass {:.7g}, com [{:.7g}, {:.7g}, {:.7g}], inertia [{:.7g}, {:.7g}, {:.7g}, {:.7g}, {:.7g}, {:.7g}]",
       body.mass, c[0], c[1], c[2], I(0, 0), I(1, 1), I(2, 2), I(0, 1), I(0, 2), I(1, 2));

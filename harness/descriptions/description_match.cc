@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <map>
 
 #include "controller/common/errors.h"
@@ -18,6 +19,8 @@
 
 namespace dexcheck {
 namespace {
+
+std::string FileName(const RobotSpec& spec) { return std::filesystem::path(spec.source).filename().string(); }
 
 /// What each of the two takes from the other.
 class Matching {
@@ -81,8 +84,9 @@ class Matching {
     const auto take = [this](RobotDescription* robot, const RobotDescription& other) {
       if (robot->states_base || other.spec.base.type != BaseType::kFloating) return;
       LetBaseFloat(robot);
-      result_.notes.push_back("base: " + robot->spec.source +
-                              " does not say how its root moves; it floats as that of " + other.spec.source);
+      result_.notes.push_back("base: " + FileName(robot->spec) +
+                              " does not say how its root moves; it floats as that of " +
+                              FileName(other.spec));
     };
     take(&a_, b_);
     take(&b_, a_);
@@ -94,7 +98,7 @@ class Matching {
     if (a_.states_gravity == b_.states_gravity) return;
     (a_.states_gravity ? b_ : a_).spec.gravity = (a_.states_gravity ? a_ : b_).spec.gravity;
     result_.unstated.emplace_back("gravity_vector");
-    result_.not_compared.push_back("gravity: only " + (a_.states_gravity ? a_ : b_).spec.source +
+    result_.not_compared.push_back("gravity: only " + FileName((a_.states_gravity ? a_ : b_).spec) +
                                    " states it, " + FormatNumbers(a_.spec.gravity));
   }
 
@@ -142,7 +146,7 @@ class Matching {
         finding.location = {Location::Kind::kJoint, static_cast<int>(i), -1};
         finding.model = own;
         finding.engine = other;
-        finding.effect = "only " + (in_a ? a_ : b_).spec.source + " states it";
+        finding.effect = "only " + FileName((in_a ? a_ : b_).spec) + " states it";
       }
       (in_a ? other : own) = in_a ? own : other;
     });
@@ -162,7 +166,7 @@ class Matching {
     result_.not_compared.push_back(std::string(constant.word) + ": ignored" +
                                    (names.empty() ? ""
                                                   : ", though it differs at " + JoinNames(names) +
-                                                        "; terms are with that of " + a_.spec.source));
+                                                        "; terms are with that of " + FileName(a_.spec)));
   }
 
   void IgnoreCouplings() {
@@ -180,7 +184,7 @@ class Matching {
       Joint& own = a_.spec.joints[i];
       Joint& other = b_.spec.joints[j];
       if (own.lower != other.lower || own.upper != other.upper)
-        taken[(in_a ? a_ : b_).spec.source].push_back(own.name);
+        taken[FileName((in_a ? a_ : b_).spec)].push_back(own.name);
       const Joint& stated = in_a ? own : other;
       Joint& silent = in_a ? other : own;
       silent.lower = stated.lower;
@@ -201,7 +205,7 @@ class Matching {
         return lacks;
       });
       if (!dropped.empty())
-        result_.not_compared.push_back("frames only in " + robot->spec.source + ": " + JoinNames(dropped));
+        result_.not_compared.push_back("frames only in " + FileName(robot->spec) + ": " + JoinNames(dropped));
     };
     drop(&a_, b_);
     drop(&b_, a_);
