@@ -1,7 +1,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <map>
+#include <span>
 
 #include "controller/common/text.h"
 #include "harness/descriptions/finding.h"
@@ -9,20 +11,16 @@
 namespace dexcheck {
 namespace {
 
-/// Without -0, and rounding.
-template <typename Matrix>
-Matrix Tidy(const Matrix& values) {
-  const double rounding = 1e-12 * values.cwiseAbs().maxCoeff();
-  return values.unaryExpr([=](double value) { return std::abs(value) > rounding ? value : 0.0; });
-}
-
-/// Seven digits: what a person reads of a body.
-std::string Describe(const MassProperties& body) {
-  const Matrix3d I = Tidy(body.inertia);
-  const Vector3d c = Tidy(body.com);
-  return fmt::format(
-      "mass {:.7g}, com [{:.7g}, {:.7g}, {:.7g}], inertia [{:.7g}, {:.7g}, {:.7g}, {:.7g}, {:.7g}, {:.7g}]",
-      body.mass, c[0], c[1], c[2], I(0, 0), I(1, 1), I(2, 2), I(0, 1), I(0, 2), I(1, 2));
+/// What a person reads of a body.
+std::string Describe(const MassProperties& body, std::span<const Quantity> quantities) {
+  const Matrix3d& I = body.inertia;
+  Vector6d moments;
+  moments << I.diagonal(), I(0, 1), I(0, 2), I(1, 2);
+  const std::string texts[] = {"mass " + FormatNumber(body.mass, 7), "com " + ShowNumbers(body.com),
+                               "inertia " + ShowNumbers(moments)};
+  std::string text;
+  for (const Quantity one : quantities) text += (text.empty() ? "" : ", ") + texts[static_cast<size_t>(one)];
+  return text;
 }
 
 constexpr size_t kMany = 3;
@@ -117,12 +115,14 @@ class BodySearch {
                             " looks " + convention->words);
       finding.many.push_back(std::string(NameOf(convention->of, true)) + " look " + convention->words);
     }
-    Add(std::move(finding), cover.links);
+    Add(std::move(finding), cover.links,
+        IsOfBody(quantity) ? std::span<const Quantity>(&quantity, 1)
+                           : std::span<const Quantity>(kBodyQuantities));
     for (size_t k = 0; k < cover.links.size(); ++k) bodies_[cover.links[k]] = cover.undone[k].body;
   }
 
   /// Names the links, and adds to an earlier finding of the same kind.
-  void Add(Finding finding, const std::vector<size_t>& links) {
+  void Add(Finding finding, const std::vector<size_t>& links, std::span<const Quantity> quantities) {
     finding.cells = links.size();
     const auto same = std::find_if(found_.begin(), found_.end(), [&](const Finding& other) {
       return other.ids == finding.ids && other.what == finding.what &&
@@ -135,15 +135,15 @@ class BodySearch {
     }
     for (const size_t i : links) {
       target.parts.push_back(target.what == "joint" ? read_[i].joint_name : read_[i].link);
-      AddValue(i, &target);
+      AddValue(i, quantities, &target);
     }
   }
 
-  void AddValue(size_t i, Finding* finding) const {
+  void AddValue(size_t i, std::span<const Quantity> quantities, Finding* finding) const {
     constexpr size_t kMostValues = 3;
     if (finding->what == "joint" || finding->values.size() == kMostValues) return;
-    finding->values.push_back("link " + read_[i].link + ": " + Describe(read_[i].given.body) +
-                              "; right would be " + Describe(read_[i].right.body));
+    finding->values.push_back("link " + read_[i].link + ": " + Describe(read_[i].given.body, quantities) +
+                              "; right would be " + Describe(read_[i].right.body, quantities));
   }
 
   [[nodiscard]] std::vector<size_t> ListOpen() const {
@@ -171,7 +171,7 @@ class BodySearch {
     Finding finding;
     finding.ids = {id};
     finding.one = {sentence};
-    Add(std::move(finding), links);
+    Add(std::move(finding), links, kBodyQuantities);
   }
 
   /// Each body is that of the next joint, or of the one before.
@@ -273,7 +273,7 @@ class BodySearch {
     for (size_t i = 0; i < bodies_.size(); ++i) {
       if (!IsWrong(bodies_[i], quantity)) continue;
       finding.parts.push_back(bodies_[i].link);
-      AddValue(i, &finding);
+      AddValue(i, {&quantity, 1}, &finding);
       TakeRight(quantity, i);
       taken_.emplace_back(i, quantity);
     }

@@ -24,6 +24,9 @@ inline bool IsOfRow(Quantity quantity) { return IsOfPlace(quantity) || quantity 
 /// "mass" and "masses"; "place" stands for origin and rotation together.
 const char* NameOf(Quantity quantity, bool many);
 
+/// "[a, b, c]" to be read: seven digits, zero for what is rounding beside the largest.
+std::string ShowNumbers(const VectorXd& values);
+
 /// What a file states of a link, or of a part that is welded to one, and of what places it.
 struct StatedPart {
   MassProperties body;                   ///< In the part's own frame L.

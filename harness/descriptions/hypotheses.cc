@@ -261,7 +261,7 @@ class Explaining {
                                     [](const auto& reading) { return std::get<0>(reading); });
     finding.ids = {std::get<1>(*first)};
     finding.one = {std::get<2>(*first)};
-    finding.values.push_back("gravity: " + FormatNumbers(own) + "; right would be " + FormatNumbers(right));
+    finding.values.push_back("gravity: " + ShowNumbers(own) + "; right would be " + ShowNumbers(right));
     found_.push_back(std::move(finding));
   }
 

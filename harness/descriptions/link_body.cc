@@ -18,6 +18,14 @@ const char* NameOf(Quantity quantity, bool many) {
   return kNames[static_cast<size_t>(quantity)][many ? 1 : 0];
 }
 
+std::string ShowNumbers(const VectorXd& values) {
+  const double rounding = 1e-9 * values.cwiseAbs().maxCoeff();
+  std::string text;
+  for (const double value : values)
+    text += (text.empty() ? "[" : ", ") + FormatNumber(std::abs(value) > rounding ? value : 0.0, 7);
+  return text + "]";
+}
+
 bool AgreesIn(Quantity quantity, const StatedPart& a, const StatedPart& b, double length, double tolerance) {
   const auto same = [&](double x, double y) {
     return std::abs(x - y) <= tolerance * std::max(std::abs(x), std::abs(y));

@@ -9,9 +9,8 @@
 namespace dexcheck {
 namespace {
 
-std::string Format(const Vector3d& v) { return FormatNumbers(v + Vector3d::Zero()); }
 std::string DescribeOrigin(const StatedPart& part) {
-  return "another one, " + Format(part.X_PL.translation()) + " would be right";
+  return "another one, " + ShowNumbers(part.X_PL.translation()) + " would be right";
 }
 
 }  // namespace
@@ -74,8 +73,11 @@ void RowReader::AddNumbers(size_t i, const Pose& X_ab_P, const StatedPart& given
   if (IsAxisRight(problem_, i, given, X_ab_P)) AddOffsets(i, X_ab_P, given, readings);
   StatedPart turned = given;
   turned.axis = given.X_PL.linear().transpose() * right.X_PL.linear() * right.axis;
-  offer(
-      {turned, kNumber + 0.2, {}, "number.axis", "another one, " + Format(turned.axis) + " would be right"});
+  offer({turned,
+         kNumber + 0.2,
+         {},
+         "number.axis",
+         "another one, " + ShowNumbers(turned.axis) + " would be right"});
   for (int k = 0; k < 3; ++k) {
     StatedPart moved = given;
     moved.X_PL.translation()[k] = right.X_PL.translation()[k];
@@ -93,8 +95,8 @@ void RowReader::AddNumbers(size_t i, const Pose& X_ab_P, const StatedPart& given
          std::min(kNumber * numbers, kUnexplained - 0.5),
          {},
          "number.place",
-         "another one, [" + Format(right.X_PL.translation()) + "] with roll, pitch, yaw " +
-             Format(CalcRollPitchYaw(right.X_PL.linear())) + " would be right"});
+         "another one, " + ShowNumbers(right.X_PL.translation()) + " with roll, pitch, yaw " +
+             ShowNumbers(CalcRollPitchYaw(right.X_PL.linear())) + " would be right"});
   placed.axis = right.axis;
   offer({placed,
          std::min(kNumber * (numbers + 1.0), kUnexplained - 0.4),

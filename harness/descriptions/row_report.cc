@@ -101,10 +101,11 @@ class RowReport {
   void AddValue(const std::string& id, size_t row, size_t rows, Finding* finding) const {
     if (rows < 2 || id.find('.') == std::string::npos) return;
     for (const RowReading& reading : open_[row].readings) {
-      if (reading.number == id)
-        finding->values.push_back("joint " + finding->parts.back() + ": its " +
-                                  (id == "zero.offset" ? "zero" : id.substr(id.find('.') + 1)) + " looks " +
-                                  reading.words);
+      if (reading.number != id) continue;
+      finding->values.push_back("joint " + finding->parts.back() + ": its " +
+                                (id == "zero.offset" ? "zero" : id.substr(id.find('.') + 1)) + " looks " +
+                                reading.words);
+      return;
     }
   }
 

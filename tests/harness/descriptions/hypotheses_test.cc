@@ -115,7 +115,7 @@ TEST_P(BodyFaults, OfOneLinkNameTheLink) {
     EXPECT_TRUE(Names(found[0], id())) << List(found);
     EXPECT_NEAR(found[0].explained, 1.0, 1e-6);
     ASSERT_EQ(found[0].values.size(), 1U);
-    EXPECT_THAT(found[0].values[0], HasSubstr("; right would be mass "));
+    EXPECT_THAT(found[0].values[0], HasSubstr("; right would be "));
     return;
   }
   GTEST_SKIP() << "the robot's bodies do not show it";
