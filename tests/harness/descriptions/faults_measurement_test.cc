@@ -15,9 +15,13 @@
 namespace dexcheck::testing::faults_measurement_test {
 namespace {
 
-/// The numbers behind "right would be" of a body's line, as mass, com, inertia.
-std::vector<double> ReadRight(const std::string& line) {
-  const std::string part = line.substr(line.find("right would be"));
+/// The numbers of a quantity behind "right would be" of a body's line; none where it has not that quantity.
+std::vector<double> ReadRight(const std::string& line, const std::string& quantity) {
+  std::string part = line.substr(line.find("right would be"));
+  const size_t begin = part.find(quantity + " ");
+  if (begin == std::string::npos) return {};
+  part = part.substr(begin,
+                     part.find_first_of(part[begin + quantity.size() + 1] == '[' ? "]" : ",", begin) - begin);
   static const std::regex number(R"(-?\d+\.?\d*(e[-+]?\d+)?)");
   std::vector<double> values;
   for (auto it = std::sregex_iterator(part.begin(), part.end(), number); it != std::sregex_iterator(); ++it) {
@@ -26,17 +30,21 @@ std::vector<double> ReadRight(const std::string& line) {
   return values;
 }
 
-/// Whether a printed body is the right one to the printed digits, of which there are seven.
-bool IsRight(const std::vector<double>& printed, const MassProperties& body) {
+/// Whether what is printed of a body is right to the printed digits, of which there are seven.
+bool IsRight(const std::string& line, const MassProperties& body) {
   constexpr double kDigits = 2e-6;
-  if (printed.size() != 10) return false;
-  const std::vector<double> I = ListInertia(body.inertia);
-  bool good = std::abs(printed[0] - body.mass) <= kDigits * body.mass;
-  for (int k = 0; k < 3; ++k)
-    good = good && std::abs(printed[static_cast<size_t>(1 + k)] - body.com[k]) <= kDigits;
-  for (size_t k = 0; k < 6; ++k)
-    good = good && std::abs(printed[4 + k] - I[k]) <= kDigits * body.inertia.trace();
-  return good;
+  size_t printed = 0;
+  const auto is_right = [&](const char* quantity, const std::vector<double>& right, double scale) {
+    const std::vector<double> values = ReadRight(line, quantity);
+    printed += values.size();
+    bool good = values.empty() || values.size() == right.size();
+    for (size_t k = 0; good && k < values.size(); ++k)
+      good = std::abs(values[k] - right[k]) <= kDigits * scale;
+    return good;
+  };
+  return is_right("mass", {body.mass}, body.mass) &&
+         is_right("com", {body.com.begin(), body.com.end()}, 1.0) &&
+         is_right("inertia", ListInertia(body.inertia), body.inertia.trace()) && printed > 0;
 }
 
 struct Count {
@@ -74,7 +82,7 @@ void Try(const testing::RobotPair& pair, const ConventionFault& fault, bool all,
         if (!line.starts_with("link " + pair.a.spec.joints[i].link + ":")) continue;
         ++count->values;
         const MassProperties right = ExpressIn(pair.a.spec.joints[i].body, pair.a.joints[i].X_iL.inverse());
-        const bool good = IsRight(ReadRight(line), right);
+        const bool good = IsRight(line, right);
         count->wrong_values += good ? 0 : 1;
         if (!good) count->missed += "\n  " + pair.name + ": wrong value: " + line;
       }
