@@ -1,5 +1,5 @@
 // What a controller of one's own costs a step beyond its law: a step of each kind, less the model that is
-// evaluated in it. The laws are those of controller/examples, or do nothing, so that what is left is what
+// evaluated in it. The laws are those of harness/examples, or do nothing, so that what is left is what
 // they compute and the way there and back.
 
 #include <fmt/format.h>
@@ -57,7 +57,7 @@ void MeasureController(const std::string& scenario, const std::string& run, cons
 }  // namespace
 
 int main() {
-  const std::string examples = dexcheck::testing::SourcePath("/controller/examples/");
+  const std::string examples = dexcheck::testing::SourcePath("/harness/examples/");
   MeasureController("panda-reach", "", "built in");
   MeasureController("panda-reach", JOINT_LAW_LIBRARY, "library in C++, the same law");
   MeasureController("panda-reach", JOINT_PD_LIBRARY, "library in C, PD with gravity");

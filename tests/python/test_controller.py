@@ -9,7 +9,7 @@ import dexcheck
 
 SOURCE = os.environ["DEXCHECK_SOURCE"]
 SHORT = {"duration": 0.2, "settle": 0.05}
-LAW_FILE = f"{SOURCE}/controller/examples/numpy_joint_law.py"
+LAW_FILE = f"{SOURCE}/harness/examples/numpy_joint_law.py"
 
 
 class Law(dexcheck.Controller):
@@ -105,7 +105,7 @@ def test_a_law_that_fails_costs_its_trial_alone():
 
 
 def test_the_file_of_the_examples_is_a_study(tmp_path):
-    study = dexcheck.study(f"{SOURCE}/controller/examples/own_gains.toml", db=tmp_path / "gains.sqlite", jobs=2)
+    study = dexcheck.study(f"{SOURCE}/harness/examples/own_gains.toml", db=tmp_path / "gains.sqlite", jobs=2)
     assert len(study) == 12 and (tmp_path / "gains.sqlite").exists()
     best = np.nanargmin(study["joint_error_rms"])
     assert study["controller.natural_frequency"][best] > 10

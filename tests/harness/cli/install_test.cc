@@ -21,7 +21,7 @@ TEST(InstalledProgram, UsesTheFilesBesideIt) {
   const std::filesystem::path share = std::filesystem::canonical(prefix) / "share/dexcheck";
   EXPECT_EQ(results.at("robot"), (share / "controller/parameters/assistant_robot.toml").string());
   EXPECT_EQ(results.at("mjcf"), (share / "mjcf/scene.xml").string());
-  for (const char* name : {"README.md", "controller/NOTATION.md", "controller/examples/paper_law.cc",
+  for (const char* name : {"README.md", "controller/NOTATION.md", "harness/examples/paper_law.cc",
                            "harness/shipped/scenarios/README.md", "harness/shipped/scenarios/paper.toml"}) {
     EXPECT_TRUE(std::filesystem::exists(share / name)) << name;
   }

@@ -7,7 +7,7 @@
 namespace dexcheck::testing::own_controller_commands_test {
 namespace {
 
-const std::string kNumPyLaw = SourcePath("/controller/examples/numpy_joint_law.py");
+const std::string kNumPyLaw = SourcePath("/harness/examples/numpy_joint_law.py");
 
 /// A scenario of an arm with the controller in it, in a folder of its own.
 class OwnControllerCommands : public CommandTest {

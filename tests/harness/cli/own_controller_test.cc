@@ -56,7 +56,7 @@ class OwnController : public CommandTest {
 TEST_F(OwnController, TheLawRewrittenAsALibraryIsTheLaw) { ExpectThePapersLaw(PAPER_LAW_LIBRARY); }
 
 TEST_F(OwnController, TheLawRewrittenInNumPyIsTheLaw) {
-  ExpectThePapersLaw(SourcePath("/controller/examples/numpy_law.py"));
+  ExpectThePapersLaw(SourcePath("/harness/examples/numpy_law.py"));
 }
 
 /// The law of the joints rewritten outside, with gains that differ from joint to joint.
@@ -80,7 +80,7 @@ TEST_P(OwnJointLaw, IsTheLaw) {
 
 INSTANTIATE_TEST_SUITE_P(OwnController, OwnJointLaw,
                          ::testing::Values(JOINT_LAW_LIBRARY,
-                                           SourcePath("/controller/examples/numpy_joint_law.py")),
+                                           SourcePath("/harness/examples/numpy_joint_law.py")),
                          [](const auto& info) { return info.index == 0 ? "Library" : "NumPy"; });
 
 TEST_F(OwnController, AJointLawIsNoneForAGrasp) {

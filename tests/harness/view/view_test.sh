@@ -224,7 +224,7 @@ shows bare 300 "Tab does not hide the controls"
 end 0
 
 # A controller of the user's own, which steps in a thread of the viewer's: its log is repeated bit for bit.
-law=$(cd "$(dirname "${BASH_SOURCE[0]}")/../../.." && pwd)/controller/examples/numpy_joint_law.py
+law=$(cd "$(dirname "${BASH_SOURCE[0]}")/../../.." && pwd)/harness/examples/numpy_joint_law.py
 export DEXCHECK_PYTHON=/usr/bin/python3
 start panda-reach --set duration=0.1 --set settle=0.05 --controller "$law" --out own
 await finished
