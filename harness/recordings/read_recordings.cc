@@ -6,6 +6,7 @@
 
 #include "controller/common/errors.h"
 #include "controller/common/linear_algebra.h"
+#include "harness/descriptions/join_names.h"
 
 namespace dexcheck {
 namespace {
@@ -87,6 +88,14 @@ void RecordingSet::Read(Recording* recording, const ReadOptions& options,
   rows_ += motion.rows();
   one.fit->Finish();
   one.held->Finish();
+  std::vector<std::string> resting;
+  for (int joint = 0; joint < model_->num_joints(); ++joint) {
+    if (recording->FindColumn(RecordedQuantity::kPosition, joint) < 0)
+      resting.push_back(model_->joint(joint).name);
+  }
+  if (!resting.empty())
+    notes_.push_back(recording->name + ": has no positions of " + JoinNames(resting) +
+                     ": taken to rest at 0");
   for (const std::string& note : motion.ListNotes()) notes_.push_back(note);
   for (const Fault& fault : motion.faults()) faults_.push_back(fault);
   one.motion = motion.noise();

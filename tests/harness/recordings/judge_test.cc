@@ -296,6 +296,14 @@ TEST(Judge, RepeatedAndDoubledRowsAreLeftOut) {
   EXPECT_GE(judgement.notes.size(), 3U);
 }
 
+TEST(Judge, JointsWithoutPositionsAreSaid) {
+  RecordedTable table = Record({});
+  table.Get("q.panda_joint7") = table.columns[0];
+  *std::find(table.names.begin(), table.names.end(), "q.panda_joint7") = "temperature";
+  EXPECT_THAT(Judge(table).notes,
+              ::testing::Contains("drawn: has no positions of panda_joint7: taken to rest at 0"));
+}
+
 TEST(Judge, GapsAreNotSmoothedOver) {
   RecordedTable table = Record({DryFriction(1, 1.5)});
   for (size_t i = table.rows() / 3; i < table.rows(); ++i) table.columns[0][i] += 5.0;
