@@ -76,14 +76,16 @@ VectorXd StepForces::Moved() const {
   return scale;
 }
 
-void StepForces::AddRobot(Candidate* candidate, const MatrixXd& f) const {
-  for (Index k = 0; k < f.cols(); ++k)
-    candidate->columns.col(k).segment(begin_, rows()) = Whiten(f.col(k), Vector6d::Zero());
+void StepForces::AddRobot(Candidate* candidate, const Eigen::Ref<const MatrixXd>& f) const {
+  auto rows = RowsOf(candidate);
+  rows.topRows(n_) = f;
+  Whiten(rows);
 }
 
 void StepForces::AddObject(Candidate* candidate, const Matrix6Xd& w) const {
-  for (Index k = 0; k < w.cols(); ++k)
-    candidate->columns.col(k).segment(begin_, rows()) = Whiten(VectorXd::Zero(n_), w.col(k));
+  auto rows = RowsOf(candidate);
+  rows.bottomRows<6>() = w;
+  Whiten(rows);
 }
 
 void StepForces::AddColumns(Index begin, Index steps, std::vector<Candidate>* candidates) {
@@ -285,10 +287,10 @@ void StepForces::AddContacts(std::vector<Candidate>* candidates) {
     const Vector3d m = store_.Get(StepStore::kContactMoment).col(step_).segment<3>(3 * static_cast<Index>(i));
     Candidate& contact = Next(candidates, kContact, "fingertip " + frame.name, "m", 0.0, VectorXd::Ones(1));
     contact.is_possible = nullptr;
-    Vector6d w;
-    w << Vector3d::Zero(), R_T * m;
-    contact.columns.col(0).segment(begin_, rows()) =
-        Whiten(-link.J.bottomRows<3>().transpose() * (link.X.linear().transpose() * m), w);
+    auto rows = RowsOf(&contact);
+    rows << -link.J.bottomRows<3>().transpose() * (link.X.linear().transpose() * m), Vector3d::Zero(),
+        R_T * m;
+    Whiten(rows);
   }
 }
 
@@ -303,12 +305,12 @@ void StepForces::AddGravity(std::vector<Candidate>* candidates) {
     object.topRows<3>() =
         store_.setup().declared_object().body.mass * pose.head<9>().reshaped(3, 3).transpose();
   Candidate& gravity = Next(candidates, kGravity, kWorld, "m/s^2", 0.0, VectorXd::Constant(3, 20.0));
-  for (Index k = 0; k < 3; ++k)
-    gravity.columns.col(k).segment(begin_, rows()) = Whiten(weights.col(k), Vector6d(object.col(k)));
-  const MatrixXd all = gravity.columns.middleRows(begin_, rows());
+  RowsOf(&gravity) << weights, object;
+  Whiten(RowsOf(&gravity));
+  const MatrixXd all = RowsOf(&gravity);
   Candidate& size = Next(candidates, kGravitySize, kWorld, "m/s^2", 0.0, gravity.scale.head(1));
   size.is_possible = nullptr;
-  size.columns.middleRows(begin_, rows()) = all * model_.gravity().normalized();
+  RowsOf(&size) = all * model_.gravity().normalized();
 }
 
 }  // namespace dexcheck

@@ -41,9 +41,10 @@ ForceProblem::ForceProblem(const StepStore& store, StepForces* forces, const Seg
   // What the columns are off hides what is smaller on the same side, robot or object.
   level_.setConstant(level);
   Build();
-  level_ = first_level_ = level * (1.0 + (kAccuracy * CalcSizes(y_)).array().square()).sqrt();
+  first_level_ = level * (1.0 + (kAccuracy * CalcSizes(whole_y_)).array().square()).sqrt();
   least_level_ = (kExact / kAccuracy * first_level_).cwiseMax(kRounding);
-  Build();
+  SetLevel(first_level_);
+  Complete();
 }
 
 bool ForceProblem::IsExplained(double fraction, double left) const {
@@ -53,7 +54,7 @@ bool ForceProblem::IsExplained(double fraction, double left) const {
 
 void ForceProblem::Know(const Terms& known) {
   known_ = known;
-  Build();
+  Complete();
 }
 
 bool ForceProblem::ExplainConstant(const Segment& segment, Causes* causes) {
@@ -188,25 +189,43 @@ Explanation ForceProblem::Start(const Segment& segment) const {
 
 void ForceProblem::Build() {
   const Index rows = forces_->rows();
-  y_.resize(rows * steps_);
+  whole_y_.resize(rows * steps_);
   candidates_.clear();
-  uneven_.clear();
+  noise_.clear();
   turns_.clear();
   forces_->SetLevel(level_);
   for (Index i = 0; i < steps_; ++i) {
     forces_->SetStep(used_[static_cast<size_t>(i)]);
-    uneven_.push_back(forces_->uneven());
+    noise_.push_back(forces_->noise());
     turns_.push_back(forces_->ListTurns());
-    y_.segment(i * rows, rows) = forces_->CalcResidual();
+    whole_y_.segment(i * rows, rows) = forces_->CalcResidual();
     forces_->AddColumns(i * rows, steps_, &candidates_);
   }
   AddGrowing();
+  NameStuckBearings();
+  constant_ = candidates_.size();
+}
+
+void ForceProblem::SetLevel(const Vector2d& level) {
+  const Index rows = forces_->rows();
+  candidates_.resize(constant_);
+  for (Index i = 0; i < steps_; ++i) {
+    const StepNoise& noise = noise_[static_cast<size_t>(i)];
+    noise.ChangeLevel(level_, level, whole_y_.segment(i * rows, rows));
+    for (Candidate& one : candidates_)
+      noise.ChangeLevel(level_, level, one.columns.middleRows(i * rows, rows));
+  }
+  level_ = level;
+}
+
+void ForceProblem::Complete() {
+  candidates_.resize(constant_);
+  y_ = whole_y_;
   for (const auto& [candidate, amplitude] : known_.amplitudes)
     y_ -= candidates_[candidate].columns * amplitude;
   for (const ForceAtPoint& force : known_.points)
     candidates_.push_back(MakeForceAtPoint(force, turns_, candidates_));
   AddForcesAtPoints(y_, turns_, forces_->reach(), &candidates_);
-  NameStuckBearings();
 }
 
 void ForceProblem::AddGrowing() {
@@ -259,7 +278,7 @@ Vector2d ForceProblem::CalcSizes(const VectorXd& y) const {
   Vector2d square = Vector2d::Zero();
   for (Index k = 0; k < steps_; ++k) {
     VectorXd robot = y.segment(k * (n + 6), n);
-    const MatrixXd& U = uneven_[static_cast<size_t>(k)];
+    const MatrixXd& U = noise_[static_cast<size_t>(k)].uneven;
     robot -= U * (U.transpose() * robot);
     square += Vector2d(robot.squaredNorm(), y.segment<6>(k * (n + 6) + n).squaredNorm());
   }
@@ -283,8 +302,8 @@ bool ForceProblem::LeavesRounding(const VectorXd& y) const {
 CauseSelection ForceProblem::Select() {
   Vector2d level = level_;  // of the best
   const auto select = [&](const Vector2d& at) {
-    level_ = at;
-    Build();
+    SetLevel(at);
+    Complete();
     return SelectOnce();
   };
   CauseSelection best = SelectOnce();
@@ -336,8 +355,9 @@ CauseSelection ForceProblem::SelectOnce() {
     const Vector3d& g = forces_->model().gravity();
     const bool is_size = candidates_[term.candidate].fault == kGravitySize;
     const Vector3d change = is_size ? Vector3d(term.amplitude[0] * g.normalized()) : Vector3d(term.amplitude);
-    forces_->SetGravity(g + change);
+    if (!forces_->SetGravity(g + change)) break;
     Build();
+    Complete();
     selection = SelectCauses(y_, candidates_, options);
     break;
   }

@@ -63,7 +63,12 @@ class ForceProblem {
   [[nodiscard]] Free FitFree(size_t index) const;
   [[nodiscard]] Fault MakeFault(const Free& free) const;
   [[nodiscard]] Explanation Start(const Segment& segment) const;
+  /// Residual and candidates with the gravity that is known.
   void Build();
+  /// Their noise becomes another.
+  void SetLevel(const Vector2d& level);
+  /// What is known goes off the residual, and forces at points are added that explain the rest.
+  void Complete();
   /// Of each push another one that grows evenly: by so much a second, and what it is when the run ends.
   void AddGrowing();
   /// A joint that does not slide shows how much friction holds it, and not how much could.
@@ -84,12 +89,13 @@ class ForceProblem {
   bool is_faint_;  // whether the checks of the balances hold
   bool is_exact_ = false;
   std::vector<Candidate> candidates_;
-  VectorXd y_;
+  VectorXd whole_y_, y_;            // without known faults, too
+  size_t constant_ = 0;             // candidates that are none at points
   std::vector<Eigen::Index> used_;  // steps of the store
   Eigen::Index steps_ = 0;
   Terms known_, terms_;
   Vector2d first_level_, level_, least_level_;  // StepForces::SetLevel
-  std::vector<MatrixXd> uneven_;                // of each step
+  std::vector<StepNoise> noise_;                // of each step
   std::vector<Turns> turns_;                    // likewise
 };
 
