@@ -2,6 +2,7 @@
 
 // What a part of the steps leaves of the balances, and what explains it.
 
+#include <initializer_list>
 #include <string>
 #include <utility>
 #include <vector>
@@ -51,9 +52,6 @@ class ForceProblem {
   /// Several faults of one joint may be anything that acts there. So may several of other places, where they
   /// leave more than rounding and a torque of one joint, free at each step, does not.
   bool ExplainJoint(const Segment& segment, const CauseSelection& selection, Causes* causes) const;
-  /// A class of what was selected and a torque of that joint that changes.
-  [[nodiscard]] Explanation StartChanging(const Segment& segment, const CauseSelection& selection,
-                                          size_t torque) const;
   /// A candidate whose amplitudes are free at each step.
   struct Free {
     size_t candidate = SIZE_MAX;
@@ -61,7 +59,11 @@ class ForceProblem {
     VectorXd residual;
   };
   [[nodiscard]] Free FitFree(size_t index) const;
-  [[nodiscard]] Fault MakeFault(const Free& free) const;
+  /// All candidates of these faults, the most likely first.
+  [[nodiscard]] std::vector<Free> FitAll(std::initializer_list<const char*> faults) const;
+  /// What is free at each step has no size, and is a class of all that may act there: a range that ends, a
+  /// cable.
+  [[nodiscard]] Explanation TellFree(const Segment& segment, const Free& free) const;
   [[nodiscard]] Explanation Start(const Segment& segment) const;
   /// Residual and candidates with the gravity that is known.
   void Build();
