@@ -108,6 +108,9 @@ class StepForces {
   void AddRobot(Candidate* candidate, const Eigen::Ref<const MatrixXd>& f) const;
   void AddObject(Candidate* candidate, const Matrix6Xd& w) const;
   void AddJoints(std::vector<Candidate>* candidates);
+  /// @param R, V, V_dot of the centre of mass, in the body's axes. @param link null for the object.
+  void AddBody(const std::string& place, const MassProperties& body, const Matrix3d& R, const Vector6d& V,
+               const Vector6d& V_dot, const Link* link, std::vector<Candidate>* candidates);
   void AddLink(int link, std::vector<Candidate>* candidates);
   void AddObjectForces(std::vector<Candidate>* candidates);
   void AddGravity(std::vector<Candidate>* candidates);

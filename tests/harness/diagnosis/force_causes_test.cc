@@ -1,12 +1,11 @@
 // What explains the balances, step by step of the estimator, on a right run to whose residuals forces are
 // added.
 
-#include "harness/diagnosis/force_causes.h"
-
 #include <gtest/gtest.h>
 
 #include <functional>
 
+#include "harness/diagnosis/run_causes.h"
 #include "tests/harness/run/shipped_run.h"
 
 namespace dexcheck::testing::force_causes_test {
