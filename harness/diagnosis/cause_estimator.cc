@@ -26,14 +26,8 @@ class Search {
         candidates_(candidates),
         options_(options),
         rows_(options.rows > 0.0 ? options.rows : static_cast<double>(y.size())),
-        samples_(rows_ / options.alike) {
-    for (const Candidate& one : candidates)
-      visible_.push_back(FindVisible(one, std::sqrt(options.floor * options.alike)));
-    std::vector<size_t> every(candidates.size());
-    std::iota(every.begin(), every.end(), size_t{0});
-    all_ = Collect(every);
-    sizes_ = all_.colwise().norm();
-  }
+        samples_(rows_ / options.alike),
+        columns_(candidates, y, std::sqrt(options.floor * options.alike), options.independent) {}
 
   CauseSelection Run() {
     double criterion = Score(y_.squaredNorm(), 0.0, 0);
@@ -113,13 +107,14 @@ class Search {
 
   [[nodiscard]] double CountParameters(const std::vector<size_t>& set) const {
     double count = 0.0;
-    for (const size_t i : set)
-      count += static_cast<double>(visible_[i].columns.cols() + candidates_[i].parameters);
+    for (const size_t i : set) count += static_cast<double>(columns_.CountOf(i) + candidates_[i].parameters);
     return count;
   }
 
   /// Orthonormal columns of the range of what these candidates have.
-  [[nodiscard]] MatrixXd CalcRange(const std::vector<size_t>& set) const { return CalcRange(Collect(set)); }
+  [[nodiscard]] MatrixXd CalcRange(const std::vector<size_t>& set) const {
+    return CalcRange(columns_.Collect(set));
+  }
   [[nodiscard]] MatrixXd CalcRange(const MatrixXd& C) const {
     MatrixXd Q(C.rows(), C.cols());
     Index used = 0;
@@ -145,43 +140,22 @@ class Search {
   [[nodiscard]] std::vector<double> ScoreAll(const std::vector<size_t>& beside) const {
     const MatrixXd Q = CalcRange(beside);
     const VectorXd r = CalcResidual(Q);
-    MatrixXd own = all_;
-    own.noalias() -= Q * (Q.transpose() * all_);
-    const double parameters = CountParameters(beside);
+    const VectorXd left = columns_.CalcLeft(Q, r, options_.floor * rows_);
+    const double square = r.squaredNorm(), parameters = CountParameters(beside);
     std::vector<double> scores(candidates_.size(), kInfinity);
-    Index at = 0;
     for (size_t i = 0; i < candidates_.size(); ++i) {
-      const Index width = visible_[i].columns.cols();
-      const Index first = std::exchange(at, at + width);
-      if (width == 0 || std::find(beside.begin(), beside.end(), i) != beside.end()) continue;
-      const double left = CalcLeft(sizes_.segment(first, width), own.middleCols(first, width), r);
-      if (!(left < r.squaredNorm())) continue;
-      scores[i] = Score(left, parameters + CountParameters({i}), beside.size() + 1);
+      const double one = left[static_cast<Index>(i)];
+      if (!(one < square) || std::find(beside.begin(), beside.end(), i) != beside.end()) continue;
+      scores[i] = Score(one, parameters + CountParameters({i}), beside.size() + 1);
     }
     return scores;
   }
 
-  /// Square of what is left of r without what some columns have beside others. @param sizes of the columns.
-  /// @param own what they have beside those; spoilt.
-  [[nodiscard]] double CalcLeft(const Eigen::Ref<const VectorXd>& sizes, Eigen::Ref<MatrixXd> own,
-                                VectorXd r) const {
-    for (Index k = 0; k < own.cols(); ++k) {
-      const double size = own.col(k).norm();
-      if (!(size > options_.independent * sizes[k])) continue;
-      own.col(k) /= size;
-      // By subtraction, since squares that nearly cancel say nothing of what is left.
-      r -= own.col(k).dot(r) * own.col(k);
-      for (Index j = k + 1; j < own.cols(); ++j) own.col(j) -= own.col(k).dot(own.col(j)) * own.col(k);
-    }
-    return r.squaredNorm();
-  }
-
   /// Its amplitudes beside those; zero where they have all of it.
   [[nodiscard]] VectorXd CalcAmplitude(size_t candidate, const std::vector<size_t>& beside) const {
-    const Visible& one = visible_[candidate];
-    const MatrixXd Q = CalcRange(beside);
-    const MatrixXd own = one.columns - Q * (Q.transpose() * one.columns);
-    return one.basis * SolveLeastSquares(own, CalcResidual(Q), options_.independent);
+    const MatrixXd Q = CalcRange(beside), C = columns_.Of(candidate);
+    const MatrixXd own = C - Q * (Q.transpose() * C);
+    return columns_.visible(candidate).basis * SolveLeastSquares(own, CalcResidual(Q), options_.independent);
   }
 
   /// Whether it and those can be, all at once; of those, the ones that add nothing to it are no longer
@@ -194,10 +168,10 @@ class Search {
     };
     if (std::all_of(set.begin(), set.end(), is_free)) return true;
     // In the range of all their columns and y, which has few dimensions, all is as it is.
-    MatrixXd C = Reduce(Collect(set));
+    MatrixXd C = Reduce(columns_.Collect(set));
     Index at = 0;
     for (const size_t other : beside) {
-      const Index own = visible_[other].columns.cols();
+      const Index own = columns_.CountOf(other);
       MatrixXd rest(C.rows(), C.cols() - own);
       rest << C.leftCols(at), C.rightCols(C.cols() - at - own);
       if (AddsNothing(C.middleCols(at, own), rest.leftCols(rest.cols() - 1))) {
@@ -211,26 +185,14 @@ class Search {
     Index width = 0;
     for (const size_t i : set) {
       const Candidate& one = candidates_[i];
-      const Index r = visible_[i].columns.cols();
-      const VectorXd amplitude = visible_[i].basis * a.segment(width, r);
+      const Index r = columns_.CountOf(i);
+      const VectorXd amplitude = columns_.visible(i).basis * a.segment(width, r);
       width += r;
       if (one.scale.size() > 0 && (amplitude.array().abs() > kImplausible * one.scale.array()).any())
         return false;
       if (one.is_possible && !one.is_possible(amplitude)) return false;
     }
     return true;
-  }
-
-  [[nodiscard]] MatrixXd Collect(const std::vector<size_t>& set) const {
-    Index width = 0;
-    for (const size_t i : set) width += visible_[i].columns.cols();
-    MatrixXd C(y_.size(), width);
-    width = 0;
-    for (const size_t i : set) {
-      C.middleCols(width, visible_[i].columns.cols()) = visible_[i].columns;
-      width += visible_[i].columns.cols();
-    }
-    return C;
   }
 
   /// As few rows as have the same products with one another and with y, which is put behind them.
@@ -315,7 +277,7 @@ class Search {
     result.residual = y_;
     const double all = y_.squaredNorm();
     if (!chosen_.empty()) {
-      const MatrixXd C = Collect(chosen_);
+      const MatrixXd C = columns_.Collect(chosen_);
       const VectorXd size = C.colwise().norm().cwiseMax(std::numeric_limits<double>::min());
       const MatrixXd scaled = C * size.cwiseInverse().asDiagonal();
       const VectorXd a = Solve(C, y_);
@@ -328,8 +290,8 @@ class Search {
                                   size.cwiseInverse().asDiagonal() * variance;
       Index begin = 0;
       for (size_t place = 0; place < chosen_.size(); ++place) {
-        const Visible& visible = visible_[chosen_[place]];
-        const Index r = visible.columns.cols();
+        const Visible& visible = columns_.visible(chosen_[place]);
+        const Index r = columns_.CountOf(chosen_[place]);
         CauseTerm term;
         term.candidate = chosen_[place];
         term.amplitude = visible.basis * a.segment(begin, r);
@@ -378,9 +340,7 @@ class Search {
   std::span<const Candidate> candidates_;
   CauseOptions options_;
   double rows_, samples_;
-  std::vector<Visible> visible_;  // of each candidate
-  MatrixXd all_;                  // their columns, side by side
-  VectorXd sizes_;                // of these
+  VisibleColumns columns_;
   std::vector<size_t> chosen_;
 };
 

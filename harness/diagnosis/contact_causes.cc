@@ -1,7 +1,6 @@
-#include "harness/diagnosis/contact_causes.h"
-
 #include <numeric>
 
+#include "harness/diagnosis/run_causes.h"
 #include "harness/diagnosis/telling.h"
 
 namespace dexcheck {

@@ -1,9 +1,8 @@
-#include "harness/diagnosis/force_causes.h"
-
 #include <algorithm>
 #include <optional>
 
 #include "harness/diagnosis/force_problem.h"
+#include "harness/diagnosis/run_causes.h"
 #include "harness/diagnosis/telling.h"
 
 namespace dexcheck {

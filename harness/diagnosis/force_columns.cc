@@ -3,7 +3,7 @@
 #include <tuple>
 
 #include "controller/model/platform.h"
-#include "harness/diagnosis/contact_causes.h"
+#include "harness/diagnosis/run_causes.h"
 #include "harness/diagnosis/step_forces.h"
 
 namespace dexcheck {
@@ -76,14 +76,16 @@ VectorXd StepForces::Moved() const {
   return scale;
 }
 
-void StepForces::AddRobot(Candidate* candidate, const MatrixXd& f) const {
-  for (Index k = 0; k < f.cols(); ++k)
-    candidate->columns.col(k).segment(begin_, rows()) = Whiten(f.col(k), Vector6d::Zero());
+void StepForces::AddRobot(Candidate* candidate, const Eigen::Ref<const MatrixXd>& f) const {
+  auto rows = RowsOf(candidate);
+  rows.topRows(n_) = f;
+  Whiten(rows);
 }
 
 void StepForces::AddObject(Candidate* candidate, const Matrix6Xd& w) const {
-  for (Index k = 0; k < w.cols(); ++k)
-    candidate->columns.col(k).segment(begin_, rows()) = Whiten(VectorXd::Zero(n_), w.col(k));
+  auto rows = RowsOf(candidate);
+  rows.bottomRows<6>() = w;
+  Whiten(rows);
 }
 
 void StepForces::AddColumns(Index begin, Index steps, std::vector<Candidate>* candidates) {
@@ -187,92 +189,73 @@ void StepForces::AddJoints(std::vector<Candidate>* candidates) {
   }
 }
 
-void StepForces::AddLink(int index, std::vector<Candidate>* candidates) {
-  const Link& link = links_[static_cast<size_t>(index - first_link_)];
-  const MassProperties& body = *link.body;
-  const std::string place = "link " + model_.link_name(index);
-  const Matrix6Xd& J = link.J;
-  const Matrix3d R = link.X.linear();
-  const VectorXd xi_dot = store_.Get(StepStore::kAcceleration).col(step_);
-  const Vector6d V = J * terms_.velocity();
-  const Vector6d V_dot = J * xi_dot + link.J_dot * terms_.velocity();
-  const Vector3d w = V.tail<3>();
-  const Vector3d a = V_dot.head<3>() + w.cross(V.head<3>()) - R.transpose() * gravity_;
-  const BodyWrench wrench(a, w, V_dot.tail<3>());
-  const MatrixXd J_T = J.transpose();
-  const MatrixXd forces = J_T.leftCols<3>(), moments = J_T.rightCols<3>();
-  AddRobot(&Next(candidates, kForce, place, "N", 0.0, Weights(3)), MatrixXd(forces * R.transpose()));
-  AddRobot(&Next(candidates, kForceInAxes, place, "N", 0.0, Weights(3)), forces);
-  AddRobot(&Next(candidates, "moment", place, "N m", 0.0, Weights(3)), MatrixXd(moments * R.transpose()));
-  AddRobot(&Next(candidates, kMomentInAxes, place, "N m", 0.0, Weights(3)), moments);
-  MatrixXd both(n_, 6);
-  both << forces, moments;
-  AddRobot(&AddForceAtPoint(candidates, place), both);
-  both << forces * R.transpose(), moments * R.transpose();
-  AddRobot(&Next(candidates, "force and moment", place, "N", 0.0, Weights(6)), both);
+void StepForces::AddBody(const std::string& place, const MassProperties& body, const Matrix3d& R,
+                         const Vector6d& V, const Vector6d& V_dot, const Link* link,
+                         std::vector<Candidate>* candidates) {
+  const Matrix3d R_T = R.transpose(), zero = Matrix3d::Zero(), one = Matrix3d::Identity();
+  const auto add = [&](Candidate& candidate, const Matrix6Xd& w) {
+    if (link == nullptr) return AddObject(&candidate, w);
+    AddRobot(&candidate, MatrixXd(link->J.transpose() * w));
+  };
+  const auto push = [&](const char* fault, const char* unit, const Matrix3d& force, const Matrix3d& moment) {
+    Matrix6Xd w(6, 3);
+    w << force, moment;
+    add(Next(candidates, fault, place, unit, 0.0, Weights(3)), w);
+  };
+  push(kForce, "N", R_T, zero);
+  push(kForceInAxes, "N", one, zero);
+  push("moment", "N m", zero, R_T);
+  push(kMomentInAxes, "N m", zero, one);
+  Matrix6d both = Matrix6d::Identity();
+  add(AddForceAtPoint(candidates, place), both);
+  both.topLeftCorner<3, 3>() = both.bottomRightCorner<3, 3>() = R_T;
+  add(Next(candidates, "force and moment", place, "N", 0.0, Weights(6)), both);
   if (!(body.mass > 0.0)) return;
-  const VectorXd mass = -J_T * wrench.mass;
-  AddRobot(&Next(candidates, "mass", place, "kg", body.mass, Masses(1)), mass);
-  // The whole body times a factor.
-  Eigen::Matrix<double, 6, 1> I;
-  I << body.inertia(0, 0), body.inertia(1, 1), body.inertia(2, 2), body.inertia(0, 1), body.inertia(0, 2),
-      body.inertia(1, 2);
-  const VectorXd scaled = -J_T * (wrench.mass * body.mass + wrench.inertia * I);
-  AddRobot(&Next(candidates, kMassWithInertia, place, "kg", body.mass, Masses(1)),
-           VectorXd(scaled / body.mass));
-  const MatrixXd inertia = -J_T * wrench.inertia;
-  AddRobot(&Next(candidates, "inertia", place, "kg m^2", 0.0, Masses(6)), inertia);
+  const Vector3d w = V.tail<3>();
+  const BodyWrench wrench(V_dot.head<3>() + w.cross(V.head<3>()) - R_T * gravity_, w, V_dot.tail<3>());
+  add(Next(candidates, "mass", place, "kg", body.mass, Masses(1)), -wrench.mass);
+  if (link != nullptr) {
+    // The whole body times a factor.
+    const Matrix3d& I = body.inertia;
+    Vector6d entries;
+    entries << I.diagonal(), I(0, 1), I(0, 2), I(1, 2);
+    add(Next(candidates, kMassWithInertia, place, "kg", body.mass, Masses(1)),
+        -wrench.mass - wrench.inertia * entries / body.mass);
+  }
+  add(Next(candidates, "inertia", place, "kg m^2", 0.0, Masses(6)), -wrench.inertia);
   // Another centre of mass changes the inertia about the old one.
-  MatrixXd com(n_, 9);
-  com << -J_T * wrench.first_moment * body.mass, inertia;
-  AddRobot(&Next(candidates, kCenterAlone, place, "m", 0.0, VectorXd::Ones(3)), MatrixXd(com.leftCols<3>()));
-  AddRobot(&Next(candidates, kCenter, place, "m", 0.0, Moved()), com);
-  MatrixXd payload(n_, 10);
-  payload << mass, -J_T * wrench.first_moment, inertia;
+  Matrix6Xd com(6, 9), payload(6, 10);
+  com << -wrench.first_moment * body.mass, -wrench.inertia;
+  add(Next(candidates, kCenterAlone, place, "m", 0.0, VectorXd::Ones(3)), com.leftCols<3>());
+  add(Next(candidates, kCenter, place, "m", 0.0, Moved()), com);
+  if (link == nullptr) return;
+  payload << -wrench.mass, -wrench.first_moment, -wrench.inertia;
   Candidate& load = Next(candidates, "payload", place, "kg", 0.0, Masses(10));
   load.is_possible = [reach = reach_](const VectorXd& a) {
     return a.segment<3>(1).norm() <= reach * std::abs(a[0]);
   };
-  AddRobot(&load, payload);
+  add(load, payload);
+}
+
+void StepForces::AddLink(int index, std::vector<Candidate>* candidates) {
+  const Link& link = links_[static_cast<size_t>(index - first_link_)];
+  const VectorXd xi_dot = store_.Get(StepStore::kAcceleration).col(step_);
+  AddBody("link " + model_.link_name(index), *link.body, link.X.linear(), link.J * terms_.velocity(),
+          link.J * xi_dot + link.J_dot * terms_.velocity(), &link, candidates);
 }
 
 void StepForces::AddObjectForces(std::vector<Candidate>* candidates) {
   const VectorXd pose = store_.Get(StepStore::kObjectPose).col(step_);
-  const Vector6d V = store_.Get(StepStore::kObjectMotion).col(step_).head<6>();
-  const Vector6d V_dot = store_.Get(StepStore::kObjectMotion).col(step_).tail<6>();
+  const VectorXd motion = store_.Get(StepStore::kObjectMotion).col(step_);
   const Matrix3d R = pose.head<9>().reshaped(3, 3);
-  const Vector3d p = pose.tail<3>();
   const ObjectModel& object = store_.setup().declared_object();
   const std::string place = "object " + object.name;
-  const Matrix3d R_T = R.transpose(), zero = Matrix3d::Zero();
-  const auto stack = [](const Matrix3d& force, const Matrix3d& moment) {
-    Eigen::Matrix<double, 6, 3> columns;
-    columns << force, moment;
-    return columns;
-  };
-  AddObject(&Next(candidates, kForce, place, "N", 0.0, Weights(3)), stack(R_T, zero));
-  AddObject(&Next(candidates, kForceInAxes, place, "N", 0.0, Weights(3)), stack(Matrix3d::Identity(), zero));
-  AddObject(&Next(candidates, "moment", place, "N m", 0.0, Weights(3)), stack(zero, R_T));
-  AddObject(&Next(candidates, kMomentInAxes, place, "N m", 0.0, Weights(3)),
-            stack(zero, Matrix3d::Identity()));
-  AddObject(&AddForceAtPoint(candidates, place), Matrix6d::Identity());
-  Matrix6d both = Matrix6d::Zero();
-  both.topLeftCorner<3, 3>() = both.bottomRightCorner<3, 3>() = R_T;
-  AddObject(&Next(candidates, "force and moment", place, "N", 0.0, Weights(6)), both);
-  const Vector3d w = V.tail<3>();
-  const BodyWrench wrench(V_dot.head<3>() + w.cross(V.head<3>()) - R_T * gravity_, w, V_dot.tail<3>());
-  AddObject(&Next(candidates, "mass", place, "kg", object.body.mass, Masses(1)), Vector6d(-wrench.mass));
-  const Matrix6d inertia = -wrench.inertia;
-  AddObject(&Next(candidates, "inertia", place, "kg m^2", 0.0, Masses(6)), inertia);
-  Matrix6Xd com(6, 9);
-  com << -wrench.first_moment * object.body.mass, inertia;
-  AddObject(&Next(candidates, kCenterAlone, place, "m", 0.0, VectorXd::Ones(3)), com.leftCols<3>());
-  AddObject(&Next(candidates, kCenter, place, "m", 0.0, Moved()), com);
+  AddBody(place, object.body, R, motion.head<6>(), motion.tail<6>(), nullptr, candidates);
   Vector6d drag = Vector6d::Zero();
-  drag.head<3>() = -V.head<3>();
+  drag.head<3>() = -motion.head<3>();
   AddObject(&Next(candidates, "drag", place, "N s/m", 0.0, Weights(1)), drag);
   Matrix6Xd tether = Matrix6Xd::Zero(6, 4);
-  tether.topRows<3>() << -R_T * p, R_T;
+  tether.topRows<3>() << -R.transpose() * pose.tail<3>(), R.transpose();
   AddObject(&Next(candidates, "tether", place, "N/m", 0.0, Weights(4)), tether);
 }
 
@@ -285,10 +268,10 @@ void StepForces::AddContacts(std::vector<Candidate>* candidates) {
     const Vector3d m = store_.Get(StepStore::kContactMoment).col(step_).segment<3>(3 * static_cast<Index>(i));
     Candidate& contact = Next(candidates, kContact, "fingertip " + frame.name, "m", 0.0, VectorXd::Ones(1));
     contact.is_possible = nullptr;
-    Vector6d w;
-    w << Vector3d::Zero(), R_T * m;
-    contact.columns.col(0).segment(begin_, rows()) =
-        Whiten(-link.J.bottomRows<3>().transpose() * (link.X.linear().transpose() * m), w);
+    auto rows = RowsOf(&contact);
+    rows << -link.J.bottomRows<3>().transpose() * (link.X.linear().transpose() * m), Vector3d::Zero(),
+        R_T * m;
+    Whiten(rows);
   }
 }
 
@@ -303,12 +286,12 @@ void StepForces::AddGravity(std::vector<Candidate>* candidates) {
     object.topRows<3>() =
         store_.setup().declared_object().body.mass * pose.head<9>().reshaped(3, 3).transpose();
   Candidate& gravity = Next(candidates, kGravity, kWorld, "m/s^2", 0.0, VectorXd::Constant(3, 20.0));
-  for (Index k = 0; k < 3; ++k)
-    gravity.columns.col(k).segment(begin_, rows()) = Whiten(weights.col(k), Vector6d(object.col(k)));
-  const MatrixXd all = gravity.columns.middleRows(begin_, rows());
+  RowsOf(&gravity) << weights, object;
+  Whiten(RowsOf(&gravity));
+  const MatrixXd all = RowsOf(&gravity);
   Candidate& size = Next(candidates, kGravitySize, kWorld, "m/s^2", 0.0, gravity.scale.head(1));
   size.is_possible = nullptr;
-  size.columns.middleRows(begin_, rows()) = all * model_.gravity().normalized();
+  RowsOf(&size) = all * model_.gravity().normalized();
 }
 
 }  // namespace dexcheck

@@ -41,9 +41,10 @@ ForceProblem::ForceProblem(const StepStore& store, StepForces* forces, const Seg
   // What the columns are off hides what is smaller on the same side, robot or object.
   level_.setConstant(level);
   Build();
-  level_ = first_level_ = level * (1.0 + (kAccuracy * CalcSizes(y_)).array().square()).sqrt();
+  first_level_ = level * (1.0 + (kAccuracy * CalcSizes(whole_y_)).array().square()).sqrt();
   least_level_ = (kExact / kAccuracy * first_level_).cwiseMax(kRounding);
-  Build();
+  SetLevel(first_level_);
+  Complete();
 }
 
 bool ForceProblem::IsExplained(double fraction, double left) const {
@@ -53,7 +54,7 @@ bool ForceProblem::IsExplained(double fraction, double left) const {
 
 void ForceProblem::Know(const Terms& known) {
   known_ = known;
-  Build();
+  Complete();
 }
 
 bool ForceProblem::ExplainConstant(const Segment& segment, Causes* causes) {
@@ -88,53 +89,34 @@ bool ForceProblem::ExplainJoint(const Segment& segment, const CauseSelection& se
   const bool is_of_one =
       std::all_of(selection.terms.begin(), selection.terms.end(),
                   [&](const CauseTerm& term) { return candidates_[term.candidate].place == place; });
-  const auto is_joint = [&](size_t i) {
-    if (is_of_one && candidates_[i].place == place) return true;
-    return !is_exact_ && FitFree(i).residual.squaredNorm() <= static_cast<double>(y_.size());
-  };
-  for (size_t i = 0; i < candidates_.size(); ++i) {
-    if (candidates_[i].fault != "torque" || !is_joint(i)) continue;
-    causes->push_back(StartChanging(segment, selection, i));
+  if (is_exact_ && !is_of_one) return false;
+  for (const Free& torque : FitAll({"torque"})) {
+    const bool leaves_noise = torque.residual.squaredNorm() <= static_cast<double>(y_.size());
+    const bool is_joint = is_of_one && candidates_[torque.candidate].place == place;
+    if (!is_joint && (is_exact_ || !leaves_noise)) continue;
+    Explanation one = TellFree(segment, torque);
+    for (const CauseTerm& term : selection.terms)
+      one.faults.push_back(MakeForceFault(candidates_[term.candidate], term.amplitude, term.error,
+                                          forces_->model().gravity()));
+    causes->push_back(one);
     return true;
   }
   return false;
 }
 
-Explanation ForceProblem::StartChanging(const Segment& segment, const CauseSelection& selection,
-                                        size_t torque) const {
-  Explanation one = Start(segment);
-  one.outcome = CauseOutcome::kNamedClass;
-  one.fraction = selection.fraction;
-  one.left = selection.left;
-  one.faults.push_back(
-      {"torque that changes", candidates_[torque].place, FitFree(torque).largest, 0.0, "", ""});
-  for (const CauseTerm& term : selection.terms)
-    one.faults.push_back(
-        MakeForceFault(candidates_[term.candidate], term.amplitude, term.error, forces_->model().gravity()));
-  return one;
-}
-
 void ForceProblem::ExplainChanging(const Segment& segment, Causes* causes) const {
-  std::vector<Free> all;
-  for (size_t i = 0; i < candidates_.size(); ++i)
-    if (IsPush(candidates_[i]) || candidates_[i].fault == "force and moment") all.push_back(FitFree(i));
-  std::sort(all.begin(), all.end(), [](const Free& a, const Free& b) { return a.criterion < b.criterion; });
+  const std::vector<Free> all = FitAll({"torque", kForce, "moment", "force and moment"});
   if (all.empty()) return;
-  Explanation one = Start(segment);
-  one.fraction = 1.0 - all.front().residual.squaredNorm() / y_.squaredNorm();
-  one.left = std::sqrt(all.front().residual.squaredNorm() / static_cast<double>(y_.size()));
-  const bool explained = IsExplained(one.fraction, one.left);
-  for (const Free& free : all) {
-    const Candidate& candidate = candidates_[free.candidate];
-    const double odds = 0.5 * (free.criterion - all.front().criterion);
-    if (!one.faults.empty() && odds >= kEqualLogOdds) {
-      one.SetRival(candidate, odds);
-      break;
+  Explanation one = TellFree(segment, all.front());
+  if (!IsExplained(one.fraction, one.left)) one.outcome = CauseOutcome::kNotExplained;
+  for (size_t i = 1; i < all.size() && one.rival.empty(); ++i) {
+    const double odds = 0.5 * (all[i].criterion - all.front().criterion);
+    if (odds >= kEqualLogOdds) {
+      one.SetRival(candidates_[all[i].candidate], odds);
+    } else {
+      one.faults.push_back(TellFree(segment, all[i]).faults.front());
     }
-    one.faults.push_back(MakeFault(free));
   }
-  one.SetOutcome();
-  if (!explained) one.outcome = CauseOutcome::kNotExplained;
   causes->push_back(one);
 }
 
@@ -145,18 +127,23 @@ bool ForceProblem::ExplainTorque(const Segment& segment, Index amplitudes, size_
            2.0 * static_cast<double>(terms) * std::log(static_cast<double>(candidates_.size()));
   };
   if (cost(amplitudes, faults) <= cost(steps_, 1)) return false;
-  for (size_t i = 0; i < candidates_.size(); ++i) {
-    if (candidates_[i].fault != "torque") continue;
-    const Free free = FitFree(i);
-    Explanation one = Start(segment);
-    one.fraction = 1.0 - free.residual.squaredNorm() / y_.squaredNorm();
-    one.left = CalcLeft(free.residual);
-    if (!IsExplained(one.fraction, one.left)) continue;
-    one.faults.push_back(MakeFault(free));
+  for (const Free& torque : FitAll({"torque"})) {
+    const Explanation one = TellFree(segment, torque);
+    if (!IsExplained(one.fraction, CalcLeft(torque.residual))) continue;
     causes->push_back(one);
     return true;
   }
   return false;
+}
+
+std::vector<ForceProblem::Free> ForceProblem::FitAll(std::initializer_list<const char*> faults) const {
+  std::vector<Free> all;
+  for (size_t i = 0; i < candidates_.size(); ++i)
+    if (std::find(faults.begin(), faults.end(), candidates_[i].fault) != faults.end())
+      all.push_back(FitFree(i));
+  std::stable_sort(all.begin(), all.end(),
+                   [](const Free& a, const Free& b) { return a.criterion < b.criterion; });
+  return all;
 }
 
 ForceProblem::Free ForceProblem::FitFree(size_t index) const {
@@ -177,9 +164,15 @@ ForceProblem::Free ForceProblem::FitFree(size_t index) const {
   return free;
 }
 
-Fault ForceProblem::MakeFault(const Free& free) const {
+Explanation ForceProblem::TellFree(const Segment& segment, const Free& free) const {
   const Candidate& candidate = candidates_[free.candidate];
-  return {candidate.fault + " that changes, up to", candidate.place, free.largest, 0.0, candidate.unit, ""};
+  Explanation one = Start(segment);
+  one.fraction = 1.0 - free.residual.squaredNorm() / y_.squaredNorm();
+  one.left = std::sqrt(free.residual.squaredNorm() / static_cast<double>(y_.size()));
+  one.outcome = CauseOutcome::kNamedClass;
+  one.faults.push_back(
+      {candidate.fault + " that changes, up to", candidate.place, free.largest, 0.0, candidate.unit, ""});
+  return one;
 }
 
 Explanation ForceProblem::Start(const Segment& segment) const {
@@ -188,25 +181,43 @@ Explanation ForceProblem::Start(const Segment& segment) const {
 
 void ForceProblem::Build() {
   const Index rows = forces_->rows();
-  y_.resize(rows * steps_);
+  whole_y_.resize(rows * steps_);
   candidates_.clear();
-  uneven_.clear();
+  noise_.clear();
   turns_.clear();
   forces_->SetLevel(level_);
   for (Index i = 0; i < steps_; ++i) {
     forces_->SetStep(used_[static_cast<size_t>(i)]);
-    uneven_.push_back(forces_->uneven());
+    noise_.push_back(forces_->noise());
     turns_.push_back(forces_->ListTurns());
-    y_.segment(i * rows, rows) = forces_->CalcResidual();
+    whole_y_.segment(i * rows, rows) = forces_->CalcResidual();
     forces_->AddColumns(i * rows, steps_, &candidates_);
   }
   AddGrowing();
+  NameStuckBearings();
+  constant_ = candidates_.size();
+}
+
+void ForceProblem::SetLevel(const Vector2d& level) {
+  const Index rows = forces_->rows();
+  candidates_.resize(constant_);
+  for (Index i = 0; i < steps_; ++i) {
+    const StepNoise& noise = noise_[static_cast<size_t>(i)];
+    noise.ChangeLevel(level_, level, whole_y_.segment(i * rows, rows));
+    for (Candidate& one : candidates_)
+      noise.ChangeLevel(level_, level, one.columns.middleRows(i * rows, rows));
+  }
+  level_ = level;
+}
+
+void ForceProblem::Complete() {
+  candidates_.resize(constant_);
+  y_ = whole_y_;
   for (const auto& [candidate, amplitude] : known_.amplitudes)
     y_ -= candidates_[candidate].columns * amplitude;
   for (const ForceAtPoint& force : known_.points)
     candidates_.push_back(MakeForceAtPoint(force, turns_, candidates_));
   AddForcesAtPoints(y_, turns_, forces_->reach(), &candidates_);
-  NameStuckBearings();
 }
 
 void ForceProblem::AddGrowing() {
@@ -259,7 +270,7 @@ Vector2d ForceProblem::CalcSizes(const VectorXd& y) const {
   Vector2d square = Vector2d::Zero();
   for (Index k = 0; k < steps_; ++k) {
     VectorXd robot = y.segment(k * (n + 6), n);
-    const MatrixXd& U = uneven_[static_cast<size_t>(k)];
+    const MatrixXd& U = noise_[static_cast<size_t>(k)].uneven;
     robot -= U * (U.transpose() * robot);
     square += Vector2d(robot.squaredNorm(), y.segment<6>(k * (n + 6) + n).squaredNorm());
   }
@@ -283,8 +294,8 @@ bool ForceProblem::LeavesRounding(const VectorXd& y) const {
 CauseSelection ForceProblem::Select() {
   Vector2d level = level_;  // of the best
   const auto select = [&](const Vector2d& at) {
-    level_ = at;
-    Build();
+    SetLevel(at);
+    Complete();
     return SelectOnce();
   };
   CauseSelection best = SelectOnce();
@@ -336,8 +347,9 @@ CauseSelection ForceProblem::SelectOnce() {
     const Vector3d& g = forces_->model().gravity();
     const bool is_size = candidates_[term.candidate].fault == kGravitySize;
     const Vector3d change = is_size ? Vector3d(term.amplitude[0] * g.normalized()) : Vector3d(term.amplitude);
-    forces_->SetGravity(g + change);
+    if (!forces_->SetGravity(g + change)) break;
     Build();
+    Complete();
     selection = SelectCauses(y_, candidates_, options);
     break;
   }

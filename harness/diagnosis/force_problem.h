@@ -2,6 +2,7 @@
 
 // What a part of the steps leaves of the balances, and what explains it.
 
+#include <initializer_list>
 #include <string>
 #include <utility>
 #include <vector>
@@ -51,9 +52,6 @@ class ForceProblem {
   /// Several faults of one joint may be anything that acts there. So may several of other places, where they
   /// leave more than rounding and a torque of one joint, free at each step, does not.
   bool ExplainJoint(const Segment& segment, const CauseSelection& selection, Causes* causes) const;
-  /// A class of what was selected and a torque of that joint that changes.
-  [[nodiscard]] Explanation StartChanging(const Segment& segment, const CauseSelection& selection,
-                                          size_t torque) const;
   /// A candidate whose amplitudes are free at each step.
   struct Free {
     size_t candidate = SIZE_MAX;
@@ -61,9 +59,18 @@ class ForceProblem {
     VectorXd residual;
   };
   [[nodiscard]] Free FitFree(size_t index) const;
-  [[nodiscard]] Fault MakeFault(const Free& free) const;
+  /// All candidates of these faults, the most likely first.
+  [[nodiscard]] std::vector<Free> FitAll(std::initializer_list<const char*> faults) const;
+  /// What is free at each step has no size, and is a class of all that may act there: a range that ends, a
+  /// cable.
+  [[nodiscard]] Explanation TellFree(const Segment& segment, const Free& free) const;
   [[nodiscard]] Explanation Start(const Segment& segment) const;
+  /// Residual and candidates with the gravity that is known.
   void Build();
+  /// Their noise becomes another.
+  void SetLevel(const Vector2d& level);
+  /// What is known goes off the residual, and forces at points are added that explain the rest.
+  void Complete();
   /// Of each push another one that grows evenly: by so much a second, and what it is when the run ends.
   void AddGrowing();
   /// A joint that does not slide shows how much friction holds it, and not how much could.
@@ -84,12 +91,13 @@ class ForceProblem {
   bool is_faint_;  // whether the checks of the balances hold
   bool is_exact_ = false;
   std::vector<Candidate> candidates_;
-  VectorXd y_;
+  VectorXd whole_y_, y_;            // without known faults, too
+  size_t constant_ = 0;             // candidates that are none at points
   std::vector<Eigen::Index> used_;  // steps of the store
   Eigen::Index steps_ = 0;
   Terms known_, terms_;
   Vector2d first_level_, level_, least_level_;  // StepForces::SetLevel
-  std::vector<MatrixXd> uneven_;                // of each step
+  std::vector<StepNoise> noise_;                // of each step
   std::vector<Turns> turns_;                    // likewise
 };
 

@@ -1,9 +1,8 @@
-#include "harness/diagnosis/law_causes.h"
-
 #include <algorithm>
 #include <cmath>
 
 #include "controller/dynamics/tree_factor.h"
+#include "harness/diagnosis/run_causes.h"
 #include "harness/diagnosis/telling.h"
 
 namespace dexcheck {

@@ -1,10 +1,9 @@
-#include "harness/diagnosis/rolling_causes.h"
-
 #include <algorithm>
 #include <cmath>
 #include <tuple>
 
 #include "harness/checks/wheel_rolling.h"
+#include "harness/diagnosis/run_causes.h"
 #include "harness/diagnosis/telling.h"
 
 namespace dexcheck {

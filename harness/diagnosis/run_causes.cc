@@ -2,10 +2,6 @@
 
 #include <algorithm>
 
-#include "harness/diagnosis/contact_causes.h"
-#include "harness/diagnosis/force_causes.h"
-#include "harness/diagnosis/law_causes.h"
-#include "harness/diagnosis/rolling_causes.h"
 #include "harness/diagnosis/signal_causes.h"
 #include "harness/diagnosis/step_forces.h"
 

@@ -1,13 +1,35 @@
 #pragma once
 
-// All that explains a run's residuals.
+// All that explains a run's residuals, by channel. Empty where nothing differs.
 
 #include "harness/diagnosis/causes.h"
 #include "harness/diagnosis/step_store.h"
 
 namespace dexcheck {
 
-/// By channel: measurement, actuation, law, contact, rolling, balance. Empty where nothing differs.
+/// Explains E_bar' (tau' - tau'_printed) = sum_i (factor_i - 1) part_i by the summands of the reference law,
+/// of all torques or of one joint, finger or wheel.
+Causes ExplainLaw(const StepStore& store);
+
+/// Explains v +- w b / 2 - r thetadot of both wheels: another radius leaves dr thetadot, another distance
+/// -+ w db / 2. What wheels slip and sink is noise.
+Causes ExplainRolling(const StepStore& store);
+
+/// Whether fingertips and object touch at another distance than the declared ones, and the shapes that
+/// explain it.
+bool HasOtherShapes(const StepStore& store);
+Causes ExplainContacts(const StepStore& store);
+
+/// Explains what the balances leave,
+///
+///   robot   M_bar' xi_dot + C_bar' xi + F_bar' + J_B'^T f_c - E_bar' tau' = f     (48)
+///   object  M_hat V_o_dot + C_hat V_o + N_o - G f_c = w                           (19)
+///
+/// with the plant's accelerations and forces, f whitened in the metric of the inertia, |f|_M^-1: forces and
+/// moments, other masses and inertias, armature, friction and springs of joints, another gravity.
+Causes ExplainForces(const StepStore& store);
+
+/// All: measurement, actuation, law, contact, rolling, balance.
 /// @param void_from of FindVoid, s: wheels and balances are explained up to then.
 Causes ExplainRun(const StepStore& store, double void_from);
 

@@ -1,5 +1,3 @@
-#include "harness/diagnosis/signal_couplings.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -8,6 +6,7 @@
 #include <string>
 #include <utility>
 
+#include "harness/diagnosis/signal_shapes.h"
 #include "harness/diagnosis/sine_fit.h"
 
 namespace dexcheck {

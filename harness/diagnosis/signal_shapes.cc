@@ -8,7 +8,6 @@
 #include <tuple>
 #include <utility>
 
-#include "harness/diagnosis/signal_couplings.h"
 #include "harness/diagnosis/sine_fit.h"
 
 namespace dexcheck {

@@ -62,6 +62,11 @@ bool IsDecay(double decay);
 /// What is looked for, each where what is before it explains nothing: sines fit much, and couplings are many.
 enum class SignalSearch { kPlain, kSines, kCouplings };
 
+/// What may be added to a series that nothing simpler explains: crosstalk of another signal of its group, a
+/// gain of one sign or a square of the signal, a ripple or a spring over the position, and of motors friction
+/// that is smooth or grows with the square of the rate.
+std::vector<Candidate> ListCouplings(const SignalSeries& series, const SignalSteps& steps,
+                                     const std::vector<SignalSeries>& others);
 /// What may be added to a transmission's output.
 std::vector<Candidate> ListAdded(const SignalSeries& series, const SignalSteps& steps,
                                  const SignalShape& shape, SignalSearch search,

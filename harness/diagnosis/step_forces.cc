@@ -3,10 +3,12 @@
 #include <Eigen/SVD>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 namespace dexcheck {
 namespace {
 
+using Eigen::ArrayXd;
 using Eigen::Index;
 
 RobotModel AddBodyFrames(const RobotModel& model) {
@@ -23,6 +25,31 @@ RobotModel AddBodyFrames(const RobotModel& model) {
 }
 
 }  // namespace
+
+Vector2d StepNoise::CalcNoise(const Vector2d& level) const {
+  return level.cwiseProduct(bounds).cwiseMax(std::numeric_limits<double>::min());
+}
+
+ArrayXd StepNoise::CalcSpread(const Vector2d& level) const {
+  return (1.0 + (sizes / CalcNoise(level)[0]).array().square()).sqrt();
+}
+
+void StepNoise::Scale(const Vector2d& by, const ArrayXd& along, Eigen::Ref<MatrixXd> rows) const {
+  auto robot = rows.topRows(rows.rows() - 6);
+  robot *= by[0];
+  rows.bottomRows<6>() *= by[1];
+  if (uneven.cols() == 0) return;
+  const MatrixXd change = (along - 1.0).matrix().asDiagonal() * (uneven.transpose() * robot);
+  robot.noalias() += uneven * change;
+}
+
+void StepNoise::Divide(const Vector2d& level, Eigen::Ref<MatrixXd> rows) const {
+  Scale(CalcNoise(level).cwiseInverse(), CalcSpread(level).inverse(), rows);
+}
+
+void StepNoise::ChangeLevel(const Vector2d& from, const Vector2d& to, Eigen::Ref<MatrixXd> rows) const {
+  Scale(CalcNoise(from).cwiseQuotient(CalcNoise(to)), CalcSpread(from) / CalcSpread(to), rows);
+}
 
 StepForces::StepForces(const StepStore& store)
     : store_(store),
@@ -44,6 +71,12 @@ StepForces::StepForces(const StepStore& store)
   weight_ = kEarth * mass_;
 }
 
+bool StepForces::SetGravity(const Vector3d& gravity) {
+  constexpr double kSame = 1e-9;
+  const double change = (std::exchange(gravity_, gravity) - gravity).norm();
+  return change > kSame * gravity.norm();
+}
+
 void StepForces::SetStep(Index step) {
   step_ = step;
   terms_.SetState(store_.Get(StepStore::kPosition).col(step), store_.Get(StepStore::kVelocity).col(step));
@@ -57,8 +90,7 @@ void StepForces::SetStep(Index step) {
     for (size_t k = 0; k < i; ++k)
       reach_ = std::max(reach_, (links_[i].X.translation() - links_[k].X.translation()).norm());
   }
-  noise_ = level_.cwiseProduct(store_.Get(StepStore::kNoise).col(step))
-               .cwiseMax(std::numeric_limits<double>::min());
+  noise_.bounds = store_.Get(StepStore::kNoise).col(step);
   const ObjectModel& object = store_.setup().declared_object();
   arm_ = std::sqrt(object.body.inertia.trace() / object.body.mass);
   CalcUneven();
@@ -72,8 +104,9 @@ Turns StepForces::ListTurns() const {
 }
 
 void StepForces::CalcUneven() {
-  const double size = store_.Get(StepStore::kUneven)(0, step_) / noise_[0];
-  uneven_.resize(n_, 0);
+  const double size = store_.Get(StepStore::kUneven)(0, step_);
+  noise_.uneven.resize(n_, 0);
+  noise_.sizes.resize(0);
   if (!(size > 0.0) || first_link_ == 0) return;
   // An acceleration a of the platform, and alpha about it, is one of a + alpha x r of each link.
   MatrixXd U = MatrixXd::Zero(n_, 8);
@@ -96,31 +129,34 @@ void StepForces::CalcUneven() {
     const double norm = column.norm();
     U.col(k) = norm > 0.0 ? VectorXd(size / norm * column) : VectorXd(VectorXd::Zero(n_));
   }
-  // (1 + U U^T)^-1/2 = 1 + V (1 / sqrt(1 + S^2) - 1) V^T of U = V S W^T.
   const Eigen::JacobiSVD<MatrixXd> svd(U, Eigen::ComputeThinU);
-  uneven_ = svd.matrixU();
-  uneven_shrink_ = (1.0 + svd.singularValues().array().square()).rsqrt() - 1.0;
+  noise_.uneven = svd.matrixU();
+  noise_.sizes = svd.singularValues();
 }
 
 bool StepForces::Differs(const VectorXd& residual) const {
   VectorXd robot = store_.Get(StepStore::kRobotResidual).col(step_);
   factor_.SolveTransposed(robot);
   const double root = std::sqrt(static_cast<double>(n_));
-  return robot.norm() > root * noise_[0] + store_.Get(StepStore::kUneven)(0, step_) ||
+  return robot.norm() > root * level_[0] * noise_.bounds[0] + store_.Get(StepStore::kUneven)(0, step_) ||
          residual.head(n_).norm() > root || residual.tail<6>().norm() > std::sqrt(6.0);
 }
 
-VectorXd StepForces::Whiten(const VectorXd& f, const Vector6d& w) const {
-  VectorXd y = VectorXd::Zero(rows());
-  VectorXd robot = f;
-  factor_.SolveTransposed(robot);
-  robot /= noise_[0];
-  if (uneven_.cols() > 0) robot += uneven_ * uneven_shrink_.cwiseProduct(uneven_.transpose() * robot);
-  y.head(n_) = robot;
-  if (!store_.setup().has_object()) return y;
-  y.segment<3>(n_) = w.head<3>() / noise_[1];
-  y.tail<3>() = w.tail<3>() / (arm_ * noise_[1]);
+VectorXd StepForces::CalcResidual() const {
+  VectorXd y(rows());
+  y << store_.Get(StepStore::kRobotResidual).col(step_), store_.Get(StepStore::kObjectResidual).col(step_);
+  Whiten(y);
   return y;
+}
+
+void StepForces::Whiten(Eigen::Ref<MatrixXd> f_w) const {
+  for (Index k = 0; k < f_w.cols(); ++k) factor_.SolveTransposed(f_w.col(k).head(n_));
+  if (store_.setup().has_object()) {
+    f_w.bottomRows<3>() /= arm_;
+  } else {
+    f_w.bottomRows<6>().setZero();
+  }
+  noise_.Divide(level_, f_w);
 }
 
 }  // namespace dexcheck

@@ -37,25 +37,39 @@ inline constexpr const char* kContact = "contact further along the normal by";
 inline constexpr const char* kGrows = " that grows by";
 }  // namespace force_fault
 
-/// Residual and columns of one step. The robot's are whitened by
-///
-///   M' (s^2 1 + U U^T) M,  M = L^T of the inertia's factor
-///
-/// s is rounding, and U has what a platform leaves that tilts, sinks and slips: the inertial forces of all
-/// links when it accelerates in six ways, and torques of its wheels, each as large as the check's bound.
+/// Noise of one step: of the robot's rows s^2 1 + U U^T, of the object's that of each. s is rounding, and U
+/// has what a platform leaves that tilts, sinks and slips: the inertial forces of all links when it
+/// accelerates in six ways, and torques of its wheels, each as large as the check's bound.
+struct StepNoise {
+  Vector2d bounds = Vector2d::Ones();  ///< s and the object's at level 1.
+  MatrixXd uneven;                     ///< Orthonormal columns V of U = V diag(sizes) W^T.
+  VectorXd sizes;
+
+  /// Divides rows (n + 6 by any) by the noise at this level: by s and, in V, (1 + U U^T / s^2)^(1/2).
+  void Divide(const Vector2d& level, Eigen::Ref<MatrixXd> rows) const;
+  /// Rows that are divided by the noise at one level are by that at another.
+  void ChangeLevel(const Vector2d& from, const Vector2d& to, Eigen::Ref<MatrixXd> rows) const;
+
+ private:
+  [[nodiscard]] Vector2d CalcNoise(const Vector2d& level) const;
+  /// (1 + sizes^2 / s^2)^(1/2)
+  [[nodiscard]] Eigen::ArrayXd CalcSpread(const Vector2d& level) const;
+  void Scale(const Vector2d& by, const Eigen::ArrayXd& along, Eigen::Ref<MatrixXd> rows) const;
+};
+
+/// Residual and columns of one step, whitened: of the robot L^-T f, L^T L its inertia, divided by its noise.
 class StepForces {
  public:
   explicit StepForces(const StepStore& store);
 
   [[nodiscard]] Eigen::Index rows() const { return n_ + 6; }
   [[nodiscard]] const RobotModel& model() const { return model_; }
-  /// In which masses that differ fall, m/s^2; the model's at first.
-  void SetGravity(const Vector3d& gravity) { gravity_ = gravity; }
+  /// In which masses that differ fall, m/s^2; the model's at first. @returns whether it is another.
+  bool SetGravity(const Vector3d& gravity);
   /// Noise of robot and object, times the bound of their checks: 1 at first.
   void SetLevel(const Vector2d& level) { level_ = level; }
 
-  /// Orthonormal columns of U.
-  [[nodiscard]] const MatrixXd& uneven() const { return uneven_; }
+  [[nodiscard]] const StepNoise& noise() const { return noise_; }
 
   void SetStep(Eigen::Index step);
   /// How far links were apart at the most, m: where loads may be.
@@ -64,10 +78,7 @@ class StepForces {
   [[nodiscard]] Turns ListTurns() const;
   /// Whether the checks of the balances fail, or what is left is more than noise.
   [[nodiscard]] bool Differs(const VectorXd& residual) const;
-  [[nodiscard]] VectorXd CalcResidual() const {
-    return Whiten(store_.Get(StepStore::kRobotResidual).col(step_),
-                  store_.Get(StepStore::kObjectResidual).col(step_));
-  }
+  [[nodiscard]] VectorXd CalcResidual() const;
   /// Adds this step's rows to each candidate: `begin` is the first of them.
   void AddColumns(Eigen::Index begin, Eigen::Index steps, std::vector<Candidate>* candidates);
 
@@ -78,8 +89,12 @@ class StepForces {
     const MassProperties* body;
   };
 
-  /// Robot's force and object's wrench, whitened.
-  [[nodiscard]] VectorXd Whiten(const VectorXd& f, const Vector6d& w) const;
+  /// Whitens robot's forces and object's wrenches (n + 6 by any).
+  void Whiten(Eigen::Ref<MatrixXd> f_w) const;
+  /// This step's rows of a candidate.
+  [[nodiscard]] auto RowsOf(Candidate* candidate) const {
+    return candidate->columns.middleRows(begin_, rows());
+  }
   void CalcUneven();
   /// The next candidate of the list, made at the first step. @param scale plausible sizes.
   Candidate& Next(std::vector<Candidate>* candidates, const char* fault, const std::string& place,
@@ -90,9 +105,12 @@ class StepForces {
   /// Of a centre of mass, and of the inertia about the old one.
   [[nodiscard]] VectorXd Moved() const;
   Candidate& AddForceAtPoint(std::vector<Candidate>* candidates, const std::string& place);
-  void AddRobot(Candidate* candidate, const MatrixXd& f) const;
+  void AddRobot(Candidate* candidate, const Eigen::Ref<const MatrixXd>& f) const;
   void AddObject(Candidate* candidate, const Matrix6Xd& w) const;
   void AddJoints(std::vector<Candidate>* candidates);
+  /// @param R, V, V_dot of the centre of mass, in the body's axes. @param link null for the object.
+  void AddBody(const std::string& place, const MassProperties& body, const Matrix3d& R, const Vector6d& V,
+               const Vector6d& V_dot, const Link* link, std::vector<Candidate>* candidates);
   void AddLink(int link, std::vector<Candidate>* candidates);
   void AddObjectForces(std::vector<Candidate>* candidates);
   void AddGravity(std::vector<Candidate>* candidates);
@@ -110,9 +128,8 @@ class StepForces {
   std::vector<Link> links_;
   Eigen::Index step_ = 0, begin_ = 0, steps_ = 1;
   size_t next_ = 0;
-  Vector2d noise_ = Vector2d::Ones(), level_ = Vector2d::Ones();
-  MatrixXd uneven_;                   // orthonormal columns
-  VectorXd uneven_shrink_;            // what is left of each by whitening, less 1
+  Vector2d level_ = Vector2d::Ones();
+  StepNoise noise_;
   double arm_ = 1.0;                  // of the object's inertia, m
   double mass_ = 0.0, weight_ = 0.0;  // of all, kg and N
   double reach_ = 0.0;

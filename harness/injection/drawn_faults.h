@@ -29,6 +29,13 @@ std::vector<FaultSet> DrawFaults(const Setup& setup, const DrawOptions& options)
 /// One fault of each kind, `count` times.
 std::vector<FaultSet> DrawEachKind(const Setup& setup, const DrawOptions& options);
 
+/// `count` numbers of the model, evenly out of all, changed by `scale` relative to GetScale.
+std::vector<FaultSet> ListNumberFaults(const Setup& setup, size_t count, double scale);
+/// Each part of (55) a thousandth too large and left out, and what else may be wrong in it.
+std::vector<FaultSet> ListLawFaults(const Setup& setup);
+/// Wrong equations of the model that the law goes by.
+std::vector<FaultSet> ListEquationFaults(const Setup& setup);
+
 /// How the explanations of a run compare with what was wrong in it.
 struct NamingScore {
   int right = 0;     ///< Named: kind, place, and value within 5 % of the change or 3 standard errors.

@@ -1,4 +1,4 @@
-#include "harness/injection/listed_faults.h"
+#include "harness/injection/drawn_faults.h"
 
 #include <algorithm>
 

@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "controller/common/text.h"
-#include "harness/injection/listed_faults.h"
 
 namespace dexcheck {
 namespace {

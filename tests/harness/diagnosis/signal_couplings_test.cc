@@ -1,8 +1,6 @@
 // Made series of what a motor or a sensor takes of the state, or of another signal: named with their values,
 // also where steps are kept in blocks with gaps between them.
 
-#include "harness/diagnosis/signal_couplings.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -10,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "harness/diagnosis/signal_shapes.h"
 #include "harness/diagnosis/sine_fit.h"
 #include "tests/harness/diagnosis/made_signals.h"
 
