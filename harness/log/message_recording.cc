@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <bit>
 #include <cstdint>
-#include <cstring>
 #include <deque>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -47,6 +46,7 @@ class ByteReader {
     return taken;
   }
   std::string_view TakeText() { return TakeBytes(Take<std::uint32_t>()); }
+  std::uint32_t TakeCount() { return Align(4), Take<std::uint32_t>(); }
   void Skip(std::uint64_t count) { TakeBytes(count); }
   /// To the next multiple, counted from where this began.
   void Align(size_t size) { Skip((size - at_ % size) % size); }
@@ -58,6 +58,15 @@ class ByteReader {
   bool is_swapped_;
   size_t at_ = 0;
 };
+
+constexpr const char* kFields[] = {"position", "velocity", "effort"};
+
+/// Of a field that is there.
+void RequireCount(size_t count, size_t joints, const std::string& where, const char* field) {
+  if (count != joints)
+    throw InputError(where + ": " + field + ": must have " + std::to_string(joints) +
+                     " numbers, one for each joint, got " + std::to_string(count));
+}
 
 void Flatten(const AnyJson& json, const std::string& name, TimedMessage* message) {
   if (json.is_number()) {
@@ -135,26 +144,23 @@ class MessageRecording : public RecordingReader {
 /// What reads a message of a type; null for one that cannot be read.
 using Parser = TimedMessage (*)(std::string_view data, double time, const std::string& where);
 
-TimedMessage ParseCdr(std::string_view data, double time, const std::string& where) {
-  TimedMessage message = ParseJointState(data, where);
-  if (message.time == 0.0) message.time = time;
-  return message;
-}
-
 Parser FindParser(const std::string& type, const std::string& encoding) {
   if (encoding == "json") return &ParseJsonMessage;
-  const bool is_joint_state = type == kJointState || type == "sensor_msgs/JointState";
-  return encoding == "cdr" && is_joint_state ? &ParseCdr : nullptr;
+  if (encoding != "cdr" || (type != kJointState && type != "sensor_msgs/JointState")) return nullptr;
+  return [](std::string_view data, double time, const std::string& where) {
+    TimedMessage message = ParseJointState(data, where);
+    if (message.time == 0.0) message.time = time;
+    return message;
+  };
 }
 
 [[noreturn]] void FailOnTopics(const std::string& source, const std::string& topic,
                                const std::set<std::string>& topics) {
   std::string list;
   for (const std::string& one : topics) list += (list.empty() ? "" : ", ") + one;
-  if (!topic.empty())
-    throw InputError(source + ": has no topic " + Quote(topic) + " that can be read; it has " + list);
-  throw InputError(source + ": has no topic of joints (" + kJointState + ", or messages in JSON); it has " +
-                   (list.empty() ? "none" : list));
+  const std::string what = topic.empty() ? std::string("of joints (") + kJointState + ", or messages in JSON)"
+                                         : Quote(topic) + " that can be read";
+  throw InputError(source + ": has no topic " + what + "; it has " + (list.empty() ? "none" : list));
 }
 
 class McapRecording : public MessageRecording {
@@ -168,24 +174,17 @@ class McapRecording : public MessageRecording {
 
  protected:
   std::optional<TimedMessage> ReadMessage() override {
-    for (;;) {
-      if (chunk_.is_empty()) {
+    std::optional<TimedMessage> message;
+    while (!message) {
+      while (chunk_.is_empty())
         if (!ReadRecord()) return std::nullopt;
-        continue;
-      }
       const auto opcode = chunk_.Take<std::uint8_t>();
-      if (std::optional<TimedMessage> message =
-              Handle(opcode, chunk_.TakeBytes(chunk_.Take<std::uint64_t>())))
-        return message;
+      message = Handle(opcode, chunk_.TakeBytes(chunk_.Take<std::uint64_t>()));
     }
+    return message;
   }
 
  private:
-  struct Channel {
-    std::string topic;
-    Parser parse = nullptr;
-  };
-
   [[noreturn]] void Fail(const std::string& problem) const { throw InputError(source_ + ": " + problem); }
 
   /// The file's next record becomes what is read.
@@ -224,35 +223,25 @@ class McapRecording : public MessageRecording {
     constexpr std::uint64_t kMost = std::uint64_t{1} << 32U;
     if (size > kMost) Fail("has a chunk of " + std::to_string(size) + " bytes");
     content_.resize(size);
-    bool is_good = true;
+    if (!compression.empty() && compression != "zstd" && compression != "lz4")
+      Fail("has a chunk with compression " + Quote(compression) + "; known are lz4 and zstd");
     if (compression.empty()) {
       content_ = data;
-    } else if (compression == "zstd") {
-      is_good = ZSTD_decompress(content_.data(), size, data.data(), data.size()) == size;
-    } else if (compression == "lz4") {
-      is_good = DecompressLz4(data);
-    } else {
-      Fail("has a chunk with compression " + Quote(compression) + "; known are lz4 and zstd");
+    } else if (compression == "lz4"
+                   ? !DecompressLz4(data)
+                   : ZSTD_decompress(content_.data(), size, data.data(), data.size()) != size) {
+      Fail("has a chunk that cannot be decompressed (" + compression + ")");
     }
-    if (!is_good) Fail("has a chunk that cannot be decompressed (" + compression + ")");
     chunk_ = ByteReader(content_, source_);
   }
 
   bool DecompressLz4(std::string_view data) {
     LZ4F_dctx* context = nullptr;
     if (LZ4F_isError(LZ4F_createDecompressionContext(&context, LZ4F_VERSION)) != 0) return false;
-    size_t written = 0;
-    size_t state = 1;
-    while (state != 0 && !data.empty() && LZ4F_isError(state) == 0) {
-      size_t out = content_.size() - written;
-      size_t in = data.size();
-      state = LZ4F_decompress(context, content_.data() + written, &out, data.data(), &in, nullptr);
-      written += out;
-      data.remove_prefix(in);
-      if (in == 0 && out == 0) break;
-    }
+    size_t out = content_.size(), in = data.size();
+    const size_t missing = LZ4F_decompress(context, content_.data(), &out, data.data(), &in, nullptr);
     LZ4F_freeDecompressionContext(context);
-    return LZ4F_isError(state) == 0 && written == content_.size();
+    return missing == 0 && out == content_.size();
   }
 
   std::optional<TimedMessage> Handle(std::uint8_t opcode, std::string_view content) {
@@ -271,17 +260,18 @@ class McapRecording : public MessageRecording {
       if (topic_.empty() && encoding == "cdr" && channels_.contains(id)) topic_ = topic;
     } else if (opcode == kMessage) {
       const auto channel = channels_.find(reader.Take<std::uint16_t>());
-      if (channel == channels_.end() || (!topic_.empty() && channel->second.topic != topic_))
-        return std::nullopt;
+      if (channel == channels_.end()) return std::nullopt;
+      const auto& [topic, parse] = channel->second;
+      if (!topic_.empty() && topic != topic_) return std::nullopt;
       reader.Skip(4);
       const double time = kNanoseconds * static_cast<double>(reader.Take<std::uint64_t>());
       reader.Skip(8);
       std::string_view data = content.substr(22);
       ++message_number_;
-      TimedMessage message = channel->second.parse(data, time, Where());
+      TimedMessage message = parse(data, time, Where());
       // Of several topics each field says whose it is.
       if (topic_.empty())
-        for (auto& field : message.fields) field.first = channel->second.topic + "." + field.first;
+        for (auto& field : message.fields) field.first = topic + "." + field.first;
       return message;
     }
     return std::nullopt;
@@ -292,7 +282,7 @@ class McapRecording : public MessageRecording {
   std::string record_, content_;
   ByteReader chunk_{{}, ""};
   std::map<std::uint16_t, std::string> schemas_;
-  std::map<std::uint16_t, Channel> channels_;
+  std::map<std::uint16_t, std::pair<std::string, Parser>> channels_;  // topic
   std::set<std::string> seen_;
   bool has_ended_ = false;
 };
@@ -360,22 +350,16 @@ TimedMessage ParseJointState(std::string_view cdr, const std::string& where) {
   TimedMessage message;
   const auto seconds = reader.Take<std::int32_t>();
   message.time = seconds + kNanoseconds * reader.Take<std::uint32_t>();
-  const auto count = [&] {
-    reader.Align(4);
-    return reader.Take<std::uint32_t>();
-  };
-  reader.Skip(count());
+  reader.Skip(reader.TakeCount());
   std::vector<std::string> joints;
-  for (std::uint32_t n = count(), i = 0; i < n; ++i) {
-    const std::string_view text = reader.TakeBytes(count());
+  for (std::uint32_t n = reader.TakeCount(), i = 0; i < n; ++i) {
+    const std::string_view text = reader.TakeBytes(reader.TakeCount());
     joints.emplace_back(text.substr(0, text.find('\0')));
   }
-  for (const char* field : {"position", "velocity", "effort"}) {
-    const std::uint32_t n = count();
+  for (const char* field : kFields) {
+    const std::uint32_t n = reader.TakeCount();
     if (n == 0) continue;
-    if (n != joints.size())
-      throw InputError(where + ": " + field + ": must have " + std::to_string(joints.size()) +
-                       " numbers, one for each joint, got " + std::to_string(n));
+    RequireCount(n, joints.size(), where, field);
     reader.Align(8);
     for (const std::string& joint : joints)
       message.fields.emplace_back(std::string(field) + "." + joint, reader.Take<double>());
@@ -389,17 +373,12 @@ TimedMessage ParseJsonMessage(std::string_view text, double time, const std::str
   TimedMessage message;
   message.time = time;
   const bool is_joint_state = json.contains("name") && json["name"].is_array() && json.contains("position");
-  if (!is_joint_state) {
-    Flatten(json, "", &message);
-    return message;
-  }
+  if (!is_joint_state) return Flatten(json, "", &message), message;
   const AnyJson& joints = json["name"];
-  for (const char* field : {"position", "velocity", "effort"}) {
+  for (const char* field : kFields) {
     const AnyJson values = json.value(field, AnyJson::array());
     if (values.empty()) continue;
-    if (values.size() != joints.size())
-      throw InputError(where + ": " + field + ": must have " + std::to_string(joints.size()) +
-                       " numbers, one for each joint, got " + std::to_string(values.size()));
+    RequireCount(values.size(), joints.size(), where, field);
     for (size_t i = 0; i < joints.size(); ++i) {
       if (!values[i].is_number() || !joints[i].is_string())
         throw InputError(where + ": " + field + ": must be numbers by joint");
@@ -407,12 +386,11 @@ TimedMessage ParseJsonMessage(std::string_view text, double time, const std::str
                                   values[i].get<double>());
     }
   }
-  if (const AnyJson* stamp = json.contains("header") ? &json["header"] : nullptr;
-      stamp && stamp->contains("stamp")) {
-    const AnyJson& at = (*stamp)["stamp"];
-    const double seconds = at.value("sec", 0.0) + kNanoseconds * at.value("nanosec", at.value("nsec", 0.0));
-    if (seconds > 0.0) message.time = seconds;
-  }
+  const AnyJson header = json.contains("header") ? json["header"] : AnyJson();
+  const AnyJson stamp = header.contains("stamp") ? header["stamp"] : AnyJson::object();
+  const double seconds =
+      stamp.value("sec", 0.0) + kNanoseconds * stamp.value("nanosec", stamp.value("nsec", 0.0));
+  if (seconds > 0.0) message.time = seconds;
   return message;
 }
 

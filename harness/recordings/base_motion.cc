@@ -1,6 +1,9 @@
 #include "harness/recordings/base_motion.h"
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
+#include <optional>
 
 #include "controller/common/linear_algebra.h"
 
@@ -8,6 +11,55 @@ namespace dexcheck {
 namespace {
 
 using Eigen::Index;
+
+/// A push does not hide behind what it adds to its joint's noise.
+VectorXd InUnitsOfMedian(const VectorXd& squares) {
+  const double usual = Median({squares.begin(), squares.end()});
+  return usual > 0.0 ? VectorXd(squares / usual) : squares;
+}
+
+/// A stretch that stands out. Smoothing, and where blocks begin, spread a push's begin and end: the parts of
+/// the blocks there are by what is seen in them. @param usual what blocks have without it.
+Push TrimWindow(const VectorXd& squares, double usual, Index first, Index last,
+                const std::vector<TorqueBalance::Block>& blocks) {
+  const double whole = Median({squares.begin() + first, squares.begin() + last + 1});
+  constexpr double kNearlyWhole = 0.25;  // half of it
+  constexpr Index kBeside = 4;
+  while (first < last && squares[first] < kNearlyWhole * whole) ++first;
+  while (last > first && squares[last] < kNearlyWhole * whole) --last;
+  Push push{.from = blocks[static_cast<size_t>(first)].from, .to = blocks[static_cast<size_t>(last)].to};
+  for (Index at = std::max<Index>(0, first - kBeside); at <= std::min(squares.size() - 1, last + kBeside);
+       ++at)
+    push.shares.emplace_back(
+        blocks[static_cast<size_t>(at)].centre(),
+        at >= first && at <= last ? 1.0 : std::sqrt(std::clamp((squares[at] - usual) / whole, 0.0, 1.0)));
+  return push;
+}
+
+/// The few stretches that stand out most.
+std::vector<Push> FindWindows(const VectorXd& squares, const std::vector<TorqueBalance::Block>& blocks) {
+  constexpr size_t kMost = 3;
+  constexpr double kStandsOut = 12.0, kStays = 4.0;
+  if (squares.size() < 16) return {};
+  const double usual = std::max(Median({squares.begin(), squares.end()}), std::numeric_limits<double>::min());
+  VectorXd rest = squares;
+  std::vector<Push> windows;
+  while (windows.size() < kMost) {
+    Index peak = 0;
+    if (!(rest.maxCoeff(&peak) > kStandsOut * usual)) break;
+    Index first = peak, last = peak;
+    // A block in between may be small by chance.
+    const auto stays = [&](Index at) { return at >= 0 && at < rest.size() && rest[at] > kStays * usual; };
+    while (stays(first - 1) || stays(first - 2)) --first;
+    while (stays(last + 1) || stays(last + 2)) ++last;
+    // What stands out half of the time is no push.
+    const Push push = TrimWindow(squares, usual, first, last, blocks);
+    // Windows of smoothing overlap, so that what acts shows in more than one sample.
+    if (last - first <= squares.size() / 2 && push.from < push.to) windows.push_back(push);
+    rest.segment(first, last - first + 1).setZero();
+  }
+  return windows;
+}
 
 /// What a constant acceleration of the base leaves in a block: products of its three columns, of all joints,
 /// and with what is left.
@@ -100,8 +152,9 @@ double FindShaking(const RecordingSet& recordings, const TorqueRows& rows, const
   return CalcExplained(all.blocks, best) > kFraction * all.left ? best : 0.0;
 }
 
-std::optional<double> FindStep(const RecordingSet& recordings, const TorqueRows& rows, const VectorXd& left,
-                               size_t recording) {
+/// Since when.
+static std::optional<double> FindStep(const RecordingSet& recordings, const TorqueRows& rows,
+                                      const VectorXd& left, size_t recording) {
   const Blocks all = MakeBlocks(recordings, rows, left, recording);
   std::optional<double> best;
   double most = kFraction * all.left;
@@ -115,6 +168,20 @@ std::optional<double> FindStep(const RecordingSet& recordings, const TorqueRows&
     if (explained > most) most = explained, best = all.blocks[i].from;
   }
   return best;
+}
+
+std::vector<Push> FindPushes(const RecordingSet& recordings, const TorqueRows& rows, const VectorXd& left,
+                             size_t recording) {
+  const std::vector<TorqueBalance::Block>& blocks = recordings[recording].fit->blocks();
+  VectorXd squares = VectorXd::Zero(static_cast<Index>(blocks.size()));
+  for (const TorqueRows::Part& part : rows.parts)
+    if (part.recording == recording)
+      squares += InUnitsOfMedian(left.segment(part.begin + part.within, part.size - part.within).cwiseAbs2());
+  std::vector<Push> pushes = FindWindows(squares, blocks);
+  if (const std::optional<double> when = FindStep(recordings, rows, left, recording))
+    pushes.push_back({.from = *when, .to = blocks.back().to, .shares = {{*when, 0.0}, {*when, 1.0}}});
+  for (Push& when : pushes) when.recording = static_cast<int>(recording);
+  return pushes;
 }
 
 }  // namespace dexcheck

@@ -1,8 +1,8 @@
 #pragma once
 
-// A base that moves in a recording that takes it to be at rest: how it may move.
+// What acts on a robot for a while, and how a base may move that a recording takes to be at rest.
 
-#include <optional>
+#include <vector>
 
 #include "harness/recordings/torque_rows.h"
 
@@ -12,9 +12,9 @@ namespace dexcheck {
 /// blocks of time; 0 where none explains a fifth of it, or a base's pose was recorded.
 double FindShaking(const RecordingSet& recordings, const TorqueRows& rows, const VectorXd& left);
 
-/// The time (s) since which a constant acceleration of the base, or a tilt, explains most of what a recording
-/// leaves, and a fifth of it.
-std::optional<double> FindStep(const RecordingSet& recordings, const TorqueRows& rows, const VectorXd& left,
-                               size_t recording);
+/// The few stretches of a recording in which what is left stands out, and the one to its end in which a
+/// constant acceleration of the base, or a tilt, explains most of it and a fifth of all.
+std::vector<Push> FindPushes(const RecordingSet& recordings, const TorqueRows& rows, const VectorXd& left,
+                             size_t recording);
 
 }  // namespace dexcheck

@@ -19,6 +19,8 @@ using Eigen::Index;
 
 /// Times the noise: more than errors of derivatives, known to a factor of two, can be.
 constexpr double kFar = 5.0;
+/// Of what the model does not explain: a cause that explains less is no reason to read again.
+constexpr double kMuch = 0.05;
 
 /// A fault of the recording itself, that holds all the time.
 Explanation MakeCause(const Fault& fault) {
@@ -53,18 +55,20 @@ class Judge {
     const CauseSelection& selection = estimator_.selection();
     const VectorXd amplitudes = estimator_.CalcAmplitudes(selection.terms);
     const VectorXd before = estimator_.CalcLeft({}), after = estimator_.CalcLeft(selection.terms);
-    result_.left = CalcRms(estimator_.rows(), after);
-    const double all = std::max(CalcRms(estimator_.rows(), before), std::numeric_limits<double>::min());
+    result_.left = estimator_.CalcRms(estimator_.rows(), after);
+    const double all =
+        std::max(estimator_.CalcRms(estimator_.rows(), before), std::numeric_limits<double>::min());
     result_.explained = 1.0 - Square(result_.left / all);
     const TorqueRows held = MakeTorqueRows(set_, estimator_.faults(), /*is_held=*/true);
     VectorXd nothing = VectorXd::Zero(held.columns - 1);
     nothing.head(CountForced(set_)) = estimator_.CalcAmplitudes({}).head(CountForced(set_));
     Index rank = 0;
-    result_.by_all.held_left = CalcRms(held, held.CalcLeft(estimator_.FitPlainly(&rank)));
+    result_.by_all.held_left = estimator_.CalcRms(
+        held, held.CalcLeft(estimator_.FitAmplitudes(TorqueEstimator::Part::kPlain, &rank)));
     result_.by_all.numbers = rank;
     for (const CauseTerm& term : selection.terms) result_.by_causes.numbers += term.amplitude.size();
     result_.by_causes.numbers += CountForced(set_);
-    result_.by_causes.held_left = CalcRms(held, held.CalcLeft(amplitudes));
+    result_.by_causes.held_left = estimator_.CalcRms(held, held.CalcLeft(amplitudes));
     const VectorXd held_before = held.CalcLeft(nothing), held_after = held.CalcLeft(amplitudes);
     std::vector<size_t> first_fit, first_held;
     for (size_t recording = 0; recording < set_.size(); ++recording) {
@@ -106,16 +110,22 @@ class Judge {
   void Refine(const VectorXd& left) {
     constexpr double kLittle = 0.01;
     Refinements& next = result_.refinements;
-    for (const FoundFault& one : result_.found) {
-      if (one.fault.kind == TorqueFault::kZero && std::abs(one.amplitude[0]) > kLittle)
-        next.offsets[one.fault.index] = one.amplitude[0];
-      if (one.fault.kind == TorqueFault::kStribeckFriction)
-        next.stribeck[one.fault.index] = StribeckVelocityOf(one.fault, one.amplitude);
-      for (const int joint : one.fault.kind == TorqueFault::kDelay ? set_.joints() : std::vector<int>())
-        if (one.fault.index < 0 || one.fault.index == joint)
-          next.delays[joint] += std::lround(one.amplitude[0] / set_.step());
-    }
     next.shaking = set_.refinements().shaking;
+    next.gravity = set_.refinements().gravity;
+    const size_t own = result_.causes.size() - result_.found.size();
+    for (size_t i = 0; i < result_.found.size(); ++i) {
+      const auto& [fault, amplitude, error, is_named] = result_.found[i];
+      if (result_.causes[own + i].fraction < kMuch) continue;
+      if (fault.kind == TorqueFault::kZero && std::abs(amplitude[0]) > kLittle)
+        next.offsets[fault.index] = amplitude[0];
+      if (fault.kind == TorqueFault::kStribeckFriction)
+        next.stribeck[fault.index] = StribeckVelocityOf(fault, amplitude);
+      if (fault.kind == TorqueFault::kSaturation) next.limits[fault.index] = LimitOf(fault, amplitude);
+      if (fault.kind == TorqueFault::kGravity && !result_.IsWhole()) next.gravity = amplitude;
+      for (const int joint : fault.kind == TorqueFault::kDelay ? set_.joints() : std::vector<int>())
+        if (fault.index < 0 || fault.index == joint)
+          next.delays[joint] += std::lround(amplitude[0] / set_.step());
+    }
     if (!result_.IsWhole() && next.shaking == 0.0) next.shaking = FindShaking(set_, estimator_.rows(), left);
   }
   [[nodiscard]] double StribeckVelocityOf(const TorqueFault& fault, const VectorXd& a) const {
@@ -123,36 +133,23 @@ class Judge {
     return a.size() == 1 ? v : v * std::sqrt(kFineRatio) * std::exp(a[1] / a[0]);
   }
 
-  /// Of what is left of such rows, in units of noise.
-  [[nodiscard]] double CalcRms(const TorqueRows& rows, const VectorXd& left) const {
-    double squares = 0.0;
-    for (const TorqueRows::Part& part : rows.parts) {
-      const auto place = static_cast<Index>(part.place);
-      const double unit = set_[part.recording].weight[place] / set_[part.recording].noise[place];
-      squares += unit * unit * left.segment(part.begin, part.size).squaredNorm();
-    }
-    return std::sqrt(squares / std::max(1.0, rows.samples));
+  [[nodiscard]] double LimitOf(const TorqueFault& fault, const VectorXd& a) const {
+    const int component = fault.columns.front().front().column.component;
+    return FindCutOff(set_.refinements(), fault.index, component, set_[0].most_torque[fault.index]) *
+           (1.0 + a[1] / a[0]);
   }
 
-  /// Root mean square of the measured torque.
+  /// Root mean square of the measured torque: of y, the model's torque and friction.
   double CalcMeasured(const TorqueRows::Part& part) const {
     const TorqueBalance& balance = *set_[part.recording].fit;
-    const VectorXd b = MeasuredOf(part);
-    return std::sqrt(std::max(0.0, b.dot(balance.products(part.place) * b)) / std::max(1.0, part.samples));
-  }
-
-  /// The measured torque as a sum of columns: y, the model's torque and friction.
-  [[nodiscard]] VectorXd MeasuredOf(const TorqueRows::Part& part) const {
-    const TorqueBalance& balance = *set_[part.recording].fit;
-    const int joint = set_.joints()[part.place];
+    const TorqueColumn current{TorqueColumn::kCurrent, set_.joints()[part.place]};
     VectorXd b = ModelledOf(part);
     if (set_.has_currents()) {
-      b.setZero();
-      b[balance.Find(part.place, {TorqueColumn::kCurrent, joint})] = set_.gain(part.place);
+      b = set_.gain(part.place) * VectorXd::Unit(b.size(), balance.Find(part.place, current));
     } else {
       b[b.size() - 1] = 1.0;
     }
-    return b;
+    return std::sqrt(std::max(0.0, b.dot(balance.products(part.place) * b)) / std::max(1.0, part.samples));
   }
 
   [[nodiscard]] VectorXd ModelledOf(const TorqueRows::Part& part) const {
@@ -223,16 +220,20 @@ class Judge {
         {fault, term.amplitude, term.error, result_.causes.back().outcome == CauseOutcome::kNamed});
   }
 
-  /// Whether far more than noise is left beside it, so that something else is at work. Friction and payloads
-  /// are named all the same: drives have more shapes of friction than are tried.
+  /// Whether more than noise is left, so that something else is at work, and it explains little, or where far
+  /// more is left not far more: a wrong mass fits a little of any. Friction is named all the same: drives
+  /// have more shapes of it than are tried.
   [[nodiscard]] bool IsDoubtful(const TorqueFault& fault, const CauseTerm& term) const {
-    // Measured, no bound: the nearest cause of drawn torques that were cut off explains less.
+    if (fault.IsFriction() || result_.left <= kMostNoise) return false;
+    const double left = 1.0 - estimator_.selection().fraction;
+    // Measured, no bounds: the nearest cause of drawn torques that were cut off explains less than the last.
     constexpr double kMost = 100.0;
-    return result_.left > kFar && !fault.IsFriction() && fault.kind != TorqueFault::kPayload &&
-           term.fraction <= kMost * (1.0 - estimator_.selection().fraction);
+    return (term.fraction - left < kMuch && fault.kind > TorqueFault::kArmature) ||
+           (result_.left > kFar && fault.kind != TorqueFault::kPayload && term.fraction <= kMost * left);
   }
 
-  [[nodiscard]] Fault Describe(const TorqueFault& fault, const VectorXd& a, const VectorXd& error) const {
+  [[nodiscard]] Fault Describe(const TorqueFault& fault, const VectorXd& a, VectorXd error) const {
+    if (error.size() == 0) error = VectorXd::Zero(a.size());
     Fault one;
     one.fault = fault.fault;
     one.place = fault.place;
@@ -240,7 +241,7 @@ class Judge {
     const bool is_number =
         a.size() == 1 || fault.kind == TorqueFault::kSpring || fault.kind == TorqueFault::kStribeckFriction;
     one.value = is_number ? fault.nominal + a[0] : a.norm();
-    one.error = error.size() == 0 ? 0.0 : is_number ? error[0] : error.norm();
+    one.error = is_number ? error[0] : error.norm();
     const auto vector = [](const VectorXd& v) {
       std::string text = "(";
       for (Index i = 0; i < v.size(); ++i) text += (i == 0 ? "" : ", ") + FormatNumber(v[i], 3);
@@ -249,13 +250,16 @@ class Judge {
     using enum TorqueFault::Kind;
     if (fault.kind == kPayload) {
       one.value = a[0];
-      one.error = error.size() == 0 ? 0.0 : error[0];
+      one.error = error[0];
       one.detail = "at " + vector(a.segment<3>(1) / a[0]) + " m in its frame";
+    } else if (fault.kind == kSaturation) {
+      one.value = LimitOf(fault, a);
+      one.error = error[1] * one.value;
     } else if (fault.kind == kSpring) {
       one.detail = "at rest at " + FormatNumber(-a[1] / a[0], 3);
     } else if (fault.kind == kShaking) {
       one.value = a.head<6>().norm();
-      one.error = error.size() == 0 ? 0.0 : error.head<6>().norm();
+      one.error = error.head<6>().norm();
       const auto size = [&](Index i) { return a.segment<2>(2 * i).norm(); };
       one.detail = fmt::format("at {} Hz, along its axes {}",
                                FormatNumber(set_.refinements().shaking / (2.0 * kPi), 4),
@@ -263,7 +267,7 @@ class Judge {
       if (a.size() > 6) one.detail += ", about them " + vector(Vector3d(size(3), size(4), size(5))) + " rad";
     } else if (fault.kind == kPush && fault.push.has_moment) {
       one.value = a.head<3>().norm();
-      one.error = error.size() == 0 ? 0.0 : error.head<3>().norm();
+      one.error = error.head<3>().norm();
       one.detail = vector(a.head<3>()) + " N and " + vector(a.tail<3>()) + " N m at its centre of mass";
     } else if (fault.kind == kPush && fault.push.link < 0 && fault.push.joint < 0) {
       const double turned = 2.0 * std::asin(std::min(1.0, 0.5 * a.norm() / model_.gravity().norm()));
@@ -329,14 +333,22 @@ RecordingJudgement JudgeRecordings(const RobotModel& model, std::vector<Recordin
   RecordingJudgement judgement = Judge(model, recordings, options, count).Run();
   if (!goes_on) return judgement;
   constexpr double kWell = 0.95;
-  std::optional<PositionFault> fault;
-  const bool is_poor = !judgement.IsWhole() &&
-                       (judgement.explained < kWell || judgement.left > kFar || judgement.causes.size() > 3);
-  if (is_poor && options.tries_positions) fault = FindPositionFault(model, recordings->front());
+  std::vector<PositionFault> faults;
   const auto undo = [&](Recording* one) {
-    if (fault) fault->Undo(one);
+    for (const PositionFault& fault : faults) fault.Undo(one);
   };
-  if (fault && Reopen(recordings, undo)) judgement = Judge(model, recordings, options, count).Run();
+  constexpr size_t kMostFaults = 3;
+  while (goes_on && options.tries_positions && faults.size() < kMostFaults && !judgement.IsWhole() &&
+         (judgement.explained < kWell || judgement.left > kFar || judgement.causes.size() > 3)) {
+    if (!recordings->front().reopen) break;
+    Recording begin = recordings->front().reopen();
+    undo(&begin);
+    const std::optional<PositionFault> fault = FindPositionFault(model, std::move(begin));
+    if (!fault) break;
+    faults.push_back(*fault);
+    if (!Reopen(recordings, undo)) break;
+    judgement = Judge(model, recordings, options, count).Run();
+  }
   constexpr int kReadings = 5;
   JudgeOptions next = options;
   for (int i = 1; i < kReadings && goes_on && judgement.refinements != next.refinements; ++i) {
@@ -344,7 +356,8 @@ RecordingJudgement JudgeRecordings(const RobotModel& model, std::vector<Recordin
     if (!Reopen(recordings, undo)) break;
     judgement = Judge(model, recordings, next, count).Run();
   }
-  if (fault) judgement.causes.insert(judgement.causes.begin(), MakeCause(fault->fault));
+  for (const PositionFault& fault : faults)
+    judgement.causes.insert(judgement.causes.begin(), MakeCause(fault.fault));
   return judgement;
 }
 

@@ -71,7 +71,7 @@ struct RecordingJudgement {
 };
 
 struct JudgeOptions : ReadOptions {
-  size_t most_causes = 30;
+  size_t most_causes = 16;
   bool tries_positions = true;  ///< Other signs, units and orders of positions, where little is explained.
 };
 

@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <nlopt.hpp>
 #include <numeric>
 #include <random>
@@ -39,7 +40,7 @@ std::vector<TorqueFault> ListDesignedFaults(const RobotModel& model, const std::
     using enum TorqueFault::Kind;
     const bool is_variant = fault.parameters > 0 || (fault.kind == kPayload && fault.columns.size() > 4);
     const bool is_of_all = fault.index < 0 && fault.kind != kGravity;
-    const bool is_left_out = fault.kind == kExchange || fault.kind == kDelay || fault.kind == kLoadFriction;
+    const bool is_left_out = fault.kind == kDelay || fault.kind == kLoadFriction;
     return is_variant || is_of_all || is_left_out;
   });
   return faults;
@@ -163,6 +164,7 @@ class MotionDesigner {
     constexpr size_t kEvery = 4;
     RecordedSample sample;
     sample.torque_rate = VectorXd::Zero(model_.num_joints());
+    sample.most_torque = VectorXd::Constant(model_.num_joints(), std::numeric_limits<double>::infinity());
     sample.friction.resize(model_.num_joints(), kFrictionShapes);
     const MatrixXd shape_velocities = ListShapeVelocities(0.5 * limits_.velocity);
     VectorXd largest = VectorXd::Zero(model_.num_joints());

@@ -16,13 +16,17 @@
 namespace dexcheck {
 
 inline double Square(double x) { return x * x; }
+/// 0 of none.
+double Median(std::vector<double> values);
 
 /// What a first reading told, so that the next has columns that fit better.
 struct Refinements {
-  std::map<int, double> offsets;   ///< Of joints' positions, rad or m.
-  std::map<int, double> stribeck;  ///< Velocities below which joints have more friction, rad/s or m/s.
-  std::map<int, long> delays;      ///< Of joints' torques, rows.
-  double shaking = 0.0;            ///< Angular frequency of the base, rad/s; 0 where it rests.
+  std::map<int, double> offsets;        ///< Of joints' positions, rad or m.
+  std::map<int, double> stribeck;       ///< Velocities below which joints have more friction, rad/s or m/s.
+  std::map<int, double> limits;         ///< Torques at which joints' were cut off, N m or N.
+  std::map<int, long> delays;           ///< Of joints' torques, rows.
+  Vector3d gravity = Vector3d::Zero();  ///< What it is more than the model's, m/s^2, world.
+  double shaking = 0.0;                 ///< Angular frequency of the base, rad/s; 0 where it rests.
   bool operator==(const Refinements&) const = default;
 };
 
@@ -32,6 +36,7 @@ struct RecordedSample {
   double time = 0.0;
   VectorXd q, qd, qdd;
   VectorXd torque;                    ///< Measured, or the current; smoothed like the motion.
+  VectorXd most_torque;               ///< The largest of those that were read ahead.
   VectorXd torque_rate;               ///< Per s, the secant's over a delay that is known.
   BaseMotion base;                    ///< At rest where it was not recorded.
   VectorXd wrench;                    ///< Measured, on the link, N and N m; empty for none.
@@ -75,6 +80,7 @@ class MotionFit {
   [[nodiscard]] std::vector<bool> IsJudged(const RecordedSample& sample) const;
   /// Of shapes of friction, by the root mean square of the joints' velocities.
   [[nodiscard]] const MatrixXd& shape_velocities() const { return shape_velocities_; }
+  [[nodiscard]] const VectorXd& most_torque() const { return sample_.most_torque; }
   /// Root mean square of the entries of M_bar'.
   [[nodiscard]] const MatrixXd& inertia() const { return inertia_; }
   [[nodiscard]] bool has_currents() const { return has_currents_; }

@@ -16,14 +16,14 @@ namespace {
 constexpr int kHigherOrder = 6;
 constexpr size_t kHalves[] = {3, 4, 6, 8, 11, 16, 23, 32, 45, 64, 90, 128};
 
+}  // namespace
+
 double Median(std::vector<double> values) {
   if (values.empty()) return 0.0;
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::nth_element(values.begin(), middle, values.end());
   return *middle;
 }
-
-}  // namespace
 
 double MotionFit::FindQuantum(Eigen::Index channel) const {
   double least = std::numeric_limits<double>::infinity();
@@ -65,9 +65,10 @@ void MotionFit::Analyse() {
     segments_[i] = segment_;
   }
   const Eigen::Index n = model_->num_joints();
-  for (VectorXd* vector : {&noise_.position, &noise_.velocity, &noise_.torque, &noise_.smooth_position,
-                           &noise_.smooth_torque, &noise_.acceleration, &noise_.rest, &sample_.q, &sample_.qd,
-                           &sample_.qdd, &sample_.torque, &sample_.torque_rate, &sample_.direction})
+  for (VectorXd* vector :
+       {&noise_.position, &noise_.velocity, &noise_.torque, &noise_.smooth_position, &noise_.smooth_torque,
+        &noise_.acceleration, &noise_.rest, &sample_.q, &sample_.qd, &sample_.qdd, &sample_.torque,
+        &sample_.torque_rate, &sample_.direction, &sample_.most_torque})
     *vector = VectorXd::Zero(n);
   sample_.friction = MatrixXd::Zero(n, kFrictionShapes);
   // Noise of each channel: what a polynomial over a short window leaves.
@@ -104,6 +105,9 @@ void MotionFit::Analyse() {
     noise_.position[joint] = get(RecordedQuantity::kPosition);
     noise_.velocity[joint] = get(RecordedQuantity::kVelocity);
     noise_.torque[joint] = get(Effort());
+    for (const Row& row : rows_ahead_)
+      if (const int channel = ChannelOf(Effort(), joint); channel >= 0)
+        sample_.most_torque[joint] = std::max(sample_.most_torque[joint], std::abs(row[channel]));
   }
   if (recording_->wrench.link >= 0) {
     noise_.wrench = sample_.wrench = VectorXd::Zero(6);

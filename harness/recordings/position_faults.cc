@@ -12,6 +12,10 @@ namespace {
 
 using Eigen::Index;
 
+bool IsTorque(const Channel& channel) {
+  return channel.quantity == RecordedQuantity::kTorque || channel.quantity == RecordedQuantity::kCurrent;
+}
+
 bool IsMotion(const Channel& channel) {
   return channel.quantity == RecordedQuantity::kPosition || channel.quantity == RecordedQuantity::kVelocity ||
          channel.quantity == RecordedQuantity::kAcceleration;
@@ -94,12 +98,16 @@ std::vector<PositionFault> ListPositionFaults(const RobotModel& model, const Rec
                         joint,
                         -1,
                         1.0 / gain});
+    faults.push_back({{"torque gain", place, -1.0, 0.0, "", "(the other sign)"}, joint, -1, -1.0, true});
     for (int other = joint + 1; other < model.num_joints(); ++other) {
       if (recording.FindColumn(RecordedQuantity::kPosition, other) < 0) continue;
-      faults.push_back(
-          {{"position exchanged with that of " + model.joint(other).name, place, 1.0, 0.0, "", ""},
-           joint,
-           other});
+      for (const char* const what : {"position", "torque"})
+        faults.push_back({{std::string(what) + " exchanged with that of " + model.joint(other).name, place,
+                           1.0, 0.0, "", ""},
+                          joint,
+                          other,
+                          1.0,
+                          *what == 't'});
     }
   }
   return faults;
@@ -109,7 +117,7 @@ std::vector<PositionFault> ListPositionFaults(const RobotModel& model, const Rec
 
 void PositionFault::Undo(Recording* recording) const {
   for (Channel& one : recording->channels) {
-    if (!IsMotion(one)) continue;
+    if (!(is_torque ? IsTorque(one) : IsMotion(one))) continue;
     if (other >= 0) {
       if (one.joint == joint || one.joint == other) one.joint = joint + other - one.joint;
     } else if (joint < 0 || one.joint == joint) {
@@ -120,7 +128,8 @@ void PositionFault::Undo(Recording* recording) const {
 }
 
 void PositionFault::Undo(RecordedSample* sample) const {
-  for (VectorXd* const each : {&sample->q, &sample->qd, &sample->qdd, &sample->direction}) {
+  for (VectorXd* const each : {&sample->torque, &sample->q, &sample->qd, &sample->qdd, &sample->direction}) {
+    if (is_torque != (each == &sample->torque)) continue;
     if (other >= 0) {
       std::swap((*each)[joint], (*each)[other]);
     } else if (joint >= 0) {
@@ -131,13 +140,13 @@ void PositionFault::Undo(RecordedSample* sample) const {
   }
 }
 
-std::optional<PositionFault> FindPositionFault(const RobotModel& model, const Recording& recording) {
-  if (!recording.reopen) return std::nullopt;
-  Begin begin(model, recording.reopen());
+std::optional<PositionFault> FindPositionFault(const RobotModel& model, Recording recording) {
+  std::vector<PositionFault> all = ListPositionFaults(model, recording);
+  Begin begin(model, std::move(recording));
   // A few samples say which are worth all of them.
   constexpr size_t kFewSamples = 100, kFewFaults = 10;
   std::vector<std::pair<double, PositionFault>> faults;
-  for (PositionFault& one : ListPositionFaults(model, recording)) {
+  for (PositionFault& one : all) {
     const double misfit = begin.CalcMisfit(one, std::max<size_t>(1, begin.size() / kFewSamples));
     faults.emplace_back(misfit, std::move(one));
   }

@@ -1,6 +1,6 @@
 #pragma once
 
-// Positions of a recording that are not the model's: another sign, another unit, another order.
+// Positions and torques of a recording that are not the model's: another sign, another unit, another order.
 
 #include <optional>
 
@@ -10,19 +10,19 @@
 
 namespace dexcheck {
 
-/// What was done to positions, and how to undo it.
+/// What was done to positions or torques, and how to undo it.
 struct PositionFault {
   Fault fault;
   int joint = -1;       ///< -1 for all.
   int other = -1;       ///< That it was exchanged with.
   double factor = 1.0;  ///< That undoes it.
+  bool is_torque = false;
 
   void Undo(Recording* recording) const;
   void Undo(RecordedSample* sample) const;
 };
 
 /// The one that explains most of what gravity, inertia and friction do not, if one explains much.
-/// @param recording can be opened again.
-std::optional<PositionFault> FindPositionFault(const RobotModel& model, const Recording& recording);
+std::optional<PositionFault> FindPositionFault(const RobotModel& model, Recording recording);
 
 }  // namespace dexcheck

@@ -102,6 +102,7 @@ void RecordingSet::Read(Recording* recording, const ReadOptions& options,
   one.inertia = motion.inertia();
   one.step = motion.step();
   one.shape_velocities = motion.shape_velocities();
+  one.most_torque = motion.most_torque();
 }
 
 void RecordingSet::TellSecond(const ReadOptions& options, double time, const VectorXd& residual) {

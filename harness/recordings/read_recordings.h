@@ -27,6 +27,7 @@ struct ReadRecording {
   MotionNoise motion;
   MatrixXd inertia;
   MatrixXd shape_velocities;  ///< MotionFit's.
+  VectorXd most_torque;       ///< RecordedSample's.
   double step = 0.0;          ///< Between rows, s.
   VectorXd noise;             ///< Of a sample's balance, by judged joint, N m or N.
   VectorXd weight;            ///< Likewise: noise, or what no cause explains.

@@ -9,13 +9,19 @@ namespace dexcheck {
 
 using Eigen::Index;
 
+double FindCutOff(const Refinements& refinements, int joint, int component, double most) {
+  constexpr double kFractions[kCutOffs] = {1.0, 0.8, 0.55};
+  const auto known = refinements.limits.find(joint);
+  return known != refinements.limits.end() ? known->second : kFractions[component / 2] * most;
+}
+
 TorqueBalance::TorqueBalance(const RobotModel& model, const std::vector<int>& joints, bool has_currents,
                              const Refinements& refinements)
     : model_(&model),
       regressor_(model),
       joints_(joints),
       has_currents_(has_currents),
-      frequency_(refinements.shaking) {
+      refinements_(refinements) {
   const Index n = model.num_joints();
   bodies_.resize(n, TorqueRegressor::kBody * n);
   gravity_.resize(n, 3);
@@ -48,9 +54,10 @@ void TorqueBalance::ListColumns(bool has_currents) {
       for (int k = 0; is_moved && k < TorqueRegressor::kBody; ++k)
         columns.push_back({TorqueColumn::kBody, link, k});
     }
-    for (const int other : joints_) columns.push_back({TorqueColumn::kTorque, other});
-    for (int other = 0; other < model_->num_joints(); ++other)
-      columns.push_back({TorqueColumn::kPosition, other});
+    columns.push_back({TorqueColumn::kTorque, joint});
+    for (const auto kind : {TorqueColumn::kPosition, TorqueColumn::kBacklash})
+      for (int other = 0; other < model_->num_joints(); ++other) columns.push_back({kind, other});
+    for (int k = 0; k < 2 * kCutOffs; ++k) columns.push_back({TorqueColumn::kCutOff, joint, k});
     for (int k = 0; k < 3; ++k) columns.push_back({TorqueColumn::kGravity, 0, k});
     if (has_currents) columns.push_back({TorqueColumn::kCurrent, joint});
     for (const auto kind :
@@ -58,7 +65,7 @@ void TorqueBalance::ListColumns(bool has_currents) {
           TorqueColumn::kAcceleration, TorqueColumn::kLoad, TorqueColumn::kAngle})
       columns.push_back({kind, joint});
     for (int k = 0; k < kFrictionShapes; ++k) columns.push_back({TorqueColumn::kFriction, joint, k});
-    for (int k = 0; frequency_ > 0.0 && k < shaking_.cols(); ++k)
+    for (int k = 0; refinements_.shaking > 0.0 && k < shaking_.cols(); ++k)
       columns.push_back({TorqueColumn::kShaking, 0, k});
     std::map<TorqueColumn, Index>& places = places_.emplace_back();
     for (const TorqueColumn& column : columns) places.emplace(column, static_cast<Index>(places.size()));
@@ -75,58 +82,59 @@ double TorqueBalance::CalcFriction(int joint, const RecordedSample& sample) cons
   return modelled.damping * sample.qd[joint] + modelled.dry_friction * sample.direction[joint];
 }
 
+double TorqueBalance::CalcCutOff(int joint, int component, const RecordedSample& sample) const {
+  const bool is_recorded = component < 2;
+  const double torque = is_recorded ? torques_[joint] + CalcFriction(joint, sample) : sample.torque[joint];
+  const double limit = FindCutOff(refinements_, joint, component, sample.most_torque[joint]);
+  const double beyond = std::abs(torque) - limit;
+  if (!(beyond > 0.0)) return 0.0;
+  return std::copysign(component % 2 == 0 ? beyond : -limit, torque) * (is_recorded ? -1.0 : 1.0);
+}
+
+double TorqueBalance::CalcEntry(int joint, const TorqueColumn& column, const RecordedSample& sample) const {
+  const double direction = sample.direction[joint];
+  switch (column.kind) {
+    case TorqueColumn::kBody:
+      return bodies_(joint, TorqueRegressor::kBody * column.index + column.component);
+    case TorqueColumn::kTorque:
+      return torques_[joint] + CalcFriction(joint, sample);
+    case TorqueColumn::kPosition:
+      return by_position_(joint, column.index);
+    case TorqueColumn::kBacklash:
+      return std::copysign(by_position_(joint, column.index),
+                           by_position_(joint, column.index) * torques_[column.index]);
+    case TorqueColumn::kCutOff:
+      return CalcCutOff(joint, column.component, sample);
+    case TorqueColumn::kGravity:
+      return gravity_(joint, column.component);
+    case TorqueColumn::kRate:
+      return sample.torque_rate[joint];
+    case TorqueColumn::kCurrent:
+      return sample.torque[joint];
+    case TorqueColumn::kOffset:
+      return 1.0;
+    case TorqueColumn::kDry:
+      return direction;
+    case TorqueColumn::kViscous:
+      return sample.qd[joint];
+    case TorqueColumn::kAcceleration:
+      return sample.qdd[joint];
+    case TorqueColumn::kFriction:
+      return sample.friction(joint, column.component);
+    case TorqueColumn::kAngle:
+      return sample.q[joint];
+    case TorqueColumn::kShaking:
+      return shaking_(joint, column.component);
+    case TorqueColumn::kLoad:
+      return direction * std::abs(torques_[joint]);
+  }
+  return 0.0;
+}
+
 void TorqueBalance::FillRow(size_t place, const RecordedSample& sample, Eigen::Ref<VectorXd> row) const {
   const int joint = joints_[place];
-  const double direction = sample.direction[joint];
-  const double rate = sample.qd[joint];
-  for (size_t i = 0; i < columns_[place].size(); ++i) {
-    const TorqueColumn& column = columns_[place][i];
-    double& entry = row[static_cast<Index>(i)];
-    switch (column.kind) {
-      case TorqueColumn::kBody:
-        entry = bodies_(joint, TorqueRegressor::kBody * column.index + column.component);
-        break;
-      case TorqueColumn::kTorque:
-        entry = torques_[column.index] + CalcFriction(column.index, sample);
-        break;
-      case TorqueColumn::kPosition:
-        entry = by_position_(joint, column.index);
-        break;
-      case TorqueColumn::kGravity:
-        entry = gravity_(joint, column.component);
-        break;
-      case TorqueColumn::kRate:
-        entry = sample.torque_rate[joint];
-        break;
-      case TorqueColumn::kCurrent:
-        entry = sample.torque[joint];
-        break;
-      case TorqueColumn::kOffset:
-        entry = 1.0;
-        break;
-      case TorqueColumn::kDry:
-        entry = direction;
-        break;
-      case TorqueColumn::kViscous:
-        entry = rate;
-        break;
-      case TorqueColumn::kAcceleration:
-        entry = sample.qdd[joint];
-        break;
-      case TorqueColumn::kFriction:
-        entry = sample.friction(joint, column.component);
-        break;
-      case TorqueColumn::kAngle:
-        entry = sample.q[joint];
-        break;
-      case TorqueColumn::kShaking:
-        entry = shaking_(joint, column.component);
-        break;
-      case TorqueColumn::kLoad:
-        entry = direction * std::abs(torques_[joint]);
-        break;
-    }
-  }
+  for (size_t i = 0; i < columns_[place].size(); ++i)
+    row[static_cast<Index>(i)] = CalcEntry(joint, columns_[place][i], sample);
   row[row.size() - 1] =
       (has_currents_ ? 0.0 : sample.torque[joint]) - torques_[joint] - CalcFriction(joint, sample);
 }
@@ -144,7 +152,7 @@ MatrixXd TorqueBalance::CalcWrenchColumns() {
 
 void TorqueBalance::CalcShakingColumns(const RecordedSample& sample) {
   constexpr double kStep = 1e-6;  // rad
-  const double w = frequency_;
+  const double w = refinements_.shaking;
   for (int k = 0; k < 3; ++k)
     for (int phase = 0; phase < 2; ++phase) {
       const double value = sample.swing[phase];
@@ -169,10 +177,16 @@ void TorqueBalance::Add(const RecordedSample& sample, const std::vector<bool>& i
   }
   regressor_.SetMotion(sample.q, sample.qd, sample.qdd, sample.base);
   regressor_.CalcTorques(torques_);
-  regressor_.CalcBodyColumns(bodies_);
   regressor_.CalcGravityColumns(gravity_);
+  if (!refinements_.gravity.isZero()) {
+    BaseMotion turned = sample.base;
+    turned.a -= refinements_.gravity;
+    regressor_.SetMotion(sample.q, sample.qd, sample.qdd, turned);
+  }
+  regressor_.CalcBodyColumns(bodies_);
+  if (!refinements_.gravity.isZero()) regressor_.SetMotion(sample.q, sample.qd, sample.qdd, sample.base);
   by_position_ = (by_position_.colwise() - torques_) * steps_.cwiseInverse().asDiagonal();
-  if (frequency_ > 0.0) {
+  if (refinements_.shaking > 0.0) {
     CalcShakingColumns(sample);
     regressor_.SetMotion(sample.q, sample.qd, sample.qdd, sample.base);
   }

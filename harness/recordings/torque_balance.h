@@ -22,6 +22,8 @@ struct TorqueColumn {
     kBody,      ///< By a link's BodyVector: index is the link, component 0 to 9.
     kTorque,    ///< The model's torque of joint index, with its friction.
     kPosition,  ///< By the position of joint index.
+    kBacklash,  ///< The same, with the sign of that joint's torque.
+    kCutOff,    ///< By component: 2 of each torque at which it may have been cut off.
     kGravity,   ///< By component of gravity.
     kRate,      ///< Of the measured torque.
     kCurrent,   ///< Measured.
@@ -41,6 +43,12 @@ struct TorqueColumn {
     return std::tie(kind, index, component) < std::tie(other.kind, other.index, other.component);
   }
 };
+
+/// Torques at which a recorded torque may have been cut off (the first), or a motor's, which was less than
+/// recorded: what is beyond, and by the logarithm of the limit.
+inline constexpr int kCutOffs = 3;
+/// Such a torque, as far as is known. @param component of kCutOff. @param most that was recorded.
+double FindCutOff(const Refinements& refinements, int joint, int component, double most);
 
 class TorqueBalance {
  public:
@@ -96,6 +104,8 @@ class TorqueBalance {
   void CalcShakingColumns(const RecordedSample& sample);
   /// The model's, at a joint.
   [[nodiscard]] double CalcFriction(int joint, const RecordedSample& sample) const;
+  [[nodiscard]] double CalcCutOff(int joint, int component, const RecordedSample& sample) const;
+  [[nodiscard]] double CalcEntry(int joint, const TorqueColumn& column, const RecordedSample& sample) const;
   void FillRow(size_t place, const RecordedSample& sample, Eigen::Ref<VectorXd> row) const;
   void Flush(size_t place);
   void MergeBlocks();
@@ -105,7 +115,7 @@ class TorqueBalance {
   TorqueRegressor regressor_;
   std::vector<int> joints_;
   bool has_currents_;
-  double frequency_;  // of a base that shakes
+  Refinements refinements_;
   std::vector<std::vector<TorqueColumn>> columns_;
   std::vector<std::map<TorqueColumn, Eigen::Index>> places_;
   std::vector<MatrixXd> products_, rows_;

@@ -11,6 +11,12 @@ namespace {
 using BodyVector = TorqueRegressor::BodyVector;
 using Parts = std::vector<ColumnPart>;
 
+/// N m, N, N m/rad or N/m: what is larger is of two that leave the same.
+constexpr double kMostTorque = 1e4;
+
+/// How far from 1 a part may be that is there or not.
+constexpr double kWhole = 0.3;
+
 /// The columns of a link by a change of its BodyVector.
 Parts BodyParts(int link, const BodyVector& change, int recording = -1) {
   Parts parts;
@@ -38,9 +44,6 @@ class FaultList {
 
   std::vector<TorqueFault> Make() {
     for (const int joint : joints_) AddJoint(joint);
-    for (const int joint : joints_)
-      for (const int other : joints_)
-        if (joint < other) AddExchange(joint, other);
     for (int link = 0; link < model_.num_joints(); ++link) AddLink(link);
     AddAll();
     return std::move(faults_);
@@ -90,6 +93,7 @@ class FaultList {
     TorqueFault& spring = AddAtJoint(kSpring, joint, "spring", turns ? "N m/rad" : "N/m",
                                      {TorqueColumn::kAngle, joint}, 0.0, true);
     spring.columns.push_back({{{TorqueColumn::kOffset, joint}, joint}});
+    spring.scale = VectorXd::Constant(2, kMostTorque);
     AddAtJoint(kLoadFriction, joint, "friction that grows with the load", "", {TorqueColumn::kLoad, joint},
                0.0, true);
     AddAtJoint(kOffset, joint, "torque offset", torque, {TorqueColumn::kOffset, joint}, 0.0, false);
@@ -101,6 +105,20 @@ class FaultList {
         AddAtJoint(kDelay, joint, "delay of the torque", "s", {TorqueColumn::kRate, joint}, 0.0, false);
     delay.columns[0][0].factor = -1.0;
     delay.scale = DelayScale();
+    const int limits = refinements_.limits.contains(joint) ? 2 : kCutOffs;
+    for (int k = 0; k < limits && recordings_ == 1; ++k) {
+      const TorqueColumn beyond{TorqueColumn::kCutOff, joint, 2 * k},
+          limit{TorqueColumn::kCutOff, joint, 2 * k + 1};
+      TorqueFault& one = Add(kSaturation, joint, "saturation", "joint " + modelled.name, torque,
+                             {{{beyond, joint}}, {{limit, joint}}});
+      one.parameters = 1;
+      one.is_possible = [](const VectorXd& a) {
+        return std::abs(a[0] - 1.0) < kWhole && std::abs(a[1]) < kWhole;
+      };
+    }
+    Add(kBacklash, joint, "backlash", "joint " + modelled.name, turns ? "rad" : "m",
+        {{{{TorqueColumn::kBacklash, joint}, -1, -0.5}}})
+        .is_possible = [](const VectorXd& a) { return a[0] > 0.0; };
     Add(kZero, joint, "position offset", "joint " + modelled.name, turns ? "rad" : "m",
         {{{{TorqueColumn::kPosition, joint}, -1, -1.0}}});
   }
@@ -113,19 +131,6 @@ class FaultList {
     Add(TorqueFault::kStribeckFriction, joint, "Stribeck friction", "joint " + model_.joint(joint).name, unit,
         {{{slow, joint, 0.5}, {fast, joint, 0.5}}, {{slow, joint, -slope}, {fast, joint, slope}}})
         .is_possible = [](const VectorXd& a) { return std::abs(a[1]) < a[0]; };
-  }
-
-  void AddExchange(int joint, int other) {
-    const Parts parts = {{{TorqueColumn::kTorque, other}, joint, 1.0},
-                         {{TorqueColumn::kTorque, joint}, joint, -1.0},
-                         {{TorqueColumn::kTorque, joint}, other, 1.0},
-                         {{TorqueColumn::kTorque, other}, other, -1.0}};
-    TorqueFault& one =
-        Add(TorqueFault::kExchange, joint, "torque exchanged with that of " + model_.joint(other).name,
-            "joint " + model_.joint(joint).name, "", {parts});
-    one.other = other;
-    constexpr double kWhole = 0.2;
-    one.is_possible = [](const VectorXd& a) { return std::abs(a[0] - 1.0) < kWhole; };
   }
 
   void AddLink(int link) {
@@ -209,6 +214,7 @@ class FaultList {
         AddInAll(kAllDry, "dry friction", {shape}).parameters = shape == TorqueColumn::kDry ? 0 : 1;
       AddInAll(kAllFriction, "dry and viscous friction", {TorqueColumn::kDry, TorqueColumn::kViscous});
       AddInAll(kAllOffsets, "torque offset", {TorqueColumn::kOffset}).is_possible = nullptr;
+      faults_.back().scale = VectorXd::Constant(static_cast<Eigen::Index>(joints_.size()), kMostTorque);
       Add(kDelay, -1, "delay of the torques", "all joints", "s", {delay}).scale = DelayScale();
       Add(kTorqueGain, -1, "torque gain", "all joints", "", {gain}, 1.0).is_possible = IsGain;
     }

@@ -44,9 +44,10 @@ struct TorqueFault {
     kOffset,
     kArmature,
     kTorqueGain,
-    kExchange,
     kDelay,
     kZero,
+    kSaturation,
+    kBacklash,
     kMass,
     kCentre,
     kInertia,
@@ -57,7 +58,6 @@ struct TorqueFault {
   };
   Kind kind;
   int index = -1;  ///< Joint or link; -1 for all.
-  int other = -1;  ///< That is exchanged with it.
   int recording = -1;
   std::string fault, place, unit;
   double nominal = 0.0;
@@ -70,8 +70,8 @@ struct TorqueFault {
 
   /// Of any shape, in one joint or in all.
   [[nodiscard]] bool IsFriction() const { return kind <= kLoadFriction; }
-  /// Whether it is a number of bodies, gravity or a position.
-  [[nodiscard]] bool IsOfBodies() const { return kind >= kZero && kind <= kGravity; }
+  /// Of bodies, gravity, positions or springs: what a torque depends on beside the drive's own numbers.
+  [[nodiscard]] bool IsOfLoad() const { return kind == kSpring || (kind >= kZero && kind <= kGravity); }
 };
 
 /// All that are tried of a model's recordings.

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <tuple>
+#include <utility>
 
 #include "controller/common/errors.h"
 #include "controller/common/linear_algebra.h"
@@ -14,67 +15,6 @@ namespace dexcheck {
 namespace {
 
 using Eigen::Index;
-
-double Median(const VectorXd& values) {
-  std::vector<double> sorted(values.begin(), values.end());
-  const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
-  std::nth_element(sorted.begin(), middle, sorted.end());
-  return *middle;
-}
-
-/// A push does not hide behind what it adds to its joint's noise.
-VectorXd InUnitsOfMedian(const VectorXd& squares) {
-  const double usual = squares.size() > 0 ? Median(squares) : 0.0;
-  return usual > 0.0 ? VectorXd(squares / usual) : squares;
-}
-
-/// A stretch that stands out. Smoothing, and where blocks begin, spread a push's begin and end: the parts of
-/// the blocks there are by what is seen in them. @param usual what blocks have without it.
-Push TrimWindow(const VectorXd& squares, double usual, Index first, Index last,
-                const std::vector<TorqueBalance::Block>& blocks) {
-  const double whole = Median(squares.segment(first, last - first + 1));
-  constexpr double kNearlyWhole = 0.25;  // half of it
-  constexpr Index kBeside = 4;
-  while (first < last && squares[first] < kNearlyWhole * whole) ++first;
-  while (last > first && squares[last] < kNearlyWhole * whole) --last;
-  Push push{.from = blocks[static_cast<size_t>(first)].from, .to = blocks[static_cast<size_t>(last)].to};
-  for (Index at = std::max<Index>(0, first - kBeside); at <= std::min(squares.size() - 1, last + kBeside);
-       ++at)
-    push.shares.emplace_back(
-        blocks[static_cast<size_t>(at)].centre(),
-        at >= first && at <= last ? 1.0 : std::sqrt(std::clamp((squares[at] - usual) / whole, 0.0, 1.0)));
-  return push;
-}
-
-/// The few stretches that stand out most.
-std::vector<Push> FindWindows(const VectorXd& squares, const std::vector<TorqueBalance::Block>& blocks) {
-  constexpr size_t kMost = 3;
-  constexpr double kStandsOut = 12.0, kStays = 4.0;
-  if (squares.size() < 16) return {};
-  const double usual = std::max(Median(squares), std::numeric_limits<double>::min());
-  VectorXd rest = squares;
-  std::vector<Push> windows;
-  while (windows.size() < kMost) {
-    Index peak = 0;
-    if (!(rest.maxCoeff(&peak) > kStandsOut * usual)) break;
-    Index first = peak, last = peak;
-    // A block in between may be small by chance.
-    const auto stays = [&](Index at) { return at >= 0 && at < rest.size() && rest[at] > kStays * usual; };
-    while (stays(first - 1) || stays(first - 2)) --first;
-    while (stays(last + 1) || stays(last + 2)) ++last;
-    // What stands out half of the time is no push.
-    const Push push = TrimWindow(squares, usual, first, last, blocks);
-    // Windows of smoothing overlap, so that what acts shows in more than one sample.
-    if (last - first <= squares.size() / 2 && push.from < push.to) windows.push_back(push);
-    rest.segment(first, last - first + 1).setZero();
-  }
-  return windows;
-}
-
-/// How large a fault's amplitude may plausibly be.
-double CalcPlausible(const TorqueFault& fault, Index k) {
-  return fault.scale.size() > 0 ? fault.scale[k] : std::max(1.0, std::abs(fault.nominal));
-}
 
 /// Rounding of sums of products hides what a column has less of beside others.
 constexpr double kIndependent = 1e-5;
@@ -118,7 +58,7 @@ TorqueEstimator::TorqueEstimator(RecordingSet* recordings, size_t most_causes)
     barred_.resize(faults_.size(), false);
     selection_ = Select();
   }
-  while (BarSeconds() || BarWeakBodies()) selection_ = Select();
+  while (BarSeconds()) selection_ = Select();
 }
 
 void TorqueEstimator::ListFaults() {
@@ -127,31 +67,35 @@ void TorqueEstimator::ListFaults() {
   faults_ = ListTorqueFaults(recordings_->model(), judged, static_cast<int>(recordings_->size()),
                              recordings_->refinements());
   if (recordings_->has_currents())
-    std::erase_if(faults_, [](const TorqueFault& one) { return one.kind == TorqueFault::kTorqueGain; });
-  barred_.assign(faults_.size(), false);
+    std::erase_if(faults_, [](const TorqueFault& one) {
+      return one.kind == TorqueFault::kTorqueGain || one.kind == TorqueFault::kSaturation;
+    });
+  barred_.clear();
+  // Where drives' gains are sought, the model's bodies are the scale by which they are told.
+  for (const TorqueFault& one : faults_)
+    barred_.push_back(recordings_->has_currents() && one.IsOfLoad() && one.kind != TorqueFault::kPayload);
 }
 
 CauseSelection TorqueEstimator::Select() {
   CauseSelection selection;
-  double alike = 0.0;
   recordings_->ResetWeights();
   constexpr int kRounds = 6;
   constexpr double kLeastGain = 0.9;  // of what was estimated before, taken away at once
+  // Of the square of what no cause explains: so much is left of a drive that is not known well.
+  constexpr double kFarFromKnown = 2.0;
   for (int round = 0; round < kRounds; ++round) {
     rows_ = MakeTorqueRows(*recordings_, faults_, /*is_held=*/false);
     Compress();
-    // Where no more than noise is left, its likeness says nothing of causes.
-    const double now = round == 0 ? CalcAlike(CalcUsual())
-                       : CalcMeanSquare(CalcLeft(selection.terms)) <= Square(kMostNoise)
-                           ? alike
-                           : CalcAlike(CalcLeft(selection.terms));
-    const bool is_settled = round > 1 && std::abs(now - alike) < 0.2 * alike;
-    alike = now;
-    selection = SelectAmong(alike);
-    if (is_settled) break;
-    if (round + 1 == kRounds) break;
+    // Where more than noise is left, what no cause explains weighs as noise does, and is alike.
+    const bool is_known = round == 0 || IsNoise(CalcLeft(selection.terms));
+    const double before = std::exchange(
+        alike_, round > 0 && is_known ? alike_ : CalcAlike(Fit(is_known ? Part::kUsual : Part::kAll)));
+    floor_ = is_known ? 1.0 : kFarFromKnown;
+    selection = SelectAmong();
+    if (round + 1 == kRounds || (round > 1 && std::abs(alike_ - before) < 0.2 * before)) break;
     Relinearise(selection);
-    Weigh(CalcLeft(selection.terms));
+    const VectorXd left = CalcLeft(selection.terms);
+    Weigh(IsNoise(left) ? left : Fit(Part::kAll));
     if (recordings_->has_currents()) {
       const VectorXd off = CalcAmplitudes(selection.terms).head(CountForced(*recordings_));
       recordings_->DivideGains(VectorXd(1.0 + off.array().max(-kLeastGain)));
@@ -188,9 +132,9 @@ void TorqueEstimator::ScaleWhole(const std::vector<CauseTerm>& terms, TorqueFaul
   parts.resize(1);
   for (const CauseTerm& term : terms) {
     const TorqueFault& found = faults_[term.candidate];
-    const bool is_recorded = found.kind == TorqueFault::kTorqueGain || found.kind == TorqueFault::kExchange ||
-                             found.kind == TorqueFault::kOffset || found.kind == TorqueFault::kAllOffsets ||
-                             found.kind == TorqueFault::kDelay || found.kind == TorqueFault::kPush;
+    const bool is_recorded = found.kind == TorqueFault::kTorqueGain || found.kind == TorqueFault::kOffset ||
+                             found.kind == TorqueFault::kAllOffsets || found.kind == TorqueFault::kDelay ||
+                             found.kind == TorqueFault::kPush;
     if (is_recorded) continue;
     for (size_t k = 0; k < found.columns.size(); ++k)
       for (ColumnPart part : found.columns[k]) {
@@ -217,19 +161,20 @@ Index TorqueEstimator::CountForcedRows() const {
   return (R_.leftCols(CountForced(*recordings_)).array() != 0.0).rowwise().any().count();
 }
 
-CauseSelection TorqueEstimator::SelectAmong(double alike) const {
-  CauseSelection best = SelectAmong(alike, barred_);
+CauseSelection TorqueEstimator::SelectAmong() const {
+  CauseSelection best = SelectAmong(barred_);
   // A fault in all joints goes before several single ones, of which the first alone explains less.
   std::vector<bool> barred = barred_;
   for (const CauseTerm& term : best.terms)
     if (faults_[term.candidate].index < 0 && faults_[term.candidate].columns.size() > 3)
       barred[term.candidate] = true;
-  if (barred == barred_) return best;
-  CauseSelection other = SelectAmong(alike, barred);
+  constexpr size_t kFew = 4;
+  if (barred == barred_ || best.terms.size() > kFew) return best;
+  CauseSelection other = SelectAmong(barred);
   return other.criterion < best.criterion ? other : best;
 }
 
-CauseSelection TorqueEstimator::SelectAmong(double alike, const std::vector<bool>& barred) const {
+CauseSelection TorqueEstimator::SelectAmong(const std::vector<bool>& barred) const {
   const Index width = R_.cols();
   const Index begin = CountForcedRows(), rows = R_.rows() - begin;
   std::vector<Candidate> candidates;
@@ -253,7 +198,8 @@ CauseSelection TorqueEstimator::SelectAmong(double alike, const std::vector<bool
   options.restarts = 0;
   options.exchanges_pairs = false;
   options.rows = rows_.samples;
-  options.alike = alike;
+  options.alike = alike_;
+  options.floor = floor_;
   options.independent = kIndependent;
   return SelectCauses(R_.col(width - 1).tail(rows), candidates, options);
 }
@@ -288,10 +234,21 @@ VectorXd TorqueEstimator::CalcLeft(const std::vector<CauseTerm>& terms) const {
 
 bool TorqueEstimator::BarSeconds() {
   bool has_any = false;
+  // What is attached in all recordings is the link's own.
+  std::vector<const CauseTerm*> payloads;
+  for (const CauseTerm& term : selection_.terms)
+    if (faults_[term.candidate].kind == TorqueFault::kPayload && faults_[term.candidate].recording >= 0)
+      payloads.push_back(&term);
+  if (payloads.size() > 1 && payloads.size() >= recordings_->size()) {
+    const auto least =
+        std::ranges::min_element(payloads, {}, [](const CauseTerm* one) { return one->amplitude[0]; });
+    barred_[(*least)->candidate] = has_any = true;
+  }
   std::vector<std::tuple<TorqueFault::Kind, int, int, double>> seen;
   for (const CauseTerm& term : selection_.terms) {
     const TorqueFault& one = faults_[term.candidate];
-    const bool is_shape = one.kind == TorqueFault::kDryFriction || one.kind == TorqueFault::kStribeckFriction;
+    const bool is_shape = one.kind == TorqueFault::kDryFriction ||
+                          one.kind == TorqueFault::kStribeckFriction || one.kind == TorqueFault::kSaturation;
     if (one.kind != TorqueFault::kPush && !is_shape) continue;
     const std::tuple what(one.kind, one.index, one.push.recording, one.push.from);
     if (std::find(seen.begin(), seen.end(), what) == seen.end()) {
@@ -303,71 +260,55 @@ bool TorqueEstimator::BarSeconds() {
   return has_any;
 }
 
-double TorqueEstimator::CalcMeanSquare(const VectorXd& left) const {
+double TorqueEstimator::CalcRms(const TorqueRows& rows, const VectorXd& left) const {
   double squares = 0.0;
-  for (const TorqueRows::Part& part : rows_.parts) {
+  for (const TorqueRows::Part& part : rows.parts) {
     const ReadRecording& one = (*recordings_)[part.recording];
     const auto place = static_cast<Index>(part.place);
     squares +=
         left.segment(part.begin, part.size).squaredNorm() * Square(one.weight[place] / one.noise[place]);
   }
-  return squares / std::max(1.0, rows_.samples);
+  return std::sqrt(squares / std::max(1.0, rows.samples));
 }
 
-bool TorqueEstimator::BarWeakBodies() {
-  if (CalcMeanSquare(CalcLeft(selection_.terms)) <= Square(kMostNoise)) return false;
-  constexpr double kMuch = 0.05;
-  bool has_any = false;
-  for (const CauseTerm& term : selection_.terms) {
-    if (!faults_[term.candidate].IsOfBodies() || term.fraction - (1.0 - selection_.fraction) >= kMuch)
-      continue;
-    barred_[term.candidate] = true;
-    has_any = true;
-  }
-  return has_any;
+bool TorqueEstimator::IsPart(const TorqueFault& fault, Part part) {
+  using enum TorqueFault::Kind;
+  if (part == Part::kAll) return fault.kind != kPush;
+  const bool is_usual = fault.kind == kDryFriction || fault.kind == kViscousFriction || fault.kind == kOffset;
+  if (part == Part::kUsual || is_usual) return is_usual && (part == Part::kUsual || fault.parameters == 0);
+  return fault.kind == kArmature || (fault.kind >= kMass && fault.kind <= kInertia);
 }
 
-VectorXd TorqueEstimator::Fit(const std::vector<TorqueFault::Kind>& kinds, bool is_plain, Index* rank) const {
+VectorXd TorqueEstimator::FitAmplitudes(Part part, Index* rank) const {
   const std::vector<Index> first = ListFirstColumns();
   std::vector<Index> columns;
   std::vector<double> plausible;
   for (Index i = 0; i < CountForced(*recordings_); ++i) columns.push_back(i), plausible.push_back(1.0);
   for (size_t i = 0; i < faults_.size(); ++i) {
-    const bool is_shape = faults_[i].parameters > 0;
-    if ((is_shape && is_plain) || std::find(kinds.begin(), kinds.end(), faults_[i].kind) == kinds.end())
-      continue;
-    for (Index k = 0; k < CountColumns(faults_[i]); ++k)
-      columns.push_back(first[i] + k), plausible.push_back(CalcPlausible(faults_[i], k));
+    for (Index k = 0; k < CountColumns(faults_[i]) && IsPart(faults_[i], part); ++k)
+      columns.push_back(first[i] + k),
+          plausible.push_back(faults_[i].scale.size() > 0 ? faults_[i].scale[k]
+                                                          : std::max(1.0, std::abs(faults_[i].nominal)));
   }
   const Index y = R_.cols() - 1, width = static_cast<Index>(columns.size());
-  MatrixXd C = R_(Eigen::all, columns) * Eigen::Map<const VectorXd>(plausible.data(), width).asDiagonal();
-  Eigen::ColPivHouseholderQR<MatrixXd> qr;
-  qr.setThreshold(kIndependent);
-  *rank = qr.compute(C).rank();
-  VectorXd right = R_.col(y);
-  if (is_plain) {
-    // What the motion hardly tells stays of plausible size.
-    C.conservativeResize(C.rows() + width, Eigen::NoChange);
-    C.bottomRows(width).setIdentity();
-    right.conservativeResize(C.rows());
-    right.tail(width).setZero();
-    qr.compute(C);
+  const Eigen::Map<const VectorXd> scale(plausible.data(), width);
+  MatrixXd C = R_(Eigen::all, columns) * scale.asDiagonal();
+  if (rank != nullptr) {
+    Eigen::ColPivHouseholderQR<MatrixXd> qr;
+    qr.setThreshold(kIndependent);
+    *rank = qr.compute(C).rank();
   }
+  // What the motion hardly tells stays of plausible size.
+  C.conservativeResize(C.rows() + width, Eigen::NoChange);
+  C.bottomRows(width).setIdentity();
+  VectorXd right = VectorXd::Zero(C.rows());
+  right.head(R_.rows()) = R_.col(y);
   VectorXd a = VectorXd::Zero(y);
-  a(columns) = qr.solve(right).cwiseProduct(Eigen::Map<const VectorXd>(plausible.data(), width));
+  a(columns) = Eigen::HouseholderQR<MatrixXd>(C).solve(right).cwiseProduct(scale);
   return a;
 }
 
-VectorXd TorqueEstimator::FitPlainly(Index* rank) const {
-  using enum TorqueFault::Kind;
-  return Fit({kMass, kCentre, kInertia, kDryFriction, kViscousFriction, kOffset, kArmature}, true, rank);
-}
-
-VectorXd TorqueEstimator::CalcUsual() const {
-  Index rank = 0;
-  return rows_.CalcLeft(
-      Fit({TorqueFault::kDryFriction, TorqueFault::kViscousFriction, TorqueFault::kOffset}, false, &rank));
-}
+VectorXd TorqueEstimator::Fit(Part part) const { return rows_.CalcLeft(FitAmplitudes(part, nullptr)); }
 
 double TorqueEstimator::CalcAlike(const VectorXd& left) const {
   double blocks = 0.0, of_blocks = 0.0, next = 0.0;
@@ -391,25 +332,12 @@ double TorqueEstimator::CalcAlike(const VectorXd& left) const {
 
 bool TorqueEstimator::AddPushes() {
   const VectorXd left = CalcLeft(selection_.terms);
-  bool has_any = false;
-  for (size_t r = 0; r < recordings_->size(); ++r) {
-    const std::vector<TorqueBalance::Block>& blocks = (*recordings_)[r].fit->blocks();
-    VectorXd squares = VectorXd::Zero(static_cast<Index>(blocks.size()));
-    for (const TorqueRows::Part& part : rows_.parts)
-      if (part.recording == r)
-        squares +=
-            InUnitsOfMedian(left.segment(part.begin + part.within, part.size - part.within).cwiseAbs2());
-    std::vector<Push> pushes = FindWindows(squares, blocks);
-    if (const std::optional<double> when = FindStep(*recordings_, rows_, left, r))
-      pushes.push_back({.from = *when, .to = blocks.back().to, .shares = {{*when, 0.0}, {*when, 1.0}}});
-    for (Push& when : pushes) {
-      when.recording = static_cast<int>(r);
+  const size_t before = faults_.size();
+  for (size_t r = 0; r < recordings_->size(); ++r)
+    for (const Push& when : FindPushes(*recordings_, rows_, left, r))
       for (TorqueFault& one : ListPushes(recordings_->model(), recordings_->joints(), when))
         faults_.push_back(std::move(one));
-      has_any = true;
-    }
-  }
-  return has_any;
+  return faults_.size() > before;
 }
 
 }  // namespace dexcheck

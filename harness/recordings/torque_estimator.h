@@ -26,11 +26,16 @@ class TorqueEstimator {
   [[nodiscard]] const TorqueRows& rows() const { return rows_; }
   /// Amplitudes of all columns under these terms; those that are part of every explanation follow from them.
   [[nodiscard]] VectorXd CalcAmplitudes(const std::vector<CauseTerm>& terms) const;
-  /// Amplitudes of a plain least-squares fit of all bodies' numbers, friction, offsets and armatures.
-  /// @param rank how many of them the motion tells.
-  [[nodiscard]] VectorXd FitPlainly(Eigen::Index* rank) const;
+  /// Bodies' numbers, dry and viscous friction, offsets and armatures; friction in all its shapes and
+  /// offsets, which no robot is without; all faults but pushes.
+  enum class Part { kPlain, kUsual, kAll };
+  /// Amplitudes of a least-squares fit of drives' gains and such faults. Plausible sizes are a prior.
+  /// @param rank how many of them the motion tells; null where it is not asked for.
+  [[nodiscard]] VectorXd FitAmplitudes(Part part, Eigen::Index* rank) const;
   /// What these terms leave, by row.
   [[nodiscard]] VectorXd CalcLeft(const std::vector<CauseTerm>& terms) const;
+  /// Of what is left of such rows, in units of noise.
+  [[nodiscard]] double CalcRms(const TorqueRows& rows, const VectorXd& left) const;
 
  private:
   void ListFaults();
@@ -40,27 +45,20 @@ class TorqueEstimator {
   /// A gain's column: the torque of the model and of these causes, where the robot has them.
   void ScaleWhole(const std::vector<CauseTerm>& terms, TorqueFault* gain) const;
   void Weigh(const VectorXd& left);
-  /// Of what is left, in units of noise.
-  [[nodiscard]] double CalcMeanSquare(const VectorXd& left) const;
   /// As many rows as there are independent ones.
   void Compress();
   /// Of these, those that columns which are part of every explanation have.
   [[nodiscard]] Eigen::Index CountForcedRows() const;
-  [[nodiscard]] CauseSelection SelectAmong(double alike) const;
-  [[nodiscard]] CauseSelection SelectAmong(double alike, const std::vector<bool>& barred) const;
+  [[nodiscard]] CauseSelection SelectAmong() const;
+  [[nodiscard]] CauseSelection SelectAmong(const std::vector<bool>& barred) const;
   [[nodiscard]] std::vector<Eigen::Index> ListFirstColumns() const;
-  /// One stretch of time has one push, a joint one shape of its dry friction: others would share the force.
+  /// One stretch of time has one push, a joint one shape of its dry friction, and some recording no payload:
+  /// others would share the force.
   bool BarSeconds();
-  /// Where what is left is no noise, numbers of bodies, gravity and positions are named only when they
-  /// explain much: drives have friction of more shapes than are tried, and a wrong mass fits a little of any.
-  /// @return whether there are others to be chosen.
-  bool BarWeakBodies();
-  /// Amplitudes of a least-squares fit of drives' gains and faults of these kinds, friction in all its
-  /// shapes; a plain one has the simplest only, and plausible sizes as a prior.
-  [[nodiscard]] VectorXd Fit(const std::vector<TorqueFault::Kind>& kinds, bool is_plain,
-                             Eigen::Index* rank) const;
-  /// What drives' gains, friction and offsets leave, which no robot is without.
-  [[nodiscard]] VectorXd CalcUsual() const;
+  [[nodiscard]] static bool IsPart(const TorqueFault& fault, Part part);
+  /// What they leave.
+  [[nodiscard]] VectorXd Fit(Part part) const;
+  [[nodiscard]] bool IsNoise(const VectorXd& left) const { return CalcRms(rows_, left) <= kMostNoise; }
   /// How many samples say the same, by how alike blocks are that follow one another.
   [[nodiscard]] double CalcAlike(const VectorXd& left) const;
   /// Adds what may have pushed for a while; false when nothing stands out.
@@ -71,7 +69,8 @@ class TorqueEstimator {
   std::vector<TorqueFault> faults_;
   std::vector<bool> barred_;  // of these
   TorqueRows rows_;
-  MatrixXd R_;  // with the products of rows_
+  double alike_ = 1.0, floor_ = 1.0;  // CauseOptions'
+  MatrixXd R_;                        // with the products of rows_
   CauseSelection selection_;
 };
 

@@ -35,7 +35,6 @@ Corrections Collect(const RobotModel& model, const RecordingJudgement& judgement
         for (const ColumnPart& part : fault.columns[k])
           body[part.column.component] += part.factor * a[static_cast<Eigen::Index>(k)];
     };
-    const auto n = static_cast<Eigen::Index>(judgement.joints.size());
     const auto add = [&](std::map<int, double>* values, int joint, double before, double change) {
       values->emplace(joint, before).first->second += change;
     };
@@ -46,24 +45,21 @@ Corrections Collect(const RobotModel& model, const RecordingJudgement& judgement
     bool is_written = fault.recording < 0;
     switch (fault.kind) {
       case TorqueFault::kDryFriction:
-        add(&corrections.dry, fault.index, fault.nominal, a[0]);
-        break;
       case TorqueFault::kViscousFriction:
-        add(&corrections.viscous, fault.index, fault.nominal, a[0]);
-        break;
       case TorqueFault::kAllDry:
       case TorqueFault::kAllFriction:
+      case TorqueFault::kArmature:
         for (Eigen::Index k = 0; k < a.size(); ++k) {
-          const int joint = fault.columns[static_cast<size_t>(k)].front().column.index;
-          if (k < n) {
-            add(&corrections.dry, joint, model.joint(joint).dry_friction, a[k]);
+          const TorqueColumn& column = fault.columns[static_cast<size_t>(k)].front().column;
+          const Joint& joint = model.joint(column.index);
+          const bool is_viscous = column.kind == TorqueColumn::kViscous;
+          if (column.kind == TorqueColumn::kAcceleration) {
+            add(&corrections.armature, column.index, joint.armature, a[k]);
           } else {
-            add(&corrections.viscous, joint, model.joint(joint).damping, a[k]);
+            add(is_viscous ? &corrections.viscous : &corrections.dry, column.index,
+                is_viscous ? joint.damping : joint.dry_friction, a[k]);
           }
         }
-        break;
-      case TorqueFault::kArmature:
-        add(&corrections.armature, fault.index, fault.nominal, a[0]);
         break;
       case TorqueFault::kMass:
       case TorqueFault::kCentre:
