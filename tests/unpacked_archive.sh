@@ -54,6 +54,9 @@ share=$bin/../share/dexcheck
 "$bin/dexcheck" "$share/harness/descriptions/examples/arm.urdf" "$share/harness/descriptions/examples/arm.urdf" --quiet
 "$bin/dexcheck" run panda-reach --set duration=2 --out arm --quiet
 "$bin/dexcheck" judge "$share/controller/parameters/panda.toml" arm
+"$bin/dexcheck" init "$share/harness/descriptions/examples/arm.urdf" --out mine
+"$bin/dexcheck" run mine/motion.toml --quiet
+test -e "$bin/../lib/python3/dist-packages/dexcheck/__main__.py" # for controllers in Python
 for file in "$bin/dexcheck" "$bin"/../libexec/dexcheck/* "$bin"/../lib/dexcheck/*; do
   LD_TRACE_LOADED_OBJECTS=1 /lib64/ld-linux-x86-64.so.2 "$file"
 done >libraries.txt

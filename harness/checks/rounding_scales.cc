@@ -68,7 +68,9 @@ RoundingScales::RoundingScales(const RobotModel& model)
   subtree_mass_[0] = model.base().type == BaseType::kFixed ? 0.0 : model.base_with_wheels().mass;
   for (int i = model.num_joints() - 1; i >= 0; --i) {
     const Joint& joint = model.joints()[static_cast<size_t>(i)];
-    subtree_mass_[static_cast<size_t>(i + 1)] += joint.body.mass;
+    // An inertia that no mass within reach has counts as the mass that would have it there.
+    const double turned = joint.body.inertia.trace() / Positive(arm_ * arm_);
+    subtree_mass_[static_cast<size_t>(i + 1)] += std::max(joint.body.mass, turned);
     subtree_mass_[static_cast<size_t>(joint.parent + 1)] += subtree_mass_[static_cast<size_t>(i + 1)];
     rotors_ += CountVelocities(joint.type) * joint.armature;
   }

@@ -131,7 +131,8 @@ InitSources ReadSources(const InitRequest& request) {
     sources.mjcf = AdaptForRun(request.mjcf, limits);
     return sources;
   }
-  MendForRun(request.robot.string(), &sources.robot);
+  MendForEngine(&sources.robot);
+  ReduceFriction(request.robot.string(), &sources.robot);
   sources.mjcf = std::make_unique<MjcfFile>(WriteMjcf(sources.robot, request.robot.filename().string()),
                                             request.robot.string() + " as an MJCF");
   AddMotors(sources.mjcf.get(), limits);
@@ -318,11 +319,13 @@ int InitRobot(const InitRequest& request) {
     CompleteEachOther(&other, &robot);
     TakeCompiledInertias(*sources.mjcf, *engine, &robot);
   }
+  const RobotDescription stated = robot;
+  FreeCoupledJoints(&robot);
   const std::string parameters = WriteParameters(robot, request.robot.filename().string());
   InitMotion motion;
   if (!stand) {
     const std::string table = request.robot.string() + " as a parameter file";
-    motion = PlanInitMotion(robot, ParseRobotModel(parameters, table), limits, home);
+    motion = PlanInitMotion(stated, ParseRobotModel(parameters, table), limits, home);
   }
   FreeMotors(stand ? stand->weak : motion.weak, sources.mjcf.get());
   const std::vector<std::string> overlaps =

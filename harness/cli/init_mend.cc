@@ -14,9 +14,7 @@
 #include "harness/descriptions/parameter_writer.h"
 
 namespace dexcheck::cli {
-namespace {
 
-/// For inertias that no body has the nearest ones stand.
 void MendForEngine(RobotDescription* robot) {
   constexpr double kLeast = 1e-12;  // kg, kg m^2
   std::vector<std::string> ranges, bodies, points;
@@ -43,8 +41,6 @@ void MendForEngine(RobotDescription* robot) {
     Warn("joints move these links, which have no mass or no inertia; 1 g and 1e-6 kg m^2 are written: " +
          JoinNames(points));
 }
-
-}  // namespace
 
 VectorXd CalcJointInertias(const RobotModel& model) {
   ModelTerms terms(model);
@@ -75,9 +71,13 @@ std::vector<Joint> ReduceFriction(const std::string& source, RobotDescription* r
   return reduced;
 }
 
-void MendForRun(const std::string& source, RobotDescription* robot) {
-  MendForEngine(robot);
-  ReduceFriction(source, robot);
+void FreeCoupledJoints(RobotDescription* robot) {
+  std::vector<std::string> names;
+  for (Joint& joint : robot->spec.joints) {
+    if (joint.coupling) names.push_back(joint.name);
+    joint.coupling.reset();
+  }
+  if (!names.empty()) Warn("joints that follow others get motors of their own: " + JoinNames(names));
 }
 
 }  // namespace dexcheck::cli

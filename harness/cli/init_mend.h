@@ -9,9 +9,11 @@
 namespace dexcheck::cli {
 
 /// Changes what the engine refuses of a description that an MJCF is made of, and warns of it: ranges without
-/// width, inertias that no body has, links that move and have no mass; and friction, as below.
-/// @param source its file, for messages.
-void MendForRun(const std::string& source, RobotDescription* robot);
+/// width, inertias that no body has, of which the nearest stand, links that move and have no mass.
+void MendForEngine(RobotDescription* robot);
+
+/// Joints that follow others no longer do, since each has a motor of its own in a run; warns of it.
+void FreeCoupledJoints(RobotDescription* robot);
 
 /// Of each joint while all else is free, at zero: kg m^2 or kg.
 VectorXd CalcJointInertias(const RobotModel& model);

@@ -4,9 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "controller/common/text.h"
+#include "controller/control/joint_motion.h"
 #include "controller/dynamics/model_terms.h"
 #include "harness/cli/init_mend.h"
 
@@ -53,53 +53,35 @@ std::vector<JointSpan> ChooseSpans(const RobotDescription& robot, const std::map
   return spans;
 }
 
-/// What the motion asks of each motor, as a fraction of its limit.
-class MotorUse {
- public:
-  MotorUse(const RobotModel& model, const std::map<std::string, double>& limits)
-      : model_(model), terms_(model) {
-    for (const Joint& joint : model.joints()) {
+/// The largest that the motion there asks of each motor, as a fraction of its limit; back it is as large.
+/// @param parts of it that are looked at, out of kParts; none but where it begins for 0. @param poses by
+/// which it comes, by joint.
+constexpr int kParts = 20;
+VectorXd CalcMotorUse(const RobotModel& model, const std::map<std::string, double>& limits,
+                      const std::vector<JointSpan>& spans, int parts, JointPoses* poses) {
+  ModelTerms terms(model);
+  VectorXd start(terms.size()), end(terms.size()), most = VectorXd::Zero(terms.size());
+  std::transform(spans.begin(), spans.end(), start.begin(), [](const JointSpan& span) { return span.start; });
+  std::transform(spans.begin(), spans.end(), end.begin(), [](const JointSpan& span) { return span.end; });
+  const JointMotion motion(start, {{kHalf, end}}, {});
+  DesiredJoints desired;
+  poses->assign(static_cast<size_t>(parts) + 1, {});
+  for (int k = 0; k <= parts; ++k) {
+    motion.Evaluate(kHalf * k / kParts, &desired);
+    terms.SetState(desired.q, desired.q_dot);
+    terms.CalcDynamics();
+    const VectorXd force =
+        terms.M() * desired.q_ddot + terms.C() * desired.q_dot + terms.friction() + terms.gravity();
+    for (Eigen::Index i = 0; i < force.size(); ++i) {
+      const Joint& joint = model.joints()[static_cast<size_t>(i)];
+      (*poses)[static_cast<size_t>(k)][joint.name] = desired.q[i];
       const auto limit = limits.find(joint.name);
-      limits_.push_back(limit == limits.end() ? std::numeric_limits<double>::infinity() : limit->second);
+      const double dry = desired.q_dot[i] != 0.0 ? joint.dry_friction : 0.0;
+      if (limit != limits.end()) most[i] = std::max(most[i], (std::abs(force[i]) + dry) / limit->second);
     }
   }
-
-  /// The largest of the motion there; back it is as large.
-  VectorXd CalcMotion(const std::vector<JointSpan>& spans) {
-    VectorXd most = CalcHold(spans);
-    constexpr int kSamples = 20;
-    for (int k = 1; k <= kSamples; ++k) most = most.cwiseMax(CalcAt(spans, double(k) / kSamples));
-    return most;
-  }
-  /// That of holding the robot where the motion begins.
-  VectorXd CalcHold(const std::vector<JointSpan>& spans) { return CalcAt(spans, 0.0); }
-
- private:
-  /// @param s 0 to 1, by q = start + (end - start) (10 s^3 - 15 s^4 + 6 s^5).
-  VectorXd CalcAt(const std::vector<JointSpan>& spans, double s) {
-    const Eigen::Index n = terms_.size();
-    VectorXd q(n), rate(n), acceleration(n), friction = VectorXd::Zero(n);
-    for (Eigen::Index i = 0; i < n; ++i) {
-      const JointSpan& span = spans[static_cast<size_t>(i)];
-      const double way = span.end - span.start;
-      q[i] = span.start + way * s * s * s * (10.0 - 15.0 * s + 6.0 * s * s);
-      rate[i] = way * 30.0 * s * s * (1.0 - s) * (1.0 - s) / kHalf;
-      acceleration[i] = way * 60.0 * s * (1.0 - s) * (1.0 - 2.0 * s) / (kHalf * kHalf);
-      if (rate[i] != 0.0) friction[i] = model_.joints()[static_cast<size_t>(i)].dry_friction;
-    }
-    terms_.SetState(q, rate);
-    terms_.CalcDynamics();
-    VectorXd use =
-        (terms_.M() * acceleration + terms_.C() * rate + terms_.friction() + terms_.gravity()).cwiseAbs() +
-        friction;
-    for (Eigen::Index i = 0; i < n; ++i) use[i] /= limits_[static_cast<size_t>(i)];
-    return use;
-  }
-
-  const RobotModel& model_;
-  ModelTerms terms_;
-  std::vector<double> limits_;
-};
+  return most;
+}
 
 /// Natural frequency, rad/s, at which feedback damps each joint as its viscous friction does, which the law
 /// takes away: torques may be twice as large before the loop is unstable.
@@ -107,18 +89,6 @@ double ChooseFrequency(const RobotModel& model) {
   VectorXd rates = CalcJointInertias(model).cwiseInverse();  // 1/s
   for (Eigen::Index i = 0; i < rates.size(); ++i) rates[i] *= model.joints()[static_cast<size_t>(i)].damping;
   return std::ceil(std::clamp(0.5 * rates.maxCoeff(), 10.0, 50.0));
-}
-
-std::vector<std::map<std::string, double>> ListPoses(const RobotModel& model,
-                                                     const std::vector<JointSpan>& spans) {
-  constexpr int kPoses = 20;
-  std::vector<std::map<std::string, double>> poses(kPoses + 1);
-  for (int k = 0; k <= kPoses; ++k) {
-    for (size_t i = 0; i < spans.size(); ++i)
-      poses[static_cast<size_t>(k)][model.joints()[i].name] =
-          spans[i].start + (spans[i].end - spans[i].start) * k / kPoses;
-  }
-  return poses;
 }
 
 }  // namespace
@@ -131,19 +101,17 @@ InitMotion PlanInitMotion(const RobotDescription& robot, const RobotModel& model
   motion.frequency = ChooseFrequency(model);
   constexpr double kMostUse = 0.7, kFull = 0.9;
   constexpr int kHalvings = 4;
-  MotorUse use(model, limits);
-  const VectorXd hold = use.CalcHold(motion.spans);
-  VectorXd most = use.CalcMotion(motion.spans);
+  const VectorXd hold = CalcMotorUse(model, limits, motion.spans, 0, &motion.poses);
+  VectorXd most = CalcMotorUse(model, limits, motion.spans, kParts, &motion.poses);
   // A motor that cannot hold the robot is none that a smaller motion helps.
   const auto too_much = [&] { return (hold.array() < kMostUse && most.array() > kMostUse).any(); };
   for (int k = 0; k < kHalvings && too_much(); ++k) {
     for (JointSpan& span : motion.spans) span.end = span.start + 0.5 * (span.end - span.start);
-    most = use.CalcMotion(motion.spans);
+    most = CalcMotorUse(model, limits, motion.spans, kParts, &motion.poses);
   }
   for (Eigen::Index i = 0; i < most.size(); ++i) {
     if (most[i] > kFull) motion.weak.push_back(model.joints()[static_cast<size_t>(i)].name);
   }
-  motion.poses = ListPoses(model, motion.spans);
   return motion;
 }
 
@@ -155,30 +123,27 @@ std::string ListJoints(const RobotDescription& robot, const std::function<double
   return list;
 }
 
-std::string WriteTolerance(double tolerance) {
-  if (!(tolerance > 0.0)) return "";
-  return fmt::format("# Numbers that were rounded when they were printed agree to this.\ntolerance = {}\n",
-                     FormatNumber(tolerance, 1));
-}
-
-std::string WriteCompensation(const RobotDescription& robot) {
+std::string WriteScenario(const RobotDescription& robot, const MotionText& motion, double tolerance) {
   const std::vector<Joint>& joints = robot.spec.joints;
-  if (std::none_of(joints.begin(), joints.end(), [](const Joint& joint) { return joint.dry_friction > 0.0; }))
-    return "";
-  return fmt::format("# Dry friction, compensated along the desired rates.\ncoulomb = {{ {} }}\n",
-                     ListJoints(robot, [&](size_t i) { return joints[i].dry_friction; }));
-}
-
-std::string WriteInitScenario(const RobotDescription& robot, const InitMotion& motion, double tolerance) {
-  const std::string start = ListJoints(robot, [&](size_t i) { return motion.spans[i].start; });
-  const std::string end = ListJoints(robot, [&](size_t i) { return motion.spans[i].end; });
-  const std::string compensation = WriteCompensation(robot);
+  const bool has_friction =
+      std::any_of(joints.begin(), joints.end(), [](const Joint& joint) { return joint.dry_friction > 0.0; });
+  std::string law;
+  if (has_friction)
+    law = fmt::format("# Dry friction, compensated along the desired rates.\ncoulomb = {{ {} }}\n",
+                      ListJoints(robot, [&](size_t i) { return joints[i].dry_friction; }));
+  else if (motion.is_followed)
+    law = "\n[expect]\njoints = 0.01\n";
+  const std::string rounded =
+      tolerance > 0.0
+          ? fmt::format("# Numbers that were rounded when they were printed agree to this.\ntolerance = {}\n",
+                        FormatNumber(tolerance, 1))
+          : "";
   return fmt::format(
-      R"(# A motion of the joints within their ranges, by computed torque, checked at every step.
+      R"(# {}, by computed torque, checked at every step.
 name = "motion"
-description = "each joint leaves its place and comes back"
+description = "{}"
 duration = 4.0
-settle = 0.5
+settle = {}
 start = "rest"
 {}
 [model]
@@ -187,20 +152,31 @@ file = "robot.toml"
 [plant]
 mjcf = "robot.xml"
 
-[joint_motion]
+{}
+[control]
+law = "computed_torque"
+natural_frequency = {}
+damping_ratio = 1
+{})",
+      motion.title, motion.description, motion.settle, rounded, motion.text, motion.frequency, law);
+}
+
+std::string WriteInitScenario(const RobotDescription& robot, const InitMotion& motion, double tolerance) {
+  const std::string start = ListJoints(robot, [&](size_t i) { return motion.spans[i].start; });
+  const std::string end = ListJoints(robot, [&](size_t i) { return motion.spans[i].end; });
+  const std::string text = fmt::format(
+      R"([joint_motion]
 start = {{ {} }}
 points = [
   {{ time = 2, joints = {{ {} }} }},
   {{ time = 4, joints = {{ {} }} }},
 ]
-
-[control]
-law = "computed_torque"
-natural_frequency = {}
-damping_ratio = 1
-{}{})",
-      WriteTolerance(tolerance), start, end, start, motion.frequency, compensation,
-      compensation.empty() ? "\n[expect]\njoints = 0.01\n" : "");
+)",
+      start, end, start);
+  return WriteScenario(robot,
+                       {"A motion of the joints within their ranges",
+                        "each joint leaves its place and comes back", 0.5, text, motion.frequency, true},
+                       tolerance);
 }
 
 }  // namespace dexcheck::cli

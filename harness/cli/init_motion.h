@@ -17,11 +17,14 @@ struct JointSpan {
   double end = 0.0;
 };
 
+/// Postures by joint, rad or m.
+using JointPoses = std::vector<std::map<std::string, double>>;
+
 /// A motion there and back, and which motors it asks too much of.
 struct InitMotion {
-  std::vector<JointSpan> spans;                      ///< One a joint.
-  std::vector<std::map<std::string, double>> poses;  ///< Along it, by joint, rad or m.
-  double frequency = 10.0;                           ///< Natural frequency of its law, rad/s.
+  std::vector<JointSpan> spans;   ///< One a joint.
+  JointPoses poses;               ///< Along it.
+  double frequency = 10.0;        ///< Natural frequency of its law, rad/s.
   std::vector<std::string> weak;  ///< Joints whose limit does not even hold the robot, or move it so little.
 };
 
@@ -36,10 +39,16 @@ InitMotion PlanInitMotion(const RobotDescription& robot, const RobotModel& model
 
 /// "shoulder" = 0.1, "elbow" = 0: a number of each joint.
 std::string ListJoints(const RobotDescription& robot, const std::function<double(size_t joint)>& value);
-/// `tolerance`; nothing for 0.
-std::string WriteTolerance(double tolerance);
-/// `control.coulomb`; nothing where no joint has dry friction.
-std::string WriteCompensation(const RobotDescription& robot);
+/// What one scenario has and another has not.
+struct MotionText {
+  const char* title;
+  const char* description;
+  double settle;     ///< s.
+  std::string text;  ///< The tables of the motion.
+  double frequency;  ///< Natural frequency of the law, rad/s.
+  bool is_followed;  ///< To 0.01 rad, without friction.
+};
+std::string WriteScenario(const RobotDescription& robot, const MotionText& motion, double tolerance);
 
 /// The scenario of that motion. @param tolerance of runs; 0 for rounding.
 std::string WriteInitScenario(const RobotDescription& robot, const InitMotion& motion, double tolerance);

@@ -31,6 +31,12 @@ class StandTrial {
     stance_.mu = 0.45;  // less than the scenario's
     stance_.f_min = 2.0 * LeastForce(stand);
     stance_.f_max = stand.weight;
+    SetAtRest(VectorXd::Unit(model.num_positions(), 3));
+  }
+
+  /// 1 or -1, by which joints of either side turn alike.
+  [[nodiscard]] double FindSide(int joint) const {
+    return terms_.CalcLinkPose(joint).linear().col(2).sum() < 0.0 ? -1.0 : 1.0;
   }
 
   /// Puts the feet on the ground, and then, with the base lower by `sink`, the centre of mass over them.
@@ -136,9 +142,11 @@ std::string FindPosture(const RobotModel& model, const std::map<std::string, dou
     VectorXd q = VectorXd::Zero(model.num_positions());
     for (int i = 0; i < model.num_joints(); ++i) {
       const Joint& joint = model.joints()[static_cast<size_t>(i)];
-      const double middle = 0.5 * (joint.lower + joint.upper);
-      q[q.size() - model.num_joints() + i] =
-          (1.0 - bend) * ClampInside(joint, stand->pose[joint.name]) + bend * middle;
+      const double at = ClampInside(joint, stand->pose[joint.name]);
+      // A leg that is stretched bends by joints that may turn on.
+      const bool turns = joint.type == JointType::kRevolute && joint.upper - joint.lower >= 2.0 * kPi;
+      const double middle = turns ? at + trial.FindSide(i) : 0.5 * (joint.lower + joint.upper);
+      q[q.size() - model.num_joints() + i] = (1.0 - bend) * at + bend * middle;
     }
     if (!trial.Settle(0.1 * bend * stand->height, stand->in_plane, &q)) continue;
     settles = true;

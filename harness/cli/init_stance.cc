@@ -71,22 +71,17 @@ bool TurnsAboutMiddle(const mjModel& m, int joint, int geom) {
   return arm.cross(MapVector(m.jnt_axis + 3 * joint)).norm() < kNear * m.geom_rbound[geom];
 }
 
-/// The element of that name anywhere in the world.
-XMLElement* FindBody(MjcfFile* mjcf, const std::string& name) {
+/// The element of a body. @throws InputError when it has no name.
+XMLElement* RequireBody(const mjModel& m, int body, MjcfFile* mjcf) {
+  const std::string name = NameOf(m, mjOBJ_BODY, body);
   XMLElement* found = nullptr;
   VisitElements(mjcf->root(), [&](XMLElement* element) {
     if (std::string_view(element->Name()) == "body" && ReadAttribute(*element, "name") == name)
       found = element;
   });
+  if (found == nullptr)
+    throw InputError(mjcf->source() + ": body " + name + ": must have a name, it is a foot");
   return found;
-}
-
-/// @throws InputError when it has no name.
-XMLElement* RequireBody(const mjModel& m, int body, MjcfFile* mjcf) {
-  XMLElement* const element = FindBody(mjcf, NameOf(m, mjOBJ_BODY, body));
-  if (element != nullptr) return element;
-  throw InputError(mjcf->source() + ": body " + NameOf(m, mjOBJ_BODY, body) +
-                   ": must have a name, it is a foot");
 }
 
 /// Gives a geom of the engine's model a name in its file. @throws as RequireBody.
@@ -198,9 +193,17 @@ Stand FindStand(const mjModel& m) {
     lowest_of[body] = std::min(place.p_W.z(), lowest_of.try_emplace(body, place.p_W.z()).first->second);
     lowest = std::min(lowest, place.p_W.z());
   }
-  // Feet are bodies that are nearly as low as the lowest; of each, what is lowest.
+  // Feet are bodies that are nearly as low as the lowest, and of a leg the lowest; of each, what is lowest.
   constexpr double kNear = 0.02, kFlat = 0.01, kSole = 0.002;  // m
+  std::map<int, double> near = lowest_of;
   for (const auto& [body, own] : lowest_of) {
+    for (int up = m.body_parentid[body]; up > 0; up = m.body_parentid[up]) {
+      const auto carrier = lowest_of.find(up);
+      if (carrier == lowest_of.end() || std::abs(carrier->second - own) < kSole) continue;
+      near.erase(carrier->second > own ? up : body);
+    }
+  }
+  for (const auto& [body, own] : near) {
     if (own > lowest + kNear) continue;
     std::vector<Place> low;
     for (Place place : places) {
@@ -296,21 +299,8 @@ std::string WriteStandScenario(const RobotDescription& robot, const Stand& stand
     points += fmt::format("  {{ time = {}, xyz = {}, rpy_deg = {} }},\n", point.time, list(0, 1.0),
                           list(3, kPi / 180.0));
   }
-  return fmt::format(
-      R"(# The robot stands on its feet and sways over them, by computed torque, checked at every step.
-name = "motion"
-description = "the base shifts, sinks and turns over feet that stay"
-duration = 4.0
-settle = 1.0
-start = "rest"
-{}
-[model]
-file = "robot.toml"
-
-[plant]
-mjcf = "robot.xml"
-
-# The posture to stand in.
+  const std::string text = fmt::format(
+      R"(# The posture to stand in.
 [joint_motion]
 start = {{ {} }}
 
@@ -321,14 +311,12 @@ f_min = {}
 f_max = {}
 points = [
 {}]
-
-[control]
-law = "computed_torque"
-natural_frequency = 20
-damping_ratio = 1
-{})",
-      WriteTolerance(tolerance), start, feet, FormatNumber(LeastForce(stand), 2),
-      FormatNumber(std::ceil(stand.weight)), points, WriteCompensation(robot));
+)",
+      start, feet, FormatNumber(LeastForce(stand), 2), FormatNumber(std::ceil(stand.weight)), points);
+  return WriteScenario(robot,
+                       {"The robot stands on its feet and sways over them",
+                        "the base shifts, sinks and turns over feet that stay", 1.0, text, 20.0, false},
+                       tolerance);
 }
 
 }  // namespace dexcheck::cli

@@ -21,12 +21,7 @@ std::string DescribeException(const RunMutant& mutant) {
   const std::string& name = mutant.all.name;
   if (mutant.refused) return fmt::format("refused: {}: {}", name, mutant.failure);
   if (mutant.no_effect) return "no effect: " + name;
-  if (!mutant.killed) {
-    const std::string off = mutant.is_as_expected
-                                ? ""
-                                : fmt::format(", though the object is {:.1e} m off", mutant.position_error);
-    return fmt::format("survived: {}{}", name, off);
-  }
+  if (!mutant.killed) return "survived: " + name;
   if (mutant.faults.size() == 1 && !mutant.has_right_cause()) {
     return fmt::format("cause: {}: expected {}, named {} ({})", name, NameOf(mutant.all.cause),
                        NameOf(mutant.cause), mutant.evidence);

@@ -25,8 +25,9 @@ struct RunMutant {
 
   bool refused = false;  ///< There is no such robot, or the scenario cannot be run with it.
   bool killed = false;   ///< The verdict is not "pass".
-  /// Not killed, and what moves is at the end where it is without the fault, to 1e-12: a push that bearings
-  /// hold, a number that no motion shows.
+  /// Not killed, and what moves is at the end where it is without the fault, to 1e-12, or of a plant's fault
+  /// to the part of its way that the balances' bound is: a push that bearings hold, a number that no motion
+  /// shows.
   bool no_effect = false;
   Cause cause = Cause::kNone;
   std::string evidence = {};
@@ -35,7 +36,6 @@ struct RunMutant {
   std::string failure = {};        ///< Why the run ended early; empty when it did not.
   std::string failed_checks = {};  ///< Names, separated by blanks.
   double position_error = 0.0;     ///< Largest of the object, m.
-  bool is_as_expected = true;      ///< Whether the object was where [expect] wants it.
 
   [[nodiscard]] bool has_right_cause() const { return killed && cause == all.cause; }
   /// Whether all of `truth` is named, with its values, and nothing else; of faults without a size, whether
@@ -86,6 +86,7 @@ class RunCampaign {
   std::unique_ptr<Setup> setup_;         // of the right robot, from the start
   std::unique_ptr<Setup> offset_setup_;  // the same with an error that feedback has to answer
   VectorXd end_, offset_end_;            // where they come to without a fault
+  double way_ = 0.0;                     // up to there, the largest of positions and rates
   VectorXd tau_;                         // that they end with, in the first of both
   std::vector<RunMutant> mutants_;
 };

@@ -9,7 +9,10 @@ from pathlib import Path
 sys.dont_write_bytecode = True
 sys.path[0] = str(Path(__file__).resolve().parents[1])
 
-from dexcheck.controller import Controller, describe, refuse, serve  # noqa: E402
+try:
+    from dexcheck.controller import Controller, describe, refuse, serve  # noqa: E402
+except ImportError as error:
+    sys.exit(f"dexcheck: {sys.executable}: {error}: controllers in Python need NumPy; DEXCHECK_PYTHON names another python3")
 
 
 def find_controller(file):

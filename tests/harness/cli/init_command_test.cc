@@ -141,6 +141,30 @@ TEST_F(InitCommand, MendsWhatTheEngineRefuses) {
   EXPECT_EQ(RunMotion(0, "empty").at("verdict"), "pass");
 }
 
+// A body whose inertia no mass within the robot's reach has; 10 um off an upright axis its mass hardly shows,
+// less than the bound of the balances.
+TEST_F(InitCommand, AFaultThatNoMotionShowsIsNoSurvivor) {
+  Write("spin.urdf", R"(<robot name="spin"><link name="stand"/>
+<link name="upper"><inertial><origin xyz="1e-5 0 0.02"/><mass value="1.5"/>
+  <inertia ixx="0.01" iyy="0.02" izz="0.022" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<joint name="shoulder" type="revolute"><parent link="stand"/><child link="upper"/><axis xyz="0 0 1"/>
+  <limit lower="-2" upper="2" effort="1" velocity="1"/></joint></robot>)");
+  Expect(0, "init spin.urdf");
+  EXPECT_EQ(RunMotion(0, "spin").at("verdict"), "pass");
+  const std::string said = Expect(0, "mutate --run spin/motion.toml --numbers 0 --kinds body").out;
+  EXPECT_THAT(said, HasSubstr("no effect: link upper: mass"));
+}
+
+// Each joint has its motor: what a URDF couples would be coupled in one of the two alone.
+TEST_F(InitCommand, JointsThatFollowOthersMoveByThemselves) {
+  WriteChanged("mimic.urdf", ReadFixture("pair.urdf"), "<origin xyz=\"0.3 0 0\"/>",
+               "<origin xyz=\"0.3 0 0\"/><mimic joint=\"shoulder\" multiplier=\"0.5\"/>");
+  const ProgramResult said = Expect(0, "init mimic.urdf");
+  EXPECT_THAT(said.err, HasSubstr("get motors of their own: elbow"));
+  EXPECT_THAT(said.out, Not(HasSubstr("the two differ")));
+  Expect(0, "consistency mimic/robot.toml mimic/robot.xml --samples 50");
+}
+
 // Motors too weak to hold the arm run without their limits; those too weak for the motion get a smaller one.
 TEST_F(InitCommand, MovesAsMotorsCan) {
   const std::string urdf = ReadFixture("pair.urdf");
@@ -197,6 +221,17 @@ TEST_F(InitCommand, ABipedBendsItsKneesToStand) {
   EXPECT_THAT(Expect(0, "init stiff.xml").err, Not(HasSubstr("held")));
   EXPECT_THAT(Read("stiff/motion.toml"), HasSubstr("rpy_deg = [0, 0, 0]"));
   EXPECT_EQ(RunMotion(0, "stiff").at("verdict"), "pass");
+  // An ankle nearly as low as the sole is no foot; a stretched leg whose joints have no ranges bends, too.
+  std::string low = ReplaceOnce(ReadFixture("biped.xml"), " range=\"-1 1\"", "");
+  for (const std::string side : {"left", "right"}) {
+    const std::string foot = "/>\n                <body name=\"" + side + "_foot\">";
+    low = ReplaceOnce(low, side + "_knee\" range=\"0 2\"", side + "_knee\"");
+    low = ReplaceOnce(low, "size=\"0.03\"" + foot, "size=\"0.055\" contype=\"1\" conaffinity=\"1\"" + foot);
+  }
+  Write("low.xml", low);
+  EXPECT_THAT(Expect(0, "init low.xml").err, Not(HasSubstr("held")));
+  EXPECT_THAT(Read("low/motion.toml"), HasSubstr(R"("foot_8"])"));
+  EXPECT_EQ(RunMotion(0, "low").at("verdict"), "pass");
   // An ankle without limits is no wheel, on which it would roll away.
   const std::string ankle = "<joint name=\"left_ankle_roll\"";
   WriteChanged("free.xml", ReadFixture("biped.xml"), ankle, ankle + " limited=\"false\"");
