@@ -1,5 +1,3 @@
-#include "harness/report/comparison_page.h"
-
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -7,6 +5,7 @@
 
 #include "harness/report/page_assets.h"
 #include "harness/report/page_frame.h"
+#include "harness/report/run_comparison.h"
 
 namespace dexcheck {
 
@@ -104,7 +103,7 @@ class ComparisonPage {
     std::vector<std::string> drawn;
     for (const SignalDifference& signal : comparison_.signals) {
       if (drawn.size() == kMostPlots || signal.fraction() < kLeastFraction) break;
-      if (std::find(drawn.begin(), drawn.end(), signal.name) != drawn.end()) continue;
+      if (std::ranges::find(drawn, signal.name) != drawn.end()) continue;
       drawn.push_back(signal.name);
       const std::string title = signal.NameColumn();
       const bool has_unit = signal.unit != "1";

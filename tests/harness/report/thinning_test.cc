@@ -44,9 +44,9 @@ TEST(Thinning, LosesNoSpikeOfALongSeries) {
   ASSERT_EQ(kept.size(), thinning.times().size());
   EXPECT_LE(kept.size(), 500U);
   EXPECT_GE(kept.size(), 490U);
-  EXPECT_EQ(*std::max_element(kept.begin(), kept.end()), 40.0);
-  EXPECT_EQ(*std::min_element(kept.begin(), kept.end()), -30.0);
-  EXPECT_TRUE(std::is_sorted(thinning.times().begin(), thinning.times().end()));
+  EXPECT_EQ(*std::ranges::max_element(kept), 40.0);
+  EXPECT_EQ(*std::ranges::min_element(kept), -30.0);
+  EXPECT_TRUE(std::ranges::is_sorted(thinning.times()));
   EXPECT_EQ(thinning.times().front(), 0.0);
   EXPECT_EQ(thinning.times().back(), time[kRows - 1]);
 }
