@@ -13,11 +13,6 @@ class CompareFiles : public CommandTest {
     Write("b.xml", kPair);
   }
 
-  /// The results of a comparison, which must end so.
-  Json Compare(int exit_code, const std::string& a, const std::string& b,
-               const Words& more = "--seed 1") const {
-    return RunJson(exit_code, Words{"consistency", a, b, "--samples", "200"} + more);
-  }
   /// The comparison must find this alone.
   void ExpectFinding(const std::string& a, const std::string& b, const std::string& check) const {
     const Json results = Compare(1, a, b);
@@ -115,7 +110,7 @@ TEST_F(CompareFiles, OneWayLeadsToEachResult) {
   for (const std::string& a : files) {
     for (const std::string& b : files) {
       Json placed = Compare(0, a, b);
-      Json named = RunJson(0, {"consistency", "--robot", a, "--mjcf", b, "--samples", "200"});
+      Json named = RunJson(0, {"consistency", "--robot", a, "--mjcf", b, "--samples", "100"});
       for (Json* const results : {&placed, &named}) results->erase("seconds");
       EXPECT_EQ(placed, named) << a << " " << b;
     }
@@ -202,9 +197,7 @@ TEST_F(CompareFiles, ARealDifferenceIsInTheFirstLine) {
   Write("rounded.urdf", rounded);
   WriteChanged("wrong.urdf", rounded, "upper=\"1\" ", "upper=\"1.5\" ");
   const auto verdict = [&](const std::string& file) {
-    const std::string out =
-        Expect(1, {"consistency", file, "a.urdf", "--samples", "20", "--quiet", "--exact"}).out;
-    return out.substr(0, out.find('\n'));
+    return FirstLine(Expect(1, {"consistency", file, "a.urdf", "--samples", "20", "--quiet", "--exact"}).out);
   };
   EXPECT_THAT(verdict("rounded.urdf"), AllOf(HasSubstr("5 digits"), Not(HasSubstr("joint"))));
   EXPECT_THAT(verdict("wrong.urdf"), AllOf(HasSubstr("joint_range"), HasSubstr("joint elbow"),

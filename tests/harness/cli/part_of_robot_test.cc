@@ -12,10 +12,6 @@ class PartOfRobot : public CommandTest {
     Write("a.urdf", ReplaceOnce(ReadFixture("pair.urdf"), "</robot>", kGripper));
     Write("b.xml", ReadFixture("pair.xml"));
   }
-  Json Compare(int exit_code, const std::string& a, const std::string& b,
-               const Words& more = "--seed 1") const {
-    return RunJson(exit_code, Words{"consistency", a, b, "--samples", "50"} + more);
-  }
 
   const std::string kGripper = R"(<link name="finger"><inertial><origin xyz="0.02 0 0"/><mass value="0.1"/>
 <inertia ixx="1e-4" iyy="2e-4" izz="2e-4" ixy="0" ixz="0" iyz="0"/></inertial></link>
