@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "harness/report/campaign_page.h"
 #include "harness/report/page_assets.h"
 #include "harness/report/page_frame.h"
 #include "harness/report/run_comparison.h"
@@ -129,6 +130,14 @@ class ComparisonPage {
 std::string MakeComparisonPage(const std::vector<const RunData*>& runs, const std::vector<std::string>& names,
                                const RunComparison& comparison) {
   return ComparisonPage(runs, names, comparison).Make();
+}
+
+std::string MakeCampaignPage(const nlohmann::ordered_json& campaign) {
+  return AssemblePage({.title = "faults made on purpose",
+                       .styles = {},
+                       .markup = {kPageHtml},
+                       .data = EmbedJson("campaign-data", campaign),
+                       .scripts = {kCampaignJs}});
 }
 
 }  // namespace dexcheck

@@ -287,7 +287,7 @@ ErrorBudget CalcErrorBudget(const Scenario& scenario, const std::filesystem::pat
   budget.all = size_of(all.errors);
   const double scale =
       std::max(size_of(Add(all.errors, -1.0, ideal.errors)).rms, std::numeric_limits<double>::min());
-  Errors sum = ideal.errors, predicted = ideal.errors;
+  Errors sum = ideal.errors, predicted = sum;
   for (size_t i = 0; 2 * i + 3 < taken; ++i) {
     const Measured& one = runs[2 * i + 2];
     const Measured& others = runs[2 * i + 3];
