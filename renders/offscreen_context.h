@@ -1,12 +1,30 @@
 #pragma once
 
+#include <GL/osmesa.h>
+
 #include <cstdint>
-#include <memory>
 #include <vector>
 
-struct osmesa_context;
-
 namespace dexcheck {
+
+// Mesa's off-screen OpenGL, loaded when the first context is made: with LLVM in it, it takes 60 ms of
+// processor time to load, and most commands draw nothing.
+
+/// The functions that are called here; MuJoCo finds its own.
+struct Mesa {
+// clang-format off
+#define DEXCHECK_MESA(X)                                                                             \
+  X(OSMesaCreateContextExt) X(OSMesaDestroyContext) X(OSMesaGetCurrentContext) X(OSMesaMakeCurrent)  \
+  X(glBegin) X(glDeleteLists) X(glEnd) X(glEndList) X(glGenLists) X(glNewList) X(glNormal3dv)        \
+  X(glNormal3f) X(glVertex3dv) X(glVertex3f)
+// clang-format on
+#define DEXCHECK_FUNCTION(name) decltype(&::name) name;
+  DEXCHECK_MESA(DEXCHECK_FUNCTION)
+#undef DEXCHECK_FUNCTION
+};
+
+/// @throws Error when the library is not there.
+const Mesa& LoadMesa();
 
 /// An OpenGL context in software that needs neither a display nor a graphics card. It belongs to the thread
 /// that makes it. The process must not link EGL: MuJoCo's OpenGL loader would prefer it.
@@ -24,7 +42,7 @@ class OffscreenContext {
   void MakeCurrent();
 
  private:
-  osmesa_context* context_ = nullptr;
+  OSMesaContext context_ = nullptr;
   std::vector<std::uint8_t> buffer_;  // the context's own surface; MuJoCo draws into one of its own
 };
 

@@ -56,8 +56,8 @@ std::string FormatSi(double value, const std::string& unit) {
   const double size = std::abs(value);
   if (size < 1e-18) return "0 " + unit;
   // Compared with what rounds to 1.00 of the prefix.
-  const auto* prefix = std::find_if(kPrefixes.begin(), kPrefixes.end(),
-                                    [&](const Prefix& p) { return size >= 0.9995 * p.factor; });
+  const auto* prefix =
+      std::ranges::find_if(kPrefixes, [&](const Prefix& p) { return size >= 0.9995 * p.factor; });
   if (prefix == kPrefixes.end()) prefix = &kPrefixes.back();
   const double scaled = value / prefix->factor;
   const int decimals = std::abs(scaled) < 9.995 ? 2 : std::abs(scaled) < 99.95 ? 1 : 0;

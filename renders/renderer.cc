@@ -9,7 +9,6 @@
 #include "controller/common/text.h"
 #include "harness/engine/engine.h"
 #include "harness/engine/mujoco_release.h"
-#include "renders/mesa.h"
 
 namespace dexcheck {
 
@@ -282,7 +281,7 @@ void Renderer::AddGhost(const Ghost& ghost) {
   mjv_addGeoms(ghost.model, ghost.data, &visible_, &perturb_, mjCAT_DYNAMIC, &scene_);
   for (int i = first; i < scene_.ngeom; ++i) {
     mjvGeom& geom = scene_.geoms[i];
-    std::copy(ghost.color.begin(), ghost.color.end(), geom.rgba);
+    std::ranges::copy(ghost.color, geom.rgba);
     geom.texid = -1;
     geom.reflectance = 0.0F;
   }

@@ -15,7 +15,7 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 }  // namespace
 
 long RunFrames::RowAt(double time) const {
-  const auto after = std::upper_bound(times.begin(), times.end(), time);
+  const auto after = std::ranges::upper_bound(times, time);
   return std::max(0L, static_cast<long>(after - times.begin()) - 1);
 }
 

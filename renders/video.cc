@@ -3,14 +3,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <optional>
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
 #include "harness/base/process_pool.h"
 #include "harness/engine/engine.h"
 #include "renders/canvas.h"
-#include "renders/image.h"
 #include "renders/overlay.h"
 #include "renders/renderer.h"
 #include "renders/run_decorations.h"
@@ -307,7 +305,7 @@ bool RenderVideo(std::span<const RunView> runs, const VideoOptions& options, Vid
   const auto write = [&](size_t frame, const std::string& rgb) {
     Require(rgb.size() == image.rgb.size(), "bytes of a frame", "must be the video's",
             static_cast<double>(rgb.size()));
-    std::copy(rgb.begin(), rgb.end(), image.rgb.begin());
+    std::ranges::copy(rgb, image.rgb.begin());
     video->Write(image);
     goes_on = !progress || progress(static_cast<long>(frame) + 1, frames);
   };

@@ -7,12 +7,9 @@
 #include <array>
 #include <cerrno>
 #include <cstring>
-#include <string>
-#include <vector>
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
-#include "harness/base/files.h"
 #include "renders/cairo_surface.h"
 
 namespace dexcheck {
@@ -116,7 +113,7 @@ std::vector<std::string> ListArguments(const EncodingOptions& options, VideoForm
 }  // namespace
 
 VideoFormat FindVideoFormat(const std::filesystem::path& path) {
-  const auto found = std::find(kExtensions.begin(), kExtensions.end(), ExtensionOf(path));
+  const auto found = std::ranges::find(kExtensions, ExtensionOf(path));
   if (found != kExtensions.end()) return static_cast<VideoFormat>(found - kExtensions.begin());
   throw InputError(path.string() + ": cannot be written: a video's name must end in .mp4, .webm or .gif");
 }

@@ -95,8 +95,7 @@ std::string WriteAuditJUnit(const AuditRequest& request, const AuditResult& resu
     cases.push_back({"audit", check, "", ""});
   }
   for (const AuditFinding& finding : result.findings) {
-    auto test = std::find_if(cases.begin(), cases.end(),
-                             [&](const JUnitCase& candidate) { return candidate.name == finding.check; });
+    auto test = std::ranges::find(cases, finding.check, &JUnitCase::name);
     if (test == cases.end()) test = cases.insert(test, {"audit", finding.check, "", ""});
     std::string& text = finding.level == AuditLevel::kNote ? test->output : test->failure;
     text += (text.empty() ? "" : "\n") + finding.where + " " + finding.text;

@@ -2,9 +2,7 @@
 
 #include <cmath>
 #include <cstdint>
-#include <limits>
 #include <memory>
-#include <optional>
 #include <string>
 
 #include "harness/base/interrupts.h"
@@ -61,8 +59,7 @@ int Run(const BudgetRequest& request) {
   std::unique_ptr<ProgressBar> bar;
   const auto progress = [&](long done, long total) {
     if (!bar) bar = std::make_unique<ProgressBar>("running", total, request.quiet);
-    bar->Update(done);
-    return !IsInterrupted();
+    return bar->GoOn(done);
   };
   const ErrorBudget budget =
       CalcErrorBudget(files.scenario, files.robot, files.mjcf, CountJobs(request.jobs), progress);

@@ -11,7 +11,6 @@
 #include "harness/base/process_pool.h"
 #include "harness/base/version.h"
 #include "harness/cli/commands.h"
-#include "harness/cli/terminal.h"
 
 namespace dexcheck::cli {
 namespace {
@@ -39,7 +38,7 @@ std::vector<Row> SumUp(const std::vector<CampaignFault>& faults) {
   std::vector<Row> rows;
   Row all{.kind = "all"};
   for (const CampaignFault& fault : faults) {
-    auto row = std::find_if(rows.begin(), rows.end(), [&](const Row& one) { return one.kind == fault.kind; });
+    auto row = std::ranges::find(rows, fault.kind, &Row::kind);
     if (row == rows.end()) row = rows.insert(rows.end(), Row{.kind = fault.kind});
     row->Add(fault);
     all.Add(fault);

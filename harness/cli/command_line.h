@@ -4,11 +4,9 @@
 // source which includes them ten seconds, so that only command_line.cc does.
 
 #include <cstdint>
-#include <filesystem>
 #include <functional>
 #include <initializer_list>
 #include <memory>
-#include <optional>
 #include <stdexcept>
 #include <string>
 #include <vector>

@@ -2,7 +2,6 @@
 
 #include <limits>
 
-#include "controller/common/text.h"
 #include "harness/base/process_pool.h"
 #include "harness/checks/consistency.h"
 #include "harness/cli/run_folder.h"

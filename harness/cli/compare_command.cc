@@ -15,10 +15,9 @@
 #include "harness/cli/make_video.h"
 #include "harness/cli/output_file.h"
 #include "harness/cli/terminal.h"
-#include "harness/report/comparison_page.h"
 #include "harness/report/page_frame.h"
-#include "harness/report/recorded_frames.h"
 #include "harness/report/run_comparison.h"
+#include "harness/report/run_data.h"
 #include "renders/video_writer.h"
 
 namespace dexcheck::cli {
@@ -57,8 +56,8 @@ void PrintNumbers(const std::vector<ComparedNumber>& numbers, bool all) {
 }
 
 void PrintSignals(const RunComparison& comparison, bool all) {
-  const auto equal = std::count_if(comparison.signals.begin(), comparison.signals.end(),
-                                   [](const SignalDifference& signal) { return signal.difference == 0.0; });
+  const auto equal = std::ranges::count_if(
+      comparison.signals, [](const SignalDifference& signal) { return signal.difference == 0.0; });
   fmt::print("\nsignals: {} of {} are equal bit for bit; differences, over sizes\n", equal,
              comparison.signals.size());
   size_t printed = 0;
@@ -87,8 +86,7 @@ void Print(const CompareRequest& request, const RunComparison& comparison) {
   }
   fmt::print("\nresults\n");
   PrintNumbers(comparison.results, true);
-  const auto failing = std::count_if(comparison.checks.begin(), comparison.checks.end(),
-                                     std::mem_fn(&ComparedNumber::fails_anywhere));
+  const auto failing = std::ranges::count_if(comparison.checks, std::mem_fn(&ComparedNumber::fails_anywhere));
   fmt::print("\nchecks: {} of {} are above their bounds (!)\n", failing, comparison.checks.size());
   PrintNumbers(comparison.checks, request.all);
   PrintSignals(comparison, request.all);

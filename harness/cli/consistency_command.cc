@@ -43,10 +43,7 @@ int Run(ConsistencyRequest request) {
   ResultFile json(request.json_file);
   ResultFile junit(request.junit_file);
   ProgressBar bar("comparing", request.options.samples, request.quiet);
-  const auto progress = [&](long samples) {
-    bar.Update(samples);
-    return !IsInterrupted();
-  };
+  const auto progress = [&](long samples) { return bar.GoOn(samples); };
   const RobotFiles& files = request.files;
   Comparison comparison =
       request.has_results()

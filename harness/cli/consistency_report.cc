@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <nlohmann/json.hpp>
 
 #include "controller/common/text.h"
 #include "harness/base/check_record.h"
@@ -258,8 +257,8 @@ std::string WriteJUnit(const ConsistencyRequest& request, const Comparison& comp
   for (const CheckRecord& record : result.terms) add("term", record);
   // What the engine's model alone has belongs to no check of its own.
   for (const ConstantFinding& finding : result.constants.findings) {
-    const bool has_case = std::any_of(cases.begin(), cases.end(),
-                                      [&](const JUnitCase& test) { return test.name == finding.check; });
+    const bool has_case =
+        std::ranges::any_of(cases, [&](const JUnitCase& test) { return test.name == finding.check; });
     if (!has_case) cases.push_back({"constant", finding.check, finding.where, ""});
   }
   std::string likely;

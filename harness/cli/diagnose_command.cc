@@ -42,9 +42,8 @@ struct Answer {
   /// @param undone what is wrong besides.
   void TakeConventions(Diagnosis undone) {
     const auto is_number = [](const Hypothesis& one) { return one.ids[0].starts_with("number."); };
-    const bool is_shared = std::any_of(likely.begin(), likely.end(), [&](const Hypothesis& one) {
-      return !is_number(one) && one.parts.size() > 1;
-    });
+    const bool is_shared = std::ranges::any_of(
+        likely, [&](const Hypothesis& one) { return !is_number(one) && one.parts.size() > 1; });
     const size_t remaining = CountRemaining(undone);
     if (remaining >= CountRemaining(numbers) && !(remaining == 0 && is_shared)) return;
     std::erase_if(likely, is_number);
@@ -117,7 +116,7 @@ void Print(const DiagnoseRequest& request, const RobotModel& model, const Answer
     for (const std::string& value : one.values) fmt::print("   {}\n", value);
   }
   for (const Repair& cause : diagnosis.causes) {
-    if (std::find(rounded.begin(), rounded.end(), &cause) != rounded.end()) continue;
+    if (std::ranges::find(rounded, &cause) != rounded.end()) continue;
     fmt::print("{}. {}", ++number, Describe(cause, written, file));
     if (cause.kind == RepairKind::kEngineOnly) {
       fmt::print("\n");
@@ -233,10 +232,7 @@ int Run(DiagnoseRequest request) {
   constexpr long kStages = 4;
   long stage = 0;
   ProgressBar bar("diagnosing", kStages, request.quiet);
-  const auto progress = [&](const char*) {
-    bar.Update(std::min(stage++, kStages));
-    return !IsInterrupted();
-  };
+  const auto progress = [&](const char*) { return bar.GoOn(std::min(stage++, kStages)); };
   const auto diagnose = [&](const RobotModel& own, const RobotDescription& rows) {
     return Diagnose(own, *engine, request.files.mjcf.string(), request.options, progress,
                     {rows.joints.begin(), rows.joints.end()});

@@ -45,7 +45,7 @@ const CheckRecord* FindWorst(const ComparedPair& pair) {
   const auto by_bound = [](const CheckRecord& a, const CheckRecord& b) {
     return a.worst / a.bound < b.worst / b.bound;
   };
-  const auto worst = std::max_element(pair.terms.begin(), pair.terms.end(), by_bound);
+  const auto worst = std::ranges::max_element(pair.terms, by_bound);
   return worst == pair.terms.end() ? nullptr : &*worst;
 }
 
@@ -72,7 +72,7 @@ void PrintTable(const EnginesRequest& request, const RobotModel& model,
   std::vector<std::string> terms;
   for (const ComparedPair& pair : result.pairs) {
     for (const CheckRecord& record : pair.terms) {
-      if (std::find(terms.begin(), terms.end(), record.name) == terms.end()) terms.push_back(record.name);
+      if (std::ranges::find(terms, record.name) == terms.end()) terms.push_back(record.name);
     }
   }
   constexpr size_t kPairsInARow = 6;
@@ -169,10 +169,8 @@ int Run(EnginesRequest request) {
   const RobotDescription robot = file.Describe();
   const RobotModel model(robot.spec);
   ProgressBar bar("comparing", request.options.states.samples, request.quiet);
-  const EngineComparisonResult result = RunEngineComparison(file, robot, request.options, [&](long samples) {
-    bar.Update(samples);
-    return !IsInterrupted();
-  });
+  const EngineComparisonResult result =
+      RunEngineComparison(file, robot, request.options, [&](long samples) { return bar.GoOn(samples); });
   bar.Finish();
   const bool is_whole = result.samples >= request.options.states.samples && !result.lacks_requested;
   ExitCode code = is_whole ? kSuccess : kFailure;

@@ -1,14 +1,26 @@
+// Terms of model and engine at one state, as JSON by their names in controller/NOTATION.md; matrices are
+// lists of rows.
+
+#include <fmt/format.h>
+
 #include <memory>
+#include <span>
 #include <string>
+#include <vector>
 
 #include "controller/common/errors.h"
+#include "controller/contact/contact_geometry.h"
+#include "controller/contact/grasp_map.h"
+#include "controller/contact/shapes.h"
+#include "controller/contact/surface.h"
+#include "controller/control/grasp_controller.h"
 #include "controller/dynamics/model_terms.h"
+#include "controller/grasp/force_closure.h"
 #include "controller/model/parameter_reader.h"
 #include "controller/model/platform.h"
 #include "controller/object/euler_zyz.h"
 #include "controller/object/object_dynamics.h"
 #include "harness/cli/commands.h"
-#include "harness/cli/eval_contacts.h"
 #include "harness/cli/json_matrix.h"
 #include "harness/cli/output_file.h"
 #include "harness/cli/run_folder.h"
@@ -21,9 +33,6 @@
 
 namespace dexcheck::cli {
 namespace {
-
-// Terms of model and engine at one state, as JSON by their names in controller/NOTATION.md; matrices are
-// lists of rows.
 
 /// A term of a provider at the state set, of that shape.
 MatrixXd ReadTerm(DynamicsProvider* provider, Term term, Eigen::Index rows, Eigen::Index cols = 1) {
@@ -40,8 +49,7 @@ void AddFrames(const RobotModel& model, const VectorXd& xi, DynamicsProvider* pr
   const MatrixXd poses = ReadTerm(provider, Term::kFramePose, 12, count);
   const MatrixXd J = ReadTerm(provider, Term::kJ, 6, n * count);
   const MatrixXd accelerations = ReadTerm(provider, Term::kJDotXi, 6, count);
-  Json frames = Json::object();
-  Json tips = Json::array();
+  Json frames = Json::object(), tips = Json::array();
   for (Eigen::Index i = 0; i < count; ++i) {
     const Frame& frame = model.frames()[static_cast<size_t>(i)];
     Eigen::Matrix4d X = Eigen::Matrix4d::Identity();
@@ -57,9 +65,14 @@ void AddFrames(const RobotModel& model, const VectorXd& xi, DynamicsProvider* pr
   (*out)["frames"] = frames;
 }
 
-/// What model and engine have alike, at the state set.
-void AddSharedTerms(const RobotModel& model, const VectorXd& xi, DynamicsProvider* provider, Json* out) {
-  const Eigen::Index n = xi.size();
+/// What model and engine have alike, of the robot alone: M_bar, C_bar_xi, gravity, friction, F_bar, bias,
+/// energies and momenta, fingertip_pose, and pose, J_f, J_f_dot_xi of each frame.
+void AddSharedTerms(const RobotModel& model, const State& state, DynamicsProvider* provider, Json* out) {
+  DynamicsState at;
+  at.q = state.q;
+  at.xi = state.xi;
+  provider->SetState(at);
+  const Eigen::Index n = state.xi.size();
   const VectorXd coriolis = ReadTerm(provider, Term::kCBarXi, n);
   const VectorXd gravity = ReadTerm(provider, Term::kGravity, n);
   const VectorXd friction = ReadTerm(provider, Term::kFriction, n);
@@ -74,28 +87,19 @@ void AddSharedTerms(const RobotModel& model, const VectorXd& xi, DynamicsProvide
   (*out)["potential_energy"] = ReadTerm(provider, Term::kPotentialEnergy, 1)(0, 0);
   (*out)["linear_momentum"] = ToList(ReadTerm(provider, Term::kLinearMomentum, 3));
   (*out)["angular_momentum"] = ToList(ReadTerm(provider, Term::kAngularMomentum, 3));
-  AddFrames(model, xi, provider, out);
+  AddFrames(model, state.xi, provider, out);
 }
 
 /// The model's matrices, of which the engine has products alone.
 void AddMatrices(const ModelTerms& terms, const VectorXd& xi, Json* out) {
   (*out)["C_bar"] = ToRows(terms.C());
-  Matrix6Xd J(6, terms.size());
-  Matrix6Xd J_dot(6, terms.size());
+  Matrix6Xd J(6, terms.size()), J_dot(6, terms.size());
   for (size_t i = 0; i < terms.model().frames().size(); ++i) {
     Json& frame = (*out)["frames"][terms.model().frames()[i].name];
     terms.CalcFrameJacobian(static_cast<int>(i), J, J_dot);
     frame["J_f_dot"] = ToRows(J_dot);
     frame["J_f_dot_xi"] = ToList(J_dot * xi);
   }
-}
-
-/// Of the robot alone.
-DynamicsState MakeState(const State& state) {
-  DynamicsState made;
-  made.q = state.q;
-  made.xi = state.xi;
-  return made;
 }
 
 /// M, C and F of (16), and for a differential drive the matrices of (2), (12), (13), (15), (17).
@@ -123,10 +127,7 @@ void AddUnreducedTerms(const RobotModel& model, const State& state, Json* out) {
 /// What Pinocchio has at the same state of a floating base: [x y z, qx qy qz qw], the origin's velocity in
 /// the base's axes.
 void AddPinocchioTerms(const ModelTerms& terms, const State& state, Json* out) {
-  BaseConvention convention;
-  convention.position = BaseConvention::Position::kXyzXyzw;
-  convention.linear_in_base = true;
-  const BaseConversion conversion(convention);
+  const BaseConversion conversion({.position = BaseConvention::Position::kXyzXyzw, .linear_in_base = true});
   TermResults converted;
   converted.M = terms.M();
   converted.gravity = terms.gravity();
@@ -139,7 +140,7 @@ void AddPinocchioTerms(const ModelTerms& terms, const State& state, Json* out) {
                          {"nle", ToList(converted.bias)}};
 }
 
-void AddObjectTerms(const RobotModel& model, const ObjectState& object, Json* out) {
+void AddObjectTerms(const RobotModel& model, const ObjectState& object, Json* out) try {
   const ObjectTerms terms =
       CalcObjectTerms(model.object()->body, model.gravity(), object.X_o, object.X_o_dot);
   (*out)["P"] = ToRows(CalcP(object.X_o));
@@ -149,12 +150,190 @@ void AddObjectTerms(const RobotModel& model, const ObjectState& object, Json* ou
   (*out)["M_o"] = ToRows(terms.M_o);
   (*out)["C_o"] = ToRows(terms.C_o);
   (*out)["N_o"] = ToList(terms.N_o);
+} catch (const SingularityError& error) {
+  throw InputError(std::string("object.X_o: ") + error.what());
 }
 
-/// Adds every term of the robot, those of the object when the state has one, and those of the contacts when
-/// it has them.
-/// @throws SingularityError where the object's ZYZ angles are singular, or where contacts cannot be
-/// evaluated.
+// A contact point may be off the surface by the digits that a person writes, m.
+constexpr double kOnSurface = 1e-6;
+
+/// kappa of a fingertip that touches the object's surface at a point: the fingertip's point whose normal is
+/// opposite.
+ContactCoordinates CalcKappaAt(const Surface& fingertip, const Surface& object, const SurfacePoint& alpha_o,
+                               const Matrix3d& R_OF) {
+  const SurfaceGeometry on_object = object.Evaluate(alpha_o);
+  const SurfacePoint alpha_f = fingertip.Project(-R_OF.transpose() * on_object.R.col(2)).alpha;
+  // x_cf = R_psi's first column in Sigma_co: [cos psi, -sin psi].
+  const Vector3d x_cf = R_OF * fingertip.Evaluate(alpha_f).R.col(0);
+  return {alpha_f, alpha_o, std::atan2(-on_object.R.col(1).dot(x_cf), on_object.R.col(0).dot(x_cf))};
+}
+
+ContactCoordinates ReadKappa(const ContactState& contacts, Eigen::Index i) {
+  const auto kappa = contacts.kappa.row(i);
+  return {{kappa[0], kappa[1], 0}, {kappa[2], kappa[3], 0}, kappa[4]};
+}
+
+Json DescribeContact(const Contact& contact, const ContactCoordinates& kappa, const std::string& finger) {
+  const ContactGeometry& geometry = contact.geometry;
+  return {{"finger", finger},
+          {"kappa", ToList(kappa.CalcVector())},
+          {"charts", {kappa.alpha_f.chart, kappa.alpha_o.chart}},
+          {"kappa_dot", ToList(contact.kappa_dot)},
+          {"M_f", ToRows(geometry.fingertip.M)},
+          {"K_f", ToRows(geometry.fingertip.K)},
+          {"T_f", ToList(geometry.fingertip.T.transpose())},
+          {"M_o", ToRows(geometry.object.M)},
+          {"K_o", ToRows(geometry.object.K)},
+          {"T_o", ToList(geometry.object.T.transpose())},
+          {"R_psi", ToRows(geometry.R_psi)},
+          {"g_f_cf", ToRows(geometry.g_f_cf.matrix())},
+          {"g_o_cf", ToRows(geometry.g_o_cf.matrix())}};
+}
+
+/// Whether the grasp can resist every wrench (26), and how large a wrench in its weakest direction.
+void AddForceClosure(const Matrix6Xd& G, double friction, Json* out) {
+  const ForceClosureOptions options;
+  const ForceClosureResult result = CalcForceClosure(G, VectorXd::Constant(G.cols() / 3, friction), options);
+  Json closed;
+  if (result.status == ForceClosureStatus::kForceClosure) closed = true;
+  if (result.status == ForceClosureStatus::kNotForceClosure) closed = false;
+  (*out)["force_closure"] = {{"mu", friction},
+                             {"closed", closed},
+                             {"margin", result.margin},
+                             {"margin_lower", result.margin_lower},
+                             {"weakest_wrench", ToList(result.direction)},
+                             {"length", options.length}};
+}
+
+/// Sections 4.4 and 5: J_B_pinv, N, xi_c, V_o_dot, xi_dot_d (47), F_o, F_N, f_c (49), tau (55), A (56).
+/// @param terms with CalcDynamics done. @param state with object, contacts and law. @param kappa of its
+/// contacts.
+/// @throws Error where the law has no solution: singular J_B' or G, no contact forces in the cones.
+Json CalcLaw(const ModelTerms& terms, const State& state, const Surface& surface,
+             std::span<const ContactCoordinates> kappa) {
+  const RobotModel& model = terms.model();
+  const LawState& wanted = *state.law;
+  const ContactState& contacts = *state.contacts;
+  const int count = static_cast<int>(contacts.fingertips.size());
+  GraspTerms grasp(model, contacts.fingertips, model.object()->body, surface);
+  grasp.SetState(terms, state.object->X_o, state.object->X_o_dot, kappa);
+  const Vector6d V_o_dot = CalcTrackingAcceleration({wanted.K_v, wanted.K_p}, grasp,
+                                                    {wanted.X_d, wanted.X_d_dot, wanted.X_d_ddot});
+  ComputedTorque law(model, count);
+  law.SetDemand(terms, grasp, V_o_dot, wanted.sigma_prime);
+  GraspForceProblem problem(count);
+  problem.G = grasp.G();
+  problem.F_o = law.F_o();
+  problem.mu.setConstant(contacts.friction);
+  problem.f_min.setConstant(wanted.f_min);
+  problem.f_max.setConstant(wanted.f_max);
+  GraspForceSolver solver(count);
+  const GraspForceResult& force = solver.Solve(problem);
+  RequireGraspForce(force);
+  VectorXd F_N(grasp.num_forces());
+  law.CalcInternalForce(force.f_c, F_N);
+  const VectorXd tau = law.CalcTorque(grasp, F_N);
+
+  Pseudoinverse J_B("J_B'", grasp.num_forces(), terms.size());
+  J_B.Factor(grasp.J_B());
+  Pseudoinverse G("G", 6, grasp.num_forces());
+  G.Factor(grasp.G());
+  const MatrixXd J_B_pinv = J_B.CalcMatrix();
+  const ObjectTerms& object = grasp.coordinates();
+  // (56): M_bar' J_B'^+ G^T P^-1 + J_B'^T G^+ M_o
+  const MatrixXd A = terms.M() * J_B_pinv * grasp.G().transpose() * object.P_inv +
+                     grasp.J_B().transpose() * G.CalcMatrix() * object.M_o;
+  return {{"J_B_pinv", ToRows(J_B_pinv)},
+          {"N", ToRows(J_B.CalcProjector())},
+          {"xi_c", ToList(law.xi_c())},
+          {"V_o_dot", ToList(V_o_dot)},
+          {"xi_dot_d", ToList(law.xi_dot_d())},
+          {"F_o", ToList(law.F_o())},
+          {"F_N", ToList(F_N)},
+          {"f_c", ToList(law.f_c())},
+          {"tau", ToList(tau)},
+          {"A", ToRows(A)}};
+}
+
+/// Adds the terms of section 4 for hard fingers at the state's contacts: G, G_dot, J_B, J_B_dot, and for each
+/// contact its coordinates, their rates, frames and surface parameters. Without an object the contacts are
+/// taken as at rest on both bodies (kappa_dot = 0).
+/// @param terms at the state, reduced coordinates.
+/// @throws InputError when a contact point is off the surface, or the law has no solution; SingularityError
+/// when a chart or (40) is singular.
+void AddContactTerms(const ModelTerms& terms, const State& state, Json* out) {
+  const RobotModel& model = terms.model();
+  const ContactState& contacts = *state.contacts;
+  const std::unique_ptr<Surface> object = MakeSurface(model.object()->shape);
+  Pose X_Bo = Pose::Identity();
+  Vector6d V_o = Vector6d::Zero();
+  if (state.object) {
+    X_Bo = CalcObjectPose(state.object->X_o);
+    V_o = CalcPInverse(state.object->X_o) * state.object->X_o_dot;
+  }
+
+  const bool has_points = contacts.points.rows() > 0;
+  const auto count = static_cast<Eigen::Index>(contacts.fingertips.size());
+  const int n = terms.size();
+  std::vector<Contact> grasp;
+  std::vector<ContactCoordinates> coordinates;
+  MatrixXd J_B(3 * count, n), J_B_dot(3 * count, n);
+  Matrix6Xd J_f(6, n), J_f_dot(6, n), G(6, 3 * count), G_dot(6, 3 * count);
+  Json list = Json::array();
+  for (Eigen::Index i = 0; i < count; ++i) {
+    const int frame = contacts.fingertips[static_cast<size_t>(i)];
+    const Frame& tip = model.frames()[static_cast<size_t>(frame)];
+    const Sphere fingertip(*tip.sphere_radius);
+    const Pose X_OF = X_Bo.inverse() * terms.CalcFramePose(frame);
+    const std::string entry = fmt::format("{}[{}]: ", has_points ? "contact_points" : "kappa", i);
+    terms.CalcFrameJacobian(frame, J_f, J_f_dot);
+    ContactCoordinates kappa;
+    Contact contact;
+    try {
+      kappa = has_points ? CalcKappaAt(fingertip, *object, object->Locate(contacts.points.row(i), kOnSurface),
+                                       X_OF.linear())
+                         : ReadKappa(contacts, i);
+      contact.geometry = CalcContactGeometry(fingertip, *object, kappa);
+      if (state.object) {
+        contact.kappa_dot =
+            CalcKappaDot(contact.geometry, CalcRelativeTwist(contact.geometry, J_f * state.xi, V_o));
+      }
+    } catch (const std::invalid_argument& error) {
+      throw InputError(entry + error.what());
+    } catch (const SingularityError& error) {
+      throw InputError(entry + error.what());
+    }
+    CalcContactJacobian(contact, J_f, J_B.middleRows(3 * i, 3));
+    CalcContactJacobianDot(contact, J_f, J_f_dot, J_B_dot.middleRows(3 * i, 3));
+    Json described = DescribeContact(contact, kappa, tip.name);
+    if (state.object) {
+      // How far the bodies' contact points are apart: zero where kappa belongs to the state.
+      const Vector3d on_fingertip = X_OF * contact.geometry.g_f_cf.translation();
+      described["distance"] = (on_fingertip - contact.geometry.g_o_cf.translation()).norm();
+    }
+    list.push_back(described);
+    grasp.push_back(contact);
+    coordinates.push_back(kappa);
+  }
+  CalcGraspMap(grasp, G);
+  CalcGraspMapDot(grasp, G_dot);
+  (*out)["G"] = ToRows(G);
+  (*out)["G_dot"] = ToRows(G_dot);
+  (*out)["J_B"] = ToRows(J_B);
+  (*out)["J_B_dot"] = ToRows(J_B_dot);
+  (*out)["contacts"] = list;
+  AddForceClosure(G, contacts.friction, out);
+  try {
+    if (state.law) (*out)["law"] = CalcLaw(terms, state, *object, coordinates);
+  } catch (const InputError&) {
+    throw;
+  } catch (const Error& error) {
+    throw InputError(std::string("law: ") + error.what());
+  }
+}
+
+/// Adds every term of the robot, and those of object and contacts where the state has them.
+/// @throws SingularityError where one of them is singular.
 void AddModelTerms(const RobotModel& model, const State& state, Json* out) {
   ModelTerms terms(model, Coordinates::kReduced);
   terms.SetState(state.q, state.xi);
@@ -162,27 +341,12 @@ void AddModelTerms(const RobotModel& model, const State& state, Json* out) {
   RobotSpec robot = model.spec();
   robot.object.reset();
   AnalyticProvider provider(robot, "model");
-  provider.SetState(MakeState(state));
-  AddSharedTerms(model, state.xi, &provider, out);
+  AddSharedTerms(model, state, &provider, out);
   AddMatrices(terms, state.xi, out);
   AddUnreducedTerms(model, state, out);
   if (model.base().type == BaseType::kFloating) AddPinocchioTerms(terms, state, out);
-  try {
-    if (state.object) AddObjectTerms(model, *state.object, out);
-  } catch (const SingularityError& error) {
-    throw InputError(std::string("object.X_o: ") + error.what());
-  }
+  if (state.object) AddObjectTerms(model, *state.object, out);
   if (state.contacts) AddContactTerms(terms, state, out);
-}
-
-/// The engine's values of the model's terms of the same names: M_bar, C_bar_xi, gravity, friction, F_bar,
-/// bias, energies and momenta, fingertip_pose, and pose, J_f, J_f_dot_xi of each frame.
-Json EvaluateEngineTerms(const Adapter& adapter, const State& state) {
-  EngineProvider provider(adapter, "engine");
-  provider.SetState(MakeState(state));
-  Json out = Json::object();
-  AddSharedTerms(adapter.model(), state.xi, &provider, &out);
-  return out;
 }
 
 struct EvalRequest {
@@ -195,9 +359,7 @@ struct EvalRequest {
 int Run(const EvalRequest& request) {
   const RobotModel model = ReadRobotModel(request.robot);
   const State state = ReadState(request.state_file, model);
-  Json out = {{"robot", model.name()},
-              {"q", std::vector<double>(state.q.begin(), state.q.end())},
-              {"xi", std::vector<double>(state.xi.begin(), state.xi.end())}};
+  Json out = {{"robot", model.name()}, {"q", ToList(state.q)}, {"xi", ToList(state.xi)}};
   try {
     AddModelTerms(model, state, &out);
   } catch (const InputError& error) {
@@ -206,7 +368,8 @@ int Run(const EvalRequest& request) {
   if (!request.mjcf.empty()) {
     const MjModelPtr engine = LoadMjcf(request.mjcf);
     const Adapter adapter(model, *engine, request.mjcf.string());
-    out["engine"] = EvaluateEngineTerms(adapter, state);
+    EngineProvider provider(adapter, "engine");
+    AddSharedTerms(model, state, &provider, &out["engine"]);
   }
   OutputFile(request.out).Write(out.dump(1) + "\n");
   return kSuccess;

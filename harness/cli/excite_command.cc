@@ -1,17 +1,24 @@
 #include <fmt/format.h>
 
+#include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "controller/common/errors.h"
+#include "controller/common/text.h"
+#include "controller/dynamics/torque_regressor.h"
 #include "harness/base/console.h"
 #include "harness/base/interrupts.h"
 #include "harness/cli/commands.h"
-#include "harness/cli/excite_model.h"
 #include "harness/cli/json_matrix.h"
 #include "harness/cli/output_file.h"
 #include "harness/cli/run_folder.h"
 #include "harness/cli/terminal.h"
+#include "harness/descriptions/read_description.h"
+#include "harness/engine/self_contact.h"
+#include "harness/recordings/motion_design.h"
 #include "harness/run/excitation.h"
 #include "harness/study/exciting_motion.h"
 
@@ -20,6 +27,127 @@ namespace {
 
 // A motion of a model alone takes some milliseconds, a run a second.
 constexpr int kMotionsPerRun = 10;
+
+/// A motion for a robot of which a recording is to be made.
+struct MotionRequest {
+  std::filesystem::path model, mjcf, limits, columns;
+  std::vector<std::filesystem::path> recorded;
+  std::string motion_file, json_file;
+  bool quiet = false;
+  MotionDesignOptions options;
+};
+
+std::vector<std::string> ListJointNames(const RobotModel& model) {
+  std::vector<std::string> names;
+  names.reserve(static_cast<size_t>(model.num_joints()));
+  for (int i = 0; i < model.num_joints(); ++i) names.push_back(model.joint(i).name);
+  return names;
+}
+
+/// Time, positions, velocities, accelerations and the model's torques.
+std::string WriteMotion(const RobotModel& model, const SeriesMotion& motion, double rate) {
+  std::string text = "t";
+  for (const char* const quantity : {"q", "qd", "qdd", "tau"})
+    for (const std::string& name : ListJointNames(model)) text += fmt::format(",{}.{}", quantity, name);
+  text += "\n";
+  TorqueRegressor regressor(model);
+  VectorXd q, qd, qdd;
+  const auto rows = static_cast<long>(std::floor(motion.duration() * rate));
+  for (long row = 0; row <= rows; ++row) {
+    const double time = static_cast<double>(row) / rate;
+    motion.Calc(time, &q, &qd, &qdd);
+    VectorXd torque = CalcMotionTorques(q, qd, qdd, &regressor);
+    text += FormatNumber(time);
+    for (const VectorXd* const values : {&q, &qd, &qdd, &torque})
+      for (const double value : *values) text += fmt::format(",{:.9g}", value);
+    text += "\n";
+  }
+  return text;
+}
+
+Json ToJson(const RobotModel& model, const MotionDesign& design, bool complete) {
+  Json json = {{"model", model.spec().source},        {"complete", complete},
+               {"motions", design.evaluations},       {"combinations", design.combinations},
+               {"known_before", design.known_before}, {"known_after", design.known_after}};
+  for (int i = 0; i < model.num_joints(); ++i) json["largest_torque"][model.joint(i).name] = design.torque[i];
+  for (const ExpectedError& one : design.errors)
+    json["errors"][one.fault] = {{"before", one.before}, {"after", one.after}};
+  return json;
+}
+
+void Print(const MotionRequest& request, const RobotModel& model, const MotionDesign& design) {
+  fmt::print(
+      "{}: a motion of {} s, {} motions tried{}\n\n", model.name(), request.options.duration,
+      design.evaluations,
+      request.options.calc_overlap ? "" : "; overlaps of bodies are not known without an MJCF (--mjcf)");
+  std::vector<TableRow> rows = {{{"standard error over plausible size", "before", "after"}}};
+  for (const ExpectedError& one : design.errors)
+    rows.push_back({{one.fault, fmt::format("{:.2g}", one.before), fmt::format("{:.2g}", one.after)}});
+  fmt::print("{}\n", FormatTable("<>>", rows));
+  std::vector<TableRow> torques = {{{"joint", "largest torque"}}};
+  for (int i = 0; i < model.num_joints(); ++i)
+    torques.push_back({{model.joint(i).name, fmt::format("{:.3g}", design.torque[i])}});
+  fmt::print("{}\n", FormatTable("<>", torques));
+}
+
+void AddMotionOptions(const Command& command, MotionRequest* request) {
+  Command of_model = command.Under("A motion for a robot");
+  of_model.AddOption("--model FILE", &request->model,
+                     "Instead of a scenario, a parameter file, URDF or MJCF: make a motion to record");
+  of_model.AddOption("--out FILE.csv", &request->motion_file,
+                     "The motion: t, q, qd, qdd and the model's torques");
+  of_model
+      .AddOption("--recording FILE", &request->recorded, "What was recorded already: the motion adds to it")
+      .Repeatable();
+  of_model.AddOption("--columns FILE.toml", &request->columns, "Which column of the recordings is what");
+  of_model.AddOption("--limits FILE.toml", &request->limits, "Ranges, velocities, accelerations and torques");
+  of_model.AddOption("--mjcf FILE", &request->mjcf, "The robot's shapes, which must not overlap");
+  of_model.AddOption("--duration S", &request->options.duration, "How long the motion takes, s")
+      .Check(NumberFrom(1.0, 3600.0))
+      .ShowDefault();
+  of_model.AddOption("--rate HZ", &request->options.rate, "Rows per second")
+      .Check(NumberFrom(1.0, 1e5))
+      .ShowDefault();
+  AddSeedOption(of_model, &request->options.seed, "Of the motions that are drawn at first");
+}
+
+/// @return exit code.
+int DesignMotionOfModel(MotionRequest request) {
+  const RobotDescription description = ReadDescription(request.model);
+  const RobotModel model(description.spec);
+  const MotionLimits limits = ReadMotionLimits(description, request.limits);
+  std::vector<Recording> recordings;
+  for (const std::filesystem::path& path : request.recorded)
+    recordings.push_back(OpenRecordingOf(model, path, request.columns));
+  if (request.mjcf.empty() && description.format == RobotFormat::kMjcf) request.mjcf = request.model;
+  std::optional<SelfContact> contact;
+  if (!request.mjcf.empty()) {
+    contact.emplace(LoadMjcf(request.mjcf), request.mjcf.string(), ListJointNames(model),
+                    0.5 * (limits.lower + limits.upper));
+    request.options.calc_overlap = [&](const VectorXd& q) { return contact->CalcDepth(q); };
+  }
+  CatchInterrupts();
+  ResultFile json(request.json_file);
+  ResultFile motion(request.motion_file);
+  std::optional<RecordingSet> recorded;
+  if (!recordings.empty())
+    recorded.emplace(model, &recordings, ReadOptions{}, [](long) { return !IsInterrupted(); });
+  request.options.recorded = recorded ? &*recorded : nullptr;
+  ProgressBar bar("motions", request.options.evaluations, request.quiet);
+  request.options.go_on = [&](int evaluations) { return bar.GoOn(evaluations); };
+  const MotionDesign design = DesignMotion(model, limits, request.options);
+  bar.Finish();
+  const bool complete = !IsInterrupted();
+  motion.Write([&] { return WriteMotion(model, design.motion, request.options.rate); });
+  json.Write([&] { return ToJson(model, design, complete).dump(2) + "\n"; });
+  if (!json.TakesStdout() && !motion.TakesStdout()) {
+    if (!request.quiet) Print(request, model, design);
+    fmt::print("{}: {} of {} combinations of sizes are known to a third of what is plausible, {} before.\n",
+               complete ? "FOUND" : "INTERRUPTED, so far", design.known_after, design.combinations,
+               design.known_before);
+  }
+  return complete ? kSuccess : ReportFailure("interrupted");
+}
 
 struct ExciteRequest : ScenarioRequest {
   ExcitingMotionOptions options;
@@ -75,11 +203,8 @@ int Run(const ExciteRequest& request) {
   CatchInterrupts();
   ResultFile json(request.json_file);
   ProgressBar bar("running", request.options.runs, request.quiet);
-  const ExcitingMotion motion =
-      FindExcitingMotion(files.scenario, files.robot, files.mjcf, request.options, [&](int runs) {
-        bar.Update(runs);
-        return !IsInterrupted();
-      });
+  const ExcitingMotion motion = FindExcitingMotion(files.scenario, files.robot, files.mjcf, request.options,
+                                                   [&](int runs) { return bar.GoOn(runs); });
   bar.Finish();
   const bool complete = !IsInterrupted();
   json.Write([&] { return ToText(files.scenario, motion, complete); });

@@ -143,7 +143,7 @@ std::string ListDistinctUnits(const SignalInfo& signal) {
   std::vector<std::string> seen;
   std::string text;
   for (const std::string& unit : ListUnits(signal)) {
-    if (std::find(seen.begin(), seen.end(), unit) != seen.end()) continue;
+    if (std::ranges::find(seen, unit) != seen.end()) continue;
     seen.push_back(unit);
     text += (text.empty() ? "" : ", ") + unit;
   }

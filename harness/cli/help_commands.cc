@@ -1,7 +1,9 @@
 // The help in other forms: completion for shells, and a manual page.
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
+#include <algorithm>
 #include <memory>
 #include <string>
 #include <utility>
@@ -17,9 +19,7 @@ namespace dexcheck::cli {
 namespace {
 
 std::string Join(const std::vector<std::string>& words, const char* between) {
-  std::string text;
-  for (const std::string& word : words) text += (text.empty() ? "" : between) + word;
-  return text;
+  return fmt::format("{}", fmt::join(words, between));
 }
 
 /// Text with each of some characters preceded by a backslash.
@@ -32,11 +32,17 @@ std::string Escape(const std::string& text, const char* special) {
   return escaped;
 }
 
-bool TakesScenario(const CommandHelp& command) {
-  for (const OptionHelp& option : command.options) {
-    if (option.is_positional && option.names.front().find("SCENARIO") != std::string::npos) return true;
+/// Commands or scenarios that may follow a command.
+std::vector<std::string> ListNextWords(const CommandHelp& command) {
+  std::vector<std::string> words = command.commands;
+  const bool takes_scenario = std::ranges::any_of(command.options, [](const OptionHelp& option) {
+    return option.is_positional && option.names.front().find("SCENARIO") != std::string::npos;
+  });
+  if (takes_scenario) {
+    const std::vector<std::string> scenarios = kScenarios.ListNames();
+    words.insert(words.end(), scenarios.begin(), scenarios.end());
   }
-  return false;
+  return words;
 }
 
 std::vector<std::string> ListOptionNames(const CommandHelp& command) {
@@ -71,13 +77,8 @@ std::string MakeBashCompletion(const std::vector<CommandHelp>& commands) {
       "    case \"$command $word\" in\n";
   text += ListCommandCases(commands) + "    esac\n  done\n  local words= files=\n  case $command in\n";
   for (const CommandHelp& command : commands) {
-    std::vector<std::string> words = command.commands;
-    if (TakesScenario(command)) {
-      const std::vector<std::string> scenarios = kScenarios.ListNames();
-      words.insert(words.end(), scenarios.begin(), scenarios.end());
-    }
     text += fmt::format("    '{}') words='{}'; [[ $cur != -* ]] || words='{}'; files={} ;;\n", command.name,
-                        Join(words, " "), Join(ListOptionNames(command), " "),
+                        Join(ListNextWords(command), " "), Join(ListOptionNames(command), " "),
                         command.commands.empty() || command.name.empty() ? "1" : "");
   }
   text +=
@@ -131,10 +132,7 @@ std::string MakeZshCompletion(const std::vector<CommandHelp>& commands) {
     }
     std::string next;
     if (!command.name.empty()) {  // those of the program stand in groups
-      for (const std::string& word : command.commands) next += " '" + word + "'";
-    }
-    if (TakesScenario(command)) {
-      for (const std::string& name : kScenarios.ListNames()) next += " '" + name + "'";
+      for (const std::string& word : ListNextWords(command)) next += " '" + word + "'";
     }
     text += fmt::format("    '{}') options=({}); next=({}); files={}{} ;;\n", command.name, options, next,
                         command.commands.empty() ? "1" : "", command.name.empty() ? groups : "");
@@ -150,11 +148,9 @@ std::string MakeZshCompletion(const std::vector<CommandHelp>& commands) {
 /// A manual page in man's macros.
 std::string MakeManualPage(const std::vector<CommandHelp>& commands) {
   const auto clean = [](const std::string& text) {
-    const std::string escaped = Escape(text, "\\");
-    std::string hyphens;
-    for (const char c : escaped) hyphens += c == '-' ? std::string("\\-") : std::string(1, c);
+    const std::string escaped = Escape(text, "\\-");
     // A line that begins with one of these would be a request.
-    return hyphens.starts_with(".") || hyphens.starts_with("'") ? "\\&" + hyphens : hyphens;
+    return escaped.starts_with(".") || escaped.starts_with("'") ? "\\&" + escaped : escaped;
   };
   std::string text =
       fmt::format(".TH DEXCHECK 1 \"\" \"dexcheck {}\" \"User Commands\"\n.SH NAME\ndexcheck \\- {}\n",

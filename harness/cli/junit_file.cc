@@ -39,7 +39,7 @@ JUnitCase MakeJUnitCase(const std::string& group, const CheckRecord& record, con
 std::string WriteJUnit(const std::string& suite, const std::vector<JUnitCase>& cases, double seconds,
                        const std::string& error) {
   const auto failures =
-      std::count_if(cases.begin(), cases.end(), [](const JUnitCase& test) { return !test.failure.empty(); });
+      std::ranges::count_if(cases, [](const JUnitCase& test) { return !test.failure.empty(); });
   tinyxml2::XMLPrinter xml;
   xml.PushHeader(/*writeBOM=*/false, /*writeDeclaration=*/true);
   const auto open = [&](const char* name) {

@@ -12,7 +12,7 @@
 #include "harness/base/console.h"
 #include "harness/base/interrupts.h"
 #include "harness/cli/terminal.h"
-#include "harness/report/recorded_frames.h"
+#include "harness/report/run_data.h"
 
 namespace dexcheck::cli {
 
@@ -42,10 +42,7 @@ bool WriteVideo(const std::vector<RunView>& views, const VideoOptions& options, 
   VideoWriter video(out, encoding);
   CatchInterrupts();
   ProgressBar bar("drawing", frames, quiet);
-  const bool complete = RenderVideo(views, options, &video, [&](long done, long) {
-    bar.Update(done);
-    return !IsInterrupted();
-  });
+  const bool complete = RenderVideo(views, options, &video, [&](long done, long) { return bar.GoOn(done); });
   bar.Finish();
   if (!complete) {
     Warn(fmt::format("stopped after {} of {} frames; {} was not written", video.frames(), frames, out));

@@ -8,7 +8,6 @@
 #include <utility>
 
 #include "controller/common/errors.h"
-#include "harness/base/files.h"
 
 namespace dexcheck::cli {
 

@@ -34,12 +34,12 @@ struct PlanClearance {
   std::string bodies;                                         ///< Empty when there is no such pair.
 };
 
+using Clearances = std::array<PlanClearance, kPairClassCount>;
+
 /// How far bodies that should not touch are apart in an MJCF's scene, with the hand open and closed
 /// around the object. @param q, q_open positions q'. @throws InputError as LoadMjcf and Adapter.
-std::array<PlanClearance, kPairClassCount> FindPlanClearance(const RobotModel& model,
-                                                             const std::filesystem::path& mjcf,
-                                                             const Pose& X_Bo, const VectorXd& q,
-                                                             const VectorXd& q_open) {
+Clearances FindPlanClearance(const RobotModel& model, const std::filesystem::path& mjcf, const Pose& X_Bo,
+                             const VectorXd& q, const VectorXd& q_open) {
   const MjModelPtr engine = LoadMjcf(mjcf);
   const Adapter adapter(model, *engine, mjcf.string());
   const Solids solids = ListSolids(*engine);
@@ -52,7 +52,7 @@ std::array<PlanClearance, kPairClassCount> FindPlanClearance(const RobotModel& m
     const double quaternion[4] = {turn.w(), turn.x(), turn.y(), turn.z()};
     std::copy_n(quaternion, 4, place + 3);
   }
-  std::array<PlanClearance, kPairClassCount> smallest;
+  Clearances smallest;
   for (const VectorXd* posture : {&q, &q_open}) {
     adapter.SetPositions(*posture, data->qpos);
     mj_kinematics(engine.get(), data.get());
@@ -189,28 +189,22 @@ std::string ToToml(const Json& value) {
   return value.is_object() ? "{ " + entries + " }" : "[" + entries + "]";
 }
 
-using Clearances = std::array<PlanClearance, kPairClassCount>;
-
-/// The smallest of all; null when nothing is watched.
-const PlanClearance* FindSmallest(const Clearances& clearances) {
-  const PlanClearance* smallest = nullptr;
-  for (const PlanClearance& one : clearances) {
-    if (!one.bodies.empty() && (smallest == nullptr || one.distance < smallest->distance)) smallest = &one;
-  }
-  return smallest;
+/// The smallest of all; without bodies when nothing is watched.
+const PlanClearance& FindSmallest(const Clearances& clearances) {
+  return *std::ranges::min_element(clearances, {}, &PlanClearance::distance);
 }
 
 void PrintText(const PlanRequest& request, const ContactPlan& plan, const Json& grasp,
-               const std::optional<Clearances>& clearances, double seconds) {
+               const Clearances& clearances, double seconds) {
   fmt::print("# {} contacts for the object at {} m, {} degrees (ZYZ); {} palm poses tried in {:.2f} s\n",
              plan.contacts.size(), FormatNumbers(request.xyz), FormatNumbers(request.zyz_deg),
              plan.palm_poses, seconds);
   fmt::print("# margin of force closure {:.3f} per newton of normal force, mu = {}\n", plan.margin,
              FormatNumber(request.options.mu));
   fmt::print("# every joint stays {:.3f} or more from the ends of its range\n", plan.joint_margin);
-  if (const PlanClearance* nearest = clearances ? FindSmallest(*clearances) : nullptr) {
-    fmt::print("# nearest of what should not touch, hand open or closed: {}, {:.1f} mm {}\n", nearest->bodies,
-               1e3 * std::abs(nearest->distance), nearest->distance < 0.0 ? "into each other" : "apart");
+  if (const PlanClearance& nearest = FindSmallest(clearances); !nearest.bodies.empty()) {
+    fmt::print("# nearest of what should not touch, hand open or closed: {}, {:.1f} mm {}\n", nearest.bodies,
+               1e3 * std::abs(nearest.distance), nearest.distance < 0.0 ? "into each other" : "apart");
   }
   if (std::abs(std::sin(DegToRad(request.zyz_deg[1]))) < kMinSinBeta) {
     fmt::print("# ZYZ angles are singular at this pose: in [control], orientation = \"rotation\"\n");
@@ -220,14 +214,14 @@ void PrintText(const PlanRequest& request, const ContactPlan& plan, const Json& 
 }
 
 std::string ToText(const PlanRequest& request, const ContactPlan& plan, const Json& grasp,
-                   const std::optional<Clearances>& clearances, double seconds) {
+                   const Clearances& clearances, double seconds) {
   Json json = {
       {"found", plan.found},      {"object_xyz", request.xyz},     {"object_zyz_deg", request.zyz_deg},
       {"mu", request.options.mu}, {"palm_poses", plan.palm_poses}, {"seconds", seconds}};
-  if (clearances) {
+  if (plan.found && !request.mjcf.empty()) {
     json["clearance"] = Json::object();
-    for (size_t i = 0; i < clearances->size(); ++i) {
-      const PlanClearance& one = (*clearances)[i];
+    for (size_t i = 0; i < clearances.size(); ++i) {
+      const PlanClearance& one = clearances[i];
       if (one.bodies.empty()) continue;
       json["clearance"][NameOf(static_cast<PairClass>(i))] = {{"smallest_m", one.distance},
                                                               {"bodies", one.bodies}};
@@ -291,18 +285,16 @@ int Run(PlanRequest request) {
   const ContactPlan plan = PlanContacts(model, hand, *surface, CalcObjectPose(X_o), nominal, request.options);
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   Json grasp;
-  std::optional<Clearances> clearances;
+  Clearances clearances;
   if (plan.found) {
     grasp = MakeGrasp(model, hand, *surface, plan, request);
-    if (!request.mjcf.empty()) {
+    if (!request.mjcf.empty())
       clearances = FindPlanClearance(model, request.mjcf, CalcObjectPose(X_o), plan.q, plan.q_open);
-    }
   }
   json.Write([&] { return ToText(request, plan, grasp, clearances, seconds); });
   if (!plan.found) throw Error("no plan: " + plan.problem);
   if (!json.TakesStdout()) PrintText(request, plan, grasp, clearances, seconds);
-  const PlanClearance* nearest = clearances ? FindSmallest(*clearances) : nullptr;
-  return nearest != nullptr && nearest->distance < 0.0 ? kDisagreement : kSuccess;
+  return FindSmallest(clearances).distance < 0.0 ? kDisagreement : kSuccess;
 }
 
 }  // namespace

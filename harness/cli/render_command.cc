@@ -18,7 +18,7 @@
 #include "harness/cli/make_video.h"
 #include "harness/cli/output_file.h"
 #include "harness/cli/run_folder.h"
-#include "harness/report/recorded_frames.h"
+#include "harness/report/run_data.h"
 #include "renders/video.h"
 #include "renders/video_writer.h"
 

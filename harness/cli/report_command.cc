@@ -8,7 +8,6 @@
 #include "harness/cli/commands.h"
 #include "harness/cli/output_file.h"
 #include "harness/report/page.h"
-#include "harness/report/tex_table.h"
 
 namespace dexcheck::cli {
 namespace {

@@ -16,11 +16,9 @@
 #include "controller/common/text.h"
 #include "controller/common/toml_reader.h"
 #include "harness/base/console.h"
-#include "harness/base/files.h"
 #include "harness/base/interrupts.h"
 #include "harness/cli/terminal.h"
 #include "harness/engine/machine.h"
-#include "harness/report/recorded_frames.h"
 #include "harness/report/run_data.h"
 
 namespace dexcheck::cli {
@@ -57,9 +55,9 @@ std::vector<std::string> Supersede(const std::filesystem::path& file, std::vecto
   const auto replaces_table = [](const std::string& assignment) {
     return assignment.starts_with("control=");
   };
-  if (std::any_of(overrides.begin(), overrides.end(), replaces_table)) return overrides;
+  if (std::ranges::any_of(overrides, replaces_table)) return overrides;
   const auto is_changed = [&](const std::string& key) {
-    return std::any_of(overrides.begin(), overrides.end(), [&](const std::string& assignment) {
+    return std::ranges::any_of(overrides, [&](const std::string& assignment) {
       return assignment.starts_with("control." + key + "=") || assignment == "control." + key + "-=";
     });
   };
@@ -184,8 +182,8 @@ RecordedRun::RecordedRun(const std::filesystem::path& folder, const std::vector<
 }
 
 bool RecordedRun::was_checked() const {
-  return std::any_of(log_.signals().begin(), log_.signals().end(),
-                     [](const SignalInfo& signal) { return signal.name.starts_with("check/"); });
+  return std::ranges::any_of(log_.signals(),
+                             [](const SignalInfo& signal) { return signal.name.starts_with("check/"); });
 }
 
 ReplayDifference RecordedRun::Compare(const std::filesystem::path& other_log) const {
@@ -196,7 +194,7 @@ ReplayDifference RecordedRun::Compare(const std::filesystem::path& other_log) co
   long first_row = log_.rows();
   for (const SignalInfo& signal : log_.signals()) {
     const std::vector<OldName>& names = ListOldNames();
-    const auto replaced = std::find_if(names.begin(), names.end(), [&](const OldName& name) {
+    const auto replaced = std::ranges::find_if(names, [&](const OldName& name) {
       return name.of == OldName::Of::kReplaced && name.old == signal.name;
     });
     if (replaced != names.end()) {
@@ -238,14 +236,14 @@ std::vector<std::string> ShippedKind::ListNames() const {
        std::filesystem::directory_iterator(FindShippedFile(folder))) {
     if (entry.path().extension() == ".toml") names.push_back(entry.path().stem().string());
   }
-  std::sort(names.begin(), names.end());
+  std::ranges::sort(names);
   return names;
 }
 
 std::filesystem::path ShippedKind::Find(const std::string& name_or_file) const {
   if (IsTomlFile(name_or_file)) return name_or_file;
   const std::vector<std::string> known = ListNames();
-  if (std::find(known.begin(), known.end(), name_or_file) != known.end())
+  if (std::ranges::find(known, name_or_file) != known.end())
     return FindShippedFile(folder) / (name_or_file + ".toml");
   const std::string where = *listed != '\0' ? listed : fmt::format("{}", fmt::join(known, ", "));
   throw InputError(fmt::format("{} {}: is neither shipped ({}) nor a TOML file{}", name, Quote(name_or_file),

@@ -61,8 +61,7 @@ void PrintChecks(const Setup& setup, const ClosedLoop& loop, Detail detail) {
   fmt::print("\n  {:<17}    {:<28}{:>8}{:>8}\n", "category",
              detail == Detail::kAll ? "check" : "checks, nearest to its bound", "worst", "bound");
   const auto& constants = setup.constants().records;
-  const auto differs =
-      std::count_if(constants.begin(), constants.end(), [](const CheckRecord& r) { return r.failed; });
+  const auto differs = std::ranges::count_if(constants, [](const CheckRecord& r) { return r.failed; });
   fmt::print("  {:<17}{:>3} {:<28}{:>8}{:>8}       {}\n", "model", constants.size(), "constants", differs, 0,
              Tell(differs > 0));
   if (detail == Detail::kAll) {
@@ -108,8 +107,7 @@ void PrintLimits(std::span<const Motor> motors, const std::vector<LimitedTorque>
   std::vector<size_t> order;
   for (size_t i = 0; i < limited.size(); ++i)
     if (limited[i].time > 0.0) order.push_back(i);
-  std::sort(order.begin(), order.end(),
-            [&](size_t a, size_t b) { return limited[a].time > limited[b].time; });
+  std::ranges::sort(order, [&](size_t a, size_t b) { return limited[a].time > limited[b].time; });
   std::string text = "torque limited: ";
   for (const size_t i : order)
     text += fmt::format("{}{} for {:.3f} s from {:.3f} s, by up to {:.3g}", i == order.front() ? "" : "; ",
@@ -147,9 +145,8 @@ void PrintCauses(const Causes& causes) {
   int number = 0;
   for (const Explanation& one : causes)
     fmt::print("{}\n", Wrap(fmt::format("    {}  {}: {}", ++number, NameOf(one.channel), one.Tell()), 7));
-  const bool has_class = std::any_of(causes.begin(), causes.end(), [](const Explanation& one) {
-    return one.outcome == CauseOutcome::kNamedClass;
-  });
+  const bool has_class = std::ranges::any_of(
+      causes, [](const Explanation& one) { return one.outcome == CauseOutcome::kNamedClass; });
   if (has_class) fmt::print("    (what is not isolable here may be on another motion: dexcheck excite)\n");
 }
 
@@ -215,9 +212,8 @@ void PrintRunReport(const Setup& setup, const ClosedLoop& loop, const RunResult&
                finding.model, finding.engine);
   }
   const std::vector<ConstantFinding>& findings = setup.constants().findings;
-  const bool has_servos = std::any_of(findings.begin(), findings.end(), [](const ConstantFinding& finding) {
-    return finding.check.starts_with("motor_");
-  });
+  const bool has_servos = std::ranges::any_of(
+      findings, [](const ConstantFinding& finding) { return finding.check.starts_with("motor_"); });
   if (has_servos)
     fmt::print(
         "  A run sends torques: each actuator must be a <motor>, not a servo or a muscle; dexcheck import "

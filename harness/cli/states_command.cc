@@ -1,9 +1,7 @@
 #include <filesystem>
-#include <limits>
 #include <memory>
 #include <string>
 #include <system_error>
-#include <vector>
 
 #include "controller/common/errors.h"
 #include "harness/cli/commands.h"

@@ -202,7 +202,7 @@ std::vector<long> MakeTrials(const StudyInputs& inputs, const std::vector<Trial>
   const std::vector<long> done = StudyStore::Open(request.database).ListNumbers();
   std::vector<long> missing;
   for (const Trial& trial : trials) {
-    if (!std::binary_search(done.begin(), done.end(), trial.number)) missing.push_back(trial.number);
+    if (!std::ranges::binary_search(done, trial.number)) missing.push_back(trial.number);
   }
   return missing;
 }

@@ -1,4 +1,3 @@
-
 #include <fmt/format.h>
 
 #include <chrono>
@@ -17,9 +16,7 @@
 #include "harness/cli/terminal.h"
 #include "harness/study/study_findings.h"
 #include "harness/study/study_page.h"
-#include "harness/study/study_rows.h"
 #include "harness/study/study_store.h"
-#include "harness/study/study_summary.h"
 
 namespace dexcheck::cli {
 namespace {

@@ -9,6 +9,8 @@
 #include <cstdlib>
 #include <utility>
 
+#include "harness/base/interrupts.h"
+
 namespace dexcheck::cli {
 
 namespace {
@@ -75,10 +77,7 @@ std::string FormatTable(std::string_view align, const std::vector<TableRow>& row
 
 std::string Paint(Tone tone, std::string_view text) {
   if (!TakesColors()) return std::string(text);
-  const char* const code = tone == Tone::kGood      ? "32"
-                           : tone == Tone::kBad     ? "1;31"
-                           : tone == Tone::kWarning ? "33"
-                                                    : "2";
+  const char* const code = tone == Tone::kGood ? "32" : tone == Tone::kBad ? "1;31" : "2";
   return "\033[" + std::string(code) + "m" + std::string(text) + "\033[0m";
 }
 
@@ -138,9 +137,13 @@ void ProgressBar::Update(long done) {
   last_drawn_ = now;
   drawn_ = true;
   // Without the rest of an earlier, longer line.
-  std::fputs(("\r" + MakeLine(done, now) + "\033[K").c_str(),
-             stderr);  // a terminal that has gone does not matter
+  std::fputs(("\r" + MakeLine(done, now) + "\033[K").c_str(), stderr);  // gone: it does not matter
   std::fflush(stderr);
+}
+
+bool ProgressBar::GoOn(long done) {
+  Update(done);
+  return !IsInterrupted();
 }
 
 void ProgressBar::Finish() {

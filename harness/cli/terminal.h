@@ -29,7 +29,7 @@ struct TableRow {
 /// to the right.
 std::string FormatTable(std::string_view align, const std::vector<TableRow>& rows);
 
-enum class Tone { kGood, kBad, kWarning, kFaint };
+enum class Tone { kGood, kBad, kFaint };
 
 /// The text in a colour when standard output is a terminal and the environment has no NO_COLOR (no-color.org)
 /// and no TERM=dumb; otherwise as it is.
@@ -46,6 +46,8 @@ class ProgressBar {
   ProgressBar& operator=(const ProgressBar&) = delete;
 
   void Update(long done);
+  /// The same. @returns whether to go on: not once the program was interrupted.
+  bool GoOn(long done);
   /// Clears the line.
   void Finish();
 

@@ -71,6 +71,7 @@ using Attribute = Handle<H5Aclose>;
 using Dataset = Handle<H5Dclose>;
 using Dataspace = Handle<H5Sclose>;
 using Datatype = Handle<H5Tclose>;
+using Driver = Handle<H5FDunregister>;
 using File = Handle<H5Fclose>;
 using Group = Handle<H5Gclose>;
 using Object = Handle<H5Oclose>;

@@ -32,8 +32,8 @@ bool IsPlainPath(std::string_view name) {
     if (part.empty() || part == "." || part == "..") return false;
     begin = end + 1;
   }
-  return std::none_of(name.begin(), name.end(),
-                      [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f || c == '\\'; });
+  return std::ranges::none_of(
+      name, [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f || c == '\\'; });
 }
 
 namespace {

@@ -8,11 +8,13 @@
 #include <bit>
 #include <cerrno>
 #include <cstring>
+#include <exception>
 #include <limits>
+#include <map>
+#include <new>
 
 #include "controller/common/errors.h"
 #include "harness/log/hdf5_handle.h"
-#include "harness/log/hdf5_memory.h"
 
 namespace dexcheck {
 namespace {
@@ -20,6 +22,110 @@ namespace {
 static_assert(std::endian::native == std::endian::little, "numbers are written as they lie in memory");
 
 using hdf5::Check;
+
+// A file that HDF5 writes into memory. HDF5 1.10 cannot close a file on a full disk: it keeps the half-closed
+// file and ends the program with a segmentation fault at its exit. So HDF5 gets a file that is never full,
+// and what it wrote is put on disk without it.
+
+/// Bytes at any offset; what was never written is zero and takes no memory.
+class MemoryImage {
+ public:
+  static constexpr size_t kPageSize = 4096;
+  using Page = std::array<unsigned char, kPageSize>;
+
+  void Read(std::uint64_t offset, size_t count, unsigned char* out) const {
+    ForEachPart(offset, count, [&](std::uint64_t number, size_t begin, size_t done, size_t part) {
+      const auto page = pages_.find(number);
+      if (page == pages_.end()) {
+        std::memset(out + done, 0, part);
+      } else {
+        std::memcpy(out + done, page->second.data() + begin, part);
+      }
+    });
+  }
+
+  void Write(std::uint64_t offset, size_t count, const unsigned char* bytes) {
+    ForEachPart(offset, count, [&](std::uint64_t number, size_t begin, size_t done, size_t part) {
+      std::memcpy(pages_[number].data() + begin, bytes + done, part);
+    });
+  }
+
+  /// By page number; page n begins at n * kPageSize.
+  [[nodiscard]] const std::map<std::uint64_t, Page>& pages() const { return pages_; }
+  /// As HDF5 means the file to be, written or not.
+  [[nodiscard]] std::uint64_t size() const { return size_; }
+  void set_size(std::uint64_t size) { size_ = size; }
+
+ private:
+  /// Calls act(page number, begin within the page, begin within the range, count) for each page of a range.
+  template <typename Action>
+  static void ForEachPart(std::uint64_t offset, size_t count, const Action& act) {
+    for (size_t done = 0; done < count;) {
+      const std::uint64_t at = offset + done;
+      const auto begin = static_cast<size_t>(at % kPageSize);
+      const size_t part = std::min(kPageSize - begin, count - done);
+      act(at / kPageSize, begin, done, part);
+      done += part;
+    }
+  }
+
+  std::map<std::uint64_t, Page> pages_;
+  std::uint64_t size_ = 0;
+};
+
+/// What HDF5 holds of such a file: its own part first.
+struct MemoryFile {
+  H5FD_t base;
+  MemoryImage* image;
+};
+
+MemoryImage& ImageOf(const H5FD_t* file) { return *reinterpret_cast<const MemoryFile*>(file)->image; }
+
+/// The driver by which HDF5 writes into an image, to which its properties point. It must outlive the files.
+hdf5::Driver RegisterMemoryDriver() {
+  static const H5FD_class_t driver = [] {
+    H5FD_class_t made{};
+    made.name = "dexcheck_memory";
+    made.maxaddr = static_cast<haddr_t>(std::numeric_limits<std::int64_t>::max());
+    made.fc_degree = H5F_CLOSE_STRONG;
+    made.fapl_size = sizeof(MemoryImage*);
+    made.open = [](const char* /*name*/, unsigned /*flags*/, hid_t access,
+                   haddr_t /*most*/) noexcept -> H5FD_t* {
+      const void* const image = H5Pget_driver_info(access);
+      auto* const file = image == nullptr ? nullptr : new (std::nothrow) MemoryFile{};
+      if (file == nullptr) return nullptr;
+      file->image = *static_cast<MemoryImage* const*>(image);
+      return &file->base;
+    };
+    made.close = [](H5FD_t* file) noexcept -> herr_t {
+      delete reinterpret_cast<MemoryFile*>(file);
+      return 0;
+    };
+    made.get_eoa = [](const H5FD_t* file, H5FD_mem_t) noexcept -> haddr_t { return ImageOf(file).size(); };
+    made.get_eof = made.get_eoa;
+    made.set_eoa = [](H5FD_t* file, H5FD_mem_t, haddr_t size) noexcept -> herr_t {
+      ImageOf(file).set_size(size);
+      return 0;
+    };
+    made.read = [](H5FD_t* file, H5FD_mem_t, hid_t, haddr_t offset, size_t count,
+                   void* out) noexcept -> herr_t {
+      ImageOf(file).Read(offset, count, static_cast<unsigned char*>(out));
+      return 0;
+    };
+    made.write = [](H5FD_t* file, H5FD_mem_t, hid_t, haddr_t offset, size_t count,
+                    const void* bytes) noexcept -> herr_t {
+      try {
+        ImageOf(file).Write(offset, count, static_cast<const unsigned char*>(bytes));
+        return 0;
+      } catch (const std::exception&) {
+        return -1;  // exceptions must not pass through HDF5
+      }
+    };
+    std::fill(std::begin(made.fl_map), std::end(made.fl_map), H5FD_MEM_DEFAULT);
+    return made;
+  }();
+  return hdf5::Driver(H5FDregister(&driver));
+}
 
 /// A dataset's or attribute's extents: none for a single value.
 using Extents = std::vector<hsize_t>;
@@ -42,14 +148,14 @@ hdf5::Properties MakeDatasetProperties() {
 
 class LogBuilder {
  public:
-  LogBuilder(const LogContent& content, long rows, hdf5::MemoryImage* image)
+  LogBuilder(const LogContent& content, long rows, MemoryImage* image)
       : content_(content),
         rows_(static_cast<hsize_t>(rows)),
         string_type_(hdf5::MakeStringType()),
         dataset_properties_(MakeDatasetProperties()),
         group_properties_(H5Pcreate(H5P_GROUP_CREATE)),
         link_properties_(H5Pcreate(H5P_LINK_CREATE)),
-        driver_(hdf5::RegisterMemoryDriver()),
+        driver_(RegisterMemoryDriver()),
         file_(CreateFile(driver_, image)) {
     Check(H5Pset_obj_track_times(group_properties_.id(), false));
     Check(H5Pset_create_intermediate_group(link_properties_.id(), 1));
@@ -67,13 +173,13 @@ class LogBuilder {
   }
 
  private:
-  static hdf5::File CreateFile(const hdf5::Driver& driver, hdf5::MemoryImage* image) {
+  static hdf5::File CreateFile(const hdf5::Driver& driver, MemoryImage* image) {
     const hdf5::Properties creation(H5Pcreate(H5P_FILE_CREATE));
     Check(H5Pset_obj_track_times(creation.id(), false));
     const hdf5::Properties access(H5Pcreate(H5P_FILE_ACCESS));
     Check(H5Pset_libver_bounds(access.id(), H5F_LIBVER_EARLIEST, H5F_LIBVER_LATEST));
     Check(H5Pset_fclose_degree(access.id(), H5F_CLOSE_STRONG));
-    hdf5::UseMemory(driver, access, image);
+    Check(H5Pset_driver(access.id(), driver.id(), &image));
     return hdf5::File(H5Fcreate("log", H5F_ACC_TRUNC, creation.id(), access.id()));
   }
 
@@ -159,30 +265,24 @@ class LogBuilder {
   hdf5::File file_;
 };
 
-/// Writes the image to an empty file. @return 0, or the system's error number.
-int WriteImage(int descriptor, const hdf5::MemoryImage& image) {
-  if (::ftruncate(descriptor, static_cast<off_t>(image.size())) != 0) return errno;
+/// Writes the image to an empty file.
+void WriteImage(const std::string& name, int descriptor, const MemoryImage& image) {
+  if (::ftruncate(descriptor, static_cast<off_t>(image.size())) != 0) FailToWrite(name, errno);
   for (const auto& [number, page] : image.pages()) {
     const std::uint64_t offset = number * page.size();
     if (offset >= image.size()) break;
     const auto count = static_cast<size_t>(std::min<std::uint64_t>(page.size(), image.size() - offset));
-    const int error = WriteAt(descriptor, page.data(), count, offset);
-    if (error != 0) return error;
+    WriteAt(name, descriptor, page.data(), count, offset);
   }
-  return 0;
 }
 
-/// @return 0, or the system's error number.
-int MarkAllRowsUnwritten(int descriptor, std::uint64_t time_offset, long rows) {
+void MarkAllRowsUnwritten(const std::string& name, int descriptor, std::uint64_t time_offset, long rows) {
   std::array<double, 4096> chunk;
   chunk.fill(std::numeric_limits<double>::quiet_NaN());
   for (size_t row = 0; row < static_cast<size_t>(rows); row += chunk.size()) {
     const size_t count = std::min(chunk.size(), static_cast<size_t>(rows) - row);
-    const int error =
-        WriteAt(descriptor, chunk.data(), count * sizeof(double), time_offset + row * sizeof(double));
-    if (error != 0) return error;
+    WriteAt(name, descriptor, chunk.data(), count * sizeof(double), time_offset + row * sizeof(double));
   }
-  return 0;
 }
 
 }  // namespace
@@ -195,36 +295,33 @@ void FailToRead(const std::filesystem::path& path, int error) {
   throw InputError(path.string() + ": cannot be read: " + std::strerror(error));
 }
 
-int WriteAt(int descriptor, const void* bytes, size_t count, std::uint64_t offset) {
-  size_t done = 0;
-  while (done < count) {
+void WriteAt(const std::string& name, int descriptor, const void* bytes, size_t count, std::uint64_t offset) {
+  for (size_t done = 0; done < count;) {
     const ssize_t step = ::pwrite(descriptor, static_cast<const char*>(bytes) + done, count - done,
                                   static_cast<off_t>(offset + done));
     if (step < 0 && errno == EINTR) continue;
-    if (step < 0) return errno;
+    if (step < 0) FailToWrite(name, errno);
     done += static_cast<size_t>(step);
   }
-  return 0;
 }
 
-int CopyBytes(int from, std::uint64_t from_offset, int to, std::uint64_t to_offset, size_t count) {
+void CopyBytes(const std::string& name, int from, std::uint64_t from_offset, int to, std::uint64_t to_offset,
+               size_t count) {
   constexpr size_t kChunk = size_t{1} << 20;
   std::vector<char> chunk(std::min(kChunk, count));
   for (size_t done = 0; done < count;) {
     const ssize_t step = ::pread(from, chunk.data(), std::min(chunk.size(), count - done),
                                  static_cast<off_t>(from_offset + done));
     if (step < 0 && errno == EINTR) continue;
-    if (step <= 0) return step == 0 ? EIO : errno;
-    const int error = WriteAt(to, chunk.data(), static_cast<size_t>(step), to_offset + done);
-    if (error != 0) return error;
+    if (step <= 0) FailToWrite(name, step == 0 ? EIO : errno);
+    WriteAt(name, to, chunk.data(), static_cast<size_t>(step), to_offset + done);
     done += static_cast<size_t>(step);
   }
-  return 0;
 }
 
 std::vector<std::uint64_t> WriteLogFile(const std::filesystem::path& path, const std::string& name,
                                         const LogContent& content, long rows) {
-  hdf5::MemoryImage image;
+  MemoryImage image;
   std::vector<std::uint64_t> offsets;
   try {
     const hdf5::SilencedErrors silenced;
@@ -234,10 +331,9 @@ std::vector<std::uint64_t> WriteLogFile(const std::filesystem::path& path, const
   }
   FileDescriptor file(::open(path.c_str(), O_WRONLY | O_TRUNC | O_CLOEXEC));
   if (!file.is_open()) FailToWrite(name, errno);
-  int error = WriteImage(file.get(), image);
-  if (error == 0) error = MarkAllRowsUnwritten(file.get(), offsets.front(), rows);
-  if (error == 0) error = file.Close();
-  if (error != 0) FailToWrite(name, error);
+  WriteImage(name, file.get(), image);
+  MarkAllRowsUnwritten(name, file.get(), offsets.front(), rows);
+  if (const int error = file.Close(); error != 0) FailToWrite(name, error);
   return offsets;
 }
 

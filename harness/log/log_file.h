@@ -19,11 +19,12 @@ namespace dexcheck {
 /// @throws InputError "PATH: cannot be read: reason".
 [[noreturn]] void FailToRead(const std::filesystem::path& path, int error);
 
-/// Writes all bytes at the offset, or returns the system's error number; 0 is success.
-int WriteAt(int descriptor, const void* bytes, size_t count, std::uint64_t offset);
+/// Writes all bytes at the offset. @throws InputError as FailToWrite of this name.
+void WriteAt(const std::string& name, int descriptor, const void* bytes, size_t count, std::uint64_t offset);
 
-/// Copies bytes between files, or returns the system's error number; 0 is success.
-int CopyBytes(int from, std::uint64_t from_offset, int to, std::uint64_t to_offset, size_t count);
+/// Copies bytes between files. @throws InputError likewise.
+void CopyBytes(const std::string& name, int from, std::uint64_t from_offset, int to, std::uint64_t to_offset,
+               size_t count);
 
 /// The root's attribute that says how a log is laid out and which names it uses; logs of format 1 have none.
 inline constexpr const char* kFormatAttribute = "format";

@@ -19,7 +19,6 @@
 #include "controller/common/text.h"
 #include "harness/base/child_process.h"
 #include "harness/log/hdf5_handle.h"
-#include "harness/log/log_content.h"
 #include "harness/log/log_file.h"
 
 namespace dexcheck {
@@ -205,8 +204,7 @@ class LogReader::File {
 
   /// Of a dataset that is no signal.
   void AddFile(const std::string& name) {
-    if (std::any_of(signals_.begin(), signals_.end(), [&](const SignalInfo& s) { return s.name == name; }))
-      return;
+    if (std::ranges::find(signals_, name, &SignalInfo::name) != signals_.end()) return;
     if (!IsPlainPath(name)) RefusePart(name, "is not a plain relative path");
     const DatasetShape shape = GetShape(Open(file_.id(), name));
     if (Check(H5Tequal(shape.type.id(), H5T_STD_U8LE)) == 0 || shape.extents.size() != 1)
@@ -277,8 +275,7 @@ LogReader::LogReader(const std::filesystem::path& path) : path_(path) {
 LogReader::~LogReader() = default;
 
 const SignalInfo* LogReader::Find(const std::string& signal) const {
-  const auto found = std::find_if(signals_.begin(), signals_.end(),
-                                  [&](const SignalInfo& info) { return info.name == signal; });
+  const auto found = std::ranges::find(signals_, signal, &SignalInfo::name);
   return found == signals_.end() ? nullptr : &*found;
 }
 
@@ -316,15 +313,14 @@ std::vector<std::string> LogReader::ListFiles(const std::string& group) const {
     if (name.starts_with(prefix)) names.push_back(name.substr(prefix.size()));
   }
   if (names.empty()) FailToFind(path_, "group of files", group, {});
-  std::sort(names.begin(), names.end());
+  std::ranges::sort(names);
   return names;
 }
 
 std::string LogReader::ReadFile(const std::string& group, const std::string& relative_name) const {
   const std::string name = group + "/" + relative_name;
   const std::vector<std::string>& files = file_->files();
-  if (std::find(files.begin(), files.end(), name) == files.end())
-    FailToFind(path_, "embedded file", name, {});
+  if (std::ranges::find(files, name) == files.end()) FailToFind(path_, "embedded file", name, {});
   return Guard(path_, [&] { return file_->ReadFile(name); });
 }
 
@@ -346,20 +342,20 @@ std::vector<SignalInfo> ChooseSignals(const LogReader& log, const std::vector<st
   if (patterns.empty()) return log.signals();
   std::vector<std::string> names;
   for (const SignalInfo& signal : log.signals()) names.push_back(signal.name);
-  const auto matches = [](const std::string& pattern, const std::string& name) {
-    return ::fnmatch(pattern.c_str(), name.c_str(), 0) == 0;
-  };
+  std::vector<bool> wanted(names.size(), false);
   for (const std::string& pattern : patterns) {
-    if (std::any_of(names.begin(), names.end(), [&](const auto& name) { return matches(pattern, name); }))
-      continue;
+    bool found = false;
+    for (size_t i = 0; i < names.size(); ++i) {
+      if (::fnmatch(pattern.c_str(), names[i].c_str(), 0) == 0) wanted[i] = found = true;
+    }
+    if (found) continue;
     const std::string nearest = SuggestNearest(pattern, names);
     throw InputError("--signals: no signal matches " + Quote(pattern) +
                      (nearest.empty() ? " (dexcheck export --list names them)" : nearest));
   }
   std::vector<SignalInfo> chosen;
-  for (const SignalInfo& signal : log.signals()) {
-    const auto is_wanted = [&](const std::string& pattern) { return matches(pattern, signal.name); };
-    if (std::any_of(patterns.begin(), patterns.end(), is_wanted)) chosen.push_back(signal);
+  for (size_t i = 0; i < names.size(); ++i) {
+    if (wanted[i]) chosen.push_back(log.signals()[i]);
   }
   return chosen;
 }

@@ -13,7 +13,6 @@
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
-#include "harness/base/files.h"
 
 namespace dexcheck {
 namespace {
@@ -192,9 +191,8 @@ void LogWriter::Flush() {
 void LogWriter::WriteBufferedRows() {
   for (size_t k = buffers_.size(); k-- > 0;) {
     const size_t row_size = buffers_[k].width * sizeof(double);
-    const int error = WriteAt(file_.get(), buffers_[k].begin, buffered_rows_ * row_size,
-                              offsets_[k] + static_cast<size_t>(flushed_rows_) * row_size);
-    if (error != 0) Fail(error);
+    WriteAt(name_, file_.get(), buffers_[k].begin, buffered_rows_ * row_size,
+            offsets_[k] + static_cast<size_t>(flushed_rows_) * row_size);
   }
 }
 
@@ -226,8 +224,7 @@ void LogWriter::Rewrite() {
   FileDescriptor file = Open(partial);
   for (size_t k = 0; k < buffers_.size(); ++k) {
     const size_t size = buffers_[k].width * sizeof(double) * static_cast<size_t>(flushed_rows_);
-    const int error = CopyBytes(file_.get(), offsets_[k], file.get(), offsets[k], size);
-    if (error != 0) Fail(error);
+    CopyBytes(name_, file_.get(), offsets_[k], file.get(), offsets[k], size);
   }
   if (::fsync(file.get()) != 0) Fail(errno);
   if (const int error = file.Close(); error != 0) Fail(error);

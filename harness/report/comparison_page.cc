@@ -1,12 +1,12 @@
-#include "harness/report/comparison_page.h"
-
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
 #include <algorithm>
 
+#include "harness/report/campaign_page.h"
 #include "harness/report/page_assets.h"
 #include "harness/report/page_frame.h"
+#include "harness/report/run_comparison.h"
 
 namespace dexcheck {
 
@@ -104,7 +104,7 @@ class ComparisonPage {
     std::vector<std::string> drawn;
     for (const SignalDifference& signal : comparison_.signals) {
       if (drawn.size() == kMostPlots || signal.fraction() < kLeastFraction) break;
-      if (std::find(drawn.begin(), drawn.end(), signal.name) != drawn.end()) continue;
+      if (std::ranges::find(drawn, signal.name) != drawn.end()) continue;
       drawn.push_back(signal.name);
       const std::string title = signal.NameColumn();
       const bool has_unit = signal.unit != "1";
@@ -130,6 +130,14 @@ class ComparisonPage {
 std::string MakeComparisonPage(const std::vector<const RunData*>& runs, const std::vector<std::string>& names,
                                const RunComparison& comparison) {
   return ComparisonPage(runs, names, comparison).Make();
+}
+
+std::string MakeCampaignPage(const nlohmann::ordered_json& campaign) {
+  return AssemblePage({.title = "faults made on purpose",
+                       .styles = {},
+                       .markup = {kPageHtml},
+                       .data = EmbedJson("campaign-data", campaign),
+                       .scripts = {kCampaignJs}});
 }
 
 }  // namespace dexcheck

@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstring>
 #include <fstream>
@@ -108,8 +107,7 @@ std::string PlotCurves(const Figure& figure) {
 }
 
 void WriteScript(const Figure& figure, const VectorXd& time, std::ostream* script) {
-  const auto named = std::count_if(figure.curves.begin(), figure.curves.end(),
-                                   [](const Curve& curve) { return curve.in_key; });
+  const auto named = std::ranges::count_if(figure.curves, [](const Curve& curve) { return curve.in_key; });
   const int key_rows = static_cast<int>(named + kKeyEntriesPerRow) / kKeyEntriesPerRow;
   const int height = kHeight + kKeyRowHeight * key_rows;
   const double end = std::max(time[time.size() - 1], time[0] + 1e-6);

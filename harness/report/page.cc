@@ -9,7 +9,6 @@
 #include <cstring>
 #include <iterator>
 #include <memory>
-#include <optional>
 #include <system_error>
 #include <utility>
 
@@ -18,7 +17,7 @@
 #include "harness/base/interrupts.h"
 #include "harness/report/page_assets.h"
 #include "harness/report/page_frame.h"
-#include "harness/report/recorded_frames.h"
+#include "harness/report/run_data.h"
 #include "renders/renderer.h"
 #include "renders/video.h"
 #include "renders/video_writer.h"
@@ -262,7 +261,7 @@ class Page {
 
   void AddFile(const std::string& name, const std::string& title, bool open, Json* list) const {
     const std::vector<std::string> files = run_.log().ListFiles("inputs");
-    if (std::find(files.begin(), files.end(), name) == files.end()) return;
+    if (std::ranges::find(files, name) == files.end()) return;
     list->push_back({{"title", title}, {"text", run_.log().ReadFile("inputs", name)}, {"open", open}});
   }
 

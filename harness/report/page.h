@@ -77,4 +77,9 @@ std::vector<Figure> MakeMotionFigures(const RunData& run);
 /// bounds.
 std::vector<Figure> MakeResidualFigures(const RunData& run);
 
+/// A table for LaTeX with booktabs: tracking errors, and of each category of checks the one nearest its
+/// bound. Its caption names the verdict, the program's commit and the command.
+/// @throws InputError that names the log when its summary is none.
+std::string MakeTexTable(const RunData& run);
+
 }  // namespace dexcheck

@@ -9,7 +9,6 @@
 #include <cstdint>
 #include <nlohmann/json.hpp>
 
-#include "harness/report/figure.h"
 #include "harness/report/page_assets.h"
 
 namespace dexcheck {

@@ -1,13 +1,10 @@
 #include "harness/report/replay.h"
 
 #include <algorithm>
-#include <array>
 #include <bit>
 #include <cmath>
 #include <map>
-#include <nlohmann/json.hpp>
 #include <set>
-#include <vector>
 
 #include "controller/object/euler_zyz.h"
 #include "harness/engine/engine.h"
@@ -333,7 +330,7 @@ TriangleMesh Cluster(const TriangleMesh& mesh, double size) {
     for (size_t k = 0; k < 3; ++k) corners[k] = where[static_cast<size_t>(face[k])];
     if (corners[0] == corners[1] || corners[1] == corners[2] || corners[2] == corners[0]) continue;
     // The same face whichever corner it begins with.
-    std::rotate(corners.begin(), std::min_element(corners.begin(), corners.end()), corners.end());
+    std::rotate(corners.begin(), std::ranges::min_element(corners), corners.end());
     if (known.insert(corners).second) coarse.faces.push_back(corners);
   }
   return coarse;

@@ -50,7 +50,7 @@ std::string DescribeVerdict(const RunData& run) {
 
 template <typename Value>
 bool AllEqual(const std::vector<Value>& values) {
-  return std::all_of(values.begin(), values.end(), [&](const Value& value) { return value == values[0]; });
+  return std::ranges::all_of(values, [&](const Value& value) { return value == values[0]; });
 }
 
 /// The engine's settings, each by its name.
@@ -92,7 +92,7 @@ std::vector<InputDifference> CompareInputs(const std::vector<const RunData*>& ru
   for (const std::string& file : files) {
     compare(file, [&](const RunData& run) {
       const std::vector<std::string> own = run.log().ListFiles("inputs");
-      const bool has = std::find(own.begin(), own.end(), file) != own.end();
+      const bool has = std::ranges::find(own, file) != own.end();
       if (!has) return std::string("none");
       const std::string bytes = run.log().ReadFile("inputs", file);
       return fmt::format("{} bytes, {}", bytes.size(), HashBytes(bytes));
@@ -110,8 +110,8 @@ std::vector<ComparedNumber> CompareResults(const std::vector<const RunData*>& ru
       if (run->is_cut_off() && result.name == kSimulated) value = run->end();  // as long as its rows
       number.values.push_back(std::isnan(value) ? std::nullopt : std::optional(value));
     }
-    const auto has_value = [](const std::optional<double>& value) { return value.has_value(); };
-    if (std::any_of(number.values.begin(), number.values.end(), has_value)) numbers.push_back(number);
+    if (std::ranges::any_of(number.values, [](const auto& value) { return value.has_value(); }))
+      numbers.push_back(number);
   }
   for (const auto& [signal, name] : {std::pair("engine/contacts", "contacts of the engine, mean"),
                                      std::pair("engine/constraint_rows", "its constraint rows, mean")}) {
@@ -122,7 +122,7 @@ std::vector<ComparedNumber> CompareResults(const std::vector<const RunData*>& ru
                                          : std::nullopt);
     }
     const auto is_some = [](const std::optional<double>& value) { return value.value_or(0.0) != 0.0; };
-    if (std::any_of(number.values.begin(), number.values.end(), is_some)) numbers.push_back(number);
+    if (std::ranges::any_of(number.values, is_some)) numbers.push_back(number);
   }
   return numbers;
 }
@@ -131,8 +131,7 @@ std::vector<ComparedNumber> CompareChecks(const std::vector<const RunData*>& run
   std::vector<ComparedNumber> checks;
   for (size_t i = 0; i < runs.size(); ++i) {
     for (const CheckRecord& record : runs[i]->checks()) {
-      auto found = std::find_if(checks.begin(), checks.end(),
-                                [&](const ComparedNumber& check) { return check.name == record.name; });
+      auto found = std::ranges::find(checks, record.name, &ComparedNumber::name);
       if (found == checks.end()) {
         checks.push_back({record.name, record.unit, std::vector<std::optional<double>>(runs.size()),
                           std::vector<bool>(runs.size(), false)});
@@ -205,9 +204,7 @@ std::optional<double> ComparedNumber::CalcRatio(size_t run) const {
   return *values[run] / *values[0];
 }
 
-bool ComparedNumber::fails_anywhere() const {
-  return std::find(fails.begin(), fails.end(), true) != fails.end();
-}
+bool ComparedNumber::fails_anywhere() const { return std::ranges::find(fails, true) != fails.end(); }
 
 double SignalDifference::fraction() const { return CalcFraction(difference, size); }
 
@@ -262,9 +259,9 @@ RunComparison CompareRuns(const std::vector<const RunData*>& runs, const RunComp
       comparison.signals.push_back(CompareSignal(signal, *runs[0], *runs[i], i, options.tolerance));
     }
   }
-  std::stable_sort(
-      comparison.signals.begin(), comparison.signals.end(),
-      [](const SignalDifference& a, const SignalDifference& b) { return a.fraction() > b.fraction(); });
+  std::ranges::stable_sort(comparison.signals, [](const SignalDifference& a, const SignalDifference& b) {
+    return a.fraction() > b.fraction();
+  });
   return comparison;
 }
 
@@ -278,8 +275,8 @@ std::string DescribeComparison(const RunComparison& comparison, double tolerance
   }
   const SignalDifference* const first = comparison.FindFirst();
   if (first == nullptr) return "DIFFERENT: verdict or duration.";
-  const auto differing = std::count_if(comparison.signals.begin(), comparison.signals.end(),
-                                       [](const SignalDifference& signal) { return signal.differs; });
+  const auto differing = std::ranges::count_if(comparison.signals,
+                                               [](const SignalDifference& signal) { return signal.differs; });
   return fmt::format("DIFFERENT: {} of {} signals, first {} at {:.3f} s.", differing, count,
                      first->NameColumn(), first->first_time);
 }

@@ -1,6 +1,7 @@
 #pragma once
 
-// Recorded runs side by side: what differs in their inputs, their verdicts and checks, and their signals.
+// Recorded runs side by side: what differs in their inputs, their verdicts and checks, and their signals; and
+// the page of that.
 
 #include <optional>
 #include <string>
@@ -77,5 +78,11 @@ VectorXd Resample(const VectorXd& time, const Eigen::Ref<const VectorXd>& values
 
 /// "SAME ...", or "DIFFERENT ..." with the signal that differs first: one line.
 std::string DescribeComparison(const RunComparison& comparison, double tolerance);
+
+/// A whole HTML document that loads nothing: verdict, inputs that differ, results and checks side by side,
+/// the signals that differ most, overlaid and subtracted.
+/// @param names what the runs are called, such as their folders.
+std::string MakeComparisonPage(const std::vector<const RunData*>& runs, const std::vector<std::string>& names,
+                               const RunComparison& comparison);
 
 }  // namespace dexcheck

@@ -1,6 +1,6 @@
 #pragma once
 
-// A recorded run as the report needs it: signals by name, and its summary.
+// A recorded run as the report needs it: signals by name, and its summary; and as drawing needs it.
 
 #include <filesystem>
 #include <nlohmann/json.hpp>
@@ -8,7 +8,9 @@
 #include <vector>
 
 #include "harness/base/check_record.h"
+#include "harness/engine/engine.h"
 #include "harness/log/log_reader.h"
+#include "renders/run_frames.h"
 
 namespace dexcheck {
 
@@ -59,5 +61,22 @@ std::string DescribeCut(const LogReader& log);
 
 /// The check that a signal "check/NAME" belongs to, without values. @throws InputError that names what lacks.
 CheckRecord ReadCheckInfo(const LogReader& log, const SignalInfo& signal);
+
+/// Where the robot ("robot") or the model ("mjcf") that a log names lies, once its files are unpacked.
+/// @throws InputError when the log holds no such file, or the model names files outside its folder.
+std::filesystem::path FindEmbedded(const LogReader& log, const std::string& kind,
+                                   const std::filesystem::path& unpacked);
+
+/// A recorded run, ready to be drawn.
+struct RecordedFrames {
+  MjModelPtr model;  ///< From the MJCF that the log keeps.
+  RunFrames frames;
+};
+
+/// From a log, or from RUN_DIR/log.h5. Only time, engine/qpos and the MJCF must be there; what else is
+/// missing is not drawn.
+/// @throws InputError that names the log and what is wrong with it.
+RecordedFrames ReadRecordedFrames(const LogReader& log);
+RecordedFrames ReadRecordedFrames(const std::filesystem::path& run_folder);
 
 }  // namespace dexcheck

@@ -150,9 +150,9 @@ class MotionFigures {
     const auto is_of = [](const std::string& finger) {
       return [finger](const std::string& part) { return NameFinger(part) == finger; };
     };
-    const bool are_alike = std::all_of(tips.begin(), tips.end(), is_of(NameFinger(tips.front())));
+    const bool are_alike = std::ranges::all_of(tips, is_of(NameFinger(tips.front())));
     if (are_alike && !IsPapersFinger(joint)) return false;
-    return std::any_of(tips.begin(), tips.end(), is_of(NameFinger(joint)));
+    return std::ranges::any_of(tips, is_of(NameFinger(joint)));
   }
 
   [[nodiscard]] bool IsFinger(const std::string& joint) const {
@@ -185,8 +185,8 @@ class MotionFigures {
     if (!Has("tau")) return;
     // Arms and trunk of the paper's robot have figures of their own.
     const std::vector<std::string>& joints = run_.Find("tau")->columns;
-    const bool is_papers = std::any_of(joints.begin(), joints.end(),
-                                       [](const std::string& name) { return name.starts_with("waist"); });
+    const bool is_papers =
+        std::ranges::any_of(joints, [](const std::string& name) { return name.starts_with("waist"); });
     const auto grasps = [&](const std::string& joint) { return Grasps(joint); };
     const auto idle = [&](const std::string& joint) { return IsFinger(joint) && !Grasps(joint); };
     const auto left = [&](const std::string& joint) { return is_papers && joint.starts_with("l_"); };

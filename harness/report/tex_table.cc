@@ -1,5 +1,3 @@
-#include "harness/report/tex_table.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -7,6 +5,7 @@
 #include <string_view>
 
 #include "controller/common/errors.h"
+#include "harness/report/page.h"
 
 namespace dexcheck {
 namespace {
@@ -65,9 +64,9 @@ std::string MakeTrackingRows(const RunData& run) {
 /// The checks stand with the worst first.
 std::string MakeCategoryRow(const RunData& run, CheckCategory category) {
   const auto belongs = [&](const CheckRecord& check) { return check.kind == category; };
-  const auto worst = std::find_if(run.checks().begin(), run.checks().end(), belongs);
+  const auto worst = std::ranges::find_if(run.checks(), belongs);
   if (worst == run.checks().end()) return "";
-  const auto count = std::count_if(run.checks().begin(), run.checks().end(), belongs);
+  const auto count = std::ranges::count_if(run.checks(), belongs);
   return MakeRow(fmt::format("{} ({})", WithSpaces(NameOf(category)), count),
                  Typewriter(worst->name) + (worst->failed ? " \\textbf{fails}" : ""), worst->worst,
                  FormatTex(worst->bound), worst->unit);

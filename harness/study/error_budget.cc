@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <memory>
 #include <utility>
 
 #include "controller/common/errors.h"
@@ -172,8 +171,8 @@ class SetupMaker {
 
 /// Of the joints' errors.
 std::string NameUnit(const RobotModel& model) {
-  const bool slides = std::any_of(model.joints().begin(), model.joints().end(),
-                                  [](const Joint& joint) { return joint.type == JointType::kPrismatic; });
+  const bool slides = std::ranges::any_of(
+      model.joints(), [](const Joint& joint) { return joint.type == JointType::kPrismatic; });
   return slides ? "rad or m" : "rad";
 }
 
@@ -219,7 +218,7 @@ nlohmann::ordered_json ToJson(const ErrorBudget& budget) {
 
 bool ErrorBudget::is_complete() const {
   return failure.empty() &&
-         std::all_of(entries.begin(), entries.end(), [](const BudgetEntry& e) { return e.failure.empty(); });
+         std::ranges::all_of(entries, [](const BudgetEntry& e) { return e.failure.empty(); });
 }
 
 ErrorBudget CalcErrorBudget(const Scenario& scenario, const std::filesystem::path& robot,
@@ -288,7 +287,7 @@ ErrorBudget CalcErrorBudget(const Scenario& scenario, const std::filesystem::pat
   budget.all = size_of(all.errors);
   const double scale =
       std::max(size_of(Add(all.errors, -1.0, ideal.errors)).rms, std::numeric_limits<double>::min());
-  Errors sum = ideal.errors, predicted = ideal.errors;
+  Errors sum = ideal.errors, predicted = sum;
   for (size_t i = 0; 2 * i + 3 < taken; ++i) {
     const Measured& one = runs[2 * i + 2];
     const Measured& others = runs[2 * i + 3];

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <nlopt.hpp>
 #include <utility>
 
@@ -43,9 +42,7 @@ constexpr double kAmplitudes = 3.0, kOthers = 2.0;  // factors that a value may 
 
 void AddKey(const TomlValue& value, double factor, std::vector<MotionKey>* keys) {
   const double x = value.AsNumber();
-  if (x == 0.0) return;
-  const double low = x / factor, high = x * factor;
-  keys->push_back({value.path(), x, low, high});
+  if (x != 0.0) keys->push_back({value.path(), x, x / factor, x * factor});
 }
 
 /// Keys of one oscillation or weave, or of the parts of a sum.
@@ -98,8 +95,7 @@ class MotionSearch {
   ExcitingMotion Run() {
     RunGiven();
     const auto n = static_cast<unsigned>(result_.keys.size());
-    std::vector<double> x;
-    for (const MotionKey& key : result_.keys) x.push_back(ToUnit(key, key.value));
+    std::vector<double> x = x_;
     nlopt::opt method(nlopt::LN_COBYLA, n);
     method.set_lower_bounds(0.0);
     method.set_upper_bounds(1.0);
@@ -165,8 +161,8 @@ class MotionSearch {
     for (const MotionKey& key : result_.keys) values.push_back(key.value);
     std::vector<Taken> taken;
     result_.given = Try(values, &taken);
-    const auto failed = std::find_if(taken.begin(), taken.end(),
-                                     [](const Taken& check) { return !(check.worst <= check.bound); });
+    const auto failed =
+        std::ranges::find_if(taken, [](const Taken& check) { return !(check.worst <= check.bound); });
     if (!result_.given.failure.empty() || failed != taken.end()) {
       throw InputError(scenario_.source + ": must pass before its motion is changed, got " +
                        (failed != taken.end() ? failed->name + " above its bound" : result_.given.failure));
@@ -178,7 +174,6 @@ class MotionSearch {
       throw InputError(scenario_.source + ": no number of the model shows in its forces");
     Judge(taken, &result_.given, &constraints_);
     result_.found = result_.given;
-    x_.clear();
     for (const MotionKey& key : result_.keys) x_.push_back(ToUnit(key, key.value));
     last_ = result_.given;
   }
@@ -231,7 +226,7 @@ class MotionSearch {
                               double* /*gradient*/, void* self) {
     auto* const search = static_cast<MotionSearch*>(self);
     search->Evaluate({x, x + n});
-    std::copy(search->constraints_.begin(), search->constraints_.end(), values);
+    std::ranges::copy(search->constraints_, values);
   }
 
   const Scenario& scenario_;

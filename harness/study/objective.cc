@@ -1,7 +1,6 @@
 #include "harness/study/objective.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <stdexcept>
 
@@ -22,7 +21,7 @@ SymbolTable MakeSymbols(const TrialResult& result) {
 Outcome ParseOutcome(const std::string& name) {
   if (const auto outcome = FindOutcome(name)) return *outcome;
   std::vector<std::string> known;
-  for (int i = 0; i < kNumOutcomes; ++i) known.emplace_back(NameOf(static_cast<Outcome>(i)));
+  for (const OutcomeInfo& outcome : kOutcomes) known.emplace_back(outcome.name);
   throw std::invalid_argument("no outcome is called " + Quote(name) + SuggestNearest(name, known));
 }
 
@@ -33,7 +32,7 @@ double CalcEarliness(const TrialResult& result) {
 }
 
 double Combine(const Objective& objective, std::vector<double> values) {
-  std::sort(values.begin(), values.end());
+  std::ranges::sort(values);
   switch (objective.aggregate) {
     case Aggregate::kWorst:
       return values.back();
@@ -61,10 +60,9 @@ std::string Describe(const Objective& objective) {
 }
 
 std::string ShowUnit(const std::string& expression) {
-  for (const MetricInfo& metric : kMetrics) {
-    if (expression == metric.name && metric.unit != std::string("1")) return std::string(" ") + metric.unit;
-  }
-  return "";
+  const std::optional<Metric> metric = FindMetric(expression);
+  const std::string unit = metric ? kMetrics[*metric].unit : "1";
+  return unit == "1" ? "" : " " + unit;
 }
 
 Constraint ParseConstraint(const std::string& text) {
@@ -107,15 +105,8 @@ void RequireMetricExpression(const std::string& expression) {
 }
 
 double EvaluateMetrics(const std::string& expression, const TrialResult& result) {
-  for (size_t i = 0; i < kMetrics.size(); ++i) {
-    if (expression == kMetrics[i].name) return result.metrics[i];  // as most are
-  }
+  if (const auto metric = FindMetric(expression)) return result.metrics[*metric];  // as most are
   return EvaluateExpression(expression, MakeSymbols(result));
-}
-
-bool IsHeld(Outcome outcome) {
-  return outcome == Outcome::kTracked || outcome == Outcome::kSlipped || outcome == Outcome::kWheelsSpun ||
-         outcome == Outcome::kChecksDisagreed;
 }
 
 double CalcViolation(const Constraint& constraint, const TrialResult& result) {
@@ -142,8 +133,7 @@ Judgement JudgePoint(const std::vector<Objective>& objectives, const std::vector
   const auto count = static_cast<double>(results.size());
   Judgement judgement;
   std::vector<Constraint> all = constraints;
-  if (std::none_of(all.begin(), all.end(),
-                   [](const Constraint& c) { return c.kind == Constraint::Kind::kHeld; })) {
+  if (std::ranges::none_of(all, [](const Constraint& c) { return c.kind == Constraint::Kind::kHeld; })) {
     all.emplace_back();
   }
   for (const Constraint& constraint : all) {

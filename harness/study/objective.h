@@ -3,8 +3,6 @@
 // What a study wants: objectives and constraints as expressions of metrics, judged over all trials of a
 // point.
 
-#include <limits>
-#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -53,9 +51,6 @@ void RequireMetricExpression(const std::string& expression);
 
 /// Value of an expression; NaN where one of its metrics is.
 double EvaluateMetrics(const std::string& expression, const TrialResult& result);
-
-/// Whether a run came to its end with the object in the hand.
-bool IsHeld(Outcome outcome);
 
 /// How far one trial violates a constraint: 0 where it holds, at most 1, more for trials that were not held,
 /// the more the earlier they ended.

@@ -1,14 +1,12 @@
 #include "harness/study/sampled_stability.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 
 #include "harness/checks/judged_law.h"
 #include "harness/plant/velocity_filter.h"
 #include "harness/run/joint_margins.h"
-#include "harness/study/trial.h"
 
 namespace dexcheck {
 

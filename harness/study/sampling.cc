@@ -34,20 +34,31 @@ std::uint32_t ScrambleDigits(std::uint32_t x, std::uint32_t seed) {
   return ReverseBits(x);
 }
 
+// What the standard's own distributions and std::shuffle draw, it leaves open.
+
+/// Even in [0, 1).
+double DrawUnit(std::mt19937_64* random) { return static_cast<double>((*random)() >> 11U) * 0x1p-53; }
+
+/// 0 to size - 1 in random order.
+void ShuffleNumbers(std::vector<size_t>* numbers, std::mt19937_64* random) {
+  std::iota(numbers->begin(), numbers->end(), size_t{0});
+  for (size_t i = numbers->size(); i > 1; --i) std::swap((*numbers)[i - 1], (*numbers)[(*random)() % i]);
+}
+
+std::vector<UnitPoint> MakePoints(int dimensions, long count) {
+  return {static_cast<size_t>(count), UnitPoint(static_cast<size_t>(dimensions))};
+}
+
 }  // namespace
 
 std::vector<UnitPoint> MakeLatinHypercube(int dimensions, long count, std::uint64_t seed) {
-  std::vector<UnitPoint> points(static_cast<size_t>(count), UnitPoint(static_cast<size_t>(dimensions)));
+  std::vector<UnitPoint> points = MakePoints(dimensions, count);
   std::mt19937_64 random(seed);
   std::vector<size_t> slices(points.size());
   for (size_t d = 0; d < static_cast<size_t>(dimensions); ++d) {
-    std::iota(slices.begin(), slices.end(), size_t{0});
-    // Not std::shuffle, whose draws the standard leaves open.
-    for (size_t i = slices.size(); i > 1; --i) std::swap(slices[i - 1], slices[random() % i]);
-    for (size_t i = 0; i < points.size(); ++i) {
-      const double within = static_cast<double>(random() >> 11U) * 0x1p-53;
-      points[i][d] = (static_cast<double>(slices[i]) + within) / static_cast<double>(count);
-    }
+    ShuffleNumbers(&slices, &random);
+    for (size_t i = 0; i < points.size(); ++i)
+      points[i][d] = (static_cast<double>(slices[i]) + DrawUnit(&random)) / static_cast<double>(count);
   }
   return points;
 }
@@ -60,7 +71,7 @@ std::vector<UnitPoint> MakeSobol(int dimensions, long count, std::optional<std::
   std::vector<std::uint32_t> seeds(static_cast<size_t>(dimensions));
   std::mt19937_64 random(scramble.value_or(0));
   for (std::uint32_t& seed : seeds) seed = static_cast<std::uint32_t>(random() >> 32U);
-  std::vector<UnitPoint> points(static_cast<size_t>(count), UnitPoint(static_cast<size_t>(dimensions)));
+  std::vector<UnitPoint> points = MakePoints(dimensions, count);
   for (size_t i = 0; i < points.size(); ++i) {
     for (size_t d = 0; d < points[i].size(); ++d) {
       // Boost's sequence leaves the origin out.
@@ -72,10 +83,10 @@ std::vector<UnitPoint> MakeSobol(int dimensions, long count, std::optional<std::
 }
 
 std::vector<UnitPoint> MakeRandom(int dimensions, long count, std::uint64_t seed) {
-  std::vector<UnitPoint> points(static_cast<size_t>(count), UnitPoint(static_cast<size_t>(dimensions)));
+  std::vector<UnitPoint> points = MakePoints(dimensions, count);
   std::mt19937_64 random(seed);
   for (UnitPoint& point : points) {
-    for (double& x : point) x = static_cast<double>(random() >> 11U) * 0x1p-53;
+    for (double& x : point) x = DrawUnit(&random);
   }
   return points;
 }
@@ -118,7 +129,7 @@ constexpr std::uint64_t kBootstrapSeed = 1;
 
 /// From the percentiles of a sample.
 Estimate MakeEstimate(double value, std::vector<double> sample) {
-  std::sort(sample.begin(), sample.end());
+  std::ranges::sort(sample);
   const auto at = [&](double fraction) {
     const double place = fraction * static_cast<double>(sample.size() - 1);
     return sample[static_cast<size_t>(std::lround(place))];
@@ -181,7 +192,7 @@ std::vector<SobolIndex> CalcSobolIndices(std::span<const double> values, int dim
   std::vector<Block> blocks;
   for (size_t begin = 0; begin + k + 2 <= values.size(); begin += k + 2) {
     const std::span<const double> block = values.subspan(begin, k + 2);
-    if (!std::all_of(block.begin(), block.end(), [](double value) { return std::isfinite(value); })) continue;
+    if (!std::ranges::all_of(block, [](double value) { return std::isfinite(value); })) continue;
     blocks.push_back({block[0], block[1], block.subspan(2)});
   }
   if (blocks.size() < 2) return {};
@@ -217,8 +228,7 @@ std::vector<UnitPoint> MakeMorris(int dimensions, long count, std::uint64_t seed
     UnitPoint point(k);
     for (double& x : point) x = kLevel * static_cast<double>(random() % 4);
     points.push_back(point);
-    std::iota(order.begin(), order.end(), size_t{0});
-    for (size_t i = k; i > 1; --i) std::swap(order[i - 1], order[random() % i]);
+    ShuffleNumbers(&order, &random);
     for (const size_t i : order) {
       // Two levels on or back: from each of the four levels one of them stays inside.
       point[i] += point[i] < 0.5 ? 2.0 * kLevel : -2.0 * kLevel;
@@ -243,7 +253,7 @@ std::vector<MorrisEffect> CalcMorrisEffects(std::span<const UnitPoint> points,
       }
     }
   }
-  if (std::all_of(effects.begin(), effects.end(), [](const auto& all) { return all.empty(); })) return {};
+  if (std::ranges::all_of(effects, [](const auto& all) { return all.empty(); })) return {};
   std::vector<MorrisEffect> result;
   std::mt19937_64 random(kBootstrapSeed);
   for (const std::vector<double>& all : effects) {
@@ -286,8 +296,7 @@ std::vector<size_t> Sensitivity::ListByImportance() const {
   const auto importance = [&](size_t i) {
     return sobol.empty() ? morris[i].size.value : sobol[i].total.value;
   };
-  std::stable_sort(keys.begin(), keys.end(),
-                   [&](size_t a, size_t b) { return importance(a) > importance(b); });
+  std::ranges::stable_sort(keys, [&](size_t a, size_t b) { return importance(a) > importance(b); });
   return keys;
 }
 
@@ -355,14 +364,13 @@ std::string Describe(const Study& study, const Sensitivity& sensitivity) {
   if (sensitivity.sobol.empty()) {
     constexpr double kSmall = 0.1;
     const double largest = sensitivity.morris[keys.front()].size.value;
-    const auto idle = std::count_if(keys.begin(), keys.end(), [&](size_t i) {
-      return sensitivity.morris[i].size.high < kSmall * largest;
-    });
+    const auto idle = std::ranges::count_if(
+        keys, [&](size_t i) { return sensitivity.morris[i].size.high < kSmall * largest; });
     if (idle > 0)
       text += fmt::format("; {} of {} keys move it by less than a tenth of the first", idle, keys.size());
   } else {
-    const auto idle = std::count_if(keys.begin(), keys.end(),
-                                    [&](size_t i) { return sensitivity.sobol[i].total.high < kMatters; });
+    const auto idle =
+        std::ranges::count_if(keys, [&](size_t i) { return sensitivity.sobol[i].total.high < kMatters; });
     if (idle > 0) text += fmt::format("; {} of {} keys explain less than 1 %", idle, keys.size());
   }
   if (sensitivity.left_out > 0) text += fmt::format(" ({} points have no value)", sensitivity.left_out);

@@ -139,7 +139,7 @@ std::vector<const JudgedPoint*> SortFeasibleBy(const std::vector<JudgedPoint>& p
   for (const JudgedPoint& point : points) {
     if (point.judgement.is_feasible()) sorted.push_back(&point);
   }
-  std::stable_sort(sorted.begin(), sorted.end(), [&](const JudgedPoint* a, const JudgedPoint* b) {
+  std::ranges::stable_sort(sorted, [&](const JudgedPoint* a, const JudgedPoint* b) {
     return is_before(a->judgement, b->judgement);
   });
   return sorted;
@@ -157,9 +157,8 @@ std::vector<const JudgedPoint*> FindFront(const std::vector<JudgedPoint>& points
   // In this order only a point before another one can dominate it.
   std::vector<const JudgedPoint*> front;
   for (const JudgedPoint* point : sorted) {
-    const bool dominated = std::any_of(front.begin(), front.end(), [&](const JudgedPoint* other) {
-      return Dominates(other->judgement, point->judgement);
-    });
+    const bool dominated = std::ranges::any_of(
+        front, [&](const JudgedPoint* other) { return Dominates(other->judgement, point->judgement); });
     if (!dominated) front.push_back(point);
   }
   return front;

@@ -4,7 +4,9 @@
 
 #include <SQLiteCpp/Database.h>
 #include <SQLiteCpp/Exception.h>
+#include <SQLiteCpp/Statement.h>
 #include <SQLiteCpp/Transaction.h>
+#include <SQLiteCpp/VariadicBind.h>
 
 #include <string>
 
@@ -24,6 +26,14 @@ class SqliteFile : public SQLite::Database {
  public:
   SqliteFile(const std::string& name, int flags);
 
+  /// A statement with values for its marks.
+  template <typename... Values>
+  SQLite::Statement Prepare(const std::string& sql, const Values&... values) const {
+    SQLite::Statement statement(*this, sql);
+    SQLite::bind(statement, values...);
+    return statement;
+  }
+
   /// Calls a function, and makes InputError of what SQLite throws.
   template <typename Function>
   auto Do(const Function& function) const {
@@ -41,5 +51,13 @@ class SqliteTransaction : public SQLite::Transaction {
   explicit SqliteTransaction(SQLite::Database* database)
       : SQLite::Transaction(*database, SQLite::TransactionBehavior::IMMEDIATE) {}
 };
+
+// Which of the processes that use it are alive.
+
+/// Machine, process id and start of this process: no other process ever has the same.
+std::string NameThisProcess();
+
+/// Whether the process of that name runs on this machine; false for those of other machines.
+bool IsRunningHere(const std::string& process);
 
 }  // namespace dexcheck

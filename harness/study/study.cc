@@ -55,7 +55,7 @@ double ValueAt(const Variation& variation, double fraction) {
 
 double FractionOf(const Variation& variation, double value) {
   if (!variation.values.empty()) {
-    const auto found = std::find(variation.values.begin(), variation.values.end(), value);
+    const auto found = std::ranges::find(variation.values, value);
     return (static_cast<double>(found - variation.values.begin()) + 0.5) /
            static_cast<double>(variation.values.size());
   }

@@ -5,7 +5,6 @@
 #include <cstdint>
 #include <span>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include "harness/study/objective.h"
@@ -33,6 +32,10 @@ struct Sample {
   long count = 0;  ///< Points; of a grid its keys say how many. Blocks of kSaltelli, trajectories of kMorris.
   std::uint64_t seed = 0;  ///< Of all but a grid and a Sobol sequence that is not scrambled.
   bool scramble = false;   ///< A Sobol sequence.
+  /// Whether its points show which key matters, and are of no use one by one.
+  [[nodiscard]] bool is_of_sensitivity() const {
+    return method == SamplingMethod::kSaltelli || method == SamplingMethod::kMorris;
+  }
   bool operator==(const Sample&) const = default;
 };
 

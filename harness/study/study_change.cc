@@ -16,7 +16,6 @@
 #include "harness/engine/engine.h"
 #include "harness/engine/machine.h"
 #include "harness/engine/mjcf_file.h"
-#include "harness/study/study_store.h"
 
 namespace dexcheck {
 namespace {
@@ -26,7 +25,7 @@ using TrialName = std::pair<std::uint64_t, std::vector<std::string>>;
 
 TrialName NameTrial(const Study& study, const Trial& trial) {
   TrialName name{trial.seed, ListOverrides(study, trial)};
-  std::sort(name.second.begin(), name.second.end());
+  std::ranges::sort(name.second);
   return name;
 }
 
@@ -51,8 +50,7 @@ std::optional<std::vector<double>> ReorderValues(const Study& before, const Stud
     for (size_t i = 0; i < values.size(); ++i) {
       const Variation& was = before.variations[i];
       if (was.key != variation.key) continue;
-      const auto label =
-          std::find(variation.labels.begin(), variation.labels.end(), FormatValue(was, values[i]));
+      const auto label = std::ranges::find(variation.labels, FormatValue(was, values[i]));
       if (was.labels.empty() && variation.labels.empty()) {
         reordered.push_back(values[i]);
       } else if (label != variation.labels.end()) {
@@ -66,7 +64,7 @@ std::optional<std::vector<double>> ReorderValues(const Study& before, const Stud
 std::vector<std::string> ListKeys(const Study& study) {
   std::vector<std::string> keys;
   for (const Variation& variation : study.variations) keys.push_back(variation.key);
-  std::sort(keys.begin(), keys.end());
+  std::ranges::sort(keys);
   return keys;
 }
 
@@ -145,7 +143,7 @@ bool IsSameNumber(double a, double b) {
 }  // namespace
 
 Metric FindErrorMetric(const std::vector<TrialRow>& rows) {
-  const bool of_joints = std::any_of(rows.begin(), rows.end(), [](const TrialRow& row) {
+  const bool of_joints = std::ranges::any_of(rows, [](const TrialRow& row) {
     return std::isfinite(row.result.metrics[kJointErrorRms]) &&
            !std::isfinite(row.result.metrics[kPositionErrorRms]);
   });

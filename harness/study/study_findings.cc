@@ -10,7 +10,6 @@
 
 #include "harness/run/joint_margins.h"
 #include "harness/study/sampling.h"
-#include "harness/study/search.h"
 
 namespace dexcheck {
 
@@ -36,21 +35,18 @@ std::string DescribeEdges(const Study& study, const std::vector<double>& values)
 std::string DescribeBest(const Study& study, const std::vector<JudgedPoint>& points) {
   const JudgedPoint& best = *SortFeasible(points).front();
   const Objective& objective = study.objectives.front();
-  const auto value = [&](const JudgedPoint& point) {
-    return ShowObjective(objective, point.judgement.objectives.front());
-  };
   const std::string unit = ShowUnit(objective.expression);
   std::string text =
       fmt::format("The {} {} of {} is {:.4g}{}, at {} (trial {}).", objective.maximize ? "largest" : "least",
-                  Describe(objective), CountPoints(points.size()), value(best), unit,
+                  Describe(objective), CountPoints(points.size()), ShowObjective(study, best), unit,
                   DescribeValues(study, best.values), best.number * CountTrialsOfPoint(study));
   const JudgedPoint& first = points.front();
   if (study.is_search() && first.number == 0 && first.number != best.number) {
-    if (!std::isfinite(value(first))) {
+    if (!std::isfinite(ShowObjective(study, first))) {
       text += " The search began where it has no value.";
     } else {
       text += first.judgement.is_feasible()
-                  ? fmt::format(" The search began with {:.4g}{}.", value(first), unit)
+                  ? fmt::format(" The search began with {:.4g}{}.", ShowObjective(study, first), unit)
                   : " The search began where a constraint does not hold.";
     }
   }
@@ -67,12 +63,10 @@ std::string DescribeFront(const Study& study, const std::vector<JudgedPoint>& po
         std::minmax_element(front.begin(), front.end(), [&](const JudgedPoint* a, const JudgedPoint* b) {
           return a->judgement.objectives[i] < b->judgement.objectives[i];
         });
-    const auto show = [&](const JudgedPoint* point) {
-      return ShowObjective(study.objectives[i], point->judgement.objectives[i]);
-    };
-    text += fmt::format("{} {} from {:.4g} ({}) to {:.4g}{}", i == 0 ? "" : ";",
-                        Describe(study.objectives[i]), show(*least), DescribeValues(study, (*least)->values),
-                        show(*most), ShowUnit(study.objectives[i].expression));
+    text +=
+        fmt::format("{} {} from {:.4g} ({}) to {:.4g}{}", i == 0 ? "" : ";", Describe(study.objectives[i]),
+                    ShowObjective(study, **least, i), DescribeValues(study, (*least)->values),
+                    ShowObjective(study, **most, i), ShowUnit(study.objectives[i].expression));
   }
   return text + ".";
 }
@@ -113,7 +107,7 @@ std::vector<std::string> DescribeMargins(const Study& study, const std::vector<J
 
 /// "0.000302 (0.00029 to 0.00034)": the median and the range. @param values not empty.
 std::string ShowSpread(std::vector<double> values) {
-  std::sort(values.begin(), values.end());
+  std::ranges::sort(values);
   const size_t half = values.size() / 2;
   const double median = values.size() % 2 == 1 ? values[half] : 0.5 * (values[half - 1] + values[half]);
   return fmt::format("{:.3g} ({:.3g} to {:.3g})", median, values.front(), values.back());
@@ -138,10 +132,8 @@ std::vector<std::string> DescribeSpreads(const Study& study, const std::vector<T
     std::string text = fmt::format("{}: held in {} of {} trials",
                                    DescribeValues(study, {static_cast<double>(i)}), held, all);
     for (const std::string& name : study.metrics) {
-      for (size_t k = 0; k < metrics.size(); ++k) {
-        if (kMetrics[k].name == name && !metrics[k].empty())
-          text += fmt::format("; {} {}{}", name, ShowSpread(metrics[k]), ShowUnit(name));
-      }
+      const std::vector<double>& values = metrics[FindMetric(name).value()];
+      if (!values.empty()) text += fmt::format("; {} {}{}", name, ShowSpread(values), ShowUnit(name));
     }
     findings.push_back(text + (held > 0 ? ", medians and ranges." : "."));
   }
@@ -163,10 +155,6 @@ std::string DescribeFailures(const Study& study, const std::vector<TrialRow>& ro
           ? ""
           : "; it holds for a random sample, a more even one scatters less");
 }
-
-}  // namespace
-
-namespace {
 
 /// What keeps points that would be better than `best`, or came to no end, from being feasible: by how many
 /// trials.
@@ -201,8 +189,8 @@ std::string MakeGainCard(const StudyInputs& inputs, const std::vector<TrialRow>&
   if (feasible.empty()) return "";
   const JudgedPoint& best = *feasible.front();
   const long number = best.number * CountTrialsOfPoint(study);
-  const TrialRow& row = *std::find_if(rows.begin(), rows.end(),
-                                      [&](const TrialRow& one) { return one.trial.number == number; });
+  const TrialRow& row =
+      *std::ranges::find_if(rows, [&](const TrialRow& one) { return one.trial.number == number; });
   const Scenario scenario = MakeTrialScenario(inputs, row.trial);
   // Of a controller of the user's own the gains are its own.
   if (scenario.joint_task() == nullptr || scenario.controller.exists()) return "";
@@ -210,8 +198,7 @@ std::string MakeGainCard(const StudyInputs& inputs, const std::vector<TrialRow>&
       ParseScenario(inputs.scenario_text, inputs.scenario_source, inputs.scenario_folder, study.overrides);
   std::string card = "# your gains:\n" + CommentLines(WriteJointControl(yours, 1.0));
   card += fmt::format("# best of {} points: {} {:.4g}{}\n", points.size(), Describe(study.objectives.front()),
-                      ShowObjective(study.objectives.front(), best.judgement.objectives.front()),
-                      ShowUnit(study.objectives.front().expression));
+                      ShowObjective(study, best), ShowUnit(study.objectives.front().expression));
   const auto& metrics = row.result.metrics;
   if (std::isfinite(metrics[kGainMargin]))  // of a robot on its feet margins are not judged
     card +=
@@ -238,21 +225,22 @@ std::string DescribeValues(const Study& study, const std::vector<double>& values
   return text;
 }
 
-double ShowObjective(const Objective& objective, double value) { return objective.maximize ? -value : value; }
+double ShowObjective(const Study& study, const JudgedPoint& point, size_t objective) {
+  const double value = point.judgement.objectives[objective];
+  return study.objectives[objective].maximize ? -value : value;
+}
 
 std::vector<std::string> ListFindings(const Study& study, const std::vector<TrialRow>& rows) {
   std::vector<std::string> findings;
   if (rows.empty()) return findings;
   if (study.search.method == SearchMethod::kMargins) return DescribeMargins(study, JudgePoints(study, rows));
   findings = DescribeSpreads(study, rows);
-  const SamplingMethod method = study.sample.method;
-  if (method == SamplingMethod::kSaltelli || method == SamplingMethod::kMorris) {
-    for (const std::string& quantity : ListQuantities(study, rows)) {
+  if (study.sample.is_of_sensitivity()) {
+    for (const std::string& quantity : ListQuantities(study, rows))
       findings.push_back(Describe(study, AnalyseSensitivity(study, rows, quantity)));
-    }
     return findings;
   }
-  if (method != SamplingMethod::kGrid && !study.constraints.empty())
+  if (study.sample.method != SamplingMethod::kGrid && !study.constraints.empty())
     findings.push_back(DescribeFailures(study, rows));
   if (study.objectives.empty()) return findings;
   const std::vector<JudgedPoint> points = JudgePoints(study, rows);
@@ -282,8 +270,7 @@ StudyProgress FindProgress(const StudyStore& store) {
                   outcomes;
   progress.is_over = progress.done >= progress.total;
   const bool has_question = study.is_search() || !study.objectives.empty() || !study.constraints.empty() ||
-                            study.sample.method == SamplingMethod::kSaltelli ||
-                            study.sample.method == SamplingMethod::kMorris;
+                            study.sample.is_of_sensitivity();
   if (!has_question) return progress;
   const std::vector<TrialRow> rows = store.ReadRows(0, /*with_machine=*/false);
   for (const std::string& finding : ListFindings(study, rows)) progress.text += finding + "\n";

@@ -14,8 +14,8 @@ namespace dexcheck {
 /// "control.K_p = 4000, control.K_v = 126".
 std::string DescribeValues(const Study& study, const std::vector<double>& values);
 
-/// The value of an objective as the user wrote it: of `maximize` with its own sign again.
-double ShowObjective(const Objective& objective, double value);
+/// A point's objective as the user wrote it: of `maximize` with its own sign again.
+double ShowObjective(const Study& study, const JudgedPoint& point, size_t objective = 0);
 
 /// What the trials say to the study's question, one sentence each; empty for a study without one.
 /// @param rows of all trials that are done.

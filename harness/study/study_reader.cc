@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <stdexcept>
 
 #include "controller/common/text.h"
@@ -117,7 +116,7 @@ void RequireDimensions(const TomlValue& where, const Sample& sample, size_t keys
 void ReadNested(const TomlValue& value, Study* study) {
   TomlTable table = value.AsTable();
   study->nested = ReadSample(&table);
-  if (study->nested.method == SamplingMethod::kSaltelli || study->nested.method == SamplingMethod::kMorris) {
+  if (study->nested.is_of_sensitivity()) {
     table.Get("method").Fail("must be one of \"latin_hypercube\", \"sobol\", \"random\"");
   }
   const TomlValue vary = table.Get("vary");
@@ -131,12 +130,10 @@ void ReadNested(const TomlValue& value, Study* study) {
 
 void ReadMetrics(const TomlValue& value, Study* study) {
   std::vector<std::string> known;
-  known.reserve(kMetrics.size());
   for (const MetricInfo& metric : kMetrics) known.emplace_back(metric.name);
   for (const TomlValue& entry : value.AsList()) {
     const std::string name = entry.AsName();
-    if (std::find(known.begin(), known.end(), name) == known.end())
-      entry.Reject("no metric is called " + Quote(name) + SuggestNearest(name, known));
+    if (!FindMetric(name)) entry.Reject("no metric is called " + Quote(name) + SuggestNearest(name, known));
     study->metrics.push_back(name);
   }
 }

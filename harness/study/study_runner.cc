@@ -4,8 +4,6 @@
 #include <chrono>
 #include <deque>
 #include <limits>
-#include <map>
-#include <optional>
 #include <set>
 #include <thread>
 #include <utility>
@@ -127,7 +125,7 @@ void RunTrials(const StudyInputs& inputs, const std::vector<Trial>& trials, cons
   const std::vector<long> done = store->ListNumbers();
   std::vector<Trial> missing;
   for (const Trial& trial : trials) {
-    if (!std::binary_search(done.begin(), done.end(), trial.number)) missing.push_back(trial);
+    if (!std::ranges::binary_search(done, trial.number)) missing.push_back(trial);
   }
   if (missing.empty()) return;
   auto finished = static_cast<long>(trials.size() - missing.size());

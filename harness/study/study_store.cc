@@ -4,15 +4,12 @@
 #include <fmt/ranges.h>
 #include <sqlite3.h>
 
-#include <algorithm>
 #include <cmath>
 #include <limits>
-#include <set>
 #include <unordered_map>
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
-#include "harness/study/process_name.h"
 #include "harness/study/study_change.h"
 
 namespace dexcheck {
@@ -28,8 +25,36 @@ std::string QuoteName(const std::string& name) {
   return quoted + "\"";
 }
 
-std::string ListMarks(size_t count) {
-  return fmt::format("{}", fmt::join(std::vector<const char*>(count, "?"), ", "));
+/// A column of the table of trials.
+struct StoredColumn {
+  std::string name, type;
+};
+
+/// In their order; what a trial is, then what it came to.
+std::vector<StoredColumn> ListColumns(const Study& study) {
+  std::vector<StoredColumn> columns = {{"trial", "INTEGER PRIMARY KEY"}, {"seed", "INTEGER NOT NULL"}};
+  for (const Variation& variation : study.variations)
+    columns.push_back({QuoteName(variation.key), "REAL NOT NULL"});
+  columns.insert(columns.end(), {{"outcome", "TEXT NOT NULL"}, {"failure", "TEXT NOT NULL"}});
+  for (const MetricInfo& metric : kMetrics) columns.push_back({metric.name, "REAL"});
+  columns.push_back({"machine", "TEXT NOT NULL"});
+  return columns;
+}
+
+/// Each in this format, with commas.
+std::string JoinColumns(const Study& study, const std::string& format) {
+  std::vector<std::string> texts;
+  for (const StoredColumn& column : ListColumns(study))
+    texts.push_back(fmt::format(fmt::runtime(format), column.name, column.type));
+  return fmt::format("{}", fmt::join(texts, ", "));
+}
+
+/// None when there is no such column.
+const std::string* FindText(const StudyIdentity& identity, const std::string& column) {
+  for (const auto& [name, value] : identity) {
+    if (name == column) return &value;
+  }
+  return nullptr;
 }
 
 }  // namespace
@@ -62,19 +87,16 @@ void StudyStore::Create(const StudyIdentity& identity, const Study& study) {
   SqliteTransaction transaction(database_.get());
   if (!is_empty()) return;  // another process was faster
   database_->exec("PRAGMA application_id = " + std::to_string(kApplicationId));
-  std::vector<std::string> columns;
-  for (const auto& [column, value] : identity) columns.push_back(column + " TEXT NOT NULL");
+  std::vector<std::string> columns, texts;
+  for (const auto& [column, value] : identity) {
+    columns.push_back(column + " TEXT NOT NULL");
+    texts.emplace_back("?");
+  }
   database_->exec(fmt::format("CREATE TABLE study ({})", fmt::join(columns, ", ")));
-  SQLite::Statement insert(*database_, "INSERT INTO study VALUES (" + ListMarks(identity.size()) + ")");
+  SQLite::Statement insert(*database_, fmt::format("INSERT INTO study VALUES ({})", fmt::join(texts, ", ")));
   for (size_t i = 0; i < identity.size(); ++i) insert.bind(static_cast<int>(i) + 1, identity[i].second);
   insert.exec();
-  std::string table = "CREATE TABLE trials (trial INTEGER PRIMARY KEY, seed INTEGER NOT NULL";
-  for (const Variation& variation : study.variations) {
-    table += ", " + QuoteName(variation.key) + " REAL NOT NULL";
-  }
-  table += ", outcome TEXT NOT NULL, failure TEXT NOT NULL";
-  for (const MetricInfo& metric : kMetrics) table += std::string(", ") + metric.name + " REAL";
-  database_->exec(table + ", machine TEXT NOT NULL)");
+  database_->exec("CREATE TABLE trials (" + JoinColumns(study, "{} {}") + ")");
   // Of trials that are running: who has them.
   database_->exec("CREATE TABLE claims (trial INTEGER PRIMARY KEY, process TEXT NOT NULL)");
   transaction.commit();
@@ -99,23 +121,16 @@ void StudyStore::Load() {
 }
 
 void StudyStore::AddMissingColumns() {
-  const auto list_columns = [&](const char* table) {
-    std::set<std::string> there;
-    SQLite::Statement columns(*database_, fmt::format("SELECT name FROM pragma_table_info('{}')", table));
-    while (columns.executeStep()) there.insert(columns.getColumn(0));
-    return there;
-  };
+  constexpr const char* kText = "TEXT NOT NULL DEFAULT ''";
   const auto list_missing = [&] {
-    const std::set<std::string> there = list_columns("trials");
     std::vector<std::string> missing;
-    for (const MetricInfo& metric : kMetrics) {
-      if (!there.contains(metric.name))
-        missing.push_back("trials ADD COLUMN " + std::string(metric.name) + " REAL");
-    }
-    if (!there.contains("machine"))
-      missing.emplace_back("trials ADD COLUMN machine TEXT NOT NULL DEFAULT ''");
-    if (!list_columns("study").contains("controller_hash"))
-      missing.emplace_back("study ADD COLUMN controller_hash TEXT NOT NULL DEFAULT ''");
+    const auto add = [&](const char* table, const char* name, const char* type) {
+      auto there = database_->Prepare("SELECT 1 FROM pragma_table_info(?) WHERE name = ?", table, name);
+      if (!there.executeStep()) missing.push_back(fmt::format("{} ADD COLUMN {} {}", table, name, type));
+    };
+    for (const MetricInfo& metric : kMetrics) add("trials", metric.name, "REAL");
+    add("trials", "machine", kText);
+    add("study", "controller_hash", kText);
     return missing;
   };
   if (list_missing().empty()) return;
@@ -126,9 +141,7 @@ void StudyStore::AddMissingColumns() {
 }
 
 const std::string& StudyStore::Identify(const std::string& column) const {
-  for (const auto& [name, value] : identity_) {
-    if (name == column) return value;
-  }
+  if (const std::string* const value = FindText(identity_, column)) return *value;
   throw InputError(name() + ": no column " + Quote(column));
 }
 
@@ -141,9 +154,7 @@ bool StudyStore::IsInUse() {
 }
 
 void StudyStore::Update(const std::string& column, const std::string& value) {
-  SQLite::Statement update(*database_, "UPDATE study SET " + column + " = ?");
-  update.bind(1, value);
-  update.exec();
+  database_->Prepare("UPDATE study SET " + column + " = ?", value).exec();
   for (auto& [name, text] : identity_) {
     if (name == column) text = value;
   }
@@ -158,40 +169,32 @@ void StudyStore::Adopt(const StudyIdentity& identity, const Study& study,
            (makes_same_rows && column.first == "git_revision");
   });
   RequireSame(strict);
-  const auto find = [&](const std::string& column) {
-    const auto found = std::find_if(identity.begin(), identity.end(),
-                                    [&](const auto& entry) { return entry.first == column; });
-    return found == identity.end() ? Identify(column) : found->second;
-  };
-  const std::string difference = FindDifference(study_, study);
-  if (!difference.empty()) {
+  if (const std::string difference = FindDifference(study_, study); !difference.empty())
     throw InputError(name() + ": is of another study: study differs: " + difference +
                      "; rows made otherwise cannot be kept, take another database");
-  }
-  if (find("git_revision") != Identify("git_revision")) {
+  const std::string* const revision = FindText(identity, "git_revision");
+  if (revision != nullptr && *revision != Identify("git_revision")) {
     if (!makes_same_rows(ReadRows())) RequireSame(identity);  // which throws
-    Update("git_revision", find("git_revision"));
+    Update("git_revision", *revision);
     change_ = "its rows are of another revision, which made the same ones";
   }
   if (study.text == study_.text) return;
-  if (!HasSameTrials(study_, study)) {
-    if (IsInUse()) throw InputError(name() + ": another process makes trials of the study as it was");
-    SqliteTransaction transaction(database_.get());
-    StudyChange changed = ChangeStudy(study_, study, ReadRows(std::numeric_limits<long>::min()));
-    database_->exec("DELETE FROM trials");
+  const auto take_over = [&] {
     study_ = study;
-    insert_.reset();  // their columns' order
-    find_.reset();
-    for (const TrialRow& row : changed.rows) Insert(row);
     Update("study", study.text);
     Update("name", study.name);
-    transaction.commit();
-    change_ += (change_.empty() ? "" : "; ") + ("the study was edited: " + Describe(changed));
-    return;
-  }
-  study_ = study;
-  Update("study", study.text);
-  Update("name", study.name);
+  };
+  if (HasSameTrials(study_, study)) return take_over();
+  if (IsInUse()) throw InputError(name() + ": another process makes trials of the study as it was");
+  SqliteTransaction transaction(database_.get());
+  StudyChange changed = ChangeStudy(study_, study, ReadRows(std::numeric_limits<long>::min()));
+  database_->exec("DELETE FROM trials");
+  take_over();
+  insert_.reset();  // their columns' order
+  find_.reset();
+  for (const TrialRow& row : changed.rows) Insert(row);
+  transaction.commit();
+  change_ += (change_.empty() ? "" : "; ") + ("the study was edited: " + Describe(changed));
 }
 
 void StudyStore::RequireSame(const StudyIdentity& other) const {
@@ -199,22 +202,11 @@ void StudyStore::RequireSame(const StudyIdentity& other) const {
   for (const auto& [column, value] : other) {
     const std::string& own = Identify(column);
     if (own == value) continue;
-    if (column == "study") {
-      const Study there = ParseStudy(value, name());
-      if (HasSameTrials(study_, there)) continue;
-    }
+    if (column == "study" && HasSameTrials(study_, ParseStudy(value, name()))) continue;
     const bool is_short = own.size() < kReadable && value.size() < kReadable;
     throw InputError(name() + ": is of another study: " + column + " differs" +
                      (is_short ? ", " + Quote(own) + " there and " + Quote(value) + " here" : ""));
   }
-}
-
-std::string StudyStore::ListColumns() const {
-  std::string columns = "trial, seed";
-  for (const Variation& variation : study_.variations) columns += ", " + QuoteName(variation.key);
-  columns += ", outcome, failure";
-  for (const MetricInfo& metric : kMetrics) columns += std::string(", ") + metric.name;
-  return columns + ", machine";
 }
 
 std::vector<long> StudyStore::ListNumbers() const {
@@ -243,8 +235,7 @@ std::vector<TrialRow> StudyStore::ReadRows(long first, bool with_machine) const 
   std::vector<TrialRow> rows;
   database_->Do([&] {
     // A vector that grows holds its rows twice for a moment.
-    SQLite::Statement count(*database_, "SELECT count(*) FROM trials WHERE trial >= ?");
-    count.bind(1, first);
+    auto count = database_->Prepare("SELECT count(*) FROM trials WHERE trial >= ?", first);
     count.executeStep();
     rows.reserve(static_cast<size_t>(count.getColumn(0).getInt64()));
   });
@@ -255,9 +246,8 @@ std::vector<TrialRow> StudyStore::ReadRows(long first, bool with_machine) const 
 void StudyStore::ForEachRow(const std::function<void(TrialRow&&)>& take, long first,
                             bool with_machine) const {
   database_->Do([&] {
-    SQLite::Statement select(*database_,
-                             "SELECT " + ListColumns() + " FROM trials WHERE trial >= ? ORDER BY trial");
-    select.bind(1, first);
+    auto select = database_->Prepare(
+        "SELECT " + JoinColumns(study_, "{}") + " FROM trials WHERE trial >= ? ORDER BY trial", first);
     while (select.executeStep()) take(ReadRow(select, with_machine));
   });
 }
@@ -300,8 +290,8 @@ TrialRow StudyStore::ReadRow(const SQLite::Statement& select, bool with_machine)
 std::optional<TrialRow> StudyStore::FindRow(long trial) const {
   return database_->Do([&] {
     if (!find_) {
-      find_ = std::make_unique<SQLite::Statement>(*database_,
-                                                  "SELECT " + ListColumns() + " FROM trials WHERE trial = ?");
+      find_ = std::make_unique<SQLite::Statement>(
+          *database_, "SELECT " + JoinColumns(study_, "{}") + " FROM trials WHERE trial = ?");
     }
     find_->reset();
     find_->bind(1, trial);
@@ -312,33 +302,18 @@ std::optional<TrialRow> StudyStore::FindRow(long trial) const {
   });
 }
 
-bool StudyStore::Has(long trial) const {
-  return database_->Do([&] {
-    SQLite::Statement select(*database_, "SELECT 1 FROM trials WHERE trial = ?");
-    select.bind(1, trial);
-    return select.executeStep();
-  });
-}
-
 std::vector<long> StudyStore::Claim(const std::vector<long>& trials) {
   return database_->Do([&] {
     SqliteTransaction transaction(database_.get());
-    SQLite::Statement owner(*database_, "SELECT process FROM claims WHERE trial = ?");
-    SQLite::Statement claim(*database_, "INSERT OR REPLACE INTO claims VALUES (?, ?)");
     const std::string self = NameThisProcess();
     std::vector<long> claimed;
     for (const long trial : trials) {
-      if (Has(trial)) continue;
-      owner.reset();
-      owner.bind(1, trial);
+      if (FindRow(trial)) continue;
+      auto owner = database_->Prepare("SELECT process FROM claims WHERE trial = ?", trial);
       if (owner.executeStep() && IsRunningHere(owner.getColumn(0))) continue;
-      claim.reset();
-      claim.bind(1, trial);
-      claim.bind(2, self);
-      claim.exec();
+      database_->Prepare("INSERT OR REPLACE INTO claims VALUES (?, ?)", trial, self).exec();
       claimed.push_back(trial);
     }
-    owner.reset();
     transaction.commit();
     return claimed;
   });
@@ -346,21 +321,17 @@ std::vector<long> StudyStore::Claim(const std::vector<long>& trials) {
 
 void StudyStore::Release(const std::vector<long>& trials) {
   database_->Do([&] {
-    SQLite::Statement release(*database_, "DELETE FROM claims WHERE trial = ? AND process = ?");
-    release.bind(2, NameThisProcess());
-    for (const long trial : trials) {
-      release.reset();
-      release.bind(1, trial);
-      release.exec();
-    }
+    const std::string self = NameThisProcess();
+    for (const long trial : trials)
+      database_->Prepare("DELETE FROM claims WHERE trial = ? AND process = ?", trial, self).exec();
   });
 }
 
 void StudyStore::Insert(const TrialRow& row) {
   if (!insert_) {
-    const std::string marks = ListMarks(study_.variations.size() + kNumMetrics + 5);
     insert_ = std::make_unique<SQLite::Statement>(
-        *database_, "INSERT OR IGNORE INTO trials (" + ListColumns() + ") VALUES (" + marks + ")");
+        *database_, fmt::format("INSERT OR IGNORE INTO trials ({}) VALUES ({})", JoinColumns(study_, "{}"),
+                                JoinColumns(study_, "?")));
   }
   SQLite::Statement& insert = *insert_;
   int parameter = 1;
@@ -396,16 +367,14 @@ void StudyStore::AddAll(const std::vector<TrialSource>& sources) {
       source.read([&](TrialRow&& row) {
         const long number = row.trial.number;
         if (const auto other = FindRow(number)) {
-          if (IsFailed(row.result.outcome)) return;
-          if (IsFailed(other->result.outcome)) {
-            database_->exec("DELETE FROM trials WHERE trial = " + std::to_string(number));
-          } else if (IsSame(*other, row)) {
-            return;
-          } else {
-            const auto from = added.find(number);
+          const bool gives_way = IsFailed(other->result.outcome);
+          if (IsFailed(row.result.outcome) || (!gives_way && IsSame(*other, row))) return;
+          const auto from = added.find(number);
+          if (!gives_way) {
             throw InputError(source.name + ": trial " + std::to_string(number) +
                              " has another result than in " + (from == added.end() ? name() : *from->second));
           }
+          database_->exec("DELETE FROM trials WHERE trial = " + std::to_string(number));
         }
         Insert(row);
         added[number] = &source.name;
@@ -421,10 +390,8 @@ void StudyStore::RemoveFrom(long first) {
 
 void StudyStore::RemoveFailed() {
   database_->Do([&] {
-    SQLite::Statement remove(*database_, "DELETE FROM trials WHERE trial >= 0 AND outcome IN (?, ?)");
-    remove.bind(1, NameOf(Outcome::kCrashed));
-    remove.bind(2, NameOf(Outcome::kTimedOut));
-    remove.exec();
+    database_->exec(fmt::format("DELETE FROM trials WHERE trial >= 0 AND outcome IN ('{}', '{}')",
+                                NameOf(Outcome::kCrashed), NameOf(Outcome::kTimedOut)));
   });
 }
 

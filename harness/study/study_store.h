@@ -90,7 +90,6 @@ class StudyStore {
   [[nodiscard]] std::optional<TrialRow> FindRow(long trial) const;
   /// Numbers of the trials that have a row, ascending.
   [[nodiscard]] std::vector<long> ListNumbers() const;
-  [[nodiscard]] bool Has(long trial) const;
 
   /// Takes trials on for this process. @return those of them that are not done, and that no other living
   /// process of this machine has.
@@ -120,7 +119,6 @@ class StudyStore {
   void Load();
   void Insert(const TrialRow& row);
   [[nodiscard]] TrialRow ReadRow(const SQLite::Statement& select, bool with_machine) const;
-  [[nodiscard]] std::string ListColumns() const;
 
   std::unique_ptr<SqliteFile> database_;
   std::unique_ptr<SQLite::Statement> insert_;        // prepared once

@@ -1,5 +1,3 @@
-#include "harness/study/study_summary.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -13,7 +11,7 @@
 #include "harness/study/sampling.h"
 #include "harness/study/search.h"
 #include "harness/study/study_findings.h"
-#include "harness/study/study_rows.h"
+#include "harness/study/study_page.h"
 
 namespace dexcheck {
 
@@ -21,8 +19,6 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr std::array<const char*, kNumOutcomes> kOutcomeColors = {
-    "#7bb662", "#f2c14e", "#e4572e", "#f78154", "#9b2226", "#577590", "#cccccc", "#000000", "#6d597a"};
 constexpr size_t kMostBest = 20;        // trials in the table of the best
 constexpr size_t kMostCompared = 2000;  // trials that are compared with theory
 
@@ -47,16 +43,12 @@ class Summary {
     inputs_.study = study_;
     inputs_.scenario_text = store.Identify("scenario");
     inputs_.scenario_source = study_.scenario;
-    for (const std::string& name : study_.metrics) {
-      for (size_t i = 0; i < kMetrics.size(); ++i) {
-        if (kMetrics[i].name == name) metrics_.push_back(static_cast<Metric>(i));
-      }
-    }
+    for (const std::string& name : study_.metrics) metrics_.push_back(FindMetric(name).value());
     if (metrics_.empty()) metrics_ = {error_, kPeakEffort, of_joints() ? kEnergy : kConeMargin};
     for (const TrialRow& row : rows_) {
       if (row.result.outcome == Outcome::kTracked) tracked_.push_back(&row);
     }
-    std::stable_sort(tracked_.begin(), tracked_.end(), [&](const TrialRow* a, const TrialRow* b) {
+    std::ranges::stable_sort(tracked_, [&](const TrialRow* a, const TrialRow* b) {
       return a->result.metrics[error_] < b->result.metrics[error_];
     });
   }
@@ -101,22 +93,18 @@ class Summary {
   [[nodiscard]] bool has_theory() const { return !theory_.empty(); }
 
   [[nodiscard]] Json ListOutcomes() const {
-    std::array<long, kNumOutcomes> counts{};
+    std::array<long, kOutcomes.size()> counts{};
     for (const TrialRow& row : rows_) ++counts[static_cast<size_t>(row.result.outcome)];
     Json outcomes = Json::array();
-    for (int i = 0; i < kNumOutcomes; ++i) {
-      const auto outcome = static_cast<Outcome>(i);
-      outcomes.push_back({{"name", NameOf(outcome)},
-                          {"count", counts[static_cast<size_t>(i)]},
-                          {"held", IsHeld(outcome)},
-                          {"color", kOutcomeColors[static_cast<size_t>(i)]}});
+    for (size_t i = 0; i < kOutcomes.size(); ++i) {
+      const auto& [name, is_held, color] = kOutcomes[i];
+      outcomes.push_back({{"name", name}, {"count", counts[i]}, {"held", is_held}, {"color", color}});
     }
     return outcomes;
   }
 
   const TrialRow& FindRow(long number) const {
-    return *std::lower_bound(rows_.begin(), rows_.end(), number,
-                             [](const TrialRow& row, long wanted) { return row.trial.number < wanted; });
+    return *std::ranges::lower_bound(rows_, number, {}, [](const TrialRow& row) { return row.trial.number; });
   }
 
   Json ListBest() {
@@ -163,7 +151,7 @@ class Summary {
     for (size_t i = 0; i < std::min(chosen.size(), kMostBest); ++i) {
       std::vector<double> values;
       for (size_t k = 0; k < study_.objectives.size(); ++k)
-        values.push_back(ShowObjective(study_.objectives[k], chosen[i]->judgement.objectives[k]));
+        values.push_back(ShowObjective(study_, *chosen[i], k));
       AddBest(FindRow(chosen[i]->number * CountTrialsOfPoint(study_)), chosen[i]->values, values, best);
     }
   }
@@ -187,7 +175,7 @@ class Summary {
       (*best)["heads"].push_back(study_.variations[i].key);
     std::vector<Metric> metrics = {error_, kEnergy};
     for (const Metric metric : metrics_) {
-      if (std::find(metrics.begin(), metrics.end(), metric) == metrics.end()) metrics.push_back(metric);
+      if (std::ranges::find(metrics, metric) == metrics.end()) metrics.push_back(metric);
     }
     for (const Metric metric : metrics) (*best)["heads"].push_back(LabelOf(metric));
     for (size_t i = 0; i < std::min(admitted.size(), kMostBest); ++i) {
@@ -224,9 +212,7 @@ class Summary {
 
   [[nodiscard]] Json ListSensitivity() const {
     Json list = Json::array();
-    const SamplingMethod method = study_.sample.method;
-    if (study_.is_search() || (method != SamplingMethod::kSaltelli && method != SamplingMethod::kMorris))
-      return list;
+    if (study_.is_search() || !study_.sample.is_of_sensitivity()) return list;
     for (const std::string& quantity : ListQuantities(study_, rows_)) {
       const Sensitivity sensitivity = AnalyseSensitivity(study_, rows_, quantity);
       if (sensitivity.empty()) continue;
@@ -253,7 +239,7 @@ class Summary {
   void ChooseShown() {
     const size_t every = std::max((rows_.size() + kMostShown - 1) / kMostShown, size_t{1});
     for (size_t i = 0; i < rows_.size(); i += every) shown_.push_back(&rows_[i]);
-    std::sort(shown_.begin(), shown_.end());  // of one vector, by number
+    std::ranges::sort(shown_);  // of one vector, by number
     shown_.erase(std::unique(shown_.begin(), shown_.end()), shown_.end());
   }
 
@@ -316,9 +302,7 @@ class Summary {
     for (int i = 0; i < kNumMetrics; ++i) {
       const auto metric = static_cast<Metric>(i);
       columns.push_back({{"name", kMetrics[metric].name}, {"label", LabelOf(metric)}});
-      if (metric == kConeMargin || metric == kSimulatedTime || metric == kGainMargin ||
-          metric == kPhaseMargin || metric == kDelayMargin)
-        columns.back()["larger_is_better"] = true;
+      if (kMetrics[metric].is_better_large) columns.back()["larger_is_better"] = true;
     }
     if (!has_theory()) return columns;
     columns.push_back(
@@ -363,10 +347,9 @@ class Summary {
     Json history = Json::array();
     if (!study_.is_search() || study_.objectives.empty()) return history;
     for (const JudgedPoint& point : JudgePoints(study_, rows_)) {
-      history.push_back(
-          {{"trial", point.number * CountTrialsOfPoint(study_)},
-           {"value", ShowObjective(study_.objectives.front(), point.judgement.objectives.front())},
-           {"feasible", point.judgement.is_feasible()}});
+      history.push_back({{"trial", point.number * CountTrialsOfPoint(study_)},
+                         {"value", ShowObjective(study_, point)},
+                         {"feasible", point.judgement.is_feasible()}});
     }
     return history;
   }

@@ -10,7 +10,6 @@
 #include "controller/common/text.h"
 #include "controller/model/parameter_reader.h"
 #include "harness/engine/compiled_model.h"
-#include "harness/engine/engine.h"
 #include "harness/run/joint_margins.h"
 #include "harness/run/runner.h"
 
@@ -185,7 +184,7 @@ void CheckTrials(StudyInputs* inputs) {
   for (const std::string& assignment : first.model_overrides) model.Override(assignment);
   inputs->model_document = std::make_shared<const TomlDocument>(std::move(model));
   inputs->model_overrides = first.model_overrides;
-  if (std::none_of(study.variations.begin(), study.variations.end(), IsModelKey))
+  if (std::ranges::none_of(study.variations, IsModelKey))
     inputs->model = std::make_shared<const RobotModel>(setup.model());
   const Runner runner(setup, study.check);  // sensors and motors know more names than the setup
   inputs->controller_hash = HashController(first.controller);

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <filesystem>
 #include <utility>
 
 #include "controller/common/text.h"
@@ -93,8 +92,7 @@ void LiveRun::Disturb() {
 
 void LiveRun::Record(const StepRecord& step) {
   if (recorder_) recorder_->Record(step);
-  ViewFrame view;
-  RunFrames& frame = view.frame;
+  RunFrames frame;
   frame.title = setup_->scenario().name;
   const int object = setup_->adapter().object_body();
   if (object >= 0) {
@@ -114,15 +112,15 @@ void LiveRun::Record(const StepRecord& step) {
     frame.desired_positions = step.command.desired.X_d.head<3>().transpose();
   }
   const auto count = static_cast<long>(step.response.contacts.size());
-  for (RowMatrixXd* matrix : {&frame.contact_positions, &frame.contact_forces, &frame.contact_normals}) {
+  for (RowMatrixXd* matrix : {&frame.contact_positions, &frame.contact_forces, &frame.contact_normals})
     matrix->resize(1, 3 * count);
-  }
   for (long i = 0; i < count; ++i) {
     const PlantContact& contact = step.response.contacts[static_cast<size_t>(i)];
     frame.contact_positions.block<1, 3>(0, 3 * i) = contact.position.transpose();
     frame.contact_forces.block<1, 3>(0, 3 * i) = contact.force.transpose();
     frame.contact_normals.block<1, 3>(0, 3 * i) = contact.normal.transpose();
   }
+  ViewFrame view;
   const RunChecks& checks = runner_->loop().checks();
   for (const CheckCategory kind : kCheckCategories) {
     CategoryStatus& status = view.categories.emplace_back(CategoryStatus{kind});
@@ -133,6 +131,7 @@ void LiveRun::Record(const StepRecord& step) {
       }
     }
   }
+  view.run = std::make_shared<RunFrames>(std::move(frame));
   view.q = step.reading.state.q;
   view.X_Bo = step.reading.state.X_Bo;
   const std::lock_guard lock(mutex_);
@@ -146,7 +145,7 @@ long LiveRun::rows() const {
 
 double LiveRun::TimeAt(long row) const {
   const std::lock_guard lock(mutex_);
-  return frames_[static_cast<size_t>(row)].frame.times.front();
+  return frames_[static_cast<size_t>(row)].run->times.front();
 }
 
 ViewFrame LiveRun::Read(long row) const {

@@ -42,7 +42,7 @@ std::optional<MouseSpring> MouseSpring::Grab(const Setup& setup, const mjModel& 
                                              const Ray& ray) {
   const mjModel& m = looks;
   const MjDataPtr data = MakeData(m);
-  SetRow(m, frame.frame, 0, data.get());
+  SetRow(m, *frame.run, frame.row, data.get());
   int geom = -1;
   const mjtByte groups[mjNGROUP] = {1, 1, 1, 0, 0, 0};
   const double distance = CastRay(m, *data, ray.from.data(), ray.along.data(), groups, &geom);
@@ -94,10 +94,10 @@ ObjectCamera::ObjectCamera(const FrameSource& source, int width, int height)
 Vector3d ObjectCamera::FindObject(long row) {
   const ViewFrame frame = source_.Read(row);
   const mjModel& model = source_.model();
-  const int body = mj_name2id(&model, mjOBJ_BODY, frame.frame.object_body.c_str());
+  const int body = mj_name2id(&model, mjOBJ_BODY, frame.run->object_body.c_str());
   if (body < 0) return Vector3d(model.stat.center);
   if (!data_) data_ = MakeData(model);
-  SetRow(model, frame.frame, 0, data_.get());
+  SetRow(model, *frame.run, frame.row, data_.get());
   return BodyPose(*data_, body).translation();
 }
 

@@ -27,12 +27,12 @@ ScenePainter::ScenePainter(const mjModel& model, int width, int height)
     : model_(model), data_(MakeData(model)), renderer_(model, MakeOptions(width, height)) {}
 
 Image ScenePainter::Paint(const ViewFrame& frame, const SceneLook& look) {
-  SetRow(model_, frame.frame, 0, data_.get());
+  SetRow(model_, *frame.run, frame.row, data_.get());
   std::vector<Decoration> decorations;
-  if (look.forces) AddForces(frame.frame, 0, look.meters_per_newton, &decorations);
+  if (look.forces) AddForces(*frame.run, frame.row, look.meters_per_newton, &decorations);
   if (look.mouse_force) decorations.emplace_back(*look.mouse_force);
   Image image = renderer_.Render(*data_, look.view, decorations);
-  overlay_.Draw(MakeOverlayState(frame.frame, 0, frame.categories), &image);
+  overlay_.Draw(MakeOverlayState(*frame.run, frame.row, frame.categories), &image);
   return image;
 }
 

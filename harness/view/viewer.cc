@@ -11,7 +11,6 @@
 
 #include "harness/base/interrupts.h"
 #include "harness/view/controls.h"
-#include "harness/view/live_run.h"
 #include "harness/view/pointer.h"
 #include "harness/view/studio.h"
 #include "harness/view/window.h"
@@ -30,12 +29,13 @@ constexpr double kPixelsOfANotch = 32.0;  // of the middle button's way that cou
 class Viewer {
  public:
   Viewer(const FrameSource& source, LiveRun* live, Window* window, const ViewerOptions& options,
-         ControlsState controls)
+         ControlsState controls, std::function<std::string()> save)
       : source_(source),
         live_(live),
         window_(*window),
         options_(options),
         state_(std::move(controls)),
+        save_(std::move(save)),
         camera_(source, options.width, options.height),
         studio_(source, options.width, options.height) {
     state_.live = live != nullptr;
@@ -43,9 +43,9 @@ class Viewer {
   }
 
   /// Until the window is closed, or sliders were moved. @returns whether it was the sliders.
-  bool Show(const std::string& title, const std::function<std::string()>& save) {
+  bool Show(const std::string& title) {
     while (!window_.is_closed() && !closed_ && !IsInterrupted()) {
-      for (const InputEvent& event : window_.Poll(0.008)) Handle(event, save);
+      for (const InputEvent& event : window_.Poll(0.008)) Handle(event);
       if (restart_) return true;
       Move();
       if (const std::optional<Image> image = studio_.Take()) window_.Show(*image);
@@ -138,18 +138,17 @@ class Viewer {
   }
 
   void ChangeSpeed(int by) {
-    const auto at = std::min_element(kSpeeds.begin(), kSpeeds.end(), [&](double a, double b) {
-      return std::abs(a - state_.speed) < std::abs(b - state_.speed);
-    });
+    const auto at = std::ranges::min_element(
+        kSpeeds, [&](double a, double b) { return std::abs(a - state_.speed) < std::abs(b - state_.speed); });
     const long next = std::clamp<long>(at - kSpeeds.begin() + by, 0, static_cast<long>(kSpeeds.size()) - 1);
     state_.speed = kSpeeds[static_cast<size_t>(next)];
     if (live_ != nullptr) live_->SetSpeed(state_.speed);
   }
 
   [[nodiscard]] double MeasureForces(const ViewFrame& frame) {
-    const RowMatrixXd& forces = frame.frame.contact_forces;
+    const RowMatrixXd& forces = frame.run->contact_forces;
     for (long k = 0; k < forces.cols() / 3; ++k) {
-      const double size = forces.block<1, 3>(0, 3 * k).norm();
+      const double size = forces.block<1, 3>(frame.row, 3 * k).norm();
       if (std::isfinite(size)) largest_force_ = std::max(largest_force_, size);
     }
     return kForceLength / std::max(largest_force_, 1e-9);
@@ -176,14 +175,14 @@ class Viewer {
     state_.message = "let go; the checks know the force";
   }
 
-  void Handle(const InputEvent& event, const std::function<std::string()>& save) {
+  void Handle(const InputEvent& event) {
     using Kind = InputEvent::Kind;
     switch (event.kind) {
       case Kind::kPress:
-        Press(event, save);
+        Press(event);
         break;
       case Kind::kRelease:
-        Release(event);
+        Release();
         break;
       case Kind::kMove:
         Drag(event);
@@ -192,19 +191,19 @@ class Viewer {
         camera_.Zoom(event.scroll);
         break;
       case Kind::kKey:
-        if (const std::optional<Action> action = FindAction(event.key)) Act(*action, save);
+        if (const std::optional<Action> action = FindAction(event.key)) Act(*action);
         break;
     }
     mouse_ = event;
   }
 
-  void Press(const InputEvent& event, const std::function<std::string()>& save) {
+  void Press(const InputEvent& event) {
     button_ = event.button;
     held_ = event.button == InputEvent::Button::kLeft
                 ? Controls::Find(state_, options_.width, options_.height, event.x, event.y)
                 : std::nullopt;
     if (held_ && held_->kind == ControlHit::Kind::kButton) {
-      Act(held_->action, save);
+      Act(held_->action);
     } else if (held_) {
       Slide(*held_);
     } else if (event.control && live_ != nullptr && source_.rows() > 0 && !live_->is_finished()) {
@@ -217,7 +216,7 @@ class Viewer {
     }
   }
 
-  void Release(const InputEvent& /*event*/) {
+  void Release() {
     turning_ = false;
     LetGo();
     if (held_ && held_->kind == ControlHit::Kind::kSlider) restart_ = true;
@@ -244,7 +243,7 @@ class Viewer {
     if (hit.kind == ControlHit::Kind::kSlider) state_.sliders[hit.slider].factor = hit.value;
   }
 
-  void Act(Action action, const std::function<std::string()>& save) {
+  void Act(Action action) {
     switch (action) {
       case Action::kPlay:
         return SetPlaying(!state_.playing);
@@ -272,7 +271,7 @@ class Viewer {
         state_.forces = !state_.forces;
         return;
       case Action::kSave:
-        if (live_ != nullptr) state_.message = save();
+        if (live_ != nullptr) state_.message = save_();
         return;
       case Action::kControls:
         state_.shown = !state_.shown;
@@ -291,6 +290,7 @@ class Viewer {
   Window& window_;
   ViewerOptions options_;
   ControlsState state_;
+  std::function<std::string()> save_;
   ObjectCamera camera_;
   long row_ = -1;
   bool looks_back_ = false;
@@ -317,7 +317,7 @@ void ViewRecording(const FrameSource& recording, const std::string& title, const
   controls.playing = !options.paused;
   controls.speed = options.speed;
   controls.message = "F1: keys, drag: turn, wheel: nearer, space: play, arrows: step, Q: quit";
-  Viewer(recording, nullptr, &window, options, controls).Show(title, [] { return std::string(); });
+  Viewer(recording, nullptr, &window, options, controls, {}).Show(title);
 }
 
 std::unique_ptr<LiveRun> ViewLive(const LiveRunMaker& make, const std::string& title,
@@ -336,8 +336,8 @@ std::unique_ptr<LiveRun> ViewLive(const LiveRunMaker& make, const std::string& t
     bool restart = false;
     {
       // It draws this run in a thread of its own, and ends before the run does.
-      Viewer viewer(*run, run.get(), &window, options, controls);
-      restart = viewer.Show(title, [&] { return save(*run); });
+      Viewer viewer(*run, run.get(), &window, options, controls, [&] { return save(*run); });
+      restart = viewer.Show(title);
       controls = viewer.state();
     }
     run->Finish();

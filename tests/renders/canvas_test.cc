@@ -5,7 +5,6 @@
 #include <gtest/gtest.h>
 
 #include <array>
-#include <cmath>
 #include <utility>
 
 #include "controller/common/errors.h"
@@ -92,8 +91,7 @@ TEST(Font, BrokenUtf8IsMended) {
 TEST(Font, NamesAFileThatIsNone) {
   EXPECT_TRUE(Throws<InputError>([] { Font font("/nowhere/font.ttf"); },
                                  "/nowhere/font.ttf: cannot be used as a font"));
-  EXPECT_TRUE(
-      Throws<InputError>([] { Font font(testing::SourcePath("/README.md")); }, "cannot be used as a font"));
+  EXPECT_TRUE(Throws<InputError>([] { Font font(SourcePath("/README.md")); }, "cannot be used as a font"));
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <stdexcept>
 #include <vector>
 
@@ -30,6 +31,49 @@ TEST(Image, RefusesEmptyPictures) {
   EXPECT_TRUE(
       Throws<std::invalid_argument>([] { return Image(0, 3); }, "image width: must be positive, got 0"));
   EXPECT_TRUE(Throws<std::invalid_argument>([] { return Image(3, -1); }, "image height"));
+}
+
+Image MakePlain(int width, int height, std::uint8_t value) {
+  Image image(width, height);
+  std::ranges::fill(image.rgb, value);
+  return image;
+}
+
+TEST(PlaceBeside, KeepsBothPictures) {
+  const Image both = PlaceBeside(MakePlain(40, 36, 10), MakePlain(30, 36, 20));
+  ASSERT_EQ(both.width, 70);
+  ASSERT_EQ(both.height, 36);
+  for (const int y : {0, 35}) {
+    EXPECT_EQ(both.Pixel(0, y)[0], 10);
+    EXPECT_EQ(both.Pixel(38, y)[0], 10);
+    EXPECT_EQ(both.Pixel(40, y)[0], 242) << "the line between";
+    EXPECT_EQ(both.Pixel(42, y)[0], 20);
+    EXPECT_EQ(both.Pixel(69, y)[0], 20);
+  }
+}
+
+TEST(PlaceBeside, RefusesDifferentHeights) {
+  EXPECT_TRUE(
+      Throws<std::invalid_argument>([] { PlaceBeside(Image(4, 4), Image(4, 5)); }, "must be equally high"));
+}
+
+TEST(PlaceInset, LiesInTheLowerRightCornerWithAFrame) {
+  Image image = MakePlain(640, 360, 10);
+  PlaceInset(MakePlain(100, 50, 20), &image);
+  // At 360 rows the frame is 1 wide, the margin 10.
+  const int right = 640 - 10;
+  const int bottom = 360 - 10;
+  EXPECT_EQ(image.Pixel(right - 2, bottom - 2)[0], 20);
+  EXPECT_EQ(image.Pixel(right - 101, bottom - 51)[0], 20);
+  EXPECT_EQ(image.Pixel(right - 1, bottom - 1)[0], 242);
+  EXPECT_EQ(image.Pixel(right - 102, bottom - 52)[0], 242);
+  EXPECT_EQ(image.Pixel(right, bottom)[0], 10);
+  EXPECT_EQ(image.Pixel(right - 103, bottom - 53)[0], 10);
+}
+
+TEST(PlaceInset, RefusesWhatDoesNotFit) {
+  Image image(100, 100);
+  EXPECT_TRUE(Throws<std::invalid_argument>([&] { PlaceInset(Image(100, 20), &image); }, "inset: must fit"));
 }
 
 }  // namespace

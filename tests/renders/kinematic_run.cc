@@ -85,4 +85,16 @@ RunFrames MakeKinematicRun(const mjModel& model, double duration, double step) {
   return run;
 }
 
+Vector3d FindTorus(const Image& image) {
+  Vector3d sum = Vector3d::Zero();
+  for (int y = 0; y < image.height; ++y) {
+    for (int x = 0; x < image.width; ++x) {
+      const std::uint8_t* const rgb = image.Pixel(x, y);
+      if (rgb[0] > 90 && rgb[0] > 1.5 * rgb[1] && rgb[0] > 2.2 * rgb[2])
+        sum += Vector3d(x + 0.5, y + 0.5, 1.0);
+    }
+  }
+  return {sum.x() / sum.z(), sum.y() / sum.z(), sum.z()};
+}
+
 }  // namespace dexcheck::testing

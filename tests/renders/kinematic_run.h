@@ -2,6 +2,7 @@
 
 #include <mujoco/mujoco.h>
 
+#include "renders/image.h"
 #include "renders/run_frames.h"
 
 namespace dexcheck::testing {
@@ -11,5 +12,8 @@ namespace dexcheck::testing {
 /// are smooth inventions.
 /// @param model the shipped scene.
 RunFrames MakeKinematicRun(const mjModel& model, double duration, double step = 0.01);
+
+/// Where the torus is in a picture: the mean of its orange pixels, and how many there are.
+Vector3d FindTorus(const Image& image);
 
 }  // namespace dexcheck::testing

@@ -101,7 +101,7 @@ TEST(Overlay, GrowsWithThePictureAndStaysInItsCorner) {
   const OverlayState state = MakeState();
   for (const int height : {90, 360, 720, 1080}) {
     Image image(height * 16 / 9, height);
-    std::fill(image.rgb.begin(), image.rgb.end(), std::uint8_t{255});
+    std::ranges::fill(image.rgb, std::uint8_t{255});
     overlay.Draw(state, &image);
     int right = 0;
     int bottom = 0;

@@ -29,7 +29,7 @@ constexpr double kTube = 0.011;
 class RendererTest : public ::testing::Test {
  protected:
   void SetUp() override {
-    run_ = testing::MakeKinematicRun(*model_, 0.1);
+    run_ = MakeKinematicRun(*model_, 0.1);
     SetRow(*model_, run_, 0, data_.get());
   }
 
@@ -80,7 +80,7 @@ class RendererTest : public ::testing::Test {
     return count;
   }
 
-  MjModelPtr model_ = LoadMjcf(testing::SourcePath("/mjcf/scene.xml"));
+  MjModelPtr model_ = LoadMjcf(SourcePath("/mjcf/scene.xml"));
   MjDataPtr data_ = MakeData(*model_);
   RunFrames run_;
 };
@@ -246,7 +246,7 @@ TEST_F(RendererTest, StillLooksAsItDid) {
     return VideoPainter({&view, 1}, options).Paint(0.1);
   };
   const Image image = paint(run_);
-  const std::string path = testing::SourcePath("/tests/renders/golden_still.png");
+  const std::string path = SourcePath("/tests/renders/golden_still.png");
   if (std::getenv("DEXCHECK_WRITE_GOLDEN") != nullptr) WritePicture(path, image);
   const Image golden = ReadPng(path);
   ASSERT_EQ(golden.rgb.size(), image.rgb.size());

@@ -19,8 +19,8 @@ constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
 class RunFramesTest : public ::testing::Test {
  protected:
-  MjModelPtr model_ = LoadMjcf(testing::SourcePath("/mjcf/scene.xml"));
-  RunFrames run_ = testing::MakeKinematicRun(*model_, 0.1);
+  MjModelPtr model_ = LoadMjcf(SourcePath("/mjcf/scene.xml"));
+  RunFrames run_ = MakeKinematicRun(*model_, 0.1);
 };
 
 TEST_F(RunFramesTest, AcceptsARunWithAndWithoutExtras) {

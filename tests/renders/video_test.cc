@@ -19,8 +19,8 @@
 #include "renders/renderer.h"
 #include "tests/common/files.h"
 #include "tests/common/paths.h"
-#include "tests/common/run_program.h"
 #include "tests/common/throws.h"
+#include "tests/renders/decode.h"
 #include "tests/renders/kinematic_run.h"
 
 namespace dexcheck::testing::video_test {
@@ -33,8 +33,9 @@ constexpr int kHeight = 180;
 
 class VideoTest : public ::testing::Test {
  protected:
-  static VideoOptions MakeOptions() {
+  static VideoOptions MakeOptions(bool panel = true) {
     VideoOptions options;
+    options.panel = panel;
     options.width = kWidth;
     options.height = kHeight;
     options.fps = 10;
@@ -55,28 +56,18 @@ class VideoTest : public ::testing::Test {
     return true;
   }
 
-  MjModelPtr model_ = LoadMjcf(testing::SourcePath("/mjcf/scene.xml"));
-  RunFrames run_ = testing::MakeKinematicRun(*model_, 0.5);
+  Image Paint(const VideoOptions& options, double time) const {
+    return VideoPainter({&view_, 1}, options).Paint(time);
+  }
+
+  MjModelPtr model_ = LoadMjcf(SourcePath("/mjcf/scene.xml"));
+  RunFrames run_ = MakeKinematicRun(*model_, 0.5);
   RunView view_ = {model_.get(), &run_};
   TempFolder folder_;
 };
 
-/// Where the torus is in a picture: the mean of its orange pixels, and how many there are.
-Vector3d FindTorus(const Image& image) {
-  Vector3d sum = Vector3d::Zero();
-  for (int y = 0; y < image.height; ++y) {
-    for (int x = 0; x < image.width; ++x) {
-      const std::uint8_t* const rgb = image.Pixel(x, y);
-      if (rgb[0] > 90 && rgb[0] > 1.5 * rgb[1] && rgb[0] > 2.2 * rgb[2])
-        sum += Vector3d(x + 0.5, y + 0.5, 1.0);
-    }
-  }
-  return {sum.x() / sum.z(), sum.y() / sum.z(), sum.z()};
-}
-
 TEST_F(VideoTest, AFreeCameraKeepsWhatItLooksAtInTheMiddle) {
-  VideoOptions options = MakeOptions();
-  options.panel = false;
+  VideoOptions options = MakeOptions(/*panel=*/false);
   options.free = FreeCamera{{0.9, -1.0, 1.0}, {}, /*follow=*/true, /*orbit=*/0.8};
   VideoPainter orbiting({&view_, 1}, options);
   constexpr double kPixels = 4.0;  // fingers hide parts of the torus
@@ -116,16 +107,12 @@ TEST_F(VideoTest, DecodedFramesDifferWhereTheRobotMoved) {
     run_.qpos.row(row) = run_.qpos.row(0).eval();
     run_.qpos(row, elbow) -= 2.0 * run_.times[static_cast<size_t>(row)];
   }
-  VideoOptions options = MakeOptions();
-  options.panel = false;
+  VideoOptions options = MakeOptions(/*panel=*/false);
   ASSERT_TRUE(Video(folder_.path() / "a.mp4", {&view_, 1}, options));
-  const testing::ProgramResult decoded =
-      testing::RunProgram({DEXCHECK_FFMPEG, "-v", "error", "-i", folder_.path() / "a.mp4", "-f", "rawvideo",
-                           "-pix_fmt", "rgb24", "-"});
-  ASSERT_EQ(decoded.exit_code, 0) << decoded.err;
+  const std::string decoded = Decode(folder_.path() / "a.mp4");
   constexpr size_t kFrame = 3UL * kWidth * kHeight;
-  ASSERT_EQ(decoded.out.size(), 5 * kFrame);
-  const char* first = decoded.out.data();
+  ASSERT_EQ(decoded.size(), 5 * kFrame);
+  const char* first = decoded.data();
   const char* last = first + 4 * kFrame;
   EXPECT_GT(Difference(first, last, 41, 57, 45, 65), 15.0) << "forearm and torus";
   EXPECT_LT(Difference(first, last, 44, 56, 2, 30), 2.0) << "head";
@@ -133,12 +120,11 @@ TEST_F(VideoTest, DecodedFramesDifferWhereTheRobotMoved) {
 }
 
 TEST_F(VideoTest, CamerasOfItsOwnAreNearToRobotAndObject) {
-  run_ = testing::MakeKinematicRun(*model_, 6.0, 0.1);
-  VideoOptions options = MakeOptions();
-  options.panel = false;
+  run_ = MakeKinematicRun(*model_, 6.0, 0.1);
+  VideoOptions options = MakeOptions(/*panel=*/false);
   const auto find = [&](const char* camera, double time) {
     options.camera = camera;
-    return FindTorus(VideoPainter({&view_, 1}, options).Paint(time));
+    return FindTorus(Paint(options, time));
   };
   const double far = find(kCourseCamera, 0.0).z();
   EXPECT_GT(find(kRobotCamera, 0.0).z(), 3.0 * far);
@@ -149,9 +135,9 @@ TEST_F(VideoTest, CamerasOfItsOwnAreNearToRobotAndObject) {
   EXPECT_NEAR(torus.y(), 0.5 * kHeight, 0.1 * kHeight);
   // As an inset, too, without moving the picture's own camera.
   options.camera = kCourseCamera;
-  const Image plain = VideoPainter({&view_, 1}, options).Paint(6.0);
+  const Image plain = Paint(options, 6.0);
   options.inset = kObjectCamera;
-  const Image with_inset = VideoPainter({&view_, 1}, options).Paint(6.0);
+  const Image with_inset = Paint(options, 6.0);
   EXPECT_EQ(Difference(plain.rgb.data(), with_inset.rgb.data(), 0, 50, 0, 100), 0.0);
   EXPECT_GT(FindTorus(with_inset).z(), FindTorus(plain).z() + 0.001 * kWidth * kHeight);
 }
@@ -163,11 +149,10 @@ TEST_F(VideoTest, TheGhostOfAnotherRunStandsWhereThatRunIs) {
     const int address = model_->jnt_qposadr[mj_name2id(model_.get(), mjOBJ_JOINT, joint)];
     other.qpos.col(address + 1).array() += kOff;
   }
-  VideoOptions options = MakeOptions();
-  options.panel = false;
+  VideoOptions options = MakeOptions(/*panel=*/false);
   options.free = FreeCamera{{2.6, -2.2, 1.4}, Vector3d(0.9, 0.0, 0.7), false, 0.0};
   const RunView other_view = {model_.get(), &other};
-  const Image here = VideoPainter({&view_, 1}, options).Paint(0.2);
+  const Image here = Paint(options, 0.2);
   const Image there = VideoPainter({&other_view, 1}, options).Paint(0.2);
   options.ghost = true;
   const std::array<RunView, 2> both = {view_, other_view};
@@ -204,9 +189,8 @@ TEST_F(VideoTest, TheGhostOfAnotherRunStandsWhereThatRunIs) {
 }
 
 TEST_F(VideoTest, TheCourseCameraStandsStill) {
-  run_ = testing::MakeKinematicRun(*model_, 3.0);
-  VideoOptions options = MakeOptions();
-  options.panel = false;
+  run_ = MakeKinematicRun(*model_, 3.0);
+  VideoOptions options = MakeOptions(/*panel=*/false);
   const auto differences = [&](const char* camera) {
     options.camera = camera;
     VideoPainter painter({&view_, 1}, options);
@@ -233,8 +217,7 @@ TEST_F(VideoTest, VideoDoesNotDependOnTheNumberOfProcesses) {
   ASSERT_TRUE(Video(folder_.path() / "one.mp4", {&view_, 1}, options));
   options.workers = 3;
   ASSERT_TRUE(Video(folder_.path() / "three.mp4", {&view_, 1}, options));
-  EXPECT_TRUE(testing::ReadText(folder_.path() / "one.mp4") ==
-              testing::ReadText(folder_.path() / "three.mp4"));
+  EXPECT_TRUE(ReadText(folder_.path() / "one.mp4") == ReadText(folder_.path() / "three.mp4"));
 }
 
 TEST_F(VideoTest, ProcessesDrawTheSameFramesByteForByte) {
@@ -250,7 +233,7 @@ TEST_F(VideoTest, ProcessesDrawTheSameFramesByteForByte) {
   }
   EXPECT_NE(own.front().rgb, own.back().rgb);
   const auto paint = [&](size_t frame) {
-    const Image image = VideoPainter({&view_, 1}, options).Paint(static_cast<double>(frame) / 10);
+    const Image image = Paint(options, static_cast<double>(frame) / 10);
     return std::string(image.rgb.begin(), image.rgb.end());
   };
   const auto compare = [&](size_t frame, const std::string& rgb) {
@@ -290,16 +273,15 @@ TEST_F(VideoTest, TwoRunsStandSideBySide) {
 }
 
 TEST_F(VideoTest, LostContactsAreNotDrawn) {
-  VideoOptions options = MakeOptions();
-  options.panel = false;
+  VideoOptions options = MakeOptions(/*panel=*/false);
   options.camera = "grasp";
   options.forces = options.tracks = true;
-  const Image all = VideoPainter({&view_, 1}, options).Paint(0.5);
+  const Image all = Paint(options, 0.5);
   run_.contact_positions.block(20, 0, 31, 3).setConstant(std::numeric_limits<double>::quiet_NaN());
-  const Image fewer = VideoPainter({&view_, 1}, options).Paint(0.5);
+  const Image fewer = Paint(options, 0.5);
   EXPECT_NE(all.rgb, fewer.rgb);
   run_.contact_forces.setConstant(std::numeric_limits<double>::quiet_NaN());
-  EXPECT_NO_THROW(VideoPainter({&view_, 1}, options).Paint(0.5));
+  EXPECT_NO_THROW(Paint(options, 0.5));
 }
 
 TEST_F(VideoTest, ReportsItsProgressAndStopsOnRequest) {
@@ -336,7 +318,7 @@ TEST_F(VideoTest, BadInputIsRefusedAndLeavesNothing) {
 }
 
 TEST_F(VideoTest, CountsTheFramesOfTheLongestRun) {
-  const RunFrames longer = testing::MakeKinematicRun(*model_, 2.0);
+  const RunFrames longer = MakeKinematicRun(*model_, 2.0);
   const std::array<RunView, 2> both = {view_, {model_.get(), &longer}};
   EXPECT_EQ(CountFrames({&view_, 1}, 30), 15);
   EXPECT_EQ(CountFrames(both, 30), 60);

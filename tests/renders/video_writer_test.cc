@@ -1,12 +1,10 @@
-// The files as ffprobe and ffmpeg see them.
+// Videos and pictures as ffprobe and ffmpeg see them.
 
 #include "renders/video_writer.h"
 
 #include <gtest/gtest.h>
-#include <sys/resource.h>
 
 #include <algorithm>
-#include <csignal>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <random>
@@ -16,8 +14,10 @@
 
 #include "controller/common/errors.h"
 #include "tests/common/files.h"
+#include "tests/common/full_disk.h"
 #include "tests/common/run_program.h"
 #include "tests/common/throws.h"
+#include "tests/renders/decode.h"
 
 namespace dexcheck::testing::video_writer_test {
 namespace {
@@ -54,33 +54,73 @@ void WriteVideo(const fs::path& path, int frames) {
   EXPECT_EQ(video.frames(), frames);
 }
 
-TEST(VideoWriter, IsWhatBrowsersPlay) {
-  const TempFolder folder;
-  const fs::path path = folder.path() / "a video.mp4";
-  WriteVideo(path, 20);
-  const testing::ProgramResult probe =
-      RunProgram({DEXCHECK_FFPROBE, "-v", "error", "-count_frames", "-show_streams", "-show_format", "-of",
-                  "json", path.string()});
-  ASSERT_EQ(probe.exit_code, 0) << probe.err;
+/// Of a file with one stream.
+nlohmann::json Probe(const fs::path& path) {
+  const ProgramResult probe = RunProgram({DEXCHECK_FFPROBE, "-v", "error", "-count_frames", "-show_streams",
+                                          "-show_format", "-of", "json", path.string()});
+  EXPECT_EQ(probe.exit_code, 0) << probe.err;
   EXPECT_EQ(probe.err, "");
   const nlohmann::json json = nlohmann::json::parse(probe.out);
-  ASSERT_EQ(json["streams"].size(), 1);
-  const nlohmann::json& stream = json["streams"][0];
-  EXPECT_EQ(stream["codec_name"], "h264");
-  EXPECT_EQ(stream["pix_fmt"], "yuv420p");
-  EXPECT_EQ(stream["width"], kWidth);
-  EXPECT_EQ(stream["height"], kHeight);
-  EXPECT_EQ(stream["nb_read_frames"], "20");
-  EXPECT_EQ(stream["avg_frame_rate"], "25/1");
-  EXPECT_EQ(stream["color_space"], "bt709");
-  EXPECT_EQ(stream["color_range"], "tv");
-  EXPECT_NEAR(std::stod(json["format"]["duration"].get<std::string>()), 20.0 / 25.0, 1e-3);
+  EXPECT_EQ(json["streams"].size(), 1U);
+  return json;
+}
+
+TEST(VideoWriter, WritesWhatTheNameSaysAsBrowsersPlayIt) {
+  struct Format {
+    const char* name;
+    const char* codec;
+    const char* container;
+    int levels;  // how far colours may be off
+  };
+  // Plain colours survive chroma subsampling; conversion to 8-bit YUV and quantisation cost a few levels.
+  // With the matrix of standard definition the green of these frames would be off by ten levels and more.
+  // A GIF has all colours that there are.
+  constexpr int kVideoLevels = 6;
+  constexpr int kGifLevels = 4;
+  constexpr size_t kFrame = 3UL * kWidth * kHeight;
+  const TempFolder folder;
+  for (const Format& format : {Format{"A video.MP4", "h264", "mov,mp4", kVideoLevels},
+                               {"a.webm", "vp9", "matroska,webm", kVideoLevels},
+                               {"a.gif", "gif", "gif", kGifLevels}}) {
+    SCOPED_TRACE(format.name);
+    const fs::path path = folder.path() / format.name;
+    WriteVideo(path, 20);
+    const nlohmann::json json = Probe(path);
+    const nlohmann::json& stream = json["streams"][0];
+    EXPECT_EQ(stream["codec_name"], format.codec);
+    EXPECT_EQ(json["format"]["format_name"].get<std::string>().find(format.container), 0U);
+    EXPECT_EQ(stream["width"], kWidth);
+    EXPECT_EQ(stream["height"], kHeight);
+    EXPECT_EQ(stream["nb_read_frames"], "20");
+    EXPECT_EQ(stream["avg_frame_rate"], "25/1");
+    EXPECT_NEAR(std::stod(json["format"]["duration"].get<std::string>()), 20.0 / 25.0, 0.01);
+    if (stream["codec_name"] == "h264") {
+      EXPECT_EQ(stream["pix_fmt"], "yuv420p");
+      EXPECT_EQ(stream["color_space"], "bt709");
+      EXPECT_EQ(stream["color_range"], "tv");
+    }
+    const std::string decoded = Decode(path);
+    ASSERT_EQ(decoded.size(), 20 * kFrame);
+    for (size_t k = 0; k < 20; ++k) {
+      const Image expected = MakeFrame(static_cast<int>(k));
+      for (const size_t i : {size_t{0}, kFrame / 2, kFrame - 3}) {
+        for (size_t c = i; c < i + 3; ++c) {
+          const int value = static_cast<unsigned char>(decoded[k * kFrame + c]);
+          EXPECT_NEAR(value, expected.rgb[c], format.levels) << "frame " << k << ", byte " << c;
+        }
+      }
+    }
+    const std::string bytes = ReadText(path);
+    fs::remove(path);
+    WriteVideo(path, 20);
+    EXPECT_TRUE(ReadText(path) == bytes) << "same frames, same bytes";
+  }
 }
 
 TEST(VideoWriter, IndexStandsBeforeTheData) {
   const TempFolder folder;
   WriteVideo(folder.path() / "a.mp4", 5);
-  const std::string bytes = testing::ReadText(folder.path() / "a.mp4");
+  const std::string bytes = ReadText(folder.path() / "a.mp4");
   std::vector<std::string> boxes;
   for (size_t at = 0; at + 8 <= bytes.size();) {
     size_t size = 0;
@@ -89,34 +129,9 @@ TEST(VideoWriter, IndexStandsBeforeTheData) {
     ASSERT_GE(size, 8);
     at += size;
   }
-  const auto place = [&](const char* name) {
-    return std::find(boxes.begin(), boxes.end(), name) - boxes.begin();
-  };
+  const auto place = [&](const char* name) { return std::ranges::find(boxes, name) - boxes.begin(); };
   ASSERT_LT(place("mdat"), static_cast<long>(boxes.size()));
   EXPECT_LT(place("moov"), place("mdat"));
-}
-
-TEST(VideoWriter, DecodesToTheFramesThatWereWritten) {
-  const TempFolder folder;
-  WriteVideo(folder.path() / "a.mp4", 20);
-  const testing::ProgramResult decoded =
-      RunProgram({DEXCHECK_FFMPEG, "-v", "error", "-i", folder.path() / "a.mp4", "-f", "rawvideo", "-pix_fmt",
-                  "rgb24", "-"});
-  ASSERT_EQ(decoded.exit_code, 0) << decoded.err;
-  constexpr size_t kFrame = 3UL * kWidth * kHeight;
-  ASSERT_EQ(decoded.out.size(), 20 * kFrame);
-  // Plain colours survive chroma subsampling; conversion to 8-bit YUV and quantisation cost a few levels.
-  // With the matrix of standard definition the green of these frames would be off by ten levels and more.
-  constexpr int kLevels = 6;
-  for (int k = 0; k < 20; ++k) {
-    const Image expected = MakeFrame(k);
-    for (const size_t i : {size_t{0}, kFrame / 2, kFrame - 3}) {
-      for (size_t c = 0; c < 3; ++c) {
-        const int value = static_cast<unsigned char>(decoded.out[static_cast<size_t>(k) * kFrame + i + c]);
-        EXPECT_NEAR(value, expected.rgb[i + c], kLevels) << "frame " << k << ", channel " << c;
-      }
-    }
-  }
 }
 
 TEST(VideoWriter, SameFramesGiveTheSameBytes) {
@@ -134,56 +149,9 @@ TEST(VideoWriter, SameFramesGiveTheSameBytes) {
     VideoWriter video(folder.path() / "a.mp4", MakeOptions());
     for (const Image& frame : frames) video.Write(Image(frame));
     video.Finish();
-    const std::string bytes = testing::ReadText(folder.path() / "a.mp4");
+    const std::string bytes = ReadText(folder.path() / "a.mp4");
     if (first.empty()) first = bytes;
     ASSERT_TRUE(bytes == first) << "video " << k;
-  }
-}
-
-/// What ffprobe says of a file's only stream.
-nlohmann::json Probe(const fs::path& path) {
-  const testing::ProgramResult probe =
-      RunProgram({DEXCHECK_FFPROBE, "-v", "error", "-count_frames", "-show_streams", "-show_format", "-of",
-                  "json", path.string()});
-  EXPECT_EQ(probe.exit_code, 0) << probe.err;
-  return nlohmann::json::parse(probe.out);
-}
-
-TEST(VideoWriter, WritesWhatTheNameSays) {
-  struct Format {
-    const char* name;
-    const char* codec;
-    const char* container;
-    int levels;  // how far colours may be off
-  };
-  // Plain colours; a GIF has all that there are.
-  constexpr int kVideoLevels = 6;
-  constexpr int kGifLevels = 4;
-  const TempFolder folder;
-  for (const Format& format :
-       {Format{"a.webm", "vp9", "matroska,webm", kVideoLevels}, Format{"a.gif", "gif", "gif", kGifLevels},
-        Format{"A.MP4", "h264", "mov,mp4", kVideoLevels}}) {
-    const fs::path path = folder.path() / format.name;
-    WriteVideo(path, 20);
-    const nlohmann::json json = Probe(path);
-    EXPECT_EQ(json["streams"][0]["codec_name"], format.codec);
-    EXPECT_EQ(json["format"]["format_name"].get<std::string>().find(format.container), 0U) << format.name;
-    EXPECT_EQ(json["streams"][0]["nb_read_frames"], "20") << format.name;
-    EXPECT_NEAR(std::stod(json["format"]["duration"].get<std::string>()), 20.0 / 25.0, 0.01) << format.name;
-    const testing::ProgramResult decoded =
-        RunProgram({DEXCHECK_FFMPEG, "-v", "error", "-i", path, "-f", "rawvideo", "-pix_fmt", "rgb24", "-"});
-    ASSERT_EQ(decoded.out.size(), 20UL * 3 * kWidth * kHeight) << format.name;
-    for (size_t k = 0; k < 20; ++k) {
-      const Image expected = MakeFrame(static_cast<int>(k));
-      for (size_t c = 0; c < 3; ++c) {
-        const int value = static_cast<unsigned char>(decoded.out[k * 3 * kWidth * kHeight + c]);
-        EXPECT_NEAR(value, expected.rgb[c], format.levels) << format.name << ", frame " << k;
-      }
-    }
-    const std::string bytes = testing::ReadText(path);
-    fs::remove(path);
-    WriteVideo(path, 20);
-    EXPECT_TRUE(testing::ReadText(path) == bytes) << format.name << ": same frames, same bytes";
   }
 }
 
@@ -202,12 +170,12 @@ TEST(VideoWriter, RefusesNamesOfOtherFormats) {
 
 TEST(VideoWriter, LeavesNothingUnlessFinished) {
   const TempFolder folder;
-  testing::WriteText(folder.path() / "old.mp4", "old");
+  WriteText(folder.path() / "old.mp4", "old");
   {
     VideoWriter video(folder.path() / "old.mp4", MakeOptions());
     for (int k = 0; k < 10; ++k) video.Write(MakeFrame(k));
   }
-  EXPECT_EQ(testing::ReadText(folder.path() / "old.mp4"), "old");
+  EXPECT_EQ(ReadText(folder.path() / "old.mp4"), "old");
   EXPECT_EQ(std::distance(fs::directory_iterator(folder.path()), {}), 1);
 }
 
@@ -230,31 +198,10 @@ TEST(VideoWriter, NamesThePathThatCannotBeWritten) {
   EXPECT_TRUE(fs::is_empty(folder.path()));
 }
 
-/// While it lives, no file of this process grows beyond a size.
-class FileSizeLimit {
- public:
-  explicit FileSizeLimit(rlim_t bytes) {
-    getrlimit(RLIMIT_FSIZE, &before_);
-    const rlimit limit = {bytes, before_.rlim_max};
-    setrlimit(RLIMIT_FSIZE, &limit);
-    handler_ = std::signal(SIGXFSZ, SIG_IGN);
-  }
-  ~FileSizeLimit() {
-    setrlimit(RLIMIT_FSIZE, &before_);
-    std::signal(SIGXFSZ, handler_);
-  }
-  FileSizeLimit(const FileSizeLimit&) = delete;
-  FileSizeLimit& operator=(const FileSizeLimit&) = delete;
-
- private:
-  rlimit before_{};
-  void (*handler_)(int) = nullptr;
-};
-
 TEST(VideoWriter, AFullDiskLeavesNothing) {
   const TempFolder folder;
   {
-    const FileSizeLimit limit(1000);
+    const FullDisk full(1000);
     EXPECT_TRUE(Throws<InputError>([&] { WriteVideo(folder.path() / "a.mp4", 60); },
                                    "a.mp4: cannot be written: File size limit exceeded"));
   }
@@ -277,6 +224,64 @@ TEST(VideoWriter, RefusesWhatH264CannotTake) {
   VideoWriter video(folder.path() / "a.mp4", MakeOptions());
   EXPECT_TRUE(
       Throws<std::invalid_argument>([&] { video.Write(Image(2, 2)); }, "frame width: must be the video's"));
+}
+
+/// Colours that change smoothly over the picture; odd sizes, as a user may want.
+Image MakePicture() {
+  Image image(51, 33);
+  for (int row = 0; row < image.height; ++row) {
+    for (int col = 0; col < image.width; ++col) {
+      std::uint8_t* const rgb = &image.rgb[static_cast<size_t>(3 * (row * image.width + col))];
+      rgb[0] = static_cast<std::uint8_t>(5 * col);
+      rgb[1] = static_cast<std::uint8_t>(7 * row);
+      rgb[2] = static_cast<std::uint8_t>(200 - 3 * col);
+    }
+  }
+  return image;
+}
+
+TEST(PictureFile, AJpegDecodesToThePicture) {
+  const TempFolder folder;
+  const fs::path path = folder.path() / "a.jpg";
+  const Image picture = MakePicture();
+  WritePicture(path, picture);
+  const std::string decoded = Decode(path);
+  ASSERT_EQ(decoded.size(), picture.rgb.size());
+  // Quantisation at the quality that is used; measured 6.
+  constexpr int kLevels = 12;
+  for (size_t i = 0; i < picture.rgb.size(); ++i) {
+    ASSERT_NEAR(static_cast<unsigned char>(decoded[i]), picture.rgb[i], kLevels) << i;
+  }
+}
+
+TEST(PictureFile, WritesWhatTheNameSaysOrNothing) {
+  const TempFolder folder;
+  WritePicture(folder.path() / "a.PNG", MakePicture());
+  EXPECT_EQ(ReadPng(folder.path() / "a.PNG").rgb, MakePicture().rgb);
+  for (const char* name : {"a.gif", "a", "jpg", "a.jpg.txt"}) {
+    EXPECT_TRUE(Throws<InputError>([&] { WritePicture(folder.path() / name, MakePicture()); },
+                                   "a picture's name must end in .png, .jpg or .jpeg"));
+  }
+  EXPECT_TRUE(Throws<InputError>([&] { WritePicture("/nowhere/a.jpg", MakePicture()); },
+                                 "/nowhere/a.jpg: cannot be written: No such file"));
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder.path()), fs::directory_iterator()), 1);
+}
+
+TEST(PictureFile, ReplacesAnExistingFileWhole) {
+  const TempFolder folder;
+  WriteText(folder.path() / "a.png", "old");
+  WritePicture(folder.path() / "a.png", Image(3, 3));
+  EXPECT_EQ(ReadPng(folder.path() / "a.png").width, 3);
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder.path()), {}), 1);
+}
+
+TEST(PictureFile, NamesTheFileThatIsNoPicture) {
+  EXPECT_TRUE(Throws<InputError>([] { ReadPng("/nowhere/a.png"); }, "/nowhere/a.png: cannot be read"));
+  const TempFolder folder;
+  WritePicture(folder.path() / "a.png", MakePicture());
+  const std::string text = ReadText(folder.path() / "a.png");
+  WriteText(folder.path() / "a.png", text.substr(0, text.size() / 2));
+  EXPECT_TRUE(Throws<InputError>([&] { ReadPng(folder.path() / "a.png"); }, "a.png: cannot be read"));
 }
 
 }  // namespace

@@ -63,7 +63,7 @@ inline ::testing::AssertionResult IsRefused(const ProgramResult& result,
   };
   if (result.exit_code != 2) return fail("exit code must be 2");
   if (!result.out.empty()) return fail("standard output must be empty");
-  if (std::count(result.err.begin(), result.err.end(), '\n') != 1 || result.err.back() != '\n' ||
+  if (std::ranges::count(result.err, '\n') != 1 || result.err.back() != '\n' ||
       !result.err.starts_with("dexcheck: ")) {
     return fail("standard error must be one line of the program");
   }
@@ -88,6 +88,8 @@ inline ::testing::AssertionResult HasFinding(const Json& results, const std::str
   return ::testing::AssertionFailure()
          << check << " at " << where << " is not among " << results.at("findings");
 }
+
+inline std::string FirstLine(const std::string& text) { return text.substr(0, text.find('\n')); }
 
 /// Shipped files.
 inline const std::string kParameters = SourcePath("/controller/parameters/");
@@ -133,6 +135,11 @@ class CommandTest : public ::testing::Test {
   /// What the command prints with --json, and nothing else.
   [[nodiscard]] Json RunJson(int exit_code, const Words& arguments) const {
     return Json::parse(Expect(exit_code, arguments + Words{"--json", "-"}).out);
+  }
+  /// The results of a comparison, which must end so.
+  Json Compare(int exit_code, const std::string& a, const std::string& b,
+               const Words& more = "--seed 1") const {
+    return RunJson(exit_code, Words{"consistency", a, b, "--samples", "100"} + more);
   }
   /// Success when the command is refused in one line with these parts.
   [[nodiscard]] ::testing::AssertionResult Refused(const Words& arguments,

@@ -203,7 +203,7 @@ TEST_F(MutateCommand, AllFaultsAreFoundAndCounted) {
     return fault.at("name") == "half of the mass matrix not mirrored";
   };
   const Json& faults = results.at("faults");
-  const auto found = std::find_if(faults.begin(), faults.end(), mirrored);
+  const auto found = std::ranges::find_if(faults, mirrored);
   ASSERT_NE(found, faults.end());
   EXPECT_EQ(found->at("outcome"), "no effect");
 }
@@ -235,7 +235,7 @@ TEST_F(MutateCommand, GoesOnFromWhatAnInterruptedCampaignLeft) {
   part["faults"].erase(part["faults"].begin() + 3, part["faults"].end());
   part["faults"][0]["remark"] = "taken";
   Write("out.json", part.dump());
-  EXPECT_THAT(Run(command).err, ::testing::HasSubstr("3 of 6 faults"));
+  EXPECT_THAT(Run(command).err, HasSubstr("3 of 6 faults"));
   Json again = Json::parse(Read("out.json"));
   EXPECT_EQ(again["faults"][0]["remark"], "taken");
   again["faults"][0]["remark"] = whole["faults"][0]["remark"];

@@ -22,10 +22,6 @@ std::string RoundNumbers(const std::string& text, int digits) {
 
 class Digits : public CommandTest {
  protected:
-  Json Compare(int exit_code, const std::string& a, const std::string& b,
-               const Words& more = "--seed 1") const {
-    return RunJson(exit_code, Words{"consistency", a, b, "--samples", "100"} + more);
-  }
   const std::string kPanda = MakePandaUrdf();
 };
 
@@ -99,8 +95,8 @@ TEST_F(Digits, AMistakeIsOnTheFirstLine) {
         EXPECT_THAT(excess.at("where"), HasSubstr("panda_link3"));
     }
     const std::string out = Expect(1, "consistency wrong.urdf " + kPandaXml + " --samples 50 --quiet").out;
-    EXPECT_THAT(out.substr(0, out.find('\n')), AllOf(HasSubstr(one.check), HasSubstr("panda_link3")));
-    EXPECT_LE(std::count(out.begin(), out.end(), '\n'), 24);
+    EXPECT_THAT(FirstLine(out), AllOf(HasSubstr(one.check), HasSubstr("panda_link3")));
+    EXPECT_LE(std::ranges::count(out, '\n'), 24);
   }
 }
 

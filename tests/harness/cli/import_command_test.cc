@@ -12,10 +12,6 @@ class TwoDescriptions : public CommandTest {
     Write("panda.urdf", MakePandaUrdf());
     WriteChanged("wrong.urdf", MakePandaUrdf(), "<mass value=\"3.228604\"/>", "<mass value=\"3.3\"/>");
   }
-  Json Compare(int exit_code, const std::string& a, const std::string& b,
-               const Words& more = "--seed 1") const {
-    return RunJson(exit_code, Words{"consistency", a, b, "--samples", "20"} + more);
-  }
 };
 
 TEST_F(TwoDescriptions, AgreeInEveryPairing) {
@@ -44,9 +40,8 @@ TEST_F(TwoDescriptions, AreJudgedByDigitsOnRequest) {
     rounded.replace(at, right_angle.size(), "1.5708");
   Write("rounded.urdf", rounded);
   const auto verdict = [&](const std::string& file, const Words& more) {
-    const std::string out =
-        Expect(1, Words{"consistency", file, kPandaXml, "--samples", "20", "--quiet"} + more).out;
-    return out.substr(0, out.find('\n'));
+    return FirstLine(
+        Expect(1, Words{"consistency", file, kPandaXml, "--samples", "20", "--quiet"} + more).out);
   };
   EXPECT_THAT(verdict("rounded.urdf", "--exact"), HasSubstr("4 digits"));
   const Json results = Compare(0, "rounded.urdf", kPandaXml, "--digits 4");

@@ -52,22 +52,22 @@ TEST_F(OwnControllerCommands, AScenarioNamesItAndALogKnowsIt) {
   const Json checks = RunJson(0, "run own.toml --no-report --out run")["checks"];
   EXPECT_LE(checks["law_torque"]["max"], 1e-13);
   EXPECT_GT(checks["law_torque"]["max"], 0.0);
-  EXPECT_THAT(Expect(0, "run --replay run").out, ::testing::HasSubstr("IDENTICAL"));
+  EXPECT_THAT(Expect(0, "run --replay run").out, HasSubstr("IDENTICAL"));
   // Another one in its place is another run; the same file under another name is not what the log names.
   std::filesystem::copy_file(JOINT_LAW_LIBRARY, Path("copy.so"));
-  EXPECT_THAT(Expect(0, "run --replay run --controller ./copy.so").out, ::testing::HasSubstr("IDENTICAL"));
+  EXPECT_THAT(Expect(0, "run --replay run --controller ./copy.so").out, HasSubstr("IDENTICAL"));
   Expect(1, Words("run --replay run --controller") + Words{JOINT_PD_LIBRARY});
   // Of two files that are the same only the name differs; of a changed one the hash too.
   WriteScenario("copied.toml", "copy.so", "");
   Expect(0, "run copied.toml --no-report --out copied");
   const std::string same = Expect(0, "compare run copied").out;
-  EXPECT_THAT(same, ::testing::HasSubstr("copy.so"));
-  EXPECT_THAT(same, ::testing::Not(::testing::HasSubstr("controller_hash")));
+  EXPECT_THAT(same, HasSubstr("copy.so"));
+  EXPECT_THAT(same, Not(HasSubstr("controller_hash")));
   std::filesystem::copy_file(JOINT_PD_LIBRARY, Path("copy.so"),
                              std::filesystem::copy_options::overwrite_existing);
   const ProgramResult changed = Run("run --replay copied");
   EXPECT_EQ(changed.exit_code, 1);
-  EXPECT_THAT(changed.err, ::testing::HasSubstr("is not the file that made the run"));
+  EXPECT_THAT(changed.err, HasSubstr("is not the file that made the run"));
   std::filesystem::remove(Path("copy.so"));
   EXPECT_TRUE(IsRefused(Run("run --replay copied"), {"copy.so"}));
 }
@@ -76,9 +76,9 @@ TEST_F(OwnControllerCommands, ComparedRunsSayWhichControllerTheyHad) {
   Expect(0, "run own.toml --no-report --out a");
   Expect(0, Words("run own.toml --no-report --out b --controller") + Words{kNumPyLaw});
   const std::string out = Expect(0, "compare a b").out;
-  EXPECT_THAT(out, ::testing::HasSubstr("  controller\n"));
-  EXPECT_THAT(out, ::testing::HasSubstr("joint_law.so"));
-  EXPECT_THAT(out, ::testing::HasSubstr("numpy_joint_law.py"));
+  EXPECT_THAT(out, HasSubstr("  controller\n"));
+  EXPECT_THAT(out, HasSubstr("joint_law.so"));
+  EXPECT_THAT(out, HasSubstr("numpy_joint_law.py"));
 }
 
 /// In a budget, an excitation and a campaign the law rewritten outside is the law.
@@ -100,7 +100,7 @@ TEST_P(OwnLawEverywhere, HasABudget) {
   EXPECT_TRUE(unnamed["predicted"]["rms"].is_null());
   EXPECT_NEAR(unnamed["all"]["rms"], own["all"]["rms"], 1e-12);
   EXPECT_THAT(Expect(0, Words("budget own.toml --jobs 2 --unset control.law") + Own()).out,
-              ::testing::HasSubstr("  - "));
+              HasSubstr("  - "));
 }
 
 TEST_P(OwnLawEverywhere, IsExcited) {
@@ -144,9 +144,9 @@ TEST_F(OwnControllerCommands, AFailureCostsItsTrial) {
   const Json failed = RunJson(0, "study show study.sqlite 1");
   EXPECT_EQ(failed["outcome"], "crashed");
   EXPECT_THAT(failed["failure"].get<std::string>(),
-              ::testing::HasSubstr("controller law.py: ValueError: ouch (law.py:5)"));
+              HasSubstr("controller law.py: ValueError: ouch (law.py:5)"));
   EXPECT_THAT(Expect(0, "study slurm study.toml --tasks 2 --controller law.py").out,
-              ::testing::HasSubstr("--controller " + Path("law.py").string()));
+              HasSubstr("--controller " + Path("law.py").string()));
 }
 
 /// A library in C++, one in C and a Python file, each with a parameter of its own.
@@ -193,7 +193,7 @@ TEST_P(OwnParameters, AreKeysOfAStudy) {
   const double soft = first["metrics"]["joint_error_rms"], stiff = last["metrics"]["joint_error_rms"];
   EXPECT_GT(soft, 2.0 * stiff);
   EXPECT_GT(stiff, 0.0);
-  EXPECT_THAT(first["command"].get<std::string>(), ::testing::HasSubstr("--controller"));
+  EXPECT_THAT(first["command"].get<std::string>(), HasSubstr("--controller"));
   // The rows belong to this controller: to its name, and to its file.
   const std::filesystem::path own = GetParam().controller;
   const std::string copy = "copy" + own.extension().string();

@@ -14,7 +14,7 @@ namespace fs = std::filesystem;
 class Quickstart : public ::testing::Test {
  protected:
   Quickstart() {
-    WriteScript("harness/quickstart.sh", ReadText(testing::SourcePath("/harness/quickstart.sh")));
+    WriteScript("harness/quickstart.sh", ReadText(SourcePath("/harness/quickstart.sh")));
     WriteScript("harness/install-packages.sh", "#!/bin/sh\n");
     WriteScript("bin/cmake", "#!/bin/sh\n");
     WriteScript("build/release/bin/dexcheck", "#!/bin/sh\necho \"$@\"\n");
@@ -24,9 +24,9 @@ class Quickstart : public ::testing::Test {
   [[nodiscard]] std::string Run(const std::vector<std::string>& arguments) const {
     std::vector<std::string> command = {folder_.path() / "harness/quickstart.sh"};
     command.insert(command.end(), arguments.begin(), arguments.end());
-    testing::ProgramOptions options;
+    ProgramOptions options;
     options.environment = {{"PATH", (folder_.path() / "bin").string() + ":/usr/bin:/bin"}};
-    const testing::ProgramResult result = testing::RunProgram(command, options);
+    const ProgramResult result = RunProgram(command, options);
     EXPECT_EQ(result.exit_code, 0) << result.err;
     return result.out;
   }
@@ -39,7 +39,7 @@ class Quickstart : public ::testing::Test {
     fs::permissions(path, fs::perms::owner_all);
   }
 
-  testing::TempFolder folder_;
+  TempFolder folder_;
 };
 
 TEST_F(Quickstart, RunsThePapersExperimentByDefault) {

@@ -4,11 +4,9 @@
 #include <map>
 #include <utility>
 
-#include "harness/engine/engine.h"
-#include "harness/log/log_writer.h"
 #include "renders/video_writer.h"
 #include "tests/harness/cli/dexcheck_program.h"
-#include "tests/renders/kinematic_run.h"
+#include "tests/harness/report/replay_run.h"
 
 namespace dexcheck::testing::render_command_test {
 namespace {
@@ -23,15 +21,6 @@ struct Flaw {
   bool only_what_must_be = false;
 };
 
-void EmbedModel(LogWriter* log) {
-  const fs::path mjcf = SourcePath("/mjcf");
-  for (const fs::directory_entry& entry : fs::recursive_directory_iterator(mjcf)) {
-    const std::string extension = entry.path().extension();
-    if (extension != ".xml" && extension != ".msh") continue;
-    log->EmbedFile("inputs", "mjcf/" + fs::relative(entry.path(), mjcf).string(), ReadText(entry.path()));
-  }
-}
-
 /// Writes FOLDER/log.h5.
 void WriteRun(const fs::path& folder, double duration, const Flaw& flaw = {}) {
   fs::create_directory(folder);
@@ -39,13 +28,10 @@ void WriteRun(const fs::path& folder, double duration, const Flaw& flaw = {}) {
   const RunFrames run = MakeKinematicRun(*model, duration);
   LogWriter log(folder / "log.h5", run.rows());
   log.SetText("scenario", "posed");
-  if (!flaw.no_mjcf) {
-    log.SetText("mjcf", "scene.xml");
-    EmbedModel(&log);
-  }
-  std::vector<std::pair<int, RowMatrixXd>> channels;
-  const auto add = [&](const SignalInfo& signal, const RowMatrixXd& values) {
-    channels.emplace_back(log.AddSignal(signal), values);
+  if (!flaw.no_mjcf) EmbedScene(&log);
+  std::vector<std::pair<SignalInfo, RowMatrixXd>> signals;
+  const auto add = [&](const SignalInfo& signal, const RowMatrixXd& rows) {
+    signals.emplace_back(signal, rows);
   };
   const auto as_column = [](const std::vector<double>& values) -> RowMatrixXd {
     return Eigen::Map<const VectorXd>(values.data(), static_cast<long>(values.size()));
@@ -66,14 +52,7 @@ void WriteRun(const fs::path& folder, double duration, const Flaw& flaw = {}) {
       add({"check/" + check.name, "1", "check", 1, {}, attributes}, as_column(check.residuals));
     }
   }
-  log.StartRows();
-  for (long row = 0; row < run.rows(); ++row) {
-    log.Row(LogWriter::kTime)[0] = run.times[static_cast<size_t>(row)];
-    for (const auto& [signal, values] : channels) {
-      std::copy(values.row(row).begin(), values.row(row).end(), log.Row(signal).begin());
-    }
-    log.EndRow();
-  }
+  WriteRows(run.times, signals, &log);
   log.Close();
 }
 

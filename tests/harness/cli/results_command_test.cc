@@ -47,7 +47,7 @@ TEST_F(Results, OfFilesAgree) {
   Expect(0, {"states", urdf_, "--count", "50", "--out", "states"});
   EXPECT_EQ(ReadJson("states/layout.json").at("joints"), Json({"yaw", "shoulder", "elbow"}));
   const std::string lines = Read("states/states.jsonl");
-  EXPECT_EQ(std::count(lines.begin(), lines.end(), '\n'), 50);
+  EXPECT_EQ(std::ranges::count(lines, '\n'), 50);
   EXPECT_EQ(Json::parse(lines.substr(0, lines.find('\n'))).at("v").size(), 3U);
 
   const Words command = {"consistency", urdf_, "--results", "states"};
@@ -102,15 +102,15 @@ TEST_F(Results, AuditExitsByWhatItFinds) {
   EXPECT_LT(odd.at("findings").at(0).at("condition_number_without"), odd.at("condition_number"));
   // The published inertia of this link was identified, and is that of something much longer than the link.
   const Json findings = RunJson(1, {"audit", kPandaXml}).at("findings");
-  EXPECT_TRUE(std::any_of(findings.begin(), findings.end(), [](const Json& finding) {
+  EXPECT_TRUE(std::ranges::any_of(findings, [](const Json& finding) {
     return finding.at("level") == "suspicious" && finding.at("where") == "link panda_link1";
   })) << findings;
 }
 
 TEST_F(Results, FloatingBasesSayTheirConvention) {
   const std::vector<LeggedLink> links = ListQuadruped();
-  Write("robot.urdf", testing::WriteLeggedUrdf("quadruped", links));
-  Write("robot.xml", testing::WriteLeggedMjcf("quadruped", links));
+  Write("robot.urdf", WriteLeggedUrdf("quadruped", links));
+  Write("robot.xml", WriteLeggedMjcf("quadruped", links));
   EXPECT_THAT(Expect(0, "consistency robot.urdf robot.xml --samples 20").out,
               AllOf(HasSubstr("[x y z, qw qx qy qz"), HasSubstr("Pinocchio")));
   Expect(0, "import robot.xml --out robot.toml");

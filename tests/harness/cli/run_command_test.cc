@@ -29,12 +29,12 @@ TEST_F(RunCommand, SaysThatARunWithoutStepsHasNoVideo) {
   EXPECT_EQ(ReadSummary().at("verdict"), "failed");
   EXPECT_EQ(ReadSummary().at("speed").at("steps"), 0);
   // A failure has its line, whatever is printed.
-  EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 2) << result.err;
+  EXPECT_EQ(std::ranges::count(result.err, '\n'), 2) << result.err;
   EXPECT_THAT(result.err, HasSubstr("dexcheck: no video: "));
   EXPECT_THAT(result.err, HasSubstr(ReadSummary().at("failure").get<std::string>()));
   EXPECT_TRUE(Refused("run --replay run", {"run/log.h5", "first step"}));
   const ProgramResult table = Expect(0, "export run --csv -");
-  EXPECT_EQ(std::count(table.out.begin(), table.out.end(), '\n'), 1) << "the header";
+  EXPECT_EQ(std::ranges::count(table.out, '\n'), 1) << "the header";
   EXPECT_FALSE(Has("run/video.mp4"));
   EXPECT_FALSE(Has("run/report.html"));
 }
@@ -153,7 +153,7 @@ TEST_F(RunCommand, AReplayLeavesOutASignalThatWasReplaced) {
     std::vector<char*> names(static_cast<size_t>(H5Sget_simple_extent_npoints(space)));
     ASSERT_GE(H5Aread(attribute, type, names.data()), 0);
     std::string old = "check/grasp_force";
-    *std::find(names.begin(), names.end(), std::string_view("check/grasp_cone")) = old.data();
+    *std::ranges::find(names, std::string_view("check/grasp_cone")) = old.data();
     ASSERT_GE(H5Awrite(attribute, type, names.data()), 0);
     H5Sclose(space);
     H5Tclose(type);

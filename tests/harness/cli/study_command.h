@@ -5,7 +5,6 @@
 #include <SQLiteCpp/Database.h>
 #include <SQLiteCpp/Statement.h>
 #include <fmt/format.h>
-#include <gmock/gmock.h>
 
 #include <filesystem>
 #include <memory>
@@ -13,7 +12,6 @@
 #include <vector>
 
 #include "harness/study/study_store.h"
-#include "tests/common/paths.h"
 #include "tests/harness/cli/dexcheck_program.h"
 
 namespace dexcheck::testing {
@@ -55,20 +53,23 @@ inline std::string Dump(const std::filesystem::path& path) {
   return text;
 }
 
-class StudyCommand : public ::testing::Test {
+class StudyCommand : public CommandTest {
  protected:
-  StudyCommand() { WriteText(folder_.path() / "tiny.toml", kStudy); }
+  StudyCommand() { Write("tiny.toml", kStudy); }
 
-  [[nodiscard]] std::vector<std::string> RunArguments(const std::string& database,
-                                                      std::vector<std::string> more = {}) const {
-    std::vector<std::string> arguments = {"study", "run", Path("tiny.toml"), "--db", Path(database)};
-    arguments.insert(arguments.end(), more.begin(), more.end());
-    return arguments;
+  /// Words that make the study's rows, in whatever folder.
+  [[nodiscard]] Words RunArguments(const std::string& database, const Words& more = {}) const {
+    return Words{"study", "run", Path("tiny.toml"), "--db", Path(database)} + more;
   }
-  [[nodiscard]] std::string Path(const std::string& file) const { return folder_.path() / file; }
-
+  ProgramResult Make(const std::string& database, const Words& more = {}) const {
+    return Expect(0, RunArguments(database, more));
+  }
+  [[nodiscard]] std::string Dump(const std::string& file) const { return testing::Dump(Path(file)); }
+  [[nodiscard]] std::vector<TrialRow> ReadRows(const std::string& file) const {
+    return StudyStore::Open(Path(file)).ReadRows();
+  }
   [[nodiscard]] long CountRows(const std::string& file) const {
-    if (!std::filesystem::exists(Path(file))) return 0;
+    if (!Has(file)) return 0;
     SQLite::Database database = OpenDatabase(Path(file));
     if (!database.tableExists("trials")) return 0;
     return database.execAndGet("SELECT count(*) FROM trials");
@@ -78,15 +79,11 @@ class StudyCommand : public ::testing::Test {
   const std::string& Reference() {
     static const auto reference = std::make_unique<std::string>();
     if (reference->empty()) {
-      const ProgramResult result = RunDexcheck(RunArguments("reference.sqlite"));
-      EXPECT_EQ(result.exit_code, 0) << result.err;
-      EXPECT_THAT(result.out, ::testing::HasSubstr("tiny: 6 of 6 trials"));
-      *reference = Dump(Path("reference.sqlite"));
+      EXPECT_THAT(Make("reference.sqlite").out, HasSubstr("tiny: 6 of 6 trials"));
+      *reference = Dump("reference.sqlite");
     }
     return *reference;
   }
-
-  TempFolder folder_;
 };
 
 }  // namespace dexcheck::testing

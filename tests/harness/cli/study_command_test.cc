@@ -7,7 +7,6 @@
 #include <chrono>
 #include <cmath>
 #include <csignal>
-#include <cstdlib>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <random>
@@ -22,8 +21,8 @@ namespace {
 constexpr double kSettled = 5e-8;
 
 TEST_F(StudyCommand, ClassifiesItsTrials) {
-  ASSERT_EQ(RunDexcheck(RunArguments("a.sqlite", {"--quiet"})).exit_code, 0);
-  const std::vector<TrialRow> rows = StudyStore::Open(Path("a.sqlite")).ReadRows();
+  Make("a.sqlite", {"--quiet"});
+  const std::vector<TrialRow> rows = ReadRows("a.sqlite");
   ASSERT_EQ(rows.size(), kNumTrials);
   for (const TrialRow& row : rows) {
     const bool stable = row.trial.parameters[1] < 2000.0;
@@ -42,8 +41,8 @@ TEST_F(StudyCommand, ClassifiesItsTrials) {
 
 TEST_F(StudyCommand, TheNumberOfProcessesDoesNotMatter) {
   for (const std::string jobs : {"1", "2", "6"}) {
-    ASSERT_EQ(RunDexcheck(RunArguments(jobs + ".sqlite", {"--jobs", jobs})).exit_code, 0);
-    EXPECT_EQ(Dump(Path(jobs + ".sqlite")), Reference()) << jobs;
+    Make(jobs + ".sqlite", {"--jobs", jobs});
+    EXPECT_EQ(Dump(jobs + ".sqlite"), Reference()) << jobs;
   }
 }
 
@@ -59,7 +58,7 @@ long CountTransactions(const std::string& path) {
 
 TEST_F(StudyCommand, ShortTrialsFractionTransactionsWithOneJobToo) {
   constexpr long kTrials = 100;
-  WriteText(Path("tiny.toml"), R"(name = "tiny"
+  Write("tiny.toml", R"(name = "tiny"
 scenario = "hold"
 set = ["duration=0.001", "settle=0.001"]
 [[vary]]
@@ -69,7 +68,7 @@ to = 50
 count = 100
 )");
   const auto begun = std::chrono::steady_clock::now();
-  ASSERT_EQ(RunDexcheck(RunArguments("a.sqlite", {"--jobs", "1"})).exit_code, 0);
+  Make("a.sqlite", {"--jobs", "1"});
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
   ASSERT_EQ(CountRows("a.sqlite"), kTrials);
   // One to store and one to claim in 0.2 s; some more at first, when it is not known how many 0.2 s take.
@@ -93,12 +92,12 @@ TEST_F(StudyCommand, GivesTheSameRowsHoweverOftenItIsKilled) {
       continue;
     }
     // Done in spite of it all: once more from the beginning.
-    EXPECT_EQ(Dump(Path("a.sqlite")), reference) << i;
+    EXPECT_EQ(Dump("a.sqlite"), reference) << i;
     std::filesystem::remove(Path("a.sqlite"));
   }
   EXPECT_GE(unfinished, 5) << "it was killed too late to matter";
-  EXPECT_EQ(RunDexcheck(RunArguments("a.sqlite")).exit_code, 0);
-  EXPECT_EQ(Dump(Path("a.sqlite")), reference);
+  Make("a.sqlite");
+  EXPECT_EQ(Dump("a.sqlite"), reference);
 }
 
 TEST_F(StudyCommand, TwoWritersLoseNothing) {
@@ -112,83 +111,73 @@ TEST_F(StudyCommand, TwoWritersLoseNothing) {
   for (const ProgramResult& result : {first, second}) {
     if (result.exit_code != 0) EXPECT_THAT(result.err, HasSubstr("another process has them"));
   }
-  EXPECT_EQ(Dump(Path("a.sqlite")), reference);
+  EXPECT_EQ(Dump("a.sqlite"), reference);
 }
 
 TEST_F(StudyCommand, CtrlCEndsItInGoodOrder) {
   Program program(DexcheckCommand(RunArguments("a.sqlite", {"--jobs", "1"})), {});
-  while (!std::filesystem::exists(Path("a.sqlite")))
-    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  while (!Has("a.sqlite")) std::this_thread::sleep_for(std::chrono::milliseconds(5));
   std::this_thread::sleep_for(std::chrono::milliseconds(50));
   program.Signal(SIGINT);
   const ProgramResult result = program.Wait();
   EXPECT_EQ(result.exit_code, 3);
   EXPECT_THAT(result.err, HasSubstr("interrupted"));
-  EXPECT_EQ(RunDexcheck(RunArguments("a.sqlite")).exit_code, 0);
-  EXPECT_EQ(Dump(Path("a.sqlite")), Reference());
+  Make("a.sqlite");
+  EXPECT_EQ(Dump("a.sqlite"), Reference());
 }
 
 TEST_F(StudyCommand, AnEditedStudyKeepsItsRows) {
-  ASSERT_EQ(RunDexcheck(RunArguments("reference.sqlite", {"--quiet"})).exit_code, 0);
-  ASSERT_EQ(RunDexcheck(RunArguments("a.sqlite", {"--quiet"})).exit_code, 0);
+  Make("reference.sqlite", {"--quiet"});
+  Make("a.sqlite", {"--quiet"});
   // One value goes, one comes.
-  WriteText(folder_.path() / "tiny.toml", ReplaceOnce(kStudy, "[20, 200, 2100]", "[300, 20, 200]"));
-  const ProgramResult edited = RunDexcheck(RunArguments("a.sqlite"));
-  EXPECT_EQ(edited.exit_code, 0) << edited.err;
+  WriteChanged("tiny.toml", kStudy, "[20, 200, 2100]", "[300, 20, 200]");
+  const ProgramResult edited = Make("a.sqlite");
   EXPECT_THAT(edited.out, HasSubstr("the study was edited: 4 trials are kept, 2 are set aside"));
   EXPECT_THAT(edited.out, HasSubstr("tiny: 6 of 6 trials"));
   // Back again, with a comment: nothing is left to be made, and the rows are those of the study as it was.
-  WriteText(folder_.path() / "tiny.toml", "# back\n" + kStudy);
-  const ProgramResult back = RunDexcheck(RunArguments("a.sqlite"));
+  Write("tiny.toml", "# back\n" + kStudy);
+  const ProgramResult back = Run(RunArguments("a.sqlite"));
   EXPECT_THAT(back.out, HasSubstr("4 trials are kept, 2 are brought back, 2 are set aside"));
-  const auto rows = StudyStore::Open(Path("a.sqlite")).ReadRows();
-  const auto expected = StudyStore::Open(Path("reference.sqlite")).ReadRows();
+  const auto rows = ReadRows("a.sqlite");
+  const auto expected = ReadRows("reference.sqlite");
   ASSERT_EQ(rows.size(), expected.size());
   for (size_t i = 0; i < rows.size(); ++i) EXPECT_TRUE(IsSame(rows[i], expected[i])) << i;
 }
 
 TEST_F(StudyCommand, FaultsAreNamed) {
-  EXPECT_TRUE(IsRefused(RunDexcheck({"study", "run", "gain", "--db", Path("a.sqlite")}),
-                        {"study \"gain\"", "did you mean \"gains\"?"}));
-  EXPECT_TRUE(IsRefused(RunDexcheck(RunArguments("no/a.sqlite")), {"no/a.sqlite: cannot be opened"}));
+  EXPECT_TRUE(Refused("study run gain --db a.sqlite", {"study \"gain\"", "did you mean \"gains\"?"}));
+  EXPECT_TRUE(Refused(RunArguments("no/a.sqlite"), {"no/a.sqlite: cannot be opened"}));
   // Nothing is thrown away: what is no file is refused, by every command.
-  ASSERT_EQ(RunDexcheck(RunArguments("good.sqlite", {"--shard", "1/6"})).exit_code, 0);
-  ProgramOptions here;
-  here.folder = folder_.path();
+  Make("good.sqlite", {"--shard", "1/6"});
   for (const std::string name : {"", ":memory:", "file:x.sqlite?mode=memory", ".", "/dev/null"}) {
-    const std::string quoted = "\"" + name + "\": a database must be a plain file";
-    for (const std::vector<std::string>& arguments :
-         {std::vector<std::string>{"run", "tiny.toml", "--db", name},
-          {"merge", name, "good.sqlite"},
-          {"merge", "new.sqlite", name},
-          {"report", name, "--out", "page.html"}}) {
-      std::vector<std::string> command = {"study"};
-      command.insert(command.end(), arguments.begin(), arguments.end());
-      EXPECT_TRUE(IsRefused(RunDexcheck(command, here), {quoted})) << arguments[0];
+    for (const Words& words : {Words{"run", "tiny.toml", "--db", name},
+                               {"merge", name, "good.sqlite"},
+                               {"merge", "new.sqlite", name},
+                               {"report", name, "--out", "page.html"}}) {
+      EXPECT_TRUE(Refused("study" + words, {"\"" + name + "\": a database must be a plain file"}))
+          << words[0];
     }
   }
-  EXPECT_FALSE(std::filesystem::exists(Path("page.html")));
-  EXPECT_FALSE(std::filesystem::exists(Path("new.sqlite")));
+  EXPECT_FALSE(Has("page.html"));
+  EXPECT_FALSE(Has("new.sqlite"));
   for (const char* shard : {"0/2", "3/2", "1", "1/", "a/b", "1/2x"}) {
-    EXPECT_TRUE(IsRefused(RunDexcheck(RunArguments("a.sqlite", {"--shard", shard})),
-                          {"--shard: must be I/N with 1 <= I <= N, got \"" + std::string(shard) + "\""}));
+    EXPECT_TRUE(Refused(RunArguments("a.sqlite", {"--shard", shard}),
+                        {"--shard: must be I/N with 1 <= I <= N, got \"" + std::string(shard) + "\""}));
   }
-  WriteText(folder_.path() / "tiny.toml", ReplaceOnce(kStudy, "control.K_v", "control.K_w"));
-  EXPECT_TRUE(IsRefused(RunDexcheck(RunArguments("a.sqlite")), {"control.K_w: unknown key, did you mean"}));
-  EXPECT_FALSE(std::filesystem::exists(Path("a.sqlite"))) << "nothing was begun";
+  WriteChanged("tiny.toml", kStudy, "control.K_v", "control.K_w");
+  EXPECT_TRUE(Refused(RunArguments("a.sqlite"), {"control.K_w: unknown key, did you mean"}));
+  EXPECT_FALSE(Has("a.sqlite")) << "nothing was begun";
 }
 
 TEST_F(StudyCommand, TheReportsCommandsRepeatTheTrials) {
-  ASSERT_EQ(RunDexcheck(RunArguments("a.sqlite", {"--quiet"})).exit_code, 0);
-  const ProgramResult page = RunDexcheck({"study", "report", Path("a.sqlite"), "--out", "-"});
-  ASSERT_EQ(page.exit_code, 0) << page.err;
-  EXPECT_THAT(page.out, ::testing::StartsWith("<!DOCTYPE html>"));
-  EXPECT_THAT(page.out, ::testing::EndsWith("</html>\n"));
-  const auto report = nlohmann::json::parse(RunDexcheck({"study", "report", Path("a.sqlite"), "--json"}).out);
+  Make("a.sqlite", {"--quiet"});
+  const ProgramResult page = Expect(0, "study report a.sqlite --out -");
+  EXPECT_THAT(page.out, StartsWith("<!DOCTYPE html>"));
+  EXPECT_THAT(page.out, EndsWith("</html>\n"));
+  const auto report = RunJson(0, "study report a.sqlite");
   EXPECT_EQ(report["theory"]["compared"], 6);
   EXPECT_EQ(report["theory"]["agree"], 6);
-  const auto trial =
-      nlohmann::json::parse(RunDexcheck({"study", "show", Path("a.sqlite"), "4", "--json"}).out);
+  const auto trial = RunJson(0, "study show a.sqlite 4");
   const auto shown = trial["command"].get<std::string>();
   EXPECT_THAT(shown, HasSubstr("--set control.K_p=10000 --set control.K_v=200"));
   const std::filesystem::path program = ProgramPath();
@@ -197,10 +186,10 @@ TEST_F(StudyCommand, TheReportsCommandsRepeatTheTrials) {
   options.environment = {{"PATH", program.parent_path().string() + ":" + ::getenv("PATH")}};
   const ProgramResult replay = RunProgram({"sh", "-c", shown}, options);
   EXPECT_EQ(replay.exit_code, 0) << replay.err;
-  EXPECT_EQ(ReadText(folder_.path() / "trial-4/video.mp4").substr(4, 4), "ftyp");
+  EXPECT_EQ(Read("trial-4/video.mp4").substr(4, 4), "ftyp");
   // The same number, bit for bit.
-  const auto summary = nlohmann::json::parse(ReadText(folder_.path() / "trial-4/summary.json"));
-  const std::vector<TrialRow> rows = StudyStore::Open(Path("a.sqlite")).ReadRows();
+  const auto summary = ReadJson("trial-4/summary.json");
+  const std::vector<TrialRow> rows = ReadRows("a.sqlite");
   EXPECT_EQ(summary["tracking"]["position_error_rms_m"].get<double>(),
             rows[4].result.metrics[kPositionErrorRms]);
 }

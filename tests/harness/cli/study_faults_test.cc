@@ -20,39 +20,37 @@ values = [20, 0.02]
 )";
 
 TEST_F(StudyCommand, ATrialThatIsAlwaysKilledEndsNoStudyAndCanBeRetried) {
-  WriteText(folder_.path() / "tiny.toml", kSlowStudy);
+  Write("tiny.toml", kSlowStudy);
   std::vector<std::string> limited = DexcheckCommand(RunArguments("a.sqlite", {"--jobs", "2"}));
   // With a hard limit of its processor time the system kills every process that takes more.
   limited.insert(limited.begin(), {"prlimit", "--cpu=1:1"});
   const ProgramResult result = RunProgram(limited);
   EXPECT_EQ(result.exit_code, 0) << result.err;
   EXPECT_THAT(result.out, HasSubstr("--retry-failed"));
-  std::vector<TrialRow> rows = StudyStore::Open(Path("a.sqlite")).ReadRows();
+  std::vector<TrialRow> rows = ReadRows("a.sqlite");
   ASSERT_EQ(rows.size(), 2u);
   EXPECT_EQ(rows[0].result.outcome, Outcome::kCrashed);
   EXPECT_EQ(rows[0].result.failure, "the process was killed from outside: Killed, 3 times");
   EXPECT_EQ(rows[1].result.outcome, Outcome::kTracked);
-  const std::string before = Dump(Path("a.sqlite"));
-  EXPECT_EQ(RunDexcheck(RunArguments("a.sqlite")).exit_code, 0);
-  EXPECT_EQ(Dump(Path("a.sqlite")), before) << "not unless requested";
-  const ProgramResult retried = RunDexcheck(RunArguments("a.sqlite", {"--retry-failed"}));
-  EXPECT_EQ(retried.exit_code, 0) << retried.err;
-  rows = StudyStore::Open(Path("a.sqlite")).ReadRows();
+  const std::string before = Dump("a.sqlite");
+  Make("a.sqlite");
+  EXPECT_EQ(Dump("a.sqlite"), before) << "not unless requested";
+  const ProgramResult retried = Make("a.sqlite", {"--retry-failed"});
+  rows = ReadRows("a.sqlite");
   ASSERT_EQ(rows.size(), 2u);
   EXPECT_EQ(rows[0].result.outcome, Outcome::kTracked) << rows[0].result.failure;
   EXPECT_EQ(rows[0].result.metrics[kSimulatedTime], 20.0);
 }
 
 TEST_F(StudyCommand, TrialsHaveATimeLimit) {
-  WriteText(folder_.path() / "tiny.toml", "trial_time_limit = 0.5\n" + kSlowStudy);
-  EXPECT_EQ(RunDexcheck(RunArguments("a.sqlite")).exit_code, 0);
-  const std::vector<TrialRow> rows = StudyStore::Open(Path("a.sqlite")).ReadRows();
+  Write("tiny.toml", "trial_time_limit = 0.5\n" + kSlowStudy);
+  Make("a.sqlite");
+  const std::vector<TrialRow> rows = ReadRows("a.sqlite");
   ASSERT_EQ(rows.size(), 2u);
   EXPECT_EQ(rows[0].result.outcome, Outcome::kTimedOut);
   EXPECT_THAT(rows[0].result.failure, HasSubstr("trial_time_limit, 0.5 s"));
   EXPECT_EQ(rows[1].result.outcome, Outcome::kTracked);
-  const ProgramResult report = RunDexcheck({"study", "report", Path("a.sqlite"), "--out", "-"});
-  EXPECT_EQ(report.exit_code, 0) << report.err;
+  const ProgramResult report = Expect(0, "study report a.sqlite --out -");
   EXPECT_THAT(report.out, HasSubstr("timed out"));
 }
 
@@ -62,14 +60,14 @@ TEST_F(StudyCommand, AFullDiskLosesNothing) {
   GTEST_SKIP() << "the thread sanitizer itself needs files larger than this test allows";
 #endif
 #endif
-  ASSERT_EQ(RunDexcheck(RunArguments("a.sqlite", {"--shard", "1/2"})).exit_code, 0);
-  const std::string before = Dump(Path("a.sqlite"));
+  Make("a.sqlite", {"--shard", "1/2"});
+  const std::string before = Dump("a.sqlite");
   ProgramOptions full;
   full.largest_file = 4096;
-  EXPECT_TRUE(IsRefused(RunDexcheck(RunArguments("a.sqlite"), full), {"a.sqlite: cannot be written"}));
-  EXPECT_EQ(Dump(Path("a.sqlite")), before);
-  EXPECT_EQ(RunDexcheck(RunArguments("a.sqlite")).exit_code, 0);
-  EXPECT_EQ(Dump(Path("a.sqlite")), Reference());
+  EXPECT_TRUE(IsRefused(Run(RunArguments("a.sqlite"), full), {"a.sqlite: cannot be written"}));
+  EXPECT_EQ(Dump("a.sqlite"), before);
+  Make("a.sqlite");
+  EXPECT_EQ(Dump("a.sqlite"), Reference());
 }
 
 // On a file system of its own, which only a process in a name space of its own may mount.
@@ -84,8 +82,8 @@ TEST_F(StudyCommand, AFullFileSystemLosesNothing) {
   };
   std::filesystem::create_directory(folder_.path() / "disk");
   if (run(mount).exit_code != 0) GTEST_SKIP() << "no file system may be mounted here";
-  ASSERT_EQ(RunDexcheck(RunArguments("a.sqlite", {"--shard", "1/2"})).exit_code, 0);
-  const std::string before = Dump(Path("a.sqlite"));
+  Make("a.sqlite", {"--shard", "1/2"});
+  const std::string before = Dump("a.sqlite");
   const ProgramResult result = run(mount + R"(
     cp "$3/a.sqlite" "$1"
     dd if=/dev/zero of="$1/filler" bs=4k 2>"$3/dd.txt" && exit 99
@@ -98,14 +96,14 @@ TEST_F(StudyCommand, AFullFileSystemLosesNothing) {
     cp "$1/a.sqlite" "$3/freed.sqlite"
     exit $code)");
   EXPECT_TRUE(IsRefused(result, {"disk/a.sqlite: cannot be written: database or disk is full"}));
-  EXPECT_EQ(ReadText(Path("left.txt")), "a.sqlite\nfiller\n");
-  EXPECT_EQ(Dump(Path("full.sqlite")), before);
-  EXPECT_EQ(Dump(Path("freed.sqlite")), Reference());
+  EXPECT_EQ(Read("left.txt"), "a.sqlite\nfiller\n");
+  EXPECT_EQ(Dump("full.sqlite"), before);
+  EXPECT_EQ(Dump("freed.sqlite"), Reference());
 }
 
 TEST_F(StudyCommand, AReadOnlyDatabaseIsNamed) {
-  ASSERT_EQ(RunDexcheck(RunArguments("a.sqlite", {"--shard", "1/2"})).exit_code, 0);
-  const std::string before = Dump(Path("a.sqlite"));
+  Make("a.sqlite", {"--shard", "1/2"});
+  const std::string before = Dump("a.sqlite");
   std::vector<std::string> command = DexcheckCommand(RunArguments("a.sqlite"));
   ::chmod(Path("a.sqlite").c_str(), 0444);
   if (::geteuid() == 0) {
@@ -114,7 +112,7 @@ TEST_F(StudyCommand, AReadOnlyDatabaseIsNamed) {
     command.insert(command.begin(), {"setpriv", "--reuid=65534", "--clear-groups"});
   }
   EXPECT_TRUE(IsRefused(RunProgram(command), {"a.sqlite: cannot be written: it is read-only"}));
-  EXPECT_EQ(Dump(Path("a.sqlite")), before);
+  EXPECT_EQ(Dump("a.sqlite"), before);
 }
 
 }  // namespace

@@ -43,20 +43,20 @@ spacing = "log"
 
 class StudySearch : public StudyCommand {
  protected:
-  StudySearch() { WriteText(folder_.path() / "tiny.toml", kSearch); }
+  StudySearch() { Write("tiny.toml", kSearch); }
 };
 
 TEST_F(StudySearch, GivesTheSameRowsKilledOrSharedOrAlone) {
   const auto begun = std::chrono::steady_clock::now();
-  const ProgramResult whole = RunDexcheck(RunArguments("whole.sqlite", {"--jobs", "1"}));
+  const ProgramResult whole = Run(RunArguments("whole.sqlite", {"--jobs", "1"}));
   std::chrono::duration<double> time = std::chrono::steady_clock::now() - begun;
   ASSERT_EQ(whole.exit_code, 0) << whole.err;
   EXPECT_THAT(whole.out, HasSubstr("tiny: 48 of at most 48 trials"));
   EXPECT_THAT(whole.out, HasSubstr("The least position_error_rms, worst of its trials of 24 points is "));
-  const std::string reference = Dump(Path("whole.sqlite"));
+  const std::string reference = Dump("whole.sqlite");
   // What it found is better than what it began with.
   const Study study = ParseStudy(kSearch, "tiny.toml");
-  const auto points = JudgePoints(study, StudyStore::Open(Path("whole.sqlite")).ReadRows());
+  const auto points = JudgePoints(study, ReadRows("whole.sqlite"));
   ASSERT_EQ(points.size(), 24U);
   ASSERT_FALSE(SortFeasible(points).empty());
   EXPECT_LT(SortFeasible(points).front()->judgement.objectives[0], points[0].judgement.objectives[0]);
@@ -81,7 +81,7 @@ TEST_F(StudySearch, GivesTheSameRowsKilledOrSharedOrAlone) {
       if (rows > 0) ++midway;
       continue;
     }
-    EXPECT_EQ(Dump(Path("killed.sqlite")), reference) << "after " << made << " kills";
+    EXPECT_EQ(Dump("killed.sqlite"), reference) << "after " << made << " kills";
     for (const char* const part : {"", "-journal", "-wal", "-shm"})
       std::filesystem::remove(Path(std::string("killed.sqlite") + part));
     ++searches;
@@ -91,17 +91,17 @@ TEST_F(StudySearch, GivesTheSameRowsKilledOrSharedOrAlone) {
   }
   EXPECT_GT(midway, 0) << "it was killed too early to matter";
   std::printf("%ld kills, %ld of them midway, in %ld searches\n", kills, midway, searches);
-  ASSERT_EQ(RunDexcheck(RunArguments("killed.sqlite")).exit_code, 0);
-  EXPECT_EQ(Dump(Path("killed.sqlite")), reference);
+  Make("killed.sqlite");
+  EXPECT_EQ(Dump("killed.sqlite"), reference);
 
   Program one(DexcheckCommand(RunArguments("shared.sqlite", {"--jobs", "1"})), {});
   Program other(DexcheckCommand(RunArguments("shared.sqlite", {"--jobs", "1"})), {});
   for (const ProgramResult& result : {one.Wait(), other.Wait()}) EXPECT_EQ(result.exit_code, 0) << result.err;
-  EXPECT_EQ(Dump(Path("shared.sqlite")), reference);
+  EXPECT_EQ(Dump("shared.sqlite"), reference);
 }
 
 TEST_F(StudySearch, StopsTrialsThatAreLost) {
-  WriteText(folder_.path() / "tiny.toml", R"(name = "tiny"
+  Write("tiny.toml", R"(name = "tiny"
 scenario = "offset"
 set = ["duration=0.02", "settle=0.3"]
 stop_error = 2e-6
@@ -109,8 +109,8 @@ stop_error = 2e-6
 key = "start_error.xyz"
 values = [[1e-6, 0, 0], [3e-6, 0, 0]]
 )");
-  ASSERT_EQ(RunDexcheck(RunArguments("a.sqlite", {"--quiet"})).exit_code, 0);
-  const std::vector<TrialRow> rows = StudyStore::Open(Path("a.sqlite")).ReadRows();
+  Make("a.sqlite", {"--quiet"});
+  const std::vector<TrialRow> rows = ReadRows("a.sqlite");
   ASSERT_EQ(rows.size(), 2U);
   EXPECT_EQ(rows[0].result.outcome, Outcome::kTracked);
   EXPECT_EQ(rows[1].result.outcome, Outcome::kDiverged);
@@ -119,46 +119,36 @@ values = [[1e-6, 0, 0], [3e-6, 0, 0]]
 }
 
 TEST_F(StudySearch, IsWatchedShownAndExported) {
-  ASSERT_EQ(RunDexcheck(RunArguments("a.sqlite", {"--quiet"})).exit_code, 0);
-  const ProgramResult watched =
-      RunDexcheck({"study", "watch", Path("a.sqlite"), "--interval", "0.1", "--page", Path("a.html")});
-  EXPECT_EQ(watched.exit_code, 0) << watched.err;
+  Make("a.sqlite", {"--quiet"});
+  const ProgramResult watched = Expect(0, "study watch a.sqlite --interval 0.1 --page a.html");
   EXPECT_THAT(watched.out, HasSubstr("tiny: 48 of at most 48 trials"));
   EXPECT_THAT(watched.out, HasSubstr("The least position_error_rms"));
-  EXPECT_THAT(ReadText(Path("a.html")), ::testing::Not(HasSubstr("http-equiv=\"refresh\""))) << "it is over";
-  const std::vector<TrialRow> rows = StudyStore::Open(Path("a.sqlite")).ReadRows();
-  const ProgramResult shown = RunDexcheck({"study", "show", Path("a.sqlite"), "17"});
-  EXPECT_EQ(shown.exit_code, 0) << shown.err;
+  EXPECT_THAT(Read("a.html"), Not(HasSubstr("http-equiv=\"refresh\""))) << "it is over";
+  const std::vector<TrialRow> rows = ReadRows("a.sqlite");
+  const ProgramResult shown = Expect(0, "study show a.sqlite 17");
   EXPECT_THAT(shown.out, HasSubstr("trial 17, seed 1: tracked"));
-  const auto trial =
-      nlohmann::json::parse(RunDexcheck({"study", "show", Path("a.sqlite"), "17", "--json"}).out);
+  const auto trial = RunJson(0, "study show a.sqlite 17");
   EXPECT_EQ(trial["outcome"], "tracked");
   EXPECT_EQ(trial["metrics"]["position_error_rms"], rows[17].result.metrics[kPositionErrorRms]);
   EXPECT_THAT(trial["command"].get<std::string>(), HasSubstr("dexcheck run offset --set duration=0.02"));
-  EXPECT_TRUE(
-      IsRefused(RunDexcheck({"study", "show", Path("a.sqlite"), "48"}), {"a.sqlite: trial 48: has no row"}));
-  EXPECT_TRUE(
-      IsRefused(RunDexcheck({"study", "watch", Path("a.sqlite"), "--interval", "0"}), {"--interval"}));
-  const ProgramResult csv = RunDexcheck({"study", "export", Path("a.sqlite"), "--out", "-"});
-  EXPECT_EQ(csv.exit_code, 0) << csv.err;
-  EXPECT_EQ(std::count(csv.out.begin(), csv.out.end(), '\n'), 49);
-  EXPECT_THAT(csv.out, ::testing::StartsWith(
-                           "trial,seed,control.K_p,control.K_v,outcome,failure,position_error_rms,"));
+  EXPECT_TRUE(Refused("study show a.sqlite 48", {"a.sqlite: trial 48: has no row"}));
+  EXPECT_TRUE(Refused("study watch a.sqlite --interval 0", {"--interval"}));
+  const ProgramResult csv = Expect(0, "study export a.sqlite --out -");
+  EXPECT_EQ(std::ranges::count(csv.out, '\n'), 49);
+  EXPECT_THAT(csv.out, StartsWith("trial,seed,control.K_p,control.K_v,outcome,failure,position_error_rms,"));
   // Numbers read back as they were.
   size_t at = csv.out.find("\n17,1,") + 6;
   EXPECT_EQ(std::strtod(csv.out.c_str() + at, nullptr), rows[17].trial.parameters[0]);
 }
 
 TEST_F(StudySearch, IsMadeByOneCommand) {
-  EXPECT_TRUE(IsRefused(RunDexcheck(RunArguments("a.sqlite", {"--shard", "1/2"})),
-                        {"--shard: the trials of a search follow from one another"}));
-  EXPECT_TRUE(IsRefused(RunDexcheck({"study", "slurm", Path("tiny.toml"), "--tasks", "2"}),
-                        {"--tasks: the trials of a search follow from one another"}));
-  const ProgramResult script =
-      RunDexcheck({"study", "slurm", Path("tiny.toml"), "--tasks", "1", "--cpus", "16"});
-  EXPECT_EQ(script.exit_code, 0) << script.err;
+  EXPECT_TRUE(Refused(RunArguments("a.sqlite", {"--shard", "1/2"}),
+                      {"--shard: the trials of a search follow from one another"}));
+  EXPECT_TRUE(Refused("study slurm tiny.toml --tasks 2",
+                      {"--tasks: the trials of a search follow from one another"}));
+  const ProgramResult script = Expect(0, "study slurm tiny.toml --tasks 1 --cpus 16");
   EXPECT_THAT(script.out, HasSubstr("#SBATCH --cpus-per-task=16\n"));
-  EXPECT_THAT(script.out, ::testing::Not(HasSubstr("--shard")));
+  EXPECT_THAT(script.out, Not(HasSubstr("--shard")));
 }
 
 }  // namespace

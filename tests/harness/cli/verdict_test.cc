@@ -29,7 +29,7 @@ TEST_F(Verdict, StandsWithoutATemporaryFolder) {
   const ProgramResult result = RunHold(options, "--video");
   EXPECT_EQ(result.exit_code, 0) << result.err;
   // One line each for the video and the report.
-  EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 2);
+  EXPECT_EQ(std::ranges::count(result.err, '\n'), 2);
   for (const char* what : {"dexcheck: no video: TMPDIR: ", "dexcheck: no report: TMPDIR: "})
     EXPECT_THAT(result.err, HasSubstr(what));
   EXPECT_TRUE(IsRecorded());

@@ -1,17 +1,16 @@
 // Writers that are refused: by the file system, or for a caller's fault.
 
 #include <gmock/gmock.h>
-#include <sys/resource.h>
 #include <unistd.h>
 
-#include <csignal>
 #include <cstdlib>
 
 #include "controller/common/errors.h"
 #include "tests/common/files.h"
+#include "tests/common/full_disk.h"
 #include "tests/common/matchers.h"
 #include "tests/common/throws.h"
-#include "tests/harness/log/sample_log_check.h"
+#include "tests/harness/log/sample_log.h"
 
 namespace dexcheck::testing::log_failures_test {
 namespace {
@@ -75,27 +74,6 @@ TEST_F(LogFailures, ForbiddenFoldersAreNamed) {
   std::filesystem::permissions(folder_.path(), std::filesystem::perms(0755));
 }
 
-/// Lets this process write no more than so many bytes into a file, as if the disk were full then.
-class FullDisk {
- public:
-  explicit FullDisk(rlim_t bytes) {
-    ::getrlimit(RLIMIT_FSIZE, &before_);
-    handler_ = std::signal(SIGXFSZ, SIG_IGN);
-    const rlimit limit{bytes, before_.rlim_max};
-    ::setrlimit(RLIMIT_FSIZE, &limit);
-  }
-  ~FullDisk() {
-    ::setrlimit(RLIMIT_FSIZE, &before_);
-    std::signal(SIGXFSZ, handler_);
-  }
-  FullDisk(const FullDisk&) = delete;
-  FullDisk& operator=(const FullDisk&) = delete;
-
- private:
-  rlimit before_{};
-  void (*handler_)(int) = nullptr;
-};
-
 TEST_F(LogFailures, FullDiskAtTheBegin) {
   const std::string reason = path_.string() + ": cannot be written: File too large";
   for (const rlim_t bytes : {0UL, 1UL, 600UL, 2000UL, 5000UL, 9000UL}) {
@@ -129,9 +107,7 @@ TEST_F(LogFailures, FullDiskLetsTheProgramEnd) {
 
 TEST_F(LogFailures, FullDiskKeepsWhatWasFlushed) {
   const std::string reason = path_.string() + ": cannot be written: ";
-  LogWriter log(path_, 2000, 10);
-  StartSample(&log);
-  WriteSampleRows(25, &log);
+  SampleLog log(path_, 2000, 10, 25);
   const auto size = static_cast<rlim_t>(std::filesystem::file_size(path_));
   {
     const FullDisk full(size / 2);
@@ -145,9 +121,7 @@ TEST_F(LogFailures, FullDiskKeepsWhatWasFlushed) {
 }
 
 TEST_F(LogFailures, FullDiskAtTheEndKeepsAllRows) {
-  LogWriter log(path_, 2000, 10);
-  StartSample(&log);
-  WriteSampleRows(1500, &log);
+  SampleLog log(path_, 2000, 10, 1500);
   log.SetText("summary", "late");
   {
     // The rows' places are there; the trimmed copy, of some 150 kB, fails.
@@ -161,15 +135,13 @@ TEST_F(LogFailures, FullDiskAtTheEndKeepsAllRows) {
   EXPECT_EQ(CountFiles(), 1);
   const LogReader reader(path_);
   EXPECT_TRUE(IsSample(reader, 1500));
-  EXPECT_THAT(reader.ListTexts(), ::testing::Not(::testing::Contains("summary")));
+  EXPECT_THAT(reader.ListTexts(), Not(Contains("summary")));
 }
 
 TEST_F(LogFailures, VanishedFilesAndFoldersAreNoticed) {
   std::filesystem::create_directory(folder_.path() / "run");
   const std::filesystem::path path = folder_.path() / "run/log.h5";
-  LogWriter log(path, 100, 10);
-  StartSample(&log);
-  WriteSampleRows(10, &log);
+  SampleLog log(path, 100, 10, 10);
   std::filesystem::remove_all(folder_.path() / "run");
   EXPECT_EQ(MessageOf<InputError>([&] { WriteSampleRows(10, &log); }),
             path.string() + ": cannot be written: it was removed");
@@ -185,9 +157,7 @@ TEST_F(LogFailures, FoldersThatVanishBeforeTheRowsAreNoticed) {
 }
 
 TEST_F(LogFailures, AnotherFileInItsPlaceIsNotReplaced) {
-  LogWriter log(path_, 100, 10);
-  StartSample(&log);
-  WriteSampleRows(10, &log);
+  SampleLog log(path_, 100, 10, 10);
   std::filesystem::rename(path_, folder_.path() / "moved.h5");
   WriteText(path_, "another");
   EXPECT_EQ(MessageOf<InputError>([&] { log.Close(); }),

@@ -14,7 +14,7 @@
 #include <utility>
 
 #include "tests/common/run_program.h"
-#include "tests/harness/log/sample_log_check.h"
+#include "tests/harness/log/sample_log.h"
 
 namespace dexcheck::testing::log_kill_test {
 namespace {
@@ -53,11 +53,10 @@ class SharedProgress {
 
 /// The victim's life.
 [[noreturn]] void WriteLog(const std::filesystem::path& path, const SharedProgress& progress) {
-  LogWriter log(path, kMaxRows, kRowsPerFlush);
-  testing::StartSample(&log);
+  SampleLog log(path, kMaxRows, kRowsPerFlush);
   progress->has_started = true;
   for (long row = 0; row < kRows; ++row) {
-    testing::WriteSampleRow(&log);
+    WriteSampleRow(&log);
     progress->flushed = (row + 1) / kRowsPerFlush * kRowsPerFlush;
   }
   log.Flush();
@@ -122,7 +121,7 @@ void CheckRemains(const std::filesystem::path& path, const SharedProgress& progr
   }
   const LogReader log(path);
   ASSERT_GE(log.rows(), progress->flushed);
-  ASSERT_TRUE(testing::IsSample(log, log.rows()));
+  ASSERT_TRUE(IsSample(log, log.rows()));
   if (progress->is_closed) ASSERT_EQ(log.ReadText("summary"), "late");
   if (progress->is_closing && !progress->is_closed) ++findings->closing;
   if (log.rows() > 0 && log.rows() < kRows) ++findings->amid;
@@ -143,7 +142,7 @@ class KilledWriter : public ::testing::Test {
       victim.Kill();
       ASSERT_NO_FATAL_FAILURE(CheckRemains(path, victim.progress(), &findings_));
       if (i % 10 == 0 && std::filesystem::exists(path)) {
-        const testing::ProgramResult dump = testing::RunProgram({DEXCHECK_H5DUMP, path});
+        const ProgramResult dump = RunProgram({DEXCHECK_H5DUMP, path});
         ASSERT_EQ(dump.exit_code, 0) << dump.err;
         ASSERT_EQ(dump.err, "");
       }
@@ -168,7 +167,7 @@ TEST_F(KilledWriter, AtAnyMoment) {
     Victim unharmed(folder_.path() / "whole.h5");
     unharmed.Wait();
     ASSERT_TRUE(unharmed.progress()->is_closed);
-    ASSERT_TRUE(testing::IsSample(LogReader(folder_.path() / "whole.h5"), kRows));
+    ASSERT_TRUE(IsSample(LogReader(folder_.path() / "whole.h5"), kRows));
   }
   const std::chrono::duration<double> life = Clock::now() - start;
   KillMany([&](const SharedProgress&) { std::this_thread::sleep_for(1.1 * Draw() * life); });

@@ -3,7 +3,6 @@
 #include <gmock/gmock.h>
 #include <sys/stat.h>
 
-#include <cmath>
 #include <cstdlib>
 #include <filesystem>
 #include <functional>
@@ -18,19 +17,16 @@
 #include "tests/common/run_program.h"
 #include "tests/common/throws.h"
 #include "tests/harness/log/change_log.h"
-#include "tests/harness/log/sample_log_check.h"
+#include "tests/harness/log/sample_log.h"
 
 namespace dexcheck::testing::log_reader_test {
 namespace {
 
-class LogReaderTest : public ::testing::Test {
+class LogReaderTest : public LogFileTest {
  protected:
   [[nodiscard]] std::string Open() const {
     return MessageOf<InputError>([&] { const LogReader log(path_); });
   }
-
-  TempFolder folder_;
-  std::filesystem::path path_ = folder_.path() / "log.h5";
 };
 
 TEST_F(LogReaderTest, FilesComeBackWithTheirBytes) {

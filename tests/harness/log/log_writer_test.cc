@@ -10,7 +10,7 @@
 #include "tests/common/files.h"
 #include "tests/common/matchers.h"
 #include "tests/common/run_program.h"
-#include "tests/harness/log/sample_log_check.h"
+#include "tests/harness/log/sample_log.h"
 
 namespace dexcheck::testing::log_writer_test {
 namespace {
@@ -36,13 +36,13 @@ TEST_F(LogWriterTest, UnitsAndDescriptionsComeBack) {
   EXPECT_EQ(pose.name, "object/X_o");
   EXPECT_EQ(pose.unit, "m, m, m, rad, rad, rad");
   EXPECT_EQ(pose.description, "Pose of the object");
-  EXPECT_THAT(pose.columns, ::testing::ElementsAre("x", "y", "z", "phi", "theta", "psi"));
+  EXPECT_THAT(pose.columns, ElementsAre("x", "y", "z", "phi", "theta", "psi"));
   EXPECT_TRUE(pose.attributes.empty());
   const SignalInfo& check = log.signals()[2];
   EXPECT_EQ(check.width, 1);
   EXPECT_TRUE(check.columns.empty());
   EXPECT_EQ(check.attributes, (std::map<std::string, double>{{"bound", 1e-10}, {"kind", 2.0}}));
-  EXPECT_THAT(log.ListTexts(), ::testing::ElementsAre("empty", "scenario"));
+  EXPECT_THAT(log.ListTexts(), ElementsAre("empty", "scenario"));
   EXPECT_EQ(log.ReadText("empty"), "");
 }
 
@@ -58,8 +58,7 @@ TEST_F(LogWriterTest, SameRowsGiveTheSameBytes) {
 }
 
 TEST_F(LogWriterTest, FlushMakesRowsVisible) {
-  LogWriter log(path_, 100000, 10);
-  StartSample(&log);
+  SampleLog log(path_, 100000, 10);
   EXPECT_TRUE(IsSample(LogReader(path_), 0));
   WriteSampleRows(19, &log);
   EXPECT_TRUE(IsSample(LogReader(path_), 10));
@@ -73,9 +72,7 @@ TEST_F(LogWriterTest, FlushMakesRowsVisible) {
 
 TEST_F(LogWriterTest, DestructionKeepsCompleteRows) {
   {
-    LogWriter log(path_, 100, 40);
-    StartSample(&log);
-    WriteSampleRows(3, &log);
+    SampleLog log(path_, 100, 40, 3);
     log.Row(1)[0] = 5.0;  // a row that never ends
   }
   EXPECT_TRUE(IsSample(LogReader(path_), 3));
@@ -83,12 +80,10 @@ TEST_F(LogWriterTest, DestructionKeepsCompleteRows) {
 
 TEST_F(LogWriterTest, WhatARowLeavesOutIsNotANumber) {
   {
-    LogWriter log(path_, 10, 2);
-    StartSample(&log);
-    WriteSampleRows(3, &log);
+    SampleLog log(path_, 10, 2, 3);
     log.Flush();
     for (int row = 3; row < 7; ++row) {
-      log.Row(LogWriter::kTime)[0] = testing::kTimeStep * row;
+      log.Row(LogWriter::kTime)[0] = kTimeStep * row;
       log.Row(1)[2] = 7.0;
       log.EndRow();
     }
@@ -105,12 +100,11 @@ TEST_F(LogWriterTest, WhatARowLeavesOutIsNotANumber) {
 
 TEST_F(LogWriterTest, FlushForgetsARowUnderConstruction) {
   {
-    LogWriter log(path_, 10, 5);
-    StartSample(&log);
+    SampleLog log(path_, 10, 5);
     WriteSampleRow(&log);
     log.Row(2)[0] = 3.0;
     log.Flush();
-    log.Row(LogWriter::kTime)[0] = testing::kTimeStep;
+    log.Row(LogWriter::kTime)[0] = kTimeStep;
     log.EndRow();
     log.Close();
   }
@@ -119,9 +113,7 @@ TEST_F(LogWriterTest, FlushForgetsARowUnderConstruction) {
 
 TEST_F(LogWriterTest, LateTextsAndFilesReachTheFile) {
   for (const long max_rows : {20L, 1000L}) {
-    LogWriter log(path_, max_rows, 8);
-    StartSample(&log);
-    WriteSampleRows(20, &log);
+    SampleLog log(path_, max_rows, 8, 20);
     const std::string long_text(1 << 20, 'x');
     log.SetText("summary", long_text);
     log.SetText("empty", "no longer");
@@ -152,10 +144,8 @@ TEST_F(LogWriterTest, RoomCostsNoDiskSpace) {
 }
 
 TEST_F(LogWriterTest, RowsAllocateNothing) {
-  LogWriter log(path_, 1000, 10);
-  StartSample(&log);
-  WriteSampleRows(20, &log);
-  const testing::AllocationCounter counter;
+  SampleLog log(path_, 1000, 10, 20);
+  const AllocationCounter counter;
   WriteSampleRows(500, &log);
   EXPECT_EQ(counter.count(), 0);
   EXPECT_FALSE(ReadText(path_).empty());
@@ -164,13 +154,11 @@ TEST_F(LogWriterTest, RowsAllocateNothing) {
 
 TEST_F(LogWriterTest, AnOtherProgramReadsIt) {
   {
-    LogWriter log(path_, 40, 8);
-    StartSample(&log);
-    WriteSampleRows(20, &log);
+    SampleLog log(path_, 40, 8, 20);
     for (const char* state : {"unfinished", "finished"}) {
-      const testing::ProgramResult dump =
-          testing::RunProgram({DEXCHECK_H5DUMP, "--attribute=object/X_o/columns", "--attribute=meta/scenario",
-                               "--dataset=check/M_bar", "--format=%.17g", path_});
+      const ProgramResult dump =
+          RunProgram({DEXCHECK_H5DUMP, "--attribute=object/X_o/columns", "--attribute=meta/scenario",
+                      "--dataset=check/M_bar", "--format=%.17g", path_});
       EXPECT_EQ(dump.exit_code, 0) << state << dump.err;
       EXPECT_EQ(dump.err, "") << state;
       // Rows 14 and 15 of check/M_bar; "theta" among the columns.
@@ -183,7 +171,7 @@ TEST_F(LogWriterTest, AnOtherProgramReadsIt) {
       }
     }
   }
-  const testing::ProgramResult header = testing::RunProgram({DEXCHECK_H5DUMP, "--header", path_});
+  const ProgramResult header = RunProgram({DEXCHECK_H5DUMP, "--header", path_});
   EXPECT_THAT(header.out, HasSubstr("DATASET \"X_o\""));
   EXPECT_THAT(header.out, HasSubstr("SIMPLE { ( 21, 6 ) / ( 21, 6 ) }"));
   EXPECT_THAT(header.out, HasSubstr("H5T_IEEE_F64LE"));

@@ -29,11 +29,10 @@ class AccessibilityBrowserTest : public ::testing::Test {
  protected:
   /// axe-core's script from the npm registry; empty without a network.
   std::string FetchAxe() {
-    const testing::ProgramResult result =
-        testing::RunProgram({"/usr/bin/env", "npm", "install", "--silent", "--no-audit", "--prefix",
-                             folder_.path().string(), "axe-core@4"});
+    const ProgramResult result = RunProgram({"/usr/bin/env", "npm", "install", "--silent", "--no-audit",
+                                             "--prefix", folder_.path().string(), "axe-core@4"});
     const std::filesystem::path script = folder_.path() / "node_modules/axe-core/axe.min.js";
-    return result.exit_code == 0 && std::filesystem::exists(script) ? testing::ReadText(script) : "";
+    return result.exit_code == 0 && std::filesystem::exists(script) ? ReadText(script) : "";
   }
   /// Light and dark.
   static void ExpectNothingFound(const std::string& axe, const std::filesystem::path& page,
@@ -48,13 +47,13 @@ class AccessibilityBrowserTest : public ::testing::Test {
       EXPECT_EQ(browser->Run("return window.found;"), nlohmann::json::array()) << (dark ? "dark" : "light");
     }
   }
-  testing::TempFolder folder_;
+  TempFolder folder_;
 };
 
 TEST_F(AccessibilityBrowserTest, AxeFindsNothingInThePageOfARun) {
   const std::string axe = FetchAxe();
   if (axe.empty()) GTEST_SKIP() << "axe-core cannot be fetched from the npm registry";
-  testing::WriteReplayRun(folder_.path(), 0.3);
+  WriteReplayRun(folder_.path(), 0.3);
   WriteRunReport(folder_.path(), MakeReportFiles(folder_.path()));
   Browser browser;
   ExpectNothingFound(axe, folder_.path() / "report.html", &browser);

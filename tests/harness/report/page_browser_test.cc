@@ -3,13 +3,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <string>
 
 #include "harness/report/campaign_page.h"
-#include "harness/report/comparison_page.h"
 #include "harness/report/page.h"
 #include "harness/report/run_comparison.h"
 #include "harness/report/run_data.h"
@@ -41,9 +39,7 @@ std::string AskRange(int plot) {
 class PageBrowserTest : public ::testing::Test {
  protected:
   void SetUp() override {
-    testing::ReportRun run;
-    run.rows = kRows;
-    testing::WriteReportRun(folder_.path(), run);
+    WriteReportRun(folder_.path(), {.rows = kRows});
     WriteRunReport(folder_.path(), MakeReportFiles(folder_.path()));
   }
 
@@ -59,8 +55,8 @@ class PageBrowserTest : public ::testing::Test {
     EXPECT_GT(place["height"], 50.0);
     EXPECT_LT(place["bottom"], height) << width;
     EXPECT_LE(place["overflow"], 0) << width;
-    EXPECT_THAT(place["text"].get<std::string>(), ::testing::HasSubstr("DISAGREEMENT"));
-    EXPECT_THAT(place["text"].get<std::string>(), ::testing::HasSubstr("wheel slip"));
+    EXPECT_THAT(place["text"].get<std::string>(), HasSubstr("DISAGREEMENT"));
+    EXPECT_THAT(place["text"].get<std::string>(), HasSubstr("wheel slip"));
   }
 
   /// A high window, so that all plots are in view and thus drawn.
@@ -95,7 +91,7 @@ class PageBrowserTest : public ::testing::Test {
     for (const int plot : {0, 1, 5}) ExpectRange(plot, 0.0, kEnd);
   }
 
-  testing::TempFolder folder_;
+  TempFolder folder_;
   Browser& browser_ = Browser::Shared();
 };
 
@@ -113,7 +109,7 @@ TEST_F(PageBrowserTest, ShowsVerdictAndPlotsWithoutErrors) {
   for (size_t k = 0; k < points.size(); ++k) {
     const double t = points[k]["x"];
     EXPECT_NEAR(t, 1.0, kPixelTolerance);
-    EXPECT_NEAR(points[k]["y"].get<double>(), testing::ReportObjectX(t) + 1e-3 * static_cast<double>(k),
+    EXPECT_NEAR(points[k]["y"].get<double>(), ReportObjectX(t) + 1e-3 * static_cast<double>(k),
                 kFloatTolerance);
   }
   // Something was painted.
@@ -247,7 +243,7 @@ TEST_F(PageBrowserTest, PlaysTheVideo) {
 }
 
 TEST_F(PageBrowserTest, WouldNoticeAVideoThatCannotBePlayed) {
-  testing::WriteText(folder_.path() / "video.mp4", "no video");
+  WriteText(folder_.path() / "video.mp4", "no video");
   WriteRunReport(folder_.path(), MakeReportFiles(folder_.path()), MakeNoScene);
   browser_.Open(folder_.path() / "report.html");
   EXPECT_TRUE(
@@ -256,13 +252,13 @@ TEST_F(PageBrowserTest, WouldNoticeAVideoThatCannotBePlayed) {
 }
 
 TEST_F(PageBrowserTest, WouldNoticeErrors) {
-  std::string page = testing::ReadText(folder_.path() / "report.html");
+  std::string page = ReadText(folder_.path() / "report.html");
   const std::string end = "</body>";
   page.insert(page.rfind(end),
               "<script>noSuchFunction();</script><img src=\"https://example.invalid/x.png\">");
-  testing::WriteText(folder_.path() / "report.html", page);
+  WriteText(folder_.path() / "report.html", page);
   browser_.Open(folder_.path() / "report.html");
-  EXPECT_THAT(browser_.TakeConsole(), ::testing::AllOf(Not(IsEmpty()), ::testing::SizeIs(2)));
+  EXPECT_THAT(browser_.TakeConsole(), AllOf(Not(IsEmpty()), ::testing::SizeIs(2)));
 }
 
 }  // namespace

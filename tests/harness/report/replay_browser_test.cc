@@ -3,7 +3,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <array>
 #include <cmath>
 #include <string>
 
@@ -30,34 +29,10 @@ constexpr int kHeight = 300;
 /// A view from the side that sees the whole way.
 Viewpoint SideView() { return {{0.7, -0.2, 0.7}, 2.0, DegToRad(120.0), DegToRad(-12.0)}; }
 
-/// Pixels of the object's colour.
-struct Blob {
-  double x = 0.0, y = 0.0, area = 0.0;
-};
-
-bool IsOrange(int r, int g, int b) { return r > 90 && r > 1.5 * g && r > 2.2 * b; }
-
-template <typename Pixel>
-Blob FindOrange(const Pixel& pixel) {
-  Blob blob;
-  for (int y = 0; y < kHeight; ++y) {
-    for (int x = 0; x < kWidth; ++x) {
-      const std::array<int, 3> rgb = pixel(x, y);
-      if (!IsOrange(rgb[0], rgb[1], rgb[2])) continue;
-      blob.x += x;
-      blob.y += y;
-      ++blob.area;
-    }
-  }
-  blob.x /= blob.area;
-  blob.y /= blob.area;
-  return blob;
-}
-
 class ReplayBrowserTest : public ::testing::Test {
  protected:
   void SetUp() override {
-    run_ = testing::WriteReplayRun(folder_.path(), kEnd);
+    run_ = WriteReplayRun(folder_.path(), kEnd);
     WriteRunReport(folder_.path(), MakeReportFiles(folder_.path()));
     browser_.SetViewport(900, 420);  // small, for drawing without a graphics card takes long
     browser_.Open(folder_.path() / "report.html");
@@ -73,12 +48,12 @@ class ReplayBrowserTest : public ::testing::Test {
   }
 
   void ExpectPartsAt(long row) const;
-  void ExpectObjectDrawnAt(long row, Renderer* renderer, double* x) const;
+  void ExpectObjectDrawnAt(long row, Renderer* renderer, double* column) const;
   void LookFrom(const Viewpoint& view) const;
 
-  testing::TempFolder folder_;
+  TempFolder folder_;
   RunFrames run_;
-  MjModelPtr model_ = LoadMjcf(testing::SourcePath("/mjcf/scene.xml"));
+  MjModelPtr model_ = LoadMjcf(SourcePath("/mjcf/scene.xml"));
   MjDataPtr data_ = MakeData(*model_);
   Browser& browser_ = Browser::Shared();
 };
@@ -93,7 +68,7 @@ void ReplayBrowserTest::ExpectPartsAt(long row) const {
     if (model_->body_weldid[body] != body) continue;
     ++moving;
     const Vector3d p(data_->xpos + 3 * body);
-    const bool found = std::any_of(bones.begin(), bones.end(), [&](const nlohmann::json& bone) {
+    const bool found = std::ranges::any_of(bones, [&](const nlohmann::json& bone) {
       return (Vector3d(bone[0], bone[1], bone[2]) - p).norm() < kFloatTolerance;
     });
     EXPECT_TRUE(found) << NameOf(*model_, mjOBJ_BODY, body) << " at " << p.transpose();
@@ -118,15 +93,12 @@ void ReplayBrowserTest::LookFrom(const Viewpoint& view) const {
       "); r.controls.target.set(" + print(view.look_at) + ");");
 }
 
-/// @param x where the object is in the picture.
-void ReplayBrowserTest::ExpectObjectDrawnAt(long row, Renderer* renderer, double* x) const {
+/// @param column where the object is in the picture.
+void ReplayBrowserTest::ExpectObjectDrawnAt(long row, Renderer* renderer, double* column) const {
   SetRow(*model_, run_, row, data_.get());
   const Image image = renderer->Render(*data_);
-  const Blob there = FindOrange([&](int column, int line) -> std::array<int, 3> {
-    const std::uint8_t* const rgb = image.Pixel(column, line);
-    return {rgb[0], rgb[1], rgb[2]};
-  });
-  ASSERT_GT(there.area, 60.0);
+  const Vector3d there = FindTorus(image);
+  ASSERT_GT(there.z(), 60.0);
   const nlohmann::json pixels = Ask(
       "runClock.set(" + std::to_string(run_.times[static_cast<size_t>(row)]) +
       "); r.draw(); const gl = r.renderer.context, p = new Uint8Array(4 * gl.drawingBufferWidth * "
@@ -135,14 +107,20 @@ void ReplayBrowserTest::ExpectObjectDrawnAt(long row, Renderer* renderer, double
   ASSERT_EQ(pixels[0], kWidth);
   ASSERT_EQ(pixels[1], kHeight);
   const std::vector<int> rgba = pixels[2];
-  const Blob here = FindOrange([&](int column, int line) -> std::array<int, 3> {
-    const auto at = 4 * static_cast<size_t>((kHeight - 1 - line) * kWidth + column);
-    return {rgba[at], rgba[at + 1], rgba[at + 2]};
-  });
-  EXPECT_NEAR(here.x, there.x, kCentreTolerance) << row;
-  EXPECT_NEAR(here.y, there.y, kCentreTolerance) << row;
-  EXPECT_NEAR(here.area / there.area, 1.0, kAreaTolerance) << row;
-  *x = here.x;
+  Image drawn(kWidth, kHeight);  // whose lowest row came first
+  for (int y = 0; y < kHeight; ++y) {
+    for (int x = 0; x < kWidth; ++x) {
+      for (int c = 0; c < 3; ++c) {
+        const int from = 4 * ((kHeight - 1 - y) * kWidth + x) + c;
+        drawn.rgb[static_cast<size_t>(3 * (y * kWidth + x) + c)] =
+            static_cast<std::uint8_t>(rgba[static_cast<size_t>(from)]);
+      }
+    }
+  }
+  const Vector3d here = FindTorus(drawn);
+  EXPECT_LT((here - there).head<2>().cwiseAbs().maxCoeff(), kCentreTolerance) << row;
+  EXPECT_NEAR(here.z() / there.z(), 1.0, kAreaTolerance) << row;
+  *column = here.x();
 }
 
 TEST_F(ReplayBrowserTest, DrawsWhatTheOffscreenRendererDrawsAndCostsAPhoneLittle) {
@@ -217,7 +195,7 @@ TEST_F(ReplayBrowserTest, PlaysTurnsHidesAndFits) {
   EXPECT_NEAR(Ask("const lag = r.bones.map(b => r.groups.ghost.position.clone().sub(b.position)).filter(d => "
                   "Math.hypot(d.y, d.z) < 1e-6); return Math.min(...lag.map(d => d.x));")
                   .get<double>(),
-              testing::kReplayLag, kFloatTolerance);
+              kReplayLag, kFloatTolerance);
   EXPECT_EQ(Ask("return r.groups.forces.children.filter(c => c.visible).length;"), 8);
   EXPECT_EQ(Ask("find('ghost').click(); return r.groups.ghost.visible;"), false);
 

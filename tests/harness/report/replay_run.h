@@ -2,7 +2,11 @@
 
 // A run with a scene: the kinematic run of the renderer's tests, in a log.
 
+#include <algorithm>
 #include <filesystem>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "harness/engine/engine.h"
 #include "harness/engine/mjcf_file.h"
@@ -26,45 +30,46 @@ inline RunFrames MakeReplayRun(const mjModel& model, double duration, double ste
   return run;
 }
 
+/// Puts the shipped scene into a log.
+inline void EmbedScene(LogWriter* log) {
+  const std::filesystem::path mjcf = SourcePath("/mjcf/scene.xml");
+  log->SetText("mjcf", "scene.xml");
+  for (const std::string& file : ListMjcfFiles(mjcf))
+    log->EmbedFile("inputs", "mjcf/" + file, ReadText(mjcf.parent_path() / file));
+}
+
+/// Adds signals, each with its rows, and writes these at their times.
+inline void WriteRows(const std::vector<double>& times,
+                      const std::vector<std::pair<SignalInfo, RowMatrixXd>>& signals, LogWriter* log) {
+  for (const auto& [signal, rows] : signals) log->AddSignal(signal);
+  log->StartRows();
+  for (size_t i = 0; i < times.size(); ++i) {
+    log->Row(LogWriter::kTime)[0] = times[i];
+    for (size_t k = 0; k < signals.size(); ++k)
+      std::ranges::copy(signals[k].second.row(static_cast<long>(i)),
+                        log->Row(static_cast<int>(k) + 1).begin());
+    log->EndRow();
+  }
+}
+
 /// Writes FOLDER/log.h5 with the shipped scene. @returns what is in it.
 inline RunFrames WriteReplayRun(const std::filesystem::path& folder, double duration, double step = 0.01) {
-  const std::filesystem::path mjcf = SourcePath("/mjcf/scene.xml");
-  const MjModelPtr model = LoadMjcf(mjcf);
+  const MjModelPtr model = LoadMjcf(SourcePath("/mjcf/scene.xml"));
   const RunFrames run = MakeReplayRun(*model, duration, step);
   LogWriter log(folder / "log.h5", run.rows());
   log.SetText("scenario", "replayed");
   log.SetText("object_body", run.object_body);
-  log.SetText("mjcf", "scene.xml");
-  for (const std::string& file : ListMjcfFiles(mjcf)) {
-    log.EmbedFile("inputs", "mjcf/" + file, ReadText(mjcf.parent_path() / file));
-  }
-  const auto add = [&](const char* name, const char* unit, long width) {
-    SignalInfo info{name, unit, name, static_cast<int>(width), {}, {}};
-    if (std::string(name) == "contact/force") info.attributes["mu"] = run.friction;
-    return log.AddSignal(info);
-  };
-  const int qpos = add("engine/qpos", "m, rad", run.qpos.cols());
-  const int position = add("contact/position", "m", run.contact_positions.cols());
-  const int force = add("contact/force", "N", run.contact_forces.cols());
-  const int normal = add("contact/normal", "1", run.contact_normals.cols());
-  const int X_o = add("object/X_o", "m, rad", 6);
-  const int X_d = add("object/X_d", "m, rad", 6);
-  log.StartRows();
-  const auto copy = [&](int signal, const auto& row) {
-    std::copy_n(row.data(), row.size(), log.Row(signal).begin());
-  };
-  for (long row = 0; row < run.rows(); ++row) {
-    log.Row(LogWriter::kTime)[0] = run.times[static_cast<size_t>(row)];
-    copy(qpos, run.qpos.row(row));
-    copy(position, run.contact_positions.row(row));
-    copy(force, run.contact_forces.row(row));
-    copy(normal, run.contact_normals.row(row));
-    Vector6d desired;
-    desired << run.desired_positions.row(row).transpose(), run.desired_angles.row(row).transpose();
-    copy(X_d, desired);
-    copy(X_o, desired);
-    log.EndRow();
-  }
+  EmbedScene(&log);
+  RowMatrixXd desired(run.rows(), 6);
+  desired << run.desired_positions, run.desired_angles;
+  WriteRows(run.times,
+            {{{"engine/qpos", "m, rad", "positions", model->nq, {}, {}}, run.qpos},
+             {{"contact/position", "m", "places", 12, {}, {}}, run.contact_positions},
+             {{"contact/force", "N", "forces", 12, {}, {{"mu", run.friction}}}, run.contact_forces},
+             {{"contact/normal", "1", "normals", 12, {}, {}}, run.contact_normals},
+             {{"object/X_o", "m, rad", "pose", 6, {}, {}}, desired},
+             {{"object/X_d", "m, rad", "desired", 6, {}, {}}, desired}},
+            &log);
   log.SetText("summary", MakeReportSummary({.rows = run.rows(), .scenario = "replayed"}));
   log.Close();
   return run;

@@ -20,8 +20,8 @@ namespace {
 constexpr size_t kMostBytes = 3'000'000;  // that the replay of 10 s may add to a page
 
 TEST(MakeReplayData, AddsAtMostThreeMegabytesForTenSeconds) {
-  const MjModelPtr model = LoadMjcf(testing::SourcePath("/mjcf/scene.xml"));
-  const ReplayData replay = MakeReplayData(*model, testing::MakeReplayRun(*model, 10.0, 0.001));
+  const MjModelPtr model = LoadMjcf(SourcePath("/mjcf/scene.xml"));
+  const ReplayData replay = MakeReplayData(*model, MakeReplayRun(*model, 10.0, 0.001));
   const size_t size = EmbedJson("", replay.json).size() + EmbedBytes("", replay.values).size() +
                       std::string(kThreeJs).size() + std::string(kReplayJs).size();
   RecordProperty("bytes", static_cast<int>(size));

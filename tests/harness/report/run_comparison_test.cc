@@ -4,7 +4,6 @@
 
 #include <gmock/gmock.h>
 
-#include "harness/report/comparison_page.h"
 #include "tests/common/files.h"
 #include "tests/common/matchers.h"
 #include "tests/harness/report/report_run.h"
@@ -39,18 +38,16 @@ void WriteLine(const std::filesystem::path& folder, double time_step, double slo
 
 class RunComparisonTest : public ::testing::Test {
  protected:
-  RunComparison Compare(const std::filesystem::path& a, const std::filesystem::path& b,
-                        const RunComparisonOptions& options = {}) {
-    const RunData first(a);
-    const RunData second(b);
+  RunComparison Compare(const char* a, const char* b, const RunComparisonOptions& options = {}) {
+    const RunData first(folder_.path() / a), second(folder_.path() / b);
     return CompareRuns({&first, &second}, options);
   }
-  testing::TempFolder folder_;
+  TempFolder folder_;
 };
 
 TEST_F(RunComparisonTest, ARunIsTheSameAsItself) {
-  testing::WriteReportRun(folder_.path());
-  const RunComparison comparison = Compare(folder_.path(), folder_.path());
+  WriteReportRun(folder_.path());
+  const RunComparison comparison = Compare("", "");
   EXPECT_TRUE(comparison.IsSame());
   EXPECT_THAT(comparison.inputs, IsEmpty());
   EXPECT_THAT(comparison.not_compared, IsEmpty());
@@ -66,7 +63,7 @@ TEST_F(RunComparisonTest, ASignalIsJudgedByTheSizeOfItsUnit) {
   WriteLine(folder_.path() / "a", 0.01, 1.0, "");
   WriteLine(folder_.path() / "b", 0.01, 1.001, "");
   // In metres y is the size.
-  RunComparison comparison = Compare(folder_.path() / "a", folder_.path() / "b", {4e-7, {}});
+  RunComparison comparison = Compare("a", "b", {4e-7, {}});
   ASSERT_EQ(comparison.signals.size(), 1U);
   const SignalDifference& signal = comparison.signals[0];
   EXPECT_EQ(signal.column, "x");
@@ -79,7 +76,7 @@ TEST_F(RunComparisonTest, ASignalIsJudgedByTheSizeOfItsUnit) {
   EXPECT_FALSE(comparison.IsSame());
   EXPECT_THAT(DescribeComparison(comparison, 4e-7),
               HasSubstr("DIFFERENT: 1 of 1 signals, first object/X_o.x at 0.410 s"));
-  comparison = Compare(folder_.path() / "a", folder_.path() / "b", {6e-7, {}});
+  comparison = Compare("a", "b", {6e-7, {}});
   EXPECT_TRUE(comparison.IsSame());
   // Residuals of checks are rounding: they stand side by side and decide nothing.
   ASSERT_EQ(comparison.checks.size(), 2U);
@@ -89,8 +86,8 @@ TEST_F(RunComparisonTest, OtherStepsAreComparedAlongLines) {
   WriteLine(folder_.path() / "a", 0.01, 1.0, "");
   WriteLine(folder_.path() / "b", 0.02, 1.0, "");
   WriteLine(folder_.path() / "c", 0.02, 1.5, "");
-  EXPECT_TRUE(Compare(folder_.path() / "a", folder_.path() / "b", {1e-12, {}}).IsSame());
-  const RunComparison comparison = Compare(folder_.path() / "a", folder_.path() / "c");
+  EXPECT_TRUE(Compare("a", "b", {1e-12, {}}).IsSame());
+  const RunComparison comparison = Compare("a", "c");
   // x differs by 0.5 t at each of the first run's rows.
   EXPECT_NEAR(comparison.signals[0].difference, 0.25, 1e-12);
   EXPECT_NEAR(comparison.signals[0].first_time, 0.01, 1e-12);
@@ -99,7 +96,7 @@ TEST_F(RunComparisonTest, OtherStepsAreComparedAlongLines) {
 TEST_F(RunComparisonTest, NumbersAgainstNoneAreAnInfiniteDifference) {
   WriteLine(folder_.path() / "a", 0.01, 1.0, "");
   WriteLine(folder_.path() / "b", 0.01, 1.0, "", 0.3);
-  const RunComparison comparison = Compare(folder_.path() / "a", folder_.path() / "b", {1.0, {}});
+  const RunComparison comparison = Compare("a", "b", {1.0, {}});
   EXPECT_FALSE(comparison.IsSame());
   EXPECT_NEAR(comparison.FindFirst()->first_time, 0.3, 1e-12);
 }
@@ -108,35 +105,33 @@ TEST_F(RunComparisonTest, InputsThatDifferAreNamed) {
   WriteLine(folder_.path() / "a", 0.01, 1.0, "");
   WriteLine(folder_.path() / "b", 0.01, 1.0, "mu=0.5\nseed=3\n");
   WriteLine(folder_.path() / "c", 0.01, 2.0, "");
-  RunComparison comparison = Compare(folder_.path() / "a", folder_.path() / "b");
+  RunComparison comparison = Compare("a", "b");
   ASSERT_EQ(comparison.inputs.size(), 1U);
   EXPECT_EQ(comparison.inputs[0].name, "overrides");
   EXPECT_EQ(comparison.inputs[0].values[1], "mu=0.5 seed=3");
-  comparison = Compare(folder_.path() / "a", folder_.path() / "c");
+  comparison = Compare("a", "c");
   ASSERT_EQ(comparison.inputs.size(), 1U);
   EXPECT_EQ(comparison.inputs[0].name, "scenario.toml");
 }
 
 TEST_F(RunComparisonTest, OtherVerdictsAreADifference) {
-  testing::WriteReportRun(folder_.path() / "a");
-  testing::ReportRun passing;
-  passing.verdict = "pass";
-  testing::WriteReportRun(folder_.path() / "b", passing);
-  const RunComparison comparison = Compare(folder_.path() / "a", folder_.path() / "b", {1.0, {}});
+  WriteReportRun(folder_.path() / "a");
+  WriteReportRun(folder_.path() / "b", {.verdict = "pass"});
+  const RunComparison comparison = Compare("a", "b", {1.0, {}});
   EXPECT_EQ(comparison.verdicts[0], "disagreement: wheel slip");
   EXPECT_EQ(comparison.verdicts[1], "pass");
   EXPECT_FALSE(comparison.IsSame());
 }
 
 TEST_F(RunComparisonTest, SignalsOfOneRunAloneAreSaid) {
-  testing::WriteReportRun(folder_.path() / "a");
+  WriteReportRun(folder_.path() / "a");
   WriteLine(folder_.path() / "b", 0.01, 1.0, "");
-  const RunComparison comparison = Compare(folder_.path() / "a", folder_.path() / "b");
-  EXPECT_THAT(comparison.not_compared, ::testing::Contains("tau"));
+  const RunComparison comparison = Compare("a", "b");
+  EXPECT_THAT(comparison.not_compared, Contains("tau"));
 }
 
 TEST_F(RunComparisonTest, NothingOfTheLogsIsMarkup) {
-  testing::WriteReportRun(folder_.path() / "a");
+  WriteReportRun(folder_.path() / "a");
   WriteLine(folder_.path() / "b", 0.01, 1.0, "<script>alert(1)</script>");
   const RunData a(folder_.path() / "a");
   const RunData b(folder_.path() / "b");

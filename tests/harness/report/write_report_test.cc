@@ -16,7 +16,6 @@
 #include "controller/common/errors.h"
 #include "harness/report/page.h"
 #include "harness/report/run_data.h"
-#include "harness/report/tex_table.h"
 #include "tests/common/files.h"
 #include "tests/common/matchers.h"
 #include "tests/harness/report/report_run.h"
@@ -88,12 +87,9 @@ TEST_F(WriteReportTest, HasThePapersPanelsFromTheRightSignals) {
 }
 
 TEST_F(WriteReportTest, ShowsTheOptimalForcesBesideTheMeasuredOnes) {
-  ReportRun with_law;
-  with_law.has_law = true;
-  WriteReportRun(run_dir(), with_law);
+  WriteReportRun(run_dir(), {.has_law = true});
   const std::vector<Figure> figures = MakeMotionFigures(RunData(run_dir()));
-  const auto figure =
-      std::find_if(figures.begin(), figures.end(), [](const Figure& f) { return f.name == "fig13a"; });
+  const auto figure = std::ranges::find(figures, "fig13a", &Figure::name);
   ASSERT_NE(figure, figures.end());
   std::vector<std::string> labels;
   for (const Curve& curve : figure->curves) labels.push_back(curve.label);
@@ -135,7 +131,7 @@ TEST_F(WriteReportTest, WritesPageAndFiguresAndLeavesNothingElse) {
     for (const auto& [extension, beginning] :
          {std::pair(".pdf", "%PDF"), std::pair(".png", "\x89PNG"), std::pair(".csv", "t (s),\"")}) {
       const fs::path file = run_dir() / "figures" / (std::string(name) + extension);
-      EXPECT_THAT(ReadText(file), ::testing::StartsWith(beginning)) << file;
+      EXPECT_THAT(ReadText(file), StartsWith(beginning)) << file;
     }
   }
 }
@@ -218,12 +214,11 @@ TEST_F(WriteReportTest, SaysVerdictCauseAndWhatWasRun) {
 }
 
 TEST_F(WriteReportTest, NothingOfTheLogIsMarkup) {
-  ReportRun run;
-  run.scenario = "<i>'sample'</i>";
-  const std::string page = Report(run);
+  const std::string scenario = "<i>'sample'</i>";
+  const std::string page = Report({.scenario = scenario});
   EXPECT_THAT(page, Not(HasSubstr("<script>alert")));
   EXPECT_THAT(page, Not(HasSubstr("<i>'sample'")));
-  EXPECT_EQ(ReadData(page)["scenario"], run.scenario);
+  EXPECT_EQ(ReadData(page)["scenario"], scenario);
   EXPECT_THAT(ReadData(page)["description"].get<std::string>(), HasSubstr("made <by> hand & \"quoted\""));
 }
 
@@ -234,9 +229,7 @@ TEST_F(WriteReportTest, IsTheSameWhenMadeAgain) {
 }
 
 TEST_F(WriteReportTest, GivesNoVerdictForARunThatWasCutOff) {
-  ReportRun run;
-  run.has_summary = false;
-  const Json page = ReadData(Report(run));
+  const Json page = ReadData(Report({.has_summary = false}));
   EXPECT_EQ(page["verdict"]["word"], "NO VERDICT");
   // From the recorded values themselves.
   EXPECT_NEAR(page["verdict"]["first_failure"]["time"], 0.133, 5e-4);
@@ -244,7 +237,7 @@ TEST_F(WriteReportTest, GivesNoVerdictForARunThatWasCutOff) {
 
 TEST_F(WriteReportTest, EmbedsASmallVideoAndLinksToALargeOne) {
   WriteReportRun(run_dir());
-  testing::WriteText(run_dir() / "video.mp4", "foobar");
+  WriteText(run_dir() / "video.mp4", "foobar");
   WriteRunReport(run_dir(), MakeReportFiles(run_dir()));
   const std::string embedded = "id=\"run-video\">Zm9vYmFy<";
   EXPECT_THAT(ReadText(run_dir() / "report.html"), HasSubstr(embedded));
@@ -259,7 +252,7 @@ TEST_F(WriteReportTest, EmbedsASmallVideoAndLinksToALargeOne) {
 TEST_F(WriteReportTest, AddsPicturesFromElsewhere) {
   WriteReportRun(run_dir());
   WriteRunReport(run_dir(), MakeReportFiles(run_dir()), [](const RunData&, const fs::path& folder) {
-    testing::WriteText(folder / "fig11a.png", "foobar");
+    WriteText(folder / "fig11a.png", "foobar");
     return RunScene{{{folder / "fig11a.png", "11 (a)", "Beginning"}}, {}};
   });
   EXPECT_THAT(ReadText(run_dir() / "report.html"), HasSubstr("id=\"run-picture-0\">Zm9vYmFy<"));
@@ -268,7 +261,7 @@ TEST_F(WriteReportTest, AddsPicturesFromElsewhere) {
 
 TEST_F(WriteReportTest, KeepsWhatWasThereWhenPicturesFail) {
   WriteReportRun(run_dir());
-  testing::WriteText(run_dir() / "report.html", "old");
+  WriteText(run_dir() / "report.html", "old");
   const SceneMaker fail = [](const RunData&, const fs::path&) -> RunScene {
     throw InputError("no pictures");
   };
@@ -277,11 +270,7 @@ TEST_F(WriteReportTest, KeepsWhatWasThereWhenPicturesFail) {
   EXPECT_THAT(ListFiles(), ElementsAre("log.h5", "report.html"));
 }
 
-TEST_F(WriteReportTest, StaysSmallForALongRun) {
-  ReportRun run;
-  run.rows = 60000;
-  EXPECT_LT(Report(run).size(), 6'000'000U);
-}
+TEST_F(WriteReportTest, StaysSmallForALongRun) { EXPECT_LT(Report({.rows = 60000}).size(), 6'000'000U); }
 
 TEST(Figures, CurvesOfTwoAxesDoNotLieOnOneAnother) {
   Figure figure;

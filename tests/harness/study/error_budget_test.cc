@@ -12,54 +12,49 @@
 namespace dexcheck::testing::error_budget_test {
 namespace {
 
-const std::string kRobot = SourcePath("/controller/parameters/assistant_robot.toml");
-const std::string kScene = SourcePath("/mjcf/scene.xml");
 constexpr int kJobs = 2;
 
-ErrorBudget Calc(const std::vector<std::string>& overrides) {
-  return CalcErrorBudget(ReadShippedScenario("curve", overrides), kRobot, kScene, kJobs,
-                         [](long, long) { return true; });
+ErrorBudget Calc(const std::string& scenario, const std::vector<std::string>& overrides) {
+  const bool is_panda = scenario.starts_with("panda");
+  return CalcErrorBudget(
+      ReadShippedScenario(scenario, overrides),
+      SourcePath("/controller/parameters/") + (is_panda ? "panda.toml" : "assistant_robot.toml"),
+      SourcePath("/mjcf/") + (is_panda ? "panda_scene.xml" : "scene.xml"), kJobs,
+      [](long, long) { return true; });
 }
 
-TEST(ErrorBudget, PartsThatDoNotInteractAddUpAndArePredicted) {
-  const ErrorBudget budget =
-      Calc({"duration=0.6", "settle=0.5", "mismatch.mass={ r_forearm = 1.01 }",
-            "actuation.gain_error={ r_elbow = 2e-3 }",
-            "disturbance=[{ type = 'step', body = 'object', force = [0, 0.05, 0], begin = 0.1 }]"});
+/// Sources that are as large as this at least, do not interact, add up and are predicted.
+void ExpectSumsAndPredictions(const ErrorBudget& budget, size_t sources, double least) {
   EXPECT_TRUE(budget.is_complete()) << budget.failure;
-  ASSERT_EQ(budget.entries.size(), 3U);
+  ASSERT_EQ(budget.entries.size(), sources);
   for (const BudgetEntry& entry : budget.entries) {
     SCOPED_TRACE(entry.name);
-    EXPECT_GT(entry.alone.rms, 10.0 * budget.ideal.rms);
+    EXPECT_GT(entry.alone.rms, least);
     EXPECT_FALSE(entry.interacts()) << entry.interaction;
     EXPECT_NEAR(entry.predicted.rms, entry.alone.rms, 0.1 * entry.alone.rms);
   }
   EXPECT_NEAR(budget.sum.rms, budget.all.rms, 0.1 * budget.all.rms);
 }
 
+TEST(ErrorBudget, PartsThatDoNotInteractAddUpAndArePredicted) {
+  const ErrorBudget budget =
+      Calc("curve", {"duration=0.6", "settle=0.5", "mismatch.mass={ r_forearm = 1.01 }",
+                     "actuation.gain_error={ r_elbow = 2e-3 }",
+                     "disturbance=[{ type = 'step', body = 'object', force = [0, 0.05, 0], begin = 0.1 }]"});
+  ExpectSumsAndPredictions(budget, 3, 10.0 * budget.ideal.rms);
+}
+
 // Also of an arm that holds nothing, whatever its law: by computed torque, and by springs.
 TEST(ErrorBudget, PartsOfAMotionOfJointsAddUpAndArePredicted) {
   for (const std::string law : {"computed_torque", "feedforward_pd"}) {
     SCOPED_TRACE(law);
-    const Scenario scenario = ReadShippedScenario(
+    const ErrorBudget budget = Calc(
         "panda-reach",
         {"duration=0.8", "settle=0.2", "control.law='" + law + "'", "mismatch.mass={ panda_link4 = 1.02 }",
          "actuation.gain_error={ panda_joint2 = 2e-3 }", "sensing.latency=0.001",
          "disturbance=[{ type = 'step', body = 'panda_link5', force = [0, 2, 0], begin = 0.2 }]"});
-    const ErrorBudget budget =
-        CalcErrorBudget(scenario, SourcePath("/controller/parameters/panda.toml"),
-                        SourcePath("/mjcf/panda_scene.xml"), kJobs, [](long, long) { return true; });
-    EXPECT_TRUE(budget.is_complete()) << budget.failure;
+    ExpectSumsAndPredictions(budget, 4, 1e-7);
     EXPECT_TRUE(budget.of_joints);
-    EXPECT_EQ(budget.unit, "rad");
-    ASSERT_EQ(budget.entries.size(), 4U);
-    for (const BudgetEntry& entry : budget.entries) {
-      SCOPED_TRACE(entry.name);
-      EXPECT_GT(entry.alone.rms, 1e-7);
-      EXPECT_FALSE(entry.interacts()) << entry.interaction;
-      EXPECT_NEAR(entry.predicted.rms, entry.alone.rms, 0.1 * entry.alone.rms);
-    }
-    EXPECT_NEAR(budget.sum.rms, budget.all.rms, 0.1 * budget.all.rms);
     EXPECT_EQ(ToJson(budget).at("unit"), "rad");
     EXPECT_EQ(ToJson(budget).at("all").at("rms"), budget.all.rms);
   }
@@ -68,11 +63,7 @@ TEST(ErrorBudget, PartsOfAMotionOfJointsAddUpAndArePredicted) {
 // A run begins with no lasting error of what noise its first step has.
 TEST(ErrorBudget, NoiseIsPredictedToItsSize) {
   constexpr double kFewPeriods = 0.3;  // what the rms of a second of filtered noise is known to
-  const Scenario scenario =
-      ReadShippedScenario("panda-reach", {"duration=1", "settle=0.2", "sensing.joint_noise=1e-5"});
-  const ErrorBudget budget =
-      CalcErrorBudget(scenario, SourcePath("/controller/parameters/panda.toml"),
-                      SourcePath("/mjcf/panda_scene.xml"), kJobs, [](long, long) { return true; });
+  const ErrorBudget budget = Calc("panda-reach", {"duration=1", "settle=0.2", "sensing.joint_noise=1e-5"});
   ASSERT_EQ(budget.entries.size(), 1U);
   const BudgetEntry& entry = budget.entries[0];
   EXPECT_GT(entry.alone.rms, 10.0 * budget.ideal.rms);
@@ -83,11 +74,8 @@ TEST(ErrorBudget, NoiseIsPredictedToItsSize) {
 // of (1 + m) / (1 + g) - 1 of the weight: that is more than m and 1 / (1 + g) - 1 by their product.
 TEST(ErrorBudget, SourcesThatInteractAreMarked) {
   constexpr double kMass = 0.5, kGain = -0.3;
-  const Scenario scenario = ReadShippedScenario(
-      "panda-reach", {"duration=0.5", "settle=0.5", "actuation.gain_error=-0.3", "mismatch.mass=1.5"});
   const ErrorBudget budget =
-      CalcErrorBudget(scenario, SourcePath("/controller/parameters/panda.toml"),
-                      SourcePath("/mjcf/panda_scene.xml"), kJobs, [](long, long) { return true; });
+      Calc("panda-reach", {"duration=0.5", "settle=0.5", "actuation.gain_error=-0.3", "mismatch.mass=1.5"});
   EXPECT_TRUE(budget.is_complete()) << budget.failure;
   const double of_gain = 1.0 / (1.0 + kGain) - 1.0;
   const double expected = kMass * of_gain / ((1.0 + kMass) / (1.0 + kGain) - 1.0);
@@ -126,13 +114,9 @@ TEST(ErrorBudget, EverySourceOfAScenarioIsListedAndDropped) {
 }
 
 TEST(ErrorBudget, IdealPlantsAndTasksAreRefused) {
-  EXPECT_TRUE(Throws<InputError>([] { return Calc({"duration=0.1"}); }, "has nothing in [sensing]"));
-  EXPECT_TRUE(Throws<InputError>(
-      [] {
-        return CalcErrorBudget(ReadShippedScenario("lift", {"mismatch.mass=1.01"}), kRobot, kScene, kJobs,
-                               [](long, long) { return true; });
-      },
-      "task: a budget needs a trajectory"));
+  EXPECT_TRUE(Throws<InputError>([] { return Calc("curve", {"duration=0.1"}); }, "has nothing in [sensing]"));
+  EXPECT_TRUE(Throws<InputError>([] { return Calc("lift", {"mismatch.mass=1.01"}); },
+                                 "task: a budget needs a trajectory"));
 }
 
 }  // namespace

@@ -9,20 +9,15 @@
 #include <cmath>
 #include <complex>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "controller/common/text.h"
-#include "controller/common/toml_reader.h"
 #include "harness/plant/velocity_filter.h"
 #include "harness/run/runner.h"
-#include "harness/study/trial.h"
-#include "tests/common/paths.h"
+#include "tests/harness/study/study_fixture.h"
 
 namespace dexcheck::testing::sampled_stability_test {
 namespace {
-
-const std::string kFolder = testing::SourcePath("/harness/shipped/scenarios");
 
 /// One sample built step by step, and the roots of its characteristic polynomial.
 double SolveSpectralRadius(const SampledLoop& loop, const AxisGains& gains) {
@@ -103,7 +98,7 @@ TEST(SampledStability, CriticalDampingIsFastest) {
     // Without overshoot from there on, with overshoot before.
     const auto least = [&](double fraction) {
       const std::vector<double> response = CalcStepResponse(loop, {K_p, fraction * K_v}, 100 * loop.hold);
-      return *std::min_element(response.begin(), response.end());
+      return *std::ranges::min_element(response);
     };
     EXPECT_GT(least(1.001), 0.0);
     EXPECT_LT(least(0.8), 0.0);
@@ -190,15 +185,9 @@ TEST(SampledStability, AChainWithoutLatenessIsTheDirectLoop) {
 
 /// The closed loop of `offset` at these gains.
 StudyInputs MakeInputs(const std::vector<std::string>& overrides) {
-  StudyInputs inputs;
-  inputs.study = ParseStudy(
-      "name = \"s\"\nscenario = \"offset\"\n[[vary]]\nkey = \"control.K_v\"\nvalues = [1]\n", "study.toml");
+  StudyInputs inputs =
+      MakeStudyInputs("name = \"s\"\nscenario = \"offset\"\n[[vary]]\nkey = \"control.K_v\"\nvalues = [1]\n");
   inputs.study.overrides = overrides;
-  inputs.scenario_text = ReadTextFile(kFolder + "/offset.toml");
-  inputs.scenario_source = "offset";
-  inputs.scenario_folder = kFolder;
-  inputs.robot = testing::SourcePath("/controller/parameters/assistant_robot.toml");
-  inputs.mjcf = testing::SourcePath("/mjcf/scene.xml");
   return inputs;
 }
 
@@ -277,30 +266,12 @@ constexpr long kStride = 20;
 /// trace^2 / 4 - determinant of the recurrence that fits a response best: negative where it swings, zero at
 /// critical damping.
 double FitDiscriminant(const std::vector<double>& errors) {
-  // Columns e', -e, 1 and what they are to give, made orthogonal one after another (Gram and Schmidt).
-  const size_t count = errors.size() - 2 * kStride;
-  std::array<std::vector<double>, 4> columns;
-  for (size_t i = 0; i < count; ++i) {
-    columns[0].push_back(1.0);
-    columns[1].push_back(-errors[i]);
-    columns[2].push_back(errors[i + kStride]);
-    columns[3].push_back(errors[i + 2 * kStride]);
-  }
-  const auto product = [&](size_t a, size_t b) {
-    double sum = 0.0;
-    for (size_t i = 0; i < count; ++i) sum += columns[a][i] * columns[b][i];
-    return sum;
-  };
-  std::array<std::array<double, 4>, 4> r{};
-  for (size_t a = 0; a < 3; ++a) {
-    for (size_t b = a + 1; b < 4; ++b) {
-      r[a][b] = product(a, b) / product(a, a);
-      for (size_t i = 0; i < count; ++i) columns[b][i] -= r[a][b] * columns[a][i];
-    }
-  }
-  const double trace = r[2][3];
-  const double determinant = r[1][3] - r[1][2] * trace;
-  return 0.25 * trace * trace - determinant;
+  const auto n = static_cast<Eigen::Index>(errors.size()) - 2 * kStride;
+  const Eigen::Map<const VectorXd> all(errors.data(), static_cast<Eigen::Index>(errors.size()));
+  MatrixXd known(n, 3);
+  known << all.segment(kStride, n), -all.head(n), VectorXd::Ones(n);
+  const Eigen::Vector3d fit = known.colPivHouseholderQr().solve(all.tail(n));  // trace, determinant, constant
+  return 0.25 * fit[0] * fit[0] - fit[1];
 }
 
 // At most ten times what was measured, 1.0e-7 for torques at every step and 1.4e-6 for torques that are held.

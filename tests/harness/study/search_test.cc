@@ -6,14 +6,18 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <cstdlib>
-#include <functional>
 #include <random>
+#include <sstream>
+#include <string>
 
 #include "controller/common/errors.h"
 #include "harness/study/study_findings.h"
+#include "tests/common/run_program.h"
 #include "tests/common/throws.h"
 #include "tests/harness/study/search_functions.h"
+#include "tests/harness/study/study_fixture.h"
 
 namespace dexcheck::testing::search_test {
 namespace {
@@ -197,9 +201,7 @@ to = 1
 )";
 
 TrialRow MakeRow(const Trial& trial) {
-  TrialRow row;
-  row.trial = trial;
-  row.result.metrics.fill(0.0);
+  TrialRow row = MakeTrialRow(trial);
   const double a = std::log(trial.parameters[0] / 20.0);
   row.result.metrics[kEnergy] =
       a * a + trial.parameters[1] * trial.parameters[1] + 0.01 * trial.parameters[2];
@@ -241,11 +243,10 @@ TEST(SearchHistory, GoesOnFromItsRowsWhereverItWasStopped) {
     for (const TrialRow& row : std::vector<TrialRow>(rows)) again.Add(row);
     Follow(&again, SIZE_MAX, &rows);
     ASSERT_EQ(rows.size(), all.size()) << stop;
-    std::sort(rows.begin(), rows.end(),
-              [](const TrialRow& a, const TrialRow& b) { return a.trial.number < b.trial.number; });
     std::vector<TrialRow> expected = all;
-    std::sort(expected.begin(), expected.end(),
-              [](const TrialRow& a, const TrialRow& b) { return a.trial.number < b.trial.number; });
+    for (std::vector<TrialRow>* const some : {&rows, &expected})
+      std::sort(some->begin(), some->end(),
+                [](const TrialRow& a, const TrialRow& b) { return a.trial.number < b.trial.number; });
     for (size_t i = 0; i < rows.size(); ++i)
       EXPECT_EQ(rows[i].trial.parameters, expected[i].trial.parameters) << i;
   }
@@ -278,6 +279,51 @@ TEST(SearchHistory, RowsOfAnotherSearchAreRefused) {
         return 0;
       },
       "is not what this search makes of the trials before it"));
+}
+
+// NSGA-II beside Optuna's own, on the same problem with the same budget.
+constexpr long kPoints = 480;
+constexpr int kSeeds = 3;
+
+// Values of the points of each seed, all on one line.
+const std::string kOptuna = R"(
+import math, optuna
+optuna.logging.set_verbosity(optuna.logging.ERROR)
+def zdt1(trial):
+    x = [trial.suggest_float(f"x{i}", 0, 1) for i in range(4)]
+    g = 1 + 3 * (x[1] + x[2] + x[3])
+    return x[0], g * (1 - math.sqrt(x[0] / g))
+for seed in range(3):
+    sampler = optuna.samplers.NSGAIISampler(population_size=24, seed=seed)
+    study = optuna.create_study(directions=["minimize", "minimize"], sampler=sampler)
+    study.optimize(zdt1, n_trials=480)
+    print(" ".join(f"{a!r} {b!r}" for a, b in (t.values for t in study.trials)))
+)";
+
+TEST(SearchOptuna, Nsga2HasNoLessHypervolumeThanOptunas) {
+  const ProgramResult result = RunProgram({"/usr/bin/python3", "-W", "ignore", "-c", kOptuna});
+  if (result.err.find("No module named 'optuna'") != std::string::npos) GTEST_SKIP() << "no Optuna here";
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  std::istringstream lines(result.out);
+  double ours = 0.0;
+  double theirs = 0.0;
+  for (int seed = 0; seed < kSeeds; ++seed) {
+    std::string line;
+    ASSERT_TRUE(std::getline(lines, line));
+    std::istringstream numbers(line);
+    std::vector<JudgedPoint> points;
+    for (double a = 0.0, b = 0.0; numbers >> a >> b;) points.push_back({0, {}, {{a, b}, 0.0}});
+    ASSERT_EQ(points.size(), static_cast<size_t>(kPoints));
+    theirs += CalcHypervolume(FindFront(points)) / kSeeds;
+    Search search = MakeSearch(SearchMethod::kNsga2, kPoints);
+    search.population = 24;
+    search.seed = static_cast<std::uint64_t>(seed);
+    ours += CalcHypervolume(FindFront(RunSearch(search, {0.5, 0.5, 0.5, 0.5}, Zdt1))) / kSeeds;
+  }
+  EXPECT_GT(theirs, 0.5) << "it was understood";
+  EXPECT_GE(ours, theirs);
+  std::printf("hypervolume, mean of %d seeds with %ld points: %.4f, Optuna %.4f\n", kSeeds, kPoints, ours,
+              theirs);
 }
 
 }  // namespace

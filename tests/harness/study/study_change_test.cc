@@ -7,6 +7,7 @@
 #include "controller/common/errors.h"
 #include "tests/common/files.h"
 #include "tests/common/throws.h"
+#include "tests/harness/study/study_fixture.h"
 
 namespace dexcheck::testing::study_change_test {
 namespace {
@@ -24,9 +25,7 @@ values = ["x", "y"]
 
 /// A row whose energy says which trial it is.
 TrialRow MakeRow(const Study& study, const Trial& trial) {
-  TrialRow row;
-  row.trial = trial;
-  row.result.metrics.fill(0.0);
+  TrialRow row = MakeTrialRow(trial);
   row.result.metrics[kEnergy] = 100.0 * trial.parameters[0] + static_cast<double>(trial.seed) +
                                 (FormatValue(study.variations[1], trial.parameters[1]) == "x" ? 0.5 : 0.25);
   return row;
@@ -37,11 +36,10 @@ class StudyChangeTest : public ::testing::Test {
   StudyStore Open(const std::string& text, const std::string& revision = "r1",
                   const MakesSameRows& same = {}) {
     const Study study = ParseStudy(text, "study.toml");
-    const StudyIdentity identity = {
-        {"layout", "2"},          {"name", study.name},      {"study", text},
-        {"scenario", "text"},     {"robot", "text"},         {"mjcf_hash", "0"},
-        {"controller_hash", "0"}, {"dexcheck_version", "1"}, {"git_revision", revision},
-        {"mujoco_version", "2"}};
+    StudyIdentity identity = MakeIdentity(study);
+    for (auto& [column, value] : identity) {
+      if (column == "git_revision") value = revision;
+    }
     return StudyStore::OpenOrCreate(folder_.path() / "s.sqlite", identity, study, same);
   }
 

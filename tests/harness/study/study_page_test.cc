@@ -13,7 +13,7 @@
 #include "tests/common/browser.h"
 #include "tests/common/files.h"
 #include "tests/common/matchers.h"
-#include "tests/common/paths.h"
+#include "tests/harness/study/study_fixture.h"
 
 namespace dexcheck::testing::study_page_test {
 namespace {
@@ -30,12 +30,7 @@ class StudyPageBrowserTest : public ::testing::Test {
  protected:
   /// Opens the page of a study whose trials are all there.
   void Open(const std::string& study, int width = 1280) {
-    StudyInputs inputs;
-    inputs.study = ParseStudy("name = \"page\"\nscenario = \"offset\"\n" + study, "study.toml");
-    inputs.scenario_text = ReadTextFile(SourcePath("/harness/shipped/scenarios/offset.toml"));
-    inputs.scenario_source = "offset";
-    inputs.robot = SourcePath("/controller/parameters/assistant_robot.toml");
-    inputs.mjcf = SourcePath("/mjcf/scene.xml");
+    const StudyInputs inputs = MakeStudyInputs("name = \"page\"\nscenario = \"offset\"\n" + study);
     std::filesystem::remove(folder_.path() / "page.sqlite");
     StudyStore store =
         StudyStore::OpenOrCreate(folder_.path() / "page.sqlite", IdentifyStudy(inputs), inputs.study);
@@ -48,13 +43,11 @@ class StudyPageBrowserTest : public ::testing::Test {
     browser_.SetViewport(width, 900, width < 500);
     browser_.Open(folder_.path() / "page.html");
     EXPECT_TRUE(browser_.WaitFor("return document.getElementById('explore').dataset.ready === 'yes';"));
-    EXPECT_THAT(browser_.TakeConsole(), ::testing::IsEmpty()) << study;
+    EXPECT_THAT(browser_.TakeConsole(), IsEmpty()) << study;
   }
 
   static TrialRow MakeRow(const Trial& trial) {
-    TrialRow row;
-    row.trial = trial;
-    row.result.metrics.fill(1.0 / static_cast<double>(trial.number + 1));
+    TrialRow row = MakeTrialRow(trial, 1.0 / static_cast<double>(trial.number + 1));
     // The last number, of K_v or of a law.
     if (trial.parameters.back() > kLimit || trial.parameters.back() == kLastLaw) {
       row.result.outcome = Outcome::kDiverged;
@@ -95,7 +88,7 @@ TEST_F(StudyPageBrowserTest, ACellShowsTheCommandThatRepeatsItsTrial) {
                 ".filter(c => c.mark).length;"),
             6);
   EXPECT_THAT(Text("departures"), HasSubstr("agree with 12 of 12 trials"));
-  EXPECT_THAT(browser_.TakeConsole(), ::testing::IsEmpty());
+  EXPECT_THAT(browser_.TakeConsole(), IsEmpty());
 }
 
 // All that a page has works for studies of every kind, and nothing sticks out at any width.
@@ -161,7 +154,7 @@ TEST_F(StudyPageBrowserTest, LooksCloserAtItsTrials) {
   choose("x", Run("return String([...document.getElementById('explore-x').options].find(o => o.text === "
                   "'energy, J').value);"));
   EXPECT_EQ(Run("return " + scatter + ".data.datasets[1].label;"), "Pareto front, 1 trials");
-  EXPECT_THAT(browser_.TakeConsole(), ::testing::IsEmpty());
+  EXPECT_THAT(browser_.TakeConsole(), IsEmpty());
 }
 
 // Where (57) knows a metric, what it makes of it stands beside what was measured.
@@ -174,7 +167,7 @@ TEST_F(StudyPageBrowserTest, ShowsTheoryBesideTheTrials) {
   EXPECT_EQ(Run("return document.querySelectorAll('#best a').length;"), 6);
   Run("document.querySelector('#best a').click();");
   EXPECT_TRUE(browser_.WaitFor("return !document.getElementById('explore-chosen').hidden;"));
-  EXPECT_THAT(browser_.TakeConsole(), ::testing::IsEmpty());
+  EXPECT_THAT(browser_.TakeConsole(), IsEmpty());
 }
 
 }  // namespace

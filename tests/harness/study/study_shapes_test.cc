@@ -10,15 +10,12 @@
 #include <vector>
 
 #include "controller/common/errors.h"
-#include "controller/common/toml_reader.h"
 #include "harness/study/search.h"
 #include "harness/study/study_findings.h"
 #include "harness/study/study_page.h"
-#include "harness/study/study_rows.h"
-#include "harness/study/study_summary.h"
 #include "tests/common/files.h"
 #include "tests/common/matchers.h"
-#include "tests/common/paths.h"
+#include "tests/harness/study/study_fixture.h"
 
 namespace dexcheck::testing::study_shapes_test {
 namespace {
@@ -84,9 +81,7 @@ const std::vector<Shape> kShapes = {
 };
 
 TrialRow MakeRow(const Trial& trial) {
-  TrialRow row;
-  row.trial = trial;
-  row.result.metrics.fill(1.0 / static_cast<double>(trial.number + 1));
+  TrialRow row = MakeTrialRow(trial, 1.0 / static_cast<double>(trial.number + 1));
   if (trial.number % 3 == 2) row.result.outcome = Outcome::kDiverged;
   row.machine = "=cmd|calc";
   return row;
@@ -96,12 +91,7 @@ class StudyShapes : public ::testing::TestWithParam<Shape> {
  protected:
   /// A study with all its trials; of a search with those of its first batches.
   StudyStore Make(const std::string& text) {
-    StudyInputs inputs;
-    inputs.study = ParseStudy("name = 'shape'\nscenario = 'offset'\n" + text, "study.toml");
-    inputs.scenario_text = ReadTextFile(testing::SourcePath("/harness/shipped/scenarios/offset.toml"));
-    inputs.scenario_source = "offset";
-    inputs.robot = testing::SourcePath("/controller/parameters/assistant_robot.toml");
-    inputs.mjcf = testing::SourcePath("/mjcf/scene.xml");
+    const StudyInputs inputs = MakeStudyInputs("name = 'shape'\nscenario = 'offset'\n" + text);
     const Study& study = inputs.study;
     StudyStore store = StudyStore::OpenOrCreate(path(), IdentifyStudy(inputs), study);
     if (!study.is_search()) {
@@ -123,7 +113,7 @@ class StudyShapes : public ::testing::TestWithParam<Shape> {
   [[nodiscard]] std::filesystem::path path() const { return folder_.path() / "s.sqlite"; }
   void Spoil(const std::string& sql) const { SQLite::Database(path(), SQLite::OPEN_READWRITE).exec(sql); }
 
-  testing::TempFolder folder_;
+  TempFolder folder_;
 };
 
 TEST_P(StudyShapes, HasItsPageItsProgressAndItsCsv) {
@@ -137,7 +127,7 @@ TEST_P(StudyShapes, HasItsPageItsProgressAndItsCsv) {
   EXPECT_EQ(FindProgress(store).done, static_cast<long>(count));
   std::string csv;
   WriteStudyCsv(store, [&](std::string_view text) { csv += text; });
-  EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n'), static_cast<std::ptrdiff_t>(count) + 1);
+  EXPECT_EQ(std::ranges::count(csv, '\n'), static_cast<std::ptrdiff_t>(count) + 1);
   EXPECT_THAT(csv, HasSubstr(",\"'=cmd|calc\"\n")) << "no formula for a spreadsheet";
 }
 

@@ -11,9 +11,9 @@
 #include <limits>
 
 #include "controller/common/errors.h"
-#include "harness/study/process_name.h"
 #include "tests/common/files.h"
 #include "tests/common/throws.h"
+#include "tests/harness/study/study_fixture.h"
 
 namespace dexcheck::testing::study_store_test {
 namespace {
@@ -25,10 +25,7 @@ class StudyStoreTest : public ::testing::Test {
  protected:
   StudyStoreTest() {
     study_ = ParseStudy(kText, "study.toml");
-    identity_ = {
-        {"layout", "2"},      {"name", "s"},          {"study", study_.text},   {"scenario", "text"},
-        {"robot", "text"},    {"mjcf_hash", "0"},     {"controller_hash", "0"}, {"dexcheck_version", "1"},
-        {"git_revision", ""}, {"mujoco_version", "2"}};
+    identity_ = MakeIdentity(study_);
   }
 
   [[nodiscard]] StudyStore Open() const {
@@ -83,8 +80,8 @@ TEST_F(StudyStoreTest, RowsComeBackBitForBit) {
     }
   }
   EXPECT_EQ(store.identity(), identity_);
-  EXPECT_TRUE(store.Has(3));
-  EXPECT_FALSE(store.Has(1));
+  EXPECT_TRUE(store.FindRow(3));
+  EXPECT_FALSE(store.FindRow(1));
 }
 
 TEST_F(StudyStoreTest, AnotherStudyIsRefused) {
@@ -100,7 +97,7 @@ TEST_F(StudyStoreTest, AnotherStudyIsRefused) {
 
 TEST_F(StudyStoreTest, OtherFilesAreRefused) {
   const std::filesystem::path path = folder_.path() / "s.sqlite";
-  testing::WriteText(path, std::string(5000, 'x'));
+  WriteText(path, std::string(5000, 'x'));
   EXPECT_TRUE(Throws<InputError>([&] { return Open(); }, "s.sqlite: is not a usable database"));
   std::filesystem::remove(path);
   Execute("CREATE TABLE other (x)");
@@ -181,8 +178,8 @@ TEST_F(StudyStoreTest, FailedTrialsGiveWay) {
     crashed.trial.number = 1;
     store.Add(crashed);
     store.RemoveFailed();
-    EXPECT_TRUE(store.Has(0));
-    EXPECT_FALSE(store.Has(1));
+    EXPECT_TRUE(store.FindRow(0));
+    EXPECT_FALSE(store.FindRow(1));
     EXPECT_TRUE(store.Claim(1));
   }
 }

@@ -1,7 +1,5 @@
 // What a page and `report --json` have of a study, from a database that somebody else may have written.
 
-#include "harness/study/study_summary.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -12,10 +10,9 @@
 
 #include "harness/study/study_findings.h"
 #include "harness/study/study_page.h"
-#include "harness/study/study_rows.h"
 #include "tests/common/files.h"
 #include "tests/common/matchers.h"
-#include "tests/common/paths.h"
+#include "tests/harness/study/study_fixture.h"
 
 namespace dexcheck::testing::study_summary_test {
 namespace {
@@ -33,14 +30,9 @@ const std::string kGrid =
 /// @param of_joints its trials have errors of joints, and none of an object.
 StudySummary Summarise(const Study& study, const std::string& text, bool of_joints = false) {
   const TempFolder folder;
-  StudyIdentity identity;
-  for (const char* column : {"layout", "name", "study", "scenario", "robot", "mjcf_hash", "dexcheck_version",
-                             "git_revision", "mujoco_version"}) {
-    identity.emplace_back(column, text);
-  }
-  identity[0].second = "2";
-  identity[2].second = study.text;
-  identity[3].second = ReadTextFile(SourcePath("/harness/shipped/scenarios/offset.toml"));
+  StudyIdentity identity = MakeIdentity(study, text);
+  identity[1].second = text;
+  identity[3].second = MakeStudyInputs(study.text).scenario_text;
   StudyStore store = StudyStore::OpenOrCreate(folder.path() / "s.sqlite", identity, study);
   std::vector<TrialRow> rows;
   for (const Trial& trial : ListTrials(study)) {
@@ -134,10 +126,10 @@ TEST(StudyFindings, ReportsTheSpreadOfWhatHasNoOrder) {
   }
   ASSERT_EQ(rows.size(), 8U);
   EXPECT_THAT(ListFindings(study, rows),
-              ::testing::ElementsAre("control.law = computed_torque: held in 4 of 4 trials; "
-                                     "position_error_rms 6.5 (1 to 16) m, medians and ranges.",
-                                     "control.law = pd_gravity: held in 1 of 4 trials; "
-                                     "position_error_rms 9 (9 to 9) m, medians and ranges."));
+              ElementsAre("control.law = computed_torque: held in 4 of 4 trials; "
+                          "position_error_rms 6.5 (1 to 16) m, medians and ranges.",
+                          "control.law = pd_gravity: held in 1 of 4 trials; "
+                          "position_error_rms 9 (9 to 9) m, medians and ranges."));
 }
 
 // The best of a search that presses against its range, in the quantity's unit.
@@ -154,9 +146,9 @@ TEST(StudyFindings, ReportsWhatIsWantedWithItsUnitAndItsEdge) {
     row.result.metrics[kSettlingTime] = i == 0 ? std::nan("") : 0.01 * static_cast<double>(i);
     rows.push_back(row);
   }
-  EXPECT_THAT(ListFindings(study, rows),
-              ::testing::ElementsAre(
-                  "The least settling_time of 3 points is 0.01 s, at control.K_p = 100, control.K_v = 30 "
+  EXPECT_THAT(
+      ListFindings(study, rows),
+      ElementsAre("The least settling_time of 3 points is 0.01 s, at control.K_p = 100, control.K_v = 30 "
                   "(trial 1). The search began where it has no value. At an end of its range is control.K_p: "
                   "a wider range may give a better one."));
 }

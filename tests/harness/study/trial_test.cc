@@ -1,4 +1,4 @@
-// Trials of a scenario that moves joints: what they come to.
+// What trials come to; every shipped study can be run, and what trials share changes none.
 
 #include "harness/study/trial.h"
 
@@ -6,9 +6,11 @@
 
 #include <cmath>
 #include <cstring>
+#include <filesystem>
+#include <set>
 
-#include "harness/study/study.h"
 #include "tests/harness/run/shipped_run.h"
+#include "tests/harness/study/study_fixture.h"
 
 namespace dexcheck::testing::trial_test {
 namespace {
@@ -18,14 +20,7 @@ const std::string kText =
     "[[vary]]\nkey = 'mismatch.mass.panda_link4'\nvalues = [1.0, 1.05, 3.0]\n";
 
 TrialResult RunReach(double mass, const std::string& more = "") {
-  StudyInputs inputs;
-  inputs.study = ParseStudy(more + kText, "study.toml");
-  inputs.scenario_folder = SourcePath("/harness/shipped/scenarios");
-  inputs.scenario_source = "panda-reach.toml";
-  inputs.scenario_text = ReadTextFile((inputs.scenario_folder / inputs.scenario_source).string());
-  inputs.robot = SourcePath("/controller/parameters/panda.toml");
-  inputs.mjcf = SourcePath("/mjcf/panda_scene.xml");
-  return RunTrial(inputs, {0, 0, {mass}});
+  return RunTrial(MakeStudyInputs(more + kText), {0, 0, {mass}});
 }
 
 TEST(TrialOfJoints, HasTheErrorsOfTheRun) {
@@ -58,18 +53,11 @@ TEST(TrialOfJoints, DivergesAndIsStoppedByTheErrorOfAJoint) {
 // A trial sets its numbers in files that are parsed once: the same bits, and the same refusals, as from their
 // text with "KEY=VALUE".
 TEST(Trial, NumbersSetInParsedFilesAreThoseOfTheText) {
-  StudyInputs text;
-  text.study = ParseStudy(
+  const StudyInputs text = MakeStudyInputs(
       "name = 'mass'\nscenario = 'hold'\nset = ['duration=0.02', 'settle=0.05', 'model.object.mass=0.21']\n"
       "[[vary]]\nkey = 'model.base.wheels.damping'\nvalues = [0.02, 0.0312345678901234]\n"
       "[[vary]]\nkey = 'control.law'\nvalues = ['computed_torque', 'impedance']\n"
-      "[[vary]]\nkey = 'actuation.delay'\nvalues = [0, 0.0012345678901234, -1]\n",
-      "study.toml");
-  text.scenario_folder = SourcePath("/harness/shipped/scenarios");
-  text.scenario_source = "hold";
-  text.scenario_text = ReadTextFile((text.scenario_folder / "hold.toml").string());
-  text.robot = SourcePath("/controller/parameters/assistant_robot.toml");
-  text.mjcf = SourcePath("/mjcf/scene.xml");
+      "[[vary]]\nkey = 'actuation.delay'\nvalues = [0, 0.0012345678901234, -1]\n");
   StudyInputs parsed = text;
   parsed.study.variations.back().from = 0.0;  // whose ends must make a scenario
   CheckTrials(&parsed);
@@ -84,6 +72,47 @@ TEST(Trial, NumbersSetInParsedFilesAreThoseOfTheText) {
     refused += a.outcome == Outcome::kRefused ? 1 : 0;
   }
   EXPECT_EQ(refused, 4) << "delays below zero";
+}
+
+TEST(ShippedStudies, AreAccepted) {
+  int count = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(SourcePath("/harness/shipped/studies"))) {
+    if (entry.path().extension() != ".toml") continue;
+    ++count;
+    StudyInputs inputs = MakeStudyInputs(ReadTextFile(entry.path().string()));
+    EXPECT_EQ(inputs.study.name, entry.path().stem().string());
+    EXPECT_NO_THROW(CheckTrials(&inputs)) << entry.path();
+  }
+  EXPECT_GE(count, 8);
+}
+
+/// A trial is made the same way whether its study was prepared or not, bit for bit.
+TEST(Trials, ShareNothingThatOneOfThemChanged) {
+  const StudyInputs alone = MakeStudyInputs(R"(name = "shared"
+scenario = "hold"
+set = ["duration=0.02", "settle=0.01"]
+[[vary]]
+key = "control.natural_frequency"
+values = [5, 50]
+[[vary]]
+key = "model.object.mass"
+values = [0.2, 0.21]
+[[vary]]
+key = "mismatch.mass.r_forearm"
+values = [1, 1.1]
+)");
+  StudyInputs prepared = alone;
+  CheckTrials(&prepared);
+  ASSERT_TRUE(prepared.model_document && prepared.engine);
+  EXPECT_FALSE(prepared.model) << "a key of the robot varies";
+  std::set<double> errors;
+  for (const Trial& trial : ListTrials(alone.study)) {
+    const TrialRow row{trial, RunTrial(prepared, trial), "this"};
+    EXPECT_TRUE(IsSame(row, {trial, RunTrial(alone, trial), "this"})) << trial.number;
+    EXPECT_EQ(row.result.failure, "");
+    errors.insert(row.result.metrics[kPositionErrorRms]);
+  }
+  EXPECT_EQ(errors.size(), 8U) << "each key counts";
 }
 
 }  // namespace
