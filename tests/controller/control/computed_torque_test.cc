@@ -123,7 +123,7 @@ TEST_P(LawTest, WholeSystemFollowsTheErrorDynamics) {
     EXPECT_TRUE(MatrixNear(law_.F_o(), F_o, kPredictedWrenchRounding));
     EXPECT_TRUE(MatrixNear(scene_.grasp.G() * p.f_c, F_o, kForceRounding));
     const MatrixXd G_plus =
-        scene_.grasp.G().transpose() * testing::CalcInverse(scene_.grasp.G() * scene_.grasp.G().transpose());
+        scene_.grasp.G().transpose() * CalcInverse(scene_.grasp.G() * scene_.grasp.G().transpose());
     EXPECT_TRUE(MatrixNear(p.f_c, G_plus * F_o + F_N, kForceRounding));
   }
 }
@@ -136,7 +136,7 @@ TEST_P(LawTest, AHasFullColumnRank) {
   const VectorXd F_N = VectorXd::Zero(scene_.num_forces());
   const PrintedLaw printed(scene_, FactorJacobian(scene_, weight_), MakeGains(), desired, zero, F_N);
   // Columns for translation and rotation differ in unit: compare their directions.
-  const VectorXd sigma = testing::CalcSingularValues(printed.A_transposed.rowwise().normalized());
+  const VectorXd sigma = CalcSingularValues(printed.A_transposed.rowwise().normalized());
   EXPECT_GT(sigma[5], 1e-4 * sigma[0]);  // measured 8e-4
   const VectorXd force = CalcForce(CalcTrackingAcceleration(MakeGains(), scene_.grasp, desired), zero, F_N);
   const Vector6d X_o_ddot =
@@ -316,7 +316,7 @@ TEST(ObjectTracking, BothOrientationErrorsAgreeOnTheTrajectory) {
 }
 
 TEST(PostureTask, ByHand) {
-  const RobotModel model = testing::ReadPaperRobot();
+  const RobotModel model = ReadPaperRobot();
   PostureTask task(model);
   VectorXd q = VectorXd::Zero(model.num_positions());
   VectorXd xi = VectorXd::Zero(model.num_velocities());
@@ -335,11 +335,8 @@ TEST(PostureTask, ByHand) {
   expected[0] = 3.0 * 0.5;
   EXPECT_TRUE(MatrixNear(sigma_prime, expected, 1e-14));
   task.damping.resize(3);
-  const auto call = [&] {
-    task.CalcAcceleration(q, xi, sigma_prime);
-    return 0;
-  };
-  EXPECT_TRUE(Throws<std::invalid_argument>(call, "length of damping"));
+  EXPECT_TRUE(
+      Throws<std::invalid_argument>([&] { task.CalcAcceleration(q, xi, sigma_prime); }, "length of damping"));
 }
 
 // With W = 1 an arm that holds nothing gets exactly its own entries of sigma'.
@@ -368,22 +365,18 @@ TEST(ComputedTorque, Errors) {
   const VectorXd sigma_prime = VectorXd::Zero(scene.robot.size());
   const auto torque = [&] { return law.CalcTorque(scene.grasp, VectorXd::Zero(3)); };
   EXPECT_TRUE(Throws<std::invalid_argument>(torque, "length of F_N"));
-  const auto demand = [&] {
-    law.SetDemand(scene.robot, scene.grasp, Vector6d::Zero(), VectorXd::Zero(3));
-    return 0;
-  };
-  EXPECT_TRUE(Throws<std::invalid_argument>(demand, "length of sigma'"));
+  EXPECT_TRUE(Throws<std::invalid_argument>(
+      [&] { law.SetDemand(scene.robot, scene.grasp, Vector6d::Zero(), VectorXd::Zero(3)); },
+      "length of sigma'"));
 
   // Two contacts leave the object free to turn about the line through them.
   const std::span<const int> two = std::span(scene.fingertips).subspan(1, 2);
   GraspTerms grasp(scene.model, two, scene.object, scene.surface);
   grasp.SetState(scene.robot, scene.X_o, scene.X_o_dot, std::span(scene.kappa).subspan(1, 2));
   ComputedTorque weak(scene.model, 2);
-  const auto weak_demand = [&] {
-    weak.SetDemand(scene.robot, grasp, Vector6d::Zero(), sigma_prime);
-    return 0;
-  };
-  EXPECT_TRUE(Throws<SingularityError>(weak_demand, "G has not full row rank, condition number"));
+  EXPECT_TRUE(
+      Throws<SingularityError>([&] { weak.SetDemand(scene.robot, grasp, Vector6d::Zero(), sigma_prime); },
+                               "G has not full row rank, condition number"));
 }
 
 TEST(ComputedTorque, OneControlStepDoesNotAllocate) {

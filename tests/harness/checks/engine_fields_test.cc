@@ -25,7 +25,7 @@
 namespace dexcheck::testing::engine_fields_test {
 namespace {
 
-const std::string kMjcf = testing::SourcePath("/mjcf/");
+const std::string kMjcf = SourcePath("/mjcf/");
 
 /// One field of a model: its numbers, as bytes.
 struct Field {
@@ -206,8 +206,8 @@ class Subject {
   /// The same of the model that a run makes of it: nothing when no run has this robot.
   [[nodiscard]] Motion MoveAsInRun(const mjModel& engine) const {
     if (!model_.object()) return {};
-    static const Scenario scenario = testing::ReadShippedScenario("hold");
-    const Setup setup(scenario, testing::SourcePath("/controller/parameters/assistant_robot.toml"), "mjcf",
+    static const Scenario scenario = ReadShippedScenario("hold");
+    const Setup setup(scenario, SourcePath("/controller/parameters/assistant_robot.toml"), "mjcf",
                       MjModelPtr(mj_copyModel(nullptr, &engine)));
     return Move(setup.engine());
   }
@@ -337,7 +337,7 @@ class FieldCheck {
     }
     if (now.notes != verdict_.notes) {
       const auto names = [&](const auto& some, const auto& others) {
-        return std::any_of(some.begin(), some.end(), [&](const std::string& note) {
+        return std::ranges::any_of(some, [&](const std::string& note) {
           return note.starts_with(row.how) && !others.contains(note);
         });
       };
@@ -392,19 +392,19 @@ TEST_F(EngineFields, ChangedAreNamedOrMoveNothing) {
   std::map<std::string, int> tried;
   // Held by the fingers, and on the floor.
   for (const char* key : {"grasp_ready", "home"}) {
-    const Subject subject(testing::ReadPaperRobot(), folder_.path() / "rich.xml", key);
+    const Subject subject(ReadPaperRobot(), folder_.path() / "rich.xml", key);
     FieldCheck check(subject);
     EXPECT_GT(subject.contacts(), 3) << key;
     check.Run(&named, &tried);
   }
   // Among things that can touch by their type.
-  std::string text = testing::ReadText(kMjcf + "panda.xml");
+  std::string text = ReadText(kMjcf + "panda.xml");
   const std::string end = "</mujoco>";
   text.replace(text.rfind(end), end.size(), R"(<option collision="all"/>
   <worldbody><geom name="table" type="box" size="0.1 0.1 0.1" pos="2 0 0"/></worldbody>
   <contact><exclude body1="panda_link1" body2="panda_link3"/></contact></mujoco>)");
   WriteText(folder_.path() / "rich_panda.xml", text);
-  const Subject panda(testing::ReadPanda(), folder_.path() / "rich_panda.xml", "");
+  const Subject panda(ReadPanda(), folder_.path() / "rich_panda.xml", "");
   EXPECT_THAT(panda.Judge(*panda.Copy(), false).notes,
               Contains(HasSubstr("excluded: panda_link1 and panda_link3")));
   FieldCheck(panda).Run(&named, &tried);

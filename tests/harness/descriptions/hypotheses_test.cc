@@ -20,8 +20,8 @@
 namespace dexcheck::testing::hypotheses_test {
 namespace {
 
-using Pair = testing::RobotPair;
-const std::vector<Pair>& ListRobots() { return testing::ListRobotPairs(); }
+using Pair = RobotPair;
+const std::vector<Pair>& ListRobots() { return ListRobotPairs(); }
 
 // Of bodies, those whose every case must be named (faults_measurement_test counts the others).
 constexpr const char* kBodyFaults[] = {"inertia as if given about the link's origin",
@@ -69,7 +69,7 @@ std::string List(const std::vector<Hypothesis>& found) {
 
 /// Whether it says so, alone or as one of several that cannot be told apart.
 bool Names(const Hypothesis& found, const std::string& id) {
-  return std::find(found.ids.begin(), found.ids.end(), id) != found.ids.end();
+  return std::ranges::find(found.ids, id) != found.ids.end();
 }
 
 struct Case {
@@ -96,7 +96,7 @@ TEST_P(BodyFaults, OfAllLinksAreNamedInOneLine) {
   if (visible < 2) GTEST_SKIP() << "the robot's bodies do not show it";
   const std::vector<Hypothesis> found = ExplainDifference(wrong, pair().b);
   ASSERT_FALSE(found.empty());
-  EXPECT_TRUE(std::any_of(found.begin(), found.end(), [](const Hypothesis& one) { return Names(one, id()); }))
+  EXPECT_TRUE(std::ranges::any_of(found, [](const Hypothesis& one) { return Names(one, id()); }))
       << List(found);
   double explained = 0.0;
   for (const Hypothesis& hypothesis : found) explained += hypothesis.explained;
@@ -183,10 +183,10 @@ TEST(Hypotheses, ListsThatAreShiftedAndBodiesThatAreExchanged) {
 }
 
 TEST(Hypotheses, ALostPartIsNamed) {
-  const std::vector<testing::LeggedLink> links = testing::ListQuadruped();
-  std::string text = testing::WriteLeggedUrdf("quadruped", links);
+  const std::vector<LeggedLink> links = ListQuadruped();
+  std::string text = WriteLeggedUrdf("quadruped", links);
   const RobotDescription right = ParseUrdf(text, "right.urdf");
-  const size_t begin = text.find("<inertial>", text.find("<link name=\"FR_foot\">"));
+  const size_t begin = text.find("<inertial>", text.find(R"(<link name="FR_foot">)"));
   const size_t end = text.find("</inertial>", begin) + std::string("</inertial>").size();
   text.erase(begin, end - begin);
   EXPECT_EQ(List(ExplainDifference(ParseUrdf(text, "wrong.urdf"), right)),
@@ -195,8 +195,8 @@ TEST(Hypotheses, ALostPartIsNamed) {
 
 /// A quadruped whose feet, welded to the calves, have generic bodies.
 RobotDescription ReadWeldedRobot() {
-  std::vector<testing::LeggedLink> links = testing::ListQuadruped();
-  for (testing::LeggedLink& link : links) {
+  std::vector<LeggedLink> links = ListQuadruped();
+  for (LeggedLink& link : links) {
     if (link.has_joint) continue;
     link.com = "0.01 0.02 -0.015";
     link.com_rpy = "0.3 -0.2 0.5";
@@ -204,7 +204,7 @@ RobotDescription ReadWeldedRobot() {
     link.rpy = "0.2 0.4 -0.3";
     link.xyz = "0.01 -0.02 -0.213";
   }
-  return ParseUrdf(testing::WriteLeggedUrdf("quadruped", links), "robot.urdf");
+  return ParseUrdf(WriteLeggedUrdf("quadruped", links), "robot.urdf");
 }
 
 /// What a file says of its parts makes the bodies.
@@ -219,8 +219,7 @@ void CombineParts(RobotDescription* robot) {
 }
 
 DescribedPart& FindPart(const std::string& name, RobotDescription* robot) {
-  return *std::find_if(robot->parts.begin(), robot->parts.end(),
-                       [&](const DescribedPart& part) { return part.name == name; });
+  return *std::ranges::find(robot->parts, name, &DescribedPart::name);
 }
 
 TEST(Hypotheses, FaultsOfOneWeldedPartAreNamed) {
@@ -271,7 +270,7 @@ TEST(Hypotheses, FaultsOfOneWeldedPartAreNamed) {
       ASSERT_EQ(found.size(), 1U) << one.id << "\n" << List(found);
       EXPECT_TRUE(Names(found[0], one.id)) << one.id << "\n" << List(found);
       EXPECT_EQ(found[0].parts, std::vector<std::string>{"FR_calf"});
-      EXPECT_THAT(found[0].text, HasSubstr("its part \"FR_foot\""));
+      EXPECT_THAT(found[0].text, HasSubstr(R"(its part "FR_foot")"));
     }
   }
 }
@@ -357,8 +356,8 @@ INSTANTIATE_TEST_SUITE_P(
     [](const auto& named) { return named.param.name; });
 
 TEST(Hypotheses, GravityAndUnitsOfJoints) {
-  RobotDescription table = ReadDescription(testing::SourcePath("/controller/parameters/panda.toml"));
-  const RobotDescription mjcf = ReadDescription(testing::SourcePath("/mjcf/panda.xml"));
+  RobotDescription table = ReadDescription(SourcePath("/controller/parameters/panda.toml"));
+  const RobotDescription mjcf = ReadDescription(SourcePath("/mjcf/panda.xml"));
   EXPECT_EQ(List(ExplainDifference(table, mjcf)), "");
   RobotDescription wrong = table;
   wrong.spec.gravity *= -1.0;
@@ -377,8 +376,8 @@ TEST(Hypotheses, GravityAndUnitsOfJoints) {
 
 // Tables of the Panda that were read by another convention.
 TEST(Hypotheses, TablesThatAreMisread) {
-  const RobotDescription right = ReadDescription(testing::SourcePath("/controller/parameters/panda.toml"));
-  const RobotDescription mjcf = ReadDescription(testing::SourcePath("/mjcf/panda.xml"));
+  const RobotDescription right = ReadDescription(SourcePath("/controller/parameters/panda.toml"));
+  const RobotDescription mjcf = ReadDescription(SourcePath("/mjcf/panda.xml"));
   RobotDescription degrees = right;
   for (Joint& joint : degrees.spec.joints) joint.mdh.alpha = RadToDeg(joint.mdh.alpha);
   EXPECT_EQ(List(ExplainDifference(degrees, mjcf)),
