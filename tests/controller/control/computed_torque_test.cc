@@ -21,9 +21,8 @@ namespace dexcheck::testing::computed_torque_test {
 namespace {
 
 // Measured, largest of all hands and weights: contact forces 2.8e-14 N (of 40 N), their wrench as M_o
-// X_o_ddot +
-// ... of a predicted X_o_ddot 2.3e-13 N (of 15 N; with Eigen's factorisation in the prediction 3.4e-13),
-// accelerations 1.4e-11 (of 1000 rad/s^2); through the inverses that the printed form makes of
+// X_o_ddot + ... of a predicted X_o_ddot 2.3e-13 N (of 15 N; with Eigen's factorisation in the prediction
+// 3.4e-13), accelerations 1.4e-11 (of 1000 rad/s^2); through the inverses that the printed form makes of
 // ill-conditioned products 2.5e-11 N m (of 100).
 constexpr double kForceRounding = 2e-13;
 constexpr double kPredictedWrenchRounding = 1e-12;
@@ -34,6 +33,9 @@ DesiredMotion DrawDesired(const GraspScene& scene, std::mt19937* random) {
   return {scene.X_o + DrawVector(6, 0.05, random), DrawVector(6, 0.5, random), DrawVector(6, 2.0, random)};
 }
 
+constexpr RedundancyWeight::Kind kWeights[] = {
+    RedundancyWeight::Kind::kIdentity, RedundancyWeight::Kind::kDiagonal, RedundancyWeight::Kind::kMass};
+
 RedundancyWeight MakeWeight(RedundancyWeight::Kind kind, Eigen::Index n) {
   RedundancyWeight weight{kind, {}};
   if (kind == RedundancyWeight::Kind::kDiagonal) weight.w = VectorXd::LinSpaced(n, 1.0, 3.0);
@@ -42,16 +44,10 @@ RedundancyWeight MakeWeight(RedundancyWeight::Kind kind, Eigen::Index n) {
 
 Pseudoinverse FactorJacobian(const GraspScene& scene, const RedundancyWeight& weight) {
   Pseudoinverse pinv("J_B'", scene.num_forces(), scene.robot.size());
-  switch (weight.kind) {
-    case RedundancyWeight::Kind::kIdentity:
-      pinv.Factor(scene.grasp.J_B());
-      break;
-    case RedundancyWeight::Kind::kDiagonal:
-      pinv.FactorDiagonal(scene.grasp.J_B(), weight.w);
-      break;
-    case RedundancyWeight::Kind::kMass:
-      pinv.FactorWeighted(scene.grasp.J_B(), scene.robot.M());
-  }
+  using enum RedundancyWeight::Kind;
+  if (weight.kind == kIdentity) pinv.Factor(scene.grasp.J_B());
+  if (weight.kind == kDiagonal) pinv.FactorDiagonal(scene.grasp.J_B(), weight.w);
+  if (weight.kind == kMass) pinv.FactorWeighted(scene.grasp.J_B(), scene.robot.M());
   return pinv;
 }
 
@@ -203,21 +199,15 @@ TEST_P(LawTest, RotationErrorFollowsTheErrorDynamics) {
 }
 
 std::string NameCase(const ::testing::TestParamInfo<LawTest::ParamType>& info) {
-  const Hands hands = std::get<0>(info.param);
-  const RedundancyWeight::Kind kind = std::get<1>(info.param);
-  const std::string hand = hands == Hands::kRight  ? "RightHand"
-                           : hands == Hands::kLeft ? "LeftHand"
-                                                   : "BothHands";
-  return hand + (kind == RedundancyWeight::Kind::kIdentity   ? "Identity"
-                 : kind == RedundancyWeight::Kind::kDiagonal ? "Diagonal"
-                                                             : "Mass");
+  constexpr const char* kHands[] = {"RightHand", "LeftHand", "BothHands"};
+  constexpr const char* kKinds[] = {"Identity", "Diagonal", "Mass"};
+  return std::string(kHands[static_cast<int>(std::get<0>(info.param))]) +
+         kKinds[static_cast<int>(std::get<1>(info.param))];
 }
 
 INSTANTIATE_TEST_SUITE_P(HandsAndWeights, LawTest,
                          ::testing::Combine(::testing::Values(Hands::kRight, Hands::kLeft, Hands::kBoth),
-                                            ::testing::Values(RedundancyWeight::Kind::kIdentity,
-                                                              RedundancyWeight::Kind::kDiagonal,
-                                                              RedundancyWeight::Kind::kMass)),
+                                            ::testing::ValuesIn(kWeights)),
                          NameCase);
 
 // The measured xi may violate (45), as in a soft plant: the law plans with the nearest velocity that does
@@ -380,8 +370,7 @@ TEST(ComputedTorque, Errors) {
 }
 
 TEST(ComputedTorque, OneControlStepDoesNotAllocate) {
-  for (const auto kind : {RedundancyWeight::Kind::kIdentity, RedundancyWeight::Kind::kDiagonal,
-                          RedundancyWeight::Kind::kMass}) {
+  for (const RedundancyWeight::Kind kind : kWeights) {
     GraspScene scene;
     std::mt19937 random(6);
     scene.DrawVelocities(&random, 1.0);

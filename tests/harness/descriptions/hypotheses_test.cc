@@ -20,9 +20,6 @@
 namespace dexcheck::testing::hypotheses_test {
 namespace {
 
-using Pair = RobotPair;
-const std::vector<Pair>& ListRobots() { return ListRobotPairs(); }
-
 // Of bodies, those whose every case must be named (faults_measurement_test counts the others).
 constexpr const char* kBodyFaults[] = {"inertia as if given about the link's origin",
                                        "inertia with the products' sign turned around",
@@ -67,6 +64,17 @@ std::string List(const std::vector<Hypothesis>& found) {
   return text;
 }
 
+std::string Say(const RobotDescription& wrong, const RobotDescription& right) {
+  return List(ExplainDifference(wrong, right));
+}
+
+/// What is said when every joint is changed.
+std::string SayOfJoints(RobotDescription robot, const RobotDescription& right,
+                        const std::function<void(Joint&)>& change) {
+  std::ranges::for_each(robot.spec.joints, change);
+  return Say(robot, right);
+}
+
 /// Whether it says so, alone or as one of several that cannot be told apart.
 bool Names(const Hypothesis& found, const std::string& id) {
   return std::ranges::find(found.ids, id) != found.ids.end();
@@ -77,12 +85,14 @@ struct Case {
   std::string fault;  ///< Empty for transposed axes.
 };
 void PrintTo(const Case& tried, std::ostream* out) {
-  *out << ListRobots()[static_cast<size_t>(tried.robot)].name << " " << tried.fault;
+  *out << ListRobotPairs()[static_cast<size_t>(tried.robot)].name << " " << tried.fault;
 }
 
 class BodyFaults : public ::testing::TestWithParam<Case> {
  protected:
-  [[nodiscard]] const Pair& pair() const { return ListRobots()[static_cast<size_t>(GetParam().robot)]; }
+  [[nodiscard]] const RobotPair& pair() const {
+    return ListRobotPairs()[static_cast<size_t>(GetParam().robot)];
+  }
   [[nodiscard]] static std::string id() {
     const std::string& fault = GetParam().fault;
     return fault.empty() ? "inertia.frame_transposed" : FindConventionFault(fault).ids[0];
@@ -133,24 +143,24 @@ std::vector<Case> ListCases() {
 INSTANTIATE_TEST_SUITE_P(Hypotheses, BodyFaults, ::testing::ValuesIn(ListCases()));
 
 TEST(Hypotheses, NothingIsSaidOfRobotsThatAgree) {
-  for (const Pair& pair : ListRobots()) EXPECT_EQ(List(ExplainDifference(pair.a, pair.b)), "") << pair.name;
+  for (const RobotPair& pair : ListRobotPairs()) EXPECT_EQ(Say(pair.a, pair.b), "") << pair.name;
+}
+
+void ChangeNumbers(MassProperties* body) {
+  body->mass *= 1.2345;
+  body->inertia *= 1.321;
+  body->com += Vector3d(0.0123, -0.0456, 0.0789);
 }
 
 // What no convention explains is left to the numbers.
 TEST(Hypotheses, NothingIsSaidOfOtherNumbers) {
-  for (const Pair& pair : ListRobots()) {
-    RobotDescription wrong = pair.a;
-    for (Joint& joint : wrong.spec.joints) {
-      joint.body.mass *= 1.2345;
-      joint.body.inertia *= 1.321;
-      joint.body.com += Vector3d(0.0123, -0.0456, 0.0789);
-    }
-    EXPECT_EQ(List(ExplainDifference(wrong, pair.b)), "") << pair.name;
+  for (const RobotPair& pair : ListRobotPairs()) {
+    EXPECT_EQ(SayOfJoints(pair.a, pair.b, [](Joint& joint) { ChangeNumbers(&joint.body); }), "") << pair.name;
   }
 }
 
 TEST(Hypotheses, ListsThatAreShiftedAndBodiesThatAreExchanged) {
-  for (const Pair& pair : ListRobots()) {
+  for (const RobotPair& pair : ListRobotPairs()) {
     // In own frames, as tables have them.
     const auto own = [&](const RobotDescription& robot, size_t i) {
       return ExpressIn(robot.spec.joints[i].body, robot.joints[i].X_iL.inverse());
@@ -161,24 +171,20 @@ TEST(Hypotheses, ListsThatAreShiftedAndBodiesThatAreExchanged) {
       shifted.spec.joints[i].body = ExpressIn(own(pair.a, i + 1), pair.a.joints[i].X_iL);
     }
     if (pair.name != "humanoid") {  // whose list is a tree
-      EXPECT_THAT(List(ExplainDifference(shifted, pair.b)),
-                  HasSubstr("the list of bodies looks shifted by one"))
-          << pair.name;
+      EXPECT_THAT(Say(shifted, pair.b), HasSubstr("the list of bodies looks shifted by one")) << pair.name;
     }
-    RobotDescription exchanged = pair.a;
-    exchanged.spec.joints[1].body = ExpressIn(own(pair.a, 2), pair.a.joints[1].X_iL);
-    exchanged.spec.joints[2].body = ExpressIn(own(pair.a, 1), pair.a.joints[2].X_iL);
+    const auto give = [&](const MassProperties& first, const MassProperties& second) {
+      RobotDescription robot = pair.a;
+      robot.spec.joints[1].body = ExpressIn(first, pair.a.joints[1].X_iL);
+      robot.spec.joints[2].body = ExpressIn(second, pair.a.joints[2].X_iL);
+      return Say(robot, pair.b);
+    };
     const std::string links = pair.a.spec.joints[1].link + " and " + pair.a.spec.joints[2].link;
-    EXPECT_EQ(List(ExplainDifference(exchanged, pair.b)),
-              "links " + links + ": their bodies look exchanged\n");
-    RobotDescription inertias = pair.a;
     MassProperties first = own(pair.a, 1);
     MassProperties second = own(pair.a, 2);
+    EXPECT_EQ(give(second, first), "links " + links + ": their bodies look exchanged\n");
     std::swap(first.inertia, second.inertia);
-    inertias.spec.joints[1].body = ExpressIn(first, pair.a.joints[1].X_iL);
-    inertias.spec.joints[2].body = ExpressIn(second, pair.a.joints[2].X_iL);
-    EXPECT_EQ(List(ExplainDifference(inertias, pair.b)),
-              "links " + links + ": their inertias look exchanged\n");
+    EXPECT_EQ(give(first, second), "links " + links + ": their inertias look exchanged\n");
   }
 }
 
@@ -189,7 +195,7 @@ TEST(Hypotheses, ALostPartIsNamed) {
   const size_t begin = text.find("<inertial>", text.find(R"(<link name="FR_foot">)"));
   const size_t end = text.find("</inertial>", begin) + std::string("</inertial>").size();
   text.erase(begin, end - begin);
-  EXPECT_EQ(List(ExplainDifference(ParseUrdf(text, "wrong.urdf"), right)),
+  EXPECT_EQ(Say(ParseUrdf(text, "wrong.urdf"), right),
             "link FR_calf: the mass of \"FR_foot\", which is welded to it, looks lost\n");
 }
 
@@ -284,7 +290,7 @@ TEST(Hypotheses, AFaultInAllPartsIsOneFault) {
   LetBaseFloat(&wrong);
   RobotDescription floating = right;
   LetBaseFloat(&floating);
-  EXPECT_EQ(List(ExplainDifference(wrong, floating)),
+  EXPECT_EQ(Say(wrong, floating),
             "all inertias look as if given about the link's origin instead of the centre of mass: 13 of 13 "
             "links\n");
 }
@@ -292,12 +298,9 @@ TEST(Hypotheses, AFaultInAllPartsIsOneFault) {
 TEST(Hypotheses, NothingIsSaidOfOtherNumbersOfAPart) {
   const RobotDescription right = ReadWeldedRobot();
   RobotDescription wrong = right;
-  DescribedPart& part = FindPart("FR_foot", &wrong);
-  part.body.mass *= 1.2345;
-  part.body.inertia *= 1.321;
-  part.body.com += Vector3d(0.0123, -0.0456, 0.0789);
+  ChangeNumbers(&FindPart("FR_foot", &wrong).body);
   CombineParts(&wrong);
-  EXPECT_EQ(List(ExplainDifference(wrong, right)), "");
+  EXPECT_EQ(Say(wrong, right), "");
 }
 
 /// What a person may have done to a joint.
@@ -323,7 +326,7 @@ class JointFaults : public ::testing::TestWithParam<JointFaultCase> {};
 
 TEST_P(JointFaults, AreNamed) {
   int named = 0;
-  for (const Pair& pair : ListRobots()) {
+  for (const RobotPair& pair : ListRobotPairs()) {
     for (const size_t i : {size_t{1}, size_t{3}}) {
       RobotDescription wrong = pair.a;
       GetParam().make(i, &wrong);
@@ -358,40 +361,34 @@ INSTANTIATE_TEST_SUITE_P(
 TEST(Hypotheses, GravityAndUnitsOfJoints) {
   RobotDescription table = ReadDescription(SourcePath("/controller/parameters/panda.toml"));
   const RobotDescription mjcf = ReadDescription(SourcePath("/mjcf/panda.xml"));
-  EXPECT_EQ(List(ExplainDifference(table, mjcf)), "");
+  EXPECT_EQ(Say(table, mjcf), "");
   RobotDescription wrong = table;
   wrong.spec.gravity *= -1.0;
-  EXPECT_EQ(List(ExplainDifference(wrong, mjcf)), "gravity looks turned around (its sign)\n");
+  EXPECT_EQ(Say(wrong, mjcf), "gravity looks turned around (its sign)\n");
   wrong.spec.gravity = Vector3d(0.0, 0.0, -9.8);
-  EXPECT_EQ(List(ExplainDifference(wrong, mjcf)), "gravity has the right direction and another value\n");
+  EXPECT_EQ(Say(wrong, mjcf), "gravity has the right direction and another value\n");
   wrong.spec.gravity = Vector3d(0.0, -9.81, 0.0);
-  EXPECT_EQ(List(ExplainDifference(wrong, mjcf)), "gravity points along another axis\n");
-  wrong = table;
-  for (Joint& joint : wrong.spec.joints) {
+  EXPECT_EQ(Say(wrong, mjcf), "gravity points along another axis\n");
+  const auto in_degrees = [](Joint& joint) {
     joint.lower = RadToDeg(joint.lower);
     joint.upper = RadToDeg(joint.upper);
-  }
-  EXPECT_EQ(List(ExplainDifference(wrong, mjcf)), "all ranges look as if in degrees: 7 of 7 joints\n");
+  };
+  EXPECT_EQ(SayOfJoints(table, mjcf, in_degrees), "all ranges look as if in degrees: 7 of 7 joints\n");
 }
 
 // Tables of the Panda that were read by another convention.
 TEST(Hypotheses, TablesThatAreMisread) {
   const RobotDescription right = ReadDescription(SourcePath("/controller/parameters/panda.toml"));
   const RobotDescription mjcf = ReadDescription(SourcePath("/mjcf/panda.xml"));
-  RobotDescription degrees = right;
-  for (Joint& joint : degrees.spec.joints) joint.mdh.alpha = RadToDeg(joint.mdh.alpha);
-  EXPECT_EQ(List(ExplainDifference(degrees, mjcf)),
+  EXPECT_EQ(SayOfJoints(right, mjcf, [](Joint& joint) { joint.mdh.alpha = RadToDeg(joint.mdh.alpha); }),
             "alpha and q of the rows look as if in degrees: 7 of 7 joints\n");
-  RobotDescription millimetres = right;
-  for (Joint& joint : millimetres.spec.joints) {
+  const auto in_millimetres = [](Joint& joint) {
     joint.mdh.a *= 1e3;
     joint.mdh.d *= 1e3;
-  }
-  EXPECT_EQ(List(ExplainDifference(millimetres, mjcf)),
+  };
+  EXPECT_EQ(SayOfJoints(right, mjcf, in_millimetres),
             "a and d of the rows look as if in mm: 7 of 7 joints\n");
-  RobotDescription signs = right;
-  for (Joint& joint : signs.spec.joints) joint.mdh.alpha *= -1.0;
-  EXPECT_EQ(List(ExplainDifference(signs, mjcf)),
+  EXPECT_EQ(SayOfJoints(right, mjcf, [](Joint& joint) { joint.mdh.alpha *= -1.0; }),
             "alpha of all rows looks turned around (its sign): 7 of 7 joints\n");
 
   // The same arm by classic rows (q, d, a, alpha of each joint, and bodies in their frames), read as
@@ -408,10 +405,9 @@ TEST(Hypotheses, TablesThatAreMisread) {
         Eigen::Translation3d(next.a, 0.0, 0.0) * Eigen::AngleAxisd(next.alpha, Vector3d::UnitX());
     joint.body = ExpressIn(right.spec.joints[i].body, X_iL.inverse());
   }
-  EXPECT_EQ(List(ExplainDifference(classic, mjcf)),
+  EXPECT_EQ(Say(classic, mjcf),
             "the rows look like classic (standard) Denavit-Hartenberg parameters, and are read as modified "
-            "ones: 7 of "
-            "7 joints\n");
+            "ones: 7 of 7 joints\n");
 }
 
 }  // namespace
