@@ -4,10 +4,20 @@
 // for what is not done at every step of control.
 
 #include <Eigen/QR>
+#include <numeric>
+#include <vector>
 
 #include "controller/common/types.h"
 
 namespace dexcheck {
+
+/// 0, 1, ... count - 1.
+template <typename Count>
+std::vector<int> ListIndices(Count count) {
+  std::vector<int> indices(static_cast<size_t>(count));
+  std::iota(indices.begin(), indices.end(), 0);
+  return indices;
+}
 
 /// Eigenvalues, ascending, and their orthonormal eigenvectors as columns.
 struct SymmetricEigen {

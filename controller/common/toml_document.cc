@@ -170,6 +170,39 @@ void Assign(std::string_view assignment, toml::table* root) {
   Place(path, mode, parsed.get("value"), fail, root);
 }
 
+/// The toml as printed, with each number in its shortest form: the printer writes 0.59999999999999998 for
+/// 0.6.
+std::string ShortenNumbers(const std::string& toml) {
+  constexpr std::string_view kQuotes = "'\"";
+  constexpr std::string_view kNumber = "+-.0123456789eE";
+  std::string shortened;
+  for (size_t at = 0; at < toml.size();) {
+    const size_t begin = at;
+    if (kQuotes.find(toml[at]) != std::string_view::npos) {
+      const std::string three(3, toml[at]);
+      const std::string quote = toml.compare(at, 3, three) == 0 ? three : toml.substr(at, 1);
+      for (at += quote.size(); at < toml.size() && toml.compare(at, quote.size(), quote) != 0; ++at) {
+        if (toml[at] == '\\' && toml[begin] == '"') ++at;
+      }
+      at += quote.size();
+    } else {
+      const bool is_number = kNumber.find(toml[at]) != std::string_view::npos;
+      const size_t end = is_number ? toml.find_first_not_of(kNumber, at) : at + 1;
+      at = std::min(end, toml.size());
+    }
+    const std::string word = toml.substr(begin, at - begin);
+    double value = 0.0;
+    const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
+    const bool is_long = word.size() > std::numeric_limits<double>::max_digits10 &&
+                         word.find('.') != std::string::npos && error == std::errc() &&
+                         end == word.data() + word.size();
+    std::string number = is_long ? FormatNumber(value) : word;
+    if (is_long && number.find_first_of(".e") == std::string::npos) number += ".0";  // it stays no integer
+    shortened += number;
+  }
+  return shortened;
+}
+
 }  // namespace
 
 TomlDocument::TomlDocument(std::string_view text, std::string_view source)
@@ -210,43 +243,6 @@ void TomlDocument::Set(std::string_view path, double number) {
     Place(path, Change::kSet, &value, fail, root_.get());
   }
 }
-
-namespace {
-
-/// The toml as printed, with each number in its shortest form: the printer writes 0.59999999999999998 for
-/// 0.6.
-std::string ShortenNumbers(const std::string& toml) {
-  constexpr std::string_view kQuotes = "'\"";
-  constexpr std::string_view kNumber = "+-.0123456789eE";
-  std::string shortened;
-  for (size_t at = 0; at < toml.size();) {
-    const size_t begin = at;
-    if (kQuotes.find(toml[at]) != std::string_view::npos) {
-      const std::string three(3, toml[at]);
-      const std::string quote = toml.compare(at, 3, three) == 0 ? three : toml.substr(at, 1);
-      for (at += quote.size(); at < toml.size() && toml.compare(at, quote.size(), quote) != 0; ++at) {
-        if (toml[at] == '\\' && toml[begin] == '"') ++at;
-      }
-      at += quote.size();
-    } else {
-      const bool is_number = kNumber.find(toml[at]) != std::string_view::npos;
-      const size_t end = is_number ? toml.find_first_not_of(kNumber, at) : at + 1;
-      at = std::min(end, toml.size());
-    }
-    const std::string word = toml.substr(begin, at - begin);
-    double value = 0.0;
-    const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
-    const bool is_long = word.size() > std::numeric_limits<double>::max_digits10 &&
-                         word.find('.') != std::string::npos && error == std::errc() &&
-                         end == word.data() + word.size();
-    std::string number = is_long ? FormatNumber(value) : word;
-    if (is_long && number.find_first_of(".e") == std::string::npos) number += ".0";  // it stays no integer
-    shortened += number;
-  }
-  return shortened;
-}
-
-}  // namespace
 
 std::string ApplyOverrides(const std::string& text, const std::string& source,
                            const std::vector<std::string>& overrides) {

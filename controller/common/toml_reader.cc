@@ -24,7 +24,7 @@ bool IsName(std::string_view text) {
 /// Keys name parts of robots too, which other formats name as they like.
 bool IsKey(std::string_view text) {
   return !text.empty() && text.size() <= kMaxKeyLength &&
-         std::none_of(text.begin(), text.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; });
+         std::ranges::none_of(text, [](unsigned char c) { return c < 0x20 || c == 0x7f; });
 }
 
 std::string Format(const toml::node& node);
@@ -65,7 +65,7 @@ void TomlContext::RejectMissing() const {
   if (missing.empty()) return;
   // In the file's order; what does not come from the file is last.
   std::vector<MissingKeys> sorted = missing;
-  std::stable_sort(sorted.begin(), sorted.end(), [](const MissingKeys& a, const MissingKeys& b) {
+  std::ranges::stable_sort(sorted, [](const MissingKeys& a, const MissingKeys& b) {
     return a.line != 0 && (b.line == 0 || a.line < b.line);
   });
   std::string text;
@@ -133,7 +133,7 @@ MissingKeys& TomlValue::Note(const std::string& problem) const {
   MissingKeys note{Locate(), is_own ? 0 : line(), path_, {}, problem};
   std::vector<MissingKeys>& all = context_->missing;
   // What two arms are made from is read twice.
-  const auto same = std::find_if(all.begin(), all.end(), [&](const MissingKeys& other) {
+  const auto same = std::ranges::find_if(all, [&](const MissingKeys& other) {
     return other.where == note.where && other.path == note.path && other.problem == problem;
   });
   return same == all.end() ? all.emplace_back(std::move(note)) : *same;
@@ -141,7 +141,7 @@ MissingKeys& TomlValue::Note(const std::string& problem) const {
 
 void TomlValue::NoteMissing(const std::string& key) const {
   std::vector<std::string>& names = Note("").names;
-  if (std::find(names.begin(), names.end(), key) == names.end()) names.push_back(key);
+  if (std::ranges::find(names, key) == names.end()) names.push_back(key);
 }
 
 void TomlValue::NoteMisspelt(const std::string& key) const {
@@ -270,8 +270,7 @@ TomlValue TomlTable::Get(std::string_view key) {
 std::vector<std::pair<std::string, TomlValue>> TomlTable::ListInFileOrder() const {
   std::vector<std::pair<std::string, TomlValue>> entries;
   for (const auto& [key, node] : *table_) entries.emplace_back(key.str(), MakeValue(key.str(), node));
-  std::sort(entries.begin(), entries.end(),
-            [](const auto& a, const auto& b) { return a.second.IsBefore(b.second); });
+  std::ranges::sort(entries, [](const auto& a, const auto& b) { return a.second.IsBefore(b.second); });
   return entries;
 }
 

@@ -20,6 +20,102 @@ Matrix3d CalcContactRotation3(const Matrix2d& R_psi) {
   return R_co_cf;
 }
 
+// Ratio of the principal relative curvatures below which the contact counts as a line.
+constexpr double kMinCurvatureRatio = 1e-9;
+
+// Principal values of a symmetric 2x2 matrix: mean -+ radius.
+void RequirePointContact(const Matrix2d& K_relative) {
+  const double mean = 0.5 * K_relative.trace();
+  const double radius = std::hypot(0.5 * (K_relative(0, 0) - K_relative(1, 1)), K_relative(0, 1));
+  const double smallest = mean - radius;
+  if (smallest > kMinCurvatureRatio * (mean + radius)) return;
+  throw SingularityError(
+      "surfaces do not touch at an isolated point, smallest relative curvature K_f + R_psi K_o R_psi "
+      "[1/m]: " +
+          std::to_string(smallest),
+      smallest);
+}
+
+// Angle about the normal from the Gauss frame at `from` to that at `to`, two coordinates of one point.
+double CalcFrameAngle(const Surface& surface, const SurfacePoint& from, const SurfacePoint& to) {
+  if (from.chart == to.chart) return 0.0;
+  const Matrix3d R_from = surface.Evaluate(from).R;
+  const Vector3d x_to = surface.Evaluate(to).R.col(0);
+  return std::atan2(R_from.col(1).dot(x_to), R_from.col(0).dot(x_to));
+}
+
+// The contact with its points written as alpha_f and alpha_o. Like T_f and T_o in psidot: each frame's turn
+// about its own outward normal adds to psi.
+ContactCoordinates Rewrite(const Surface& fingertip, const Surface& object, const ContactCoordinates& kappa,
+                           const SurfacePoint& alpha_f, const SurfacePoint& alpha_o) {
+  const double turn =
+      CalcFrameAngle(fingertip, kappa.alpha_f, alpha_f) + CalcFrameAngle(object, kappa.alpha_o, alpha_o);
+  return {alpha_f, alpha_o, std::remainder(kappa.psi + turn, 2.0 * kPi)};
+}
+
+constexpr int kMaxSteps = 50;
+// Largest turn of either normal in one Newton step, rad.
+constexpr double kMaxTurn = 0.5;
+
+// The fingertip's and the object's surface at the present kappa, all in the object frame.
+struct Pair {
+  SurfaceGeometry f;
+  SurfaceGeometry o;
+  Vector3d p_f;
+  Matrix3d R_f;
+  Vector3d e;     // from the fingertip's point to the object's
+  Vector2d e_xy;  // tangential part of e, in the fingertip's Gauss frame
+  Vector2d n_xy;  // tangential part of the object's normal, likewise
+  double gap;
+};
+
+Pair EvaluatePair(const Surface& fingertip, const Surface& object, const Pose& X_OF,
+                  const SurfacePoint& alpha_f, const SurfacePoint& alpha_o) {
+  Pair pair;
+  pair.f = fingertip.Evaluate(alpha_f);
+  pair.o = object.Evaluate(alpha_o);
+  pair.p_f = X_OF * pair.f.p;
+  pair.R_f = X_OF.linear() * pair.f.R;
+  pair.e = pair.o.p - pair.p_f;
+  pair.e_xy = pair.R_f.leftCols<2>().transpose() * pair.e;
+  pair.n_xy = pair.R_f.leftCols<2>().transpose() * pair.o.R.col(2);
+  pair.gap = pair.R_f.col(2).dot(pair.e);
+  return pair;
+}
+
+bool HasConverged(const Pair& pair, const Pose& X_OF) {
+  const double length = pair.o.p.norm() + pair.f.p.norm() + X_OF.translation().norm();
+  return pair.n_xy.norm() <= kContactConvergence && pair.e_xy.norm() <= kContactConvergence * length;
+}
+
+// Newton step [s_f; s_o] = [M_f dalpha_f; M_o dalpha_o] (m) for e_xy = 0, n_xy = 0. To first order
+//   d e_xy = C s_o - (I + gap K_f) s_f,   d n_xy = C K_o s_o - (n_f . n_o) K_f s_f,
+// with C the object's tangent axes in the fingertip's; turning the fingertip's axes only adds second-order
+// terms.
+Eigen::Vector4d CalcStep(const Pair& pair) {
+  const Matrix2d C = pair.R_f.leftCols<2>().transpose() * pair.o.R.leftCols<2>();
+  const double n_dot = pair.R_f.col(2).dot(pair.o.R.col(2));
+  Eigen::Matrix4d A;
+  A << -(Matrix2d::Identity() + pair.gap * pair.f.K), C, -n_dot * pair.f.K, C * pair.o.K;
+  Eigen::Vector4d residual;
+  residual << pair.e_xy, pair.n_xy;
+  const Eigen::Vector4d step = -A.partialPivLu().solve(residual);
+  const double turn = std::max((pair.f.K * step.head<2>()).norm(), (pair.o.K * step.tail<2>()).norm());
+  return turn > kMaxTurn ? Eigen::Vector4d(step * (kMaxTurn / turn)) : step;
+}
+
+SurfacePoint Move(const Surface& surface, const SurfacePoint& alpha, const SurfaceGeometry& geometry,
+                  const Vector2d& s) {
+  const Vector2d change = geometry.M.triangularView<Eigen::Upper>().solve(s);
+  return surface.Normalize({alpha.u + change.x(), alpha.v + change.y(), alpha.chart});
+}
+
+// psi from x_cf = cos(psi) x_co - sin(psi) y_co
+double CalcPsi(const Pair& pair) {
+  const Vector3d x_cf = pair.R_f.col(0);
+  return std::atan2(-pair.o.R.col(1).dot(x_cf), pair.o.R.col(0).dot(x_cf));
+}
+
 }  // namespace
 
 Vector5d ContactCoordinates::CalcVector() const {
@@ -87,43 +183,6 @@ double CalcRimDistance(double radius, const Vector3d& pole, const Vector3d& p) {
   return radius * std::atan2(pole.dot(p), pole.cross(p).norm());
 }
 
-namespace {
-
-// Ratio of the principal relative curvatures below which the contact counts as a line.
-constexpr double kMinCurvatureRatio = 1e-9;
-
-// Principal values of a symmetric 2x2 matrix: mean -+ radius.
-void RequirePointContact(const Matrix2d& K_relative) {
-  const double mean = 0.5 * K_relative.trace();
-  const double radius = std::hypot(0.5 * (K_relative(0, 0) - K_relative(1, 1)), K_relative(0, 1));
-  const double smallest = mean - radius;
-  if (smallest > kMinCurvatureRatio * (mean + radius)) return;
-  throw SingularityError(
-      "surfaces do not touch at an isolated point, smallest relative curvature K_f + R_psi K_o R_psi "
-      "[1/m]: " +
-          std::to_string(smallest),
-      smallest);
-}
-
-// Angle about the normal from the Gauss frame at `from` to that at `to`, two coordinates of one point.
-double CalcFrameAngle(const Surface& surface, const SurfacePoint& from, const SurfacePoint& to) {
-  if (from.chart == to.chart) return 0.0;
-  const Matrix3d R_from = surface.Evaluate(from).R;
-  const Vector3d x_to = surface.Evaluate(to).R.col(0);
-  return std::atan2(R_from.col(1).dot(x_to), R_from.col(0).dot(x_to));
-}
-
-// The contact with its points written as alpha_f and alpha_o. Like T_f and T_o in psidot: each frame's turn
-// about its own outward normal adds to psi.
-ContactCoordinates Rewrite(const Surface& fingertip, const Surface& object, const ContactCoordinates& kappa,
-                           const SurfacePoint& alpha_f, const SurfacePoint& alpha_o) {
-  const double turn =
-      CalcFrameAngle(fingertip, kappa.alpha_f, alpha_f) + CalcFrameAngle(object, kappa.alpha_o, alpha_o);
-  return {alpha_f, alpha_o, std::remainder(kappa.psi + turn, 2.0 * kPi)};
-}
-
-}  // namespace
-
 Vector5d CalcKappaDot(const ContactGeometry& contact, const Vector6d& V) {
   const SurfaceGeometry& f = contact.fingertip;
   const SurfaceGeometry& o = contact.object;
@@ -168,73 +227,6 @@ ContactCoordinates Displace(const ContactCoordinates& kappa, const Vector5d& cha
   displaced.psi += change(4);
   return displaced;
 }
-
-namespace {
-
-constexpr int kMaxSteps = 50;
-// Largest turn of either normal in one Newton step, rad.
-constexpr double kMaxTurn = 0.5;
-
-// The fingertip's and the object's surface at the present kappa, all in the object frame.
-struct Pair {
-  SurfaceGeometry f;
-  SurfaceGeometry o;
-  Vector3d p_f;
-  Matrix3d R_f;
-  Vector3d e;     // from the fingertip's point to the object's
-  Vector2d e_xy;  // tangential part of e, in the fingertip's Gauss frame
-  Vector2d n_xy;  // tangential part of the object's normal, likewise
-  double gap;
-};
-
-Pair EvaluatePair(const Surface& fingertip, const Surface& object, const Pose& X_OF,
-                  const SurfacePoint& alpha_f, const SurfacePoint& alpha_o) {
-  Pair pair;
-  pair.f = fingertip.Evaluate(alpha_f);
-  pair.o = object.Evaluate(alpha_o);
-  pair.p_f = X_OF * pair.f.p;
-  pair.R_f = X_OF.linear() * pair.f.R;
-  pair.e = pair.o.p - pair.p_f;
-  pair.e_xy = pair.R_f.leftCols<2>().transpose() * pair.e;
-  pair.n_xy = pair.R_f.leftCols<2>().transpose() * pair.o.R.col(2);
-  pair.gap = pair.R_f.col(2).dot(pair.e);
-  return pair;
-}
-
-bool HasConverged(const Pair& pair, const Pose& X_OF) {
-  const double length = pair.o.p.norm() + pair.f.p.norm() + X_OF.translation().norm();
-  return pair.n_xy.norm() <= kContactConvergence && pair.e_xy.norm() <= kContactConvergence * length;
-}
-
-// Newton step [s_f; s_o] = [M_f dalpha_f; M_o dalpha_o] (m) for e_xy = 0, n_xy = 0. To first order
-//   d e_xy = C s_o - (I + gap K_f) s_f,   d n_xy = C K_o s_o - (n_f . n_o) K_f s_f,
-// with C the object's tangent axes in the fingertip's; turning the fingertip's axes only adds second-order
-// terms.
-Eigen::Vector4d CalcStep(const Pair& pair) {
-  const Matrix2d C = pair.R_f.leftCols<2>().transpose() * pair.o.R.leftCols<2>();
-  const double n_dot = pair.R_f.col(2).dot(pair.o.R.col(2));
-  Eigen::Matrix4d A;
-  A << -(Matrix2d::Identity() + pair.gap * pair.f.K), C, -n_dot * pair.f.K, C * pair.o.K;
-  Eigen::Vector4d residual;
-  residual << pair.e_xy, pair.n_xy;
-  const Eigen::Vector4d step = -A.partialPivLu().solve(residual);
-  const double turn = std::max((pair.f.K * step.head<2>()).norm(), (pair.o.K * step.tail<2>()).norm());
-  return turn > kMaxTurn ? Eigen::Vector4d(step * (kMaxTurn / turn)) : step;
-}
-
-SurfacePoint Move(const Surface& surface, const SurfacePoint& alpha, const SurfaceGeometry& geometry,
-                  const Vector2d& s) {
-  const Vector2d change = geometry.M.triangularView<Eigen::Upper>().solve(s);
-  return surface.Normalize({alpha.u + change.x(), alpha.v + change.y(), alpha.chart});
-}
-
-// psi from x_cf = cos(psi) x_co - sin(psi) y_co
-double CalcPsi(const Pair& pair) {
-  const Vector3d x_cf = pair.R_f.col(0);
-  return std::atan2(-pair.o.R.col(1).dot(x_cf), pair.o.R.col(0).dot(x_cf));
-}
-
-}  // namespace
 
 FoundContact FindContact(const Surface& fingertip, const Surface& object, const Pose& X_OF,
                          const ContactCoordinates& guess) {

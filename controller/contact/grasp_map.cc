@@ -13,6 +13,24 @@ void RequireGraspShape(std::span<const Contact> contacts, Eigen::Index columns) 
           "must equal the number of contact forces", columns);
 }
 
+using Matrix36 = Eigen::Matrix<double, 3, 6>;
+
+void RequireRowsShape(Eigen::Index columns, Eigen::Ref<MatrixXd> rows) {
+  Require(rows.rows() == 3, "rows of the contact Jacobian", "must be three", rows.rows());
+  Require(rows.cols() == columns, "columns of the contact Jacobian",
+          "must equal those of the fingertip Jacobian", rows.cols());
+}
+
+/// Calls visit(i) for the columns of each run, or for all columns when there are no runs.
+template <typename Visit>
+void ForEachColumn(std::span<const ColumnRun> columns, Eigen::Index all, const Visit& visit) {
+  const ColumnRun whole{0, all};
+  if (columns.empty()) columns = {&whole, 1};
+  for (const ColumnRun& run : columns) {
+    for (Eigen::Index i = run.begin; i < run.begin + run.count; ++i) visit(i);
+  }
+}
+
 }  // namespace
 
 void CalcGraspMap(std::span<const Contact> contacts, Eigen::Ref<Matrix6Xd> G) {
@@ -37,28 +55,6 @@ void CalcGraspMapDot(std::span<const Contact> contacts, Eigen::Ref<Matrix6Xd> G_
     column += 3;
   }
 }
-
-namespace {
-
-using Matrix36 = Eigen::Matrix<double, 3, 6>;
-
-void RequireRowsShape(Eigen::Index columns, Eigen::Ref<MatrixXd> rows) {
-  Require(rows.rows() == 3, "rows of the contact Jacobian", "must be three", rows.rows());
-  Require(rows.cols() == columns, "columns of the contact Jacobian",
-          "must equal those of the fingertip Jacobian", rows.cols());
-}
-
-/// Calls visit(i) for the columns of each run, or for all columns when there are no runs.
-template <typename Visit>
-void ForEachColumn(std::span<const ColumnRun> columns, Eigen::Index all, const Visit& visit) {
-  const ColumnRun whole{0, all};
-  if (columns.empty()) columns = {&whole, 1};
-  for (const ColumnRun& run : columns) {
-    for (Eigen::Index i = run.begin; i < run.begin + run.count; ++i) visit(i);
-  }
-}
-
-}  // namespace
 
 void CalcContactJacobian(const Contact& contact, const Eigen::Ref<const Matrix6Xd>& J_f,
                          Eigen::Ref<MatrixXd> rows, std::span<const ColumnRun> columns) {

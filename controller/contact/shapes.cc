@@ -100,6 +100,28 @@ Face FaceOf(int chart) {
 // How far rounding may carry a contact beyond an edge, relative to the face.
 constexpr double kEdgeRounding = 1e-9;
 
+struct SurfaceMaker {
+  std::unique_ptr<Surface> operator()(const SolidSphere& sphere) const {
+    return std::make_unique<Sphere>(sphere.radius);
+  }
+  std::unique_ptr<Surface> operator()(const SolidCylinder& cylinder) const {
+    return std::make_unique<Cylinder>(cylinder.radius);
+  }
+  std::unique_ptr<Surface> operator()(const SolidTorus& torus) const {
+    return std::make_unique<Torus>(torus.ring_radius, torus.tube_radius);
+  }
+  std::unique_ptr<Surface> operator()(const SolidBox& box) const {
+    return std::make_unique<Box>(0.5 * box.size);
+  }
+  std::unique_ptr<Surface> operator()(const SolidEllipsoid& ellipsoid) const {
+    return std::make_unique<Ellipsoid>(ellipsoid.semi_axes);
+  }
+  std::unique_ptr<Surface> operator()(const SolidCapsule&) const { throw std::invalid_argument(kNotSmooth); }
+
+  static constexpr const char* kNotSmooth =
+      "object shape: must be a sphere, a cylinder, an ellipsoid, a box or a torus for contact terms";
+};
+
 }  // namespace
 
 SurfaceProjection Plane::Project(const Vector3d& p) const { return {{p.x(), p.y(), 0}, p.z()}; }
@@ -284,32 +306,6 @@ SurfaceJet Torus::DoCalcJet(const SurfacePoint& alpha) const {
 SurfacePoint Torus::DoToChart(const SurfacePoint& alpha, int chart) const {
   return {WrapAngle(alpha.u), WrapAngle(alpha.v), chart};
 }
-
-namespace {
-
-struct SurfaceMaker {
-  std::unique_ptr<Surface> operator()(const SolidSphere& sphere) const {
-    return std::make_unique<Sphere>(sphere.radius);
-  }
-  std::unique_ptr<Surface> operator()(const SolidCylinder& cylinder) const {
-    return std::make_unique<Cylinder>(cylinder.radius);
-  }
-  std::unique_ptr<Surface> operator()(const SolidTorus& torus) const {
-    return std::make_unique<Torus>(torus.ring_radius, torus.tube_radius);
-  }
-  std::unique_ptr<Surface> operator()(const SolidBox& box) const {
-    return std::make_unique<Box>(0.5 * box.size);
-  }
-  std::unique_ptr<Surface> operator()(const SolidEllipsoid& ellipsoid) const {
-    return std::make_unique<Ellipsoid>(ellipsoid.semi_axes);
-  }
-  std::unique_ptr<Surface> operator()(const SolidCapsule&) const { throw std::invalid_argument(kNotSmooth); }
-
-  static constexpr const char* kNotSmooth =
-      "object shape: must be a sphere, a cylinder, an ellipsoid, a box or a torus for contact terms";
-};
-
-}  // namespace
 
 std::unique_ptr<Surface> MakeSurface(const Shape& shape) { return std::visit(SurfaceMaker{}, shape); }
 

@@ -1,8 +1,8 @@
 #include "controller/control/constrained_dynamics.h"
 
 #include <algorithm>
+#include <cmath>
 
-#include "controller/common/block_cholesky.h"
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
 
@@ -28,6 +28,9 @@ void FactorIndependentConstraints(const MatrixXd& schur, Eigen::Index k, BlockCh
       "contact constraints depend on each other, smallest independent part " + FormatNumber(smallest),
       smallest);
 }
+
+// Pivots of L^-T J^T below this, against the largest, are rounding: constraints that others hold already.
+constexpr double kRedundant = 1e-8;
 
 }  // namespace
 
@@ -113,6 +116,33 @@ void ConstrainedDynamics::CalcFreeForce(const ModelTerms& robot, const Eigen::Re
   bias_ = robot.gravity() + robot.friction();
   bias_.noalias() += robot.C() * robot.velocity();
   free = force - bias_;
+}
+
+GroundDynamics::GroundDynamics(const RobotModel& model, int feet) : factor_(model), constraints_(kRedundant) {
+  half_.setZero(model.num_velocities(), Eigen::Index{3} * feet);
+}
+
+const Prediction& GroundDynamics::Predict(const ModelTerms& robot, const GroundContacts& ground,
+                                          const Eigen::Ref<const VectorXd>& force) {
+  factor_.Compute(robot.M());
+  // y = L xi_dot: y = y_free + B^T f and B y = -J_dot xi, with B = J L^-1
+  VectorXd y = force - robot.gravity() - robot.friction();
+  y.noalias() -= robot.C() * robot.velocity();
+  factor_.SolveTransposed(y);
+  half_ = ground.J().transpose();
+  factor_.SolveTransposedColumns(half_);
+  constraints_.Compute(half_.transpose());
+  VectorXd made = -ground.J_dot_xi();
+  made.noalias() -= half_.transpose() * y;
+  const VectorXd change = constraints_.Solve(made);  // B^T f
+  prediction_.f_c = constraints_.SolveTransposed(change);
+  prediction_.xi_dot = y + change;
+  factor_.Solve(prediction_.xi_dot);
+  return prediction_;
+}
+
+double GroundDynamics::CalcForceGain() const {
+  return 1.0 / std::sqrt(CalcSymmetricEigenvalues(half_.transpose() * half_)[0]);
 }
 
 }  // namespace dexcheck

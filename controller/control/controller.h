@@ -2,8 +2,6 @@
 
 // What stands in the loop between sensors and motors: a law, or a task that uses several.
 
-#include <string>
-
 #include "controller/common/types.h"
 #include "controller/control/grasp_model.h"
 #include "controller/control/joint_motion.h"

@@ -10,7 +10,6 @@
 
 #include <algorithm>
 #include <cstdio>
-#include <memory>
 #include <string>
 #include <utility>
 #include <vector>
@@ -32,8 +31,7 @@ class ControllerParameters {
   /// its controller never asks is refused.
   [[nodiscard]] double Get(const std::string& name, double otherwise) const {
     asked_.push_back(name);
-    const auto found =
-        std::find_if(given_.begin(), given_.end(), [&](const auto& one) { return one.first == name; });
+    const auto found = std::ranges::find_if(given_, [&](const auto& part) { return part.first == name; });
     return found == given_.end() ? otherwise : found->second;
   }
 

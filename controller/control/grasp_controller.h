@@ -4,7 +4,6 @@
 
 #include <optional>
 #include <span>
-#include <vector>
 
 #include "controller/common/errors.h"
 #include "controller/control/baseline_law.h"

@@ -3,11 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numeric>
 #include <utility>
 
-#include "controller/common/block_cholesky.h"
 #include "controller/common/errors.h"
+#include "controller/common/linear_algebra.h"
 #include "controller/common/text.h"
 
 namespace dexcheck {
@@ -23,7 +22,7 @@ Eigen::Index CheckRows(const std::string& name, Eigen::Index rows, Eigen::Index 
 
 Pseudoinverse::Pseudoinverse(std::string name, Eigen::Index rows, Eigen::Index columns)
     : name_(std::move(name)),
-      all_columns_(static_cast<size_t>(columns)),
+      all_columns_(ListIndices(columns)),
       J_T_(RowMatrixXd::Zero(columns, PadToGramBlock(CheckRows(name_, rows, columns)))),
       W_inv_J_T_(J_T_),
       W_solution_(columns, rows),
@@ -31,9 +30,7 @@ Pseudoinverse::Pseudoinverse(std::string name, Eigen::Index rows, Eigen::Index c
       work_(rows),
       gram_factor_(rows),
       W_llt_(columns) {
-  std::iota(all_columns_.begin(), all_columns_.end(), 0);
-  columns_ = all_columns_;
-  entries_ = all_columns_;
+  columns_ = entries_ = all_columns_;
 }
 
 void Pseudoinverse::Load(const Eigen::Ref<const MatrixXd>& J, std::span<const int> columns) {

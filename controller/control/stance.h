@@ -3,7 +3,6 @@
 // A robot that stands on its feet: what the ground has to give, and the motion of its joints while its body
 // moves.
 
-#include <memory>
 #include <vector>
 
 #include "controller/contact/ground_contacts.h"

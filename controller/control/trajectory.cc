@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <utility>
-#include <vector>
 
 #include "controller/common/errors.h"
 #include "controller/object/euler_zyz.h"
@@ -135,119 +134,6 @@ DesiredMotion EvaluateKnots(const std::vector<Knot>& knots, double t) {
   return motion;
 }
 
-}  // namespace
-
-ScalarMotion CalcMinJerk(double t, double duration) {
-  if (t <= 0.0) return {};
-  if (t >= duration) return {1.0, 0.0, 0.0};
-  const double u = t / duration;
-  return {u * u * u * (10.0 + u * (-15.0 + 6.0 * u)), 30.0 * u * u * (1.0 - u) * (1.0 - u) / duration,
-          60.0 * u * (1.0 - u) * (1.0 - 2.0 * u) / (duration * duration)};
-}
-
-ScalarMotion CalcMinSnap(double t, double duration) {
-  if (t <= 0.0) return {};
-  if (t >= duration) return {1.0, 0.0, 0.0};
-  const double u = t / duration;
-  const double v = 1.0 - u;
-  return {u * u * u * u * (35.0 + u * (-84.0 + u * (70.0 - 20.0 * u))),
-          140.0 * u * u * u * v * v * v / duration,
-          420.0 * u * u * v * v * (1.0 - 2.0 * u) / (duration * duration)};
-}
-
-ScalarMotion CalcSpeedRamp(double t, double duration) {
-  if (duration <= 0.0) return {t, 1.0, 0.0};
-  if (t <= 0.0) return {};
-  if (t >= duration) return {t - duration / 2.0, 1.0, 0.0};
-  // integral of the least-jerk step: duration (5/2 u^4 - 3 u^5 + u^6)
-  const ScalarMotion speed = CalcMinJerk(t, duration);
-  const double u = t / duration;
-  return {duration * u * u * u * u * (2.5 + u * (-3.0 + u)), speed.s, speed.s_dot};
-}
-
-std::unique_ptr<Trajectory> MakeLineTrajectory(const Vector6d& X_start, const Vector6d& velocity,
-                                               double ramp_time) {
-  RequireNotNegative(ramp_time, "ramp_time");
-  return MakeTrajectory([=](double t) { return MoveAlong(X_start, velocity, CalcSpeedRamp(t, ramp_time)); });
-}
-
-std::unique_ptr<Trajectory> MakePointToPointTrajectory(const Vector6d& X_start, const Vector6d& displacement,
-                                                       double duration) {
-  Require(duration > 0.0, "duration", "must be positive", duration);
-  return MakeTrajectory([=](double t) { return MoveAlong(X_start, displacement, CalcMinJerk(t, duration)); });
-}
-
-std::unique_ptr<Trajectory> MakeOscillationTrajectory(const Vector6d& X_start, const Vector6d& amplitude,
-                                                      double frequency, double ramp_time) {
-  RequireNotNegative(ramp_time, "ramp_time");
-  Require(frequency > 0.0, "frequency", "must be positive", frequency);
-  return MakeTrajectory([=, rate = 2.0 * kPi * frequency](double t) {
-    const ScalarMotion ramp = ramp_time > 0.0 ? CalcMinJerk(t, ramp_time) : ScalarMotion{1.0, 0.0, 0.0};
-    const double sine = std::sin(rate * t);
-    const double cosine = std::cos(rate * t);
-    return MoveAlong(X_start, amplitude,
-                     {ramp.s * sine, ramp.s_dot * sine + ramp.s * rate * cosine,
-                      ramp.s_ddot * sine + 2.0 * ramp.s_dot * rate * cosine - ramp.s * rate * rate * sine});
-  });
-}
-
-std::unique_ptr<Trajectory> MakeWeaveTrajectory(const Vector6d& X_start, const PlanarPath& path,
-                                                double amplitude, double wavelength) {
-  Require(wavelength > 0.0, "wavelength", "must be positive", wavelength);
-  return MakePlanarTrajectory(X_start, path, [=, k = 2.0 * kPi / wavelength](double s) -> PathPoint {
-    const double c = std::cos(k * s);
-    // y' = slope; turn = atan(slope)
-    const double slope = amplitude * k * std::sin(k * s);
-    const double slope_s = amplitude * k * k * c;
-    const double slope_ss = -k * k * slope;
-    const double secant = 1.0 / (1.0 + slope * slope);
-    return {{s, amplitude * (1.0 - c), std::atan(slope)},
-            {1.0, slope, slope_s * secant},
-            {0.0, slope_s, slope_ss * secant - 2.0 * slope * slope_s * slope_s * secant * secant}};
-  });
-}
-
-std::unique_ptr<Trajectory> MakeCircleTrajectory(const Vector6d& X_start, const PlanarPath& path,
-                                                 double radius) {
-  Require(radius != 0.0, "radius", "must not be zero", radius);
-  return MakePlanarTrajectory(X_start, path, [=](double s) -> PathPoint {
-    const double turn = s / radius;
-    const double c = std::cos(turn);
-    const double n = std::sin(turn);
-    return {{radius * n, radius * (1.0 - c), turn}, {c, n, 1.0 / radius}, {-n / radius, c / radius, 0.0}};
-  });
-}
-
-std::unique_ptr<Trajectory> MakeWayPointTrajectory(const Vector6d& X_start,
-                                                   const std::vector<WayPoint>& points) {
-  Require(!points.empty(), "number of way-points", "must be positive", 0.0);
-  std::vector<Knot> knots = {{0.0, X_start, Vector6d::Zero(), Vector6d::Zero()}};
-  for (const WayPoint& point : points) {
-    Require(point.time > knots.back().time, "time of way-point",
-            "must be positive and greater than the one before", point.time);
-    knots.push_back({point.time, X_start + point.displacement, Vector6d::Zero(), Vector6d::Zero()});
-  }
-  SetKnotRates(&knots);
-  return MakeTrajectory([knots = std::move(knots)](double t) { return EvaluateKnots(knots, t); });
-}
-
-std::unique_ptr<Trajectory> MakeSumTrajectory(const Vector6d& X_start,
-                                              std::vector<std::unique_ptr<Trajectory>> parts) {
-  Require(!parts.empty(), "number of parts", "must be positive", 0.0);
-  return MakeTrajectory([X_start, parts = std::move(parts)](double t) {
-    DesiredMotion sum{X_start, Vector6d::Zero(), Vector6d::Zero()};
-    for (const std::unique_ptr<Trajectory>& part : parts) {
-      const DesiredMotion motion = part->Evaluate(t);
-      sum.X_d += motion.X_d;
-      sum.X_d_dot += motion.X_d_dot;
-      sum.X_d_ddot += motion.X_d_ddot;
-    }
-    return sum;
-  });
-}
-
-namespace {
-
 enum class Type { kLine, kPointToPoint, kOscillation, kWeave, kCircle, kWayPoints, kSum };
 
 // [linear under one key; angles under another, rad or degrees], 0 where a key is missing.
@@ -376,6 +262,115 @@ TrajectoryMaker ReadByType(TomlTable& table) {
 }
 
 }  // namespace
+
+ScalarMotion CalcMinJerk(double t, double duration) {
+  if (t <= 0.0) return {};
+  if (t >= duration) return {1.0, 0.0, 0.0};
+  const double u = t / duration;
+  return {u * u * u * (10.0 + u * (-15.0 + 6.0 * u)), 30.0 * u * u * (1.0 - u) * (1.0 - u) / duration,
+          60.0 * u * (1.0 - u) * (1.0 - 2.0 * u) / (duration * duration)};
+}
+
+ScalarMotion CalcMinSnap(double t, double duration) {
+  if (t <= 0.0) return {};
+  if (t >= duration) return {1.0, 0.0, 0.0};
+  const double u = t / duration;
+  const double v = 1.0 - u;
+  return {u * u * u * u * (35.0 + u * (-84.0 + u * (70.0 - 20.0 * u))),
+          140.0 * u * u * u * v * v * v / duration,
+          420.0 * u * u * v * v * (1.0 - 2.0 * u) / (duration * duration)};
+}
+
+ScalarMotion CalcSpeedRamp(double t, double duration) {
+  if (duration <= 0.0) return {t, 1.0, 0.0};
+  if (t <= 0.0) return {};
+  if (t >= duration) return {t - duration / 2.0, 1.0, 0.0};
+  // integral of the least-jerk step: duration (5/2 u^4 - 3 u^5 + u^6)
+  const ScalarMotion speed = CalcMinJerk(t, duration);
+  const double u = t / duration;
+  return {duration * u * u * u * u * (2.5 + u * (-3.0 + u)), speed.s, speed.s_dot};
+}
+
+std::unique_ptr<Trajectory> MakeLineTrajectory(const Vector6d& X_start, const Vector6d& velocity,
+                                               double ramp_time) {
+  RequireNotNegative(ramp_time, "ramp_time");
+  return MakeTrajectory([=](double t) { return MoveAlong(X_start, velocity, CalcSpeedRamp(t, ramp_time)); });
+}
+
+std::unique_ptr<Trajectory> MakePointToPointTrajectory(const Vector6d& X_start, const Vector6d& displacement,
+                                                       double duration) {
+  Require(duration > 0.0, "duration", "must be positive", duration);
+  return MakeTrajectory([=](double t) { return MoveAlong(X_start, displacement, CalcMinJerk(t, duration)); });
+}
+
+std::unique_ptr<Trajectory> MakeOscillationTrajectory(const Vector6d& X_start, const Vector6d& amplitude,
+                                                      double frequency, double ramp_time) {
+  RequireNotNegative(ramp_time, "ramp_time");
+  Require(frequency > 0.0, "frequency", "must be positive", frequency);
+  return MakeTrajectory([=, rate = 2.0 * kPi * frequency](double t) {
+    const ScalarMotion ramp = ramp_time > 0.0 ? CalcMinJerk(t, ramp_time) : ScalarMotion{1.0, 0.0, 0.0};
+    const double sine = std::sin(rate * t);
+    const double cosine = std::cos(rate * t);
+    return MoveAlong(X_start, amplitude,
+                     {ramp.s * sine, ramp.s_dot * sine + ramp.s * rate * cosine,
+                      ramp.s_ddot * sine + 2.0 * ramp.s_dot * rate * cosine - ramp.s * rate * rate * sine});
+  });
+}
+
+std::unique_ptr<Trajectory> MakeWeaveTrajectory(const Vector6d& X_start, const PlanarPath& path,
+                                                double amplitude, double wavelength) {
+  Require(wavelength > 0.0, "wavelength", "must be positive", wavelength);
+  return MakePlanarTrajectory(X_start, path, [=, k = 2.0 * kPi / wavelength](double s) -> PathPoint {
+    const double c = std::cos(k * s);
+    // y' = slope; turn = atan(slope)
+    const double slope = amplitude * k * std::sin(k * s);
+    const double slope_s = amplitude * k * k * c;
+    const double slope_ss = -k * k * slope;
+    const double secant = 1.0 / (1.0 + slope * slope);
+    return {{s, amplitude * (1.0 - c), std::atan(slope)},
+            {1.0, slope, slope_s * secant},
+            {0.0, slope_s, slope_ss * secant - 2.0 * slope * slope_s * slope_s * secant * secant}};
+  });
+}
+
+std::unique_ptr<Trajectory> MakeCircleTrajectory(const Vector6d& X_start, const PlanarPath& path,
+                                                 double radius) {
+  Require(radius != 0.0, "radius", "must not be zero", radius);
+  return MakePlanarTrajectory(X_start, path, [=](double s) -> PathPoint {
+    const double turn = s / radius;
+    const double c = std::cos(turn);
+    const double n = std::sin(turn);
+    return {{radius * n, radius * (1.0 - c), turn}, {c, n, 1.0 / radius}, {-n / radius, c / radius, 0.0}};
+  });
+}
+
+std::unique_ptr<Trajectory> MakeWayPointTrajectory(const Vector6d& X_start,
+                                                   const std::vector<WayPoint>& points) {
+  Require(!points.empty(), "number of way-points", "must be positive", 0.0);
+  std::vector<Knot> knots = {{0.0, X_start, Vector6d::Zero(), Vector6d::Zero()}};
+  for (const WayPoint& point : points) {
+    Require(point.time > knots.back().time, "time of way-point",
+            "must be positive and greater than the one before", point.time);
+    knots.push_back({point.time, X_start + point.displacement, Vector6d::Zero(), Vector6d::Zero()});
+  }
+  SetKnotRates(&knots);
+  return MakeTrajectory([knots = std::move(knots)](double t) { return EvaluateKnots(knots, t); });
+}
+
+std::unique_ptr<Trajectory> MakeSumTrajectory(const Vector6d& X_start,
+                                              std::vector<std::unique_ptr<Trajectory>> parts) {
+  Require(!parts.empty(), "number of parts", "must be positive", 0.0);
+  return MakeTrajectory([X_start, parts = std::move(parts)](double t) {
+    DesiredMotion sum{X_start, Vector6d::Zero(), Vector6d::Zero()};
+    for (const std::unique_ptr<Trajectory>& part : parts) {
+      const DesiredMotion motion = part->Evaluate(t);
+      sum.X_d += motion.X_d;
+      sum.X_d_dot += motion.X_d_dot;
+      sum.X_d_ddot += motion.X_d_ddot;
+    }
+    return sum;
+  });
+}
 
 TrajectoryMaker ReadTrajectory(TomlTable& table) {
   TrajectoryMaker maker = ReadByType(table);

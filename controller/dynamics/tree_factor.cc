@@ -1,9 +1,9 @@
 #include "controller/dynamics/tree_factor.h"
 
 #include <cmath>
-#include <numeric>
 
 #include "controller/common/errors.h"
+#include "controller/common/linear_algebra.h"
 
 namespace dexcheck {
 namespace {
@@ -27,8 +27,7 @@ TreeFactor::TreeFactor(const RobotModel& model) {
       add(std::span(entries).first(entries.size() - k));
   }
   L_.assign(path_.size(), 0.0);
-  all_rows_.resize(rows_.size());
-  std::iota(all_rows_.begin(), all_rows_.end(), 0);
+  all_rows_ = ListIndices(rows_.size());
 }
 
 void TreeFactor::Compute(const Eigen::Ref<const MatrixXd>& M) {

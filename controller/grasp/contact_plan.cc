@@ -69,7 +69,7 @@ class Planner {
     constexpr size_t kMostMapped = 80;
     std::vector<PalmPose> palms = search_.List();
     const auto by_margin = [](const PalmPose& a, const PalmPose& b) { return a.arm_margin > b.arm_margin; };
-    std::stable_sort(palms.begin(), palms.end(), by_margin);
+    std::ranges::stable_sort(palms, by_margin);
     if (palms.size() > kMostMapped) palms.resize(kMostMapped);
     std::vector<MappedPose> poses;
     for (const PalmPose& palm : palms) Map(palm, &poses);
@@ -100,14 +100,14 @@ class Planner {
       return plan;
     }
     const auto by_score = [](const Candidate& a, const Candidate& b) { return a.score < b.score; };
-    Finish(*std::max_element(candidates.begin(), candidates.end(), by_score), &plan);
+    Finish(*std::ranges::max_element(candidates, by_score), &plan);
     return plan;
   }
 
  private:
   static void Sort(std::vector<MappedPose>* poses) {
     const auto by_score = [](const MappedPose& a, const MappedPose& b) { return a.score > b.score; };
-    std::stable_sort(poses->begin(), poses->end(), by_score);
+    std::ranges::stable_sort(*poses, by_score);
   }
 
   /// What each finger can touch from a palm pose, and the best of it, if there is any.
@@ -292,7 +292,7 @@ double CalcContactHalfLength(const Shape& shape, double tip_radius) {
 std::vector<int> ListArmJoints(const RobotModel& model, std::span<const int> fingertips, int palm_frame) {
   std::vector<int> joints = model.ListChain(model.frame(palm_frame).link);
   for (const int tip : model.fingertips()) {
-    if (std::find(fingertips.begin(), fingertips.end(), tip) != fingertips.end()) continue;
+    if (std::ranges::find(fingertips, tip) != fingertips.end()) continue;
     for (const int joint : model.ListChain(model.frame(tip).link)) std::erase(joints, joint);
   }
   return joints;

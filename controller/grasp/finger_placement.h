@@ -3,7 +3,6 @@
 // Inverse kinematics of a grasp: finger joints that bring the fingertips to given points of an object.
 
 #include <span>
-#include <vector>
 
 #include "controller/common/types.h"
 #include "controller/contact/surface.h"

@@ -1,6 +1,5 @@
 #include "controller/grasp/grasp_force.h"
 
-#include <algorithm>
 #include <cmath>
 #include <string>
 

@@ -71,7 +71,7 @@ void GrowingPolytope::Link(int index) {
     Ridge ridge;
     std::copy_if(facet.vertices.begin(), facet.vertices.end(), ridge.begin(),
                  [&](int v) { return v != facet.vertices[k]; });
-    std::sort(ridge.begin(), ridge.end());
+    std::ranges::sort(ridge);
     const auto [found, inserted] = open_ridges_.try_emplace(ridge, index);
     if (inserted) continue;
     const int other = found->second;
@@ -79,8 +79,7 @@ void GrowingPolytope::Link(int index) {
     facet.neighbors[k] = other;
     Facet& neighbor = facets_[static_cast<std::size_t>(other)];
     for (std::size_t j = 0; j < kDimension; ++j) {
-      if (std::find(ridge.begin(), ridge.end(), neighbor.vertices[j]) == ridge.end())
-        neighbor.neighbors[j] = index;
+      if (std::ranges::find(ridge, neighbor.vertices[j]) == ridge.end()) neighbor.neighbors[j] = index;
     }
   }
 }
@@ -89,8 +88,8 @@ const GrowingPolytope::Facet& GrowingPolytope::FindNearestFacet() const {
   const auto distance = [](const Facet& facet) {
     return facet.alive ? facet.offset : std::numeric_limits<double>::infinity();
   };
-  return *std::min_element(facets_.begin(), facets_.end(),
-                           [&](const Facet& a, const Facet& b) { return distance(a) < distance(b); });
+  return *std::ranges::min_element(facets_,
+                                   [&](const Facet& a, const Facet& b) { return distance(a) < distance(b); });
 }
 
 bool GrowingPolytope::Add(const Vector6d& point) {
@@ -122,12 +121,10 @@ bool GrowingPolytope::Add(const Vector6d& point) {
     const int index = AddFacet(vertices);
     Facet& facet = facets_[static_cast<std::size_t>(index)];
     Facet& neighbor = facets_[static_cast<std::size_t>(beyond)];
-    const std::size_t k =
-        static_cast<std::size_t>(std::find(vertices.begin(), vertices.end(), apex) - vertices.begin());
+    const std::size_t k = static_cast<std::size_t>(std::ranges::find(vertices, apex) - vertices.begin());
     facet.neighbors[k] = beyond;
     for (std::size_t j = 0; j < kDimension; ++j) {
-      if (std::find(vertices.begin(), vertices.end(), neighbor.vertices[j]) == vertices.end())
-        neighbor.neighbors[j] = index;
+      if (std::ranges::find(vertices, neighbor.vertices[j]) == vertices.end()) neighbor.neighbors[j] = index;
     }
     Link(index);
   }

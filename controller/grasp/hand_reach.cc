@@ -57,7 +57,7 @@ HandReach::HandReach(const RobotModel& model, std::span<const int> fingertips, i
   for (size_t i = 0; i < fingertips.size(); ++i) {
     const std::vector<int> chain = model.ListChain(model.frame(fingertips[i]).link);
     const bool on_palm = std::includes(chain.begin(), chain.end(), palm_chain.begin(), palm_chain.end());
-    const bool is_free = std::find(palm_chain.begin(), palm_chain.end(), own[i].back()) == palm_chain.end();
+    const bool is_free = std::ranges::find(palm_chain, own[i].back()) == palm_chain.end();
     if (!on_palm || !is_free) {
       throw std::invalid_argument("fingertips: " + model.frame(fingertips[i]).name +
                                   " does not hang on the palm with the others");

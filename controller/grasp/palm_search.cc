@@ -5,8 +5,6 @@
 #include <cmath>
 #include <optional>
 
-#include "controller/common/errors.h"
-
 namespace dexcheck::grasp_internal {
 namespace {
 
@@ -79,7 +77,7 @@ bool PalmSearch::IsPalmClear(const Pose& X_BP) const {
   std::vector<Vector3d> points = reach_.bases();
   points.push_back(reach_.center());
   points.emplace_back(Vector3d::Zero());
-  return std::all_of(points.begin(), points.end(), [&](const Vector3d& p) {
+  return std::ranges::all_of(points, [&](const Vector3d& p) {
     return CalcDistance(object_, X_oP * p) >= reach_.radius(0) &&
            (!options_.support ||
             options_.support->CalcHeight(X_BP * p) >= reach_.radius(0) + options_.clearance);
@@ -90,7 +88,7 @@ bool PalmSearch::IsArmClear(const VectorXd& q_arm) const {
   if (!options_.support) return true;
   SerialChain::Poses poses;
   arm_.CalcPoses(q_arm, &poses);
-  return std::all_of(poses.links.begin(), poses.links.end(), [&](const Pose& link) {
+  return std::ranges::all_of(poses.links, [&](const Pose& link) {
     return options_.support->CalcHeight(link.translation()) >= options_.arm_clearance;
   });
 }
@@ -152,7 +150,7 @@ std::vector<PalmPose> PalmSearch::ListOtherDistances(const PalmPose& pose) {
 }
 
 bool PalmSearch::ReachesBeyond(const PalmPose& pose) const {
-  return std::all_of(options_.reaches.begin(), options_.reaches.end(), [&](const Vector3d& displacement) {
+  return std::ranges::all_of(options_.reaches, [&](const Vector3d& displacement) {
     Pose X_BP = pose.X_BP;
     X_BP.translation() += displacement;
     const ChainSolution solution = SolveArm(X_BP, pose.q_arm);

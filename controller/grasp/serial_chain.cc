@@ -19,7 +19,7 @@ std::vector<std::vector<int>> ListOwnJoints(const RobotModel& model, std::span<c
   std::vector<std::vector<int>> own(fingertips.size());
   for (size_t i = 0; i < fingertips.size(); ++i) {
     std::vector<int> chain = model.ListChain(model.frame(fingertips[i]).link);
-    std::reverse(chain.begin(), chain.end());
+    std::ranges::reverse(chain);
     for (const int joint : chain) {
       if (users[static_cast<size_t>(joint)] == 1) own[i].push_back(joint);
     }
@@ -37,7 +37,7 @@ SerialChain::SerialChain(const RobotModel& model, int frame, std::span<const int
     const Joint& joint = model.joint(index);
     const bool revolute = joint.type == JointType::kRevolute;
     held = held * joint.X_PB;
-    if (std::find(joints.begin(), joints.end(), index) == joints.end()) {
+    if (std::ranges::find(joints, index) == joints.end()) {
       const double position = q[q_offset_ + index];
       held = held * CalcMdhTransform(joint.mdh.alpha, joint.mdh.a, joint.mdh.q + (revolute ? position : 0.0),
                                      joint.mdh.d + (revolute ? 0.0 : position));

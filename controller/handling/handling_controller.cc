@@ -1,11 +1,8 @@
 #include "controller/handling/handling_controller.h"
 
-#include <stdexcept>
-
 #include "controller/control/object_tracking.h"
 
 namespace dexcheck {
-
 namespace {
 
 std::vector<size_t> ListMembers(ContactSet set, size_t count) {

@@ -13,7 +13,6 @@
 #include "controller/control/grasp_controller.h"
 #include "controller/control/grasp_model.h"
 #include "controller/control/grasp_terms.h"
-#include "controller/grasp/grasp_force.h"
 
 namespace dexcheck {
 

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
@@ -115,10 +114,6 @@ void PickAndPlace::StartPath(const VectorXd& from, const PosturePath& path, bool
   move_.backwards = backwards;
 }
 
-void PickAndPlace::HoldPosture(const VectorXd& q_joints) { StartMove(q_joints, q_joints, begin_, 0.0); }
-
-VectorXd PickAndPlace::Joints(const MeasuredState& state) const { return state.q.tail(model_->num_joints()); }
-
 ScalarMotion PickAndPlace::EvaluateMove(double t) const {
   if (move_.duration <= 0.0) return {1.0, 0.0, 0.0};
   if (!move_.steady) return CalcMinSnap(t - move_.begin, move_.duration);
@@ -179,7 +174,6 @@ void PickAndPlace::Update(double t, const MeasuredState& state, const Touch& tou
   if (phase_ == Phase::kClose || phase_ == Phase::kGrip) {
     push_ = std::max(push_, (state.X_Bo.translation() - lay_at_).norm());
   }
-  // By phase.
   constexpr std::array<void (PickAndPlace::*)(double, const MeasuredState&, const Touch&), 9> kUpdates = {
       &PickAndPlace::UpdateApproach, &PickAndPlace::UpdateClose,    &PickAndPlace::UpdateGrip,
       &PickAndPlace::UpdateTakeOver, &PickAndPlace::UpdateCarry,    &PickAndPlace::UpdateHandOver,
@@ -275,8 +269,7 @@ void PickAndPlace::UpdateTakeOver(double t, const MeasuredState& /*state*/, cons
     }
     if (t - begin_ < options_.take_over_time + kPause) return;
     if (touch.support_force < kNominal * weight_) return Enter(Phase::kCarry, t);
-    stage_ = 1;
-    stage_begin_ = t;
+    BeginStage(1, t);
   }
   // Heavier than stated.
   demand_.weight = 1.0 + kWeighingRate * (t - stage_begin_);
@@ -284,10 +277,9 @@ void PickAndPlace::UpdateTakeOver(double t, const MeasuredState& /*state*/, cons
     demand_.scale = demand_.weight;
     return Enter(Phase::kCarry, t);
   }
-  if (demand_.weight > options_.overload) {
-    Refuse(t,
-           "the object weighs more than " + FormatNumber(options_.overload) + " times what the model states");
-  }
+  if (demand_.weight <= options_.overload) return;
+  Refuse(t,
+         "the object weighs more than " + FormatNumber(options_.overload) + " times what the model states");
 }
 
 void PickAndPlace::Refuse(double t, const std::string& reason) {
@@ -313,11 +305,9 @@ DesiredMotion PickAndPlace::EvaluateCarry(double t) const {
     desired.X_d_dot.head<3>() += CalcMinSnap(t - half_step_ - from, duration).s_dot * way;
     desired.X_d_ddot.head<3>() += now.s_ddot * way;
   };
-  const double raised = begin_ + raise_time_;
-  const double there = raised + transport_time_;
   add(options_.raise, begin_, raise_time_);
-  add(options_.transport, raised, transport_time_);
-  add(-options_.raise, there, raise_time_);
+  add(options_.transport, raised_at(), transport_time_);
+  add(-options_.raise, there_at(), raise_time_);
   return desired;
 }
 
@@ -325,19 +315,17 @@ void PickAndPlace::UpdateCarry(double t, const MeasuredState& /*state*/, const T
   demand_.weight = demand_.scale;
   demand_.desired = EvaluateCarry(t);
   // The arm bends as the plan has it, so that fingers need not.
-  const double raised = begin_ + raise_time_;
-  const double there = raised + transport_time_;
   if (stage_ == 0) {
     StartPath(move_.to, plan_.rise, /*backwards=*/false, begin_, raise_time_);
     stage_ = 1;
-  } else if (stage_ == 1 && t >= raised) {
+  } else if (stage_ == 1 && t >= raised_at()) {
     if (plan_.along.size() > 0) {
-      StartPath(move_.to, plan_.along, /*backwards=*/false, raised, transport_time_);
+      StartPath(move_.to, plan_.along, /*backwards=*/false, raised_at(), transport_time_);
     }
     stage_ = 2;
-  } else if (stage_ == 2 && t >= there) {
+  } else if (stage_ == 2 && t >= there_at()) {
     carried_over_ = true;
-    StartPath(move_.to, rise(), /*backwards=*/true, there, raise_time_);
+    StartPath(move_.to, rise(), /*backwards=*/true, there_at(), raise_time_);
     stage_ = 3;
   }
   if (t < begin_ + 2.0 * raise_time_ + transport_time_ + kPause) return;
@@ -360,13 +348,11 @@ void PickAndPlace::UpdateRelease(double t, const MeasuredState& state, const Tou
     demand_.f_min = options_.f_min + s * (options_.touch_force - options_.f_min);
     if (since < kReleaseTime) return;
     demand_.grip = 0.0;
-    stage_ = 1;
-    stage_begin_ = t;
+    BeginStage(1, t);
   } else if (stage_ == 1) {
     const double s = CalcMinSnap(since, kTouchTime).s;
     const double last = std::min(kLastTouch, options_.touch_force);
-    std::fill(demand_.touch_force.begin(), demand_.touch_force.end(),
-              options_.touch_force + s * (last - options_.touch_force));
+    std::ranges::fill(demand_.touch_force, options_.touch_force + s * (last - options_.touch_force));
     if (since < kTouchTime) return;
     demand_.contacts = 0;
     stage_ = 2;

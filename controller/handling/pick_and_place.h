@@ -3,7 +3,6 @@
 // The task "take the object from where it lies, carry it, put it down" as a sequence of phases. Which phase
 // comes next is decided by what the hand feels.
 
-#include <functional>
 #include <string>
 #include <vector>
 
@@ -108,6 +107,10 @@ class PickAndPlace {
   };
 
   void Enter(Phase phase, double t);
+  void BeginStage(int stage, double t) {
+    stage_ = stage;
+    stage_begin_ = t;
+  }
   void StartMove(const VectorXd& from, const VectorXd& to, double t, double duration, bool steady = false);
   /// Along a path of the plan, or back.
   void StartPath(const VectorXd& from, const PosturePath& path, bool backwards, double t, double duration);
@@ -119,8 +122,10 @@ class PickAndPlace {
   void EvaluateWay(double s);
   void FollowMove(double t);
   void SetPostureGains(double t);
-  void HoldPosture(const VectorXd& q_joints);
-  [[nodiscard]] VectorXd Joints(const MeasuredState& state) const;
+  void HoldPosture(const VectorXd& q_joints) { StartMove(q_joints, q_joints, begin_, 0.0); }
+  [[nodiscard]] VectorXd Joints(const MeasuredState& state) const {
+    return state.q.tail(model_->num_joints());
+  }
 
   void UpdateApproach(double t, const MeasuredState& state, const Touch& touch);
   void UpdateClose(double t, const MeasuredState& state, const Touch& touch);
@@ -133,6 +138,9 @@ class PickAndPlace {
   void GiveUp(double t, const MeasuredState& state, const std::string& reason);
   void PlanAttempt(double t, const MeasuredState& state);
   [[nodiscard]] DesiredMotion EvaluateCarry(double t) const;
+  /// When the object is up, and when it is over its new place, s.
+  [[nodiscard]] double raised_at() const { return begin_ + raise_time_; }
+  [[nodiscard]] double there_at() const { return raised_at() + transport_time_; }
 
   const RobotModel* model_;
   Hand hand_;

@@ -72,7 +72,7 @@ void PlanPaths(const RobotModel& model, const Hand& hand, const PickPlanOptions&
   plan->along = PosturePath(along);
   std::vector<VectorXd> down = planner.Plan(-raise, "down where it puts the object", &plan->problem);
   if (!plan->problem.empty()) return;
-  std::reverse(down.begin(), down.end());
+  std::ranges::reverse(down);
   plan->landing = PosturePath(down);
 }
 

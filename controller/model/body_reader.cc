@@ -135,13 +135,7 @@ Shape ReadShape(TomlTable& table) {
 
 Matrix3d ReadInertia(const TomlValue& value) {
   const Vector6d I = value.AsVector<6>();
-  Matrix3d inertia;
-  // clang-format off
-  inertia << I[0], I[3], I[4],
-             I[3], I[1], I[5],
-             I[4], I[5], I[2];
-  // clang-format on
-  return inertia;
+  return MakeTensor({I[0], I[1], I[2], I[3], I[4], I[5]});
 }
 
 MassProperties ReadBody(TomlTable& table) {

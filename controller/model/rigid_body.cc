@@ -56,7 +56,24 @@ Matrix3d CalcInertia(const SolidEllipsoid& ellipsoid, double m) {
   return Diagonal(a2.y() + a2.z(), a2.z() + a2.x(), a2.x() + a2.y()) * (m / 5.0);
 }
 
+/// Rods and plates meet the inequalities with equality. Their entries, rounded when written down, rotated and
+/// summed (some ten roundings each), and the eigenvalues computed from them are off by a few eps |I|. An
+/// inertia that was moved to the centre of mass is a difference of terms of the size m |c|^2.
+double CalcAllowance(const MassProperties& body) {
+  const double size = body.inertia.cwiseAbs().maxCoeff() + body.mass * body.com.squaredNorm();
+  return 64.0 * std::numeric_limits<double>::epsilon() * size;
+}
+
+/// Ascending.
+Vector3d CalcPrincipalMoments(const Matrix3d& inertia) {
+  return Eigen::SelfAdjointEigenSolver<Matrix3d>(inertia, Eigen::EigenvaluesOnly).eigenvalues();
+}
+
 }  // namespace
+
+Matrix3d MakeTensor(const std::array<double, 6>& I) {
+  return Matrix3d{{I[0], I[3], I[4]}, {I[3], I[1], I[5]}, {I[4], I[5], I[2]}};
+}
 
 Matrix3d CalcUniformInertia(const Shape& shape, double mass) {
   return std::visit([mass](const auto& solid) { return CalcInertia(solid, mass); }, shape);
@@ -86,23 +103,6 @@ MassProperties Combine(const std::vector<MassProperties>& parts) {
   }
   return whole;
 }
-
-namespace {
-
-/// Rods and plates meet the inequalities with equality. Their entries, rounded when written down, rotated and
-/// summed (some ten roundings each), and the eigenvalues computed from them are off by a few eps |I|. An
-/// inertia that was moved to the centre of mass is a difference of terms of the size m |c|^2.
-double CalcAllowance(const MassProperties& body) {
-  const double size = body.inertia.cwiseAbs().maxCoeff() + body.mass * body.com.squaredNorm();
-  return 64.0 * std::numeric_limits<double>::epsilon() * size;
-}
-
-/// Ascending.
-Vector3d CalcPrincipalMoments(const Matrix3d& inertia) {
-  return Eigen::SelfAdjointEigenSolver<Matrix3d>(inertia, Eigen::EigenvaluesOnly).eigenvalues();
-}
-
-}  // namespace
 
 std::string FindPhysicalInconsistency(const MassProperties& body) {
   std::string problem = FindUndefinedDynamics(body);

@@ -2,6 +2,7 @@
 
 // Mass properties of a link: given, or from its shapes by closed form.
 
+#include <array>
 #include <string>
 #include <variant>
 #include <vector>
@@ -41,6 +42,9 @@ struct SolidEllipsoid {
   Vector3d semi_axes;  ///< Along the shape's x, y, z, m.
 };
 using Shape = std::variant<SolidSphere, SolidCylinder, SolidCapsule, SolidBox, SolidTorus, SolidEllipsoid>;
+
+/// Symmetric tensor of its entries xx, yy, zz, xy, xz, yz.
+Matrix3d MakeTensor(const std::array<double, 6>& entries);
 
 /// Rotational inertia of a uniform solid about its centre of mass, in its own axes, kg m^2.
 Matrix3d CalcUniformInertia(const Shape& shape, double mass);

@@ -1,15 +1,14 @@
 #include "controller/model/robot_model.h"
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 #include <map>
-#include <numeric>
 #include <set>
 #include <stdexcept>
 #include <utility>
 
 #include "controller/common/errors.h"
+#include "controller/common/linear_algebra.h"
 #include "controller/common/text.h"
 
 namespace dexcheck {
@@ -194,8 +193,7 @@ std::vector<int> SortDepthFirst(const std::vector<Joint>& joints) {
 /// Index of the first entry whose `member` is `name`; -1 when there is none.
 template <typename T>
 int FindByName(const std::vector<T>& entries, std::string T::*member, std::string_view name) {
-  const auto found =
-      std::find_if(entries.begin(), entries.end(), [&](const T& entry) { return entry.*member == name; });
+  const auto found = std::ranges::find_if(entries, [&](const T& entry) { return entry.*member == name; });
   return found == entries.end() ? -1 : static_cast<int>(found - entries.begin());
 }
 
@@ -293,14 +291,13 @@ double RobotModel::tip_radius(int frame) const {
 std::vector<int> RobotModel::ListChain(int link) const {
   std::vector<int> chain;
   for (int joint = link; joint >= 0; joint = this->joint(joint).parent) chain.push_back(joint);
-  std::reverse(chain.begin(), chain.end());
+  std::ranges::reverse(chain);
   return chain;
 }
 
 std::vector<int> RobotModel::ListMovingEntries(int link) const {
   const int base = num_base_velocities();
-  std::vector<int> entries(static_cast<size_t>(base));
-  std::iota(entries.begin(), entries.end(), 0);
+  std::vector<int> entries = ListIndices(base);
   for (const int index : ListChain(link)) {
     for (int k = 0; k < CountVelocities(joint(index).type); ++k) entries.push_back(base + dof(index) + k);
   }

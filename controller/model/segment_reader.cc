@@ -1,7 +1,5 @@
 #include "controller/model/segment_reader.h"
 
-#include <algorithm>
-
 #include "controller/model/body_frame.h"
 #include "controller/model/body_reader.h"
 

@@ -1,10 +1,8 @@
 #include "harness/base/check_record.h"
 
-#include <limits>
 #include <nlohmann/json.hpp>
 
 namespace dexcheck {
-
 namespace {
 
 std::string DescribeVelocity(int coordinate, const RobotModel& model, int base_velocities) {
@@ -29,13 +27,13 @@ const char* NameOf(CheckCategory kind) {
 std::string Describe(const Location& where, const RobotModel& model, int base_velocities) {
   switch (where.kind) {
     case Location::Kind::kJoint: {
-      const Joint& joint = model.joints()[static_cast<size_t>(where.first)];
+      const Joint& joint = model.joint(where.first);
       return "joint " + joint.name + " on link " + model.link_name(joint.parent);
     }
     case Location::Kind::kLink:
       return "link " + model.link_name(where.first);
     case Location::Kind::kFrame: {
-      const Frame& frame = model.frames()[static_cast<size_t>(where.first)];
+      const Frame& frame = model.frame(where.first);
       return "frame " + frame.name + " on link " + model.link_name(frame.link);
     }
     case Location::Kind::kVelocity:

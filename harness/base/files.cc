@@ -3,11 +3,9 @@
 #include <fcntl.h>
 #include <stdlib.h>
 #include <sys/wait.h>
-#include <unistd.h>
 
 #include <array>
 #include <atomic>
-#include <cerrno>
 #include <climits>
 #include <csignal>
 #include <cstdint>
@@ -16,7 +14,6 @@
 #include <cstring>
 #include <fstream>
 #include <iterator>
-#include <string>
 #include <system_error>
 
 #include "controller/common/errors.h"
@@ -24,7 +21,6 @@
 #include "harness/base/interrupts.h"
 
 namespace dexcheck {
-
 namespace {
 
 /// One path. A handler may run at any time, so the path is complete before its owner is set.

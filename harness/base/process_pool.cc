@@ -103,8 +103,7 @@ ProcessPool::Worker ProcessPool::MakeWorker() const {
 
 void ProcessPool::Start(long number, const std::string& request) {
   while (true) {
-    auto idle =
-        std::find_if(workers_.begin(), workers_.end(), [](const Worker& worker) { return !worker.job; });
+    auto idle = std::ranges::find_if(workers_, [](const Worker& worker) { return !worker.job; });
     if (idle == workers_.end()) {
       workers_.push_back(MakeWorker());
       idle = workers_.end() - 1;

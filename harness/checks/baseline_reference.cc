@@ -1,7 +1,5 @@
 #include "harness/checks/baseline_reference.h"
 
-#include <cmath>
-
 #include "controller/common/errors.h"
 #include "controller/common/linear_algebra.h"
 #include "controller/object/so3.h"

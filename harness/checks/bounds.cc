@@ -69,8 +69,8 @@ double CalcBound(const CheckInfo& info, const Scenario& scenario) {
 
 double CalcStatedBound(const CheckInfo& info, const BoundOverride& stated, const Scenario& scenario) {
   const Scenario* const written = scenario.written.get();
-  const bool is_written = written != nullptr && std::find(written->bounds.begin(), written->bounds.end(),
-                                                          stated) != written->bounds.end();
+  const bool is_written =
+      written != nullptr && std::ranges::find(written->bounds, stated) != written->bounds.end();
   if (!is_written) return stated.second;
   return stated.second * CalcScale(info.bound.scaling, scenario) / CalcScale(info.bound.scaling, *written);
 }

@@ -49,7 +49,6 @@ constexpr double kShippedSoftness = 1.0 - 0.99;
 constexpr double kShippedCreep = kShippedSoftness * kShippedTimeConstant / 2.0 / 100.0 * kTipLoad;  // m/s
 constexpr double kShippedLag = kShippedTimeConstant / 2.0 * kSideways;                              // m/s
 constexpr double kShippedSinking = kShippedSoftness * kShippedTimeConstant * kShippedTimeConstant;  // s^2
-constexpr double kJointLimitBound = 1e-12;
 
 constexpr bool kOwn = true;       // FailureMeaning::is_own
 constexpr bool kRelative = true;  // Bound::is_relative
@@ -63,6 +62,9 @@ Evaluation When(bool applies, double value, double explained = 0.0) {
   return CheckValue{value, -1, explained};
 }
 
+/// Which part it is of stands beside the value.
+Evaluation At(const std::pair<double, int>& value) { return CheckValue{value.first, value.second}; }
+
 template <double LawErrors::*error>
 Evaluation OfLaw(const Analysis& a) {
   return a.law == nullptr ? std::nullopt : When(true, a.law->*error);
@@ -72,6 +74,10 @@ bool IsHolding(const Analysis& a) { return a.step->command.handling.holding; }
 bool IsPredicted(const Analysis& a) { return a.mass_factor != nullptr && !a.is_transient; }
 /// Whether the scenario's expectations begin.
 bool IsExpected(const Analysis& a) { return a.step->time >= a.setup->scenario().expect.from; }
+/// Of an object that follows its motion, where expectations have begun.
+Evaluation Tracked(const Analysis& a, double error, double by_hold) {
+  return When(a.step->command.tracks && IsExpected(a), error, by_hold);
+}
 
 /// What the solver leaves over of the object while contacts come and go is taken off the inverse dynamics,
 /// and is gone some steps later.
@@ -84,21 +90,19 @@ Evaluation EvaluateSolver(const Analysis& a) {
 // bound: shipped, reason, scaling, formula, whether relative;
 // description;
 // what a failure means: cause, precedence, rank, whether its own, sharper check;
-// how it is evaluated, when, how its part is described, who evaluates it
+// who evaluates it, when, and how its part is described
 const CheckInfo kChecks[] = {
     // Asked once, before anything moves. A radius of 1 never settles; so near to it an error takes 1e9 steps.
     {{"closed_loop_spectral_radius", kLaw, "1"},
      {1.0 - 1e-9, "an error that settles within 1e9 steps", Scaling::kNone, "1 - 1e-9"},
      "largest eigenvalue of (57) with the scenario's gains, sampled as the controller does it",
      {Cause::kControlLaw, 14, Rank::kLaw, kOwn},
-     [](const Analysis& a) { return When(true, a.spectral_radius); },
-     kRunning},
+     {[](const Analysis& a) { return When(true, a.spectral_radius); }, kRunning}},
     {{"measurement", kLaw, "1"},
      {0.0, "copied, or computed twice from the same numbers"},
      "measured state against the true one, beyond what the scenario declares",
      {Cause::kSensing, 15, Rank::kMeasurement, kOwn},
-     [](const Analysis& a) { return When(true, a.measurement_error); },
-     kRunning | kUnsent},
+     {[](const Analysis& a) { return When(true, a.measurement_error); }, kRunning | kUnsent}},
     {{"law_torque", kLaw, "1"},
      {kLawTorqueBound,
       "rounding of the terms, 1e-15, through Gram matrices of condition number^2; the condition number is "
@@ -107,8 +111,7 @@ const CheckInfo kChecks[] = {
      "tau' sent against (53)-(55) computed from the engine's terms, relative to the forces balanced and to "
      "the condition number of J_B'",
      {Cause::kControlLaw, 16, Rank::kLaw, kOwn},
-     OfLaw<&LawErrors::torque>,
-     kRunning | kUnsent},
+     {OfLaw<&LawErrors::torque>, kRunning | kUnsent}},
     // Where contacts slip, (47) plans for xi_c and the rigid system starts from xi: C_bar' (xi - xi_c) and
     // J_dot (xi - xi_c) stay, slip speeds of some 1e-6 m/s against rates of the order of 1/s: measured 8e-10
     // in `curve`.
@@ -118,21 +121,18 @@ const CheckInfo kChecks[] = {
      "accelerations and contact forces of the rigid system (46), (48) under tau' against those that (47), "
      "(49), (55) demand, likewise",
      {Cause::kControlLaw, 17, Rank::kLaw, kOwn},
-     OfLaw<&LawErrors::demand>,
-     kRunning},
+     {OfLaw<&LawErrors::demand>, kRunning}},
     {{"grasp_null_space", kLaw, "1"},
      {kGraspNullBound,
       "F_N = f_c - G^+ F_o has the solver's residual of f_c, 1e-10, and the rounding of G^+"},
      "largest entry of G F_N, N and N m, over |f_c| and 1 N",
      {Cause::kControlLaw, 18, Rank::kLaw, kOwn},
-     OfLaw<&LawErrors::grasp_null_space>,
-     kRunning},
+     {OfLaw<&LawErrors::grasp_null_space>, kRunning}},
     {{"grasp_cone", kLaw, "1"},
      {kGraspNullBound, "likewise: the solver's own f_c are inside"},
      "how far f_c = G^+ F_o + F_N is outside the friction cones, f_min and f_max, over |f_c| and 1 N",
      {Cause::kControlLaw, 32, Rank::kLaw, kOwn},
-     OfLaw<&LawErrors::grasp_cone>,
-     kRunning},
+     {OfLaw<&LawErrors::grasp_cone>, kRunning}},
     {{"grasp_optimality", kLaw, "1"},
      {kGraspOptimalityBound,
       "a barrier solution is optimal to the tolerance of the solver's slacks, 1e-5; near a cone's edge its "
@@ -141,13 +141,12 @@ const CheckInfo kChecks[] = {
      "slope of the grasp force's objective that is left within null(G), over the whole slope and 1; where "
      "f_c is inside",
      {Cause::kControlLaw, 33, Rank::kLaw, kOwn},
-     OfLaw<&LawErrors::grasp_optimality>,
-     kRunning},
+     {OfLaw<&LawErrors::grasp_optimality>, kRunning}},
     {{"torque_applied", kLaw, "1"},
      {1e-14, "a gear's ratio, once and back: two roundings"},
      "torques that the joints received against those that were sent, relative to the largest",
      {Cause::kActuator, 19, Rank::kActuator, kOwn},
-     [](const Analysis& a) { return When(true, a.torque_error); }},
+     {[](const Analysis& a) { return When(true, a.torque_error); }}},
     // What law_demand leaves, over K_p = 400/s^2: 1e-8 of accelerations of some m/s^2, times a condition
     // number of some tens. Measured 1.2e-9 m in `curve`.
     {{"error_dynamics", kLaw, "m"},
@@ -155,49 +154,41 @@ const CheckInfo kChecks[] = {
      "object's position against (57) integrated beside the run, driven by the accelerations that the "
      "prediction missed",
      {Cause::kUnexplained, 20, Rank::kResidual},
-     OfLaw<&LawErrors::error_dynamics>,
-     kRunning},
+     {OfLaw<&LawErrors::error_dynamics>, kRunning}},
     {{"orientation_dynamics", kLaw, "rad"},
      {1e-7, "likewise", Scaling::kOrientationGain, "4e-5 rad/s^2 / K_p"},
      "object's orientation likewise",
      {Cause::kUnexplained, 28, Rank::kResidual},
-     OfLaw<&LawErrors::orientation_dynamics>,
-     kRunning},
+     {OfLaw<&LawErrors::orientation_dynamics>, kRunning}},
     {{"expect_position", kLaw, "m"},
      {0.0,
       "what the scenario means; hold is where (57) is led by what a rigid plant accelerates within a step",
       Scaling::kNone, "[expect] position + hold"},
      "object's position error, against what the scenario expects",
      {Cause::kControlLaw, 21, Rank::kResidual},
-     [](const Analysis& a) {
-       return When(a.step->command.tracks && IsExpected(a), a.step->error.position.norm(),
-                   a.position_by_hold);
-     },
-     kRunning},
+     {[](const Analysis& a) { return Tracked(a, a.step->error.position.norm(), a.position_by_hold); },
+      kRunning}},
     {{"expect_orientation", kLaw, "rad"},
      {0.0, "likewise", Scaling::kNone, "[expect] orientation + hold"},
      "object's orientation error, against what the scenario expects",
      {Cause::kControlLaw, 22, Rank::kResidual},
-     [](const Analysis& a) {
-       return When(a.step->command.tracks && IsExpected(a), a.step->error.orientation, a.orientation_by_hold);
-     },
-     kRunning},
+     {[](const Analysis& a) { return Tracked(a, a.step->error.orientation, a.orientation_by_hold); },
+      kRunning}},
     // Measured 1e-14 for the Panda.
     {{"joint_dynamics", kLaw, "rad"},
      {1e-11, "rounding of torques, over the least inertia that they drive and over K_p"},
      "joints against e_ddot + K_v e_dot + K_p e = 0 integrated beside the run, driven by the accelerations "
      "that the prediction missed",
      {Cause::kUnexplained, 29, Rank::kResidual},
-     OfLaw<&LawErrors::error_dynamics>,
-     kRunning},
+     {OfLaw<&LawErrors::error_dynamics>, kRunning}},
     {{"expect_joints", kLaw, "rad"},
      {0.0, "what the scenario means", Scaling::kNone, "[expect] joints"},
      "largest error of a joint (rad or m), against what the scenario expects",
      {Cause::kControlLaw, 30, Rank::kResidual},
-     [](const Analysis& a) {
-       return When(a.step->command.joints.q.size() > 0 && IsExpected(a), a.step->error.joints);
-     },
-     kRunning},
+     {[](const Analysis& a) {
+        return When(a.step->command.joints.q.size() > 0 && IsExpected(a), a.step->error.joints);
+      },
+      kRunning}},
     // What is left of (48) is compared less the inertia of what the platform does on soft tyres besides
     // rolling, less what the solver left over, and less what tilt and slip can come to
     // (StepAnalysis::uneven_force). Then all of it is rounding of the engine's terms, 1e-14 of forces that
@@ -210,7 +201,7 @@ const CheckInfo kChecks[] = {
      "what is left of (48) with the engine's accelerations and contact forces, less what the platform does "
      "besides and its solver left over, against the forces balanced",
      {Cause::kUnmodelledForce, 40, Rank::kDecisive},
-     EvaluateRobotDynamics},
+     {EvaluateRobotDynamics}},
     // The object's dynamics have no other unknowns than its inertia and the contacts' geometry, which checks
     // of the model compare: where those hold, a force acts on the object that nobody has.
     {{"inverse_dynamics_object", kInverseDynamics, "1"},
@@ -218,7 +209,7 @@ const CheckInfo kChecks[] = {
      "what is left of (19) with the engine's acceleration and contact forces, less what its solver left "
      "over, against the contact forces",
      {Cause::kUnmodelledForce, 24, Rank::kObjectBalance},
-     [](const Analysis& a) { return When(true, a.object_residual_size); }},
+     {[](const Analysis& a) { return When(true, a.object_residual_size); }}},
     {{"reduced_acceleration", kForwardDynamics, "1"},
      {1e-6,
       "what contacts hold back of forces that change, computed at each step; the rest is of second order in "
@@ -226,21 +217,23 @@ const CheckInfo kChecks[] = {
       Scaling::kNone, "1e-6 + compliance", kRelative},
      "xi_dot of the rigid constrained system (46), (48) against the engine's",
      {Cause::kContactSoftness, 25, Rank::kPrediction},
-     [](const Analysis& a) { return When(IsPredicted(a), a.acceleration_error, a.acceleration_compliance); }},
+     {[](const Analysis& a) {
+       return When(IsPredicted(a), a.acceleration_error, a.acceleration_compliance);
+     }}},
     {{"contact_force", kForwardDynamics, "1"},
      {1e-7, "likewise", Scaling::kNone, "1e-7 + compliance", kRelative},
      "f_c of the rigid constrained system against the engine's, relative to |f_c|",
      {Cause::kContactSoftness, 26, Rank::kPrediction},
-     [](const Analysis& a) {
+     {[](const Analysis& a) {
        return When(IsPredicted(a), a.contact_force_error, a.contact_force_compliance);
-     }},
+     }}},
     // Slip and use of the cone tell sliding from contacts that merely give.
     {{"fingertip_slip", kAssumption, "m"},
      {kSlipWindow * kShippedCreep, "the rate below, over the window, less the same", Scaling::kCreep,
       "10 s (1 - d) dt 2 m/s^2"},
      "how far a fingertip has slipped on the object in the last 5 to 10 s",
      {Cause::kContactSoftness, 6, Rank::kAssumption, kOwn, "cone_use"},
-     [](const Analysis& a) { return When(IsHolding(a), a.fingertips.distance); }},
+     {[](const Analysis& a) { return When(IsHolding(a), a.fingertips.distance); }}},
     {{"fingertip_slip_rate", kAssumption, "m/s"},
      {kShippedCreep,
       "besides dt J_dot qvel, which is known and taken off: creep of a contact that sticks under f_t / m of "
@@ -248,88 +241,82 @@ const CheckInfo kChecks[] = {
       Scaling::kCreep, "(1 - d) dt 2 m/s^2"},
      "how fast a fingertip slips on the object, less what (46) and the engine's constraint differ by",
      {Cause::kContactSoftness, 7, Rank::kAssumption, kOwn, "cone_use"},
-     [](const Analysis& a) { return When(IsHolding(a) && !a.is_transient, a.fingertips.rate); }},
+     {[](const Analysis& a) { return When(IsHolding(a) && !a.is_transient, a.fingertips.rate); }}},
     {{"wheel_slip", kAssumption, "m"},
      {kSlipWindow * kShippedLag, "the rate below, over the window", Scaling::kLag, "10 s dt 0.1 m/s^2"},
      "how far a wheel has slipped on the floor in the last 5 to 10 s, (1)",
      {Cause::kContactSoftness, 8, Rank::kAssumption, kOwn, "traction_use"},
-     [](const Analysis& a) { return When(true, a.wheels.distance); }},
+     {[](const Analysis& a) { return When(true, a.wheels.distance); }}},
     {{"wheel_slip_rate", kAssumption, "m/s"},
      {kShippedLag, "tyres give sideways by v w / b, of v w up to 0.1 m/s^2", Scaling::kLag, "dt 0.1 m/s^2"},
      "how fast a wheel slips on the floor",
      {Cause::kContactSoftness, 9, Rank::kAssumption, kOwn, "traction_use"},
-     [](const Analysis& a) { return When(true, a.wheels.rate); }},
+     {[](const Analysis& a) { return When(true, a.wheels.rate); }}},
     {{"rolling", kAssumption, "m/s"},
      {kShippedSoftness * kShippedTimeConstant * kRollLoad,
       "a platform that sinks or tilts on soft tyres; how fast it does under changing torques is computed",
       Scaling::kSinkingRate, "(1 - d) tc 0.5 m/s^2 + slip + sinking"},
      "speed of a wheel's rim against that of the platform above it, less its slip, (1)",
      {Cause::kWheelGeometry, 27, Rank::kDecisive, kOwn},
-     EvaluateRolling},
+     {EvaluateRolling}},
     {{"foot_slip", kAssumption, "m"},
      {kSlipWindow * kShippedCreep, "as fingertip_slip", Scaling::kCreep, "10 s (1 - d) dt 2 m/s^2"},
      "how far a foot has slipped on the ground in the last 5 to 10 s",
      {Cause::kContactSoftness, 34, Rank::kAssumption, kOwn, "foot_cone_use"},
-     [](const Analysis& a) { return When(true, a.feet.distance); },
-     kRunning},
+     {[](const Analysis& a) { return When(true, a.feet.distance); }, kRunning}},
     {{"foot_slip_rate", kAssumption, "m/s"},
      {kShippedCreep, "as fingertip_slip_rate", Scaling::kCreep, "(1 - d) dt 2 m/s^2"},
      "how fast a foot slips on the ground, less what (46) and the engine's constraint differ by",
      {Cause::kContactSoftness, 35, Rank::kAssumption, kOwn, "foot_cone_use"},
-     [](const Analysis& a) { return When(true, a.feet.rate); },
-     kRunning},
+     {[](const Analysis& a) { return When(true, a.feet.rate); }, kRunning}},
     {{"foot_cone_use", kAssumption, "1"},
      {0.99, "1 slides; how a foot's contacts share its load is not determined"},
      "power of the friction at all contacts of a foot over the most that it can be; 1 slides",
      {Cause::kFootSlip, 36, Rank::kDecisive, kOwn},
-     [](const Analysis& a) { return When(true, a.feet.cone_use); }},
+     {[](const Analysis& a) { return When(true, a.feet.cone_use); }}},
     {{"feet_lost", kAssumption, "m"},
      {kShippedSinking * kTipPress,
       "as foot_penetration; of more feet than hold the robot some may bear nothing", Scaling::kSinking,
       "4 (1 - d) dt^2 500 m/s^2"},
      "gap of a foot and the ground",
      {Cause::kFootSlip, 37, Rank::kDecisive, kOwn},
-     [](const Analysis& a) { return When(true, a.foot_gap); }},
+     {[](const Analysis& a) { return When(true, a.foot_gap); }}},
     {{"foot_penetration", kAssumption, "m"},
      {kShippedSinking * kTipPress, "as penetration", Scaling::kSinking, "4 (1 - d) dt^2 500 m/s^2"},
      "overlap of a foot and the ground",
      {Cause::kContactSoftness, 38, Rank::kAssumption, kOwn},
-     [](const Analysis& a) { return When(true, a.foot_penetration); }},
+     {[](const Analysis& a) { return When(true, a.foot_penetration); }}},
     {{"foot_distance", kAssumption, "m"},
      {1e-12, "rounding of poses over lengths of some m"},
      "distance of a foot and the ground: the plant's against that of the declared shapes",
      {Cause::kContactGeometry, -7, Rank::kObjectBalance, kOwn},
-     EvaluateFootDistance,
-     kAlways,
-     DescribeFoot},
+     {[](const Analysis& a) { return At(a.foot_mismatch); }, kAlways, DescribeFoot}},
     {{"cone_use", kAssumption, "1"},
      {0.99, "1 slides"},
      "tangential force over mu times normal force at a fingertip; 1 slides, (21)",
      {Cause::kFingertipSlip, 2, Rank::kDecisive, kOwn},
-     [](const Analysis& a) { return When(IsHolding(a), a.fingertips.cone_use); }},
+     {[](const Analysis& a) { return When(IsHolding(a), a.fingertips.cone_use); }}},
     {{"traction_use", kAssumption, "1"},
      {0.99, "1 slides"},
      "tangential force over mu times normal force at a wheel; 1 spins or skids",
      {Cause::kWheelSlip, 3, Rank::kDecisive, kOwn},
-     [](const Analysis& a) { return When(true, a.wheels.cone_use); }},
+     {[](const Analysis& a) { return When(true, a.wheels.cone_use); }}},
     {{"contacts_lost", kAssumption, "1"},
      {0.0, "none"},
      "fingertips that do not touch the object",
      {Cause::kFingertipSlip, 4, Rank::kDecisive, kOwn},
-     [](const Analysis& a) { return When(true, IsHolding(a) ? a.contacts_missing : 0); }},
+     {[](const Analysis& a) { return When(true, IsHolding(a) ? a.contacts_missing : 0); }}},
     {{"penetration", kAssumption, "m"},
      {kShippedSinking * kTipPress, "the overlap at rest under f_n / m of 500 m/s^2", Scaling::kSinking,
       "4 (1 - d) dt^2 500 m/s^2"},
      "overlap of fingertip and object",
      {Cause::kContactSoftness, 5, Rank::kAssumption, kOwn},
-     [](const Analysis& a) { return When(true, a.penetration); }},
+     {[](const Analysis& a) { return When(true, a.penetration); }}},
     {{"contact_distance", kAssumption, "m"},
      {1e-12, "ten times where FindContact stops, 1e-13 rad over lengths of 1 m; rounding is some 1e-16"},
      "distance of a fingertip and the object: the plant's against that of the declared shapes",
      {Cause::kContactGeometry, -2, Rank::kObjectBalance, kOwn},
-     EvaluateContactDistance,
-     kAlways,
-     DescribeFingertip},
+     {EvaluateContactDistance, kAlways, DescribeFingertip}},
     // For the shipped step of 1 ms: the error of the trapezoidal rule, (rate dt)^2 / 12 of the way. Measured
     // 3e-9 at most in the shipped scenarios.
     {{"kappa", kAssumption, "m"},
@@ -339,33 +326,25 @@ const CheckInfo kChecks[] = {
      "kappa integrated by (40) over the last 5 to 10 s, as fingertip and object moved, slip included, "
      "against the engine's: points on object and fingertip, psi at its radius",
      {Cause::kContactSoftness, 10},
-     nullptr,
-     kAlways,
-     nullptr,
-     MakeKappaJudge},
+     {.make = MakeKappaJudge}},
     // On the sphere that the plant has, contacts roll on; the paper's fingertip ends.
     {{"fingertip_rim", kAssumption, "m"},
      {0.0, "a hemisphere ends there"},
      "how far a contact is past the rim of its hemispherical fingertip",
      {Cause::kFingertipRim, -6, Rank::kDecisive, kOwn},
-     EvaluateRim,
-     kAlways,
-     DescribeFingertip},
+     {EvaluateRim, kAlways, DescribeFingertip}},
     {{"base_tilt", kAssumption, "rad"},
      {kShippedSinking * kTiltLoad, "tyres that sink under loads of 100 m/s^2 at an arm of 0.4 m",
       Scaling::kSinking, "4 (1 - d) dt^2 250 / s^2"},
      "angle of the platform against the vertical",
      {Cause::kTilt, 13},
-     [](const Analysis& a) { return When(true, a.step->reading.departure.tilt); }},
+     {[](const Analysis& a) { return When(true, a.step->reading.departure.tilt); }}},
     {{"idle_joints", kAssumption, "rad"},
      {1e-5, "what the posture task's stiffness leaves of accelerations that soft contacts make",
       Scaling::kPosture, "(1 - d) dt^2 1e5 rad/s^4 / omega_p^2"},
      "movement since t = 0 of joints that do not carry the object",
      {},
-     nullptr,
-     kAlways,
-     nullptr,
-     MakeIdleJointsJudge},
+     {.make = MakeIdleJointsJudge}},
     // As small as the discrepancies that the prediction is judged by. Forces that do not fit the motion
     // explain whatever else is wrong from then on.
     {{"solver", kAssumption, "1"},
@@ -373,48 +352,39 @@ const CheckInfo kChecks[] = {
      "what the engine's solver left over of its own equations of motion, of the object as "
      "inverse_dynamics_object, of the robot as inverse_dynamics_robot",
      {Cause::kSolver, -4, Rank::kDecisive, kOwn},
-     EvaluateSolver},
+     {EvaluateSolver}},
     // rad, m: rounding of a joint that rests exactly at the end of its range, as fingers of a closed gripper
     // do.
     {{"joint_limit", kAssumption, "rad"},
-     {kJointLimitBound, "a limit pushes; less is rounding"},
+     {1e-12, "a limit pushes; less is rounding"},
      "how far a joint is beyond its range, where a limit pushes that the model does not have",
      {Cause::kJointLimit, 41, Rank::kDecisive, kOwn},
-     EvaluateJointLimit,
-     kAlways,
-     DescribeJoint},
+     {EvaluateJointLimit, kAlways, DescribeJoint}},
     // Ten times the accuracy of distances between bodies that are apart (solid.h).
     {{"clearance", kAssumption, "m"},
      {1e-6, "the bodies' distances are known to 1e-7 m"},
      "how deep two bodies overlap that are not meant to touch",
      {Cause::kCollision, 12, Rank::kAssumption, kOwn},
-     [](const Analysis& a) -> Evaluation {
-       return CheckValue{a.deepest_overlap.first, a.deepest_overlap.second};
-     },
-     kAlways | kUnsent,
-     [](const Analysis& a, int part) { return a.clearance->Describe(part); }},
+     {[](const Analysis& a) { return At(a.deepest_overlap); }, kAlways | kUnsent,
+      [](const Analysis& a, int part) { return a.clearance->Describe(part); }}},
     {{"collision", kAssumption, "N"},
      {0.0, "the model has no such contact"},
      "largest force between two bodies that are not meant to touch",
      {Cause::kCollision, -5, Rank::kDecisive, kOwn},
-     [](const Analysis& a) -> Evaluation {
-       return CheckValue{a.step->response.collision.force, 0};
-     },
-     kAlways | kUnsent,
-     DescribeCollision},
+     {[](const Analysis& a) { return At(std::pair(a.step->response.collision.force, 0)); }, kAlways | kUnsent,
+      DescribeCollision}},
     // The fingers of one hand touch within some hundredths of a second, kTransient each at the most.
     {{"excluded", kAssumption, "s"},
      {5.0 * kTransient, "five transients: the fingers of one hand touch within some hundredths of a second",
       Scaling::kNone, "0.25 s"},
      "how long in one go contacts have come and gone, so that the prediction was not judged",
      {Cause::kContactSoftness, 11},
-     [](const Analysis& a) { return When(true, a.transient_time); }},
+     {[](const Analysis& a) { return When(true, a.transient_time); }}},
     {{"actuator_effort", kAssumption, "1"},
      {1.0, "the motor's limit"},
      "|tau'| over the motor's limit",
      {Cause::kActuatorLimit, -3, Rank::kDecisive, kOwn},
-     [](const Analysis& a) { return When(true, a.step->drive.effort); },
-     kBefore},
+     {[](const Analysis& a) { return When(true, a.step->drive.effort); }, kBefore}},
 };
 
 }  // namespace
@@ -422,8 +392,7 @@ const CheckInfo kChecks[] = {
 std::span<const CheckInfo> ListChecks() { return kChecks; }
 
 const CheckInfo* FindCheck(std::string_view name) {
-  const auto* const found = std::find_if(std::begin(kChecks), std::end(kChecks),
-                                         [&](const CheckInfo& info) { return info.name == name; });
+  const auto* const found = std::ranges::find(kChecks, name, &CheckInfo::name);
   return found == std::end(kChecks) ? nullptr : found;
 }
 

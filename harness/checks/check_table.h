@@ -115,10 +115,13 @@ struct CheckInfo : CheckName {
   Bound bound;
   const char* description = "";
   FailureMeaning meaning;
-  Evaluation (*evaluate)(const StepAnalysis& step) = nullptr;
-  unsigned moments = kAlways;
-  std::string (*describe)(const StepAnalysis& step, int part) = nullptr;  ///< A value's part in words.
-  std::unique_ptr<StatefulJudge> (*make)(const Setup& setup) = nullptr;   ///< In the place of `evaluate`.
+  struct Judging {
+    Evaluation (*evaluate)(const StepAnalysis& step) = nullptr;
+    unsigned moments = kAlways;
+    std::string (*describe)(const StepAnalysis& step, int part) = nullptr;  ///< A value's part in words.
+    std::unique_ptr<StatefulJudge> (*make)(const Setup& setup) = nullptr;   ///< In the place of `evaluate`.
+  };
+  Judging by;
 };
 
 /// In the order of log and summary.

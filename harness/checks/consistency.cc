@@ -32,8 +32,7 @@ ConsistencyResult CompareAtRandomStates(const ConsistencyOptions& options, const
 
 bool ConsistencyResult::Agrees() const {
   const auto good = [](const CheckRecord& record) { return !record.failed; };
-  return std::all_of(constants.records.begin(), constants.records.end(), good) &&
-         std::all_of(terms.begin(), terms.end(), good);
+  return std::ranges::all_of(constants.records, good) && std::ranges::all_of(terms, good);
 }
 
 ConsistencyResult CheckConsistency(const Adapter& adapter, const ConsistencyOptions& options,
@@ -69,10 +68,9 @@ bool AgreeAtFirst(const RobotModel& model, DynamicsProvider* a, DynamicsProvider
   constexpr long kStates = 3;
   const ConsistencyResult result =
       CompareProviders(model, a, b, feed, [](long samples) { return samples < kStates; });
-  return !result.terms.empty() &&
-         std::all_of(result.terms.begin(), result.terms.end(), [&](const CheckRecord& record) {
-           return record.worst <= std::max(record.bound, tolerance);
-         });
+  return !result.terms.empty() && std::ranges::all_of(result.terms, [&](const CheckRecord& record) {
+    return record.worst <= std::max(record.bound, tolerance);
+  });
 }
 
 std::optional<BaseConvention> FindOtherConvention(const RobotModel& model, DynamicsProvider* reference,

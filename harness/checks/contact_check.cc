@@ -5,7 +5,6 @@
 #include <utility>
 
 #include "controller/common/errors.h"
-#include "controller/contact/shapes.h"
 #include "harness/checks/contact_terms.h"
 
 namespace dexcheck {
@@ -28,7 +27,7 @@ ContactCheck::ContactCheck(const Adapter& adapter, int fingertip, ContactFormula
       model_(engine_.terms().size()),
       comparison_(adapter.model(), kAskedByContacts, {&model_, &engine_}, {fingertip}, 1),
       robot_(adapter.model()),
-      tip_(adapter.model().frames()[static_cast<size_t>(fingertip)].sphere_radius.value()) {
+      tip_(adapter.model().frame(fingertip).sphere_radius.value()) {
   const RobotModel& model = adapter.model();
   try {
     object_ = MakeSurface(model.object()->shape);

@@ -4,7 +4,6 @@
 
 #include <functional>
 #include <memory>
-#include <vector>
 
 #include "controller/contact/contact_geometry.h"
 #include "controller/contact/grasp_map.h"

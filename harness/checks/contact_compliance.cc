@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "harness/checks/check_table.h"
+#include "harness/checks/wheel_rolling.h"
 
 namespace dexcheck {
 namespace {

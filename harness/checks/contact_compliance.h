@@ -7,7 +7,6 @@
 #include "controller/common/types.h"
 #include "harness/checks/declared_plant.h"
 #include "harness/checks/step_record.h"
-#include "harness/checks/wheel_rolling.h"
 #include "harness/engine/contact_softness.h"
 #include "harness/scenario/setup.h"
 

@@ -11,8 +11,7 @@ bool IsIdeal(const Setup& setup) {
   const std::vector<Joint>& joints = setup.model().joints();
   return setup.scenario().imperfections.is_ideal() &&
          setup.scenario().control.kappa != ContactSource::kIntegrated &&
-         std::none_of(joints.begin(), joints.end(),
-                      [](const Joint& joint) { return joint.dry_friction > 0.0; });
+         std::ranges::none_of(joints, [](const Joint& joint) { return joint.dry_friction > 0.0; });
 }
 
 /// Whether the measured state is the declared one, from which the terms of both are the same.

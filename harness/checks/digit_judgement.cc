@@ -21,9 +21,7 @@ constexpr size_t kLeastDraws = 4;
 constexpr long kStates = 20;
 constexpr Term kCauses[] = {Term::kJointAxis, Term::kLinkCom, Term::kLinkInertia, Term::kFramePose};
 
-bool IsCause(Term term) {
-  return std::find(std::begin(kCauses), std::end(kCauses), term) != std::end(kCauses);
-}
+bool IsCause(Term term) { return std::ranges::find(kCauses, term) != std::end(kCauses); }
 
 /// Which number of which part a constant check compares.
 using ConstantKey = std::tuple<std::string, Location::Kind, std::string, int>;
@@ -137,8 +135,8 @@ void JudgeConstants(const MovedFile& a, const MovedFile& b, const RobotSpec& spe
   });
   for (CheckRecord& record : constants->records) {
     if (!record.failed) continue;
-    record.failed = std::any_of(constants->findings.begin(), constants->findings.end(),
-                                [&](const ConstantFinding& finding) { return finding.check == record.name; });
+    record.failed = std::ranges::any_of(
+        constants->findings, [&](const ConstantFinding& finding) { return finding.check == record.name; });
     if (!record.failed) RaiseTo(record.worst, &verdict->largest_within);
   }
 }
@@ -147,8 +145,7 @@ void JudgeTerms(const TermComparison& comparison, std::vector<CheckRecord>* term
   const RobotModel& model = comparison.model();
   for (size_t i = 0; i < comparison.records().size(); ++i) {
     const CheckRecord& judged = comparison.records()[i];
-    const auto record = std::find_if(terms->begin(), terms->end(),
-                                     [&](const CheckRecord& one) { return one.name == judged.name; });
+    const auto record = std::ranges::find(*terms, judged.name, &CheckRecord::name);
     if (record == terms->end() || !record->failed) continue;
     verdict->units[record->name] = judged.worst;
     record->failed = judged.failed;
@@ -181,10 +178,9 @@ void JudgeTerms(const TermComparison& comparison, std::vector<CheckRecord>* term
 
 bool DigitVerdict::Concerns(const std::vector<std::string>& ids,
                             const std::vector<std::string>& parts) const {
-  if (std::any_of(ids.begin(), ids.end(), [](const std::string& id) { return !id.starts_with("number."); }))
-    return true;
-  return std::any_of(parts.begin(), parts.end(), [&](const std::string& part) {
-    return std::any_of(excesses.begin(), excesses.end(), [&](const DigitExcess& excess) {
+  if (std::ranges::any_of(ids, [](const std::string& id) { return !id.starts_with("number."); })) return true;
+  return std::ranges::any_of(parts, [&](const std::string& part) {
+    return std::ranges::any_of(excesses, [&](const DigitExcess& excess) {
       return excess.is_cause && (" " + excess.where + " ").find(" " + part + " ") != std::string::npos;
     });
   });
@@ -214,10 +210,9 @@ std::optional<DigitVerdict> JudgeByDigits(const std::array<const DescriptionFile
         [](long) { return true; }, &comparison);
     JudgeConstants(moved_a, moved_b, model.spec(), &result->constants, &verdict);
     JudgeTerms(comparison, &result->terms, &verdict);
-    std::stable_sort(verdict.excesses.begin(), verdict.excesses.end(),
-                     [](const DigitExcess& x, const DigitExcess& y) {
-                       return x.is_cause != y.is_cause ? x.is_cause : x.units > y.units;
-                     });
+    std::ranges::stable_sort(verdict.excesses, [](const DigitExcess& x, const DigitExcess& y) {
+      return x.is_cause != y.is_cause ? x.is_cause : x.units > y.units;
+    });
     return verdict;
   } catch (const InputError&) {
     return std::nullopt;  // with its numbers moved, one of the two is another mechanism

@@ -17,9 +17,9 @@
 #include "harness/descriptions/constant_checks.h"
 #include "harness/descriptions/description_match.h"
 #include "harness/descriptions/engine_provider.h"
-#include "harness/descriptions/engine_urdf.h"
 #include "harness/descriptions/join_names.h"
 #include "harness/descriptions/mjcf_reader.h"
+#include "harness/descriptions/mjcf_writer.h"
 
 namespace dexcheck {
 namespace {
@@ -56,15 +56,14 @@ class EngineComparisonRun {
 
  private:
   [[nodiscard]] bool IsWanted(const std::string& name) const {
-    return options_.engines.empty() ||
-           std::find(options_.engines.begin(), options_.engines.end(), name) != options_.engines.end();
+    return options_.engines.empty() || std::ranges::find(options_.engines, name) != options_.engines.end();
   }
 
   void CheckNames() const {
     std::vector<std::string> known;
     for (const EngineComparisonEngine& engine : ListEngineComparisonEngines()) known.push_back(engine.name);
     for (const std::string& name : options_.engines) {
-      if (std::find(known.begin(), known.end(), name) != known.end()) continue;
+      if (std::ranges::find(known, name) != known.end()) continue;
       throw InputError("--engines: must be of " + JoinNames(known) + ", got " + Quote(name));
     }
     for (const std::string& program : options_.programs) {
@@ -167,8 +166,8 @@ class EngineComparisonRun {
       throw InputError("its base floats, and that of " + file_.path().filename().string() +
                        " is fixed (--floating)");
     }
-    const bool has_moved = std::any_of(robot_.spec.frames.begin(), robot_.spec.frames.end(),
-                                       [&](const Frame& frame) { return frame.name == base.link; });
+    const bool has_moved =
+        std::ranges::any_of(robot_.spec.frames, [&](const Frame& frame) { return frame.name == base.link; });
     if (base.type == BaseType::kFloating && has_moved) {
       throw InputError("its base is " + Quote(base.link) + ", which another frame than " +
                        Quote(robot_.spec.base.link) + " belongs to");
@@ -191,8 +190,7 @@ class EngineComparisonRun {
     double largest = 0.0;
     for (size_t i = 0; i < completed.spec.joints.size(); ++i) {
       Joint& joint = completed.spec.joints[i];
-      const auto other = std::find_if(compiled.spec.joints.begin(), compiled.spec.joints.end(),
-                                      [&](const Joint& candidate) { return candidate.name == joint.name; });
+      const auto other = std::ranges::find(compiled.spec.joints, joint.name, &Joint::name);
       if (other == compiled.spec.joints.end()) return;
       const auto j = static_cast<size_t>(other - compiled.spec.joints.begin());
       // From the compiled joint's frame over the link's own, which both know.
@@ -212,9 +210,9 @@ class EngineComparisonRun {
     constexpr const char* kChecks[] = {"joint_spring", "tendon_spring", "tendon_damping", "fluid"};
     std::vector<std::string> parts;
     for (const ConstantFinding& finding : CheckConstants(adapter).findings) {
-      if (std::find(std::begin(kChecks), std::end(kChecks), finding.check) == std::end(kChecks)) continue;
+      if (std::ranges::find(kChecks, finding.check) == std::end(kChecks)) continue;
       std::string part = finding.check;
-      std::replace(part.begin(), part.end(), '_', ' ');
+      std::ranges::replace(part, '_', ' ');
       parts.push_back(part + (finding.where.empty() ? "" : " of " + finding.where));
     }
     if (!parts.empty())
@@ -240,26 +238,24 @@ class EngineComparisonRun {
   /// Each provider joins the first group with all of which it agrees.
   void FormGroups() {
     const auto agree = [&](size_t a, size_t b) {
-      const auto pair =
-          std::find_if(result_.pairs.begin(), result_.pairs.end(), [&](const ComparedPair& candidate) {
-            return candidate.first == std::min(a, b) && candidate.second == std::max(a, b);
-          });
-      return std::none_of(pair->terms.begin(), pair->terms.end(),
-                          [](const CheckRecord& record) { return record.failed; });
+      const auto pair = std::ranges::find_if(result_.pairs, [&](const ComparedPair& candidate) {
+        return candidate.first == std::min(a, b) && candidate.second == std::max(a, b);
+      });
+      return std::ranges::none_of(pair->terms, &CheckRecord::failed);
     };
     for (size_t one = 0; one < providers_.size(); ++one) {
       const auto fits = [&](const std::vector<size_t>& group) {
-        return std::all_of(group.begin(), group.end(), [&](size_t member) { return agree(member, one); });
+        return std::ranges::all_of(group, [&](size_t member) { return agree(member, one); });
       };
-      const auto group = std::find_if(result_.groups.begin(), result_.groups.end(), fits);
+      const auto group = std::ranges::find_if(result_.groups, fits);
       if (group != result_.groups.end()) {
         group->push_back(one);
       } else {
         result_.groups.push_back({one});
       }
     }
-    std::stable_sort(result_.groups.begin(), result_.groups.end(),
-                     [](const auto& a, const auto& b) { return a.size() > b.size(); });
+    std::ranges::stable_sort(result_.groups,
+                             [](const auto& a, const auto& b) { return a.size() > b.size(); });
   }
 
   /// Why those outside of the largest group differ from the description's analytic model.

@@ -1,12 +1,8 @@
 #include "harness/checks/engine_settings.h"
 
-#include <algorithm>
-#include <memory>
 #include <utility>
-#include <vector>
 
 #include "controller/common/errors.h"
-#include "controller/model/body_frame.h"
 
 namespace dexcheck {
 namespace {

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
-#include <optional>
 #include <utility>
 
 #include "controller/common/errors.h"
@@ -124,8 +123,7 @@ void CompareWithEngine(const DescriptionFile& first, const DescriptionFile& seco
   CountRoundings(robot.is_imported ? 1 : 0, completed.has_link_frames, &comparison->result.terms);
   ConstantChecks& constants = comparison->result.constants;
   std::erase_if(constants.records, [&](const CheckRecord& record) {
-    return !record.failed && std::find(completion.unstated.begin(), completion.unstated.end(), record.name) !=
-                                 completion.unstated.end();
+    return !record.failed && std::ranges::find(completion.unstated, record.name) != completion.unstated.end();
   });
   AddOneSided(*comparison->model, completion.one_sided, &constants);
   AppendTo(&comparison->not_compared,
@@ -186,6 +184,37 @@ void ComparePart(const DescriptionFile& first, const DescriptionFile& second, co
   CompareTwoDescriptions(first, second, urdf, options, part, progress, comparison);
 }
 
+/// A description whose terms stand first: the analytic model's, or of an MJCF the engine's.
+struct Reference {
+  Reference(const DescriptionFile& file, Comparison* comparison) : robot(file.Describe()) {
+    comparison->first = file.path();
+    comparison->notes = robot.notes;
+    comparison->model.emplace(robot.spec);
+    if (file.format() == RobotFormat::kMjcf) {
+      provider =
+          std::make_unique<EngineProvider>(robot.spec, file.CopyEngine(), file.path().string(), "MuJoCo");
+    } else {
+      provider = std::make_unique<AnalyticProvider>(*comparison->model, file.path().filename().string());
+    }
+  }
+  RobotDescription robot;
+  std::unique_ptr<DynamicsProvider> provider;
+};
+
+/// What is worth knowing of a base whose convention is the other side's.
+void NoteConvention(const Reference& reference, LayoutProvider* provider,
+                    const std::function<StateFeed()>& make_feed, Comparison* comparison) {
+  if (!provider->layout().is_floating()) return;
+  comparison->notes.push_back("the other side's base is taken as " +
+                              Describe(provider->layout().convention()));
+  if (comparison->result.Agrees()) return;
+  const std::optional<BaseConvention> other =
+      FindOtherConvention(*comparison->model, reference.provider.get(), provider, make_feed);
+  if (!other) return;
+  comparison->notes.push_back("all its terms agree with its base taken as " + Describe(*other) +
+                              ": this is its convention, and its key \"base\" can say so");
+}
+
 }  // namespace
 
 Comparison CompareFiles(const std::filesystem::path& a, const std::filesystem::path& b,
@@ -227,41 +256,6 @@ Comparison CompareFiles(const std::filesystem::path& a, const std::filesystem::p
   NoteTermsOfFrames(&comparison);
   return comparison;
 }
-
-namespace {
-
-/// A description whose terms stand first: the analytic model's, or of an MJCF the engine's.
-struct Reference {
-  Reference(const DescriptionFile& file, Comparison* comparison) : robot(file.Describe()) {
-    comparison->first = file.path();
-    comparison->notes = robot.notes;
-    comparison->model.emplace(robot.spec);
-    if (file.format() == RobotFormat::kMjcf) {
-      provider =
-          std::make_unique<EngineProvider>(robot.spec, file.CopyEngine(), file.path().string(), "MuJoCo");
-    } else {
-      provider = std::make_unique<AnalyticProvider>(*comparison->model, file.path().filename().string());
-    }
-  }
-  RobotDescription robot;
-  std::unique_ptr<DynamicsProvider> provider;
-};
-
-/// What is worth knowing of a base whose convention is the other side's.
-void NoteConvention(const Reference& reference, LayoutProvider* provider,
-                    const std::function<StateFeed()>& make_feed, Comparison* comparison) {
-  if (!provider->layout().is_floating()) return;
-  comparison->notes.push_back("the other side's base is taken as " +
-                              Describe(provider->layout().convention()));
-  if (comparison->result.Agrees()) return;
-  const std::optional<BaseConvention> other =
-      FindOtherConvention(*comparison->model, reference.provider.get(), provider, make_feed);
-  if (!other) return;
-  comparison->notes.push_back("all its terms agree with its base taken as " + Describe(*other) +
-                              ": this is its convention, and its key \"base\" can say so");
-}
-
-}  // namespace
 
 Comparison CompareResults(const std::filesystem::path& file, const ResultsSource& source,
                           const UrdfOptions& urdf, const ConsistencyOptions& options,
@@ -342,8 +336,7 @@ Differences SortDifferences(const Comparison& comparison) {
   for (const ConstantFinding& finding : comparison.result.constants.findings) {
     // Where zero is a proper value, the check has another scale than the larger of the two.
     const double size = std::max(std::abs(finding.model), std::abs(finding.engine));
-    const auto check = std::find_if(checks.begin(), checks.end(),
-                                    [&](const CheckRecord& record) { return record.name == finding.check; });
+    const auto check = std::ranges::find(checks, finding.check, &CheckRecord::name);
     const double worst = check == checks.end() ? 1.0 : check->worst;
     add(std::min(std::abs(finding.model - finding.engine) / size, worst),
         fmt::format("{}: {}: {:.12g} in {}, {:.12g} in {}{}{}", finding.check, finding.where, finding.model,

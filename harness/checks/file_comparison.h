@@ -9,9 +9,9 @@
 
 #include "harness/checks/consistency.h"
 #include "harness/checks/digit_judgement.h"
-#include "harness/descriptions/function_provider.h"
 #include "harness/descriptions/hypotheses.h"
 #include "harness/descriptions/program_provider.h"
+#include "harness/descriptions/term_results.h"
 #include "harness/descriptions/urdf_reader.h"
 
 namespace dexcheck {

@@ -2,7 +2,6 @@
 
 // A law as the checks judge it: computed a second time, from the terms of another provider.
 
-#include <limits>
 #include <memory>
 #include <optional>
 #include <span>

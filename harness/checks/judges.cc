@@ -52,10 +52,6 @@ Evaluation EvaluateContactDistance(const StepAnalysis& step) {
   return CheckValue{worst, static_cast<int>(part)};
 }
 
-Evaluation EvaluateFootDistance(const StepAnalysis& step) {
-  return CheckValue{step.foot_mismatch.first, step.foot_mismatch.second};
-}
-
 std::string DescribeFoot(const StepAnalysis& step, int part) {
   return part < 0
              ? ""
@@ -77,14 +73,14 @@ Evaluation EvaluateRim(const StepAnalysis& step) {
 
 std::string DescribeFingertip(const StepAnalysis& step, int part) {
   const int frame = step.grasp->fingertips()[static_cast<size_t>(part)];
-  return "fingertip " + Quote(step.setup->model().frames()[static_cast<size_t>(frame)].name);
+  return "fingertip " + Quote(step.setup->model().frame(frame).name);
 }
 
 Evaluation EvaluateJointLimit(const StepAnalysis& step) {
   const RobotModel& model = step.setup->model();
   CheckValue farthest;
   for (int i = 0; i < model.num_joints(); ++i) {
-    const Joint& joint = model.joints()[static_cast<size_t>(i)];
+    const Joint& joint = model.joint(i);
     if (joint.type == JointType::kBall) continue;  // its position is a quaternion
     const double q = step.step->reading.state.q[model.position_index(i)];
     const double over = std::max(q - joint.upper, joint.lower - q);
@@ -94,7 +90,7 @@ Evaluation EvaluateJointLimit(const StepAnalysis& step) {
 }
 
 std::string DescribeJoint(const StepAnalysis& step, int part) {
-  return "joint " + Quote(step.setup->model().joints()[static_cast<size_t>(part)].name);
+  return "joint " + Quote(step.setup->model().joint(part).name);
 }
 
 std::string DescribeCollision(const StepAnalysis& step, int /*part*/) {

@@ -11,8 +11,6 @@ namespace dexcheck {
 Evaluation EvaluateRobotDynamics(const StepAnalysis& step);
 /// A wheel's rim against the platform above it, (1), m/s.
 Evaluation EvaluateRolling(const StepAnalysis& step);
-/// Of a foot that touches: the plant's distance to the ground less that of the declared shapes, m.
-Evaluation EvaluateFootDistance(const StepAnalysis& step);
 /// Of a fingertip that touches: the plant's distance less that of the declared shapes, m.
 Evaluation EvaluateContactDistance(const StepAnalysis& step);
 /// Of a hemispherical fingertip, m.

@@ -4,8 +4,8 @@
 #include <utility>
 
 #include "controller/contact/contact_geometry.h"
-#include "harness/checks/contact_drift.h"
 #include "harness/checks/judges.h"
+#include "harness/checks/step_record.h"
 
 namespace dexcheck {
 namespace {

@@ -137,7 +137,7 @@ std::vector<Judge> MakeChecks(const Setup& setup, const JudgedLaw* law) {
     if (missing.contains(info.name)) continue;
     Judge& judge = checks.emplace_back();
     judge.info = &info;
-    if (info.make != nullptr) judge.state = info.make(setup);
+    if (info.by.make != nullptr) judge.state = info.by.make(setup);
     judge.record.name = info.name;
     judge.record.kind = info.category;
     judge.record.unit = info.unit;

@@ -18,7 +18,7 @@ struct Judge {
   CheckRecord record;                    ///< Without what came of it.
 
   [[nodiscard]] Evaluation Evaluate(const StepAnalysis& step) const {
-    return state ? state->Evaluate(step) : info->evaluate(step);
+    return state ? state->Evaluate(step) : info->by.evaluate(step);
   }
 };
 

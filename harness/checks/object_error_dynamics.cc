@@ -4,7 +4,7 @@
 
 #include "controller/object/euler_zyz.h"
 #include "controller/object/so3.h"
-#include "harness/checks/judged_law.h"
+#include "harness/checks/step_analysis.h"
 
 namespace dexcheck {
 namespace {

@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "controller/control/trajectory.h"
-#include "controller/object/euler_zyz.h"
 #include "harness/checks/baseline_reference.h"
 #include "harness/checks/check_table.h"
 #include "harness/checks/judged_law.h"

@@ -1,8 +1,6 @@
 #include "harness/checks/rounding_scales.h"
 
-#include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "harness/descriptions/random_states.h"
 
@@ -26,7 +24,7 @@ double CalcReach(const RobotModel& model) {
   std::vector<double> reach(static_cast<size_t>(model.num_joints()) + 1, 0.0);
   double farthest = model.base_with_wheels().com.norm() + 0.5 * model.base().wheel_distance;
   for (int i = 0; i < model.num_joints(); ++i) {
-    const Joint& joint = model.joints()[static_cast<size_t>(i)];
+    const Joint& joint = model.joint(i);
     double& mine = reach[static_cast<size_t>(i + 1)];
     mine = reach[static_cast<size_t>(joint.parent + 1)] + RowReach(joint);
     farthest = std::max(farthest, mine + joint.body.com.norm());
@@ -67,7 +65,7 @@ RoundingScales::RoundingScales(const RobotModel& model)
   subtree_mass_.assign(static_cast<size_t>(model.num_joints()) + 1, 0.0);
   subtree_mass_[0] = model.base().type == BaseType::kFixed ? 0.0 : model.base_with_wheels().mass;
   for (int i = model.num_joints() - 1; i >= 0; --i) {
-    const Joint& joint = model.joints()[static_cast<size_t>(i)];
+    const Joint& joint = model.joint(i);
     // An inertia that no mass within reach has counts as the mass that would have it there.
     const double turned = joint.body.inertia.trace() / Positive(arm_ * arm_);
     subtree_mass_[static_cast<size_t>(i + 1)] += std::max(joint.body.mass, turned);
@@ -88,7 +86,7 @@ void RoundingScales::SetState(const ModelTerms& terms, const Eigen::Ref<const Ve
   squared_rate_[0] = base_velocity_.tail<3>().squaredNorm();
   double fastest = squared_rate_[0];
   for (int i = 0; i < model_->num_joints(); ++i) {
-    const Joint& joint = model_->joints()[static_cast<size_t>(i)];
+    const Joint& joint = model_->joint(i);
     const double squared =
         xi.segment(base_velocities_ + model_->dof(i), CountVelocities(joint.type)).squaredNorm();
     double& rate = squared_rate_[static_cast<size_t>(i + 1)];
@@ -110,7 +108,7 @@ double RoundingScales::CalcVelocityScale(int coordinate) const {
 }
 
 const Joint& RoundingScales::JointOf(int coordinate) const {
-  return model_->joints()[static_cast<size_t>(model_->joint_of_dof(coordinate - base_velocities_))];
+  return model_->joint(model_->joint_of_dof(coordinate - base_velocities_));
 }
 
 double RoundingScales::GetSubtreeMass(int coordinate) const {

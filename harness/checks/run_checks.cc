@@ -66,8 +66,7 @@ void RunChecks::Forget() {
 }
 
 bool RunChecks::Has(std::string_view name) const {
-  return std::any_of(records_.begin(), records_.end(),
-                     [&](const CheckRecord& record) { return record.name == name; });
+  return std::ranges::any_of(records_, [&](const CheckRecord& record) { return record.name == name; });
 }
 
 const CheckRecord& RunChecks::Find(std::string_view name) const {
@@ -78,7 +77,7 @@ const CheckRecord& RunChecks::Find(std::string_view name) const {
 
 void RunChecks::Evaluate(CheckInfo::Moment moment, double time) {
   for (size_t i = 0; i < judges_.size(); ++i) {
-    if ((judges_[i].info->moments & moment) != 0) Add(judges_[i], &records_[i], time);
+    if ((judges_[i].info->by.moments & moment) != 0) Add(judges_[i], &records_[i], time);
   }
 }
 
@@ -90,8 +89,8 @@ void RunChecks::Add(const Judge& judge, CheckRecord* record, double time) {
   // As it is up to the bound, and above it less what is known to be in it.
   if (found->explained != 0.0 && !std::isnan(value))
     value = std::max(std::min(value, record->bound), value - found->explained);
-  if (judge.info->describe != nullptr && !record->failed && !(value <= record->bound))
-    record->part = judge.info->describe(analysis(), found->part);
+  if (judge.info->by.describe != nullptr && !record->failed && !(value <= record->bound))
+    record->part = judge.info->by.describe(analysis(), found->part);
   record->Add(value, time);
   differs_ = differs_ || !(value <= record->bound);
 }
@@ -105,8 +104,8 @@ void RunChecks::JudgeEffort(const StepRecord& step, double time) {
 void RunChecks::JudgeModel(const StepRecord& step) {
   const MeasuredState& state = step.reading.state;
   if (step.command.handling.partial) {
-    model_.IncludeContacts(std::all_of(state.overlap.begin(), state.overlap.end(),
-                                       [](double depth) { return depth > -PlantReading::kFar; }));
+    model_.IncludeContacts(
+        std::ranges::all_of(state.overlap, [](double depth) { return depth > -PlantReading::kFar; }));
   }
   const GraspModel& plant = *declared_step_->model;
   model_.Compare(plant.robot(), plant.grasp(), state, step.reading.X_W0, step.time);

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "harness/checks/wheel_rolling.h"
+
 namespace dexcheck {
 namespace {
 
@@ -58,7 +60,7 @@ void StepAnalyzer::Reset() {
   StepFindings& findings = now_.findings;
   ForgetSlip();
   for (std::vector<SlipState>* slips : {&findings.wheel_slip, &findings.foot_slip})
-    std::fill(slips->begin(), slips->end(), SlipState{});
+    std::ranges::fill(*slips, SlipState{});
   findings.contacts_lost = 0;
   findings.least_cone_margin = std::numeric_limits<double>::infinity();
   findings.excluded_steps = 0;
@@ -192,7 +194,7 @@ void StepAnalyzer::CalcAppliedForce() {
   const RobotModel& model = setup_->model();
   for (int k = 0; k < model.num_dofs(); ++k) {
     const int j = model.joint_of_dof(k);
-    const Joint& joint = model.joints()[static_cast<size_t>(j)];
+    const Joint& joint = model.joint(j);
     const Eigen::Index entry = model.num_base_velocities() + k;
     // No more than the parameters say, and where they say: what else is there stays to be found.
     if (friction.size() > 0)

@@ -9,16 +9,13 @@
 #include <limits>
 #include <map>
 #include <memory>
-#include <vector>
 
 #include "controller/control/actuation.h"
 #include "controller/control/constrained_dynamics.h"
-#include "controller/control/ground_dynamics.h"
 #include "controller/handling/handling_controller.h"
 #include "harness/checks/contact_compliance.h"
 #include "harness/checks/declared_plant.h"
 #include "harness/checks/step_record.h"
-#include "harness/checks/wheel_rolling.h"
 #include "harness/engine/clearance.h"
 #include "harness/scenario/setup.h"
 

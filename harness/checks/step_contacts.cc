@@ -68,9 +68,7 @@ void StepAnalyzer::FindFeet() {
 
 double StepAnalyzer::CalcFootUse() const {
   const std::vector<GroundContact>& contacts = now_.step->response.feet;
-  const auto body = [&](size_t i) {
-    return setup_->model().frames()[static_cast<size_t>(setup_->feet()[i])].link;
-  };
+  const auto body = [&](size_t i) { return setup_->model().frame(setup_->feet()[i]).link; };
   double largest = 0.0;
   for (size_t i = 0; i < contacts.size(); ++i) {
     double friction = 0.0, most = 0.0;
@@ -85,9 +83,7 @@ double StepAnalyzer::CalcFootUse() const {
   return largest;
 }
 
-void StepAnalyzer::ForgetSlip() {
-  std::fill(now_.findings.fingertip_slip.begin(), now_.findings.fingertip_slip.end(), SlipState{});
-}
+void StepAnalyzer::ForgetSlip() { std::ranges::fill(now_.findings.fingertip_slip, SlipState{}); }
 
 void StepAnalyzer::MoveWindow() {
   const long half = std::max(1L, std::lround(0.5 * kSlipWindow / time_step_));

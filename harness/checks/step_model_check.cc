@@ -1,8 +1,8 @@
 #include "harness/checks/step_model_check.h"
 
 #include <algorithm>
-#include <numeric>
 
+#include "controller/common/linear_algebra.h"
 #include "controller/object/object_dynamics.h"
 #include "harness/checks/contact_terms.h"
 
@@ -11,11 +11,8 @@ namespace {
 
 /// Of a grasp, or of a robot that holds nothing, all of whose frames are of interest.
 std::vector<int> ListFrames(const RobotModel& model, std::span<const int> fingertips) {
-  std::vector<int> frames(fingertips.begin(), fingertips.end());
-  if (!frames.empty()) return frames;
-  frames.resize(model.frames().size());
-  std::iota(frames.begin(), frames.end(), 0);
-  return frames;
+  if (fingertips.empty()) return ListIndices(model.frames().size());
+  return {fingertips.begin(), fingertips.end()};
 }
 
 }  // namespace

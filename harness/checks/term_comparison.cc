@@ -4,17 +4,13 @@
 #include <cmath>
 #include <limits>
 #include <memory>
-#include <numeric>
 #include <utility>
+
+#include "controller/common/linear_algebra.h"
+#include "harness/descriptions/robot_description.h"
 
 namespace dexcheck {
 namespace {
-
-std::vector<int> ListFrames(const RobotModel& model) {
-  std::vector<int> all(model.frames().size());
-  std::iota(all.begin(), all.end(), 0);
-  return all;
-}
 
 bool IsVelocity(TermParts parts) {
   return parts == TermParts::kVelocity || parts == TermParts::kVelocityPair;
@@ -24,8 +20,7 @@ bool IsVelocity(TermParts parts) {
 /// perpendicular from the second's. A ball has one place.
 void MoveAlongAxes(const RobotModel& model, const MatrixXd& second, MatrixXd* first) {
   for (Eigen::Index i = 0; i < first->cols(); ++i) {
-    if (model.joints()[static_cast<size_t>(model.joint_of_dof(static_cast<int>(i)))].type == JointType::kBall)
-      continue;
+    if (model.joint(model.joint_of_dof(static_cast<int>(i))).type == JointType::kBall) continue;
     const Vector3d axis = first->col(i).head<3>();
     const Vector3d point = first->col(i).tail<3>();
     first->col(i).tail<3>() = point + axis.dot(second.col(i).tail<3>() - point) * axis;
@@ -35,7 +30,7 @@ void MoveAlongAxes(const RobotModel& model, const MatrixXd& second, MatrixXd* fi
 }  // namespace
 
 TermComparison::TermComparison(const RobotModel& model, Asker asker, std::vector<DynamicsProvider*> providers)
-    : TermComparison(model, asker, std::move(providers), ListFrames(model)) {}
+    : TermComparison(model, asker, std::move(providers), ListIndices(model.frames().size())) {}
 
 TermComparison::TermComparison(const RobotModel& model, Asker asker, std::vector<DynamicsProvider*> providers,
                                std::vector<int> frames, size_t contacts)
@@ -45,8 +40,8 @@ TermComparison::TermComparison(const RobotModel& model, Asker asker, std::vector
   scales_.frames = std::move(frames);
   scales_.xi.setZero(model.num_velocities());
   for (int link = model.base().type == BaseType::kFixed ? 0 : -1; link < model.num_joints(); ++link) {
-    scales_.has_mass.push_back(std::all_of(providers_.begin(), providers_.end(),
-                                           [&](const DynamicsProvider* one) { return one->HasMass(link); }));
+    scales_.has_mass.push_back(
+        std::ranges::all_of(providers_, [&](const DynamicsProvider* one) { return one->HasMass(link); }));
   }
   for (const DynamicsProvider* const provider : providers_) {
     is_reduced_ = is_reduced_ || provider->is_reduced();
@@ -122,15 +117,15 @@ void TermComparison::CompareWithin(const std::vector<Spread>& spreads) {
 }
 
 bool TermComparison::needs_second_velocity() const {
-  return std::any_of(terms_.begin(), terms_.end(),
-                     [](const AskedTerm& term) { return term.entry->term == Term::kCBarProduct; });
+  return std::ranges::any_of(terms_,
+                             [](const AskedTerm& term) { return term.entry->term == Term::kCBarProduct; });
 }
 
 void TermComparison::Follow(DynamicsState* state) const {
   if (!is_reduced_) return;
   const int base = model().num_base_velocities();
   for (int i = 0; i < model().num_joints(); ++i) {
-    const std::optional<JointCoupling>& coupling = model().joints()[static_cast<size_t>(i)].coupling;
+    const std::optional<JointCoupling>& coupling = model().joint(i).coupling;
     if (!coupling) continue;
     state->q[model().position_index(i)] =
         coupling->multiplier * state->q[model().position_index(coupling->leader)] + coupling->offset;
@@ -210,8 +205,8 @@ void TermComparison::WidenByDraws(AskedTerm* term) const {
 void TermComparison::NoteExcess(size_t term, const Location& where, double units, double first, double second,
                                 double when) {
   if (spreads_.empty() || units <= 1.0) return;
-  auto known = std::find_if(excesses_.begin(), excesses_.end(),
-                            [&](const Excess& one) { return one.term == term && one.where == where; });
+  auto known = std::ranges::find_if(
+      excesses_, [&](const Excess& one) { return one.term == term && one.where == where; });
   if (known == excesses_.end()) known = excesses_.insert(known, Excess{term, where});
   if (units > known->units) *known = {term, where, units, first, second, when};
 }
@@ -277,8 +272,7 @@ std::vector<ComparedPair> TermComparison::TakePairs() const {
 std::vector<std::string> TermComparison::ListNotCompared() const {
   std::vector<std::string> names;
   for (size_t i = 0; i < terms_.size(); ++i) {
-    if (std::all_of(pairs_.begin(), pairs_.end(),
-                    [&](const ComparedPair& pair) { return pair.terms[i].comparisons == 0; }))
+    if (std::ranges::all_of(pairs_, [&](const ComparedPair& pair) { return pair.terms[i].comparisons == 0; }))
       names.emplace_back(pairs_.front().terms[i].name);
   }
   return names;

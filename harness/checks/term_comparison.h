@@ -10,7 +10,6 @@
 
 #include "harness/checks/term_table.h"
 #include "harness/descriptions/random_states.h"
-#include "harness/descriptions/robot_description.h"
 
 namespace dexcheck {
 

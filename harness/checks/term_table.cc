@@ -86,7 +86,7 @@ constexpr TermEntry kTerms[] = {
      [](const C& c, S scale) {
        ScalePlaces(c, scale);
        for (int i = 0; i < scale.cols(); ++i) {
-         if (c.model->joints()[static_cast<size_t>(c.model->joint_of_dof(i))].type == JointType::kPrismatic)
+         if (c.model->joint(c.model->joint_of_dof(i)).type == JointType::kPrismatic)
            scale.col(i).tail<3>().setConstant(kNotCompared);
        }
      }},
@@ -99,8 +99,7 @@ constexpr TermEntry kTerms[] = {
      [](const C& c, S scale) {
        for (Eigen::Index i = 0; i < scale.cols(); ++i) {
          const int link = static_cast<int>(i) + FirstLink(*c.model);
-         const double mass = link < 0 ? c.model->base_with_wheels().mass
-                                      : c.model->joints()[static_cast<size_t>(link)].body.mass;
+         const double mass = link < 0 ? c.model->base_with_wheels().mass : c.model->joint(link).body.mass;
          const Matrix3d first = c.first->col(i).reshaped(3, 3);
          scale.col(i).setConstant(CalcInertiaScale(mass, first, c.second->col(i).reshaped(3, 3)));
        }

@@ -6,7 +6,6 @@
 
 #include "controller/common/text.h"
 #include "harness/descriptions/join_names.h"
-#include "harness/descriptions/structure_match.h"
 
 namespace dexcheck {
 namespace {
@@ -24,7 +23,7 @@ size_t CountCommonPrefix(const Names& names) {
 }
 
 Names Reverse(Names names) {
-  for (std::string& name : names) std::reverse(name.begin(), name.end());
+  for (std::string& name : names) std::ranges::reverse(name);
   return names;
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
-// Joints that two files call alike: "panda_joint1" and "joint1", "LeftKnee" and "left_knee".
+// Which joint of one file is which of another: by names that are alike ("panda_joint1" and "joint1",
+// "LeftKnee" and "left_knee"), or by the tree, and then by numbers.
 
 #include <string>
 #include <vector>
@@ -20,8 +21,13 @@ std::vector<std::string> FindAlikeNames(const std::vector<std::string>& names,
 std::vector<std::string> ListJointNames(const RobotDescription& robot);
 
 /// Gives the joints of a description the names that another file has for them, when those are alike, or else
-/// when one tree is the other's (structure_match.h). @return a note that lists them; none when nothing was
+/// when one tree is the other's (MatchByStructure). @return a note that lists them; none when nothing was
 /// renamed.
 std::vector<std::string> TakeJointNames(const RobotDescription& other, RobotDescription* robot);
+
+/// Joint of `b` for each of `a`, such that kinds of joints and what hangs on what are the same. A name that
+/// both have is one joint. Of several such matches, the one whose axes and places at zero, masses and ranges
+/// differ least. Empty where there is none, or more than 12 joints hang on one link.
+std::vector<int> MatchByStructure(const RobotDescription& a, const RobotDescription& b);
 
 }  // namespace dexcheck

@@ -1,47 +1,42 @@
 #include "harness/descriptions/analytic_provider.h"
 
 #include <algorithm>
-#include <numeric>
+
+#include "controller/common/linear_algebra.h"
 
 namespace dexcheck {
 namespace {
 
-std::vector<int> ListAll(int count) {
-  std::vector<int> all(static_cast<size_t>(count));
-  std::iota(all.begin(), all.end(), 0);
-  return all;
-}
-
 const MassProperties& BodyOf(const RobotModel& model, int link) {
-  return link < 0 ? model.base_with_wheels() : model.joints()[static_cast<size_t>(link)].body;
+  return link < 0 ? model.base_with_wheels() : model.joint(link).body;
 }
 
 }  // namespace
 
 std::vector<int> ListChain(const RobotModel& model, int link) {
   std::vector<int> chain;
-  for (int joint = link; joint >= 0; joint = model.joints()[static_cast<size_t>(joint)].parent) {
-    for (int k = 0; k < CountVelocities(model.joints()[static_cast<size_t>(joint)].type); ++k)
+  for (int joint = link; joint >= 0; joint = model.joint(joint).parent) {
+    for (int k = 0; k < CountVelocities(model.joint(joint).type); ++k)
       chain.push_back(model.num_base_velocities() + model.dof(joint) + k);
   }
   for (int i = model.num_base_velocities() - 1; i >= 0; --i) chain.push_back(i);
-  std::sort(chain.begin(), chain.end());
+  std::ranges::sort(chain);
   return chain;
 }
 
 CoordinateMap::CoordinateMap(const RobotModel& model, std::vector<int> compared)
-    : positions(ListAll(model.num_positions())),
-      velocities(ListAll(model.num_velocities())),
-      joints(ListAll(model.num_joints())),
-      frames(ListAll(static_cast<int>(model.frames().size()))),
+    : positions(ListIndices(model.num_positions())),
+      velocities(ListIndices(model.num_velocities())),
+      joints(ListIndices(model.num_joints())),
+      frames(ListIndices(model.frames().size())),
       compared_frames(std::move(compared)) {}
 
 CoordinateMap::CoordinateMap(const RobotModel& model, const RobotModel& coordinates)
-    : CoordinateMap(coordinates, ListAll(static_cast<int>(coordinates.frames().size()))) {
+    : CoordinateMap(coordinates, ListIndices(coordinates.frames().size())) {
   is_identity = false;
   const int base = model.num_base_velocities();
   for (int i = 0; i < coordinates.num_joints(); ++i) {
-    const Joint& joint = coordinates.joints()[static_cast<size_t>(i)];
+    const Joint& joint = coordinates.joint(i);
     const int own = model.FindJoint(joint.name);
     joints[static_cast<size_t>(i)] = own;
     for (int k = 0; k < CountPositions(joint.type); ++k)
@@ -58,8 +53,7 @@ AnalyticProvider::AnalyticProvider(const RobotModel& model, std::string name, st
   has_object_ = model.object().has_value();
   xi_.setZero(model.num_velocities());
   jacobians_.resize(map_.compared_frames.size());
-  for (const int frame : map_.compared_frames)
-    chains_.push_back(ListChain(model, model.frames()[static_cast<size_t>(frame)].link));
+  for (const int frame : map_.compared_frames) chains_.push_back(ListChain(model, model.frame(frame).link));
 }
 
 AnalyticProvider::AnalyticProvider(const RobotModel& model, std::string name, CoordinateMap map,
@@ -81,9 +75,8 @@ AnalyticProvider::AnalyticProvider(const RobotModel& model, std::string name, Co
 
 AnalyticProvider::AnalyticProvider(const RobotModel& model, std::string name,
                                    const ModelViewFactory& make_view, ObjectFormulas object)
-    : AnalyticProvider(model, std::move(name),
-                       CoordinateMap(model, ListAll(static_cast<int>(model.frames().size()))), make_view,
-                       std::move(object)) {}
+    : AnalyticProvider(model, std::move(name), CoordinateMap(model, ListIndices(model.frames().size())),
+                       make_view, std::move(object)) {}
 
 AnalyticProvider::AnalyticProvider(const RobotSpec& robot, std::string name)
     : AnalyticProvider(std::make_shared<const RobotModel>(robot), std::move(name)) {}
@@ -149,7 +142,7 @@ void AnalyticProvider::ReadMatrix(const MatrixXd& own, Eigen::Ref<MatrixXd> out)
   } else {
     // In unreduced coordinates the base has other entries, and the joints the same.
     const auto shift = static_cast<int>(own.rows() - xi_.size());
-    std::vector<int> places = ListAll(static_cast<int>(own.rows()));
+    std::vector<int> places = ListIndices(own.rows());
     for (int i = model_->num_base_velocities(); i < static_cast<int>(xi_.size()); ++i)
       places[static_cast<size_t>(i + shift)] = map_.velocities[static_cast<size_t>(i)] + shift;
     out = own(places, places);
@@ -196,7 +189,7 @@ void AnalyticProvider::Read(Term term, Eigen::Ref<MatrixXd> out) {
         const int base = model.num_base_velocities();
         const int dof = map_.velocities[static_cast<size_t>(base + col)] - base;
         const int own = model.joint_of_dof(dof);
-        const bool is_ball = model.joints()[static_cast<size_t>(own)].type == JointType::kBall;
+        const bool is_ball = model.joint(own).type == JointType::kBall;
         const Pose X = view_->CalcLinkPose(own);
         out.col(col) << X.linear().col(is_ball ? dof - model.dof(own) : 2), X.translation();
       }

@@ -2,7 +2,6 @@
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <limits>
 #include <map>
@@ -225,8 +224,8 @@ const char* NameOf(AuditLevel level) {
 }
 
 bool AuditResult::IsGood() const {
-  return std::all_of(findings.begin(), findings.end(),
-                     [](const AuditFinding& finding) { return finding.level == AuditLevel::kNote; });
+  return std::ranges::all_of(findings,
+                             [](const AuditFinding& finding) { return finding.level == AuditLevel::kNote; });
 }
 
 MassProperties MakePlausibleBody(const MassProperties& body) {
@@ -268,8 +267,8 @@ AuditResult AuditRobot(const RobotDescription& robot) {
   AuditMirrors(robot, &result.findings);
   AuditJoints(robot, &result.findings);
   AuditCondition(robot, &result);
-  std::stable_sort(result.findings.begin(), result.findings.end(),
-                   [](const AuditFinding& a, const AuditFinding& b) { return a.level < b.level; });
+  std::ranges::stable_sort(result.findings,
+                           [](const AuditFinding& a, const AuditFinding& b) { return a.level < b.level; });
   return result;
 }
 

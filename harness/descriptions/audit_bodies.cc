@@ -13,7 +13,6 @@
 
 #include "controller/common/linear_algebra.h"
 #include "controller/common/text.h"
-#include "controller/model/body_frame.h"
 #include "harness/descriptions/audit.h"
 
 namespace dexcheck {

@@ -1,12 +1,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
-#include <map>
 #include <span>
 
 #include "controller/common/text.h"
-#include "harness/descriptions/finding.h"
+#include "harness/descriptions/fault_search.h"
 
 namespace dexcheck {
 namespace {
@@ -76,8 +74,7 @@ class BodySearch {
   /// The convention that explains most links comes first, with those that explain the same ones.
   /// @param fewest links that a fault must explain.
   void Vote(Quantity quantity, size_t fewest) {
-    while (std::any_of(bodies_.begin(), bodies_.end(),
-                       [&](const LinkBody& body) { return IsWrong(body, quantity); })) {
+    while (std::ranges::any_of(bodies_, [&](const LinkBody& body) { return IsWrong(body, quantity); })) {
       Cover best;
       std::vector<BodyUndoing> undoings;
       for (const LinkBody& body : bodies_) undoings.emplace_back(body, close_);
@@ -101,8 +98,8 @@ class BodySearch {
   }
 
   void Take(Quantity quantity, const Cover& cover) {
-    const size_t wrong = static_cast<size_t>(std::count_if(
-        bodies_.begin(), bodies_.end(), [&](const LinkBody& body) { return IsWrong(body, quantity); }));
+    const size_t wrong = static_cast<size_t>(
+        std::ranges::count_if(bodies_, [&](const LinkBody& body) { return IsWrong(body, quantity); }));
     Finding finding;
     finding.what = IsOfBody(quantity) || IsOfPlace(quantity) ? "link" : "joint";
     finding.total = IsOfBody(quantity) ? count_ : bodies_.size();
@@ -124,7 +121,7 @@ class BodySearch {
   /// Names the links, and adds to an earlier finding of the same kind.
   void Add(Finding finding, const std::vector<size_t>& links, std::span<const Quantity> quantities) {
     finding.cells = links.size();
-    const auto same = std::find_if(found_.begin(), found_.end(), [&](const Finding& other) {
+    const auto same = std::ranges::find_if(found_, [&](const Finding& other) {
       return other.ids == finding.ids && other.what == finding.what &&
              !finding.ids[0].starts_with("exchange");
     });
@@ -158,8 +155,8 @@ class BodySearch {
     return AgreesIn(quantity, bodies_[i].given, bodies_[other].right, close_.length, close_.tolerance);
   }
   [[nodiscard]] bool IsBodyOf(size_t i, size_t other) const {
-    return std::all_of(std::begin(kBodyQuantities), std::end(kBodyQuantities),
-                       [&](Quantity quantity) { return IsBodyOf(i, other, quantity); });
+    return std::ranges::all_of(kBodyQuantities,
+                               [&](Quantity quantity) { return IsBodyOf(i, other, quantity); });
   }
 
   void TakeRight(Quantity quantity, size_t i) {

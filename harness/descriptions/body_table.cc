@@ -113,9 +113,8 @@ class BodyTableReader {
     for (size_t i = 0; i < cells.size(); ++i) {
       const size_t open = cells[i].find_first_of("[(");
       const std::string name = SimplifyName(cells[i].substr(0, open));
-      const auto* const column = std::find_if(kColumns.begin(), kColumns.end(), [&](const ColumnInfo& info) {
-        return name == info.name || name == info.other;
-      });
+      const auto* const column = std::ranges::find_if(
+          kColumns, [&](const ColumnInfo& info) { return name == info.name || name == info.other; });
       if (column == kColumns.end()) continue;  // a column of no interest
       const auto k = static_cast<size_t>(column - kColumns.begin());
       double& unit = units[static_cast<size_t>(column->kind)];
@@ -153,7 +152,7 @@ class BodyTableReader {
     row.body.com << number(kComX), number(kComX + 1), number(kComX + 2);
     std::array<double, 6> n{};
     for (size_t k = 0; k < n.size(); ++k) n[k] = number(kIxx + k);
-    row.body.inertia << n[0], n[3], n[4], n[3], n[1], n[5], n[4], n[5], n[2];
+    row.body.inertia = MakeTensor(n);
     if (about_origin_) row.body.inertia -= CalcPointInertia(row.body.mass, row.body.com);
   }
 
@@ -178,8 +177,7 @@ RobotDescription PlaceBodies(const std::vector<TabledBody>& bodies, const std::s
   robot.format = RobotFormat::kBodies;
   std::vector<std::string> strange, links;
   for (const TabledBody& row : bodies) {
-    const auto part = std::find_if(robot.parts.begin(), robot.parts.end(),
-                                   [&](const DescribedPart& one) { return one.name == row.link; });
+    const auto part = std::ranges::find(robot.parts, row.link, &DescribedPart::name);
     if (part == robot.parts.end()) {
       links.clear();
       for (const DescribedPart& one : robot.parts) links.push_back(one.name);

@@ -3,16 +3,15 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <limits>
 #include <sstream>
-#include <vector>
 
 #include "controller/model/body_frame.h"
 #include "harness/descriptions/join_names.h"
 #include "harness/descriptions/mjcf_reader.h"
 #include "harness/descriptions/own_rows.h"
 #include "harness/engine/engine.h"
-#include "harness/engine/mjcf_file.h"
 #include "harness/engine/xml.h"
 
 namespace dexcheck {
@@ -33,11 +32,9 @@ std::vector<const XMLElement*> ListInertials(const MjcfFile& mjcf, const mjModel
 
 std::optional<Matrix3d> ReadFullInertia(const XMLElement& inertial) {
   std::istringstream numbers(ReadAttribute(inertial, "fullinertia"));
-  Vector6d I;
+  std::array<double, 6> I{};
   if (!(numbers >> I[0] >> I[1] >> I[2] >> I[3] >> I[4] >> I[5])) return std::nullopt;
-  Matrix3d tensor;
-  tensor << I[0], I[3], I[4], I[3], I[1], I[5], I[4], I[5], I[2];
-  return tensor;
+  return MakeTensor(I);
 }
 std::optional<std::string> TakeCompiledInertias(const MjcfFile& mjcf, const mjModel& engine,
                                                 RobotDescription* robot) {

@@ -4,7 +4,6 @@
 
 #include <mujoco/mujoco.h>
 
-#include <filesystem>
 #include <optional>
 #include <string>
 #include <vector>

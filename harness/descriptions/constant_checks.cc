@@ -5,7 +5,6 @@
 #include <initializer_list>
 #include <optional>
 #include <utility>
-#include <vector>
 
 #include "harness/descriptions/constant_comparison.h"
 #include "harness/descriptions/constant_table.h"
@@ -61,8 +60,7 @@ class DescriptionConstants : public ConstantComparison {
 }  // namespace
 
 CheckRecord* ConstantChecks::Define(const std::string& check) {
-  auto record =
-      std::find_if(records.begin(), records.end(), [&](const CheckRecord& one) { return one.name == check; });
+  auto record = std::ranges::find(records, check, &CheckRecord::name);
   if (record == records.end()) {
     record = records.insert(record, CheckRecord{});
     record->name = check;
@@ -99,9 +97,9 @@ void JudgeByTolerance(double tolerance, ConstantChecks* constants) {
   std::erase_if(constants->findings, [&](const ConstantFinding& finding) {
     const double size = std::max(std::abs(finding.model), std::abs(finding.engine));
     const bool is_within = std::abs(finding.model - finding.engine) <= tolerance * size;
-    const bool check_holds = std::any_of(
-        constants->records.begin(), constants->records.end(),
-        [&](const CheckRecord& record) { return record.name == finding.check && !record.failed; });
+    const bool check_holds = std::ranges::any_of(constants->records, [&](const CheckRecord& record) {
+      return record.name == finding.check && !record.failed;
+    });
     return is_within || check_holds;
   });
 }

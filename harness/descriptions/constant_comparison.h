@@ -54,7 +54,7 @@ class ConstantComparison {
   void AddCoupling(int joint, double model, double engine, const std::string& effect) {
     result_.Add({kCoupling, DescribeWhere(AtJoint(joint)), model, engine, AtJoint(joint), 1, false, effect});
   }
-  [[nodiscard]] const Joint& JointOf(int joint) const { return model_.joints()[static_cast<size_t>(joint)]; }
+  [[nodiscard]] const Joint& JointOf(int joint) const { return model_.joint(joint); }
 
   static constexpr const char* kCoupling = "joint_coupling";
   const RobotModel& model_;

@@ -5,8 +5,6 @@
 #include <algorithm>
 #include <limits>
 
-#include "harness/engine/mujoco_release.h"
-
 namespace dexcheck {
 namespace {
 

@@ -8,9 +8,6 @@
 #include <type_traits>
 #include <utility>
 
-#include "controller/common/text.h"
-#include "controller/model/body_frame.h"
-
 namespace dexcheck {
 namespace {
 
@@ -95,9 +92,7 @@ Matrix3d UndoOrder(const NumberOrder& order, const Matrix3d& I) {
   const std::array<double, 6> given = {I(0, 0), I(1, 1), I(2, 2), I(0, 1), I(0, 2), I(1, 2)};
   std::array<double, 6> n{};
   for (size_t i = 0; i < 6; ++i) n[order.place[i]] = given[i];
-  Matrix3d right;
-  right << n[0], n[3], n[4], n[3], n[1], n[5], n[4], n[5], n[2];
-  return right;
+  return MakeTensor(n);
 }
 
 Matrix3d UndoOrder(const Order& order, const Matrix3d& I) {
@@ -228,9 +223,8 @@ class TableMaker {
     add("com.child_frame", "as if given in the next joint's frame",
         [](StatedPart& p, const StatedPart& right) {
           const auto distance = [&](const Pose& X) { return (X * p.body.com - right.body.com).norm(); };
-          const auto best = std::min_element(p.X_LD.begin(), p.X_LD.end(), [&](const Pose& a, const Pose& b) {
-            return distance(a) < distance(b);
-          });
+          const auto best = std::ranges::min_element(
+              p.X_LD, [&](const Pose& a, const Pose& b) { return distance(a) < distance(b); });
           if (best == p.X_LD.end()) return false;
           p.body.com = *best * p.body.com;
           return true;

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <filesystem>
 #include <map>
 
@@ -125,8 +124,7 @@ class Matching {
   /// The check has nothing to say when one of the two states the constant nowhere.
   void NoteUnstated(const char* check, bool DescribedJoint::*states) {
     for (const RobotDescription* const robot : {&a_, &b_}) {
-      if (std::any_of(robot->joints.begin(), robot->joints.end(),
-                      [&](const DescribedJoint& joint) { return joint.*states; })) {
+      if (std::ranges::any_of(robot->joints, [&](const DescribedJoint& joint) { return joint.*states; })) {
         continue;
       }
       result_.unstated.emplace_back(check);
@@ -199,8 +197,8 @@ class Matching {
     const auto drop = [this](RobotDescription* robot, const RobotDescription& other) {
       std::vector<std::string> dropped;
       std::erase_if(robot->spec.frames, [&](const Frame& frame) {
-        const bool lacks = std::none_of(other.spec.frames.begin(), other.spec.frames.end(),
-                                        [&](const Frame& candidate) { return candidate.name == frame.name; });
+        const bool lacks = std::ranges::none_of(
+            other.spec.frames, [&](const Frame& candidate) { return candidate.name == frame.name; });
         if (lacks) dropped.push_back(frame.name);
         return lacks;
       });
@@ -233,7 +231,7 @@ std::vector<int> MatchJoints(const RobotSpec& a, const RobotSpec& b) {
 }
 
 bool Ignores(const std::string& word, const std::vector<std::string>& ignore) {
-  return std::find(ignore.begin(), ignore.end(), word) != ignore.end();
+  return std::ranges::find(ignore, word) != ignore.end();
 }
 
 Completion CompleteEachOther(RobotDescription* a, RobotDescription* b,
@@ -305,7 +303,7 @@ void AddOneSided(const RobotModel& model, const std::vector<ConstantFinding>& on
     inertia = i == 0 ? diagonal : inertia.cwiseMin(diagonal).eval();
   }
   for (ConstantFinding finding : one_sided) {
-    const Joint& joint = model.joints()[static_cast<size_t>(finding.location.first)];
+    const Joint& joint = model.joint(finding.location.first);
     const int first = base + model.dof(finding.location.first);
     const double M_jj = inertia.segment(first, CountVelocities(joint.type)).minCoeff();
     const double value = std::max(finding.model, finding.engine);

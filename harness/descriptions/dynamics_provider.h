@@ -3,7 +3,6 @@
 // Whatever has the terms of a robot's dynamics at a state: an analytic model, the engine, a program,
 // results in files.
 
-#include <optional>
 #include <string>
 #include <vector>
 

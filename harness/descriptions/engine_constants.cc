@@ -58,8 +58,7 @@ class EngineConstants : public ConstantComparison {
         AddCoupling(i, own->multiplier, 0.0,
                     "only " + model_.spec().source + " states it: it follows " + JointOf(own->leader).name);
       } else {
-        const auto leader =
-            std::find(adapter_.joint_ids().begin(), adapter_.joint_ids().end(), other->leader);
+        const auto leader = std::ranges::find(adapter_.joint_ids(), other->leader);
         const bool is_known = leader != adapter_.joint_ids().end();
         const int index = is_known ? static_cast<int>(leader - adapter_.joint_ids().begin()) : -1;
         CompareCouplings(i, *own, own->leader, {index, other->multiplier, other->offset});
@@ -95,11 +94,10 @@ class EngineConstants : public ConstantComparison {
     constexpr const char* kCheck = "equality_constraint";
     if (constraints.empty()) return;
     std::erase_if(result_.findings, [&](const ConstantFinding& finding) {
-      return finding.check == kCheck &&
-             std::find(constraints.begin(), constraints.end(), finding.where) != constraints.end();
+      return finding.check == kCheck && std::ranges::find(constraints, finding.where) != constraints.end();
     });
-    if (std::none_of(result_.findings.begin(), result_.findings.end(),
-                     [&](const ConstantFinding& finding) { return finding.check == kCheck; }))
+    if (std::ranges::none_of(result_.findings,
+                             [&](const ConstantFinding& finding) { return finding.check == kCheck; }))
       std::erase_if(result_.records, [&](const CheckRecord& record) { return record.name == kCheck; });
   }
 
@@ -168,7 +166,7 @@ class EngineConstants : public ConstantComparison {
       int geom = FindTipGeom(frame);
       if (geom < 0 && model_.base().type == BaseType::kFloating) geom = FindTipCapsule(frame);
       const double radius = geom < 0 ? kMissing : engine_.geom_size[3 * geom];
-      Compare("fingertip_radius", where, *model_.frames()[static_cast<size_t>(frame)].sphere_radius, radius);
+      Compare("fingertip_radius", where, *model_.frame(frame).sphere_radius, radius);
     }
   }
 

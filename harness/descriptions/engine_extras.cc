@@ -10,8 +10,6 @@
 
 #include "harness/descriptions/constant_table.h"
 #include "harness/descriptions/join_names.h"
-#include "harness/engine/engine.h"
-#include "harness/engine/mujoco_release.h"
 
 namespace dexcheck {
 namespace {
@@ -204,8 +202,8 @@ std::optional<std::string> SetAsideMotors(const std::string& source, mjModel* en
   std::vector<std::string> motors;
   for (int i = 0; i < engine->nu; ++i) {
     const auto properties = ReadMotor(*engine, i);
-    if (std::all_of(properties.begin(), properties.end(),
-                    [](const MotorProperty& property) { return property.value == property.plain; }))
+    if (std::ranges::all_of(properties,
+                            [](const MotorProperty& property) { return property.value == property.plain; }))
       continue;
     motors.push_back(NameOf(*engine, mjOBJ_ACTUATOR, i));
     MakeIdle(EnginePart::kActuator, i, kRobotJoint, engine);
@@ -238,9 +236,9 @@ void AddExtras(const Extras& extras, ConstantChecks* constants) {
     missing.push_back(std::move(finding));
   }
   std::erase_if(constants->records, [&](const CheckRecord& record) {
-    return record.failed &&
-           std::none_of(constants->findings.begin(), constants->findings.end(),
-                        [&](const ConstantFinding& finding) { return finding.check == record.name; });
+    return record.failed && std::ranges::none_of(constants->findings, [&](const ConstantFinding& finding) {
+             return finding.check == record.name;
+           });
   });
   for (const ConstantFinding& finding : extras.differences.findings) constants->Add(finding);
   for (const ConstantFinding& finding : missing) constants->Add(finding);

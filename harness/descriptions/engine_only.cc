@@ -172,13 +172,13 @@ class EngineOnly {
   }
   [[nodiscard]] bool IsWorld(int geom) const { return engine_.body_weldid[engine_.geom_bodyid[geom]] == 0; }
   [[nodiscard]] bool IsWheel(int geom) const {
-    return std::any_of(adapter_.wheels().begin(), adapter_.wheels().end(), [&](const EngineWheel& wheel) {
+    return std::ranges::any_of(adapter_.wheels(), [&](const EngineWheel& wheel) {
       return engine_.geom_bodyid[geom] == engine_.jnt_bodyid[wheel.joint];
     });
   }
   [[nodiscard]] bool IsFingertip(int geom) const {
     const auto& tips = adapter_.model().fingertips();
-    return std::any_of(tips.begin(), tips.end(), [&](int frame) {
+    return std::ranges::any_of(tips, [&](int frame) {
       return engine_.site_bodyid[adapter_.frame_sites()[static_cast<size_t>(frame)]] ==
              engine_.geom_bodyid[geom];
     });
@@ -187,8 +187,7 @@ class EngineOnly {
   /// What a floating robot may stand on: shapes on whose body the model has a frame.
   [[nodiscard]] bool IsFoot(int geom) const {
     const std::vector<int>& sites = adapter_.frame_sites();
-    return adapter_.model().base().type == BaseType::kFloating &&
-           std::any_of(sites.begin(), sites.end(), [&](int site) {
+    return adapter_.model().base().type == BaseType::kFloating && std::ranges::any_of(sites, [&](int site) {
              return site >= 0 && engine_.site_bodyid[site] == engine_.geom_bodyid[geom];
            });
   }

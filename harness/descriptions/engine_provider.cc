@@ -1,18 +1,11 @@
 #include "harness/descriptions/engine_provider.h"
 
 #include <algorithm>
-#include <numeric>
 
-#include "harness/descriptions/object_rates.h"
+#include "controller/common/linear_algebra.h"
 
 namespace dexcheck {
 namespace {
-
-std::vector<int> ListFrames(const RobotModel& model) {
-  std::vector<int> all(model.frames().size());
-  std::iota(all.begin(), all.end(), 0);
-  return all;
-}
 
 EngineTerms MakeTerms(const Adapter& adapter, std::span<const int> fingertips) {
   return fingertips.empty() ? EngineTerms(adapter, Coordinates::kReduced) : EngineTerms(adapter, fingertips);
@@ -35,7 +28,7 @@ EngineProvider::EngineProvider(const Adapter& adapter, std::string name)
       unreduced_(std::make_unique<EngineTerms>(adapter, Coordinates::kUnreduced)) {
   has_object_ = has_coordinates_ = adapter.model().object().has_value();
   if (has_object_) terms_.RequireObject();
-  PrepareFrames(ListFrames(adapter.model()), /*contacts=*/false);
+  PrepareFrames(ListIndices(adapter.model().frames().size()), /*contacts=*/false);
   unreduced_velocity_.setZero(unreduced_->size());
 }
 
@@ -54,7 +47,7 @@ EngineProvider::EngineProvider(const Adapter& adapter, std::span<const int> fing
   has_coordinates_ = has_coordinates;
   if (fingertips.empty()) {
     if (has_object_) terms_.RequireObject();
-    PrepareFrames(ListFrames(adapter.model()), /*contacts=*/false);
+    PrepareFrames(ListIndices(adapter.model().frames().size()), /*contacts=*/false);
   } else {
     PrepareFrames(fingertips, /*contacts=*/true);
   }
@@ -111,8 +104,7 @@ bool EngineProvider::Has(Term term) const {
 
 bool EngineProvider::HasMass(int link) const {
   const std::vector<int>& bodies = adapter_->welded_bodies()[static_cast<size_t>(link + 1)];
-  return std::any_of(bodies.begin(), bodies.end(),
-                     [&](int body) { return adapter_->engine().body_mass[body] > 0.0; });
+  return std::ranges::any_of(bodies, [&](int body) { return adapter_->engine().body_mass[body] > 0.0; });
 }
 
 void EngineProvider::ReadJacobians(Eigen::Ref<MatrixXd> out) const {

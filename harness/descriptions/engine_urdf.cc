@@ -1,7 +1,6 @@
-#include "harness/descriptions/engine_urdf.h"
-
 #include <set>
 
+#include "harness/descriptions/mjcf_writer.h"
 #include "harness/descriptions/urdf_file.h"
 #include "harness/engine/xml.h"
 

@@ -1,14 +1,13 @@
 #include "harness/descriptions/hypotheses.h"
 
 #include <algorithm>
-#include <optional>
 #include <tuple>
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
 #include "controller/model/body_frame.h"
 #include "harness/descriptions/description_match.h"
-#include "harness/descriptions/finding.h"
+#include "harness/descriptions/fault_search.h"
 #include "harness/descriptions/join_names.h"
 
 namespace dexcheck {
@@ -136,9 +135,8 @@ class Explaining {
   std::vector<Hypothesis> Run() {
     RowProblem problem = MakeProblem(a_, b_, MatchJoints(a_.spec, b_.spec), tolerance_);
     std::vector<RowFinding> rows = SearchRows(problem);
-    const bool is_misread = std::any_of(rows.begin(), rows.end(), [](const RowFinding& row) {
-      return !row.is_placed || !row.readings.empty();
-    });
+    const bool is_misread = std::ranges::any_of(
+        rows, [](const RowFinding& row) { return !row.is_placed || !row.readings.empty(); });
     if (!is_misread || !FindMisreadTable(&problem, &rows)) {
       for (const Finding& finding : ReportRows(a_, rows)) found_.push_back(finding);
     }
@@ -193,15 +191,15 @@ class Explaining {
 
  private:
   static bool IsRightEverywhere(const std::vector<RowFinding>& rows) {
-    return std::all_of(rows.begin(), rows.end(),
-                       [](const RowFinding& row) { return row.is_placed && row.readings.empty(); });
+    return std::ranges::all_of(rows,
+                               [](const RowFinding& row) { return row.is_placed && row.readings.empty(); });
   }
 
   /// Tables of Denavit-Hartenberg rows that were meant in another way.
   bool FindMisreadTable(RowProblem* problem, std::vector<RowFinding>* rows) {
     const std::vector<Joint>& joints = a_.spec.joints;
-    if (std::none_of(joints.begin(), joints.end(),
-                     [](const Joint& joint) { return joint.mdh.alpha != 0.0 || joint.mdh.a != 0.0; }))
+    if (std::ranges::none_of(joints,
+                             [](const Joint& joint) { return joint.mdh.alpha != 0.0 || joint.mdh.a != 0.0; }))
       return false;
     const auto same = [](MdhRow row) { return row; };
     const auto radians = [](MdhRow row) {
@@ -257,8 +255,8 @@ class Explaining {
         {is_along, "gravity.value", "gravity has the right direction and another value"},
         {std::abs(own.norm() - right.norm()) <= few, "gravity.axis", "gravity points along another axis"},
         {true, "gravity.other", "gravity differs"}};
-    const auto first = std::find_if(std::begin(readings), std::end(readings),
-                                    [](const auto& reading) { return std::get<0>(reading); });
+    const auto first =
+        std::ranges::find_if(readings, [](const auto& reading) { return std::get<0>(reading); });
     finding.ids = {std::get<1>(*first)};
     finding.one = {std::get<2>(*first)};
     finding.values.push_back("gravity: " + ShowNumbers(own) + "; right would be " + ShowNumbers(right));

@@ -1,10 +1,9 @@
-#include "harness/descriptions/link_body.h"
-
 #include <algorithm>
 #include <cmath>
 #include <tuple>
 
 #include "controller/model/body_frame.h"
+#include "harness/descriptions/fault_search.h"
 
 namespace dexcheck {
 
@@ -86,14 +85,13 @@ bool Describe(const std::vector<DescribedPart>& parts, const MassProperties& bod
   constexpr double kRounding = 1e-9;
   if (parts.size() < 2) return false;
   const StatedPart whole{CombineOthers(parts, parts.size())};
-  return std::all_of(std::begin(kBodyQuantities), std::end(kBodyQuantities), [&](Quantity quantity) {
+  return std::ranges::all_of(kBodyQuantities, [&](Quantity quantity) {
     return AgreesIn(quantity, whole, StatedPart{body}, 1.0, kRounding);
   });
 }
 
 const DescribedPart* FindByName(const std::vector<DescribedPart>& parts, const std::string& name) {
-  const auto found =
-      std::find_if(parts.begin(), parts.end(), [&](const DescribedPart& part) { return part.name == name; });
+  const auto found = std::ranges::find(parts, name, &DescribedPart::name);
   return found == parts.end() ? nullptr : &*found;
 }
 
@@ -143,9 +141,9 @@ std::optional<PartView> ViewRight(const LinkBody& link, size_t k) {
 }
 
 int CountRight(const StatedPart& a, const StatedPart& b, const Closeness& close) {
-  return static_cast<int>(std::count_if(
-      std::begin(kBodyQuantities), std::end(kBodyQuantities),
-      [&](Quantity quantity) { return AgreesIn(quantity, a, b, close.length, close.tolerance); }));
+  return static_cast<int>(std::ranges::count_if(kBodyQuantities, [&](Quantity quantity) {
+    return AgreesIn(quantity, a, b, close.length, close.tolerance);
+  }));
 }
 
 /// Keeps the better of two.

@@ -211,7 +211,7 @@ class MjcfDescriptionReader {
     for (size_t i = 0; i < robot_.joints.size(); ++i) {
       std::optional<JointCoupling> coupling = FindEngineCoupling(engine_, joint_ids_[i]);
       if (!coupling) continue;
-      const auto leader = std::find(joint_ids_.begin(), joint_ids_.end(), coupling->leader);
+      const auto leader = std::ranges::find(joint_ids_, coupling->leader);
       if (leader == joint_ids_.end()) continue;
       coupling->leader = static_cast<int>(leader - joint_ids_.begin());
       robot_.spec.joints[i].coupling = coupling;
@@ -261,7 +261,7 @@ std::string ReduceToMechanism(const MjcfFile& mjcf) {
   MjcfFile reduced(mjcf.PrintFor(std::filesystem::current_path()), mjcf.source());
   tinyxml2::XMLElement* const root = reduced.root();
   const auto keeps = [](std::string_view name, std::initializer_list<std::string_view> kept) {
-    return std::find(kept.begin(), kept.end(), name) != kept.end();
+    return std::ranges::find(kept, name) != kept.end();
   };
   bool uses_geoms = false;
   for (tinyxml2::XMLElement* child : ListChildren(root)) {

@@ -1,8 +1,10 @@
 #pragma once
 
-// An MJCF from a description of a robot, where its user has none.
+// Files that the engine reads: an MJCF from a description whose user has none, and a URDF as its importer
+// should read it.
 
 #include <string>
+#include <string_view>
 
 #include "harness/descriptions/robot_description.h"
 
@@ -14,5 +16,11 @@ namespace dexcheck {
 /// @param origin what it was made from, for its first comment.
 /// @throws InputError for a base that moves and for ball joints.
 std::string WriteMjcf(const RobotDescription& robot, const std::string& origin);
+
+/// A URDF as the engine's own importer should read it: without looks and collision shapes, whose meshes
+/// nobody needs, without inertials of what is fixed to the world, each link a body of its own (<compiler
+/// fusestatic="false"/>), and the root on a floating joint when it floats.
+/// @throws InputError as UrdfFile.
+std::string WriteEngineUrdf(std::string_view text, const std::string& source, bool floats);
 
 }  // namespace dexcheck

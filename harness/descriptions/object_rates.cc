@@ -1,6 +1,6 @@
-#include "harness/descriptions/object_rates.h"
-
 #include <mujoco/mujoco.h>
+
+#include "harness/descriptions/engine_provider.h"
 
 namespace dexcheck {
 

@@ -27,8 +27,7 @@ std::vector<Pose> CalcZeroPoses(const RobotDescription& robot) {
 }
 
 bool HasParts(const RobotDescription& robot, int joint) {
-  return std::any_of(robot.parts.begin(), robot.parts.end(),
-                     [&](const DescribedPart& part) { return part.joint == joint; });
+  return std::ranges::any_of(robot.parts, [&](const DescribedPart& part) { return part.joint == joint; });
 }
 
 }  // namespace
@@ -113,7 +112,7 @@ std::vector<DescribedPart> ListParts(const RobotDescription& robot, int joint, c
 
 std::vector<LinkPlace> PlaceLinks(const RobotDescription& a, const RobotDescription& b) {
   const std::vector<int> b_of_a = MatchJoints(a.spec, b.spec);
-  if (std::find(b_of_a.begin(), b_of_a.end(), -1) != b_of_a.end()) return {};
+  if (std::ranges::find(b_of_a, -1) != b_of_a.end()) return {};
   const std::vector<Pose> poses_a = CalcZeroPoses(a);
   const std::vector<Pose> poses_b = CalcZeroPoses(b);
   std::vector<LinkPlace> places;

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <cstdlib>
 #include <limits>
-#include <vector>
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
@@ -110,18 +109,14 @@ class ParameterWriter {
   void WriteHead(const std::string& origin) {
     text_ += kImportMark + FormatComment(origin) + ".\n";
     for (const std::string& note : robot_.notes) text_ += "# Note: " + FormatComment(note) + ".\n";
-    text_ +=
-        "#\n"
-        "# Each row is a joint and the link that it moves. The link's frame stands at xyz (m), rpy (rad; R = "
-        "Rz(yaw)\n"
-        "# Ry(pitch) Rx(roll)) in its parent's frame when the joint is at zero, and turns about, or moves "
-        "along, axis\n"
-        "# ([0, 0, 1] unless given; a ball turns about all). A link's com (m) is the centre of mass from its "
-        "frame's origin; its "
-        "inertia\n"
-        "# [Ixx, Iyy, Izz, Ixy, Ixz, Iyz] (kg m^2) is about the centre of mass, along its frame's axes. "
-        "Damping is in\n"
-        "# N m s/rad or N s/m, armature in kg m^2 or kg, range in rad or m.\n\n";
+    text_ += R"(#
+# Each row is a joint and the link that it moves. The link's frame stands at xyz (m), rpy (rad; R = Rz(yaw)
+# Ry(pitch) Rx(roll)) in its parent's frame when the joint is at zero, and turns about, or moves along, axis
+# ([0, 0, 1] unless given; a ball turns about all). A link's com (m) is the centre of mass from its frame's origin; its inertia
+# [Ixx, Iyy, Izz, Ixy, Ixz, Iyz] (kg m^2) is about the centre of mass, along its frame's axes. Damping is in
+# N m s/rad or N s/m, armature in kg m^2 or kg, range in rad or m.
+
+)";
     text_ += "name = " + QuoteToml(spec_.name) + "\n";
     text_ += "gravity = " + FormatNumbers(spec_.gravity);
     text_ += robot_.states_gravity ? "\n\n" : "  # not stated there\n\n";

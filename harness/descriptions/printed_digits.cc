@@ -44,8 +44,7 @@ std::string ReplaceNumbers(std::string_view list, bool is_of_body, const Replace
   while (!list.empty()) {
     const bool is_gap = IsSeparator(list.front());
     const size_t length = static_cast<size_t>(
-        std::find_if(list.begin(), list.end(), [&](char c) { return IsSeparator(c) != is_gap; }) -
-        list.begin());
+        std::ranges::find_if(list, [&](char c) { return IsSeparator(c) != is_gap; }) - list.begin());
     const std::string_view word = list.substr(0, length);
     const std::optional<PrintedNumber> number = is_gap ? std::nullopt : ReadPrinted(word);
     result += number ? replace({*number, is_of_body}, word) : std::string(word);
@@ -57,7 +56,7 @@ std::string ReplaceNumbers(std::string_view list, bool is_of_body, const Replace
 /// Whether an element is one of these names or stands in one.
 bool IsIn(const Element* element, std::initializer_list<std::string_view> names) {
   for (; element != nullptr; element = element->Parent()->ToElement()) {
-    if (std::find(names.begin(), names.end(), element->Name()) != names.end()) return true;
+    if (std::ranges::find(names, element->Name()) != names.end()) return true;
   }
   return false;
 }
@@ -67,8 +66,7 @@ void ReplaceInXml(Element* root, const Replace& replace) {
     if (IsIn(element, {"visual", "collision"})) return;
     const bool is_of_body = IsIn(element, {"inertial", "geom"});
     for (const tinyxml2::XMLAttribute* at = element->FirstAttribute(); at != nullptr; at = at->Next()) {
-      if (std::find(std::begin(kAttributes), std::end(kAttributes), at->Name()) == std::end(kAttributes))
-        continue;
+      if (std::ranges::find(kAttributes, at->Name()) == std::end(kAttributes)) continue;
       element->SetAttribute(at->Name(), ReplaceNumbers(at->Value(), is_of_body, replace).c_str());
     }
   });
@@ -95,7 +93,7 @@ std::string ReplaceInToml(std::string_view text, const Replace& replace) {
     text.remove_prefix(length);
     // The key that stands before its numbers.
     if (!number && std::isalpha(static_cast<unsigned char>(first)) != 0)
-      is_of_body = std::find(std::begin(kOfBody), std::end(kOfBody), word) != std::end(kOfBody);
+      is_of_body = std::ranges::find(kOfBody, word) != std::end(kOfBody);
   }
   return result;
 }
@@ -143,7 +141,16 @@ class Mover {
 class NumberedFile {
  public:
   virtual ~NumberedFile() = default;
-  [[nodiscard]] virtual PrintedSpread Draw(int count, const Values& exact) const = 0;
+  [[nodiscard]] PrintedSpread Draw(int count, const Values& exact) const {
+    PrintedSpread spread;
+    spread.digits = CountDigits(exact);
+    spread.nominal = ReadNominal(&spread.undiagonalized);
+    for (int k = 0; k < count; ++k) {
+      std::optional<RobotDescription> moved = ReadMoved(Mover(static_cast<unsigned>(k), exact));
+      if (moved) spread.draws.push_back(*std::move(moved));
+    }
+    return spread;
+  }
 
   [[nodiscard]] Values ListValues() const {
     Values values;
@@ -156,6 +163,10 @@ class NumberedFile {
  protected:
   /// All numbers that describe the mechanism.
   virtual void Visit(const std::function<void(const FileNumber&)>& visit) const = 0;
+  /// As the file has it. @param undiagonalized PrintedSpread::undiagonalized.
+  virtual RobotDescription ReadNominal(std::optional<RobotDescription>* undiagonalized) const = 0;
+  /// With its numbers moved; none where that is no robot.
+  [[nodiscard]] virtual std::optional<RobotDescription> ReadMoved(Mover mover) const = 0;
 
   [[nodiscard]] PrintedDigits CountDigits(const Values& exact) const {
     PrintedDigits digits;
@@ -209,14 +220,6 @@ class NumberedMjcf : public NumberedFile {
   explicit NumberedMjcf(const DescriptionFile& file)
       : source_(file.path().string()), text_(ReduceToMechanism(file.document())) {}
 
-  [[nodiscard]] PrintedSpread Draw(int count, const Values& exact) const override {
-    PrintedSpread spread;
-    spread.digits = CountDigits(exact);
-    spread.nominal = ReadNominal(&spread.undiagonalized);
-    for (int k = 0; k < count; ++k) spread.draws.push_back(ReadMoved(Mover(static_cast<unsigned>(k), exact)));
-    return spread;
-  }
-
  protected:
   void Visit(const std::function<void(const FileNumber&)>& visit) const override {
     const MjcfFile mjcf(text_, source_);
@@ -227,8 +230,7 @@ class NumberedMjcf : public NumberedFile {
     ReplaceInXml(mjcf.root(), AsReplace(visit));
   }
 
- private:
-  [[nodiscard]] RobotDescription ReadNominal(std::optional<RobotDescription>* undiagonalized) const {
+  RobotDescription ReadNominal(std::optional<RobotDescription>* undiagonalized) const override {
     const MjcfFile mjcf(text_, source_);
     const MjModelPtr engine = LoadMjcfText(text_, source_);
     RobotDescription robot = ReadMjcfDescription(*engine, source_);
@@ -245,7 +247,7 @@ class NumberedMjcf : public NumberedFile {
     return robot;
   }
 
-  [[nodiscard]] RobotDescription ReadMoved(Mover mover) const {
+  [[nodiscard]] std::optional<RobotDescription> ReadMoved(Mover mover) const override {
     const MjcfFile mjcf(text_, source_);
     ReplaceInXml(mjcf.root(), mover.AsReplace());
     const MjModelPtr engine = LoadMjcfText(mjcf.Print(), source_);
@@ -259,6 +261,7 @@ class NumberedMjcf : public NumberedFile {
     return robot;
   }
 
+ private:
   std::string source_;
   std::string text_;
 };
@@ -270,26 +273,21 @@ class NumberedText : public NumberedFile {
     options_.keep_impossible = true;
   }
 
-  [[nodiscard]] PrintedSpread Draw(int count, const Values& exact) const override {
-    PrintedSpread spread;
-    spread.digits = CountDigits(exact);
-    spread.nominal = file_.Describe();
-    for (int k = 0; k < count; ++k) {
-      Mover mover(static_cast<unsigned>(k), exact);
-      try {
-        DescriptionFile moved(file_.path(), ReplaceAll(mover.AsReplace()), options_);
-        if (file_.carrier()) moved.PlaceOn(*file_.carrier());
-        spread.draws.push_back(moved.Describe());
-      } catch (const InputError&) {
-        // A parameter file's bodies must be some: of a slender one that may fail.
-      }
-    }
-    return spread;
-  }
-
  protected:
   void Visit(const std::function<void(const FileNumber&)>& visit) const override {
     static_cast<void>(ReplaceAll(AsReplace(visit)));
+  }
+
+  RobotDescription ReadNominal(std::optional<RobotDescription>*) const override { return file_.Describe(); }
+
+  [[nodiscard]] std::optional<RobotDescription> ReadMoved(Mover mover) const override {
+    try {
+      DescriptionFile moved(file_.path(), ReplaceAll(mover.AsReplace()), options_);
+      if (file_.carrier()) moved.PlaceOn(*file_.carrier());
+      return moved.Describe();
+    } catch (const InputError&) {
+      return std::nullopt;  // a parameter file's bodies must be some: of a slender one that may fail
+    }
   }
 
  private:

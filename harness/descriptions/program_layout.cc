@@ -1,12 +1,10 @@
 #include "harness/descriptions/program_layout.h"
 
 #include <algorithm>
-#include <cmath>
 #include <initializer_list>
-#include <numeric>
-#include <utility>
 
 #include "controller/common/errors.h"
+#include "controller/common/linear_algebra.h"
 #include "controller/common/text.h"
 #include "harness/descriptions/join_names.h"
 
@@ -54,40 +52,36 @@ BaseConvention ReadConvention(const Json& table, const std::string& source) {
   return convention;
 }
 
+void RequireList(const Json& list, Eigen::Index size, const char* of, const std::string& key,
+                 const std::string& source) {
+  if (list.is_array() && list.size() == static_cast<size_t>(size)) return;
+  Fail(source, key,
+       "must be a list of " + std::to_string(size) + " " + of + ", got " +
+           (list.is_array() ? std::to_string(list.size()) : Abbreviate(list.dump())));
+}
+
+double ReadNumber(const Json& value, const std::string& key, const std::string& source) {
+  if (!value.is_number()) Fail(source, key, "must be a number, got " + Abbreviate(value.dump()));
+  return value.get<double>();
+}
+
 VectorXd ReadVector(const Json& list, Eigen::Index size, const std::string& key, const std::string& source) {
-  if (!list.is_array() || list.size() != static_cast<size_t>(size)) {
-    Fail(source, key,
-         "must be a list of " + std::to_string(size) + " numbers, got " +
-             (list.is_array() ? std::to_string(list.size()) : Abbreviate(list.dump())));
-  }
+  RequireList(list, size, "numbers", key, source);
   VectorXd values(size);
   for (Eigen::Index i = 0; i < size; ++i) {
-    const Json& value = list[static_cast<size_t>(i)];
-    if (!value.is_number()) {
-      Fail(source, key + "[" + std::to_string(i) + "]", "must be a number, got " + Abbreviate(value.dump()));
-    }
-    values[i] = value.get<double>();
+    values[i] = ReadNumber(list[static_cast<size_t>(i)], key + "[" + std::to_string(i) + "]", source);
   }
   return values;
 }
 
 MatrixXd ReadMatrix(const Json& rows, Eigen::Index size, const std::string& key, const std::string& source) {
-  if (!rows.is_array() || rows.size() != static_cast<size_t>(size)) {
-    Fail(source, key,
-         "must be a list of " + std::to_string(size) + " rows, got " +
-             (rows.is_array() ? std::to_string(rows.size()) : Abbreviate(rows.dump())));
-  }
+  RequireList(rows, size, "rows", key, source);
   MatrixXd M(size, size);
   for (Eigen::Index i = 0; i < size; ++i) {
     M.row(i) = ReadVector(rows[static_cast<size_t>(i)], size, key + "[" + std::to_string(i) + "]", source)
                    .transpose();
   }
   return M;
-}
-
-double ReadNumber(const Json& value, const std::string& key, const std::string& source) {
-  if (!value.is_number()) Fail(source, key, "must be a number, got " + Abbreviate(value.dump()));
-  return value.get<double>();
 }
 
 }  // namespace
@@ -99,13 +93,11 @@ ProgramLayout::ProgramLayout(const RobotDescription& robot)
   }
   const RobotModel model(robot.spec);
   for (int i = 0; i < model.num_joints(); ++i) {
-    const Joint& joint = model.joints()[static_cast<size_t>(i)];
+    const Joint& joint = model.joint(i);
     robot_joints_.push_back({joint.name, model.position_index(i), CountPositions(joint.type), model.dof(i),
                              CountVelocities(joint.type), joint.coupling.has_value()});
   }
-  std::vector<int> all(robot_joints_.size());
-  std::iota(all.begin(), all.end(), 0);
-  SetJoints(std::move(all));
+  SetJoints(ListIndices(robot_joints_.size()));
 }
 
 void ProgramLayout::SetJoints(std::vector<int> joints) {
@@ -117,9 +109,8 @@ void ProgramLayout::SetJoints(std::vector<int> joints) {
     num_positions_ += joint.num_positions;
     for (int k = 0; k < joint.num_velocities; ++k) velocities_.push_back(joint.velocity + k);
   }
-  places_.resize(velocities_.size());
-  std::iota(places_.begin(), places_.end(), 0);
-  std::sort(places_.begin(), places_.end(), [this](int a, int b) {
+  places_ = ListIndices(velocities_.size());
+  std::ranges::sort(places_, [this](int a, int b) {
     return velocities_[static_cast<size_t>(a)] < velocities_[static_cast<size_t>(b)];
   });
 }
@@ -141,7 +132,7 @@ ProgramLayout::ProgramLayout(const RobotDescription& robot, const Json& json, co
     const std::string key = "joints[" + std::to_string(i) + "]";
     if (!list[i].is_string()) Fail(source, key, "must be a name, got " + Abbreviate(list[i].dump()));
     const std::string name = list[i].get<std::string>();
-    const auto found = std::find(names.begin(), names.end(), name);
+    const auto found = std::ranges::find(names, name);
     if (found == names.end()) {
       const std::string nearest = FindNearest(name, names);
       Fail(source, key,
@@ -178,15 +169,15 @@ nlohmann::ordered_json ProgramLayout::ToJson() const {
   const auto is_ball = [this](int joint) {
     return robot_joints_[static_cast<size_t>(joint)].num_positions > 1;
   };
-  if (std::any_of(joints_.begin(), joints_.end(), is_ball)) {
+  if (std::ranges::any_of(joints_, is_ball)) {
     json["balls"] = nlohmann::ordered_json::array();
     for (const int joint : joints_) {
       if (is_ball(joint)) json["balls"].push_back(robot_joints_[static_cast<size_t>(joint)].name);
     }
   }
   if (base_ == 0) return json;
-  const auto position = std::find_if(std::begin(kPositions), std::end(kPositions),
-                                     [&](const auto& entry) { return entry.second == convention_.position; });
+  const auto position =
+      std::ranges::find_if(kPositions, [&](const auto& one) { return one.second == convention_.position; });
   json["base"] = {{"position", position->first},
                   {"velocity", convention_.angular_first ? "angular_linear" : "linear_angular"},
                   {"linear_axes", convention_.linear_in_base ? "base" : "world"},
@@ -257,7 +248,7 @@ TermResults ReadResult(const Json& json, const ProgramLayout& layout, const Vect
   if (const Json* U = find("potential_energy")) terms.potential = ReadNumber(*U, "potential_energy", source);
   constexpr Term kAll[] = {Term::kMBar,     Term::kCBarXi,        Term::kGravity,        Term::kBias,
                            Term::kFriction, Term::kKineticEnergy, Term::kPotentialEnergy};
-  if (std::none_of(std::begin(kAll), std::end(kAll), [&](Term term) { return terms.Has(term); })) {
+  if (std::ranges::none_of(kAll, [&](Term term) { return terms.Has(term); })) {
     throw InputError(source +
                      ": must have M, C, c, g, h, friction, kinetic_energy or potential_energy, got " +
                      Abbreviate(json.dump()));

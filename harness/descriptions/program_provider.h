@@ -2,7 +2,6 @@
 
 // A program of the user's that computes terms at states: the protocol is in README.md.
 
-#include <memory>
 #include <string>
 
 #include "harness/descriptions/program_layout.h"

@@ -39,7 +39,7 @@ void StateSource::DrawPositions(VectorXd* q) {
         std::sqrt(u) * std::sin(second), std::sqrt(u) * std::cos(second);
   }
   for (int i = 0; i < model_->num_joints(); ++i) {
-    const Joint& joint = model_->joints()[static_cast<size_t>(i)];
+    const Joint& joint = model_->joint(i);
     const int at = model_->position_index(i);
     if (joint.type != JointType::kBall) {
       (*q)[at] = Draw(joint.lower, joint.upper);
@@ -63,7 +63,7 @@ void StateSource::DrawVelocity(VectorXd* xi) {
     (*xi)[1] = forward - turn;
   }
   for (int i = 0; i < model_->num_dofs(); ++i) {
-    const Joint& joint = model_->joints()[static_cast<size_t>(model_->joint_of_dof(i))];
+    const Joint& joint = model_->joint(model_->joint_of_dof(i));
     const bool slides = joint.type == JointType::kPrismatic;
     (*xi)[base + i] = draw(slides ? range_.linear_speed : range_.joint_speed);
   }

@@ -129,7 +129,7 @@ void ResultFiles::ReadLines(const std::filesystem::path& path) {
         ReadResult(json, layout(), layout().WriteVelocities(Row(q_, state), Row(v_, state)), source);
     seen[sample] = true;
   }
-  const auto missing = std::find(seen.begin(), seen.end(), false);
+  const auto missing = std::ranges::find(seen, false);
   if (missing == seen.end()) return;
   throw InputError(path.string() + ": must have a line for each state, got none for state " +
                    std::to_string(missing - seen.begin()));

@@ -84,9 +84,8 @@ void LetBaseFloat(RobotDescription* robot) {
 bool MoveBaseTo(const std::string& frame, RobotDescription* robot) {
   RobotSpec& spec = robot->spec;
   if (frame == spec.base.link) return true;
-  const auto found = std::find_if(spec.frames.begin(), spec.frames.end(), [&](const Frame& candidate) {
-    return candidate.link < 0 && candidate.name == frame;
-  });
+  const auto found = std::ranges::find_if(
+      spec.frames, [&](const Frame& candidate) { return candidate.link < 0 && candidate.name == frame; });
   if (found == spec.frames.end()) return false;
   const Pose X_F0 = found->X_LF.inverse();  // Sigma_0 in the frame
   *found = {spec.base.link, -1, X_F0, std::nullopt};
@@ -125,7 +124,7 @@ std::vector<std::string> DescribeBalls(const RobotDescription& robot) {
   const RobotModel model(robot.spec);
   std::vector<std::string> places;
   for (int i = 0; i < model.num_joints(); ++i) {
-    const Joint& joint = model.joints()[static_cast<size_t>(i)];
+    const Joint& joint = model.joint(i);
     if (joint.type != JointType::kBall) continue;
     const auto range = [](int first, int count) {
       return "[" + std::to_string(first) + ".." + std::to_string(first + count - 1) + "]";

@@ -2,7 +2,6 @@
 
 // What a file says of a robot, beside what stands in its place where the file says nothing.
 
-#include <optional>
 #include <string>
 #include <vector>
 

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <set>
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
@@ -15,8 +14,8 @@ namespace {
 
 /// The joint with that name, or that moves the link of that name as its own; -1.
 int FindJoint(const RobotSpec& spec, const std::string& name, std::string Joint::*part = &Joint::name) {
-  const auto found = std::find_if(spec.joints.begin(), spec.joints.end(),
-                                  [&](const Joint& joint) { return joint.*part == name; });
+  const auto found =
+      std::ranges::find_if(spec.joints, [&](const Joint& joint) { return joint.*part == name; });
   return found == spec.joints.end() ? -1 : static_cast<int>(found - spec.joints.begin());
 }
 
@@ -126,8 +125,7 @@ void HoldFollowers(const RobotSpec& spec, std::map<std::string, double>* held) {
 
 bool HasLink(const RobotDescription& robot, const std::string& name) {
   return FindJoint(robot.spec, name, &Joint::link) >= 0 ||
-         std::any_of(robot.parts.begin(), robot.parts.end(),
-                     [&](const DescribedPart& part) { return part.name == name; });
+         std::ranges::any_of(robot.parts, [&](const DescribedPart& part) { return part.name == name; });
 }
 
 double SumMasses(const RobotDescription& robot, const std::vector<bool>& is_in) {
@@ -173,7 +171,7 @@ std::vector<std::string> TakePart(const RobotPart& part, RobotDescription* a, Ro
   std::vector<std::string> notes = TakeJointNames(*a, b);
   // What one of the two calls a joint is as good as what the other calls it.
   const auto translate = [&](const std::string& name) {
-    const auto found = std::find(of_b.begin(), of_b.end(), name);
+    const auto found = std::ranges::find(of_b, name);
     return found == of_b.end() ? name : b->spec.joints[static_cast<size_t>(found - of_b.begin())].name;
   };
   const auto require = [&](bool is_there, const std::string& name, const char* option) {
@@ -245,7 +243,7 @@ std::optional<RobotPart> FindCommonPart(const RobotDescription& a, const RobotDe
                     (types[0] == BaseType::kFloating || types[1] == BaseType::kFloating);
   const auto find = [&](const RobotDescription& robot, const RobotDescription& other) {
     const std::vector<int> match = MatchJoints(robot.spec, other.spec);
-    const auto missing = std::count(match.begin(), match.end(), -1);
+    const auto missing = std::ranges::count(match, -1);
     std::vector<bool> is_gone(match.size(), false);
     for (size_t i = 0; i < match.size(); ++i) {
       if (match[i] >= 0 || is_gone[i]) continue;

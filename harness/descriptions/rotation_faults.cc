@@ -1,4 +1,3 @@
-#include "controller/common/text.h"
 #include "harness/descriptions/conventions.h"
 #include "harness/descriptions/parameter_writer.h"
 

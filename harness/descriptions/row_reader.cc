@@ -3,8 +3,8 @@
 
 #include "controller/common/text.h"
 #include "controller/model/body_frame.h"
+#include "harness/descriptions/fault_search.h"
 #include "harness/descriptions/parameter_writer.h"
-#include "harness/descriptions/row_search.h"
 
 namespace dexcheck {
 namespace {

@@ -2,7 +2,7 @@
 #include <map>
 #include <set>
 
-#include "harness/descriptions/finding.h"
+#include "harness/descriptions/fault_search.h"
 
 namespace dexcheck {
 namespace {
@@ -46,9 +46,8 @@ class RowReport {
         for (const std::string& id : ListIds(open_[i])) rows_of[id].push_back(i);
       }
       if (rows_of.empty()) return std::move(found_);
-      const auto most = std::max_element(rows_of.begin(), rows_of.end(), [](const auto& x, const auto& y) {
-        return x.second.size() < y.second.size();
-      });
+      const auto most = std::ranges::max_element(
+          rows_of, [](const auto& x, const auto& y) { return x.second.size() < y.second.size(); });
       Take(rows_of, most->second);
     }
   }
@@ -56,8 +55,8 @@ class RowReport {
  private:
   static bool Has(const RowReading& reading, const std::string& id) {
     return reading.number == id ||
-           std::any_of(reading.conventions.begin(), reading.conventions.end(),
-                       [&](const Convention* convention) { return convention->id == id; });
+           std::ranges::any_of(reading.conventions,
+                               [&](const Convention* convention) { return convention->id == id; });
   }
 
   /// One finding of these rows: all ids that explain each of them.
@@ -70,10 +69,9 @@ class RowReport {
       const std::string& id = entry.first;
       if (entry.second != rows) continue;
       const std::vector<RowReading>& readings = open_[rows[0]].readings;
-      const bool is_beside =
-          !taken.empty() && std::any_of(readings.begin(), readings.end(), [&](const RowReading& reading) {
-            return Has(reading, id) && Has(reading, taken);
-          });
+      const bool is_beside = !taken.empty() && std::ranges::any_of(readings, [&](const RowReading& reading) {
+        return Has(reading, id) && Has(reading, taken);
+      });
       if (is_beside) continue;  // both at once are two faults
       if (taken.empty()) taken = id;
       finding.ids.push_back(id);

@@ -1,8 +1,8 @@
-#include "harness/descriptions/row_search.h"
-
 #include <algorithm>
 #include <functional>
 #include <map>
+
+#include "harness/descriptions/fault_search.h"
 
 namespace dexcheck {
 namespace {
@@ -22,7 +22,7 @@ class RowSearch {
 
  private:
   static bool IsExplainedByOne(const std::vector<RowFinding>& findings) {
-    return std::count_if(findings.begin(), findings.end(), [](const RowFinding& finding) {
+    return std::ranges::count_if(findings, [](const RowFinding& finding) {
              return !finding.is_placed || !finding.readings.empty();
            }) <= 1;
   }
@@ -169,11 +169,11 @@ class RowSearch {
   /// The cheapest; the row as it is stands alone, since what is wrong is then another's.
   static void Keep(std::vector<RowReading> readings, const Pose& X_PR, RowFinding* finding) {
     const auto cheaper = [](const RowReading& a, const RowReading& b) { return a.cost < b.cost; };
-    const double least = std::min_element(readings.begin(), readings.end(), cheaper)->cost;
+    const double least = std::ranges::min_element(readings, cheaper)->cost;
     std::erase_if(readings, [&](const RowReading& reading) { return reading.cost > least + kSameCost; });
     // Another place is what any of the others is.
     const auto is_place = [](const RowReading& reading) { return reading.number == "number.place"; };
-    if (!std::all_of(readings.begin(), readings.end(), is_place)) std::erase_if(readings, is_place);
+    if (!std::ranges::all_of(readings, is_place)) std::erase_if(readings, is_place);
     finding->X_ab = readings[0].part.X_PL.inverse() * X_PR;
     finding->is_placed = true;
     const bool is_right = readings[0].conventions.empty() && readings[0].number.empty();

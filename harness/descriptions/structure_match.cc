@@ -1,10 +1,9 @@
-#include "harness/descriptions/structure_match.h"
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <map>
 
+#include "harness/descriptions/alike_names.h"
 #include "harness/descriptions/own_rows.h"
 
 namespace dexcheck {

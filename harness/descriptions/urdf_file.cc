@@ -22,7 +22,7 @@ using Element = tinyxml2::XMLElement;
 /// The part of that name; nullptr when there is none.
 template <typename Part>
 const Part* Find(const std::vector<Part>& parts, std::string_view name) {
-  const auto found = std::find_if(parts.begin(), parts.end(), [&](const Part& p) { return p.name == name; });
+  const auto found = std::ranges::find(parts, name, &Part::name);
   return found == parts.end() ? nullptr : &*found;
 }
 
@@ -160,14 +160,14 @@ void UrdfFile::RejectCycles() const {
     reached[static_cast<size_t>(index)] = true;
     for (const int child : link(index).child_joints) open.push_back(joint(child).child);
   }
-  const auto lost = std::find(reached.begin(), reached.end(), false);
+  const auto lost = std::ranges::find(reached, false);
   if (lost != reached.end()) FailCycle(static_cast<size_t>(lost - reached.begin()));
 }
 
 /// Follows the parents of a link that no root carries until one comes again.
 void UrdfFile::FailCycle(size_t link) const {
   std::vector<size_t> path;
-  while (std::find(path.begin(), path.end(), link) == path.end()) {
+  while (std::ranges::find(path, link) == path.end()) {
     path.push_back(link);
     link = static_cast<size_t>(joint(links_[link].parent_joint).parent);
   }

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <optional>
 #include <set>
 #include <utility>
@@ -103,7 +102,7 @@ class UrdfReader {
     const std::string key = KeyOf(joint);
     constexpr std::string_view kTypes[] = {"fixed",     "revolute", "continuous",
                                            "prismatic", "floating", "planar"};
-    if (std::find(std::begin(kTypes), std::end(kTypes), joint.type) == std::end(kTypes))
+    if (std::ranges::find(kTypes, joint.type) == std::end(kTypes))
       file_.Fail(joint.line,
                  key + "type: must be fixed, revolute, continuous or prismatic, got " + Quote(joint.type));
     for (const auto& [name, attribute, is_required] : kJointNumbers) {

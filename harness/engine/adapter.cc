@@ -2,8 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <set>
-#include <string>
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"

@@ -6,13 +6,10 @@
 #include <optional>
 #include <sstream>
 #include <string>
-#include <string_view>
-#include <vector>
 
 #include "controller/common/text.h"
 #include "harness/engine/engine.h"
 #include "harness/engine/mjcf_passes.h"
-#include "harness/engine/mujoco_release.h"
 #include "harness/engine/robot_tree.h"
 #include "harness/engine/xml.h"
 

@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "controller/common/text.h"
-#include "harness/engine/engine.h"
 #include "harness/engine/map_vector.h"
 
 namespace dexcheck {
@@ -88,7 +86,7 @@ Clearance::Clearance(const mjModel& engine, const Adapter& adapter, const Solids
     for (const int index : {pair.a, pair.b}) {
       const Solid& s = solid(index);
       if (engine.body_weldid[s.body] == 0) {
-        const bool is_new = std::find(planes_.begin(), planes_.end(), index) == planes_.end();
+        const bool is_new = std::ranges::find(planes_, index) == planes_.end();
         if (s.shape == Solid::Shape::kPlane && is_new) planes_.push_back(index);
         continue;
       }
@@ -251,7 +249,7 @@ void Clearance::SetOverlap(int index, bool overlaps) {
   if (overlaps) {
     overlapping_.push_back(index);
   } else {
-    overlapping_.erase(std::find(overlapping_.begin(), overlapping_.end(), index));
+    overlapping_.erase(std::ranges::find(overlapping_, index));
   }
 }
 

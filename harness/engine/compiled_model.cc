@@ -1,11 +1,8 @@
 #include "harness/engine/compiled_model.h"
 
 #include <mujoco/mjxmacro.h>
-#include <mujoco/mujoco.h>
 
 #include <algorithm>
-#include <cmath>
-#include <cstddef>
 #include <cstdint>
 #include <cstring>
 #include <new>
@@ -14,12 +11,10 @@
 #include <vector>
 
 #include "controller/common/errors.h"
-#include "harness/engine/engine.h"
 #include "harness/engine/map_vector.h"
 #include "harness/engine/mujoco_release.h"
 
 namespace dexcheck {
-
 namespace {
 
 // The arrays of an mjModel stand one after the other in its one buffer.
@@ -78,70 +73,6 @@ void KeepRows(const std::vector<int>& stay, size_t columns, Number* rows) {
   }
 }
 
-}  // namespace
-
-int RemoveLooks(MjModelPtr* model, std::span<const int> wanted) {
-  mjModel* m = model->get();
-  std::vector<bool> keep(static_cast<size_t>(m->ngeom), false);
-  for (const int geom : wanted) keep[static_cast<size_t>(geom)] = true;
-  for (int geom = 0; geom < m->ngeom; ++geom) {
-    if (CanTouch(*m, geom) || m->geom_fluid[mjNFLUID * geom] != 0.0) keep[static_cast<size_t>(geom)] = true;
-  }
-  ForEachReference(m, [&](const int* geom) {
-    if (*geom >= 0) keep[static_cast<size_t>(*geom)] = true;
-  });
-  std::vector<int> stay;
-  std::vector<int> new_id(keep.size(), -1);
-  for (int geom = 0; geom < m->ngeom; ++geom) {
-    if (!keep[static_cast<size_t>(geom)]) continue;
-    new_id[static_cast<size_t>(geom)] = static_cast<int>(stay.size());
-    stay.push_back(geom);
-  }
-  const auto removed = static_cast<int>(m->ngeom) - static_cast<int>(stay.size());
-  if (removed == 0) return 0;
-
-  const auto renumber = [&](int* geom) {
-    if (*geom >= 0) *geom = new_id[static_cast<size_t>(*geom)];
-  };
-  ForEachReference(m, renumber);
-  for (int pair = 0; pair < m->npair; ++pair) {
-    renumber(m->pair_geom1 + pair);
-    renumber(m->pair_geom2 + pair);
-  }
-  ForEachArray(m, [&]<typename Number>(Number*& array, size_t, size_t columns, const ArrayName& array_name) {
-    if (array_name.rows == "ngeom") KeepRows(stay, columns, array);
-  });
-  *model = MakeResizedCopy(*m, [&](mjModel* smaller) { smaller->ngeom = static_cast<int>(stay.size()); });
-  m = model->get();
-  DropGeomTrees(m);
-
-  int next = 0;
-  for (int body = 0; body < m->nbody; ++body) {
-    const int first = next;
-    while (next < m->ngeom && m->geom_bodyid[next] == body) ++next;
-    m->body_geomnum[body] = next - first;
-    m->body_geomadr[body] = next > first ? first : -1;
-  }
-  return removed;
-}
-
-size_t RemovePictures(MjModelPtr* model) {
-  const mjModel& m = **model;
-  if (m.ntex == 0) return 0;
-  const auto before = static_cast<size_t>(m.nbuffer);
-  *model = MakeResizedCopy(m, [](mjModel* smaller) { smaller->ntex = smaller->ntexdata = 0; });
-  // In later releases a material has several. An empty array lies where the next one begins: names tell them.
-  ForEachArray(model->get(), [&]<typename Number>(Number*& array, size_t rows, size_t columns,
-                                                  const ArrayName& array_name) {
-    if constexpr (std::is_same_v<Number, int>) {
-      if (array_name.name == "mat_texid") std::fill_n(array, rows * columns, -1);
-    }
-  });
-  return before - static_cast<size_t>((*model)->nbuffer);
-}
-
-namespace {
-
 struct Rows {
   const void* data;
   size_t bytes;
@@ -184,45 +115,6 @@ void FillNameTable(mjModel* m) {
   });
 }
 
-}  // namespace
-
-MjModelPtr MakeResizedCopy(const mjModel& model, const std::function<void(mjModel*)>& resize) {
-  auto* m = static_cast<mjModel*>(mju_malloc(sizeof(mjModel)));
-  if (m == nullptr) throw std::bad_alloc();
-  *m = model;
-  std::vector<Rows> old;
-  ForEachArray(m, [&](auto* array, size_t rows, size_t columns, const ArrayName&) {
-    old.push_back({array, sizeof(*array) * rows * columns});
-  });
-  resize(m);
-  size_t names = 0;
-  ForEachKindOfName(m, [&](const int*, size_t count) { names += count; });
-  SetNameSlots(names, m);
-  size_t bytes = 0;
-  ForEachArray(m, [&](auto* array, size_t rows, size_t columns, const ArrayName&) {
-    bytes = AlignArray(bytes) + sizeof(*array) * rows * columns;
-  });
-  m->buffer = mju_malloc(bytes);
-  m->nbuffer = static_cast<decltype(m->nbuffer)>(bytes);
-  MjModelPtr resized(m);
-  if (m->buffer == nullptr) throw std::bad_alloc();
-  size_t offset = 0;
-  size_t i = 0;
-  ForEachArray(m, [&]<typename Number>(Number*& array, size_t rows, size_t columns, const ArrayName&) {
-    offset = AlignArray(offset);
-    const size_t size = sizeof(Number) * rows * columns;
-    array = reinterpret_cast<Number*>(static_cast<char*>(m->buffer) + offset);
-    std::memset(array, 0, size);
-    if (const size_t kept = std::min(size, old[i].bytes); kept > 0) std::memcpy(array, old[i].data, kept);
-    offset += size;
-    ++i;
-  });
-  FillNameTable(m);
-  return resized;
-}
-
-namespace {
-
 void FillPair(mjModel* m, int pair, const std::pair<int, int>& geoms) {
   const auto [a, b] = geoms;
   m->name_pairadr[pair] = static_cast<int>(m->nnames - 1);  // no name
@@ -242,21 +134,6 @@ void FillPair(mjModel* m, int pair, const std::pair<int, int>& geoms) {
         std::max(m->geom_friction[3 * a + kOfGeom[k]], m->geom_friction[3 * b + kOfGeom[k]]);
   }
 }
-
-}  // namespace
-
-MjModelPtr AddContactPairs(const mjModel& model, std::span<const std::pair<int, int>> geoms) {
-  if (CollidesByType(model)) {
-    throw InputError("MJCF: option collision: must be \"predefined\" for plant.collide");
-  }
-  const auto first = static_cast<int>(model.npair);
-  MjModelPtr resized =
-      MakeResizedCopy(model, [&](mjModel* m) { m->npair += static_cast<int>(geoms.size()); });
-  for (size_t k = 0; k < geoms.size(); ++k) FillPair(resized.get(), first + static_cast<int>(k), geoms[k]);
-  return resized;
-}
-
-namespace {
 
 // Of the largest distance between two bodies that hang on one another.
 constexpr double kRodRadius = 0.04;
@@ -359,13 +236,119 @@ void FillGeom(mjModel* m, int geom, const Bone& bone, double unit) {
 
 }  // namespace
 
+int RemoveLooks(MjModelPtr* model, std::span<const int> wanted) {
+  mjModel* m = model->get();
+  std::vector<bool> keep(static_cast<size_t>(m->ngeom), false);
+  for (const int geom : wanted) keep[static_cast<size_t>(geom)] = true;
+  for (int geom = 0; geom < m->ngeom; ++geom) {
+    if (CanTouch(*m, geom) || m->geom_fluid[mjNFLUID * geom] != 0.0) keep[static_cast<size_t>(geom)] = true;
+  }
+  ForEachReference(m, [&](const int* geom) {
+    if (*geom >= 0) keep[static_cast<size_t>(*geom)] = true;
+  });
+  std::vector<int> stay;
+  std::vector<int> new_id(keep.size(), -1);
+  for (int geom = 0; geom < m->ngeom; ++geom) {
+    if (!keep[static_cast<size_t>(geom)]) continue;
+    new_id[static_cast<size_t>(geom)] = static_cast<int>(stay.size());
+    stay.push_back(geom);
+  }
+  const auto removed = static_cast<int>(m->ngeom) - static_cast<int>(stay.size());
+  if (removed == 0) return 0;
+
+  const auto renumber = [&](int* geom) {
+    if (*geom >= 0) *geom = new_id[static_cast<size_t>(*geom)];
+  };
+  ForEachReference(m, renumber);
+  for (int pair = 0; pair < m->npair; ++pair) {
+    renumber(m->pair_geom1 + pair);
+    renumber(m->pair_geom2 + pair);
+  }
+  ForEachArray(m, [&]<typename Number>(Number*& array, size_t, size_t columns, const ArrayName& array_name) {
+    if (array_name.rows == "ngeom") KeepRows(stay, columns, array);
+  });
+  *model = MakeResizedCopy(*m, [&](mjModel* smaller) { smaller->ngeom = static_cast<int>(stay.size()); });
+  m = model->get();
+  DropGeomTrees(m);
+
+  int next = 0;
+  for (int body = 0; body < m->nbody; ++body) {
+    const int first = next;
+    while (next < m->ngeom && m->geom_bodyid[next] == body) ++next;
+    m->body_geomnum[body] = next - first;
+    m->body_geomadr[body] = next > first ? first : -1;
+  }
+  return removed;
+}
+
+size_t RemovePictures(MjModelPtr* model) {
+  const mjModel& m = **model;
+  if (m.ntex == 0) return 0;
+  const auto before = static_cast<size_t>(m.nbuffer);
+  *model = MakeResizedCopy(m, [](mjModel* smaller) { smaller->ntex = smaller->ntexdata = 0; });
+  // In later releases a material has several. An empty array lies where the next one begins: names tell them.
+  ForEachArray(model->get(), [&]<typename Number>(Number*& array, size_t rows, size_t columns,
+                                                  const ArrayName& array_name) {
+    if constexpr (std::is_same_v<Number, int>) {
+      if (array_name.name == "mat_texid") std::fill_n(array, rows * columns, -1);
+    }
+  });
+  return before - static_cast<size_t>((*model)->nbuffer);
+}
+
+MjModelPtr MakeResizedCopy(const mjModel& model, const std::function<void(mjModel*)>& resize) {
+  auto* m = static_cast<mjModel*>(mju_malloc(sizeof(mjModel)));
+  if (m == nullptr) throw std::bad_alloc();
+  *m = model;
+  std::vector<Rows> old;
+  ForEachArray(m, [&](auto* array, size_t rows, size_t columns, const ArrayName&) {
+    old.push_back({array, sizeof(*array) * rows * columns});
+  });
+  resize(m);
+  size_t names = 0;
+  ForEachKindOfName(m, [&](const int*, size_t count) { names += count; });
+  SetNameSlots(names, m);
+  size_t bytes = 0;
+  ForEachArray(m, [&](auto* array, size_t rows, size_t columns, const ArrayName&) {
+    bytes = AlignArray(bytes) + sizeof(*array) * rows * columns;
+  });
+  m->buffer = mju_malloc(bytes);
+  m->nbuffer = static_cast<decltype(m->nbuffer)>(bytes);
+  MjModelPtr resized(m);
+  if (m->buffer == nullptr) throw std::bad_alloc();
+  size_t offset = 0;
+  size_t i = 0;
+  ForEachArray(m, [&]<typename Number>(Number*& array, size_t rows, size_t columns, const ArrayName&) {
+    offset = AlignArray(offset);
+    const size_t size = sizeof(Number) * rows * columns;
+    array = reinterpret_cast<Number*>(static_cast<char*>(m->buffer) + offset);
+    std::memset(array, 0, size);
+    if (const size_t kept = std::min(size, old[i].bytes); kept > 0) std::memcpy(array, old[i].data, kept);
+    offset += size;
+    ++i;
+  });
+  FillNameTable(m);
+  return resized;
+}
+
+MjModelPtr AddContactPairs(const mjModel& model, std::span<const std::pair<int, int>> geoms) {
+  if (CollidesByType(model)) {
+    throw InputError("MJCF: option collision: must be \"predefined\" for plant.collide");
+  }
+  const auto first = static_cast<int>(model.npair);
+  MjModelPtr resized =
+      MakeResizedCopy(model, [&](mjModel* m) { m->npair += static_cast<int>(geoms.size()); });
+  for (size_t k = 0; k < geoms.size(); ++k) FillPair(resized.get(), first + static_cast<int>(k), geoms[k]);
+  return resized;
+}
+
 MjModelPtr MakeVisible(MjModelPtr model) {
   Brighten(model.get());
   const std::vector<int> geoms = ListMovingGeoms(*model);
   if (model->nskin > 0) return model;
   if (!geoms.empty()) {
-    const bool all_hidden = std::all_of(
-        geoms.begin(), geoms.end(), [&](int geom) { return model->geom_group[geom] >= kFirstHiddenGroup; });
+    const bool all_hidden =
+        std::ranges::all_of(geoms, [&](int geom) { return model->geom_group[geom] >= kFirstHiddenGroup; });
     for (const int geom : geoms) {
       if (all_hidden) model->geom_group[geom] = 0;
     }

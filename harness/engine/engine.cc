@@ -4,17 +4,13 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <charconv>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
-#include <fstream>
 #include <mutex>
 #include <new>
-#include <set>
 #include <string_view>
-#include <system_error>
 #include <type_traits>
 #include <vector>
 
@@ -28,7 +24,6 @@
 #include "harness/engine/xml.h"
 
 namespace dexcheck {
-
 namespace {
 
 constexpr int kEngineFailureExitCode = 3;
@@ -73,13 +68,13 @@ LoadNotes& AllLoadNotes() {
 void WarnOnce(const std::string& text) {
   LoadNotes& notes = AllLoadNotes();
   const std::scoped_lock lock(notes.mutex);
-  if (std::find(notes.texts.begin(), notes.texts.end(), text) != notes.texts.end()) return;
+  if (std::ranges::find(notes.texts, text) != notes.texts.end()) return;
   notes.texts.push_back(text);
   Warn(text);
 }
 
 std::string OneLine(std::string text) {
-  std::replace(text.begin(), text.end(), '\n', ' ');
+  std::ranges::replace(text, '\n', ' ');
   while (!text.empty() && text.back() == ' ') text.pop_back();
   return text;
 }
@@ -162,6 +157,73 @@ MjModelPtr LoadAdapted(MjcfFile* mjcf, const Load& load) {
   return model;
 }
 
+constexpr const char* kBlanks = " \t\r\n";
+
+/// Attributes that the engine reads as one integer, between blanks.
+constexpr std::string_view kIntegers =
+    "iterations noslip_iterations mpr_iterations njmax nconmax nstack nuserdata nkey nuser_body"
+    " nuser_jnt nuser_geom nuser_site nuser_cam nuser_tendon nuser_actuator nuser_sensor group contype"
+    " conaffinity condim priority subgrid offwidth offheight shadowsize offsamples numslices numstacks"
+    " numquads nrow ncol dim";
+/// Those of which there may be fewer numbers than the most. At a blank behind the last one, 2.2.2 reads that
+/// once more: "1 " as a friction of 1 1 0.0001.
+constexpr std::string_view kOpenLists =
+    "o_solref o_solimp solref solimp solreflimit solimplimit solreffriction solimpfriction"
+    " solrefsmooth solimpsmooth solreffix solimpfix size friction fluidcoef gear dynprm gainprm biasprm"
+    " user data qpos qvel act mpos mquat ctrl";
+/// Attributes of meshes, skins and bones that it reads as lists.
+constexpr std::string_view kLists = "vertex normal texcoord face vertid vertweight";
+
+/// Whether a text is numbers and blanks alone. @param integer one integer. A list's ends at the first other.
+bool IsNumbers(const char* text, bool integer) {
+  int count = 0;
+  while (*(text += std::strspn(text, kBlanks)) != '\0') {
+    char* end = nullptr;
+    const double value = std::strtod(text, &end);
+    const bool is_cut_off = end == text || (*end != '\0' && std::strchr(kBlanks, *end) == nullptr);
+    if (is_cut_off || !std::isfinite(value) || (integer && value != std::trunc(value))) return false;
+    text = end;
+    ++count;
+  }
+  return !integer || count == 1;
+}
+
+/// Elements whose numbers must be finite: by the array's name, "body_mass" is the mass of a body.
+constexpr struct {
+  std::string_view prefix;
+  const char* kind;
+  mjtObj type;
+  std::string_view finite;  ///< Attributes, between blanks.
+} kElements[] = {
+    {"body_", "body", mjOBJ_BODY, "pos quat ipos iquat mass inertia"},
+    {"jnt_", "joint", mjOBJ_JOINT, "pos axis range stiffness"},
+    {"dof_", "joint", mjOBJ_JOINT, "armature damping frictionloss"},
+    {"geom_", "geom", mjOBJ_GEOM, "pos quat size friction"},
+    {"site_", "site", mjOBJ_SITE, "pos quat"},
+    {"pair_", "pair", mjOBJ_PAIR, "friction"},
+};
+
+template <typename Number>
+void CheckArray(const mjModel& model, const std::string& source, const std::string& name,
+                const Number* values, size_t rows, size_t columns) {
+  for (const auto& element : kElements) {
+    if (!name.starts_with(element.prefix)) continue;
+    const std::string attribute = name.substr(element.prefix.size());
+    if (!IsAmong(element.finite, attribute)) break;
+    for (size_t i = 0; i < rows * columns; ++i) {
+      if (std::isfinite(values[i])) continue;
+      const auto row = static_cast<int>(i / columns);
+      const int id = element.prefix == "dof_" ? model.dof_jntid[row] : row;
+      throw InputError(source + ": " + element.kind + " " + Quote(NameOf(model, element.type, id)) + ": " +
+                       attribute + " must be finite, got " + FormatNumber(static_cast<double>(values[i])));
+    }
+  }
+  for (size_t i = 0; i < rows * columns; ++i) {
+    if (std::isnan(values[i]))
+      throw InputError(source + ": " + name + "[" + std::to_string(i) + "] must be a number, got nan");
+  }
+}
+
 }  // namespace
 
 MjModelPtr LoadMjcf(const std::filesystem::path& path) {
@@ -237,10 +299,8 @@ int CountElements(const mjModel& model, mjtObj type) {
 int FindByName(const mjModel& model, mjtObj type, const std::string& name) {
   const int id = mj_name2id(&model, type, name.c_str());
   if (id >= 0 || !name.starts_with('#')) return id;
-  int number = -1;
-  const char* const end = name.data() + name.size();
-  const std::from_chars_result read = std::from_chars(name.data() + 1, end, number);
-  if (read.ec != std::errc() || read.ptr != end || number < 0) return -1;
+  const int number = ParseNumber<int>(name.substr(1)).value_or(-1);
+  if (number < 0) return -1;
   const char* const own = mj_id2name(&model, type, number);
   return number < CountElements(model, type) && (own == nullptr || *own == '\0') ? number : -1;
 }
@@ -252,92 +312,6 @@ bool CanTouch(const mjModel& model, int geom) {
   return model.geom_contype[geom] != 0 || model.geom_conaffinity[geom] != 0;
 }
 
-namespace {
-
-constexpr const char* kBlanks = " \t\r\n";
-
-/// Attributes that the engine reads as one integer.
-const std::set<std::string_view> kIntegers = {"iterations",     "noslip_iterations",
-                                              "mpr_iterations", "njmax",
-                                              "nconmax",        "nstack",
-                                              "nuserdata",      "nkey",
-                                              "nuser_body",     "nuser_jnt",
-                                              "nuser_geom",     "nuser_site",
-                                              "nuser_cam",      "nuser_tendon",
-                                              "nuser_actuator", "nuser_sensor",
-                                              "group",          "contype",
-                                              "conaffinity",    "condim",
-                                              "priority",       "subgrid",
-                                              "offwidth",       "offheight",
-                                              "shadowsize",     "offsamples",
-                                              "numslices",      "numstacks",
-                                              "numquads",       "nrow",
-                                              "ncol",           "dim"};
-
-/// Those of which there may be fewer numbers than the most. At a blank behind the last one, 2.2.2 reads that
-/// once more: "1 " as a friction of 1 1 0.0001.
-const std::set<std::string_view> kOpenLists = {
-    "o_solref",       "o_solimp",       "solref",       "solimp",       "solreflimit", "solimplimit",
-    "solreffriction", "solimpfriction", "solrefsmooth", "solimpsmooth", "solreffix",   "solimpfix",
-    "size",           "friction",       "fluidcoef",    "gear",         "dynprm",      "gainprm",
-    "biasprm",        "user",           "data",         "qpos",         "qvel",        "act",
-    "mpos",           "mquat",          "ctrl"};
-
-/// Attributes of meshes, skins and bones that it reads as lists.
-const std::set<std::string_view> kLists = {"vertex", "normal", "texcoord", "face", "vertid", "vertweight"};
-
-/// Whether a text is numbers and blanks alone. @param integer one integer. A list's ends at the first other.
-bool IsNumbers(const char* text, bool integer) {
-  int count = 0;
-  while (*(text += std::strspn(text, kBlanks)) != '\0') {
-    char* end = nullptr;
-    const double value = std::strtod(text, &end);
-    const bool is_cut_off = end == text || (*end != '\0' && std::strchr(kBlanks, *end) == nullptr);
-    if (is_cut_off || !std::isfinite(value) || (integer && value != std::trunc(value))) return false;
-    text = end;
-    ++count;
-  }
-  return !integer || count == 1;
-}
-
-/// Elements whose numbers must be finite: by the array's name, "body_mass" is the mass of a body.
-constexpr struct {
-  std::string_view prefix;
-  const char* kind;
-  mjtObj type;
-  std::string_view finite;  ///< Attributes, each between blanks.
-} kElements[] = {
-    {"body_", "body", mjOBJ_BODY, " pos quat ipos iquat mass inertia "},
-    {"jnt_", "joint", mjOBJ_JOINT, " pos axis range stiffness "},
-    {"dof_", "joint", mjOBJ_JOINT, " armature damping frictionloss "},
-    {"geom_", "geom", mjOBJ_GEOM, " pos quat size friction "},
-    {"site_", "site", mjOBJ_SITE, " pos quat "},
-    {"pair_", "pair", mjOBJ_PAIR, " friction "},
-};
-
-template <typename Number>
-void CheckArray(const mjModel& model, const std::string& source, const std::string& name,
-                const Number* values, size_t rows, size_t columns) {
-  for (const auto& element : kElements) {
-    if (!name.starts_with(element.prefix)) continue;
-    const std::string attribute = name.substr(element.prefix.size());
-    if (element.finite.find(" " + attribute + " ") == std::string_view::npos) break;
-    for (size_t i = 0; i < rows * columns; ++i) {
-      if (std::isfinite(values[i])) continue;
-      const auto row = static_cast<int>(i / columns);
-      const int id = element.prefix == "dof_" ? model.dof_jntid[row] : row;
-      throw InputError(source + ": " + element.kind + " " + Quote(NameOf(model, element.type, id)) + ": " +
-                       attribute + " must be finite, got " + FormatNumber(static_cast<double>(values[i])));
-    }
-  }
-  for (size_t i = 0; i < rows * columns; ++i) {
-    if (std::isnan(values[i]))
-      throw InputError(source + ": " + name + "[" + std::to_string(i) + "] must be a number, got nan");
-  }
-}
-
-}  // namespace
-
 void CheckNumbers(MjcfFile* mjcf) {
   VisitElements(mjcf->root(), [&](tinyxml2::XMLElement* element) {
     const std::string_view kind = element->Name();
@@ -348,13 +322,13 @@ void CheckNumbers(MjcfFile* mjcf) {
       const std::string value = attribute->Value();
       const std::string word = "<" + std::string(kind) + " " + name + ">";
       const size_t end = value.find_last_not_of(kBlanks) + 1;
-      if (end < value.size() && kOpenLists.contains(name) && IsNumbers(value.c_str(), false)) {
+      if (end < value.size() && IsAmong(kOpenLists, name) && IsNumbers(value.c_str(), false)) {
         element->SetAttribute(name.c_str(), value.substr(0, end).c_str());
         mjcf->Note(*element, word, "without the blank at its end, at which 2.2.2 reads a number too many");
       }
       const bool is_integer =
-          kIntegers.contains(name) || (kind == "texture" && (name == "width" || name == "height"));
-      if (!is_integer && !(has_lists && kLists.contains(name))) continue;
+          IsAmong(kIntegers, name) || (kind == "texture" && (name == "width" || name == "height"));
+      if (!is_integer && !(has_lists && IsAmong(kLists, name))) continue;
       if (IsNumbers(value.c_str(), is_integer)) continue;
       throw InputError(mjcf->FindPlace(*element) + ": " + word + ": must be " +
                        (is_integer ? "an integer" : "numbers") + ", got " + Quote(value));

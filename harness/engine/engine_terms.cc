@@ -1,11 +1,10 @@
 #include "harness/engine/engine_terms.h"
 
 #include <algorithm>
-#include <numeric>
 
 #include "controller/common/errors.h"
+#include "controller/common/linear_algebra.h"
 #include "controller/common/text.h"
-#include "harness/engine/engine.h"
 #include "harness/engine/map_vector.h"
 #include "harness/engine/mujoco_release.h"
 
@@ -21,12 +20,6 @@ void CalcPassiveForces(const mjModel& model, mjData* data) {
     CalcTendonVelocities(model, data);
   }
   mj_passive(&model, data);
-}
-
-std::vector<int> ListAll(size_t count) {
-  std::vector<int> all(count);
-  std::iota(all.begin(), all.end(), 0);
-  return all;
 }
 
 /// Dofs from `dof` to the root, itself included.
@@ -80,7 +73,7 @@ EngineTerms::EngineTerms(const Adapter& adapter, Coordinates coordinates, std::s
 }
 
 EngineTerms::EngineTerms(const Adapter& adapter, Coordinates coordinates)
-    : EngineTerms(adapter, coordinates, ListAll(adapter.model().frames().size())) {
+    : EngineTerms(adapter, coordinates, ListIndices(adapter.model().frames().size())) {
   DropGeoms();
 }
 

@@ -11,7 +11,6 @@
 #include "harness/engine/mjcf_passes.h"
 #include "harness/engine/mujoco_release.h"
 #include "harness/engine/solid.h"
-#include "harness/engine/xml.h"
 
 namespace dexcheck {
 namespace {

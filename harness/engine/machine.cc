@@ -1,7 +1,6 @@
 #include "harness/engine/machine.h"
 
 #include <gnu/libc-version.h>
-#include <mujoco/mujoco.h>
 
 #include <bit>
 #include <cmath>

@@ -84,7 +84,7 @@ void MjcfFile::Splice(XMLElement* include) {
   // The engine takes all names from the folder of the file that is loaded, and each file once.
   const std::filesystem::path own = source_;
   const std::string path = (own.parent_path() / name).lexically_normal().string();
-  if (path == own.lexically_normal() || std::find(files_.begin(), files_.end(), path) != files_.end()) {
+  if (path == own.lexically_normal() || std::ranges::find(files_, path) != files_.end()) {
     throw InputError(FindPlace(*include) + ": <include>: file " + Quote(name) +
                      ": must be included once only");
   }

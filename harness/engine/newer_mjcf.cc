@@ -1,6 +1,5 @@
 #include <mujoco/mujoco.h>
 
-#include <algorithm>
 #include <map>
 #include <memory>
 #include <set>

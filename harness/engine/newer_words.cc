@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <vector>
 
 #include "harness/engine/xml.h"
 
@@ -18,16 +17,30 @@ constexpr std::string_view kExpand =
     "no such element";
 constexpr std::string_view kActuatorInertia = "give it to the joint, as armature or damping";
 
-/// Of what acts on no term, or on motors and contacts alone: elements, or attributes that each of the
-/// elements has.
-struct PlainWords {
-  std::string_view elements;    ///< Separated by blanks; "*" stands for all, "a/b" for b in a.
-  std::string_view attributes;  ///< Empty for the elements themselves.
-  std::string_view since;
-  MjcfEffect effect;
-};
-
-constexpr PlainWords kPlainWords[] = {
+constexpr NewerWord kWords[] = {
+    // What acts on the dynamics, or on nothing with a certain value.
+    {"frame", "", "3.1.0", kDynamics, "", kExpand},
+    {"replicate", "", "3.1.5", kDynamics, "", kExpand},
+    {"attach model", "", "3.2.0", kDynamics, "", kExpand},
+    {"flexcomp deformable flex", "", "3.0.0", kDynamics, "", "deformable bodies are not in 2.2.2"},
+    {"flexvert", "", "3.5.0", kDynamics, "", "deformable bodies are not in 2.2.2"},
+    {"flexstrain", "", "3.6.0", kDynamics, "", "deformable bodies are not in 2.2.2"},
+    {"composite", "initial curve", "2.3.0", kDynamics, "", kExpand},
+    {"plugin", "", "2.3.0", kDynamics, "", "plugins may apply forces; remove them by hand"},
+    {"compiler", "alignfree", "3.2.3", kDynamics, "false", "it moves frames of free bodies; set it to false"},
+    {"freejoint", "align", "3.2.3", kDynamics, "false",
+     "it moves the frame of the free body; set it to false"},
+    {"mesh", "inertia", "3.2.5", kDynamics, "legacy",
+     "give each body an inertial, or use compiler exactmeshinertia"},
+    {"mesh", "builtin params", "3.3.5", kDynamics, "", "save the mesh as a file"},
+    {"body", "gravcomp", "2.3.1", kDynamics, "0", "it holds a part of the weight; set it to 0"},
+    {"connect", "site1 site2", "3.2.3", kDynamics, "", "give the constraint bodies and an anchor"},
+    {"weld", "site1 site2", "3.2.3", kDynamics, "", "give the constraint bodies and a pose"},
+    {"spatial fixed", "armature", "3.3.1", kDynamics, "0", "tendons have no inertia in 2.2.2"},
+    {"flag", "spring damper", "3.3.6", kDynamics, "enable",
+     "the flag passive switches springs and dampers together"},
+    {"*", "armature damping", "3.7.0", kDynamics, "0", kActuatorInertia},
+    // What acts on no term, or on motors and contacts alone.
     {"layer", "", "3.2.5", kNone},
     {"rgb", "", "3.2.1", kNone},
     {"dcmotor", "", "3.7.0", kActuators},
@@ -94,66 +107,6 @@ constexpr PlainWords kPlainWords[] = {
     {"rangefinder", "camera data", "3.5.0", kNone},
 };
 
-/// What acts on the dynamics, or on nothing with a certain value.
-constexpr NewerWord kWords[] = {
-    {"frame", "", "3.1.0", kDynamics, "", kExpand},
-    {"replicate", "", "3.1.5", kDynamics, "", kExpand},
-    {"attach", "", "3.2.0", kDynamics, "", kExpand},
-    {"model", "", "3.2.0", kDynamics, "", kExpand},
-    {"flexcomp", "", "3.0.0", kDynamics, "", "deformable bodies are not in 2.2.2"},
-    {"deformable", "", "3.0.0", kDynamics, "", "deformable bodies are not in 2.2.2"},
-    {"flex", "", "3.0.0", kDynamics, "", "deformable bodies are not in 2.2.2"},
-    {"flexvert", "", "3.5.0", kDynamics, "", "deformable bodies are not in 2.2.2"},
-    {"flexstrain", "", "3.6.0", kDynamics, "", "deformable bodies are not in 2.2.2"},
-    {"composite", "initial", "2.3.0", kDynamics, "", kExpand},
-    {"composite", "curve", "2.3.0", kDynamics, "", kExpand},
-    {"plugin", "", "2.3.0", kDynamics, "", "plugins may apply forces; remove them by hand"},
-    {"compiler", "alignfree", "3.2.3", kDynamics, "false", "it moves frames of free bodies; set it to false"},
-    {"freejoint", "align", "3.2.3", kDynamics, "false",
-     "it moves the frame of the free body; set it to false"},
-    {"mesh", "inertia", "3.2.5", kDynamics, "legacy",
-     "give each body an inertial, or use compiler exactmeshinertia"},
-    {"mesh", "builtin", "3.3.5", kDynamics, "", "save the mesh as a file"},
-    {"mesh", "params", "3.3.5", kDynamics, "", "save the mesh as a file"},
-    {"body", "gravcomp", "2.3.1", kDynamics, "0", "it holds a part of the weight; set it to 0"},
-    {"connect", "site1", "3.2.3", kDynamics, "", "give the constraint bodies and an anchor"},
-    {"connect", "site2", "3.2.3", kDynamics, "", "give the constraint bodies and an anchor"},
-    {"weld", "site1", "3.2.3", kDynamics, "", "give the constraint bodies and a pose"},
-    {"weld", "site2", "3.2.3", kDynamics, "", "give the constraint bodies and a pose"},
-    {"spatial", "armature", "3.3.1", kDynamics, "0", "tendons have no inertia in 2.2.2"},
-    {"fixed", "armature", "3.3.1", kDynamics, "0", "tendons have no inertia in 2.2.2"},
-    {"flag", "spring", "3.3.6", kDynamics, "enable",
-     "the flag passive switches springs and dampers together"},
-    {"flag", "damper", "3.3.6", kDynamics, "enable",
-     "the flag passive switches springs and dampers together"},
-    {"*", "armature", "3.7.0", kDynamics, "0", kActuatorInertia},
-    {"*", "damping", "3.7.0", kDynamics, "0", kActuatorInertia},
-};
-
-std::vector<std::string_view> Split(std::string_view list) {
-  std::vector<std::string_view> words;
-  while (!list.empty()) {
-    const size_t end = std::min(list.find(' '), list.size());
-    words.push_back(list.substr(0, end));
-    list.remove_prefix(std::min(end + 1, list.size()));
-  }
-  return words.empty() ? std::vector<std::string_view>{""} : words;
-}
-
-const std::vector<NewerWord>& ListWords() {
-  static const std::vector<NewerWord> all = [] {
-    std::vector<NewerWord> list(std::begin(kWords), std::end(kWords));
-    for (const PlainWords& words : kPlainWords) {
-      for (const std::string_view element : Split(words.elements)) {
-        for (const std::string_view attribute : Split(words.attributes))
-          list.push_back({element, attribute, words.since, words.effect, "", ""});
-      }
-    }
-    return list;
-  }();
-  return all;
-}
-
 }  // namespace
 
 const char* NameOf(MjcfEffect effect) {
@@ -164,11 +117,10 @@ const char* NameOf(MjcfEffect effect) {
 
 const NewerWord* FindNewerWord(std::string_view element, std::string_view attribute) {
   const auto find = [&](std::string_view name) -> const NewerWord* {
-    const std::vector<NewerWord>& words = ListWords();
-    const auto found = std::find_if(words.begin(), words.end(), [&](const NewerWord& word) {
-      return word.element == name && word.attribute == attribute;
+    const auto* const found = std::ranges::find_if(kWords, [&](const NewerWord& word) {
+      return IsAmong(word.elements, name) && IsAmong(word.attributes, attribute);
     });
-    return found == words.end() ? nullptr : &*found;
+    return found == std::end(kWords) ? nullptr : found;
   };
   const NewerWord* const own = find(element);
   return own != nullptr || attribute.empty() ? own : find("*");

@@ -14,14 +14,14 @@ enum class MjcfEffect {
   kDynamics,   ///< M, C v, gravity, friction, or the mechanism itself.
 };
 
-/// An element (`attribute` is empty) or an attribute that 2.2.2 does not have.
+/// Elements, or attributes that each of the elements has, which 2.2.2 does not have.
 struct NewerWord {
-  std::string_view element;  ///< Or "PARENT/ELEMENT".
-  std::string_view attribute;
-  std::string_view since;  ///< Release, "3.1.4".
+  std::string_view elements;    ///< Separated by blanks; "*" stands for all, "a/b" for b in a.
+  std::string_view attributes;  ///< Empty for the elements themselves.
+  std::string_view since;       ///< Release, "3.1.4".
   MjcfEffect effect;
-  std::string_view neutral;  ///< Value with which it acts on nothing; empty: none is known.
-  std::string_view advice;   ///< What to do, when it acts on the dynamics.
+  std::string_view neutral = {};  ///< Value with which it acts on nothing; empty: none is known.
+  std::string_view advice = {};   ///< What to do, when it acts on the dynamics.
 };
 
 /// The word's entry; nullptr when it is not known. @param attribute empty for the element itself.

@@ -26,8 +26,7 @@ double SelfContact::CalcDepth(const VectorXd& q) {
   double depth = 0.0;
   for (int i = 0; i < data_->ncon; ++i) {
     const mjContact& contact = data_->contact[i];
-    if (std::find(usual_.begin(), usual_.end(), BodiesOf(contact)) == usual_.end())
-      depth += std::max(0.0, -contact.dist);
+    if (std::ranges::find(usual_, BodiesOf(contact)) == usual_.end()) depth += std::max(0.0, -contact.dist);
   }
   return depth;
 }

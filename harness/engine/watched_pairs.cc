@@ -116,7 +116,7 @@ std::vector<WatchedPair> ListWatchedPairs(const mjModel& engine, const Adapter& 
   for (const AllowedPair& pair : allowed) {
     for (const std::string& name : {pair.first, pair.second}) {
       const auto has_name = [&](const Solid& solid) { return solid.name == name; };
-      if (std::any_of(solids.list.begin(), solids.list.end(), has_name)) continue;
+      if (std::ranges::any_of(solids.list, has_name)) continue;
       throw InputError(source + ": plant.allowed_collision_pairs: " + Quote(name) +
                        " is no body with a shape in the MJCF");
     }
@@ -128,11 +128,10 @@ std::vector<WatchedPair> ListWatchedPairs(const mjModel& engine, const Adapter& 
     for (int b = a + 1; b < count; ++b) {
       const std::string& name_a = solids.list[static_cast<size_t>(a)].name;
       const std::string& name_b = solids.list[static_cast<size_t>(b)].name;
-      const bool allowed_collision_pairs =
-          std::any_of(allowed.begin(), allowed.end(), [&](const AllowedPair& pair) {
-            return (pair.first == name_a && pair.second == name_b) ||
-                   (pair.first == name_b && pair.second == name_a);
-          });
+      const bool allowed_collision_pairs = std::ranges::any_of(allowed, [&](const AllowedPair& pair) {
+        return (pair.first == name_a && pair.second == name_b) ||
+               (pair.first == name_b && pair.second == name_a);
+      });
       if (!allowed_collision_pairs && lister.IsWatched(a, b)) pairs.push_back({a, b, lister.Classify(a, b)});
     }
   }

@@ -13,6 +13,11 @@
 
 namespace dexcheck {
 
+/// Whether a word is one of those that blanks separate; an empty one where there are none.
+inline bool IsAmong(std::string_view words, std::string_view word) {
+  return (" " + std::string(words) + " ").find(" " + std::string(word) + " ") != std::string::npos;
+}
+
 /// @param shown the file in messages. @throws InputError "FILE:LINE: is not XML, XML_ERROR_...".
 inline void ParseXml(std::string_view text, const std::string& shown, tinyxml2::XMLDocument* document) {
   if (document->Parse(text.data(), text.size()) == tinyxml2::XML_SUCCESS) return;

@@ -1,6 +1,5 @@
 #include "harness/plant/disturbances.h"
 
-#include <algorithm>
 #include <cmath>
 
 #include "controller/common/errors.h"

@@ -41,7 +41,7 @@ void EnginePlant::Read(PlantResponse* response) {
 void EnginePlant::WatchCollisions(std::span<const std::pair<int, int>> geoms) {
   colliding_.clear();
   for (const auto& [a, b] : geoms) colliding_.emplace_back(std::min(a, b), std::max(a, b));
-  std::sort(colliding_.begin(), colliding_.end());
+  std::ranges::sort(colliding_);
 }
 
 Collision EnginePlant::FindCollision() const {

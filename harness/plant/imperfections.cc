@@ -8,13 +8,13 @@
 namespace dexcheck {
 bool ByName::Is(double value) const {
   return all == value &&
-         std::all_of(groups.begin(), groups.end(), [&](const auto& group) { return group.second == value; });
+         std::ranges::all_of(groups, [&](const auto& group) { return group.second == value; });
 }
 
 VectorXd ByName::Resolve(std::span<const std::string> names, const std::string& source) const {
   VectorXd values = VectorXd::Constant(static_cast<Eigen::Index>(names.size()), all);
   for (const auto& [group, value] : groups) {
-    const bool is_name = std::find(names.begin(), names.end(), group) != names.end();
+    const bool is_name = std::ranges::find(names, group) != names.end();
     bool found = false;
     for (size_t i = 0; i < names.size(); ++i) {
       const bool fits = is_name ? names[i] == group : group == "all" || names[i].starts_with(group);
@@ -45,7 +45,7 @@ bool ActuationOptions::is_exact() const {
 
 bool MismatchOptions::is_none() const {
   return mass.Is(1.0) && mass_within.Is(0.0) && damping.Is(1.0) && armature.Is(1.0) &&
-         std::all_of(com.begin(), com.end(), [](const auto& shift) { return shift.second.isZero(0.0); }) &&
+         std::ranges::all_of(com, [](const auto& shift) { return shift.second.isZero(0.0); }) &&
          payloads.empty() && slope.isZero(0.0);
 }
 

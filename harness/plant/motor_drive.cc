@@ -80,7 +80,7 @@ void MotorDrive::ReadRates(const VectorXd& xi) {
 
 void MotorDrive::Delay(VectorXd* tau) {
   const size_t ring = sent_.size();
-  if (k_ == 0) std::fill(sent_.begin(), sent_.end(), *tau);
+  if (k_ == 0) std::ranges::fill(sent_, *tau);
   sent_[k_ % ring] = *tau;
   // The ring has the torques of 0 ... ring - 1 steps ago.
   const size_t whole = ring - 2;

@@ -4,8 +4,6 @@
 #include <cmath>
 #include <limits>
 
-#include "controller/common/text.h"
-#include "controller/contact/contact_geometry.h"
 #include "controller/model/platform.h"
 #include "harness/engine/map_vector.h"
 #include "harness/engine/mujoco_release.h"
@@ -267,7 +265,7 @@ void Observer::ReadFeet(const mjModel& m, const mjData& d, std::vector<GroundCon
 }
 
 int Observer::FindFingertip(int geom) const {
-  const auto found = std::find(tip_geoms_.begin(), tip_geoms_.end(), geom);
+  const auto found = std::ranges::find(tip_geoms_, geom);
   return found == tip_geoms_.end() ? -1 : static_cast<int>(found - tip_geoms_.begin());
 }
 
@@ -342,7 +340,7 @@ void Observer::ReadJointLimits(const mjModel& m, const mjData& d, VectorXd* forc
 
 Eigen::Index Observer::FindEntry(int dof) const {
   const std::vector<int>& dofs = adapter_->joint_dofs();
-  const auto joint = std::find(dofs.begin(), dofs.end(), dof);
+  const auto joint = std::ranges::find(dofs, dof);
   return joint == dofs.end() ? -1 : adapter_->model().num_base_velocities() + (joint - dofs.begin());
 }
 

@@ -1,10 +1,8 @@
 #include "harness/plant/rigid_plant.h"
 
-#include <algorithm>
 #include <cmath>
 
 #include "controller/common/text.h"
-#include "controller/contact/contact_geometry.h"
 #include "controller/contact/shapes.h"
 #include "controller/model/platform.h"
 #include "controller/object/object_dynamics.h"

@@ -7,7 +7,6 @@
 #include "controller/object/so3.h"
 
 namespace dexcheck {
-
 namespace {
 
 bool HasObjectFault(const SensingOptions& options) {
@@ -22,6 +21,29 @@ Vector3d DrawNormal(const RandomStream& stream, std::uint64_t k) {
 
 // What a filter expects of the object's velocity before the first step, m/s and rad/s.
 constexpr double kStartSpread = 0.1;
+
+/// Wheels, then joints: by the entries of tau'.
+std::vector<std::string> ListNames(const RobotModel& model, bool wheels) {
+  std::vector<std::string> names;
+  const Base& base = model.base();
+  if (wheels && base.type == BaseType::kDifferentialDrive) {
+    names = {base.wheel_joint_right, base.wheel_joint_left};
+  }
+  for (const Joint& joint : model.joints()) names.push_back(joint.name);
+  return names;
+}
+
+/// Rates below this are none, rad/s.
+constexpr double kStandstill = 1e-30;
+
+Reading MakeReading(const PartContext& context) {
+  Reading reading;
+  reading.state.q.setZero(context.model->num_positions());
+  reading.state.xi.setZero(context.model->num_velocities());
+  reading.state.kappa.resize(context.num_contacts);
+  reading.state.overlap.resize(context.num_contacts);
+  return reading;
+}
 
 }  // namespace
 
@@ -76,7 +98,7 @@ ObjectMotion ObjectSensor::Measure(const ObjectMotion& true_motion, std::uint64_
 }
 
 void ObjectSensor::Start() {
-  std::fill(delayed_.begin(), delayed_.end(), seen_);
+  std::ranges::fill(delayed_, seen_);
   estimate_ = seen_.X_Bo;
   p_dot_ = seen_.X_Bo.linear() * seen_.V_Bo.head<3>();
   omega_ = seen_.V_Bo.tail<3>();
@@ -149,33 +171,6 @@ void ObjectSensor::Translate(const Vector3d& way) {
   seen_.X_Bo.translation() += way;
   estimate_.translation() += way;
 }
-
-namespace {
-
-/// Wheels, then joints: by the entries of tau'.
-std::vector<std::string> ListNames(const RobotModel& model, bool wheels) {
-  std::vector<std::string> names;
-  const Base& base = model.base();
-  if (wheels && base.type == BaseType::kDifferentialDrive) {
-    names = {base.wheel_joint_right, base.wheel_joint_left};
-  }
-  for (const Joint& joint : model.joints()) names.push_back(joint.name);
-  return names;
-}
-
-/// Rates below this are none, rad/s.
-constexpr double kStandstill = 1e-30;
-
-Reading MakeReading(const PartContext& context) {
-  Reading reading;
-  reading.state.q.setZero(context.model->num_positions());
-  reading.state.xi.setZero(context.model->num_velocities());
-  reading.state.kappa.resize(context.num_contacts);
-  reading.state.overlap.resize(context.num_contacts);
-  return reading;
-}
-
-}  // namespace
 
 Sensing::Sensing(const SensingOptions& options, const PartContext& context)
     : options_(options),

@@ -1,10 +1,8 @@
 #include "tests/common/convention_faults.h"
 
 #include <Eigen/Eigenvalues>
-#include <algorithm>
 #include <array>
 #include <stdexcept>
-#include <utility>
 
 namespace dexcheck::testing {
 namespace {

@@ -36,14 +36,15 @@ void WriteText(const std::filesystem::path& path, const std::string& text) {
   EXPECT_TRUE(file.good()) << path;
 }
 
-std::string ReplaceOnce(std::string text, const std::string& from, const std::string& to) {
+std::string ReplaceFirst(std::string text, const std::string& from, const std::string& to) {
   const size_t at = text.find(from);
-  if (at == std::string::npos) {
-    ADD_FAILURE() << "not there: " << from;
-    return text;
-  }
-  EXPECT_EQ(text.find(from, at + 1), std::string::npos) << "not unique: " << from;
-  return text.replace(at, from.size(), to);
+  EXPECT_NE(at, std::string::npos) << "not there: " << from;
+  return at == std::string::npos ? text : text.replace(at, from.size(), to);
+}
+
+std::string ReplaceOnce(const std::string& text, const std::string& from, const std::string& to) {
+  EXPECT_EQ(text.find(from), text.rfind(from)) << "not unique: " << from;
+  return ReplaceFirst(text, from, to);
 }
 
 std::string ApplyEdits(std::string text, const std::vector<Edit>& edits) {

@@ -25,8 +25,10 @@ class TempFolder {
 std::string ReadText(const std::filesystem::path& path);
 void WriteText(const std::filesystem::path& path, const std::string& text);
 
-/// The text with its only occurrence of `from` replaced; anything but one occurrence fails the test.
-std::string ReplaceOnce(std::string text, const std::string& from, const std::string& to);
+/// The text with its first occurrence of `from` replaced; where there is none the test fails.
+std::string ReplaceFirst(std::string text, const std::string& from, const std::string& to);
+/// The same of its only occurrence: several fail the test, too.
+std::string ReplaceOnce(const std::string& text, const std::string& from, const std::string& to);
 
 /// One place of a text, and what stands there instead.
 struct Edit {

@@ -134,22 +134,22 @@ std::string WriteLeggedUrdf(const std::string& name, const std::vector<LeggedLin
     std::string ixx, iyy, izz;
     moments >> ixx >> iyy >> izz;
     text += fmt::format(
-        "<link name=\"{}\"><inertial><origin xyz=\"{}\" rpy=\"{}\"/><mass value=\"{}\"/><inertia ixx=\"{}\" "
+        R"(<link name="{}"><inertial><origin xyz="{}" rpy="{}"/><mass value="{}"/><inertia ixx="{}" )"
         "ixy=\"0\" ixz=\"0\" iyy=\"{}\" iyz=\"0\" izz=\"{}\"/></inertial></link>\n",
         link.name, link.com, link.com_rpy, link.mass, ixx, iyy, izz);
     text += fmt::format(
-        "<link name=\"{0}_mark\"/><joint name=\"{0}_marked\" type=\"fixed\"><origin xyz=\"0.01 0.02 0.03\"/>"
+        R"(<link name="{0}_mark"/><joint name="{0}_marked" type="fixed"><origin xyz="0.01 0.02 0.03"/>)"
         "<parent link=\"{0}\"/><child link=\"{0}_mark\"/></joint>\n",
         link.name);
     if (link.parent.empty()) continue;
-    text += fmt::format("<joint name=\"{}_joint\" type=\"{}\"><origin xyz=\"{}\" rpy=\"{}\"/>", link.name,
+    text += fmt::format(R"(<joint name="{}_joint" type="{}"><origin xyz="{}" rpy="{}"/>)", link.name,
                         link.has_joint ? "revolute" : "fixed", link.xyz, link.rpy);
-    text += fmt::format("<parent link=\"{}\"/><child link=\"{}\"/>", link.parent, link.name);
+    text += fmt::format(R"(<parent link="{}"/><child link="{}"/>)", link.parent, link.name);
     if (link.has_joint) {
-      text += fmt::format(
-          "<axis xyz=\"{}\"/><limit lower=\"-1.5\" upper=\"1.5\" effort=\"1\" velocity=\"1\"/><dynamics "
-          "damping=\"0.25\"/>",
-          link.axis);
+      text +=
+          fmt::format(R"(<axis xyz="{}"/><limit lower="-1.5" upper="1.5" effort="1" velocity="1"/><dynamics )"
+                      R"(damping="0.25"/>)",
+                      link.axis);
     }
     text += "</joint>\n";
   }
@@ -161,7 +161,7 @@ std::string WriteLeggedMjcf(const std::string& name, const std::vector<LeggedLin
   // A URDF's roll, pitch and yaw are about axes that stand still, in this order.
   std::string text = fmt::format(
       "<mujoco model=\"{}\">\n<compiler angle=\"radian\" eulerseq=\"XYZ\"/>\n<worldbody>\n<geom "
-      "type=\"plane\" "
+      R"(type="plane" )"
       "size=\"1 1 1\"/>\n",
       name);
   WriteMjcfBody(links, links.front(), base_joint, &text);

@@ -5,7 +5,6 @@
 #include <Eigen/Core>
 #include <cmath>
 #include <cstdlib>
-#include <string>
 
 namespace dexcheck::testing {
 

@@ -40,7 +40,7 @@ class NaiveDynamics {
       AddWheel(-0.5 * base.wheel_distance);
       AddWheel(0.5 * base.wheel_distance);
     }
-    for (int i = 0; i < model_.num_joints(); ++i) AddBody(i, model_.joints()[static_cast<size_t>(i)].body);
+    for (int i = 0; i < model_.num_joints(); ++i) AddBody(i, model_.joint(i).body);
   }
 
   [[nodiscard]] const std::vector<Body>& bodies() const { return bodies_; }
@@ -53,7 +53,7 @@ class NaiveDynamics {
     }
     for (int i = 0; i < model_.num_joints(); ++i) {
       const int k = model_.num_base_positions() + i;
-      M(k, k) += T(model_.joints()[static_cast<size_t>(i)].armature);
+      M(k, k) += T(model_.joint(i).armature);
     }
     for (const RowVectorX& rate : wheel_rates_) {
       M += T(model_.base().wheel.armature) * (rate.transpose() * rate);
@@ -77,7 +77,7 @@ class NaiveDynamics {
     Rate sum(0.0);
     for (int i = 0; i < model_.num_joints(); ++i) {
       const Rate rate = q_dot[model_.num_base_positions() + i];
-      sum += Rate(0.5 * model_.joints()[static_cast<size_t>(i)].damping) * rate * rate;
+      sum += Rate(0.5 * model_.joint(i).damping) * rate * rate;
     }
     for (const RowVectorX& row : wheel_rates_) {
       Rate rate(0.0);
@@ -114,7 +114,7 @@ class NaiveDynamics {
     const int offset = model_.num_base_positions();
     if (offset == 3) X_base_ = Translate(q_[0], q_[1], T(0.0)) * X_base_ * RotateZ(q_[2]);
     for (int i = 0; i < model_.num_joints(); ++i) {
-      const Joint& joint = model_.joints()[static_cast<size_t>(i)];
+      const Joint& joint = model_.joint(i);
       const bool turns = joint.type == JointType::kRevolute;
       const T theta = T(joint.mdh.q) + (turns ? q_[offset + i] : T(0.0));
       const T d = T(joint.mdh.d) + (turns ? T(0.0) : q_[offset + i]);
@@ -141,9 +141,9 @@ class NaiveDynamics {
       body.J_p(0, 0) = body.J_p(1, 1) = T(1.0);
       SetHinge(2, Vector3(T(0.0), T(0.0), T(1.0)), X_base_.template topRightCorner<3, 1>(), &body);
     }
-    for (int i = joint; i >= 0; i = model_.joints()[static_cast<size_t>(i)].parent) {
+    for (int i = joint; i >= 0; i = model_.joint(i).parent) {
       const Vector3 z = link(i).template block<3, 1>(0, 2);
-      if (model_.joints()[static_cast<size_t>(i)].type == JointType::kRevolute) {
+      if (model_.joint(i).type == JointType::kRevolute) {
         SetHinge(offset + i, z, link(i).template topRightCorner<3, 1>(), &body);
       } else {
         body.J_p.col(offset + i) = z;

@@ -1,7 +1,5 @@
 #include "tests/common/random_robot.h"
 
-#include <string>
-
 namespace dexcheck::testing {
 namespace {
 
@@ -109,7 +107,7 @@ VectorXd DrawPositions(const RobotModel& model, std::mt19937* random) {
   }
   if (offset == 3) q.head<3>() << Draw(random, -2, 2), Draw(random, -2, 2), Draw(random, -kPi, kPi);
   for (int i = 0; i < model.num_joints(); ++i) {
-    const Joint& joint = model.joints()[static_cast<size_t>(i)];
+    const Joint& joint = model.joint(i);
     const int at = model.position_index(i);
     if (joint.type != JointType::kBall) {
       q[at] = Draw(random, joint.lower, joint.upper);

@@ -10,7 +10,7 @@ namespace {
 std::string WritePose(const Pose& X) {
   const Eigen::Quaterniond q(X.linear());
   const Vector3d p = X.translation();
-  return fmt::format("pos=\"{:.17g} {:.17g} {:.17g}\" quat=\"{:.17g} {:.17g} {:.17g} {:.17g}\"", p.x(), p.y(),
+  return fmt::format(R"(pos="{:.17g} {:.17g} {:.17g}" quat="{:.17g} {:.17g} {:.17g} {:.17g}")", p.x(), p.y(),
                      p.z(), q.w(), q.x(), q.y(), q.z());
 }
 
@@ -36,14 +36,13 @@ void WriteJoint(const RobotSpec& spec, int index, std::string* text) {
                  Eigen::AngleAxisd(joint.mdh.q, Vector3d::UnitZ()) *
                  Eigen::Translation3d(0.0, 0.0, joint.mdh.d);
   *text += fmt::format("<body name=\"{}\" {}>\n", joint.link, WritePose(X));
-  *text += fmt::format(
-      "<joint name=\"{}\" type=\"{}\" axis=\"0 0 1\" damping=\"{:.17g}\" armature=\"{:.17g}\" "
-      "limited=\"true\" range=\"{:.17g} {:.17g}\"/>\n",
-      joint.name,
-      joint.type == JointType::kBall       ? "ball"
-      : joint.type == JointType::kRevolute ? "hinge"
-                                           : "slide",
-      joint.damping, joint.armature, joint.lower, joint.upper);
+  *text += fmt::format(R"(<joint name="{}" type="{}" axis="0 0 1" damping="{:.17g}" armature="{:.17g}" )"
+                       "limited=\"true\" range=\"{:.17g} {:.17g}\"/>\n",
+                       joint.name,
+                       joint.type == JointType::kBall       ? "ball"
+                       : joint.type == JointType::kRevolute ? "hinge"
+                                                            : "slide",
+                       joint.damping, joint.armature, joint.lower, joint.upper);
   *text += WriteInertial(joint.body);
   WriteLinkContent(spec, index, text);
   *text += "</body>\n";

@@ -35,6 +35,12 @@ struct RefusedText {
   std::vector<Edit> edits;
   std::vector<std::string> parts;
 };
+/// One place changed, and what the line says of it.
+inline RefusedText OneEdit(const std::string& name, const std::string& from, const std::string& to,
+                           const std::string& part) {
+  return {name, {{from, to}}, {part}};
+}
+
 inline void PrintTo(const RefusedText& refused, std::ostream* out) { *out << refused.name; }
 
 /// Success when the text is one line, whether its end is there or not, that contains all of the parts.

@@ -1,7 +1,6 @@
 #include "tests/common/run_program.h"
 
 #include <fcntl.h>
-#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 

@@ -16,7 +16,7 @@ template <typename ErrorType, typename Function>
   } catch (const ErrorType& error) {
     const std::string message = error.what();
     if (message.find(text) != std::string::npos) return ::testing::AssertionSuccess();
-    return ::testing::AssertionFailure() << "message \"" << message << "\" lacks \"" << text << "\"";
+    return ::testing::AssertionFailure() << "message \"" << message << R"(" lacks ")" << text << "\"";
   } catch (const std::exception& error) {
     return ::testing::AssertionFailure() << "another error: " << error.what();
   }

@@ -23,16 +23,16 @@ Matrix3d DrawRollPitchYaw(std::mt19937* random) {
 std::string WriteOrigin(const Pose& X) {
   const Vector3d ypr = X.linear().eulerAngles(2, 1, 0);
   const Vector3d p = X.translation();
-  return fmt::format("<origin xyz=\"{:.17g} {:.17g} {:.17g}\" rpy=\"{:.17g} {:.17g} {:.17g}\"/>", p.x(),
-                     p.y(), p.z(), ypr[2], ypr[1], ypr[0]);
+  return fmt::format(R"(<origin xyz="{:.17g} {:.17g} {:.17g}" rpy="{:.17g} {:.17g} {:.17g}"/>)", p.x(), p.y(),
+                     p.z(), ypr[2], ypr[1], ypr[0]);
 }
 
 /// @param X_LC where the inertial's frame stands; its origin is the centre of mass.
 std::string WriteInertial(const MassProperties& body, const Pose& X_LC) {
   const Matrix3d I = X_LC.linear().transpose() * body.inertia * X_LC.linear();
   return fmt::format(
-      "<inertial>{}<mass value=\"{:.17g}\"/><inertia ixx=\"{:.17g}\" ixy=\"{:.17g}\" ixz=\"{:.17g}\" "
-      "iyy=\"{:.17g}\" iyz=\"{:.17g}\" izz=\"{:.17g}\"/></inertial>",
+      R"(<inertial>{}<mass value="{:.17g}"/><inertia ixx="{:.17g}" ixy="{:.17g}" ixz="{:.17g}" )"
+      R"(iyy="{:.17g}" iyz="{:.17g}" izz="{:.17g}"/></inertial>)",
       WriteOrigin(X_LC), body.mass, I(0, 0), I(0, 1), I(0, 2), I(1, 1), I(1, 2), I(2, 2));
 }
 
@@ -88,8 +88,8 @@ class UrdfWriter {
     AddBody(joint.link, joint.body, X_iL);
     if (random_ != nullptr && index % 3 == 1) AddWeldedBody(index);
     std::string content = fmt::format(
-        "<axis xyz=\"{:.17g} {:.17g} {:.17g}\"/><limit lower=\"{:.17g}\" upper=\"{:.17g}\" effort=\"1\" "
-        "velocity=\"1\"/><dynamics damping=\"{:.17g}\" friction=\"{:.17g}\"/>",
+        R"(<axis xyz="{:.17g} {:.17g} {:.17g}"/><limit lower="{:.17g}" upper="{:.17g}" effort="1" )"
+        R"(velocity="1"/><dynamics damping="{:.17g}" friction="{:.17g}"/>)",
         axis.x(), axis.y(), axis.z(), joint.lower, joint.upper, joint.damping, dry_friction_);
     AddJoint(joint.name, joint.type == JointType::kRevolute ? "revolute" : "prismatic",
              LinkName(joint.parent), joint.link, X_PL, content);

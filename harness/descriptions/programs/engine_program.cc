@@ -1,6 +1,5 @@
 #include "harness/descriptions/programs/engine_program.h"
 
-#include <cstdio>
 #include <exception>
 #include <iostream>
 #include <nlohmann/json.hpp>

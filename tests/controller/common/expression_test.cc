@@ -48,18 +48,18 @@ TEST(Expression, LeavesOverflowToTheCaller) {
 
 TEST(Expression, SaysWhatIsWrongAndWhere) {
   constexpr std::pair<const char*, const char*> kProblems[] = {
-      {"", "a number, symbol or \"(\" is missing at character 1"},
-      {"1 +", "a number, symbol or \"(\" is missing at character 4"},
-      {"1 2", "unexpected \"2\" at character 3"},
-      {"2 ^ 3", "unexpected \"^ 3\" at character 3"},
-      {"0x10", "unexpected \"x10\" at character 2"},
+      {"", R"(a number, symbol or "(" is missing at character 1)"},
+      {"1 +", R"(a number, symbol or "(" is missing at character 4)"},
+      {"1 2", R"(unexpected "2" at character 3)"},
+      {"2 ^ 3", R"(unexpected "^ 3" at character 3)"},
+      {"0x10", R"(unexpected "x10" at character 2)"},
       {"(1 + 2", "\")\" is missing at character 7"},
       {"1)", "unexpected \")\" at character 2"},
-      {"*2", "unexpected \"*2\" at character 1"},
+      {"*2", R"(unexpected "*2" at character 1)"},
       {".", "malformed number at character 1"},
       {"1e999", "number out of range at character 1"},
-      {"2 * L_2", "unknown symbol \"L_2\" (did you mean \"L_1\"?) at character 5"},
-      {"inf", "unknown symbol \"inf\" at character 1"},
+      {"2 * L_2", R"(unknown symbol "L_2" (did you mean "L_1"?) at character 5)"},
+      {"inf", R"(unknown symbol "inf" at character 1)"},
   };
   for (const auto& [text, problem] : kProblems) EXPECT_EQ(CatchProblem(text), problem);
 }

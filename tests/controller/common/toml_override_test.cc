@@ -60,9 +60,9 @@ TEST(TomlOverride, SaysWhereAValueComesFrom) {
 TEST(TomlOverride, RefusesWhatCannotBeSet) {
   EXPECT_EQ(TakeMessage("size"), "--set size: must be PATH=VALUE");
   EXPECT_EQ(TakeMessage("a..b=1"), "--set a..b=1: its path has an empty part");
-  EXPECT_EQ(TakeMessage("size.x=1"), "--set size.x=1: \"size\" is no table or list");
-  EXPECT_EQ(TakeMessage("list.2=1"), "--set list.2=1: \"2\" is no entry of a list of 2");
-  EXPECT_EQ(TakeMessage("list.x=1"), "--set list.x=1: \"x\" is no entry of a list of 2");
+  EXPECT_EQ(TakeMessage("size.x=1"), R"(--set size.x=1: "size" is no table or list)");
+  EXPECT_EQ(TakeMessage("list.2=1"), R"(--set list.2=1: "2" is no entry of a list of 2)");
+  EXPECT_EQ(TakeMessage("list.x=1"), R"(--set list.x=1: "x" is no entry of a list of 2)");
   // A line break cannot smuggle in another key.
   EXPECT_EQ(TakeMessage("name=1\nsize=2", "size"), "accepted");
 }

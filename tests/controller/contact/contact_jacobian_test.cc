@@ -80,7 +80,7 @@ TEST_F(ContactJacobianTest, RollingSatisfiesTheGraspConstraint) {
 
     const Vector6d V_f = motion.CalcBodyJacobian(0.0) * motion.q_dot();
     const Matrix6d Ad = CalcAdjointInverse(contact.geometry.g_f_cf);
-    for (const Matrix6d& wrong : {Matrix6d(Ad.transpose()), Matrix6d(testing::CalcInverse(Ad))}) {
+    for (const Matrix6d& wrong : {Matrix6d(Ad.transpose()), Matrix6d(CalcInverse(Ad))}) {
       EXPECT_GT(((wrong * V_f).head<3>() - object_side).norm(), 1e-3);
     }
   }
@@ -113,7 +113,6 @@ TEST_F(ContactJacobianTest, WrongSizesAreAClearError) {
     return [&, rows, columns, rate_columns] {
       MatrixXd out(rows, columns);
       CalcContactJacobianDot(contact, J_f, J_f.leftCols(rate_columns), out);
-      return 0;
     };
   };
   using Invalid = std::invalid_argument;
@@ -131,12 +130,12 @@ TEST_F(ContactJacobianTest, AControlStepDoesNotAllocate) {
   Matrix6Xd G(6, 12);
   MatrixXd J_B(12, 50);
 
-  const testing::AllocationCounter probe_counter;
+  const AllocationCounter probe_counter;
   const VectorXd probe = DrawVector(random_, 7);
   ASSERT_GT(probe.norm(), 0.0);
   ASSERT_GT(probe_counter.count(), 0) << "the counter must work";
 
-  const testing::AllocationCounter counter;
+  const AllocationCounter counter;
   ContactCoordinates kappa = FindContact(blunt_tip_, torus_, X_OF).kappa;
   for (Contact& contact : contacts) {
     const auto twist = [](double, const ContactGeometry& geometry) {

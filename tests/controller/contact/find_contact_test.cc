@@ -49,7 +49,7 @@ void ExpectSameContact(const FoundContact& found, const Placement& placement, co
 template <typename Check>
 void ForEachContact(unsigned seed, const Check& check) {
   std::mt19937 random(seed);
-  for (const SurfacePair& pair : testing::MakeAllPairs()) {
+  for (const SurfacePair& pair : MakeAllPairs()) {
     SCOPED_TRACE(pair.first.name + " on " + pair.second.name);
     for (int sample = 0; sample < kSamples; ++sample) check(pair, DrawPlacement(random, pair, 0.002), random);
   }

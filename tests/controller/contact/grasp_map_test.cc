@@ -5,7 +5,6 @@
 #include <array>
 #include <vector>
 
-#include "controller/common/errors.h"
 #include "controller/contact/adjoint.h"
 #include "tests/common/linear_algebra.h"
 #include "tests/common/matrix_near.h"
@@ -49,11 +48,11 @@ TEST(AdjointTest, IsTheBodyTwistOfTheMovedFrame) {
   const Pose g = CalcScrewMotion(DrawVector(random, 6), 1.0);
   const Vector6d V = DrawVector(random, 6);
   EXPECT_TRUE(MatrixNear(CalcAdjoint(g) * CalcAdjointInverse(g), Matrix6d::Identity(), kRounding));
-  EXPECT_TRUE(MatrixNear(CalcWrenchTransform(g), Matrix6d(testing::CalcInverse(CalcAdjoint(g)).transpose()),
-                         kRounding));
+  EXPECT_TRUE(
+      MatrixNear(CalcWrenchTransform(g), Matrix6d(CalcInverse(CalcAdjoint(g)).transpose()), kRounding));
   // Seen in a frame moved by g, the motion exp(V t) is g exp(V t) g^-1, whose twist is Ad_g V.
   const auto moved = [&](double t) { return Pose(g * CalcScrewMotion(V, t) * g.inverse()); };
-  EXPECT_TRUE(MatrixNear(testing::DifferentiatePose(moved), CalcAdjoint(g) * V, kDifference));
+  EXPECT_TRUE(MatrixNear(DifferentiatePose(moved), CalcAdjoint(g) * V, kDifference));
   // d/dt Ad_g = Ad_g ad_V along g(t) = g exp(V t)
   const auto along = [&](double t) { return MatrixXd(CalcAdjoint(g * CalcScrewMotion(V, t))); };
   EXPECT_TRUE(MatrixNear(Differentiate(along), CalcAdjoint(g) * CalcTwistCross(V), kDifference));
@@ -78,8 +77,8 @@ TEST(GraspMapTest, TransposedAdjointFailsTheHandWorkedCase) {
   const MatrixXd G = CalcG({contact});
   const MatrixXd B_c = MatrixXd::Identity(6, 3);
   const Matrix6d Ad = CalcAdjoint(contact.geometry.g_o_cf);
-  EXPECT_TRUE(MatrixNear(G, Matrix6d(testing::CalcInverse(Ad)).transpose() * B_c, kRounding));
-  for (const Matrix6d& wrong : {Ad, Matrix6d(Ad.transpose()), Matrix6d(testing::CalcInverse(Ad))}) {
+  EXPECT_TRUE(MatrixNear(G, Matrix6d(CalcInverse(Ad)).transpose() * B_c, kRounding));
+  for (const Matrix6d& wrong : {Ad, Matrix6d(Ad.transpose()), Matrix6d(CalcInverse(Ad))}) {
     EXPECT_GT((wrong * B_c - G).norm(), 0.05);
   }
 }
@@ -169,10 +168,7 @@ TEST(GraspMapTest, WrongSizesAreAClearError) {
   const std::vector<Contact> contacts = MakeTorusGrasp({90.0, -90.0});
   Matrix6Xd G(6, 5);
   const auto calc = [&](std::span<const Contact> some, bool rate) {
-    return [&G, some, rate] {
-      rate ? CalcGraspMapDot(some, G) : CalcGraspMap(some, G);
-      return 0;
-    };
+    return [&G, some, rate] { rate ? CalcGraspMapDot(some, G) : CalcGraspMap(some, G); };
   };
   for (const bool rate : {false, true}) {
     EXPECT_TRUE(Throws<std::invalid_argument>(calc(contacts, rate), "columns of the grasp map"));

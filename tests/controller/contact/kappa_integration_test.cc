@@ -15,7 +15,7 @@ constexpr double kRounding = 1e-13;
 TEST(NormalizeContactTest, ChartChangesDoNotMoveTheBodies) {
   std::mt19937 random(31);
   int changes = 0;
-  for (const SurfacePair& pair : testing::MakeAllPairs()) {
+  for (const SurfacePair& pair : MakeAllPairs()) {
     const Surface& fingertip = *pair.first.surface;
     const Surface& object = *pair.second.surface;
     SCOPED_TRACE(pair.first.name + " on " + pair.second.name);

@@ -188,8 +188,6 @@ struct SphereCase {
 };
 
 std::vector<SphereCase> MakeSphereCases() {
-  using testing::MakeCylinder, testing::MakeEllipsoid, testing::MakePlane, testing::MakeSphere,
-      testing::MakeTorus;
   return {{"plane", MakePlane(), -0.03, 0.03},
           {"sphere", MakeSphere(), -1.0, 1.0},
           {"cylinder", MakeCylinder(), -0.04, 0.04},

@@ -121,7 +121,7 @@ TEST(SurfaceTest, PointsLieOnTheBodyAndNormalsPointOut) {
 TEST(SurfaceTest, ExchangedChartOrderTurnsTheNormalInward) {
   constexpr double kU = 0.3;
   constexpr double kV = 0.4;
-  const NamedSurface named = testing::MakeSphere(1.0);
+  const NamedSurface named = MakeSphere(1.0);
   const SurfaceJet swapped = {
       .c = {std::cos(kU) * std::cos(kV), std::cos(kU) * std::sin(kV), std::sin(kU)},
       .c_u = {-std::sin(kU) * std::cos(kV), -std::sin(kU) * std::sin(kV), std::cos(kU)},
@@ -171,7 +171,7 @@ TEST(SurfaceTest, EllipsoidHasItsKnownGaussianCurvature) {
   std::mt19937 random(3);
   double largest_skew = 0.0;
   for (int sample = 0; sample < kSamples; ++sample) {
-    const SurfacePoint alpha = DrawPoint(random, testing::MakeEllipsoid(axes), sample % 2);
+    const SurfacePoint alpha = DrawPoint(random, MakeEllipsoid(axes), sample % 2);
     const SurfaceGeometry geometry = ellipsoid.Evaluate(alpha);
     // 1 / (a b c sum p_i^2 / a_i^4)^2
     const double h = geometry.p.cwiseQuotient(axes.cwiseAbs2()).squaredNorm();
@@ -208,7 +208,7 @@ TEST(SurfaceTest, GaussBonnet) {
 
 TEST(SurfaceTest, ChartsAgreeOnThePointAndItsCurvatures) {
   std::mt19937 random(4);
-  for (const NamedSurface& named : {testing::MakeSphere(), testing::MakeEllipsoid()}) {
+  for (const NamedSurface& named : {MakeSphere(), MakeEllipsoid()}) {
     for (int sample = 0; sample < kSamples; ++sample) {
       SCOPED_TRACE(named.name);
       const Vector3d direction = DrawVector(random, 3);

@@ -82,8 +82,7 @@ class BaselineLawTest : public ::testing::Test {
     const MatrixXd& J = scene_.grasp.J_B();
     const MatrixXd& G = scene_.grasp.G();
     return object * scene_.grasp.body().M_hat +
-           robot * G * testing::CalcInverse(J * testing::CalcInverse(scene_.robot.M()) * J.transpose()) *
-               G.transpose();
+           robot * G * CalcInverse(J * CalcInverse(scene_.robot.M()) * J.transpose()) * G.transpose();
   }
 
   std::mt19937 random_{7};
@@ -203,7 +202,7 @@ TEST_F(BaselineLawTest, ImpedanceDampsEveryModeAlike) {
   A.topRightCorner<6, 6>().setIdentity();
   A.bottomLeftCorner<6, 6>() = -Lambda.inverse() * K;
   A.bottomRightCorner<6, 6>() = -Lambda.inverse() * D;
-  for (const std::complex<double>& s : testing::CalcEigenvalues(A)) {
+  for (const std::complex<double>& s : CalcEigenvalues(A)) {
     EXPECT_NEAR(-s.real() / std::abs(s), 0.7, 1e-7);  // measured 1e-10
   }
 }

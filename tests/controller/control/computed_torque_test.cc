@@ -21,9 +21,8 @@ namespace dexcheck::testing::computed_torque_test {
 namespace {
 
 // Measured, largest of all hands and weights: contact forces 2.8e-14 N (of 40 N), their wrench as M_o
-// X_o_ddot +
-// ... of a predicted X_o_ddot 2.3e-13 N (of 15 N; with Eigen's factorisation in the prediction 3.4e-13),
-// accelerations 1.4e-11 (of 1000 rad/s^2); through the inverses that the printed form makes of
+// X_o_ddot + ... of a predicted X_o_ddot 2.3e-13 N (of 15 N; with Eigen's factorisation in the prediction
+// 3.4e-13), accelerations 1.4e-11 (of 1000 rad/s^2); through the inverses that the printed form makes of
 // ill-conditioned products 2.5e-11 N m (of 100).
 constexpr double kForceRounding = 2e-13;
 constexpr double kPredictedWrenchRounding = 1e-12;
@@ -34,6 +33,9 @@ DesiredMotion DrawDesired(const GraspScene& scene, std::mt19937* random) {
   return {scene.X_o + DrawVector(6, 0.05, random), DrawVector(6, 0.5, random), DrawVector(6, 2.0, random)};
 }
 
+constexpr RedundancyWeight::Kind kWeights[] = {
+    RedundancyWeight::Kind::kIdentity, RedundancyWeight::Kind::kDiagonal, RedundancyWeight::Kind::kMass};
+
 RedundancyWeight MakeWeight(RedundancyWeight::Kind kind, Eigen::Index n) {
   RedundancyWeight weight{kind, {}};
   if (kind == RedundancyWeight::Kind::kDiagonal) weight.w = VectorXd::LinSpaced(n, 1.0, 3.0);
@@ -42,16 +44,10 @@ RedundancyWeight MakeWeight(RedundancyWeight::Kind kind, Eigen::Index n) {
 
 Pseudoinverse FactorJacobian(const GraspScene& scene, const RedundancyWeight& weight) {
   Pseudoinverse pinv("J_B'", scene.num_forces(), scene.robot.size());
-  switch (weight.kind) {
-    case RedundancyWeight::Kind::kIdentity:
-      pinv.Factor(scene.grasp.J_B());
-      break;
-    case RedundancyWeight::Kind::kDiagonal:
-      pinv.FactorDiagonal(scene.grasp.J_B(), weight.w);
-      break;
-    case RedundancyWeight::Kind::kMass:
-      pinv.FactorWeighted(scene.grasp.J_B(), scene.robot.M());
-  }
+  using enum RedundancyWeight::Kind;
+  if (weight.kind == kIdentity) pinv.Factor(scene.grasp.J_B());
+  if (weight.kind == kDiagonal) pinv.FactorDiagonal(scene.grasp.J_B(), weight.w);
+  if (weight.kind == kMass) pinv.FactorWeighted(scene.grasp.J_B(), scene.robot.M());
   return pinv;
 }
 
@@ -123,7 +119,7 @@ TEST_P(LawTest, WholeSystemFollowsTheErrorDynamics) {
     EXPECT_TRUE(MatrixNear(law_.F_o(), F_o, kPredictedWrenchRounding));
     EXPECT_TRUE(MatrixNear(scene_.grasp.G() * p.f_c, F_o, kForceRounding));
     const MatrixXd G_plus =
-        scene_.grasp.G().transpose() * testing::CalcInverse(scene_.grasp.G() * scene_.grasp.G().transpose());
+        scene_.grasp.G().transpose() * CalcInverse(scene_.grasp.G() * scene_.grasp.G().transpose());
     EXPECT_TRUE(MatrixNear(p.f_c, G_plus * F_o + F_N, kForceRounding));
   }
 }
@@ -136,7 +132,7 @@ TEST_P(LawTest, AHasFullColumnRank) {
   const VectorXd F_N = VectorXd::Zero(scene_.num_forces());
   const PrintedLaw printed(scene_, FactorJacobian(scene_, weight_), MakeGains(), desired, zero, F_N);
   // Columns for translation and rotation differ in unit: compare their directions.
-  const VectorXd sigma = testing::CalcSingularValues(printed.A_transposed.rowwise().normalized());
+  const VectorXd sigma = CalcSingularValues(printed.A_transposed.rowwise().normalized());
   EXPECT_GT(sigma[5], 1e-4 * sigma[0]);  // measured 8e-4
   const VectorXd force = CalcForce(CalcTrackingAcceleration(MakeGains(), scene_.grasp, desired), zero, F_N);
   const Vector6d X_o_ddot =
@@ -203,21 +199,15 @@ TEST_P(LawTest, RotationErrorFollowsTheErrorDynamics) {
 }
 
 std::string NameCase(const ::testing::TestParamInfo<LawTest::ParamType>& info) {
-  const Hands hands = std::get<0>(info.param);
-  const RedundancyWeight::Kind kind = std::get<1>(info.param);
-  const std::string hand = hands == Hands::kRight  ? "RightHand"
-                           : hands == Hands::kLeft ? "LeftHand"
-                                                   : "BothHands";
-  return hand + (kind == RedundancyWeight::Kind::kIdentity   ? "Identity"
-                 : kind == RedundancyWeight::Kind::kDiagonal ? "Diagonal"
-                                                             : "Mass");
+  constexpr const char* kHands[] = {"RightHand", "LeftHand", "BothHands"};
+  constexpr const char* kKinds[] = {"Identity", "Diagonal", "Mass"};
+  return std::string(kHands[static_cast<int>(std::get<0>(info.param))]) +
+         kKinds[static_cast<int>(std::get<1>(info.param))];
 }
 
 INSTANTIATE_TEST_SUITE_P(HandsAndWeights, LawTest,
                          ::testing::Combine(::testing::Values(Hands::kRight, Hands::kLeft, Hands::kBoth),
-                                            ::testing::Values(RedundancyWeight::Kind::kIdentity,
-                                                              RedundancyWeight::Kind::kDiagonal,
-                                                              RedundancyWeight::Kind::kMass)),
+                                            ::testing::ValuesIn(kWeights)),
                          NameCase);
 
 // The measured xi may violate (45), as in a soft plant: the law plans with the nearest velocity that does
@@ -316,7 +306,7 @@ TEST(ObjectTracking, BothOrientationErrorsAgreeOnTheTrajectory) {
 }
 
 TEST(PostureTask, ByHand) {
-  const RobotModel model = testing::ReadPaperRobot();
+  const RobotModel model = ReadPaperRobot();
   PostureTask task(model);
   VectorXd q = VectorXd::Zero(model.num_positions());
   VectorXd xi = VectorXd::Zero(model.num_velocities());
@@ -335,11 +325,8 @@ TEST(PostureTask, ByHand) {
   expected[0] = 3.0 * 0.5;
   EXPECT_TRUE(MatrixNear(sigma_prime, expected, 1e-14));
   task.damping.resize(3);
-  const auto call = [&] {
-    task.CalcAcceleration(q, xi, sigma_prime);
-    return 0;
-  };
-  EXPECT_TRUE(Throws<std::invalid_argument>(call, "length of damping"));
+  EXPECT_TRUE(
+      Throws<std::invalid_argument>([&] { task.CalcAcceleration(q, xi, sigma_prime); }, "length of damping"));
 }
 
 // With W = 1 an arm that holds nothing gets exactly its own entries of sigma'.
@@ -368,27 +355,22 @@ TEST(ComputedTorque, Errors) {
   const VectorXd sigma_prime = VectorXd::Zero(scene.robot.size());
   const auto torque = [&] { return law.CalcTorque(scene.grasp, VectorXd::Zero(3)); };
   EXPECT_TRUE(Throws<std::invalid_argument>(torque, "length of F_N"));
-  const auto demand = [&] {
-    law.SetDemand(scene.robot, scene.grasp, Vector6d::Zero(), VectorXd::Zero(3));
-    return 0;
-  };
-  EXPECT_TRUE(Throws<std::invalid_argument>(demand, "length of sigma'"));
+  EXPECT_TRUE(Throws<std::invalid_argument>(
+      [&] { law.SetDemand(scene.robot, scene.grasp, Vector6d::Zero(), VectorXd::Zero(3)); },
+      "length of sigma'"));
 
   // Two contacts leave the object free to turn about the line through them.
   const std::span<const int> two = std::span(scene.fingertips).subspan(1, 2);
   GraspTerms grasp(scene.model, two, scene.object, scene.surface);
   grasp.SetState(scene.robot, scene.X_o, scene.X_o_dot, std::span(scene.kappa).subspan(1, 2));
   ComputedTorque weak(scene.model, 2);
-  const auto weak_demand = [&] {
-    weak.SetDemand(scene.robot, grasp, Vector6d::Zero(), sigma_prime);
-    return 0;
-  };
-  EXPECT_TRUE(Throws<SingularityError>(weak_demand, "G has not full row rank, condition number"));
+  EXPECT_TRUE(
+      Throws<SingularityError>([&] { weak.SetDemand(scene.robot, grasp, Vector6d::Zero(), sigma_prime); },
+                               "G has not full row rank, condition number"));
 }
 
 TEST(ComputedTorque, OneControlStepDoesNotAllocate) {
-  for (const auto kind : {RedundancyWeight::Kind::kIdentity, RedundancyWeight::Kind::kDiagonal,
-                          RedundancyWeight::Kind::kMass}) {
+  for (const RedundancyWeight::Kind kind : kWeights) {
     GraspScene scene;
     std::mt19937 random(6);
     scene.DrawVelocities(&random, 1.0);

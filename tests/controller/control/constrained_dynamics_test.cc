@@ -122,7 +122,7 @@ TEST_P(PredictionTest, IsTheSolutionOfTheWholeSystem) {
   VectorXd b(n + 6 + k);
   b << force_ - scene_.robot.C() * scene_.xi - scene_.robot.gravity() - scene_.robot.friction(),
       -g.body().C_hat * g.V_Bo() - g.body().N_o, -g.J_B_dot() * scene_.xi + g.G_dot().transpose() * g.V_Bo();
-  const VectorXd x = testing::SolveDense(A, b);
+  const VectorXd x = SolveDense(A, b);
   // The whole matrix mixes kg with 1e-5 kg m^2 and loses more digits; measured 5.4e-10 of 6000
   // rad/s^2, 2.7e-12 N.
   EXPECT_TRUE(MatrixNear(p.xi_dot, x.head(n), 5e-9));
@@ -293,11 +293,8 @@ TEST(ConstrainedDynamics, RejectsWrongSizes) {
       },
       "r_palm_frame carries no sphere"));
   const auto few = std::span(scene.kappa).first(2);
-  const auto set = [&] {
-    scene.grasp.SetState(scene.robot, scene.X_o, scene.X_o_dot, few);
-    return 0;
-  };
-  EXPECT_TRUE(Throws<std::invalid_argument>(set, "number of kappa"));
+  EXPECT_TRUE(Throws<std::invalid_argument>(
+      [&] { scene.grasp.SetState(scene.robot, scene.X_o, scene.X_o_dot, few); }, "number of kappa"));
 }
 
 TEST(ConstrainedDynamics, DoesNotAllocate) {
@@ -315,7 +312,7 @@ TEST(ConstrainedDynamics, DoesNotAllocate) {
 // E_bar' = diag(S_v^T E_v, 1), for both choices of v.
 TEST(ActuationMap, IsEBar) {
   for (const DriveVelocity velocity : {DriveVelocity::kTwist, DriveVelocity::kWheelRates}) {
-    const RobotModel model = testing::ReadPaperRobot(velocity);
+    const RobotModel model = ReadPaperRobot(velocity);
     const ActuationMap actuation(model);
     std::mt19937 random(7);
     const VectorXd tau = DrawForce(model.num_velocities(), &random);

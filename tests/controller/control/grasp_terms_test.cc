@@ -5,8 +5,6 @@
 
 #include <gtest/gtest.h>
 
-#include <algorithm>
-#include <array>
 #include <functional>
 #include <random>
 #include <stdexcept>
@@ -46,7 +44,7 @@ class GraspTermsTest : public ::testing::Test {
     q_ = scene_.q;
     X_o_ = scene_.X_o;
     kappa_ = scene_.kappa;
-    q_dot_ = testing::CalcReductionMap(scene_.model, q_, scene_.xi).S * scene_.xi;
+    q_dot_ = CalcReductionMap(scene_.model, q_, scene_.xi).S * scene_.xi;
     StoreContactRates();
   }
 
@@ -196,7 +194,7 @@ TEST_F(Overlaps, ContactsStandMidway) {
   SetOverlaps(kOverlaps);
   for (size_t i = 0; i < kOverlaps.size(); ++i) {
     const ContactGeometry& geometry = scene_.grasp.contacts()[i].geometry;
-    const double radius = *scene_.model.frames()[static_cast<size_t>(scene_.fingertips[i])].sphere_radius;
+    const double radius = *scene_.model.frame(scene_.fingertips[i]).sphere_radius;
     EXPECT_NEAR(geometry.g_f_cf.translation().norm(), radius - kOverlaps[i] / 2.0, kRounding);
     EXPECT_NEAR(scene_.surface.Project(geometry.g_o_cf.translation()).distance, -kOverlaps[i] / 2.0,
                 kRounding);
@@ -232,18 +230,13 @@ using Misuse = GraspTermsTest;
 TEST_F(Misuse, WrongCountsAreNamed) {
   const std::vector<Bond> bonds(3);
   const std::vector<double> overlaps(5);
-  const auto run = [](const std::function<void()>& call) {
-    return [call] {
-      call();
-      return 0;
-    };
-  };
+  const auto run = [](const std::function<void()>& call) { return [call] { call(); }; };
   EXPECT_TRUE(Throws<std::invalid_argument>(run([&] { scene_.grasp.SetBonds(bonds); }), "number of bonds"));
   EXPECT_TRUE(
       Throws<std::invalid_argument>(run([&] { scene_.grasp.SetOverlaps(overlaps); }), "number of overlaps"));
   scene_.kappa.pop_back();
   EXPECT_TRUE(Throws<std::invalid_argument>(run([&] { scene_.SetState(); }), "number of kappa"));
-  const RobotModel other = testing::ReadPanda();
+  const RobotModel other = ReadPanda();
   ModelTerms robot(other);
   robot.SetState(VectorXd::Zero(other.num_positions()), VectorXd::Zero(robot.size()));
   EXPECT_TRUE(Throws<std::invalid_argument>(

@@ -3,8 +3,6 @@
 // The paper's own plant: rigid robot and object, rolling contacts, integrated by Runge-Kutta's classical
 // method.
 
-#include <utility>
-
 #include "controller/contact/contact_geometry.h"
 #include "controller/control/constrained_dynamics.h"
 #include "controller/model/platform.h"

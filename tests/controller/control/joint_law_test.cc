@@ -29,7 +29,7 @@ VectorXd DrawVector(double scale, std::mt19937* random) {
 
 class JointLawTest : public ::testing::Test {
  protected:
-  JointLawTest() : model_(testing::ReadPanda()), robot_(model_, Coordinates::kReduced), dynamics_(model_, 0) {
+  JointLawTest() : model_(ReadPanda()), robot_(model_, Coordinates::kReduced), dynamics_(model_, 0) {
     std::mt19937 random(20);
     q_ = DrawVector(1.0, &random);
     xi_ = DrawVector(1.0, &random);
@@ -119,8 +119,7 @@ TEST_F(JointLawTest, AllocatesNothing) {
 }
 
 TEST_F(JointLawTest, RefusesWhatItCannotDrive) {
-  EXPECT_THROW(JointLaw(testing::ReadPaperRobot(), ControlLaw::kComputedTorque, gains_),
-               std::invalid_argument);
+  EXPECT_THROW(JointLaw(ReadPaperRobot(), ControlLaw::kComputedTorque, gains_), std::invalid_argument);
   EXPECT_THROW(JointLaw(model_, ControlLaw::kImpedance, gains_), std::invalid_argument);
   JointGains wrong = gains_;
   wrong.coulomb.setOnes(6);

@@ -50,7 +50,7 @@ struct PrintedLaw {
     const MatrixXd J_plus = J_B_pinv.CalcMatrix();
     const MatrixXd N = J_B_pinv.CalcProjector();
     const MatrixXd J_T = grasp.J_B().transpose();
-    const MatrixXd G_plus = G.transpose() * testing::CalcInverse(G * G.transpose());
+    const MatrixXd G_plus = G.transpose() * CalcInverse(G * G.transpose());
     const VectorXd sigma = scene.xi;
     const Vector6d& X_dot = scene.X_o_dot;
     const Vector6d command = desired.X_d_ddot + gains.K_v.cwiseProduct(desired.X_d_dot - X_dot) +

@@ -140,7 +140,7 @@ TEST(Pseudoinverse, ColumnsThatAreNotListedAreZero) {
 TEST(Pseudoinverse, UnweightedIsTheMoorePenroseInverse) {
   std::mt19937 random(3);
   Case c(0, &random);
-  const MatrixXd expected = testing::CalcPseudoinverse(c.J);
+  const MatrixXd expected = CalcPseudoinverse(c.J);
   EXPECT_TRUE(MatrixNear(c.J_pinv.CalcMatrix(), expected, kRounding));
 }
 
@@ -178,7 +178,7 @@ TEST(Pseudoinverse, ConditionNumberIsABound) {
     Case c(kind, &random);
     const Eigen::LLT<MatrixXd> W_llt(c.W);
     const MatrixXd half = W_llt.matrixL().solve(c.J.transpose());
-    const VectorXd sigma = testing::CalcSingularValues(half);
+    const VectorXd sigma = CalcSingularValues(half);
     const double exact = sigma[0] / sigma[kRows - 1];
     EXPECT_GE(c.J_pinv.condition_number(), exact);
     EXPECT_LE(c.J_pinv.condition_number(), kRows * exact);
@@ -193,10 +193,7 @@ TEST(Pseudoinverse, RejectsRankDeficientMatrices) {
   J.row(3) = J.row(5) + 1e-4 * J.row(7);
   EXPECT_NO_THROW(pinv.Factor(J + 1e-4 * DrawMatrix(kRows, kColumns, &random)));
   J.row(3) = J.row(5) + 2.0 * J.row(7);
-  const auto factor = [&] {
-    pinv.Factor(J);
-    return 0;
-  };
+  const auto factor = [&] { pinv.Factor(J); };
   EXPECT_TRUE(Throws<SingularityError>(factor, "J_B' has not full row rank, condition number"));
   J.row(3).setZero();
   EXPECT_TRUE(Throws<SingularityError>(factor, "condition number inf"));
@@ -209,24 +206,12 @@ TEST(Pseudoinverse, RejectsWrongArguments) {
   EXPECT_TRUE(Throws<std::invalid_argument>([] { return Pseudoinverse("J", 0, 2); }, "rows of J"));
   Pseudoinverse pinv("J", 2, 3);
   const MatrixXd J = MatrixXd::Identity(2, 3);
-  const auto diagonal = [&](const VectorXd& w) {
-    return [&, w] {
-      pinv.FactorDiagonal(J, w);
-      return 0;
-    };
-  };
+  const auto diagonal = [&](const VectorXd& w) { return [&, w] { pinv.FactorDiagonal(J, w); }; };
   EXPECT_TRUE(Throws<std::invalid_argument>(diagonal(Vector3d(1.0, 0.0, 1.0)), "entry of w"));
   EXPECT_TRUE(Throws<std::invalid_argument>(diagonal(Vector2d(1.0, 1.0)), "length of w"));
-  const auto transposed = [&] {
-    pinv.Factor(J.transpose());
-    return 0;
-  };
-  EXPECT_TRUE(Throws<std::invalid_argument>(transposed, "rows of J"));
-  const auto indefinite = [&] {
-    pinv.FactorWeighted(J, -Matrix3d::Identity());
-    return 0;
-  };
-  EXPECT_TRUE(Throws<std::invalid_argument>(indefinite, "W: must be positive definite"));
+  EXPECT_TRUE(Throws<std::invalid_argument>([&] { pinv.Factor(J.transpose()); }, "rows of J"));
+  EXPECT_TRUE(Throws<std::invalid_argument>([&] { pinv.FactorWeighted(J, -Matrix3d::Identity()); },
+                                            "W: must be positive definite"));
 }
 
 TEST(Pseudoinverse, DoesNotAllocate) {

@@ -7,9 +7,8 @@
 
 #include <random>
 
-#include "controller/common/errors.h"
+#include "controller/control/constrained_dynamics.h"
 #include "controller/control/grasp_controller.h"
-#include "controller/control/ground_dynamics.h"
 #include "controller/model/parameter_reader.h"
 #include "tests/common/finite_difference.h"
 #include "tests/common/matrix_near.h"

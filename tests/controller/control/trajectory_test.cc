@@ -266,12 +266,7 @@ TEST(Trajectory, SumOfAPathAndATiltTiltsAboutAHorizontalAxis) {
 TEST(Trajectory, RejectsWrongNumbers) {
   const Vector6d X = MakeStart();
   const auto rejects = [](const auto& make, const std::string& text) {
-    return Throws<std::invalid_argument>(
-        [&] {
-          make();
-          return 0;
-        },
-        text);
+    return Throws<std::invalid_argument>([&] { make(); }, text);
   };
   EXPECT_TRUE(rejects([&] { MakeLineTrajectory(X, X, -1.0); }, "ramp_time"));
   EXPECT_TRUE(rejects([&] { MakePointToPointTrajectory(X, X, 0.0); }, "duration"));

@@ -85,8 +85,8 @@ class Allocation : public ::testing::TestWithParam<RobotCase> {
   const RobotModel& model_ = GetParam().model;
   std::mt19937 random_{12};
   ModelTerms terms_{model_, GetParam().coordinates};
-  const VectorXd q_ = testing::DrawPositions(model_, &random_);
-  const VectorXd velocity_ = testing::DrawVelocities(terms_.size(), &random_);
+  const VectorXd q_ = DrawPositions(model_, &random_);
+  const VectorXd velocity_ = DrawVelocities(terms_.size(), &random_);
 };
 
 INSTANTIATE_TEST_SUITE_P(Robots, Allocation, ::testing::ValuesIn(MakeCases()), NameOf);

@@ -29,7 +29,7 @@ constexpr int kFingers = 32;  // q_f
 std::vector<int> FindJoints(const RobotModel& model, const std::string& prefix, int base) {
   std::vector<int> found;
   for (int i = 0; i < model.num_joints(); ++i) {
-    if (model.joints()[static_cast<size_t>(i)].name.starts_with(prefix)) found.push_back(base + i);
+    if (model.joint(i).name.starts_with(prefix)) found.push_back(base + i);
   }
   return found;
 }
@@ -156,7 +156,7 @@ TEST_P(ReducedBlocks, AreThoseOfEquation17) {
   ASSERT_GT(S_v_dot.norm(), 0.01);
 
   ModelTerms full(model, Coordinates::kUnreduced);
-  full.SetState(q, testing::CalcReductionMap(model, q, xi).S * xi);
+  full.SetState(q, CalcReductionMap(model, q, xi).S * xi);
   full.CalcDynamics();
   ModelTerms reduced(model);
   reduced.SetState(q, xi);

@@ -4,7 +4,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <string>
 #include <vector>
 
 #include "tests/common/dual.h"
@@ -58,14 +57,14 @@ LagrangeTerms CalcLagrangeTerms(const RobotModel& model, const VectorXd& q, cons
   const NaiveDynamics<double> naive(model, q);
   LagrangeTerms terms{naive.CalcMassMatrix(), MatrixXd::Zero(n, n), VectorXd::Zero(n), VectorXd::Zero(n)};
   for (Eigen::Index k = 0; k < n; ++k) {
-    const NaiveDynamics<Dual> along_k(model, testing::MakeDual(q, VectorXd::Unit(n, k)));
-    const MatrixXd dM = testing::GetRates(along_k.CalcMassMatrix());
+    const NaiveDynamics<Dual> along_k(model, MakeDual(q, VectorXd::Unit(n, k)));
+    const MatrixXd dM = GetRates(along_k.CalcMassMatrix());
     const VectorXd dM_q_dot = dM * q_dot;
     terms.C += 0.5 * q_dot[k] * dM;
     terms.C.col(k) += 0.5 * dM_q_dot;
     terms.C.row(k) -= 0.5 * dM_q_dot.transpose();
     terms.gravity[k] = along_k.CalcPotentialEnergy().rate;
-    terms.friction[k] = naive.CalcDissipation(testing::MakeDual(q_dot, VectorXd::Unit(n, k))).rate;
+    terms.friction[k] = naive.CalcDissipation(MakeDual(q_dot, VectorXd::Unit(n, k))).rate;
   }
   return terms;
 }
@@ -132,8 +131,8 @@ TEST_P(Christoffel, EnergyAndMomentumAreSumsOverBodies) {
     ASSERT_GT(linear.norm(), 0.1);
     ASSERT_GT(angular.norm(), 0.1);
     ASSERT_GT(std::abs(potential), 0.1);
-    EXPECT_NEAR(result.kinetic, kinetic, kSumRounding * testing::TolScale());
-    EXPECT_NEAR(result.potential, potential, kSumRounding * testing::TolScale());
+    EXPECT_NEAR(result.kinetic, kinetic, kSumRounding * TolScale());
+    EXPECT_NEAR(result.potential, potential, kSumRounding * TolScale());
     EXPECT_TRUE(MatrixNear(result.com, com, kSumRounding)) << "com";
     EXPECT_TRUE(MatrixNear(result.linear_momentum, linear, kSumRounding)) << "linear momentum";
     EXPECT_TRUE(MatrixNear(result.angular_momentum, angular, kSumRounding)) << "angular momentum";

@@ -105,14 +105,14 @@ class FingertipPose : public ::testing::Test {
     terms_.SetState(q, VectorXd::Zero(terms_.size()));
     return terms_.CalcFramePose(model_.FindFrame(frame)).matrix();
   }
-  const RobotModel model_ = testing::ReadPaperRobot();
+  const RobotModel model_ = ReadPaperRobot();
   ModelTerms terms_{model_};
 };
 
 TEST_F(FingertipPose, IsTheProductOfTheTables) {
   std::mt19937 random(51);
   for (int state = 0; state < 20; ++state) {
-    const VectorXd q = testing::DrawPositions(model_, &random);
+    const VectorXd q = DrawPositions(model_, &random);
     EXPECT_TRUE(MatrixNear(CalcPose("rf1_tip", q), CalcR1(q), kRounding));
     EXPECT_TRUE(MatrixNear(CalcPose("lf4_tip", q), CalcL4(q), kRounding));
     // A loop with another finger, and joints in another order, are seen.

@@ -4,7 +4,6 @@
 
 #include "controller/dynamics/model_terms.h"
 #include "controller/model/body_frame.h"
-#include "controller/model/body_reader.h"
 #include "controller/model/parameter_reader.h"
 #include "tests/common/matrix_near.h"
 #include "tests/common/random_robot.h"
@@ -16,10 +15,10 @@ namespace {
 constexpr double kRounding = 1e-11;
 
 RobotSpec MakeFloating(std::mt19937* random) {
-  testing::RandomRobotOptions options;
+  RandomRobotOptions options;
   options.base = BaseType::kFloating;
   options.joints = 12;
-  return testing::MakeRandomRobot(options, random);
+  return MakeRandomRobot(options, random);
 }
 
 /// The robot with its base carried by x, y, z, yaw, pitch, roll.
@@ -68,8 +67,8 @@ struct State {
 
 State MakeState(const RobotModel& floating, std::mt19937* random) {
   State state;
-  state.q = testing::DrawPositions(floating, random);
-  state.xi = testing::DrawVelocities(floating.num_velocities(), random);
+  state.q = DrawPositions(floating, random);
+  state.xi = DrawVelocities(floating.num_velocities(), random);
   const double yaw = 0.7, p = -0.9, r = 0.4;
   const Eigen::Quaterniond quaternion(Eigen::AngleAxisd(yaw, Vector3d::UnitZ()) *
                                       Eigen::AngleAxisd(p, Vector3d::UnitY()) *
@@ -151,7 +150,7 @@ TEST_F(FloatingBase, HasTheTermsOfTheRobotOnAChain) {
 TEST_F(FloatingBase, HasTheCoriolisMatrixOfItsForces) {
   const State state = MakeState(floating_, &random_);
   const VectorXd x = state.xi;
-  const VectorXd w = testing::DrawVelocities(floating_.num_velocities(), &random_);
+  const VectorXd w = DrawVelocities(floating_.num_velocities(), &random_);
   ModelTerms terms(floating_);
   const auto coriolis = [&](const VectorXd& velocity) {
     terms.SetState(state.q, velocity);

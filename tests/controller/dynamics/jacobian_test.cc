@@ -106,11 +106,9 @@ TEST_P(Jacobian, IsTheDerivativeOfThePose) {
           kPoseStep);
       by_difference.col(i) = CalcBodyVelocity(X, X_dot);
     }
-    const bool moves =
-        model_.base().type != BaseType::kFixed || model_.frames()[static_cast<size_t>(frame)].link >= 0;
+    const bool moves = model_.base().type != BaseType::kFixed || model_.frame(frame).link >= 0;
     if (moves) ASSERT_GT(J.norm(), 0.01);
-    EXPECT_TRUE(MatrixNear(J, by_difference, kPoseDifference))
-        << model_.frames()[static_cast<size_t>(frame)].name;
+    EXPECT_TRUE(MatrixNear(J, by_difference, kPoseDifference)) << model_.frame(frame).name;
   }
 }
 
@@ -123,8 +121,7 @@ TEST_P(Jacobian, RateIsTheDerivativeAlongTheMotion) {
     terms_.CalcFrameJacobian(frame, J, J_dot);
     const Matrix6Xd by_difference = Differentiate(
         [&](double t) -> Matrix6Xd { return CalcJacobian(frame, q_ + t * q_dot_); }, kStateStep);
-    EXPECT_TRUE(MatrixNear(J_dot, by_difference, kStateDifference))
-        << model_.frames()[static_cast<size_t>(frame)].name;
+    EXPECT_TRUE(MatrixNear(J_dot, by_difference, kStateDifference)) << model_.frame(frame).name;
     largest = std::max(largest, J_dot.norm());
   }
   ASSERT_GT(largest, 1.0);
@@ -135,7 +132,7 @@ TEST_P(Jacobian, LinkVelocityIsTheDerivativeOfTheLinksPose) {
   terms_.SetState(q_, velocity_);
   double largest = 0.0;
   for (int frame = 0; frame < frames_; ++frame) {
-    const int link = model_.frames()[static_cast<size_t>(frame)].link;
+    const int link = model_.frame(frame).link;
     const Vector6d V = terms_.CalcLinkVelocity(link);
     const Pose X = terms_.CalcLinkPose(link);
     const Eigen::Matrix4d X_dot = Differentiate(
@@ -198,9 +195,9 @@ TEST_P(Jacobian, WrongSizesAreRejected) {
 TEST(BasePose, OfAMobileBaseIsNotTurned) {
   std::mt19937 random(3);
   for (const BaseType type : {BaseType::kPlanar, BaseType::kDifferentialDrive}) {
-    testing::RandomRobotOptions options;
+    RandomRobotOptions options;
     options.base = type;
-    RobotSpec spec = testing::MakeRandomRobot(options, &random);
+    RobotSpec spec = MakeRandomRobot(options, &random);
     spec.base.X_B0.translation() = Vector3d(0.5, -0.4, 0.3);
     const RobotModel model(spec);
     ModelTerms terms(model);

@@ -113,7 +113,7 @@ struct KdlTerms {
 
 class PandaAgainstKdl : public ::testing::Test {
  protected:
-  const RobotModel panda_ = testing::ReadPanda();
+  const RobotModel panda_ = ReadPanda();
   std::mt19937 random_{1989};
 };
 
@@ -125,8 +125,8 @@ TEST_F(PandaAgainstKdl, AllTermsAgree) {
   Matrix6Xd J(6, kJoints);
   Matrix6Xd J_dot(6, kJoints);
   for (int state = 0; state < 50; ++state) {
-    const VectorXd q = testing::DrawPositions(panda_, &random_);
-    const VectorXd q_dot = testing::DrawVelocities(kJoints, &random_);
+    const VectorXd q = DrawPositions(panda_, &random_);
+    const VectorXd q_dot = DrawVelocities(kJoints, &random_);
     const KdlTerms expected(chain, q, q_dot);
     terms.SetState(q, q_dot);
     terms.CalcDynamics();
@@ -146,8 +146,8 @@ TEST_F(PandaAgainstKdl, AllTermsAgree) {
 }
 
 TEST_F(PandaAgainstKdl, MutationsAreSeen) {
-  const VectorXd q = testing::DrawPositions(panda_, &random_);
-  const VectorXd q_dot = testing::DrawVelocities(kJoints, &random_);
+  const VectorXd q = DrawPositions(panda_, &random_);
+  const VectorXd q_dot = DrawVelocities(kJoints, &random_);
   const KdlTerms expected(MakeChain(panda_), q, q_dot);
   const int flange = panda_.FindFrame("panda_flange");
   Matrix6Xd J(6, kJoints);

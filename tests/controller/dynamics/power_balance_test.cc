@@ -148,11 +148,11 @@ void PrintTo(const Case& robot, std::ostream* out) { *out << robot.name; }
 
 RobotModel MakeTree(BaseType base, DriveVelocity velocity = DriveVelocity::kTwist) {
   std::mt19937 random(48);
-  testing::RandomRobotOptions options;
+  RandomRobotOptions options;
   options.base = base;
   options.velocity = velocity;
   options.joints = 8;
-  return RobotModel(testing::MakeRandomRobot(options, &random));
+  return RobotModel(MakeRandomRobot(options, &random));
 }
 
 std::vector<Case> MakeCases() {
@@ -160,8 +160,8 @@ std::vector<Case> MakeCases() {
           {"Planar", MakeTree(BaseType::kPlanar)},
           {"DriveTwist", MakeTree(BaseType::kDifferentialDrive)},
           {"DriveWheelRates", MakeTree(BaseType::kDifferentialDrive, DriveVelocity::kWheelRates)},
-          {"PaperTwist", testing::ReadPaperRobot()},
-          {"PaperWheelRates", testing::ReadPaperRobot(DriveVelocity::kWheelRates)}};
+          {"PaperTwist", ReadPaperRobot()},
+          {"PaperWheelRates", ReadPaperRobot(DriveVelocity::kWheelRates)}};
 }
 
 class PowerBalance : public ::testing::TestWithParam<Case> {};

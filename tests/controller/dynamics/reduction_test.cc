@@ -3,10 +3,6 @@
 
 #include <gtest/gtest.h>
 
-#include <cmath>
-#include <string>
-#include <vector>
-
 #include "tests/common/finite_difference.h"
 #include "tests/common/linear_algebra.h"
 #include "tests/common/mass_scaling.h"
@@ -73,9 +69,9 @@ TEST_P(Reduction, SSpansTheNullSpaceOfA) {
   for (int state = 0; state < kStates; ++state) {
     const Evaluation at(model_, &random_);
     ASSERT_EQ(at.map.A.rows(), constrained_ ? 1 : 0);
-    ASSERT_EQ(testing::CalcRank(at.map.S), model_.num_velocities());
+    ASSERT_EQ(CalcRank(at.map.S), model_.num_velocities());
     if (!constrained_) continue;
-    ASSERT_EQ(testing::CalcRank(at.map.A), 1);
+    ASSERT_EQ(CalcRank(at.map.A), 1);
     const MatrixXd product = at.map.S.transpose() * at.map.A.transpose();
     EXPECT_TRUE(MatrixNear(product, MatrixXd::Zero(model_.num_velocities(), 1), kRounding));
   }
@@ -145,7 +141,7 @@ TEST(PlatformPose, IsCyclic) {
 /// M_dot of given terms along q_dot, by differences.
 MatrixXd CalcMassMatrixRate(ModelTerms* terms, const VectorXd& q, const VectorXd& q_dot,
                             const VectorXd& velocity) {
-  return testing::Differentiate(
+  return Differentiate(
       [&](double t) -> MatrixXd {
         terms->SetState(q + t * q_dot, velocity);
         terms->CalcDynamics();

@@ -78,8 +78,8 @@ TEST(TreeFactor, SolvesForChainsAlone) {
   TreeFactor factor(model);
   factor.Compute(terms.M());
   std::vector<int> rows = {0, 1};
-  const int tip = model.frames()[static_cast<size_t>(model.fingertips()[1])].link;
-  for (int i = tip; i >= 0; i = model.joints()[static_cast<size_t>(i)].parent) {
+  const int tip = model.frame(model.fingertips()[1]).link;
+  for (int i = tip; i >= 0; i = model.joint(i).parent) {
     rows.insert(rows.begin() + 2, 2 + i);
   }
   ASSERT_LT(static_cast<int>(rows.size()), n / 2);

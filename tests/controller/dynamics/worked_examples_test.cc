@@ -108,8 +108,8 @@ TEST(TwoLinkArm, AgreesWithNumbersByHand) {
   const EnergyAndMomentum energy = terms.CalcEnergyAndMomentum();
   // T = 1/2 (0.49 * 4 + 2 * 0.11 * 2 + 0.115) = 1.2575 J, V = 9.81 * 0.3 J; the centre of mass moves with
   // (m1 (0, 0.4) + m2 (-0.9, 1.0)) / 3.
-  EXPECT_NEAR(energy.kinetic, 1.2575, kRounding * testing::TolScale());
-  EXPECT_NEAR(energy.potential, 2.943, kRounding * testing::TolScale());
+  EXPECT_NEAR(energy.kinetic, 1.2575, kRounding * TolScale());
+  EXPECT_NEAR(energy.potential, 2.943, kRounding * TolScale());
   EXPECT_TRUE(MatrixNear(energy.linear_momentum, Vector3d(-0.9, 1.8, 0.0), kRounding));
 }
 

@@ -13,7 +13,6 @@
 #include "controller/contact/grasp_map.h"
 #include "controller/contact/shapes.h"
 #include "controller/dynamics/model_terms.h"
-#include "controller/grasp/finger_placement.h"
 #include "controller/grasp/force_closure.h"
 #include "tests/common/matchers.h"
 #include "tests/common/matrix_near.h"
@@ -39,7 +38,7 @@ class ContactPlanTest : public ::testing::Test {
   [[nodiscard]] Hand MakeHand(char side) const {
     Hand hand;
     for (const int tip : model_.fingertips()) {
-      if (model_.frames()[static_cast<size_t>(tip)].name.front() == side) hand.fingertips.push_back(tip);
+      if (model_.frame(tip).name.front() == side) hand.fingertips.push_back(tip);
     }
     hand.palm_frame = model_.FindFrame(side + std::string("_palm_frame"));
     hand.arm_joints = ListArmJoints(model_, hand.fingertips, hand.palm_frame);
@@ -92,14 +91,13 @@ class ContactPlanTest : public ::testing::Test {
     // Joints: own ranges, and nothing else has moved.
     std::vector<int> moved = hand.arm_joints;
     for (const int tip : hand.fingertips) {
-      int joint = model_.frames()[static_cast<size_t>(tip)].link;
-      for (int k = 0; k < 4; ++k, joint = model_.joints()[static_cast<size_t>(joint)].parent)
-        moved.push_back(joint);
+      int joint = model_.frame(tip).link;
+      for (int k = 0; k < 4; ++k, joint = model_.joint(joint).parent) moved.push_back(joint);
     }
     double joint_margin = 1e9;
     VectorXd q = q_nominal;
     for (const int index : moved) {
-      const Joint& joint = model_.joints()[static_cast<size_t>(index)];
+      const Joint& joint = model_.joint(index);
       q[3 + index] = plan.q[3 + index];
       joint_margin = std::min({joint_margin, q[3 + index] - joint.lower, joint.upper - q[3 + index]});
     }
@@ -110,7 +108,7 @@ class ContactPlanTest : public ::testing::Test {
     // Fingertips: touching at the contacts, open by the normals, apart, above the support.
     std::vector<Vector3d> centers;
     for (size_t i = 0; i < hand.fingertips.size(); ++i) {
-      const double r = *model_.frames()[static_cast<size_t>(hand.fingertips[i])].sphere_radius;
+      const double r = *model_.frame(hand.fingertips[i]).sphere_radius;
       const SurfaceGeometry surface = object.Evaluate(plan.contacts[i]);
       const Vector3d n = surface.R.col(2);
       const Vector3d center = X_Bo.inverse() * terms.CalcFramePose(hand.fingertips[i]).translation();
@@ -130,8 +128,8 @@ class ContactPlanTest : public ::testing::Test {
                   std::sin(options.steepest) + 1e-9);
       }
       // The finger's other joints stay outside of the object.
-      int joint = model_.frames()[static_cast<size_t>(hand.fingertips[i])].link;
-      for (int k = 0; k < 4; ++k, joint = model_.joints()[static_cast<size_t>(joint)].parent) {
+      int joint = model_.frame(hand.fingertips[i]).link;
+      for (int k = 0; k < 4; ++k, joint = model_.joint(joint).parent) {
         const Vector3d origin = X_Bo.inverse() * terms.CalcLinkPose(joint).translation();
         EXPECT_GE(object.Project(origin).distance, options.finger_thickness * r);
       }
@@ -143,7 +141,7 @@ class ContactPlanTest : public ::testing::Test {
     EXPECT_GE(plan.margin, options.least_margin);
   }
 
-  RobotModel model_ = testing::ReadPaperRobot();
+  RobotModel model_ = ReadPaperRobot();
 };
 
 TEST_F(ContactPlanTest, HoldsTheTorusOfThePaperBetterThanHandPickedContacts) {

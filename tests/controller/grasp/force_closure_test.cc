@@ -133,8 +133,7 @@ TEST(ForceClosureHandWorked, FourContactsOnTheEquator) {
   const GraspForceProblem grasp = MakeEquatorGraspForceProblem(4, kMu);
   ForceClosureOptions options;
   options.length = 1.0;
-  const double expected =
-      kMu * (testing::kTorusRadius + testing::kTubeRadius) / (std::sqrt(2.0) * options.length);
+  const double expected = kMu * (kTorusRadius + kTubeRadius) / (std::sqrt(2.0) * options.length);
   const ForceClosureResult result = CalcForceClosure(grasp.G, grasp.mu, options);
   EXPECT_EQ(result.status, ForceClosureStatus::kForceClosure);
   EXPECT_LE(result.margin_lower, expected);
@@ -157,8 +156,8 @@ TEST(ForceClosureHandWorked, CharacteristicLengthWeighsMoments) {
 TEST(ForceClosureHandWorked, TwoHardFingersCannotResistTheirAxis) {
   // No moment about the line through two point contacts, here x.
   Matrix6Xd G(6, 6);
-  G << testing::CalcContactColumns(testing::CalcTorusContact(0.0, 0.0, 0.0)),
-      testing::CalcContactColumns(testing::CalcTorusContact(kPi, 0.0, 0.0));
+  G << CalcContactColumns(CalcTorusContact(0.0, 0.0, 0.0)),
+      CalcContactColumns(CalcTorusContact(kPi, 0.0, 0.0));
   const ForceClosureResult result = CalcForceClosure(G, Vector2d(0.5, 0.5));
   EXPECT_EQ(result.status, ForceClosureStatus::kNotForceClosure);
   EXPECT_EQ(result.margin, 0.0);
@@ -172,8 +171,8 @@ TEST(ForceClosureHandWorked, FingersOnOneSideCannotPush) {
   const double mu = 0.3;
   Matrix6Xd G(6, 12);
   for (Eigen::Index i = 0; i < 4; ++i) {
-    G.middleCols<3>(3 * i) = testing::CalcContactColumns(
-        testing::CalcTorusContact(0.5 * kPi * static_cast<double>(i), 0.5 * kPi, 0.0));
+    G.middleCols<3>(3 * i) =
+        CalcContactColumns(CalcTorusContact(0.5 * kPi * static_cast<double>(i), 0.5 * kPi, 0.0));
   }
   const ForceClosureResult result = CalcForceClosure(G, Eigen::Vector4d::Constant(mu));
   EXPECT_EQ(result.status, ForceClosureStatus::kNotForceClosure);
@@ -189,7 +188,7 @@ TEST(ForceClosureRank, ContactsOnOneLineNeverReachThePolytope) {
   for (const double offset : kOffsets) {
     for (const double unit : kUnits) {
       for (int sample = 0; sample < 100; ++sample) {
-        const testing::LineGrasp grasp = testing::MakeRandomLineGrasp(random, 3 + sample % 4, offset, unit);
+        const LineGrasp grasp = MakeRandomLineGrasp(random, 3 + sample % 4, offset, unit);
         ForceClosureOptions options;
         options.length *= unit;
         const Matrix6Xd& G = grasp.problem.G;
@@ -223,7 +222,7 @@ TEST(ForceClosureRank, ContactsNearlyOnOneLineReachIt) {
   std::mt19937_64 random(4);
   for (const double unit : kUnits) {
     for (int sample = 0; sample < 100; ++sample) {
-      testing::LineGrasp grasp = testing::MakeRandomLineGrasp(random, 3 + sample % 4, 0.1, unit);
+      LineGrasp grasp = MakeRandomLineGrasp(random, 3 + sample % 4, 0.1, unit);
       Matrix6Xd& G = grasp.problem.G;
       const Vector3d aside = 1e-6 * unit * grasp.n.tail<3>().unitOrthogonal();
       G.block<3, 3>(3, 3) += Skew(aside) * G.block<3, 3>(0, 3);

@@ -39,7 +39,7 @@ class FramePlacementTest : public ::testing::Test {
     VectorXd q = VectorXd::Zero(model_.num_positions());
     q.head<3>() << 0.4, -0.3, 0.7;
     for (const int index : joints) {
-      const Joint& joint = model_.joints()[static_cast<size_t>(index)];
+      const Joint& joint = model_.joint(index);
       const double range = joint.upper - joint.lower - 2.0 * margin;
       At(&q, index) = joint.lower + margin + unit(random_) * range;
     }
@@ -49,12 +49,12 @@ class FramePlacementTest : public ::testing::Test {
   [[nodiscard]] std::vector<int> ListArm(const std::string& side) const {
     std::vector<int> tips;
     for (const int tip : model_.fingertips()) {
-      if (model_.frames()[static_cast<size_t>(tip)].name.starts_with(side)) tips.push_back(tip);
+      if (model_.frame(tip).name.starts_with(side)) tips.push_back(tip);
     }
     return ListArmJoints(model_, tips, model_.FindFrame(side + "_palm_frame"));
   }
 
-  RobotModel model_ = testing::ReadPaperRobot();
+  RobotModel model_ = ReadPaperRobot();
   ModelTerms terms_{model_};
   std::mt19937 random_{1};
 };
@@ -112,7 +112,7 @@ TEST_F(FramePlacementTest, StaysNearTheNominalPosture) {
     Matrix6Xd J_dot(6, terms_.size());
     terms_.CalcFrameJacobian(palm, J, J_dot);
     const Matrix6Xd J_arm = J.middleCols(model_.num_base_velocities() + joints.front(), 7);
-    const MatrixXd J_pinv = testing::CalcPseudoinverse(J_arm);
+    const MatrixXd J_pinv = CalcPseudoinverse(J_arm);
     const VectorXd away = (nominal - placement.q).segment(3 + joints.front(), 7);
     const VectorXd free = away - J_pinv * (J_arm * away);
     farthest = std::max(farthest, away.norm());
@@ -160,18 +160,18 @@ TEST(FramePlacementOfRandomRobots, FollowsTheForwardKinematics) {
   int prismatic = 0;
   for (const BaseType base : {BaseType::kFixed, BaseType::kPlanar, BaseType::kDifferentialDrive}) {
     for (int sample = 0; sample < 20; ++sample) {
-      const RobotModel model(testing::MakeRandomRobot({.base = base}, &random));
+      const RobotModel model(MakeRandomRobot({.base = base}, &random));
       ModelTerms terms(model);
-      const VectorXd q = testing::DrawPositions(model, &random);
+      const VectorXd q = DrawPositions(model, &random);
       terms.SetState(q, VectorXd::Zero(terms.size()));
       for (int frame = 0; frame < static_cast<int>(model.frames().size()); ++frame) {
         std::vector<int> joints;
         VectorXd q_start = q;
-        int joint = model.frames()[static_cast<size_t>(frame)].link;
-        for (; joint >= 0; joint = model.joints()[static_cast<size_t>(joint)].parent) {
+        int joint = model.frame(frame).link;
+        for (; joint >= 0; joint = model.joint(joint).parent) {
           joints.push_back(joint);
           q_start[model.num_base_positions() + joint] += 0.02;
-          prismatic += model.joints()[static_cast<size_t>(joint)].type == JointType::kPrismatic;
+          prismatic += model.joint(joint).type == JointType::kPrismatic;
         }
         if (joints.empty()) continue;
         const Pose X = terms.CalcFramePose(frame);

@@ -2,7 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <cstdlib>
 #include <random>
 #include <vector>
 
@@ -46,7 +45,7 @@ TEST(GraspForceAllocation, SolveDoesNone) {
   for (const int num_contacts : {4, 8, 11}) {
     std::vector<GraspForceProblem> problems;
     for (int sample = 0; sample < 20; ++sample) {
-      problems.push_back(testing::MakeRandomGraspForceProblem(random, num_contacts));
+      problems.push_back(MakeRandomGraspForceProblem(random, num_contacts));
       problems.push_back(problems.back());  // a warm start, if feasible
     }
     GraspForceSolver solver(num_contacts);

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <random>
-#include <vector>
 
 #include "controller/grasp/grasp_force.h"
 #include "tests/common/matrix_near.h"

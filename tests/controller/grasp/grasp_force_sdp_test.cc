@@ -45,7 +45,7 @@ class GraspForceSdp : public ::testing::Test {
       ASSERT_NE(result.status, GraspForceStatus::kNotConverged);
       // csdp takes some infeasible problems for failures of its own; a few certificates from it are enough.
       if (result.status == GraspForceStatus::kInfeasible && infeasible >= count / 4) continue;
-      const SdpSolution sdp = testing::SolveSdp(problem, folder_);
+      const SdpSolution sdp = SolveSdp(problem, folder_);
       if (result.status == GraspForceStatus::kInfeasible) {
         ASSERT_NE(sdp.status, SdpStatus::kOptimal);
         if (sdp.status == SdpStatus::kInfeasible) ++infeasible;
@@ -59,7 +59,7 @@ class GraspForceSdp : public ::testing::Test {
       ++feasible;
       EXPECT_GT(result.objective, 0.0);
       EXPECT_NEAR(result.objective, sdp.objective,
-                  testing::TolScale() * (kRelative * sdp.objective + 4.0 * num_contacts * kRho));
+                  TolScale() * (kRelative * sdp.objective + 4.0 * num_contacts * kRho));
       worst = std::max(worst, std::abs(result.objective / sdp.objective - 1.0));
     }
     std::ostringstream text;

@@ -55,7 +55,7 @@ double CalcBarrierObjective(const GraspForceProblem& problem, double rho, const 
 // Minimum of the barrier objective from a feasible interior point, by damped Newton steps in null(G) (27)
 // with derivatives of log det written out: shares nothing with the solver.
 VectorXd MinimiseBarrier(const GraspForceProblem& problem, double rho, VectorXd f_c) {
-  const MatrixXd Z = testing::CalcNullspace(problem.G);
+  const MatrixXd Z = CalcNullspace(problem.G);
   for (int iteration = 0; iteration < 100; ++iteration) {
     VectorXd gradient = VectorXd::Zero(f_c.size());
     MatrixXd hessian = MatrixXd::Zero(f_c.size(), f_c.size());
@@ -73,7 +73,7 @@ VectorXd MinimiseBarrier(const GraspForceProblem& problem, double rho, VectorXd 
       gradient[3 * i + 2] += 1.0 - rho * (1.0 / lower - 1.0 / upper);
       hessian.block<3, 3>(3 * i, 3 * i) = rho * H;
     }
-    const VectorXd step = -Z * testing::SolveDense(Z.transpose() * hessian * Z, Z.transpose() * gradient);
+    const VectorXd step = -Z * SolveDense(Z.transpose() * hessian * Z, Z.transpose() * gradient);
     const double value = CalcBarrierObjective(problem, rho, f_c);
     double length = 1.0;
     while (CalcBarrierObjective(problem, rho, f_c + length * step) > value && length > kEps) length *= 0.5;
@@ -315,7 +315,7 @@ TEST(GraspForceErrors, ContactsOnAnyLineAreSingular) {
     for (const double unit : {1.0, 1e3, 1e-3}) {
       for (int sample = 0; sample < 100; ++sample) {
         const int n = 3 + sample % 9;
-        GraspForceProblem problem = testing::MakeRandomLineGrasp(random, n, offset, unit).problem;
+        GraspForceProblem problem = MakeRandomLineGrasp(random, n, offset, unit).problem;
         problem.F_o = problem.G * VectorXd::Ones(3 * n);
         GraspForceSolver& solver = solvers.at(n);
         ASSERT_THROW(solver.Solve(problem), SingularityError) << "offset " << offset << ", unit " << unit;
@@ -339,7 +339,7 @@ TEST(GraspForceErrors, ContactsOnOneLineAreSingular) {
   for (Eigen::Index i = 0; i < 3; ++i) {
     Pose X_OC = Pose::Identity();
     X_OC.translation().x() = 0.02 * static_cast<double>(i);
-    problem.G.middleCols<3>(3 * i) = testing::CalcContactColumns(X_OC);
+    problem.G.middleCols<3>(3 * i) = CalcContactColumns(X_OC);
   }
   GraspForceSolver solver(3);
   EXPECT_THROW(solver.Solve(problem), SingularityError);

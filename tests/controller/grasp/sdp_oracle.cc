@@ -18,8 +18,8 @@ struct ForceSpace {
 
 ForceSpace CalcForceSpace(const GraspForceProblem& problem) {
   ForceSpace space;
-  space.offset = testing::CalcPseudoinverse(problem.G) * problem.F_o;
-  space.basis = testing::CalcNullspace(problem.G);
+  space.offset = CalcPseudoinverse(problem.G) * problem.F_o;
+  space.basis = CalcNullspace(problem.G);
   return space;
 }
 

@@ -6,11 +6,9 @@
 
 #include <random>
 
-#include "controller/common/errors.h"
 #include "controller/control/constrained_dynamics.h"
 #include "tests/common/allocation_counter.h"
 #include "tests/common/matrix_near.h"
-#include "tests/common/throws.h"
 #include "tests/controller/control/grasp_scene.h"
 
 namespace dexcheck::testing::handling_controller_test {

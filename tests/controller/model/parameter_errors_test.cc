@@ -13,6 +13,7 @@
 #include "controller/common/errors.h"
 #include "controller/common/toml_reader.h"
 #include "controller/model/parameter_reader.h"
+#include "tests/common/files.h"
 #include "tests/common/matchers.h"
 #include "tests/common/paths.h"
 #include "tests/common/throws.h"
@@ -22,8 +23,7 @@ namespace {
 
 const std::string& ShippedText() {
   static const std::string text = ReadTextFile(
-      (std::filesystem::path(testing::SourcePath("/controller/parameters")) / "assistant_robot.toml")
-          .string());
+      (std::filesystem::path(SourcePath("/controller/parameters")) / "assistant_robot.toml").string());
   return text;
 }
 
@@ -62,11 +62,7 @@ class ParameterErrors : public ::testing::TestWithParam<BadInput> {};
 
 TEST_P(ParameterErrors, NameFileLineKeyAndValue) {
   const BadInput& bad = GetParam();
-  std::string text = ShippedText();
-  const size_t at = text.find(bad.original);
-  ASSERT_NE(at, std::string::npos) << bad.original;
-  ASSERT_EQ(text.find(bad.original, at + 1), std::string::npos) << "not unique: " << bad.original;
-  text.replace(at, bad.original.size(), bad.changed);
+  const std::string text = ReplaceOnce(ShippedText(), bad.original, bad.changed);
   const std::string line = FindLine(text, bad.line_of.empty() ? bad.changed : bad.line_of);
   EXPECT_EQ(CatchProblem(text), "robot.toml:" + line + ": " + FillInLines(bad.message, text));
 }
@@ -225,7 +221,7 @@ INSTANTIATE_TEST_SUITE_P(
         {"LaterParent", kRightArm, Chain("l_palm", "r_"),
          "chain[1].parent: must be declared before its children, move chain[2] (line {" +
              Chain("torso", "l_") + "}) before chain[1] (line {" + Chain("l_palm", "r_") +
-             "}), got \"l_palm\"",
+             R"(}), got "l_palm")",
          R"(parent = "l_palm")"},
         {"UnknownParent", kRightArm, Chain("torsoo", "r_"),
          R"(chain[1].parent: must be a link (did you mean "torso"?), got "torsoo")", R"(parent = "torsoo")"},
@@ -301,16 +297,16 @@ std::string Repeat(const std::string& part, int count) {
 TEST(ParameterTexts, OfExcessiveSizeOrDepthAreRefused) {
   const std::string too_deep = "robot.toml:1: nested too deeply, more than 32 brackets or 16 dots";
   EXPECT_EQ(CatchProblem("[" + Repeat("a.", 200000) + "a]"), too_deep);
-  EXPECT_EQ(CatchProblem(Repeat("\"a\" . ", 100000) + "a = 1"), too_deep);
+  EXPECT_EQ(CatchProblem(Repeat(R"("a" . )", 100000) + "a = 1"), too_deep);
   EXPECT_EQ(CatchProblem("a = " + Repeat("[", 500000)), too_deep);
   EXPECT_EQ(CatchProblem("a = " + Repeat("{a=", 200000)), too_deep);
   EXPECT_EQ(CatchProblem("gravity = [1.0, " + Repeat("2.5, ", 1000) + "]"),
-            "robot.toml:1: missing key \"name\"");
+            R"(robot.toml:1: missing key "name")");
   EXPECT_EQ(CatchProblem(Repeat("#", 2000000)), "robot.toml: must be at most 1048576 bytes long");
   // Brackets and dots in text and comments do not count.
   EXPECT_EQ(CatchProblem(ShippedText() + "\n# " + Repeat("[.", 100) + "\n"), "accepted");
   EXPECT_EQ(CatchProblem("name = \"\\\"" + Repeat("[.", 100) + "\""),
-            "robot.toml:1: missing key \"gravity\", \"base\", \"chain\"");
+            R"(robot.toml:1: missing key "gravity", "base", "chain")");
 }
 
 TEST(ParameterTexts, AllMissingKeysAreReportedAtOnce) {
@@ -326,10 +322,10 @@ TEST(ParameterTexts, AllMissingKeysAreReportedAtOnce) {
   change(kElbow, "elbow = { damping = 0.2 }");
   EXPECT_EQ(
       CatchProblem(text),
-      FillInLines("robot.toml:1: missing key \"gravity\"; line {alpha_dge}: chain[0].rows[0].alpha_dge: "
-                  "unknown key, did you mean \"alpha_deg\"?; line {alpha_dge}: chain[0].rows[0]: "
-                  "missing key \"q_deg\"; line {elbow = {}: template.arm.joints.elbow: missing key "
-                  "\"range\", \"armature\"; line {[object]}: object: missing key \"friction\"",
+      FillInLines(R"(robot.toml:1: missing key "gravity"; line {alpha_dge}: chain[0].rows[0].alpha_dge: )"
+                  R"(unknown key, did you mean "alpha_deg"?; line {alpha_dge}: chain[0].rows[0]: )"
+                  R"(missing key "q_deg"; line {elbow = {}: template.arm.joints.elbow: missing key )"
+                  R"("range", "armature"; line {[object]}: object: missing key "friction")",
                   text));
 }
 

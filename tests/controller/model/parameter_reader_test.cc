@@ -8,8 +8,6 @@
 #include <string>
 #include <vector>
 
-#include "controller/common/errors.h"
-#include "controller/common/toml_reader.h"
 #include "tests/common/matchers.h"
 #include "tests/common/matrix_near.h"
 #include "tests/common/paths.h"
@@ -17,7 +15,7 @@
 namespace dexcheck::testing::parameter_reader_test {
 namespace {
 
-const std::filesystem::path kParameters = testing::SourcePath("/controller/parameters");
+const std::filesystem::path kParameters = SourcePath("/controller/parameters");
 
 // A chain of at most 13 transforms of size 1, some four roundings each, and pi/2 rounded once per joint.
 constexpr double kRounding = 100.0 * std::numeric_limits<double>::epsilon();
@@ -37,7 +35,7 @@ std::vector<Pose> CalcHomePoses(const RobotModel& model) {
 }
 
 Pose CalcHomePose(const RobotModel& model, const std::string& frame_name) {
-  const Frame& frame = model.frames()[static_cast<size_t>(model.FindFrame(frame_name))];
+  const Frame& frame = model.frame(model.FindFrame(frame_name));
   return CalcHomePoses(model)[static_cast<size_t>(frame.link)] * frame.X_LF;
 }
 
@@ -87,7 +85,7 @@ TEST_F(AssistantRobot, HasThePapersCoordinates) {
 
 TEST_F(AssistantRobot, OrdersItsFingertips) {
   std::vector<std::string> tips;
-  for (const int tip : model_.fingertips()) tips.push_back(model_.frames()[static_cast<size_t>(tip)].name);
+  for (const int tip : model_.fingertips()) tips.push_back(model_.frame(tip).name);
   EXPECT_THAT(tips, ElementsAre("rf1_tip", "rf2_tip", "rf3_tip", "rf4_tip", "lf1_tip", "lf2_tip", "lf3_tip",
                                 "lf4_tip"));
 }
@@ -152,7 +150,7 @@ TEST_F(AssistantRobot, WeighsWhatItsPartsWeigh) {
 }
 
 TEST_F(AssistantRobot, ReadsJointsWheelsAndObject) {
-  const Joint& elbow = model_.joints()[static_cast<size_t>(model_.FindJoint("l_elbow"))];
+  const Joint& elbow = model_.joint(model_.FindJoint("l_elbow"));
   EXPECT_EQ(elbow.lower, -0.1);
   EXPECT_EQ(elbow.upper, 2.5);
   EXPECT_EQ(elbow.damping, 0.2);

@@ -9,6 +9,7 @@
 
 #include "tests/common/linear_algebra.h"
 #include "tests/common/matrix_near.h"
+#include "tests/common/throws.h"
 
 namespace dexcheck::testing::platform_test {
 namespace {
@@ -125,7 +126,7 @@ TEST(PlatformByHand, FacingYWithWheelRates) {
 TEST_P(PlatformTest, SSpansTheNullSpaceOfA) {
   for (const State& state : states_) {
     const PlatformConstraint platform = CalcPlatformConstraint(base_, state.q_v, state.v);
-    ASSERT_EQ(testing::CalcRank(platform.S_v), 2);
+    ASSERT_EQ(CalcRank(platform.S_v), 2);
     EXPECT_NEAR(platform.A_v.norm(), 1.0, kRounding * TolScale());
     EXPECT_TRUE(MatrixNear(platform.S_v.transpose() * platform.A_v.transpose(), Vector2d::Zero(), kRounding));
   }
@@ -214,12 +215,8 @@ TEST_P(PlatformTest, RejectsWhatIsNotADifferentialDrive) {
   EXPECT_THROW(CalcWheelRateMap(base), std::invalid_argument);
   base = base_;
   base.wheel_distance = -0.4;
-  try {
-    CalcDriveVelocity(base, Vector2d::Zero());
-    FAIL() << "a negative wheel distance was accepted";
-  } catch (const std::invalid_argument& error) {
-    EXPECT_STREQ(error.what(), "wheel_distance: must be positive, got -0.4");
-  }
+  EXPECT_EQ(MessageOf<std::invalid_argument>([&] { return CalcDriveVelocity(base, Vector2d::Zero()); }),
+            "wheel_distance: must be positive, got -0.4");
 }
 
 }  // namespace

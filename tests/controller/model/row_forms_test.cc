@@ -8,6 +8,7 @@
 
 #include "controller/common/errors.h"
 #include "controller/model/parameter_reader.h"
+#include "tests/common/files.h"
 #include "tests/common/matrix_near.h"
 #include "tests/common/throws.h"
 
@@ -32,12 +33,12 @@ Pose Turn(const Vector3d& axis, double angle) { return Pose(Eigen::AngleAxisd(an
 /// origin.
 Pose OwnFrame(const RobotModel& model, int joint) {
   if (joint < 0) return Pose::Identity();
-  return model.frames()[static_cast<size_t>(joint)].X_LF;
+  return model.frame(joint).X_LF;
 }
 
 /// The link's own frame in its parent's own frame, at q.
 Pose CalcOwnPose(const RobotModel& model, int index, double q) {
-  const Joint& joint = model.joints()[static_cast<size_t>(index)];
+  const Joint& joint = model.joint(index);
   const bool turns = joint.type == JointType::kRevolute;
   return OwnFrame(model, joint.parent).inverse() * joint.X_PB *
          CalcMdhTransform(joint.mdh.alpha, joint.mdh.a, joint.mdh.q + (turns ? q : 0.0),
@@ -115,8 +116,7 @@ rows = [
   for (const int i : {0, 1}) {
     EXPECT_TRUE(
         MatrixNear(CalcOwnPose(modified, i, 0.4).matrix(), CalcOwnPose(plain, i, 0.4).matrix(), kRounding));
-    EXPECT_EQ(modified.joints()[static_cast<size_t>(i)].body.com,
-              plain.joints()[static_cast<size_t>(i)].body.com);
+    EXPECT_EQ(modified.joint(i).body.com, plain.joint(i).body.com);
   }
 }
 
@@ -146,25 +146,22 @@ TEST(OtherForms, BodiesAddUp) {
   EXPECT_TRUE(MatrixNear(body.inertia, Matrix3d(Vector3d(4.3, 4.3, 0.5).asDiagonal()), 8.0 * kRounding));
 }
 
-std::string CatchProblem(std::string text, const std::string& original, const std::string& changed) {
-  const size_t at = text.find(original);
-  EXPECT_NE(at, std::string::npos) << original;
-  text.replace(at, original.size(), changed);
-  return MessageOf<InputError>([&] { return Read(text); });
+std::string CatchProblem(const std::string& text, const std::string& original, const std::string& changed) {
+  return MessageOf<InputError>([&] { return Read(ReplaceFirst(text, original, changed)); });
 }
 
 TEST(OtherForms, AreRefusedInOneLine) {
   EXPECT_EQ(CatchProblem(kOneRow, "xyz = [1, 0, 0]", "xyz = [1, 0, 0], alpha = 0"),
-            "rows.toml:8: chain[0].rows[1].alpha: must not stand beside \"xyz\"");
+            R"(rows.toml:8: chain[0].rows[1].alpha: must not stand beside "xyz")");
   EXPECT_EQ(CatchProblem(kOneRow, "xyz = [1, 0, 0]", "axis = [1, 1, 0]"),
             "rows.toml:8: chain[0].rows[1].axis: must be a unit vector, got [1, 1, 0]");
   EXPECT_EQ(CatchProblem(kOneRow, "parent", "convention = \"dh\"\nparent"),
-            "rows.toml:7: chain[0].convention: must be one of \"modified\", \"classic\", got \"dh\"");
+            R"(rows.toml:7: chain[0].convention: must be one of "modified", "classic", got "dh")");
   EXPECT_EQ(CatchProblem(kOneRow, "mass = 2, inertia = [0.1", "mass = 2, inertia = [-0.1"),
             "rows.toml:16: chain[0].links.l1.bodies[0].inertia: principal moments of inertia must not be "
             "negative, got [-0.1, 0.2, 0.25]");
   EXPECT_EQ(CatchProblem(kOneRow, "bodies", "mass = 1\nbodies"),
-            "rows.toml:15: chain[0].links.l1.mass: must not stand beside \"bodies\"");
+            R"(rows.toml:15: chain[0].links.l1.mass: must not stand beside "bodies")");
 }
 
 }  // namespace

@@ -6,7 +6,6 @@
 #include <cmath>
 #include <limits>
 #include <stdexcept>
-#include <string>
 
 #include "controller/common/errors.h"
 #include "tests/common/matchers.h"

@@ -10,6 +10,7 @@
 #include "controller/object/euler_zyz.h"
 #include "tests/common/linear_algebra.h"
 #include "tests/common/matrix_near.h"
+#include "tests/common/throws.h"
 #include "tests/controller/object/object_states.h"
 
 namespace dexcheck::testing::object_dynamics_test {
@@ -156,8 +157,7 @@ TEST(ObjectDynamics, MassMatrixIsSymmetricOnlyInLagrangeForm) {
     EXPECT_GT((terms.M_o - terms.M_o.transpose()).norm(), kVisible);
     const Matrix6d M_X = CalcLagrangeMass(state.X_o);
     EXPECT_TRUE(MatrixNear(M_X, M_X.transpose(), kRounding));
-    EXPECT_GT(testing::CalcEigenvalues(M_X.selfadjointView<Eigen::Lower>().toDenseMatrix()).real().minCoeff(),
-              1e-3);
+    EXPECT_GT(CalcEigenvalues(M_X.selfadjointView<Eigen::Lower>().toDenseMatrix()).real().minCoeff(), 1e-3);
     EXPECT_NEAR(0.5 * state.X_o_dot.dot(M_X * state.X_o_dot),
                 CalcObjectKineticEnergy(MakeObject(), terms.V_Bo), kRounding * TolScale());
   }
@@ -247,7 +247,7 @@ ObjectState SimulateFree(const MassProperties& object, const Vector3d& gravity, 
     const ObjectTerms terms = CalcObjectTerms(object, gravity, x.head<6>(), x.tail<6>());
     const Vector6d residual = terms.C_o * x.tail<6>() + terms.N_o;
     Vector12d rate;
-    rate << x.tail<6>(), testing::SolveDense(terms.M_o, -residual);
+    rate << x.tail<6>(), SolveDense(terms.M_o, -residual);
     return rate;
   };
   Vector12d x;
@@ -324,7 +324,7 @@ TEST(ObjectDynamics, TermsAreFiniteWhereZyzIsSingular) {
   state.X_o_ddot << 0.3, 0.2, 0.1, 0.6, 0.5, 0.4;
   const ObjectTerms terms = CalcTerms(state);
   EXPECT_TRUE(MatrixNear(CalcWrench(terms, state), CalcWrenchOnParticles(state), kParticles));
-  EXPECT_EQ(testing::CalcRank(terms.M_o), 5);
+  EXPECT_EQ(CalcRank(terms.M_o), 5);
 }
 
 TEST(ObjectDynamics, RejectsABodyThatIsNotAnObject) {
@@ -333,12 +333,9 @@ TEST(ObjectDynamics, RejectsABodyThatIsNotAnObject) {
   EXPECT_THROW(CalcObjectTerms(object, kGravity, Vector6d::Zero(), Vector6d::Zero()), std::invalid_argument);
   object = MakeObject();
   object.com = Vector3d(0.0, 0.01, 0.0);
-  try {
-    CalcObjectBodyTerms(object, kGravity, Matrix3d::Identity(), Vector6d::Zero());
-    FAIL() << "an object off its centre of mass was accepted";
-  } catch (const std::invalid_argument& error) {
-    EXPECT_STREQ(error.what(), "object com: must be zero (Sigma_o stands at the centre of mass), got 0.01");
-  }
+  EXPECT_EQ(MessageOf<std::invalid_argument>(
+                [&] { CalcObjectBodyTerms(object, kGravity, Matrix3d::Identity(), Vector6d::Zero()); }),
+            "object com: must be zero (Sigma_o stands at the centre of mass), got 0.01");
 }
 
 }  // namespace

@@ -5,7 +5,6 @@
 #include <unistd.h>
 
 #include <csignal>
-#include <cstring>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -40,7 +39,7 @@ bool HasExited(int status, int code) { return WIFEXITED(status) && WEXITSTATUS(s
 
 class TemporaryPathTest : public ::testing::Test {
  protected:
-  testing::TempFolder folder_;
+  TempFolder folder_;
   fs::path kept_ = folder_.path() / "kept";
 
   /// Begins files and folders of all kinds, then sends the signal to itself.
@@ -58,7 +57,7 @@ class TemporaryPathTest : public ::testing::Test {
   }
   [[nodiscard]] bool IsOnlyKeptLeft() const {
     const auto count = std::distance(fs::directory_iterator(folder_.path()), fs::directory_iterator());
-    return count == 1 && testing::ReadText(kept_) == "kept";
+    return count == 1 && ReadText(kept_) == "kept";
   }
 };
 
@@ -117,7 +116,7 @@ TEST_F(TemporaryPathTest, WhatIsFinishedStays) {
                           std::raise(SIGINT);
                         }),
                         kExitCode));
-  EXPECT_EQ(testing::ReadText(page), "whole");
+  EXPECT_EQ(ReadText(page), "whole");
 }
 
 TEST_F(TemporaryPathTest, AChildRemovesNothingOfItsParents) {

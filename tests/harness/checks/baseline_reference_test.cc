@@ -1,11 +1,8 @@
 // The laws that the paper's is compared with, in the loop: their torques are what a second computation from
 // the engine's terms says, and another law's are not.
 
-#include "harness/checks/baseline_reference.h"
-
 #include <gtest/gtest.h>
 
-#include "controller/control/trajectory_controller.h"
 #include "harness/checks/check_table.h"
 #include "tests/harness/run/changed_parts.h"
 #include "tests/harness/run/shipped_run.h"

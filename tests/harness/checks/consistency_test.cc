@@ -37,18 +37,18 @@ ConsistencyResult Compare(const RobotSpec& spec, const MjModelPtr& engine, long 
 MjModelPtr LoadLongChain(const RobotSpec& spec) {
   constexpr size_t kLinksPerFile = 80;
   const std::string kEnd = "</body>\n";
-  const testing::TempFolder folder;
-  std::string text = testing::WriteMjcf(spec);
+  const TempFolder folder;
+  std::string text = WriteMjcf(spec);
   const size_t count = spec.joints.size();
   for (size_t link = (count - 1) / kLinksPerFile * kLinksPerFile; link > 0; link -= kLinksPerFile) {
     // From this link's body to the end of it: in a chain all bodies end together.
     const std::string file = fmt::format("from_{}.xml", link);
-    const size_t begin = text.find(fmt::format("<body name=\"link_{}\"", link));
+    const size_t begin = text.find(fmt::format(R"(<body name="link_{}")", link));
     const size_t end = text.find(kEnd, begin) + (std::min(count - link, kLinksPerFile)) * kEnd.size();
-    testing::WriteText(folder.path() / file, "<mujoco>" + text.substr(begin, end - begin) + "</mujoco>");
+    WriteText(folder.path() / file, "<mujoco>" + text.substr(begin, end - begin) + "</mujoco>");
     text.replace(begin, end - begin, fmt::format("<include file=\"{}\"/>\n", file));
   }
-  testing::WriteText(folder.path() / "chain.xml", text);
+  WriteText(folder.path() / "chain.xml", text);
   return LoadMjcf(folder.path() / "chain.xml");
 }
 
@@ -81,7 +81,7 @@ TEST(Consistency, HoldsOnTwoHundredRandomRobots) {
   std::mt19937 random(300);
   double fraction = 0.0;
   for (int index = 0; index < 200; ++index) {
-    const RobotSpec spec = testing::MakeRandomRobot(MakeOptions(index), &random);
+    const RobotSpec spec = MakeRandomRobot(MakeOptions(index), &random);
     const bool free_joint = index % 4 < 2;
     Pose X_0b = Pose::Identity();
     if (index % 8 >= 4) {
@@ -89,9 +89,8 @@ TEST(Consistency, HoldsOnTwoHundredRandomRobots) {
       X_0b.linear() = Eigen::AngleAxisd(0.7, axis).toRotationMatrix();
       X_0b.translation() = Vector3d(0.1, -0.2, 0.15);
     }
-    const ConsistencyResult result =
-        Compare(spec, LoadMjcfText(testing::WriteMjcf(spec, free_joint, X_0b), "text"), 5,
-                static_cast<std::uint64_t>(index));
+    const ConsistencyResult result = Compare(spec, LoadMjcfText(WriteMjcf(spec, free_joint, X_0b), "text"), 5,
+                                             static_cast<std::uint64_t>(index));
     EXPECT_EQ(result.samples, 5);
     EXPECT_EQ(ListFailures(result, &fraction), "") << "robot " << index;
   }
@@ -105,7 +104,7 @@ TEST(Consistency, BoundsStaySmallOnLongChains) {
     RandomRobotOptions options;
     options.joints = joints;
     options.branching = 0.0;
-    const RobotSpec spec = testing::MakeRandomRobot(options, &random);
+    const RobotSpec spec = MakeRandomRobot(options, &random);
     double fraction = 0.0;
     EXPECT_EQ(ListFailures(Compare(spec, LoadLongChain(spec), 2), &fraction), "") << joints << " joints";
     EXPECT_GT(fraction, 1e-4);
@@ -116,9 +115,9 @@ TEST(Consistency, BoundsStaySmallOnLongChains) {
 TEST(Consistency, HoldsForVelocitiesOfDifferentSize) {
   std::mt19937 random(304);
   for (int index = 0; index < 12; ++index) {
-    const RobotSpec spec = testing::MakeRandomRobot(MakeOptions(index), &random);
+    const RobotSpec spec = MakeRandomRobot(MakeOptions(index), &random);
     const RobotModel model(spec);
-    const MjModelPtr engine = LoadMjcfText(testing::WriteMjcf(spec), "text");
+    const MjModelPtr engine = LoadMjcfText(WriteMjcf(spec), "text");
     const Adapter adapter(model, *engine, "text");
     std::uint64_t seed = 5;
     for (const double ratio : {1e-6, 1e-3, 1e3, 1e6}) {
@@ -144,22 +143,21 @@ TEST(Consistency, HoldsForVelocitiesOfDifferentSize) {
 TEST(Consistency, FindsSmallErrorsOnRandomRobots) {
   std::mt19937 random(302);
   for (int index = 0; index < 24; ++index) {
-    const RobotSpec spec = testing::MakeRandomRobot(MakeOptions(index), &random);
+    const RobotSpec spec = MakeRandomRobot(MakeOptions(index), &random);
     RobotSpec wrong = spec;
     Joint& joint = wrong.joints[random() % wrong.joints.size()];
     double* const numbers[] = {&joint.body.mass, &joint.body.com.x(), &joint.mdh.alpha, &joint.mdh.a,
                                &joint.mdh.q,     &joint.mdh.d,        &joint.damping,   &joint.armature};
     *numbers[index % 8] *= 1.001;
-    EXPECT_FALSE(Compare(wrong, LoadMjcfText(testing::WriteMjcf(spec), "text"), 3).Agrees())
-        << "robot " << index;
+    EXPECT_FALSE(Compare(wrong, LoadMjcfText(WriteMjcf(spec), "text"), 3).Agrees()) << "robot " << index;
   }
 }
 
 // The shipped robot with the larger ring of its two-hand scenario.
 TEST(Consistency, HoldsOnTheRingScene) {
-  const Scenario scenario = testing::ReadShippedScenario("two-hands");
-  const std::string robot = testing::SourcePath("/controller/parameters/assistant_robot.toml");
-  const RobotModel model = ParseRobotModel(testing::ReadText(robot), robot, scenario.model_overrides);
+  const Scenario scenario = ReadShippedScenario("two-hands");
+  const std::string robot = SourcePath("/controller/parameters/assistant_robot.toml");
+  const RobotModel model = ParseRobotModel(ReadText(robot), robot, scenario.model_overrides);
   const MjModelPtr engine = LoadMjcf(scenario.mjcf_file);
   ConsistencyOptions options;
   options.samples = 100;
@@ -174,9 +172,9 @@ TEST(Consistency, HoldsOnTheRingScene) {
 
 TEST(Consistency, StopsWhenToldTo) {
   std::mt19937 random(303);
-  const RobotSpec spec = testing::MakeRandomRobot(MakeOptions(0), &random);
+  const RobotSpec spec = MakeRandomRobot(MakeOptions(0), &random);
   const RobotModel model(spec);
-  const MjModelPtr engine = LoadMjcfText(testing::WriteMjcf(spec), "text");
+  const MjModelPtr engine = LoadMjcfText(WriteMjcf(spec), "text");
   const Adapter adapter(model, *engine, "text");
   ConsistencyOptions options;
   options.samples = 1000;

@@ -9,6 +9,8 @@
 #include <cstring>
 #include <map>
 #include <set>
+#include <span>
+#include <variant>
 
 // Here and not by the compiler's include path alone: the engine's list of its own fields.
 #include <mujoco/mjxmacro.h>
@@ -25,82 +27,68 @@
 namespace dexcheck::testing::engine_fields_test {
 namespace {
 
-const std::string kMjcf = testing::SourcePath("/mjcf/");
+const std::string kMjcf = SourcePath("/mjcf/");
 
 /// One field of a model: its numbers, as bytes.
 struct Field {
   std::string name;
-  enum Type { kReal, kFloat, kWhole, kByte, kText } type;
-  void* values;
+  std::variant<mjtNum*, float*, int*, mjtByte*, char*> values;
   int count;    // of elements
   int columns;  // numbers of each
-};
 
-Field::Type TypeOf(const mjtNum*) { return Field::kReal; }
-Field::Type TypeOf(const float*) { return Field::kFloat; }
-Field::Type TypeOf(const int*) { return Field::kWhole; }
-Field::Type TypeOf(const mjtByte*) { return Field::kByte; }
-Field::Type TypeOf(const char*) { return Field::kText; }
+  [[nodiscard]] std::span<char> bytes() const {
+    return std::visit(
+        [&](auto* first) {
+          return std::span(reinterpret_cast<char*>(first),
+                           sizeof(*first) * static_cast<size_t>(count) * static_cast<size_t>(columns));
+        },
+        values);
+  }
+};
 
 std::vector<Field> ListFields(mjModel* m) {
   std::vector<Field> fields;
   MJMODEL_POINTERS_PREAMBLE(m)
-#define X(name) fields.push_back({#name, Field::kWhole, &m->name, 1, 1});
+#define X(name) fields.push_back({#name, &m->name, 1, 1});
   MJMODEL_INTS
 #undef X
 // The sizes are members of the model, unless they are numbers.
-#define X(type, name, rows, columns) \
-  fields.push_back({#name, TypeOf(m->name), m->name, m->rows, static_cast<int>(columns)});
+#define X(type, name, rows, columns) fields.push_back({#name, m->name, m->rows, static_cast<int>(columns)});
   MJMODEL_POINTERS
 #undef X
-#define X(type, name) fields.push_back({"opt." #name, TypeOf(&m->opt.name), &m->opt.name, 1, 1});
+#define X(type, name) fields.push_back({"opt." #name, &m->opt.name, 1, 1});
   MJOPTION_SCALARS
 #undef X
-#define X(name, size) fields.push_back({"opt." #name, Field::kReal, m->opt.name, 1, size});
+#define X(name, size) fields.push_back({"opt." #name, m->opt.name, 1, size});
   MJOPTION_VECTORS
 #undef X
   mjStatistic& stat = m->stat;
-  fields.push_back({"stat.meaninertia", Field::kReal, &stat.meaninertia, 1, 1});
-  fields.push_back({"stat.meanmass", Field::kReal, &stat.meanmass, 1, 1});
-  fields.push_back({"stat.meansize", Field::kReal, &stat.meansize, 1, 1});
-  fields.push_back({"stat.extent", Field::kReal, &stat.extent, 1, 1});
-  fields.push_back({"stat.center", Field::kReal, stat.center, 1, 3});
+  fields.push_back({"stat.meaninertia", &stat.meaninertia, 1, 1});
+  fields.push_back({"stat.meanmass", &stat.meanmass, 1, 1});
+  fields.push_back({"stat.meansize", &stat.meansize, 1, 1});
+  fields.push_back({"stat.extent", &stat.extent, 1, 1});
+  fields.push_back({"stat.center", stat.center, 1, 3});
   return fields;
 }
 
 /// Changes a number to another that the engine survives.
 void Change(const Field& field, int index) {
-  switch (field.type) {
-    case Field::kReal: {
-      mjtNum& x = static_cast<mjtNum*>(field.values)[index];
-      if (field.name == "actuator_gear") {
-        x *= 2.0;  // so that a torque divided by it comes back without rounding
-        return;
-      }
-      x += 1e-3 + 0.01 * x;
-      return;
-    }
-    case Field::kFloat: {
-      float& x = static_cast<float*>(field.values)[index];
-      x += 1e-3F + 0.01F * x;
-      return;
-    }
-    case Field::kWhole: {
-      int& x = static_cast<int*>(field.values)[index];
-      // A contact has 1, 3, 4 or 6 dimensions; transmissions 0 and 1 are the same for a hinge.
-      const bool by_two =
-          field.name == "geom_condim" || field.name == "pair_dim" || field.name == "actuator_trntype";
-      x ^= by_two ? 2 : 1;
-      return;
-    }
-    case Field::kByte: {
-      mjtByte& x = static_cast<mjtByte*>(field.values)[index];
-      x = x == 0 ? 1 : 0;
-      return;
-    }
-    case Field::kText:
-      static_cast<char*>(field.values)[index] ^= 1;
-      return;
+  if (auto* const reals = std::get_if<mjtNum*>(&field.values)) {
+    mjtNum& x = (*reals)[index];
+    // A torque divided by twice the gear comes back without rounding.
+    x += field.name == "actuator_gear" ? x : 1e-3 + 0.01 * x;
+  } else if (auto* const floats = std::get_if<float*>(&field.values)) {
+    float& x = (*floats)[index];
+    x += 1e-3F + 0.01F * x;
+  } else if (auto* const whole = std::get_if<int*>(&field.values)) {
+    // A contact has 1, 3, 4 or 6 dimensions; transmissions 0 and 1 are the same for a hinge.
+    const bool by_two =
+        field.name == "geom_condim" || field.name == "pair_dim" || field.name == "actuator_trntype";
+    (*whole)[index] ^= by_two ? 2 : 1;
+  } else if (auto* const flags = std::get_if<mjtByte*>(&field.values)) {
+    (*flags)[index] = (*flags)[index] == 0 ? 1 : 0;
+  } else {
+    std::get<char*>(field.values)[index] ^= 1;
   }
 }
 
@@ -206,8 +194,8 @@ class Subject {
   /// The same of the model that a run makes of it: nothing when no run has this robot.
   [[nodiscard]] Motion MoveAsInRun(const mjModel& engine) const {
     if (!model_.object()) return {};
-    static const Scenario scenario = testing::ReadShippedScenario("hold");
-    const Setup setup(scenario, testing::SourcePath("/controller/parameters/assistant_robot.toml"), "mjcf",
+    static const Scenario scenario = ReadShippedScenario("hold");
+    const Setup setup(scenario, SourcePath("/controller/parameters/assistant_robot.toml"), "mjcf",
                       MjModelPtr(mj_copyModel(nullptr, &engine)));
     return Move(setup.engine());
   }
@@ -281,36 +269,17 @@ class FieldCheck {
         sets.push_back({element * field.columns + column});
       }
       for (const std::vector<int>& set : sets) {
-        const std::vector<char> kept = Save(field, size);
+        const std::span<char> bytes = field.bytes();
+        const std::vector<char> kept(bytes.begin(), bytes.end());
         for (const int i : set) Change(field, i);
         ++(*tried)[field.name];
         (*named)[field.name] += Look(*model, field.name, row) ? 1 : 0;
-        std::memcpy(field.values, kept.data(), kept.size());
+        std::ranges::copy(kept, bytes.begin());
       }
     }
   }
 
  private:
-  static size_t SizeOf(Field::Type type) {
-    switch (type) {
-      case Field::kReal:
-        return sizeof(mjtNum);
-      case Field::kFloat:
-        return sizeof(float);
-      case Field::kWhole:
-        return sizeof(int);
-      case Field::kByte:
-      case Field::kText:
-        break;
-    }
-    return 1;
-  }
-  static std::vector<char> Save(const Field& field, int size) {
-    std::vector<char> bytes(static_cast<size_t>(size) * SizeOf(field.type));
-    std::memcpy(bytes.data(), field.values, bytes.size());
-    return bytes;
-  }
-
   /// Whether the change is named as the table says; a change that nothing names must move nothing.
   bool Look(const mjModel& model, const std::string& name, const EngineField& row) {
     const bool terms = row.outcome == FieldClass::kCompared;
@@ -337,7 +306,7 @@ class FieldCheck {
     }
     if (now.notes != verdict_.notes) {
       const auto names = [&](const auto& some, const auto& others) {
-        return std::any_of(some.begin(), some.end(), [&](const std::string& note) {
+        return std::ranges::any_of(some, [&](const std::string& note) {
           return note.starts_with(row.how) && !others.contains(note);
         });
       };
@@ -392,19 +361,19 @@ TEST_F(EngineFields, ChangedAreNamedOrMoveNothing) {
   std::map<std::string, int> tried;
   // Held by the fingers, and on the floor.
   for (const char* key : {"grasp_ready", "home"}) {
-    const Subject subject(testing::ReadPaperRobot(), folder_.path() / "rich.xml", key);
+    const Subject subject(ReadPaperRobot(), folder_.path() / "rich.xml", key);
     FieldCheck check(subject);
     EXPECT_GT(subject.contacts(), 3) << key;
     check.Run(&named, &tried);
   }
   // Among things that can touch by their type.
-  std::string text = testing::ReadText(kMjcf + "panda.xml");
+  std::string text = ReadText(kMjcf + "panda.xml");
   const std::string end = "</mujoco>";
   text.replace(text.rfind(end), end.size(), R"(<option collision="all"/>
   <worldbody><geom name="table" type="box" size="0.1 0.1 0.1" pos="2 0 0"/></worldbody>
   <contact><exclude body1="panda_link1" body2="panda_link3"/></contact></mujoco>)");
   WriteText(folder_.path() / "rich_panda.xml", text);
-  const Subject panda(testing::ReadPanda(), folder_.path() / "rich_panda.xml", "");
+  const Subject panda(ReadPanda(), folder_.path() / "rich_panda.xml", "");
   EXPECT_THAT(panda.Judge(*panda.Copy(), false).notes,
               Contains(HasSubstr("excluded: panda_link1 and panda_link3")));
   FieldCheck(panda).Run(&named, &tried);

@@ -4,7 +4,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "harness/checks/law_terms.h"
 #include "harness/injection/faulty_law.h"
 #include "tests/common/matchers.h"
 #include "tests/harness/run/changed_parts.h"

@@ -9,11 +9,11 @@
 #include "harness/descriptions/alike_names.h"
 #include "harness/descriptions/description_match.h"
 #include "harness/descriptions/read_description.h"
-#include "harness/descriptions/structure_match.h"
 #include "tests/common/list_failures.h"
 #include "tests/common/matchers.h"
 #include "tests/common/paths.h"
 #include "tests/common/random_robot.h"
+#include "tests/common/throws.h"
 #include "tests/common/urdf_text.h"
 #include "tests/harness/descriptions/panda_urdf.h"
 #include "tests/harness/descriptions/robot_pairs.h"
@@ -28,13 +28,11 @@ std::string ListFailures(RobotDescription a, RobotDescription b, long samples = 
   return testing::ListFailures(CompareDescriptions(a, b, options, [](long) { return true; }));
 }
 
-RobotDescription ReadPandaTable() {
-  return ReadDescription(testing::SourcePath("/controller/parameters/panda.toml"));
-}
+RobotDescription ReadPandaTable() { return ReadDescription(SourcePath("/controller/parameters/panda.toml")); }
 
 TEST(ModelComparison, PandaByTableByUrdfAndByMjcf) {
-  const RobotDescription urdf = ParseUrdf(testing::MakePandaUrdf(), "panda.urdf");
-  const RobotDescription mjcf = ReadDescription(testing::SourcePath("/mjcf/panda.xml"));
+  const RobotDescription urdf = ParseUrdf(MakePandaUrdf(), "panda.urdf");
+  const RobotDescription mjcf = ReadDescription(SourcePath("/mjcf/panda.xml"));
   EXPECT_EQ(ListFailures(ReadPandaTable(), urdf, 200), "");
   EXPECT_EQ(ListFailures(urdf, ReadPandaTable()), "");
   EXPECT_EQ(ListFailures(mjcf, urdf), "");
@@ -43,13 +41,13 @@ TEST(ModelComparison, PandaByTableByUrdfAndByMjcf) {
 TEST(ModelComparison, RandomUrdfsWithOtherFramesAgree) {
   std::mt19937 random(1710);
   for (int index = 0; index < 20; ++index) {
-    testing::RandomRobotOptions options;
+    RandomRobotOptions options;
     options.base = BaseType::kFixed;
     options.joints = 1 + index % 13;
-    RobotSpec spec = testing::MakeRandomRobot(options, &random);
+    RobotSpec spec = MakeRandomRobot(options, &random);
     // The welded bodies are part of the specification after this.
-    const RobotDescription turned = ParseUrdf(testing::WriteUrdf(&spec, &random, 0.3), "turned.urdf");
-    const RobotDescription straight = ParseUrdf(testing::WriteUrdf(&spec, nullptr, 0.3), "straight.urdf");
+    const RobotDescription turned = ParseUrdf(WriteUrdf(&spec, &random, 0.3), "turned.urdf");
+    const RobotDescription straight = ParseUrdf(WriteUrdf(&spec, nullptr, 0.3), "straight.urdf");
     EXPECT_EQ(ListFailures(turned, straight), "") << "robot " << index;
   }
 }
@@ -58,11 +56,11 @@ TEST(ModelComparison, RandomUrdfsWithOtherFramesAgree) {
 TEST(ModelComparison, WhatRoundingLeftOfAPointsInertiaIsNone) {
   const auto parse = [](const std::string& inertia) {
     return ParseUrdf(
-        "<robot name=\"point\"><link name=\"base\"/><link name=\"head\"><inertial><mass value=\"1.3\"/>" +
-            std::string("<origin xyz=\"0.0185 -0.1108 0\"/>") + inertia +
-            "</inertial></link><joint name=\"neck\" type=\"revolute\"><parent link=\"base\"/>"
-            "<child link=\"head\"/><axis xyz=\"0 0 1\"/>"
-            "<limit lower=\"-1\" upper=\"1\" effort=\"1\" velocity=\"1\"/></joint></robot>",
+        R"(<robot name="point"><link name="base"/><link name="head"><inertial><mass value="1.3"/>)" +
+            std::string(R"(<origin xyz="0.0185 -0.1108 0"/>)") + inertia +
+            R"(</inertial></link><joint name="neck" type="revolute"><parent link="base"/>)"
+            R"(<child link="head"/><axis xyz="0 0 1"/>)"
+            R"(<limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>)",
         "point.urdf");
   };
   const RobotDescription point = parse(R"(<inertia ixx="0" iyy="0" izz="0" ixy="0" ixz="2.4e-35" iyz="0"/>)");
@@ -79,7 +77,7 @@ TEST(ModelComparison, OneBodyThatFloatsIsARobot) {
     UrdfOptions options;
     options.floating = true;
     return ParseUrdf(
-        "<robot name=\"drone\"><link name=\"body\"><inertial><mass value=\"" + mass +
+        R"(<robot name="drone"><link name="body"><inertial><mass value=")" + mass +
             R"("/><origin xyz="0.01 0 0"/><inertia ixx="0.02" iyy="0.03" izz="0.04" ixy="0" ixz="0"
                          iyz="0"/></inertial></link></robot>)",
         "drone.urdf", options);
@@ -92,10 +90,10 @@ TEST(ModelComparison, OneBodyThatFloatsIsARobot) {
 std::string MakeTwoArms(bool left_first) {
   const auto arm = [](const std::string& name, const std::string& y) {
     return "<link name=\"" + name +
-           "\"><inertial><origin xyz=\"0.1 0 0.2\"/><mass value=\"2\"/><inertia ixx=\"0.1\" " +
-           "ixy=\"0\" ixz=\"0\" iyy=\"0.1\" iyz=\"0\" izz=\"0.1\"/></inertial></link><joint name=\"" + name +
-           "_joint\" type=\"continuous\"><origin xyz=\"0 " + y +
-           " 0\"/><parent link=\"base\"/><child link=\"" + name + "\"/><axis xyz=\"0 1 0\"/></joint>\n";
+           R"("><inertial><origin xyz="0.1 0 0.2"/><mass value="2"/><inertia ixx="0.1" )" +
+           R"(ixy="0" ixz="0" iyy="0.1" iyz="0" izz="0.1"/></inertial></link><joint name=")" + name +
+           R"(_joint" type="continuous"><origin xyz="0 )" + y + R"( 0"/><parent link="base"/><child link=")" +
+           name + "\"/><axis xyz=\"0 1 0\"/></joint>\n";
   };
   const std::string left = arm("left", "1");
   const std::string right = arm("right", "-1");
@@ -112,7 +110,7 @@ TEST(ModelComparison, DoesNotMindTheOrderOfJoints) {
 }
 
 TEST(ModelComparison, FindsWhatDiffers) {
-  const RobotDescription right = ParseUrdf(testing::MakePandaUrdf(), "panda.urdf");
+  const RobotDescription right = ParseUrdf(MakePandaUrdf(), "panda.urdf");
   RobotDescription wrong = right;
   wrong.spec.joints[3].body.com.y() += 1e-6;
   EXPECT_THAT(ListFailures(right, wrong), HasSubstr("link_com"));
@@ -134,7 +132,7 @@ TEST(ModelComparison, FindsWhatDiffers) {
 }
 
 TEST(ModelComparison, WhatOneLacksIsNotCompared) {
-  RobotDescription urdf = ParseUrdf(testing::MakePandaUrdf(), "panda.urdf");
+  RobotDescription urdf = ParseUrdf(MakePandaUrdf(), "panda.urdf");
   RobotDescription table = ReadPandaTable();
   table.spec.joints[1].armature = 0.1;
   table.spec.gravity.x() = 1.0;
@@ -144,40 +142,35 @@ TEST(ModelComparison, WhatOneLacksIsNotCompared) {
   EXPECT_FALSE(completion.one_sided.empty());
   for (const ConstantFinding& finding : completion.one_sided) EXPECT_EQ(finding.check, "joint_armature");
   EXPECT_THAT(completion.not_compared, ::testing::Contains(HasSubstr("gravity: only")));
-  EXPECT_THAT(completion.notes, ::testing::Contains("links by other names: \"panda_link3\" is \"elbow\""));
+  EXPECT_THAT(completion.notes, ::testing::Contains(R"(links by other names: "panda_link3" is "elbow")"));
   EXPECT_EQ(urdf.spec.joints[1].armature, 0.1);
 }
 
 TEST(ModelComparison, RefusesOtherMechanisms) {
-  const RobotDescription right = ParseUrdf(testing::MakePandaUrdf(), "panda.urdf");
+  const RobotDescription right = ParseUrdf(MakePandaUrdf(), "panda.urdf");
   const auto problem = [&](RobotDescription other) {
     RobotDescription own = right;
-    try {
-      CompleteEachOther(&own, &other);
-    } catch (const InputError& error) {
-      return std::string(error.what());
-    }
-    return std::string("accepted");
+    return MessageOf<InputError>([&] { CompleteEachOther(&own, &other); });
   };
   RobotDescription other = right;
   other.spec.source = "other.urdf";
   other.spec.joints[2].name = "elbow";
   other.spec.joints[3].type = JointType::kPrismatic;
   EXPECT_EQ(problem(other),
-            "other.urdf: does not match panda.urdf; only in panda.urdf: joint \"panda_joint3\"; only in "
+            R"(other.urdf: does not match panda.urdf; only in panda.urdf: joint "panda_joint3"; only in )"
             "other.urdf: "
-            "joint \"elbow\"");
+            R"(joint "elbow")");
   other = right;
   other.spec.source = "other.urdf";
   other.spec.joints[2].type = JointType::kPrismatic;
-  EXPECT_EQ(problem(other), "other.urdf: joint \"panda_joint3\": must be revolute as in panda.urdf");
+  EXPECT_EQ(problem(other), R"(other.urdf: joint "panda_joint3": must be revolute as in panda.urdf)");
   other = right;
   other.spec.source = "other.urdf";
   other.spec.joints[2].parent = 0;
   EXPECT_EQ(
       problem(other),
-      "other.urdf: joint \"panda_joint3\": must come after \"panda_joint2\" as in panda.urdf, comes after "
-      "\"panda_joint1\"");
+      R"(other.urdf: joint "panda_joint3": must come after "panda_joint2" as in panda.urdf, comes after )"
+      R"("panda_joint1")");
 }
 
 // Every joint and link renamed, and the humanoid's limbs in another order: by its place each is the one it
@@ -197,7 +190,7 @@ TEST(StructureMatch, FindsTheJointsOfOtherNames) {
 }
 
 TEST(StructureMatch, KeepsNamesThatBothHave) {
-  const RobotDescription right = ParseUrdf(testing::MakePandaUrdf(), "panda.urdf");
+  const RobotDescription right = ParseUrdf(MakePandaUrdf(), "panda.urdf");
   RobotDescription other = right;
   other.spec.joints[2].name = "elbow";
   EXPECT_EQ(MatchByStructure(right, other), std::vector<int>({0, 1, 2, 3, 4, 5, 6}));
@@ -225,15 +218,15 @@ TEST(AlikeNames, HaveOnePartnerEach) {
 }
 
 TEST(AlikeNames, AreTakenAndNoted) {
-  const RobotDescription urdf = ParseUrdf(testing::MakePandaUrdf(), "panda.urdf");
-  RobotDescription other = ReadDescription(testing::SourcePath("/mjcf/panda.xml"));
+  const RobotDescription urdf = ParseUrdf(MakePandaUrdf(), "panda.urdf");
+  RobotDescription other = ReadDescription(SourcePath("/mjcf/panda.xml"));
   for (size_t i = 0; i < other.spec.joints.size(); ++i)
     other.spec.joints[i].name = "Joint " + std::to_string(i + 1);
   EXPECT_EQ(ListFailures(urdf, other), "");
   RobotDescription own = urdf;
   EXPECT_THAT(CompleteEachOther(&own, &other).notes,
-              ::testing::Contains(HasSubstr("joints by other names: \"Joint 1\" is "
-                                            "\"panda_joint1\"")));
+              ::testing::Contains(HasSubstr(R"(joints by other names: "Joint 1" is )"
+                                            R"("panda_joint1")")));
 }
 
 }  // namespace

@@ -125,10 +125,10 @@ struct Files {
 class NegativeControl : public ::testing::TestWithParam<Files> {};
 
 TEST_P(NegativeControl, EveryNumberIsFoundAndNamed) {
-  const std::string path = testing::SourcePath(GetParam().robot);
+  const std::string path = SourcePath(GetParam().robot);
   const std::string text = ReadText(path);
   const RobotModel model = ReadRobotModel(path);
-  const MjModelPtr engine = LoadMjcf(testing::SourcePath(GetParam().mjcf));
+  const MjModelPtr engine = LoadMjcf(SourcePath(GetParam().mjcf));
   ConsistencyOptions options;
   options.samples = kSamples;
   const auto go_on = [](long) { return true; };
@@ -149,9 +149,8 @@ TEST_P(NegativeControl, EveryNumberIsFoundAndNamed) {
     const ConsistencyResult result = CheckConsistency(adapter, options, go_on);
     EXPECT_FALSE(result.Agrees());
     const std::string named = ListNamedParts(result, mutant);
-    const bool names_one = std::any_of(parts.begin(), parts.end(), [&](const std::string& part) {
-      return named.find(part) != std::string::npos;
-    });
+    const bool names_one = std::ranges::any_of(
+        parts, [&](const std::string& part) { return named.find(part) != std::string::npos; });
     EXPECT_TRUE(names_one) << "named: " << named;
   }
   EXPECT_GT(changed, 50);

@@ -17,7 +17,7 @@ class CheckedController {
   CheckedController(const RobotSpec& spec, const Torus& torus, std::span<const int> fingertips,
                     OrientationFeedback orientation = OrientationFeedback::kAngles)
       : model(spec),
-        engine(LoadMjcf(testing::SourcePath("/mjcf/scene.xml"))),
+        engine(LoadMjcf(SourcePath("/mjcf/scene.xml"))),
         adapter(model, *engine, "scene.xml"),
         surface(torus),
         robot(model),

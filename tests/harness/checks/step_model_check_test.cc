@@ -70,8 +70,8 @@ INSTANTIATE_TEST_SUITE_P(Orientation, StepModelCheckTest,
                          ::testing::Values(OrientationFeedback::kAngles, OrientationFeedback::kRotation));
 
 TEST(StepModelCheck, AgreesWithWhatTheControllerEvaluatesInThePlant) {
-  const RobotModel model = testing::ReadPaperRobot();
-  const MjModelPtr engine = LoadMjcf(testing::SourcePath("/mjcf/scene.xml"));
+  const RobotModel model = ReadPaperRobot();
+  const MjModelPtr engine = LoadMjcf(SourcePath("/mjcf/scene.xml"));
   const Adapter adapter(model, *engine, "scene.xml");
   const Torus torus(kRingRadius, kTubeRadius);
   const std::span<const int> fingertips = std::span(model.fingertips()).first(4);
@@ -298,7 +298,7 @@ class MatrixProvider : public MechanismProvider {
 };
 
 TEST(TermComparison, FindsWhatIsNotANumberAndWhatShouldBeZero) {
-  const RobotModel model = testing::ReadPaperRobot();
+  const RobotModel model = ReadPaperRobot();
   for (const double value : {1e-9, std::nan(""), std::numeric_limits<double>::infinity()}) {
     MatrixProvider a(model.num_velocities());
     MatrixProvider b(model.num_velocities());

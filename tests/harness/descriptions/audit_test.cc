@@ -11,9 +11,11 @@
 #include "harness/descriptions/read_description.h"
 #include "harness/descriptions/urdf_reader.h"
 #include "harness/engine/engine.h"
+#include "tests/common/files.h"
 #include "tests/common/legged_robots.h"
 #include "tests/common/matchers.h"
 #include "tests/common/paths.h"
+#include "tests/common/refused_text.h"
 #include "tests/harness/descriptions/panda_urdf.h"
 
 namespace dexcheck::testing::audit_test {
@@ -59,15 +61,15 @@ TEST(Audit, SoundRobotsAreGood) {
   EXPECT_TRUE(result.IsGood()) << Describe(result);
   EXPECT_GT(result.condition, 1.0);
   EXPECT_LT(result.condition, 1.2);
-  const AuditResult panda = Audit(testing::MakePandaUrdf());
+  const AuditResult panda = Audit(MakePandaUrdf());
   EXPECT_TRUE(panda.IsGood()) << Describe(panda);
   const AuditResult table =
-      AuditRobot(ReadDescription(testing::SourcePath("/controller/parameters/assistant_robot.toml")));
+      AuditRobot(ReadDescription(SourcePath("/controller/parameters/assistant_robot.toml")));
   EXPECT_TRUE(table.IsGood()) << Describe(table);
-  for (const auto& links : {testing::ListQuadruped(), testing::ListHumanoid()}) {
-    const AuditResult urdf = Audit(testing::WriteLeggedUrdf("legged", links));
+  for (const auto& links : {ListQuadruped(), ListHumanoid()}) {
+    const AuditResult urdf = Audit(WriteLeggedUrdf("legged", links));
     EXPECT_TRUE(urdf.IsGood()) << Describe(urdf);
-    const MjModelPtr engine = LoadMjcfText(testing::WriteLeggedMjcf("legged", links), "legged.xml");
+    const MjModelPtr engine = LoadMjcfText(WriteLeggedMjcf("legged", links), "legged.xml");
     const AuditResult mjcf = AuditRobot(ReadMjcfDescription(*engine, "legged.xml"));
     EXPECT_TRUE(mjcf.IsGood()) << Describe(mjcf);
     EXPECT_TRUE(std::isfinite(mjcf.condition));
@@ -85,11 +87,7 @@ struct Suspicion {
 class Suspicions : public ::testing::TestWithParam<Suspicion> {};
 
 TEST_P(Suspicions, AreFound) {
-  std::string text = kArms;
-  const size_t at = text.find(GetParam().original);
-  ASSERT_NE(at, std::string::npos);
-  text.replace(at, GetParam().original.size(), GetParam().changed);
-  const AuditResult result = Audit(text);
+  const AuditResult result = Audit(ReplaceFirst(kArms, GetParam().original, GetParam().changed));
   EXPECT_FALSE(result.IsGood());
   EXPECT_THAT(Describe(result), HasSubstr(GetParam().finding));
 }
@@ -97,43 +95,43 @@ TEST_P(Suspicions, AreFound) {
 INSTANTIATE_TEST_SUITE_P(
     Audit, Suspicions,
     ::testing::Values(
-        Suspicion{"Triangle", "ixx=\"0.028\"", "ixx=\"0.28\"",
+        Suspicion{"Triangle", R"(ixx="0.028")", R"(ixx="0.28")",
                   "impossible inertia: link left_arm has principal moments [0.0034"},
-        Suspicion{"Negative", "iyy=\"0.0035\"", "iyy=\"-0.0035\"", "one of them negative"},
-        Suspicion{"NegativeMass", "<mass value=\"2\"/>", "<mass value=\"-2\"/>",
+        Suspicion{"Negative", R"(iyy="0.0035")", R"(iyy="-0.0035")", "one of them negative"},
+        Suspicion{"NegativeMass", R"(<mass value="2"/>)", R"(<mass value="-2"/>)",
                   "impossible mass: link left_arm has a negative mass, -2 kg"},
-        Suspicion{"NoMass", "<mass value=\"2\"/>", "<mass value=\"0\"/>",
+        Suspicion{"NoMass", R"(<mass value="2"/>)", R"(<mass value="0"/>)",
                   "impossible inertia: link left_arm has inertia"},
-        Suspicion{"GramsForKilograms", "<mass value=\"2\"/>", "<mass value=\"2000\"/>",
+        Suspicion{"GramsForKilograms", R"(<mass value="2"/>)", R"(<mass value="2000"/>)",
                   "suspicious density: link left_arm has 2000 kg in a geometry of 0.0032 m^3"},
-        Suspicion{"Light", "<mass value=\"2\"/>", "<mass value=\"0.002\"/>",
+        Suspicion{"Light", R"(<mass value="2"/>)", R"(<mass value="0.002"/>)",
                   "suspicious density: link left_arm"},
         Suspicion{
-            "ComOutside", "xyz=\"0.01 0.2 0\"", "xyz=\"0.01 2 0\"",
+            "ComOutside", R"(xyz="0.01 0.2 0")", R"(xyz="0.01 2 0")",
             "suspicious com: link left_arm has its centre of mass [0.01, 2, 0] m outside of its geometry"},
         Suspicion{"TooMuchInertia",
-                  "ixx=\"0.028\" ixy=\"0.001\" ixz=\"0.0002\" iyy=\"0.0035\" iyz=\"0.0004\" izz=\"0.029\"",
-                  "ixx=\"28\" ixy=\"1\" ixz=\"0.2\" iyy=\"3.5\" iyz=\"0.4\" izz=\"29\"",
+                  R"(ixx="0.028" ixy="0.001" ixz="0.0002" iyy="0.0035" iyz="0.0004" izz="0.029")",
+                  R"(ixx="28" ixy="1" ixz="0.2" iyy="3.5" iyz="0.4" izz="29")",
                   "more than its mass can have within its geometry"},
         Suspicion{"GramMillimetres",
-                  "ixx=\"0.028\" ixy=\"0.001\" ixz=\"0.0002\" iyy=\"0.0035\" iyz=\"0.0004\" izz=\"0.029\"",
-                  "ixx=\"2.8e-8\" ixy=\"1e-9\" ixz=\"2e-10\" iyy=\"3.5e-9\" iyz=\"4e-10\" izz=\"2.9e-8\"",
+                  R"(ixx="0.028" ixy="0.001" ixz="0.0002" iyy="0.0035" iyz="0.0004" izz="0.029")",
+                  R"(ixx="2.8e-8" ixy="1e-9" ixz="2e-10" iyy="3.5e-9" iyz="4e-10" izz="2.9e-8")",
                   "which is small for its 2 kg"},
-        Suspicion{"MirroredMass", "<mass value=\"2\"/>", "<mass value=\"2.2\"/>",
+        Suspicion{"MirroredMass", R"(<mass value="2"/>)", R"(<mass value="2.2"/>)",
                   "suspicious mirror: link right_arm has 2 kg, the other side 2.2 kg (against left_arm)"},
-        Suspicion{"MirroredSigns", "ixy=\"-0.001\"", "ixy=\"0.001\"",
+        Suspicion{"MirroredSigns", R"(ixy="-0.001")", R"(ixy="0.001")",
                   "suspicious mirror: link right_arm has products of inertia [0.001, 0.0002, -0.0004] kg m^2 "
                   "with signs"},
-        Suspicion{"MirroredPlace", "xyz=\"0.01 -0.2 0\"", "xyz=\"0.01 -0.17 0\"",
+        Suspicion{"MirroredPlace", R"(xyz="0.01 -0.2 0")", R"(xyz="0.01 -0.17 0")",
                   "suspicious mirror: link right_arm has its centre of mass at [0.01, -0.17, 0] m"},
-        Suspicion{"Degrees", "lower=\"-1\" upper=\"2\"", "lower=\"-90\" upper=\"120\"",
+        Suspicion{"Degrees", R"(lower="-1" upper="2")", R"(lower="-90" upper="120")",
                   "suspicious range: joint left range [-90, 120] rad: as if it were in degrees"},
-        Suspicion{"NoRange", "lower=\"-1\" upper=\"2\"", "lower=\"0\" upper=\"0\"", "the joint cannot move"},
-        Suspicion{"Axis", "<axis xyz=\"1 0 0\"/>", "<axis xyz=\"1 1 0\"/>",
+        Suspicion{"NoRange", R"(lower="-1" upper="2")", R"(lower="0" upper="0")", "the joint cannot move"},
+        Suspicion{"Axis", R"(<axis xyz="1 0 0"/>)", R"(<axis xyz="1 1 0"/>)",
                   "suspicious axis: joint left axis of length 1.414"},
-        Suspicion{"NameByCase", "joint name=\"right\"", "joint name=\"Left\"",
-                  "suspicious name: joint Left its name is that of \"left\" but for case and punctuation"}),
-    [](const auto& named) { return named.param.name; });
+        Suspicion{"NameByCase", R"(joint name="right")", R"(joint name="Left")",
+                  R"(suspicious name: joint Left its name is that of "left" but for case and punctuation)"}),
+    CaseName());
 
 // What each finding does to M is said: a point mass on the axis leaves it singular.
 TEST(Audit, SaysWhatItDoesToTheMassMatrix) {
@@ -159,14 +157,9 @@ TEST(Audit, SaysWhatItDoesToTheMassMatrix) {
 
 // Impossible inertias have an M too: that of the file, which is not positive then.
 TEST(Audit, CountsImpossibleInertiaAsTheFileHasIt) {
-  std::string text = kArms;
-  const std::string original = "iyz=\"0.0004\" izz=\"0.029\"";
-  text.replace(text.find(original), original.size(), "iyz=\"0.0004\" izz=\"2.9\"");
-  const AuditResult result = Audit(text);
-  EXPECT_LT(result.condition, 1.2);  // about x, izz does not count
-  const std::string negative = "ixx=\"0.028\"";
-  text.replace(text.find(negative), negative.size(), "ixx=\"-28\"");
-  EXPECT_TRUE(std::isinf(Audit(text).condition));
+  const std::string text = ReplaceFirst(kArms, R"(iyz="0.0004" izz="0.029")", R"(iyz="0.0004" izz="2.9")");
+  EXPECT_LT(Audit(text).condition, 1.2);  // about x, izz does not count
+  EXPECT_TRUE(std::isinf(Audit(ReplaceFirst(text, R"(ixx="0.028")", R"(ixx="-28")")).condition));
 }
 
 }  // namespace

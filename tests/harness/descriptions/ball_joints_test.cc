@@ -16,10 +16,12 @@
 #include "harness/descriptions/parameter_writer.h"
 #include "harness/descriptions/program_layout.h"
 #include "harness/engine/engine.h"
+#include "tests/common/files.h"
 #include "tests/common/list_failures.h"
 #include "tests/common/matchers.h"
 #include "tests/common/matrix_near.h"
 #include "tests/common/random_robot.h"
+#include "tests/common/throws.h"
 
 namespace dexcheck::testing::ball_joints_test {
 namespace {
@@ -35,13 +37,13 @@ ConsistencyResult CompareWithEngine(const RobotModel& model, const mjModel& engi
 }
 
 RobotSpec MakeRobot(BaseType base, std::mt19937* random) {
-  testing::RandomRobotOptions options;
+  RandomRobotOptions options;
   options.base = base;
   options.joints = 8;
   options.ball = 0.5;
-  RobotSpec spec = testing::MakeRandomRobot(options, random);
+  RobotSpec spec = MakeRandomRobot(options, random);
   const auto is_ball = [](const Joint& joint) { return joint.type == JointType::kBall; };
-  EXPECT_GE(std::count_if(spec.joints.begin(), spec.joints.end(), is_ball), 2);
+  EXPECT_GE(std::ranges::count_if(spec.joints, is_ball), 2);
   return spec;
 }
 
@@ -54,11 +56,11 @@ TEST(BallJoints, RandomRobotsAgree) {
       EXPECT_GE(model.num_dofs(), model.num_joints() + 4);
       EXPECT_EQ(2 * (model.num_positions() - model.num_base_positions() - model.num_joints()),
                 3 * (model.num_dofs() - model.num_joints()));
-      const MjModelPtr engine = LoadMjcfText(testing::WriteMjcf(spec), "text");
-      EXPECT_EQ(testing::ListFailures(CompareWithEngine(model, *engine)), "");
+      const MjModelPtr engine = LoadMjcfText(WriteMjcf(spec), "text");
+      EXPECT_EQ(ListFailures(CompareWithEngine(model, *engine)), "");
       if (base == BaseType::kPlanar) continue;  // an MJCF's description has none
       RobotDescription mjcf = ReadMjcfDescription(*engine, "robot.xml");
-      EXPECT_EQ(testing::ListFailures(CompareWithEngine(RobotModel(mjcf.spec), *engine)), "");
+      EXPECT_EQ(ListFailures(CompareWithEngine(RobotModel(mjcf.spec), *engine)), "");
       // Angles of a table are rounded twice: when they are written, and when they are read.
       constexpr double kWritten = 1e-13;
       RobotDescription table = ReadTable(WriteParameters(mjcf, "robot.xml"));
@@ -90,14 +92,12 @@ OnHinges PutOnHinges(const RobotModel& balls, const VectorXd& xi, VectorXd* q, s
   const Vector3d axes[] = {Vector3d::UnitZ(), Vector3d::UnitY(), Vector3d::UnitX()};
   Pose X_turned = Pose::Identity();  // a ball's frame i in that of its last hinge
   X_turned.linear() = MakeRotationFromZ(Vector3d::UnitX()).transpose();
-  const auto is_ball = [&](int joint) {
-    return joint >= 0 && balls.joints()[static_cast<size_t>(joint)].type == JointType::kBall;
-  };
+  const auto is_ball = [&](int joint) { return joint >= 0 && balls.joint(joint).type == JointType::kBall; };
   const auto last_of = [&](int joint) {
     return joint < 0 ? -1 : balls.dof(joint) + (is_ball(joint) ? 2 : 0);
   };
   for (int i = 0; i < balls.num_joints(); ++i) {
-    Joint joint = balls.joints()[static_cast<size_t>(i)];
+    Joint joint = balls.joint(i);
     if (is_ball(joint.parent)) joint.X_PB = X_turned * joint.X_PB;
     joint.parent = last_of(joint.parent);
     const int first = balls.dof(i);
@@ -157,8 +157,8 @@ TEST(BallJoints, HaveTheTermsOfTheRobotOnHinges) {
       if (joint.type == JointType::kBall) joint.damping = joint.armature = 0.0;
     }
     const RobotModel model(spec);
-    VectorXd q = testing::DrawPositions(model, &random);
-    const VectorXd xi = testing::DrawVelocities(model.num_velocities(), &random);
+    VectorXd q = DrawPositions(model, &random);
+    const VectorXd xi = DrawVelocities(model.num_velocities(), &random);
     const OnHinges hinges = PutOnHinges(model, xi, &q, &random);
     const RobotModel on_hinges(hinges.spec);
     ModelTerms terms(model);
@@ -193,17 +193,17 @@ constexpr const char* kArm = R"(<mujoco model="arm"><compiler angle="radian"/><w
 TEST(BallJoints, MjcfIsImportedAndAgrees) {
   const MjModelPtr engine = LoadMjcfText(kArm, "arm.xml");
   const RobotDescription mjcf = ReadMjcfDescription(*engine, "arm.xml");
-  EXPECT_EQ(testing::ListFailures(CompareWithEngine(RobotModel(mjcf.spec), *engine)), "");
+  EXPECT_EQ(ListFailures(CompareWithEngine(RobotModel(mjcf.spec), *engine)), "");
   const std::string text = WriteParameters(mjcf, "arm.xml");
-  EXPECT_THAT(text, HasSubstr("{ joint = \"shoulder\", link = \"upper\", type = \"ball\", xyz = "));
-  EXPECT_THAT(text, HasSubstr("\"shoulder\" = { range = [0, 1.5], damping = 0.2, armature = 0.01"));
+  EXPECT_THAT(text, HasSubstr(R"({ joint = "shoulder", link = "upper", type = "ball", xyz = )"));
+  EXPECT_THAT(text, HasSubstr(R"("shoulder" = { range = [0, 1.5], damping = 0.2, armature = 0.01)"));
   const RobotDescription table = ReadTable(text);
   EXPECT_EQ(table.spec.joints.size(), 4U);
   for (const CheckRecord& record : CompareWithEngine(RobotModel(table.spec), *engine).terms)
     EXPECT_LT(record.worst, 1e-13) << record.name;
   EXPECT_THAT(
       DescribeCoordinates(table),
-      Contains(HasSubstr("ball joints: \"shoulder\" has q[0..3] and xi[0..2], \"wrist\" has q[6..9] "
+      Contains(HasSubstr(R"(ball joints: "shoulder" has q[0..3] and xi[0..2], "wrist" has q[6..9] )"
                          "and xi[5..7]: q = [qw qx qy qz] turns the link against its parent, xi = its "
                          "angular velocity against the parent in the link's own axes")));
   const AuditResult audit = AuditRobot(mjcf);
@@ -216,7 +216,7 @@ TEST(BallJoints, FaultsAreFound) {
   const auto compare = [&](const auto& change) {
     RobotSpec spec = mjcf.spec;
     change(&spec);
-    return testing::ListFailures(CompareWithEngine(RobotModel(spec), *engine));
+    return ListFailures(CompareWithEngine(RobotModel(spec), *engine));
   };
   // The frame in whose axes the velocity is written, the point about which the link turns, damping, range.
   const auto turn = [](RobotSpec* spec) {
@@ -267,21 +267,13 @@ TEST(BallJoints, TablesAreRefusedWithAReason) {
       WriteParameters(ReadMjcfDescription(*LoadMjcfText(kArm, "arm.xml"), "arm.xml"), "arm.xml");
   const auto expect = [&](const std::string& original, const std::string& changed,
                           const std::string& message) {
-    std::string text = good;
-    const size_t at = text.find(original);
-    ASSERT_NE(at, std::string::npos) << original;
-    text.replace(at, original.size(), changed);
-    try {
-      ReadTable(text);
-      ADD_FAILURE() << changed;
-    } catch (const InputError& error) {
-      EXPECT_THAT(error.what(), HasSubstr(message));
-    }
+    EXPECT_TRUE(Throws<InputError>([&] { ReadTable(ReplaceFirst(good, original, changed)); }, message));
   };
   expect("[0, 1.5]", "[-1, 1.5]", "must begin at 0 for a ball joint");
-  expect("type = \"ball\"", "axis = [0, 1, 0], type = \"ball\"", "axis");
-  expect("armature = 0.01", "armature = 0.01, mimic = { joint = \"elbow\" }", "must not be given for a ball");
-  expect("\"elbow\" = { range", "\"elbow\" = { mimic = { joint = \"shoulder\" }, range", "must be no ball");
+  expect(R"(type = "ball")", R"(axis = [0, 1, 0], type = "ball")", "axis");
+  expect("armature = 0.01", R"(armature = 0.01, mimic = { joint = "elbow" })",
+         "must not be given for a ball");
+  expect(R"("elbow" = { range)", R"("elbow" = { mimic = { joint = "shoulder" }, range)", "must be no ball");
 }
 
 }  // namespace

@@ -23,7 +23,7 @@ constexpr double kRounding = 1e-11;
 RobotDescription ReadQuadruped() {
   UrdfOptions options;
   options.floating = true;
-  return ParseUrdf(testing::WriteLeggedUrdf("quadruped", testing::ListQuadruped()), "robot.urdf", options);
+  return ParseUrdf(WriteLeggedUrdf("quadruped", ListQuadruped()), "robot.urdf", options);
 }
 
 /// Draws the first state.
@@ -42,7 +42,7 @@ TEST(BaseConvention, ListsAllOnce) {
   EXPECT_EQ(all[0], BaseConvention());
   std::vector<std::string> names;
   for (const BaseConvention& convention : all) names.push_back(Describe(convention));
-  std::sort(names.begin(), names.end());
+  std::ranges::sort(names);
   EXPECT_EQ(std::unique(names.begin(), names.end()), names.end());
 }
 

@@ -17,8 +17,8 @@
 namespace dexcheck::testing::static_gate_test {
 namespace {
 
-const std::string kParameters = testing::SourcePath("/controller/parameters/");
-const std::string kMjcf = testing::SourcePath("/mjcf/");
+const std::string kParameters = SourcePath("/controller/parameters/");
+const std::string kMjcf = SourcePath("/mjcf/");
 
 /// One place changed in the shipped MJCF, and the finding that it must lead to.
 struct Mutation {
@@ -55,9 +55,9 @@ TEST_P(StaticGateTest, FindsAndNames) {
   const std::filesystem::path file = folder_.path() / mutation.file;
   WriteText(file, ReplaceOnce(ReadText(file), mutation.from, mutation.to));
   const ConstantChecks result = Run();
-  const auto finding = std::find_if(
-      result.findings.begin(), result.findings.end(),
-      [&](const ConstantFinding& one) { return one.check == mutation.check && one.where == mutation.where; });
+  const auto finding = std::ranges::find_if(result.findings, [&](const ConstantFinding& one) {
+    return one.check == mutation.check && one.where == mutation.where;
+  });
   std::string found;
   for (const ConstantFinding& one : result.findings) found += one.check + ": " + one.where + "; ";
   ASSERT_NE(finding, result.findings.end()) << "found: " << found;
@@ -69,11 +69,10 @@ TEST_P(StaticGateTest, FindsAndNames) {
 
 // A fingertip's body may have other spheres, before it: one that is only seen, one that touches elsewhere.
 TEST_F(StaticGateFiles, TheFingertipIsTheSphereThatTouchesAtItsSite) {
-  const std::string tip = "<geom name=\"rf1_tip_geom\" class=\"tip\"/>";
-  const std::string seen =
-      "<geom name=\"seen\" size=\"0.011\" pos=\"0 0 -0.0185\" mass=\"0\" contype=\"0\" "
-      "conaffinity=\"0\"/>";
-  const std::string knuckle = "<geom name=\"knuckle\" size=\"0.008\" mass=\"0\" contype=\"2\"/>";
+  const std::string tip = R"(<geom name="rf1_tip_geom" class="tip"/>)";
+  const std::string seen = R"(<geom name="seen" size="0.011" pos="0 0 -0.0185" mass="0" contype="0" )"
+                           R"(conaffinity="0"/>)";
+  const std::string knuckle = R"(<geom name="knuckle" size="0.008" mass="0" contype="2"/>)";
   const std::filesystem::path file = folder_.path() / "robot.xml";
   WriteText(file, ReplaceOnce(ReadText(file), tip, seen + knuckle + tip));
   const MjModelPtr engine = LoadMjcf(folder_.path() / "scene.xml");
@@ -89,8 +88,8 @@ TEST_F(StaticGateFiles, TheFingertipIsTheSphereThatTouchesAtItsSite) {
 
 const std::string kRightWheelColumn =
     "<joint name=\"wheel_right\" class=\"wheel\"/>\n        <geom class=\"column\" size=\"0.1 0.02\" "
-    "quat=\"1 1 0 0\" "
-    "mass=\"1.5\"/>";
+    R"(quat="1 1 0 0" )"
+    R"(mass="1.5"/>)";
 const char* const kWheel = "joint wheel_right";
 const char* const kElbow = "joint r_elbow on link r_upper_arm";
 const char* const kFingertip = "frame rf3_tip on link rf3_phalanx_4";
@@ -98,73 +97,71 @@ const char* const kFingertip = "frame rf3_tip on link rf3_phalanx_4";
 INSTANTIATE_TEST_SUITE_P(
     Mjcf, StaticGateTest,
     ::testing::ValuesIn(std::vector<Mutation>{
-        {"BaseMass", "robot.xml", "mass=\"12\"", "mass=\"12.01\"", "link_mass", "link platform"},
-        {"LinkMass", "robot.xml", "mass=\"2.5\"", "mass=\"2.501\"", "link_mass", "link torso"},
-        {"Damping", "robot.xml", "damping=\"0.2\" armature=\"0.02\"", "damping=\"0.21\" armature=\"0.02\"",
+        {"BaseMass", "robot.xml", R"(mass="12")", R"(mass="12.01")", "link_mass", "link platform"},
+        {"LinkMass", "robot.xml", R"(mass="2.5")", R"(mass="2.501")", "link_mass", "link torso"},
+        {"Damping", "robot.xml", R"(damping="0.2" armature="0.02")", R"(damping="0.21" armature="0.02")",
          "joint_damping", kElbow},
-        {"Armature", "robot.xml", "damping=\"0.2\" armature=\"0.02\"", "damping=\"0.2\" armature=\"0\"",
+        {"Armature", "robot.xml", R"(damping="0.2" armature="0.02")", R"(damping="0.2" armature="0")",
          "joint_armature", kElbow},
-        {"LowerLimit", "robot.xml", "range=\"-0.1 2.5\"", "range=\"-0.2 2.5\"", "joint_range", kElbow},
-        {"UpperLimit", "robot.xml", "range=\"-0.1 2.5\"", "range=\"-0.1 2.4\"", "joint_range", kElbow},
-        {"Spring", "robot.xml", "range=\"-0.1 2.5\"", "range=\"-0.1 2.5\" stiffness=\"1\"", "joint_spring",
+        {"LowerLimit", "robot.xml", R"(range="-0.1 2.5")", R"(range="-0.2 2.5")", "joint_range", kElbow},
+        {"UpperLimit", "robot.xml", R"(range="-0.1 2.5")", R"(range="-0.1 2.4")", "joint_range", kElbow},
+        {"Spring", "robot.xml", R"(range="-0.1 2.5")", R"(range="-0.1 2.5" stiffness="1")", "joint_spring",
          kElbow},
-        {"DryFriction", "robot.xml", "range=\"-0.1 2.5\"", "range=\"-0.1 2.5\" frictionloss=\"0.1\"",
+        {"DryFriction", "robot.xml", R"(range="-0.1 2.5")", R"(range="-0.1 2.5" frictionloss="0.1")",
          "joint_dry_friction", kElbow},
-        {"Gravity", "stage.xml", "gravity=\"0 0 -9.81\"", "gravity=\"0 0 -9.8\"", "gravity_vector", "robot"},
-        {"GravityTilted", "stage.xml", "gravity=\"0 0 -9.81\"", "gravity=\"0.01 0 -9.81\"", "gravity_vector",
+        {"Gravity", "stage.xml", R"(gravity="0 0 -9.81")", R"(gravity="0 0 -9.8")", "gravity_vector",
          "robot"},
-        {"Density", "stage.xml", "gravity=\"0 0 -9.81\"", "gravity=\"0 0 -9.81\" density=\"1.2\"", "fluid",
+        {"GravityTilted", "stage.xml", R"(gravity="0 0 -9.81")", R"(gravity="0.01 0 -9.81")",
+         "gravity_vector", "robot"},
+        {"Density", "stage.xml", R"(gravity="0 0 -9.81")", R"(gravity="0 0 -9.81" density="1.2")", "fluid",
          "robot"},
-        {"Viscosity", "stage.xml", "gravity=\"0 0 -9.81\"", "gravity=\"0 0 -9.81\" viscosity=\"2e-5\"",
+        {"Viscosity", "stage.xml", R"(gravity="0 0 -9.81")", R"(gravity="0 0 -9.81" viscosity="2e-5")",
          "fluid", "robot"},
-        {"WheelRadiusLarger", "robot.xml", "<default class=\"tyre\"> <geom size=\"0.1\"/>",
-         "<default class=\"tyre\"> <geom size=\"0.101\"/>", "wheel_radius", kWheel},
-        {"WheelRadiusSmaller", "robot.xml", "<default class=\"tyre\"> <geom size=\"0.1\"/>",
-         "<default class=\"tyre\"> <geom size=\"0.099\"/>", "wheel_radius", kWheel},
-        {"WheelDistance", "robot.xml", "<body name=\"wheel_right\" pos=\"0 -0.20 0\">",
-         "<body name=\"wheel_right\" pos=\"0 -0.21 0\">", "wheel_distance", kWheel},
-        {"AxleForward", "robot.xml", "<body name=\"wheel_right\" pos=\"0 -0.20 0\">",
-         "<body name=\"wheel_right\" pos=\"0.01 -0.20 0\">", "axle_position", kWheel},
-        {"AxleHigh", "robot.xml", "<body name=\"wheel_right\" pos=\"0 -0.20 0\">",
-         "<body name=\"wheel_right\" pos=\"0 -0.20 0.01\">", "axle_position", kWheel},
-        {"WheelAxis", "robot.xml", "<joint axis=\"0 1 0\" limited=\"false\"",
-         "<joint axis=\"0 1 0.01\" limited=\"false\"", "wheel_axis", kWheel},
-        {"WheelBackwards", "robot.xml", "<joint axis=\"0 1 0\" limited=\"false\"",
-         "<joint axis=\"0 -1 0\" limited=\"false\"", "wheel_axis", kWheel},
+        {"WheelRadiusLarger", "robot.xml", R"(<default class="tyre"> <geom size="0.1"/>)",
+         R"(<default class="tyre"> <geom size="0.101"/>)", "wheel_radius", kWheel},
+        {"WheelRadiusSmaller", "robot.xml", R"(<default class="tyre"> <geom size="0.1"/>)",
+         R"(<default class="tyre"> <geom size="0.099"/>)", "wheel_radius", kWheel},
+        {"WheelDistance", "robot.xml", R"(<body name="wheel_right" pos="0 -0.20 0">)",
+         R"(<body name="wheel_right" pos="0 -0.21 0">)", "wheel_distance", kWheel},
+        {"AxleForward", "robot.xml", R"(<body name="wheel_right" pos="0 -0.20 0">)",
+         R"(<body name="wheel_right" pos="0.01 -0.20 0">)", "axle_position", kWheel},
+        {"AxleHigh", "robot.xml", R"(<body name="wheel_right" pos="0 -0.20 0">)",
+         R"(<body name="wheel_right" pos="0 -0.20 0.01">)", "axle_position", kWheel},
+        {"WheelAxis", "robot.xml", R"(<joint axis="0 1 0" limited="false")",
+         R"(<joint axis="0 1 0.01" limited="false")", "wheel_axis", kWheel},
+        {"WheelBackwards", "robot.xml", R"(<joint axis="0 1 0" limited="false")",
+         R"(<joint axis="0 -1 0" limited="false")", "wheel_axis", kWheel},
         {"WheelMass", "robot.xml", kRightWheelColumn, ReplaceOnce(kRightWheelColumn, "1.5", "1.6"),
          "wheel_mass", kWheel},
         {"WheelSpinInertia", "robot.xml", kRightWheelColumn,
          ReplaceOnce(kRightWheelColumn, "0.1 0.02", "0.09 0.02"), "wheel_spin_inertia", kWheel},
-        {"WheelDamping", "robot.xml", "damping=\"0.02\" armature=\"0.004\"",
-         "damping=\"0.03\" armature=\"0.004\"", "wheel_damping", kWheel},
-        {"WheelArmature", "robot.xml", "damping=\"0.02\" armature=\"0.004\"",
-         "damping=\"0.02\" armature=\"0.005\"", "wheel_armature", kWheel},
-        {"WheelSpring", "robot.xml", "damping=\"0.02\" armature=\"0.004\"",
-         "damping=\"0.02\" armature=\"0.004\" stiffness=\"1\"", "joint_spring", kWheel},
-        {"WheelDryFriction", "robot.xml", "damping=\"0.02\" armature=\"0.004\"",
-         "damping=\"0.02\" armature=\"0.004\" frictionloss=\"0.1\"", "joint_dry_friction", kWheel},
-        {"BaseDryFriction", "robot.xml", "<freejoint name=\"base\"/>",
-         "<joint name=\"base\" type=\"free\" limited=\"false\" frictionloss=\"0.1\"/>", "joint_dry_friction",
+        {"WheelDamping", "robot.xml", R"(damping="0.02" armature="0.004")",
+         R"(damping="0.03" armature="0.004")", "wheel_damping", kWheel},
+        {"WheelArmature", "robot.xml", R"(damping="0.02" armature="0.004")",
+         R"(damping="0.02" armature="0.005")", "wheel_armature", kWheel},
+        {"WheelSpring", "robot.xml", R"(damping="0.02" armature="0.004")",
+         R"(damping="0.02" armature="0.004" stiffness="1")", "joint_spring", kWheel},
+        {"WheelDryFriction", "robot.xml", R"(damping="0.02" armature="0.004")",
+         R"(damping="0.02" armature="0.004" frictionloss="0.1")", "joint_dry_friction", kWheel},
+        {"BaseDryFriction", "robot.xml", R"(<freejoint name="base"/>)",
+         R"(<joint name="base" type="free" limited="false" frictionloss="0.1"/>)", "joint_dry_friction",
          "free joint of link platform"},
-        {"FingertipRadius", "robot.xml", "<default class=\"tip\"> <geom size=\"0.009\"",
-         "<default class=\"tip\"> <geom size=\"0.0091\"", "fingertip_radius", kFingertip},
-        {"FingertipPlace", "robot.xml", "<default class=\"tip\"> <geom size=\"0.009\" pos=\"0 0 -0.0185\"/>",
-         "<default class=\"tip\"> <geom size=\"0.008\" pos=\"0 0 -0.0195\"/>", "fingertip_radius",
-         kFingertip},
-        {"PairFriction", "contacts.xml",
-         "<default class=\"fingertip\"> <pair condim=\"3\" friction=\"0.8 0.8",
-         "<default class=\"fingertip\"> <pair condim=\"3\" friction=\"0.8 0.7", "contact_friction",
-         kFingertip},
+        {"FingertipRadius", "robot.xml", R"(<default class="tip"> <geom size="0.009")",
+         R"(<default class="tip"> <geom size="0.0091")", "fingertip_radius", kFingertip},
+        {"FingertipPlace", "robot.xml", R"(<default class="tip"> <geom size="0.009" pos="0 0 -0.0185"/>)",
+         R"(<default class="tip"> <geom size="0.008" pos="0 0 -0.0195"/>)", "fingertip_radius", kFingertip},
+        {"PairFriction", "contacts.xml", R"(<default class="fingertip"> <pair condim="3" friction="0.8 0.8)",
+         R"(<default class="fingertip"> <pair condim="3" friction="0.8 0.7)", "contact_friction", kFingertip},
         {"PairMissing", "contacts.xml",
-         "<pair name=\"rf3_torus\" class=\"fingertip\" geom1=\"rf3_tip_geom\" geom2=\"torus_geom\"/>", "",
+         R"(<pair name="rf3_torus" class="fingertip" geom1="rf3_tip_geom" geom2="torus_geom"/>)", "",
          "contact_friction", kFingertip},
-        {"ObjectMass", "torus.xml", "mass=\"0.2\"", "mass=\"0.21\"", "object_mass", "object torus"},
+        {"ObjectMass", "torus.xml", R"(mass="0.2")", R"(mass="0.21")", "object_mass", "object torus"},
         {"ObjectInertia", "torus.xml", "0.00026315\"", "0.00026\"", "object_inertia", "object torus"},
-        {"ObjectCom", "torus.xml", "<inertial pos=\"0 0 0\"", "<inertial pos=\"0 0 0.001\"", "object_com",
+        {"ObjectCom", "torus.xml", R"(<inertial pos="0 0 0")", R"(<inertial pos="0 0 0.001")", "object_com",
          "object torus"},
-        {"ObjectShape", "torus.xml", "user=\"0.035 0.011\"", "user=\"0.035 0.012\"", "object_shape",
+        {"ObjectShape", "torus.xml", R"(user="0.035 0.011")", R"(user="0.035 0.012")", "object_shape",
          "object torus"},
-        {"ObjectUnmarked", "torus.xml", "user=\"0.035 0.011\"", "", "object_shape", "object torus"},
+        {"ObjectUnmarked", "torus.xml", R"(user="0.035 0.011")", "", "object_shape", "object torus"},
     }),
     [](const auto& info) { return info.param.name; });
 
@@ -187,7 +184,7 @@ TEST(ConstantComparison, RaisesNoFalseAlarm) {
 
 // The larger ring agrees with what its scenario says of it, and not with the torus of the parameter file.
 TEST(ConstantComparison, DistinguishesTheRingFromTheTorus) {
-  const Scenario scenario = testing::ReadShippedScenario("two-hands");
+  const Scenario scenario = ReadShippedScenario("two-hands");
   const std::string robot = kParameters + "assistant_robot.toml";
   ExpectNoFindings(ParseRobotModel(ReadText(robot), robot, scenario.model_overrides), scenario.mjcf_file);
 

@@ -295,9 +295,8 @@ class Campaign {
     bool is_class = false;
     std::set<std::string> named;
     for (const Hypothesis& one : found) {
-      const auto fits = std::find_if(ids.begin(), ids.end(), [&](const std::string& id) {
-        return std::find(one.ids.begin(), one.ids.end(), id) != one.ids.end();
-      });
+      const auto fits = std::ranges::find_if(
+          ids, [&](const std::string& id) { return std::ranges::find(one.ids, id) != one.ids.end(); });
       if (fits != ids.end()) {
         is_class = is_class || one.ids.size() > 1;
         named.insert(*fits);

@@ -78,7 +78,7 @@ TEST_P(TwoMjcfs, AreComparedInWhatTheyHaveBesidesTheMechanism) {
 }
 
 const char* const kEnd = "</mujoco>";
-const char* const kGravity = "gravity=\"0 0 -9.81\"/>";
+const char* const kGravity = R"(gravity="0 0 -9.81"/>)";
 
 INSTANTIATE_TEST_SUITE_P(
     Extras, TwoMjcfs,
@@ -91,10 +91,10 @@ INSTANTIATE_TEST_SUITE_P(
               "<actuator><muscle name='p' joint='elbow' lengthrange='-1 1' timeconst='0.02 0.04'/></actuator>"
               "</mujoco>",
               "motor_dynamics"},
-        Extra{"Spring", "name=\"elbow\"", "name=\"elbow\" stiffness=\"2\"", "name=\"elbow\" stiffness=\"3\"",
+        Extra{"Spring", R"(name="elbow")", R"(name="elbow" stiffness="2")", R"(name="elbow" stiffness="3")",
               "joint_spring"},
-        Extra{"RestOfASpring", "name=\"elbow\"", "name=\"elbow\" stiffness=\"2\"",
-              "name=\"elbow\" stiffness=\"2\" springref=\"0.1\"", "joint_spring"},
+        Extra{"RestOfASpring", R"(name="elbow")", R"(name="elbow" stiffness="2")",
+              R"(name="elbow" stiffness="2" springref="0.1")", "joint_spring"},
         Extra{"TendonSpring", kEnd,
               "<tendon><fixed name='t' stiffness='300'><joint joint='elbow' coef='1'/></fixed></tendon>"
               "</mujoco>",
@@ -113,8 +113,8 @@ INSTANTIATE_TEST_SUITE_P(
               "<equality><joint name='e' joint1='elbow' joint2='shoulder' polycoef='0 1 0.6 0 0'/></equality>"
               "</mujoco>",
               "equality_constraint"},
-        Extra{"Fluid", kGravity, "gravity=\"0 0 -9.81\" density=\"1.2\"/>",
-              "gravity=\"0 0 -9.81\" density=\"1.3\"/>", "fluid"}),
+        Extra{"Fluid", kGravity, R"(gravity="0 0 -9.81" density="1.2"/>)",
+              R"(gravity="0 0 -9.81" density="1.3"/>)", "fluid"}),
     [](const auto& info) { return info.param.name; });
 
 // A coefficient of a tendon's path, distinguished although its stiffness is the same.
@@ -137,7 +137,7 @@ TEST_F(TwoMjcfs, CompareWhichJointAServoMoves) {
 }
 
 TEST_F(TwoMjcfs, MayBothBeWithoutGravitysFlag) {
-  const std::string text = "gravity=\"0 0 -9.81\"><flag gravity=\"disable\"/></option>";
+  const std::string text = R"(gravity="0 0 -9.81"><flag gravity="disable"/></option>)";
   const std::string off = ReplaceOnce(kArm, kGravity, text);
   EXPECT_TRUE(Compare(off, off).result.Agrees());
   EXPECT_THAT(List(Compare(off, kArm)), HasSubstr("disable_flag: Gravity: 1 in a.xml, 0 in b.xml"));
@@ -146,10 +146,9 @@ TEST_F(TwoMjcfs, MayBothBeWithoutGravitysFlag) {
 
 // What <joint type="free"> takes from the defaults of <joint>.
 TEST_F(TwoMjcfs, CompareWhatActsOnTheJointOfTheBase) {
-  const std::string damped =
-      ReplaceOnce(kArm, "<body name=\"upper\"><joint name=\"shoulder\" axis=\"0 1 0\"/>",
-                  "<body name=\"upper\"><joint type=\"free\" limited=\"false\"/>");
-  const std::string free = ReplaceOnce(damped, "<joint type=\"free\" limited=\"false\"/>", "<freejoint/>");
+  const std::string damped = ReplaceOnce(kArm, R"(<body name="upper"><joint name="shoulder" axis="0 1 0"/>)",
+                                         R"(<body name="upper"><joint type="free" limited="false"/>)");
+  const std::string free = ReplaceOnce(damped, R"(<joint type="free" limited="false"/>)", "<freejoint/>");
   EXPECT_TRUE(Compare(damped, damped).result.Agrees());
   const std::string found = List(Compare(damped, free));
   EXPECT_THAT(found, HasSubstr("damping[0]: 0.3 in a.xml, 0 in b.xml"));

@@ -55,7 +55,7 @@ struct Count {
   std::string missed;
 };
 
-void Try(const testing::RobotPair& pair, const ConventionFault& fault, bool all, Count* count) {
+void Try(const RobotPair& pair, const ConventionFault& fault, bool all, Count* count) {
   RobotDescription wrong = pair.a;
   size_t visible = 0;
   for (size_t i = 0; i < wrong.spec.joints.size() && (all || visible == 0); ++i) {
@@ -69,10 +69,9 @@ void Try(const testing::RobotPair& pair, const ConventionFault& fault, bool all,
   const std::vector<Hypothesis> found = ExplainDifference(wrong, pair.b);
   std::string lines;
   for (const Hypothesis& hypothesis : found) lines += "\n    " + hypothesis.text;
-  const bool named = std::all_of(fault.ids.begin(), fault.ids.end(), [&](const std::string& id) {
-    return std::any_of(found.begin(), found.end(), [&](const Hypothesis& one) {
-      return std::find(one.ids.begin(), one.ids.end(), id) != one.ids.end();
-    });
+  const bool named = std::ranges::all_of(fault.ids, [&](const std::string& id) {
+    return std::ranges::any_of(
+        found, [&](const Hypothesis& one) { return std::ranges::find(one.ids, id) != one.ids.end(); });
   });
   count->named += named ? 1 : 0;
   if (!named) count->missed += "\n  " + pair.name + (all ? " all: " : " one: ") + fault.name + lines;
@@ -97,7 +96,7 @@ TEST(Faults, AreNamedInWordsWithTheRightValues) {
   constexpr size_t kSample = 5;  // every fifth case, another one for each robot
   Count count;
   size_t number = 0;
-  for (const testing::RobotPair& pair : testing::ListRobotPairs()) {
+  for (const RobotPair& pair : ListRobotPairs()) {
     for (const ConventionFault& fault : faults) {
       for (const bool all : {false, true}) {
         if (everything || number % kSample == 0) Try(pair, fault, all, &count);
@@ -107,7 +106,7 @@ TEST(Faults, AreNamedInWordsWithTheRightValues) {
     ++number;
   }
   std::printf("%zu faults on %zu robots, on one link and on all: %d cases, %d named, %d values, %d wrong\n",
-              faults.size(), testing::ListRobotPairs().size(), count.tried, count.named, count.values,
+              faults.size(), ListRobotPairs().size(), count.tried, count.named, count.values,
               count.wrong_values);
   EXPECT_GE(count.tried, everything ? 480 : 80);
   EXPECT_GE(count.named, 0.95 * count.tried) << count.missed;

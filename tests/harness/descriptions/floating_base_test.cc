@@ -1,6 +1,7 @@
 // Robots with a floating base: tables, URDFs, MJCFs and the engine agree to rounding, and what differs is
 // found.
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -33,26 +34,26 @@ ConsistencyOptions Few(long samples = 20) {
 
 std::string CompleteAndCompare(RobotDescription robot, const mjModel& engine) {
   CompleteFromEngine(engine, "robot.xml", &robot);
-  return testing::CompareWithEngine(robot, engine);
+  return CompareWithEngine(robot, engine);
 }
 
 std::string CompareBoth(RobotDescription a, RobotDescription b) {
   CompleteEachOther(&a, &b);
-  return testing::ListFailures(CompareDescriptions(a, b, Few(), [](long) { return true; }));
+  return ListFailures(CompareDescriptions(a, b, Few(), [](long) { return true; }));
 }
 
 TEST(FloatingBase, RandomRobotsAgree) {
   std::mt19937 random(1720);
   for (int index = 0; index < 20; ++index) {
-    testing::RandomRobotOptions options;
+    RandomRobotOptions options;
     options.base = BaseType::kFloating;
     options.joints = 1 + index % 13;
     options.branching = 0.1 * (index % 6);
-    RobotSpec spec = testing::MakeRandomRobot(options, &random);
-    RobotDescription urdf = ParseUrdf(testing::WriteUrdf(&spec, &random), "robot.urdf");
+    RobotSpec spec = MakeRandomRobot(options, &random);
+    RobotDescription urdf = ParseUrdf(WriteUrdf(&spec, &random), "robot.urdf");
     urdf.spec.gravity = spec.gravity;
     urdf.states_gravity = true;
-    const MjModelPtr engine = LoadMjcfText(testing::WriteMjcf(spec), "text");
+    const MjModelPtr engine = LoadMjcfText(WriteMjcf(spec), "text");
     EXPECT_EQ(CompleteAndCompare(urdf, *engine), "") << "robot " << index;
     const RobotDescription mjcf = ReadMjcfDescription(*engine, "robot.xml");
     EXPECT_EQ(CompareBoth(urdf, mjcf), "") << "robot " << index;
@@ -69,11 +70,11 @@ TEST(FloatingBase, RandomRobotsAgree) {
 class LeggedRobots : public ::testing::TestWithParam<std::string> {
  protected:
   LeggedRobots()
-      : links_(GetParam() == "quadruped" ? testing::ListQuadruped() : testing::ListHumanoid()),
-        urdf_(testing::WriteLeggedUrdf(GetParam(), links_)),
-        engine_(LoadMjcfText(testing::WriteLeggedMjcf(GetParam(), links_), "robot.xml")) {}
+      : links_(GetParam() == "quadruped" ? ListQuadruped() : ListHumanoid()),
+        urdf_(WriteLeggedUrdf(GetParam(), links_)),
+        engine_(LoadMjcfText(WriteLeggedMjcf(GetParam(), links_), "robot.xml")) {}
 
-  std::vector<testing::LeggedLink> links_;
+  std::vector<LeggedLink> links_;
   std::string urdf_;
   MjModelPtr engine_;
 };
@@ -96,20 +97,15 @@ TEST_P(LeggedRobots, FaultsOfTheBaseAreFound) {
   const std::string base = links_[0].name;
   const auto expect = [&](const std::string& original, const std::string& changed,
                           const std::string& found_by) {
-    std::string text = urdf_;
-    const size_t at = text.find(original);
-    ASSERT_NE(at, std::string::npos) << original;
-    text.replace(at, original.size(), changed);
+    const std::string text = ReplaceFirst(urdf_, original, changed);
     const std::string failures = CompleteAndCompare(ParseUrdf(text, "robot.urdf"), *engine_);
     EXPECT_THAT(failures, HasSubstr(found_by));
     EXPECT_THAT(failures, HasSubstr("M_bar"));
   };
-  const testing::LeggedLink& link = links_[0];
-  expect("xyz=\"" + link.com + "\"", "xyz=\"0.02 0 0\"", "link_com");
-  expect("rpy=\"" + link.com_rpy + "\"", "rpy=\"0 0 0\"", "link_inertia");
-  std::ostringstream mass;
-  mass << "<mass value=\"" << link.mass << "\"/>";
-  expect(mass.str(), "<mass value=\"5\"/>", "link_mass");
+  const LeggedLink& link = links_[0];
+  expect("xyz=\"" + link.com + "\"", R"(xyz="0.02 0 0")", "link_com");
+  expect("rpy=\"" + link.com_rpy + "\"", R"(rpy="0 0 0")", "link_inertia");
+  expect(fmt::format(R"(<mass value="{}"/>)", link.mass), R"(<mass value="5"/>)", "link_mass");
 }
 
 // What publishers call a floating base: an empty footprint, a joint of the type "floating", the name "world".
@@ -120,17 +116,17 @@ TEST_P(LeggedRobots, RootsThatPublishersWrite) {
     return text.insert(text.find('\n') + 1, root);
   };
   const RobotDescription footprint =
-      ParseUrdf(with_root("<link name=\"footprint\"/><joint name=\"up\" type=\"fixed\"><origin xyz=\"0.1 0 "
-                          "0.3\" rpy=\"0 0.2 0\"/>"
-                          "<parent link=\"footprint\"/><child link=\"" +
+      ParseUrdf(with_root(R"(<link name="footprint"/><joint name="up" type="fixed"><origin xyz="0.1 0 )"
+                          R"(0.3" rpy="0 0.2 0"/>)"
+                          R"(<parent link="footprint"/><child link=")" +
                           base + "\"/></joint>"),
                 "robot.urdf");
   EXPECT_EQ(footprint.spec.base.link, "footprint");
   EXPECT_EQ(CompleteAndCompare(footprint, *engine_), "");
   EXPECT_EQ(CompareBoth(footprint, ReadMjcfDescription(*engine_, "robot.xml")), "");
   const RobotDescription floating =
-      ParseUrdf(with_root("<link name=\"world\"/><joint name=\"free\" type=\"floating\"><parent "
-                          "link=\"world\"/><child link=\"" +
+      ParseUrdf(with_root(R"(<link name="world"/><joint name="free" type="floating"><parent )"
+                          R"(link="world"/><child link=")" +
                           base + "\"/></joint>"),
                 "robot.urdf");
   EXPECT_EQ(floating.spec.base.link, base);
@@ -138,9 +134,8 @@ TEST_P(LeggedRobots, RootsThatPublishersWrite) {
   EXPECT_EQ(CompleteAndCompare(floating, *engine_), "");
 
   const RobotDescription fixed = ParseUrdf(
-      with_root(
-          "<link name=\"world\"/><joint name=\"weld\" type=\"fixed\"><parent link=\"world\"/><child link=\"" +
-          base + "\"/></joint>"),
+      with_root(R"(<link name="world"/><joint name="weld" type="fixed"><parent link="world"/><child link=")" +
+                base + "\"/></joint>"),
       "robot.urdf");
   EXPECT_TRUE(fixed.states_base);
   EXPECT_THROW(CompleteAndCompare(fixed, *engine_), InputError);
@@ -148,7 +143,7 @@ TEST_P(LeggedRobots, RootsThatPublishersWrite) {
 }
 
 TEST_P(LeggedRobots, FixedInOneFileAndFloatingInTheOtherIsSaid) {
-  const MjModelPtr fixed = LoadMjcfText(testing::WriteLeggedMjcf(GetParam(), links_, ""), "fixed.xml");
+  const MjModelPtr fixed = LoadMjcfText(WriteLeggedMjcf(GetParam(), links_, ""), "fixed.xml");
   UrdfOptions floating;
   floating.floating = true;
   EXPECT_THROW(CompleteAndCompare(ParseUrdf(urdf_, "robot.urdf", floating), *fixed), InputError);
@@ -169,18 +164,17 @@ INSTANTIATE_TEST_SUITE_P(FloatingBase, LeggedRobots, ::testing::Values("quadrupe
 // A scene has objects beside the robot, and published files have parts parked in the world.
 TEST(FloatingBase, TheRobotIsTheTreeWithTheMostJoints) {
   const auto make = [](const std::string& more) {
-    return "<mujoco><worldbody><body name=\"trunk\"><freejoint/><geom size=\"1\"/><body name=\"leg\"><joint "
-           "name=\"j\"/><geom size=\"1\"/><body name=\"foot\"><joint name=\"k\"/><geom "
-           "size=\"1\"/></body></body></body>" +
+    return R"(<mujoco><worldbody><body name="trunk"><freejoint/><geom size="1"/><body name="leg"><joint )"
+           R"(name="j"/><geom size="1"/><body name="foot"><joint name="k"/><geom )"
+           R"(size="1"/></body></body></body>)" +
            more + "</worldbody></mujoco>";
   };
   const TempFolder folder;
   const std::filesystem::path alone = folder.path() / "alone.xml";
   const std::filesystem::path scene = folder.path() / "scene.xml";
   WriteText(alone, make(""));
-  WriteText(scene,
-            make("<body name=\"ball\"><freejoint name=\"b\"/><geom size=\"1\"/></body><body name=\"spare\">"
-                 "<joint name=\"s\"/><geom size=\"1\"/></body>"));
+  WriteText(scene, make(R"(<body name="ball"><freejoint name="b"/><geom size="1"/></body><body name="spare">)"
+                        R"(<joint name="s"/><geom size="1"/></body>)"));
   const RobotDescription robot = ReadDescription(scene);
   EXPECT_EQ(robot.spec.base.link, "trunk");
   EXPECT_EQ(robot.spec.joints.size(), 2U);
@@ -191,21 +185,21 @@ TEST(FloatingBase, TheRobotIsTheTreeWithTheMostJoints) {
   for (const auto& [a, b] : {std::pair(alone, scene), std::pair(scene, alone), std::pair(scene, scene)}) {
     const Comparison comparison = CompareFiles(a, b, {}, options);
     EXPECT_TRUE(comparison.result.Agrees()) << ::testing::PrintToString(ListDifferences(comparison));
-    const bool is_said = std::find(comparison.not_compared.begin(), comparison.not_compared.end(),
-                                   "no part of the robot, since nothing joins them to it: joints b, s") !=
-                         comparison.not_compared.end();
+    const bool is_said =
+        std::ranges::find(comparison.not_compared,
+                          "no part of the robot, since nothing joins them to it: joints b, s") !=
+        comparison.not_compared.end();
     EXPECT_EQ(is_said, b == scene);
   }
 }
 
 TEST(FloatingBase, TwoRobotsAreRefused) {
   const MjModelPtr two = LoadMjcfText(
-      "<mujoco><worldbody><body name=\"a\"><freejoint/><geom size=\"1\"/></body><body name=\"b\"><freejoint/>"
-      "<geom size=\"1\"/></body></worldbody></mujoco>",
+      R"(<mujoco><worldbody><body name="a"><freejoint/><geom size="1"/></body><body name="b"><freejoint/>)"
+      R"(<geom size="1"/></body></worldbody></mujoco>)",
       "two.xml");
-  EXPECT_TRUE(
-      testing::Throws<InputError>([&] { ReadMjcfDescription(*two, "two.xml"); },
-                                  {"two.xml: must have one robot; \"a\" and \"b\" carry as many joints"}));
+  EXPECT_TRUE(Throws<InputError>([&] { ReadMjcfDescription(*two, "two.xml"); },
+                                 {R"(two.xml: must have one robot; "a" and "b" carry as many joints)"}));
 }
 
 // The engine's coordinates are the world's, and round by the world's size.

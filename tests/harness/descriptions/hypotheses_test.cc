@@ -20,9 +20,6 @@
 namespace dexcheck::testing::hypotheses_test {
 namespace {
 
-using Pair = testing::RobotPair;
-const std::vector<Pair>& ListRobots() { return testing::ListRobotPairs(); }
-
 // Of bodies, those whose every case must be named (faults_measurement_test counts the others).
 constexpr const char* kBodyFaults[] = {"inertia as if given about the link's origin",
                                        "inertia with the products' sign turned around",
@@ -67,9 +64,20 @@ std::string List(const std::vector<Hypothesis>& found) {
   return text;
 }
 
+std::string Say(const RobotDescription& wrong, const RobotDescription& right) {
+  return List(ExplainDifference(wrong, right));
+}
+
+/// What is said when every joint is changed.
+std::string SayOfJoints(RobotDescription robot, const RobotDescription& right,
+                        const std::function<void(Joint&)>& change) {
+  std::ranges::for_each(robot.spec.joints, change);
+  return Say(robot, right);
+}
+
 /// Whether it says so, alone or as one of several that cannot be told apart.
 bool Names(const Hypothesis& found, const std::string& id) {
-  return std::find(found.ids.begin(), found.ids.end(), id) != found.ids.end();
+  return std::ranges::find(found.ids, id) != found.ids.end();
 }
 
 struct Case {
@@ -77,12 +85,14 @@ struct Case {
   std::string fault;  ///< Empty for transposed axes.
 };
 void PrintTo(const Case& tried, std::ostream* out) {
-  *out << ListRobots()[static_cast<size_t>(tried.robot)].name << " " << tried.fault;
+  *out << ListRobotPairs()[static_cast<size_t>(tried.robot)].name << " " << tried.fault;
 }
 
 class BodyFaults : public ::testing::TestWithParam<Case> {
  protected:
-  [[nodiscard]] const Pair& pair() const { return ListRobots()[static_cast<size_t>(GetParam().robot)]; }
+  [[nodiscard]] const RobotPair& pair() const {
+    return ListRobotPairs()[static_cast<size_t>(GetParam().robot)];
+  }
   [[nodiscard]] static std::string id() {
     const std::string& fault = GetParam().fault;
     return fault.empty() ? "inertia.frame_transposed" : FindConventionFault(fault).ids[0];
@@ -96,7 +106,7 @@ TEST_P(BodyFaults, OfAllLinksAreNamedInOneLine) {
   if (visible < 2) GTEST_SKIP() << "the robot's bodies do not show it";
   const std::vector<Hypothesis> found = ExplainDifference(wrong, pair().b);
   ASSERT_FALSE(found.empty());
-  EXPECT_TRUE(std::any_of(found.begin(), found.end(), [](const Hypothesis& one) { return Names(one, id()); }))
+  EXPECT_TRUE(std::ranges::any_of(found, [](const Hypothesis& one) { return Names(one, id()); }))
       << List(found);
   double explained = 0.0;
   for (const Hypothesis& hypothesis : found) explained += hypothesis.explained;
@@ -133,24 +143,24 @@ std::vector<Case> ListCases() {
 INSTANTIATE_TEST_SUITE_P(Hypotheses, BodyFaults, ::testing::ValuesIn(ListCases()));
 
 TEST(Hypotheses, NothingIsSaidOfRobotsThatAgree) {
-  for (const Pair& pair : ListRobots()) EXPECT_EQ(List(ExplainDifference(pair.a, pair.b)), "") << pair.name;
+  for (const RobotPair& pair : ListRobotPairs()) EXPECT_EQ(Say(pair.a, pair.b), "") << pair.name;
+}
+
+void ChangeNumbers(MassProperties* body) {
+  body->mass *= 1.2345;
+  body->inertia *= 1.321;
+  body->com += Vector3d(0.0123, -0.0456, 0.0789);
 }
 
 // What no convention explains is left to the numbers.
 TEST(Hypotheses, NothingIsSaidOfOtherNumbers) {
-  for (const Pair& pair : ListRobots()) {
-    RobotDescription wrong = pair.a;
-    for (Joint& joint : wrong.spec.joints) {
-      joint.body.mass *= 1.2345;
-      joint.body.inertia *= 1.321;
-      joint.body.com += Vector3d(0.0123, -0.0456, 0.0789);
-    }
-    EXPECT_EQ(List(ExplainDifference(wrong, pair.b)), "") << pair.name;
+  for (const RobotPair& pair : ListRobotPairs()) {
+    EXPECT_EQ(SayOfJoints(pair.a, pair.b, [](Joint& joint) { ChangeNumbers(&joint.body); }), "") << pair.name;
   }
 }
 
 TEST(Hypotheses, ListsThatAreShiftedAndBodiesThatAreExchanged) {
-  for (const Pair& pair : ListRobots()) {
+  for (const RobotPair& pair : ListRobotPairs()) {
     // In own frames, as tables have them.
     const auto own = [&](const RobotDescription& robot, size_t i) {
       return ExpressIn(robot.spec.joints[i].body, robot.joints[i].X_iL.inverse());
@@ -161,42 +171,38 @@ TEST(Hypotheses, ListsThatAreShiftedAndBodiesThatAreExchanged) {
       shifted.spec.joints[i].body = ExpressIn(own(pair.a, i + 1), pair.a.joints[i].X_iL);
     }
     if (pair.name != "humanoid") {  // whose list is a tree
-      EXPECT_THAT(List(ExplainDifference(shifted, pair.b)),
-                  HasSubstr("the list of bodies looks shifted by one"))
-          << pair.name;
+      EXPECT_THAT(Say(shifted, pair.b), HasSubstr("the list of bodies looks shifted by one")) << pair.name;
     }
-    RobotDescription exchanged = pair.a;
-    exchanged.spec.joints[1].body = ExpressIn(own(pair.a, 2), pair.a.joints[1].X_iL);
-    exchanged.spec.joints[2].body = ExpressIn(own(pair.a, 1), pair.a.joints[2].X_iL);
+    const auto give = [&](const MassProperties& first, const MassProperties& second) {
+      RobotDescription robot = pair.a;
+      robot.spec.joints[1].body = ExpressIn(first, pair.a.joints[1].X_iL);
+      robot.spec.joints[2].body = ExpressIn(second, pair.a.joints[2].X_iL);
+      return Say(robot, pair.b);
+    };
     const std::string links = pair.a.spec.joints[1].link + " and " + pair.a.spec.joints[2].link;
-    EXPECT_EQ(List(ExplainDifference(exchanged, pair.b)),
-              "links " + links + ": their bodies look exchanged\n");
-    RobotDescription inertias = pair.a;
     MassProperties first = own(pair.a, 1);
     MassProperties second = own(pair.a, 2);
+    EXPECT_EQ(give(second, first), "links " + links + ": their bodies look exchanged\n");
     std::swap(first.inertia, second.inertia);
-    inertias.spec.joints[1].body = ExpressIn(first, pair.a.joints[1].X_iL);
-    inertias.spec.joints[2].body = ExpressIn(second, pair.a.joints[2].X_iL);
-    EXPECT_EQ(List(ExplainDifference(inertias, pair.b)),
-              "links " + links + ": their inertias look exchanged\n");
+    EXPECT_EQ(give(first, second), "links " + links + ": their inertias look exchanged\n");
   }
 }
 
 TEST(Hypotheses, ALostPartIsNamed) {
-  const std::vector<testing::LeggedLink> links = testing::ListQuadruped();
-  std::string text = testing::WriteLeggedUrdf("quadruped", links);
+  const std::vector<LeggedLink> links = ListQuadruped();
+  std::string text = WriteLeggedUrdf("quadruped", links);
   const RobotDescription right = ParseUrdf(text, "right.urdf");
-  const size_t begin = text.find("<inertial>", text.find("<link name=\"FR_foot\">"));
+  const size_t begin = text.find("<inertial>", text.find(R"(<link name="FR_foot">)"));
   const size_t end = text.find("</inertial>", begin) + std::string("</inertial>").size();
   text.erase(begin, end - begin);
-  EXPECT_EQ(List(ExplainDifference(ParseUrdf(text, "wrong.urdf"), right)),
+  EXPECT_EQ(Say(ParseUrdf(text, "wrong.urdf"), right),
             "link FR_calf: the mass of \"FR_foot\", which is welded to it, looks lost\n");
 }
 
 /// A quadruped whose feet, welded to the calves, have generic bodies.
 RobotDescription ReadWeldedRobot() {
-  std::vector<testing::LeggedLink> links = testing::ListQuadruped();
-  for (testing::LeggedLink& link : links) {
+  std::vector<LeggedLink> links = ListQuadruped();
+  for (LeggedLink& link : links) {
     if (link.has_joint) continue;
     link.com = "0.01 0.02 -0.015";
     link.com_rpy = "0.3 -0.2 0.5";
@@ -204,7 +210,7 @@ RobotDescription ReadWeldedRobot() {
     link.rpy = "0.2 0.4 -0.3";
     link.xyz = "0.01 -0.02 -0.213";
   }
-  return ParseUrdf(testing::WriteLeggedUrdf("quadruped", links), "robot.urdf");
+  return ParseUrdf(WriteLeggedUrdf("quadruped", links), "robot.urdf");
 }
 
 /// What a file says of its parts makes the bodies.
@@ -219,8 +225,7 @@ void CombineParts(RobotDescription* robot) {
 }
 
 DescribedPart& FindPart(const std::string& name, RobotDescription* robot) {
-  return *std::find_if(robot->parts.begin(), robot->parts.end(),
-                       [&](const DescribedPart& part) { return part.name == name; });
+  return *std::ranges::find(robot->parts, name, &DescribedPart::name);
 }
 
 TEST(Hypotheses, FaultsOfOneWeldedPartAreNamed) {
@@ -271,7 +276,7 @@ TEST(Hypotheses, FaultsOfOneWeldedPartAreNamed) {
       ASSERT_EQ(found.size(), 1U) << one.id << "\n" << List(found);
       EXPECT_TRUE(Names(found[0], one.id)) << one.id << "\n" << List(found);
       EXPECT_EQ(found[0].parts, std::vector<std::string>{"FR_calf"});
-      EXPECT_THAT(found[0].text, HasSubstr("its part \"FR_foot\""));
+      EXPECT_THAT(found[0].text, HasSubstr(R"(its part "FR_foot")"));
     }
   }
 }
@@ -285,7 +290,7 @@ TEST(Hypotheses, AFaultInAllPartsIsOneFault) {
   LetBaseFloat(&wrong);
   RobotDescription floating = right;
   LetBaseFloat(&floating);
-  EXPECT_EQ(List(ExplainDifference(wrong, floating)),
+  EXPECT_EQ(Say(wrong, floating),
             "all inertias look as if given about the link's origin instead of the centre of mass: 13 of 13 "
             "links\n");
 }
@@ -293,12 +298,9 @@ TEST(Hypotheses, AFaultInAllPartsIsOneFault) {
 TEST(Hypotheses, NothingIsSaidOfOtherNumbersOfAPart) {
   const RobotDescription right = ReadWeldedRobot();
   RobotDescription wrong = right;
-  DescribedPart& part = FindPart("FR_foot", &wrong);
-  part.body.mass *= 1.2345;
-  part.body.inertia *= 1.321;
-  part.body.com += Vector3d(0.0123, -0.0456, 0.0789);
+  ChangeNumbers(&FindPart("FR_foot", &wrong).body);
   CombineParts(&wrong);
-  EXPECT_EQ(List(ExplainDifference(wrong, right)), "");
+  EXPECT_EQ(Say(wrong, right), "");
 }
 
 /// What a person may have done to a joint.
@@ -324,7 +326,7 @@ class JointFaults : public ::testing::TestWithParam<JointFaultCase> {};
 
 TEST_P(JointFaults, AreNamed) {
   int named = 0;
-  for (const Pair& pair : ListRobots()) {
+  for (const RobotPair& pair : ListRobotPairs()) {
     for (const size_t i : {size_t{1}, size_t{3}}) {
       RobotDescription wrong = pair.a;
       GetParam().make(i, &wrong);
@@ -357,42 +359,36 @@ INSTANTIATE_TEST_SUITE_P(
     [](const auto& named) { return named.param.name; });
 
 TEST(Hypotheses, GravityAndUnitsOfJoints) {
-  RobotDescription table = ReadDescription(testing::SourcePath("/controller/parameters/panda.toml"));
-  const RobotDescription mjcf = ReadDescription(testing::SourcePath("/mjcf/panda.xml"));
-  EXPECT_EQ(List(ExplainDifference(table, mjcf)), "");
+  RobotDescription table = ReadDescription(SourcePath("/controller/parameters/panda.toml"));
+  const RobotDescription mjcf = ReadDescription(SourcePath("/mjcf/panda.xml"));
+  EXPECT_EQ(Say(table, mjcf), "");
   RobotDescription wrong = table;
   wrong.spec.gravity *= -1.0;
-  EXPECT_EQ(List(ExplainDifference(wrong, mjcf)), "gravity looks turned around (its sign)\n");
+  EXPECT_EQ(Say(wrong, mjcf), "gravity looks turned around (its sign)\n");
   wrong.spec.gravity = Vector3d(0.0, 0.0, -9.8);
-  EXPECT_EQ(List(ExplainDifference(wrong, mjcf)), "gravity has the right direction and another value\n");
+  EXPECT_EQ(Say(wrong, mjcf), "gravity has the right direction and another value\n");
   wrong.spec.gravity = Vector3d(0.0, -9.81, 0.0);
-  EXPECT_EQ(List(ExplainDifference(wrong, mjcf)), "gravity points along another axis\n");
-  wrong = table;
-  for (Joint& joint : wrong.spec.joints) {
+  EXPECT_EQ(Say(wrong, mjcf), "gravity points along another axis\n");
+  const auto in_degrees = [](Joint& joint) {
     joint.lower = RadToDeg(joint.lower);
     joint.upper = RadToDeg(joint.upper);
-  }
-  EXPECT_EQ(List(ExplainDifference(wrong, mjcf)), "all ranges look as if in degrees: 7 of 7 joints\n");
+  };
+  EXPECT_EQ(SayOfJoints(table, mjcf, in_degrees), "all ranges look as if in degrees: 7 of 7 joints\n");
 }
 
 // Tables of the Panda that were read by another convention.
 TEST(Hypotheses, TablesThatAreMisread) {
-  const RobotDescription right = ReadDescription(testing::SourcePath("/controller/parameters/panda.toml"));
-  const RobotDescription mjcf = ReadDescription(testing::SourcePath("/mjcf/panda.xml"));
-  RobotDescription degrees = right;
-  for (Joint& joint : degrees.spec.joints) joint.mdh.alpha = RadToDeg(joint.mdh.alpha);
-  EXPECT_EQ(List(ExplainDifference(degrees, mjcf)),
+  const RobotDescription right = ReadDescription(SourcePath("/controller/parameters/panda.toml"));
+  const RobotDescription mjcf = ReadDescription(SourcePath("/mjcf/panda.xml"));
+  EXPECT_EQ(SayOfJoints(right, mjcf, [](Joint& joint) { joint.mdh.alpha = RadToDeg(joint.mdh.alpha); }),
             "alpha and q of the rows look as if in degrees: 7 of 7 joints\n");
-  RobotDescription millimetres = right;
-  for (Joint& joint : millimetres.spec.joints) {
+  const auto in_millimetres = [](Joint& joint) {
     joint.mdh.a *= 1e3;
     joint.mdh.d *= 1e3;
-  }
-  EXPECT_EQ(List(ExplainDifference(millimetres, mjcf)),
+  };
+  EXPECT_EQ(SayOfJoints(right, mjcf, in_millimetres),
             "a and d of the rows look as if in mm: 7 of 7 joints\n");
-  RobotDescription signs = right;
-  for (Joint& joint : signs.spec.joints) joint.mdh.alpha *= -1.0;
-  EXPECT_EQ(List(ExplainDifference(signs, mjcf)),
+  EXPECT_EQ(SayOfJoints(right, mjcf, [](Joint& joint) { joint.mdh.alpha *= -1.0; }),
             "alpha of all rows looks turned around (its sign): 7 of 7 joints\n");
 
   // The same arm by classic rows (q, d, a, alpha of each joint, and bodies in their frames), read as
@@ -409,10 +405,9 @@ TEST(Hypotheses, TablesThatAreMisread) {
         Eigen::Translation3d(next.a, 0.0, 0.0) * Eigen::AngleAxisd(next.alpha, Vector3d::UnitX());
     joint.body = ExpressIn(right.spec.joints[i].body, X_iL.inverse());
   }
-  EXPECT_EQ(List(ExplainDifference(classic, mjcf)),
+  EXPECT_EQ(Say(classic, mjcf),
             "the rows look like classic (standard) Denavit-Hartenberg parameters, and are read as modified "
-            "ones: 7 of "
-            "7 joints\n");
+            "ones: 7 of 7 joints\n");
 }
 
 }  // namespace

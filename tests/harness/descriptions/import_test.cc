@@ -4,7 +4,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <string>
 
 #include "controller/common/errors.h"
@@ -58,8 +57,8 @@ void ExpectSameModel(const RobotModel& a, const RobotModel& b, std::mt19937* ran
   ASSERT_EQ(a.num_joints(), b.num_joints());
   ASSERT_EQ(a.frames().size(), b.frames().size());
   for (int i = 0; i < a.num_joints(); ++i) {
-    const Joint& x = a.joints()[static_cast<size_t>(i)];
-    const Joint& y = b.joints()[static_cast<size_t>(i)];
+    const Joint& x = a.joint(i);
+    const Joint& y = b.joint(i);
     EXPECT_EQ(x.name, y.name);
     EXPECT_EQ(x.link, y.link);
     EXPECT_EQ(x.parent, y.parent);
@@ -71,8 +70,8 @@ void ExpectSameModel(const RobotModel& a, const RobotModel& b, std::mt19937* ran
   ModelTerms terms_a(a);
   ModelTerms terms_b(b);
   for (int sample = 0; sample < 3; ++sample) {
-    const VectorXd q = testing::DrawPositions(a, random);
-    const VectorXd xi = testing::DrawVelocities(a.num_velocities(), random);
+    const VectorXd q = DrawPositions(a, random);
+    const VectorXd xi = DrawVelocities(a.num_velocities(), random);
     for (ModelTerms* terms : {&terms_a, &terms_b}) {
       terms->SetState(q, xi);
       terms->CalcDynamics();
@@ -91,11 +90,11 @@ void ExpectSameModel(const RobotModel& a, const RobotModel& b, std::mt19937* ran
 TEST(Import, OfAUrdfReadsBackToTheSameModel) {
   std::mt19937 random(1702);
   for (int index = 0; index < 20; ++index) {
-    testing::RandomRobotOptions options;
+    RandomRobotOptions options;
     options.base = BaseType::kFixed;
     options.joints = 1 + index % 13;
-    RobotSpec spec = testing::MakeRandomRobot(options, &random);
-    const RobotDescription robot = ParseUrdf(testing::WriteUrdf(&spec, &random), "robot.urdf");
+    RobotSpec spec = MakeRandomRobot(options, &random);
+    const RobotDescription robot = ParseUrdf(WriteUrdf(&spec, &random), "robot.urdf");
     const std::string text = WriteParameters(robot, "robot.urdf");
     SCOPED_TRACE(text);
     ExpectSameModel(RobotModel(robot.spec), ParseRobotModel(text, "robot.toml"), &random);
@@ -104,16 +103,15 @@ TEST(Import, OfAUrdfReadsBackToTheSameModel) {
 
 TEST(Import, OfTheShippedPandaReadsBackToTheSameModel) {
   std::mt19937 random(1703);
-  const MjModelPtr engine = LoadMjcf(testing::SourcePath("/mjcf/panda.xml"));
+  const MjModelPtr engine = LoadMjcf(SourcePath("/mjcf/panda.xml"));
   const RobotDescription robot = ReadMjcfDescription(*engine, "panda.xml");
   const std::string text = WriteParameters(robot, "panda.xml");
   const RobotModel imported = ParseRobotModel(text, "imported.toml");
   ExpectSameModel(RobotModel(robot.spec), imported, &random);
-  ExpectSameModel(ReadRobotModel(testing::SourcePath("/controller/parameters/panda.toml")), imported,
-                  &random);
+  ExpectSameModel(ReadRobotModel(SourcePath("/controller/parameters/panda.toml")), imported, &random);
   // What a person would have written.
-  EXPECT_THAT(text, HasSubstr("{ joint = \"panda_joint1\", link = \"panda_link1\", xyz = [0, 0, 0.333] },"));
-  EXPECT_THAT(text, HasSubstr("rpy = [\"-pi / 2\", 0, 0]"));
+  EXPECT_THAT(text, HasSubstr(R"({ joint = "panda_joint1", link = "panda_link1", xyz = [0, 0, 0.333] },)"));
+  EXPECT_THAT(text, HasSubstr(R"(rpy = ["-pi / 2", 0, 0])"));
   EXPECT_THAT(text, HasSubstr("mass = 3.228604\ncom = [0.027518, 0.039252, -0.066502]\n"));
 }
 
@@ -172,9 +170,9 @@ TEST(MjcfDescription, IsTheEnginesModel) {
 
 TEST(MjcfDescription, RefusesWhatDoesNotMove) {
   const MjModelPtr engine =
-      LoadMjcfText("<mujoco><worldbody><geom size=\"1\"/></worldbody></mujoco>", "text");
-  EXPECT_TRUE(testing::Throws<InputError>([&] { ReadMjcfDescription(*engine, "scene.xml"); },
-                                          {"scene.xml: must have a joint: nothing in it moves"}));
+      LoadMjcfText(R"(<mujoco><worldbody><geom size="1"/></worldbody></mujoco>)", "text");
+  EXPECT_TRUE(Throws<InputError>([&] { ReadMjcfDescription(*engine, "scene.xml"); },
+                                 {"scene.xml: must have a joint: nothing in it moves"}));
 }
 
 TEST(MjcfDescription, OneBodyThatFloatsIsARobot) {
@@ -182,7 +180,7 @@ TEST(MjcfDescription, OneBodyThatFloatsIsARobot) {
   const std::filesystem::path file = folder.path() / "ball.xml";
   WriteText(
       file,
-      "<mujoco><worldbody><body name=\"ball\"><freejoint/><geom size=\"0.1\"/></body></worldbody></mujoco>");
+      R"(<mujoco><worldbody><body name="ball"><freejoint/><geom size="0.1"/></body></worldbody></mujoco>)");
   const std::filesystem::path table = folder.path() / "ball.toml";
   WriteText(table, WriteParameters(ReadDescription(file), "ball.xml"));
   ConsistencyOptions options;
@@ -194,11 +192,10 @@ TEST(MjcfDescription, OneBodyThatFloatsIsARobot) {
 TEST(MjcfDescription, JointsAndBodiesWithoutNamesAreCounted) {
   const TempFolder folder;
   const std::filesystem::path file = folder.path() / "arm.xml";
-  WriteText(
-      file,
-      "<mujoco><worldbody><body><joint axis=\"0 1 0\"/><geom size=\"0.1\" pos=\"0.1 0 0\"/><body "
-      "pos=\"0.2 0 0\"><joint axis=\"0 1 0\"/><geom size=\"0.1\" pos=\"0.1 0 0\"/></body></body></worldbody>"
-      "</mujoco>");
+  WriteText(file,
+            R"(<mujoco><worldbody><body><joint axis="0 1 0"/><geom size="0.1" pos="0.1 0 0"/><body )"
+            R"(pos="0.2 0 0"><joint axis="0 1 0"/><geom size="0.1" pos="0.1 0 0"/></body></body></worldbody>)"
+            "</mujoco>");
   const RobotDescription robot = ReadDescription(file);
   EXPECT_EQ(robot.spec.joints[1].name, "#1");
   EXPECT_EQ(robot.spec.joints[1].link, "#2");
@@ -214,13 +211,13 @@ TEST(MjcfDescription, JointsAndBodiesWithoutNamesAreCounted) {
 // What is in a URDF costs no more than what is in a table: both become the same analytic model.
 TEST(ImportedRobot, IsOfTheTablesSize) {
   std::mt19937 random(50);
-  testing::RandomRobotOptions robot;
+  RandomRobotOptions robot;
   robot.base = BaseType::kFixed;
   robot.joints = 50;
-  RobotSpec spec = testing::MakeRandomRobot(robot, &random);
-  const std::string urdf = testing::WriteUrdf(&spec, &random);
+  RobotSpec spec = MakeRandomRobot(robot, &random);
+  const std::string urdf = WriteUrdf(&spec, &random);
   RobotDescription description = ParseUrdf(urdf, "robot.urdf");
-  CompleteFromEngine(*LoadMjcfText(testing::WriteMjcf(spec), "robot.xml"), "robot.xml", &description);
+  CompleteFromEngine(*LoadMjcfText(WriteMjcf(spec), "robot.xml"), "robot.xml", &description);
   const RobotModel of_table = ParseRobotModel(WriteParameters(description, "robot.urdf"), "robot.toml");
   const RobotModel of_urdf(description.spec);
   EXPECT_EQ(of_urdf.num_joints(), of_table.num_joints());

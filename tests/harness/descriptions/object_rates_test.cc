@@ -1,12 +1,11 @@
 // The checks' own P^-1 and its rate: the model's formulas and finite differences agree with them.
 
-#include "harness/descriptions/object_rates.h"
-
 #include <gtest/gtest.h>
 
 #include <random>
 
 #include "controller/object/euler_zyz.h"
+#include "harness/descriptions/engine_provider.h"
 #include "tests/common/matrix_near.h"
 
 namespace dexcheck::testing::object_rates_test {

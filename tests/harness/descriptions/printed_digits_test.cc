@@ -87,10 +87,10 @@ TEST(PrintedDigits, MoveEachNumberByItsHalfUnit) {
   EXPECT_THAT(ListChanges(urdf, [](const auto& r) { return r.parts[1].body.mass; }), Each(near(5e-4)));
   EXPECT_THAT(ListChanges(other, [](const auto& r) { return r.parts[1].body.mass; }), Each(near(5e-5)));
   // Both directions are drawn.
-  EXPECT_TRUE(std::any_of(urdf.draws.begin(), urdf.draws.end(),
-                          [](const auto& draw) { return draw.parts[1].body.mass > 1.234; }));
-  EXPECT_TRUE(std::any_of(urdf.draws.begin(), urdf.draws.end(),
-                          [](const auto& draw) { return draw.parts[1].body.mass < 1.234; }));
+  EXPECT_TRUE(
+      std::ranges::any_of(urdf.draws, [](const auto& draw) { return draw.parts[1].body.mass > 1.234; }));
+  EXPECT_TRUE(
+      std::ranges::any_of(urdf.draws, [](const auto& draw) { return draw.parts[1].body.mass < 1.234; }));
   EXPECT_EQ(urdf.digits.count, 6);  // mass, centre of mass, inertia
   EXPECT_EQ(urdf.digits.fewest, 1);
   EXPECT_EQ(other.digits.most, 5);
@@ -128,11 +128,7 @@ TEST(PrintedDigits, OfAnMjcfAreCarriedThroughTheCompiler) {
 TEST(PrintedDigits, OfAParameterFileAreThoseOfItsText) {
   const std::string file = SourcePath("/controller/parameters/panda.toml");
   const DescriptionFile table(file);
-  std::string text = table.text();
-  const size_t at = text.find("3.228604");
-  ASSERT_NE(at, std::string::npos);
-  text.replace(at, 8, "3.2286");
-  const auto [a, b] = Draw(text, table.text());
+  const auto [a, b] = Draw(ReplaceFirst(table.text(), "3.228604", "3.2286"), table.text());
   EXPECT_GT(a.digits.count, 7 * 10 - 7);
   EXPECT_EQ(b.digits.count, a.digits.count);
   EXPECT_THAT(ListChanges(a, [](const auto& r) { return r.spec.joints[2].X_PB.translation().norm(); }),

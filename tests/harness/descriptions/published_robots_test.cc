@@ -126,17 +126,17 @@ std::vector<PublishedRobot> ListPublishedRobots() {
     AddLeg("leg" + Number(i) + "_", fmt::format("{} {} 0", 0.1 - 0.1 * (i % 3), i < 3 ? 0.08 : -0.08),
            fmt::format("0 0 {}", i < 3 ? 1.4 : -1.4), &robots.back().links);
   }
-  robots.push_back({"Quadruped", true, testing::ListQuadruped()});
-  robots.push_back({"Humanoid", true, testing::ListHumanoid()});
+  robots.push_back({"Quadruped", true, ListQuadruped()});
+  robots.push_back({"Humanoid", true, ListHumanoid()});
   return robots;
 }
 
 class PublishedRobots : public ::testing::TestWithParam<PublishedRobot> {
  protected:
   void Write(const std::string& name, const std::vector<LeggedLink>& links) const {
-    WriteText(folder_.path() / (name + ".urdf"), testing::WriteLeggedUrdf(GetParam().name, links));
+    WriteText(folder_.path() / (name + ".urdf"), WriteLeggedUrdf(GetParam().name, links));
     WriteText(folder_.path() / (name + ".xml"),
-              testing::WriteLeggedMjcf(GetParam().name, links, GetParam().floats ? "<freejoint/>" : ""));
+              WriteLeggedMjcf(GetParam().name, links, GetParam().floats ? "<freejoint/>" : ""));
   }
   [[nodiscard]] Comparison Compare(const std::string& a, const std::string& b, long samples) const {
     ConsistencyOptions options;

@@ -371,7 +371,7 @@ TEST(CheckTable, SaysWhatEachFailureMeansWithoutTies) {
     EXPECT_TRUE(!meaning.is_own || meaning.cause != Cause::kNone) << info.name;
     EXPECT_TRUE(meaning.sharper.empty() || (meaning.is_own && FindCheck(meaning.sharper) != nullptr))
         << info.name;
-    EXPECT_NE(info.make == nullptr, info.evaluate == nullptr) << info.name;
+    EXPECT_NE(info.by.make == nullptr, info.by.evaluate == nullptr) << info.name;
   }
   for (const Step& step : kSteps) EXPECT_NE(FindCheck(step.name), nullptr) << step.name;
   std::sort(names.begin(), names.end());

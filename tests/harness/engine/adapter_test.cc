@@ -60,14 +60,14 @@ std::vector<Case> MakeCases() {
   const Pose displaced = MakePose({0.2, -0.1, 0.3}, 0.8, {1.0, -2.0, 0.5});
   const Pose turned = MakePose({0.2, -0.1, 0.3}, 0.8, Vector3d::UnitZ());
   const auto reverse_hinge = [](const std::string& text) {
-    return ReplaceOnce(text, "<joint axis=\"0 0 1\"/>", "<joint axis=\"0 0 -1\" ref=\"0.2\"/>");
+    return ReplaceOnce(text, R"(<joint axis="0 0 1"/>)", R"(<joint axis="0 0 -1" ref="0.2"/>)");
   };
   const auto reverse_slide = [](const std::string& text) {
-    return ReplaceOnce(text, "type=\"slide\" axis=\"0 1 0\"", "type=\"slide\" axis=\"0 -1 0\" ref=\"0.4\"");
+    return ReplaceOnce(text, R"(type="slide" axis="0 1 0")", R"(type="slide" axis="0 -1 0" ref="0.4")");
   };
   const auto reverse_wheel = [](const std::string& text) {
-    return ReplaceOnce(text, "<joint name=\"wheel_left\" axis=\"0 1 0\"",
-                       "<joint name=\"wheel_left\" axis=\"0 -1 0\"");
+    return ReplaceOnce(text, R"(<joint name="wheel_left" axis="0 1 0")",
+                       R"(<joint name="wheel_left" axis="0 -1 0")");
   };
   constexpr DriveVelocity kTwist = DriveVelocity::kTwist;
   constexpr DriveVelocity kWheelRates = DriveVelocity::kWheelRates;
@@ -92,13 +92,13 @@ std::vector<Case> MakeCases() {
 class AdapterTest : public ::testing::TestWithParam<Case> {
  protected:
   AdapterTest() {
-    testing::RandomRobotOptions options;
+    RandomRobotOptions options;
     options.base = GetParam().base;
     options.velocity = GetParam().velocity;
     options.joints = 8;
-    const RobotSpec spec = testing::MakeRandomRobot(options, &random_);
+    const RobotSpec spec = MakeRandomRobot(options, &random_);
     subject_ = std::make_unique<Subject>(
-        spec, GetParam().edit(testing::WriteMjcf(spec, GetParam().free_joint, GetParam().X_0b)));
+        spec, GetParam().edit(WriteMjcf(spec, GetParam().free_joint, GetParam().X_0b)));
   }
 
   [[nodiscard]] const RobotModel& model() const { return subject_->model; }
@@ -197,7 +197,7 @@ TEST_P(AdapterTest, PlacesEveryLinkWhereTheModelHasIt) {
   for (int trial = 0; trial < kTrials; ++trial) {
     const VectorXd q = DrawPositions();
     const VectorXd qpos = CalcQpos(q);
-    EXPECT_LT(ComparePoses(q, qpos), kRounding * testing::TolScale());
+    EXPECT_LT(ComparePoses(q, qpos), kRounding * TolScale());
 
     // Positions of two joints swapped; and for a free joint the transposed rotation.
     VectorXd swapped = q;
@@ -302,7 +302,7 @@ TEST_P(AdapterTest, TheProjectionIsTheProductWithTheDenseMap) {
     VelocityMap map(adapter(), coordinates);
     map.SetState(DrawPositions(), DrawVelocities(map.size()));
     const MatrixXd T = CalcDenseMap(map);
-    ASSERT_EQ(testing::CalcRank(T), map.size());
+    ASSERT_EQ(CalcRank(T), map.size());
 
     const VectorXd force = DrawVelocities(static_cast<int>(m()->nv));
     VectorXd projected_force(map.size());
@@ -321,7 +321,7 @@ TEST_P(WheeledAdapterTest, WheelsRollWithoutSlip) {
     map.SetState(q, xi);
     VectorXd qvel = VectorXd::Zero(m()->nv);
     map.Expand(xi, qvel.data());
-    EXPECT_LT(CalcWheelSlip(q, qvel), kRounding * testing::TolScale());
+    EXPECT_LT(CalcWheelSlip(q, qvel), kRounding * TolScale());
 
     VectorXd wrong = qvel;
     for (const EngineWheel& wheel : adapter().wheels()) wrong[wheel.dof] *= -1.0;
@@ -363,8 +363,8 @@ INSTANTIATE_TEST_SUITE_P(Bases, WheeledAdapterTest, ::testing::ValuesIn(Select(H
 INSTANTIATE_TEST_SUITE_P(Bases, WheelRatesAdapterTest, ::testing::ValuesIn(Select(HasWheelRates)), PrintName);
 
 TEST(ShippedAdapter, LeavesTheObjectAlone) {
-  const RobotModel model = ReadRobotModel(testing::SourcePath("/controller/parameters/assistant_robot.toml"));
-  const MjModelPtr engine = LoadMjcf(testing::SourcePath("/mjcf/scene.xml"));
+  const RobotModel model = ReadRobotModel(SourcePath("/controller/parameters/assistant_robot.toml"));
+  const MjModelPtr engine = LoadMjcf(SourcePath("/mjcf/scene.xml"));
   const Adapter adapter(model, *engine, "scene.xml");
   ASSERT_EQ(engine->nv, 6 + 2 + 48 + 6);
   constexpr double kMark = 77.0;

@@ -127,8 +127,8 @@ TEST(SolidDistance, IsBetweenABoundOfEitherSide) {
 class ClearanceTest : public ::testing::Test {
  protected:
   ClearanceTest()
-      : model_(ReadRobotModel(testing::SourcePath("/controller/parameters/assistant_robot.toml"))),
-        engine_(LoadMjcf(testing::SourcePath("/mjcf/bench_scene.xml"))),
+      : model_(ReadRobotModel(SourcePath("/controller/parameters/assistant_robot.toml"))),
+        engine_(LoadMjcf(SourcePath("/mjcf/bench_scene.xml"))),
         adapter_(model_, *engine_, "bench_scene.xml"),
         solids_(ListSolids(*engine_)) {}
 
@@ -137,7 +137,7 @@ class ClearanceTest : public ::testing::Test {
   }
   [[nodiscard]] bool Watches(const std::vector<WatchedPair>& pairs, const std::string& a,
                              const std::string& b) const {
-    return std::any_of(pairs.begin(), pairs.end(), [&](const WatchedPair& pair) {
+    return std::ranges::any_of(pairs, [&](const WatchedPair& pair) {
       const std::string& first = solids_.list[static_cast<size_t>(pair.a)].name;
       const std::string& second = solids_.list[static_cast<size_t>(pair.b)].name;
       return (first == a && second == b) || (first == b && second == a);
@@ -173,7 +173,7 @@ TEST_F(ClearanceTest, WatchesWhatIsNotMeantToTouch) {
   }
   // A declared contact is of its geoms alone: another part of the fingertip's body is watched.
   for (const WatchedPair& pair : pairs) {
-    EXPECT_EQ(std::count(solids_.declared.begin(), solids_.declared.end(), std::pair(pair.a, pair.b)), 0);
+    EXPECT_EQ(std::ranges::count(solids_.declared, std::pair(pair.a, pair.b)), 0);
   }
   EXPECT_FALSE(Watches(List({{"bench", "r_palm"}}), "r_palm", "bench"));
   EXPECT_THROW((void)List({{"bench", "r_plam"}}), InputError);

@@ -75,8 +75,8 @@ TEST(CylinderCollision, HasAResultOnTheAxisAndAtTheRim) {
 
 TEST(CylinderCollision, IsTheEnginesToRounding) {
   const MjModelPtr model = LoadMjcfText(
-      "<mujoco><worldbody><body><freejoint/><geom type=\"cylinder\" size=\"0.05 0.03\"/></body>"
-      "<body pos=\"0.0551 0.006 0.01\"><freejoint/><geom type=\"sphere\" size=\"0.01\"/></body></worldbody>"
+      R"(<mujoco><worldbody><body><freejoint/><geom type="cylinder" size="0.05 0.03"/></body>)"
+      R"(<body pos="0.0551 0.006 0.01"><freejoint/><geom type="sphere" size="0.01"/></body></worldbody>)"
       "</mujoco>",
       "ball at a cylinder");
   const MjDataPtr data = MakeData(*model);

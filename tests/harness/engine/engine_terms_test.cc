@@ -51,10 +51,9 @@ constexpr double kRounding = 2e-12;
 TEST_P(RandomRobot, AgreesWithEngine) {
   std::mt19937 random(20161);
   for (int trial = 0; trial < 20; ++trial) {
-    const RobotSpec spec = testing::MakeRandomRobot(GetParam().options, &random);
+    const RobotSpec spec = MakeRandomRobot(GetParam().options, &random);
     const RobotModel model(spec);
-    const MjModelPtr engine =
-        LoadMjcfText(testing::WriteMjcf(spec, GetParam().options.planar_by_free_joint), "text");
+    const MjModelPtr engine = LoadMjcfText(WriteMjcf(spec, GetParam().options.planar_by_free_joint), "text");
     const Adapter adapter(model, *engine, "text");
     for (const Coordinates coordinates : {Coordinates::kReduced, Coordinates::kUnreduced}) {
       // In q_dot' of a differential drive the wheels' spin is no holonomic function: only the reduced terms
@@ -192,8 +191,8 @@ class SparseTerms : public ::testing::TestWithParam<DriveVelocity> {};
 constexpr double kSmall = 1e-12;
 
 TEST_P(SparseTerms, AreThoseOfDenseProjections) {
-  const RobotModel model = testing::ReadPaperRobot(GetParam());
-  const MjModelPtr engine = LoadMjcf(testing::SourcePath("/mjcf/scene.xml"));
+  const RobotModel model = ReadPaperRobot(GetParam());
+  const MjModelPtr engine = LoadMjcf(SourcePath("/mjcf/scene.xml"));
   const Adapter adapter(model, *engine, "scene.xml");
   EngineTerms all(adapter, Coordinates::kReduced);
   EngineTerms grasp(adapter, model.fingertips());
@@ -239,15 +238,15 @@ INSTANTIATE_TEST_SUITE_P(Drive, SparseTerms,
                          ::testing::Values(DriveVelocity::kTwist, DriveVelocity::kWheelRates));
 
 TEST(EngineTerms, NeedsAnObjectAndSpheresThatTouch) {
-  const RobotModel model = testing::ReadPaperRobot();
+  const RobotModel model = ReadPaperRobot();
   RobotSpec spec = model.spec();
   spec.object.reset();
   const RobotModel alone(spec);
-  const MjModelPtr robot = LoadMjcf(testing::SourcePath("/mjcf/robot.xml"));
+  const MjModelPtr robot = LoadMjcf(SourcePath("/mjcf/robot.xml"));
   const Adapter without_object(alone, *robot, "robot.xml");
   EXPECT_THROW(EngineTerms(without_object, std::span<const int>(model.fingertips())), InputError);
 
-  const MjModelPtr scene = LoadMjcf(testing::SourcePath("/mjcf/scene.xml"));
+  const MjModelPtr scene = LoadMjcf(SourcePath("/mjcf/scene.xml"));
   const Adapter adapter(model, *scene, "scene.xml");
   const std::vector<int> palm = {model.FindFrame("r_palm_frame")};
   EXPECT_THROW(EngineTerms(adapter, std::span<const int>(palm)), InputError);

@@ -29,8 +29,8 @@ constexpr double kRounding = 2e-14;
 class RandomGrasp : public ::testing::Test {
  protected:
   RandomGrasp()
-      : model_(ReadRobotModel(testing::SourcePath("/controller/parameters/assistant_robot.toml"))),
-        engine_(LoadMjcf(testing::SourcePath("/mjcf/scene.xml"))),
+      : model_(ReadRobotModel(SourcePath("/controller/parameters/assistant_robot.toml"))),
+        engine_(LoadMjcf(SourcePath("/mjcf/scene.xml"))),
         adapter_(model_, *engine_, "scene.xml"),
         map_(adapter_, Coordinates::kReduced),
         data_(MakeData(*engine_)),
@@ -52,7 +52,7 @@ class RandomGrasp : public ::testing::Test {
       VectorXd q(model_.num_positions());
       q.head<3>() << Draw(-1, 1), Draw(-1, 1), Draw(-kPi, kPi);
       for (int i = 0; i < model_.num_joints(); ++i) {
-        const Joint& joint = model_.joints()[static_cast<size_t>(i)];
+        const Joint& joint = model_.joint(i);
         q[3 + i] = i < 16 ? Draw(joint.lower, joint.upper) : Draw(0.0, 0.5);
       }
       terms_.SetState(q, VectorXd::Zero(terms_.size()));
@@ -89,7 +89,7 @@ class RandomGrasp : public ::testing::Test {
       normal_rows.row(i) = G_.col(3 * i + 2).transpose();
       approach[i] = J_B_.row(3 * i + 2) * xi_;
     }
-    V_o_ += testing::CalcPseudoinverse(normal_rows) * (approach - normal_rows * V_o_);
+    V_o_ += CalcPseudoinverse(normal_rows) * (approach - normal_rows * V_o_);
     CalcModelContacts();
     SetEngineState();
   }

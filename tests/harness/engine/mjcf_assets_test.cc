@@ -60,11 +60,11 @@ std::string MakeObj() {
 std::string WriteMjcf(const std::string& file, const std::string& geom, const std::string& in_body) {
   return "<mujoco>\n<asset><mesh name=\"shell\" file=\"" + file +
          "\"/></asset>\n<worldbody><body name=\"link\"><joint axis=\"0 1 0\"/>\n" + in_body +
-         "<geom name=\"cover\" type=\"mesh\" mesh=\"shell\" " + geom + "/></body></worldbody></mujoco>\n";
+         R"(<geom name="cover" type="mesh" mesh="shell" )" + geom + "/></body></worldbody></mujoco>\n";
 }
 
-constexpr const char* kInertial = "<inertial pos=\"0 0 0.1\" mass=\"1\" diaginertia=\"0.01 0.01 0.01\"/>";
-constexpr const char* kLooks = "contype=\"0\" conaffinity=\"0\"";
+constexpr const char* kInertial = R"(<inertial pos="0 0 0.1" mass="1" diaginertia="0.01 0.01 0.01"/>)";
+constexpr const char* kLooks = R"(contype="0" conaffinity="0")";
 
 struct Format {
   const char* file;
@@ -126,7 +126,7 @@ TEST(MjcfAssets, AMissingMeshIsLeftOut) {
 TEST(MjcfAssets, AMissingMeshThatHasMassIsNamed) {
   const TempFolder folder;
   WriteText(folder.path() / "robot.xml", WriteMjcf("no.stl", "", ""));
-  EXPECT_TRUE(testing::Throws<InputError>([&] { LoadMjcf(folder.path() / "robot.xml"); }, "no.stl"));
+  EXPECT_TRUE(Throws<InputError>([&] { LoadMjcf(folder.path() / "robot.xml"); }, "no.stl"));
 }
 
 }  // namespace

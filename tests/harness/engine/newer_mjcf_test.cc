@@ -86,19 +86,19 @@ TEST_P(LeftOut, ThePendulumStays) {
 INSTANTIATE_TEST_SUITE_P(
     NewerMjcf, LeftOut,
     ::testing::Values(
-        Words{.joint = "actuatorfrcrange=\"-5 5\""}, Words{.joint = "actuatorgravcomp=\"true\""},
-        Words{.joint = "stiffness=\"0 0 0\""}, Words{.option = "integrator=\"implicitfast\""},
-        Words{.option = "ls_iterations=\"20\" ccd_iterations=\"30\""},
-        Words{.flag = "eulerdamp=\"disable\" nativeccd=\"enable\""}, Words{.flag = "damper=\"enable\""},
-        Words{.compiler = "saveinertial=\"true\" alignfree=\"false\""},
+        Words{.joint = R"(actuatorfrcrange="-5 5")"}, Words{.joint = R"(actuatorgravcomp="true")"},
+        Words{.joint = R"(stiffness="0 0 0")"}, Words{.option = R"(integrator="implicitfast")"},
+        Words{.option = R"(ls_iterations="20" ccd_iterations="30")"},
+        Words{.flag = R"(eulerdamp="disable" nativeccd="enable")"}, Words{.flag = R"(damper="enable")"},
+        Words{.compiler = R"(saveinertial="true" alignfree="false")"},
         Words{.root = "<size memory=\"1M\"/>\n"},
         Words{.root = "<visual><global bvactive=\"false\"/></visual>\n"},
         Words{.root = "<default><camera resolution=\"64 48\"/></default>\n"},
-        Words{.geom = "surfacevel=\"1 0 0\""}, Words{.body = "gravcomp=\"0\""},
-        Words{.in_body = "<light intensity=\"2\"/>"}, Words{.in_body = "<body name=\"b\" sleep=\"never\"/>"},
-        Words{.actuator = "kv=\"3\" dampratio=\"1\" inheritrange=\"0\""},
-        Words{.actuator = "armature=\"0.0\""}, Words{.tendon = "armature=\"0\" actuatorfrcrange=\"-1 1\""},
-        Words{.sensor = "delay=\"0.1\" nsample=\"3\""}, Words{.root = "<sensor><e_kinetic/></sensor>\n"},
+        Words{.geom = R"(surfacevel="1 0 0")"}, Words{.body = R"(gravcomp="0")"},
+        Words{.in_body = R"(<light intensity="2"/>)"}, Words{.in_body = R"(<body name="b" sleep="never"/>)"},
+        Words{.actuator = R"(kv="3" dampratio="1" inheritrange="0")"}, Words{.actuator = R"(armature="0.0")"},
+        Words{.tendon = R"(armature="0" actuatorfrcrange="-1 1")"},
+        Words{.sensor = R"(delay="0.1" nsample="3")"}, Words{.root = "<sensor><e_kinetic/></sensor>\n"},
         Words{.root = "<sensor><contact geom1=\"a\"/><plugin/></sensor><extension><plugin/></extension>\n"}));
 
 /// What acts on the dynamics is refused in one line, with its place, since when it is, and what to do.
@@ -111,48 +111,49 @@ class NotLeftOut : public ::testing::TestWithParam<Refused> {};
 
 TEST_P(NotLeftOut, IsNamed) {
   NEEDS_2_2_2();
-  EXPECT_TRUE(testing::Throws<InputError>([] { Downgrade(WriteMjcf(GetParam().words), "newer.xml"); },
-                                          GetParam().message));
+  EXPECT_TRUE(
+      Throws<InputError>([] { Downgrade(WriteMjcf(GetParam().words), "newer.xml"); }, GetParam().message));
 }
 
 INSTANTIATE_TEST_SUITE_P(
     NewerMjcf, NotLeftOut,
-    ::testing::Values(
-        Refused{{.body = "gravcomp=\"1\""},
-                "newer.xml:5: <body gravcomp>: acts on the dynamics, since MuJoCo 2.3.1: it "
-                "holds a part of the weight"},
-        Refused{{.tendon = "armature=\"0.1\""}, "<fixed armature>: acts on the dynamics, since MuJoCo 3.3.1"},
-        Refused{{.actuator = "armature=\"0.1\""},
-                "<position armature>: acts on the dynamics, since MuJoCo 3.7.0"},
-        Refused{{.flag = "damper=\"disable\""}, "<flag damper>: acts on the dynamics, since MuJoCo 3.3.6"},
-        Refused{{.joint = "stiffness=\"0 1\""},
-                "<joint stiffness>: acts on the dynamics: 2.2.2 has the first"},
-        Refused{{.in_body = "<frame pos=\"0 0 1\"/>"},
-                "<frame>: acts on the dynamics, since MuJoCo 3.1.0: load the file"},
-        Refused{{.in_body = "<plugin/>"}, "<plugin>: acts on the dynamics, since MuJoCo 2.3.0"},
-        Refused{{.in_body = "<replicate count=\"2\"/>"}, "<replicate>: acts on the dynamics"},
-        Refused{{.joint = "springiness=\"1\""},
-                "<joint springiness>: is neither in 2.2.2 nor known to be newer"},
-        Refused{{.in_body = "<wing/>"}, "<wing>: is neither in 2.2.2 nor known to be newer"}));
+    ::testing::Values(Refused{{.body = R"(gravcomp="1")"},
+                              "newer.xml:5: <body gravcomp>: acts on the dynamics, since MuJoCo 2.3.1: it "
+                              "holds a part of the weight"},
+                      Refused{{.tendon = R"(armature="0.1")"},
+                              "<fixed armature>: acts on the dynamics, since MuJoCo 3.3.1"},
+                      Refused{{.actuator = R"(armature="0.1")"},
+                              "<position armature>: acts on the dynamics, since MuJoCo 3.7.0"},
+                      Refused{{.flag = R"(damper="disable")"},
+                              "<flag damper>: acts on the dynamics, since MuJoCo 3.3.6"},
+                      Refused{{.joint = R"(stiffness="0 1")"},
+                              "<joint stiffness>: acts on the dynamics: 2.2.2 has the first"},
+                      Refused{{.in_body = R"(<frame pos="0 0 1"/>)"},
+                              "<frame>: acts on the dynamics, since MuJoCo 3.1.0: load the file"},
+                      Refused{{.in_body = "<plugin/>"}, "<plugin>: acts on the dynamics, since MuJoCo 2.3.0"},
+                      Refused{{.in_body = R"(<replicate count="2"/>)"}, "<replicate>: acts on the dynamics"},
+                      Refused{{.joint = R"(springiness="1")"},
+                              "<joint springiness>: is neither in 2.2.2 nor known to be newer"},
+                      Refused{{.in_body = "<wing/>"}, "<wing>: is neither in 2.2.2 nor known to be newer"}));
 
 TEST(NewerMjcf, TheNewDefaultIsStated) {
   const Copy copy = Downgrade("<mujoco><worldbody/></mujoco>", "newer");
-  EXPECT_THAT(copy.text, HasSubstr("<compiler autolimits=\"true\"/>"));
+  EXPECT_THAT(copy.text, HasSubstr(R"(<compiler autolimits="true"/>)"));
   EXPECT_THAT(copy.changes, Contains(Field(&MjcfChange::word, "<compiler autolimits>")));
   EXPECT_TRUE(Downgrade(kPlain, "plain").changes.empty());
 }
 
 TEST(NewerMjcf, AssetsHaveTheirFolders) {
-  const Copy copy = Downgrade("<mujoco><compiler assetdir=\"a\" meshdir=\"m\"/></mujoco>", "newer");
-  EXPECT_THAT(copy.text, HasSubstr("meshdir=\"m\" texturedir=\"a\""));
+  const Copy copy = Downgrade(R"(<mujoco><compiler assetdir="a" meshdir="m"/></mujoco>)", "newer");
+  EXPECT_THAT(copy.text, HasSubstr(R"(meshdir="m" texturedir="a")"));
 }
 
 /// The shipped robots and scenes have nothing that the engine does not know.
 TEST(NewerMjcf, ShippedFilesNeedNoCopy) {
   NEEDS_2_2_2();
   for (const std::string name : {"panda.xml", "robot.xml", "scene.xml", "contacts.xml"}) {
-    const std::string path = testing::SourcePath("/mjcf/" + name);
-    for (const MjcfChange& change : Downgrade(testing::ReadText(path), path).changes) {
+    const std::string path = SourcePath("/mjcf/" + name);
+    for (const MjcfChange& change : Downgrade(ReadText(path), path).changes) {
       EXPECT_EQ(change.word, "<compiler autolimits>") << name;
     }
   }
@@ -160,18 +161,18 @@ TEST(NewerMjcf, ShippedFilesNeedNoCopy) {
 
 TEST(NewerMjcf, WhatIsNoMjcfIsNamed) {
   NEEDS_2_2_2();
-  EXPECT_TRUE(testing::Throws<InputError>([] { LoadMjcfText(WriteMjcf({.in_body = "<frame/>"}), "f"); },
-                                          "f:8: <frame>: acts on the dynamics, since MuJoCo 3.1.0"));
-  EXPECT_TRUE(testing::Throws<InputError>([] { Downgrade("<mujoco>", "f"); }, "f:1: is not XML"));
-  EXPECT_TRUE(testing::Throws<InputError>([] { Downgrade("<model/>", "f"); }, "f: must be an MJCF"));
+  EXPECT_TRUE(Throws<InputError>([] { LoadMjcfText(WriteMjcf({.in_body = "<frame/>"}), "f"); },
+                                 "f:8: <frame>: acts on the dynamics, since MuJoCo 3.1.0"));
+  EXPECT_TRUE(Throws<InputError>([] { Downgrade("<mujoco>", "f"); }, "f:1: is not XML"));
+  EXPECT_TRUE(Throws<InputError>([] { Downgrade("<model/>", "f"); }, "f: must be an MJCF"));
 }
 
 /// As later releases take it; 2.2.2 asks for "limited".
 TEST(NewerMjcf, ARangeLimits) {
-  for (const auto& [words, limited] : {std::pair("", 1), std::pair("limited=\"false\"", 0)}) {
+  for (const auto& [words, limited] : {std::pair("", 1), std::pair(R"(limited="false")", 0)}) {
     const MjModelPtr model =
-        LoadMjcfText("<mujoco><worldbody><body><joint range=\"-20 30\" " + std::string(words) +
-                         "/><geom size=\"1\"/></body></worldbody></mujoco>",
+        LoadMjcfText(R"(<mujoco><worldbody><body><joint range="-20 30" )" + std::string(words) +
+                         R"(/><geom size="1"/></body></worldbody></mujoco>)",
                      "robot");
     EXPECT_EQ(model->jnt_limited[0], limited) << words;
   }
@@ -179,10 +180,10 @@ TEST(NewerMjcf, ARangeLimits) {
 
 // What 2.2.2 alone says, as the release that reads it does.
 TEST(OlderMjcf, IsReadByLaterReleases) {
-  const std::string words = WriteMjcf(
-      {.compiler = "convexhull=\"true\" exactmeshinertia=\"false\"",
-       .option = "collision=\"predefined\" mpr_iterations=\"60\" mpr_tolerance=\"1e-7\" apirate=\"50\"",
-       .flag = "passive=\"disable\" sensornoise=\"enable\""});
+  const std::string words =
+      WriteMjcf({.compiler = R"(convexhull="true" exactmeshinertia="false")",
+                 .option = R"(collision="predefined" mpr_iterations="60" mpr_tolerance="1e-7" apirate="50")",
+                 .flag = R"(passive="disable" sensornoise="enable")"});
   const MjModelPtr model = LoadMjcfText(words, "older");
   EXPECT_EQ(GetColliderIterations(model->opt), 60);
   EXPECT_EQ(GetColliderTolerance(model->opt), 1e-7);
@@ -191,7 +192,7 @@ TEST(OlderMjcf, IsReadByLaterReleases) {
   EXPECT_NE(CalcTerms(kPlain).back(), 0.0);
   if (mjVERSION_HEADER == 222) return;
   const Copy copy = Downgrade(words, "older");
-  EXPECT_THAT(copy.text, AllOf(HasSubstr("spring=\"disable\""), HasSubstr("damper=\"disable\"")));
+  EXPECT_THAT(copy.text, AllOf(HasSubstr(R"(spring="disable")"), HasSubstr(R"(damper="disable")")));
   EXPECT_THAT(copy.changes, Contains(AllOf(Field(&MjcfChange::word, "<option mpr_iterations>"),
                                            Field(&MjcfChange::what, "written as ccd_iterations"))));
 }
@@ -202,11 +203,11 @@ TEST(OlderMjcf, SaysWhichGeomsTouch) {
        {std::pair("all", 2), std::pair("predefined", 1), std::pair("dynamic", 1)}) {
     const MjModelPtr model =
         LoadMjcfText("<mujoco><option collision=\"" + std::string(value) +
-                         "\"/><worldbody><geom name=\"floor\" type=\"plane\" size=\"1 1 1\"/>"
-                         "<body><freejoint/><geom size=\"0.1\"/></body>"
-                         "<body pos=\"1 0 0\"><freejoint/><geom name=\"ball\" contype=\"0\" "
-                         "conaffinity=\"0\" size=\"0.1\"/></body>"
-                         "</worldbody><contact><pair geom1=\"floor\" geom2=\"ball\"/></contact></mujoco>",
+                         R"("/><worldbody><geom name="floor" type="plane" size="1 1 1"/>)"
+                         R"(<body><freejoint/><geom size="0.1"/></body>)"
+                         R"(<body pos="1 0 0"><freejoint/><geom name="ball" contype="0" )"
+                         R"(conaffinity="0" size="0.1"/></body>)"
+                         R"(</worldbody><contact><pair geom1="floor" geom2="ball"/></contact></mujoco>)",
                      "older");
     const MjDataPtr data = MakeData(*model);
     mj_forward(model.get(), data.get());

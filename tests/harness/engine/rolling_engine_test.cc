@@ -26,8 +26,7 @@ class RollingBall {
   explicit RollingBall(double time_step)
       : torus_(kRing, kTube),
         ball_(kBall),
-        engine_(
-            LoadMjcfText(fmt::format(R"(<mujoco><size nuser_geom="2"/><compiler meshdir="{}/mjcf/assets"/>
+        engine_(LoadMjcfText(fmt::format(R"(<mujoco><size nuser_geom="2"/><compiler meshdir="{}/mjcf/assets"/>
               <option timestep="{}" gravity="0 0 0" cone="elliptic" impratio="100" solver="Newton" tolerance="1e-14"/>
               <default><geom solref="{} 1" solimp="0.99 0.99 0.001 0.5 2" friction="1 0.005 0.0001" condim="3"/></default>
               <asset><mesh name="torus" file="torus.msh"/></asset><worldbody>
@@ -35,8 +34,8 @@ class RollingBall {
                 <geom type="mesh" mesh="torus" mass="0" user="{} {}"/></body>
               <body name="ball"><freejoint/><geom type="sphere" size="{}" mass="0.05"/></body>
               </worldbody></mujoco>)",
-                                     testing::SourcePath(), time_step, 2.0 * time_step, kRing, kTube, kBall),
-                         "rolling ball")),
+                                         SourcePath(), time_step, 2.0 * time_step, kRing, kTube, kBall),
+                             "rolling ball")),
         data_(MakeData(*engine_)) {
     const SurfaceGeometry start = torus_.Evaluate(PathPoint(0.0));
     const Vector3d center = start.p + kBall * start.R.col(2);

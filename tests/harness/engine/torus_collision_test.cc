@@ -34,8 +34,8 @@ MjModelPtr LoadBallAndTorus(double ball_radius, bool exact, bool torus_fixed = f
           <geom name="torus" type="mesh" mesh="torus" mass="0" {}/></body>
         <body name="ball" pos="0 0 1"><freejoint/><geom name="ball" type="sphere" size="{}" mass="0.01"/></body>
         </worldbody></mujoco>)",
-                                  testing::SourcePath(), torus_fixed ? "" : "<freejoint/>",
-                                  exact ? "user=\"0.035 0.011\"" : "", ball_radius),
+                                  SourcePath(), torus_fixed ? "" : "<freejoint/>",
+                                  exact ? R"(user="0.035 0.011")" : "", ball_radius),
                       "ball and torus");
 }
 
@@ -113,14 +113,14 @@ double CapsuleRingDistance(int capsules, const Vector3d& center) {
   for (int k = 0; k < capsules; ++k) {
     const double a = 2.0 * kPi * k / capsules;
     const double b = 2.0 * kPi * (k + 1) / capsules;
-    geoms += fmt::format(
-        "<geom type=\"capsule\" size=\"{}\" fromto=\"{:.17g} {:.17g} 0 {:.17g} {:.17g} 0\"/>", kTube,
-        kRing * std::cos(a), kRing * std::sin(a), kRing * std::cos(b), kRing * std::sin(b));
+    geoms +=
+        fmt::format(R"(<geom type="capsule" size="{}" fromto="{:.17g} {:.17g} 0 {:.17g} {:.17g} 0"/>)", kTube,
+                    kRing * std::cos(a), kRing * std::sin(a), kRing * std::cos(b), kRing * std::sin(b));
   }
   const MjModelPtr model = LoadMjcfText(
       fmt::format(
-          "<mujoco><size nconmax=\"500\"/><worldbody><body>{}</body><body pos=\"{:.17g} {:.17g} {:.17g}\">"
-          "<freejoint/><geom type=\"sphere\" size=\"{}\"/></body></worldbody></mujoco>",
+          R"(<mujoco><size nconmax="500"/><worldbody><body>{}</body><body pos="{:.17g} {:.17g} {:.17g}">)"
+          R"(<freejoint/><geom type="sphere" size="{}"/></body></worldbody></mujoco>)",
           geoms, center.x(), center.y(), center.z(), kBall),
       "capsule ring");
   const MjDataPtr data = MakeData(*model);
@@ -169,7 +169,7 @@ TEST(TorusCollision, BallFallsThroughTheHole) {
 TEST(TorusCollision, ShippedMeshesShowTheSurface) {
   constexpr double kFloats = 1e-6;  // coordinates of some 0.3 m as floats, and the engine's own rotation
   for (const char* scene : {"scene.xml", "ring_scene.xml"}) {
-    const MjModelPtr model = LoadMjcf(testing::SourcePath("/mjcf/") + scene);
+    const MjModelPtr model = LoadMjcf(SourcePath("/mjcf/") + scene);
     const int geom = mj_name2id(model.get(), mjOBJ_GEOM, "torus_geom");
     double ring_radius = 0.0;
     double tube_radius = 0.0;
@@ -279,7 +279,7 @@ TEST(TorusInTheEngine, LiesStillOnABox) {
           <inertial pos="0 0 0" mass="0.2" diaginertia="0.000137625 0.000137625 0.00026315"/>
           <geom name="torus" type="mesh" mesh="torus" mass="0" user="0.035 0.011"/></body>
         </worldbody></mujoco>)",
-                               testing::SourcePath()),
+                               SourcePath()),
                    "torus on a box");
   const MjDataPtr data = MakeData(*model);
   for (int i = 0; i < 2000; ++i) mj_step(model.get(), data.get());

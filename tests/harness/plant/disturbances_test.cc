@@ -94,7 +94,7 @@ TEST_F(DisturbancesTest, MomentAndSizeAreDrawnOncePerRepetitionFromTheSeed) {
     sizes.push_back(size);
   }
   EXPECT_TRUE(differs);
-  std::sort(begins.begin(), begins.end());
+  std::ranges::sort(begins);
   EXPECT_GT(begins.back() - begins.front(), 0.7);
   EXPECT_NE(sizes[0], sizes[1]);
 }
@@ -150,7 +150,7 @@ TEST_F(DisturbancesTest, ForcesOnXiDoTheWrenchsWork) {
 TEST_F(DisturbancesTest, AnUnknownBodyIsRefused) {
   EXPECT_TRUE(Throws<InputError>([&] { return Make({.body = "r_forarm"}); },
                                  "s.toml: disturbance.0.body: is no link of the robot and not the object "
-                                 "(\"r_forearm\"?), got \"r_forarm\""));
+                                 R"(("r_forearm"?), got "r_forarm")"));
 }
 
 }  // namespace

@@ -5,7 +5,6 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <cmath>
 
 #include "harness/plant/sensing.h"
 #include "tests/common/allocation_counter.h"

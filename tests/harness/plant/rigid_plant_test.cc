@@ -6,10 +6,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <filesystem>
-#include <limits>
 
 #include "controller/control/trajectory_controller.h"
 #include "harness/plant/engine_plant.h"

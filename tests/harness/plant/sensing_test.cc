@@ -282,7 +282,7 @@ TEST(VelocityFilter, InnovationsOfItsOwnModelAreWhiteAndAsLargeAsItSays) {
 TEST_F(SensingTest, AGroupThatIsNoJointIsRefused) {
   const SensingOptions options{.joint_noise = {.groups = {{"r_elbov", 1.0}}, .key = "sensing.joint_noise"}};
   EXPECT_TRUE(Throws<InputError>([&] { return Make(options); },
-                                 "s.toml: sensing.joint_noise: fits no name of the robot (\"r_elbow\"?)"));
+                                 R"(s.toml: sensing.joint_noise: fits no name of the robot ("r_elbow"?))"));
 }
 
 }  // namespace

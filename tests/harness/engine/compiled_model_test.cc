@@ -1,4 +1,7 @@
-// A model without looks moves as the one that is drawn, bit for bit.
+// A model without looks moves as the one that is drawn, bit for bit; and what is drawn of a robot without
+// shapes.
+
+#include "harness/engine/compiled_model.h"
 
 #include <gtest/gtest.h>
 
@@ -6,12 +9,12 @@
 #include <cstring>
 #include <string>
 
-#include "harness/engine/compiled_model.h"
 #include "harness/engine/engine.h"
 #include "harness/engine/mujoco_release.h"
+#include "tests/common/files.h"
 #include "tests/common/paths.h"
 
-namespace dexcheck::testing::remove_looks_test {
+namespace dexcheck::testing::compiled_model_test {
 namespace {
 
 /// Whether two arrays have the same bits.
@@ -26,7 +29,7 @@ namespace {
 class SameMotion : public ::testing::TestWithParam<const char*> {};
 
 TEST_P(SameMotion, WithAndWithoutLooks) {
-  const MjModelPtr full = LoadMjcf(testing::SourcePath(GetParam()));
+  const MjModelPtr full = LoadMjcf(SourcePath(GetParam()));
   MjModelPtr bare(mj_copyModel(nullptr, full.get()));
   const int removed = RemoveLooks(&bare);
   EXPECT_GT(removed, 10);
@@ -138,5 +141,81 @@ TEST(RemovePictures, OfAModelWithoutMaterialsLeavesItsMotors) {
   EXPECT_EQ(model->actuator_trnid[0], 0);
 }
 
+constexpr const char* kArm = R"(<mujoco>
+  <worldbody>
+    <geom name="floor" type="plane" size="1 1 1"/>
+    <body name="upper" pos="0 0 0.5">
+      <inertial pos="0 0 0.1" mass="1" diaginertia="0.1 0.1 0.1"/>
+      <joint name="shoulder" axis="0 1 0"/>
+      <body name="fore" pos="0.3 0 0.2" euler="20 0 0">
+        <inertial pos="0 0 0.1" mass="1" diaginertia="0.1 0.1 0.1"/>
+        <joint name="elbow" axis="0 1 0"/>
+        <site name="tool" pos="0 0.05 0.4"/>
+      </body>
+    </body>
+    <body name="stone" pos="1 0 0"><freejoint/>
+      <inertial pos="0.02 0 0" mass="1" diaginertia="0.1 0.1 0.1"/>
+    </body>
+  </worldbody>
+</mujoco>)";
+
+/// The two ends of a capsule, world, m.
+std::pair<Vector3d, Vector3d> EndsOf(const mjModel& model, const mjData& data, int geom) {
+  const Vector3d middle(data.geom_xpos + 3 * geom);
+  const mjtNum* R = data.geom_xmat + 9 * geom;
+  const Vector3d half = model.geom_size[3 * geom + 1] * Vector3d(R[2], R[5], R[8]);
+  return {middle - half, middle + half};
+}
+
+TEST(Skeleton, JoinsBodiesOfARobotWithoutShapes) {
+  const MjModelPtr plain = LoadMjcfText(kArm, "arm");
+  const MjModelPtr model = MakeVisible(LoadMjcfText(kArm, "arm"));
+  ASSERT_EQ(model->nbody, plain->nbody);
+  ASSERT_EQ(model->nq, plain->nq);
+  // A ball at each joint, and of the stone; rods to the forearm, to the tool and to the forearm's mass.
+  ASSERT_EQ(model->ngeom, plain->ngeom + 6);
+  EXPECT_EQ(mj_name2id(model.get(), mjOBJ_GEOM, "floor"), 0);
+  const MjDataPtr data = MakeData(*model);
+  data->qpos[0] = 0.3;
+  data->qpos[1] = -0.7;
+  mj_kinematics(model.get(), data.get());
+  const auto body = [&](const char* name) { return mj_name2id(model.get(), mjOBJ_BODY, name); };
+  const auto place = [&](const char* name) { return Vector3d(data->xpos + 3 * body(name)); };
+  int to_forearm = 0;
+  int to_tool = 0;
+  for (int geom = static_cast<int>(plain->ngeom); geom < model->ngeom; ++geom) {
+    EXPECT_EQ(model->geom_contype[geom], 0);
+    EXPECT_GT(model->geom_rbound[geom], 0.0);
+    EXPECT_GE(geom, model->body_geomadr[model->geom_bodyid[geom]]);
+    EXPECT_LT(geom,
+              model->body_geomadr[model->geom_bodyid[geom]] + model->body_geomnum[model->geom_bodyid[geom]]);
+    if (model->geom_type[geom] != mjGEOM_CAPSULE) continue;
+    const auto [from, to] = EndsOf(*model, *data, geom);
+    to_forearm += (from - place("upper")).norm() < 1e-12 && (to - place("fore")).norm() < 1e-12 ? 1 : 0;
+    const Vector3d tool(data->site_xpos);
+    to_tool += (from - place("fore")).norm() < 1e-12 && (to - tool).norm() < 1e-12 ? 1 : 0;
+  }
+  EXPECT_EQ(to_forearm, 1);
+  EXPECT_EQ(to_tool, 1);
+  EXPECT_EQ(model->body_geomnum[body("stone")], 1);
+  mj_forward(model.get(), data.get());  // reads every array of geoms
+  mj_step(model.get(), data.get());
+}
+
+TEST(Skeleton, LeavesARobotWithShapesAlone) {
+  const MjModelPtr plain = LoadMjcf(SourcePath("/mjcf/scene.xml"));
+  const MjModelPtr model = MakeVisible(LoadMjcf(SourcePath("/mjcf/scene.xml")));
+  ASSERT_EQ(model->ngeom, plain->ngeom);
+  for (int geom = 0; geom < model->ngeom; ++geom) EXPECT_EQ(model->geom_group[geom], plain->geom_group[geom]);
+}
+
+TEST(Skeleton, ShowsShapesThatAreAllHidden) {
+  const std::string joint = R"(<joint name="elbow" axis="0 1 0"/>)";
+  const MjModelPtr model = MakeVisible(LoadMjcfText(
+      ReplaceOnce(kArm, joint, joint + R"(<geom name="collides" size="0.1" group="3"/>)"), "arm"));
+  ASSERT_EQ(model->ngeom, 2);
+  EXPECT_EQ(model->geom_group[mj_name2id(model.get(), mjOBJ_GEOM, "collides")], 0);
+}
+
 }  // namespace
-}  // namespace dexcheck::testing::remove_looks_test
+}  // namespace dexcheck::testing::compiled_model_test
