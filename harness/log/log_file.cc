@@ -88,7 +88,7 @@ hdf5::Driver RegisterMemoryDriver() {
     made.name = "dexcheck_memory";
     made.maxaddr = static_cast<haddr_t>(std::numeric_limits<std::int64_t>::max());
     made.fc_degree = H5F_CLOSE_STRONG;
-    made.fapl_size = sizeof(MemoryImage*);
+    made.fapl_size = sizeof(void*);  // a pointer to the image
     made.open = [](const char* /*name*/, unsigned /*flags*/, hid_t access,
                    haddr_t /*most*/) noexcept -> H5FD_t* {
       const void* const image = H5Pget_driver_info(access);
