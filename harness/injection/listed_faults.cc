@@ -1,9 +1,8 @@
-#include "harness/injection/drawn_faults.h"
-
 #include <algorithm>
 
 #include "harness/diagnosis/equation_faults.h"
 #include "harness/diagnosis/parameters.h"
+#include "harness/injection/drawn_faults.h"
 #include "harness/injection/faulty_law.h"
 
 namespace dexcheck {
