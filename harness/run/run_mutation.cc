@@ -213,8 +213,8 @@ void RunCampaign::RequireNoFaultToPass(const std::function<bool()>& should_stop)
     LoopParts parts = MakeLoopParts(*setup);
     GoToStart(parts);
     InjectFault(*setup, nothing, begin_, &parts);
-    VectorXd* const end = setup == setup_.get() ? &end_ : &offset_end_;
-    if (!RunLoop(*setup, std::move(parts), &none, end, should_stop)) return;
+    VectorXd* const way = setup == setup_.get() ? &way_ : &offset_way_;
+    if (!RunLoop(*setup, std::move(parts), &none, way, should_stop)) return;
     if (!none.killed) continue;
     throw InputError(
         scenario_.source + ": must pass before faults are made in it, got " +
@@ -222,7 +222,7 @@ void RunCampaign::RequireNoFaultToPass(const std::function<bool()>& should_stop)
   }
 }
 
-bool RunCampaign::RunLoop(const Setup& setup, LoopParts parts, RunMutant* mutant, VectorXd* end,
+bool RunCampaign::RunLoop(const Setup& setup, LoopParts parts, RunMutant* mutant, VectorXd* way,
                           const std::function<bool()>& should_stop) {
   Runner runner(setup, /*check=*/true, std::move(parts));
   const auto read = [](const PlantReading& reading, VectorXd* state) {
@@ -236,8 +236,8 @@ bool RunCampaign::RunLoop(const Setup& setup, LoopParts parts, RunMutant* mutant
       },
       should_stop);
   if (result.interrupted) return false;
-  read(runner.loop().record().reading, end);
-  if (way_ == 0.0 && begin.size() > 0) way_ = (*end - begin).lpNorm<Eigen::Infinity>();
+  read(runner.loop().record().reading, way);
+  if (begin.size() == way->size()) *way -= begin;
   if (tau_.size() == 0) tau_ = runner.loop().record().drive.tau;
   mutant->killed = result.verdict != Verdict::kPass;
   mutant->cause = result.attribution.cause;
@@ -251,7 +251,7 @@ bool RunCampaign::RunLoop(const Setup& setup, LoopParts parts, RunMutant* mutant
   return true;
 }
 
-bool RunCampaign::RunFault(const InjectedFault& fault, RunMutant* mutant, VectorXd* end,
+bool RunCampaign::RunFault(const InjectedFault& fault, RunMutant* mutant, VectorXd* way,
                            const std::function<bool()>& should_stop) {
   const bool needs_error = fault.needs_error && offset_setup_ != nullptr;
   const Setup* setup = needs_error ? offset_setup_.get() : setup_.get();
@@ -272,7 +272,7 @@ bool RunCampaign::RunFault(const InjectedFault& fault, RunMutant* mutant, Vector
   LoopParts parts = MakeLoopParts(*setup);
   if (!fault.from_start) GoToStart(parts);
   InjectFault(*setup, fault, begin, &parts);
-  return RunLoop(*setup, std::move(parts), mutant, end, should_stop);
+  return RunLoop(*setup, std::move(parts), mutant, way, should_stop);
 }
 
 bool RunCampaign::FindTruth(RunMutant* mutant, const std::function<bool()>& should_stop) {
@@ -281,8 +281,8 @@ bool RunCampaign::FindTruth(RunMutant* mutant, const std::function<bool()>& shou
   mutant->truth.clear();
   for (const InjectedFault& one : mutant->faults) {
     RunMutant alone{.faults = {}, .all = one, .truth = one.truth};
-    VectorXd end;
-    if (!RunFault(one, &alone, &end, should_stop)) return false;
+    VectorXd way;
+    if (!RunFault(one, &alone, &way, should_stop)) return false;
     if (!alone.killed) continue;
     mutant->truth.insert(mutant->truth.end(), one.truth.begin(), one.truth.end());
     const std::vector<CauseOutcome>& outcomes = alone.score.outcomes;
@@ -293,20 +293,21 @@ bool RunCampaign::FindTruth(RunMutant* mutant, const std::function<bool()>& shou
 
 bool RunCampaign::Run(size_t index, const std::function<bool()>& should_stop) {
   RunMutant& mutant = mutants_[index];
-  VectorXd end;
+  VectorXd way;
   try {
-    if (!FindTruth(&mutant, should_stop) || !RunFault(mutant.all, &mutant, &end, should_stop)) return false;
+    if (!FindTruth(&mutant, should_stop) || !RunFault(mutant.all, &mutant, &way, should_stop)) return false;
   } catch (const InputError& error) {
     mutant.refused = true;
     mutant.failure = error.what();
     return true;
   }
-  const VectorXd& right = mutant.all.needs_error && offset_end_.size() > 0 ? offset_end_ : end_;
+  const VectorXd& right = mutant.all.needs_error && offset_way_.size() > 0 ? offset_way_ : way_;
   // What is wrong in the plant alone is judged by the balances.
-  const double unseen = mutant.all.model ? 0.0 : CalcBound(*FindCheck("inverse_dynamics_robot"), scenario_);
-  const double same = std::max(kSameMotion, unseen * way_);
-  mutant.no_effect = !mutant.killed && end.size() == right.size() && right.size() > 0 &&
-                     (end - right).lpNorm<Eigen::Infinity>() < same;
+  const bool is_of_law = mutant.all.model || mutant.all.controller;
+  const double unseen = is_of_law ? 0.0 : CalcBound(*FindCheck("inverse_dynamics_robot"), scenario_);
+  const double same = std::max(kSameMotion, unseen * right.lpNorm<Eigen::Infinity>());
+  mutant.no_effect = !mutant.killed && way.size() == right.size() && right.size() > 0 &&
+                     (way - right).lpNorm<Eigen::Infinity>() < same;
   return true;
 }
 

@@ -25,9 +25,8 @@ struct RunMutant {
 
   bool refused = false;  ///< There is no such robot, or the scenario cannot be run with it.
   bool killed = false;   ///< The verdict is not "pass".
-  /// Not killed, and what moves is at the end where it is without the fault, to 1e-12, or of a plant's fault
-  /// to the part of its way that the balances' bound is: a push that bearings hold, a number that no motion
-  /// shows.
+  /// Not killed, and what moves goes the way that it goes without the fault: to 1e-12, or of a plant's fault
+  /// to the part of it that the balances' bound is. A push that bearings hold, a number that no motion shows.
   bool no_effect = false;
   Cause cause = Cause::kNone;
   std::string evidence = {};
@@ -68,10 +67,10 @@ class RunCampaign {
   /// @param offset by which X_d jumps at the beginning, m and rad.
   [[nodiscard]] Scenario MakeScenario(double from, double duration, double offset) const;
   [[nodiscard]] std::unique_ptr<Setup> MakeSetup(const Scenario& scenario, const RobotModel* model) const;
-  bool RunLoop(const Setup& setup, LoopParts parts, RunMutant* mutant, VectorXd* end,
+  bool RunLoop(const Setup& setup, LoopParts parts, RunMutant* mutant, VectorXd* way,
                const std::function<bool()>& should_stop);
-  /// @param end gets the engine's positions and rates at the end. @returns as Run.
-  bool RunFault(const InjectedFault& fault, RunMutant* mutant, VectorXd* end,
+  /// @param way gets how the engine's positions and rates change up to the end. @returns as Run.
+  bool RunFault(const InjectedFault& fault, RunMutant* mutant, VectorXd* way,
                 const std::function<bool()>& should_stop);
   /// Fills `truth` and `alone`. @returns as Run.
   bool FindTruth(RunMutant* mutant, const std::function<bool()>& should_stop);
@@ -85,8 +84,7 @@ class RunCampaign {
   std::optional<EngineState> start_;     // of a trajectory; joints begin at their beginning
   std::unique_ptr<Setup> setup_;         // of the right robot, from the start
   std::unique_ptr<Setup> offset_setup_;  // the same with an error that feedback has to answer
-  VectorXd end_, offset_end_;            // where they come to without a fault
-  double way_ = 0.0;                     // up to there, the largest of positions and rates
+  VectorXd way_, offset_way_;            // how far what moves comes without a fault
   VectorXd tau_;                         // that they end with, in the first of both
   std::vector<RunMutant> mutants_;
 };
