@@ -141,17 +141,6 @@ TEST(Judge, ARecordedTorqueThatWasCutOffIsNamed) {
   EXPECT_TRUE(NamesOnly(Judge(table), "saturation", "joint panda_joint2", most));
 }
 
-TEST(Judge, AMotorThatGivesLessThanRecordedIsNamed) {
-  RecordedTable strong = Record({});
-  const std::vector<double>& torque = strong.Get("tau.panda_joint1");
-  // About a vertical axis: it lags, and does not fall.
-  const double most = 0.7 * *std::max_element(torque.begin(), torque.end());
-  const RecordedFault weak = {.act = [=](double, const mjModel&, mjData* data) {
-    data->qfrc_applied[0] = std::clamp(data->qfrc_applied[0], -most, most);
-  }};
-  EXPECT_TRUE(NamesOnly(Judge(Record({weak})), "saturation", "joint panda_joint1", most));
-}
-
 TEST(Judge, BacklashIsNamed) {
   constexpr double kPlay = 0.06;
   RecordedTable table = Record({}, /*has_velocities=*/true);
