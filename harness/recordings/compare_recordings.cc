@@ -45,20 +45,15 @@ std::optional<VectorXd> CalcDifference(const Traces& first, const Traces& second
   return VectorXd(squares.cwiseQuotient(counts.cwiseMax(1.0)));
 }
 
-double CalcMisfit(const Traces& first, const Traces& second, Eigen::Index joints, double delay) {
-  const std::optional<VectorXd> squares = CalcDifference(first, second, delay);
-  return squares ? squares->head(joints).sum() : std::numeric_limits<double>::infinity();
-}
-
 /// The delay at which the positions are most alike: over a grid, then by halving.
 double FindDelay(const Traces& first, const Traces& second, Eigen::Index joints) {
   const double length = first.back().time - first.front().time;
   const double begin = second.front().time - first.front().time;
   double step = length / static_cast<double>(first.size());
-  double best = begin;
-  double least = CalcMisfit(first, second, joints, begin);
+  double best = begin, least = std::numeric_limits<double>::infinity();
   const auto try_delay = [&](double delay) {
-    const double misfit = CalcMisfit(first, second, joints, delay);
+    const std::optional<VectorXd> squares = CalcDifference(first, second, delay);
+    const double misfit = squares ? squares->head(joints).sum() : least;
     if (misfit < least) least = misfit, best = delay;
   };
   const int half = static_cast<int>(first.size() / 2);
@@ -72,13 +67,6 @@ double FindDelay(const Traces& first, const Traces& second, Eigen::Index joints)
   return best;
 }
 
-/// Times are none of a cause's.
-std::vector<Fault> ListNamed(const RecordingJudgement& judgement) {
-  std::vector<Fault> faults;
-  for (const Explanation& one : judgement.causes) faults.push_back(one.faults.front());
-  return faults;
-}
-
 bool Differ(const Fault& a, const Fault& b) {
   constexpr double kErrors = 3.0, kEqual = 0.01;
   const double apart = std::abs(a.value - b.value);
@@ -89,8 +77,10 @@ bool Differ(const Fault& a, const Fault& b) {
 std::vector<CauseDifference> CompareCauses(const RecordingJudgement& first,
                                            const RecordingJudgement& second) {
   std::vector<CauseDifference> differences;
-  std::vector<Fault> others = ListNamed(second);
-  for (const Fault& one : ListNamed(first)) {
+  std::vector<Fault> others;
+  for (const Explanation& other : second.causes) others.push_back(other.faults.front());
+  for (const Explanation& cause : first.causes) {
+    const Fault& one = cause.faults.front();
     const auto same =
         std::find_if(others.begin(), others.end(), [&](const Fault& other) { return one.IsLike(other); });
     if (same == others.end()) {

@@ -141,18 +141,6 @@ TEST(Judge, ARecordedTorqueThatWasCutOffIsNamed) {
   EXPECT_TRUE(NamesOnly(Judge(table), "saturation", "joint panda_joint2", most));
 }
 
-TEST(Judge, AMotorThatGivesLessThanRecordedIsNamed) {
-  RecordedTable strong = Record({});
-  const std::vector<double>& torque = strong.Get("tau.panda_joint2");
-  const auto [low, high] = std::minmax_element(torque.begin(), torque.end());
-  const double most = 0.85 * std::max(-*low, *high);
-  const RecordedFault weak = {.act = [=](double, const mjModel&, mjData* data) {
-    data->qfrc_applied[1] = std::clamp(data->qfrc_applied[1], -most, most);
-  }};
-  const RecordedTable table = Record({weak});
-  EXPECT_TRUE(NamesOnly(Judge(table), "saturation", "joint panda_joint2", most));
-}
-
 TEST(Judge, BacklashIsNamed) {
   constexpr double kPlay = 0.06;
   RecordedTable table = Record({}, /*has_velocities=*/true);
@@ -198,13 +186,6 @@ TEST(Judge, StribeckFrictionIsNamed) {
   // The tanh, by which it begins, takes a part of it: measured 0.79.
   EXPECT_NEAR(first.value, kFriction, 0.25 * kFriction) << Tell(judgement);
   EXPECT_LT(judgement.balances[1].left, 0.5 * judgement.balances[1].residual);
-}
-
-TEST(Judge, ASpringIsNamed) {
-  const RecordedFault spring = {.act = [](double, const mjModel&, mjData* data) {
-    data->qfrc_applied[1] -= 5.0 * (data->qpos[1] - 0.3);
-  }};
-  EXPECT_TRUE(NamesOnly(Judge(Record({spring})), "spring", "joint panda_joint2", 5.0));
 }
 
 /// What a base that is accelerated does to all bodies.
