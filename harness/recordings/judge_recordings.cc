@@ -238,7 +238,8 @@ class Judge {
     one.fault = fault.fault;
     one.place = fault.place;
     one.unit = fault.unit;
-    const bool is_number = a.size() == 1 || fault.kind == TorqueFault::kStribeckFriction;
+    const bool is_number =
+        a.size() == 1 || fault.kind == TorqueFault::kSpring || fault.kind == TorqueFault::kStribeckFriction;
     one.value = is_number ? fault.nominal + a[0] : a.norm();
     one.error = is_number ? error[0] : error.norm();
     const auto vector = [](const VectorXd& v) {
@@ -248,19 +249,25 @@ class Judge {
     };
     using enum TorqueFault::Kind;
     if (fault.kind == kPayload) {
-      one.value = a[0], one.error = error[0];
+      one.value = a[0];
+      one.error = error[0];
       one.detail = "at " + vector(a.segment<3>(1) / a[0]) + " m in its frame";
     } else if (fault.kind == kSaturation) {
-      one.value = LimitOf(fault, a), one.error = error[1] * one.value;
+      one.value = LimitOf(fault, a);
+      one.error = error[1] * one.value;
+    } else if (fault.kind == kSpring) {
+      one.detail = "at rest at " + FormatNumber(-a[1] / a[0], 3);
     } else if (fault.kind == kShaking) {
-      one.value = a.head<6>().norm(), one.error = error.head<6>().norm();
+      one.value = a.head<6>().norm();
+      one.error = error.head<6>().norm();
       const auto size = [&](Index i) { return a.segment<2>(2 * i).norm(); };
       one.detail = fmt::format("at {} Hz, along its axes {}",
                                FormatNumber(set_.refinements().shaking / (2.0 * kPi), 4),
                                vector(Vector3d(size(0), size(1), size(2))));
       if (a.size() > 6) one.detail += ", about them " + vector(Vector3d(size(3), size(4), size(5))) + " rad";
     } else if (fault.kind == kPush && fault.push.has_moment) {
-      one.value = a.head<3>().norm(), one.error = error.head<3>().norm();
+      one.value = a.head<3>().norm();
+      one.error = error.head<3>().norm();
       one.detail = vector(a.head<3>()) + " N and " + vector(a.tail<3>()) + " N m at its centre of mass";
     } else if (fault.kind == kPush && fault.push.link < 0 && fault.push.joint < 0) {
       const double turned = 2.0 * std::asin(std::min(1.0, 0.5 * a.norm() / model_.gravity().norm()));

@@ -60,8 +60,9 @@ void TorqueBalance::ListColumns(bool has_currents) {
     for (int k = 0; k < 2 * kCutOffs; ++k) columns.push_back({TorqueColumn::kCutOff, joint, k});
     for (int k = 0; k < 3; ++k) columns.push_back({TorqueColumn::kGravity, 0, k});
     if (has_currents) columns.push_back({TorqueColumn::kCurrent, joint});
-    for (const auto kind : {TorqueColumn::kRate, TorqueColumn::kOffset, TorqueColumn::kDry,
-                            TorqueColumn::kViscous, TorqueColumn::kAcceleration, TorqueColumn::kLoad})
+    for (const auto kind :
+         {TorqueColumn::kRate, TorqueColumn::kOffset, TorqueColumn::kDry, TorqueColumn::kViscous,
+          TorqueColumn::kAcceleration, TorqueColumn::kLoad, TorqueColumn::kAngle})
       columns.push_back({kind, joint});
     for (int k = 0; k < kFrictionShapes; ++k) columns.push_back({TorqueColumn::kFriction, joint, k});
     for (int k = 0; refinements_.shaking > 0.0 && k < shaking_.cols(); ++k)
@@ -120,6 +121,8 @@ double TorqueBalance::CalcEntry(int joint, const TorqueColumn& column, const Rec
       return sample.qdd[joint];
     case TorqueColumn::kFriction:
       return sample.friction(joint, column.component);
+    case TorqueColumn::kAngle:
+      return sample.q[joint];
     case TorqueColumn::kShaking:
       return shaking_(joint, column.component);
     case TorqueColumn::kLoad:

@@ -33,6 +33,7 @@ struct TorqueColumn {
     kAcceleration,
     kFriction,  ///< RecordedSample::friction, by component.
     kLoad,      ///< Direction times the size of the model's torque.
+    kAngle,     ///< Position.
     kShaking,   ///< By a base that shakes: m along each axis, then rad about it; the sine's and the cosine's.
   };
   Kind kind;

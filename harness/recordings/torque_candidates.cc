@@ -11,7 +11,7 @@ namespace {
 using BodyVector = TorqueRegressor::BodyVector;
 using Parts = std::vector<ColumnPart>;
 
-/// N m or N: what is larger is of two that leave the same.
+/// N m, N, N m/rad or N/m: what is larger is of two that leave the same.
 constexpr double kMostTorque = 1e4;
 
 /// How far from 1 a part may be that is there or not.
@@ -90,6 +90,10 @@ class FaultList {
                  {TorqueColumn::kFriction, joint, shape}, is_stribeck ? 0.0 : modelled.dry_friction, true)
           .parameters = 1;
     }
+    TorqueFault& spring = AddAtJoint(kSpring, joint, "spring", turns ? "N m/rad" : "N/m",
+                                     {TorqueColumn::kAngle, joint}, 0.0, true);
+    spring.columns.push_back({{{TorqueColumn::kOffset, joint}, joint}});
+    spring.scale = VectorXd::Constant(2, kMostTorque);
     AddAtJoint(kLoadFriction, joint, "friction that grows with the load", "", {TorqueColumn::kLoad, joint},
                0.0, true);
     AddAtJoint(kOffset, joint, "torque offset", torque, {TorqueColumn::kOffset, joint}, 0.0, false);

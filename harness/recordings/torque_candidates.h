@@ -40,6 +40,7 @@ struct TorqueFault {
     kStribeckFriction,
     kLoadFriction,
     kAllOffsets,
+    kSpring,
     kOffset,
     kArmature,
     kTorqueGain,
@@ -69,8 +70,8 @@ struct TorqueFault {
 
   /// Of any shape, in one joint or in all.
   [[nodiscard]] bool IsFriction() const { return kind <= kLoadFriction; }
-  /// Of bodies, gravity or positions: beside the drive's own numbers.
-  [[nodiscard]] bool IsOfLoad() const { return kind >= kZero && kind <= kGravity; }
+  /// Of bodies, gravity, positions or springs: what a torque depends on beside the drive's own numbers.
+  [[nodiscard]] bool IsOfLoad() const { return kind == kSpring || (kind >= kZero && kind <= kGravity); }
 };
 
 /// All that are tried of a model's recordings.

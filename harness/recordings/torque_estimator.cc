@@ -273,7 +273,7 @@ double TorqueEstimator::CalcRms(const TorqueRows& rows, const VectorXd& left) co
 
 bool TorqueEstimator::IsPart(const TorqueFault& fault, Part part) {
   using enum TorqueFault::Kind;
-  if (part == Part::kAll) return true;
+  if (part == Part::kAll) return fault.kind != kPush;
   const bool is_usual = fault.kind == kDryFriction || fault.kind == kViscousFriction || fault.kind == kOffset;
   if (part == Part::kUsual || is_usual) return is_usual && (part == Part::kUsual || fault.parameters == 0);
   return fault.kind == kArmature || (fault.kind >= kMass && fault.kind <= kInertia);
@@ -293,8 +293,11 @@ VectorXd TorqueEstimator::FitAmplitudes(Part part, Index* rank) const {
   const Index y = R_.cols() - 1, width = static_cast<Index>(columns.size());
   const Eigen::Map<const VectorXd> scale(plausible.data(), width);
   MatrixXd C = R_(Eigen::all, columns) * scale.asDiagonal();
-  Eigen::ColPivHouseholderQR<MatrixXd> qr;
-  if (rank != nullptr) *rank = qr.setThreshold(kIndependent).compute(C).rank();
+  if (rank != nullptr) {
+    Eigen::ColPivHouseholderQR<MatrixXd> qr;
+    qr.setThreshold(kIndependent);
+    *rank = qr.compute(C).rank();
+  }
   // What the motion hardly tells stays of plausible size.
   C.conservativeResize(C.rows() + width, Eigen::NoChange);
   C.bottomRows(width).setIdentity();

@@ -27,7 +27,7 @@ class TorqueEstimator {
   /// Amplitudes of all columns under these terms; those that are part of every explanation follow from them.
   [[nodiscard]] VectorXd CalcAmplitudes(const std::vector<CauseTerm>& terms) const;
   /// Bodies' numbers, dry and viscous friction, offsets and armatures; friction in all its shapes and
-  /// offsets, which no robot is without; all faults.
+  /// offsets, which no robot is without; all faults but pushes.
   enum class Part { kPlain, kUsual, kAll };
   /// Amplitudes of a least-squares fit of drives' gains and such faults. Plausible sizes are a prior.
   /// @param rank how many of them the motion tells; null where it is not asked for.

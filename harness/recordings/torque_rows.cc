@@ -130,13 +130,18 @@ std::vector<Index> ListUsed(const Eigen::SparseMatrix<double>& map) {
 
 }  // namespace
 
-VectorXd TorqueRows::CalcLeft(const VectorXd& a) const {
-  VectorXd signs(columns), left(parts.empty() ? 0 : parts.back().begin + parts.back().size);
-  signs << -a, 1.0;
+VectorXd TorqueRows::Multiply(const VectorXd& a) const {
+  VectorXd product(parts.empty() ? 0 : parts.back().begin + parts.back().size);
   for (const Part& part : parts)
-    left.segment(part.begin, part.size) =
-        part.balance->rows(part.place) * (part.map * signs) + part.pushes * signs;
-  return left;
+    product.segment(part.begin, part.size) =
+        part.balance->rows(part.place) * (part.map * a) + part.pushes * a;
+  return product;
+}
+
+VectorXd TorqueRows::CalcLeft(const VectorXd& a) const {
+  VectorXd signs(columns);
+  signs << -a, 1.0;
+  return Multiply(signs);
 }
 
 MatrixXd TorqueRows::CalcProducts() const {

@@ -28,6 +28,8 @@ struct TorqueRows {
   /// Columns that are part of every explanation, then the faults', y last.
   Eigen::Index columns = 0;
 
+  /// rows * a.
+  [[nodiscard]] VectorXd Multiply(const VectorXd& a) const;
   /// y - columns * a.
   [[nodiscard]] VectorXd CalcLeft(const VectorXd& a) const;
   /// rows^T rows.

@@ -7,7 +7,6 @@
 
 #include "controller/common/text.h"
 #include "harness/checks/check_table.h"
-#include "harness/injection/listed_faults.h"
 
 namespace dexcheck {
 namespace {

@@ -188,6 +188,13 @@ TEST(Judge, StribeckFrictionIsNamed) {
   EXPECT_LT(judgement.balances[1].left, 0.5 * judgement.balances[1].residual);
 }
 
+TEST(Judge, ASpringIsNamed) {
+  const RecordedFault spring = {.act = [](double, const mjModel&, mjData* data) {
+    data->qfrc_applied[1] -= 5.0 * (data->qpos[1] - 0.3);
+  }};
+  EXPECT_TRUE(NamesOnly(Judge(Record({spring})), "spring", "joint panda_joint2", 5.0));
+}
+
 /// What a base that is accelerated does to all bodies.
 RecordedFault Accelerate(const std::function<Vector3d(double t)>& acceleration) {
   return {.act = [=](double t, const mjModel& model, mjData* data) {
