@@ -21,8 +21,8 @@ namespace dexcheck {
 namespace {
 
 using AnyJson = nlohmann::json;
-
 constexpr double kNanoseconds = 1e-9;
+constexpr std::uint64_t kMost = std::uint64_t{1} << 32U;  // bytes at once
 constexpr const char* kJointState = "sensor_msgs/msg/JointState";
 
 /// Takes numbers and texts from the front of bytes.
@@ -85,8 +85,7 @@ class MessageRecording : public RecordingReader {
   bool Next(std::vector<double>* row) override {
     if (!next_) return false;
     row->assign(names_.size(), kMissing);
-    const double time = next_->time;
-    (*row)[0] = time;
+    const double time = (*row)[0] = next_->time;
     while (next_ && next_->time == time) {
       for (const auto& [name, value] : next_->fields) {
         const auto place = columns_.find(name);
@@ -123,16 +122,16 @@ class MessageRecording : public RecordingReader {
   }
 
   std::string source_;
-  long message_number_ = 0;
+  long message_number_ = 0;  // of those that were read, counted by ReadMessage
 
  private:
   void Advance() {
     if (ahead_.empty()) {
       next_ = ReadMessage();
-    } else {
-      next_ = std::move(ahead_.front());
-      ahead_.pop_front();
+      return;
     }
+    next_ = std::move(ahead_.front());
+    ahead_.pop_front();
     ++message_number_;
   }
 
@@ -189,15 +188,13 @@ class McapRecording : public MessageRecording {
 
   /// The file's next record becomes what is read.
   bool ReadRecord() {
-    constexpr std::uint64_t kMost = std::uint64_t{1} << 32U;
     char head[9];
     if (has_ended_ || !file_.read(head, sizeof head)) {
       if (channels_.empty() || (!topic_.empty() && !seen_.contains(topic_)))
         FailOnTopics(source_, topic_, seen_);
       return false;
     }
-    ByteReader size({head + 1, 8}, source_);
-    const auto length = size.Take<std::uint64_t>();
+    const auto length = ByteReader({head + 1, 8}, source_).Take<std::uint64_t>();
     if (length > kMost) Fail("has a record of " + std::to_string(length) + " bytes");
     record_.assign(head, sizeof head);
     record_.resize(sizeof head + length);
@@ -205,11 +202,8 @@ class McapRecording : public MessageRecording {
       Fail("ends within a record");
     constexpr char kDataEnd = 0x0F, kChunk = 0x06;
     has_ended_ = head[0] == kDataEnd;
-    if (head[0] == kChunk) {
-      OpenChunk();
-    } else {
-      chunk_ = ByteReader(record_, source_);
-    }
+    chunk_ = ByteReader(record_, source_);
+    if (head[0] == kChunk) OpenChunk();
     return true;
   }
 
@@ -220,7 +214,6 @@ class McapRecording : public MessageRecording {
     reader.Skip(4);
     const std::string compression(reader.TakeText());
     const std::string_view data = reader.TakeBytes(reader.Take<std::uint64_t>());
-    constexpr std::uint64_t kMost = std::uint64_t{1} << 32U;
     if (size > kMost) Fail("has a chunk of " + std::to_string(size) + " bytes");
     content_.resize(size);
     if (!compression.empty() && compression != "zstd" && compression != "lz4")
@@ -266,9 +259,8 @@ class McapRecording : public MessageRecording {
       reader.Skip(4);
       const double time = kNanoseconds * static_cast<double>(reader.Take<std::uint64_t>());
       reader.Skip(8);
-      std::string_view data = content.substr(22);
       ++message_number_;
-      TimedMessage message = parse(data, time, Where());
+      TimedMessage message = parse(content.substr(22), time, Where());
       // Of several topics each field says whose it is.
       if (topic_.empty())
         for (auto& field : message.fields) field.first = topic + "." + field.first;
@@ -370,8 +362,7 @@ TimedMessage ParseJointState(std::string_view cdr, const std::string& where) {
 TimedMessage ParseJsonMessage(std::string_view text, double time, const std::string& where) {
   const AnyJson json = AnyJson::parse(text, nullptr, /*allow_exceptions=*/false);
   if (!json.is_object()) throw InputError(where + ": must be an object in JSON");
-  TimedMessage message;
-  message.time = time;
+  TimedMessage message{.time = time};
   const bool is_joint_state = json.contains("name") && json["name"].is_array() && json.contains("position");
   if (!is_joint_state) return Flatten(json, "", &message), message;
   const AnyJson& joints = json["name"];
@@ -380,16 +371,17 @@ TimedMessage ParseJsonMessage(std::string_view text, double time, const std::str
     if (values.empty()) continue;
     RequireCount(values.size(), joints.size(), where, field);
     for (size_t i = 0; i < joints.size(); ++i) {
-      if (!values[i].is_number() || !joints[i].is_string())
+      if (!values.is_array() || !values[i].is_number() || !joints[i].is_string())
         throw InputError(where + ": " + field + ": must be numbers by joint");
       message.fields.emplace_back(std::string(field) + "." + joints[i].get<std::string>(),
                                   values[i].get<double>());
     }
   }
-  const AnyJson header = json.contains("header") ? json["header"] : AnyJson();
-  const AnyJson stamp = header.contains("stamp") ? header["stamp"] : AnyJson::object();
-  const double seconds =
-      stamp.value("sec", 0.0) + kNanoseconds * stamp.value("nanosec", stamp.value("nsec", 0.0));
+  const auto read = [&](const char* key) {
+    const AnyJson::json_pointer place(std::string("/header/stamp/") + key);
+    return json.contains(place) && json[place].is_number() ? json[place].get<double>() : 0.0;
+  };
+  const double seconds = read("sec") + kNanoseconds * (read("nanosec") + read("nsec"));
   if (seconds > 0.0) message.time = seconds;
   return message;
 }

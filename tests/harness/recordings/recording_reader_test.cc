@@ -204,6 +204,19 @@ NpyArray Array(size_t width, double (*value)(size_t row, size_t column)) {
   return array;
 }
 
+TEST(JointState, JsonOfOtherShapesIsRefusedOrLeftOut) {
+  for (const char* const text :
+       {R"([1])", R"({"name": ["a"], "position": 3})", R"({"name": ["a"], "position": {"x": 1}})",
+        R"({"name": [1], "position": [1]})", R"({"name": ["a"], "position": [1, 2]})"})
+    EXPECT_THROW(ParseJsonMessage(text, 0.0, "bag"), InputError) << text;
+  for (const char* const stamp : {R"(5)", R"({"stamp": 5})", R"({"stamp": {"sec": "5"}})", R"([1])"})
+    EXPECT_EQ(ParseJsonMessage(std::string(R"({"name": ["a"], "position": [1], "header": )") + stamp + "}",
+                               7.0, "bag")
+                  .time,
+              7.0)
+        << stamp;
+}
+
 TEST_F(Formats, NumPy) {
   int error = 0;
   zip_t* archive = zip_open(Path("a.npz").c_str(), ZIP_CREATE, &error);
