@@ -5,9 +5,9 @@
 # Exit code: 0 a ladder, 1 not, 2 nothing to look at.
 set -euo pipefail
 
-# Prints "FOLDER INCLUDED FILE" for each include of another folder of ROOT.
+# Prints "FOLDER INCLUDED FILE" for each include of another folder of ROOT; examples are users' code.
 list_includes() {
-  (cd "$1" && find controller harness renders -type f \( -name '*.h' -o -name '*.cc' \) -exec \
+  (cd "$1" && find controller harness renders -type f \( -name '*.h' -o -name '*.cc' \) -not -path 'harness/examples/*' -exec \
     grep -HoE '^#include "(controller|harness|renders)/[^"]+"' {} +) |
     sed -E 's|^((.*)/[^/:]+):#include "(.*)/[^/]+"$|\2 \3 \1|' | awk '$1 != $2' | sort -u
 }

@@ -67,8 +67,15 @@ void Print(const JudgeRequest& request, const RobotModel& model, const Recording
                  100.0 * judgement.explained, judgement.left),
              2));
     int number = 0;
-    for (const Explanation& one : judgement.causes)
-      fmt::print("{}\n", Wrap(fmt::format("  {:2}  {}", ++number, one.Tell()), 6));
+    std::string nearest;
+    for (const Explanation& one : judgement.causes) {
+      if (one.outcome != CauseOutcome::kNotExplained || one.faults.empty())
+        fmt::print("{}\n", Wrap(fmt::format("  {:2}  {}", ++number, one.Tell()), 6));
+      else
+        nearest += fmt::format("{}{} ({:.2g} %)", nearest.empty() ? "not explained; nearest: " : ", ",
+                               one.faults.front().Tell(), 100.0 * one.fraction);
+    }
+    if (!nearest.empty()) fmt::print("{}\n", Wrap(nearest, 2));
     const auto tell = [](const HeldPrediction& one) {
       return fmt::format("{} number{} {:.3g} times the noise", one.numbers,
                          one.numbers == 1 ? " leaves" : "s leave", one.held_left);
