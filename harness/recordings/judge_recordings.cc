@@ -344,7 +344,8 @@ RecordingJudgement JudgeRecordings(const RobotModel& model, std::vector<Recordin
     Recording begin = recordings->front().reopen();
     undo(&begin);
     const std::optional<PositionFault> fault = FindPositionFault(model, std::move(begin));
-    if (!fault) break;
+    const auto is_like = [&](const PositionFault& one) { return one.fault.IsLike(fault->fault); };
+    if (!fault || std::ranges::any_of(faults, is_like)) break;
     faults.push_back(*fault);
     if (!Reopen(recordings, undo)) break;
     judgement = Judge(model, recordings, options, count).Run();
