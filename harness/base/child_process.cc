@@ -81,8 +81,10 @@ std::string ProcessEnd::Describe(const std::string& without_signal) const {
 }
 
 std::string ProcessEnd::Describe() const {
+  constexpr int kNotFound = 127;  // of a shell
   return signal != 0 ? "was killed by signal " + std::to_string(signal)
-                     : "ended with exit code " + std::to_string(exit_code);
+                     : "ended with exit code " + std::to_string(exit_code) +
+                           (exit_code == kNotFound ? " (no such command)" : "");
 }
 
 ChildProcess::ChildProcess(const std::string& what, const std::function<bool(int channel)>& work) {

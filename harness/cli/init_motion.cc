@@ -53,10 +53,11 @@ std::vector<JointSpan> ChooseSpans(const RobotDescription& robot, const std::map
   return spans;
 }
 
+constexpr int kParts = 20;
+
 /// The largest that the motion there asks of each motor, as a fraction of its limit; back it is as large.
 /// @param parts of it that are looked at, out of kParts; none but where it begins for 0. @param poses by
 /// which it comes, by joint.
-constexpr int kParts = 20;
 VectorXd CalcMotorUse(const RobotModel& model, const std::map<std::string, double>& limits,
                       const std::vector<JointSpan>& spans, int parts, JointPoses* poses) {
   ModelTerms terms(model);

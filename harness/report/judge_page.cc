@@ -62,7 +62,8 @@ class JudgePage {
       const Joint& joint = model_.joint(part.joint);
       const bool turns = joint.type == JointType::kRevolute;
       const bool is_viscous = part.column.kind == TorqueColumn::kViscous;
-      const bool is_dry = part.column.kind == TorqueColumn::kDry;
+      const bool is_dry =
+          part.column.kind == TorqueColumn::kDry || part.column.kind == TorqueColumn::kFriction;
       const auto at = static_cast<Eigen::Index>(k);
       const double nominal = is_viscous ? joint.damping : is_dry ? joint.dry_friction : 0.0;
       parts.push_back({{"joint", joint.name},

@@ -12,10 +12,11 @@
   const Ratio = joint => joint.left / joint.noise;
   const Span = values => [...new Set([Math.min(...values), Math.max(...values)].map(Short))].join(' to ');
   const recordings = several ? 'the recordings' : 'the recording', causes = data.causes;
+  const explaining = causes.filter(cause => cause.outcome !== 'not explained').length;
   const [tone, word, sentence] = {
     explained: ['pass', 'EXPLAINED', `The model explains ${recordings}: what is left is noise.`],
     'not explained': ['fail', 'NOT EXPLAINED', `The model does not explain ${recordings}, and no cause that is known does.`],
-    differs: ['open', 'DIFFERS', `The model does not explain ${recordings}: ${Count(causes.length, 'cause')} explain${causes.length === 1 ? 's' : ''} ` +
+    differs: ['open', 'DIFFERS', `The model does not explain ${recordings}: ${Count(explaining, 'cause')}${explaining < causes.length ? ' and the nearest that are known' : ''} explain${causes.length === 1 ? 's' : ''} ` +
       `${Percent(data.explained)} of what it leaves, and ${Span(data.joints.map(Ratio))} times the noise is left.`],
   }[data.verdict];
   AddVerdict(tone, word, Make('p', sentence), ...(several ? [Make('p', data.recordings.join(', '))] : []));
