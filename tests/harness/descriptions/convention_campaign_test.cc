@@ -3,7 +3,7 @@
 // that which finds it. A sample is tried on robots from the tests, or on robots of yours with
 //   DEXCHECK_CAMPAIGN="a.urdf b.urdf" build/release/tests/descriptions_test
 //   --gtest_filter='ConventionCampaign.*'
-// and every fault of every robot with DEXCHECK_CAMPAIGN_SAMPLE=1, which takes hours.
+// and every fault of every robot with DEXCHECK_CAMPAIGN_SAMPLE=1.
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>

@@ -212,7 +212,9 @@ TEST(Judge, ABaseThatShakesIsNamed) {
   });
   const RecordingJudgement judgement = Judge(Record({shaking}));
   EXPECT_TRUE(NamesOnly(judgement, "shaking", "base", kAmplitude));
-  EXPECT_NE(judgement.causes[0].faults[0].detail.find("at 0.9"), std::string::npos) << Tell(judgement);
+  const std::string& detail = judgement.causes[0].faults[0].detail;  // "at 0.9 Hz, ..."
+  ASSERT_TRUE(detail.starts_with("at ")) << Tell(judgement);
+  EXPECT_NEAR(std::stod(detail.substr(3)), 0.9, 0.01) << Tell(judgement);
 }
 
 TEST(Judge, ABaseThatIsAcceleratedForAWhileIsNamed) {
