@@ -132,8 +132,7 @@ void CompareWithEngine(const DescriptionFile& first, const DescriptionFile& seco
   // An MJCF's notes are about what CompareExtras compares.
   if (format != RobotFormat::kMjcf) AppendTo(&comparison->notes, robot.notes);
   AppendTo(&comparison->not_compared, completion.not_compared);
-  for (const auto& notes : {completion.notes, DescribeCoordinates(robot)})
-    AppendTo(&comparison->notes, notes);
+  AppendTo(&comparison->notes, completion.notes);
   NoteOthers(adapter, comparison);
   AnalyticProvider model(adapter.model(), "model", options.make_view, options.object);
   EngineProvider of_engine(adapter, "engine");
@@ -154,7 +153,7 @@ void CompareTwoDescriptions(const DescriptionFile& first, const DescriptionFile&
     comparison->read_second = b;
   }
   const Completion completion = CompleteEachOther(&a, &b, options.ignore);
-  for (const auto& notes : {a.notes, b.notes, completion.notes, DescribeCoordinates(a)}) {
+  for (const auto& notes : {a.notes, b.notes, completion.notes}) {
     AppendTo(&comparison->notes, notes);
   }
   AppendTo(&comparison->not_compared, completion.not_compared);

@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <map>
+#include <string>
 
 #include "controller/common/text.h"
 #include "harness/base/check_record.h"
@@ -44,20 +46,35 @@ std::string DescribeDigits(const DigitVerdict& verdict) {
   return text;
 }
 
-/// One line for each; below what differs, where.
+/// Of two that agree to rounding all is listed.
+bool ListsAll(const Comparison& comparison) { return comparison.result.Agrees() && !comparison.digits; }
+
+/// A line for each; else one for what differs, with its place, and the names of all that agrees in one way.
 void AddRecords(const char* title, const std::vector<CheckRecord>& records, const Comparison& comparison,
                 const RobotModel* places, std::vector<TableRow>* rows) {
-  rows->push_back({{title, "compared", "worst error", "bound", "digits", ""}});
-  for (const CheckRecord& record : records) {
-    rows->push_back({{record.name, std::to_string(record.comparisons), fmt::format("{:.2e}", record.worst),
-                      fmt::format("{:.1e}", record.bound), std::to_string(CountDigits(record.worst)),
-                      record.failed                                                         ? "DIFFERS"
-                      : comparison.digits && comparison.digits->units.contains(record.name) ? "within digits"
-                                                                                            : "ok"}});
-    if (!record.failed || places == nullptr) continue;
-    const std::string where = Describe(record.where, *places, places->num_base_velocities());
-    rows->back().note = fmt::format("    worst at {}, sample {}", where, static_cast<long>(record.at));
+  if (ListsAll(comparison)) {
+    rows->push_back({{title, "compared", "worst error", "bound", "digits", ""}});
+    for (const CheckRecord& record : records)
+      rows->push_back(
+          {{record.name, std::to_string(record.comparisons), fmt::format("{:.2e}", record.worst),
+            fmt::format("{:.1e}", record.bound), std::to_string(CountDigits(record.worst)), "ok"}});
+    return;
   }
+  std::map<std::string, std::string> alike;
+  rows->push_back({{title, "worst error", "bound", ""}});
+  for (const CheckRecord& record : records) {
+    if (record.failed) {
+      rows->push_back({{record.name, fmt::format("{:.2e}", record.worst), fmt::format("{:.1e}", record.bound),
+                        places == nullptr ? "DIFFERS"
+                                          : "DIFFERS at " + Describe(record.where, *places,
+                                                                     places->num_base_velocities())}});
+    } else {
+      const bool is_within = comparison.digits && comparison.digits->units.contains(record.name);
+      std::string& names = alike[is_within ? "within digits" : "ok"];
+      names += (names.empty() ? ": " : ", ") + record.name;
+    }
+  }
+  for (const auto& [outcome, names] : alike) rows->push_back({{}, "  " + outcome + names});
 }
 
 Json ToJson(const DigitVerdict& verdict) {
@@ -140,7 +157,7 @@ void PrintTable(const ConsistencyRequest& request, const Comparison& comparison)
   }
   rows.emplace_back();
   AddRecords("term", result.terms, comparison, &model, &rows);
-  fmt::print("{}", FormatTable("<>>>><", rows));
+  fmt::print("{}", FormatTable(ListsAll(comparison) ? "<>>>><" : "<>><", rows));
   const std::string bounds = request.judging.Find()
                                  ? "bounds are those of rounding or the tolerance given, whichever is wider"
                                  : "bounds follow from rounding";

@@ -93,6 +93,40 @@ std::vector<const Repair*> FindRounded(const Diagnosis& diagnosis) {
   return rounded;
 }
 
+/// A repair, and the other places at which the same number repairs the same.
+struct RepairLine {
+  const Repair* first;
+  std::string text;
+  std::vector<std::string> others = {};
+  double explained = 0.0;
+};
+
+std::vector<RepairLine> ListRepairs(const Diagnosis& diagnosis, const std::vector<const Repair*>& left_out,
+                                    const std::string& file) {
+  std::vector<RepairLine> lines;
+  const auto after_place = [](const std::string& text) { return text.substr(text.find(": ") + 1); };
+  for (const Repair& cause : diagnosis.causes) {
+    if (std::ranges::find(left_out, &cause) != left_out.end()) continue;
+    const std::string text = Describe(cause, diagnosis.written, file);
+    const auto alike = std::ranges::find_if(lines, [&](const RepairLine& line) {
+      return cause.kind == RepairKind::kParameters && cause.equivalents.empty() &&
+             line.first->equivalents.empty() && after_place(line.text) == after_place(text);
+    });
+    if (alike == lines.end()) {
+      lines.push_back({&cause, text, {}, cause.explained});
+    } else {
+      alike->others.push_back(text.substr(0, text.find(": ")));
+      alike->explained += cause.explained;
+    }
+  }
+  return lines;
+}
+
+std::string FormatPercent(double fraction) {
+  constexpr double kLeast = 1e-6;
+  return fraction < kLeast ? "under 0.0001 %" : fmt::format("{:.4g} %", 100.0 * fraction);
+}
+
 void Print(const DiagnoseRequest& request, const RobotModel& model, const Answer& answer) {
   const Diagnosis& diagnosis = answer.numbers;
   const RobotSpec& written = diagnosis.written;
@@ -115,15 +149,16 @@ void Print(const DiagnoseRequest& request, const RobotModel& model, const Answer
     fmt::print("{}. {}; explains {:.4g} % of the residual\n", ++number, one.text, 100.0 * one.explained);
     for (const std::string& value : one.values) fmt::print("   {}\n", value);
   }
-  for (const Repair& cause : diagnosis.causes) {
-    if (std::ranges::find(rounded, &cause) != rounded.end()) continue;
-    fmt::print("{}. {}", ++number, Describe(cause, written, file));
-    if (cause.kind == RepairKind::kEngineOnly) {
+  for (const RepairLine& line : ListRepairs(diagnosis, rounded, file)) {
+    fmt::print("{}. {}", ++number, line.text);
+    if (!line.others.empty())
+      fmt::print(", and so at {} more ({})", line.others.size(), JoinNames(line.others));
+    if (line.first->kind == RepairKind::kEngineOnly) {
       fmt::print("\n");
       continue;
     }
-    fmt::print("; explains {:.4g} % of the residual\n", 100.0 * cause.explained);
-    for (const Repair& equal : cause.equivalents)
+    fmt::print("; explains {} of the residual\n", FormatPercent(line.explained));
+    for (const Repair& equal : line.first->equivalents)
       fmt::print("   or, just as well: {}\n", Describe(equal, written, file));
   }
   if (!rounded.empty()) {
@@ -132,11 +167,11 @@ void Print(const DiagnoseRequest& request, const RobotModel& model, const Answer
     for (const Repair* const cause : rounded) names.push_back(DescribeShort(*cause, written));
     fmt::print("And {} that agree to 4 digits, as rounded numbers do (--digits 4 judges by that): {}\n",
                rounded.size(), JoinNames(names));
-    number += static_cast<int>(rounded.size());
   }
-  if (number > 1) fmt::print("Together: {:.4g} %.\n", 100.0 * diagnosis.explained);
+  const size_t repairs = answer.conventions.size() + diagnosis.causes.size();
+  if (repairs > 1) fmt::print("Together: {:.4g} %.\n", 100.0 * diagnosis.explained);
   if (CountRemaining(diagnosis) == 0) {
-    fmt::print("With {} the two agree to {}.\n", number == 1 ? "it repaired" : "these repaired",
+    fmt::print("With {} the two agree to {}.\n", repairs == 1 ? "it repaired" : "these repaired",
                request.DescribeTolerance());
   } else {
     PrintRemaining(request, model, diagnosis);

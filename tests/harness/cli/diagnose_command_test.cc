@@ -99,6 +99,17 @@ TEST_F(DiagnoseCommand, RoundedNumbersAreLast) {
   EXPECT_THAT(result.out, Not(HasSubstr("\n2. ")));
 }
 
+TEST_F(DiagnoseCommand, WhatManyJointsLackIsOneLine) {
+  std::string text = ReadText(kPandaToml);
+  for (size_t at = 0; (at = text.find("damping = 0.003", at)) != std::string::npos;)
+    text.replace(at, 15, "damping = 0.001");
+  Write("bad.toml", text);
+  EXPECT_EQ(Diagnose("bad.toml", kPandaXml).at("causes").size(), 7U);
+  const std::string out = Expect(1, {"diagnose", "bad.toml", kPandaXml, "--quiet"}).out;
+  EXPECT_THAT(out, AllOf(HasSubstr("and so at 6 more (joint "), HasSubstr("Together: 100 %.")));
+  EXPECT_THAT(out, Not(HasSubstr("\n2. ")));
+}
+
 TEST_F(DiagnoseCommand, JudgesPublishedNumbersByTheirDigits) {
   WritePanda("rounded.toml", {{"3.228604", "3.2286"}});
   ExpectCauses(Diagnose("rounded.toml", kPandaXml), {{"link panda_link3", "mass", 3.2286, 3.228604}});

@@ -97,6 +97,10 @@ TEST_F(Digits, AMistakeIsOnTheFirstLine) {
     const std::string out = Expect(1, "consistency wrong.urdf " + kPandaXml + " --samples 50 --quiet").out;
     EXPECT_THAT(FirstLine(out), AllOf(HasSubstr(one.check), HasSubstr("panda_link3")));
     EXPECT_LE(std::ranges::count(out, '\n'), 24);
+    // What agrees is a list of names.
+    const std::string whole = Expect(1, "consistency wrong.urdf " + kPandaXml + " --samples 50").out;
+    EXPECT_LE(std::ranges::count(whole, '\n'), 48);
+    EXPECT_THAT(whole, AllOf(HasSubstr("DIFFERS at "), HasSubstr("  ok: ")));
   }
 }
 
