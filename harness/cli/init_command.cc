@@ -78,6 +78,10 @@ void LeaveOutBaseContacts(MjcfFile* mjcf) {
     Warn(mjcf->source() + ": contacts of neighbours at a joint left out: " + JoinNames(pairs));
 }
 
+MjModelPtr Load(const MjcfFile& mjcf) {
+  return LoadMjcfText(mjcf.PrintFor(fs::current_path()), mjcf.source());
+}
+
 /// The user's MJCF with motors, as a run needs it.
 std::unique_ptr<MjcfFile> AdaptForRun(const fs::path& source, std::map<std::string, double> limits) {
   auto mjcf = std::make_unique<MjcfFile>(source);
@@ -88,6 +92,7 @@ std::unique_ptr<MjcfFile> AdaptForRun(const fs::path& source, std::map<std::stri
   AdaptMjcf(mjcf.get());
   StateNewDefaults(mjcf.get());
   RequireExactSolver(mjcf.get());
+  LeaveOutOthers(*Load(*mjcf), mjcf.get());
   if (!mjcf->changes().empty()) Warn(mjcf->SummarizeChanges());
   AddMotors(mjcf.get(), own);
   LeaveOutBaseContacts(mjcf.get());
@@ -250,10 +255,6 @@ std::optional<double> FindTolerance(const fs::path& table, const fs::path& mjcf)
   }
   // Rates of a motion are other ones than the states that were compared.
   return worst > 0.0 ? std::pow(10.0, std::ceil(std::log10(worst)) + 1.0) : 0.0;
-}
-
-MjModelPtr Load(const MjcfFile& mjcf) {
-  return LoadMjcfText(mjcf.PrintFor(fs::current_path()), mjcf.source());
 }
 
 /// A robot whose base floats stands on its feet, or, where no stance is found, is held above the ground, so

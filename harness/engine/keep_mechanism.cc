@@ -1,5 +1,7 @@
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <set>
 #include <sstream>
 #include <string>
 #include <string_view>
@@ -7,6 +9,7 @@
 
 #include "controller/common/types.h"
 #include "harness/engine/mjcf_passes.h"
+#include "harness/engine/robot_tree.h"
 #include "harness/engine/xml.h"
 
 namespace dexcheck {
@@ -79,6 +82,54 @@ void KeepMechanism(MjcfFile* mjcf) {
     mjcf->Note(*ball, "<joint type=\"ball\">", "held, of which a run's law has no number");
     DeleteJoint(ball, mjcf);
   }
+}
+
+namespace {
+
+/// What names an element that is gone.
+void DeleteNaming(const std::set<std::string>& names, MjcfFile* mjcf) {
+  for (const char* kind : {"actuator", "sensor", "contact"}) {
+    for (XMLElement* section : ListChildren(mjcf->root(), kind)) {
+      for (XMLElement* part : ListChildren(section)) {
+        bool is_user = false;
+        for (const auto* word = part->FirstAttribute(); word != nullptr; word = word->Next())
+          is_user |= std::string_view(word->Name()) != "name" && names.contains(word->Value());
+        if (is_user) section->DeleteChild(part);
+      }
+    }
+  }
+}
+
+}  // namespace
+
+void LeaveOutOthers(const mjModel& engine, MjcfFile* mjcf) {
+  const RobotTree robot = FindRobotTree(engine, mjcf->source());
+  std::vector<XMLElement*> others, free_joints;
+  VisitElements(mjcf->root(), [&](XMLElement* element) {
+    const std::string_view kind = element->Name();
+    if (kind == "body" &&
+        std::ranges::find(robot.others, ReadAttribute(*element, "name")) != robot.others.end())
+      others.push_back(element);
+    if (kind == "joint" && ReadAttribute(*element, "type") == "free") free_joints.push_back(element);
+  });
+  const int dof = robot.floating_body == 0 ? -1 : engine.body_dofadr[robot.floating_body];
+  if (dof >= 0 && (engine.dof_damping[dof] != 0.0 || engine.dof_armature[dof] != 0.0 ||
+                   engine.dof_frictionloss[dof] != 0.0)) {
+    for (XMLElement* joint : free_joints) {
+      mjcf->Note(*joint, "<joint type=\"free\">", "without the damping, armature and friction of a joint");
+      for (const char* word : {"damping", "armature", "frictionloss"}) joint->SetAttribute(word, "0");
+    }
+  }
+  std::set<std::string> names;
+  for (XMLElement* body : others) {
+    VisitElements(body, [&](XMLElement* part) { names.insert(ReadAttribute(*part, "name")); });
+    mjcf->Note(*body, "<body name=\"" + ReadAttribute(*body, "name") + "\">",
+               "left out, no part of the robot");
+    body->Parent()->DeleteChild(body);
+  }
+  if (others.empty()) return;
+  DeleteNaming(names, mjcf);
+  for (XMLElement* section : ListChildren(mjcf->root(), "keyframe")) mjcf->root()->DeleteChild(section);
 }
 
 void HoldBase(double lift, MjcfFile* mjcf) {

@@ -2,6 +2,8 @@
 
 // Passes over an MJCF, each of which changes it, notes what it did (MjcfFile::changes), or refuses it.
 
+#include <mujoco/mujoco.h>
+
 #include <filesystem>
 #include <map>
 #include <span>
@@ -45,6 +47,11 @@ void AddMotors(MjcfFile* mjcf, const std::map<std::string, double>& limits = {})
 /// Leaves out what acts on joints beside a run's motors, and a run's model has not: constraints, tendons,
 /// springs of joints, and the weight that bodies do not feel (gravcomp). Ball joints are held.
 void KeepMechanism(MjcfFile* mjcf);
+
+/// Leaves out what moves and is no part of the robot, with what names it, and what acts on a floating base as
+/// on a joint: `<joint type="free">` takes what a class has for joints.
+/// @param engine as it was loaded of this MJCF. @throws InputError when two robots have as many joints.
+void LeaveOutOthers(const mjModel& engine, MjcfFile* mjcf);
 
 /// Welds what floats to the world, higher by `lift`, m: free joints go, and key frames with them.
 void HoldBase(double lift, MjcfFile* mjcf);

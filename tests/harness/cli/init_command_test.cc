@@ -243,6 +243,19 @@ TEST_F(InitCommand, ABipedBendsItsKneesToStand) {
   EXPECT_THAT(Expect(0, "init rolls.xml").err, HasSubstr("because a foot turns without end, as wheels do"));
 }
 
+// As published humanoids have them: joints' defaults that the joint of the base takes, and parked bodies.
+TEST_F(InitCommand, WhatIsNoPartOfTheRobotIsLeftOut) {
+  const std::string text = ReadFixture("biped.xml");
+  const std::string sensor = "<sensor><jointpos joint=\"lid\"/></sensor>";
+  const std::string box = "<body name=\"box\" pos=\"9 0 9\"><joint name=\"lid\"/><geom size=\"0.1\"/></body>";
+  std::string parked = ReplaceOnce(text, "</worldbody>", box + "</worldbody>" + sensor);
+  parked = ReplaceOnce(parked, "<freejoint/>", "<joint type=\"free\" damping=\"0.1\" armature=\"0.2\"/>");
+  Write("parked.xml", parked);
+  EXPECT_THAT(Expect(0, "init parked.xml").err, HasSubstr("no part of the robot: <body name=\"box\">"));
+  EXPECT_THAT(Read("parked/robot.xml"), Not(HasSubstr("lid")));
+  EXPECT_EQ(RunMotion(0, "parked").at("verdict"), "pass");
+}
+
 // A run's clearance is of shapes that the engine does not let touch, too.
 TEST_F(InitCommand, WhatOverlapsIsExcluded) {
   Copy("biped.xml");
