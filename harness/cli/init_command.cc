@@ -268,13 +268,20 @@ std::optional<Stand> StandOrHold(const mjModel& engine, const std::map<std::stri
   const auto describe = [&](const MjcfFile& mjcf) {
     return DescriptionFile(source, mjcf.Print(), {}).Describe();
   };
-  Stand stand = FindStand(engine);
-  std::unique_ptr<MjcfFile> mjcf = copy();
-  PutOnFloor(engine, stand, mjcf.get());
-  RobotDescription robot = describe(*mjcf);
-  AddFeet(stand, &robot);
-  const std::string why =
-      FindPosture(ParseRobotModel(WriteParameters(robot, source), source), limits, &stand);
+  Stand stand;
+  std::unique_ptr<MjcfFile> mjcf;
+  RobotDescription robot;
+  std::string why;
+  // A key frame may have it lie: then as its joints are zero.
+  for (int at_key = engine.nkey > 0 ? 1 : 0; at_key >= 0; --at_key) {
+    stand = FindStand(engine, at_key == 1);
+    mjcf = copy();
+    PutOnFloor(engine, stand, mjcf.get());
+    robot = describe(*mjcf);
+    AddFeet(stand, &robot);
+    why = FindPosture(ParseRobotModel(WriteParameters(robot, source), source), limits, &stand);
+    if (why.empty()) break;
+  }
   if (!why.empty()) {
     mjcf = copy();
     HoldBase(engine.stat.extent, mjcf.get());

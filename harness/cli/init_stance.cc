@@ -171,9 +171,9 @@ std::vector<JointWayPoint> ListWay(const Stand& stand) {
   return points;
 }
 
-Stand FindStand(const mjModel& m) {
+Stand FindStand(const mjModel& m, bool at_key) {
   const MjDataPtr data = MakeData(m);
-  if (m.nkey > 0) mj_resetDataKeyframe(&m, data.get(), 0);
+  if (at_key) mj_resetDataKeyframe(&m, data.get(), 0);
   Stand stand;
   int base = 0;
   for (int joint = 0; joint < m.njnt; ++joint) {

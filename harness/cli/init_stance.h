@@ -36,8 +36,8 @@ struct Stand {
   std::vector<std::string> weak;                     ///< Joints whose motors' limits are too low for that.
 };
 
-/// Places that are lowest, of each body four at the most.
-Stand FindStand(const mjModel& m);
+/// Places that are lowest, of each body four at the most, as the first key frame or zero puts its joints.
+Stand FindStand(const mjModel& m, bool at_key);
 
 /// Adds a site of each foot, a floor where there is none, and pairs of each foot with it, which alone touch.
 /// @throws InputError when the body of a foot has no name.

@@ -243,6 +243,15 @@ TEST_F(InitCommand, ABipedBendsItsKneesToStand) {
   EXPECT_THAT(Expect(0, "init rolls.xml").err, HasSubstr("because a foot turns without end, as wheels do"));
 }
 
+// Shanks on the ground are no feet.
+TEST_F(InitCommand, ARobotThatLiesInItsKeyFrameStands) {
+  WriteChanged(
+      "lies.xml", ReadFixture("biped.xml"), "</worldbody>",
+      "</worldbody><keyframe><key qpos=\"0 0 0.5 1 0 0 0 0 0 -1 1.9 0 0 0 0 -1 1.9 0 0\"/></keyframe>");
+  EXPECT_THAT(Expect(0, "init lies.xml").err, Not(HasSubstr("held")));
+  EXPECT_EQ(RunMotion(0, "lies").at("verdict"), "pass");
+}
+
 // As published humanoids have them: joints' defaults that the joint of the base takes, and parked bodies.
 TEST_F(InitCommand, WhatIsNoPartOfTheRobotIsLeftOut) {
   const std::string text = ReadFixture("biped.xml");
