@@ -11,11 +11,12 @@
 #include "harness/engine/mjcf_passes.h"
 #include "harness/engine/mujoco_release.h"
 #include "harness/engine/solid.h"
+#include "harness/engine/xml.h"
 
 namespace dexcheck {
 namespace {
 
-/// Adds the exclusions of pairs of bodies, those that have names.
+/// Adds the exclusions of pairs of bodies, those that have names; explicit pairs, which they do not stop, go.
 /// @returns "base_link and link_1" of each.
 std::vector<std::string> Exclude(const mjModel& m, const std::set<std::pair<int, int>>& pairs,
                                  MjcfFile* mjcf) {
@@ -29,6 +30,16 @@ std::vector<std::string> Exclude(const mjModel& m, const std::set<std::pair<int,
     exclude->SetAttribute("body1", first);
     exclude->SetAttribute("body2", second);
     names.push_back(std::string(first) + " and " + second);
+  }
+  const auto find_body = [&](const tinyxml2::XMLElement& pair, const char* attribute) {
+    const int geom = mj_name2id(&m, mjOBJ_GEOM, ReadAttribute(pair, attribute).c_str());
+    return geom < 0 ? -1 : m.geom_bodyid[geom];
+  };
+  for (tinyxml2::XMLElement* contact : ListChildren(mjcf->root(), "contact")) {
+    for (tinyxml2::XMLElement* pair : ListChildren(contact, "pair")) {
+      if (pairs.contains(std::minmax({find_body(*pair, "geom1"), find_body(*pair, "geom2")})))
+        contact->DeleteChild(pair);
+    }
   }
   return names;
 }
@@ -50,12 +61,13 @@ bool AreOfOneTree(const mjModel& m, int one, int other) {
   return m.body_rootid[one] == m.body_rootid[other] && (m.body_weldid[one] != 0 || m.body_weldid[other] != 0);
 }
 
-/// What the engine lets touch.
+/// What the engine lets touch; it pushes apart what is as near as their margin.
 void AddContacts(const mjModel& m, const mjData& data, std::set<std::pair<int, int>>* pairs) {
   for (int i = 0; i < data.ncon; ++i) {
     const mjContact& contact = data.contact[i];
     const std::pair bodies = std::minmax(m.geom_bodyid[contact.geom1], m.geom_bodyid[contact.geom2]);
-    if (contact.dist <= 0.0 && AreOfOneTree(m, bodies.first, bodies.second)) pairs->insert(bodies);
+    if (contact.dist <= contact.includemargin && AreOfOneTree(m, bodies.first, bodies.second))
+      pairs->insert(bodies);
   }
 }
 

@@ -72,6 +72,7 @@ void KeepMechanism(MjcfFile* mjcf) {
     } else if (kind == "joint") {
       DeleteWord(element, "stiffness", mjcf);
       DeleteWord(element, "springdamper", mjcf);
+      DeleteWord(element, "margin", mjcf);
     } else if (kind == "body") {
       DeleteWord(element, "gravcomp", mjcf);
     } else if (kind == "flag") {

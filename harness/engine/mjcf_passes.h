@@ -45,7 +45,8 @@ void StateNewDefaults(MjcfFile* mjcf);
 void AddMotors(MjcfFile* mjcf, const std::map<std::string, double>& limits = {});
 
 /// Leaves out what acts on joints beside a run's motors, and a run's model has not: constraints, tendons,
-/// springs of joints, and the weight that bodies do not feel (gravcomp). Ball joints are held.
+/// springs of joints, what pushes before their ends (margin), and the weight that bodies do not feel
+/// (gravcomp). Ball joints are held.
 void KeepMechanism(MjcfFile* mjcf);
 
 /// Leaves out what moves and is no part of the robot, with what names it, and what acts on a floating base as

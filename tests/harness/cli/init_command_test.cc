@@ -100,9 +100,11 @@ TEST_F(InitCommand, ALinkDoesNotTouchTheBaseThatItTurnsOn) {
     mjcf = Read("changed");
   };
   change("<body name=\"upper\" pos=\"0 0 0.1\">",
-         "<body name=\"stand\"><geom size=\"0.2\"/><body name=\"upper\" pos=\"0 0 0.1\"><geom size=\"0.05\" "
-         "mass=\"0\"/>");
-  change("</worldbody>", "</body></worldbody>");
+         "<body name=\"stand\"><geom name=\"a\" size=\"0.2\"/><body name=\"upper\" pos=\"0 0 0.1\">"
+         "<geom name=\"b\" size=\"0.05\" mass=\"0\"/>");
+  // Explicit pairs are not stopped by exclusions; a margin acts before the end of a range.
+  change("</worldbody>", "</body></worldbody><contact><pair geom1=\"a\" geom2=\"b\"/></contact>");
+  change("axis=\"0 0 1\"", "axis=\"0 0 1\" margin=\"0.01\"");
   Write("stands.xml", mjcf);
   Expect(0, "init stands.xml");
   EXPECT_THAT(Read("stands/robot.xml"), HasSubstr(R"(<exclude body1="stand" body2="upper"/>)"));
