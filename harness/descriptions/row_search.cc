@@ -27,29 +27,36 @@ class RowSearch {
            }) <= 1;
   }
 
-  /// One reading of all rows.
-  using Change = std::function<std::optional<RowReading>(const StatedPart& given, const StatedPart& right)>;
+  /// One reading of all rows; none of those that it is not about.
+  using Change =
+      std::function<std::optional<RowReading>(size_t row, const StatedPart& given, const StatedPart& right)>;
 
   [[nodiscard]] std::vector<Change> ListChanges(const std::vector<RowFinding>& findings) const {
     std::vector<Change> changes;
     for (const Convention& convention : ListConventions()) {
       if (!IsOfRow(convention.of)) continue;
-      changes.push_back([&](const StatedPart& given, const StatedPart& right) -> std::optional<RowReading> {
-        const std::optional<StatedPart> undone = convention.undo(given, right);
-        if (!undone) return std::nullopt;
-        return RowReading{*undone, kConvention, {&convention}, "", ""};
-      });
+      changes.push_back(
+          [&](size_t, const StatedPart& given, const StatedPart& right) -> std::optional<RowReading> {
+            const std::optional<StatedPart> undone = convention.undo(given, right);
+            if (!undone) return std::nullopt;
+            return RowReading{*undone, kConvention, {&convention}, "", ""};
+          });
     }
-    std::map<std::string, double> offsets;
-    for (const RowFinding& finding : findings) {
-      for (const RowReading& reading : finding.readings) {
-        if (reading.number == kZero) offsets[reading.words] = reading.offset;
+    // Of all joints that turn, or of all that slide.
+    std::map<std::string, std::pair<double, bool>> offsets;
+    for (size_t i = 1; i < findings.size(); ++i) {
+      for (const RowReading& reading : findings[i].readings) {
+        if (reading.number == kZero)
+          offsets[reading.words] = {reading.offset, problem_.given[i - 1].is_revolute};
       }
     }
-    for (const auto& offset : offsets) {
-      changes.push_back([offset](StatedPart given, const StatedPart&) -> std::optional<RowReading> {
-        given.X_PL = given.X_PL * Eigen::AngleAxisd(offset.second, given.axis);
-        return RowReading{given, kConvention, {}, kZero, offset.first, offset.second};
+    for (const auto& [words, offset] : offsets) {
+      changes.push_back([this, words = words, by = offset.first, turns = offset.second](
+                            size_t row, StatedPart given, const StatedPart&) -> std::optional<RowReading> {
+        if (problem_.given[row].is_revolute != turns) return std::nullopt;
+        given.X_PL = given.X_PL * (turns ? Pose(Eigen::AngleAxisd(by, given.axis))
+                                         : Pose(Eigen::Translation3d(by * given.axis)));
+        return RowReading{given, kConvention, {}, kZero, words, by};
       });
     }
     return changes;
@@ -96,7 +103,7 @@ class RowSearch {
       const Pose X_ab_P =
           reader_.ToCarrier(i, findings[static_cast<size_t>(problem_.given[i].parent + 1)].X_ab);
       RowReading reading{reader_.StateRow(i), 0.0, {}, "", ""};
-      std::optional<RowReading> changed = change(reading.part, reader_.StateRight(i, X_ab_P));
+      std::optional<RowReading> changed = change(i, reading.part, reader_.StateRight(i, X_ab_P));
       const bool changes = changed && !reader_.IsSame(changed->part, reading.part);
       if (changes) reading = std::move(*changed);
       if (!IsAxisRight(problem_, i, reading.part, X_ab_P)) return {};

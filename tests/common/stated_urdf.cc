@@ -129,6 +129,7 @@ StatedUrdf::StatedUrdf(const std::string& text) : document_(std::make_unique<tin
       const Element* const joint = joint_of[name];
       part.joint = joint->Attribute("name");
       part.moves = joint->Attribute("type", "fixed") == nullptr;
+      part.slides = joint->Attribute("type", "prismatic") != nullptr;
       part.stated.X_PL = ReadOrigin(joint);
       part.stated.axis = ReadVector(joint->FirstChildElement("axis"), "xyz", Vector3d::UnitX());
       const Element* const limit = joint->FirstChildElement("limit");

@@ -43,6 +43,7 @@ bool IsVisible(const StatedLink& a, const StatedLink& b) {
 
 bool Concerns(const ConventionFault& fault, const UrdfPart& part) {
   if (fault.of == FaultOf::kBody) return part.has_body && part.stated.body.mass > 0.0;
+  if (fault.ids[0] == "zero.offset" && part.slides) return false;
   if (fault.of == FaultOf::kJoint) return part.moves;
   return part.moves && part.has_limit;
 }
