@@ -169,7 +169,7 @@ class MotionFigures {
     std::string finger;
     for (int k = 0; k < WidthOf("tau"); ++k) {
       const std::string joint = NameColumn("tau", k);
-      if (!belongs(joint)) continue;
+      if (!belongs(joint) || values.col(k).isZero(0.0)) continue;  // nothing drives a floating base
       if (IsFinger(joint)) {
         dash = NameFinger(joint) == finger ? dash + 1 : 0;
         color = NameFinger(joint) == finger || finger.empty() ? color : color + 1;
@@ -184,9 +184,11 @@ class MotionFigures {
   void AddTorques() {
     if (!Has("tau")) return;
     // Arms and trunk of the paper's robot have figures of their own.
-    const std::vector<std::string>& joints = run_.Find("tau")->columns;
-    const bool is_papers =
-        std::ranges::any_of(joints, [](const std::string& name) { return name.starts_with("waist"); });
+    const auto has = [&](const char* word) {
+      return std::ranges::any_of(run_.Find("tau")->columns,
+                                 [&](const std::string& name) { return name.starts_with(word); });
+    };
+    const bool is_papers = has("waist") && has("wheel");
     const auto grasps = [&](const std::string& joint) { return Grasps(joint); };
     const auto idle = [&](const std::string& joint) { return IsFinger(joint) && !Grasps(joint); };
     const auto left = [&](const std::string& joint) { return is_papers && joint.starts_with("l_"); };

@@ -19,6 +19,7 @@ inline constexpr double kReportStep = 1e-3;  // s
 struct ReportRun {
   long rows = 400;
   bool has_summary = true;
+  bool has_wheels = true;
   bool has_law = false;  ///< Whether it reports the forces that the law commands.
   std::string verdict = "disagreement";
   std::string scenario = "sample";
@@ -79,8 +80,14 @@ inline void WriteReportRun(const std::filesystem::path& folder, const ReportRun&
   log.EmbedFile("inputs", "robot/robot.toml", "name = \"robot\"\n");
   log.EmbedFile("inputs", "mjcf/scene.xml", "<mujoco/>\n");
   const std::vector<std::string> pose = {"x", "y", "z", "alpha", "beta", "gamma"};
-  const std::vector<std::string> joints = {"wheel_right", "waist_yaw", "r_elbow", "l_elbow",
-                                           "rf1_1",       "rf1_2",     "lf1_1",   "tail"};
+  const std::vector<std::string> joints = {run.has_wheels ? "wheel_right" : "ankle",
+                                           "waist_yaw",
+                                           "r_elbow",
+                                           "l_elbow",
+                                           "rf1_1",
+                                           "rf1_2",
+                                           "lf1_1",
+                                           "tail"};
   const int X_o = log.AddSignal({"object/X_o", "m, rad", "pose", 6, pose, {}});
   const int X_d = log.AddSignal({"object/X_d", "m, rad", "desired pose", 6, pose, {}});
   const int e_p = log.AddSignal({"object/position_error", "m", "error", 1, {}, {}});

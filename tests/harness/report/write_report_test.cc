@@ -86,6 +86,16 @@ TEST_F(WriteReportTest, HasThePapersPanelsFromTheRightSignals) {
   EXPECT_EQ(labels["fig13a"].size(), 3U);
 }
 
+// A humanoid has a waist, too.
+TEST_F(WriteReportTest, PanelsAreThoseOfThePapersRobotAlone) {
+  WriteReportRun(run_dir(), {.has_wheels = false});
+  std::map<std::string, size_t> curves;
+  for (const Figure& figure : MakeMotionFigures(RunData(run_dir())))
+    curves[figure.name] = figure.curves.size();
+  EXPECT_EQ(curves["fig12f"], 0U);
+  EXPECT_EQ(curves["other_torques"], 5U);
+}
+
 TEST_F(WriteReportTest, ShowsTheOptimalForcesBesideTheMeasuredOnes) {
   WriteReportRun(run_dir(), {.has_law = true});
   const std::vector<Figure> figures = MakeMotionFigures(RunData(run_dir()));
