@@ -232,11 +232,15 @@ void ForceProblem::AddGrowing() {
     growing.unit += "/s";
     growing.nominal = store_.last_time();
     growing.scale = candidates_[i].scale.replicate(2, 1);
-    // It began within what is kept: before the steps of this residual, and after all of it had begun.
-    growing.is_possible = [first = time(0, 0) - slack, last = time(0, used_.front()) + slack,
+    // It began before the steps of this residual; where it began before all that is kept, it did not show
+    // yet.
+    MatrixXd shows = growing.columns.topRows(forces_->rows());
+    noise_.front().ChangeLevel(level_, Vector2d::Ones(), shows);
+    growing.is_possible = [=, first = time(0, 0) - slack, last = time(0, used_.front()) + slack,
                            end = growing.nominal](const VectorXd& a) {
       const double since = CalcGrowthBegin(a, end);
-      return since >= first && since <= last;
+      const double hidden = (first - since) * (shows * a.head(width)).norm();
+      return since <= last && hidden <= std::sqrt(static_cast<double>(shows.rows()));
     };
     growing.columns.conservativeResize(Eigen::NoChange, 2 * width);
     growing.columns.rightCols(width) = candidates_[i].columns;
