@@ -74,10 +74,11 @@ bool ForceProblem::ExplainConstant(const Segment& segment, Causes* causes) {
   }
   if (ExplainTorque(segment, terms_.count, selection.terms.size(), causes)) return true;
   if (ExplainJoint(segment, selection, causes)) return true;
-  Causes told = TellSelection(Start(segment), selection, candidates_,
-                              [&](const Candidate& one, const VectorXd& amplitude, const VectorXd& error) {
-                                return MakeForceFault(one, amplitude, error, forces_->model().gravity());
-                              });
+  Causes told =
+      TellSelection(StartExplanation(store_, CauseChannel::kBalance, segment), selection, candidates_,
+                    [&](const Candidate& one, const VectorXd& amplitude, const VectorXd& error) {
+                      return MakeForceFault(one, amplitude, error, forces_->model().gravity());
+                    });
   std::move(told.begin(), told.end(), std::back_inserter(*causes));
   return true;
 }
@@ -166,17 +167,13 @@ ForceProblem::Free ForceProblem::FitFree(size_t index) const {
 
 Explanation ForceProblem::TellFree(const Segment& segment, const Free& free) const {
   const Candidate& candidate = candidates_[free.candidate];
-  Explanation one = Start(segment);
+  Explanation one = StartExplanation(store_, CauseChannel::kBalance, segment);
   one.fraction = 1.0 - free.residual.squaredNorm() / y_.squaredNorm();
   one.left = std::sqrt(free.residual.squaredNorm() / static_cast<double>(y_.size()));
   one.outcome = CauseOutcome::kNamedClass;
   one.faults.push_back(
       {candidate.fault + " that changes, up to", candidate.place, free.largest, 0.0, candidate.unit, ""});
   return one;
-}
-
-Explanation ForceProblem::Start(const Segment& segment) const {
-  return StartExplanation(store_, CauseChannel::kBalance, segment);
 }
 
 void ForceProblem::Build() {

@@ -167,8 +167,7 @@ Causes ExplainLaw(const StepStore& store) {
                          });
   if (selection.left <= kMostLeft * std::sqrt(floor)) return causes;
   // The nearest stands for all.
-  causes.resize(std::min<size_t>(causes.size(), 1));
-  if (causes.empty()) causes.push_back(StartExplanation(store, CauseChannel::kLaw, steps));
+  causes.resize(1, StartExplanation(store, CauseChannel::kLaw, steps));
   causes.front().outcome = CauseOutcome::kNotExplained;
   causes.front().faults.resize(std::min<size_t>(causes.front().faults.size(), 1));
   causes.front().rival.clear();
