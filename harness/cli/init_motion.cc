@@ -15,16 +15,18 @@ namespace {
 
 constexpr double kHalf = 2.0;  // s, there, and as long back
 
-JointSpan ChooseSpan(const Joint& joint, bool states_range, double home) {
-  constexpr double kMargin = 0.2;  // of the range, at either end
+/// @param number of the joint.
+JointSpan ChooseSpan(const Joint& joint, bool states_range, double home, size_t number) {
+  constexpr double kMargin = 0.2;       // of the range, at either end
+  constexpr double kSwing = 1.0 / 3.0;  // of the way
   const double most = joint.type == JointType::kPrismatic ? 0.05 : 0.3;
   const double width = states_range ? joint.upper - joint.lower : 2.0 * most;
   // All turns are alike; those that are written stay between -pi and pi, as printed, too.
-  constexpr double kTurns = 1.1;
+  constexpr double kTurns = 1.4;
   if (!states_range) home = std::clamp(home, joint.lower + kTurns * most, joint.upper - kTurns * most);
   const double low = states_range ? joint.lower + kMargin * width : home - most;
   const double high = states_range ? joint.upper - kMargin * width : home + most;
-  JointSpan span;
+  JointSpan span{.swing = std::min(kSwing * most, 0.5 * kMargin * width), .number = number};
   span.start = std::clamp(home, low, high);
   const double step = std::min(most, 0.5 * (high - low));
   span.end = span.start + step <= high ? span.start + step : span.start - step;
@@ -35,8 +37,12 @@ JointSpan ChooseSpan(const Joint& joint, bool states_range, double home) {
 JointSpan Follow(const Joint& joint, const JointSpan& leader, const JointSpan& own) {
   const JointCoupling& coupling = *joint.coupling;
   const JointSpan led{coupling.multiplier * leader.start + coupling.offset,
-                      coupling.multiplier * leader.end + coupling.offset};
-  const auto is_within = [&](double q) { return q >= joint.lower && q <= joint.upper; };
+                      coupling.multiplier * leader.end + coupling.offset, coupling.multiplier * leader.swing,
+                      leader.number};
+  const auto is_within = [&](double q) {
+    const double swing = std::abs(led.swing);
+    return q - swing >= joint.lower && q + swing <= joint.upper;
+  };
   return is_within(led.start) && is_within(led.end) ? led : own;
 }
 
@@ -45,7 +51,8 @@ std::vector<JointSpan> ChooseSpans(const RobotDescription& robot, const std::map
   for (size_t i = 0; i < robot.spec.joints.size(); ++i) {
     const Joint& joint = robot.spec.joints[i];
     const auto wish = home.find(joint.name);
-    JointSpan span = ChooseSpan(joint, robot.joints[i].states_range, wish == home.end() ? 0.0 : wish->second);
+    JointSpan span =
+        ChooseSpan(joint, robot.joints[i].states_range, wish == home.end() ? 0.0 : wish->second, i);
     if (joint.coupling && joint.coupling->leader < static_cast<int>(i))
       span = Follow(joint, spans[static_cast<size_t>(joint.coupling->leader)], span);
     spans.push_back(span);
@@ -53,9 +60,16 @@ std::vector<JointSpan> ChooseSpans(const RobotDescription& robot, const std::map
   return spans;
 }
 
-constexpr int kParts = 20;
+std::vector<JointOscillation> ListSwings(const std::vector<JointSpan>& spans) {
+  std::vector<JointOscillation> swings;
+  for (size_t i = 0; i < spans.size(); ++i)
+    AddSwings(static_cast<int>(i), spans[i].swing, spans[i].number, &swings);
+  return swings;
+}
 
-/// The largest that the motion there asks of each motor, as a fraction of its limit; back it is as large.
+constexpr int kParts = 100;
+
+/// The largest that the motion asks of each motor, as a fraction of its limit.
 /// @param parts of it that are looked at, out of kParts; none but where it begins for 0. @param poses by
 /// which it comes, by joint.
 VectorXd CalcMotorUse(const RobotModel& model, const std::map<std::string, double>& limits,
@@ -64,11 +78,11 @@ VectorXd CalcMotorUse(const RobotModel& model, const std::map<std::string, doubl
   VectorXd start(terms.size()), end(terms.size()), most = VectorXd::Zero(terms.size());
   std::transform(spans.begin(), spans.end(), start.begin(), [](const JointSpan& span) { return span.start; });
   std::transform(spans.begin(), spans.end(), end.begin(), [](const JointSpan& span) { return span.end; });
-  const JointMotion motion(start, {{kHalf, end}}, {});
+  const JointMotion motion(start, {{kHalf, end}, {2.0 * kHalf, start}}, ListSwings(spans));
   DesiredJoints desired;
   poses->assign(static_cast<size_t>(parts) + 1, {});
   for (int k = 0; k <= parts; ++k) {
-    motion.Evaluate(kHalf * k / kParts, &desired);
+    motion.Evaluate(2.0 * kHalf * k / kParts, &desired);
     terms.SetState(desired.q, desired.q_dot);
     terms.CalcDynamics();
     const VectorXd force =
@@ -94,6 +108,15 @@ double ChooseFrequency(const RobotModel& model) {
 
 }  // namespace
 
+void AddSwings(int joint, double amplitude, size_t number, std::vector<JointOscillation>* swings) {
+  // Multiples of the golden ratio lie evenly, however many there are, and are no multiples of each other.
+  const double part = std::fmod(0.618034 * static_cast<double>(number), 1.0);
+  constexpr double kRamp = 1.0;  // s
+  for (const auto& [share, frequency] : {std::pair(0.7, 0.7), {0.3, 1.9}})
+    swings->push_back(
+        {joint, share * amplitude, std::round(1e3 * frequency * (1.0 + 0.6 * part)) / 1e3, kRamp});
+}
+
 InitMotion PlanInitMotion(const RobotDescription& robot, const RobotModel& model,
                           const std::map<std::string, double>& limits,
                           const std::map<std::string, double>& home) {
@@ -107,7 +130,10 @@ InitMotion PlanInitMotion(const RobotDescription& robot, const RobotModel& model
   // A motor that cannot hold the robot is none that a smaller motion helps.
   const auto too_much = [&] { return (hold.array() < kMostUse && most.array() > kMostUse).any(); };
   for (int k = 0; k < kHalvings && too_much(); ++k) {
-    for (JointSpan& span : motion.spans) span.end = span.start + 0.5 * (span.end - span.start);
+    for (JointSpan& span : motion.spans) {
+      span.end = span.start + 0.5 * (span.end - span.start);
+      span.swing *= 0.5;
+    }
     most = CalcMotorUse(model, limits, motion.spans, kParts, &motion.poses);
   }
   for (Eigen::Index i = 0; i < most.size(); ++i) {
@@ -122,6 +148,16 @@ std::string ListJoints(const RobotDescription& robot, const std::function<double
     list += fmt::format("{}{} = {}", i == 0 ? "" : ", ", Quote(robot.spec.joints[i].name),
                         FormatNumber(value(i), 4));
   return list;
+}
+
+std::string WriteSwings(const std::vector<JointOscillation>& swings, const char* key,
+                        const std::function<std::string(int joint)>& name) {
+  std::string text = "oscillations = [\n";
+  for (const JointOscillation& one : swings)
+    text += fmt::format("  {{ {} = {}, amplitude = {}, frequency = {}, ramp_time = {} }},\n", key,
+                        Quote(name(one.joint)), FormatNumber(one.amplitude, 3), FormatNumber(one.frequency),
+                        FormatNumber(one.ramp_time));
+  return text + "]\n";
 }
 
 std::string WriteScenario(const RobotDescription& robot, const MotionText& motion, double tolerance) {
@@ -172,11 +208,15 @@ points = [
   {{ time = 2, joints = {{ {} }} }},
   {{ time = 4, joints = {{ {} }} }},
 ]
-)",
-      start, end, start);
+# What only moves one way hardly tells a torque from an inertia or from friction.
+{})",
+      start, end, start, WriteSwings(ListSwings(motion.spans), "joint", [&](int i) {
+        return robot.spec.joints[static_cast<size_t>(i)].name;
+      }));
   return WriteScenario(robot,
                        {"A motion of the joints within their ranges",
-                        "each joint leaves its place and comes back", 0.5, text, motion.frequency, true},
+                        "each joint leaves its place and comes back, and swings on its way", 0.5, text,
+                        motion.frequency, true},
                        tolerance);
 }
 

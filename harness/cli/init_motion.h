@@ -1,12 +1,14 @@
 #pragma once
 
-// The motion that a new folder begins with: each joint leaves its place and comes back, as its motors can.
+// The motion that a new folder begins with: each joint leaves its place, comes back, and swings on its way,
+// as its motors can.
 
 #include <functional>
 #include <map>
 #include <string>
 #include <vector>
 
+#include "controller/control/joint_motion.h"
 #include "harness/descriptions/robot_description.h"
 
 namespace dexcheck::cli {
@@ -15,6 +17,8 @@ namespace dexcheck::cli {
 struct JointSpan {
   double start = 0.0;
   double end = 0.0;
+  double swing = 0.0;  ///< Amplitude of both sines.
+  size_t number = 0;   ///< That gives their frequencies: of the joint, or of the one that leads it.
 };
 
 /// Postures by joint, rad or m.
@@ -35,7 +39,15 @@ InitMotion PlanInitMotion(const RobotDescription& robot, const RobotModel& model
                           const std::map<std::string, double>& limits,
                           const std::map<std::string, double>& home);
 
+/// Adds a slow sine and a fast one, which tell forces apart that a smooth way does not: a torque, an inertia
+/// and friction. @param amplitude of both. @param number that frequencies are chosen by, none the same.
+void AddSwings(int joint, double amplitude, size_t number, std::vector<JointOscillation>* swings);
+
 // Parts of a scenario's text.
+
+/// The key `oscillations`. @param key of what swings: "joint". @param name of each.
+std::string WriteSwings(const std::vector<JointOscillation>& swings, const char* key,
+                        const std::function<std::string(int joint)>& name);
 
 /// "shoulder" = 0.1, "elbow" = 0: a number of each joint.
 std::string ListJoints(const RobotDescription& robot, const std::function<double(size_t joint)>& value);

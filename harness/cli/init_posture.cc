@@ -67,10 +67,11 @@ class StandTrial {
     stand->poses.clear();
     stand->weak.clear();
     StanceForces forces(model_, stance_);
-    const StanceMotion motion(model_, stance_, q, JointMotion(VectorXd::Zero(6), ListWay(*stand), {}));
+    const Sway sway = ListWay(*stand);
+    const StanceMotion motion(model_, stance_, q, JointMotion(VectorXd::Zero(6), sway.points, sway.swings));
     GroundContacts ground(model_, stance_.feet);
     DesiredJoints desired;
-    constexpr int kSamples = 32;
+    constexpr int kSamples = 64;
     constexpr double kStays = 1e-9;  // m, m/s, of feet
     for (int k = 0; k <= kSamples; ++k) {
       motion.Evaluate(4.0 * k / kSamples, &desired);

@@ -4,6 +4,7 @@
 #include <mujoco/mujoco.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <set>
@@ -163,12 +164,18 @@ std::vector<Place> KeepOutermost(const std::vector<Place>& places) {
 
 double LeastForce(const Stand& stand) { return 0.01 * stand.weight / static_cast<double>(stand.feet.size()); }
 
-std::vector<JointWayPoint> ListWay(const Stand& stand) {
+Sway ListWay(const Stand& stand) {
   const double way = 0.03 * stand.height * stand.sway, turn = kPi / 90.0 * stand.sway;
-  std::vector<JointWayPoint> points{{2.0, VectorXd::Zero(6)}, {4.0, VectorXd::Zero(6)}};
-  points[0].q << way, 0.0, -way, 0.0, turn, 0.0;
-  if (!stand.in_plane) points[1].q << 0.0, way, -way, turn, 0.0, turn;
-  return points;
+  Sway sway{.points = {{2.0, VectorXd::Zero(6)}, {4.0, VectorXd::Zero(6)}}};
+  sway.points[0].q << way, 0.0, -way, 0.0, turn, 0.0;
+  if (!stand.in_plane) sway.points[1].q << 0.0, way, -way, turn, 0.0, turn;
+  constexpr double kSwing = 1.0 / 3.0;  // of the way
+  for (int axis = 0; axis < 6; ++axis) {
+    const bool is_in_plane = axis == 0 || axis == 2 || axis == 4;
+    if (is_in_plane || !stand.in_plane)
+      AddSwings(axis, kSwing * (axis < 3 ? way : turn), static_cast<size_t>(axis), &sway.swings);
+  }
+  return sway;
 }
 
 Stand FindStand(const mjModel& m, bool at_key) {
@@ -290,7 +297,8 @@ std::string WriteStandScenario(const RobotDescription& robot, const Stand& stand
   std::string feet;
   for (const Foot& foot : stand.feet) feet += (feet.empty() ? "" : ", ") + Quote(foot.frame);
   std::string points;
-  for (const JointWayPoint& point : ListWay(stand)) {
+  const Sway sway = ListWay(stand);
+  for (const JointWayPoint& point : sway.points) {
     const auto list = [&](int from, double unit) {
       return fmt::format("[{}, {}, {}]", FormatNumber(point.q[from] / unit, 2),
                          FormatNumber(point.q[from + 1] / unit, 2),
@@ -311,8 +319,11 @@ f_min = {}
 f_max = {}
 points = [
 {}]
-)",
-      start, feet, FormatNumber(LeastForce(stand), 2), FormatNumber(std::ceil(stand.weight)), points);
+{})",
+      start, feet, FormatNumber(LeastForce(stand), 2), FormatNumber(std::ceil(stand.weight)), points,
+      WriteSwings(sway.swings, "axis", [](int axis) {
+        return std::string(std::array{"x", "y", "z", "roll", "pitch", "yaw"}[static_cast<size_t>(axis)]);
+      }));
   return WriteScenario(robot,
                        {"The robot stands on its feet and sways over them",
                         "the base shifts, sinks and turns over feet that stay", 1.0, text, 20.0, false},

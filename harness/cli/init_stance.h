@@ -46,8 +46,12 @@ void PutOnFloor(const mjModel& m, const Stand& stand, MjcfFile* mjcf);
 /// Least normal force that the scenario's law asks of a foot, N.
 double LeastForce(const Stand& stand);
 
-/// How the base sways: down by 3 % of its height, and turned by 2 degrees.
-std::vector<JointWayPoint> ListWay(const Stand& stand);
+/// How the base sways: down by 3 % of its height, turned by 2 degrees, and swinging by a third of that.
+struct Sway {
+  std::vector<JointWayPoint> points;
+  std::vector<JointOscillation> swings;  ///< By axis.
+};
+Sway ListWay(const Stand& stand);
 
 /// Finds a posture from which the robot can sway with forces of the ground inside their cones: that of the
 /// stand, or with joints bent and the centre of mass over the feet.

@@ -142,11 +142,13 @@ void AddMutateCommand(Command app) {
           .Needs(run)
           .ShowDefault();
   Option duration =
-      command.AddOption("--duration", &request->run.options.duration, "In a run: how long it is looked at, s")
+      command
+          .AddOption(
+              "--duration", &request->run.options.duration,
+              "In a run: how long it is looked at, s (default: all of a motion of joints, 0.1 of others)")
           .TypeName("T")
           .Check(NumberFrom(1e-3, 1e4))
-          .Needs(run)
-          .ShowDefault();
+          .Needs(run);
   Option faults = command
                       .AddOption("--numbers", &request->run.options.parameters,
                                  "In a run: how many numbers of the model are changed, evenly out of all")

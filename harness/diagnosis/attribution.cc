@@ -68,20 +68,11 @@ Entry MakeFact(const CheckRecord& check, const FailureMeaning& meaning) {
 
 /// What an explanation of that channel means.
 FailureMeaning MeaningOf(CauseChannel channel) {
-  switch (channel) {
-    case CauseChannel::kMeasurement:
-      return {Cause::kSensing, 0, Rank::kMeasurement};
-    case CauseChannel::kActuation:
-      return {Cause::kActuator, 0, Rank::kActuator};
-    case CauseChannel::kLaw:
-      return {Cause::kControlLaw, 0, Rank::kLaw};
-    case CauseChannel::kContact:
-      return {Cause::kContactGeometry, 0, Rank::kObjectBalance};
-    case CauseChannel::kRolling:
-      return {Cause::kWheelGeometry, 0, Rank::kDecisive};
-    default:
-      return {Cause::kUnmodelledForce, 0, Rank::kDecisive};
-  }
+  static const FailureMeaning kMeanings[] = {
+      {Cause::kSensing, 0, Rank::kMeasurement},    {Cause::kActuator, 0, Rank::kActuator},
+      {Cause::kControlLaw, 0, Rank::kLaw},         {Cause::kContactGeometry, 0, Rank::kObjectBalance},
+      {Cause::kWheelGeometry, 0, Rank::kDecisive}, {Cause::kUnmodelledForce, 0, Rank::kDecisive}};
+  return kMeanings[static_cast<size_t>(channel)];
 }
 
 /// Explanations of the residuals, those of a channel in their order.

@@ -54,11 +54,8 @@ Causes ExplainContacts(const StepStore& store) {
       SelectCauses(y, candidates, {.alike = static_cast<double>(mismatch.cols())});
   std::vector<Index> steps(static_cast<size_t>(mismatch.cols()));
   std::iota(steps.begin(), steps.end(), 0);
-  Causes causes = TellSelection(StartExplanation(store, CauseChannel::kContact, steps), selection, candidates,
-                                TellNumber);
-  if (selection.left > 1.0 && selection.fraction < kExplainsDistance)
-    for (Explanation& one : causes) one.outcome = CauseOutcome::kNotExplained;
-  return causes;
+  return TellSelection(StartExplanation(store, CauseChannel::kContact, steps), selection, candidates,
+                       TellNumber, selection.left <= 1.0 || selection.fraction >= kExplainsDistance);
 }
 
 }  // namespace dexcheck

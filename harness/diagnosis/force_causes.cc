@@ -72,13 +72,18 @@ std::vector<Segment> JoinAcrossGaps(const StepStore& store, StepForces* forces,
   };
   std::vector<Segment> joined;
   for (size_t begin = 0; begin < parts.size() && joined.size() <= kMostSegments;) {
-    if (!explain(begin, 1).is_explained) return {};
+    const Part first = explain(begin, 1);
+    if (!first.is_explained) return {};
+    // What leaves more than rounding where its first part does not has something else in it.
+    const auto is_one = [&](size_t count) {
+      const Part part = explain(begin, count);
+      return part.is_explained && (part.is_exact || !first.is_exact);
+    };
     size_t most = 1;
     while (begin + most < parts.size() && is_gap(begin + most)) ++most;
     // The most that are explained, by bisection, all of them first.
     size_t count = 1, fails = most + 1;
-    for (size_t next = most; next > count; next = (count + fails) / 2)
-      (explain(begin, next).is_explained ? count : fails) = next;
+    for (size_t next = most; next > count; next = (count + fails) / 2) (is_one(next) ? count : fails) = next;
     if (!known) known = explain(begin, count);
     joined.push_back(Concatenate(parts, begin, count));
     begin += count;

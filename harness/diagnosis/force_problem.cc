@@ -74,10 +74,11 @@ bool ForceProblem::ExplainConstant(const Segment& segment, Causes* causes) {
   }
   if (ExplainTorque(segment, terms_.count, selection.terms.size(), causes)) return true;
   if (ExplainJoint(segment, selection, causes)) return true;
-  Causes told = TellSelection(Start(segment), selection, candidates_,
-                              [&](const Candidate& one, const VectorXd& amplitude, const VectorXd& error) {
-                                return MakeForceFault(one, amplitude, error, forces_->model().gravity());
-                              });
+  Causes told =
+      TellSelection(StartExplanation(store_, CauseChannel::kBalance, segment), selection, candidates_,
+                    [&](const Candidate& one, const VectorXd& amplitude, const VectorXd& error) {
+                      return MakeForceFault(one, amplitude, error, forces_->model().gravity());
+                    });
   std::move(told.begin(), told.end(), std::back_inserter(*causes));
   return true;
 }
@@ -166,17 +167,13 @@ ForceProblem::Free ForceProblem::FitFree(size_t index) const {
 
 Explanation ForceProblem::TellFree(const Segment& segment, const Free& free) const {
   const Candidate& candidate = candidates_[free.candidate];
-  Explanation one = Start(segment);
+  Explanation one = StartExplanation(store_, CauseChannel::kBalance, segment);
   one.fraction = 1.0 - free.residual.squaredNorm() / y_.squaredNorm();
   one.left = std::sqrt(free.residual.squaredNorm() / static_cast<double>(y_.size()));
   one.outcome = CauseOutcome::kNamedClass;
   one.faults.push_back(
       {candidate.fault + " that changes, up to", candidate.place, free.largest, 0.0, candidate.unit, ""});
   return one;
-}
-
-Explanation ForceProblem::Start(const Segment& segment) const {
-  return StartExplanation(store_, CauseChannel::kBalance, segment);
 }
 
 void ForceProblem::Build() {
@@ -232,11 +229,15 @@ void ForceProblem::AddGrowing() {
     growing.unit += "/s";
     growing.nominal = store_.last_time();
     growing.scale = candidates_[i].scale.replicate(2, 1);
-    // It began within what is kept: before the steps of this residual, and after all of it had begun.
-    growing.is_possible = [first = time(0, 0) - slack, last = time(0, used_.front()) + slack,
+    // It began before the steps of this residual; where it began before all that is kept, it did not show
+    // yet.
+    MatrixXd shows = growing.columns.topRows(forces_->rows());
+    noise_.front().ChangeLevel(level_, Vector2d::Ones(), shows);
+    growing.is_possible = [=, first = time(0, 0) - slack, last = time(0, used_.front()) + slack,
                            end = growing.nominal](const VectorXd& a) {
       const double since = CalcGrowthBegin(a, end);
-      return since >= first && since <= last;
+      const double hidden = (first - since) * (shows * a.head(width)).norm();
+      return since <= last && hidden <= std::sqrt(static_cast<double>(shows.rows()));
     };
     growing.columns.conservativeResize(Eigen::NoChange, 2 * width);
     growing.columns.rightCols(width) = candidates_[i].columns;

@@ -64,7 +64,6 @@ class ForceProblem {
   /// What is free at each step has no size, and is a class of all that may act there: a range that ends, a
   /// cable.
   [[nodiscard]] Explanation TellFree(const Segment& segment, const Free& free) const;
-  [[nodiscard]] Explanation Start(const Segment& segment) const;
   /// Residual and candidates with the gravity that is known.
   void Build();
   /// Their noise becomes another.

@@ -159,18 +159,15 @@ Causes ExplainLaw(const StepStore& store) {
   const double floor = 1.0 + kLawAccuracy * kLawAccuracy * y.squaredNorm() / static_cast<double>(y.size());
   const CauseSelection selection =
       SelectCauses(y, candidates, {.most_terms = 4, .restarts = 0, .floor = floor});
-  causes = TellSelection(
-      StartExplanation(store, CauseChannel::kLaw, steps), selection, candidates,
-      [](const Candidate& one, const VectorXd& amplitude, const VectorXd& error) {
-        const double value = one.nominal + amplitude[0];
-        return Fault{
-            one.fault, one.place, std::abs(value) < kZero ? 0.0 : value, error.size() > 0 ? error[0] : 0.0,
-            one.unit,  ""};
-      });
+  causes = TellSelection(StartExplanation(store, CauseChannel::kLaw, steps), selection, candidates,
+                         [](const Candidate& one, const VectorXd& amplitude, const VectorXd& error) {
+                           Fault fault = TellNumber(one, amplitude, error);
+                           if (std::abs(fault.value) < kZero) fault.value = 0.0;
+                           return fault;
+                         });
   if (selection.left <= kMostLeft * std::sqrt(floor)) return causes;
   // The nearest stands for all.
-  causes.resize(std::min<size_t>(causes.size(), 1));
-  if (causes.empty()) causes.push_back(StartExplanation(store, CauseChannel::kLaw, steps));
+  causes.resize(1, StartExplanation(store, CauseChannel::kLaw, steps));
   causes.front().outcome = CauseOutcome::kNotExplained;
   causes.front().faults.resize(std::min<size_t>(causes.front().faults.size(), 1));
   causes.front().rival.clear();

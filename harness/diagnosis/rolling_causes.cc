@@ -85,11 +85,8 @@ Causes ExplainRolling(const StepStore& store) {
     for (Candidate& one : candidates) one.columns /= level;
     selection = SelectWheels(y, &candidates, options);
   }
-  Causes causes = TellSelection(StartExplanation(store, CauseChannel::kRolling, steps), selection, candidates,
-                                TellNumber);
-  for (Explanation& one : causes)
-    if (!explained) one.outcome = CauseOutcome::kNotExplained;
-  return causes;
+  return TellSelection(StartExplanation(store, CauseChannel::kRolling, steps), selection, candidates,
+                       TellNumber, explained);
 }
 
 }  // namespace dexcheck

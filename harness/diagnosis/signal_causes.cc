@@ -264,12 +264,6 @@ std::vector<SignalSeries> ListSeries(const StepStore& store, bool motors) {
 
 }  // namespace
 
-Causes ExplainSignal(const SignalSeries& series, const std::vector<SignalSeries>& others) {
-  Causes causes;
-  TellVerdict(JudgeSignal(series, others), CauseChannel::kActuation, &causes);
-  return causes;
-}
-
 Causes ExplainSignals(std::vector<SignalSeries> series, CauseChannel channel) {
   return SignalGroup(std::move(series), channel).Explain();
 }

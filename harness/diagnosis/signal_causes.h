@@ -26,14 +26,10 @@ struct SignalSeries {
   double faint = 1e3, left = 30.0;
 };
 
-/// What explains got - expected: a transmission (none, a delay, a limit, a dead zone, steps, the signal of
-/// another one, a stuck value), with gain, offset, friction, drift or lag of its result, or noise.
-/// @param others series whose signal this one may have got; it is one of them itself.
-/// @returns one for each fault; none where nothing differs.
-Causes ExplainSignal(const SignalSeries& series, const std::vector<SignalSeries>& others);
-
-/// Those of one channel. What several have with the same value is told once, and each is judged beside that:
-/// one gain of all motors, and another one of one of them.
+/// What explains got - expected of the signals of one channel: a transmission (none, a delay, a limit, a dead
+/// zone, steps, the signal of another one, a stuck value), with gain, offset, friction, drift or lag of its
+/// result, or noise. One for each fault; none where nothing differs. What several have with the same value is
+/// told once, and each is judged beside that: one gain of all motors, and another one of one of them.
 Causes ExplainSignals(std::vector<SignalSeries> series, CauseChannel channel);
 /// All motors, and all readings.
 Causes ExplainSignals(const StepStore& store);

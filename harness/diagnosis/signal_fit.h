@@ -32,7 +32,8 @@ struct SignalVerdict {
   bool is_explained = false;
 };
 
-/// @param others see ExplainSignal. @returns one without steps where nothing differs.
+/// @param others whose signal this one may have got; it is one of them itself. @returns one without steps
+/// where nothing differs.
 SignalVerdict JudgeSignal(const SignalSeries& series, const std::vector<SignalSeries>& others);
 /// An explanation without faults.
 Explanation StartExplanation(const SignalVerdict& verdict, CauseChannel channel);

@@ -1,14 +1,9 @@
 #include "harness/diagnosis/signal_shapes.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <tuple>
 #include <utility>
-
-#include "harness/diagnosis/sine_fit.h"
 
 namespace dexcheck {
 namespace {
@@ -17,13 +12,6 @@ using Eigen::ArrayXd;
 using Eigen::Index;
 
 double SquaredNorm(const ArrayXd& x) { return x.square().sum(); }
-
-/// Whether what has this output for good is over when it would still show.
-bool IsRefuted(const SignalSeries& series, const SignalSteps& steps, const VectorXd& output) {
-  if (!steps.ends) return false;
-  const Index count = output.size() - 1 - steps.last;
-  return ((output - series.expected).tail(count).array().abs() > series.faint * series.noise).any();
-}
 
 /// The signal so many steps before; the first where there is none.
 VectorXd Shift(const VectorXd& signal, Index back) {
@@ -307,6 +295,12 @@ std::vector<SignalShape> ListShapes(const SignalSeries& series, const SignalStep
   return shapes.Take();
 }
 
+bool IsRefuted(const SignalSeries& series, const SignalSteps& steps, const VectorXd& output) {
+  if (!steps.ends) return false;
+  const Index count = output.size() - 1 - steps.last;
+  return ((output - series.expected).tail(count).array().abs() > series.faint * series.noise).any();
+}
+
 std::string PlaceOf(const SignalName& name) {
   return name.group == "motors" ? name.place : name.place + ", " + name.what;
 }
@@ -314,65 +308,6 @@ std::string PlaceOf(const SignalName& name) {
 bool IsDecay(double decay) {
   constexpr double kLeast = 1e-6;
   return decay > kLeast && decay < 1.0 - kLeast;
-}
-
-std::vector<Candidate> ListAdded(const SignalSeries& series, const SignalSteps& steps,
-                                 const SignalShape& shape, SignalSearch search,
-                                 const std::vector<SignalSeries>& others) {
-  const SignalName& name = series.name;
-  const std::string place = PlaceOf(name);
-  std::vector<Candidate> added;
-  const auto add = [&](const char* fault, const std::string& unit, const ArrayXd& column,
-                       double nominal = 0.0) {
-    if (!(column.abs().maxCoeff() > 0.0)) return;
-    added.push_back({.fault = fault,
-                     .place = place,
-                     .unit = unit,
-                     .nominal = nominal,
-                     .columns = column.matrix() / series.noise});
-  };
-  const ArrayXd got = steps.Take(series.got), output = steps.Take(shape.output);
-  const ArrayXd since = steps.Take(series.time) - steps.from;
-  if (shape.has_gain) add("gain", "", output, 1.0);
-  add("offset", name.unit, ArrayXd::Ones(got.size()));
-  add("drift", name.unit + "/s", since);
-  if (shape.fault.empty()) {
-    add("drift of the gain", "1/s", since * output);
-    // g_t - u_t = d (g_(t-1) - u_t) [+ c (u_(t-1) - u_t)]
-    const ArrayXd before = steps.Take(series.got, 1) - output;
-    const auto is_lag = [](const VectorXd& a) { return IsDecay(a[0]); };
-    add("lag", "s", before);
-    if (!added.empty() && added.back().fault == "lag") added.back().is_possible = is_lag;
-    MatrixXd both(got.size(), 2);
-    both << before.matrix() / series.noise, (steps.Take(series.expected, 1) - output).matrix() / series.noise;
-    // Of any gain and offset, got_t - u_t = 1 (got_(t-1) - u_t) - gain (u_(t-1) - u_t).
-    added.push_back({.fault = "lag", .place = place, .unit = "s", .columns = both, .is_possible = is_lag});
-  }
-  if (series.rate.size() > 0) {
-    const ArrayXd rate = steps.Take(series.rate);
-    for (const auto& [fault, unit, column] :
-         {std::tuple{"viscous friction", name.unit + " s/rad", ArrayXd(-rate)},
-          std::tuple{"dry friction", name.unit, ArrayXd(-rate.sign())}}) {
-      const size_t count = added.size();
-      if (IsRefuted(series, steps, series.expected + series.rate)) continue;
-      add(fault, unit, column);
-      if (added.size() > count) added.back().is_possible = [](const VectorXd& a) { return a[0] >= 0.0; };
-    }
-  }
-  if (search == SignalSearch::kCouplings && shape.fault.empty()) {
-    for (Candidate& one : ListCouplings(series, steps, others)) added.push_back(std::move(one));
-  }
-  if (search == SignalSearch::kSines && got.size() >= kFewestOfNoise) {
-    const Sine sine = FindSine(got - output, steps.Take(series.time));
-    // The frequency is the best of as many as there are steps, which weighs 2 log n as two numbers would.
-    added.push_back({.fault = "ripple",
-                     .place = place,
-                     .unit = name.unit,
-                     .detail = fmt::format("at {:.4g} Hz", sine.frequency),
-                     .columns = sine.columns / series.noise,
-                     .parameters = 3});
-  }
-  return added;
 }
 
 }  // namespace dexcheck

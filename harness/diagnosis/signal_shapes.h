@@ -55,6 +55,8 @@ double CalcDecay(const Fault& lag, const SignalSeries& series);
 std::vector<SignalShape> ListShapes(const SignalSeries& series, const SignalSteps& steps,
                                     const std::vector<SignalSeries>& others);
 
+/// Whether what has this output for good is over when it would still show.
+bool IsRefuted(const SignalSeries& series, const SignalSteps& steps, const VectorXd& output);
 /// "motor r_elbow", "joint r_elbow, position".
 std::string PlaceOf(const SignalName& name);
 /// Whether an output that goes on with this fraction of itself follows, and neither runs away nor ahead.
@@ -62,12 +64,9 @@ bool IsDecay(double decay);
 /// What is looked for, each where what is before it explains nothing: sines fit much, and couplings are many.
 enum class SignalSearch { kPlain, kSines, kCouplings };
 
-/// What may be added to a series that nothing simpler explains: crosstalk of another signal of its group, a
-/// gain of one sign or a square of the signal, a ripple or a spring over the position, and of motors friction
-/// that is smooth or grows with the square of the rate.
-std::vector<Candidate> ListCouplings(const SignalSeries& series, const SignalSteps& steps,
-                                     const std::vector<SignalSeries>& others);
-/// What may be added to a transmission's output.
+/// What may be added to a transmission's output: gain, offset, drift, lag and friction; a ripple; and of the
+/// signal itself crosstalk of another one of its group, a gain of one sign, a square or cube, a ripple or a
+/// spring over the position, and of motors friction that is smooth or grows with the square of the rate.
 std::vector<Candidate> ListAdded(const SignalSeries& series, const SignalSteps& steps,
                                  const SignalShape& shape, SignalSearch search,
                                  const std::vector<SignalSeries>& others);

@@ -33,7 +33,7 @@ Fault TellNumber(const Candidate& candidate, const VectorXd& amplitude, const Ve
 }
 
 Causes TellSelection(const Explanation& start, const CauseSelection& selection,
-                     std::span<const Candidate> candidates, const TellCandidate& tell) {
+                     std::span<const Candidate> candidates, const TellCandidate& tell, bool is_explained) {
   Causes causes;
   for (const CauseTerm& term : selection.terms) {
     Explanation& one = causes.emplace_back(start);
@@ -43,6 +43,7 @@ Causes TellSelection(const Explanation& start, const CauseSelection& selection,
     for (const auto& [same, amplitude] : term.same)
       one.faults.push_back(tell(candidates[same], amplitude, {}));
     one.SetOutcome();
+    if (!is_explained) one.outcome = CauseOutcome::kNotExplained;
     if (term.rival != SIZE_MAX) one.SetRival(candidates[term.rival], term.log_odds);
   }
   return causes;

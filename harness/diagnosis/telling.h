@@ -24,7 +24,9 @@ using TellCandidate =
 Fault TellNumber(const Candidate& candidate, const VectorXd& amplitude, const VectorXd& error);
 
 /// As `start`, an explanation for each candidate that is chosen, with what would do in its place.
+/// @param is_explained whether that is enough.
 Causes TellSelection(const Explanation& start, const CauseSelection& selection,
-                     std::span<const Candidate> candidates, const TellCandidate& tell);
+                     std::span<const Candidate> candidates, const TellCandidate& tell,
+                     bool is_explained = true);
 
 }  // namespace dexcheck

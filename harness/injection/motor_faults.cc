@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <deque>
+#include <optional>
 
 #include "harness/injection/fault_kinds.h"
 
@@ -33,24 +34,15 @@ double TorqueOf(const FaultContext& context, int entry) {
   return std::max(std::abs(context.tau[entry]), 1e-6);
 }
 
-/// @param make a transmission that remembers nothing yet.
-InjectedFault OneMotor(const FaultContext& context, int entry, const std::string& name, double value,
-                       double change, const std::function<Transmit()>& make) {
-  InjectedFault fault = FaultAt(NameMotor(context, entry), name, value, change);
+/// Of one motor, or of all for no entry. @param make a transmission that remembers nothing yet.
+InjectedFault ChangeMotors(const FaultContext& context, std::optional<int> entry, const std::string& name,
+                           double value, double change, const std::function<Transmit()>& make) {
+  InjectedFault fault = FaultAt(entry ? NameMotor(context, *entry) : "all motors", name, value, change);
   fault.motors = [entry, make](const Setup&) -> MotorFault {
-    return
-        [entry, transmit = make()](double t, VectorXd* tau) { (*tau)[entry] = transmit((*tau)[entry], t); };
-  };
-  return fault;
-}
-
-InjectedFault AllMotors(const std::string& name, double value, double change,
-                        const std::function<Transmit()>& make) {
-  InjectedFault fault = FaultAt("all motors", name, value, change);
-  fault.motors = [make](const Setup&) -> MotorFault {
-    return [make, all = std::vector<Transmit>()](double t, VectorXd* tau) mutable {
+    return [entry, make, all = std::vector<Transmit>()](double t, VectorXd* tau) mutable {
       while (all.size() < static_cast<size_t>(tau->size())) all.push_back(make());
-      for (Eigen::Index i = 0; i < tau->size(); ++i) (*tau)[i] = all[static_cast<size_t>(i)]((*tau)[i], t);
+      for (int i = entry.value_or(0); i < (entry ? *entry + 1 : tau->size()); ++i)
+        (*tau)[i] = all[static_cast<size_t>(i)]((*tau)[i], t);
     };
   };
   return fault;
@@ -103,8 +95,8 @@ Transmit Round(double step) {
 
 InjectedFault Gain(const FaultContext& context) {
   const double gain = 1.0 + context.draw->Size(0.005, 0.2);
-  return OneMotor(context, DrawEntry(context), "gain", gain, gain - 1.0,
-                  Pure([gain](double u, double) { return gain * u; }));
+  return ChangeMotors(context, DrawEntry(context), "gain", gain, gain - 1.0,
+                      Pure([gain](double u, double) { return gain * u; }));
 }
 
 /// Of the engine's own actuator, after all that is sent.
@@ -123,75 +115,77 @@ InjectedFault EngineGain(const FaultContext& context) {
 
 InjectedFault Offset(const FaultContext& context) {
   const double offset = context.draw->Size(1e-3, 0.1);
-  return OneMotor(context, DrawEntry(context), "offset", offset, offset,
-                  Pure([offset](double u, double) { return u + offset; }));
+  return ChangeMotors(context, DrawEntry(context), "offset", offset, offset,
+                      Pure([offset](double u, double) { return u + offset; }));
 }
 
 InjectedFault Burst(const FaultContext& context) {
   const double offset = context.draw->Size(1e-3, 0.1);
   const double begin = context.draw->Uniform(0.0, 0.5 * context.duration);
   const double end = begin + 0.3 * context.duration;
-  return OneMotor(context, DrawEntry(context), "offset", offset, offset,
-                  Pure([=](double u, double t) { return begin <= t && t < end ? u + offset : u; }));
+  return ChangeMotors(context, DrawEntry(context), "offset", offset, offset,
+                      Pure([=](double u, double t) { return begin <= t && t < end ? u + offset : u; }));
 }
 
 InjectedFault Drift(const FaultContext& context) {
   const double rate = context.draw->Size(0.01, 1.0);
   const double begin = context.draw->Uniform(0.0, 0.3 * context.duration);
-  return OneMotor(context, DrawEntry(context), "drift", rate, rate,
-                  Pure([=](double u, double t) { return u + rate * std::max(0.0, t - begin); }));
+  return ChangeMotors(context, DrawEntry(context), "drift", rate, rate,
+                      Pure([=](double u, double t) { return u + rate * std::max(0.0, t - begin); }));
 }
 
 InjectedFault Ripple(const FaultContext& context) {
   const double size = context.draw->Positive(1e-3, 0.1);
   const double frequency = context.draw->Uniform(3.0, 15.0) / context.duration;
-  return OneMotor(context, DrawEntry(context), "ripple", size, size,
-                  Pure([=](double u, double t) { return u + size * std::sin(2.0 * kPi * frequency * t); }));
+  return ChangeMotors(context, DrawEntry(context), "ripple", size, size, Pure([=](double u, double t) {
+                        return u + size * std::sin(2.0 * kPi * frequency * t);
+                      }));
 }
 
 InjectedFault Delay(const FaultContext& context) {
   const size_t steps = 1 + context.draw->Index(8);
   const auto value = static_cast<double>(steps);
-  return OneMotor(context, DrawEntry(context), "delay", value, value, Late(steps));
+  return ChangeMotors(context, DrawEntry(context), "delay", value, value, Late(steps));
 }
 
 InjectedFault LagOfOne(const FaultContext& context) {
   const double time = context.draw->Uniform(1.0, 20.0) * context.time_step();
-  return OneMotor(context, DrawEntry(context), "lag", time, time, Lag(time, context.time_step()));
+  return ChangeMotors(context, DrawEntry(context), "lag", time, time, Lag(time, context.time_step()));
 }
 
 InjectedFault DeadZone(const FaultContext& context) {
   const int entry = DrawEntry(context);
   const double zone = context.draw->Positive(0.02, 0.8) * TorqueOf(context, entry);
-  return OneMotor(context, entry, "dead zone", zone, zone, Pure([zone](double u, double) {
-                    return std::abs(u) > zone ? u - std::copysign(zone, u) : 0.0;
-                  }));
+  return ChangeMotors(context, entry, "dead zone", zone, zone, Pure([zone](double u, double) {
+                        return std::abs(u) > zone ? u - std::copysign(zone, u) : 0.0;
+                      }));
 }
 
 InjectedFault Rounding(const FaultContext& context) {
   const int entry = DrawEntry(context);
   const double step = context.draw->Positive(1e-3, 0.2) * TorqueOf(context, entry);
-  return OneMotor(context, entry, "rounding to steps of", step, step, Pure(Round(step)));
+  return ChangeMotors(context, entry, "rounding to steps of", step, step, Pure(Round(step)));
 }
 
 InjectedFault Limit(const FaultContext& context) {
   const int entry = DrawEntry(context);
   const double most = context.draw->Uniform(0.3, 0.95) * TorqueOf(context, entry);
-  return OneMotor(context, entry, "limit", most, TorqueOf(context, entry) - most,
-                  Pure([most](double u, double) { return std::clamp(u, -most, most); }));
+  return ChangeMotors(context, entry, "limit", most, TorqueOf(context, entry) - most,
+                      Pure([most](double u, double) { return std::clamp(u, -most, most); }));
 }
 
 InjectedFault Stuck(const FaultContext& context) {
   const int entry = DrawEntry(context);
   const double torque = context.draw->Uniform(-0.9, 0.9) * context.tau[entry];
-  return OneMotor(context, entry, "stuck at", torque, torque - context.tau[entry],
-                  Pure([torque](double, double) { return torque; }));
+  return ChangeMotors(context, entry, "stuck at", torque, torque - context.tau[entry],
+                      Pure([torque](double, double) { return torque; }));
 }
 
 InjectedFault NoiseOfOne(const FaultContext& context) {
   const double size = context.draw->Positive(1e-4, 1e-2);
   // A sample's standard deviation scatters.
-  return OneMotor(context, DrawEntry(context), "noise, standard deviation", size, 5.0 * size, Noise(size));
+  return ChangeMotors(context, DrawEntry(context), "noise, standard deviation", size, 5.0 * size,
+                      Noise(size));
 }
 
 InjectedFault Exchange(const FaultContext& context) {
@@ -213,23 +207,24 @@ InjectedFault Exchange(const FaultContext& context) {
 
 InjectedFault GainOfAll(const FaultContext& context) {
   const double gain = 1.0 + context.draw->Size(1e-4, 1e-2);
-  return AllMotors("gain", gain, gain - 1.0, Pure([gain](double u, double) { return gain * u; }));
+  return ChangeMotors(context, std::nullopt, "gain", gain, gain - 1.0,
+                      Pure([gain](double u, double) { return gain * u; }));
 }
 
 InjectedFault DelayOfAll(const FaultContext& context) {
   const size_t steps = 1 + context.draw->Index(4);
   const auto value = static_cast<double>(steps);
-  return AllMotors("delay", value, value, Late(steps));
+  return ChangeMotors(context, std::nullopt, "delay", value, value, Late(steps));
 }
 
 InjectedFault LagOfAll(const FaultContext& context) {
   const double time = context.draw->Uniform(1.0, 10.0) * context.time_step();
-  return AllMotors("lag", time, time, Lag(time, context.time_step()));
+  return ChangeMotors(context, std::nullopt, "lag", time, time, Lag(time, context.time_step()));
 }
 
 InjectedFault RoundingOfAll(const FaultContext& context) {
   const double step = context.draw->Positive(1e-3, 1e-2);
-  return AllMotors("rounding to steps of", step, step, Pure(Round(step)));
+  return ChangeMotors(context, std::nullopt, "rounding to steps of", step, step, Pure(Round(step)));
 }
 
 constexpr const char* kMotor = "motor";

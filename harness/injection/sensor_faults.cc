@@ -111,23 +111,17 @@ InjectedFault Heading(const FaultContext& context) {
 
 std::string ObjectPlace(const FaultContext& context) { return "object " + context.setup.object().name; }
 
-InjectedFault ObjectPosition(const FaultContext& context) {
+/// One entry of its "position" or "velocity".
+InjectedFault ObjectEntry(const FaultContext& context, const std::string& what) {
   const double offset = DrawOffset(context);
-  const size_t axis = context.draw->Index(3);
-  return Sensor(ObjectPlace(context) + ", position " + "xyz"[axis], "offset", offset, offset,
-                [axis, offset](double, MeasuredState* state) {
-                  state->X_Bo.translation()[static_cast<Eigen::Index>(axis)] += offset;
+  const auto axis = static_cast<Eigen::Index>(context.draw->Index(3));
+  return Sensor(ObjectPlace(context) + ", " + what + " " + "xyz"[axis], "offset", offset, offset,
+                [=, is_position = what == "position"](double, MeasuredState* state) {
+                  (is_position ? state->X_Bo.translation()[axis] : state->V_Bo[axis]) += offset;
                 });
 }
-
-InjectedFault ObjectVelocity(const FaultContext& context) {
-  const double offset = DrawOffset(context);
-  const size_t axis = context.draw->Index(3);
-  return Sensor(ObjectPlace(context) + ", velocity " + "xyz"[axis], "offset", offset, offset,
-                [axis, offset](double, MeasuredState* state) {
-                  state->V_Bo[static_cast<Eigen::Index>(axis)] += offset;
-                });
-}
+InjectedFault ObjectPosition(const FaultContext& context) { return ObjectEntry(context, "position"); }
+InjectedFault ObjectVelocity(const FaultContext& context) { return ObjectEntry(context, "velocity"); }
 
 /// What is measured of one fingertip's contact.
 InjectedFault Contact(const FaultContext& context) {

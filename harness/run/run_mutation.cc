@@ -111,6 +111,9 @@ RunCampaign::RunCampaign(const Scenario& scenario, std::filesystem::path robot, 
     throw InputError(scenario.source + ": task: faults are made in runs along a trajectory");
   if (scenario.plant.type == PlantType::kRigid)
     throw InputError(scenario.source + ": plant.type: faults are made in a run of the engine's plant");
+  if (options.duration == 0.0)
+    options_.duration =
+        scenario.joint_task() == nullptr ? 0.1 : std::max(0.1, scenario.duration - options.from);
   MakeSetups();
   if (scenario.joint_task() == nullptr && begin_ == 0.0) MoveToStart(should_stop);
   if (!should_stop()) RequireNoFaultToPass(should_stop);

@@ -22,11 +22,13 @@ constexpr double kClose = 0.005;  // of a range: near enough to end
 // A check far below what it may take, or far above, says no more by being farther.
 constexpr double kFar = 3.0;
 
+constexpr const char* kTables[] = {"trajectory", "joint_motion", "stance"};
+
 TomlDocument Open(const Scenario& scenario) {
   TomlDocument document(scenario.text, scenario.source);
   for (const std::string& assignment : scenario.overrides) {
-    if (assignment.starts_with("trajectory") || assignment.starts_with("joint_motion"))
-      document.Override(assignment);
+    for (const char* table : kTables)
+      if (assignment.starts_with(table)) document.Override(assignment);
   }
   return document;
 }
@@ -48,7 +50,7 @@ void AddKey(const TomlValue& value, double factor, std::vector<MotionKey>* keys)
 /// Keys of one oscillation or weave, or of the parts of a sum.
 void AddKeys(const std::vector<std::pair<std::string, TomlValue>>& entries, std::vector<MotionKey>* keys) {
   for (const auto& [name, value] : entries) {
-    if (name == "parts") {
+    if (name == "parts" || name == "oscillations") {
       for (const TomlValue& part : value.AsList()) AddKeys(part.AsTable().GetEntries(), keys);
     } else if (name == "xyz" || name == "zyz" || name == "zyz_deg") {
       for (const TomlValue& component : value.AsList()) AddKey(component, kAmplitudes, keys);
@@ -248,11 +250,7 @@ std::vector<MotionKey> ListMotionKeys(const Scenario& scenario) {
   const TomlDocument document = Open(scenario);
   TomlTable root = document.Open();
   std::vector<MotionKey> keys;
-  AddKeys(ListEntries(root, "trajectory"), &keys);
-  for (const auto& [name, value] : ListEntries(root, "joint_motion")) {
-    if (name != "oscillations") continue;
-    for (const TomlValue& one : value.AsList()) AddKeys(one.AsTable().GetEntries(), &keys);
-  }
+  for (const char* table : kTables) AddKeys(ListEntries(root, table), &keys);
   for (MotionKey& key : keys) key.key = ToOverridePath(key.key);
   return keys;
 }

@@ -26,6 +26,8 @@ TEST_F(InitCommand, MakesAFolderOfAUrdfThatRuns) {
   const Json run = RunMotion(0, "pair");
   EXPECT_EQ(run.at("verdict"), "pass");
   EXPECT_GT(run.at("tracking").at("joint_error_max_rad").get<double>(), 0.0);
+  // It swings, each joint in its own way, which can be made to show more.
+  EXPECT_THAT(Expect(0, "excite pair/motion.toml --runs 4 --quiet").out, HasSubstr("FOUND"));
   // The MJCF is the URDF to rounding, and an independent one agrees with it.
   for (const char* other : {"pair.urdf", "pair/robot.toml"})
     EXPECT_EQ(
@@ -182,6 +184,7 @@ TEST_F(InitCommand, ARobotWithAFloatingBaseStands) {
   const Json run = RunMotion(0, "dog");
   EXPECT_EQ(run.at("verdict"), "pass");
   EXPECT_GT(run.at("checks").at("foot_cone_use").at("max").get<double>(), 0.0);
+  EXPECT_THAT(Expect(0, "excite dog/motion.toml --runs 2 --quiet").out, HasSubstr("FOUND"));
   // Without places to stand on it is held, and its joints move all the same.
   EXPECT_THAT(Expect(0, {"init", kMjcf + "quadruped.xml", "--out", "held"}).err,
               HasSubstr("base is held: no stance was found, because 0 places touch the ground"));

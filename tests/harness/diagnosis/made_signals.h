@@ -67,7 +67,7 @@ inline Causes Explain(const SignalSeries& series) {
   SignalSeries other = series;
   other.name.place = "motor wrist";
   other.expected = other.got = CalcOtherTorque();
-  return ExplainSignal(series, {series, other});
+  return ExplainSignals({series, other}, CauseChannel::kActuation);
 }
 
 /// What a motor gives that does this: `got` as a function of the step.

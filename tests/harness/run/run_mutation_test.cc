@@ -182,6 +182,7 @@ TEST(RunCampaign, RefusesMoreFaultsThanThereArePlaces) {
 TEST(RunCampaign, NamesTheWrongSummandOfEveryLaw) {
   RunMutationOptions options;
   options.draws = 15;
+  options.duration = 0.1;
   options.kinds = {"law"};
   int all = 0, named = 0;
   const auto count = [&](const char* scenario, const std::vector<std::string>& overrides) {
@@ -214,6 +215,7 @@ TEST(RunCampaign, NamesLawsOfJointsBesideWrongSensors) {
   RunMutationOptions options;
   options.draws = 12;
   options.together = 2;
+  options.duration = 0.1;
   options.kinds = {"law", "sensor"};
   const Scenario read = ReadShippedScenario("panda-reach", {});
   RunCampaign campaign(read, read.model_file, read.mjcf_file, options, kGoOn);
@@ -237,6 +239,7 @@ TEST(RunCampaign, NamesForcesThatGrow) {
     options.together = together;
     options.kinds = {"joint", "body"};
     options.seed = 3;
+    options.duration = 0.1;
     const Scenario read = ReadShippedScenario("panda-reach", {});
     RunCampaign campaign(read, read.model_file, read.mjcf_file, options, kGoOn);
     int grow = 0, named = 0, told = 0, wrong = 0;
@@ -271,6 +274,46 @@ TEST(RunCampaign, NamesForcesThatGrow) {
 }
 
 // Contacts that are elsewhere do not hide what else acts on object and fingers.
+RunCampaign MakeReach(const RunMutationOptions& options) {
+  const Scenario read = ReadShippedScenario("panda-reach", {});
+  return {read, read.model_file, read.mjcf_file, options, kGoOn};
+}
+
+// What grows on a body that hardly shows it has begun long before it is seen, and is not taken for what else
+// leaves as little there.
+TEST(RunCampaign, ForcesMayGrowBeforeTheyShow) {
+  RunMutationOptions options;
+  options.duration = 0.1;
+  options.draws = 300;  // of others none is run
+  options.kinds = {"body"};
+  options.seed = 5;
+  RunCampaign campaign = MakeReach(options);
+  int grow = 0;
+  for (size_t i = 0; i < campaign.mutants().size(); ++i) {
+    const RunMutant& mutant = campaign.mutants()[i];
+    if (!mutant.all.name.starts_with("link panda_link1: force at its centre of mass that grows")) continue;
+    EXPECT_TRUE(campaign.Run(i, kGoOn));
+    if (!mutant.killed) continue;
+    ++grow;
+    EXPECT_EQ(mutant.score.wrong + mutant.score.not_explained, 0) << mutant.all.name << ": " << mutant.causes;
+  }
+  EXPECT_GE(grow, 2);
+}
+
+// Of all of a motion blocks of steps are kept: what begins in one of them is not spread over those before.
+TEST(RunCampaign, NamesWhatBeginsInAllOfAMotion) {
+  RunMutationOptions options;
+  options.draws = 60;
+  options.together = 2;
+  options.seed = 1101;
+  RunCampaign campaign = MakeReach(options);
+  const RunMutant& mutant = campaign.mutants()[58];
+  ASSERT_THAT(mutant.all.name,
+              ::testing::StartsWith("link panda_link4: force at its centre of mass that grows by"));
+  EXPECT_TRUE(campaign.Run(58, kGoOn));
+  EXPECT_TRUE(mutant.is_named()) << mutant.causes;
+}
+
 TEST(RunCampaign, NamesForcesBesideOtherShapes) {
   RunMutationOptions options;
   options.draws = 24;
