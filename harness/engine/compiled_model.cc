@@ -143,7 +143,8 @@ constexpr double kLoneRadius = 0.05;   // m, of a body that no other hangs on
 constexpr int kFirstHiddenGroup = 3;   // the engine shows groups 0 to 2
 constexpr float kRodColor[4] = {0.80F, 0.82F, 0.85F, 1.0F};
 constexpr float kBallColor[4] = {0.30F, 0.50F, 0.78F, 1.0F};
-constexpr float kHeadlight[3] = {0.7F, 0.7F, 0.7F};
+constexpr float kDiffuse = 0.7F;  // of the headlight
+constexpr float kAmbient = 0.4F;  // likewise; a floor, seen at an angle, has little else
 
 /// A rod between two places of a body, or a ball where they are one, in the body's frame.
 struct Bone {
@@ -168,12 +169,15 @@ bool FloatsFreely(const mjModel& m, int body) {
   return m.body_jntnum[body] > 0 && m.jnt_type[m.body_jntadr[body]] == mjJNT_FREE;
 }
 
-/// Of a model without lights: the engine's own headlight leaves it dark.
+/// Of a model without lights, or with lamps that reach one place only: the engine's own headlight leaves it
+/// dark.
 void Brighten(mjModel* m) {
-  if (m->nlight > 0) return;
+  for (int light = 0; light < m->nlight; ++light) {
+    if (IsDirectional(*m, light)) return;
+  }
   for (int i = 0; i < 3; ++i) {
-    m->vis.headlight.diffuse[i] = std::max(m->vis.headlight.diffuse[i], kHeadlight[i]);
-    m->vis.headlight.ambient[i] = std::max(m->vis.headlight.ambient[i], 0.4F * kHeadlight[i]);
+    if (m->nlight == 0) m->vis.headlight.diffuse[i] = std::max(m->vis.headlight.diffuse[i], kDiffuse);
+    m->vis.headlight.ambient[i] = std::max(m->vis.headlight.ambient[i], kAmbient);
   }
 }
 

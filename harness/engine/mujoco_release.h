@@ -12,6 +12,7 @@
 // | 3.2   | (or before) mjv_connector takes points; sensors have no noise |
 // | 3.2.3 | mpr_iterations, mpr_tolerance are ccd_iterations, ccd_tolerance |
 // | 3.3   | mj_makeM makes the mass matrix, rotors of tendons included |
+// | 3.3.3 | lights have a type in the place of whether they are directional |
 // | 3.5   | version numbers have three digits for minor and patch: 3005000; sizes are mjtSize |
 // | 3.5   | mj_ray gives the normal of what it meets |
 // | 3.6   | the tendons' Jacobian is sparse in any case, and its rows are the model's |
@@ -91,6 +92,15 @@ inline mjtNum GetColliderTolerance(const mjOption& option) { return option.ccd_t
 inline int GetColliderIterations(const mjOption& option) { return option.mpr_iterations; }
 inline mjtNum GetColliderTolerance(const mjOption& option) { return option.mpr_tolerance; }
 #endif
+
+/// Whether a light shines everywhere alike.
+inline bool IsDirectional(const mjModel& m, int light) {
+#if mjVERSION_HEADER >= 333
+  return m.light_type[light] == mjLIGHT_DIRECTIONAL;
+#else
+  return m.light_directional[light] != 0;
+#endif
+}
 
 /// What the engine warned of. Its information is an int, or in later releases a size.
 template <typename Info>

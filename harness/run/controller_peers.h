@@ -54,7 +54,8 @@ class ProgramPeer final : public ControllerPeer {
 
   OwnControllerSetup setup_;
   FileDescriptor socket_;
-  double time_limit_ = 0.0;  // s
+  double time_limit_ = 0.0;   // s
+  bool answers_soon_ = true;  // the last wait was short
   std::optional<ChildProcess> process_;
 };
 

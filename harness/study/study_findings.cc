@@ -184,6 +184,7 @@ std::string DescribeLimits(const Study& study, const std::vector<TrialRow>& rows
 std::string MakeGainCard(const StudyInputs& inputs, const std::vector<TrialRow>& rows) {
   const Study& study = inputs.study;
   if (study.objectives.size() != 1 || study.search.method == SearchMethod::kMargins) return "";
+  if (!study.controller.empty()) return "";  // whose gains are its own
   const std::vector<JudgedPoint> points = JudgePoints(study, rows);
   const std::vector<const JudgedPoint*> feasible = SortFeasible(points);
   if (feasible.empty()) return "";
@@ -192,7 +193,6 @@ std::string MakeGainCard(const StudyInputs& inputs, const std::vector<TrialRow>&
   const TrialRow& row =
       *std::ranges::find_if(rows, [&](const TrialRow& one) { return one.trial.number == number; });
   const Scenario scenario = MakeTrialScenario(inputs, row.trial);
-  // Of a controller of the user's own the gains are its own.
   if (scenario.joint_task() == nullptr || scenario.controller.exists()) return "";
   const Scenario yours =
       ParseScenario(inputs.scenario_text, inputs.scenario_source, inputs.scenario_folder, study.overrides);

@@ -1,8 +1,10 @@
 """Controllers of one's own: what they are given at each step, and how they answer (controller_protocol.h)."""
 
 import inspect
+import os
 import socket
 import struct
+import time
 import traceback
 
 import numpy as np
@@ -12,6 +14,8 @@ _MAGIC, _PROTOCOL = b"DEXCTRL\0", 1
 _STEP, _BEGIN, _END, _SET_PARAMETERS, _ERROR = 1, 2, 3, 4, 5
 _HELLO = struct.Struct("=8s6I17d")
 _MESSAGE = struct.Struct("=II")
+# To sleep and be woken by another core takes longer than a step: a wait begins so long awake, s, if the last was over by then.
+_AWAKE = 300e-6
 
 
 class RunError(RuntimeError):
@@ -148,9 +152,16 @@ def _receive(connection, size):
     return bytes(data)
 
 
-def _receive_into(connection, view):
+def _receive_into(connection, view, awake=0.0):
+    """@param awake: how long it looks before it sleeps, s."""
+    until = time.monotonic() + awake
     while view:
-        got = connection.recv_into(view, len(view), socket.MSG_WAITALL)
+        looks = awake > 0 and time.monotonic() < until
+        try:
+            got = connection.recv_into(view, 0, socket.MSG_DONTWAIT if looks else socket.MSG_WAITALL)
+        except BlockingIOError:
+            os.sched_yield()
+            continue
         if got == 0:
             raise EOFError
         view = view[got:]
@@ -189,8 +200,13 @@ def _serve_steps(connection, controller):
     reply = np.zeros(1 + robot.n + (3 * robot.N if controller.reports_F_N else 0))
     reply[:1] = np.frombuffer(_MESSAGE.pack(_STEP, len(reply) - 1))
     torques, F_N = reply[1:1 + robot.n], reply[1 + robot.n:]
+    header = memoryview(bytearray(_MESSAGE.size))
+    awake = _AWAKE
     while True:
-        kind, size = _MESSAGE.unpack(_receive(connection, _MESSAGE.size))
+        begin = time.monotonic()
+        _receive_into(connection, header, awake)
+        awake = _AWAKE if time.monotonic() - begin < _AWAKE else 0.0
+        kind, size = _MESSAGE.unpack(header)
         if kind == _STEP:
             _receive_into(connection, into)
             tau = controller.step(state)

@@ -186,14 +186,16 @@ TEST_P(OwnParameters, AreKeysOfAStudy) {
   WriteText(
       Path("gains.toml"),
       "name = \"gains\"\nscenario = \"own.toml\"\nset = [\"sensing-=\", \"actuation-=\"]\ncontroller = '" +
-          GetParam().controller + "'\n[[vary]]\nkey = \"" + GetParam().parameter + "\"\nvalues = [" +
-          std::to_string(GetParam().soft) + ", " + std::to_string(GetParam().stiff) + "]\n");
+          GetParam().controller + "'\nobjective = [{ minimize = \"joint_error_rms\" }]\n[[vary]]\nkey = \"" +
+          GetParam().parameter + "\"\nvalues = [" + std::to_string(GetParam().soft) + ", " +
+          std::to_string(GetParam().stiff) + "]\n");
   Expect(0, "study run gains.toml --db gains.sqlite --quiet --jobs 2");
   const Json first = RunJson(0, "study show gains.sqlite 0"), last = RunJson(0, "study show gains.sqlite 1");
   const double soft = first["metrics"]["joint_error_rms"], stiff = last["metrics"]["joint_error_rms"];
   EXPECT_GT(soft, 2.0 * stiff);
   EXPECT_GT(stiff, 0.0);
   EXPECT_THAT(first["command"].get<std::string>(), HasSubstr("--controller"));
+  Expect(0, "study report gains.sqlite --out gains.html");
   // The rows belong to this controller: to its name, and to its file.
   const std::filesystem::path own = GetParam().controller;
   const std::string copy = "copy" + own.extension().string();

@@ -209,6 +209,18 @@ TEST(Skeleton, LeavesARobotWithShapesAlone) {
   for (int geom = 0; geom < model->ngeom; ++geom) EXPECT_EQ(model->geom_group[geom], plain->geom_group[geom]);
 }
 
+// A lamp over one place leaves the floor dark; what shines everywhere is as its author wants it.
+TEST(Skeleton, BrightensWhatLampsLeaveDark) {
+  const std::string world = "<worldbody>";
+  const auto ambient = [&](const std::string& light) {
+    return MakeVisible(LoadMjcfText(ReplaceOnce(kArm, world, world + light), "arm"))
+        ->vis.headlight.ambient[0];
+  };
+  EXPECT_GT(ambient(""), 0.3);
+  EXPECT_EQ(ambient(R"(<light pos="0 0 2"/>)"), ambient(""));
+  EXPECT_LT(ambient(R"(<light pos="0 0 2"/><light pos="0 0 2" directional="true"/>)"), 0.2);
+}
+
 TEST(Skeleton, ShowsShapesThatAreAllHidden) {
   const std::string joint = R"(<joint name="elbow" axis="0 1 0"/>)";
   const MjModelPtr model = MakeVisible(LoadMjcfText(
