@@ -16,8 +16,7 @@ namespace {
 constexpr double kHalf = 2.0;  // s, there, and as long back
 
 JointSpan ChooseSpan(const Joint& joint, bool states_range, double home) {
-  constexpr double kMargin = 0.2;       // of the range, at either end
-  constexpr double kSwing = 1.0 / 3.0;  // of the way
+  constexpr double kMargin = 0.2, kSwing = 1.0 / 3.0;  // of the range, at either end; of the way
   const double most = joint.type == JointType::kPrismatic ? 0.05 : 0.3;
   const double width = states_range ? joint.upper - joint.lower : 2.0 * most;
   // All turns are alike; those that are written stay between -pi and pi, as printed, too.

@@ -82,7 +82,8 @@ std::string JoinFailed(const RunChecks& checks) {
 }
 
 InjectedFault JoinAll(const FaultSet& set) {
-  return std::accumulate(set.begin() + 1, set.end(), set.front(), Join);
+  return std::accumulate(set.begin() + 1, set.end(), set.front(),
+                         [](const auto& a, const auto& b) { return dexcheck::Join(a, b); });
 }
 
 }  // namespace
