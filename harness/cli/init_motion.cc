@@ -15,10 +15,8 @@ namespace {
 
 constexpr double kHalf = 2.0;  // s, there, and as long back
 
-/// @param number of the joint.
-JointSpan ChooseSpan(const Joint& joint, bool states_range, double home, size_t number) {
-  constexpr double kMargin = 0.2;       // of the range, at either end
-  constexpr double kSwing = 1.0 / 3.0;  // of the way
+JointSpan ChooseSpan(const Joint& joint, bool states_range, double home) {
+  constexpr double kMargin = 0.2, kSwing = 1.0 / 3.0;  // of the range, at either end; of the way
   const double most = joint.type == JointType::kPrismatic ? 0.05 : 0.3;
   const double width = states_range ? joint.upper - joint.lower : 2.0 * most;
   // All turns are alike; those that are written stay between -pi and pi, as printed, too.
@@ -26,7 +24,7 @@ JointSpan ChooseSpan(const Joint& joint, bool states_range, double home, size_t 
   if (!states_range) home = std::clamp(home, joint.lower + kTurns * most, joint.upper - kTurns * most);
   const double low = states_range ? joint.lower + kMargin * width : home - most;
   const double high = states_range ? joint.upper - kMargin * width : home + most;
-  JointSpan span{.swing = std::min(kSwing * most, 0.5 * kMargin * width), .number = number};
+  JointSpan span{.swing = std::min(kSwing * most, 0.5 * kMargin * width)};
   span.start = std::clamp(home, low, high);
   const double step = std::min(most, 0.5 * (high - low));
   span.end = span.start + step <= high ? span.start + step : span.start - step;
@@ -39,10 +37,8 @@ JointSpan Follow(const Joint& joint, const JointSpan& leader, const JointSpan& o
   const JointSpan led{coupling.multiplier * leader.start + coupling.offset,
                       coupling.multiplier * leader.end + coupling.offset, coupling.multiplier * leader.swing,
                       leader.number};
-  const auto is_within = [&](double q) {
-    const double swing = std::abs(led.swing);
-    return q - swing >= joint.lower && q + swing <= joint.upper;
-  };
+  const double swing = std::abs(led.swing);
+  const auto is_within = [&](double q) { return q - swing >= joint.lower && q + swing <= joint.upper; };
   return is_within(led.start) && is_within(led.end) ? led : own;
 }
 
@@ -51,8 +47,8 @@ std::vector<JointSpan> ChooseSpans(const RobotDescription& robot, const std::map
   for (size_t i = 0; i < robot.spec.joints.size(); ++i) {
     const Joint& joint = robot.spec.joints[i];
     const auto wish = home.find(joint.name);
-    JointSpan span =
-        ChooseSpan(joint, robot.joints[i].states_range, wish == home.end() ? 0.0 : wish->second, i);
+    JointSpan span = ChooseSpan(joint, robot.joints[i].states_range, wish == home.end() ? 0.0 : wish->second);
+    span.number = i;
     if (joint.coupling && joint.coupling->leader < static_cast<int>(i))
       span = Follow(joint, spans[static_cast<size_t>(joint.coupling->leader)], span);
     spans.push_back(span);

@@ -68,31 +68,27 @@ CampaignFault Describe(const RunMutant& mutant) {
 /// Of drawn faults, by the number of those of a set that are found alone: how many are named, and in how many
 /// sets each is named as well as when it is alone.
 void PrintScores(const Campaign& campaign, int together) {
+  constexpr const char* kNames[] = {"right", "in_class", "not_explained", "wrong"};
   struct Count {
-    int sets = 0, all_right = 0, as_alone = 0, right = 0, in_class = 0, not_explained = 0, wrong = 0;
+    int sets = 0, all_right = 0, as_alone = 0, of[std::size(kNames)] = {};
   };
   std::map<int, Count> counts;
   for (const CampaignFault& fault : campaign.faults) {
     if (fault.outcome != MutantOutcome::kKilled) continue;
-    const int right = fault.details["right"].get<int>();
-    const int in_class = fault.details["in_class"].get<int>();
-    const int not_explained = fault.details["not_explained"].get<int>();
-    Count& count = counts[right + in_class + not_explained];
+    int of[std::size(kNames)];
+    for (size_t k = 0; k < std::size(kNames); ++k) of[k] = fault.details[kNames[k]].get<int>();
+    Count& count = counts[of[0] + of[1] + of[2]];
     ++count.sets;
-    const int wrong = fault.details["wrong"].get<int>();
-    count.all_right += static_cast<int>(in_class + not_explained + wrong == 0);
+    count.all_right += static_cast<int>(of[1] + of[2] + of[3] == 0);
     count.as_alone += static_cast<int>(fault.details["as_alone"].get<bool>());
-    count.right += right;
-    count.in_class += in_class;
-    count.not_explained += not_explained;
-    count.wrong += wrong;
+    for (size_t k = 0; k < std::size(kNames); ++k) count.of[k] += of[k];
   }
   for (const auto& [size, one] : counts) {
     const std::string alone = together > 1 ? fmt::format(", each as well as alone in {}", one.as_alone) : "";
     fmt::print(
         "{} sets of {}: all named in {}{}; of their faults {} named, {} up to a class, {} not explained; {} "
         "wrong names.\n",
-        one.sets, size, one.all_right, alone, one.right, one.in_class, one.not_explained, one.wrong);
+        one.sets, size, one.all_right, alone, one.of[0], one.of[1], one.of[2], one.of[3]);
   }
 }
 

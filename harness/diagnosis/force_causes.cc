@@ -12,13 +12,21 @@ using Eigen::Index;
 
 constexpr size_t kMostSegments = 8, kMostBends = 4;
 
+/// Whether they have a fault in common.
 bool IsSame(const Explanation& a, const Explanation& b) {
-  if (a.outcome == CauseOutcome::kNotExplained || b.outcome == CauseOutcome::kNotExplained) return false;
-  const Fault& x = a.faults.front();
-  const Fault& y = b.faults.front();
   constexpr double kSame = 0.02;
-  return x.fault == y.fault && x.place == y.place &&
-         std::abs(x.value - y.value) <= kSame * std::abs(x.value) + 3.0 * (x.error + y.error);
+  const double error = 3.0 * (a.faults.front().error + b.faults.front().error);
+  return std::any_of(a.faults.begin(), a.faults.end(), [&](const Fault& x) {
+    return std::any_of(b.faults.begin(), b.faults.end(), [&](const Fault& y) {
+      return x.IsLike(y) && std::abs(x.value - y.value) <= kSame * std::abs(x.value) + error;
+    });
+  });
+}
+
+/// What tells fewer faults apart, or the size of the same one better.
+bool IsSharper(const Explanation& a, const Explanation& b) {
+  if (a.faults.size() != b.faults.size()) return a.faults.size() < b.faults.size();
+  return a.faults.front().error < b.faults.front().error;
 }
 
 /// A part of the steps and what explains it.
@@ -106,7 +114,13 @@ Causes ExplainParts(const StepStore& store, StepForces* forces, const std::vecto
   Causes causes;
   for (size_t i = 0; i < parts.size(); ++i) {
     if (simplest.is_explained) {
-      const Part beside = ExplainPart(store, forces, segments[i], &simplest);
+      Part beside = ExplainPart(store, forces, segments[i], &simplest);
+      // What has the same faults by itself, and no more of them, knows them better.
+      const auto& own = parts[i].causes;
+      if (std::all_of(simplest.causes.begin(), simplest.causes.end(), [&](const auto& one) {
+            return std::any_of(own.begin(), own.end(), [&](const auto& other) { return IsSame(one, other); });
+          }))
+        beside.terms.count += simplest.terms.count;
       if (is_simpler(beside, parts[i])) parts[i] = beside;
     }
     if (!parts[i].is_explained || (exactly && !parts[i].is_exact)) return {};
@@ -119,7 +133,7 @@ Causes ExplainParts(const StepStore& store, StepForces* forces, const std::vecto
         same->to = one.to;
         same->ends = one.ends;
         same->unseen_after = one.unseen_after;
-        if (one.faults.size() < same->faults.size()) same->faults = one.faults, same->outcome = one.outcome;
+        if (IsSharper(one, *same)) same->faults = one.faults, same->outcome = one.outcome;
       }
     }
   }

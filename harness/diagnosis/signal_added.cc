@@ -75,11 +75,9 @@ class AddedList {
   [[nodiscard]] std::vector<Candidate> Take() { return std::move(candidates_); }
 
  private:
-  using IsPossible = std::function<bool(const VectorXd&)>;
-
   /// @param columns that are not all zero.
   void Add(const std::string& fault, const std::string& unit, const MatrixXd& columns, double nominal = 0.0,
-           const IsPossible& is_possible = nullptr) {
+           const std::function<bool(const VectorXd&)>& is_possible = nullptr) {
     if (!(columns.cwiseAbs().maxCoeff() > 0.0)) return;
     candidates_.push_back({.fault = fault,
                            .place = PlaceOf(series_.name),

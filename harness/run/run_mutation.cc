@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <stdexcept>
 #include <utility>
 
@@ -81,9 +82,8 @@ std::string JoinFailed(const RunChecks& checks) {
 }
 
 InjectedFault JoinAll(const FaultSet& set) {
-  InjectedFault all = set.front();
-  for (size_t i = 1; i < set.size(); ++i) all = Join(all, set[i]);
-  return all;
+  return std::accumulate(set.begin() + 1, set.end(), set.front(),
+                         [](const auto& a, const auto& b) { return dexcheck::Join(a, b); });
 }
 
 }  // namespace
