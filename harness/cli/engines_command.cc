@@ -108,7 +108,7 @@ void PrintVerdict(const EnginesRequest& request, const EngineComparisonResult& r
                request.options.states.samples);
   }
   if (result.Agrees()) {
-    fmt::print("AGREE: {} agree in all terms that they have in common.\n", JoinNames(result.names));
+    fmt::print("AGREE: {} agree in all terms that they share.\n", JoinNames(result.names));
     return;
   }
   fmt::print("DISAGREE:\n");

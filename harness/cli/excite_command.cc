@@ -154,10 +154,6 @@ struct ExciteRequest : ScenarioRequest {
   MotionRequest of_model;
 };
 
-std::string Head(const ExcitingMotion& motion) {
-  return fmt::format("{} numbers of the motion, {} runs", motion.keys.size(), motion.runs);
-}
-
 void Print(const Scenario& scenario, const ExcitingMotion& motion) {
   std::vector<TableRow> rows = {{{"regressor of (48) along the run", "given", "found"}}};
   const auto both = [&](const std::string& what, const char* format, const auto& calc) {
@@ -170,7 +166,8 @@ void Print(const Scenario& scenario, const ExcitingMotion& motion) {
   both("condition number of these", "{:.3e}", [](const JudgedMotion& m) { return m.condition(); });
   both(fmt::format("combinations above the floor of {:.0e}", motion.floor), "{}",
        [&](const JudgedMotion& m) { return CountAbove(m.singular_values, motion.floor); });
-  fmt::print("{}: {}\n\n{}", scenario.name, Head(motion), FormatTable("<>>", rows));
+  fmt::print("{}: {} numbers of the motion, {} runs\n\n{}", scenario.name, motion.keys.size(), motion.runs,
+             FormatTable("<>>", rows));
   fmt::print("nearest to what it may take: {}\n\n", motion.found.nearest);
   for (const std::string& setting : motion.overrides) fmt::print("--set {}\n", QuoteForShell(setting));
 }

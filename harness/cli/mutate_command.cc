@@ -23,6 +23,7 @@ struct MutateRequest {
   MutateRunRequest run;  // with a scenario, faults are made in its run
   RobotFiles files;
   MutationOptions options;
+  std::optional<double> duration;
   bool no_diagnosis = false;
   std::string json_file;
   bool quiet = false;
@@ -65,6 +66,8 @@ CampaignFault Describe(const FormulaMutant& mutant) {
 int Run(MutateRequest request) {
   if (!request.run.scenario.empty()) {
     request.run.options.scale = request.options.scale;
+    request.run.options.looks_on = !request.duration && request.run.options.draws == 0;
+    request.run.options.duration = request.duration.value_or(request.run.options.duration);
     request.run.json_file = request.json_file;
     request.run.quiet = request.quiet;
     return request.run.smallest ? PrintSmallestErrors(request.run) : MutateRun(request.run);
@@ -142,11 +145,14 @@ void AddMutateCommand(Command app) {
           .Needs(run)
           .ShowDefault();
   Option duration =
-      command.AddOption("--duration", &request->run.options.duration, "In a run: how long it is looked at, s")
+      command
+          .AddOption(
+              "--duration", &request->duration,
+              "In a run: how long it is looked at, s (0.1 by default; in a motion of joints a fault that "
+              "is not drawn and not found is looked at to the end)")
           .TypeName("T")
           .Check(NumberFrom(1e-3, 1e4))
-          .Needs(run)
-          .ShowDefault();
+          .Needs(run);
   Option faults = command
                       .AddOption("--numbers", &request->run.options.parameters,
                                  "In a run: how many numbers of the model are changed, evenly out of all")
