@@ -321,7 +321,9 @@ bool RunCampaign::LookOn(RunMutant* mutant, const std::function<bool()>& should_
   }
   whole_->mutants_ = {{.faults = mutant->faults, .all = mutant->all}};
   const bool is_done = whole_->Run(0, should_stop);
-  *mutant = whole_->mutants_.front();
+  // A motion may end where it began, where its way is no scale for what has no effect.
+  const RunMutant& later = whole_->mutants_.front();
+  if (later.killed || !mutant->no_effect) *mutant = later;
   return is_done;
 }
 
