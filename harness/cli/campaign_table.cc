@@ -3,7 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <fstream>
+#include <string_view>
 
 #include "controller/common/toml_reader.h"
 #include "harness/base/byte_archive.h"
@@ -15,18 +17,18 @@
 namespace dexcheck::cli {
 namespace {
 
+/// In the order of MutantOutcome.
+constexpr std::array<std::string_view, 4> kOutcomes = {"found", "refused", "no effect", "survived"};
+
 /// A line of the table.
 struct Row {
   std::string kind;
-  int faults = 0, found = 0, refused = 0, no_effect = 0, survived = 0, cause_right = 0, part_named = 0,
-      with_part = 0;
+  int faults = 0, cause_right = 0, part_named = 0, with_part = 0;
+  std::array<int, kOutcomes.size()> outcomes{};
 
   void Add(const CampaignFault& fault) {
     ++faults;
-    found += fault.outcome == MutantOutcome::kKilled ? 1 : 0;
-    refused += fault.outcome == MutantOutcome::kRefused ? 1 : 0;
-    no_effect += fault.outcome == MutantOutcome::kNoEffect ? 1 : 0;
-    survived += fault.outcome == MutantOutcome::kSurvived ? 1 : 0;
+    ++outcomes[static_cast<size_t>(fault.outcome)];
     cause_right += fault.cause_right ? 1 : 0;
     with_part += fault.part_named ? 1 : 0;
     part_named += fault.part_named.value_or(false) ? 1 : 0;
@@ -47,24 +49,13 @@ std::vector<Row> SumUp(const std::vector<CampaignFault>& faults) {
   return rows;
 }
 
-const char* NameOutcome(MutantOutcome outcome) {
-  if (outcome == MutantOutcome::kKilled) return "found";
-  if (outcome == MutantOutcome::kRefused) return "refused";
-  return outcome == MutantOutcome::kNoEffect ? "no effect" : "survived";
-}
-
 constexpr const char* kOwnKeys[] = {"kind", "name", "outcome", "cause_right", "part_named", "remark"};
-
-MutantOutcome OutcomeOf(const Json& name) {
-  for (const MutantOutcome outcome :
-       {MutantOutcome::kKilled, MutantOutcome::kRefused, MutantOutcome::kNoEffect})
-    if (name == NameOutcome(outcome)) return outcome;
-  return MutantOutcome::kSurvived;
-}
 
 CampaignFault ReadFault(const Json& json) {
   CampaignFault fault{.kind = json.at("kind"), .name = json.at("name")};
-  fault.outcome = OutcomeOf(json.at("outcome"));
+  const std::string outcome = json.at("outcome");
+  fault.outcome = static_cast<MutantOutcome>(std::find(kOutcomes.begin(), kOutcomes.end() - 1, outcome) -
+                                             kOutcomes.begin());
   fault.cause_right = json.at("cause_right");
   if (json.contains("part_named")) fault.part_named = json["part_named"].get<bool>();
   fault.exception = json.at("remark");
@@ -124,8 +115,9 @@ void Campaign::Print(bool quiet) const {
     fmt::print("{:<{}}{:>7}{:>6}{:>8}{:>10}{:>9}{:>6}{:>10}\n", "what was wrong", width, "faults", "found",
                "refused", "no effect", "survived", "cause", all.with_part > 0 ? "part" : "");
     for (const Row& row : rows) {
-      fmt::print("{:<{}}{:>7}{:>6}{:>8}{:>10}{:>9}{:>6}{:>10}\n", row.kind, width, row.faults, row.found,
-                 row.refused, row.no_effect, row.survived, row.cause_right,
+      const auto [found, refused, no_effect, survived] = row.outcomes;
+      fmt::print("{:<{}}{:>7}{:>6}{:>8}{:>10}{:>9}{:>6}{:>10}\n", row.kind, width, row.faults, found, refused,
+                 no_effect, survived, row.cause_right,
                  row.with_part > 0 ? fmt::format("{} of {}", row.part_named, row.with_part) : "");
     }
     for (const CampaignFault& fault : faults) {
@@ -135,8 +127,8 @@ void Campaign::Print(bool quiet) const {
   }
   if (faults.size() < total) fmt::print("INTERRUPTED after {} of {} faults. So far:\n", faults.size(), total);
   std::string verdict = fmt::format("{}: {} of {} faults that are possible and have an effect were found",
-                                    all.survived == 0 ? "ALL FOUND" : "SURVIVORS", all.found,
-                                    all.faults - all.refused - all.no_effect);
+                                    all.outcomes[3] == 0 ? "ALL FOUND" : "SURVIVORS", all.outcomes[0],
+                                    all.outcomes[0] + all.outcomes[3]);
   if (names_causes) verdict += fmt::format("; the cause is right in {}", all.cause_right);
   if (all.with_part > 0) verdict += fmt::format(", the part in {} of {}", all.part_named, all.with_part);
   fmt::print("{}\n", Wrap(verdict + ".", 2));
@@ -147,16 +139,17 @@ std::string Campaign::ToText() const {
   json["complete"] = faults.size() == total;
   json["kinds"] = Json::object();
   for (const Row& row : SumUp(faults)) {
-    json["kinds"][row.kind] = {{"faults", row.faults},         {"found", row.found},
-                               {"refused", row.refused},       {"no_effect", row.no_effect},
-                               {"survived", row.survived},     {"cause_right", row.cause_right},
+    const auto [found, refused, no_effect, survived] = row.outcomes;
+    json["kinds"][row.kind] = {{"faults", row.faults},         {"found", found},
+                               {"refused", refused},           {"no_effect", no_effect},
+                               {"survived", survived},         {"cause_right", row.cause_right},
                                {"part_named", row.part_named}, {"with_a_part", row.with_part}};
   }
   json["faults"] = Json::array();
   for (const CampaignFault& fault : faults) {
     Json one = {{"kind", fault.kind},
                 {"name", fault.name},
-                {"outcome", NameOutcome(fault.outcome)},
+                {"outcome", kOutcomes[static_cast<size_t>(fault.outcome)]},
                 {"cause_right", fault.cause_right},
                 {"remark", fault.exception}};
     if (fault.part_named) one["part_named"] = *fault.part_named;
@@ -169,7 +162,7 @@ std::string Campaign::ToText() const {
 ExitCode Campaign::ToExitCode() const {
   if (faults.size() < total)
     return ReportFailure(fmt::format("interrupted after {} of {} faults", faults.size(), total));
-  return SumUp(faults).back().survived > 0 ? kDisagreement : kSuccess;
+  return SumUp(faults).back().outcomes[3] > 0 ? kDisagreement : kSuccess;
 }
 
 }  // namespace dexcheck::cli

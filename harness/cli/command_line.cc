@@ -211,8 +211,7 @@ bool NamesRobot(std::string_view word) {
 /// description of a robot, or what a command reads: a scenario's name or a folder.
 std::vector<std::string> CompleteWords(int argc, char** argv) {
   std::vector<std::string> words(argv, argv + argc);
-  if (argc > 2 && NamesRobot(words[1]) && NamesRobot(words[2]))
-    words.insert(words.begin() + 1, "consistency");
+  if (argc > 1 && NamesRobot(words[1])) words.insert(words.begin() + 1, "consistency");
   const auto is_file = [&](const std::string& word) {
     if (word == "-" || word.ends_with(".json") || word.starts_with("/dev/")) return true;
     const bool is_of_run = words.size() > 1 && words[1] == "run";

@@ -163,7 +163,8 @@ struct ComparisonRequest {
   /// Puts A and B where --robot and --mjcf would stand. @param command for messages.
   void TakeFiles(const std::string& command) {
     if (a.empty()) return;
-    if (b.empty()) throw InputError(command + ": two files must be given, got " + Quote(a));
+    if (b.empty())
+      throw InputError(command + ": takes two files, got " + a + "; init, audit, judge take one");
     files = {a, b};
   }
   /// To what two files agree.

@@ -18,11 +18,6 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-const char* Judge(ExitCode code) {
-  if (code == kSuccess) return "pass";
-  return code == kDisagreement ? "disagreement" : "failed";
-}
-
 /// How two descriptions agree, or that they do not.
 const char* NameOutcome(const ConsistencyRequest& request, const Comparison& comparison) {
   if (!comparison.result.Agrees()) return "differ";
@@ -237,7 +232,9 @@ std::string ToText(const ConsistencyRequest& request, const Comparison& comparis
                {"samples_requested", request.options.samples},
                {"seed", request.options.seed},
                {"seconds", result.seconds},
-               {"verdict", Judge(code)},
+               {"verdict", code == kSuccess        ? "pass"
+                           : code == kDisagreement ? "disagreement"
+                                                   : "failed"},
                {"outcome", NameOutcome(request, comparison)}};
   json["notes"] = comparison.notes;
   for (const std::string& note : comparison.not_compared) json["notes"].push_back(note);

@@ -108,7 +108,7 @@ void PrintVerdict(const EnginesRequest& request, const EngineComparisonResult& r
                request.options.states.samples);
   }
   if (result.Agrees()) {
-    fmt::print("AGREE: {} agree in all terms that they have in common.\n", JoinNames(result.names));
+    fmt::print("AGREE: {} agree in all terms that they share.\n", JoinNames(result.names));
     return;
   }
   fmt::print("DISAGREE:\n");
@@ -192,8 +192,6 @@ int Run(EnginesRequest request) {
 }  // namespace
 
 void AddEngineComparisonCommand(Command app) {
-  constexpr std::uint64_t kMaxSamples = 1000000;
-  constexpr int kMostDigits = 15;
   const auto request = std::make_shared<EnginesRequest>();
   request->options.states.samples = 100;
   Command command =
@@ -216,10 +214,10 @@ void AddEngineComparisonCommand(Command app) {
   command.AddOption("--node-modules FOLDER", &request->options.node_modules,
                     "Folder where npm installed @mujoco/mujoco");
   command.AddFlag("--floating", &request->urdf.floating, "The root of a URDF floats");
-  AddSampleOptions(command, kMaxSamples, &request->options.states.samples, &request->options.states.seed);
+  AddSampleOptions(command, 1000000, &request->options.states.samples, &request->options.states.seed);
   command
       .AddOption("--digits N", &request->digits, "Agreement to this many digits of a term's scale is enough")
-      .Check(WholeNumber(1, kMostDigits))
+      .Check(WholeNumber(1, 15))
       .ShowDefault();
   AddJsonOption(command, "the results", &request->json_file);
   AddJUnitOption(command, &request->junit_file);

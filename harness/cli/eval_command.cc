@@ -298,9 +298,7 @@ void AddContactTerms(const ModelTerms& terms, const State& state, Json* out) {
         contact.kappa_dot =
             CalcKappaDot(contact.geometry, CalcRelativeTwist(contact.geometry, J_f * state.xi, V_o));
       }
-    } catch (const std::invalid_argument& error) {
-      throw InputError(entry + error.what());
-    } catch (const SingularityError& error) {
+    } catch (const std::exception& error) {
       throw InputError(entry + error.what());
     }
     CalcContactJacobian(contact, J_f, J_B.middleRows(3 * i, 3));

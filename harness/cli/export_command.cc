@@ -83,18 +83,20 @@ void WriteCsv(const LogReader& log, const std::vector<SignalInfo>& signals, cons
   file.Finish();
 }
 
-/// A column's name in a message; numbers without one are a list.
+/// A column's name in a message. Numbers without one are a list, "values".
+std::string NameNumber(const SignalInfo& signal, size_t k) {
+  return signal.columns.empty() ? "value" : signal.columns[k];
+}
+
+bool IsList(const SignalInfo& signal) { return signal.columns.empty() && signal.width > 1; }
+
 nlohmann::json MakeSchema(const SignalInfo& signal) {
   const std::vector<std::string> units = ListUnits(signal);
   nlohmann::json properties;
-  if (signal.columns.empty() && signal.width > 1) {
+  for (size_t k = 0; k < units.size() && !IsList(signal); ++k)
+    properties[NameNumber(signal, k)] = {{"type", "number"}, {"description", units[k]}};
+  if (IsList(signal))
     properties["values"] = {{"type", "array"}, {"items", {{"type", "number"}}}, {"description", signal.unit}};
-  } else {
-    for (size_t k = 0; k < units.size(); ++k) {
-      const std::string name = signal.columns.empty() ? "value" : signal.columns[k];
-      properties[name] = {{"type", "number"}, {"description", units[k]}};
-    }
-  }
   return {{"type", "object"},
           {"title", signal.name},
           {"description", signal.description},
@@ -104,16 +106,12 @@ nlohmann::json MakeSchema(const SignalInfo& signal) {
 /// A row as JSON, which has no number for what is not finite: null.
 nlohmann::json MakeMessage(const SignalInfo& signal, const Eigen::Ref<const Eigen::RowVectorXd>& row) {
   nlohmann::json message;
-  const auto number = [](double value) {
-    return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json();
-  };
   for (long k = 0; k < row.size(); ++k) {
-    if (!signal.columns.empty()) {
-      message[signal.columns[static_cast<size_t>(k)]] = number(row[k]);
-    } else if (row.size() > 1) {
-      message["values"].push_back(number(row[k]));
+    const nlohmann::json number = std::isfinite(row[k]) ? nlohmann::json(row[k]) : nlohmann::json();
+    if (IsList(signal)) {
+      message["values"].push_back(number);
     } else {
-      message["value"] = number(row[k]);
+      message[NameNumber(signal, static_cast<size_t>(k))] = number;
     }
   }
   return message;

@@ -23,6 +23,7 @@ struct MutateRequest {
   MutateRunRequest run;  // with a scenario, faults are made in its run
   RobotFiles files;
   MutationOptions options;
+  std::optional<double> duration;
   bool no_diagnosis = false;
   std::string json_file;
   bool quiet = false;
@@ -65,6 +66,9 @@ CampaignFault Describe(const FormulaMutant& mutant) {
 int Run(MutateRequest request) {
   if (!request.run.scenario.empty()) {
     request.run.options.scale = request.options.scale;
+    const bool draws = request.run.options.draws > 0;
+    request.run.options.looks_on = !request.duration && !draws;
+    request.run.options.duration = request.duration.value_or(draws ? 0.0 : request.run.options.duration);
     request.run.json_file = request.json_file;
     request.run.quiet = request.quiet;
     return request.run.smallest ? PrintSmallestErrors(request.run) : MutateRun(request.run);
@@ -141,14 +145,14 @@ void AddMutateCommand(Command app) {
           .Check(NumberFrom(0.0, 1e4))
           .Needs(run)
           .ShowDefault();
-  Option duration =
-      command
-          .AddOption(
-              "--duration", &request->run.options.duration,
-              "In a run: how long it is looked at, s (default: all of a motion of joints, 0.1 of others)")
-          .TypeName("T")
-          .Check(NumberFrom(1e-3, 1e4))
-          .Needs(run);
+  Option duration = command
+                        .AddOption("--duration", &request->duration,
+                                   "In a run: how long it is looked at, s (default 0.1; faults that are "
+                                   "drawn in a motion of joints, "
+                                   "or not found, are looked at to its end)")
+                        .TypeName("T")
+                        .Check(NumberFrom(1e-3, 1e4))
+                        .Needs(run);
   Option faults = command
                       .AddOption("--numbers", &request->run.options.parameters,
                                  "In a run: how many numbers of the model are changed, evenly out of all")

@@ -42,15 +42,14 @@ struct RenderRequest {
   std::string json_file;
 };
 
-/// Of the last step, whose end is no row of its own, s.
-double LastStep(const RunFrames& run) { return run.times.back() - run.times[run.times.size() - 2]; }
-
 void WriteStill(const RenderRequest& request, const std::vector<RunView>& views, const std::string& out) {
   double longest = 0.0;
   double end = 0.0;
   for (const RunView& view : views) {
     longest = std::max(longest, view.frames->duration());
-    end = std::max(end, view.frames->duration() + LastStep(*view.frames));
+    // The end of the last step is no row of its own.
+    const std::vector<double>& times = view.frames->times;
+    end = std::max(end, view.frames->duration() + times.back() - times[times.size() - 2]);
   }
   constexpr double kTimeRounding = 1e-9;
   if (!(*request.still >= 0.0 && *request.still <= end + kTimeRounding)) {

@@ -52,15 +52,13 @@ std::vector<std::string> Supersede(const std::filesystem::path& file, std::vecto
   const TomlDocument document(ReadTextFile(file.string()), file.string());
   const std::optional<TomlValue> control = document.Open().Find("control");
   if (!control || !control->IsTable()) return overrides;
-  const auto replaces_table = [](const std::string& assignment) {
-    return assignment.starts_with("control=");
-  };
-  if (std::ranges::any_of(overrides, replaces_table)) return overrides;
-  const auto is_changed = [&](const std::string& key) {
+  const auto sets = [&](const std::string& key) {
     return std::ranges::any_of(overrides, [&](const std::string& assignment) {
-      return assignment.starts_with("control." + key + "=") || assignment == "control." + key + "-=";
+      return assignment.starts_with(key + "=") || assignment == key + "-=";
     });
   };
+  const auto is_changed = [&](const std::string& key) { return sets("control." + key); };
+  if (sets("control")) return overrides;
   const auto prefer = [&](const std::string& key, const std::string& other) {
     const std::optional<TomlValue> replaced = control->AsTable().Find(other);
     if (!replaced || !is_changed(key) || is_changed(other)) return;

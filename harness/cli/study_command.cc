@@ -74,19 +74,11 @@ StudyInputs FindStudy(const std::string& name_or_file, const OwnController& cont
   return inputs;
 }
 
-bool Matches(const std::string& text, const char* pattern) {
-  return std::regex_match(text, std::regex(pattern));
-}
-
-/// What is wrong with a text as sbatch's --time and --mem; empty when nothing is.
-std::string CheckSlurmTime(const std::string& text) {
-  if (Matches(text, "\\d{1,9}(-\\d{1,9})?(:\\d{1,9}){0,2}")) return {};
-  return "must be MIN, MIN:SEC, HOURS:MIN:SEC or DAYS-HOURS[:MIN[:SEC]], got " + Quote(text);
-}
-
-std::string CheckSlurmMemory(const std::string& text) {
-  if (Matches(text, "\\d{1,9}[KMGT]?")) return {};
-  return "must be a whole number with K, M, G or T, got " + Quote(text);
+/// Whether a text is as sbatch's --time or --mem has it.
+ValueCheck SlurmValue(const char* pattern, const std::string& demand) {
+  return [=](const std::string& text) {
+    return std::regex_match(text, std::regex(pattern)) ? "" : demand + ", got " + Quote(text);
+  };
 }
 
 /// The text of a batch script whose array makes the study, a shard for each task; killed and requeued
@@ -161,17 +153,6 @@ std::string ListNumbers(const std::vector<long>& numbers) {
   return text;
 }
 
-/// Numbers from 0 to `count` that are not among `done`, which ascends.
-std::vector<long> FindMissing(long count, const std::vector<long>& done) {
-  std::vector<long> missing;
-  auto next = done.begin();
-  for (long number = 0; number < count; ++number) {
-    while (next != done.end() && *next < number) ++next;
-    if (next == done.end() || *next != number) missing.push_back(number);
-  }
-  return missing;
-}
-
 RunOptions MakeRunOptions(const StudyRequest& request, ProgressBar* bar) {
   RunOptions options;
   options.jobs = CountJobs(request.jobs);
@@ -219,10 +200,9 @@ std::vector<long> MakeSearch(const StudyInputs& inputs, const StudyRequest& requ
 }
 
 StudyStore OpenDatabase(const StudyInputs& inputs, const StudyRequest& request) {
-  const auto makes_same_rows = [&](const std::vector<TrialRow>& rows) {
-    return MakesRowsAgain(inputs, rows);
-  };
-  return StudyStore::OpenOrCreate(request.database, IdentifyStudy(inputs), inputs.study, makes_same_rows);
+  return StudyStore::OpenOrCreate(
+      request.database, IdentifyStudy(inputs), inputs.study,
+      [&](const std::vector<TrialRow>& rows) { return MakesRowsAgain(inputs, rows); });
 }
 
 int RunStudy(const StudyRequest& request) {
@@ -288,7 +268,11 @@ int MergeStudies(const std::string& out, const std::vector<std::string>& databas
   if (!quiet) fmt::print("{}\n", Wrap(FindProgress(merged).text, 2));
   if (first.study().is_search()) return kSuccess;
   const long count = CountTrials(first.study());
-  const std::vector<long> missing = FindMissing(count, merged.ListNumbers());
+  const std::vector<long> done = merged.ListNumbers();
+  std::vector<long> missing;
+  for (long number = 0; number < count; ++number) {
+    if (!std::ranges::binary_search(done, number)) missing.push_back(number);
+  }
   if (missing.empty()) return kSuccess;
   throw Error(fmt::format("{}: {} of {} trials are missing: {}; merge again when they are done", out,
                           missing.size(), count, ListNumbers(missing)));
@@ -343,9 +327,10 @@ void AddStudyCommand(Command app) {
   slurm
       .AddOption("--time TIME", &job->time,
                  "Time limit of an element: MIN, MIN:SEC, HOURS:MIN:SEC or DAYS-HOURS[:MIN[:SEC]]")
-      .Check(CheckSlurmTime);
+      .Check(SlurmValue("\\d{1,9}(-\\d{1,9})?(:\\d{1,9}){0,2}",
+                        "must be MIN, MIN:SEC, HOURS:MIN:SEC or DAYS-HOURS[:MIN[:SEC]]"));
   slurm.AddOption("--memory SIZE", &job->memory, "Memory of an element, as 500M or 2G")
-      .Check(CheckSlurmMemory);
+      .Check(SlurmValue("\\d{1,9}[KMGT]?", "must be a whole number with K, M, G or T"));
   slurm.SetAction([=] {
     StudyInputs inputs = FindStudy(request->study, request->controller);
     if (inputs.study.is_search() && job->tasks > 1)

@@ -64,19 +64,17 @@ struct ComparisonResult {
 
   [[nodiscard]] std::vector<std::string> Likely() const {
     std::vector<std::string> lines;
-    for (const Hypothesis& hypothesis : comparison.hypotheses) {
+    for (const Hypothesis& hypothesis : comparison.hypotheses)
       lines.push_back(fmt::format("{}; explains {:.0f} %", hypothesis.text, 100.0 * hypothesis.explained));
-    }
     return lines;
   }
 
   [[nodiscard]] std::string Print() const {
     const std::string both =
         comparison.first.filename().string() + " and " + comparison.second.filename().string();
-    if (Agrees()) {
+    if (Agrees())
       return fmt::format("AGREE: {} in {} terms at {} states", both, comparison.result.terms.size(),
                          comparison.result.samples);
-    }
     std::string text = "DISAGREE: " + both;
     for (const std::string& line : ListDifferences(comparison)) text += "\n  " + line;
     for (const std::string& line : Likely()) text += "\n  likely: " + line;
@@ -115,9 +113,7 @@ class Robot {
     return {energy.kinetic, energy.potential};
   }
   MatrixXd PoseOf(const std::string& name, const Input& q) {
-    const auto& frames = model_->frames();
-    const bool is_frame =
-        std::any_of(frames.begin(), frames.end(), [&](const Frame& frame) { return frame.name == name; });
+    const bool is_frame = std::ranges::find(model_->frames(), name, &Frame::name) != model_->frames().end();
     const int link = is_frame ? -1 : FindLink(name);
     terms_->SetState(q, still_);
     if (is_frame) return terms_->CalcFramePose(model_->FindFrame(name)).matrix();
@@ -158,9 +154,8 @@ class Robot {
     UrdfOptions options = urdf_;
     options.keep_impossible = true;
     std::vector<std::string> lines;
-    for (const AuditFinding& finding : AuditRobot(ReadDescription(file_, options)).findings) {
+    for (const AuditFinding& finding : AuditRobot(ReadDescription(file_, options)).findings)
       lines.push_back(std::string(NameOf(finding.level)) + ": " + finding.where + " " + finding.text);
-    }
     return lines;
   }
 
@@ -174,9 +169,9 @@ class Robot {
   /// The joint whose link it is; -1 for the base.
   [[nodiscard]] int FindLink(const std::string& name) const {
     if (name == description_.spec.base.link) return -1;
-    for (size_t i = 0; i < description_.spec.joints.size(); ++i) {
-      if (description_.spec.joints[i].link == name) return static_cast<int>(i);
-    }
+    const std::vector<Joint>& joints = description_.spec.joints;
+    const auto found = std::ranges::find(joints, name, &Joint::link);
+    if (found != joints.end()) return static_cast<int>(found - joints.begin());
     throw std::invalid_argument(file_.string() + ": must have a frame or link " + Quote(name));
   }
 
@@ -209,6 +204,13 @@ class Robot {
   VectorXd still_;
 };
 
+template <typename Named>
+std::vector<std::string> ListNames(const Named& all) {
+  std::vector<std::string> names;
+  for (const auto& one : all) names.push_back(one.name);
+  return names;
+}
+
 const SignalInfo& FindSignal(const LogReader& log, const std::string& name) {
   const SignalInfo* const signal = log.Find(name);
   if (signal == nullptr) throw py::key_error(name);
@@ -239,18 +241,8 @@ PYBIND11_MODULE(_dexcheck, m) {
   py::class_<Robot>(m, "Robot", "A description with its analytic model.")
       .def_property_readonly("name", [](const Robot& robot) { return robot.model().name(); })
       .def_property_readonly("file", [](const Robot& robot) { return robot.file().string(); })
-      .def_property_readonly("joints",
-                             [](const Robot& robot) {
-                               std::vector<std::string> names;
-                               for (const Joint& joint : robot.model().joints()) names.push_back(joint.name);
-                               return names;
-                             })
-      .def_property_readonly("frames",
-                             [](const Robot& robot) {
-                               std::vector<std::string> names;
-                               for (const Frame& frame : robot.model().frames()) names.push_back(frame.name);
-                               return names;
-                             })
+      .def_property_readonly("joints", [](const Robot& robot) { return ListNames(robot.model().joints()); })
+      .def_property_readonly("frames", [](const Robot& robot) { return ListNames(robot.model().frames()); })
       .def_property_readonly("nq", [](const Robot& robot) { return robot.model().num_positions(); })
       .def_property_readonly("nv", [](const Robot& robot) { return robot.model().num_velocities(); })
       .def_property_readonly("notes", [](const Robot& robot) { return robot.description().notes; })
@@ -268,10 +260,8 @@ PYBIND11_MODULE(_dexcheck, m) {
       .def("compare", &Robot::Compare, py::arg("other"), py::arg("samples") = 1000, py::arg("seed") = 1,
            py::arg("digits") = 0, py::arg("ignore") = std::vector<std::string>(),
            "Compares with another robot or file (TOML, URDF, MJCF), or with functions M(q), c(q, v), g(q), "
-           "h(q, v), "
-           "friction(q, v) of an object or a dictionary; to rounding, or to a number of digits; without the "
-           "constants of joints in "
-           "ignore (armature, damping, friction).")
+           "h(q, v), friction(q, v) of an object or a dictionary; to rounding, or to a number of digits; "
+           "without the constants of joints in ignore (armature, damping, friction).")
       .def("__repr__", [](const Robot& robot) {
         return fmt::format("<dexcheck.Robot {} of {}: {} joints>", robot.model().name(),
                            robot.file().string(), robot.model().joints().size());
@@ -289,12 +279,7 @@ PYBIND11_MODULE(_dexcheck, m) {
 
   py::class_<LogReader>(m, "Log", "The signals of a run's log.h5, by name.")
       .def(py::init<std::filesystem::path>(), py::arg("file"))
-      .def("keys",
-           [](const LogReader& log) {
-             std::vector<std::string> names;
-             for (const SignalInfo& signal : log.signals()) names.push_back(signal.name);
-             return names;
-           })
+      .def("keys", [](const LogReader& log) { return ListNames(log.signals()); })
       .def("__len__", [](const LogReader& log) { return log.signals().size(); })
       .def("__contains__",
            [](const LogReader& log, const std::string& name) { return log.Find(name) != nullptr; })

@@ -310,7 +310,24 @@ bool RunCampaign::Run(size_t index, const std::function<bool()>& should_stop) {
   const double same = std::max(kSameMotion, unseen * right.lpNorm<Eigen::Infinity>());
   mutant.no_effect = !mutant.killed && way.size() == right.size() && right.size() > 0 &&
                      (way - right).lpNorm<Eigen::Infinity>() < same;
-  return true;
+  const bool goes_on =
+      scenario_.joint_task() != nullptr && scenario_.duration > options_.from + options_.duration;
+  return mutant.killed || !options_.looks_on || !goes_on || LookOn(&mutant, should_stop);
+}
+
+bool RunCampaign::LookOn(RunMutant* mutant, const std::function<bool()>& should_stop) {
+  if (whole_ == nullptr) {
+    RunMutationOptions options = options_;
+    options.looks_on = false;
+    options.duration = scenario_.duration - options.from;
+    whole_ = std::make_unique<RunCampaign>(scenario_, robot_, mjcf_, options, should_stop);
+  }
+  whole_->mutants_ = {{.faults = mutant->faults, .all = mutant->all}};
+  const bool is_done = whole_->Run(0, should_stop);
+  // A motion may end where it began, where its way is no scale for what has no effect.
+  const RunMutant& later = whole_->mutants_.front();
+  if (later.killed || !mutant->no_effect) *mutant = later;
+  return is_done;
 }
 
 }  // namespace dexcheck

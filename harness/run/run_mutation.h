@@ -75,6 +75,8 @@ class RunCampaign {
   /// Fills `truth` and `alone`. @returns as Run.
   bool FindTruth(RunMutant* mutant, const std::function<bool()>& should_stop);
   void RequireNoFaultToPass(const std::function<bool()>& should_stop);
+  /// The same fault up to the end of the motion. @returns as Run.
+  bool LookOn(RunMutant* mutant, const std::function<bool()>& should_stop);
 
   Scenario scenario_;
   std::filesystem::path robot_, mjcf_;
@@ -87,6 +89,7 @@ class RunCampaign {
   VectorXd way_, offset_way_;            // how far what moves comes without a fault
   VectorXd tau_;                         // that they end with, in the first of both
   std::vector<RunMutant> mutants_;
+  std::unique_ptr<RunCampaign> whole_;  // of all of the motion
 };
 
 }  // namespace dexcheck

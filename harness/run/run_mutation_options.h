@@ -11,9 +11,11 @@ struct RunMutationOptions {
   /// The fault begins at this time of the scenario, s. In a motion of joints it is there from the first,
   /// and this is added to `duration`.
   double from = 0.5;
-  double duration = 0.0;  ///< How long it is looked at, s; 0 for all of a motion of joints, 0.1 s of others.
-  int parameters = 40;    ///< Numbers of the model that are changed, evenly out of all of them.
-  double scale = 1e-3;    ///< By how much, relative to GetScale.
+  double duration = 0.1;  ///< How long it is looked at, s; 0 for all of a motion of joints, 0.1 s of others.
+  /// What is not found by then is looked at up to the end of a motion of joints, which begins at rest.
+  bool looks_on = false;
+  int parameters = 40;  ///< Numbers of the model that are changed, evenly out of all of them.
+  double scale = 1e-3;  ///< By how much, relative to GetScale.
   bool laws = true;
   bool equations = true;
   bool plants =

@@ -75,7 +75,8 @@ TEST(Usage, TwoRobotsAreComparedWithoutTheWordForIt) {
     return results;
   };
   EXPECT_EQ(compare(Words{}), compare("consistency"));
-  EXPECT_TRUE(IsRefused(RunDexcheck(Words{kPandaToml}), {"unknown command"}));
+  EXPECT_TRUE(IsRefused(RunDexcheck(Words{kPandaToml}),
+                        {"takes two files, got " + kPandaToml, "init, audit, judge take one"}));
 }
 
 TEST(Usage, TheVersionIsThreeNumbers) {

@@ -420,6 +420,31 @@ TEST(RunCampaign, MakesItsFaultsInOtherRobotsToo) {
   }
 }
 
+// A motion of joints begins at rest, where their friction is nothing; the seventh never moves.
+TEST(RunCampaign, LooksOnWhereAFaultIsNotFound) {
+  RunMutationOptions options = MakeOptions(0.01, 0.01);
+  options.draws = 40;
+  options.kinds = {"joint"};
+  const Scenario scenario = ReadShippedScenario("panda-reach", {"duration=1"});
+  RunCampaign brief(scenario, scenario.model_file, scenario.mjcf_file, options, kGoOn);
+  options.looks_on = true;
+  RunCampaign whole(scenario, scenario.model_file, scenario.mjcf_file, options, kGoOn);
+  int moving = 0, still = 0;
+  for (size_t i = 0; i < brief.mutants().size(); ++i) {
+    const std::string& name = brief.mutants()[i].all.name;
+    const bool is_still = name.starts_with("joint panda_joint7: viscous friction");
+    if (!is_still && !name.starts_with("joint panda_joint3: viscous friction")) continue;
+    ASSERT_EQ(whole.mutants()[i].all.name, name);
+    ASSERT_TRUE(brief.Run(i, kGoOn) && whole.Run(i, kGoOn));
+    EXPECT_FALSE(brief.mutants()[i].killed) << name;
+    EXPECT_EQ(whole.mutants()[i].killed, !is_still) << name;
+    EXPECT_EQ(whole.mutants()[i].no_effect, is_still) << name;
+    ++(is_still ? still : moving);
+  }
+  EXPECT_GE(moving, 1);
+  EXPECT_GE(still, 1);
+}
+
 TEST(RunCampaign, AnUprightAxisHoldsWhatPushesAlongIt) {
   RunMutationOptions options;
   options.laws = options.equations = false;
