@@ -70,7 +70,7 @@ CampaignFault Describe(const RunMutant& mutant) {
 void PrintScores(const Campaign& campaign, int together) {
   constexpr const char* kNames[] = {"right", "in_class", "not_explained", "wrong"};
   struct Count {
-    int sets = 0, all_right = 0, as_alone = 0, of[std::size(kNames)] = {};
+    int sets = 0, all_right = 0, as_alone = 0, of[4] = {};
   };
   std::map<int, Count> counts;
   for (const CampaignFault& fault : campaign.faults) {
