@@ -75,7 +75,7 @@ void PrintScores(const Campaign& campaign, int together) {
   std::map<int, Count> counts;
   for (const CampaignFault& fault : campaign.faults) {
     if (fault.outcome != MutantOutcome::kKilled) continue;
-    int of[std::size(kNames)];
+    int of[std::size(kNames)] = {};
     for (size_t k = 0; k < std::size(kNames); ++k) of[k] = fault.details[kNames[k]].get<int>();
     Count& count = counts[of[0] + of[1] + of[2]];
     ++count.sets;
