@@ -101,6 +101,7 @@ void RecordingSet::Read(Recording* recording, const ReadOptions& options,
   one.motion = motion.noise();
   one.inertia = motion.inertia();
   one.step = motion.step();
+  one.reach = 0.5 * motion.window();
   one.shape_velocities = motion.shape_velocities();
   one.most_torque = motion.most_torque();
 }

@@ -23,8 +23,8 @@ struct ColumnPart {
 /// joint, or an acceleration of the base (three columns), for a time.
 struct Push {
   int recording = 0;
-  double from = 0.0, to = 0.0;                         ///< s
-  std::vector<std::pair<double, double>> shares = {};  ///< Times, and which part of it acts then.
+  double from = 0.0, to = 0.0;  ///< s
+  double reach = 0.0;           ///< Over which smoothing spreads its begin and end to each side, s.
   int link = -1;
   bool has_moment = false;
   int joint = -1;  ///< -1 besides no link: the base.

@@ -10,6 +10,7 @@
 #include "controller/common/errors.h"
 #include "controller/common/linear_algebra.h"
 #include "harness/recordings/base_motion.h"
+#include "harness/recordings/torque_errors.h"
 
 namespace dexcheck {
 namespace {
@@ -52,13 +53,53 @@ TorqueEstimator::TorqueEstimator(RecordingSet* recordings, size_t most_causes)
     : recordings_(recordings), most_causes_(most_causes) {
   do {
     ListFaults();
-    selection_ = Select();
+    Select();
   } while (recordings_->DropUnknownGains());
   if (AddPushes()) {
     barred_.resize(faults_.size(), false);
-    selection_ = Select();
+    Select();
   }
-  while (BarSeconds()) selection_ = Select();
+  while (BarSeconds()) Select();
+  WidenErrors();
+}
+
+void TorqueEstimator::WidenErrors() {
+  std::vector<Index> columns;
+  const std::vector<Index> first = ListFirstColumns();
+  for (Index i = 0; i < CountForced(*recordings_); ++i) columns.push_back(i);
+  for (const CauseTerm& term : selection_.terms)
+    for (Index k = 0; k < term.error.size(); ++k) columns.push_back(first[term.candidate] + k);
+  const auto width = static_cast<Index>(columns.size());
+  if (selection_.terms.empty()) return;
+  Eigen::SparseMatrix<double> chosen(rows_.columns, width);
+  for (Index k = 0; k < width; ++k) chosen.insert(columns[static_cast<size_t>(k)], k) = 1.0;
+  constexpr Index kStretches = 12;  // of each recording
+  const RowCluster none{MatrixXd::Zero(width, width), VectorXd::Zero(width)};
+  const auto stretches = static_cast<size_t>(kStretches) * recordings_->size();
+  std::vector<RowCluster> by_time(stretches, none), by_joint(recordings_->joints().size(), none);
+  const VectorXd left = CalcLeft(selection_.terms);
+  for (const TorqueRows::Part& part : rows_.parts) {
+    const MatrixXd C = part.balance->rows(part.place) * MatrixXd(part.map * chosen) + part.pushes * chosen;
+    const auto add = [&](Index begin, Index end, RowCluster* to) {
+      const auto rows = C.middleRows(begin, end - begin);
+      to->products.noalias() += rows.transpose() * rows;
+      to->scores.noalias() += rows.transpose() * left.segment(part.begin + begin, end - begin);
+    };
+    add(0, part.size, &by_joint[part.place]);
+    // What is within blocks is of no stretch.
+    add(0, part.within, &by_time.emplace_back(none));
+    const Index blocks = part.size - part.within;
+    for (Index k = 0; k < kStretches; ++k)
+      add(part.within + k * blocks / kStretches, part.within + (k + 1) * blocks / kStretches,
+          &by_time[part.recording * kStretches + static_cast<size_t>(k)]);
+  }
+  const VectorXd errors =
+      CalcClusteredVariances(by_time).cwiseMax(CalcClusteredVariances(by_joint)).cwiseSqrt();
+  Index at = CountForced(*recordings_);
+  for (CauseTerm& term : selection_.terms) {
+    term.error = term.error.cwiseMax(errors.segment(at, term.error.size()));
+    at += term.error.size();
+  }
 }
 
 void TorqueEstimator::ListFaults() {
@@ -76,8 +117,8 @@ void TorqueEstimator::ListFaults() {
     barred_.push_back(recordings_->has_currents() && one.IsOfLoad() && one.kind != TorqueFault::kPayload);
 }
 
-CauseSelection TorqueEstimator::Select() {
-  CauseSelection selection;
+void TorqueEstimator::Select() {
+  selection_ = {};
   recordings_->ResetWeights();
   constexpr int kRounds = 6;
   constexpr double kLeastGain = 0.9;  // of what was estimated before, taken away at once
@@ -87,32 +128,32 @@ CauseSelection TorqueEstimator::Select() {
     rows_ = MakeTorqueRows(*recordings_, faults_, /*is_held=*/false);
     Compress();
     // Where more than noise is left, what no cause explains weighs as noise does, and is alike.
-    const bool is_known = round == 0 || IsNoise(CalcLeft(selection.terms));
+    const bool is_known = round == 0 || IsNoise(CalcLeft(selection_.terms));
     const double before = std::exchange(
         alike_, round > 0 && is_known ? alike_ : CalcAlike(Fit(is_known ? Part::kUsual : Part::kAll)));
     floor_ = is_known ? 1.0 : kFarFromKnown;
-    selection = SelectAmong();
+    selection_ = SelectAmong();
     if (round + 1 == kRounds || (round > 1 && std::abs(alike_ - before) < 0.2 * before)) break;
-    Relinearise(selection);
-    const VectorXd left = CalcLeft(selection.terms);
+    Relinearise();
+    const VectorXd left = CalcLeft(selection_.terms);
     Weigh(IsNoise(left) ? left : Fit(Part::kAll));
     if (recordings_->has_currents()) {
-      const VectorXd off = CalcAmplitudes(selection.terms).head(CountForced(*recordings_));
+      const VectorXd off = CalcAmplitudes(selection_.terms).head(CountForced(*recordings_));
       recordings_->DivideGains(VectorXd(1.0 + off.array().max(-kLeastGain)));
     }
   }
-  return selection;
 }
 
-void TorqueEstimator::Relinearise(const CauseSelection& selection) {
+void TorqueEstimator::Relinearise() {
   const auto shift = [&](size_t fault, const VectorXd& amplitude) {
     if (faults_[fault].kind == TorqueFault::kCentre)
       ShiftCentre(recordings_->model(), amplitude, &faults_[fault]);
   };
   std::vector<bool> is_found(faults_.size(), false);
-  for (const CauseTerm& term : selection.terms) {
+  for (const CauseTerm& term : selection_.terms) {
     const TorqueFault& found = faults_[term.candidate];
     is_found[term.candidate] = true;
+    if (found.kind == TorqueFault::kPush) FindTimesOf(term);
     shift(term.candidate, term.amplitude);
     for (const auto& [fault, amplitude] : term.same) shift(fault, amplitude);
     for (TorqueFault& one : faults_) {
@@ -124,7 +165,17 @@ void TorqueEstimator::Relinearise(const CauseSelection& selection) {
   }
   for (size_t i = 0; i < faults_.size(); ++i)
     if (faults_[i].kind == TorqueFault::kTorqueGain && faults_[i].index >= 0)
-      ScaleWhole(is_found[i] ? selection.terms : std::vector<CauseTerm>(), &faults_[i]);
+      ScaleWhole(is_found[i] ? selection_.terms : std::vector<CauseTerm>(), &faults_[i]);
+}
+
+void TorqueEstimator::FindTimesOf(const CauseTerm& term) {
+  VectorXd others = CalcAmplitudes(selection_.terms);
+  others.segment(ListFirstColumns()[term.candidate], term.amplitude.size()).setZero();
+  const Push before = faults_[term.candidate].push;
+  const Push found = FindTimes(*recordings_, rows_, rows_.CalcLeft(others), before);
+  for (TorqueFault& one : faults_)
+    if (one.kind == TorqueFault::kPush && one.recording == before.recording && one.push.from == before.from)
+      one.push.from = found.from, one.push.to = found.to;
 }
 
 void TorqueEstimator::ScaleWhole(const std::vector<CauseTerm>& terms, TorqueFault* gain) const {
@@ -285,7 +336,10 @@ VectorXd TorqueEstimator::FitAmplitudes(Part part, Index* rank) const {
   std::vector<double> plausible;
   for (Index i = 0; i < CountForced(*recordings_); ++i) columns.push_back(i), plausible.push_back(1.0);
   for (size_t i = 0; i < faults_.size(); ++i) {
-    for (Index k = 0; k < CountColumns(faults_[i]) && IsPart(faults_[i], part); ++k)
+    const auto is_this = [i](const CauseTerm& term) { return term.candidate == i; };
+    const bool is_part =
+        IsPart(faults_[i], part) || (part == Part::kAll && std::ranges::any_of(selection_.terms, is_this));
+    for (Index k = 0; k < CountColumns(faults_[i]) && is_part; ++k)
       columns.push_back(first[i] + k),
           plausible.push_back(faults_[i].scale.size() > 0 ? faults_[i].scale[k]
                                                           : std::max(1.0, std::abs(faults_[i].nominal)));
