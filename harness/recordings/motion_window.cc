@@ -65,10 +65,10 @@ void MotionFit::Analyse() {
     segments_[i] = segment_;
   }
   const Eigen::Index n = model_->num_joints();
-  for (VectorXd* vector :
-       {&noise_.position, &noise_.velocity, &noise_.torque, &noise_.smooth_position, &noise_.smooth_torque,
-        &noise_.acceleration, &noise_.rest, &sample_.q, &sample_.qd, &sample_.qdd, &sample_.torque,
-        &sample_.torque_rate, &sample_.direction, &sample_.most_torque})
+  for (VectorXd* vector : {&noise_.position, &noise_.velocity, &noise_.torque, &noise_.smooth_position,
+                           &noise_.smooth_torque, &noise_.acceleration, &noise_.rest, &sample_.q, &sample_.qd,
+                           &sample_.qdd, &sample_.torque, &sample_.torque_rate, &sample_.direction,
+                           &sample_.direction_error, &sample_.beyond, &sample_.most_torque})
     *vector = VectorXd::Zero(n);
   sample_.friction = MatrixXd::Zero(n, kFrictionShapes);
   // Noise of each channel: what a polynomial over a short window leaves.
@@ -107,7 +107,8 @@ void MotionFit::Analyse() {
     noise_.torque[joint] = get(Effort());
     for (const Row& row : rows_ahead_)
       if (const int channel = ChannelOf(Effort(), joint); channel >= 0)
-        sample_.most_torque[joint] = std::max(sample_.most_torque[joint], std::abs(row[channel]));
+        sample_.most_torque[joint] =
+            std::max(sample_.most_torque[joint], std::abs(row[channel]) - 3.0 * noise_.torque[joint]);
   }
   if (recording_->wrench.link >= 0) {
     noise_.wrench = sample_.wrench = VectorXd::Zero(6);

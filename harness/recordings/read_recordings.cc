@@ -129,6 +129,7 @@ double RecordingSet::CalcNoise(const ReadRecording& one, size_t place) const {
     variance += Square(one.inertia(joint, other) * one.motion.acceleration[other]);
     variance += mean_square({TorqueColumn::kPosition, other}) * Square(one.motion.smooth_position[other]);
   }
+  variance += Square(model_->joint(joint).dry_friction * one.motion.direction[joint]);
   for (int k = 0; k < 3; ++k)
     variance += mean_square({TorqueColumn::kGravity, 0, k}) * Square(one.motion.base);
   if (one.motion.wrench.size() > 0)

@@ -88,7 +88,7 @@ double TorqueBalance::CalcCutOff(int joint, int component, const RecordedSample&
   const double limit = FindCutOff(refinements_, joint, component, sample.most_torque[joint]);
   const double beyond = std::abs(torque) - limit;
   if (!(beyond > 0.0)) return 0.0;
-  return std::copysign(component % 2 == 0 ? beyond : -limit, torque) * (is_recorded ? -1.0 : 1.0);
+  return (is_recorded == torque > 0.0 ? -1.0 : 1.0) * (component % 2 == 0 ? beyond : -limit);
 }
 
 double TorqueBalance::CalcEntry(int joint, const TorqueColumn& column, const RecordedSample& sample) const {

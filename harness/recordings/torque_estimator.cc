@@ -124,19 +124,20 @@ void TorqueEstimator::Select() {
   constexpr double kLeastGain = 0.9;  // of what was estimated before, taken away at once
   // Of the square of what no cause explains: so much is left of a drive that is not known well.
   constexpr double kFarFromKnown = 2.0;
+  bool is_known = true;
   for (int round = 0; round < kRounds; ++round) {
     rows_ = MakeTorqueRows(*recordings_, faults_, /*is_held=*/false);
     Compress();
     // Where more than noise is left, what no cause explains weighs as noise does, and is alike.
-    const bool is_known = round == 0 || IsNoise(CalcLeft(selection_.terms));
     const double before = std::exchange(
         alike_, round > 0 && is_known ? alike_ : CalcAlike(Fit(is_known ? Part::kUsual : Part::kAll)));
     floor_ = is_known ? 1.0 : kFarFromKnown;
     selection_ = SelectAmong();
     if (round + 1 == kRounds || (round > 1 && std::abs(alike_ - before) < 0.2 * before)) break;
-    Relinearise();
     const VectorXd left = CalcLeft(selection_.terms);
-    Weigh(IsNoise(left) ? left : Fit(Part::kAll));
+    is_known = IsNoise(left);
+    Relinearise();
+    Weigh(is_known ? left : Fit(Part::kAll));
     if (recordings_->has_currents()) {
       const VectorXd off = CalcAmplitudes(selection_.terms).head(CountForced(*recordings_));
       recordings_->DivideGains(VectorXd(1.0 + off.array().max(-kLeastGain)));
@@ -145,22 +146,26 @@ void TorqueEstimator::Select() {
 }
 
 void TorqueEstimator::Relinearise() {
-  const auto shift = [&](size_t fault, const VectorXd& amplitude) {
-    if (faults_[fault].kind == TorqueFault::kCentre)
-      ShiftCentre(recordings_->model(), amplitude, &faults_[fault]);
-  };
+  const std::vector<Index> first = ListFirstColumns();
   std::vector<bool> is_found(faults_.size(), false);
+  for (const CauseTerm& term : selection_.terms) is_found[term.candidate] = true;
   for (const CauseTerm& term : selection_.terms) {
     const TorqueFault& found = faults_[term.candidate];
-    is_found[term.candidate] = true;
     if (found.kind == TorqueFault::kPush) FindTimesOf(term);
-    shift(term.candidate, term.amplitude);
-    for (const auto& [fault, amplitude] : term.same) shift(fault, amplitude);
-    for (TorqueFault& one : faults_) {
-      // A payload's inertia is that of a point: it grows with the square of the distance.
-      if (found.kind == TorqueFault::kPayload && one.kind == TorqueFault::kPayload &&
-          one.index == found.index && one.recording == found.recording)
-        PlacePayload(term.amplitude[0], term.amplitude.segment<3>(1), &one);
+    if (!found.IsOfLoad()) continue;
+    // So are those that may have been in its place.
+    VectorXd others = VectorXd::Ones(R_.cols());
+    others.head(R_.cols() - 1) = -CalcAmplitudes(selection_.terms);
+    others.segment(first[term.candidate], term.amplitude.size()).setZero();
+    const VectorXd y = R_ * others;
+    for (size_t i = 0; i < faults_.size(); ++i) {
+      const bool is_same = std::ranges::any_of(term.same, [&](const auto& one) { return one.first == i; });
+      if ((faults_[i].index != found.index || faults_[i].recording != found.recording) && !is_same) continue;
+      if (is_found[i] && i != term.candidate) continue;
+      if (faults_[i].kind == TorqueFault::kCentre || faults_[i].kind == TorqueFault::kPayload)
+        PlaceMass(recordings_->model(),
+                  SolveLeastSquares(R_.middleCols(first[i], CountColumns(faults_[i])), y, kIndependent),
+                  &faults_[i]);
     }
   }
   for (size_t i = 0; i < faults_.size(); ++i)
