@@ -141,6 +141,27 @@ NamedColumn ReadName(const RobotModel& model, const std::string& written) {
   return column;
 }
 
+/// "q.x" of "q.x [m]".
+std::string WithoutUnit(const std::string& name) { return name.substr(0, name.find(" [")); }
+
+/// Of a base's pose, by the last word and those before it; -1 for none. A run's log calls it "q.qw".
+int FindPoseComponent(const std::vector<std::string>& words) {
+  constexpr std::string_view kBase[] = {"base", "root", "trunk", "torso", "pelvis", "pose"};
+  constexpr std::string_view kTurned[] = {"quat", "quaternion", "orientation", "rotation"};
+  constexpr std::string_view kComponents[] = {"x", "y", "z", "qw", "qx", "qy", "qz", "w"};
+  const auto has = [&](const auto& some) {
+    return std::ranges::any_of(words,
+                               [&](const std::string& word) { return std::ranges::count(some, word) > 0; });
+  };
+  const auto* const found = std::ranges::find(kComponents, words.empty() ? "" : words.back());
+  const bool is_base = has(kBase) || (words.size() == 2 && words[0] == "q");
+  if (!is_base || found == std::end(kComponents)) return -1;
+  const auto at = static_cast<int>(found - kComponents);
+  if (at > 2 && at < 7) return at;
+  const bool is_turned = has(kTurned);
+  return at == 7 ? (is_turned ? 3 : -1) : is_turned ? at + 4 : at;
+}
+
 }  // namespace
 
 std::span<const Unit> ListUnits() { return kUnits; }
@@ -182,7 +203,33 @@ std::vector<Channel> GuessChannels(const RobotModel& model, const std::vector<st
     if (seen.emplace(*column.quantity, joint).second)
       channels.push_back({*column.quantity, joint, i, column.scale});
   }
+  // A pose has all of its numbers.
+  std::vector<Channel> pose;
+  for (size_t i = 0; i < names.size(); ++i) {
+    const NamedColumn& column = columns[i];
+    const bool is_rate = column.quantity && *column.quantity != RecordedQuantity::kPosition;
+    const int component = column.joint >= 0 || column.is_commanded || is_rate
+                              ? -1
+                              : FindPoseComponent(SplitWords(ToLower(WithoutUnit(names[i]))));
+    if (component >= 0 && seen.emplace(RecordedQuantity::kBase, component).second)
+      pose.push_back({RecordedQuantity::kBase, component, i});
+  }
+  if (static_cast<int>(pose.size()) == CountComponents(RecordedQuantity::kBase))
+    channels.insert(channels.end(), pose.begin(), pose.end());
   return channels;
+}
+
+void GuessFeet(const RobotModel& model, const std::vector<std::string>& names, Recording* recording) {
+  for (const Frame& frame : model.frames()) {
+    const auto first = std::ranges::find(names, "foot/force." + frame.name + ".x", WithoutUnit);
+    if (first == names.end() || frame.link < 0) continue;
+    const auto column = static_cast<size_t>(first - names.begin());
+    for (int k = 0; k < 3; ++k)
+      recording->channels.push_back({RecordedQuantity::kWrench,
+                                     6 * static_cast<int>(recording->wrenches.size()) + k,
+                                     column + static_cast<size_t>(k)});
+    recording->wrenches.push_back({frame.link, frame.X_LF.translation(), /*is_world=*/true});
+  }
 }
 
 }  // namespace dexcheck

@@ -47,6 +47,11 @@ class Judge {
     result_.notes = set_.notes();
     for (const Fault& fault : set_.faults()) result_.causes.push_back(MakeCause(fault));
     Tell();
+    if (getenv("DBG")) {
+      fprintf(stderr, "READING left %.3f explained %.4f\n", result_.left, result_.explained);
+      for (auto& c : result_.causes) fprintf(stderr, "   %s\n", c.Tell().c_str());
+      for (auto& [k, v] : set_.refinements().limits) fprintf(stderr, "   limit %d %g\n", k, v);
+    }
     return std::move(result_);
   }
 
@@ -125,6 +130,15 @@ class Judge {
       for (const int joint : fault.kind == TorqueFault::kDelay ? set_.joints() : std::vector<int>())
         if (fault.index < 0 || fault.index == joint)
           next.delays[joint] += std::lround(amplitude[0] / set_.step());
+    }
+    // A motor gives no more than the motion needed; what was recorded may be far more.
+    constexpr double kMore = 1.1;
+    for (size_t place = 0; place < set_.joints().size() && !result_.IsWhole(); ++place) {
+      const double most = set_[0].fit->most_torque(place);
+      const int joint = set_.joints()[place];
+      const auto known = set_.refinements().limits.find(joint);
+      if (known != set_.refinements().limits.end()) next.limits.insert(*known);
+      if (!set_.has_currents() && set_[0].most_torque[joint] > kMore * most) next.limits.emplace(joint, most);
     }
     if (!result_.IsWhole() && next.shaking == 0.0) next.shaking = FindShaking(set_, estimator_.rows(), left);
   }
@@ -360,7 +374,11 @@ RecordingJudgement JudgeRecordings(const RobotModel& model, std::vector<Recordin
   for (int i = 1; i < kReadings && goes_on && judgement.refinements != next.refinements; ++i) {
     next.refinements = judgement.refinements;
     if (!Reopen(recordings, undo)) break;
-    judgement = Judge(model, recordings, next, count).Run();
+    RecordingJudgement again = Judge(model, recordings, next, count).Run();
+    // What a reading leaves out is no reason to find nothing.
+    constexpr double kWorse = 1.1;
+    if (again.Agrees() || again.left > kWorse * judgement.left) break;
+    judgement = std::move(again);
   }
   for (const PositionFault& fault : faults)
     judgement.causes.insert(judgement.causes.begin(), MakeCause(fault.fault));

@@ -261,7 +261,8 @@ bool MotionFit::Emit(size_t centre, const Receiver& receive) {
   }
   if (recording_->Has(RecordedQuantity::kBase)) sample_.base = CalcBase(fitted);
   for (Eigen::Index k = 0; k < sample_.wrench.size(); ++k)
-    sample_.wrench[k] = fitted(0, ChannelOf(RecordedQuantity::kWrench, static_cast<int>(k)));
+    if (const int channel = ChannelOf(RecordedQuantity::kWrench, static_cast<int>(k)); channel >= 0)
+      sample_.wrench[k] = fitted(0, channel);
   return receive(sample_);
 }
 

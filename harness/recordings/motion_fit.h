@@ -109,6 +109,7 @@ class MotionFit {
   void Analyse();
   void ChooseWindow(const std::vector<size_t>& centres);
   void CalcSpeeds();
+  void AddWrenchErrors();
   void CheckVelocities(const std::vector<size_t>& centres, size_t half);
   [[nodiscard]] std::vector<size_t> ListCentres(size_t half) const;
   /// (order + 1) x rows of the window: of the polynomial about the centre, in powers of the time.

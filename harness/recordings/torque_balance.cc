@@ -31,7 +31,6 @@ TorqueBalance::TorqueBalance(const RobotModel& model, const std::vector<int>& jo
   torques_.resize(n);
   q_.resize(n);
   residual_ = VectorXd::Zero(static_cast<Index>(joints.size()));
-  wrench_squares_ = MatrixXd::Zero(residual_.size(), 6);
   constexpr double kStep = 1e-6;
   steps_ = VectorXd::Constant(n, kStep);
   for (const auto& [joint, offset] : refinements.offsets) steps_[joint] = -offset;
@@ -43,6 +42,7 @@ TorqueBalance::TorqueBalance(const RobotModel& model, const std::vector<int>& jo
   }
   used_.assign(joints_.size(), 0);
   counts_.assign(joints_.size(), 0.0);
+  most_torque_.assign(joints_.size(), 0.0);
 }
 
 void TorqueBalance::ListColumns(bool has_currents) {
@@ -139,14 +139,23 @@ void TorqueBalance::FillRow(size_t place, const RecordedSample& sample, Eigen::R
       (has_currents_ ? 0.0 : sample.torque[joint]) - torques_[joint] - CalcFriction(joint, sample);
 }
 
+void TorqueBalance::SetWrenches(const std::vector<WrenchPlace>& places) {
+  wrenches_ = places;
+  wrench_squares_ = MatrixXd::Zero(residual_.size(), 6 * static_cast<Index>(places.size()));
+}
+
 MatrixXd TorqueBalance::CalcWrenchColumns() {
-  const Matrix3d& R = regressor_.GetRotation(wrench_.link);
-  const Matrix3d axes = wrench_.is_world ? Matrix3d(Matrix3d::Identity()) : R;
-  const Vector3d lever = R * (wrench_.point - model_->joint(wrench_.link).body.com);
-  regressor_.CalcForceColumns(wrench_.link, forces_);
-  MatrixXd columns(forces_.rows(), 6);
-  columns << (forces_.leftCols<3>() + forces_.rightCols<3>() * Skew(lever)) * axes,
-      forces_.rightCols<3>() * axes;
+  MatrixXd columns(forces_.rows(), wrench_squares_.cols());
+  Index at = 0;
+  for (const WrenchPlace& place : wrenches_) {
+    const Matrix3d& R = regressor_.GetRotation(place.link);
+    const Matrix3d axes = place.is_world ? Matrix3d(Matrix3d::Identity()) : R;
+    const Vector3d lever = R * (place.point - model_->joint(place.link).body.com);
+    regressor_.CalcForceColumns(place.link, forces_);
+    columns.middleCols(at, 6) << (forces_.leftCols<3>() + forces_.rightCols<3>() * Skew(lever)) * axes,
+        forces_.rightCols<3>() * axes;
+    at += 6;
+  }
   return columns;
 }
 
@@ -190,7 +199,7 @@ void TorqueBalance::Add(const RecordedSample& sample, const std::vector<bool>& i
     CalcShakingColumns(sample);
     regressor_.SetMotion(sample.q, sample.qd, sample.qdd, sample.base);
   }
-  if (wrench_.link >= 0) {
+  if (!wrenches_.empty()) {
     const MatrixXd columns = CalcWrenchColumns();
     torques_ += columns * sample.wrench;
     wrench_squares_ += columns(joints_, Eigen::all).cwiseAbs2();
@@ -222,6 +231,9 @@ void TorqueBalance::Add(const RecordedSample& sample, const std::vector<bool>& i
     auto row = parts_[place].col(used_[place]);
     FillRow(place, sample, row);
     residual_[static_cast<Index>(place)] = row[row.size() - 1];
+    const int joint = joints_[place];
+    most_torque_[place] =
+        std::max(most_torque_[place], std::abs(torques_[joint] + CalcFriction(joint, sample)));
     block.sums[place] += row;
     block.counts[place] += 1.0;
     counts_[place] += 1.0;
