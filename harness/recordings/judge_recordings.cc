@@ -47,11 +47,6 @@ class Judge {
     result_.notes = set_.notes();
     for (const Fault& fault : set_.faults()) result_.causes.push_back(MakeCause(fault));
     Tell();
-    if (getenv("DBG")) {
-      fprintf(stderr, "READING left %.3f explained %.4f\n", result_.left, result_.explained);
-      for (auto& c : result_.causes) fprintf(stderr, "   %s\n", c.Tell().c_str());
-      for (auto& [k, v] : set_.refinements().limits) fprintf(stderr, "   limit %d %g\n", k, v);
-    }
     return std::move(result_);
   }
 
@@ -130,15 +125,6 @@ class Judge {
       for (const int joint : fault.kind == TorqueFault::kDelay ? set_.joints() : std::vector<int>())
         if (fault.index < 0 || fault.index == joint)
           next.delays[joint] += std::lround(amplitude[0] / set_.step());
-    }
-    // A motor gives no more than the motion needed; what was recorded may be far more.
-    constexpr double kMore = 1.1;
-    for (size_t place = 0; place < set_.joints().size() && !result_.IsWhole(); ++place) {
-      const double most = set_[0].fit->most_torque(place);
-      const int joint = set_.joints()[place];
-      const auto known = set_.refinements().limits.find(joint);
-      if (known != set_.refinements().limits.end()) next.limits.insert(*known);
-      if (!set_.has_currents() && set_[0].most_torque[joint] > kMore * most) next.limits.emplace(joint, most);
     }
     if (!result_.IsWhole() && next.shaking == 0.0) next.shaking = FindShaking(set_, estimator_.rows(), left);
   }
@@ -376,8 +362,7 @@ RecordingJudgement JudgeRecordings(const RobotModel& model, std::vector<Recordin
     if (!Reopen(recordings, undo)) break;
     RecordingJudgement again = Judge(model, recordings, next, count).Run();
     // What a reading leaves out is no reason to find nothing.
-    constexpr double kWorse = 1.1;
-    if (again.Agrees() || again.left > kWorse * judgement.left) break;
+    if (again.Agrees()) break;
     judgement = std::move(again);
   }
   for (const PositionFault& fault : faults)

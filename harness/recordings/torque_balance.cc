@@ -42,7 +42,6 @@ TorqueBalance::TorqueBalance(const RobotModel& model, const std::vector<int>& jo
   }
   used_.assign(joints_.size(), 0);
   counts_.assign(joints_.size(), 0.0);
-  most_torque_.assign(joints_.size(), 0.0);
 }
 
 void TorqueBalance::ListColumns(bool has_currents) {
@@ -231,9 +230,6 @@ void TorqueBalance::Add(const RecordedSample& sample, const std::vector<bool>& i
     auto row = parts_[place].col(used_[place]);
     FillRow(place, sample, row);
     residual_[static_cast<Index>(place)] = row[row.size() - 1];
-    const int joint = joints_[place];
-    most_torque_[place] =
-        std::max(most_torque_[place], std::abs(torques_[joint] + CalcFriction(joint, sample)));
     block.sums[place] += row;
     block.counts[place] += 1.0;
     counts_[place] += 1.0;

@@ -91,8 +91,6 @@ class TorqueBalance {
   /// sum c c^T, y last.
   [[nodiscard]] const MatrixXd& products(size_t place) const { return products_[place]; }
   [[nodiscard]] double samples(size_t place) const { return counts_[place]; }
-  /// The largest torque of the model, in size.
-  [[nodiscard]] double most_torque(size_t place) const { return most_torque_[place]; }
   /// Rows with the same products: a factor of those within blocks, then one of each block, sum / sqrt(count).
   [[nodiscard]] const MatrixXd& rows(size_t place) const { return rows_[place]; }
 
@@ -123,7 +121,7 @@ class TorqueBalance {
   std::vector<MatrixXd> products_, rows_;
   std::vector<MatrixXd> parts_;  // columns x kPart
   std::vector<Eigen::Index> used_;
-  std::vector<double> counts_, most_torque_;
+  std::vector<double> counts_;
   std::vector<Block> blocks_;
   double block_samples_ = 1.0;
   // at the sample

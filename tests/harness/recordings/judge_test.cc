@@ -145,7 +145,7 @@ TEST(Judge, ARecordedTorqueThatWasCutOffIsNamed) {
 TEST(Judge, AMotorThatGivesLessThanRecordedIsNamed) {
   const std::vector<double> torque = Record({}).Get("tau.panda_joint1");
   const auto [low, high] = std::minmax_element(torque.begin(), torque.end());
-  for (const double fraction : {0.85, 0.7}) {
+  for (const double fraction : {0.92, 0.85}) {
     const double most = fraction * std::max(-*low, *high);
     const RecordedFault weak = {.act = [=](double, const mjModel&, mjData* data) {
       data->qfrc_applied[0] = std::clamp(data->qfrc_applied[0], -most, most);
