@@ -11,54 +11,18 @@ namespace dexcheck {
 namespace {
 
 /// Words that logs use for a quantity.
-struct Word {
-  std::string_view word;
-  RecordedQuantity quantity;
-};
-constexpr Word kWords[] = {
-    {"t", RecordedQuantity::kTime},
-    {"time", RecordedQuantity::kTime},
-    {"timestamp", RecordedQuantity::kTime},
-    {"stamp", RecordedQuantity::kTime},
-    {"secs", RecordedQuantity::kTime},
-    {"seconds", RecordedQuantity::kTime},
-    {"q", RecordedQuantity::kPosition},
-    {"pos", RecordedQuantity::kPosition},
-    {"position", RecordedQuantity::kPosition},
-    {"positions", RecordedQuantity::kPosition},
-    {"angle", RecordedQuantity::kPosition},
-    {"qpos", RecordedQuantity::kPosition},
-    {"theta", RecordedQuantity::kPosition},
-    {"qd", RecordedQuantity::kVelocity},
-    {"dq", RecordedQuantity::kVelocity},
-    {"vel", RecordedQuantity::kVelocity},
-    {"velocity", RecordedQuantity::kVelocity},
-    {"velocities", RecordedQuantity::kVelocity},
-    {"qvel", RecordedQuantity::kVelocity},
-    {"qdot", RecordedQuantity::kVelocity},
-    {"speed", RecordedQuantity::kVelocity},
-    {"xi", RecordedQuantity::kVelocity},
-    {"qdd", RecordedQuantity::kAcceleration},
-    {"ddq", RecordedQuantity::kAcceleration},
-    {"acc", RecordedQuantity::kAcceleration},
-    {"acceleration", RecordedQuantity::kAcceleration},
-    {"qacc", RecordedQuantity::kAcceleration},
-    {"qddot", RecordedQuantity::kAcceleration},
-    {"tau", RecordedQuantity::kTorque},
-    {"torque", RecordedQuantity::kTorque},
-    {"torques", RecordedQuantity::kTorque},
-    {"effort", RecordedQuantity::kTorque},
-    {"efforts", RecordedQuantity::kTorque},
-    {"trq", RecordedQuantity::kTorque},
-    {"force", RecordedQuantity::kTorque},
-    {"current", RecordedQuantity::kCurrent},
-    {"currents", RecordedQuantity::kCurrent},
-    {"amps", RecordedQuantity::kCurrent},
-    {"i", RecordedQuantity::kCurrent},
-};
+constexpr std::pair<RecordedQuantity, std::string_view> kWords[] = {
+    {RecordedQuantity::kTime, " t time timestamp stamp secs seconds "},
+    {RecordedQuantity::kPosition, " q pos position positions angle qpos theta "},
+    {RecordedQuantity::kVelocity, " qd dq vel velocity velocities qvel qdot speed xi "},
+    {RecordedQuantity::kAcceleration, " qdd ddq acc acceleration qacc qddot "},
+    {RecordedQuantity::kTorque, " tau torque torques effort efforts trq force "},
+    {RecordedQuantity::kCurrent, " current currents amps i "}};
 /// What is commanded is no measurement.
-constexpr std::string_view kCommanded[] = {"cmd",      "command", "commanded", "des", "desired", "target",
-                                           "setpoint", "ref",     "reference", "d",   "error",   "ext"};
+constexpr std::string_view kCommanded =
+    " cmd command commanded des desired target setpoint ref reference d error ext ";
+
+bool Has(std::string_view list, const std::string& word) { return list.find(" " + word + " ") != list.npos; }
 
 constexpr Unit kUnits[] = {
     {"s", RecordedQuantity::kTime, 1.0},
@@ -125,15 +89,15 @@ NamedColumn ReadName(const RobotModel& model, const std::string& written) {
   if (column.joint >= 0) name.replace(at, longest, "/");
   const std::vector<std::string> words = SplitWords(name);
   for (const std::string& word : words) {
-    const auto quantity =
-        std::find_if(std::begin(kWords), std::end(kWords), [&](const Word& one) { return one.word == word; });
+    const auto* const quantity =
+        std::ranges::find_if(kWords, [&](const auto& one) { return Has(one.second, word); });
     const bool is_unit = column.quantity && FindUnit(word, *column.quantity) != nullptr;
-    if (std::find(std::begin(kCommanded), std::end(kCommanded), word) != std::end(kCommanded)) {
+    if (Has(kCommanded, word)) {
       column.is_commanded = true;
     } else if (is_unit) {
       column.scale = FindUnit(word, *column.quantity)->scale;
     } else if (quantity != std::end(kWords) && !(word == "t" && words.size() > 2)) {
-      column.quantity = quantity->quantity;
+      column.quantity = quantity->first;
     } else if (IsDigit(word[0]) && word.size() < 4) {
       column.number = std::stoi(word);
     }
@@ -146,20 +110,15 @@ std::string WithoutUnit(const std::string& name) { return name.substr(0, name.fi
 
 /// Of a base's pose, by the last word and those before it; -1 for none. A run's log calls it "q.qw".
 int FindPoseComponent(const std::vector<std::string>& words) {
-  constexpr std::string_view kBase[] = {"base", "root", "trunk", "torso", "pelvis", "pose"};
-  constexpr std::string_view kTurned[] = {"quat", "quaternion", "orientation", "rotation"};
-  constexpr std::string_view kComponents[] = {"x", "y", "z", "qw", "qx", "qy", "qz", "w"};
-  const auto has = [&](const auto& some) {
-    return std::ranges::any_of(words,
-                               [&](const std::string& word) { return std::ranges::count(some, word) > 0; });
+  constexpr std::string_view kComponents[] = {"x", "y", "z", "qw", "qx", "qy", "qz"};
+  const auto has = [&](std::string_view list) {
+    return std::ranges::any_of(words, [&](const std::string& word) { return Has(list, word); });
   };
-  const auto* const found = std::ranges::find(kComponents, words.empty() ? "" : words.back());
-  const bool is_base = has(kBase) || (words.size() == 2 && words[0] == "q");
-  if (!is_base || found == std::end(kComponents)) return -1;
-  const auto at = static_cast<int>(found - kComponents);
-  if (at > 2 && at < 7) return at;
-  const bool is_turned = has(kTurned);
-  return at == 7 ? (is_turned ? 3 : -1) : is_turned ? at + 4 : at;
+  if (!has(" base root trunk torso pelvis pose ") && !(words.size() == 2 && words[0] == "q")) return -1;
+  const bool is_turned = has(" quat quaternion orientation rotation ") && words.back().size() == 1;
+  const std::string component = (is_turned ? "q" : "") + words.back();
+  const auto* const found = std::ranges::find(kComponents, component);
+  return found == std::end(kComponents) ? -1 : static_cast<int>(found - kComponents);
 }
 
 }  // namespace

@@ -4,7 +4,7 @@
 
 #include <vector>
 
-#include "controller/common/types.h"
+#include "harness/recordings/torque_rows.h"
 
 namespace dexcheck {
 
@@ -18,5 +18,10 @@ struct RowCluster {
 /// they are. [Bell McCaffrey 2002] (bias-reduced linearisation, CR2): errors that are white give, on average,
 /// what they give without clusters. What one cluster alone tells of an amplitude is left out.
 VectorXd CalcClusteredVariances(const std::vector<RowCluster>& clusters);
+
+/// Errors of amplitudes of such columns, by how far stretches of each recording disagree about them, or
+/// joints, whichever is more. @param left of rows.
+VectorXd CalcClusteredErrors(const TorqueRows& rows, const VectorXd& left,
+                             const std::vector<Eigen::Index>& columns);
 
 }  // namespace dexcheck

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <tuple>
 #include <utility>
 
@@ -64,37 +65,13 @@ TorqueEstimator::TorqueEstimator(RecordingSet* recordings, size_t most_causes)
 }
 
 void TorqueEstimator::WidenErrors() {
-  std::vector<Index> columns;
   const std::vector<Index> first = ListFirstColumns();
-  for (Index i = 0; i < CountForced(*recordings_); ++i) columns.push_back(i);
+  std::vector<Index> columns(static_cast<size_t>(CountForced(*recordings_)));
+  std::iota(columns.begin(), columns.end(), Index{0});
   for (const CauseTerm& term : selection_.terms)
     for (Index k = 0; k < term.error.size(); ++k) columns.push_back(first[term.candidate] + k);
-  const auto width = static_cast<Index>(columns.size());
   if (selection_.terms.empty()) return;
-  Eigen::SparseMatrix<double> chosen(rows_.columns, width);
-  for (Index k = 0; k < width; ++k) chosen.insert(columns[static_cast<size_t>(k)], k) = 1.0;
-  constexpr Index kStretches = 12;  // of each recording
-  const RowCluster none{MatrixXd::Zero(width, width), VectorXd::Zero(width)};
-  const auto stretches = static_cast<size_t>(kStretches) * recordings_->size();
-  std::vector<RowCluster> by_time(stretches, none), by_joint(recordings_->joints().size(), none);
-  const VectorXd left = CalcLeft(selection_.terms);
-  for (const TorqueRows::Part& part : rows_.parts) {
-    const MatrixXd C = part.balance->rows(part.place) * MatrixXd(part.map * chosen) + part.pushes * chosen;
-    const auto add = [&](Index begin, Index end, RowCluster* to) {
-      const auto rows = C.middleRows(begin, end - begin);
-      to->products.noalias() += rows.transpose() * rows;
-      to->scores.noalias() += rows.transpose() * left.segment(part.begin + begin, end - begin);
-    };
-    add(0, part.size, &by_joint[part.place]);
-    // What is within blocks is of no stretch.
-    add(0, part.within, &by_time.emplace_back(none));
-    const Index blocks = part.size - part.within;
-    for (Index k = 0; k < kStretches; ++k)
-      add(part.within + k * blocks / kStretches, part.within + (k + 1) * blocks / kStretches,
-          &by_time[part.recording * kStretches + static_cast<size_t>(k)]);
-  }
-  const VectorXd errors =
-      CalcClusteredVariances(by_time).cwiseMax(CalcClusteredVariances(by_joint)).cwiseSqrt();
+  const VectorXd errors = CalcClusteredErrors(rows_, CalcLeft(selection_.terms), columns);
   Index at = CountForced(*recordings_);
   for (CauseTerm& term : selection_.terms) {
     term.error = term.error.cwiseMax(errors.segment(at, term.error.size()));
