@@ -60,6 +60,7 @@ VectorXd CalcClusteredErrors(const TorqueRows& rows, const VectorXd& left,
   }
   const auto calc = [](const auto& clusters) {
     std::vector<RowCluster> all;
+    all.reserve(clusters.size());
     for (const auto& [key, cluster] : clusters) all.push_back(cluster);
     return CalcClusteredVariances(all);
   };
