@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <optional>
 
@@ -18,22 +19,14 @@ VectorXd InUnitsOfMedian(const VectorXd& squares) {
   return usual > 0.0 ? VectorXd(squares / usual) : squares;
 }
 
-/// A stretch that stands out. Smoothing, and where blocks begin, spread a push's begin and end: the parts of
-/// the blocks there are by what is seen in them. @param usual what blocks have without it.
-Push TrimWindow(const VectorXd& squares, double usual, Index first, Index last,
+/// A stretch that stands out, without what smoothing makes of its begin and end.
+Push TrimWindow(const VectorXd& squares, Index first, Index last,
                 const std::vector<TorqueBalance::Block>& blocks) {
   const double whole = Median({squares.begin() + first, squares.begin() + last + 1});
   constexpr double kNearlyWhole = 0.25;  // half of it
-  constexpr Index kBeside = 4;
   while (first < last && squares[first] < kNearlyWhole * whole) ++first;
   while (last > first && squares[last] < kNearlyWhole * whole) --last;
-  Push push{.from = blocks[static_cast<size_t>(first)].from, .to = blocks[static_cast<size_t>(last)].to};
-  for (Index at = std::max<Index>(0, first - kBeside); at <= std::min(squares.size() - 1, last + kBeside);
-       ++at)
-    push.shares.emplace_back(
-        blocks[static_cast<size_t>(at)].centre(),
-        at >= first && at <= last ? 1.0 : std::sqrt(std::clamp((squares[at] - usual) / whole, 0.0, 1.0)));
-  return push;
+  return {.from = blocks[static_cast<size_t>(first)].from, .to = blocks[static_cast<size_t>(last)].to};
 }
 
 /// The few stretches that stand out most.
@@ -53,7 +46,7 @@ std::vector<Push> FindWindows(const VectorXd& squares, const std::vector<TorqueB
     while (stays(first - 1) || stays(first - 2)) --first;
     while (stays(last + 1) || stays(last + 2)) ++last;
     // What stands out half of the time is no push.
-    const Push push = TrimWindow(squares, usual, first, last, blocks);
+    const Push push = TrimWindow(squares, first, last, blocks);
     // Windows of smoothing overlap, so that what acts shows in more than one sample.
     if (last - first <= squares.size() / 2 && push.from < push.to) windows.push_back(push);
     rest.segment(first, last - first + 1).setZero();
@@ -117,12 +110,12 @@ double CalcExplained(const std::vector<BlockProducts>& blocks, double frequency)
   return b.dot(SolveLeastSquares(G, b));
 }
 
-/// Of a grid, then by halving its step.
-double FindBest(const std::vector<BlockProducts>& blocks, double begin, double end, double step) {
+/// Where a score is largest: of a grid, then by halving its step.
+double FindBest(const std::function<double(double)>& score, double begin, double end, double step) {
   double best = begin, most = 0.0;
-  const auto try_one = [&](double frequency) {
-    const double explained = CalcExplained(blocks, frequency);
-    if (explained > most) most = explained, best = frequency;
+  const auto try_one = [&](double x) {
+    const double value = score(x);
+    if (value > most) most = value, best = x;
   };
   for (int i = 0; begin + i * step < end; ++i) try_one(begin + i * step);
   constexpr int kHalvings = 16;
@@ -148,8 +141,9 @@ double FindShaking(const RecordingSet& recordings, const TorqueRows& rows, const
   const double cycle = 2.0 * kPi / length;
   const double begin = kFewestCycles * cycle, end = kMostOfCycle * 2.0 * kPi / longest;
   if (!(begin < end)) return 0.0;
-  const double best = FindBest(all.blocks, begin, end, kGrid * cycle);
-  return CalcExplained(all.blocks, best) > kFraction * all.left ? best : 0.0;
+  const auto explained = [&](double frequency) { return CalcExplained(all.blocks, frequency); };
+  const double best = FindBest(explained, begin, end, kGrid * cycle);
+  return explained(best) > kFraction * all.left ? best : 0.0;
 }
 
 /// Since when.
@@ -179,9 +173,53 @@ std::vector<Push> FindPushes(const RecordingSet& recordings, const TorqueRows& r
       squares += InUnitsOfMedian(left.segment(part.begin + part.within, part.size - part.within).cwiseAbs2());
   std::vector<Push> pushes = FindWindows(squares, blocks);
   if (const std::optional<double> when = FindStep(recordings, rows, left, recording))
-    pushes.push_back({.from = *when, .to = blocks.back().to, .shares = {{*when, 0.0}, {*when, 1.0}}});
-  for (Push& when : pushes) when.recording = static_cast<int>(recording);
+    pushes.push_back({.from = *when, .to = blocks.back().to});
+  for (Push& when : pushes) {
+    when.recording = static_cast<int>(recording);
+    when.reach = recordings[recording].reach;
+    // What goes on at the end does not end there.
+    if (when.to >= blocks.back().from) when.to = blocks.back().to + when.reach;
+    if (when.from <= blocks.front().to) when.from = blocks.front().from - when.reach;
+  }
   return pushes;
+}
+
+Push FindTimes(const RecordingSet& recordings, const TorqueRows& rows, const VectorXd& left, Push push) {
+  std::vector<const TorqueBalance::Block*> blocks;
+  std::vector<Eigen::RowVectorXd> columns;
+  std::vector<double> y;
+  constexpr double kBeside = 0.5;  // s: what is held out may hide an end
+  const double beside = push.reach + kBeside;
+  for (const TorqueRows::Part& part : rows.parts) {
+    if (part.recording != static_cast<size_t>(push.recording)) continue;
+    for (size_t b = 0; b < part.balance->blocks().size(); ++b) {
+      const TorqueBalance::Block& block = part.balance->blocks()[b];
+      if (block.to < push.from - 2.0 * beside || block.from > push.to + 2.0 * beside) continue;
+      blocks.push_back(&block);
+      columns.push_back(CalcPushColumns(recordings, push, part, b));
+      y.push_back(left[part.begin + part.within + static_cast<Index>(b)]);
+    }
+  }
+  const auto explained = [&](double from, double to) {
+    const Index width = columns.front().size();
+    MatrixXd G = MatrixXd::Zero(width, width);
+    VectorXd b = VectorXd::Zero(width);
+    for (size_t i = 0; i < blocks.size() && from < to; ++i) {
+      const double share = CalcShare({.from = from, .to = to, .reach = push.reach}, *blocks[i]);
+      if (share == 0.0) continue;
+      G.noalias() += share * share * columns[i].transpose() * columns[i];
+      b += share * y[i] * columns[i].transpose();
+    }
+    return b.dot(SolveLeastSquares(G, b));
+  };
+  constexpr double kGrid = 0.2;
+  for (int twice = 0; twice < 2; ++twice) {
+    push.from = FindBest([&](double from) { return explained(from, push.to); }, push.from - beside,
+                         push.from + beside, kGrid * push.reach);
+    push.to = FindBest([&](double to) { return explained(push.from, to); }, push.to - beside,
+                       push.to + beside, kGrid * push.reach);
+  }
+  return push;
 }
 
 }  // namespace dexcheck

@@ -17,4 +17,8 @@ double FindShaking(const RecordingSet& recordings, const TorqueRows& rows, const
 std::vector<Push> FindPushes(const RecordingSet& recordings, const TorqueRows& rows, const VectorXd& left,
                              size_t recording);
 
+/// When a push begins and ends, near to when it is thought to: what it explains is most.
+/// @param left without it.
+Push FindTimes(const RecordingSet& recordings, const TorqueRows& rows, const VectorXd& left, Push push);
+
 }  // namespace dexcheck

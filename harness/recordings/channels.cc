@@ -99,6 +99,7 @@ Recording OpenRecordingOf(const RobotModel& model, const fs::path& path, const f
     recording.name = path == "-" ? "standard input" : path.filename().string();
     recording.reader = OpenRecording(path);
     recording.channels = GuessChannels(model, recording.reader->names());
+    GuessFeet(model, recording.reader->names(), &recording);
   }
   if (is_complete)
     Require(model, recording, names_files ? path.string() : path == "-" ? "standard input" : path.string());
@@ -115,11 +116,12 @@ std::string DescribeColumns(const RobotModel& model, const Recording& recording)
       "\n# Numbers count columns from 1. unit: s, ms, us, ns; rad, deg, turn, m, mm; N m, mN m; A, mA.\n"
       "# Each may have: joints = [...], sign = [...], ratio = [...], offset = [...], file = \"...\".\n";
   std::set<size_t> used;
-  for (const RecordedQuantity quantity : kQuantities) {
+  const auto describe = [&](RecordedQuantity quantity, int first, const std::string& head) {
     std::string columns, joints;
     double scale = 1.0;
     for (const Channel& one : recording.channels) {
-      if (one.quantity != quantity) continue;
+      const bool is_other = quantity == RecordedQuantity::kWrench && one.joint / 6 != first / 6;
+      if (one.quantity != quantity || is_other) continue;
       used.insert(one.column);
       scale = one.scale;
       const std::string separator = columns.empty() ? "" : ", ";
@@ -129,18 +131,27 @@ std::string DescribeColumns(const RobotModel& model, const Recording& recording)
         joints += separator + Quote(model.joint(one.joint).name);
     }
     if (columns.empty()) {
-      text += fmt::format("\n# [{}]\n# columns = []\n", NameOf(quantity));
+      text += fmt::format("\n# {}\n# columns = []\n", head);
       if (quantity == RecordedQuantity::kWrench) text += "# link = \"\"\n";
-      continue;
+      return;
     }
-    text += fmt::format("\n[{}]\ncolumns = [{}]\n", NameOf(quantity), columns);
+    text += fmt::format("\n{}\ncolumns = [{}]\n", head, columns);
     if (!joints.empty()) text += fmt::format("joints = [{}]\n", joints);
-    if (quantity == RecordedQuantity::kWrench)
-      text += fmt::format("link = {}\n", Quote(model.link_name(recording.wrench.link)));
+    if (quantity == RecordedQuantity::kWrench) {
+      const WrenchPlace& place = recording.wrenches[static_cast<size_t>(first / 6)];
+      text +=
+          fmt::format("link = {}\npoint = [{}, {}, {}]\naxes = \"{}\"\n", Quote(model.link_name(place.link)),
+                      place.point[0], place.point[1], place.point[2], place.is_world ? "world" : "link");
+    }
     for (const Unit& unit : ListUnits())
       if (scale != 1.0 && unit.scale == scale && FindUnit(std::string(unit.name), quantity) == &unit)
         text += fmt::format("unit = \"{}\"\n", unit.name);
-  }
+  };
+  for (const RecordedQuantity quantity : kQuantities)
+    if (quantity != RecordedQuantity::kWrench || recording.wrenches.empty())
+      describe(quantity, 0, fmt::format("[{}]", NameOf(quantity)));
+  for (size_t i = 0; i < recording.wrenches.size(); ++i)
+    describe(RecordedQuantity::kWrench, 6 * static_cast<int>(i), "[[wrench]]");
   std::string unused;
   for (size_t i = 0; i < names.size(); ++i)
     if (!used.contains(i))

@@ -28,7 +28,7 @@ int CountComponents(RecordedQuantity quantity);
 /// A column that is used: quantity = scale * number + offset, in rad, m, s, N m, N, A.
 struct Channel {
   RecordedQuantity quantity = RecordedQuantity::kTime;
-  int joint = -1;  ///< Or the component of a wrench or of the base's pose.
+  int joint = -1;  ///< Or the component of the base's pose, or of wrenches, six for each.
   size_t column = 0;
   double scale = 1.0;
   double offset = 0.0;
@@ -43,7 +43,7 @@ struct DeclaredPayload {
 
 /// Where a measured wrench acts on the robot.
 struct WrenchPlace {
-  int link = -1;                      ///< -1 for no wrench.
+  int link = -1;
   Vector3d point = Vector3d::Zero();  ///< In the link's frame, m: what the moment is about.
   bool is_world = false;              ///< In world axes; otherwise in the link's.
 };
@@ -54,7 +54,7 @@ struct Recording {
   std::unique_ptr<RecordingReader> reader;
   std::vector<Channel> channels;
   std::optional<DeclaredPayload> payload;
-  WrenchPlace wrench;
+  std::vector<WrenchPlace> wrenches;  ///< Those without a moment have three channels.
   std::function<Recording()> reopen;  ///< From its begin; empty where that cannot be.
 
   /// -1 where it has none.

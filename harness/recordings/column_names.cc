@@ -11,54 +11,18 @@ namespace dexcheck {
 namespace {
 
 /// Words that logs use for a quantity.
-struct Word {
-  std::string_view word;
-  RecordedQuantity quantity;
-};
-constexpr Word kWords[] = {
-    {"t", RecordedQuantity::kTime},
-    {"time", RecordedQuantity::kTime},
-    {"timestamp", RecordedQuantity::kTime},
-    {"stamp", RecordedQuantity::kTime},
-    {"secs", RecordedQuantity::kTime},
-    {"seconds", RecordedQuantity::kTime},
-    {"q", RecordedQuantity::kPosition},
-    {"pos", RecordedQuantity::kPosition},
-    {"position", RecordedQuantity::kPosition},
-    {"positions", RecordedQuantity::kPosition},
-    {"angle", RecordedQuantity::kPosition},
-    {"qpos", RecordedQuantity::kPosition},
-    {"theta", RecordedQuantity::kPosition},
-    {"qd", RecordedQuantity::kVelocity},
-    {"dq", RecordedQuantity::kVelocity},
-    {"vel", RecordedQuantity::kVelocity},
-    {"velocity", RecordedQuantity::kVelocity},
-    {"velocities", RecordedQuantity::kVelocity},
-    {"qvel", RecordedQuantity::kVelocity},
-    {"qdot", RecordedQuantity::kVelocity},
-    {"speed", RecordedQuantity::kVelocity},
-    {"xi", RecordedQuantity::kVelocity},
-    {"qdd", RecordedQuantity::kAcceleration},
-    {"ddq", RecordedQuantity::kAcceleration},
-    {"acc", RecordedQuantity::kAcceleration},
-    {"acceleration", RecordedQuantity::kAcceleration},
-    {"qacc", RecordedQuantity::kAcceleration},
-    {"qddot", RecordedQuantity::kAcceleration},
-    {"tau", RecordedQuantity::kTorque},
-    {"torque", RecordedQuantity::kTorque},
-    {"torques", RecordedQuantity::kTorque},
-    {"effort", RecordedQuantity::kTorque},
-    {"efforts", RecordedQuantity::kTorque},
-    {"trq", RecordedQuantity::kTorque},
-    {"force", RecordedQuantity::kTorque},
-    {"current", RecordedQuantity::kCurrent},
-    {"currents", RecordedQuantity::kCurrent},
-    {"amps", RecordedQuantity::kCurrent},
-    {"i", RecordedQuantity::kCurrent},
-};
+constexpr std::pair<RecordedQuantity, std::string_view> kWords[] = {
+    {RecordedQuantity::kTime, " t time timestamp stamp secs seconds "},
+    {RecordedQuantity::kPosition, " q pos position positions angle qpos theta "},
+    {RecordedQuantity::kVelocity, " qd dq vel velocity velocities qvel qdot speed xi "},
+    {RecordedQuantity::kAcceleration, " qdd ddq acc acceleration qacc qddot "},
+    {RecordedQuantity::kTorque, " tau torque torques effort efforts trq force "},
+    {RecordedQuantity::kCurrent, " current currents amps i "}};
 /// What is commanded is no measurement.
-constexpr std::string_view kCommanded[] = {"cmd",      "command", "commanded", "des", "desired", "target",
-                                           "setpoint", "ref",     "reference", "d",   "error",   "ext"};
+constexpr std::string_view kCommanded =
+    " cmd command commanded des desired target setpoint ref reference d error ext ";
+
+bool Has(std::string_view list, const std::string& word) { return list.find(" " + word + " ") != list.npos; }
 
 constexpr Unit kUnits[] = {
     {"s", RecordedQuantity::kTime, 1.0},
@@ -125,20 +89,36 @@ NamedColumn ReadName(const RobotModel& model, const std::string& written) {
   if (column.joint >= 0) name.replace(at, longest, "/");
   const std::vector<std::string> words = SplitWords(name);
   for (const std::string& word : words) {
-    const auto quantity =
-        std::find_if(std::begin(kWords), std::end(kWords), [&](const Word& one) { return one.word == word; });
+    const auto* const quantity =
+        std::ranges::find_if(kWords, [&](const auto& one) { return Has(one.second, word); });
     const bool is_unit = column.quantity && FindUnit(word, *column.quantity) != nullptr;
-    if (std::find(std::begin(kCommanded), std::end(kCommanded), word) != std::end(kCommanded)) {
+    if (Has(kCommanded, word)) {
       column.is_commanded = true;
     } else if (is_unit) {
       column.scale = FindUnit(word, *column.quantity)->scale;
     } else if (quantity != std::end(kWords) && !(word == "t" && words.size() > 2)) {
-      column.quantity = quantity->quantity;
+      column.quantity = quantity->first;
     } else if (IsDigit(word[0]) && word.size() < 4) {
       column.number = std::stoi(word);
     }
   }
   return column;
+}
+
+/// "q.x" of "q.x [m]".
+std::string WithoutUnit(const std::string& name) { return name.substr(0, name.find(" [")); }
+
+/// Of a base's pose, by the last word and those before it; -1 for none. A run's log calls it "q.qw".
+int FindPoseComponent(const std::vector<std::string>& words) {
+  constexpr std::string_view kComponents[] = {"x", "y", "z", "qw", "qx", "qy", "qz"};
+  const auto has = [&](std::string_view list) {
+    return std::ranges::any_of(words, [&](const std::string& word) { return Has(list, word); });
+  };
+  if (!has(" base root trunk torso pelvis pose ") && !(words.size() == 2 && words[0] == "q")) return -1;
+  const bool is_turned = has(" quat quaternion orientation rotation ") && words.back().size() == 1;
+  const std::string component = (is_turned ? "q" : "") + words.back();
+  const auto* const found = std::ranges::find(kComponents, component);
+  return found == std::end(kComponents) ? -1 : static_cast<int>(found - kComponents);
 }
 
 }  // namespace
@@ -182,7 +162,33 @@ std::vector<Channel> GuessChannels(const RobotModel& model, const std::vector<st
     if (seen.emplace(*column.quantity, joint).second)
       channels.push_back({*column.quantity, joint, i, column.scale});
   }
+  // A pose has all of its numbers.
+  std::vector<Channel> pose;
+  for (size_t i = 0; i < names.size(); ++i) {
+    const NamedColumn& column = columns[i];
+    const bool is_rate = column.quantity && *column.quantity != RecordedQuantity::kPosition;
+    const int component = column.joint >= 0 || column.is_commanded || is_rate
+                              ? -1
+                              : FindPoseComponent(SplitWords(ToLower(WithoutUnit(names[i]))));
+    if (component >= 0 && seen.emplace(RecordedQuantity::kBase, component).second)
+      pose.push_back({RecordedQuantity::kBase, component, i});
+  }
+  if (static_cast<int>(pose.size()) == CountComponents(RecordedQuantity::kBase))
+    channels.insert(channels.end(), pose.begin(), pose.end());
   return channels;
+}
+
+void GuessFeet(const RobotModel& model, const std::vector<std::string>& names, Recording* recording) {
+  for (const Frame& frame : model.frames()) {
+    const auto first = std::ranges::find(names, "foot/force." + frame.name + ".x", WithoutUnit);
+    if (first == names.end() || frame.link < 0) continue;
+    const auto column = static_cast<size_t>(first - names.begin());
+    for (int k = 0; k < 3; ++k)
+      recording->channels.push_back({RecordedQuantity::kWrench,
+                                     6 * static_cast<int>(recording->wrenches.size()) + k,
+                                     column + static_cast<size_t>(k)});
+    recording->wrenches.push_back({frame.link, frame.X_LF.translation(), /*is_world=*/true});
+  }
 }
 
 }  // namespace dexcheck

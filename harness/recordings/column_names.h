@@ -24,4 +24,7 @@ const Unit* FindUnit(std::string name, RecordedQuantity quantity);
 /// Columns by their names alone; those that are not known are left out.
 std::vector<Channel> GuessChannels(const RobotModel& model, const std::vector<std::string>& names);
 
+/// Forces of the ground on frames of the robot, as a run's log has them: "foot/force.FRAME.x".
+void GuessFeet(const RobotModel& model, const std::vector<std::string>& names, Recording* recording);
+
 }  // namespace dexcheck

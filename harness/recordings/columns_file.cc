@@ -81,7 +81,15 @@ class ColumnsFile {
   /// "q = [2, 3]", or a table.
   void ReadQuantity(RecordedQuantity quantity, const TomlValue& value, Recording* recording) {
     std::vector<Channel>* channels = &recording->channels;
-    if (quantity == RecordedQuantity::kWrench && !value.IsTable()) value.Fail("must be a table, with a link");
+    if (quantity == RecordedQuantity::kWrench && !value.IsTable()) {
+      const bool is_list = IsList(value);
+      for (const TomlValue& one : is_list ? value.AsList() : std::vector<TomlValue>()) {
+        if (!one.IsTable()) value.Fail("must be a table, with a link");
+        ReadQuantity(quantity, one, recording);
+      }
+      if (!is_list) value.Fail("must be a table, with a link");
+      return;
+    }
     if (!value.IsTable()) {
       ReadColumns(quantity, value, 0, ListComponents(quantity), channels);
       return;
@@ -92,7 +100,12 @@ class ColumnsFile {
     if (const auto given = table.Find("width")) width = static_cast<size_t>(given->AsWhole(1, 1000));
     if (const auto file = table.Find("file")) first = Add(path_.parent_path() / file->AsText(), width);
     std::vector<int> joints = ListComponents(quantity);
-    if (quantity == RecordedQuantity::kWrench) recording->wrench = ReadWrenchPlace(&table);
+    if (quantity == RecordedQuantity::kWrench) {
+      for (int& component : joints) component += 6 * static_cast<int>(recording->wrenches.size());
+      const auto columns = table.Find("columns");
+      if (columns && IsList(*columns) && columns->AsList().size() == 3) joints.resize(3);
+      recording->wrenches.push_back(ReadWrenchPlace(&table));
+    }
     const auto list = joints.empty() ? table.Find("joints") : std::nullopt;
     if (list) {
       for (const TomlValue& one : list->AsList()) joints.push_back(FindJoint(one));

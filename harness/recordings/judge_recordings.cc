@@ -203,7 +203,12 @@ class Judge {
     Explanation one;
     one.channel = CauseChannel::kBalance;
     one.from = one.to = std::numeric_limits<double>::quiet_NaN();
-    if (fault.kind == TorqueFault::kPush) one.from = fault.push.from, one.to = fault.push.to, one.ends = true;
+    if (fault.kind == TorqueFault::kPush) {
+      const auto& blocks = set_[static_cast<size_t>(fault.push.recording)].fit->blocks();
+      one.from = std::max(fault.push.from, blocks.front().from);
+      one.to = std::min(fault.push.to, blocks.back().to);
+      one.ends = true;
+    }
     one.faults.push_back(Describe(fault, term.amplitude, term.error));
     for (const auto& [candidate, amplitude] : term.same)
       one.faults.push_back(Describe(estimator_.faults()[candidate], amplitude, {}));
@@ -355,7 +360,10 @@ RecordingJudgement JudgeRecordings(const RobotModel& model, std::vector<Recordin
   for (int i = 1; i < kReadings && goes_on && judgement.refinements != next.refinements; ++i) {
     next.refinements = judgement.refinements;
     if (!Reopen(recordings, undo)) break;
-    judgement = Judge(model, recordings, next, count).Run();
+    RecordingJudgement again = Judge(model, recordings, next, count).Run();
+    // What a reading leaves out is no reason to find nothing.
+    if (again.Agrees()) break;
+    judgement = std::move(again);
   }
   for (const PositionFault& fault : faults)
     judgement.causes.insert(judgement.causes.begin(), MakeCause(fault.fault));

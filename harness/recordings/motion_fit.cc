@@ -13,6 +13,7 @@ namespace dexcheck {
 namespace {
 
 constexpr size_t kMostCentres = 300;  // at which noise is measured
+constexpr double kMostNoisy = 6.0;    // times its noise, what a torque at its limit is below it
 constexpr long kHeld = 5;             // rows that repeat one another; more of them are a robot at rest
 
 }  // namespace
@@ -189,8 +190,9 @@ void MotionFit::AverageFriction(int joint, const VectorXd& times, const VectorXd
                                 const VectorXd& weights) {
   auto shapes = sample_.friction.row(joint);
   shapes.setZero();
-  double direction = 0.0, slip = 0.0;
-  const bool moves = std::abs(sample_.qd[joint]) >= noise_.rest[joint];
+  double direction = 0.0, slip = 0.0, error = 0.0;
+  const double rest = noise_.rest[joint];
+  const bool moves = std::abs(sample_.qd[joint]) >= rest;
   for (Eigen::Index k = 0; k < times.size() && moves; ++k) {
     double v = 0.0;
     for (Eigen::Index p = rate.size(); p-- > 0;) v = v * times[k] + rate[p];
@@ -199,9 +201,11 @@ void MotionFit::AverageFriction(int joint, const VectorXd& times, const VectorXd
     slip = k > 0 ? CalcSlip(sign, slip, std::abs(v) * (times[k] - times[k - 1])) : sign;
     here[kSlipShape] = slip;
     direction += weights[k] * sign;
+    error += std::abs(v) < rest ? weights[k] : 0.0;
     shapes += weights[k] * here;
   }
   sample_.direction[joint] = direction;
+  sample_.direction_error[joint] = error;
 }
 
 size_t MotionFit::CalcReach() const {
@@ -248,28 +252,36 @@ bool MotionFit::Emit(size_t centre, const Receiver& receive) {
     const int torque = ChannelOf(Effort(), joint);
     if (torque < 0) continue;
     sample_.torque[joint] = fitted(0, torque);
+    if (const auto limit = refinements_.limits.find(joint); limit != refinements_.limits.end())
+      sample_.beyond[joint] =
+          (window.col(torque).array().abs() > limit->second - kMostNoisy * noise_.torque[joint])
+              .cast<double>()
+              .mean();
     sample_.torque_rate[joint] = CalcTorqueRate(joint, centre, fitted.col(torque));
   }
   if (recording_->Has(RecordedQuantity::kBase)) sample_.base = CalcBase(fitted);
   for (Eigen::Index k = 0; k < sample_.wrench.size(); ++k)
-    sample_.wrench[k] = fitted(0, ChannelOf(RecordedQuantity::kWrench, static_cast<int>(k)));
+    if (const int channel = ChannelOf(RecordedQuantity::kWrench, static_cast<int>(k)); channel >= 0)
+      sample_.wrench[k] = fitted(0, channel);
   return receive(sample_);
 }
 
 void MotionFit::CalcSpeeds() {
   const Eigen::Index n = model_->num_joints();
-  VectorXd squares = VectorXd::Zero(n), moving = VectorXd::Zero(n);
+  VectorXd squares = VectorXd::Zero(n), moving = VectorXd::Zero(n), errors = VectorXd::Zero(n);
   shape_velocities_ = ListShapeVelocities(VectorXd::Ones(n));
   double count = 0.0;
   for (const size_t centre : ListCentres(CalcReach())) {
     Emit(centre, [&](const RecordedSample& sample) {
       squares += sample.qd.cwiseAbs2();
+      errors += sample.direction_error.cwiseAbs2();
       moving += sample.direction.unaryExpr([](double s) { return s != 0.0 ? 1.0 : 0.0; });
       return true;
     });
     count += 1.0;
   }
   const VectorXd speeds = (squares / std::max(1.0, count)).cwiseSqrt();
+  noise_.direction = (errors / std::max(1.0, count)).cwiseSqrt();
   shape_velocities_ = ListShapeVelocities(speeds, refinements_.stribeck);
   constexpr double kSlow = 2e-3, kMoving = 0.2;
   noise_.rest = noise_.rest.cwiseMax(kSlow * speeds);
@@ -278,8 +290,13 @@ void MotionFit::CalcSpeeds() {
 
 std::vector<bool> MotionFit::IsJudged(const RecordedSample& sample) const {
   std::vector<bool> judged(moves_.size());
-  for (size_t joint = 0; joint < judged.size(); ++joint)
-    judged[joint] = !moves_[joint] || sample.direction[static_cast<Eigen::Index>(joint)] != 0.0;
+  // Where a torque reaches its limit, what is smoothed is neither the one nor the other.
+  constexpr double kFew = 0.02;
+  for (size_t joint = 0; joint < judged.size(); ++joint) {
+    const auto at = static_cast<Eigen::Index>(joint);
+    judged[joint] = (!moves_[joint] || sample.direction[at] != 0.0) &&
+                    std::min(sample.beyond[at], 1.0 - sample.beyond[at]) < kFew;
+  }
   return judged;
 }
 

@@ -36,11 +36,13 @@ struct RecordedSample {
   double time = 0.0;
   VectorXd q, qd, qdd;
   VectorXd torque;                    ///< Measured, or the current; smoothed like the motion.
-  VectorXd most_torque;               ///< The largest of those that were read ahead.
+  VectorXd most_torque;               ///< The largest of those that were read ahead, less its noise.
   VectorXd torque_rate;               ///< Per s, the secant's over a delay that is known.
   BaseMotion base;                    ///< At rest where it was not recorded.
   VectorXd wrench;                    ///< Measured, on the link, N and N m; empty for none.
   VectorXd direction;                 ///< Sign of the velocity, averaged as the torque is; 0 at rest.
+  VectorXd direction_error;           ///< By what the velocity may be off.
+  VectorXd beyond;                    ///< Share of the rows whose torque is beyond a limit that is known.
   MatrixXd friction;                  ///< Other shapes of it, n x kFrictionShapes, likewise.
   Vector2d swing = Vector2d::Zero();  ///< Sine and cosine of a base that shakes, averaged likewise.
 };
@@ -49,10 +51,11 @@ struct RecordedSample {
 struct MotionNoise {
   VectorXd position, velocity, torque;  ///< Of a single number.
   VectorXd smooth_position, smooth_torque,
-      acceleration;   ///< Of a sample, the last with what smoothing leaves out.
-  VectorXd wrench;    ///< Of a sample; empty for none.
-  double base = 0.0;  ///< Of a sample: the base's acceleration with gravity, m/s^2.
-  VectorXd rest;      ///< Velocity below which a joint is at rest.
+      acceleration;    ///< Of a sample, the last with what smoothing leaves out.
+  VectorXd wrench;     ///< Of a sample; empty for none.
+  double base = 0.0;   ///< Of a sample: the base's acceleration with gravity, m/s^2.
+  VectorXd rest;       ///< Velocity below which a joint is at rest.
+  VectorXd direction;  ///< Of a sample.
 };
 
 /// Reads a recording once, in constant memory. Rows whose times are doubled are left out, so are those that
@@ -106,6 +109,7 @@ class MotionFit {
   void Analyse();
   void ChooseWindow(const std::vector<size_t>& centres);
   void CalcSpeeds();
+  void AddWrenchErrors();
   void CheckVelocities(const std::vector<size_t>& centres, size_t half);
   [[nodiscard]] std::vector<size_t> ListCentres(size_t half) const;
   /// (order + 1) x rows of the window: of the polynomial about the centre, in powers of the time.

@@ -65,10 +65,10 @@ void MotionFit::Analyse() {
     segments_[i] = segment_;
   }
   const Eigen::Index n = model_->num_joints();
-  for (VectorXd* vector :
-       {&noise_.position, &noise_.velocity, &noise_.torque, &noise_.smooth_position, &noise_.smooth_torque,
-        &noise_.acceleration, &noise_.rest, &sample_.q, &sample_.qd, &sample_.qdd, &sample_.torque,
-        &sample_.torque_rate, &sample_.direction, &sample_.most_torque})
+  for (VectorXd* vector : {&noise_.position, &noise_.velocity, &noise_.torque, &noise_.smooth_position,
+                           &noise_.smooth_torque, &noise_.acceleration, &noise_.rest, &sample_.q, &sample_.qd,
+                           &sample_.qdd, &sample_.torque, &sample_.torque_rate, &sample_.direction,
+                           &sample_.direction_error, &sample_.beyond, &sample_.most_torque})
     *vector = VectorXd::Zero(n);
   sample_.friction = MatrixXd::Zero(n, kFrictionShapes);
   // Noise of each channel: what a polynomial over a short window leaves.
@@ -107,22 +107,44 @@ void MotionFit::Analyse() {
     noise_.torque[joint] = get(Effort());
     for (const Row& row : rows_ahead_)
       if (const int channel = ChannelOf(Effort(), joint); channel >= 0)
-        sample_.most_torque[joint] = std::max(sample_.most_torque[joint], std::abs(row[channel]));
+        sample_.most_torque[joint] =
+            std::max(sample_.most_torque[joint], std::abs(row[channel]) - 3.0 * noise_.torque[joint]);
   }
-  if (recording_->wrench.link >= 0) {
-    noise_.wrench = sample_.wrench = VectorXd::Zero(6);
-    for (int k = 0; k < 6; ++k) noise_.wrench[k] = sigma[ChannelOf(RecordedQuantity::kWrench, k)];
-  }
+  noise_.wrench = sample_.wrench = VectorXd::Zero(6 * static_cast<Eigen::Index>(recording_->wrenches.size()));
+  for (int k = 0; k < noise_.wrench.size(); ++k)
+    if (const int channel = ChannelOf(RecordedQuantity::kWrench, k); channel >= 0)
+      noise_.wrench[k] = sigma[channel];
   VectorXd base = VectorXd::Zero(2);
   for (int k = 0; k < 7 && recording_->Has(RecordedQuantity::kBase); ++k)
     base[k / 3 > 0 ? 1 : 0] += Square(sigma[ChannelOf(RecordedQuantity::kBase, k)]);
   CheckVelocities(centres, half);
   inertia_ = CalcInertia(centres);
   ChooseWindow(centres);
+  AddWrenchErrors();
   const MatrixXd C = CalcCoefficients(ListCentres(half_).front(), half_, kOrder);
   noise_.base = 2.0 * std::sqrt(base[0] * C.row(2).squaredNorm() +
                                 base[1] * C.row(0).squaredNorm() * model_->gravity().squaredNorm());
   CalcSpeeds();
+}
+
+void MotionFit::AddWrenchErrors() {
+  // When a force acted is known to a row's time, and where, if its moment was not measured, to what soft
+  // ground gives.
+  constexpr double kPlace = 1e-4;  // m
+  const std::vector<size_t> centres = ListCentres(half_);
+  VectorXd errors = VectorXd::Zero(noise_.wrench.size());
+  for (const size_t centre : centres) {
+    const MatrixXd fitted = CalcCoefficients(centre, half_, kOrder) * GetWindow(centre, half_);
+    for (int k = 0; k < errors.size(); ++k) {
+      const int channel = ChannelOf(RecordedQuantity::kWrench, k);
+      if (channel < 0) continue;
+      errors[k] += Square(fitted(1, channel) * step_) / 12.0;
+      if (k % 6 < 3 && ChannelOf(RecordedQuantity::kWrench, k + 3) < 0)
+        errors.segment<3>(k - k % 6 + 3).array() += Square(kPlace * fitted(0, channel));
+    }
+  }
+  noise_.wrench =
+      (noise_.wrench.cwiseAbs2() + errors / static_cast<double>(centres.size())).cwiseSqrt().eval();
 }
 
 void MotionFit::CheckVelocities(const std::vector<size_t>& centres, size_t half) {

@@ -69,7 +69,7 @@ void RecordingSet::Read(Recording* recording, const ReadOptions& options,
   step_ = std::max(step_, motion.step());
   for (std::unique_ptr<TorqueBalance>* balance : {&one.fit, &one.held}) {
     *balance = std::make_unique<TorqueBalance>(*one.model, joints_, has_currents_, options.refinements);
-    (*balance)->SetWrenchPlace(recording->wrench);
+    (*balance)->SetWrenches(recording->wrenches);
   }
   long samples = 0;
   double begin = 0.0;
@@ -96,11 +96,16 @@ void RecordingSet::Read(Recording* recording, const ReadOptions& options,
   if (!resting.empty())
     notes_.push_back(recording->name + ": has no positions of " + JoinNames(resting) +
                      ": taken to rest at 0");
+  if (model_->base().type == BaseType::kFloating && recording->wrenches.empty())
+    notes_.push_back(recording->name +
+                     ": has no forces of the ground: links are taken to touch nothing; wrench in a file of "
+                     "--columns gives them, or leave the torques of those that touch out of tau");
   for (const std::string& note : motion.ListNotes()) notes_.push_back(note);
   for (const Fault& fault : motion.faults()) faults_.push_back(fault);
   one.motion = motion.noise();
   one.inertia = motion.inertia();
   one.step = motion.step();
+  one.reach = 0.5 * motion.window();
   one.shape_velocities = motion.shape_velocities();
   one.most_torque = motion.most_torque();
 }
@@ -128,6 +133,7 @@ double RecordingSet::CalcNoise(const ReadRecording& one, size_t place) const {
     variance += Square(one.inertia(joint, other) * one.motion.acceleration[other]);
     variance += mean_square({TorqueColumn::kPosition, other}) * Square(one.motion.smooth_position[other]);
   }
+  variance += Square(model_->joint(joint).dry_friction * one.motion.direction[joint]);
   for (int k = 0; k < 3; ++k)
     variance += mean_square({TorqueColumn::kGravity, 0, k}) * Square(one.motion.base);
   if (one.motion.wrench.size() > 0)

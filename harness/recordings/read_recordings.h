@@ -29,6 +29,7 @@ struct ReadRecording {
   MatrixXd shape_velocities;  ///< MotionFit's.
   VectorXd most_torque;       ///< RecordedSample's.
   double step = 0.0;          ///< Between rows, s.
+  double reach = 0.0;         ///< Of smoothing, to each side, s.
   VectorXd noise;             ///< Of a sample's balance, by judged joint, N m or N.
   VectorXd weight;            ///< Likewise: noise, or what no cause explains.
 };

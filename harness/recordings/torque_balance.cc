@@ -31,7 +31,6 @@ TorqueBalance::TorqueBalance(const RobotModel& model, const std::vector<int>& jo
   torques_.resize(n);
   q_.resize(n);
   residual_ = VectorXd::Zero(static_cast<Index>(joints.size()));
-  wrench_squares_ = MatrixXd::Zero(residual_.size(), 6);
   constexpr double kStep = 1e-6;
   steps_ = VectorXd::Constant(n, kStep);
   for (const auto& [joint, offset] : refinements.offsets) steps_[joint] = -offset;
@@ -88,7 +87,7 @@ double TorqueBalance::CalcCutOff(int joint, int component, const RecordedSample&
   const double limit = FindCutOff(refinements_, joint, component, sample.most_torque[joint]);
   const double beyond = std::abs(torque) - limit;
   if (!(beyond > 0.0)) return 0.0;
-  return std::copysign(component % 2 == 0 ? beyond : -limit, torque) * (is_recorded ? -1.0 : 1.0);
+  return (is_recorded == torque > 0.0 ? -1.0 : 1.0) * (component % 2 == 0 ? beyond : -limit);
 }
 
 double TorqueBalance::CalcEntry(int joint, const TorqueColumn& column, const RecordedSample& sample) const {
@@ -139,14 +138,23 @@ void TorqueBalance::FillRow(size_t place, const RecordedSample& sample, Eigen::R
       (has_currents_ ? 0.0 : sample.torque[joint]) - torques_[joint] - CalcFriction(joint, sample);
 }
 
+void TorqueBalance::SetWrenches(const std::vector<WrenchPlace>& places) {
+  wrenches_ = places;
+  wrench_squares_ = MatrixXd::Zero(residual_.size(), 6 * static_cast<Index>(places.size()));
+}
+
 MatrixXd TorqueBalance::CalcWrenchColumns() {
-  const Matrix3d& R = regressor_.GetRotation(wrench_.link);
-  const Matrix3d axes = wrench_.is_world ? Matrix3d(Matrix3d::Identity()) : R;
-  const Vector3d lever = R * (wrench_.point - model_->joint(wrench_.link).body.com);
-  regressor_.CalcForceColumns(wrench_.link, forces_);
-  MatrixXd columns(forces_.rows(), 6);
-  columns << (forces_.leftCols<3>() + forces_.rightCols<3>() * Skew(lever)) * axes,
-      forces_.rightCols<3>() * axes;
+  MatrixXd columns(forces_.rows(), wrench_squares_.cols());
+  Index at = 0;
+  for (const WrenchPlace& place : wrenches_) {
+    const Matrix3d& R = regressor_.GetRotation(place.link);
+    const Matrix3d axes = place.is_world ? Matrix3d(Matrix3d::Identity()) : R;
+    const Vector3d lever = R * (place.point - model_->joint(place.link).body.com);
+    regressor_.CalcForceColumns(place.link, forces_);
+    columns.middleCols(at, 6) << (forces_.leftCols<3>() + forces_.rightCols<3>() * Skew(lever)) * axes,
+        forces_.rightCols<3>() * axes;
+    at += 6;
+  }
   return columns;
 }
 
@@ -190,7 +198,7 @@ void TorqueBalance::Add(const RecordedSample& sample, const std::vector<bool>& i
     CalcShakingColumns(sample);
     regressor_.SetMotion(sample.q, sample.qd, sample.qdd, sample.base);
   }
-  if (wrench_.link >= 0) {
+  if (!wrenches_.empty()) {
     const MatrixXd columns = CalcWrenchColumns();
     torques_ += columns * sample.wrench;
     wrench_squares_ += columns(joints_, Eigen::all).cwiseAbs2();

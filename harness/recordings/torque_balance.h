@@ -56,9 +56,9 @@ class TorqueBalance {
   TorqueBalance(const RobotModel& model, const std::vector<int>& joints, bool has_currents,
                 const Refinements& refinements = {});
 
-  /// What measures the samples' wrench.
-  void SetWrenchPlace(const WrenchPlace& place) { wrench_ = place; }
-  /// sum over samples of the squared entries of the columns by which a joint balances the wrench (6).
+  /// Where the samples' wrenches act.
+  void SetWrenches(const std::vector<WrenchPlace>& places);
+  /// sum over samples of the squared entries of the columns by which a joint balances the wrenches (6 each).
   [[nodiscard]] VectorXd wrench_squares(size_t place) const {
     return wrench_squares_.row(static_cast<Eigen::Index>(place)).transpose();
   }
@@ -99,7 +99,7 @@ class TorqueBalance {
   static constexpr size_t kMostBlocks = 512;
 
   void ListColumns(bool has_currents);
-  /// What balances a force at the wrench's point and a moment, in its axes: n x 6.
+  /// What balances a force at each wrench's point and a moment, in its axes: n x 6 each.
   [[nodiscard]] MatrixXd CalcWrenchColumns();
   void CalcShakingColumns(const RecordedSample& sample);
   /// The model's, at a joint.
@@ -126,7 +126,7 @@ class TorqueBalance {
   double block_samples_ = 1.0;
   // at the sample
   MatrixXd bodies_, gravity_, forces_, by_position_, shaking_;
-  WrenchPlace wrench_;
+  std::vector<WrenchPlace> wrenches_;
   MatrixXd wrench_squares_;
   VectorXd torques_, q_, steps_, residual_;
 };

@@ -155,9 +155,10 @@ class FaultList {
       };
       std::vector<BodyVector> changes;
       TorqueFault& centre = Add(kCentre, link, "centre of mass", place, "m", std::vector<Parts>(3));
-      ShiftCentre(model_, Vector3d::Zero(), &centre);
-      constexpr double kLength = 0.05;
+      PlaceMass(model_, Vector3d::Zero(), &centre);
+      constexpr double kLength = 0.05, kFarthest = 0.15;
       centre.scale = VectorXd::Constant(3, kLength);
+      centre.is_possible = [](const VectorXd& a) { return a.norm() < kFarthest; };
       centre.is_ordinary = true;
       TorqueFault& inertia = Add(kInertia, link, "inertia", place, "kg m^2", {});
       changes.clear();
@@ -305,15 +306,14 @@ std::vector<TorqueFault> ListTorqueFaults(const RobotModel& model, const std::ve
   return FaultList(model, joints, recordings, refinements).Make();
 }
 
-void ShiftCentre(const RobotModel& model, const Vector3d& shift, TorqueFault* centre) {
+static void ShiftCentre(const RobotModel& model, const Vector3d& shift, TorqueFault* centre) {
   MassProperties body = model.joint(centre->index).body;
   body.com += 0.5 * shift;
   for (int k = 0; k < 3; ++k)
     centre->columns[static_cast<size_t>(k)] = BodyParts(centre->index, CentreColumn(body, k));
 }
 
-void PlacePayload(double mass, const Vector3d& h, TorqueFault* payload) {
-  if (payload->columns.size() != 4 || !(mass > 0.0)) return;
+static void PlacePayload(double mass, const Vector3d& h, TorqueFault* payload) {
   // I(m, h) = (h^2 1 - h h^T) / m has degree one, so that its derivatives times m and h are I itself.
   const auto column = [&](int k) {
     const Vector3d e = k > 0 ? Vector3d(Vector3d::Unit(k - 1)) : Vector3d(Vector3d::Zero());
@@ -327,6 +327,13 @@ void PlacePayload(double mass, const Vector3d& h, TorqueFault* payload) {
   };
   for (int k = 0; k < 4; ++k)
     payload->columns[static_cast<size_t>(k)] = BodyParts(payload->index, column(k), payload->recording);
+}
+
+void PlaceMass(const RobotModel& model, const VectorXd& amplitude, TorqueFault* fault) {
+  if (fault->is_possible && !fault->is_possible(amplitude)) return;
+  if (fault->kind == TorqueFault::kCentre) ShiftCentre(model, amplitude, fault);
+  if (fault->kind == TorqueFault::kPayload && fault->columns.size() == 4)
+    PlacePayload(amplitude[0], amplitude.segment<3>(1), fault);
 }
 
 std::vector<TorqueFault> ListPushes(const RobotModel& model, const std::vector<int>& joints,

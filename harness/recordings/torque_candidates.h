@@ -23,8 +23,8 @@ struct ColumnPart {
 /// joint, or an acceleration of the base (three columns), for a time.
 struct Push {
   int recording = 0;
-  double from = 0.0, to = 0.0;                         ///< s
-  std::vector<std::pair<double, double>> shares = {};  ///< Times, and which part of it acts then.
+  double from = 0.0, to = 0.0;  ///< s
+  double reach = 0.0;           ///< Over which smoothing spreads its begin and end to each side, s.
   int link = -1;
   bool has_moment = false;
   int joint = -1;  ///< -1 besides no link: the base.
@@ -79,13 +79,10 @@ struct TorqueFault {
 std::vector<TorqueFault> ListTorqueFaults(const RobotModel& model, const std::vector<int>& joints,
                                           int recordings, const Refinements& refinements = {});
 
-/// Gives a payload's columns, of its mass (kg) and mass times place (kg m), the inertia of a point near such
-/// a one; a payload of ten columns stays as it is.
-void PlacePayload(double mass, const Vector3d& moment, TorqueFault* payload);
-
-/// Gives a centre of mass the columns with which a shift (m) of this size leaves what it leaves: its inertia
-/// about the link's origin grows with the square.
-void ShiftCentre(const RobotModel& model, const Vector3d& shift, TorqueFault* centre);
+/// Gives a centre of mass, or a payload that is a point, the columns with which these amplitudes, if they can
+/// be, leave what they leave: inertias about the link's origin grow with the square of a distance.
+/// @param amplitude a shift, m; mass (kg) and mass times place (kg m).
+void PlaceMass(const RobotModel& model, const VectorXd& amplitude, TorqueFault* fault);
 
 /// Pushes during one stretch of time.
 std::vector<TorqueFault> ListPushes(const RobotModel& model, const std::vector<int>& joints,

@@ -4,12 +4,14 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <tuple>
 #include <utility>
 
 #include "controller/common/errors.h"
 #include "controller/common/linear_algebra.h"
 #include "harness/recordings/base_motion.h"
+#include "harness/recordings/torque_errors.h"
 
 namespace dexcheck {
 namespace {
@@ -52,13 +54,29 @@ TorqueEstimator::TorqueEstimator(RecordingSet* recordings, size_t most_causes)
     : recordings_(recordings), most_causes_(most_causes) {
   do {
     ListFaults();
-    selection_ = Select();
+    Select();
   } while (recordings_->DropUnknownGains());
   if (AddPushes()) {
     barred_.resize(faults_.size(), false);
-    selection_ = Select();
+    Select();
   }
-  while (BarSeconds()) selection_ = Select();
+  while (BarSeconds()) Select();
+  WidenErrors();
+}
+
+void TorqueEstimator::WidenErrors() {
+  const std::vector<Index> first = ListFirstColumns();
+  std::vector<Index> columns(static_cast<size_t>(CountForced(*recordings_)));
+  std::iota(columns.begin(), columns.end(), Index{0});
+  for (const CauseTerm& term : selection_.terms)
+    for (Index k = 0; k < term.error.size(); ++k) columns.push_back(first[term.candidate] + k);
+  if (selection_.terms.empty()) return;
+  const VectorXd errors = CalcClusteredErrors(rows_, CalcLeft(selection_.terms), columns);
+  Index at = CountForced(*recordings_);
+  for (CauseTerm& term : selection_.terms) {
+    term.error = term.error.cwiseMax(errors.segment(at, term.error.size()));
+    at += term.error.size();
+  }
 }
 
 void TorqueEstimator::ListFaults() {
@@ -76,55 +94,70 @@ void TorqueEstimator::ListFaults() {
     barred_.push_back(recordings_->has_currents() && one.IsOfLoad() && one.kind != TorqueFault::kPayload);
 }
 
-CauseSelection TorqueEstimator::Select() {
-  CauseSelection selection;
+void TorqueEstimator::Select() {
+  selection_ = {};
   recordings_->ResetWeights();
   constexpr int kRounds = 6;
   constexpr double kLeastGain = 0.9;  // of what was estimated before, taken away at once
   // Of the square of what no cause explains: so much is left of a drive that is not known well.
   constexpr double kFarFromKnown = 2.0;
+  bool is_known = true;
   for (int round = 0; round < kRounds; ++round) {
     rows_ = MakeTorqueRows(*recordings_, faults_, /*is_held=*/false);
     Compress();
     // Where more than noise is left, what no cause explains weighs as noise does, and is alike.
-    const bool is_known = round == 0 || IsNoise(CalcLeft(selection.terms));
     const double before = std::exchange(
         alike_, round > 0 && is_known ? alike_ : CalcAlike(Fit(is_known ? Part::kUsual : Part::kAll)));
     floor_ = is_known ? 1.0 : kFarFromKnown;
-    selection = SelectAmong();
+    selection_ = SelectAmong();
     if (round + 1 == kRounds || (round > 1 && std::abs(alike_ - before) < 0.2 * before)) break;
-    Relinearise(selection);
-    const VectorXd left = CalcLeft(selection.terms);
-    Weigh(IsNoise(left) ? left : Fit(Part::kAll));
+    const VectorXd left = CalcLeft(selection_.terms);
+    is_known = IsNoise(left);
+    Relinearise();
+    Weigh(is_known ? left : Fit(Part::kAll));
     if (recordings_->has_currents()) {
-      const VectorXd off = CalcAmplitudes(selection.terms).head(CountForced(*recordings_));
+      const VectorXd off = CalcAmplitudes(selection_.terms).head(CountForced(*recordings_));
       recordings_->DivideGains(VectorXd(1.0 + off.array().max(-kLeastGain)));
     }
   }
-  return selection;
 }
 
-void TorqueEstimator::Relinearise(const CauseSelection& selection) {
-  const auto shift = [&](size_t fault, const VectorXd& amplitude) {
-    if (faults_[fault].kind == TorqueFault::kCentre)
-      ShiftCentre(recordings_->model(), amplitude, &faults_[fault]);
-  };
+void TorqueEstimator::Relinearise() {
+  const std::vector<Index> first = ListFirstColumns();
   std::vector<bool> is_found(faults_.size(), false);
-  for (const CauseTerm& term : selection.terms) {
+  for (const CauseTerm& term : selection_.terms) is_found[term.candidate] = true;
+  for (const CauseTerm& term : selection_.terms) {
     const TorqueFault& found = faults_[term.candidate];
-    is_found[term.candidate] = true;
-    shift(term.candidate, term.amplitude);
-    for (const auto& [fault, amplitude] : term.same) shift(fault, amplitude);
-    for (TorqueFault& one : faults_) {
-      // A payload's inertia is that of a point: it grows with the square of the distance.
-      if (found.kind == TorqueFault::kPayload && one.kind == TorqueFault::kPayload &&
-          one.index == found.index && one.recording == found.recording)
-        PlacePayload(term.amplitude[0], term.amplitude.segment<3>(1), &one);
+    if (found.kind == TorqueFault::kPush) FindTimesOf(term);
+    if (!found.IsOfLoad()) continue;
+    // So are those that may have been in its place.
+    VectorXd others = VectorXd::Ones(R_.cols());
+    others.head(R_.cols() - 1) = -CalcAmplitudes(selection_.terms);
+    others.segment(first[term.candidate], term.amplitude.size()).setZero();
+    const VectorXd y = R_ * others;
+    for (size_t i = 0; i < faults_.size(); ++i) {
+      const bool is_same = std::ranges::any_of(term.same, [&](const auto& one) { return one.first == i; });
+      if ((faults_[i].index != found.index || faults_[i].recording != found.recording) && !is_same) continue;
+      if (is_found[i] && i != term.candidate) continue;
+      if (faults_[i].kind == TorqueFault::kCentre || faults_[i].kind == TorqueFault::kPayload)
+        PlaceMass(recordings_->model(),
+                  SolveLeastSquares(R_.middleCols(first[i], CountColumns(faults_[i])), y, kIndependent),
+                  &faults_[i]);
     }
   }
   for (size_t i = 0; i < faults_.size(); ++i)
     if (faults_[i].kind == TorqueFault::kTorqueGain && faults_[i].index >= 0)
-      ScaleWhole(is_found[i] ? selection.terms : std::vector<CauseTerm>(), &faults_[i]);
+      ScaleWhole(is_found[i] ? selection_.terms : std::vector<CauseTerm>(), &faults_[i]);
+}
+
+void TorqueEstimator::FindTimesOf(const CauseTerm& term) {
+  VectorXd others = CalcAmplitudes(selection_.terms);
+  others.segment(ListFirstColumns()[term.candidate], term.amplitude.size()).setZero();
+  const Push before = faults_[term.candidate].push;
+  const Push found = FindTimes(*recordings_, rows_, rows_.CalcLeft(others), before);
+  for (TorqueFault& one : faults_)
+    if (one.kind == TorqueFault::kPush && one.recording == before.recording && one.push.from == before.from)
+      one.push.from = found.from, one.push.to = found.to;
 }
 
 void TorqueEstimator::ScaleWhole(const std::vector<CauseTerm>& terms, TorqueFault* gain) const {
@@ -285,7 +318,10 @@ VectorXd TorqueEstimator::FitAmplitudes(Part part, Index* rank) const {
   std::vector<double> plausible;
   for (Index i = 0; i < CountForced(*recordings_); ++i) columns.push_back(i), plausible.push_back(1.0);
   for (size_t i = 0; i < faults_.size(); ++i) {
-    for (Index k = 0; k < CountColumns(faults_[i]) && IsPart(faults_[i], part); ++k)
+    const auto is_this = [i](const CauseTerm& term) { return term.candidate == i; };
+    const bool is_part =
+        IsPart(faults_[i], part) || (part == Part::kAll && std::ranges::any_of(selection_.terms, is_this));
+    for (Index k = 0; k < CountColumns(faults_[i]) && is_part; ++k)
       columns.push_back(first[i] + k),
           plausible.push_back(faults_[i].scale.size() > 0 ? faults_[i].scale[k]
                                                           : std::max(1.0, std::abs(faults_[i].nominal)));

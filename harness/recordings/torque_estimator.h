@@ -27,7 +27,7 @@ class TorqueEstimator {
   /// Amplitudes of all columns under these terms; those that are part of every explanation follow from them.
   [[nodiscard]] VectorXd CalcAmplitudes(const std::vector<CauseTerm>& terms) const;
   /// Bodies' numbers, dry and viscous friction, offsets and armatures; friction in all its shapes and
-  /// offsets, which no robot is without; all faults but pushes.
+  /// offsets, which no robot is without; all faults, of pushes those that were selected.
   enum class Part { kPlain, kUsual, kAll };
   /// Amplitudes of a least-squares fit of drives' gains and such faults. Plausible sizes are a prior.
   /// @param rank how many of them the motion tells; null where it is not asked for.
@@ -39,9 +39,13 @@ class TorqueEstimator {
 
  private:
   void ListFaults();
-  CauseSelection Select();
+  /// Errors are no less than those by which stretches of time, or joints, disagree.
+  void WidenErrors();
+  void Select();
   /// What products of faults leave is linear in each once the others are known.
-  void Relinearise(const CauseSelection& selection);
+  void Relinearise();
+  /// When a push begins and ends, for all that may have pushed then.
+  void FindTimesOf(const CauseTerm& term);
   /// A gain's column: the torque of the model and of these causes, where the robot has them.
   void ScaleWhole(const std::vector<CauseTerm>& terms, TorqueFault* gain) const;
   void Weigh(const VectorXd& left);

@@ -46,38 +46,22 @@ namespace {
 
 using Entries = std::vector<Eigen::Triplet<double>>;
 
-/// How much of a push acts at a time, between those at which it is known.
-double CalcShare(const Push& push, double time) {
-  const auto next = std::upper_bound(push.shares.begin(), push.shares.end(), time,
-                                     [](double t, const auto& one) { return t < one.first; });
-  if (next == push.shares.begin()) return 0.0;
-  if (next == push.shares.end()) return time <= push.to ? push.shares.back().second : 0.0;
-  const auto before = next - 1;
-  const double part = (time - before->first) / (next->first - before->first);
-  return before->second + part * (next->second - before->second);
+/// What a polynomial of order four over [-1, 1] makes of a step at 0, at its centre.
+double SmoothStep(double u) {
+  if (std::abs(u) >= 1.0) return u > 0.0 ? 1.0 : 0.0;
+  const double s = u * u;
+  return 0.5 + 15.0 / 128.0 * u * (15.0 - 70.0 / 3.0 * s + 63.0 / 5.0 * s * s);
 }
 
 void AddPush(const RecordingSet& recordings, const Push& push, const TorqueRows::Part& part, Index at,
              Entries* entries) {
   if (static_cast<size_t>(push.recording) != part.recording) return;
-  const double noise = recordings[part.recording].weight[static_cast<Index>(part.place)];
   for (size_t b = 0; b < part.balance->blocks().size(); ++b) {
-    const TorqueBalance::Block& block = part.balance->blocks()[b];
-    const double share = CalcShare(push, block.centre());
-    if (!(share > 0.0) || !(block.counts[part.place] > 0.0)) continue;
-    const Index row = part.within + static_cast<Index>(b);
-    const double count = share * std::sqrt(block.counts[part.place]) / noise;
-    const auto place = static_cast<Index>(part.place);
-    if (push.link >= 0) {
-      for (int k = 0; k < (push.has_moment ? 6 : 3); ++k)
-        entries->emplace_back(row, at + k, block.forces(place, 6 * push.link + k) / block.samples * count);
-    } else if (push.joint < 0) {
-      // To be accelerated is to weigh the other way.
-      for (int k = 0; k < 3; ++k)
-        entries->emplace_back(row, at + k, -block.gravity(place, k) / block.samples * count);
-    } else if (recordings.joints()[part.place] == push.joint) {
-      entries->emplace_back(row, at, count);
-    }
+    const double share = CalcShare(push, part.balance->blocks()[b]);
+    if (share == 0.0) continue;
+    const Eigen::RowVectorXd columns = share * CalcPushColumns(recordings, push, part, b);
+    for (Index k = 0; k < columns.size(); ++k)
+      if (columns[k] != 0.0) entries->emplace_back(part.within + static_cast<Index>(b), at + k, columns[k]);
   }
 }
 
@@ -129,6 +113,33 @@ std::vector<Index> ListUsed(const Eigen::SparseMatrix<double>& map) {
 }
 
 }  // namespace
+
+double CalcShare(const Push& push, const TorqueBalance::Block& block) {
+  constexpr double kMost = 8.0;
+  const int count = static_cast<int>(std::clamp(block.samples, 1.0, kMost));
+  double share = 0.0;
+  for (int i = 0; i < count; ++i) {
+    const double t = block.from + (i + 0.5) / count * (block.to - block.from);
+    share += SmoothStep((t - push.from) / push.reach) - SmoothStep((t - push.to) / push.reach);
+  }
+  return share / count;
+}
+
+Eigen::RowVectorXd CalcPushColumns(const RecordingSet& recordings, const Push& push,
+                                   const TorqueRows::Part& part, size_t b) {
+  const TorqueBalance::Block& block = part.balance->blocks()[b];
+  const auto place = static_cast<Index>(part.place);
+  Eigen::RowVectorXd columns = Eigen::RowVectorXd::Zero(1);
+  if (push.link >= 0) {
+    columns = block.forces.row(place).segment(6 * push.link, push.has_moment ? 6 : 3) / block.samples;
+  } else if (push.joint < 0) {
+    // To be accelerated is to weigh the other way.
+    columns = -block.gravity.row(place) / block.samples;
+  } else if (recordings.joints()[part.place] == push.joint) {
+    columns[0] = 1.0;
+  }
+  return columns * (std::sqrt(block.counts[part.place]) / recordings[part.recording].weight[place]);
+}
 
 VectorXd TorqueRows::Multiply(const VectorXd& a) const {
   VectorXd product(parts.empty() ? 0 : parts.back().begin + parts.back().size);

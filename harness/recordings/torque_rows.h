@@ -45,6 +45,12 @@ TorqueRows MakeTorqueRows(const RecordingSet& recordings, const std::vector<Torq
 Eigen::SparseMatrix<double> MapColumns(const TorqueBalance& balance, size_t place, size_t recording,
                                        const std::vector<TorqueFault>& faults);
 
+/// How much of a push acts in a block, on average.
+double CalcShare(const Push& push, const TorqueBalance::Block& block);
+/// What it leaves in a joint's row of a block in which all of it acts.
+Eigen::RowVectorXd CalcPushColumns(const RecordingSet& recordings, const Push& push,
+                                   const TorqueRows::Part& part, size_t block);
+
 /// Columns of the errors of drives' gains, one for each joint where currents were recorded.
 Eigen::Index CountForced(const RecordingSet& recordings);
 Eigen::Index CountColumns(const TorqueFault& fault);

@@ -15,6 +15,7 @@
 #include "harness/base/files.h"
 #include "harness/descriptions/read_description.h"
 #include "harness/recordings/compare_recordings.h"
+#include "harness/recordings/torque_errors.h"
 #include "harness/recordings/write_corrections.h"
 #include "tests/common/paths.h"
 #include "tests/common/throws.h"
@@ -134,11 +135,26 @@ TEST(Judge, AWrongRatioOfAnEncoderIsNamed) {
 }
 
 TEST(Judge, ARecordedTorqueThatWasCutOffIsNamed) {
-  RecordedTable table = Record({});
-  std::vector<double>& torque = table.Get("tau.panda_joint2");
-  const double most = 0.5 * *std::max_element(torque.begin(), torque.end());
-  for (double& value : torque) value = std::clamp(value, -most, most);
+  double most = 0.0;
+  // Noise comes after the cut, so that the largest number is not the limit.
+  const RecordedFault cut = {.record = [&](RecordedTable* table) {
+    std::vector<double>& torque = table->Get("tau.panda_joint2");
+    most = 0.5 * *std::max_element(torque.begin(), torque.end());
+    for (double& value : torque) value = std::clamp(value, -most, most);
+  }};
+  const RecordedTable table = Record({cut});
   EXPECT_TRUE(NamesOnly(Judge(table), "saturation", "joint panda_joint2", most));
+}
+
+TEST(Judge, AMotorThatGivesLessThanRecordedIsNamed) {
+  // About a vertical axis: gravity would make the arm fall.
+  const std::vector<double> torque = Record({}).Get("tau.panda_joint1");
+  const auto [low, high] = std::minmax_element(torque.begin(), torque.end());
+  const double most = 0.85 * std::max(-*low, *high);
+  const RecordedFault weak = {.act = [=](double, const mjModel&, mjData* data) {
+    data->qfrc_applied[0] = std::clamp(data->qfrc_applied[0], -most, most);
+  }};
+  EXPECT_TRUE(NamesOnly(Judge(Record({weak})), "saturation", "joint panda_joint1", most));
 }
 
 TEST(Judge, BacklashIsNamed) {
@@ -234,7 +250,11 @@ TEST(Judge, APushBesideACentreOfMassIsNamed) {
     data->xfrc_applied[6 * body] = 30.0 * size;
     data->xfrc_applied[6 * body + 4] = 6.0 * size;
   }};
-  EXPECT_TRUE(NamesOnly(Judge(Record({push})), "force", "link panda_link5", 30.0));
+  const RecordingJudgement judgement = Judge(Record({push}));
+  EXPECT_TRUE(NamesOnly(judgement, "force", "link panda_link5", 30.0));
+  constexpr double kFewRows = 0.1;  // s; the quarter second before either is held out
+  EXPECT_NEAR(judgement.causes[0].from, 8.0, kFewRows);
+  EXPECT_NEAR(judgement.causes[0].to, 11.0, kFewRows);
 }
 
 TEST(Judge, AMeasuredWrenchIsNoCause) {
@@ -253,11 +273,44 @@ TEST(Judge, AMeasuredWrenchIsNoCause) {
   }
   std::vector<Recording> recordings;
   recordings.push_back(ToRecording(Panda(), table));
-  recordings[0].wrench = {kLink, Panda().joint(kLink).body.com, /*is_world=*/true};
+  recordings[0].wrenches = {{kLink, Panda().joint(kLink).body.com, /*is_world=*/true}};
   for (int k = 0; k < 6; ++k)
     recordings[0].channels.push_back(
         {RecordedQuantity::kWrench, k, table.names.size() - 6 + static_cast<size_t>(k)});
   const RecordingJudgement judgement = JudgeRecordings(Panda(), &recordings, {});
+  EXPECT_TRUE(judgement.Agrees()) << Tell(judgement);
+}
+
+TEST(Judge, ForcesOnTwoLinksWithoutMomentsAreNoCause) {
+  const auto calc_force = [](int link, double t, int k) { return 10.0 * std::sin((k + 1.0) * t + k + link); };
+  const std::vector<int> links = {3, 6};
+  const RecordedFault push = {.act = [&](double t, const mjModel& m, mjData* data) {
+    for (const int link : links)
+      for (int k = 0; k < 3; ++k) data->xfrc_applied[6 * m.jnt_bodyid[link] + k] = calc_force(link, t, k);
+  }};
+  RecordedTable table = Record({push});
+  std::vector<Channel> channels;
+  const auto judge = [&](size_t count) {
+    std::vector<Recording> recordings;
+    recordings.push_back(ToRecording(Panda(), table));
+    for (size_t i = 0; i < count; ++i)
+      recordings[0].wrenches.push_back({links[i], Panda().joint(links[i]).body.com, /*is_world=*/true});
+    recordings[0].channels.insert(recordings[0].channels.end(), channels.begin(),
+                                  channels.begin() + static_cast<std::ptrdiff_t>(3 * count));
+    return JudgeRecordings(Panda(), &recordings, {.tries_positions = false});
+  };
+  const std::vector<double> times = table.columns[0];
+  for (int i = 0; i < 2; ++i) {
+    for (int k = 0; k < 3; ++k) {
+      channels.push_back({RecordedQuantity::kWrench, 6 * i + k, table.names.size()});
+      table.names.push_back("force" + std::to_string(3 * i + k));
+      std::vector<double>& column = table.columns.emplace_back();
+      for (const double t : times) column.push_back(calc_force(links[static_cast<size_t>(i)], t, k));
+    }
+  }
+  EXPECT_FALSE(judge(0).Agrees());
+  EXPECT_FALSE(judge(1).Agrees()) << "one of them alone";
+  const RecordingJudgement judgement = judge(2);
   EXPECT_TRUE(judgement.Agrees()) << Tell(judgement);
 }
 
@@ -294,6 +347,20 @@ TEST(Judge, ARecordedMotionOfTheBaseIsNoCause) {
         {RecordedQuantity::kBase, k, table.names.size() - 7 + static_cast<size_t>(k)});
   const RecordingJudgement judgement = JudgeRecordings(Panda(), &recordings, {});
   EXPECT_TRUE(judgement.Agrees()) << Tell(judgement);
+}
+
+TEST(ClusteredVariances, OfAMeanAreThoseOfTheClustersMeans) {
+  // Residuals of a mean in clusters of two: sum (mean of a cluster)^2 / (C (C - 1)).
+  const std::vector<double> sums = {3.0, -1.0, -4.0, 2.0};
+  std::vector<RowCluster> clusters;
+  double expected = 0.0;
+  for (const double sum : sums) {
+    clusters.push_back({MatrixXd::Constant(1, 1, 2.0), VectorXd::Constant(1, sum)});
+    expected += 0.25 * sum * sum / 12.0;
+  }
+  EXPECT_NEAR(CalcClusteredVariances(clusters)[0], expected, 1e-14);
+  // What one cluster alone tells is not told by what clusters disagree.
+  EXPECT_EQ(CalcClusteredVariances({clusters[0], {MatrixXd::Zero(1, 1), VectorXd::Zero(1)}})[0], 0.0);
 }
 
 TEST(Judge, FewNumbersPredictWhatIsHeldOut) {

@@ -14,6 +14,7 @@
 
 #include "controller/common/errors.h"
 #include "harness/base/files.h"
+#include "harness/descriptions/read_description.h"
 #include "harness/log/mcap_writer.h"
 #include "harness/log/npy_file.h"
 #include "harness/recordings/channels.h"
@@ -271,8 +272,28 @@ TEST(Channels, AreFoundByTheWordsOfLogs) {
   EXPECT_EQ(Guess({"t [ms]", "joint 3 angle [deg]", "joint_3_torque_cmd"}), "t q3 ");
   EXPECT_EQ(Guess({"position[0]", "position[2]", "velocity[2]"}), "q1 q3 qd3 ");
   EXPECT_EQ(Guess({"temperature_1", "comment"}), "");
+  EXPECT_EQ(Guess({"q.x [m]", "q.y [m]", "q.z [m]", "q.qw", "q.qx", "q.qy", "q.qz", "q.joint 1"}),
+            "q1 base1 base2 base3 base4 base5 base6 base7 ");
+  EXPECT_EQ(Guess({"base_orientation_x", "base_orientation_y", "base_orientation_z", "base_orientation_w",
+                   "base_position_x", "base_position_y", "base_position_z", "base_velocity_x"}),
+            "base5 base6 base7 base4 base1 base2 base3 ");
+  EXPECT_EQ(Guess({"base.x", "base.y", "base.z"}), "") << "a pose has its quaternion";
   EXPECT_DOUBLE_EQ(GuessChannels(MakeUnknownRobot(1), {"time_ms"})[0].scale, 1e-3);
   EXPECT_DOUBLE_EQ(GuessChannels(MakeUnknownRobot(1), {"angle_deg"})[0].scale, kPi / 180.0);
+}
+
+TEST(Channels, ForcesOnFeetAreThoseOfARunsLog) {
+  const RobotModel model(ReadDescription(SourcePath("/controller/parameters/quadruped.toml")).spec);
+  Recording recording;
+  GuessFeet(model,
+            {"time", "law/foot_force.fr_foot.x", "foot/force.fr_foot.x [N]", "foot/force.fr_foot.y [N]",
+             "foot/force.fr_foot.z [N]"},
+            &recording);
+  ASSERT_EQ(recording.wrenches.size(), 1U);
+  EXPECT_EQ(model.link_name(recording.wrenches[0].link), "fr_shank");
+  EXPECT_TRUE(recording.wrenches[0].is_world);
+  ASSERT_EQ(recording.channels.size(), 3U);
+  for (int k = 0; k < 3; ++k) EXPECT_EQ(recording.FindColumn(RecordedQuantity::kWrench, k), 2 + k);
 }
 
 TEST_F(Formats, ColumnsAreNamedInAFile) {
@@ -303,6 +324,12 @@ TEST_F(Formats, ColumnsAreNamedInAFile) {
   EXPECT_THAT(problem("t = 1\nq = [2]\n"), HasSubstr("has no column that is known as a joint's torque"));
   EXPECT_THAT(problem("t = 1\nq = [2]\ntau = [4]\ntorque = [5]\n"), HasSubstr("torque"));
   const std::string some = "t = 1\nq = [2]\ntau = [4]\n";
+  const auto forces = Write("columns.toml", "t = 1\n[[wrench]]\ncolumns = [3, 4, 5]\nlink = \"link 2\"\n");
+  const Recording pushed = OpenRecordingOf(model, rows, forces, /*is_complete=*/false);
+  ASSERT_EQ(pushed.wrenches.size(), 1U);
+  EXPECT_EQ(pushed.channels.back().joint, 2) << "a force without a moment";
+  EXPECT_THAT(DescribeColumns(model, pushed),
+              HasSubstr("[[wrench]]\ncolumns = [3, 4, 5]\nlink = \"link 2\""));
   EXPECT_THAT(problem(some + "wrench = [3]\n"), HasSubstr("wrench: must be a table, with a link"));
   EXPECT_THAT(problem(some + "wrench = { columns = [3, 5], link = \"link 2\" }\n"),
               HasSubstr("wrench.columns: must be 6 columns"));
