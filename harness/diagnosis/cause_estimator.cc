@@ -170,7 +170,9 @@ class Search {
     // In the range of all their columns and y, which has few dimensions, all is as it is.
     MatrixXd C = Reduce(columns_.Collect(set));
     Index at = 0;
+    const bool has_needless = !AreIndependent(C.leftCols(C.cols() - 1));
     for (const size_t other : beside) {
+      if (!has_needless) break;
       const Index own = columns_.CountOf(other);
       MatrixXd rest(C.rows(), C.cols() - own);
       rest << C.leftCols(at), C.rightCols(C.cols() - at - own);
@@ -199,9 +201,20 @@ class Search {
   [[nodiscard]] MatrixXd Reduce(const MatrixXd& C) const {
     MatrixXd all(C.rows(), C.cols() + 1);
     all << C, y_;
-    if (all.rows() <= all.cols()) return all;
+    if (all.rows() < all.cols()) return all;
     const Eigen::HouseholderQR<MatrixXd> qr(all);
     return qr.matrixQR().topRows(all.cols()).triangularView<Eigen::Upper>();
+  }
+
+  /// Whether each of these columns, as Reduce left them, has something that all others together lack: 1 /
+  /// |row j of R^-1|.
+  [[nodiscard]] bool AreIndependent(const MatrixXd& C) const {
+    const Index n = C.cols();
+    if (C.rows() <= n) return false;
+    const auto R = C.topRows(n);
+    const MatrixXd inverse = R.triangularView<Eigen::Upper>().solve(MatrixXd::Identity(n, n));
+    const auto sizes = R.colwise().norm().transpose();
+    return (options_.independent * inverse.rowwise().norm().cwiseProduct(sizes).array() < 1.0).all();
   }
 
   static VectorXd Solve(const MatrixXd& C, const VectorXd& y) {
