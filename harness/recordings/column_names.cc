@@ -142,9 +142,12 @@ const Unit* FindUnit(std::string name, RecordedQuantity quantity) {
 std::vector<Channel> GuessChannels(const RobotModel& model, const std::vector<std::string>& names) {
   std::vector<NamedColumn> columns;
   int least = 1;  // numbers count from 0 or from 1
+  std::set<RecordedQuantity>
+      named;  // where joints have names, a number is no joint's: "qpos.#0.x" of a free one
   for (const std::string& name : names) {
     const NamedColumn& column = columns.emplace_back(ReadName(model, name));
     if (column.quantity && column.number >= 0) least = std::min(least, column.number);
+    if (column.quantity && column.joint >= 0) named.insert(*column.quantity);
   }
   std::vector<Channel> channels;
   std::set<std::pair<RecordedQuantity, int>> seen;
@@ -154,7 +157,7 @@ std::vector<Channel> GuessChannels(const RobotModel& model, const std::vector<st
     int joint = -1;
     if (*column.quantity != RecordedQuantity::kTime) {
       joint = column.joint;
-      if (joint < 0 && column.number >= 0) joint = column.number - least;
+      if (joint < 0 && column.number >= 0 && !named.contains(*column.quantity)) joint = column.number - least;
       // A robot of one joint needs no number.
       if (joint < 0 && model.num_joints() == 1) joint = 0;
       if (joint < 0 || joint >= model.num_joints()) continue;

@@ -111,9 +111,13 @@ TEST_F(Results, FloatingBasesSayTheirConvention) {
   const std::vector<LeggedLink> links = ListQuadruped();
   Write("robot.urdf", WriteLeggedUrdf("quadruped", links));
   Write("robot.xml", WriteLeggedMjcf("quadruped", links));
-  EXPECT_THAT(Expect(0, "consistency robot.urdf robot.xml --samples 20").out,
-              AllOf(HasSubstr("[x y z, qw qx qy qz"), HasSubstr("Pinocchio")));
+  Expect(0, "consistency robot.urdf robot.xml --samples 20");
   Expect(0, "import robot.xml --out robot.toml");
+  // Where another program's coordinates may be other ones.
+  Expect(0, "states robot.toml --count 1 --out states");
+  Write("states/results.jsonl", Json{{"id", 0}, {"g", std::vector<double>(18, 1.0)}}.dump() + "\n");
+  const Json notes = RunJson(1, "consistency robot.toml --results states").at("notes");
+  EXPECT_THAT(notes, ::testing::IsSupersetOf({HasSubstr("[x y z, qw qx qy qz"), HasSubstr("Pinocchio")}));
   Expect(0, "consistency robot.toml robot.xml --samples 20 --tolerance 1e-12");
   // Turned about x by an angle with cosine 0.28 and sine 0.96.
   std::vector<double> q = {1.0, 2.0, 0.3, 0.8, 0.6, 0.0, 0.0};

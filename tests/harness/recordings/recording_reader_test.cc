@@ -272,6 +272,9 @@ TEST(Channels, AreFoundByTheWordsOfLogs) {
   EXPECT_EQ(Guess({"t [ms]", "joint 3 angle [deg]", "joint_3_torque_cmd"}), "t q3 ");
   EXPECT_EQ(Guess({"position[0]", "position[2]", "velocity[2]"}), "q1 q3 qd3 ");
   EXPECT_EQ(Guess({"temperature_1", "comment"}), "");
+  // A free joint without a name is no joint's number.
+  EXPECT_EQ(Guess({"engine/qpos.#0.x", "engine/qpos.#0.y", "engine/qpos.joint 1"}), "q1 ");
+  EXPECT_EQ(GuessChannels(MakeUnknownRobot(3), {"qpos.#0.x", "qpos.joint 1"})[0].column, 1U);
   EXPECT_EQ(Guess({"q.x [m]", "q.y [m]", "q.z [m]", "q.qw", "q.qx", "q.qy", "q.qz", "q.joint 1"}),
             "q1 base1 base2 base3 base4 base5 base6 base7 ");
   EXPECT_EQ(Guess({"base_orientation_x", "base_orientation_y", "base_orientation_z", "base_orientation_w",
