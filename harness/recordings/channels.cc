@@ -142,6 +142,7 @@ std::string DescribeColumns(const RobotModel& model, const Recording& recording)
       text +=
           fmt::format("link = {}\npoint = [{}, {}, {}]\naxes = \"{}\"\n", Quote(model.link_name(place.link)),
                       place.point[0], place.point[1], place.point[2], place.is_world ? "world" : "link");
+      if (place.below > 0.0) text += fmt::format("below = {}\n", place.below);
     }
     for (const Unit& unit : ListUnits())
       if (scale != 1.0 && unit.scale == scale && FindUnit(std::string(unit.name), quantity) == &unit)

@@ -46,6 +46,7 @@ struct WrenchPlace {
   int link = -1;
   Vector3d point = Vector3d::Zero();  ///< In the link's frame, m: what the moment is about.
   bool is_world = false;              ///< In world axes; otherwise in the link's.
+  double below = 0.0;  ///< How far the force acts below the point, m: where a sphere touches the ground.
 };
 
 /// A recording that is open, and what its columns are.

@@ -190,7 +190,8 @@ void GuessFeet(const RobotModel& model, const std::vector<std::string>& names, R
       recording->channels.push_back({RecordedQuantity::kWrench,
                                      6 * static_cast<int>(recording->wrenches.size()) + k,
                                      column + static_cast<size_t>(k)});
-    recording->wrenches.push_back({frame.link, frame.X_LF.translation(), /*is_world=*/true});
+    recording->wrenches.push_back(
+        {frame.link, frame.X_LF.translation(), /*is_world=*/true, frame.sphere_radius.value_or(0.0)});
   }
 }
 

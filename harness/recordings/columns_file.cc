@@ -217,6 +217,7 @@ class ColumnsFile {
     WrenchPlace place;
     place.link = FindLink(table->Get("link"));
     if (const auto point = table->Find("point")) place.point = point->AsVector<3>();
+    if (const auto below = table->Find("below")) place.below = below->AsPositive();
     if (const auto axes = table->Find("axes")) {
       place.is_world = axes->AsText() == "world";
       if (!place.is_world && axes->AsText() != "link") axes->Fail("must be \"link\" or \"world\"");

@@ -149,7 +149,8 @@ MatrixXd TorqueBalance::CalcWrenchColumns() {
   for (const WrenchPlace& place : wrenches_) {
     const Matrix3d& R = regressor_.GetRotation(place.link);
     const Matrix3d axes = place.is_world ? Matrix3d(Matrix3d::Identity()) : R;
-    const Vector3d lever = R * (place.point - model_->joint(place.link).body.com);
+    const Vector3d lever =
+        R * (place.point - model_->joint(place.link).body.com) - place.below * Vector3d::UnitZ();
     regressor_.CalcForceColumns(place.link, forces_);
     columns.middleCols(at, 6) << (forces_.leftCols<3>() + forces_.rightCols<3>() * Skew(lever)) * axes,
         forces_.rightCols<3>() * axes;

@@ -295,6 +295,7 @@ TEST(Channels, ForcesOnFeetAreThoseOfARunsLog) {
   ASSERT_EQ(recording.wrenches.size(), 1U);
   EXPECT_EQ(model.link_name(recording.wrenches[0].link), "fr_shank");
   EXPECT_TRUE(recording.wrenches[0].is_world);
+  EXPECT_EQ(recording.wrenches[0].below, 0.02);
   ASSERT_EQ(recording.channels.size(), 3U);
   for (int k = 0; k < 3; ++k) EXPECT_EQ(recording.FindColumn(RecordedQuantity::kWrench, k), 2 + k);
 }
