@@ -71,6 +71,7 @@ enum {
   DEXCHECK_ERROR = 5
 };
 
+/* Names are those of C. NOLINTBEGIN(readability-identifier-naming) */
 struct dexcheck_hello {
   char magic[8]; /* DEXCHECK_MAGIC */
   uint32_t protocol;
@@ -112,6 +113,7 @@ void dexcheck_begin(void* controller);
 /* State and torques are the doubles of STEP. */
 const char* dexcheck_step(void* controller, const double* state, double* torques);
 void dexcheck_close(void* controller);
+/* NOLINTEND(readability-identifier-naming) */
 
 #ifdef __cplusplus
 }

@@ -69,7 +69,7 @@ void AddRecords(const char* title, const std::vector<CheckRecord>& records, cons
       names += (names.empty() ? ": " : ", ") + record.name;
     }
   }
-  for (const auto& [outcome, names] : alike) rows->push_back({{}, "  " + outcome + names});
+  for (const auto& [outcome, names] : alike) rows->push_back({{}, fmt::format("  {}{}", outcome, names)});
 }
 
 Json ToJson(const DigitVerdict& verdict) {

@@ -51,6 +51,7 @@ const CheckRecord* FindWorst(const ComparedPair& pair) {
 
 std::vector<std::string> NamesOf(const std::vector<size_t>& group, const EngineComparisonResult& result) {
   std::vector<std::string> names;
+  names.reserve(group.size());
   for (const size_t provider : group) names.push_back(result.names[provider]);
   return names;
 }

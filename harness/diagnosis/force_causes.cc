@@ -104,6 +104,7 @@ std::vector<Segment> JoinAcrossGaps(const StepStore& store, StepForces* forces,
 Causes ExplainParts(const StepStore& store, StepForces* forces, const std::vector<Segment>& segments,
                     bool exactly) {
   std::vector<Part> parts;
+  parts.reserve(segments.size());
   for (const Segment& one : segments) parts.push_back(ExplainPart(store, forces, one, nullptr));
   const auto is_simpler = [](const Part& a, const Part& b) {
     if (a.is_explained != b.is_explained) return a.is_explained;
@@ -166,7 +167,7 @@ Causes ExplainForces(const StepStore& store) {
     const bool are_many = segments.size() > kMostSegments;
     const std::vector<Segment> few = are_many ? JoinAcrossGaps(store, &forces, segments) : segments;
     if (few.size() < 2 || few.size() > kMostSegments) continue;
-    const Causes found = ExplainParts(store, &forces, few, is_explained);
+    Causes found = ExplainParts(store, &forces, few, is_explained);
     const auto count = static_cast<Index>(found.size());
     if (!is_explained && problem.ExplainTorque(whole, count, found.size(), &causes)) return causes;
     if (!found.empty() && (!is_exact || found.size() < causes.size())) return found;

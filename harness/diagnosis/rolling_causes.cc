@@ -19,7 +19,7 @@ constexpr double kLevel = 5.0;
 /// Two wheels that are off by different amounts are two faults, not one that both have and another of one.
 CauseSelection SelectWheels(const VectorXd& y, std::vector<Candidate>* candidates,
                             const CauseOptions& options) {
-  const CauseSelection selection = SelectCauses(y, *candidates, options);
+  CauseSelection selection = SelectCauses(y, *candidates, options);
   const auto count =
       std::count_if(selection.terms.begin(), selection.terms.end(), [&](const CauseTerm& term) {
         return (*candidates)[term.candidate].fault == candidates->front().fault;

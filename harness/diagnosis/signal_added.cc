@@ -115,7 +115,9 @@ class AddedList {
     constexpr int kGrid = 60;
     constexpr double kSlowest = 15.0, kStep = kSlowest / kGrid;  // down to 3e-7 of the fastest
     for (int i = 0; i <= kGrid; ++i) consider(std::log(fastest) + 1.0 - i * kStep);
-    for (double width = kStep; width > 1e-13; width *= 0.7)
+    constexpr int kNarrower = 81;  // to 1e-13
+    double width = kStep;
+    for (int k = 0; k < kNarrower; ++k, width *= 0.7)
       for (const double to : {best - width, best + width}) consider(to);
     Add("dry friction", unit_, -(rate / std::exp(best)).tanh(), 0.0, IsFriction);
     candidates_.back().detail = fmt::format("times tanh(rate / {:.4g})", std::exp(best));

@@ -207,6 +207,7 @@ class Robot {
 template <typename Named>
 std::vector<std::string> ListNames(const Named& all) {
   std::vector<std::string> names;
+  names.reserve(std::size(all));
   for (const auto& one : all) names.push_back(one.name);
   return names;
 }

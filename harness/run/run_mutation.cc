@@ -50,7 +50,7 @@ EnginePlant* FindEngine(const LoopParts& parts) {
 void InjectFault(const Setup& setup, const InjectedFault& fault, double begin, LoopParts* parts) {
   const auto clock = std::make_shared<RunClock>();
   EnginePlant* const engine = FindEngine(*parts);
-  parts->plant.release();
+  static_cast<void>(parts->plant.release());  // it is the engine
   parts->plant =
       std::make_unique<FaultyPlant>(setup, std::unique_ptr<EnginePlant>(engine), fault, clock, begin);
   if (fault.sensors) {
