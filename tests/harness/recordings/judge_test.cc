@@ -13,7 +13,6 @@
 #include "harness/base/files.h"
 #include "harness/descriptions/read_description.h"
 #include "harness/recordings/compare_recordings.h"
-#include "harness/recordings/torque_errors.h"
 #include "harness/recordings/write_corrections.h"
 #include "tests/common/paths.h"
 #include "tests/common/throws.h"
@@ -35,29 +34,10 @@ TEST(Judge, RightRecordingsAreExplained) {
   }
 }
 
-/// A recording with faults, all else by default.
-RecordedTable Record(const std::vector<RecordedFault>& faults, bool has_velocities = false,
-                     unsigned seed = 3) {
-  std::mt19937 random(seed);
-  RecordingOptions options;
-  options.has_velocities = has_velocities;
-  return RecordRobot(kMjcf, faults, options, &random);
-}
-
 void ScaleColumns(const std::string& begin, double factor, RecordedTable* table) {
   for (const std::string& name : table->names)
     if (name.starts_with(begin))
       for (double& value : table->Get(name)) value *= factor;
-}
-
-/// The only cause is this one, and is named.
-::testing::AssertionResult NamesOnly(const RecordingJudgement& judgement, const std::string& fault,
-                                     const std::string& place, double value) {
-  const bool is_named = judgement.causes.size() == 1 && judgement.causes[0].outcome == CauseOutcome::kNamed &&
-                        judgement.causes[0].faults[0].fault == fault &&
-                        judgement.causes[0].faults[0].place == place &&
-                        std::abs(judgement.causes[0].faults[0].value - value) < 0.05 * std::abs(value);
-  return is_named ? ::testing::AssertionSuccess() : ::testing::AssertionFailure() << Tell(judgement);
 }
 
 RecordedFault DryFriction(int joint, double value) {
@@ -159,158 +139,6 @@ TEST(Judge, ASpringIsNamed) {
     data->qfrc_applied[1] -= 5.0 * (data->qpos[1] - 0.3);
   }};
   EXPECT_TRUE(NamesOnly(Judge(Record({spring})), "spring", "joint panda_joint2", 5.0));
-}
-
-/// What a base that is accelerated does to all bodies.
-RecordedFault Accelerate(const std::function<Vector3d(double t)>& acceleration) {
-  return {.act = [=](double t, const mjModel& model, mjData* data) {
-    const Vector3d a = acceleration(t);
-    for (int body = 1; body < model.nbody; ++body)
-      for (int k = 0; k < 3; ++k) data->xfrc_applied[6 * body + k] = -model.body_mass[body] * a[k];
-  }};
-}
-
-TEST(Judge, ABaseThatShakesIsNamed) {
-  constexpr double kAmplitude = 0.03, kFrequency = 2.0 * kPi * 0.9;
-  const RecordedFault shaking = Accelerate([](double t) {
-    return Vector3d(-kAmplitude * kFrequency * kFrequency * std::sin(kFrequency * t + 0.4) *
-                    Vector3d::UnitY());
-  });
-  const RecordingJudgement judgement = Judge(Record({shaking}));
-  EXPECT_TRUE(NamesOnly(judgement, "shaking", "base", kAmplitude));
-  const std::string& detail = judgement.causes[0].faults[0].detail;  // "at 0.9 Hz, ..."
-  ASSERT_TRUE(detail.starts_with("at ")) << Tell(judgement);
-  EXPECT_NEAR(std::stod(detail.substr(3)), 0.9, 0.01) << Tell(judgement);
-}
-
-TEST(Judge, ABaseThatIsAcceleratedForAWhileIsNamed) {
-  const auto judge = [](double from, double to) {
-    const Vector3d a(0.6, -0.8, 0.0);
-    return Judge(
-        Record({Accelerate([=](double t) { return t > from && t < to ? a : Vector3d(Vector3d::Zero()); })}));
-  };
-  EXPECT_TRUE(NamesOnly(judge(8.0, 10.0), "acceleration", "base", 1.0));
-  EXPECT_TRUE(NamesOnly(judge(7.0, 1e9), "acceleration", "base", 1.0)) << "to the end, as a tilt";
-}
-
-TEST(Judge, APushBesideACentreOfMassIsNamed) {
-  const RecordedFault push = {.act = [](double t, const mjModel& model, mjData* data) {
-    const int body = mj_name2id(&model, mjOBJ_BODY, "panda_link5");
-    const double size = t > 8.0 && t < 11.0 ? 1.0 : 0.0;
-    data->xfrc_applied[6 * body] = 30.0 * size;
-    data->xfrc_applied[6 * body + 4] = 6.0 * size;
-  }};
-  const RecordingJudgement judgement = Judge(Record({push}));
-  EXPECT_TRUE(NamesOnly(judgement, "force", "link panda_link5", 30.0));
-  constexpr double kFewRows = 0.1;  // s; the quarter second before either is held out
-  EXPECT_NEAR(judgement.causes[0].from, 8.0, kFewRows);
-  EXPECT_NEAR(judgement.causes[0].to, 11.0, kFewRows);
-}
-
-TEST(Judge, AMeasuredWrenchIsNoCause) {
-  constexpr int kLink = 6;
-  const auto calc_force = [](double t, int k) { return 10.0 * std::sin((k + 1.0) * t + k); };
-  const RecordedFault push = {.act = [&](double t, const mjModel& m, mjData* data) {
-    for (int k = 0; k < 3; ++k) data->xfrc_applied[6 * m.jnt_bodyid[kLink] + k] = calc_force(t, k);
-  }};
-  RecordedTable table = Record({push});
-  EXPECT_FALSE(Judge(table).Agrees());
-  const std::vector<double> times = table.columns[0];
-  for (int k = 0; k < 6; ++k) {
-    table.names.push_back("wrench" + std::to_string(k));
-    std::vector<double>& column = table.columns.emplace_back();
-    for (const double t : times) column.push_back(k < 3 ? calc_force(t, k) : 0.0);
-  }
-  std::vector<Recording> recordings;
-  recordings.push_back(ToRecording(Panda(), table));
-  recordings[0].wrenches = {{kLink, Panda().joint(kLink).body.com, /*is_world=*/true}};
-  for (int k = 0; k < 6; ++k)
-    recordings[0].channels.push_back(
-        {RecordedQuantity::kWrench, k, table.names.size() - 6 + static_cast<size_t>(k)});
-  const RecordingJudgement judgement = JudgeRecordings(Panda(), &recordings, {});
-  EXPECT_TRUE(judgement.Agrees()) << Tell(judgement);
-}
-
-TEST(Judge, ForcesOnTwoLinksWithoutMomentsAreNoCause) {
-  const auto calc_force = [](int link, double t, int k) { return 10.0 * std::sin((k + 1.0) * t + k + link); };
-  const std::vector<int> links = {3, 6};
-  const RecordedFault push = {.act = [&](double t, const mjModel& m, mjData* data) {
-    for (const int link : links)
-      for (int k = 0; k < 3; ++k) data->xfrc_applied[6 * m.jnt_bodyid[link] + k] = calc_force(link, t, k);
-  }};
-  RecordedTable table = Record({push});
-  std::vector<Channel> channels;
-  const auto judge = [&](size_t count) {
-    std::vector<Recording> recordings;
-    recordings.push_back(ToRecording(Panda(), table));
-    for (size_t i = 0; i < count; ++i)
-      recordings[0].wrenches.push_back({links[i], Panda().joint(links[i]).body.com, /*is_world=*/true});
-    recordings[0].channels.insert(recordings[0].channels.end(), channels.begin(),
-                                  channels.begin() + static_cast<std::ptrdiff_t>(3 * count));
-    return JudgeRecordings(Panda(), &recordings, {.tries_positions = false});
-  };
-  const std::vector<double> times = table.columns[0];
-  for (int i = 0; i < 2; ++i) {
-    for (int k = 0; k < 3; ++k) {
-      channels.push_back({RecordedQuantity::kWrench, 6 * i + k, table.names.size()});
-      table.names.push_back("force" + std::to_string(3 * i + k));
-      std::vector<double>& column = table.columns.emplace_back();
-      for (const double t : times) column.push_back(calc_force(links[static_cast<size_t>(i)], t, k));
-    }
-  }
-  EXPECT_FALSE(judge(0).Agrees());
-  EXPECT_FALSE(judge(1).Agrees()) << "one of them alone";
-  const RecordingJudgement judgement = judge(2);
-  EXPECT_TRUE(judgement.Agrees()) << Tell(judgement);
-}
-
-TEST(Judge, ARecordedMotionOfTheBaseIsNoCause) {
-  // The base is turned, and moves to and fro: in its axes that is another gravity, and a force on each body.
-  const Eigen::Quaterniond turned(Eigen::AngleAxisd(0.4, Vector3d(1.0, 2.0, 0.5).normalized()));
-  constexpr double kReach = 0.05, kRate = 4.0;
-  const RecordedFault moved = {
-      .change =
-          [&](mjModel* robot) {
-            const Vector3d g = turned.conjugate() * Eigen::Map<Vector3d>(robot->opt.gravity);
-            Eigen::Map<Vector3d>(robot->opt.gravity) = g;
-          },
-      .act =
-          [&](double t, const mjModel& m, mjData* data) {
-            const Vector3d a =
-                turned.conjugate() * Vector3d(-kReach * kRate * kRate * std::sin(kRate * t), 0, 0);
-            for (int body = 1; body < m.nbody; ++body)
-              for (int k = 0; k < 3; ++k) data->xfrc_applied[6 * body + k] = -m.body_mass[body] * a[k];
-          }};
-  RecordedTable table = Record({moved});
-  EXPECT_FALSE(Judge(table).Agrees());
-  const std::vector<double> times = table.columns[0];
-  const double rest[] = {0.0, 0.3, 0.5, turned.w(), turned.x(), turned.y(), turned.z()};
-  for (int k = 0; k < 7; ++k) {
-    table.names.push_back("pose" + std::to_string(k));
-    std::vector<double>& column = table.columns.emplace_back();
-    for (const double t : times) column.push_back(k == 0 ? kReach * std::sin(kRate * t) : rest[k]);
-  }
-  std::vector<Recording> recordings;
-  recordings.push_back(ToRecording(Panda(), table));
-  for (int k = 0; k < 7; ++k)
-    recordings[0].channels.push_back(
-        {RecordedQuantity::kBase, k, table.names.size() - 7 + static_cast<size_t>(k)});
-  const RecordingJudgement judgement = JudgeRecordings(Panda(), &recordings, {});
-  EXPECT_TRUE(judgement.Agrees()) << Tell(judgement);
-}
-
-TEST(ClusteredVariances, OfAMeanAreThoseOfTheClustersMeans) {
-  // Residuals of a mean in clusters of two: sum (mean of a cluster)^2 / (C (C - 1)).
-  const std::vector<double> sums = {3.0, -1.0, -4.0, 2.0};
-  std::vector<RowCluster> clusters;
-  double expected = 0.0;
-  for (const double sum : sums) {
-    clusters.push_back({MatrixXd::Constant(1, 1, 2.0), VectorXd::Constant(1, sum)});
-    expected += 0.25 * sum * sum / 12.0;
-  }
-  EXPECT_NEAR(CalcClusteredVariances(clusters)[0], expected, 1e-14);
-  // What one cluster alone tells is not told by what clusters disagree.
-  EXPECT_EQ(CalcClusteredVariances({clusters[0], {MatrixXd::Zero(1, 1), VectorXd::Zero(1)}})[0], 0.0);
 }
 
 TEST(Judge, FewNumbersPredictWhatIsHeldOut) {
