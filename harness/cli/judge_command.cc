@@ -159,7 +159,8 @@ int Run(JudgeRequest request) {
   constexpr int kManyJoints = 64;
   std::optional<RobotDescription> description;
   if (!request.model.empty()) description = ReadDescription(request.model, request.urdf);
-  const RobotModel model = !description ? MakeUnknownRobot(kManyJoints) : RobotModel(description->spec);
+  const RobotModel model =
+      !description ? MakeUnknownRobot(kManyJoints) : RobotModel(AddSpheres(*description));
   std::vector<std::filesystem::path> paths = {request.recording};
   paths.insert(paths.end(), request.more.begin(), request.more.end());
   std::vector<Recording> recordings;
@@ -265,7 +266,7 @@ void Print(const RobotModel& model, const RecordingPair& pair, const RecordingCo
 }  // namespace
 
 int CompareTwoRecordings(const RecordingPair& pair) {
-  const RobotModel model(ReadDescription(pair.model).spec);
+  const RobotModel model(AddSpheres(ReadDescription(pair.model)));
   std::vector<Recording> recordings;
   for (const std::filesystem::path& path : {pair.first, pair.second})
     recordings.push_back(OpenRecordingOf(model, path, pair.columns));

@@ -142,6 +142,12 @@ std::vector<std::string> DescribeBalls(const RobotDescription& robot) {
 
 }  // namespace
 
+RobotSpec AddSpheres(const RobotDescription& robot) {
+  RobotSpec spec = robot.spec;
+  for (const auto& [frame, radius] : robot.spheres) spec.frames[frame].sphere_radius = radius;
+  return spec;
+}
+
 std::vector<std::string> DescribeCoordinates(const RobotDescription& robot) {
   std::vector<std::string> notes = DescribeBase(robot);
   for (const std::string& note : DescribeBalls(robot)) notes.push_back(note);

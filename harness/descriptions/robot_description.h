@@ -2,6 +2,7 @@
 
 // What a file says of a robot, beside what stands in its place where the file says nothing.
 
+#include <map>
 #include <string>
 #include <vector>
 
@@ -61,7 +62,12 @@ struct RobotDescription {
   std::vector<std::string> unused;  ///< "mesh hand": what the file defines and nothing uses.
   std::vector<std::string> notes;   ///< What was done with the file that its reader may not expect.
   bool is_imported = false;         ///< A parameter file that dexcheck import wrote.
+  /// Radii of spheres about frames' origins, as an MJCF's feet have them: by the place in spec.frames, m.
+  std::map<size_t, double> spheres;
 };
+
+/// The robot with these spheres as its frames', as one that touches the ground with them needs.
+RobotSpec AddSpheres(const RobotDescription& robot);
 
 /// The nearest inertia about the centre of mass, kg m^2, that a body can have: of which no second moment of
 /// mass is negative; itself where it is one.

@@ -306,7 +306,7 @@ PYBIND11_MODULE(_dexcheck, m) {
 
   AddJudge(&m, [](const py::object& model, const std::function<void(const RobotModel&)>& use) {
     if (py::isinstance<Robot>(model)) return use(model.cast<const Robot&>().model());
-    use(RobotModel(ReadDescription(model.cast<std::filesystem::path>()).spec));
+    use(RobotModel(AddSpheres(ReadDescription(model.cast<std::filesystem::path>()))));
   });
 }
 

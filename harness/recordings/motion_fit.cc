@@ -5,6 +5,7 @@
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
@@ -190,7 +191,7 @@ void MotionFit::AverageFriction(int joint, const VectorXd& times, const VectorXd
                                 const VectorXd& weights) {
   auto shapes = sample_.friction.row(joint);
   shapes.setZero();
-  double direction = 0.0, slip = 0.0, error = 0.0;
+  double direction = 0.0, slip = 0.0, first = 0.0, slowest = std::numeric_limits<double>::infinity();
   const double rest = noise_.rest[joint];
   const bool moves = std::abs(sample_.qd[joint]) >= rest;
   for (Eigen::Index k = 0; k < times.size() && moves; ++k) {
@@ -201,11 +202,12 @@ void MotionFit::AverageFriction(int joint, const VectorXd& times, const VectorXd
     slip = k > 0 ? CalcSlip(sign, slip, std::abs(v) * (times[k] - times[k - 1])) : sign;
     here[kSlipShape] = slip;
     direction += weights[k] * sign;
-    error += std::abs(v) < rest ? weights[k] : 0.0;
+    if (k == 0) first = sign;
+    slowest = std::min(slowest, v * first);
     shapes += weights[k] * here;
   }
   sample_.direction[joint] = direction;
-  sample_.direction_error[joint] = error;
+  sample_.slowest[joint] = moves ? slowest : 0.0;
 }
 
 size_t MotionFit::CalcReach() const {
@@ -268,24 +270,29 @@ bool MotionFit::Emit(size_t centre, const Receiver& receive) {
 
 void MotionFit::CalcSpeeds() {
   const Eigen::Index n = model_->num_joints();
-  VectorXd squares = VectorXd::Zero(n), moving = VectorXd::Zero(n), errors = VectorXd::Zero(n);
+  VectorXd squares = VectorXd::Zero(n), moving = VectorXd::Zero(n);
+  VectorXd lowest = VectorXd::Constant(n, std::numeric_limits<double>::infinity()), highest = -lowest;
   shape_velocities_ = ListShapeVelocities(VectorXd::Ones(n));
   double count = 0.0;
   for (const size_t centre : ListCentres(CalcReach())) {
     Emit(centre, [&](const RecordedSample& sample) {
       squares += sample.qd.cwiseAbs2();
-      errors += sample.direction_error.cwiseAbs2();
+      lowest = lowest.cwiseMin(sample.q);
+      highest = highest.cwiseMax(sample.q);
       moving += sample.direction.unaryExpr([](double s) { return s != 0.0 ? 1.0 : 0.0; });
       return true;
     });
     count += 1.0;
   }
   const VectorXd speeds = (squares / std::max(1.0, count)).cwiseSqrt();
-  noise_.direction = (errors / std::max(1.0, count)).cwiseSqrt();
   shape_velocities_ = ListShapeVelocities(speeds, refinements_.stribeck);
   constexpr double kSlow = 2e-3, kMoving = 0.2;
+  constexpr double kHeld = 2e-3;  // rad or m, that a joint gives under its friction
   noise_.rest = noise_.rest.cwiseMax(kSlow * speeds);
-  for (Eigen::Index joint = 0; joint < n; ++joint) moves_.push_back(moving[joint] > kMoving * count);
+  for (int joint = 0; joint < n; ++joint) {
+    const double least = model_->joint(joint).dry_friction > 0.0 ? kHeld : 0.0;
+    moves_.push_back(moving[joint] > kMoving * count && highest[joint] - lowest[joint] > least);
+  }
 }
 
 std::vector<bool> MotionFit::IsJudged(const RecordedSample& sample) const {
@@ -294,8 +301,9 @@ std::vector<bool> MotionFit::IsJudged(const RecordedSample& sample) const {
   constexpr double kFew = 0.02;
   for (size_t joint = 0; joint < judged.size(); ++joint) {
     const auto at = static_cast<Eigen::Index>(joint);
-    judged[joint] = (!moves_[joint] || sample.direction[at] != 0.0) &&
-                    std::min(sample.beyond[at], 1.0 - sample.beyond[at]) < kFew;
+    const bool has_friction = model_->joint(static_cast<int>(joint)).dry_friction > 0.0;
+    const bool slides = has_friction ? sample.slowest[at] >= noise_.rest[at] : sample.direction[at] != 0.0;
+    judged[joint] = (!moves_[joint] || slides) && std::min(sample.beyond[at], 1.0 - sample.beyond[at]) < kFew;
   }
   return judged;
 }

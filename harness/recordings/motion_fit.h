@@ -41,7 +41,7 @@ struct RecordedSample {
   BaseMotion base;                    ///< At rest where it was not recorded.
   VectorXd wrench;                    ///< Measured, on the link, N and N m; empty for none.
   VectorXd direction;                 ///< Sign of the velocity, averaged as the torque is; 0 at rest.
-  VectorXd direction_error;           ///< By what the velocity may be off.
+  VectorXd slowest;                   ///< Row's speed the way that the first goes; negative where it turns.
   VectorXd beyond;                    ///< Share of the rows whose torque is beyond a limit that is known.
   MatrixXd friction;                  ///< Other shapes of it, n x kFrictionShapes, likewise.
   Vector2d swing = Vector2d::Zero();  ///< Sine and cosine of a base that shakes, averaged likewise.
@@ -51,11 +51,10 @@ struct RecordedSample {
 struct MotionNoise {
   VectorXd position, velocity, torque;  ///< Of a single number.
   VectorXd smooth_position, smooth_torque,
-      acceleration;    ///< Of a sample, the last with what smoothing leaves out.
-  VectorXd wrench;     ///< Of a sample; empty for none.
-  double base = 0.0;   ///< Of a sample: the base's acceleration with gravity, m/s^2.
-  VectorXd rest;       ///< Velocity below which a joint is at rest.
-  VectorXd direction;  ///< Of a sample.
+      acceleration;   ///< Of a sample, the last with what smoothing leaves out.
+  VectorXd wrench;    ///< Of a sample; empty for none.
+  double base = 0.0;  ///< Of a sample: the base's acceleration with gravity, m/s^2.
+  VectorXd rest;      ///< Velocity below which a joint is at rest.
 };
 
 /// Reads a recording once, in constant memory. Rows whose times are doubled are left out, so are those that
@@ -78,8 +77,10 @@ class MotionFit {
   [[nodiscard]] const MotionNoise& noise() const { return noise_; }
   /// Joints with a position and a torque or current.
   [[nodiscard]] const std::vector<int>& joints() const { return judged_; }
+  /// By joint: whether it moves, and farther than its dry friction may hold it.
+  [[nodiscard]] const std::vector<bool>& moves() const { return moves_; }
   /// By joint: whether a sample says what moves it. Where friction holds a joint that moves at other times,
-  /// it does not.
+  /// it does not; nor does it where a joint of which dry friction is known turns or rests within a window.
   [[nodiscard]] std::vector<bool> IsJudged(const RecordedSample& sample) const;
   /// Of shapes of friction, by the root mean square of the joints' velocities.
   [[nodiscard]] const MatrixXd& shape_velocities() const { return shape_velocities_; }

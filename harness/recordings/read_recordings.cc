@@ -103,6 +103,7 @@ void RecordingSet::Read(Recording* recording, const ReadOptions& options,
   for (const std::string& note : motion.ListNotes()) notes_.push_back(note);
   for (const Fault& fault : motion.faults()) faults_.push_back(fault);
   one.motion = motion.noise();
+  one.moves = motion.moves();
   one.inertia = motion.inertia();
   one.step = motion.step();
   one.reach = 0.5 * motion.window();
@@ -133,7 +134,8 @@ double RecordingSet::CalcNoise(const ReadRecording& one, size_t place) const {
     variance += Square(one.inertia(joint, other) * one.motion.acceleration[other]);
     variance += mean_square({TorqueColumn::kPosition, other}) * Square(one.motion.smooth_position[other]);
   }
-  variance += Square(model_->joint(joint).dry_friction * one.motion.direction[joint]);
+  // Where it holds a joint, it is anything up to that.
+  if (!one.moves[static_cast<size_t>(joint)]) variance += Square(model_->joint(joint).dry_friction);
   for (int k = 0; k < 3; ++k)
     variance += mean_square({TorqueColumn::kGravity, 0, k}) * Square(one.motion.base);
   if (one.motion.wrench.size() > 0)

@@ -25,6 +25,7 @@ struct ReadRecording {
   std::unique_ptr<RobotModel> model;
   std::unique_ptr<TorqueBalance> fit, held;
   MotionNoise motion;
+  std::vector<bool> moves;  ///< MotionFit's, by joint.
   MatrixXd inertia;
   MatrixXd shape_velocities;  ///< MotionFit's.
   VectorXd most_torque;       ///< RecordedSample's.

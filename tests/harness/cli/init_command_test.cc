@@ -248,6 +248,17 @@ TEST_F(InitCommand, ABipedBendsItsKneesToStand) {
   EXPECT_THAT(Expect(0, "init rolls.xml").err, HasSubstr("because a foot turns without end, as wheels do"));
 }
 
+// Where friction holds a joint, and where it turns, a torque says nothing of the model; forces act where feet
+// touch the ground, which an MJCF says by its spheres.
+TEST_F(InitCommand, ARobotWithDryFrictionExplainsItsOwnLog) {
+  WriteChanged("rubs.xml", ReadFixture("biped.xml"), "armature=\"0.01\"",
+               "armature=\"0.01\" frictionloss=\"0.03\"");
+  Expect(0, "init rubs.xml");
+  Expect(0, "run rubs/motion.toml --out run --no-report");
+  for (const char* model : {"rubs/robot.xml", "rubs/robot.toml"})
+    EXPECT_THAT(Expect(0, {"judge", model, "run/log.h5"}).out, HasSubstr("EXPLAINED"));
+}
+
 // Shanks on the ground are no feet.
 TEST_F(InitCommand, ARobotThatLiesInItsKeyFrameStands) {
   WriteChanged(
