@@ -58,7 +58,7 @@ std::map<std::string, std::unique_ptr<Trajectory>> MakeAll() {
   all["ramp"] = MakeLineTrajectory(X, d, 1.3);
   all["point_to_point"] = MakePointToPointTrajectory(X, d, 1.7);
   all["oscillation"] = MakeOscillationTrajectory(X, d, 0.8, 1.1);
-  all["fading"] = MakeOscillationTrajectory(X, d, 0.8, 0.6, 2.1);
+  all["fading"] = MakeOscillationTrajectory(X, d, 0.8, 1.3, 2.75);
   all["weave"] = MakeWeaveTrajectory(X, {0.7, 1.0, 1.2}, 0.15, 1.6);
   all["circle"] = MakeCircleTrajectory(X, {-0.4, 0.9, 1.2}, 0.8);
   all["right_circle"] = MakeCircleTrajectory(X, {-0.4, 0.9, 0.0}, -0.8);

@@ -299,7 +299,10 @@ TEST_F(InitCommand, HoldsBallJoints) {
 
 // Friction that stops a joint within a step leaves its law no time to act.
 TEST_F(InitCommand, ReducesFrictionThatAStepCannotCarry) {
-  const std::string urdf = ReadFixture("pair.urdf");
+  // A motion that leaves the motors room for what late torques and coarse encoders cost.
+  WriteChanged("fast.urdf", ReadFixture("pair.urdf"), "upper=\"2\" effort=\"1\" velocity=\"1\"",
+               "upper=\"2\" effort=\"1\" velocity=\"3\"");
+  const std::string urdf = Read("fast.urdf");
   WriteChanged("stuck.urdf", urdf, "<limit lower=\"-1\"",
                "<dynamics damping=\"500\" friction=\"500\"/><limit lower=\"-1\"");
   EXPECT_THAT(Expect(0, "init stuck.urdf").err,
