@@ -69,6 +69,7 @@ void AddLegShapes(const RobotDescription& robot, const std::vector<int>& legs, M
           std::string_view(element->Name()) == "body")
         body = element;
     });
+    if (body == nullptr) continue;
     const auto write = [](const auto& numbers) { return fmt::format("{:.12g}", fmt::join(numbers, " ")); };
     const auto add = [&](const char* type, const Vector3d& size, const Pose& X_iL, const Vector3d& p_L) {
       XMLElement* const geom = body->InsertNewChildElement("geom");

@@ -92,6 +92,13 @@ TEST_F(InitCommand, MotorsHaveTheLimitsThatTheFilesState) {
   Expect(0, "init newer.xml --out newer");
   EXPECT_THAT(Read("newer/robot.xml"), HasSubstr(R"(ctrlrange="-7 7")"));
   EXPECT_THAT(Read("newer/robot.xml"), HasSubstr(R"(ctrlrange="-3 3")"));
+  // A run says what is left out of its MJCF; what reads its log does not say it of the log's copy again.
+  WriteChanged("newer/robot.xml", Read("newer/robot.xml"), "<joint name=\"elbow\"",
+               "<joint actuatorfrcrange=\"-3 4\" name=\"elbow\"");
+  const std::string said = Expect(0, "run newer/motion.toml --set duration=0.2 --out run").err;
+  EXPECT_THAT(said, HasSubstr("newer/robot.xml: left out"));
+  EXPECT_THAT(said, Not(HasSubstr("mjcf/robot.xml")));
+  EXPECT_EQ(Expect(0, "report run").err, "");
 }
 
 // MuJoCo leaves out contacts of neighbours, but not those of a link on a base that is welded to the world.
