@@ -36,7 +36,8 @@ JointMotion::JointMotion(const VectorXd& q_start, const std::vector<JointWayPoin
             one.joint);
     const Vector6d amplitude = one.amplitude * Vector6d::Unit(0);
     oscillations_.emplace_back(
-        one.joint, MakeOscillationTrajectory(Vector6d::Zero(), amplitude, one.frequency, one.ramp_time));
+        one.joint,
+        MakeOscillationTrajectory(Vector6d::Zero(), amplitude, one.frequency, one.ramp_time, one.end_time));
   }
 }
 

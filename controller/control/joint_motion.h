@@ -22,12 +22,14 @@ struct JointWayPoint {
   VectorXd q;         ///< All joints, rad or m.
 };
 
-/// A joint swings: amplitude sin(2 pi frequency t), which grows with least jerk over ramp_time.
+/// A joint swings: amplitude sin(2 pi frequency t), which grows with least jerk over ramp_time,
+/// and ends so at end_time.
 struct JointOscillation {
   int joint = 0;
   double amplitude = 0.0;  ///< rad or m.
   double frequency = 0.0;  ///< 1/s.
   double ramp_time = 0.0;  ///< s.
+  double end_time = 0.0;   ///< s; 0 for never.
 };
 
 class StanceMotion;

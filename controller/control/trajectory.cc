@@ -242,7 +242,7 @@ TrajectoryMaker ReadByType(TomlTable& table) {
     case Type::kOscillation: {
       const Vector6d amplitude = ReadCoordinates(table, "xyz", "zyz");
       const double frequency = ReadFrequency(table);
-      return MakerOf(MakeOscillationTrajectory, amplitude, frequency, ReadRampTime(table));
+      return MakerOf(MakeOscillationTrajectory, amplitude, frequency, ReadRampTime(table), 0.0);
     }
     case Type::kWeave: {
       const Wave wave = ReadWave(table);
@@ -304,11 +304,16 @@ std::unique_ptr<Trajectory> MakePointToPointTrajectory(const Vector6d& X_start, 
 }
 
 std::unique_ptr<Trajectory> MakeOscillationTrajectory(const Vector6d& X_start, const Vector6d& amplitude,
-                                                      double frequency, double ramp_time) {
+                                                      double frequency, double ramp_time, double end_time) {
   RequireNotNegative(ramp_time, "ramp_time");
   Require(frequency > 0.0, "frequency", "must be positive", frequency);
+  Require(end_time == 0.0 || end_time >= 2.0 * ramp_time, "end_time", "must be 0 or two ramps", end_time);
   return MakeTrajectory([=, rate = 2.0 * kPi * frequency](double t) {
-    const ScalarMotion ramp = ramp_time > 0.0 ? CalcMinJerk(t, ramp_time) : ScalarMotion{1.0, 0.0, 0.0};
+    ScalarMotion ramp = ramp_time > 0.0 ? CalcMinJerk(t, ramp_time) : ScalarMotion{1.0, 0.0, 0.0};
+    if (end_time > 0.0 && t > end_time - ramp_time) {
+      ramp = CalcMinJerk(end_time - t, ramp_time);
+      ramp.s_dot = -ramp.s_dot;
+    }
     const double sine = std::sin(rate * t);
     const double cosine = std::cos(rate * t);
     return MoveAlong(X_start, amplitude,

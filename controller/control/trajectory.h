@@ -72,10 +72,12 @@ std::unique_ptr<Trajectory> MakeLineTrajectory(const Vector6d& X_start, const Ve
 std::unique_ptr<Trajectory> MakePointToPointTrajectory(const Vector6d& X_start, const Vector6d& displacement,
                                                        double duration);
 
-/// X_start + amplitude sin(2 pi frequency t), the amplitude growing with least jerk over ramp_time.
-/// @throws std::invalid_argument unless frequency > 0 (1/s) and ramp_time >= 0 (s).
+/// X_start + amplitude sin(2 pi frequency t), the amplitude growing with least jerk over ramp_time, and
+/// going again until end_time, from when on it is at rest; 0 for never.
+/// @throws std::invalid_argument unless frequency > 0 (1/s), ramp_time >= 0 (s), and end_time 0 or two ramps.
 std::unique_ptr<Trajectory> MakeOscillationTrajectory(const Vector6d& X_start, const Vector6d& amplitude,
-                                                      double frequency, double ramp_time);
+                                                      double frequency, double ramp_time,
+                                                      double end_time = 0.0);
 
 /// A path in a horizontal plane that the object follows with its heading: it turns about the world's z
 /// (alpha) like the path's tangent. It starts in the `heading` (rad, against the world's x) and has the speed

@@ -45,7 +45,6 @@ struct InitRequest {
   fs::path mjcf;
   std::string from;
   std::string out;
-  UrdfOptions urdf;
 };
 
 /// Copies meshes, textures and the like into the folder's assets: a log keeps what lies beside the MJCF.
@@ -115,6 +114,7 @@ void StateFriction(const std::vector<Joint>& joints, MjcfFile* mjcf) {
 struct InitSources {
   RobotDescription robot;
   std::unique_ptr<MjcfFile> mjcf;
+  std::map<std::string, double> rates;  ///< Largest that the URDF states, rad/s or m/s.
 };
 
 InitSources ReadSources(const InitRequest& request) {
@@ -130,16 +130,26 @@ InitSources ReadSources(const InitRequest& request) {
   }
   if (format != RobotFormat::kUrdf)
     throw InputError(request.robot.string() + ": must be a URDF or an MJCF, is a parameter file");
-  sources.robot = ParseUrdf(text, request.robot.string(), request.urdf);
-  const std::map<std::string, double> limits = ReadUrdfEfforts(text, request.robot.string());
+  const std::string source = request.robot.string();
+  sources.robot = ParseUrdf(text, source);
+  sources.rates = ReadUrdfLimits(text, source, "velocity");
+  const std::map<std::string, double> limits = ReadUrdfLimits(text, source, "effort");
   if (!request.mjcf.empty()) {
     sources.mjcf = AdaptForRun(request.mjcf, limits);
     return sources;
   }
+  const std::vector<int> legs = FindLegs(sources.robot);
+  if (!sources.robot.states_base && !legs.empty()) {
+    Warn(fmt::format("{}: floats, on {} legs that are alike; what hangs on a link \"world\" is fixed", source,
+                     legs.size()));
+    sources.robot = ParseUrdf(text, source, {.floating = true});
+  }
   MendForEngine(&sources.robot);
-  ReduceFriction(request.robot.string(), &sources.robot);
+  ReduceFriction(source, &sources.robot);
   sources.mjcf = std::make_unique<MjcfFile>(WriteMjcf(sources.robot, request.robot.filename().string()),
-                                            request.robot.string() + " as an MJCF");
+                                            source + " as an MJCF");
+  if (sources.robot.spec.base.type == BaseType::kFloating)
+    AddLegShapes(sources.robot, legs, sources.mjcf.get());
   AddMotors(sources.mjcf.get(), limits);
   return sources;
 }
@@ -189,38 +199,6 @@ void FreeMotors(const std::vector<std::string>& names, MjcfFile* mjcf) {
   }
   Warn("motors whose limits do not carry the robot along the motion run without them: " + JoinNames(names));
 }
-
-// A gain margin of 6 dB and a phase margin of 45 degrees; of a robot on its feet margins are not judged.
-constexpr const char* kMargins =
-    R"(metrics = ["joint_error_rms", "peak_effort", "gain_margin", "phase_margin"]
-constraints = ["peak_effort < 1", "gain_margin > 2", "phase_margin > 0.785"])";
-constexpr const char* kEffort = R"(metrics = ["joint_error_rms", "peak_effort"]
-constraints = ["peak_effort < 1"])";
-
-constexpr const char* kStudy = R"(# Which gains follow the motion best, with margins that an arm needs.
-name = "gains"
-description = "natural frequency x damping ratio of the motion"
-scenario = "motion.toml"
-set = ["expect={{}}"]
-{}
-
-[[objective]]
-minimize = "joint_error_rms"
-
-[[vary]]
-key = "control.natural_frequency"
-from = 5
-to = 500
-count = 6
-spacing = "log"
-
-[[vary]]
-key = "control.damping_ratio"
-from = 0.5
-to = 2
-count = 3
-spacing = "log"
-)";
 
 constexpr const char* kWorkflow =
     R"(# Compares the two descriptions at every push. In the place of OWNER and REVISION: where dexcheck lies.
@@ -288,7 +266,8 @@ std::optional<Stand> StandOrHold(const mjModel& engine, const std::map<std::stri
     LeaveOutBaseContacts(mjcf.get());
     robot = describe(*mjcf);
   }
-  *sources = {std::move(robot), std::move(mjcf)};
+  sources->robot = std::move(robot);
+  sources->mjcf = std::move(mjcf);
   if (why.empty()) {
     Warn("contacts other than the feet's with the floor are left out; overlaps are judged by their distance");
     return stand;
@@ -300,6 +279,7 @@ std::optional<Stand> StandOrHold(const mjModel& engine, const std::map<std::stri
 int InitRobot(const InitRequest& request) {
   InitSources sources = ReadSources(request);
   RobotDescription& robot = sources.robot;
+  const bool is_made = request.mjcf.empty() && robot.format == RobotFormat::kUrdf;
   if (robot.spec.joints.empty()) throw InputError(request.robot.string() + ": has no joint that moves");
   for (const Joint& joint : robot.spec.joints) {
     if (joint.type == JointType::kBall)
@@ -333,7 +313,7 @@ int InitRobot(const InitRequest& request) {
   InitMotion motion;
   if (!stand) {
     const std::string table = request.robot.string() + " as a parameter file";
-    motion = PlanInitMotion(stated, ParseRobotModel(parameters, table), limits, home);
+    motion = PlanInitMotion(stated, ParseRobotModel(parameters, table), limits, sources.rates, home);
   }
   FreeMotors(stand ? stand->weak : motion.weak, sources.mjcf.get());
   const std::vector<std::string> overlaps =
@@ -350,12 +330,12 @@ int InitRobot(const InitRequest& request) {
   const double rounded = tolerance.value_or(0.0);
   WriteFile(folder.path() / "motion.toml",
             stand ? WriteStandScenario(robot, *stand, rounded) : WriteInitScenario(robot, motion, rounded));
-  WriteFile(folder.path() / "gains.toml", fmt::format(kStudy, stand ? kEffort : kMargins));
+  WriteFile(folder.path() / "gains.toml", WriteGainStudy(stand.has_value()));
   fs::create_directories(folder.path() / ".github/workflows");
   WriteFile(folder.path() / ".github/workflows/dexcheck.yml", kWorkflow);
   fmt::print("{}: robot.toml, robot.xml, motion.toml, gains.toml, .github/workflows/dexcheck.yml\n",
              folder.path().string());
-  if (request.mjcf.empty() && robot.format == RobotFormat::kUrdf)
+  if (is_made)
     fmt::print("robot.xml was made of {}: what is wrong there is wrong in both\n",
                request.robot.filename().string());
   if (!tolerance)

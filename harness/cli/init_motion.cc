@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "controller/common/text.h"
 #include "controller/control/joint_motion.h"
@@ -13,9 +14,10 @@
 namespace dexcheck::cli {
 namespace {
 
-constexpr double kHalf = 2.0;  // s, there, and as long back
+constexpr double kHalf = 2.0;     // s, there, and as long back
+constexpr double kFastest = 1.6;  // of sines: the most that one is faster than the slowest of its kind
 
-JointSpan ChooseSpan(const Joint& joint, bool states_range, double home) {
+JointSpan ChooseSpan(const Joint& joint, bool states_range, double home, double fastest) {
   constexpr double kMargin = 0.2, kSwing = 1.0 / 3.0;  // of the range, at either end; of the way
   const double most = joint.type == JointType::kPrismatic ? 0.05 : 0.3;
   const double width = states_range ? joint.upper - joint.lower : 2.0 * most;
@@ -27,7 +29,11 @@ JointSpan ChooseSpan(const Joint& joint, bool states_range, double home) {
   JointSpan span{.swing = std::min(kSwing * most, 0.5 * kMargin * width)};
   span.start = std::clamp(home, low, high);
   const double step = std::min(most, 0.5 * (high - low));
-  span.end = span.start + step <= high ? span.start + step : span.start - step;
+  // Least jerk's largest rate; the sines' with the highest frequencies that they may have.
+  constexpr double kWay = 1.875 / kHalf, kSines = 2.0 * kPi * kFastest * (0.7 * 0.7 + 0.3 * 1.9), kPart = 0.8;
+  const double part = std::min(1.0, kPart * fastest / (kWay * step + kSines * span.swing));
+  span.swing *= part;
+  span.end = span.start + (span.start + step <= high ? part : -part) * step;
   return span;
 }
 
@@ -42,12 +48,17 @@ JointSpan Follow(const Joint& joint, const JointSpan& leader, const JointSpan& o
   return is_within(led.start) && is_within(led.end) ? led : own;
 }
 
-std::vector<JointSpan> ChooseSpans(const RobotDescription& robot, const std::map<std::string, double>& home) {
+std::vector<JointSpan> ChooseSpans(const RobotDescription& robot, const std::map<std::string, double>& rates,
+                                   const std::map<std::string, double>& home) {
   std::vector<JointSpan> spans;
   for (size_t i = 0; i < robot.spec.joints.size(); ++i) {
     const Joint& joint = robot.spec.joints[i];
-    const auto wish = home.find(joint.name);
-    JointSpan span = ChooseSpan(joint, robot.joints[i].states_range, wish == home.end() ? 0.0 : wish->second);
+    const auto find = [&](const std::map<std::string, double>& numbers, double otherwise) {
+      const auto found = numbers.find(joint.name);
+      return found == numbers.end() ? otherwise : found->second;
+    };
+    JointSpan span = ChooseSpan(joint, robot.joints[i].states_range, find(home, 0.0),
+                                find(rates, std::numeric_limits<double>::infinity()));
     span.number = i;
     if (joint.coupling && joint.coupling->leader < static_cast<int>(i))
       span = Follow(joint, spans[static_cast<size_t>(joint.coupling->leader)], span);
@@ -102,6 +113,38 @@ double ChooseFrequency(const RobotModel& model) {
   return std::ceil(std::clamp(0.5 * rates.maxCoeff(), 10.0, 50.0));
 }
 
+// A gain margin of 6 dB and a phase margin of 45 degrees; of a robot on its feet margins are not judged.
+constexpr const char* kMargins =
+    R"(metrics = ["joint_error_rms", "peak_effort", "gain_margin", "phase_margin"]
+constraints = ["peak_effort < 1", "gain_margin > 2", "phase_margin > 0.785"])";
+constexpr const char* kEffort = R"(metrics = ["joint_error_rms", "peak_effort"]
+constraints = ["peak_effort < 1"])";
+
+constexpr const char* kStudy = R"(# Which gains follow the motion best, with margins that an arm needs.
+name = "gains"
+description = "natural frequency x damping ratio of the motion"
+scenario = "motion.toml"
+set = ["expect={{}}"]
+{}
+
+[[objective]]
+minimize = "joint_error_rms"
+
+[[vary]]
+key = "control.natural_frequency"
+from = 5
+to = 500
+count = 6
+spacing = "log"
+
+[[vary]]
+key = "control.damping_ratio"
+from = 0.5
+to = 2
+count = 3
+spacing = "log"
+)";
+
 }  // namespace
 
 void AddSwings(int joint, double amplitude, size_t number, std::vector<JointOscillation>* swings) {
@@ -109,15 +152,17 @@ void AddSwings(int joint, double amplitude, size_t number, std::vector<JointOsci
   const double part = std::fmod(0.618034 * static_cast<double>(number), 1.0);
   constexpr double kRamp = 1.0;  // s
   for (const auto& [share, frequency] : {std::pair(0.7, 0.7), {0.3, 1.9}})
-    swings->push_back(
-        {joint, share * amplitude, std::round(1e3 * frequency * (1.0 + 0.6 * part)) / 1e3, kRamp});
+    swings->push_back({joint, share * amplitude,
+                       std::round(1e3 * frequency * (1.0 + (kFastest - 1.0) * part)) / 1e3, kRamp,
+                       2.0 * kHalf});
 }
 
 InitMotion PlanInitMotion(const RobotDescription& robot, const RobotModel& model,
                           const std::map<std::string, double>& limits,
+                          const std::map<std::string, double>& rates,
                           const std::map<std::string, double>& home) {
   InitMotion motion;
-  motion.spans = ChooseSpans(robot, home);
+  motion.spans = ChooseSpans(robot, rates, home);
   motion.frequency = ChooseFrequency(model);
   constexpr double kMostUse = 0.7, kFull = 0.9;
   constexpr int kHalvings = 4;
@@ -150,9 +195,9 @@ std::string WriteSwings(const std::vector<JointOscillation>& swings, const char*
                         const std::function<std::string(int joint)>& name) {
   std::string text = "oscillations = [\n";
   for (const JointOscillation& one : swings)
-    text += fmt::format("  {{ {} = {}, amplitude = {}, frequency = {}, ramp_time = {} }},\n", key,
-                        Quote(name(one.joint)), FormatNumber(one.amplitude, 3), FormatNumber(one.frequency),
-                        FormatNumber(one.ramp_time));
+    text += fmt::format("  {{ {} = {}, amplitude = {}, frequency = {}, ramp_time = {}, end_time = {} }},\n",
+                        key, Quote(name(one.joint)), FormatNumber(one.amplitude, 3),
+                        FormatNumber(one.frequency), FormatNumber(one.ramp_time), FormatNumber(one.end_time));
   return text + "]\n";
 }
 
@@ -193,6 +238,8 @@ damping_ratio = 1
 {})",
       motion.title, motion.description, motion.settle, rounded, motion.text, motion.frequency, law);
 }
+
+std::string WriteGainStudy(bool stands) { return fmt::format(kStudy, stands ? kEffort : kMargins); }
 
 std::string WriteInitScenario(const RobotDescription& robot, const InitMotion& motion, double tolerance) {
   const std::string start = ListJoints(robot, [&](size_t i) { return motion.spans[i].start; });

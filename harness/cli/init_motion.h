@@ -33,10 +33,11 @@ struct InitMotion {
 };
 
 /// A motion within the joints' ranges, smaller where motors would be at their limits.
-/// @param limits of motors by joint, N m or N. @param home where it had best begin, by joint, rad or m; 0 for
-/// others.
+/// @param limits of motors by joint, N m or N. @param rates largest, likewise, rad/s or m/s. @param home
+/// where it had best begin, by joint, rad or m; 0 for others.
 InitMotion PlanInitMotion(const RobotDescription& robot, const RobotModel& model,
                           const std::map<std::string, double>& limits,
+                          const std::map<std::string, double>& rates,
                           const std::map<std::string, double>& home);
 
 /// Adds a slow sine and a fast one, which tell forces apart that a smooth way does not: a torque, an inertia
@@ -64,5 +65,9 @@ std::string WriteScenario(const RobotDescription& robot, const MotionText& motio
 
 /// The scenario of that motion. @param tolerance of runs; 0 for rounding.
 std::string WriteInitScenario(const RobotDescription& robot, const InitMotion& motion, double tolerance);
+
+/// The study of its gains, for the best with margins that an arm needs.
+/// @param stands on feet, whose margins are not judged.
+std::string WriteGainStudy(bool stands);
 
 }  // namespace dexcheck::cli

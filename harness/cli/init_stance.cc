@@ -21,8 +21,6 @@ namespace {
 
 using tinyxml2::XMLElement;
 
-constexpr double kAddedRadius = 0.005;  // m, of spheres that are added to feet
-
 /// Whether a stance knows the shape; of others, spheres are added where they touch.
 bool IsKnown(int type) { return type == mjGEOM_SPHERE || type == mjGEOM_CAPSULE || type == mjGEOM_BOX; }
 

@@ -13,6 +13,8 @@
 
 namespace dexcheck::cli {
 
+constexpr double kAddedRadius = 0.005;  ///< m, of spheres that are added to feet.
+
 /// A place of the robot that stands on the ground: a sphere's centre, the end of a capsule, the corner of a
 /// box; of a mesh or a cylinder, the centre of a small sphere that is added there.
 struct Foot {
@@ -35,6 +37,14 @@ struct Stand {
   std::vector<std::map<std::string, double>> poses;  ///< Likewise, as it sways.
   std::vector<std::string> weak;                     ///< Joints whose motors' limits are too low for that.
 };
+
+/// Joints of a robot, whose base is not said to be fixed, at the ends of its legs: chains of as many joints
+/// that reach lowest while all joints are zero, lower than the base. None where there are not two.
+std::vector<int> FindLegs(const RobotDescription& robot);
+
+/// Adds the shapes of the legs' last links to an MJCF that has none (WriteMjcf): spheres, or boxes around
+/// others, or, of meshes, a small sphere at what is welded farthest.
+void AddLegShapes(const RobotDescription& robot, const std::vector<int>& legs, MjcfFile* mjcf);
 
 /// Places that are lowest, of each body four at the most, as the first key frame or zero puts its joints.
 Stand FindStand(const mjModel& m, bool at_key);

@@ -27,10 +27,12 @@ void UseInstalledFonts() {
   if (::access(fonts.c_str(), R_OK) == 0) ::setenv("FONTCONFIG_FILE", fonts.c_str(), /*overwrite=*/0);
 }
 
-int Report(const std::string& problem, ExitCode code) {
-  std::fflush(stdout);
-  Warn(problem);
-  return code;
+constexpr const char* kNoMemory =
+    "not enough memory, or the limit of this process's (ulimit -v) is too small";
+
+int Refuse(const std::string& problem) {
+  ReportFailure(problem);
+  return kInputError;
 }
 
 /// What a call of the system said. When it was about printing, it names standard output.
@@ -85,17 +87,19 @@ int Run(int argc, char** argv) {
     FlushOutput();
     return exit_code;
   } catch (const UsageError& error) {
-    return Report(std::string(error.what()) + " (see dexcheck --help)", kInputError);
+    return Refuse(std::string(error.what()) + " (see dexcheck --help)");
   } catch (const InputError& error) {
-    return Report(error.what(), kInputError);
+    return Refuse(error.what());
   } catch (const std::system_error& error) {
-    return Report(Explain(error), kInputError);
+    // A thread for which there is no room.
+    if (error.code() == std::errc::resource_unavailable_try_again) return ReportFailure(kNoMemory);
+    return Refuse(Explain(error));
   } catch (const std::bad_alloc&) {
-    return Report("not enough memory, or the limit of this process's (ulimit -v) is too small", kFailure);
+    return ReportFailure(kNoMemory);
   } catch (const std::logic_error& error) {  // readers throw InputError: this is a fault of the program
-    return Report(std::string("internal error: ") + error.what(), kFailure);
+    return ReportFailure(std::string("internal error: ") + error.what());
   } catch (const std::exception& error) {
-    return Report(error.what(), kFailure);
+    return ReportFailure(error.what());
   }
 }
 

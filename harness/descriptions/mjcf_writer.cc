@@ -67,7 +67,9 @@ void AddJoint(const Joint& joint, bool is_limited, XMLElement* body) {
 
 std::string WriteMjcf(const RobotDescription& robot, const std::string& origin) {
   const RobotSpec& spec = robot.spec;
-  if (spec.base.type != BaseType::kFixed) throw InputError(spec.source + ": base: must be fixed, and moves");
+  const bool floats = spec.base.type == BaseType::kFloating;
+  if (!floats && spec.base.type != BaseType::kFixed)
+    throw InputError(spec.source + ": base: must be fixed or float, and rolls");
   tinyxml2::XMLDocument document;
   document.InsertEndChild(document.NewComment((" Written by dexcheck from " + origin + ". ").c_str()));
   XMLElement* const root = document.NewElement("mujoco");
@@ -82,6 +84,10 @@ std::string WriteMjcf(const RobotDescription& robot, const std::string& origin) 
   // The world cannot be the name of a body.
   base->SetAttribute("name", spec.base.link == "world" ? "base" : spec.base.link.c_str());
   SetPose(spec.base.X_B0, base);
+  if (floats) {
+    base->InsertNewChildElement("freejoint");
+    AddInertial(spec.base.body, base);
+  }
   std::vector<XMLElement*> bodies = {base};  // of joint i - 1
   for (size_t i = 0; i < spec.joints.size(); ++i) {
     const Joint& joint = spec.joints[i];

@@ -14,7 +14,7 @@ namespace dexcheck {
 /// to rounding; limits, damping, armature, friction and frames (as sites). It has no shapes, no couplings and
 /// no actuators. What is wrong in the description is wrong in it.
 /// @param origin what it was made from, for its first comment.
-/// @throws InputError for a base that moves and for ball joints.
+/// @throws InputError for a base that rolls and for ball joints.
 std::string WriteMjcf(const RobotDescription& robot, const std::string& origin);
 
 /// A URDF as the engine's own importer should read it: without looks and collision shapes, whose meshes

@@ -30,8 +30,9 @@ struct UrdfOptions {
 /// @throws InputError, one line that names file, line, part and value.
 RobotDescription ParseUrdf(std::string_view text, const std::string& source, const UrdfOptions& options = {});
 
-/// The largest force or torque of each joint that states one (limit effort), N or N m, by name.
-/// @throws as ParseUrdf.
-std::map<std::string, double> ReadUrdfEfforts(std::string_view text, const std::string& source);
+/// An attribute of each joint's <limit> that is above 0, by name: the largest "effort", N or N m, or
+/// "velocity", m/s or rad/s. @throws as ParseUrdf.
+std::map<std::string, double> ReadUrdfLimits(std::string_view text, const std::string& source,
+                                             const char* attribute);
 
 }  // namespace dexcheck

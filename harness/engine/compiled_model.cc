@@ -350,14 +350,19 @@ MjModelPtr MakeVisible(MjModelPtr model) {
   Brighten(model.get());
   const std::vector<int> geoms = ListMovingGeoms(*model);
   if (model->nskin > 0) return model;
-  if (!geoms.empty()) {
-    const bool all_hidden =
-        std::ranges::all_of(geoms, [&](int geom) { return model->geom_group[geom] >= kFirstHiddenGroup; });
-    for (const int geom : geoms) {
-      if (all_hidden) model->geom_group[geom] = 0;
-    }
-    return model;
+  const bool all_hidden =
+      std::ranges::all_of(geoms, [&](int geom) { return model->geom_group[geom] >= kFirstHiddenGroup; });
+  for (const int geom : geoms) {
+    if (all_hidden) model->geom_group[geom] = 0;
   }
+  // Of a robot of feet alone nothing else would be seen.
+  int moving = 0, shaped = 0;
+  for (int body = 1; body < model->nbody; ++body) {
+    if (model->body_jntnum[body] == 0) continue;
+    ++moving;
+    shaped += model->body_geomnum[body] > 0 ? 1 : 0;
+  }
+  if (!geoms.empty() && 2 * shaped >= moving) return model;
   const std::vector<Bone> bones = ListBones(*model);
   if (bones.empty()) return model;
   double longest = 0.0;

@@ -138,6 +138,13 @@ void LeaveBodiesGeneral(MjcfFile* mjcf) {
   });
 }
 
+/// Whether a file was unpacked from a log into a TemporaryFolder: what is left out of it was said by its run.
+bool IsOfLog(const std::filesystem::path& file) {
+  std::error_code ignored;
+  const std::string folders = (std::filesystem::temp_directory_path(ignored) / "dexcheck-").string();
+  return file.string().starts_with(folders) && file.parent_path().filename() == "mjcf";
+}
+
 /// @param load what loads it when nothing need be changed.
 template <typename Load>
 MjModelPtr LoadAdapted(MjcfFile* mjcf, const Load& load) {
@@ -153,7 +160,7 @@ MjModelPtr LoadAdapted(MjcfFile* mjcf, const Load& load) {
   }
   StateNewDefaults(mjcf);
   MjModelPtr model = LoadDocument(*mjcf);
-  WarnOnce(mjcf->SummarizeChanges());
+  if (!IsOfLog(mjcf->source())) WarnOnce(mjcf->SummarizeChanges());
   return model;
 }
 

@@ -2,6 +2,7 @@
 
 #include <map>
 #include <memory>
+#include <new>
 #include <set>
 #include <sstream>
 #include <string_view>
@@ -34,6 +35,8 @@ class Schema {
     std::istringstream lines(text.data());
     std::vector<SchemaElement*> path;
     for (std::string line; std::getline(lines, line);) ReadLine(line, &path);
+    // 3.x prints through a stream, which is cut off, its last element first, where memory is short.
+    if (elements_.empty() || !root().children.contains("keyframe")) throw std::bad_alloc();
   }
   [[nodiscard]] const SchemaElement& root() const { return *elements_.front(); }
 

@@ -33,13 +33,13 @@ MatrixXd Differentiate(VectorXd x, const Function& f) {
   return derivative;
 }
 
-/// Where the motion is judged.
+/// Where the motion is judged: each place once.
 std::vector<VectorXd> ListPostures(const Setup& setup) {
   std::vector<VectorXd> postures = {setup.start().q};
   DesiredJoints at;
   for (const JointTask::Point& point : setup.scenario().joint_task()->points) {
     setup.joints()->motion.Evaluate(point.time, &at);
-    postures.push_back(at.q);
+    if (std::ranges::find(postures, at.q) == postures.end()) postures.push_back(at.q);
   }
   return postures;
 }

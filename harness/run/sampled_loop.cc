@@ -195,10 +195,15 @@ LoopMargins CalcMargins(const SampledSystem& system, bool together) {
   const std::vector<double> w = ListFrequencies(system.period);
   std::vector<std::vector<Complex>> own(static_cast<size_t>(n)), loci(together ? own.size() : 0);
   MatrixXcd shifted;
+  // S, or its diagonal in a diagonal matrix where no more is wanted.
   const auto evaluate = [&](Complex z) {
     shifted = R;
     shifted.diagonal().array() -= z;
-    return MatrixXcd(MatrixXcd::Identity(n, n) + C * shifted.triangularView<Eigen::Upper>().solve(B));
+    const MatrixXcd x = shifted.triangularView<Eigen::Upper>().solve(B);
+    MatrixXcd S = MatrixXcd::Identity(n, n);
+    if (together) return MatrixXcd(S + C * x);
+    S.diagonal() += C.cwiseProduct(x.transpose()).rowwise().sum();
+    return S;
   };
   const auto find_loci = [&](const MatrixXcd& S) {
     VectorXcd values = Eigen::ComplexSchur<MatrixXcd>(S, false).matrixT().diagonal().cwiseInverse();

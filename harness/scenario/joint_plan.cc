@@ -132,7 +132,7 @@ JointMotion MakeBodyMotion(const StanceTask& task) {
   }
   std::vector<JointOscillation> oscillations;
   for (const StanceTask::Oscillation& one : task.oscillations)
-    oscillations.push_back({one.axis, one.amplitude, one.frequency, one.ramp_time});
+    oscillations.push_back({one.axis, one.amplitude, one.frequency, one.ramp_time, one.end_time});
   return JointMotion(VectorXd::Zero(6), points, oscillations);
 }
 
@@ -191,7 +191,7 @@ JointPlan MakeJointPlan(const Scenario& scenario, const RobotPair& robots, Start
   std::vector<JointOscillation> oscillations;
   for (const JointTask::Oscillation& one : task.oscillations) {
     oscillations.push_back({joints.Find(one.key + ".joint", one.joint, one.in_degrees), one.amplitude,
-                            one.frequency, one.ramp_time});
+                            one.frequency, one.ramp_time, one.end_time});
   }
   Pose X_Bo = Pose::Identity();
   if (model.object()) {

@@ -142,6 +142,7 @@ struct StanceTask {
     double amplitude = 0.0;  ///< m or rad.
     double frequency = 0.0;  ///< 1/s.
     double ramp_time = 0.0;  ///< s.
+    double end_time = 0.0;   ///< s; 0 for never.
   };
   std::vector<std::string> feet;  ///< Frames.
   double mu = 0.0;                ///< Friction that the law counts on.
@@ -163,6 +164,7 @@ struct JointTask {
     bool in_degrees = false;
     double frequency = 0.0;  ///< 1/s.
     double ramp_time = 0.0;  ///< s.
+    double end_time = 0.0;   ///< s; 0 for never.
     std::string key;
   };
   JointNumbers start;  ///< Others begin at 0.

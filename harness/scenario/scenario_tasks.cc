@@ -241,6 +241,11 @@ double ReadSine(const char* missing, TomlTable* table, Oscillation* one) {
   const double rate = 2.0 * kPi * one->frequency;
   if (!std::isfinite(one->amplitude * rate * rate)) frequency.Fail("must not be so large");
   if (const auto time = table->Find("ramp_time")) one->ramp_time = time->AsNotNegative();
+  if (const auto time = table->Find("end_time")) {
+    one->end_time = time->AsNotNegative();
+    if (one->end_time > 0.0 && one->end_time < 2.0 * one->ramp_time)
+      time->Fail("must be two ramp_times or 0");
+  }
   table->RejectUnused();
   return unit;
 }

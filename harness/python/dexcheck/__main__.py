@@ -12,6 +12,10 @@ sys.path[0] = str(Path(__file__).resolve().parents[1])
 try:
     from dexcheck.controller import Controller, describe, refuse, serve  # noqa: E402
 except ImportError as error:
+    # A python3 of a user's own often lacks the NumPy that the system's has.
+    system = "/usr/bin/python3"
+    if "DEXCHECK_PYTHON" not in os.environ and os.access(system, os.X_OK) and not os.path.samefile(sys.executable, system):
+        os.execv(system, [system, __file__, *sys.argv[1:]])
     sys.exit(f"dexcheck: {sys.executable}: {error}: controllers in Python need NumPy; DEXCHECK_PYTHON names another python3")
 
 

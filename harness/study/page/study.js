@@ -101,7 +101,7 @@
   const ColorBy = (column, list = rows) => {
     if (column === kOutcome) return row => study.outcomes[value(row, kOutcome)].color;
     const [least, most] = Range(list, column), f = IsWide(least, most) ? Math.log : x => x;
-    return row => Number.isFinite(value(row, column)) ? ColorOf(most > least ? (f(value(row, column)) - f(least)) / (f(most) - f(least)) : 0) : '#bbb';
+    return row => Number.isFinite(value(row, column)) ? ColorOf(!isFlat ? (f(value(row, column)) - f(least)) / (f(most) - f(least)) : 0) : '#bbb';
   };
   // Of points, those that no other one beats in both quantities, by the first one.
   const FindFront = (list, x, y) => {
@@ -179,6 +179,7 @@
     });
     const finite = cells.map(cell => cell.z).filter(Number.isFinite);
     const least = finite.reduce((a, b) => Math.min(a, b), Infinity), most = finite.reduce((a, b) => Math.max(a, b), -Infinity);
+    const isFlat = Short(least) === Short(most); // what differs by rounding has one colour
     const f = IsWide(least, most) ? Math.log : v => v;
     for (const cell of cells) {
       cell.color = z === kOutcome ? study.outcomes[cell.z].color
@@ -186,6 +187,7 @@
     }
     Cells(canvas, {x: AxisOf(x), y: AxisOf(y), cells, chosen, choose: Choose, describe: p => Describe(p.row) + (z === kOutcome ? '' : `; ${columns[z].name} ${Show(p.z, z)}`)});
     text.textContent = z === kOutcome ? 'The worst outcome of each cell.' + (cells.some(cell => cell.mark) ? ' Crosses: unstable by (57).' : '')
+      : finite.length && isFlat ? `${Short(least)} everywhere; grey: no value.`
       : finite.length ? `From ${Short(least)} (pale) to ${Short(most)} (dark)${f === Math.log ? ', by the logarithm' : ''}; grey: no value.` : 'No value.';
   };
 

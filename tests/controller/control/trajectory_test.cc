@@ -58,6 +58,7 @@ std::map<std::string, std::unique_ptr<Trajectory>> MakeAll() {
   all["ramp"] = MakeLineTrajectory(X, d, 1.3);
   all["point_to_point"] = MakePointToPointTrajectory(X, d, 1.7);
   all["oscillation"] = MakeOscillationTrajectory(X, d, 0.8, 1.1);
+  all["fading"] = MakeOscillationTrajectory(X, d, 0.8, 1.3, 2.75);
   all["weave"] = MakeWeaveTrajectory(X, {0.7, 1.0, 1.2}, 0.15, 1.6);
   all["circle"] = MakeCircleTrajectory(X, {-0.4, 0.9, 1.2}, 0.8);
   all["right_circle"] = MakeCircleTrajectory(X, {-0.4, 0.9, 0.0}, -0.8);
@@ -155,6 +156,14 @@ TEST(Trajectory, OscillationByHand) {
   EXPECT_TRUE(MatrixNear(peak.X_d, MakeStart() + MakeDirection(), kRounding));
   EXPECT_TRUE(MatrixNear(peak.X_d_dot, Vector6d::Zero(), kRounding));
   EXPECT_TRUE(MatrixNear(peak.X_d_ddot, -kPi * kPi / 4.0 * MakeDirection(), kRounding));
+  // At its end it is at rest, before it fades it is as without an end.
+  const auto fading = MakeOscillationTrajectory(MakeStart(), MakeDirection(), 0.25, 0.5, 2.0);
+  const auto endless = MakeOscillationTrajectory(MakeStart(), MakeDirection(), 0.25, 0.5);
+  EXPECT_TRUE(MatrixNear(fading->Evaluate(1.4).X_d, endless->Evaluate(1.4).X_d, 0.0));
+  const DesiredMotion end = fading->Evaluate(2.0);
+  EXPECT_TRUE(MatrixNear(end.X_d, MakeStart(), 0.0));
+  for (const Vector6d& rate : {end.X_d_dot, end.X_d_ddot})
+    EXPECT_TRUE(MatrixNear(rate, Vector6d::Zero(), 0.0));
 }
 
 TEST(Trajectory, CircleByHand) {
@@ -271,6 +280,7 @@ TEST(Trajectory, RejectsWrongNumbers) {
   EXPECT_TRUE(rejects([&] { MakeLineTrajectory(X, X, -1.0); }, "ramp_time"));
   EXPECT_TRUE(rejects([&] { MakePointToPointTrajectory(X, X, 0.0); }, "duration"));
   EXPECT_TRUE(rejects([&] { MakeOscillationTrajectory(X, X, 0.0, 1.0); }, "frequency"));
+  EXPECT_TRUE(rejects([&] { MakeOscillationTrajectory(X, X, 1.0, 1.0, 1.9); }, "end_time"));
   EXPECT_TRUE(rejects([&] { MakeWeaveTrajectory(X, {0.0, 1.0, 1.0}, 0.1, 0.0); }, "wavelength"));
   EXPECT_TRUE(rejects([&] { MakeCircleTrajectory(X, {0.0, 1.0, 1.0}, 0.0); }, "radius"));
   EXPECT_TRUE(rejects([&] { MakeWayPointTrajectory(X, {}); }, "number of way-points"));

@@ -92,6 +92,13 @@ TEST_F(InitCommand, MotorsHaveTheLimitsThatTheFilesState) {
   Expect(0, "init newer.xml --out newer");
   EXPECT_THAT(Read("newer/robot.xml"), HasSubstr(R"(ctrlrange="-7 7")"));
   EXPECT_THAT(Read("newer/robot.xml"), HasSubstr(R"(ctrlrange="-3 3")"));
+  // A run says what is left out of its MJCF; what reads its log does not say it of the log's copy again.
+  WriteChanged("newer/robot.xml", Read("newer/robot.xml"), "<joint name=\"elbow\"",
+               "<joint actuatorfrcrange=\"-3 4\" name=\"elbow\"");
+  const std::string said = Expect(0, "run newer/motion.toml --set duration=0.2 --out run").err;
+  EXPECT_THAT(said, HasSubstr("newer/robot.xml: left out"));
+  EXPECT_THAT(said, Not(HasSubstr("mjcf/robot.xml")));
+  EXPECT_EQ(Expect(0, "report run").err, "");
 }
 
 // MuJoCo leaves out contacts of neighbours, but not those of a link on a base that is welded to the world.
@@ -310,7 +317,10 @@ TEST_F(InitCommand, HoldsBallJoints) {
 
 // Friction that stops a joint within a step leaves its law no time to act.
 TEST_F(InitCommand, ReducesFrictionThatAStepCannotCarry) {
-  const std::string urdf = ReadFixture("pair.urdf");
+  // A motion that leaves the motors room for what late torques and coarse encoders cost.
+  WriteChanged("fast.urdf", ReadFixture("pair.urdf"), "upper=\"2\" effort=\"1\" velocity=\"1\"",
+               "upper=\"2\" effort=\"1\" velocity=\"3\"");
+  const std::string urdf = Read("fast.urdf");
   WriteChanged("stuck.urdf", urdf, "<limit lower=\"-1\"",
                "<dynamics damping=\"500\" friction=\"500\"/><limit lower=\"-1\"");
   EXPECT_THAT(Expect(0, "init stuck.urdf").err,
@@ -366,7 +376,7 @@ TEST_F(InitCommand, RefusesInOneLine) {
   Write("floats.urdf", R"(<robot name="r"><link name="world"/><link name="l"><inertial><mass value="1"/>
 <inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>
 <joint name="j" type="floating"><parent link="world"/><child link="l"/></joint></robot>)");
-  EXPECT_TRUE(Refused("init floats.urdf", {"floats.urdf", "base", "floats"}));
+  EXPECT_TRUE(Refused("init floats.urdf", {"floats.urdf", "no joint that moves"}));
   EXPECT_FALSE(Has("floats"));
 }
 

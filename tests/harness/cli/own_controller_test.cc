@@ -59,6 +59,22 @@ TEST_F(OwnController, TheLawRewrittenInNumPyIsTheLaw) {
   ExpectThePapersLaw(SourcePath("/harness/examples/numpy_law.py"));
 }
 
+// A python3 of the user's own that finds no NumPy gives way to the system's, unless it is asked for.
+TEST_F(OwnController, APythonWithoutNumPyGivesWay) {
+  const std::string path = std::getenv("PATH");
+  std::filesystem::create_directory(Path("own"));
+  std::filesystem::copy_file(std::filesystem::canonical("/usr/bin/python3"), Path("own/python"));
+  Write("own/python3", "#!/bin/sh\nexec \"$(dirname \"$0\")/python\" -S \"$@\"\n");
+  std::filesystem::permissions(Path("own/python3"), std::filesystem::perms::owner_all);
+  ::setenv("PATH", (Path("own").string() + ":" + path).c_str(), /*replace=*/1);
+  const std::string law = SourcePath("/harness/examples/numpy_law.py");
+  ::unsetenv("DEXCHECK_PYTHON");
+  EXPECT_EQ(RunWith(law).exit_code, 0);
+  ::setenv("DEXCHECK_PYTHON", "python3", /*replace=*/1);
+  EXPECT_THAT(RunWith(law, "--out asked").err, HasSubstr("need NumPy"));
+  ::setenv("PATH", path.c_str(), /*replace=*/1);
+}
+
 /// The law of the joints rewritten outside, with gains that differ from joint to joint.
 class OwnJointLaw : public OwnController, public ::testing::WithParamInterface<std::string> {};
 

@@ -128,6 +128,8 @@ TEST(SampledLoop, IsBrokenAtOneTorqueAtATime) {
     EXPECT_LT(CalcRadius(Strengthen(loop, i, 1.01 * one.least_gain)), 1.0) << i;
     EXPECT_GT(CalcRadius(Strengthen(loop, i, 0.99 * one.least_gain)), 1.0) << i;
   }
+  const LoopMargins alone = CalcMargins(CalcSampledSystem(loop), /*together=*/false);
+  for (size_t i = 0; i < 2; ++i) EXPECT_NEAR(alone.loops[i].gain, margins.loops[i].gain, 1e-9) << i;
   // All together is another question.
   const auto both = [&](double factor) {
     return CalcRadius(Strengthen(Strengthen(loop, 0, factor), 1, factor));
