@@ -260,7 +260,7 @@ class Search {
     return criterion;
   }
 
-  /// Exchanges two at once: what one lacks the other may have. @returns the criterion.
+  /// Exchanges two at once, what one lacks the other may have, for two or for one. @returns the criterion.
   double ExchangePairs(double criterion) {
     constexpr size_t kLikeliest = 12;
     for (size_t i = 0; i < chosen_.size(); ++i) {
@@ -272,6 +272,12 @@ class Search {
         for (const Best& first : firsts) {
           std::vector<size_t> set = others;
           set.push_back(first.candidate);
+          // One that does as well as both needs no second.
+          if (first.criterion < criterion && (IsNoise(set) || !IsNoise(chosen_)) &&
+              CanBe(first.candidate, others)) {
+            chosen_ = set;
+            return ExchangePairs(Exchange(first.criterion));
+          }
           const Best second = FindBest(set);
           if (!(second.criterion < criterion - kEqualLogOdds * 1e-3)) continue;
           set.push_back(second.candidate);
