@@ -8,8 +8,6 @@
 namespace dexcheck {
 namespace {
 
-using Eigen::Index;
-
 constexpr size_t kMostSegments = 8;
 
 /// Whether they have a fault in common.
@@ -171,8 +169,6 @@ Causes ExplainForces(const StepStore& store) {
   if (found.size() != 1 && growing.ExplainConstant(whole, &grown) && growing.is_exact() &&
       (found.empty() || grown.size() < found.size()))
     found = grown;
-  const auto count = static_cast<Index>(found.size());
-  if (!is_explained && problem.ExplainTorque(whole, count, found.size(), &causes)) return causes;
   if (!found.empty() && (!is_exact || found.size() < causes.size())) return found;
   if (!is_explained) problem.ExplainChanging(whole, &causes);
   return causes;

@@ -86,7 +86,6 @@ bool ForceProblem::ExplainConstant(const Segment& segment, Causes* causes) {
       terms_.amplitudes.emplace_back(term.candidate, term.amplitude);
     }
   }
-  if (ExplainTorque(segment, terms_.count, selection.terms.size(), causes)) return true;
   if (ExplainJoint(segment, selection, causes)) return true;
   Causes told =
       TellSelection(StartExplanation(store_, CauseChannel::kBalance, segment), selection, candidates_,
@@ -139,22 +138,6 @@ void ForceProblem::ExplainChanging(const Segment& segment, Causes* causes) const
     }
   }
   causes->push_back(one);
-}
-
-bool ForceProblem::ExplainTorque(const Segment& segment, Index amplitudes, size_t faults,
-                                 Causes* causes) const {
-  const auto cost = [&](Index parameters, size_t terms) {
-    return static_cast<double>(parameters) * std::log(static_cast<double>(forces_->rows())) +
-           2.0 * static_cast<double>(terms) * std::log(static_cast<double>(candidates_.size()));
-  };
-  if (cost(amplitudes, faults) <= cost(steps_, 1)) return false;
-  for (const Free& torque : FitAll({"torque"})) {
-    const Explanation one = TellFree(segment, torque);
-    if (!IsExplained(one.fraction, CalcLeft(torque.residual))) continue;
-    causes->push_back(one);
-    return true;
-  }
-  return false;
 }
 
 std::vector<ForceProblem::Free> ForceProblem::FitAll(std::initializer_list<const char*> faults) const {

@@ -48,10 +48,6 @@ class ForceProblem {
   /// One force that changes in time, free at each step.
   void ExplainChanging(const Segment& segment, Causes* causes) const;
 
-  /// The torque of one joint, free at each step, where that has fewer amplitudes than so many faults: a range
-  /// that ends, a cable.
-  bool ExplainTorque(const Segment& segment, Eigen::Index amplitudes, size_t faults, Causes* causes) const;
-
  private:
   /// Several faults of one joint may be anything that acts there. So may several of other places, where they
   /// leave more than rounding and a torque of one joint, free at each step, does not.
