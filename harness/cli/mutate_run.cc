@@ -108,7 +108,7 @@ int MutateRun(const MutateRunRequest& request) {
                     .head = {{"scenario", request.scenario},
                              {"overrides", request.overrides.List()},
                              {"from_s", options.from},
-                             {"duration_s", options.duration},
+                             {"duration_s", runs.duration()},
                              {"scale", options.scale},
                              {"numbers", options.parameters},
                              {"kinds_drawn", options.kinds},

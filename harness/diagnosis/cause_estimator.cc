@@ -129,13 +129,6 @@ class Search {
     return Q.leftCols(used);
   }
 
-  /// Whether others have all of what these columns have.
-  [[nodiscard]] bool AddsNothing(const MatrixXd& C, const MatrixXd& others) const {
-    const MatrixXd Q = CalcRange(others);
-    const MatrixXd own = C - Q * (Q.transpose() * C);
-    return (own.colwise().norm().array() <= options_.independent * C.colwise().norm().array()).all();
-  }
-
   /// The criterion of `beside` and each candidate; infinite where it adds nothing.
   [[nodiscard]] std::vector<double> ScoreAll(const std::vector<size_t>& beside) const {
     const MatrixXd Q = CalcRange(beside);
@@ -158,8 +151,7 @@ class Search {
     return columns_.visible(candidate).basis * SolveLeastSquares(own, CalcResidual(Q), options_.independent);
   }
 
-  /// Whether it and those can be, all at once; of those, the ones that add nothing to it are no longer
-  /// needed.
+  /// Whether it and those can be, all at once.
   [[nodiscard]] bool CanBe(size_t candidate, const std::vector<size_t>& beside) const {
     std::vector<size_t> set = beside;
     set.push_back(candidate);
@@ -167,23 +159,7 @@ class Search {
       return !candidates_[i].is_possible && candidates_[i].scale.size() == 0;
     };
     if (std::all_of(set.begin(), set.end(), is_free)) return true;
-    // In the range of all their columns and y, which has few dimensions, all is as it is.
-    MatrixXd C = Reduce(columns_.Collect(set));
-    Index at = 0;
-    const bool has_needless = !AreIndependent(C.leftCols(C.cols() - 1));
-    for (const size_t other : beside) {
-      if (!has_needless) break;
-      const Index own = columns_.CountOf(other);
-      MatrixXd rest(C.rows(), C.cols() - own);
-      rest << C.leftCols(at), C.rightCols(C.cols() - at - own);
-      if (AddsNothing(C.middleCols(at, own), rest.leftCols(rest.cols() - 1))) {
-        C = rest;
-        set.erase(std::find(set.begin(), set.end(), other));
-      } else {
-        at += own;
-      }
-    }
-    const VectorXd a = Solve(C.leftCols(C.cols() - 1), C.rightCols(1));
+    const VectorXd a = Solve(columns_.Collect(set), y_);
     Index width = 0;
     for (const size_t i : set) {
       const Candidate& one = candidates_[i];
@@ -195,26 +171,6 @@ class Search {
       if (one.is_possible && !one.is_possible(amplitude)) return false;
     }
     return true;
-  }
-
-  /// As few rows as have the same products with one another and with y, which is put behind them.
-  [[nodiscard]] MatrixXd Reduce(const MatrixXd& C) const {
-    MatrixXd all(C.rows(), C.cols() + 1);
-    all << C, y_;
-    if (all.rows() < all.cols()) return all;
-    const Eigen::HouseholderQR<MatrixXd> qr(all);
-    return qr.matrixQR().topRows(all.cols()).triangularView<Eigen::Upper>();
-  }
-
-  /// Whether each of these columns, as Reduce left them, has something that all others together lack: 1 /
-  /// |row j of R^-1|.
-  [[nodiscard]] bool AreIndependent(const MatrixXd& C) const {
-    const Index n = C.cols();
-    if (C.rows() <= n) return false;
-    const auto R = C.topRows(n);
-    const MatrixXd inverse = R.triangularView<Eigen::Upper>().solve(MatrixXd::Identity(n, n));
-    const auto sizes = R.colwise().norm().transpose();
-    return (options_.independent * inverse.rowwise().norm().cwiseProduct(sizes).array() < 1.0).all();
   }
 
   static VectorXd Solve(const MatrixXd& C, const VectorXd& y) {
@@ -260,7 +216,7 @@ class Search {
     return criterion;
   }
 
-  /// Exchanges two at once: what one lacks the other may have. @returns the criterion.
+  /// Exchanges two at once, what one lacks the other may have, for two or for one. @returns the criterion.
   double ExchangePairs(double criterion) {
     constexpr size_t kLikeliest = 12;
     for (size_t i = 0; i < chosen_.size(); ++i) {
@@ -272,6 +228,12 @@ class Search {
         for (const Best& first : firsts) {
           std::vector<size_t> set = others;
           set.push_back(first.candidate);
+          // One that does as well as both needs no second.
+          if (first.criterion < criterion && (IsNoise(set) || !IsNoise(chosen_)) &&
+              CanBe(first.candidate, others)) {
+            chosen_ = set;
+            return ExchangePairs(Exchange(first.criterion));
+          }
           const Best second = FindBest(set);
           if (!(second.criterion < criterion - kEqualLogOdds * 1e-3)) continue;
           set.push_back(second.candidate);

@@ -8,9 +8,7 @@
 namespace dexcheck {
 namespace {
 
-using Eigen::Index;
-
-constexpr size_t kMostSegments = 8, kMostBends = 4;
+constexpr size_t kMostSegments = 8;
 
 /// Whether they have a fault in common.
 bool IsSame(const Explanation& a, const Explanation& b) {
@@ -148,11 +146,11 @@ Causes ExplainForces(const StepStore& store) {
   if (store.size() == 0) return causes;
   StepForces forces(store);
   Segment whole;
-  std::vector<Segment> parts, bent;
-  FindSegments(store, &forces, 1.0, &whole, &parts, &bent);
+  std::vector<Segment> parts;
+  FindSegments(store, &forces, 1.0, &whole, &parts);
   if (whole.empty()) {
     // Predictions fail by what is less than the bounds of the balances.
-    FindSegments(store, &forces, kFaint, &whole, &parts, &bent);
+    FindSegments(store, &forces, kFaint, &whole, &parts);
     if (!whole.empty()) ForceProblem(store, &forces, whole, kFaint).ExplainConstant(whole, &causes);
     return causes;
   }
@@ -161,17 +159,17 @@ Causes ExplainForces(const StepStore& store) {
   const bool is_exact = is_explained && problem.is_exact();
   constexpr size_t kHeap = 3;  // so many faults may be fewer that begin one after another
   if (is_exact && causes.size() < kHeap) return causes;
-  // Where there are no more bends than jumps, these are the same; what moves by itself bends all the time.
-  if (bent.size() == parts.size() || bent.size() > kMostBends) bent.clear();
-  for (const std::vector<Segment>& segments : {parts, bent}) {
-    const bool are_many = segments.size() > kMostSegments;
-    const std::vector<Segment> few = are_many ? JoinAcrossGaps(store, &forces, segments) : segments;
-    if (few.size() < 2 || few.size() > kMostSegments) continue;
-    Causes found = ExplainParts(store, &forces, few, is_explained);
-    const auto count = static_cast<Index>(found.size());
-    if (!is_explained && problem.ExplainTorque(whole, count, found.size(), &causes)) return causes;
-    if (!found.empty() && (!is_exact || found.size() < causes.size())) return found;
-  }
+  const bool are_many = parts.size() > kMostSegments;
+  const std::vector<Segment> few = are_many ? JoinAcrossGaps(store, &forces, parts) : parts;
+  Causes found;
+  if (few.size() > 1 && few.size() <= kMostSegments) found = ExplainParts(store, &forces, few, is_explained);
+  // One that grows from a time on explains all steps at once.
+  ForceProblem growing(store, &forces, whole, 1.0, ForceProblem::Growth::kWithin);
+  Causes grown;
+  if (found.size() != 1 && growing.ExplainConstant(whole, &grown) && growing.is_exact() &&
+      (found.empty() || grown.size() < found.size()))
+    found = grown;
+  if (!found.empty() && (!is_exact || found.size() < causes.size())) return found;
   if (!is_explained) problem.ExplainChanging(whole, &causes);
   return causes;
 }

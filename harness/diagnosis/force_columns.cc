@@ -14,6 +14,7 @@ using namespace force_fault;
 
 constexpr double kFarthest = 10.0;  // rad or m: where springs relax
 constexpr double kStill = 1e-3;     // rad or m
+constexpr double kHidden = 0.1;     // by so much of the reach a centre of mass may be off along an axis
 
 /// I a by the six entries Ixx, Iyy, Izz, Ixy, Ixz, Iyz of I.
 Eigen::Matrix<double, 3, 6> InertiaTimes(const Vector3d& a) {
@@ -227,7 +228,13 @@ void StepForces::AddBody(const std::string& place, const MassProperties& body, c
   Matrix6Xd com(6, 9), payload(6, 10);
   com << -wrench.first_moment * body.mass, -wrench.inertia;
   add(Next(candidates, kCenterAlone, place, "m", 0.0, VectorXd::Ones(3)), com.leftCols<3>());
-  add(Next(candidates, kCenter, place, "m", 0.0, Moved()), com);
+  Candidate& center = Next(candidates, kCenter, place, "m", 0.0, Moved());
+  // By d it changes the inertia by m (d^T d 1 - d d^T), of which not all of d need show.
+  center.is_possible = [m = body.mass, hidden = kHidden * reach_](const VectorXd& a) {
+    const double d = a.head<3>().norm() + hidden;
+    return a.tail<6>().norm() <= 2.0 * m * d * d;
+  };
+  add(center, com);
   if (link == nullptr) return;
   payload << -wrench.mass, -wrench.first_moment, -wrench.inertia;
   Candidate& load = Next(candidates, "payload", place, "kg", 0.0, Masses(10));

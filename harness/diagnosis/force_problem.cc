@@ -22,7 +22,19 @@ constexpr double kLeastFraction = 0.99;
 // and to what columns are known to; found anew so often.
 constexpr double kOfLeft = 5.0, kRounding = 1e-4, kExact = 1e-7;
 constexpr int kMostLevels = 4;
-constexpr Index kMostSteps = 20;  // that are looked at
+constexpr Index kMostSteps = 20;      // that are looked at
+constexpr Index kMostGrowing = 1000;  // pushes that grow, from all times that are tried
+
+/// An explanation of all steps is one of those from that time on, s.
+void SetBegin(const StepStore& store, const Segment& all, double since, Explanation* one) {
+  const auto time = store.Get(StepStore::kTime);
+  const auto first = std::find_if(all.begin(), all.end() - 1, [&](Index i) { return time(0, i) > since; });
+  const Explanation later = StartExplanation(store, one->channel, Segment(first, all.end()));
+  one->from = later.from, one->unseen_before = later.unseen_before;
+}
+
+/// What a push that grows is told by.
+std::string NameGrowing(const Candidate& push) { return push.place + push.fault + kGrows; }
 
 /// What pushes as it is, whatever moves.
 bool IsPush(const Candidate& one) {
@@ -31,8 +43,9 @@ bool IsPush(const Candidate& one) {
 
 }  // namespace
 
-ForceProblem::ForceProblem(const StepStore& store, StepForces* forces, const Segment& segment, double level)
-    : store_(store), forces_(forces), is_faint_(level < 1.0) {
+ForceProblem::ForceProblem(const StepStore& store, StepForces* forces, const Segment& segment, double level,
+                           Growth growth)
+    : store_(store), forces_(forces), growth_(growth), is_faint_(level < 1.0) {
   const auto count = static_cast<Index>(segment.size());
   steps_ = std::min(count, kMostSteps);
   for (Index i = 0; i < steps_; ++i)
@@ -61,7 +74,8 @@ bool ForceProblem::ExplainConstant(const Segment& segment, Causes* causes) {
   terms_ = {};
   is_exact_ = LeavesRounding(y_);
   if (!known_.amplitudes.empty() && CalcLeft(y_) <= 1.0) return true;
-  const CauseSelection selection = Select();
+  CauseSelection selection = Select();
+  if (growth_ == Growth::kWithin && NarrowGrowing(selection)) selection = Select();
   if (!IsExplained(selection.fraction, selection.left)) return false;
   for (const CauseTerm& term : selection.terms) {
     const Candidate& one = candidates_[term.candidate];
@@ -72,13 +86,18 @@ bool ForceProblem::ExplainConstant(const Segment& segment, Causes* causes) {
       terms_.amplitudes.emplace_back(term.candidate, term.amplitude);
     }
   }
-  if (ExplainTorque(segment, terms_.count, selection.terms.size(), causes)) return true;
   if (ExplainJoint(segment, selection, causes)) return true;
   Causes told =
       TellSelection(StartExplanation(store_, CauseChannel::kBalance, segment), selection, candidates_,
                     [&](const Candidate& one, const VectorXd& amplitude, const VectorXd& error) {
                       return MakeForceFault(one, amplitude, error, forces_->model().gravity());
                     });
+  for (size_t i = 0; i < told.size(); ++i) {
+    const CauseTerm& term = selection.terms[i];
+    const Candidate& one = candidates_[term.candidate];
+    if (one.fault.ends_with(kGrows))
+      SetBegin(store_, segment, CalcGrowthBegin(term.amplitude, one.nominal), &told[i]);
+  }
   std::move(told.begin(), told.end(), std::back_inserter(*causes));
   return true;
 }
@@ -119,22 +138,6 @@ void ForceProblem::ExplainChanging(const Segment& segment, Causes* causes) const
     }
   }
   causes->push_back(one);
-}
-
-bool ForceProblem::ExplainTorque(const Segment& segment, Index amplitudes, size_t faults,
-                                 Causes* causes) const {
-  const auto cost = [&](Index parameters, size_t terms) {
-    return static_cast<double>(parameters) * std::log(static_cast<double>(forces_->rows())) +
-           2.0 * static_cast<double>(terms) * std::log(static_cast<double>(candidates_.size()));
-  };
-  if (cost(amplitudes, faults) <= cost(steps_, 1)) return false;
-  for (const Free& torque : FitAll({"torque"})) {
-    const Explanation one = TellFree(segment, torque);
-    if (!IsExplained(one.fraction, CalcLeft(torque.residual))) continue;
-    causes->push_back(one);
-    return true;
-  }
-  return false;
 }
 
 std::vector<ForceProblem::Free> ForceProblem::FitAll(std::initializer_list<const char*> faults) const {
@@ -218,35 +221,55 @@ void ForceProblem::Complete() {
 }
 
 void ForceProblem::AddGrowing() {
-  const auto time = store_.Get(StepStore::kTime);
-  const double slack = store_.size() > 1 ? 2.0 * (time(0, 1) - time(0, 0)) : 0.0;
-  const size_t count = candidates_.size();
-  for (size_t i = 0; i < count; ++i) {
-    if (!IsPush(candidates_[i])) continue;
-    Candidate growing = candidates_[i];
-    const Index width = growing.columns.cols();
-    growing.fault += kGrows;
-    growing.unit += "/s";
-    growing.nominal = store_.last_time();
-    growing.scale = candidates_[i].scale.replicate(2, 1);
-    // It began before the steps of this residual; where it began before all that is kept, it did not show
-    // yet.
-    MatrixXd shows = growing.columns.topRows(forces_->rows());
-    noise_.front().ChangeLevel(level_, Vector2d::Ones(), shows);
-    growing.is_possible = [=, first = time(0, 0) - slack, last = time(0, used_.front()) + slack,
-                           end = growing.nominal](const VectorXd& a) {
-      const double since = CalcGrowthBegin(a, end);
-      const double hidden = (first - since) * (shows * a.head(width)).norm();
-      return since <= last && hidden <= std::sqrt(static_cast<double>(shows.rows()));
-    };
-    growing.columns.conservativeResize(Eigen::NoChange, 2 * width);
-    growing.columns.rightCols(width) = candidates_[i].columns;
-    for (Index k = 0; k < steps_; ++k) {
-      const double since = time(0, used_[static_cast<size_t>(k)]) - growing.nominal;
-      growing.columns.block(k * forces_->rows(), 0, forces_->rows(), width) *= since;
-    }
-    candidates_.push_back(std::move(growing));
+  std::vector<Candidate> pushes;
+  std::copy_if(candidates_.begin(), candidates_.end(), std::back_inserter(pushes), IsPush);
+  if (!growing_.empty())
+    std::erase_if(pushes, [&](const Candidate& one) { return growing_.count(NameGrowing(one)) == 0; });
+  // Of many not each time of their begin is tried.
+  const auto skipped = static_cast<Index>(pushes.size()) * steps_ / kMostGrowing;
+  for (Index first = 0; first + 1 < steps_; first += 1 + skipped) {
+    for (const Candidate& push : pushes) candidates_.push_back(MakeGrowing(push, first, skipped));
+    if (growth_ == Growth::kBefore) break;
   }
+}
+
+bool ForceProblem::NarrowGrowing(const CauseSelection& selection) {
+  for (const CauseTerm& term : selection.terms)
+    if (const Candidate& one = candidates_[term.candidate]; one.fault.ends_with(kGrows))
+      growing_.insert(one.place + one.fault);
+  if (growing_.empty()) return false;
+  level_ = first_level_;
+  Build();
+  Complete();
+  return true;
+}
+
+Candidate ForceProblem::MakeGrowing(const Candidate& push, Index first, Index skipped) const {
+  const auto time = store_.Get(StepStore::kTime);
+  const auto time_of = [&](Index k) { return time(0, used_[static_cast<size_t>(k)]); };
+  const double slack = store_.size() > 1 ? 2.0 * (time(0, 1) - time(0, 0)) : 0.0;
+  const Index rows = forces_->rows(), width = push.columns.cols();
+  Candidate growing = push;
+  growing.fault += kGrows;
+  growing.unit += "/s";
+  growing.nominal = store_.last_time();
+  growing.scale = push.scale.replicate(2, 1);
+  growing.columns = MatrixXd::Zero(rows * steps_, 2 * width);
+  for (Index k = first; k < steps_; ++k) {
+    const auto at = push.columns.middleRows(k * rows, rows);
+    growing.columns.middleRows(k * rows, rows) << (time_of(k) - growing.nominal) * at, at;
+  }
+  // Where it began before all that is kept, it did not show yet.
+  MatrixXd shows = push.columns.middleRows(first * rows, rows);
+  noise_[static_cast<size_t>(first)].ChangeLevel(level_, Vector2d::Ones(), shows);
+  const double earliest = (first > skipped ? time_of(first - 1 - skipped) : time(0, 0)) - slack;
+  growing.is_possible = [=, last = time_of(std::min(first + skipped, steps_ - 1)) + slack,
+                         end = growing.nominal](const VectorXd& a) {
+    const double since = CalcGrowthBegin(a, end);
+    const double hidden = (earliest - since) * (shows * a.head(width)).norm();
+    return since <= last && hidden <= std::sqrt(static_cast<double>(rows));
+  };
+  return growing;
 }
 
 void ForceProblem::NameStuckBearings() {

@@ -3,6 +3,7 @@
 // What a part of the steps leaves of the balances, and what explains it.
 
 #include <initializer_list>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -20,8 +21,11 @@ inline constexpr double kFaint = 0.01;
 /// One residual and what explains it.
 class ForceProblem {
  public:
+  /// What grows: from before these steps on, or from between any two of them.
+  enum class Growth { kBefore, kWithin };
   /// @param level of the noise, in bounds of the checks.
-  ForceProblem(const StepStore& store, StepForces* forces, const Segment& segment, double level = 1.0);
+  ForceProblem(const StepStore& store, StepForces* forces, const Segment& segment, double level = 1.0,
+               Growth growth = Growth::kBefore);
 
   /// Whether the last explanation leaves no more than rounding.
   [[nodiscard]] bool is_exact() const { return is_exact_; }
@@ -43,10 +47,6 @@ class ForceProblem {
 
   /// One force that changes in time, free at each step.
   void ExplainChanging(const Segment& segment, Causes* causes) const;
-
-  /// The torque of one joint, free at each step, where that has fewer amplitudes than so many faults: a range
-  /// that ends, a cable.
-  bool ExplainTorque(const Segment& segment, Eigen::Index amplitudes, size_t faults, Causes* causes) const;
 
  private:
   /// Several faults of one joint may be anything that acts there. So may several of other places, where they
@@ -70,8 +70,13 @@ class ForceProblem {
   void SetLevel(const Vector2d& level);
   /// What is known goes off the residual, and forces at points are added that explain the rest.
   void Complete();
-  /// Of each push another one that grows evenly: by so much a second, and what it is when the run ends.
+  /// Of each push others that grow evenly: by so much a second, and what it is when the run ends.
   void AddGrowing();
+  /// Only those that were selected, from each time on. @returns whether there are any.
+  bool NarrowGrowing(const CauseSelection& selection);
+  /// One that begins between the step of the residual before this one and this one, or, where it stands for
+  /// others, so many further away.
+  [[nodiscard]] Candidate MakeGrowing(const Candidate& push, Eigen::Index first, Eigen::Index skipped) const;
   /// A joint that does not slide shows how much friction holds it, and not how much could.
   void NameStuckBearings();
   /// Root mean square of the robot's and the object's rows, without what the platform may leave.
@@ -87,7 +92,9 @@ class ForceProblem {
 
   const StepStore& store_;
   StepForces* forces_;
-  bool is_faint_;  // whether the checks of the balances hold
+  Growth growth_;
+  std::set<std::string> growing_;  // that are tried; empty for all
+  bool is_faint_;                  // whether the checks of the balances hold
   bool is_exact_ = false;
   std::vector<Candidate> candidates_;
   VectorXd whole_y_, y_;            // without known faults, too

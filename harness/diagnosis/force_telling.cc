@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <initializer_list>
 #include <limits>
 #include <utility>
 
@@ -123,8 +122,8 @@ namespace {
 /// A step that differs.
 struct DifferingStep {
   Index index;
-  bool follows;             // the one before
-  double jump[2], bend[2];  // first and second difference of the robot's and the object's residual
+  bool follows;    // the one before
+  double jump[2];  // of the robot's and the object's residual
 };
 
 /// Of each step's rows, the root mean square of the robot's and of the object's.
@@ -136,34 +135,28 @@ void CalcSizes(const VectorXd& y, double (&sizes)[2]) {
 
 std::vector<DifferingStep> ListDiffering(const StepStore& store, StepForces* forces) {
   std::vector<DifferingStep> steps;
-  VectorXd before, before_that;
+  VectorXd before;
   for (Index i = 0; i < store.size(); ++i) {
     if (!(store.Get(StepStore::kNoise)(0, i) > 0.0)) continue;
     forces->SetStep(i);
     const VectorXd y = forces->CalcResidual();
     if (forces->Differs(y)) {
       const bool follows = !steps.empty() && steps.back().index == i - 1;
-      const bool both_follow = follows && steps.back().follows;
-      steps.push_back({i, follows, {}, {}});
+      steps.push_back({i, follows, {}});
       if (follows) CalcSizes(y - before, steps.back().jump);
-      if (both_follow) CalcSizes(y - 2.0 * before + before_that, steps.back().bend);
     }
-    before_that = std::exchange(before, y);
+    before = y;
   }
   return steps;
 }
 
 /// Whether something begins or ends at step k, which its neighbours do not have.
-bool StandsOut(const std::vector<DifferingStep>& steps, size_t k, double (DifferingStep::*sizes)[2],
-               std::initializer_list<std::ptrdiff_t> neighbours) {
+bool Jumps(const std::vector<DifferingStep>& steps, size_t k) {
+  if (!steps[k].follows) return true;
   for (const int side : {0, 1}) {
-    double around = 0.0;
-    for (const std::ptrdiff_t by : neighbours) {
-      const std::ptrdiff_t other = static_cast<std::ptrdiff_t>(k) + by;
-      if (other >= 0 && other < static_cast<std::ptrdiff_t>(steps.size()))
-        around = std::max(around, (steps[static_cast<size_t>(other)].*sizes)[side]);
-    }
-    if ((steps[k].*sizes)[side] > std::max(kJumpNoise, kJump * around)) return true;
+    const double before = k > 0 ? steps[k - 1].jump[side] : 0.0;
+    const double after = k + 1 < steps.size() ? steps[k + 1].jump[side] : 0.0;
+    if (steps[k].jump[side] > std::max({kJumpNoise, kJump * before, kJump * after})) return true;
   }
   return false;
 }
@@ -171,20 +164,13 @@ bool StandsOut(const std::vector<DifferingStep>& steps, size_t k, double (Differ
 }  // namespace
 
 void FindSegments(const StepStore& store, StepForces* forces, double level, Segment* whole,
-                  std::vector<Segment>* parts, std::vector<Segment>* bent) {
+                  std::vector<Segment>* parts) {
   forces->SetLevel(Vector2d::Constant(level));
   const std::vector<DifferingStep> steps = ListDiffering(store, forces);
-  bool was_bent = false;
   for (size_t k = 0; k < steps.size(); ++k) {
-    const bool jumps = !steps[k].follows || StandsOut(steps, k, &DifferingStep::jump, {-1, 1});
-    // What begins to grow between two steps bends both.
-    const bool bends = !was_bent && StandsOut(steps, k, &DifferingStep::bend, {-2, -1, 2, 3});
-    was_bent = jumps || bends;
-    if (jumps) parts->emplace_back();
-    if (was_bent) bent->emplace_back();
+    if (Jumps(steps, k)) parts->emplace_back();
     whole->push_back(steps[k].index);
     parts->back().push_back(steps[k].index);
-    bent->back().push_back(steps[k].index);
   }
 }
 

@@ -19,9 +19,9 @@ Fault MakeForceFault(const Candidate& candidate, const VectorXd& a, const Vector
 /// Steps of a store that differ.
 using Segment = std::vector<Eigen::Index>;
 
-/// All steps that differ, the same in parts that begin or end with a jump, and in those that begin or end
-/// with a jump or a bend. @param level of the noise, in bounds of the checks.
+/// All steps that differ, and the same in parts that begin or end with a jump. @param level of the noise, in
+/// bounds of the checks.
 void FindSegments(const StepStore& store, StepForces* forces, double level, Segment* whole,
-                  std::vector<Segment>* parts, std::vector<Segment>* bent);
+                  std::vector<Segment>* parts);
 
 }  // namespace dexcheck

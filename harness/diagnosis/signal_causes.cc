@@ -26,6 +26,15 @@ struct CommonFault {
 
 double CalcRms(const VectorXd& x) { return x.norm() / std::sqrt(static_cast<double>(x.size())); }
 
+/// What remembers is not known where the steps before are not: there it is as it should be.
+void Ignore(const Fault& fault, const VectorXd& right, const SignalSeries& series, VectorXd* signal) {
+  const bool remembers = fault.fault == "delay" || fault.fault == "lag";
+  if (!remembers || std::count(series.has_history.begin(), series.has_history.end(), true) < kFewestSteps)
+    return;
+  for (Index i = 0; i < signal->size(); ++i)
+    if (!series.has_history[static_cast<size_t>(i)]) (*signal)[i] = right[i];
+}
+
 /// The series of one that has this fault after whatever else it has: that is expected then.
 SignalSeries ExpectFault(const SignalSeries& series, const CommonFault& common) {
   SignalSeries after = series;
@@ -34,6 +43,7 @@ SignalSeries ExpectFault(const SignalSeries& series, const CommonFault& common) 
   Fault off = common.fault;
   off.value += off.error;
   after.noise = std::max(series.noise, CalcRms(Transmit(off, series, common.begin) - after.expected));
+  Ignore(common.fault, series.got, series, &after.expected);
   return after;
 }
 
@@ -68,6 +78,7 @@ std::optional<SignalSeries> UndoFault(const SignalSeries& series, const CommonFa
   const double magnified = sent.norm() / std::max(series.got.norm(), std::numeric_limits<double>::min());
   before.noise = std::max(series.noise * std::max(1.0, magnified),
                           CalcRms((off - sent).tail(sent.size() - common.begin)));
+  Ignore(fault, series.expected, series, &sent);
   before.got = sent;
   return before;
 }

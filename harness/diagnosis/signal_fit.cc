@@ -83,11 +83,11 @@ SignalFit MakeFit(const SignalSeries& series, const SignalSteps& steps, const Si
     return 0.0;
   };
   const double decay = find("lag");
-  // A drift that began since the step before has come so far at the first.
+  // A drift that began since the step before, of which many may be missing, has come so far at the first.
+  const double unseen = steps.first > 0 ? series.time[steps.first] - series.time[steps.first - 1] : time_step;
   const auto has_come_to = [&](const char* fault, const char* drift) {
     const double since = find(fault) / find(drift);
-    return since > 0.0 && std::isfinite(since) &&
-           (steps.was_before || since <= (1.0 + kSinceStep) * time_step);
+    return since > 0.0 && std::isfinite(since) && (steps.was_before || since <= (1.0 + kSinceStep) * unseen);
   };
   const bool drifts_to_offset = has_come_to("offset", "drift");
   const bool drifts_to_gain = has_come_to("gain", "drift of the gain");

@@ -144,8 +144,8 @@ class ShapeList {
   void AddPlay() {
     const ArrayXd off = got_ - u_;
     const double half = off.abs().maxCoeff();
-    constexpr double kBothSides = 0.9;
-    if (series_.name.group != "joint positions" || off.maxCoeff() < kBothSides * half ||
+    constexpr double kBothSides = 0.9, kMost = 0.1;  // rad or m, of any gear's play
+    if (series_.name.group != "joint positions" || half > kMost || off.maxCoeff() < kBothSides * half ||
         -off.minCoeff() < kBothSides * half)
       return;
     Add("play", series_.name.unit, half, false);

@@ -35,8 +35,8 @@ struct Parts {
   size_t carried = PartNamed("acceleration without the null space");
   size_t M = PartNamed("mass matrix M_bar'");
   size_t C = PartNamed("Coriolis forces C_bar'");
-  size_t gravity = PartNamed("gravity in F_bar'");
-  size_t friction = PartNamed("friction in F_bar'");
+  size_t gravity = PartNamed("gravity");
+  size_t friction = PartNamed("friction");
   size_t F = PartNamed("gravity and friction F_bar'");
   size_t M_o = PartNamed("object's inertia M_o");
   size_t C_o = PartNamed("object's C_o");

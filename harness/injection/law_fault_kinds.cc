@@ -121,9 +121,7 @@ InjectedFault PartOfF(const FaultContext& context, const std::string& name,
                       const VectorXd& (*get)(const ModelTerms&)) {
   const Place place = DrawPlace(context);
   const double factor = DrawFactor(context);
-  InjectedFault one = LawFaultAt(
-      place, (IsOfJoints(context.setup) ? name : name + " in F_bar'") + " (F_bar' (" + name + ")), factor",
-      factor, 1.0);
+  InjectedFault one = LawFaultAt(place, name + " (F_bar' (" + name + ")), factor", factor, 1.0);
   one.controller = [=](const Setup& setup, std::unique_ptr<Controller> right, const IsOn& is_on) {
     return std::make_unique<ChangedLaw>(
         std::move(right), is_on,

@@ -54,6 +54,8 @@ class RunCampaign {
               const RunMutationOptions& options, const std::function<bool()>& should_stop);
 
   [[nodiscard]] const std::vector<RunMutant>& mutants() const { return mutants_; }
+  /// How long each fault is looked at, s.
+  [[nodiscard]] double duration() const { return options_.duration; }
   /// Makes the fault and looks what comes of it. @param should_stop asked before each step; what was
   /// stopped is not done.
   /// @returns whether it is done.

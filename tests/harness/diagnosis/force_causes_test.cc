@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <functional>
 
 #include "harness/diagnosis/run_causes.h"
@@ -85,6 +86,24 @@ TEST(ForceCauses, StepOfOneTorqueIsNotTheSumOfTwo) {
   ASSERT_EQ(causes.size(), 2U);
   EXPECT_NEAR(causes[0].faults.front().value, 0.3, 1e-6);
   EXPECT_NEAR(causes[1].faults.front().value, 0.9, 1e-6);
+}
+
+// Most steps between two that are kept are not known, and it may begin there.
+TEST(ForceCauses, WhatGrowsSinceALaterTimeIsNamedBesideWhatIsThereAllTheTime) {
+  constexpr int kEvery = 4;
+  constexpr double kTimeStep = 1e-3, kRate = 2.5, kSince = 13.4;  // s, N m/s, in looked at steps
+  const auto grow = [](int k) { return kRate * kEvery * kTimeStep * std::max(0.0, k - kSince); };
+  const Causes causes =
+      Explain(200, kEvery, 24, [&](int k) -> VectorXd { return Torque(1, 0.7) + Torque(3, grow(k)); });
+  EXPECT_EQ(causes.size(), 2U);
+  ExpectTorque(causes, "joint panda_joint2", 0.7);
+  const Explanation* const grows = FindPlace(causes, "joint panda_joint4");
+  const Explanation* const always = FindPlace(causes, "joint panda_joint2");
+  ASSERT_TRUE(grows != nullptr && always != nullptr) << TellCauses(causes, CauseChannel::kBalance);
+  EXPECT_EQ(grows->outcome, CauseOutcome::kNamed) << grows->Tell();
+  EXPECT_EQ(grows->faults.front().fault, "torque that grows by");
+  EXPECT_NEAR(grows->faults.front().value, kRate, 1e-3 * kRate);
+  EXPECT_GT(grows->from, always->from);
 }
 
 // A joint that rests shows a spring's torque, and nothing of its stiffness.

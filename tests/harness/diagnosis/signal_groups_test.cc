@@ -45,6 +45,12 @@ TEST_P(MotorBesideAll, BothAreNamed) {
 ArrayXd Delay(const ArrayXd& u, Index steps) {
   return MakeEach([&](Index i) { return Back(u, i, steps); });
 }
+/// What was sent before the first step is not known.
+ArrayXd DelayUnknown(const ArrayXd& u, Index steps) {
+  ArrayXd late = Delay(u, steps);
+  late.head(steps) += 0.1;
+  return late;
+}
 ArrayXd Round(const ArrayXd& u, double step) { return step * (u / step).round(); }
 
 INSTANTIATE_TEST_SUITE_P(
@@ -59,6 +65,14 @@ INSTANTIATE_TEST_SUITE_P(
                       Beside{"DelayAndGain", OfMotor("delay", 3.0, "steps"), OfMotor("gain", 0.95),
                              [](const ArrayXd& u) { return Delay(u, 3); },
                              [](const ArrayXd& u) { return ArrayXd(0.95 * u); }},
+                      Beside{"DelayAndLateOffset", OfMotor("delay", 3.0, "steps"),
+                             OfMotor("offset", 0.2, "N m"),
+                             [](const ArrayXd& u) { return DelayUnknown(u, 3); },
+                             [](const ArrayXd& u) {
+                               ArrayXd late = u;
+                               late.tail(kSteps / 2) += 0.2;
+                               return late;
+                             }},
                       Beside{"DelayAndLimit", OfMotor("delay", 3.0, "steps"), OfMotor("limit", 1.2, "N m"),
                              [](const ArrayXd& u) { return Delay(u, 3); },
                              [](const ArrayXd& u) { return ArrayXd(u.min(1.2).max(-1.2)); }},
