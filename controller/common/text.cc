@@ -55,6 +55,22 @@ std::string Abbreviate(std::string_view text) {
 
 std::string Quote(std::string_view text) { return '"' + Abbreviate(text) + '"'; }
 
+std::string JoinNames(const std::vector<std::string>& names) {
+  constexpr size_t kMaxShown = 8;
+  std::string text;
+  for (size_t i = 0; i < std::min(names.size(), kMaxShown); ++i) text += (i == 0 ? "" : ", ") + names[i];
+  if (names.size() > kMaxShown) text += " and " + std::to_string(names.size() - kMaxShown) + " more";
+  return Abbreviate(text);
+}
+
+std::string QuoteField(const std::string& text) {
+  const bool is_formula = text.find_first_of("=+-@\t\r") == 0;
+  if (!is_formula && text.find_first_of(",\"\n\r") == std::string::npos) return text;
+  std::string quoted = is_formula ? "\"'" : "\"";
+  for (const char c : text) quoted += c == '"' ? std::string("\"\"") : std::string(1, c);
+  return quoted + "\"";
+}
+
 std::string FindNearest(std::string_view word, const std::vector<std::string>& candidates) {
   std::string nearest;
   size_t smallest = word.size() + 1;

@@ -33,6 +33,13 @@ std::string Abbreviate(std::string_view text);
 /// The abbreviated text in double quotes.
 std::string Quote(std::string_view text);
 
+/// "a, b, c" on one line: the first few names, and how many more.
+std::string JoinNames(const std::vector<std::string>& names);
+
+/// A value of a table of comma-separated ones: in quotes where a comma, a quote or a line's end needs them.
+/// One that a spreadsheet would take for a formula gets an apostrophe, which makes it a text there.
+std::string QuoteField(const std::string& text);
+
 /// The candidate closest to a misspelt word by edit distance; empty when none is close (a third of the
 /// letters).
 std::string FindNearest(std::string_view word, const std::vector<std::string>& candidates);

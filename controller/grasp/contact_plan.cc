@@ -7,9 +7,8 @@
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
 #include "controller/grasp/finger_placement.h"
+#include "controller/grasp/grasp_search.h"
 #include "controller/grasp/hand_reach.h"
-#include "controller/grasp/palm_search.h"
-#include "controller/grasp/touch_choice.h"
 #include "controller/object/so3.h"
 
 namespace dexcheck {

@@ -4,7 +4,6 @@
 
 #include "controller/common/text.h"
 #include "controller/common/toml_reader.h"
-#include "controller/model/body_reader.h"
 #include "controller/model/segment_reader.h"
 
 namespace dexcheck {

@@ -1,6 +1,6 @@
 #pragma once
 
-// A run of joints as it stands in a parameter file, in a chain or in a template: names without prefix.
+// Poses, shapes and mass properties as they stand in a parameter file. All throw InputError.
 
 #include <map>
 #include <optional>
@@ -8,10 +8,36 @@
 #include <vector>
 
 #include "controller/common/toml_reader.h"
+#include "controller/common/types.h"
 #include "controller/model/parameter_reader.h"
+#include "controller/model/rigid_body.h"
 #include "controller/model/robot_model.h"
 
 namespace dexcheck {
+
+/// Pose from the keys xyz (m) and rpy or rpy_deg, both optional: R = Rz(yaw) Ry(pitch) Rx(roll).
+Pose ReadPose(TomlTable& table);
+
+/// Pose from a table of its own.
+Pose ReadPose(const TomlValue& value);
+
+/// Shape from the key `shape` and the dimensions that belong to it, m.
+Shape ReadShape(TomlTable& table);
+
+/// Inertia about the centre of mass from a list [Ixx, Iyy, Izz, Ixy, Ixz, Iyz] of tensor entries, kg m^2.
+Matrix3d ReadInertia(const TomlValue& value);
+
+/// Unit vector from "x", "y", "z" or a list of three numbers.
+Vector3d ReadAxis(const TomlValue& value);
+
+/// Mass properties from the key `shapes`, or from `bodies` with a frame each, or from `mass`, `com` and
+/// `inertia`; physically consistent.
+MassProperties ReadBody(TomlTable& table);
+
+/// Throws at `value` when the body cannot be real.
+void CheckBody(const TomlValue& value, const MassProperties& body);
+
+// A run of joints as it stands in a parameter file, in a chain or in a template: names without prefix.
 
 /// A row of a table of joints, with the names of the joint and of the link that it moves. It is a row of MDH
 /// parameters, of classic Denavit-Hartenberg parameters, or a plain transform with an axis. A ball joint's

@@ -5,8 +5,7 @@
 #include <vector>
 
 #include "controller/common/text.h"
-#include "controller/model/body_frame.h"
-#include "controller/model/body_reader.h"
+#include "controller/model/rigid_body.h"
 #include "controller/model/segment_reader.h"
 
 namespace dexcheck {

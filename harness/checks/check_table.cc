@@ -2,9 +2,6 @@
 
 #include <algorithm>
 
-#include "harness/checks/judges.h"
-#include "harness/checks/step_analysis.h"
-
 namespace dexcheck {
 namespace {
 
@@ -29,7 +26,7 @@ namespace {
 //
 // The prediction differs from the engine's motion by r_ddot and v_dot, which die out under a constant force,
 // and by what tilt leaves. What they come to is computed at each step, from the engine's own A = J M^-1 J^T
-// and R and from how the forces change (contact_compliance.h, contact_softness.h), and taken off above the
+// and R and from how the forces change (contact_compliance.h), and taken off above the
 // bound.
 
 /// f_t / m up to which a fingertip may creep, m/s^2: 10 N on a phalanx of 50 g. `hold` has 6, `two-hands`

@@ -12,6 +12,7 @@
 
 #include "harness/base/check_record.h"
 #include "harness/checks/failure_cause.h"
+#include "harness/checks/step_analysis.h"
 #include "harness/scenario/scenario.h"
 
 namespace dexcheck {
@@ -149,5 +150,27 @@ inline constexpr double kLawTorqueBound = 1e-12;
 inline constexpr double kGraspNullBound = 1e-9;
 // Slope of the grasp-force objective, relative: ten times the tolerance of the solver's slacks, 1e-5.
 inline constexpr double kGraspOptimalityBound = 1e-4;
+
+// Values of checks that take more than a line (check_table.cc).
+
+/// What is left of (48), less what tilt, slip and sinking of the platform can make of it, relative.
+Evaluation EvaluateRobotDynamics(const StepAnalysis& step);
+/// A wheel's rim against the platform above it, (1), m/s.
+Evaluation EvaluateRolling(const StepAnalysis& step);
+/// Of a fingertip that touches: the plant's distance less that of the declared shapes, m.
+Evaluation EvaluateContactDistance(const StepAnalysis& step);
+/// Of a hemispherical fingertip, m.
+Evaluation EvaluateRim(const StepAnalysis& step);
+std::string DescribeFoot(const StepAnalysis& step, int part);
+std::string DescribeFingertip(const StepAnalysis& step, int part);
+/// How far a joint is beyond its range, rad or m.
+Evaluation EvaluateJointLimit(const StepAnalysis& step);
+std::string DescribeJoint(const StepAnalysis& step, int part);
+/// "r_palm and bench", of the step's largest force between bodies.
+std::string DescribeCollision(const StepAnalysis& step, int part);
+/// Movement of joints that do not carry the object, since the beginning, rad.
+std::unique_ptr<StatefulJudge> MakeIdleJointsJudge(const Setup& setup);
+/// kappa integrated by (40) from how fingertip and object moved, against where the contacts are, m.
+std::unique_ptr<StatefulJudge> MakeKappaJudge(const Setup& setup);
 
 }  // namespace dexcheck

@@ -2,11 +2,13 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 
 #include "controller/common/errors.h"
 #include "harness/descriptions/engine_provider.h"
 
 namespace dexcheck {
+
 namespace {
 
 /// Compares at all states; constants are the caller's.
@@ -89,6 +91,34 @@ std::optional<BaseConvention> FindOtherConvention(const RobotModel& model, Dynam
   }
   provider->set_convention(spoken);
   return found;
+}
+
+namespace {
+
+constexpr int kMostDigits = 16;
+
+}  // namespace
+
+int CountDigits(double error) {
+  for (int digits = kMostDigits; digits > 0; --digits) {
+    if (error <= std::pow(10.0, -digits)) return digits;
+  }
+  return 0;
+}
+
+int CountDigits(const ConsistencyResult& result) {
+  int digits = kMostDigits;
+  for (const std::vector<CheckRecord>* records : {&result.constants.records, &result.terms}) {
+    for (const CheckRecord& record : *records) {
+      if (record.failed) digits = std::min(digits, CountDigits(record.worst));
+    }
+  }
+  return digits;
+}
+
+void JudgeByTolerance(double tolerance, ConsistencyResult* result) {
+  JudgeByTolerance(tolerance, &result->constants);
+  JudgeByTolerance(tolerance, &result->terms);
 }
 
 }  // namespace dexcheck

@@ -1,7 +1,5 @@
 #pragma once
 
-// The contact equations (22)-(40) against the engine's motion of the two bodies that touch.
-
 #include <functional>
 #include <memory>
 
@@ -9,10 +7,19 @@
 #include "controller/contact/grasp_map.h"
 #include "controller/contact/shapes.h"
 #include "harness/checks/term_comparison.h"
+#include "harness/checks/term_table.h"
 #include "harness/descriptions/engine_provider.h"
 #include "harness/descriptions/random_states.h"
 
 namespace dexcheck {
+
+/// Evaluates the contact of one of the compared frames by the engine: its narrow phase and the motion of the
+/// two bodies that touch, and what of the model's values follows from the contact alone.
+/// @param contact by the model. @param shift carries the projected robot to where the plant has it.
+void EvaluateContact(const Contact& contact, const Pose& shift, size_t index, EngineProvider* engine,
+                     ContactValues* model, ScaleContext* scales);
+
+// The contact equations (22)-(40) against the engine's motion of the two bodies that touch.
 
 /// The model's contact equations. Checks of checks put wrong ones in their place.
 struct ContactFormulas {

@@ -1,16 +1,47 @@
 #pragma once
 
-// What soft contacts hold back of a force that changes.
+// How soft the engine's contacts are, from the engine's own numbers.
 
 #include <functional>
 
 #include "controller/common/types.h"
+#include "controller/model/robot_model.h"
 #include "harness/checks/declared_plant.h"
 #include "harness/checks/step_record.h"
-#include "harness/engine/contact_softness.h"
+#include "harness/engine/adapter.h"
 #include "harness/scenario/setup.h"
 
 namespace dexcheck {
+
+/// Fractions of a change of forces that soft contacts hold back at first. A smooth force F on the robot and
+/// what it holds causes contact forces (A + R) f = -J M^-1 F + ... with A = J M^-1 J^T and the engine's R,
+/// where rigid contacts have R = 0. In |.|_M the accelerations differ by the matrix (1 + J^T R^-1 J)^-1 on
+/// the range of J^T (M = 1 in that metric), whose largest eigenvalue is
+///
+///   fraction = 1 / (1 + s),   s the smallest eigenvalue of R^-1/2 A R^-1/2 that is not zero:
+///
+/// directions that contacts hold twice have zeros there, and nothing moves along them.
+struct ContactSoftness {
+  double fraction = 0.0;             ///< Of all rows of all contacts.
+  double tangential_fraction = 0.0;  ///< Of the rows along the tangents, the others taken as rigid.
+  /// Likewise of the object's contacts alone.
+  double object_fraction = 0.0, object_tangential_fraction = 0.0;
+};
+
+/// Where robot and object stand. Contacts that are open by less than 0.1 mm count as closed.
+/// @param adapter of an engine whose contacts have constant impedances. @param q q' (p').
+ContactSoftness FindContactSoftness(const Adapter& adapter, const Eigen::Ref<const VectorXd>& q,
+                                    const Pose& X_Bo);
+
+// How wheels of a differential drive roll: r thetadot = v +- w b / 2, the right one with +, (1).
+
+/// [v; w], m/s and rad/s, of a platform that rolls. @param xi starts with the base's velocity.
+Vector2d CalcRollingTwist(const Base& base, const VectorXd& xi);
+
+/// v +- w b / 2 - r thetadot of the right and the left wheel, m/s. @param rates thetadot, rad/s.
+Vector2d CalcRollingMismatch(const Base& base, const VectorXd& xi, const Vector2d& rates);
+
+// What soft contacts hold back of a force that changes.
 
 /// J_dot qvel of the plant's constraints at the fingertips (3N), m/s^2, each in its Sigma_cf: the model's
 /// slip_bias(), and the w x v of object and platform, which the model's rates of velocities that turn along

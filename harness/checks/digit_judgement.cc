@@ -1,5 +1,3 @@
-#include "harness/checks/digit_judgement.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -9,9 +7,10 @@
 #include <utility>
 
 #include "controller/common/errors.h"
+#include "controller/common/text.h"
+#include "harness/checks/file_comparison.h"
 #include "harness/descriptions/description_match.h"
-#include "harness/descriptions/join_names.h"
-#include "harness/descriptions/own_rows.h"
+#include "harness/descriptions/fault_search.h"
 
 namespace dexcheck {
 namespace {

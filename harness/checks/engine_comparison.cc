@@ -5,21 +5,18 @@
 
 #include <algorithm>
 #include <fstream>
-#include <optional>
 #include <utility>
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
-#include "controller/model/body_frame.h"
+#include "controller/model/rigid_body.h"
 #include "harness/base/console.h"
 #include "harness/base/files.h"
-#include "harness/checks/engine_settings.h"
 #include "harness/descriptions/constant_checks.h"
 #include "harness/descriptions/description_match.h"
+#include "harness/descriptions/description_writer.h"
 #include "harness/descriptions/engine_provider.h"
-#include "harness/descriptions/join_names.h"
 #include "harness/descriptions/mjcf_reader.h"
-#include "harness/descriptions/mjcf_writer.h"
 
 namespace dexcheck {
 namespace {

@@ -1,8 +1,7 @@
-#include "harness/checks/engine_settings.h"
-
 #include <utility>
 
 #include "controller/common/errors.h"
+#include "harness/checks/engine_comparison.h"
 
 namespace dexcheck {
 namespace {

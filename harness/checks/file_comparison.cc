@@ -8,14 +8,13 @@
 #include <utility>
 
 #include "controller/common/errors.h"
-#include "harness/checks/tolerance.h"
+#include "controller/common/text.h"
 #include "harness/descriptions/compiled_inertias.h"
 #include "harness/descriptions/description_match.h"
 #include "harness/descriptions/engine_extras.h"
 #include "harness/descriptions/engine_provider.h"
-#include "harness/descriptions/join_names.h"
+#include "harness/descriptions/fault_search.h"
 #include "harness/descriptions/mjcf_reader.h"
-#include "harness/descriptions/own_rows.h"
 #include "harness/descriptions/read_description.h"
 #include "harness/descriptions/result_files.h"
 #include "harness/engine/engine.h"

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <complex>
 
+#include "controller/control/joint_controller.h"
 #include "harness/checks/check_table.h"
 #include "harness/checks/rounding_scales.h"
 
@@ -55,6 +56,188 @@ double JudgedLaw::CompareTorque(const StepRecord& step, const LawTerms& terms) {
   own_factor_.Compute(terms.M);
   if (!Evaluate(step, terms)) return std::numeric_limits<double>::infinity();
   return CalcTorqueError(step, terms, own_factor_);
+}
+
+// The law of a robot that holds nothing and follows a motion of its joints.
+
+namespace {
+
+class JudgedJointLaw final : public JudgedLaw {
+ public:
+  explicit JudgedJointLaw(const Setup& setup)
+      : JudgedLaw(setup),
+        law_(setup.scenario().control.law),
+        gains_(setup.joints()->gains),
+        motion_(&setup.joints()->motion) {
+    if (stands_) ground_.emplace(setup.model(), setup.feet(), gains_.stance->height);
+    for (VectorXd* vector :
+         {&force_, &demand_, &true_demand_, &commanded_force_, &coulomb_, &viscous_, &position_error_})
+      vector->setZero(setup.model().num_velocities());
+    // Of the other laws the gain of a joint is the feedback in its torque.
+    if (law_ != ControlLaw::kComputedTorque) return;
+    for (const char* gain : {"K_v", "K_p"})
+      for (int i = 0; i < setup.model().num_velocities(); ++i) {
+        const int dof = i - setup.model().num_base_velocities();
+        gain_names_.push_back(std::string(gain) + " of " + (dof < 0 ? "base" : setup.model().dof_name(dof)));
+      }
+  }
+
+  [[nodiscard]] std::optional<double> CalcSpectralRadius() const override {
+    if (law_ != ControlLaw::kComputedTorque) return std::nullopt;
+    double radius = 0.0;
+    for (Eigen::Index i = 0; i < gains_.K_p.size(); ++i) {
+      ObjectGains one;
+      one.K_p.setConstant(gains_.K_p[i]);
+      one.K_v.setConstant(gains_.K_v[i]);
+      radius = std::max(radius, CalcSampledRadius(one, time_step_, hold_, velocity_age_));
+    }
+    return radius;
+  }
+  [[nodiscard]] bool IsComputed(const Command& command) const override { return command.computes_joints; }
+
+  const LawErrors& Compare(const StepRecord& step, const LawTerms& terms, const StepAnalysis& plant,
+                           bool as_commanded) override {
+    errors_ = LawErrors{};
+    errors_.torque = CompareTorque(step, terms);
+    if (!follows_error()) return errors_;
+    const VectorXd* predicted = &plant.findings.xi_dot_model;
+    if (!as_commanded || compensates()) {
+      actuation_.CalcForce(step.command.tau, commanded_force_);
+      // The rigid robot has no friction that this would compensate.
+      commanded_force_ -= coulomb_ + viscous_;
+      predicted = &commanded_.PredictFree(step.model->robot(), commanded_force_).xi_dot;
+    }
+    FollowError(step, plant.declared->is_ideal ? predicted : nullptr);
+    return errors_;
+  }
+
+  [[nodiscard]] int CountParts() const override { return kPartCount; }
+  [[nodiscard]] std::span<const LawPartName> ListParts() const override { return kParts; }
+
+ protected:
+  bool Evaluate(const StepRecord& step, const LawTerms& terms) override {
+    JointDemand::EvaluateDesired(*motion_, step.time, 2.0 * velocity_age_, &desired_, &half_step_);
+    CalcCompensation();
+    CalcPositionError(stands_, desired_.q, terms.q, position_error_);
+    const bool has_forces = EvaluateForce(terms);
+    if (ground_ && step.command.demand.f_c.size() == ground_->J().rows()) {
+      // (F - J^T f)_joints, with an f that has to balance F_b
+      ground_->SetState(step.model->robot());
+      force_.noalias() -= ground_->J().transpose() * step.command.demand.f_c;
+    }
+    return has_forces;
+  }
+  bool EvaluateForce(const LawTerms& terms) {
+    force_ = terms.C_xi + terms.gravity + terms.friction + coulomb_ + viscous_;
+    if (law_ == ControlLaw::kComputedTorque) {
+      // M_bar' (q_d_ddot + K_v e_dot + K_p e) + C_bar' q_dot + F_bar' + tau_f
+      demand_ = desired_.q_ddot + gains_.K_v.cwiseProduct(desired_.q_dot - terms.xi) +
+                gains_.K_p.cwiseProduct(position_error_);
+      force_.noalias() += terms.M * demand_;
+      return true;
+    }
+    // K e + D e_dot + g + tau_f [+ M_bar' q_d_ddot + C_bar' q_d_dot + friction]
+    if (law_ == ControlLaw::kPdGravity) {
+      force_ = terms.gravity + coulomb_ + viscous_;
+    } else {
+      force_.noalias() += terms.M * desired_.q_ddot;
+      force_.noalias() += *terms.C * (desired_.q_dot - terms.xi);
+    }
+    force_ += gains_.K.cwiseProduct(position_error_);
+    force_ += gains_.D.cwiseProduct(desired_.q_dot - terms.xi);
+    return true;
+  }
+  [[nodiscard]] const VectorXd& force() const override { return force_; }
+  /// What the law sends may be much more than what it balances, and is rounded as that.
+  [[nodiscard]] double CalcScale(double balanced) override { return std::max(balanced, Norm(force_)); }
+  void CalcParts(const StepRecord& /*step*/, const LawTerms& terms) override {
+    const bool computed = law_ == ControlLaw::kComputedTorque;
+    const bool moves = law_ != ControlLaw::kPdGravity;
+    const VectorXd& D = computed ? gains_.K_v : gains_.D;
+    const VectorXd& K = computed ? gains_.K_p : gains_.K;
+    const VectorXd rate = D.cwiseProduct(desired_.q_dot - terms.xi);
+    const VectorXd position = K.cwiseProduct(position_error_);
+    parts_.setZero(terms.xi.size(), CountColumns());
+    if (moves) parts_.col(0) = terms.M * desired_.q_ddot;
+    parts_.col(1) = computed ? VectorXd(terms.M * rate) : rate;
+    parts_.col(2) = computed ? VectorXd(terms.M * position) : position;
+    if (moves) parts_.col(3) = terms.C_xi;
+    if (moves && !computed) parts_.col(3) += *terms.C * (desired_.q_dot - terms.xi);
+    parts_.col(4) = terms.gravity;
+    if (moves) parts_.col(5) = terms.friction;
+    parts_.col(6) = coulomb_;
+    parts_.col(7) = viscous_;
+    if (!computed) return;
+    const Eigen::Index n = rate.size();
+    parts_.middleCols(kPartCount, n) = terms.M * rate.asDiagonal();
+    parts_.rightCols(n) = terms.M * position.asDiagonal();
+  }
+
+ private:
+  static constexpr int kPartCount = 8;
+  static constexpr LawPartName kParts[] = {
+      {"M_bar' q_d_ddot", "feed-forward acceleration", 1U},
+      {"K_v e_dot", "velocity feedback", 2U},
+      {"K_p e", "position feedback", 4U},
+      {"C_bar' q_dot", "Coriolis forces", 8U},
+      {"F_bar' (gravity)", "gravity", 16U},
+      {"F_bar' (friction)", "friction", 32U},
+      {"coulomb tanh(q_d_dot / coulomb_velocity)", "compensation of Coulomb friction", 64U},
+      {"viscous q_d_dot", "compensation of viscous friction", 128U},
+      {"K_v e_dot + K_p e", "feedback of both gains", 6U},
+      {"F_bar'", "gravity and friction", 48U},
+      {"tau_f", "compensation of friction", 192U},
+      {"tau'", "all torques", 255U}};
+
+  [[nodiscard]] bool compensates() const { return gains_.coulomb.size() + gains_.viscous.size() > 0; }
+  void CalcCompensation() {
+    for (Eigen::Index i = 0; i < gains_.coulomb.size(); ++i)
+      coulomb_[i] = gains_.coulomb[i] * std::tanh(desired_.q_dot[i] / gains_.coulomb_velocity);
+    for (Eigen::Index i = 0; i < gains_.viscous.size(); ++i)
+      viscous_[i] = gains_.viscous[i] * desired_.q_dot[i];
+  }
+
+  /// K_v e_dot + K_p e + q_d_ddot.
+  void CalcDemand(const VectorXd& q, const VectorXd& xi, VectorXd* xi_dot) const {
+    *xi_dot = desired_.q_ddot;
+    *xi_dot += gains_.K_v.cwiseProduct(desired_.q_dot - xi);
+    *xi_dot += gains_.K_p.cwiseProduct(desired_.q - q);
+  }
+
+  /// @param predicted xi_dot of the rigid robot; null where the true error's own demand stands for it.
+  void FollowError(const StepRecord& step, const VectorXd* predicted) {
+    const MeasuredState& truth = step.reading.state;
+    if (q_.size() == 0) {
+      q_ = truth.q;
+      xi_ = truth.xi;
+    }
+    errors_.error_dynamics = (q_ - truth.q).cwiseAbs().maxCoeff();
+    CalcDemand(q_, xi_, &demand_);
+    // What the plant's robot did beyond the rigid prediction. Where the controller measures otherwise, its
+    // torques arrive otherwise and the robot is pushed, all of that drives the error as well.
+    demand_ += step.response.xi_dot;
+    if (predicted == nullptr) CalcDemand(truth.q, truth.xi, &true_demand_);
+    demand_ -= predicted != nullptr ? *predicted : true_demand_;
+    // Semi-implicit, as the plant: velocities first.
+    xi_ += time_step_ * demand_;
+    q_ += time_step_ * xi_;
+  }
+
+  ControlLaw law_;
+  JointGains gains_;
+  const JointMotion* motion_;
+  DesiredJoints desired_, half_step_;
+  VectorXd force_, demand_, true_demand_, commanded_force_;  // n
+  VectorXd coulomb_, viscous_;                               // n, what is compensated
+  VectorXd position_error_;                                  // n, q_d - q
+  std::optional<GroundContacts> ground_;                     // of a robot that stands
+  VectorXd q_, xi_;  // where the error dynamics have the joints; empty at first
+};
+
+}  // namespace
+
+std::unique_ptr<JudgedLaw> MakeJointLaw(const Setup& setup) {
+  return std::make_unique<JudgedJointLaw>(setup);
 }
 
 }  // namespace dexcheck

@@ -1,9 +1,9 @@
-#include "harness/checks/make_checks.h"
-
 #include <algorithm>
 #include <initializer_list>
 #include <map>
 #include <set>
+
+#include "harness/checks/run_checks.h"
 
 namespace dexcheck {
 namespace {
@@ -85,9 +85,7 @@ std::map<std::string_view, const char*> ListDescriptions(const Setup& setup) {
         {"reduced_acceleration", "xi_dot of the robot on rigid feet that do not slip, against the engine's"},
         {"contact_force",
          "forces of the feet of that system against the engine's, relative to them and the weight; where "
-         "more feet touch "
-         "than "
-         "hold the robot they are not determined, and 0"},
+         "more feet touch than hold the robot they are not determined, and 0"},
         {"solver", "what the engine's solver left over of its own equations of motion"}};
   }
   if (setup.joints() != nullptr) {

@@ -15,8 +15,8 @@
 #include <ostream>
 #include <string>
 
+#include "harness/checks/consistency.h"
 #include "harness/checks/file_comparison.h"
-#include "harness/checks/tolerance.h"
 
 namespace dexcheck::testing {
 

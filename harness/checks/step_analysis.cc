@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "harness/checks/wheel_rolling.h"
-
 namespace dexcheck {
 namespace {
 

@@ -4,7 +4,7 @@
 
 #include "controller/common/linear_algebra.h"
 #include "controller/object/object_dynamics.h"
-#include "harness/checks/contact_terms.h"
+#include "harness/checks/contact_check.h"
 
 namespace dexcheck {
 namespace {

@@ -10,7 +10,7 @@
 #include "harness/cli/output_file.h"
 #include "harness/cli/run_folder.h"
 #include "harness/cli/terminal.h"
-#include "harness/study/study_page.h"
+#include "harness/study/study_findings.h"
 
 namespace dexcheck::cli {
 namespace {

@@ -9,7 +9,7 @@
 
 #include "controller/common/errors.h"
 #include "harness/base/interrupts.h"
-#include "harness/checks/tolerance.h"
+#include "harness/checks/consistency.h"
 #include "harness/cli/commands.h"
 #include "harness/cli/consistency_report.h"
 #include "harness/cli/output_file.h"

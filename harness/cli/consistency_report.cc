@@ -4,11 +4,10 @@
 
 #include <algorithm>
 #include <map>
-#include <string>
 
 #include "controller/common/text.h"
 #include "harness/base/check_record.h"
-#include "harness/checks/tolerance.h"
+#include "harness/checks/consistency.h"
 #include "harness/cli/junit_file.h"
 #include "harness/cli/terminal.h"
 #include "harness/engine/engine.h"

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "controller/common/errors.h"
+#include "controller/common/text.h"
 #include "harness/base/interrupts.h"
 #include "harness/cli/consistency_report.h"
 #include "harness/cli/json_matrix.h"
@@ -15,7 +16,6 @@
 #include "harness/descriptions/compiled_inertias.h"
 #include "harness/descriptions/description_match.h"
 #include "harness/descriptions/engine_extras.h"
-#include "harness/descriptions/join_names.h"
 #include "harness/descriptions/read_description.h"
 #include "harness/diagnosis/diagnose.h"
 #include "harness/engine/mjcf_file.h"

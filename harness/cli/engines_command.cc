@@ -15,7 +15,6 @@
 #include "harness/cli/junit_file.h"
 #include "harness/cli/output_file.h"
 #include "harness/cli/terminal.h"
-#include "harness/descriptions/join_names.h"
 #include "harness/descriptions/read_description.h"
 
 namespace dexcheck::cli {

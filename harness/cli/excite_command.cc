@@ -17,7 +17,7 @@
 #include "harness/cli/run_folder.h"
 #include "harness/cli/terminal.h"
 #include "harness/descriptions/read_description.h"
-#include "harness/engine/self_contact.h"
+#include "harness/engine/clearance.h"
 #include "harness/recordings/motion_design.h"
 #include "harness/run/excitation.h"
 #include "harness/study/exciting_motion.h"

@@ -9,7 +9,7 @@
 #include "harness/cli/commands.h"
 #include "harness/cli/json_matrix.h"
 #include "harness/cli/output_file.h"
-#include "harness/descriptions/parameter_writer.h"
+#include "harness/descriptions/description_writer.h"
 #include "harness/descriptions/read_description.h"
 #include "harness/engine/engine.h"
 #include "harness/engine/mjcf_passes.h"

@@ -5,13 +5,12 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <tuple>
-#include <vector>
 
+#include "controller/common/text.h"
 #include "controller/dynamics/model_terms.h"
 #include "controller/model/parameter_reader.h"
 #include "harness/base/console.h"
-#include "harness/descriptions/join_names.h"
-#include "harness/descriptions/parameter_writer.h"
+#include "harness/descriptions/description_writer.h"
 
 namespace dexcheck::cli {
 

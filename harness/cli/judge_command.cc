@@ -17,7 +17,6 @@
 #include "harness/recordings/compare_recordings.h"
 #include "harness/recordings/write_corrections.h"
 #include "harness/report/judge_page.h"
-#include "harness/report/judge_replay.h"
 
 namespace dexcheck::cli {
 namespace {

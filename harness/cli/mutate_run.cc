@@ -10,7 +10,7 @@
 #include "harness/cli/output_file.h"
 #include "harness/cli/run_folder.h"
 #include "harness/cli/terminal.h"
-#include "harness/report/campaign_page.h"
+#include "harness/report/page.h"
 #include "harness/run/run_mutation.h"
 
 namespace dexcheck::cli {

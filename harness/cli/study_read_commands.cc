@@ -15,7 +15,6 @@
 #include "harness/cli/output_file.h"
 #include "harness/cli/terminal.h"
 #include "harness/study/study_findings.h"
-#include "harness/study/study_page.h"
 #include "harness/study/study_store.h"
 
 namespace dexcheck::cli {

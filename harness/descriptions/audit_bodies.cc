@@ -166,9 +166,8 @@ class BodyAudit {
     if (largest > kAllowance * body.mass * farthest) {
       Add(AuditLevel::kSuspicious, "inertia", part,
           "has a principal moment of " + Format(largest) +
-              " kg m^2, more than its mass can have within its "
-              "geometry, " +
-              Format(body.mass * farthest) + " kg m^2");
+              " kg m^2, more than its mass can have within its geometry, " + Format(body.mass * farthest) +
+              " kg m^2");
     }
   }
 

@@ -1,5 +1,3 @@
-#include "harness/descriptions/body_table.h"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -9,7 +7,7 @@
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
 #include "harness/descriptions/alike_names.h"
-#include "harness/descriptions/join_names.h"
+#include "harness/descriptions/read_description.h"
 
 namespace dexcheck {
 namespace {

@@ -7,10 +7,10 @@
 #include <limits>
 #include <sstream>
 
-#include "controller/model/body_frame.h"
-#include "harness/descriptions/join_names.h"
+#include "controller/common/text.h"
+#include "controller/model/rigid_body.h"
+#include "harness/descriptions/fault_search.h"
 #include "harness/descriptions/mjcf_reader.h"
-#include "harness/descriptions/own_rows.h"
 #include "harness/engine/engine.h"
 #include "harness/engine/xml.h"
 
@@ -72,8 +72,7 @@ std::optional<std::string> TakeCompiledInertias(const MjcfFile& mjcf, const mjMo
   if (names.empty()) return std::nullopt;
   return fmt::format(
       "inertias: MuJoCo's compiler diagonalises fullinertia and is up to {:.0e} off what the file states: "
-      "that "
-      "difference is the engine's, and terms are with what it made of {}",
+      "that difference is the engine's, and terms are with what it made of {}",
       largest, JoinNames(names));
 }
 

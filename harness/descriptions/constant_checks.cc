@@ -1,12 +1,10 @@
 #include "harness/descriptions/constant_checks.h"
 
-#include <algorithm>
 #include <cmath>
 #include <initializer_list>
 #include <optional>
 #include <utility>
 
-#include "harness/descriptions/constant_comparison.h"
 #include "harness/descriptions/constant_table.h"
 #include "harness/descriptions/description_match.h"
 

@@ -11,7 +11,6 @@
 #include "controller/dynamics/model_terms.h"
 #include "harness/descriptions/alike_names.h"
 #include "harness/descriptions/constant_table.h"
-#include "harness/descriptions/join_names.h"
 #include "harness/descriptions/mjcf_reader.h"
 #include "harness/descriptions/random_states.h"
 #include "harness/engine/engine.h"

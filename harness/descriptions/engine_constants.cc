@@ -4,10 +4,10 @@
 #include <optional>
 #include <vector>
 
-#include "harness/descriptions/constant_comparison.h"
+#include "controller/common/text.h"
+#include "harness/descriptions/constant_checks.h"
 #include "harness/descriptions/constant_table.h"
 #include "harness/descriptions/engine_extras.h"
-#include "harness/descriptions/join_names.h"
 #include "harness/descriptions/mjcf_reader.h"
 #include "harness/engine/engine.h"
 #include "harness/engine/exact_collision.h"

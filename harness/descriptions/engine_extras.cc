@@ -8,8 +8,8 @@
 #include <utility>
 #include <vector>
 
+#include "controller/common/text.h"
 #include "harness/descriptions/constant_table.h"
-#include "harness/descriptions/join_names.h"
 
 namespace dexcheck {
 namespace {

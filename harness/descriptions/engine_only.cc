@@ -243,8 +243,7 @@ class EngineOnly {
       for (int k = 0; k < 4; ++k) sum += engine_.hfield_size[4 * id + k];
     }
     Note("mesh_contacts",
-         fmt::format("{}: touches with its mesh's hull or height field{}; its coordinates "
-                     "add up to {:.17g}",
+         fmt::format("{}: touches with its mesh's hull or height field{}; its coordinates add up to {:.17g}",
                      GeomName(geom), IsTorus(geom) ? ", spheres and boxes with the exact torus" : "", sum));
   }
 
@@ -311,8 +310,7 @@ class EngineOnly {
       if (engine_.geom_contype[geom] == 0 && engine_.geom_conaffinity[geom] == 0) continue;
       Note("contacts_by_type",
            fmt::format("{}: contype {}, conaffinity {}, condim {}, priority {}, friction {}, margin {:.17g}, "
-                       "gap {:.17g}, "
-                       "solmix {:.17g}, solref {}, solimp {}",
+                       "gap {:.17g}, solmix {:.17g}, solref {}, solimp {}",
                        DescribeGeom(geom), engine_.geom_contype[geom], engine_.geom_conaffinity[geom],
                        engine_.geom_condim[geom], engine_.geom_priority[geom],
                        List(engine_.geom_friction + 3 * geom, 3), engine_.geom_margin[geom],
@@ -330,17 +328,16 @@ class EngineOnly {
   void NoteSettings() {
     const mjOption& option = engine_.opt;
     Note("overridden",
-         fmt::format(
-             "a run sets the time step ({:.17g} s here), impratio ({:.17g}), noslip iterations ({}) and "
-             "the stiffness of all contact pairs; joint damping acts as an explicit force",
-             option.timestep, option.impratio, option.noslip_iterations));
+         fmt::format("a run sets the time step ({:.17g} s here), impratio ({:.17g}), noslip iterations ({}) "
+                     "and the stiffness of all contact pairs; joint damping acts as an explicit force",
+                     option.timestep, option.impratio, option.noslip_iterations));
     Note("solver",
-         fmt::format("integrator {}, cone {}, jacobian {}, solver {}, iterations {}, tolerance "
-                     "{:.17g}, noslip tolerance {:.17g}, "
-                     "mpr iterations {}, mpr tolerance {:.17g}, mean inertia {:.17g}",
-                     option.integrator, option.cone, option.jacobian, option.solver, option.iterations,
-                     option.tolerance, option.noslip_tolerance, GetColliderIterations(option),
-                     GetColliderTolerance(option), engine_.stat.meaninertia));
+         fmt::format(
+             "integrator {}, cone {}, jacobian {}, solver {}, iterations {}, tolerance {:.17g}, noslip "
+             "tolerance {:.17g}, mpr iterations {}, mpr tolerance {:.17g}, mean inertia {:.17g}",
+             option.integrator, option.cone, option.jacobian, option.solver, option.iterations,
+             option.tolerance, option.noslip_tolerance, GetColliderIterations(option),
+             GetColliderTolerance(option), engine_.stat.meaninertia));
   }
 
   const Adapter& adapter_;

@@ -1,7 +1,7 @@
 #pragma once
 
-// Which conventions and numbers explain that bodies differ, and that axes and bodies stand elsewhere: links
-// and rows of the two descriptions, and what was found, before it is put into words.
+// A robot joint by joint as its file has it: each link in its own frame, placed in its parent's. Where the
+// links of two descriptions are in each other, and a frame on each link that has no common one.
 
 #include <optional>
 #include <string>
@@ -9,10 +9,56 @@
 
 #include "harness/descriptions/conventions.h"
 #include "harness/descriptions/hypotheses.h"
-#include "harness/descriptions/own_rows.h"
 #include "harness/descriptions/robot_description.h"
 
 namespace dexcheck {
+
+/// A joint and its link in the link's own frame: the joint turns about, or slides along, `axis` there.
+struct OwnRow {
+  int parent = -1;
+  bool is_revolute = true;
+  Pose X_PL = Pose::Identity();  ///< The link's own frame in its parent's own frame, at q = 0.
+  Pose X_PW = Pose::Identity();  ///< Of what is welded to the parent and carries the joint.
+  Vector3d axis = Vector3d::UnitZ();
+  MassProperties body;  ///< In the own frame.
+};
+
+/// The rows of a description; the base's own frame is Sigma_0.
+std::vector<OwnRow> ListOwnRows(const RobotDescription& robot);
+
+/// Pose of each link's own frame in the world, the base first, with all joints at zero.
+std::vector<Pose> CalcOwnPoses(const Pose& X_W0, const std::vector<OwnRow>& rows);
+
+/// Gives the link of a plain row another place in its parent's own frame, and its joint another axis in the
+/// own frame, in which all that it carries stays where it is.
+void TakeOwnRow(int joint, const Pose& X_PL, const Vector3d& axis, RobotDescription* robot);
+
+/// The rows as if the file's Denavit-Hartenberg rows had been changed so, and were classic ones.
+std::vector<OwnRow> ReadRowsAs(const RobotDescription& robot, MdhRow (*change)(MdhRow), bool classic);
+
+/// Parts of a link that have mass, in the own frame of another description.
+/// @param joint that moves it; -1 for the base. @param X_ab the link's own frame in that of the other
+/// description. @return `body`, X_LC and, as X_iL, the part's own frame, all in that frame.
+std::vector<DescribedPart> ListParts(const RobotDescription& robot, int joint, const Pose& X_ab);
+
+/// A link of two descriptions: which frame it has is each description's own choice.
+struct LinkPlace {
+  int a = -1;  ///< Its joint in `a`; -1 the base.
+  int b = -1;
+  Pose X_ab = Pose::Identity();  ///< Frame i of `b` in that of `a`: they coincide so with all joints at zero.
+};
+
+/// The joints' links and a floating base, as far as `b` has parts of them.
+/// @param a, b as CompleteEachOther left them; without places when their joints do not match.
+std::vector<LinkPlace> PlaceLinks(const RobotDescription& a, const RobotDescription& b);
+
+/// Adds to both descriptions a frame of the link's name on each link that joints move and on which they have
+/// none in common, so that how links move is compared: the link's own frame of `b`, and in `a` where it is
+/// with all joints at zero. @return whether there is such a link.
+bool AddLinkFrames(RobotDescription* a, RobotDescription* b);
+
+// Which conventions and numbers explain that bodies differ, and that axes and bodies stand elsewhere: links
+// and rows of the two descriptions, and what was found, before it is put into words.
 
 /// A link of two descriptions, in its own frame of the first.
 struct LinkBody {

@@ -5,10 +5,9 @@
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
-#include "controller/model/body_frame.h"
+#include "controller/model/rigid_body.h"
 #include "harness/descriptions/description_match.h"
 #include "harness/descriptions/fault_search.h"
-#include "harness/descriptions/join_names.h"
 
 namespace dexcheck {
 namespace {

@@ -2,7 +2,7 @@
 #include <cmath>
 #include <tuple>
 
-#include "controller/model/body_frame.h"
+#include "controller/model/rigid_body.h"
 #include "harness/descriptions/fault_search.h"
 
 namespace dexcheck {

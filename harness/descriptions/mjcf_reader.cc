@@ -6,9 +6,8 @@
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
-#include "controller/model/body_frame.h"
+#include "controller/model/rigid_body.h"
 #include "harness/descriptions/constant_table.h"
-#include "harness/descriptions/join_names.h"
 #include "harness/engine/engine.h"
 #include "harness/engine/map_vector.h"
 #include "harness/engine/robot_tree.h"

@@ -1,10 +1,9 @@
-#include "harness/descriptions/own_rows.h"
-
 #include <algorithm>
 #include <set>
 
-#include "controller/model/body_frame.h"
+#include "controller/model/rigid_body.h"
 #include "harness/descriptions/description_match.h"
+#include "harness/descriptions/fault_search.h"
 
 namespace dexcheck {
 namespace {

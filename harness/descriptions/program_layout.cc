@@ -6,7 +6,6 @@
 #include "controller/common/errors.h"
 #include "controller/common/linear_algebra.h"
 #include "controller/common/text.h"
-#include "harness/descriptions/join_names.h"
 
 namespace dexcheck {
 namespace {

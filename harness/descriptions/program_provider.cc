@@ -1,8 +1,162 @@
 #include "harness/descriptions/program_provider.h"
 
+#include <fcntl.h>
+#include <poll.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <chrono>
+#include <system_error>
+
 #include "controller/common/text.h"
 
 namespace dexcheck {
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+// A mass matrix of a thousand joints is 20 MB of text.
+constexpr size_t kLongestResult = size_t{1} << 26;
+// Of standard error: enough for the last line of a traceback.
+constexpr size_t kKeptMessages = 4096;
+
+void Close(int* descriptor) {
+  if (*descriptor >= 0) ::close(*descriptor);
+  *descriptor = -1;
+}
+
+void SetNonBlocking(int descriptor) {
+  ::fcntl(descriptor, F_SETFL, ::fcntl(descriptor, F_GETFL) | O_NONBLOCK);
+}
+
+}  // namespace
+
+ProgramProcess::ProgramProcess(std::string command, double seconds)
+    : command_(std::move(command)), seconds_(seconds) {
+  int in[2] = {-1, -1};
+  int out[2] = {-1, -1};
+  int err[2] = {-1, -1};
+  const bool piped = ::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, in) == 0 &&
+                     ::pipe2(out, O_CLOEXEC) == 0 && ::pipe2(err, O_CLOEXEC) == 0;
+  const int error = errno;
+  input_ = in[0];
+  output_ = out[0];
+  messages_ = err[0];
+  const auto close = [&](std::initializer_list<int*> ends) {
+    for (int* const end : ends) Close(end);
+  };
+  try {
+    if (!piped) throw Error(std::generic_category().message(error));
+    child_.emplace("program", Program{{"/bin/sh", "-c", command_}, in[1], out[1], err[1]});
+  } catch (const Error& failure) {
+    close({&in[1], &out[1], &err[1], &input_, &output_, &messages_});
+    throw ProgramError("program " + Quote(command_) + ": cannot be started: " + failure.what());
+  }
+  close({&in[1], &out[1], &err[1]});
+  for (const int descriptor : {input_, output_, messages_}) SetNonBlocking(descriptor);
+}
+
+ProgramProcess::~ProgramProcess() {
+  Close(&input_);
+  Close(&output_);
+  Close(&messages_);
+}
+
+std::string ProgramProcess::LastWords() const {
+  const size_t end = said_.find_last_not_of(" \t\r\n");
+  if (end == std::string::npos) return "";
+  const size_t begin = said_.find_last_of('\n', end);
+  return ", its last words: " + Quote(std::string_view(said_).substr(begin + 1, end - begin));
+}
+
+void ProgramProcess::FailEnded() {
+  // The pipes are closed; what closed them without ending gets a moment.
+  const std::optional<ProcessEnd> end = child_->WaitFor(0.5);
+  ReadMessages();
+  const std::string key = "program " + Quote(command_) + ": ";
+  const std::string after =
+      results_ == 0 ? " before its first result" : " after " + std::to_string(results_) + " results";
+  if (!end) throw ProgramError(key + "closed its standard output" + after + LastWords());
+  constexpr int kCannotRun = 126;
+  if (results_ == 0 && (end->exit_code == kCannotRun || end->exit_code == kNotFoundExitCode)) {
+    throw InputError(key + "cannot be run" + LastWords());
+  }
+  throw ProgramError(key + end->Describe() + after + LastWords());
+}
+
+void ProgramProcess::Write(const std::string& text, size_t* written) {
+  const ssize_t count =
+      ::send(input_, text.data() + *written, text.size() - *written, MSG_NOSIGNAL | MSG_DONTWAIT);
+  if (count > 0) *written += static_cast<size_t>(count);
+  // A program that reads no more may still have written: its output says what became of it.
+  if (count < 0 && errno != EAGAIN && errno != EINTR) *written = text.size();
+}
+
+bool ProgramProcess::ReadOutput() {
+  char buffer[1 << 16];
+  const ssize_t count = ::read(output_, buffer, sizeof buffer);
+  if (count < 0 && (errno == EAGAIN || errno == EINTR)) return true;
+  if (count <= 0) return false;
+  pending_.append(buffer, static_cast<size_t>(count));
+  return true;
+}
+
+void ProgramProcess::ReadMessages() {
+  char buffer[4096];
+  while (messages_ >= 0) {
+    const ssize_t count = ::read(messages_, buffer, sizeof buffer);
+    if (count < 0 && errno == EINTR) continue;
+    if (count == 0) Close(&messages_);
+    if (count <= 0) return;
+    said_.append(buffer, static_cast<size_t>(count));
+    if (said_.size() > kKeptMessages) said_.erase(0, said_.size() - kKeptMessages);
+  }
+}
+
+std::string ProgramProcess::Query(const std::string& line) {
+  const std::string text = line + "\n";
+  size_t written = 0;
+  size_t searched = 0;
+  const Clock::time_point deadline =
+      Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(seconds_));
+  while (true) {
+    const size_t end = written == text.size() ? pending_.find('\n', searched) : std::string::npos;
+    if (end != std::string::npos) {
+      std::string result = pending_.substr(0, end);
+      pending_.erase(0, end + 1);
+      if (!result.empty() && result.back() == '\r') result.pop_back();
+      ++results_;
+      return result;
+    }
+    searched = written == text.size() ? pending_.size() : 0;
+    const std::string key = "program " + Quote(command_) + ": ";
+    if (pending_.size() > kLongestResult) {
+      throw ProgramError(key + "writes without end, more than " + std::to_string(kLongestResult >> 20) +
+                         " MB without an end of line");
+    }
+    const double left = std::chrono::duration<double>(deadline - Clock::now()).count();
+    if (left <= 0.0) {
+      ReadMessages();
+      throw ProgramError(key + "wrote no result within " + FormatNumber(seconds_) + " s (--time-limit)" +
+                         LastWords());
+    }
+    pollfd ends[3] = {{output_, POLLIN, 0}, {messages_, POLLIN, 0}, {input_, POLLOUT, 0}};
+    const nfds_t count = written < text.size() ? 3 : 2;
+    constexpr double kLongestWait = 1.0;  // s, so that a deadline far away overflows nothing
+    const int ready = ::poll(ends, count, static_cast<int>(1e3 * std::min(left, kLongestWait)) + 1);
+    if (ready < 0 && errno != EINTR) {
+      throw ProgramError(key + "cannot be talked to: " + std::generic_category().message(errno));
+    }
+    if (ready <= 0) continue;
+    if ((ends[1].revents & (POLLIN | POLLHUP)) != 0) ReadMessages();
+    if (count == 3 && ends[2].revents != 0) Write(text, &written);
+    if ((ends[0].revents & (POLLIN | POLLHUP)) != 0 && !ReadOutput()) FailEnded();
+  }
+}
+
 namespace {
 
 using Json = nlohmann::json;

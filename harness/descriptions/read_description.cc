@@ -5,11 +5,11 @@
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
-#include "controller/model/body_frame.h"
 #include "controller/model/parameter_reader.h"
+#include "controller/model/rigid_body.h"
 #include "harness/base/files.h"
+#include "harness/descriptions/description_writer.h"
 #include "harness/descriptions/mjcf_reader.h"
-#include "harness/descriptions/parameter_writer.h"
 
 namespace dexcheck {
 namespace {

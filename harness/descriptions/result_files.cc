@@ -100,10 +100,9 @@ ResultFiles::ResultFiles(const std::filesystem::path& folder, const RobotDescrip
   for (const char* term : {"c", "g", "h", "friction"}) find(term, {count, n});
   for (const char* term : {"kinetic_energy", "potential_energy"}) find(term, {count});
   if (!terms_.empty()) return;
-  throw InputError(
-      folder.string() +
-      ": must have results: M.npy, C.npy, c.npy, g.npy, h.npy, friction.npy, kinetic_energy.npy, "
-      "potential_energy.npy or results.jsonl, got none");
+  throw InputError(folder.string() +
+                   ": must have results: M.npy, C.npy, c.npy, g.npy, h.npy, friction.npy, "
+                   "kinetic_energy.npy, potential_energy.npy or results.jsonl, got none");
 }
 
 void ResultFiles::ReadLines(const std::filesystem::path& path) {

@@ -5,8 +5,7 @@
 #include <cmath>
 
 #include "controller/common/text.h"
-#include "controller/model/body_frame.h"
-#include "harness/descriptions/join_names.h"
+#include "controller/model/rigid_body.h"
 
 namespace dexcheck {
 
@@ -107,16 +106,14 @@ namespace {
 
 std::vector<std::string> DescribeBase(const RobotDescription& robot) {
   if (robot.spec.base.type != BaseType::kFloating) return {};
-  return {
-      "base " + Quote(robot.spec.base.link) +
-          " floats: q = [x y z, qw qx qy qz, joints from q[7]], xi = [velocity of its origin in world axes, "
-          "angular velocity in its own axes, joints from xi[6]], as MuJoCo has them",
-      "in Pinocchio's convention the quaternion is qx qy qz qw and the origin's velocity is in the base's "
-      "axes: xi' = B xi with B = diag(R^T, 1, 1), M' = B^-T M B^-1, bias' = B^-T bias + M' [omega x v; 0; "
-      "0] (dexcheck eval prints both)",
-      "in Drake's convention q = [qw qx qy qz, x y z, joints], xi = [angular velocity, velocity of its "
-      "origin, "
-      "both in world axes, joints]"};
+  return {"base " + Quote(robot.spec.base.link) +
+              " floats: q = [x y z, qw qx qy qz, joints from q[7]], xi = [velocity of its origin in world "
+              "axes, angular velocity in its own axes, joints from xi[6]], as MuJoCo has them",
+          "in Pinocchio's convention the quaternion is qx qy qz qw and the origin's velocity is in the "
+          "base's axes: xi' = B xi with B = diag(R^T, 1, 1), M' = B^-T M B^-1, bias' = B^-T bias + M' [omega "
+          "x v; 0; 0] (dexcheck eval prints both)",
+          "in Drake's convention q = [qw qx qy qz, x y z, joints], xi = [angular velocity, velocity of its "
+          "origin, both in world axes, joints]"};
 }
 
 /// Ball joints: where each one's entries are, and what others have in their place.

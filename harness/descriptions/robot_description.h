@@ -15,7 +15,7 @@ enum class RobotFormat {
   kToml,
   kUrdf,
   kMjcf,
-  kBodies,  ///< A table of bodies (body_table.h).
+  kBodies,  ///< A table of bodies (ReadBodyTable).
 };
 
 /// What a file says of a joint and its link, beside the specification: how its row is written, too.

@@ -7,7 +7,6 @@
 #include "controller/common/text.h"
 #include "harness/descriptions/alike_names.h"
 #include "harness/descriptions/description_match.h"
-#include "harness/descriptions/join_names.h"
 
 namespace dexcheck {
 namespace {

@@ -7,8 +7,7 @@
 #include <utility>
 
 #include "controller/common/text.h"
-#include "controller/model/body_frame.h"
-#include "harness/descriptions/join_names.h"
+#include "controller/model/rigid_body.h"
 #include "harness/descriptions/urdf_file.h"
 #include "harness/engine/xml.h"
 

@@ -3,9 +3,7 @@
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numeric>
-#include <utility>
 
 #include "controller/common/linear_algebra.h"
 #include "harness/diagnosis/visible_columns.h"

@@ -8,7 +8,6 @@
 #include <numeric>
 #include <optional>
 
-#include "harness/checks/tolerance.h"
 #include "harness/descriptions/constant_table.h"
 #include "harness/diagnosis/repair_trial.h"
 

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "controller/model/body_frame.h"
+#include "controller/model/rigid_body.h"
 #include "controller/model/robot_model.h"
 
 namespace dexcheck {

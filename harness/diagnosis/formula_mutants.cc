@@ -6,7 +6,7 @@
 
 #include "controller/object/object_dynamics.h"
 #include "harness/checks/contact_check.h"
-#include "harness/descriptions/model_view.h"
+#include "harness/descriptions/analytic_provider.h"
 
 namespace dexcheck {
 namespace {

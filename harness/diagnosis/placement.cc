@@ -1,6 +1,5 @@
 #include "harness/diagnosis/placement.h"
 
-#include <algorithm>
 #include <cmath>
 
 #include "harness/descriptions/random_states.h"

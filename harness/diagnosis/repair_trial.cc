@@ -2,10 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
 #include <utility>
 
-#include "controller/model/body_frame.h"
+#include "controller/model/rigid_body.h"
 #include "harness/descriptions/mjcf_reader.h"
 #include "harness/engine/map_vector.h"
 #include "harness/engine/robot_tree.h"

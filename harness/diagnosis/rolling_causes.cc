@@ -2,7 +2,7 @@
 #include <cmath>
 #include <tuple>
 
-#include "harness/checks/wheel_rolling.h"
+#include "harness/checks/contact_compliance.h"
 #include "harness/diagnosis/run_causes.h"
 #include "harness/diagnosis/telling.h"
 

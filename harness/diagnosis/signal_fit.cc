@@ -4,8 +4,6 @@
 #include <cmath>
 #include <limits>
 
-#include "harness/diagnosis/signal_shapes.h"
-
 namespace dexcheck {
 namespace {
 

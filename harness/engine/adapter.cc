@@ -15,15 +15,6 @@ namespace {
 /// The body that carries the joints which move `body`: itself, or the one it is welded to.
 int MovingBody(const mjModel& engine, int body) { return engine.body_weldid[body]; }
 
-/// "a, b, c": the first few of them, and how many more.
-std::string JoinNames(const std::vector<std::string>& names) {
-  constexpr size_t kMaxShown = 8;
-  std::string text;
-  for (size_t i = 0; i < std::min(names.size(), kMaxShown); ++i) text += (i == 0 ? "" : ", ") + names[i];
-  if (names.size() > kMaxShown) text += " and " + std::to_string(names.size() - kMaxShown) + " more";
-  return text;
-}
-
 bool IsRound(int geom_type) {
   return geom_type == mjGEOM_SPHERE || geom_type == mjGEOM_CYLINDER || geom_type == mjGEOM_CAPSULE ||
          geom_type == mjGEOM_ELLIPSOID;

@@ -3,7 +3,6 @@
 #include <mujoco/mjxmacro.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>

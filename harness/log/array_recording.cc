@@ -3,8 +3,6 @@
 #include <zip.h>
 
 #include <algorithm>
-#include <limits>
-#include <optional>
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"

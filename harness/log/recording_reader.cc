@@ -1,11 +1,15 @@
 #include "harness/log/recording_reader.h"
 
+#include <algorithm>
 #include <fstream>
-#include <limits>
+#include <iostream>
+#include <optional>
 
 #include "controller/common/errors.h"
+#include "controller/common/text.h"
 
 namespace dexcheck {
+
 namespace {
 
 namespace fs = std::filesystem;
@@ -63,5 +67,151 @@ bool TableReader::Next(std::vector<double>* row) {
 }
 
 std::string TableReader::Where() const { return source_ + ": row " + std::to_string(row_); }
+
+namespace {
+
+constexpr size_t kLongestLine = size_t{1} << 20U;
+
+/// Also of one with a plus.
+std::optional<double> ParseCell(std::string_view text) {
+  return ParseNumber<double>(text.starts_with('+') ? text.substr(1) : text);
+}
+
+/// Cells of a line.
+/// @param separator ' ' for any blanks.
+void Split(std::string_view line, char separator, std::vector<std::string_view>* cells) {
+  cells->clear();
+  if (separator == ' ') {
+    for (size_t at = line.find_first_not_of(" \t\r"); at != std::string_view::npos;) {
+      const size_t end = std::min(line.find_first_of(" \t\r", at), line.size());
+      cells->push_back(line.substr(at, end - at));
+      at = line.find_first_not_of(" \t\r", end);
+    }
+    return;
+  }
+  for (;;) {
+    // A name in quotes may have separators in it.
+    const size_t close = Trim(line).starts_with('"') ? line.find('"', line.find('"') + 1) : 0;
+    const size_t end = line.find(separator, close == std::string_view::npos ? 0 : close);
+    cells->push_back(Trim(line.substr(0, end), " \t\r\"'"));
+    if (end == std::string_view::npos) return;
+    line.remove_prefix(end + 1);
+  }
+}
+
+class TextRecording : public RecordingReader {
+ public:
+  TextRecording(const std::filesystem::path& path, size_t width)
+      : source_(path == "-" ? "standard input" : path.string()), width_(width) {
+    if (path != "-") {
+      file_.open(path);
+      if (!file_) throw InputError(source_ + ": cannot be read");
+    }
+    stream_ = path == "-" ? &std::cin : &file_;
+    ReadHead();
+  }
+
+  bool Next(std::vector<double>* row) override {
+    if (!is_pending_ && !ReadLine()) return FinishRow();
+    is_pending_ = false;
+    row->clear();
+    Append(row);
+    while (row->size() < width_) {
+      if (!ReadLine())
+        Fail("the last row has " + std::to_string(row->size()) + " of " + std::to_string(width_) +
+             " numbers");
+      Append(row);
+    }
+    if (row->size() != names_.size())
+      Fail("must have " + std::to_string(names_.size()) + " numbers as the rows before, got " +
+           std::to_string(row->size()));
+    return true;
+  }
+
+  [[nodiscard]] std::string Where() const override { return source_ + ":" + std::to_string(line_number_); }
+
+ private:
+  [[noreturn]] void Fail(const std::string& problem) const { throw InputError(Where() + ": " + problem); }
+  bool FinishRow() const {
+    if (stream_->bad()) Fail("cannot be read to its end");
+    return false;
+  }
+
+  /// The next line that is no comment.
+  bool ReadLine() {
+    while (std::getline(*stream_, line_)) {
+      ++line_number_;
+      if (line_.size() > kLongestLine)
+        Fail("a line of " + std::to_string(line_.size()) + " bytes is no row of a recording");
+      if (line_number_ == 1 && line_.starts_with("\xef\xbb\xbf")) line_.erase(0, 3);
+      const size_t begin = line_.find_first_not_of(" \t\r");
+      if (begin == std::string::npos) continue;
+      if (line_[begin] != '#' && line_[begin] != '%') return true;
+      comment_ = line_.substr(begin + 1);
+    }
+    return false;
+  }
+
+  void ReadHead() {
+    if (!ReadLine()) throw InputError(source_ + ": has no rows");
+    if (std::any_of(line_.begin(), line_.end(),
+                    [](char c) { return c >= 0 && c < ' ' && c != '\t' && c != '\r'; }))
+      Fail("is no text, and no recording that is known");
+    for (const char candidate : {'\t', ';', ','})
+      if (separator_ == ' ' && line_.find(candidate) != std::string::npos) separator_ = candidate;
+    has_decimal_comma_ = separator_ == ';' && line_.find('.') == std::string::npos;
+    Split(line_, separator_, &cells_);
+    const bool is_header = std::any_of(cells_.begin(), cells_.end(), [](std::string_view cell) {
+      return !cell.empty() && !ParseCell(cell) && cell.find(',') == std::string_view::npos;
+    });
+    format_ = separator_ == ' ' ? "text" : "CSV";
+    if (is_header) {
+      names_.assign(cells_.begin(), cells_.end());
+    } else {
+      // A header may stand in a comment, as NumPy writes it.
+      std::vector<std::string_view> names;
+      Split(comment_, separator_, &names);
+      names_.resize(width_ > 0 ? width_ : cells_.size());
+      if (names.size() == names_.size()) names_.assign(names.begin(), names.end());
+      is_pending_ = true;
+    }
+    has_names_ =
+        std::any_of(names_.begin(), names_.end(), [](const std::string& name) { return !name.empty(); });
+    if (is_header && has_decimal_comma_) has_decimal_comma_ = false, may_have_decimal_comma_ = true;
+  }
+
+  void Append(std::vector<double>* row) {
+    if (may_have_decimal_comma_)
+      has_decimal_comma_ = line_.find('.') == std::string::npos, may_have_decimal_comma_ = false;
+    if (has_decimal_comma_) std::replace(line_.begin(), line_.end(), ',', '.');
+    Split(line_, separator_, &cells_);
+    for (size_t i = 0; i < cells_.size(); ++i) {
+      const std::optional<double> number = cells_[i].empty() ? kMissing : ParseCell(cells_[i]);
+      if (!number)
+        Fail("column " + NameOf(row->size()) + ": must be a number, got " + Quote(std::string(cells_[i])));
+      row->push_back(*number);
+    }
+  }
+  [[nodiscard]] std::string NameOf(size_t column) const {
+    if (column < names_.size() && !names_[column].empty()) return names_[column];
+    return std::to_string(column + 1);
+  }
+
+  std::string source_;
+  size_t width_;
+  std::ifstream file_;
+  std::istream* stream_ = nullptr;
+  std::string line_, comment_;
+  long line_number_ = 0;
+  char separator_ = ' ';
+  bool has_decimal_comma_ = false, may_have_decimal_comma_ = false, is_pending_ = false;
+  std::vector<std::string_view> cells_;
+};
+
+}  // namespace
+
+std::unique_ptr<RecordingReader> OpenTextRecording(const std::filesystem::path& path, size_t width) {
+  return std::make_unique<TextRecording>(path, width);
+}
 
 }  // namespace dexcheck

@@ -6,7 +6,7 @@
 
 #include "controller/common/errors.h"
 #include "controller/common/linear_algebra.h"
-#include "harness/descriptions/join_names.h"
+#include "controller/common/text.h"
 
 namespace dexcheck {
 namespace {

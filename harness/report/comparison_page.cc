@@ -3,8 +3,7 @@
 
 #include <algorithm>
 
-#include "harness/report/campaign_page.h"
-#include "harness/report/page_assets.h"
+#include "harness/report/page.h"
 #include "harness/report/page_frame.h"
 #include "harness/report/run_comparison.h"
 

@@ -11,8 +11,8 @@
 #include <utility>
 
 #include "controller/common/errors.h"
+#include "controller/common/text.h"
 #include "harness/base/child_process.h"
-#include "harness/base/csv.h"
 #include "harness/base/files.h"
 
 namespace dexcheck {

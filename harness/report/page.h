@@ -1,9 +1,10 @@
 #pragma once
 
-// The page of evidence.
+// The page of a campaign of faults.
 
 #include <filesystem>
 #include <functional>
+#include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
 #include <vector>
@@ -13,6 +14,12 @@
 #include "harness/report/run_data.h"
 
 namespace dexcheck {
+
+/// A whole HTML document that loads nothing: what was found, a matrix of the faults that were made and the
+/// names that they got, and each of them. @param campaign as `mutate --json` writes it.
+std::string MakeCampaignPage(const nlohmann::ordered_json& campaign);
+
+// The page of evidence.
 
 // What of a run is seen in space: pictures and the replay of its page.
 

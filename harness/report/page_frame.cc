@@ -9,8 +9,6 @@
 #include <cstdint>
 #include <nlohmann/json.hpp>
 
-#include "harness/report/page_assets.h"
-
 namespace dexcheck {
 
 std::string EncodeBase64(std::string_view bytes) {

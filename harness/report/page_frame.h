@@ -1,6 +1,6 @@
 #pragma once
 
-// How a page is put together: built-in markup and scripts, and the data that the scripts make it of.
+// Texts that are built into the program, for pages that need no other file.
 
 #include <nlohmann/json_fwd.hpp>
 #include <span>
@@ -12,6 +12,22 @@
 #include "harness/report/replay.h"
 
 namespace dexcheck {
+
+extern const char* const kPageCss;
+extern const char* const kDomJs;  ///< What the other scripts make elements with.
+extern const char* const kPageHtml;
+extern const char* const kRunJs;
+extern const char* const kCampaignJs;
+extern const char* const kComparisonJs;
+extern const char* const kJudgeJs;
+extern const char* const kPageJs;  ///< Needs kChartsJs.
+extern const char* const kReplayHtml;
+extern const char* const kReplayJs;
+extern const char* const kThreeJs;
+extern const char* const kChartJs;   ///< Chart.js: window.Chart.
+extern const char* const kChartsJs;  ///< What it gets of a page's charts.
+
+// How a page is put together: built-in markup and scripts, and the data that the scripts make it of.
 
 // Data and texts of pages. A page's script makes its elements of them, so that no text can become markup.
 

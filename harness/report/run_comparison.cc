@@ -10,7 +10,6 @@
 #include <sstream>
 
 #include "harness/base/files.h"
-#include "harness/report/page_assets.h"
 #include "harness/report/page_frame.h"
 
 namespace dexcheck {

@@ -9,7 +9,6 @@
 #include "controller/common/text.h"
 #include "controller/common/toml_reader.h"
 #include "controller/control/joint_controller.h"
-#include "controller/control/trajectory_controller.h"
 #include "harness/plant/engine_plant.h"
 #include "harness/plant/rigid_plant.h"
 #include "harness/run/own_controller.h"

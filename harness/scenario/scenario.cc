@@ -1,8 +1,5 @@
 #include "harness/scenario/scenario.h"
 
-#include <string_view>
-#include <utility>
-
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
 #include "harness/scenario/scenario_reader.h"

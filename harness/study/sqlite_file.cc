@@ -1,5 +1,3 @@
-#include "harness/study/sqlite_file.h"
-
 #include <sqlite3.h>
 #include <unistd.h>
 
@@ -9,6 +7,7 @@
 #include <system_error>
 
 #include "controller/common/text.h"
+#include "harness/study/study_store.h"
 
 namespace dexcheck {
 namespace {

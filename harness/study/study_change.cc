@@ -1,5 +1,3 @@
-#include "harness/study/study_change.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -16,6 +14,7 @@
 #include "harness/engine/engine.h"
 #include "harness/engine/machine.h"
 #include "harness/engine/mjcf_file.h"
+#include "harness/study/study_store.h"
 
 namespace dexcheck {
 namespace {

@@ -8,9 +8,7 @@
 #include <limits>
 #include <unordered_map>
 
-#include "controller/common/errors.h"
 #include "controller/common/text.h"
-#include "harness/study/study_change.h"
 
 namespace dexcheck {
 namespace {

@@ -1,9 +1,12 @@
 #pragma once
 
-// A study's database: table `study` says what the study is, table `trials` has a row for each finished trial.
-// Each row is one transaction, so that the file is whole whenever a process is killed.
+// A database of SQLite in a plain file.
 
+#include <SQLiteCpp/Database.h>
+#include <SQLiteCpp/Exception.h>
 #include <SQLiteCpp/Statement.h>
+#include <SQLiteCpp/Transaction.h>
+#include <SQLiteCpp/VariadicBind.h>
 
 #include <filesystem>
 #include <functional>
@@ -14,11 +17,60 @@
 #include <utility>
 #include <vector>
 
-#include "harness/study/sqlite_file.h"
+#include "controller/common/errors.h"
 #include "harness/study/study.h"
 #include "harness/study/trial.h"
 
 namespace dexcheck {
+
+/// @throws InputError when this cannot be the name of a database file: it must be a regular file, and nothing
+/// else that SQLite would take a name for (nothing that is gone when the process ends).
+void RequirePlainFile(const std::string& name);
+
+/// "is locked by another program", of what SQLite threw.
+std::string Explain(const SQLite::Exception& error);
+
+/// Everything that fails throws InputError "FILE: what: why".
+class SqliteFile : public SQLite::Database {
+ public:
+  SqliteFile(const std::string& name, int flags);
+
+  /// A statement with values for its marks.
+  template <typename... Values>
+  SQLite::Statement Prepare(const std::string& sql, const Values&... values) const {
+    SQLite::Statement statement(*this, sql);
+    SQLite::bind(statement, values...);
+    return statement;
+  }
+
+  /// Calls a function, and makes InputError of what SQLite throws.
+  template <typename Function>
+  auto Do(const Function& function) const {
+    try {
+      return function();
+    } catch (const SQLite::Exception& error) {
+      throw InputError(getFilename() + ": " + Explain(error));
+    }
+  }
+};
+
+/// One that may write; undone unless committed.
+class SqliteTransaction : public SQLite::Transaction {
+ public:
+  explicit SqliteTransaction(SQLite::Database* database)
+      : SQLite::Transaction(*database, SQLite::TransactionBehavior::IMMEDIATE) {}
+};
+
+// Which of the processes that use it are alive.
+
+/// Machine, process id and start of this process: no other process ever has the same.
+std::string NameThisProcess();
+
+/// Whether the process of that name runs on this machine; false for those of other machines.
+bool IsRunningHere(const std::string& process);
+
+// A study's database: table `study` says what the study is, table `trials` has a row for each finished trial.
+// Each row is one transaction, so that the file is whole whenever a process is killed.
 
 /// What a study is, column by column. Rows of studies that differ in any of them do not belong together.
 using StudyIdentity = std::vector<std::pair<std::string, std::string>>;
@@ -127,5 +179,31 @@ class StudyStore {
   Study study_;
   std::string change_;
 };
+
+// A study that was edited: which of its rows still belong to it.
+
+/// What an edited study makes of a database's rows.
+struct StudyChange {
+  std::vector<TrialRow> rows;  ///< All of them, with the numbers that they have now; those that do not belong
+                               ///< to it have negative ones.
+  long kept = 0;               ///< Rows that belonged to it, and do.
+  long brought_back = 0;       ///< Rows that had been set aside.
+  long set_aside = 0;          ///< Rows that belonged to it and do not any more.
+};
+
+/// Why rows of one study cannot be rows of the other, whatever their parameters; empty when they can: trials
+/// are made in the same way, and the same keys are varied. A search must be the same but for its number of
+/// points.
+std::string FindDifference(const Study& before, const Study& now);
+
+/// Whether both list the same trials under the same numbers.
+bool HasSameTrials(const Study& before, const Study& now);
+
+/// Finds the rows' places in the study as it is now. The two must not differ (FindDifference).
+/// @param rows of `before`, those that were set aside among them.
+StudyChange ChangeStudy(const Study& before, const Study& now, std::vector<TrialRow> rows);
+
+/// "12 trials are kept, 4 are set aside".
+std::string Describe(const StudyChange& change);
 
 }  // namespace dexcheck

@@ -6,12 +6,10 @@
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
-#include "harness/base/console.h"
 #include "harness/study/sampled_stability.h"
 #include "harness/study/sampling.h"
 #include "harness/study/search.h"
 #include "harness/study/study_findings.h"
-#include "harness/study/study_page.h"
 
 namespace dexcheck {
 

@@ -2,9 +2,6 @@
 
 #include <benchmark/benchmark.h>
 
-#include <map>
-#include <memory>
-
 #include "controller/dynamics/model_terms.h"
 #include "controller/model/parameter_reader.h"
 #include "harness/engine/adapter.h"

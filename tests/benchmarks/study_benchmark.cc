@@ -43,8 +43,7 @@ double Median(std::vector<double> values) {
 StudyInputs MakeInputs(const std::string& more) {
   StudyInputs inputs;
   inputs.study = ParseStudy(
-      "name = \"s\"\nscenario = \"offset\"\nset = [\"duration=3\", \"start_error.xyz=[1e-5, 0, "
-      "0]\"]\n" +
+      "name = \"s\"\nscenario = \"offset\"\nset = [\"duration=3\", \"start_error.xyz=[1e-5, 0, 0]\"]\n" +
           more,
       "study.toml");
   inputs.scenario_folder = kSource + "/harness/shipped/scenarios";
@@ -100,8 +99,7 @@ void Compare(int repetitions) {
   fmt::print("bare closed loop of 3 s: {:.0f} ms of processor time\n", 1e3 * bare_seconds);
   fmt::print(
       "trial / bare loop, medians of {} times {}: {:.3f} of processor time, {:.3f} of wall time; {:.1f} ms "
-      "of "
-      "processor time more a trial\n",
+      "of processor time more a trial\n",
       repetitions, kCount, Median(processor), Median(wall), 1e3 * Median(overhead));
   std::vector<double> ratios;
   for (int i = 0; i < repetitions / 3 + 1; ++i, next += 2 * kCount) {

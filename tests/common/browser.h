@@ -36,13 +36,12 @@ class Browser {
   /// How many ids stand twice, and how many things the page loaded beside itself.
   [[nodiscard]] int CountRepeatedIds() const {
     return Run(
-        "const ids = [...document.querySelectorAll('[id]')].map(e => e.id);"
-        "return ids.length - new Set(ids).size;");
+        "const ids = [...document.querySelectorAll('[id]')].map(e => e.id);return ids.length - new "
+        "Set(ids).size;");
   }
   [[nodiscard]] int CountLoaded() const {
     return Run(
-        "return performance.getEntriesByType('resource')"
-        "  .filter(e => !e.name.startsWith('data:')).length;");
+        "return performance.getEntriesByType('resource')  .filter(e => !e.name.startsWith('data:')).length;");
   }
   /// Errors and warnings since the last call.
   [[nodiscard]] std::vector<std::string> TakeConsole() const;

@@ -4,7 +4,7 @@
 
 #include <vector>
 
-#include "controller/model/body_frame.h"
+#include "controller/model/rigid_body.h"
 
 namespace dexcheck::testing {
 namespace {

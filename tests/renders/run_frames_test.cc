@@ -7,7 +7,6 @@
 
 #include "controller/common/errors.h"
 #include "harness/engine/engine.h"
-#include "tests/common/files.h"
 #include "tests/common/paths.h"
 #include "tests/common/throws.h"
 #include "tests/renders/kinematic_run.h"

@@ -11,7 +11,6 @@
 #include "controller/control/constrained_dynamics.h"
 #include "controller/control/object_tracking.h"
 #include "controller/object/so3.h"
-#include "tests/common/allocation_counter.h"
 #include "tests/common/linear_algebra.h"
 #include "tests/common/matrix_near.h"
 #include "tests/common/throws.h"
@@ -367,30 +366,6 @@ TEST(ComputedTorque, Errors) {
   EXPECT_TRUE(
       Throws<SingularityError>([&] { weak.SetDemand(scene.robot, grasp, Vector6d::Zero(), sigma_prime); },
                                "G has not full row rank, condition number"));
-}
-
-TEST(ComputedTorque, OneControlStepDoesNotAllocate) {
-  for (const RedundancyWeight::Kind kind : kWeights) {
-    GraspScene scene;
-    std::mt19937 random(6);
-    scene.DrawVelocities(&random, 1.0);
-    const DesiredMotion desired = DrawDesired(scene, &random);
-    const VectorXd F_N = scene.CalcInternalForce(2.0);
-    ComputedTorque law(scene.model, 4, MakeWeight(kind, scene.robot.size()));
-    PostureTask task(scene.model);
-    VectorXd sigma_prime(scene.robot.size());
-    for (const auto feedback : {OrientationFeedback::kAngles, OrientationFeedback::kRotation}) {
-      const AllocationCounter counter;
-      scene.robot.SetState(scene.q, scene.xi);
-      scene.robot.CalcDynamics();
-      scene.grasp.SetState(scene.robot, scene.X_o, scene.X_o_dot, scene.kappa);
-      task.CalcAcceleration(scene.q, scene.xi, sigma_prime);
-      law.SetDemand(scene.robot, scene.grasp,
-                    CalcTrackingAcceleration(MakeGains(), feedback, scene.grasp, desired), sigma_prime);
-      law.CalcTorque(scene.grasp, F_N);
-      EXPECT_EQ(counter.count(), 0);
-    }
-  }
 }
 
 }  // namespace

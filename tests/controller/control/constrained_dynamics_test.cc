@@ -9,7 +9,6 @@
 #include "controller/common/errors.h"
 #include "controller/control/actuation.h"
 #include "controller/model/platform.h"
-#include "tests/common/allocation_counter.h"
 #include "tests/common/linear_algebra.h"
 #include "tests/common/matrix_near.h"
 #include "tests/common/throws.h"
@@ -295,18 +294,6 @@ TEST(ConstrainedDynamics, RejectsWrongSizes) {
   const auto few = std::span(scene.kappa).first(2);
   EXPECT_TRUE(Throws<std::invalid_argument>(
       [&] { scene.grasp.SetState(scene.robot, scene.X_o, scene.X_o_dot, few); }, "number of kappa"));
-}
-
-TEST(ConstrainedDynamics, DoesNotAllocate) {
-  GraspScene scene;
-  ConstrainedDynamics dynamics(scene.model, scene.grasp.num_contacts());
-  const VectorXd force = VectorXd::Zero(scene.robot.size());
-  const AllocationCounter counter;
-  scene.robot.SetState(scene.q, scene.xi);
-  scene.robot.CalcDynamics();
-  scene.grasp.SetState(scene.robot, scene.X_o, scene.X_o_dot, scene.kappa);
-  dynamics.Predict(scene.robot, scene.grasp, force);
-  EXPECT_EQ(counter.count(), 0);
 }
 
 // E_bar' = diag(S_v^T E_v, 1), for both choices of v.

@@ -7,7 +7,6 @@
 #include <random>
 
 #include "controller/common/errors.h"
-#include "tests/common/allocation_counter.h"
 #include "tests/common/linear_algebra.h"
 #include "tests/common/matrix_near.h"
 #include "tests/common/throws.h"
@@ -212,21 +211,6 @@ TEST(Pseudoinverse, RejectsWrongArguments) {
   EXPECT_TRUE(Throws<std::invalid_argument>([&] { pinv.Factor(J.transpose()); }, "rows of J"));
   EXPECT_TRUE(Throws<std::invalid_argument>([&] { pinv.FactorWeighted(J, -Matrix3d::Identity()); },
                                             "W: must be positive definite"));
-}
-
-TEST(Pseudoinverse, DoesNotAllocate) {
-  std::mt19937 random(8);
-  Case c(2, &random);
-  const VectorXd w = VectorXd::Constant(kColumns, 2.0);
-  const VectorXd y = VectorXd::Ones(kRows);
-  VectorXd x(kColumns);
-  const AllocationCounter counter;
-  c.J_pinv.Factor(c.J);
-  c.J_pinv.FactorDiagonal(c.J, w);
-  c.J_pinv.FactorWeighted(c.J, c.W);
-  c.J_pinv.Apply(y, x);
-  c.J_pinv.Project(x);
-  EXPECT_EQ(counter.count(), 0);
 }
 
 }  // namespace

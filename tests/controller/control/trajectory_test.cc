@@ -324,9 +324,8 @@ TEST(TrajectoryReader, ReadsEveryType) {
   expect_same("circle", "type = 'circle'\nheading = -0.4\nspeed = 0.9\nramp_time = 1.2\nradius = 0.8\n");
   expect_same(
       "sum",
-      "type = 'sum'\nparts = [{ type = 'circle', heading = -0.4, speed = 0.9, ramp_time = 1.2, radius = "
-      "0.8 }, { type = 'point_to_point', duration = 1.7, xyz = [0.3, -0.1, 0.05], zyz = [0.4, 0.2, "
-      "-0.3] }]\n");
+      "type = 'sum'\nparts = [{ type = 'circle', heading = -0.4, speed = 0.9, ramp_time = 1.2, radius = 0.8 "
+      "}, { type = 'point_to_point', duration = 1.7, xyz = [0.3, -0.1, 0.05], zyz = [0.4, 0.2, -0.3] }]\n");
   const std::unique_ptr<Trajectory> points = Parse(
       "type = 'way_points'\npoints = [{ time = 1.0, xyz = [0.1, 0, 0] }, { time = 2, zyz_deg = [90, 0, 0] "
       "}]\n");

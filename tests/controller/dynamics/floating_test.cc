@@ -3,8 +3,8 @@
 #include <gtest/gtest.h>
 
 #include "controller/dynamics/model_terms.h"
-#include "controller/model/body_frame.h"
 #include "controller/model/parameter_reader.h"
+#include "controller/model/rigid_body.h"
 #include "tests/common/matrix_near.h"
 #include "tests/common/random_robot.h"
 

@@ -35,25 +35,24 @@ struct FieldGroup {
 
 constexpr FieldGroup kFieldGroups[] = {
     {FieldClass::kDerived, "size or address in the model's arrays",
-     "nq nv nu na nbody njnt ngeom nsite ncam nlight nmesh nmeshvert nmeshtexvert nmeshface "
-     "nmeshgraph nskin nskinvert nskintexvert nskinface nskinbone nskinbonevert nhfield nhfielddata "
-     "ntex ntexdata nmat npair nexclude neq ntendon nwrap nsensor nnumeric nnumericdata ntext "
-     "ntextdata ntuple ntupledata nkey nmocap nuser_body nuser_jnt nuser_geom nuser_site nuser_cam "
-     "nuser_tendon nuser_actuator nuser_sensor nnames nM nD nemax nuserdata nsensordata nbuffer "
-     "mesh_vertadr mesh_vertnum mesh_texcoordadr mesh_faceadr mesh_facenum mesh_graphadr skin_vertadr "
-     "skin_vertnum skin_texcoordadr skin_faceadr skin_facenum skin_boneadr skin_bonenum skin_face "
-     "skin_bonevertadr skin_bonevertnum skin_bonebodyid skin_bonevertid hfield_nrow hfield_ncol "
-     "hfield_adr tex_type tex_height tex_width tex_adr tendon_adr tendon_num wrap_type wrap_objid "
-     "sensor_type sensor_datatype sensor_needstage sensor_objtype sensor_objid sensor_reftype "
-     "sensor_refid sensor_dim sensor_adr numeric_adr numeric_size text_adr text_size tuple_adr "
-     "tuple_size tuple_objtype tuple_objid"},
+     "nq nv nu na nbody njnt ngeom nsite ncam nlight nmesh nmeshvert nmeshtexvert nmeshface nmeshgraph nskin "
+     "nskinvert nskintexvert nskinface nskinbone nskinbonevert nhfield nhfielddata ntex ntexdata nmat npair "
+     "nexclude neq ntendon nwrap nsensor nnumeric nnumericdata ntext ntextdata ntuple ntupledata nkey nmocap "
+     "nuser_body nuser_jnt nuser_geom nuser_site nuser_cam nuser_tendon nuser_actuator nuser_sensor nnames "
+     "nM nD nemax nuserdata nsensordata nbuffer mesh_vertadr mesh_vertnum mesh_texcoordadr mesh_faceadr "
+     "mesh_facenum mesh_graphadr skin_vertadr skin_vertnum skin_texcoordadr skin_faceadr skin_facenum "
+     "skin_boneadr skin_bonenum skin_face skin_bonevertadr skin_bonevertnum skin_bonebodyid skin_bonevertid "
+     "hfield_nrow hfield_ncol hfield_adr tex_type tex_height tex_width tex_adr tendon_adr tendon_num "
+     "wrap_type wrap_objid sensor_type sensor_datatype sensor_needstage sensor_objtype sensor_objid "
+     "sensor_reftype sensor_refid sensor_dim sensor_adr numeric_adr numeric_size text_adr text_size "
+     "tuple_adr tuple_size tuple_objtype tuple_objid"},
     {FieldClass::kDerived, "size of buffers; a run that needs more ends with the engine's warning",
      "njmax nconmax nstack"},
     {FieldClass::kDerived, "order of the tree, which names match (adapter)",
-     "body_parentid body_rootid body_weldid body_mocapid body_jntnum body_jntadr body_dofnum "
-     "body_dofadr body_geomnum body_geomadr body_simple body_sameframe jnt_type jnt_qposadr "
-     "jnt_dofadr jnt_bodyid dof_bodyid dof_jntid dof_parentid dof_Madr dof_simplenum geom_bodyid "
-     "geom_sameframe site_bodyid site_sameframe"},
+     "body_parentid body_rootid body_weldid body_mocapid body_jntnum body_jntadr body_dofnum body_dofadr "
+     "body_geomnum body_geomadr body_simple body_sameframe jnt_type jnt_qposadr jnt_dofadr jnt_bodyid "
+     "dof_bodyid dof_jntid dof_parentid dof_Madr dof_simplenum geom_bodyid geom_sameframe site_bodyid "
+     "site_sameframe"},
     {FieldClass::kDerived, "of the bodies' masses and inertias",
      "body_subtreemass body_invweight0 dof_invweight0 dof_M0 stat.meanmass stat.meansize"},
     {FieldClass::kDerived, "type or mesh that a geom refers to", "geom_type geom_dataid"},
@@ -67,10 +66,9 @@ constexpr FieldGroup kFieldGroups[] = {
     {FieldClass::kDerived, "the joint that a motor is named by", "actuator_trnid"},
     {FieldClass::kDerived, "of the motors' gears", "actuator_acc0 actuator_length0"},
     {FieldClass::kDerived, "names, by which both sides are matched (adapter)",
-     "name_bodyadr name_jntadr name_geomadr name_siteadr name_camadr name_lightadr name_meshadr "
-     "name_skinadr name_hfieldadr name_texadr name_matadr name_pairadr name_excludeadr name_eqadr "
-     "name_tendonadr name_actuatoradr name_sensoradr name_numericadr name_textadr name_tupleadr "
-     "name_keyadr names"},
+     "name_bodyadr name_jntadr name_geomadr name_siteadr name_camadr name_lightadr name_meshadr name_skinadr "
+     "name_hfieldadr name_texadr name_matadr name_pairadr name_excludeadr name_eqadr name_tendonadr "
+     "name_actuatoradr name_sensoradr name_numericadr name_textadr name_tupleadr name_keyadr names"},
     {FieldClass::kCompared, "joint_axis", "qpos0 body_pos body_quat jnt_pos jnt_axis"},
     {FieldClass::kCompared, "link_com", "body_ipos"},
     {FieldClass::kCompared, "link_inertia", "body_iquat body_inertia"},
@@ -116,21 +114,21 @@ constexpr FieldGroup kFieldGroups[] = {
     {FieldClass::kJudged, "motor_limit",
      "actuator_ctrllimited actuator_forcelimited actuator_ctrlrange actuator_forcerange"},
     {FieldClass::kJudged, "solver",
-     "opt.tolerance opt.noslip_tolerance opt.mpr_tolerance opt.integrator opt.cone opt.jacobian "
-     "opt.solver opt.iterations opt.mpr_iterations stat.meaninertia"},
+     "opt.tolerance opt.noslip_tolerance opt.mpr_tolerance opt.integrator opt.cone opt.jacobian opt.solver "
+     "opt.iterations opt.mpr_iterations stat.meaninertia"},
     {FieldClass::kNoEffect, "used by springs alone (joint_spring)", "qpos_spring"},
     {FieldClass::kNoEffect, "for users' programs",
-     "body_user jnt_user site_user cam_user tendon_user actuator_user sensor_user numeric_data "
-     "text_data tuple_objprm"},
+     "body_user jnt_user site_user cam_user tendon_user actuator_user sensor_user numeric_data text_data "
+     "tuple_objprm"},
     {FieldClass::kNoEffect, "looks",
-     "jnt_group geom_matid geom_group geom_rgba site_type site_matid site_group site_size site_rgba "
-     "cam_mode cam_bodyid cam_targetbodyid cam_pos cam_quat cam_fovy cam_ipd light_mode light_bodyid "
+     "jnt_group geom_matid geom_group geom_rgba site_type site_matid site_group site_size site_rgba cam_mode "
+     "cam_bodyid cam_targetbodyid cam_pos cam_quat cam_fovy cam_ipd light_mode light_bodyid "
      "light_targetbodyid light_directional light_castshadow light_active light_pos light_dir "
-     "light_attenuation light_cutoff light_exponent light_ambient light_diffuse light_specular "
-     "mesh_normal mesh_texcoord skin_matid skin_group skin_rgba skin_inflate skin_vert skin_texcoord "
-     "skin_bonebindpos skin_bonebindquat skin_bonevertweight tex_rgb mat_texid mat_texuniform "
-     "mat_texrepeat mat_emission mat_specular mat_shininess mat_reflectance mat_rgba tendon_matid "
-     "tendon_group tendon_width tendon_rgba actuator_group stat.center stat.extent"},
+     "light_attenuation light_cutoff light_exponent light_ambient light_diffuse light_specular mesh_normal "
+     "mesh_texcoord skin_matid skin_group skin_rgba skin_inflate skin_vert skin_texcoord skin_bonebindpos "
+     "skin_bonebindquat skin_bonevertweight tex_rgb mat_texid mat_texuniform mat_texrepeat mat_emission "
+     "mat_specular mat_shininess mat_reflectance mat_rgba tendon_matid tendon_group tendon_width tendon_rgba "
+     "actuator_group stat.center stat.extent"},
     {FieldClass::kNoEffect, "acts beyond the joints' ranges alone, where no run may go",
      "jnt_solref jnt_solimp"},
     {FieldClass::kNoEffect, "of dry friction (joint_dry_friction)", "dof_solref dof_solimp"},

@@ -12,7 +12,6 @@
 
 #include "harness/plant/engine_simulation.h"
 #include "harness/plant/observer.h"
-#include "tests/common/allocation_counter.h"
 #include "tests/common/paths.h"
 #include "tests/harness/checks/step_check_scene.h"
 
@@ -104,21 +103,6 @@ TEST(StepModelCheck, AgreesWithWhatTheControllerEvaluatesInThePlant) {
   }
 }
 
-TEST(StepModelCheck, ComparingDoesNotAllocate) {
-  GraspWalk walk;
-  CheckedController controller(walk.scene().model.spec(), Torus(kRingRadius, kTubeRadius),
-                               walk.scene().fingertips);
-  std::int64_t allocations = 0;
-  for (int step = 0; step < 20; ++step) {
-    walk.Step(1.0);
-    controller.SetState(walk.q, walk.xi, walk.X_Bo, walk.V_Bo);
-    const AllocationCounter counter;
-    controller.Compare(step);
-    allocations += counter.count();
-  }
-  EXPECT_EQ(allocations, 0);
-}
-
 /// A change of the model, and what must come of it.
 struct Mutation {
   const char* name;
@@ -178,30 +162,12 @@ const Mutation kMutations[] = {
      {"frame_pose", "J", "J_dot_xi", "friction", "contact_frame", "G", "J_B", "J_B_dot_xi", "M_hat", "N_o"},
      "gravity",
      "waist_pitch"},
-    {"JointAxis",
-     [](RobotSpec* spec, Torus*) { FindJoint(spec, "r_elbow").mdh.alpha += 1e-3; },
-     {"frame_pose", "J", "J_dot_xi", "M_bar", "C_bar_xi", "gravity", "contact_frame", "J_B", "J_B_dot_xi"},
-     {"friction", "object_pose", "M_hat", "C_hat_V", "N_o"},
-     "frame_pose",
-     "r_"},
     {"Damping",
      [](RobotSpec* spec, Torus*) { FindJoint(spec, "r_elbow").damping *= kChange; },
      {"friction"},
      {"M_bar", "C_bar_xi", "gravity"},
      "friction",
      "r_elbow"},
-    {"WheelDamping",
-     [](RobotSpec* spec, Torus*) { spec->base.wheel.damping *= kChange; },
-     {"friction"},
-     {"M_bar", "C_bar_xi", "gravity"},
-     "friction",
-     "v_c"},
-    {"Armature",
-     [](RobotSpec* spec, Torus*) { FindJoint(spec, "l_elbow").armature *= kChange; },
-     {"M_bar", "kinetic_energy"},
-     {"C_bar_xi", "gravity", "friction", "angular_momentum"},
-     "M_bar",
-     "(l_elbow, l_elbow)"},
     {"Gravity",
      [](RobotSpec* spec, Torus*) { spec->gravity *= kChange; },
      {"gravity", "potential_energy", "N_o", "object_potential_energy"},
@@ -234,23 +200,11 @@ const Mutation kMutations[] = {
      {"frame_pose", "J", "M_hat", "N_o"},
      "contact_frame",
      "rf1_tip"},
-    {"TorusRing",
-     [](RobotSpec*, Torus* torus) { *torus = Torus(kRingRadius * kChange, kTubeRadius); },
-     {"contact_frame", "J_B", "G", "J_B_dot_xi", "G_dot_T_V"},
-     {"frame_pose", "J", "M_hat", "N_o"},
-     "G",
-     "rf1_tip"},
     {"ObjectInertia",
      [](RobotSpec* spec, Torus*) { spec->object->body.inertia(2, 2) *= kChange; },
      {"M_hat", "C_hat_V", "M_o", "C_o_X_o_dot", "object_kinetic_energy"},
      {"N_o", "object_pose", "V_Bo", "M_bar", "object_potential_energy"},
      "M_hat",
-     "torus"},
-    {"ObjectMass",
-     [](RobotSpec* spec, Torus*) { spec->object->body.mass *= kChange; },
-     {"M_hat", "C_hat_V", "M_o", "N_o", "object_kinetic_energy", "object_potential_energy"},
-     {"object_pose", "V_Bo", "G", "gravity"},
-     "N_o",
      "torus"},
 };
 

@@ -92,8 +92,8 @@ TEST_F(CompareFiles, AJointThatFollowsAnotherIsADisagreementUnlessItIsIgnored) {
   WriteChanged("mimic.urdf", kUrdf, "<origin xyz=\"0.3 0 0\"/>",
                "<origin xyz=\"0.3 0 0\"/><mimic joint=\"shoulder\" multiplier=\"0.5\"/>");
   WriteChanged("tied.xml", kPair, "</worldbody>",
-               "</worldbody><equality><joint joint1=\"elbow\" joint2=\"shoulder\" "
-               "polycoef=\"0 0.5 0 0 0\"/></equality>");
+               "</worldbody><equality><joint joint1=\"elbow\" joint2=\"shoulder\" polycoef=\"0 0.5 0 0 "
+               "0\"/></equality>");
   Compare(0, "mimic.urdf", "tied.xml");
   for (const auto& [a, b, check] : {std::tuple("mimic.urdf", "b.xml", "joint_coupling"),
                                     {"mimic.urdf", "a.urdf", "joint_coupling"},
@@ -213,12 +213,12 @@ TEST_F(CompareFiles, PartsWithoutANameGetOne) {
   Compare(0, "nameless.toml", "nameless.urdf");
   // A free body, too.
   WriteChanged("free.xml", kPair, "<body name=\"upper\" pos=\"0 0 0.1\">",
-               "<body pos=\"0 0 1\"><freejoint/><inertial pos=\"0 0 0\" mass=\"1\" "
-               "diaginertia=\"1 1 1\"/><body name=\"upper\" pos=\"0 0 0.1\">");
+               "<body pos=\"0 0 1\"><freejoint/><inertial pos=\"0 0 0\" mass=\"1\" diaginertia=\"1 1 "
+               "1\"/><body name=\"upper\" pos=\"0 0 0.1\">");
   WriteChanged("free.xml", Read("free.xml"), "  </worldbody>", "</body></worldbody>");
   WriteChanged("free.urdf", kUrdf, "<link name=\"stand\"/>",
-               "<link name=\"stand\"><inertial><mass value=\"1\"/><inertia ixx=\"1\" "
-               "iyy=\"1\" izz=\"1\" ixy=\"0\" ixz=\"0\" iyz=\"0\"/></inertial></link>");
+               "<link name=\"stand\"><inertial><mass value=\"1\"/><inertia ixx=\"1\" iyy=\"1\" izz=\"1\" "
+               "ixy=\"0\" ixz=\"0\" iyz=\"0\"/></inertial></link>");
   Compare(0, "free.urdf", "free.xml");
 }
 
@@ -249,10 +249,9 @@ TEST_F(PartOfRobot, TheCommonPartIsComparedAndSaid) {
   EXPECT_THAT(results.at("not_compared"), Contains(AllOf(HasSubstr("left out"), HasSubstr("finger"))));
   EXPECT_GT(results.at("checks").at("M_bar").at("compared"), 0);
   // Where the other file has its mass, the joint is held.
-  WriteChanged(
-      "welded.xml", ReadFixture("pair.xml"), "diaginertia=\"0.01 0.011 0.012\"/>",
-      "diaginertia=\"0.01 0.011 0.012\"/><body pos=\"0.25 0 0\"><inertial pos=\"0.02 0 0\" mass=\"0.1\" "
-      "diaginertia=\"1e-4 2e-4 2e-4\"/></body>");
+  WriteChanged("welded.xml", ReadFixture("pair.xml"), "diaginertia=\"0.01 0.011 0.012\"/>",
+               "diaginertia=\"0.01 0.011 0.012\"/><body pos=\"0.25 0 0\"><inertial pos=\"0.02 0 0\" "
+               "mass=\"0.1\" diaginertia=\"1e-4 2e-4 2e-4\"/></body>");
   EXPECT_THAT(Compare(0, "a.urdf", "welded.xml").at("not_compared"),
               Contains(AllOf(HasSubstr("held"), HasSubstr("grip at 0"))));
   Compare(0, "a.urdf", "welded.xml", "--lock grip");

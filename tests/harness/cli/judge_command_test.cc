@@ -1,7 +1,6 @@
 // judge and compare of recordings as a user types them: exit codes, JSON, one line for what is wrong.
 
 #include <cmath>
-#include <fstream>
 #include <sstream>
 
 #include "tests/common/refused_text.h"

@@ -6,14 +6,14 @@
 
 #include "controller/common/errors.h"
 #include "controller/dynamics/model_terms.h"
-#include "controller/model/body_frame.h"
 #include "controller/model/parameter_reader.h"
+#include "controller/model/rigid_body.h"
 #include "harness/checks/consistency.h"
 #include "harness/descriptions/audit.h"
 #include "harness/descriptions/description_match.h"
+#include "harness/descriptions/description_writer.h"
 #include "harness/descriptions/hypotheses.h"
 #include "harness/descriptions/mjcf_reader.h"
-#include "harness/descriptions/parameter_writer.h"
 #include "harness/descriptions/program_layout.h"
 #include "harness/engine/engine.h"
 #include "tests/common/files.h"
@@ -201,11 +201,10 @@ TEST(BallJoints, MjcfIsImportedAndAgrees) {
   EXPECT_EQ(table.spec.joints.size(), 4U);
   for (const CheckRecord& record : CompareWithEngine(RobotModel(table.spec), *engine).terms)
     EXPECT_LT(record.worst, 1e-13) << record.name;
-  EXPECT_THAT(
-      DescribeCoordinates(table),
-      Contains(HasSubstr(R"(ball joints: "shoulder" has q[0..3] and xi[0..2], "wrist" has q[6..9] )"
-                         "and xi[5..7]: q = [qw qx qy qz] turns the link against its parent, xi = its "
-                         "angular velocity against the parent in the link's own axes")));
+  EXPECT_THAT(DescribeCoordinates(table),
+              Contains(HasSubstr(R"(ball joints: "shoulder" has q[0..3] and xi[0..2], "wrist" has q[6..9] )"
+                                 "and xi[5..7]: q = [qw qx qy qz] turns the link against its parent, xi = "
+                                 "its angular velocity against the parent in the link's own axes")));
   const AuditResult audit = AuditRobot(mjcf);
   EXPECT_TRUE(audit.IsGood()) << audit.findings.at(0).text;
 }

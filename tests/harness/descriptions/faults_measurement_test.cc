@@ -8,7 +8,7 @@
 #include <cstdlib>
 #include <regex>
 
-#include "controller/model/body_frame.h"
+#include "controller/model/rigid_body.h"
 #include "harness/descriptions/hypotheses.h"
 #include "tests/harness/descriptions/robot_pairs.h"
 

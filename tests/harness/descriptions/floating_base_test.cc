@@ -10,8 +10,8 @@
 #include "harness/checks/consistency.h"
 #include "harness/checks/file_comparison.h"
 #include "harness/descriptions/description_match.h"
+#include "harness/descriptions/description_writer.h"
 #include "harness/descriptions/mjcf_reader.h"
-#include "harness/descriptions/parameter_writer.h"
 #include "harness/descriptions/read_description.h"
 #include "harness/descriptions/urdf_reader.h"
 #include "harness/engine/engine.h"
@@ -151,12 +151,11 @@ TEST_P(LeggedRobots, FixedInOneFileAndFloatingInTheOtherIsSaid) {
   RobotDescription mjcf = ReadMjcfDescription(*engine_, "robot.xml");
   const std::vector<std::string> notes = CompleteEachOther(&urdf, &mjcf).notes;
   EXPECT_THAT(notes,
-              Contains(HasSubstr("base: robot.urdf does not say how its root moves; it floats as that of "
-                                 "robot.xml")));
-  EXPECT_THAT(
-      DescribeCoordinates(urdf),
-      Contains(HasSubstr("q = [x y z, qw qx qy qz, joints from q[7]], xi = [velocity of its origin in world "
-                         "axes, angular velocity in its own axes, joints from xi[6]]")));
+              Contains(HasSubstr(
+                  "base: robot.urdf does not say how its root moves; it floats as that of robot.xml")));
+  EXPECT_THAT(DescribeCoordinates(urdf),
+              Contains(HasSubstr("q = [x y z, qw qx qy qz, joints from q[7]], xi = [velocity of its origin "
+                                 "in world axes, angular velocity in its own axes, joints from xi[6]]")));
 }
 
 INSTANTIATE_TEST_SUITE_P(FloatingBase, LeggedRobots, ::testing::Values("quadruped", "humanoid"));

@@ -10,7 +10,7 @@
 #include <functional>
 #include <ostream>
 
-#include "controller/model/body_frame.h"
+#include "controller/model/rigid_body.h"
 #include "harness/descriptions/read_description.h"
 #include "tests/common/legged_robots.h"
 #include "tests/common/matchers.h"

@@ -88,8 +88,7 @@ inline std::string MakePandaUrdf() {
   }
   return text +
          "<link name=\"panda_flange\"/>\n<joint name=\"flange_joint\" type=\"fixed\"><origin xyz=\"0 0 "
-         "0.107\"/>"
-         "<parent link=\"panda_link7\"/><child link=\"panda_flange\"/></joint>\n</robot>\n";
+         "0.107\"/><parent link=\"panda_link7\"/><child link=\"panda_flange\"/></joint>\n</robot>\n";
 }
 
 }  // namespace dexcheck::testing

@@ -1,12 +1,12 @@
 // A program that cannot be started costs nothing.
 
-#include "harness/descriptions/program_process.h"
-
 #include <fcntl.h>
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 
 #include <filesystem>
+
+#include "harness/descriptions/program_provider.h"
 
 namespace dexcheck::testing::program_process_test {
 namespace {

@@ -7,7 +7,7 @@
 #include <gmock/gmock.h>
 
 #include "harness/checks/file_comparison.h"
-#include "harness/descriptions/parameter_writer.h"
+#include "harness/descriptions/description_writer.h"
 #include "harness/descriptions/read_description.h"
 #include "tests/common/files.h"
 #include "tests/common/legged_robots.h"

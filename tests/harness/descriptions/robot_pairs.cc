@@ -2,7 +2,7 @@
 
 #include <random>
 
-#include "controller/model/body_frame.h"
+#include "controller/model/rigid_body.h"
 #include "harness/descriptions/mjcf_reader.h"
 #include "harness/descriptions/read_description.h"
 #include "harness/engine/engine.h"

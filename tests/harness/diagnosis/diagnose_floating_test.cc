@@ -11,8 +11,8 @@
 #include <sstream>
 
 #include "controller/model/parameter_reader.h"
+#include "harness/descriptions/description_writer.h"
 #include "harness/descriptions/mjcf_reader.h"
-#include "harness/descriptions/parameter_writer.h"
 #include "harness/diagnosis/diagnose.h"
 #include "harness/diagnosis/file_terms.h"
 #include "harness/diagnosis/mutation.h"

@@ -62,9 +62,7 @@ TEST_F(LogReaderTest, UnknownNamesAreNamed) {
   const LogReader log(path_);
   const std::string file = path_.string() + ": ";
   EXPECT_EQ(MessageOf<InputError>([&] { (void)log.ReadSignal("object/X"); }),
-            file +
-                "no signal \"object/X\", did you mean "
-                "\"object/X_o\"?");
+            file + "no signal \"object/X\", did you mean \"object/X_o\"?");
   EXPECT_EQ(MessageOf<InputError>([&] { (void)log.ReadSignal("object"); }), file + "no signal \"object\"");
   EXPECT_EQ(MessageOf<InputError>([&] { (void)log.ReadText("scenari"); }),
             file + "no text \"scenari\", did you mean \"scenario\"?");
@@ -123,17 +121,6 @@ TEST_F(LogReaderTest, FilesThatAreNoLogsAreRefused) {
   for (const std::string& text : {std::string("x"), std::string("time,x\n0,1\n"), std::string(5000, '\0')}) {
     WriteText(path_, text);
     EXPECT_EQ(Open(), file + "not a dexcheck log");
-  }
-}
-
-TEST_F(LogReaderTest, EveryTruncationIsNoticed) {
-  WriteSampleLog(path_, 20, 20);
-  const std::uintmax_t size = std::filesystem::file_size(path_);
-  ASSERT_TRUE(IsSample(LogReader(path_), 20));
-  constexpr std::uintmax_t kStride = 997;
-  for (std::uintmax_t length = size - 1; length > kStride; length -= kStride) {
-    std::filesystem::resize_file(path_, length);
-    ASSERT_THAT(Open(), StartsWith(path_.string() + ": ")) << length;
   }
 }
 

@@ -7,7 +7,6 @@
 #include <algorithm>
 
 #include "harness/plant/sensing.h"
-#include "tests/common/allocation_counter.h"
 #include "tests/common/matrix_near.h"
 #include "tests/harness/run/shipped_run.h"
 
@@ -99,13 +98,6 @@ TEST_F(EnginePlantTest, MovesAsAWhole) {
   EXPECT_NEAR(reading_.state.q[1] - before.state.q[1], -0.125, kRounding);
   const Vector3d moved = reading_.state.X_Bo.translation() - before.state.X_Bo.translation();
   EXPECT_TRUE(MatrixNear(moved, Vector3d(0.25, -0.125, 0.0), kRounding));
-}
-
-TEST_F(EnginePlantTest, ReadsWithoutAllocation) {
-  Step();
-  const AllocationCounter counter;
-  Step();
-  EXPECT_EQ(counter.count(), 0);
 }
 
 TEST_F(EnginePlantTest, TheControllerMeasuresTheTrueStateUnlessDeclaredOtherwise) {

@@ -232,8 +232,7 @@ TEST(RigidRun, PushesMoveItAsTheEngine) {
                          const std::string& step = "plant.time_step=1e-3") {
     const std::string pushes =
         "disturbance=[{ type = 'step', body = 'r_forearm', force = [0, 3, 1] }, { type = 'pulse', body = "
-        "'object', "
-        "force = [0, 0, 0.5], torque = [0, 0.01, 0], begin = 0.1, duration = 0.1 }]";
+        "'object', force = [0, 0, 0.5], torque = [0, 0.01, 0], begin = 0.1, duration = 0.1 }]";
     ShippedRun run(
         "hold", {plant, step, "duration=0.3", "settle=0.3", "expect={}", pushed ? pushes : "disturbance=[]"});
     const RunResult& result = run.Run();

@@ -6,7 +6,7 @@
 
 #include "controller/common/errors.h"
 #include "harness/descriptions/read_description.h"
-#include "harness/engine/self_contact.h"
+#include "harness/engine/clearance.h"
 #include "harness/recordings/judge_recordings.h"
 #include "tests/common/files.h"
 #include "tests/common/paths.h"

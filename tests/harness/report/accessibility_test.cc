@@ -19,11 +19,9 @@ namespace {
 
 /// Everything unfolded; what axe finds comes as one line each.
 constexpr const char* kAsk =
-    "for (const fold of document.querySelectorAll('details')) fold.open = true;"
-    "window.found = null; axe.run({resultTypes: ['violations']}).then(r => { window.found = "
-    "r.violations.map(v => "
-    "`${v.id} (${v.impact}), ${v.nodes.length} times: ${v.nodes[0].target} ${v.nodes[0].failureSummary}`); "
-    "});";
+    "for (const fold of document.querySelectorAll('details')) fold.open = true;window.found = null; "
+    "axe.run({resultTypes: ['violations']}).then(r => { window.found = r.violations.map(v => `${v.id} "
+    "(${v.impact}), ${v.nodes.length} times: ${v.nodes[0].target} ${v.nodes[0].failureSummary}`); });";
 
 class AccessibilityBrowserTest : public ::testing::Test {
  protected:
@@ -60,8 +58,7 @@ TEST_F(AccessibilityBrowserTest, AxeFindsNothingInThePageOfARun) {
   // It can find something: a picture without a text, grey on grey.
   (void)browser.Run(
       "document.body.insertAdjacentHTML('beforeend', '<img src=\"data:,\"><p style=\"color: #777; "
-      "background: "
-      "#888\">faint</p>');");
+      "background: #888\">faint</p>');");
   (void)browser.Run(kAsk);
   ASSERT_TRUE(browser.WaitFor("return window.found !== null;", 60.0));
   const std::string found = browser.Run("return window.found;").dump();

@@ -36,12 +36,11 @@ class JudgeBrowserTest : public ::testing::Test {
       browser_.SetViewport(width, 900, false);
       EXPECT_LE(browser_.Run("return document.documentElement.scrollWidth - innerWidth;"), 0) << width;
       // What a table has beyond its card can be scrolled to.
-      EXPECT_EQ(
-          browser_.Run(
-              "return [...document.querySelectorAll('.card, .verdict, .tiles b, p, h1, h3')]"
-              "  .filter(c => c.scrollWidth > c.clientWidth && getComputedStyle(c).overflowX !== 'auto' &&"
-              "    getComputedStyle(c).display !== 'inline').map(c => c.innerText.slice(0, 40));"),
-          nlohmann::json::array())
+      EXPECT_EQ(browser_.Run(
+                    "return [...document.querySelectorAll('.card, .verdict, .tiles b, p, h1, h3')]  "
+                    ".filter(c => c.scrollWidth > c.clientWidth && getComputedStyle(c).overflowX !== 'auto' "
+                    "&&    getComputedStyle(c).display !== 'inline').map(c => c.innerText.slice(0, 40));"),
+                nlohmann::json::array())
           << width;
     }
   }
@@ -94,8 +93,8 @@ TEST_F(JudgeBrowserTest, TwoRecordingsAreShownWithTheirCauses) {
 
   // The fourth joint: what was measured, and what is left beyond the causes with its noise.
   const nlohmann::json points = browser_.Run(
-      "const boxes = document.querySelectorAll('[data-plot]'); return [6, 7].map(k => boxes[k].chart.data"
-      ".datasets[0].data.find(point => point.x > 3 && point.y));");
+      "const boxes = document.querySelectorAll('[data-plot]'); return [6, 7].map(k => "
+      "boxes[k].chart.data.datasets[0].data.find(point => point.x > 3 && point.y));");
   const auto row = static_cast<size_t>(points[0]["x"].get<double>() / options.step);
   RecordedTable table = first;
   EXPECT_NEAR(points[0]["y"].get<double>(), table.Get("tau.panda_joint4")[row], 1.5) << "a mean over a block";
@@ -106,17 +105,15 @@ TEST_F(JudgeBrowserTest, TwoRecordingsAreShownWithTheirCauses) {
 
   // A zoom in the first recording's first plot is one in all.
   const nlohmann::json area = browser_.Run(
-      "const {canvas, chartArea: a} = document.querySelectorAll('[data-plot]')[0].chart,"
-      "  r = canvas.getBoundingClientRect();"
-      "return [r.x + a.left, r.y + a.top + a.height / 2, a.width].map(Math.round);");
+      "const {canvas, chartArea: a} = document.querySelectorAll('[data-plot]')[0].chart,  r = "
+      "canvas.getBoundingClientRect();return [r.x + a.left, r.y + a.top + a.height / 2, "
+      "a.width].map(Math.round);");
   const int x = area[0], y = area[1], width = area[2];
   browser_.Drag(x + width / 4, y, x + width / 2, y);
-  ASSERT_TRUE(
-      browser_.WaitFor("const x = document.querySelectorAll('[data-plot]')[0].chart.scales.x;"
-                       "return x.max - x.min < 5;"));
-  EXPECT_EQ(browser_.Run(
-                "const all = [...document.querySelectorAll('[data-plot]')].map(b => [b.chart.scales.x.min, "
-                "b.chart.scales.x.max].join());return new Set(all).size;"),
+  ASSERT_TRUE(browser_.WaitFor(
+      "const x = document.querySelectorAll('[data-plot]')[0].chart.scales.x;return x.max - x.min < 5;"));
+  EXPECT_EQ(browser_.Run("const all = [...document.querySelectorAll('[data-plot]')].map(b => "
+                         "[b.chart.scales.x.min, b.chart.scales.x.max].join());return new Set(all).size;"),
             1);
   EXPECT_EQ(browser_.Run("return ReadJson('replay-scene').parts;"), kJoints + 1)
       << "the joints' links and the world";

@@ -1,7 +1,5 @@
 // The motion of a recording: rods of a table of joints stand where the engine's links do.
 
-#include "harness/report/judge_replay.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -14,6 +12,7 @@
 #include <vector>
 
 #include "harness/descriptions/read_description.h"
+#include "harness/report/judge_page.h"
 #include "tests/common/paths.h"
 
 namespace dexcheck::testing::judge_replay_test {

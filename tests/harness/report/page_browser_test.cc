@@ -7,7 +7,6 @@
 #include <fstream>
 #include <string>
 
-#include "harness/report/campaign_page.h"
 #include "harness/report/page.h"
 #include "harness/report/run_comparison.h"
 #include "harness/report/run_data.h"
@@ -32,8 +31,7 @@ const char* const kAllDrawn =
 /// [from, to] of the plot with this number.
 std::string AskRange(int plot) {
   return "const x = document.querySelectorAll('[data-plot]')[" + std::to_string(plot) +
-         "].chart.scales.x;"
-         "return [x.min, x.max];";
+         "].chart.scales.x;return [x.min, x.max];";
 }
 
 class PageBrowserTest : public ::testing::Test {
@@ -47,10 +45,9 @@ class PageBrowserTest : public ::testing::Test {
     browser_.SetViewport(width, height, mobile);
     browser_.Open(folder_.path() / "report.html");
     const nlohmann::json place = browser_.Run(
-        "const r = document.getElementById('verdict').getBoundingClientRect();"
-        "return {bottom: r.bottom, height: r.height, text: document.getElementById('verdict').innerText,"
-        "  scroll: scrollY, view: innerHeight, overflow: document.documentElement.scrollWidth - "
-        "innerWidth};");
+        "const r = document.getElementById('verdict').getBoundingClientRect();return {bottom: r.bottom, "
+        "height: r.height, text: document.getElementById('verdict').innerText,  scroll: scrollY, view: "
+        "innerHeight, overflow: document.documentElement.scrollWidth - innerWidth};");
     EXPECT_EQ(place["scroll"], 0);
     EXPECT_GT(place["height"], 50.0);
     EXPECT_LT(place["bottom"], height) << width;
@@ -74,18 +71,17 @@ class PageBrowserTest : public ::testing::Test {
 
   void ExpectZoomAndReset() {
     const nlohmann::json area = browser_.Run(
-        "const {canvas, chartArea: a} = document.querySelectorAll('[data-plot]')[0].chart,"
-        "  r = canvas.getBoundingClientRect();"
-        "return [r.x + a.left, r.y + a.top, a.width, a.height].map(Math.round);");
+        "const {canvas, chartArea: a} = document.querySelectorAll('[data-plot]')[0].chart,  r = "
+        "canvas.getBoundingClientRect();return [r.x + a.left, r.y + a.top, a.width, "
+        "a.height].map(Math.round);");
     const int x = area[0];
     const int y = area[1].get<int>() + area[3].get<int>() / 2;
     const int width = area[2];
     ASSERT_GT(width, 200);
     ExpectRange(0, 0.0, kEnd);
     browser_.Drag(x + width / 4, y, x + width / 2, y);
-    ASSERT_TRUE(
-        browser_.WaitFor("const x = document.querySelectorAll('[data-plot]')[0].chart.scales.x;"
-                         "return x.max - x.min < 1;"));
+    ASSERT_TRUE(browser_.WaitFor(
+        "const x = document.querySelectorAll('[data-plot]')[0].chart.scales.x;return x.max - x.min < 1;"));
     for (const int plot : {0, 1, 5}) ExpectRange(plot, 0.25 * kEnd, 0.5 * kEnd);
     browser_.DoubleClick(x + width / 2, y);
     for (const int plot : {0, 1, 5}) ExpectRange(plot, 0.0, kEnd);
@@ -103,8 +99,8 @@ TEST_F(PageBrowserTest, ShowsVerdictAndPlotsWithoutErrors) {
   // The plots have the log's numbers: x actual and desired, near t = 1 s, where a row for each pixel is
   // drawn.
   const nlohmann::json points = browser_.Run(
-      "const sets = document.querySelectorAll('[data-plot]')[0].chart.data.datasets;"
-      "return sets.map(set => set.data.find(point => point.x >= 1));");
+      "const sets = document.querySelectorAll('[data-plot]')[0].chart.data.datasets;return sets.map(set => "
+      "set.data.find(point => point.x >= 1));");
   ASSERT_EQ(points.size(), 2);
   for (size_t k = 0; k < points.size(); ++k) {
     const double t = points[k]["x"];
@@ -114,17 +110,16 @@ TEST_F(PageBrowserTest, ShowsVerdictAndPlotsWithoutErrors) {
   }
   // Something was painted.
   EXPECT_GT(browser_
-                .Run("const c = document.querySelector('.plot canvas');"
-                     "return c.getContext('2d').getImageData(0, 0, c.width, c.height).data"
-                     "  .reduce((sum, value, i) => sum + (i % 4 === 3 && value > 0 ? 1 : 0), 0);")
+                .Run("const c = document.querySelector('.plot canvas');return "
+                     "c.getContext('2d').getImageData(0, 0, c.width, c.height).data  .reduce((sum, value, i) "
+                     "=> sum + (i % 4 === 3 && value > 0 ? 1 : 0), 0);")
                 .get<int>(),
             500);
   ExpectZoomAndReset();
 
   // A name switches its curve off.
-  EXPECT_EQ(browser_.Run("const box = document.querySelectorAll('[data-plot]')[0];"
-                         "box.querySelector('.keys button').click();"
-                         "return [0, 1].map(k => box.chart.isDatasetVisible(k));"),
+  EXPECT_EQ(browser_.Run("const box = document.querySelectorAll('[data-plot]')[0];box.querySelector('.keys "
+                         "button').click();return [0, 1].map(k => box.chart.isDatasetVisible(k));"),
             nlohmann::json({false, true}));
   // No id stands twice, and nothing was loaded.
   EXPECT_EQ(browser_.CountRepeatedIds(), 0);
@@ -162,8 +157,8 @@ TEST_F(PageBrowserTest, NoTileIsNarrowerThanItsWords) {
   for (const int width : {360, 641, 850, 1300, 2560}) {
     browser_.SetViewport(width, 900, false);
     ASSERT_GE(browser_.Run("return document.querySelectorAll('.category b').length;"), 1);
-    EXPECT_EQ(browser_.Run("return [...document.querySelectorAll('.tiles b')]"
-                           "  .filter(b => b.scrollWidth > b.clientWidth).map(b => b.textContent);"),
+    EXPECT_EQ(browser_.Run("return [...document.querySelectorAll('.tiles b')]  .filter(b => b.scrollWidth > "
+                           "b.clientWidth).map(b => b.textContent);"),
               nlohmann::json::array())
         << width;
   }
@@ -178,10 +173,11 @@ TEST_F(PageBrowserTest, AComparisonsTablesStayInTheirCards) {
   for (const int width : {360, 800, 1300}) {
     browser_.SetViewport(width, 900, false);
     ASSERT_GE(browser_.Run("return document.querySelectorAll('.card table').length;"), 2);
-    EXPECT_EQ(browser_.Run("return [...document.querySelectorAll('.card')]"
-                           "  .filter(c => c.scrollWidth > c.clientWidth && "
-                           "getComputedStyle(c).overflowX !== 'auto').map(c => c.innerText.slice(0, 40));"),
-              nlohmann::json::array())
+    EXPECT_EQ(
+        browser_.Run(
+            "return [...document.querySelectorAll('.card')]  .filter(c => c.scrollWidth > c.clientWidth && "
+            "getComputedStyle(c).overflowX !== 'auto').map(c => c.innerText.slice(0, 40));"),
+        nlohmann::json::array())
         << width;
   }
   EXPECT_GE(browser_.Run("return document.querySelectorAll('#checks + .card details tr').length;"), 2)
@@ -231,9 +227,9 @@ TEST_F(PageBrowserTest, PlaysTheVideo) {
   // Red, green and blue of a pixel as it is painted.
   const std::string paint =
       video +
-      "const canvas = document.createElement('canvas'); canvas.width = 160; canvas.height = 90;"
-      "const context = canvas.getContext('2d', {willReadFrequently: true}); context.drawImage(video, 0, 0);"
-      "const pixel = context.getImageData(80, 45, 1, 1).data;";
+      "const canvas = document.createElement('canvas'); canvas.width = 160; canvas.height = 90;const context "
+      "= canvas.getContext('2d', {willReadFrequently: true}); context.drawImage(video, 0, 0);const pixel = "
+      "context.getImageData(80, 45, 1, 1).data;";
   EXPECT_TRUE(browser_.WaitFor(paint + "return pixel[0] > 150 && pixel[2] < 80;"))
       << "red at first, not " << browser_.Run(paint + "return [...pixel];");
   EXPECT_TRUE(browser_.Run(video + "video.muted = true; video.play();").is_null());
@@ -247,8 +243,8 @@ TEST_F(PageBrowserTest, WouldNoticeAVideoThatCannotBePlayed) {
   WriteRunReport(folder_.path(), MakeReportFiles(folder_.path()), MakeNoScene);
   browser_.Open(folder_.path() / "report.html");
   EXPECT_TRUE(
-      browser_.WaitFor("const video = document.querySelector('video');"
-                       "return video.error !== null && video.readyState === 0;"));
+      browser_.WaitFor("const video = document.querySelector('video');return video.error !== null && "
+                       "video.readyState === 0;"));
 }
 
 TEST_F(PageBrowserTest, WouldNoticeErrors) {

@@ -84,8 +84,7 @@ void ReplayBrowserTest::LookFrom(const Viewpoint& view) const {
     return std::to_string(p.x()) + "," + std::to_string(p.y()) + "," + std::to_string(p.z());
   };
   Ask("find('follow').checked = false; r.groups.tracks.visible = r.groups.ghost.visible = "
-      "r.groups.forces.visible = "
-      "false; r.renderer.setPixelRatio(1); r.renderer.setSize(" +
+      "r.groups.forces.visible = false; r.renderer.setPixelRatio(1); r.renderer.setSize(" +
       std::to_string(kWidth) + "," + std::to_string(kHeight) +
       ", false); r.camera.aspect = " + std::to_string(static_cast<double>(kWidth) / kHeight) +
       "; r.camera.fov = " + std::to_string(model_->vis.global.fovy) +
@@ -99,11 +98,11 @@ void ReplayBrowserTest::ExpectObjectDrawnAt(long row, Renderer* renderer, double
   const Image image = renderer->Render(*data_);
   const Vector3d there = FindTorus(image);
   ASSERT_GT(there.z(), 60.0);
-  const nlohmann::json pixels = Ask(
-      "runClock.set(" + std::to_string(run_.times[static_cast<size_t>(row)]) +
-      "); r.draw(); const gl = r.renderer.context, p = new Uint8Array(4 * gl.drawingBufferWidth * "
-      "gl.drawingBufferHeight); gl.readPixels(0, 0, gl.drawingBufferWidth, gl.drawingBufferHeight, gl.RGBA, "
-      "gl.UNSIGNED_BYTE, p); return [gl.drawingBufferWidth, gl.drawingBufferHeight, [...p]];");
+  const nlohmann::json pixels =
+      Ask("runClock.set(" + std::to_string(run_.times[static_cast<size_t>(row)]) +
+          "); r.draw(); const gl = r.renderer.context, p = new Uint8Array(4 * gl.drawingBufferWidth * "
+          "gl.drawingBufferHeight); gl.readPixels(0, 0, gl.drawingBufferWidth, gl.drawingBufferHeight, "
+          "gl.RGBA, gl.UNSIGNED_BYTE, p); return [gl.drawingBufferWidth, gl.drawingBufferHeight, [...p]];");
   ASSERT_EQ(pixels[0], kWidth);
   ASSERT_EQ(pixels[1], kHeight);
   const std::vector<int> rgba = pixels[2];
@@ -126,9 +125,8 @@ void ReplayBrowserTest::ExpectObjectDrawnAt(long row, Renderer* renderer, double
 TEST_F(ReplayBrowserTest, DrawsWhatTheOffscreenRendererDrawsAndCostsAPhoneLittle) {
   for (const long row : {0L, 37L, 100L}) ExpectPartsAt(row);
   const nlohmann::json info =
-      Ask("const info = r.renderer.info; info.autoReset = false; info.reset(); r.draw();"
-          "const spent = [info.render.calls, info.render.triangles]; info.autoReset = true; info.reset(); "
-          "return spent;");
+      Ask("const info = r.renderer.info; info.autoReset = false; info.reset(); r.draw();const spent = "
+          "[info.render.calls, info.render.triangles]; info.autoReset = true; info.reset(); return spent;");
   EXPECT_GT(info[0], 5);
   EXPECT_LE(info[0], kMostCalls);
   EXPECT_GT(info[1], 20'000);
@@ -160,17 +158,17 @@ TEST_F(ReplayBrowserTest, SharesItsTimeWithThePlots) {
   EXPECT_EQ(Ask("return [Number(find('time').value), find('clock').textContent];"),
             nlohmann::json({0.133, "t = 0.133 s"}));
   const std::string ask_line =
-      "const b = document.querySelectorAll('[data-plot]')[0], i = b.querySelector('.now');"
-      "return b.chart.scales.x.getValueForPixel(parseFloat(i.style.left));";
+      "const b = document.querySelectorAll('[data-plot]')[0], i = b.querySelector('.now');return "
+      "b.chart.scales.x.getValueForPixel(parseFloat(i.style.left));";
   EXPECT_NEAR(browser_.Run(ask_line).get<double>(), 0.133, 1e-3);
   // The slider moves the plots' line, a click into a plot the replay.
   Ask("find('time').value = 0.5; find('time').dispatchEvent(new Event('input'));");
   EXPECT_NEAR(browser_.Run(ask_line).get<double>(), 0.5, 1e-3);
   const nlohmann::json area = browser_.Run(
-      "document.querySelectorAll('[data-plot]')[0].scrollIntoView({block: 'center'});"
-      "const {canvas, chartArea: a} = document.querySelectorAll('[data-plot]')[0].chart,"
-      "  r = canvas.getBoundingClientRect();"
-      "return [r.x + a.left + 0.75 * a.width, r.y + a.top + 0.5 * a.height].map(Math.round);");
+      "document.querySelectorAll('[data-plot]')[0].scrollIntoView({block: 'center'});const {canvas, "
+      "chartArea: a} = document.querySelectorAll('[data-plot]')[0].chart,  r = "
+      "canvas.getBoundingClientRect();return [r.x + a.left + 0.75 * a.width, r.y + a.top + 0.5 * "
+      "a.height].map(Math.round);");
   browser_.Drag(area[0], area[1], area[0], area[1]);
   EXPECT_NEAR(Ask("return Number(find('time').value);").get<double>(), 0.75 * kEnd, 0.02 * kEnd);
 }
@@ -185,8 +183,8 @@ TEST_F(ReplayBrowserTest, PlaysTurnsHidesAndFits) {
       "r.draw(); return [...r.camera.position.toArray(), r.camera.position.distanceTo(r.controls.target)];";
   const nlohmann::json before = Ask(ask_camera);
   const nlohmann::json middle =
-      Ask("const v = box.querySelector('.view').getBoundingClientRect();"
-          "return [v.x + v.width / 2, v.y + v.height / 2].map(Math.round);");
+      Ask("const v = box.querySelector('.view').getBoundingClientRect();return [v.x + v.width / 2, v.y + "
+          "v.height / 2].map(Math.round);");
   browser_.Drag(middle[0], middle[1], middle[0].get<int>() + 120, middle[1]);
   const nlohmann::json after = Ask(ask_camera);
   EXPECT_GT(std::abs(after[0].get<double>() - before[0].get<double>()), 0.1);
@@ -203,10 +201,9 @@ TEST_F(ReplayBrowserTest, PlaysTurnsHidesAndFits) {
     browser_.SetViewport(width, 420, width < 500);
     (void)browser_.WaitFor("return document.documentElement.scrollWidth <= innerWidth;", 2.0);
     const nlohmann::json place = browser_.Run(
-        "for (const d of document.querySelectorAll('details')) d.open = true;"
-        "const v = document.querySelector('#replay .view').getBoundingClientRect();"
-        "return {overflow: document.documentElement.scrollWidth - innerWidth, width: v.width, height: "
-        "v.height};");
+        "for (const d of document.querySelectorAll('details')) d.open = true;const v = "
+        "document.querySelector('#replay .view').getBoundingClientRect();return {overflow: "
+        "document.documentElement.scrollWidth - innerWidth, width: v.width, height: v.height};");
     EXPECT_LE(place["overflow"], 0) << width;
     EXPECT_GT(place["width"], 0.75 * std::min(width, 1180)) << width;
     EXPECT_LT(place["height"], 0.7 * 420) << width;

@@ -10,7 +10,6 @@
 #include <set>
 #include <string>
 
-#include "harness/report/page_assets.h"
 #include "harness/report/page_frame.h"
 #include "tests/harness/report/replay_run.h"
 

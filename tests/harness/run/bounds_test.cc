@@ -11,7 +11,6 @@
 #include "controller/dynamics/tree_factor.h"
 #include "harness/checks/check_table.h"
 #include "harness/checks/contact_compliance.h"
-#include "harness/engine/contact_softness.h"
 #include "tests/common/matchers.h"
 #include "tests/harness/run/shipped_run.h"
 

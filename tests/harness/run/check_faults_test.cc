@@ -2,7 +2,6 @@
 
 #include <gmock/gmock.h>
 
-#include <functional>
 #include <set>
 
 #include "harness/plant/engine_plant.h"

@@ -102,16 +102,6 @@ TEST(ImplicitDamping, LosesDigitsThatExplicitDampingKeeps) {
   EXPECT_GT(implicit.acceleration, 20.0 * as_force.acceleration);
 }
 
-TEST(ClosedLoop, IsDeterministic) {
-  ShippedRun first("curve", {"duration=0.2"}, 5);
-  ShippedRun second("curve", {"duration=0.2"}, 5);
-  first.Run();
-  second.Run();
-  EXPECT_EQ(first.step().reading.qpos, second.step().reading.qpos);
-  EXPECT_EQ(first.step().command.tau, second.step().command.tau);
-  EXPECT_EQ(first.step().findings.f_c_model, second.step().findings.f_c_model);
-}
-
 void ExpectStepsWithoutAllocation(const ShippedRun& run) {
   ClosedLoop loop(run.setup(), /*check=*/true);
   loop.Settle();

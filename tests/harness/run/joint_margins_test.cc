@@ -4,7 +4,6 @@
 
 #include <gtest/gtest.h>
 
-#include <cmath>
 #include <deque>
 
 #include "tests/harness/run/changed_parts.h"
@@ -22,8 +21,8 @@ std::unique_ptr<Setup> MakeStandingPanda(const std::vector<std::string>& keys) {
       "control.damping_ratio=0.7",
       "joint_motion.points=[]",
       "actuation.limit=1e4",
-      "joint_motion.oscillations=[{ joint = 'panda_joint2', amplitude_deg = 0.2, frequency = 3 }, "
-      "{ joint = 'panda_joint6', amplitude_deg = 0.2, frequency = 4 }]"};
+      "joint_motion.oscillations=[{ joint = 'panda_joint2', amplitude_deg = 0.2, frequency = 3 }, { joint = "
+      "'panda_joint6', amplitude_deg = 0.2, frequency = 4 }]"};
   all.insert(all.end(), keys.begin(), keys.end());
   const Scenario scenario = ReadShippedScenario("panda-reach", all);
   return std::make_unique<Setup>(scenario, scenario.model_file, scenario.mjcf_file);
@@ -131,8 +130,7 @@ TEST(JointMargins, BestGainsLeaveEnoughAndNotMore) {
 TEST(JointMargins, TheCardIsTheScenariosControl) {
   const auto setup =
       MakeStandingPanda({"control={ law = 'feedforward_pd', natural_frequency = { all = 20, panda_joint7 = "
-                         "30 }, damping_ratio = "
-                         "0.7, stiffness = 50, coulomb = { all = 0.1 } }"});
+                         "30 }, damping_ratio = 0.7, stiffness = 50, coulomb = { all = 0.1 } }"});
   EXPECT_EQ(
       WriteJointControl(setup->scenario(), 1.0),
       "[control]\nlaw = \"feedforward_pd\"\n"

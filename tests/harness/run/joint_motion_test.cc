@@ -175,8 +175,7 @@ TEST(JointMotionRun, AForceThatNobodyKnowsIsNamed) {
 TEST(JointMotionRun, WhatTheScenarioAsksForCriesNoWolf) {
   ShippedRun run("panda-reach",
                  {"duration=1", "expect.joints=0.1",
-                  "sensing={ joint_counts = 4096, velocity = 'differenced', "
-                  "velocity_cutoff = 60 }",
+                  "sensing={ joint_counts = 4096, velocity = 'differenced', velocity_cutoff = 60 }",
                   "actuation={ delay = 0.002, torque_step = 0.01 }", "mismatch={ mass = 1.05 }",
                   "disturbance=[{ type = 'step', body = 'panda_link5', force = [0, 2, 0] }]"});
   const RunResult& result = run.Run();

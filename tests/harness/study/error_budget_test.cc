@@ -92,12 +92,11 @@ TEST(ErrorBudget, EverySourceOfAScenarioIsListedAndDropped) {
       "curve",
       {"sensing={ joint_counts = 4096, joint_noise = 1e-5, velocity = 'kalman', kalman_acceleration = 10, "
        "velocity_noise = 1e-3, odometry = true, object_position_noise = 1e-4, object_orientation_noise = "
-       "1e-4, "
-       "object_rate = 100, object_latency = 0.01, object_velocity = 'differenced', latency = 0.002 }",
+       "1e-4, object_rate = 100, object_latency = 0.01, object_velocity = 'differenced', latency = 0.002 }",
        "actuation={ delay = 0.001, torque_step = 0.01, gain_error = 0.01, lag = 0.001, backlash = 1e-4, "
        "coulomb = 0.1 }",
-       "disturbance=[{ type = 'slope', slope_deg = [1, 0] }, { type = 'step', body = 'object' }, "
-       "{ type = 'payload', body = 'r_palm', mass = 0.1 }]",
+       "disturbance=[{ type = 'slope', slope_deg = [1, 0] }, { type = 'step', body = 'object' }, { type = "
+       "'payload', body = 'r_palm', mass = 0.1 }]",
        "mismatch={ mass = 1.1, mass_within = 0.1, com = { r_palm = [0.01, 0, 0] }, damping = 1.1, armature = "
        "1.1 }"});
   Imperfections left = scenario.imperfections;

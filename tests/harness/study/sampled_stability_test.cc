@@ -81,31 +81,6 @@ TEST(SampledStability, TheRangeEndsWhereTheRadiusIsOne) {
   EXPECT_GE(none.least, none.most);
 }
 
-/// K_v of critical damping at K_p, 1/s: where both eigenvalues are equal.
-double CalcCriticalDamping(const SampledLoop& loop, double K_p) {
-  return 2.0 * std::sqrt(K_p) - 0.5 * (loop.period() + loop.time_step) * K_p;
-}
-
-TEST(SampledStability, CriticalDampingIsFastest) {
-  for (const SampledLoop loop : {SampledLoop{1e-3, 1}, SampledLoop{1e-3, 10}}) {
-    const double K_p = 0.04 / (loop.period() * loop.period());
-    const double K_v = CalcCriticalDamping(loop, K_p);
-    const double best = CalcSpectralRadius(loop, {K_p, K_v});
-    EXPECT_LT(best, 1.0);
-    for (const double change : {0.9, 0.99, 1.01, 1.1}) {
-      EXPECT_GT(CalcSpectralRadius(loop, {K_p, change * K_v}), best) << change;
-    }
-    // Without overshoot from there on, with overshoot before.
-    const auto least = [&](double fraction) {
-      const std::vector<double> response = CalcStepResponse(loop, {K_p, fraction * K_v}, 100 * loop.hold);
-      return *std::ranges::min_element(response);
-    };
-    EXPECT_GT(least(1.001), 0.0);
-    EXPECT_LT(least(0.8), 0.0);
-  }
-  EXPECT_NEAR(CalcCriticalDamping({1e-9, 1}, 400.0), 40.0, 1e-6) << "the continuous limit";
-}
-
 constexpr double kCutoff = 60.0;  // Hz, of the object's rate
 
 /// Torques three steps late and a filtered rate; half a step and two measured late; motors that lag.
@@ -257,49 +232,6 @@ TEST(SampledStability, TheRobotRespondsAsPredicted) {
   // Other samplings are distinguished.
   EXPECT_GT(MeasureDeparture({1e-3, 1}, {1e4, 50}, {1e-3, 2}), 100.0 * kAtEveryStep);
   EXPECT_GT(MeasureDeparture({1e-3, 10}, {400, 40}, {1e-3, 9}), 3.0 * kHeld);
-}
-
-// Every kStride-th error follows e'' = trace e' - determinant e. A constant is left where settling leaves the
-// object.
-constexpr long kStride = 20;
-
-/// trace^2 / 4 - determinant of the recurrence that fits a response best: negative where it swings, zero at
-/// critical damping.
-double FitDiscriminant(const std::vector<double>& errors) {
-  const auto n = static_cast<Eigen::Index>(errors.size()) - 2 * kStride;
-  const Eigen::Map<const VectorXd> all(errors.data(), static_cast<Eigen::Index>(errors.size()));
-  MatrixXd known(n, 3);
-  known << all.segment(kStride, n), -all.head(n), VectorXd::Ones(n);
-  const Eigen::Vector3d fit = known.colPivHouseholderQr().solve(all.tail(n));  // trace, determinant, constant
-  return 0.25 * fit[0] * fit[0] - fit[1];
-}
-
-// At most ten times what was measured, 1.0e-7 for torques at every step and 1.4e-6 for torques that are held.
-constexpr double kDiscriminantAtEveryStep = 1e-6;
-constexpr double kDiscriminantHeld = 1e-5;
-
-// The robot's response turns from swinging to creeping within 0.5 % of the predicted K_v.
-TEST(SampledStability, TheRobotIsDampedCriticallyWhereItIsPredicted) {
-  constexpr double kMargin = 0.005;
-  struct Case {
-    SampledLoop loop;
-    double K_p;
-    double tolerance;
-  };
-  for (const Case& one :
-       {Case{{1e-3, 1}, 400.0, kDiscriminantAtEveryStep}, Case{{1e-3, 1}, 2500.0, kDiscriminantAtEveryStep},
-        Case{{5e-4, 1}, 400.0, kDiscriminantAtEveryStep}, Case{{1e-3, 4}, 400.0, kDiscriminantHeld}}) {
-    const double critical = CalcCriticalDamping(one.loop, one.K_p);
-    for (const double fraction : {1.0 - kMargin, 1.0, 1.0 + kMargin}) {
-      const AxisGains gains{one.K_p, fraction * critical};
-      const double measured = FitDiscriminant(MeasureResponse(one.loop, gains, 0.25));
-      const double predicted = FitDiscriminant(CalcStepResponse(one.loop, gains, 250));
-      EXPECT_NEAR(measured, predicted, one.tolerance) << one.K_p << ", " << fraction;
-      if (fraction == 1.0) continue;
-      EXPECT_EQ(measured > 0.0, fraction > 1.0) << measured;
-      EXPECT_GT(std::abs(predicted), 10.0 * one.tolerance) << "too near to distinguish";
-    }
-  }
 }
 
 Outcome Try(const SampledLoop& loop, const AxisGains& gains) {

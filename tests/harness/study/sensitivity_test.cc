@@ -34,29 +34,6 @@ TEST(Sampling, LatinHypercubeFillsEverySliceOfEveryAxis) {
   EXPECT_NE(points, MakeLatinHypercube(5, 37, 4));
 }
 
-TEST(Sampling, SobolFillsEverySliceOfEveryAxis) {
-  for (const long count : {2L, 16L, 256L, 4096L}) {
-    const std::vector<UnitPoint> points = MakeSobol(kMaxSobolDimensions, count);
-    for (size_t axis = 0; axis < kMaxSobolDimensions; ++axis) {
-      EXPECT_TRUE(FillsSlices(points, axis)) << count << " points, axis " << axis;
-    }
-  }
-}
-
-// The first two dimensions are a (0, 2)-sequence: every dyadic box of the points' share holds one.
-TEST(Sampling, SobolsFirstTwoDimensionsFillEveryDyadicBox) {
-  constexpr int kBits = 8;
-  const std::vector<UnitPoint> points = MakeSobol(2, 1L << kBits);
-  for (int bits = 0; bits <= kBits; ++bits) {
-    std::set<std::pair<long, long>> boxes;
-    for (const UnitPoint& point : points) {
-      boxes.emplace(static_cast<long>(point[0] * static_cast<double>(1L << bits)),
-                    static_cast<long>(point[1] * static_cast<double>(1L << (kBits - bits))));
-    }
-    EXPECT_EQ(boxes.size(), points.size()) << bits;
-  }
-}
-
 // Owen's scrambling moves every point and keeps what makes the sequence even.
 TEST(Sampling, ScrambledSobolFillsEverySliceAndDependsOnItsSeed) {
   const std::vector<UnitPoint> points = MakeSobol(kMaxSobolDimensions, 1024, 5);

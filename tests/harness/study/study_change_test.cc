@@ -1,10 +1,9 @@
 // A study that was edited keeps the rows that it still means.
 
-#include "harness/study/study_change.h"
-
 #include <gtest/gtest.h>
 
 #include "controller/common/errors.h"
+#include "harness/study/study_store.h"
 #include "tests/common/files.h"
 #include "tests/common/throws.h"
 #include "tests/harness/study/study_fixture.h"
@@ -130,8 +129,7 @@ TEST_F(StudyChangeTest, OtherTrialsAreRefused) {
 TEST_F(StudyChangeTest, ASearchMayOnlyGrow) {
   const std::string search =
       "name = \"s\"\nscenario = \"hold\"\n[[objective]]\nminimize = \"energy\"\n[search]\nmethod = "
-      "\"cma_es\"\ncount = "
-      "32\n[[vary]]\nkey = \"a\"\nfrom = 0\nto = 1\n";
+      "\"cma_es\"\ncount = 32\n[[vary]]\nkey = \"a\"\nfrom = 0\nto = 1\n";
   { const StudyStore store = Open(search); }
   EXPECT_NO_THROW({ const StudyStore store = Open(ReplaceOnce(search, "32", "64")); });
   EXPECT_TRUE(Throws<InputError>([&] { return Open(ReplaceOnce(search, "energy", "overshoot")); },

@@ -1,7 +1,5 @@
 // A study's page in a browser.
 
-#include "harness/study/study_page.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -10,6 +8,7 @@
 #include <vector>
 
 #include "harness/study/search.h"
+#include "harness/study/study_findings.h"
 #include "tests/common/browser.h"
 #include "tests/common/files.h"
 #include "tests/common/matchers.h"
@@ -73,19 +72,18 @@ TEST_F(StudyPageBrowserTest, ACellShowsTheCommandThatRepeatsItsTrial) {
             (std::vector<int>{12, 12, 12}));
   const nlohmann::json place = Run(
       "const canvas = document.querySelector('#maps canvas'); canvas.scrollIntoView({behavior: 'instant', "
-      "block: 'center'});"
-      "const chart = Chart.getChart(canvas), i = chart.data.datasets[0].data.findIndex(c => c.row === 5);"
-      "const p = chart.getDatasetMeta(0).data[i], r = canvas.getBoundingClientRect();"
-      "return {x: Math.round(r.x + p.x), y: Math.round(r.y + p.y)};");
+      "block: 'center'});const chart = Chart.getChart(canvas), i = chart.data.datasets[0].data.findIndex(c "
+      "=> c.row === 5);const p = chart.getDatasetMeta(0).data[i], r = canvas.getBoundingClientRect();return "
+      "{x: Math.round(r.x + p.x), y: Math.round(r.y + p.y)};");
   browser_.Drag(place["x"], place["y"], place["x"], place["y"]);
   ASSERT_TRUE(browser_.WaitFor("return !document.getElementById('explore-chosen').hidden;"));
-  EXPECT_EQ(Text("explore-command"),
-            "dexcheck run offset --set control.K_p=1000 --set control.K_v=200 --no-check --video --out "
-            "trial-5");
+  EXPECT_EQ(
+      Text("explore-command"),
+      "dexcheck run offset --set control.K_p=1000 --set control.K_v=200 --no-check --video --out trial-5");
   EXPECT_EQ(Run("return location.hash;"), "#trial-5");
   // In theory K_v < 2 / h - h K_p / 2: the cells beyond are crossed, and in these the plant diverged.
-  EXPECT_EQ(Run("return Chart.getChart(document.querySelector('#maps canvas')).data.datasets[0].data"
-                ".filter(c => c.mark).length;"),
+  EXPECT_EQ(Run("return Chart.getChart(document.querySelector('#maps "
+                "canvas')).data.datasets[0].data.filter(c => c.mark).length;"),
             6);
   EXPECT_THAT(Text("departures"), HasSubstr("agree with 12 of 12 trials"));
   EXPECT_THAT(browser_.TakeConsole(), IsEmpty());
@@ -161,8 +159,8 @@ TEST_F(StudyPageBrowserTest, LooksCloserAtItsTrials) {
 TEST_F(StudyPageBrowserTest, ShowsTheoryBesideTheTrials) {
   Open(kGrid + "[[objective]]\nminimize = 'overshoot'\n");
   const nlohmann::json rings =
-      Run("const chart = Chart.getChart(document.getElementById('explore-scatter'));"
-          "return chart.data.datasets.find(d => d.label === 'by (57)').data.length;");
+      Run("const chart = Chart.getChart(document.getElementById('explore-scatter'));return "
+          "chart.data.datasets.find(d => d.label === 'by (57)').data.length;");
   EXPECT_EQ(rings, 6) << "those that are stable";
   EXPECT_EQ(Run("return document.querySelectorAll('#best a').length;"), 6);
   Run("document.querySelector('#best a').click();");

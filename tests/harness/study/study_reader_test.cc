@@ -176,16 +176,15 @@ TEST(StudyReader, FaultsOfASearchAreNamed) {
   EXPECT_TRUE(
       fails("method = \"sobol\"", "method = \"latin_hypercube\"", "scramble: is for a Sobol sequence"));
   EXPECT_TRUE(
-      IsRefused("name = \"s\"\nscenario = \"hold\"\n[search]\nmethod = \"cma_es\"\ncount = "
-                "32\n[[vary]]\nkey = \"a\"\nfrom = 0\nto = 1\n",
+      IsRefused("name = \"s\"\nscenario = \"hold\"\n[search]\nmethod = \"cma_es\"\ncount = 32\n[[vary]]\nkey "
+                "= \"a\"\nfrom = 0\nto = 1\n",
                 "a search needs an [[objective]]"));
 }
 
 TEST(StudyReader, ReadsMargins) {
   const std::string text =
       "name = \"s\"\nscenario = \"hold\"\n[search]\nmethod = \"margins\"\nstart = [0.5]\ndirections = "
-      "3\ntolerance = "
-      "0.125\n[[vary]]\nkey = \"a\"\nfrom = 0\nto = 1\n";
+      "3\ntolerance = 0.125\n[[vary]]\nkey = \"a\"\nfrom = 0\nto = 1\n";
   EXPECT_EQ(CountTrials(ParseStudy(text, "study.toml")), 1 + 5 * (1 + 3))
       << "the start, 5 directions, 3 bisections each";
   EXPECT_TRUE(IsRefused(ReplaceOnce(text, "0.125", "0"), "tolerance"));

@@ -12,7 +12,6 @@
 #include "controller/common/errors.h"
 #include "harness/study/search.h"
 #include "harness/study/study_findings.h"
-#include "harness/study/study_page.h"
 #include "tests/common/files.h"
 #include "tests/common/matchers.h"
 #include "tests/harness/study/study_fixture.h"
@@ -37,8 +36,7 @@ const std::string kText = Vary("control.law", "values = ['computed_torque', 'pd_
 const std::string kRanges = Vary("control.K_p", kRange) + Vary("control.K_v", kRange);
 const std::string kNested =
     "[nested]\nmethod = 'random'\ncount = 3\nseed = 1\n[[nested.vary]]\nkey = 'plant.finger_friction'\nfrom "
-    "= "
-    "0.5\nto = 1\n";
+    "= 0.5\nto = 1\n";
 const std::string kWish = "[[objective]]\nminimize = 'energy'\n";
 
 std::string Search(const std::string& method) {

@@ -106,30 +106,6 @@ TEST_F(StudyStoreTest, OtherFilesAreRefused) {
       Throws<InputError>([&] { return StudyStore::Open(folder_.path() / "no.sqlite"); }, "cannot be opened"));
 }
 
-TEST_F(StudyStoreTest, DifferentResultsOfOneTrialAreRefused) {
-  StudyStore store = Open();
-  store.AddAll({MakeSource("a.sqlite", {MakeRow(0), MakeRow(1)})});
-  store.AddAll({MakeSource("b.sqlite", {MakeRow(1), MakeRow(2)})});
-  EXPECT_EQ(store.ReadRows().size(), 3u);
-  TrialRow other = MakeRow(2);
-  other.result.metrics[kEnergy] = std::nextafter(other.result.metrics[kEnergy], 1.0);
-  EXPECT_TRUE(Throws<InputError>(
-      [&] {
-        store.AddAll({MakeSource("c.sqlite", {MakeRow(5)}), MakeSource("d.sqlite", {MakeRow(6), other})});
-        return 0;
-      },
-      "d.sqlite: trial 2 has another result"));
-  EXPECT_TRUE(Throws<InputError>(
-      [&] {
-        TrialRow third = MakeRow(7);
-        third.result.outcome = Outcome::kTracked;
-        store.AddAll({MakeSource("c.sqlite", {MakeRow(7)}), MakeSource("d.sqlite", {third})});
-        return 0;
-      },
-      "d.sqlite: trial 7 has another result than in c.sqlite"));
-  EXPECT_EQ(store.ReadRows().size(), 3u) << "all or nothing";
-}
-
 TEST_F(StudyStoreTest, BetweenMachinesResultsAreTheSameWithinRounding) {
   TrialRow row = MakeRow(0);
   row.result.failure.clear();

@@ -9,7 +9,6 @@
 #include <utility>
 
 #include "harness/study/study_findings.h"
-#include "harness/study/study_page.h"
 #include "tests/common/files.h"
 #include "tests/common/matchers.h"
 #include "tests/harness/study/study_fixture.h"
@@ -126,10 +125,10 @@ TEST(StudyFindings, ReportsTheSpreadOfWhatHasNoOrder) {
   }
   ASSERT_EQ(rows.size(), 8U);
   EXPECT_THAT(ListFindings(study, rows),
-              ElementsAre("control.law = computed_torque: held in 4 of 4 trials; "
-                          "position_error_rms 6.5 (1 to 16) m, medians and ranges.",
-                          "control.law = pd_gravity: held in 1 of 4 trials; "
-                          "position_error_rms 9 (9 to 9) m, medians and ranges."));
+              ElementsAre("control.law = computed_torque: held in 4 of 4 trials; position_error_rms 6.5 (1 "
+                          "to 16) m, medians and ranges.",
+                          "control.law = pd_gravity: held in 1 of 4 trials; position_error_rms 9 (9 to 9) m, "
+                          "medians and ranges."));
 }
 
 // The best of a search that presses against its range, in the quantity's unit.
@@ -146,11 +145,10 @@ TEST(StudyFindings, ReportsWhatIsWantedWithItsUnitAndItsEdge) {
     row.result.metrics[kSettlingTime] = i == 0 ? std::nan("") : 0.01 * static_cast<double>(i);
     rows.push_back(row);
   }
-  EXPECT_THAT(
-      ListFindings(study, rows),
-      ElementsAre("The least settling_time of 3 points is 0.01 s, at control.K_p = 100, control.K_v = 30 "
-                  "(trial 1). The search began where it has no value. At an end of its range is control.K_p: "
-                  "a wider range may give a better one."));
+  EXPECT_THAT(ListFindings(study, rows),
+              ElementsAre("The least settling_time of 3 points is 0.01 s, at control.K_p = 100, control.K_v "
+                          "= 30 (trial 1). The search began where it has no value. At an end of its range is "
+                          "control.K_p: a wider range may give a better one."));
 }
 
 }  // namespace
