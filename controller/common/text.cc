@@ -59,8 +59,9 @@ std::string JoinNames(const std::vector<std::string>& names) {
   constexpr size_t kMaxShown = 8;
   std::string text;
   for (size_t i = 0; i < std::min(names.size(), kMaxShown); ++i) text += (i == 0 ? "" : ", ") + names[i];
+  text = Abbreviate(text);
   if (names.size() > kMaxShown) text += " and " + std::to_string(names.size() - kMaxShown) + " more";
-  return Abbreviate(text);
+  return text;
 }
 
 std::string QuoteField(const std::string& text) {

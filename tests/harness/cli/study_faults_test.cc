@@ -91,7 +91,8 @@ TEST_F(StudyCommand, AFullFileSystemLosesNothing) {
     "$4" study run "$2" --db "$1/a.sqlite" --jobs 1 || code=$?
     ls "$1" >"$3/left.txt"
     cp "$1/a.sqlite" "$3/full.sqlite"
-    rm "$1/filler$4" study run "$2" --db "$1/a.sqlite" --quiet
+    rm "$1/filler"
+    "$4" study run "$2" --db "$1/a.sqlite" --quiet
     cp "$1/a.sqlite" "$3/freed.sqlite"
     exit $code)");
   EXPECT_TRUE(IsRefused(result, {"disk/a.sqlite: cannot be written: database or disk is full"}));

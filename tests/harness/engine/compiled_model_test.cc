@@ -225,7 +225,6 @@ TEST(Skeleton, ShowsShapesThatAreAllHidden) {
   const std::string joint = R"(<joint name="elbow" axis="0 1 0"/>)";
   const MjModelPtr model = MakeVisible(LoadMjcfText(
       ReplaceOnce(kArm, joint, joint + R"(<geom name="collides" size="0.1" group="3"/>)"), "arm"));
-  ASSERT_EQ(model->ngeom, 2);
   EXPECT_EQ(model->geom_group[mj_name2id(model.get(), mjOBJ_GEOM, "collides")], 0);
 }
 

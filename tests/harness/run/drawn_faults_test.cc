@@ -162,16 +162,16 @@ TEST(DrawnFaults, AreForcesThatGrow) {
         const bool is_named = mutant->score.outcomes[k] == CauseOutcome::kNamed;
         ++grow;
         named += is_named;
+        if (!is_named) std::cout << mutant->all.name << ": " << mutant->causes << "\n";
         dated += is_named && has_begin;
       }
       wrong += mutant->score.wrong;
     }
-    // Beside another force what grows is named all the same, and in one of ten with a third that is not
-    // there.
+    // Beside another force what grows is mostly named all the same, and nothing that is not there.
     EXPECT_GE(grow, 5 * together);
-    EXPECT_GE(named, together == 1 ? grow : 0.85 * grow);
+    EXPECT_GE(named, together == 1 ? grow : 0.8 * grow);
     EXPECT_EQ(dated, named);
-    EXPECT_LE(wrong, together == 1 ? 0.0 : 0.15 * grow);
+    EXPECT_EQ(wrong, 0);
   }
 }
 
