@@ -3,6 +3,7 @@
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <numeric>
 
 #include "controller/common/linear_algebra.h"
@@ -46,6 +47,14 @@ class Search {
       }
       chosen_ = best;
     }
+    if (const std::vector<size_t> best = chosen_; !options_.start.empty() && best.size() > 1) {
+      chosen_ = Thin(options_.start);
+      const double other = chosen_.empty() ? kInfinity : GrowFrom(Exchange(ScoreOf(chosen_)));
+      if (other < criterion)
+        criterion = other;
+      else
+        chosen_ = best;
+    }
     if (options_.exchanges_pairs) criterion = ExchangePairs(criterion);
     return Finish(criterion);
   }
@@ -59,7 +68,9 @@ class Search {
   /// Adds one after another. @returns the criterion.
   double Grow(const Best& first) {
     chosen_ = {first.candidate};
-    double criterion = first.criterion;
+    return GrowFrom(first.criterion);
+  }
+  double GrowFrom(double criterion) {
     while (chosen_.size() < options_.most_terms && !IsNoise(chosen_)) {
       const Best next = FindBest(chosen_);
       if (!(next.criterion < criterion)) break;
@@ -67,6 +78,31 @@ class Search {
       criterion = Exchange(next.criterion);
     }
     return criterion;
+  }
+
+  /// Those of a set, each of one column, that are needed: the least needed goes while that is for the better,
+  /// there are too many, or amplitudes cannot be.
+  [[nodiscard]] std::vector<size_t> Thin(std::vector<size_t> set) const {
+    std::erase_if(set, [&](size_t i) { return columns_.CountOf(i) != 1; });
+    while (!set.empty()) {
+      const Solution found = Solve(set);
+      // The square of what is left grows by so much without each.
+      const double squares = found.residual.squaredNorm();
+      const VectorXd more =
+          found.amplitude.cwiseAbs2().cwiseQuotient(found.covariance.diagonal()) * found.variance;
+      std::vector<Index> impossible, all(set.size());
+      std::iota(all.begin(), all.end(), Index{0});
+      std::ranges::copy_if(all, std::back_inserter(impossible),
+                           [&](Index k) { return !CanHave(set[static_cast<size_t>(k)], found, k); });
+      const Index least = *std::ranges::min_element(impossible.empty() ? all : impossible, {},
+                                                    [&](Index k) { return more[k]; });
+      const auto count = static_cast<double>(set.size());
+      const bool is_needed =
+          Score(squares + more[least], count - 1.0, set.size() - 1) > Score(squares, count, set.size());
+      if (impossible.empty() && is_needed && set.size() <= options_.most_terms) break;
+      set.erase(set.begin() + least);
+    }
+    return set;
   }
 
   /// All that add something to those, the most likely first.
@@ -93,6 +129,10 @@ class Search {
   [[nodiscard]] double Score(double squares, double parameters, size_t terms) const {
     return samples_ * std::log(options_.floor + squares / rows_) + parameters * std::log(samples_) +
            2.0 * static_cast<double>(terms) * std::log(static_cast<double>(candidates_.size()));
+  }
+
+  [[nodiscard]] double ScoreOf(const std::vector<size_t>& set) const {
+    return Score(CalcResidual(CalcRange(set)).squaredNorm(), CountParameters(set), set.size());
   }
 
   /// What columns leave of y. @param Q of their range.
@@ -154,26 +194,54 @@ class Search {
     std::vector<size_t> set = beside;
     set.push_back(candidate);
     const auto is_free = [&](size_t i) {
-      return !candidates_[i].is_possible && candidates_[i].scale.size() == 0;
+      const Candidate& one = candidates_[i];
+      return !one.is_possible && one.scale.size() == 0 && one.least.size() == 0;
     };
     if (std::all_of(set.begin(), set.end(), is_free)) return true;
-    const VectorXd a = Solve(columns_.Collect(set), y_);
-    Index width = 0;
+    const Solution found = Solve(set);
+    Index begin = 0;
     for (const size_t i : set) {
-      const Candidate& one = candidates_[i];
-      const Index r = columns_.CountOf(i);
-      const VectorXd amplitude = columns_.visible(i).basis * a.segment(width, r);
-      width += r;
-      if (one.scale.size() > 0 && (amplitude.array().abs() > kImplausible * one.scale.array()).any())
-        return false;
-      if (one.is_possible && !one.is_possible(amplitude)) return false;
+      if (!CanHave(i, found, begin)) return false;
+      begin += columns_.CountOf(i);
     }
     return true;
   }
 
-  static VectorXd Solve(const MatrixXd& C, const VectorXd& y) {
+  /// Of a set: amplitudes of the visible columns, their covariance, and what they leave.
+  struct Solution {
+    VectorXd amplitude;
+    MatrixXd covariance;
+    VectorXd residual;
+    double variance = 1.0;  // of the noise
+  };
+
+  [[nodiscard]] Solution Solve(const std::vector<size_t>& set) const {
+    const MatrixXd C = columns_.Collect(set);
     const VectorXd size = C.colwise().norm().cwiseMax(std::numeric_limits<double>::min());
-    return (C * size.cwiseInverse().asDiagonal()).colPivHouseholderQr().solve(y).cwiseQuotient(size);
+    const MatrixXd scaled = C * size.cwiseInverse().asDiagonal();
+    Solution found;
+    found.amplitude = scaled.colPivHouseholderQr().solve(y_).cwiseQuotient(size);
+    found.residual = y_ - C * found.amplitude;
+    const double freedom = std::max(1.0, rows_ - static_cast<double>(C.cols()));
+    found.variance = std::max(options_.floor, found.residual.squaredNorm() / freedom) * options_.alike;
+    found.covariance = size.cwiseInverse().asDiagonal() * CalcPseudoinverse(scaled.transpose() * scaled) *
+                       size.cwiseInverse().asDiagonal() * found.variance;
+    return found;
+  }
+
+  /// Whether a candidate can have such amplitudes. @param begin of its visible columns.
+  [[nodiscard]] bool CanHave(size_t candidate, const Solution& found, Index begin) const {
+    const Candidate& one = candidates_[candidate];
+    const Index r = columns_.CountOf(candidate);
+    const Visible& visible = columns_.visible(candidate);
+    VectorXd a = visible.basis * found.amplitude.segment(begin, r);
+    if (one.scale.size() > 0 && (a.array().abs() > kImplausible * one.scale.array()).any()) return false;
+    if (one.least.size() > 0 && (a.array() < one.least.array()).any()) {
+      constexpr double kErrors = 3.0;
+      const VectorXd error = CalcErrors(visible, found.covariance.block(begin, begin, r, r));
+      if ((a.array() + kErrors * error.array() < one.least.array()).any()) return false;
+    }
+    return !one.is_possible || one.is_possible(a);
   }
 
   [[nodiscard]] Best FindBest(const std::vector<size_t>& beside) const {
@@ -197,8 +265,7 @@ class Search {
       improved = false;
       for (size_t place = 0; place < chosen_.size() && chosen_.size() > 1; ++place) {
         const std::vector<size_t> others = Without(place);
-        const double alone =
-            Score(CalcResidual(CalcRange(others)).squaredNorm(), CountParameters(others), others.size());
+        const double alone = ScoreOf(others);
         const Best best = FindBest(others);
         const bool is_noise = IsNoise(chosen_);
         if (IsNoise(others) || (!is_noise && alone <= criterion && alone <= best.criterion)) {
@@ -250,25 +317,18 @@ class Search {
     result.residual = y_;
     const double all = y_.squaredNorm();
     if (!chosen_.empty()) {
-      const MatrixXd C = columns_.Collect(chosen_);
-      const VectorXd size = C.colwise().norm().cwiseMax(std::numeric_limits<double>::min());
-      const MatrixXd scaled = C * size.cwiseInverse().asDiagonal();
-      const VectorXd a = Solve(C, y_);
-      result.residual = y_ - C * a;
-      const double freedom = std::max(1.0, rows_ - static_cast<double>(C.cols()));
-      const double variance =
-          std::max(options_.floor, result.residual.squaredNorm() / freedom) * options_.alike;
-      const MatrixXd covariance = size.cwiseInverse().asDiagonal() *
-                                  CalcPseudoinverse(scaled.transpose() * scaled) *
-                                  size.cwiseInverse().asDiagonal() * variance;
+      const Solution found = Solve(chosen_);
+      result.residual = found.residual;
       Index begin = 0;
       for (size_t place = 0; place < chosen_.size(); ++place) {
         const Visible& visible = columns_.visible(chosen_[place]);
         const Index r = columns_.CountOf(chosen_[place]);
         CauseTerm term;
         term.candidate = chosen_[place];
-        term.amplitude = visible.basis * a.segment(begin, r);
-        term.error = CalcErrors(visible, covariance.block(begin, begin, r, r));
+        term.amplitude = visible.basis * found.amplitude.segment(begin, r);
+        if (const VectorXd& least = candidates_[term.candidate].least; least.size() > 0)
+          term.amplitude = term.amplitude.cwiseMax(least);
+        term.error = CalcErrors(visible, found.covariance.block(begin, begin, r, r));
         Compare(place, criterion, all, &term);
         begin += r;
         result.terms.push_back(std::move(term));

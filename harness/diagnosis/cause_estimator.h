@@ -37,7 +37,9 @@ struct Candidate {
   /// How large each amplitude may plausibly be (p); empty for any size. What less than that does not show
   /// above the noise is not estimated.
   VectorXd scale;
-  /// Whether an amplitude can be: no friction or mass is negative. Empty for all.
+  /// The smallest that each amplitude can be (p), but for its error: no friction is negative. Empty for any.
+  VectorXd least;
+  /// Whether an amplitude can be: no mass is negative. Empty for all.
   std::function<bool(const VectorXd&)> is_possible;
   /// Whether it is as likely as a simpler one that explains no less: a spring that does not move is a torque.
   bool is_ordinary = false;
@@ -68,6 +70,9 @@ struct CauseOptions {
   size_t restarts = 3;  ///< Other first choices that are tried where the first led nowhere.
   bool exchanges_pairs =
       true;  ///< Whether two terms are exchanged at once, too; with many of them that takes long.
+  /// Candidates of one column each with which the search begins once more, of all of them but the needless:
+  /// what several explain together may look like something else to one at a time.
+  std::vector<size_t> start;
   /// Mean square of what no explanation need explain: noise, and what the columns are off themselves.
   double floor = 1.0;
   /// Rows whose noise is one and the same: 1 where each has its own. N / alike are counted then.

@@ -210,8 +210,10 @@ class Judge {
       one.ends = true;
     }
     one.faults.push_back(Describe(fault, term.amplitude, term.error));
-    for (const auto& [candidate, amplitude] : term.same)
-      one.faults.push_back(Describe(estimator_.faults()[candidate], amplitude, {}));
+    for (const auto& [candidate, amplitude] : term.same) {
+      Fault same = Describe(estimator_.faults()[candidate], amplitude, {});
+      if (!same.IsLike(one.faults.front())) one.faults.push_back(std::move(same));
+    }
     one.fraction = term.fraction;
     one.left = result_.left;
     if (term.rival != SIZE_MAX) {

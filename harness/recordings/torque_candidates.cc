@@ -67,7 +67,7 @@ class FaultList {
                           const std::string& unit, TorqueColumn column, double nominal, bool is_positive) {
     TorqueFault& one =
         Add(kind, joint, fault, "joint " + model_.joint(joint).name, unit, {{{column, joint}}}, nominal);
-    if (is_positive) one.is_possible = [nominal](const VectorXd& a) { return nominal + a[0] >= 0.0; };
+    if (is_positive) one.least = VectorXd::Constant(1, -nominal);
     return one;
   }
 
@@ -94,6 +94,7 @@ class FaultList {
                                      {TorqueColumn::kAngle, joint}, 0.0, true);
     spring.columns.push_back({{{TorqueColumn::kOffset, joint}, joint}});
     spring.scale = VectorXd::Constant(2, kMostTorque);
+    spring.least = Eigen::Vector2d(0.0, -kMostTorque);
     AddAtJoint(kLoadFriction, joint, "friction that grows with the load", "", {TorqueColumn::kLoad, joint},
                0.0, true);
     AddAtJoint(kOffset, joint, "torque offset", torque, {TorqueColumn::kOffset, joint}, 0.0, false);
@@ -147,12 +148,13 @@ class FaultList {
     };
     using enum TorqueFault::Kind;
     if (body.mass > 0.0) {
-      TorqueFault& mass =
-          Add(kMass, link, "mass", place, "kg", {BodyParts(link, vector / body.mass)}, body.mass);
-      constexpr double kMostTimes = 10.0;
-      mass.is_possible = [m = body.mass](const VectorXd& a) {
-        return m + a[0] > 0.0 && m + a[0] < kMostTimes * m;
-      };
+      // With the inertia of its shape, or at its centre.
+      for (const BodyVector& change :
+           {BodyVector(vector / body.mass), TorqueRegressor::Pack({1.0, body.com})}) {
+        constexpr double kMostTimes = 10.0;
+        Add(kMass, link, "mass", place, "kg", {BodyParts(link, change)}, body.mass).is_possible =
+            [m = body.mass](const VectorXd& a) { return m + a[0] > 0.0 && m + a[0] < kMostTimes * m; };
+      }
       std::vector<BodyVector> changes;
       TorqueFault& centre = Add(kCentre, link, "centre of mass", place, "m", std::vector<Parts>(3));
       PlaceMass(model_, Vector3d::Zero(), &centre);
@@ -214,7 +216,7 @@ class FaultList {
       for (const auto shape : {TorqueColumn::kDry, TorqueColumn::kFriction})
         AddInAll(kAllDry, "dry friction", {shape}).parameters = shape == TorqueColumn::kDry ? 0 : 1;
       AddInAll(kAllFriction, "dry and viscous friction", {TorqueColumn::kDry, TorqueColumn::kViscous});
-      AddInAll(kAllOffsets, "torque offset", {TorqueColumn::kOffset}).is_possible = nullptr;
+      AddInAll(kAllOffsets, "torque offset", {TorqueColumn::kOffset}).least.resize(0);
       faults_.back().scale = VectorXd::Constant(static_cast<Eigen::Index>(joints_.size()), kMostTorque);
       Add(kDelay, -1, "delay of the torques", "all joints", "s", {delay}).scale = DelayScale();
       Add(kTorqueGain, -1, "torque gain", "all joints", "", {gain}, 1.0).is_possible = IsGain;
@@ -247,7 +249,7 @@ class FaultList {
     TorqueFault& one = Add(kind, -1, name, "all joints", "N m", {});
     for (const TorqueColumn::Kind column : columns)
       for (const int joint : joints_) one.columns.push_back({{{column, joint}, joint}});
-    one.is_possible = [](const VectorXd& a) { return (a.array() >= 0.0).all(); };
+    one.least = VectorXd::Zero(static_cast<Eigen::Index>(one.columns.size()));
     return one;
   }
 

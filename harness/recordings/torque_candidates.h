@@ -62,7 +62,7 @@ struct TorqueFault {
   std::string fault, place, unit;
   double nominal = 0.0;
   std::vector<std::vector<ColumnPart>> columns;  ///< None of a push.
-  VectorXd scale;                                ///< As Candidate's.
+  VectorXd scale, least;                         ///< As Candidate's.
   int parameters = 0;
   std::function<bool(const VectorXd&)> is_possible;
   bool is_ordinary = false;  ///< As Candidate's.

@@ -221,12 +221,18 @@ CauseSelection TorqueEstimator::SelectAmong(const std::vector<bool>& barred) con
     one.columns = R_.block(begin, at, rows, CountColumns(fault));
     if (barred[candidates.size() - 1]) one.columns.setZero();
     one.scale = fault.scale;
+    one.least = fault.least;
     one.is_possible = fault.is_possible;
     one.parameters = fault.parameters;
     one.is_ordinary = fault.is_ordinary;
     at += CountColumns(fault);
   }
   CauseOptions options;
+  for (size_t i = 0; i < faults_.size(); ++i) {
+    const TorqueFault& fault = faults_[i];
+    if (fault.parameters > 0 || barred[i]) continue;
+    if (IsPart(fault, Part::kUsual) || fault.kind == TorqueFault::kArmature) options.start.push_back(i);
+  }
   options.most_terms = most_causes_;
   options.restarts = 0;
   options.exchanges_pairs = false;
