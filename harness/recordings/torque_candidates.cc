@@ -216,7 +216,7 @@ class FaultList {
       for (const auto shape : {TorqueColumn::kDry, TorqueColumn::kFriction})
         AddInAll(kAllDry, "dry friction", {shape}).parameters = shape == TorqueColumn::kDry ? 0 : 1;
       AddInAll(kAllFriction, "dry and viscous friction", {TorqueColumn::kDry, TorqueColumn::kViscous});
-      AddInAll(kAllOffsets, "torque offset", {TorqueColumn::kOffset}).least.resize(0);
+      AddInAll(kAllOffsets, "torque offset", {TorqueColumn::kOffset}).is_possible = nullptr;
       faults_.back().scale = VectorXd::Constant(static_cast<Eigen::Index>(joints_.size()), kMostTorque);
       Add(kDelay, -1, "delay of the torques", "all joints", "s", {delay}).scale = DelayScale();
       Add(kTorqueGain, -1, "torque gain", "all joints", "", {gain}, 1.0).is_possible = IsGain;
@@ -249,7 +249,8 @@ class FaultList {
     TorqueFault& one = Add(kind, -1, name, "all joints", "N m", {});
     for (const TorqueColumn::Kind column : columns)
       for (const int joint : joints_) one.columns.push_back({{{column, joint}, joint}});
-    one.least = VectorXd::Zero(static_cast<Eigen::Index>(one.columns.size()));
+    // In all of them, not in a few and by noise in the others.
+    one.is_possible = [](const VectorXd& a) { return (a.array() > 0.0).all(); };
     return one;
   }
 
