@@ -50,10 +50,12 @@ class Search {
     if (const std::vector<size_t> best = chosen_; !options_.start.empty() && best.size() > 1) {
       chosen_ = Thin(options_.start);
       const double other = chosen_.empty() ? kInfinity : GrowFrom(Exchange(ScoreOf(chosen_)));
-      if (other < criterion)
+      // What does not explain all is no more likely for its beginning.
+      if (other < criterion && IsNoise(chosen_)) {
         criterion = other;
-      else
+      } else {
         chosen_ = best;
+      }
     }
     if (options_.exchanges_pairs) criterion = ExchangePairs(criterion);
     return Finish(criterion);
