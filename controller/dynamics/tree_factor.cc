@@ -8,9 +8,14 @@
 namespace dexcheck {
 namespace {
 
-/// Short rows, of which there are hundreds: Eigen's loops take them two by two, where a compiler's own
-/// prepare for long ones.
-using Segment = Eigen::Map<VectorXd>;
+/// y -= a x. Rows are short and there are hundreds: loops that first look for an aligned place, or prepare
+/// for long rows, take longer.
+inline void SubtractMultiple(double a, const double* x, size_t count, double* y) {
+  size_t i = 0;
+  for (; i + 1 < count; i += 2)
+    Eigen::Map<Eigen::Array2d>(y + i) -= a * Eigen::Map<const Eigen::Array2d>(x + i);
+  if (i < count) y[i] -= a * x[i];
+}
 
 }  // namespace
 
@@ -35,8 +40,8 @@ void TreeFactor::Compute(const Eigen::Ref<const MatrixXd>& M) {
   Require(M.rows() == n && M.cols() == n, "rows of M", "must be those of xi", M.rows());
   for (Eigen::Index i = 0; i < n; ++i) {
     const Row row = rows_[static_cast<size_t>(i)];
-    // A column, which is contiguous.
-    for (size_t k = row.begin; k < row.begin + row.size; ++k) L_[k] = M(path_[k], i);
+    const double* const column = M.col(i).data();
+    for (size_t k = row.begin; k < row.begin + row.size; ++k) L_[k] = column[path_[k]];
   }
   // From the tips inward: a row is final, then its part is taken from the rows that it hangs on.
   for (auto i = rows_.rbegin(); i != rows_.rend(); ++i) {
@@ -48,11 +53,10 @@ void TreeFactor::Compute(const Eigen::Ref<const MatrixXd>& M) {
     const double root = std::sqrt(pivot);
     const double inverse = 1.0 / root;
     entries[last] = root;
-    Segment(entries, static_cast<Eigen::Index>(last)) *= inverse;
+    for (size_t k = 0; k < last; ++k) entries[k] *= inverse;
     for (size_t above = 0; above < last; ++above) {
-      const auto count = static_cast<Eigen::Index>(above) + 1;
-      double* const others = L_.data() + rows_[static_cast<size_t>(path_[row.begin + above])].begin;
-      Segment(others, count) -= entries[above] * Segment(entries, count);
+      const Row& other = rows_[static_cast<size_t>(path_[row.begin + above])];
+      SubtractMultiple(entries[above], entries, above + 1, L_.data() + other.begin);
     }
   }
 }
@@ -105,15 +109,16 @@ void TreeFactor::SolveTransposedColumns(Eigen::Ref<RowMatrixXd> X) const {
 }
 
 void TreeFactor::SolveTransposedColumns(std::span<const int> rows, Eigen::Ref<RowMatrixXd> X) const {
-  const Eigen::Index width = X.cols();
+  const auto width = static_cast<size_t>(X.cols());
   for (auto index = rows.rbegin(); index != rows.rend(); ++index) {
     const Eigen::Index i = *index;
     const Row row = rows_[static_cast<size_t>(i)];
     const size_t last = row.begin + row.size - 1;
-    Segment x_i(X.data() + i * X.outerStride(), width);
-    x_i *= 1.0 / L_[last];
+    double* const x_i = X.data() + i * X.outerStride();
+    const double inverse = 1.0 / L_[last];
+    for (size_t k = 0; k < width; ++k) x_i[k] *= inverse;
     for (size_t k = last; k-- > row.begin;)
-      Segment(X.data() + path_[k] * X.outerStride(), width) -= L_[k] * x_i;
+      SubtractMultiple(L_[k], x_i, width, X.data() + path_[k] * X.outerStride());
   }
 }
 

@@ -30,8 +30,7 @@ void ReadEngineContacts(const EngineProvider& engine, LawTerms* terms) {
 /// By the engine: all that the table of terms has evaluated on its side. What multiplies only the slip,
 /// C_bar' and J_B_dot', and X_o's branch of the angles are the model's.
 /// @param contacts whether the engine has contacts to compare; bonds it has not, and theirs are the model's.
-/// @param terms of this engine and model at each step, or new: entries that are always zero are not written.
-/// It keeps pointers into the model.
+/// @param terms keeps pointers into the model.
 void ReadEngineTerms(const EngineProvider& engine, const GraspModel& model, const MeasuredState& state,
                      bool contacts, LawTerms* terms) {
   terms->q = state.q;
@@ -41,8 +40,7 @@ void ReadEngineTerms(const EngineProvider& engine, const GraspModel& model, cons
   if (model.has_coordinates()) terms->X_o = model.grasp().X_o();
 
   const EngineTerms& robot = engine.terms();
-  const double* entry = robot.mass().data();
-  for (const MassEntry& at : robot.mass_entries()) terms->M(at.row, at.col) = *entry++;
+  terms->M = engine.M();
   terms->C_xi = robot.coriolis();
   terms->gravity = robot.gravity();
   terms->friction = robot.friction();

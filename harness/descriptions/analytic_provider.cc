@@ -136,7 +136,7 @@ void AnalyticProvider::ReadVelocities(const Eigen::Ref<const VectorXd>& own, Eig
 
 void AnalyticProvider::ReadMatrix(const MatrixXd& own, Eigen::Ref<MatrixXd> out) const {
   if (map_.is_identity) {
-    out = own;
+    CopyColumns(own, 0, out);
   } else if (own.rows() == xi_.size()) {
     out = own(map_.velocities, map_.velocities);
   } else {
@@ -152,11 +152,11 @@ void AnalyticProvider::ReadMatrix(const MatrixXd& own, Eigen::Ref<MatrixXd> out)
 void AnalyticProvider::ReadJacobians(Eigen::Ref<MatrixXd> out) const {
   const Eigen::Index n = xi_.size();
   for (size_t i = 0; i < jacobians_.size(); ++i) {
-    auto J = out.middleCols(static_cast<Eigen::Index>(i) * n, n);
+    const Eigen::Index first = static_cast<Eigen::Index>(i) * n;
     if (map_.is_identity) {
-      J = *jacobians_[i].first;
+      CopyColumns(*jacobians_[i].first, first, out);
     } else {
-      J = (*jacobians_[i].first)(Eigen::all, map_.velocities);
+      out.middleCols(first, n) = (*jacobians_[i].first)(Eigen::all, map_.velocities);
     }
   }
 }

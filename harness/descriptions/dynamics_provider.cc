@@ -1,6 +1,17 @@
 #include "harness/descriptions/dynamics_provider.h"
 
+#include <algorithm>
+
 namespace dexcheck {
+
+void CopyColumns(const Eigen::Ref<const MatrixXd>& columns, Eigen::Index first, Eigen::Ref<MatrixXd> out) {
+  const Eigen::Index rows = columns.rows();
+  if (columns.outerStride() == rows && out.outerStride() == rows) {
+    std::copy_n(columns.data(), columns.size(), out.col(first).data());
+  } else {
+    out.middleCols(first, columns.cols()) = columns;
+  }
+}
 
 bool MechanismProvider::HasValue(Term term) const {
   switch (term) {
@@ -22,7 +33,7 @@ bool MechanismProvider::HasValue(Term term) const {
 
 bool MechanismProvider::ReadValues(Term term, Eigen::Ref<MatrixXd> out) const {
   const auto put = [&](const auto& values) {
-    out = values.reshaped();
+    std::copy_n(values.data(), values.size(), out.data());
     return true;
   };
   const auto put_number = [&](double value) {
@@ -30,8 +41,10 @@ bool MechanismProvider::ReadValues(Term term, Eigen::Ref<MatrixXd> out) const {
     return true;
   };
   const auto put_each = [&](const auto& member) {
-    for (size_t i = 0; i < contacts_.size(); ++i)
-      out.col(static_cast<Eigen::Index>(i)) = (contacts_[i].*member).reshaped();
+    for (size_t i = 0; i < contacts_.size(); ++i) {
+      const auto& values = contacts_[i].*member;
+      std::copy_n(values.data(), values.size(), out.col(static_cast<Eigen::Index>(i)).data());
+    }
     return true;
   };
   switch (term) {
@@ -48,10 +61,8 @@ bool MechanismProvider::ReadValues(Term term, Eigen::Ref<MatrixXd> out) const {
     case Term::kG:
       return put_each(&ContactValues::G);
     case Term::kJB:
-      for (size_t i = 0; i < contacts_.size(); ++i) {
-        const Eigen::Index n = contacts_[i].J_B.cols();
-        out.middleCols(static_cast<Eigen::Index>(i) * n, n) = contacts_[i].J_B;
-      }
+      for (size_t i = 0; i < contacts_.size(); ++i)
+        CopyColumns(contacts_[i].J_B, static_cast<Eigen::Index>(i) * contacts_[i].J_B.cols(), out);
       return true;
     case Term::kKappaDot:
       return put_each(&ContactValues::relative_twist);

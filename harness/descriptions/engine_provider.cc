@@ -65,6 +65,7 @@ void EngineProvider::PrepareFrames(std::span<const int> frames, bool contacts) {
     for (ContactValues& contact : contacts_) contact.J_B.setZero(3, terms_.size());
   }
   xi_.setZero(terms_.size());
+  M_.setZero(terms_.size(), terms_.size());
 }
 
 void EngineProvider::SetState(const DynamicsState& state) {
@@ -80,6 +81,8 @@ void EngineProvider::SetState(const VectorXd& q, const VectorXd& xi, const Pose&
                               const ObjectCoordinates* coordinates) {
   xi_ = xi;
   terms_.SetState(q, xi, X_Bo, V_Bo);
+  const double* entry = terms_.mass().data();
+  for (const MassEntry& at : terms_.mass_entries()) M_(at.row, at.col) = *entry++;
   for (size_t i = 0; i < frames_.size(); ++i) terms_.CalcFrameColumns(frames_[i], columns_[i]);
   energy_ = terms_.energy_and_momentum();
   if (has_object_) ReadObject(coordinates);
@@ -158,11 +161,8 @@ void EngineProvider::Read(Term term, Eigen::Ref<MatrixXd> out) {
     case Term::kM:
       out = unreduced_->M();
       return;
-    case Term::kMBar: {
-      const double* entry = terms_.mass().data();
-      for (const MassEntry& at : terms_.mass_entries()) out(at.row, at.col) = *entry++;
-      return;
-    }
+    case Term::kMBar:
+      return CopyColumns(M_, 0, out);
     case Term::kCBarXi:
       out = terms_.coriolis();
       return;

@@ -54,6 +54,8 @@ class EngineProvider : public MechanismProvider {
 
   [[nodiscard]] EngineTerms& terms() { return terms_; }
   [[nodiscard]] const EngineTerms& terms() const { return terms_; }
+  /// M_bar' at the last state.
+  [[nodiscard]] const MatrixXd& M() const { return M_; }
   /// The last of Read(kJ) of a compared frame: 6 x chain, world axes.
   [[nodiscard]] const Matrix6Xd& columns(size_t frame) const { return columns_[frame]; }
 
@@ -71,6 +73,7 @@ class EngineProvider : public MechanismProvider {
   std::vector<Matrix6Xd> columns_;
   std::vector<LinkInWorld> links_;
   VectorXd xi_, w_, unreduced_velocity_;
+  MatrixXd M_;
 };
 
 }  // namespace dexcheck
