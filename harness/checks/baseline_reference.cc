@@ -20,7 +20,7 @@ BaselineReference::BaselineReference(ControlLaw law, const ObjectStiffness& stif
 
 bool BaselineReference::CalcInertia(const LawTerms& terms) {
   // Lambda_c = (J M^-1 J^T)^-1, Lambda = M_hat + G Lambda_c G^T
-  M_llt_.compute(terms.M);
+  M_llt_.compute(*terms.M);
   if (M_llt_.info() != Eigen::Success) return false;
   M_inv_J_T_ = terms.J.transpose();
   M_llt_.solveInPlace(M_inv_J_T_);
@@ -95,7 +95,7 @@ bool BaselineReference::Evaluate(const LawSpec& spec, const LawReference& plain,
     f_c_.noalias() = Lambda_c_ * rates_;
     force_ += terms.C_xi + terms.friction;
     force_.noalias() += terms.J.transpose() * f_c_;
-    force_.noalias() += terms.M * plain.sigma_prime();
+    force_.noalias() += *terms.M * plain.sigma_prime();
     F_o += terms.M_hat * V_dot + terms.C_hat_V;
   } else {
     CalcErrors(spec, terms, desired);
@@ -123,7 +123,7 @@ bool BaselineReference::Evaluate(const LawSpec& spec, const LawReference& plain,
     rates_.noalias() -= terms.J * plain.sigma_prime();
     plain.ApplyPseudoinverse(&rates_, &motion_);
     motion_ += plain.sigma_prime();
-    force_.noalias() += terms.M * motion_;
+    force_.noalias() += *terms.M * motion_;
     F_o += terms.M_hat * V_dot;
   }
   f_c_ = F_N;

@@ -53,7 +53,7 @@ double JudgedLaw::CalcTorqueError(const StepRecord& step, const LawTerms& terms,
 }
 
 double JudgedLaw::CompareTorque(const StepRecord& step, const LawTerms& terms) {
-  own_factor_.Compute(terms.M);
+  own_factor_.Compute(*terms.M);
   if (!Evaluate(step, terms)) return std::numeric_limits<double>::infinity();
   return CalcTorqueError(step, terms, own_factor_);
 }
@@ -133,14 +133,14 @@ class JudgedJointLaw final : public JudgedLaw {
       // M_bar' (q_d_ddot + K_v e_dot + K_p e) + C_bar' q_dot + F_bar' + tau_f
       demand_ = desired_.q_ddot + gains_.K_v.cwiseProduct(desired_.q_dot - terms.xi) +
                 gains_.K_p.cwiseProduct(position_error_);
-      force_.noalias() += terms.M * demand_;
+      force_.noalias() += *terms.M * demand_;
       return true;
     }
     // K e + D e_dot + g + tau_f [+ M_bar' q_d_ddot + C_bar' q_d_dot + friction]
     if (law_ == ControlLaw::kPdGravity) {
       force_ = terms.gravity + coulomb_ + viscous_;
     } else {
-      force_.noalias() += terms.M * desired_.q_ddot;
+      force_.noalias() += *terms.M * desired_.q_ddot;
       force_.noalias() += *terms.C * (desired_.q_dot - terms.xi);
     }
     force_ += gains_.K.cwiseProduct(position_error_);
@@ -158,9 +158,9 @@ class JudgedJointLaw final : public JudgedLaw {
     const VectorXd rate = D.cwiseProduct(desired_.q_dot - terms.xi);
     const VectorXd position = K.cwiseProduct(position_error_);
     parts_.setZero(terms.xi.size(), CountColumns());
-    if (moves) parts_.col(0) = terms.M * desired_.q_ddot;
-    parts_.col(1) = computed ? VectorXd(terms.M * rate) : rate;
-    parts_.col(2) = computed ? VectorXd(terms.M * position) : position;
+    if (moves) parts_.col(0) = *terms.M * desired_.q_ddot;
+    parts_.col(1) = computed ? VectorXd(*terms.M * rate) : rate;
+    parts_.col(2) = computed ? VectorXd(*terms.M * position) : position;
     if (moves) parts_.col(3) = terms.C_xi;
     if (moves && !computed) parts_.col(3) += *terms.C * (desired_.q_dot - terms.xi);
     parts_.col(4) = terms.gravity;
@@ -169,8 +169,8 @@ class JudgedJointLaw final : public JudgedLaw {
     parts_.col(7) = viscous_;
     if (!computed) return;
     const Eigen::Index n = rate.size();
-    parts_.middleCols(kPartCount, n) = terms.M * rate.asDiagonal();
-    parts_.rightCols(n) = terms.M * position.asDiagonal();
+    parts_.middleCols(kPartCount, n) = *terms.M * rate.asDiagonal();
+    parts_.rightCols(n) = *terms.M * position.asDiagonal();
   }
 
  private:

@@ -77,7 +77,6 @@ std::span<const LawPartName> ListLawParts() { return kLawParts; }
 LawTerms::LawTerms(int num_positions, int num_velocities, int num_forces) {
   q.setZero(num_positions);
   xi.setZero(num_velocities);
-  M.setZero(num_velocities, num_velocities);
   C_xi.setZero(num_velocities);
   gravity.setZero(num_velocities);
   friction.setZero(num_velocities);
@@ -105,7 +104,7 @@ bool LawReference::FactorJacobian(const LawSpec& spec, const LawTerms& terms) {
   if (spec.weight.kind == RedundancyWeight::Kind::kDiagonal) {
     W_inv_J_T_.array().colwise() /= spec.weight.w.array();
   } else if (spec.weight.kind == RedundancyWeight::Kind::kMass) {
-    W_llt_.compute(terms.M);
+    W_llt_.compute(*terms.M);
     W_llt_.solveInPlace(W_inv_J_T_);
   }
   A_.noalias() = terms.J * W_inv_J_T_;
@@ -213,7 +212,7 @@ bool LawReference::Evaluate(const LawSpec& spec, const LawTerms& terms, const De
   AddLeastForces(terms.M_hat * V_Bo_dot_ + terms.C_hat_V + terms.N_o, &f_c_);
 
   force_ = terms.C_xi + slip_coriolis_ + terms.gravity + terms.friction;
-  force_.noalias() += terms.M * xi_dot_d_;
+  force_.noalias() += *terms.M * xi_dot_d_;
   force_.noalias() += terms.J.transpose() * f_c_;
   return true;
 }
@@ -223,7 +222,7 @@ const MatrixXd& LawReference::CalcParts(const LawTerms& terms, const Eigen::Ref<
   // M_bar' J^+ rates
   const auto set_motion = [&](LawPart which) {
     ApplyPseudoinverse(&rates_, &motion_);
-    part(which).noalias() = terms.M * motion_;
+    part(which).noalias() = *terms.M * motion_;
   };
   for (size_t i = 0; i < demand_.size(); ++i) {
     rates_.noalias() = terms.G.transpose() * demand_[i];
@@ -236,7 +235,7 @@ const MatrixXd& LawReference::CalcParts(const LawTerms& terms, const Eigen::Ref<
   rates_.noalias() = terms.J * sigma_prime_;
   ApplyPseudoinverse(&rates_, &motion_);
   motion_ = sigma_prime_ - motion_;
-  part(LawPart::kPosture).noalias() = terms.M * motion_;
+  part(LawPart::kPosture).noalias() = *terms.M * motion_;
 
   part(LawPart::kCoriolis) = terms.C_xi + slip_coriolis_;
   part(LawPart::kGravity) = terms.gravity;
@@ -268,7 +267,7 @@ void LawReference::CalcGainParts(const LawSpec& spec, const LawTerms& terms, con
     const Vector6d V_dot = demand[i < 6 ? 1 : 2];
     rates_.noalias() = terms.G.transpose() * V_dot;
     ApplyPseudoinverse(&rates_, &motion_);
-    parts.col(i).noalias() = terms.M * motion_;
+    parts.col(i).noalias() = *terms.M * motion_;
     rates_.setZero();
     AddLeastForces(terms.M_hat * V_dot, &rates_);
     parts.col(i).noalias() += terms.J.transpose() * rates_;

@@ -35,14 +35,14 @@ Matrix3d CalcAngleMapRate(const Vector3d& angles, const Vector3d& rates);
 /// Robot, object and contacts at one state, by either side. n entries of xi, k = 3N of f_c; contact forces
 /// and J in each Sigma_cf, the object in Sigma_o.
 struct LawTerms {
-  VectorXd q, xi;              ///< q' (p'), xi (n).
-  MatrixXd M;                  ///< M_bar' (n x n).
-  VectorXd C_xi;               ///< C_bar' xi (n).
-  VectorXd gravity, friction;  ///< n; F_bar' is their sum.
-  MatrixXd J;                  ///< J_B' (k x n).
-  VectorXd J_dot_xi;           ///< k.
-  Matrix6Xd G;                 ///< 6 x k.
-  VectorXd G_dot_T_V;          ///< G_dot^T V_Bo (k).
+  VectorXd q, xi;               ///< q' (p'), xi (n).
+  const MatrixXd* M = nullptr;  ///< M_bar' (n x n).
+  VectorXd C_xi;                ///< C_bar' xi (n).
+  VectorXd gravity, friction;   ///< n; F_bar' is their sum.
+  MatrixXd J;                   ///< J_B' (k x n).
+  VectorXd J_dot_xi;            ///< k.
+  Matrix6Xd G;                  ///< 6 x k.
+  VectorXd G_dot_T_V;           ///< G_dot^T V_Bo (k).
   Pose X_Bo = Pose::Identity();
   Vector6d V_Bo = Vector6d::Zero();
   Vector6d X_o = Vector6d::Zero();  ///< Of X_Bo, on the law's branch of the angles; kAngles only.

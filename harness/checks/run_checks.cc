@@ -30,17 +30,17 @@ void ReadEngineContacts(const EngineProvider& engine, LawTerms* terms) {
 /// By the engine: all that the table of terms has evaluated on its side. What multiplies only the slip,
 /// C_bar' and J_B_dot', and X_o's branch of the angles are the model's.
 /// @param contacts whether the engine has contacts to compare; bonds it has not, and theirs are the model's.
-/// @param terms keeps pointers into the model.
+/// @param terms keeps pointers into model and engine.
 void ReadEngineTerms(const EngineProvider& engine, const GraspModel& model, const MeasuredState& state,
                      bool contacts, LawTerms* terms) {
   terms->q = state.q;
   terms->xi = state.xi;
+  terms->M = &engine.M();
   terms->C = &model.robot().C();
   terms->J_dot = &model.grasp().J_B_dot();
   if (model.has_coordinates()) terms->X_o = model.grasp().X_o();
 
   const EngineTerms& robot = engine.terms();
-  terms->M = engine.M();
   terms->C_xi = robot.coriolis();
   terms->gravity = robot.gravity();
   terms->friction = robot.friction();
