@@ -27,30 +27,6 @@ void MoveAlongAxes(const RobotModel& model, const MatrixXd& second, MatrixXd* fi
   }
 }
 
-/// Largest |first - second| weight; infinity where one is no number.
-double FindLargestError(const MatrixXd& first, const MatrixXd& second, const MatrixXd& weight) {
-  constexpr Eigen::Index kBlock = 4;
-  using Block = Eigen::Array<double, kBlock, 1>;
-  const auto at = [](const MatrixXd& matrix, Eigen::Index i) {
-    return Eigen::Map<const Block>(matrix.data() + i);
-  };
-  Block largest = Block::Zero();
-  Block no_numbers = Block::Zero();  // a maximum passes them over
-  Eigen::Index i = 0;
-  for (; i + kBlock <= first.size(); i += kBlock) {
-    const Block error = (at(first, i) - at(second, i)).abs() * at(weight, i);
-    largest = largest.max(error);
-    no_numbers += 0.0 * error;
-  }
-  double worst = largest.maxCoeff(), sum = no_numbers.sum();
-  for (; i < first.size(); ++i) {
-    const double error = std::abs(first.data()[i] - second.data()[i]) * weight.data()[i];
-    worst = std::max(worst, error);
-    sum += 0.0 * error;
-  }
-  return sum == 0.0 ? worst : std::numeric_limits<double>::infinity();
-}
-
 }  // namespace
 
 TermComparison::TermComparison(const RobotModel& model, Asker asker, std::vector<DynamicsProvider*> providers)
@@ -250,7 +226,10 @@ void TermComparison::ComparePair(size_t index, double when, ComparedPair* pair) 
   MatrixXd& first = term.numbers[pair->first];
   const MatrixXd& second = term.numbers[pair->second];
   if (entry.term == Term::kJointAxis) MoveAlongAxes(model(), second, &first);
-  const double error = FindLargestError(first, second, term.weight);
+  double error = 0.0;
+  if (first.size() > 0)
+    error = ((first - second).array().abs() * term.weight.array()).maxCoeff<Eigen::PropagateNaN>();
+  if (!(error < std::numeric_limits<double>::infinity())) error = std::numeric_limits<double>::infinity();
   const bool failed_before = record.failed;
   const bool is_worst = error > record.worst || record.comparisons == 0 || (!spreads_.empty() && error > 1.0);
   if (is_worst || (!(error <= record.bound) && !failed_before)) {

@@ -183,11 +183,8 @@ constexpr TermEntry kTerms[] = {
     {T::kJB, "J_B", "J_B'", "(34), (44)", P::kContactColumns, 3, kRun | kTip, 1.0,
      [](const C& c, S scale) {
        const int n = c.model->num_velocities();
-       for (int i = 0; i < n; ++i) {
-         const double velocity = c.robot.CalcVelocityScale(i);
-         for (int col = i; col < scale.cols(); col += n)
-           scale.col(col).setConstant(velocity * ContactOf(c, col / n).J_B);
-       }
+       for (int i = 0; i < scale.cols(); ++i)
+         scale.col(i).setConstant(c.robot.CalcVelocityScale(i % n) * ContactOf(c, i / n).J_B);
      }},
     {T::kKappaDot, "kappa_dot", "kappa_dot", "(40)", P::kContact, 6, kTip, 1.0,
      ScaleContacts<&ContactScales::relative_twist>},
