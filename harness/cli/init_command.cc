@@ -242,7 +242,8 @@ std::optional<Stand> StandOrHold(const mjModel& engine, const std::map<std::stri
     return std::make_unique<MjcfFile>(sources->mjcf->PrintFor(fs::current_path()), source);
   };
   const auto describe = [&](const MjcfFile& mjcf) {
-    return DescriptionFile(source, mjcf.Print(), {}).Describe();
+    // Its files are found from the source's folder, and of this copy from the working directory.
+    return DescriptionFile(source, mjcf.PrintFor(fs::absolute(source).parent_path()), {}).Describe();
   };
   Stand stand;
   std::unique_ptr<MjcfFile> mjcf;

@@ -152,9 +152,19 @@ void Correct(const RobotDescription& robot, const RecordingJudgement& judgement,
   fmt::print("\n");
 }
 
+/// @throws UsageError when MODEL and RECORDING stand the other way round.
+void RequireOrder(const JudgeRequest& request) {
+  const std::filesystem::path model = request.model.extension(), recording = request.recording.extension();
+  if (recording == ".urdf" || recording == ".xml" || std::filesystem::is_directory(request.model) ||
+      (recording == ".toml" && model == ".csv"))
+    throw UsageError(fmt::format("judge: MODEL comes before RECORDING: judge {} {}",
+                                 request.recording.string(), request.model.string()));
+}
+
 int Run(JudgeRequest request) {
   if (request.describe && request.recording.empty()) std::swap(request.model, request.recording);
   if (request.recording.empty()) throw UsageError("judge: RECORDING is missing");
+  RequireOrder(request);
   constexpr int kManyJoints = 64;
   std::optional<RobotDescription> description;
   if (!request.model.empty()) description = ReadDescription(request.model, request.urdf);

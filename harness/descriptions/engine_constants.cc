@@ -137,11 +137,7 @@ class EngineConstants : public ConstantComparison {
 
   /// The fingertip's sphere if it is at the frame's site; otherwise -1.
   [[nodiscard]] int FindTipGeom(int frame) const {
-    const int geom = adapter_.FindTipGeom(frame);
-    if (geom < 0) return -1;
-    const int site = adapter_.frame_sites()[static_cast<size_t>(frame)];
-    const Vector3d apart = MapVector(engine_.geom_pos + 3 * geom) - MapVector(engine_.site_pos + 3 * site);
-    return apart.norm() < kSamePlace ? geom : -1;
+    return FindTipSphere(engine_, adapter_.frame_sites()[static_cast<size_t>(frame)], kSamePlace);
   }
 
   /// A capsule one of whose ends is there, as feet may have them; -1 without one.

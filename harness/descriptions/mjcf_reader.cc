@@ -203,13 +203,9 @@ class MjcfDescriptionReader {
       const Pose X_LF = ReadPose(engine_.site_pos + 3 * site, engine_.site_quat + 4 * site);
       robot_.spec.frames.push_back({NameOf(engine_, mjOBJ_SITE, site), place.joint, place.X_iL * X_LF, {}});
       constexpr double kSamePlace = 1e-9;  // m
-      for (int geom = 0; geom < engine_.ngeom; ++geom) {
-        if (engine_.geom_bodyid[geom] != engine_.site_bodyid[site]) continue;
-        const Vector3d apart =
-            MapVector(engine_.geom_pos + 3 * geom) - MapVector(engine_.site_pos + 3 * site);
-        if (engine_.geom_type[geom] == mjGEOM_SPHERE && CanTouch(engine_, geom) && apart.norm() < kSamePlace)
-          robot_.spheres[robot_.spec.frames.size() - 1] = engine_.geom_size[3 * geom];
-      }
+      const int tip = FindTipSphere(engine_, site, kSamePlace);
+      if (tip >= 0 && CanTouch(engine_, tip))
+        robot_.spheres[robot_.spec.frames.size() - 1] = engine_.geom_size[3 * tip];
     }
   }
 

@@ -318,24 +318,8 @@ Pose Adapter::GetBasePose(const mjtNum* qpos) const {
   return X_W0;
 }
 
-int Adapter::FindTipGeom(int frame) const {
-  const int site = frame_sites_[static_cast<size_t>(frame)];
-  const auto distance = [&](int geom) {
-    return (MapVector(engine_->geom_pos + 3 * geom) - MapVector(engine_->site_pos + 3 * site)).norm();
-  };
-  int found = -1;
-  for (int geom = 0; geom < engine_->ngeom; ++geom) {
-    if (engine_->geom_bodyid[geom] != engine_->site_bodyid[site]) continue;
-    if (engine_->geom_type[geom] != mjGEOM_SPHERE) continue;
-    const bool touches = CanTouch(*engine_, geom);
-    const bool found_touches = found >= 0 && CanTouch(*engine_, found);
-    if (found < 0 || (touches == found_touches ? distance(geom) < distance(found) : touches)) found = geom;
-  }
-  return found;
-}
-
 int Adapter::RequireTipGeom(int frame) const {
-  const int geom = FindTipGeom(frame);
+  const int geom = FindTipSphere(*engine_, frame_sites_[static_cast<size_t>(frame)]);
   if (geom >= 0 && CanTouch(*engine_, geom)) return geom;
   throw InputError("MJCF: fingertip " + Quote(model_->frame(frame).name) +
                    ": its body needs a sphere that can touch");

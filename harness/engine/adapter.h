@@ -53,10 +53,7 @@ class Adapter {
   /// Engine's site of each frame of the model; -1 of one that has its link's name and no site, and is the
   /// frame of the link's body.
   [[nodiscard]] const std::vector<int>& frame_sites() const { return frame_sites_; }
-  /// Engine's geom of a fingertip: of the spheres on the body of the frame's site that can touch the one
-  /// nearest to the site, or of all spheres there when none can; -1 without one.
-  [[nodiscard]] int FindTipGeom(int frame) const;
-  /// The same. @throws InputError unless it can touch.
+  /// Engine's geom of a fingertip (FindTipSphere). @throws InputError unless it can touch.
   [[nodiscard]] int RequireTipGeom(int frame) const;
   /// Engine's body of the object; -1 without one.
   [[nodiscard]] int object_body() const { return object_body_; }

@@ -57,6 +57,7 @@ void PrepareEngine() {
 struct LoadNotes {
   std::mutex mutex;
   std::vector<std::string> texts;
+  std::vector<std::string> quiet_sources;  // of KeepQuietAbout
 };
 
 LoadNotes& AllLoadNotes() {
@@ -64,9 +65,10 @@ LoadNotes& AllLoadNotes() {
   return notes;
 }
 
-void WarnOnce(const std::string& text) {
+void WarnOnce(const std::string& text, const std::string& source) {
   LoadNotes& notes = AllLoadNotes();
   const std::scoped_lock lock(notes.mutex);
+  if (std::ranges::find(notes.quiet_sources, source) != notes.quiet_sources.end()) return;
   if (std::ranges::find(notes.texts, text) != notes.texts.end()) return;
   notes.texts.push_back(text);
   Warn(text);
@@ -105,7 +107,7 @@ MjModelPtr Load(const std::string& path, const mjVFS* vfs, const std::string& so
     throw InputError(source + ": actuator " + Quote(NameOf(*model, mjOBJ_ACTUATOR, wide)) +
                      ": must have one control and one force");
   }
-  if (message[0] != '\0') WarnOnce(source + ": " + OneLine(message));
+  if (message[0] != '\0') WarnOnce(source + ": " + OneLine(message), source);
   return model;
 }
 
@@ -137,13 +139,6 @@ void LeaveBodiesGeneral(MjcfFile* mjcf) {
   });
 }
 
-/// Whether a file was unpacked from a log into a TemporaryFolder: what is left out of it was said by its run.
-bool IsOfLog(const std::filesystem::path& file) {
-  std::error_code ignored;
-  const std::string folders = (std::filesystem::temp_directory_path(ignored) / "dexcheck-").string();
-  return file.string().starts_with(folders) && file.parent_path().filename() == "mjcf";
-}
-
 /// @param load what loads it when nothing need be changed.
 template <typename Load>
 MjModelPtr LoadAdapted(MjcfFile* mjcf, const Load& load) {
@@ -159,7 +154,7 @@ MjModelPtr LoadAdapted(MjcfFile* mjcf, const Load& load) {
   }
   StateNewDefaults(mjcf);
   MjModelPtr model = LoadDocument(*mjcf);
-  if (!IsOfLog(mjcf->source())) WarnOnce(mjcf->SummarizeChanges());
+  WarnOnce(mjcf->SummarizeChanges(), mjcf->source());
   return model;
 }
 
@@ -259,6 +254,12 @@ MjModelPtr LoadMjcfText(const std::string& text, const std::string& source) {
   MjcfFile mjcf(text, source);
   if (mjcf.IsUrdf()) return LoadText(text, source);
   return LoadAdapted(&mjcf, [&] { return kHasSimpleBodies ? LoadDocument(mjcf) : LoadText(text, source); });
+}
+
+void KeepQuietAbout(const std::filesystem::path& mjcf) {
+  LoadNotes& notes = AllLoadNotes();
+  const std::scoped_lock lock(notes.mutex);
+  notes.quiet_sources.push_back(mjcf.string());
 }
 
 std::vector<std::string> ListLoadNotes() {

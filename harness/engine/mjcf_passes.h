@@ -18,6 +18,9 @@ namespace dexcheck {
 /// Makes an MJCF one that this program's engine reads: CheckNumbers, LeaveOutNewerWords, LeaveOutAssets.
 void AdaptMjcf(MjcfFile* mjcf);
 
+/// What later loads of this file leave out of it is not said: the run whose log it comes from has said it.
+void KeepQuietAbout(const std::filesystem::path& mjcf);
+
 /// Of single integers and of lists of numbers the engine reads what it can and drops the rest: 1 of "1,5".
 /// Takes off blanks at which it reads a number twice.
 /// @throws InputError "FILE:LINE: <size nconmax>: must be an integer, got "1,5"".

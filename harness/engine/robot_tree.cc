@@ -5,6 +5,7 @@
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
 #include "harness/engine/engine.h"
+#include "harness/engine/map_vector.h"
 
 namespace dexcheck {
 
@@ -42,6 +43,25 @@ RobotTree FindRobotTree(const mjModel& engine, const std::string& source) {
     if (stands_on_world && moves) robot.others.push_back(name(body));
   }
   return robot;
+}
+
+int FindTipSphere(const mjModel& engine, int site, double within) {
+  if (site < 0) return -1;
+  int found = -1;
+  bool found_touches = false;
+  double nearest = 0.0;
+  for (int geom = 0; geom < engine.ngeom; ++geom) {
+    if (engine.geom_bodyid[geom] != engine.site_bodyid[site] || engine.geom_type[geom] != mjGEOM_SPHERE)
+      continue;
+    const bool touches = CanTouch(engine, geom);
+    const double apart =
+        (MapVector(engine.geom_pos + 3 * geom) - MapVector(engine.site_pos + 3 * site)).norm();
+    if (found >= 0 && (touches == found_touches ? apart >= nearest : found_touches)) continue;
+    found = geom;
+    found_touches = touches;
+    nearest = apart;
+  }
+  return nearest <= within ? found : -1;
 }
 
 WheelInertia CalcWheelInertia(const mjModel& engine, const EngineWheel& wheel) {

@@ -5,6 +5,7 @@
 
 #include <mujoco/mujoco.h>
 
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -28,6 +29,10 @@ RobotTree FindRobotTree(const mjModel& engine, const std::string& source);
 
 /// The floating body that carries a joint; 0 when the world does.
 int FindTree(const mjModel& engine, int joint);
+
+/// The sphere of a fingertip: of those on a site's body that can touch the nearest to the site, or of all
+/// there when none can; -1 without one, or when its centre is farther away than `within`, m.
+int FindTipSphere(const mjModel& engine, int site, double within = std::numeric_limits<double>::infinity());
 
 /// Moments of inertia of a wheel's body, kg m^2.
 struct WheelInertia {

@@ -10,6 +10,7 @@
 #include "harness/base/files.h"
 #include "harness/engine/compiled_model.h"
 #include "harness/engine/mjcf_file.h"
+#include "harness/engine/mjcf_passes.h"
 
 namespace dexcheck {
 namespace {
@@ -198,7 +199,10 @@ std::filesystem::path FindEmbedded(const LogReader& log, const std::string& kind
                                    const std::filesystem::path& unpacked) {
   const std::string name = kind + "/" + log.ReadText(kind);
   (void)log.ReadFile("inputs", name);  // which is an error unless the log has it
-  if (kind == "mjcf") (void)ListMjcfFiles(unpacked / name);
+  if (kind == "mjcf") {
+    (void)ListMjcfFiles(unpacked / name);
+    KeepQuietAbout(unpacked / name);
+  }
   return unpacked / name;
 }
 

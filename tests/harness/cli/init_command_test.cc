@@ -288,6 +288,17 @@ TEST_F(InitCommand, WhatIsNoPartOfTheRobotIsLeftOut) {
   EXPECT_EQ(RunMotion(0, "parked").at("verdict"), "pass");
 }
 
+// Wherever it is called from.
+TEST_F(InitCommand, MeshesLieBesideARobotThatFloats) {
+  std::filesystem::create_directory(Path("far"));
+  Write("far/tetra.obj", "v 0 0 0\nv .1 0 0\nv 0 .1 0\nv 0 0 .1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n");
+  const std::string mesh = R"(<geom type="mesh" mesh="tetra" mass="0" contype="0" conaffinity="0"/>)";
+  const std::string text = ReplaceOnce(ReadFixture("biped.xml"), "<freejoint/>", "<freejoint/>" + mesh);
+  WriteChanged("far/biped.xml", text, "<worldbody>", R"(<asset><mesh file="tetra.obj"/></asset><worldbody>)");
+  EXPECT_THAT(Expect(0, "init far/biped.xml").err, Not(HasSubstr("does not exist")));
+  EXPECT_THAT(Read("biped/robot.xml"), HasSubstr("assets/1-tetra.obj"));
+}
+
 // A run's clearance is of shapes that the engine does not let touch, too.
 TEST_F(InitCommand, WhatOverlapsIsExcluded) {
   Copy("biped.xml");
