@@ -81,9 +81,15 @@ bool MjcfFile::HasWorld() const { return root_->FirstChildElement("worldbody") !
 void MjcfFile::Splice(XMLElement* include) {
   const char* const name = include->Attribute("file");
   if (name == nullptr) throw InputError(FindPlace(*include) + ": <include>: must have a file");
-  // The engine takes all names from the folder of the file that is loaded, and each file once.
+  // The engine takes names from the folder of the file that is loaded, and later releases then from that of
+  // the file that includes, and each file once.
   const std::filesystem::path own = source_;
-  const std::string path = (own.parent_path() / name).lexically_normal().string();
+  std::string path = (own.parent_path() / name).lexically_normal().string();
+  if (!std::filesystem::exists(path)) {
+    const std::filesystem::path beside =
+        std::filesystem::path(*ReadPlace(*include).file).parent_path() / name;
+    if (std::filesystem::exists(beside)) path = beside.lexically_normal().string();
+  }
   if (path == own.lexically_normal() || std::ranges::find(files_, path) != files_.end()) {
     throw InputError(FindPlace(*include) + ": <include>: file " + Quote(name) +
                      ": must be included once only");
@@ -91,7 +97,8 @@ void MjcfFile::Splice(XMLElement* include) {
   tinyxml2::XMLDocument document;
   ParseXml(ReadFile(path, FindPlace(*include) + ": file " + Quote(name)), path, &document);
   files_.push_back(path);
-  included_.push_back(std::filesystem::path(name).lexically_normal().string());
+  included_.push_back(
+      std::filesystem::path(path).lexically_relative(own.lexically_normal().parent_path()).string());
   XMLNode* last = include;
   for (const XMLElement* child : ListChildren<const XMLElement>(document.RootElement()))
     last = include->Parent()->InsertAfterChild(last, Clone(*child, &files_.back()));
