@@ -47,11 +47,13 @@ class Search {
       }
       chosen_ = best;
     }
-    if (const std::vector<size_t> best = chosen_; !options_.start.empty() && best.size() > 1) {
+    const std::vector<size_t> best = chosen_;
+    // Where columns are off themselves it begins so only if nothing was found.
+    const bool may_be_others = best.empty() ? !IsNoise(best) : best.size() > 1 && options_.floor <= 1.0;
+    if (!options_.start.empty() && may_be_others) {
       chosen_ = Thin(options_.start);
       const double other = chosen_.empty() ? kInfinity : GrowFrom(Exchange(ScoreOf(chosen_)));
-      // What does not explain all is no more likely for its beginning.
-      if (other < criterion && IsNoise(chosen_)) {
+      if (other < criterion) {
         criterion = other;
       } else {
         chosen_ = best;
@@ -239,9 +241,9 @@ class Search {
     VectorXd a = visible.basis * found.amplitude.segment(begin, r);
     if (one.scale.size() > 0 && (a.array().abs() > kImplausible * one.scale.array()).any()) return false;
     if (one.least.size() > 0 && (a.array() < one.least.array()).any()) {
-      constexpr double kErrors = 3.0;
+      constexpr double kErrors = 3.0, kRelative = 0.02;
       const VectorXd error = CalcErrors(visible, found.covariance.block(begin, begin, r, r));
-      if ((a.array() + kErrors * error.array() < one.least.array()).any()) return false;
+      if ((a.array() + kErrors * error.array() < (1.0 + kRelative) * one.least.array()).any()) return false;
     }
     return !one.is_possible || one.is_possible(a);
   }

@@ -230,7 +230,7 @@ CauseSelection TorqueEstimator::SelectAmong(const std::vector<bool>& barred) con
   CauseOptions options;
   for (size_t i = 0; i < faults_.size(); ++i) {
     const TorqueFault& fault = faults_[i];
-    if (fault.parameters > 0 || barred[i] || floor_ > 1.0) continue;
+    if (fault.parameters > 0 || barred[i]) continue;
     if (IsPart(fault, Part::kUsual) || fault.kind == TorqueFault::kArmature) options.start.push_back(i);
   }
   options.most_terms = most_causes_;

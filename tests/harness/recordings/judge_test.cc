@@ -45,6 +45,27 @@ RecordedFault DryFriction(int joint, double value) {
           [=](mjModel* robot) { robot->dof_frictionloss[joint] = value; }};
 }
 
+// One at a time, each set of frictions is nearly a gain of the torque, and bodies the rest.
+TEST(Judge, SeveralFrictionsOfAModelThatAreWrongAtOnceAreNamed) {
+  RobotSpec spec = ReadDescription(SourcePath("/controller/parameters/panda.toml")).spec;
+  for (const size_t joint : {4U, 5U, 6U}) {
+    spec.joints[joint].damping = 0.5;
+    spec.joints[joint].dry_friction = 0.5;
+  }
+  const RobotModel wrong(spec);
+  const RecordedTable table = Record({DryFriction(4, 0.2)});
+  std::vector<Recording> recordings;
+  recordings.push_back(ToRecording(wrong, table));
+  const RecordingJudgement judgement = JudgeRecordings(wrong, &recordings, {});
+  ASSERT_EQ(judgement.causes.size(), 6U) << Tell(judgement);
+  for (const Explanation& cause : judgement.causes) {
+    const Fault& found = cause.faults.front();
+    const double right = found.place == "joint panda_joint5" && found.fault == "dry friction" ? 0.2 : 0.0;
+    EXPECT_NEAR(found.value, right, std::max(0.02, 3.0 * found.error)) << Tell(judgement);
+    EXPECT_THAT(found.fault, ::testing::AnyOf("dry friction", "viscous friction"));
+  }
+}
+
 TEST(Judge, VelocitiesOfAnotherSignAreSaidAndNotUsed) {
   RecordedTable table = Record({}, /*has_velocities=*/true);
   ScaleColumns("qd.panda_joint3", -1.0, &table);
