@@ -362,7 +362,9 @@ bool ForceProblem::RefinePoints(const CauseSelection& selection) {
 }
 
 CauseSelection ForceProblem::SelectOnce() {
-  const CauseOptions options{.alike = static_cast<double>(steps_)};
+  // Of one step several faults explain anything.
+  const CauseOptions options{.most_terms = std::min<size_t>(5, used_.size()),
+                             .alike = static_cast<double>(steps_)};
   CauseSelection selection = SelectCauses(y_, candidates_, options);
   if (RefinePoints(selection)) selection = SelectCauses(y_, candidates_, options);
   for (const CauseTerm& term : selection.terms) {

@@ -49,6 +49,48 @@ Fault MakeGrowing(const Candidate& candidate, const VectorXd& a, const VectorXd&
   return fault;
 }
 
+/// A step that differs.
+struct DifferingStep {
+  Index index;
+  bool follows;    // the one before
+  double jump[2];  // of the robot's and the object's residual
+};
+
+/// Of each step's rows, the root mean square of the robot's and of the object's.
+void CalcSizes(const VectorXd& y, double (&sizes)[2]) {
+  const Index n = y.size() - 6;
+  sizes[0] = y.head(n).norm() / std::sqrt(static_cast<double>(n));
+  sizes[1] = y.tail<6>().norm() / std::sqrt(6.0);
+}
+
+std::vector<DifferingStep> ListDiffering(const StepStore& store, StepForces* forces) {
+  std::vector<DifferingStep> steps;
+  VectorXd before;
+  for (Index i = 0; i < store.size(); ++i) {
+    if (!(store.Get(StepStore::kNoise)(0, i) > 0.0)) continue;
+    forces->SetStep(i);
+    const VectorXd y = forces->CalcResidual();
+    if (forces->Differs(y)) {
+      const bool follows = !steps.empty() && steps.back().index == i - 1;
+      steps.push_back({i, follows, {}});
+      if (follows) CalcSizes(y - before, steps.back().jump);
+    }
+    before = y;
+  }
+  return steps;
+}
+
+/// Whether something begins or ends at step k, which its neighbours do not have.
+bool Jumps(const std::vector<DifferingStep>& steps, size_t k) {
+  if (!steps[k].follows) return true;
+  for (const int side : {0, 1}) {
+    const double before = k > 0 ? steps[k - 1].jump[side] : 0.0;
+    const double after = k + 1 < steps.size() ? steps[k + 1].jump[side] : 0.0;
+    if (steps[k].jump[side] > std::max({kJumpNoise, kJump * before, kJump * after})) return true;
+  }
+  return false;
+}
+
 }  // namespace
 
 double CalcGrowthBegin(const VectorXd& a, double end) {
@@ -116,52 +158,6 @@ Fault MakeForceFault(const Candidate& candidate, const VectorXd& a, const Vector
   }
   return fault;
 }
-
-namespace {
-
-/// A step that differs.
-struct DifferingStep {
-  Index index;
-  bool follows;    // the one before
-  double jump[2];  // of the robot's and the object's residual
-};
-
-/// Of each step's rows, the root mean square of the robot's and of the object's.
-void CalcSizes(const VectorXd& y, double (&sizes)[2]) {
-  const Index n = y.size() - 6;
-  sizes[0] = y.head(n).norm() / std::sqrt(static_cast<double>(n));
-  sizes[1] = y.tail<6>().norm() / std::sqrt(6.0);
-}
-
-std::vector<DifferingStep> ListDiffering(const StepStore& store, StepForces* forces) {
-  std::vector<DifferingStep> steps;
-  VectorXd before;
-  for (Index i = 0; i < store.size(); ++i) {
-    if (!(store.Get(StepStore::kNoise)(0, i) > 0.0)) continue;
-    forces->SetStep(i);
-    const VectorXd y = forces->CalcResidual();
-    if (forces->Differs(y)) {
-      const bool follows = !steps.empty() && steps.back().index == i - 1;
-      steps.push_back({i, follows, {}});
-      if (follows) CalcSizes(y - before, steps.back().jump);
-    }
-    before = y;
-  }
-  return steps;
-}
-
-/// Whether something begins or ends at step k, which its neighbours do not have.
-bool Jumps(const std::vector<DifferingStep>& steps, size_t k) {
-  if (!steps[k].follows) return true;
-  for (const int side : {0, 1}) {
-    const double before = k > 0 ? steps[k - 1].jump[side] : 0.0;
-    const double after = k + 1 < steps.size() ? steps[k + 1].jump[side] : 0.0;
-    if (steps[k].jump[side] > std::max({kJumpNoise, kJump * before, kJump * after})) return true;
-  }
-  return false;
-}
-
-}  // namespace
 
 void FindSegments(const StepStore& store, StepForces* forces, double level, Segment* whole,
                   std::vector<Segment>* parts) {
