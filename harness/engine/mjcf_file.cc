@@ -85,10 +85,14 @@ void MjcfFile::Splice(XMLElement* include) {
   // the file that includes, and each file once.
   const std::filesystem::path own = source_;
   std::string path = (own.parent_path() / name).lexically_normal().string();
+  std::filesystem::path kept = std::filesystem::path(name).lexically_normal();
   if (!std::filesystem::exists(path)) {
     const std::filesystem::path beside =
         std::filesystem::path(*ReadPlace(*include).file).parent_path() / name;
-    if (std::filesystem::exists(beside)) path = beside.lexically_normal().string();
+    if (std::filesystem::exists(beside)) {
+      path = beside.lexically_normal().string();
+      kept = beside.lexically_normal().lexically_relative(own.lexically_normal().parent_path());
+    }
   }
   if (path == own.lexically_normal() || std::ranges::find(files_, path) != files_.end()) {
     throw InputError(FindPlace(*include) + ": <include>: file " + Quote(name) +
@@ -97,8 +101,7 @@ void MjcfFile::Splice(XMLElement* include) {
   tinyxml2::XMLDocument document;
   ParseXml(ReadFile(path, FindPlace(*include) + ": file " + Quote(name)), path, &document);
   files_.push_back(path);
-  included_.push_back(
-      std::filesystem::path(path).lexically_relative(own.lexically_normal().parent_path()).string());
+  included_.push_back(kept.string());
   XMLNode* last = include;
   for (const XMLElement* child : ListChildren<const XMLElement>(document.RootElement()))
     last = include->Parent()->InsertAfterChild(last, Clone(*child, &files_.back()));
