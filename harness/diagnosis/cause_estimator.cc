@@ -241,6 +241,7 @@ class Search {
     VectorXd a = visible.basis * found.amplitude.segment(begin, r);
     if (one.scale.size() > 0 && (a.array().abs() > kImplausible * one.scale.array()).any()) return false;
     if (one.least.size() > 0 && (a.array() < one.least.array()).any()) {
+      // Columns of derivatives that were smoothed are off by a part of themselves, which no error says.
       constexpr double kErrors = 3.0, kRelative = 0.02;
       const VectorXd error = CalcErrors(visible, found.covariance.block(begin, begin, r, r));
       if ((a.array() + kErrors * error.array() < (1.0 + kRelative) * one.least.array()).any()) return false;

@@ -37,7 +37,8 @@ struct Candidate {
   /// How large each amplitude may plausibly be (p); empty for any size. What less than that does not show
   /// above the noise is not estimated.
   VectorXd scale;
-  /// The smallest that each amplitude can be (p), but for its error: no friction is negative. Empty for any.
+  /// The smallest that each amplitude can be (p), but for its error and what columns are off: no friction is
+  /// negative. Empty for any.
   VectorXd least;
   /// Whether an amplitude can be: no mass is negative. Empty for all.
   std::function<bool(const VectorXd&)> is_possible;
