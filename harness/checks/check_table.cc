@@ -265,7 +265,7 @@ const CheckInfo kChecks[] = {
      {kShippedCreep, "as fingertip_slip_rate", Scaling::kCreep, "(1 - d) dt 2 m/s^2"},
      "how fast a foot slips on the ground, less what (46) and the engine's constraint differ by",
      {Cause::kContactSoftness, 35, Rank::kAssumption, kOwn, "foot_cone_use"},
-     {[](const Analysis& a) { return When(true, a.feet.rate); }, kRunning}},
+     {[](const Analysis& a) { return When(!a.is_transient, a.feet.rate); }, kRunning}},
     {{"foot_cone_use", kAssumption, "1"},
      {0.99, "1 slides; how a foot's contacts share its load is not determined"},
      "power of the friction at all contacts of a foot over the most that it can be; 1 slides",

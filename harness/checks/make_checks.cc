@@ -49,8 +49,8 @@ std::set<std::string_view> ListMissing(const Setup& setup, const JudgedLaw* law)
   leave_out(!joints, {"joint_dynamics"});
   leave_out(!setup.start().bonds.empty(),
             {"fingertip_slip_rate", "cone_use", "contacts_lost", "penetration", "kappa"});
-  // Without a task every step is judged.
-  leave_out(scenario.pick_task() == nullptr, {"excluded"});
+  // Without a task and without feet every step is judged.
+  leave_out(scenario.pick_task() == nullptr && !stands, {"excluded"});
   leave_out(setup.adapter().wheels().empty(), {"wheel_slip", "wheel_slip_rate", "rolling", "traction_use"});
   leave_out(setup.model().base().type == BaseType::kFixed, {"base_tilt"});
   leave_out(!scenario.grasp.hemisphere, {"fingertip_rim"});

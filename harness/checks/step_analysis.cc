@@ -46,6 +46,7 @@ StepAnalyzer::StepAnalyzer(const Setup& setup)
   now_.findings.wheel_slip.resize(setup.adapter().wheels().size());
   const std::span<const int> feet = setup.feet();
   now_.findings.foot_slip.resize(feet.size());
+  contact_count_ = static_cast<int>(feet.size());
   if (feet.empty()) return;
   ground_ =
       std::make_unique<GroundContacts>(setup.declared_model(), feet, setup.joints()->gains.stance->height);
@@ -167,7 +168,7 @@ void StepAnalyzer::FindTransient() {
   }
   const PlantResponse& response = now_.step->response;
   const bool is_supported = !response.support_wrench.isZero(0.0);
-  // What is put down touches at one point, then at more.
+  // What is put down touches at one point, then at more; of feet of several points one may lift a little.
   if (handling.contacts != handling_.contacts || touching != now_.touching ||
       is_supported != now_.is_supported || response.contact_count != contact_count_)
     changed_at_ = time;
@@ -175,7 +176,7 @@ void StepAnalyzer::FindTransient() {
   handling_ = handling;
   now_.touching = touching;
   now_.is_supported = is_supported;
-  const bool is_transient = handling.partial && time - changed_at_ < kTransient;
+  const bool is_transient = (handling.partial || ground_) && time - changed_at_ < kTransient;
   if (is_transient && !now_.is_transient) transient_since_ = time;
   now_.is_transient = is_transient;
   now_.transient_time = is_transient ? time - transient_since_ : 0.0;

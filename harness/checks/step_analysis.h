@@ -69,7 +69,7 @@ struct StepAnalysis {
   // Contacts.
   ContactSet touching = 0;      ///< Fingertips that touch the object.
   bool is_supported = false;    ///< Whether anything else does.
-  bool is_transient = false;    ///< Whether contacts of a task have just changed.
+  bool is_transient = false;    ///< Whether contacts of a task or a stance have just changed.
   double transient_time = 0.0;  ///< How long it has been so in one go, s.
   bool begins_holding = false;  ///< Whether all fingertips should touch the object from this step on.
   bool is_window_end = false;  ///< Whether the window that distances are judged over moves on after the step.
@@ -130,8 +130,8 @@ struct StepAnalysis {
 /// contacts comes up for the first time.
 ///
 /// For a task, each step is predicted with the contacts that it has: (46) for the fingertips that touch, and
-/// an object that does not move while it lies on something. For kTransient after a contact has come, gone or
-/// been let go there is no prediction.
+/// an object that does not move while it lies on something. For kTransient after a contact of it has come,
+/// gone or been let go, or a foot's, there is no prediction.
 class StepAnalyzer {
  public:
   explicit StepAnalyzer(const Setup& setup);
@@ -198,9 +198,9 @@ class StepAnalyzer {
   std::unique_ptr<GroundDynamics> ground_dynamics_;
   std::map<ContactSet, std::unique_ptr<PartialDynamics>> parts_;
   PredictionCompliance compliance_;
-  Handling handling_;                                             // of the step before
-  int contact_count_ = 0;                                         // likewise, of all of the engine's
-  bool was_holding_ = false;                                      // likewise
+  Handling handling_;         // of the step before
+  int contact_count_ = 0;     // likewise, of all of the engine's; first the feet
+  bool was_holding_ = false;  // likewise
   double changed_at_ = -std::numeric_limits<double>::infinity();  // the contacts, s
   double transient_since_ = 0.0;                                  // s
   long steps_ = 0;

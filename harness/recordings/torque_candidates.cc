@@ -95,6 +95,13 @@ class FaultList {
     spring.columns.push_back({{{TorqueColumn::kOffset, joint}, joint}});
     spring.scale = VectorXd::Constant(2, kMostTorque);
     spring.least = Eigen::Vector2d(0.0, -kMostTorque);
+    // What is at rest further from the joint's range than its width is an offset that changes a little.
+    const double middle = 0.5 * (modelled.lower + modelled.upper), width = modelled.upper - modelled.lower;
+    if (std::isfinite(width) && width > 0.0) {
+      spring.is_possible = [middle, width](const VectorXd& a) {
+        return std::abs(-a[1] / a[0] - middle) <= 1.5 * width;
+      };
+    }
     AddAtJoint(kLoadFriction, joint, "friction that grows with the load", "", {TorqueColumn::kLoad, joint},
                0.0, true);
     AddAtJoint(kOffset, joint, "torque offset", torque, {TorqueColumn::kOffset, joint}, 0.0, false);

@@ -162,6 +162,21 @@ TEST(Judge, ASpringIsNamed) {
   EXPECT_TRUE(NamesOnly(Judge(Record({spring})), "spring", "joint panda_joint2", 5.0));
 }
 
+// An offset that changes a little with the angle would be a spring at rest where the joint never is.
+TEST(TorqueFaults, ASpringIsAtRestNearTheJointsRange) {
+  constexpr int kLink = 1;
+  const Joint& joint = Panda().joint(kLink);
+  for (const TorqueFault& fault : ListTorqueFaults(Panda(), {kLink}, 1)) {
+    if (fault.kind != TorqueFault::kSpring) continue;
+    const auto is_possible = [&](double rest) { return fault.is_possible(Vector2d(2.0, -2.0 * rest)); };
+    EXPECT_TRUE(is_possible(joint.upper + 0.5));
+    EXPECT_FALSE(is_possible(joint.upper + 1.1 * (joint.upper - joint.lower)));
+    EXPECT_FALSE(is_possible(joint.lower - 1.1 * (joint.upper - joint.lower)));
+    return;
+  }
+  FAIL() << "no spring";
+}
+
 TEST(Judge, FewNumbersPredictWhatIsHeldOut) {
   const RecordingJudgement judgement = Judge(Record({DryFriction(1, 1.5), DryFriction(3, 1.0)}));
   EXPECT_EQ(judgement.by_causes.numbers, 2);
