@@ -24,8 +24,8 @@ void DefineLengths(TomlTable& root, TomlDocument& document) {
 /// The wheels as cylinders of the given radius, or with their moments of inertia given.
 void ReadWheels(const TomlValue& value, Base& base) {
   TomlTable table = value.AsTable();
-  base.wheel_joint_right = table.Get("right").AsName();
-  base.wheel_joint_left = table.Get("left").AsName();
+  base.wheel_joint_right = table.Get("right").AsPartName();
+  base.wheel_joint_left = table.Get("left").AsPartName();
   if (base.wheel_joint_left == base.wheel_joint_right) table.Get("left").Fail("must differ from right");
   WheelProperties& wheel = base.wheel;
   wheel.mass = table.Get("mass").AsNotNegative();
@@ -80,7 +80,7 @@ Base ReadBase(const TomlValue& value) {
 ObjectModel ReadObject(const TomlValue& value) {
   TomlTable table = value.AsTable();
   ObjectModel object;
-  object.name = table.Get("body").AsName();
+  object.name = table.Get("body").AsPartName();
   object.shape = ReadShape(table);
   object.body.mass = table.Get("mass").AsPositive();
   const std::optional<TomlValue> inertia = table.Find("inertia");

@@ -46,8 +46,9 @@ StepAnalyzer::StepAnalyzer(const Setup& setup)
   now_.findings.wheel_slip.resize(setup.adapter().wheels().size());
   const std::span<const int> feet = setup.feet();
   now_.findings.foot_slip.resize(feet.size());
-  contact_count_ = static_cast<int>(feet.size());
   if (feet.empty()) return;
+  contact_count_ = static_cast<int>(feet.size());
+  for (int i = 0; i < contact_count_; ++i) now_.touching |= ContactSet{1} << (i % 32);
   ground_ =
       std::make_unique<GroundContacts>(setup.declared_model(), feet, setup.joints()->gains.stance->height);
   ground_dynamics_ = std::make_unique<GroundDynamics>(setup.declared_model(), static_cast<int>(feet.size()));
@@ -165,6 +166,10 @@ void StepAnalyzer::FindTransient() {
   const std::vector<PlantContact>& contacts = now_.step->response.contacts;
   for (size_t i = 0; i < contacts.size(); ++i) {
     if (contacts[i].touching) touching |= ContactSet{1} << i;
+  }
+  const std::vector<GroundContact>& feet = now_.step->response.feet;
+  for (size_t i = 0; i < feet.size(); ++i) {
+    if (feet[i].force.z() > 0.0) touching |= ContactSet{1} << (i % 32);
   }
   const PlantResponse& response = now_.step->response;
   const bool is_supported = !response.support_wrench.isZero(0.0);

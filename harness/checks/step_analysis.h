@@ -67,7 +67,7 @@ struct StepAnalysis {
   const GraspTerms* grasp = nullptr;  ///< Likewise.
 
   // Contacts.
-  ContactSet touching = 0;      ///< Fingertips that touch the object.
+  ContactSet touching = 0;      ///< Fingertips that touch the object, or feet that bear something.
   bool is_supported = false;    ///< Whether anything else does.
   bool is_transient = false;    ///< Whether contacts of a task or a stance have just changed.
   double transient_time = 0.0;  ///< How long it has been so in one go, s.

@@ -70,7 +70,7 @@ void ReadPlant(const TomlValue& value, const std::filesystem::path& folder, Scen
     for (const TomlValue& entry : pairs->AsList()) {
       const std::vector<TomlValue> bodies = entry.AsList();
       if (bodies.size() != 2) entry.Reject("must name two bodies");
-      plant.allowed_collision_pairs.emplace_back(bodies[0].AsName(), bodies[1].AsName());
+      plant.allowed_collision_pairs.emplace_back(bodies[0].AsPartName(), bodies[1].AsPartName());
     }
   }
   table.RejectUnused();
@@ -236,7 +236,7 @@ void ReadValue(const TomlValue& value, Range range, ByName* target) {
 void ReadValue(const TomlValue& value, Range /*range*/, Vector3d* target) { *target = value.AsVector<3>(); }
 
 void ReadValue(const TomlValue& value, Range /*range*/, std::vector<std::string>* target) {
-  for (const TomlValue& entry : value.AsList()) target->push_back(entry.AsName());
+  for (const TomlValue& entry : value.AsList()) target->push_back(entry.AsPartName());
 }
 
 }  // namespace dexcheck

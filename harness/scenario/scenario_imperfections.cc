@@ -75,7 +75,7 @@ void ReadActuation(const TomlValue& value, double time_step, ActuationOptions* a
 
 void ReadWrench(TomlTable& table, double time_step, DisturbanceOptions* one) {
   using Options = DisturbanceOptions;
-  one->body = table.Get("body").AsName();
+  one->body = table.Get("body").AsPartName();
   ReadChoice<bool>(table, "frame", {{"world", false}, {"body", true}}, &one->in_body_frame);
   ReadKeys<Options>(table,
                     {KEY(force), KEY(torque), KEY(at), KEY(begin), POSITIVE_KEY(duration),
@@ -120,7 +120,8 @@ void ReadDisturbance(const TomlValue& value, size_t number, double time_step, Im
   if (type == Type::kSlope) {
     ReadSlope(table, &all->mismatch.slope);
   } else if (type == Type::kPayload) {
-    Payload payload{.body = table.Get("body").AsName(), .mass = table.Get("mass").AsPositive(), .key = key};
+    Payload payload{
+        .body = table.Get("body").AsPartName(), .mass = table.Get("mass").AsPositive(), .key = key};
     if (const auto at = table.Find("at")) payload.at = at->AsVector<3>();
     all->mismatch.payloads.push_back(payload);
   } else {

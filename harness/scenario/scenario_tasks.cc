@@ -44,7 +44,7 @@ void ReadGrasp(const TomlValue& value, bool planned, GraspOptions* grasp) {
   } else if (const auto xyz = table.Find("xyz")) {
     grasp->hold_at = xyz->AsVector<3>();
   }
-  grasp->frame = table.Get("frame").AsName();
+  grasp->frame = table.Get("frame").AsPartName();
   if (const auto pole = table.Find("hemisphere")) {
     grasp->hemisphere = pole->AsVector<3>();
     if (!(grasp->hemisphere->norm() > 0.0)) pole->Fail("must have a direction");
@@ -253,7 +253,7 @@ double ReadSine(const char* missing, TomlTable* table, Oscillation* one) {
 JointTask::Oscillation ReadOscillation(const TomlValue& value) {
   TomlTable table = value.AsTable();
   JointTask::Oscillation one;
-  one.joint = table.Get("joint").AsName();
+  one.joint = table.Get("joint").AsPartName();
   one.key = value.path();
   one.in_degrees = ReadSine("amplitude_deg", &table, &one) != 1.0;
   return one;

@@ -26,6 +26,17 @@ TEST_F(InitUrdf, MovesAsFastAsJointsMay) {
   EXPECT_LT(rates.bottomRows(1).cwiseAbs().maxCoeff(), 1e-3 * fastest[0]);
 }
 
+// Names are those of the file, as URDF and MJCF allow them.
+TEST_F(InitUrdf, PartsMayHaveAnyName) {
+  std::string text =
+      ReplaceOnce(ReadFixture("pair.urdf"), "joint name=\"elbow\"", "joint name=\"left/elbow 2\"");
+  text = ReplaceOnce(text, "link name=\"lower\"", "link name=\"left/lower\"");
+  WriteChanged("names.urdf", text, "child link=\"lower\"", "child link=\"left/lower\"");
+  Expect(0, "init names.urdf");
+  Expect(0, {"run", "names/motion.toml", "--no-log", "--set", "settle=0.1", "--set",
+             "disturbance=[{type='pulse',body='left/lower',force=[1,0,0],begin=0.1,duration=0.1}]"});
+}
+
 /// A URDF of a trunk on four legs of three joints, with a ball for a foot.
 std::string MakeLeggedUrdf(const std::string& head) {
   const auto link = [](const std::string& name, double mass, const std::string& more) {
