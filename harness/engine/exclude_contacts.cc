@@ -63,9 +63,11 @@ bool AreNeighbours(const mjModel& m, int one, int other) {
          m.body_weldid[m.body_parentid[other_root]] == root;
 }
 
-/// Of one robot. With the world, or what stands on it, it is a matter of the motion.
-bool AreOfOneTree(const mjModel& m, int one, int other) {
-  return m.body_rootid[one] == m.body_rootid[other] && (m.body_weldid[one] != 0 || m.body_weldid[other] != 0);
+/// All that moves is the robot, be it several trees on the world, as fingers are. With the world, or what
+/// stands on it, it is a matter of the motion.
+bool AreOfTheRobot(const mjModel& m, int one, int other) {
+  const int moving = (m.body_weldid[one] != 0 ? 1 : 0) + (m.body_weldid[other] != 0 ? 1 : 0);
+  return moving == 2 || (moving == 1 && m.body_rootid[one] == m.body_rootid[other]);
 }
 
 /// What the engine lets touch; it pushes apart what is as near as their margin.
@@ -73,7 +75,7 @@ void AddContacts(const mjModel& m, const mjData& data, std::set<std::pair<int, i
   for (int i = 0; i < data.ncon; ++i) {
     const mjContact& contact = data.contact[i];
     const std::pair bodies = std::minmax(m.geom_bodyid[contact.geom1], m.geom_bodyid[contact.geom2]);
-    if (contact.dist <= contact.includemargin && AreOfOneTree(m, bodies.first, bodies.second))
+    if (contact.dist <= contact.includemargin && AreOfTheRobot(m, bodies.first, bodies.second))
       pairs->insert(bodies);
   }
 }
@@ -90,7 +92,7 @@ void AddOverlaps(const mjModel& m, const mjData& data, const Solids& solids,
     for (size_t k = 0; k < i; ++k) {
       const Solid& b = solids.list[k];
       const std::pair bodies = std::minmax(a.body, b.body);
-      if (!AreOfOneTree(m, a.body, b.body) || AreNeighbours(m, a.body, b.body) || pairs->count(bodies) > 0)
+      if (!AreOfTheRobot(m, a.body, b.body) || AreNeighbours(m, a.body, b.body) || pairs->count(bodies) > 0)
         continue;
       const Pose X_WA = pose(a), X_WB = pose(b);
       if ((X_WA.translation() - X_WB.translation()).norm() > a.reach + b.reach + kNear) continue;

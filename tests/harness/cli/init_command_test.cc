@@ -102,6 +102,20 @@ TEST_F(InitCommand, MotorsHaveTheLimitsThatTheFilesState) {
 }
 
 // MuJoCo leaves out contacts of neighbours, but not those of a link on a base that is welded to the world.
+// Fingers that stand on the world are one robot.
+TEST_F(InitCommand, TreesOfOneRobotDoNotTouch) {
+  const auto finger = [](const std::string& name, const std::string& at) {
+    return "<body name=\"" + name + "\" pos=\"" + at + "\"><joint name=\"" + name +
+           "_joint\" axis=\"0 1 0\" range=\"-60 60\"/><geom type=\"capsule\" fromto=\"0 0 0 0 0 0.2\" "
+           "size=\"0.03\"/></body>";
+  };
+  Write("fingers.xml", "<mujoco><worldbody>" + finger("left", "0 0 0") + finger("right", "0 0.05 0") +
+                           "</worldbody></mujoco>");
+  Expect(0, "init fingers.xml");
+  EXPECT_THAT(Read("fingers/robot.xml"), HasSubstr(R"(<exclude body1="left" body2="right"/>)"));
+  EXPECT_EQ(RunMotion(0, "fingers").at("verdict"), "pass");
+}
+
 TEST_F(InitCommand, ALinkDoesNotTouchTheBaseThatItTurnsOn) {
   std::string mjcf = ReadFixture("pair.xml");
   const auto change = [&](const std::string& from, const std::string& to) {
