@@ -2,6 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <map>
+#include <memory>
+#include <vector>
+
+#include "harness/checks/rounding_scales.h"
 
 namespace dexcheck {
 namespace {
