@@ -47,23 +47,15 @@ struct InitRequest {
 
 /// Copies meshes, textures and the like into the folder's assets: a log keeps what lies beside the MJCF.
 void TakeAssets(const fs::path& folder, MjcfFile* mjcf) {
-  AssetFolders places;
-  for (const XMLElement* compiler : ListChildren(mjcf->root(), "compiler")) places.Read(*compiler);
   int count = 0;
-  VisitElements(mjcf->root(), [&](XMLElement* element) {
-    const std::string_view kind = element->Name();
-    for (const char* attribute : ListAssetAttributes(kind)) {
-      const std::string name = ReadAttribute(*element, attribute);
-      if (name.empty()) continue;
-      // The engine names an asset that has no name by its file.
-      if (element->Attribute("name") == nullptr) element->SetAttribute("name", fs::path(name).stem().c_str());
-      const fs::path from =
-          mjcf->folder() / places.Find(kind == "texture" ? places.textures : places.meshes, name);
-      const std::string to = fmt::format("assets/{}-{}", ++count, from.filename().string());
-      CopyInto(from, folder / to);
-      element->SetAttribute(attribute, to.c_str());
-    }
-  });
+  for (const AssetFile& asset : ListAssetFiles(mjcf->root())) {
+    // The engine names an asset that has no name by its file.
+    if (asset.element->Attribute("name") == nullptr)
+      asset.element->SetAttribute("name", asset.path.stem().c_str());
+    const std::string to = fmt::format("assets/{}-{}", ++count, asset.path.filename().string());
+    CopyInto(mjcf->folder() / asset.path, folder / to);
+    asset.element->SetAttribute(asset.attribute, to.c_str());
+  }
   for (XMLElement* compiler : ListChildren(mjcf->root(), "compiler")) {
     for (const char* key : {"assetdir", "meshdir", "texturedir", "strippath"}) compiler->DeleteAttribute(key);
   }
@@ -276,6 +268,8 @@ std::optional<Stand> StandOrHold(const mjModel& engine, const std::map<std::stri
 }
 
 int InitRobot(const InitRequest& request) {
+  const std::string out = request.out.empty() ? request.robot.stem().string() : request.out;
+  RequireFree(out);
   InitSources sources = ReadSources(request);
   RobotDescription& robot = sources.robot;
   const bool is_made = request.mjcf.empty() && robot.format == RobotFormat::kUrdf;
@@ -319,7 +313,7 @@ int InitRobot(const InitRequest& request) {
       ExcludeOverlaps(stand ? stand->poses : motion.poses, sources.mjcf.get());
   if (!overlaps.empty()) Warn("contacts left out of what overlaps along the motion: " + JoinNames(overlaps));
 
-  const RunFolder folder(request.out.empty() ? request.robot.stem().string() : request.out, "");
+  const RunFolder folder(out, "");
   const fs::path table = folder.path() / "robot.toml", mjcf = folder.path() / "robot.xml";
   AddSky(sources.mjcf.get());
   TakeAssets(folder.path(), sources.mjcf.get());

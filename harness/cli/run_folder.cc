@@ -118,6 +118,12 @@ ScenarioFiles FindScenario(const std::string& name_or_file, const std::vector<st
   return OpenWhole(kScenarios.Find(name_or_file), overrides, seed);
 }
 
+void RequireFree(const std::filesystem::path& folder) {
+  std::error_code error;
+  if (std::filesystem::exists(folder) && (!std::filesystem::is_empty(folder, error) || error))
+    throw InputError(folder.string() + ": already holds files; give a new folder with --out");
+}
+
 RunFolder::RunFolder(const std::string& path, const std::string& name) : path_(path) {
   if (path.empty()) {
     path_ = std::filesystem::path("runs") / name;
@@ -128,9 +134,7 @@ RunFolder::RunFolder(const std::string& path, const std::string& name) : path_(p
   std::error_code error;
   std::filesystem::create_directories(path_, error);
   if (error) throw InputError(path_.string() + ": cannot be made: " + error.message());
-  if (!std::filesystem::is_empty(path_, error) || error) {
-    throw InputError(path_.string() + ": already holds files; give a new folder with --out");
-  }
+  RequireFree(path_);
 }
 
 long RunWithProgress(const std::string& label, long rows, bool quiet, Runner* runner, RunRecorder* recorder) {

@@ -36,6 +36,9 @@ struct ShippedScenario {
 /// In alphabetic order.
 std::vector<ShippedScenario> ListShippedScenarios();
 
+/// @throws InputError when a folder has something in it.
+void RequireFree(const std::filesystem::path& folder);
+
 /// A folder for the results of one run, made new.
 class RunFolder {
  public:

@@ -143,14 +143,19 @@ int FindCouplingConstraint(const mjModel& engine, int joint) {
 }
 
 std::optional<JointCoupling> FindEngineCoupling(const mjModel& engine, int joint) {
-  const int eq = FindCouplingConstraint(engine, joint);
-  if (eq < 0) return std::nullopt;
-  // q1 - q1_0 = a0 + a1 (q2 - q2_0)
-  const mjtNum* a = engine.eq_data + mjNEQDATA * eq;
-  const int leader = engine.eq_obj2id[eq];
-  const double q1_0 = engine.qpos0[engine.jnt_qposadr[joint]];
-  const double q2_0 = engine.qpos0[engine.jnt_qposadr[leader]];
-  return JointCoupling{leader, a[1], a[0] + q1_0 - a[1] * q2_0};
+  JointCoupling found{joint, 1.0, 0.0};
+  // Of joints that follow one another in a circle, none is the leader.
+  for (int count = 0; count <= engine.neq; ++count) {
+    const int eq = FindCouplingConstraint(engine, found.leader);
+    if (eq < 0) return count > 0 ? std::optional(found) : std::nullopt;
+    // q1 - q1_0 = a0 + a1 (q2 - q2_0)
+    const mjtNum* a = engine.eq_data + mjNEQDATA * eq;
+    const int leader = engine.eq_obj2id[eq];
+    const double q1_0 = engine.qpos0[engine.jnt_qposadr[found.leader]];
+    const double q2_0 = engine.qpos0[engine.jnt_qposadr[leader]];
+    found = {leader, found.multiplier * a[1], found.offset + found.multiplier * (a[0] + q1_0 - a[1] * q2_0)};
+  }
+  return std::nullopt;
 }
 
 }  // namespace dexcheck

@@ -1,5 +1,6 @@
 #include "harness/engine/engine.h"
 
+#include <fmt/format.h>
 #include <mujoco/mjxmacro.h>
 
 #include <algorithm>
@@ -102,6 +103,7 @@ MjModelPtr Load(const std::string& path, const mjVFS* vfs, const std::string& so
     if (std::strstr(message, "Could not allocate memory") != nullptr) throw std::bad_alloc();
     throw InputError(source + ": not a valid MJCF model: " + OneLine(message) + Advise(message));
   }
+  KeepNearFrames(model.get());
   CheckFinite(*model, source);
   if (const int wide = FindWideActuator(*model); wide >= 0) {
     throw InputError(source + ": actuator " + Quote(NameOf(*model, mjOBJ_ACTUATOR, wide)) +
@@ -215,13 +217,14 @@ void CheckArray(const mjModel& model, const std::string& source, const std::stri
       if (std::isfinite(values[i])) continue;
       const auto row = static_cast<int>(i / columns);
       const int id = element.prefix == "dof_" ? model.dof_jntid[row] : row;
-      throw InputError(source + ": " + element.kind + " " + Quote(NameOf(model, element.type, id)) + ": " +
-                       attribute + " must be finite, got " + FormatNumber(static_cast<double>(values[i])));
+      throw InputError(fmt::format("{}: {} {}: {} must be finite, got {}", source, element.kind,
+                                   Quote(NameOf(model, element.type, id)), attribute,
+                                   FormatNumber(static_cast<double>(values[i]))));
     }
   }
   for (size_t i = 0; i < rows * columns; ++i) {
     if (std::isnan(values[i]))
-      throw InputError(source + ": " + name + "[" + std::to_string(i) + "] must be a number, got nan");
+      throw InputError(fmt::format("{}: {}[{}] must be a number, got nan", source, name, i));
   }
 }
 

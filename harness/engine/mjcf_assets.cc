@@ -12,7 +12,6 @@ namespace {
 
 using tinyxml2::XMLElement;
 
-constexpr const char* kFile[] = {"file"};
 constexpr const char* kTextureFiles[] = {"file",     "fileright", "fileleft", "fileup",
                                          "filedown", "filefront", "fileback"};
 
@@ -246,10 +245,23 @@ void AdaptMjcf(MjcfFile* mjcf) {
   for (const auto& pass : {CheckNumbers, LeaveOutNewerWords, LeaveOutAssets}) pass(mjcf);
 }
 
-std::span<const char* const> ListAssetAttributes(std::string_view element) {
-  if (element == "texture") return kTextureFiles;
-  if (element == "mesh" || element == "hfield" || element == "skin") return kFile;
-  return {};
+std::vector<AssetFile> ListAssetFiles(XMLElement* root) {
+  AssetFolders folders;
+  VisitElements(root, [&](XMLElement* element) {
+    if (Is(*element, "compiler")) folders.Read(*element);
+  });
+  std::vector<AssetFile> files;
+  const auto add = [&](XMLElement* element, const char* attribute, const std::string& folder) {
+    if (const char* const name = element->Attribute(attribute))
+      files.push_back({element, attribute, folder, folders.Find(folder, name)});
+  };
+  VisitElements(root, [&](XMLElement* element) {
+    if (Is(*element, "texture"))
+      for (const char* attribute : kTextureFiles) add(element, attribute, folders.textures);
+    if (Is(*element, "mesh") || Is(*element, "hfield") || Is(*element, "skin"))
+      add(element, "file", folders.meshes);
+  });
+  return files;
 }
 
 }  // namespace dexcheck

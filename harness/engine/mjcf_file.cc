@@ -41,8 +41,8 @@ bool LiesInside(const std::filesystem::path& file) {
 }  // namespace
 
 void AssetFolders::Read(const XMLElement& compiler) {
-  meshes = ReadAttribute(compiler, "meshdir", meshes);
-  textures = ReadAttribute(compiler, "texturedir", textures);
+  meshes = ReadAttribute(compiler, "meshdir", ReadAttribute(compiler, "assetdir", meshes));
+  textures = ReadAttribute(compiler, "texturedir", ReadAttribute(compiler, "assetdir", textures));
   strips_paths = ReadAttribute(compiler, "strippath", strips_paths ? "true" : "false") == "true";
 }
 
@@ -56,6 +56,17 @@ MjcfFile::MjcfFile(const std::filesystem::path& file, const std::string* text)
   Parse(text != nullptr ? *text : ReadBytes(file));
   if (IsUrdf()) return;
   while (XMLElement* const include = FindInclude(root_)) Splice(include);
+  // As the files themselves: what is not where the file that is loaded has it lies beside the one that names
+  // it.
+  if (files_.empty()) return;
+  for (const AssetFile& asset : ListAssetFiles(root_)) {
+    const std::filesystem::path beside = std::filesystem::absolute(*ReadPlace(*asset.element).file)
+                                             .replace_filename(asset.element->Attribute(asset.attribute))
+                                             .lexically_normal();
+    if (std::filesystem::exists(folder_ / asset.path) || !std::filesystem::exists(beside)) continue;
+    const std::filesystem::path from = (folder_ / asset.folder / "").lexically_normal();
+    asset.element->SetAttribute(asset.attribute, beside.lexically_relative(from).c_str());
+  }
 }
 
 MjcfFile::MjcfFile(std::string_view text, const std::string& source)
@@ -190,21 +201,12 @@ std::vector<std::string> ListMjcfFiles(const std::filesystem::path& mjcf) {
   };
   add(mjcf.filename());
   for (const std::string& file : model.included()) add(file);
-  AssetFolders folders;
-  VisitElements(model.root(), [&](const XMLElement* element) {
-    if (std::string_view(element->Name()) == "compiler") folders.Read(*element);
-  });
-  VisitElements(model.root(), [&](const XMLElement* element) {
-    for (const char* attribute : ListAssetAttributes(element->Name())) {
-      const char* const name = element->Attribute(attribute);
-      if (name == nullptr) continue;
-      const bool is_texture = std::string_view(element->Name()) == "texture";
-      const std::filesystem::path file = folders.Find(is_texture ? folders.textures : folders.meshes, name);
-      std::error_code error;
-      if (!LiesInside(file.lexically_normal()) || std::filesystem::exists(model.folder() / file, error))
-        add(file);
-    }
-  });
+  for (const AssetFile& asset : ListAssetFiles(model.root())) {
+    std::error_code error;
+    if (!LiesInside(asset.path.lexically_normal()) ||
+        std::filesystem::exists(model.folder() / asset.path, error))
+      add(asset.path);
+  }
   std::sort(files.begin() + 1, files.end());
   files.erase(std::unique(files.begin(), files.end()), files.end());
   return files;

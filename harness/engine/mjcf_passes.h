@@ -6,7 +6,6 @@
 
 #include <filesystem>
 #include <map>
-#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -84,8 +83,14 @@ tinyxml2::XMLElement* RequireSection(tinyxml2::XMLElement* root, const char* nam
 /// Takes away controls of key frames, whose actuators are gone.
 void DeleteControls(tinyxml2::XMLElement* root);
 
-/// Attributes of an element of that name (mesh, hfield, skin, texture) that name files; empty for others.
-std::span<const char* const> ListAssetAttributes(std::string_view element);
+/// A file that a mesh, height field, skin or texture names.
+struct AssetFile {
+  tinyxml2::XMLElement* element;
+  const char* attribute;
+  std::filesystem::path folder;  ///< That the compiler gives for its kind, from the MJCF's folder.
+  std::filesystem::path path;    ///< From the MJCF's folder.
+};
+std::vector<AssetFile> ListAssetFiles(tinyxml2::XMLElement* root);
 
 /// What the engine cannot read of a mesh's file (STL, OBJ or MSH): "does not exist", "face 12 has vertex 900
 /// of 60". Empty when it can. The engine's own readers follow indices without looking at them.

@@ -9,6 +9,7 @@
 // | 3.0   | option collision is gone; eq_active is what acts now, eq_active0 what acts at first |
 // | 3.0   | bodies have trees of their geoms; signatures of pairs count bodies from 0 |
 // | 3.2   | files in memory by mj_addBufferVFS; mj_makeEmptyFileVFS and the tables of mjVFS are gone |
+// | 3.2   | (or before) a frame within 1e-6 of its body's is taken for it |
 // | 3.2   | (or before) mjv_connector takes points; sensors have no noise |
 // | 3.2.3 | mpr_iterations, mpr_tolerance are ccd_iterations, ccd_tolerance |
 // | 3.3   | mj_makeM makes the mass matrix, rotors of tendons included |
@@ -109,6 +110,24 @@ std::string DescribeWarning(const char* (*text)(int, Info), const mjData& d, int
 }
 inline std::string DescribeWarning(const mjData& d, int warning) {
   return DescribeWarning(mju_warningText, d, warning);
+}
+
+/// Later releases take a frame for its body's when the two are within 1e-6; here it stays where it is.
+inline void KeepNearFrames([[maybe_unused]] mjModel* m) {
+#if mjVERSION_HEADER >= 320
+  std::fill_n(m->body_sameframe, m->nbody, mjtByte{0});
+  std::fill_n(m->geom_sameframe, m->ngeom, mjtByte{0});
+  std::fill_n(m->site_sameframe, m->nsite, mjtByte{0});
+#endif
+}
+
+/// Whether a library that is loaded brings the plugin of that name.
+inline bool HasPlugin([[maybe_unused]] const char* name) {
+#if mjVERSION_HEADER >= 320
+  return mjp_getPlugin(name, nullptr) != nullptr;
+#else
+  return false;
+#endif
 }
 
 /// Lets a drawn geom reach from one point to another.

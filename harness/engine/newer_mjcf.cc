@@ -130,7 +130,9 @@ class Downgrade {
     for (XMLElement* child : ListChildren(element)) {
       const std::string name = child->Name();
       const auto known = schema.children.find(name);
-      if (known != schema.children.end()) {
+      const char* const plugin = child->Attribute("plugin");
+      const bool is_missing = name == "plugin" && plugin != nullptr && !HasPlugin(plugin);
+      if (known != schema.children.end() && !is_missing) {
         Check(child, *known->second);
         continue;
       }

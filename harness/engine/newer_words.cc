@@ -52,7 +52,7 @@ constexpr NewerWord kWords[] = {
     {"distance normal fromto", "", "3.1.6", kNone},
     {"e_potential e_kinetic", "", "3.3.0", kNone},
     {"insidesite tactile sensor/contact", "", "3.3.5", kNone},
-    {"extension sensor/plugin", "", "2.3.0", kNone},
+    {"extension extension/plugin sensor/plugin", "", "2.3.0", kNone},
     {"actuator/plugin", "", "2.3.0", kActuators},
     {"compiler", "saveinertial", "3.3.1", kNone},
     {"compiler", "conflict", "3.10.0", kNone},

@@ -17,8 +17,12 @@ constexpr int kCollisionGroup = 3;
 void ReadHull(const mjModel& m, int geom, Solid* solid) {
   const int mesh = m.geom_dataid[geom];
   const float* const first = m.mesh_vert + 3 * m.mesh_vertadr[mesh];
-  for (int i = 0; i < m.mesh_vertnum[mesh]; ++i) {
-    solid->vertices.push_back(Eigen::Map<const Eigen::Vector3f>(first + 3 * i).cast<double>());
+  // The engine's hull of a mesh that collides: how many vertices and faces, where their edges are, and which.
+  const int* const hull = m.mesh_graphadr[mesh] < 0 ? nullptr : m.mesh_graph + m.mesh_graphadr[mesh];
+  const int count = hull == nullptr ? m.mesh_vertnum[mesh] : hull[0];
+  for (int i = 0; i < count; ++i) {
+    const int vertex = hull == nullptr ? i : hull[2 + count + i];
+    solid->vertices.push_back(Eigen::Map<const Eigen::Vector3f>(first + 3 * vertex).cast<double>());
     solid->reach = std::max(solid->reach, solid->vertices.back().norm());
   }
 }
@@ -71,20 +75,36 @@ bool ReadShape(const mjModel& m, int geom, Solid* solid) {
   }
 }
 
+/// By geom, whether it is there to be seen only: what is not of the group that collides in a body that has
+/// such geoms, or of the others a mesh that touches nothing in a body whose other geoms do.
+std::vector<bool> FindLooks(const mjModel& m) {
+  std::vector<bool> touches(static_cast<size_t>(m.ngeom)), has_group(static_cast<size_t>(m.nbody)),
+      has_touch(static_cast<size_t>(m.nbody)), is_looks(static_cast<size_t>(m.ngeom));
+  for (const int* geoms : {m.pair_geom1, m.pair_geom2})
+    for (int pair = 0; pair < m.npair; ++pair) touches[static_cast<size_t>(geoms[pair])] = true;
+  for (int geom = 0; geom < m.ngeom; ++geom) {
+    const auto g = static_cast<size_t>(geom), body = static_cast<size_t>(m.geom_bodyid[geom]);
+    if (m.geom_contype[geom] != 0 || m.geom_conaffinity[geom] != 0) touches[g] = true;
+    if (m.geom_group[geom] == kCollisionGroup) has_group[body] = true;
+    if (touches[g]) has_touch[body] = true;
+  }
+  for (int geom = 0; geom < m.ngeom; ++geom) {
+    const auto g = static_cast<size_t>(geom), body = static_cast<size_t>(m.geom_bodyid[geom]);
+    is_looks[g] = has_group[body] ? m.geom_group[geom] != kCollisionGroup
+                                  : has_touch[body] && !touches[g] && m.geom_type[geom] == mjGEOM_MESH;
+  }
+  return is_looks;
+}
+
 }  // namespace
 
 Solids ListSolids(const mjModel& m) {
-  std::vector<bool> has_collision_geoms(static_cast<size_t>(m.nbody), false);
-  for (int geom = 0; geom < m.ngeom; ++geom) {
-    if (m.geom_group[geom] == kCollisionGroup) {
-      has_collision_geoms[static_cast<size_t>(m.geom_bodyid[geom])] = true;
-    }
-  }
+  const std::vector<bool> is_looks = FindLooks(m);
   Solids solids;
   std::vector<int> index(static_cast<size_t>(m.ngeom), -1);
   for (int geom = 0; geom < m.ngeom; ++geom) {
+    if (is_looks[static_cast<size_t>(geom)]) continue;
     const int body = m.geom_bodyid[geom];
-    if (has_collision_geoms[static_cast<size_t>(body)] && m.geom_group[geom] != kCollisionGroup) continue;
     Solid solid{.name = body > 0 ? NameOf(m, mjOBJ_BODY, body) : NameOf(m, mjOBJ_GEOM, geom),
                 .body = body,
                 .geom = geom,

@@ -36,8 +36,8 @@ struct Solids {
 };
 
 /// Lists them. Of a body that has geoms of group 3, in which MJCFs keep what collides apart from what is
-/// seen, those count, and of others all; a mesh is its convex hull unless it is marked as a torus. Height
-/// fields are left out.
+/// seen, those count, and of others all but meshes that touch nothing beside geoms that do; a mesh is its
+/// convex hull unless it is marked as a torus. Height fields are left out.
 Solids ListSolids(const mjModel& model);
 
 /// Distance of a solid from another, m; negative when they overlap: by how far one must move to be clear.

@@ -97,9 +97,10 @@ std::optional<ReplayData> MakeMotionReplay(const RobotModel& model, const std::f
   RunFrames frames;
   frames.source = file.string();
   frames.title = model.name();
-  std::vector<const TorqueTrace*> rows;
+  std::vector<const TorqueTrace*> rows;  // stretches on both sides of one that was held out have its time
   for (const TorqueTrace& trace : judgement.traces)
-    if (trace.recording == 0 && trace.q.allFinite()) rows.push_back(&trace);
+    if (trace.recording == 0 && trace.q.allFinite() && (rows.empty() || trace.time > rows.back()->time))
+      rows.push_back(&trace);
   if (rows.size() < 2) return std::nullopt;
   frames.qpos = Eigen::Map<const VectorXd>(scene->qpos0, scene->nq)
                     .transpose()

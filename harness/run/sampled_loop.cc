@@ -72,7 +72,7 @@ MatrixXd LoopChain::Delay(const MatrixXd& c, MatrixXd* x) const {
   Shift(first, late_, x, &late);
   // The last place holds what was sent one step earlier.
   auto last = x->bottomRows(n_);
-  const MatrixXd mixed = (1.0 - fraction_) * late + fraction_ * last;
+  MatrixXd mixed = (1.0 - fraction_) * late + fraction_ * last;
   last = late;
   return mixed;
 }

@@ -26,8 +26,12 @@ std::string DescribeEdges(const Study& study, const std::vector<double>& values)
   std::string text;
   for (size_t i = 0; i < study.num_keys(); ++i) {
     const Variation& variation = study.variations[i];
-    if (!variation.values.empty() || variation.from == variation.to) continue;
-    const double fraction = FractionOf(variation, values[i]);
+    const std::vector<double>& grid = variation.values;
+    if (!variation.labels.empty() || (grid.empty() ? variation.from == variation.to : grid.size() < 3))
+      continue;
+    const auto [low, high] = std::minmax_element(grid.begin(), grid.end());
+    const double fraction =
+        grid.empty() ? FractionOf(variation, values[i]) : (values[i] - *low) / (*high - *low);
     if (fraction > kAtEnd && fraction < 1.0 - kAtEnd) continue;
     text += (text.empty() ? " At an end of its range is " : ", ") + variation.key;
   }

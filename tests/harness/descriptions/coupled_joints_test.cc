@@ -94,7 +94,7 @@ TEST(CoupledJoints, FaultsInTablesAreNamed) {
   expect("dry_friction = 0.4", "dry_friction = -0.4", "dry_friction");
 }
 
-// The same gripper for the engine: a0 + a1 q of equality/joint.
+// The same gripper for the engine: a0 + a1 q of equality/joint, the right finger's of the left one.
 constexpr const char* kGripperMjcf = R"(<mujoco><compiler angle="radian"/><worldbody><body name="arm">
   <body name="palm" pos="0 0 0.1">
     <joint name="wrist" axis="1 0 0" damping="0.1" armature="0.01" frictionloss="0.4" limited="true" range="-1 1"/>
@@ -105,7 +105,7 @@ constexpr const char* kGripperMjcf = R"(<mujoco><compiler angle="radian"/><world
       <inertial pos="0 0.01 0.03" mass="0.2" diaginertia="0.0002 0.0003 0.0001"/></body>
   </body></body></worldbody>
   <equality><joint joint1="left_joint" joint2="wrist" polycoef="0.4 2 0 0 0"/>
-    <joint joint1="right_joint" joint2="wrist" polycoef="-0.3 -2 0 0 0"/></equality></mujoco>)";
+    <joint joint1="right_joint" joint2="left_joint" polycoef="0.1 -1 0 0 0"/></equality></mujoco>)";
 
 TEST(CoupledJoints, TablesAgreeWithTheMjcf) {
   const MjModelPtr engine = LoadMjcfText(kGripperMjcf, "gripper.xml");

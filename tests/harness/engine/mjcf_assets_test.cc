@@ -129,5 +129,30 @@ TEST(MjcfAssets, AMissingMeshThatHasMassIsNamed) {
   EXPECT_TRUE(Throws<InputError>([&] { LoadMjcf(folder.path() / "robot.xml"); }, "no.stl"));
 }
 
+// A file that is included in one that is included, and its mesh, are found from the folder that is loaded, or
+// else beside the file that names them.
+TEST(MjcfAssets, LieBesideTheFileThatNamesThem) {
+  const TempFolder folder;
+  const std::filesystem::path parts = folder.path() / "parts";
+  std::filesystem::create_directories(parts / "links");
+  WriteText(folder.path() / "robot.xml", R"(<mujoco><include file="parts/arm.xml"/></mujoco>)");
+  WriteText(parts / "arm.xml", R"(<mujoco><include file="links/link.xml"/></mujoco>)");
+  const auto write = [&](const std::string& mesh) {
+    WriteText(parts / "links/link.xml", WriteMjcf(mesh, "", ""));
+  };
+  WriteText(parts / "shell.stl", MakeStl());
+  write("../shell.stl");
+  const double mass = LoadMjcf(folder.path() / "robot.xml")->body_mass[1];
+  EXPECT_GT(mass, 0.1);
+  EXPECT_THAT(
+      ListMjcfFiles(folder.path() / "robot.xml"),
+      ::testing::ElementsAre("robot.xml", "parts/arm.xml", "parts/links/link.xml", "parts/shell.stl"));
+  write("parts/shell.stl");
+  EXPECT_EQ(LoadMjcf(folder.path() / "robot.xml")->body_mass[1], mass);
+  write("shell.stl");
+  EXPECT_TRUE(Throws<InputError>([&] { LoadMjcf(folder.path() / "robot.xml"); },
+                                 "parts/links/link.xml:4: mesh \"shell.stl\": does not exist"));
+}
+
 }  // namespace
 }  // namespace dexcheck::testing::mjcf_assets_test

@@ -215,6 +215,20 @@ TEST(OlderMjcf, SaysWhichGeomsTouch) {
   }
 }
 
+// A frame that is nearly its body's, as two roundings of half a turn leave it, is not taken for it.
+TEST(Frames, AreWhereTheFileHasThem) {
+  constexpr double kTurn = 2e-8;  // rad
+  const MjModelPtr model =
+      LoadMjcfText(R"(<mujoco><worldbody><body><joint/><geom size="1" pos="1e-8 0 0"/>)"
+                   R"(<site name="tool" quat="1 1e-8 0 0"/></body></worldbody></mujoco>)",
+                   "robot");
+  const MjDataPtr data = MakeData(*model);
+  mj_kinematics(model.get(), data.get());
+  EXPECT_NEAR(data->site_xmat[7], kTurn, 1e-16);
+  EXPECT_NEAR(data->geom_xpos[0], 1e-8, 1e-16);
+  EXPECT_NEAR(data->xipos[3], 1e-8, 1e-16);
+}
+
 /// The compiled model, byte by byte.
 std::string Save(const mjModel& model) {
   std::string bytes(static_cast<size_t>(mj_sizeModel(&model)), '\0');

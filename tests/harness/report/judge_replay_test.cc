@@ -51,6 +51,17 @@ std::optional<ReplayData> Replay(const std::string& file, const RecordingJudgeme
   return MakeMotionReplay(RobotModel(ReadDescription(path).spec), path, judgement);
 }
 
+// Of a stretch that was held out, what is around it has the time, too.
+TEST(JudgeReplay, TimesIncrease) {
+  std::mt19937 random(11);
+  RecordingJudgement judgement = Record(&random);
+  const auto all = Replay("/controller/parameters/panda.toml", judgement);
+  judgement.traces[7].time = judgement.traces[6].time;
+  const auto fewer = Replay("/controller/parameters/panda.toml", judgement);
+  ASSERT_TRUE(all && fewer);
+  EXPECT_EQ(fewer->json["times"].size(), all->json["times"].size() - 1);
+}
+
 TEST(JudgeReplay, RodsStandWhereTheEnginesLinksDo) {
   std::mt19937 random(11);
   const RecordingJudgement judgement = Record(&random), another = Record(&random);
