@@ -17,8 +17,6 @@
 #include "harness/base/files.h"
 #include "harness/checks/file_comparison.h"
 #include "harness/cli/commands.h"
-#include "harness/cli/copy_scenario.h"
-#include "harness/cli/init_mend.h"
 #include "harness/cli/init_motion.h"
 #include "harness/cli/init_stance.h"
 #include "harness/cli/output_file.h"
@@ -53,7 +51,7 @@ void TakeAssets(const fs::path& folder, MjcfFile* mjcf) {
     if (asset.element->Attribute("name") == nullptr)
       asset.element->SetAttribute("name", asset.path.stem().c_str());
     const std::string to = fmt::format("assets/{}-{}", ++count, asset.path.filename().string());
-    CopyInto(mjcf->folder() / asset.path, folder / to);
+    WriteFile(folder / to, ReadBytes(mjcf->folder() / asset.path));
     asset.element->SetAttribute(asset.attribute, to.c_str());
   }
   for (XMLElement* compiler : ListChildren(mjcf->root(), "compiler")) {
@@ -324,7 +322,6 @@ int InitRobot(const InitRequest& request) {
   WriteFile(folder.path() / "motion.toml",
             stand ? WriteStandScenario(robot, *stand, rounded) : WriteInitScenario(robot, motion, rounded));
   WriteFile(folder.path() / "gains.toml", WriteGainStudy(stand.has_value()));
-  fs::create_directories(folder.path() / ".github/workflows");
   WriteFile(folder.path() / ".github/workflows/dexcheck.yml", kWorkflow);
   fmt::print("{}: robot.toml, robot.xml, motion.toml, gains.toml, .github/workflows/dexcheck.yml\n",
              folder.path().string());

@@ -1,5 +1,3 @@
-#include "harness/cli/judge_command.h"
-
 #include <fmt/format.h>
 
 #include <chrono>

@@ -17,8 +17,10 @@
 #include "controller/common/toml_reader.h"
 #include "harness/base/console.h"
 #include "harness/base/interrupts.h"
+#include "harness/cli/output_file.h"
 #include "harness/cli/terminal.h"
 #include "harness/engine/machine.h"
+#include "harness/engine/mjcf_file.h"
 #include "harness/report/run_data.h"
 
 namespace dexcheck::cli {
@@ -95,6 +97,17 @@ double CalcLargest(const RowMatrixXd& values) {
     if (std::isfinite(value)) largest = std::max(largest, std::abs(value));
   }
   return largest;
+}
+
+/// Puts a key's line into a table of the text; an own table at its end when it has none.
+void InsertKey(const std::string& table, const std::string& line, std::string* text) {
+  const std::string header = "[" + table + "]\n";
+  const size_t at = text->starts_with(header) ? 0 : text->find("\n" + header);
+  if (at == std::string::npos) {
+    *text += "\n" + header + line;
+  } else {
+    text->insert(text->find(header, at) + header.size(), line);
+  }
 }
 
 }  // namespace
@@ -254,6 +267,43 @@ std::filesystem::path ShippedKind::Find(const std::string& name_or_file) const {
 
 bool IsTomlFile(const std::string& name) {
   return name.ends_with(".toml") || name.find('/') != std::string::npos;
+}
+
+int CopyScenario(const std::string& name, const std::string& out) {
+  const std::filesystem::path source = kScenarios.Find(name);
+  const ScenarioFiles files = FindScenario(name, {}, 0);
+  const std::vector<std::string> parts = ListMjcfFiles(files.mjcf);
+  const RunFolder folder(out.empty() ? source.stem().string() : out, "");
+  std::string text = ReadTextFile(source.string());
+  // As the scenario writes the files: from its own folder.
+  const auto refer = [&](const std::string& stated, const char* table, const char* key,
+                         const std::filesystem::path& file) {
+    const std::string own = file.filename().string();
+    const std::string written =
+        std::filesystem::path(stated).lexically_relative(source.parent_path()).generic_string();
+    const size_t at = stated.empty() ? std::string::npos : text.find('"' + written + '"');
+    if (at == std::string::npos) {
+      InsertKey(table, fmt::format("{} = \"{}\"\n", key, own), &text);
+    } else {
+      text.replace(at + 1, written.size(), own);
+    }
+  };
+  refer(files.scenario.model_file, "model", "file", files.robot);
+  refer(files.scenario.mjcf_file, "plant", "mjcf", files.mjcf);
+  WriteFile(folder.path() / files.robot.filename(), ReadTextFile(files.robot.string()));
+  for (const std::string& part : parts)
+    WriteFile(folder.path() / part, ReadBytes(files.mjcf.parent_path() / part));
+  const std::filesystem::path scenario = folder.path() / source.filename();
+  WriteFile(scenario, text);
+  FindScenario(scenario.string(), {}, 0);
+  fmt::print("{0}: {1}, {2}, {3}\nnext: cd {0} && dexcheck run {1}\n", folder.path().string(),
+             scenario.filename().string(), files.robot.filename().string(), files.mjcf.filename().string());
+  return 0;
+}
+
+void WriteFile(const std::filesystem::path& path, const std::string& text) {
+  std::filesystem::create_directories(path.parent_path());
+  OutputFile(path).Write(text);
 }
 
 }  // namespace dexcheck::cli

@@ -116,4 +116,11 @@ inline constexpr ShippedKind kStudies = {"study", "harness/shipped/studies", ""}
 /// Whether this names a file, and nothing that is shipped.
 bool IsTomlFile(const std::string& name);
 
+/// Copies a shipped scenario with its robot into a folder of its own. @param out empty: named after it.
+/// @returns the exit code. @throws InputError when there is none of that name, or files cannot be written.
+int CopyScenario(const std::string& name, const std::string& out);
+
+/// Writes a file of a folder, whole or not at all, and makes the folder.
+void WriteFile(const std::filesystem::path& path, const std::string& text);
+
 }  // namespace dexcheck::cli

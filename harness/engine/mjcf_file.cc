@@ -58,14 +58,15 @@ MjcfFile::MjcfFile(const std::filesystem::path& file, const std::string* text)
   while (XMLElement* const include = FindInclude(root_)) Splice(include);
   // As the files themselves: what is not where the file that is loaded has it lies beside the one that names
   // it.
-  if (files_.empty()) return;
   for (const AssetFile& asset : ListAssetFiles(root_)) {
-    const std::filesystem::path beside = std::filesystem::absolute(*ReadPlace(*asset.element).file)
+    const Place place = ReadPlace(*asset.element);
+    if (place.file == &source_ || std::filesystem::exists(folder_ / asset.path)) continue;
+    const std::filesystem::path beside = std::filesystem::absolute(*place.file)
                                              .replace_filename(asset.element->Attribute(asset.attribute))
-                                             .lexically_normal();
-    if (std::filesystem::exists(folder_ / asset.path) || !std::filesystem::exists(beside)) continue;
-    const std::filesystem::path from = (folder_ / asset.folder / "").lexically_normal();
-    asset.element->SetAttribute(asset.attribute, beside.lexically_relative(from).c_str());
+                                             .lexically_normal(),
+                                from = (folder_ / asset.folder / "").lexically_normal();
+    if (std::filesystem::exists(beside))
+      asset.element->SetAttribute(asset.attribute, beside.lexically_relative(from).c_str());
   }
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <ranges>
 
 #include "harness/engine/engine.h"
 #include "harness/engine/exact_collision.h"
@@ -75,35 +76,26 @@ bool ReadShape(const mjModel& m, int geom, Solid* solid) {
   }
 }
 
-/// By geom, whether it is there to be seen only: what is not of the group that collides in a body that has
-/// such geoms, or of the others a mesh that touches nothing in a body whose other geoms do.
-std::vector<bool> FindLooks(const mjModel& m) {
-  std::vector<bool> touches(static_cast<size_t>(m.ngeom)), has_group(static_cast<size_t>(m.nbody)),
-      has_touch(static_cast<size_t>(m.nbody)), is_looks(static_cast<size_t>(m.ngeom));
-  for (const int* geoms : {m.pair_geom1, m.pair_geom2})
-    for (int pair = 0; pair < m.npair; ++pair) touches[static_cast<size_t>(geoms[pair])] = true;
-  for (int geom = 0; geom < m.ngeom; ++geom) {
-    const auto g = static_cast<size_t>(geom), body = static_cast<size_t>(m.geom_bodyid[geom]);
-    if (m.geom_contype[geom] != 0 || m.geom_conaffinity[geom] != 0) touches[g] = true;
-    if (m.geom_group[geom] == kCollisionGroup) has_group[body] = true;
-    if (touches[g]) has_touch[body] = true;
-  }
-  for (int geom = 0; geom < m.ngeom; ++geom) {
-    const auto g = static_cast<size_t>(geom), body = static_cast<size_t>(m.geom_bodyid[geom]);
-    is_looks[g] = has_group[body] ? m.geom_group[geom] != kCollisionGroup
-                                  : has_touch[body] && !touches[g] && m.geom_type[geom] == mjGEOM_MESH;
-  }
-  return is_looks;
+/// Whether a geom is there to be seen only: what is not of the group that collides in a body that has such
+/// geoms, or of the others a mesh that touches nothing in a body whose other geoms do.
+bool IsLooks(const mjModel& m, int geom) {
+  const int body = m.geom_bodyid[geom], first = m.body_geomadr[body];
+  const auto any = [&](const auto& is) {
+    return std::ranges::any_of(std::views::iota(first, first + m.body_geomnum[body]), is);
+  };
+  const auto touches = [&](int g) { return CanTouch(m, g); };
+  if (any([&](int g) { return m.geom_group[g] == kCollisionGroup; }))
+    return m.geom_group[geom] != kCollisionGroup;
+  return m.geom_type[geom] == mjGEOM_MESH && !touches(geom) && any(touches);
 }
 
 }  // namespace
 
 Solids ListSolids(const mjModel& m) {
-  const std::vector<bool> is_looks = FindLooks(m);
   Solids solids;
   std::vector<int> index(static_cast<size_t>(m.ngeom), -1);
   for (int geom = 0; geom < m.ngeom; ++geom) {
-    if (is_looks[static_cast<size_t>(geom)]) continue;
+    if (IsLooks(m, geom)) continue;
     const int body = m.geom_bodyid[geom];
     Solid solid{.name = body > 0 ? NameOf(m, mjOBJ_BODY, body) : NameOf(m, mjOBJ_GEOM, geom),
                 .body = body,
