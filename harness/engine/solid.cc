@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <limits>
-#include <ranges>
 
 #include "harness/engine/engine.h"
 #include "harness/engine/exact_collision.h"
@@ -81,7 +80,9 @@ bool ReadShape(const mjModel& m, int geom, Solid* solid) {
 bool IsLooks(const mjModel& m, int geom) {
   const int body = m.geom_bodyid[geom], first = m.body_geomadr[body];
   const auto any = [&](const auto& is) {
-    return std::ranges::any_of(std::views::iota(first, first + m.body_geomnum[body]), is);
+    bool is_any = false;
+    for (int g = first; g < first + m.body_geomnum[body]; ++g) is_any |= is(g);
+    return is_any;
   };
   const auto touches = [&](int g) { return CanTouch(m, g); };
   if (any([&](int g) { return m.geom_group[g] == kCollisionGroup; }))
