@@ -80,13 +80,18 @@ std::vector<DifferingStep> ListDiffering(const StepStore& store, StepForces* for
   return steps;
 }
 
-/// Whether something begins or ends at step k, which its neighbours do not have.
+/// Whether something begins or ends at step k, which its neighbours do not have: of two on a side one may be
+/// where something else begins.
 bool Jumps(const std::vector<DifferingStep>& steps, size_t k) {
   if (!steps[k].follows) return true;
   for (const int side : {0, 1}) {
-    const double before = k > 0 ? steps[k - 1].jump[side] : 0.0;
-    const double after = k + 1 < steps.size() ? steps[k + 1].jump[side] : 0.0;
-    if (steps[k].jump[side] > std::max({kJumpNoise, kJump * before, kJump * after})) return true;
+    const auto calc = [&](size_t near, size_t far) {
+      if (near >= steps.size()) return 0.0;
+      const double jump = steps[near].jump[side];
+      return far < steps.size() && steps[far].follows ? std::min(jump, steps[far].jump[side]) : jump;
+    };
+    const double around = std::max(calc(k - 1, k - 2), calc(k + 1, k + 2));  // before the first is none
+    if (steps[k].jump[side] > std::max(kJumpNoise, kJump * around)) return true;
   }
   return false;
 }

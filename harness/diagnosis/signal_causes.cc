@@ -28,11 +28,17 @@ double CalcRms(const VectorXd& x) { return x.norm() / std::sqrt(static_cast<doub
 
 /// What remembers is not known where the steps before are not: there it is as it should be.
 void Ignore(const Fault& fault, const VectorXd& right, const SignalSeries& series, VectorXd* signal) {
-  const bool remembers = fault.fault == "delay" || fault.fault == "lag";
-  if (!remembers || std::count(series.has_history.begin(), series.has_history.end(), true) < kFewestSteps)
+  const bool is_late = fault.fault == "delay";
+  if ((!is_late && fault.fault != "lag") ||
+      std::count(series.has_history.begin(), series.has_history.end(), true) < kFewestSteps)
     return;
-  for (Index i = 0; i < signal->size(); ++i)
-    if (!series.has_history[static_cast<size_t>(i)]) (*signal)[i] = right[i];
+  // What is late is known after its delay, and another delay may need it.
+  const double remembered = is_late ? fault.value : static_cast<double>(StepStore::kHistory);
+  double known = 0.0;  // steps since the last gap
+  for (Index i = 0; i < signal->size(); ++i, ++known) {
+    if (series.has_history[static_cast<size_t>(i)]) known = -1.0;
+    if (known >= 0.0 && known < remembered) (*signal)[i] = right[i];
+  }
 }
 
 /// The series of one that has this fault after whatever else it has: that is expected then.
@@ -215,6 +221,15 @@ class SignalGroup {
       if (other.name.group == series_[i].name.group) others.push_back(ExpectFault(other, common));
     consider(ExpectFault(series_[i], common), others);
     if (const std::optional<SignalSeries> before = UndoFault(series_[i], common)) consider(*before, series_);
+    const bool may_be_noise = !best.is_explained || best.fits.front().is_noise;
+    if (common.fault.fault != "rounding to steps of" || !may_be_noise) return best;
+    const SignalSteps steps = FindSteps(ExpectFault(series_[i], common));
+    if (const auto noise = FitNoiseBeforeSteps(series_[i], steps, common.fault.value)) {
+      best = verdicts_[i];
+      best.fits = {*noise};
+      best.is_explained = true;
+      best.rival.clear();
+    }
     return best;
   }
 

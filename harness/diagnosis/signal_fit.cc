@@ -37,8 +37,9 @@ Fault MakeFault(const Candidate& candidate, const VectorXd& amplitude, const Vec
   return fault;
 }
 
-/// Whether what is left over is noise, each step for itself.
-bool IsWhite(const VectorXd& residual) {
+/// Whether each step is for itself, and no few values are beside all the rest: those of noise are within 6
+/// times its size.
+bool IsWhite(const VectorXd& residual, double most = 6.0) {
   const Index count = residual.size();
   if (count < kFewestOfNoise) return false;
   const double square = residual.squaredNorm();
@@ -46,8 +47,7 @@ bool IsWhite(const VectorXd& residual) {
     const double along = residual.head(count - k).dot(residual.tail(count - k)) / square;
     if (std::abs(along) > kWhite / std::sqrt(static_cast<double>(count))) return false;
   }
-  // Noise has no few values that all the rest is beside.
-  return residual.cwiseAbs().maxCoeff() < 6.0 * std::sqrt(square / static_cast<double>(count));
+  return residual.cwiseAbs().maxCoeff() < most * std::sqrt(square / static_cast<double>(count));
 }
 
 /// Of a shape, and of when the fault begins and ends, beside what is added.
@@ -178,6 +178,40 @@ SignalVerdict JudgeSignal(const SignalSeries& series, const std::vector<SignalSe
   if (verdict.is_explained && steps.Take(series.got).abs().maxCoeff() <= series.noise)
     AddSilence(series, steps.Take(series.expected).abs().maxCoeff(), &verdict.fits.front());
   return verdict;
+}
+
+std::optional<SignalFit> FitNoiseBeforeSteps(const SignalSeries& series, const SignalSteps& steps,
+                                             double step) {
+  const ArrayXd got = steps.Take(series.got), off = got - steps.Take(series.expected);
+  const double rest = (got - step * (got / step).round()).abs().maxCoeff();
+  if (rest > series.left * series.noise) return std::nullopt;  // it came after them
+  // Of noise of 1: the probability that it comes between those, and its mean where it does times that.
+  const auto calc = [&](double deviation, ArrayXd* mean) -> ArrayXd {
+    const ArrayXd low = (off - 0.5 * step) / deviation, high = (off + 0.5 * step) / deviation;
+    const auto tail = [](double x) { return 0.5 * std::erfc(x / std::sqrt(2.0)); };
+    *mean = ((-0.5 * low.square()).exp() - (-0.5 * high.square()).exp()) / std::sqrt(2.0 * kPi);
+    // On the side where both are small.
+    return (low.max(-high).unaryExpr(tail) - high.max(-low).unaryExpr(tail)).max(1e-300);
+  };
+  // Of the deviations that are tried, in steps, and standard errors that one is away from nothing.
+  constexpr double kRatio = 1.02, kLeast = 1e-2, kMost = 10.0, kSure = 5.0;
+  ArrayXd mean;
+  const auto rate = [&](double deviation) { return calc(deviation, &mean).log().sum(); };
+  double best = kLeast * step;
+  for (double tried = best; tried < kMost * step; tried *= kRatio)
+    if (rate(tried) > rate(best)) best = tried;
+  const double bend = 2.0 * rate(best) - rate(kRatio * best) - rate(best / kRatio);
+  const double error = best * std::log(kRatio) / std::sqrt(bend);
+  // What follows from the signal, as an offset does, goes one way, and goes on for a while.
+  mean /= calc(best, &mean);
+  const bool goes_one_way = std::abs(mean.sum()) > kWhite * mean.matrix().norm();
+  const double any = static_cast<double>(mean.size());
+  if (!(kSure * error < best) || goes_one_way || !IsWhite(mean, any)) return std::nullopt;
+  SignalFit fit;
+  fit.faults = {{"noise, standard deviation", PlaceOf(series.name), best, error, series.name.unit, ""}};
+  fit.same.resize(1);
+  fit.is_noise = true;
+  return fit;
 }
 
 Explanation StartExplanation(const SignalVerdict& verdict, CauseChannel channel) {

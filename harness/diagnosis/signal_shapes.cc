@@ -87,7 +87,10 @@ class ShapeList {
 
   /// Whole multiples of a step: the largest that divides all, made better by all of them.
   void AddSteps() {
-    const double rounding = 1e-10 * got_.abs().maxCoeff();
+    // A difference of multiples, each off by the noise, and what of it the step before them was off.
+    constexpr double kRemainder = 8.0;
+    const double largest = got_.abs().maxCoeff(), exact = 1e-10 * largest;
+    const double rounding = std::max(exact, kRemainder * series_.noise);
     const Index count = got_.size() - 1;
     if (!((got_ - got_[0]).abs().maxCoeff() > rounding)) return AddOneStep();
     // From few multiples to many, so that each is counted right, and the step is known better with each.
@@ -107,9 +110,16 @@ class ShapeList {
       if (whole > rounding) step = whole / std::round(whole / step);
     }
     // Multiples of what is hardly more than rounding are any values.
-    if (!(step > 1e2 * rounding)) return;
-    const double largest = got_.abs().maxCoeff();
-    step = largest / std::round(largest / step);
+    if (!(step > 1e2 * exact)) return;
+    // Of those that the largest may be as many of, the one that leaves least.
+    const double count_of_largest = std::round(largest / step);
+    double least = std::numeric_limits<double>::infinity();
+    const int tried = rounding > exact ? 100 : 0;  // on each side
+    for (int i = -tried; i <= tried; ++i) {
+      const double one = (largest + i * series_.noise / std::max(1, tried)) / count_of_largest;
+      const double left = SquaredNorm(got_ - one * (u_ / one).round());
+      if (left < least) least = left, step = one;
+    }
     Add("rounding to steps of", series_.name.unit, step, false);
   }
 

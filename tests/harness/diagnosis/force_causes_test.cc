@@ -106,6 +106,17 @@ TEST(ForceCauses, WhatGrowsSinceALaterTimeIsNamedBesideWhatIsThereAllTheTime) {
   EXPECT_GT(grows->from, always->from);
 }
 
+// Of a single step several faults explain anything.
+TEST(ForceCauses, OfOneStepOneFaultIsNamed) {
+  const auto force = [](int) -> VectorXd { return Torque(1, 0.7) + Torque(3, 0.4); };
+  for (const int count : {1, 2}) {
+    const Causes causes = Explain(200, 4, count, force);
+    SCOPED_TRACE(TellCauses(causes, CauseChannel::kBalance));
+    const auto named = std::ranges::count(causes, CauseOutcome::kNamed, &Explanation::outcome);
+    EXPECT_EQ(named, count == 1 ? 0 : 2);
+  }
+}
+
 // A joint that rests shows a spring's torque, and nothing of its stiffness.
 TEST(ForceCauses, TorqueOfAJointThatRestsMayBeASprings) {
   for (const int joint : {1, 6}) {

@@ -55,36 +55,44 @@ ArrayXd Round(const ArrayXd& u, double step) { return step * (u / step).round();
 
 INSTANTIATE_TEST_SUITE_P(
     Faults, MotorBesideAll,
-    ::testing::Values(Beside{"Gains", OfMotor("gain", 1.003), OfMotor("gain", 0.95),
-                             [](const ArrayXd& u) { return ArrayXd(1.003 * u); },
-                             [](const ArrayXd& u) { return ArrayXd(0.95 * u); }},
-                      Beside{"RoundingAndGain", OfMotor("gain", 1.003),
-                             OfMotor("rounding to steps of", 0.04, "N m"),
-                             [](const ArrayXd& u) { return ArrayXd(1.003 * u); },
-                             [](const ArrayXd& u) { return Round(u, 0.04); }},
-                      Beside{"DelayAndGain", OfMotor("delay", 3.0, "steps"), OfMotor("gain", 0.95),
-                             [](const ArrayXd& u) { return Delay(u, 3); },
-                             [](const ArrayXd& u) { return ArrayXd(0.95 * u); }},
-                      Beside{"DelayAndLateOffset", OfMotor("delay", 3.0, "steps"),
-                             OfMotor("offset", 0.2, "N m"),
-                             [](const ArrayXd& u) { return DelayUnknown(u, 3); },
-                             [](const ArrayXd& u) {
-                               ArrayXd late = u;
-                               late.tail(kSteps / 2) += 0.2;
-                               return late;
-                             }},
-                      Beside{"DelayAndLimit", OfMotor("delay", 3.0, "steps"), OfMotor("limit", 1.2, "N m"),
-                             [](const ArrayXd& u) { return Delay(u, 3); },
-                             [](const ArrayXd& u) { return ArrayXd(u.min(1.2).max(-1.2)); }},
-                      Beside{"LagAndGain", OfMotor("lag", 5e-3, "s"), OfMotor("gain", 0.95),
-                             [](const ArrayXd& u) { return MakeLag(u, 5e-3); },
-                             [](const ArrayXd& u) { return ArrayXd(0.95 * u); }},
-                      Beside{"LagAndOffset", OfMotor("lag", 5e-3, "s"), OfMotor("offset", 0.2, "N m"),
-                             [](const ArrayXd& u) { return MakeLag(u, 5e-3); },
-                             [](const ArrayXd& u) { return ArrayXd(u + 0.2); }},
-                      Beside{"RoundingAndOffset", OfMotor("rounding to steps of", 0.01, "N m"),
-                             OfMotor("offset", 0.3, "N m"), [](const ArrayXd& u) { return Round(u, 0.01); },
-                             [](const ArrayXd& u) { return ArrayXd(u + 0.3); }}),
+    ::testing::Values(
+        Beside{"Gains", OfMotor("gain", 1.003), OfMotor("gain", 0.95),
+               [](const ArrayXd& u) { return ArrayXd(1.003 * u); },
+               [](const ArrayXd& u) { return ArrayXd(0.95 * u); }},
+        Beside{"RoundingAndGain", OfMotor("gain", 1.003), OfMotor("rounding to steps of", 0.04, "N m"),
+               [](const ArrayXd& u) { return ArrayXd(1.003 * u); },
+               [](const ArrayXd& u) { return Round(u, 0.04); }},
+        Beside{"DelayAndGain", OfMotor("delay", 3.0, "steps"), OfMotor("gain", 0.95),
+               [](const ArrayXd& u) { return Delay(u, 3); },
+               [](const ArrayXd& u) { return ArrayXd(0.95 * u); }},
+        Beside{"DelayAndLateOffset", OfMotor("delay", 3.0, "steps"), OfMotor("offset", 0.2, "N m"),
+               [](const ArrayXd& u) { return DelayUnknown(u, 3); },
+               [](const ArrayXd& u) {
+                 ArrayXd late = u;
+                 late.tail(kSteps / 2) += 0.2;
+                 return late;
+               }},
+        Beside{"DelayAndLimit", OfMotor("delay", 3.0, "steps"), OfMotor("limit", 1.2, "N m"),
+               [](const ArrayXd& u) { return Delay(u, 3); },
+               [](const ArrayXd& u) { return ArrayXd(u.min(1.2).max(-1.2)); }},
+        Beside{"Delays", OfMotor("delay", 1.0, "steps"), OfMotor("delay", 8.0, "steps"),
+               [](const ArrayXd& u) { return Delay(u, 1); }, [](const ArrayXd& u) { return Delay(u, 8); }},
+        Beside{"LagAndGain", OfMotor("lag", 5e-3, "s"), OfMotor("gain", 0.95),
+               [](const ArrayXd& u) { return MakeLag(u, 5e-3); },
+               [](const ArrayXd& u) { return ArrayXd(0.95 * u); }},
+        Beside{"LagAndOffset", OfMotor("lag", 5e-3, "s"), OfMotor("offset", 0.2, "N m"),
+               [](const ArrayXd& u) { return MakeLag(u, 5e-3); },
+               [](const ArrayXd& u) { return ArrayXd(u + 0.2); }},
+        Beside{"Roundings", OfMotor("rounding to steps of", 0.01, "N m"),
+               OfMotor("rounding to steps of", 0.217, "N m"), [](const ArrayXd& u) { return Round(u, 0.01); },
+               [](const ArrayXd& u) { return Round(u, 0.217); }},
+        Beside{"RoundingAndLessNoise", OfMotor("rounding to steps of", 0.05, "N m"),
+               OfMotor("noise, standard deviation", 0.01, "N m"),
+               [](const ArrayXd& u) { return Round(u, 0.05); },
+               [](const ArrayXd& u) { return ArrayXd(u + MakeNoise(0.01, 5)); }},
+        Beside{"RoundingAndOffset", OfMotor("rounding to steps of", 0.01, "N m"),
+               OfMotor("offset", 0.3, "N m"), [](const ArrayXd& u) { return Round(u, 0.01); },
+               [](const ArrayXd& u) { return ArrayXd(u + 0.3); }}),
     [](const ::testing::TestParamInfo<Beside>& info) { return info.param.name; });
 
 // A motor that gives nothing has the steps of all, if they are wide enough.
