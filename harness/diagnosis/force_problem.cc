@@ -67,6 +67,11 @@ bool ForceProblem::IsExplained(double fraction, double left) const {
 
 void ForceProblem::Know(const Terms& known) {
   known_ = known;
+  VectorXd off = VectorXd::Zero(y_.size());
+  for (const CauseTerm& term : known.amplitudes)
+    off += candidates_[term.candidate].columns * term.error.array().isFinite().select(term.error, 0.0);
+  constexpr double kErrors = 3.0;
+  least_level_ = least_level_.cwiseMax(kErrors * level_.cwiseProduct(CalcSizes(off)));
   Complete();
 }
 
@@ -83,7 +88,7 @@ bool ForceProblem::ExplainConstant(const Segment& segment, Causes* causes) {
     if (one.fault == kForceAtPoint) {
       terms_.points.push_back({one.place, term.amplitude, one.fitted});
     } else {
-      terms_.amplitudes.emplace_back(term.candidate, term.amplitude);
+      terms_.amplitudes.push_back(term);
     }
   }
   if (ExplainJoint(segment, selection, causes)) return true;
@@ -213,8 +218,7 @@ void ForceProblem::SetLevel(const Vector2d& level) {
 void ForceProblem::Complete() {
   candidates_.resize(constant_);
   y_ = whole_y_;
-  for (const auto& [candidate, amplitude] : known_.amplitudes)
-    y_ -= candidates_[candidate].columns * amplitude;
+  for (const CauseTerm& term : known_.amplitudes) y_ -= candidates_[term.candidate].columns * term.amplitude;
   for (const ForceAtPoint& force : known_.points)
     candidates_.push_back(MakeForceAtPoint(force, turns_, candidates_));
   AddForcesAtPoints(y_, turns_, forces_->reach(), &candidates_);
@@ -227,7 +231,8 @@ void ForceProblem::AddGrowing() {
     std::erase_if(pushes, [&](const Candidate& one) { return growing_.count(NameGrowing(one)) == 0; });
   // Of many not each time of their begin is tried.
   const auto skipped = static_cast<Index>(pushes.size()) * steps_ / kMostGrowing;
-  for (Index first = 0; first + 1 < steps_; first += 1 + skipped) {
+  // Of one step they are there to be known only.
+  for (Index first = 0; first + 1 < std::max<Index>(2, steps_); first += 1 + skipped) {
     for (const Candidate& push : pushes) candidates_.push_back(MakeGrowing(push, first, skipped));
     if (growth_ == Growth::kBefore) break;
   }
@@ -263,11 +268,11 @@ Candidate ForceProblem::MakeGrowing(const Candidate& push, Index first, Index sk
   MatrixXd shows = push.columns.middleRows(first * rows, rows);
   noise_[static_cast<size_t>(first)].ChangeLevel(level_, Vector2d::Ones(), shows);
   const double earliest = (first > skipped ? time_of(first - 1 - skipped) : time(0, 0)) - slack;
-  growing.is_possible = [=, last = time_of(std::min(first + skipped, steps_ - 1)) + slack,
+  growing.is_possible = [=, steps = steps_, last = time_of(std::min(first + skipped, steps_ - 1)) + slack,
                          end = growing.nominal](const VectorXd& a) {
     const double since = CalcGrowthBegin(a, end);
     const double hidden = (earliest - since) * (shows * a.head(width)).norm();
-    return since <= last && hidden <= std::sqrt(static_cast<double>(rows));
+    return steps > 1 && since <= last && hidden <= std::sqrt(static_cast<double>(rows));
   };
   return growing;
 }

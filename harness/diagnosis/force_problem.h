@@ -34,12 +34,12 @@ class ForceProblem {
 
   /// Of the last explanation: what was selected, and how large each is; forces at points by themselves.
   struct Terms {
-    std::vector<std::pair<size_t, VectorXd>> amplitudes;
+    std::vector<CauseTerm> amplitudes;
     std::vector<ForceAtPoint> points;
     Eigen::Index count = 0;  ///< Of amplitudes.
   };
   [[nodiscard]] const Terms& terms() const { return terms_; }
-  /// Faults that are there, as other steps have shown.
+  /// Faults that are there, as other steps have shown: known to their errors.
   void Know(const Terms& known);
 
   /// Faults that do not change.

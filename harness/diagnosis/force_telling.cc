@@ -18,8 +18,8 @@ constexpr double kTilted = 0.2;
 // Of a spring, by its torque: less shows only the torque, 1 / rad or 1 / m.
 constexpr double kSoft = 0.1;
 
-// Residuals that change by more than this from one step to the next, in units of noise, and by this many
-// times what they change in the steps around, have begun, or ended.
+// Residuals whose change from one step to the next is further from that of the steps around than this, in
+// units of noise, and than this many times what theirs are, have begun, or ended.
 constexpr double kJumpNoise = 0.01, kJump = 5.0;
 
 std::string TellVector(const Eigen::Ref<const VectorXd>& v) {
@@ -52,15 +52,16 @@ Fault MakeGrowing(const Candidate& candidate, const VectorXd& a, const VectorXd&
 /// A step that differs.
 struct DifferingStep {
   Index index;
-  bool follows;    // the one before
-  double jump[2];  // of the robot's and the object's residual
+  bool follows;          // the one before
+  VectorXd change;       // since then
+  double apart[2] = {};  // how far that is from the neighbours' changes, the robot's and the object's
 };
 
-/// Of each step's rows, the root mean square of the robot's and of the object's.
-void CalcSizes(const VectorXd& y, double (&sizes)[2]) {
+/// Of a step's rows, the root mean square of the robot's or of the object's.
+double CalcSize(const VectorXd& y, bool of_object) {
   const Index n = y.size() - 6;
-  sizes[0] = y.head(n).norm() / std::sqrt(static_cast<double>(n));
-  sizes[1] = y.tail<6>().norm() / std::sqrt(6.0);
+  return of_object ? y.tail<6>().norm() / std::sqrt(6.0)
+                   : y.head(n).norm() / std::sqrt(static_cast<double>(n));
 }
 
 std::vector<DifferingStep> ListDiffering(const StepStore& store, StepForces* forces) {
@@ -72,10 +73,18 @@ std::vector<DifferingStep> ListDiffering(const StepStore& store, StepForces* for
     const VectorXd y = forces->CalcResidual();
     if (forces->Differs(y)) {
       const bool follows = !steps.empty() && steps.back().index == i - 1;
-      steps.push_back({i, follows, {}});
-      if (follows) CalcSizes(y - before, steps.back().jump);
+      steps.push_back({i, follows, follows ? VectorXd(y - before) : y});
     }
     before = y;
+  }
+  // What grows evenly changes as one of its neighbours does, even where it begins to, or between two jumps.
+  for (size_t k = 0; k < steps.size(); ++k) {
+    for (const bool of_object : {false, true}) {
+      double& apart = steps[k].apart[of_object ? 1 : 0] = CalcSize(steps[k].change, of_object);
+      for (const size_t other : {k - 2, k - 1, k + 1, k + 2})
+        if (other < steps.size() && steps[other].follows)
+          apart = std::min(apart, CalcSize(steps[k].change - steps[other].change, of_object));
+    }
   }
   return steps;
 }
@@ -86,12 +95,12 @@ bool Jumps(const std::vector<DifferingStep>& steps, size_t k) {
   if (!steps[k].follows) return true;
   for (const int side : {0, 1}) {
     const auto calc = [&](size_t near, size_t far) {
-      if (near >= steps.size()) return 0.0;
-      const double jump = steps[near].jump[side];
-      return far < steps.size() && steps[far].follows ? std::min(jump, steps[far].jump[side]) : jump;
+      if (near >= steps.size() || !steps[near].follows) return 0.0;
+      const bool has_both = far < steps.size() && steps[far].follows;
+      return std::min(steps[near].apart[side], steps[has_both ? far : near].apart[side]);
     };
     const double around = std::max(calc(k - 1, k - 2), calc(k + 1, k + 2));  // before the first is none
-    if (steps[k].jump[side] > std::max(kJumpNoise, kJump * around)) return true;
+    if (steps[k].apart[side] > std::max(kJumpNoise, kJump * around)) return true;
   }
   return false;
 }
