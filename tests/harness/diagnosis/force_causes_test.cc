@@ -106,6 +106,29 @@ TEST(ForceCauses, WhatGrowsSinceALaterTimeIsNamedBesideWhatIsThereAllTheTime) {
   EXPECT_GT(grows->from, always->from);
 }
 
+// What grows changes more from step to step than what begins beside it.
+TEST(ForceCauses, WhatBeginsAndEndsBesideWhatGrowsIsNamed) {
+  const Causes causes = Explain(200, 1, 24, [](int k) -> VectorXd {
+    return Torque(1, 0.05 * k + 0.02) + Torque(3, 9 <= k && k < 17 ? 0.1 : 0.0);
+  });
+  EXPECT_EQ(causes.size(), 2U) << TellCauses(causes, CauseChannel::kBalance);
+  ExpectTorque(causes, "joint panda_joint4", 0.1);
+  const Explanation* const grows = FindPlace(causes, "joint panda_joint2");
+  ASSERT_NE(grows, nullptr) << TellCauses(causes, CauseChannel::kBalance);
+  EXPECT_EQ(grows->outcome, CauseOutcome::kNamed) << grows->Tell();
+  EXPECT_EQ(grows->faults.front().fault, "torque that grows by");
+}
+
+// Of two jumps that follow each other neither is taken for how the other one's neighbours change.
+TEST(ForceCauses, WhatBeginsAStepBeforeAnotherEndsIsNamed) {
+  const Causes causes = Explain(200, 1, 24, [](int k) -> VectorXd {
+    return Torque(1, k < 15 ? 0.7 : 0.0) + Torque(3, k < 14 ? 0.0 : 0.4);
+  });
+  EXPECT_EQ(causes.size(), 2U) << TellCauses(causes, CauseChannel::kBalance);
+  ExpectTorque(causes, "joint panda_joint2", 0.7);
+  ExpectTorque(causes, "joint panda_joint4", 0.4);
+}
+
 // Of a single step several faults explain anything.
 TEST(ForceCauses, OfOneStepOneFaultIsNamed) {
   const auto force = [](int) -> VectorXd { return Torque(1, 0.7) + Torque(3, 0.4); };
