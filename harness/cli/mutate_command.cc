@@ -148,8 +148,7 @@ void AddMutateCommand(Command app) {
   Option duration = command
                         .AddOption("--duration", &request->duration,
                                    "In a run: how long it is looked at, s (default 0.1; faults that are "
-                                   "drawn in a motion of joints, "
-                                   "or not found, are looked at to its end)")
+                                   "drawn in a motion of joints, or not found, are looked at to its end)")
                         .TypeName("T")
                         .Check(NumberFrom(1e-3, 1e4))
                         .Needs(run);

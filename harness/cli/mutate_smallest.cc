@@ -17,8 +17,6 @@ namespace {
 
 constexpr int kStates = 24;
 
-Json SizeToJson(double size) { return std::isfinite(size) ? Json(size) : Json(nullptr); }
-
 std::string ToText(const MutateRunRequest& request, const std::vector<Detectability>& all, bool complete) {
   Json json = {{"scenario", request.scenario},
                {"overrides", request.overrides.List()},
@@ -30,11 +28,11 @@ std::string ToText(const MutateRunRequest& request, const std::vector<Detectabil
                                {"place", one.place},
                                {"component", one.component},
                                {"unit", one.unit},
-                               {"found", SizeToJson(one.found)},
-                               {"named", SizeToJson(one.named)},
+                               {"found", one.found},
+                               {"named", one.named},
                                {"rival", one.rival}});
   }
-  return json.dump(2) + "\n";
+  return json.dump(2) + "\n";  // null for infinite
 }
 
 /// Sizes of one fault, sorted, those that are infinite last.

@@ -21,12 +21,6 @@ bool IsSame(const Explanation& a, const Explanation& b) {
   });
 }
 
-/// What tells fewer faults apart, or the size of the same one better.
-bool IsSharper(const Explanation& a, const Explanation& b) {
-  if (a.faults.size() != b.faults.size()) return a.faults.size() < b.faults.size();
-  return a.faults.front().error < b.faults.front().error;
-}
-
 /// A part of the steps and what explains it.
 struct Part {
   bool is_explained = false, is_exact = false;
@@ -132,7 +126,9 @@ Causes ExplainParts(const StepStore& store, StepForces* forces, const std::vecto
         same->to = one.to;
         same->ends = one.ends;
         same->unseen_after = one.unseen_after;
-        if (IsSharper(one, *same)) same->faults = one.faults, same->outcome = one.outcome;
+        // What tells fewer faults apart, or the size of the same one better.
+        const auto rank = [](const auto& of) { return std::pair(of.faults.size(), of.faults.front().error); };
+        if (rank(one) < rank(*same)) same->faults = one.faults, same->outcome = one.outcome;
       }
     }
   }

@@ -67,11 +67,6 @@ bool ForceProblem::IsExplained(double fraction, double left) const {
 
 void ForceProblem::Know(const Terms& known) {
   known_ = known;
-  VectorXd off = VectorXd::Zero(y_.size());
-  for (const CauseTerm& term : known.amplitudes)
-    off += candidates_[term.candidate].columns * term.error.array().isFinite().select(term.error, 0.0);
-  constexpr double kErrors = 3.0;
-  least_level_ = least_level_.cwiseMax(kErrors * level_.cwiseProduct(CalcSizes(off)));
   Complete();
 }
 

@@ -39,7 +39,7 @@ class ForceProblem {
     Eigen::Index count = 0;  ///< Of amplitudes.
   };
   [[nodiscard]] const Terms& terms() const { return terms_; }
-  /// Faults that are there, as other steps have shown: known to their errors.
+  /// Faults that are there, as other steps have shown.
   void Know(const Terms& known);
 
   /// Faults that do not change.

@@ -52,16 +52,15 @@ Fault MakeGrowing(const Candidate& candidate, const VectorXd& a, const VectorXd&
 /// A step that differs.
 struct DifferingStep {
   Index index;
-  bool follows;          // the one before
-  VectorXd change;       // since then
-  double apart[2] = {};  // how far that is from the neighbours' changes, the robot's and the object's
+  bool follows;     // the one before
+  VectorXd change;  // since then
+  Vector2d apart;   // how far that is from the neighbours' changes
 };
 
-/// Of a step's rows, the root mean square of the robot's or of the object's.
-double CalcSize(const VectorXd& y, bool of_object) {
+/// Of a step's rows, the root mean square of the robot's and of the object's.
+Vector2d CalcSizes(const VectorXd& y) {
   const Index n = y.size() - 6;
-  return of_object ? y.tail<6>().norm() / std::sqrt(6.0)
-                   : y.head(n).norm() / std::sqrt(static_cast<double>(n));
+  return {y.head(n).norm() / std::sqrt(static_cast<double>(n)), y.tail<6>().norm() / std::sqrt(6.0)};
 }
 
 std::vector<DifferingStep> ListDiffering(const StepStore& store, StepForces* forces) {
@@ -73,19 +72,16 @@ std::vector<DifferingStep> ListDiffering(const StepStore& store, StepForces* for
     const VectorXd y = forces->CalcResidual();
     if (forces->Differs(y)) {
       const bool follows = !steps.empty() && steps.back().index == i - 1;
-      steps.push_back({i, follows, follows ? VectorXd(y - before) : y});
+      const VectorXd change = follows ? VectorXd(y - before) : y;
+      steps.push_back({i, follows, change, CalcSizes(change)});
     }
     before = y;
   }
   // What grows evenly changes as one of its neighbours does, even where it begins to, or between two jumps.
-  for (size_t k = 0; k < steps.size(); ++k) {
-    for (const bool of_object : {false, true}) {
-      double& apart = steps[k].apart[of_object ? 1 : 0] = CalcSize(steps[k].change, of_object);
-      for (const size_t other : {k - 2, k - 1, k + 1, k + 2})
-        if (other < steps.size() && steps[other].follows)
-          apart = std::min(apart, CalcSize(steps[k].change - steps[other].change, of_object));
-    }
-  }
+  for (size_t k = 0; k < steps.size(); ++k)
+    for (const size_t other : {k - 2, k - 1, k + 1, k + 2})
+      if (other < steps.size() && steps[other].follows)
+        steps[k].apart = steps[k].apart.cwiseMin(CalcSizes(steps[k].change - steps[other].change));
   return steps;
 }
 
@@ -93,16 +89,13 @@ std::vector<DifferingStep> ListDiffering(const StepStore& store, StepForces* for
 /// where something else begins.
 bool Jumps(const std::vector<DifferingStep>& steps, size_t k) {
   if (!steps[k].follows) return true;
-  for (const int side : {0, 1}) {
-    const auto calc = [&](size_t near, size_t far) {
-      if (near >= steps.size() || !steps[near].follows) return 0.0;
-      const bool has_both = far < steps.size() && steps[far].follows;
-      return std::min(steps[near].apart[side], steps[has_both ? far : near].apart[side]);
-    };
-    const double around = std::max(calc(k - 1, k - 2), calc(k + 1, k + 2));  // before the first is none
-    if (steps[k].apart[side] > std::max(kJumpNoise, kJump * around)) return true;
-  }
-  return false;
+  const auto calc = [&](size_t near, size_t far) -> Vector2d {
+    if (near >= steps.size() || !steps[near].follows) return Vector2d::Zero();  // as before the first
+    const bool has_both = far < steps.size() && steps[far].follows;
+    return steps[near].apart.cwiseMin(steps[has_both ? far : near].apart);
+  };
+  const Vector2d around = calc(k - 1, k - 2).cwiseMax(calc(k + 1, k + 2));
+  return (steps[k].apart.array() > (kJump * around.array()).max(kJumpNoise)).any();
 }
 
 }  // namespace

@@ -160,7 +160,7 @@ void RunFormulaMutant(const Adapter& adapter, int samples, FormulaMutant* mutant
   const std::vector<CheckRecord> records =
       contact ? CheckContacts(adapter, *contact, samples)
               : CheckConsistency(adapter, options, [](long) { return true; }).terms;
-  mutant->AddFailed(records);
+  AddFailed(records, &mutant->failed_checks);
   mutant->named_first = std::any_of(records.begin(), records.end(), [&](const CheckRecord& record) {
     return record.failed && record.name == equation.term;
   });

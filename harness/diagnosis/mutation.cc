@@ -143,10 +143,9 @@ class MutantList {
 
 }  // namespace
 
-void TriedFault::AddFailed(const std::vector<CheckRecord>& records) {
-  for (const CheckRecord& record : records) {
-    if (record.failed) failed_checks += (failed_checks.empty() ? "" : " ") + record.name;
-  }
+void AddFailed(std::span<const CheckRecord> records, std::string* names) {
+  for (const CheckRecord& record : records)
+    if (record.failed) *names += (names->empty() ? "" : " ") + record.name;
 }
 
 bool HasEffect(const RobotModel& model, DynamicsProvider* other, int samples, std::uint64_t seed) {
@@ -196,8 +195,8 @@ void TryMutant(const RobotModel& model, const mjModel& engine, const std::string
   check.seed = options.seed;
   const ConsistencyResult result =
       CheckConsistency(Adapter(*changed, engine, engine_source), check, [](long) { return true; });
-  mutant->AddFailed(result.constants.records);
-  mutant->AddFailed(result.terms);
+  AddFailed(result.constants.records, &mutant->failed_checks);
+  AddFailed(result.terms, &mutant->failed_checks);
   if (result.Agrees()) {
     AnalyticProvider other(*changed, "changed", model);
     const bool has_effect = HasEffect(model, &other, options.samples, options.seed);

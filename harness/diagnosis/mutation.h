@@ -4,6 +4,7 @@
 // changed.
 
 #include <functional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -26,9 +27,10 @@ struct TriedFault {
   MutantOutcome outcome = MutantOutcome::kSurvived;
   std::string failed_checks;  ///< Names, separated by blanks.
   bool named_first = false;   ///< What is named first is the fault.
-
-  void AddFailed(const std::vector<CheckRecord>& records);
 };
+
+/// Adds the names of those that failed, separated by blanks.
+void AddFailed(std::span<const CheckRecord> records, std::string* names);
 
 /// A wrong model.
 struct Mutant : TriedFault {

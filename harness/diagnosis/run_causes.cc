@@ -8,12 +8,6 @@
 namespace dexcheck {
 namespace {
 
-bool Explains(const Causes& causes, CauseChannel channel) {
-  return std::any_of(causes.begin(), causes.end(), [&](const Explanation& one) {
-    return one.channel == channel && one.outcome != CauseOutcome::kNotExplained;
-  });
-}
-
 /// Contacts that are elsewhere are told by their shapes.
 void DropConsequencesOfShapes(Causes* causes) {
   std::erase_if(*causes, [](const Explanation& one) {
@@ -24,7 +18,10 @@ void DropConsequencesOfShapes(Causes* causes) {
 
 /// Wheels that roll otherwise make platform and wheels move as if something else acted on them.
 void DropConsequences(const StepStore& store, Causes* causes) {
-  if (!Explains(*causes, CauseChannel::kRolling)) return;
+  if (std::none_of(causes->begin(), causes->end(), [](const Explanation& one) {
+        return one.channel == CauseChannel::kRolling && one.outcome != CauseOutcome::kNotExplained;
+      }))
+    return;
   const Base& base = store.setup().model().base();
   const std::string places[] = {"link " + base.link, "joint " + base.wheel_joint_right,
                                 "joint " + base.wheel_joint_left};

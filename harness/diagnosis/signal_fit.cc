@@ -185,28 +185,27 @@ std::optional<SignalFit> FitNoiseBeforeSteps(const SignalSeries& series, const S
   const ArrayXd got = steps.Take(series.got), off = got - steps.Take(series.expected);
   const double rest = (got - step * (got / step).round()).abs().maxCoeff();
   if (rest > series.left * series.noise) return std::nullopt;  // it came after them
-  // Of noise of 1: the probability that it comes between those, and its mean where it does times that.
-  const auto calc = [&](double deviation, ArrayXd* mean) -> ArrayXd {
-    const ArrayXd low = (off - 0.5 * step) / deviation, high = (off + 0.5 * step) / deviation;
+  // Log of the probability of what came, for noise of that deviation about `mean`.
+  const auto calc = [&](double deviation, double mean) -> ArrayXd {
+    const ArrayXd low = (off - mean - 0.5 * step) / deviation, high = low + step / deviation;
     const auto tail = [](double x) { return 0.5 * std::erfc(x / std::sqrt(2.0)); };
-    *mean = ((-0.5 * low.square()).exp() - (-0.5 * high.square()).exp()) / std::sqrt(2.0 * kPi);
     // On the side where both are small.
-    return (low.max(-high).unaryExpr(tail) - high.max(-low).unaryExpr(tail)).max(1e-300);
+    return (low.max(-high).unaryExpr(tail) - high.max(-low).unaryExpr(tail)).max(1e-300).log();
   };
-  // Of the deviations that are tried, in steps, and standard errors that one is away from nothing.
-  constexpr double kRatio = 1.02, kLeast = 1e-2, kMost = 10.0, kSure = 5.0;
-  ArrayXd mean;
-  const auto rate = [&](double deviation) { return calc(deviation, &mean).log().sum(); };
+  // Of the deviations that are tried, in steps up to 10, and standard errors that one is away from nothing.
+  constexpr double kRatio = 1.02, kLeast = 1e-2, kSure = 5.0, kSlope = 1e-3;
+  constexpr int kTried = 350;
+  const auto rate = [&](double deviation) { return calc(deviation, 0.0).sum(); };
   double best = kLeast * step;
-  for (double tried = best; tried < kMost * step; tried *= kRatio)
-    if (rate(tried) > rate(best)) best = tried;
+  for (int i = 1; i < kTried; ++i)
+    if (const double tried = kLeast * step * std::pow(kRatio, i); rate(tried) > rate(best)) best = tried;
   const double bend = 2.0 * rate(best) - rate(kRatio * best) - rate(best / kRatio);
   const double error = best * std::log(kRatio) / std::sqrt(bend);
   // What follows from the signal, as an offset does, goes one way, and goes on for a while.
-  mean /= calc(best, &mean);
-  const bool goes_one_way = std::abs(mean.sum()) > kWhite * mean.matrix().norm();
-  const double any = static_cast<double>(mean.size());
-  if (!(kSure * error < best) || goes_one_way || !IsWhite(mean, any)) return std::nullopt;
+  const VectorXd score = calc(best, kSlope * best) - calc(best, -kSlope * best);
+  if (!(kSure * error < best) || std::abs(score.sum()) > kWhite * score.norm() ||
+      !IsWhite(score, static_cast<double>(score.size())))
+    return std::nullopt;
   SignalFit fit;
   fit.faults = {{"noise, standard deviation", PlaceOf(series.name), best, error, series.name.unit, ""}};
   fit.same.resize(1);

@@ -33,10 +33,9 @@ class ShapeList {
 
   /// A fault that Transmit knows.
   void Add(const char* fault, const std::string& unit, double value, bool has_gain, int parameters = 1,
-           Index tried = 1, const char* detail = "") {
+           Index tried = 1) {
     Add({.fault = fault,
          .unit = unit,
-         .detail = detail,
          .value = value,
          .parameters = parameters,
          .output = Transmit({fault, "", value, 0.0, "", ""}, series_),

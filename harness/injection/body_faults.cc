@@ -1,6 +1,7 @@
 // Joints, links and objects that are not as they are described, and what pulls at them.
 
 #include <cmath>
+#include <limits>
 
 #include "harness/injection/fault_kinds.h"
 
@@ -23,22 +24,15 @@ InjectedFault ChangeJoint(const Joint& joint, const char* name, double nominal, 
 double DrawForce(const FaultContext& context) { return context.draw->Positive(2e-3, 0.1); }
 
 /// More of a constant that a joint has.
-InjectedFault AddToJoint(const FaultContext& context, const char* name, double Joint::*constant,
-                         mjtNum* mjModel::*by_dof) {
+template <double Joint::*constant, mjtNum* mjModel::*by_dof>
+InjectedFault AddToJoint(const FaultContext& context) {
   const Joint& joint = context.DrawJoint();
   const double size = DrawForce(context);
+  const char* const name = constant == &Joint::armature  ? "armature"
+                           : constant == &Joint::damping ? "viscous friction"
+                                                         : "dry friction";
   return ChangeJoint(joint, name, joint.*constant, size,
                      [=](mjModel* m, int, int dof) { (m->*by_dof)[dof] += size; });
-}
-
-InjectedFault Armature(const FaultContext& context) {
-  return AddToJoint(context, "armature", &Joint::armature, &mjModel::dof_armature);
-}
-InjectedFault Damping(const FaultContext& context) {
-  return AddToJoint(context, "viscous friction", &Joint::damping, &mjModel::dof_damping);
-}
-InjectedFault DryFriction(const FaultContext& context) {
-  return AddToJoint(context, "dry friction", &Joint::dry_friction, &mjModel::dof_frictionloss);
 }
 
 InjectedFault Spring(const FaultContext& context) {
@@ -71,27 +65,26 @@ InjectedFault HiddenLimit(const FaultContext& context) {
 void PushJoint(const mjModel& m, int joint, double size, mjData* d) {
   const int body = m.jnt_bodyid[joint], parent = m.body_parentid[body];
   const Vector3d push = size * Eigen::Map<const Vector3d>(d->xaxis + 3 * joint);
-  const bool slides = m.jnt_type[joint] == mjJNT_SLIDE;
   const Vector3d arm =
       Eigen::Map<const Vector3d>(d->xipos + 3 * body) - Eigen::Map<const Vector3d>(d->xipos + 3 * parent);
   Vector6d wrench = Vector6d::Zero();
-  if (slides) {
-    wrench << push, Vector3d::Zero();
-  } else {
-    wrench << Vector3d::Zero(), push;
-  }
+  wrench.segment<3>(m.jnt_type[joint] == mjJNT_SLIDE ? 0 : 3) = push;
   Eigen::Map<Vector6d>(d->xfrc_applied + 6 * body) += wrench;
   if (parent == 0) return;
   wrench.tail<3>() += arm.cross(wrench.head<3>());
   Eigen::Map<Vector6d>(d->xfrc_applied + 6 * parent) -= wrench;
 }
 
+/// A torque, or one that grows evenly from a time on.
+template <bool kGrows>
 InjectedFault Torque(const FaultContext& context) {
   const Joint& joint = context.DrawJoint();
-  const double size = DrawForce(context);
-  InjectedFault fault = FaultAt("joint " + joint.name, "torque", size, size);
-  fault.forces = [name = joint.name, size](const mjModel& m, double, mjData* d) {
-    PushJoint(m, FindId(m, mjOBJ_JOINT, name), size, d);
+  const double size = DrawForce(context) / (kGrows ? context.duration : 1.0);
+  const double begin = kGrows ? context.draw->Uniform(0.0, 0.3 * context.duration) : 0.0;
+  InjectedFault fault =
+      FaultAt("joint " + joint.name, kGrows ? "torque that grows by" : "torque", size, size);
+  fault.forces = [=, name = joint.name](const mjModel& m, double t, mjData* d) {
+    PushJoint(m, FindId(m, mjOBJ_JOINT, name), kGrows ? size * std::max(0.0, t - begin) : size, d);
   };
   return fault;
 }
@@ -166,20 +159,11 @@ InjectedFault Inertia(const FaultContext& context) {
   return fault;
 }
 
-/// A torque that grows evenly from a time on.
-InjectedFault GrowingTorque(const FaultContext& context) {
-  const Joint& joint = context.DrawJoint();
-  const double rate = DrawForce(context) / context.duration;
-  const double begin = context.draw->Uniform(0.0, 0.3 * context.duration);
-  InjectedFault fault = FaultAt("joint " + joint.name, "torque that grows by", rate, rate);
-  fault.forces = [=, name = joint.name](const mjModel& m, double t, mjData* d) {
-    PushJoint(m, FindId(m, mjOBJ_JOINT, name), rate * std::max(0.0, t - begin), d);
-  };
-  return fault;
-}
-
-/// A force, or moment, on a body from `begin` to `end`, s, in a drawn direction of the world.
-InjectedFault Push(const FaultContext& context, bool is_moment, double begin, double end) {
+/// A force, or moment, on a body, all the time or for a while, in a drawn direction of the world.
+template <bool is_moment, bool for_a_while>
+InjectedFault Push(const FaultContext& context) {
+  const double begin = for_a_while ? context.draw->Uniform(0.0, 0.5 * context.duration) : 0.0;
+  const double end = for_a_while ? begin + 0.3 * context.duration : std::numeric_limits<double>::infinity();
   const Body body = DrawBody(context);
   const double size = context.draw->Positive(body.is_object ? 1e-3 : 1e-2, body.is_object ? 0.1 : 2.0) *
                       (is_moment ? 0.1 : 1.0);
@@ -190,19 +174,6 @@ InjectedFault Push(const FaultContext& context, bool is_moment, double begin, do
     Eigen::Map<Vector3d>(d->xfrc_applied + 6 * FindId(m, mjOBJ_BODY, name) + (is_moment ? 3 : 0)) += push;
   };
   return fault;
-}
-
-constexpr double kAlways = 1e9;  // s
-
-InjectedFault Force(const FaultContext& context) { return Push(context, false, 0.0, kAlways); }
-InjectedFault Moment(const FaultContext& context) { return Push(context, true, 0.0, kAlways); }
-InjectedFault ForceForAWhile(const FaultContext& context) {
-  const double begin = context.draw->Uniform(0.0, 0.5 * context.duration);
-  return Push(context, false, begin, begin + 0.3 * context.duration);
-}
-InjectedFault MomentForAWhile(const FaultContext& context) {
-  const double begin = context.draw->Uniform(0.0, 0.5 * context.duration);
-  return Push(context, true, begin, begin + 0.3 * context.duration);
 }
 
 /// As strong at the end of the run as others are.
@@ -255,20 +226,20 @@ bool MovesObject(const FaultContext& context) {
 constexpr const char* kJoint = "joint";
 constexpr const char* kBody = "body";
 constexpr FaultKind kKinds[] = {
-    {kJoint, "armature", Armature},
-    {kJoint, "viscous friction", Damping},
-    {kJoint, "dry friction", DryFriction},
+    {kJoint, "armature", AddToJoint<&Joint::armature, &mjModel::dof_armature>},
+    {kJoint, "viscous friction", AddToJoint<&Joint::damping, &mjModel::dof_damping>},
+    {kJoint, "dry friction", AddToJoint<&Joint::dry_friction, &mjModel::dof_frictionloss>},
     {kJoint, "spring", Spring},
-    {kJoint, "torque", Torque},
+    {kJoint, "torque", Torque<false>},
     {kJoint, "hidden limit", HiddenLimit},
-    {kJoint, "growing torque", GrowingTorque},
+    {kJoint, "growing torque", Torque<true>},
     {kBody, "mass", Mass},
     {kBody, "centre of mass", CenterOfMass},
     {kBody, "inertia", Inertia, MovesObject},
-    {kBody, "force", Force},
-    {kBody, "moment", Moment},
-    {kBody, "force for a while", ForceForAWhile},
-    {kBody, "moment for a while", MomentForAWhile},
+    {kBody, "force", Push<false, false>},
+    {kBody, "moment", Push<true, false>},
+    {kBody, "force for a while", Push<false, true>},
+    {kBody, "moment for a while", Push<true, true>},
     {kBody, "growing force", GrowingForce},
     {kBody, "tether", Tether, HasObject},
     {kBody, "drag", Drag, MovesObject},

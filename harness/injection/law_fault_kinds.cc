@@ -116,9 +116,10 @@ class ChangedLaw final : public Controller {
   Change change_;
 };
 
-/// A summand of F_bar' times a factor. @param get the summand (n), by the controller's own model.
-InjectedFault PartOfF(const FaultContext& context, const std::string& name,
-                      const VectorXd& (*get)(const ModelTerms&)) {
+/// Gravity, or friction, of F_bar' times a factor, by the controller's own model.
+template <bool kGravity>
+InjectedFault PartOfF(const FaultContext& context) {
+  const std::string name = kGravity ? "gravity" : "friction";
   const Place place = DrawPlace(context);
   const double factor = DrawFactor(context);
   InjectedFault one = LawFaultAt(place, name + " (F_bar' (" + name + ")), factor", factor, 1.0);
@@ -126,22 +127,13 @@ InjectedFault PartOfF(const FaultContext& context, const std::string& name,
     return std::make_unique<ChangedLaw>(
         std::move(right), is_on,
         [=, actuation = ActuationMap(setup.model())](const Reading&, const GraspModel& model, VectorXd* tau) {
-          VectorXd part = get(model.robot());
+          VectorXd part = kGravity ? model.robot().gravity() : model.robot().friction();
           actuation.CalcTorque(part, part);
           if (place.entries.empty()) *tau += (factor - 1.0) * part;
           for (const Eigen::Index entry : place.entries) (*tau)[entry] += (factor - 1.0) * part[entry];
         });
   };
   return one;
-}
-
-InjectedFault GravityPart(const FaultContext& context) {
-  return PartOfF(context, "gravity",
-                 [](const ModelTerms& terms) -> const VectorXd& { return terms.gravity(); });
-}
-InjectedFault FrictionPart(const FaultContext& context) {
-  return PartOfF(context, "friction",
-                 [](const ModelTerms& terms) -> const VectorXd& { return terms.friction(); });
 }
 
 /// A torque of one joint that is added. @param get it, by the joint's measured rate.
@@ -195,7 +187,8 @@ InjectedFault CoulombCompensation(const FaultContext& context) {
 }
 
 /// All gains of position, or of velocity, times a factor, or one of them.
-InjectedFault Gains(const FaultContext& context, bool of_velocity, bool is_one) {
+template <bool of_velocity, bool is_one>
+InjectedFault Gains(const FaultContext& context) {
   const double factor = 1.0 + context.draw->Size(1e-3, 0.3);
   const bool joints = IsOfJoints(context.setup);
   // The last gains are those of the joints; before them stand those of a base that floats.
@@ -246,10 +239,6 @@ InjectedFault Gains(const FaultContext& context, bool of_velocity, bool is_one) 
   return one;
 }
 
-InjectedFault GainsOfPosition(const FaultContext& context) { return Gains(context, false, false); }
-InjectedFault GainsOfVelocity(const FaultContext& context) { return Gains(context, true, false); }
-InjectedFault GainOfPosition(const FaultContext& context) { return Gains(context, false, true); }
-InjectedFault GainOfVelocity(const FaultContext& context) { return Gains(context, true, true); }
 /// With an impedance another stiffness is another damping, too.
 bool HasOwnStiffness(const FaultContext& context) {
   return IsOfJoints(context.setup) || context.setup.scenario().control.law != ControlLaw::kImpedance;
@@ -258,16 +247,16 @@ bool HasOwnStiffness(const FaultContext& context) {
 constexpr const char* kLaw = "law";
 constexpr FaultKind kKinds[] = {
     {kLaw, "summand", Summand, IsPaperLaw},
-    {kLaw, "gravity", GravityPart},
-    {kLaw, "friction", FrictionPart, KnowsMotion},
+    {kLaw, "gravity", PartOfF<true>},
+    {kLaw, "friction", PartOfF<false>, KnowsMotion},
     {kLaw, "compensation of Coulomb friction", CoulombCompensation, CompensatesCoulomb},
     {kLaw, "torque", AddedTorque},
     {kLaw, "viscous friction", AddedFriction,
      [](const FaultContext& context) { return !KnowsMotion(context); }},
-    {kLaw, "gains of position", GainsOfPosition, HasOwnStiffness},
-    {kLaw, "gains of velocity", GainsOfVelocity},
-    {kLaw, "one gain of position", GainOfPosition, HasOwnStiffness},
-    {kLaw, "one gain of velocity", GainOfVelocity, HasOwnStiffness},
+    {kLaw, "gains of position", Gains<false, false>, HasOwnStiffness},
+    {kLaw, "gains of velocity", Gains<true, false>},
+    {kLaw, "one gain of position", Gains<false, true>, HasOwnStiffness},
+    {kLaw, "one gain of velocity", Gains<true, true>, HasOwnStiffness},
 };
 
 }  // namespace

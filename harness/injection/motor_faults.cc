@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <deque>
+#include <limits>
 #include <optional>
 
 #include "harness/injection/fault_kinds.h"
@@ -93,9 +94,15 @@ Transmit Round(double step) {
 
 // Kinds.
 
+/// One motor, or all.
+std::optional<int> DrawEntry(const FaultContext& context, bool all) {
+  return all ? std::nullopt : std::optional(DrawEntry(context));
+}
+
+template <bool kAll>
 InjectedFault Gain(const FaultContext& context) {
-  const double gain = 1.0 + context.draw->Size(0.005, 0.2);
-  return ChangeMotors(context, DrawEntry(context), "gain", gain, gain - 1.0,
+  const double gain = 1.0 + (kAll ? context.draw->Size(1e-4, 1e-2) : context.draw->Size(0.005, 0.2));
+  return ChangeMotors(context, DrawEntry(context, kAll), "gain", gain, gain - 1.0,
                       Pure([gain](double u, double) { return gain * u; }));
 }
 
@@ -113,16 +120,11 @@ InjectedFault EngineGain(const FaultContext& context) {
   return fault;
 }
 
+template <bool kForAWhile>
 InjectedFault Offset(const FaultContext& context) {
   const double offset = context.draw->Size(1e-3, 0.1);
-  return ChangeMotors(context, DrawEntry(context), "offset", offset, offset,
-                      Pure([offset](double u, double) { return u + offset; }));
-}
-
-InjectedFault Burst(const FaultContext& context) {
-  const double offset = context.draw->Size(1e-3, 0.1);
-  const double begin = context.draw->Uniform(0.0, 0.5 * context.duration);
-  const double end = begin + 0.3 * context.duration;
+  const double begin = kForAWhile ? context.draw->Uniform(0.0, 0.5 * context.duration) : 0.0;
+  const double end = kForAWhile ? begin + 0.3 * context.duration : std::numeric_limits<double>::infinity();
   return ChangeMotors(context, DrawEntry(context), "offset", offset, offset,
                       Pure([=](double u, double t) { return begin <= t && t < end ? u + offset : u; }));
 }
@@ -142,15 +144,17 @@ InjectedFault Ripple(const FaultContext& context) {
                       }));
 }
 
+template <bool kAll>
 InjectedFault Delay(const FaultContext& context) {
-  const size_t steps = 1 + context.draw->Index(8);
+  const size_t steps = 1 + context.draw->Index(kAll ? 4 : 8);
   const auto value = static_cast<double>(steps);
-  return ChangeMotors(context, DrawEntry(context), "delay", value, value, Late(steps));
+  return ChangeMotors(context, DrawEntry(context, kAll), "delay", value, value, Late(steps));
 }
 
-InjectedFault LagOfOne(const FaultContext& context) {
-  const double time = context.draw->Uniform(1.0, 20.0) * context.time_step();
-  return ChangeMotors(context, DrawEntry(context), "lag", time, time, Lag(time, context.time_step()));
+template <bool kAll>
+InjectedFault LagOf(const FaultContext& context) {
+  const double time = context.draw->Uniform(1.0, kAll ? 10.0 : 20.0) * context.time_step();
+  return ChangeMotors(context, DrawEntry(context, kAll), "lag", time, time, Lag(time, context.time_step()));
 }
 
 InjectedFault DeadZone(const FaultContext& context) {
@@ -161,9 +165,11 @@ InjectedFault DeadZone(const FaultContext& context) {
                       }));
 }
 
+template <bool kAll>
 InjectedFault Rounding(const FaultContext& context) {
-  const int entry = DrawEntry(context);
-  const double step = context.draw->Positive(1e-3, 0.2) * TorqueOf(context, entry);
+  const std::optional<int> entry = DrawEntry(context, kAll);
+  const double step = kAll ? context.draw->Positive(1e-3, 1e-2)
+                           : context.draw->Positive(1e-3, 0.2) * TorqueOf(context, *entry);
   return ChangeMotors(context, entry, "rounding to steps of", step, step, Pure(Round(step)));
 }
 
@@ -205,48 +211,26 @@ InjectedFault Exchange(const FaultContext& context) {
   return fault;
 }
 
-InjectedFault GainOfAll(const FaultContext& context) {
-  const double gain = 1.0 + context.draw->Size(1e-4, 1e-2);
-  return ChangeMotors(context, std::nullopt, "gain", gain, gain - 1.0,
-                      Pure([gain](double u, double) { return gain * u; }));
-}
-
-InjectedFault DelayOfAll(const FaultContext& context) {
-  const size_t steps = 1 + context.draw->Index(4);
-  const auto value = static_cast<double>(steps);
-  return ChangeMotors(context, std::nullopt, "delay", value, value, Late(steps));
-}
-
-InjectedFault LagOfAll(const FaultContext& context) {
-  const double time = context.draw->Uniform(1.0, 10.0) * context.time_step();
-  return ChangeMotors(context, std::nullopt, "lag", time, time, Lag(time, context.time_step()));
-}
-
-InjectedFault RoundingOfAll(const FaultContext& context) {
-  const double step = context.draw->Positive(1e-3, 1e-2);
-  return ChangeMotors(context, std::nullopt, "rounding to steps of", step, step, Pure(Round(step)));
-}
-
 constexpr const char* kMotor = "motor";
 constexpr FaultKind kKinds[] = {
-    {kMotor, "gain", Gain},
+    {kMotor, "gain", Gain<false>},
     {kMotor, "gain in the engine", EngineGain},
-    {kMotor, "offset", Offset},
-    {kMotor, "offset for a while", Burst},
+    {kMotor, "offset", Offset<false>},
+    {kMotor, "offset for a while", Offset<true>},
     {kMotor, "drift", Drift},
     {kMotor, "ripple", Ripple},
-    {kMotor, "delay", Delay},
-    {kMotor, "lag", LagOfOne},
+    {kMotor, "delay", Delay<false>},
+    {kMotor, "lag", LagOf<false>},
     {kMotor, "dead zone", DeadZone},
-    {kMotor, "rounding", Rounding},
+    {kMotor, "rounding", Rounding<false>},
     {kMotor, "limit", Limit},
     {kMotor, "stuck", Stuck},
     {kMotor, "noise", NoiseOfOne},
     {kMotor, "exchange", Exchange},
-    {kMotor, "gain of all", GainOfAll},
-    {kMotor, "delay of all", DelayOfAll},
-    {kMotor, "lag of all", LagOfAll},
-    {kMotor, "rounding of all", RoundingOfAll},
+    {kMotor, "gain of all", Gain<true>},
+    {kMotor, "delay of all", Delay<true>},
+    {kMotor, "lag of all", LagOf<true>},
+    {kMotor, "rounding of all", Rounding<true>},
 };
 
 }  // namespace

@@ -38,18 +38,14 @@ InjectedFault Offset(const FaultContext& context) {
                 [i = joint.q, offset](double, MeasuredState* state) { state->q[i] += offset; });
 }
 
+template <bool kRate>
 InjectedFault Gain(const FaultContext& context) {
   const JointEntry joint = DrawEntry(context);
   const double gain = 1.0 + context.draw->Size(1e-3, 2e-2);
-  return Sensor(joint.name + ", position", "gain", gain, gain - 1.0,
-                [i = joint.q, gain](double, MeasuredState* state) { state->q[i] *= gain; });
-}
-
-InjectedFault GainOfRate(const FaultContext& context) {
-  const JointEntry joint = DrawEntry(context);
-  const double gain = 1.0 + context.draw->Size(1e-3, 2e-2);
-  return Sensor(joint.name + ", rate", "gain", gain, gain - 1.0,
-                [i = joint.xi, gain](double, MeasuredState* state) { state->xi[i] *= gain; });
+  return Sensor(joint.name + (kRate ? ", rate" : ", position"), "gain", gain, gain - 1.0,
+                [joint, gain](double, MeasuredState* state) {
+                  (kRate ? state->xi[joint.xi] : state->q[joint.q]) *= gain;
+                });
 }
 
 InjectedFault Drift(const FaultContext& context) {
@@ -109,19 +105,17 @@ InjectedFault Heading(const FaultContext& context) {
                 [offset](double, MeasuredState* state) { state->q[2] += offset; });
 }
 
-std::string ObjectPlace(const FaultContext& context) { return "object " + context.setup.object().name; }
-
-/// One entry of its "position" or "velocity".
-InjectedFault ObjectEntry(const FaultContext& context, const std::string& what) {
+/// One entry of its position or velocity.
+template <bool kPosition>
+InjectedFault ObjectEntry(const FaultContext& context) {
   const double offset = DrawOffset(context);
   const auto axis = static_cast<Eigen::Index>(context.draw->Index(3));
-  return Sensor(ObjectPlace(context) + ", " + what + " " + "xyz"[axis], "offset", offset, offset,
-                [=, is_position = what == "position"](double, MeasuredState* state) {
-                  (is_position ? state->X_Bo.translation()[axis] : state->V_Bo[axis]) += offset;
-                });
+  return Sensor(
+      "object " + context.setup.object().name + ", " + (kPosition ? "position " : "velocity ") + "xyz"[axis],
+      "offset", offset, offset, [=](double, MeasuredState* state) {
+        (kPosition ? state->X_Bo.translation()[axis] : state->V_Bo[axis]) += offset;
+      });
 }
-InjectedFault ObjectPosition(const FaultContext& context) { return ObjectEntry(context, "position"); }
-InjectedFault ObjectVelocity(const FaultContext& context) { return ObjectEntry(context, "velocity"); }
 
 /// What is measured of one fingertip's contact.
 InjectedFault Contact(const FaultContext& context) {
@@ -143,16 +137,16 @@ bool Holds(const FaultContext& context) { return context.holds(); }
 constexpr const char* kSensor = "sensor";
 constexpr FaultKind kKinds[] = {
     {kSensor, "offset", Offset},
-    {kSensor, "gain", Gain},
-    {kSensor, "gain of a rate", GainOfRate},
+    {kSensor, "gain", Gain<false>},
+    {kSensor, "gain of a rate", Gain<true>},
     {kSensor, "drift", Drift},
     {kSensor, "noise", Noise},
     {kSensor, "rounding", Rounding},
     {kSensor, "stuck", Stuck},
     {kSensor, "delay of all", DelayOfAll},
     {kSensor, "heading", Heading, [](const FaultContext& context) { return context.rolls(); }},
-    {kSensor, "object's position", ObjectPosition, Holds},
-    {kSensor, "object's velocity", ObjectVelocity, Holds},
+    {kSensor, "object's position", ObjectEntry<true>, Holds},
+    {kSensor, "object's velocity", ObjectEntry<false>, Holds},
     {kSensor, "contact coordinates", Contact, Holds},
 };
 

@@ -46,8 +46,12 @@ void ScaleWheel(const Setup& setup, mjModel* m, size_t wheel, double by) {
   m->body_pos[3 * body + 2] += by;
 }
 
-InjectedFault Wheels(const FaultContext& context, const std::string& place, bool right, bool left) {
-  const double radius = context.model().base().wheel_radius;
+template <bool right, bool left>
+InjectedFault Wheels(const FaultContext& context) {
+  const Base& base = context.model().base();
+  const std::string place =
+      right && left ? "wheels" : "wheel " + (right ? base.wheel_joint_right : base.wheel_joint_left);
+  const double radius = base.wheel_radius;
   const double change = context.draw->Size(2e-4, 2e-3) * radius;
   InjectedFault fault = FaultAt(place, "radius", radius + change, change);
   fault.cause = Cause::kWheelGeometry;
@@ -57,14 +61,6 @@ InjectedFault Wheels(const FaultContext& context, const std::string& place, bool
     if (left) ScaleWheel(setup, m, 1, change);
   };
   return fault;
-}
-
-InjectedFault BothWheels(const FaultContext& context) { return Wheels(context, "wheels", true, true); }
-InjectedFault RightWheel(const FaultContext& context) {
-  return Wheels(context, "wheel " + context.model().base().wheel_joint_right, true, false);
-}
-InjectedFault LeftWheel(const FaultContext& context) {
-  return Wheels(context, "wheel " + context.model().base().wheel_joint_left, false, true);
 }
 
 InjectedFault WheelDistance(const FaultContext& context) {
@@ -93,23 +89,16 @@ void ChangePairs(mjModel* m, bool floor, const std::function<void(int pair)>& ch
   }
 }
 
-InjectedFault Slippery(const std::string& name, Cause cause, bool floor, double mu) {
-  InjectedFault fault = FaultAt(name, cause);
+template <bool kOfFloor>
+InjectedFault Slippery(const FaultContext& context) {
+  const double mu = kOfFloor ? context.draw->Uniform(0.001, 0.003) : context.draw->Uniform(0.05, 0.1);
+  InjectedFault fault = kOfFloor ? FaultAt("wheels slide", Cause::kWheelSlip)
+                                 : FaultAt("fingertips slide", Cause::kFingertipSlip);
   fault.engine = [=](const Setup&, mjModel* m) {
-    ChangePairs(m, floor,
+    ChangePairs(m, kOfFloor,
                 [&](int pair) { m->pair_friction[5 * pair] = m->pair_friction[5 * pair + 1] = mu; });
   };
   return fault;
-}
-
-InjectedFault SlipperyFloor(const FaultContext& context) {
-  const double mu = context.draw->Uniform(0.001, 0.003);
-  return Slippery("wheels slide", Cause::kWheelSlip, true, mu);
-}
-
-InjectedFault SlipperyFingertips(const FaultContext& context) {
-  const double mu = context.draw->Uniform(0.05, 0.1);
-  return Slippery("fingertips slide", Cause::kFingertipSlip, false, mu);
 }
 
 InjectedFault SoftFingertips(const FaultContext& context) {
@@ -172,12 +161,12 @@ constexpr const char* kContact = "contact";
 constexpr FaultKind kKinds[] = {
     {kFloor, "slope", Slope},
     {kFloor, "gravity", Gravity},
-    {kWheels, "radius of both", BothWheels, Rolls},
-    {kWheels, "radius of the right one", RightWheel, Rolls},
-    {kWheels, "radius of the left one", LeftWheel, Rolls},
+    {kWheels, "radius of both", Wheels<true, true>, Rolls},
+    {kWheels, "radius of the right one", Wheels<true, false>, Rolls},
+    {kWheels, "radius of the left one", Wheels<false, true>, Rolls},
     {kWheels, "distance", WheelDistance, Rolls},
-    {kContact, "wheels slide", SlipperyFloor, Rolls},
-    {kContact, "fingertips slide", SlipperyFingertips, Touches},
+    {kContact, "wheels slide", Slippery<true>, Rolls},
+    {kContact, "fingertips slide", Slippery<false>, Touches},
     {kContact, "soft fingertips", SoftFingertips, Touches},
     {kContact, "creep", Creep, Touches},
     {kContact, "fingertip's radius", FingertipRadius, Touches},

@@ -8,6 +8,7 @@
 
 #include "controller/common/text.h"
 #include "harness/checks/check_table.h"
+#include "harness/diagnosis/mutation.h"
 
 namespace dexcheck {
 namespace {
@@ -71,16 +72,6 @@ void InjectFault(const Setup& setup, const InjectedFault& fault, double begin, L
   parts->controller = std::make_unique<ClockedController>(std::move(parts->controller), clock);
 }
 
-std::string JoinFailed(const RunChecks& checks) {
-  std::string names;
-  for (const std::span<const CheckRecord> records : {checks.model_checks(), checks.motion_checks()}) {
-    for (const CheckRecord& record : records) {
-      if (record.failed) names += (names.empty() ? "" : " ") + record.name;
-    }
-  }
-  return names;
-}
-
 InjectedFault JoinAll(const FaultSet& set) {
   return std::accumulate(set.begin() + 1, set.end(), set.front(),
                          [](const auto& a, const auto& b) { return dexcheck::Join(a, b); });
@@ -95,10 +86,8 @@ bool RunMutant::is_named() const {
 }
 
 bool RunMutant::is_as_alone() const {
-  if (!killed || score.wrong > 0) return false;
-  if (faults.size() == 1) return true;
-  if (score.outcomes.size() != alone.size()) return false;
-  return std::equal(alone.begin(), alone.end(), score.outcomes.begin(),
+  if (!killed || score.wrong > 0 || faults.size() == 1) return killed && score.wrong == 0;
+  return std::equal(alone.begin(), alone.end(), score.outcomes.begin(), score.outcomes.end(),
                     [](CauseOutcome by_itself, CauseOutcome here) { return here <= by_itself; });
 }
 
@@ -258,7 +247,8 @@ bool RunCampaign::RunLoop(const Setup& setup, LoopParts parts, RunMutant* mutant
   for (const Explanation& one : result.causes)
     mutant->causes += (mutant->causes.empty() ? "" : "; ") + one.Tell();
   mutant->failure = result.failure;
-  mutant->failed_checks = JoinFailed(runner.loop().checks());
+  AddFailed(runner.loop().checks().model_checks(), &mutant->failed_checks);
+  AddFailed(runner.loop().checks().motion_checks(), &mutant->failed_checks);
   mutant->position_error = result.tracking.position_max();
   return true;
 }
@@ -303,23 +293,6 @@ bool RunCampaign::FindTruth(RunMutant* mutant, const std::function<bool()>& shou
   return true;
 }
 
-std::optional<RunMutant> RunCampaign::LeaveOutLate(const RunMutant& mutant, const VectorXd& way,
-                                                   const std::function<bool()>& should_stop) {
-  for (size_t i = 0; i < mutant.faults.size(); ++i) {
-    RunMutant fewer{.faults = mutant.faults, .all = {}};
-    fewer.faults.erase(fewer.faults.begin() + static_cast<std::ptrdiff_t>(i));
-    fewer.all = JoinAll(fewer.faults);
-    VectorXd its_way;
-    if (!RunFault(fewer.all, &fewer, &its_way, should_stop)) return std::nullopt;
-    if (its_way != way || fewer.causes != mutant.causes) continue;
-    const std::string name = fewer.all.name + "; too late: " + mutant.faults[i].name;
-    fewer = {.faults = fewer.faults, .all = fewer.all};
-    fewer.all.name = name;
-    return fewer;
-  }
-  return std::nullopt;
-}
-
 bool RunCampaign::Run(size_t index, const std::function<bool()>& should_stop) {
   RunMutant& mutant = mutants_[index];
   VectorXd way;
@@ -330,13 +303,18 @@ bool RunCampaign::Run(size_t index, const std::function<bool()>& should_stop) {
     mutant.failure = error.what();
     return true;
   }
-  if (mutant.score.not_explained > 0 && mutant.faults.size() > 1) {
-    const std::optional<RunMutant> fewer = LeaveOutLate(mutant, way, should_stop);
-    if (should_stop()) return false;
-    if (fewer) {
-      mutant = *fewer;
-      return Run(index, should_stop);
-    }
+  const bool may_be_late = mutant.score.not_explained > 0 && mutant.faults.size() > 1;
+  for (size_t i = 0; may_be_late && i < mutant.faults.size(); ++i) {
+    RunMutant fewer{.faults = mutant.faults, .all = {}};
+    fewer.faults.erase(fewer.faults.begin() + static_cast<std::ptrdiff_t>(i));
+    fewer.all = JoinAll(fewer.faults);
+    VectorXd its_way;
+    if (!RunFault(fewer.all, &fewer, &its_way, should_stop)) return false;
+    // What comes after the others have ended the run is not in it: without it all is the same, bit by bit.
+    if (its_way != way || fewer.causes != mutant.causes) continue;
+    fewer.all.name += "; too late: " + mutant.faults[i].name;
+    mutant = {.faults = fewer.faults, .all = fewer.all};
+    return Run(index, should_stop);
   }
   const VectorXd& right = mutant.all.needs_error && offset_way_.size() > 0 ? offset_way_ : way_;
   // What is wrong in the plant alone is judged by the balances.

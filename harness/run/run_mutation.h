@@ -78,10 +78,6 @@ class RunCampaign {
   bool FindTruth(RunMutant* mutant, const std::function<bool()>& should_stop);
   /// @returns why the run without a fault does not pass; empty where it does.
   std::string RunWithoutFault(const std::function<bool()>& should_stop);
-  /// The set without a fault that comes after the others have ended the run: without it all is the same, bit
-  /// by bit. None where there is no such fault.
-  std::optional<RunMutant> LeaveOutLate(const RunMutant& mutant, const VectorXd& way,
-                                        const std::function<bool()>& should_stop);
   /// The same fault up to the end of the motion. @returns as Run.
   bool LookOn(RunMutant* mutant, const std::function<bool()>& should_stop);
 
