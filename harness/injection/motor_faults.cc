@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <deque>
-#include <limits>
 #include <optional>
 
 #include "harness/injection/fault_kinds.h"
@@ -124,7 +123,7 @@ template <bool kForAWhile>
 InjectedFault Offset(const FaultContext& context) {
   const double offset = context.draw->Size(1e-3, 0.1);
   const double begin = kForAWhile ? context.draw->Uniform(0.0, 0.5 * context.duration) : 0.0;
-  const double end = kForAWhile ? begin + 0.3 * context.duration : std::numeric_limits<double>::infinity();
+  const double end = kForAWhile ? begin + 0.3 * context.duration : HUGE_VAL;
   return ChangeMotors(context, DrawEntry(context), "offset", offset, offset,
                       Pure([=](double u, double t) { return begin <= t && t < end ? u + offset : u; }));
 }
