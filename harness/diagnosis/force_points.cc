@@ -150,4 +150,19 @@ std::optional<ForceAtPoint> RefinePoint(const VectorXd& y, const std::vector<Tur
   return fit.force();
 }
 
+MatrixXd CalcCenterColumns(const std::string& place, const Vector3d& d,
+                           std::span<const Candidate> candidates) {
+  const auto find = [&](const char* fault) -> const Candidate& {
+    return *std::ranges::find_if(
+        candidates, [&](const Candidate& one) { return one.fault == fault && one.place == place; });
+  };
+  const Vector3d m_d = find("mass").nominal * d, half = 0.5 * m_d;
+  Eigen::Matrix<double, 6, 3> B;
+  B.topRows<3>() = m_d.transpose().replicate<3, 1>();
+  B.diagonal().setZero();
+  B.bottomRows<3>() << -half[1], -half[0], 0.0, -half[2], 0.0, -half[0], 0.0, -half[2], -half[1];
+  const MatrixXd& all = find(force_fault::kCenter).columns;
+  return all.leftCols<3>() + all.rightCols<6>() * B;
+}
+
 }  // namespace dexcheck

@@ -3,6 +3,7 @@
 // Forces that act at a point of a body, not at its centre of mass.
 
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -35,5 +36,10 @@ Candidate MakeForceAtPoint(const ForceAtPoint& force, const std::vector<Turns>& 
 std::optional<ForceAtPoint> RefinePoint(const VectorXd& y, const std::vector<Turns>& turns, double reach,
                                         const ForceAtPoint& start, const MatrixXd& beside,
                                         const std::vector<Candidate>& candidates);
+
+/// Columns of a centre of mass at `place` that is about d (m) off: by d it changes the inertia about the old
+/// one by b(d, d), b(d, e) = m (d^T e 1 - (d e^T + e d^T) / 2), and those of d_k get b(d, e_k).
+MatrixXd CalcCenterColumns(const std::string& place, const Vector3d& d,
+                           std::span<const Candidate> candidates);
 
 }  // namespace dexcheck

@@ -361,12 +361,24 @@ bool ForceProblem::RefinePoints(const CauseSelection& selection) {
   return is_refined;
 }
 
+bool ForceProblem::RefineCenters(const CauseSelection& selection) {
+  bool is_refined = false;
+  for (const CauseTerm& term : selection.terms) {
+    Candidate& one = candidates_[term.candidate];
+    if (one.fault != kCenterAlone) continue;
+    one.columns = CalcCenterColumns(one.place, term.amplitude, candidates_);
+    is_refined = true;
+  }
+  return is_refined;
+}
+
 CauseSelection ForceProblem::SelectOnce() {
   // Of one step several faults explain anything.
   const CauseOptions options{.most_terms = std::min<size_t>(5, used_.size()),
                              .alike = static_cast<double>(steps_)};
   CauseSelection selection = SelectCauses(y_, candidates_, options);
   if (RefinePoints(selection)) selection = SelectCauses(y_, candidates_, options);
+  if (RefineCenters(selection)) selection = SelectCauses(y_, candidates_, options);
   for (const CauseTerm& term : selection.terms) {
     if (candidates_[term.candidate].place != kWorld || selection.terms.size() == 1) continue;
     // Masses that differ fall as all do.

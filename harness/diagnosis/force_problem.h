@@ -88,6 +88,8 @@ class ForceProblem {
   [[nodiscard]] CauseSelection Select();
   /// Beside other faults a force acts elsewhere than by itself.
   bool RefinePoints(const CauseSelection& selection);
+  /// What a centre of mass changes grows with its square, too.
+  bool RefineCenters(const CauseSelection& selection);
   [[nodiscard]] CauseSelection SelectOnce();
 
   const StepStore& store_;

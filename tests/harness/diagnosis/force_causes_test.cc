@@ -129,14 +129,16 @@ TEST(ForceCauses, WhatBeginsAStepBeforeAnotherEndsIsNamed) {
   ExpectTorque(causes, "joint panda_joint4", 0.4);
 }
 
-// Of a single step several faults explain anything.
-TEST(ForceCauses, OfOneStepOneFaultIsNamed) {
-  const auto force = [](int) -> VectorXd { return Torque(1, 0.7) + Torque(3, 0.4); };
-  for (const int count : {1, 2}) {
-    const Causes causes = Explain(200, 4, count, force);
+// Of a single step several faults explain anything: made-up torques are none of them.
+TEST(ForceCauses, OfOneStepNoSeveralFaultsAreNamed) {
+  for (int draw = 0; draw < 20; ++draw) {
+    const Causes causes = Explain(200 + draw, 4, 1, [&](int) -> VectorXd {
+      VectorXd torques(7);
+      for (int i = 0; i < 7; ++i) torques[i] = 0.1 * ((7 * i * i + 3 * draw * i + 5 * draw) % 11 - 5);
+      return torques;
+    });
     SCOPED_TRACE(TellCauses(causes, CauseChannel::kBalance));
-    const auto named = std::ranges::count(causes, CauseOutcome::kNamed, &Explanation::outcome);
-    EXPECT_EQ(named, count == 1 ? 0 : 2);
+    EXPECT_LE(causes.size(), 1U);
   }
 }
 
