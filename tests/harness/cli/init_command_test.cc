@@ -1,9 +1,8 @@
 // dexcheck init: a folder that runs at once.
 
-#include <algorithm>
-#include <sstream>
 #include <string>
 
+#include "harness/log/log_reader.h"
 #include "tests/harness/cli/dexcheck_program.h"
 
 namespace dexcheck::testing::init_command_test {
@@ -198,77 +197,6 @@ TEST_F(InitCommand, MovesAsMotorsCan) {
   EXPECT_EQ(RunMotion(0, "weak").at("verdict"), "pass");
 }
 
-// A floating base stands on what is lowest of the robot and can touch.
-TEST_F(InitCommand, ARobotWithAFloatingBaseStands) {
-  Expect(0, {"init", kMjcf + "quadruped_scene.xml", "--out", "dog"});
-  EXPECT_THAT(Read("dog/motion.toml"), HasSubstr(R"(feet = ["foot_1", "foot_2", "foot_3", "foot_4"])"));
-  const Json run = RunMotion(0, "dog");
-  EXPECT_EQ(run.at("verdict"), "pass");
-  EXPECT_GT(run.at("checks").at("foot_cone_use").at("max").get<double>(), 0.0);
-  EXPECT_THAT(Expect(0, "excite dog/motion.toml --runs 2 --quiet").out, HasSubstr("FOUND"));
-  // Without places to stand on it is held, and its joints move all the same.
-  EXPECT_THAT(Expect(0, {"init", kMjcf + "quadruped.xml", "--out", "held"}).err,
-              HasSubstr("base is held: no stance was found, because 0 places touch the ground"));
-  EXPECT_THAT(Read("held/robot.xml"), Not(HasSubstr("freejoint")));
-  const Json held = RunMotion(0, "held");
-  EXPECT_EQ(held.at("verdict"), "pass");
-  EXPECT_GT(held.at("tracking").at("joint_error_max_rad").get<double>(), 0.0);
-}
-
-// With straight knees a body can only rise. Soles that are no shape of a stance stand on spheres.
-TEST_F(InitCommand, ABipedBendsItsKneesToStand) {
-  Copy("biped.xml");
-  EXPECT_THAT(Expect(0, "init biped.xml").err, Not(HasSubstr("held")));
-  const std::string motion = Read("biped/motion.toml");
-  EXPECT_THAT(motion, HasSubstr(R"("foot_8"])"));
-  const double knee = std::stod(motion.substr(motion.find("\"left_knee\" = ") + 14));
-  EXPECT_GT(knee, 0.1);
-  const Json run = RunJson(0, {"run", "biped/motion.toml", "--out", "stood", "--set", "settle=0.1"});
-  EXPECT_EQ(run.at("verdict"), "pass");
-  // How a foot's four contacts share its load is not determined: the use is the foot's, not theirs.
-  const double use = run.at("checks").at("foot_cone_use").at("max").get<double>();
-  EXPECT_GT(use, 0.0);
-  std::istringstream rows(Expect(0, "export stood --csv - --signals foot/cone_use").out);
-  double most = 0.0;
-  std::string row, cell;
-  for (std::getline(rows, row); std::getline(rows, row);) {
-    for (std::istringstream cells(row); std::getline(cells, cell, ',');)
-      most = std::max(most, std::stod(cell));
-  }
-  EXPECT_GT(most, 1.5 * use);
-  // Legs with too few joints move the body in its plane alone.
-  std::string stiff = ReadFixture("biped.xml");
-  for (const std::string side : {"left", "right"}) {
-    const std::string roll = "<joint name=\"" + side + "_ankle_roll\" axis=\"1 0 0\"/>";
-    ASSERT_NE(stiff.find(roll), std::string::npos);
-    stiff.erase(stiff.find(roll), roll.size());
-  }
-  Write("stiff.xml", stiff);
-  EXPECT_THAT(Expect(0, "init stiff.xml").err, Not(HasSubstr("held")));
-  EXPECT_THAT(Read("stiff/motion.toml"), HasSubstr("rpy_deg = [0, 0, 0]"));
-  EXPECT_EQ(RunMotion(0, "stiff").at("verdict"), "pass");
-  // An ankle nearly as low as the sole is no foot; a stretched leg whose joints have no ranges bends, too.
-  std::string low = ReplaceOnce(ReadFixture("biped.xml"), " range=\"-1 1\"", "");
-  for (const std::string side : {"left", "right"}) {
-    const std::string foot = "/>\n                <body name=\"" + side + "_foot\">";
-    low = ReplaceOnce(low, side + "_knee\" range=\"0 2\"", side + "_knee\"");
-    low = ReplaceOnce(low, "size=\"0.03\"" + foot, "size=\"0.055\" contype=\"1\" conaffinity=\"1\"" + foot);
-  }
-  Write("low.xml", low);
-  EXPECT_THAT(Expect(0, "init low.xml").err, Not(HasSubstr("held")));
-  EXPECT_THAT(Read("low/motion.toml"), HasSubstr(R"("foot_8"])"));
-  EXPECT_EQ(RunMotion(0, "low").at("verdict"), "pass");
-  // An ankle without limits is no wheel, on which it would roll away.
-  const std::string ankle = "<joint name=\"left_ankle_roll\"";
-  WriteChanged("free.xml", ReadFixture("biped.xml"), ankle, ankle + " limited=\"false\"");
-  EXPECT_THAT(Expect(0, "init free.xml").err, Not(HasSubstr("held")));
-  const std::string sole = "/>\n                  <geom class=\"sole\" ";
-  WriteChanged("rolls.xml", ReadFixture("biped.xml"),
-               ankle + " axis=\"1 0 0\"" + sole + "pos=\"0.02 0 -0.06\"",
-               ankle + " limited=\"false\"" + sole + "zaxis=\"0 1 0\"");
-  EXPECT_THAT(Expect(0, "init rolls.xml").err, HasSubstr("because a foot turns without end, as wheels do"));
-}
-
 // Where friction holds a joint, and where it turns, a torque says nothing of the model; forces act where feet
 // touch the ground, which an MJCF says by its spheres.
 TEST_F(InitCommand, ARobotWithDryFrictionExplainsItsOwnLog) {
@@ -278,15 +206,6 @@ TEST_F(InitCommand, ARobotWithDryFrictionExplainsItsOwnLog) {
   Expect(0, "run rubs/motion.toml --out run --no-report");
   for (const char* model : {"rubs/robot.xml", "rubs/robot.toml"})
     EXPECT_THAT(Expect(0, {"judge", model, "run/log.h5"}).out, HasSubstr("EXPLAINED"));
-}
-
-// Shanks on the ground are no feet.
-TEST_F(InitCommand, ARobotThatLiesInItsKeyFrameStands) {
-  WriteChanged(
-      "lies.xml", ReadFixture("biped.xml"), "</worldbody>",
-      "</worldbody><keyframe><key qpos=\"0 0 0.5 1 0 0 0 0 0 -1 1.9 0 0 0 0 -1 1.9 0 0\"/></keyframe>");
-  EXPECT_THAT(Expect(0, "init lies.xml").err, Not(HasSubstr("held")));
-  EXPECT_EQ(RunMotion(0, "lies").at("verdict"), "pass");
 }
 
 // As published humanoids have them: joints' defaults that the joint of the base takes, and parked bodies.
@@ -375,6 +294,32 @@ TEST_F(InitCommand, ArmsMayLieOrHang) {
     Expect(0, "init " + name + ".xml");
     EXPECT_EQ(RunMotion(0, name).at("verdict"), "pass");
   }
+}
+
+// The motion that is written keeps the rates that the URDF allows, and ends at rest.
+TEST_F(InitCommand, MovesAsFastAsJointsMay) {
+  WriteChanged("slow.urdf", ReadFixture("pair.urdf"), "upper=\"2\" effort=\"1\" velocity=\"1\"",
+               "upper=\"2\" effort=\"1\" velocity=\"0.05\"");
+  Expect(0, "init slow.urdf");
+  Expect(0, "run slow/motion.toml --no-report --out run");
+  const LogReader log(Path("run/log.h5"));
+  const RowMatrixXd rates = log.ReadSignal("xi");
+  const VectorXd fastest = rates.cwiseAbs().colwise().maxCoeff();
+  EXPECT_LT(fastest[0], 0.05);
+  EXPECT_GT(fastest[0], 0.02);
+  EXPECT_GT(fastest[1], 0.2);
+  EXPECT_LT(rates.bottomRows(1).cwiseAbs().maxCoeff(), 1e-3 * fastest[0]);
+}
+
+// Names are those of the file, as URDF and MJCF allow them.
+TEST_F(InitCommand, PartsMayHaveAnyName) {
+  std::string text =
+      ReplaceOnce(ReadFixture("pair.urdf"), "joint name=\"elbow\"", "joint name=\"left/elbow 2\"");
+  text = ReplaceOnce(text, "link name=\"lower\"", "link name=\"left/lower\"");
+  WriteChanged("names.urdf", text, "child link=\"lower\"", "child link=\"left/lower\"");
+  Expect(0, "init names.urdf");
+  Expect(0, {"run", "names/motion.toml", "--no-log", "--set", "settle=0.1", "--set",
+             "disturbance=[{type='pulse',body='left/lower',force=[1,0,0],begin=0.1,duration=0.1}]"});
 }
 
 TEST_F(InitCommand, CopiesShippedScenarios) {
