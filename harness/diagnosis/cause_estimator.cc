@@ -358,12 +358,13 @@ class Search {
       double odds = 0.5 * (scores[i] - criterion);
       // One with more columns has simpler ones as a special case, unless only fewer of theirs show.
       const double more = CountParameters({i}) - CountParameters({term->candidate});
-      const bool is_wider =
-          candidates_[i].columns.cols() + candidates_[i].parameters >
-          candidates_[term->candidate].columns.cols() + candidates_[term->candidate].parameters;
-      if (more > 0.0 && candidates_[i].is_ordinary) odds -= 0.5 * more * std::log(samples_);
-      if (odds < kEqualLogOdds && more > 0.0 && is_wider && !candidates_[i].is_ordinary) continue;
-      if ((odds >= kEqualLogOdds && odds >= best) || !CanBe(i, others)) continue;
+      const Candidate &own = candidates_[term->candidate], &other = candidates_[i];
+      const bool is_wider = other.columns.cols() + other.parameters > own.columns.cols() + own.parameters;
+      if (more > 0.0 && other.is_ordinary) odds -= 0.5 * more * std::log(samples_);
+      if (odds < kEqualLogOdds && more > 0.0 && is_wider && !other.is_ordinary) continue;
+      // Another shape of the same fault is no rival of it.
+      const bool is_shape = other.fault == own.fault && other.place == own.place;
+      if ((odds >= kEqualLogOdds && (odds >= best || is_shape)) || !CanBe(i, others)) continue;
       if (odds < kEqualLogOdds) {
         term->same.emplace_back(i, CalcAmplitude(i, others));
       } else {

@@ -64,6 +64,8 @@ TEST(JudgeCampaign, NamesDrawnFaults) {
     options.has_velocities = std::bernoulli_distribution()(random);
     const RecordingJudgement judgement = Judge(RecordRobot(kMjcf, faults, options, &random));
     const Score score = ScoreOf(judgement, faults);
+    for (const Explanation& one : judgement.causes)
+      EXPECT_NE(one.rival, one.faults.front().place + ": " + one.faults.front().fault);
     ++counts[static_cast<int>(score)];
     constexpr const char* kNames[] = {"named", "class", "missed", "WRONG"};
     if (score != Score::kNamed || asked != nullptr)
