@@ -126,7 +126,8 @@ class AssetSieve {
     textures_.insert(NameOf(*texture));
     for (const char* side : kTextureFiles) {
       const char* const file = texture->Attribute(side);
-      const std::string fault = file != nullptr ? FindFault(*texture, folders_.textures, file) : "";
+      if (file == nullptr) continue;
+      const std::string fault = FindFault(*texture, folders_.textures, file);
       if (fault.empty()) continue;
       NoteFile(*texture, file, "its texture left out", fault);
       texture->SetAttribute("name", NameOf(*texture).c_str());
