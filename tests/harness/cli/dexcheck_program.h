@@ -136,6 +136,10 @@ class CommandTest : public ::testing::Test {
   [[nodiscard]] Json RunJson(int exit_code, const Words& arguments) const {
     return Json::parse(Expect(exit_code, arguments + Words{"--json", "-"}).out);
   }
+  /// The summary of the motion, shortened, of a folder that `init` made.
+  [[nodiscard]] Json RunMotion(int exit_code, const std::string& folder) const {
+    return RunJson(exit_code, {"run", folder + "/motion.toml", "--no-log", "--set", "settle=0.1"});
+  }
   /// The results of a comparison, which must end so.
   Json Compare(int exit_code, const std::string& a, const std::string& b,
                const Words& more = "--seed 1") const {

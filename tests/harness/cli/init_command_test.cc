@@ -8,13 +8,7 @@
 namespace dexcheck::testing::init_command_test {
 namespace {
 
-class InitCommand : public CommandTest {
- protected:
-  /// The folder's motion, shortened.
-  [[nodiscard]] Json RunMotion(int exit_code, const std::string& folder) const {
-    return RunJson(exit_code, {"run", folder + "/motion.toml", "--no-log", "--set", "settle=0.1"});
-  }
-};
+using InitCommand = CommandTest;
 
 TEST_F(InitCommand, MakesAFolderOfAUrdfThatRuns) {
   Copy("pair.urdf");

@@ -10,12 +10,7 @@
 namespace dexcheck::testing::init_stand_test {
 namespace {
 
-class InitStand : public CommandTest {
- protected:
-  [[nodiscard]] Json RunMotion(int exit_code, const std::string& folder) const {
-    return RunJson(exit_code, {"run", folder + "/motion.toml", "--no-log", "--set", "settle=0.1"});
-  }
-};
+using InitStand = CommandTest;
 
 // A floating base stands on what is lowest of the robot and can touch.
 TEST_F(InitStand, ARobotWithAFloatingBaseStands) {
