@@ -226,8 +226,9 @@ TEST_F(MutateCommand, DisagreeingModelsAreNotMutated) {
 
 // Faults in a run: the same exit codes, a table, and JSON that a program reads.
 TEST_F(MutateCommand, CountsWhatIsFoundInARun) {
-  // `hold` does not move: what acts on velocities alone survives.
-  const Json json = RunJson(1, "mutate --run hold --set settle=0.2 --from 0.01 --duration 0.01 --numbers 4");
+  // The hand does not move: what acts on velocities alone survives. It costs a fiftieth of the robot's `hold`.
+  const Json json =
+      RunJson(1, "mutate --run hand-hold --set settle=0.2 --from 0.01 --duration 0.01 --numbers 4");
   EXPECT_EQ(json["complete"], true);
   EXPECT_GT(json["kinds"]["all"]["survived"], 0);
   EXPECT_EQ(json["kinds"]["number"]["cause_right"], 4);
