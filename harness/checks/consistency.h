@@ -28,8 +28,10 @@ struct ConsistencyOptions {
   ObjectFormulas object;                       ///< What stands for the object's equations.
   std::vector<std::string> ignore;             ///< What two files need not share: kIgnorable.
   RobotPart part;                              ///< Of two files; all of it when it is empty.
-  /// Whether two files agree that differ by no more than the digits that they print leave open.
+  /// Whether two files agree whose numbers differ by no more than their printed precision.
   bool within_digits = false;
+  /// Coarsest precision, relative to a number's size, to which such a number still counts as agreement.
+  double precision = 0.01;
 };
 
 struct ConsistencyResult {

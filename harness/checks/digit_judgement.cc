@@ -3,14 +3,17 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <set>
 #include <tuple>
 #include <utility>
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
 #include "harness/checks/file_comparison.h"
+#include "harness/descriptions/body_comparison.h"
 #include "harness/descriptions/description_match.h"
 #include "harness/descriptions/fault_search.h"
+#include "harness/descriptions/placement_difference.h"
 
 namespace dexcheck {
 namespace {
@@ -18,7 +21,10 @@ namespace {
 constexpr int kDraws = 24;
 constexpr size_t kLeastDraws = 4;
 constexpr long kStates = 20;
-constexpr Term kCauses[] = {Term::kJointAxis, Term::kLinkCom, Term::kLinkInertia, Term::kFramePose};
+// Bodies are causes, too, and are judged in their links' frames (CompareBodies).
+constexpr Term kCauses[] = {Term::kJointAxis, Term::kFramePose};
+// The engine finds the principal moments of a tensor to this fraction of the largest.
+constexpr double kDiagonalisation = 1e-6;
 
 bool IsCause(Term term) { return std::ranges::find(kCauses, term) != std::end(kCauses); }
 
@@ -32,18 +38,20 @@ ConstantKey KeyOf(const ConstantFinding& finding, const RobotSpec& spec) {
           is_of_base ? "" : spec.joints[static_cast<size_t>(first)].name, finding.entry};
 }
 
+/// Constants and bodies in which two descriptions differ.
+std::vector<ConstantFinding> ListDifferentNumbers(const RobotDescription& a, const RobotDescription& b) {
+  std::vector<ConstantFinding> findings = CheckConstants(a, b).findings;
+  const std::vector<ConstantFinding> bodies = CompareBodies(a, b).findings;
+  findings.insert(findings.end(), bodies.begin(), bodies.end());
+  return findings;
+}
+
 /// Both files' descriptions brought to the same statements, one of them with its numbers moved.
-class MovedPair {
- public:
+struct MovedPair {
   MovedPair(RobotDescription first, RobotDescription second, const std::vector<std::string>& ignore,
             const RobotPart& part)
       : sides{std::move(first), std::move(second)} {
-    int held = 0;
-    if (!part.empty()) TakePart(part, &sides[0], &sides[1], &held);
-    // As the comparison does it: joints are called as in an MJCF.
-    const size_t named = sides[1].format == RobotFormat::kMjcf && part.empty() ? 1 : 0;
-    CompleteEachOther(&sides[named], &sides[1 - named], ignore);
-    AddLinkFrames(&sides[0], &sides[1]);
+    CompletePair(ignore, part, &sides);
   }
   std::array<RobotDescription, 2> sides;
 };
@@ -54,23 +62,24 @@ class MovedFile {
   MovedFile(const PrintedSpread& own, const RobotDescription& other, size_t side,
             const std::vector<std::string>& ignore, const RobotPart& part, const RobotModel& model)
       : side_(side), other_(other), ignore_(ignore), part_(part), model_(model) {
-    const MovedPair nominal = Complete(own.nominal);
+    nominal_.emplace(Complete(own.nominal));
+    const MovedPair& nominal = *nominal_;
     spread_.nominal = MakeCopy(nominal);
     for (const RobotDescription& draw : own.draws) {
       const MovedPair moved = Complete(draw);
       const std::optional<TermComparison::Copy> copy = TryToCopy(moved);
       if (!copy) continue;
       spread_.draws.push_back(*copy);
-      for (const ConstantFinding& finding :
-           CheckConstants(nominal.sides[side_], moved.sides[side_]).findings) {
+      for (const ConstantFinding& finding : ListDifferentNumbers(nominal.sides[side_], moved.sides[side_])) {
         double& open = constants_[KeyOf(finding, nominal.sides[side_].spec)];
         open = std::max(open, std::abs(finding.model - finding.engine));
       }
     }
-    if (own.undiagonalized) spread_.others.push_back(MakeCopy(Complete(*own.undiagonalized)));
+    if (own.undiagonalized) TakeDiagonalisation(*own.undiagonalized);
   }
 
   [[nodiscard]] const TermComparison::Spread& spread() const { return spread_; }
+  [[nodiscard]] const MovedPair& nominal() const { return *nominal_; }
   [[nodiscard]] double FindOpen(const ConstantKey& key) const {
     const auto found = constants_.find(key);
     return found == constants_.end() ? 0.0 : found->second;
@@ -79,6 +88,19 @@ class MovedFile {
  private:
   [[nodiscard]] MovedPair Complete(const RobotDescription& own) const {
     return side_ == 0 ? MovedPair(own, other_, ignore_, part_) : MovedPair(other_, own, ignore_, part_);
+  }
+
+  /// What the engine's diagonalisation changes is as good as the file's tensor. A larger change is no
+  /// rounding.
+  void TakeDiagonalisation(const RobotDescription& stated) {
+    const MovedPair pair = Complete(stated);
+    const ConstantChecks bodies = CompareBodies(nominal_->sides[side_], pair.sides[side_]);
+    const bool is_small = std::ranges::all_of(
+        bodies.records, [](const CheckRecord& record) { return record.worst <= kDiagonalisation; });
+    if (!is_small) return;
+    spread_.others.push_back(MakeCopy(pair));
+    for (const ConstantFinding& finding : bodies.findings)
+      constants_[KeyOf(finding, nominal_->sides[side_].spec)] += std::abs(finding.model - finding.engine);
   }
 
   TermComparison::Copy MakeCopy(const MovedPair& pair) {
@@ -110,6 +132,7 @@ class MovedFile {
   const std::vector<std::string>& ignore_;
   const RobotPart& part_;
   const RobotModel& model_;
+  std::optional<MovedPair> nominal_;
   std::vector<std::unique_ptr<RobotModel>> models_;
   std::vector<std::unique_ptr<AnalyticProvider>> providers_;
   TermComparison::Spread spread_{};
@@ -118,62 +141,149 @@ class MovedFile {
 
 void RaiseTo(double value, double* largest) { *largest = std::max(*largest, value); }
 
-/// Constants: what is left are the findings that exceed what both files leave open.
-void JudgeConstants(const MovedFile& a, const MovedFile& b, const RobotSpec& spec, ConstantChecks* constants,
-                    DigitVerdict* verdict) {
-  constexpr double kTie = 1e-6;  // of two numbers that are half a unit apart to their last digit
-  std::erase_if(constants->findings, [&](const ConstantFinding& finding) {
-    const ConstantKey key = KeyOf(finding, spec);
-    const double open = a.FindOpen(key) + b.FindOpen(key);
-    const double units = std::abs(finding.model - finding.engine) / open;
-    RaiseTo(units, &verdict->units[finding.check]);
-    if (units <= 1.0 + kTie) return true;
-    verdict->excesses.push_back(
-        {finding.check, finding.where, units, finding.model, finding.engine, finding.effect, true});
-    return false;
-  });
-  for (CheckRecord& record : constants->records) {
-    if (!record.failed) continue;
-    record.failed = std::ranges::any_of(
-        constants->findings, [&](const ConstantFinding& finding) { return finding.check == record.name; });
-    if (!record.failed) RaiseTo(record.worst, &verdict->largest_within);
-  }
-}
+/// Judges numbers of two files by the precision to which both print them.
+class DigitJudge {
+ public:
+  DigitJudge(const MovedFile& a, const MovedFile& b, const RobotModel& model, double precision,
+             DigitVerdict* verdict)
+      : a_(a),
+        b_(b),
+        pair_{a.nominal().sides[0], a.nominal().sides[1], verdict->files[0].file, verdict->files[1].file},
+        model_(model),
+        precision_(precision),
+        verdict_(*verdict) {}
 
-void JudgeTerms(const TermComparison& comparison, std::vector<CheckRecord>* terms, DigitVerdict* verdict) {
-  const RobotModel& model = comparison.model();
-  for (size_t i = 0; i < comparison.records().size(); ++i) {
-    const CheckRecord& judged = comparison.records()[i];
-    const auto record = std::ranges::find(*terms, judged.name, &CheckRecord::name);
-    if (record == terms->end() || !record->failed) continue;
-    verdict->units[record->name] = judged.worst;
-    record->failed = judged.failed;
-    if (!judged.failed) {
-      RaiseTo(record->worst, &verdict->largest_within);
-      continue;
-    }
-    record->where = judged.where;
-    record->first_failure = judged.first_failure;
-    record->part = judged.part;
-    record->at = judged.at;
-    record->model_value = judged.model_value;
-    record->engine_value = judged.engine_value;
-    const bool is_cause = IsCause(comparison.entry(i).term);
-    if (!is_cause) {
-      const std::string where = Describe(judged.where, model, model.num_base_velocities());
-      verdict->excesses.push_back(
-          {judged.name, where, judged.worst, judged.model_value, judged.engine_value, "", false});
-      continue;
-    }
-    for (const Excess& excess : comparison.excesses()) {
-      if (excess.term != i) continue;
-      verdict->excesses.push_back({judged.name, Describe(excess.where, model, model.num_base_velocities()),
-                                   excess.units, excess.first, excess.second, "", true});
+  /// Keeps the findings that exceed the precision of both files.
+  void JudgeConstants(ConstantChecks* constants) {
+    std::erase_if(constants->findings, [&](const ConstantFinding& finding) {
+      const double size = std::max(std::abs(finding.model), std::abs(finding.engine));
+      return IsWithin(finding, size);
+    });
+    for (CheckRecord& record : constants->records) {
+      if (!record.failed) continue;
+      record.failed = std::ranges::any_of(
+          constants->findings, [&](const ConstantFinding& finding) { return finding.check == record.name; });
+      if (!record.failed) RaiseTo(record.worst, &verdict_.largest_within);
     }
   }
-}
+
+  /// Judges the numbers of bodies in their links' frames.
+  void JudgeBodies() {
+    const MovedPair& pair = a_.nominal();
+    const ConstantChecks bodies = CompareBodies(pair.sides[0], pair.sides[1]);
+    for (const ConstantFinding& finding : bodies.findings) {
+      // The chains of both files place the link's frame, each with its roundings.
+      constexpr double kChains = 1e-10;
+      if (!IsWithin(finding, finding.scale, kChains)) failed_bodies_.insert(finding.check);
+    }
+  }
+
+  /// @param terms of the comparison by rounding; those that agree within the precision pass.
+  void JudgeTerms(const TermComparison& comparison, std::vector<CheckRecord>* terms) {
+    std::optional<size_t> too_loose;
+    if (const std::optional<Excess>& loosest = comparison.loosest()) {
+      DigitExcess excess = {comparison.records()[loosest->term].name,
+                            WordsOf(loosest->where),
+                            {"", "", loosest->first, loosest->second},
+                            1.0};
+      excess.is_cause = true;
+      if (IsTooLoose(std::move(excess), loosest->units)) too_loose = loosest->term;
+    }
+    for (size_t i = 0; i < comparison.records().size(); ++i) {
+      const CheckRecord& judged = comparison.records()[i];
+      const auto record = std::ranges::find(*terms, judged.name, &CheckRecord::name);
+      if (record == terms->end() || !record->failed) continue;
+      RaiseTo(judged.worst, &verdict_.units[record->name]);
+      record->failed = judged.failed || failed_bodies_.contains(record->name) || too_loose == i;
+      if (!judged.failed) {
+        RaiseTo(record->worst, &verdict_.largest_within);
+        continue;
+      }
+      record->where = judged.where;
+      record->first_failure = judged.first_failure;
+      record->part = judged.part;
+      record->at = judged.at;
+      record->model_value = judged.model_value;
+      record->engine_value = judged.engine_value;
+      AddExcesses(comparison, i);
+    }
+  }
+
+ private:
+  [[nodiscard]] std::string WordsOf(const Location& where) const {
+    return Describe(where, model_, model_.num_base_velocities());
+  }
+
+  /// @param rounding relative to `size`, which is allowed for beside the printed precision.
+  bool IsWithin(const ConstantFinding& finding, double size, double rounding = 0.0) {
+    constexpr double kTie = 1e-6;  // of two numbers that are half a unit apart to their last digit
+    const ConstantKey key = KeyOf(finding, model_.spec());
+    const double open = a_.FindOpen(key) + b_.FindOpen(key) + rounding * size;
+    const double units = std::abs(finding.model - finding.engine) / open;
+    RaiseTo(units, &verdict_.units[finding.check]);
+    DigitExcess excess = {finding.check, finding.where, TakeNumbers(finding, model_), units};
+    excess.effect = finding.effect;
+    excess.is_cause = true;
+    if (units <= 1.0 + kTie) return !IsTooLoose(excess, open / size);
+    verdict_.excesses.push_back(std::move(excess));
+    return false;
+  }
+
+  /// Takes note of the precision of a number that agrees. A number whose precision is too coarse is no
+  /// agreement.
+  bool IsTooLoose(DigitExcess excess, double fraction) {
+    if (fraction > verdict_.loosest.fraction)
+      verdict_.loosest = {NameQuantity(excess.check) + " of " + excess.where, fraction};
+    if (fraction <= precision_) return false;
+    excess.too_loose = fraction;
+    verdict_.excesses.push_back(std::move(excess));
+    return true;
+  }
+
+  void AddExcesses(const TermComparison& comparison, size_t term) {
+    const CheckRecord& judged = comparison.records()[term];
+    if (!IsCause(comparison.entry(term).term)) {
+      verdict_.excesses.push_back({judged.name,
+                                   WordsOf(judged.where),
+                                   {"", "", judged.model_value, judged.engine_value},
+                                   judged.worst});
+      return;
+    }
+    for (const Excess& entry : comparison.excesses()) {
+      if (entry.term != term) continue;
+      DigitExcess excess = {
+          judged.name, WordsOf(entry.where), {"", "", entry.first, entry.second}, entry.units};
+      const std::optional<std::string> placement =
+          entry.where.kind == Location::Kind::kJoint
+              ? DescribeJointDifference(pair_, entry.where.first)
+              : DescribeFrameDifference(pair_, model_.frame(entry.where.first).name);
+      excess.placement = placement.value_or("");
+      excess.is_cause = placement.has_value();
+      verdict_.excesses.push_back(std::move(excess));
+    }
+  }
+
+  const MovedFile& a_;
+  const MovedFile& b_;
+  DescribedPair pair_;
+  const RobotModel& model_;
+  double precision_;
+  DigitVerdict& verdict_;
+  std::set<std::string> failed_bodies_;
+};
 
 }  // namespace
+
+void CompletePair(const std::vector<std::string>& ignore, const RobotPart& part,
+                  std::array<RobotDescription, 2>* sides) {
+  auto& [first, second] = *sides;
+  int held = 0;
+  if (!part.empty()) TakePart(part, &first, &second, &held);
+  // Joints are called as in an MJCF, as the comparison calls them.
+  const bool is_named_by_second = second.format == RobotFormat::kMjcf && part.empty();
+  CompleteEachOther(is_named_by_second ? &second : &first, is_named_by_second ? &first : &second, ignore);
+  AddLinkFrames(&first, &second);
+}
 
 bool DigitVerdict::Concerns(const std::vector<std::string>& ids,
                             const std::vector<std::string>& parts) const {
@@ -200,15 +310,20 @@ std::optional<DigitVerdict> JudgeByDigits(const std::array<const DescriptionFile
     if (std::min(moved_a.spread().draws.size(), moved_b.spread().draws.size()) < kLeastDraws)
       return std::nullopt;
     TermComparison comparison(model, kAskedByConsistency, {a, b});
-    comparison.CompareWithin({moved_a.spread(), moved_b.spread()});
+    comparison.CompareWithin({moved_a.spread(), moved_b.spread()}, kCauses);
     DigitVerdict verdict;
     verdict.files = {first.digits, second.digits};
     verdict.states = CompareAtStates(
         FeedRandomStates(model, std::min(kStates, options.samples), options.range, options.seed,
                          comparison.needs_second_velocity()),
         [](long) { return true; }, &comparison);
-    JudgeConstants(moved_a, moved_b, model.spec(), &result->constants, &verdict);
-    JudgeTerms(comparison, &result->terms, &verdict);
+    DigitJudge judge(moved_a, moved_b, model, options.precision, &verdict);
+    judge.JudgeConstants(&result->constants);
+    judge.JudgeBodies();
+    judge.JudgeTerms(comparison, &result->terms);
+    if (std::ranges::none_of(verdict.excesses, &DigitExcess::is_cause)) {
+      for (DigitExcess& excess : verdict.excesses) excess.is_cause = true;
+    }
     std::ranges::stable_sort(verdict.excesses, [](const DigitExcess& x, const DigitExcess& y) {
       return x.is_cause != y.is_cause ? x.is_cause : x.units > y.units;
     });
@@ -218,42 +333,52 @@ std::optional<DigitVerdict> JudgeByDigits(const std::array<const DescriptionFile
   }
 }
 
-std::vector<std::string> ListExcesses(const DigitVerdict& verdict, const std::string& first,
-                                      const std::string& second) {
-  constexpr double kNothingOpen = 1e9;  // the unit is rounding then
-  std::vector<std::string> lines;
+namespace {
+
+constexpr double kExact = 1e9;  // times the printed precision, which is rounding then
+
+/// The values of a number that differs, and by how much.
+std::string DescribeValues(const DigitExcess& excess, const std::string& first, const std::string& second) {
+  if (!excess.placement.empty()) return excess.placement;
+  const std::string text = DescribeNumbers(excess.numbers, first, second);
+  if (!excess.effect.empty()) return text + "; " + excess.effect;
+  if (excess.too_loose > 0.0)
+    return text + fmt::format("; the printed digits tell it to {:.2g} % only", 100.0 * excess.too_loose);
+  if (excess.units >= kExact) return text + "; both numbers are exact";
+  return text + fmt::format("; {:.3g} times the printed precision", excess.units);
+}
+
+}  // namespace
+
+Differences ListExcesses(const DigitVerdict& verdict, const std::string& first, const std::string& second) {
+  Differences differences;
+  std::vector<std::string>& lines = differences.real;
   std::vector<std::string> following;
-  std::map<std::string, std::pair<size_t, int>> alike;  // its line, and how many more there are
+  std::map<std::string, std::pair<size_t, int>> repeated;  // its line, and at how many more places it is
   double most = 0.0;
   for (const DigitExcess& excess : verdict.excesses) {
     if (!excess.is_cause) {
-      following.push_back(excess.check);
+      if (std::ranges::find(following, excess.check) == following.end()) following.push_back(excess.check);
       RaiseTo(excess.units, &most);
       continue;
     }
-    const std::string values =
-        fmt::format("{:.12g} in {}, {:.12g} in {}; ", excess.first, first, excess.second, second);
+    const std::string values = DescribeValues(excess, first, second);
     // The same two numbers, or what one file leaves out, are one fault of many joints: the worst stands for
     // all.
     const auto [line, is_new] =
-        alike.emplace(excess.check + (excess.effect.empty() ? values : ""), std::pair(lines.size(), 0));
+        repeated.emplace(excess.check + (excess.effect.empty() ? values : ""), std::pair(lines.size(), 0));
     line->second.second += is_new ? 0 : 1;
-    if (!is_new) continue;
-    lines.push_back(excess.check + ": " + excess.where + ": " + values);
-    lines.back() += !excess.effect.empty() ? excess.effect
-                    : excess.units < kNothingOpen
-                        ? fmt::format("{:.3g} times what their digits leave open", excess.units)
-                        : "their digits leave nothing open";
+    if (is_new) lines.push_back(excess.check + ": " + excess.where + ": " + values);
   }
-  for (const auto& [key, line] : alike) {
+  for (const auto& [key, line] : repeated) {
     if (line.second > 0) lines[line.first] += fmt::format("; and so at {} more", line.second);
   }
   if (!following.empty())
-    lines.push_back(fmt::format(
-        "terms{}: {}",
-        most < kNothingOpen ? fmt::format(" up to {:.3g} times what the digits leave open", most) : "",
-        JoinNames(following)));
-  return lines;
+    differences.following =
+        fmt::format("terms that follow{}: {}",
+                    most < kExact ? fmt::format(", up to {:.3g} times the printed precision", most) : "",
+                    JoinNames(following));
+  return differences;
 }
 
 }  // namespace dexcheck

@@ -9,6 +9,7 @@
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
+#include "harness/descriptions/body_comparison.h"
 #include "harness/descriptions/compiled_inertias.h"
 #include "harness/descriptions/description_match.h"
 #include "harness/descriptions/engine_extras.h"
@@ -220,11 +221,18 @@ Comparison CompareFiles(const std::filesystem::path& a, const std::filesystem::p
                         const Progress& progress) {
   DescriptionFile first(a, urdf);
   DescriptionFile second(b, urdf);
+  return CompareFiles(&first, &second, urdf, options, progress);
+}
+
+Comparison CompareFiles(DescriptionFile* a, DescriptionFile* b, const UrdfOptions& urdf,
+                        const ConsistencyOptions& options, const Progress& progress) {
   // Terms of an MJCF are the engine's; bodies of a table are those that a file was made from.
   const auto rank = [](const DescriptionFile& file) {
     return file.format() == RobotFormat::kBodies ? 2 : file.format() == RobotFormat::kMjcf ? 1 : 0;
   };
-  if (rank(first) > rank(second)) std::swap(first, second);
+  if (rank(*a) > rank(*b)) std::swap(a, b);
+  const DescriptionFile& first = *a;
+  DescriptionFile& second = *b;
   if (second.format() == RobotFormat::kBodies) second.PlaceOn(first.Describe());
   Comparison comparison;
   comparison.first = first.path();
@@ -253,6 +261,24 @@ Comparison CompareFiles(const std::filesystem::path& a, const std::filesystem::p
   }
   NoteTermsOfFrames(&comparison);
   return comparison;
+}
+
+std::optional<double> FindTolerance(const std::filesystem::path& table, const std::filesystem::path& mjcf) {
+  ConsistencyOptions options;
+  options.samples = 100;
+  options.within_digits = true;
+  const ConsistencyResult result = CompareFiles(table, mjcf, {}, options).result;
+  if (!result.Agrees()) return std::nullopt;
+  double worst = 0.0;
+  for (const auto* records : {&result.constants.records, &result.terms}) {
+    for (const CheckRecord& record : *records) {
+      if (record.worst > record.bound) worst = std::max(worst, record.worst);
+    }
+  }
+  if (worst == 0.0) return 0.0;
+  constexpr double kOtherRates = 4.0;  // states of a run over the states that are compared
+  const double unit = std::pow(10.0, std::floor(std::log10(kOtherRates * worst)));
+  return std::ceil(kOtherRates * worst / unit) * unit;
 }
 
 Comparison CompareResults(const std::filesystem::path& file, const ResultsSource& source,
@@ -314,34 +340,88 @@ void ExplainComparison(Comparison* comparison, double tolerance) {
   }
 }
 
+std::string DescribeNumbers(const NumberPair& numbers, const std::string& first, const std::string& second) {
+  const std::string unit = numbers.unit.empty() ? "" : " " + numbers.unit;
+  return fmt::format("{}{}{:.12g}{} in {}, {:.12g}{} in {}", numbers.component,
+                     numbers.component.empty() ? "" : ": ", numbers.first, unit, first, numbers.second, unit,
+                     second);
+}
+
+NumberPair TakeNumbers(const ConstantFinding& finding, const RobotModel& model) {
+  const bool is_prismatic = finding.location.kind == Location::Kind::kJoint &&
+                            model.joint(finding.location.first).type == JointType::kPrismatic;
+  return {NameComponent(finding.check, finding.entry), UnitOf(finding.check, is_prismatic), finding.model,
+          finding.engine};
+}
+
+namespace {
+
+/// The number of each link's body that differs most, in the link's frame; none where the files cannot be
+/// compared so.
+std::vector<ConstantFinding> FindBodyDifferences(const Comparison& comparison) {
+  if (!comparison.read_first || !comparison.read_second) return {};
+  std::array<RobotDescription, 2> sides = {*comparison.read_first, *comparison.read_second};
+  std::vector<ConstantFinding> worst;
+  try {
+    CompletePair({}, {}, &sides);
+    for (const ConstantFinding& finding : CompareBodies(sides[0], sides[1]).findings) {
+      const auto size = [](const ConstantFinding& one) {
+        return std::abs(one.model - one.engine) / one.scale;
+      };
+      const auto known = std::ranges::find_if(worst, [&](const ConstantFinding& one) {
+        return one.check == finding.check && one.location == finding.location;
+      });
+      if (known == worst.end()) {
+        worst.push_back(finding);
+      } else if (size(finding) > size(*known)) {
+        *known = finding;
+      }
+    }
+  } catch (const InputError&) {
+    return {};
+  }
+  return worst;
+}
+
+}  // namespace
+
 Differences SortDifferences(const Comparison& comparison) {
   const RobotModel& model = *comparison.model;
   const int base = model.num_base_velocities();
   const std::string first = comparison.first.filename().string();
   const std::string second = comparison.second.filename().string();
   const std::vector<CheckRecord>& checks = comparison.result.constants.records;
+  if (comparison.digits) return ListExcesses(*comparison.digits, first, second);
   Differences differences;
-  if (comparison.digits) {
-    differences.real = ListExcesses(*comparison.digits, first, second);
-    return differences;
-  }
   const auto add = [&](double error, std::string line) {
     const int digits = CountDigits(error);
     const bool is_rounded = digits >= kDigitsOfRoundedInput;
     if (is_rounded) differences.digits = std::min(differences.digits, digits);
     (is_rounded ? differences.rounded : differences.real).push_back(std::move(line));
   };
+  const auto add_number = [&](double error, const ConstantFinding& finding) {
+    add(error, fmt::format("{}: {}: {}{}{}", finding.check, finding.where,
+                           DescribeNumbers(TakeNumbers(finding, model), first, second),
+                           finding.effect.empty() ? "" : "; ", finding.effect));
+  };
   for (const ConstantFinding& finding : comparison.result.constants.findings) {
     // Where zero is a proper value, the check has another scale than the larger of the two.
     const double size = std::max(std::abs(finding.model), std::abs(finding.engine));
     const auto check = std::ranges::find(checks, finding.check, &CheckRecord::name);
     const double worst = check == checks.end() ? 1.0 : check->worst;
-    add(std::min(std::abs(finding.model - finding.engine) / size, worst),
-        fmt::format("{}: {}: {:.12g} in {}, {:.12g} in {}{}{}", finding.check, finding.where, finding.model,
-                    first, finding.engine, second, finding.effect.empty() ? "" : "; ", finding.effect));
+    add_number(std::min(std::abs(finding.model - finding.engine) / size, worst), finding);
   }
+  std::vector<ConstantFinding> bodies;
+  if (!comparison.result.Agrees()) bodies = FindBodyDifferences(comparison);
   for (const CheckRecord& record : comparison.result.terms) {
     if (!record.failed) continue;
+    bool is_listed = false;
+    for (const ConstantFinding& finding : bodies) {
+      if (finding.check != record.name) continue;
+      add_number(std::abs(finding.model - finding.engine) / finding.scale, finding);
+      is_listed = true;
+    }
+    if (is_listed) continue;
     add(record.worst,
         fmt::format("{}: nearest the base: {}; worst: {}: {:.12g} in {}, {:.12g} in {} (sample {})",
                     record.name, Describe(record.first_failure, model, base),
@@ -356,6 +436,7 @@ std::vector<std::string> ListDifferences(const Comparison& comparison) {
   Differences differences = SortDifferences(comparison);
   std::vector<std::string> lines = std::move(differences.real);
   lines.insert(lines.end(), differences.rounded.begin(), differences.rounded.end());
+  if (!differences.following.empty()) lines.push_back(differences.following);
   return lines;
 }
 

@@ -18,15 +18,42 @@
 
 namespace dexcheck {
 
-/// One number that differs by more than the digits leave open.
+/// A number as two files have it.
+struct NumberPair {
+  std::string component;  ///< Of a vector, tensor or range: "Ixx", "lower"; empty for a single number.
+  std::string unit;       ///< Empty where it is not known.
+  double first = 0.0, second = 0.0;
+};
+/// "Ixx: 0.0002 kg m^2 in a.urdf, 0.0001 kg m^2 in b.urdf"
+std::string DescribeNumbers(const NumberPair& numbers, const std::string& first, const std::string& second);
+/// The numbers of a finding. @param model whose locations it has.
+NumberPair TakeNumbers(const ConstantFinding& finding, const RobotModel& model);
+
+/// One number that differs by more than the printed precision.
 struct DigitExcess {
   std::string check;
   std::string where;
-  double units = 0.0;  ///< Difference relative to what is left open; infinite where nothing is.
-  double first = 0.0, second = 0.0;
-  std::string effect;     ///< Of a constant that one file leaves out.
+  NumberPair numbers;
+  double units = 0.0;    ///< Difference relative to the precision; infinite where both numbers are exact.
+  std::string effect{};  ///< What a constant does that one file leaves out.
+  std::string
+      placement{};        ///< How a joint's or frame's placement differs, in words (placement_difference.h).
   bool is_cause = false;  ///< A constant, or a term of geometry or bodies, from which the other terms follow.
+  /// Relative precision of a number that agrees within it, where that is too coarse for a verdict; 0
+  /// elsewhere.
+  double too_loose = 0.0;
 };
+
+/// The number that was compared most coarsely of those that differ by more than rounding.
+struct LoosestNumber {
+  std::string what;       ///< "inertia of link3"; empty where all agree to rounding.
+  double fraction = 0.0;  ///< Precision to which it was compared, relative to its size.
+};
+
+/// Brings two descriptions to the same statements, names and frames of links, or parts of both.
+/// @throws InputError when they are of two mechanisms.
+void CompletePair(const std::vector<std::string>& ignore, const RobotPart& part,
+                  std::array<RobotDescription, 2>* sides);
 
 /// How two files differ that do not agree to rounding.
 struct DigitVerdict {
@@ -35,6 +62,7 @@ struct DigitVerdict {
   std::map<std::string, double> units;  ///< Of each check that does not agree to rounding, its worst.
   std::vector<DigitExcess> excesses;    ///< Causes first, the worst first.
   double largest_within = 0.0;          ///< Relative to its scale, the worst that the digits explain.
+  LoosestNumber loosest;
 
   /// Whether a hypothesis is about what exceeds them: single numbers that differ do so within the digits as
   /// well.
@@ -55,10 +83,6 @@ std::optional<DigitVerdict> JudgeByDigits(const std::array<const DescriptionFile
                                           const UrdfOptions& urdf, const ConsistencyOptions& options,
                                           DynamicsProvider* a, DynamicsProvider* b, const RobotModel& model,
                                           const RobotPart& part, ConsistencyResult* result);
-
-/// One line for each cause, the worst first, and one for all terms that follow from them.
-std::vector<std::string> ListExcesses(const DigitVerdict& verdict, const std::string& first,
-                                      const std::string& second);
 
 // Two files that describe one robot, compared: what `dexcheck consistency A B` does.
 
@@ -84,6 +108,14 @@ struct Comparison {
 Comparison CompareFiles(
     const std::filesystem::path& a, const std::filesystem::path& b, const UrdfOptions& urdf,
     const ConsistencyOptions& options, const Progress& progress = [](long) { return true; });
+/// The same of files that are read already. A table of bodies among them is placed on the other's robot.
+Comparison CompareFiles(DescriptionFile* a, DescriptionFile* b, const UrdfOptions& urdf,
+                        const ConsistencyOptions& options, const Progress& progress);
+
+/// Returns the relative tolerance to which a run's two files agree by the digits that they print: 0 where
+/// they agree to rounding, nothing where they differ. It is ten times the worst error found, rounded up to a
+/// power of ten, since the rates of a run are other ones than those of the states that are compared.
+std::optional<double> FindTolerance(const std::filesystem::path& table, const std::filesystem::path& mjcf);
 
 /// What stands against a description: a program's command, or a folder with results.
 struct ResultsSource {
@@ -113,11 +145,14 @@ inline constexpr int kDigitsOfRoundedInput = 4;
 struct Differences {
   std::vector<std::string> real;
   std::vector<std::string> rounded;  ///< Those that agree to kDigitsOfRoundedInput digits or more.
+  std::string following;             ///< One line for all terms that follow from `real`.
   int digits = 16;                   ///< To which all of `rounded` and what does not differ agree.
 };
+/// Lists the numbers that exceed the printed precision, the worst first.
+Differences ListExcesses(const DigitVerdict& verdict, const std::string& first, const std::string& second);
 Differences SortDifferences(const Comparison& comparison);
 
-/// Both kinds in one list.
+/// All of them in one list.
 std::vector<std::string> ListDifferences(const Comparison& comparison);
 
 }  // namespace dexcheck

@@ -96,7 +96,8 @@ bool TermComparison::Shares(const TermEntry& entry, size_t a, size_t b) const {
   return both_have(entry.term) && (entry.instead_of == Term::kTermCount || !both_have(entry.instead_of));
 }
 
-void TermComparison::CompareWithin(const std::vector<Spread>& spreads) {
+void TermComparison::CompareWithin(const std::vector<Spread>& spreads, std::span<const Term> causes) {
+  causes_.assign(causes.begin(), causes.end());
   const auto add = [&](const std::vector<Copy>& copies) {
     for (const Copy& copy : copies) providers_.insert(providers_.end(), {copy.first, copy.second});
     return providers_.size();
@@ -184,31 +185,50 @@ MatrixXd TermComparison::CalcDifference(AskedTerm* term, size_t copy) const {
   return term->numbers[copy] - term->numbers[copy + 1];
 }
 
+bool TermComparison::IsCause(const AskedTerm& term) const {
+  return std::ranges::find(causes_, term.entry->term) != causes_.end();
+}
+
 void TermComparison::WidenByDraws(AskedTerm* term) const {
-  constexpr double kCoverage =
-      3.0;  // of the root mean square of draws at both ends of each number's interval
+  constexpr double kCoverage = 3.0;  // times the root mean square of draws at the ends of the intervals
+  constexpr double kFew = 1.9;  // the largest draw over the root mean square; 1.73 of three equal numbers
+  const bool is_cause = IsCause(*term);
   MatrixXd U = CalcBound(*term->entry, model().max_depth()) * term->scale;
   for (const SpreadRange& spread : spreads_) {
     const MatrixXd nominal = CalcDifference(term, spread.nominal);
     const size_t first_draw = spread.nominal + 2;
     MatrixXd squares = MatrixXd::Zero(nominal.rows(), nominal.cols());
-    for (size_t i = first_draw; i < spread.first_other; i += 2)
-      squares += (CalcDifference(term, i) - nominal).cwiseAbs2();
-    U += kCoverage / std::sqrt(0.5 * static_cast<double>(spread.first_other - first_draw)) *
-         squares.cwiseSqrt();
+    MatrixXd largest = squares;
+    for (size_t i = first_draw; i < spread.first_other; i += 2) {
+      const MatrixXd moved = (CalcDifference(term, i) - nominal).cwiseAbs();
+      squares += moved.cwiseAbs2();
+      largest = largest.cwiseMax(moved);
+    }
+    const MatrixXd rms = (squares * (2.0 / static_cast<double>(spread.first_other - first_draw))).cwiseSqrt();
+    const MatrixXd wide = kCoverage * rms;
+    U += is_cause ? MatrixXd((largest.array() <= kFew * rms.array()).select(largest, largest.cwiseMax(wide)))
+                  : wide;
     for (size_t i = spread.first_other; i < spread.end; i += 2)
       U += (CalcDifference(term, i) - nominal).cwiseAbs();
   }
   term->weight = U.cwiseInverse();  // 0 of what is not compared, whose scale is infinite
 }
 
-void TermComparison::NoteExcess(size_t term, const Location& where, double units, double first, double second,
-                                double when) {
-  if (spreads_.empty() || units <= 1.0) return;
-  auto known = std::ranges::find_if(
-      excesses_, [&](const Excess& one) { return one.term == term && one.where == where; });
-  if (known == excesses_.end()) known = excesses_.insert(known, Excess{term, where});
-  if (units > known->units) *known = {term, where, units, first, second, when};
+void TermComparison::NoteWithin(size_t index, Eigen::Index row, Eigen::Index col, const Excess& entry) {
+  if (spreads_.empty()) return;
+  const AskedTerm& term = terms_[index];
+  if (entry.units > 1.0) {
+    auto known = std::ranges::find_if(
+        excesses_, [&](const Excess& one) { return one.term == index && one.where == entry.where; });
+    if (known == excesses_.end()) known = excesses_.insert(known, Excess{index, entry.where});
+    if (entry.units > known->units) *known = entry;
+  }
+  const double rounding = CalcBound(*term.entry, model().max_depth());
+  if (!IsCause(term) || std::abs(entry.first - entry.second) <= rounding * term.scale(row, col)) return;
+  const double open = 1.0 / (term.weight(row, col) * term.scale(row, col));
+  if (loosest_ && open <= loosest_->units) return;
+  loosest_ = entry;
+  loosest_->units = open;
 }
 
 Location TermComparison::Locate(const TermEntry& entry, Eigen::Index row, Eigen::Index col) const {
@@ -231,7 +251,7 @@ void TermComparison::ComparePair(size_t index, double when, ComparedPair* pair) 
     error = ((first - second).array().abs() * term.weight.array()).maxCoeff<Eigen::PropagateNaN>();
   if (!(error < std::numeric_limits<double>::infinity())) error = std::numeric_limits<double>::infinity();
   const bool failed_before = record.failed;
-  const bool is_worst = error > record.worst || record.comparisons == 0 || (!spreads_.empty() && error > 1.0);
+  const bool is_worst = error > record.worst || record.comparisons == 0 || !spreads_.empty();
   if (is_worst || (!(error <= record.bound) && !failed_before)) {
     for (Eigen::Index col = 0; col < first.cols(); ++col) {
       for (Eigen::Index row = 0; row < first.rows(); ++row) {
@@ -240,7 +260,7 @@ void TermComparison::ComparePair(size_t index, double when, ComparedPair* pair) 
         const double its_error = std::abs(first(row, col) - second(row, col)) * weight;
         const Location where = Locate(entry, row, col);
         record.CompareError(its_error, first(row, col), second(row, col), where, when);
-        NoteExcess(index, where, its_error, first(row, col), second(row, col), when);
+        NoteWithin(index, row, col, {index, where, its_error, first(row, col), second(row, col), when});
       }
     }
   } else {

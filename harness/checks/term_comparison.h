@@ -54,12 +54,17 @@ class TermComparison {
     std::vector<Copy> draws;
     std::vector<Copy> others;
   };
-  /// From now on the first pair's errors are relative to U = scale * bound + sum over the spreads of (3 root
-  /// mean square of d - d_nominal over the draws + sum |d - d_nominal| over the others), with d = first -
-  /// second of a copy, and its bounds are 1.
-  void CompareWithin(const std::vector<Spread>& spreads);
+  /// From now on the first pair's errors are relative to U = scale * bound + sum over the spreads of (the
+  /// coverage of d - d_nominal over the draws + sum |d - d_nominal| over the others), with d = first - second
+  /// of a copy, and its bounds are 1. The coverage is the largest value over the draws where few numbers act
+  /// on the entry, and three times the root mean square where many do, as for all terms that are no causes.
+  /// @param causes terms from which the others follow.
+  void CompareWithin(const std::vector<Spread>& spreads, std::span<const Term> causes);
   /// The worst of each place whose error is above 1; none before CompareWithin.
   [[nodiscard]] const std::vector<Excess>& excesses() const { return excesses_; }
+  /// The entry of the causes that was compared most loosely of those that differ by more than rounding:
+  /// `units` is U relative to the term's scale. None where all agree to rounding.
+  [[nodiscard]] const std::optional<Excess>& loosest() const { return loosest_; }
 
   /// What scales are formed of. Nothing else is known of the state.
   [[nodiscard]] ScaleContext& scales() { return scales_; }
@@ -101,7 +106,8 @@ class TermComparison {
   void Weigh(AskedTerm* term);
   [[nodiscard]] MatrixXd CalcDifference(AskedTerm* term, size_t copy) const;
   void WidenByDraws(AskedTerm* term) const;
-  void NoteExcess(size_t term, const Location& where, double units, double first, double second, double when);
+  [[nodiscard]] bool IsCause(const AskedTerm& term) const;
+  void NoteWithin(size_t term, Eigen::Index row, Eigen::Index col, const Excess& entry);
   void ComparePair(size_t term, double when, ComparedPair* pair);
   [[nodiscard]] Location Locate(const TermEntry& entry, Eigen::Index row, Eigen::Index col) const;
 
@@ -112,7 +118,9 @@ class TermComparison {
 
   std::vector<DynamicsProvider*> providers_;
   std::vector<SpreadRange> spreads_;
+  std::vector<Term> causes_;
   std::vector<Excess> excesses_;
+  std::optional<Excess> loosest_;
   ScaleContext scales_;
   std::vector<AskedTerm> terms_;
   std::vector<ComparedPair> pairs_;

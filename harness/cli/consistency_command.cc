@@ -30,7 +30,6 @@ void TakeFiles(ConsistencyRequest* request) {
 
 int Run(ConsistencyRequest request) {
   TakeFiles(&request);
-  request.options.within_digits = !request.exact && !request.judging.Find();
   for (const std::string& joint : request.lock) AddHeldJoint(joint, &request.options.part);
   for (const std::string& name : request.ignore) {
     const bool is_word =
@@ -43,15 +42,8 @@ int Run(ConsistencyRequest request) {
   ResultFile json(request.json_file);
   ResultFile junit(request.junit_file);
   ProgressBar bar("comparing", request.options.samples, request.quiet);
-  const auto progress = [&](long samples) { return bar.GoOn(samples); };
-  const RobotFiles& files = request.files;
-  Comparison comparison =
-      request.has_results()
-          ? CompareResults(files.robot, request.source, request.urdf, request.options, progress)
-          : CompareFiles(files.robot, files.mjcf, request.urdf, request.options, progress);
+  Comparison comparison = Compare(request, [&](long samples) { return bar.GoOn(samples); });
   bar.Finish();
-  if (const std::optional<double> tolerance = request.judging.Find())
-    JudgeByTolerance(*tolerance, &comparison.result);
   if (!request.has_results()) ExplainComparison(&comparison, request.judging.Find().value_or(0.0));
   const ConsistencyResult& result = comparison.result;
   ExitCode code = request.IsWhole(result) ? kSuccess : kFailure;
@@ -95,12 +87,7 @@ void AddConsistencyCommand(Command app) {
   AddSampleOptions(command, kMaxSamples, &request->options.samples, &request->options.seed);
   AddJsonOption(command, "the results", &request->json_file);
   AddJUnitOption(command, &request->junit_file);
-  const std::array<Option, 2> tolerance = AddToleranceOptions(command, &request->judging);
-  command
-      .AddFlag("--exact", &request->exact,
-               "Two files must agree to rounding, not only within the digits that they print")
-      .Excludes(tolerance[0])
-      .Excludes(tolerance[1]);
+  AddJudgingOptions(command, request.get());
   command
       .AddOption("--ignore WORD,...", &request->ignore,
                  "Constants of joints in which the two may differ: armature, damping, friction, coupling to "

@@ -3,10 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <map>
 
 #include "controller/common/text.h"
 #include "harness/base/check_record.h"
+#include "harness/base/console.h"
 #include "harness/checks/consistency.h"
 #include "harness/cli/junit_file.h"
 #include "harness/cli/terminal.h"
@@ -83,14 +85,87 @@ Json ToJson(const DigitVerdict& verdict) {
   for (const DigitExcess& excess : verdict.excesses) {
     json["exceeds"].push_back({{"check", excess.check},
                                {"where", excess.where},
+                               {"component", excess.numbers.component},
+                               {"unit", excess.numbers.unit},
                                {"units", excess.units},
-                               {"model", excess.first},
-                               {"engine", excess.second}});
+                               {"model", excess.numbers.first},
+                               {"engine", excess.numbers.second}});
+    if (!excess.placement.empty()) json["exceeds"].back()["placement"] = excess.placement;
+    if (excess.too_loose > 0.0) json["exceeds"].back()["precision"] = excess.too_loose;
   }
+  if (!verdict.loosest.what.empty())
+    json["loosest"] = {{"what", verdict.loosest.what}, {"precision", verdict.loosest.fraction}};
   return json;
 }
 
+/// "; loosest: inertia of link forearm, compared to 0.5 %"
+std::string DescribeLoosest(const LoosestNumber& loosest) {
+  if (loosest.what.empty()) return "";
+  return fmt::format("; loosest: {}, compared to {:.2g} %", loosest.what, 100.0 * loosest.fraction);
+}
+
+/// The command that explains why two files differ; none where no command knows more.
+std::string SuggestExplanation(const ConsistencyRequest& request, const Comparison& comparison) {
+  const bool is_repairable = comparison.with_engine && comparison.read_first &&
+                             comparison.read_first->format != RobotFormat::kMjcf && !request.has_results() &&
+                             request.options.part.empty();
+  if (!is_repairable) return "";
+  std::string command = "dexcheck diagnose " + QuoteForShell(comparison.first.string()) + " " +
+                        QuoteForShell(comparison.second.string());
+  if (const std::optional<double> tolerance = request.judging.Find())
+    command += " --tolerance " + FormatNumber(*tolerance);
+  return command;
+}
+
 }  // namespace
+
+void AddJudgingOptions(Command command, ConsistencyRequest* request) {
+  const std::array<Option, 2> tolerance = AddToleranceOptions(command, &request->judging);
+  command
+      .AddFlag("--exact", &request->exact,
+               "Two files must agree to rounding, not only within the digits that they print")
+      .Excludes(tolerance[0])
+      .Excludes(tolerance[1]);
+  command
+      .AddOption("--precision PERCENT", &request->precision,
+                 "Coarsest printed precision that still counts as agreement, % of a number's size")
+      .Check(PositiveNumber())
+      .Excludes(tolerance[0])
+      .Excludes(tolerance[1])
+      .ShowDefault();
+}
+
+namespace {
+
+/// @param compare the two as the options say.
+template <typename CompareBy>
+Comparison JudgeAsAsked(const ConsistencyRequest& request, const CompareBy& compare) {
+  ConsistencyOptions options = request.options;
+  const std::optional<double> tolerance = request.judging.Find();
+  options.within_digits = !request.exact && !tolerance;
+  options.precision = 0.01 * request.precision;
+  Comparison comparison = compare(options);
+  if (tolerance) JudgeByTolerance(*tolerance, &comparison.result);
+  return comparison;
+}
+
+}  // namespace
+
+Comparison Compare(const ConsistencyRequest& request, const Progress& progress) {
+  return JudgeAsAsked(request, [&](const ConsistencyOptions& options) {
+    const RobotFiles& files = request.files;
+    if (request.has_results())
+      return CompareResults(files.robot, request.source, request.urdf, options, progress);
+    return CompareFiles(files.robot, files.mjcf, request.urdf, options, progress);
+  });
+}
+
+Comparison Compare(const ConsistencyRequest& request, DescriptionFile* robot, DescriptionFile* mjcf,
+                   const Progress& progress) {
+  return JudgeAsAsked(request, [&](const ConsistencyOptions& options) {
+    return CompareFiles(robot, mjcf, request.urdf, options, progress);
+  });
+}
 
 Json DescribeRecord(const CheckRecord& record, const RobotModel& model) {
   const int base = model.num_base_velocities();
@@ -157,15 +232,16 @@ void PrintTable(const ConsistencyRequest& request, const Comparison& comparison)
                                  : "bounds follow from rounding";
   const std::string digits =
       comparison.digits
-          ? fmt::format(" What is above them was judged by the digits that the files print, at {} states.",
-                        comparison.digits->states)
+          ? fmt::format(
+                " Larger differences were compared with the printed precision of the files ({} states).",
+                comparison.digits->states)
           : "";
   fmt::print("\n{}\n", Wrap("Errors are relative to each term's own scale; " + bounds + " (README.md)." +
                                 digits + " --json says where each is worst.",
                             0));
 }
 
-void PrintVerdict(const ConsistencyRequest& request, const Comparison& comparison) {
+void PrintVerdict(const ConsistencyRequest& request, const Comparison& comparison, bool suggest) {
   const ConsistencyResult& result = comparison.result;
   if (!request.IsWhole(result)) {
     fmt::print("INTERRUPTED after {} of {} samples. So far:\n", result.samples, request.options.samples);
@@ -177,13 +253,10 @@ void PrintVerdict(const ConsistencyRequest& request, const Comparison& compariso
     left_out = fmt::format("; {} not compared ({})", comparison.not_compared.size(), Abbreviate(left_out));
   if (result.Agrees()) {
     if (comparison.digits) {
-      double most = 0.0;
-      for (const auto& [check, units] : comparison.digits->units) most = std::max(most, units);
       fmt::print(
-          "AGREE within the digits that the files print ({}) in all {} terms, up to {:.2g} of what these "
-          "leave "
-          "open; --exact asks for rounding alone{}.\n",
-          DescribeDigits(*comparison.digits), result.terms.size(), most, left_out);
+          "AGREE within the printed digits ({}) in all {} terms{}; --exact asks for rounding alone{}.\n",
+          DescribeDigits(*comparison.digits), result.terms.size(),
+          DescribeLoosest(comparison.digits->loosest), left_out);
       return;
     }
     fmt::print("AGREE: {} agree to {} in all {} terms{}.\n",
@@ -202,15 +275,16 @@ void PrintVerdict(const ConsistencyRequest& request, const Comparison& compariso
   } else {
     fmt::print("DISAGREE: {}", differences.real.front());
     if (differences.real.size() > 1) fmt::print("; and in {} more", differences.real.size() - 1);
-    const std::string within = comparison.digits ? "agrees within the digits that the files print (" +
-                                                       DescribeDigits(*comparison.digits) + ")"
-                                                 : "agrees to " + request.DescribeTolerance();
+    const std::string within =
+        comparison.digits ? "agrees within the printed digits (" + DescribeDigits(*comparison.digits) + ")"
+                          : "agrees to " + request.DescribeTolerance();
     fmt::print("; everything else {}{}.\n", differences.rounded.empty() ? within : to_digits, left_out);
     const size_t shown =
         comparison.digits ? std::min(differences.real.size(), kMostShown) : differences.real.size();
     for (size_t i = 1; i < shown; ++i) fmt::print("  {}\n", differences.real[i]);
     if (shown < differences.real.size())
       fmt::print("  and {} more (--json)\n", differences.real.size() - shown);
+    if (!differences.following.empty()) fmt::print("  {}\n", differences.following);
   }
   PrintHypotheses(comparison.hypotheses);
   const size_t shown = std::min(differences.rounded.size(), kMostShown);
@@ -219,6 +293,8 @@ void PrintVerdict(const ConsistencyRequest& request, const Comparison& compariso
   for (size_t i = 0; i < shown; ++i) fmt::print("  {}\n", differences.rounded[i]);
   if (shown < differences.rounded.size())
     fmt::print("  and {} more (--json)\n", differences.rounded.size() - shown);
+  const std::string command = suggest ? SuggestExplanation(request, comparison) : "";
+  if (!command.empty()) fmt::print("why: {}\n", command);
 }
 
 std::string ToText(const ConsistencyRequest& request, const Comparison& comparison, ExitCode code) {

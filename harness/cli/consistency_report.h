@@ -18,6 +18,7 @@ struct ConsistencyRequest : ComparisonRequest {
   std::vector<std::string> lock;    ///< "JOINT" or "JOINT=VALUE".
   std::vector<std::string> ignore;  ///< Words of kIgnorable, and links.
   bool exact = false;               ///< Two files agree to rounding only, whatever digits they print.
+  double precision = 1.0;           ///< Coarsest printed precision that counts as agreement, per cent.
 
   /// What stands for B provides terms, and is no description.
   [[nodiscard]] bool has_results() const { return !source.program.empty() || !source.results.empty(); }
@@ -27,13 +28,24 @@ struct ConsistencyRequest : ComparisonRequest {
   }
 };
 
+/// Adds --digits, --tolerance, --exact and --precision.
+void AddJudgingOptions(Command command, ConsistencyRequest* request);
+
+/// Compares two files, or a file and the terms that stand in the place of the other, as the request says.
+/// Every command that judges a pair of files does it by this function.
+Comparison Compare(const ConsistencyRequest& request, const Progress& progress);
+/// The same of two files that are read already.
+Comparison Compare(const ConsistencyRequest& request, DescriptionFile* robot, DescriptionFile* mjcf,
+                   const Progress& progress);
+
 /// A compared term or constant: its record, where it was worst, and the two values there.
 nlohmann::ordered_json DescribeRecord(const CheckRecord& record, const RobotModel& model);
 
 /// Large results first fail, then where to look: what a person reads.
 void PrintTable(const ConsistencyRequest& request, const Comparison& comparison);
-/// Whether the two agree, and if not, in what and why.
-void PrintVerdict(const ConsistencyRequest& request, const Comparison& comparison);
+/// Prints whether the two agree, and if not, in what and why.
+/// @param suggest whether the command that knows more is printed.
+void PrintVerdict(const ConsistencyRequest& request, const Comparison& comparison, bool suggest = true);
 /// The same as JSON.
 std::string ToText(const ConsistencyRequest& request, const Comparison& comparison, ExitCode code);
 

@@ -23,9 +23,8 @@
 namespace dexcheck::cli {
 namespace {
 
-struct DiagnoseRequest : ComparisonRequest {
-  DiagnosisOptions options;
-  std::vector<std::string> ignore;
+struct DiagnoseRequest : ConsistencyRequest {
+  DiagnosisOptions diagnosis;
 };
 
 size_t CountRemaining(const Diagnosis& diagnosis) {
@@ -131,14 +130,6 @@ void Print(const DiagnoseRequest& request, const RobotModel& model, const Answer
   const Diagnosis& diagnosis = answer.numbers;
   const RobotSpec& written = diagnosis.written;
   const std::string file = request.files.robot.filename().string();
-  if (diagnosis.agrees) {
-    fmt::print("{}\n",
-               Wrap(fmt::format("AGREE: nothing to explain: {} and {} agree to {} at {} random states.", file,
-                                request.files.mjcf.filename().string(), request.DescribeTolerance(),
-                                request.options.samples),
-                    2));
-    return;
-  }
   fmt::print("DISAGREE: {} against {}.\n", file, request.files.mjcf.filename().string());
   PrintHypotheses(answer.likely);
   if (diagnosis.causes.empty() && answer.conventions.empty())
@@ -202,8 +193,8 @@ std::string ToText(const DiagnoseRequest& request, const Answer& answer,
   const std::string file = request.files.robot.filename().string();
   Json json = {
       {"robot", request.files.robot.string()}, {"mjcf", request.files.mjcf.string()},
-      {"mujoco", mj_versionString()},          {"samples", request.options.samples},
-      {"seed", request.options.seed},          {"verdict", diagnosis.agrees ? "pass" : "disagreement"},
+      {"mujoco", mj_versionString()},          {"samples", request.diagnosis.samples},
+      {"seed", request.diagnosis.seed},        {"verdict", diagnosis.agrees ? "pass" : "disagreement"},
       {"explained", diagnosis.explained},      {"explained_of_forces", diagnosis.explained_of_forces}};
   if (const std::optional<double> tolerance = request.judging.Find()) json["tolerance"] = *tolerance;
   json["notes"] = ListLoadNotes();
@@ -248,28 +239,15 @@ RobotModel Complete(const DiagnoseRequest& request, const MjcfFile& document, Ro
   return RobotModel(robot.spec);
 }
 
-int Run(DiagnoseRequest request) {
-  request.TakeFiles("diagnose");
-  request.options.tolerance = request.judging.Find().value_or(0.0);
-  const RobotDescription robot = ReadDescription(request.files.robot);
-  const DescriptionFile mjcf(request.files.mjcf);
-  Require(robot.format != RobotFormat::kMjcf, request.files.robot,
-          "must be a parameter file or a URDF to be repaired, is an MJCF (dexcheck import writes a parameter "
-          "file from it)");
-  Require(mjcf.format() == RobotFormat::kMjcf, request.files.mjcf,
-          "must be an MJCF, which is taken to be right (dexcheck consistency compares any two files)");
+/// What would repair the first file.
+Answer FindAnswer(const DiagnoseRequest& request, const RobotDescription& robot, const DescriptionFile& mjcf,
+                  const std::function<bool(const char*)>& progress, std::vector<Hypothesis>* hypotheses,
+                  std::vector<std::string>* notes) {
   const MjModelPtr engine = mjcf.CopyEngine();
-  std::vector<std::string> notes;
-  const RobotModel model = Complete(request, mjcf.document(), robot, engine.get(), &notes);
+  const RobotModel model = Complete(request, mjcf.document(), robot, engine.get(), notes);
   RequireNoBalls(model, "in a diagnosis of single numbers (dexcheck consistency names likely faults)");
-  CatchInterrupts();
-  ResultFile json(request.json_file);
-  constexpr long kStages = 4;
-  long stage = 0;
-  ProgressBar bar("diagnosing", kStages, request.quiet);
-  const auto progress = [&](const char*) { return bar.GoOn(std::min(stage++, kStages)); };
   const auto diagnose = [&](const RobotModel& own, const RobotDescription& rows) {
-    return Diagnose(own, *engine, request.files.mjcf.string(), request.options, progress,
+    return Diagnose(own, *engine, request.files.mjcf.string(), request.diagnosis, progress,
                     {rows.joints.begin(), rows.joints.end()});
   };
   Answer answer;
@@ -277,8 +255,8 @@ int Run(DiagnoseRequest request) {
   // What can only be moved shows no bodies to compare.
   ExplainedDifference why;
   const std::optional<RobotDescription> right = mjcf.TryToDescribe();
-  if (!answer.numbers.agrees && !request.options.by_motion && right)
-    why = Explain(robot, *right, std::max(request.options.tolerance, kHypothesisTolerance));
+  if (!answer.numbers.agrees && !request.diagnosis.by_motion && right)
+    why = Explain(robot, *right, std::max(request.diagnosis.tolerance, kHypothesisTolerance));
   answer.likely = why.hypotheses;
   if (why.undone) {
     try {
@@ -290,17 +268,60 @@ int Run(DiagnoseRequest request) {
       // With what other faults leave of it, it is no robot.
     }
   }
+  *hypotheses = std::move(why.hypotheses);
+  return answer;
+}
+
+int Run(DiagnoseRequest request) {
+  request.TakeFiles("diagnose");
+  request.diagnosis.tolerance = request.judging.Find().value_or(0.0);
+  request.options.ignore = request.ignore;
+  request.options.seed = request.diagnosis.seed;
+  DescriptionFile file(request.files.robot);
+  DescriptionFile mjcf(request.files.mjcf);
+  Require(file.format() != RobotFormat::kMjcf, request.files.robot,
+          "must be a parameter file or a URDF to be repaired, is an MJCF (dexcheck import writes a parameter "
+          "file from it)");
+  Require(mjcf.format() == RobotFormat::kMjcf, request.files.mjcf,
+          "must be an MJCF, which is taken to be right (dexcheck consistency compares any two files)");
+  CatchInterrupts();
+  ResultFile json(request.json_file);
+  constexpr long kStages = 4;
+  long stage = 0;
+  ProgressBar bar("diagnosing", kStages, request.quiet);
+  const auto progress = [&](const char*) { return bar.GoOn(std::min(stage++, kStages)); };
+  std::vector<std::string> notes;
+  std::vector<Hypothesis> hypotheses;
+  std::string unrepaired;  // why no numbers are named
+  Answer answer;
+  const Comparison comparison = Compare(request, &file, &mjcf, [](long) { return !IsInterrupted(); });
+  if (comparison.result.Agrees()) {
+    notes = comparison.notes;
+  } else {
+    try {
+      answer = FindAnswer(request, file.Describe(), mjcf, progress, &hypotheses, &notes);
+    } catch (const InputError& error) {
+      unrepaired = error.what();
+    }
+  }
+  const bool has_answer = !answer.numbers.agrees;
+  answer.numbers.agrees = comparison.result.Agrees();
   bar.Finish();
-  json.Write([&] { return ToText(request, answer, why.hypotheses, notes); });
+  json.Write([&] { return ToText(request, answer, hypotheses, notes); });
   if (!json.TakesStdout()) {
     if (!request.quiet) {
       for (const std::string& note : notes) fmt::print("{}\n", note);
     }
     if (IsInterrupted()) fmt::print("INTERRUPTED. So far:\n");
-    Print(request, model, answer);
+    if (has_answer) {
+      Print(request, *comparison.model, answer);
+    } else {
+      PrintVerdict(request, comparison, /*suggest=*/false);
+      if (!unrepaired.empty()) fmt::print("No repair was looked for: {}\n", unrepaired);
+    }
   }
   if (IsInterrupted()) return ReportFailure("interrupted");
-  return answer.numbers.agrees ? kSuccess : kDisagreement;
+  return comparison.result.Agrees() ? kSuccess : kDisagreement;
 }
 
 }  // namespace
@@ -311,10 +332,11 @@ void AddDiagnoseCommand(Command app) {
   Command command = app.AddCommand("diagnose", "Say why model and engine disagree, and what would repair it");
   AddFileOptions(command, "What may be wrong, instead of --robot and --mjcf: parameter file (TOML) or URDF",
                  "What is right: MJCF", request.get());
-  AddSampleOptions(command, kMaxSamples, &request->options.samples, &request->options.seed);
-  command.AddFlag("--by-motion", &request->options.by_motion,
+  AddSampleOptions(command, kMaxSamples, &request->diagnosis.samples, &request->diagnosis.seed);
+  command.AddFlag("--by-motion", &request->diagnosis.by_motion,
                   "Use axes, frames and forces only, not the bodies' masses and inertias in the MJCF");
-  AddToleranceOptions(command, &request->judging);
+  request->options.samples = 200;
+  AddJudgingOptions(command, request.get());
   AddIgnoreOption(command, &request->ignore);
   AddJsonOption(command, "the results", &request->json_file);
   command.AddFlag("--quiet", &request->quiet, "No progress, and causes only");

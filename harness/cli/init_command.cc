@@ -205,24 +205,6 @@ jobs:
           audit: "true"
 )";
 
-/// To what the two agree where they do not to rounding: a tolerance for runs. 0 to rounding; none when they
-/// differ.
-std::optional<double> FindTolerance(const fs::path& table, const fs::path& mjcf) {
-  ConsistencyOptions options;
-  options.samples = 100;
-  options.within_digits = true;
-  const ConsistencyResult result = CompareFiles(table, mjcf, {}, options).result;
-  if (!result.Agrees()) return std::nullopt;
-  double worst = 0.0;
-  for (const auto* records : {&result.constants.records, &result.terms}) {
-    for (const CheckRecord& record : *records) {
-      if (record.worst > record.bound) worst = std::max(worst, record.worst);
-    }
-  }
-  // Rates of a motion are other ones than the states that were compared.
-  return worst > 0.0 ? std::pow(10.0, std::ceil(std::log10(worst)) + 1.0) : 0.0;
-}
-
 /// A robot whose base floats stands on its feet, or, where no stance is found, is held above the ground, so
 /// that its joints move all the same.
 std::optional<Stand> StandOrHold(const mjModel& engine, const std::map<std::string, double>& limits,

@@ -13,6 +13,7 @@
 #include "controller/common/text.h"
 #include "harness/base/console.h"
 #include "harness/base/interrupts.h"
+#include "harness/checks/file_comparison.h"
 #include "harness/cli/commands.h"
 #include "harness/cli/make_video.h"
 #include "harness/cli/output_file.h"
@@ -84,13 +85,28 @@ LoopParts MakeParts(const RunRequest& request, const Setup& setup) {
   return parts;
 }
 
+/// Judges a pair whose numbers agree within the digits that its files print by these digits, and says so.
+void JudgeByPrintedDigits(ScenarioFiles* files) {
+  constexpr long kStates = 20;
+  if (files->scenario.tolerance > 0.0 || files->scenario.joint_task() == nullptr) return;
+  ConsistencyOptions options;
+  options.samples = kStates;
+  if (CompareFiles(files->robot, files->mjcf, {}, options).result.Agrees()) return;
+  const std::optional<double> tolerance = FindTolerance(files->robot, files->mjcf);
+  if (!tolerance || *tolerance == 0.0) return;
+  files->scenario.tolerance = *tolerance;
+  Warn(fmt::format("{} and {} agree within the printed digits: the model is judged to {:.0e}",
+                   files->robot.filename().string(), files->mjcf.filename().string(), *tolerance));
+}
+
 int RunScenario(const RunRequest& request) {
   const bool quiet = request.quiet || request.json_file == "-";
   std::vector<std::string> overrides = request.overrides.List();
   if (const std::optional<double> tolerance = request.judging.Find()) {
     overrides.push_back("tolerance=" + FormatNumber(*tolerance));
   }
-  const ScenarioFiles files = FindScenario(request.scenario, overrides, request.seed);
+  ScenarioFiles files = FindScenario(request.scenario, overrides, request.seed);
+  if (!request.no_check) JudgeByPrintedDigits(&files);
   ResultFile junit(request.junit_file);
   const Setup setup(files.scenario, files.robot, files.mjcf);
   CatchInterrupts();
@@ -123,6 +139,9 @@ int RunScenario(const RunRequest& request) {
                      request.quiet ? Detail::kVerdict
                      : request.all ? Detail::kAll
                                    : Detail::kCategories);
+      if (result.attribution.cause == Cause::kModel && files.scenario.model_overrides.empty())
+        fmt::print("why: dexcheck diagnose {} {}\n", QuoteForShell(files.robot.string()),
+                   QuoteForShell(files.mjcf.string()));
     }
     FlushOutput();
   } catch (const std::exception&) {

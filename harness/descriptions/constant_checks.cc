@@ -1,8 +1,10 @@
 #include "harness/descriptions/constant_checks.h"
 
+#include <array>
 #include <cmath>
 #include <initializer_list>
 #include <optional>
+#include <string_view>
 #include <utility>
 
 #include "harness/descriptions/constant_table.h"
@@ -55,7 +57,52 @@ class DescriptionConstants : public ConstantComparison {
   std::vector<int> b_of_a_;
 };
 
+/// A check's quantity, its components, and its unit for hinges and for slides.
+struct QuantityWords {
+  const char* check;
+  const char* name;
+  const char* unit;
+  const char* prismatic_unit;
+  std::array<const char*, 6> components = {};
+};
+
+constexpr QuantityWords kQuantities[] = {
+    {"gravity_vector", "gravity", "m/s^2", "m/s^2", {"x", "y", "z"}},
+    {"link_mass", "mass", "kg", "kg"},
+    {"link_com", "centre of mass", "m", "m", {"x", "y", "z"}},
+    {"link_inertia", "inertia", "kg m^2", "kg m^2", {"Ixx", "Iyy", "Izz", "Ixy", "Ixz", "Iyz"}},
+    {"joint_axis", "axis", "", ""},
+    {"frame_pose", "pose", "", ""},
+    {"joint_range", "range", "rad", "m", {"lower", "upper"}},
+    {"joint_damping", "damping", "N m s/rad", "N s/m"},
+    {"joint_dry_friction", "dry friction", "N m", "N"},
+    {"joint_armature", "armature", "kg m^2", "kg"},
+    {"joint_coupling", "coupling", "", "", {"leader", "multiplier", "offset"}}};
+
+const QuantityWords* FindWords(const std::string& check) {
+  const auto* const found = std::ranges::find(kQuantities, std::string_view(check), &QuantityWords::check);
+  return found == std::end(kQuantities) ? nullptr : found;
+}
+
 }  // namespace
+
+std::string NameQuantity(const std::string& check) {
+  const QuantityWords* const words = FindWords(check);
+  return words != nullptr ? words->name : check;
+}
+
+std::string NameComponent(const std::string& check, int entry) {
+  const QuantityWords* const words = FindWords(check);
+  const bool has = words != nullptr && entry >= 0 && entry < static_cast<int>(words->components.size());
+  const char* const name = has ? words->components[static_cast<size_t>(entry)] : nullptr;
+  return name != nullptr ? name : "";
+}
+
+std::string UnitOf(const std::string& check, bool is_prismatic) {
+  const QuantityWords* const words = FindWords(check);
+  if (words == nullptr) return "";
+  return is_prismatic ? words->prismatic_unit : words->unit;
+}
 
 CheckRecord* ConstantChecks::Define(const std::string& check) {
   auto record = std::ranges::find(records, check, &CheckRecord::name);

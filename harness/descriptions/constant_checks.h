@@ -27,7 +27,16 @@ struct ConstantFinding {
   int entry = 0;  ///< Which of the numbers that the check compares there: of a vector, a range, a 3x3 tensor.
   bool engine_only = false;  ///< The analytic model has no such number: it takes the neutral value.
   std::string effect{};      ///< What it does to the motion, when one of the two leaves it out.
+  double scale = 0.0;        ///< What the difference is relative to; 0: the larger of the two numbers.
 };
+
+/// Returns a check's quantity in words, "centre of mass" of "link_com"; the check's name where it has none.
+std::string NameQuantity(const std::string& check);
+/// Returns the component of a vector, tensor or range that an entry is: "Ixx" of entry 0 of "link_inertia";
+/// empty where the quantity is one number.
+std::string NameComponent(const std::string& check, int entry);
+/// Returns the unit of a check's numbers, "kg"; empty where it is not known.
+std::string UnitOf(const std::string& check, bool is_prismatic);
 
 /// Something that the MJCF sets and the analytic model has no number for, and that is no disagreement: it
 /// belongs to the plant of a run, which overrides it or whose checks judge it.
@@ -87,7 +96,8 @@ class ConstantComparison {
     const double size = std::max({std::abs(model), std::abs(engine), scale});
     const double error = record->Compare(model, engine, size > 0.0 ? size : 1.0, where, -1);
     if (error > kConstantRounding) {
-      result_.findings.push_back({check, DescribeWhere(where), model, engine, where, entry_});
+      result_.findings.push_back(
+          {check, DescribeWhere(where), model, engine, where, entry_, false, {}, size});
     }
   }
   [[nodiscard]] std::string DescribeWhere(const Location& where) const {

@@ -29,6 +29,9 @@ std::vector<OwnRow> ListOwnRows(const RobotDescription& robot);
 /// Pose of each link's own frame in the world, the base first, with all joints at zero.
 std::vector<Pose> CalcOwnPoses(const Pose& X_W0, const std::vector<OwnRow>& rows);
 
+/// Returns the poses of the links' own frames in the world as CalcOwnPoses has them.
+std::vector<Pose> CalcZeroPoses(const RobotDescription& robot);
+
 /// Gives the link of a plain row another place in its parent's own frame, and its joint another axis in the
 /// own frame, in which all that it carries stays where it is.
 void TakeOwnRow(int joint, const Pose& X_PL, const Vector3d& axis, RobotDescription* robot);

@@ -18,13 +18,6 @@ Pose CalcRow(const Joint& joint, const MdhRow& mdh) {
   return joint.X_PB * CalcMdhTransform(mdh.alpha, mdh.a, mdh.q, mdh.d);
 }
 
-/// Of each link's own frame in the world, the base first, with all joints at zero.
-std::vector<Pose> CalcZeroPoses(const RobotDescription& robot) {
-  const Base& base = robot.spec.base;
-  const Pose X_W0 = base.type == BaseType::kFloating ? Pose::Identity() : base.X_B0;
-  return CalcOwnPoses(X_W0, ListOwnRows(robot));
-}
-
 bool HasParts(const RobotDescription& robot, int joint) {
   return std::ranges::any_of(robot.parts, [&](const DescribedPart& part) { return part.joint == joint; });
 }
@@ -54,6 +47,12 @@ std::vector<Pose> CalcOwnPoses(const Pose& X_W0, const std::vector<OwnRow>& rows
   std::vector<Pose> poses = {X_W0};
   for (const OwnRow& row : rows) poses.push_back(poses[static_cast<size_t>(row.parent + 1)] * row.X_PL);
   return poses;
+}
+
+std::vector<Pose> CalcZeroPoses(const RobotDescription& robot) {
+  const Base& base = robot.spec.base;
+  const Pose X_W0 = base.type == BaseType::kFloating ? Pose::Identity() : base.X_B0;
+  return CalcOwnPoses(X_W0, ListOwnRows(robot));
 }
 
 void TakeOwnRow(int index, const Pose& X_PL, const Vector3d& axis, RobotDescription* robot) {

@@ -313,7 +313,7 @@ std::unique_ptr<NumberedFile> MakeNumbered(const DescriptionFile& file, const Ur
 
 std::optional<PrintedNumber> ReadPrinted(std::string_view text) {
   constexpr int kFewestDigits = 3;
-  constexpr int kFewestDecimals = 4;
+  constexpr int kFewestDecimals = 4;  // of a whole number that a program printed
   if (text.starts_with('+')) text.remove_prefix(1);
   PrintedNumber number;
   const char* const end = text.data() + text.size();
@@ -335,7 +335,8 @@ std::optional<PrintedNumber> ReadPrinted(std::string_view text) {
     if (number.digits > 0 || mantissa[i] != '0') ++number.digits;
   }
   if (number.value == std::floor(number.value) && decimals < kFewestDecimals) return number;
-  if (decimals < kFewestDecimals) decimals += std::max(kFewestDigits - number.digits, 0);
+  // A zero has no significant digit, and is known to its last decimal.
+  if (number.value != 0.0) decimals += std::max(kFewestDigits - number.digits, 0);
   number.half_unit = 0.5 * std::pow(10.0, -decimals);
   return number;
 }

@@ -117,6 +117,31 @@ TEST_F(CompareFiles, OneWayLeadsToEachResult) {
   }
 }
 
+// What consistency, diagnose and a run say of one pair of files is one verdict, whatever the one change is.
+TEST_F(CompareFiles, HaveOneVerdictInEachCommand) {
+  Copy("pair.urdf");
+  Copy("pair.xml");
+  Expect(0, "init pair.urdf pair.xml --out made");
+  const std::string table = Read("made/robot.toml");
+  ASSERT_THAT(table, AllOf(HasSubstr("mass = 0.8"), HasSubstr("com = [0.1, 0.02, 0]")));
+  const auto judge = [&](const std::string& changed) {
+    Write("made/robot.toml", changed);
+    const int consistency = Run("consistency made/robot.toml made/robot.xml --samples 100").exit_code;
+    EXPECT_EQ(Run("diagnose made/robot.toml made/robot.xml").exit_code, consistency) << changed;
+    EXPECT_EQ(Run("run made/motion.toml --set duration=0.05 --no-log").exit_code, consistency) << changed;
+    return consistency;
+  };
+  EXPECT_EQ(judge(table), 0);
+  // To the printed digits the first two are the same number.
+  EXPECT_EQ(judge(ReplaceOnce(table, "mass = 0.8", "mass = 0.8004")), 0);
+  EXPECT_EQ(judge(ReplaceOnce(table, "com = [0.1, 0.02, 0]", "com = [0.1002, 0.02, 0]")), 0);
+  for (const Edit& edit : {Edit{"mass = 0.8", "mass = 0.81"},
+                           {"com = [0.1, 0.02, 0]", "com = [0.1, 0.021, 0]"},
+                           {"-1, 1], damping = 0", "-1, 1], damping = 0.1"},
+                           {"xyz = [0.3, 0, 0]", "xyz = [0.3, 0.001, 0]"}})
+    EXPECT_EQ(judge(ReplaceOnce(table, edit.from, edit.to)), 1) << edit.to;
+}
+
 TEST_F(CompareFiles, FramesOfLinksAreAlwaysThereToCompare) {
   Expect(0, "import a.urdf --out a.toml");
   for (const char* const a : {"a.urdf", "a.toml"}) {

@@ -64,6 +64,75 @@ TEST_F(Digits, FramesOfLinksMoveWithBothFiles) {
   }
 }
 
+/// A hand's finger: its numbers have few digits.
+std::string MakeFinger(const std::string& inertia, const std::string& com = "0.01 0 0",
+                       const std::string& mass = "0.05") {
+  return R"(<robot name="finger"><link name="palm"/><link name="tip"><inertial><origin xyz=")" + com +
+         R"("/><mass value=")" + mass + R"("/><inertia )" + inertia +
+         R"( ixz="0" iyz="0"/></inertial></link><joint name="bend" type="continuous"><parent link="palm"/>)"
+         R"(<child link="tip"/><origin xyz="0 0.02 0.1" rpy="0.3 0 0"/><axis xyz="0 1 0"/></joint></robot>)";
+}
+
+// People type 0.0001 and mean it: a short number stands for three digits, however small it is.
+TEST_F(Digits, OfFewDigitsHideNoMistake) {
+  Write("right.urdf", MakeFinger(R"(ixx="0.0001" iyy="0.0002" izz="0.0002" ixy="0")"));
+  const std::pair<std::string, std::string> cases[] = {
+      {MakeFinger(R"(ixx="0.0002" iyy="0.0002" izz="0.0002" ixy="0")"), "Ixx: 0.0002 kg m^2 in wrong.urdf"},
+      {MakeFinger(R"(ixx="0.0001" iyy="0.0002" izz="0.00021" ixy="0")"), "Izz: 0.00021 kg m^2 in wrong.urdf"},
+      {MakeFinger(R"(ixx="0.0001" iyy="0.0002" izz="0.0002" ixy="0.00001")"), "Ixy: 1e-05 kg m^2"},
+      {MakeFinger(R"(ixx="0.0001" iyy="0.0002" izz="0.0002" ixy="0")", "0.01 0.002 0"),
+       "y: 0.002 m in wrong.urdf"},
+      {MakeFinger(R"(ixx="0.0001" iyy="0.0002" izz="0.0002" ixy="0")", "0.01 0 0", "0.051"),
+       "0.051 kg in wrong.urdf"}};
+  for (const auto& [wrong, value] : cases) {
+    SCOPED_TRACE(value);
+    Write("wrong.urdf", wrong);
+    EXPECT_EQ(Compare(1, "wrong.urdf", "right.urdf").at("outcome"), "differ");
+    // The number stands in the first line as it stands in the file, with its component and unit.
+    EXPECT_THAT(FirstLine(Expect(1, "wrong.urdf right.urdf --quiet").out),
+                AllOf(HasSubstr("link tip"), HasSubstr(value)));
+  }
+}
+
+// The verdict names the number that was compared most coarsely, and is good only to 1 %.
+TEST_F(Digits, AreAgreementOnlyToTheStatedPrecision) {
+  Write("long.urdf", MakeFinger(R"(ixx="0.000123" iyy="0.000234" izz="0.000245" ixy="0.0000000")"));
+  Write("short.urdf", MakeFinger(R"(ixx="0.0001234" iyy="0.000234" izz="0.000245" ixy="0.0000000")"));
+  const Json good = Compare(0, "long.urdf", "short.urdf");
+  EXPECT_EQ(good.at("digits").at("loosest").at("what"), "inertia of link tip");
+  EXPECT_NEAR(good.at("digits").at("loosest").at("precision").get<double>(), 5.5e-7 / 2.45e-4, 1e-5);
+  EXPECT_THAT(Expect(0, "long.urdf short.urdf --quiet").out,
+              HasSubstr("loosest: inertia of link tip, compared to 0.22 %"));
+  Expect(1, "consistency long.urdf short.urdf --precision 0.2");
+  // A zero of four decimals leaves a third of this tensor open.
+  Write("zero.urdf", MakeFinger(R"(ixx="0.000123" iyy="0.000234" izz="0.000245" ixy="0.0000")"));
+  Write("small.urdf", MakeFinger(R"(ixx="0.000123" iyy="0.000234" izz="0.000245" ixy="0.00001")"));
+  EXPECT_EQ(Compare(1, "zero.urdf", "small.urdf").at("outcome"), "differ");
+  EXPECT_THAT(Expect(1, "zero.urdf small.urdf --quiet").out,
+              HasSubstr("the printed digits tell it to 20 % only"));
+  Expect(0, "consistency zero.urdf small.urdf --precision 30");
+}
+
+// What differs is told in the frames of the files: a joint's origin or its axis, or a frame on its link.
+TEST_F(Digits, APlacementIsToldAsItsFileHasIt) {
+  const std::string right = MakeFinger(R"(ixx="0.000123" iyy="0.000234" izz="0.000245" ixy="0")");
+  Write("right.urdf", right);
+  const std::pair<Edit, std::string> cases[] = {
+      {{"xyz=\"0 0.02 0.1\"", "xyz=\"0 0.02 0.13\""},
+       "origin, position z: 0.13 m in wrong.urdf, 0.1 m in right.urdf"},
+      {{"rpy=\"0.3 0 0\"", "rpy=\"0.5 0 0\""},
+       "origin in wrong.urdf is turned by 11.4592 deg about x against right.urdf"},
+      {{"axis xyz=\"0 1 0\"", "axis xyz=\"0 -1 0\""},
+       "axis [0 -1 0] in wrong.urdf, [0 1 0] in right.urdf; its origin agrees"}};
+  for (const auto& [edit, words] : cases) {
+    Write("wrong.urdf", ApplyEdits(right, {edit}));
+    const std::string out = Expect(1, "wrong.urdf right.urdf --quiet").out;
+    EXPECT_THAT(FirstLine(out), AllOf(HasSubstr("joint bend"), HasSubstr(words)));
+    // Nothing beside it is a cause.
+    EXPECT_THAT(FirstLine(out), Not(HasSubstr(" more")));
+  }
+}
+
 // One number in the middle of a robot whose others are all rounded.
 TEST_F(Digits, AMistakeIsOnTheFirstLine) {
   const std::string rounded = RoundNumbers(kPanda, 5);

@@ -151,8 +151,8 @@ TEST_F(TwoMjcfs, CompareWhatActsOnTheJointOfTheBase) {
   const std::string free = ReplaceOnce(damped, R"(<joint type="free" limited="false"/>)", "<freejoint/>");
   EXPECT_TRUE(Compare(damped, damped).result.Agrees());
   const std::string found = List(Compare(damped, free));
-  EXPECT_THAT(found, HasSubstr("damping[0]: 0.3 in a.xml, 0 in b.xml"));
-  EXPECT_THAT(found, HasSubstr("armature[5]: 0.01 in a.xml, 0 in b.xml"));
+  EXPECT_THAT(found, HasSubstr("damping[0]: 0.3 N m s/rad in a.xml, 0 N m s/rad in b.xml"));
+  EXPECT_THAT(found, HasSubstr("armature[5]: 0.01 kg m^2 in a.xml, 0 kg m^2 in b.xml"));
 }
 
 // How motors make their torques is no part of a URDF, and no disagreement.

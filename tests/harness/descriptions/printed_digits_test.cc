@@ -27,7 +27,7 @@ TEST(PrintedNumbers, AreKnownToHalfAUnitOfTheirLastDigit) {
                           {"+12.340", 5, 5e-4},
                           {"1.234e-3", 4, 5e-7},
                           {"1.234E+2", 4, 5e-2},
-                          {"0.0001", 1, 5e-5},
+                          // A zero is known to its last decimal.
                           {"0.000000", 0, 5e-7},
                           {"1.0000", 5, 5e-5},
                           // Short ones stand for three digits.
@@ -35,6 +35,9 @@ TEST(PrintedNumbers, AreKnownToHalfAUnitOfTheirLastDigit) {
                           {".25", 2, 5e-4},
                           {"2.9", 2, 5e-3},
                           {"0.01", 1, 5e-5},
+                          {"0.0001", 1, 5e-7},
+                          {"2e-5", 1, 5e-8},
+                          {"0.0043", 2, 5e-6},
                           // Whole ones are exact.
                           {"0", 0, 0.0},
                           {"90", 2, 0.0},
@@ -118,7 +121,7 @@ TEST(PrintedDigits, OfAnMjcfAreCarriedThroughTheCompiler) {
     for (int k = 0; k < 3; ++k) {
       // Principal moments at the triangle's limit may be moved beyond it.
       EXPECT_THAT(ListChanges(a, [&](const auto& r) { return r.parts[0].body.inertia(k, k); }),
-                  Each(::testing::DoubleNear(5e-5, 1e-9)));
+                  Each(::testing::DoubleNear(5e-6, 1e-9)));
     }
     ASSERT_EQ(a.undiagonalized.has_value(), inertial == full);
     if (inertial == full) EXPECT_EQ(a.undiagonalized->parts[0].body.inertia(0, 1), 0.0001);
