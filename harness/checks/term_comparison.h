@@ -62,8 +62,8 @@ class TermComparison {
   void CompareWithin(const std::vector<Spread>& spreads, std::span<const Term> causes);
   /// The worst of each place whose error is above 1; none before CompareWithin.
   [[nodiscard]] const std::vector<Excess>& excesses() const { return excesses_; }
-  /// The entry of the causes that was compared most loosely of those that differ by more than rounding:
-  /// `units` is U relative to the term's scale. None where all agree to rounding.
+  /// The entry of the causes that was compared most loosely of those that differ by more than rounding and by
+  /// no more than U: `units` is U relative to the term's scale. None where there is no such entry.
   [[nodiscard]] const std::optional<Excess>& loosest() const { return loosest_; }
 
   /// What scales are formed of. Nothing else is known of the state.

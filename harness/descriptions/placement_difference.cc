@@ -74,9 +74,16 @@ std::optional<std::string> DescribeJointDifference(const DescribedPair& pair, in
   const bool is_placed = AreSame(a.X_PL.translation(), b.X_PL.translation());
   const bool is_turned = !AreSame(a.X_PL.linear(), b.X_PL.linear());
   const bool has_axis = AreSame(a.axis, b.axis);
-  const int differences = (is_placed ? 0 : 1) + (is_turned ? 1 : 0) + (has_axis ? 0 : 1);
+  const Vector3d point =
+      X_ab[i].translation();  // of the axis of `b`; the axis of `a` passes through the origin
+  const bool has_point = !a.is_revolute || point.cross(a.axis).norm() < kSame;
+  const int differences =
+      (is_placed ? 0 : 1) + (is_turned ? 1 : 0) + (has_axis ? 0 : 1) + (has_point ? 0 : 1);
   if (differences == 0) return std::nullopt;
   if (differences > 1) return CompareAxesAtZero(pair, i, j);
+  if (!has_point)
+    return fmt::format("axis through {} m of its link in {}, through the link's origin in {}",
+                       DescribeVector(point), pair.second, pair.first);
   if (!has_axis)
     return fmt::format("axis {} in {}, {} in {}; its origin agrees", DescribeVector(a.axis), pair.first,
                        DescribeVector(b.axis), pair.second);
