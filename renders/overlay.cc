@@ -166,10 +166,10 @@ void Overlay::Draw(const OverlayState& state, Image* image) {
       y += kLine * s;
       const Color& dot = !status.is_asked() ? kUnknown : status.failed == 0 ? kGood : kBad;
       canvas.FillCircle({left + 5.0 * s, y - 5.0 * s}, 5.0 * s, dot);
-      draw_row(
-          left + 19.0 * s,
-          {TitleOf(status.category),
-           status.is_asked() ? fmt::format("{:.1e} / {:.0e}", status.worst, status.bound) : "not checked"});
+      draw_row(left + 19.0 * s,
+               {TitleOf(status.category),
+                status.is_asked() ? fmt::format("{:.1e} / {:.0e}", status.nearest.worst, status.nearest.bound)
+                                  : "not checked"});
     }
   }
   if (keys > 0) {

@@ -78,8 +78,10 @@ std::vector<CategoryStatus> CheckHistory::ListCategories(long row) const {
     CategoryStatus& status = categories.emplace_back(CategoryStatus{kind});
     for (size_t i = 0; i < worst_.size(); ++i) {
       const CheckSeries& check = run_.checks[i];
-      const double worst = worst_[i][static_cast<size_t>(row)];
-      if (check.kind == kind) status.Add(check.name, worst, check.bound, worst > check.bound);
+      if (check.kind != kind) continue;
+      CheckRecord record{.name = check.name, .kind = kind, .bound = check.bound};
+      record.Add(worst_[i][static_cast<size_t>(row)], 0.0);
+      status.Add(record);
     }
   }
   return categories;

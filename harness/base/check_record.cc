@@ -1,6 +1,9 @@
 #include "harness/base/check_record.h"
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
+
+#include "controller/common/text.h"
 
 namespace dexcheck {
 namespace {
@@ -57,18 +60,45 @@ const char* TitleOf(CheckCategory category) {
   return kTitles[static_cast<size_t>(category)];
 }
 
+void CheckRecord::Add(double value, double when, double allowed) {
+  if (!applies) return;
+  const double judged =
+      allowed == 0.0 || std::isnan(value) ? value : Worst(std::min(value, bound), value - allowed);
+  const bool is_worst = Note(judged, when);
+  // Of values that the bound cut off, the one that took most of its allowance.
+  const bool takes_more =
+      judged == worst && CalcFraction(value, bound + allowed) > CalcFraction(residual, bound + allowance);
+  if (allowed != 0.0 && (is_worst || takes_more)) {
+    residual = value;
+    at = when;
+  }
+  if (is_worst || (allowed != 0.0 && takes_more)) allowance = allowed;
+  AddStep(judged);
+}
+
 double CalcFraction(double value, double bound) {
   if (bound > 0.0) return value / bound;
   return value > 0.0 ? std::numeric_limits<double>::infinity() : 0.0;
 }
 
 nlohmann::ordered_json ToJson(const CheckRecord& record, bool timed) {
-  nlohmann::ordered_json json = {{"kind", NameOf(record.kind)}, {"max", record.worst}};
-  if (timed) json["rms"] = record.rms();
+  nlohmann::ordered_json json = {{"kind", NameOf(record.kind)}};
+  const bool is_reached = !timed || IsReached(record);
+  if (is_reached) json["max"] = record.worst;
+  if (is_reached && record.allowance > 0.0) {
+    json["residual"] = record.residual;
+    json["allowance"] = record.allowance;
+  }
+  if (timed && is_reached) json["rms"] = record.rms();
   json["bound"] = record.bound;
   json["unit"] = record.unit;
-  if (timed) json["at_time_s"] = record.at;
-  json["pass"] = !record.failed;
+  if (timed && is_reached) json["at_time_s"] = record.at;
+  if (is_reached) {
+    json["pass"] = !record.failed;
+  } else {
+    json["reached"] = false;
+  }
+  if (record.same_source) json["same_source"] = true;
   if (timed && record.failed) json["failed_at_s"] = record.failed_at;
   if (!record.part.empty()) json["where"] = record.part;
   if (!record.description.empty()) json["description"] = record.description;
@@ -91,22 +121,46 @@ CheckRecord ReadCheck(const std::string& name, const nlohmann::json& json) {
   record.description = json.value("description", "");
   record.bound = number("bound");
   record.worst = number("max");
+  record.allowance = number("allowance");
+  record.residual = record.allowance > 0.0 ? number("residual") : record.worst;
   record.at = number("at_time_s");
-  record.failed = !json.at("pass").get<bool>();
+  record.comparisons = json.value("reached", true) ? 1 : 0;
+  record.same_source = json.value("same_source", false);
+  record.failed = IsReached(record) && !json.at("pass").get<bool>();
   record.failed_at = number("failed_at_s");
   record.part = json.value("where", "");
   record.count = json.contains("at_time_s") ? 1 : 0;
   return record;
 }
 
-void CategoryStatus::Add(const std::string& name, double value, double its_bound, bool fails) {
-  if (!is_asked() || CalcFraction(value, its_bound) > fraction()) {
-    check = name;
-    worst = value;
-    bound = its_bound;
+const char* DescribeStatus(const CheckRecord& check) {
+  if (!IsReached(check)) return "not reached";
+  return check.failed ? "FAILS" : check.same_source ? "same source" : "ok";
+}
+
+std::string DescribeNumbers(const CheckRecord& check) {
+  if (!IsReached(check)) return "not reached";
+  const std::string bound = ", bound " + FormatNumber(check.bound, 3);
+  if (check.allowance == 0.0) return "worst " + FormatNumber(check.worst, 3) + bound;
+  return "residual " + FormatNumber(check.residual, 3) + bound + ", allowance " +
+         FormatNumber(check.allowance, 3);
+}
+
+std::string CategoryStatus::Describe() const {
+  if (failed > 0) return std::to_string(failed) + " of " + std::to_string(checks) + " fail";
+  if (!is_asked()) return not_reached > 0 ? "not reached" : "not checked";
+  return same_source == checks ? "same source" : "holds";
+}
+
+void CategoryStatus::Add(const CheckRecord& check) {
+  if (!IsReached(check)) {
+    ++not_reached;
+    return;
   }
+  if (!is_asked() || CalcFraction(check) > CalcFraction(nearest)) nearest = check;
   ++checks;
-  failed += fails ? 1 : 0;
+  failed += check.failed ? 1 : 0;
+  same_source += check.same_source && !check.failed ? 1 : 0;
 }
 
 }  // namespace dexcheck

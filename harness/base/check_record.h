@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "controller/model/robot_model.h"
+#include "harness/base/worst.h"
 
 namespace dexcheck {
 
@@ -45,15 +46,19 @@ struct CheckRecord {
   std::string name;  ///< As in the log and in summary.json; of terms, as in NOTATION.md.
   CheckCategory kind = CheckCategory::kModel;
   std::string unit = "1";
-  std::string description;  ///< What is measured, and against what: one line for log and report.
-  double bound = 0.0;       ///< Largest value that passes.
-  bool applies = true;      ///< Whether this run evaluates it at all; otherwise Add does nothing.
+  std::string description;   ///< What is measured, and against what: one line for log and report.
+  double bound = 0.0;        ///< Largest value that passes.
+  bool applies = true;       ///< Whether this run evaluates it at all; otherwise Add does nothing.
+  bool same_source = false;  ///< Both sides come from one file: agreement is no evidence.
 
   // What came of it. "When" is the time in s of a step of a run, the number of a sample elsewhere.
   double last = 0.0;   ///< Value of the last step.
   double worst = 0.0;  ///< Largest value; infinity when something was not a number.
-  double at = 0.0;     ///< When it was worst, for the first time.
-  Location where;      ///< Of the worst number.
+  /// At the same step, the value before what is known to come of the plant was taken off, and how much that
+  /// is; `worst` and 0 of a check that forgives nothing.
+  double residual = 0.0, allowance = 0.0;
+  double at = 0.0;  ///< When it was worst, for the first time.
+  Location where;   ///< Of the worst number.
   double model_value = 0.0;
   double engine_value = 0.0;
   bool failed = false;     ///< Whether any value was above the bound, or was not a number.
@@ -65,12 +70,9 @@ struct CheckRecord {
   long count = 0;        ///< Steps.
   double sum_of_squares = 0.0;
 
-  /// Adds the value of one step.
-  void Add(double value, double when) {
-    if (!applies) return;
-    Note(value, when);
-    AddStep(value);
-  }
+  /// Adds the value of one step: as it is up to the bound, and above it less the allowance.
+  /// @param allowed how much of it is known to come of the plant.
+  void Add(double value, double when, double allowed = 0.0);
 
   /// Adds one of a step's numbers. `scale` is positive; the error is |model - engine| / scale. Returns it, or
   /// infinity when it is not a number.
@@ -107,6 +109,8 @@ struct CheckRecord {
   void Merge(const CheckRecord& other) {
     if (other.worst > worst) {
       worst = other.worst;
+      residual = other.residual;
+      allowance = other.allowance;
       at = other.at;
       model_value = other.model_value;
       engine_value = other.engine_value;
@@ -119,7 +123,7 @@ struct CheckRecord {
       first_failure = other.first_failure;
       part = other.part;
     }
-    if (other.last > last) last = other.last;
+    last = Worst(last, other.last);
   }
 
   /// Forgets what came of it.
@@ -131,6 +135,7 @@ struct CheckRecord {
     fresh.description = std::move(description);
     fresh.bound = bound;
     fresh.applies = applies;
+    fresh.same_source = same_source;
     *this = std::move(fresh);
   }
 
@@ -142,7 +147,7 @@ struct CheckRecord {
     const bool is_worst = size > worst || comparisons == 0;
     ++comparisons;
     if (is_worst) {
-      worst = size;
+      worst = residual = size;
       at = when;
     }
     if (!(value <= bound) && !failed) {
@@ -165,13 +170,24 @@ const char* TitleOf(CheckCategory category);
 
 /// A value as a fraction of its bound; 0 for 0 / 0, infinite for anything else over 0.
 double CalcFraction(double value, double bound);
-inline double CalcFraction(const CheckRecord& check) { return CalcFraction(check.worst, check.bound); }
+inline double CalcFraction(const CheckRecord& check) {
+  return check.failed ? CalcFraction(check.worst, check.bound)
+                      : CalcFraction(check.residual, check.bound + check.allowance);
+}
 
-/// Whether a check was evaluated at each step, and not once, as a constant is.
+/// Whether a check is evaluated at each step, and not once, as a constant is.
 inline bool IsTimed(const CheckRecord& check) { return check.count > 0; }
 
-/// As summaries and pages have it: kind, max, bound, unit, pass, where, description; and of a check that was
-/// evaluated at each step (`timed`) rms, at_time_s and failed_at_s.
+/// Whether a check of a run was evaluated at all: a run may end before.
+inline bool IsReached(const CheckRecord& check) { return check.comparisons > 0; }
+/// "FAILS", "ok", "same source" or "not reached".
+const char* DescribeStatus(const CheckRecord& check);
+/// Value and bound in words: "worst 1e-8, bound 1e-6", with residual and allowance where they differ.
+std::string DescribeNumbers(const CheckRecord& check);
+
+/// As summaries and pages have it: kind, max, bound, unit, pass, where, description; of a check that is
+/// evaluated at each step (`timed`) rms, at_time_s and failed_at_s; residual and allowance where something
+/// was taken off. A timed check that was not reached has `reached` false in the place of max and pass.
 nlohmann::ordered_json ToJson(const CheckRecord& record, bool timed);
 /// The same back; JSON has no infinity, which is written as null. @throws nlohmann::json::exception.
 CheckRecord ReadCheck(const std::string& name, const nlohmann::json& json);
@@ -181,15 +197,16 @@ struct CategoryStatus {
   explicit CategoryStatus(CheckCategory of = CheckCategory::kModel) : category(of) {}
 
   CheckCategory category;
-  std::string check;
-  double worst = 0.0;
-  double bound = 0.0;
-  long checks = 0;  ///< None when the run has no check of this category.
-  long failed = 0;  ///< Of these.
+  CheckRecord nearest;   ///< The check.
+  long checks = 0;       ///< None when the run has reached no check of this category.
+  long failed = 0;       ///< Of these.
+  long same_source = 0;  ///< Of these, those that hold and are no evidence.
+  long not_reached = 0;  ///< Besides these.
 
-  void Add(const std::string& name, double value, double its_bound, bool fails);
+  void Add(const CheckRecord& check);
   [[nodiscard]] bool is_asked() const { return checks > 0; }
-  [[nodiscard]] double fraction() const { return CalcFraction(worst, bound); }
+  /// "holds", "2 of 5 fail", "same source", "not reached" or "not checked".
+  [[nodiscard]] std::string Describe() const;
 };
 
 }  // namespace dexcheck

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "controller/common/text.h"
+#include "harness/base/worst.h"
 #include "harness/checks/check_table.h"
 
 namespace dexcheck {
@@ -64,7 +65,7 @@ double CalcBound(const CheckInfo& info, const Scenario& scenario) {
   const double bound = info.bound.shipped * CalcScale(info.bound.scaling, scenario);
   // What is formed of several terms, parts of which cancel, has a digit less than they.
   constexpr double kLost = 10.0;
-  return info.bound.is_relative ? std::max(bound, kLost * scenario.tolerance) : bound;
+  return info.bound.is_relative ? Worst(bound, kLost * scenario.tolerance) : bound;
 }
 
 double CalcStatedBound(const CheckInfo& info, const BoundOverride& stated, const Scenario& scenario) {

@@ -1,6 +1,9 @@
 #include "harness/checks/check_table.h"
 
 #include <algorithm>
+#include <map>
+
+#include "harness/base/worst.h"
 
 namespace dexcheck {
 namespace {
@@ -67,6 +70,15 @@ Evaluation OfLaw(const Analysis& a) {
   return a.law == nullptr ? std::nullopt : When(true, a.law->*error);
 }
 
+Evaluation EvaluateDemand(const Analysis& a) {
+  return a.law == nullptr ? std::nullopt : When(true, a.law->demand, a.law->demand_by_slip);
+}
+
+/// Where f_c is inside its cones and bounds.
+Evaluation EvaluateOptimality(const Analysis& a) {
+  return a.law == nullptr ? std::nullopt : When(!(a.law->grasp_cone > 0.0), a.law->grasp_optimality);
+}
+
 bool IsHolding(const Analysis& a) { return a.step->command.handling.holding; }
 bool IsPredicted(const Analysis& a) { return a.mass_factor != nullptr && !a.is_transient; }
 /// Whether the scenario's expectations begin.
@@ -79,8 +91,9 @@ Evaluation Tracked(const Analysis& a, double error, double by_hold) {
 /// What the solver leaves over of the object while contacts come and go is taken off the inverse dynamics,
 /// and is gone some steps later.
 Evaluation EvaluateSolver(const Analysis& a) {
+  if (a.mass_factor == nullptr) return std::nullopt;
   if (!a.setup->has_object()) return When(true, a.robot_solver);
-  return When(!a.is_transient, std::max(a.object_solver, a.robot_solver));
+  return When(!a.is_transient, Worst(a.object_solver, a.robot_solver));
 }
 
 // name, category, unit;
@@ -118,7 +131,7 @@ const CheckInfo kChecks[] = {
      "accelerations and contact forces of the rigid system (46), (48) under tau' against those that (47), "
      "(49), (55) demand, likewise",
      {Cause::kControlLaw, 17, Rank::kLaw, kOwn},
-     {OfLaw<&LawErrors::demand>, kRunning}},
+     {EvaluateDemand, kRunning}},
     {{"grasp_null_space", kLaw, "1"},
      {kGraspNullBound,
       "F_N = f_c - G^+ F_o has the solver's residual of f_c, 1e-10, and the rounding of G^+"},
@@ -138,7 +151,7 @@ const CheckInfo kChecks[] = {
      "slope of the grasp force's objective that is left within null(G), over the whole slope and 1; where "
      "f_c is inside",
      {Cause::kControlLaw, 33, Rank::kLaw, kOwn},
-     {OfLaw<&LawErrors::grasp_optimality>, kRunning}},
+     {EvaluateOptimality, kRunning}},
     {{"torque_applied", kLaw, "1"},
      {1e-14, "a gear's ratio, once and back: two roundings"},
      "torques that the joints received against those that were sent, relative to the largest",
@@ -363,7 +376,7 @@ const CheckInfo kChecks[] = {
      "how deep two bodies overlap that are not meant to touch",
      {Cause::kCollision, 12, Rank::kAssumption, kOwn},
      {[](const Analysis& a) { return At(a.deepest_overlap); }, kAlways | kUnsent,
-      [](const Analysis& a, int part) { return a.clearance->Describe(part); }}},
+      [](const Analysis& a, int part) { return part < 0 ? "" : a.clearance->Describe(part); }}},
     {{"collision", kAssumption, "N"},
      {0.0, "the model has no such contact"},
      "largest force between two bodies that are not meant to touch",
@@ -387,6 +400,40 @@ const CheckInfo kChecks[] = {
 }  // namespace
 
 std::span<const CheckInfo> ListChecks() { return kChecks; }
+
+std::string DescribeWhatHolds(std::span<const CheckRecord> checks) {
+  std::map<CheckCategory, bool> judged, same;
+  bool judges_law = false;
+  for (const CheckRecord& check : checks) {
+    if (!check.applies || !IsReached(check)) continue;
+    (check.same_source ? same : judged)[check.kind] = true;
+    judges_law = judges_law || check.name == "law_torque";
+  }
+  std::string holds, missing;
+  const auto add = [](const std::string& name, std::string* list) {
+    *list += (list->empty() ? "" : ", ") + name;
+  };
+  const auto judge = [&](CheckCategory kind, const std::string& name) {
+    if (judged[kind]) return add(name, &holds);
+    add(name + (same[kind] ? " (model and plant are one file)" : ""), &missing);
+  };
+  judge(kModel, "model");
+  if (judges_law || !judged[kLaw]) {
+    judge(kLaw, "law");
+  } else {
+    add("motors and sensors", &holds);
+    add("law", &missing);
+  }
+  if (judged[kInverseDynamics] == judged[kForwardDynamics]) {
+    same[kInverseDynamics] = same[kInverseDynamics] || same[kForwardDynamics];
+    judge(kInverseDynamics, "inverse and forward dynamics");
+  } else {
+    judge(kInverseDynamics, "inverse dynamics");
+    judge(kForwardDynamics, "forward dynamics");
+  }
+  judge(kAssumption, "assumptions");
+  return holds + " hold at every step" + (missing.empty() ? "" : "; not judged: " + missing);
+}
 
 const CheckInfo* FindCheck(std::string_view name) {
   const auto* const found = std::ranges::find(kChecks, name, &CheckInfo::name);

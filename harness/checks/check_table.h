@@ -130,6 +130,10 @@ std::span<const CheckInfo> ListChecks();
 /// The entry of that name; null for checks of the model.
 const CheckInfo* FindCheck(std::string_view name);
 
+/// What holds of a run whose checks passed, by those that were evaluated and are evidence: "model, law,
+/// inverse and forward dynamics, assumptions hold at every step"; and then what was not judged.
+[[nodiscard]] std::string DescribeWhatHolds(std::span<const CheckRecord> checks);
+
 /// tc of the scenario's contacts, s: twice the time step unless it says otherwise.
 [[nodiscard]] double FindContactTimeConstant(const PlantOptions& plant);
 /// The bound of a check in that scenario, but for what the scenario itself says under [bounds] and [expect].

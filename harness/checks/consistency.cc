@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "controller/common/errors.h"
+#include "harness/base/worst.h"
 #include "harness/descriptions/engine_provider.h"
 
 namespace dexcheck {
@@ -71,7 +72,7 @@ bool AgreeAtFirst(const RobotModel& model, DynamicsProvider* a, DynamicsProvider
   const ConsistencyResult result =
       CompareProviders(model, a, b, feed, [](long samples) { return samples < kStates; });
   return !result.terms.empty() && std::ranges::all_of(result.terms, [&](const CheckRecord& record) {
-    return record.worst <= std::max(record.bound, tolerance);
+    return record.worst <= Worst(record.bound, tolerance);
   });
 }
 

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "controller/common/errors.h"
+#include "harness/base/worst.h"
 
 namespace dexcheck {
 
@@ -24,7 +25,7 @@ void CalcPlaceScales(const RoundingScales& robot, const ContactGeometry& contact
   const double length = robot.world_length();
   // On a flat object hardly anything turns the normal but what the search for the contact leaves.
   const double left = kContactConvergence / CalcRoundingBound(robot.depth(), 1.0);
-  scales->normal = std::max(1.0 + contact.object.K.norm() * moved * length, left);
+  scales->normal = Worst(1.0 + contact.object.K.norm() * moved * length, left);
   scales->position = (1.0 + moved) * length;
   scales->moment = scales->position + contact.g_o_cf.translation().norm() * scales->normal;
   scales->J_B = scales->normal + scales->position / robot.length();

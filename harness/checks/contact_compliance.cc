@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "controller/common/linear_algebra.h"
+#include "harness/base/worst.h"
 #include "harness/checks/check_table.h"
 #include "harness/engine/engine.h"
 #include "harness/engine/map_vector.h"
@@ -58,7 +59,7 @@ double FindFraction(const MatrixXd& A, const VectorXd& R) {
   const MatrixXd S = scale.asDiagonal() * A * scale.asDiagonal();
   const VectorXd values = CalcSymmetricEigenvalues(S);
   for (const double value : values) {
-    if (value > kNothing * values.maxCoeff()) return 1.0 / (1.0 + value);
+    if (value > kNothing * Largest(values)) return 1.0 / (1.0 + value);
   }
   return 0.0;
 }
@@ -186,7 +187,7 @@ void ContactCompliance::Add(const Eigen::Ref<const VectorXd>& force) {
 
 ModesCompliance::ModesCompliance(const PlantOptions& plant, double normal_fraction,
                                  double tangential_fraction)
-    : fraction_(std::max(normal_fraction, tangential_fraction)),
+    : fraction_(Worst(normal_fraction, tangential_fraction)),
       softest_(plant, ContactCompliance::Fraction::Of(normal_fraction),
                ContactCompliance::Fraction::Of(tangential_fraction)),
       stiffest_(plant, {normal_fraction, 1.0}, {tangential_fraction, 1.0}),
@@ -282,9 +283,9 @@ void PredictionCompliance::Follow(const StepRecord& step, const DeclaredStep& de
     grasp_.Add(grasp_force_);
     held += grasp_.CalcSize(norm) + push_.CalcSize(length) / root;
   }
-  held_ = std::max(held, force_.softest().memory() * held_);
-  held_of_f_c_ = std::max(f_c_.CalcSize(length), f_c_.softest().memory() * held_of_f_c_);
-  const double tips = std::max(tips_.size(), CalcLeadingBack(setup_->scenario().plant, step, grasp));
+  held_ = Worst(held, force_.softest().memory() * held_);
+  held_of_f_c_ = Worst(f_c_.CalcSize(length), f_c_.softest().memory() * held_of_f_c_);
+  const double tips = Worst(tips_.size(), CalcLeadingBack(setup_->scenario().plant, step, grasp));
   motion_ = held_ + root * (tips + tyres_.size()) + uneven;
   contact_force_ = held_of_f_c_ + setup_->object().body.mass * (tips + motion_ / root);
   sinking_ = norm(force_.softest().rate()) / root;

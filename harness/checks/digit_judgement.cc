@@ -9,6 +9,7 @@
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
+#include "harness/base/worst.h"
 #include "harness/checks/file_comparison.h"
 #include "harness/descriptions/body_comparison.h"
 #include "harness/descriptions/description_match.h"
@@ -72,7 +73,7 @@ class MovedFile {
       spread_.draws.push_back(*copy);
       for (const ConstantFinding& finding : ListDifferentNumbers(nominal.sides[side_], moved.sides[side_])) {
         double& open = constants_[KeyOf(finding, nominal.sides[side_].spec)];
-        open = std::max(open, std::abs(finding.model - finding.engine));
+        open = Worst(open, std::abs(finding.model - finding.engine));
       }
     }
     if (own.undiagonalized) TakeDiagonalisation(*own.undiagonalized);
@@ -139,7 +140,7 @@ class MovedFile {
   std::map<ConstantKey, double> constants_;
 };
 
-void RaiseTo(double value, double* largest) { *largest = std::max(*largest, value); }
+void RaiseTo(double value, double* largest) { *largest = Worst(*largest, value); }
 
 /// Judges numbers of two files by the precision to which both print them.
 class DigitJudge {
@@ -156,7 +157,7 @@ class DigitJudge {
   /// Keeps the findings that exceed the precision of both files.
   void JudgeConstants(ConstantChecks* constants) {
     std::erase_if(constants->findings, [&](const ConstantFinding& finding) {
-      const double size = std::max(std::abs(finding.model), std::abs(finding.engine));
+      const double size = Worst(std::abs(finding.model), std::abs(finding.engine));
       return IsWithin(finding, size);
     });
     for (CheckRecord& record : constants->records) {

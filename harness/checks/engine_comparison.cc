@@ -12,6 +12,7 @@
 #include "controller/model/rigid_body.h"
 #include "harness/base/console.h"
 #include "harness/base/files.h"
+#include "harness/base/worst.h"
 #include "harness/descriptions/constant_checks.h"
 #include "harness/descriptions/description_match.h"
 #include "harness/descriptions/description_writer.h"
@@ -194,7 +195,7 @@ class EngineComparisonRun {
       const MassProperties body =
           ExpressIn(other->body, completed.joints[i].X_iL * compiled.joints[j].X_iL.inverse());
       const double size = joint.body.inertia.norm();
-      if (size > 0.0) largest = std::max(largest, (body.inertia - joint.body.inertia).norm() / size);
+      if (size > 0.0) largest = Worst(largest, (body.inertia - joint.body.inertia).norm() / size);
       joint.body = body;
     }
     others_.push_back(
@@ -226,7 +227,7 @@ class EngineComparisonRun {
     result_.pairs = comparison.TakePairs();
     for (ComparedPair& pair : result_.pairs) {
       for (CheckRecord& record : pair.terms) {
-        record.bound = std::max(record.bound, options_.tolerance);
+        record.bound = Worst(record.bound, options_.tolerance);
         record.failed = !(record.worst <= record.bound);
       }
     }
@@ -236,7 +237,7 @@ class EngineComparisonRun {
   void FormGroups() {
     const auto agree = [&](size_t a, size_t b) {
       const auto pair = std::ranges::find_if(result_.pairs, [&](const ComparedPair& candidate) {
-        return candidate.first == std::min(a, b) && candidate.second == std::max(a, b);
+        return std::pair(candidate.first, candidate.second) == std::minmax({a, b});
       });
       return std::ranges::none_of(pair->terms, &CheckRecord::failed);
     };

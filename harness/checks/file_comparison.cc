@@ -9,6 +9,7 @@
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
+#include "harness/base/worst.h"
 #include "harness/descriptions/body_comparison.h"
 #include "harness/descriptions/compiled_inertias.h"
 #include "harness/descriptions/description_match.h"
@@ -272,7 +273,7 @@ std::optional<double> FindTolerance(const std::filesystem::path& table, const st
   double worst = 0.0;
   for (const auto* records : {&result.constants.records, &result.terms}) {
     for (const CheckRecord& record : *records) {
-      if (record.worst > record.bound) worst = std::max(worst, record.worst);
+      if (record.worst > record.bound) worst = Worst(worst, record.worst);
     }
   }
   if (worst == 0.0) return 0.0;
@@ -330,9 +331,9 @@ Comparison CompareFunctions(const std::filesystem::path& file, const TermFunctio
 
 void ExplainComparison(Comparison* comparison, double tolerance) {
   if (comparison->result.Agrees() || !comparison->read_first || !comparison->read_second) return;
-  if (comparison->digits) tolerance = std::max(tolerance, comparison->digits->largest_within);
+  if (comparison->digits) tolerance = Worst(tolerance, comparison->digits->largest_within);
   comparison->hypotheses = ExplainDifference(*comparison->read_first, *comparison->read_second,
-                                             std::max(tolerance, kHypothesisTolerance));
+                                             Worst(tolerance, kHypothesisTolerance));
   if (comparison->digits) {
     std::erase_if(comparison->hypotheses, [&](const Hypothesis& hypothesis) {
       return !comparison->digits->Concerns(hypothesis.ids, hypothesis.parts);
@@ -406,7 +407,7 @@ Differences SortDifferences(const Comparison& comparison) {
   };
   for (const ConstantFinding& finding : comparison.result.constants.findings) {
     // Where zero is a proper value, the check has another scale than the larger of the two.
-    const double size = std::max(std::abs(finding.model), std::abs(finding.engine));
+    const double size = Worst(std::abs(finding.model), std::abs(finding.engine));
     const auto check = std::ranges::find(checks, finding.check, &CheckRecord::name);
     const double worst = check == checks.end() ? 1.0 : check->worst;
     add_number(std::min(std::abs(finding.model - finding.engine) / size, worst), finding);

@@ -5,6 +5,7 @@
 #include <complex>
 
 #include "controller/control/joint_controller.h"
+#include "harness/base/worst.h"
 #include "harness/checks/check_table.h"
 #include "harness/checks/rounding_scales.h"
 
@@ -21,8 +22,8 @@ double CalcSampledRadius(const ObjectGains& gains, double time_step, long hold, 
     A << 1.0 - b_v * gains.K_v[i], -b_v * gains.K_p[i], b_v - b_e * gains.K_v[i], 1.0 - b_e * gains.K_p[i];
     const double half = 0.5 * A.trace();
     const std::complex<double> root = std::sqrt(std::complex<double>(half * half - A.determinant()));
-    const double largest = std::max(std::abs(half + root), std::abs(half - root));
-    radius = std::max(radius, std::isnan(largest) ? std::numeric_limits<double>::infinity() : largest);
+    const double largest = Worst(std::abs(half + root), std::abs(half - root));
+    radius = Worst(radius, largest);
   }
   return std::pow(radius, 1.0 / h);
 }
@@ -30,7 +31,7 @@ double CalcSampledRadius(const ObjectGains& gains, double time_step, long hold, 
 JudgedLaw::JudgedLaw(const Setup& setup)
     : time_step_(setup.scenario().plant.time_step),
       velocity_age_(setup.scenario().plant.velocity_age()),
-      hold_(std::max(1L, std::lround(setup.scenario().plant.control_step / time_step_))),
+      hold_(Worst(1L, std::lround(setup.scenario().plant.control_step / time_step_))),
       stands_(!setup.feet().empty()),
       actuation_(setup.model()),
       commanded_(setup.model(), static_cast<int>(setup.fingertips().size())),
@@ -42,7 +43,7 @@ JudgedLaw::JudgedLaw(const Setup& setup)
 double JudgedLaw::CalcTorqueError(const StepRecord& step, const LawTerms& terms, const TreeFactor& factor) {
   factor_ = &factor;
   balanced_ = terms.C_xi + terms.gravity + terms.friction;
-  scale_ = std::max({CalcScale(Norm(balanced_)), Norm(least_), std::numeric_limits<double>::min()});
+  scale_ = Worst(CalcScale(Norm(balanced_)), Norm(least_), std::numeric_limits<double>::min());
   actuation_.CalcForce(step.command.tau, difference_);
   difference_ -= force();
   const double error = Norm(difference_) / scale_ / condition_number();
@@ -89,7 +90,7 @@ class JudgedJointLaw final : public JudgedLaw {
       ObjectGains one;
       one.K_p.setConstant(gains_.K_p[i]);
       one.K_v.setConstant(gains_.K_v[i]);
-      radius = std::max(radius, CalcSampledRadius(one, time_step_, hold_, velocity_age_));
+      radius = Worst(radius, CalcSampledRadius(one, time_step_, hold_, velocity_age_));
     }
     return radius;
   }
@@ -149,7 +150,7 @@ class JudgedJointLaw final : public JudgedLaw {
   }
   [[nodiscard]] const VectorXd& force() const override { return force_; }
   /// What the law sends may be much more than what it balances, and is rounded as that.
-  [[nodiscard]] double CalcScale(double balanced) override { return std::max(balanced, Norm(force_)); }
+  [[nodiscard]] double CalcScale(double balanced) override { return Worst(balanced, Norm(force_)); }
   void CalcParts(const StepRecord& /*step*/, const LawTerms& terms) override {
     const bool computed = law_ == ControlLaw::kComputedTorque;
     const bool moves = law_ != ControlLaw::kPdGravity;
@@ -211,7 +212,7 @@ class JudgedJointLaw final : public JudgedLaw {
       q_ = truth.q;
       xi_ = truth.xi;
     }
-    errors_.error_dynamics = (q_ - truth.q).cwiseAbs().maxCoeff();
+    errors_.error_dynamics = MaxAbs(q_ - truth.q);
     CalcDemand(q_, xi_, &demand_);
     // What the plant's robot did beyond the rigid prediction. Where the controller measures otherwise, its
     // torques arrive otherwise and the robot is pushed, all of that drives the error as well.

@@ -4,6 +4,7 @@
 
 #include "controller/common/text.h"
 #include "controller/contact/contact_geometry.h"
+#include "harness/base/worst.h"
 #include "harness/checks/check_table.h"
 #include "harness/checks/step_record.h"
 
@@ -19,7 +20,7 @@ class IdleJointsJudge final : public StatefulJudge {
     for (size_t i = 0; i < joints_.size(); ++i) {
       const double q = step.step->reading.state.q[step.setup->model().position_index(joints_[i])];
       if (!has_start_) start_[i] = q;
-      moved = std::max(moved, std::abs(q - start_[i]));
+      moved = Worst(moved, std::abs(q - start_[i]));
     }
     has_start_ = true;
     return CheckValue{moved};
@@ -36,22 +37,25 @@ class IdleJointsJudge final : public StatefulJudge {
 
 Evaluation EvaluateRobotDynamics(const StepAnalysis& step) {
   if (step.mass_factor == nullptr) return std::nullopt;
-  const double left = step.robot_residual_norm;
-  return CheckValue{std::isnan(left) ? left : std::max(0.0, left - step.uneven_force) / step.balanced};
+  return CheckValue{step.robot_residual_norm / step.balanced, -1, step.uneven_force / step.balanced};
 }
 
 Evaluation EvaluateRolling(const StepAnalysis& step) {
   if (step.step->response.wheels.size() != 2) return std::nullopt;
-  const double beyond = (step.wheel_mismatch.cwiseAbs() - step.wheel_slip).maxCoeff();
+  const Vector2d beyond = step.wheel_mismatch.cwiseAbs() - step.wheel_slip;
+  const int wheel = IsWorse(beyond[1], beyond[0]) ? 1 : 0;
   // A wheel rolls on another radius also while its platform sinks or tilts under a force that changes.
-  return CheckValue{std::max(0.0, beyond - step.sinking)};
+  return CheckValue{std::abs(step.wheel_mismatch[wheel]), -1, step.wheel_slip[wheel] + step.sinking};
 }
 
 Evaluation EvaluateContactDistance(const StepAnalysis& step) {
   if (step.touching == 0 || !step.setup->start().bonds.empty()) return std::nullopt;
-  Eigen::Index part = 0;
-  const double worst = step.contact_mismatch.cwiseAbs().maxCoeff(&part);
-  return CheckValue{worst, static_cast<int>(part)};
+  CheckValue worst{0.0, 0};
+  for (int i = 0; i < step.grasp->num_contacts(); ++i) {
+    const double apart = std::abs(step.contact_mismatch[i]);
+    if (IsWorse(apart, worst.value)) worst = {apart, i};
+  }
+  return worst;
 }
 
 std::string DescribeFoot(const StepAnalysis& step, int part) {
@@ -68,7 +72,7 @@ Evaluation EvaluateRim(const StepAnalysis& step) {
     const SurfacePoint& alpha_f = step.step->reading.state.kappa[static_cast<size_t>(i)].alpha_f;
     const Vector3d p = step.grasp->tip(i).Evaluate(alpha_f).p;
     const double past = -CalcRimDistance(p.norm(), pole, p);
-    if (past > farthest.value) farthest = {past, i};
+    if (IsWorse(past, farthest.value)) farthest = {past, i};
   }
   return farthest;
 }
@@ -85,8 +89,8 @@ Evaluation EvaluateJointLimit(const StepAnalysis& step) {
     const Joint& joint = model.joint(i);
     if (joint.type == JointType::kBall) continue;  // its position is a quaternion
     const double q = step.step->reading.state.q[model.position_index(i)];
-    const double over = std::max(q - joint.upper, joint.lower - q);
-    if (!(over <= farthest.value)) farthest = {over, i};
+    const double over = Worst(q - joint.upper, joint.lower - q);
+    if (IsWorse(over, farthest.value)) farthest = {over, i};
   }
   return farthest;
 }
@@ -168,7 +172,7 @@ class KappaJudge final : public StatefulJudge {
       const ContactDrift drift = CalcContactDrift(tip, object, kappa_[i], state.kappa[i]);
       // psi at the fingertip's radius
       const double radius = tip.Evaluate(state.kappa[i].alpha_f).p.norm();
-      apart = std::max(apart, std::max({drift.object, drift.fingertip, drift.psi * radius}));
+      apart = Worst(apart, Worst(drift.object, drift.fingertip, drift.psi * radius));
     }
     has_kappa_ = true;
     return apart;

@@ -140,6 +140,10 @@ std::vector<Judge> MakeChecks(const Setup& setup, const JudgedLaw* law) {
     judge.record.kind = info.category;
     judge.record.unit = info.unit;
     judge.record.bound = FindBound(info, setup.scenario());
+    // A rigid plant integrates the equations that its forces are put into.
+    judge.record.same_source = setup.scenario().plant.type == PlantType::kRigid &&
+                               (info.category == CheckCategory::kInverseDynamics ||
+                                info.category == CheckCategory::kForwardDynamics);
     const auto own = descriptions.find(info.name);
     judge.record.description = own == descriptions.end() ? info.description : own->second;
   }

@@ -6,6 +6,7 @@
 #include "controller/control/trajectory.h"
 #include "controller/object/euler_zyz.h"
 #include "controller/object/so3.h"
+#include "harness/base/worst.h"
 #include "harness/checks/baseline_reference.h"
 #include "harness/checks/check_table.h"
 #include "harness/checks/judged_law.h"
@@ -192,16 +193,12 @@ class JudgedObjectLaw final : public JudgedLaw {
   const LawErrors& Compare(const StepRecord& step, const LawTerms& terms, const StepAnalysis& plant,
                            bool as_commanded) override {
     errors_ = LawErrors{};
-    if (!Evaluate(step, terms)) {
-      constexpr double kInfinity = std::numeric_limits<double>::infinity();
-      errors_ = {kInfinity, kInfinity, kInfinity, kInfinity, kInfinity, kInfinity};
-      return errors_;
-    }
+    if (!Evaluate(step, terms)) return errors_;
     const Motion moved = as_commanded ? Motion{&plant.findings.xi_dot_model, &plant.findings.V_Bo_dot_model,
                                                &plant.findings.f_c_model, plant.mass_factor}
                                       : Predict(step);
     errors_.torque = CalcTorqueError(step, terms, *moved.mass_factor);
-    if (!baseline_) errors_.demand = CompareDemand(moved, /*has_slip=*/as_commanded);
+    if (!baseline_) CompareDemand(moved, /*has_slip=*/as_commanded);
     CompareGraspForce(terms, step.command.demand.F_N, baseline_ ? baseline_->f_c() : reference_.f_c());
     if (CalcSpectralRadius() && hold_ == 1) {
       error_.Follow(step, terms, desired_, plant.declared->is_ideal ? moved.V_Bo_dot : nullptr, &reference_,
@@ -258,26 +255,26 @@ class JudgedObjectLaw final : public JudgedLaw {
 
   /// @param has_slip whether the rigid system starts from xi, and not from xi_c, as (47) plans: where
   /// contacts slip the two differ, which is taken off.
-  double CompareDemand(const Motion& moved, bool has_slip) {
+  void CompareDemand(const Motion& moved, bool has_slip) {
     // |a|_M = |L a|
     work_n_ = *moved.xi_dot - reference_.xi_dot_d();
     factor_->Multiply(work_n_);
     const double motion = work_n_.norm() / scale_;
     const VectorXd& f_c = reference_.f_c();
-    const double forces = (*moved.f_c - f_c).norm() / std::max(f_c.norm(), kSmallest);
-    const double error = std::max(motion, forces) / reference_.condition_number();
-    if (!has_slip) return error;
+    const double forces = (*moved.f_c - f_c).norm() / Worst(f_c.norm(), kSmallest);
+    errors_.demand = Worst(motion, forces) / reference_.condition_number();
+    if (!has_slip) return;
     work_n_ = reference_.slip_acceleration();
     factor_->Multiply(work_n_);
-    const double apart = error - kSlipFraction * work_n_.norm() / scale_;
-    const bool slip_explains = apart <= 0.0;
-    return slip_explains ? 0.0
-                         : std::max(apart - kSlipFraction * Norm(reference_.slip_coriolis()) / scale_, 0.0);
+    double& by_slip = errors_.demand_by_slip;
+    by_slip = kSlipFraction * work_n_.norm() / scale_;
+    const bool is_explained = errors_.demand <= by_slip;
+    if (!is_explained) by_slip += kSlipFraction * Norm(reference_.slip_coriolis()) / scale_;
   }
 
   void CompareGraspForce(const LawTerms& terms, const VectorXd& F_N, const VectorXd& f_c) {
-    const double size = std::max(1.0, f_c.norm());
-    errors_.grasp_null_space = (terms.G * F_N).cwiseAbs().maxCoeff() / size;
+    const double size = Worst(1.0, f_c.norm());
+    errors_.grasp_null_space = MaxAbs(terms.G * F_N) / size;
     // Slope of sum f_i3 - rho [sum log det P_i + sum log slack]: at the optimum it is in the range of G^T, so
     // that no internal force improves on F_N.
     double outside = 0.0;
@@ -286,7 +283,7 @@ class JudgedObjectLaw final : public JudgedLaw {
     for (Eigen::Index i = 0; i < f_c.size(); i += 3) {
       const double x = f_c[i], y = f_c[i + 1], z = f_c[i + 2];
       const double det = mu * mu * z * z - x * x - y * y;
-      outside = std::max({outside, std::hypot(x, y) - mu * z, f_min - z, z - f_max});
+      outside = Worst(outside, std::hypot(x, y) - mu * z, f_min - z, z - f_max);
       work_k_.segment<3>(i) << 2.0 * rho * x / det, 2.0 * rho * y / det,
           1.0 - 2.0 * rho * mu * mu * z / det - rho / (z - f_min) + rho / (f_max - z);
     }
@@ -295,7 +292,7 @@ class JudgedObjectLaw final : public JudgedLaw {
     const double whole = work_k_.norm();
     const Vector6d y = reference_.SolveGrasp(work_k_);
     work_k_.noalias() -= terms.G.transpose() * y;
-    errors_.grasp_optimality = work_k_.norm() / std::max(whole, 1.0);
+    errors_.grasp_optimality = work_k_.norm() / Worst(whole, 1.0);
   }
 
   GraspControllerOptions options_;

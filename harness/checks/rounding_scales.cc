@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "harness/base/worst.h"
 #include "harness/descriptions/random_states.h"
 
 namespace dexcheck {
@@ -14,7 +15,7 @@ constexpr double kErrorsPerJoint = 16.0;
 
 double RowReach(const Joint& joint) {
   const double slide =
-      joint.type == JointType::kPrismatic ? std::max(std::abs(joint.lower), std::abs(joint.upper)) : 0.0;
+      joint.type == JointType::kPrismatic ? Worst(std::abs(joint.lower), std::abs(joint.upper)) : 0.0;
   return joint.X_PB.translation().norm() + std::abs(joint.mdh.a) + std::abs(joint.mdh.d) + slide;
 }
 
@@ -27,11 +28,10 @@ double CalcReach(const RobotModel& model) {
     const Joint& joint = model.joint(i);
     double& mine = reach[static_cast<size_t>(i + 1)];
     mine = reach[static_cast<size_t>(joint.parent + 1)] + RowReach(joint);
-    farthest = std::max(farthest, mine + joint.body.com.norm());
+    farthest = Worst(farthest, mine + joint.body.com.norm());
   }
   for (const Frame& frame : model.frames()) {
-    farthest =
-        std::max(farthest, reach[static_cast<size_t>(frame.link + 1)] + frame.X_LF.translation().norm());
+    farthest = Worst(farthest, reach[static_cast<size_t>(frame.link + 1)] + frame.X_LF.translation().norm());
   }
   return farthest;
 }
@@ -42,7 +42,7 @@ double CalcArm(const RobotModel& model, double reach) {
   constexpr double kErrorsOfWorld = 4.0;
   double world = reach + model.base().X_B0.translation().norm();
   if (model.base().type != BaseType::kFixed) world += std::sqrt(3.0) * StateRange{}.area;
-  return std::max(reach, kErrorsOfWorld * world / (kErrorsPerJoint * (model.max_depth() + 1)));
+  return Worst(reach, kErrorsOfWorld * world / (kErrorsPerJoint * (model.max_depth() + 1)));
 }
 
 }  // namespace
@@ -53,7 +53,7 @@ double CalcRoundingBound(int depth, double factors) {
 
 double CalcInertiaScale(double mass, const Matrix3d& a, const Matrix3d& b) {
   constexpr double kPoint = 1e-9;  // m
-  return Positive(std::max({a.trace(), b.trace(), mass * kPoint * kPoint}));
+  return Positive(Worst(a.trace(), b.trace(), mass * kPoint * kPoint));
 }
 
 RoundingScales::RoundingScales(const RobotModel& model)
@@ -68,7 +68,7 @@ RoundingScales::RoundingScales(const RobotModel& model)
     const Joint& joint = model.joint(i);
     // An inertia that no mass within reach has counts as the mass that would have it there.
     const double turned = joint.body.inertia.trace() / Positive(arm_ * arm_);
-    subtree_mass_[static_cast<size_t>(i + 1)] += std::max(joint.body.mass, turned);
+    subtree_mass_[static_cast<size_t>(i + 1)] += Worst(joint.body.mass, turned);
     subtree_mass_[static_cast<size_t>(joint.parent + 1)] += subtree_mass_[static_cast<size_t>(i + 1)];
     rotors_ += CountVelocities(joint.type) * joint.armature;
   }
@@ -92,7 +92,7 @@ void RoundingScales::SetState(const ModelTerms& terms, const Eigen::Ref<const Ve
     double& rate = squared_rate_[static_cast<size_t>(i + 1)];
     rate = squared_rate_[static_cast<size_t>(joint.parent + 1)];
     (joint.type == JointType::kPrismatic ? sliding : rate) += squared;
-    fastest = std::max(fastest, rate);
+    fastest = Worst(fastest, rate);
   }
   angular_rate_ = std::sqrt(fastest);
   linear_rate_ = std::sqrt(sliding) + angular_rate_ * arm_;
@@ -135,7 +135,7 @@ double RoundingScales::CalcGravityScale(int coordinate) const {
 
 double RoundingScales::acceleration() const {
   const double straight = arm_ > 0.0 ? linear_rate_ / arm_ : 0.0;
-  return linear_rate_ * std::max(angular_rate_, straight);
+  return linear_rate_ * Worst(angular_rate_, straight);
 }
 
 double RoundingScales::CalcCoriolisScale(int coordinate) const {

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "controller/dynamics/model_terms.h"
+#include "harness/base/worst.h"
 
 namespace dexcheck {
 
@@ -19,7 +20,7 @@ double CalcRoundingBound(int depth, double factors);
 /// what a filter leaves of a rate long after it has stopped.
 inline double Positive(double scale) {
   constexpr double kLeast = std::numeric_limits<double>::min() / std::numeric_limits<double>::epsilon();
-  return scale > 0.0 ? std::max(scale, kLeast) : 1.0;
+  return scale > 0.0 ? Worst(scale, kLeast) : 1.0;
 }
 
 /// Scale of a body's inertia by two descriptions, kg m^2. A body smaller than 1 nm is a point: what inertia a

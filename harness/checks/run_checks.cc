@@ -5,6 +5,7 @@
 #include <stdexcept>
 
 #include "controller/common/text.h"
+#include "harness/base/worst.h"
 
 namespace dexcheck {
 namespace {
@@ -135,14 +136,11 @@ void RunChecks::Add(const Judge& judge, CheckRecord* record, double time) {
   if (!record->applies) return;
   const Evaluation found = judge.Evaluate(analysis());
   if (!found) return;
-  double value = found->value;
-  // As it is up to the bound, and above it less what is known to be in it.
-  if (found->explained != 0.0 && !std::isnan(value))
-    value = std::max(std::min(value, record->bound), value - found->explained);
-  if (judge.info->by.describe != nullptr && !record->failed && !(value <= record->bound))
+  const bool had_failed = record->failed;
+  record->Add(found->value, time, found->explained);
+  if (judge.info->by.describe != nullptr && record->failed && !had_failed)
     record->part = judge.info->by.describe(analysis(), found->part);
-  record->Add(value, time);
-  differs_ = differs_ || !(value <= record->bound);
+  differs_ = differs_ || !(record->last <= record->bound);
 }
 
 void RunChecks::JudgeEffort(const StepRecord& step, double time) {
@@ -208,8 +206,8 @@ void RunChecks::CompareLaw(const StepRecord& step) {
   const LawErrors& errors = law_->Compare(step, ReadLawTerms(step), analysis(), as_commanded);
   analyzer_.SetLaw(&errors);
   if (!law_->follows_error() || step.time < setup_->scenario().expect.from) return;
-  position_by_law_ = std::max(position_by_law_, errors.position_by_law);
-  orientation_by_law_ = std::max(orientation_by_law_, errors.orientation_by_law);
+  position_by_law_ = Worst(position_by_law_, errors.position_by_law);
+  orientation_by_law_ = Worst(orientation_by_law_, errors.orientation_by_law);
 }
 
 }  // namespace dexcheck

@@ -7,6 +7,7 @@
 #include <memory>
 #include <vector>
 
+#include "harness/base/worst.h"
 #include "harness/checks/rounding_scales.h"
 
 namespace dexcheck {
@@ -98,14 +99,13 @@ void StepAnalyzer::CompareMeasurement() {
   if (measured.touch.fingertips != declared.touch.fingertips) apart = std::numeric_limits<double>::infinity();
   const MeasuredState& a = measured.state;
   const MeasuredState& b = declared.state;
-  apart = std::max(apart, (a.q - b.q).lpNorm<Eigen::Infinity>());
-  apart = std::max(apart, (a.xi - b.xi).lpNorm<Eigen::Infinity>());
-  apart = std::max(apart, (a.X_Bo.matrix() - b.X_Bo.matrix()).cwiseAbs().maxCoeff());
-  apart = std::max(apart, (a.V_Bo - b.V_Bo).lpNorm<Eigen::Infinity>());
+  apart = Worst(apart, MaxAbs(a.q - b.q));
+  apart = Worst(apart, MaxAbs(a.xi - b.xi));
+  apart = Worst(apart, MaxAbs(a.X_Bo.matrix() - b.X_Bo.matrix()));
+  apart = Worst(apart, MaxAbs(a.V_Bo - b.V_Bo));
   for (size_t i = 0; i < b.kappa.size(); ++i) {
     const ContactCoordinates &x = a.kappa[i], &y = b.kappa[i];
-    apart = std::max({apart, (x.CalcVector() - y.CalcVector()).lpNorm<Eigen::Infinity>(),
-                      std::abs(a.overlap[i] - b.overlap[i])});
+    apart = Worst(apart, MaxAbs(x.CalcVector() - y.CalcVector()), std::abs(a.overlap[i] - b.overlap[i]));
     if (x.alpha_f.chart != y.alpha_f.chart || x.alpha_o.chart != y.alpha_o.chart)
       apart = std::numeric_limits<double>::infinity();
   }
@@ -115,6 +115,9 @@ void StepAnalyzer::CompareMeasurement() {
 void StepAnalyzer::MeasureClearance() {
   if (clearance_.pairs().empty()) return;
   const PlantReading& reading = now_.step->reading;
+  now_.deepest_overlap = {kNaN, -1};
+  if (!reading.body_positions.allFinite() || !reading.body_rotations.allFinite() || !reading.qpos.allFinite())
+    return;
   if (reading.body_positions.size() > 0) {
     clearance_.Update({reading.body_positions.data(), reading.body_rotations.data()}, now_.step->time);
   } else {
@@ -126,8 +129,8 @@ void StepAnalyzer::MeasureClearance() {
 }
 
 void StepAnalyzer::CompareMotors() {
-  now_.torque_error = (now_.step->response.motor_torques - now_.declared->tau).cwiseAbs().maxCoeff() /
-                      std::max(now_.step->command.tau.cwiseAbs().maxCoeff(), kTiny);
+  now_.torque_error = MaxAbs(now_.step->response.motor_torques - now_.declared->tau) /
+                      Worst(MaxAbs(now_.step->command.tau), kTiny);
 }
 
 void StepAnalyzer::Analyze() {
@@ -145,7 +148,7 @@ void StepAnalyzer::Analyze() {
     // A tyre that gives rolls on a radius that is smaller by as much.
     for (Eigen::Index k = 0; k < 2; ++k) {
       const BodyContact& wheel = step.response.wheels[static_cast<size_t>(k)];
-      now_.wheel_slip[k] = wheel.slip.norm() + std::max(0.0, -wheel.distance) * std::abs(now_.wheel_rates[k]);
+      now_.wheel_slip[k] = wheel.slip.norm() + Worst(0.0, -wheel.distance) * std::abs(now_.wheel_rates[k]);
     }
   }
   CalcContactBias(*setup_, step, *now_.declared->model, &now_.contact_bias);
@@ -280,8 +283,8 @@ void StepAnalyzer::CalcRobotResidual() {
     actuation_.CalcForce(spin_force_, spin_force_);
     residual += spin_force_;
   }
-  const double least = std::max(kLeastBias * Norm(now_.applied_force), Norm(least_));
-  now_.balanced = std::max({Norm(now_.bias), least, kTiny});
+  const double least = Worst(kLeastBias * Norm(now_.applied_force), Norm(least_));
+  now_.balanced = Worst(Norm(now_.bias), least, kTiny);
   now_.robot_residual_norm = Norm(residual);
   now_.uneven_force = CalcUnevenForce() + CalcSwingForce();
   now_.robot_solver = response.solver_force.size() > 0 ? Norm(response.solver_force) / now_.balanced : 0.0;
@@ -297,7 +300,7 @@ double StepAnalyzer::CalcUnevenForce() {
   // gives gravity g theta along the floor, and tyres that slip by v in a turn at w give 2 v w.
   const StepRecord& step = *now_.step;
   double slip = 0.0;
-  for (const BodyContact& wheel : step.response.wheels) slip = std::max(slip, wheel.slip.norm());
+  for (const BodyContact& wheel : step.response.wheels) slip = Worst(slip, wheel.slip.norm());
   const double turn = step.response.wheels.empty()
                           ? 0.0
                           : std::abs(CalcRollingTwist(setup_->model().base(), step.reading.state.xi)[1]);
@@ -306,7 +309,7 @@ double StepAnalyzer::CalcUnevenForce() {
   // of that, with the robot's weight on a floor of mu <= 1.
   double sunk = 0.0;
   for (const BodyContact& wheel : step.response.wheels)
-    sunk += std::max(0.0, -0.5 * wheel.distance) * wheel.cone_use;
+    sunk += Worst(0.0, -0.5 * wheel.distance) * wheel.cone_use;
   if (sunk > 0.0) {
     sunk *=
         mass_ * g / setup_->model().base().wheel_radius / std::sqrt(setup_->model().base_with_wheels().mass);
@@ -329,7 +332,7 @@ double StepAnalyzer::CalcSwingForce() {
   momentum_.noalias() = now_.robot->M() * moving_;
   Vector3d velocity, omega;
   setup_->adapter().GetBaseMotion(step.reading.qpos.data(), step.reading.qvel.data(), &velocity, &omega);
-  return 2.0 * omega.head<2>().norm() * std::sqrt(std::max(0.0, moving_.dot(momentum_)));
+  return 2.0 * omega.head<2>().norm() * std::sqrt(Worst(0.0, moving_.dot(momentum_)));
 }
 
 void StepAnalyzer::ComparePrediction() {
@@ -343,7 +346,7 @@ void StepAnalyzer::ComparePrediction() {
     const bool has_forces = ground_dynamics_->determines_forces();
     // Of feet that leave the ground, what they should bear.
     const double weight = mass_ * setup_->model().gravity().norm();
-    const double scale = std::max({findings.foot_force.norm(), weight, kTiny});
+    const double scale = Worst(findings.foot_force.norm(), weight, kTiny);
     now_.contact_force_error =
         has_forces ? (findings.foot_force_model - findings.foot_force).norm() / scale : 0.0;
     // J^T (f - f_model) is M_bar' times the accelerations' error.
@@ -351,9 +354,9 @@ void StepAnalyzer::ComparePrediction() {
         has_forces ? ground_dynamics_->CalcForceGain() * compliance_.motion() / scale : 0.0;
     return;
   }
-  double scale = std::max(findings.f_c.norm(), kTiny);
+  double scale = Worst(findings.f_c.norm(), kTiny);
   // Fingertips that only touch push with less than what they will bear.
-  if (handling_.partial) scale = std::max(scale, CalcWeight());
+  if (handling_.partial) scale = Worst(scale, CalcWeight());
   now_.contact_force_error = (findings.f_c_model - findings.f_c).norm() / scale;
   now_.contact_force_compliance = compliance_.force() / scale;
 }
@@ -372,8 +375,8 @@ void StepAnalyzer::CalcObjectResidual() {
                          ? grasp.contacts()[0].geometry.g_o_cf.translation().norm()
                          : std::sqrt(body.M_hat.bottomRightCorner<3, 3>().trace() / body.M_hat(0, 0));
   const auto relative = [&](const Vector6d& wrench) {
-    return std::max(wrench.head<3>().norm(), wrench.tail<3>().norm() / arm) /
-           std::max(CalcWeight(), now_.findings.f_c.norm());
+    return Worst(wrench.head<3>().norm(), wrench.tail<3>().norm() / arm) /
+           Worst(CalcWeight(), now_.findings.f_c.norm());
   };
   now_.object_residual = body.M_hat * response.V_Bo_dot + body.C_hat * grasp.V_Bo() + body.N_o -
                          grasp.G() * now_.findings.f_c - response.support_wrench - response.solver_residual -

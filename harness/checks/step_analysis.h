@@ -34,25 +34,28 @@ struct SlipSummary {
   double cone_use = 0.0;
 };
 
-/// What one step says of the law. Each is relative to what rounding, or the named tolerance, can explain;
-/// what a law does not have is zero.
+inline constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+
+/// What one step says of the law. Each is relative to what rounding, or the named tolerance, can explain.
+/// Errors begin as NaN, so that a check of one that nobody set fails; allowances begin as 0.
 struct LawErrors {
   /// |E_bar' (tau' - tau'_printed)| against the forces that the motors balance, both in the metric of the
   /// robot's inertia, over the condition number of J_B'.
-  double torque = 0.0;
+  double torque = kNaN;
   /// xi_dot, V_o_dot and f_c of the rigid system (46), (48) under tau' against what (47), (49), (55) demand,
   /// likewise; forces relative to |f_c|. The largest of them.
-  double demand = 0.0;
+  double demand = kNaN;
+  double demand_by_slip = 0.0;  ///< How much of it contacts that slip make.
   /// F_N by its certificate: the largest entry of G F_N, and how far f_c is outside its cones and bounds,
   /// both over max(1 N, |f_c|); the slope that the objective has left within null(G), over max(1, all of it).
-  double grasp_null_space = 0.0, grasp_cone = 0.0, grasp_optimality = 0.0;
+  double grasp_null_space = kNaN, grasp_cone = kNaN, grasp_optimality = kNaN;
   /// Object's position, m, or largest distance of a joint, rad or m, against the error dynamics integrated
   /// from t = 0 and driven by the accelerations that the prediction missed.
-  double error_dynamics = 0.0;
-  double orientation_dynamics = 0.0;  ///< The object's orientation likewise, rad.
+  double error_dynamics = kNaN;
+  double orientation_dynamics = kNaN;  ///< The object's orientation likewise, rad.
   /// How far from its desired pose the object would be if (57) alone drove it, m and rad: what the gains
   /// leave.
-  double position_by_law = 0.0, orientation_by_law = 0.0;
+  double position_by_law = kNaN, orientation_by_law = kNaN;
   /// How far what the plant accelerates within a step, while torques and demand are held, leads away from
   /// (57), m and rad.
   double position_by_hold = 0.0, orientation_by_hold = 0.0;
@@ -94,28 +97,28 @@ struct StepAnalysis {
   VectorXd bias;           ///< C_bar' xi + F_bar' (n).
   /// M_bar' = L^T L, of the last prediction; null before the first, and then nothing of the following is set.
   const TreeFactor* mass_factor = nullptr;
-  double balanced = 1.0;           ///< |bias|_M^-1, at least that of RoundingScales::CalcLeastForces.
-  VectorXd robot_residual;         ///< M_bar' xi_dot + bias + J_B'^T f_c - applied_force (n) of (48).
-  double robot_residual_norm = 0;  ///< Of that, |.|_M^-1.
-  double uneven_force = 0.0;       ///< Largest that tilt, slip and sinking of the platform can make of it.
-  double robot_solver = 0.0;  ///< What the plant's solver left over for the robot, relative to `balanced`.
+  double balanced = 1.0;              ///< |bias|_M^-1, at least that of RoundingScales::CalcLeastForces.
+  VectorXd robot_residual;            ///< M_bar' xi_dot + bias + J_B'^T f_c - applied_force (n) of (48).
+  double robot_residual_norm = kNaN;  ///< Of that, |.|_M^-1.
+  double uneven_force = 0.0;          ///< Largest that tilt, slip and sinking of the platform can make of it.
+  double robot_solver = kNaN;  ///< What the plant's solver left over for the robot, relative to `balanced`.
   Vector6d object_residual = Vector6d::Zero();  ///< M_hat V_o_dot + C_hat V_o + N_o - G f_c - ... of (19).
-  double object_residual_size = 0.0;            ///< Relative, as forces at the contacts' arm.
-  double object_solver = 0.0;                   ///< What the plant's solver left over, likewise.
+  double object_residual_size = kNaN;           ///< Relative, as forces at the contacts' arm.
+  double object_solver = kNaN;                  ///< What the plant's solver left over, likewise.
 
   // Prediction: what the rigid constrained system does under the same torques. Not in a transient.
-  double acceleration_error = 0.0;       ///< |xi_dot_model - xi_dot|_M relative to `balanced`.
-  double contact_force_error = 0.0;      ///< |f_c_model - f_c|, relative.
+  double acceleration_error = kNaN;      ///< |xi_dot_model - xi_dot|_M relative to `balanced`.
+  double contact_force_error = kNaN;     ///< |f_c_model - f_c|, relative.
   double acceleration_compliance = 0.0;  ///< What contacts that give can make of each.
   double contact_force_compliance = 0.0;
   double sinking = 0.0;  ///< How fast the platform sinks and tilts, m/s.
 
   // Law, motors and sensors.
   double measurement_error =
-      0.0;                    ///< What was measured against what the declared sensing makes of the truth.
-  double torque_error = 0.0;  ///< Largest torque received against the declared one, over the largest.
+      kNaN;                    ///< What was measured against what the declared sensing makes of the truth.
+  double torque_error = kNaN;  ///< Largest torque received against the declared one, over the largest.
   const LawErrors* law = nullptr;  ///< Of torques that a known law computed at this step; null otherwise.
-  double spectral_radius = 0.0;    ///< Of the law's sampled closed loop, where it has error dynamics.
+  double spectral_radius = kNaN;   ///< Of the law's sampled closed loop, where it has error dynamics.
   /// LawErrors, of the last step whose law was judged.
   double position_by_hold = 0.0, orientation_by_hold = 0.0;
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "harness/base/worst.h"
 #include "harness/checks/step_analysis.h"
 
 namespace dexcheck {
@@ -18,9 +19,9 @@ void Follow(const BodyContact& contact, const Matrix3d& R, const Vector3d& creep
   slip->velocity = R.transpose() * contact.slip;
   slip->distance += time_step * slip->velocity;
   slip->creep += time_step * creep_rate;
-  largest->distance = std::max(largest->distance, (slip->distance - slip->creep - slip->window).norm());
-  largest->rate = std::max(largest->rate, (slip->velocity - creep_rate).norm());
-  largest->cone_use = std::max(largest->cone_use, contact.cone_use);
+  largest->distance = Worst(largest->distance, (slip->distance - slip->creep - slip->window).norm());
+  largest->rate = Worst(largest->rate, (slip->velocity - creep_rate).norm());
+  largest->cone_use = Worst(largest->cone_use, contact.cone_use);
 }
 
 }  // namespace
@@ -43,7 +44,7 @@ void StepAnalyzer::FindContacts() {
           contacts[i].distance + step.reading.state.overlap[i];
     if (step.command.handling.holding && !contacts[i].touching && findings.fingertip_slip[i].touching)
       ++findings.contacts_lost;
-    now_.penetration = std::max(now_.penetration, -contacts[i].distance);
+    now_.penetration = Worst(now_.penetration, -contacts[i].distance);
   }
 }
 
@@ -57,12 +58,12 @@ void StepAnalyzer::FindFeet() {
     const auto k = static_cast<Eigen::Index>(i);
     now_.findings.foot_force.segment<3>(3 * k) = feet[i].force;
     if (!feet[i].touching) {
-      now_.foot_gap = std::max(now_.foot_gap, ground_->gap()[k]);
+      now_.foot_gap = Worst(now_.foot_gap, ground_->gap()[k]);
       continue;
     }
-    now_.foot_penetration = std::max(now_.foot_penetration, -feet[i].distance);
+    now_.foot_penetration = Worst(now_.foot_penetration, -feet[i].distance);
     const double mismatch = std::abs(feet[i].distance - ground_->gap()[k]);
-    if (!(mismatch <= now_.foot_mismatch.first)) now_.foot_mismatch = {mismatch, static_cast<int>(i)};
+    if (IsWorse(mismatch, now_.foot_mismatch.first)) now_.foot_mismatch = {mismatch, static_cast<int>(i)};
   }
 }
 
@@ -78,7 +79,7 @@ double StepAnalyzer::CalcFootUse() const {
       friction += speed * tangential;
       most += speed * (contacts[k].cone_margin + tangential);
     }
-    if (most > 0.0) largest = std::max(largest, friction / most);
+    if (!(most <= 0.0)) largest = Worst(largest, friction / most);
   }
   return largest;
 }
@@ -86,7 +87,7 @@ double StepAnalyzer::CalcFootUse() const {
 void StepAnalyzer::ForgetSlip() { std::ranges::fill(now_.findings.fingertip_slip, SlipState{}); }
 
 void StepAnalyzer::MoveWindow() {
-  const long half = std::max(1L, std::lround(0.5 * kSlipWindow / time_step_));
+  const long half = Worst(1L, std::lround(0.5 * kSlipWindow / time_step_));
   now_.is_window_end = steps_ > 0 && steps_ % half == 0;
   if (!now_.is_window_end) return;
   for (std::vector<SlipState>* slips :
@@ -121,7 +122,7 @@ void StepAnalyzer::FollowSlip() {
   }
   if (!setup_->start().bonds.empty()) {
     for (const PlantContact& bond : step.response.contacts)
-      now_.fingertips.distance = std::max(now_.fingertips.distance, bond.distance);
+      now_.fingertips.distance = Worst(now_.fingertips.distance, bond.distance);
   }
   const double phi = setup_->model().num_base_positions() == 3 ? state.q[2] : 0.0;
   const Matrix3d R_B0 = Eigen::AngleAxisd(phi, Vector3d::UnitZ()).toRotationMatrix();

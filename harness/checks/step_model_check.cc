@@ -4,6 +4,7 @@
 
 #include "controller/common/linear_algebra.h"
 #include "controller/object/object_dynamics.h"
+#include "harness/base/worst.h"
 #include "harness/checks/contact_check.h"
 
 namespace dexcheck {
@@ -88,7 +89,7 @@ StepModelCheck::StepModelCheck(const Adapter& adapter, std::span<const int> fing
                   ListFrames(adapter.model(), fingertips), fingertips.size()) {}
 
 void StepModelCheck::RaiseBounds(double least) {
-  for (CheckRecord& record : comparison_.records()) record.bound = std::max(record.bound, least);
+  for (CheckRecord& record : comparison_.records()) record.bound = Worst(record.bound, least);
 }
 
 void StepModelCheck::Merge(const StepModelCheck& other) {
@@ -115,8 +116,8 @@ void StepModelCheck::Compare(const ModelTerms& robot, const GraspTerms& grasp, c
   ScaleContext& scales = comparison_.scales();
   if (has_object) {
     const Vector6d& V = controller_.object().V_Bo;
-    double rate = std::max(V.head<3>().norm(), V.tail<3>().norm());
-    if (coordinates) rate = std::max(rate, coordinates->X_o_dot.tail<3>().cwiseAbs().sum());
+    double rate = Worst(V.head<3>().norm(), V.tail<3>().norm());
+    if (coordinates) rate = Worst(rate, coordinates->X_o_dot.tail<3>().cwiseAbs().sum());
     scales.object =
         CalcObjectScales(grasp.object(), grasp.gravity(), engine_.object().pose.col(3).norm(), rate);
   }

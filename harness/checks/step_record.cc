@@ -4,6 +4,7 @@
 
 #include "controller/object/euler_zyz.h"
 #include "controller/object/so3.h"
+#include "harness/base/worst.h"
 
 namespace dexcheck {
 namespace {
@@ -65,7 +66,7 @@ TrackingError CalcTrackingError(const StepRecord& step) {
   const VectorXd& q_d = step.command.joints.q;
   return {X_d.head<3>() - X_Bo.translation(),
           LogSo3(X_Bo.linear().transpose() * CalcRotationZyz(X_d.tail<3>())).norm(),
-          q_d.size() > 0 ? (q_d - step.reading.state.q.tail(q_d.size())).cwiseAbs().maxCoeff() : 0.0};
+          MaxAbs(q_d - step.reading.state.q.tail(q_d.size()))};
 }
 
 }  // namespace dexcheck

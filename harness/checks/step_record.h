@@ -9,6 +9,7 @@
 #include "controller/contact/contact_geometry.h"
 #include "controller/control/controller.h"
 #include "controller/control/grasp_model.h"
+#include "harness/base/worst.h"
 #include "harness/plant/motor_drive.h"
 #include "harness/plant/plant.h"
 
@@ -22,9 +23,9 @@ struct ContactDrift {
 
   /// The larger of each.
   void Raise(const ContactDrift& other) {
-    object = std::max(object, other.object);
-    fingertip = std::max(fingertip, other.fingertip);
-    psi = std::max(psi, other.psi);
+    object = Worst(object, other.object);
+    fingertip = Worst(fingertip, other.fingertip);
+    psi = Worst(psi, other.psi);
   }
 };
 

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "controller/common/linear_algebra.h"
+#include "harness/base/worst.h"
 #include "harness/descriptions/robot_description.h"
 
 namespace dexcheck {
@@ -247,9 +248,7 @@ void TermComparison::ComparePair(size_t index, double when, ComparedPair* pair) 
   MatrixXd& first = term.numbers[pair->first];
   const MatrixXd& second = term.numbers[pair->second];
   if (entry.term == Term::kJointAxis) MoveAlongAxes(model(), second, &first);
-  double error = 0.0;
-  if (first.size() > 0)
-    error = ((first - second).array().abs() * term.weight.array()).maxCoeff<Eigen::PropagateNaN>();
+  double error = Largest((first - second).array().abs() * term.weight.array());
   if (!(error < std::numeric_limits<double>::infinity())) error = std::numeric_limits<double>::infinity();
   const bool failed_before = record.failed;
   const bool is_worst = error > record.worst || record.comparisons == 0 || !spreads_.empty();
@@ -332,7 +331,7 @@ long CompareAtStates(const StateFeed& feed, const std::function<bool(long)>& pro
     terms.SetState(state.q, state.xi);
     comparison->SetScales(terms, state.q, state.xi);
     if (model.object()) {
-      const double rate = std::max(state.X_o_dot.head<3>().norm(), state.X_o_dot.tail<3>().cwiseAbs().sum());
+      const double rate = Worst(state.X_o_dot.head<3>().norm(), state.X_o_dot.tail<3>().cwiseAbs().sum());
       scales.object =
           CalcObjectScales(model.object()->body, model.gravity(), state.X_o.head<3>().norm(), rate);
     }

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <limits>
 
+#include "harness/base/worst.h"
+
 namespace dexcheck {
 namespace {
 
@@ -130,8 +132,7 @@ constexpr TermEntry kTerms[] = {
     // C_ij is a force per velocity.
     {T::kCBar, "C_bar", "C_bar'", "(18), (42)", P::kVelocityPair, 0, kTwo, 4.0,
      [](const C& c, S scale) {
-       const double rate =
-           std::max(c.robot.angular_rate(), c.robot.linear_rate() / Positive(c.robot.length()));
+       const double rate = Worst(c.robot.angular_rate(), c.robot.linear_rate() / Positive(c.robot.length()));
        ScaleMass(c, scale);
        scale = (scale * rate).unaryExpr([](double x) { return Positive(x); });
      }},
@@ -277,7 +278,7 @@ Location FindLocation(const TermEntry& entry, const ScaleContext& c, Eigen::Inde
       return {Kind::kVelocityPair, r, i};
     case P::kUnreducedPair: {
       const int shift = c.model->num_unreduced_base_velocities() - c.model->num_base_velocities();
-      return {Kind::kVelocityPair, std::max(r - shift, 0), std::max(i - shift, 0)};
+      return {Kind::kVelocityPair, Worst(r - shift, 0), Worst(i - shift, 0)};
     }
     case P::kContact:
       return {Kind::kFrame, c.contact_frames[static_cast<size_t>(i)], -1};
@@ -293,7 +294,7 @@ Location FindLocation(const TermEntry& entry, const ScaleContext& c, Eigen::Inde
 
 ObjectScales CalcObjectScales(const MassProperties& body, const Vector3d& gravity, double distance,
                               double rate) {
-  return {1.0 + distance, std::max(rate, kLeastRate), body.mass, body.inertia.trace(),
+  return {1.0 + distance, Worst(rate, kLeastRate), body.mass, body.inertia.trace(),
           Positive(body.mass * gravity.norm())};
 }
 

@@ -30,8 +30,7 @@ void AddText(const char* name, const std::string& text, bool has_message, tinyxm
 
 JUnitCase MakeJUnitCase(const std::string& group, const CheckRecord& record, const std::string& where) {
   JUnitCase test{group, record.name, "", ""};
-  const std::string numbers = fmt::format("worst {:.3g}, bound {:.3g}{}{}", record.worst, record.bound,
-                                          where.empty() ? "" : ", ", where);
+  const std::string numbers = DescribeNumbers(record) + (where.empty() ? "" : ", " + where);
   (record.failed ? test.failure : test.output) = numbers;
   return test;
 }
@@ -60,7 +59,7 @@ std::string WriteJUnit(const std::string& suite, const std::vector<JUnitCase>& c
   for (const JUnitCase& test : cases) {
     open_case(test.group, test.name);
     AddText("failure", test.failure, true, &xml);
-    AddText("system-out", test.output, false, &xml);
+    AddText(test.output.starts_with("not reached") ? "skipped" : "system-out", test.output, false, &xml);
     xml.CloseElement();
   }
   if (!error.empty()) {

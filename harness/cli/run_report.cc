@@ -9,52 +9,58 @@
 
 #include "harness/base/check_record.h"
 #include "harness/base/interrupts.h"
+#include "harness/checks/check_table.h"
 #include "harness/cli/junit_file.h"
 #include "harness/cli/terminal.h"
 
 namespace dexcheck::cli {
 namespace {
 
-constexpr const char* kAllHolds = "model, law, inverse and forward dynamics, assumptions hold at every step";
-
-std::string Tell(bool failed) { return failed ? Paint(Tone::kBad, "FAILS") : Paint(Tone::kGood, "ok"); }
-
-/// @param count of the checks that the row stands for; empty for one. @param tell "ok", or what is wrong.
-void PrintRow(CheckCategory kind, const std::string& count, const std::string& check, double worst,
-              double bound, const std::string& unit, const std::string& tell) {
-  fmt::print("  {:<17}{:>3} {:<28}{:>8.1e}{:>8.0e}  {:<4} {}\n", NameOf(kind), count, check, worst, bound,
-             unit == "1" ? "" : unit, tell);
+std::string PaintStatus(const CheckRecord& check) {
+  const std::string status = DescribeStatus(check);
+  return check.failed ? Paint(Tone::kBad, status) : status == "ok" ? Paint(Tone::kGood, status) : status;
 }
 
-void PrintCheck(const CheckRecord& check) {
+/// @param count of the checks that the row stands for; empty for one.
+void PrintCheck(const CheckRecord& check, const std::string& count = "") {
   if (!check.applies) return;
-  PrintRow(check.kind, "", check.name, check.worst, check.bound, check.unit, Tell(check.failed));
+  const bool is_reached = IsReached(check);
+  const double shown = check.failed ? check.worst : check.residual;
+  fmt::print("  {:<17}{:>3} {:<28}{:>8}{:>8.0e}  {:<4} {}{}\n", NameOf(check.kind), count, check.name,
+             is_reached ? fmt::format("{:.1e}", shown) : "-", check.bound,
+             check.unit == "1" ? "" : check.unit, PaintStatus(check),
+             is_reached && check.residual > check.bound && !check.failed
+                 ? fmt::format(", with an allowance of {:.1e}", check.allowance)
+                 : "");
   if (check.failed) fmt::print("{:22}from {:.3f} s\n", "", check.failed_at);
+}
+
+/// Checks of the model and of the motion that the run has.
+std::vector<CheckRecord> ListChecksOf(const ClosedLoop& loop) {
+  std::vector<CheckRecord> all;
+  for (const std::span<const CheckRecord> records :
+       {loop.checks().model_checks(), loop.checks().motion_checks()})
+    std::ranges::copy_if(records, std::back_inserter(all), &CheckRecord::applies);
+  return all;
 }
 
 /// One line for what passes of a category, with the check that came nearest to its bound, and each that
 /// fails.
 void PrintCategory(CheckCategory kind, const ClosedLoop& loop) {
   CategoryStatus passing{kind};
-  std::vector<const CheckRecord*> failing;
-  std::string unit;
-  for (const std::span<const CheckRecord> records :
-       {loop.checks().model_checks(), std::span<const CheckRecord>(loop.checks().motion_checks())}) {
-    for (const CheckRecord& check : records) {
-      if (check.kind != kind || !check.applies) continue;
-      if (check.failed) {
-        failing.push_back(&check);
-        continue;
-      }
-      passing.Add(check.name, check.worst, check.bound, false);
-      if (passing.check == check.name) unit = check.unit;
+  std::vector<CheckRecord> failing;
+  for (const CheckRecord& check : ListChecksOf(loop)) {
+    if (check.kind != kind) continue;
+    if (check.failed) {
+      failing.push_back(check);
+    } else {
+      passing.Add(check);
     }
   }
-  if (passing.is_asked()) {
-    const std::string count = passing.checks == 1 ? "" : std::to_string(passing.checks);
-    PrintRow(kind, count, passing.check, passing.worst, passing.bound, unit, Tell(false));
-  }
-  for (const CheckRecord* check : failing) PrintCheck(*check);
+  if (passing.is_asked())
+    PrintCheck(passing.nearest, passing.checks == 1 ? "" : std::to_string(passing.checks));
+  if (passing.not_reached > 0) fmt::print("  {:<17}{:>3} not reached\n", NameOf(kind), passing.not_reached);
+  for (const CheckRecord& check : failing) PrintCheck(check);
 }
 
 void PrintChecks(const Setup& setup, const ClosedLoop& loop, Detail detail) {
@@ -63,10 +69,9 @@ void PrintChecks(const Setup& setup, const ClosedLoop& loop, Detail detail) {
   const auto& constants = setup.constants().records;
   const auto differs = std::ranges::count_if(constants, [](const CheckRecord& r) { return r.failed; });
   fmt::print("  {:<17}{:>3} {:<28}{:>8}{:>8}       {}\n", "model", constants.size(), "constants", differs, 0,
-             Tell(differs > 0));
+             differs > 0 ? Paint(Tone::kBad, "FAILS") : Paint(Tone::kGood, "ok"));
   if (detail == Detail::kAll) {
-    for (const CheckRecord& check : loop.checks().model_checks()) PrintCheck(check);
-    for (const CheckRecord& check : loop.checks().motion_checks()) PrintCheck(check);
+    for (const CheckRecord& check : ListChecksOf(loop)) PrintCheck(check);
   } else {
     for (const CheckCategory kind : kCheckCategories) {
       PrintCategory(kind, loop);
@@ -165,7 +170,7 @@ void PrintRunReport(const Setup& setup, const ClosedLoop& loop, const RunResult&
     if (!scenario.imperfections.is_ideal()) {
       for (const std::string& key : scenario.imperfections.declared) fmt::print("declared: {}\n", key);
     }
-    PrintTracking(scenario, result.tracking);
+    if (loop.record().step > 0) PrintTracking(scenario, result.tracking);
     if (scenario.control.kappa == ContactSource::kIntegrated) {
       const ContactDrift& drift = loop.largest_drift();
       fmt::print(
@@ -185,7 +190,7 @@ void PrintRunReport(const Setup& setup, const ClosedLoop& loop, const RunResult&
   switch (result.verdict) {
     case Verdict::kPass:
       fmt::print("{}: {}\n", Paint(Tone::kGood, "PASS"),
-                 loop.is_checking() ? std::string(kAllHolds) +
+                 loop.is_checking() ? DescribeWhatHolds(ListChecksOf(loop)) +
                                           (scenario.imperfections.is_ideal()
                                                ? "."
                                                : ",\nwith what the scenario asks of the plant counted in.")
@@ -226,12 +231,8 @@ std::string WriteJUnit(const Setup& setup, const ClosedLoop& loop, const RunResu
     for (const CheckRecord& check : setup.constants().records) {
       cases.push_back(MakeJUnitCase("constant", check, ""));
     }
-    for (const std::span<const CheckRecord> checks :
-         {loop.checks().model_checks(), loop.checks().motion_checks()}) {
-      for (const CheckRecord& check : checks) {
-        if (check.applies) cases.push_back(MakeJUnitCase(NameOf(check.kind), check, check.part));
-      }
-    }
+    for (const CheckRecord& check : ListChecksOf(loop))
+      cases.push_back(MakeJUnitCase(NameOf(check.kind), check, check.part));
   }
   const bool disagrees = result.verdict == Verdict::kDisagreement;
   const std::string cause =

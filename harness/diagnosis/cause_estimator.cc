@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "controller/common/linear_algebra.h"
+#include "harness/diagnosis/search_limit.h"
 #include "harness/diagnosis/visible_columns.h"
 
 namespace dexcheck {
@@ -42,6 +43,7 @@ class Search {
       });
       SpreadOut(1, options_.restarts, &firsts);
       for (const Best& first : firsts) {
+        if (SearchLimit::IsOver()) break;
         const double other = Grow(first);
         if (other < criterion) best = chosen_, criterion = other;
       }
@@ -50,7 +52,7 @@ class Search {
     const std::vector<size_t> best = chosen_;
     // Where columns are off themselves it begins so only if nothing was found.
     const bool may_be_others = best.empty() ? !IsNoise(best) : best.size() > 1 && options_.floor <= 1.0;
-    if (!options_.start.empty() && may_be_others) {
+    if (!options_.start.empty() && may_be_others && !SearchLimit::IsOver()) {
       chosen_ = Thin(options_.start);
       const double other = chosen_.empty() ? kInfinity : GrowFrom(Exchange(ScoreOf(chosen_)));
       if (other < criterion) {
@@ -75,7 +77,7 @@ class Search {
     return GrowFrom(first.criterion);
   }
   double GrowFrom(double criterion) {
-    while (chosen_.size() < options_.most_terms && !IsNoise(chosen_)) {
+    while (chosen_.size() < options_.most_terms && !IsNoise(chosen_) && !SearchLimit::IsOver()) {
       const Best next = FindBest(chosen_);
       if (!(next.criterion < criterion)) break;
       chosen_.push_back(next.candidate);
@@ -266,7 +268,7 @@ class Search {
   /// noise is kept so, whatever the criterion says: else one step would undo the other for ever. @returns the
   /// criterion.
   double Exchange(double criterion) {
-    for (bool improved = true; improved;) {
+    for (bool improved = true; improved && !SearchLimit::IsOver();) {
       improved = false;
       for (size_t place = 0; place < chosen_.size() && chosen_.size() > 1; ++place) {
         const std::vector<size_t> others = Without(place);
@@ -296,6 +298,7 @@ class Search {
         std::vector<Best> firsts = Rank(others);
         SpreadOut(2, kLikeliest, &firsts);
         for (const Best& first : firsts) {
+          if (SearchLimit::IsOver()) return criterion;
           std::vector<size_t> set = others;
           set.push_back(first.candidate);
           // One that does as well as both needs no second.

@@ -27,8 +27,10 @@ const char* NameOf(CauseOutcome outcome) {
 }
 
 std::string Fault::Tell() const {
+  if (fault == kUnknownFault) return place;
   return place + ": " + fault + " " + FormatNumber(value, 6) +
-         (error > 0.0 ? " +- " + FormatNumber(error, 2) : "") + Unit(unit) +
+         (error > 0.0 && std::isfinite(error) ? " +- " + FormatNumber(error, 2) : "") + Unit(unit) +
+         (std::isinf(error) && detail.empty() ? ", a size that this motion does not show" : "") +
          (detail.empty() ? "" : " " + detail);
 }
 

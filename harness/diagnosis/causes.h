@@ -26,6 +26,9 @@ struct Fault {
   [[nodiscard]] std::string Tell() const;
 };
 
+/// A fault that is none of those that are known.
+inline constexpr const char* kUnknownFault = "differs";
+
 /// Where residuals are compared: what one of them shows, the others do not; and what checks observe.
 enum class CauseChannel { kMeasurement, kActuation, kLaw, kContact, kRolling, kBalance, kObservation };
 /// "measurement", "actuation", "law", "contact", "rolling", "balance", "observation".

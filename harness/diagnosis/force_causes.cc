@@ -3,6 +3,7 @@
 
 #include "harness/diagnosis/force_problem.h"
 #include "harness/diagnosis/run_causes.h"
+#include "harness/diagnosis/search_limit.h"
 #include "harness/diagnosis/telling.h"
 
 namespace dexcheck {
@@ -73,7 +74,7 @@ std::vector<Segment> JoinAcrossGaps(const StepStore& store, StepForces* forces,
   std::vector<Segment> joined;
   for (size_t begin = 0; begin < parts.size() && joined.size() <= kMostSegments;) {
     const Part first = explain(begin, 1);
-    if (!first.is_explained) return {};
+    if (!first.is_explained || SearchLimit::IsOver()) return {};
     // What leaves more than rounding where its first part does not has something else in it.
     const auto is_one = [&](size_t count) {
       const Part part = explain(begin, count);
@@ -97,7 +98,10 @@ Causes ExplainParts(const StepStore& store, StepForces* forces, const std::vecto
                     bool exactly) {
   std::vector<Part> parts;
   parts.reserve(segments.size());
-  for (const Segment& one : segments) parts.push_back(ExplainPart(store, forces, one, nullptr));
+  for (const Segment& one : segments) {
+    if (SearchLimit::IsOver()) return {};
+    parts.push_back(ExplainPart(store, forces, one, nullptr));
+  }
   const auto is_simpler = [](const Part& a, const Part& b) {
     if (a.is_explained != b.is_explained) return a.is_explained;
     if (a.is_exact != b.is_exact) return a.is_exact;
@@ -106,6 +110,7 @@ Causes ExplainParts(const StepStore& store, StepForces* forces, const std::vecto
   const Part simplest = *std::min_element(parts.begin(), parts.end(), is_simpler);
   Causes causes;
   for (size_t i = 0; i < parts.size(); ++i) {
+    if (SearchLimit::IsOver()) return {};
     if (simplest.is_explained) {
       Part beside = ExplainPart(store, forces, segments[i], &simplest);
       // What has the same faults by itself, and no more of them, knows them better.
@@ -154,16 +159,17 @@ Causes ExplainForces(const StepStore& store) {
   const bool is_explained = problem.ExplainConstant(whole, &causes);
   const bool is_exact = is_explained && problem.is_exact();
   constexpr size_t kHeap = 3;  // so many faults may be fewer that begin one after another
-  if (is_exact && causes.size() < kHeap) return causes;
+  if ((is_exact && causes.size() < kHeap) || SearchLimit::IsOver()) return causes;
   const bool are_many = parts.size() > kMostSegments;
   const std::vector<Segment> few = are_many ? JoinAcrossGaps(store, &forces, parts) : parts;
   Causes found;
   if (few.size() > 1 && few.size() <= kMostSegments) found = ExplainParts(store, &forces, few, is_explained);
+  if (SearchLimit::IsOver()) return causes;
   // One that grows from a time on explains all steps at once.
   ForceProblem growing(store, &forces, whole, 1.0, ForceProblem::Growth::kWithin);
   Causes grown;
   if (found.size() != 1 && growing.ExplainConstant(whole, &grown) && growing.is_exact() &&
-      (found.empty() || grown.size() < found.size()))
+      !SearchLimit::IsOver() && (found.empty() || grown.size() < found.size()))
     found = grown;
   if (!found.empty() && (!is_exact || found.size() < causes.size())) return found;
   if (!is_explained) problem.ExplainChanging(whole, &causes);

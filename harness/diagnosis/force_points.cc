@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "controller/common/linear_algebra.h"
+#include "harness/diagnosis/search_limit.h"
 #include "harness/diagnosis/step_forces.h"
 
 namespace dexcheck {
@@ -128,7 +129,7 @@ void AddForcesAtPoints(const VectorXd& y, const std::vector<Turns>& turns, doubl
                    [](const PointFit& a, const PointFit& b) { return a.explains() > b.explains(); });
   std::vector<Candidate> added;
   for (PointFit& fit : fits) {
-    if (added.size() == kMostBodies || fit.explains() < kPointExplains) break;
+    if (added.size() == kMostBodies || fit.explains() < kPointExplains || SearchLimit::IsOver()) break;
     if (fit.Improve(reach, MatrixXd(y.size(), 0))) added.push_back(fit.Make());
   }
   std::move(added.begin(), added.end(), std::back_inserter(*candidates));

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "controller/common/linear_algebra.h"
+#include "harness/diagnosis/search_limit.h"
 #include "harness/diagnosis/telling.h"
 
 namespace dexcheck {
@@ -75,7 +76,7 @@ bool ForceProblem::ExplainConstant(const Segment& segment, Causes* causes) {
   is_exact_ = LeavesRounding(y_);
   if (!known_.amplitudes.empty() && CalcLeft(y_) <= 1.0) return true;
   CauseSelection selection = Select();
-  if (growth_ == Growth::kWithin && NarrowGrowing(selection)) selection = Select();
+  if (growth_ == Growth::kWithin && !SearchLimit::IsOver() && NarrowGrowing(selection)) selection = Select();
   if (!IsExplained(selection.fraction, selection.left)) return false;
   for (const CauseTerm& term : selection.terms) {
     const Candidate& one = candidates_[term.candidate];
@@ -324,16 +325,16 @@ CauseSelection ForceProblem::Select() {
   };
   CauseSelection best = SelectOnce();
   if (best.terms.empty()) best = select(level = kFaint * level);
-  for (int i = 0; i < kMostLevels && IsExplained(best.fraction, best.left); ++i) {
+  for (int i = 0; i < kMostLevels && IsExplained(best.fraction, best.left) && !SearchLimit::IsOver(); ++i) {
     const Vector2d lower =
         (kOfLeft * level_.cwiseProduct(CalcSizes(best.residual))).cwiseMax(least_level_).cwiseMin(level_);
     if ((lower.array() > 0.5 * level_.array()).all()) break;
     CauseSelection next = select(lower);
-    if (!IsExplained(next.fraction, next.left)) break;
+    if (!IsExplained(next.fraction, next.left) || SearchLimit::IsOver()) break;
     best = next;
     level = lower;
   }
-  if (!IsExplained(best.fraction, best.left) || is_exact_) return best;
+  if (!IsExplained(best.fraction, best.left) || is_exact_ || SearchLimit::IsOver()) return best;
   // Only what was left has told how much noise there is: more faults that leave but rounding are likelier.
   if (CauseSelection exact = select(least_level_); is_exact_) return exact;
   return select(level);
@@ -377,9 +378,10 @@ CauseSelection ForceProblem::SelectOnce() {
   const CauseOptions options{.most_terms = std::min<size_t>(5, used_.size()),
                              .alike = static_cast<double>(steps_)};
   CauseSelection selection = SelectCauses(y_, candidates_, options);
-  if (RefinePoints(selection)) selection = SelectCauses(y_, candidates_, options);
-  if (RefineCenters(selection)) selection = SelectCauses(y_, candidates_, options);
+  if (!SearchLimit::IsOver() && RefinePoints(selection)) selection = SelectCauses(y_, candidates_, options);
+  if (!SearchLimit::IsOver() && RefineCenters(selection)) selection = SelectCauses(y_, candidates_, options);
   for (const CauseTerm& term : selection.terms) {
+    if (SearchLimit::IsOver()) break;
     if (candidates_[term.candidate].place != kWorld || selection.terms.size() == 1) continue;
     // Masses that differ fall as all do.
     const Vector3d& g = forces_->model().gravity();

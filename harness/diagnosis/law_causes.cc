@@ -50,7 +50,8 @@ std::vector<Place> ListPlaces(const StepStore& store) {
 
 /// A sum of which all but one summand vanish, and friction that the law has anyway, are no candidates besides
 /// those. @param parts of each candidate, bits by summand; 0 for what is added.
-void DropRepeated(const std::vector<unsigned>& parts, std::vector<Candidate>* candidates) {
+void DropRepeated(std::vector<unsigned>* parts_of, std::vector<Candidate>* candidates) {
+  std::vector<unsigned>& parts = *parts_of;
   const auto repeats = [&](size_t i, size_t of) {
     const Candidate &a = (*candidates)[of], &b = (*candidates)[i];
     const bool is_sum = parts[of] != 0 && (parts[i] & parts[of]) == parts[of];
@@ -65,10 +66,78 @@ void DropRepeated(const std::vector<unsigned>& parts, std::vector<Candidate>* ca
     if (!((*candidates)[i].columns.squaredNorm() > 0.0)) continue;
     if (std::none_of(kept.begin(), kept.end(), [&](size_t of) { return repeats(i, of); })) kept.push_back(i);
   }
-  for (size_t k = 0; k < kept.size(); ++k)
-    if (kept[k] != k) (*candidates)[k] = std::move((*candidates)[kept[k]]);
+  for (size_t k = 0; k < kept.size(); ++k) {
+    if (kept[k] == k) continue;
+    (*candidates)[k] = std::move((*candidates)[kept[k]]);
+    parts[k] = parts[kept[k]];
+  }
   candidates->resize(kept.size());
+  parts.resize(kept.size());
 }
+
+/// Factors of parts of the law, of which several may act on one torque: all torques' and one joint's, that of
+/// a sum and that of one of its summands.
+class LawFactors {
+ public:
+  LawFactors(std::span<const LawPartName> names, const std::vector<unsigned>& parts,
+             std::span<const Candidate> candidates)
+      : names_(names), parts_(parts), candidates_(candidates) {}
+
+  /// What several have in common is no alternative to one of them.
+  void DropAlternatives(CauseSelection* selection) const {
+    for (CauseTerm& term : selection->terms) {
+      std::erase_if(term.same, [&](const auto& same) {
+        return std::ranges::any_of(selection->terms, [&](const CauseTerm& other) {
+          return &other != &term &&
+                 (Holds(other.candidate, same.first) || Holds(same.first, other.candidate));
+        });
+      });
+    }
+  }
+
+  /// The candidate's whole factor, and what it is of: what others of the selection have of it apart is
+  /// theirs.
+  void MakeWhole(const Candidate& one, const CauseSelection& selection, Fault* fault) const {
+    const auto index = static_cast<size_t>(&one - candidates_.data());
+    unsigned rest = parts_[index];
+    std::string joints;
+    for (const CauseTerm& term : selection.terms) {
+      const size_t other = term.candidate;
+      if (other == index) continue;
+      if (Holds(other, index)) fault->value += term.amplitude[0];
+      if (!Holds(index, other)) continue;
+      const Candidate& apart = candidates_[other];
+      if (apart.place == one.place) {
+        rest &= ~parts_[other];
+      } else if (parts_[other] == parts_[index]) {
+        joints += (joints.empty() ? "" : ", ") + apart.place.substr(kOf.size());
+      } else {
+        fault->detail += (fault->detail.empty() ? "but for " : ", ") + apart.place + ": " + apart.fault;
+      }
+    }
+    if (!joints.empty()) fault->place += " of all but " + joints;
+    const auto name = std::ranges::find(names_, rest, &LawPartName::parts);
+    if (rest != parts_[index] && name != names_.end()) fault->fault = NameFactor(*name);
+    if (std::abs(fault->value) < kZero) fault->value = 0.0;
+  }
+
+  static std::string NameFactor(const LawPartName& name) {
+    return std::string(name.name) + " (" + name.symbol + "), factor";
+  }
+
+ private:
+  static constexpr std::string_view kAll = "law", kOf = "law of ";
+  /// Whether one factor acts on all that the other one acts on.
+  [[nodiscard]] bool Holds(size_t one, size_t other) const {
+    const bool is_there =
+        candidates_[one].place == candidates_[other].place || candidates_[one].place == kAll;
+    return one != other && is_there && parts_[other] != 0 && (parts_[other] & parts_[one]) == parts_[other];
+  }
+
+  std::span<const LawPartName> names_;
+  const std::vector<unsigned>& parts_;
+  std::span<const Candidate> candidates_;
+};
 
 }  // namespace
 
@@ -101,8 +170,7 @@ Causes ExplainLaw(const StepStore& store) {
     return candidates.back();
   };
   for (const LawPartName& name : names)
-    for (const Place& place : places)
-      add(std::string(name.name) + " (" + name.symbol + "), factor", place.name, 1.0, name.parts);
+    for (const Place& place : places) add(LawFactors::NameFactor(name), place.name, 1.0, name.parts);
   for (const std::string& gain : store.law()->gains())
     add("gain " + gain + ", factor", places.front().name, 1.0, 0);
   // What a controller of another's may add.
@@ -155,14 +223,15 @@ Causes ExplainLaw(const StepStore& store) {
         candidates[candidate++].columns.col(0).segment(k * n, n) = size * own;
     }
   }
-  DropRepeated(parts_of, &candidates);
+  DropRepeated(&parts_of, &candidates);
   const double floor = 1.0 + kLawAccuracy * kLawAccuracy * y.squaredNorm() / static_cast<double>(y.size());
-  const CauseSelection selection =
-      SelectCauses(y, candidates, {.most_terms = 4, .restarts = 0, .floor = floor});
+  CauseSelection selection = SelectCauses(y, candidates, {.most_terms = 4, .restarts = 0, .floor = floor});
+  const LawFactors factors(names, parts_of, candidates);
+  factors.DropAlternatives(&selection);
   causes = TellSelection(StartExplanation(store, CauseChannel::kLaw, steps), selection, candidates,
-                         [](const Candidate& one, const VectorXd& amplitude, const VectorXd& error) {
+                         [&](const Candidate& one, const VectorXd& amplitude, const VectorXd& error) {
                            Fault fault = TellNumber(one, amplitude, error);
-                           if (std::abs(fault.value) < kZero) fault.value = 0.0;
+                           if (one.nominal != 0.0) factors.MakeWhole(one, selection, &fault);
                            return fault;
                          });
   if (selection.left <= kMostLeft * std::sqrt(floor)) return causes;

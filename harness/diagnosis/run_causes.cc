@@ -1,7 +1,11 @@
 #include "harness/diagnosis/run_causes.h"
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
 
+#include "harness/diagnosis/search_limit.h"
 #include "harness/diagnosis/signal_causes.h"
 #include "harness/diagnosis/step_forces.h"
 
@@ -27,25 +31,99 @@ void DropConsequences(const StepStore& store, Causes* causes) {
                                 "joint " + base.wheel_joint_left};
   std::erase_if(*causes, [&](const Explanation& one) {
     if (one.channel != CauseChannel::kBalance) return false;
+    if (one.faults.empty()) return false;
     const std::string& place = one.faults.front().place;
     return place.starts_with("wheel") ||
            std::find(std::begin(places), std::end(places), place) != std::end(places);
   });
 }
 
+/// The largest that a fault of each unit can be in this robot.
+class PlausibleSizes {
+ public:
+  explicit PlausibleSizes(const StepStore& store) {
+    const RobotModel& model = store.setup().model();
+    double mass = model.base_with_wheels().mass, reach = 0.0, effort = 0.0;
+    for (const Joint& joint : model.joints()) {
+      mass += joint.body.mass;
+      reach += joint.X_PB.translation().norm() + std::abs(joint.mdh.a) + std::abs(joint.mdh.d);
+    }
+    const mjModel& engine = store.setup().engine();
+    for (int i = 0; i < engine.nu; ++i)
+      if (engine.actuator_ctrllimited[i] != 0)
+        effort =
+            std::max(effort, std::abs(engine.actuator_ctrlrange[2 * i + 1] * engine.actuator_gear[6 * i]));
+    if (store.setup().has_object()) mass += store.setup().declared_object().body.mass;
+    constexpr double kMany = 10.0, kEarth = 10.0;  // of anything; m/s^2
+    const double weight = mass * kEarth;
+    const double torque = kMany * std::max(effort, weight * reach), force = kMany * std::max(effort, weight);
+    // Friction that takes all torque at a hundredth of a radian or metre a second.
+    constexpr double kSlow = 1e-2;
+    most_ = {{"N m", torque},
+             {"N", force},
+             {"N m s/rad", torque / kSlow},
+             {"N s/m", force / kSlow},
+             {"kg", kMany * mass},
+             {"m/s^2", 2.0 * kEarth},
+             {"deg", 90.0},
+             {"s", 1.0}};
+  }
+
+  /// Whether such a fault can be. What is no size, and what motion does not show, is none.
+  [[nodiscard]] bool CanBe(const Fault& fault) const {
+    if (fault.fault == kUnknownFault) return true;
+    const bool is_factor = fault.unit.empty();
+    const bool has_no_size =
+        fault.value == 0.0 && !is_factor && (!(fault.error < kNever) || fault.error > 0.0);
+    if (!std::isfinite(fault.value) || has_no_size) return false;
+    // No time, mass, friction and size of a step is negative.
+    for (const char* kind :
+         {"delay", "lag", "dead zone", "backlash", "noise", "rounding", "mass", "friction"})
+      if (fault.value < 0.0 && !is_factor && fault.fault.find(kind) != std::string::npos) return false;
+    const auto most = most_.find(fault.unit);
+    return most == most_.end() || std::abs(fault.value) <= most->second;
+  }
+
+ private:
+  static constexpr double kNever = std::numeric_limits<double>::infinity();
+  std::map<std::string, double> most_;
+};
+
+/// What cannot be is not told; what only such faults would explain is not explained.
+void DropImpossible(const StepStore& store, Causes* causes) {
+  const PlausibleSizes sizes(store);
+  for (Explanation& one : *causes) {
+    if (one.faults.empty()) continue;
+    const std::string place = one.faults.front().place;
+    const auto dropped = std::erase_if(one.faults, [&](const Fault& fault) { return !sizes.CanBe(fault); });
+    if (dropped == 0) continue;
+    if (one.faults.empty()) {
+      one.faults.push_back({kUnknownFault, place, 0.0, 0.0, "", ""});
+      one.outcome = CauseOutcome::kNotExplained;
+      one.rival.clear();
+    } else if (one.outcome != CauseOutcome::kNotExplained) {
+      one.SetOutcome();
+    }
+  }
+}
+
 }  // namespace
 
-Causes ExplainRun(const StepStore& store, double void_from) {
+Causes ExplainRun(const StepStore& store, double void_from, const SearchOptions& options, bool* stopped) {
+  const SearchLimit limit(options.seconds);
   Causes causes;
   const auto add = [&](Causes (*explain)(const StepStore&), const StepStore& from) {
+    if (SearchLimit::IsOver()) return;
     Causes found = explain(from);
     std::move(found.begin(), found.end(), std::back_inserter(causes));
   };
   for (const auto explain : {ExplainSignals, ExplainLaw, ExplainContacts}) add(explain, store);
   const StepStore before = store.GetBefore(void_from);
   for (const auto explain : {ExplainRolling, ExplainForces}) add(explain, before);
+  if (stopped != nullptr) *stopped = limit.has_ended();
   DropConsequencesOfShapes(&causes);
   DropConsequences(store, &causes);
+  DropImpossible(store, &causes);
   std::stable_sort(causes.begin(), causes.end(),
                    [](const Explanation& a, const Explanation& b) { return a.channel < b.channel; });
   return causes;

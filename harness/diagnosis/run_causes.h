@@ -29,8 +29,17 @@ Causes ExplainContacts(const StepStore& store);
 /// moments, other masses and inertias, armature, friction and springs of joints, another gravity.
 Causes ExplainForces(const StepStore& store);
 
-/// All: measurement, actuation, law, contact, rolling, balance.
+struct SearchOptions {
+  /// Processor time that the search for causes may take, s: what was found until then stands. Most faults
+  /// take tenths of a second, some minutes.
+  double seconds = 2.0;
+};
+
+/// All: measurement, actuation, law, contact, rolling, balance. What no robot like this one can have is told
+/// as not explained.
 /// @param void_from of FindVoid, s: wheels and balances are explained up to then.
-Causes ExplainRun(const StepStore& store, double void_from);
+/// @param stopped whether the search ended before it was done, by its limit or by the user.
+Causes ExplainRun(const StepStore& store, double void_from, const SearchOptions& options = {},
+                  bool* stopped = nullptr);
 
 }  // namespace dexcheck

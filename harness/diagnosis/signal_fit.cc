@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "harness/diagnosis/search_limit.h"
+
 namespace dexcheck {
 namespace {
 
@@ -149,6 +151,7 @@ SignalVerdict JudgeSignal(const SignalSeries& series, const std::vector<SignalSe
   };
   std::vector<SignalFit> fits;
   for (const SignalSearch search : {SignalSearch::kPlain, SignalSearch::kSines, SignalSearch::kCouplings}) {
+    if (!fits.empty() && SearchLimit::IsOver()) break;
     fits.clear();
     for (const SignalShape& shape : ListShapes(series, steps, others))
       fits.push_back(MakeFit(series, steps, shape, floor, search, others));
@@ -236,7 +239,7 @@ void TellVerdict(const SignalVerdict& verdict, CauseChannel channel, Causes* cau
   if (!verdict.is_explained || verdict.fits.empty()) {
     whole.outcome = CauseOutcome::kNotExplained;
     if (!verdict.fits.empty()) whole.faults = verdict.fits.front().faults;
-    if (whole.faults.empty()) whole.faults.push_back({"differs", verdict.name.place, 0.0, 0.0, "", ""});
+    if (whole.faults.empty()) whole.faults.push_back({kUnknownFault, verdict.name.place, 0.0, 0.0, "", ""});
     causes->push_back(whole);
     return;
   }

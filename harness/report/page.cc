@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <cerrno>
 #include <cmath>
 #include <cstring>
@@ -15,6 +16,7 @@
 #include "controller/common/errors.h"
 #include "harness/base/files.h"
 #include "harness/base/interrupts.h"
+#include "harness/checks/check_table.h"
 #include "harness/report/page_frame.h"
 #include "renders/renderer.h"
 #include "renders/video.h"
@@ -87,7 +89,9 @@ Headline FindHeadline(const RunData& run) {
                                      : "The engine does not do what the equations say."};
   }
   if (run.checks().empty()) return {"open", "NOT CHECKED", "The run completed; nothing was checked."};
-  return {"pass", "PASS", "Model, law, inverse and forward dynamics, assumptions hold at every step."};
+  std::string holds = DescribeWhatHolds(run.checks());
+  holds.front() = static_cast<char>(std::toupper(holds.front()));
+  return {"pass", "PASS", holds + "."};
 }
 
 /// A value with its unit; 0 has none.
@@ -159,24 +163,26 @@ class Page {
     Json checks = Json::array();
     for (const CheckRecord& check : run_.checks()) {
       if (check.kind != category) continue;
-      status.Add(check.name, check.worst, check.bound, check.failed);
+      status.Add(check);
       checks.push_back(MakeCheck(check));
     }
     Json json = {{"name", NameOf(category)},
                  {"title", TitleOf(category)},
                  {"explanation", run_.Explain(category)},
-                 {"tone", !status.is_asked()  ? "open"
-                          : status.failed > 0 ? "fail"
-                                              : "pass"},
-                 {"word", !status.is_asked()  ? "not checked"
-                          : status.failed > 0 ? fmt::format("{} of {} fail", status.failed, status.checks)
-                                              : "holds"},
+                 {"tone", status.failed > 0                     ? "fail"
+                          : status.checks == status.same_source ? "open"
+                                                                : "pass"},
+                 {"word", status.Describe()},
                  {"extent", ""},
                  {"checks", checks}};
     if (status.is_asked()) {
-      json["extent"] = fmt::format("{} check{}, at most {} of a bound", status.checks,
-                                   status.checks == 1 ? "" : "s", FormatFraction(status.fraction()));
+      json["extent"] =
+          fmt::format("{} check{}, at most {} of a bound", status.checks, status.checks == 1 ? "" : "s",
+                      FormatFraction(CalcFraction(status.nearest)));
     }
+    if (status.not_reached > 0)
+      json["extent"] = fmt::format("{}{}{} not reached", json["extent"].get<std::string>(),
+                                   status.is_asked() ? "; " : "", status.not_reached);
     return json;
   }
 
@@ -185,17 +191,22 @@ class Page {
     std::string where = check.part;
     if (IsTimed(check)) where += fmt::format("{}{:.3f} s", where.empty() ? "" : ", ", check.at);
     const std::string cause = run_.FindSummaryText(("/attribution/checks/" + check.name).c_str());
-    return {{"name", check.name},
-            {"description", check.description},
-            {"failed", check.failed},
-            {"fails_from", OrNull(check.failed && IsTimed(check), check.failed_at)},
-            {"is_equal", !check.failed && !IsTimed(check)},
-            {"cause", check.failed ? cause : ""},
-            {"worst", FormatWithUnit(check.worst, check.unit)},
-            {"bound", FormatWithUnit(check.bound, check.unit)},
-            {"of_bound", FormatFraction(fraction)},
-            {"meter", 100.0 * std::clamp(std::isfinite(fraction) ? fraction : 1.0, 0.0, 1.0)},
-            {"where", where}};
+    return {
+        {"name", check.name},
+        {"description", check.description},
+        {"failed", check.failed},
+        {"fails_from", OrNull(check.failed && IsTimed(check), check.failed_at)},
+        {"is_equal", !check.failed && IsReached(check) && !IsTimed(check)},
+        {"cause", check.failed ? cause : ""},
+        {"status", IsTimed(check) || !IsReached(check) ? DescribeStatus(check) : ""},
+        {"allowance",
+         check.allowance > 0.0 && !check.failed ? FormatWithUnit(check.allowance, check.unit) : ""},
+        {"worst",
+         IsReached(check) ? FormatWithUnit(check.failed ? check.worst : check.residual, check.unit) : "–"},
+        {"bound", FormatWithUnit(check.bound, check.unit)},
+        {"of_bound", IsReached(check) ? FormatFraction(fraction) : ""},
+        {"meter", 100.0 * std::clamp(std::isfinite(fraction) ? fraction : 1.0, 0.0, 1.0)},
+        {"where", where}};
   }
 
   /// Values and what they are.

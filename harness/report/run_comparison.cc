@@ -136,6 +136,7 @@ std::vector<ComparedNumber> CompareChecks(const std::vector<const RunData*>& run
                           std::vector<bool>(runs.size(), false)});
         found = checks.end() - 1;
       }
+      if (!IsReached(record)) continue;
       found->values[i] = record.worst;
       found->fails[i] = record.failed;
     }

@@ -63,13 +63,13 @@ std::string MakeTrackingRows(const RunData& run) {
 
 /// The checks stand with the worst first.
 std::string MakeCategoryRow(const RunData& run, CheckCategory category) {
-  const auto belongs = [&](const CheckRecord& check) { return check.kind == category; };
+  const auto belongs = [&](const CheckRecord& check) { return check.kind == category && IsReached(check); };
   const auto worst = std::ranges::find_if(run.checks(), belongs);
   if (worst == run.checks().end()) return "";
   const auto count = std::ranges::count_if(run.checks(), belongs);
   return MakeRow(fmt::format("{} ({})", WithSpaces(NameOf(category)), count),
-                 Typewriter(worst->name) + (worst->failed ? " \\textbf{fails}" : ""), worst->worst,
-                 FormatTex(worst->bound), worst->unit);
+                 Typewriter(worst->name) + (worst->failed ? " \\textbf{fails}" : ""),
+                 worst->failed ? worst->worst : worst->residual, FormatTex(worst->bound), worst->unit);
 }
 
 std::string MakeCaption(const RunData& run) {

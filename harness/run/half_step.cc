@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "controller/common/text.h"
 #include "harness/checks/check_table.h"
@@ -24,6 +25,41 @@ Interval FindInterval(const CheckRecord& check, double time_step) {
   return {check.failed_at + time_step, check.bound};
 }
 
+/// What the check comes to in another scenario up to that time; none where it cannot be run.
+std::optional<double> Repeat(const Scenario& scenario, const std::string& check,
+                             const std::filesystem::path& robot, const std::filesystem::path& mjcf,
+                             const std::function<bool()>& should_stop) {
+  try {
+    const Setup setup(scenario, robot, mjcf);
+    Runner runner(setup, /*check=*/true);
+    const RunResult& repeated = runner.Run([](const StepRecord&) {}, should_stop);
+    if (!repeated.failure.empty() || !runner.loop().checks().Has(check)) return std::nullopt;
+    return runner.loop().checks().Find(check).worst;
+  } catch (const InputError&) {
+    return std::nullopt;  // some time of the scenario is no whole number of half steps
+  }
+}
+
+/// The run's cause is this one, and so is that of failures that have none of their own.
+void SetCause(Cause cause, RunResult* result) {
+  for (Attribution& one : result->attribution.attributions)
+    if (one.cause == result->attribution.cause) one.cause = cause;
+  result->attribution.cause = cause;
+  result->causes.front().faults.front().fault = NameOf(cause);
+}
+
+/// How much of the error comes of what the scenario declares: without it the same run leaves the rest.
+void WeighDeclared(const Scenario& scenario, const CheckRecord& check, double without, RunResult* result) {
+  std::string keys;
+  for (const std::string& key : scenario.imperfections.declared) keys += (keys.empty() ? "" : ", ") + key;
+  const double explained = std::max(0.0, 1.0 - without / check.worst);
+  constexpr double kMost = 0.5;
+  if (explained >= kMost) SetCause(Cause::kDeclared, result);
+  result->attribution.evidence += "; without what the scenario declares (" + Abbreviate(keys) + ") it is " +
+                                  FormatNumber(without, 3) + " " + check.unit + ": that explains " +
+                                  FormatNumber(100.0 * explained, 3) + " % of the error";
+}
+
 }  // namespace
 
 void LookForIntegrator(const Setup& setup, const ClosedLoop& loop, const std::filesystem::path& robot,
@@ -32,8 +68,6 @@ void LookForIntegrator(const Setup& setup, const ClosedLoop& loop, const std::fi
   if (setup.scenario().controller.exists()) return;  // its own gains may be those of one step
   AttributionResult& attribution = result->attribution;
   const CheckInfo* const info = FindCheck(attribution.check);
-  // Noise and encoders that are declared are other ones at another step.
-  if (attribution.cause == Cause::kDeclared) return;
   if (!loop.is_checking() || info == nullptr || info->meaning.rank != Rank::kResidual) return;
   const CheckRecord& check = loop.checks().Find(attribution.check);
   if (!std::isfinite(check.worst)) return;
@@ -41,26 +75,21 @@ void LookForIntegrator(const Setup& setup, const ClosedLoop& loop, const std::fi
   const double time_step = half.plant.time_step;
   const Interval interval = FindInterval(check, time_step);
   if (interval.duration > kLongest) return;
+  if (!half.imperfections.declared.empty()) {
+    half.duration = interval.duration;
+    half.imperfections = {};
+    if (const auto without = Repeat(half, attribution.check, robot, mjcf, should_stop))
+      WeighDeclared(setup.scenario(), check, *without, result);
+    return;  // noise and encoders that are declared are other ones at another step
+  }
   half.duration = interval.duration;
   if (half.plant.type == PlantType::kEngine)
     half.plant.contact_time_constant = FindContactTimeConstant(half.plant);
   half.plant.time_step *= 0.5;
-  try {
-    const Setup half_setup(half, robot, mjcf);
-    Runner runner(half_setup, /*check=*/true);
-    const RunResult& repeated = runner.Run([](const StepRecord&) {}, should_stop);
-    if (!repeated.failure.empty()) return;
-    const double value = runner.loop().checks().Find(attribution.check).worst;
-    attribution.evidence += "; at half the step " + FormatNumber(value, 3) + " " + check.unit;
-    if (!(value <= kFirstOrder * interval.value)) return;
-    // Those that have no cause of their own have the run's.
-    for (Attribution& one : attribution.attributions)
-      if (one.cause == attribution.cause) one.cause = Cause::kIntegrator;
-    attribution.cause = Cause::kIntegrator;
-    result->causes.front().faults.front().fault = NameOf(Cause::kIntegrator);
-  } catch (const InputError&) {
-    // Some time of the scenario is no whole number of half steps.
-  }
+  const std::optional<double> value = Repeat(half, attribution.check, robot, mjcf, should_stop);
+  if (!value) return;
+  attribution.evidence += "; at half the step " + FormatNumber(*value, 3) + " " + check.unit;
+  if (*value <= kFirstOrder * interval.value) SetCause(Cause::kIntegrator, result);
 }
 
 }  // namespace dexcheck

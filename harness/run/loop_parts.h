@@ -11,6 +11,7 @@
 #include "controller/control/controller.h"
 #include "controller/control/trajectory_controller.h"
 #include "controller/handling/pick_and_place_controller.h"
+#include "harness/diagnosis/run_causes.h"
 #include "harness/plant/imperfections.h"
 #include "harness/plant/plant.h"
 #include "harness/scenario/setup.h"
@@ -26,6 +27,7 @@ struct LoopParts {
   const TrajectoryController* follower = nullptr;  ///< The controller, when it follows its contacts by (40).
   bool knows_law = true;                           ///< Whether the controller's law is the scenario's.
   int threads = 1;                                 ///< 2: checks have a thread of their own.
+  SearchOptions search;                            ///< Of what explains a run whose checks fail.
   SensingOptions sensing;
   ActuationOptions actuation;
   std::vector<DisturbanceOptions> disturbances;

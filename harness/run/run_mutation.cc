@@ -40,6 +40,9 @@ constexpr double kSameMotion = 1e-12;
 // Faults that are there from the beginning settle so long at the most, s.
 constexpr double kSettle = 0.3;
 
+// A campaign judges names: its searches end late, s of processor time.
+constexpr double kSearchSeconds = 60.0;
+
 /// The engine's simulation among the parts.
 EnginePlant* FindEngine(const LoopParts& parts) {
   auto* const plant = dynamic_cast<EnginePlant*>(parts.plant.get());
@@ -214,6 +217,7 @@ std::string RunCampaign::RunWithoutFault(const std::function<bool()>& should_sto
     InjectedFault nothing;
     nothing.engine = [](const Setup&, mjModel*) {};
     LoopParts parts = MakeLoopParts(*setup);
+    parts.search.seconds = kSearchSeconds;
     GoToStart(parts);
     InjectFault(*setup, nothing, begin_, &parts);
     VectorXd* const way = setup == setup_.get() ? &way_ : &offset_way_;
@@ -272,6 +276,7 @@ bool RunCampaign::RunFault(const InjectedFault& fault, RunMutant* mutant, Vector
     setup = own.get();
   }
   LoopParts parts = MakeLoopParts(*setup);
+  parts.search.seconds = kSearchSeconds;
   if (!fault.from_start) GoToStart(parts);
   InjectFault(*setup, fault, begin, &parts);
   return RunLoop(*setup, std::move(parts), mutant, way, should_stop);

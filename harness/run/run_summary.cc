@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "controller/common/text.h"
 #include "harness/base/check_record.h"
 #include "harness/base/version.h"
-#include "harness/diagnosis/run_causes.h"
 #include "harness/engine/machine.h"
 
 namespace dexcheck {
@@ -94,11 +94,11 @@ const char* NameOf(Verdict verdict) {
 }
 
 void TrackingStatistics::Add(const TrackingError& error) {
-  position_max_ = std::max(position_max_, error.position.norm());
+  position_max_ = Worst(position_max_, error.position.norm());
   position_squares_ += error.position.squaredNorm();
-  orientation_max_ = std::max(orientation_max_, error.orientation);
+  orientation_max_ = Worst(orientation_max_, error.orientation);
   orientation_squares_ += error.orientation * error.orientation;
-  joints_max_ = std::max(joints_max_, error.joints);
+  joints_max_ = Worst(joints_max_, error.joints);
   joints_squares_ += error.joints * error.joints;
   ++count_;
 }
@@ -120,12 +120,16 @@ void AddLimits(const StepRecord& step, double dt, std::vector<LimitedTorque>* li
   }
 }
 
-void Judge(const Setup& setup, const ClosedLoop& loop, RunResult* result) {
+void Judge(const Setup& setup, const ClosedLoop& loop, const SearchOptions& search, RunResult* result) {
   if (loop.is_checking()) {
     const std::span<const CheckRecord> steps = loop.checks().motion_checks();
-    result->causes = ExplainRun(loop.store(), FindVoid(steps));
+    bool stopped = false;
+    result->causes = ExplainRun(loop.store(), FindVoid(steps), search, &stopped);
     result->attribution = Attribute(setup.constants(), loop.checks().model_checks(), steps,
                                     loop.checks().context(), &result->causes);
+    if (stopped && result->attribution.cause != Cause::kNone)
+      result->attribution.evidence += "; the search for causes was stopped after " +
+                                      FormatNumber(search.seconds) + " s of processor time, or by hand";
   }
   const bool disagrees = result->attribution.cause != Cause::kNone;
   result->verdict = disagrees ? Verdict::kDisagreement : Verdict::kPass;
@@ -178,8 +182,10 @@ Json MakeSummary(const Setup& setup, const ClosedLoop& loop, const RunResult& re
     for (const CheckRecord& check : loop.checks().settling_failures())
       json["settling"][check.name] = ToJson(check, /*timed=*/true);
     const StepFindings& findings = loop.checks().analysis().findings;
-    const auto worst = [&](const char* name) {
-      return loop.checks().Has(name) ? loop.checks().Find(name).worst : 0.0;
+    const auto worst = [&](const char* name) -> Json {
+      if (!loop.checks().Has(name)) return 0.0;
+      const CheckRecord& check = loop.checks().Find(name);
+      return IsReached(check) ? Json(check.worst) : Json();
     };
     json["assumptions"] = {{"fingertip_slip_max_m", worst("fingertip_slip")},
                            {"wheel_slip_max_m", worst("wheel_slip")},

@@ -10,6 +10,7 @@
 
 #include "harness/diagnosis/attribution.h"
 #include "harness/diagnosis/causes.h"
+#include "harness/diagnosis/run_causes.h"
 #include "harness/run/closed_loop.h"
 #include "harness/run/sampled_loop.h"
 
@@ -72,7 +73,7 @@ struct RunResult {
 void AddLimits(const StepRecord& step, double dt, std::vector<LimitedTorque>* limited);
 
 /// The verdict and its attribution. Call when the last step is done.
-void Judge(const Setup& setup, const ClosedLoop& loop, RunResult* result);
+void Judge(const Setup& setup, const ClosedLoop& loop, const SearchOptions& search, RunResult* result);
 
 /// Keys as README.md lists them for summary.json; lengths m, angles rad.
 nlohmann::ordered_json MakeSummary(const Setup& setup, const ClosedLoop& loop, const RunResult& result);

@@ -18,7 +18,7 @@ class Runner {
   Runner(const Setup& setup, bool check) : setup_(&setup), loop_(setup, check) {}
   /// The same with other parts than the scenario's own.
   Runner(const Setup& setup, bool check, LoopParts parts)
-      : setup_(&setup), loop_(setup, check, std::move(parts)) {}
+      : setup_(&setup), search_(parts.search), loop_(setup, check, std::move(parts)) {}
 
   [[nodiscard]] const ClosedLoop& loop() const { return loop_; }
   [[nodiscard]] const RunResult& result() const { return result_; }
@@ -57,7 +57,7 @@ class Runner {
     }
     Guard([&] { loop_.Finish(); }, /*settling=*/false);
     result_.wall_seconds = SecondsSince(begin);
-    Judge(*setup_, loop_, &result_);
+    Judge(*setup_, loop_, search_, &result_);
     return result_;
   }
 
@@ -87,6 +87,7 @@ class Runner {
   }
 
   const Setup* setup_;
+  SearchOptions search_;
   ClosedLoop loop_;
   RunResult result_;
 };

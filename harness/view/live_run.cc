@@ -126,8 +126,7 @@ void LiveRun::Record(const StepRecord& step) {
     CategoryStatus& status = view.categories.emplace_back(CategoryStatus{kind});
     for (const std::span<const CheckRecord> records : {checks.model_checks(), checks.motion_checks()}) {
       for (const CheckRecord& check : records) {
-        if (check.kind == kind && check.applies)
-          status.Add(check.name, check.worst, check.bound, check.failed);
+        if (check.kind == kind && check.applies) status.Add(check);
       }
     }
   }

@@ -74,12 +74,12 @@ TEST_F(RunFramesTest, CheckHistoryKeepsTheWorstPerBound) {
   run_.checks[2].residuals[6] = kNan;
   const CheckHistory history(run_);
   const auto at = [&](size_t category, long row) { return history.ListCategories(row)[category]; };
-  EXPECT_EQ(at(0, 3).check, "a");
-  EXPECT_DOUBLE_EQ(at(0, 3).worst, 5e-4);
-  EXPECT_EQ(at(0, 4).check, "b");
-  EXPECT_DOUBLE_EQ(at(0, 10).worst, 8e-10) << "a peak stays";
-  EXPECT_EQ(at(2, 5).worst, 0.0);
-  EXPECT_EQ(at(2, 10).worst, std::numeric_limits<double>::infinity());
+  EXPECT_EQ(at(0, 3).nearest.name, "a");
+  EXPECT_DOUBLE_EQ(at(0, 3).nearest.worst, 5e-4);
+  EXPECT_EQ(at(0, 4).nearest.name, "b");
+  EXPECT_DOUBLE_EQ(at(0, 10).nearest.worst, 8e-10) << "a peak stays";
+  EXPECT_EQ(at(2, 5).nearest.worst, 0.0);
+  EXPECT_EQ(at(2, 10).nearest.worst, std::numeric_limits<double>::infinity());
   EXPECT_FALSE(at(3, 10).is_asked());
 }
 
@@ -92,8 +92,8 @@ TEST_F(RunFramesTest, AllFiveCategoriesAreListed) {
   ASSERT_EQ(categories.size(), kCheckCategories.size());
   for (size_t i = 0; i < categories.size(); ++i) EXPECT_EQ(categories[i].category, kCheckCategories[i]);
   EXPECT_FALSE(categories[0].is_asked());
-  EXPECT_EQ(categories[1].check, "law_torque");
-  EXPECT_DOUBLE_EQ(categories[1].worst, 2e-9);
+  EXPECT_EQ(categories[1].nearest.name, "law_torque");
+  EXPECT_DOUBLE_EQ(categories[1].nearest.worst, 2e-9);
   EXPECT_EQ(categories[1].failed, 1);
   EXPECT_EQ(history.ListCategories(3)[1].failed, 0);
   EXPECT_EQ(categories[4].failed, 0);

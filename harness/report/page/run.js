@@ -59,9 +59,9 @@
     };
     return Add(Make('tr', '', {className: check.failed ? 'fail' : 'pass'}),
       Cell('', '', Make('code', check.name), Make('small', check.description)),
-      Cell('', '', check.fails_from === null ? Make('span', check.failed ? 'differs' : 'holds', {className: 'badge'})
+      Cell('', '', check.fails_from === null ? Make('span', check.failed ? 'differs' : ['', 'ok'].includes(check.status) ? 'holds' : check.status, {className: 'badge'})
         : TimeButton('fails from', check.fails_from, 'badge'), ...(check.cause ? [Make('small', 'cause: ' + check.cause)] : [])),
-      Cell('value number', 'worst', check.worst), Cell('value number', 'bound', check.bound),
+      Cell('value number', 'worst', check.worst), Cell('value number', 'bound', check.bound, ...(check.allowance ? [Make('small', '+ allowance ' + check.allowance)] : [])),
       Cell('', 'of bound', Make('span', check.of_bound, {className: 'number'}),
         Add(Make('span', '', {className: 'meter'}), Make('i', '', {style: `width:${check.meter}%`}))),
       Cell('where', check.where ? 'at' : '', Make('small', check.where)));

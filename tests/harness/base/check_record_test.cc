@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <limits>
+#include <nlohmann/json.hpp>
 
 namespace dexcheck::testing::check_record_test {
 namespace {
@@ -84,6 +85,30 @@ TEST(CheckRecord, KeepsWorstAndFirstFailure) {
   EXPECT_EQ(check.last, 1.5);
   EXPECT_EQ(check.count, 4);
   EXPECT_DOUBLE_EQ(check.rms(), std::sqrt((0.25 + 4.0 + 9.0 + 2.25) / 4.0));
+}
+
+TEST(CheckRecord, WhatIsTakenOffStandsBesideTheValue) {
+  CheckRecord check = MakeRecord(1.0);
+  EXPECT_STREQ(DescribeStatus(check), "not reached");
+  EXPECT_EQ(ToJson(check, /*timed=*/true)["reached"], false);
+  EXPECT_FALSE(ToJson(check, /*timed=*/true).contains("pass"));
+  check.Add(3.0, 0.1, 4.0);
+  check.Add(4.0, 0.2, 4.0);
+  check.Add(2.0, 0.3, 4.0);
+  EXPECT_EQ(check.worst, 1.0) << "the bound, since the allowance explains the rest";
+  EXPECT_EQ(check.residual, 4.0);
+  EXPECT_EQ(check.allowance, 4.0);
+  EXPECT_EQ(CalcFraction(check), 4.0 / 5.0);
+  EXPECT_STREQ(DescribeStatus(check), "ok");
+  const CheckRecord read = ReadCheck("one", ToJson(check, /*timed=*/true));
+  EXPECT_EQ(read.residual, 4.0);
+  EXPECT_EQ(read.allowance, 4.0);
+  check.Add(5.5, 0.4, 4.0);
+  EXPECT_TRUE(check.failed);
+  EXPECT_EQ(check.worst, 1.5);
+  CheckRecord unknown = MakeRecord(1.0);
+  unknown.Add(0.5, 0.1, kNaN);
+  EXPECT_TRUE(unknown.failed) << "an allowance that is not a number allows nothing";
 }
 
 TEST(CheckRecord, ValueAtTheBoundPasses) {

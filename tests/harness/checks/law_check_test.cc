@@ -89,6 +89,47 @@ TEST(LawCheck, TorquesThatDoNotArriveAreTheActuators) {
   EXPECT_THAT(result.attribution.evidence, HasSubstr("all motors: gain 0.999"));
 }
 
+/// What explains torques of the joints' law to which this is added.
+Causes ExplainTorques(const std::function<void(const GraspModel& model, VectorXd* tau)>& change) {
+  const ShippedRun shipped("panda-reach", {"duration=0.2", "settle=0.1", "expect.joints=1"});
+  LoopParts parts = MakeLoopParts(shipped.setup());
+  parts.controller = std::make_unique<ChangedController>(
+      std::move(parts.controller),
+      [&](const GraspModel& model, Command* command) { change(model, &command->tau); });
+  return RunParts(shipped.setup(), std::move(parts))->result().causes;
+}
+
+TEST(LawCheck, ASmallTorqueIsNoZero) {
+  const Causes causes = ExplainTorques([](const GraspModel&, VectorXd* tau) { (*tau)[3] += 1e-6; });
+  ASSERT_FALSE(causes.empty());
+  EXPECT_NEAR(causes.front().faults.front().value, 1e-6, 1e-9) << causes.front().Tell();
+  EXPECT_EQ(causes.front().faults.front().place, "law of panda_joint4");
+}
+
+TEST(LawCheck, ASearchThatIsStoppedSaysSo) {
+  const ShippedRun shipped("panda-reach", {"duration=0.05", "settle=0.1", "expect.joints=1"});
+  LoopParts parts = MakeLoopParts(shipped.setup());
+  parts.search.seconds = 0.0;
+  parts.controller = std::make_unique<ChangedController>(
+      std::move(parts.controller), [](const GraspModel&, Command* command) { command->tau[3] += 0.1; });
+  const RunResult result = RunParts(shipped.setup(), std::move(parts))->result();
+  EXPECT_EQ(result.attribution.cause, Cause::kControlLaw);
+  EXPECT_THAT(result.attribution.evidence, HasSubstr("search for causes was stopped after 0 s"));
+}
+
+// Of a factor of all joints and one of a single joint each is told whole.
+TEST(LawCheck, FactorsOfAllJointsAndOfOneAreToldWhole) {
+  const Causes causes = ExplainTorques([](const GraspModel& model, VectorXd* tau) {
+    const VectorXd& gravity = model.robot().gravity();
+    *tau -= 0.2 * gravity;
+    (*tau)[1] -= 0.3 * gravity[1];
+  });
+  std::string told;
+  for (const Explanation& one : causes) told += one.Tell() + "\n";
+  EXPECT_THAT(told, HasSubstr("law of all but panda_joint2: gravity (F_bar' (gravity)), factor 0.8"));
+  EXPECT_THAT(told, HasSubstr("law of panda_joint2: gravity (F_bar' (gravity)), factor 0.5"));
+}
+
 TEST(LawCheck, AnErrorThatDoesNotFollowIsFound) {
   EXPECT_NE(RunFaultyPlant(1.0, 1e-3, "error_dynamics").verdict, Verdict::kPass);
 }

@@ -84,5 +84,22 @@ TEST(StandardOutput, FullIsNoticedByWhateverPrints) {
   }
 }
 
+// What a scenario declares is no fault of the law: the run without it shows how much it explains.
+TEST_F(Verdict, ADeclaredMismatchIsTheCauseOfAMissedExpectation) {
+  const Json result = RunJson(
+      1, "run paper --no-log --set duration=0.3 --set 'mismatch.mass={ torso = 1.03 }'")["attribution"];
+  EXPECT_EQ(result["cause"], "declared imperfections");
+  EXPECT_THAT(result["evidence"].get<std::string>(), HasSubstr("mismatch.mass"));
+  EXPECT_THAT(result["evidence"].get<std::string>(), HasSubstr("that explains 100 % of the error"));
+}
+
+// A rigid plant integrates the equations that its forces are put into.
+TEST_F(Verdict, ARigidPlantIsNoEvidenceOfItsOwnEquations) {
+  const ProgramResult run = Expect(0, "run paper-rigid --no-report --set duration=0.02 --out run");
+  EXPECT_THAT(run.out, HasSubstr("same source"));
+  EXPECT_THAT(run.out, HasSubstr("not judged: inverse and forward dynamics (model and plant are one file)"));
+  EXPECT_EQ(ReadJson("run/summary.json")["checks"]["contact_force"]["same_source"], true);
+}
+
 }  // namespace
 }  // namespace dexcheck::testing::verdict_test

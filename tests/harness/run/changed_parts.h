@@ -14,14 +14,21 @@ namespace dexcheck::testing {
 /// A plant that is given other torques than its own, and answers otherwise.
 class ChangedPlant final : public Plant {
  public:
-  /// @param gain of the torques. @param change of the response; none for nothing.
+  /// @param gain of the torques. @param change of the response, and of the reading; none for nothing.
   ChangedPlant(std::unique_ptr<Plant> plant, double gain,
-               std::function<void(PlantResponse* response)> change = {})
-      : plant_(std::move(plant)), gain_(gain), change_(std::move(change)) {}
+               std::function<void(PlantResponse* response)> change = {},
+               std::function<void(PlantReading* reading)> change_reading = {})
+      : plant_(std::move(plant)),
+        gain_(gain),
+        change_(std::move(change)),
+        change_reading_(std::move(change_reading)) {}
   double time_step() const override { return plant_->time_step(); }
   std::span<const Motor> motors() const override { return plant_->motors(); }
   void BeginStep() override { plant_->BeginStep(); }
-  void Read(PlantReading* reading) override { plant_->Read(reading); }
+  void Read(PlantReading* reading) override {
+    plant_->Read(reading);
+    if (change_reading_) change_reading_(reading);
+  }
   void EndStep(const Eigen::Ref<const VectorXd>& tau) override { plant_->EndStep(gain_ * tau); }
   void Read(PlantResponse* response) override {
     plant_->Read(response);
@@ -35,6 +42,7 @@ class ChangedPlant final : public Plant {
   std::unique_ptr<Plant> plant_;
   double gain_;
   std::function<void(PlantResponse* response)> change_;
+  std::function<void(PlantReading* reading)> change_reading_;
 };
 
 /// A controller whose command is changed after each step.

@@ -4,7 +4,9 @@
 
 #include <set>
 
+#include "harness/base/worst.h"
 #include "harness/plant/engine_plant.h"
+#include "tests/harness/run/changed_parts.h"
 #include "tests/harness/run/shipped_run.h"
 
 namespace dexcheck::testing::check_faults_test {
@@ -136,6 +138,121 @@ TEST(CheckFaults, AreThereForEveryCheck) {
     if (info.category != CheckCategory::kLaw && info.name != "fingertip_rim") checks.emplace(info.name);
   }
   EXPECT_EQ(seeded, checks);
+}
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+
+/// One number of what a plant says becomes NaN, not the last of its kind: whoever takes the largest by
+/// position loses it.
+struct LostNumber {
+  const char* name;
+  const char* scenario;
+  const char* check;  ///< That fails by it.
+  void (*change)(PlantReading* reading, PlantResponse* response);
+};
+
+void PrintTo(const LostNumber& lost, std::ostream* out) { *out << lost.name; }
+
+const LostNumber kLostNumbers[] = {
+    {"xi_dot", "hold", "inverse_dynamics_robot", [](auto*, auto* r) { r->xi_dot[7] = kNaN; }},
+    {"xi_dot_again", "hold", "reduced_acceleration", [](auto*, auto* r) { r->xi_dot[0] = kNaN; }},
+    {"V_Bo_dot", "hold", "inverse_dynamics_object", [](auto*, auto* r) { r->V_Bo_dot[4] = kNaN; }},
+    {"contact_force", "hold", "contact_force", [](auto*, auto* r) { r->contacts[1].force.y() = kNaN; }},
+    {"contact_distance", "hold", "contact_distance", [](auto*, auto* r) { r->contacts[1].distance = kNaN; }},
+    {"contact_overlap", "hold", "penetration", [](auto*, auto* r) { r->contacts[0].distance = kNaN; }},
+    {"fingertip_slip", "hold", "fingertip_slip", [](auto*, auto* r) { r->fingertips[2].slip.x() = kNaN; }},
+    {"fingertip_rate", "hold", "fingertip_slip_rate",
+     [](auto*, auto* r) { r->fingertips[0].slip.z() = kNaN; }},
+    {"fingertip_use", "hold", "cone_use", [](auto*, auto* r) { r->fingertips[1].cone_use = kNaN; }},
+    {"wheel_slip", "hold", "wheel_slip", [](auto*, auto* r) { r->wheels[0].slip.x() = kNaN; }},
+    {"wheel_rate", "hold", "wheel_slip_rate", [](auto*, auto* r) { r->wheels[0].slip.y() = kNaN; }},
+    {"wheel_rolling", "hold", "rolling", [](auto*, auto* r) { r->wheels[0].slip.y() = kNaN; }},
+    {"wheel_use", "hold", "traction_use", [](auto*, auto* r) { r->wheels[0].cone_use = kNaN; }},
+    {"motor_torque", "hold", "torque_applied", [](auto*, auto* r) { r->motor_torques[5] = kNaN; }},
+    {"solver_force", "hold", "solver",
+     [](auto*, auto* r) {
+       if (r->solver_force.size() > 0) r->solver_force[3] = kNaN;
+     }},
+    {"solver_residual", "hold", "solver", [](auto*, auto* r) { r->solver_residual[2] = kNaN; }},
+    {"departure_force", "hold", "inverse_dynamics_robot",
+     [](auto*, auto* r) {
+       if (r->departure_force.size() > 0) r->departure_force[1] = kNaN;
+     }},
+    {"tilt", "hold", "base_tilt", [](auto* r, auto*) { r->departure.tilt = kNaN; }},
+    {"wheel_speed", "hold", "rolling", [](auto* r, auto*) { r->qvel.setConstant(kNaN); }},
+    {"qpos", "hold", "clearance", [](auto* r, auto*) { r->qpos[9] = kNaN; }},
+    {"body_position", "hold", "clearance",
+     [](auto* r, auto*) {
+       if (r->body_positions.size() > 0) r->body_positions[30] = kNaN;
+     }},
+    {"joint_position", "panda-reach", "joint_limit", [](auto* r, auto*) { r->state.q[2] = kNaN; }},
+    {"joint_acceleration", "panda-reach", "joint_dynamics", [](auto*, auto* r) { r->xi_dot[2] = kNaN; }},
+    {"foot_slip", "stand", "foot_slip", [](auto*, auto* r) { r->feet[1].slip.x() = kNaN; }},
+    {"foot_rate", "stand", "foot_slip_rate", [](auto*, auto* r) { r->feet[0].slip.y() = kNaN; }},
+    {"foot_use", "stand", "foot_cone_use", [](auto*, auto* r) { r->feet[1].cone_margin = kNaN; }},
+    {"foot_overlap", "stand", "foot_penetration", [](auto*, auto* r) { r->feet[0].distance = kNaN; }},
+    {"foot_distance", "stand", "foot_distance", [](auto*, auto* r) { r->feet[0].distance = kNaN; }},
+};
+
+class LostNumbers : public ::testing::TestWithParam<LostNumber> {};
+
+TEST_P(LostNumbers, FailTheirCheck) {
+  const LostNumber& lost = GetParam();
+  const std::string scenario = lost.scenario;
+  const ShippedRun shipped(
+      scenario, scenario == "stand" ? std::vector<std::string>{"duration=0.02", "settle=0.02", "expect={}"}
+                                    : std::vector<std::string>{"duration=0.02", "settle=0.02"});
+  LoopParts parts = MakeLoopParts(shipped.setup());
+  // One step of the run.
+  const double dt = shipped.setup().scenario().plant.time_step;
+  const long when = std::lround(shipped.setup().scenario().settle / dt) + 4;
+  long readings = 0, responses = 0;
+  PlantReading no_reading;
+  PlantResponse no_response;
+  parts.plant = std::make_unique<ChangedPlant>(
+      std::move(parts.plant), 1.0,
+      [&](PlantResponse* response) {
+        no_reading.qvel.resize(1), no_reading.qpos.resize(10), no_reading.state.q.resize(3);
+        if (++responses == when) lost.change(&no_reading, response);
+      },
+      [&](PlantReading* reading) {
+        no_response = PlantResponse{};
+        no_response.xi_dot.resize(50), no_response.motor_torques.resize(50);
+        no_response.contacts.resize(4), no_response.fingertips.resize(4);
+        no_response.wheels.resize(2), no_response.feet.resize(4);
+        if (++readings == when) lost.change(reading, &no_response);
+      });
+  const std::unique_ptr<Runner> runner = RunParts(shipped.setup(), std::move(parts));
+  EXPECT_NE(runner->result().verdict, Verdict::kPass);
+  EXPECT_NE(runner->result().attribution.cause, Cause::kNone);
+  const CheckRecord& check = runner->loop().checks().Find(lost.check);
+  EXPECT_TRUE(check.failed || !runner->result().failure.empty()) << check.worst;
+  if (check.failed) EXPECT_EQ(check.worst, std::numeric_limits<double>::infinity());
+}
+
+INSTANTIATE_TEST_SUITE_P(All, LostNumbers, ::testing::ValuesIn(kLostNumbers),
+                         [](const auto& info) { return std::string(info.param.name); });
+
+TEST(LostNumbers, OfALawFailItsChecks) {
+  for (const char* check : {"grasp_null_space", "law_torque"}) {
+    const ShippedRun shipped("hold", {"duration=0.02", "settle=0.02"});
+    LoopParts parts = MakeLoopParts(shipped.setup());
+    parts.controller = std::make_unique<ChangedController>(
+        std::move(parts.controller),
+        [](const GraspModel&, Command* command) { command->demand.F_N[4] = kNaN; });
+    EXPECT_TRUE(RunParts(shipped.setup(), std::move(parts))->loop().checks().Find(check).failed) << check;
+  }
+}
+
+TEST(LostNumbers, OfOneLaterValueAreKept) {
+  Eigen::Vector4d values(1.0, kNaN, 3.0, 2.0);
+  for (int shift = 0; shift < 4; ++shift) {
+    EXPECT_TRUE(std::isnan(MaxAbs(values)));
+    EXPECT_TRUE(std::isnan(Worst(values[0], values[1], values[2], values[3])));
+    std::rotate(values.begin(), values.begin() + 1, values.end());
+  }
+  EXPECT_EQ(MaxAbs(Eigen::Vector3d(1.0, -3.0, 2.0)), 3.0);
+  EXPECT_EQ(MaxAbs(Eigen::VectorXd()), 0.0);
 }
 
 std::set<std::string> ListApplying(const ShippedRun& run) {

@@ -1,0 +1,36 @@
+#include "harness/diagnosis/search_limit.h"
+
+#include <ctime>
+
+#include "harness/base/interrupts.h"
+
+namespace dexcheck {
+namespace {
+
+/// The limit of this thread's searches; null for none.
+thread_local SearchLimit* current = nullptr;
+
+double ReadProcessorTime() {
+  timespec time{};
+  ::clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
+  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
+}
+
+}  // namespace
+
+SearchLimit::SearchLimit(double seconds)
+    : end_(ReadProcessorTime() + seconds), was_interrupted_(IsInterrupted()) {
+  current = this;
+}
+
+SearchLimit::~SearchLimit() { current = nullptr; }
+
+bool SearchLimit::IsOver() {
+  SearchLimit* const limit = current;
+  if (limit == nullptr) return false;
+  const bool is_interrupted = IsInterrupted() && !limit->was_interrupted_;
+  limit->has_ended_ = limit->has_ended_ || is_interrupted || ReadProcessorTime() > limit->end_;
+  return limit->has_ended_;
+}
+
+}  // namespace dexcheck
