@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include "harness/base/files.h"
+#include "harness/base/watched_process.h"
 
 namespace dexcheck {
 namespace {
@@ -41,11 +42,12 @@ void Interrupt(int /*signal*/) {
   constexpr std::string_view kMessage = "dexcheck: interrupted\n";
   // The process ends, whether anybody reads this or not.
   [[maybe_unused]] const ssize_t ignored = ::write(STDERR_FILENO, kMessage.data(), kMessage.size());
-  ::_exit(interrupted_exit_code);
+  ::_exit(EndProgram(interrupted_exit_code));
 }
 
 void EndByPipe(int signal) {
   RemoveTemporaryPaths();
+  EndProgram(0);
   Install(signal, SIG_DFL);
   ::raise(signal);
 }

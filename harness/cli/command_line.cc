@@ -98,6 +98,7 @@ template <typename Value>
 Option Command::AddOption(const std::string& name, Value* value, const std::string& help) {
   const size_t blank = name.find(' ');
   Option option(app_->add_option(name.substr(0, blank), *value, help));
+  option.Check([](const std::string& text) { return text.empty() ? "must not be empty" : ""; });
   return blank == std::string::npos ? option : option.TypeName(name.substr(blank + 1));
 }
 

@@ -16,6 +16,7 @@
 #include "harness/base/files.h"
 #include "harness/base/interrupts.h"
 #include "harness/base/version.h"
+#include "harness/base/watched_process.h"
 #include "harness/cli/commands.h"
 
 namespace dexcheck::cli {
@@ -106,10 +107,16 @@ int Run(int argc, char** argv) {
 }  // namespace
 }  // namespace dexcheck::cli
 
+namespace {
+/// Before the libraries initialise themselves, which takes most of the time until main.
+void HandleSignalsFirst() { dexcheck::HandleSignals(dexcheck::cli::kFailure); }
+[[gnu::section(".preinit_array"), gnu::used]] void (*const kFirst)() = HandleSignalsFirst;
+}  // namespace
+
 // What a handler of exceptions throws is want of memory. NOLINTNEXTLINE(bugprone-exception-escape)
 int main(int argc, char** argv) {
   dexcheck::OccupyStandardStreams();
   dexcheck::cli::UseInstalledFonts();
-  dexcheck::HandleSignals(dexcheck::cli::kFailure);
-  return dexcheck::cli::Run(argc, argv);
+  dexcheck::AllowWatching(dexcheck::cli::kFailure);
+  return dexcheck::EndProgram(dexcheck::cli::Run(argc, argv));
 }

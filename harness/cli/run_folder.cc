@@ -168,17 +168,6 @@ void WarnOfCut(const std::filesystem::path& run_folder, const LogReader& log) {
     Warn("note: " + run_folder.string() + ": " + cut);
 }
 
-std::vector<std::string> RecordedRun::ListController(const std::filesystem::path& folder) const {
-  const std::string run = log_.FindText("controller");
-  if (run.empty()) return {};
-  const std::string own_folder = log_.FindText("controller_folder");
-  if (own_folder.empty()) {
-    throw InputError(folder.string() + ": its controller is not in the log; give it again: --controller " +
-                     Quote(run));
-  }
-  return NameController(run, own_folder);
-}
-
 RecordedRun::RecordedRun(const std::filesystem::path& folder, const std::vector<std::string>& controller)
     : log_(folder / "log.h5") {
   log_.ExtractFiles("inputs", unpacked_.path());
@@ -189,9 +178,15 @@ RecordedRun::RecordedRun(const std::filesystem::path& folder, const std::vector<
     const bool is_file = line.starts_with("model.file=") || line.starts_with("plant.mjcf=");
     if (!is_file) overrides.push_back(line);
   }
-  const std::vector<std::string> own = controller.empty() ? ListController(folder) : controller;
-  overrides.insert(overrides.end(), own.begin(), own.end());
+  overrides.insert(overrides.end(), controller.begin(), controller.end());
   files_ = Open(unpacked_.path() / "scenario.toml", overrides, ReadSeed(log_, folder / "log.h5"));
+  // A log is data, and may be anybody's.
+  const OwnControllerOptions& own = files_.scenario.controller;
+  const std::string named = own.exists() ? own.run : log_.FindText("controller");
+  if (controller.empty() && !named.empty())
+    throw InputError((folder / "log.h5").string() +
+                     ": names a controller, which no log starts; give it anew: --controller " +
+                     QuoteForShell(named));
   files_.robot = FindEmbedded(log_, "robot", unpacked_.path());
   files_.mjcf = FindEmbedded(log_, "mjcf", unpacked_.path());
 }

@@ -75,7 +75,8 @@ class RecordedRun {
  public:
   /// @param controller in the place of the one that the log names; "PATH=VALUE" each, as NameController has
   /// them.
-  /// @throws InputError when the folder holds no log that can be repeated.
+  /// @throws InputError when the folder holds no log that can be repeated, and when the log names a
+  /// controller and none is given: nothing that a log names is started.
   RecordedRun(const std::filesystem::path& folder, const std::vector<std::string>& controller);
   [[nodiscard]] const ScenarioFiles& files() const { return files_; }
   [[nodiscard]] long rows() const { return log_.rows(); }
@@ -86,9 +87,6 @@ class RecordedRun {
   [[nodiscard]] const LogReader& log() const { return log_; }
 
  private:
-  /// Those of the log's own controller.
-  [[nodiscard]] std::vector<std::string> ListController(const std::filesystem::path& folder) const;
-
   LogReader log_;
   TemporaryFolder unpacked_;
   ScenarioFiles files_;

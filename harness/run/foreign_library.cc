@@ -17,7 +17,8 @@ void ForeignLibrary::Close::operator()(void* handle) const { dlclose(handle); }
 
 ForeignLibrary::ForeignLibrary(const OwnControllerSetup& setup)
     : name_(setup.name), code_(setup.own.time_limit) {
-  handle_.reset(dlopen(FindControllerFile(setup.own).c_str(), RTLD_NOW | RTLD_LOCAL));
+  Guard([&] { handle_.reset(dlopen(FindControllerFile(setup.own).c_str(), RTLD_NOW | RTLD_LOCAL)); },
+        kPatience);
   if (handle_ == nullptr) throw InputError(name_ + ": " + dlerror());
 }
 

@@ -50,11 +50,11 @@ uint32_t LibraryPeer::Greet(const dexcheck_hello& hello, std::span<const double>
 void LibraryPeer::SetParameters() {
   const auto set = library_->Find<const char*(void*, const char*, double)>("dexcheck_set_parameter");
   for (const auto& [parameter, value] : setup_.own.parameters) {
-    const char* problem = nullptr;
-    library_->Guard(
-        [&, name = parameter.c_str(), number = value] { problem = set(controller_, name, number); });
-    if (problem != nullptr)
-      throw InputError(setup_.name + ": controller." + parameter + ": " + Abbreviate(problem));
+    std::string problem;
+    library_->Guard([&, name = parameter.c_str(), number = value] {
+      if (const char* text = set(controller_, name, number)) problem = Abbreviate(text);
+    });
+    if (!problem.empty()) throw InputError(setup_.name + ": controller." + parameter + ": " + problem);
   }
 }
 
@@ -66,7 +66,10 @@ void LibraryPeer::Begin() {
 void LibraryPeer::Step(std::span<double> request, std::span<double> torques) {
   const char* problem = nullptr;
   library_->Guard([&] { problem = step_(controller_, request.data() + 1, torques.data()); });
-  if (problem != nullptr) throw ControllerFailure(setup_.name + ": " + Abbreviate(problem));
+  if (problem == nullptr) return;
+  std::string text;
+  library_->Guard([&] { text = Abbreviate(problem); });
+  throw ControllerFailure(setup_.name + ": " + text);
 }
 
 }  // namespace dexcheck

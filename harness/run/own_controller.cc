@@ -8,6 +8,7 @@
 #include "controller/common/text.h"
 #include "controller/common/toml_reader.h"
 #include "harness/base/files.h"
+#include "harness/base/watched_process.h"
 #include "harness/run/controller_peers.h"
 #include "harness/run/library_controller.h"
 #include "harness/run/protocol_controller.h"
@@ -80,6 +81,7 @@ std::unique_ptr<Controller> MakeOwnController(const Setup& setup, const Sampling
                                scenario.controller};
   if (FindControllerFile(own.own).extension() != ".so")
     return std::make_unique<ProtocolController>(StartProgram(own), own);
+  ContinueWatched(own.name);  // whatever it does to the process is told in one line
   auto library = std::make_unique<ForeignLibrary>(own);
   if (library->Find<void>("dexcheck_protocol") == nullptr)
     return std::make_unique<LibraryController>(std::move(library), own);

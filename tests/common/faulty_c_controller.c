@@ -1,5 +1,5 @@
 /* A controller's library in C with a fault that the environment chooses: FAULT is protocol, open, step,
- * crash, or none. */
+ * crash, exit, text (it returns no text), beyond (it writes far past the torques), or none. */
 
 #include <stdlib.h>
 #include <string.h>
@@ -26,6 +26,9 @@ const char* dexcheck_step(void* controller, const double* state, double* torques
   (void)state;
   if (Has("step")) return "the widget is out of cheese";
   if (Has("crash")) abort();
+  if (Has("exit")) exit(0);
+  if (Has("text")) return (const char*)8;
+  if (Has("beyond")) memset(torques, 0x55, 1u << 28);
   memset(torques, 0, n * sizeof(double));
   return NULL;
 }

@@ -1,6 +1,9 @@
 // A controller's library with a fault that the environment chooses: FAULT is throw, throw_number, nan, size,
-// crash, abort, overflow, hang or none.
+// crash, abort, overflow, hang, exit, _exit, quick_exit, kill, load (a crash while it is loaded) or none.
 
+#include <unistd.h>
+
+#include <csignal>
 #include <cstdlib>
 #include <limits>
 #include <stdexcept>
@@ -41,6 +44,10 @@ class FaultyController final : public Controller {
     if (fault_ == "crash") Crash();
     if (fault_ == "abort") std::abort();
     if (fault_ == "overflow") command->tau[0] = Overflow(0);
+    if (fault_ == "exit") std::exit(0);
+    if (fault_ == "_exit") ::_exit(0);
+    if (fault_ == "quick_exit") std::quick_exit(0);
+    if (fault_ == "kill") ::raise(SIGKILL);
     if (fault_ == "hang") {
       while (has_begun_) std::this_thread::yield();
     }
@@ -53,6 +60,11 @@ class FaultyController final : public Controller {
   std::string fault_;
   bool has_begun_ = false;
 };
+
+[[gnu::constructor]] void Load() {
+  const char* const fault = std::getenv("FAULT");
+  if (fault != nullptr && std::string(fault) == "load") std::abort();
+}
 
 std::unique_ptr<Controller> Make(const ControllerContext& context) {
   return std::make_unique<FaultyController>(context);

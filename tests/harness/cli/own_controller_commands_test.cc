@@ -52,7 +52,8 @@ TEST_F(OwnControllerCommands, AScenarioNamesItAndALogKnowsIt) {
   const Json checks = RunJson(0, "run own.toml --no-report --out run")["checks"];
   EXPECT_LE(checks["law_torque"]["max"], 1e-13);
   EXPECT_GT(checks["law_torque"]["max"], 0.0);
-  EXPECT_THAT(Expect(0, "run --replay run").out, HasSubstr("IDENTICAL"));
+  EXPECT_THAT(Expect(0, Words("run --replay run --controller") + Words{JOINT_LAW_LIBRARY}).out,
+              HasSubstr("IDENTICAL"));
   // Another one in its place is another run; the same file under another name is not what the log names.
   std::filesystem::copy_file(JOINT_LAW_LIBRARY, Path("copy.so"));
   EXPECT_THAT(Expect(0, "run --replay run --controller ./copy.so").out, HasSubstr("IDENTICAL"));
@@ -65,11 +66,18 @@ TEST_F(OwnControllerCommands, AScenarioNamesItAndALogKnowsIt) {
   EXPECT_THAT(same, Not(HasSubstr("controller_hash")));
   std::filesystem::copy_file(JOINT_PD_LIBRARY, Path("copy.so"),
                              std::filesystem::copy_options::overwrite_existing);
-  const ProgramResult changed = Run("run --replay copied");
+  const ProgramResult changed = Run("run --replay copied --controller ./copy.so");
   EXPECT_EQ(changed.exit_code, 1);
   EXPECT_THAT(changed.err, HasSubstr("is not the file that made the run"));
   std::filesystem::remove(Path("copy.so"));
-  EXPECT_TRUE(IsRefused(Run("run --replay copied"), {"copy.so"}));
+  EXPECT_TRUE(IsRefused(Run("run --replay copied --controller ./copy.so"), {"copy.so"}));
+  // A log starts nothing, whatever it names: a library, or a command of its scenario.
+  EXPECT_TRUE(IsRefused(Run("run --replay copied"), {"copied/log.h5", "--controller", "copy.so"}));
+  WriteScenario("command.toml", "touch started; false", "");
+  static_cast<void>(Run("run command.toml --no-report --out command"));
+  std::filesystem::remove(Path("started"));
+  static_cast<void>(Run("run --replay command"));
+  EXPECT_FALSE(Has("started"));
 }
 
 TEST_F(OwnControllerCommands, ComparedRunsSayWhichControllerTheyHad) {

@@ -1,5 +1,6 @@
 // Controllers that the user brings along: a library and programs, sound ones and each way to fail.
 
+#include <algorithm>
 #include <cstdlib>
 
 #include "tests/harness/cli/dexcheck_program.h"
@@ -104,7 +105,11 @@ TEST_F(OwnController, AJointLawIsNoneForAGrasp) {
 }
 
 TEST_F(OwnController, AnUnknownLawIsNotChecked) {
-  EXPECT_EQ(RunWith(PAPER_LAW_LIBRARY).exit_code, 0);
+  const ProgramResult result = RunWith(PAPER_LAW_LIBRARY);
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out,
+              HasSubstr("PASS: model, motors and sensors, inverse and forward dynamics, assumptions "
+                        "hold at every step; not judged: law."));
   const Json checks = ReadChecks();
   for (const char* check : {"law_torque", "law_demand", "grasp_null_space", "grasp_cone", "grasp_optimality",
                             "closed_loop_spectral_radius", "error_dynamics"})
@@ -112,8 +117,9 @@ TEST_F(OwnController, AnUnknownLawIsNotChecked) {
   for (const char* check :
        {"measurement", "torque_applied", "expect_position", "inverse_dynamics_robot", "contact_force"})
     EXPECT_TRUE(checks.contains(check)) << check;
-  // The log knows where it was.
-  Expect(0, "run --replay run");
+  // A log is data: it starts nothing.
+  EXPECT_TRUE(IsRefused(Run("run --replay run"), {"run/log.h5", "--controller", "paper_law.so"}));
+  Expect(0, Words("run --replay run --controller") + Words{PAPER_LAW_LIBRARY});
 }
 
 // A log that ends before it, and nothing else, is left.
@@ -135,6 +141,22 @@ TEST_F(OwnController, WhatALibraryDoesWrongEndsTheRunInOneLine) {
     EXPECT_EQ(ReadSummary(fault)["speed"]["steps"], 10) << fault;
     EXPECT_EQ(CountFiles(fault), 2) << fault << ": log and summary";
     EXPECT_TRUE(HasFailed(result, words, fault)) << fault;
+  }
+}
+
+// Whatever ends the process that has the library in it: exit code 3 and one line that names it.
+TEST_F(OwnController, WhatALibraryEndsIsNeverGood) {
+  for (const char* fault : {"exit", "_exit", "quick_exit", "kill", "load"}) {
+    const ProgramResult result = RunWith(FAULTY_LIBRARY, "--no-log", {.environment = {{"FAULT", fault}}});
+    EXPECT_EQ(result.exit_code, 3) << fault << result.out;
+    EXPECT_THAT(result.err, HasSubstr("faulty_controller.so")) << fault;
+    EXPECT_EQ(std::ranges::count(result.err, '\n'), 1) << fault << result.err;
+    EXPECT_THAT(result.out, Not(HasSubstr("PASS"))) << fault;
+  }
+  for (const char* fault : {"exit", "text", "beyond"}) {
+    const ProgramResult result = RunWith(FAULTY_C_LIBRARY, "--no-log", {.environment = {{"FAULT", fault}}});
+    EXPECT_EQ(result.exit_code, 3) << fault << result.out;
+    EXPECT_THAT(result.out + result.err, HasSubstr("faulty_c_controller.so")) << fault;
   }
 }
 
@@ -188,6 +210,18 @@ TEST_F(OwnPythonFile, EachFailureIsOneClearLine) {
   EXPECT_TRUE(HasFailed(RunStep("return np.full(7, np.nan)"), "not a number"));
   EXPECT_TRUE(HasFailed(RunStep("time.sleep(9)"), "within 0.5 s"));
   EXPECT_TRUE(HasFailed(RunStep("os._exit(4)"), "exit code 4"));
+}
+
+TEST_F(OwnPythonFile, WhatARunDoesNotReachIsNotGood) {
+  const ProgramResult result = RunLaw(
+      "import dexcheck\nclass Law(dexcheck.Controller):\n  def step(self, s): raise KeyError('cheese')\n");
+  EXPECT_EQ(result.exit_code, 3);
+  EXPECT_THAT(result.out, HasSubstr("not reached"));
+  const Json checks = ReadChecks();
+  for (const char* check : {"law_torque", "inverse_dynamics_robot", "joint_limit"}) {
+    EXPECT_EQ(checks[check]["reached"], false) << check;
+    EXPECT_FALSE(checks[check].contains("pass")) << check;
+  }
 }
 
 TEST_F(OwnPythonFile, WithoutAControllerIsRefused) {

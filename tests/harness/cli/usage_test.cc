@@ -67,6 +67,22 @@ TEST(Usage, AnOptionMeansOneThing) {
   EXPECT_EQ(seen["--ignore"], 3);
 }
 
+// An empty text is what a variable of a shell leaves that has no value: never what was meant.
+TEST(Usage, NoTextIsEmpty) {
+  for (const Words& words :
+       {Words{"run", "hold", "--controller", ""}, Words{"run", "hold", "--out", ""},
+        Words{"run", "hold", "--set", ""}, Words{"run", ""}, Words{"run", "--replay", ""},
+        Words{"consistency", "--model", ""}, Words{"consistency", kPandaToml, ""},
+        Words{"judge", kPandaToml, "recording.csv", "--columns", ""}, Words{"judge", kPandaToml, ""},
+        Words{"compare", "a", ""}, Words{"export", "a", "--csv", ""}, Words{"report", "a", "--out", ""},
+        Words{"study", "run", "joint_gains", "--db", ""}, Words{"import", kPandaXml, "--out="},
+        Words{"init", kPandaXml, "--out", ""}, Words{"eval", "--q", ""}}) {
+    EXPECT_TRUE(IsRefused(RunDexcheck(words), {"must not be empty"}) ||
+                IsRefused(RunDexcheck(words), {"--help"}))
+        << words[0] << " " << words[words.size() - 2];
+  }
+}
+
 TEST(Usage, TwoRobotsAreComparedWithoutTheWordForIt) {
   const auto compare = [](const Words& words) {
     Json results =
