@@ -168,14 +168,26 @@ class DigitJudge {
     }
   }
 
-  /// Judges the numbers of bodies in their links' frames.
+  /// Judges the numbers of bodies in their links' frames: as if the two files had the same frames, and as the
+  /// frames stand with all joints at zero. Of each link the better one counts.
   void JudgeBodies() {
     const MovedPair& pair = a_.nominal();
-    const ConstantChecks bodies = CompareBodies(pair.sides[0], pair.sides[1]);
-    for (const ConstantFinding& finding : bodies.findings) {
-      // The chains of both files place the link's frame, each with its roundings.
-      constexpr double kChains = 1e-10;
-      if (!IsWithin(finding, finding.scale, kChains)) failed_bodies_.insert(finding.check);
+    std::array<std::map<int, std::vector<ConstantFinding>>, 2> found;
+    const std::vector<Pose> choices[] = {{}, PlaceLinkFrames(pair.sides[0], pair.sides[1])};
+    for (size_t i = 0; i < 2; ++i) {
+      for (const ConstantFinding& finding : CompareBodies(pair.sides[0], pair.sides[1], choices[i]).findings)
+        found[i][finding.location.first].push_back(finding);
+    }
+    const auto find_worst = [&](const std::vector<ConstantFinding>& findings) {
+      double worst = 0.0;
+      for (const ConstantFinding& one : findings) RaiseTo(CalcUnits(one, kChains * one.scale), &worst);
+      return worst;
+    };
+    for (const auto& [link, same] : found[0]) {
+      const std::vector<ConstantFinding>& placed = found[1][link];
+      for (const ConstantFinding& finding : find_worst(same) <= find_worst(placed) ? same : placed) {
+        if (!IsWithin(finding, finding.scale, kChains)) failed_bodies_.insert(finding.check);
+      }
     }
   }
 
@@ -211,16 +223,27 @@ class DigitJudge {
   }
 
  private:
+  // The chains of both files place a link's frame, each with its roundings; relative to a body's numbers.
+  static constexpr double kChains = 1e-10;
+
   [[nodiscard]] std::string WordsOf(const Location& where) const {
     return Describe(where, model_, model_.num_base_velocities());
+  }
+
+  /// The printed precision of both files.
+  [[nodiscard]] double FindOpen(const ConstantFinding& finding) const {
+    const ConstantKey key = KeyOf(finding, model_.spec());
+    return a_.FindOpen(key) + b_.FindOpen(key);
+  }
+  [[nodiscard]] double CalcUnits(const ConstantFinding& finding, double rounding) const {
+    return std::abs(finding.model - finding.engine) / (FindOpen(finding) + rounding);
   }
 
   /// @param rounding relative to `size`, which is allowed for beside the printed precision.
   bool IsWithin(const ConstantFinding& finding, double size, double rounding = 0.0) {
     constexpr double kTie = 1e-6;  // of two numbers that are half a unit apart to their last digit
-    const ConstantKey key = KeyOf(finding, model_.spec());
-    const double open = a_.FindOpen(key) + b_.FindOpen(key) + rounding * size;
-    const double units = std::abs(finding.model - finding.engine) / open;
+    const double open = FindOpen(finding) + rounding * size;
+    const double units = CalcUnits(finding, rounding * size);
     RaiseTo(units, &verdict_.units[finding.check]);
     DigitExcess excess = {finding.check, finding.where, TakeNumbers(finding, model_), units};
     excess.effect = finding.effect;

@@ -365,7 +365,8 @@ std::vector<ConstantFinding> FindBodyDifferences(const Comparison& comparison) {
   std::vector<ConstantFinding> worst;
   try {
     CompletePair({}, {}, &sides);
-    for (const ConstantFinding& finding : CompareBodies(sides[0], sides[1]).findings) {
+    for (const ConstantFinding& finding :
+         CompareBodies(sides[0], sides[1], RegisterLinks(sides[0], sides[1])).findings) {
       const auto size = [](const ConstantFinding& one) {
         return std::abs(one.model - one.engine) / one.scale;
       };

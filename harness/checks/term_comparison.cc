@@ -192,7 +192,7 @@ bool TermComparison::IsCause(const AskedTerm& term) const {
 
 void TermComparison::WidenByDraws(AskedTerm* term) const {
   constexpr double kCoverage = 3.0;  // times the root mean square of draws at the ends of the intervals
-  constexpr double kFew = 1.9;  // the largest draw over the root mean square; 1.73 of three equal numbers
+  constexpr double kFew = 1.45;      // the largest draw over the root mean square; 1.41 of two equal numbers
   const bool is_cause = IsCause(*term);
   MatrixXd U = CalcBound(*term->entry, model().max_depth()) * term->scale;
   for (const SpreadRange& spread : spreads_) {
@@ -207,7 +207,7 @@ void TermComparison::WidenByDraws(AskedTerm* term) const {
     }
     const MatrixXd rms = (squares * (2.0 / static_cast<double>(spread.first_other - first_draw))).cwiseSqrt();
     const MatrixXd wide = kCoverage * rms;
-    U += is_cause ? MatrixXd((largest.array() <= kFew * rms.array()).select(largest, largest.cwiseMax(wide)))
+    U += is_cause ? MatrixXd((largest.array() <= kOne * rms.array()).select(largest, largest.cwiseMax(wide)))
                   : wide;
     for (size_t i = spread.first_other; i < spread.end; i += 2)
       U += (CalcDifference(term, i) - nominal).cwiseAbs();

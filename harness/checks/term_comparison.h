@@ -56,8 +56,8 @@ class TermComparison {
   };
   /// From now on the first pair's errors are relative to U = scale * bound + sum over the spreads of (the
   /// coverage of d - d_nominal over the draws + sum |d - d_nominal| over the others), with d = first - second
-  /// of a copy, and its bounds are 1. The coverage is the largest value over the draws where few numbers act
-  /// on the entry, and three times the root mean square where many do, as for all terms that are no causes.
+  /// of a copy, and its bounds are 1. The coverage is the largest value over the draws where one number acts
+  /// on the entry, and three times the root mean square elsewhere and for all terms that are no causes.
   /// @param causes terms from which the others follow.
   void CompareWithin(const std::vector<Spread>& spreads, std::span<const Term> causes);
   /// The worst of each place whose error is above 1; none before CompareWithin.

@@ -40,45 +40,56 @@ class BodyComparison : public ConstantComparison {
 
 }  // namespace
 
+std::vector<Pose> PlaceLinkFrames(const RobotDescription& a, const RobotDescription& b) {
+  const std::vector<int> b_of_a = MatchJoints(a.spec, b.spec);
+  const std::vector<Pose> poses_a = CalcZeroPoses(a);
+  const std::vector<Pose> poses_b = CalcZeroPoses(b);
+  std::vector<Pose> placed(b_of_a.size(), Pose::Identity());
+  for (size_t i = 0; i < placed.size(); ++i) {
+    if (b_of_a[i] < 0) continue;
+    placed[i] = poses_a[i + 1].inverse(Eigen::Isometry) * poses_b[static_cast<size_t>(b_of_a[i] + 1)];
+  }
+  return placed;
+}
+
 std::vector<Pose> RegisterLinks(const RobotDescription& a, const RobotDescription& b) {
+  constexpr double kNear = 1e-3;   // relative distance of bodies that are one, but for rounding
+  constexpr double kBetter = 0.5;  // of the distance, where the frames are chosen differently
   const std::vector<int> b_of_a = MatchJoints(a.spec, b.spec);
   const std::vector<OwnRow> rows_a = ListOwnRows(a);
   const std::vector<OwnRow> rows_b = ListOwnRows(b);
-  const std::vector<Pose> poses_a = CalcZeroPoses(a);
-  const std::vector<Pose> poses_b = CalcZeroPoses(b);
-  std::vector<Pose> registered(rows_a.size(), Pose::Identity());
+  std::vector<Pose> registered = PlaceLinkFrames(a, b);
   std::vector<bool> is_placed(rows_a.size(), false);
   for (size_t i = 0; i < rows_a.size(); ++i) {
     if (b_of_a[i] < 0) continue;
-    const auto j = static_cast<size_t>(b_of_a[i]);
-    const Pose X_ab = poses_a[i + 1].inverse(Eigen::Isometry) * poses_b[j + 1];
     const MassProperties& own = rows_a[i].body;
-    const MassProperties& other = rows_b[j].body;
+    const MassProperties& other = rows_b[static_cast<size_t>(b_of_a[i])].body;
     if (own.mass > 0.0 && other.mass > 0.0) {
-      is_placed[i] = CalcDistance(own, ExpressIn(other, X_ab)) < CalcDistance(own, other);
+      const double distance = CalcDistance(own, other);
+      is_placed[i] =
+          distance > kNear && CalcDistance(own, ExpressIn(other, registered[i])) < kBetter * distance;
     } else {
       is_placed[i] = rows_a[i].parent >= 0 && is_placed[static_cast<size_t>(rows_a[i].parent)];
     }
-    if (is_placed[i]) registered[i] = X_ab;
+    if (!is_placed[i]) registered[i].setIdentity();
   }
   return registered;
 }
 
-ConstantChecks CompareBodies(const RobotDescription& a, const RobotDescription& b) {
+ConstantChecks CompareBodies(const RobotDescription& a, const RobotDescription& b,
+                             const std::vector<Pose>& X_ab) {
   ConstantChecks result;
   const RobotModel model(a.spec);
   BodyComparison comparison(model, &result);
   if (a.spec.base.type == BaseType::kFloating) comparison.CompareLink(-1, a.spec.base.body, b.spec.base.body);
   const std::vector<int> b_of_a = MatchJoints(a.spec, b.spec);
-  const std::vector<Pose> X_ab = RegisterLinks(a, b);
+  const std::vector<OwnRow> rows_a = ListOwnRows(a);
   const std::vector<OwnRow> rows_b = ListOwnRows(b);
-  size_t i = 0;
-  for (const OwnRow& own : ListOwnRows(a)) {
-    if (b_of_a[i] >= 0) {
-      const MassProperties other = ExpressIn(rows_b[static_cast<size_t>(b_of_a[i])].body, X_ab[i]);
-      comparison.CompareLink(static_cast<int>(i), own.body, other);
-    }
-    ++i;
+  for (size_t i = 0; i < rows_a.size(); ++i) {
+    if (b_of_a[i] < 0) continue;
+    const MassProperties& other = rows_b[static_cast<size_t>(b_of_a[i])].body;
+    comparison.CompareLink(static_cast<int>(i), rows_a[i].body,
+                           X_ab.empty() ? other : ExpressIn(other, X_ab[i]));
   }
   return result;
 }

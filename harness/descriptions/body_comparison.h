@@ -9,18 +9,22 @@
 
 namespace dexcheck {
 
-/// Returns the pose of each link's own frame of `b` in that of `a`, by the joints of `a`. It is the identity
-/// where the link has the same body in both files, so that an error of a joint that carries the link does not
-/// count for the link. Elsewhere it is where the frames stand with all joints at zero.
-/// @param a, b as CompleteEachOther left them.
+/// Returns the pose of each link's own frame of `b` in that of `a`, by the joints of `a`, with all joints at
+/// zero.
+/// @param a, b as CompleteEachOther left them, here and below.
+std::vector<Pose> PlaceLinkFrames(const RobotDescription& a, const RobotDescription& b);
+
+/// Returns the same, but the identity where the link has nearly the same body in both files: an error of a
+/// joint that carries the link then does not count for the link.
 std::vector<Pose> RegisterLinks(const RobotDescription& a, const RobotDescription& b);
 
 /// Compares the centre of mass (check "link_com": x, y, z, m) and the inertia about it (check "link_inertia":
 /// xx, yy, zz, xy, xz, yz, kg m^2) of each link that has mass in both descriptions. All numbers are expressed
-/// in the link's own frame of `a`. Where the two files place a link differently but give it the same body,
-/// the body agrees. Centres are relative to their distance from the link's origin or to the link's radius of
-/// gyration, whichever is larger; inertias are relative to the largest moment.
-/// @param a, b as CompleteEachOther left them. Locations are those of `a`.
-ConstantChecks CompareBodies(const RobotDescription& a, const RobotDescription& b);
+/// in the link's own frame of `a`. Centres are relative to their distance from the link's origin or to the
+/// link's radius of gyration, whichever is larger; inertias are relative to the largest moment. Locations are
+/// those of `a`.
+/// @param X_ab frames of `b` in those of `a`; none: the two files have the same.
+ConstantChecks CompareBodies(const RobotDescription& a, const RobotDescription& b,
+                             const std::vector<Pose>& X_ab = {});
 
 }  // namespace dexcheck
