@@ -192,7 +192,7 @@ bool TermComparison::IsCause(const AskedTerm& term) const {
 
 void TermComparison::WidenByDraws(AskedTerm* term) const {
   constexpr double kCoverage = 3.0;  // times the root mean square of draws at the ends of the intervals
-  constexpr double kFew = 1.45;      // the largest draw over the root mean square; 1.41 of two equal numbers
+  constexpr double kOne = 1.02;      // the largest draw over the root mean square; 1 where one number acts
   const bool is_cause = IsCause(*term);
   MatrixXd U = CalcBound(*term->entry, model().max_depth()) * term->scale;
   for (const SpreadRange& spread : spreads_) {
