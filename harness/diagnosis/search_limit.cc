@@ -7,8 +7,9 @@
 namespace dexcheck {
 namespace {
 
-/// The limit of this thread's searches; null for none.
-thread_local SearchLimit* current = nullptr;
+/// The limit of this thread's searches; null for none. The Python module, a shared library, has this object,
+/// too.
+[[gnu::tls_model("initial-exec")]] thread_local SearchLimit* current = nullptr;
 
 double ReadProcessorTime() {
   timespec time{};

@@ -35,12 +35,20 @@ int CountSaturated(const Image& image, int channel) {
   return count;
 }
 
+CheckRecord MakeCheck(const char* name, double value) {
+  CheckRecord check;
+  check.name = name;
+  check.bound = 1e-6;
+  check.Add(value, 0.0);
+  return check;
+}
+
 OverlayState MakeState() {
   OverlayState state;
   state.title = "scenario";
   state.time = 1.0;
   for (const CheckCategory category : kCheckCategories) state.categories.emplace_back(category);
-  for (const size_t asked : {0U, 3U, 4U}) state.categories[asked].Add("a check", 1e-7, 1e-6, false);
+  for (const size_t asked : {0U, 3U, 4U}) state.categories[asked].Add(MakeCheck("a check", 1e-7));
   return state;
 }
 
@@ -53,13 +61,13 @@ TEST(Overlay, DotsShowTheChecksThatPassAndFail) {
   EXPECT_NEAR(CountSaturated(good, 1), 3 * 78, 40);
   EXPECT_EQ(CountSaturated(good, 0), 0);
 
-  state.categories[3].Add("another", 2e-6, 1e-6, true);
+  state.categories[3].Add(MakeCheck("another", 2e-6));
   Image bad(900, 720);
   overlay.Draw(state, &bad);
   EXPECT_NEAR(CountSaturated(bad, 1), 2 * 78, 30);
   EXPECT_NEAR(CountSaturated(bad, 0), 78, 15);
 
-  state.categories[3].Add("a third", std::numeric_limits<double>::infinity(), 1e-6, true);
+  state.categories[3].Add(MakeCheck("a third", std::numeric_limits<double>::infinity()));
   Image infinite(900, 720);
   overlay.Draw(state, &infinite);
   EXPECT_NEAR(CountSaturated(infinite, 0), 78, 15);
