@@ -1,5 +1,7 @@
 #include "harness/diagnosis/search_limit.h"
 
+#include <pthread.h>
+
 #include <ctime>
 
 #include "harness/base/interrupts.h"
@@ -21,13 +23,13 @@ double ReadProcessorTime() {
 
 SearchLimit::SearchLimit(double seconds)
     : end_(ReadProcessorTime() + seconds), was_interrupted_(IsInterrupted()) {
-  current = this;
+  ::pthread_setspecific(GetKey(), this);
 }
 
-SearchLimit::~SearchLimit() { current = nullptr; }
+SearchLimit::~SearchLimit() { ::pthread_setspecific(GetKey(), nullptr); }
 
 bool SearchLimit::IsOver() {
-  SearchLimit* const limit = current;
+  auto* const limit = static_cast<SearchLimit*>(::pthread_getspecific(GetKey()));
   if (limit == nullptr) return false;
   const bool is_interrupted = IsInterrupted() && !limit->was_interrupted_;
   limit->has_ended_ = limit->has_ended_ || is_interrupted || ReadProcessorTime() > limit->end_;
