@@ -60,20 +60,18 @@ const char* TitleOf(CheckCategory category) {
   return kTitles[static_cast<size_t>(category)];
 }
 
-void CheckRecord::Add(double value, double when, double allowed) {
+void CheckRecord::Add(double value, double when, double before, double allowed) {
   if (!applies) return;
-  const double judged =
-      allowed == 0.0 || std::isnan(value) ? value : Worst(std::min(value, bound), value - allowed);
-  const bool is_worst = Note(judged, when);
-  // Of values that the bound cut off, the one that took most of its allowance.
-  const bool takes_more =
-      judged == worst && CalcFraction(value, bound + allowed) > CalcFraction(residual, bound + allowance);
-  if (allowed != 0.0 && (is_worst || takes_more)) {
-    residual = value;
+  const bool is_worst = Note(value, when);
+  // Of values that are alike once something is taken off, the one that needed most of its allowance.
+  const bool needs_more =
+      value == worst && CalcFraction(before, bound + allowed) > CalcFraction(residual, bound + allowance);
+  if (allowed != 0.0 && (is_worst || needs_more)) {
+    residual = before;
     at = when;
   }
-  if (is_worst || (allowed != 0.0 && takes_more)) allowance = allowed;
-  AddStep(judged);
+  if (is_worst || (allowed != 0.0 && needs_more)) allowance = allowed;
+  AddStep(value);
 }
 
 double CalcFraction(double value, double bound) {

@@ -70,9 +70,11 @@ struct CheckRecord {
   long count = 0;        ///< Steps.
   double sum_of_squares = 0.0;
 
-  /// Adds the value of one step: as it is up to the bound, and above it less the allowance.
-  /// @param allowed how much of it is known to come of the plant.
-  void Add(double value, double when, double allowed = 0.0);
+  /// Adds the value of one step.
+  void Add(double value, double when) { Add(value, when, value, 0.0); }
+  /// The same of a value from which something is taken off. @param before the value without that. @param
+  /// allowed how much of it is known to come of the plant.
+  void Add(double value, double when, double before, double allowed);
 
   /// Adds one of a step's numbers. `scale` is positive; the error is |model - engine| / scale. Returns it, or
   /// infinity when it is not a number.

@@ -71,7 +71,8 @@ Evaluation OfLaw(const Analysis& a) {
 }
 
 Evaluation EvaluateDemand(const Analysis& a) {
-  return a.law == nullptr ? std::nullopt : When(true, a.law->demand, a.law->demand_by_slip);
+  if (a.law == nullptr) return std::nullopt;
+  return CheckValue{a.law->demand, -1, a.law->demand_by_slip, a.law->demand_residual};
 }
 
 /// Where f_c is inside its cones and bounds.

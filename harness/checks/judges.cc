@@ -37,7 +37,9 @@ class IdleJointsJudge final : public StatefulJudge {
 
 Evaluation EvaluateRobotDynamics(const StepAnalysis& step) {
   if (step.mass_factor == nullptr) return std::nullopt;
-  return CheckValue{step.robot_residual_norm / step.balanced, -1, step.uneven_force / step.balanced};
+  const double left = step.robot_residual_norm;
+  return CheckValue{Worst(0.0, left - step.uneven_force) / step.balanced, -1,
+                    step.uneven_force / step.balanced, left / step.balanced};
 }
 
 Evaluation EvaluateRolling(const StepAnalysis& step) {
@@ -45,7 +47,8 @@ Evaluation EvaluateRolling(const StepAnalysis& step) {
   const Vector2d beyond = step.wheel_mismatch.cwiseAbs() - step.wheel_slip;
   const int wheel = IsWorse(beyond[1], beyond[0]) ? 1 : 0;
   // A wheel rolls on another radius also while its platform sinks or tilts under a force that changes.
-  return CheckValue{std::abs(step.wheel_mismatch[wheel]), -1, step.wheel_slip[wheel] + step.sinking};
+  return CheckValue{Worst(0.0, beyond[wheel] - step.sinking), -1, step.wheel_slip[wheel] + step.sinking,
+                    std::abs(step.wheel_mismatch[wheel])};
 }
 
 Evaluation EvaluateContactDistance(const StepAnalysis& step) {

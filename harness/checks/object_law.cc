@@ -262,14 +262,18 @@ class JudgedObjectLaw final : public JudgedLaw {
     const double motion = work_n_.norm() / scale_;
     const VectorXd& f_c = reference_.f_c();
     const double forces = (*moved.f_c - f_c).norm() / Worst(f_c.norm(), kSmallest);
-    errors_.demand = Worst(motion, forces) / reference_.condition_number();
+    const double error = Worst(motion, forces) / reference_.condition_number();
+    errors_.demand = errors_.demand_residual = error;
     if (!has_slip) return;
     work_n_ = reference_.slip_acceleration();
     factor_->Multiply(work_n_);
-    double& by_slip = errors_.demand_by_slip;
-    by_slip = kSlipFraction * work_n_.norm() / scale_;
-    const bool is_explained = errors_.demand <= by_slip;
-    if (!is_explained) by_slip += kSlipFraction * Norm(reference_.slip_coriolis()) / scale_;
+    const double by_motion = kSlipFraction * work_n_.norm() / scale_, apart = error - by_motion;
+    errors_.demand_by_slip = by_motion;
+    errors_.demand = 0.0;
+    if (apart <= 0.0) return;
+    const double by_coriolis = kSlipFraction * Norm(reference_.slip_coriolis()) / scale_;
+    errors_.demand_by_slip += by_coriolis;
+    errors_.demand = Worst(apart - by_coriolis, 0.0);
   }
 
   void CompareGraspForce(const LawTerms& terms, const VectorXd& F_N, const VectorXd& f_c) {

@@ -137,7 +137,11 @@ void RunChecks::Add(const Judge& judge, CheckRecord* record, double time) {
   const Evaluation found = judge.Evaluate(analysis());
   if (!found) return;
   const bool had_failed = record->failed;
-  record->Add(found->value, time, found->explained);
+  double value = found->value;
+  // As it is up to the bound, and above it less what is known to be in it.
+  if (!found->residual && found->explained != 0.0 && !std::isnan(value))
+    value = Worst(std::min(value, record->bound), value - found->explained);
+  record->Add(value, time, found->residual.value_or(found->value), found->explained);
   if (judge.info->by.describe != nullptr && record->failed && !had_failed)
     record->part = judge.info->by.describe(analysis(), found->part);
   differs_ = differs_ || !(record->last <= record->bound);

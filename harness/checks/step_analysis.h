@@ -45,7 +45,8 @@ struct LawErrors {
   /// xi_dot, V_o_dot and f_c of the rigid system (46), (48) under tau' against what (47), (49), (55) demand,
   /// likewise; forces relative to |f_c|. The largest of them.
   double demand = kNaN;
-  double demand_by_slip = 0.0;  ///< How much of it contacts that slip make.
+  /// The same with what contacts that slip make of it, and how much that is.
+  double demand_residual = kNaN, demand_by_slip = 0.0;
   /// F_N by its certificate: the largest entry of G F_N, and how far f_c is outside its cones and bounds,
   /// both over max(1 N, |f_c|); the slope that the objective has left within null(G), over max(1, all of it).
   double grasp_null_space = kNaN, grasp_cone = kNaN, grasp_optimality = kNaN;
