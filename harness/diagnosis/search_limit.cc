@@ -9,9 +9,16 @@
 namespace dexcheck {
 namespace {
 
-/// The limit of this thread's searches; null for none. The Python module, a shared library, has this object,
-/// too.
-[[gnu::tls_model("initial-exec")]] thread_local SearchLimit* current = nullptr;
+/// Where a thread keeps the limit of its searches; null for none. The Python module, a shared library, has
+/// this object, too, and takes no thread_local of it.
+pthread_key_t GetKey() {
+  static const pthread_key_t key = [] {
+    pthread_key_t made{};
+    ::pthread_key_create(&made, nullptr);
+    return made;
+  }();
+  return key;
+}
 
 double ReadProcessorTime() {
   timespec time{};
