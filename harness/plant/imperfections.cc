@@ -46,7 +46,7 @@ bool ActuationOptions::is_exact() const {
 bool MismatchOptions::is_none() const {
   return mass.Is(1.0) && mass_within.Is(0.0) && damping.Is(1.0) && armature.Is(1.0) &&
          std::ranges::all_of(com, [](const auto& shift) { return shift.second.isZero(0.0); }) &&
-         payloads.empty() && slope.isZero(0.0);
+         payloads.empty() && slope.isZero(0.0) && !friction;
 }
 
 bool Imperfections::is_ideal() const {

@@ -4,6 +4,7 @@
 // engine whose masses are not those that the controller knows. The defaults are the ideal plant.
 
 #include <cmath>
+#include <optional>
 #include <span>
 #include <string>
 #include <utility>
@@ -127,6 +128,7 @@ struct MismatchOptions {
       com;  ///< By how much a link's centre of mass is elsewhere, m.
   std::vector<Payload> payloads;
   Vector2d slope = Vector2d::Zero();  ///< Rise of the floor along x and y, rad.
+  std::optional<double> friction;     ///< mu of fingertips on the object, instead of the model's.
 
   [[nodiscard]] bool is_none() const;
 };

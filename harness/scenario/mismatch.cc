@@ -219,6 +219,7 @@ void ApplyMismatch(const MismatchOptions& options, std::uint64_t seed, const std
     bodies.AddPoint(bodies.FindLink(payload.body, payload.key + ".body", source), payload.mass, payload.at);
   }
   ScaleJoints(options, source, adapter, engine, plant);
+  if (options.friction) SetFingerFriction(*options.friction, engine);
   if (!options.slope.isZero(0.0)) plant->gravity = TiltGravity(plant->gravity, options.slope);
   std::copy_n(plant->gravity.data(), 3, engine->opt.gravity);
 

@@ -43,8 +43,24 @@ std::unique_ptr<RobotModel> ReadRigidModel(const Scenario& scenario, const std::
   return std::make_unique<RobotModel>(ParseRobotModel(ReadTextFile(robot), robot, own));
 }
 
+/// Gives contact pairs this friction along the surface, those with a floor or all others.
+void SetFriction(double mu, bool of_floors, mjModel* engine) {
+  const mjModel& m = *engine;
+  for (int pair = 0; pair < m.npair; ++pair) {
+    const bool has_floor =
+        m.geom_type[m.pair_geom1[pair]] == mjGEOM_PLANE || m.geom_type[m.pair_geom2[pair]] == mjGEOM_PLANE;
+    if (has_floor == of_floors) m.pair_friction[5 * pair] = m.pair_friction[5 * pair + 1] = mu;
+  }
+}
+
+void ApplyFriction(const PlantOptions& plant, mjModel* engine) {
+  if (plant.floor_friction) SetFriction(*plant.floor_friction, true, engine);
+  if (plant.finger_friction) SetFriction(*plant.finger_friction, false, engine);
+}
+
 void ApplyPlantOptions(const PlantOptions& plant, mjModel* engine) {
   mjModel& m = *engine;
+  ApplyFriction(plant, engine);
   m.opt.timestep = plant.time_step;
   m.opt.impratio = plant.impratio;
   m.opt.noslip_iterations = plant.noslip_iterations;
@@ -53,10 +69,6 @@ void ApplyPlantOptions(const PlantOptions& plant, mjModel* engine) {
   for (int pair = 0; pair < m.npair; ++pair) {
     SetStiffness(time_constant, plant.contact_impedance, m.pair_solref + mjNREF * pair,
                  m.pair_solimp + mjNIMP * pair);
-    const bool has_floor =
-        m.geom_type[m.pair_geom1[pair]] == mjGEOM_PLANE || m.geom_type[m.pair_geom2[pair]] == mjGEOM_PLANE;
-    const std::optional<double>& mu = has_floor ? plant.floor_friction : plant.finger_friction;
-    if (mu) m.pair_friction[5 * pair] = m.pair_friction[5 * pair + 1] = *mu;
   }
   // By default dry friction creeps until (1 - d) f tc / (2 M): by radians a second at joints of little
   // inertia.
@@ -80,6 +92,8 @@ void WatchBodies(const Scenario& scenario, const std::string& mjcf, RobotPair* r
 }
 
 }  // namespace
+
+void SetFingerFriction(double mu, mjModel* engine) { SetFriction(mu, false, engine); }
 
 void SetStiffness(double time_constant, double impedance, mjtNum* solref, mjtNum* solimp) {
   solref[0] = time_constant;
@@ -135,6 +149,7 @@ RobotPair::RobotPair(const Scenario& scenario, RobotModel the_model, const std::
   RemoveLooks(&engine, pushing);
   adapter = std::make_unique<Adapter>(model, *engine, mjcf.string());
   RequireNothingElse(*adapter, mjcf.string());
+  ApplyFriction(scenario.plant, engine.get());
   constants = CheckConstants(*adapter);
   if (scenario.tolerance > 0.0) JudgeByTolerance(scenario.tolerance, &constants);
   WatchBodies(scenario, mjcf.string(), this);

@@ -42,7 +42,7 @@ struct RobotPair {
   std::unique_ptr<RobotModel> rigid;
   std::unique_ptr<DeclaredMismatch> declared;  ///< Null without one.
   ConstantChecks
-      constants;  ///< What the two disagree on before anything moves, the scenario's changes aside.
+      constants;  ///< What the two disagree on before anything moves, with the friction of the scenario.
   Solids solids;  ///< The shapes of all bodies,
   std::vector<WatchedPair> watched_pairs;  ///< and those pairs that should not touch.
 };
@@ -59,6 +59,9 @@ std::vector<std::pair<int, int>> ListPushingGeoms(const RobotPair& robots);
 /// Makes the plant's robot what the scenario declares it to be, if it does.
 /// @throws InputError when a link or joint is not there.
 void DeclareMismatch(const Scenario& scenario, const std::filesystem::path& mjcf, RobotPair* robots);
+
+/// Gives all contact pairs but those with a floor this friction along the surface.
+void SetFingerFriction(double mu, mjModel* engine);
 
 /// Makes contacts of the engine critically damped, of constant impedance, whatever the MJCF says.
 void SetStiffness(double time_constant, double impedance, mjtNum* solref, mjtNum* solimp);

@@ -138,7 +138,9 @@ void ReadDisturbance(const TomlValue& value, size_t number, double time_step, Im
 void ReadMismatch(const TomlValue& value, MismatchOptions* mismatch) {
   using Options = MismatchOptions;
   TomlTable table = value.AsTable();
-  ReadKeys<Options>(table, {POSITIVE_KEY(mass), KEY(mass_within), KEY(damping), KEY(armature)}, mismatch);
+  ReadKeys<Options>(
+      table, {POSITIVE_KEY(mass), KEY(mass_within), KEY(damping), KEY(armature), POSITIVE_KEY(friction)},
+      mismatch);
   const ByName& within = mismatch->mass_within;
   const bool too_wide = within.all > kLargestSpread ||
                         std::any_of(within.groups.begin(), within.groups.end(),

@@ -149,6 +149,7 @@ void ListMismatch(const Imperfections& all, std::vector<ErrorSource>* list) {
   lister.Add("mismatch.com", &M::com);
   lister.Add("mismatch.damping", &M::damping);
   lister.Add("mismatch.armature", &M::armature);
+  lister.Add("mismatch.friction", &M::friction);
 }
 
 /// Makes setups of one scenario with other imperfections; the scene is compiled once.

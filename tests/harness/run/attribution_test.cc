@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <functional>
 #include <utility>
 
@@ -46,7 +47,7 @@ INSTANTIATE_TEST_SUITE_P(
         Fault{"misplaced_contact", "curve", {"duration=0.2", "control.contact_error_deg=2"}, Cause::kSensing},
         Fault{"low_fingertip_friction",
               "curve",
-              {"duration=1", "plant.finger_friction=0.18"},
+              {"duration=1", "mismatch.friction=0.18"},
               Cause::kFingertipSlip},
         Fault{"soft_contacts",
               "curve",
@@ -61,6 +62,21 @@ INSTANTIATE_TEST_SUITE_P(
         Fault{"ring_radius", "two-hands", {"duration=0.1", "model.object.ring_radius=0.2503"}, Cause::kModel},
         Fault{"slippery_floor", "paper-ramp", {"duration=2", "plant.floor_friction=0.1"}, Cause::kWheelSlip}),
     [](const ::testing::TestParamInfo<Fault>& info) { return info.param.name; });
+
+// What the scenario makes of the plant is compared, not what the MJCF was before.
+TEST(ConstantsAsSimulated, HaveTheFrictionOfTheScenario) {
+  const auto differs = [](const std::vector<std::string>& overrides) {
+    const ShippedRun run("hold", overrides);
+    const std::vector<ConstantFinding>& findings = run.setup().constants().findings;
+    return std::ranges::any_of(
+        findings, [](const ConstantFinding& finding) { return finding.check == "contact_friction"; });
+  };
+  EXPECT_FALSE(differs({}));
+  EXPECT_TRUE(differs({"plant.finger_friction=0.3"}));
+  EXPECT_TRUE(differs({"model.object.friction=0.3"}));
+  EXPECT_FALSE(differs({"plant.finger_friction=0.3", "model.object.friction=0.3"}));
+  EXPECT_FALSE(differs({"mismatch.friction=0.3"}));
+}
 
 struct Failure {
   const char* name;

@@ -106,7 +106,7 @@ TEST_F(LiftTest, WeighsAHeavierObjectAndLiftsIt) {
 }
 
 TEST_F(LiftTest, LiftsWithLessFrictionThanStated) {
-  const RunResult& result = LiftCoarsely({"plant.finger_friction=0.56"});
+  const RunResult& result = LiftCoarsely({"mismatch.friction=0.56"});
   EXPECT_EQ(result.verdict, Verdict::kPass) << result.failure << result.attribution.evidence;
   EXPECT_EQ(ListPhases(task()), kWholeTask);
   EXPECT_GT(run_->Worst("cone_use"), 0.7);
@@ -145,7 +145,7 @@ TEST_F(LiftTest, TriesAgainAndSaysWhichFingerMissed) {
 }
 
 TEST_F(LiftTest, LosesTheGraspWhereFrictionIsFarLessThanStated) {
-  const RunResult& result = LiftCoarsely({"plant.finger_friction=0.3"});
+  const RunResult& result = LiftCoarsely({"mismatch.friction=0.3"});
   EXPECT_EQ(result.verdict, Verdict::kFailed);
   EXPECT_TRUE(result.grasp_lost);
   EXPECT_EQ(result.attribution.cause, Cause::kFingertipSlip);

@@ -131,7 +131,7 @@ std::string ShowImperfections(const Imperfections& all) {
       s.odometry, s.object_position_noise, s.object_orientation_noise, s.object_rate, s.object_latency,
       s.object_velocity, s.object_velocity_cutoff, s.object_acceleration, s.contact_force_noise, s.latency);
   text += ShowAll(a.torque_step, a.gain_error, a.lag, a.coulomb, a.stribeck, a.backlash, a.stribeck_velocity,
-                  a.delay, a.saturate, a.limit, m.mass, m.mass_within, m.damping, m.armature);
+                  a.delay, a.saturate, a.limit, m.mass, m.mass_within, m.damping, m.armature, m.friction);
   for (const DisturbanceOptions& d : all.disturbances) {
     text += ShowAll(d.kind, d.body, d.force, d.torque, d.at, d.in_body_frame, d.begin, d.duration, d.period,
                     d.frequency, d.begin_within, d.size_within);
