@@ -42,7 +42,15 @@ double CalcArm(const RobotModel& model, double reach) {
   constexpr double kErrorsOfWorld = 4.0;
   double world = reach + model.base().X_B0.translation().norm();
   if (model.base().type != BaseType::kFixed) world += std::sqrt(3.0) * StateRange{}.area;
-  return Worst(reach, kErrorsOfWorld * world / (kErrorsPerJoint * (model.max_depth() + 1)));
+  const double arm = Worst(reach, kErrorsOfWorld * world / (kErrorsPerJoint * (model.max_depth() + 1)));
+  if (arm > 0.0) return arm;
+  // All lies at one point: an inertia has the arm at which its mass would have it.
+  double squared = 0.0;
+  for (int i = 0; i < model.num_joints(); ++i) {
+    const MassProperties& body = model.joint(i).body;
+    if (body.mass > 0.0) squared = Worst(squared, body.inertia.trace() / body.mass);
+  }
+  return squared > 0.0 ? std::sqrt(squared) : 1.0;
 }
 
 }  // namespace
@@ -63,12 +71,14 @@ RoundingScales::RoundingScales(const RobotModel& model)
       arm_(CalcArm(model, reach_)) {
   squared_rate_.assign(static_cast<size_t>(model.num_joints()) + 1, 0.0);
   subtree_mass_.assign(static_cast<size_t>(model.num_joints()) + 1, 0.0);
-  subtree_mass_[0] = model.base().type == BaseType::kFixed ? 0.0 : model.base_with_wheels().mass;
+  // An inertia that no mass within reach has counts as the mass that would have it there.
+  const auto count_mass = [this](const MassProperties& body) {
+    return Worst(body.mass, body.inertia.trace() / (arm_ * arm_));
+  };
+  subtree_mass_[0] = model.base().type == BaseType::kFixed ? 0.0 : count_mass(model.base_with_wheels());
   for (int i = model.num_joints() - 1; i >= 0; --i) {
     const Joint& joint = model.joint(i);
-    // An inertia that no mass within reach has counts as the mass that would have it there.
-    const double turned = joint.body.inertia.trace() / Positive(arm_ * arm_);
-    subtree_mass_[static_cast<size_t>(i + 1)] += Worst(joint.body.mass, turned);
+    subtree_mass_[static_cast<size_t>(i + 1)] += count_mass(joint.body);
     subtree_mass_[static_cast<size_t>(joint.parent + 1)] += subtree_mass_[static_cast<size_t>(i + 1)];
     rotors_ += CountVelocities(joint.type) * joint.armature;
   }
@@ -134,8 +144,7 @@ double RoundingScales::CalcGravityScale(int coordinate) const {
 }
 
 double RoundingScales::acceleration() const {
-  const double straight = arm_ > 0.0 ? linear_rate_ / arm_ : 0.0;
-  return linear_rate_ * Worst(angular_rate_, straight);
+  return linear_rate_ * Worst(angular_rate_, linear_rate_ / arm_);
 }
 
 double RoundingScales::CalcCoriolisScale(int coordinate) const {
