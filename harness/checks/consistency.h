@@ -17,8 +17,8 @@
 
 namespace dexcheck {
 
-/// What two descriptions need not share: constants of joints, and that joints follow others.
-inline constexpr const char* kIgnorable[] = {"armature", "damping", "friction", "coupling"};
+/// What two descriptions need not share: constants of joints, that joints follow others, limits of motors.
+inline constexpr const char* kIgnorable[] = {"armature", "damping", "friction", "coupling", "effort"};
 
 struct ConsistencyOptions {
   long samples = 10000;

@@ -387,10 +387,11 @@ Differences ListExcesses(const DigitVerdict& verdict, const std::string& first, 
       continue;
     }
     const std::string values = DescribeValues(excess, first, second);
-    // The same two numbers, or what one file leaves out, are one fault of many joints: the worst stands for
-    // all.
+    // The same two numbers, or a constant that one file leaves out, are one fault of many joints: the worst
+    // stands for all.
+    const bool is_left_out = excess.effect.find(" states it") != std::string::npos;
     const auto [line, is_new] =
-        repeated.emplace(excess.check + (excess.effect.empty() ? values : ""), std::pair(lines.size(), 0));
+        repeated.emplace(excess.check + (is_left_out ? "" : values), std::pair(lines.size(), 0));
     line->second.second += is_new ? 0 : 1;
     if (is_new) lines.push_back(excess.check + ": " + excess.where + ": " + values);
   }

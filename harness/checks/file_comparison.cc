@@ -100,6 +100,26 @@ EngineCompletion Complete(const ConsistencyOptions& options, const MjcfFile& mjc
   return result;
 }
 
+/// Compares motors, wheels and shapes, and names what the compilers of MJCFs changed.
+/// @param robot the first description, with the second's names.
+void CompareBeside(const DescriptionFile& first, const RobotDescription& robot, const DescriptionFile& second,
+                   Comparison* comparison) {
+  ConstantChecks& constants = comparison->result.constants;
+  const RobotDescription& other = *comparison->read_second;
+  const bool has_motors = std::ranges::any_of(
+      constants.findings, [](const ConstantFinding& finding) { return finding.check == "motor_limit"; });
+  if (!has_motors) CheckMotorsAndWheels(robot, other, &constants);
+  // Of two MJCFs each shape that can touch was compared.
+  if (first.format() != RobotFormat::kMjcf)
+    AppendTo(&comparison->without_effect, CompareShapes(robot, other));
+  for (const size_t side : {0U, 1U}) {
+    const DescriptionFile& file = side == 0 ? first : second;
+    if (file.format() != RobotFormat::kMjcf) continue;
+    NameCompiledChanges(ListCompiledChanges(file.document(), *file.CopyEngine()), {&robot, &other}, side,
+                        &constants, &comparison->notes);
+  }
+}
+
 /// A description against the engine.
 void CompareWithEngine(const DescriptionFile& first, const DescriptionFile& second, const UrdfOptions& urdf,
                        const ConsistencyOptions& options, const Progress& progress, Comparison* comparison) {
@@ -118,8 +138,11 @@ void CompareWithEngine(const DescriptionFile& first, const DescriptionFile& seco
   comparison->model.emplace(robot.spec);
   const Adapter adapter(*comparison->model, *engine, comparison->second.string());
   std::optional<Extras> extras;
-  if (format == RobotFormat::kMjcf)
-    extras = CompareExtras(written, first.CopyEngine(), first.path().string(), adapter, engine.get());
+  if (format == RobotFormat::kMjcf) {
+    extras = CompareExtras(written, first.CopyEngine(), first.path().string(), adapter, engine.get(), file);
+    comparison->without_effect = extras->without_effect;
+    AppendTo(&comparison->not_compared, extras->not_compared);
+  }
   comparison->result = CheckConsistency(adapter, options, progress);
   CountRoundings(robot.is_imported ? 1 : 0, completed.has_link_frames, &comparison->result.terms);
   ConstantChecks& constants = comparison->result.constants;
@@ -129,7 +152,11 @@ void CompareWithEngine(const DescriptionFile& first, const DescriptionFile& seco
   AddOneSided(*comparison->model, completion.one_sided, &constants);
   AppendTo(&comparison->not_compared,
            CheckCouplings(adapter, Ignores("coupling", options.ignore), &constants));
-  if (extras) AddExtras(*extras, &constants);
+  if (extras) {
+    AppendTo(&comparison->without_effect, CompareContacts(extras->of_first, constants));
+    AddExtras(*extras, &constants);
+  }
+  if (comparison->read_second) CompareBeside(first, robot, second, comparison);
   // An MJCF's notes are about what CompareExtras compares.
   if (format != RobotFormat::kMjcf) AppendTo(&comparison->notes, robot.notes);
   AppendTo(&comparison->not_compared, completion.not_compared);
@@ -141,10 +168,11 @@ void CompareWithEngine(const DescriptionFile& first, const DescriptionFile& seco
                                      {}, &comparison->result);
 }
 
-/// Two descriptions without the engine.
+/// Two descriptions without the engine. @param missing what only one of them has.
 void CompareTwoDescriptions(const DescriptionFile& first, const DescriptionFile& second,
                             const UrdfOptions& urdf, const ConsistencyOptions& options, const RobotPart& part,
-                            const Progress& progress, Comparison* comparison) {
+                            const std::vector<ConstantFinding>& missing, const Progress& progress,
+                            Comparison* comparison) {
   RobotDescription a = first.Describe();
   RobotDescription b = second.Describe();
   int held = 0;
@@ -165,6 +193,8 @@ void CompareTwoDescriptions(const DescriptionFile& first, const DescriptionFile&
   CountRoundings((a.is_imported ? 1 : 0) + (b.is_imported ? 1 : 0), has_link_frames,
                  &comparison->result.terms, held);
   AddOneSided(*comparison->model, completion.one_sided, &comparison->result.constants);
+  for (const ConstantFinding& finding : missing) comparison->result.constants.Add(finding);
+  AppendTo(&comparison->without_effect, CompareShapes(a, b));
   const RobotModel other(b.spec);
   AnalyticProvider of_a(*comparison->model, a.spec.source);
   AnalyticProvider of_b(other, b.spec.source, *comparison->model);
@@ -174,14 +204,15 @@ void CompareTwoDescriptions(const DescriptionFile& first, const DescriptionFile&
 
 /// Part of two robots. Of an MJCF, the terms are those of what MuJoCo compiled, by the analytic model.
 void ComparePart(const DescriptionFile& first, const DescriptionFile& second, const UrdfOptions& urdf,
-                 const ConsistencyOptions& options, const RobotPart& part, const Progress& progress,
+                 const ConsistencyOptions& options, const RobotPart& part,
+                 const std::vector<ConstantFinding>& missing, const Progress& progress,
                  Comparison* comparison) {
   comparison->with_engine = false;
   if (second.format() == RobotFormat::kMjcf)
     comparison->notes.push_back("part of a robot: the terms of " + second.path().filename().string() +
                                 " are those of what MuJoCo compiled, by the analytic model; what an MJCF has "
                                 "besides the mechanism is not compared");
-  CompareTwoDescriptions(first, second, urdf, options, part, progress, comparison);
+  CompareTwoDescriptions(first, second, urdf, options, part, missing, progress, comparison);
 }
 
 /// A description whose terms stand first: the analytic model's, or of an MJCF the engine's.
@@ -243,11 +274,11 @@ Comparison CompareFiles(DescriptionFile* a, DescriptionFile* b, const UrdfOption
   comparison.read_second = second.TryToDescribe();
   try {
     if (!options.part.empty()) {
-      ComparePart(first, second, urdf, options, options.part, progress, &comparison);
+      ComparePart(first, second, urdf, options, options.part, {}, progress, &comparison);
     } else if (comparison.with_engine) {
       CompareWithEngine(first, second, urdf, options, progress, &comparison);
     } else {
-      CompareTwoDescriptions(first, second, urdf, options, {}, progress, &comparison);
+      CompareTwoDescriptions(first, second, urdf, options, {}, {}, progress, &comparison);
     }
   } catch (const InputError& error) {
     // Names of joints that were exchanged make another mechanism of one robot.
@@ -258,7 +289,13 @@ Comparison CompareFiles(DescriptionFile* a, DescriptionFile* b, const UrdfOption
     if (!common) throw;
     comparison.notes.clear();
     comparison.not_compared.clear();
-    ComparePart(first, second, urdf, options, *common, progress, &comparison);
+    comparison.without_effect.clear();
+    const std::vector<ConstantFinding> missing =
+        ListMissing(*common, *comparison.read_first, *comparison.read_second);
+    ComparePart(first, second, urdf, options, *common, missing, progress, &comparison);
+  }
+  for (std::optional<RobotDescription>* read : {&comparison.read_first, &comparison.read_second}) {
+    if (*read) LeaveOutIgnored(options.ignore, &**read);
   }
   NoteTermsOfFrames(&comparison);
   return comparison;
@@ -329,11 +366,38 @@ Comparison CompareFunctions(const std::filesystem::path& file, const TermFunctio
   return comparison;
 }
 
+namespace {
+
+/// Where axes, frames and Jacobians agree, no convention of them explains anything.
+void LeaveOutKinematics(Comparison* comparison) {
+  constexpr const char* kTerms[] = {"joint_axis", "frame_pose", "J"};
+  constexpr const char* kIds[] = {"origin.", "rotation.", "place.", "axis.", "zero.", "table."};
+  const bool agrees = std::ranges::all_of(kTerms, [&](const char* term) {
+    return std::ranges::any_of(comparison->result.terms, [&](const CheckRecord& record) {
+      return record.name == term && !record.failed;
+    });
+  });
+  if (!agrees) return;
+  const auto is_kinematic = [&](const std::string& id) {
+    return std::ranges::any_of(kIds, [&](const char* begin) { return id.starts_with(begin); });
+  };
+  std::vector<Hypothesis>& hypotheses = comparison->hypotheses;
+  std::erase_if(hypotheses,
+                [&](const Hypothesis& one) { return std::ranges::all_of(one.ids, is_kinematic); });
+  // Numbers that are wrong besides are listed beside a convention alone.
+  if (std::ranges::all_of(hypotheses,
+                          [](const Hypothesis& one) { return one.ids[0].starts_with("number."); }))
+    hypotheses.clear();
+}
+
+}  // namespace
+
 void ExplainComparison(Comparison* comparison, double tolerance) {
   if (comparison->result.Agrees() || !comparison->read_first || !comparison->read_second) return;
   if (comparison->digits) tolerance = Worst(tolerance, comparison->digits->largest_within);
   comparison->hypotheses = ExplainDifference(*comparison->read_first, *comparison->read_second,
                                              Worst(tolerance, kHypothesisTolerance));
+  LeaveOutKinematics(comparison);
   if (comparison->digits) {
     std::erase_if(comparison->hypotheses, [&](const Hypothesis& hypothesis) {
       return !comparison->digits->Concerns(hypothesis.ids, hypothesis.parts);

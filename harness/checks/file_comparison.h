@@ -94,6 +94,8 @@ struct Comparison {
   std::optional<RobotModel> model;
   std::vector<std::string> notes;         ///< What its reader may not expect.
   std::vector<std::string> not_compared;  ///< What only one of them has and no term depends on.
+  /// What both state and no term depends on, where it differs: one line each, with both values.
+  std::vector<std::string> without_effect;
   ConsistencyResult result;
   /// Where the two do not agree to rounding and were judged by their digits, which `result` then is.
   std::optional<DigitVerdict> digits;

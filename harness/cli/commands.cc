@@ -32,11 +32,11 @@ Option AddJUnitOption(Command command, std::string* file) {
 
 Option AddIgnoreOption(Command command, std::vector<std::string>* ignore) {
   return command
-      .AddOption(
-          "--ignore WORD,...", ignore,
-          "Constants of joints in which the two may differ: armature, damping, friction, coupling to others")
+      .AddOption("--ignore WORD,...", ignore,
+                 "Constants of joints in which the two may differ: armature, damping, friction, coupling to "
+                 "others, effort")
       .Delimiter(',')
-      .OneOf({kIgnorable[0], kIgnorable[1], kIgnorable[2], kIgnorable[3]});
+      .OneOf({kIgnorable[0], kIgnorable[1], kIgnorable[2], kIgnorable[3], kIgnorable[4]});
 }
 
 void AddUrdfOptions(Command command, UrdfOptions* options) {

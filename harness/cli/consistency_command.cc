@@ -91,7 +91,7 @@ void AddConsistencyCommand(Command app) {
   command
       .AddOption("--ignore WORD,...", &request->ignore,
                  "Constants of joints in which the two may differ: armature, damping, friction, coupling to "
-                 "others; or links to leave out with all that they carry")
+                 "others, effort; or links to leave out with all that they carry")
       .Delimiter(',');
   command.AddOption("--only LINK", &request->options.part.only,
                     "Compare this link or joint and what it carries; all else is held");

@@ -216,6 +216,7 @@ void PrintTable(const ConsistencyRequest& request, const Comparison& comparison)
     fmt::print("\n");
   };
   list("not compared", comparison.not_compared);
+  list("differs, does not act on these terms", comparison.without_effect);
   list("worth knowing", comparison.notes);
   std::vector<TableRow> rows;
   AddRecords("constant", result.constants.records, comparison, nullptr, &rows);
@@ -246,11 +247,14 @@ void PrintVerdict(const ConsistencyRequest& request, const Comparison& compariso
   if (!request.IsWhole(result)) {
     fmt::print("INTERRUPTED after {} of {} samples. So far:\n", result.samples, request.options.samples);
   }
-  std::string left_out;
-  for (const std::string& note : comparison.not_compared)
-    left_out += (left_out.empty() ? "" : ", ") + note.substr(0, note.find(':'));
-  if (!left_out.empty())
-    left_out = fmt::format("; {} not compared ({})", comparison.not_compared.size(), Abbreviate(left_out));
+  const auto count = [](const std::vector<std::string>& notes, const char* what) {
+    std::string names;
+    for (const std::string& note : notes)
+      names += (names.empty() ? "" : ", ") + note.substr(0, note.find(':'));
+    return notes.empty() ? "" : fmt::format("; {} {} ({})", notes.size(), what, Abbreviate(names));
+  };
+  const std::string left_out = count(comparison.not_compared, "not compared") +
+                               count(comparison.without_effect, "differ, do not act on these terms");
   if (result.Agrees()) {
     if (comparison.digits) {
       fmt::print(
@@ -314,6 +318,7 @@ std::string ToText(const ConsistencyRequest& request, const Comparison& comparis
   json["notes"] = comparison.notes;
   for (const std::string& note : comparison.not_compared) json["notes"].push_back(note);
   json["not_compared"] = comparison.not_compared;
+  json["without_effect"] = comparison.without_effect;
   if (const std::optional<double> tolerance = request.judging.Find()) json["tolerance"] = *tolerance;
   json["checks"] = Json::object();
   for (const auto* records : {&result.constants.records, &result.terms}) {

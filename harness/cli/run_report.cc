@@ -221,7 +221,8 @@ void PrintRunReport(const Setup& setup, const ClosedLoop& loop, const RunResult&
       findings, [](const ConstantFinding& finding) { return finding.check.starts_with("motor_"); });
   if (has_servos)
     fmt::print(
-        "  A run sends torques: each actuator must be a <motor>, not a servo or a muscle; dexcheck import "
+        "  A run sends torques: each actuator must be a <motor> of gear 1, not a servo or a muscle; dexcheck "
+        "import "
         "FILE.xml --motors --out COPY.xml writes such a copy.\n");
 }
 

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <cctype>
@@ -14,6 +13,7 @@
 #include "controller/common/linear_algebra.h"
 #include "controller/common/text.h"
 #include "harness/descriptions/audit.h"
+#include "harness/descriptions/compiled_inertias.h"
 
 namespace dexcheck {
 namespace {
@@ -21,12 +21,6 @@ namespace {
 /// Four digits: what a person reads.
 std::string Format(double value) { return fmt::format("{:.4g}", value); }
 std::string Format(const Vector3d& v) { return fmt::format("[{:.4g}, {:.4g}, {:.4g}]", v[0], v[1], v[2]); }
-
-Vector3d CalcMoments(const Matrix3d& inertia) {
-  return Eigen::SelfAdjointEigenSolver<Matrix3d>(0.5 * (inertia + inertia.transpose()),
-                                                 Eigen::EigenvaluesOnly)
-      .eigenvalues();
-}
 
 /// Of [S, m c; m c^T, m] with S = tr(I_o) / 2 - I_o about the link's origin: positive for every body that
 /// fills a volume.

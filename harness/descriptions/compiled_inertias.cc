@@ -1,14 +1,20 @@
 #include "harness/descriptions/compiled_inertias.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <filesystem>
 #include <limits>
+#include <map>
 #include <sstream>
 
 #include "controller/common/text.h"
 #include "controller/model/rigid_body.h"
+#include "harness/descriptions/description_match.h"
 #include "harness/descriptions/fault_search.h"
 #include "harness/descriptions/mjcf_reader.h"
 #include "harness/engine/engine.h"
@@ -30,12 +36,167 @@ std::vector<const XMLElement*> ListInertials(const MjcfFile& mjcf, const mjModel
   return inertials;
 }
 
-std::optional<Matrix3d> ReadFullInertia(const XMLElement& inertial) {
-  std::istringstream numbers(ReadAttribute(inertial, "fullinertia"));
-  std::array<double, 6> I{};
-  if (!(numbers >> I[0] >> I[1] >> I[2] >> I[3] >> I[4] >> I[5])) return std::nullopt;
-  return MakeTensor(I);
+namespace {
+
+/// How far the engine's search for principal axes leaves a tensor at most, kg m^2: it stops at products of
+/// 1e-12 kg m^2, six of which have a norm of 2.5e-12.
+double BoundDiagonalisation(double size) { return 1e-6 * size + 2.5e-12; }
+
+template <size_t kCount>
+std::optional<std::array<double, kCount>> ReadNumbers(const XMLElement& element, const char* attribute) {
+  std::istringstream text(ReadAttribute(element, attribute));
+  std::array<double, kCount> numbers{};
+  for (double& number : numbers) text >> number;
+  return text ? std::optional(numbers) : std::nullopt;
 }
+
+std::optional<Matrix3d> ReadTensor(const XMLElement& inertial) {
+  const auto full = ReadNumbers<6>(inertial, "fullinertia");
+  if (full) return MakeTensor(*full);
+  const auto moments = ReadNumbers<3>(inertial, "diaginertia");
+  if (moments) return Matrix3d(Vector3d(moments->data()).asDiagonal());
+  return std::nullopt;
+}
+
+/// What the compiler's settings do to masses and inertias; the last of several elements outweighs others.
+struct CompilerSettings {
+  explicit CompilerSettings(const XMLElement* root) {
+    for (const XMLElement* compiler : ListChildren(root, "compiler")) {
+      const auto read = [&](const char* name, double* value) {
+        if (const auto number = ReadNumbers<1>(*compiler, name)) *value = number->front();
+      };
+      read("boundmass", &bound_mass);
+      read("boundinertia", &bound_inertia);
+      read("settotalmass", &total_mass);
+      from_geoms = ReadAttribute(*compiler, "inertiafromgeom", from_geoms ? "true" : "auto") == "true";
+      balances = ReadAttribute(*compiler, "balanceinertia", balances ? "true" : "false") == "true";
+    }
+  }
+
+  double bound_mass = 0.0, bound_inertia = 0.0;
+  double total_mass = -1.0;
+  bool from_geoms = false, balances = false;
+};
+
+/// A change of numbers, named by those of the settings that change such numbers.
+void AddChange(const std::string& body, const std::vector<std::string>& settings, std::vector<double> stated,
+               std::vector<double> made, double bound, std::vector<CompiledChange>* changes) {
+  double error = 0.0;
+  for (size_t k = 0; k < stated.size(); ++k) error = std::max(error, std::abs(stated[k] - made[k]));
+  if (error <= bound) return;
+  const std::string setting = settings.empty() ? "diagonalisation" : JoinNames(settings);
+  changes->push_back({body, setting, std::move(stated), std::move(made)});
+}
+
+}  // namespace
+
+Vector3d CalcMoments(const Matrix3d& inertia) {
+  return Eigen::SelfAdjointEigenSolver<Matrix3d>(0.5 * (inertia + inertia.transpose()),
+                                                 Eigen::EigenvaluesOnly)
+      .eigenvalues();
+}
+
+std::optional<Matrix3d> ReadFullInertia(const XMLElement& inertial, const Matrix3d& compiled) {
+  const std::optional<Matrix3d> tensor =
+      inertial.Attribute("fullinertia") == nullptr ? std::nullopt : ReadTensor(inertial);
+  if (!tensor || (*tensor - compiled).norm() > BoundDiagonalisation(tensor->norm())) return std::nullopt;
+  return tensor;
+}
+
+std::vector<CompiledChange> ListCompiledChanges(const MjcfFile& mjcf, const mjModel& engine) {
+  constexpr double kRounding = 64.0 * std::numeric_limits<double>::epsilon();
+  const std::vector<const XMLElement*> inertials = ListInertials(mjcf, engine);
+  const CompilerSettings compiler(mjcf.root());
+  std::vector<CompiledChange> changes;
+  for (size_t body = 1; body < inertials.size(); ++body) {
+    if (inertials[body] == nullptr) continue;
+    const auto id = static_cast<int>(body);
+    const std::string name = NameOf(engine, mjOBJ_BODY, id);
+    const bool from_geoms = compiler.from_geoms && engine.body_geomnum[id] > 0;
+    const auto list = [&](std::vector<std::string> settings) {
+      if (from_geoms) settings = {"inertiafromgeom"};
+      if (compiler.total_mass > 0.0) settings.emplace_back("settotalmass");
+      return settings;
+    };
+    const auto mass = ReadNumbers<1>(*inertials[body], "mass");
+    if (mass) {
+      const bool is_bound = mass->front() < compiler.bound_mass;
+      AddChange(name, list(is_bound ? std::vector<std::string>{"boundmass"} : std::vector<std::string>{}),
+                {mass->front()}, {engine.body_mass[body]}, kRounding * mass->front(), &changes);
+    }
+    const std::optional<Matrix3d> tensor = ReadTensor(*inertials[body]);
+    if (!tensor) continue;
+    std::vector<std::string> settings;
+    const Vector3d stated = CalcMoments(*tensor);
+    if (stated[0] < compiler.bound_inertia) settings.emplace_back("boundinertia");
+    const Vector3d bound = stated.cwiseMax(compiler.bound_inertia);
+    if (compiler.balances && bound[0] + bound[1] < bound[2]) settings.emplace_back("balanceinertia");
+    std::vector<double> made(engine.body_inertia + 3 * body, engine.body_inertia + 3 * body + 3);
+    std::ranges::sort(made);
+    AddChange(name, list(settings), {stated.begin(), stated.end()}, made, BoundDiagonalisation(stated.norm()),
+              &changes);
+  }
+  return changes;
+}
+
+namespace {
+
+/// The joint that moves a body; none of what the description does not have. -1 is the base.
+std::optional<int> FindJointOf(const std::string& body, const RobotDescription& robot) {
+  const auto part = std::ranges::find(robot.parts, body, &DescribedPart::name);
+  return part == robot.parts.end() ? std::nullopt : std::optional(part->joint);
+}
+
+const MassProperties& FindBody(int joint, const RobotSpec& spec) {
+  return joint < 0 ? spec.base.body : spec.joints[static_cast<size_t>(joint)].body;
+}
+
+}  // namespace
+
+void NameCompiledChanges(const std::vector<CompiledChange>& changes,
+                         const std::array<const RobotDescription*, 2>& robots, size_t side,
+                         ConstantChecks* constants, std::vector<std::string>* notes) {
+  constexpr double kSame = 0.01;  // of what the text states, which the other file prints with other digits
+  const RobotDescription& own = *robots[side];
+  const RobotDescription& other = *robots[1 - side];
+  const std::string file = std::filesystem::path(own.spec.source).filename().string();
+  const std::vector<int> match = MatchJoints(own.spec, other.spec);
+  std::map<std::string, std::pair<std::string, int>> first_of;  // by setting, and how many more
+  for (const CompiledChange& change : changes) {
+    const bool is_mass = change.stated.size() == 1;
+    const std::string effect =
+        fmt::format("{} of {}'s compiler changed the {} of {} from {:.6g} to {:.6g} {}", change.setting, file,
+                    is_mass ? "mass" : "moments of inertia", change.body, fmt::join(change.stated, ", "),
+                    fmt::join(change.made, ", "), is_mass ? "kg" : "kg m^2");
+    const auto [line, is_new] = first_of.emplace(change.setting, std::pair(effect, 0));
+    line->second.second += is_new ? 0 : 1;
+    const std::optional<int> joint = FindJointOf(change.body, own);
+    if (!joint || (*joint >= 0 && match[static_cast<size_t>(*joint)] < 0)) continue;
+    const int joint_there = *joint < 0 ? -1 : match[static_cast<size_t>(*joint)];
+    const RobotSpec& first = robots[0]->spec;
+    const int joint_first = side == 0 ? *joint : joint_there;
+    const std::string where =
+        "link " + (joint_first < 0 ? first.base.link : first.joints[static_cast<size_t>(joint_first)].link);
+    if (is_mass) {
+      for (ConstantFinding& finding : constants->findings) {
+        if (finding.check == "link_mass" && finding.where == where) finding.effect = effect;
+      }
+      continue;
+    }
+    const Vector3d stated(change.stated.data()), made(change.made.data());
+    const Vector3d there = CalcMoments(FindBody(joint_there, other.spec).inertia);
+    const double apart = (there - stated).norm();
+    if (apart > kSame * stated.norm() || apart >= (there - made).norm()) continue;
+    Eigen::Index k = 0;
+    (made - stated).cwiseAbs().maxCoeff(&k);
+    constants->Add({"compiled_inertia", where, side == 0 ? made[k] : stated[k],
+                    side == 0 ? stated[k] : made[k], AtLink(joint_first), static_cast<int>(k), false,
+                    effect});
+  }
+  for (const auto& [setting, line] : first_of)
+    notes->push_back(line.first + (line.second > 0 ? fmt::format(", and {} more", line.second) : ""));
+}
+
 std::optional<std::string> TakeCompiledInertias(const MjcfFile& mjcf, const mjModel& engine,
                                                 RobotDescription* robot) {
   const std::vector<const XMLElement*> inertials = ListInertials(mjcf, engine);
@@ -52,7 +213,7 @@ std::optional<std::string> TakeCompiledInertias(const MjcfFile& mjcf, const mjMo
     for (const DescribedPart& part : compiled.parts) {
       const auto body = static_cast<size_t>(FindByName(engine, mjOBJ_BODY, part.name));
       if (part.joint != place.b || body >= inertials.size() || inertials[body] == nullptr) continue;
-      const std::optional<Matrix3d> tensor = ReadFullInertia(*inertials[body]);
+      const std::optional<Matrix3d> tensor = ReadFullInertia(*inertials[body], part.body.inertia);
       if (!tensor) continue;
       const Matrix3d R = (place.X_ab * part.X_iL).linear();
       change += R * (part.body.inertia - *tensor) * R.transpose();

@@ -4,10 +4,12 @@
 
 #include <mujoco/mujoco.h>
 
+#include <array>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "harness/descriptions/constant_checks.h"
 #include "harness/descriptions/robot_description.h"
 #include "harness/engine/mjcf_file.h"
 
@@ -17,11 +19,33 @@ class XMLElement;
 
 namespace dexcheck {
 
+/// Principal moments of an inertia by size, kg m^2.
+Vector3d CalcMoments(const Matrix3d& inertia);
+
 /// The inertial elements of an MJCF by the engine's body, depth first, nullptr for bodies without; empty
 /// where elements make bodies of their own.
 std::vector<const tinyxml2::XMLElement*> ListInertials(const MjcfFile& mjcf, const mjModel& engine);
-/// The tensor that an inertial states in its body's axes; none when it states no fullinertia.
-std::optional<Matrix3d> ReadFullInertia(const tinyxml2::XMLElement& inertial);
+/// The tensor that an inertial states in its body's axes; none when it states no fullinertia, and when what
+/// the engine compiled is farther from it than its search for principal axes leaves it.
+std::optional<Matrix3d> ReadFullInertia(const tinyxml2::XMLElement& inertial, const Matrix3d& compiled);
+
+/// A body whose mass or inertia a setting of the compiler changed.
+struct CompiledChange {
+  std::string body;
+  std::string setting;         ///< "boundmass", "boundinertia, balanceinertia"
+  std::vector<double> stated;  ///< Mass, kg, or principal moments by size, kg m^2, as the text has them.
+  std::vector<double> made;    ///< The same of the engine's model.
+};
+
+/// Bodies whose stated mass or inertia is not that of the engine's model.
+std::vector<CompiledChange> ListCompiledChanges(const MjcfFile& mjcf, const mjModel& engine);
+
+/// Names what the compiler changed: in a note, at findings of masses, and by findings of inertias where the
+/// other description has what the text states.
+/// @param robots both descriptions, with joints of the same names. @param side of the MJCF: 0 or 1.
+void NameCompiledChanges(const std::vector<CompiledChange>& changes,
+                         const std::array<const RobotDescription*, 2>& robots, size_t side,
+                         ConstantChecks* constants, std::vector<std::string>* notes);
 
 /// The engine has principal moments and axes, and finds them of a tensor to 1e-8 of its size or, for slender
 /// bodies, 1e-6. Gives each body of a description whose inertia is, to rounding, the one that the MJCF states

@@ -1,5 +1,7 @@
 #include "harness/descriptions/constant_checks.h"
 
+#include <fmt/format.h>
+
 #include <array>
 #include <cmath>
 #include <initializer_list>
@@ -7,11 +9,33 @@
 #include <string_view>
 #include <utility>
 
+#include "controller/common/text.h"
 #include "harness/descriptions/constant_table.h"
 #include "harness/descriptions/description_match.h"
 
 namespace dexcheck {
 namespace {
+
+/// Radius of the round shape that turns about its joint's axis, m; 0 of a link that is no wheel.
+double FindWheelRadius(const RobotDescription& robot, int joint) {
+  constexpr double kSamePlace = 1e-6;  // m, and of the axes' directions
+  const Joint& own = robot.spec.joints[static_cast<size_t>(joint)];
+  if (own.type != JointType::kRevolute || robot.joints[static_cast<size_t>(joint)].states_range) return 0.0;
+  if (robot.spec.base.type == BaseType::kFixed) return 0.0;
+  if (std::ranges::any_of(robot.spec.joints, [&](const Joint& next) { return next.parent == joint; }))
+    return 0.0;
+  double radius = 0.0;
+  for (const DescribedPart& part : robot.parts) {
+    if (part.joint != joint) continue;
+    for (const DescribedShape& shape : part.shapes) {
+      const Vector3d center = part.X_iL * (0.5 * (shape.low + shape.high));
+      const Vector3d axis = part.X_iL.linear() * shape.axis;
+      if (center.head<2>().norm() < kSamePlace && axis.head<2>().norm() < kSamePlace)
+        radius = std::max(radius, shape.radius);
+    }
+  }
+  return radius;
+}
 
 /// Two descriptions, in what both state.
 class DescriptionConstants : public ConstantComparison {
@@ -28,9 +52,30 @@ class DescriptionConstants : public ConstantComparison {
       CompareStated(constant.check, constant.states, {constant.value});
     CompareStated("joint_range", &DescribedJoint::states_range, {&Joint::lower, &Joint::upper});
     for (int i = 0; i < model_.num_joints(); ++i) CompareCoupling(i, JointOf(i).coupling, Other(i).coupling);
+    CompareMotorsAndWheels();
+  }
+
+  void CompareMotorsAndWheels() {
+    for (int i = 0; i < model_.num_joints(); ++i) {
+      const auto own = static_cast<size_t>(i);
+      if (b_of_a_[own] < 0) continue;
+      const auto other = static_cast<size_t>(b_of_a_[own]);
+      CompareForces(i, a_.joints[own].forces, b_.joints[other].forces);
+      const double radius = FindWheelRadius(a_, i);
+      const double other_radius = FindWheelRadius(b_, b_of_a_[own]);
+      if (radius > 0.0 && other_radius > 0.0) Compare("wheel_radius", AtJoint(i), radius, other_radius);
+    }
   }
 
  private:
+  /// A limit that is the same both ways is one number.
+  void CompareForces(int joint, const std::optional<StatedForces>& own,
+                     const std::optional<StatedForces>& other) {
+    if (!own || !other) return;
+    const auto is_even = [](const StatedForces& forces) { return forces.lower == -forces.upper; };
+    if (!is_even(*own) || !is_even(*other)) Compare("motor_limit", AtJoint(joint), own->lower, other->lower);
+    Compare("motor_limit", AtJoint(joint), own->upper, other->upper);
+  }
   [[nodiscard]] const Joint& Other(int joint) const {
     return b_.spec.joints[static_cast<size_t>(b_of_a_[static_cast<size_t>(joint)])];
   }
@@ -126,6 +171,30 @@ ConstantChecks CheckConstants(const RobotDescription& a, const RobotDescription&
   ConstantChecks result;
   DescriptionConstants(model, a, b, &result).Run();
   return result;
+}
+
+void CheckMotorsAndWheels(const RobotDescription& a, const RobotDescription& b, ConstantChecks* constants) {
+  const RobotModel model(a.spec);
+  DescriptionConstants(model, a, b, constants).CompareMotorsAndWheels();
+}
+
+std::vector<std::string> CompareShapes(const RobotDescription& a, const RobotDescription& b) {
+  constexpr double kSame = 1e-3;  // of the larger volume
+  const auto sum = [](const DescribedPart& part) {
+    double volume = 0.0;
+    for (const DescribedShape& shape : part.shapes) volume += shape.volume;
+    return volume;
+  };
+  std::vector<std::string> differing;
+  for (const DescribedPart& part : a.parts) {
+    const auto other = std::ranges::find(b.parts, part.name, &DescribedPart::name);
+    if (other == b.parts.end()) continue;
+    const double volume = sum(part), there = sum(*other);
+    if (volume > 0.0 && there > 0.0 && std::abs(volume - there) > kSame * std::max(volume, there))
+      differing.push_back(fmt::format("{} ({:.4g} against {:.4g} m^3)", part.name, volume, there));
+  }
+  if (differing.empty()) return {};
+  return {"shapes: their volume differs at " + JoinNames(differing)};
 }
 
 void JudgeByTolerance(double tolerance, std::vector<CheckRecord>* records) {

@@ -67,6 +67,16 @@ ConstantChecks CheckConstants(const Adapter& adapter);
 /// @param a, b as CompleteEachOther left them.
 ConstantChecks CheckConstants(const RobotDescription& a, const RobotDescription& b);
 
+/// Compares the limits of the motors of joints, and the radii of wheels, where both descriptions state them.
+/// Wheels are the last links of joints without limits, with a round shape about the joint's axis, on a base
+/// that moves.
+/// @param a, b with joints of the same names.
+void CheckMotorsAndWheels(const RobotDescription& a, const RobotDescription& b, ConstantChecks* constants);
+
+/// Compares the volumes of the links' shapes where both descriptions have them, on which no term depends.
+/// @return one line on those that differ.
+std::vector<std::string> CompareShapes(const RobotDescription& a, const RobotDescription& b);
+
 /// Compares couplings of joints, in the place of the constant checks' findings that the engine has them.
 /// @param ignores none is a disagreement. @return a note on those that only the engine has, which are not
 /// compared.

@@ -32,6 +32,8 @@ constexpr DescribedConstant kDescribed[] = {
 
 bool HasSpring(const mjModel& m, int joint) { return m.jnt_stiffness[joint] != 0.0; }
 bool HasLimit(const mjModel& m, int joint) { return m.jnt_limited[joint] != 0; }
+bool HasControlLimit(const mjModel& m, int motor) { return m.actuator_ctrllimited[motor] != 0; }
+bool HasForceLimit(const mjModel& m, int motor) { return m.actuator_forcelimited[motor] != 0; }
 
 constexpr unsigned kAllJoints = kRobotJoint | kWheelJoint | kFreeJoint;
 
@@ -64,6 +66,24 @@ constexpr Constant kConstants[] = {
     {"motor_gain", P::kActuator, "gainprm", &mjModel::actuator_gainprm, Index::kPart, mjNGAIN, 1.0},
     {"motor_bias", P::kActuator, "biastype", &mjModel::actuator_biastype, Index::kPart, 1, mjBIAS_NONE},
     {"motor_bias", P::kActuator, "biasprm", &mjModel::actuator_biasprm, Index::kPart, mjNBIAS},
+    {"motor_limit",
+     P::kActuator,
+     "ctrlrange",
+     &mjModel::actuator_ctrlrange,
+     Index::kPart,
+     2,
+     {},
+     kAllJoints,
+     HasControlLimit},
+    {"motor_limit",
+     P::kActuator,
+     "forcerange",
+     &mjModel::actuator_forcerange,
+     Index::kPart,
+     2,
+     {},
+     kAllJoints,
+     HasForceLimit},
     {"tendon_spring", P::kTendon, "stiffness", &mjModel::tendon_stiffness, Index::kPart, 1, 0.0},
     {"tendon_spring", P::kTendon, "springlength", &mjModel::tendon_lengthspring, Index::kPart, 2},
     {"tendon_damping", P::kTendon, "damping", &mjModel::tendon_damping, Index::kPart, 1, 0.0},
@@ -121,12 +141,13 @@ void MakeIdle(EnginePart kind, int id, unsigned role, mjModel* m) {
   }
 }
 
-std::array<MotorProperty, 4> ReadMotor(const mjModel& m, int i) {
+std::array<MotorProperty, 5> ReadMotor(const mjModel& m, int i) {
   const int transmission = m.actuator_trntype[i];
   const bool has_gain = m.actuator_gaintype[i] == mjGAIN_FIXED && m.actuator_gear[6 * i] != 0.0;
   const double gain = has_gain ? m.actuator_gainprm[mjNGAIN * i] : std::numeric_limits<double>::quiet_NaN();
   return {{{"motor_transmission", mjTRN_JOINT,
             static_cast<double>(transmission == mjTRN_JOINTINPARENT ? mjTRN_JOINT : transmission)},
+           {"motor_transmission", 1.0, m.actuator_gear[6 * i]},
            {"motor_dynamics", mjDYN_NONE, static_cast<double>(m.actuator_dyntype[i])},
            {"motor_gain", 1.0, gain},
            {"motor_bias", mjBIAS_NONE, static_cast<double>(m.actuator_biastype[i])}}};

@@ -64,13 +64,13 @@ void MakeNeutral(const Constant& constant, int part, mjModel* engine);
 /// Gives a part the neutral value of all its constants, of joints of those that belong to the role.
 void MakeIdle(EnginePart kind, int part, unsigned role, mjModel* engine);
 
-/// What an actuator has of what a plain torque on its joint, gear times control, has.
+/// What an actuator has of what a plain torque on its joint has, which is the control.
 struct MotorProperty {
   const char* check;
   double plain;
   double value;  ///< Not a number when no gain is comparable.
 };
-std::array<MotorProperty, 4> ReadMotor(const mjModel& engine, int actuator);
+std::array<MotorProperty, 5> ReadMotor(const mjModel& engine, int actuator);
 
 /// The active equality/joint of first order that makes a joint of the engine's model follow another one; -1
 /// when there is none.

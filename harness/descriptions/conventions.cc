@@ -249,8 +249,15 @@ class TableMaker {
             return v;
           });
     }
-    for (const Factor& unit : kLengths)
-      add(unit.id, unit.words, [&unit](const Vector3d& v) { return Vector3d(unit.right * v); });
+    // What is small by its unit alone is no zero.
+    constexpr double kZero = 1e-9;  // m
+    for (const Factor& unit : kLengths) {
+      Add(prefix + unit.id, of, unit.words, [of, &unit](StatedPart& p, const StatedPart& right) {
+        if (Read(of, right).norm() <= kZero) return false;
+        Write(of, unit.right * Read(of, p), &p);
+        return true;
+      });
+    }
   }
 
   void AddInertias() {

@@ -38,6 +38,7 @@ class Matching {
     for (const DescribedConstant& constant : ListDescribedConstants())
       Ignores(constant.word, ignore_) ? Ignore(constant) : Take(constant);
     if (Ignores("coupling", ignore_)) IgnoreCouplings();
+    if (Ignores("effort", ignore_)) IgnoreEfforts();
     TakeRanges();
     DropFrames();
     return std::move(result_);
@@ -173,6 +174,11 @@ class Matching {
     result_.not_compared.emplace_back("coupling: ignored");
   }
 
+  void IgnoreEfforts() {
+    for (RobotDescription* const robot : {&a_, &b_}) LeaveOutIgnored({"effort"}, robot);
+    result_.not_compared.emplace_back("effort: ignored");
+  }
+
   void TakeRanges() {
     std::map<std::string, std::vector<std::string>> taken;  // by the source that states it
     ForJoints([&](size_t i, size_t j) {
@@ -231,6 +237,19 @@ std::vector<int> MatchJoints(const RobotSpec& a, const RobotSpec& b) {
 
 bool Ignores(const std::string& word, const std::vector<std::string>& ignore) {
   return std::ranges::find(ignore, word) != ignore.end();
+}
+
+void LeaveOutIgnored(const std::vector<std::string>& ignore, RobotDescription* robot) {
+  for (size_t i = 0; i < robot->joints.size(); ++i) {
+    Joint& joint = robot->spec.joints[i];
+    for (const DescribedConstant& constant : ListDescribedConstants()) {
+      if (!Ignores(constant.word, ignore)) continue;
+      joint.*constant.value = 0.0;
+      robot->joints[i].*constant.states = false;
+    }
+    if (Ignores("coupling", ignore)) joint.coupling.reset();
+    if (Ignores("effort", ignore)) robot->joints[i].forces.reset();
+  }
 }
 
 Completion CompleteEachOther(RobotDescription* a, RobotDescription* b,

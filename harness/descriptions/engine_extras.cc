@@ -1,9 +1,12 @@
 #include "harness/descriptions/engine_extras.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
+#include <map>
 #include <span>
 #include <utility>
 #include <vector>
@@ -117,6 +120,51 @@ Part ReadWhole(const mjModel& m, EnginePart kind, int id, unsigned role) {
   return part;
 }
 
+/// An option that acts on no term at a given state.
+struct EngineOption {
+  const char* name;
+  std::vector<double> (*read)(const mjOption& option);
+  std::vector<const char*> words = {};  // of the values 0, 1, ...
+};
+
+template <auto kMember, int kCount = 1>
+std::vector<double> ReadOption(const mjOption& option) {
+  if constexpr (kCount == 1) {
+    return {static_cast<double>(option.*kMember)};
+  } else {
+    return {option.*kMember, option.*kMember + kCount};
+  }
+}
+
+const std::vector<EngineOption> kOptions = {
+    {"timestep", ReadOption<&mjOption::timestep>},
+    {"integrator", ReadOption<&mjOption::integrator>, {"Euler", "RK4", "implicit", "implicitfast"}},
+    {"cone", ReadOption<&mjOption::cone>, {"pyramidal", "elliptic"}},
+    {"impratio", ReadOption<&mjOption::impratio>},
+    {"solver", ReadOption<&mjOption::solver>, {"PGS", "CG", "Newton"}},
+    {"jacobian", ReadOption<&mjOption::jacobian>, {"dense", "sparse", "auto"}},
+    {"iterations", ReadOption<&mjOption::iterations>},
+    {"tolerance", ReadOption<&mjOption::tolerance>},
+    {"noslip_iterations", ReadOption<&mjOption::noslip_iterations>},
+    {"noslip_tolerance", ReadOption<&mjOption::noslip_tolerance>},
+    {"iterations of the collider",
+     [](const mjOption& option) {
+       return std::vector<double>{static_cast<double>(GetColliderIterations(option))};
+     }},
+    {"tolerance of the collider",
+     [](const mjOption& option) { return std::vector<double>{GetColliderTolerance(option)}; }},
+    {"wind", ReadOption<&mjOption::wind, 3>},
+    {"magnetic", ReadOption<&mjOption::magnetic, 3>},
+    {"o_margin", ReadOption<&mjOption::o_margin>},
+    {"o_solref", ReadOption<&mjOption::o_solref, mjNREF>},
+    {"o_solimp", ReadOption<&mjOption::o_solimp, mjNIMP>}};
+
+std::string Show(const EngineOption& option, const std::vector<double>& values) {
+  const auto word = static_cast<size_t>(values.front());
+  if (values.size() == 1 && word < option.words.size()) return option.words[word];
+  return fmt::format("{:g}", fmt::join(values, " "));
+}
+
 class ExtrasComparison {
  public:
   ExtrasComparison(const Adapter& a, mjModel* engine_a, const Adapter& b, mjModel* engine_b,
@@ -137,6 +185,60 @@ class ExtrasComparison {
     Compare("fluid", "density", a_.opt.density, b_.opt.density);
     Compare("fluid", "viscosity", a_.opt.viscosity, b_.opt.viscosity);
     for (mjModel* const m : {&a_, &b_}) m->opt.density = m->opt.viscosity = 0.0;
+  }
+
+  /// Compares what later releases of the engine add by its element, and takes it out of both.
+  /// @return lines on what was taken out.
+  std::vector<std::string> LeaveOutNewerForces() {
+    std::map<std::string, std::vector<std::string>> names;  // by kind
+    for (const NewerForce& force : kNewerForces) {
+      const int count = CountElements(b_, force.type);
+      if (CountElements(a_, force.type) != count) continue;
+      for (int i = 0; i < count * force.columns; ++i) {
+        mjtNum& value_a = (a_.*force.values)[i];
+        mjtNum& value_b = (b_.*force.values)[i];
+        const std::string element = NameOf(b_, force.type, i / force.columns);
+        Compare(force.check, element + ": " + force.name, value_a, value_b);
+        if (value_a != 0.0 || value_b != 0.0) names[force.check].push_back(element);
+        value_a = value_b = 0.0;
+      }
+    }
+    std::vector<std::string> lines;
+    for (const auto& [check, elements] : names)
+      lines.push_back(check + ": left out on both sides, at " + JoinNames(elements));
+    LeaveOutFlexes(&a_);
+    const int flexes = LeaveOutFlexes(&b_);
+    if (flexes > 0) lines.push_back(fmt::format("flex: elastic forces of {} left out on both sides", flexes));
+    return lines;
+  }
+
+  /// Options that act on steps, contacts and solvers alone.
+  [[nodiscard]] std::vector<std::string> CompareOptions(const std::string& file_a,
+                                                        const std::string& file_b) const {
+    std::vector<std::string> lines;
+    for (const EngineOption& option : kOptions) {
+      const auto values_a = option.read(a_.opt);
+      const auto values_b = option.read(b_.opt);
+      if (values_a == values_b) continue;
+      lines.push_back(fmt::format("option {}: {} in {}, {} in {}", option.name, Show(option, values_a),
+                                  file_a, Show(option, values_b), file_b));
+    }
+    return lines;
+  }
+
+  /// Motors that one has and the other lacks: of those that are no plain torques the constant checks tell.
+  [[nodiscard]] std::vector<std::string> ListLoneMotors(const std::string& file_a,
+                                                        const std::string& file_b) const {
+    std::vector<std::string> lines;
+    const auto list = [&](const mjModel& m, const mjModel& other, const std::string& file) {
+      std::vector<std::string> names;
+      for (int i = 0; i < m.nu; ++i) names.push_back(NameOf(m, mjOBJ_ACTUATOR, i));
+      for (int i = 0; i < other.nu; ++i) std::erase(names, NameOf(other, mjOBJ_ACTUATOR, i));
+      if (!names.empty()) lines.push_back("motors only in " + file + ": " + JoinNames(names));
+    };
+    list(a_, b_, file_a);
+    list(b_, a_, file_b);
+    return lines;
   }
 
  private:
@@ -205,20 +307,28 @@ std::optional<std::string> SetAsideMotors(const std::string& source, mjModel* en
     if (std::ranges::all_of(properties,
                             [](const MotorProperty& property) { return property.value == property.plain; }))
       continue;
-    motors.push_back(NameOf(*engine, mjOBJ_ACTUATOR, i));
+    const double gear = engine->actuator_gear[6 * i];
+    motors.push_back(NameOf(*engine, mjOBJ_ACTUATOR, i) +
+                     (gear == 1.0 ? "" : fmt::format(" (gear {:g})", gear)));
     MakeIdle(EnginePart::kActuator, i, kRobotJoint, engine);
   }
   if (motors.empty()) return std::nullopt;
   return "motors: only " + source +
-         " says how they make their forces (servos, muscles, transmissions): " + JoinNames(motors);
+         " says how they make their forces (servos, muscles, transmissions, gears): " + JoinNames(motors);
 }
 
 Extras CompareExtras(const RobotDescription& first, MjModelPtr first_engine, const std::string& file,
-                     const Adapter& second, mjModel* engine) {
+                     const Adapter& second, mjModel* engine, const std::string& other) {
   const RobotModel own_model(first.spec);
   const Adapter own(own_model, *first_engine, file);
   Extras extras;
-  ExtrasComparison(own, first_engine.get(), second, engine, &extras.differences).Run();
+  ExtrasComparison comparison(own, first_engine.get(), second, engine, &extras.differences);
+  const std::string names[] = {std::filesystem::path(file).filename(),
+                               std::filesystem::path(other).filename()};
+  extras.without_effect = comparison.CompareOptions(names[0], names[1]);
+  extras.not_compared = comparison.ListLoneMotors(names[0], names[1]);
+  for (std::string& line : comparison.LeaveOutNewerForces()) extras.not_compared.push_back(std::move(line));
+  comparison.Run();
   extras.of_first = CheckConstants(own);
   CheckCouplings(own, /*ignores=*/false, &extras.of_first);
   return extras;
@@ -242,6 +352,33 @@ void AddExtras(const Extras& extras, ConstantChecks* constants) {
   });
   for (const ConstantFinding& finding : extras.differences.findings) constants->Add(finding);
   for (const ConstantFinding& finding : missing) constants->Add(finding);
+}
+
+std::vector<std::string> CompareContacts(const ConstantChecks& first, const ConstantChecks& second) {
+  std::vector<std::string> lines;
+  for (const auto& [kind, word] : {std::pair("contacts_by_type", "contacts by contype and conaffinity"),
+                                   {"contact_pair", "contact pairs"},
+                                   {"mesh_contacts", "meshes that touch"}}) {
+    std::map<std::string, std::string> texts[2];
+    for (const size_t side : {0U, 1U}) {
+      for (const ConstantNote& note : (side == 0 ? first : second).notes) {
+        const size_t end = std::min(note.text.find(" ("), note.text.find(": "));
+        if (note.kind == kind) texts[side][note.text.substr(0, end)] += note.text;
+      }
+    }
+    std::vector<std::string> differing;
+    for (const size_t side : {0U, 1U}) {
+      for (const auto& [name, text] : texts[side]) {
+        const auto other = texts[1 - side].find(name);
+        const bool is_missing = other == texts[1 - side].end();
+        if (is_missing || (side == 0 && other->second != text)) differing.push_back(name);
+      }
+    }
+    if (!differing.empty())
+      lines.push_back(std::string(word) + ": shapes, places, friction or parameters differ at " +
+                      Abbreviate(JoinNames(differing)));
+  }
+  return lines;
 }
 
 }  // namespace dexcheck

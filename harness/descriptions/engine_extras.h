@@ -7,6 +7,7 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "harness/descriptions/constant_checks.h"
 #include "harness/descriptions/robot_description.h"
@@ -22,20 +23,25 @@ std::optional<std::string> SetAsideMotors(const std::string& source, mjModel* en
 
 /// What two MJCFs have besides the mechanism, compared with each other.
 struct Extras {
-  ConstantChecks differences;  ///< Parts of one name that both have, whose numbers differ.
-  ConstantChecks of_first;     ///< What the first one's constant checks find besides them.
+  ConstantChecks differences;               ///< Parts of one name that both have, whose numbers differ.
+  ConstantChecks of_first;                  ///< What the first one's constant checks find besides them.
+  std::vector<std::string> without_effect;  ///< Options that differ and act on no compared term, a line each.
+  std::vector<std::string> not_compared;    ///< Plain motors that only one of them has, a line each.
 };
 
 /// Compares part by part of the same name, and takes such parts out of the second model, so that the constant
 /// checks finds there what the first one lacks. Couplings of joints (equality/joint) stay.
 /// @param first as it is read from `file`, whose model is `first_engine`, before names are taken over.
-/// @param second of the same joints in the same order; `engine` is its model.
+/// @param second of the same joints in the same order; `engine` is its model, read from `other`.
 Extras CompareExtras(const RobotDescription& first, MjModelPtr first_engine, const std::string& file,
-                     const Adapter& second, mjModel* engine);
+                     const Adapter& second, mjModel* engine, const std::string& other);
 
 /// Puts them into the second one's constant checks: what both constant checks find alike is taken back, what
 /// only the first one's finds is a difference the other way round.
 void AddExtras(const Extras& extras, ConstantChecks* constants);
+
+/// Shapes, pairs and parameters of contacts that differ, by the notes of both sides' constant checks.
+std::vector<std::string> CompareContacts(const ConstantChecks& first, const ConstantChecks& second);
 
 /// Adds to `result` what the MJCF has and the analytic model has no number for: tendons' forces, equality
 /// constraints, motors that are no plain torque sources, flags, contacts with friction, distance or a floor

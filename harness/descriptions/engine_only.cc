@@ -123,7 +123,7 @@ class EngineOnly {
     }
   }
 
-  /// A motor is a torque on its joint: gear times control. The plant divides by the gear.
+  /// A motor is a torque on its joint, and its control is that torque: its gear is 1.
   void FindMotors() {
     for (int i = 0; i < engine_.nu; ++i) {
       const std::string where = Name(mjOBJ_ACTUATOR, "actuator", i);

@@ -10,6 +10,7 @@
 #include "harness/descriptions/constant_table.h"
 #include "harness/engine/engine.h"
 #include "harness/engine/map_vector.h"
+#include "harness/engine/mjcf_passes.h"
 #include "harness/engine/robot_tree.h"
 #include "harness/engine/xml.h"
 
@@ -123,7 +124,11 @@ class MjcfDescriptionReader {
     DescribedShape shape;
     const mjtNum* size = engine_.geom_size + 3 * geom;
     Vector3d half(size[0], size[0], size[0]);
-    switch (engine_.geom_type[geom]) {
+    const int type = engine_.geom_type[geom];
+    const Pose X_LG = ReadPose(engine_.geom_pos + 3 * geom, engine_.geom_quat + 4 * geom);
+    if (type == mjGEOM_SPHERE || type == mjGEOM_CAPSULE || type == mjGEOM_CYLINDER) shape.radius = size[0];
+    if (type == mjGEOM_CAPSULE || type == mjGEOM_CYLINDER) shape.axis = X_LG.linear().col(2);
+    switch (type) {
       case mjGEOM_SPHERE:
         shape.volume = 4.0 / 3.0 * kPi * size[0] * size[0] * size[0];
         break;
@@ -146,7 +151,6 @@ class MjcfDescriptionReader {
       default:
         half.setConstant(engine_.geom_rbound[geom]);  // a mesh: around it
     }
-    const Pose X_LG = ReadPose(engine_.geom_pos + 3 * geom, engine_.geom_quat + 4 * geom);
     const Vector3d around = X_LG.linear().cwiseAbs() * half;
     shape.low = X_LG.translation() - around;
     shape.high = X_LG.translation() + around;
@@ -189,10 +193,27 @@ class MjcfDescriptionReader {
     joint.lower = stated.states_range ? engine_.jnt_range[2 * id] : -kPi;
     joint.upper = stated.states_range ? engine_.jnt_range[2 * id + 1] : kPi;
     if (type == mjJNT_BALL) joint.lower = 0.0;
+    stated.forces = ReadForces(id);
     robot_.spec.joints.push_back(joint);
     robot_.joints.push_back(stated);
     joint_ids_.push_back(id);
     return {static_cast<int>(robot_.spec.joints.size()) - 1, stated.X_iL};
+  }
+
+  /// What the limits of a joint's motors add up to; none where one of them has no limit.
+  [[nodiscard]] std::optional<StatedForces> ReadForces(int joint) const {
+    std::optional<StatedForces> sum;
+    for (int i = 0; i < engine_.nu; ++i) {
+      const int transmission = engine_.actuator_trntype[i];
+      if (transmission != mjTRN_JOINT && transmission != mjTRN_JOINTINPARENT) continue;
+      if (engine_.actuator_trnid[2 * i] != joint) continue;
+      const std::optional<std::pair<double, double>> limits = FindForceLimits(engine_, i);
+      if (!limits) return std::nullopt;
+      if (!sum) sum.emplace();
+      sum->lower += limits->first;
+      sum->upper += limits->second;
+    }
+    return sum;
   }
 
   void AddSites() {

@@ -238,7 +238,7 @@ class NumberedMjcf : public NumberedFile {
     bool has_tensor = false;
     ChangeParts(*engine, ListInertials(mjcf, *engine), &stated,
                 [&](const Element& inertial, DescribedPart* part) {
-                  const std::optional<Matrix3d> tensor = ReadFullInertia(inertial);
+                  const std::optional<Matrix3d> tensor = ReadFullInertia(inertial, part->body.inertia);
                   if (!tensor) return;
                   has_tensor = true;
                   part->body.inertia = *tensor;

@@ -10,6 +10,7 @@
 #include "harness/base/files.h"
 #include "harness/descriptions/description_writer.h"
 #include "harness/descriptions/mjcf_reader.h"
+#include "harness/engine/mjcf_passes.h"
 
 namespace dexcheck {
 namespace {
@@ -93,6 +94,7 @@ DescriptionFile::DescriptionFile(std::filesystem::path path, std::string text, c
       break;
     case RobotFormat::kMjcf:
       document_ = std::make_unique<MjcfFile>(path_, &text_);
+      force_ranges_ = FindForceRanges(*document_);
       engine_ = LoadMjcf(document_.get());
       break;
     case RobotFormat::kToml:
@@ -112,7 +114,16 @@ RobotDescription DescriptionFile::Describe() const {
   if (format_ == RobotFormat::kBodies && !description_)
     throw InputError(path_.string() + ": is a table of bodies, which has no joints; dexcheck consistency " +
                      "compares it with a URDF, an MJCF or a parameter file");
-  return description_ ? *description_ : ReadMjcfDescription(*engine_, path_.string());
+  if (description_) return *description_;
+  RobotDescription robot = ReadMjcfDescription(*engine_, path_.string());
+  for (size_t i = 0; i < robot.joints.size(); ++i) {
+    const auto range = force_ranges_.find(robot.spec.joints[i].name);
+    if (range == force_ranges_.end()) continue;
+    std::optional<StatedForces>& forces = robot.joints[i].forces;
+    if (!forces) forces = {-range->second, range->second};
+    forces = {std::max(forces->lower, -range->second), std::min(forces->upper, range->second)};
+  }
+  return robot;
 }
 
 std::optional<RobotDescription> DescriptionFile::TryToDescribe() const {

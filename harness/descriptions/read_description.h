@@ -3,6 +3,7 @@
 // A table of bodies as CAD programs export it: masses, centres of mass and inertias of links, no joints.
 
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -76,6 +77,7 @@ class DescriptionFile {
   std::optional<RobotDescription> carrier_;      // likewise
   std::unique_ptr<MjcfFile> document_;           // of an MJCF
   MjModelPtr engine_;                            // likewise
+  std::map<std::string, double> force_ranges_;   // FindForceRanges of an MJCF, which the engine may not know
 };
 
 /// What one file says. @throws InputError as DescriptionFile.

@@ -3,6 +3,7 @@
 // What a file says of a robot, beside what stands in its place where the file says nothing.
 
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -18,6 +19,12 @@ enum class RobotFormat {
   kBodies,  ///< A table of bodies (ReadBodyTable).
 };
 
+/// The least and the largest force that the motors of a joint may exert, N m or N.
+struct StatedForces {
+  double lower = 0.0;
+  double upper = 0.0;
+};
+
 /// What a file says of a joint and its link, beside the specification: how its row is written, too.
 struct DescribedJoint : WrittenRow {
   // Which constants the file states. What it does not state is zero in the specification, or a range of +-pi.
@@ -28,8 +35,9 @@ struct DescribedJoint : WrittenRow {
 
   /// The frame in which the file places the joint, in the parent's own: of a link that is welded to it.
   Pose X_PW = Pose::Identity();
-  int line = 0;              ///< Of the file; 0 when it is not known.
-  double axis_length = 1.0;  ///< Of the axis as the file gives it.
+  int line = 0;                        ///< Of the file; 0 when it is not known.
+  std::optional<StatedForces> forces;  ///< Limits of the joint's motors; none where the file states none.
+  double axis_length = 1.0;            ///< Of the axis as the file gives it.
 };
 
 /// Geometry of a part, as the file gives it.
@@ -37,6 +45,8 @@ struct DescribedShape {
   double volume = 0.0;              ///< m^3; 0 when it is not known.
   Vector3d low = Vector3d::Zero();  ///< Corners of a box around it, along the link's own axes, m.
   Vector3d high = Vector3d::Zero();
+  double radius = 0.0;               ///< Radius of a sphere, cylinder or capsule, m; 0 of other shapes.
+  Vector3d axis = Vector3d::Zero();  ///< Unit axis of a cylinder or capsule; zero of a sphere.
 };
 
 /// A link as the file gives it, before what is welded together becomes one body.

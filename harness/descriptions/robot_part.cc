@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
@@ -187,7 +188,7 @@ std::vector<std::string> TakePart(const RobotPart& part, RobotDescription* a, Ro
   }
   for (const std::string& link : part.left_out)
     require(HasLink(*a, link) || HasLink(*b, link), link,
-            "--ignore: must be armature, damping, friction, coupling, or a link");
+            "--ignore: must be armature, damping, friction, coupling, effort, or a link");
   if (!part.only.empty()) {
     const std::string only = translate(part.only);
     const auto has = [&](const RobotDescription& robot) {
@@ -227,14 +228,48 @@ std::vector<std::string> TakePart(const RobotPart& part, RobotDescription* a, Ro
   return notes;
 }
 
+std::vector<ConstantFinding> ListMissing(const RobotPart& common, const RobotDescription& a,
+                                         const RobotDescription& b) {
+  RobotDescription renamed = b;
+  TakeJointNames(a, &renamed);
+  const auto name = [](const RobotDescription& robot) {
+    return std::filesystem::path(robot.spec.source).filename().string();
+  };
+  std::vector<ConstantFinding> findings;
+  const auto add = [&](bool is_of_a, const std::string& where, const std::string& effect) {
+    ConstantFinding& finding = findings.emplace_back();
+    finding.check = "missing_joint";
+    finding.where = where;
+    (is_of_a ? finding.model : finding.engine) = 1.0;
+    finding.effect = "only in " + name(is_of_a ? a : b) + ", " + effect;
+  };
+  for (const bool is_of_a : {true, false}) {
+    const RobotDescription& robot = is_of_a ? a : renamed;
+    const std::vector<int> match = MatchJoints(robot.spec, (is_of_a ? renamed : a).spec);
+    for (size_t i = 0; i < match.size(); ++i) {
+      const Joint& joint = robot.spec.joints[i];
+      if (match[i] >= 0) continue;
+      const bool is_held = common.held.contains(joint.name);
+      add(is_of_a, "joint " + joint.name,
+          "with link " + joint.link + " of " + FormatNumber(joint.body.mass, 6) + " kg" +
+              (is_held ? ", which does not move there (--lock " + joint.name + " says that it is meant)"
+                       : " (--ignore " + joint.link + " says that it is meant)"));
+    }
+  }
+  if (common.fixes_base) {
+    const bool floats_in_a = a.spec.base.type == BaseType::kFloating;
+    add(floats_in_a, "base " + (floats_in_a ? a : b).spec.base.link,
+        "where it floats (--only LINK compares what it carries)");
+  }
+  return findings;
+}
+
 std::optional<RobotPart> FindCommonPart(const RobotDescription& a, const RobotDescription& b) {
   RobotDescription renamed = b;
   TakeJointNames(a, &renamed);
   for (const RobotDescription* robot : {&a, &b}) {
     const BaseType type = robot->spec.base.type;
-    if ((type != BaseType::kFixed && type != BaseType::kFloating) || robot->spec.object ||
-        robot->format == RobotFormat::kToml)
-      return std::nullopt;
+    if ((type != BaseType::kFixed && type != BaseType::kFloating) || robot->spec.object) return std::nullopt;
   }
   RobotPart part;
   const BaseType types[] = {a.spec.base.type, renamed.spec.base.type};

@@ -234,6 +234,7 @@ DescribedShape UrdfFile::ReadShape(const Element& use) const {
   if (kind == "sphere") {
     const double r = read("radius");
     half.setConstant(r);
+    shape.radius = r;
     shape.volume = 4.0 / 3.0 * kPi * r * r * r;
   } else if (kind == "box" && solid->Attribute("size") != nullptr) {
     const Vector3d size = ReadVector(*solid, "", "size", half);
@@ -243,6 +244,8 @@ DescribedShape UrdfFile::ReadShape(const Element& use) const {
     const double length = read("length");
     const double r = read("radius");
     half << r, r, 0.5 * length;
+    shape.radius = r;
+    shape.axis = X_LS.linear().col(2);
     shape.volume = kPi * r * r * length;
   } else if (kind == "mesh" && solid->Attribute("filename") != nullptr) {
     ReadVector(*solid, "", "scale", half);

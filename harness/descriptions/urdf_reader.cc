@@ -212,6 +212,10 @@ class UrdfReader {
   }
 
   void ReadLimits(const UrdfJoint& joint, Joint* added, DescribedJoint* stated) const {
+    // Files whose motors are not known state an effort of 0.
+    const Element* const effort = joint.element->FirstChildElement("limit");
+    const double most = effort == nullptr ? 0.0 : file_.ReadNumber(*effort, KeyOf(joint), "effort", 0.0);
+    if (most > 0.0) stated->forces = {-most, most};
     added->lower = -kPi;
     added->upper = kPi;
     stated->states_range = joint.type != "continuous";

@@ -6,6 +6,7 @@
 #include <optional>
 #include <sstream>
 #include <string>
+#include <utility>
 
 #include "controller/common/text.h"
 #include "harness/engine/engine.h"
@@ -18,25 +19,14 @@ namespace {
 
 using tinyxml2::XMLElement;
 
-/// The largest force or torque of an actuator at its joint, as -limit to limit; none when nothing limits it.
-std::optional<double> FindLimit(const mjModel& m, int actuator) {
-  const double gear = std::abs(m.actuator_gear[6 * actuator]);
-  const auto reach = [&](const mjtNum* range) { return std::max(std::abs(range[0]), std::abs(range[1])); };
-  if (m.actuator_forcelimited[actuator] != 0) return gear * reach(m.actuator_forcerange + 2 * actuator);
-  const bool is_motor = m.actuator_gaintype[actuator] == mjGAIN_FIXED &&
-                        m.actuator_biastype[actuator] == mjBIAS_NONE &&
-                        m.actuator_dyntype[actuator] == mjDYN_NONE;
-  if (!is_motor || m.actuator_ctrllimited[actuator] == 0) return std::nullopt;
-  return gear * std::abs(m.actuator_gainprm[mjNGAIN * actuator]) * reach(m.actuator_ctrlrange + 2 * actuator);
-}
-
 /// Of all actuators of a joint, the strongest's.
 std::optional<double> FindJointLimit(const mjModel& m, int joint) {
   std::optional<double> largest;
   for (int i = 0; i < m.nu; ++i) {
     if (m.actuator_trntype[i] != mjTRN_JOINT || m.actuator_trnid[2 * i] != joint) continue;
-    const std::optional<double> limit = FindLimit(m, i);
-    if (limit) largest = std::max(largest.value_or(0.0), *limit);
+    const std::optional<std::pair<double, double>> limits = FindForceLimits(m, i);
+    if (limits)
+      largest = std::max({largest.value_or(0.0), std::abs(limits->first), std::abs(limits->second)});
   }
   return largest;
 }
@@ -76,6 +66,23 @@ void ReadJoints(const XMLElement& body, std::string child_class,
 }
 
 }  // namespace
+
+std::optional<std::pair<double, double>> FindForceLimits(const mjModel& m, int actuator) {
+  std::optional<std::pair<double, double>> limits;
+  const auto cut = [&](const mjtNum* range, double factor) {
+    const std::pair<double, double> cut = std::minmax({factor * range[0], factor * range[1]});
+    if (!limits) limits = cut;
+    limits = {std::max(limits->first, cut.first), std::min(limits->second, cut.second)};
+  };
+  const double gear = m.actuator_gear[6 * actuator];
+  if (m.actuator_forcelimited[actuator] != 0) cut(m.actuator_forcerange + 2 * actuator, gear);
+  const bool is_motor = m.actuator_gaintype[actuator] == mjGAIN_FIXED &&
+                        m.actuator_biastype[actuator] == mjBIAS_NONE &&
+                        m.actuator_dyntype[actuator] == mjDYN_NONE;
+  if (is_motor && m.actuator_ctrllimited[actuator] != 0)
+    cut(m.actuator_ctrlrange + 2 * actuator, gear * m.actuator_gainprm[mjNGAIN * actuator]);
+  return limits;
+}
 
 void DeleteControls(XMLElement* root) {
   for (XMLElement* section : ListChildren(root, "keyframe")) {

@@ -6,8 +6,10 @@
 
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "harness/engine/mjcf_file.h"
@@ -72,6 +74,10 @@ std::vector<std::string> ExcludeBaseContacts(MjcfFile* mjcf);
 /// @param poses rad or m, by joint. @returns "link_1 and link_3" of each. @throws as AddMotors.
 std::vector<std::string> ExcludeOverlaps(const std::vector<std::map<std::string, double>>& poses,
                                          MjcfFile* mjcf);
+
+/// The least and the largest force of an actuator at its joint, N m or N: by its forcerange and, of a plain
+/// motor, by its ctrlrange, times its gear; none when neither limits it.
+std::optional<std::pair<double, double>> FindForceLimits(const mjModel& m, int actuator);
 
 /// The largest force that joints themselves allow (actuatorfrcrange, which this program's engine does not
 /// know and AdaptMjcf takes away), by name: their own, or their class's.

@@ -248,6 +248,19 @@ inline constexpr std::array<NewerForce, 0> kNewerForces = {};
 inline constexpr std::array<NewerPart, 0> kNewerParts = {};
 #endif
 
+/// Takes out the elastic forces of flexes. @return how many flexes there are.
+inline int LeaveOutFlexes([[maybe_unused]] mjModel* m) {
+#if mjVERSION_HEADER >= 3012000
+  std::fill_n(m->flex_stiffness, m->nflexstiffness, 0.0);
+  std::fill_n(m->flex_bending, m->nflexbending, 0.0);
+  for (mjtNum* const values : {m->flex_damping, m->flex_edgestiffness, m->flex_edgedamping})
+    std::fill_n(values, m->nflex, 0.0);
+  return static_cast<int>(m->nflex);
+#else
+  return 0;
+#endif
+}
+
 /// The mass matrix at the positions that mj_kinematics and mj_comPos have placed.
 inline void MakeMass(const mjModel& m, mjData* d) {
 #if mjVERSION_HEADER >= 330

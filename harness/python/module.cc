@@ -262,7 +262,7 @@ PYBIND11_MODULE(_dexcheck, m) {
            py::arg("digits") = 0, py::arg("ignore") = std::vector<std::string>(),
            "Compares with another robot or file (TOML, URDF, MJCF), or with functions M(q), c(q, v), g(q), "
            "h(q, v), friction(q, v) of an object or a dictionary; to rounding, or to a number of digits; "
-           "without the constants of joints in ignore (armature, damping, friction).")
+           "without what of joints stands in ignore (armature, damping, friction, effort).")
       .def("__repr__", [](const Robot& robot) {
         return fmt::format("<dexcheck.Robot {} of {}: {} joints>", robot.model().name(),
                            robot.file().string(), robot.model().joints().size());

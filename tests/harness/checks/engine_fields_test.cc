@@ -75,8 +75,7 @@ std::vector<Field> ListFields(mjModel* m) {
 void Change(const Field& field, int index) {
   if (auto* const reals = std::get_if<mjtNum*>(&field.values)) {
     mjtNum& x = (*reals)[index];
-    // A torque divided by twice the gear comes back without rounding.
-    x += field.name == "actuator_gear" ? x : 1e-3 + 0.01 * x;
+    x += 1e-3 + 0.01 * x;
   } else if (auto* const floats = std::get_if<float*>(&field.values)) {
     float& x = (*floats)[index];
     x += 1e-3F + 0.01F * x;

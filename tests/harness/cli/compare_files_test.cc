@@ -269,15 +269,16 @@ class PartOfRobot : public CommandTest {
 <axis xyz="0 0 1"/><limit lower="0" upper="0.04" effort="1" velocity="1"/></joint></robot>)";
 };
 
-TEST_F(PartOfRobot, TheCommonPartIsComparedAndSaid) {
-  const Json results = Compare(0, "a.urdf", "b.xml");
+TEST_F(PartOfRobot, TheCommonPartIsComparedAndTheRestIsADifference) {
+  const Json results = Compare(1, "a.urdf", "b.xml");
+  EXPECT_TRUE(HasFinding(results, "missing_joint", "joint grip", 1.0, 0.0));
   EXPECT_THAT(results.at("not_compared"), Contains(AllOf(HasSubstr("left out"), HasSubstr("finger"))));
   EXPECT_GT(results.at("checks").at("M_bar").at("compared"), 0);
   // Where the other file has its mass, the joint is held.
   WriteChanged("welded.xml", ReadFixture("pair.xml"), "diaginertia=\"0.01 0.011 0.012\"/>",
                "diaginertia=\"0.01 0.011 0.012\"/><body pos=\"0.25 0 0\"><inertial pos=\"0.02 0 0\" "
                "mass=\"0.1\" diaginertia=\"1e-4 2e-4 2e-4\"/></body>");
-  EXPECT_THAT(Compare(0, "a.urdf", "welded.xml").at("not_compared"),
+  EXPECT_THAT(Compare(1, "a.urdf", "welded.xml").at("not_compared"),
               Contains(AllOf(HasSubstr("held"), HasSubstr("grip at 0"))));
   Compare(0, "a.urdf", "welded.xml", "--lock grip");
   EXPECT_FALSE(Compare(1, "a.urdf", "welded.xml", "--lock grip=0.03").at("checks").at("link_com").at("pass"));
@@ -295,7 +296,8 @@ TEST_F(PartOfRobot, ABaseThatOneFileWeldsIsHeld) {
   const std::string floats = ReplaceOnce(body, "  </worldbody>", "</body></worldbody>");
   Write("floats.xml", floats);
   Write("welded.xml", ReplaceOnce(floats, "<freejoint/>", ""));
-  const Json results = Compare(0, "welded.xml", "floats.xml");
+  const Json results = Compare(1, "welded.xml", "floats.xml");
+  EXPECT_TRUE(HasFinding(results, "missing_joint", "base stand", 0.0, 1.0));
   EXPECT_THAT(results.at("not_compared"), Contains(HasSubstr("base")));
 }
 

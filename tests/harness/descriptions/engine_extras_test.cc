@@ -176,7 +176,7 @@ TEST_F(TwoMjcfs, MotorsBesideAUrdfAreNotCompared) {
   EXPECT_TRUE(comparison.result.Agrees()) << List(comparison);
   EXPECT_THAT(comparison.not_compared,
               ::testing::Contains("motors: only arm.xml says how they make their forces (servos, muscles, "
-                                  "transmissions): servo"));
+                                  "transmissions, gears): servo"));
 }
 
 }  // namespace
