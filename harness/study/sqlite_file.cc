@@ -7,13 +7,25 @@
 #include <system_error>
 
 #include "controller/common/text.h"
+#include "harness/base/console.h"
+#include "harness/base/interrupts.h"
 #include "harness/study/study_store.h"
 
 namespace dexcheck {
 namespace {
 
-/// Others hold the lock for some rows; on a slow disk or network that may take a while.
-constexpr int kBusyTimeout = 60000;  // ms
+/// Waits while another program has the file: others write some rows, or read it for as long as they like.
+/// @param file the database. @param count how often this was called for one lock. @returns whether to try
+/// again.
+int WaitForOthers(void* file, int count) {
+  constexpr int kPause = 50, kSilent = 5000;  // ms
+  if (IsInterrupted()) return 0;
+  if (count == kSilent / kPause)
+    Warn(static_cast<const SqliteFile*>(file)->getFilename() +
+         ": another program uses it; waiting until it ends");
+  ::usleep(1000 * kPause);
+  return 1;
+}
 
 const std::string& RequirePlain(const std::string& name) {
   RequirePlainFile(name);
@@ -35,7 +47,7 @@ std::string Explain(const SQLite::Exception& error) {
     case SQLITE_IOERR:
       return std::string("cannot be written: ") + error.what();
     case SQLITE_BUSY:
-      return "is locked by another program";
+      return "is locked by another program; the same command goes on where this one ended";
     default:
       return error.what();
   }
@@ -59,7 +71,7 @@ void RequirePlainFile(const std::string& name) {
 }
 
 SqliteFile::SqliteFile(const std::string& name, int flags) try : SQLite
-  ::Database(RequirePlain(name), flags, kBusyTimeout) {}
+  ::Database(RequirePlain(name), flags) { sqlite3_busy_handler(getHandle(), WaitForOthers, this); }
 catch (const SQLite::Exception& error) {
   throw InputError(name + ": " + Explain(error));
 }

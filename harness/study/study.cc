@@ -137,4 +137,14 @@ std::vector<std::string> ListOverrides(const Study& study, const Trial& trial) {
   return overrides;
 }
 
+bool NeedsMargins(const Study& study) {
+  const auto is_of_margins = [](const std::string& text) {
+    return text.find("gain_margin") != std::string::npos || text.find("phase_margin") != std::string::npos ||
+           text.find("delay_margin") != std::string::npos;
+  };
+  return std::ranges::any_of(study.metrics, is_of_margins) ||
+         std::ranges::any_of(study.objectives, is_of_margins, &Objective::expression) ||
+         std::ranges::any_of(study.constraints, is_of_margins, &Constraint::text);
+}
+
 }  // namespace dexcheck

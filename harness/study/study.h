@@ -100,6 +100,9 @@ Study ParseStudy(const std::string& text, const std::string& source);
 /// All trials; the same list for the same file, always. Not of a search, whose points follow from results.
 std::vector<Trial> ListTrials(const Study& study);
 
+/// Whether a metric, objective or constraint is of a loop's margins, which cost more than a short trial.
+bool NeedsMargins(const Study& study);
+
 /// How many trials there are; of a search at most.
 long CountTrials(const Study& study);
 

@@ -75,6 +75,7 @@ std::string FindDifference(const Study& before, const Study& now) {
   if (before.overrides != now.overrides) return "set";
   if (before.check != now.check) return "check";
   if (before.stop_error != now.stop_error) return "stop_error";
+  if (NeedsMargins(now) && !NeedsMargins(before)) return "margins";  // which its trials do not have
   if (ListKeys(before) != ListKeys(now)) return "keys of vary";
   return FindSearchDifference(before, now);
 }

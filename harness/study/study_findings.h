@@ -43,7 +43,7 @@ StudyProgress FindProgress(const StudyStore& store);
 
 // What a study looks like elsewhere: what came of it as data, its pages, and its rows for other programs.
 
-/// Most trials whose numbers are in a page; of more an even part, and the best.
+/// Most trials whose numbers are in a page; of more the trials of points that a hash draws, and the best.
 constexpr size_t kMostShown = 20000;
 
 struct StudySummary {

@@ -6,6 +6,7 @@
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
+#include "harness/plant/random_stream.h"
 #include "harness/study/sampled_stability.h"
 #include "harness/study/sampling.h"
 #include "harness/study/search.h"
@@ -79,6 +80,8 @@ class Summary {
     json["shown"] = Json::array();
     for (const Metric metric : metrics_) json["shown"].push_back(kMetrics[metric].name);
     json["columns"] = ListColumns();
+    json["added"] = Json::array();
+    for (const TrialRow* row : added_) json["added"].push_back(row->trial.number);
     json["failures"] = ListFailures();
     json["history"] = ListHistory();
     json["maximize"] = !study_.objectives.empty() && study_.objectives.front().maximize;
@@ -122,7 +125,7 @@ class Summary {
     for (size_t i = 0; i < keys.size(); ++i) cells.push_back(ShowValue(study_.variations[i], keys[i]));
     for (const double value : more) cells.push_back(value);
     (*best)["rows"].push_back({{"trial", row.trial.number}, {"cells", cells}});
-    shown_.push_back(&row);  // what the table leads to must be on the page
+    best_.push_back(&row);
   }
 
   /// Of a study that says what it wants: points that fulfil the constraints, by the objective; of several
@@ -233,12 +236,37 @@ class Summary {
     return list;
   }
 
-  /// All trials, or an even part and the best.
+  /// Rows of points that are drawn by a hash of their number, at most so many: all trials of a point, its
+  /// seeds and its draws, or none. A step through the rows would meet the same values of a grid's keys again
+  /// and again.
+  [[nodiscard]] std::vector<const TrialRow*> DrawPoints(const std::vector<const TrialRow*>& rows,
+                                                        size_t most) const {
+    if (rows.size() <= most) return rows;
+    const long trials = CountTrialsOfPoint(study_);
+    const long together = static_cast<size_t>(trials) > most ? 1 : trials;  // one point alone is too many
+    const RandomStream stream(/*seed=*/0, "page");
+    std::vector<std::pair<double, const TrialRow*>> drawn;
+    drawn.reserve(rows.size());
+    for (const TrialRow* row : rows)
+      drawn.emplace_back(stream.Uniform(static_cast<std::uint64_t>(row->trial.number / together)), row);
+    std::ranges::sort(drawn);  // rows are of one vector, by number
+    size_t end = most;
+    while (end > 0 && drawn[end].first == drawn[end - 1].first) --end;
+    std::vector<const TrialRow*> result;
+    for (size_t i = 0; i < end; ++i) result.push_back(drawn[i].second);
+    std::ranges::sort(result);
+    return result;
+  }
+
+  /// All trials, or a drawn part; apart from these the best, to which the table leads.
   void ChooseShown() {
-    const size_t every = std::max((rows_.size() + kMostShown - 1) / kMostShown, size_t{1});
-    for (size_t i = 0; i < rows_.size(); i += every) shown_.push_back(&rows_[i]);
-    std::ranges::sort(shown_);  // of one vector, by number
-    shown_.erase(std::unique(shown_.begin(), shown_.end()), shown_.end());
+    for (const TrialRow& row : rows_) shown_.push_back(&row);
+    shown_ = DrawPoints(shown_, kMostShown);
+    compared_ = DrawPoints(shown_, kMostCompared);
+    std::ranges::sort(best_);
+    std::ranges::set_difference(best_, shown_, std::back_inserter(added_));
+    shown_.insert(shown_.end(), added_.begin(), added_.end());
+    std::ranges::sort(shown_);
   }
 
   /// None for values that make no scenario.
@@ -255,9 +283,8 @@ class Summary {
     if (of_joints() || rows_.empty()) return;
     inputs_.OpenScenario();
     theory_.resize(shown_.size());
-    const size_t every = (shown_.size() + kMostCompared - 1) / kMostCompared;
-    for (size_t i = 0; i < shown_.size(); i += every) {
-      if (shown_[i]->result.outcome != Outcome::kRefused)
+    for (size_t i = 0; i < shown_.size(); ++i) {
+      if (shown_[i]->result.outcome != Outcome::kRefused && std::ranges::binary_search(compared_, shown_[i]))
         theory_[i] = FindTheory(shown_[i]->trial.parameters);
     }
   }
@@ -359,6 +386,9 @@ class Summary {
   std::vector<Metric> metrics_;                // to be shown
   std::vector<const TrialRow*> tracked_;       // least error first
   std::vector<const TrialRow*> shown_;         // by number
+  std::vector<const TrialRow*> compared_;      // of these, with theory
+  std::vector<const TrialRow*> best_;          // in the table of the best
+  std::vector<const TrialRow*> added_;         // of the best, those that were not drawn
   std::vector<std::optional<Theory>> theory_;  // of these; empty without
 };
 

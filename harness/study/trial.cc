@@ -154,7 +154,7 @@ TrialResult RunTrial(const StudyInputs& inputs, const Trial& trial) {
                        FormatNumber(runner.loop().record().time) + " s";
     }
     result.metrics = monitor.CalcMetrics(run.tracking);
-    SetMargins(setup, &result.metrics);
+    if (NeedsMargins(inputs.study)) SetMargins(setup, &result.metrics);
     result.outcome = Classify(setup, run, result);
   } catch (const InputError& error) {
     result.metrics.fill(std::numeric_limits<double>::quiet_NaN());

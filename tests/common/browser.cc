@@ -147,6 +147,38 @@ bool Browser::WaitFor(const std::string& body, double seconds) const {
   return true;
 }
 
+int Browser::WorkControls() const {
+  const Json count = Run(R"(
+    const all = () => [...document.querySelectorAll('select, input, button, summary, [tabindex="0"], a[href^="#"]')]
+      .filter(e => !e.disabled && e.getClientRects().length > 0);
+    const set = (control, value) => {
+      control.value = value;
+      for (const name of ['input', 'change']) control.dispatchEvent(new Event(name, {bubbles: true}));
+    };
+    const work = control => {
+      const old = control.value, {type, min, max} = control;
+      if (control.tagName === 'SELECT') for (const {value} of [...control.options]) set(control, value);
+      else if (type === 'range') for (const value of [min || 0, max || 100]) set(control, value);
+      else if (type === 'text' || type === 'search') for (const value of ['(', 'x < 1', '*']) set(control, value);
+      else {
+        control.click();
+        if (control.isConnected) control.click();  // back
+        return;
+      }
+      set(control, old);
+    };
+    let i = 0;
+    // What a control draws anew is asked for anew.
+    for (; i < Math.min(all().length, 300); ++i) work(all()[i]);
+    window.isAlive = false;
+    requestAnimationFrame(() => setTimeout(() => { window.isAlive = true; }));
+    return i;)");
+  if (!WaitFor("return window.isAlive;", 60.0)) throw std::runtime_error("the page does not answer any more");
+  const std::vector<std::string> messages = TakeConsole();
+  if (!messages.empty()) throw std::runtime_error("after its controls were worked: " + messages.front());
+  return count.get<int>();
+}
+
 void Browser::Drag(int from_x, int from_y, int to_x, int to_y) const {
   const auto move = [](int x, int y) {
     return Json{{"type", "pointerMove"}, {"duration", 50}, {"x", x}, {"y", y}};

@@ -30,6 +30,11 @@ class Browser {
   [[nodiscard]] nlohmann::json Run(const std::string& body) const;
   /// Runs the body until it returns true; false after `seconds`.
   [[nodiscard]] bool WaitFor(const std::string& body, double seconds = 120.0) const;
+  /// Works every control of the page that can be seen: options, buttons, boxes, sliders, texts, folds, heads
+  /// and rows of tables, links within the page. A page that does not answer afterwards, or whose console is
+  /// not silent, throws.
+  /// @returns how many there were.
+  [[nodiscard]] int WorkControls() const;
   /// Presses the mouse's button at the first place and lets it go at the second, in viewport coordinates.
   void Drag(int from_x, int from_y, int to_x, int to_y) const;
   void DoubleClick(int x, int y) const;

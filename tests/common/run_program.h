@@ -28,7 +28,7 @@ struct ProgramOptions {
   std::optional<std::filesystem::path> out = {};  ///< Standard output goes into this file instead.
   std::optional<std::filesystem::path> err = {};  ///< Standard error goes into this file instead.
   std::vector<int> closed = {};                   ///< Standard streams that it finds closed.
-  unsigned seconds = 300;  ///< After these, which a busy machine needs, it is ended by force.
+  unsigned seconds = 1200;  ///< It hangs when it needs more, on any machine, and is ended by force.
 };
 
 /// A running program.

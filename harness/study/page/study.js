@@ -7,9 +7,12 @@
   const columns = study.columns, width = columns.length, count = numbers.length / width;
   const value = (row, column) => numbers[row * width + column];
   const kNumber = 0, kSeed = 1, kOutcome = 2, kFirstKey = 3, firstMetric = kFirstKey + study.keys.length;
+  const drawn = count - study.added.length, isPart = study.done > drawn;
   const find = name => columns.findIndex(column => column.name === name);
   const get = id => document.getElementById(id), byId = id => get('explore-' + id);
   const held = row => study.outcomes[value(row, kOutcome)].held;
+  // Rows of the best that the page's part of the trials lacks: they are marks, and count nowhere.
+  const added = new Set(study.added), isAdded = row => added.has(value(row, kNumber));
 
   const Show = (x, column) => {
     const {labels} = columns[column];
@@ -71,7 +74,7 @@
   };
 
   // Rows that pass the filters.
-  let chosen = -1, rows = [];
+  let chosen = -1, rows = [], marks = [];
   const Filter = () => {
     const outcome = byId('outcome').value, tests = [];
     for (const part of byId('filter').value.split(',')) {
@@ -83,8 +86,10 @@
       const holds = {'<': x => x < limit, '<=': x => x <= limit, '>': x => x > limit, '>=': x => x >= limit, '=': x => x === limit}[match[2]];
       tests.push(row => holds(value(row, column)));
     }
-    rows = [...Array(count).keys()].filter(row => (outcome === '' || value(row, kOutcome) === Number(outcome)) && tests.every(test => test(row)));
-    byId('count').textContent = `${rows.length} of ${count} trials` + (study.done > count ? `, a part of ${study.done}` : '');
+    const passed = [...Array(count).keys()].filter(row => (outcome === '' || value(row, kOutcome) === Number(outcome)) && tests.every(test => test(row)));
+    rows = passed.filter(row => !isAdded(row));
+    marks = passed.filter(isAdded);
+    byId('count').textContent = `${rows.length} of ${drawn} trials` + (isPart ? `, a part of ${study.done}` : '');
   };
 
   const Range = (list, column) => {
@@ -98,10 +103,15 @@
   };
   const AxisOf = (column, list = rows) => ({label: columns[column].label, labels: column === kOutcome ? study.outcomes.map(o => o.name)
     : columns[column].labels, log: !columns[column].labels && column !== kOutcome && IsWide(...Range(list, column))});
+  // Colours of numbers, pale to dark; those that differ by rounding have one.
+  const ColorsOf = (least, most, none) => {
+    const f = IsWide(least, most) ? Math.log : x => x, isFlat = !(most > least) || Short(least) === Short(most);
+    return {isFlat, isLog: f === Math.log, of: x => !Number.isFinite(x) ? none : ColorOf(isFlat ? 0 : (f(x) - f(least)) / (f(most) - f(least)))};
+  };
   const ColorBy = (column, list = rows) => {
     if (column === kOutcome) return row => study.outcomes[value(row, kOutcome)].color;
-    const [least, most] = Range(list, column), f = IsWide(least, most) ? Math.log : x => x;
-    return row => Number.isFinite(value(row, column)) ? ColorOf(!isFlat ? (f(value(row, column)) - f(least)) / (f(most) - f(least)) : 0) : '#bbb';
+    const colors = ColorsOf(...Range(list, column), '#bbb');
+    return row => colors.of(value(row, column));
   };
   // Of points, those that no other one beats in both quantities, by the first one.
   const FindFront = (list, x, y) => {
@@ -126,11 +136,18 @@
     return groups;
   };
 
-  const kMostDrawn = 6000;  // points of a chart
+  const kMostDrawn = 6000;  // points of a chart, about
+  // In [0, 1); a step through the rows would meet the same seed again and again.
+  const Hash = row => {
+    let x = Math.imul(row + 1, 0x9e3779b1);
+    x = Math.imul(x ^ (x >>> 15), 0x85ebca6b);
+    return ((x ^ (x >>> 13)) >>> 0) / 2 ** 32;
+  };
   // Any quantity against another one, with the Pareto front of two metrics, and what (57) makes of the second one.
   const DrawPair = (canvas, x, y, color, list = rows, withMedian = false) => {
     const good = list.filter(row => Number.isFinite(value(row, x)) && Number.isFinite(value(row, y)));
-    const colorOf = ColorBy(color, good), every = Math.ceil(good.length / kMostDrawn);
+    const seen = good.concat(marks.filter(row => Number.isFinite(value(row, x)) && Number.isFinite(value(row, y))));
+    const colorOf = ColorBy(color, seen), part = kMostDrawn / seen.length;
     const At = row => ({x: value(row, x), y: value(row, y), row, color: colorOf(row)});
     const lines = [];
     if (x >= firstMetric && y >= firstMetric) {
@@ -144,7 +161,7 @@
     const theory = find('theory.' + columns[y].name);
     const predicted = theory < 0 ? [] : good.filter(row => Number.isFinite(value(row, theory)));
     if (predicted.length) lines.push({label: 'by (57)', rings: true, color: '#005f73', points: predicted.map(row => ({x: value(row, x), y: value(row, theory)}))});
-    Scatter(canvas, {x: AxisOf(x, good), y: AxisOf(y, good), points: good.filter((row, i) => i % every === 0 || row === chosen).map(At), lines, chosen,
+    Scatter(canvas, {x: AxisOf(x, seen), y: AxisOf(y, seen), points: seen.filter(row => Hash(row) < part || row === chosen || isAdded(row)).map(At), lines, chosen,
       choose: Choose, describe: p => Describe(p.row) + `; ${columns[y].name} ${Show(p.y, y)}`});
   };
 
@@ -179,16 +196,12 @@
     });
     const finite = cells.map(cell => cell.z).filter(Number.isFinite);
     const least = finite.reduce((a, b) => Math.min(a, b), Infinity), most = finite.reduce((a, b) => Math.max(a, b), -Infinity);
-    const isFlat = Short(least) === Short(most); // what differs by rounding has one colour
-    const f = IsWide(least, most) ? Math.log : v => v;
-    for (const cell of cells) {
-      cell.color = z === kOutcome ? study.outcomes[cell.z].color
-        : Number.isFinite(cell.z) ? ColorOf(most > least ? (f(cell.z) - f(least)) / (f(most) - f(least)) : 0) : '#e8e8e8';
-    }
+    const colors = ColorsOf(least, most, '#e8e8e8');
+    for (const cell of cells) cell.color = z === kOutcome ? study.outcomes[cell.z].color : colors.of(cell.z);
     Cells(canvas, {x: AxisOf(x), y: AxisOf(y), cells, chosen, choose: Choose, describe: p => Describe(p.row) + (z === kOutcome ? '' : `; ${columns[z].name} ${Show(p.z, z)}`)});
-    text.textContent = z === kOutcome ? 'The worst outcome of each cell.' + (cells.some(cell => cell.mark) ? ' Crosses: unstable by (57).' : '')
-      : finite.length && isFlat ? `${Short(least)} everywhere; grey: no value.`
-      : finite.length ? `From ${Short(least)} (pale) to ${Short(most)} (dark)${f === Math.log ? ', by the logarithm' : ''}; grey: no value.` : 'No value.';
+    text.textContent = z === kOutcome ? `The worst outcome of each cell${isPart ? ', of the trials on this page' : ''}.` + (cells.some(cell => cell.mark) ? ' Crosses: unstable by (57).' : '')
+      : finite.length && colors.isFlat ? `${Short(least)} everywhere; grey: no value.`
+      : finite.length ? `From ${Short(least)} (pale) to ${Short(most)} (dark)${colors.isLog ? ', by the logarithm' : ''}; grey: no value.` : 'No value.';
   };
 
   const DrawHistory = () => {
@@ -198,7 +211,7 @@
       if (best === null || (study.maximize ? p.y > best : p.y < best)) best = p.y;
       return {x: p.x, y: best};
     });
-    const byNumber = new Map(rows.map(row => [value(row, kNumber), row]));
+    const byNumber = new Map(rows.concat(marks).map(row => [value(row, kNumber), row]));
     const values = good.map(p => p.y);
     Scatter(byId('history'), {x: {label: 'point'}, y: {label: 'objective', log: IsWide(Math.min(...values), Math.max(...values))}, chosen, choose: Choose,
       points: good.map(p => ({...p, row: byNumber.get(p.number), color: '#8a9a9a'})), lines: [{label: 'best until then', points: line, color: style('--accent')}],
@@ -234,7 +247,7 @@
     if (event.key === 'Enter' || event.key === ' ') { event.preventDefault(); act(); }
   }});
   const DrawTable = () => {
-    const list = [...rows].sort((a, b) => {
+    const list = rows.concat(marks).sort((a, b) => {
       const x = value(a, sorted.column), y = value(b, sorted.column);
       if (!Number.isFinite(x) || !Number.isFinite(y)) return Number.isFinite(y) - Number.isFinite(x);
       return sorted.down ? y - x : x - y;
@@ -315,8 +328,10 @@
   drop('best', !study.best || !study.best.order);
   drop('history', !study.history.length);
   drop('over-two', study.keys.length < 2);
-  get('trials-text').textContent = 'A trial that is chosen, here or in a chart, shows the command that repeats it.' + (study.done > count
-    ? ` Here are ${count} of ${study.done} trials; "dexcheck study show DB NUMBER" shows any other one,` : '') + ' "dexcheck study export DB" writes all as CSV.';
+  get('trials-text').textContent = 'A trial that is chosen, here or in a chart, shows the command that repeats it.' + (isPart
+    ? ` Here are ${drawn} of ${study.done} trials, those of points that a hash of their number draws, with all their seeds and draws` +
+      `${added.size ? `, and ${added.size} of the best, which are marks in charts and count nowhere` : ''}. ` +
+      `${study.done - count} trials are left out; "dexcheck study show DB NUMBER" shows any of them,` : '') + ' "dexcheck study export DB" writes all as CSV.';
   for (const [id, name] of [['margins', 'Margins'], ['effects', 'Which key matters'], ['outcomes', 'Outcomes'], ['explore', 'Look closer'], ['best', 'Best'],
     ['trials', 'Trials']]) {
     if (get(id)) Add(get('study-nav'), Make('a', name, {href: '#' + id}));

@@ -4,6 +4,9 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <chrono>
+#include <thread>
+
 #include "tests/common/matchers.h"
 #include "tests/harness/cli/study_command.h"
 
@@ -99,6 +102,25 @@ TEST_F(StudyCommand, AFullFileSystemLosesNothing) {
   EXPECT_EQ(Read("left.txt"), "a.sqlite\nfiller\n");
   EXPECT_EQ(Dump("full.sqlite"), before);
   EXPECT_EQ(Dump("freed.sqlite"), Reference());
+}
+
+// Who reads a database for long keeps rows from being written meanwhile, and no more than that.
+TEST_F(StudyCommand, WaitsForAnotherProgramThatReads) {
+  Make("db.sqlite", {"--shard", "1/2"});
+  SQLite::Database other = OpenDatabase(Path("db.sqlite"));
+  other.exec("BEGIN");
+  (void)other.execAndGet("SELECT count(*) FROM trials");
+  ProgramOptions options;
+  options.folder = Path("");
+  options.err = Path("said.txt");
+  Program study(DexcheckCommand(RunArguments("db.sqlite")), options);
+  const auto said = [&] { return std::filesystem::exists(Path("said.txt")) ? Read("said.txt") : ""; };
+  for (int k = 0; k < 600 && said().find("another program uses it") == std::string::npos; ++k)
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+  EXPECT_THAT(said(), HasSubstr("db.sqlite: another program uses it; waiting until it ends"));
+  other.exec("COMMIT");
+  EXPECT_EQ(study.Wait().exit_code, 0) << said();
+  EXPECT_EQ(other.execAndGet("SELECT count(*) FROM trials").getInt(), static_cast<int>(kNumTrials));
 }
 
 TEST_F(StudyCommand, AReadOnlyDatabaseIsNamed) {

@@ -118,6 +118,7 @@ TEST_F(JudgeBrowserTest, TwoRecordingsAreShownWithTheirCauses) {
   EXPECT_EQ(browser_.Run("return ReadJson('replay-scene').parts;"), kJoints + 1)
       << "the joints' links and the world";
   EXPECT_THAT(TextOf("#replay"), ::testing::HasSubstr("The motion of first.csv."));
+  EXPECT_GT(browser_.WorkControls(), 10);
   ExpectNothingIsCutOff();
   ExpectSoundPage();
 }

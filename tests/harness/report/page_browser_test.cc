@@ -129,6 +129,7 @@ TEST_F(PageBrowserTest, ShowsVerdictAndPlotsWithoutErrors) {
   const nlohmann::json light = browser_.Run(ask_ground);
   browser_.SetDark(true);
   EXPECT_NE(browser_.Run(ask_ground), light);
+  EXPECT_GT(browser_.WorkControls(), 10);
   EXPECT_THAT(browser_.TakeConsole(), IsEmpty());
 }
 
@@ -182,6 +183,7 @@ TEST_F(PageBrowserTest, AComparisonsTablesStayInTheirCards) {
   }
   EXPECT_GE(browser_.Run("return document.querySelectorAll('#checks + .card details tr').length;"), 2)
       << "constants that agree are folded";
+  EXPECT_GT(browser_.WorkControls(), 2);
 }
 
 // The confusion matrix counts what each fault was named.
@@ -207,6 +209,7 @@ TEST_F(PageBrowserTest, ACampaignsPageHasItsMatrix) {
   EXPECT_EQ(browser_.Run("return [...document.querySelectorAll('.matrix tr')].map(row => "
                          "[...row.children].map(cell => cell.textContent).join('|'));"),
             nlohmann::json({"injected|gain|lag|a class|all", "gain|1||1|2", "signal of another one||1||1"}));
+  EXPECT_GE(browser_.WorkControls(), 0);
 }
 
 TEST_F(PageBrowserTest, PlaysTheVideo) {

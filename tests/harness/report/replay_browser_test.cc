@@ -208,6 +208,8 @@ TEST_F(ReplayBrowserTest, PlaysTurnsHidesAndFits) {
     EXPECT_GT(place["width"], 0.75 * std::min(width, 1180)) << width;
     EXPECT_LT(place["height"], 0.7 * 420) << width;
   }
+  browser_.SetViewport(900, 420);
+  EXPECT_GT(browser_.WorkControls(), 10);
   EXPECT_THAT(browser_.TakeConsole(), IsEmpty());
 }
 

@@ -37,7 +37,9 @@ class StudyPageBrowserTest : public ::testing::Test {
         inputs.study.is_search()
             ? SearchHistory(inputs.study, UnitPoint(inputs.study.num_keys(), 0.5)).ListMissing()
             : ListTrials(inputs.study);
-    for (const Trial& trial : trials) store.Add(MakeRow(trial));
+    std::vector<TrialRow> rows;
+    for (const Trial& trial : trials) rows.push_back(MakeRow(trial));
+    store.Add(rows);
     WriteText(folder_.path() / "page.html", MakeStudyPage(SummariseStudy(store)));
     browser_.SetViewport(width, 900, width < 500);
     browser_.Open(folder_.path() / "page.html");
@@ -47,6 +49,7 @@ class StudyPageBrowserTest : public ::testing::Test {
 
   static TrialRow MakeRow(const Trial& trial) {
     TrialRow row = MakeTrialRow(trial, 1.0 / static_cast<double>(trial.number + 1));
+    if (trial.seed == 2 && trial.parameters.size() == 2) row.result.outcome = Outcome::kLostContact;
     // The last number, of K_v or of a law.
     if (trial.parameters.back() > kLimit || trial.parameters.back() == kLastLaw) {
       row.result.outcome = Outcome::kDiverged;
@@ -114,8 +117,39 @@ TEST_F(StudyPageBrowserTest, FitsEveryWidthWithoutAnError) {
       EXPECT_EQ(
           Run("return [...document.querySelectorAll('canvas')].filter(c => !Chart.getChart(c)).length;"), 0)
           << "each chart is drawn";
+      if (width == 1280) {
+        // Maps and charts in every colour, sorted and filtered.
+        EXPECT_GT(browser_.WorkControls(), 12) << study;
+        EXPECT_EQ(
+            Run("const x = document.getElementById('explore-color'); return [...x.options].length > 3;"),
+            true);
+      }
     }
   }
+}
+
+// Every trial of seed 2 was lost. A grid's rows alternate between the seeds: every other one would be all
+// green.
+TEST_F(StudyPageBrowserTest, APartOfManyTrialsHasEverySeed) {
+  Open(
+      "seeds = [1, 2]\nmetrics = ['energy']\n[[vary]]\nkey = 'control.K_p'\nfrom = 1\nto = 100\ncount = "
+      "1250\n[[vary]]\n"
+      "key = 'control.K_v'\nfrom = 11\nto = 20\ncount = 10\n");
+  const std::string held = "Chart.getChart(document.querySelector('#maps canvas')).data.datasets[0].data";
+  const std::string tracked = Run("return ReadJson('study-data').outcomes[0].color;");
+  EXPECT_GT(Run("return " + held + ".length;"), 0);
+  EXPECT_EQ(Run("return " + held + ".filter(c => c.color === '" + tracked + "').length;"), 0);
+  // A chart's part of these has both seeds too.
+  EXPECT_EQ(
+      Run("const p = Chart.getChart(document.getElementById('explore-scatter')).data.datasets.at(-1).data; "
+          "return new Set(p.map(q => q.color)).size;"),
+      2);
+  // The best are marks: the page has them, and counts them nowhere.
+  const int added = Run("return ReadJson('study-data').added.length;");
+  EXPECT_GT(added, 0);
+  EXPECT_EQ(Text("explore-count"), "20000 of 20000 trials, a part of 25000");
+  EXPECT_THAT(Text("trials-text"), HasSubstr("Here are 20000 of 25000 trials, those of points that a hash"));
+  EXPECT_THAT(Text("trials-text"), HasSubstr(std::to_string(5000 - added) + " trials are left out"));
 }
 
 // What it draws, how it filters, sorts and leads to a trial; by the keyboard too.

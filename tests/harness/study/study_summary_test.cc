@@ -3,10 +3,15 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstring>
 #include <limits>
+#include <map>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "harness/study/study_findings.h"
 #include "tests/common/files.h"
@@ -80,21 +85,48 @@ TEST(StudySummary, OfJointsHasTheirErrorAndNoTheoryOfAnObject) {
   EXPECT_EQ(json["best"]["order"], "By rms joint error, of the trials that tracked.");
 }
 
-TEST(StudySummary, OfManyTrialsItHasAnEvenPartAndTheBest) {
-  const StudySummary summary = Summarise(
-      Parse("[[objective]]\nmaximize = 'position_error_rms'\n[[vary]]\nkey = 'control.K_p'\nfrom = 1\nto = "
-            "100\ncount = 150\n[[vary]]\nkey = 'control.K_v'\nfrom = 1\nto = 100\ncount = 150\n"),
-      "why");
-  EXPECT_EQ(summary.json["done"], 22500);
+/// The numbers of the trials that a page has, row by row.
+std::vector<std::vector<double>> ReadValues(const StudySummary& summary) {
   const size_t width = summary.json["columns"].size();
-  const size_t count = summary.values.size() / sizeof(double) / width;
-  EXPECT_GT(count, kMostShown / 2);
-  EXPECT_LE(count, kMostShown + 20);
-  // The last that tracked have the largest error, and are not among each so many.
-  std::vector<double> numbers(count * width);
-  std::memcpy(numbers.data(), summary.values.data(), summary.values.size());
-  EXPECT_EQ(summary.json["best"]["rows"][0]["trial"], 22498);
-  EXPECT_EQ(numbers[(count - 1) * width], 22498.0);
+  std::vector<std::vector<double>> rows(summary.values.size() / sizeof(double) / width,
+                                        std::vector<double>(width));
+  for (size_t i = 0; i < rows.size(); ++i)
+    std::memcpy(rows[i].data(), summary.values.data() + i * width * sizeof(double), width * sizeof(double));
+  return rows;
+}
+
+// All trials of seed 2 diverge, and the last key has ten values: a step through the rows would show one seed,
+// or two of the ten.
+TEST(StudySummary, OfManyTrialsItHasWholePointsAndTheBest) {
+  const StudySummary summary = Summarise(
+      Parse(
+          "seeds = [1, 2]\n[[vary]]\nkey = 'control.K_p'\n"
+          "from = 1\nto = 100\ncount = 1250\n[[vary]]\nkey = 'control.K_v'\nfrom = 1\nto = 10\ncount = 10\n"),
+      "why");
+  EXPECT_EQ(summary.json["done"], 25000);
+  const std::vector<std::vector<double>> rows = ReadValues(summary);
+  const std::vector<long> added = summary.json["added"];
+  ASSERT_GT(rows.size(), added.size());
+  const size_t drawn = rows.size() - added.size();
+  EXPECT_LE(drawn, kMostShown);
+  EXPECT_GE(drawn, kMostShown - 1);
+  std::map<double, std::array<int, 2>> seeds_of_value;
+  for (const std::vector<double>& row : rows) {
+    if (std::ranges::find(added, static_cast<long>(row[0])) == added.end())
+      ++seeds_of_value[row[4]][row[1] == 1.0 ? 0 : 1];
+  }
+  ASSERT_EQ(seeds_of_value.size(), 10U);
+  for (const auto& [value, counts] : seeds_of_value) {
+    EXPECT_EQ(counts[0], counts[1]) << value << ": each point with both seeds";
+    EXPECT_GT(counts[0], 850) << value;
+  }
+  // The best are on the page, and those that were not drawn are said to be additions.
+  for (const auto& best : summary.json["best"]["rows"]) {
+    const auto is_it = [&](const std::vector<double>& row) { return row[0] == best["trial"].get<double>(); };
+    EXPECT_EQ(std::ranges::count_if(rows, is_it), 1) << best;
+  }
+  EXPECT_FALSE(added.empty());
+  EXPECT_EQ(summary.json["theory"]["compared"], 2000);
 }
 
 TEST(StudySummary, ATrialHasTheCommandThatRepeatsIt) {

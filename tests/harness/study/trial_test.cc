@@ -115,5 +115,20 @@ values = [1, 1.1]
   EXPECT_EQ(errors.size(), 8U) << "each key counts";
 }
 
+// A loop's margins cost more than a short trial: they are computed where the study asks for one.
+TEST(Trial, HasMarginsWhereTheStudyAsks) {
+  const std::string head = "name = 'm'\nscenario = 'panda-reach'\nset = ['duration=0.002']\n",
+                    vary = "[[vary]]\nkey = 'control.natural_frequency'\nvalues = [10]\n";
+  const auto gain_margin = [&](const std::string& more) {
+    return RunTrial(MakeStudyInputs(head + more + vary), {0, 0, {10.0}}).metrics[kGainMargin];
+  };
+  EXPECT_TRUE(std::isnan(gain_margin("")));
+  EXPECT_TRUE(std::isnan(gain_margin("constraints = ['peak_effort < 1']\n")));
+  const double asked = gain_margin("metrics = ['gain_margin']\n");
+  EXPECT_GT(asked, 1.0);
+  EXPECT_EQ(gain_margin("constraints = ['2 < phase_margin']\n"), asked);
+  EXPECT_EQ(gain_margin("[[objective]]\nmaximize = 'delay_margin'\n"), asked);
+}
+
 }  // namespace
 }  // namespace dexcheck::testing::trial_test
