@@ -16,6 +16,13 @@ namespace dexcheck {
 
 namespace {
 
+constexpr const char* kRunXacro = ": write the URDF with the program xacro first";
+
+/// What stands in the place of a number; braces are an expression that xacro has not expanded.
+std::string QuoteValue(const std::string& value) {
+  return Quote(value) + (value.find('{') == std::string::npos ? "" : kRunXacro);
+}
+
 // Far more than robots have; it also keeps what follows within seconds and megabytes.
 constexpr size_t kMaxLinks = 2000;
 
@@ -67,8 +74,7 @@ UrdfFile::UrdfFile(std::string_view text, std::string source)
   for (Element* child : ListChildren(robot_)) {
     const std::string_view kind = child->Name();
     if (kind.starts_with("xacro:")) {
-      Fail(child->GetLineNum(), "is a template, got " + Quote("<" + std::string(kind) + ">") +
-                                    ": write the URDF with the program xacro first");
+      Fail(child->GetLineNum(), "is a template, got " + Quote("<" + std::string(kind) + ">") + kRunXacro);
     }
     if (kind == "link") AddLink(child);
     if (kind == "joint") AddJoint(child);
@@ -186,7 +192,7 @@ double UrdfFile::ReadNumber(const Element& element, const std::string& key, cons
   try {
     return urdf::strToDouble(value);
   } catch (const std::runtime_error&) {
-    Fail(element.GetLineNum(), name + "must be a number, got " + Quote(value));
+    Fail(element.GetLineNum(), name + "must be a number, got " + QuoteValue(value));
   }
 }
 
@@ -205,7 +211,7 @@ Vector3d UrdfFile::ReadVector(const Element& element, const std::string& key, co
     return {numbers.x, numbers.y, numbers.z};
   } catch (const urdf::ParseError&) {
     Fail(element.GetLineNum(),
-         key + element.Name() + ": " + attribute + ": must be three numbers, got " + Quote(value));
+         key + element.Name() + ": " + attribute + ": must be three numbers, got " + QuoteValue(value));
   }
 }
 

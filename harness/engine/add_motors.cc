@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <map>
 #include <optional>
 #include <sstream>
 #include <string>
+#include <string_view>
 #include <utility>
 
 #include "controller/common/text.h"
@@ -136,6 +138,26 @@ void AddMotors(MjcfFile* mjcf, const std::map<std::string, double>& limits) {
   mjcf->Note(*root, "<actuator>",
              std::to_string(m.nu) + (m.nu == 1 ? " actuator" : " actuators") + " replaced by " +
                  std::to_string(motors) + (motors == 1 ? " motor" : " motors"));
+}
+
+void NameParts(MjcfFile* mjcf) {
+  int joint = 0, body = 1;
+  // The engine numbers bodies from the root on, each before its children, and joints by their bodies.
+  const std::function<void(tinyxml2::XMLElement*)> name_children = [&](tinyxml2::XMLElement* parent) {
+    const auto name = [](tinyxml2::XMLElement* element, int number) {
+      if (ReadAttribute(*element, "name").empty())
+        element->SetAttribute("name", fmt::format("#{}", number).c_str());
+    };
+    for (tinyxml2::XMLElement* child : ListChildren(parent, "body")) {
+      name(child, body++);
+      for (tinyxml2::XMLElement* own : ListChildren(child)) {
+        const std::string_view kind = own->Name();
+        if (kind == "joint" || kind == "freejoint") name(own, joint++);
+      }
+      name_children(child);
+    }
+  };
+  for (tinyxml2::XMLElement* world : ListChildren(mjcf->root(), "worldbody")) name_children(world);
 }
 
 }  // namespace dexcheck

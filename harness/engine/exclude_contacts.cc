@@ -64,24 +64,24 @@ bool AreNeighbours(const mjModel& m, int one, int other) {
 }
 
 /// All that moves is the robot, be it several trees on the world, as fingers are. With the world, or what
-/// stands on it, it is a matter of the motion.
-bool AreOfTheRobot(const mjModel& m, int one, int other) {
+/// stands on it, it is a matter of the motion, unless they overlap before it begins.
+bool MayBeExcluded(const mjModel& m, int one, int other, bool at_start) {
   const int moving = (m.body_weldid[one] != 0 ? 1 : 0) + (m.body_weldid[other] != 0 ? 1 : 0);
-  return moving == 2 || (moving == 1 && m.body_rootid[one] == m.body_rootid[other]);
+  return moving == 2 || (moving == 1 && (at_start || m.body_rootid[one] == m.body_rootid[other]));
 }
 
 /// What the engine lets touch; it pushes apart what is as near as their margin.
-void AddContacts(const mjModel& m, const mjData& data, std::set<std::pair<int, int>>* pairs) {
+void AddContacts(const mjModel& m, const mjData& data, bool at_start, std::set<std::pair<int, int>>* pairs) {
   for (int i = 0; i < data.ncon; ++i) {
     const mjContact& contact = data.contact[i];
     const std::pair bodies = std::minmax(m.geom_bodyid[contact.geom1], m.geom_bodyid[contact.geom2]);
-    if (contact.dist <= contact.includemargin && AreOfTheRobot(m, bodies.first, bodies.second))
+    if (contact.dist <= contact.includemargin && MayBeExcluded(m, bodies.first, bodies.second, at_start))
       pairs->insert(bodies);
   }
 }
 
 /// What a run's clearance is of: shapes that the engine does not let touch, too.
-void AddOverlaps(const mjModel& m, const mjData& data, const Solids& solids,
+void AddOverlaps(const mjModel& m, const mjData& data, const Solids& solids, bool at_start,
                  std::set<std::pair<int, int>>* pairs) {
   constexpr double kNear = 1e-3;  // m, which a run's motion is off by
   const auto pose = [&](const Solid& s) {
@@ -92,8 +92,9 @@ void AddOverlaps(const mjModel& m, const mjData& data, const Solids& solids,
     for (size_t k = 0; k < i; ++k) {
       const Solid& b = solids.list[k];
       const std::pair bodies = std::minmax(a.body, b.body);
-      if (!AreOfTheRobot(m, a.body, b.body) || AreNeighbours(m, a.body, b.body) || pairs->count(bodies) > 0)
-        continue;
+      // The engine and the clearance leave out neighbours, but not a link and what it turns on in the world.
+      const bool is_left_out = AreNeighbours(m, a.body, b.body) && !(at_start && bodies.first == 0);
+      if (!MayBeExcluded(m, a.body, b.body, at_start) || is_left_out || pairs->count(bodies) > 0) continue;
       const Pose X_WA = pose(a), X_WB = pose(b);
       if ((X_WA.translation() - X_WB.translation()).norm() > a.reach + b.reach + kNear) continue;
       if (CalcDistance(a, X_WA, b, X_WB) < kNear) pairs->insert(bodies);
@@ -117,7 +118,7 @@ std::vector<std::string> ExcludeBaseContacts(MjcfFile* mjcf) {
 }
 
 std::vector<std::string> ExcludeOverlaps(const std::vector<std::map<std::string, double>>& poses,
-                                         MjcfFile* mjcf) {
+                                         bool with_world, MjcfFile* mjcf) {
   const MjModelPtr model = LoadMjcfText(mjcf->PrintFor(std::filesystem::current_path()), mjcf->source());
   const mjModel& m = *model;
   const MjDataPtr data = MakeData(m);
@@ -132,8 +133,9 @@ std::vector<std::string> ExcludeOverlaps(const std::vector<std::map<std::string,
     mj_kinematics(&m, data.get());
     mj_comPos(&m, data.get());
     mj_collision(&m, data.get());
-    AddContacts(m, *data, &pairs);
-    AddOverlaps(m, *data, solids, &pairs);
+    const bool at_start = with_world && &pose == &poses.front();
+    AddContacts(m, *data, at_start, &pairs);
+    AddOverlaps(m, *data, solids, at_start, &pairs);
   }
   return Exclude(m, pairs, mjcf);
 }

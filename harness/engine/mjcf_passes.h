@@ -64,6 +64,9 @@ void HoldBase(double lift, MjcfFile* mjcf);
 /// States a solver that goes on until rounding: a run's checks see what an early end leaves.
 void RequireExactSolver(MjcfFile* mjcf);
 
+/// Names joints and bodies that have no name as the engine numbers them: "#1".
+void NameParts(MjcfFile* mjcf);
+
 /// Excludes the contact of a link with the fixed link that it turns on: the engine leaves out neighbours, but
 /// not those of what is welded to the world.
 /// @returns "base_link and link_1" of each that it adds. @throws as AddMotors.
@@ -71,9 +74,10 @@ std::vector<std::string> ExcludeBaseContacts(MjcfFile* mjcf);
 
 /// Excludes the contacts of the robot's bodies that lie in each other in any of these poses, as the engine or
 /// a run's clearance has their shapes: meshes and their hulls often do.
-/// @param poses rad or m, by joint. @returns "link_1 and link_3" of each. @throws as AddMotors.
+/// @param poses rad or m, by joint. @param with_world excludes what overlaps the world in the first pose,
+/// too, since no motion avoids it. @returns "link_1 and link_3" of each. @throws as AddMotors.
 std::vector<std::string> ExcludeOverlaps(const std::vector<std::map<std::string, double>>& poses,
-                                         MjcfFile* mjcf);
+                                         bool with_world, MjcfFile* mjcf);
 
 /// The least and the largest force of an actuator at its joint, N m or N: by its forcerange and, of a plain
 /// motor, by its ctrlrange, times its gear; none when neither limits it.

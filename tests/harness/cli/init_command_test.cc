@@ -329,6 +329,61 @@ TEST_F(InitCommand, CopiesShippedScenarios) {
   }
 }
 
+// What floats in the MJCF has a root in the URDF that is not said to move.
+TEST_F(InitCommand, AUrdfBesideAFloatingMjcfFloats) {
+  Write("a.xml", R"(<mujoco><compiler angle="radian"/><worldbody><body name="base" pos="0 0 1"><freejoint/>
+<inertial pos="0.01 0 0" mass="4" diaginertia="0.05 0.06 0.07"/><body name="arm" pos="0.1 0 0.05">
+<joint name="j" axis="0 1 0" range="-1 1" limited="true"/><inertial pos="0.1 0 0" mass="1" diaginertia="0.002 0.01 0.01"/>
+</body></body></worldbody></mujoco>)");
+  Write("a.urdf", R"(<robot name="a"><link name="base"><inertial><origin xyz="0.01 0 0"/><mass value="4"/>
+<inertia ixx="0.05" iyy="0.06" izz="0.07" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<link name="arm"><inertial><origin xyz="0.1 0 0"/><mass value="1"/>
+<inertia ixx="0.002" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<joint name="j" type="revolute"><origin xyz="0.1 0 0.05"/><parent link="base"/><child link="arm"/><axis xyz="0 1 0"/>
+<limit lower="-1" upper="1" effort="20" velocity="3"/></joint></robot>)");
+  EXPECT_THAT(Expect(0, "init a.urdf a.xml").err, HasSubstr("the base is held"));
+  EXPECT_EQ(RunMotion(0, "a").at("verdict"), "pass");
+}
+
+// The engine numbers what has no name, and so does `import`.
+TEST_F(InitCommand, JointsWithoutNamesAreNumbered) {
+  std::string text = ReadFixture("pair.xml");
+  for (const std::string name : {"shoulder", "elbow"}) {
+    const size_t at = text.find("<joint name=\"" + name + "\"");
+    ASSERT_NE(at, std::string::npos);
+    text.erase(at + 6, name.size() + 8);
+  }
+  Write("plain.xml", text.substr(0, text.find("<actuator>")) + "</mujoco>");
+  Expect(0, "init plain.xml");
+  EXPECT_THAT(Read("plain/motion.toml"), HasSubstr("\"#0\""));
+  EXPECT_EQ(RunMotion(0, "plain").at("verdict"), "pass");
+}
+
+// A cart lies in its rail from the first; a mast comes down on the floor only where it moves far.
+TEST_F(InitCommand, ItsFirstRunTouchesNothing) {
+  Write("cart.xml", R"(<mujoco><compiler angle="radian"/><worldbody>
+<geom name="rail" type="capsule" fromto="-1 0 0 1 0 0" size="0.02"/><body name="cart">
+<joint name="slider" type="slide" axis="1 0 0" range="-1 1" limited="true"/><geom type="capsule" fromto="-0.1 0 0 0.1 0 0" size="0.1" mass="4"/>
+<body name="pole"><joint name="hinge" axis="0 1 0" range="-1.5 1.5" limited="true"/>
+<geom type="capsule" fromto="0 0 0 0 0 0.6" size="0.049" mass="2"/></body></body></worldbody></mujoco>)");
+  Expect(0, "init cart.xml");
+  EXPECT_EQ(RunMotion(0, "cart").at("verdict"), "pass");
+  Write("mast.xml",
+        R"(<mujoco><compiler angle="radian"/><worldbody><geom name="floor" type="plane" size="3 3 0.1"/>
+<body name="mast" pos="0 0 0.12"><joint name="tilt" axis="0 1 0" range="-2 2" limited="true"/>
+<geom type="capsule" fromto="0.05 0 0 0.5 0 0" size="0.03" mass="1"/></body></worldbody></mujoco>)");
+  Expect(0, "init mast.xml");
+  EXPECT_EQ(RunMotion(0, "mast").at("verdict"), "pass");
+}
+
+// What no motion makes pass is said before anything is written.
+TEST_F(InitCommand, ARobotThatCannotPassIsRefused) {
+  WriteChanged("swims.xml", ReadFixture("pair.xml"), "<worldbody>",
+               "<option density=\"1000\" viscosity=\"0.1\"/><worldbody>");
+  EXPECT_TRUE(Refused("init swims.xml", {"swims.xml", "no motion", "fluid"}));
+  EXPECT_FALSE(Has("swims"));
+}
+
 TEST_F(InitCommand, RefusesInOneLine) {
   Copy("two.toml");
   Copy("pair.xml");
