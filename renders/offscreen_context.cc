@@ -5,6 +5,7 @@
 #include <cstdlib>
 #include <mutex>
 #include <string>
+#include <string_view>
 
 #include "controller/common/errors.h"
 
@@ -38,12 +39,15 @@ constexpr int kStencilBits = 8;
 
 // Each frame is drawn by one thread; videos draw several frames at once in processes instead, which would not
 // have their parent's threads. Mesa's cache of shaders wants a home folder, and complains on standard error
-// where there is none.
+// where there is none. OSMesa has two drivers and crashes when the environment names another one, such as the
+// d3d12 of WSL2.
 void ConfigureMesa() {
   static std::once_flag once;
   std::call_once(once, [] {
     ::setenv("LP_NUM_THREADS", "0", /*overwrite=*/1);
     ::setenv("MESA_SHADER_CACHE_DISABLE", "true", /*overwrite=*/0);
+    const char* const driver = std::getenv("GALLIUM_DRIVER");
+    if (driver != nullptr && std::string_view(driver) != "softpipe") ::unsetenv("GALLIUM_DRIVER");
   });
 }
 

@@ -66,7 +66,7 @@ std::string JoinNames(const std::vector<std::string>& names) {
 
 std::string QuoteField(const std::string& text) {
   const bool is_formula = text.find_first_of("=+-@\t\r") == 0;
-  if (!is_formula && text.find_first_of(",\"\n\r") == std::string::npos) return text;
+  if (!is_formula && text.find_first_of(",;\t\"\n\r") == std::string::npos) return text;
   std::string quoted = is_formula ? "\"'" : "\"";
   for (const char c : text) quoted += c == '"' ? std::string("\"\"") : std::string(1, c);
   return quoted + "\"";

@@ -228,6 +228,9 @@ class TomlDocument {
   std::unique_ptr<toml::table> root_;
 };
 
+/// The text as a string of TOML, on one line; bytes that are no UTF-8 become '?'.
+std::string QuoteToml(std::string_view text);
+
 /// The text of a file. @throws InputError when it cannot be read or is longer than TomlDocument::kMaxSize.
 std::string ReadTextFile(const std::string& path);
 

@@ -2,8 +2,10 @@
 
 #include <fcntl.h>
 #include <stdlib.h>
+#include <sys/stat.h>
 #include <sys/wait.h>
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <climits>
@@ -13,7 +15,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <fstream>
-#include <iterator>
+#include <mutex>
 #include <system_error>
 
 #include "controller/common/errors.h"
@@ -83,17 +85,137 @@ void RemoveTemporaryPaths() {
   }
 }
 
-std::string ReadBytes(const std::filesystem::path& path) {
-  const auto fail = [&](const std::string& why) {
-    throw InputError(path.string() + ": cannot be read: " + why);
+namespace {
+
+/// A file by what it is, whatever its names are.
+struct NamedFile {
+  dev_t device = 0;
+  ino_t number = 0;
+  std::filesystem::path name;
+};
+
+/// The regular file of this name; none when there is no such.
+std::optional<NamedFile> Identify(const std::filesystem::path& path) {
+  struct stat status {};
+  if (::stat(path.c_str(), &status) != 0 || !S_ISREG(status.st_mode)) return std::nullopt;
+  return NamedFile{status.st_dev, status.st_ino, path};
+}
+
+/// The same file in a list, when it still has that name: numbers are given again.
+const NamedFile* Find(const std::vector<NamedFile>& files, const NamedFile& file) {
+  const auto is_same = [&](const NamedFile& other) {
+    if (other.device != file.device || other.number != file.number) return false;
+    const std::optional<NamedFile> now = Identify(other.name);
+    return now && now->device == file.device && now->number == file.number;
   };
-  if (std::error_code ignored; std::filesystem::is_directory(path, ignored)) fail("is a directory");
-  errno = 0;
-  std::ifstream file(path, std::ios::binary);
-  if (!file) fail(std::strerror(errno));
-  std::string bytes{std::istreambuf_iterator<char>(file), {}};
-  if (file.bad()) fail(std::strerror(errno));
+  const auto found = std::ranges::find_if(files, is_same);
+  return found == files.end() ? nullptr : &*found;
+}
+
+/// What this process has read, and the targets that stand while it writes what replaces them.
+struct FilesInUse {
+  std::mutex mutex;
+  std::vector<NamedFile> inputs;
+  std::vector<NamedFile> targets;
+};
+
+FilesInUse& AllFilesInUse() {
+  static FilesInUse files;
+  return files;
+}
+
+[[noreturn]] void RefuseOutput(const std::filesystem::path& output, const std::filesystem::path& input) {
+  throw InputError(output.string() + ": cannot be written: it is an input of this command" +
+                   (output == input ? "" : ", " + input.string()));
+}
+
+/// Reads from a descriptor to its end. @returns the system's error number; EFBIG above `most` bytes.
+int ReadAll(int descriptor, std::uintmax_t most, std::string* bytes) {
+  constexpr size_t kPart = size_t{1} << 18U;
+  while (bytes->size() <= most) {
+    const size_t size = bytes->size();
+    bytes->resize(size + kPart);
+    const ssize_t count = ::read(descriptor, bytes->data() + size, kPart);
+    const int error = errno;
+    bytes->resize(size + static_cast<size_t>(std::max<ssize_t>(count, 0)));
+    if (count == 0) return 0;
+    if (count < 0 && error != EINTR) return error;
+  }
+  return EFBIG;
+}
+
+}  // namespace
+
+void NoteInput(const std::filesystem::path& path) {
+  const std::optional<NamedFile> file = Identify(path);
+  if (!file) return;
+  FilesInUse& files = AllFilesInUse();
+  const std::scoped_lock lock(files.mutex);
+  if (const NamedFile* const target = Find(files.targets, *file)) RefuseOutput(target->name, path);
+  if (Find(files.inputs, *file) == nullptr) files.inputs.push_back(*file);
+}
+
+std::string ReadBytes(const std::filesystem::path& path, std::uintmax_t most, const std::string& shown) {
+  const auto fail = [&](const std::string& why) {
+    throw InputError((shown.empty() ? path.string() : shown) + ": cannot be read: " + why);
+  };
+  if (path.native().find('\0') != std::string::npos) fail("a file's name has no NUL");
+  const FileDescriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NOCTTY));
+  struct stat status {};
+  if (!file.is_open() || ::fstat(file.get(), &status) != 0) fail(std::strerror(errno));
+  if (S_ISDIR(status.st_mode)) fail("is a directory");
+  NoteInput(path);
+  const bool is_regular = S_ISREG(status.st_mode);
+  if (!is_regular) most = std::min(most, kMostText);
+  std::string bytes;
+  const bool fits = !is_regular || static_cast<std::uintmax_t>(status.st_size) <= most;
+  const int error = fits ? ReadAll(file.get(), most, &bytes) : EFBIG;
+  if (error == EFBIG) fail("is longer than " + std::to_string(most >> 20U) + " MiB");
+  if (error != 0) fail(std::strerror(error));
   return bytes;
+}
+
+bool Exists(const std::filesystem::path& path) {
+  std::error_code ignored;
+  return std::filesystem::exists(path, ignored);
+}
+
+bool IsFolder(const std::filesystem::path& path) {
+  std::error_code ignored;
+  return std::filesystem::is_directory(path, ignored);
+}
+
+std::uintmax_t SizeOf(const std::filesystem::path& path) {
+  std::error_code error;
+  const std::uintmax_t size = std::filesystem::file_size(path, error);
+  return error ? 0 : size;
+}
+
+std::filesystem::path CurrentFolder() {
+  std::error_code error;
+  std::filesystem::path folder = std::filesystem::current_path(error);
+  if (error) throw InputError("the current folder: cannot be read: " + error.message());
+  return folder;
+}
+
+std::filesystem::path MakeAbsolute(const std::filesystem::path& path) {
+  return path.is_absolute() ? path : CurrentFolder() / path;
+}
+
+void MakeFolder(const std::filesystem::path& path) {
+  std::error_code error;
+  std::filesystem::create_directories(path, error);
+  if (error) throw InputError(path.string() + ": cannot be made: " + error.message());
+}
+
+std::vector<std::filesystem::path> ListFolder(const std::filesystem::path& folder) {
+  std::vector<std::filesystem::path> paths;
+  std::error_code error;
+  for (std::filesystem::directory_iterator at(folder, error), end; !error && at != end; at.increment(error))
+    paths.push_back(at->path());
+  if (error) throw InputError(folder.string() + ": cannot be read: " + error.message());
+  std::ranges::sort(paths);
+  return paths;
 }
 
 std::string HashBytes(std::string_view bytes) {
@@ -150,6 +272,7 @@ PartialFile::PartialFile(const std::filesystem::path& target) : path_(target), t
     if (::access(target.c_str(), W_OK) != 0) Fail(std::strerror(errno));
     target_ = fs::canonical(target, error);
     if (error) Fail(error.message());
+    RefuseInput();
   }
   const std::string partial =
       target_.string() + ".partial-" + std::to_string(::getpid()) + "-" + std::to_string(count++);
@@ -158,6 +281,11 @@ PartialFile::PartialFile(const std::filesystem::path& target) : path_(target), t
   if (descriptor < 0) Fail(std::strerror(errno));
   ::close(descriptor);
   partial_ = partial;
+  if (const std::optional<NamedFile> replaced = Identify(target_)) {
+    FilesInUse& files = AllFilesInUse();
+    const std::scoped_lock lock(files.mutex);
+    files.targets.push_back({replaced->device, replaced->number, path_});
+  }
 }
 
 PartialFile::~PartialFile() { Abort(); }
@@ -171,16 +299,32 @@ void PartialFile::Write(std::string_view bytes) const {
 }
 
 void PartialFile::Commit() {
+  RefuseInput();
   if (std::rename(partial_.c_str(), target_.c_str()) != 0) Fail(std::strerror(errno));
-  partial_.clear();
-  protection_.reset();
+  Release();
 }
 
 void PartialFile::Abort() {
   if (partial_.empty()) return;
   std::remove(partial_.c_str());
+  Release();
+}
+
+void PartialFile::Release() {
   partial_.clear();
   protection_.reset();
+  FilesInUse& files = AllFilesInUse();
+  const std::scoped_lock lock(files.mutex);
+  const auto own = std::ranges::find(files.targets, path_, &NamedFile::name);
+  if (own != files.targets.end()) files.targets.erase(own);
+}
+
+void PartialFile::RefuseInput() const {
+  const std::optional<NamedFile> replaced = Identify(target_);
+  FilesInUse& files = AllFilesInUse();
+  const std::scoped_lock lock(files.mutex);
+  const NamedFile* const input = replaced ? Find(files.inputs, *replaced) : nullptr;
+  if (input != nullptr) RefuseOutput(path_, input->name);
 }
 
 void PartialFile::Fail(const std::string& reason) const {

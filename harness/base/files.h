@@ -7,11 +7,13 @@
 
 #include <cerrno>
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
+#include <vector>
 
 namespace dexcheck {
 
@@ -45,8 +47,43 @@ class TemporaryChild {
 /// Ends the child and removes the paths. Calls only what a signal's handler may call.
 void RemoveTemporaryPaths();
 
+/// Notes that a file is read, so that no output replaces it; a name without a file is passed over.
+/// @throws InputError when the file is also being written under this or another name.
+void NoteInput(const std::filesystem::path& path);
+
+/// The largest files that are read whole, in bytes: texts, and files of numbers or meshes. A pipe or a
+/// device, which may never end, gives at most kMostText.
+inline constexpr std::uintmax_t kMostText = std::uintmax_t{1} << 26U;
+inline constexpr std::uintmax_t kMostData = std::uintmax_t{1} << 32U;
+
+/// Returns the whole file, and notes it as an input.
+/// @param shown the file in messages, when not its path.
 /// @throws InputError "PATH: cannot be read: reason".
-std::string ReadBytes(const std::filesystem::path& path);
+std::string ReadBytes(const std::filesystem::path& path, std::uintmax_t most = kMostText,
+                      const std::string& shown = "");
+
+/// Bytes that a stated size may ask for: content that is packed in `stored` bytes of a file.
+constexpr std::uintmax_t MostUnpacked(std::uintmax_t stored) {
+  constexpr std::uintmax_t kAlways = std::uintmax_t{1} << 27U;
+  constexpr std::uintmax_t kRatio = 32;
+  return kAlways + kRatio * stored;
+}
+
+// Calls of the file system that answer "no" instead of throwing what std::filesystem throws: names that are
+// too long, loops of links, folders that may not be read. Whoever opens such a file says why it cannot.
+
+bool Exists(const std::filesystem::path& path);
+bool IsFolder(const std::filesystem::path& path);
+/// The size of a file in bytes; 0 for what has none.
+std::uintmax_t SizeOf(const std::filesystem::path& path);
+/// The folder that names are relative to. @throws InputError when it was removed.
+std::filesystem::path CurrentFolder();
+/// The path from the root, links and ".." as they stand. @throws InputError as CurrentFolder.
+std::filesystem::path MakeAbsolute(const std::filesystem::path& path);
+/// Makes a folder and those above it. @throws InputError "PATH: cannot be made: reason".
+void MakeFolder(const std::filesystem::path& path);
+/// Returns what is in a folder, by name. @throws InputError "PATH: cannot be read: reason".
+std::vector<std::filesystem::path> ListFolder(const std::filesystem::path& folder);
 
 /// FNV-1a of 64 bits, as 16 hexadecimal digits: what a reader sees of bytes that differ.
 std::string HashBytes(std::string_view bytes);
@@ -75,7 +112,8 @@ class TemporaryFolder {
 };
 
 /// A file that is written under a temporary name beside its target and takes the target's name when it is
-/// complete. Destroyed before that, it leaves nothing behind; nor does a signal that ends the program.
+/// complete. Destroyed before that, it leaves nothing behind; nor does a signal that ends the program. A
+/// target that is an input of this process, by device and inode, is refused.
 class PartialFile {
  public:
   /// Creates the temporary file, so that a bad path is known before long work starts.
@@ -100,6 +138,11 @@ class PartialFile {
   [[noreturn]] void Fail(const std::string& reason) const;
 
  private:
+  /// @throws InputError when the target is a file that this process has read.
+  void RefuseInput() const;
+  /// Its temporary file is gone.
+  void Release();
+
   std::filesystem::path path_;     // as given, for messages
   std::filesystem::path target_;   // links followed
   std::filesystem::path partial_;  // empty once committed or removed

@@ -109,8 +109,7 @@ class EngineComparisonRun {
   }
 
   static void RequireProgram(const std::filesystem::path& path) {
-    std::error_code ignored;
-    if (!std::filesystem::exists(path, ignored)) throw InputError("is not installed: " + path.string());
+    if (!Exists(path)) throw InputError("is not installed: " + path.string());
   }
 
   ProviderPtr MakeProgram(const std::string& command) {

@@ -8,7 +8,9 @@
 #include <string_view>
 
 #include "controller/common/toml_reader.h"
+#include "harness/base/bounded_json.h"
 #include "harness/base/byte_archive.h"
+#include "harness/base/files.h"
 #include "harness/base/interrupts.h"
 #include "harness/base/process_pool.h"
 #include "harness/base/version.h"
@@ -68,13 +70,14 @@ CampaignFault ReadFault(const Json& json) {
 
 void Campaign::Resume(const std::string& json_file, const std::vector<std::filesystem::path>& inputs) {
   std::string texts;
-  for (const std::filesystem::path& input : inputs) texts += ReadTextFile(input.string());
+  for (const std::filesystem::path& input : inputs) texts += ReadBytes(input.string());
   head["dexcheck_version"] = Version();
   head["inputs_hash"] = std::hash<std::string>()(texts);
   if (json_file.empty() || json_file == "-") return;
+  if (SizeOf(json_file) == 0) return;  // a pipe, too
   std::ifstream file(json_file);
-  const Json json = Json::parse(file, nullptr, /*allow_exceptions=*/false);
-  if (!json.is_object() || json.value("complete", true)) return;
+  const Json json = ParseJson<Json>(std::string{std::istreambuf_iterator<char>(file), {}});
+  if (!json.is_object() || json.value("complete", Json()) != false) return;
   for (const auto& [key, value] : head.items())
     if (!json.contains(key) || json[key] != value) return;
   try {

@@ -7,6 +7,7 @@
 
 #include "controller/common/text.h"
 #include "harness/base/console.h"
+#include "harness/base/files.h"
 #include "harness/cli/terminal.h"
 
 namespace dexcheck::cli {
@@ -203,16 +204,28 @@ namespace {
 
 /// Whether the word names a file that may describe a robot.
 bool NamesRobot(std::string_view word) {
-  return !word.starts_with("-") &&
-         (word.ends_with(".urdf") || word.ends_with(".xml") || word.ends_with(".toml"));
+  return !word.starts_with("-") && (word.ends_with(".urdf") || word.ends_with(".xml") ||
+                                    word.ends_with(".mjcf") || word.ends_with(".toml"));
 }
 
-/// The words with what they leave out: the command that compares two robots, and the "-" of a --json that
-/// names no file. The next word is none when it is an option, a
-/// description of a robot, or what a command reads: a scenario's name or a folder.
+/// Whether the word names a recording of one, or the folder of a run.
+bool NamesRecording(const std::string& word) {
+  constexpr std::string_view kExtensions = " .csv .tsv .txt .mcap .db3 .npz .npy .h5 .hdf5 ";
+  const std::string extension = ExtensionOf(word);
+  return !word.starts_with("-") &&
+         (extension.empty() ? IsFolder(word)
+                            : kExtensions.find(" " + extension + " ") != std::string_view::npos);
+}
+
+/// The words with what they leave out: the command for two robots, or for a robot and its recording, and the
+/// "-" of a --json that names no file. The next word is none when it is an option, a description of a robot,
+/// or what a command reads: a scenario's name or a folder.
 std::vector<std::string> CompleteWords(int argc, char** argv) {
   std::vector<std::string> words(argv, argv + argc);
-  if (argc > 1 && NamesRobot(words[1])) words.insert(words.begin() + 1, "consistency");
+  if (argc > 1 && NamesRobot(words[1])) {
+    const bool is_recorded = argc > 2 && NamesRecording(words[2]);
+    words.insert(words.begin() + 1, is_recorded ? "judge" : "consistency");
+  }
   const auto is_file = [&](const std::string& word) {
     if (word == "-" || word.ends_with(".json") || word.starts_with("/dev/")) return true;
     const bool is_of_run = words.size() > 1 && words[1] == "run";

@@ -127,9 +127,9 @@ class CommandLine {
   [[nodiscard]] std::vector<CommandHelp> Describe() const;
   [[nodiscard]] Command root() { return {app_.get(), &exit_code_}; }
   /// Reads the words and runs the command's action. Two files of robots instead of a command are compared, as
-  /// by "consistency". @returns the program's exit code; --help and --version
-  /// print and are a success. @throws UsageError, which for an unknown word names the nearest known one; what
-  /// the action throws.
+  /// by "consistency"; a robot and a recording are judged, as by "judge". @returns the program's exit code;
+  /// --help and --version print and are a success. @throws UsageError, which for an unknown word names the
+  /// nearest known one; what the action throws.
   int Run(int argc, char** argv);
 
  private:

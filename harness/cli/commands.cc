@@ -2,6 +2,7 @@
 
 #include <limits>
 
+#include "harness/base/files.h"
 #include "harness/base/process_pool.h"
 #include "harness/checks/consistency.h"
 #include "harness/cli/run_folder.h"
@@ -58,7 +59,7 @@ std::vector<std::string> Overrides::List() const {
 
 std::vector<std::string> OwnController::List() const {
   if (run.empty()) return {};
-  std::vector<std::string> list = NameController(run, std::filesystem::current_path());
+  std::vector<std::string> list = NameController(run, CurrentFolder());
   if (time_limit > 0.0) list.push_back("controller.time_limit=" + FormatNumber(time_limit));
   return list;
 }

@@ -20,6 +20,7 @@
 #include "controller/model/platform.h"
 #include "controller/object/euler_zyz.h"
 #include "controller/object/object_dynamics.h"
+#include "harness/base/files.h"
 #include "harness/cli/commands.h"
 #include "harness/cli/json_matrix.h"
 #include "harness/cli/output_file.h"
@@ -355,7 +356,7 @@ struct EvalRequest {
 };
 
 int Run(const EvalRequest& request) {
-  const RobotModel model = ReadRobotModel(request.robot);
+  const RobotModel model = ParseRobotModel(ReadBytes(request.robot), std::string(request.robot));
   const State state = ReadState(request.state_file, model);
   Json out = {{"robot", model.name()}, {"q", ToList(state.q)}, {"xi", ToList(state.xi)}};
   try {

@@ -6,6 +6,7 @@
 #include "controller/common/errors.h"
 #include "controller/model/parameter_reader.h"
 #include "harness/base/console.h"
+#include "harness/base/files.h"
 #include "harness/cli/commands.h"
 #include "harness/cli/json_matrix.h"
 #include "harness/cli/output_file.h"
@@ -71,8 +72,8 @@ int WriteCopy(const ImportRequest& request) {
   }
   if (request.motors) AddMotors(&mjcf, limits);
   // What cannot be loaded must not be written.
-  LoadMjcfText(mjcf.PrintFor(std::filesystem::current_path()), request.source.string());
-  const std::filesystem::path to = std::filesystem::absolute(request.out).parent_path();
+  LoadMjcfText(mjcf.PrintFor(CurrentFolder()), request.source.string());
+  const std::filesystem::path to = MakeAbsolute(request.out).parent_path();
   std::error_code error;
   const bool stays = request.out == "-" || std::filesystem::equivalent(mjcf.folder(), to, error);
   WriteOut(request, stays ? mjcf.Print() : mjcf.PrintFor(to));

@@ -9,6 +9,7 @@
 #include <tuple>
 
 #include "controller/common/text.h"
+#include "controller/common/toml_reader.h"
 #include "controller/control/joint_motion.h"
 #include "controller/dynamics/model_terms.h"
 #include "controller/model/parameter_reader.h"
@@ -200,7 +201,7 @@ InitMotion PlanInitMotion(const RobotDescription& robot, const RobotModel& model
 std::string ListJoints(const RobotDescription& robot, const std::function<double(size_t joint)>& value) {
   std::string list;
   for (size_t i = 0; i < robot.spec.joints.size(); ++i)
-    list += fmt::format("{}{} = {}", i == 0 ? "" : ", ", Quote(robot.spec.joints[i].name),
+    list += fmt::format("{}{} = {}", i == 0 ? "" : ", ", QuoteToml(robot.spec.joints[i].name),
                         FormatNumber(value(i), 4));
   return list;
 }
@@ -210,7 +211,7 @@ std::string WriteSwings(const std::vector<JointOscillation>& swings, const char*
   std::string text = "oscillations = [\n";
   for (const JointOscillation& one : swings)
     text += fmt::format("  {{ {} = {}, amplitude = {}, frequency = {}, ramp_time = {}, end_time = {} }},\n",
-                        key, Quote(name(one.joint)), FormatNumber(one.amplitude, 3),
+                        key, QuoteToml(name(one.joint)), FormatNumber(one.amplitude, 3),
                         FormatNumber(one.frequency), FormatNumber(one.ramp_time), FormatNumber(one.end_time));
   return text + "]\n";
 }

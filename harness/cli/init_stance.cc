@@ -11,6 +11,7 @@
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
+#include "controller/common/toml_reader.h"
 #include "harness/cli/init_motion.h"
 #include "harness/engine/map_vector.h"
 #include "harness/engine/mjcf_passes.h"
@@ -293,7 +294,7 @@ std::string WriteStandScenario(const RobotDescription& robot, const Stand& stand
   const std::string start =
       ListJoints(robot, [&](size_t i) { return stand.pose.at(robot.spec.joints[i].name); });
   std::string feet;
-  for (const Foot& foot : stand.feet) feet += (feet.empty() ? "" : ", ") + Quote(foot.frame);
+  for (const Foot& foot : stand.feet) feet += (feet.empty() ? "" : ", ") + QuoteToml(foot.frame);
   std::string points;
   const Sway sway = ListWay(stand);
   for (const JointWayPoint& point : sway.points) {

@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "controller/common/errors.h"
+#include "harness/base/files.h"
 #include "harness/base/interrupts.h"
 #include "harness/cli/commands.h"
 #include "harness/cli/json_matrix.h"
@@ -153,7 +154,7 @@ void Correct(const RobotDescription& robot, const RecordingJudgement& judgement,
 /// @throws UsageError when MODEL and RECORDING stand the other way round.
 void RequireOrder(const JudgeRequest& request) {
   const std::filesystem::path model = request.model.extension(), recording = request.recording.extension();
-  if (recording == ".urdf" || recording == ".xml" || std::filesystem::is_directory(request.model) ||
+  if (recording == ".urdf" || recording == ".xml" || IsFolder(request.model) ||
       (recording == ".toml" && model == ".csv"))
     throw UsageError(fmt::format("judge: MODEL comes before RECORDING: judge {} {}",
                                  request.recording.string(), request.model.string()));

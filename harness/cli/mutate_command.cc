@@ -7,6 +7,7 @@
 
 #include "controller/common/errors.h"
 #include "controller/model/parameter_reader.h"
+#include "harness/base/files.h"
 #include "harness/base/interrupts.h"
 #include "harness/cli/campaign_table.h"
 #include "harness/cli/commands.h"
@@ -74,7 +75,7 @@ int Run(MutateRequest request) {
     return request.run.smallest ? PrintSmallestErrors(request.run) : MutateRun(request.run);
   }
   request.options.diagnose = !request.no_diagnosis;
-  const RobotModel model = ReadRobotModel(request.files.robot);
+  const RobotModel model = ParseRobotModel(ReadBytes(request.files.robot), std::string(request.files.robot));
   RequireNoBalls(model, "when each number is changed on purpose");
   const MjModelPtr engine = LoadMjcf(request.files.mjcf);
   const std::string source = request.files.mjcf.string();

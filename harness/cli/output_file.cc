@@ -54,8 +54,7 @@ void OutputFile::Fail(int error) const {
 void RequirePageName(const std::filesystem::path& path) {
   const std::string extension = ExtensionOf(path);
   if (extension.empty() || extension == ".html" || extension == ".htm") return;
-  std::error_code ignored;
-  if (std::filesystem::is_directory(path, ignored)) return;  // refused as such
+  if (IsFolder(path)) return;  // refused as such
   throw InputError(path.string() + ": cannot be written: a page's name must end in .html");
 }
 

@@ -18,6 +18,7 @@
 #include "controller/model/parameter_reader.h"
 #include "controller/model/robot_model.h"
 #include "controller/object/euler_zyz.h"
+#include "harness/base/files.h"
 #include "harness/cli/commands.h"
 #include "harness/cli/json_matrix.h"
 #include "harness/cli/output_file.h"
@@ -251,7 +252,7 @@ int Run(PlanRequest request) {
   if (request.mjcf.empty() && request.robot == shipped) {
     request.mjcf = FindShippedFile("mjcf/scene.xml").string();
   }
-  const RobotModel model = ReadRobotModel(request.robot);
+  const RobotModel model = ParseRobotModel(ReadBytes(request.robot), std::string(request.robot));
   RequireNoBalls(model, "in a plan, whose postures have one number for each joint");
   if (!model.object())
     throw InputError(request.robot.string() + ": object: is missing, and a plan holds one");

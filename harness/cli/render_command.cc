@@ -14,6 +14,7 @@
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
+#include "harness/base/files.h"
 #include "harness/cli/commands.h"
 #include "harness/cli/make_video.h"
 #include "harness/cli/output_file.h"
@@ -87,10 +88,7 @@ std::optional<FreeCamera> MakeFreeCamera(const RenderRequest& request) {
 
 /// What the name of the output says is what it gets.
 void CheckOutput(const RenderRequest& request, const std::string& out) {
-  std::error_code ignored;
-  if (std::filesystem::is_directory(out, ignored)) {
-    throw InputError(out + ": cannot be written: " + std::strerror(EISDIR));
-  }
+  if (IsFolder(out)) throw InputError(out + ": cannot be written: " + std::strerror(EISDIR));
   if (request.still) {
     RequirePictureName(out);
   } else if (FindVideoFormat(out) == VideoFormat::kGif && request.video.fps > kMostGifFramesPerSecond) {

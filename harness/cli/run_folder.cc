@@ -16,6 +16,7 @@
 #include "controller/common/text.h"
 #include "controller/common/toml_reader.h"
 #include "harness/base/console.h"
+#include "harness/base/files.h"
 #include "harness/base/interrupts.h"
 #include "harness/cli/output_file.h"
 #include "harness/cli/terminal.h"
@@ -34,7 +35,7 @@ std::filesystem::path OrShipped(const std::string& file, const char* shipped) {
 ScenarioFiles Open(const std::filesystem::path& path, const std::vector<std::string>& overrides,
                    std::uint64_t seed) {
   ScenarioFiles files;
-  files.scenario = ParseScenario(ReadTextFile(path.string()), path.string(), path.parent_path(), overrides);
+  files.scenario = ParseScenario(ReadBytes(path.string()), path.string(), path.parent_path(), overrides);
   files.scenario.seed = seed;
   files.robot = OrShipped(files.scenario.model_file, "controller/parameters/assistant_robot.toml");
   files.mjcf = OrShipped(files.scenario.mjcf_file, "mjcf/scene.xml");
@@ -51,7 +52,7 @@ std::uint64_t ReadSeed(const LogReader& log, const std::filesystem::path& path) 
 std::vector<std::string> Supersede(const std::filesystem::path& file, std::vector<std::string> overrides) {
   static constexpr std::pair<const char*, const char*> kWords[] = {{"K_p", "natural_frequency"},
                                                                    {"K_v", "damping_ratio"}};
-  const TomlDocument document(ReadTextFile(file.string()), file.string());
+  const TomlDocument document(ReadBytes(file.string()), file.string());
   const std::optional<TomlValue> control = document.Open().Find("control");
   if (!control || !control->IsTable()) return overrides;
   const auto sets = [&](const std::string& key) {
@@ -118,7 +119,7 @@ std::vector<ShippedScenario> ListShippedScenarios() {
   for (const std::string& name : kScenarios.ListNames()) {
     const std::string file = (folder / (name + ".toml")).string();
     try {
-      scenarios.push_back({name, ParseScenario(ReadTextFile(file), file, folder, {}).description});
+      scenarios.push_back({name, ParseScenario(ReadBytes(file), file, folder, {}).description});
     } catch (const InputError& error) {
       scenarios.push_back({name, error.what(), /*is_readable=*/false});
     }
@@ -133,20 +134,18 @@ ScenarioFiles FindScenario(const std::string& name_or_file, const std::vector<st
 
 void RequireFree(const std::filesystem::path& folder) {
   std::error_code error;
-  if (std::filesystem::exists(folder) && (!std::filesystem::is_empty(folder, error) || error))
+  if (Exists(folder) && (!std::filesystem::is_empty(folder, error) || error))
     throw InputError(folder.string() + ": already holds files; give a new folder with --out");
 }
 
 RunFolder::RunFolder(const std::string& path, const std::string& name) : path_(path) {
   if (path.empty()) {
     path_ = std::filesystem::path("runs") / name;
-    for (int i = 2; std::filesystem::exists(path_); ++i) {
+    for (int i = 2; Exists(path_); ++i) {
       path_ = std::filesystem::path("runs") / (name + "-" + std::to_string(i));
     }
   }
-  std::error_code error;
-  std::filesystem::create_directories(path_, error);
-  if (error) throw InputError(path_.string() + ": cannot be made: " + error.message());
+  MakeFolder(path_);
   RequireFree(path_);
 }
 
@@ -235,18 +234,16 @@ ReplayDifference RecordedRun::Compare(const std::filesystem::path& other_log) co
 
 std::filesystem::path FindShippedFile(const std::filesystem::path& name) {
   std::filesystem::path file = FindInstalled("share/dexcheck" / name);
-  if (std::error_code error; !std::filesystem::exists(file, error))
+  if (!Exists(file))
     throw InputError(file.string() + ": does not exist: this program's shipped files are missing");
   return file;
 }
 
 std::vector<std::string> ShippedKind::ListNames() const {
   std::vector<std::string> names;
-  for (const std::filesystem::directory_entry& entry :
-       std::filesystem::directory_iterator(FindShippedFile(folder))) {
-    if (entry.path().extension() == ".toml") names.push_back(entry.path().stem().string());
+  for (const std::filesystem::path& path : ListFolder(FindShippedFile(folder))) {
+    if (path.extension() == ".toml") names.push_back(path.stem().string());
   }
-  std::ranges::sort(names);
   return names;
 }
 
@@ -269,7 +266,7 @@ int CopyScenario(const std::string& name, const std::string& out) {
   const ScenarioFiles files = FindScenario(name, {}, 0);
   const std::vector<std::string> parts = ListMjcfFiles(files.mjcf);
   const RunFolder folder(out.empty() ? source.stem().string() : out, "");
-  std::string text = ReadTextFile(source.string());
+  std::string text = ReadBytes(source.string());
   // As the scenario writes the files: from its own folder.
   const auto refer = [&](const std::string& stated, const char* table, const char* key,
                          const std::filesystem::path& file) {
@@ -278,16 +275,16 @@ int CopyScenario(const std::string& name, const std::string& out) {
         std::filesystem::path(stated).lexically_relative(source.parent_path()).generic_string();
     const size_t at = stated.empty() ? std::string::npos : text.find('"' + written + '"');
     if (at == std::string::npos) {
-      InsertKey(table, fmt::format("{} = \"{}\"\n", key, own), &text);
+      InsertKey(table, fmt::format("{} = {}\n", key, QuoteToml(own)), &text);
     } else {
       text.replace(at + 1, written.size(), own);
     }
   };
   refer(files.scenario.model_file, "model", "file", files.robot);
   refer(files.scenario.mjcf_file, "plant", "mjcf", files.mjcf);
-  WriteFile(folder.path() / files.robot.filename(), ReadTextFile(files.robot.string()));
+  WriteFile(folder.path() / files.robot.filename(), ReadBytes(files.robot.string()));
   for (const std::string& part : parts)
-    WriteFile(folder.path() / part, ReadBytes(files.mjcf.parent_path() / part));
+    WriteFile(folder.path() / part, ReadBytes(files.mjcf.parent_path() / part, kMostData));
   const std::filesystem::path scenario = folder.path() / source.filename();
   WriteFile(scenario, text);
   FindScenario(scenario.string(), {}, 0);
@@ -297,7 +294,7 @@ int CopyScenario(const std::string& name, const std::string& out) {
 }
 
 void WriteFile(const std::filesystem::path& path, const std::string& text) {
-  std::filesystem::create_directories(path.parent_path());
+  MakeFolder(path.parent_path());
   OutputFile(path).Write(text);
 }
 

@@ -4,6 +4,7 @@
 #include <system_error>
 
 #include "controller/common/errors.h"
+#include "harness/base/files.h"
 #include "harness/cli/commands.h"
 #include "harness/cli/output_file.h"
 #include "harness/descriptions/read_description.h"
@@ -23,9 +24,7 @@ struct StatesRequest {
 int Run(const StatesRequest& request) {
   const RobotDescription robot = ReadDescription(request.robot, request.urdf);
   const StateTable states = DrawStates(robot, request.count, {}, request.seed);
-  std::error_code error;
-  std::filesystem::create_directories(request.out, error);
-  if (error) throw InputError(request.out.string() + ": cannot be made: " + error.message());
+  MakeFolder(request.out);
   const auto write = [&](const char* name, const std::string& text) {
     OutputFile file(request.out / name);
     file.Write(text);

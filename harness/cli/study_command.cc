@@ -54,7 +54,7 @@ struct SlurmJob {
 StudyInputs FindStudy(const std::string& name_or_file, const OwnController& controller) {
   const std::filesystem::path path = kStudies.Find(name_or_file);
   StudyInputs inputs;
-  std::string text = ReadTextFile(path.string());
+  std::string text = ReadBytes(path.string());
   if (!controller.run.empty())
     text = ApplyOverrides(text, path.string(), {"controller='''" + controller.run + "'''"});
   inputs.study = ParseStudy(text, path.string());
@@ -84,13 +84,13 @@ ValueCheck SlurmValue(const char* pattern, const std::string& demand) {
 /// The text of a batch script whose array makes the study, a shard for each task; killed and requeued
 /// elements go on where they were.
 std::string MakeSlurmScript(const StudyInputs& inputs, const StudyRequest& request, const SlurmJob& job) {
-  const std::string program = std::filesystem::read_symlink("/proc/self/exe").string();
-  std::string study = QuoteForShell(IsTomlFile(request.study)
-                                        ? std::filesystem::absolute(request.study).lexically_normal().string()
-                                        : request.study);
+  std::error_code error;
+  const std::string program = std::filesystem::read_symlink("/proc/self/exe", error).string();
+  std::string study = QuoteForShell(
+      IsTomlFile(request.study) ? MakeAbsolute(request.study).lexically_normal().string() : request.study);
   if (const std::string& own = request.controller.run; !own.empty()) {
     const std::filesystem::path file =
-        FindControllerFile({.run = own, .folder = std::filesystem::current_path(), .parameters = {}});
+        FindControllerFile({.run = own, .folder = CurrentFolder(), .parameters = {}});
     study += " --controller " + QuoteForShell(file.empty() ? own : file.string());
   }
   const std::string& name = inputs.study.name;
@@ -252,8 +252,7 @@ void AddToDatabase(const std::string& path, const StudyStore& like, const std::v
     store.AddAll(all);
   };
   RequirePlainFile(path);
-  std::error_code error;
-  if (std::filesystem::file_size(path, error) > 0 && !error) return add(path);
+  if (SizeOf(path) > 0) return add(path);
   PartialFile file(path);
   add(file.partial());
   file.Commit();

@@ -8,6 +8,7 @@
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
 #include "harness/base/console.h"
+#include "harness/base/files.h"
 #include "harness/base/interrupts.h"
 #include "harness/cli/commands.h"
 #include "harness/cli/make_video.h"
@@ -103,7 +104,7 @@ int ViewScenario(const ViewRequest& request) {
 }
 
 int View(const ViewRequest& request) {
-  if (std::filesystem::exists(std::filesystem::path(request.what) / "log.h5")) {
+  if (Exists(std::filesystem::path(request.what) / "log.h5")) {
     if (!request.out.empty() || !request.overrides.empty() || !request.save.empty() || request.seed != 0) {
       throw UsageError("--out, --set, --controller, --seed and --save belong to a scenario; " +
                        Quote(request.what) + " is a recorded run");

@@ -54,16 +54,6 @@ std::string FormatAngles(const Vector3d& angles) {
   return "[" + format(angles[0]) + ", " + format(angles[1]) + ", " + format(angles[2]) + "]";
 }
 
-/// A TOML string.
-std::string QuoteToml(const std::string& text) {
-  std::string quoted = "\"";
-  for (const char c : text) {
-    if (c == '"' || c == '\\') quoted += '\\';
-    quoted += static_cast<unsigned char>(c) < 0x20 || c == 0x7f ? '?' : c;
-  }
-  return quoted + "\"";
-}
-
 /// A comment's text on one line.
 std::string FormatComment(const std::string& text) { return Abbreviate(text); }
 

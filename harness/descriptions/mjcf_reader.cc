@@ -7,6 +7,7 @@
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
 #include "controller/model/rigid_body.h"
+#include "harness/base/files.h"
 #include "harness/descriptions/constant_table.h"
 #include "harness/engine/engine.h"
 #include "harness/engine/map_vector.h"
@@ -282,7 +283,7 @@ MassProperties ReadEngineBody(const mjModel& engine, int body) {
 }
 
 std::string ReduceToMechanism(const MjcfFile& mjcf) {
-  MjcfFile reduced(mjcf.PrintFor(std::filesystem::current_path()), mjcf.source());
+  MjcfFile reduced(mjcf.PrintFor(CurrentFolder()), mjcf.source());
   tinyxml2::XMLElement* const root = reduced.root();
   const auto keeps = [](std::string_view name, std::initializer_list<std::string_view> kept) {
     return std::ranges::find(kept, name) != kept.end();

@@ -6,6 +6,7 @@
 #include "controller/common/errors.h"
 #include "controller/common/linear_algebra.h"
 #include "controller/common/text.h"
+#include "harness/base/bounded_json.h"
 
 namespace dexcheck {
 namespace {
@@ -220,16 +221,8 @@ void ProgramLayout::ReadTerms(const VectorXd& q, const VectorXd& xi, TermResults
 }
 
 std::optional<Json> ParseResult(std::string_view text) {
-  // Results have three brackets inside each other; what nests deeper would be freed by recursion.
-  constexpr int kMaxDepth = 32;
-  bool is_deep = false;
-  const auto check = [&](int depth, Json::parse_event_t, const Json&) {
-    is_deep = is_deep || depth > kMaxDepth;
-    return !is_deep;
-  };
-  Json result = Json::parse(text, check, /*allow_exceptions=*/false);
-  if (is_deep || !result.is_object()) return std::nullopt;
-  return result;
+  Json result = ParseJson<Json>(text);
+  return result.is_object() ? std::optional(std::move(result)) : std::nullopt;
 }
 
 TermResults ReadResult(const Json& json, const ProgramLayout& layout, const VectorXd& v,

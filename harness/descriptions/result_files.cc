@@ -28,7 +28,7 @@ Eigen::Map<const VectorXd> MapRow(const NpyArray& array, long sample) {
 }
 
 ProgramLayout ReadLayout(const std::filesystem::path& path, const RobotDescription& robot) {
-  if (!std::filesystem::exists(path)) return ProgramLayout(robot);
+  if (!Exists(path)) return ProgramLayout(robot);
   const std::optional<Json> json = ParseResult(ReadBytes(path));
   if (!json) throw InputError(path.string() + ": must be a JSON object");
   return {robot, *json, path.string()};
@@ -81,20 +81,20 @@ std::string WriteLayout(const RobotDescription& robot, const std::string& origin
 ResultFiles::ResultFiles(const std::filesystem::path& folder, const RobotDescription& robot)
     : LayoutProvider(ReadLayout(folder / "layout.json", robot)), folder_(folder), name_(folder.string()) {
   const RobotModel model(robot.spec);
-  q_ = ParseNpy(ReadBytes(folder / "q.npy"), (folder / "q.npy").string());
+  q_ = ParseNpy(ReadBytes(folder / "q.npy", kMostData), (folder / "q.npy").string());
   const size_t count = q_.shape.empty() ? 0 : q_.shape[0];
   count_ = static_cast<long>(count);
   if (count == 0) throw InputError((folder / "q.npy").string() + ": must have states, got none");
   q_ = ReadArray("q.npy", {count, static_cast<size_t>(model.num_positions())});
   v_ = ReadArray("v.npy", {count, static_cast<size_t>(model.num_velocities())});
-  if (std::filesystem::exists(folder_ / "results.jsonl")) {
+  if (Exists(folder_ / "results.jsonl")) {
     ReadLines(folder_ / "results.jsonl");
     return;
   }
   const auto n = static_cast<size_t>(layout().size());
   const auto find = [&](const std::string& term, const std::vector<size_t>& shape) {
     const std::string file = term + ".npy";
-    if (std::filesystem::exists(folder_ / file)) terms_.emplace(term, ReadArray(file, shape));
+    if (Exists(folder_ / file)) terms_.emplace(term, ReadArray(file, shape));
   };
   for (const char* term : {"M", "C"}) find(term, {count, n, n});
   for (const char* term : {"c", "g", "h", "friction"}) find(term, {count, n});
@@ -108,7 +108,7 @@ ResultFiles::ResultFiles(const std::filesystem::path& folder, const RobotDescrip
 void ResultFiles::ReadLines(const std::filesystem::path& path) {
   lines_.resize(static_cast<size_t>(count_));
   std::vector<bool> seen(lines_.size(), false);
-  std::istringstream text(ReadBytes(path));
+  std::istringstream text(ReadBytes(path, kMostData));
   long number = 0;
   for (std::string line; std::getline(text, line);) {
     const std::string source = path.string() + ":" + std::to_string(++number);
@@ -143,7 +143,7 @@ bool ResultFiles::ReadState(DynamicsState* state) const {
 
 NpyArray ResultFiles::ReadArray(const std::string& file, const std::vector<size_t>& shape) const {
   const std::string source = (folder_ / file).string();
-  NpyArray array = Check(ParseNpy(ReadBytes(folder_ / file), source), source, shape);
+  NpyArray array = Check(ParseNpy(ReadBytes(folder_ / file, kMostData), source), source, shape);
   if (file != "q.npy" && file != "v.npy") return array;
   for (size_t i = 0; i < array.values.size(); ++i) {
     if (std::isfinite(array.values[i])) continue;

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "controller/common/text.h"
+#include "harness/base/files.h"
 #include "harness/descriptions/description_writer.h"
 #include "harness/engine/xml.h"
 
@@ -46,7 +47,7 @@ std::filesystem::path FindMesh(const std::string& name, const std::filesystem::p
     const std::filesystem::path package = path.begin() == path.end() ? path : *path.begin();
     for (const std::filesystem::path& root : packages) {
       candidates.push_back(root / path);
-      if (std::filesystem::absolute(root).lexically_normal().filename() == package) {
+      if (MakeAbsolute(root).lexically_normal().filename() == package) {
         candidates.push_back(root / path.lexically_relative(package));
       }
     }
@@ -54,8 +55,9 @@ std::filesystem::path FindMesh(const std::string& name, const std::filesystem::p
     candidates.push_back(folder / (name.starts_with(kFile) ? name.substr(kFile.size()) : name));
   }
   for (const std::filesystem::path& path : candidates) {
-    std::error_code ignored;
-    if (std::filesystem::is_regular_file(path, ignored)) return path;
+    if (!Exists(path) || IsFolder(path)) continue;
+    NoteInput(path);
+    return path;
   }
   return {};
 }

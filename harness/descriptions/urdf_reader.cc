@@ -163,10 +163,11 @@ class UrdfReader {
       return {parent.joint, X_iJ};
     }
     if (joint.type == "floating" || joint.type == "planar") {
-      file_.Fail(joint.line,
-                 key + "type: must be fixed, revolute, continuous or prismatic, got " +
-                     (joint.type == "floating" ? "\"floating\", which must be the only joint on the root"
-                                               : "\"planar\""));
+      file_.Fail(joint.line, key + "type: must be fixed, revolute, continuous or prismatic, got " +
+                                 (joint.type == "floating"
+                                      ? "\"floating\", which must be the only joint on the root"
+                                      : "\"planar\": write two prismatic joints and a continuous one, "
+                                        "with links without inertials between"));
     }
     AddMovingJoint(joint, link, parent.joint, X_iJ);
     robot_.joints.back().X_PW = parent.X_iL;

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "controller/common/text.h"
+#include "harness/base/files.h"
 #include "harness/engine/engine.h"
 #include "harness/engine/mjcf_passes.h"
 #include "harness/engine/robot_tree.h"
@@ -107,7 +108,7 @@ std::map<std::string, double> FindForceRanges(const MjcfFile& mjcf) {
 
 void AddMotors(MjcfFile* mjcf, const std::map<std::string, double>& limits) {
   const std::string& source = mjcf->source();
-  const MjModelPtr model = LoadMjcfText(mjcf->PrintFor(std::filesystem::current_path()), source);
+  const MjModelPtr model = LoadMjcfText(mjcf->PrintFor(CurrentFolder()), source);
   const mjModel& m = *model;
   const int tree = FindRobotTree(m, source).floating_body;
   XMLElement* const root = mjcf->root();

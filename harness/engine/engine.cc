@@ -129,7 +129,7 @@ MjModelPtr LoadText(const std::string& text, const std::string& source) {
 }
 
 MjModelPtr LoadDocument(const MjcfFile& mjcf) {
-  return LoadText(mjcf.PrintFor(std::filesystem::current_path()), mjcf.source());
+  return LoadText(mjcf.PrintFor(CurrentFolder()), mjcf.source());
 }
 
 /// Entries of M that are zero as the bodies stand may not be left out of it: their masses may be moved.

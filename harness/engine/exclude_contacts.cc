@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "controller/common/types.h"
+#include "harness/base/files.h"
 #include "harness/engine/engine.h"
 #include "harness/engine/map_vector.h"
 #include "harness/engine/mjcf_passes.h"
@@ -105,7 +106,7 @@ void AddOverlaps(const mjModel& m, const mjData& data, const Solids& solids, boo
 }  // namespace
 
 std::vector<std::string> ExcludeBaseContacts(MjcfFile* mjcf) {
-  const MjModelPtr model = LoadMjcfText(mjcf->PrintFor(std::filesystem::current_path()), mjcf->source());
+  const MjModelPtr model = LoadMjcfText(mjcf->PrintFor(CurrentFolder()), mjcf->source());
   const mjModel& m = *model;
   std::set<std::pair<int, int>> pairs;
   for (int body = 1; body < m.nbody; ++body) {
@@ -119,7 +120,7 @@ std::vector<std::string> ExcludeBaseContacts(MjcfFile* mjcf) {
 
 std::vector<std::string> ExcludeOverlaps(const std::vector<std::map<std::string, double>>& poses,
                                          bool with_world, MjcfFile* mjcf) {
-  const MjModelPtr model = LoadMjcfText(mjcf->PrintFor(std::filesystem::current_path()), mjcf->source());
+  const MjModelPtr model = LoadMjcfText(mjcf->PrintFor(CurrentFolder()), mjcf->source());
   const mjModel& m = *model;
   const MjDataPtr data = MakeData(m);
   const Solids solids = ListSolids(m);

@@ -200,11 +200,10 @@ std::string FindMeshFault(const std::filesystem::path& file) {
   const char* const kind = name.c_str() + name.size() - std::min<size_t>(name.size(), 3);
   const auto is = [&](const char* ending) { return ::strcasecmp(kind, ending) == 0; };
   if (!is("stl") && !is("obj") && !is("msh")) return "must be an STL, OBJ or MSH";
-  std::error_code error;
-  if (!std::filesystem::exists(file, error)) return "does not exist";
+  if (!Exists(file)) return "does not exist";
   std::string bytes;
   try {
-    bytes = ReadBytes(file);
+    bytes = ReadBytes(file, kMostData);
   } catch (const InputError&) {
     return "cannot be read";
   }

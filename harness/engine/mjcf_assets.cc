@@ -4,6 +4,7 @@
 #include <system_error>
 
 #include "controller/common/text.h"
+#include "harness/base/files.h"
 #include "harness/engine/mjcf_passes.h"
 #include "harness/engine/xml.h"
 
@@ -103,8 +104,7 @@ class AssetSieve {
   [[nodiscard]] std::string FindFault(const XMLElement& asset, const std::string& folder, const char* file) {
     const std::filesystem::path path = mjcf_.folder() / folders_.Find(folder, file);
     if (Is(asset, "mesh")) return FindMeshFault(path);
-    std::error_code error;
-    return std::filesystem::exists(path, error) ? "" : "does not exist";
+    return Exists(path) ? "" : "does not exist";
   }
 
   void SieveAssets(XMLElement* section) {

@@ -1,8 +1,6 @@
 #include "harness/engine/mjcf_file.h"
 
 #include <algorithm>
-#include <fstream>
-#include <iterator>
 #include <map>
 #include <system_error>
 
@@ -16,14 +14,6 @@ namespace {
 
 using tinyxml2::XMLElement;
 using tinyxml2::XMLNode;
-
-std::string ReadFile(const std::filesystem::path& path, const std::string& shown) {
-  std::error_code error;
-  if (std::filesystem::is_directory(path, error)) throw InputError(shown + ": cannot be read: is a folder");
-  std::ifstream file(path, std::ios::binary);
-  if (!file) throw InputError(shown + ": cannot be read");
-  return {std::istreambuf_iterator<char>(file), {}};
-}
 
 /// The first <include> at or below an element, in the order of the file.
 XMLElement* FindInclude(XMLElement* root) {
@@ -52,26 +42,26 @@ std::filesystem::path AssetFolders::Find(const std::string& folder, const std::s
 }
 
 MjcfFile::MjcfFile(const std::filesystem::path& file, const std::string* text)
-    : source_(file.string()), folder_(std::filesystem::absolute(file).parent_path()) {
+    : source_(file.string()), folder_(MakeAbsolute(file).parent_path()) {
   Parse(text != nullptr ? *text : ReadBytes(file));
   if (IsUrdf()) return;
   while (XMLElement* const include = FindInclude(root_)) Splice(include);
   // As the files themselves: what is not where the file that is loaded has it lies beside the one that names
   // it.
   for (const AssetFile& asset : ListAssetFiles(root_)) {
+    NoteInput(folder_ / asset.path);
     const Place place = ReadPlace(*asset.element);
-    if (place.file == &source_ || std::filesystem::exists(folder_ / asset.path)) continue;
-    const std::filesystem::path beside = std::filesystem::absolute(*place.file)
+    if (place.file == &source_ || Exists(folder_ / asset.path)) continue;
+    const std::filesystem::path beside = MakeAbsolute(*place.file)
                                              .replace_filename(asset.element->Attribute(asset.attribute))
                                              .lexically_normal(),
                                 from = (folder_ / asset.folder / "").lexically_normal();
-    if (std::filesystem::exists(beside))
-      asset.element->SetAttribute(asset.attribute, beside.lexically_relative(from).c_str());
+    if (Exists(beside)) asset.element->SetAttribute(asset.attribute, beside.lexically_relative(from).c_str());
   }
 }
 
 MjcfFile::MjcfFile(std::string_view text, const std::string& source)
-    : source_(source), folder_(std::filesystem::current_path()) {
+    : source_(source), folder_(CurrentFolder()) {
   Parse(text);
 }
 
@@ -98,10 +88,10 @@ void MjcfFile::Splice(XMLElement* include) {
   const std::filesystem::path own = source_;
   std::string path = (own.parent_path() / name).lexically_normal().string();
   std::filesystem::path kept = std::filesystem::path(name).lexically_normal();
-  if (!std::filesystem::exists(path)) {
+  if (!Exists(path)) {
     const std::filesystem::path beside =
         std::filesystem::path(*ReadPlace(*include).file).parent_path() / name;
-    if (std::filesystem::exists(beside)) {
+    if (Exists(beside)) {
       path = beside.lexically_normal().string();
       kept = beside.lexically_normal().lexically_relative(own.lexically_normal().parent_path());
     }
@@ -111,7 +101,7 @@ void MjcfFile::Splice(XMLElement* include) {
                      ": must be included once only");
   }
   tinyxml2::XMLDocument document;
-  ParseXml(ReadFile(path, FindPlace(*include) + ": file " + Quote(name)), path, &document);
+  ParseXml(ReadBytes(path, kMostText, FindPlace(*include) + ": file " + Quote(name)), path, &document);
   files_.push_back(path);
   included_.push_back(kept.string());
   XMLNode* last = include;
@@ -203,10 +193,7 @@ std::vector<std::string> ListMjcfFiles(const std::filesystem::path& mjcf) {
   add(mjcf.filename());
   for (const std::string& file : model.included()) add(file);
   for (const AssetFile& asset : ListAssetFiles(model.root())) {
-    std::error_code error;
-    if (!LiesInside(asset.path.lexically_normal()) ||
-        std::filesystem::exists(model.folder() / asset.path, error))
-      add(asset.path);
+    if (!LiesInside(asset.path.lexically_normal()) || Exists(model.folder() / asset.path)) add(asset.path);
   }
   std::sort(files.begin() + 1, files.end());
   files.erase(std::unique(files.begin(), files.end()), files.end());

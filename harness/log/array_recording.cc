@@ -52,7 +52,7 @@ std::unique_ptr<RecordingReader> MakeReader(const std::filesystem::path& path, c
     }
   }
   if (columns.empty()) Fail(path, "has no rows");
-  return std::make_unique<TableReader>(path.string(), format, names, columns);
+  return std::make_unique<TableReader>(path.string(), format, std::move(names), std::move(columns));
 }
 
 NamedArray ToArray(const std::string& name, const std::filesystem::path& path, std::string_view bytes) {
@@ -66,14 +66,15 @@ std::vector<NamedArray> ReadZip(const std::filesystem::path& path) {
                                                         &zip_close);
   if (!archive) Fail(path, "is no .npz that can be opened");
   std::vector<NamedArray> arrays;
+  std::uintmax_t room = MostUnpacked(SizeOf(path));
   for (zip_uint64_t i = 0; i < static_cast<zip_uint64_t>(zip_get_num_entries(archive.get(), 0)); ++i) {
     zip_stat_t stat;
     const std::unique_ptr<zip_file_t, int (*)(zip_file_t*)> file(zip_fopen_index(archive.get(), i, 0),
                                                                  &zip_fclose);
     if (zip_stat_index(archive.get(), i, 0, &stat) != 0 || !file)
       Fail(path, "has an entry that cannot be read");
-    constexpr zip_uint64_t kMost = zip_uint64_t{1} << 33U;
-    if (stat.size > kMost) Fail(path, std::string(stat.name) + ": is too long");
+    if (stat.size > room) Fail(path, std::string(stat.name) + ": is longer than its file can hold");
+    room -= stat.size;
     std::string bytes(stat.size, '\0');
     if (zip_fread(file.get(), bytes.data(), stat.size) != static_cast<zip_int64_t>(stat.size))
       Fail(path, std::string(stat.name) + ": cannot be read to its end");
@@ -94,6 +95,7 @@ std::vector<NamedArray> ListArrays(const std::filesystem::path& path) {
   };
   hdf5::Check(H5Ovisit2(file.id(), H5_INDEX_NAME, H5_ITER_INC, visit, &names, H5O_INFO_BASIC));
   std::vector<NamedArray> arrays;
+  std::uintmax_t room = MostUnpacked(SizeOf(path)) / sizeof(double);
   for (const std::string& name : names) {
     const hdf5::Dataset set(H5Dopen2(file.id(), name.c_str(), H5P_DEFAULT));
     const hdf5::Datatype type(H5Dget_type(set.id()));
@@ -103,6 +105,9 @@ std::vector<NamedArray> ListArrays(const std::filesystem::path& path) {
     if ((kind != H5T_FLOAT && kind != H5T_INTEGER) || rank < 1 || rank > 2) continue;
     hsize_t extents[2] = {0, 1};
     hdf5::Check(H5Sget_simple_extent_dims(space.id(), extents, nullptr));
+    if (extents[1] != 0 && extents[0] > room / extents[1])
+      Fail(path, name + ": is longer than its file can hold");
+    room -= extents[0] * extents[1];
     NamedArray array = {name, {extents[0]}, std::vector<double>(extents[0] * extents[1])};
     if (rank == 2) array.shape.push_back(extents[1]);
     hdf5::Check(H5Dread(set.id(), H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, array.values.data()));
@@ -150,14 +155,15 @@ std::unique_ptr<RecordingReader> OpenRunLog(const std::filesystem::path& path, c
       columns.emplace_back(rows.col(k).begin(), rows.col(k).end());
     }
   }
-  return std::make_unique<TableReader>(path.string(), "log of a run", names, columns);
+  return std::make_unique<TableReader>(path.string(), "log of a run", std::move(names), std::move(columns));
 }
 
 }  // namespace
 
 std::unique_ptr<RecordingReader> OpenNumpyRecording(const std::filesystem::path& path) {
-  if (ReadBytes(path).starts_with("PK")) return MakeReader(path, "NumPy (.npz)", ReadZip(path));
-  const NamedArray array = ToArray("", path, ReadBytes(path));
+  const std::string bytes = ReadBytes(path, kMostData);
+  if (bytes.starts_with("PK")) return MakeReader(path, "NumPy (.npz)", ReadZip(path));
+  const NamedArray array = ToArray("", path, bytes);
   if (array.shape.size() != 2)
     Fail(path, "must have two indices, of rows and columns, has " + std::to_string(array.shape.size()));
   return MakeReader(path, "NumPy (.npy)", {array});

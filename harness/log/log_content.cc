@@ -4,6 +4,8 @@
 #include <nlohmann/json.hpp>
 #include <regex>
 
+#include "harness/base/bounded_json.h"
+
 namespace dexcheck {
 
 std::string NameColumn(const SignalInfo& signal, size_t column) {
@@ -97,7 +99,7 @@ std::string RenameSignal(const std::string& name) {
 }
 
 std::string RenameSummary(const std::string& summary) {
-  const Json json = Json::parse(summary, nullptr, /*allow_exceptions=*/false);
+  const Json json = ParseJson<Json>(summary);
   return json.is_object() ? RenameAll(json).dump(2) + "\n" : summary;
 }
 

@@ -9,7 +9,6 @@
 #include <cerrno>
 #include <cmath>
 #include <exception>
-#include <fstream>
 #include <map>
 #include <stdexcept>
 #include <system_error>
@@ -17,6 +16,7 @@
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
 #include "harness/base/child_process.h"
+#include "harness/base/files.h"
 #include "harness/log/hdf5_handle.h"
 #include "harness/log/log_file.h"
 
@@ -117,6 +117,12 @@ SignalInfo ReadInfo(const hdf5::Dataset& dataset, const std::string& name) {
   return info;
 }
 
+/// @throws std::runtime_error of more bytes than the file can hold, before they are allocated.
+void RequireRoom(const std::string& name, std::uintmax_t count, std::uintmax_t each, std::uintmax_t* room) {
+  if (each != 0 && count > *room / each) RefusePart(name, "is longer than the file can hold");
+  *room -= count * each;
+}
+
 RowMatrixXd ReadRows(hid_t file, const std::string& name, hsize_t rows, int width) {
   const hdf5::Dataset dataset = Open(file, name);
   const hdf5::Dataspace space(H5Dget_space(dataset.id()));
@@ -147,7 +153,8 @@ void RequireHdf5(const std::filesystem::path& path) {
 /// What is read of the file at once. Throws any std::exception of what is damaged.
 class LogReader::File {
  public:
-  explicit File(const std::filesystem::path& path) : file_(OpenFile(path)) {
+  explicit File(const std::filesystem::path& path)
+      : file_(OpenFile(path)), room_left_(MostUnpacked(SizeOf(path))) {
     if (H5Aexists(file_.id(), "signals") <= 0) throw std::runtime_error("it has no list of signals");
     const bool has_format = H5Aexists(file_.id(), kFormatAttribute) > 0;
     if (has_format && ReadString(file_.id(), kFormatAttribute) != kLogFormat)
@@ -199,6 +206,8 @@ class LogReader::File {
     const hsize_t rows = GetShape(dataset).extents[0];
     if (signals_.size() == 1) room_ = rows;
     if (rows != room_) RefusePart(name, "has other rows");
+    RequireRoom(name, rows, sizeof(double) * static_cast<size_t>(std::max(signals_.back().width, 0)),
+                &room_left_);
   }
 
   /// Of a dataset that is no signal.
@@ -208,6 +217,7 @@ class LogReader::File {
     const DatasetShape shape = GetShape(Open(file_.id(), name));
     if (Check(H5Tequal(shape.type.id(), H5T_STD_U8LE)) == 0 || shape.extents.size() != 1)
       RefusePart(name, "is not a file");
+    RequireRoom(name, shape.extents[0], 1, &room_left_);
     files_.push_back(name);
   }
 
@@ -224,6 +234,7 @@ class LogReader::File {
 
   hdf5::SilencedErrors silenced_;
   hdf5::File file_;
+  std::uintmax_t room_left_;         // bytes that further parts may state
   bool is_old_ = false;              // format 1
   hsize_t room_ = 0;                 // rows, written or not
   std::vector<SignalInfo> signals_;  // by their names in the file
@@ -238,8 +249,10 @@ template <typename Work>
 auto Guard(const std::filesystem::path& path, const Work& work) {
   try {
     return work();
-  } catch (const std::exception& error) {
+  } catch (const std::runtime_error& error) {
     throw InputError(path.string() + ": the log is damaged: " + Abbreviate(error.what()));
+  } catch (const std::exception&) {  // sizes that no memory and no list can have
+    throw InputError(path.string() + ": the log is damaged");
   }
 }
 
@@ -253,6 +266,7 @@ auto Guard(const std::filesystem::path& path, const Work& work) {
 LogReader::LogReader(const std::filesystem::path& path) : path_(path) {
   const hdf5::SilencedErrors silenced;
   RequireHdf5(path);
+  NoteInput(path);
   ChildProcess trial("reading a log", [&](int /*channel*/) {
     constexpr rlimit kLongest{3, 3};  // s
     ::setrlimit(RLIMIT_CPU, &kLongest);
@@ -326,14 +340,11 @@ std::string LogReader::ReadFile(const std::string& group, const std::string& rel
 void LogReader::ExtractFiles(const std::string& group, const std::filesystem::path& folder) const {
   for (const std::string& name : ListFiles(group)) {
     const std::filesystem::path path = folder / name;
-    std::error_code error;
-    std::filesystem::create_directories(path.parent_path(), error);
-    if (error) FailToWrite(path.parent_path(), error.value());
-    if (std::filesystem::exists(path)) FailToWrite(path, EEXIST);
-    std::ofstream file(path, std::ios::binary);
-    file << ReadFile(group, name);
-    file.close();
-    if (!file) FailToWrite(path, errno);
+    MakeFolder(path.parent_path());
+    if (Exists(path)) FailToWrite(path, EEXIST);
+    PartialFile file(path);
+    file.Write(ReadFile(group, name));
+    file.Commit();
   }
 }
 

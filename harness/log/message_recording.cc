@@ -9,12 +9,13 @@
 #include <cstdint>
 #include <deque>
 #include <fstream>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <set>
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
+#include "harness/base/bounded_json.h"
+#include "harness/base/files.h"
 #include "harness/log/recording_reader.h"
 
 namespace dexcheck {
@@ -22,7 +23,8 @@ namespace {
 
 using AnyJson = nlohmann::json;
 constexpr double kNanoseconds = 1e-9;
-constexpr std::uint64_t kMost = std::uint64_t{1} << 32U;  // bytes at once
+constexpr size_t kMostFields = size_t{1} << 16U;      // numbers in a message
+constexpr size_t kLongestMessage = size_t{1} << 24U;  // bytes of one that is read
 constexpr const char* kJointState = "sensor_msgs/msg/JointState";
 
 /// Takes numbers and texts from the front of bytes.
@@ -69,7 +71,7 @@ void RequireCount(size_t count, size_t joints, const std::string& where, const c
 }
 
 void Flatten(const AnyJson& json, const std::string& name, TimedMessage* message) {
-  if (json.is_number()) {
+  if (json.is_number() && message->fields.size() <= kMostFields) {
     message->fields.emplace_back(name, json.get<double>());
   } else if (json.is_structured()) {
     size_t i = 0;
@@ -78,6 +80,9 @@ void Flatten(const AnyJson& json, const std::string& name, TimedMessage* message
               message);
   }
 }
+
+/// What reads a message of a type; null for one that cannot be read.
+using Parser = TimedMessage (*)(std::string_view data, double time, const std::string& where);
 
 /// Rows of messages: those of one time are one row.
 class MessageRecording : public RecordingReader {
@@ -121,8 +126,17 @@ class MessageRecording : public RecordingReader {
     Advance();
   }
 
+  TimedMessage Parse(Parser parse, std::string_view data, double time) {
+    ++message_number_;
+    TimedMessage message;
+    if (data.size() <= kLongestMessage) message = parse(data, time, Where());
+    if (data.size() > kLongestMessage || message.fields.size() > kMostFields)
+      throw InputError(Where() + ": is too large for a message of joints; choose a topic with --topic");
+    return message;
+  }
+
   std::string source_;
-  long message_number_ = 0;  // of those that were read, counted by ReadMessage
+  long message_number_ = 0;  // of those that were read, counted by Parse
 
  private:
   void Advance() {
@@ -139,9 +153,6 @@ class MessageRecording : public RecordingReader {
   std::optional<TimedMessage> next_;
   std::map<std::string, size_t> columns_;
 };
-
-/// What reads a message of a type; null for one that cannot be read.
-using Parser = TimedMessage (*)(std::string_view data, double time, const std::string& where);
 
 Parser FindParser(const std::string& type, const std::string& encoding) {
   if (encoding == "json") return &ParseJsonMessage;
@@ -165,7 +176,10 @@ Parser FindParser(const std::string& type, const std::string& encoding) {
 class McapRecording : public MessageRecording {
  public:
   McapRecording(const std::filesystem::path& path, std::string topic)
-      : MessageRecording(path.string()), topic_(std::move(topic)), file_(path, std::ios::binary) {
+      : MessageRecording(path.string()),
+        topic_(std::move(topic)),
+        file_(path, std::ios::binary),
+        size_(SizeOf(path)) {
     file_.seekg(8);
     ReadNames();
     format_ = topic_.empty() ? "MCAP, all topics" : "MCAP, topic " + topic_;
@@ -195,7 +209,7 @@ class McapRecording : public MessageRecording {
       return false;
     }
     const auto length = ByteReader({head + 1, 8}, source_).Take<std::uint64_t>();
-    if (length > kMost) Fail("has a record of " + std::to_string(length) + " bytes");
+    if (length > size_) Fail("ends within a record, of " + std::to_string(length) + " bytes");
     record_.assign(head, sizeof head);
     record_.resize(sizeof head + length);
     if (!file_.read(record_.data() + sizeof head, static_cast<std::streamsize>(length)))
@@ -214,7 +228,7 @@ class McapRecording : public MessageRecording {
     reader.Skip(4);
     const std::string compression(reader.TakeText());
     const std::string_view data = reader.TakeBytes(reader.Take<std::uint64_t>());
-    if (size > kMost) Fail("has a chunk of " + std::to_string(size) + " bytes");
+    if (size > MostUnpacked(data.size())) Fail("has a chunk of " + std::to_string(size) + " bytes");
     content_.resize(size);
     if (!compression.empty() && compression != "zstd" && compression != "lz4")
       Fail("has a chunk with compression " + Quote(compression) + "; known are lz4 and zstd");
@@ -259,8 +273,7 @@ class McapRecording : public MessageRecording {
       reader.Skip(4);
       const double time = kNanoseconds * static_cast<double>(reader.Take<std::uint64_t>());
       reader.Skip(8);
-      ++message_number_;
-      TimedMessage message = parse(content.substr(22), time, Where());
+      TimedMessage message = Parse(parse, content.substr(22), time);
       // Of several topics each field says whose it is.
       if (topic_.empty())
         for (auto& field : message.fields) field.first = topic + "." + field.first;
@@ -271,6 +284,7 @@ class McapRecording : public MessageRecording {
 
   std::string topic_;
   std::ifstream file_;
+  std::uintmax_t size_;  // of the file, in bytes
   std::string record_, content_;
   ByteReader chunk_{{}, ""};
   std::map<std::uint16_t, std::string> schemas_;
@@ -299,9 +313,8 @@ class BagRecording : public MessageRecording {
       if (has_ended_) return std::nullopt;
       const SQLite::Column data = messages_->getColumn(1);
       const double time = kNanoseconds * static_cast<double>(messages_->getColumn(0).getInt64());
-      ++message_number_;
-      return parse_({static_cast<const char*>(data.getBlob()), static_cast<size_t>(data.getBytes())}, time,
-                    Where());
+      return Parse(parse_, {static_cast<const char*>(data.getBlob()), static_cast<size_t>(data.getBytes())},
+                   time);
     } catch (const SQLite::Exception& error) {
       throw InputError(Where() + ": cannot be read: " + error.what());
     }
@@ -360,8 +373,9 @@ TimedMessage ParseJointState(std::string_view cdr, const std::string& where) {
 }
 
 TimedMessage ParseJsonMessage(std::string_view text, double time, const std::string& where) {
-  const AnyJson json = AnyJson::parse(text, nullptr, /*allow_exceptions=*/false);
-  if (!json.is_object()) throw InputError(where + ": must be an object in JSON");
+  const AnyJson json = ParseJson(text);
+  if (!json.is_object())
+    throw InputError(where + ": must be an object in JSON, of at most 32 brackets inside each other");
   TimedMessage message{.time = time};
   const bool is_joint_state = json.contains("name") && json["name"].is_array() && json.contains("position");
   if (!is_joint_state) return Flatten(json, "", &message), message;

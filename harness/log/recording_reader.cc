@@ -1,12 +1,15 @@
 #include "harness/log/recording_reader.h"
 
 #include <algorithm>
+#include <cerrno>
+#include <cstring>
 #include <fstream>
 #include <iostream>
 #include <optional>
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
+#include "harness/base/files.h"
 
 namespace dexcheck {
 
@@ -17,19 +20,20 @@ namespace fs = std::filesystem;
 /// The file of a bag's folder that has its messages.
 fs::path FindBagFile(const fs::path& folder) {
   fs::path found;
-  for (const fs::directory_entry& entry : fs::directory_iterator(folder)) {
-    const fs::path extension = entry.path().extension();
-    if (extension != ".db3" && extension != ".mcap" && entry.path().filename() != "log.h5") continue;
+  for (const fs::path& path : ListFolder(folder)) {
+    const fs::path extension = path.extension();
+    if (extension != ".db3" && extension != ".mcap" && path.filename() != "log.h5") continue;
     if (!found.empty()) throw InputError(folder.string() + ": has several recordings; name one of its files");
-    found = entry.path();
+    found = path;
   }
   if (found.empty()) throw InputError(folder.string() + ": has no recording (.db3, .mcap or log.h5)");
   return found;
 }
 
 std::string ReadBeginning(const fs::path& path) {
+  errno = 0;
   std::ifstream stream(path, std::ios::binary);
-  if (!stream) throw InputError(path.string() + ": cannot be read");
+  if (!stream) throw InputError(path.string() + ": cannot be read: " + std::strerror(errno));
   std::string begin(16, '\0');
   stream.read(begin.data(), static_cast<std::streamsize>(begin.size()));
   begin.resize(static_cast<size_t>(stream.gcount()));
@@ -40,7 +44,8 @@ std::string ReadBeginning(const fs::path& path) {
 
 std::unique_ptr<RecordingReader> OpenRecording(const fs::path& path, const std::string& topic, size_t width) {
   if (path == "-") return OpenTextRecording(path, width);
-  if (fs::is_directory(path)) return OpenRecording(FindBagFile(path), topic, width);
+  if (IsFolder(path)) return OpenRecording(FindBagFile(path), topic, width);
+  NoteInput(path);
   const std::string begin = ReadBeginning(path);
   if (begin.empty()) throw InputError(path.string() + ": is empty");
   if (begin.starts_with("\x89MCAP")) return OpenMcapRecording(path, topic);
@@ -72,12 +77,54 @@ namespace {
 
 constexpr size_t kLongestLine = size_t{1} << 20U;
 
-/// Also of one with a plus.
+std::string_view WithoutQuotes(std::string_view cell) { return Trim(cell, " \t\r\"'"); }
+
+/// Also of one with a plus, or in quotes.
 std::optional<double> ParseCell(std::string_view text) {
+  text = WithoutQuotes(text);
   return ParseNumber<double>(text.starts_with('+') ? text.substr(1) : text);
 }
 
-/// Cells of a line.
+/// What stands outside of quotes, which open where a cell begins and are doubled inside (RFC 4180).
+/// @param is_open whether the text ends inside of quotes.
+std::string ListUnquoted(std::string_view text, bool* is_open) {
+  std::string outside;
+  bool begins = true;
+  *is_open = false;
+  for (const char c : text) {
+    const bool turns = c == '"' && (*is_open || begins);
+    begins = *is_open ? turns : c == ',' || c == ';' || c == '\t';
+    if (turns) *is_open = !*is_open;
+    if (!turns && !*is_open) outside += c;
+  }
+  return outside;
+}
+
+/// Where the first cell's closing quote is; 0 for a cell without quotes.
+size_t FindClosingQuote(std::string_view line) {
+  size_t at = line.find_first_not_of(' ');
+  if (at == std::string_view::npos || line[at] != '"') return 0;
+  for (at = line.find('"', at + 1); at != std::string_view::npos && line.substr(at, 2) == "\"\"";)
+    at = line.find('"', at + 2);
+  return at;
+}
+
+/// A name as it was before QuoteField.
+std::string Unquote(std::string_view cell) {
+  if (!cell.starts_with('"')) return std::string(WithoutQuotes(cell));
+  cell = cell.substr(1, cell.size() - (cell.size() > 1 && cell.ends_with('"') ? 2 : 1));
+  if (cell.size() > 1 && cell[0] == '\'' &&
+      std::string_view("=+-@\t\r").find(cell[1]) != std::string_view::npos)
+    cell.remove_prefix(1);
+  std::string name;
+  for (size_t i = 0; i < cell.size(); ++i) {
+    if (cell.substr(i, 2) == "\"\"") ++i;
+    name += cell[i];
+  }
+  return name;
+}
+
+/// Cells of a line, with the quotes that they have.
 /// @param separator ' ' for any blanks.
 void Split(std::string_view line, char separator, std::vector<std::string_view>* cells) {
   cells->clear();
@@ -90,10 +137,9 @@ void Split(std::string_view line, char separator, std::vector<std::string_view>*
     return;
   }
   for (;;) {
-    // A name in quotes may have separators in it.
-    const size_t close = Trim(line).starts_with('"') ? line.find('"', line.find('"') + 1) : 0;
+    const size_t close = FindClosingQuote(line);
     const size_t end = line.find(separator, close == std::string_view::npos ? 0 : close);
-    cells->push_back(Trim(line.substr(0, end), " \t\r\"'"));
+    cells->push_back(Trim(line.substr(0, end)));
     if (end == std::string_view::npos) return;
     line.remove_prefix(end + 1);
   }
@@ -139,10 +185,13 @@ class TextRecording : public RecordingReader {
 
   /// The next line that is no comment.
   bool ReadLine() {
-    while (std::getline(*stream_, line_)) {
+    while (stream_->getline(buffer_.data(), kLongestLine) || stream_->gcount() > 0) {
+      if (stream_->bad()) break;
       ++line_number_;
-      if (line_.size() > kLongestLine)
-        Fail("a line of " + std::to_string(line_.size()) + " bytes is no row of a recording");
+      const bool has_end = !stream_->eof() && !stream_->fail();
+      if (!has_end && !stream_->eof())
+        Fail("a line of more than " + std::to_string(kLongestLine - 2) + " bytes is no row of a recording");
+      line_.assign(buffer_.data(), static_cast<size_t>(stream_->gcount()) - (has_end ? 1 : 0));
       if (line_number_ == 1 && line_.starts_with("\xef\xbb\xbf")) line_.erase(0, 3);
       const size_t begin = line_.find_first_not_of(" \t\r");
       if (begin == std::string::npos) continue;
@@ -157,22 +206,26 @@ class TextRecording : public RecordingReader {
     if (std::any_of(line_.begin(), line_.end(),
                     [](char c) { return c >= 0 && c < ' ' && c != '\t' && c != '\r'; }))
       Fail("is no text, and no recording that is known");
+    bool is_open = false;
+    std::string outside = ListUnquoted(line_, &is_open);
+    for (std::string begun = line_; is_open && ReadLine(); outside = ListUnquoted(begun, &is_open))
+      line_ = begun += "\n" + line_;
     for (const char candidate : {'\t', ';', ','})
-      if (separator_ == ' ' && line_.find(candidate) != std::string::npos) separator_ = candidate;
+      if (separator_ == ' ' && outside.find(candidate) != std::string::npos) separator_ = candidate;
     has_decimal_comma_ = separator_ == ';' && line_.find('.') == std::string::npos;
     Split(line_, separator_, &cells_);
     const bool is_header = std::any_of(cells_.begin(), cells_.end(), [](std::string_view cell) {
-      return !cell.empty() && !ParseCell(cell) && cell.find(',') == std::string_view::npos;
+      return !WithoutQuotes(cell).empty() && !ParseCell(cell) && cell.find(',') == std::string_view::npos;
     });
     format_ = separator_ == ' ' ? "text" : "CSV";
     if (is_header) {
-      names_.assign(cells_.begin(), cells_.end());
+      std::ranges::transform(cells_, std::back_inserter(names_), Unquote);
     } else {
       // A header may stand in a comment, as NumPy writes it.
       std::vector<std::string_view> names;
       Split(comment_, separator_, &names);
       names_.resize(width_ > 0 ? width_ : cells_.size());
-      if (names.size() == names_.size()) names_.assign(names.begin(), names.end());
+      if (names.size() == names_.size()) std::ranges::transform(names, names_.begin(), Unquote);
       is_pending_ = true;
     }
     has_names_ =
@@ -186,7 +239,7 @@ class TextRecording : public RecordingReader {
     if (has_decimal_comma_) std::replace(line_.begin(), line_.end(), ',', '.');
     Split(line_, separator_, &cells_);
     for (size_t i = 0; i < cells_.size(); ++i) {
-      const std::optional<double> number = cells_[i].empty() ? kMissing : ParseCell(cells_[i]);
+      const std::optional<double> number = WithoutQuotes(cells_[i]).empty() ? kMissing : ParseCell(cells_[i]);
       if (!number)
         Fail("column " + NameOf(row->size()) + ": must be a number, got " + Quote(std::string(cells_[i])));
       row->push_back(*number);
@@ -201,6 +254,7 @@ class TextRecording : public RecordingReader {
   size_t width_;
   std::ifstream file_;
   std::istream* stream_ = nullptr;
+  std::vector<char> buffer_ = std::vector<char>(kLongestLine);
   std::string line_, comment_;
   long line_number_ = 0;
   char separator_ = ' ';

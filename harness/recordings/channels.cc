@@ -8,6 +8,7 @@
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
+#include "controller/common/toml_reader.h"
 #include "harness/recordings/column_names.h"
 #include "harness/recordings/columns_file.h"
 
@@ -125,10 +126,10 @@ std::string DescribeColumns(const RobotModel& model, const Recording& recording)
       used.insert(one.column);
       scale = one.scale;
       const std::string separator = columns.empty() ? "" : ", ";
-      columns +=
-          separator + (names[one.column].empty() ? std::to_string(one.column + 1) : Quote(names[one.column]));
+      columns += separator +
+                 (names[one.column].empty() ? std::to_string(one.column + 1) : QuoteToml(names[one.column]));
       if (one.joint >= 0 && CountComponents(quantity) == 0)
-        joints += separator + Quote(model.joint(one.joint).name);
+        joints += separator + QuoteToml(model.joint(one.joint).name);
     }
     if (columns.empty()) {
       text += fmt::format("\n# {}\n# columns = []\n", head);
@@ -139,9 +140,9 @@ std::string DescribeColumns(const RobotModel& model, const Recording& recording)
     if (!joints.empty()) text += fmt::format("joints = [{}]\n", joints);
     if (quantity == RecordedQuantity::kWrench) {
       const WrenchPlace& place = recording.wrenches[static_cast<size_t>(first / 6)];
-      text +=
-          fmt::format("link = {}\npoint = [{}, {}, {}]\naxes = \"{}\"\n", Quote(model.link_name(place.link)),
-                      place.point[0], place.point[1], place.point[2], place.is_world ? "world" : "link");
+      text += fmt::format("link = {}\npoint = [{}, {}, {}]\naxes = \"{}\"\n",
+                          QuoteToml(model.link_name(place.link)), place.point[0], place.point[1],
+                          place.point[2], place.is_world ? "world" : "link");
       if (place.below > 0.0) text += fmt::format("below = {}\n", place.below);
     }
     for (const Unit& unit : ListUnits())
@@ -156,7 +157,8 @@ std::string DescribeColumns(const RobotModel& model, const Recording& recording)
   std::string unused;
   for (size_t i = 0; i < names.size(); ++i)
     if (!used.contains(i))
-      unused += (unused.empty() ? "" : ", ") + (names[i].empty() ? std::to_string(i + 1) : names[i]);
+      unused +=
+          (unused.empty() ? "" : ", ") + (names[i].empty() ? std::to_string(i + 1) : Abbreviate(names[i]));
   if (!unused.empty()) text += "\n# Not used: " + unused + "\n";
   return text;
 }

@@ -44,6 +44,9 @@ constexpr Unit kUnits[] = {
 bool IsLetter(char c) { return std::isalpha(static_cast<unsigned char>(c)) != 0; }
 bool IsDigit(char c) { return std::isdigit(static_cast<unsigned char>(c)) != 0; }
 
+/// "q.x" of "q.x [m]".
+std::string WithoutUnit(const std::string& name) { return name.substr(0, name.find(" [")); }
+
 /// Words and numbers of a name.
 std::vector<std::string> SplitWords(const std::string& name) {
   std::vector<std::string> words;
@@ -61,6 +64,19 @@ std::vector<std::string> SplitWords(const std::string& name) {
   return words;
 }
 
+/// The last place of a joint's name that is no part of a longer word or number; npos for none.
+size_t FindName(const std::string& name, const std::string& own) {
+  for (size_t at = name.rfind(own); at != std::string::npos && !own.empty(); at = name.rfind(own, at - 1)) {
+    const size_t end = at + own.size();
+    const bool goes_on =
+        end < name.size() &&
+        (IsLetter(own.back()) ? IsLetter(name[end]) : IsDigit(own.back()) && IsDigit(name[end]));
+    if (!goes_on && (at == 0 || (!IsLetter(name[at - 1]) && !IsDigit(name[at - 1])))) return at;
+    if (at == 0) break;
+  }
+  return std::string::npos;
+}
+
 /// What a column's name says.
 struct NamedColumn {
   std::optional<RecordedQuantity> quantity;
@@ -73,15 +89,12 @@ struct NamedColumn {
 NamedColumn ReadName(const RobotModel& model, const std::string& written) {
   NamedColumn column;
   std::string name = ToLower(written);
+  const bool is_time = Has(kWords[0].second, WithoutUnit(name));  // whatever joints are called
   size_t longest = 0, at = 0;
   for (int joint = 0; joint < model.num_joints(); ++joint) {
     const std::string own = ToLower(model.joint(joint).name);
-    const size_t found = name.rfind(own);
+    const size_t found = is_time ? std::string::npos : FindName(name, own);
     if (found == std::string::npos || own.size() <= longest) continue;
-    const size_t end = found + own.size();
-    if ((found > 0 && (IsLetter(name[found - 1]) || IsDigit(name[found - 1]))) ||
-        (end < name.size() && IsDigit(name[end]) && IsDigit(own.back())))
-      continue;
     longest = own.size();
     at = found;
     column.joint = joint;
@@ -104,9 +117,6 @@ NamedColumn ReadName(const RobotModel& model, const std::string& written) {
   }
   return column;
 }
-
-/// "q.x" of "q.x [m]".
-std::string WithoutUnit(const std::string& name) { return name.substr(0, name.find(" [")); }
 
 /// Of a base's pose, by the last word and those before it; -1 for none. A run's log calls it "q.qw".
 int FindPoseComponent(const std::vector<std::string>& words) {

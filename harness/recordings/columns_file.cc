@@ -9,6 +9,7 @@
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
 #include "controller/common/toml_reader.h"
+#include "harness/base/files.h"
 #include "harness/recordings/column_names.h"
 
 namespace dexcheck {
@@ -50,7 +51,7 @@ class JoinedRecording : public RecordingReader {
 class ColumnsFile {
  public:
   ColumnsFile(const RobotModel& model, const fs::path& path)
-      : model_(model), path_(path), document_(ReadTextFile(path.string()), path.string()) {}
+      : model_(model), path_(path), document_(ReadBytes(path.string()), path.string()) {}
 
   /// @param recording its file, unless this one names it.
   Recording Open(const fs::path& recording) {

@@ -3,6 +3,7 @@
 #include <limits>
 
 #include "controller/common/toml_reader.h"
+#include "harness/base/files.h"
 
 namespace dexcheck {
 namespace {
@@ -42,7 +43,7 @@ void Read(const TomlValue& value, Eigen::Index joint, MotionLimits* limits) {
 MotionLimits ReadMotionLimits(const RobotDescription& robot, const std::filesystem::path& file) {
   MotionLimits limits = MakeUsualLimits(robot);
   if (file.empty()) return limits;
-  TomlDocument document(ReadTextFile(file.string()), file.string());
+  TomlDocument document(ReadBytes(file.string()), file.string());
   TomlTable root = document.Open();
   if (const auto all = root.Find("all"))
     for (Eigen::Index i = 0; i < limits.lower.size(); ++i) Read(*all, i, &limits);

@@ -250,8 +250,7 @@ class Page {
 
   Json MakeVideo() {
     if (content_.video.empty()) return nullptr;
-    std::error_code error;
-    const bool is_large = std::filesystem::file_size(content_.video, error) > kLargestEmbeddedVideo || error;
+    const bool is_large = SizeOf(content_.video) > kLargestEmbeddedVideo;
     if (!is_large) media_ += EmbedBytes("run-video", ReadBytes(content_.video));
     return {{"is_embedded", !is_large},
             {"link", content_.video_link},
@@ -317,7 +316,7 @@ class FigureFolder {
     const HeldSignals until_protected;
     std::error_code error;
     made_ = fs::create_directory(folder_, error);
-    if (error || !fs::is_directory(folder_)) {
+    if (error || !IsFolder(folder_)) {
       throw InputError(folder_.string() +
                        ": cannot be made: " + (error ? error.message() : std::strerror(ENOTDIR)));
     }
@@ -357,8 +356,8 @@ void AddVideo(const fs::path& run_dir, const fs::path& page, PageContent* conten
   std::error_code error;
   if (!fs::is_regular_file(video, error)) return;
   content->video = video;
-  const fs::path folder = fs::absolute(page).parent_path();
-  content->video_link = fs::proximate(fs::absolute(video), folder, error).generic_string();
+  const fs::path folder = MakeAbsolute(page).parent_path();
+  content->video_link = fs::proximate(MakeAbsolute(video), folder, error).generic_string();
 }
 
 }  // namespace

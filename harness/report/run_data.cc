@@ -7,6 +7,7 @@
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
 #include "controller/handling/pick_and_place.h"
+#include "harness/base/bounded_json.h"
 #include "harness/base/files.h"
 #include "harness/engine/compiled_model.h"
 #include "harness/engine/mjcf_file.h"
@@ -73,7 +74,7 @@ double RunData::FindSummaryNumber(const char* pointer) const {
 
 std::string DescribeCut(const LogReader& log) {
   const std::string text = log.FindText("summary");
-  const nlohmann::json summary = nlohmann::json::parse(text, nullptr, /*allow_exceptions=*/false);
+  const nlohmann::json summary = ParseJson(text);
   const bool stopped = summary.is_object() && summary.value("interrupted", nlohmann::json()) == true;
   if (!text.empty() && !stopped && log.rows() > 0) return "";
   const std::string how = text.empty() ? "was cut off" : stopped ? "was stopped by hand" : "ended";
@@ -82,7 +83,7 @@ std::string DescribeCut(const LogReader& log) {
 }
 
 void RunData::ReadChecksOfSummary() {
-  summary_ = nlohmann::json::parse(FindText("summary"), nullptr, /*allow_exceptions=*/false);
+  summary_ = ParseJson(FindText("summary"));
   if (!summary_.is_object() || !summary_.contains("verdict") || !summary_.contains("checks"))
     Fail(log_, "summary: is not a run's summary");
   try {

@@ -19,7 +19,7 @@ namespace {
 /// The texts of robot and scenario, with what a run changes in them.
 std::string MakeRobotText(const Setup& setup) {
   const std::string& source = setup.model().spec().source;
-  return ApplyOverrides(ReadTextFile(source), source, setup.scenario().model_overrides);
+  return ApplyOverrides(ReadBytes(source), source, setup.scenario().model_overrides);
 }
 
 std::string MakeScenarioText(const Scenario& scenario) {
@@ -90,7 +90,7 @@ std::unique_ptr<Controller> MakeOwnController(const Setup& setup, const Sampling
 
 std::string HashController(const OwnControllerOptions& own) {
   const std::filesystem::path file = FindControllerFile(own);
-  return file.empty() ? "" : HashBytes(ReadBytes(file));
+  return file.empty() ? "" : HashBytes(ReadBytes(file, kMostData));
 }
 
 void RejectParameter(const OwnControllerSetup& setup, const std::string& parameter, const std::string& why) {

@@ -116,7 +116,7 @@ RunRecorder::RunRecorder(const std::filesystem::path& path, const ClosedLoop& lo
   log_.EmbedFile("inputs", "scenario.toml", scenario.text);
   log_.EmbedFile("inputs", "robot/" + inputs.robot.filename().string(), ReadBytes(inputs.robot));
   for (const std::string& file : ListMjcfFiles(inputs.mjcf)) {
-    log_.EmbedFile("inputs", "mjcf/" + file, ReadBytes(inputs.mjcf.parent_path() / file));
+    log_.EmbedFile("inputs", "mjcf/" + file, ReadBytes(inputs.mjcf.parent_path() / file, kMostData));
   }
   AddStateSignals();
   if (setup.joints() != nullptr) {

@@ -7,6 +7,7 @@
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
 #include "controller/model/parameter_reader.h"
+#include "harness/base/files.h"
 #include "harness/engine/compiled_model.h"
 #include "harness/engine/mujoco_release.h"
 
@@ -40,7 +41,7 @@ std::unique_ptr<RobotModel> ReadRigidModel(const Scenario& scenario, const std::
   const auto first = scenario.model_overrides.begin();
   const std::vector<std::string> own(first,
                                      first + static_cast<std::ptrdiff_t>(scenario.own_model_overrides));
-  return std::make_unique<RobotModel>(ParseRobotModel(ReadTextFile(robot), robot, own));
+  return std::make_unique<RobotModel>(ParseRobotModel(ReadBytes(robot), robot, own));
 }
 
 /// Gives contact pairs this friction along the surface, those with a floor or all others.

@@ -2,6 +2,8 @@
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
+#include "controller/common/toml_reader.h"
+#include "harness/base/files.h"
 #include "harness/scenario/scenario_reader.h"
 
 namespace dexcheck {
@@ -11,11 +13,6 @@ constexpr double kMaxSteps = 1e8;
 /// s. Contacts settle within some of their time constants, 2 ms each, and posture within some periods of its
 /// task; whatever has not come to rest by then, never will.
 constexpr double kMaxSettle = 100.0;
-
-/// An empty one is the current folder.
-std::filesystem::path MakeAbsolute(const std::filesystem::path& folder) {
-  return (std::filesystem::current_path() / folder).lexically_normal();
-}
 
 std::string ReadPath(TomlTable& table, std::string_view key, const std::filesystem::path& folder) {
   const auto value = table.Find(key);
@@ -95,7 +92,7 @@ void ReadController(const TomlValue& value, const std::filesystem::path& folder,
   controller->run = run->AsText();
   if (controller->run.empty()) run->Fail("must be a library (.so), a Python file (.py) or a command");
   const auto own_folder = table.Find("folder");
-  controller->folder = MakeAbsolute(own_folder ? folder / own_folder->AsText() : folder);
+  controller->folder = MakeAbsolute(own_folder ? folder / own_folder->AsText() : folder).lexically_normal();
   using Options = OwnControllerOptions;
   ReadKeys<Options>(table, {POSITIVE_KEY(time_limit)}, controller);
   for (const auto& [name, number] : table.GetEntries()) {
@@ -164,8 +161,8 @@ Scenario ReadScenario(TomlTable& root, const std::filesystem::path& folder,
 }  // namespace
 
 std::vector<std::string> NameController(const std::string& run, const std::filesystem::path& folder) {
-  const auto quote = [](const std::string& text) { return "'''" + text + "'''"; };
-  return {"controller.run=" + quote(run), "controller.folder=" + quote(MakeAbsolute(folder).string())};
+  return {"controller.run=" + QuoteToml(run),
+          "controller.folder=" + QuoteToml(MakeAbsolute(folder).lexically_normal().string())};
 }
 
 bool IsOfModel(std::string_view assignment) {

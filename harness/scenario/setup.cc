@@ -6,6 +6,7 @@
 #include "controller/common/errors.h"
 #include "controller/contact/shapes.h"
 #include "controller/model/parameter_reader.h"
+#include "harness/base/files.h"
 #include "harness/engine/engine.h"
 
 namespace dexcheck {
@@ -35,7 +36,7 @@ Setup::Setup(const Scenario& scenario, const std::filesystem::path& robot, const
 
 Setup::Setup(const Scenario& scenario, const std::filesystem::path& robot, const std::filesystem::path& mjcf,
              MjModelPtr engine)
-    : Setup(scenario, ParseRobotModel(ReadTextFile(robot.string()), robot.string(), scenario.model_overrides),
+    : Setup(scenario, ParseRobotModel(ReadBytes(robot.string()), robot.string(), scenario.model_overrides),
             mjcf, std::move(engine)) {}
 
 Setup::Setup(const Scenario& scenario, RobotModel model, const std::filesystem::path& mjcf, MjModelPtr engine)

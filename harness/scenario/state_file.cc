@@ -6,6 +6,8 @@
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
 #include "controller/common/toml_reader.h"
+#include "harness/base/bounded_json.h"
+#include "harness/base/files.h"
 
 namespace dexcheck {
 namespace {
@@ -14,8 +16,6 @@ using Json = nlohmann::json;
 
 // Three hard fingers are the fewest that can balance every wrench.
 constexpr size_t kFewestContacts = 3;
-// Messages print values by recursion; a state has three brackets inside each other.
-constexpr int kMaxDepth = 32;
 
 /// Reads the keys that it knows and refuses all others. A key is named by its path, such as "object.X_o".
 class StateReader {
@@ -54,13 +54,10 @@ class StateReader {
   }
 
   [[nodiscard]] Json Parse(std::string_view text) const {
-    const auto check = [this](int depth, Json::parse_event_t, const Json&) {
-      if (depth > kMaxDepth)
-        Fail("", "nested too deeply, more than " + std::to_string(kMaxDepth) + " brackets");
-      return true;
-    };
+    if (IsNestedTooDeep(text))
+      Fail("", "nested too deeply, more than " + std::to_string(kMostBrackets) + " brackets");
     try {
-      return Json::parse(text, check);
+      return Json::parse(text);
     } catch (const Json::exception& error) {
       // The library's messages begin with "[json.exception.NAME.NUMBER] ".
       const std::string message = error.what();
@@ -227,7 +224,7 @@ State ParseState(std::string_view text, const std::string& source, const RobotMo
 }
 
 State ReadState(const std::string& file, const RobotModel& model) {
-  return ParseState(ReadTextFile(file), file, model);
+  return ParseState(ReadBytes(file), file, model);
 }
 
 }  // namespace dexcheck

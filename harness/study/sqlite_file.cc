@@ -8,6 +8,7 @@
 
 #include "controller/common/text.h"
 #include "harness/base/console.h"
+#include "harness/base/files.h"
 #include "harness/base/interrupts.h"
 #include "harness/study/study_store.h"
 
@@ -71,7 +72,10 @@ void RequirePlainFile(const std::string& name) {
 }
 
 SqliteFile::SqliteFile(const std::string& name, int flags) try : SQLite
-  ::Database(RequirePlain(name), flags) { sqlite3_busy_handler(getHandle(), WaitForOthers, this); }
+  ::Database(RequirePlain(name), flags) {
+  sqlite3_busy_handler(getHandle(), WaitForOthers, this);
+  NoteInput(name);
+}
 catch (const SQLite::Exception& error) {
   throw InputError(name + ": " + Explain(error));
 }

@@ -130,7 +130,7 @@ namespace {
 std::string HashMjcf(const std::filesystem::path& mjcf) {
   std::string all;
   for (const std::string& file : ListMjcfFiles(mjcf)) {
-    all += file + "\n" + HashBytes(ReadBytes(mjcf.parent_path() / file)) + "\n";
+    all += file + "\n" + HashBytes(ReadBytes(mjcf.parent_path() / file, kMostData)) + "\n";
   }
   return HashBytes(all);
 }
@@ -174,7 +174,7 @@ StudyIdentity IdentifyStudy(const StudyInputs& inputs) {
           {"name", inputs.study.name},
           {"study", inputs.study.text},
           {"scenario", inputs.scenario_text},
-          {"robot", ReadTextFile(inputs.robot.string())},
+          {"robot", ReadBytes(inputs.robot.string())},
           {"mjcf_hash", HashMjcf(inputs.mjcf)},
           {"controller_hash", inputs.controller_hash},
           {"dexcheck_version", Version()},

@@ -9,6 +9,7 @@
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
 #include "controller/model/parameter_reader.h"
+#include "harness/base/files.h"
 #include "harness/engine/compiled_model.h"
 #include "harness/run/joint_margins.h"
 #include "harness/run/runner.h"
@@ -77,7 +78,7 @@ RobotModel MakeModel(const StudyInputs& inputs, const Trial& trial, const Scenar
     } catch (const InputError&) {
     }
   }
-  return ParseRobotModel(ReadTextFile(source), source, ParseTrialScenario(inputs, trial).model_overrides);
+  return ParseRobotModel(ReadBytes(source), source, ParseTrialScenario(inputs, trial).model_overrides);
 }
 
 Setup MakeSetup(const StudyInputs& inputs, const Trial& trial, const Scenario& scenario) {
@@ -180,7 +181,7 @@ void CheckTrials(StudyInputs* inputs) {
   inputs->engine = std::move(engine);
   const Setup setup = MakeSetup(*inputs, trial, first);
   const std::string robot = inputs->robot.string();
-  TomlDocument model(ReadTextFile(robot), robot);
+  TomlDocument model(ReadBytes(robot), robot);
   for (const std::string& assignment : first.model_overrides) model.Override(assignment);
   inputs->model_document = std::make_shared<const TomlDocument>(std::move(model));
   inputs->model_overrides = first.model_overrides;

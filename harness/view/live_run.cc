@@ -10,6 +10,7 @@
 #include "controller/common/text.h"
 #include "controller/common/toml_reader.h"
 #include "controller/handling/pick_and_place.h"
+#include "harness/base/files.h"
 #include "harness/engine/compiled_model.h"
 
 namespace dexcheck {
@@ -86,8 +87,8 @@ void LiveRun::Disturb() {
   runner_->Disturb(one);
   held_until_ = t + one.duration;
   forces_.push_back(fmt::format(
-      "disturbance+={{ type = \"pulse\", body = \"{}\", at = {}, force = {}, begin = {}, duration = {} }}",
-      one.body, Print(one.at), Print(one.force), one.begin, one.duration));
+      "disturbance+={{ type = \"pulse\", body = {}, at = {}, force = {}, begin = {}, duration = {} }}",
+      QuoteToml(one.body), Print(one.at), Print(one.force), one.begin, one.duration));
 }
 
 void LiveRun::Record(const StepRecord& step) {
@@ -221,7 +222,7 @@ void Multiply(const ByName& numbers, double factor, std::vector<std::string>* ov
   if (numbers.key.empty() || factor == 1.0) return;
   std::string text = std::isnan(numbers.all) ? "" : ", all = " + PrintGain(factor * numbers.all);
   for (const auto& [name, number] : numbers.groups) {
-    text += ", " + Quote(name) + " = " + PrintGain(factor * number);
+    text += ", " + QuoteToml(name) + " = " + PrintGain(factor * number);
   }
   overrides->push_back(numbers.key + "={" + text.substr(1) + " }");
 }
@@ -269,7 +270,7 @@ std::vector<std::string> MakeGainOverrides(const Scenario& scenario, const std::
 std::string MakeScenarioText(const Scenario& scenario, const std::vector<std::string>& overrides,
                              const std::string& name) {
   constexpr std::string_view kModel = "model.";
-  std::vector<std::string> assignments = {"name=" + Quote(name)};
+  std::vector<std::string> assignments = {"name=" + QuoteToml(name)};
   for (const std::string& assignment : overrides) {
     const bool own = assignment.starts_with("model.file=") || assignment.starts_with("model.overrides");
     if (assignment.starts_with(kModel) && !own) {
@@ -280,8 +281,7 @@ std::string MakeScenarioText(const Scenario& scenario, const std::vector<std::st
     }
   }
   const auto add_file = [&](const char* key, const std::string& file) {
-    if (!file.empty())
-      assignments.push_back(key + std::string("=") + Quote(std::filesystem::absolute(file).string()));
+    if (!file.empty()) assignments.push_back(key + std::string("=") + QuoteToml(MakeAbsolute(file).string()));
   };
   add_file("model.file", scenario.model_file);
   add_file("plant.mjcf", scenario.mjcf_file);

@@ -53,6 +53,9 @@ class RefusedFolder : public CommandTest {
     for (const char* folder : {"folder.toml", "folder.xml"}) fs::create_directory(Path(folder));
     for (const char* file : {"out.json", "state.json"}) Write(file, "what stood here before");
     Write("scene.sdf", "<sdf/>");
+    Write("whole.xml", R"(<mujoco><include file="two.xml"/></mujoco>)");
+    fs::create_symlink("pair.xml", Path("link.xml"));
+    fs::create_hard_link(Path("pair.xml"), Path("hard.xml"));
   }
 
   /// All files of the folder and what is in them.
@@ -88,9 +91,9 @@ class RefusedFolder : public CommandTest {
   }
 };
 
-constexpr const char* kGroups[] = {"CommandLine",  "RunsOptions", "ParameterFiles", "Mjcfs",
-                                   "Descriptions", "Programs",    "States",         "Grasps",
-                                   "JointMotions", "GraspPlans",  "Logs",           "Pictures"};
+constexpr const char* kGroups[] = {
+    "CommandLine", "RunsOptions",  "ParameterFiles", "Mjcfs", "Descriptions", "Programs", "States",
+    "Grasps",      "JointMotions", "GraspPlans",     "Logs",  "Pictures",     "Outputs"};
 
 class Refused : public RefusedFolder, public ::testing::WithParamInterface<const char*> {};
 

@@ -160,6 +160,12 @@ TEST_F(StudyCommand, FaultsAreNamed) {
   }
   EXPECT_FALSE(Has("page.html"));
   EXPECT_FALSE(Has("new.sqlite"));
+  const std::string rows = Read("good.sqlite");
+  for (const char* onto_itself :
+       {"export good.sqlite --out ./good.sqlite", "show good.sqlite 0 --json=good.sqlite"})
+    EXPECT_TRUE(
+        Refused(std::string("study ") + onto_itself, {"good.sqlite: cannot be written: it is an input"}));
+  EXPECT_EQ(Read("good.sqlite"), rows);
   for (const char* shard : {"0/2", "3/2", "1", "1/", "a/b", "1/2x"}) {
     EXPECT_TRUE(Refused(RunArguments("a.sqlite", {"--shard", shard}),
                         {"--shard: must be I/N with 1 <= I <= N, got \"" + std::string(shard) + "\""}));

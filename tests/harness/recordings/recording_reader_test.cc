@@ -116,6 +116,68 @@ std::string JointStateJson(size_t row) {
   return text.str();
 }
 
+std::string MessageOfOpening(const std::filesystem::path& path) {
+  return MessageOf<InputError>([&] { return OpenRecording(path); });
+}
+
+/// A record of MCAP's.
+std::string McapRecord(char opcode, std::uint64_t length, const std::string& content) {
+  return opcode + std::string(reinterpret_cast<const char*>(&length), sizeof length) + content;
+}
+
+// 24,000 brackets overflowed the stack.
+TEST_F(Formats, JsonInJsonIsBounded) {
+  for (const size_t depth : {30, 40, 24000}) {
+    McapWriter writer(Path("deep.mcap"));
+    const auto channel = writer.AddChannel("/a", "a", "{}");
+    for (size_t i = 0; i < 2; ++i)
+      writer.Write(channel, Time(i),
+                   R"({"a": )" + std::string(depth, '[') + "1" + std::string(depth, ']') + "}");
+    writer.Finish();
+    if (depth < 32) {
+      EXPECT_EQ(OpenRecording(Path("deep.mcap"))->names().size(), 2U);
+    } else {
+      EXPECT_THAT(MessageOfOpening(Path("deep.mcap")), HasSubstr("at most 32 brackets inside each other"));
+    }
+  }
+}
+
+// A size in a file asks for no more memory than the file can hold.
+TEST_F(Formats, StatedSizesAreNotTrusted) {
+  constexpr std::uint64_t kStated = 0xffffff00U;
+  const std::string begin = "\x89MCAP0\r\n";
+  EXPECT_THAT(MessageOfOpening(Write("record.mcap", begin + McapRecord(5, kStated, "abc"))),
+              HasSubstr("record.mcap: ends within a record, of 4294967040 bytes"));
+  for (const std::string compression : {"", "lz4", "zstd"}) {
+    std::string chunk(16, '\0');
+    chunk.append(reinterpret_cast<const char*>(&kStated), 8);
+    chunk +=
+        std::string(4, '\0') + std::string(1, static_cast<char>(compression.size())) + std::string(3, '\0');
+    chunk += compression + std::string("\x02\0\0\0\0\0\0\0ab", 10);
+    const std::string bytes = begin + McapRecord(6, chunk.size(), chunk);
+    EXPECT_THAT(MessageOfOpening(Write("chunk.mcap", bytes)), HasSubstr("has a chunk of 4294967040 bytes"));
+  }
+  int error = 0;
+  zip_t* archive = zip_open(Path("zeros.npz").c_str(), ZIP_CREATE, &error);
+  const std::string zeros(size_t{300} << 20U, '\0');
+  zip_file_add(archive, "q.npy", zip_source_buffer(archive, zeros.data(), zeros.size(), 0), 0);
+  zip_close(archive);
+  EXPECT_THAT(MessageOfOpening(Path("zeros.npz")), HasSubstr("q.npy: is longer than its file can hold"));
+  const hid_t file = H5Fcreate(Path("empty.h5").c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT);
+  const hsize_t extents[2] = {size_t{1} << 34U, 7};
+  const hid_t space = H5Screate_simple(2, extents, nullptr);
+  H5Dclose(H5Dcreate2(file, "q", H5T_NATIVE_DOUBLE, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT));
+  H5Sclose(space);
+  H5Fclose(file);
+  EXPECT_THAT(MessageOfOpening(Path("empty.h5")), HasSubstr("empty.h5"));
+}
+
+TEST_F(Formats, EndlessFilesAreRefused) {
+  EXPECT_THAT(MessageOfOpening("/dev/zero"), HasSubstr("a line of more than 1048574 bytes"));
+  EXPECT_THAT(MessageOf<InputError>([] { return ReadBytes("/dev/zero"); }),
+              HasSubstr("/dev/zero: cannot be read: is longer than 64 MiB"));
+}
+
 TEST_F(Formats, McapOfJson) {
   {
     McapWriter writer(Path("a.mcap"));
