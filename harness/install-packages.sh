@@ -56,7 +56,7 @@ if [[ $purpose == tests || $purpose == development ]]; then
 fi
 if [[ $purpose == development ]]; then
   # sanitizers and libFuzzer, coverage, static analysis
-  packages+=(libclang-rt-14-dev llvm-14 clang-format-14 clang-tidy-14 cppcheck)
+  packages+=(libclang-rt-14-dev llvm-14 clang-format-14 clang-tidy-14 cppcheck eslint)
 fi
 
 Fail() {

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Checks format and code without changing anything: clang-format looks at every source of the project, cppcheck and
-# clang-tidy at those of controller/, harness/ and renders/ that are asked for:
+# Checks format and code without changing anything: clang-format looks at every source of the project, eslint at the
+# pages' scripts, cppcheck and clang-tidy at those of controller/, harness/ and renders/ that are asked for:
 #   tests/lint.sh                     all
 #   tests/lint.sh SOURCE.cc...        these
 #   tests/lint.sh --since REV [MOST]  those changed since this commit of git, at most MOST of them, the largest changes first
@@ -25,6 +25,16 @@ fi
 
 echo "clang-format"
 git ls-files '*.cc' '*.h' | xargs clang-format-14 --dry-run --Werror || failed=1
+
+echo "eslint"
+# Names that the pages' scripts share: those of libraries, and what dom.js and charts.js define for all. Debian's Node
+# finds Debian's modules by itself, another one does so by NODE_PATH.
+shared=$(sed -nE 's/^(const|function) ([A-Za-z]+).*/\2/p' harness/report/page/dom.js harness/report/page/charts.js)
+globals=Chart,THREE,$(tr '\n' , <<<"$shared")
+git ls-files 'harness/*.js' | NODE_PATH=${NODE_PATH:-/usr/share/nodejs} xargs eslint --no-eslintrc --format unix \
+  --parser-options=ecmaVersion:2022 --env browser,es2020 --global "${globals%,}" --rule "{no-undef: error, no-const-assign: error,
+  no-dupe-keys: error, no-redeclare: [error, {builtinGlobals: false}], no-unreachable: error, no-unused-vars: [error, {varsIgnorePattern: '^(${shared//$'\n'/|})$'}],
+  use-isnan: error, valid-typeof: error}" || failed=1
 
 [[ ${#sources[@]} -gt 0 ]] || exit "$failed"
 
