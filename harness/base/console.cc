@@ -7,6 +7,8 @@
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
+#include <utility>
+#include <vector>
 
 #include "controller/common/errors.h"
 
@@ -40,10 +42,30 @@ std::string Shorten(const std::string& text) {
                                    : shown.substr(0, kMost) + "..." + shown.substr(shown.size() - kMost);
 }
 
+/// Folders, and what they are shown as.
+using ShownFolders = std::vector<std::pair<std::string, std::string>>;
+
+ShownFolders& AllShownFolders() {
+  static ShownFolders folders;
+  return folders;
+}
+
+std::string ShowFolders(std::string text) {
+  for (const auto& [folder, name] : AllShownFolders()) {
+    for (size_t at = text.find(folder); at != std::string::npos; at = text.find(folder, at + name.size()))
+      text.replace(at, folder.size(), name);
+  }
+  return text;
+}
+
 }  // namespace
 
+void ShowFolderAs(const std::string& folder, const std::string& name) {
+  AllShownFolders().emplace_back(folder + "/", name + ": ");
+}
+
 void Warn(const std::string& text) {
-  std::string line = "dexcheck: " + Shorten(text);
+  std::string line = "dexcheck: " + Shorten(ShowFolders(text));
   std::replace_if(
       line.begin(), line.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; }, '?');
   line += '\n';

@@ -16,6 +16,7 @@
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
 #include "harness/base/child_process.h"
+#include "harness/base/console.h"
 #include "harness/base/files.h"
 #include "harness/log/hdf5_handle.h"
 #include "harness/log/log_file.h"
@@ -338,6 +339,7 @@ std::string LogReader::ReadFile(const std::string& group, const std::string& rel
 }
 
 void LogReader::ExtractFiles(const std::string& group, const std::filesystem::path& folder) const {
+  ShowFolderAs(folder.string(), path_.string());
   for (const std::string& name : ListFiles(group)) {
     const std::filesystem::path path = folder / name;
     MakeFolder(path.parent_path());

@@ -40,6 +40,8 @@ std::string Explain(const SQLite::Exception& error) {
     case SQLITE_NOTADB:
     case SQLITE_CORRUPT:
       return std::string("is not a usable database: ") + error.what();
+    case -1:  // SQLiteCpp's own, about its calls
+      return "is not a usable database: it lacks a row or a column";
     case SQLITE_CANTOPEN:
       return "cannot be opened";
     case SQLITE_READONLY:

@@ -68,6 +68,12 @@ TEST_F(ForgedLog, ReadsNoFilesOutside) {
   EXPECT_TRUE(AllRefuse(secret.string()));
 }
 
+// Its files are unpacked into a folder that nobody looks into.
+TEST_F(ForgedLog, WhatIsWrongInsideNamesTheLog) {
+  WriteLog("scene.xml", "1", model_);
+  EXPECT_TRUE(Refused("run --replay run", {"dexcheck: run/log.h5: robot/robot.toml:1: missing key"}));
+}
+
 TEST_F(ForgedLog, ASeedThatIsNoNumberIsNamed) {
   for (const char* seed : {"", "x", "-1", "1 ", "99999999999999999999999"}) {
     WriteLog("scene.xml", seed, model_);

@@ -227,6 +227,26 @@ TEST_F(InitCommand, MeshesLieBesideARobotThatFloats) {
 }
 
 // A run's clearance is of shapes that the engine does not let touch, too.
+// What is written is read again: as TOML, as XML, and as the names of columns.
+TEST_F(InitCommand, AnyNamesOfJoints) {
+  for (const auto& [first, second] :
+       {std::pair("t", "a;b"), {"a&quot;b,c", "=g\\h'"}, {"a&#10;\u00e4", "time"}}) {
+    SCOPED_TRACE(first);
+    WriteChanged("arm.urdf", ReadFixture("pair.urdf"), "name=\"shoulder\"",
+                 std::string("name=\"") + first + "\"");
+    WriteChanged("arm.urdf", Read("arm.urdf"), "name=\"elbow\"", std::string("name=\"") + second + "\"");
+    for (const char* folder : {"arm", "run"}) std::filesystem::remove_all(Path(folder));
+    Expect(0, "init arm.urdf --out arm");
+    Expect(0, "run arm/motion.toml --no-report --out run --set settle=0.1");
+    Expect(0, "export run --csv run.csv");
+    for (const char* recording : {"run", "run.csv"}) {
+      const ProgramResult judged = Run({"judge", "arm/robot.toml", recording});
+      EXPECT_LE(judged.exit_code, 1) << recording << ": " << judged.err;
+      EXPECT_THAT(judged.out, Not(HasSubstr("not judged"))) << recording;
+    }
+  }
+}
+
 TEST_F(InitCommand, WhatOverlapsIsExcluded) {
   Copy("biped.xml");
   Expect(0, "init biped.xml");

@@ -93,6 +93,12 @@ TEST(Usage, TwoRobotsAreComparedWithoutTheWordForIt) {
   EXPECT_EQ(compare(Words{}), compare("consistency"));
   EXPECT_TRUE(IsRefused(RunDexcheck(Words{kPandaToml}),
                         {"takes two files, got " + kPandaToml, "init, audit, judge take one"}));
+  const TempFolder folder;
+  std::filesystem::copy(kPandaXml, folder.path() / "panda.mjcf");
+  WriteText(folder.path() / "rows.csv", "t,nothing\n0,1\n");
+  const auto run = [&](const Words& words) { return RunDexcheck(words, {.folder = folder.path()}); };
+  EXPECT_EQ(run({"panda.mjcf", "panda.mjcf", "--samples", "2"}).exit_code, 0);
+  EXPECT_TRUE(IsRefused(run({kPandaToml, "rows.csv"}), {"rows.csv", "joint"})) << "is judged";
 }
 
 TEST(Usage, TheVersionIsThreeNumbers) {

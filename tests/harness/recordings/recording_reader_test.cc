@@ -82,6 +82,11 @@ TEST_F(Formats, TextWithAndWithoutHeaders) {
   }
   EXPECT_THAT(OpenRecording(Write("named.csv", "t,a,b,c,d\n" + Rows(",")))->names(),
               ElementsAre("t", "a", "b", "c", "d"));
+  // As RFC 4180 has it: separators, quotes and ends of lines in quotes.
+  const auto quoted =
+      OpenRecording(Write("quoted.csv", "t,\"a;b,c\",\"d\"\"e\",\"f\ng\",\"'=h\"\n" + Rows(",")));
+  EXPECT_THAT(quoted->names(), ElementsAre("t", "a;b,c", "d\"e", "f\ng", "=h"));
+  ExpectRows(quoted.get());
 }
 
 TEST_F(Formats, NumbersOnLinesOfTheirOwn) {
@@ -127,7 +132,7 @@ std::string McapRecord(char opcode, std::uint64_t length, const std::string& con
 
 // 24,000 brackets overflowed the stack.
 TEST_F(Formats, JsonInJsonIsBounded) {
-  for (const size_t depth : {30, 40, 24000}) {
+  for (const size_t depth : {30U, 40U, 24000U}) {
     McapWriter writer(Path("deep.mcap"));
     const auto channel = writer.AddChannel("/a", "a", "{}");
     for (size_t i = 0; i < 2; ++i)
