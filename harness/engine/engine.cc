@@ -8,6 +8,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <limits>
 #include <mutex>
 #include <new>
 #include <string_view>
@@ -168,6 +169,13 @@ constexpr std::string_view kIntegers =
     " nuser_jnt nuser_geom nuser_site nuser_cam nuser_tendon nuser_actuator nuser_sensor group contype"
     " conaffinity condim priority subgrid offwidth offheight shadowsize offsamples numslices numstacks"
     " numquads nrow ncol dim";
+/// Those that are sizes of memory, and the most that is accepted of them: each model fits into some 1 GB.
+constexpr std::pair<std::string_view, double> kSizes[] = {
+    {"width height nrow ncol offwidth offheight shadowsize", 1 << 13},
+    {"njmax nconmax nuserdata nkey nuser_body nuser_jnt nuser_geom nuser_site nuser_cam nuser_tendon"
+     " nuser_actuator nuser_sensor",
+     1 << 20},
+    {"nstack", 1 << 26}};
 /// Those of which there may be fewer numbers than the most. At a blank behind the last one, 2.2.2 reads that
 /// once more: "1 " as a friction of 1 1 0.0001.
 constexpr std::string_view kOpenLists =
@@ -189,6 +197,23 @@ bool IsNumbers(const char* text, bool integer) {
     ++count;
   }
   return !integer || count == 1;
+}
+
+/// The most of an attribute that is a size; infinite for others.
+double MostOf(std::string_view name) {
+  const auto* const size =
+      std::ranges::find_if(kSizes, [&](const auto& one) { return IsAmong(one.first, name); });
+  return size == std::end(kSizes) ? std::numeric_limits<double>::infinity() : size->second;
+}
+
+/// The product of a text's numbers.
+double Multiply(const char* text) {
+  double product = 1.0;
+  for (char* end = nullptr;; text = end) {
+    const double value = std::strtod(text, &end);
+    if (end == text) return product;
+    product *= value;
+  }
 }
 
 /// Elements whose numbers must be finite: by the array's name, "body_mass" is the mass of a body.
@@ -338,6 +363,11 @@ void CheckNumbers(MjcfFile* mjcf) {
       }
       const bool is_integer =
           IsAmong(kIntegers, name) || (kind == "texture" && (name == "width" || name == "height"));
+      constexpr double kMostParts = 1e5;
+      const double most = kind == "composite" && name == "count" ? kMostParts : MostOf(name);
+      if (std::isfinite(most) && Multiply(value.c_str()) > most)
+        throw InputError(mjcf->FindPlace(*element) + ": " + word + ": must be at most " + FormatNumber(most) +
+                         ", got " + Quote(value));
       if (!is_integer && !(has_lists && IsAmong(kLists, name))) continue;
       if (IsNumbers(value.c_str(), is_integer)) continue;
       throw InputError(mjcf->FindPlace(*element) + ": " + word + ": must be " +
