@@ -72,11 +72,11 @@ std::optional<Stand> StandOrHold(const mjModel& engine, const std::map<std::stri
                                  const std::string& held, InitSources* sources) {
   const std::string source = sources->mjcf->source();
   const auto copy = [&] {
-    return std::make_unique<MjcfFile>(sources->mjcf->PrintFor(fs::current_path()), source);
+    return std::make_unique<MjcfFile>(sources->mjcf->PrintFor(CurrentFolder()), source);
   };
   const auto describe = [&](const MjcfFile& mjcf) {
     // Its files are found from the source's folder, and of this copy from the working directory.
-    return DescriptionFile(source, mjcf.PrintFor(fs::absolute(source).parent_path()), {}).Describe();
+    return DescriptionFile(source, mjcf.PrintFor(MakeAbsolute(source).parent_path()), {}).Describe();
   };
   Stand stand;
   std::unique_ptr<MjcfFile> mjcf;

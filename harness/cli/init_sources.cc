@@ -31,7 +31,7 @@ void TakeAssets(const fs::path& folder, MjcfFile* mjcf) {
     if (asset.element->Attribute("name") == nullptr)
       asset.element->SetAttribute("name", asset.path.stem().c_str());
     const std::string to = fmt::format("assets/{}-{}", ++count, asset.path.filename().string());
-    WriteFile(folder / to, ReadBytes(mjcf->folder() / asset.path));
+    WriteFile(folder / to, ReadBytes(mjcf->folder() / asset.path, kMostData));
     asset.element->SetAttribute(asset.attribute, to.c_str());
   }
   for (XMLElement* compiler : ListChildren(mjcf->root(), "compiler")) {
@@ -45,9 +45,7 @@ void LeaveOutBaseContacts(MjcfFile* mjcf) {
     Warn(mjcf->source() + ": contacts of neighbours at a joint left out: " + JoinNames(pairs));
 }
 
-MjModelPtr Load(const MjcfFile& mjcf) {
-  return LoadMjcfText(mjcf.PrintFor(fs::current_path()), mjcf.source());
-}
+MjModelPtr Load(const MjcfFile& mjcf) { return LoadMjcfText(mjcf.PrintFor(CurrentFolder()), mjcf.source()); }
 
 void StateFriction(const std::vector<Joint>& joints, MjcfFile* mjcf) {
   VisitElements(mjcf->root(), [&](XMLElement* element) {

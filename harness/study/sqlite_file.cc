@@ -75,9 +75,9 @@ void RequirePlainFile(const std::string& name) {
 
 SqliteFile::SqliteFile(const std::string& name, int flags) try : SQLite
   ::Database(RequirePlain(name), flags) {
-  sqlite3_busy_handler(getHandle(), WaitForOthers, this);
-  NoteInput(name);
-}
+    sqlite3_busy_handler(getHandle(), WaitForOthers, this);
+    NoteInput(name);
+  }
 catch (const SQLite::Exception& error) {
   throw InputError(name + ": " + Explain(error));
 }
