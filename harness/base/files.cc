@@ -117,6 +117,7 @@ struct FilesInUse {
   std::mutex mutex;
   std::vector<NamedFile> inputs;
   std::vector<NamedFile> targets;
+  std::vector<NamedFile> written;  // by this process, which may write them again
 };
 
 FilesInUse& AllFilesInUse() {
@@ -151,6 +152,7 @@ void NoteInput(const std::filesystem::path& path) {
   if (!file) return;
   FilesInUse& files = AllFilesInUse();
   const std::scoped_lock lock(files.mutex);
+  if (Find(files.written, *file) != nullptr) return;
   if (const NamedFile* const target = Find(files.targets, *file)) RefuseOutput(target->name, path);
   if (Find(files.inputs, *file) == nullptr) files.inputs.push_back(*file);
 }
@@ -301,6 +303,11 @@ void PartialFile::Write(std::string_view bytes) const {
 void PartialFile::Commit() {
   RefuseInput();
   if (std::rename(partial_.c_str(), target_.c_str()) != 0) Fail(std::strerror(errno));
+  if (const std::optional<NamedFile> own = Identify(target_)) {
+    FilesInUse& files = AllFilesInUse();
+    const std::scoped_lock lock(files.mutex);
+    files.written.push_back(*own);
+  }
   Release();
 }
 
