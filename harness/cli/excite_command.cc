@@ -118,7 +118,8 @@ int DesignMotionOfModel(MotionRequest request) {
   const MotionLimits limits = ReadMotionLimits(description, request.limits);
   std::vector<Recording> recordings;
   for (const std::filesystem::path& path : request.recorded)
-    recordings.push_back(OpenRecordingOf(model, path, request.columns));
+    recordings.push_back(
+        OpenRecordingOf(model, path, request.columns, /*is_complete=*/true, ListLinkFrames(description)));
   if (request.mjcf.empty() && description.format == RobotFormat::kMjcf) request.mjcf = request.model;
   std::optional<SelfContact> contact;
   if (!request.mjcf.empty()) {

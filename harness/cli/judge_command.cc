@@ -1,5 +1,7 @@
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cctype>
 #include <chrono>
 #include <cmath>
 #include <memory>
@@ -14,6 +16,7 @@
 #include "harness/cli/terminal.h"
 #include "harness/descriptions/read_description.h"
 #include "harness/recordings/compare_recordings.h"
+#include "harness/recordings/judgement_verdict.h"
 #include "harness/recordings/write_corrections.h"
 #include "harness/report/judge_page.h"
 
@@ -31,6 +34,13 @@ struct JudgeRequest {
 };
 
 std::string Number(double value) { return fmt::format("{:.3g}", value); }
+
+JudgementVerdict FindVerdict(const RobotModel& model, const RecordingJudgement& judgement,
+                             const std::vector<Recording>& recordings) {
+  const bool is_one = recordings.size() == 1;
+  return MakeVerdict(judgement, model,
+                     is_one ? recordings.front().name : std::to_string(recordings.size()) + " recordings");
+}
 
 void PrintBalances(const RobotModel& model, const RecordingJudgement& judgement,
                    const std::vector<Recording>& recordings) {
@@ -87,32 +97,20 @@ void Print(const JudgeRequest& request, const RobotModel& model, const Recording
                       2));
     fmt::print("\n");
   }
-  const std::string& name =
-      recordings.size() == 1 ? recordings.front().name : std::to_string(recordings.size()) + " recordings";
-  if (judgement.Agrees()) {
-    fmt::print("{}: {} explains {}: what is left is noise.\n", Paint(Tone::kGood, "EXPLAINED"), model.name(),
-               name);
-  } else if (judgement.CountExplaining() == 0) {
-    fmt::print("{}: {} does not explain {}, and no cause that is known does.\n",
-               Paint(Tone::kBad, "NOT EXPLAINED"), model.name(), name);
-  } else {
-    const size_t count = judgement.CountExplaining();
-    fmt::print("{}: {} does not explain {}; {} cause{}{}.\n", Paint(Tone::kBad, "DIFFERS"), model.name(),
-               name, count, count == 1 ? " does" : "s do",
-               judgement.IsWhole()
-                   ? ""
-                   : fmt::format(" by {:.3g} %, and more than noise is left", 100.0 * judgement.explained));
-  }
+  const JudgementVerdict verdict = FindVerdict(model, judgement, recordings);
+  std::string word = verdict.word;
+  std::ranges::transform(word, word.begin(), [](unsigned char c) { return std::toupper(c); });
+  fmt::print("{}: {}\n", Paint(judgement.Agrees() ? Tone::kGood : Tone::kBad, word), verdict.sentence);
 }
 
 Json ToJson(const HeldPrediction& one) { return {{"numbers", one.numbers}, {"left", one.held_left}}; }
 
 std::string ToText(const RobotModel& model, const RecordingJudgement& judgement,
                    const std::vector<Recording>& recordings) {
+  const JudgementVerdict verdict = FindVerdict(model, judgement, recordings);
   Json json = {{"model", model.spec().source},
-               {"verdict", judgement.Agrees()                 ? "explained"
-                           : judgement.CountExplaining() == 0 ? "not explained"
-                                                              : "differs"},
+               {"verdict", verdict.word},
+               {"verdict_text", verdict.sentence},
                {"rows", judgement.rows},
                {"explained", judgement.explained},
                {"left", judgement.left},
@@ -133,8 +131,17 @@ std::string ToText(const RobotModel& model, const RecordingJudgement& judgement,
                               {"held_left", one.held_left}});
     if (one.drive_gain != 0.0) json["joints"].back()["drive_gain"] = one.drive_gain;
   }
+  json["not_judged"] = Json::array();
+  for (const UnjudgedJoint& one : judgement.unjudged)
+    json["not_judged"].push_back(
+        {{"joint", model.joint(one.joint).name}, {"moves", one.moves}, {"reason", one.reason}});
   json["causes"] = Json::array();
   for (const Explanation& one : judgement.causes) json["causes"].push_back(dexcheck::ToJson(one));
+  // A recording's own causes come first.
+  for (size_t i = 0; i < judgement.found.size(); ++i)
+    for (const Fault& part : judgement.found[i].parts)
+      json["causes"][json["causes"].size() - judgement.found.size() + i]["parts"].push_back(
+          dexcheck::ToJson(part));
   json["notes"] = judgement.notes;
   return json.dump(2) + "\n";
 }
@@ -169,14 +176,15 @@ int Run(JudgeRequest request) {
   if (!request.model.empty()) description = ReadDescription(request.model, request.urdf);
   const RobotModel model =
       !description ? MakeUnknownRobot(kManyJoints) : RobotModel(AddSpheres(*description));
+  const LinkFrames frames = description ? ListLinkFrames(*description) : LinkFrames();
   std::vector<std::filesystem::path> paths = {request.recording};
   paths.insert(paths.end(), request.more.begin(), request.more.end());
   std::vector<Recording> recordings;
   recordings.reserve(paths.size());
   for (const std::filesystem::path& path : paths)
-    recordings.push_back(OpenRecordingOf(model, path, request.columns, !request.describe));
+    recordings.push_back(OpenRecordingOf(model, path, request.columns, !request.describe, frames));
   if (request.describe) {
-    for (const Recording& one : recordings) fmt::print("{}", DescribeColumns(model, one));
+    for (const Recording& one : recordings) fmt::print("{}", DescribeColumns(model, one, frames));
     return kSuccess;
   }
   CatchInterrupts();
@@ -187,6 +195,7 @@ int Run(JudgeRequest request) {
   ResultFile page(request.page_file);
   ProgressBar bar("rows", 0, request.quiet);
   JudgeOptions options;
+  options.frames = frames;
   const bool is_live = request.recording == "-";
   if (is_live) {
     // What comes in as it is recorded is told as it comes.
@@ -274,14 +283,17 @@ void Print(const RobotModel& model, const RecordingPair& pair, const RecordingCo
 }  // namespace
 
 int CompareTwoRecordings(const RecordingPair& pair) {
-  const RobotModel model(AddSpheres(ReadDescription(pair.model)));
+  const RobotDescription description = ReadDescription(pair.model);
+  const RobotModel model(AddSpheres(description));
+  JudgeOptions options;
+  options.frames = ListLinkFrames(description);
   std::vector<Recording> recordings;
   for (const std::filesystem::path& path : {pair.first, pair.second})
-    recordings.push_back(OpenRecordingOf(model, path, pair.columns));
+    recordings.push_back(OpenRecordingOf(model, path, pair.columns, /*is_complete=*/true, options.frames));
   CatchInterrupts();
   ResultFile json(pair.json_file);
   ProgressBar bar("rows", 0, pair.quiet);
-  const RecordingComparison comparison = CompareRecordings(model, &recordings, {}, [&](long rows) {
+  const RecordingComparison comparison = CompareRecordings(model, &recordings, options, [&](long rows) {
     bar.Update(rows);
     return !IsInterrupted();
   });

@@ -28,6 +28,7 @@ const char* NameOf(CauseOutcome outcome) {
 
 std::string Fault::Tell() const {
   if (fault == kUnknownFault) return place;
+  if (std::isnan(value)) return place + ": " + fault + (detail.empty() ? "" : " " + detail);
   return place + ": " + fault + " " + FormatNumber(value, 6) +
          (error > 0.0 && std::isfinite(error) ? " +- " + FormatNumber(error, 2) : "") + Unit(unit) +
          (std::isinf(error) && detail.empty() ? ", a size that this motion does not show" : "") +

@@ -42,8 +42,14 @@ std::string ReadBeginning(const fs::path& path) {
 
 }  // namespace
 
+bool IsReadOnce(const fs::path& path) {
+  std::error_code error;
+  const fs::file_status status = fs::status(path, error);
+  return path == "-" || fs::is_fifo(status) || fs::is_socket(status) || fs::is_character_file(status);
+}
+
 std::unique_ptr<RecordingReader> OpenRecording(const fs::path& path, const std::string& topic, size_t width) {
-  if (path == "-") return OpenTextRecording(path, width);
+  if (IsReadOnce(path)) return OpenTextRecording(path, width);
   if (IsFolder(path)) return OpenRecording(FindBagFile(path), topic, width);
   NoteInput(path);
   const std::string begin = ReadBeginning(path);

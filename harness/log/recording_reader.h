@@ -45,6 +45,9 @@ class RecordingReader {
 std::unique_ptr<RecordingReader> OpenRecording(const std::filesystem::path& path,
                                                const std::string& topic = "", size_t width = 0);
 
+/// Whether its bytes come only once: standard input ("-"), a pipe. It is read as text.
+bool IsReadOnce(const std::filesystem::path& path);
+
 /// Rows that are in memory.
 class TableReader : public RecordingReader {
  public:

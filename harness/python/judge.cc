@@ -4,6 +4,8 @@
 #include <pybind11/eigen.h>
 #include <pybind11/stl.h>
 
+#include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <memory>
 #include <optional>
@@ -13,7 +15,7 @@
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
-#include "harness/recordings/judge_recordings.h"
+#include "harness/recordings/judgement_verdict.h"
 
 namespace py = pybind11;
 
@@ -25,7 +27,7 @@ using Columns = std::optional<RowMatrixXd>;
 /// A judgement with the names of its joints, as Python sees it.
 struct JudgementResult {
   RecordingJudgement judgement;
-  std::string model;
+  JudgementVerdict verdict;
   std::vector<std::string> names;  // of all joints
 
   /// {"elbow": {"torque": ..., "residual": ..., "left": ..., "noise": ..., ...}, ...}
@@ -47,12 +49,9 @@ struct JudgementResult {
   }
 
   [[nodiscard]] std::string Print() const {
-    if (judgement.Agrees()) return "EXPLAINED: " + model + " explains the recording: what is left is noise";
-    if (judgement.causes.empty())
-      return "NOT EXPLAINED: no cause that is known explains what " + model + " does not";
-    std::string text =
-        fmt::format("DIFFERS: {} does not explain the recording; {:.4g} % of the rest is explained by", model,
-                    100.0 * judgement.explained);
+    std::string text = verdict.word;
+    std::ranges::transform(text, text.begin(), [](unsigned char c) { return std::toupper(c); });
+    text += ": " + verdict.sentence;
     for (const Explanation& one : judgement.causes) text += "\n  " + one.Tell();
     return text;
   }
@@ -87,12 +86,14 @@ class ArrayRecording {
       AddColumn(quantity, joints_[static_cast<size_t>(i)], values->col(i));
   }
 
-  Recording Make() {
+  /// @param arrays are kept, to be read again.
+  static Recording Make(const std::shared_ptr<const ArrayRecording>& arrays) {
     Recording recording;
     recording.name = "the recording";
-    recording.channels = std::move(channels_);
+    recording.channels = arrays->channels_;
     recording.reader =
-        std::make_unique<TableReader>(recording.name, "arrays", std::move(names_), std::move(columns_));
+        std::make_unique<TableReader>(recording.name, "arrays", arrays->names_, arrays->columns_);
+    recording.reopen = [arrays] { return Make(arrays); };
     return recording;
   }
 
@@ -150,6 +151,10 @@ void AddJudge(py::module_* module, const ModelFinder& with_model) {
       .def_property_readonly("explained", [](const JudgementResult& r) { return r.judgement.Agrees(); })
       .def("__bool__", [](const JudgementResult& r) { return r.judgement.Agrees(); })
       .def_property_readonly(
+          "verdict", [](const JudgementResult& r) { return r.verdict.word; },
+          "\"explained\", \"partly explained\" (not all joints that move are judged), \"not explained\" or "
+          "\"differs\".")
+      .def_property_readonly(
           "causes", [](const JudgementResult& r) { return r.judgement.causes; },
           "The one that explains most first.")
       .def_property_readonly("joints", &JudgementResult::Joints,
@@ -168,8 +173,9 @@ void AddJudge(py::module_* module, const ModelFinder& with_model) {
                    const Columns& tau, const Columns& qdd,
                    const std::optional<std::vector<std::string>>& joints, const Columns& current) {
         JudgementResult result;
-        with_model(model, [&](const RobotModel& robot) {
-          ArrayRecording arrays(robot, joints, t);
+        with_model(model, [&](const RobotModel& robot, const RobotDescription& description) {
+          const auto kept = std::make_shared<ArrayRecording>(robot, joints, t);
+          ArrayRecording& arrays = *kept;
           arrays.Add(RecordedQuantity::kPosition, q);
           arrays.Add(RecordedQuantity::kVelocity, qd);
           arrays.Add(RecordedQuantity::kAcceleration, qdd);
@@ -177,11 +183,13 @@ void AddJudge(py::module_* module, const ModelFinder& with_model) {
           arrays.Add(RecordedQuantity::kCurrent, current);
           if (!tau == !current) throw InputError("judge: must have one of tau and current");
           std::vector<Recording> recordings;
-          recordings.push_back(arrays.Make());
-          result.model = robot.name();
+          recordings.push_back(ArrayRecording::Make(kept));
           for (const Joint& joint : robot.joints()) result.names.push_back(joint.name);
           const py::gil_scoped_release release;
-          result.judgement = JudgeRecordings(robot, &recordings, {});
+          JudgeOptions options;
+          options.frames = ListLinkFrames(description);
+          result.judgement = JudgeRecordings(robot, &recordings, options);
+          result.verdict = MakeVerdict(result.judgement, robot, "the recording");
         });
         return result;
       },

@@ -304,9 +304,13 @@ PYBIND11_MODULE(_dexcheck, m) {
                            log.signals().size(), log.rows());
       });
 
-  AddJudge(&m, [](const py::object& model, const std::function<void(const RobotModel&)>& use) {
-    if (py::isinstance<Robot>(model)) return use(model.cast<const Robot&>().model());
-    use(RobotModel(AddSpheres(ReadDescription(model.cast<std::filesystem::path>()))));
+  AddJudge(&m, [](const py::object& model, const auto& use) {
+    if (py::isinstance<Robot>(model)) {
+      const auto& robot = model.cast<const Robot&>();
+      return use(robot.model(), robot.description());
+    }
+    const RobotDescription description = ReadDescription(model.cast<std::filesystem::path>());
+    use(RobotModel(AddSpheres(description)), description);
   });
 }
 

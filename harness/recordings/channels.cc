@@ -75,6 +75,20 @@ bool Recording::Has(RecordedQuantity quantity) const {
                      [&](const Channel& one) { return one.quantity == quantity; });
 }
 
+std::string LinkFrames::NameOf(const std::string& link) const {
+  return link + "'s " + kind + (file.empty() ? "" : " of " + file);
+}
+
+LinkFrames ListLinkFrames(const RobotDescription& robot) {
+  LinkFrames frames;
+  for (const DescribedJoint& joint : robot.joints) frames.X_iL.push_back(joint.X_iL);
+  frames.kind = robot.format == RobotFormat::kUrdf   ? "link frame"
+                : robot.format == RobotFormat::kMjcf ? "body frame"
+                                                     : "row frame";
+  frames.file = fs::path(robot.spec.source).filename().string();
+  return frames;
+}
+
 RobotModel MakeUnknownRobot(int joints) {
   RobotSpec spec;
   spec.name = spec.source = "unknown";
@@ -91,11 +105,11 @@ RobotModel MakeUnknownRobot(int joints) {
 }
 
 Recording OpenRecordingOf(const RobotModel& model, const fs::path& path, const fs::path& columns,
-                          bool is_complete) {
+                          bool is_complete, const LinkFrames& frames) {
   Recording recording;
   const bool names_files = path.extension() == ".toml";
   if (names_files || !columns.empty()) {
-    recording = OpenByColumns(model, names_files ? path : columns, names_files ? fs::path() : path);
+    recording = OpenByColumns(model, frames, names_files ? path : columns, names_files ? fs::path() : path);
   } else {
     recording.name = path == "-" ? "standard input" : path.filename().string();
     recording.reader = OpenRecording(path);
@@ -104,12 +118,12 @@ Recording OpenRecordingOf(const RobotModel& model, const fs::path& path, const f
   }
   if (is_complete)
     Require(model, recording, names_files ? path.string() : path == "-" ? "standard input" : path.string());
-  if (path != "-")
-    recording.reopen = [=, &model] { return OpenRecordingOf(model, path, columns, is_complete); };
+  if (!IsReadOnce(path))
+    recording.reopen = [=, &model] { return OpenRecordingOf(model, path, columns, is_complete, frames); };
   return recording;
 }
 
-std::string DescribeColumns(const RobotModel& model, const Recording& recording) {
+std::string DescribeColumns(const RobotModel& model, const Recording& recording, const LinkFrames& frames) {
   const std::vector<std::string>& names = recording.reader->names();
   std::string text = fmt::format("# {}: {} columns", recording.reader->format(), names.size());
   if (!recording.reader->has_names()) text += ", without a header";
@@ -140,9 +154,10 @@ std::string DescribeColumns(const RobotModel& model, const Recording& recording)
     if (!joints.empty()) text += fmt::format("joints = [{}]\n", joints);
     if (quantity == RecordedQuantity::kWrench) {
       const WrenchPlace& place = recording.wrenches[static_cast<size_t>(first / 6)];
+      const Vector3d point = frames.Find(place.link).inverse() * place.point;
       text += fmt::format("link = {}\npoint = [{}, {}, {}]\naxes = \"{}\"\n",
-                          QuoteToml(model.link_name(place.link)), place.point[0], place.point[1],
-                          place.point[2], place.is_world ? "world" : "link");
+                          QuoteToml(model.link_name(place.link)), point[0], point[1], point[2],
+                          place.is_world ? "world" : "link");
       if (place.below > 0.0) text += fmt::format("below = {}\n", place.below);
     }
     for (const Unit& unit : ListUnits())

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "controller/model/robot_model.h"
+#include "harness/descriptions/robot_description.h"
 #include "harness/log/recording_reader.h"
 
 namespace dexcheck {
@@ -32,21 +33,37 @@ struct Channel {
   size_t column = 0;
   double scale = 1.0;
   double offset = 0.0;
+  bool states_unit = false;  ///< Whether its name or the file of columns has a unit.
 };
+
+/// The frames in which a file gives its links' bodies.
+struct LinkFrames {
+  std::vector<Pose> X_iL;        ///< By link, in frame i; empty where they are the frames i.
+  std::string kind = "frame i";  ///< "link frame", "body frame" or "row frame".
+  std::string file;              ///< Its name.
+
+  [[nodiscard]] Pose Find(int link) const {
+    return X_iL.empty() ? Pose::Identity() : X_iL[static_cast<size_t>(link)];
+  }
+  /// "wrist's link frame of arm.urdf".
+  [[nodiscard]] std::string NameOf(const std::string& link) const;
+};
+LinkFrames ListLinkFrames(const RobotDescription& robot);
 
 /// A body that is declared to be attached in one recording.
 struct DeclaredPayload {
   int link = -1;
   double mass = 0.0;                ///< kg
-  Vector3d com = Vector3d::Zero();  ///< In the link's frame, m.
+  Vector3d com = Vector3d::Zero();  ///< In frame i, m.
 };
 
 /// Where a measured wrench acts on the robot.
 struct WrenchPlace {
   int link = -1;
-  Vector3d point = Vector3d::Zero();  ///< In the link's frame, m: what the moment is about.
-  bool is_world = false;              ///< In world axes; otherwise in the link's.
+  Vector3d point = Vector3d::Zero();  ///< In frame i, m: what the moment is about.
+  bool is_world = false;              ///< In world axes; otherwise in the link's own.
   double below = 0.0;  ///< How far the force acts below the point, m: where a sphere touches the ground.
+  Matrix3d R_iL = Matrix3d::Identity();  ///< Axes of the link's own frame in frame i.
 };
 
 /// A recording that is open, and what its columns are.
@@ -69,13 +86,16 @@ struct Recording {
 /// @throws InputError, one line, for columns that cannot be told, that are missing, or that two quantities
 /// share.
 /// @param is_complete whether time, positions and torques or currents must be there.
+/// @param frames in which a file of columns gives payloads and wrenches.
 Recording OpenRecordingOf(const RobotModel& model, const std::filesystem::path& path,
-                          const std::filesystem::path& columns, bool is_complete = true);
+                          const std::filesystem::path& columns, bool is_complete = true,
+                          const LinkFrames& frames = {});
 
 /// A robot of which nothing is known but that it has joints: to see what a recording has.
 RobotModel MakeUnknownRobot(int joints);
 
 /// A file of columns that says what was found, to start from; where nothing was found, all that it may say.
-std::string DescribeColumns(const RobotModel& model, const Recording& recording);
+std::string DescribeColumns(const RobotModel& model, const Recording& recording,
+                            const LinkFrames& frames = {});
 
 }  // namespace dexcheck

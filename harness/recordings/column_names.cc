@@ -31,6 +31,7 @@ constexpr Unit kUnits[] = {
     {"ns", RecordedQuantity::kTime, 1e-9},
     {"rad", RecordedQuantity::kPosition, 1.0},
     {"deg", RecordedQuantity::kPosition, kPi / 180.0},
+    {"\xc2\xb0", RecordedQuantity::kPosition, kPi / 180.0},  // a degree sign
     {"m", RecordedQuantity::kPosition, 1.0},
     {"mm", RecordedQuantity::kPosition, 1e-3},
     {"turn", RecordedQuantity::kPosition, 2.0 * kPi},
@@ -43,9 +44,6 @@ constexpr Unit kUnits[] = {
 
 bool IsLetter(char c) { return std::isalpha(static_cast<unsigned char>(c)) != 0; }
 bool IsDigit(char c) { return std::isdigit(static_cast<unsigned char>(c)) != 0; }
-
-/// "q.x" of "q.x [m]".
-std::string WithoutUnit(const std::string& name) { return name.substr(0, name.find(" [")); }
 
 /// Words and numbers of a name.
 std::vector<std::string> SplitWords(const std::string& name) {
@@ -83,13 +81,50 @@ struct NamedColumn {
   int joint = -1;
   int number = -1;  // instead of a joint's name
   double scale = 1.0;
+  bool states_unit = false;
   bool is_commanded = false;
 };
+
+/// The unit that a header has in brackets behind a name, "tau_1 [N m]", "q1 (deg)", "ratio [1]", which is
+/// taken off; a number right behind a word is an index: "q[0]". None where there are no brackets.
+std::optional<std::string> TakeUnit(std::string* name) {
+  const size_t end = name->find_last_not_of(' ');
+  if (end == std::string::npos || ((*name)[end] != ']' && (*name)[end] != ')')) return std::nullopt;
+  const size_t begin = name->rfind((*name)[end] == ']' ? '[' : '(', end);
+  if (begin == std::string::npos || begin == 0) return std::nullopt;
+  std::string unit = name->substr(begin + 1, end - begin - 1);
+  const bool is_index = !unit.empty() && std::ranges::all_of(unit, IsDigit) && (*name)[begin - 1] != ' ';
+  if (is_index) return std::nullopt;
+  name->resize(begin);
+  return unit;
+}
+
+/// A unit in brackets gives the scale, or says that the column is of another quantity, or of none.
+void ApplyUnit(const std::string& written, NamedColumn* column) {
+  if (!column->quantity) return;
+  const Unit* unit = FindUnit(written, *column->quantity);
+  // Currents are often called efforts.
+  const bool is_current = unit == nullptr && *column->quantity == RecordedQuantity::kTorque &&
+                          FindUnit(written, RecordedQuantity::kCurrent) != nullptr;
+  if (is_current) {
+    column->quantity = RecordedQuantity::kCurrent;
+    unit = FindUnit(written, RecordedQuantity::kCurrent);
+  }
+  const auto is_unit_of = [&](RecordedQuantity other) { return FindUnit(written, other) != nullptr; };
+  if (unit != nullptr) {
+    column->scale = unit->scale;
+    column->states_unit = true;
+  } else if (std::ranges::any_of(kQuantities, is_unit_of) || Has(" 1 - % ", written)) {
+    column->quantity.reset();
+  }
+}
 
 NamedColumn ReadName(const RobotModel& model, const std::string& written) {
   NamedColumn column;
   std::string name = ToLower(written);
-  const bool is_time = Has(kWords[0].second, WithoutUnit(name));  // whatever joints are called
+  const std::optional<std::string> unit = TakeUnit(&name);
+  const bool is_time =
+      Has(kWords[0].second, name.substr(0, name.find_last_not_of(' ') + 1));  // whatever joints are called
   size_t longest = 0, at = 0;
   for (int joint = 0; joint < model.num_joints(); ++joint) {
     const std::string own = ToLower(model.joint(joint).name);
@@ -109,13 +144,20 @@ NamedColumn ReadName(const RobotModel& model, const std::string& written) {
       column.is_commanded = true;
     } else if (is_unit) {
       column.scale = FindUnit(word, *column.quantity)->scale;
+      column.states_unit = true;
     } else if (quantity != std::end(kWords) && !(word == "t" && words.size() > 2)) {
       column.quantity = quantity->first;
     } else if (IsDigit(word[0]) && word.size() < 4) {
       column.number = std::stoi(word);
     }
   }
+  if (unit) ApplyUnit(*unit, &column);
   return column;
+}
+
+std::string WithoutUnit(std::string name) {
+  TakeUnit(&name);
+  return name.substr(0, name.find_last_not_of(' ') + 1);
 }
 
 /// Of a base's pose, by the last word and those before it; -1 for none. A run's log calls it "q.qw".
@@ -139,6 +181,7 @@ std::span<const Unit> ListUnits() { return kUnits; }
 const Unit* FindUnit(std::string name, RecordedQuantity quantity) {
   name = ToLower(std::move(name));
   std::erase_if(name, [](char c) { return c == ' ' || c == '*' || c == '.'; });
+  if (const size_t dot = name.find("\xc2\xb7"); dot != std::string::npos) name.erase(dot, 2);
   // "rad/s", "deg/s^2"
   if (const size_t slash = name.find('/'); slash != std::string::npos) name.resize(slash);
   if (quantity == RecordedQuantity::kVelocity || quantity == RecordedQuantity::kAcceleration)
@@ -173,7 +216,7 @@ std::vector<Channel> GuessChannels(const RobotModel& model, const std::vector<st
       if (joint < 0 || joint >= model.num_joints()) continue;
     }
     if (seen.emplace(*column.quantity, joint).second)
-      channels.push_back({*column.quantity, joint, i, column.scale});
+      channels.push_back({*column.quantity, joint, i, column.scale, 0.0, column.states_unit});
   }
   // A pose has all of its numbers.
   std::vector<Channel> pose;

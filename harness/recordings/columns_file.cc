@@ -50,8 +50,8 @@ class JoinedRecording : public RecordingReader {
 /// Reads a file of columns.
 class ColumnsFile {
  public:
-  ColumnsFile(const RobotModel& model, const fs::path& path)
-      : model_(model), path_(path), document_(ReadBytes(path.string()), path.string()) {}
+  ColumnsFile(const RobotModel& model, const LinkFrames& frames, const fs::path& path)
+      : model_(model), frames_(frames), path_(path), document_(ReadBytes(path.string()), path.string()) {}
 
   /// @param recording its file, unless this one names it.
   Recording Open(const fs::path& recording) {
@@ -131,7 +131,8 @@ class ColumnsFile {
     if (const auto unit = table.Find("unit")) {
       const Unit* found = FindUnit(unit->AsText(), quantity);
       if (found == nullptr) unit->Fail("must be a unit of " + std::string(NameOf(quantity)));
-      for (size_t i = begin; i < channels->size(); ++i) (*channels)[i].scale = found->scale;
+      for (size_t i = begin; i < channels->size(); ++i)
+        (*channels)[i].scale = found->scale, (*channels)[i].states_unit = true;
     }
     scale("ratio", [](double x, Channel* channel) { channel->scale *= x; });
     scale("sign", [](double x, Channel* channel) { channel->scale *= x; });
@@ -218,6 +219,8 @@ class ColumnsFile {
     WrenchPlace place;
     place.link = FindLink(table->Get("link"));
     if (const auto point = table->Find("point")) place.point = point->AsVector<3>();
+    place.point = frames_.Find(place.link) * place.point;
+    place.R_iL = frames_.Find(place.link).linear();
     if (const auto below = table->Find("below")) place.below = below->AsPositive();
     if (const auto axes = table->Find("axes")) {
       place.is_world = axes->AsText() == "world";
@@ -231,11 +234,13 @@ class ColumnsFile {
     payload.link = FindLink(table.Get("link"));
     payload.mass = table.Get("mass").AsPositive();
     if (const auto com = table.Find("com")) payload.com = com->AsVector<3>();
+    payload.com = frames_.Find(payload.link) * payload.com;
     table.RejectUnused();
     return payload;
   }
 
   const RobotModel& model_;
+  const LinkFrames& frames_;
   fs::path path_;
   TomlDocument document_;
   std::string topic_;
@@ -245,8 +250,9 @@ class ColumnsFile {
 
 }  // namespace
 
-Recording OpenByColumns(const RobotModel& model, const fs::path& columns, const fs::path& recording) {
-  return ColumnsFile(model, columns).Open(recording);
+Recording OpenByColumns(const RobotModel& model, const LinkFrames& frames, const fs::path& columns,
+                        const fs::path& recording) {
+  return ColumnsFile(model, frames, columns).Open(recording);
 }
 
 }  // namespace dexcheck

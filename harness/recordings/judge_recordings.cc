@@ -5,12 +5,13 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
+#include <optional>
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
 #include "harness/recordings/base_motion.h"
 #include "harness/recordings/position_faults.h"
-#include "harness/recordings/torque_estimator.h"
 
 namespace dexcheck {
 namespace {
@@ -36,13 +37,15 @@ class Judge {
  public:
   Judge(const RobotModel& model, std::vector<Recording>* recordings, const JudgeOptions& options,
         const std::function<bool(long)>& on_rows)
-      : model_(model),
-        recordings_(*recordings),
-        set_(model, recordings, options, on_rows),
-        estimator_(&set_, options.most_causes) {}
+      : set_(model, recordings, options, on_rows),
+        estimator_(&set_, options.most_causes),
+        description_(set_, estimator_, options.frames, names_) {
+    for (const Recording& one : *recordings) names_.push_back(one.name);
+  }
 
   RecordingJudgement Run() {
     result_.joints = set_.joints();
+    result_.unjudged = set_.ListUnjudged();
     result_.rows = set_.rows();
     result_.notes = set_.notes();
     for (const Fault& fault : set_.faults()) result_.causes.push_back(MakeCause(fault));
@@ -78,6 +81,7 @@ class Judge {
     for (size_t i = 0; i < estimator_.rows().parts.size(); ++i) {
       const TorqueRows::Part& part = estimator_.rows().parts[i];
       const TorqueRows::Part& other = held.parts[i];
+      if (!(part.samples > 0.0)) continue;
       const double noise = set_[part.recording].weight[static_cast<Index>(part.place)];
       const auto rms = [&](const VectorXd& rows, const TorqueRows::Part& of) {
         return noise * rows.segment(of.begin, of.size).norm() / std::sqrt(std::max(1.0, of.samples));
@@ -114,13 +118,15 @@ class Judge {
     next.gravity = set_.refinements().gravity;
     const size_t own = result_.causes.size() - result_.found.size();
     for (size_t i = 0; i < result_.found.size(); ++i) {
-      const auto& [fault, amplitude, error, is_named] = result_.found[i];
+      const TorqueFault& fault = result_.found[i].fault;
+      const VectorXd& amplitude = result_.found[i].amplitude;
       if (result_.causes[own + i].fraction < kMuch) continue;
       if (fault.kind == TorqueFault::kZero && std::abs(amplitude[0]) > kLittle)
         next.offsets[fault.index] = amplitude[0];
       if (fault.kind == TorqueFault::kStribeckFriction)
-        next.stribeck[fault.index] = StribeckVelocityOf(fault, amplitude);
-      if (fault.kind == TorqueFault::kSaturation) next.limits[fault.index] = LimitOf(fault, amplitude);
+        next.stribeck[fault.index] = description_.StribeckVelocityOf(fault, amplitude);
+      if (fault.kind == TorqueFault::kSaturation)
+        next.limits[fault.index] = description_.LimitOf(fault, amplitude);
       if (fault.kind == TorqueFault::kGravity && !result_.IsWhole()) next.gravity = amplitude;
       for (const int joint : fault.kind == TorqueFault::kDelay ? set_.joints() : std::vector<int>())
         if (fault.index < 0 || fault.index == joint)
@@ -128,17 +134,6 @@ class Judge {
     }
     if (!result_.IsWhole() && next.shaking == 0.0) next.shaking = FindShaking(set_, estimator_.rows(), left);
   }
-  [[nodiscard]] double StribeckVelocityOf(const TorqueFault& fault, const VectorXd& a) const {
-    const double v = set_[0].shape_velocities(fault.index, fault.columns.front().front().column.component);
-    return a.size() == 1 ? v : v * std::sqrt(kFineRatio) * std::exp(a[1] / a[0]);
-  }
-
-  [[nodiscard]] double LimitOf(const TorqueFault& fault, const VectorXd& a) const {
-    const int component = fault.columns.front().front().column.component;
-    return FindCutOff(set_.refinements(), fault.index, component, set_[0].most_torque[fault.index]) *
-           (1.0 + a[1] / a[0]);
-  }
-
   /// Root mean square of the measured torque: of y, the model's torque and friction.
   double CalcMeasured(const TorqueRows::Part& part) const {
     const TorqueBalance& balance = *set_[part.recording].fit;
@@ -209,9 +204,14 @@ class Judge {
       one.to = std::min(fault.push.to, blocks.back().to);
       one.ends = true;
     }
-    one.faults.push_back(Describe(fault, term.amplitude, term.error));
+    FoundFault found{fault, term.amplitude, term.error};
+    one.faults.push_back(description_.Describe(fault, term.amplitude, term.error));
+    const bool is_shared = description_.TellWholeNumbers(&found, &one.faults.front());
     for (const auto& [candidate, amplitude] : term.same) {
-      Fault same = Describe(estimator_.faults()[candidate], amplitude, {});
+      const TorqueFault& other = estimator_.faults()[candidate];
+      // Where each joint's gain is sought, the model's bodies are the scale by which it is told.
+      if (is_shared && (other.kind == fault.kind || other.IsOfLoad())) continue;
+      Fault same = description_.Describe(other, amplitude, {});
       if (!same.IsLike(one.faults.front())) one.faults.push_back(std::move(same));
     }
     one.fraction = term.fraction;
@@ -222,9 +222,17 @@ class Judge {
     }
     one.SetOutcome();
     if (IsDoubtful(fault, term)) one.outcome = CauseOutcome::kNotExplained;
+    constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+    if (!found.HasSize()) {
+      one.outcome = CauseOutcome::kNotExplained;
+      one.faults = {{"no cause of a possible size", fault.place, kNone, 0.0, "", ""}};
+      one.rival.clear();
+    } else if (Fault& first = one.faults.front(); std::isinf(first.error)) {
+      first = {fault.fault, fault.place, kNone, 0.0, fault.unit, "of a size that this motion does not tell"};
+    }
+    found.is_named = one.outcome == CauseOutcome::kNamed;
     result_.causes.push_back(std::move(one));
-    result_.found.push_back(
-        {fault, term.amplitude, term.error, result_.causes.back().outcome == CauseOutcome::kNamed});
+    result_.found.push_back(std::move(found));
   }
 
   /// Whether more than noise is left, so that something else is at work, and it explains little, or where far
@@ -239,75 +247,19 @@ class Judge {
            (result_.left > kFar && fault.kind != TorqueFault::kPayload && term.fraction <= kMost * left);
   }
 
-  [[nodiscard]] Fault Describe(const TorqueFault& fault, const VectorXd& a, VectorXd error) const {
-    if (error.size() == 0) error = VectorXd::Zero(a.size());
-    Fault one;
-    one.fault = fault.fault;
-    one.place = fault.place;
-    one.unit = fault.unit;
-    const bool is_number =
-        a.size() == 1 || fault.kind == TorqueFault::kSpring || fault.kind == TorqueFault::kStribeckFriction;
-    one.value = is_number ? fault.nominal + a[0] : a.norm();
-    one.error = is_number ? error[0] : error.norm();
-    const auto vector = [](const VectorXd& v) {
-      std::string text = "(";
-      for (Index i = 0; i < v.size(); ++i) text += (i == 0 ? "" : ", ") + FormatNumber(v[i], 3);
-      return text + ")";
-    };
-    using enum TorqueFault::Kind;
-    if (fault.kind == kPayload) {
-      one.value = a[0];
-      one.error = error[0];
-      one.detail = "at " + vector(a.segment<3>(1) / a[0]) + " m in its frame";
-    } else if (fault.kind == kSaturation) {
-      one.value = LimitOf(fault, a);
-      one.error = error[1] * one.value;
-    } else if (fault.kind == kSpring) {
-      one.detail = "at rest at " + FormatNumber(-a[1] / a[0], 3);
-    } else if (fault.kind == kShaking) {
-      one.value = a.head<6>().norm();
-      one.error = error.head<6>().norm();
-      const auto size = [&](Index i) { return a.segment<2>(2 * i).norm(); };
-      one.detail = fmt::format("at {} Hz, along its axes {}",
-                               FormatNumber(set_.refinements().shaking / (2.0 * kPi), 4),
-                               vector(Vector3d(size(0), size(1), size(2))));
-      if (a.size() > 6) one.detail += ", about them " + vector(Vector3d(size(3), size(4), size(5))) + " rad";
-    } else if (fault.kind == kPush && fault.push.has_moment) {
-      one.value = a.head<3>().norm();
-      one.error = error.head<3>().norm();
-      one.detail = vector(a.head<3>()) + " N and " + vector(a.tail<3>()) + " N m at its centre of mass";
-    } else if (fault.kind == kPush && fault.push.link < 0 && fault.push.joint < 0) {
-      const double turned = 2.0 * std::asin(std::min(1.0, 0.5 * a.norm() / model_.gravity().norm()));
-      one.detail = vector(a) + ", or tilted by " + FormatNumber(RadToDeg(turned), 3) + " deg";
-    } else if (fault.kind == kGravity) {
-      const Vector3d now = model_.gravity() + a.head<3>();
-      const double turned = std::atan2(now.cross(model_.gravity()).norm(), now.dot(model_.gravity()));
-      one.value = now.norm();
-      one.detail = vector(now) + ", turned by " + FormatNumber(RadToDeg(turned), 3) + " deg";
-    } else if (fault.kind == kTorqueGain && std::abs(one.value + 1.0) < 0.2) {
-      one.detail = "(the other sign)";
-    } else if (fault.kind == kStribeckFriction) {
-      one.detail = "below about " + FormatNumber(StribeckVelocityOf(fault, a), 2) + " per s";
-    } else if (!is_number) {
-      one.detail = vector(a);
-    }
-    if (fault.recording >= 0 && recordings_.size() > 1)
-      one.detail += " in " + recordings_[static_cast<size_t>(fault.recording)].name;
-    return one;
-  }
-
-  const RobotModel& model_;
-  const std::vector<Recording>& recordings_;
+  std::vector<std::string> names_;
   RecordingSet set_;
   TorqueEstimator estimator_;
+  CauseDescription description_;
   RecordingJudgement result_;
 };
 
 }  // namespace
 
 bool RecordingJudgement::IsWhole() const {
-  return std::all_of(balances.begin(), balances.end(),
-                     [](const JointJudgement& one) { return one.left <= kMostNoise * one.noise; });
+  return !balances.empty() && std::all_of(balances.begin(), balances.end(), [](const JointJudgement& one) {
+    return one.left <= kMostNoise * one.noise;
+  });
 }
 
 size_t RecordingJudgement::CountExplaining() const {
@@ -316,9 +268,37 @@ size_t RecordingJudgement::CountExplaining() const {
   }));
 }
 
-bool RecordingJudgement::Agrees() const { return causes.empty() && IsWhole(); }
+bool RecordingJudgement::Agrees() const {
+  return causes.empty() && IsWhole() && std::ranges::none_of(unjudged, &UnjudgedJoint::moves);
+}
 
 namespace {
+
+/// Whether other positions, or another order of columns, may say more simply what was found, or what was not.
+bool MayBeOtherwise(const RecordingJudgement& judgement) {
+  constexpr double kWell = 0.95;
+  constexpr long kFewNumbers = 2;
+  if (std::ranges::any_of(judgement.unjudged, &UnjudgedJoint::has_no_gain)) return true;
+  if (judgement.IsWhole()) return judgement.by_causes.numbers > kFewNumbers;
+  return judgement.explained < kWell || judgement.left > kFar || judgement.causes.size() > 3;
+}
+
+/// Whether a judgement with so many faults of positions undone explains more, or the same with fewer numbers.
+bool IsBetter(const RecordingJudgement& one, size_t faults, const RecordingJudgement& other,
+              size_t other_faults) {
+  if (one.unjudged.size() != other.unjudged.size()) return one.unjudged.size() < other.unjudged.size();
+  if (one.IsWhole() != other.IsWhole()) return one.IsWhole();
+  if (one.IsWhole())
+    return one.by_causes.numbers + static_cast<long>(faults) <
+           other.by_causes.numbers + static_cast<long>(other_faults);
+  const auto left = [](const RecordingJudgement& judgement) {
+    double sum = 0.0;
+    for (const JointJudgement& joint : judgement.balances)
+      sum += std::log(std::max(joint.left, std::numeric_limits<double>::min()));
+    return sum;
+  };
+  return left(one) < left(other);
+}
 
 /// Opens all of them again, with a change of their channels; false where that cannot be.
 bool Reopen(std::vector<Recording>* recordings, const std::function<void(Recording*)>& change) {
@@ -339,15 +319,20 @@ RecordingJudgement JudgeRecordings(const RobotModel& model, std::vector<Recordin
   const auto count = [&](long rows) { return goes_on = !on_rows || on_rows(rows); };
   RecordingJudgement judgement = Judge(model, recordings, options, count).Run();
   if (!goes_on) return judgement;
-  constexpr double kWell = 0.95;
   std::vector<PositionFault> faults;
   const auto undo = [&](Recording* one) {
     for (const PositionFault& fault : faults) fault.Undo(one);
   };
   constexpr size_t kMostFaults = 3;
-  while (goes_on && options.tries_positions && faults.size() < kMostFaults && !judgement.IsWhole() &&
-         (judgement.explained < kWell || judgement.left > kFar || judgement.causes.size() > 3)) {
-    if (!recordings->front().reopen) break;
+  RecordingJudgement best = judgement;
+  std::vector<PositionFault> best_faults;
+  while (goes_on && options.tries_positions && faults.size() < kMostFaults && MayBeOtherwise(judgement)) {
+    if (!recordings->front().reopen) {
+      best.notes.push_back(
+          recordings->front().name +
+          ": is read once: other signs, units, offsets and orders of positions are not tried");
+      break;
+    }
     Recording begin = recordings->front().reopen();
     undo(&begin);
     const std::optional<PositionFault> fault = FindPositionFault(model, std::move(begin));
@@ -356,7 +341,10 @@ RecordingJudgement JudgeRecordings(const RobotModel& model, std::vector<Recordin
     faults.push_back(*fault);
     if (!Reopen(recordings, undo)) break;
     judgement = Judge(model, recordings, options, count).Run();
+    if (IsBetter(judgement, faults.size(), best, best_faults.size())) best = judgement, best_faults = faults;
   }
+  judgement = std::move(best);
+  faults = std::move(best_faults);
   constexpr int kReadings = 5;
   JudgeOptions next = options;
   for (int i = 1; i < kReadings && goes_on && judgement.refinements != next.refinements; ++i) {

@@ -6,8 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "harness/diagnosis/causes.h"
-#include "harness/recordings/channels.h"
+#include "harness/recordings/cause_description.h"
 #include "harness/recordings/read_recordings.h"
 #include "harness/recordings/torque_candidates.h"
 
@@ -26,13 +25,6 @@ struct JointJudgement {
   double drive_gain = 0.0;                      ///< N m/A, where currents were recorded; otherwise 0.
 };
 
-/// A cause with its size.
-struct FoundFault {
-  TorqueFault fault;
-  VectorXd amplitude, error;
-  bool is_named = true;  ///< No other cause explains the same.
-};
-
 /// How well a set of numbers predicts the quarter that it was not fitted to.
 struct HeldPrediction {
   long numbers = 0;
@@ -48,7 +40,8 @@ struct TorqueTrace {
 };
 
 struct RecordingJudgement {
-  std::vector<int> joints;  ///< That were judged.
+  std::vector<int> joints;              ///< That were judged.
+  std::vector<UnjudgedJoint> unjudged;  ///< Joints with a position that were not.
   std::vector<JointJudgement> balances;
   Causes causes;
   std::vector<FoundFault> found;  ///< The same.
@@ -66,7 +59,7 @@ struct RecordingJudgement {
   [[nodiscard]] size_t CountExplaining() const;
   /// Beside the causes no more than noise is left.
   [[nodiscard]] bool IsWhole() const;
-  /// What is left is noise, with no cause.
+  /// All joints that move are judged, and what is left is noise, with no cause.
   [[nodiscard]] bool Agrees() const;
 };
 

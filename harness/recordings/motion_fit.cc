@@ -32,6 +32,11 @@ MotionFit::MotionFit(const RobotModel& model, Recording* recording, size_t ahead
   while (rows_ahead_.size() < ahead && Fill()) {
   }
   Analyse();
+  // Logs have zeros where a drive tells no torque.
+  std::erase_if(judged_, [&](int joint) {
+    return moves_[static_cast<size_t>(joint)] && noise_.torque[joint] == 0.0 &&
+           sample_.most_torque[joint] == 0.0;
+  });
 }
 
 int MotionFit::ChannelOf(RecordedQuantity quantity, int joint) const {
@@ -80,6 +85,7 @@ bool MotionFit::Fill() {
     }
     if (recording_->Has(RecordedQuantity::kBase)) CheckBase(&row);
     if (last_.size() > 0) {
+      Unwrap(&row);
       const double passed = row[time] - last_[time];
       if (passed < 0.0)
         throw InputError(fmt::format("{}: time goes back from {:.9g} to {:.9g} s",
@@ -103,6 +109,24 @@ bool MotionFit::Fill() {
     return true;
   }
   return false;
+}
+
+void MotionFit::Unwrap(Row* row) {
+  constexpr double kTurn = 2.0 * kPi, kMostStep = 1.0;  // rad
+  for (size_t i = 0; i < recording_->channels.size(); ++i) {
+    const Channel& channel = recording_->channels[i];
+    if (channel.quantity != RecordedQuantity::kPosition ||
+        model_->joint(channel.joint).type != JointType::kRevolute)
+      continue;
+    double& turned = turned_[channel.joint];
+    double& q = (*row)[static_cast<Eigen::Index>(i)];
+    q += turned;
+    const double step = q - last_[static_cast<Eigen::Index>(i)], whole = kTurn * std::round(step / kTurn);
+    if (whole == 0.0 || std::abs(step - whole) > kMostStep) continue;
+    q -= whole;
+    turned -= whole;
+    ++wraps_[channel.joint];
+  }
 }
 
 bool MotionFit::IsWhole(size_t centre, size_t half) const {
@@ -250,6 +274,7 @@ bool MotionFit::Emit(size_t centre, const Receiver& receive) {
         velocity >= 0
             ? VectorXd(fitted.col(velocity))
             : VectorXd(fitted.col(position).tail<kOrder>().cwiseProduct(Eigen::Vector4d(1.0, 2.0, 3.0, 4.0)));
+    if (stands_) sample_.qd[joint] = sample_.qdd[joint] = 0.0;
     AverageFriction(joint, times, rate, C.row(0).transpose());
     const int torque = ChannelOf(Effort(), joint);
     if (torque < 0) continue;
@@ -334,6 +359,10 @@ std::vector<std::string> MotionFit::ListNotes() const {
   note(doubled_, "rows have the time of the row before: left out");
   note(held_, "rows repeat the row before: left out");
   note(empty_, "rows have no numbers of these joints: left out");
+  for (const auto& [joint, count] : wraps_)
+    note(count, "times the position of " + model_->joint(joint).name +
+                    " passes from one end of a turn to the other: unwrapped");
+  if (stands_) notes.push_back(recording_->name + ": the robot stands: torques alone are compared");
   note(gaps_, fmt::format("gaps longer than {:.3g} s: nothing is smoothed across them", kGap * step_));
   notes.push_back(fmt::format(
       "{}: {} from {} by polynomials over {:.3g} s (a row every {:.3g} s)", recording_->name,

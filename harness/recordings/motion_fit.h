@@ -5,6 +5,7 @@
 #include <deque>
 #include <functional>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -93,6 +94,7 @@ class MotionFit {
     return 2.0 * static_cast<double>(half_) * step_;
   }  ///< That is smoothed over, s.
   [[nodiscard]] long rows() const { return rows_; }
+  [[nodiscard]] bool stands() const { return stands_; }  ///< No joint moves, in all of the recording.
   /// What was done with the rows, for the report.
   [[nodiscard]] std::vector<std::string> ListNotes() const;
 
@@ -111,7 +113,14 @@ class MotionFit {
   void ChooseWindow(const std::vector<size_t>& centres);
   void CalcSpeeds();
   void AddWrenchErrors();
-  void CheckVelocities(const std::vector<size_t>& centres, size_t half);
+  /// Takes whole turns off a row's positions that pass from one end of a turn to the other.
+  void Unwrap(Row* row);
+  /// Whether the whole recording was read ahead and no joint moves.
+  [[nodiscard]] bool Stands() const;
+  void CheckVelocities();
+  /// What is wrong with a joint's velocities, if they are not its position's derivative.
+  [[nodiscard]] std::optional<Fault> CheckVelocity(int joint, const std::vector<size_t>& centres,
+                                                   size_t half) const;
   [[nodiscard]] std::vector<size_t> ListCentres(size_t half) const;
   /// (order + 1) x rows of the window: of the polynomial about the centre, in powers of the time.
   [[nodiscard]] MatrixXd CalcCoefficients(size_t centre, size_t half, int order) const;
@@ -145,6 +154,9 @@ class MotionFit {
   std::deque<long> segments_;  // of each row ahead
   std::vector<double> numbers_;
   Row last_;
+  std::map<int, double> turned_;  // by joint: what unwrapping adds, rad
+  std::map<int, long> wraps_;     // by joint
+  bool stands_ = false;
   long segment_ = 0, rows_ = 0, held_ = 0, held_run_ = 0, doubled_ = 0, empty_ = 0, gaps_ = 0;
   bool has_ended_ = false;
   double step_ = 0.0;

@@ -117,7 +117,8 @@ void MotionFit::Analyse() {
   VectorXd base = VectorXd::Zero(2);
   for (int k = 0; k < 7 && recording_->Has(RecordedQuantity::kBase); ++k)
     base[k / 3 > 0 ? 1 : 0] += Square(sigma[ChannelOf(RecordedQuantity::kBase, k)]);
-  CheckVelocities(centres, half);
+  CheckVelocities();
+  stands_ = Stands();
   inertia_ = CalcInertia(centres);
   ChooseWindow(centres);
   AddWrenchErrors();
@@ -147,27 +148,83 @@ void MotionFit::AddWrenchErrors() {
       (noise_.wrench.cwiseAbs2() + errors / static_cast<double>(centres.size())).cwiseSqrt().eval();
 }
 
-void MotionFit::CheckVelocities(const std::vector<size_t>& centres, size_t half) {
-  constexpr double kOff = 0.1, kShows = 5.0;
+bool MotionFit::Stands() const {
+  constexpr double kLittle = 1e-3, kErrors = 10.0;  // rad or m; times the noise of a number
+  if (!has_ended_ || gaps_ > 0) return false;
+  for (size_t i = 0; i < recording_->channels.size(); ++i) {
+    if (recording_->channels[i].quantity != RecordedQuantity::kPosition) continue;
+    const auto at = static_cast<Eigen::Index>(i);
+    const auto [low, high] = std::ranges::minmax(rows_ahead_, {}, [at](const Row& row) { return row[at]; });
+    if (high[at] - low[at] > kLittle + kErrors * noise_.position[recording_->channels[i].joint]) return false;
+  }
+  return !recording_->Has(RecordedQuantity::kBase);
+}
+
+std::optional<Fault> MotionFit::CheckVelocity(int joint, const std::vector<size_t>& centres,
+                                              size_t half) const {
+  constexpr double kOff = 0.1, kShows = 5.0, kLate = 1.5, kErrors = 6.0, kExplains = 0.5;
+  const int position = ChannelOf(RecordedQuantity::kPosition, joint),
+            velocity = ChannelOf(RecordedQuantity::kVelocity, joint);
+  if (position < 0 || velocity < 0 || centres.empty()) return std::nullopt;
+  // v = gain r + lag (-r'), of derivatives r and r' of the position, whose noise makes squares too large.
+  Eigen::Matrix2d G = Eigen::Matrix2d::Zero(), noise = G;
+  Vector2d b = Vector2d::Zero();
+  double squares = 0.0;
+  for (const size_t centre : centres) {
+    const MatrixXd window = GetWindow(centre, half);
+    const MatrixXd C = CalcCoefficients(centre, half, kOrder);
+    const Vector2d rates(C.row(1).dot(window.col(position)), -2.0 * C.row(2).dot(window.col(position)));
+    const double v = C.row(0).dot(window.col(velocity));
+    const double variance = Square(noise_.position[joint]);
+    G += rates * rates.transpose();
+    noise.diagonal() += variance * Vector2d(C.row(1).squaredNorm(), 4.0 * C.row(2).squaredNorm());
+    b += v * rates;
+    squares += v * v;
+  }
+  if (!(G(0, 0) > kShows * noise(0, 0))) return std::nullopt;
+  const Eigen::Matrix2d right = G - noise;
+  const double gain = b[0] / right(0, 0);
+  const std::string place = "joint " + model_->joint(joint).name;
+  if (std::abs(gain - 1.0) >= kOff)
+    return Fault{
+        "velocity gain", place, gain, 0.0, "", std::abs(gain + 1.0) < kOff ? "(the other sign)" : ""};
+  if (!(G(1, 1) > kShows * noise(1, 1))) return std::nullopt;
+  const Vector2d x = right.ldlt().solve(b);
+  const double left = std::max(0.0, squares - x.dot(b)), without = std::max(0.0, squares - gain * b[0]);
+  const double error =
+      std::sqrt(left / right(1, 1) / std::max(1.0, static_cast<double>(centres.size()) - 2.0));
+  if (x[1] < kLate * step_ || x[1] < kErrors * error || without - left < kExplains * without)
+    return std::nullopt;
+  return Fault{"velocity lag", place, x[1], error, "s", "(late or filtered)"};
+}
+
+void MotionFit::CheckVelocities() {
+  // Over a time in which noise of positions tells accelerations, too.
+  constexpr double kWindow = 0.1;  // s to each side
+  constexpr size_t kLeast = 8, kMost = 64;
+  const size_t half =
+      std::min(std::clamp(static_cast<size_t>(kWindow / step_), kLeast, kMost), (rows_ahead_.size() - 1) / 8);
+  const std::vector<size_t> centres = half > 2 ? ListCentres(half) : std::vector<size_t>();
+  size_t recorded = 0;
   for (int joint = 0; joint < model_->num_joints(); ++joint) {
-    const int position = ChannelOf(RecordedQuantity::kPosition, joint),
-              velocity = ChannelOf(RecordedQuantity::kVelocity, joint);
-    if (position < 0 || velocity < 0) continue;
-    double squares = 0.0, product = 0.0, noise = 0.0;
-    for (const size_t centre : centres) {
-      const MatrixXd window = GetWindow(centre, half);
-      const MatrixXd C = CalcCoefficients(centre, half, kOrder);
-      const double rate = C.row(1).dot(window.col(position));
-      squares += rate * rate;
-      product += rate * C.row(0).dot(window.col(velocity));
-      noise += Square(noise_.position[joint]) * C.row(1).squaredNorm();
-    }
-    // Noise makes the derivative's square too large.
-    if (!(squares > kShows * noise)) continue;
-    const double gain = product / (squares - noise);
-    if (std::abs(gain - 1.0) < kOff) continue;
-    faults_.push_back({"velocity gain", "joint " + model_->joint(joint).name, gain, 0.0, "",
-                       std::abs(gain + 1.0) < kOff ? "(the other sign)" : ""});
+    if (ChannelOf(RecordedQuantity::kVelocity, joint) >= 0) ++recorded;
+    if (const std::optional<Fault> fault = CheckVelocity(joint, centres, half)) faults_.push_back(*fault);
+  }
+  // One fault of all joints is told once.
+  constexpr double kAlike = 0.1;
+  const auto is_alike = [&](const Fault& one) {
+    return one.fault == faults_.front().fault &&
+           std::abs(one.value - faults_.front().value) <= kAlike * std::abs(faults_.front().value);
+  };
+  if (faults_.size() > 1 && faults_.size() == recorded && std::ranges::all_of(faults_, is_alike)) {
+    Fault& all = faults_.front();
+    all.place = "all joints";
+    for (size_t i = 1; i < recorded; ++i)
+      all.value += (faults_[i].value - all.value) / static_cast<double>(i + 1);
+    constexpr double kDegrees = 180.0 / kPi;
+    if (all.fault == "velocity gain" && std::abs(all.value - kDegrees) < kAlike * kDegrees)
+      all.fault = "velocity unit", all.detail = "(degrees per second)";
+    faults_.resize(1);
   }
   if (faults_.empty()) return;
   std::vector<Channel> kept;
@@ -241,7 +298,8 @@ void MotionFit::ChooseWindow(const std::vector<size_t>& all) {
     const double count = static_cast<double>(centres.size());
     const VectorXd squares = (variance + bias.cwiseMax(0.0)) / count;
     const double score = (inertia_.array().square().matrix() * squares).sum();
-    if (!(score < best)) continue;
+    // Where nothing moves, torques alone tell, over a time as short as a push.
+    if (!(score < best) || (stands_ && std::isfinite(best))) continue;
     best = score;
     half_ = half;
     noise_.acceleration = squares.cwiseSqrt();
@@ -254,6 +312,7 @@ void MotionFit::ChooseWindow(const std::vector<size_t>& all) {
   }
   if (!std::isfinite(best))
     throw InputError(recording_->name + ": is too short to derive accelerations from");
+  if (stands_) noise_.acceleration.setZero();
   stride_ = std::max<size_t>(1, half_ / 2);
   noise_.wrench *= smoothed;
 }

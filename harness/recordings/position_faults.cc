@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <utility>
 
 #include "controller/common/linear_algebra.h"
@@ -11,6 +12,8 @@ namespace dexcheck {
 namespace {
 
 using Eigen::Index;
+
+constexpr double kNoSize = std::numeric_limits<double>::quiet_NaN();  // of an exchange
 
 bool IsTorque(const Channel& channel) {
   return channel.quantity == RecordedQuantity::kTorque || channel.quantity == RecordedQuantity::kCurrent;
@@ -24,9 +27,9 @@ bool IsMotion(const Channel& channel) {
 /// The begin of a recording, and how well the model explains it.
 class Begin {
  public:
-  Begin(const RobotModel& model, Recording recording) : regressor_(model), torques_(model.num_joints()) {
+  Begin(const RobotModel& model, Recording* recording) : regressor_(model), torques_(model.num_joints()) {
     constexpr size_t kRows = 3000;
-    MotionFit motion(model, &recording, kRows);
+    MotionFit motion(model, recording, kRows);
     joints_ = motion.joints();
     has_currents_ = motion.has_currents();
     motion.Run([&](const RecordedSample& sample) {
@@ -41,6 +44,26 @@ class Begin {
   }
 
   [[nodiscard]] size_t size() const { return samples_.size(); }
+  /// Size of the positions, by joint.
+  [[nodiscard]] VectorXd largest() const {
+    VectorXd largest = VectorXd::Zero(torques_.size());
+    for (const RecordedSample& sample : samples_) largest = largest.cwiseMax(sample.q.cwiseAbs());
+    return largest;
+  }
+  /// Whether positions in another order stay in the joints' ranges, or leave none that they do not leave now.
+  [[nodiscard]] bool IsInRange(const std::vector<int>& order) const {
+    constexpr double kBeyond = 0.2;  // rad or m
+    const auto is_beyond = [&](size_t from, int joint) {
+      const Joint& there = regressor_.model().joint(joint);
+      return std::ranges::any_of(samples_, [&](const RecordedSample& sample) {
+        const double q = sample.q[static_cast<Index>(from)];
+        return q < there.lower - kBeyond || q > there.upper + kBeyond;
+      });
+    };
+    for (size_t from = 0; from < order.size(); ++from)
+      if (is_beyond(from, order[from]) && !is_beyond(from, static_cast<int>(from))) return false;
+    return true;
+  }
 
   /// How far the model's torques are off beside gains' signs, friction and offsets: the sum over joints of
   /// the logarithm of the residual, at every such sample.
@@ -86,54 +109,154 @@ class Begin {
   VectorXd torques_;
 };
 
-std::vector<PositionFault> ListPositionFaults(const RobotModel& model, const Recording& recording) {
-  std::vector<PositionFault> faults;
-  faults.push_back(
-      {{"unit of the positions", "all joints", 180.0 / kPi, 0.0, "", "(degrees)"}, -1, -1, kPi / 180.0});
-  for (int joint = 0; joint < model.num_joints(); ++joint) {
-    if (recording.FindColumn(RecordedQuantity::kPosition, joint) < 0) continue;
-    const std::string place = "joint " + model.joint(joint).name;
-    for (const double gain : {-1.0, 0.5, 0.8, 0.9, 1.1, 1.25, 2.0})
-      faults.push_back({{"position gain", place, gain, 0.0, "", gain < 0.0 ? "(the other sign)" : ""},
-                        joint,
-                        -1,
-                        1.0 / gain});
-    faults.push_back({{"torque gain", place, -1.0, 0.0, "", "(the other sign)"}, joint, -1, -1.0, true});
-    for (int other = joint + 1; other < model.num_joints(); ++other) {
-      if (recording.FindColumn(RecordedQuantity::kPosition, other) < 0) continue;
-      for (const char* const what : {"position", "torque"})
-        faults.push_back({{std::string(what) + " exchanged with that of " + model.joint(other).name, place,
-                           1.0, 0.0, "", ""},
-                          joint,
-                          other,
-                          1.0,
-                          *what == 't'});
-    }
+/// Faults of positions and torques that nothing in the recording speaks against: its units, its columns, and
+/// the joints' ranges.
+class PositionFaults {
+ public:
+  PositionFaults(const RobotModel& model, const Recording& recording, const Begin& begin)
+      : model_(model), recording_(recording), begin_(begin), own_(static_cast<size_t>(model.num_joints())) {
+    std::iota(own_.begin(), own_.end(), 0);
   }
-  return faults;
-}
+
+  std::vector<PositionFault> List() {
+    AddUnit();
+    faults_.push_back({.fault = {"torque gain", "all joints", -1.0, 0.0, "", "(the other sign)"},
+                       .factor = -1.0,
+                       .is_motion = false,
+                       .is_torque = true});
+    AddAlphabet();
+    for (int joint = 0; joint < model_.num_joints(); ++joint) {
+      if (!HasPosition(joint)) continue;
+      AddNumbers(joint);
+      for (int other = joint + 1; other < model_.num_joints(); ++other)
+        if (HasPosition(other)) AddExchanges(joint, other);
+    }
+    return std::move(faults_);
+  }
+
+ private:
+  [[nodiscard]] bool HasPosition(int joint) const {
+    return recording_.FindColumn(RecordedQuantity::kPosition, joint) >= 0;
+  }
+  [[nodiscard]] bool HasTorque(int joint) const {
+    return recording_.FindColumn(RecordedQuantity::kTorque, joint) >= 0 ||
+           recording_.FindColumn(RecordedQuantity::kCurrent, joint) >= 0;
+  }
+  [[nodiscard]] std::string PlaceOf(int joint) const { return "joint " + model_.joint(joint).name; }
+
+  /// Degrees: where no column has a unit, and what is read is more than a joint can turn.
+  void AddUnit() {
+    constexpr double kBeyond = 1.1;
+    bool is_beyond = false;
+    for (const Channel& one : recording_.channels) {
+      if (one.quantity != RecordedQuantity::kPosition) continue;
+      if (one.scale != 1.0 || one.states_unit) return;
+      const Joint& joint = model_.joint(one.joint);
+      const double most = std::max({std::abs(joint.lower), std::abs(joint.upper), kPi});
+      is_beyond = is_beyond || begin_.largest()[one.joint] > kBeyond * most;
+    }
+    if (is_beyond)
+      faults_.push_back({.fault = {"unit of the positions", "all joints", 180.0 / kPi, 0.0, "", "(degrees)"},
+                         .factor = kPi / 180.0});
+  }
+
+  void AddNumbers(int joint) {
+    const std::string place = PlaceOf(joint);
+    const bool turns = model_.joint(joint).type == JointType::kRevolute;
+    for (const double gain : {-1.0, 0.5, 0.8, 0.9, 0.98, 1.02, 1.1, 1.25, 2.0})
+      for (const bool has_right_rates : {true, false})
+        faults_.push_back(
+            {.fault = {"position gain", place, gain, 0.0, "", gain < 0.0 ? "(the other sign)" : ""},
+             .joint = joint,
+             .factor = 1.0 / gain,
+             .has_right_rates = has_right_rates});
+    for (const double offset : {0.1, 0.2, 0.35, 0.5, 0.7, 1.0, 1.4, kPi / 2.0, 2.0, kPi})
+      for (const double sign : {-1.0, 1.0})
+        if (turns)
+          faults_.push_back({.fault = {"position offset", place, sign * offset, 0.0, "rad", ""},
+                             .joint = joint,
+                             .offset = -sign * offset});
+    if (HasTorque(joint))
+      faults_.push_back({.fault = {"torque gain", place, -1.0, 0.0, "", "(the other sign)"},
+                         .joint = joint,
+                         .factor = -1.0,
+                         .is_motion = false,
+                         .is_torque = true});
+  }
+
+  void AddExchanges(int joint, int other) {
+    std::vector<int> order = own_;
+    std::swap(order[static_cast<size_t>(joint)], order[static_cast<size_t>(other)]);
+    const std::string with = " exchanged with that of " + model_.joint(other).name;
+    const bool have_torques = HasTorque(joint) && HasTorque(other), is_in_range = begin_.IsInRange(order);
+    if (is_in_range)
+      faults_.push_back({.fault = {"position" + with, PlaceOf(joint), kNoSize, 0.0, "", ""},
+                         .joint = joint,
+                         .order = order});
+    if (have_torques)
+      faults_.push_back({.fault = {"torque" + with, PlaceOf(joint), kNoSize, 0.0, "", ""},
+                         .joint = joint,
+                         .order = order,
+                         .is_motion = false,
+                         .is_torque = true});
+    if (is_in_range && have_torques)
+      faults_.push_back({.fault = {"all columns exchanged with those of " + model_.joint(other).name,
+                                   PlaceOf(joint), kNoSize, 0.0, "", ""},
+                         .joint = joint,
+                         .order = order,
+                         .is_torque = true});
+  }
+
+  /// Messages of ROS have joints by name: a logger that forgets the names has them in that order.
+  void AddAlphabet() {
+    for (const int joint : own_)
+      if (!HasPosition(joint) || !HasTorque(joint)) return;
+    std::vector<int> order = own_;
+    std::ranges::sort(order, {}, [&](int joint) { return model_.joint(joint).name; });
+    if (order == own_ || !begin_.IsInRange(order)) return;
+    std::string names;
+    for (const int joint : order) names += (names.empty() ? "" : ", ") + model_.joint(joint).name;
+    faults_.push_back(
+        {.fault = {"columns in alphabetical order", "all joints", kNoSize, 0.0, "", "(" + names + ")"},
+         .order = order,
+         .is_torque = true});
+  }
+
+  const RobotModel& model_;
+  const Recording& recording_;
+  const Begin& begin_;
+  std::vector<int> own_;
+  std::vector<PositionFault> faults_;
+};
 
 }  // namespace
 
 void PositionFault::Undo(Recording* recording) const {
   for (Channel& one : recording->channels) {
-    if (!(is_torque ? IsTorque(one) : IsMotion(one))) continue;
-    if (other >= 0) {
-      if (one.joint == joint || one.joint == other) one.joint = joint + other - one.joint;
+    const bool is_position = one.quantity == RecordedQuantity::kPosition;
+    const bool is_changed =
+        IsTorque(one) ? is_torque : is_motion && IsMotion(one) && (is_position || !has_right_rates);
+    if (!is_changed) continue;
+    if (!order.empty()) {
+      one.joint = order[static_cast<size_t>(one.joint)];
     } else if (joint < 0 || one.joint == joint) {
       one.scale *= factor;
-      one.offset *= factor;
+      one.offset = factor * one.offset + (is_position ? offset : 0.0);
     }
   }
 }
 
 void PositionFault::Undo(RecordedSample* sample) const {
   for (VectorXd* const each : {&sample->torque, &sample->q, &sample->qd, &sample->qdd, &sample->direction}) {
-    if (is_torque != (each == &sample->torque)) continue;
-    if (other >= 0) {
-      std::swap((*each)[joint], (*each)[other]);
+    const bool is_position = each == &sample->q;
+    const bool is_changed =
+        each == &sample->torque ? is_torque : is_motion && (is_position || !has_right_rates);
+    if (!is_changed) continue;
+    if (!order.empty()) {
+      const VectorXd recorded = *each;
+      for (size_t i = 0; i < order.size(); ++i) (*each)[order[i]] = recorded[static_cast<Index>(i)];
     } else if (joint >= 0) {
-      (*each)[joint] *= factor;
+      (*each)[joint] = factor * (*each)[joint] + (is_position ? offset : 0.0);
     } else if (each != &sample->direction) {
       *each *= factor;
     }
@@ -141,8 +264,8 @@ void PositionFault::Undo(RecordedSample* sample) const {
 }
 
 std::optional<PositionFault> FindPositionFault(const RobotModel& model, Recording recording) {
-  std::vector<PositionFault> all = ListPositionFaults(model, recording);
-  Begin begin(model, std::move(recording));
+  Begin begin(model, &recording);
+  std::vector<PositionFault> all = PositionFaults(model, recording, begin).List();
   // A few samples say which are worth all of them.
   constexpr size_t kFewSamples = 100, kFewFaults = 10;
   std::vector<std::pair<double, PositionFault>> faults;
@@ -153,7 +276,7 @@ std::optional<PositionFault> FindPositionFault(const RobotModel& model, Recordin
   std::sort(faults.begin(), faults.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
   faults.resize(std::min(faults.size(), kFewFaults));
   // By a factor of three, of one joint or spread over several.
-  constexpr double kMuch = 1.1, kMuchOfRatio = 5.0;
+  constexpr double kMuch = 1.1, kMuchOfNumber = 3.0;
   const double as_read = begin.CalcMisfit({}, 1);
   double best = as_read - kMuch;
   std::optional<PositionFault> found;
@@ -161,17 +284,22 @@ std::optional<PositionFault> FindPositionFault(const RobotModel& model, Recordin
     const double misfit = begin.CalcMisfit(fault, 1);
     if (misfit < best) best = misfit, found = std::move(fault);
   }
-  // A ratio is anything; a sign, an exchange and a unit are not.
-  const bool is_ratio = found && found->joint >= 0 && found->other < 0 && found->factor > 0.0;
-  for (double step = 0.1; is_ratio && step > 1e-5; step *= 0.5)
-    for (const double change : {1.0 - step, 1.0 + step}) {
+  // A ratio and an offset are anything; a sign, an order and a unit are not.
+  const bool is_number = found && found->joint >= 0 && found->order.empty() && found->factor > 0.0;
+  const bool is_offset = is_number && found->offset != 0.0;
+  for (double step = 0.1; is_number && step > 1e-6; step *= 0.5)
+    for (const double change : {-step, step}) {
       PositionFault near = *found;
-      near.fault.value = 1.0 / (near.factor *= change);
+      if (is_offset) {
+        near.fault.value = -(near.offset += change);
+      } else {
+        near.fault.value = 1.0 / (near.factor *= 1.0 + change);
+      }
       const double misfit = begin.CalcMisfit(near, 1);
       if (misfit < best) best = misfit, found = std::move(near);
     }
   // With a free number something is always explained.
-  if (is_ratio && best > as_read - kMuchOfRatio) found.reset();
+  if (is_number && best > as_read - kMuchOfNumber) found.reset();
   return found;
 }
 

@@ -13,10 +13,12 @@ namespace dexcheck {
 /// What was done to positions or torques, and how to undo it.
 struct PositionFault {
   Fault fault;
-  int joint = -1;       ///< -1 for all.
-  int other = -1;       ///< That it was exchanged with.
-  double factor = 1.0;  ///< That undoes it.
-  bool is_torque = false;
+  int joint = -1;                     ///< -1 for all.
+  double factor = 1.0, offset = 0.0;  ///< That undo it: factor times what is recorded, plus the offset.
+  std::vector<int> order = {};        ///< The joint that each joint's columns are of; empty for its own.
+  bool is_motion = true;              ///< Positions, velocities and accelerations.
+  bool is_torque = false;             ///< Torques or currents.
+  bool has_right_rates = false;       ///< Of the motion, positions alone.
 
   void Undo(Recording* recording) const;
   void Undo(RecordedSample* sample) const;

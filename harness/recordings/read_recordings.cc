@@ -79,7 +79,9 @@ void RecordingSet::Read(Recording* recording, const ReadOptions& options,
     constexpr long kEvery = 4;
     if (samples == 0) begin = sample.time;
     const long stretch = std::lround(std::floor((sample.time - begin) / kStretch));
-    TorqueBalance& balance = stretch % kEvery == kEvery - 1 ? *one.held : *one.fit;
+    // Of a robot that stands, only when something acts is of interest.
+    const bool is_held = stretch % kEvery == kEvery - 1 && !motion.stands();
+    TorqueBalance& balance = is_held ? *one.held : *one.fit;
     balance.Add(sample, motion.IsJudged(sample));
     TellSecond(options, sample.time, balance.residual());
     ++samples;
@@ -90,8 +92,8 @@ void RecordingSet::Read(Recording* recording, const ReadOptions& options,
   one.held->Finish();
   std::vector<std::string> resting;
   for (int joint = 0; joint < model_->num_joints(); ++joint) {
-    if (recording->FindColumn(RecordedQuantity::kPosition, joint) < 0)
-      resting.push_back(model_->joint(joint).name);
+    one.has_position.push_back(recording->FindColumn(RecordedQuantity::kPosition, joint) >= 0);
+    if (!one.has_position.back()) resting.push_back(model_->joint(joint).name);
   }
   if (!resting.empty())
     notes_.push_back(recording->name + ": has no positions of " + JoinNames(resting) +
@@ -105,6 +107,7 @@ void RecordingSet::Read(Recording* recording, const ReadOptions& options,
   one.motion = motion.noise();
   one.moves = motion.moves();
   one.inertia = motion.inertia();
+  one.stands = motion.stands();
   one.step = motion.step();
   one.reach = 0.5 * motion.window();
   one.shape_velocities = motion.shape_velocities();
@@ -182,7 +185,6 @@ void RecordingSet::EstimateGains() {
     const bool is_told = inverse > 0.0 && without > (1.0 + kShows) * with &&
                          without - with > kLeastOfAll * G(current, current);
     gains_[static_cast<Index>(place)] = is_told ? 1.0 / inverse : 0.0;
-    if (!is_told) NoteUnknownGain(joints_[place]);
   }
 }
 
@@ -195,14 +197,76 @@ bool RecordingSet::DropUnknownGains() {
     if (gain == 0.0 || (gain > first / kFar && gain < first * kFar)) continue;
     gain = 0.0;
     has_any = true;
-    NoteUnknownGain(joints_[place]);
   }
   return has_any;
 }
 
-void RecordingSet::NoteUnknownGain(int joint) {
-  notes_.push_back("joint " + model_->joint(joint).name +
-                   " is not judged: its motion does not tell its drive's gain beside its friction");
+MotionExtents RecordingSet::CalcExtents() const {
+  constexpr double kPeak = 3.0;  // times the root mean square
+  MotionExtents extents;
+  const VectorXd none = VectorXd::Zero(model_->num_joints());
+  extents = {none, none, none, none, step_};
+  for (size_t place = 0; place < joints_.size(); ++place)
+    for (const ReadRecording& one : read_) {
+      const int joint = joints_[place];
+      const TorqueBalance& balance = *one.fit;
+      const MatrixXd& G = balance.products(place);
+      const double samples = std::max(1.0, balance.samples(place));
+      const auto find = [&](TorqueColumn::Kind kind) { return balance.Find(place, {kind, joint}); };
+      const auto peak = [&](double squares) { return kPeak * std::sqrt(std::max(0.0, squares) / samples); };
+      const auto widen = [&](VectorXd* sizes, double size) {
+        (*sizes)[joint] = std::max((*sizes)[joint], size);
+      };
+      const Index y = G.cols() - 1, torque = find(TorqueColumn::kTorque), angle = find(TorqueColumn::kAngle);
+      const double measured =
+          has_currents_ ? Square(gain(place)) * G(find(TorqueColumn::kCurrent), find(TorqueColumn::kCurrent))
+                        : G(y, y) + 2.0 * G(y, torque) + G(torque, torque);
+      widen(&extents.torque, peak(measured) + peak(G(torque, torque)));
+      widen(&extents.speed, peak(G(find(TorqueColumn::kViscous), find(TorqueColumn::kViscous))));
+      widen(&extents.acceleration,
+            peak(G(find(TorqueColumn::kAcceleration), find(TorqueColumn::kAcceleration))));
+      widen(&extents.span, peak(G(angle, angle) - Square(G(angle, find(TorqueColumn::kOffset))) / samples));
+    }
+  return extents;
+}
+
+bool RecordingSet::Moves(int joint) const {
+  constexpr double kLittle = 2e-3, kErrors = 10.0;  // rad or m; times the noise of a sample
+  for (const ReadRecording& one : read_) {
+    double low = std::numeric_limits<double>::infinity(), high = -low;
+    for (const auto* balance : {&one.fit, &one.held})
+      for (const TorqueBalance::Block& block : (*balance)->blocks()) {
+        low = std::min(low, block.q[joint] / block.samples);
+        high = std::max(high, block.q[joint] / block.samples);
+      }
+    if (high - low > std::max(kLittle, kErrors * one.motion.smooth_position[joint])) return true;
+  }
+  return false;
+}
+
+std::vector<UnjudgedJoint> RecordingSet::ListUnjudged() const {
+  std::vector<UnjudgedJoint> unjudged;
+  for (int joint = 0; joint < model_->num_joints(); ++joint) {
+    const auto at = std::ranges::find(joints_, joint);
+    const auto place = static_cast<size_t>(at - joints_.begin());
+    const auto has_samples = [&](const ReadRecording& one) { return one.fit->samples(place) > 0.0; };
+    const auto has_position = [&](const ReadRecording& one) {
+      return one.has_position[static_cast<size_t>(joint)];
+    };
+    std::string reason;
+    if (at == joints_.end()) {
+      if (std::ranges::none_of(read_, has_position)) continue;
+      reason = has_currents_ ? "no current of it is recorded" : "no torque of it is recorded, or only zeros";
+    } else if (!IsJudged(place)) {
+      reason = "its motion does not tell its drive's gain beside its friction";
+    } else if (std::ranges::none_of(read_, has_samples)) {
+      reason = "friction holds it at every sample";
+    } else {
+      continue;
+    }
+    unjudged.push_back({joint, Moves(joint), at != joints_.end() && !IsJudged(place), reason});
+  }
+  return unjudged;
 }
 
 }  // namespace dexcheck

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "harness/recordings/torque_balance.h"
+#include "harness/recordings/torque_candidates.h"
 
 namespace dexcheck {
 
@@ -18,6 +19,15 @@ struct ReadOptions {
   std::function<void(double time, const std::vector<int>& joints, const VectorXd& residual)> on_second;
   size_t ahead = 20'000;  ///< Rows that are read before the first is judged.
   Refinements refinements;
+  LinkFrames frames;  ///< In which links' vectors are said.
+};
+
+/// A joint whose torques are not judged.
+struct UnjudgedJoint {
+  int joint = -1;
+  bool moves = true;
+  bool has_no_gain = false;  ///< Its current does not tell its torque.
+  std::string reason;        ///< "its motion does not tell its drive's gain beside its friction".
 };
 
 /// One recording: a quarter of it, in stretches, is kept for the end.
@@ -25,10 +35,12 @@ struct ReadRecording {
   std::unique_ptr<RobotModel> model;
   std::unique_ptr<TorqueBalance> fit, held;
   MotionNoise motion;
-  std::vector<bool> moves;  ///< MotionFit's, by joint.
+  std::vector<bool> moves;         ///< MotionFit's, by joint.
+  std::vector<bool> has_position;  ///< By joint.
   MatrixXd inertia;
   MatrixXd shape_velocities;  ///< MotionFit's.
   VectorXd most_torque;       ///< RecordedSample's.
+  bool stands = false;        ///< No joint moves.
   double step = 0.0;          ///< Between rows, s.
   double reach = 0.0;         ///< Of smoothing, to each side, s.
   VectorXd noise;             ///< Of a sample's balance, by judged joint, N m or N.
@@ -62,10 +74,14 @@ class RecordingSet {
   /// Gains that became others than were estimated are not known. @return whether there are any.
   bool DropUnknownGains();
 
+  /// What sizes of faults are held against.
+  [[nodiscard]] MotionExtents CalcExtents() const;
   [[nodiscard]] const Refinements& refinements() const { return refinements_; }  ///< As was told.
   [[nodiscard]] double step() const { return step_; }  ///< The longest between rows, s.
   [[nodiscard]] long rows() const { return rows_; }
   [[nodiscard]] const std::vector<std::string>& notes() const { return notes_; }
+  /// Joints with a position, without a torque or with one that says nothing.
+  [[nodiscard]] std::vector<UnjudgedJoint> ListUnjudged() const;
   /// Of the recordings themselves: velocities that are not the positions' derivatives.
   [[nodiscard]] const std::vector<Fault>& faults() const { return faults_; }
 
@@ -76,7 +92,8 @@ class RecordingSet {
   void MeasureNoise();
   /// From all recordings, with friction and an offset beside them.
   void EstimateGains();
-  void NoteUnknownGain(int joint);
+  /// Whether its position changes by more than noise in any recording.
+  [[nodiscard]] bool Moves(int joint) const;
 
   const RobotModel* model_;
   std::string first_name_;

@@ -148,7 +148,7 @@ MatrixXd TorqueBalance::CalcWrenchColumns() {
   Index at = 0;
   for (const WrenchPlace& place : wrenches_) {
     const Matrix3d& R = regressor_.GetRotation(place.link);
-    const Matrix3d axes = place.is_world ? Matrix3d(Matrix3d::Identity()) : R;
+    const Matrix3d axes = place.is_world ? Matrix3d(Matrix3d::Identity()) : Matrix3d(R * place.R_iL);
     const Vector3d lever =
         R * (place.point - model_->joint(place.link).body.com) - place.below * Vector3d::UnitZ();
     regressor_.CalcForceColumns(place.link, forces_);

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "controller/common/linear_algebra.h"
+#include "harness/recordings/plausible_sizes.h"
 
 namespace dexcheck {
 namespace {
@@ -312,8 +313,11 @@ BodyVector FindNearestBody(const BodyVector& body) {
 }
 
 std::vector<TorqueFault> ListTorqueFaults(const RobotModel& model, const std::vector<int>& joints,
-                                          int recordings, const Refinements& refinements) {
-  return FaultList(model, joints, recordings, refinements).Make();
+                                          int recordings, const Refinements& refinements,
+                                          const MotionExtents& extents) {
+  std::vector<TorqueFault> faults = FaultList(model, joints, recordings, refinements).Make();
+  for (TorqueFault& fault : faults) LimitToPlausible(model, extents, refinements.shaking, &fault);
+  return faults;
 }
 
 static void ShiftCentre(const RobotModel& model, const Vector3d& shift, TorqueFault* centre) {
@@ -346,8 +350,8 @@ void PlaceMass(const RobotModel& model, const VectorXd& amplitude, TorqueFault* 
     PlacePayload(amplitude[0], amplitude.segment<3>(1), fault);
 }
 
-std::vector<TorqueFault> ListPushes(const RobotModel& model, const std::vector<int>& joints,
-                                    const Push& when) {
+std::vector<TorqueFault> ListPushes(const RobotModel& model, const std::vector<int>& joints, const Push& when,
+                                    const MotionExtents& extents) {
   std::vector<TorqueFault> faults;
   const auto add = [&](const std::string& fault, const std::string& place,
                        const std::string& unit) -> TorqueFault& {
@@ -376,6 +380,7 @@ std::vector<TorqueFault> ListPushes(const RobotModel& model, const std::vector<i
     add("torque", "joint " + model.joint(joint).name,
         model.joint(joint).type == JointType::kRevolute ? "N m" : "N")
         .push.joint = joint;
+  for (TorqueFault& fault : faults) LimitToPlausible(model, extents, 0.0, &fault);
   return faults;
 }
 

@@ -74,10 +74,21 @@ struct TorqueFault {
   [[nodiscard]] bool IsOfLoad() const { return kind == kSpring || (kind >= kZero && kind <= kGravity); }
 };
 
+/// How large torques and motion of each joint are (n): what no size of a fault can go far beyond. Empty where
+/// nothing was recorded.
+struct MotionExtents {
+  VectorXd torque;        ///< Measured and modelled together, N m or N.
+  VectorXd speed;         ///< rad/s or m/s
+  VectorXd acceleration;  ///< rad/s^2 or m/s^2
+  VectorXd span;          ///< Of the position, rad or m.
+  double step = 0.0;      ///< Between rows, s.
+};
+
 /// All that are tried of a model's recordings.
 /// @param joints that are judged. @param recordings their number.
 std::vector<TorqueFault> ListTorqueFaults(const RobotModel& model, const std::vector<int>& joints,
-                                          int recordings, const Refinements& refinements = {});
+                                          int recordings, const Refinements& refinements = {},
+                                          const MotionExtents& extents = {});
 
 /// Gives a centre of mass, or a payload that is a point, the columns with which these amplitudes, if they can
 /// be, leave what they leave: inertias about the link's origin grow with the square of a distance.
@@ -85,8 +96,8 @@ std::vector<TorqueFault> ListTorqueFaults(const RobotModel& model, const std::ve
 void PlaceMass(const RobotModel& model, const VectorXd& amplitude, TorqueFault* fault);
 
 /// Pushes during one stretch of time.
-std::vector<TorqueFault> ListPushes(const RobotModel& model, const std::vector<int>& joints,
-                                    const Push& when);
+std::vector<TorqueFault> ListPushes(const RobotModel& model, const std::vector<int>& joints, const Push& when,
+                                    const MotionExtents& extents);
 
 /// Whether there is a body of such mass, centre and inertia: its pseudo-inertia is positive.
 bool IsBody(const TorqueRegressor::BodyVector& body);

@@ -83,11 +83,13 @@ void TorqueEstimator::ListFaults() {
   const std::vector<int> judged = recordings_->ListJudged();
   if (judged.empty()) throw InputError("the recordings tell no joint's drive gain: nothing can be judged");
   faults_ = ListTorqueFaults(recordings_->model(), judged, static_cast<int>(recordings_->size()),
-                             recordings_->refinements());
-  if (recordings_->has_currents())
-    std::erase_if(faults_, [](const TorqueFault& one) {
-      return one.kind == TorqueFault::kTorqueGain || one.kind == TorqueFault::kSaturation;
-    });
+                             recordings_->refinements(), recordings_->CalcExtents());
+  // Torques that hold a robot still reach no limit.
+  std::erase_if(faults_, [&](const TorqueFault& one) {
+    return (recordings_->has_currents() &&
+            (one.kind == TorqueFault::kTorqueGain || one.kind == TorqueFault::kSaturation)) ||
+           ((*recordings_)[0].stands && one.kind == TorqueFault::kSaturation);
+  });
   barred_.clear();
   // Where drives' gains are sought, the model's bodies are the scale by which they are told.
   for (const TorqueFault& one : faults_)
@@ -375,9 +377,10 @@ double TorqueEstimator::CalcAlike(const VectorXd& left) const {
 bool TorqueEstimator::AddPushes() {
   const VectorXd left = CalcLeft(selection_.terms);
   const size_t before = faults_.size();
+  const MotionExtents extents = recordings_->CalcExtents();
   for (size_t r = 0; r < recordings_->size(); ++r)
     for (const Push& when : FindPushes(*recordings_, rows_, left, r))
-      for (TorqueFault& one : ListPushes(recordings_->model(), recordings_->joints(), when))
+      for (TorqueFault& one : ListPushes(recordings_->model(), recordings_->joints(), when, extents))
         faults_.push_back(std::move(one));
   return faults_.size() > before;
 }

@@ -154,36 +154,13 @@ class JudgePage {
   }
 
  private:
-  /// Its recording, and what it is at each joint.
+  /// Its recording; -1 for all.
   void AddToCause(const FoundFault* found, Json* json) const {
     (*json)["recording"] = -1;
     if (found == nullptr) return;
     const TorqueFault& fault = found->fault;
     const int recording = fault.kind == TorqueFault::kPush ? fault.push.recording : fault.recording;
     (*json)["recording"] = recording;
-    using enum TorqueFault::Kind;
-    if (fault.kind != kAllDry && fault.kind != kAllFriction && fault.kind != kAllOffsets) return;
-    Json parts = Json::array();
-    for (size_t k = 0; k < fault.columns.size(); ++k) {
-      const ColumnPart& part = fault.columns[k].front();
-      const Joint& joint = model_.joint(part.joint);
-      const bool turns = joint.type == JointType::kRevolute;
-      const bool is_viscous = part.column.kind == TorqueColumn::kViscous;
-      const bool is_dry =
-          part.column.kind == TorqueColumn::kDry || part.column.kind == TorqueColumn::kFriction;
-      const auto at = static_cast<Eigen::Index>(k);
-      const double nominal = is_viscous ? joint.damping : is_dry ? joint.dry_friction : 0.0;
-      parts.push_back({{"joint", joint.name},
-                       {"fault", is_viscous ? "viscous friction"
-                                 : is_dry   ? "dry friction"
-                                            : "torque offset"},
-                       {"value", nominal + found->amplitude[at]},
-                       {"standard_error", found->error[at]},
-                       {"unit", is_viscous ? (turns ? "N m s/rad" : "N s/m")
-                                : turns    ? "N m"
-                                           : "N"}});
-    }
-    (*json)["parts"] = parts;
   }
 
   /// Of a recording in time; nullptr where it has a gap.

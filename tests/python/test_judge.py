@@ -37,7 +37,7 @@ def make_recording(panda):
 def test_the_right_model_explains_it(panda, recording):
     judgement = dexcheck.judge(panda, *recording)
     assert judgement.explained and judgement, judgement
-    assert judgement.causes == [] and str(judgement).startswith("EXPLAINED: ")
+    assert judgement.causes == [] and judgement.verdict == "explained" and str(judgement).startswith("EXPLAINED: ")
     assert list(judgement.joints) == panda.joints
     for joint in judgement.joints.values():
         assert joint["torque"] > joint["left"] > 0 and joint["left"] < 1.5 * joint["noise"]

@@ -26,10 +26,10 @@ const TellOdds = odds => odds > 46 ? 'more than 1e20' : Number(Math.exp(odds).to
     @param columns [[head, cause => cell]] besides. */
 const CauseTable = (causes, columns = []) => {
   const Fault = (fault, parts) => Add(Make('div'), Make('b', `${fault.place}: ${fault.fault}`),
-    ...(parts || (fault.value === 0 && !fault.standard_error) ? [] : [' ', Make('span', TellValue(fault.value, fault.standard_error, fault.unit), {className: 'number'})]),
+    ...(parts || fault.value === null || (fault.value === 0 && !fault.standard_error) ? [] : [' ', Make('span', TellValue(fault.value, fault.standard_error, fault.unit), {className: 'number'})]),
     parts ? '' : fault.detail ? ' ' + fault.detail : '');
   const Parts = parts => {
-    const joints = [...new Set(parts.map(part => part.joint))], kinds = [...new Set(parts.map(part => part.fault))];
+    const joints = [...new Set(parts.map(part => part.place))], kinds = [...new Set(parts.map(part => part.fault))];
     const unit = kind => parts.find(part => part.fault === kind).unit;
     // From 0, with a whisker of the standard error on either side.
     const Interval = part => {
@@ -41,7 +41,7 @@ const CauseTable = (causes, columns = []) => {
     };
     const Cell = part => part ? Add(Make('div'), TellValue(part.value, part.standard_error), Interval(part)) : '';
     return Add(Make('div', '', {className: 'parts'}), Table(['joint', ...kinds.map(kind => `${kind}, ${unit(kind)}`)], joints.map(joint => [joint,
-      ...kinds.map(kind => Cell(parts.find(part => part.joint === joint && part.fault === kind)))])));
+      ...kinds.map(kind => Cell(parts.find(part => part.place === joint && part.fault === kind)))])));
   };
   /** A button that brings the page there. */
   const When = ([from, to]) => {

@@ -11,14 +11,10 @@
   Add(document.querySelector('h1'), Make('b', data.robot), ' – does it explain ', several ? Count(data.recordings.length, 'recording') : data.recordings[0], '?');
   const Ratio = joint => joint.left / joint.noise;
   const Span = values => [...new Set([Math.min(...values), Math.max(...values)].map(Short))].join(' to ');
-  const recordings = several ? 'the recordings' : 'the recording', causes = data.causes;
-  const explaining = causes.filter(cause => cause.outcome !== 'not explained').length;
-  const [tone, word, sentence] = {
-    explained: ['pass', 'EXPLAINED', `The model explains ${recordings}: what is left is noise.`],
-    'not explained': ['fail', 'NOT EXPLAINED', `The model does not explain ${recordings}, and no cause that is known does.`],
-    differs: ['open', 'DIFFERS', `The model does not explain ${recordings}: ${Count(explaining, 'cause')}${explaining < causes.length ? ' and the nearest that are known' : ''} explain${causes.length === 1 ? 's' : ''} ` +
-      `${Percent(data.explained)} of what it leaves, and ${Span(data.joints.map(Ratio))} times the noise is left.`],
-  }[data.verdict];
+  const causes = data.causes;
+  const tone = {explained: 'pass', 'not explained': 'fail', differs: 'open', 'partly explained': 'open'}[data.verdict];
+  const rest = data.verdict === 'differs' || data.verdict === 'not explained' ? ` ${Span(data.joints.map(Ratio))} times the noise is left.` : '';
+  const word = data.verdict.toUpperCase(), sentence = data.verdict_text + rest;
   AddVerdict(tone, word, Make('p', sentence), ...(several ? [Make('p', data.recordings.join(', '))] : []));
   const worst = data.joints.reduce((a, b) => Ratio(b) > Ratio(a) ? b : a);
   Add(document.querySelector('header'), Add(Make('div', '', {className: 'tiles'}), ...[

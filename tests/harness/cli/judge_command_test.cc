@@ -89,6 +89,39 @@ TEST_F(JudgeCommand, ReadsStandardInputAsItComes) {
   EXPECT_THAT(result.out, HasSubstr("joint panda_joint4: dry friction 0.5"));
 }
 
+TEST_F(JudgeCommand, ReadsAPipeFromItsFirstByte) {
+  const std::string model = SourcePath("/controller/parameters/panda.toml");
+  const ProgramResult result = RunProgram(
+      {"sh", "-c",
+       "mkfifo pipe; cat right.csv > pipe & '" + ProgramPath() + "' judge '" + model + "' pipe --json; wait"},
+      {.folder = folder_.path()});
+  const std::string text = Read("right.csv");
+  EXPECT_EQ(Json::parse(result.out)["rows"], std::count(text.begin(), text.end(), '\n') - 1);
+}
+
+TEST_F(JudgeCommand, ExplainsAnExportOfAllSignals) {
+  Expect(0, Words{"export", "run", "--csv", "all.csv"});
+  EXPECT_THAT(Read("all.csv"), HasSubstr(" [1]"));
+  const Json json = Json::parse(Expect(0, With("judge", "all.csv --json")).out);
+  EXPECT_EQ(json["verdict"], "explained");
+  EXPECT_EQ(json["joints"].size(), 7U);
+}
+
+TEST_F(JudgeCommand, SaysWhatIsNotJudged) {
+  std::string text = Read("right.csv");
+  const std::string column = "tau.panda_joint4 [N m]";
+  text.replace(text.find(column), column.size(), "temperature");
+  Write("partly.csv", text);
+  const ProgramResult result = Run(With("judge", "partly.csv"));
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.out, HasSubstr("PARTLY EXPLAINED: "));
+  EXPECT_THAT(result.out, HasSubstr("not judged: panda_joint4 (no torque of it is recorded"));
+  const Json json = Json::parse(Run(With("judge", "partly.csv --json --page judge.html")).out);
+  EXPECT_EQ(json["verdict"], "partly explained");
+  EXPECT_EQ(json["not_judged"][0]["joint"], "panda_joint4");
+  EXPECT_THAT(Read("judge.html"), HasSubstr(json["verdict_text"].get<std::string>().substr(0, 40)));
+}
+
 TEST_F(JudgeCommand, DescribesColumnsAsAFileThatReadsThem) {
   Write("columns.toml", Expect(0, With("judge", "right.csv --describe")).out);
   Expect(0, With("judge", "right.csv --columns columns.toml --quiet"));

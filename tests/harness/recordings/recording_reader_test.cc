@@ -339,6 +339,11 @@ TEST(Channels, AreFoundByTheWordsOfLogs) {
   EXPECT_EQ(Guess({"t [ms]", "joint 3 angle [deg]", "joint_3_torque_cmd"}), "t q3 ");
   EXPECT_EQ(Guess({"position[0]", "position[2]", "velocity[2]"}), "q1 q3 qd3 ");
   EXPECT_EQ(Guess({"temperature_1", "comment"}), "");
+  // Brackets hold a unit: of another quantity, or none, it is no such column.
+  EXPECT_EQ(
+      Guess({"check/motion position [1]", "q2 [rad]", "tau_3 [N m]", "tau 1 ratio [1]", "effort_2 (A)"}),
+      "q2 tau3 current2 ");
+  EXPECT_EQ(Guess({"time [s]", "q1 (\u00b0)", "torque_2 [N\u00b7m]", "q3 [N m]"}), "t q1 tau2 ");
   // A free joint without a name is no joint's number.
   EXPECT_EQ(Guess({"engine/qpos.#0.x", "engine/qpos.#0.y", "engine/qpos.joint 1"}), "q1 ");
   EXPECT_EQ(GuessChannels(MakeUnknownRobot(3), {"qpos.#0.x", "qpos.joint 1"})[0].column, 1U);
@@ -350,6 +355,7 @@ TEST(Channels, AreFoundByTheWordsOfLogs) {
   EXPECT_EQ(Guess({"base.x", "base.y", "base.z"}), "") << "a pose has its quaternion";
   EXPECT_DOUBLE_EQ(GuessChannels(MakeUnknownRobot(1), {"time_ms"})[0].scale, 1e-3);
   EXPECT_DOUBLE_EQ(GuessChannels(MakeUnknownRobot(1), {"angle_deg"})[0].scale, kPi / 180.0);
+  EXPECT_DOUBLE_EQ(GuessChannels(MakeUnknownRobot(1), {"q [\u00b0]"})[0].scale, kPi / 180.0);
 }
 
 TEST(Channels, ForcesOnFeetAreThoseOfARunsLog) {

@@ -1,0 +1,269 @@
+// Recordings of an arm with turned and oblique frames: vectors are those of the file's link frames, sizes can
+// be, and what is not judged is said. The faults stand in the file's text or in the recording's columns.
+
+#include <gmock/gmock.h>
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+
+#include "harness/base/files.h"
+#include "harness/recordings/judgement_verdict.h"
+#include "tests/harness/recordings/judge_panda.h"
+
+namespace dexcheck::testing::judge_crane_test {
+namespace {
+
+using ::testing::HasSubstr;
+
+const std::string kLoad = R"(<link name="load"><inertial><origin xyz="0.02 -0.03 0.04"/><mass value="1.6"/>
+  <inertia ixx="1e-6" iyy="1e-6" izz="1e-6" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <joint name="hold" type="fixed"><origin xyz="0.03 0.05 0.11"/><parent link="wrist"/><child link="load"/></joint>)";
+
+/// @param wrist_x of the wrist's centre of mass, m. @param more elements.
+RobotDescription Crane(const std::string& wrist_x = "0.052", const std::string& more = "") {
+  const auto link = [](const std::string& name, const std::string& com, double mass, double inertia) {
+    return "<link name=\"" + name + "\"><inertial><origin xyz=\"" + com + "\"/><mass value=\"" +
+           std::to_string(mass) + "\"/><inertia ixx=\"" + std::to_string(inertia) + "\" iyy=\"" +
+           std::to_string(1.2 * inertia) + "\" izz=\"" + std::to_string(0.9 * inertia) +
+           "\" ixy=\"0\" ixz=\"0\" iyz=\"0\"/></inertial></link>";
+  };
+  const auto joint = [](const std::string& name, const std::string& parent, const std::string& child,
+                        const std::string& origin, const std::string& axis, bool turns_round = false) {
+    return "<joint name=\"" + name + "\" type=\"" + (turns_round ? "continuous" : "revolute") +
+           "\"><origin " + origin + "/><parent link=\"" + parent + "\"/><child link=\"" + child +
+           "\"/><axis xyz=\"" + axis +
+           "\"/><limit lower=\"-2.6\" upper=\"2.6\" effort=\"90\" velocity=\"3\"/></joint>";
+  };
+  const std::string text =
+      "<robot name=\"crane\"><link name=\"plinth\"/>" + link("turret", "0.012 -0.021 0.083", 4.3, 0.03) +
+      link("boom", "0.171 0.014 -0.009", 3.1, 0.03) + link("jib", "0.134 -0.017 0.021", 1.9, 0.012) +
+      link("wrist", wrist_x + " 0.008 -0.013", 0.85, 0.002) +
+      joint("swivel", "plinth", "turret", "xyz=\"0 0 0.31\"", "0 0 1") +
+      joint("lift", "turret", "boom", "xyz=\"0.04 0 0.12\" rpy=\"0 0 0.3\"", "0 1 0") +
+      joint("fold", "boom", "jib", "xyz=\"0.37 0.02 0\" rpy=\"0 0.4 0\"", "0.1 -0.99 0.1") +
+      joint("roll", "jib", "wrist", "xyz=\"0.29 0.01 0\" rpy=\"0.2 0.15 -0.5\"", "1 0 0", true) + more +
+      "</robot>";
+  const TemporaryFolder folder;
+  std::ofstream(folder.path() / "crane.urdf") << text;
+  return ReadDescription(folder.path() / "crane.urdf");
+}
+
+constexpr const char* kJoints[] = {"swivel", "lift", "fold", "roll"};
+
+/// Torques of Newton-Euler along sines, with noise of 1e-5 rad, 1e-3 rad/s and 0.01 N m.
+RecordedTable Record(const RobotDescription& robot, bool stands = false, double roll = 0.2) {
+  const RobotModel model(robot.spec);
+  TorqueRegressor regressor(model);
+  std::mt19937 random(7);
+  RecordedTable table;
+  table.names = {"time"};
+  for (const char* kind : {"q.", "qd.", "tau."})
+    for (const char* joint : kJoints) table.names.push_back(std::string(kind) + joint);
+  table.columns.resize(13);
+  const auto noise = [&](double size) { return std::normal_distribution<>(0.0, size)(random); };
+  for (int row = 0; row < 4000; ++row) {
+    const double t = 0.004 * row;
+    VectorXd q(4), qd(4), qdd(4), tau(4);
+    q << 0.1, -0.5, 0.7, roll;
+    qd.setZero();
+    qdd.setZero();
+    for (int joint = 0; joint < 4 && !stands; ++joint)
+      for (int k = 1; k <= 3; ++k) {
+        const double w = 2.0 * kPi * (0.13 + 0.03 * joint) * k, phase = joint + 2.0 * k, size = 0.5 / k;
+        q[joint] += size * std::sin(w * t + phase);
+        qd[joint] += size * w * std::cos(w * t + phase);
+        qdd[joint] -= size * w * w * std::sin(w * t + phase);
+      }
+    regressor.SetMotion(q, qd, qdd);
+    regressor.CalcTorques(tau);
+    table.columns[0].push_back(t);
+    for (Eigen::Index i = 0; i < 4; ++i) {
+      table.columns[static_cast<size_t>(1 + i)].push_back(q[i] + noise(1e-5));
+      table.columns[static_cast<size_t>(5 + i)].push_back(qd[i] + noise(1e-3));
+      table.columns[static_cast<size_t>(9 + i)].push_back(tau[i] + noise(0.01));
+    }
+  }
+  return table;
+}
+
+RecordingJudgement JudgeCrane(const RecordedTable& table) {
+  const RobotDescription robot = Crane();
+  const RobotModel model(robot.spec);
+  const TemporaryFolder folder;
+  WriteCsv(table, folder.path() / "recording.csv");
+  JudgeOptions options;
+  options.frames = ListLinkFrames(robot);
+  std::vector<Recording> recordings;
+  recordings.push_back(OpenRecordingOf(model, folder.path() / "recording.csv", ""));
+  return JudgeRecordings(model, &recordings, options);
+}
+
+void Change(RecordedTable* table, const std::string& column, const std::function<double(double)>& change) {
+  for (double& value : table->Get(column)) value = change(value);
+}
+
+TEST(JudgeCrane, ARightRecordingIsExplained) {
+  const RecordingJudgement judgement = JudgeCrane(Record(Crane()));
+  EXPECT_TRUE(judgement.Agrees()) << Tell(judgement);
+  EXPECT_TRUE(judgement.unjudged.empty());
+}
+
+TEST(JudgeCrane, ACentreOfMassIsInTheLinksFrameOfTheFile) {
+  const RecordingJudgement judgement = JudgeCrane(Record(Crane("0.082")));
+  ASSERT_TRUE(NamesOnly(judgement, "centre of mass", "link wrist", 0.03));
+  EXPECT_THAT(judgement.causes[0].faults[0].detail, HasSubstr("moved by (0.03"));
+  EXPECT_THAT(judgement.causes[0].faults[0].detail, HasSubstr("in wrist's link frame of crane.urdf"));
+}
+
+TEST(JudgeCrane, APayloadIsInTheLinksFrameOfTheFile) {
+  const RecordingJudgement judgement = JudgeCrane(Record(Crane("0.052", kLoad)));
+  ASSERT_TRUE(NamesOnly(judgement, "payload", "link wrist", 1.6)) << Tell(judgement);
+  double x = 0.0, y = 0.0, z = 0.0;
+  ASSERT_EQ(std::sscanf(judgement.causes[0].faults[0].detail.c_str(), "at (%lf, %lf, %lf)", &x, &y, &z), 3);
+  EXPECT_NEAR(x, 0.05, 0.003);
+  EXPECT_NEAR(y, 0.02, 0.003);
+  EXPECT_NEAR(z, 0.15, 0.003);
+}
+
+TEST(JudgeCrane, AJointThatMovesAndIsNotJudgedIsInTheVerdict) {
+  RecordedTable table = Record(Crane());
+  *std::find(table.names.begin(), table.names.end(), "tau.fold") = "temperature";
+  const RecordingJudgement judgement = JudgeCrane(table);
+  EXPECT_TRUE(judgement.causes.empty()) << Tell(judgement);
+  EXPECT_FALSE(judgement.Agrees());
+  const JudgementVerdict verdict = MakeVerdict(judgement, RobotModel(Crane().spec), "recording.csv");
+  EXPECT_EQ(verdict.word, "partly explained");
+  EXPECT_THAT(verdict.sentence, HasSubstr("not judged: fold (no torque of it is recorded"));
+  // One that rests all the time is no reason for doubt.
+  RecordedTable standing = Record(Crane(), /*stands=*/true);
+  *std::find(standing.names.begin(), standing.names.end(), "tau.fold") = "temperature";
+  EXPECT_TRUE(JudgeCrane(standing).Agrees()) << Tell(JudgeCrane(standing));
+}
+
+TEST(JudgeCrane, EachJointsWholeGainIsTold) {
+  RecordedTable table = Record(Crane());
+  const double gains[] = {0.105, 0.0893, 0.115, 0.244};
+  for (size_t i = 0; i < 4; ++i)
+    Change(&table, std::string("tau.") + kJoints[i], [&](double x) { return gains[i] * x; });
+  const RecordingJudgement judgement = JudgeCrane(table);
+  EXPECT_TRUE(judgement.IsWhole()) << Tell(judgement);
+  size_t told = 0;
+  for (const Explanation& one : judgement.causes) {
+    const Fault& fault = one.faults.front();
+    EXPECT_NE(fault.place, "all joints") << Tell(judgement);
+    for (size_t i = 0; i < 4; ++i) {
+      if (fault.fault != "torque gain" || fault.place != std::string("joint ") + kJoints[i]) continue;
+      EXPECT_NEAR(fault.value, gains[i], 0.03 * gains[i]) << fault.place;
+      ++told;
+    }
+  }
+  EXPECT_GE(told, 3U) << Tell(judgement);
+}
+
+TEST(JudgeCrane, AnglesThatAreWrappedAreUnwrapped) {
+  RecordedTable table = Record(Crane(), /*stands=*/false, /*roll=*/3.0);
+  Change(&table, "q.roll", [](double x) { return std::remainder(x, 2.0 * kPi); });
+  const RecordingJudgement judgement = JudgeCrane(table);
+  EXPECT_TRUE(judgement.Agrees()) << Tell(judgement);
+  EXPECT_THAT(judgement.notes,
+              ::testing::Contains(HasSubstr("times the position of roll passes from one end")));
+}
+
+TEST(JudgeCrane, VelocitiesThatAreFilteredAreToldAndNotUsed) {
+  RecordedTable table = Record(Crane());
+  for (const char* joint : kJoints) {
+    double filtered = table.Get(std::string("qd.") + joint).front();
+    Change(&table, std::string("qd.") + joint, [&](double x) { return filtered += 0.05 * (x - filtered); });
+  }
+  const RecordingJudgement judgement = JudgeCrane(table);
+  ASSERT_EQ(judgement.causes.size(), 1U) << Tell(judgement);
+  EXPECT_EQ(judgement.causes[0].faults[0].fault, "velocity lag");
+  EXPECT_EQ(judgement.causes[0].faults[0].place, "all joints");
+  EXPECT_NEAR(judgement.causes[0].faults[0].value, 0.076, 0.008);
+  EXPECT_TRUE(judgement.IsWhole());
+}
+
+TEST(JudgeCrane, VelocitiesInDegreesAreToldOnce) {
+  RecordedTable table = Record(Crane());
+  for (const char* joint : kJoints)
+    Change(&table, std::string("qd.") + joint, [](double x) { return RadToDeg(x); });
+  EXPECT_TRUE(NamesOnly(JudgeCrane(table), "velocity unit", "all joints", 180.0 / kPi));
+}
+
+TEST(JudgeCrane, LargePositionOffsetsAreFoundAlone) {
+  for (const double offset : {0.35, 0.8, -0.5}) {
+    RecordedTable table = Record(Crane());
+    Change(&table, "q.fold", [=](double x) { return x + offset; });
+    EXPECT_TRUE(NamesOnly(JudgeCrane(table), "position offset", "joint fold", offset)) << offset;
+  }
+}
+
+TEST(JudgeCrane, APositionGainOfTwoPercentIsFound) {
+  RecordedTable table = Record(Crane());
+  Change(&table, "q.lift", [](double x) { return 1.02 * x; });
+  const RecordingJudgement judgement = JudgeCrane(table);
+  ASSERT_TRUE(NamesOnly(judgement, "position gain", "joint lift", 1.02));
+  EXPECT_NEAR(judgement.causes[0].faults[0].value, 1.02, 0.002);
+}
+
+TEST(JudgeCrane, ExchangedColumnsAreToldAsOneFault) {
+  RecordedTable table = Record(Crane());
+  for (const char* kind : {"q.", "qd.", "tau."})
+    std::swap(table.Get(std::string(kind) + "swivel"), table.Get(std::string(kind) + "fold"));
+  const auto tell = [](const RecordedTable& one) { return Tell(JudgeCrane(one)); };
+  EXPECT_EQ(tell(table), "\n    joint swivel: all columns exchanged with those of fold");
+  RecordedTable sorted = Record(Crane());
+  const RecordedTable right = sorted;
+  for (const std::string kind : {"q.", "qd.", "tau."}) {
+    const char* const alphabet[] = {"fold", "lift", "roll", "swivel"};
+    for (size_t i = 0; i < 4; ++i)
+      sorted.Get(kind + kJoints[i]) = RecordedTable(right).Get(kind + alphabet[i]);
+  }
+  EXPECT_EQ(tell(sorted), "\n    all joints: columns in alphabetical order (fold, lift, roll, swivel)");
+}
+
+TEST(JudgeCrane, APushOfARobotThatStandsHasItsTimes) {
+  RecordedTable table = Record(Crane(), /*stands=*/true);
+  std::vector<double>& torque = table.Get("tau.lift");
+  for (size_t row = 2000; row < 2040; ++row) torque[row] += 3.0;
+  const RecordingJudgement judgement = JudgeCrane(table);
+  ASSERT_FALSE(judgement.causes.empty());
+  EXPECT_NEAR(judgement.causes[0].from, 8.0, 0.03) << Tell(judgement);
+  EXPECT_NEAR(judgement.causes[0].to, 8.16, 0.03) << Tell(judgement);
+}
+
+// Sizes that were told of real recordings.
+TEST(JudgeCrane, ImpossibleSizesAreNoCauses) {
+  const RobotModel model(Crane().spec);
+  const VectorXd torque = VectorXd::Constant(4, 30.0), ones = VectorXd::Ones(4);
+  const MotionExtents extents{torque, ones, 5.0 * ones, ones, 0.004};
+  const auto can_be = [&](TorqueFault::Kind kind, const VectorXd& amplitude) {
+    const std::vector<TorqueFault> all = ListTorqueFaults(model, {0, 1, 2, 3}, 1, {}, extents);
+    const auto one = std::ranges::find_if(all, [&](const TorqueFault& fault) {
+      return fault.kind == kind && static_cast<Eigen::Index>(fault.columns.size()) == amplitude.size();
+    });
+    return one != all.end() && one->is_possible(amplitude);
+  };
+  const auto number = [](double x) { return VectorXd::Constant(1, x); };
+  using enum TorqueFault::Kind;
+  for (const auto& [kind, possible, impossible] :
+       std::initializer_list<std::tuple<TorqueFault::Kind, double, double>>{{kDryFriction, 5.0, 31.0},
+                                                                            {kViscousFriction, 5.0, 80'297.0},
+                                                                            {kOffset, -5.0, 7550.0},
+                                                                            {kBacklash, 0.05, 643.0},
+                                                                            {kArmature, 0.5, 7.0},
+                                                                            {kLoadFriction, 0.2, 1.5},
+                                                                            {kTorqueGain, -2.0, 2000.0},
+                                                                            {kZero, 0.8, 3.5},
+                                                                            {kDelay, 0.02, 0.6}}) {
+    EXPECT_TRUE(can_be(kind, number(possible))) << kind << " " << possible;
+    EXPECT_FALSE(can_be(kind, number(impossible))) << kind << " " << impossible;
+  }
+  EXPECT_TRUE(can_be(kGravity, Vector3d(0.0, 9.81, 9.81))) << "on a wall";
+  EXPECT_FALSE(can_be(kGravity, Vector3d(0.0, 0.0, -16.4))) << "26.2 m/s^2";
+  EXPECT_FALSE(can_be(kAllOffsets, Eigen::Vector4d(1.0, 1.0, 40.0, 1.0)));
+}
+
+}  // namespace
+}  // namespace dexcheck::testing::judge_crane_test
