@@ -100,6 +100,21 @@ EngineCompletion Complete(const ConsistencyOptions& options, const MjcfFile& mjc
   return result;
 }
 
+/// Notes joints whose actuatorfrcrange, a word of later engines, is not the limit that the other file states.
+void NoteForceRanges(const DescriptionFile& file, const RobotDescription& other, Comparison* comparison) {
+  std::vector<std::string> names;
+  for (size_t i = 0; i < other.joints.size(); ++i) {
+    const auto range = file.force_ranges().find(other.spec.joints[i].name);
+    const std::optional<StatedForces>& forces = other.joints[i].forces;
+    if (forces && range != file.force_ranges().end() && range->second != forces->upper)
+      names.push_back(
+          fmt::format("{}: {:.6g} here, {:.6g} there", range->first, range->second, forces->upper));
+  }
+  if (!names.empty())
+    comparison->without_effect.push_back("actuatorfrcrange of " + file.path().filename().string() + ": " +
+                                         JoinNames(names));
+}
+
 /// Compares motors, wheels and shapes, and names what the compilers of MJCFs changed.
 /// @param robot the first description, with the second's names.
 void CompareBeside(const DescriptionFile& first, const RobotDescription& robot, const DescriptionFile& second,
@@ -114,6 +129,7 @@ void CompareBeside(const DescriptionFile& first, const RobotDescription& robot, 
     AppendTo(&comparison->without_effect, CompareShapes(robot, other));
   for (const size_t side : {0U, 1U}) {
     const DescriptionFile& file = side == 0 ? first : second;
+    NoteForceRanges(file, side == 0 ? other : robot, comparison);
     if (file.format() != RobotFormat::kMjcf) continue;
     NameCompiledChanges(ListCompiledChanges(file.document(), *file.CopyEngine()), {&robot, &other}, side,
                         &constants, &comparison->notes);
@@ -391,119 +407,5 @@ void LeaveOutKinematics(Comparison* comparison) {
 }
 
 }  // namespace
-
-void ExplainComparison(Comparison* comparison, double tolerance) {
-  if (comparison->result.Agrees() || !comparison->read_first || !comparison->read_second) return;
-  if (comparison->digits) tolerance = Worst(tolerance, comparison->digits->largest_within);
-  comparison->hypotheses = ExplainDifference(*comparison->read_first, *comparison->read_second,
-                                             Worst(tolerance, kHypothesisTolerance));
-  LeaveOutKinematics(comparison);
-  if (comparison->digits) {
-    std::erase_if(comparison->hypotheses, [&](const Hypothesis& hypothesis) {
-      return !comparison->digits->Concerns(hypothesis.ids, hypothesis.parts);
-    });
-  }
-}
-
-std::string DescribeNumbers(const NumberPair& numbers, const std::string& first, const std::string& second) {
-  const std::string unit = numbers.unit.empty() ? "" : " " + numbers.unit;
-  return fmt::format("{}{}{:.12g}{} in {}, {:.12g}{} in {}", numbers.component,
-                     numbers.component.empty() ? "" : ": ", numbers.first, unit, first, numbers.second, unit,
-                     second);
-}
-
-NumberPair TakeNumbers(const ConstantFinding& finding, const RobotModel& model) {
-  const bool is_prismatic = finding.location.kind == Location::Kind::kJoint &&
-                            model.joint(finding.location.first).type == JointType::kPrismatic;
-  return {NameComponent(finding.check, finding.entry), UnitOf(finding.check, is_prismatic), finding.model,
-          finding.engine};
-}
-
-namespace {
-
-/// The number of each link's body that differs most, in the link's frame; none where the files cannot be
-/// compared so.
-std::vector<ConstantFinding> FindBodyDifferences(const Comparison& comparison) {
-  if (!comparison.read_first || !comparison.read_second) return {};
-  std::array<RobotDescription, 2> sides = {*comparison.read_first, *comparison.read_second};
-  std::vector<ConstantFinding> worst;
-  try {
-    CompletePair({}, {}, &sides);
-    for (const ConstantFinding& finding :
-         CompareBodies(sides[0], sides[1], RegisterLinks(sides[0], sides[1])).findings) {
-      const auto size = [](const ConstantFinding& one) {
-        return std::abs(one.model - one.engine) / one.scale;
-      };
-      const auto known = std::ranges::find_if(worst, [&](const ConstantFinding& one) {
-        return one.check == finding.check && one.location == finding.location;
-      });
-      if (known == worst.end()) {
-        worst.push_back(finding);
-      } else if (size(finding) > size(*known)) {
-        *known = finding;
-      }
-    }
-  } catch (const InputError&) {
-    return {};
-  }
-  return worst;
-}
-
-}  // namespace
-
-Differences SortDifferences(const Comparison& comparison) {
-  const RobotModel& model = *comparison.model;
-  const int base = model.num_base_velocities();
-  const std::string first = comparison.first.filename().string();
-  const std::string second = comparison.second.filename().string();
-  const std::vector<CheckRecord>& checks = comparison.result.constants.records;
-  if (comparison.digits) return ListExcesses(*comparison.digits, first, second);
-  Differences differences;
-  const auto add = [&](double error, std::string line) {
-    const int digits = CountDigits(error);
-    const bool is_rounded = digits >= kDigitsOfRoundedInput;
-    if (is_rounded) differences.digits = std::min(differences.digits, digits);
-    (is_rounded ? differences.rounded : differences.real).push_back(std::move(line));
-  };
-  const auto add_number = [&](double error, const ConstantFinding& finding) {
-    add(error, fmt::format("{}: {}: {}{}{}", finding.check, finding.where,
-                           DescribeNumbers(TakeNumbers(finding, model), first, second),
-                           finding.effect.empty() ? "" : "; ", finding.effect));
-  };
-  for (const ConstantFinding& finding : comparison.result.constants.findings) {
-    // Where zero is a proper value, the check has another scale than the larger of the two.
-    const double size = Worst(std::abs(finding.model), std::abs(finding.engine));
-    const auto check = std::ranges::find(checks, finding.check, &CheckRecord::name);
-    const double worst = check == checks.end() ? 1.0 : check->worst;
-    add_number(std::min(std::abs(finding.model - finding.engine) / size, worst), finding);
-  }
-  std::vector<ConstantFinding> bodies;
-  if (!comparison.result.Agrees()) bodies = FindBodyDifferences(comparison);
-  for (const CheckRecord& record : comparison.result.terms) {
-    if (!record.failed) continue;
-    bool is_listed = false;
-    for (const ConstantFinding& finding : bodies) {
-      if (finding.check != record.name) continue;
-      add_number(std::abs(finding.model - finding.engine) / finding.scale, finding);
-      is_listed = true;
-    }
-    if (is_listed) continue;
-    add(record.worst,
-        fmt::format("{}: nearest the base: {}; worst: {}: {:.12g} in {}, {:.12g} in {} (sample {})",
-                    record.name, Describe(record.first_failure, model, base),
-                    Describe(record.where, model, base), record.model_value,
-                    comparison.with_engine ? "the model" : first, record.engine_value,
-                    comparison.with_engine ? "MuJoCo" : second, static_cast<long>(record.at)));
-  }
-  return differences;
-}
-
-std::vector<std::string> ListDifferences(const Comparison& comparison) {
-  Differences differences = SortDifferences(comparison);
-  std::vector<std::string> lines = std::move(differences.real);
-  lines.insert(lines.end(), differences.rounded.begin(), differences.rounded.end());
-  if (!differences.following.empty()) lines.push_back(differences.following);
-  return lines;
-}
 
 }  // namespace dexcheck

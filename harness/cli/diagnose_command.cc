@@ -217,8 +217,15 @@ std::string ToText(const DiagnoseRequest& request, const Answer& answer,
   return json.dump(2) + "\n";
 }
 
-void Require(bool is_right, const std::filesystem::path& file, const char* expected) {
-  if (!is_right) throw InputError(file.string() + ": " + expected);
+/// Numbers are repaired in a parameter file or a URDF, by an MJCF that is taken to be right.
+void RequireRepairable(const DescriptionFile& file, const DescriptionFile& mjcf) {
+  if (file.format() == RobotFormat::kMjcf)
+    throw InputError(
+        file.path().string() +
+        ": must be a parameter file or a URDF to be repaired, is an MJCF (dexcheck import writes a "
+        "parameter file from it)");
+  if (mjcf.format() != RobotFormat::kMjcf)
+    throw InputError(mjcf.path().string() + ": must be an MJCF, which is taken to be right");
 }
 
 /// What is to be repaired, completed by what only the MJCF states when it is a URDF. What a URDF has no place
@@ -279,11 +286,6 @@ int Run(DiagnoseRequest request) {
   request.options.seed = request.diagnosis.seed;
   DescriptionFile file(request.files.robot);
   DescriptionFile mjcf(request.files.mjcf);
-  Require(file.format() != RobotFormat::kMjcf, request.files.robot,
-          "must be a parameter file or a URDF to be repaired, is an MJCF (dexcheck import writes a parameter "
-          "file from it)");
-  Require(mjcf.format() == RobotFormat::kMjcf, request.files.mjcf,
-          "must be an MJCF, which is taken to be right (dexcheck consistency compares any two files)");
   CatchInterrupts();
   ResultFile json(request.json_file);
   constexpr long kStages = 4;
@@ -299,6 +301,7 @@ int Run(DiagnoseRequest request) {
     notes = comparison.notes;
   } else {
     try {
+      RequireRepairable(file, mjcf);
       answer = FindAnswer(request, file.Describe(), mjcf, progress, &hypotheses, &notes);
     } catch (const InputError& error) {
       unrepaired = error.what();

@@ -6,6 +6,7 @@
 #include <limits>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -117,8 +118,9 @@ nlohmann::json MakeMessage(const SignalInfo& signal, const Eigen::Ref<const Eige
 }
 
 /// A topic for each signal: "/object/X_o". Times count from the log's first row, for none may be below zero.
-void WriteMcap(const LogReader& log, const std::vector<SignalInfo>& signals, const ExportRequest& request) {
-  McapWriter file(request.mcap_file);
+void WriteMcap(const LogReader& log, const std::vector<SignalInfo>& signals, const ExportRequest& request,
+               McapWriter* out) {
+  McapWriter& file = *out;
   const VectorXd time = log.ReadSignal("time").col(0);
   std::vector<RowMatrixXd> values;
   std::vector<std::uint16_t> channels;
@@ -177,10 +179,13 @@ int Run(const ExportRequest& request) {
   }
   const LogReader log(request.run_folder / "log.h5");
   const std::vector<SignalInfo> signals = ListWanted(log, request);
+  ResultFile json(request.json_file);
+  std::optional<McapWriter> messages;
+  if (!request.mcap_file.empty()) messages.emplace(request.mcap_file);
   if (request.list) PrintList(log, signals);
-  if (!request.json_file.empty()) OutputFile(request.json_file).Write(ToJson(log, signals).dump(1) + "\n");
+  json.Write([&] { return ToJson(log, signals).dump(1) + "\n"; });
   if (!request.csv_file.empty()) WriteCsv(log, signals, request);
-  if (!request.mcap_file.empty()) WriteMcap(log, signals, request);
+  if (messages) WriteMcap(log, signals, request, &*messages);
   WarnOfCut(request.run_folder, log);
   return kSuccess;
 }

@@ -114,6 +114,7 @@ ExitCode Run(RenderRequest request) {
   std::vector<RunView> views;
   views.reserve(runs.size());
   for (const RecordedFrames& run : runs) views.push_back({run.model.get(), &run.frames});
+  ResultFile summary(request.json_file);
   if (!request.still && !WriteVideo(views, request.video, out, request.quiet)) return kFailure;
   if (request.still) WriteStill(request, views, out);
   if (!request.json_file.empty()) {
@@ -125,7 +126,7 @@ ExitCode Run(RenderRequest request) {
       json["frames"] = CountFrames(views, request.video.fps);
       json["frames_per_second"] = request.video.fps;
     }
-    OutputFile(request.json_file).Write(json.dump(1) + "\n");
+    summary.Write([&] { return json.dump(1) + "\n"; });
   }
   if (!request.quiet) WarnOfCut(request.run_folder, LogReader(request.run_folder / "log.h5"));
   return kSuccess;

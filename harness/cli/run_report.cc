@@ -24,14 +24,15 @@ std::string PaintStatus(const CheckRecord& check) {
 /// @param count of the checks that the row stands for; empty for one.
 void PrintCheck(const CheckRecord& check, const std::string& count = "") {
   if (!check.applies) return;
-  const bool is_reached = IsReached(check);
-  const double shown = check.failed ? check.worst : check.residual;
-  fmt::print("  {:<17}{:>3} {:<28}{:>8}{:>8.0e}  {:<4} {}{}\n", NameOf(check.kind), count, check.name,
-             is_reached ? fmt::format("{:.1e}", shown) : "-", check.bound,
-             check.unit == "1" ? "" : check.unit, PaintStatus(check),
-             is_reached && check.residual > check.bound && !check.failed
-                 ? fmt::format(", with an allowance of {:.1e}", check.allowance)
-                 : "");
+  fmt::print("  {:<17}{:>3} {:<28}", NameOf(check.kind), count, check.name);
+  if (!IsReached(check)) {
+    fmt::print("{:>8}  {}\n", "-", PaintStatus(check));
+    return;
+  }
+  fmt::print("{:>8.1e}{:>8.0e}  {:<4} {}\n", check.failed ? check.worst : check.residual, check.bound,
+             check.unit == "1" ? "" : check.unit, PaintStatus(check));
+  if (check.residual > check.bound && !check.failed)
+    fmt::print("{:22}with an allowance of {:.1e}\n", "", check.allowance);
   if (check.failed) fmt::print("{:22}from {:.3f} s\n", "", check.failed_at);
 }
 

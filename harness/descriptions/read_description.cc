@@ -115,15 +115,7 @@ RobotDescription DescriptionFile::Describe() const {
     throw InputError(path_.string() + ": is a table of bodies, which has no joints; dexcheck consistency " +
                      "compares it with a URDF, an MJCF or a parameter file");
   if (description_) return *description_;
-  RobotDescription robot = ReadMjcfDescription(*engine_, path_.string());
-  for (size_t i = 0; i < robot.joints.size(); ++i) {
-    const auto range = force_ranges_.find(robot.spec.joints[i].name);
-    if (range == force_ranges_.end()) continue;
-    std::optional<StatedForces>& forces = robot.joints[i].forces;
-    if (!forces) forces = {-range->second, range->second};
-    forces = {std::max(forces->lower, -range->second), std::min(forces->upper, range->second)};
-  }
-  return robot;
+  return ReadMjcfDescription(*engine_, path_.string());
 }
 
 std::optional<RobotDescription> DescriptionFile::TryToDescribe() const {

@@ -65,6 +65,9 @@ class DescriptionFile {
   [[nodiscard]] const std::optional<RobotDescription>& carrier() const { return carrier_; }
   /// The document. @pre the format is kMjcf, here and below.
   [[nodiscard]] const MjcfFile& document() const { return *document_; }
+  /// The largest force that joints of an MJCF allow (actuatorfrcrange), by name, N or N m. Engines before 3.0
+  /// do not know it.
+  [[nodiscard]] const std::map<std::string, double>& force_ranges() const { return force_ranges_; }
   /// A copy of the engine's model.
   [[nodiscard]] MjModelPtr CopyEngine() const;
 

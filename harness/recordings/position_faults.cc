@@ -263,43 +263,68 @@ void PositionFault::Undo(RecordedSample* sample) const {
   }
 }
 
-std::optional<PositionFault> FindPositionFault(const RobotModel& model, Recording recording) {
-  Begin begin(model, &recording);
-  std::vector<PositionFault> all = PositionFaults(model, recording, begin).List();
-  // A few samples say which are worth all of them.
-  constexpr size_t kFewSamples = 100, kFewFaults = 10;
-  std::vector<std::pair<double, PositionFault>> faults;
-  for (PositionFault& one : all) {
-    const double misfit = begin.CalcMisfit(one, std::max<size_t>(1, begin.size() / kFewSamples));
-    faults.emplace_back(misfit, std::move(one));
-  }
-  std::sort(faults.begin(), faults.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
-  faults.resize(std::min(faults.size(), kFewFaults));
-  // By a factor of three, of one joint or spread over several.
-  constexpr double kMuch = 1.1, kMuchOfNumber = 3.0;
-  const double as_read = begin.CalcMisfit({}, 1);
-  double best = as_read - kMuch;
-  std::optional<PositionFault> found;
-  for (auto& [few, fault] : faults) {
-    const double misfit = begin.CalcMisfit(fault, 1);
-    if (misfit < best) best = misfit, found = std::move(fault);
-  }
-  // A ratio and an offset are anything; a sign, an order and a unit are not.
-  const bool is_number = found && found->joint >= 0 && found->order.empty() && found->factor > 0.0;
-  const bool is_offset = is_number && found->offset != 0.0;
-  for (double step = 0.1; is_number && step > 1e-6; step *= 0.5)
+namespace {
+
+/// A ratio and an offset are anything; a sign, an order and a unit are not.
+bool HasFreeNumber(const PositionFault& fault) {
+  return fault.joint >= 0 && fault.order.empty() && fault.factor > 0.0;
+}
+
+/// Moves a fault's free number to where it explains most. @param every of so many samples one counts.
+void Refine(size_t every, Begin* begin, PositionFault* fault) {
+  if (!HasFreeNumber(*fault)) return;
+  const bool is_offset = fault->offset != 0.0;
+  double best = begin->CalcMisfit(*fault, every);
+  for (double step = 0.1; step > 1e-6; step *= 0.5)
     for (const double change : {-step, step}) {
-      PositionFault near = *found;
+      PositionFault near = *fault;
       if (is_offset) {
         near.fault.value = -(near.offset += change);
       } else {
         near.fault.value = 1.0 / (near.factor *= 1.0 + change);
       }
-      const double misfit = begin.CalcMisfit(near, 1);
-      if (misfit < best) best = misfit, found = std::move(near);
+      const double misfit = begin->CalcMisfit(near, every);
+      if (misfit < best) best = misfit, *fault = std::move(near);
     }
-  // With a free number something is always explained.
-  if (is_number && best > as_read - kMuchOfNumber) found.reset();
+}
+
+}  // namespace
+
+std::optional<PositionFault> FindPositionFault(const RobotModel& model, Recording recording) {
+  Begin begin(model, &recording);
+  std::vector<PositionFault> all = PositionFaults(model, recording, begin).List();
+  // A few samples say which are worth all of them: of each kind and place the best number.
+  constexpr size_t kFewSamples = 100, kFewFaults = 10;
+  const size_t few = std::max<size_t>(1, begin.size() / kFewSamples);
+  std::vector<std::pair<double, PositionFault>> faults;
+  for (PositionFault& one : all) {
+    const double misfit = begin.CalcMisfit(one, few);
+    const auto same = std::ranges::find_if(faults, [&](const auto& known) {
+      const PositionFault& other = known.second;
+      return HasFreeNumber(one) && HasFreeNumber(other) && one.fault.fault == other.fault.fault &&
+             one.joint == other.joint && one.has_right_rates == other.has_right_rates;
+    });
+    if (same == faults.end()) {
+      faults.emplace_back(misfit, std::move(one));
+    } else if (misfit < same->first) {
+      *same = {misfit, std::move(one)};
+    }
+  }
+  std::sort(faults.begin(), faults.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+  faults.resize(std::min(faults.size(), kFewFaults));
+  // The residual falls by a factor of three, of one joint or spread over several. With a free number
+  // something is always explained.
+  constexpr double kMuch = 1.1, kMuchOfNumber = 3.0;
+  const double as_read = begin.CalcMisfit({}, 1);
+  double best = as_read;
+  std::optional<PositionFault> found;
+  for (auto& [of_few, fault] : faults) {
+    Refine(few, &begin, &fault);  // a number is compared where it explains most
+    const double misfit = begin.CalcMisfit(fault, 1);
+    const double most = as_read - (HasFreeNumber(fault) ? kMuchOfNumber : kMuch);
+    if (misfit < std::min(best, most)) best = misfit, found = std::move(fault);
+  }
+  if (found) Refine(1, &begin, &*found);
   return found;
 }
 

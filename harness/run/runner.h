@@ -72,6 +72,11 @@ class Runner {
     result_.failure = "interrupted";
   }
 
+  void EndBy(const std::exception& error, bool settling) {
+    result_.failure = error.what() + (settling ? std::string(" while settling")
+                                               : " at t = " + FormatNumber(loop_.record().time, 6) + " s");
+  }
+
   template <typename Work>
   void Guard(const Work& work, bool settling) {
     try {
@@ -81,8 +86,9 @@ class Runner {
     } catch (const Error& error) {
       result_.controller_failed = dynamic_cast<const ControllerFailure*>(&error) != nullptr;
       result_.grasp_lost = dynamic_cast<const GraspLost*>(&error) != nullptr;
-      result_.failure = error.what() + (settling ? " while settling"
-                                                 : " at t = " + FormatNumber(loop_.record().time, 6) + " s");
+      EndBy(error, settling);
+    } catch (const std::invalid_argument& error) {
+      EndBy(error, settling);  // a number of the plant is not a number
     }
   }
 

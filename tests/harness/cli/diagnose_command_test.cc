@@ -228,7 +228,8 @@ TEST_F(MutateCommand, DisagreeingModelsAreNotMutated) {
 
 // Faults in a run: the same exit codes, a table, and JSON that a program reads.
 TEST_F(MutateCommand, CountsWhatIsFoundInARun) {
-  // The hand does not move: what acts on velocities alone survives. It costs a fiftieth of the robot's `hold`.
+  // The hand does not move: what acts on velocities alone survives. It costs a fiftieth of the robot's
+  // `hold`.
   const Json json =
       RunJson(1, "mutate --run hand-hold --set settle=0.2 --from 0.01 --duration 0.01 --numbers 4");
   EXPECT_EQ(json["complete"], true);

@@ -154,8 +154,9 @@ TEST_F(StudyCommand, FaultsAreNamed) {
                                {"merge", name, "good.sqlite"},
                                {"merge", "new.sqlite", name},
                                {"report", name, "--out", "page.html"}}) {
-      EXPECT_TRUE(Refused("study" + words, {"\"" + name + "\": a database must be a plain file"}))
-          << words[0];
+      const std::string why =
+          name.empty() ? "must not be empty" : "\"" + name + "\": a database must be a plain file";
+      EXPECT_TRUE(Refused("study" + words, {why})) << words[0];
     }
   }
   EXPECT_FALSE(Has("page.html"));

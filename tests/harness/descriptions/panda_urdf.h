@@ -82,9 +82,9 @@ inline std::string MakePandaUrdf() {
     text += fmt::format(
         "<joint name=\"panda_joint{}\" type=\"revolute\"><origin rpy=\"{}\" xyz=\"{}\"/>\n"
         "<parent link=\"panda_link{}\"/><child link=\"panda_link{}\"/><axis xyz=\"0 0 1\"/>\n"
-        R"(<limit lower="{}" upper="{}" effort="87" velocity="2"/>)"
+        R"(<limit lower="{}" upper="{}" effort="{}" velocity="2"/>)"
         "<dynamics damping=\"0.003\" friction=\"0\"/></joint>\n",
-        i, row.rpy, row.xyz, i - 1, i, row.lower, row.upper);
+        i, row.rpy, row.xyz, i - 1, i, row.lower, row.upper, i <= 4 ? 87 : 12);
   }
   return text +
          "<link name=\"panda_flange\"/>\n<joint name=\"flange_joint\" type=\"fixed\"><origin xyz=\"0 0 "

@@ -54,7 +54,7 @@ TEST_F(LogReaderTest, FilesComeBackWithTheirBytes) {
   EXPECT_EQ(MessageOf<InputError>([&] { log.ExtractFiles("inputs", folder_.path() / "out/of the log"); }),
             (folder_.path() / "out/of the log/a/all").string() + ": cannot be written: File exists");
   EXPECT_THAT(MessageOf<InputError>([&] { log.ExtractFiles("inputs", path_); }),
-              HasSubstr("log.h5/a: cannot be written: Not a directory"));
+              HasSubstr("log.h5/a: cannot be made: Not a directory"));
 }
 
 TEST_F(LogReaderTest, UnknownNamesAreNamed) {

@@ -82,7 +82,7 @@ TEST_F(JudgeBrowserTest, TwoRecordingsAreShownWithTheirCauses) {
   browser_.Open(page);
   ASSERT_TRUE(browser_.WaitFor("return [...document.querySelectorAll('[data-plot]')].every(b => b.chart);"));
   EXPECT_EQ(browser_.Run("return document.querySelectorAll('[data-plot]').length;"), 2 * 2 * kJoints);
-  EXPECT_THAT(TextOf("#verdict"), ::testing::HasSubstr("The model does not explain the recordings: "));
+  EXPECT_THAT(TextOf("#verdict"), ::testing::HasSubstr("does not explain 2 recordings; "));
   const std::string causes = TextOf("#causes ~ .card");
   EXPECT_THAT(causes, ::testing::HasSubstr("joint panda_joint4: dry friction"));
   EXPECT_THAT(causes, ::testing::HasSubstr("in second.csv")) << "the push";

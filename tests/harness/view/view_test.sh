@@ -229,7 +229,7 @@ export DEXCHECK_PYTHON=/usr/bin/python3
 start panda-reach --set duration=0.1 --set settle=0.05 --controller "$law" --out own
 await finished
 end 0
-"$dexcheck" run --replay own | grep -q IDENTICAL || fail "a run with a controller in Python is not repeated"
+"$dexcheck" run --replay own --controller "$law" | grep -q IDENTICAL || fail "a run with a controller in Python is not repeated"
 
 # Without a display: one line, exit code 2.
 code=0
