@@ -96,6 +96,7 @@ nlohmann::ordered_json ToJson(const CheckRecord& record, bool timed) {
   } else {
     json["reached"] = false;
   }
+  if (record.is_empty) json["empty"] = true;
   if (record.same_source) json["same_source"] = true;
   if (timed && record.failed) json["failed_at_s"] = record.failed_at;
   if (!record.part.empty()) json["where"] = record.part;
@@ -124,6 +125,7 @@ CheckRecord ReadCheck(const std::string& name, const nlohmann::json& json) {
   record.at = number("at_time_s");
   record.comparisons = json.value("reached", true) ? 1 : 0;
   record.same_source = json.value("same_source", false);
+  record.is_empty = json.value("empty", false);
   record.failed = IsReached(record) && !json.at("pass").get<bool>();
   record.failed_at = number("failed_at_s");
   record.part = json.value("where", "");
@@ -151,6 +153,7 @@ std::string CategoryStatus::Describe() const {
 }
 
 void CategoryStatus::Add(const CheckRecord& check) {
+  if (check.is_empty) return;
   if (!IsReached(check)) {
     ++not_reached;
     return;

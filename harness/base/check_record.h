@@ -49,6 +49,7 @@ struct CheckRecord {
   std::string description;   ///< What is measured, and against what: one line for log and report.
   double bound = 0.0;        ///< Largest value that passes.
   bool applies = true;       ///< Whether this run evaluates it at all; otherwise Add does nothing.
+  bool is_empty = false;     ///< Whether the robot has nothing that it compares, so that it is not shown.
   bool same_source = false;  ///< Both sides come from one file: agreement is no evidence.
 
   // What came of it. "When" is the time in s of a step of a run, the number of a sample elsewhere.
@@ -137,6 +138,7 @@ struct CheckRecord {
     fresh.description = std::move(description);
     fresh.bound = bound;
     fresh.applies = applies;
+    fresh.is_empty = is_empty;
     fresh.same_source = same_source;
     *this = std::move(fresh);
   }

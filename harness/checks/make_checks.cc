@@ -144,6 +144,8 @@ std::vector<Judge> MakeChecks(const Setup& setup, const JudgedLaw* law) {
     judge.record.same_source = setup.scenario().plant.type == PlantType::kRigid &&
                                (info.category == CheckCategory::kInverseDynamics ||
                                 info.category == CheckCategory::kForwardDynamics);
+    const bool has_contacts = setup.joints() == nullptr && setup.start().bonds.empty();
+    judge.record.is_empty = info.name == "contact_distance" && !has_contacts;
     const auto own = descriptions.find(info.name);
     judge.record.description = own == descriptions.end() ? info.description : own->second;
   }

@@ -86,7 +86,13 @@ StepModelCheck::StepModelCheck(const Adapter& adapter, std::span<const int> fing
       controller_(adapter.model(), ListFrames(adapter.model(), fingertips), !fingertips.empty(),
                   has_coordinates_),
       comparison_(adapter.model(), kAskedByRun, {&controller_, &engine_},
-                  ListFrames(adapter.model(), fingertips), fingertips.size()) {}
+                  ListFrames(adapter.model(), fingertips), fingertips.size()) {
+  const std::span<CheckRecord> own = comparison_.records();
+  for (size_t i = 0; i < own.size(); ++i) {
+    const auto [rows, cols] = CalcShape(comparison_.entry(i), comparison_.scales());
+    own[i].is_empty = rows * cols == 0;
+  }
+}
 
 void StepModelCheck::RaiseBounds(double least) {
   for (CheckRecord& record : comparison_.records()) record.bound = Worst(record.bound, least);

@@ -23,7 +23,7 @@ std::string PaintStatus(const CheckRecord& check) {
 
 /// @param count of the checks that the row stands for; empty for one.
 void PrintCheck(const CheckRecord& check, const std::string& count = "") {
-  if (!check.applies) return;
+  if (!check.applies || check.is_empty) return;
   fmt::print("  {:<17}{:>3} {:<28}", NameOf(check.kind), count, check.name);
   if (!IsReached(check)) {
     fmt::print("{:>8}  {}\n", "-", PaintStatus(check));

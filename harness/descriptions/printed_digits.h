@@ -19,9 +19,9 @@ struct PrintedNumber {
   double half_unit = 0.0;  ///< To which it is known; 0: it is exact.
 };
 
-/// Reads a decimal number, which is known to half a unit of its last digit. A number stands for at least three
-/// significant digits: people type 0.5 and 0.0001, and mean 0.500 and 0.000100. A whole number with fewer than
-/// four decimals (0, 1, 90.0) is exact.
+/// Reads a decimal number, which is known to half a unit of its last digit. A number stands for at least
+/// three significant digits: people type 0.5 and 0.0001, and mean 0.500 and 0.000100. A whole number with
+/// fewer than four decimals (0, 1, 90.0) is exact.
 /// @return nothing where the text is no decimal number.
 std::optional<PrintedNumber> ReadPrinted(std::string_view text);
 
