@@ -317,12 +317,8 @@ Comparison CompareFiles(DescriptionFile* a, DescriptionFile* b, const UrdfOption
   return comparison;
 }
 
-std::optional<double> FindTolerance(const std::filesystem::path& table, const std::filesystem::path& mjcf) {
-  ConsistencyOptions options;
-  options.samples = 100;
-  options.within_digits = true;
-  const ConsistencyResult result = CompareFiles(table, mjcf, {}, options).result;
-  if (!result.Agrees()) return std::nullopt;
+double CalcTolerance(const ConsistencyResult& result) {
+  constexpr double kOtherRates = 4.0;  // states of a run over the states that are compared
   double worst = 0.0;
   for (const auto* records : {&result.constants.records, &result.terms}) {
     for (const CheckRecord& record : *records) {
@@ -330,7 +326,6 @@ std::optional<double> FindTolerance(const std::filesystem::path& table, const st
     }
   }
   if (worst == 0.0) return 0.0;
-  constexpr double kOtherRates = 4.0;  // states of a run over the states that are compared
   const double unit = std::pow(10.0, std::floor(std::log10(kOtherRates * worst)));
   return std::ceil(kOtherRates * worst / unit) * unit;
 }
@@ -381,31 +376,5 @@ Comparison CompareFunctions(const std::filesystem::path& file, const TermFunctio
                        FeedRandomStates(*comparison.model, options), [](long) { return true; });
   return comparison;
 }
-
-namespace {
-
-/// Where axes, frames and Jacobians agree, no convention of them explains anything.
-void LeaveOutKinematics(Comparison* comparison) {
-  constexpr const char* kTerms[] = {"joint_axis", "frame_pose", "J"};
-  constexpr const char* kIds[] = {"origin.", "rotation.", "place.", "axis.", "zero.", "table."};
-  const bool agrees = std::ranges::all_of(kTerms, [&](const char* term) {
-    return std::ranges::any_of(comparison->result.terms, [&](const CheckRecord& record) {
-      return record.name == term && !record.failed;
-    });
-  });
-  if (!agrees) return;
-  const auto is_kinematic = [&](const std::string& id) {
-    return std::ranges::any_of(kIds, [&](const char* begin) { return id.starts_with(begin); });
-  };
-  std::vector<Hypothesis>& hypotheses = comparison->hypotheses;
-  std::erase_if(hypotheses,
-                [&](const Hypothesis& one) { return std::ranges::all_of(one.ids, is_kinematic); });
-  // Numbers that are wrong besides are listed beside a convention alone.
-  if (std::ranges::all_of(hypotheses,
-                          [](const Hypothesis& one) { return one.ids[0].starts_with("number."); }))
-    hypotheses.clear();
-}
-
-}  // namespace
 
 }  // namespace dexcheck

@@ -114,10 +114,10 @@ Comparison CompareFiles(
 Comparison CompareFiles(DescriptionFile* a, DescriptionFile* b, const UrdfOptions& urdf,
                         const ConsistencyOptions& options, const Progress& progress);
 
-/// Returns the relative tolerance to which a run's two files agree by the digits that they print: 0 where
-/// they agree to rounding, nothing where they differ. It is ten times the worst error found, rounded up to a
-/// power of ten, since the rates of a run are other ones than those of the states that are compared.
-std::optional<double> FindTolerance(const std::filesystem::path& table, const std::filesystem::path& mjcf);
+/// Returns the relative tolerance by which a run judges two files that agree: 0 where they agree to rounding.
+/// Elsewhere it is four times the worst error found, rounded up to one digit, since the states of a run are
+/// other ones than those that were compared.
+double CalcTolerance(const ConsistencyResult& result);
 
 /// What stands against a description: a program's command, or a folder with results.
 struct ResultsSource {

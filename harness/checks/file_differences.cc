@@ -3,12 +3,90 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <map>
 
 #include "controller/common/errors.h"
+#include "controller/common/text.h"
+#include "harness/base/worst.h"
 #include "harness/checks/file_comparison.h"
 #include "harness/descriptions/body_comparison.h"
 
 namespace dexcheck {
+
+namespace {
+
+constexpr double kExact = 1e9;  // times the printed precision, which is rounding then
+
+/// The values of a number that differs, and by how much.
+std::string DescribeValues(const DigitExcess& excess, const std::string& first, const std::string& second) {
+  if (!excess.placement.empty()) return excess.placement;
+  const std::string text = DescribeNumbers(excess.numbers, first, second);
+  if (!excess.effect.empty()) return text + "; " + excess.effect;
+  if (excess.too_loose > 0.0)
+    return text + fmt::format("; the printed digits tell it to {:.2g} % only", 100.0 * excess.too_loose);
+  if (excess.units >= kExact) return text + "; both numbers are exact";
+  return text + fmt::format("; {:.3g} times the printed precision", excess.units);
+}
+
+}  // namespace
+
+Differences ListExcesses(const DigitVerdict& verdict, const std::string& first, const std::string& second) {
+  Differences differences;
+  std::vector<std::string>& lines = differences.real;
+  std::vector<std::string> following;
+  std::map<std::string, std::pair<size_t, int>> repeated;  // its line, and at how many more places it is
+  double most = 0.0;
+  for (const DigitExcess& excess : verdict.excesses) {
+    if (!excess.is_cause) {
+      if (std::ranges::find(following, excess.check) == following.end()) following.push_back(excess.check);
+      most = Worst(most, excess.units);
+      continue;
+    }
+    const std::string values = DescribeValues(excess, first, second);
+    // The same two numbers, or a constant that one file leaves out, are one fault of many joints: the worst
+    // stands for all.
+    const bool is_left_out = excess.effect.find(" states it") != std::string::npos;
+    const auto [line, is_new] =
+        repeated.emplace(excess.check + (is_left_out ? "" : values), std::pair(lines.size(), 0));
+    line->second.second += is_new ? 0 : 1;
+    if (is_new) lines.push_back(excess.check + ": " + excess.where + ": " + values);
+  }
+  for (const auto& [key, line] : repeated) {
+    if (line.second > 0) lines[line.first] += fmt::format("; and so at {} more", line.second);
+  }
+  if (!following.empty())
+    differences.following =
+        fmt::format("terms that follow{}: {}",
+                    most < kExact ? fmt::format(", up to {:.3g} times the printed precision", most) : "",
+                    JoinNames(following));
+  return differences;
+}
+
+namespace {
+
+/// Where axes, frames and Jacobians agree, no convention of them explains anything.
+void LeaveOutKinematics(Comparison* comparison) {
+  constexpr const char* kTerms[] = {"joint_axis", "frame_pose", "J"};
+  constexpr const char* kIds[] = {"origin.", "rotation.", "place.", "axis.", "zero.", "table."};
+  const bool agrees = std::ranges::all_of(kTerms, [&](const char* term) {
+    return std::ranges::any_of(comparison->result.terms, [&](const CheckRecord& record) {
+      return record.name == term && !record.failed;
+    });
+  });
+  if (!agrees) return;
+  const auto is_kinematic = [&](const std::string& id) {
+    return std::ranges::any_of(kIds, [&](const char* begin) { return id.starts_with(begin); });
+  };
+  std::vector<Hypothesis>& hypotheses = comparison->hypotheses;
+  std::erase_if(hypotheses,
+                [&](const Hypothesis& one) { return std::ranges::all_of(one.ids, is_kinematic); });
+  // Numbers that are wrong besides are listed beside a convention alone.
+  if (std::ranges::all_of(hypotheses,
+                          [](const Hypothesis& one) { return one.ids[0].starts_with("number."); }))
+    hypotheses.clear();
+}
+
+}  // namespace
 
 void ExplainComparison(Comparison* comparison, double tolerance) {
   if (comparison->result.Agrees() || !comparison->read_first || !comparison->read_second) return;

@@ -116,7 +116,13 @@ std::string WriteRunnable(const InitRequest& request, const RobotDescription& ro
   TakeAssets(folder, mjcf);
   WriteFile(folder / "robot.xml", mjcf->Print());
   WriteFile(folder / "robot.toml", parameters);
-  const std::optional<double> tolerance = FindTolerance(folder / "robot.toml", folder / "robot.xml");
+  ConsistencyOptions options;
+  options.samples = 100;
+  options.within_digits = true;
+  const ConsistencyResult compared =
+      CompareFiles(folder / "robot.toml", folder / "robot.xml", {}, options).result;
+  std::optional<double> tolerance;
+  if (compared.Agrees()) tolerance = CalcTolerance(compared);
   *differ = !tolerance;
   constexpr int kHalvings = 4;
   std::string why;

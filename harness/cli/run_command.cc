@@ -85,18 +85,24 @@ LoopParts MakeParts(const RunRequest& request, const Setup& setup) {
   return parts;
 }
 
-/// Judges a pair whose numbers agree within the digits that its files print by these digits, and says so.
-void JudgeByPrintedDigits(ScenarioFiles* files) {
-  constexpr long kStates = 20;
-  if (files->scenario.tolerance > 0.0 || files->scenario.joint_task() == nullptr) return;
+/// Judges the two files of joints as consistency does: numbers that agree within their printed digits are
+/// judged by these. @return what differs; empty where the files agree, or where the scenario changes or
+/// leaves out one of them.
+std::string JudgeFiles(ScenarioFiles* files) {
+  Scenario& scenario = files->scenario;
+  const bool is_judged = scenario.tolerance == 0.0 && scenario.joint_task() != nullptr &&
+                         scenario.plant.type != PlantType::kRigid && scenario.model_overrides.empty();
+  if (!is_judged) return "";
   ConsistencyOptions options;
-  options.samples = kStates;
-  if (CompareFiles(files->robot, files->mjcf, {}, options).result.Agrees()) return;
-  const std::optional<double> tolerance = FindTolerance(files->robot, files->mjcf);
-  if (!tolerance || *tolerance == 0.0) return;
-  files->scenario.tolerance = *tolerance;
-  Warn(fmt::format("{} and {} agree within the printed digits: the model is judged to {:.0e}",
-                   files->robot.filename().string(), files->mjcf.filename().string(), *tolerance));
+  options.samples = 20;
+  options.within_digits = true;
+  const Comparison comparison = CompareFiles(files->robot, files->mjcf, {}, options);
+  if (!comparison.result.Agrees()) return ListDifferences(comparison).front();
+  scenario.tolerance = CalcTolerance(comparison.result);
+  if (scenario.tolerance > 0.0)
+    Warn(fmt::format("{} and {} agree within the printed digits: the model is judged to {:.0e}",
+                     files->robot.filename().string(), files->mjcf.filename().string(), scenario.tolerance));
+  return "";
 }
 
 int RunScenario(const RunRequest& request) {
@@ -106,7 +112,7 @@ int RunScenario(const RunRequest& request) {
     overrides.push_back("tolerance=" + FormatNumber(*tolerance));
   }
   ScenarioFiles files = FindScenario(request.scenario, overrides, request.seed);
-  if (!request.no_check) JudgeByPrintedDigits(&files);
+  const std::string difference = request.no_check ? "" : JudgeFiles(&files);
   ResultFile junit(request.junit_file);
   const Setup setup(files.scenario, files.robot, files.mjcf);
   CatchInterrupts();
@@ -123,6 +129,11 @@ int RunScenario(const RunRequest& request) {
   RunResult result = runner.result();
   LookForIntegrator(setup, runner.loop(), files.robot, files.mjcf, IsInterrupted, &result);
   JudgeGains(setup, runner.loop(), &result);
+  if (!difference.empty() && result.verdict == Verdict::kPass) {
+    result.verdict = Verdict::kDisagreement;
+    result.attribution.cause = Cause::kModel;
+    result.attribution.evidence = difference;
+  }
 
   const std::string summary = MakeSummary(setup, runner.loop(), result).dump(2) + "\n";
   if (recorder) recorder->Close(summary);
