@@ -45,10 +45,11 @@ echo "cppcheck"
 #   real ones.
 # - missingInclude, missingIncludeSystem: the headers of libraries are not given.
 # - syntaxError in the Python module: so it cannot know PYBIND11_MODULE.
+# - syntaxError in sqlite_file.cc: it does not know a constructor that is one try block.
 # - invalidLifetime in text.h: it takes a number that ParseNumber has read for a view of the text.
 cppcheck --quiet --std=c++20 --language=c++ --enable=warning,performance,portability --error-exitcode=1 -I "$root" \
   --suppress=missingReturn --suppress=legacyUninitvar --suppress=missingInclude --suppress=missingIncludeSystem \
-  '--suppress=invalidLifetime:*controller/common/text.h' --suppress=syntaxError:harness/python/module.cc "${sources[@]}" || failed=1
+  '--suppress=invalidLifetime:*controller/common/text.h' --suppress=syntaxError:harness/python/module.cc --suppress=syntaxError:harness/study/sqlite_file.cc "${sources[@]}" || failed=1
 
 echo "clang-tidy"
 # Headers are precompiled by a build only, and none is needed here; each source is looked at by itself.

@@ -63,7 +63,8 @@ const char* TitleOf(CheckCategory category) {
 void CheckRecord::Add(double value, double when, double before, double allowed) {
   if (!applies) return;
   const bool is_worst = Note(value, when);
-  // Of values that are alike once something is taken off, the one that needed most of its allowance.
+  // Among values that are equal once something is taken off, the one that needed most of its allowance
+  // counts.
   const bool needs_more =
       value == worst && CalcFraction(before, bound + allowed) > CalcFraction(residual, bound + allowance);
   if (allowed != 0.0 && (is_worst || needs_more)) {

@@ -112,7 +112,7 @@ const NamedFile* Find(const std::vector<NamedFile>& files, const NamedFile& file
   return found == files.end() ? nullptr : &*found;
 }
 
-/// What this process has read, and the targets that stand while it writes what replaces them.
+/// Files that this process has read, and targets that stand while their replacements are written.
 struct FilesInUse {
   std::mutex mutex;
   std::vector<NamedFile> inputs;

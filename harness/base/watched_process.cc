@@ -26,7 +26,7 @@ int failure_exit_code = EXIT_FAILURE;
 std::atomic<int> announcement = -1;  // the copy's end of a pipe
 std::atomic<pid_t> copy = -1;
 
-/// What a terminal sends reaches the whole group.
+/// A terminal's signal reaches the whole group.
 void PassOn(int signal, siginfo_t* info, void* /*context*/) {
   if (info->si_code != SI_KERNEL) ::kill(copy, signal);
 }

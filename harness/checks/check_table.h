@@ -82,7 +82,7 @@ struct CheckValue {
   double value = 0.0;
   int part = -1;           ///< Which joint, fingertip or pair of bodies it is of; -1 for none.
   double explained = 0.0;  ///< How much of it is known to come of the plant: taken off above the bound.
-  /// Where it is taken off already, the value without that.
+  /// The value before an allowance was taken off.
   std::optional<double> residual = {};
 };
 /// None where the step says nothing.

@@ -91,7 +91,7 @@ class MovedFile {
     return side_ == 0 ? MovedPair(own, other_, ignore_, part_) : MovedPair(other_, own, ignore_, part_);
   }
 
-  /// What the engine's diagonalisation changes is as good as the file's tensor. A larger change is no
+  /// The engine's diagonalised tensor is as good as the file's. A larger change is no
   /// rounding.
   void TakeDiagonalisation(const RobotDescription& stated) {
     const MovedPair pair = Complete(stated);

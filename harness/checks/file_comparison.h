@@ -20,7 +20,7 @@ namespace dexcheck {
 
 /// A number as two files have it.
 struct NumberPair {
-  std::string component;  ///< Of a vector, tensor or range: "Ixx", "lower"; empty for a single number.
+  std::string component;  ///< "Ixx" of a tensor, "lower" of a range; empty for a single number.
   std::string unit;       ///< Empty where it is not known.
   double first = 0.0, second = 0.0;
 };
@@ -94,7 +94,7 @@ struct Comparison {
   std::optional<RobotModel> model;
   std::vector<std::string> notes;         ///< What its reader may not expect.
   std::vector<std::string> not_compared;  ///< What only one of them has and no term depends on.
-  /// What both state and no term depends on, where it differs: one line each, with both values.
+  /// Numbers that both state, that differ and that no term depends on: one line each, with both values.
   std::vector<std::string> without_effect;
   ConsistencyResult result;
   /// Where the two do not agree to rounding and were judged by their digits, which `result` then is.
@@ -110,7 +110,7 @@ struct Comparison {
 Comparison CompareFiles(
     const std::filesystem::path& a, const std::filesystem::path& b, const UrdfOptions& urdf,
     const ConsistencyOptions& options, const Progress& progress = [](long) { return true; });
-/// The same of files that are read already. A table of bodies among them is placed on the other's robot.
+/// Compares files that are read already. A table of bodies among them is placed on the other's robot.
 Comparison CompareFiles(DescriptionFile* a, DescriptionFile* b, const UrdfOptions& urdf,
                         const ConsistencyOptions& options, const Progress& progress);
 

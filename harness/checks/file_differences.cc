@@ -64,7 +64,7 @@ Differences ListExcesses(const DigitVerdict& verdict, const std::string& first, 
 
 namespace {
 
-/// Where axes, frames and Jacobians agree, no convention of them explains anything.
+/// No convention of axes, frames and Jacobians explains anything where these agree.
 void LeaveOutKinematics(Comparison* comparison) {
   constexpr const char* kTerms[] = {"joint_axis", "frame_pose", "J"};
   constexpr const char* kIds[] = {"origin.", "rotation.", "place.", "axis.", "zero.", "table."};

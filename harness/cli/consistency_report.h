@@ -34,7 +34,7 @@ void AddJudgingOptions(Command command, ConsistencyRequest* request);
 /// Compares two files, or a file and the terms that stand in the place of the other, as the request says.
 /// Every command that judges a pair of files does it by this function.
 Comparison Compare(const ConsistencyRequest& request, const Progress& progress);
-/// The same of two files that are read already.
+/// Compares two files that are read already.
 Comparison Compare(const ConsistencyRequest& request, DescriptionFile* robot, DescriptionFile* mjcf,
                    const Progress& progress);
 

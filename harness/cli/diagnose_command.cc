@@ -246,7 +246,7 @@ RobotModel Complete(const DiagnoseRequest& request, const MjcfFile& document, Ro
   return RobotModel(robot.spec);
 }
 
-/// What would repair the first file.
+/// Returns the changes that would repair the first file.
 Answer FindAnswer(const DiagnoseRequest& request, const RobotDescription& robot, const DescriptionFile& mjcf,
                   const std::function<bool(const char*)>& progress, std::vector<Hypothesis>* hypotheses,
                   std::vector<std::string>* notes) {

@@ -195,11 +195,13 @@ std::string MakeRobotFolder(const InitRequest& request, const std::string& out, 
   AddSky(sources.mjcf.get());
   const TemporaryFolder made;
   bool differ = false;
-  const std::string why =
+  std::string why =
       WriteRunnable(request, robot, parameters, made.path(), sources.mjcf.get(), &stand, &motion, &differ);
   if (!why.empty()) return why;
   const RunFolder folder(out, "");
-  fs::copy(made.path(), folder.path(), fs::copy_options::recursive);
+  std::error_code error;
+  fs::copy(made.path(), folder.path(), fs::copy_options::recursive, error);
+  if (error) throw InputError(folder.path().string() + ": cannot be written: " + error.message());
   fmt::print("{}: robot.toml, robot.xml, motion.toml, gains.toml, .github/workflows/dexcheck.yml\n",
              folder.path().string());
   if (is_made)

@@ -1,6 +1,6 @@
 #pragma once
 
-// What `init` makes a folder of: a robot's files, read and adapted so that a run can drive it.
+// Sources of the folder that `init` makes: a robot's files, read and adapted so that a run can drive it.
 
 #include <filesystem>
 #include <map>
@@ -48,7 +48,7 @@ void AddSky(MjcfFile* mjcf);
 /// Limits of motors by joint, N m or N.
 std::map<std::string, double> ReadMotorLimits(const mjModel& m);
 
-/// Where the first key frame puts joints, rad or m; nowhere without one.
+/// Returns the joints' positions in the first key frame, rad or m; none without one.
 std::map<std::string, double> ReadHome(const mjModel& m);
 
 /// Takes away the limits of motors that cannot carry the robot.

@@ -58,7 +58,7 @@ std::optional<Matrix3d> ReadTensor(const XMLElement& inertial) {
   return std::nullopt;
 }
 
-/// What the compiler's settings do to masses and inertias; the last of several elements outweighs others.
+/// Settings of the compiler that change masses and inertias; the last of several elements outweighs others.
 struct CompilerSettings {
   explicit CompilerSettings(const XMLElement* root) {
     for (const XMLElement* compiler : ListChildren(root, "compiler")) {

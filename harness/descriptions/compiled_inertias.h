@@ -34,7 +34,7 @@ struct CompiledChange {
   std::string body;
   std::string setting;         ///< "boundmass", "boundinertia, balanceinertia"
   std::vector<double> stated;  ///< Mass, kg, or principal moments by size, kg m^2, as the text has them.
-  std::vector<double> made;    ///< The same of the engine's model.
+  std::vector<double> made;    ///< Numbers of the engine's model.
 };
 
 /// Bodies whose stated mass or inertia is not that of the engine's model.

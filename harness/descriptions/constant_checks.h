@@ -27,7 +27,7 @@ struct ConstantFinding {
   int entry = 0;  ///< Which of the numbers that the check compares there: of a vector, a range, a 3x3 tensor.
   bool engine_only = false;  ///< The analytic model has no such number: it takes the neutral value.
   std::string effect{};      ///< What it does to the motion, when one of the two leaves it out.
-  double scale = 0.0;        ///< What the difference is relative to; 0: the larger of the two numbers.
+  double scale = 0.0;        ///< Size that the difference is relative to; 0: the larger of the two numbers.
 };
 
 /// Returns a check's quantity in words, "centre of mass" of "link_com"; the check's name where it has none.

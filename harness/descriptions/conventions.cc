@@ -249,7 +249,7 @@ class TableMaker {
             return v;
           });
     }
-    // What is small by its unit alone is no zero.
+    // A number that is small by its unit alone is no zero.
     constexpr double kZero = 1e-9;  // m
     for (const Factor& unit : kLengths) {
       Add(prefix + unit.id, of, unit.words, [of, &unit](StatedPart& p, const StatedPart& right) {

@@ -24,7 +24,7 @@ std::optional<std::string> SetAsideMotors(const std::string& source, mjModel* en
 /// What two MJCFs have besides the mechanism, compared with each other.
 struct Extras {
   ConstantChecks differences;               ///< Parts of one name that both have, whose numbers differ.
-  ConstantChecks of_first;                  ///< What the first one's constant checks find besides them.
+  ConstantChecks of_first;                  ///< Findings of the first one's constant checks besides them.
   std::vector<std::string> without_effect;  ///< Options that differ and act on no compared term, a line each.
   std::vector<std::string> not_compared;    ///< Plain motors that only one of them has, a line each.
 };

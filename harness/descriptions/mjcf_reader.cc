@@ -201,7 +201,7 @@ class MjcfDescriptionReader {
     return {static_cast<int>(robot_.spec.joints.size()) - 1, stated.X_iL};
   }
 
-  /// What the limits of a joint's motors add up to; none where one of them has no limit.
+  /// Sum of the limits of a joint's motors; none where one of them has no limit.
   [[nodiscard]] std::optional<StatedForces> ReadForces(int joint) const {
     std::optional<StatedForces> sum;
     for (int i = 0; i < engine_.nu; ++i) {

@@ -23,7 +23,7 @@ struct DescribedPair {
 /// @param joint of `a`. @return nothing where the joint itself agrees and only what carries it differs.
 std::optional<std::string> DescribeJointDifference(const DescribedPair& pair, int joint);
 
-/// The same of a frame on its link: "is turned by 90 deg about z; its position agrees".
+/// Returns how a frame differs on its link: "is turned by 90 deg about z; its position agrees".
 /// @return nothing where the frame agrees on its link, and for a link's own frame.
 std::optional<std::string> DescribeFrameDifference(const DescribedPair& pair, const std::string& frame);
 

@@ -19,7 +19,7 @@ namespace {
 
 constexpr const char* kRunXacro = ": write the URDF with the program xacro first";
 
-/// What stands in the place of a number; braces are an expression that xacro has not expanded.
+/// Text in the place of a number; braces are an expression that xacro has not expanded.
 std::string QuoteValue(const std::string& value) {
   return Quote(value) + (value.find('{') == std::string::npos ? "" : kRunXacro);
 }

@@ -83,7 +83,7 @@ class LawFactors {
              std::span<const Candidate> candidates)
       : names_(names), parts_(parts), candidates_(candidates) {}
 
-  /// What several have in common is no alternative to one of them.
+  /// A factor that several have in common is no alternative to one of them.
   void DropAlternatives(CauseSelection* selection) const {
     for (CauseTerm& term : selection->terms) {
       std::erase_if(term.same, [&](const auto& same) {

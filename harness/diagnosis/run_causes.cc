@@ -89,7 +89,7 @@ class PlausibleSizes {
   std::map<std::string, double> most_;
 };
 
-/// What cannot be is not told; what only such faults would explain is not explained.
+/// Impossible faults are left out; a residual that only they would explain is not explained.
 void DropImpossible(const StepStore& store, Causes* causes) {
   const PlausibleSizes sizes(store);
   for (Explanation& one : *causes) {

@@ -9,7 +9,7 @@
 namespace dexcheck {
 namespace {
 
-/// Where a thread keeps the limit of its searches; null for none. The Python module, a shared library, has
+/// Key of the limit of a thread's searches; null for none. The Python module, a shared library, has
 /// this object, too, and takes no thread_local of it.
 pthread_key_t GetKey() {
   static const pthread_key_t key = [] {

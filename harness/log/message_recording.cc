@@ -81,7 +81,7 @@ void Flatten(const AnyJson& json, const std::string& name, TimedMessage* message
   }
 }
 
-/// What reads a message of a type; null for one that cannot be read.
+/// Reader of a message type; null for one that cannot be read.
 using Parser = TimedMessage (*)(std::string_view data, double time, const std::string& where);
 
 /// Rows of messages: those of one time are one row.
