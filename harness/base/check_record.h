@@ -189,8 +189,8 @@ const char* DescribeStatus(const CheckRecord& check);
 /// Value and bound in words: "worst 1e-8, bound 1e-6", with residual and allowance where they differ.
 std::string DescribeNumbers(const CheckRecord& check);
 
-/// As summaries and pages have it: kind, max, bound, unit, pass, where, description; of a check that is
-/// evaluated at each step (`timed`) rms, at_time_s and failed_at_s; residual and allowance where something
+/// A record as summaries and pages have it: kind, max, bound, unit, pass, where, description; of a check that
+/// is evaluated at each step (`timed`) rms, at_time_s and failed_at_s; residual and allowance where something
 /// was taken off. A timed check that was not reached has `reached` false in the place of max and pass.
 nlohmann::ordered_json ToJson(const CheckRecord& record, bool timed);
 /// The same back; JSON has no infinity, which is written as null. @throws nlohmann::json::exception.

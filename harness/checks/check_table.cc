@@ -75,7 +75,7 @@ Evaluation EvaluateDemand(const Analysis& a) {
   return CheckValue{a.law->demand, -1, a.law->demand_by_slip, a.law->demand_residual};
 }
 
-/// Where f_c is inside its cones and bounds.
+/// Optimality of the grasp force, judged where f_c is inside its cones and bounds.
 Evaluation EvaluateOptimality(const Analysis& a) {
   return a.law == nullptr ? std::nullopt : When(!(a.law->grasp_cone > 0.0), a.law->grasp_optimality);
 }

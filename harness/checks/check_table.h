@@ -132,8 +132,8 @@ std::span<const CheckInfo> ListChecks();
 /// The entry of that name; null for checks of the model.
 const CheckInfo* FindCheck(std::string_view name);
 
-/// What holds of a run whose checks passed, by those that were evaluated and are evidence: "model, law,
-/// inverse and forward dynamics, assumptions hold at every step"; and then what was not judged.
+/// Words for what holds of a run whose checks passed, by those that were evaluated and are evidence: "model,
+/// law, inverse and forward dynamics, assumptions hold at every step"; and then what was not judged.
 [[nodiscard]] std::string DescribeWhatHolds(std::span<const CheckRecord> checks);
 
 /// tc of the scenario's contacts, s: twice the time step unless it says otherwise.

@@ -17,7 +17,7 @@
 
 namespace dexcheck {
 
-/// What two descriptions need not share: constants of joints, that joints follow others, limits of motors.
+/// Differences that two descriptions may have: constants of joints, couplings, limits of motors.
 inline constexpr const char* kIgnorable[] = {"armature", "damping", "friction", "coupling", "effort"};
 
 struct ConsistencyOptions {

@@ -124,7 +124,7 @@ void CompareBeside(const DescriptionFile& first, const RobotDescription& robot, 
   const bool has_motors = std::ranges::any_of(
       constants.findings, [](const ConstantFinding& finding) { return finding.check == "motor_limit"; });
   if (!has_motors) CheckMotorsAndWheels(robot, other, &constants);
-  // Of two MJCFs each shape that can touch was compared.
+  // Each shape of two MJCFs that can touch was compared.
   if (first.format() != RobotFormat::kMjcf)
     AppendTo(&comparison->without_effect, CompareShapes(robot, other));
   for (const size_t side : {0U, 1U}) {

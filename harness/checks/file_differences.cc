@@ -167,7 +167,7 @@ Differences SortDifferences(const Comparison& comparison) {
                            finding.effect.empty() ? "" : "; ", finding.effect));
   };
   for (const ConstantFinding& finding : comparison.result.constants.findings) {
-    // Where zero is a proper value, the check has another scale than the larger of the two.
+    // A check has another scale than the larger of the two where zero is a proper value.
     const double size = Worst(std::abs(finding.model), std::abs(finding.engine));
     const auto check = std::ranges::find(checks, finding.check, &CheckRecord::name);
     const double worst = check == checks.end() ? 1.0 : check->worst;
