@@ -88,9 +88,12 @@ Browser::Browser() {
     }
     if (Clock::now() > deadline) throw std::runtime_error("chromedriver did not start");
   }
-  const Json chromium = {{"args",
-                          {"--headless=new", "--no-sandbox", "--disable-dev-shm-usage",
-                           "--use-angle=swiftshader", "--enable-unsafe-swiftshader"}}};
+  // Through a pipe, since a port's address asks for `localhost`, which a bare Debian without /etc/hosts does
+  // not know.
+  const Json chromium = {
+      {"args",
+       {"--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--use-angle=swiftshader",
+        "--enable-unsafe-swiftshader", "--remote-debugging-pipe"}}};
   // A page that draws in software beside other tests may keep a script waiting for longer than the usual 30
   // s.
   const Json wanted = {{"goog:chromeOptions", chromium},
