@@ -49,6 +49,28 @@ std::vector<UnitPoint> MakePoints(int dimensions, long count) {
   return {static_cast<size_t>(count), UnitPoint(static_cast<size_t>(dimensions))};
 }
 
+/// Morris's design: `count` trajectories of k + 1 points; each step of a trajectory moves one key, in random
+/// order, by 2/3 of its range between the levels 0, 1/3, 2/3, 1.
+std::vector<UnitPoint> MakeMorris(int dimensions, long count, std::uint64_t seed) {
+  const auto k = static_cast<size_t>(dimensions);
+  constexpr double kLevel = 1.0 / 3.0;
+  std::mt19937_64 random(seed);
+  std::vector<UnitPoint> points;
+  std::vector<size_t> order(k);
+  for (long trajectory = 0; trajectory < count; ++trajectory) {
+    UnitPoint point(k);
+    for (double& x : point) x = kLevel * static_cast<double>(random() % 4);
+    points.push_back(point);
+    ShuffleNumbers(&order, &random);
+    for (const size_t i : order) {
+      // Two levels on or back: from each of the four levels one of them stays inside.
+      point[i] += point[i] < 0.5 ? 2.0 * kLevel : -2.0 * kLevel;
+      points.push_back(point);
+    }
+  }
+  return points;
+}
+
 }  // namespace
 
 std::vector<UnitPoint> MakeLatinHypercube(int dimensions, long count, std::uint64_t seed) {
@@ -127,30 +149,31 @@ Estimate MakeEstimate(double value, std::vector<double> sample) {
   return {value, at(kOutside), at(1.0 - kOutside)};
 }
 
-}  // namespace
-
-std::vector<UnitPoint> MakeMorris(int dimensions, long count, std::uint64_t seed) {
-  const auto k = static_cast<size_t>(dimensions);
-  constexpr double kLevel = 1.0 / 3.0;
-  std::mt19937_64 random(seed);
-  std::vector<UnitPoint> points;
-  std::vector<size_t> order(k);
-  for (long trajectory = 0; trajectory < count; ++trajectory) {
-    UnitPoint point(k);
-    for (double& x : point) x = kLevel * static_cast<double>(random() % 4);
-    points.push_back(point);
-    ShuffleNumbers(&order, &random);
-    for (const size_t i : order) {
-      // Two levels on or back: from each of the four levels one of them stays inside.
-      point[i] += point[i] < 0.5 ? 2.0 * kLevel : -2.0 * kLevel;
-      points.push_back(point);
-    }
+/// The elementary effects of one key; zeros where it has none. The interval follows from samples of them.
+MorrisEffect Summarise(const std::vector<double>& effects, std::mt19937_64* random) {
+  MorrisEffect effect;
+  if (effects.empty()) return effect;
+  const auto n = static_cast<double>(effects.size());
+  double size = 0.0;
+  for (const double value : effects) {
+    effect.mean += value / n;
+    size += std::abs(value) / n;
   }
-  return points;
+  for (const double value : effects) effect.spread += (value - effect.mean) * (value - effect.mean);
+  effect.spread = std::sqrt(effect.spread / std::max(n - 1.0, 1.0));
+  std::vector<double> sizes;
+  for (int resample = 0; resample < kResamples; ++resample) {
+    double sum = 0.0;
+    for (size_t i = 0; i < effects.size(); ++i) sum += std::abs(effects[(*random)() % effects.size()]);
+    sizes.push_back(sum / n);
+  }
+  effect.size = MakeEstimate(size, sizes);
+  return effect;
 }
 
-std::vector<MorrisEffect> CalcMorrisEffects(std::span<const UnitPoint> points,
-                                            std::span<const double> values) {
+/// @param points of MakeMorris. @param values f there. Steps with a value that is not finite are left out.
+std::vector<MorrisEffect> CalcMorrisEffects(const std::vector<UnitPoint>& points,
+                                            const std::vector<double>& values) {
   if (points.empty()) return {};
   const size_t k = points.front().size();
   std::vector<std::vector<double>> effects(k);
@@ -167,29 +190,11 @@ std::vector<MorrisEffect> CalcMorrisEffects(std::span<const UnitPoint> points,
   if (std::ranges::all_of(effects, [](const auto& all) { return all.empty(); })) return {};
   std::vector<MorrisEffect> result;
   std::mt19937_64 random(kBootstrapSeed);
-  for (const std::vector<double>& all : effects) {
-    MorrisEffect effect;
-    const auto n = static_cast<double>(all.size());
-    if (!all.empty()) {
-      double size = 0.0;
-      for (const double value : all) {
-        effect.mean += value / n;
-        size += std::abs(value) / n;
-      }
-      for (const double value : all) effect.spread += (value - effect.mean) * (value - effect.mean);
-      effect.spread = std::sqrt(effect.spread / std::max(n - 1.0, 1.0));
-      std::vector<double> sample;
-      for (int resample = 0; resample < kResamples; ++resample) {
-        double sum = 0.0;
-        for (size_t j = 0; j < all.size(); ++j) sum += std::abs(all[random() % all.size()]);
-        sample.push_back(sum / n);
-      }
-      effect.size = MakeEstimate(size, sample);
-    }
-    result.push_back(effect);
-  }
+  for (const std::vector<double>& of_key : effects) result.push_back(Summarise(of_key, &random));
   return result;
 }
+
+}  // namespace
 
 Estimate CalcProbability(long failures, long trials) {
   Require(trials > 0 && failures >= 0 && failures <= trials, "failures", "must be among the trials",

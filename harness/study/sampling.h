@@ -46,20 +46,12 @@ struct Estimate {
   double high = 0.0;
 };
 
-/// Morris's design: `count` trajectories of k + 1 points; each step of a trajectory moves one key, in random
-/// order, by 2/3 of its range between the levels 0, 1/3, 2/3, 1.
-std::vector<UnitPoint> MakeMorris(int dimensions, long count, std::uint64_t seed);
-
 /// Elementary effects of a key: differences of f over a step, as of a step through the whole range.
 struct MorrisEffect {
   Estimate size;        ///< mu*, the mean of their magnitudes.
   double mean = 0.0;    ///< mu.
   double spread = 0.0;  ///< sigma: it is 0 where f is linear in this key and has no interaction.
 };
-
-/// @param points of MakeMorris. @param values f there. Steps with a value that is not finite are left out.
-std::vector<MorrisEffect> CalcMorrisEffects(std::span<const UnitPoint> points,
-                                            std::span<const double> values);
 
 /// Clopper and Pearson's interval for a probability, of `failures` in `trials` independent trials; 95 %.
 Estimate CalcProbability(long failures, long trials);

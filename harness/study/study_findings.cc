@@ -20,6 +20,18 @@ namespace {
 
 std::string CountPoints(size_t count) { return fmt::format("{} point{}", count, count == 1 ? "" : "s"); }
 
+/// "control.K_p = 4000, control.K_v = 126".
+std::string DescribeValues(const Study& study, const std::vector<double>& values) {
+  std::string text;
+  for (size_t i = 0; i < values.size(); ++i) {
+    const Variation& variation = study.variations[i];
+    text += fmt::format(
+        "{}{} = {}", i == 0 ? "" : ", ", variation.key,
+        variation.labels.empty() ? fmt::format("{:.6g}", values[i]) : FormatValue(variation, values[i]));
+  }
+  return text;
+}
+
 /// Of a point that is the best: which of its keys would go on past their ranges.
 std::string DescribeEdges(const Study& study, const std::vector<double>& values) {
   constexpr double kAtEnd = 1e-3;  // of the range
@@ -185,17 +197,6 @@ std::string MakeGainCard(const StudyInputs& inputs, const std::vector<TrialRow>&
   if (limits.empty() && edges.empty())
     card += "# limited by nothing in these ranges but the objective itself\n";
   return card + WriteJointControl(scenario, 1.0);
-}
-
-std::string DescribeValues(const Study& study, const std::vector<double>& values) {
-  std::string text;
-  for (size_t i = 0; i < values.size(); ++i) {
-    const Variation& variation = study.variations[i];
-    text += fmt::format(
-        "{}{} = {}", i == 0 ? "" : ", ", variation.key,
-        variation.labels.empty() ? fmt::format("{:.6g}", values[i]) : FormatValue(variation, values[i]));
-  }
-  return text;
 }
 
 double ShowObjective(const Study& study, const JudgedPoint& point, size_t objective) {

@@ -15,9 +15,6 @@
 
 namespace dexcheck {
 
-/// "control.K_p = 4000, control.K_v = 126".
-std::string DescribeValues(const Study& study, const std::vector<double>& values);
-
 /// A point's objective as the user wrote it: of `maximize` with its own sign again.
 double ShowObjective(const Study& study, const JudgedPoint& point, size_t objective = 0);
 

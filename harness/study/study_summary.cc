@@ -41,20 +41,18 @@ class Summary {
     });
   }
 
-  StudySummary Make() {
-    StudySummary summary;
-    Json& json = summary.json;
-    json = {{"name", study_.name},
-            {"description", study_.description},
-            {"scenario", study_.scenario},
-            {"overrides", study_.overrides},
-            {"check", study_.check},
-            {"seeds", study_.seeds.size()},
-            {"is_search", study_.is_search()},
-            {"is_grid", study_.sample.method == SamplingMethod::kGrid && !study_.is_search()},
-            {"done", rows_.size()},
-            {"total", CountTrials(study_)},
-            {"error", kMetrics[error_].name}};
+  Json MakeJson() {
+    Json json = {{"name", study_.name},
+                 {"description", study_.description},
+                 {"scenario", study_.scenario},
+                 {"overrides", study_.overrides},
+                 {"check", study_.check},
+                 {"seeds", study_.seeds.size()},
+                 {"is_search", study_.is_search()},
+                 {"is_grid", study_.sample.method == SamplingMethod::kGrid && !study_.is_search()},
+                 {"done", rows_.size()},
+                 {"total", CountTrials(study_)},
+                 {"error", kMetrics[error_].name}};
     json["outcomes"] = ListOutcomes();
     json["findings"] = ListFindings(study_, rows_);
     json["gain_card"] = MakeGainCard(inputs_, rows_);
@@ -71,8 +69,21 @@ class Summary {
     json["failures"] = ListFailures();
     json["history"] = ListHistory();
     json["maximize"] = !study_.objectives.empty() && study_.objectives.front().maximize;
-    summary.values = PackValues();
-    return summary;
+    return json;
+  }
+
+  /// The numbers of the trials that MakeJson chose to be shown.
+  [[nodiscard]] std::string PackValues() const {
+    std::string bytes;
+    const auto add = [&](double value) { bytes.append(reinterpret_cast<const char*>(&value), sizeof value); };
+    for (const TrialRow* row : shown_) {
+      add(static_cast<double>(row->trial.number));
+      add(static_cast<double>(row->trial.seed));
+      add(static_cast<double>(row->result.outcome));
+      for (const double parameter : row->trial.parameters) add(parameter);
+      for (const double metric : row->result.metrics) add(metric);
+    }
+    return bytes;
   }
 
  private:
@@ -164,6 +175,7 @@ class Summary {
     for (const Metric metric : metrics) (*best)["heads"].push_back(LabelOf(metric));
     for (size_t i = 0; i < std::min(admitted.size(), kMostBest); ++i) {
       std::vector<double> values;
+      values.reserve(metrics.size());
       for (const Metric metric : metrics) values.push_back(admitted[i]->result.metrics[metric]);
       AddBest(*admitted[i], admitted[i]->trial.parameters, values, best);
     }
@@ -185,7 +197,7 @@ class Summary {
                         {"spread", effect.spread}});
       }
       const std::string unit = ShowUnit(quantity);
-      list.push_back({{"quantity", quantity + (unit.empty() ? "" : "," + unit)},
+      list.push_back({{"quantity", unit.empty() ? quantity : fmt::format("{},{}", quantity, unit)},
                       {"method", "morris"},
                       {"left_out", sensitivity.left_out},
                       {"keys", keys}});
@@ -253,19 +265,6 @@ class Summary {
     return failures;
   }
 
-  [[nodiscard]] std::string PackValues() const {
-    std::string bytes;
-    const auto add = [&](double value) { bytes.append(reinterpret_cast<const char*>(&value), sizeof value); };
-    for (const TrialRow* row : shown_) {
-      add(static_cast<double>(row->trial.number));
-      add(static_cast<double>(row->trial.seed));
-      add(static_cast<double>(row->result.outcome));
-      for (const double parameter : row->trial.parameters) add(parameter);
-      for (const double metric : row->result.metrics) add(metric);
-    }
-    return bytes;
-  }
-
   /// The points of a search.
   [[nodiscard]] Json ListHistory() const {
     Json history = Json::array();
@@ -292,10 +291,11 @@ class Summary {
 }  // namespace
 
 StudySummary SummariseStudy(const StudyStore& store) {
-  StudySummary summary = Summary(store).Make();
+  Summary summary(store);
+  Json json = summary.MakeJson();
   for (const char* column : {"dexcheck_version", "git_revision", "mujoco_version"})
-    summary.json["versions"][column] = store.Identify(column);
-  return summary;
+    json["versions"][column] = store.Identify(column);
+  return {std::move(json), summary.PackValues()};
 }
 
 }  // namespace dexcheck
