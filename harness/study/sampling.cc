@@ -189,6 +189,7 @@ std::vector<MorrisEffect> CalcMorrisEffects(const std::vector<UnitPoint>& points
   }
   if (std::ranges::all_of(effects, [](const auto& all) { return all.empty(); })) return {};
   std::vector<MorrisEffect> result;
+  result.reserve(k);
   std::mt19937_64 random(kBootstrapSeed);
   for (const std::vector<double>& of_key : effects) result.push_back(Summarise(of_key, &random));
   return result;

@@ -38,12 +38,10 @@ std::string DescribeEdges(const Study& study, const std::vector<double>& values)
   std::string text;
   for (size_t i = 0; i < study.variations.size(); ++i) {
     const Variation& variation = study.variations[i];
-    const std::vector<double>& grid = variation.values;
-    if (!variation.labels.empty() || (grid.empty() ? variation.from == variation.to : grid.size() < 3))
-      continue;
-    const auto [low, high] = std::minmax_element(grid.begin(), grid.end());
-    const double fraction =
-        grid.empty() ? FractionOf(variation, values[i]) : (values[i] - *low) / (*high - *low);
+    const bool is_range = variation.values.empty();
+    if (!variation.labels.empty() || (!is_range && variation.values.size() < 3)) continue;
+    const double fraction = is_range ? FractionOf(variation, values[i])
+                                     : (values[i] - variation.from) / (variation.to - variation.from);
     if (fraction > kAtEnd && fraction < 1.0 - kAtEnd) continue;
     text += (text.empty() ? " At an end of its range is " : ", ") + variation.key;
   }

@@ -205,32 +205,34 @@ class Summary {
     return list;
   }
 
-  /// Rows of points that are drawn by a hash of their number, at most so many: the trials of all seeds of a
-  /// point, or none. A step through the rows would meet the same values of a grid's keys again
-  /// and again.
-  [[nodiscard]] std::vector<const TrialRow*> DrawPoints(const std::vector<const TrialRow*>& rows,
-                                                        size_t most) const {
-    if (rows.size() <= most) return rows;
+  /// All rows, or of more than kMostShown those of points that are drawn by a hash of their number: the
+  /// trials of all seeds of a point, or none. A step through the rows would meet the same values of a grid's
+  /// keys again and again.
+  [[nodiscard]] std::vector<const TrialRow*> DrawPoints() const {
     const long trials = CountTrialsOfPoint(study_);
-    const long together = static_cast<size_t>(trials) > most ? 1 : trials;  // one point alone is too many
+    // The trials of a point stay together, unless one point alone has too many.
+    const long together = static_cast<size_t>(trials) > kMostShown ? 1 : trials;
     const RandomStream stream(/*seed=*/0, "page");
     std::vector<std::pair<double, const TrialRow*>> drawn;
-    drawn.reserve(rows.size());
-    for (const TrialRow* row : rows)
-      drawn.emplace_back(stream.Uniform(static_cast<std::uint64_t>(row->trial.number / together)), row);
-    std::ranges::sort(drawn);  // rows are of one vector, by number
-    size_t end = most;
-    while (end > 0 && drawn[end].first == drawn[end - 1].first) --end;
-    std::vector<const TrialRow*> result;
-    for (size_t i = 0; i < end; ++i) result.push_back(drawn[i].second);
-    std::ranges::sort(result);
-    return result;
+    drawn.reserve(rows_.size());
+    for (const TrialRow& row : rows_)
+      drawn.emplace_back(stream.Uniform(static_cast<std::uint64_t>(row.trial.number / together)), &row);
+    if (drawn.size() > kMostShown) {
+      std::ranges::sort(drawn);
+      size_t end = kMostShown;
+      while (end > 0 && drawn[end].first == drawn[end - 1].first) --end;
+      drawn.resize(end);
+    }
+    std::vector<const TrialRow*> rows;
+    rows.reserve(drawn.size());
+    for (const auto& [place, row] : drawn) rows.push_back(row);
+    std::ranges::sort(rows);  // by number, as those of one vector
+    return rows;
   }
 
   /// All trials, or a drawn part; apart from these the best, to which the table leads.
   void ChooseShown() {
-    for (const TrialRow& row : rows_) shown_.push_back(&row);
-    shown_ = DrawPoints(shown_, kMostShown);
+    shown_ = DrawPoints();
     std::ranges::sort(best_);
     std::ranges::set_difference(best_, shown_, std::back_inserter(added_));
     shown_.insert(shown_.end(), added_.begin(), added_.end());
@@ -268,7 +270,7 @@ class Summary {
   /// The points of a search.
   [[nodiscard]] Json ListHistory() const {
     Json history = Json::array();
-    if (!study_.is_search() || study_.objectives.empty()) return history;
+    if (!study_.is_search()) return history;
     for (const JudgedPoint& point : JudgePoints(study_, rows_)) {
       history.push_back({{"trial", point.number * CountTrialsOfPoint(study_)},
                          {"value", ShowObjective(study_, point)},
