@@ -42,7 +42,7 @@ if [[ $purpose == tests || $purpose == development ]]; then
   packages+=(
     libgtest-dev libgmock-dev libbenchmark-dev coinor-csdp hdf5-tools
     sqlite3 slurm-wlm munge strace xz-utils
-    chromium chromium-driver python3-numpy python3-optuna python3-h5py doxygen
+    chromium chromium-driver python3-numpy python3-h5py doxygen
     xvfb xdotool imagemagick tmux zsh bash-completion groff-base
     # the Python module
     pybind11-dev python3-dev python3-pytest

@@ -192,7 +192,7 @@ std::vector<long> MakeTrials(const StudyInputs& inputs, const std::vector<Trial>
 std::vector<long> MakeSearch(const StudyInputs& inputs, const StudyRequest& request, StudyStore* store) {
   ProgressBar bar(inputs.study.name, CountTrials(inputs.study), request.quiet);
   RunSearch(inputs, MakeRunOptions(request, &bar), store);
-  SearchHistory history(inputs.study, FindSearchStart(inputs.study));
+  SearchHistory history(inputs.study);
   for (const TrialRow& row : StudyStore::Open(request.database).ReadRows()) history.Add(row);
   std::vector<long> missing;
   for (const Trial& trial : history.ListMissing()) missing.push_back(trial.number);
@@ -231,7 +231,7 @@ int RunStudy(const StudyRequest& request) {
   }
   if (request.quiet) return kSuccess;
   const StudyStore made = StudyStore::Open(request.database);
-  fmt::print("{}\n", Wrap(FindProgress(made).text, 2));
+  fmt::print("{}\n", Wrap(DescribeProgress(made), 2));
   fmt::print("{}", MakeGainCard(inputs, made.ReadRows(0, /*with_machine=*/false)));
   const std::map<Outcome, long> outcomes = made.CountOutcomes();
   if (outcomes.count(Outcome::kCrashed) + outcomes.count(Outcome::kTimedOut) > 0) {
@@ -264,7 +264,7 @@ int MergeStudies(const std::string& out, const std::vector<std::string>& databas
   for (const std::string& database : databases) StudyStore::Open(database).RequireSame(first.identity());
   AddToDatabase(out, first, databases);
   const StudyStore merged = StudyStore::Open(out);
-  if (!quiet) fmt::print("{}\n", Wrap(FindProgress(merged).text, 2));
+  if (!quiet) fmt::print("{}\n", Wrap(DescribeProgress(merged), 2));
   if (first.study().is_search()) return kSuccess;
   const long count = CountTrials(first.study());
   const std::vector<long> done = merged.ListNumbers();

@@ -1,19 +1,15 @@
 #include <fmt/format.h>
 
-#include <chrono>
 #include <cmath>
 #include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
-#include <thread>
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
-#include "harness/base/interrupts.h"
 #include "harness/cli/commands.h"
 #include "harness/cli/output_file.h"
-#include "harness/cli/terminal.h"
 #include "harness/study/study_findings.h"
 #include "harness/study/study_store.h"
 
@@ -46,25 +42,6 @@ int ShowTrial(const std::string& database, long number, const std::string& json)
   }
   fmt::print("{}\n", MakeReplayCommand(study, row.trial));
   return kSuccess;
-}
-
-int WatchStudy(const std::string& database, double interval, const std::string& page) {
-  CatchInterrupts();
-  while (true) {
-    const StudyStore store = StudyStore::Open(database);
-    const StudyProgress progress = FindProgress(store);
-    fmt::print("{}\n\n", Wrap(progress.text, 2));
-    std::fflush(stdout);
-    if (!page.empty()) {
-      OutputFile out(page);
-      out.Write(MakeStudyPage(SummariseStudy(store), progress.is_over ? 0.0 : interval));
-    }
-    if (progress.is_over) return kSuccess;
-    const auto end = std::chrono::steady_clock::now() + std::chrono::duration<double>(interval);
-    constexpr auto kNap = std::chrono::milliseconds(50);
-    while (std::chrono::steady_clock::now() < end && !IsInterrupted()) std::this_thread::sleep_for(kNap);
-    if (IsInterrupted()) throw Error(database + ": no longer watched: interrupted");
-  }
 }
 
 }  // namespace
@@ -106,18 +83,6 @@ void AddStudyReadCommands(Command study) {
     WriteStudyCsv(store, [&](std::string_view text) { file.Append(std::string(text)); });
     file.Finish();
     return kSuccess;
-  });
-
-  Command watch = study.AddCommand("watch", "Print how far a study has come, until it is done");
-  add_database(watch);
-  const auto interval = std::make_shared<double>(5.0);
-  watch.AddOption("--interval S", interval.get(), "Seconds between two looks")
-      .Check(NumberFrom(0.1, 86400.0))
-      .ShowDefault();
-  watch.AddOption("--page FILE.html", out.get(), "Write the study's page at each look; it renews itself");
-  watch.SetAction([=] {
-    RequirePageName(*out);
-    return WatchStudy(*database, *interval, *out);
   });
 }
 

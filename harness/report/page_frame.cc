@@ -74,8 +74,6 @@ std::string EscapeTitle(const std::string& text) {
 
 std::string AssemblePage(const PageParts& parts) {
   std::string page = "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n";
-  if (parts.renew > 0.0)
-    page += fmt::format("<meta http-equiv=\"refresh\" content=\"{:.0f}\">\n", std::ceil(parts.renew));
   page += fmt::format(
       "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
       "<meta http-equiv=\"Content-Security-Policy\" content=\"{}\">\n<title>{} – dexcheck</title>\n"

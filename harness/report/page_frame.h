@@ -53,7 +53,6 @@ struct PageParts {
   std::vector<const char*> markup;   ///< Of the body.
   std::string data;                  ///< Elements, as EmbedJson and EmbedBytes make them.
   std::vector<const char*> scripts;  ///< After dom.js, in their order.
-  double renew = 0.0;                ///< Seconds after which a browser loads it again; 0 for never.
 };
 
 /// The whole document.

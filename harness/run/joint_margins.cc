@@ -44,8 +44,7 @@ std::vector<VectorXd> ListPostures(const Setup& setup) {
   return postures;
 }
 
-}  // namespace
-
+/// When the scenario's law is evaluated, and by how much torques and all that is measured are late.
 SampledLoop FindTiming(const Scenario& scenario) {
   SampledLoop loop;
   loop.time_step = scenario.plant.time_step;
@@ -54,6 +53,8 @@ SampledLoop FindTiming(const Scenario& scenario) {
   loop.latency = CountSteps(scenario.imperfections.sensing.latency, loop.time_step);
   return loop;
 }
+
+}  // namespace
 
 std::optional<LinearLoop> LineariseJoints(const Setup& setup, const JointGains& gains,
                                           const Eigen::Ref<const VectorXd>& q) {

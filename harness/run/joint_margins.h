@@ -13,9 +13,6 @@
 
 namespace dexcheck {
 
-/// When the scenario's law is evaluated, and by how much torques and all that is measured are late.
-SampledLoop FindTiming(const Scenario& scenario);
-
 /// The loop at rest in a posture: the law with these gains, of the controller's model, linearised by central
 /// differences; the plant's own mass matrix, viscous damping and gravity; sampling, delays, lags and filters
 /// as the scenario has them. What is not linear (encoder counts, dry friction, limits) is left out.

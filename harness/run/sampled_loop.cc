@@ -22,7 +22,26 @@ void Shift(Index first, Index length, MatrixXd* x, MatrixXd* values) {
   for (Index i = 0; i < length; ++i) x->middleRows(first + i * n, n).swap(*values);
 }
 
-}  // namespace
+/// Steps states of a LinearLoop, several at a time: one in each column.
+class LoopChain {
+ public:
+  explicit LoopChain(const LinearLoop& loop);
+
+  /// Number of entries of a state: q, v, the filtered rate, the lag, what was sent and measured before.
+  [[nodiscard]] Index size() const { return size_; }
+  /// Measures, at the beginning of a step. @returns K q + V v of what is measured (n x columns).
+  MatrixXd Measure(MatrixXd* x) const;
+  /// The rest of the step. @param c torques sent (n x columns).
+  void Move(const MatrixXd& c, MatrixXd* x) const;
+
+ private:
+  MatrixXd Delay(const MatrixXd& c, MatrixXd* x) const;
+
+  LinearLoop loop_;
+  Index n_, late_ = 0, size_ = 0;
+  double fraction_ = 0.0;  // of a step by which the delay is more than a whole number of them
+  MatrixXd A_, B_;         // of the plant's [q; v]
+};
 
 LoopChain::LoopChain(const LinearLoop& loop) : loop_(loop), n_(loop.M.rows()) {
   const double h = loop.timing.time_step;
@@ -34,7 +53,7 @@ LoopChain::LoopChain(const LinearLoop& loop) : loop_(loop), n_(loop.M.rows()) {
   if (fraction_ < kRounding * std::max(1.0, steps)) fraction_ = 0.0;
   late_ = static_cast<Index>(whole);
   size_ = (4 + 2 * loop.timing.latency + late_ + 1) * n_;
-  if (loop_.lag.size() == 0) loop_.lag.setConstant(n_, loop.timing.lag);
+  if (loop_.lag.size() == 0) loop_.lag.setZero(n_);
 
   MatrixXd F = MatrixXd::Zero(2 * n_, 2 * n_), E = MatrixXd::Zero(2 * n_, n_);
   const Eigen::LLT<MatrixXd> M(loop.M);
@@ -93,6 +112,8 @@ void LoopChain::Move(const MatrixXd& c, MatrixXd* x) const {
   }
   x->topRows(2 * n_) = (A_ * x->topRows(2 * n_) + B_ * u).eval();
 }
+
+}  // namespace
 
 SampledSystem CalcSampledSystem(const LinearLoop& loop) {
   const LoopChain chain(loop);

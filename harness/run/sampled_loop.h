@@ -34,43 +34,16 @@ struct SampledLoop {
   long latency = 0;         ///< Age of what is measured, steps.
   double low_pass =
       1.0;  ///< Fraction of a rate's change that its filter lets through at each step; 1 for no filter.
-  double lag = 0.0;  ///< Time constant of the motors, s.
   [[nodiscard]] double period() const { return static_cast<double>(hold) * time_step; }
-  /// Nothing is late and nothing filtered.
-  [[nodiscard]] bool is_direct() const {
-    return delay == 0.0 && latency == 0 && low_pass == 1.0 && lag == 0.0;
-  }
-  bool operator==(const SampledLoop&) const = default;
 };
 
 /// Plant and law, n x n. M, D, G as above; K and V are the law's. Units of the joints.
 struct LinearLoop {
   SampledLoop timing;
-  VectorXd lag;                 ///< Of each motor, s; in the place of that of `timing`. Empty for none.
+  VectorXd lag;                 ///< Time constant of each motor, s. Empty for none.
   bool steps_together = false;  ///< Runge-Kutta's method.
   MatrixXd M, D, G;
   MatrixXd K, V;
-};
-
-/// Steps states of a LinearLoop, several at a time: one in each column.
-class LoopChain {
- public:
-  explicit LoopChain(const LinearLoop& loop);
-
-  /// Number of entries of a state: q, v, the filtered rate, the lag, what was sent and measured before.
-  [[nodiscard]] Eigen::Index size() const { return size_; }
-  /// Measures, at the beginning of a step. @returns K q + V v of what is measured (n x columns).
-  MatrixXd Measure(MatrixXd* x) const;
-  /// The rest of the step. @param c torques sent (n x columns).
-  void Move(const MatrixXd& c, MatrixXd* x) const;
-
- private:
-  MatrixXd Delay(const MatrixXd& c, MatrixXd* x) const;
-
-  LinearLoop loop_;
-  Eigen::Index n_, late_ = 0, size_ = 0;
-  double fraction_ = 0.0;  // of a step by which the delay is more than a whole number of them
-  MatrixXd A_, B_;         // of the plant's [q; v]
 };
 
 /// One period: x <- A x + B c, c = -C x.

@@ -11,7 +11,7 @@
 
 namespace dexcheck {
 
-/// What becomes of an objective's values at the trials of one point (its seeds and nested draws).
+/// What becomes of an objective's values at the trials of one point, one for each seed.
 enum class Aggregate { kMean, kWorst, kQuantile };
 
 /// An expression of metrics that is to be small, or large.

@@ -49,6 +49,28 @@ std::vector<UnitPoint> MakePoints(int dimensions, long count) {
   return {static_cast<size_t>(count), UnitPoint(static_cast<size_t>(dimensions))};
 }
 
+/// Morris's design: `count` trajectories of k + 1 points; each step of a trajectory moves one key, in random
+/// order, by 2/3 of its range between the levels 0, 1/3, 2/3, 1.
+std::vector<UnitPoint> MakeMorris(int dimensions, long count, std::uint64_t seed) {
+  const auto k = static_cast<size_t>(dimensions);
+  constexpr double kLevel = 1.0 / 3.0;
+  std::mt19937_64 random(seed);
+  std::vector<UnitPoint> points;
+  std::vector<size_t> order(k);
+  for (long trajectory = 0; trajectory < count; ++trajectory) {
+    UnitPoint point(k);
+    for (double& x : point) x = kLevel * static_cast<double>(random() % 4);
+    points.push_back(point);
+    ShuffleNumbers(&order, &random);
+    for (const size_t i : order) {
+      // Two levels on or back: from each of the four levels one of them stays inside.
+      point[i] += point[i] < 0.5 ? 2.0 * kLevel : -2.0 * kLevel;
+      points.push_back(point);
+    }
+  }
+  return points;
+}
+
 }  // namespace
 
 std::vector<UnitPoint> MakeLatinHypercube(int dimensions, long count, std::uint64_t seed) {
@@ -98,8 +120,6 @@ std::vector<UnitPoint> MakeUnitPoints(const Sample& sample, int dimensions) {
                        sample.scramble ? std::optional<std::uint64_t>(sample.seed) : std::nullopt);
     case SamplingMethod::kRandom:
       return MakeRandom(dimensions, sample.count, sample.seed);
-    case SamplingMethod::kSaltelli:
-      return MakeSaltelli(dimensions, sample.count, sample.seed);
     case SamplingMethod::kMorris:
       return MakeMorris(dimensions, sample.count, sample.seed);
     case SamplingMethod::kLatinHypercube:
@@ -110,15 +130,7 @@ std::vector<UnitPoint> MakeUnitPoints(const Sample& sample, int dimensions) {
 }
 
 long CountUnitPoints(const Sample& sample, int dimensions) {
-  if (sample.method == SamplingMethod::kSaltelli) return sample.count * (dimensions + 2);
-  if (sample.method == SamplingMethod::kMorris) return sample.count * (dimensions + 1);
-  return sample.count;
-}
-
-int CountMostDimensions(const Sample& sample) {
-  if (sample.method == SamplingMethod::kSobol) return kMaxSobolDimensions;
-  if (sample.method == SamplingMethod::kSaltelli) return kMaxSobolDimensions / 2;
-  return std::numeric_limits<int>::max();
+  return sample.method == SamplingMethod::kMorris ? sample.count * (dimensions + 1) : sample.count;
 }
 
 namespace {
@@ -137,109 +149,31 @@ Estimate MakeEstimate(double value, std::vector<double> sample) {
   return {value, at(kOutside), at(1.0 - kOutside)};
 }
 
-/// f at one block of Saltelli's design.
-struct Block {
-  double A, B;
-  std::span<const double> A_B;
-};
-
-/// Indices from some blocks, by number. @return first and total, key by key; empty when f does not vary.
-std::vector<std::pair<double, double>> CalcIndices(const std::vector<Block>& blocks,
-                                                   const std::vector<size_t>& chosen, size_t dimensions) {
-  const auto count = static_cast<double>(chosen.size());
-  double mean = 0.0;
-  for (const size_t j : chosen) mean += 0.5 * (blocks[j].A + blocks[j].B) / count;
-  double variance = 0.0;
-  for (const size_t j : chosen) {
-    const double a = blocks[j].A - mean;
-    const double b = blocks[j].B - mean;
-    variance += 0.5 * (a * a + b * b) / count;
+/// The elementary effects of one key; zeros where it has none. The interval follows from samples of them.
+MorrisEffect Summarise(const std::vector<double>& effects, std::mt19937_64* random) {
+  MorrisEffect effect;
+  if (effects.empty()) return effect;
+  const auto n = static_cast<double>(effects.size());
+  double size = 0.0;
+  for (const double value : effects) {
+    effect.mean += value / n;
+    size += std::abs(value) / n;
   }
-  if (!(variance > 0.0)) return {};
-  std::vector<std::pair<double, double>> indices(dimensions, {0.0, 0.0});
-  for (const size_t j : chosen) {
-    const Block& block = blocks[j];
-    for (size_t i = 0; i < dimensions; ++i) {
-      const double step = block.A_B[i] - block.A;
-      indices[i].first += (block.B - mean) * step / (count * variance);
-      indices[i].second += 0.5 * step * step / (count * variance);
-    }
-  }
-  return indices;
-}
-
-}  // namespace
-
-std::vector<UnitPoint> MakeSaltelli(int dimensions, long count, std::uint64_t seed) {
-  const auto k = static_cast<size_t>(dimensions);
-  std::vector<UnitPoint> points;
-  points.reserve(static_cast<size_t>(count) * (k + 2));
-  for (const UnitPoint& both : MakeSobol(2 * dimensions, count, seed)) {
-    const UnitPoint A(both.begin(), both.begin() + dimensions);
-    const UnitPoint B(both.begin() + dimensions, both.end());
-    points.push_back(A);
-    points.push_back(B);
-    for (size_t i = 0; i < k; ++i) {
-      points.push_back(A);
-      points.back()[i] = B[i];
-    }
-  }
-  return points;
-}
-
-std::vector<SobolIndex> CalcSobolIndices(std::span<const double> values, int dimensions) {
-  const auto k = static_cast<size_t>(dimensions);
-  std::vector<Block> blocks;
-  for (size_t begin = 0; begin + k + 2 <= values.size(); begin += k + 2) {
-    const std::span<const double> block = values.subspan(begin, k + 2);
-    if (!std::ranges::all_of(block, [](double value) { return std::isfinite(value); })) continue;
-    blocks.push_back({block[0], block[1], block.subspan(2)});
-  }
-  if (blocks.size() < 2) return {};
-  std::vector<size_t> chosen(blocks.size());
-  std::iota(chosen.begin(), chosen.end(), size_t{0});
-  const auto whole = CalcIndices(blocks, chosen, k);
-  if (whole.empty()) return {};
-  std::vector<std::vector<double>> first(k);
-  std::vector<std::vector<double>> total(k);
-  std::mt19937_64 random(kBootstrapSeed);
+  for (const double value : effects) effect.spread += (value - effect.mean) * (value - effect.mean);
+  effect.spread = std::sqrt(effect.spread / std::max(n - 1.0, 1.0));
+  std::vector<double> sizes;
   for (int resample = 0; resample < kResamples; ++resample) {
-    for (size_t& j : chosen) j = random() % blocks.size();
-    const auto indices = CalcIndices(blocks, chosen, k);
-    for (size_t i = 0; i < indices.size(); ++i) {
-      first[i].push_back(indices[i].first);
-      total[i].push_back(indices[i].second);
-    }
+    double sum = 0.0;
+    for (size_t i = 0; i < effects.size(); ++i) sum += std::abs(effects[(*random)() % effects.size()]);
+    sizes.push_back(sum / n);
   }
-  std::vector<SobolIndex> indices;
-  for (size_t i = 0; i < k; ++i) {
-    indices.push_back({MakeEstimate(whole[i].first, first[i]), MakeEstimate(whole[i].second, total[i])});
-  }
-  return indices;
+  effect.size = MakeEstimate(size, sizes);
+  return effect;
 }
 
-std::vector<UnitPoint> MakeMorris(int dimensions, long count, std::uint64_t seed) {
-  const auto k = static_cast<size_t>(dimensions);
-  constexpr double kLevel = 1.0 / 3.0;
-  std::mt19937_64 random(seed);
-  std::vector<UnitPoint> points;
-  std::vector<size_t> order(k);
-  for (long trajectory = 0; trajectory < count; ++trajectory) {
-    UnitPoint point(k);
-    for (double& x : point) x = kLevel * static_cast<double>(random() % 4);
-    points.push_back(point);
-    ShuffleNumbers(&order, &random);
-    for (const size_t i : order) {
-      // Two levels on or back: from each of the four levels one of them stays inside.
-      point[i] += point[i] < 0.5 ? 2.0 * kLevel : -2.0 * kLevel;
-      points.push_back(point);
-    }
-  }
-  return points;
-}
-
-std::vector<MorrisEffect> CalcMorrisEffects(std::span<const UnitPoint> points,
-                                            std::span<const double> values) {
+/// @param points of MakeMorris. @param values f there. Steps with a value that is not finite are left out.
+std::vector<MorrisEffect> CalcMorrisEffects(const std::vector<UnitPoint>& points,
+                                            const std::vector<double>& values) {
   if (points.empty()) return {};
   const size_t k = points.front().size();
   std::vector<std::vector<double>> effects(k);
@@ -255,30 +189,13 @@ std::vector<MorrisEffect> CalcMorrisEffects(std::span<const UnitPoint> points,
   }
   if (std::ranges::all_of(effects, [](const auto& all) { return all.empty(); })) return {};
   std::vector<MorrisEffect> result;
+  result.reserve(k);
   std::mt19937_64 random(kBootstrapSeed);
-  for (const std::vector<double>& all : effects) {
-    MorrisEffect effect;
-    const auto n = static_cast<double>(all.size());
-    if (!all.empty()) {
-      double size = 0.0;
-      for (const double value : all) {
-        effect.mean += value / n;
-        size += std::abs(value) / n;
-      }
-      for (const double value : all) effect.spread += (value - effect.mean) * (value - effect.mean);
-      effect.spread = std::sqrt(effect.spread / std::max(n - 1.0, 1.0));
-      std::vector<double> sample;
-      for (int resample = 0; resample < kResamples; ++resample) {
-        double sum = 0.0;
-        for (size_t j = 0; j < all.size(); ++j) sum += std::abs(all[random() % all.size()]);
-        sample.push_back(sum / n);
-      }
-      effect.size = MakeEstimate(size, sample);
-    }
-    result.push_back(effect);
-  }
+  for (const std::vector<double>& of_key : effects) result.push_back(Summarise(of_key, &random));
   return result;
 }
+
+}  // namespace
 
 Estimate CalcProbability(long failures, long trials) {
   Require(trials > 0 && failures >= 0 && failures <= trials, "failures", "must be among the trials",
@@ -291,18 +208,15 @@ Estimate CalcProbability(long failures, long trials) {
 }
 
 std::vector<size_t> Sensitivity::ListByImportance() const {
-  std::vector<size_t> keys(std::max(sobol.size(), morris.size()));
+  std::vector<size_t> keys(effects.size());
   std::iota(keys.begin(), keys.end(), size_t{0});
-  const auto importance = [&](size_t i) {
-    return sobol.empty() ? morris[i].size.value : sobol[i].total.value;
-  };
-  std::ranges::stable_sort(keys, [&](size_t a, size_t b) { return importance(a) > importance(b); });
+  std::ranges::stable_sort(keys, std::ranges::greater{}, [&](size_t i) { return effects[i].size.value; });
   return keys;
 }
 
 Sensitivity AnalyseSensitivity(const Study& study, const std::vector<TrialRow>& rows,
                                const std::string& expression) {
-  const int dimensions = static_cast<int>(study.num_keys());
+  const int dimensions = static_cast<int>(study.variations.size());
   const long per_point = CountTrialsOfPoint(study);
   const auto count = static_cast<size_t>(CountUnitPoints(study.sample, dimensions));
   std::vector<double> values(count, 0.0);
@@ -319,11 +233,7 @@ Sensitivity AnalyseSensitivity(const Study& study, const std::vector<TrialRow>& 
     values[i] = done[i] == per_point ? values[i] / static_cast<double>(per_point) : std::nan("");
     if (!std::isfinite(values[i])) ++sensitivity.left_out;
   }
-  if (study.sample.method == SamplingMethod::kSaltelli) {
-    sensitivity.sobol = CalcSobolIndices(values, dimensions);
-  } else {
-    sensitivity.morris = CalcMorrisEffects(MakeUnitPoints(study.sample, dimensions), values);
-  }
+  sensitivity.effects = CalcMorrisEffects(MakeUnitPoints(study.sample, dimensions), values);
   return sensitivity;
 }
 
@@ -336,43 +246,27 @@ std::vector<std::string> ListQuantities(const Study& study, const std::vector<Tr
 }
 
 std::string Describe(const Study& study, const Sensitivity& sensitivity) {
-  constexpr size_t kNamed = 3;
-  constexpr double kMatters = 0.01;  // of the variance
-  if (sensitivity.empty()) return sensitivity.expression + " does not vary, or too few trials were held.";
+  constexpr size_t kMostNamed = 3;
+  constexpr double kSmall = 0.1;
+  const std::vector<MorrisEffect>& effects = sensitivity.effects;
+  if (effects.empty()) return sensitivity.expression + " does not vary, or too few trials were held.";
   const std::vector<size_t> keys = sensitivity.ListByImportance();
+  const size_t named = std::min(kMostNamed, keys.size());
   std::string text = sensitivity.expression + ":";
-  size_t named = 0;
-  for (const size_t i : keys) {
-    if (named == kNamed) break;
-    const std::string& key = study.variations[i].key;
-    const std::string separator = named == 0                                   ? " "
-                                  : named + 1 == std::min(kNamed, keys.size()) ? " and "
-                                                                               : ", ";
-    if (sensitivity.sobol.empty()) {
-      const MorrisEffect& effect = sensitivity.morris[i];
-      text +=
-          fmt::format("{}{} moves it by {:.3g} ({:.3g} to {:.3g}){} over its range", separator, key,
-                      effect.size.value, effect.size.low, effect.size.high, ShowUnit(sensitivity.expression));
-    } else {
-      const SobolIndex& index = sensitivity.sobol[i];
-      text += fmt::format("{}{} explains {:.0f} % ({:.0f} to {:.0f}) of its variance, {:.0f} % alone",
-                          separator, key, 100.0 * index.total.value, 100.0 * index.total.low,
-                          100.0 * index.total.high, 100.0 * std::max(index.first.value, 0.0));
-    }
-    ++named;
+  for (size_t i = 0; i < named; ++i) {
+    const Estimate& size = effects[keys[i]].size;
+    text += fmt::format("{} {} moves it by {:.3g} ({:.3g} to {:.3g}){} over its range",
+                        i == 0          ? ""
+                        : i + 1 < named ? ","
+                                        : " and",
+                        study.variations[keys[i]].key, size.value, size.low, size.high,
+                        ShowUnit(sensitivity.expression));
   }
-  if (sensitivity.sobol.empty()) {
-    constexpr double kSmall = 0.1;
-    const double largest = sensitivity.morris[keys.front()].size.value;
-    const auto idle = std::ranges::count_if(
-        keys, [&](size_t i) { return sensitivity.morris[i].size.high < kSmall * largest; });
-    if (idle > 0)
-      text += fmt::format("; {} of {} keys move it by less than a tenth of the first", idle, keys.size());
-  } else {
-    const auto idle =
-        std::ranges::count_if(keys, [&](size_t i) { return sensitivity.sobol[i].total.high < kMatters; });
-    if (idle > 0) text += fmt::format("; {} of {} keys explain less than 1 %", idle, keys.size());
-  }
+  const double largest = effects[keys.front()].size.value;
+  const auto idle = std::ranges::count_if(
+      effects, [&](const MorrisEffect& effect) { return effect.size.high < kSmall * largest; });
+  if (idle > 0)
+    text += fmt::format("; {} of {} keys move it by less than a tenth of the first", idle, keys.size());
   if (sensitivity.left_out > 0) text += fmt::format(" ({} points have no value)", sensitivity.left_out);
   return text + ".";
 }

@@ -36,8 +36,6 @@ std::vector<UnitPoint> MakeRandom(int dimensions, long count, std::uint64_t seed
 std::vector<UnitPoint> MakeUnitPoints(const Sample& sample, int dimensions);
 /// How many points those are.
 long CountUnitPoints(const Sample& sample, int dimensions);
-/// How many dimensions they may have.
-int CountMostDimensions(const Sample& sample);
 
 // Which key matters: designs of points, and what follows from the values there.
 
@@ -48,29 +46,6 @@ struct Estimate {
   double high = 0.0;
 };
 
-/// Saltelli's design [Saltelli 2010]: `count` blocks of k + 2 points each: A, B, and for each key i the point
-/// AB_i, which is A with B's coordinate i. (A, B) are points of a scrambled Sobol sequence in 2 k dimensions.
-std::vector<UnitPoint> MakeSaltelli(int dimensions, long count, std::uint64_t seed);
-
-/// Fractions of the variance of f over the cube.
-struct SobolIndex {
-  Estimate first;  ///< V(E(f | x_i)) / V(f): of key i alone.
-  Estimate total;  ///< E(V(f | all but x_i)) / V(f): of key i and all its interactions.
-};
-
-/// With f centred at its mean, from N blocks:
-///   S_i  = sum_j f(B_j) (f(AB_ij) - f(A_j)) / (N V)         [Saltelli 2010]
-///   ST_i = sum_j (f(A_j) - f(AB_ij))^2 / (2 N V)            [Jansen 1999]
-/// and V from all f(A_j), f(B_j). Intervals are percentiles of bootstrap samples of the blocks.
-/// @param values f at the points of MakeSaltelli, in their order. Blocks with a value that is not finite are
-/// left out.
-/// @returns one for each dimension; empty when fewer than two blocks are left or f does not vary.
-std::vector<SobolIndex> CalcSobolIndices(std::span<const double> values, int dimensions);
-
-/// Morris's design: `count` trajectories of k + 1 points; each step of a trajectory moves one key, in random
-/// order, by 2/3 of its range between the levels 0, 1/3, 2/3, 1.
-std::vector<UnitPoint> MakeMorris(int dimensions, long count, std::uint64_t seed);
-
 /// Elementary effects of a key: differences of f over a step, as of a step through the whole range.
 struct MorrisEffect {
   Estimate size;        ///< mu*, the mean of their magnitudes.
@@ -78,25 +53,19 @@ struct MorrisEffect {
   double spread = 0.0;  ///< sigma: it is 0 where f is linear in this key and has no interaction.
 };
 
-/// @param points of MakeMorris. @param values f there. Steps with a value that is not finite are left out.
-std::vector<MorrisEffect> CalcMorrisEffects(std::span<const UnitPoint> points,
-                                            std::span<const double> values);
-
 /// Clopper and Pearson's interval for a probability, of `failures` in `trials` independent trials; 95 %.
 Estimate CalcProbability(long failures, long trials);
 
 // Which of a study's keys matters for what.
 
-/// What the points of a study with `method = "saltelli"` or `"morris"` show of one quantity.
+/// What the points of a study with `method = "morris"` show of one quantity.
 struct Sensitivity {
-  std::string expression;            ///< Of metrics.
-  std::vector<SobolIndex> sobol;     ///< Of "saltelli", by key.
-  std::vector<MorrisEffect> morris;  ///< Of "morris", by key.
-  long left_out = 0;                 ///< Points without a value: a trial was not held, or is missing.
+  std::string expression;             ///< Of metrics.
+  std::vector<MorrisEffect> effects;  ///< By key; empty where no two points of a step have a value.
+  long left_out = 0;                  ///< Points without a value: a trial was not held, or is missing.
 
-  /// Keys by their total index or effect, the largest first.
+  /// Keys by the size of their effect, the largest first.
   [[nodiscard]] std::vector<size_t> ListByImportance() const;
-  [[nodiscard]] bool empty() const { return sobol.empty() && morris.empty(); }
 };
 
 /// Of a point's trials the mean is taken.
@@ -106,7 +75,7 @@ Sensitivity AnalyseSensitivity(const Study& study, const std::vector<TrialRow>& 
 /// The quantities of a study of this kind: its objectives, else its metrics, else the error of its trials.
 std::vector<std::string> ListQuantities(const Study& study, const std::vector<TrialRow>& rows);
 
-/// "energy: x1 explains 62 % of the variance, 55 to 70 %, with its interactions; then ...".
+/// "energy: x1 moves it by 62 (55 to 70) J, x2 ... over its range.".
 std::string Describe(const Study& study, const Sensitivity& sensitivity);
 
 }  // namespace dexcheck

@@ -1,21 +1,39 @@
-// Pagmo's algorithms evaluate a generation point by point. None of a generation's points depends on the
-// values of another one of it, so that a generation can be had beforehand: a copy of the algorithm runs until
-// it has named all its points and is then abandoned by an exception. When the values are known, the algorithm
-// itself makes the same generation.
-
 #include <algorithm>
 #include <cmath>
 #include <nlopt.hpp>
 #include <pagmo/algorithms/cmaes.hpp>
-#include <pagmo/algorithms/nsga2.hpp>
 #include <pagmo/population.hpp>
 #include <pagmo/problem.hpp>
-#include <variant>
 
 #include "harness/study/search.h"
 
 namespace dexcheck {
 namespace {
+
+/// Into [0, 1], as by mirrors at both ends: an algorithm that knows no bounds sees a continuous function. The
+/// mirrors stand a little outside, so that a best point on the edge is found exactly.
+UnitPoint MirrorIntoUnit(UnitPoint point) {
+  constexpr double kEdge = 0.1;                  // so far outside a point counts as one on the edge
+  constexpr double kPeriod = 1.0 + 2.0 * kEdge;  // from mirror to mirror
+  for (double& x : point) {
+    const double y = std::fmod(std::abs(x + kEdge), 2.0 * kPeriod);
+    x = std::clamp((y > kPeriod ? 2.0 * kPeriod - y : y) - kEdge, 0.0, 1.0);
+  }
+  return point;
+}
+
+/// A number that orders judgements as IsBetter does: the objective where it is feasible, else more than any
+/// objective.
+double CalcPenalised(const Judgement& judgement) {
+  // More than any objective, and still in the order of the violations.
+  constexpr double kInfeasible = 1e100;
+  return judgement.is_feasible() ? judgement.objectives.front() : kInfeasible * (1.0 + judgement.violation);
+}
+
+// Pagmo's CMA-ES evaluates a generation point by point. None of a generation's points depends on the values
+// of another one of it, so that a generation can be had beforehand: a copy of the algorithm runs until it has
+// named all its points and is then abandoned by an exception. When the values are known, the algorithm itself
+// makes the same generation.
 
 /// All points of a generation are known.
 struct GenerationIsNamed {};
@@ -23,9 +41,8 @@ struct GenerationIsNamed {};
 /// What a generation's evaluations are made of.
 struct Generation {
   size_t size = 0;
-  std::vector<std::vector<double>> points;  ///< Named so far.
-  std::vector<std::vector<double>>
-      values;  ///< Of the points in their order; empty while they are only to be named.
+  std::vector<UnitPoint> points;            ///< Named so far.
+  std::vector<std::vector<double>> values;  ///< Of the points; empty while they are only to be named.
   size_t next = 0;
 };
 
@@ -33,96 +50,64 @@ struct Generation {
 struct GenerationProblem {
   std::shared_ptr<Generation> generation = std::make_shared<Generation>();
   size_t dimensions = 1;
-  size_t objectives = 1;
 
   [[nodiscard]] std::vector<double> fitness(const std::vector<double>& x) const {
     if (!generation->values.empty()) return generation->values.at(generation->next++);
     generation->points.push_back(x);
     if (generation->points.size() == generation->size) throw GenerationIsNamed();
-    return std::vector<double>(objectives, 0.0);
+    return {0.0};
   }
   [[nodiscard]] std::pair<std::vector<double>, std::vector<double>> get_bounds() const {
     return {std::vector<double>(dimensions, 0.0), std::vector<double>(dimensions, 1.0)};
   }
-  [[nodiscard]] std::vector<double>::size_type get_nobj() const { return objectives; }
 };
 
-class PopulationSearcher : public Searcher {
+// One generation at a time, that never ends by itself; what was learnt is kept.
+constexpr double kAutomatic = -1.0;
+constexpr double kNever = 0.0;
+
+class CmaEsSearcher : public Searcher {
  public:
-  PopulationSearcher(const Search& search, size_t objectives, const UnitPoint& start)
-      : problem_{std::make_shared<Generation>(), start.size(), objectives},
+  CmaEsSearcher(const Search& search, const UnitPoint& start)
+      : problem_{std::make_shared<Generation>(), start.size()},
         population_(pagmo::problem(problem_), 0U, static_cast<unsigned>(search.seed)),
-        first_(MakeLatinHypercube(static_cast<int>(start.size()), search.population, search.seed)) {
+        first_(MakeLatinHypercube(static_cast<int>(start.size()), search.population, search.seed)),
+        algorithm_(1U, kAutomatic, kAutomatic, kAutomatic, kAutomatic, search.step, kNever, kNever,
+                   /*memory=*/true, /*force_bounds=*/false, static_cast<unsigned>(search.seed)) {
     first_.front() = start;
     problem_.generation->size = first_.size();
-    const auto seed = static_cast<unsigned>(search.seed);
-    // One generation at a time, that never ends by itself; CMA-ES keeps what it has learnt.
-    constexpr double kAutomatic = -1.0;
-    constexpr double kNever = 0.0;
-    if (search.method == SearchMethod::kCmaEs) {
-      algorithm_.emplace<pagmo::cmaes>(1U, kAutomatic, kAutomatic, kAutomatic, kAutomatic, search.step,
-                                       kNever, kNever,
-                                       /*memory=*/true, /*force_bounds=*/false, seed);
-    } else {
-      // Deb's own settings: crossover 0.9 with index 15, mutation of one key in a point with index 20.
-      constexpr double kCrossover = 0.9;
-      constexpr double kCrossoverIndex = 15.0;
-      constexpr double kMutationIndex = 20.0;
-      algorithm_.emplace<pagmo::nsga2>(1U, kCrossover, kCrossoverIndex,
-                                       1.0 / static_cast<double>(start.size()), kMutationIndex, seed);
-    }
   }
 
   std::vector<UnitPoint> Ask() override {
-    if (!is_begun_) return first_;
-    Generation& generation = *problem_.generation;
-    generation.points.clear();
-    generation.values.clear();
+    if (population_.size() == 0) return first_;
+    *problem_.generation = {.size = first_.size()};
     try {
-      auto copy = algorithm_;
-      std::visit([&](const auto& algorithm) { static_cast<void>(algorithm.evolve(population_)); }, copy);
+      const pagmo::cmaes copy = algorithm_;
+      static_cast<void>(copy.evolve(population_));
     } catch (const GenerationIsNamed&) {
     }
-    std::vector<UnitPoint> queried = generation.points;
+    std::vector<UnitPoint> queried = problem_.generation->points;
     for (UnitPoint& point : queried) point = MirrorIntoUnit(std::move(point));
     return queried;
   }
 
   void Tell(const std::vector<Judgement>& judgements) override {
     std::vector<std::vector<double>> values;
-    for (const Judgement& judgement : judgements) {
-      values.emplace_back();
-      for (size_t i = 0; i < judgement.objectives.size(); ++i)
-        values.back().push_back(CalcPenalised(judgement, i));
-    }
-    if (!is_begun_) {
+    for (const Judgement& judgement : judgements) values.push_back({CalcPenalised(judgement)});
+    if (population_.size() == 0) {
       for (size_t i = 0; i < first_.size(); ++i) population_.push_back(first_[i], values[i]);
-      is_begun_ = true;
       return;
     }
-    Generation& generation = *problem_.generation;
-    generation.values = std::move(values);
-    generation.next = 0;
-    population_ =
-        std::visit([&](const auto& algorithm) { return algorithm.evolve(population_); }, algorithm_);
+    problem_.generation->values = std::move(values);
+    population_ = algorithm_.evolve(population_);
   }
 
  private:
   GenerationProblem problem_;
   pagmo::population population_;
   std::vector<UnitPoint> first_;
-  std::variant<pagmo::cmaes, pagmo::nsga2> algorithm_;
-  bool is_begun_ = false;
+  pagmo::cmaes algorithm_;
 };
-
-}  // namespace
-
-std::unique_ptr<Searcher> MakePopulationSearcher(const Search& search, size_t num_objectives,
-                                                 const UnitPoint& start) {
-  return std::make_unique<PopulationSearcher>(search, num_objectives, start);
-}
-
-namespace {
 
 // NLopt calls the function itself and cannot be stopped in between. So each question begins it anew: it is
 // given the values that are known, and at the first point without one they are stopped. That takes n^2 calls
@@ -132,7 +117,6 @@ namespace {
 struct Descent {
   UnitPoint start;
   std::vector<double> values;  ///< Of the points that were tried.
-  bool is_over = false;
 };
 
 /// What one call of NLopt's function needs.
@@ -149,12 +133,12 @@ double Evaluate(const std::vector<double>& x, std::vector<double>& /*gradient*/,
   throw nlopt::forced_stop();
 }
 
-class LocalSearcher : public Searcher {
+class NelderMeadSearcher : public Searcher {
  public:
-  LocalSearcher(const Search& search, const UnitPoint& start) : search_(search) {
+  NelderMeadSearcher(const Search& search, const UnitPoint& start) : search_(search) {
     const auto dimensions = static_cast<int>(start.size());
     for (UnitPoint& point : MakeLatinHypercube(dimensions, search.starts, search.seed)) {
-      descents_.push_back({std::move(point), {}, false});
+      descents_.push_back({std::move(point), {}});
     }
     descents_.front().start = start;
   }
@@ -163,10 +147,8 @@ class LocalSearcher : public Searcher {
     queried_.clear();
     std::vector<UnitPoint> points;
     for (Descent& descent : descents_) {
-      if (descent.is_over) continue;
       const UnitPoint point = FindNext(descent);
-      descent.is_over = point.empty();
-      if (descent.is_over) continue;
+      if (point.empty()) continue;
       queried_.push_back(&descent);
       points.push_back(point);
     }
@@ -181,6 +163,7 @@ class LocalSearcher : public Searcher {
   }
 
  private:
+  /// Empty when the search is over.
   [[nodiscard]] UnitPoint FindNext(const Descent& descent) const {
     nlopt::opt method(nlopt::LN_NELDERMEAD, static_cast<unsigned>(descent.start.size()));
     Replay replay{&descent, 0, {}};
@@ -212,8 +195,9 @@ class LocalSearcher : public Searcher {
 
 }  // namespace
 
-std::unique_ptr<Searcher> MakeLocalSearcher(const Search& search, const UnitPoint& start) {
-  return std::make_unique<LocalSearcher>(search, start);
+std::unique_ptr<Searcher> MakeSearcher(const Search& search, const UnitPoint& start) {
+  if (search.method == SearchMethod::kCmaEs) return std::make_unique<CmaEsSearcher>(search, start);
+  return std::make_unique<NelderMeadSearcher>(search, start);
 }
 
 }  // namespace dexcheck

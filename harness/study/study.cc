@@ -10,7 +10,7 @@ namespace dexcheck {
 namespace {
 
 /// Points of the variations' product, the last one fastest.
-std::vector<std::vector<double>> MakeGrid(std::span<const Variation> variations) {
+std::vector<std::vector<double>> MakeGrid(const std::vector<Variation>& variations) {
   std::vector<std::vector<double>> points = {{}};
   for (const Variation& variation : variations) {
     std::vector<std::vector<double>> longer;
@@ -26,18 +26,11 @@ std::vector<std::vector<double>> MakeGrid(std::span<const Variation> variations)
   return points;
 }
 
-std::vector<std::vector<double>> MakePoints(const Sample& sample, std::span<const Variation> variations) {
-  if (sample.method == SamplingMethod::kGrid) return MakeGrid(variations);
-  const int dimensions = static_cast<int>(variations.size());
-  std::vector<UnitPoint> points = MakeUnitPoints(sample, dimensions);
-  for (UnitPoint& point : points) {
-    point = ValuesAt(variations, point);
-  }
+std::vector<std::vector<double>> MakePoints(const Study& study) {
+  if (study.sample.method == SamplingMethod::kGrid) return MakeGrid(study.variations);
+  std::vector<UnitPoint> points = MakeUnitPoints(study.sample, static_cast<int>(study.variations.size()));
+  for (UnitPoint& point : points) point = ValuesAt(study.variations, point);
   return points;
-}
-
-std::span<const Variation> NestedOf(const Study& study) {
-  return {study.variations.data() + study.num_keys(), study.num_nested};
 }
 
 }  // namespace
@@ -65,26 +58,13 @@ double FractionOf(const Variation& variation, double value) {
   return std::clamp(fraction, 0.0, 1.0);
 }
 
-std::vector<double> ValuesAt(std::span<const Variation> variations, const std::vector<double>& fractions) {
+std::vector<double> ValuesAt(const std::vector<Variation>& variations, const std::vector<double>& fractions) {
   std::vector<double> values;
   for (size_t i = 0; i < fractions.size(); ++i) values.push_back(ValueAt(variations[i], fractions[i]));
   return values;
 }
 
-std::vector<double> FractionsOf(std::span<const Variation> variations, const std::vector<double>& values) {
-  std::vector<double> fractions;
-  for (size_t i = 0; i < values.size(); ++i) fractions.push_back(FractionOf(variations[i], values[i]));
-  return fractions;
-}
-
-std::vector<std::vector<double>> ListDraws(const Study& study) {
-  return MakePoints(study.nested, NestedOf(study));
-}
-
-long CountTrialsOfPoint(const Study& study) {
-  const long draws = study.num_nested == 0 ? 1 : study.nested.count;
-  return draws * static_cast<long>(study.seeds.size());
-}
+long CountTrialsOfPoint(const Study& study) { return static_cast<long>(study.seeds.size()); }
 
 long CountTrials(const Study& study) {
   constexpr double kMost = 1e18;
@@ -92,32 +72,27 @@ long CountTrials(const Study& study) {
   if (study.is_search()) {
     points = static_cast<double>(study.search.count);
   } else if (study.sample.method != SamplingMethod::kGrid) {
-    points = static_cast<double>(CountUnitPoints(study.sample, static_cast<int>(study.num_keys())));
+    points = static_cast<double>(CountUnitPoints(study.sample, static_cast<int>(study.variations.size())));
   } else {
-    for (const Variation& variation : study.keys()) points *= static_cast<double>(variation.values.size());
+    for (const Variation& variation : study.variations)
+      points *= static_cast<double>(variation.values.size());
   }
   return std::lround(std::min(points * static_cast<double>(CountTrialsOfPoint(study)), kMost));
 }
 
-std::vector<Trial> ListTrialsOfPoint(const Study& study, long number, const std::vector<double>& point,
-                                     const std::vector<std::vector<double>>& draws) {
+std::vector<Trial> ListTrialsOfPoint(const Study& study, long number, const std::vector<double>& point) {
   std::vector<Trial> trials;
   long next = number * CountTrialsOfPoint(study);
-  for (const std::vector<double>& draw : draws) {
-    std::vector<double> parameters = point;
-    parameters.insert(parameters.end(), draw.begin(), draw.end());
-    for (const std::uint64_t seed : study.seeds) trials.push_back({next++, seed, parameters});
-  }
+  for (const std::uint64_t seed : study.seeds) trials.push_back({next++, seed, point});
   return trials;
 }
 
 std::vector<Trial> ListTrials(const Study& study) {
-  const std::vector<std::vector<double>> draws = ListDraws(study);
   std::vector<Trial> all;
   all.reserve(static_cast<size_t>(CountTrials(study)));
   long number = 0;
-  for (const std::vector<double>& point : MakePoints(study.sample, study.keys())) {
-    std::vector<Trial> trials = ListTrialsOfPoint(study, number++, point, draws);
+  for (const std::vector<double>& point : MakePoints(study)) {
+    std::vector<Trial> trials = ListTrialsOfPoint(study, number++, point);
     std::move(trials.begin(), trials.end(), std::back_inserter(all));
   }
   return all;

@@ -3,7 +3,6 @@
 // What a study is: a scenario, the keys that are varied, and the list of trials that follows from both.
 
 #include <cstdint>
-#include <span>
 #include <string>
 #include <vector>
 
@@ -24,32 +23,27 @@ struct Variation {
   bool operator==(const Variation&) const = default;
 };
 
-enum class SamplingMethod { kGrid, kLatinHypercube, kSobol, kRandom, kSaltelli, kMorris };
+enum class SamplingMethod { kGrid, kLatinHypercube, kSobol, kRandom, kMorris };
 
 /// Points of the ranges of some keys.
 struct Sample {
   SamplingMethod method = SamplingMethod::kGrid;
-  long count = 0;  ///< Points; of a grid its keys say how many. Blocks of kSaltelli, trajectories of kMorris.
+  long count = 0;          ///< Points; of a grid its keys say how many. Trajectories of kMorris.
   std::uint64_t seed = 0;  ///< Of all but a grid and a Sobol sequence that is not scrambled.
   bool scramble = false;   ///< A Sobol sequence.
-  /// Whether its points show which key matters, and are of no use one by one.
-  [[nodiscard]] bool is_of_sensitivity() const {
-    return method == SamplingMethod::kSaltelli || method == SamplingMethod::kMorris;
-  }
   bool operator==(const Sample&) const = default;
 };
 
-enum class SearchMethod { kNone, kCmaEs, kNsga2, kNelderMead, kMargins };
+enum class SearchMethod { kNone, kCmaEs, kNelderMead };
 
 /// How a study looks for the best point.
 struct Search {
   SearchMethod method = SearchMethod::kNone;
   long count = 0;           ///< Points at most.
-  long population = 0;      ///< Points of a generation, of kCmaEs and kNsga2.
+  long population = 0;      ///< Points of a generation, of kCmaEs.
   long starts = 1;          ///< Local searches at a time, of kNelderMead.
-  long directions = 0;      ///< Random ones, of kMargins.
   double step = 0.25;       ///< First step relative to the ranges.
-  double tolerance = 1e-3;  ///< Relative to the ranges: where a local search or a bisection ends.
+  double tolerance = 1e-3;  ///< Relative to the ranges: where a local search ends.
   std::uint64_t seed = 0;
   std::vector<double> start_values;  ///< One for each key; empty for the middle of the ranges.
   bool operator==(const Search&) const = default;
@@ -62,10 +56,8 @@ struct Study {
   std::string scenario;                ///< Shipped name, or file relative to the study's.
   std::string controller;              ///< Of the user's own, as controller.run; empty for the scenario's.
   std::vector<std::string> overrides;  ///< "PATH=VALUE", the same for all trials.
-  std::vector<Variation> variations;   ///< The last varies fastest; behind a point's own, those of its draws.
-  size_t num_nested = 0;  ///< Of the variations at the end: every point is tried with the same draws.
-  Sample sample;          ///< Of the points.
-  Sample nested;          ///< Of the draws.
+  std::vector<Variation> variations;   ///< The last varies fastest.
+  Sample sample;
   Search search;
   std::vector<Objective> objectives;
   std::vector<Constraint> constraints;
@@ -78,9 +70,6 @@ struct Study {
   std::string text;    ///< The file.
   std::string source;  ///< Its name, for messages.
 
-  /// Keys that make a point, without those of the draws.
-  [[nodiscard]] size_t num_keys() const { return variations.size() - num_nested; }
-  [[nodiscard]] std::span<const Variation> keys() const { return {variations.data(), num_keys()}; }
   [[nodiscard]] bool is_search() const { return search.method != SearchMethod::kNone; }
 };
 
@@ -106,16 +95,11 @@ bool NeedsMargins(const Study& study);
 /// How many trials there are; of a search at most.
 long CountTrials(const Study& study);
 
-/// Trials of one point: draws times seeds.
+/// Trials of one point: one for each seed.
 long CountTrialsOfPoint(const Study& study);
 
 /// The trials of a point: point `number` has those from number * CountTrialsOfPoint on.
-/// @param draws of the nested keys, as ListDraws returns them.
-std::vector<Trial> ListTrialsOfPoint(const Study& study, long number, const std::vector<double>& point,
-                                     const std::vector<std::vector<double>>& draws);
-
-/// Values of the nested keys, the same for each point; one empty draw when there are none.
-std::vector<std::vector<double>> ListDraws(const Study& study);
+std::vector<Trial> ListTrialsOfPoint(const Study& study, long number, const std::vector<double>& point);
 
 /// A value of a range, or of a list of values: 0 is its beginning, 1 its end. @param fraction in [0, 1].
 double ValueAt(const Variation& variation, double fraction);
@@ -123,9 +107,7 @@ double ValueAt(const Variation& variation, double fraction);
 double FractionOf(const Variation& variation, double value);
 
 /// Values of a point at these fractions.
-std::vector<double> ValuesAt(std::span<const Variation> variations, const std::vector<double>& fractions);
-/// The fractions of a point's values.
-std::vector<double> FractionsOf(std::span<const Variation> variations, const std::vector<double>& values);
+std::vector<double> ValuesAt(const std::vector<Variation>& variations, const std::vector<double>& fractions);
 
 /// A value of the key as --set takes it.
 std::string FormatValue(const Variation& variation, double value);

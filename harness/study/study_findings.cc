@@ -20,18 +20,28 @@ namespace {
 
 std::string CountPoints(size_t count) { return fmt::format("{} point{}", count, count == 1 ? "" : "s"); }
 
+/// "control.K_p = 4000, control.K_v = 126".
+std::string DescribeValues(const Study& study, const std::vector<double>& values) {
+  std::string text;
+  for (size_t i = 0; i < values.size(); ++i) {
+    const Variation& variation = study.variations[i];
+    text += fmt::format(
+        "{}{} = {}", i == 0 ? "" : ", ", variation.key,
+        variation.labels.empty() ? fmt::format("{:.6g}", values[i]) : FormatValue(variation, values[i]));
+  }
+  return text;
+}
+
 /// Of a point that is the best: which of its keys would go on past their ranges.
 std::string DescribeEdges(const Study& study, const std::vector<double>& values) {
   constexpr double kAtEnd = 1e-3;  // of the range
   std::string text;
-  for (size_t i = 0; i < study.num_keys(); ++i) {
+  for (size_t i = 0; i < study.variations.size(); ++i) {
     const Variation& variation = study.variations[i];
-    const std::vector<double>& grid = variation.values;
-    if (!variation.labels.empty() || (grid.empty() ? variation.from == variation.to : grid.size() < 3))
-      continue;
-    const auto [low, high] = std::minmax_element(grid.begin(), grid.end());
-    const double fraction =
-        grid.empty() ? FractionOf(variation, values[i]) : (values[i] - *low) / (*high - *low);
+    const bool is_range = variation.values.empty();
+    if (!variation.labels.empty() || (!is_range && variation.values.size() < 3)) continue;
+    const double fraction = is_range ? FractionOf(variation, values[i])
+                                     : (values[i] - variation.from) / (variation.to - variation.from);
     if (fraction > kAtEnd && fraction < 1.0 - kAtEnd) continue;
     text += (text.empty() ? " At an end of its range is " : ", ") + variation.key;
   }
@@ -78,40 +88,6 @@ std::string DescribeFront(const Study& study, const std::vector<JudgedPoint>& po
   return text + ".";
 }
 
-/// The key at a distance from the start along its own axis.
-std::string ShowKey(const Variation& variation, const UnitPoint& point, size_t key) {
-  return fmt::format("{:.4g}", ValueAt(variation, point[key]));
-}
-
-std::vector<std::string> DescribeMargins(const Study& study, const std::vector<JudgedPoint>& points) {
-  const std::vector<Margin> margins = FindMargins(study, points);
-  if (margins.empty()) return {"At the start itself a constraint does not hold: there is no margin."};
-  std::vector<std::string> findings;
-  const auto go = [&](const Margin& margin, size_t key) {
-    if (margin.bad.empty()) return std::string("to the end of its range");
-    const Variation& variation = study.variations[key];
-    return fmt::format("to {} and not to {}", ShowKey(variation, margin.good, key),
-                       ShowKey(variation, margin.bad, key));
-  };
-  for (size_t i = 0; i < study.num_keys(); ++i) {
-    findings.push_back(fmt::format("{} can go from {:.4g} down {}, and up {}.", study.variations[i].key,
-                                   points[0].values[i], go(margins[2 * i], i), go(margins[2 * i + 1], i)));
-  }
-  const Margin* nearest = nullptr;
-  for (const Margin& margin : margins) {
-    if (!margin.bad.empty() && (nearest == nullptr || margin.at_most < nearest->at_most)) nearest = &margin;
-  }
-  if (nearest == nullptr) {
-    findings.push_back(
-        fmt::format("In none of {} directions a constraint turns within the ranges.", margins.size()));
-    return findings;
-  }
-  const std::vector<double> values = ValuesAt(study.keys(), nearest->bad);
-  findings.push_back(fmt::format("Of {} directions the nearest failure is {:.3g} of the ranges away, at {}.",
-                                 margins.size(), nearest->at_most, DescribeValues(study, values)));
-  return findings;
-}
-
 /// "0.000302 (0.00029 to 0.00034)": the median and the range. @param values not empty.
 std::string ShowSpread(std::vector<double> values) {
   std::ranges::sort(values);
@@ -123,7 +99,7 @@ std::string ShowSpread(std::vector<double> values) {
 /// Of a study that compares what has no order, laws for example, each in several trials: what came of each.
 std::vector<std::string> DescribeSpreads(const Study& study, const std::vector<TrialRow>& rows) {
   std::vector<std::string> findings;
-  if (study.is_search() || study.num_keys() != 1 || CountTrialsOfPoint(study) < 2) return findings;
+  if (study.is_search() || study.variations.size() != 1 || CountTrialsOfPoint(study) < 2) return findings;
   for (size_t i = 0; i < study.variations.front().labels.size(); ++i) {
     long all = 0, held = 0;
     std::array<std::vector<double>, kNumMetrics> metrics;
@@ -190,7 +166,7 @@ std::string DescribeLimits(const Study& study, const std::vector<TrialRow>& rows
 
 std::string MakeGainCard(const StudyInputs& inputs, const std::vector<TrialRow>& rows) {
   const Study& study = inputs.study;
-  if (study.objectives.size() != 1 || study.search.method == SearchMethod::kMargins) return "";
+  if (study.objectives.size() != 1) return "";
   if (!study.controller.empty()) return "";  // whose gains are its own
   const std::vector<JudgedPoint> points = JudgePoints(study, rows);
   const std::vector<const JudgedPoint*> feasible = SortFeasible(points);
@@ -221,17 +197,6 @@ std::string MakeGainCard(const StudyInputs& inputs, const std::vector<TrialRow>&
   return card + WriteJointControl(scenario, 1.0);
 }
 
-std::string DescribeValues(const Study& study, const std::vector<double>& values) {
-  std::string text;
-  for (size_t i = 0; i < values.size(); ++i) {
-    const Variation& variation = study.variations[i];
-    text += fmt::format(
-        "{}{} = {}", i == 0 ? "" : ", ", variation.key,
-        variation.labels.empty() ? fmt::format("{:.6g}", values[i]) : FormatValue(variation, values[i]));
-  }
-  return text;
-}
-
 double ShowObjective(const Study& study, const JudgedPoint& point, size_t objective) {
   const double value = point.judgement.objectives[objective];
   return study.objectives[objective].maximize ? -value : value;
@@ -240,9 +205,8 @@ double ShowObjective(const Study& study, const JudgedPoint& point, size_t object
 std::vector<std::string> ListFindings(const Study& study, const std::vector<TrialRow>& rows) {
   std::vector<std::string> findings;
   if (rows.empty()) return findings;
-  if (study.search.method == SearchMethod::kMargins) return DescribeMargins(study, JudgePoints(study, rows));
   findings = DescribeSpreads(study, rows);
-  if (study.sample.is_of_sensitivity()) {
+  if (study.sample.method == SamplingMethod::kMorris) {
     for (const std::string& quantity : ListQuantities(study, rows))
       findings.push_back(Describe(study, AnalyseSensitivity(study, rows, quantity)));
     return findings;
@@ -263,57 +227,49 @@ std::vector<std::string> ListFindings(const Study& study, const std::vector<Tria
   return findings;
 }
 
-StudyProgress FindProgress(const StudyStore& store) {
+std::string DescribeProgress(const StudyStore& store) {
   const Study& study = store.study();
-  StudyProgress progress;
-  progress.total = CountTrials(study);
-  std::string outcomes;
+  long done = 0;
+  std::string text;
   for (const auto& [outcome, count] : store.CountOutcomes()) {
-    progress.done += count;
-    outcomes += fmt::format("  {:<18}{:>7}\n", NameOf(outcome), count);
+    done += count;
+    text += fmt::format("  {:<18}{:>7}\n", NameOf(outcome), count);
   }
-  progress.text = fmt::format("{}: {} of {}{} trials in {}\n", study.name, progress.done,
-                              study.is_search() ? "at most " : "", progress.total, store.name()) +
-                  outcomes;
-  progress.is_over = progress.done >= progress.total;
+  text = fmt::format("{}: {} of {}{} trials in {}\n", study.name, done, study.is_search() ? "at most " : "",
+                     CountTrials(study), store.name()) +
+         text;
   const bool has_question = study.is_search() || !study.objectives.empty() || !study.constraints.empty() ||
-                            study.sample.is_of_sensitivity();
-  if (!has_question) return progress;
+                            study.sample.method == SamplingMethod::kMorris;
+  if (!has_question) return text;
   const std::vector<TrialRow> rows = store.ReadRows(0, /*with_machine=*/false);
-  for (const std::string& finding : ListFindings(study, rows)) progress.text += finding + "\n";
-  if (study.is_search()) {
-    SearchHistory history(study, FindSearchStart(study));
-    for (const TrialRow& row : rows) history.Add(row);
-    progress.is_over = history.is_over();
-  }
-  return progress;
+  for (const std::string& finding : ListFindings(study, rows)) text += finding + "\n";
+  return text;
 }
 
 namespace {
 
 /// @param html of the body. @param data that the script draws.
-std::string MakePage(const std::string& title, const char* html, const std::string& data, const char* script,
-                     double renew) {
+std::string MakePage(const std::string& title, const char* html, const std::string& data,
+                     const char* script) {
   return AssemblePage({.title = title,
                        .styles = {kStudyCss},
                        .markup = {html},
                        .data = data,
-                       .scripts = {kChartJs, kChartsJs, script},
-                       .renew = renew});
+                       .scripts = {kChartJs, kChartsJs, script}});
 }
 
 }  // namespace
 
-std::string MakeStudyPage(const StudySummary& summary, double renew) {
+std::string MakeStudyPage(const StudySummary& summary) {
   const auto name = summary.json.at("name").get<std::string>();
   return MakePage(name + " – study", kStudyHtml,
                   EmbedJson("study-data", summary.json) + EmbedBytes("study-values", summary.values),
-                  kStudyJs, renew);
+                  kStudyJs);
 }
 
 std::string MakeBudgetPage(const ErrorBudget& budget) {
   return MakePage("error budget of " + budget.scenario, kBudgetHtml, EmbedJson("budget-data", ToJson(budget)),
-                  kBudgetJs, /*renew=*/0.0);
+                  kBudgetJs);
 }
 
 using Json = nlohmann::ordered_json;

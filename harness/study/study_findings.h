@@ -15,9 +15,6 @@
 
 namespace dexcheck {
 
-/// "control.K_p = 4000, control.K_v = 126".
-std::string DescribeValues(const Study& study, const std::vector<double>& values);
-
 /// A point's objective as the user wrote it: of `maximize` with its own sign again.
 double ShowObjective(const Study& study, const JudgedPoint& point, size_t objective = 0);
 
@@ -30,16 +27,8 @@ std::vector<std::string> ListFindings(const Study& study, const std::vector<Tria
 /// better as comments. Empty of another study, and where no point is feasible.
 std::string MakeGainCard(const StudyInputs& inputs, const std::vector<TrialRow>& rows);
 
-// How far a study has come, while it runs or after.
-
-struct StudyProgress {
-  long done = 0;
-  long total = 0;        ///< Of a search at most.
-  bool is_over = false;  ///< Nothing is left to be made.
-  std::string text;      ///< Lines: how far, outcomes, what is found so far.
-};
-
-StudyProgress FindProgress(const StudyStore& store);
+/// Lines: how far a study has come, its outcomes, and what is found so far.
+std::string DescribeProgress(const StudyStore& store);
 
 // What a study looks like elsewhere: what came of it as data, its pages, and its rows for other programs.
 
@@ -47,8 +36,8 @@ StudyProgress FindProgress(const StudyStore& store);
 constexpr size_t kMostShown = 20000;
 
 struct StudySummary {
-  /// What the study is, how far it has come, outcomes, findings, the best points, margins, sensitivities, and
-  /// how (57) agrees. Its keys are in the README.
+  /// What the study is, how far it has come, outcomes, findings, the best points and sensitivities. Its keys
+  /// are in the README.
   nlohmann::ordered_json json;
   /// Doubles, row by row, of the trials that are shown: the numbers of json["columns"].
   std::string values;
@@ -59,8 +48,7 @@ StudySummary SummariseStudy(const StudyStore& store);
 
 /// One HTML page that loads nothing else: what the study finds, outcomes and metrics over the varied keys,
 /// the best trials, and the command that repeats each.
-/// @param renew seconds after which a browser loads the page again; 0 for never.
-std::string MakeStudyPage(const StudySummary& summary, double renew = 0.0);
+std::string MakeStudyPage(const StudySummary& summary);
 
 /// A page with the budget's chart and table.
 std::string MakeBudgetPage(const ErrorBudget& budget);

@@ -7,7 +7,6 @@
 #include "controller/common/text.h"
 #include "controller/common/toml_reader.h"
 #include "harness/study/sampling.h"
-#include "harness/study/search.h"
 #include "harness/study/study.h"
 
 namespace dexcheck {
@@ -88,44 +87,23 @@ void ReadVariations(const TomlValue& value, bool is_grid, Study* study) {
   }
 }
 
-/// Keys "method", "count", "seed" and "scramble".
-Sample ReadSample(TomlTable* table) {
+Sample ReadSample(const TomlValue& value) {
+  TomlTable table = value.AsTable();
   Sample sample;
   sample.method =
-      table->Get("method").AsChoice<SamplingMethod>({{"latin_hypercube", SamplingMethod::kLatinHypercube},
-                                                     {"sobol", SamplingMethod::kSobol},
-                                                     {"random", SamplingMethod::kRandom},
-                                                     {"saltelli", SamplingMethod::kSaltelli},
-                                                     {"morris", SamplingMethod::kMorris}});
-  sample.count = table->Get("count").AsWhole(1, kMaxTrials);
-  if (const auto seed = table->Find("seed")) {
+      table.Get("method").AsChoice<SamplingMethod>({{"latin_hypercube", SamplingMethod::kLatinHypercube},
+                                                    {"sobol", SamplingMethod::kSobol},
+                                                    {"random", SamplingMethod::kRandom},
+                                                    {"morris", SamplingMethod::kMorris}});
+  sample.count = table.Get("count").AsWhole(1, kMaxTrials);
+  if (const auto seed = table.Find("seed"))
     sample.seed = static_cast<std::uint64_t>(seed->AsWhole(0, kMaxSeed));
-  }
-  if (const auto scramble = table->Find("scramble")) {
+  if (const auto scramble = table.Find("scramble")) {
     sample.scramble = scramble->AsFlag();
     if (sample.method != SamplingMethod::kSobol) scramble->Fail("is for a Sobol sequence");
   }
-  return sample;
-}
-
-void RequireDimensions(const TomlValue& where, const Sample& sample, size_t keys) {
-  const auto most = static_cast<size_t>(CountMostDimensions(sample));
-  if (keys > most) where.Reject("this method varies at most " + std::to_string(most) + " keys");
-}
-
-void ReadNested(const TomlValue& value, Study* study) {
-  TomlTable table = value.AsTable();
-  study->nested = ReadSample(&table);
-  if (study->nested.is_of_sensitivity()) {
-    table.Get("method").Fail("must be one of \"latin_hypercube\", \"sobol\", \"random\"");
-  }
-  const TomlValue vary = table.Get("vary");
-  const size_t before = study->variations.size();
-  ReadVariations(vary, /*is_grid=*/false, study);
-  study->num_nested = study->variations.size() - before;
-  if (study->num_nested == 0) vary.Reject("needs at least one key");
-  RequireDimensions(vary, study->nested, study->num_nested);
   table.RejectUnused();
+  return sample;
 }
 
 void ReadMetrics(const TomlValue& value, Study* study) {
@@ -190,8 +168,8 @@ void ReadStart(const TomlValue& value, Study* study) {
     return;
   }
   const std::vector<TomlValue> list = value.AsList();
-  if (list.size() != study->num_keys()) {
-    value.Reject("needs a value for each of the " + std::to_string(study->num_keys()) + " keys");
+  if (list.size() != study->variations.size()) {
+    value.Reject("needs a value for each of the " + std::to_string(study->variations.size()) + " keys");
   }
   for (size_t i = 0; i < list.size(); ++i) {
     const Variation& variation = study->variations[i];
@@ -204,58 +182,22 @@ void ReadStart(const TomlValue& value, Study* study) {
   }
 }
 
-/// Keys of `method = "margins"`.
-void ReadMargins(TomlTable* table, Study* study) {
-  constexpr long kMaxDirections = 10000;
-  constexpr double kFinest = 1e-9;
-  Search& search = study->search;
-  if (const auto directions = table->Find("directions"))
-    search.directions = directions->AsWhole(0, kMaxDirections);
-  if (const auto tolerance = table->Find("tolerance")) {
-    search.tolerance = tolerance->AsPositive();
-    if (search.tolerance < kFinest) tolerance->Fail("must be at least " + FormatNumber(kFinest));
-  }
-  if (const auto seed = table->Find("seed"))
-    search.seed = static_cast<std::uint64_t>(seed->AsWhole(0, kMaxSeed));
-  if (const auto start = table->Find("start")) ReadStart(*start, study);
-  table->RejectUnused();
-  search.count = MarginSearcher::CountPoints(search, study->num_keys());
-}
-
-/// Methods of earlier versions, and what to use instead.
-constexpr std::pair<std::string_view, const char*> kGoneMethods[] = {
-    {"bobyqa", "nelder_mead, or cma_es where there are constraints"},
-    {"halving", "nelder_mead or cma_es, with stop_error for trials that are lost"},
-    {"external", "an optimiser that calls \"dexcheck run SCENARIO --no-log --json --set KEY=VALUE\""}};
-
 void ReadSearch(const TomlValue& value, Study* study) {
-  constexpr long kLeastOfCmaEs = 5;  // of which it takes the better half
-  constexpr long kLeastOfNsga2 = 8;  // which it pairs twice
+  constexpr long kLeastPopulation = 5;  // of which CMA-ES takes the better half
   constexpr long kMaxPopulation = 10000;
   constexpr long kMaxStarts = 1000;
+  constexpr long kMaxSearchSeed = (1L << 32) - 1;  // the libraries' generators take 32 bits
   TomlTable table = value.AsTable();
   Search& search = study->search;
   const TomlValue method = table.Get("method");
-  for (const auto& [gone, instead] : kGoneMethods) {
-    if (method.AsText() == gone) method.Reject(std::string("is gone: use ") + instead);
-  }
-  search.method = method.AsChoice<SearchMethod>({{"cma_es", SearchMethod::kCmaEs},
-                                                 {"nsga2", SearchMethod::kNsga2},
-                                                 {"nelder_mead", SearchMethod::kNelderMead},
-                                                 {"margins", SearchMethod::kMargins}});
-  if (search.method == SearchMethod::kMargins) {
-    ReadMargins(&table, study);
-    return;
-  }
+  search.method = method.AsChoice<SearchMethod>(
+      {{"cma_es", SearchMethod::kCmaEs}, {"nelder_mead", SearchMethod::kNelderMead}});
   const TomlValue count = table.Get("count");
   search.count = count.AsWhole(1, kMaxTrials);
-  if (search.method == SearchMethod::kCmaEs || search.method == SearchMethod::kNsga2) {
+  if (search.method == SearchMethod::kCmaEs) {
     search.population = 16;
-    if (const auto population = table.Find("population")) {
-      const bool pairs = search.method == SearchMethod::kNsga2;
-      search.population = population->AsWhole(pairs ? kLeastOfNsga2 : kLeastOfCmaEs, kMaxPopulation);
-      if (pairs && search.population % 4 != 0) population->Fail("must be a multiple of 4");
-    }
+    if (const auto population = table.Find("population"))
+      search.population = population->AsWhole(kLeastPopulation, kMaxPopulation);
     if (search.count < search.population)
       count.Fail("must be at least the population, " + std::to_string(search.population));
     search.count -= search.count % search.population;  // whole generations
@@ -264,24 +206,17 @@ void ReadSearch(const TomlValue& value, Study* study) {
     if (const auto tolerance = table.Find("tolerance")) search.tolerance = tolerance->AsPositive();
     if (search.count < search.starts) count.Fail("must be at least the number of starts");
   }
-  if (search.method != SearchMethod::kNsga2) {
-    if (const auto step = table.Find("step")) {
-      search.step = step->AsPositive();
-      if (search.step > 1.0) step->Fail("must be at most 1, the whole range");
-    }
+  if (const auto step = table.Find("step")) {
+    search.step = step->AsPositive();
+    if (search.step > 1.0) step->Fail("must be at most 1, the whole range");
   }
-  if (const auto seed = table.Find("seed")) {
-    constexpr long kMaxSearchSeed = (1L << 32) - 1;  // the libraries' generators take 32 bits
+  if (const auto seed = table.Find("seed"))
     search.seed = static_cast<std::uint64_t>(seed->AsWhole(0, kMaxSearchSeed));
-  }
   if (const auto start = table.Find("start")) ReadStart(*start, study);
   table.RejectUnused();
-  if (study->objectives.empty()) method.Reject("a search needs an [[objective]]");
-  const bool many = study->objectives.size() > 1;
-  if (many != (search.method == SearchMethod::kNsga2)) {
-    method.Reject(many ? "looks for the best of one objective; nsga2 weighs several"
-                       : "nsga2 needs two objectives at least");
-  }
+  if (study->objectives.size() != 1)
+    method.Reject(study->objectives.empty() ? "a search needs an [[objective]]"
+                                            : "a search looks for the best of one objective");
 }
 
 void RequireFewTrials(const TomlValue& where, const Study& study) {
@@ -295,7 +230,7 @@ void RequireFewTrials(const TomlValue& where, const Study& study) {
 Study ReadStudy(TomlTable& root, Study study) {
   root.RejectOthersThan({"name", "description", "scenario", "controller", "set", "seeds", "check",
                          "trial_time_limit", "stop_error", "metrics", "sample", "search", "objective",
-                         "constraints", "vary", "nested"});
+                         "constraints", "vary"});
   study.name = root.Get("name").AsName();
   if (const auto description = root.Find("description")) study.description = description->AsText();
   study.scenario = root.Get("scenario").AsText();
@@ -319,15 +254,12 @@ Study ReadStudy(TomlTable& root, Study study) {
   if (const auto metrics = root.Find("metrics")) ReadMetrics(*metrics, &study);
   root.RejectTogether("search", {"sample"});
   const auto search = root.Find("search");
-  if (const auto sample = root.Find("sample")) {
-    TomlTable table = sample->AsTable();
-    study.sample = ReadSample(&table);
-    table.RejectUnused();
-  }
+  if (const auto sample = root.Find("sample")) study.sample = ReadSample(*sample);
   const TomlValue vary = root.Get("vary");
   ReadVariations(vary, study.sample.method == SamplingMethod::kGrid && !search, &study);
   if (study.variations.empty()) vary.Reject("needs at least one key");
-  RequireDimensions(vary, study.sample, study.variations.size());
+  if (study.sample.method == SamplingMethod::kSobol && study.variations.size() > kMaxSobolDimensions)
+    vary.Reject("a Sobol sequence varies at most " + std::to_string(kMaxSobolDimensions) + " keys");
   if (const auto list = root.Find("objective")) {
     for (const TomlValue& entry : list->AsList()) study.objectives.push_back(ReadObjective(entry));
   }
@@ -335,7 +267,6 @@ Study ReadStudy(TomlTable& root, Study study) {
     for (const TomlValue& entry : list->AsList()) study.constraints.push_back(ReadConstraint(entry));
   }
   if (search) ReadSearch(*search, &study);
-  if (const auto nested = root.Find("nested")) ReadNested(*nested, &study);
   RequireFewTrials(vary, study);
   return study;
 }

@@ -155,7 +155,7 @@ bool MakesRowsAgain(const StudyInputs& inputs, const std::vector<TrialRow>& rows
 
 void RunSearch(const StudyInputs& inputs, const RunOptions& options, StudyStore* store) {
   constexpr auto kPatience = std::chrono::milliseconds(100);  // with other processes
-  SearchHistory history(inputs.study, FindSearchStart(inputs.study));
+  SearchHistory history(inputs.study);
   const auto read = [&] {
     for (const TrialRow& row : store->ReadRows(history.first_of_batch())) history.Add(row);
   };

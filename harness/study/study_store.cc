@@ -66,7 +66,7 @@ StudyStore StudyStore::OpenOrCreate(const std::filesystem::path& path, const Stu
   store.database_->Do([&] {
     store.Create(identity, study);
     store.Load();
-    store.Adopt(identity, study, makes_same_rows);
+    store.GoOn(identity, study, makes_same_rows);
   });
   return store;
 }
@@ -143,14 +143,6 @@ const std::string& StudyStore::Identify(const std::string& column) const {
   throw InputError(name() + ": no column " + Quote(column));
 }
 
-bool StudyStore::IsInUse() {
-  SQLite::Statement claims(*database_, "SELECT process FROM claims");
-  while (claims.executeStep()) {
-    if (IsRunningHere(claims.getColumn(0))) return true;
-  }
-  return false;
-}
-
 void StudyStore::Update(const std::string& column, const std::string& value) {
   database_->Prepare("UPDATE study SET " + column + " = ?", value).exec();
   for (auto& [name, text] : identity_) {
@@ -158,18 +150,12 @@ void StudyStore::Update(const std::string& column, const std::string& value) {
   }
 }
 
-void StudyStore::Adopt(const StudyIdentity& identity, const Study& study,
-                       const MakesSameRows& makes_same_rows) {
-  // The texts of study and program may be others; what they mean decides.
+void StudyStore::GoOn(const StudyIdentity& identity, const Study& study,
+                      const MakesSameRows& makes_same_rows) {
   StudyIdentity strict = identity;
-  std::erase_if(strict, [&](const auto& column) {
-    return column.first == "study" || (column.first == "name" && study.text != study_.text) ||
-           (makes_same_rows && column.first == "git_revision");
-  });
+  if (makes_same_rows)
+    std::erase_if(strict, [](const auto& column) { return column.first == "git_revision"; });
   RequireSame(strict);
-  if (const std::string difference = FindDifference(study_, study); !difference.empty())
-    throw InputError(name() + ": is of another study: study differs: " + difference +
-                     "; rows made otherwise cannot be kept, take another database");
   const std::string* const revision = FindText(identity, "git_revision");
   if (revision != nullptr && *revision != Identify("git_revision")) {
     if (!makes_same_rows(ReadRows())) RequireSame(identity);  // which throws
@@ -177,33 +163,28 @@ void StudyStore::Adopt(const StudyIdentity& identity, const Study& study,
     change_ = "its rows are of another revision, which made the same ones";
   }
   if (study.text == study_.text) return;
-  const auto take_over = [&] {
-    study_ = study;
-    Update("study", study.text);
-    Update("name", study.name);
-  };
-  if (HasSameTrials(study_, study)) return take_over();
-  if (IsInUse()) throw InputError(name() + ": another process makes trials of the study as it was");
-  SqliteTransaction transaction(database_.get());
-  StudyChange changed = ChangeStudy(study_, study, ReadRows(std::numeric_limits<long>::min()));
-  database_->exec("DELETE FROM trials");
-  take_over();
-  insert_.reset();  // their columns' order
-  find_.reset();
-  for (const TrialRow& row : changed.rows) Insert(row);
-  transaction.commit();
-  change_ += (change_.empty() ? "" : "; ") + ("the study was edited: " + Describe(changed));
+  study_ = study;
+  Update("study", study.text);
+  Update("name", study.name);
 }
 
 void StudyStore::RequireSame(const StudyIdentity& other) const {
   constexpr size_t kReadable = 64;
+  const auto refuse = [&](const std::string& what) {
+    throw InputError(name() + ": is of another study: " + what +
+                     "; each study needs a database file of its own");
+  };
   for (const auto& [column, value] : other) {
     const std::string& own = Identify(column);
-    if (own == value) continue;
-    if (column == "study" && HasSameTrials(study_, ParseStudy(value, name()))) continue;
+    if (own == value || column == "name") continue;  // which the study's text has, too
+    if (column == "study") {
+      const std::string key = FindDifference(study_, ParseStudy(value, name()));
+      if (!key.empty()) refuse("key " + key + " differs");
+      continue;
+    }
     const bool is_short = own.size() < kReadable && value.size() < kReadable;
-    throw InputError(name() + ": is of another study: " + column + " differs" +
-                     (is_short ? ", " + Quote(own) + " there and " + Quote(value) + " here" : ""));
+    refuse(column + " differs" +
+           (is_short ? ", " + Quote(own) + " there and " + Quote(value) + " here" : ""));
   }
 }
 

@@ -81,6 +81,10 @@ inline constexpr const char* kStudyLayout = "2";
 /// @throws InputError when a file cannot be read.
 StudyIdentity IdentifyStudy(const StudyInputs& inputs);
 
+/// The first key in which two studies make other trials, or ask for what the trials do not have; empty where
+/// the rows of one are rows of the other.
+std::string FindDifference(const Study& before, const Study& now);
+
 /// A finished trial.
 struct TrialRow {
   Trial trial;
@@ -106,12 +110,13 @@ bool IsSame(const TrialRow& a, const TrialRow& b);
 /// Whether this program gives the same rows as the one that made these.
 using MakesSameRows = std::function<bool(const std::vector<TrialRow>&)>;
 
-/// An open database. Everything that fails throws InputError "FILE: what: why".
+/// An open database. Everything that fails throws InputError "FILE: what: why". Rows with negative numbers,
+/// which earlier versions set aside when a study was edited, count nowhere.
 class StudyStore {
  public:
-  /// Opens a study's database, or makes it when there is none. A study that was edited keeps the rows that it
-  /// still has, and sets the others aside (ChangeStudy); another revision of this program goes on with the
-  /// rows when it makes the same ones.
+  /// Opens a study's database, or makes it when there is none. What no row depends on, a description for
+  /// example, may have changed. Another revision of this program goes on with the rows when it makes the same
+  /// ones.
   /// @param makes_same_rows called when the file was written by another revision; none for that it does not.
   /// @throws InputError, also when the file holds another study.
   static StudyStore OpenOrCreate(const std::filesystem::path& path, const StudyIdentity& identity,
@@ -125,10 +130,9 @@ class StudyStore {
   [[nodiscard]] const std::string& Identify(const std::string& column) const;
   /// As the file has it.
   [[nodiscard]] const Study& study() const { return study_; }
-  /// Throws InputError that names the first column in which this study is another one; another text of the
-  /// same trials is the same study.
+  /// Throws InputError that names the first column, or key of the study, in which this study is another one.
   void RequireSame(const StudyIdentity& other) const;
-  /// What was changed when the study was opened, in words; empty when nothing was.
+  /// In words that its rows are of another revision of this program; empty when they are not.
   [[nodiscard]] const std::string& change() const { return change_; }
 
   /// By trial number. @param first number that is read. @param with_machine whether rows say which machine
@@ -165,9 +169,8 @@ class StudyStore {
   void Create(const StudyIdentity& identity, const Study& study);
   /// Columns that the program which wrote the file did not have: metrics, and which machine made a trial.
   void AddMissingColumns();
-  void Adopt(const StudyIdentity& identity, const Study& study, const MakesSameRows& makes_same_rows);
+  void GoOn(const StudyIdentity& identity, const Study& study, const MakesSameRows& makes_same_rows);
   void Update(const std::string& column, const std::string& value);
-  [[nodiscard]] bool IsInUse();
   void Load();
   void Insert(const TrialRow& row);
   [[nodiscard]] TrialRow ReadRow(const SQLite::Statement& select, bool with_machine) const;
@@ -179,31 +182,5 @@ class StudyStore {
   Study study_;
   std::string change_;
 };
-
-// A study that was edited: which of its rows still belong to it.
-
-/// What an edited study makes of a database's rows.
-struct StudyChange {
-  std::vector<TrialRow> rows;  ///< All of them, with the numbers that they have now; those that do not belong
-                               ///< to it have negative ones.
-  long kept = 0;               ///< Rows that belonged to it, and do.
-  long brought_back = 0;       ///< Rows that had been set aside.
-  long set_aside = 0;          ///< Rows that belonged to it and do not any more.
-};
-
-/// Why rows of one study cannot be rows of the other, whatever their parameters; empty when they can: trials
-/// are made in the same way, and the same keys are varied. A search must be the same but for its number of
-/// points.
-std::string FindDifference(const Study& before, const Study& now);
-
-/// Whether both list the same trials under the same numbers.
-bool HasSameTrials(const Study& before, const Study& now);
-
-/// Finds the rows' places in the study as it is now. The two must not differ (FindDifference).
-/// @param rows of `before`, those that were set aside among them.
-StudyChange ChangeStudy(const Study& before, const Study& now, std::vector<TrialRow> rows);
-
-/// "12 trials are kept, 4 are set aside".
-std::string Describe(const StudyChange& change);
 
 }  // namespace dexcheck

@@ -2,12 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 
-#include "controller/common/errors.h"
 #include "controller/common/text.h"
 #include "harness/plant/random_stream.h"
-#include "harness/study/sampled_stability.h"
 #include "harness/study/sampling.h"
 #include "harness/study/search.h"
 #include "harness/study/study_findings.h"
@@ -18,15 +15,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr size_t kMostBest = 20;        // trials in the table of the best
-constexpr size_t kMostCompared = 2000;  // trials that are compared with theory
-
-/// A failure without the time that it happened at, so that equal ones can be counted.
-std::string WithoutTime(const std::string& failure) {
-  constexpr std::string_view kSettling = " while settling";
-  if (failure.ends_with(kSettling)) return failure.substr(0, failure.size() - kSettling.size());
-  return failure.substr(0, failure.find(" at t = "));
-}
+constexpr size_t kMostBest = 20;  // trials in the table of the best
 
 std::string LabelOf(Metric metric) {
   const std::string unit = kMetrics[metric].unit;
@@ -52,29 +41,24 @@ class Summary {
     });
   }
 
-  StudySummary Make() {
-    StudySummary summary;
-    Json& json = summary.json;
-    json = {{"name", study_.name},
-            {"description", study_.description},
-            {"scenario", study_.scenario},
-            {"overrides", study_.overrides},
-            {"check", study_.check},
-            {"seeds", study_.seeds.size()},
-            {"is_search", study_.is_search()},
-            {"is_grid", study_.sample.method == SamplingMethod::kGrid && !study_.is_search()},
-            {"done", rows_.size()},
-            {"total", CountTrials(study_)},
-            {"error", kMetrics[error_].name}};
+  Json MakeJson() {
+    Json json = {{"name", study_.name},
+                 {"description", study_.description},
+                 {"scenario", study_.scenario},
+                 {"overrides", study_.overrides},
+                 {"check", study_.check},
+                 {"seeds", study_.seeds.size()},
+                 {"is_search", study_.is_search()},
+                 {"is_grid", study_.sample.method == SamplingMethod::kGrid && !study_.is_search()},
+                 {"done", rows_.size()},
+                 {"total", CountTrials(study_)},
+                 {"error", kMetrics[error_].name}};
     json["outcomes"] = ListOutcomes();
     json["findings"] = ListFindings(study_, rows_);
     json["gain_card"] = MakeGainCard(inputs_, rows_);
     json["best"] = rows_.empty() ? Json(nullptr) : ListBest();
-    json["margins"] = ListMargins();
     json["sensitivity"] = ListSensitivity();
     ChooseShown();
-    CalcTheories();
-    json["theory"] = CompareWithTheory();
     json["keys"] = Json::array();
     for (const Variation& variation : study_.variations) json["keys"].push_back(variation.key);
     json["shown"] = Json::array();
@@ -85,13 +69,25 @@ class Summary {
     json["failures"] = ListFailures();
     json["history"] = ListHistory();
     json["maximize"] = !study_.objectives.empty() && study_.objectives.front().maximize;
-    summary.values = PackValues();
-    return summary;
+    return json;
+  }
+
+  /// The numbers of the trials that MakeJson chose to be shown.
+  [[nodiscard]] std::string PackValues() const {
+    std::string bytes;
+    const auto add = [&](double value) { bytes.append(reinterpret_cast<const char*>(&value), sizeof value); };
+    for (const TrialRow* row : shown_) {
+      add(static_cast<double>(row->trial.number));
+      add(static_cast<double>(row->trial.seed));
+      add(static_cast<double>(row->result.outcome));
+      for (const double parameter : row->trial.parameters) add(parameter);
+      for (const double metric : row->result.metrics) add(metric);
+    }
+    return bytes;
   }
 
  private:
   [[nodiscard]] bool of_joints() const { return error_ == kJointErrorRms; }
-  [[nodiscard]] bool has_theory() const { return !theory_.empty(); }
 
   [[nodiscard]] Json ListOutcomes() const {
     std::array<long, kOutcomes.size()> counts{};
@@ -110,7 +106,7 @@ class Summary {
 
   Json ListBest() {
     Json best = {{"order", ""}, {"heads", Json::array()}, {"rows", Json::array()}};
-    for (const Variation& variation : study_.keys()) best["heads"].push_back(variation.key);
+    for (const Variation& variation : study_.variations) best["heads"].push_back(variation.key);
     if (study_.objectives.empty()) {
       FillByError(&best);
     } else {
@@ -172,8 +168,6 @@ class Summary {
     (*best)["order"] =
         fmt::format("By rms {} error, of the trials that tracked{}.", of_joints() ? "joint" : "position",
                     study_.constraints.empty() ? "" : " and fulfil the constraints");
-    for (size_t i = study_.num_keys(); i < study_.variations.size(); ++i)
-      (*best)["heads"].push_back(study_.variations[i].key);
     std::vector<Metric> metrics = {error_, kEnergy};
     for (const Metric metric : metrics_) {
       if (std::ranges::find(metrics, metric) == metrics.end()) metrics.push_back(metric);
@@ -181,137 +175,68 @@ class Summary {
     for (const Metric metric : metrics) (*best)["heads"].push_back(LabelOf(metric));
     for (size_t i = 0; i < std::min(admitted.size(), kMostBest); ++i) {
       std::vector<double> values;
+      values.reserve(metrics.size());
       for (const Metric metric : metrics) values.push_back(admitted[i]->result.metrics[metric]);
       AddBest(*admitted[i], admitted[i]->trial.parameters, values, best);
     }
   }
 
-  /// How far each key can go, the others as at the start; `fractions` of its range.
-  [[nodiscard]] Json ListMargins() const {
-    Json list = Json::array();
-    if (study_.search.method != SearchMethod::kMargins) return list;
-    const std::vector<JudgedPoint> points = JudgePoints(study_, rows_);
-    const std::vector<Margin> margins = FindMargins(study_, points);
-    for (size_t key = 0; key < study_.num_keys() && !margins.empty(); ++key) {
-      const Variation& variation = study_.variations[key];
-      Json entry = {{"key", variation.key}, {"start", points[0].values[key]}};
-      entry["fractions"]["start"] = FractionOf(variation, points[0].values[key]);
-      for (const auto& [name, margin] :
-           {std::pair("down", &margins[2 * key]), std::pair("up", &margins[2 * key + 1])}) {
-        entry[name] = {
-            {"good", ValueAt(variation, margin->good[key])}, {"bad", nullptr}, {"stable_by_57", nullptr}};
-        entry["fractions"][name] = margin->good[key];
-        if (margin->bad.empty()) continue;  // to the end of the range
-        entry[name]["bad"] = ValueAt(variation, margin->bad[key]);
-        const auto theory = FindTheory(ValuesAt(study_.keys(), margin->bad));
-        if (theory) entry[name]["stable_by_57"] = theory->is_stable();
-      }
-      list.push_back(entry);
-    }
-    return list;
-  }
-
   [[nodiscard]] Json ListSensitivity() const {
     Json list = Json::array();
-    if (study_.is_search() || !study_.sample.is_of_sensitivity()) return list;
+    if (study_.sample.method != SamplingMethod::kMorris) return list;
     for (const std::string& quantity : ListQuantities(study_, rows_)) {
       const Sensitivity sensitivity = AnalyseSensitivity(study_, rows_, quantity);
-      if (sensitivity.empty()) continue;
-      const bool is_sobol = !sensitivity.sobol.empty();
+      if (sensitivity.effects.empty()) continue;
       Json keys = Json::array();
       for (const size_t key : sensitivity.ListByImportance()) {
-        const Estimate& estimate = is_sobol ? sensitivity.sobol[key].total : sensitivity.morris[key].size;
+        const MorrisEffect& effect = sensitivity.effects[key];
         keys.push_back({{"key", study_.variations[key].key},
-                        {"value", estimate.value},
-                        {"low", estimate.low},
-                        {"high", estimate.high},
-                        {is_sobol ? "alone" : "spread",
-                         is_sobol ? sensitivity.sobol[key].first.value : sensitivity.morris[key].spread}});
+                        {"value", effect.size.value},
+                        {"low", effect.size.low},
+                        {"high", effect.size.high},
+                        {"spread", effect.spread}});
       }
-      list.push_back({{"quantity", quantity + (ShowUnit(quantity).empty() ? "" : "," + ShowUnit(quantity))},
-                      {"method", is_sobol ? "saltelli" : "morris"},
+      const std::string unit = ShowUnit(quantity);
+      list.push_back({{"quantity", unit.empty() ? quantity : fmt::format("{},{}", quantity, unit)},
+                      {"method", "morris"},
                       {"left_out", sensitivity.left_out},
                       {"keys", keys}});
     }
     return list;
   }
 
-  /// Rows of points that are drawn by a hash of their number, at most so many: all trials of a point, its
-  /// seeds and its draws, or none. A step through the rows would meet the same values of a grid's keys again
-  /// and again.
-  [[nodiscard]] std::vector<const TrialRow*> DrawPoints(const std::vector<const TrialRow*>& rows,
-                                                        size_t most) const {
-    if (rows.size() <= most) return rows;
+  /// All rows, or of more than kMostShown those of points that are drawn by a hash of their number: the
+  /// trials of all seeds of a point, or none. A step through the rows would meet the same values of a grid's
+  /// keys again and again.
+  [[nodiscard]] std::vector<const TrialRow*> DrawPoints() const {
     const long trials = CountTrialsOfPoint(study_);
-    const long together = static_cast<size_t>(trials) > most ? 1 : trials;  // one point alone is too many
+    // The trials of a point stay together, unless one point alone has too many.
+    const long together = static_cast<size_t>(trials) > kMostShown ? 1 : trials;
     const RandomStream stream(/*seed=*/0, "page");
     std::vector<std::pair<double, const TrialRow*>> drawn;
-    drawn.reserve(rows.size());
-    for (const TrialRow* row : rows)
-      drawn.emplace_back(stream.Uniform(static_cast<std::uint64_t>(row->trial.number / together)), row);
-    std::ranges::sort(drawn);  // rows are of one vector, by number
-    size_t end = most;
-    while (end > 0 && drawn[end].first == drawn[end - 1].first) --end;
-    std::vector<const TrialRow*> result;
-    for (size_t i = 0; i < end; ++i) result.push_back(drawn[i].second);
-    std::ranges::sort(result);
-    return result;
+    drawn.reserve(rows_.size());
+    for (const TrialRow& row : rows_)
+      drawn.emplace_back(stream.Uniform(static_cast<std::uint64_t>(row.trial.number / together)), &row);
+    if (drawn.size() > kMostShown) {
+      std::ranges::sort(drawn);
+      size_t end = kMostShown;
+      while (end > 0 && drawn[end].first == drawn[end - 1].first) --end;
+      drawn.resize(end);
+    }
+    std::vector<const TrialRow*> rows;
+    rows.reserve(drawn.size());
+    for (const auto& [place, row] : drawn) rows.push_back(row);
+    std::ranges::sort(rows);  // by number, as those of one vector
+    return rows;
   }
 
   /// All trials, or a drawn part; apart from these the best, to which the table leads.
   void ChooseShown() {
-    for (const TrialRow& row : rows_) shown_.push_back(&row);
-    shown_ = DrawPoints(shown_, kMostShown);
-    compared_ = DrawPoints(shown_, kMostCompared);
+    shown_ = DrawPoints();
     std::ranges::sort(best_);
     std::ranges::set_difference(best_, shown_, std::back_inserter(added_));
     shown_.insert(shown_.end(), added_.begin(), added_.end());
     std::ranges::sort(shown_);
-  }
-
-  /// None for values that make no scenario.
-  [[nodiscard]] std::optional<Theory> FindTheory(const std::vector<double>& parameters) const {
-    try {
-      return CalcTheory(inputs_, parameters);
-    } catch (const InputError&) {
-      return std::nullopt;
-    }
-  }
-
-  /// Theory is that of an object.
-  void CalcTheories() {
-    if (of_joints() || rows_.empty()) return;
-    inputs_.OpenScenario();
-    theory_.resize(shown_.size());
-    for (size_t i = 0; i < shown_.size(); ++i) {
-      if (shown_[i]->result.outcome != Outcome::kRefused && std::ranges::binary_search(compared_, shown_[i]))
-        theory_[i] = FindTheory(shown_[i]->trial.parameters);
-    }
-  }
-
-  /// Where theory and run differ in whether the object is held, by reason.
-  [[nodiscard]] Json CompareWithTheory() const {
-    if (!has_theory()) return nullptr;
-    std::map<std::string, long> reasons;
-    long compared = 0, agree = 0;
-    for (size_t i = 0; i < shown_.size(); ++i) {
-      if (!theory_[i]) continue;
-      const TrialResult& result = shown_[i]->result;
-      const bool is_stable = theory_[i]->is_stable();
-      ++compared;
-      agree += is_stable == IsHeld(result.outcome) ? 1 : 0;
-      if (is_stable == IsHeld(result.outcome)) continue;
-      std::string reason = WithoutTime(result.failure);
-      if (reason.empty()) {
-        reason = result.metrics[kErrorGrowth] > 1.0 ? "the error grew"
-                                                    : fmt::format("the rms error is above {} m", kLostTrack);
-      }
-      ++reasons[is_stable ? "stable in theory, but " + reason
-                          : "unstable in theory, but held to the end of the run"];
-    }
-    Json departures = Json::array();
-    for (const auto& [reason, count] : reasons) departures.push_back({{"reason", reason}, {"count", count}});
-    return {{"compared", compared}, {"agree", agree}, {"departures", departures}};
   }
 
   /// Names and labels of what PackValues has of each trial.
@@ -329,13 +254,6 @@ class Summary {
       columns.push_back({{"name", kMetrics[metric].name}, {"label", LabelOf(metric)}});
       if (kMetrics[metric].is_better_large) columns.back()["larger_is_better"] = true;
     }
-    if (!has_theory()) return columns;
-    columns.push_back(
-        {{"name", "theory.stable"}, {"label", "stable by (57)"}, {"labels", {"unstable", "stable"}}});
-    for (const Metric metric : kPredictedMetrics) {
-      columns.push_back({{"name", std::string("theory.") + kMetrics[metric].name},
-                         {"label", LabelOf(metric) + ", by (57)"}});
-    }
     return columns;
   }
 
@@ -349,28 +267,10 @@ class Summary {
     return failures;
   }
 
-  [[nodiscard]] std::string PackValues() const {
-    std::string bytes;
-    const auto add = [&](double value) { bytes.append(reinterpret_cast<const char*>(&value), sizeof value); };
-    for (size_t i = 0; i < shown_.size(); ++i) {
-      const TrialRow& row = *shown_[i];
-      add(static_cast<double>(row.trial.number));
-      add(static_cast<double>(row.trial.seed));
-      add(static_cast<double>(row.result.outcome));
-      for (const double parameter : row.trial.parameters) add(parameter);
-      for (const double metric : row.result.metrics) add(metric);
-      if (!has_theory()) continue;
-      add(!theory_[i] ? std::nan("") : theory_[i]->is_stable() ? 1.0 : 0.0);
-      for (const Metric metric : kPredictedMetrics)
-        add(theory_[i] ? theory_[i]->metrics[metric] : std::nan(""));
-    }
-    return bytes;
-  }
-
   /// The points of a search.
   [[nodiscard]] Json ListHistory() const {
     Json history = Json::array();
-    if (!study_.is_search() || study_.objectives.empty()) return history;
+    if (!study_.is_search()) return history;
     for (const JudgedPoint& point : JudgePoints(study_, rows_)) {
       history.push_back({{"trial", point.number * CountTrialsOfPoint(study_)},
                          {"value", ShowObjective(study_, point)},
@@ -382,23 +282,22 @@ class Summary {
   Study study_;
   StudyInputs inputs_;  // as far as the database keeps them: for scenarios of trials
   std::vector<TrialRow> rows_;
-  Metric error_;                               // that says how good the trials are
-  std::vector<Metric> metrics_;                // to be shown
-  std::vector<const TrialRow*> tracked_;       // least error first
-  std::vector<const TrialRow*> shown_;         // by number
-  std::vector<const TrialRow*> compared_;      // of these, with theory
-  std::vector<const TrialRow*> best_;          // in the table of the best
-  std::vector<const TrialRow*> added_;         // of the best, those that were not drawn
-  std::vector<std::optional<Theory>> theory_;  // of these; empty without
+  Metric error_;                          // that says how good the trials are
+  std::vector<Metric> metrics_;           // to be shown
+  std::vector<const TrialRow*> tracked_;  // least error first
+  std::vector<const TrialRow*> shown_;    // by number
+  std::vector<const TrialRow*> best_;     // in the table of the best
+  std::vector<const TrialRow*> added_;    // of the best, those that were not drawn
 };
 
 }  // namespace
 
 StudySummary SummariseStudy(const StudyStore& store) {
-  StudySummary summary = Summary(store).Make();
+  Summary summary(store);
+  Json json = summary.MakeJson();
   for (const char* column : {"dexcheck_version", "git_revision", "mujoco_version"})
-    summary.json["versions"][column] = store.Identify(column);
-  return summary;
+    json["versions"][column] = store.Identify(column);
+  return {std::move(json), summary.PackValues()};
 }
 
 }  // namespace dexcheck

@@ -18,6 +18,15 @@ namespace dexcheck {
 
 namespace {
 
+/// A run without a start error diverged when its error is above this, rms, m; of joints rad.
+constexpr double kLostTrack = 0.01;
+constexpr double kLostTrackOfJoints = 0.1;
+/// Fingertips or wheels that slide further than this have slipped, m; the bounds of the cross-check.
+constexpr double kFingertipSlipBound = 2e-4;
+constexpr double kWheelSlipBound = 1e-3;
+/// An error within this fraction of the start error has settled.
+constexpr double kSettledFraction = 0.02;
+
 /// The message without the folders of this machine.
 std::string WithoutFolders(std::string message, const StudyInputs& inputs) {
   for (const std::filesystem::path& file : {inputs.robot, inputs.mjcf}) {
@@ -169,8 +178,8 @@ void CheckTrials(StudyInputs* inputs) {
   const Study& study = inputs->study;
   Trial trial;
   if (study.is_search()) {
-    const std::vector<double> point = ValuesAt(study.keys(), std::vector<double>(study.num_keys(), 0.5));
-    trial = ListTrialsOfPoint(study, 0, point, ListDraws(study)).front();
+    const std::vector<double> middle(study.variations.size(), 0.5);
+    trial = ListTrialsOfPoint(study, 0, ValuesAt(study.variations, middle)).front();
   } else {
     trial = ListTrials(study).front();
   }

@@ -40,10 +40,6 @@ struct StudyInputs {
   void OpenScenario();
 };
 
-/// A run without a start error diverged when its error is above this, rms, m; of joints rad.
-constexpr double kLostTrack = 0.01;
-constexpr double kLostTrackOfJoints = 0.1;
-
 /// The scenario of one trial. @throws InputError as ParseScenario.
 Scenario MakeTrialScenario(const StudyInputs& inputs, const Trial& trial);
 
@@ -56,12 +52,6 @@ TrialResult RunTrial(const StudyInputs& inputs, const Trial& trial);
 void CheckTrials(StudyInputs* inputs);
 
 // Metrics of a run while it runs, from the plant alone: no cross-check is needed.
-
-/// Fingertips or wheels that slide further than this have slipped, m; the bounds of the cross-check.
-constexpr double kFingertipSlipBound = 2e-4;
-constexpr double kWheelSlipBound = 1e-3;
-/// An error within this fraction of the start error has settled.
-constexpr double kSettledFraction = 0.02;
 
 /// Watches one run. Nothing allocates after construction.
 class TrialMonitor {

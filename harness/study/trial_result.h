@@ -77,33 +77,30 @@ enum Metric {
 struct MetricInfo {
   const char* name;
   const char* unit;
-  const char* description;
   bool is_better_large = false;
 };
 
-/// By Metric.
+/// By Metric; shipped/studies/README.md says what each is.
 inline constexpr std::array<MetricInfo, kNumMetrics> kMetrics = {{
-    {"position_error_rms", "m", "object against its desired position"},
-    {"position_error_max", "m", "the largest"},
-    {"orientation_error_rms", "rad", "object against its desired orientation"},
-    {"orientation_error_max", "rad", "the largest"},
-    {"settling_time", "s", "until the error stays within 2 % of the start error"},
-    {"overshoot", "1", "largest error opposite to the start error, relative to it"},
-    {"error_growth", "1", "rms error of the last quarter over that of the first"},
-    {"peak_torque", "N m", "largest |tau'| of a motor"},
-    {"peak_effort", "1", "largest |tau'| of a motor relative to its limit"},
-    {"energy", "J", "work of all motors, either sign counted as positive"},
-    {"cone_margin", "N", "least mu f_n - |f_t| of a fingertip", true},
-    {"fingertip_slip", "m", "how far a fingertip slid"},
-    {"wheel_slip", "m", "how far a wheel slid"},
-    {"simulated_time", "s", "how far the run came", true},
-    {"joint_error_rms", "rad",
-     "of a motion of joints: at each step the joint that is farthest from its place"},
-    {"joint_error_max", "rad", "the largest"},
-    {"gain_margin", "1", "of a motion of joints: least factor above 1 of one joint's torque that is unstable",
-     true},
-    {"phase_margin", "rad", "likewise, least lag or lead", true},
-    {"delay_margin", "s", "likewise, least delay", true},
+    {"position_error_rms", "m"},
+    {"position_error_max", "m"},
+    {"orientation_error_rms", "rad"},
+    {"orientation_error_max", "rad"},
+    {"settling_time", "s"},
+    {"overshoot", "1"},
+    {"error_growth", "1"},
+    {"peak_torque", "N m"},
+    {"peak_effort", "1"},
+    {"energy", "J"},
+    {"cone_margin", "N", true},
+    {"fingertip_slip", "m"},
+    {"wheel_slip", "m"},
+    {"simulated_time", "s", true},
+    {"joint_error_rms", "rad"},
+    {"joint_error_max", "rad"},
+    {"gain_margin", "1", true},
+    {"phase_margin", "rad", true},
+    {"delay_margin", "s", true},
 }};
 
 namespace detail {

@@ -62,22 +62,21 @@ const MakeCharts = () => {
     });
   };
 
-  // Points {x, y, row, color} and lines {label, points, color, dash}. describe(point): text beside a point.
+  // Points {x, y, row, color} and lines {label, points, color}. describe(point): text beside a point.
   const Scatter = (canvas, {x, y, points, lines = [], chosen, choose, describe}) => Draw(canvas, {
     type: 'scatter',
     data: {datasets: [
       {label: 'chosen', data: points.filter(p => p.row === chosen), pointRadius: 7, pointBorderWidth: 2, pointHitRadius: 0, order: 0,
         backgroundColor: 'transparent', borderColor: style('--accent')},
-      ...lines.map(line => ({label: line.label, data: line.points, showLine: !line.rings, borderColor: line.color,
-        borderDash: line.dash ?? [], backgroundColor: 'transparent', pointRadius: line.rings ? 4 : 0, pointHitRadius: 0, borderWidth: line.rings ? 1 : 1.8,
-        order: line.rings ? 3 : 1})),
+      ...lines.map(line => ({label: line.label, data: line.points, showLine: true, borderColor: line.color,
+        backgroundColor: 'transparent', pointRadius: 0, pointHitRadius: 0, borderWidth: 1.8, order: 1})),
       {label: 'trials', data: points, order: 2, backgroundColor: points.map(p => p.color), pointRadius: points.length > 3000 ? 1.5 : 3.5}]},
     options: {onClick: Choose(choose), plugins: {legend: {...Legend(lines.length > 0),
       labels: {boxWidth: 14, filter: item => lines.some(line => line.label === item.text)}}, tooltip: Tip(describe)},
       scales: {x: MakeAxis(x), y: MakeAxis(y)}}
   });
 
-  // Cells {x: [from, to], y: [from, to], row, color, edge}.
+  // Cells {x: [from, to], y: [from, to], row, color}.
   const Cells = (canvas, {x, y, cells, chosen, choose, describe}) => {
     const ends = (of, i) => cells.reduce((best, c) => (i ? Math.max : Math.min)(best, c[of][i]), i ? -Infinity : Infinity);
     const middle = ([from, to], axis) => axis.log ? Math.sqrt(from * to) : (from + to) / 2;
@@ -96,8 +95,7 @@ const MakeCharts = () => {
     return Draw(canvas, {
       type: 'scatter', plugins: [rectangles],
       data: {datasets: [{data: cells.map(cell => ({...cell, x: middle(cell.x, x), y: middle(cell.y, y)})),
-        pointStyle: cells.map(cell => cell.mark ? 'crossRot' : 'circle'), pointRadius: cells.map(cell => cell.mark ? 5 : 0),
-        borderColor: '#000', pointHitRadius: 12}]},
+        pointRadius: 0, pointHitRadius: 12}]},
       options: {onClick: Choose(choose), plugins: {legend: Legend(false), tooltip: Tip(describe)},
         interaction: {mode: 'nearest', intersect: false},
         scales: {x: MakeAxis(x, ends('x', 0), ends('x', 1)), y: MakeAxis(y, ends('y', 0), ends('y', 1))}}

@@ -42,32 +42,16 @@
     get('study-footer').textContent = `dexcheck ${dexcheck_version}${git_revision ? ', revision ' + git_revision : ''}, MuJoCo ${mujoco_version}.`;
     Add(get('outcome-table'), ShowTable(['outcome', 'trials'], study.outcomes.filter(o => o.count > 0).map(o => [
       Add(Make('span'), Object.assign(Make('span', '', {className: 'key'}), {style: 'background:' + o.color}), ' ' + o.name), o.count])));
-    if (study.theory) {
-      Add(get('departures'), Make('p', 'The sampled error dynamics E_ddot + K_v E_dot + K_p E = 0 (57), stepped as the engine steps, agree with ' +
-        `${study.theory.agree} of ${study.theory.compared} trials in whether the object is held.`));
-      if (study.theory.departures.length)
-        Add(get('departures'), ShowTable(['where the plant departs from them', 'trials'], study.theory.departures.map(d => [d.reason, d.count])));
-    }
     if (study.best) {
       get('best').querySelector('p').textContent = study.best.order;
       if (study.best.rows.length) Add(get('best').querySelector('div'), ShowTable(['trial', ...study.best.heads],
         study.best.rows.map(row => [Link(row.trial), ...row.cells])));
     }
-    const Stable = end => end.bad === null ? 'end of the range' : end.stable_by_57 === null ? '–' : end.stable_by_57 ? 'stable' : 'unstable';
-    if (study.margins.length) {
-      const of = name => study.margins.map(m => m.fractions[name]);
-      const starts = of('start');
-      Bars(get('margins').querySelector('canvas'), {labels: study.margins.map(m => m.key), least: 0, most: 1, unit: 'fraction of the range', sets: [
-        {label: 'good', values: of('down').map((from, i) => [from, of('up')[i]]), color: style('--accent')},
-        {label: 'start', values: starts.map(s => [s - 0.004, s + 0.004]), color: style('--ink'), thin: true}]});
-      Add(get('margins').querySelector('.scroll'), ShowTable(['key', 'from', 'to', 'start', '(57) below', '(57) above'], study.margins.map(m =>
-        [m.key, m.down.good, m.up.good, m.start, Stable(m.down), Stable(m.up)])));
-    }
-    for (const {quantity, method, keys} of study.sensitivity) {
-      const other = method === 'saltelli' ? 'alone' : 'spread', canvas = Make('canvas', '', {role: 'img', ariaLabel: 'effects on ' + quantity});
-      const what = method === 'saltelli' ? 'fraction of the variance, with interactions' : 'moves it over its range by';
+    for (const {quantity, keys} of study.sensitivity) {
+      const canvas = Make('canvas', '', {role: 'img', ariaLabel: 'effects on ' + quantity});
+      const what = 'moves it over its range by';
       Add(get('effects').querySelector('.grid'), Add(Make('section', '', {className: 'card scroll'}), Make('h3', quantity),
-        Add(Make('div', '', {className: 'chart'}), canvas), ShowTable(['key', what, other], keys.map(k => [k.key, k.value, k[other]]))));
+        Add(Make('div', '', {className: 'chart'}), canvas), ShowTable(['key', what, 'spread'], keys.map(k => [k.key, k.value, k.spread]))));
       Bars(canvas, {labels: keys.map(k => k.key), sets: [{label: what, values: keys.map(k => k.value), color: style('--accent')},
         {label: 'with 95 %', values: keys.map(k => [k.low, k.high]), color: style('--ink'), thin: true}]});
     }
@@ -143,7 +127,7 @@
     x = Math.imul(x ^ (x >>> 15), 0x85ebca6b);
     return ((x ^ (x >>> 13)) >>> 0) / 2 ** 32;
   };
-  // Any quantity against another one, with the Pareto front of two metrics, and what (57) makes of the second one.
+  // Any quantity against another one, with the Pareto front of two metrics.
   const DrawPair = (canvas, x, y, color, list = rows, withMedian = false) => {
     const good = list.filter(row => Number.isFinite(value(row, x)) && Number.isFinite(value(row, y)));
     const seen = good.concat(marks.filter(row => Number.isFinite(value(row, x)) && Number.isFinite(value(row, y))));
@@ -158,9 +142,6 @@
       if (study.is_grid || good.length >= 2 * groups.length)
         lines.push({label: 'median', color: style('--accent'), points: groups.map(([at, group]) => ({x: at, y: Median(group.map(row => value(row, y)))}))});
     }
-    const theory = find('theory.' + columns[y].name);
-    const predicted = theory < 0 ? [] : good.filter(row => Number.isFinite(value(row, theory)));
-    if (predicted.length) lines.push({label: 'by (57)', rings: true, color: '#005f73', points: predicted.map(row => ({x: value(row, x), y: value(row, theory)}))});
     Scatter(canvas, {x: AxisOf(x, seen), y: AxisOf(y, seen), points: seen.filter(row => Hash(row) < part || row === chosen || isAdded(row)).map(At), lines, chosen,
       choose: Choose, describe: p => Describe(p.row) + `; ${columns[y].name} ${Show(p.y, y)}`});
   };
@@ -188,18 +169,16 @@
       const good = group.filter(row => held(row) && Number.isFinite(value(row, z)));
       return good.reduce((sum, row) => sum + value(row, z), 0) / good.length;
     };
-    const stable = find('theory.stable');
     const cells = [...groups].map(([key, group]) => {
       const i = key % ex.length, j = Math.floor(key / ex.length), row = group.includes(chosen) ? chosen : worst(group);
-      return {x: [ex[i], ex[i + 1]], y: [ey[j], ey[j + 1]], row, z: z === kOutcome ? value(worst(group), kOutcome) : mean(group),
-        mark: z === kOutcome && stable >= 0 && value(worst(group), stable) === 0};
+      return {x: [ex[i], ex[i + 1]], y: [ey[j], ey[j + 1]], row, z: z === kOutcome ? value(worst(group), kOutcome) : mean(group)};
     });
     const finite = cells.map(cell => cell.z).filter(Number.isFinite);
     const least = finite.reduce((a, b) => Math.min(a, b), Infinity), most = finite.reduce((a, b) => Math.max(a, b), -Infinity);
     const colors = ColorsOf(least, most, '#e8e8e8');
     for (const cell of cells) cell.color = z === kOutcome ? study.outcomes[cell.z].color : colors.of(cell.z);
     Cells(canvas, {x: AxisOf(x), y: AxisOf(y), cells, chosen, choose: Choose, describe: p => Describe(p.row) + (z === kOutcome ? '' : `; ${columns[z].name} ${Show(p.z, z)}`)});
-    text.textContent = z === kOutcome ? `The worst outcome of each cell${isPart ? ', of the trials on this page' : ''}.` + (cells.some(cell => cell.mark) ? ' Crosses: unstable by (57).' : '')
+    text.textContent = z === kOutcome ? `The worst outcome of each cell${isPart ? ', of the trials on this page' : ''}.`
       : finite.length && colors.isFlat ? `${Short(least)} everywhere; grey: no value.`
       : finite.length ? `From ${Short(least)} (pale) to ${Short(most)} (dark)${colors.isLog ? ', by the logarithm' : ''}; grey: no value.` : 'No value.';
   };
@@ -322,17 +301,15 @@
   ShowSummary();
   const drop = (id, gone) => { if (gone) get(id).remove(); };
   drop('findings', !study.findings.length);
-  drop('margins', !study.margins.length);
   drop('effects', !study.sensitivity.length);
-  drop('departures', !study.theory);
   drop('best', !study.best || !study.best.order);
   drop('history', !study.history.length);
   drop('over-two', study.keys.length < 2);
   get('trials-text').textContent = 'A trial that is chosen, here or in a chart, shows the command that repeats it.' + (isPart
-    ? ` Here are ${drawn} of ${study.done} trials, those of points that a hash of their number draws, with all their seeds and draws` +
+    ? ` Here are ${drawn} of ${study.done} trials, those of points that a hash of their number draws, with all their seeds` +
       `${added.size ? `, and ${added.size} of the best, which are marks in charts and count nowhere` : ''}. ` +
       `${study.done - count} trials are left out; "dexcheck study show DB NUMBER" shows any of them,` : '') + ' "dexcheck study export DB" writes all as CSV.';
-  for (const [id, name] of [['margins', 'Margins'], ['effects', 'Which key matters'], ['outcomes', 'Outcomes'], ['explore', 'Look closer'], ['best', 'Best'],
+  for (const [id, name] of [['effects', 'Which key matters'], ['outcomes', 'Outcomes'], ['explore', 'Look closer'], ['best', 'Best'],
     ['trials', 'Trials']]) {
     if (get(id)) Add(get('study-nav'), Make('a', name, {href: '#' + id}));
   }

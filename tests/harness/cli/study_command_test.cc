@@ -126,22 +126,17 @@ TEST_F(StudyCommand, CtrlCEndsItInGoodOrder) {
   EXPECT_EQ(Dump("a.sqlite"), Reference());
 }
 
-TEST_F(StudyCommand, AnEditedStudyKeepsItsRows) {
-  Make("reference.sqlite", {"--quiet"});
+TEST_F(StudyCommand, AnEditedStudyNeedsAnotherDatabase) {
   Make("a.sqlite", {"--quiet"});
-  // One value goes, one comes.
+  const std::string before = Dump("a.sqlite");
   WriteChanged("tiny.toml", kStudy, "[20, 200, 2100]", "[300, 20, 200]");
-  const ProgramResult edited = Make("a.sqlite");
-  EXPECT_THAT(edited.out, HasSubstr("the study was edited: 4 trials are kept, 2 are set aside"));
-  EXPECT_THAT(edited.out, HasSubstr("tiny: 6 of 6 trials"));
-  // Back again, with a comment: nothing is left to be made, and the rows are those of the study as it was.
+  EXPECT_TRUE(
+      Refused(RunArguments("a.sqlite"), {"a.sqlite: is of another study: key vary differs; each study "
+                                         "needs a database file of its own"}));
+  EXPECT_EQ(Dump("a.sqlite"), before);
+  // A comment is no change.
   Write("tiny.toml", "# back\n" + kStudy);
-  const ProgramResult back = Run(RunArguments("a.sqlite"));
-  EXPECT_THAT(back.out, HasSubstr("4 trials are kept, 2 are brought back, 2 are set aside"));
-  const auto rows = ReadRows("a.sqlite");
-  const auto expected = ReadRows("reference.sqlite");
-  ASSERT_EQ(rows.size(), expected.size());
-  for (size_t i = 0; i < rows.size(); ++i) EXPECT_TRUE(IsSame(rows[i], expected[i])) << i;
+  EXPECT_THAT(Make("a.sqlite").out, HasSubstr("tiny: 6 of 6 trials"));
 }
 
 TEST_F(StudyCommand, FaultsAreNamed) {
@@ -181,9 +176,6 @@ TEST_F(StudyCommand, TheReportsCommandsRepeatTheTrials) {
   const ProgramResult page = Expect(0, "study report a.sqlite --out -");
   EXPECT_THAT(page.out, StartsWith("<!DOCTYPE html>"));
   EXPECT_THAT(page.out, EndsWith("</html>\n"));
-  const auto report = RunJson(0, "study report a.sqlite");
-  EXPECT_EQ(report["theory"]["compared"], 6);
-  EXPECT_EQ(report["theory"]["agree"], 6);
   const auto trial = RunJson(0, "study show a.sqlite 4");
   const auto shown = trial["command"].get<std::string>();
   EXPECT_THAT(shown, HasSubstr("--set control.K_p=10000 --set control.K_v=200"));

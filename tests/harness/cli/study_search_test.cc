@@ -118,12 +118,8 @@ values = [[1e-6, 0, 0], [3e-6, 0, 0]]
   EXPECT_EQ(rows[1].result.metrics[kSimulatedTime], 0.001) << "it is kept, as far as it came";
 }
 
-TEST_F(StudySearch, IsWatchedShownAndExported) {
+TEST_F(StudySearch, IsShownAndExported) {
   Make("a.sqlite", {"--quiet"});
-  const ProgramResult watched = Expect(0, "study watch a.sqlite --interval 0.1 --page a.html");
-  EXPECT_THAT(watched.out, HasSubstr("tiny: 48 of at most 48 trials"));
-  EXPECT_THAT(watched.out, HasSubstr("The least position_error_rms"));
-  EXPECT_THAT(Read("a.html"), Not(HasSubstr("http-equiv=\"refresh\""))) << "it is over";
   const std::vector<TrialRow> rows = ReadRows("a.sqlite");
   const ProgramResult shown = Expect(0, "study show a.sqlite 17");
   EXPECT_THAT(shown.out, HasSubstr("trial 17, seed 1: tracked"));
@@ -132,7 +128,6 @@ TEST_F(StudySearch, IsWatchedShownAndExported) {
   EXPECT_EQ(trial["metrics"]["position_error_rms"], rows[17].result.metrics[kPositionErrorRms]);
   EXPECT_THAT(trial["command"].get<std::string>(), HasSubstr("dexcheck run offset --set duration=0.02"));
   EXPECT_TRUE(Refused("study show a.sqlite 48", {"a.sqlite: trial 48: has no row"}));
-  EXPECT_TRUE(Refused("study watch a.sqlite --interval 0", {"--interval"}));
   const ProgramResult csv = Expect(0, "study export a.sqlite --out -");
   EXPECT_EQ(std::ranges::count(csv.out, '\n'), 49);
   EXPECT_THAT(csv.out, StartsWith("trial,seed,control.K_p,control.K_v,outcome,failure,position_error_rms,"));

@@ -21,10 +21,10 @@ TEST_F(StudyCommand, MergedShardsAreTheStudy) {
   EXPECT_EQ(Dump("all.sqlite"), reference);
 
   WriteChanged("tiny.toml", kStudy, "duration=0.02", "duration=0.03");
-  EXPECT_TRUE(Refused(RunArguments("1.sqlite"), {"1.sqlite: is of another study: study differs"}));
+  EXPECT_TRUE(Refused(RunArguments("1.sqlite"), {"1.sqlite: is of another study: key set differs"}));
   Make("other.sqlite", {"--shard", "1/6"});
   EXPECT_TRUE(Refused("study merge none.sqlite 1.sqlite other.sqlite",
-                      {"other.sqlite: is of another study: study differs"}));
+                      {"other.sqlite: is of another study: key set differs"}));
   EXPECT_FALSE(Has("none.sqlite"));
 }
 

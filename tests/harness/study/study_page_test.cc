@@ -34,9 +34,7 @@ class StudyPageBrowserTest : public ::testing::Test {
     StudyStore store =
         StudyStore::OpenOrCreate(folder_.path() / "page.sqlite", IdentifyStudy(inputs), inputs.study);
     const std::vector<Trial> trials =
-        inputs.study.is_search()
-            ? SearchHistory(inputs.study, UnitPoint(inputs.study.num_keys(), 0.5)).ListMissing()
-            : ListTrials(inputs.study);
+        inputs.study.is_search() ? SearchHistory(inputs.study).ListMissing() : ListTrials(inputs.study);
     std::vector<TrialRow> rows;
     for (const Trial& trial : trials) rows.push_back(MakeRow(trial));
     store.Add(rows);
@@ -84,11 +82,6 @@ TEST_F(StudyPageBrowserTest, ACellShowsTheCommandThatRepeatsItsTrial) {
       Text("explore-command"),
       "dexcheck run offset --set control.K_p=1000 --set control.K_v=200 --no-check --video --out trial-5");
   EXPECT_EQ(Run("return location.hash;"), "#trial-5");
-  // In theory K_v < 2 / h - h K_p / 2: the cells beyond are crossed, and in these the plant diverged.
-  EXPECT_EQ(Run("return Chart.getChart(document.querySelector('#maps "
-                "canvas')).data.datasets[0].data.filter(c => c.mark).length;"),
-            6);
-  EXPECT_THAT(Text("departures"), HasSubstr("agree with 12 of 12 trials"));
   EXPECT_THAT(browser_.TakeConsole(), IsEmpty());
 }
 
@@ -98,16 +91,12 @@ TEST_F(StudyPageBrowserTest, FitsEveryWidthWithoutAnError) {
   const std::string range = "from = 5\nto = 50\n", second = "[[vary]]\nkey = 'control.K_v'\n";
   const std::vector<std::string> studies = {
       one + "values = [100, 1000]\n",
-      one +
-          "values = [100, 1000]\n[nested]\nmethod = 'random'\ncount = 3\nseed = 1\n[[nested.vary]]\nkey = "
-          "'plant.finger_friction'\nfrom = 0.5\nto = 1\n",
       one + "values = [100, 1000]\n" + second +
           "values = [20, 3000]\n[[vary]]\nkey = 'control.law'\nvalues = ['computed_torque', "
           "'pd_gravity']\n[[objective]]\nminimize = 'energy'\n",
       "seeds = [1, 2]\n[[vary]]\nkey = \"control.law\"\nvalues = [\"computed_torque\", "
       "\"operational_space\", \"feedforward_pd\", \"impedance\", \"pd_gravity\"]\n",
-      "[sample]\nmethod = 'saltelli'\ncount = 8\n" + one + range + second + range,
-      "constraints = ['held']\n[search]\nmethod = 'margins'\n" + one + range + second + range,
+      "[sample]\nmethod = 'morris'\ncount = 8\n" + one + range + second + range,
       "[[objective]]\nminimize = 'energy'\n[search]\nmethod = 'cma_es'\ncount = 40\n" + one + range + second +
           range};
   for (const std::string& study : studies) {
@@ -189,13 +178,9 @@ TEST_F(StudyPageBrowserTest, LooksCloserAtItsTrials) {
   EXPECT_THAT(browser_.TakeConsole(), IsEmpty());
 }
 
-// Where (57) knows a metric, what it makes of it stands beside what was measured.
-TEST_F(StudyPageBrowserTest, ShowsTheoryBesideTheTrials) {
+// The table of the best of a study that says what it wants leads to its trials.
+TEST_F(StudyPageBrowserTest, LeadsFromTheBestToTheirTrials) {
   Open(kGrid + "[[objective]]\nminimize = 'overshoot'\n");
-  const nlohmann::json rings =
-      Run("const chart = Chart.getChart(document.getElementById('explore-scatter'));return "
-          "chart.data.datasets.find(d => d.label === 'by (57)').data.length;");
-  EXPECT_EQ(rings, 6) << "those that are stable";
   EXPECT_EQ(Run("return document.querySelectorAll('#best a').length;"), 6);
   Run("document.querySelector('#best a').click();");
   EXPECT_TRUE(browser_.WaitFor("return !document.getElementById('explore-chosen').hidden;"));

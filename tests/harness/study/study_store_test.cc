@@ -31,6 +31,16 @@ class StudyStoreTest : public ::testing::Test {
   [[nodiscard]] StudyStore Open() const {
     return StudyStore::OpenOrCreate(folder_.path() / "s.sqlite", identity_, study_);
   }
+  /// With another text of the study, by another revision of the program.
+  [[nodiscard]] StudyStore Open(const std::string& text, const std::string& revision = "text",
+                                const MakesSameRows& same = {}) const {
+    const Study study = ParseStudy(text, "study.toml");
+    StudyIdentity identity = MakeIdentity(study);
+    for (auto& [column, value] : identity) {
+      if (column == "git_revision") value = revision;
+    }
+    return StudyStore::OpenOrCreate(folder_.path() / "s.sqlite", identity, study, same);
+  }
 
   void Execute(const std::string& sql) const {
     SQLite::Database(folder_.path() / "s.sqlite", SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE).exec(sql);
@@ -87,12 +97,85 @@ TEST_F(StudyStoreTest, RowsComeBackBitForBit) {
 TEST_F(StudyStoreTest, AnotherStudyIsRefused) {
   { const StudyStore made = Open(); }
   for (auto& [column, value] : identity_) {
-    if (column == "layout" || column == "study") continue;
+    if (column == "layout" || column == "study" || column == "name") continue;
     const std::string before = std::exchange(value, "other");
     EXPECT_TRUE(Throws<InputError>([&] { return Open(); }, "is of another study: " + column + " differs"));
     value = before;
   }
   EXPECT_NO_THROW({ const StudyStore same = Open(); });
+}
+
+// What makes no other trials may be edited.
+TEST_F(StudyStoreTest, TheDatabaseTakesOverWhatNoRowDependsOn) {
+  Open().Add(MakeRow(0));
+  const std::string edited =
+      ReplaceOnce(ReplaceOnce(kText, "\"s\"", "\"other\""), "[[vary]]",
+                  "# why\ndescription = 'd'\ntrial_time_limit = 3\nmetrics = ['energy']\n"
+                  "constraints = ['held']\n[[objective]]\nminimize = 'energy'\n[[vary]]");
+  { const StudyStore store = Open(edited); }
+  const StudyStore store = StudyStore::Open(folder_.path() / "s.sqlite");
+  EXPECT_EQ(store.study().name, "other");
+  EXPECT_EQ(store.study().trial_time_limit, 3.0);
+  EXPECT_EQ(store.study().objectives.size(), 1U);
+  EXPECT_EQ(store.ReadRows().size(), 1U);
+}
+
+TEST_F(StudyStoreTest, AnEditedStudyIsRefusedByItsKey) {
+  Open().Add(MakeRow(0));
+  for (const auto& [from, to, key] : {std::tuple{"\"hold\"", "\"offset\"", "scenario"},
+                                      {"[[", "controller = \"law.py\"\n[[", "controller"},
+                                      {"[[", "set = [\"duration=1\"]\n[[", "set"},
+                                      {"[1, 2, 3]", "[1, 2, 3, 4]", "vary"},
+                                      {"[[", "[sample]\nmethod = \"random\"\ncount = 3\n[[", "sample"},
+                                      {"[[", "seeds = [1]\n[[", "seeds"},
+                                      {"[[", "check = true\n[[", "check"},
+                                      {"[[", "stop_error = 1\n[[", "stop_error"},
+                                      {"[[", "metrics = [\"gain_margin\"]\n[[", "metrics"},
+                                      {"[[", "constraints = [\"gain_margin > 2\"]\n[[", "constraints"}}) {
+    EXPECT_TRUE(Throws<InputError>([&, f = from, t = to] { return Open(ReplaceOnce(kText, f, t)); },
+                                   std::string("s.sqlite: is of another study: key ") + key +
+                                       " differs; each study needs a database file of its own"));
+  }
+  EXPECT_EQ(Open().ReadRows().size(), 1U);
+}
+
+// Its points follow from what it looks for.
+TEST_F(StudyStoreTest, AnEditedSearchIsRefused) {
+  const std::string search =
+      "name = \"s\"\nscenario = \"hold\"\n[[objective]]\nminimize = \"energy\"\n[search]\nmethod = "
+      "\"cma_es\"\ncount = 32\n[[vary]]\nkey = \"a\"\nfrom = 0\nto = 1\n";
+  { const StudyStore store = Open(search); }
+  for (const auto& [from, to, key] : {std::tuple{"32", "64", "search"},
+                                      {"energy", "overshoot", "objective"},
+                                      {"[[obj", "constraints = [\"held\"]\n[[obj", "constraints"},
+                                      {"to = 1", "to = 2", "vary"}}) {
+    EXPECT_TRUE(Throws<InputError>([&, f = from, t = to] { return Open(ReplaceOnce(search, f, t)); },
+                                   std::string("key ") + key + " differs"));
+  }
+}
+
+TEST_F(StudyStoreTest, AnotherRevisionGoesOnWhenItMakesTheSameRows) {
+  Open().Add(MakeRow(0));
+  EXPECT_TRUE(Throws<InputError>([&] { return Open(kText, "r2"); }, "git_revision differs"));
+  EXPECT_TRUE(Throws<InputError>(
+      [&] { return Open(kText, "r2", [](const std::vector<TrialRow>&) { return false; }); },
+      "git_revision differs"));
+  {
+    const StudyStore store =
+        Open(kText, "r2", [](const std::vector<TrialRow>& rows) { return rows.size() == 1; });
+    EXPECT_EQ(store.change(), "its rows are of another revision, which made the same ones");
+  }
+  EXPECT_EQ(Open(kText, "r2").change(), "");
+}
+
+// Earlier versions kept rows of an edited study under negative numbers.
+TEST_F(StudyStoreTest, RowsThatWereSetAsideCountNowhere) {
+  Open().Add(MakeRow(0));
+  Open().Add(MakeRow(-1));
+  const StudyStore store = StudyStore::Open(folder_.path() / "s.sqlite");
+  EXPECT_EQ(store.ListNumbers(), std::vector<long>{0});
+  EXPECT_EQ(store.ReadRows().size(), 1U);
+  EXPECT_EQ(store.CountOutcomes().at(Outcome::kSlipped), 1);
 }
 
 TEST_F(StudyStoreTest, OtherFilesAreRefused) {

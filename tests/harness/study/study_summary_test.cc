@@ -54,7 +54,7 @@ StudySummary Summarise(const Study& study, const std::string& text, bool of_join
   return SummariseStudy(store);
 }
 
-TEST(StudySummary, HasOutcomesBestAndTheory) {
+TEST(StudySummary, HasOutcomesAndTheBest) {
   const nlohmann::ordered_json json = Summarise(Parse(kGrid), "why at t = 1 s").json;
   EXPECT_EQ(json["done"], 4);
   EXPECT_EQ(json["total"], 4);
@@ -62,10 +62,6 @@ TEST(StudySummary, HasOutcomesBestAndTheory) {
   EXPECT_EQ(json["outcomes"][0]["count"], 2);
   EXPECT_EQ(json["best"]["order"], "By rms position error, of the trials that tracked.");
   EXPECT_EQ(json["best"]["rows"][0]["trial"], 0);
-  EXPECT_EQ(json["theory"]["compared"], 4);
-  EXPECT_EQ(json["theory"]["agree"], 2) << "all are stable";
-  EXPECT_EQ(json["theory"]["departures"][0]["reason"], "stable in theory, but why");
-  EXPECT_EQ(json["theory"]["departures"][0]["count"], 2) << "without the time";
   EXPECT_EQ(json["failures"]["3"], "why at t = 1 s");
   EXPECT_EQ(json["versions"]["git_revision"], "why at t = 1 s");
 }
@@ -77,10 +73,8 @@ TEST(StudySummary, NoTextBecomesMarkup) {
   EXPECT_THAT(page, Not(HasSubstr(kMarkup)));
 }
 
-// Theory is that of an object, which an arm that holds nothing has not.
-TEST(StudySummary, OfJointsHasTheirErrorAndNoTheoryOfAnObject) {
+TEST(StudySummary, OfJointsHasTheirError) {
   const nlohmann::ordered_json json = Summarise(Parse(kGrid), "why", /*of_joints=*/true).json;
-  EXPECT_EQ(json["theory"], nullptr);
   EXPECT_EQ(json["error"], "joint_error_rms");
   EXPECT_EQ(json["best"]["order"], "By rms joint error, of the trials that tracked.");
 }
@@ -126,7 +120,6 @@ TEST(StudySummary, OfManyTrialsItHasWholePointsAndTheBest) {
     EXPECT_EQ(std::ranges::count_if(rows, is_it), 1) << best;
   }
   EXPECT_FALSE(added.empty());
-  EXPECT_EQ(summary.json["theory"]["compared"], 2000);
 }
 
 TEST(StudySummary, ATrialHasTheCommandThatRepeatsIt) {
