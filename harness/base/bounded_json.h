@@ -4,6 +4,7 @@
 // bounded.
 
 #include <nlohmann/json.hpp>
+#include <string>
 #include <string_view>
 
 namespace dexcheck {
@@ -24,6 +25,13 @@ inline bool IsNestedTooDeep(std::string_view json) {
     if (c == ']' || c == '}') --depth;
   }
   return depth > kMostBrackets;
+}
+
+/// The library's message without the "[json.exception.NAME.NUMBER] " that it begins with.
+inline std::string DescribeJsonError(const nlohmann::json::exception& error) {
+  const std::string message = error.what();
+  const size_t tag = message.find("] ");
+  return tag == std::string::npos ? message : message.substr(tag + 2);
 }
 
 /// The value of a text; discarded when the text is no JSON or is nested too deeply.

@@ -363,6 +363,8 @@ int Run(const EvalRequest& request) {
     AddModelTerms(model, state, &out);
   } catch (const InputError& error) {
     throw InputError(request.state_file + ": " + error.what());
+  } catch (const std::invalid_argument& error) {  // Numbers as large as 1e308 become infinite on the way.
+    throw InputError(request.state_file + ": " + error.what());
   }
   if (!request.mjcf.empty()) {
     const MjModelPtr engine = LoadMjcf(request.mjcf);

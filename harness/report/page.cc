@@ -14,6 +14,7 @@
 #include <utility>
 
 #include "controller/common/errors.h"
+#include "harness/base/bounded_json.h"
 #include "harness/base/files.h"
 #include "harness/base/interrupts.h"
 #include "harness/checks/check_table.h"
@@ -300,7 +301,7 @@ std::string MakePage(const RunData& run, const PageContent& content) {
   try {
     return Page(run, content).Make();
   } catch (const nlohmann::json::exception& error) {
-    throw InputError(run.log().path().string() + ": summary: " + error.what());
+    throw InputError(run.log().path().string() + ": summary: " + DescribeJsonError(error));
   }
 }
 

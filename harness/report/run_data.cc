@@ -89,7 +89,7 @@ void RunData::ReadChecksOfSummary() {
   try {
     for (const auto& [name, json] : summary_["checks"].items()) checks_.push_back(ReadCheck(name, json));
   } catch (const nlohmann::json::exception& error) {
-    Fail(log_, std::string("summary: ") + error.what());
+    Fail(log_, "summary: " + DescribeJsonError(error));
   }
 }
 

@@ -5,6 +5,7 @@
 #include <string_view>
 
 #include "controller/common/errors.h"
+#include "harness/base/bounded_json.h"
 #include "harness/report/page.h"
 
 namespace dexcheck {
@@ -97,7 +98,7 @@ std::string MakeTexTable(const RunData& run) {
         "{}    \\bottomrule\n  \\end{{tabular}}\n\\end{{table}}\n",
         MakeCaption(run), rows);
   } catch (const nlohmann::json::exception& error) {
-    throw InputError(run.log().path().string() + ": summary: " + error.what());
+    throw InputError(run.log().path().string() + ": summary: " + DescribeJsonError(error));
   }
 }
 

@@ -59,10 +59,7 @@ class StateReader {
     try {
       return Json::parse(text);
     } catch (const Json::exception& error) {
-      // The library's messages begin with "[json.exception.NAME.NUMBER] ".
-      const std::string message = error.what();
-      const size_t tag = message.find("] ");
-      Fail("", "not valid JSON: " + Abbreviate(tag == std::string::npos ? message : message.substr(tag + 2)));
+      Fail("", "not valid JSON: " + Abbreviate(DescribeJsonError(error)));
     }
   }
 
