@@ -15,6 +15,7 @@
 #include "harness/cli/output_file.h"
 #include "harness/cli/run_folder.h"
 #include "harness/cli/run_report.h"
+#include "harness/run/own_controller.h"
 #include "harness/view/frame_source.h"
 #include "harness/view/live_run.h"
 #include "harness/view/viewer.h"
