@@ -12,6 +12,7 @@
 #include <cstring>
 #include <filesystem>
 #include <iterator>
+#include <string_view>
 
 #include "controller/common/errors.h"
 #include "harness/base/child_process.h"
@@ -24,7 +25,7 @@ namespace {
 pid_t program = -1;  // of main, which may be watched
 int failure_exit_code = EXIT_FAILURE;
 std::atomic<int> announcement = -1;  // the copy's end of a pipe
-std::atomic<pid_t> copy = -1;
+std::atomic<pid_t> copy = -1;        // which goes on
 
 /// A terminal's signal reaches the whole group.
 void PassOn(int signal, siginfo_t* info, void* /*context*/) {
@@ -77,14 +78,25 @@ void ContinueWatched(const std::string& what) {
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);
   if (::getppid() != program) ::_exit(failure_exit_code);  // it ended before
   ::close(ends[0]);
+  copy = ::getpid();
   announcement = ends[1];
 }
 
 int EndProgram(int exit_code) {
+  if (copy != ::getpid()) return exit_code;  // a worker of the copy ends
   const int end = announcement.exchange(-1);
   if (end >= 0) [[maybe_unused]]
     const ssize_t ignored = ::write(end, "e", 1);
   return exit_code;
+}
+
+void FailAtOnce(const std::string& what) {
+  RemoveTemporaryPaths();
+  for (const std::string_view text :
+       {std::string_view("dexcheck: "), std::string_view(what), std::string_view("\n")}) {
+    [[maybe_unused]] const ssize_t ignored = ::write(STDERR_FILENO, text.data(), text.size());
+  }
+  ::_exit(EndProgram(failure_exit_code));
 }
 
 }  // namespace dexcheck

@@ -19,4 +19,8 @@ void ContinueWatched(const std::string& what);
 /// Announces that the process ends by itself. Safe in a handler of signals. @returns the exit code.
 int EndProgram(int exit_code);
 
+/// Ends this process with a line on standard error and the exit code of AllowWatching. Temporary files go
+/// before. Safe in a handler of signals.
+[[noreturn]] void FailAtOnce(const std::string& what);
+
 }  // namespace dexcheck

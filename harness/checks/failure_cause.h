@@ -19,7 +19,6 @@ enum class Cause {
   kTilt,             ///< The platform does not stay level.
   kSolver,           ///< The engine's solver stopped before its forces fit its motion.
   kUnmodelledForce,  ///< A force acts that neither the model nor the engine's description has.
-  kIntegrator,       ///< What time stepping leaves: half the step leaves less.
   kSlope,            ///< The floor is not level: gravity points elsewhere.
   kContactGeometry,  ///< A fingertip or the object has another shape.
   kWheelGeometry,    ///< The wheels' radius or distance is another.

@@ -15,10 +15,14 @@
 namespace dexcheck::cli {
 namespace {
 
-struct BudgetRequest : ScenarioRequest {
+struct BudgetRequest {
+  std::string scenario;
+  Overrides overrides;
   std::uint64_t seed = 0;
   std::uint64_t jobs = 0;
   std::string page;
+  std::string json_file;
+  bool quiet = false;
 };
 
 /// Of a law that is not known there is none.
@@ -85,11 +89,13 @@ void AddBudgetCommand(Command app) {
   const auto request = std::make_shared<BudgetRequest>();
   Command command = app.AddCommand(
       "budget", "Which part of a plant that is not ideal costs the accuracy: each alone, all but each, all");
-  AddScenarioOptions(command, request.get());
+  command.AddOption("SCENARIO", &request->scenario, "Name of a shipped scenario, or a TOML file").Required();
+  AddOverrideOptions(command, &request->overrides);
   AddSeedOption(command, &request->seed, "Seed of all that is random");
   command.AddOption("--page FILE.html", &request->page, "Write table and bar chart as a page");
   AddJobsOption(command, "Runs", &request->jobs);
-  AddResultOptions(command, "the budget", request.get());
+  AddJsonOption(command, "the budget", &request->json_file);
+  command.AddFlag("--quiet", &request->quiet, "Print the last line only");
   command.SetAction([=] { return Run(*request); });
 }
 

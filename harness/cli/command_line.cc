@@ -50,8 +50,8 @@ Option& Option::TypeName(const std::string& name) {
   return *this;
 }
 
-Option& Option::Required(bool is_required) {
-  option_->required(is_required);
+Option& Option::Required() {
+  option_->required();
   return *this;
 }
 

@@ -50,7 +50,7 @@ class Option {
  public:
   /// How the help names its value: "FILE.toml".
   Option& TypeName(const std::string& name);
-  Option& Required(bool is_required = true);
+  Option& Required();
   Option& Excludes(const Option& other);
   Option& Needs(const Option& other);
   Option& Check(const ValueCheck& check);

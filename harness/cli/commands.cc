@@ -94,19 +94,6 @@ std::array<Option, 3> AddOverrideOptions(Command command, Overrides* overrides) 
   return {set, unset, AddControllerOptions(command, &overrides->controller)};
 }
 
-Option AddScenarioOptions(Command command, ScenarioRequest* request) {
-  Option scenario =
-      command.AddOption("SCENARIO", &request->scenario, "Name of a shipped scenario, or a TOML file")
-          .Required();
-  AddOverrideOptions(command, &request->overrides);
-  return scenario;
-}
-
-void AddResultOptions(Command command, const std::string& what, ScenarioRequest* request) {
-  AddJsonOption(command, what, &request->json_file);
-  command.AddFlag("--quiet", &request->quiet, "Print the last line only");
-}
-
 Option AddJobsOption(Command command, const std::string& what, std::uint64_t* jobs) {
   return command.AddOption("--jobs N", jobs, what + " at a time (all processors by default)")
       .Check(WholeNumber(1, 1000000));

@@ -50,19 +50,6 @@ struct Overrides {
 /// Adds --set and --unset, and AddControllerOptions. @returns the three, without the time limit.
 std::array<Option, 3> AddOverrideOptions(Command command, Overrides* overrides);
 
-/// What commands need that make many runs of one scenario and print one result.
-struct ScenarioRequest {
-  std::string scenario;
-  Overrides overrides;
-  std::string json_file;
-  bool quiet = false;
-};
-
-/// Adds SCENARIO and AddOverrideOptions. @return SCENARIO, which is required.
-Option AddScenarioOptions(Command command, ScenarioRequest* request);
-/// Adds --json and --quiet. @param what the file gets: "the budget".
-void AddResultOptions(Command command, const std::string& what, ScenarioRequest* request);
-
 /// Adds --jobs. @param what is made: "Trials". @param jobs 0 for one on each processor, as CountJobs reads
 /// it.
 Option AddJobsOption(Command command, const std::string& what, std::uint64_t* jobs);

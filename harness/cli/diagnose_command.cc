@@ -259,10 +259,9 @@ Answer FindAnswer(const DiagnoseRequest& request, const RobotDescription& robot,
   };
   Answer answer;
   answer.numbers = diagnose(model, robot);
-  // What can only be moved shows no bodies to compare.
   ExplainedDifference why;
   const std::optional<RobotDescription> right = mjcf.TryToDescribe();
-  if (!answer.numbers.agrees && !request.diagnosis.by_motion && right)
+  if (!answer.numbers.agrees && right)
     why = Explain(robot, *right, std::max(request.diagnosis.tolerance, kHypothesisTolerance));
   answer.likely = why.hypotheses;
   if (why.undone) {
@@ -336,8 +335,6 @@ void AddDiagnoseCommand(Command app) {
   AddFileOptions(command, "What may be wrong, instead of --robot and --mjcf: parameter file (TOML) or URDF",
                  "What is right: MJCF", request.get());
   AddSampleOptions(command, kMaxSamples, &request->diagnosis.samples, &request->diagnosis.seed);
-  command.AddFlag("--by-motion", &request->diagnosis.by_motion,
-                  "Use axes, frames and forces only, not the bodies' masses and inertias in the MJCF");
   request->options.samples = 200;
   AddJudgingOptions(command, request.get());
   AddIgnoreOption(command, &request->ignore);

@@ -72,7 +72,7 @@ int Run(MutateRequest request) {
     request.run.options.duration = request.duration.value_or(draws ? 0.0 : request.run.options.duration);
     request.run.json_file = request.json_file;
     request.run.quiet = request.quiet;
-    return request.run.smallest ? PrintSmallestErrors(request.run) : MutateRun(request.run);
+    return MutateRun(request.run);
   }
   request.options.diagnose = !request.no_diagnosis;
   const RobotModel model = ParseRobotModel(ReadBytes(request.files.robot), std::string(request.files.robot));
@@ -128,38 +128,37 @@ void AddMutateCommand(Command app) {
       "mutate",
       "Change every number and equation of the model on purpose: which faults are found and named?");
   Option robot = AddRobotOptions(command, &request->files);
-  Option scale = command.AddOption("--scale", &request->options.scale, "Change of a number, relative to it")
-                     .TypeName("X")
-                     .Check(NumberFrom(1e-9, 0.5))
-                     .ShowDefault();
+  command.AddOption("--scale", &request->options.scale, "Change of a number, relative to it")
+      .TypeName("X")
+      .Check(NumberFrom(1e-9, 0.5))
+      .ShowDefault();
   Option run =
       command
           .AddOption("--run", &request->run.scenario,
                      "Make faults in a run of this scenario instead: numbers, equations, laws, plants")
           .TypeName("SCENARIO");
   for (Option option : AddOverrideOptions(command, &request->run.overrides)) option.Needs(run);
-  Option from =
-      command
-          .AddOption("--from", &request->run.options.from,
-                     "In a run: when the fault begins, s; in a motion of joints it is there from the first")
-          .TypeName("T")
-          .Check(NumberFrom(0.0, 1e4))
-          .Needs(run)
-          .ShowDefault();
-  Option duration = command
-                        .AddOption("--duration", &request->duration,
-                                   "In a run: how long it is looked at, s (default 0.1; faults that are "
-                                   "drawn in a motion of joints, or not found, are looked at to its end)")
-                        .TypeName("T")
-                        .Check(NumberFrom(1e-3, 1e4))
-                        .Needs(run);
-  Option faults = command
-                      .AddOption("--numbers", &request->run.options.parameters,
-                                 "In a run: how many numbers of the model are changed, evenly out of all")
-                      .TypeName("N")
-                      .Check(WholeNumber(0, 100000))
-                      .Needs(run)
-                      .ShowDefault();
+  command
+      .AddOption("--from", &request->run.options.from,
+                 "In a run: when the fault begins, s; in a motion of joints it is there from the first")
+      .TypeName("T")
+      .Check(NumberFrom(0.0, 1e4))
+      .Needs(run)
+      .ShowDefault();
+  command
+      .AddOption("--duration", &request->duration,
+                 "In a run: how long it is looked at, s (default 0.1; faults that are "
+                 "drawn in a motion of joints, or not found, are looked at to its end)")
+      .TypeName("T")
+      .Check(NumberFrom(1e-3, 1e4))
+      .Needs(run);
+  command
+      .AddOption("--numbers", &request->run.options.parameters,
+                 "In a run: how many numbers of the model are changed, evenly out of all")
+      .TypeName("N")
+      .Check(WholeNumber(0, 100000))
+      .Needs(run)
+      .ShowDefault();
   Option draws =
       command
           .AddOption("--draws", &request->run.options.draws,
@@ -190,21 +189,14 @@ void AddMutateCommand(Command app) {
   Option no_diagnosis = command.AddFlag("--no-diagnosis", &request->no_diagnosis,
                                         "Only whether each is found, not what is named");
   robot.Excludes(run);
-  Option smallest = command.AddFlag(
-      "--smallest", &request->run.smallest,
-      "In a run: how small each force, and each error of a mass, friction or inertia, may be to be found and "
-      "named by the balances");
-  smallest.Needs(run);
-  for (Option option : {from, duration, faults, scale, draws}) option.Excludes(smallest);
   for (Option option : states) option.Excludes(run);
   no_diagnosis.Excludes(run);
   command
       .AddOption("--page", &request->run.page_file,
                  "In a run: an HTML page with what was made, what was found, and how it was named")
       .TypeName("FILE")
-      .Needs(run)
-      .Excludes(smallest);
-  AddJobsOption(command, "Faults", &request->run.jobs).Excludes(smallest);
+      .Needs(run);
+  AddJobsOption(command, "Faults", &request->run.jobs);
   AddJsonOption(command, "the results, from which an interrupted campaign goes on,", &request->json_file);
   command.AddFlag("--quiet", &request->quiet, "Print the verdict only");
   command.SetAction([=] { return Run(*request); });

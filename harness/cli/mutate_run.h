@@ -19,15 +19,10 @@ struct MutateRunRequest {
   std::string json_file;
   std::uint64_t jobs = 0;  ///< Runs at a time; 0 for one on each processor.
   bool quiet = false;
-  bool smallest = false;  ///< PrintSmallestErrors instead of MutateRun.
 };
 
 /// Makes every fault, prints the table, writes the JSON. @returns the exit code: 1 when one was not found,
 /// 3 when it was interrupted. @throws InputError.
 int MutateRun(const MutateRunRequest& request);
-
-/// Prints, for every fault of the balances, how small it may be to be found and named in that run. @returns
-/// the exit code: 3 when it was interrupted. @throws InputError.
-int PrintSmallestErrors(const MutateRunRequest& request);
 
 }  // namespace dexcheck::cli

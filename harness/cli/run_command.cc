@@ -23,7 +23,7 @@
 #include "harness/engine/machine.h"
 #include "harness/report/page.h"
 #include "harness/report/run_data.h"
-#include "harness/run/half_step.h"
+#include "harness/run/declared_share.h"
 #include "harness/run/joint_margins.h"
 
 namespace dexcheck::cli {
@@ -127,7 +127,7 @@ int RunScenario(const RunRequest& request) {
   RunWithProgress(setup.scenario().name, runner.loop().num_steps(), quiet, &runner,
                   recorder ? &*recorder : nullptr);
   RunResult result = runner.result();
-  LookForIntegrator(setup, runner.loop(), files.robot, files.mjcf, IsInterrupted, &result);
+  WeighDeclared(setup, runner.loop(), files.robot, files.mjcf, IsInterrupted, &result);
   JudgeGains(setup, runner.loop(), &result);
   if (!difference.empty() && result.verdict == Verdict::kPass) {
     result.verdict = Verdict::kDisagreement;

@@ -153,7 +153,7 @@ void PrintCauses(const Causes& causes) {
     fmt::print("{}\n", Wrap(fmt::format("    {}  {}: {}", ++number, NameOf(one.channel), one.Tell()), 7));
   const bool has_class = std::ranges::any_of(
       causes, [](const Explanation& one) { return one.outcome == CauseOutcome::kNamedClass; });
-  if (has_class) fmt::print("    (what is not isolable here may be on another motion: dexcheck excite)\n");
+  if (has_class) fmt::print("    (what is not isolable here may be on another motion)\n");
 }
 
 }  // namespace

@@ -15,6 +15,7 @@
 #include "harness/cli/output_file.h"
 #include "harness/cli/run_folder.h"
 #include "harness/cli/run_report.h"
+#include "harness/run/own_controller.h"
 #include "harness/view/frame_source.h"
 #include "harness/view/live_run.h"
 #include "harness/view/viewer.h"
@@ -95,6 +96,8 @@ int ViewScenario(const ViewRequest& request) {
     const std::string seed = request.seed == 0 ? "" : fmt::format(" (needs --seed {})", request.seed);
     return "saved as " + file + seed;
   };
+  // A window has threads, with which no process can go on in a copy.
+  WatchController(FindScenario(request.what, request.overrides.List(), request.seed).scenario);
   CatchInterrupts();
   const std::unique_ptr<LiveRun> run = ViewLive(make, "dexcheck " + request.what, request.viewer, save);
   if (!folder || !run->was_disturbed()) {

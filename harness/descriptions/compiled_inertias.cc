@@ -97,7 +97,7 @@ Vector3d CalcMoments(const Matrix3d& inertia) {
 }
 
 std::optional<Matrix3d> ReadFullInertia(const XMLElement& inertial, const Matrix3d& compiled) {
-  const std::optional<Matrix3d> tensor =
+  std::optional<Matrix3d> tensor =
       inertial.Attribute("fullinertia") == nullptr ? std::nullopt : ReadTensor(inertial);
   if (!tensor || (*tensor - compiled).norm() > BoundDiagonalisation(tensor->norm())) return std::nullopt;
   return tensor;

@@ -204,6 +204,7 @@ class ExtrasComparison {
       }
     }
     std::vector<std::string> lines;
+    lines.reserve(names.size() + 1);
     for (const auto& [check, elements] : names)
       lines.push_back(check + ": left out on both sides, at " + JoinNames(elements));
     LeaveOutFlexes(&a_);
@@ -232,6 +233,7 @@ class ExtrasComparison {
     std::vector<std::string> lines;
     const auto list = [&](const mjModel& m, const mjModel& other, const std::string& file) {
       std::vector<std::string> names;
+      names.reserve(static_cast<size_t>(m.nu));
       for (int i = 0; i < m.nu; ++i) names.push_back(NameOf(m, mjOBJ_ACTUATOR, i));
       for (int i = 0; i < other.nu; ++i) std::erase(names, NameOf(other, mjOBJ_ACTUATOR, i));
       if (!names.empty()) lines.push_back("motors only in " + file + ": " + JoinNames(names));
@@ -275,7 +277,7 @@ class ExtrasComparison {
       for (int b = 0; b < CountElements(b_, type); ++b) {
         if (NameOf(b_, type, b) != name) continue;
         if (!is_coupling(a_, a) && !is_coupling(b_, b))
-          CompareParts(word + " " + name, kind, a, b, kRobotJoint);
+          CompareParts(fmt::format("{} {}", word, name), kind, a, b, kRobotJoint);
         break;
       }
     }

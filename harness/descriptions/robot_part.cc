@@ -221,6 +221,7 @@ std::vector<std::string> TakePart(const RobotPart& part, RobotDescription* a, Ro
   }
   if (!all_held.empty()) {
     std::vector<std::string> list;
+    list.reserve(all_held.size());
     for (const auto& [joint, value] : all_held) list.push_back(joint + " at " + FormatNumber(value));
     notes.push_back("joints that are held: " + JoinNames(list));
   }

@@ -147,9 +147,8 @@ class UrdfReader {
       const UrdfJoint& joint = file_.joint(index);
       visit(joint.child, ReadJoint(joint, parent));
     }
-    for (const UrdfLink& link : file_.links()) {
+    for (const UrdfLink& link : file_.links())
       if (link.element->FirstChildElement("inertial") == nullptr) massless_.push_back(link.name);
-    }
   }
 
   /// @param parent where the parent link is. @return where the child link is.
@@ -213,18 +212,17 @@ class UrdfReader {
   }
 
   void ReadLimits(const UrdfJoint& joint, Joint* added, DescribedJoint* stated) const {
+    const std::string key = KeyOf(joint);
+    const Element* const limit = joint.element->FirstChildElement("limit");
     // Files whose motors are not known state an effort of 0.
-    const Element* const effort = joint.element->FirstChildElement("limit");
-    const double most = effort == nullptr ? 0.0 : file_.ReadNumber(*effort, KeyOf(joint), "effort", 0.0);
+    const double most = limit == nullptr ? 0.0 : file_.ReadNumber(*limit, key, "effort", 0.0);
     if (most > 0.0) stated->forces = {-most, most};
     added->lower = -kPi;
     added->upper = kPi;
     stated->states_range = joint.type != "continuous";
     if (!stated->states_range) return;
-    const std::string key = KeyOf(joint);
-    const Element& limit = *joint.element->FirstChildElement("limit");
-    added->lower = file_.ReadNumber(limit, key, "lower", 0.0);
-    added->upper = file_.ReadNumber(limit, key, "upper", 0.0);
+    added->lower = file_.ReadNumber(*limit, key, "lower", 0.0);
+    added->upper = file_.ReadNumber(*limit, key, "upper", 0.0);
     if (added->lower <= added->upper) return;
     file_.Fail(joint.line, key + "limit: lower must not exceed upper " + FormatNumber(added->upper) +
                                ", got " + FormatNumber(added->lower));

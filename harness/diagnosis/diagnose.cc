@@ -92,7 +92,7 @@ class Diagnostician {
     if (progress("geometry")) {
       for (const Repair& cause : WalkGeometry(RepairTrial(result_.repaired, setup_))) Accept({cause});
     }
-    if (progress("bodies")) FitBodies();
+    if (progress("bodies")) Accept(RepairTrial(result_.repaired, setup_).ReadBodies());
     progress("verdict");
     KeepWhatRepairs();
     ListRemaining();
@@ -151,11 +151,6 @@ class Diagnostician {
     const double rounded = RoundSolved(result_.repaired, parameter, value);
     const bool same = rounded == 0.0 || std::abs(rounded - value) <= kSolved * std::abs(value);
     return ReadBackPrinted(file_, parameter, same ? rounded : value);
-  }
-
-  void FitBodies() {
-    const RepairTrial trial(result_.repaired, setup_);
-    Accept(setup_.options.by_motion ? FitForces(trial) : trial.ReadBodies());
   }
 
   /// The file with repairs made, in their order; none when that is no robot.

@@ -15,9 +15,6 @@ namespace dexcheck {
 struct DiagnosisOptions {
   int samples = 6;  ///< Random states; each gives some hundred residuals.
   std::uint64_t seed = 1;
-  /// Use axes, frames and forces alone, not the engine's masses, centres of mass, inertias and joint
-  /// constants: what would be known of a robot that can only be moved.
-  bool by_motion = false;
   /// Relative difference that is no fault, since published numbers are rounded; 0: what rounding of doubles
   /// leaves.
   double tolerance = 0.0;
@@ -38,7 +35,7 @@ struct Diagnosis {
 
 /// Compares, and explains what differs. Stages, each with what was found before repaired: what only the MJCF
 /// has; constants that no motion shows (ranges, radii, the object); geometry from the base outward; bodies,
-/// joint constants and gravity by regression. @throws InputError when model and engine do not match.
+/// joint constants and gravity by reading them. @throws InputError when model and engine do not match.
 /// @param rows how the model's rows are written in its file; none stands for modified parameters.
 /// @param progress called between stages with what follows; its false ends the work with what there is.
 Diagnosis Diagnose(const RobotModel& model, const mjModel& engine, const std::string& engine_source,

@@ -144,10 +144,8 @@ void ForceProblem::ExplainChanging(const Segment& segment, Causes* causes) const
 std::vector<ForceProblem::Free> ForceProblem::FitAll(std::initializer_list<const char*> faults) const {
   std::vector<Free> all;
   for (size_t i = 0; i < candidates_.size(); ++i)
-    if (std::find(faults.begin(), faults.end(), candidates_[i].fault) != faults.end())
-      all.push_back(FitFree(i));
-  std::stable_sort(all.begin(), all.end(),
-                   [](const Free& a, const Free& b) { return a.criterion < b.criterion; });
+    if (std::ranges::find(faults, candidates_[i].fault) != faults.end()) all.push_back(FitFree(i));
+  std::ranges::stable_sort(all, {}, &Free::criterion);
   return all;
 }
 

@@ -38,7 +38,7 @@ auto& TorusOf(Spec& spec) {
 struct ParameterTable {
   enum Part { kRow, kJoint, kLink, kFrame, kBase, kRobot, kObject };  ///< What a number belongs to.
   enum Form { kNumber, kAngle, kVector, kPosition, kRotation, kTensor };
-  enum Effect { kPlaces, kForces, kNeither };  ///< What it changes.
+  enum Effect { kPlaces, kMovesNothing };
   struct Entry {
     const char* name;
     const char* unit;
@@ -60,49 +60,52 @@ constexpr ParameterTable::Entry ParameterTable::kEntries[] = {
     {"d", "m", kRow, kNumber, kPlaces, [](auto& s, int i) { return &JointAt(s, i).mdh.d; }},
     {"position", "m", kRow, kPosition, kPlaces, [](auto& s, int i) { return JointAt(s, i).X_PB.data(); }},
     {"rotation", "deg", kRow, kRotation, kPlaces, [](auto& s, int i) { return JointAt(s, i).X_PB.data(); }},
-    {"damping", "N m s/rad", kJoint, kNumber, kForces, [](auto& s, int i) { return &JointAt(s, i).damping; }},
-    {"armature", "kg m^2", kJoint, kNumber, kForces, [](auto& s, int i) { return &JointAt(s, i).armature; }},
-    {"dry friction", "N m", kJoint, kNumber, kNeither,
+    {"damping", "N m s/rad", kJoint, kNumber, kMovesNothing,
+     [](auto& s, int i) { return &JointAt(s, i).damping; }},
+    {"armature", "kg m^2", kJoint, kNumber, kMovesNothing,
+     [](auto& s, int i) { return &JointAt(s, i).armature; }},
+    {"dry friction", "N m", kJoint, kNumber, kMovesNothing,
      [](auto& s, int i) { return &JointAt(s, i).dry_friction; }, "joint_dry_friction"},
-    {"lower limit", "m", kJoint, kNumber, kNeither, [](auto& s, int i) { return &JointAt(s, i).lower; },
+    {"lower limit", "m", kJoint, kNumber, kMovesNothing, [](auto& s, int i) { return &JointAt(s, i).lower; },
      "joint_range", 0},
-    {"upper limit", "m", kJoint, kNumber, kNeither, [](auto& s, int i) { return &JointAt(s, i).upper; },
+    {"upper limit", "m", kJoint, kNumber, kMovesNothing, [](auto& s, int i) { return &JointAt(s, i).upper; },
      "joint_range", 1},
-    {"mass", "kg", kLink, kNumber, kForces, [](auto& s, int i) { return &BodyAt(s, i).mass; }},
-    {"centre of mass", "m", kLink, kVector, kForces, [](auto& s, int i) { return BodyAt(s, i).com.data(); }},
-    {"inertia", "kg m^2", kLink, kTensor, kForces,
+    {"mass", "kg", kLink, kNumber, kMovesNothing, [](auto& s, int i) { return &BodyAt(s, i).mass; }},
+    {"centre of mass", "m", kLink, kVector, kMovesNothing,
+     [](auto& s, int i) { return BodyAt(s, i).com.data(); }},
+    {"inertia", "kg m^2", kLink, kTensor, kMovesNothing,
      [](auto& s, int i) { return BodyAt(s, i).inertia.data(); }},
     {"position", "m", kFrame, kPosition, kPlaces, [](auto& s, int i) { return FrameAt(s, i).X_LF.data(); }},
     {"rotation", "deg", kFrame, kRotation, kPlaces, [](auto& s, int i) { return FrameAt(s, i).X_LF.data(); }},
-    {"fingertip radius", "m", kFrame, kNumber, kNeither,
+    {"fingertip radius", "m", kFrame, kNumber, kMovesNothing,
      [](auto& s, int i) { return &*FrameAt(s, i).sphere_radius; }, "fingertip_radius"},
     {"position", "m", kBase, kPosition, kPlaces, [](auto& s, int) { return s.base.X_B0.data(); }},
     {"rotation", "deg", kBase, kRotation, kPlaces, [](auto& s, int) { return s.base.X_B0.data(); }},
-    {"wheel radius", "m", kBase, kNumber, kNeither, [](auto& s, int) { return &s.base.wheel_radius; },
+    {"wheel radius", "m", kBase, kNumber, kMovesNothing, [](auto& s, int) { return &s.base.wheel_radius; },
      "wheel_radius"},
-    {"wheel distance", "m", kBase, kNumber, kNeither, [](auto& s, int) { return &s.base.wheel_distance; },
-     "wheel_distance"},
-    {"wheel mass", "kg", kBase, kNumber, kForces, [](auto& s, int) { return &s.base.wheel.mass; },
+    {"wheel distance", "m", kBase, kNumber, kMovesNothing,
+     [](auto& s, int) { return &s.base.wheel_distance; }, "wheel_distance"},
+    {"wheel mass", "kg", kBase, kNumber, kMovesNothing, [](auto& s, int) { return &s.base.wheel.mass; },
      "wheel_mass"},
-    {"wheel spin inertia", "kg m^2", kBase, kNumber, kForces,
+    {"wheel spin inertia", "kg m^2", kBase, kNumber, kMovesNothing,
      [](auto& s, int) { return &s.base.wheel.spin_inertia; }, "wheel_spin_inertia"},
-    {"wheel transverse inertia", "kg m^2", kBase, kNumber, kForces,
+    {"wheel transverse inertia", "kg m^2", kBase, kNumber, kMovesNothing,
      [](auto& s, int) { return &s.base.wheel.transverse_inertia; }},
-    {"wheel armature", "kg m^2", kBase, kNumber, kForces, [](auto& s, int) { return &s.base.wheel.armature; },
-     "wheel_armature"},
-    {"wheel damping", "N m s/rad", kBase, kNumber, kForces,
+    {"wheel armature", "kg m^2", kBase, kNumber, kMovesNothing,
+     [](auto& s, int) { return &s.base.wheel.armature; }, "wheel_armature"},
+    {"wheel damping", "N m s/rad", kBase, kNumber, kMovesNothing,
      [](auto& s, int) { return &s.base.wheel.damping; }, "wheel_damping"},
-    {"gravity", "m/s^2", kRobot, kVector, kForces, [](auto& s, int) { return s.gravity.data(); }},
-    {"mass", "kg", kObject, kNumber, kNeither, [](auto& s, int) { return &s.object->body.mass; },
+    {"gravity", "m/s^2", kRobot, kVector, kMovesNothing, [](auto& s, int) { return s.gravity.data(); }},
+    {"mass", "kg", kObject, kNumber, kMovesNothing, [](auto& s, int) { return &s.object->body.mass; },
      "object_mass"},
-    {"inertia", "kg m^2", kObject, kTensor, kNeither,
+    {"inertia", "kg m^2", kObject, kTensor, kMovesNothing,
      [](auto& s, int) { return s.object->body.inertia.data(); }, "object_inertia"},
-    {"friction", "", kObject, kNumber, kNeither, [](auto& s, int) { return &s.object->friction; },
+    {"friction", "", kObject, kNumber, kMovesNothing, [](auto& s, int) { return &s.object->friction; },
      "contact_friction"},
-    {"ring radius", "m", kObject, kNumber, kNeither, [](auto& s, int) { return &TorusOf(s).ring_radius; },
-     "object_shape", 0},
-    {"tube radius", "m", kObject, kNumber, kNeither, [](auto& s, int) { return &TorusOf(s).tube_radius; },
-     "object_shape", 1},
+    {"ring radius", "m", kObject, kNumber, kMovesNothing,
+     [](auto& s, int) { return &TorusOf(s).ring_radius; }, "object_shape", 0},
+    {"tube radius", "m", kObject, kNumber, kMovesNothing,
+     [](auto& s, int) { return &TorusOf(s).tube_radius; }, "object_shape", 1},
 };
 static_assert(std::size(ParameterTable::kEntries) == static_cast<size_t>(Kind::kObjectTubeRadius) + 1);
 
@@ -238,8 +241,6 @@ bool IsRotation(ParameterKind kind) {
   const ParameterTable::Form form = EntryFor(kind).form;
   return IsGeometric(kind) && (form == ParameterTable::kAngle || form == ParameterTable::kRotation);
 }
-bool IsDynamic(ParameterKind kind) { return EntryFor(kind).effect == ParameterTable::kForces; }
-
 double GetScale(const RobotSpec& spec, const Parameter& p) {
   const double size = std::abs(GetValue(spec, p));
   if (IsTensor(p)) {
@@ -306,12 +307,11 @@ double ToPrinted(const RobotSpec& spec, const Parameter& parameter, double value
   return IsAngle(spec, parameter) ? RadToDeg(value) : value;
 }
 
-std::optional<RobotModel> TryChange(const RobotSpec& spec, const Parameter& number, double* change,
-                                    const std::function<std::optional<RobotModel>(const RobotSpec&)>& make) {
+std::optional<RobotModel> TryChange(const RobotSpec& spec, const Parameter& number, double* change) {
   for (int side = 0; side < 2; ++side) {
     RobotSpec changed = spec;
     SetValue(&changed, number, GetValue(spec, number) + *change);
-    if (std::optional<RobotModel> model = make(changed)) return model;
+    if (std::optional<RobotModel> model = TryModel(changed)) return model;
     *change = -*change;
   }
   return std::nullopt;

@@ -2,7 +2,6 @@
 
 // Every scalar parameter of the analytic model by itself: to change it, to compare it, to name it.
 
-#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -86,8 +85,6 @@ bool IsAngle(const RobotSpec& spec, const Parameter& parameter);
 bool IsGeometric(ParameterKind kind);
 /// Whether it turns them.
 bool IsRotation(ParameterKind kind);
-/// Whether it changes forces and moves nothing: of bodies, joints, wheels, gravity; not of the object.
-bool IsDynamic(ParameterKind kind);
 
 /// A length or quantity that a change of the value can be compared with, positive: the value itself, or for a
 /// value of zero what stands beside it (the tensor's trace, the link's length, a radian).
@@ -95,10 +92,7 @@ double GetScale(const RobotSpec& spec, const Parameter& parameter);
 
 /// The robot with a number changed by `change`, or by as much the other way, which is then the change; none
 /// where there is no such robot.
-/// @param make of a specification.
-std::optional<RobotModel> TryChange(
-    const RobotSpec& spec, const Parameter& number, double* change,
-    const std::function<std::optional<RobotModel>(const RobotSpec&)>& make = TryModel);
+std::optional<RobotModel> TryChange(const RobotSpec& spec, const Parameter& number, double* change);
 
 /// The robot with a number changed by `scale` times GetScale, or by as much less where there is no such
 /// robot.

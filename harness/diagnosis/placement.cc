@@ -117,15 +117,14 @@ int CarrierOf(const RobotSpec& spec, const Parameter& parameter) {
   return IsOfFrame(parameter) ? spec.frames[static_cast<size_t>(parameter.index)].link : parameter.index;
 }
 
-Placement::Placement(const RobotSpec& written, const FileTerms& terms, const EngineEvidence& evidence,
-                     bool bodies)
+Placement::Placement(const RobotSpec& written, const FileTerms& terms, const EngineEvidence& evidence)
     : base_origin_(written.base.X_B0.translation()), terms_(&terms), evidence_(&evidence) {
   for (int i = 0; i < static_cast<int>(written.joints.size()); ++i) {
     const Joint& joint = written.joints[static_cast<size_t>(i)];
     items_.push_back({ItemKind::kAxisDirection, i, i});
     if (joint.type == JointType::kRevolute) items_.push_back({ItemKind::kAxisLine, i, i});
-    if (bodies && joint.body.mass > 0.0) items_.push_back({ItemKind::kCom, i, i});
-    if (bodies && joint.body.inertia.trace() > 0.0) items_.push_back({ItemKind::kInertia, i, i});
+    if (joint.body.mass > 0.0) items_.push_back({ItemKind::kCom, i, i});
+    if (joint.body.inertia.trace() > 0.0) items_.push_back({ItemKind::kInertia, i, i});
   }
   for (size_t i = 0; i < written.frames.size(); ++i) {
     for (const ItemKind kind : {ItemKind::kFramePosition, ItemKind::kFrameRotation})

@@ -79,8 +79,7 @@ struct PlacedItem {
 class Placement {
  public:
   /// @param written numbers as they stand in the file. @param terms, evidence must outlive this.
-  /// @param bodies whether centres of mass and inertias are compared besides axes and frames.
-  Placement(const RobotSpec& written, const FileTerms& terms, const EngineEvidence& evidence, bool bodies);
+  Placement(const RobotSpec& written, const FileTerms& terms, const EngineEvidence& evidence);
 
   [[nodiscard]] const std::vector<PlacedItem>& items() const { return items_; }
   [[nodiscard]] const RobotSpec& trial() const { return trial_; }

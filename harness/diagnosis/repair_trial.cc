@@ -17,18 +17,11 @@ using Kind = ParameterKind;
 // Both sides read decimal numbers; thirteen digits are printed, and a body's are turned into the link's frame
 // by some dozen rotations, each 1e-16 of the robot's size, which may be a thousand times the body's.
 constexpr double kSame = 1e-11;
-// Of forces that follow from fitted numbers, relative to their size.
-constexpr double kSameForces = 1e-8;
 constexpr double kSameSolid = 1e-8;
 
-/// Whether motion shows the constant, so that it need not be read.
-bool MovesTheRobot(Kind kind) {
-  return kind == Kind::kWheelMass || kind == Kind::kWheelSpinInertia || kind == Kind::kWheelDamping ||
-         kind == Kind::kWheelArmature;
-}
-
 bool IsOfBothWheels(Kind kind) {
-  return MovesTheRobot(kind) || kind == Kind::kWheelRadius || kind == Kind::kWheelDistance;
+  return kind == Kind::kWheelMass || kind == Kind::kWheelSpinInertia || kind == Kind::kWheelDamping ||
+         kind == Kind::kWheelArmature || kind == Kind::kWheelRadius || kind == Kind::kWheelDistance;
 }
 
 /// Whether Sigma_0 stands where the engine's wheels have the middle of their axle; without wheels it stands
@@ -50,18 +43,14 @@ RepairTrial::RepairTrial(RobotSpec written, const TrialSetup& setup)
       model_(setup.terms.Read(written_)),
       adapter_(model_, setup.engine, setup.source),
       evidence_(adapter_, setup.options),
-      placement_(written_, setup.terms, evidence_, !setup.options.by_motion),
+      placement_(written_, setup.terms, evidence_),
       constants_(CheckConstants(adapter_)) {
   for (const ConstantFinding& finding : constants_.findings) {
     const std::optional<Parameter> parameter = FindNumber(finding);
     if (parameter && Differs(finding.model, finding.engine, 0.0)) wrong_.push_back(*parameter);
   }
-  if (setup.options.by_motion) {
-    forces_agree_ = evidence_.CalcForceResidual(model_).cwiseAbs().maxCoeff() <= evidence_.Widen(kSameForces);
-  } else {
-    for (const Repair& one : ReadBodies())
-      wrong_.insert(wrong_.end(), one.parameters.begin(), one.parameters.end());
-  }
+  for (const Repair& one : ReadBodies())
+    wrong_.insert(wrong_.end(), one.parameters.begin(), one.parameters.end());
   axle_right_ = IsAxleRight(adapter_, evidence_.Widen(kSame) * evidence_.length());
 }
 
@@ -84,7 +73,6 @@ std::vector<Repair> RepairTrial::ReadConstants() const {
   for (const ConstantFinding& finding : constants.findings) {
     const std::optional<Parameter> parameter = FindNumber(finding);
     if (!parameter || !std::isfinite(finding.engine)) continue;
-    if (setup_->options.by_motion && MovesTheRobot(parameter->kind)) continue;
     const auto again = std::find(read.parameters.begin(), read.parameters.end(), *parameter);
     if (again == read.parameters.end()) {
       read.Add(*parameter, finding.engine);
@@ -179,7 +167,6 @@ bool RepairTrial::IsNumberRight(const Parameter& parameter) const {
   const bool is_of_body = parameter.kind == Kind::kCom || parameter.kind == Kind::kInertia;
   if (parameter.index < 0 && !axle_right_ && (IsGeometric(parameter.kind) || is_of_body)) return false;
   if (IsGeometric(parameter.kind)) return IsLinkRight(CarrierOf(written_, parameter));
-  if (setup_->options.by_motion && IsDynamic(parameter.kind)) return forces_agree_;
   const bool differs = std::find(wrong_.begin(), wrong_.end(), parameter) != wrong_.end();
   return !differs && (!is_of_body || placement_.IsPlaced(parameter.index));
 }

@@ -69,7 +69,6 @@ class RepairTrial {
   ConstantChecks constants_;
   // What is wrong of it, as far as a repair is asked.
   std::vector<Parameter> wrong_;
-  bool forces_agree_ = true;
   bool axle_right_ = true;  // what the base's numbers are relative to
 };
 
@@ -81,12 +80,5 @@ class RepairTrial {
 /// one after whose repair the fewest things are misplaced is taken; then the walk goes on.
 /// @return causes in the order found, each to be repaired after those before it.
 std::vector<Repair> WalkGeometry(const RepairTrial& trial);
-
-/// Errors of masses, centres of mass, inertias, armature, damping and gravity, solved for by what the forces
-/// disagree in: what these do not show stays unknown.
-/// @param trial has the right geometry.
-/// @return the fewest causes, a single number before others; none when not all of the disagreement is
-/// explained.
-std::vector<Repair> FitForces(const RepairTrial& trial);
 
 }  // namespace dexcheck

@@ -1,8 +1,5 @@
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <cmath>
-#include <limits>
 #include <string>
 #include <utility>
 
@@ -40,25 +37,9 @@ class AddedList {
     Add("dry friction", unit_, -rate.sign(), 0.0, IsFriction);
   }
 
-  void AddCouplings(const std::vector<SignalSeries>& others) {
-    for (const SignalSeries& other : others) {
-      const bool is_own = other.name.place == series_.name.place && other.name.what == series_.name.what;
-      if (is_own || other.name.group != series_.name.group || other.name.unit != unit_) continue;
-      const std::string what = other.name.place == series_.name.place ? " " + other.name.what : std::string();
-      Add("crosstalk of " + other.name.place + what, "", steps_.Take(other.expected));
-    }
-    Add("gain where positive", "", output_.max(0.0), 1.0);
-    Add("gain where negative", "", output_.min(0.0), 1.0);
-    Add("square", "per " + unit_, output_.square());
-    Add("cube", "per " + unit_ + " squared", output_.cube());
-    if (series_.rate.size() > 0) {
-      const ArrayXd rate = steps_.Take(series_.rate);
-      Add("friction of the squared rate", unit_ + " s^2/rad^2", -rate * rate.abs(), 0.0, IsFriction);
-      AddSmoothFriction(rate);
-    }
+  void AddTurns() {
     if (series_.position.size() == 0) return;
     const ArrayXd position = steps_.Take(series_.position);
-    if (series_.rate.size() > 0) Add("spring", unit_ + "/rad", -position);
     if (position.maxCoeff() - position.minCoeff() > kLeastWay)
       AddRipple("ripple over the position", "with {:.4g} a turn", 2.0 * kPi, position);
   }
@@ -98,32 +79,6 @@ class AddedList {
     Add("lag", "s", both, 0.0, is_lag);
   }
 
-  /// -tanh(rate / v) of the v that leaves least.
-  void AddSmoothFriction(const ArrayXd& rate) {
-    const double fastest = rate.abs().maxCoeff();
-    if (!(fastest > 0.0)) return;
-    const auto find_left = [&](double log_v) {
-      const ArrayXd column = -(rate / std::exp(log_v)).tanh();
-      const double amplitude = (column * off_).sum() / column.square().sum();
-      return (off_ - amplitude * column).square().sum();
-    };
-    double best = std::log(fastest), least = std::numeric_limits<double>::infinity();
-    const auto consider = [&](double log_v) {
-      const double left = find_left(log_v);
-      if (left < least) least = left, best = log_v;
-    };
-    constexpr int kGrid = 60;
-    constexpr double kSlowest = 15.0, kStep = kSlowest / kGrid;  // down to 3e-7 of the fastest
-    for (int i = 0; i <= kGrid; ++i) consider(std::log(fastest) + 1.0 - i * kStep);
-    constexpr int kNarrower = 81;  // to 1e-13
-    double width = kStep;
-    for (int k = 0; k < kNarrower; ++k, width *= 0.7)
-      for (const double to : {best - width, best + width}) consider(to);
-    Add("dry friction", unit_, -(rate / std::exp(best)).tanh(), 0.0, IsFriction);
-    candidates_.back().detail = fmt::format("times tanh(rate / {:.4g})", std::exp(best));
-    candidates_.back().parameters = 2;
-  }
-
   const SignalSeries& series_;
   const SignalSteps& steps_;
   const std::string& unit_;
@@ -134,10 +89,9 @@ class AddedList {
 }  // namespace
 
 std::vector<Candidate> ListAdded(const SignalSeries& series, const SignalSteps& steps,
-                                 const SignalShape& shape, SignalSearch search,
-                                 const std::vector<SignalSeries>& others) {
+                                 const SignalShape& shape, SignalSearch search) {
   AddedList list(series, steps, shape);
-  if (search == SignalSearch::kCouplings && shape.fault.empty()) list.AddCouplings(others);
+  if (search == SignalSearch::kTurns && shape.fault.empty()) list.AddTurns();
   if (search == SignalSearch::kSines) list.AddRipple("ripple", "at {:.4g} Hz", 1.0, steps.Take(series.time));
   return list.Take();
 }

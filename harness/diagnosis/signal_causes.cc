@@ -41,7 +41,7 @@ void Ignore(const Fault& fault, const VectorXd& right, const SignalSeries& serie
   }
 }
 
-/// The series of one that has this fault after whatever else it has: that is expected then.
+/// The series of one of which this fault is expected.
 SignalSeries ExpectFault(const SignalSeries& series, const CommonFault& common) {
   SignalSeries after = series;
   after.from = after.to = std::numeric_limits<double>::quiet_NaN();
@@ -53,42 +53,6 @@ SignalSeries ExpectFault(const SignalSeries& series, const CommonFault& common) 
   return after;
 }
 
-/// The series of one that has this fault before whatever else it has: of what it gave, what it was sent.
-/// Where that is not known, noise is what it may be.
-std::optional<SignalSeries> UndoFault(const SignalSeries& series, const CommonFault& common) {
-  const Fault& fault = common.fault;
-  SignalSeries before = series;
-  before.from = before.to = std::numeric_limits<double>::quiet_NaN();
-  const double value = fault.value;
-  if (fault.fault == "rounding to steps of") {
-    before.noise = (0.5 + 1e-9) * value;
-    before.left = 1.0;
-    before.faint = 2.0;
-    return before;
-  }
-  const auto undo = [&](double by) -> VectorXd {
-    if (fault.fault == "gain") return series.got / by;
-    if (fault.fault == "offset") return series.got.array() - by;
-    if (fault.fault != "lag" || series.got.size() < 2) return {};
-    const double decay = CalcDecay({"lag", "", by, 0.0, "", ""}, series);
-    VectorXd sent = series.got;
-    const Index count = sent.size() - 1;
-    sent.tail(count) = (series.got.tail(count) - decay * series.got.head(count)) / (1.0 - decay);
-    return sent;
-  };
-  VectorXd sent = undo(value);
-  if (sent.size() == 0) return std::nullopt;
-  sent.head(common.begin) = series.got.head(common.begin);
-  // Rounding counts as often as the signal is magnified.
-  const VectorXd off = undo(value + fault.error);
-  const double magnified = sent.norm() / std::max(series.got.norm(), std::numeric_limits<double>::min());
-  before.noise = std::max(series.noise * std::max(1.0, magnified),
-                          CalcRms((off - sent).tail(sent.size() - common.begin)));
-  Ignore(fault, series.expected, series, &sent);
-  before.got = sent;
-  return before;
-}
-
 /// The signals of one channel.
 class SignalGroup {
  public:
@@ -97,7 +61,7 @@ class SignalGroup {
     for (const SignalSeries& one : series_) {
       verdicts_.push_back(JudgeSignal(one, series_));
       // What never changes shows no delay.
-      if (one.expected.maxCoeff() - one.expected.minCoeff() > one.faint * one.noise)
+      if (one.expected.maxCoeff() - one.expected.minCoeff() > SignalSeries::kFaint * one.noise)
         ++moving_[one.name.group];
       ++sizes_[one.name.group];
     }
@@ -155,7 +119,8 @@ class SignalGroup {
       if (common->groups.count(series_[i].name.group) == 0) continue;
       const SignalSeries after = ExpectFault(series_[i], *common);
       const SignalSteps& steps = verdicts_[i].steps;
-      if (((steps.Take(after.got) - steps.Take(after.expected)).abs() <= after.left * after.noise).all())
+      if (((steps.Take(after.got) - steps.Take(after.expected)).abs() <= SignalSeries::kLeft * after.noise)
+              .all())
         common->members.push_back(i);
     }
     std::sort(common->members.begin(), common->members.end());
@@ -201,35 +166,20 @@ class SignalGroup {
     return one;
   }
 
-  /// What a signal has besides what all have, before that or after it.
+  /// What a signal has besides what all have, after it.
   [[nodiscard]] SignalVerdict JudgeBeside(size_t i, const CommonFault& common) const {
-    SignalVerdict best = verdicts_[i];
-    if (best.steps.rows.empty() || Transmit(common.fault, series_[i]).size() == 0) return best;
-    bool is_beside = false;
-    const auto consider = [&](const SignalSeries& one, const std::vector<SignalSeries>& others) {
-      SignalVerdict verdict = JudgeSignal(one, others);
-      if (!verdict.is_explained) return;
-      const auto count = [](const SignalVerdict& of) { return of.fits.front().faults.size(); };
-      // Of noise that is as large as what all have, several faults explain anything.
-      if (one.left < series_[i].left && count(verdict) > 1) return;
-      if (best.is_explained && count(verdict) >= count(best) + (is_beside ? 0 : 1)) return;
-      best = std::move(verdict);
-      is_beside = true;
-    };
+    const SignalVerdict& alone = verdicts_[i];
+    if (alone.steps.rows.empty() || Transmit(common.fault, series_[i]).size() == 0) return alone;
     std::vector<SignalSeries> others;
     for (const SignalSeries& other : series_)
       if (other.name.group == series_[i].name.group) others.push_back(ExpectFault(other, common));
-    consider(ExpectFault(series_[i], common), others);
-    if (const std::optional<SignalSeries> before = UndoFault(series_[i], common)) consider(*before, series_);
-    const bool may_be_noise = !best.is_explained || best.fits.front().is_noise;
-    if (common.fault.fault != "rounding to steps of" || !may_be_noise) return best;
-    const SignalSteps steps = FindSteps(ExpectFault(series_[i], common));
-    if (const auto noise = FitNoiseBeforeSteps(series_[i], steps, common.fault.value)) {
-      best = verdicts_[i];
-      best.fits = {*noise};
-      best.is_explained = true;
-      best.rival.clear();
-    }
+    SignalVerdict beside = JudgeSignal(ExpectFault(series_[i], common), others);
+    const auto count = [](const SignalVerdict& of) { return of.fits.front().faults.size(); };
+    const bool is_beside = beside.is_explained && (!alone.is_explained || count(beside) <= count(alone));
+    SignalVerdict best = is_beside ? std::move(beside) : alone;
+    // Noise that is rounded, or less than the steps, has another deviation.
+    if (common.fault.fault == "rounding to steps of" && best.is_explained && best.fits.front().is_noise)
+      best.is_explained = false;
     return best;
   }
 

@@ -21,15 +21,15 @@ struct SignalSeries {
   double noise = 0.0;             ///< Rounding of got - expected.
   /// When it differs first and last, of all steps, s; NaN where these steps alone tell.
   double from = std::numeric_limits<double>::quiet_NaN(), to = from;
-  /// What is less than `faint` times the noise says nothing, and `left` times it may be left of what is
+  /// What is less than so many times the noise says nothing, and so many times it may be left of what is
   /// explained.
-  double faint = 1e3, left = 30.0;
+  static constexpr double kFaint = 1e3, kLeft = 30.0;
 };
 
 /// What explains got - expected of the signals of one channel: a transmission (none, a delay, a limit, a dead
-/// zone, steps, the signal of another one, a stuck value), with gain, offset, friction, drift or lag of its
-/// result, or noise. One for each fault; none where nothing differs. What several have with the same value is
-/// told once, and each is judged beside that: one gain of all motors, and another one of one of them.
+/// zone, steps, the signal of another one, a stuck value, play), with gain, offset, friction, drift, lag or a
+/// ripple of its result, or noise. One for each fault; none where nothing differs. A fault that several have
+/// alone and with the same value is told once.
 Causes ExplainSignals(std::vector<SignalSeries> series, CauseChannel channel);
 /// All motors, and all readings.
 Causes ExplainSignals(const StepStore& store);

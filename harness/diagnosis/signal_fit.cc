@@ -41,7 +41,8 @@ Fault MakeFault(const Candidate& candidate, const VectorXd& amplitude, const Vec
 
 /// Whether each step is for itself, and no few values are beside all the rest: those of noise are within 6
 /// times its size.
-bool IsWhite(const VectorXd& residual, double most = 6.0) {
+bool IsWhite(const VectorXd& residual) {
+  constexpr double kMost = 6.0;
   const Index count = residual.size();
   if (count < kFewestOfNoise) return false;
   const double square = residual.squaredNorm();
@@ -49,7 +50,7 @@ bool IsWhite(const VectorXd& residual, double most = 6.0) {
     const double along = residual.head(count - k).dot(residual.tail(count - k)) / square;
     if (std::abs(along) > kWhite / std::sqrt(static_cast<double>(count))) return false;
   }
-  return residual.cwiseAbs().maxCoeff() < most * std::sqrt(square / static_cast<double>(count));
+  return residual.cwiseAbs().maxCoeff() < kMost * std::sqrt(square / static_cast<double>(count));
 }
 
 /// Of a shape, and of when the fault begins and ends, beside what is added.
@@ -66,8 +67,8 @@ double CalcCost(const SignalSeries& series, const SignalSteps& steps, const Sign
 }
 
 SignalFit MakeFit(const SignalSeries& series, const SignalSteps& steps, const SignalShape& shape,
-                  double floor, SignalSearch search, const std::vector<SignalSeries>& others) {
-  const std::vector<Candidate> added = ListAdded(series, steps, shape, search, others);
+                  double floor, SignalSearch search) {
+  const std::vector<Candidate> added = ListAdded(series, steps, shape, search);
   const VectorXd y = ((steps.Take(series.got) - steps.Take(shape.output)) / series.noise).matrix();
   SignalFit fit;
   fit.size = ((steps.Take(series.got) - steps.Take(series.expected)) / series.noise).matrix().norm();
@@ -102,7 +103,7 @@ SignalFit MakeFit(const SignalSeries& series, const SignalSteps& steps, const Si
             MakeFault(added[other], amplitude, VectorXd::Zero(amplitude.size()), decay, time_step));
   }
   const double left = std::sqrt(fit.selection.residual.squaredNorm() / static_cast<double>(y.size()));
-  if (left > series.left * std::sqrt(floor) && IsWhite(fit.selection.residual)) {
+  if (left > SignalSeries::kLeft * std::sqrt(floor) && IsWhite(fit.selection.residual)) {
     fit.faults.push_back({"noise, standard deviation", place, left * series.noise,
                           left * series.noise / std::sqrt(2.0 * static_cast<double>(y.size())),
                           series.name.unit, ""});
@@ -143,24 +144,27 @@ SignalVerdict JudgeSignal(const SignalSeries& series, const std::vector<SignalSe
   const ArrayXd off = steps.Take(series.got) - steps.Take(series.expected);
   const double square = (off / series.noise).square().sum() / static_cast<double>(steps.size());
   const double floor = 1.0 + kSignalAccuracy * kSignalAccuracy * square;
+  // What is right at most steps, as beside lost samples, has no noise.
+  constexpr Index kRarest = 5;
+  const bool differs_often = kRarest * (off.abs() > series.noise).count() >= off.size();
   const auto is_good = [&](const SignalFit& fit) {
     // Noise beside several other faults is what they do not explain.
     constexpr size_t kMostWithNoise = 2;
-    return fit.is_possible() && (fit.is_noise ? fit.faults.size() <= kMostWithNoise
-                                              : fit.selection.left <= series.left * std::sqrt(floor));
+    return fit.is_possible() && (fit.is_noise ? differs_often && fit.faults.size() <= kMostWithNoise
+                                              : fit.selection.left <= SignalSeries::kLeft * std::sqrt(floor));
   };
   std::vector<SignalFit> fits;
-  for (const SignalSearch search : {SignalSearch::kPlain, SignalSearch::kSines, SignalSearch::kCouplings}) {
+  for (const SignalSearch search : {SignalSearch::kPlain, SignalSearch::kSines, SignalSearch::kTurns}) {
     if (!fits.empty() && SearchLimit::IsOver()) break;
     fits.clear();
     for (const SignalShape& shape : ListShapes(series, steps, others))
-      fits.push_back(MakeFit(series, steps, shape, floor, search, others));
+      fits.push_back(MakeFit(series, steps, shape, floor, search));
     std::sort(fits.begin(), fits.end(),
               [](const SignalFit& a, const SignalFit& b) { return a.criterion < b.criterion; });
     if (is_good(fits.front()) && !fits.front().is_noise) break;
   }
   verdict.is_explained = steps.size() >= kFewestSteps && is_good(fits.front()) &&
-                         off.abs().maxCoeff() >= series.faint * series.noise;
+                         off.abs().maxCoeff() >= SignalSeries::kFaint * series.noise;
   std::vector<std::string> names;
   for (SignalFit& fit : fits) {
     if (!fit.is_possible()) continue;
@@ -181,39 +185,6 @@ SignalVerdict JudgeSignal(const SignalSeries& series, const std::vector<SignalSe
   if (verdict.is_explained && steps.Take(series.got).abs().maxCoeff() <= series.noise)
     AddSilence(series, steps.Take(series.expected).abs().maxCoeff(), &verdict.fits.front());
   return verdict;
-}
-
-std::optional<SignalFit> FitNoiseBeforeSteps(const SignalSeries& series, const SignalSteps& steps,
-                                             double step) {
-  const ArrayXd got = steps.Take(series.got), off = got - steps.Take(series.expected);
-  const double rest = (got - step * (got / step).round()).abs().maxCoeff();
-  if (rest > series.left * series.noise) return std::nullopt;  // it came after them
-  // Log of the probability of what came, for noise of that deviation about `mean`.
-  const auto calc = [&](double deviation, double mean) -> ArrayXd {
-    const ArrayXd low = (off - mean - 0.5 * step) / deviation, high = low + step / deviation;
-    const auto tail = [](double x) { return 0.5 * std::erfc(x / std::sqrt(2.0)); };
-    // On the side where both are small.
-    return (low.max(-high).unaryExpr(tail) - high.max(-low).unaryExpr(tail)).max(1e-300).log();
-  };
-  // Of the deviations that are tried, in steps up to 10, and standard errors that one is away from nothing.
-  constexpr double kRatio = 1.02, kLeast = 1e-2, kSure = 5.0, kSlope = 1e-3;
-  constexpr int kTried = 350;
-  const auto rate = [&](double deviation) { return calc(deviation, 0.0).sum(); };
-  double best = kLeast * step;
-  for (int i = 1; i < kTried; ++i)
-    if (const double tried = kLeast * step * std::pow(kRatio, i); rate(tried) > rate(best)) best = tried;
-  const double bend = 2.0 * rate(best) - rate(kRatio * best) - rate(best / kRatio);
-  const double error = best * std::log(kRatio) / std::sqrt(bend);
-  // What follows from the signal, as an offset does, goes one way, and goes on for a while.
-  const VectorXd score = calc(best, kSlope * best) - calc(best, -kSlope * best);
-  if (!(kSure * error < best) || std::abs(score.sum()) > kWhite * score.norm() ||
-      !IsWhite(score, static_cast<double>(score.size())))
-    return std::nullopt;
-  SignalFit fit;
-  fit.faults = {{"noise, standard deviation", PlaceOf(series.name), best, error, series.name.unit, ""}};
-  fit.same.resize(1);
-  fit.is_noise = true;
-  return fit;
 }
 
 Explanation StartExplanation(const SignalVerdict& verdict, CauseChannel channel) {

@@ -36,10 +36,6 @@ struct SignalVerdict {
 /// @param others whose signal this one may have got; it is one of them itself. @returns one without steps
 /// where nothing differs.
 SignalVerdict JudgeSignal(const SignalSeries& series, const std::vector<SignalSeries>& others);
-/// Noise of what is then rounded to steps of that size, of the deviation s that makes what came most likely,
-/// P(g) = Phi((g + step / 2 - u) / s) - Phi((g - step / 2 - u) / s). None where it is not sure, or not white.
-std::optional<SignalFit> FitNoiseBeforeSteps(const SignalSeries& series, const SignalSteps& steps,
-                                             double step);
 /// An explanation without faults.
 Explanation StartExplanation(const SignalVerdict& verdict, CauseChannel channel);
 /// One explanation for each fault, with what would do in its place.

@@ -145,7 +145,7 @@ class ShapeList {
 
   void AddStuck() {
     const bool is_still = got_.maxCoeff() - got_.minCoeff() <= series_.noise;
-    if (is_still && std::abs(got_[0]) > series_.left * series_.noise)
+    if (is_still && std::abs(got_[0]) > SignalSeries::kLeft * series_.noise)
       Add("stuck at", series_.name.unit, got_[0], false);
   }
 
@@ -158,32 +158,6 @@ class ShapeList {
         -off.minCoeff() < kBothSides * half)
       return;
     Add("play", series_.name.unit, half, false);
-  }
-
-  /// Now and then nothing arrives: 0 is read, or what was read before.
-  void AddLost() {
-    const ArrayXd off = (series_.got - series_.expected).array().abs();
-    const ArrayXd before = steps_.Take(series_.got, 1);
-    Index lost = 0, changes = 0;
-    bool reads_zero = true, reads_old = true, was_lost = false;
-    for (Index i = 0; i < steps_.size(); ++i) {
-      const bool is_lost = off[steps_.rows[static_cast<size_t>(i)]] > series_.noise;
-      changes += is_lost != was_lost ? 1 : 0;
-      was_lost = is_lost;
-      if (!is_lost) continue;
-      ++lost;
-      reads_zero = reads_zero && got_[i] == 0.0;
-      reads_old = reads_old && got_[i] == before[i];
-    }
-    constexpr Index kFewestChanges = 4;
-    if (changes < kFewestChanges || (!reads_zero && !reads_old)) return;
-    SignalShape shape{.fault = "lost samples, fraction",
-                      .detail = reads_zero ? "read as 0" : "read as the one before",
-                      .value = static_cast<double>(lost) / static_cast<double>(steps_.size()),
-                      .parameters = static_cast<int>(changes),
-                      .has_gain = false};
-    shape.output = (off > series_.noise).select(series_.got.array(), series_.expected.array());
-    Add(shape);
   }
 
   [[nodiscard]] std::vector<SignalShape> Take() { return std::move(shapes_); }
@@ -203,7 +177,7 @@ class ShapeList {
     const auto differs = [&](Index begin, Index end) {
       for (Index i = begin; i < end; ++i)
         if ((!is_late || series_.has_history[static_cast<size_t>(i)]) &&
-            std::abs(shape.output[i] - series_.got[i]) > series_.left * series_.noise)
+            std::abs(shape.output[i] - series_.got[i]) > SignalSeries::kLeft * series_.noise)
           return 1;
       return 0;
     };
@@ -300,14 +274,13 @@ std::vector<SignalShape> ListShapes(const SignalSeries& series, const SignalStep
   shapes.AddExchange(others);
   shapes.AddStuck();
   shapes.AddPlay();
-  shapes.AddLost();
   return shapes.Take();
 }
 
 bool IsRefuted(const SignalSeries& series, const SignalSteps& steps, const VectorXd& output) {
   if (!steps.ends) return false;
   const Index count = output.size() - 1 - steps.last;
-  return ((output - series.expected).tail(count).array().abs() > series.faint * series.noise).any();
+  return ((output - series.expected).tail(count).array().abs() > SignalSeries::kFaint * series.noise).any();
 }
 
 std::string PlaceOf(const SignalName& name) {

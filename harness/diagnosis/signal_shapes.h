@@ -61,14 +61,15 @@ bool IsRefuted(const SignalSeries& series, const SignalSteps& steps, const Vecto
 std::string PlaceOf(const SignalName& name);
 /// Whether an output that goes on with this fraction of itself follows, and neither runs away nor ahead.
 bool IsDecay(double decay);
-/// What is looked for, each where what is before it explains nothing: sines fit much, and couplings are many.
-enum class SignalSearch { kPlain, kSines, kCouplings };
+/// What is looked for, each where what is before it explains nothing: sines fit much.
+enum class SignalSearch {
+  kPlain,
+  kSines,  ///< A ripple over time.
+  kTurns,  ///< A ripple over the position, as cogging and an eccentricity make it.
+};
 
-/// What may be added to a transmission's output: gain, offset, drift, lag and friction; a ripple; and of the
-/// signal itself crosstalk of another one of its group, a gain of one sign, a square or cube, a ripple or a
-/// spring over the position, and of motors friction that is smooth or grows with the square of the rate.
+/// What may be added to a transmission's output: gain, offset, drift, lag and friction, and a ripple.
 std::vector<Candidate> ListAdded(const SignalSeries& series, const SignalSteps& steps,
-                                 const SignalShape& shape, SignalSearch search,
-                                 const std::vector<SignalSeries>& others);
+                                 const SignalShape& shape, SignalSearch search);
 
 }  // namespace dexcheck

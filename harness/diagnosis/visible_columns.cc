@@ -14,6 +14,9 @@ using Eigen::Index;
 // A column of which less is left beside others, relative, says nothing of its own.
 constexpr double kIndependent = 1e-7;
 
+namespace {
+
+/// @param noise of the sum over all rows.
 Visible FindVisible(const Candidate& candidate, double noise) {
   const MatrixXd& C = candidate.columns;
   const VectorXd scale = candidate.scale.size() > 0 ? candidate.scale : VectorXd(VectorXd::Ones(C.cols()));
@@ -39,6 +42,8 @@ Visible FindVisible(const Candidate& candidate, double noise) {
   result.unit = unit;
   return result;
 }
+
+}  // namespace
 
 VectorXd CalcErrors(const Visible& visible, const MatrixXd& covariance) {
   const MatrixXd& B = visible.basis;

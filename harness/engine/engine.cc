@@ -308,27 +308,13 @@ std::string NameOf(const mjModel& model, mjtObj type, int id) {
 }
 
 int CountElements(const mjModel& model, mjtObj type) {
-  const auto count = [&]() -> EngineSize {
-    switch (type) {
-      case mjOBJ_BODY:
-        return model.nbody;
-      case mjOBJ_JOINT:
-        return model.njnt;
-      case mjOBJ_DOF:
-        return model.nv;
-      case mjOBJ_SITE:
-        return model.nsite;
-      case mjOBJ_EQUALITY:
-        return model.neq;
-      case mjOBJ_TENDON:
-        return model.ntendon;
-      case mjOBJ_ACTUATOR:
-        return model.nu;
-      default:
-        return 0;
-    }
-  };
-  return static_cast<int>(count());
+  const std::pair<mjtObj, EngineSize> counts[] = {{mjOBJ_BODY, model.nbody},   {mjOBJ_JOINT, model.njnt},
+                                                  {mjOBJ_DOF, model.nv},       {mjOBJ_SITE, model.nsite},
+                                                  {mjOBJ_EQUALITY, model.neq}, {mjOBJ_TENDON, model.ntendon},
+                                                  {mjOBJ_ACTUATOR, model.nu}};
+  for (const auto& [kind, count] : counts)
+    if (kind == type) return static_cast<int>(count);
+  return 0;
 }
 
 int FindByName(const mjModel& model, mjtObj type, const std::string& name) {

@@ -1,21 +1,19 @@
 #pragma once
 
-// A shared library of the user's own: what happens inside it comes back as a ControllerFailure.
+// A shared library of the user's own, in this process.
 
 #include <exception>
 #include <filesystem>
 #include <memory>
 #include <string>
 
-#include "harness/run/foreign_code.h"
 #include "harness/run/own_controller.h"
 
 namespace dexcheck {
 
-/// What a call left in its middle stays in memory as it is, where leak checkers find it.
-void KeepForEver(void* what);
-
-/// Loaded while it exists. Its crashes, and calls that do not return in time, are as ForeignCode has them.
+/// Loaded while it exists. What it throws comes back as a ControllerFailure. A call that does not return in
+/// time ends the program with one line, and so does a crash where the process is watched (ContinueWatched).
+/// Calls are made one at a time in a process.
 class ForeignLibrary {
  public:
   /// Making a controller and its first look at the robot may take this many times the limit of a step.
@@ -23,7 +21,6 @@ class ForeignLibrary {
 
   /// @throws InputError when it cannot be loaded.
   explicit ForeignLibrary(const OwnControllerSetup& setup);
-  ~ForeignLibrary();
 
   /// Null when there is none of this name.
   template <typename Function>
@@ -33,33 +30,38 @@ class ForeignLibrary {
 
   /// @param patience how many times the time limit the work may take. @throws ControllerFailure.
   template <typename Work>
-  void Guard(const Work& work, int patience = 1) {
-    std::string trouble;
+  void Guard(const Work& work, int patience = 1) const {
+    const TimedCall call(patience);
     try {
-      trouble = code_.Call(work, patience);
+      work();
     } catch (const std::exception& error) {
       throw ControllerFailure(name_ + ": " + error.what());
     } catch (...) {
       throw ControllerFailure(name_ + ": threw something that is no std::exception");
     }
-    if (trouble.empty()) return;
-    is_broken_ = true;
-    throw ControllerFailure(name_ + ": " + trouble);
   }
 
-  /// Whether a call ended in its middle: then nothing of it may be called any more, and it stays in memory.
-  [[nodiscard]] bool is_broken() const { return is_broken_; }
-
  private:
-  [[nodiscard]] void* FindSymbol(const char* name) const;
-
+  /// Looks at the calls as long as there are libraries.
+  struct Timer {
+    explicit Timer(const OwnControllerSetup& setup);
+    ~Timer();
+    Timer(const Timer&) = delete;
+    Timer& operator=(const Timer&) = delete;
+  };
+  struct TimedCall {
+    explicit TimedCall(int patience);
+    ~TimedCall();
+    TimedCall(const TimedCall&) = delete;
+    TimedCall& operator=(const TimedCall&) = delete;
+  };
   struct Close {
     void operator()(void* handle) const;
   };
+  [[nodiscard]] void* FindSymbol(const char* name) const;
 
   std::string name_;
-  ForeignCode code_;
-  bool is_broken_ = false;
+  Timer timer_;
   std::unique_ptr<void, Close> handle_;
 };
 

@@ -43,10 +43,6 @@ LibraryController::LibraryController(std::unique_ptr<ForeignLibrary> library, co
   }
 }
 
-LibraryController::~LibraryController() {
-  if (library_->is_broken()) KeepForEver(controller_.release());
-}
-
 void LibraryController::RequireInterface() const {
   const auto interface = library_->Find<const char*()>("dexcheck_controller_interface");
   if (interface == nullptr)

@@ -11,14 +11,13 @@
 
 namespace dexcheck {
 
-/// One behind controller/control/controller_library.h. What it throws ends the run, with its words; a crash,
-/// a call that does not return in time and a torque of the wrong size likewise.
+/// One behind controller/control/controller_library.h. What it throws ends the run, with its words;
+/// a torque of the wrong size likewise.
 class LibraryController final : public Controller {
  public:
   /// @throws InputError when the library names no controller, was built for another interface, makes no
   /// controller, or asks for none of a parameter.
   LibraryController(std::unique_ptr<ForeignLibrary> library, const OwnControllerSetup& setup);
-  ~LibraryController() override;
 
   void Follow(const Trajectory& motion) override;
   void Begin(double t, const Reading& reading) override;

@@ -1,5 +1,3 @@
-#include <utility>
-
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
 #include "harness/run/controller_peers.h"
@@ -13,12 +11,10 @@ LibraryPeer::LibraryPeer(std::unique_ptr<ForeignLibrary> library, const OwnContr
 
 LibraryPeer::~LibraryPeer() {
   const auto close = library_->Find<void(void*)>("dexcheck_close");
-  if (library_->is_broken() || close == nullptr) KeepForEver(std::exchange(controller_, nullptr));
-  if (controller_ == nullptr) return;
+  if (controller_ == nullptr || close == nullptr) return;
   try {
     library_->Guard([&] { close(controller_); });
-  } catch (const ControllerFailure&) {
-    KeepForEver(controller_);  // the run has its verdict
+  } catch (const ControllerFailure&) {  // the run has its verdict
   }
 }
 
@@ -66,10 +62,7 @@ void LibraryPeer::Begin() {
 void LibraryPeer::Step(std::span<double> request, std::span<double> torques) {
   const char* problem = nullptr;
   library_->Guard([&] { problem = step_(controller_, request.data() + 1, torques.data()); });
-  if (problem == nullptr) return;
-  std::string text;
-  library_->Guard([&] { text = Abbreviate(problem); });
-  throw ControllerFailure(setup_.name + ": " + text);
+  if (problem != nullptr) throw ControllerFailure(setup_.name + ": " + Abbreviate(problem));
 }
 
 }  // namespace dexcheck

@@ -28,6 +28,9 @@ std::string MakeScenarioText(const Scenario& scenario) {
   return ApplyOverrides(scenario.text, scenario.source, overrides);
 }
 
+/// For messages.
+std::string NameOf(const Scenario& scenario) { return "controller " + scenario.controller.run; }
+
 /// What runs a Python file: the module's own main program.
 std::filesystem::path FindPythonMain(const std::string& name) {
   std::error_code error;
@@ -62,13 +65,17 @@ std::filesystem::path FindControllerFile(const OwnControllerOptions& own) {
   return is_one && !is_command ? file : std::filesystem::path();
 }
 
+void WatchController(const Scenario& scenario) {
+  if (FindControllerFile(scenario.controller).extension() == ".so") ContinueWatched(NameOf(scenario));
+}
+
 std::unique_ptr<Controller> MakeOwnController(const Setup& setup, const Sampling& sampling) {
   const Scenario& scenario = setup.scenario();
   if (scenario.pick_task() != nullptr)
     throw InputError(scenario.source + ": task: is done by no other controller");
   if (scenario.control.kappa == ContactSource::kIntegrated)
     throw InputError(scenario.source + ": control.kappa: other controllers get measured contacts");
-  const OwnControllerSetup own{"controller " + scenario.controller.run,
+  const OwnControllerSetup own{NameOf(scenario),
                                &setup.model(),
                                setup.fingertips(),
                                setup.object().body,
@@ -81,7 +88,7 @@ std::unique_ptr<Controller> MakeOwnController(const Setup& setup, const Sampling
                                scenario.controller};
   if (FindControllerFile(own.own).extension() != ".so")
     return std::make_unique<ProtocolController>(StartProgram(own), own);
-  ContinueWatched(own.name);  // whatever it does to the process is told in one line
+  WatchController(scenario);
   auto library = std::make_unique<ForeignLibrary>(own);
   if (library->Find<void>("dexcheck_protocol") == nullptr)
     return std::make_unique<LibraryController>(std::move(library), own);

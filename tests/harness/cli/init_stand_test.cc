@@ -19,7 +19,6 @@ TEST_F(InitStand, ARobotWithAFloatingBaseStands) {
   const Json run = RunMotion(0, "dog");
   EXPECT_EQ(run.at("verdict"), "pass");
   EXPECT_GT(run.at("checks").at("foot_cone_use").at("max").get<double>(), 0.0);
-  EXPECT_THAT(Expect(0, "excite dog/motion.toml --runs 2 --quiet").out, HasSubstr("FOUND"));
   // Without places to stand on it is held, and its joints move all the same.
   EXPECT_THAT(Expect(0, {"init", kMjcf + "quadruped.xml", "--out", "held"}).err,
               HasSubstr("base is held: no stance was found, because 0 places touch the ground"));

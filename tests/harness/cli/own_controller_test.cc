@@ -132,11 +132,7 @@ TEST_F(OwnController, WhatALibraryDoesWrongEndsTheRunInOneLine) {
   for (const auto& [fault, words] : {std::pair("throw", "the widget is out of cheese at t = 0.01 s"),
                                      {"throw_number", "std::exception at t = 0.01 s"},
                                      {"nan", "not a number at t = 0.01 s"},
-                                     {"size", "3 torques, must be 50 at t = 0.01 s"},
-                                     {"crash", "(Segmentation fault) at t = 0.01 s"},
-                                     {"abort", "(Aborted) at t = 0.01 s"},
-                                     {"overflow", "(Segmentation fault) at t = 0.01 s"},
-                                     {"hang", "0.4 s at t = 0.01 s"}}) {
+                                     {"size", "3 torques, must be 50 at t = 0.01 s"}}) {
     const ProgramResult result = run(fault);
     EXPECT_EQ(ReadSummary(fault)["speed"]["steps"], 10) << fault;
     EXPECT_EQ(CountFiles(fault), 2) << fault << ": log and summary";
@@ -146,10 +142,20 @@ TEST_F(OwnController, WhatALibraryDoesWrongEndsTheRunInOneLine) {
 
 // Whatever ends the process that has the library in it: exit code 3 and one line that names it.
 TEST_F(OwnController, WhatALibraryEndsIsNeverGood) {
-  for (const char* fault : {"exit", "_exit", "quick_exit", "kill", "load"}) {
-    const ProgramResult result = RunWith(FAULTY_LIBRARY, "--no-log", {.environment = {{"FAULT", fault}}});
+  for (const auto& [fault, words] : {std::pair("exit", "ended the program (exit code 0)"),
+                                     {"_exit", "ended the program (exit code 0)"},
+                                     {"quick_exit", "ended the program (exit code 0)"},
+                                     {"kill", "ended the program (Killed)"},
+                                     {"load", "ended the program (Aborted)"},
+                                     {"crash", "ended the program (Segmentation fault)"},
+                                     {"abort", "ended the program (Aborted)"},
+                                     {"overflow", "ended the program (Segmentation fault)"},
+                                     {"hang", "did not return in time (0.4 s for a step)"}}) {
+    const ProgramResult result =
+        RunWith(FAULTY_LIBRARY, "--controller-time-limit 0.4 --no-log", {.environment = {{"FAULT", fault}}});
     EXPECT_EQ(result.exit_code, 3) << fault << result.out;
     EXPECT_THAT(result.err, HasSubstr("faulty_controller.so")) << fault;
+    EXPECT_THAT(result.err, HasSubstr(words)) << fault;
     EXPECT_EQ(std::ranges::count(result.err, '\n'), 1) << fault << result.err;
     EXPECT_THAT(result.out, Not(HasSubstr("PASS"))) << fault;
   }
@@ -157,6 +163,23 @@ TEST_F(OwnController, WhatALibraryEndsIsNeverGood) {
     const ProgramResult result = RunWith(FAULTY_C_LIBRARY, "--no-log", {.environment = {{"FAULT", fault}}});
     EXPECT_EQ(result.exit_code, 3) << fault << result.out;
     EXPECT_THAT(result.out + result.err, HasSubstr("faulty_c_controller.so")) << fault;
+  }
+}
+
+// In a study they cost their trial.
+TEST_F(OwnController, WhatALibraryEndsCostsItsTrial) {
+  WriteText(Path("study.toml"),
+            std::string("name = \"study\"\nscenario = \"hold\"\ncontroller = \"") + FAULTY_LIBRARY +
+                "\"\nset = [\"controller.time_limit=0.4\", \"duration=0.02\", \"settle=0.2\"]\n"
+                "[[vary]]\nkey = \"plant.impratio\"\nvalues = [100]\n");
+  for (const auto& [fault, words] :
+       {std::pair("crash", "the process died: Segmentation fault"), {"hang", "did not return in time"}}) {
+    const std::string database = std::string(fault) + ".sqlite";
+    static_cast<void>(Run(Words("study run study.toml --quiet --db") + Words{database},
+                          {.environment = {{"FAULT", fault}}}));
+    const Json trial = RunJson(0, Words{"study", "show", database, "0"});
+    EXPECT_EQ(trial["outcome"], "crashed") << fault;
+    EXPECT_THAT(trial["failure"].get<std::string>(), HasSubstr(words)) << fault;
   }
 }
 
@@ -179,7 +202,7 @@ TEST_F(OwnController, WhatALibraryInCDoesWrongIsOneLine) {
   EXPECT_TRUE(IsRefused(run("open", "--no-log"), {"faulty_c_controller.so", "made no controller"}));
   EXPECT_TRUE(IsRefused(run("none", "--no-log --set controller.gain=3"), {"controller.gain", "takes none"}));
   EXPECT_TRUE(HasFailed(run("step", "--out run"), "the widget is out of cheese while settling"));
-  EXPECT_TRUE(HasFailed(run("crash", "--out run"), "crashed (Aborted) while settling"));
+  EXPECT_TRUE(HasFailed(run("crash", "--out run"), "ended the program (Aborted)"));
   EXPECT_TRUE(HasFailed(run("none", "--out run"), "while settling"));
 }
 

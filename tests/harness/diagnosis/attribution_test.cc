@@ -348,7 +348,6 @@ TEST(Attribute, NeverContradictsItself) {
       ASSERT_EQ(result.attributions.size(), failed) << set;
       for (const Attribution& one : result.attributions) ASSERT_NE(one.cause, Cause::kNone) << set;
       const std::string evidence = result.evidence.substr(0, result.evidence.find(' '));
-      ASSERT_NE(result.cause, Cause::kIntegrator) << set;
       if (result.cause != Cause::kUnexplained) {
         ASSERT_EQ(FindCause(result, evidence), NameOf(result.cause)) << set << " " << evidence;
       }
@@ -385,9 +384,9 @@ TEST(NameOf, CausesHaveDifferentNames) {
   std::vector<std::string> names;
   for (const Cause cause :
        {Cause::kNone, Cause::kModel, Cause::kActuatorLimit, Cause::kJointLimit, Cause::kFingertipSlip,
-        Cause::kWheelSlip, Cause::kContactSoftness, Cause::kTilt, Cause::kSolver, Cause::kIntegrator,
-        Cause::kSensing, Cause::kControlLaw, Cause::kActuator, Cause::kUnmodelledForce, Cause::kSlope,
-        Cause::kWheelGeometry, Cause::kCollision, Cause::kUnexplained}) {
+        Cause::kWheelSlip, Cause::kContactSoftness, Cause::kTilt, Cause::kSolver, Cause::kSensing,
+        Cause::kControlLaw, Cause::kActuator, Cause::kUnmodelledForce, Cause::kSlope, Cause::kWheelGeometry,
+        Cause::kCollision, Cause::kUnexplained}) {
     names.emplace_back(NameOf(cause));
   }
   std::sort(names.begin(), names.end());

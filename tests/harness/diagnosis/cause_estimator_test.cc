@@ -8,7 +8,6 @@
 #include <cmath>
 #include <random>
 
-#include "harness/diagnosis/smallest_amplitudes.h"
 #include "tests/common/linear_algebra.h"
 #include "tests/common/matrix_near.h"
 
@@ -407,39 +406,6 @@ TEST(CauseEstimator, NoMoreTermsThanAreAskedFor) {
   for (size_t i = 0; i < 4; ++i) y += 3.0 * candidates[i].columns;
   EXPECT_EQ(Select(y, candidates, {.most_terms = 4}).terms.size(), 4u);
   EXPECT_EQ(Select(y, candidates, {.most_terms = 2}).terms.size(), 2u);
-}
-
-// What is claimed of the smallest sizes is what the estimator does.
-TEST(FindSmallestAmplitudes, IsFromWhereOnACandidateIsNamed) {
-  std::mt19937_64 random(5);
-  std::normal_distribution<double> normal;
-  std::vector<Candidate> candidates(6);
-  for (size_t i = 0; i < candidates.size(); ++i) {
-    candidates[i].place = std::to_string(i);
-    candidates[i].columns = MatrixXd::NullaryExpr(200, i < 4 ? 1 : 2, [&] { return normal(random); });
-  }
-  candidates[1].columns = candidates[0].columns + 0.1 * candidates[1].columns;  // nearly the same
-  candidates[3].columns = candidates[2].columns;                                // the same
-  const auto is_like = [](size_t a, size_t b) { return a == b; };
-  const CauseOptions options;
-  const std::vector<SmallestAmplitude> all = FindSmallestAmplitudes(candidates, options, is_like);
-  ASSERT_EQ(all.size(), 8u);
-  EXPECT_GT(all[0].named, 2.0 * all[0].found);
-  EXPECT_EQ(all[0].rival, 1u);
-  EXPECT_TRUE(std::isfinite(all[2].found));
-  EXPECT_TRUE(std::isinf(all[2].named));
-  for (const SmallestAmplitude& one : all) {
-    const VectorXd column = candidates[one.candidate].columns.col(one.component);
-    for (const double factor : {0.98, 1.02}) {
-      const CauseSelection found = SelectCauses(factor * one.found * column, candidates, options);
-      EXPECT_EQ(!found.terms.empty(), factor > 1.0) << one.candidate;
-      if (!std::isfinite(one.named)) continue;
-      const CauseSelection named = SelectCauses(factor * one.named * column, candidates, options);
-      const bool is_named =
-          named.terms.size() == 1 && named.terms[0].candidate == one.candidate && named.terms[0].same.empty();
-      EXPECT_EQ(is_named, factor > 1.0) << one.candidate;
-    }
-  }
 }
 
 }  // namespace

@@ -83,17 +83,27 @@ INSTANTIATE_TEST_SUITE_P(
         Beside{"LagAndOffset", OfMotor("lag", 5e-3, "s"), OfMotor("offset", 0.2, "N m"),
                [](const ArrayXd& u) { return MakeLag(u, 5e-3); },
                [](const ArrayXd& u) { return ArrayXd(u + 0.2); }},
-        Beside{"Roundings", OfMotor("rounding to steps of", 0.01, "N m"),
-               OfMotor("rounding to steps of", 0.217, "N m"), [](const ArrayXd& u) { return Round(u, 0.01); },
-               [](const ArrayXd& u) { return Round(u, 0.217); }},
-        Beside{"RoundingAndLessNoise", OfMotor("rounding to steps of", 0.05, "N m"),
-               OfMotor("noise, standard deviation", 0.01, "N m"),
-               [](const ArrayXd& u) { return Round(u, 0.05); },
-               [](const ArrayXd& u) { return ArrayXd(u + MakeNoise(0.01, 5)); }},
         Beside{"RoundingAndOffset", OfMotor("rounding to steps of", 0.01, "N m"),
                OfMotor("offset", 0.3, "N m"), [](const ArrayXd& u) { return Round(u, 0.01); },
                [](const ArrayXd& u) { return ArrayXd(u + 0.3); }}),
     [](const ::testing::TestParamInfo<Beside>& info) { return info.param.name; });
+
+// What its rounding by all leaves of a motor's own steps or noise has another size.
+TEST(SignalCauses, StepsAndNoiseBeforeTheStepsOfAllAreNotExplained) {
+  const std::vector<std::pair<double, std::function<ArrayXd(const ArrayXd&)>>> made = {
+      {0.01, [](const ArrayXd& u) { return Round(u, 0.217); }},
+      {0.05, [](const ArrayXd& u) { return ArrayXd(u + MakeNoise(0.01, 5)); }}};
+  for (const auto& [step, make_own] : made) {
+    const Causes causes =
+        ExplainSignals(MakeMotors([step = step](const ArrayXd& u) { return Round(u, step); }, make_own),
+                       CauseChannel::kActuation);
+    SCOPED_TRACE(TextOf(causes));
+    ASSERT_EQ(causes.size(), 2u);
+    EXPECT_TRUE(
+        causes.front().faults.front().IsLike({"rounding to steps of", "all motors", step, 0.0, "N m", ""}));
+    EXPECT_EQ(causes.back().outcome, CauseOutcome::kNotExplained);
+  }
+}
 
 // A motor that gives nothing has the steps of all, if they are wide enough.
 TEST(SignalCauses, SilentMotorIsOneOfAllThatRound) {
