@@ -31,18 +31,17 @@ void ReadSize(const std::string& text, int* width, int* height) {
                      Quote(text));
 }
 
-bool WriteVideo(const std::vector<RunView>& views, const VideoOptions& options, const std::string& out,
-                bool quiet) {
+bool WriteVideo(const RunView& run, const VideoOptions& options, const std::string& out, bool quiet) {
   const auto start = std::chrono::steady_clock::now();
   EncodingOptions encoding;
   encoding.width = options.width;
   encoding.height = options.height;
   encoding.fps = options.fps;
-  const long frames = CountFrames(views, options.fps);
+  const long frames = CountFrames(run, options.fps);
   VideoWriter video(out, encoding);
   CatchInterrupts();
   ProgressBar bar("drawing", frames, quiet);
-  const bool complete = RenderVideo(views, options, &video, [&](long done, long) { return bar.GoOn(done); });
+  const bool complete = RenderVideo(run, options, &video, [&](long done, long) { return bar.GoOn(done); });
   bar.Finish();
   if (!complete) {
     Warn(fmt::format("stopped after {} of {} frames; {} was not written", video.frames(), frames, out));
@@ -64,7 +63,7 @@ bool WriteRunVideo(const std::filesystem::path& run_folder, const std::string& o
   VideoOptions options;
   options.forces = true;
   options.workers = CountDrawers();
-  return WriteVideo({{run.model.get(), &run.frames}}, options, out, quiet);
+  return WriteVideo({run.model.get(), &run.frames}, options, out, quiet);
 }
 
 }  // namespace dexcheck::cli
