@@ -16,8 +16,6 @@
 
 namespace dexcheck::cli {
 
-int CountDrawers() { return std::clamp(static_cast<int>(std::thread::hardware_concurrency()), 1, 8); }
-
 void ReadSize(const std::string& text, int* width, int* height) {
   const auto read = [](std::string_view part, int most) {
     const int size = ParseNumber<int>(part).value_or(0);
@@ -31,7 +29,8 @@ void ReadSize(const std::string& text, int* width, int* height) {
                      Quote(text));
 }
 
-bool WriteVideo(const RunView& run, const VideoOptions& options, const std::string& out, bool quiet) {
+bool WriteVideo(const RunView& run, VideoOptions options, const std::string& out, bool quiet) {
+  options.workers = std::clamp(static_cast<int>(std::thread::hardware_concurrency()), 1, 8);
   const auto start = std::chrono::steady_clock::now();
   EncodingOptions encoding;
   encoding.width = options.width;
@@ -62,7 +61,6 @@ bool WriteRunVideo(const std::filesystem::path& run_folder, const std::string& o
   const RecordedFrames run = ReadRecordedFrames(run_folder);
   VideoOptions options;
   options.forces = true;
-  options.workers = CountDrawers();
   return WriteVideo({run.model.get(), &run.frames}, options, out, quiet);
 }
 

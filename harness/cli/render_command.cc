@@ -83,7 +83,6 @@ ExitCode Run(RenderRequest request) {
 void AddRenderCommand(Command app) {
   constexpr int kMostFramesPerSecond = 120;
   const auto request = std::make_shared<RenderRequest>();
-  request->video.workers = CountDrawers();
   Command command = app.AddCommand("render", "Draw a recorded run as a video, or one instant of it");
   command.AddOption("RUN_DIR", &request->run_folder, "Folder of the run").Required().TypeName("");
   command.AddOption("--out FILE", &request->out,
