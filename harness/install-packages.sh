@@ -35,7 +35,7 @@ case $purpose in
   *) echo "install-packages: $purpose: must be program, archive, tests or development" >&2; exit 2 ;;
 esac
 if [[ $purpose == archive || $purpose == development ]]; then
-  packages+=(patchelf dpkg-dev git)
+  packages+=(patchelf dpkg-dev git help2man)
 fi
 if [[ $purpose == tests || $purpose == development ]]; then
   # tests and benchmarks, and the programs they take as oracles
@@ -43,7 +43,7 @@ if [[ $purpose == tests || $purpose == development ]]; then
     libgtest-dev libgmock-dev libbenchmark-dev coinor-csdp hdf5-tools
     sqlite3 slurm-wlm munge strace xz-utils
     chromium chromium-driver python3-numpy python3-h5py doxygen
-    xvfb xdotool imagemagick tmux zsh bash-completion groff-base
+    xvfb xdotool imagemagick tmux bash-completion
     # the Python module
     pybind11-dev python3-dev python3-pytest
     # what is packaged: hooks, the action, figures as PDF

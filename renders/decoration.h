@@ -37,18 +37,12 @@ struct Polyline {
   Color color;
 };
 
-/// A frame's axes: x red, y green, z blue.
-struct Axes {
-  Pose X_WF;
-  double length;  ///< m.
-};
-
 struct Dot {
   Vector3d center;
   double radius;  ///< m.
   Color color;
 };
 
-using Decoration = std::variant<Arrow, Cone, Polyline, Axes, Dot>;
+using Decoration = std::variant<Arrow, Cone, Polyline, Dot>;
 
 }  // namespace dexcheck

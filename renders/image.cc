@@ -75,16 +75,6 @@ int FrameWidth(const Image& image) {
 
 }  // namespace
 
-Image PlaceBeside(const Image& left, const Image& right) {
-  Require(left.height == right.height, "pictures side by side", "must be equally high", right.height);
-  Image image(left.width + right.width, left.height);
-  Copy(left, 0, 0, &image);
-  Copy(right, left.width, 0, &image);
-  const int width = FrameWidth(image);
-  if (width < left.width && width < right.width) Fill(left.width - width / 2, 0, width, image.height, &image);
-  return image;
-}
-
 void PlaceInset(const Image& inset, Image* image) {
   const int frame = FrameWidth(*image);
   const int margin = static_cast<int>(std::lround(image->height / 36.0));

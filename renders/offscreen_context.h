@@ -18,6 +18,7 @@ struct Mesa {
   X(glBegin) X(glDeleteLists) X(glEnd) X(glEndList) X(glGenLists) X(glNewList) X(glNormal3dv)        \
   X(glNormal3f) X(glVertex3dv) X(glVertex3f)
 // clang-format on
+// A member's name stands without parentheses. NOLINTNEXTLINE(bugprone-macro-parentheses)
 #define DEXCHECK_FUNCTION(name) decltype(&::name) name;
   DEXCHECK_MESA(DEXCHECK_FUNCTION)
 #undef DEXCHECK_FUNCTION

@@ -159,14 +159,6 @@ mjvCamera MakeFreeCamera(const Viewpoint& from) {
   return view;
 }
 
-/// Only one model's meshes can be loaded to be drawn.
-void RequireSameMeshes(const mjModel& model, const mjModel& ghost) {
-  const bool same = model.nmesh == ghost.nmesh && model.nmeshvert == ghost.nmeshvert &&
-                    model.nmeshface == ghost.nmeshface &&
-                    std::equal(model.mesh_vert, model.mesh_vert + 3 * model.nmeshvert, ghost.mesh_vert);
-  if (!same) throw InputError("the two runs have other meshes and cannot be drawn into one scene");
-}
-
 }  // namespace
 
 std::vector<std::string> ListCameras(const mjModel& model) {
@@ -184,14 +176,12 @@ Renderer::Renderer(const mjModel& model, const RenderOptions& options)
       camera_(FindCamera(model, options.camera)),
       translucent_body_(FindBody(model, options.translucent_body)) {
   CheckOptions(options);
-  if (options.ghost) RequireSameMeshes(model, *options.ghost->model);
   const std::lock_guard lock(context_mutex);
   gl_.emplace();
   mjv_defaultOption(&visible_);
   mjv_defaultPerturb(&perturb_);
   mjv_defaultScene(&scene_);
-  const auto ghost_geoms = options.ghost ? static_cast<int>(options.ghost->model->ngeom) : 0;
-  mjv_makeScene(&model, &scene_, static_cast<int>(model.ngeom) + ghost_geoms + kMostDecorations);
+  mjv_makeScene(&model, &scene_, static_cast<int>(model.ngeom) + kMostDecorations);
   mjr_defaultContext(&context_);
   // The context takes its sizes from the model's visual section.
   const MjModelPtr sized(mj_copyModel(nullptr, &model));
@@ -248,7 +238,6 @@ Image Renderer::Draw(mjData& data, mjvCamera view, int width, int height, double
     eye.frustum_center -= static_cast<float>(shift_right * visible);
   }
   FadeBody();
-  if (options_.ghost) AddGhost(*options_.ghost);
   meshes_->ClearTubes();
   AddDecorations(decorations, &*meshes_, &scene_);
   const mjrRect viewport = {0, 0, options_.samples * width, options_.samples * height};
@@ -273,17 +262,6 @@ void Renderer::FadeBody() {
     mjvGeom& geom = scene_.geoms[i];
     if (geom.objtype != mjOBJ_GEOM || model_.geom_bodyid[geom.objid] != translucent_body_) continue;
     geom.rgba[3] = std::min(geom.rgba[3], kOpacity);
-  }
-}
-
-void Renderer::AddGhost(const Ghost& ghost) {
-  const int first = scene_.ngeom;
-  mjv_addGeoms(ghost.model, ghost.data, &visible_, &perturb_, mjCAT_DYNAMIC, &scene_);
-  for (int i = first; i < scene_.ngeom; ++i) {
-    mjvGeom& geom = scene_.geoms[i];
-    std::ranges::copy(ghost.color, geom.rgba);
-    geom.texid = -1;
-    geom.reflectance = 0.0F;
   }
 }
 
@@ -324,17 +302,6 @@ class GeomAdder {
     for (const Vector3d& point : line.points) points.push_back(point - origin);
     geom.dataid = meshes_.AddTube(points, line.radius);
     Place(origin, Matrix3d::Identity(), &geom);
-  }
-
-  void operator()(const Axes& axes) {
-    constexpr double kSlimness = 0.03;
-    for (int k = 0; k < 3; ++k) {
-      Color color = {0.15F, 0.15F, 0.15F, 1.0F};
-      color[static_cast<size_t>(k)] = 0.9F;
-      const Vector3d origin = axes.X_WF.translation();
-      (*this)(
-          Arrow{origin, origin + axes.length * axes.X_WF.linear().col(k), kSlimness * axes.length, color});
-    }
   }
 
   void operator()(const Dot& dot) {

@@ -44,13 +44,6 @@ class DisplayMeshes {
 /// A camera that stands still where RenderOptions::course says; an MJCF's camera of this name comes first.
 inline constexpr const char* kCourseCamera = "course";
 
-/// A second robot in the scene: all that moves of it, in one translucent colour.
-struct Ghost {
-  const mjModel* model;  ///< With the meshes of the renderer's model.
-  mjData* data;          ///< Its state; kinematics must be computed before each picture.
-  Color color;
-};
-
 struct RenderOptions {
   int width = 1280;
   int height = 720;
@@ -68,7 +61,6 @@ struct RenderOptions {
   /// for a panel.
   double shift_right = 0.0;
   std::string translucent_body;  ///< Its geoms are seen through; none when empty.
-  std::optional<Ghost> ghost;    ///< What it points at must outlive the renderer.
 };
 
 /// Names of the cameras of a model, in its order.
@@ -82,8 +74,7 @@ void CheckCamera(const mjModel& model, const std::string& name);
 class Renderer {
  public:
   /// @param model must outlive the renderer.
-  /// @throws InputError when the model has no such camera (the message lists those that exist) or body, or a
-  /// ghost other meshes.
+  /// @throws InputError when the model has no such camera (the message lists those that exist) or body.
   /// @throws std::invalid_argument for sizes that cannot be drawn.
   Renderer(const mjModel& model, const RenderOptions& options);
   ~Renderer();
@@ -108,7 +99,6 @@ class Renderer {
              std::span<const Decoration> decorations);
   [[nodiscard]] mjvCamera MakeCamera(int camera) const;
   void FadeBody();
-  void AddGhost(const Ghost& ghost);
 
   const mjModel& model_;
   RenderOptions options_;

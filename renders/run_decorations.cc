@@ -20,7 +20,6 @@ const Color kDesired = MakeColor(0x18c8e8, 0.25F);
 constexpr double kLongestForce = 0.042;
 constexpr double kConeHeight = 0.026;
 constexpr double kForceRadius = 0.0018;
-constexpr double kAxesLength = 0.08;
 constexpr double kTrackRadius = 0.0008;
 constexpr double kActualRadius = 0.0022;
 constexpr double kDesiredRadius = 0.0036;
@@ -74,8 +73,8 @@ RunDecorator::RunDecorator(const mjModel& model, const RunFrames& run, const Dec
       object_(mj_name2id(&model, mjOBJ_BODY, run.object_body.c_str())),
       meters_per_newton_(CalcMetersPerNewton(run)) {
   // A robot that holds nothing leaves no tracks.
-  if (run.object_body.empty()) options_.tracks = options_.frames = false;
-  if ((options_.tracks || options_.frames) && object_ < 0) {
+  if (run.object_body.empty()) options_.tracks = false;
+  if (options_.tracks && object_ < 0) {
     throw InputError(run.source + ": object: no body " + Quote(run.object_body) + " in the model");
   }
   if (!options_.tracks) return;
@@ -95,7 +94,6 @@ std::vector<Decoration> RunDecorator::Make(long row, const mjData& data) const {
     AddTracks(row, X_WO, &decorations);
     AddPaths(row, X_WO.translation(), &decorations);
   }
-  if (options_.frames) decorations.emplace_back(Axes{BodyPose(data, object_), kAxesLength});
   return decorations;
 }
 

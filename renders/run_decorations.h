@@ -13,10 +13,9 @@ namespace dexcheck {
 struct DecorationOptions {
   bool forces = false;
   bool tracks = false;
-  bool frames = false;
 };
 
-/// Makes what is drawn into the scene of a run: forces, tracks, paths, axes.
+/// Makes what is drawn into the scene of a run: forces, tracks, paths.
 class RunDecorator {
  public:
   /// @param data scratch for kinematics.

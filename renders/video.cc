@@ -24,11 +24,6 @@ constexpr double kInsetAspect = 16.0 / 9.0;
 constexpr double kWidestInset = 0.45;  // of the picture's width
 constexpr double kDown = -0.5;         // of a look at the object, against 1 along the floor
 
-const Color kGhostLine = MakeColor(0x3d7dff);
-const Color kGhost = MakeColor(0x3d7dff, 0.45F);
-constexpr double kLeastLine = 1e-3;    // m between the objects of two runs, from which on a line is drawn
-constexpr double kLineRadius = 0.003;  // m
-
 constexpr double kNarrowShift = 0.15;   // of the picture's width
 constexpr double kCourseMargin = 0.03;  // likewise
 
@@ -56,28 +51,24 @@ std::array<double, 2> ErrorRange(const std::vector<double>& errors) {
 /// Draws one run.
 class VideoPainter::RunPainter {
  public:
-  /// @param ghost a run that is drawn into the same scene; null for none.
-  RunPainter(const RunView& view, const RunView* ghost, const VideoOptions& options, int width)
+  RunPainter(const RunView& view, const VideoOptions& options)
       : model_((CheckRunFrames(*view.model, *view.frames), *view.model)),
-        ghost_(ghost != nullptr ? std::make_unique<GhostRun>(*ghost) : nullptr),
         run_(*view.frames),
         options_(options),
-        width_(width),
         camera_(ChooseCamera()),
         data_(MakeData(model_)),
         renderer_(model_, MakeRenderOptions()),
-        decorator_(model_, run_, {options.forces, options.tracks, options.frames}, data_.get()),
+        decorator_(model_, run_, {options.forces, options.tracks}, data_.get()),
         checks_(run_),
         error_range_(ErrorRange(run_.position_errors)) {
     if (options.panel) overlay_.emplace();
-    if (options.free && (options.free->follow || !options.free->look_at)) FindObject();
     for (const std::string& camera : {camera_, options.inset}) {
       if (IsOwn(camera, kObjectCamera)) FindObject();
     }
     bearing_ = FindWay(model_, run_, data_.get()).bearing;
     inset_height_ = static_cast<int>(std::lround(kInsetHeight * options.height));
     inset_width_ =
-        static_cast<int>(std::lround(std::min(kInsetAspect * inset_height_, kWidestInset * width)));
+        static_cast<int>(std::lround(std::min(kInsetAspect * inset_height_, kWidestInset * options.width)));
     if (!options.inset.empty() && !IsOwn(options.inset, kRobotCamera) && !IsOwn(options.inset, kObjectCamera))
       CheckCamera(model_, options.inset);
   }
@@ -85,10 +76,8 @@ class VideoPainter::RunPainter {
   Image Paint(double time) {
     const long row = run_.RowAt(run_.times.front() + time + kTimeRounding);
     SetRow(model_, run_, row, data_.get());
-    std::vector<Decoration> decorations = decorator_.Make(row, *data_);
-    if (ghost_) AddGhost(time, &decorations);
-    const std::optional<Viewpoint> view =
-        options_.free ? FindFreeView(row) : FindOwnView(camera_, MakeEdges());
+    const std::vector<Decoration> decorations = decorator_.Make(row, *data_);
+    const std::optional<Viewpoint> view = FindOwnView(camera_, MakeEdges());
     Image image = view ? renderer_.Render(*data_, *view, decorations) : renderer_.Render(*data_, decorations);
     if (!options_.inset.empty()) PlaceInset(PaintInset(decorations), &image);
     if (overlay_) overlay_->Draw(MakeState(row), &image);
@@ -96,32 +85,6 @@ class VideoPainter::RunPainter {
   }
 
  private:
-  /// The other run of a comparison.
-  struct GhostRun {
-    explicit GhostRun(const RunView& view)
-        : model((CheckRunFrames(*view.model, *view.frames), *view.model)),
-          run(*view.frames),
-          data(MakeData(model)),
-          object(mj_name2id(&model, mjOBJ_BODY, run.object_body.c_str())) {}
-    const mjModel& model;
-    const RunFrames& run;
-    MjDataPtr data;
-    int object;  // body, -1 for none
-  };
-
-  /// Puts the other run to the same time, and a line between the two objects.
-  void AddGhost(double time, std::vector<Decoration>* decorations) {
-    const RunFrames& run = ghost_->run;
-    SetRow(ghost_->model, run, run.RowAt(run.times.front() + time + kTimeRounding), ghost_->data.get());
-    const int object = mj_name2id(&model_, mjOBJ_BODY, run_.object_body.c_str());
-    if (object < 0 || ghost_->object < 0) return;
-    const Vector3d here = BodyPose(*data_, object).translation();
-    const Vector3d there = BodyPose(*ghost_->data, ghost_->object).translation();
-    apart_ = (there - here).norm();
-    if (*apart_ < kLeastLine) return;
-    decorations->emplace_back(Polyline{{here, there}, kLineRadius, kGhostLine});
-  }
-
   [[nodiscard]] std::string ChooseCamera() const {
     constexpr const char* kUsual = "overview";
     if (!options_.camera.empty()) return options_.camera;
@@ -130,15 +93,14 @@ class VideoPainter::RunPainter {
 
   [[nodiscard]] RenderOptions MakeRenderOptions() {
     RenderOptions render;
-    render.width = width_;
+    render.width = options_.width;
     render.height = options_.height;
     const bool is_own = IsOwn(camera_, kRobotCamera) || IsOwn(camera_, kObjectCamera);
     render.camera = is_own ? kCourseCamera : camera_;
     render.samples = options_.samples;
     render.shadow_size = options_.shadow_size;
-    if (ghost_) render.ghost = Ghost{&ghost_->model, ghost_->data.get(), kGhost};
     // In a narrow picture the panel would cover the robot.
-    if (options_.panel && width_ < options_.height * 5 / 4) render.shift_right = kNarrowShift;
+    if (options_.panel && options_.width < options_.height * 5 / 4) render.shift_right = kNarrowShift;
     // Forces point into the object.
     if (options_.forces && run_.contacts() > 0) render.translucent_body = run_.object_body;
     if (camera_ == kCourseCamera || options_.inset == kCourseCamera) {
@@ -150,32 +112,20 @@ class VideoPainter::RunPainter {
   /// What the whole run has to fit into: right of the panel, with a margin around.
   [[nodiscard]] ViewEdges MakeEdges() const {
     const double top = std::tan(0.5 * DegToRad(model_.vis.global.fovy));
-    const double side = top * width_ / options_.height;
+    const double side = top * options_.width / options_.height;
     const double margin = 2.0 * kCourseMargin * side;
     const double covered = options_.panel && (camera_ == kCourseCamera || IsOwn(camera_, kRobotCamera))
-                               ? Overlay::CalcCoveredWidth(width_, options_.height)
+                               ? Overlay::CalcCoveredWidth(options_.width, options_.height)
                                : 0.0;
-    return {side * (1.0 - 2.0 * covered / width_) - margin, side - margin, top - margin, top - margin};
+    return {side * (1.0 - 2.0 * covered / options_.width) - margin, side - margin, top - margin,
+            top - margin};
   }
 
-  /// @param row whose kinematics data_ has.
-  [[nodiscard]] Viewpoint FindFreeView(long row) const {
-    const FreeCamera& free = *options_.free;
-    const Vector3d object = object_ < 0 ? object_start_ : Vector3d(BodyPose(*data_, object_).translation());
-    const Vector3d way = free.follow ? Vector3d(object - object_start_) : Vector3d(Vector3d::Zero());
-    const Vector3d target = free.look_at ? Vector3d(*free.look_at + way) : object;
-    const double angle = free.orbit * (run_.times[static_cast<size_t>(row)] - run_.times.front());
-    const Vector3d arm = free.from + way - target;
-    return LookFrom(target + Eigen::AngleAxisd(angle, Vector3d::UnitZ()) * arm, target);
-  }
-
-  /// Where the object is at the beginning, which a free camera needs.
+  /// Finds the body that the camera "object" looks at.
   void FindObject() {
     object_ = mj_name2id(&model_, mjOBJ_BODY, run_.object_body.c_str());
     if (object_ < 0)
       throw InputError(run_.source + ": object: no body " + Quote(run_.object_body) + " in the model");
-    SetRow(model_, run_, 0, data_.get());
-    object_start_ = BodyPose(*data_, object_).translation();
   }
 
   /// Whether a name means one of the cameras below: an MJCF's camera of this name comes first.
@@ -208,16 +158,11 @@ class VideoPainter::RunPainter {
 
   [[nodiscard]] OverlayState MakeState(long row) const {
     OverlayState state = MakeOverlayState(run_, row, checks_.ListCategories(row));
-    if (apart_) state.rows.push_back({"objects apart", FormatSi(*apart_, "m")});
     state.history_span = kHistorySpan;
     state.history = MakeHistory(static_cast<size_t>(row));
     state.error_low = error_range_[0];
     state.error_high = error_range_[1];
     state.legend = decorator_.MakeLegend();
-    if (ghost_) {
-      const bool same_title = ghost_->run.title == run_.title;
-      state.legend.push_back({same_title ? "the other run" : ghost_->run.title, kGhostLine});
-    }
     return state;
   }
 
@@ -239,14 +184,10 @@ class VideoPainter::RunPainter {
   }
 
   const mjModel& model_;
-  std::unique_ptr<GhostRun> ghost_;
-  std::optional<double> apart_;  // objects of the two runs, m
-  double bearing_ = 0.0;         // of views that the run's way determines, rad
-  int object_ = -1;              // body; for cameras that look at it
-  Vector3d object_start_ = Vector3d::Zero();
+  double bearing_ = 0.0;  // of views that the run's way determines, rad
+  int object_ = -1;       // body; for cameras that look at it
   const RunFrames& run_;
   VideoOptions options_;
-  int width_;
   std::string camera_;
   int inset_width_ = 0;
   int inset_height_ = 0;
@@ -258,45 +199,28 @@ class VideoPainter::RunPainter {
   std::optional<Overlay> overlay_;
 };
 
-VideoPainter::VideoPainter(std::span<const RunView> runs, const VideoOptions& options) {
-  Require(runs.size() == 1 || runs.size() == 2, "runs", "must be one or two",
-          static_cast<double>(runs.size()));
-  if (runs.size() == 2 && options.ghost) {
-    painters_.push_back(std::make_unique<RunPainter>(runs[0], &runs[1], options, options.width));
-    return;
-  }
-  const int width = options.width / static_cast<int>(runs.size());
-  for (const RunView& run : runs) {
-    painters_.push_back(std::make_unique<RunPainter>(run, nullptr, options, width));
-  }
-}
+VideoPainter::VideoPainter(const RunView& run, const VideoOptions& options)
+    : painter_(std::make_unique<RunPainter>(run, options)) {}
 
 VideoPainter::~VideoPainter() = default;
 
-Image VideoPainter::Paint(double time) {
-  Image image = painters_.front()->Paint(time);
-  if (painters_.size() == 1) return image;
-  return PlaceBeside(image, painters_.back()->Paint(time));
-}
+Image VideoPainter::Paint(double time) { return painter_->Paint(time); }
 
-long CountFrames(std::span<const RunView> runs, int fps) {
-  double longest = 0.0;
-  for (const RunView& run : runs) {
-    CheckRunFrames(*run.model, *run.frames);
-    longest = std::max(longest, run.frames->duration());
-  }
+long CountFrames(const RunView& run, int fps) {
+  CheckRunFrames(*run.model, *run.frames);
+  const double frames = run.frames->duration() * fps;
   constexpr double kMostFrames = 1e7;
-  Require(longest * fps <= kMostFrames, "frames", "must be at most ten million", longest * fps);
-  return std::max(1L, std::lround(longest * fps));
+  Require(frames <= kMostFrames, "frames", "must be at most ten million", frames);
+  return std::max(1L, std::lround(frames));
 }
 
-bool RenderVideo(std::span<const RunView> runs, const VideoOptions& options, VideoWriter* video,
+bool RenderVideo(const RunView& run, const VideoOptions& options, VideoWriter* video,
                  const std::function<bool(long done, long total)>& progress) {
   Require(options.workers >= 1, "workers", "must be positive", options.workers);
-  const long frames = CountFrames(runs, options.fps);
+  const long frames = CountFrames(run, options.fps);
   std::unique_ptr<VideoPainter> painter;  // made in each of the processes
   const auto paint = [&](size_t frame) {
-    if (!painter) painter = std::make_unique<VideoPainter>(runs, options);
+    if (!painter) painter = std::make_unique<VideoPainter>(run, options);
     const Image image = painter->Paint(static_cast<double>(frame) / options.fps);
     return std::string(image.rgb.begin(), image.rgb.end());
   };

@@ -33,14 +33,14 @@ struct Slab {
   }
 };
 
-}  // namespace
-
+/// From one point to another, which must not be the same.
 Viewpoint LookFrom(const Vector3d& eye, const Vector3d& look_at) {
   const Vector3d way = look_at - eye;
-  Require(way.norm() > 0.0, "distance of the camera", "must be positive", way.norm());
   return {look_at, way.norm(), std::atan2(way.y(), way.x()),
           std::asin(std::clamp(way.z() / way.norm(), -1.0, 1.0))};
 }
+
+}  // namespace
 
 Viewpoint FitViewpoint(std::span<const VisibleSphere> spheres, double azimuth, double elevation,
                        const ViewEdges& edges) {

@@ -20,9 +20,6 @@ struct Viewpoint {
   double elevation = 0.0;               ///< rad; negative looks down.
 };
 
-/// From one point to another. @throws std::invalid_argument when they are the same.
-Viewpoint LookFrom(const Vector3d& eye, const Vector3d& look_at);
-
 /// What must be in the picture.
 struct VisibleSphere {
   Vector3d center;  ///< World, m.

@@ -316,13 +316,4 @@ SurfacePoint PointAtAngles(const Surface& surface, double u, double v) {
   return box->Project(ray / ray.cwiseAbs().cwiseQuotient(box->half_size()).maxCoeff()).alpha;
 }
 
-Vector2d AnglesOfPoint(const Surface& surface, const SurfacePoint& point) {
-  if (dynamic_cast<const Box*>(&surface) == nullptr) {
-    const SurfacePoint first = surface.ToChart(point, 0);
-    return {first.u, first.v};
-  }
-  const Vector3d p = surface.Evaluate(point).p;
-  return {std::atan2(p.y(), p.x()), std::atan2(p.z(), p.head<2>().norm())};
-}
-
 }  // namespace dexcheck

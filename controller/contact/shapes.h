@@ -120,7 +120,5 @@ std::unique_ptr<Surface> MakeSurface(const Shape& shape);
 /// The point of a surface that two angles (rad) name in a scenario: its coordinates in chart 0, but of a box
 /// longitude u and latitude v of the ray from the centre that leaves the box there.
 SurfacePoint PointAtAngles(const Surface& surface, double u, double v);
-/// The angles (rad) of a point.
-Vector2d AnglesOfPoint(const Surface& surface, const SurfacePoint& point);
 
 }  // namespace dexcheck

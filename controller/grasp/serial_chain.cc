@@ -111,8 +111,7 @@ namespace {
 
 constexpr double kLargestStep = 0.3;  // rad or m
 
-/// One chain on its way to one target of three or six equations.
-template <int kRows>
+/// One chain on its way to one target.
 class ChainSolver {
  public:
   ChainSolver(const SerialChain& chain, const ChainTarget& target, const JointRange& range,
@@ -131,7 +130,7 @@ class ChainSolver {
   /// the largest change of a joint.
   double Step(const VectorXd* q_nominal, double pull) {
     chain_.CalcJacobian(poses_, &J_);
-    if constexpr (kRows == 6) J_.bottomRows<3>() *= target_.length;
+    J_.bottomRows<3>() *= target_.length;
     free_.assign(static_cast<size_t>(chain_.size()), true);
     // A joint at the end of its range that wants to go on is held, and the others take over.
     for (Eigen::Index held = 0; held <= chain_.size(); ++held) {
@@ -156,17 +155,13 @@ class ChainSolver {
   }
 
  private:
-  using Rows = Eigen::Matrix<double, kRows, 1>;
-
   void SetError() {
     chain_.CalcPoses(result_.q, &poses_);
-    error_.template head<3>() = target_.X.translation() - poses_.frame.translation();
-    result_.position = error_.template head<3>().norm();
-    if constexpr (kRows == 6) {
-      const Vector3d turn = LogSo3(target_.X.linear() * poses_.frame.linear().transpose());
-      result_.orientation = turn.norm();
-      error_.template tail<3>() = target_.length * turn;
-    }
+    error_.head<3>() = target_.X.translation() - poses_.frame.translation();
+    result_.position = error_.head<3>().norm();
+    const Vector3d turn = LogSo3(target_.X.linear() * poses_.frame.linear().transpose());
+    result_.orientation = turn.norm();
+    error_.tail<3>() = target_.length * turn;
   }
 
   // step = J^T (J J^T + lambda)^-1 error + (1 - J^T (J J^T + lambda)^-1 J) pull (q_nominal - q)
@@ -175,21 +170,21 @@ class ChainSolver {
     constexpr double kLeast = 1e-13;
     step_.setZero(chain_.size());
     if (q_nominal != nullptr) step_ = pull * (*q_nominal - result_.q);
-    Eigen::Matrix<double, kRows, kRows> normal = Eigen::Matrix<double, kRows, kRows>::Zero();
-    Rows rhs = error_;
+    Matrix6d normal = Matrix6d::Zero();
+    Vector6d rhs = error_;
     for (Eigen::Index k = 0; k < chain_.size(); ++k) {
       if (!free_[static_cast<size_t>(k)]) {
         step_[k] = 0.0;
         continue;
       }
-      const Rows column = J_.col(k).template head<kRows>();
+      const Vector6d column = J_.col(k);
       normal += column * column.transpose();
       rhs -= column * step_[k];
     }
     normal.diagonal().array() += kDamping * error_.squaredNorm() + kLeast;
-    const Rows y = normal.ldlt().solve(rhs);
+    const Vector6d y = normal.ldlt().solve(rhs);
     for (Eigen::Index k = 0; k < chain_.size(); ++k) {
-      if (free_[static_cast<size_t>(k)]) step_[k] += J_.col(k).template head<kRows>().dot(y);
+      if (free_[static_cast<size_t>(k)]) step_[k] += J_.col(k).dot(y);
     }
   }
 
@@ -210,14 +205,17 @@ class ChainSolver {
   const JointRange& range_;
   ChainSolution result_;
   SerialChain::Poses poses_;
-  Rows error_;
+  Vector6d error_;
   Matrix6Xd J_;
   VectorXd step_;
   std::vector<bool> free_;
 };
 
-template <int kRows>
-ChainSolution Solve(ChainSolver<kRows> solver, int max_iterations, const VectorXd& q_nominal) {
+}  // namespace
+
+ChainSolution SolveChain(const SerialChain& chain, const ChainTarget& target, const JointRange& range,
+                         const VectorXd& q_start, const VectorXd& q_nominal) {
+  ChainSolver solver(chain, target, range, q_start);
   // First with the pull, until the posture settles; a chain that comes no nearer gives up.
   constexpr double kPull = 0.7;
   constexpr double kLeastPull = 0.1;
@@ -234,7 +232,7 @@ ChainSolution Solve(ChainSolver<kRows> solver, int max_iterations, const VectorX
   int since_best = 0;
   double pull = kPull;
   double last_moved = std::numeric_limits<double>::infinity();
-  for (; iteration < max_iterations; ++iteration) {
+  for (; iteration < target.max_iterations; ++iteration) {
     const double moved = solver.Step(&q_nominal, pull);
     if (solver.error() < kNear && moved < kSettled * pull) break;
     // Across a strongly curved set of solutions a full pull swings to and fro.
@@ -248,21 +246,11 @@ ChainSolution Solve(ChainSolver<kRows> solver, int max_iterations, const VectorX
       break;
     }
   }
-  for (; iteration < max_iterations + kPatience; ++iteration) {
+  for (; iteration < target.max_iterations + kPatience; ++iteration) {
     if (solver.IsAtTarget()) break;
     if (solver.Step(nullptr, 0.0) < std::numeric_limits<double>::epsilon()) break;
   }
   return solver.Finish();
-}
-
-}  // namespace
-
-ChainSolution SolveChain(const SerialChain& chain, const ChainTarget& target, const JointRange& range,
-                         const VectorXd& q_start, const VectorXd& q_nominal) {
-  if (target.length > 0.0) {
-    return Solve(ChainSolver<6>(chain, target, range, q_start), target.max_iterations, q_nominal);
-  }
-  return Solve(ChainSolver<3>(chain, target, range, q_start), target.max_iterations, q_nominal);
 }
 
 JointRange JointRange::Shrink(double joint_margin) const {

@@ -44,9 +44,6 @@ class SerialChain {
   [[nodiscard]] Eigen::Index size() const { return static_cast<Eigen::Index>(joints_.size()); }
   [[nodiscard]] const JointRange& range() const { return range_; }
 
-  /// Expresses all that follows in another frame than the world: X_RB places the world in it.
-  void SetRoot(const Pose& X_RB) { segments_.front().before = X_RB * segments_.front().before; }
-
   /// Poses of the frame and of the free joints' links.
   struct Poses {
     std::vector<Pose> links;  ///< One for each free joint.
@@ -54,7 +51,7 @@ class SerialChain {
   };
   void CalcPoses(const Eigen::Ref<const VectorXd>& q, Poses* poses) const;
 
-  /// Jacobian (6 x size) of the frame's origin and orientation, [linear; angular], both in the root's axes.
+  /// Jacobian (6 x size) of the frame's origin and orientation, [linear; angular], both in the world's axes.
   void CalcJacobian(const Poses& poses, Matrix6Xd* J) const;
 
   /// Entries of q' that belong to the free joints.
@@ -77,16 +74,16 @@ class SerialChain {
 
 /// Where a chain's frame should be.
 struct ChainTarget {
-  Pose X;                    ///< In the chain's root.
-  double length = 0.0;       ///< An error of one radian counts as this many m; 0: any orientation will do.
+  Pose X;                    ///< In the world.
+  double length = 0.2;       ///< An error of one radian counts as this many m.
   double tolerance = 1e-13;  ///< m; orientation in rad.
   int max_iterations = 60;
 };
 
 struct ChainSolution {
-  VectorXd q;                ///< Free joints.
-  double position = 0.0;     ///< Residuals: m, rad.
-  double orientation = 0.0;  ///< 0 when any will do.
+  VectorXd q;             ///< Free joints.
+  double position = 0.0;  ///< Residuals: m, rad.
+  double orientation = 0.0;
   bool reached = false;
 };
 

@@ -2,11 +2,13 @@
 
 // The postures of a grasp from above: over the object, around it, at its surface.
 
-#include <limits>
+#include <span>
 #include <string>
 #include <vector>
 
-#include "controller/grasp/contact_plan.h"
+#include "controller/common/types.h"
+#include "controller/contact/surface.h"
+#include "controller/model/robot_model.h"
 
 namespace dexcheck {
 
@@ -30,36 +32,48 @@ class PosturePath {
   MatrixXd coefficients_;  // joints x powers of x = 2 s - 1
 };
 
+/// The hand that is to hold the object.
+struct Hand {
+  std::vector<int> fingertips;  ///< Frames that carry spheres, three or more.
+  int palm_frame = -1;
+  std::vector<int> arm_joints;  ///< On the chain to the palm, to be moved; see ListArmJoints.
+};
+
+/// Joints that move a frame but none of the model's fingertips beyond the given ones: the hand's own arm.
+std::vector<int> ListArmJoints(const RobotModel& model, std::span<const int> fingertips, int palm_frame);
+
 struct PickPlanOptions {
-  double mu = 0.5;          ///< Friction that the choice of contacts counts on.
+  std::vector<SurfacePoint> contacts;  ///< On the object, one for each fingertip.
+  Pose X_Po = Pose::Identity();        ///< The object in the palm frame while it is held.
+  double mu = 0.5;                     ///< Friction that force closure counts on.
   double raise = 0.15;      ///< How far the object is to be lifted; the hand arrives as far over it, m.
   double opening = 0.015;   ///< Gap between fingertips and contacts before the hand closes, m.
   double nearness = 0.002;  ///< Gap from which the fingertips go on slowly, m.
   double depth = 0.004;     ///< How far beyond the surface they go when they find nothing, m.
-  double support = 0.0;     ///< Height of what the object lies on, m.
   /// How far the object is to be carried, m. A robot whose base is fixed needs arm postures for it; otherwise
   /// the base drives, and the arm keeps its posture.
   Vector3d transport = Vector3d::Zero();
-  /// As ContactPlanOptions.
-  double half_length = std::numeric_limits<double>::infinity();
-  std::optional<Vector3d> hemisphere = std::nullopt;  ///< As ContactPlanOptions.
 };
 
 /// Joint positions (rad), in the model's order.
 struct PickPlan {
   bool found = false;
-  std::string problem;   ///< Why there is none.
-  ContactPlan contacts;  ///< Where the fingertips go.
-  VectorXd q_open;       ///< The hand is open around the object.
-  PosturePath rise;      ///< From there straight up by `raise`.
-  PosturePath along;     ///< From there straight along `transport`; empty where the base drives.
-  PosturePath landing;   ///< As `rise`, from where the object is put down.
-  VectorXd q_near;       ///< Just off the contacts.
-  VectorXd q_deep;       ///< Fingertips in the object.
+  std::string problem;  ///< Why there is none.
+  double margin = 0.0;  ///< Of force closure per newton of normal force, a lower bound.
+  VectorXd q_open;      ///< The hand is open around the object.
+  PosturePath rise;     ///< From there straight up by `raise`.
+  PosturePath along;    ///< From there straight along `transport`; empty where the base drives.
+  PosturePath landing;  ///< As `rise`, from where the object is put down.
+  VectorXd q_near;      ///< Just off the contacts.
+  VectorXd q_deep;      ///< Fingertips in the object.
 };
 
-/// @param X_Bo where the object lies. @param q q' to start from and to stay near to.
-/// @throws std::invalid_argument as PlanContacts.
+/// The postures with which the hand takes the object at the given contacts. A sphere, a cylinder and a torus
+/// are held alike at any turn of the hand about the object's z axis: of turns by 15 degrees that one is taken
+/// which changes the arm's posture least and from which the way can be gone.
+/// @param X_Bo where the object lies. @param q q' to start from and to stay near to; of the fingers, where
+/// the search for contact begins.
+/// @throws std::invalid_argument as SolveFramePlacement and SolveFingerPlacement.
 PickPlan MakePickPlan(const RobotModel& model, const Hand& hand, const Surface& object, const Pose& X_Bo,
                       const Eigen::Ref<const VectorXd>& q, const PickPlanOptions& options);
 

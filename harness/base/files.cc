@@ -1,6 +1,7 @@
 #include "harness/base/files.h"
 
 #include <fcntl.h>
+#include <spawn.h>
 #include <stdlib.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
@@ -45,12 +46,11 @@ void WaitFor(pid_t child) {
 /// A file, or a folder with all that is in it. In a handler no memory may be taken: a folder is left to rm.
 void Remove(const char* path) {
   if (::unlink(path) == 0 || (errno != EISDIR && errno != EPERM)) return;
-  const pid_t child = ::vfork();
-  if (child == 0) {
-    ::execl("/bin/rm", "rm", "-rf", "--", path, static_cast<char*>(nullptr));
-    ::_exit(EXIT_FAILURE);
-  }
-  if (child > 0) WaitFor(child);
+  const std::array<const char*, 5> words = {"rm", "-rf", "--", path, nullptr};
+  pid_t child = 0;
+  if (::posix_spawn(&child, "/bin/rm", nullptr, nullptr, const_cast<char* const*>(words.data()), environ) ==
+      0)
+    WaitFor(child);
 }
 
 }  // namespace

@@ -75,11 +75,6 @@ Option& Option::OneOf(std::initializer_list<const char*> values) {
   return *this;
 }
 
-Option& Option::Takes(int count) {
-  option_->expected(count);
-  return *this;
-}
-
 Option& Option::Repeatable() {
   option_->allow_extra_args(false);
   return *this;
@@ -160,9 +155,8 @@ CommandLine::~CommandLine() = default;
 
 namespace {
 
-void DescribeCommand(const CLI::App& app, const std::string& name, const std::string& heading,
-                     std::vector<CommandHelp>* all) {
-  CommandHelp help{name, heading, app.get_description(), {}, {}};
+void DescribeCommand(const CLI::App& app, const std::string& name, std::vector<CommandHelp>* all) {
+  CommandHelp help{name, {}, {}};
   for (const CLI::Option* option : app.get_options()) {
     OptionHelp one;
     one.is_positional = option->get_positional();
@@ -172,17 +166,13 @@ void DescribeCommand(const CLI::App& app, const std::string& name, const std::st
       for (const std::string& word : option->get_snames()) one.names.push_back("-" + word);
       for (const std::string& word : option->get_lnames()) one.names.push_back("--" + word);
     }
-    // A flag takes no values.
-    if (option->get_items_expected_max() > 0) one.value = option->get_type_name();
-    one.text = option->get_description();
     help.options.push_back(one);
   }
   const std::vector<const CLI::App*> commands = app.get_subcommands([](const CLI::App*) { return true; });
   for (const CLI::App* command : commands) help.commands.push_back(command->get_name());
   all->push_back(help);
   for (const CLI::App* command : commands) {
-    DescribeCommand(*command, (name.empty() ? "" : name + " ") + command->get_name(),
-                    name.empty() ? command->get_group() : heading, all);
+    DescribeCommand(*command, (name.empty() ? "" : name + " ") + command->get_name(), all);
   }
 }
 
@@ -196,7 +186,7 @@ ExitCode ReportFailure(const std::string& why) {
 
 std::vector<CommandHelp> CommandLine::Describe() const {
   std::vector<CommandHelp> all;
-  DescribeCommand(*app_, "", "", &all);
+  DescribeCommand(*app_, "", &all);
   return all;
 }
 

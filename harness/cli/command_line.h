@@ -55,15 +55,12 @@ class Option {
   Option& Needs(const Option& other);
   Option& Check(const ValueCheck& check);
   Option& OneOf(std::initializer_list<const char*> values);
-  /// Takes this many values.
-  Option& Takes(int count);
   /// Takes one value each time that it is given, and may be given again.
   Option& Repeatable();
   /// Values may be separated by this character.
   Option& Delimiter(char delimiter);
   /// The help prints the value that the variable has now.
   Option& ShowDefault();
-  /// Whether the user gave it.
 
  private:
   friend class Command;
@@ -100,19 +97,15 @@ class Command {
   std::string heading_;
 };
 
-/// What the help says of an option or a positional argument.
+/// The words of an option or a positional argument.
 struct OptionHelp {
   std::vector<std::string> names;  ///< "--out"; of a positional argument its one name.
-  std::string value;               ///< "DIR"; empty for flags.
-  std::string text;
   bool is_positional = false;
 };
 
 /// And of a command.
 struct CommandHelp {
-  std::string name;     ///< "study run"; empty for the program itself.
-  std::string heading;  ///< Under which it stands; of the last word's, the first word's.
-  std::string text;
+  std::string name;  ///< "study run"; empty for the program itself.
   std::vector<OptionHelp> options;
   std::vector<std::string> commands;  ///< Next words.
 };
@@ -123,7 +116,7 @@ class CommandLine {
   CommandLine(const std::string& program, const std::string& help, const std::string& version);
   ~CommandLine();
 
-  /// What --help says, by command: the program first, then all commands in order.
+  /// The words by command: the program first, then all commands in order.
   [[nodiscard]] std::vector<CommandHelp> Describe() const;
   [[nodiscard]] Command root() { return {app_.get(), &exit_code_}; }
   /// Reads the words and runs the command's action. Two files of robots instead of a command are compared, as

@@ -62,9 +62,8 @@ Option AddSeedOption(Command command, std::uint64_t* seed,
 /// Adds --samples, of at most `most`, and --seed: the random states at which two descriptions are compared.
 template <typename Count>
 std::array<Option, 2> AddSampleOptions(Command command, std::uint64_t most, Count* samples,
-                                       std::uint64_t* seed, const char* word = "--samples") {
-  return {command.AddOption(word, samples, "Number of random states")
-              .TypeName("N")
+                                       std::uint64_t* seed) {
+  return {command.AddOption("--samples N", samples, "Number of random states")
               .Check(WholeNumber(1, most))
               .ShowDefault(),
           AddSeedOption(command, seed, "Seed of the random states").ShowDefault()};
@@ -92,7 +91,6 @@ void AddMutateCommand(Command app);
 void AddEvalCommand(Command app);
 void AddImportCommand(Command app);
 void AddInitCommand(Command app);
-void AddPlanCommand(Command app);
 /// @param command_line as typed, to be kept in the log.
 void AddRunCommand(Command app, const std::string& command_line);
 void AddBudgetCommand(Command app);
@@ -102,7 +100,6 @@ void AddExportCommand(Command app);
 void AddEngineComparisonCommand(Command app);
 void AddRenderCommand(Command app);
 void AddReportCommand(Command app);
-void AddStatesCommand(Command app);
 /// @param line is described when the command runs.
 void AddHelpCommands(Command app, const CommandLine& line);
 void AddStudyCommand(Command app);

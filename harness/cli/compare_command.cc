@@ -11,13 +11,11 @@
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
 #include "harness/cli/commands.h"
-#include "harness/cli/make_video.h"
 #include "harness/cli/output_file.h"
 #include "harness/cli/terminal.h"
 #include "harness/report/page_frame.h"
 #include "harness/report/run_comparison.h"
 #include "harness/report/run_data.h"
-#include "renders/video_writer.h"
 
 namespace dexcheck::cli {
 namespace {
@@ -33,7 +31,6 @@ struct CompareRequest {
   bool quiet = false;
   std::string page;
   std::string json;
-  std::string video;
   std::filesystem::path model, columns;  ///< Of recordings that are no runs.
 };
 
@@ -136,10 +133,6 @@ int Run(const CompareRequest& request) {
     throw InputError("--tolerance: must not be negative, got " + FormatNumber(*request.tolerance));
   if (request.run_folders.size() < 2) throw InputError("compare: at least two runs are needed");
   if (request.run_folders.size() > 26) throw InputError("compare: at most 26 runs are compared");
-  if (!request.video.empty()) {
-    if (request.run_folders.size() != 2) throw InputError("--video: needs two runs");
-    FindVideoFormat(request.video);
-  }
   std::vector<std::unique_ptr<RunData>> runs;
   std::vector<const RunData*> pointers;
   for (const std::string& folder : request.run_folders) {
@@ -150,16 +143,6 @@ int Run(const CompareRequest& request) {
   ResultFile json(request.json), page(request.page);
   const RunComparison comparison = CompareRuns(pointers, request.options);
   const bool prints = !json.TakesStdout();
-  if (!request.video.empty()) {
-    VideoOptions options;
-    options.ghost = true;
-    options.workers = CountDrawers();
-    const RecordedFrames run = ReadRecordedFrames(pointers[0]->log());
-    const RecordedFrames other = ReadRecordedFrames(pointers[1]->log());
-    const bool is_whole = WriteVideo({{run.model.get(), &run.frames}, {other.model.get(), &other.frames}},
-                                     options, request.video, request.quiet || !prints);
-    if (!is_whole) return kFailure;
-  }
   if (prints && !request.quiet) Print(request, comparison);
   if (prints)
     fmt::print("{}{}\n", request.quiet ? "" : "\n",
@@ -194,8 +177,6 @@ void AddCompareCommand(Command app) {
       .Repeatable();
   command.AddOption("--out FILE.html", &request->page,
                     "Write a page with the signals overlaid and subtracted");
-  command.AddOption("--video FILE", &request->video,
-                    "Draw both runs in one scene, the second as a ghost (.mp4, .webm or .gif)");
   const Option model =
       command.AddOption("--model MODEL", &request->model,
                         "Parameter file, URDF or MJCF of the robot of two recordings: what differs is named");

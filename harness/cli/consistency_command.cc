@@ -74,9 +74,8 @@ void AddConsistencyCommand(Command app) {
       "--program CMD", &request->source.program,
       "Command of a program that provides terms, instead of B (harness/descriptions/README.md)");
   command
-      .AddOption(
-          "--results FOLDER", &request->source.results,
-          "Folder with states as dexcheck states writes them and NumPy arrays of results, instead of B")
+      .AddOption("--results FOLDER", &request->source.results,
+                 "Folder with states as eval --states writes them and NumPy arrays of results, instead of B")
       .Excludes(program);
   command
       .AddOption("--time-limit S", &request->source.program_options.seconds,

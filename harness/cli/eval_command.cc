@@ -1,8 +1,9 @@
 // Terms of model and engine at one state, as JSON by their names in controller/NOTATION.md; matrices are
-// lists of rows.
+// lists of rows. Or random states, for a program that computes such terms.
 
 #include <fmt/format.h>
 
+#include <filesystem>
 #include <memory>
 #include <span>
 #include <string>
@@ -28,6 +29,8 @@
 #include "harness/descriptions/analytic_provider.h"
 #include "harness/descriptions/base_convention.h"
 #include "harness/descriptions/engine_provider.h"
+#include "harness/descriptions/read_description.h"
+#include "harness/descriptions/result_files.h"
 #include "harness/engine/adapter.h"
 #include "harness/engine/engine.h"
 #include "harness/scenario/state_file.h"
@@ -353,9 +356,32 @@ struct EvalRequest {
   std::filesystem::path mjcf;
   std::string state_file;
   std::string out = "-";
+  long states = 0;  // 0: the terms at the state of state_file
+  std::uint64_t seed = 1;
+  UrdfOptions urdf;
 };
 
+void WriteStates(const EvalRequest& request) {
+  const std::filesystem::path folder = request.out;
+  const RobotDescription robot = ReadDescription(request.robot, request.urdf);
+  const StateTable states = DrawStates(robot, request.states, {}, request.seed);
+  MakeFolder(folder);
+  const auto write = [&](const char* name, const std::string& text) {
+    OutputFile file(folder / name);
+    file.Write(text);
+  };
+  write("layout.json", WriteLayout(robot, request.robot.filename().string()));
+  write("states.jsonl", WriteStateLines(states));
+  write("q.npy", WriteNpy(states.q));
+  write("v.npy", WriteNpy(states.v));
+}
+
 int Run(const EvalRequest& request) {
+  if (request.states > 0) {
+    WriteStates(request);
+    return kSuccess;
+  }
+  if (request.state_file.empty()) throw UsageError("eval: --state or --states is required");
   const RobotModel model = ParseRobotModel(ReadBytes(request.robot), std::string(request.robot));
   const State state = ReadState(request.state_file, model);
   Json out = {{"robot", model.name()}, {"q", ToList(state.q)}, {"xi", ToList(state.xi)}};
@@ -379,21 +405,38 @@ int Run(const EvalRequest& request) {
 }  // namespace
 
 void AddEvalCommand(Command app) {
+  constexpr long kMostStates = 1000000;
   const auto request = std::make_shared<EvalRequest>();
-  Command command = app.AddCommand("eval", "Print every term at one state, as JSON");
-  Option robot =
-      command.AddOption("--robot FILE.toml", &request->robot, "Parameter file (TOML) of the analytic model");
-  command
-      .AddOption("--mjcf FILE.xml", &request->mjcf,
-                 "The same robot for the engine: adds the engine's values of the terms as \"engine\"")
-      .Needs(robot);
-  command
-      .AddOption("--state STATE.json", &request->state_file,
-                 "JSON with q, xi; optionally object, kappa or contact_points, fingers, mu, law")
-      .Required();
-  Option out = command.AddOption("--out FILE.json", &request->out, "File to write (- for standard output)")
+  Command command = app.AddCommand(
+      "eval", "Print every term at one state, as JSON; or write random states for your own program");
+  const Option robot =
+      command.AddOption("--robot FILE.toml", &request->robot,
+                        "Parameter file (TOML) of the analytic model; with --states a URDF or an MJCF, too");
+  const Option mjcf =
+      command
+          .AddOption("--mjcf FILE.xml", &request->mjcf,
+                     "The same robot for the engine: adds the engine's values of the terms as \"engine\"")
+          .Needs(robot);
+  const Option state =
+      command.AddOption("--state STATE.json", &request->state_file,
+                        "JSON with q, xi; optionally object, kappa or contact_points, fingers, mu, law");
+  Option out = command
+                   .AddOption("--out FILE.json|DIR", &request->out,
+                              "File to write (- for standard output); with --states a folder")
                    .ShowDefault();
-  AddJsonOption(command, "the terms", &request->out).Excludes(out);
+  const Option json = AddJsonOption(command, "the terms", &request->out).Excludes(out);
+  const Option states = command
+                            .AddOption("--states N", &request->states,
+                                       "Write so many random states as layout.json, states.jsonl, q.npy and "
+                                       "v.npy, for a program whose results consistency --results reads")
+                            .Check(WholeNumber(1, kMostStates))
+                            .Needs(robot)
+                            .Needs(out)
+                            .Excludes(state)
+                            .Excludes(mjcf)
+                            .Excludes(json);
+  AddSeedOption(command, &request->seed, "Seed of the random states").ShowDefault().Needs(states);
+  command.AddFlag("--floating", &request->urdf.floating, "The root of a URDF floats").Needs(states);
   command.SetAction([=] { return Run(*request); });
 }
 

@@ -80,25 +80,19 @@ void AddLegShapes(const RobotDescription& robot, const std::vector<int>& legs, M
       geom->SetAttribute("quat", write(std::array{q.w(), q.x(), q.y(), q.z()}).c_str());
       geom->SetAttribute("mass", 0);
     };
-    const auto place = [&](bool balls) {
-      bool has_placed = false;
-      for (const DescribedPart& part : robot.parts) {
-        for (const DescribedShape& shape : part.shapes) {
-          if (part.joint != leg || shape.volume == 0.0 || IsBall(shape) != balls) continue;
-          const Vector3d half = 0.5 * (shape.high - shape.low);
-          add(balls ? "sphere" : "box", half, part.X_iL, shape.low + half);
-          has_placed = true;
-        }
-      }
-      return has_placed;
-    };
-    if (place(true) || place(false)) continue;
+    bool has_shape = false;
     Vector3d farthest = Vector3d::Zero();
     for (const DescribedPart& part : robot.parts) {
-      const Vector3d& p = part.X_iL.translation();
-      if (part.joint == leg && p.norm() > farthest.norm()) farthest = p;
+      if (part.joint != leg) continue;
+      if (part.X_iL.translation().norm() > farthest.norm()) farthest = part.X_iL.translation();
+      for (const DescribedShape& shape : part.shapes) {
+        if (shape.volume == 0.0) continue;
+        const Vector3d half = 0.5 * (shape.high - shape.low);
+        add(IsBall(shape) ? "sphere" : "box", half, part.X_iL, shape.low + half);
+        has_shape = true;
+      }
     }
-    add("sphere", Vector3d::Constant(kAddedRadius), Pose::Identity(), farthest);
+    if (!has_shape) add("sphere", Vector3d::Constant(kAddedRadius), Pose::Identity(), farthest);
   }
 }
 

@@ -130,10 +130,14 @@ class StandTrial {
   Stance stance_;
 };
 
-enum class Posture { kFound, kDoesNotSway, kDoesNotReach };
+}  // namespace
 
-Posture FindPostureBearing(double least, const RobotModel& model, const std::map<std::string, double>& limits,
-                           Stand* stand) {
+std::string FindPosture(const RobotModel& model, const std::map<std::string, double>& limits, Stand* stand) {
+  if (stand->has_wheels) return "a foot turns without end, as wheels do";
+  if (stand->feet.size() < 3) return fmt::format("{} places touch the ground", stand->feet.size());
+  // The engine shares a sole's load among its corners evenly, not as the law asks: with a quarter of its
+  // share each, no corner of six humanoids lifts.
+  const double least = 0.25 * stand->weight / static_cast<double>(stand->feet.size());
   StandTrial trial(model, limits, *stand, least);
   bool settles = false;
   // Of the way to the middle of a joint's range, which bends a knee as it can be bent.
@@ -156,26 +160,10 @@ Posture FindPostureBearing(double least, const RobotModel& model, const std::map
       if (!trial.Sways(q, stand)) continue;
       for (int i = 0; i < model.num_joints(); ++i)
         stand->pose[model.joints()[static_cast<size_t>(i)].name] = q[q.size() - model.num_joints() + i];
-      return Posture::kFound;
+      return "";
     }
   }
-  return settles ? Posture::kDoesNotSway : Posture::kDoesNotReach;
-}
-
-}  // namespace
-
-std::string FindPosture(const RobotModel& model, const std::map<std::string, double>& limits, Stand* stand) {
-  if (stand->has_wheels) return "a foot turns without end, as wheels do";
-  if (stand->feet.size() < 3) return fmt::format("{} places touch the ground", stand->feet.size());
-  // The engine shares a sole's load among its corners evenly, not as the law asks: with a quarter of its
-  // share each, no corner of six humanoids lifts; with next to nothing those of Valkyrie do for half of a
-  // run.
-  const double quarter = 0.25 * stand->weight / static_cast<double>(stand->feet.size());
-  for (const double least : {quarter, 2.0 * LeastForce(*stand)}) {
-    const Posture found = FindPostureBearing(least, model, limits, stand);
-    if (found == Posture::kFound) return "";
-    if (found == Posture::kDoesNotReach) return "its feet do not all reach the ground";
-  }
+  if (!settles) return "its feet do not all reach the ground";
   return "in no posture that was tried it sways within its joints' ranges and the ground's friction cones";
 }
 

@@ -59,7 +59,6 @@ int RunCommandLine(int argc, char** argv) {
   AddDiagnoseCommand(comparing);
   AddAuditCommand(comparing);
   AddImportCommand(comparing);
-  AddStatesCommand(comparing);
   AddEvalCommand(comparing);
   AddEngineComparisonCommand(comparing);
   const Command running = app.Under("Run and look");
@@ -75,7 +74,6 @@ int RunCommandLine(int argc, char** argv) {
   AddBudgetCommand(studying);
   AddMutateCommand(studying);
   AddExciteCommand(studying);
-  AddPlanCommand(studying);
   const Command setting_up = app.Under("Set up");
   AddInitCommand(setting_up);
   AddHelpCommands(setting_up, line);

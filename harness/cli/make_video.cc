@@ -16,8 +16,6 @@
 
 namespace dexcheck::cli {
 
-int CountDrawers() { return std::clamp(static_cast<int>(std::thread::hardware_concurrency()), 1, 8); }
-
 void ReadSize(const std::string& text, int* width, int* height) {
   const auto read = [](std::string_view part, int most) {
     const int size = ParseNumber<int>(part).value_or(0);
@@ -31,18 +29,18 @@ void ReadSize(const std::string& text, int* width, int* height) {
                      Quote(text));
 }
 
-bool WriteVideo(const std::vector<RunView>& views, const VideoOptions& options, const std::string& out,
-                bool quiet) {
+bool WriteVideo(const RunView& run, VideoOptions options, const std::string& out, bool quiet) {
+  options.workers = std::clamp(static_cast<int>(std::thread::hardware_concurrency()), 1, 8);
   const auto start = std::chrono::steady_clock::now();
   EncodingOptions encoding;
   encoding.width = options.width;
   encoding.height = options.height;
   encoding.fps = options.fps;
-  const long frames = CountFrames(views, options.fps);
+  const long frames = CountFrames(run, options.fps);
   VideoWriter video(out, encoding);
   CatchInterrupts();
   ProgressBar bar("drawing", frames, quiet);
-  const bool complete = RenderVideo(views, options, &video, [&](long done, long) { return bar.GoOn(done); });
+  const bool complete = RenderVideo(run, options, &video, [&](long done, long) { return bar.GoOn(done); });
   bar.Finish();
   if (!complete) {
     Warn(fmt::format("stopped after {} of {} frames; {} was not written", video.frames(), frames, out));
@@ -63,8 +61,7 @@ bool WriteRunVideo(const std::filesystem::path& run_folder, const std::string& o
   const RecordedFrames run = ReadRecordedFrames(run_folder);
   VideoOptions options;
   options.forces = true;
-  options.workers = CountDrawers();
-  return WriteVideo({{run.model.get(), &run.frames}}, options, out, quiet);
+  return WriteVideo({run.model.get(), &run.frames}, options, out, quiet);
 }
 
 }  // namespace dexcheck::cli

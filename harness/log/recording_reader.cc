@@ -183,7 +183,9 @@ class TextRecording : public RecordingReader {
   [[nodiscard]] std::string Where() const override { return source_ + ":" + std::to_string(line_number_); }
 
  private:
-  [[noreturn]] void Fail(const std::string& problem) const { throw InputError(Where() + ": " + problem); }
+  [[noreturn]] void Fail(const std::string& problem) const {
+    throw InputError(TextRecording::Where() + ": " + problem);
+  }
   bool FinishRow() const {
     if (stream_->bad()) Fail("cannot be read to its end");
     return false;

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Builds, from Debian 12's sources, the two libraries and programs of others that would make the archive too large as Debian
 # has them: Mesa's off-screen rasteriser with the part of LLVM that it calls (14 MB instead of 42), and ffmpeg with the
-# encoders that are used alone (1 MB instead of 52). As root on Debian 12, since it installs what they are built with:
+# encoder that is used alone (1 MB instead of 52). As root on Debian 12, since it installs what they are built with:
 #   harness/packaging/bundled.sh PREFIX        then cmake -DDEXCHECK_BUNDLED=PREFIX
 set -euo pipefail
 
@@ -21,7 +21,7 @@ Signed-By: /usr/share/keyrings/debian-archive-keyring.gpg
 SOURCES
 apt-get --quiet=2 update
 apt-get --quiet=2 --yes install --no-install-recommends ca-certificates dpkg-dev gcc g++ make meson ninja-build pkg-config nasm \
-  python3-mako bison flex llvm-15-dev zlib1g-dev libexpat1-dev libx264-dev libvpx-dev >"$scratch/apt.log" 2>&1 ||
+  python3-mako bison flex llvm-15-dev zlib1g-dev libexpat1-dev libx264-dev >"$scratch/apt.log" 2>&1 ||
   { tail -20 "$scratch/apt.log"; exit 1; }
 cd "$scratch"
 apt-get --quiet=2 source mesa ffmpeg >source.log 2>&1 || { tail -20 source.log; exit 1; }
@@ -45,9 +45,9 @@ apt-get --quiet=2 source mesa ffmpeg >source.log 2>&1 || { tail -20 source.log; 
 (
   cd ffmpeg-*/
   ./configure --prefix="$prefix" --disable-everything --disable-autodetect --disable-doc --disable-network --disable-debug \
-    --disable-ffplay --disable-ffprobe --enable-gpl --enable-libx264 --enable-libvpx --enable-decoder=rawvideo \
-    --enable-demuxer=rawvideo --enable-protocol=pipe,file --enable-encoder=libx264,libvpx_vp9,gif,mjpeg \
-    --enable-muxer=mp4,webm,gif,mjpeg --enable-filter=scale,split,palettegen,paletteuse >configure.log ||
+    --disable-ffplay --disable-ffprobe --enable-gpl --enable-libx264 --enable-decoder=rawvideo \
+    --enable-demuxer=rawvideo --enable-protocol=pipe,file --enable-encoder=libx264 \
+    --enable-muxer=mp4 --enable-filter=scale >configure.log ||
     { tail -20 configure.log; exit 1; }
   make --jobs="$(nproc)" ffmpeg >make.log 2>&1 || { tail -20 make.log; exit 1; }
   install -Dsm755 ffmpeg "$prefix/bin/ffmpeg"

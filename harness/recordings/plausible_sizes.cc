@@ -20,7 +20,8 @@ double FindMost(const RobotModel& model, const MotionExtents& extents, double sh
   constexpr double kGravityError = 1.02, kForce = 300.0, kMostGain = 1100.0, kLatest = 0.5, kAngle = 0.3;
   constexpr double kPlay = 0.2, kSmallPlay = 0.02;  // rad, m
   const bool is_recorded = joint >= 0 && extents.torque.size() > 0;
-  const double torque = is_recorded ? extents.torque[joint] : kInfinite;
+  double torque = kInfinite;
+  if (is_recorded) torque = extents.torque[joint];
   const bool turns = joint < 0 || model.joint(joint).type == JointType::kRevolute;
   const double width = joint < 0 ? kInfinite : model.joint(joint).upper - model.joint(joint).lower;
   using enum TorqueFault::Kind;

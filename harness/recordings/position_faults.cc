@@ -275,7 +275,9 @@ void Refine(size_t every, Begin* begin, PositionFault* fault) {
   if (!HasFreeNumber(*fault)) return;
   const bool is_offset = fault->offset != 0.0;
   double best = begin->CalcMisfit(*fault, every);
-  for (double step = 0.1; step > 1e-6; step *= 0.5)
+  constexpr int kHalvings = 17;  // of the step, to less than 1e-6
+  double step = 0.1;
+  for (int i = 0; i < kHalvings; ++i, step *= 0.5) {
     for (const double change : {-step, step}) {
       PositionFault near = *fault;
       if (is_offset) {
@@ -286,6 +288,7 @@ void Refine(size_t every, Begin* begin, PositionFault* fault) {
       const double misfit = begin->CalcMisfit(near, every);
       if (misfit < best) best = misfit, *fault = std::move(near);
     }
+  }
 }
 
 }  // namespace

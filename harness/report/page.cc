@@ -31,7 +31,6 @@ namespace {
 /// @param holds whether an object, as in the paper's figures.
 std::vector<Picture> DrawConfigurations(const RecordedFrames& run, bool holds,
                                         const std::filesystem::path& folder) {
-  const std::array<RunView, 1> views = {{{run.model.get(), &run.frames}}};
   VideoOptions options;
   options.width = 960;
   options.height = 600;
@@ -41,13 +40,13 @@ std::vector<Picture> DrawConfigurations(const RecordedFrames& run, bool holds,
   if (FindWay(*run.model, run.frames, data.get()).length > kLongWay) options.inset = kCourseCamera;
   options.tracks = true;
   options.panel = false;
-  VideoPainter painter(views, options);
+  VideoPainter painter({run.model.get(), &run.frames}, options);
   const std::string who = holds ? "Robot and object" : "Robot";
   const std::array<Picture, 2> pictures = {
       {{folder / "fig11a.png", holds ? "11 (a)" : "", who + " at the beginning"},
        {folder / "fig11b.png", holds ? "11 (b)" : "", who + " at the end"}}};
-  WritePicture(pictures[0].file, painter.Paint(0.0));
-  WritePicture(pictures[1].file, painter.Paint(run.frames.duration()));
+  WritePng(pictures[0].file, painter.Paint(0.0));
+  WritePng(pictures[1].file, painter.Paint(run.frames.duration()));
   return {pictures.begin(), pictures.end()};
 }
 

@@ -65,12 +65,11 @@ struct PlantOptions {
 /// Where and how the object is held.
 struct GraspOptions {
   std::vector<std::string> fingertips;  ///< Frames.
-  std::vector<SurfacePoint> contacts;   ///< Of the object, one for each fingertip; none for a task.
+  std::vector<SurfacePoint> contacts;   ///< Of the object, one for each fingertip.
   /// Out of the pole, in the fingertips' frames, where fingertips are hemispheres; none for whole spheres.
   std::optional<Vector3d> hemisphere;
-  std::string frame;                ///< Frame that the object is placed in; of a task: the palm.
-  Pose X_FO = Pose::Identity();     ///< Object in it; not for a task.
-  std::optional<Vector3d> hold_at;  ///< Of a task: where in the frame the search for a grasp begins, m.
+  std::string frame;             ///< Frame that the object is placed in; of a task: the palm.
+  Pose X_FO = Pose::Identity();  ///< Object in it while it is held.
   std::vector<std::pair<std::string, double>> joints;  ///< Posture, rad; other joints are 0.
 };
 
@@ -115,7 +114,7 @@ struct TrajectoryTask {
   Vector6d start_error = Vector6d::Zero();  ///< X_d - X_o at t = 0: m, rad.
 };
 
-/// Take the object from a support, carry it, put it down. The contacts of the grasp are planned.
+/// Take the object from a support, carry it, put it down.
 struct PickTask {
   Pose X_Bo = Pose::Identity();  ///< Where the object lies.
   /// Joints that may place the palm; empty for those of the arm alone.

@@ -33,17 +33,12 @@ void ReadContacts(TomlTable& table, GraspOptions* grasp) {
   ReadPose(table, &grasp->X_FO);
 }
 
-/// @param planned whether the contacts are chosen by the task.
-void ReadGrasp(const TomlValue& value, bool planned, GraspOptions* grasp) {
+void ReadGrasp(const TomlValue& value, GraspOptions* grasp) {
   TomlTable table = value.AsTable();
   const TomlValue fingertips = table.Get("fingertips");
   ReadValue(fingertips, Range::kAny, &grasp->fingertips);
   if (grasp->fingertips.size() < 3) fingertips.Reject("needs at least three fingertips to hold an object");
-  if (!planned) {
-    ReadContacts(table, grasp);
-  } else if (const auto xyz = table.Find("xyz")) {
-    grasp->hold_at = xyz->AsVector<3>();
-  }
+  ReadContacts(table, grasp);
   grasp->frame = table.Get("frame").AsPartName();
   if (const auto pole = table.Find("hemisphere")) {
     grasp->hemisphere = pole->AsVector<3>();
@@ -161,7 +156,6 @@ PickTask ReadPickTask(const TomlValue& value) {
   using Options = PickAndPlaceOptions;
   pick.raise.z() = pick.plan.raise = table.Get("raise").AsPositive();
   pick.transport = pick.plan.transport = table.Get("transport").AsVector<3>();
-  pick.plan.support = table.Get("support_height").AsNumber();
   ReadKeys<Options>(table,
                     {POSITIVE_KEY(approach_time), POSITIVE_KEY(lower_time), POSITIVE_KEY(close_time),
                      POSITIVE_KEY(search_speed), POSITIVE_KEY(grip_time), POSITIVE_KEY(take_over_time),
@@ -200,7 +194,7 @@ void FinishPickTask(const Scenario& scenario, PickTask* task) {
   pick.f_min = scenario.control.f_min;
   pick.posture_frequency = scenario.control.posture_frequency;
   pick.plan.mu = scenario.control.mu;
-  pick.plan.hemisphere = scenario.grasp.hemisphere;
+  pick.plan.X_Po = scenario.grasp.X_FO;
 }
 
 // ----- [joint_motion], with its [control]
@@ -376,7 +370,7 @@ void ReadTask(TomlTable& root, Scenario* scenario) {
   const TomlValue grasp = root.Get("grasp");
   const TomlValue control = root.Get("control");
   const auto trajectory = pick ? std::nullopt : std::optional(root.Get("trajectory"));
-  ReadGrasp(grasp, pick.has_value(), &scenario->grasp);
+  ReadGrasp(grasp, &scenario->grasp);
   ReadControl(control, *scenario, &scenario->control);
   if (auto* const task = std::get_if<PickTask>(&scenario->task)) return FinishPickTask(*scenario, task);
   TrajectoryTask task;

@@ -47,7 +47,7 @@ Setup::Setup(const Scenario& scenario, RobotModel model, const std::filesystem::
   if (scenario_.joint_task() != nullptr) {
     joints_.emplace(MakeJointPlan(scenario_, robots_, &start_));
   } else if (scenario_.pick_task() != nullptr) {
-    start_ = PlacePickTask(robots_.model, &hold_, &scenario_);
+    start_ = PlacePickTask(robots_.model, *surface_, &hold_, &scenario_);
   } else {
     start_ = SolveGrasp(robots_.model, *surface_, hold_, &scenario_);
   }

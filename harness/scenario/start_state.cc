@@ -177,7 +177,7 @@ StartState SolveGrasp(const RobotModel& model, const Surface& surface, const Hol
            FormatNumber(residual) + " m away");
 }
 
-StartState PlacePickTask(const RobotModel& model, Hold* hold, Scenario* scenario) {
+StartState PlacePickTask(const RobotModel& model, const Surface& surface, Hold* hold, Scenario* scenario) {
   auto& task = std::get<PickTask>(scenario->task);
   Hand& hand = hold->hand;
   StartState start;
@@ -190,9 +190,11 @@ StartState PlacePickTask(const RobotModel& model, Hold* hold, Scenario* scenario
   }
   hand.fingertips = hold->fingertips;
   hand.palm_frame = FindGraspFrame(*scenario, model);
-  hand.hold_at = scenario->grasp.hold_at;
-  const double tip_radius = TipRadius(model, hold->fingertips.front());
-  task.pick_and_place.plan.half_length = CalcContactHalfLength(model.object()->shape, tip_radius);
+  std::vector<SurfacePoint>& contacts = task.pick_and_place.plan.contacts;
+  contacts.clear();
+  for (const SurfacePoint& contact : scenario->grasp.contacts) {
+    contacts.push_back(PointAtAngles(surface, contact.u, contact.v));
+  }
   for (const std::string& name : task.arm_joints) {
     const int joint = model.FindJoint(name);
     if (joint < 0) Fail(*scenario, "task.arm_joints", Quote(name) + " is no joint of the model");

@@ -8,7 +8,7 @@
 #include "controller/contact/surface.h"
 #include "controller/control/joint_controller.h"
 #include "controller/control/joint_motion.h"
-#include "controller/grasp/contact_plan.h"
+#include "controller/handling/pick_plan.h"
 #include "harness/plant/observer.h"
 #include "harness/scenario/robot_pair.h"
 
@@ -49,7 +49,7 @@ StartState SolveGrasp(const RobotModel& model, const Surface& surface, const Hol
 
 /// Where a task begins. The scenario gets the object's random place, `hold` the hand.
 /// @throws InputError for a name that is none.
-StartState PlacePickTask(const RobotModel& model, Hold* hold, Scenario* scenario);
+StartState PlacePickTask(const RobotModel& model, const Surface& surface, Hold* hold, Scenario* scenario);
 
 /// Hangs the fingertips on the object. @throws InputError when the engine has no constraints for it.
 void MakeBonds(const Scenario& scenario, const Hold& hold, const Surface& surface, RobotPair* robots,

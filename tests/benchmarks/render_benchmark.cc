@@ -92,8 +92,7 @@ int Run(long frames) {
     encoding.height = options.height;
     encoding.fps = options.fps;
     VideoWriter video(folder.path() / "video.mp4", encoding);
-    const RunView view = {model.get(), &run};
-    RenderVideo({&view, 1}, options, &video);
+    RenderVideo({model.get(), &run}, options, &video);
     video.Finish();
   });
   const auto per_frame = [&](double seconds) { return 1e3 * seconds / static_cast<double>(frames); };

@@ -39,24 +39,6 @@ Image MakePlain(int width, int height, std::uint8_t value) {
   return image;
 }
 
-TEST(PlaceBeside, KeepsBothPictures) {
-  const Image both = PlaceBeside(MakePlain(40, 36, 10), MakePlain(30, 36, 20));
-  ASSERT_EQ(both.width, 70);
-  ASSERT_EQ(both.height, 36);
-  for (const int y : {0, 35}) {
-    EXPECT_EQ(both.Pixel(0, y)[0], 10);
-    EXPECT_EQ(both.Pixel(38, y)[0], 10);
-    EXPECT_EQ(both.Pixel(40, y)[0], 242) << "the line between";
-    EXPECT_EQ(both.Pixel(42, y)[0], 20);
-    EXPECT_EQ(both.Pixel(69, y)[0], 20);
-  }
-}
-
-TEST(PlaceBeside, RefusesDifferentHeights) {
-  EXPECT_TRUE(
-      Throws<std::invalid_argument>([] { PlaceBeside(Image(4, 4), Image(4, 5)); }, "must be equally high"));
-}
-
 TEST(PlaceInset, LiesInTheLowerRightCornerWithAFrame) {
   Image image = MakePlain(640, 360, 10);
   PlaceInset(MakePlain(100, 50, 20), &image);

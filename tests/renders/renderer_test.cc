@@ -164,14 +164,9 @@ TEST_F(RendererTest, DecorationsAppearWhereTheyAre) {
       {"arrow's head", Arrow{place, place + up, 0.012, red}, Project("overview", place + 0.86 * up)},
       {"cone", Cone{place, Vector3d::UnitZ(), 0.2, 0.2, red}, middle},
       {"path", Polyline{{place, place + 0.6 * up, place + up}, 0.012, red}, middle},
-      {"dot", Dot{place, 0.02, red}, start},
-      {"z axis", Axes{Pose(Eigen::Translation3d(place)), 0.0}, beyond}};
+      {"dot", Dot{place, 0.02, red}, start}};
   for (const Case& c : cases) {
     const Image image = renderer.Render(*data_, {&c.decoration, 1});
-    if (std::string(c.name) == "z axis") {
-      EXPECT_EQ(image.rgb, plain.rgb) << "axes without length";
-      continue;
-    }
     EXPECT_GT(Redness(image, c.covered), 60.0) << c.name;
     EXPECT_LT(std::abs(Redness(image, beyond)), 30.0) << c.name << " is longer than it should be";
   }
@@ -242,12 +237,11 @@ TEST_F(RendererTest, StillLooksAsItDid) {
   options.height = kHeight;
   options.inset = "grasp";
   const auto paint = [&](const RunFrames& run) {
-    const RunView view = {model_.get(), &run};
-    return VideoPainter({&view, 1}, options).Paint(0.1);
+    return VideoPainter({model_.get(), &run}, options).Paint(0.1);
   };
   const Image image = paint(run_);
   const std::string path = SourcePath("/tests/renders/golden_still.png");
-  if (std::getenv("DEXCHECK_WRITE_GOLDEN") != nullptr) WritePicture(path, image);
+  if (std::getenv("DEXCHECK_WRITE_GOLDEN") != nullptr) WritePng(path, image);
   const Image golden = ReadPng(path);
   ASSERT_EQ(golden.rgb.size(), image.rgb.size());
   const auto share_that_differs = [&](const Image& other) {

@@ -10,7 +10,6 @@
 #include <filesystem>
 #include <functional>
 #include <limits>
-#include <span>
 #include <vector>
 
 #include "controller/common/errors.h"
@@ -44,20 +43,20 @@ class VideoTest : public ::testing::Test {
     return options;
   }
 
-  bool Video(const fs::path& path, std::span<const RunView> runs, const VideoOptions& options,
+  bool Video(const fs::path& path, const RunView& run, const VideoOptions& options,
              const std::function<bool(long, long)>& progress = {}) {
     EncodingOptions encoding;
     encoding.width = options.width;
     encoding.height = options.height;
     encoding.fps = options.fps;
     VideoWriter video(path, encoding);
-    if (!RenderVideo(runs, options, &video, progress)) return false;
+    if (!RenderVideo(run, options, &video, progress)) return false;
     video.Finish();
     return true;
   }
 
   Image Paint(const VideoOptions& options, double time) const {
-    return VideoPainter({&view_, 1}, options).Paint(time);
+    return VideoPainter(view_, options).Paint(time);
   }
 
   MjModelPtr model_ = LoadMjcf(SourcePath("/mjcf/scene.xml"));
@@ -65,23 +64,6 @@ class VideoTest : public ::testing::Test {
   RunView view_ = {model_.get(), &run_};
   TempFolder folder_;
 };
-
-TEST_F(VideoTest, AFreeCameraKeepsWhatItLooksAtInTheMiddle) {
-  VideoOptions options = MakeOptions(/*panel=*/false);
-  options.free = FreeCamera{{0.9, -1.0, 1.0}, {}, /*follow=*/true, /*orbit=*/0.8};
-  VideoPainter orbiting({&view_, 1}, options);
-  constexpr double kPixels = 4.0;  // fingers hide parts of the torus
-  for (const double time : {0.0, 0.25, 0.5}) {
-    const Vector3d torus = FindTorus(orbiting.Paint(time));
-    ASSERT_GT(torus.z(), 8.0) << time;
-    EXPECT_NEAR(torus.x(), 0.5 * kWidth, kPixels) << time;
-    EXPECT_NEAR(torus.y(), 0.5 * kHeight, kPixels) << time;
-  }
-  // One that stands still and looks at a point sees the torus pass by.
-  options.free = FreeCamera{{0.9, -1.0, 1.0}, Vector3d(0.6, -0.22, 0.75), false, 0.0};
-  VideoPainter standing({&view_, 1}, options);
-  EXPECT_GT(std::abs(FindTorus(standing.Paint(0.5)).x() - FindTorus(standing.Paint(0.0)).x()), 30.0);
-}
 
 /// Mean difference of two frames over a rectangle given in hundredths of the picture.
 template <typename Byte>
@@ -108,7 +90,7 @@ TEST_F(VideoTest, DecodedFramesDifferWhereTheRobotMoved) {
     run_.qpos(row, elbow) -= 2.0 * run_.times[static_cast<size_t>(row)];
   }
   VideoOptions options = MakeOptions(/*panel=*/false);
-  ASSERT_TRUE(Video(folder_.path() / "a.mp4", {&view_, 1}, options));
+  ASSERT_TRUE(Video(folder_.path() / "a.mp4", view_, options));
   const std::string decoded = Decode(folder_.path() / "a.mp4");
   constexpr size_t kFrame = 3UL * kWidth * kHeight;
   ASSERT_EQ(decoded.size(), 5 * kFrame);
@@ -142,58 +124,12 @@ TEST_F(VideoTest, CamerasOfItsOwnAreNearToRobotAndObject) {
   EXPECT_GT(FindTorus(with_inset).z(), FindTorus(plain).z() + 0.001 * kWidth * kHeight);
 }
 
-TEST_F(VideoTest, TheGhostOfAnotherRunStandsWhereThatRunIs) {
-  constexpr double kOff = 0.236;  // m, to the robot's left
-  RunFrames other = run_;
-  for (const char* joint : {"base", "torus_free"}) {
-    const int address = model_->jnt_qposadr[mj_name2id(model_.get(), mjOBJ_JOINT, joint)];
-    other.qpos.col(address + 1).array() += kOff;
-  }
-  VideoOptions options = MakeOptions(/*panel=*/false);
-  options.free = FreeCamera{{2.6, -2.2, 1.4}, Vector3d(0.9, 0.0, 0.7), false, 0.0};
-  const RunView other_view = {model_.get(), &other};
-  const Image here = Paint(options, 0.2);
-  const Image there = VideoPainter({&other_view, 1}, options).Paint(0.2);
-  options.ghost = true;
-  const std::array<RunView, 2> both = {view_, other_view};
-  const Image ghost = VideoPainter(both, options).Paint(0.2);
-  const Image coincident = VideoPainter(std::array<RunView, 2>{view_, view_}, options).Paint(0.2);
-  // Where the other run differs from an empty scene, the ghost is seen, and nowhere else.
-  const auto pixels = [](const Image& a, const Image& b) {
-    std::vector<Vector2d> different;
-    for (int y = 0; y < kHeight; ++y) {
-      for (int x = 0; x < kWidth; ++x) {
-        int sum = 0;
-        for (int c = 0; c < 3; ++c) sum += std::abs(a.Pixel(x, y)[c] - b.Pixel(x, y)[c]);
-        if (sum > 24) different.emplace_back(x, y);
-      }
-    }
-    return different;
-  };
-  const auto right_end = [](const std::vector<Vector2d>& some) {
-    double right = 0.0;
-    for (const Vector2d& pixel : some) right = std::max(right, pixel.x());
-    return right;
-  };
-  const std::vector<Vector2d> moved = pixels(here, there);
-  const std::vector<Vector2d> seen = pixels(here, ghost);
-  ASSERT_GT(moved.size(), 1000U);
-  EXPECT_GT(seen.size(), moved.size() / 3);
-  EXPECT_LT(seen.size(), moved.size());
-  EXPECT_NEAR(right_end(seen), right_end(moved), 3.0);
-  EXPECT_LT(right_end(pixels(here, coincident)), right_end(moved) - 5.0)
-      << "not beside a run that is the same";
-  // Still where it was, and the panel shows how far apart.
-  EXPECT_NEAR((FindTorus(ghost) - FindTorus(here)).head<2>().norm(), 0.0, 3.0);
-  EXPECT_EQ(ghost.width, kWidth);
-}
-
 TEST_F(VideoTest, TheCourseCameraStandsStill) {
   run_ = MakeKinematicRun(*model_, 3.0);
   VideoOptions options = MakeOptions(/*panel=*/false);
   const auto differences = [&](const char* camera) {
     options.camera = camera;
-    VideoPainter painter({&view_, 1}, options);
+    VideoPainter painter(view_, options);
     const Image first = painter.Paint(0.0);
     const Image last = painter.Paint(2.7);  // the floor's pattern repeats each metre
     // Where the robot is at either end, and the left border.
@@ -211,23 +147,23 @@ TEST_F(VideoTest, TheCourseCameraStandsStill) {
 
 TEST_F(VideoTest, VideoDoesNotDependOnTheNumberOfProcesses) {
   VideoOptions options = MakeOptions();
-  options.forces = options.tracks = options.frames = true;
+  options.forces = options.tracks = true;
   options.inset = "grasp";
   options.workers = 1;
-  ASSERT_TRUE(Video(folder_.path() / "one.mp4", {&view_, 1}, options));
+  ASSERT_TRUE(Video(folder_.path() / "one.mp4", view_, options));
   options.workers = 3;
-  ASSERT_TRUE(Video(folder_.path() / "three.mp4", {&view_, 1}, options));
+  ASSERT_TRUE(Video(folder_.path() / "three.mp4", view_, options));
   EXPECT_TRUE(ReadText(folder_.path() / "one.mp4") == ReadText(folder_.path() / "three.mp4"));
 }
 
 TEST_F(VideoTest, ProcessesDrawTheSameFramesByteForByte) {
   VideoOptions options = MakeOptions();
-  options.forces = options.tracks = options.frames = true;
+  options.forces = options.tracks = true;
   options.inset = "grasp";
   constexpr long kFrames = 5;
   std::vector<Image> own;
   {
-    VideoPainter painter({&view_, 1}, options);
+    VideoPainter painter(view_, options);
     for (long frame = 0; frame < kFrames; ++frame)
       own.push_back(painter.Paint(static_cast<double>(frame) / 10));
   }
@@ -243,33 +179,11 @@ TEST_F(VideoTest, ProcessesDrawTheSameFramesByteForByte) {
 }
 
 TEST_F(VideoTest, FramesAreTheStillsOfTheirTimes) {
-  VideoPainter painter({&view_, 1}, MakeOptions());
+  VideoPainter painter(view_, MakeOptions());
   const Image start = painter.Paint(0.0);
   EXPECT_NE(painter.Paint(0.3).rgb, start.rgb);
   EXPECT_EQ(painter.Paint(0.0).rgb, start.rgb);
   EXPECT_EQ(painter.Paint(9.0).rgb, painter.Paint(0.5).rgb) << "after its end a run stands still";
-}
-
-TEST_F(VideoTest, TwoRunsStandSideBySide) {
-  RunFrames other = run_;
-  const int elbow = model_->jnt_qposadr[mj_name2id(model_.get(), mjOBJ_JOINT, "r_elbow")];
-  other.qpos.col(elbow).array() -= 1.0;
-  other.title = "other";
-  const std::array<RunView, 2> both = {view_, {model_.get(), &other}};
-  const Image image = VideoPainter(both, MakeOptions()).Paint(0.2);
-  ASSERT_EQ(image.width, kWidth);
-  const std::array<RunView, 2> same = {view_, view_};
-  const Image twins = VideoPainter(same, MakeOptions()).Paint(0.2);
-  const auto half_differs = [&](int begin, int end) {
-    for (int y = 0; y < kHeight; ++y) {
-      for (int x = begin; x < end; ++x) {
-        if (!std::equal(image.Pixel(x, y), image.Pixel(x, y) + 3, twins.Pixel(x, y))) return true;
-      }
-    }
-    return false;
-  };
-  EXPECT_FALSE(half_differs(0, kWidth / 2));
-  EXPECT_TRUE(half_differs(kWidth / 2, kWidth));
 }
 
 TEST_F(VideoTest, LostContactsAreNotDrawn) {
@@ -286,20 +200,20 @@ TEST_F(VideoTest, LostContactsAreNotDrawn) {
 
 TEST_F(VideoTest, ReportsItsProgressAndStopsOnRequest) {
   std::vector<long> reported;
-  EXPECT_TRUE(Video(folder_.path() / "a.mp4", {&view_, 1}, MakeOptions(), [&](long done, long total) {
+  EXPECT_TRUE(Video(folder_.path() / "a.mp4", view_, MakeOptions(), [&](long done, long total) {
     EXPECT_EQ(total, 5);
     reported.push_back(done);
     return true;
   }));
   EXPECT_EQ(reported, (std::vector<long>{1, 2, 3, 4, 5}));
   EXPECT_FALSE(
-      Video(folder_.path() / "b.mp4", {&view_, 1}, MakeOptions(), [](long done, long) { return done < 2; }));
+      Video(folder_.path() / "b.mp4", view_, MakeOptions(), [](long done, long) { return done < 2; }));
   EXPECT_EQ(std::distance(fs::directory_iterator(folder_.path()), {}), 1) << "nothing of the stopped video";
 }
 
 TEST_F(VideoTest, BadInputIsRefusedAndLeavesNothing) {
   const auto video = [&](const VideoOptions& options) {
-    return [&, options] { return Video(folder_.path() / "a.mp4", {&view_, 1}, options); };
+    return [&, options] { return Video(folder_.path() / "a.mp4", view_, options); };
   };
   VideoOptions options = MakeOptions();
   options.camera = "sideways";
@@ -317,12 +231,9 @@ TEST_F(VideoTest, BadInputIsRefusedAndLeavesNothing) {
   EXPECT_TRUE(fs::is_empty(folder_.path()));
 }
 
-TEST_F(VideoTest, CountsTheFramesOfTheLongestRun) {
-  const RunFrames longer = MakeKinematicRun(*model_, 2.0);
-  const std::array<RunView, 2> both = {view_, {model_.get(), &longer}};
-  EXPECT_EQ(CountFrames({&view_, 1}, 30), 15);
-  EXPECT_EQ(CountFrames(both, 30), 60);
-  EXPECT_EQ(CountFrames({&view_, 1}, 1), 1) << "at least one";
+TEST_F(VideoTest, CountsFrames) {
+  EXPECT_EQ(CountFrames(view_, 30), 15);
+  EXPECT_EQ(CountFrames(view_, 1), 1) << "at least one";
 }
 
 }  // namespace

@@ -65,56 +65,36 @@ nlohmann::json Probe(const fs::path& path) {
   return json;
 }
 
-TEST(VideoWriter, WritesWhatTheNameSaysAsBrowsersPlayIt) {
-  struct Format {
-    const char* name;
-    const char* codec;
-    const char* container;
-    int levels;  // how far colours may be off
-  };
+TEST(VideoWriter, WritesWhatBrowsersPlay) {
   // Plain colours survive chroma subsampling; conversion to 8-bit YUV and quantisation cost a few levels.
   // With the matrix of standard definition the green of these frames would be off by ten levels and more.
-  // A GIF has all colours that there are.
-  constexpr int kVideoLevels = 6;
-  constexpr int kGifLevels = 4;
+  constexpr int kLevels = 6;
   constexpr size_t kFrame = 3UL * kWidth * kHeight;
   const TempFolder folder;
-  for (const Format& format : {Format{"A video.MP4", "h264", "mov,mp4", kVideoLevels},
-                               {"a.webm", "vp9", "matroska,webm", kVideoLevels},
-                               {"a.gif", "gif", "gif", kGifLevels}}) {
-    SCOPED_TRACE(format.name);
-    const fs::path path = folder.path() / format.name;
-    WriteVideo(path, 20);
-    const nlohmann::json json = Probe(path);
-    const nlohmann::json& stream = json["streams"][0];
-    EXPECT_EQ(stream["codec_name"], format.codec);
-    EXPECT_EQ(json["format"]["format_name"].get<std::string>().find(format.container), 0U);
-    EXPECT_EQ(stream["width"], kWidth);
-    EXPECT_EQ(stream["height"], kHeight);
-    EXPECT_EQ(stream["nb_read_frames"], "20");
-    EXPECT_EQ(stream["avg_frame_rate"], "25/1");
-    EXPECT_NEAR(std::stod(json["format"]["duration"].get<std::string>()), 20.0 / 25.0,
-                stream["codec_name"] == "h264" ? 1e-3 : 0.01);
-    if (stream["codec_name"] == "h264") {
-      EXPECT_EQ(stream["pix_fmt"], "yuv420p");
-      EXPECT_EQ(stream["color_space"], "bt709");
-      EXPECT_EQ(stream["color_range"], "tv");
-    }
-    const std::string decoded = Decode(path);
-    ASSERT_EQ(decoded.size(), 20 * kFrame);
-    for (size_t k = 0; k < 20; ++k) {
-      const Image expected = MakeFrame(static_cast<int>(k));
-      for (const size_t i : {size_t{0}, kFrame / 2, kFrame - 3}) {
-        for (size_t c = i; c < i + 3; ++c) {
-          const int value = static_cast<unsigned char>(decoded[k * kFrame + c]);
-          EXPECT_NEAR(value, expected.rgb[c], format.levels) << "frame " << k << ", byte " << c;
-        }
+  const fs::path path = folder.path() / "A video.MP4";
+  WriteVideo(path, 20);
+  const nlohmann::json json = Probe(path);
+  const nlohmann::json& stream = json["streams"][0];
+  EXPECT_EQ(stream["codec_name"], "h264");
+  EXPECT_EQ(json["format"]["format_name"].get<std::string>().find("mov,mp4"), 0U);
+  EXPECT_EQ(stream["width"], kWidth);
+  EXPECT_EQ(stream["height"], kHeight);
+  EXPECT_EQ(stream["nb_read_frames"], "20");
+  EXPECT_EQ(stream["avg_frame_rate"], "25/1");
+  EXPECT_NEAR(std::stod(json["format"]["duration"].get<std::string>()), 20.0 / 25.0, 1e-3);
+  EXPECT_EQ(stream["pix_fmt"], "yuv420p");
+  EXPECT_EQ(stream["color_space"], "bt709");
+  EXPECT_EQ(stream["color_range"], "tv");
+  const std::string decoded = Decode(path);
+  ASSERT_EQ(decoded.size(), 20 * kFrame);
+  for (size_t k = 0; k < 20; ++k) {
+    const Image expected = MakeFrame(static_cast<int>(k));
+    for (const size_t i : {size_t{0}, kFrame / 2, kFrame - 3}) {
+      for (size_t c = i; c < i + 3; ++c) {
+        const int value = static_cast<unsigned char>(decoded[k * kFrame + c]);
+        EXPECT_NEAR(value, expected.rgb[c], kLevels) << "frame " << k << ", byte " << c;
       }
     }
-    const std::string bytes = ReadText(path);
-    fs::remove(path);
-    WriteVideo(path, 20);
-    EXPECT_TRUE(ReadText(path) == bytes) << "same frames, same bytes";
   }
 }
 
@@ -160,12 +140,8 @@ TEST(VideoWriter, RefusesNamesOfOtherFormats) {
   const TempFolder folder;
   for (const char* name : {"a.avi", "a.png", "a", "mp4", "a.mp4.txt"}) {
     EXPECT_TRUE(Throws<InputError>([&] { VideoWriter video(folder.path() / name, MakeOptions()); },
-                                   "a video's name must end in .mp4, .webm or .gif"));
+                                   "the name must end in .mp4"));
   }
-  EncodingOptions options = MakeOptions();
-  options.fps = kMostGifFramesPerSecond + 1;
-  EXPECT_TRUE(Throws<std::invalid_argument>([&] { VideoWriter video(folder.path() / "a.gif", options); },
-                                            "must be at most 50 in a GIF"));
   EXPECT_TRUE(fs::is_empty(folder.path()));
 }
 
@@ -241,37 +217,23 @@ Image MakePicture() {
   return image;
 }
 
-TEST(PictureFile, AJpegDecodesToThePicture) {
+TEST(PictureFile, WritesAPngOrNothing) {
   const TempFolder folder;
-  const fs::path path = folder.path() / "a.jpg";
-  const Image picture = MakePicture();
-  WritePicture(path, picture);
-  const std::string decoded = Decode(path);
-  ASSERT_EQ(decoded.size(), picture.rgb.size());
-  // Quantisation at the quality that is used; measured 6.
-  constexpr int kLevels = 12;
-  for (size_t i = 0; i < picture.rgb.size(); ++i) {
-    ASSERT_NEAR(static_cast<unsigned char>(decoded[i]), picture.rgb[i], kLevels) << i;
-  }
-}
-
-TEST(PictureFile, WritesWhatTheNameSaysOrNothing) {
-  const TempFolder folder;
-  WritePicture(folder.path() / "a.PNG", MakePicture());
+  WritePng(folder.path() / "a.PNG", MakePicture());
   EXPECT_EQ(ReadPng(folder.path() / "a.PNG").rgb, MakePicture().rgb);
-  for (const char* name : {"a.gif", "a", "jpg", "a.jpg.txt"}) {
-    EXPECT_TRUE(Throws<InputError>([&] { WritePicture(folder.path() / name, MakePicture()); },
-                                   "a picture's name must end in .png, .jpg or .jpeg"));
+  for (const char* name : {"a.gif", "a", "png", "a.png.txt"}) {
+    EXPECT_TRUE(Throws<InputError>([&] { WritePng(folder.path() / name, MakePicture()); },
+                                   "the name must end in .png"));
   }
-  EXPECT_TRUE(Throws<InputError>([&] { WritePicture("/nowhere/a.jpg", MakePicture()); },
-                                 "/nowhere/a.jpg: cannot be written: No such file"));
+  EXPECT_TRUE(Throws<InputError>([&] { WritePng("/nowhere/a.png", MakePicture()); },
+                                 "/nowhere/a.png: cannot be written: No such file"));
   EXPECT_EQ(std::distance(fs::directory_iterator(folder.path()), fs::directory_iterator()), 1);
 }
 
 TEST(PictureFile, ReplacesAnExistingFileWhole) {
   const TempFolder folder;
   WriteText(folder.path() / "a.png", "old");
-  WritePicture(folder.path() / "a.png", Image(3, 3));
+  WritePng(folder.path() / "a.png", Image(3, 3));
   EXPECT_EQ(ReadPng(folder.path() / "a.png").width, 3);
   EXPECT_EQ(std::distance(fs::directory_iterator(folder.path()), {}), 1);
 }
@@ -279,7 +241,7 @@ TEST(PictureFile, ReplacesAnExistingFileWhole) {
 TEST(PictureFile, NamesTheFileThatIsNoPicture) {
   EXPECT_TRUE(Throws<InputError>([] { ReadPng("/nowhere/a.png"); }, "/nowhere/a.png: cannot be read"));
   const TempFolder folder;
-  WritePicture(folder.path() / "a.png", MakePicture());
+  WritePng(folder.path() / "a.png", MakePicture());
   const std::string text = ReadText(folder.path() / "a.png");
   WriteText(folder.path() / "a.png", text.substr(0, text.size() / 2));
   EXPECT_TRUE(Throws<InputError>([&] { ReadPng(folder.path() / "a.png"); }, "a.png: cannot be read"));

@@ -5,7 +5,7 @@
 
 or, without a running program, over files:
 
-    dexcheck states arm.urdf --count 1000 --out states
+    dexcheck eval --robot arm.urdf --states 1000 --out states
     python3 arm.py states
     dexcheck consistency arm.urdf --results states
 """

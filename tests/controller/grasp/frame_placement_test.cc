@@ -7,8 +7,8 @@
 #include <random>
 
 #include "controller/dynamics/model_terms.h"
-#include "controller/grasp/contact_plan.h"
 #include "controller/grasp/finger_placement.h"
+#include "controller/handling/pick_plan.h"
 #include "tests/common/linear_algebra.h"
 #include "tests/common/matchers.h"
 #include "tests/common/matrix_near.h"

@@ -82,8 +82,8 @@ TEST_P(Golden, WordsAreThoseOfTheFile) {
 }
 
 constexpr const char* kFiles[] = {"audit",  "compare", "consistency", "dexcheck", "diagnose",
-                                  "eval",   "export",  "import",      "mutate",   "plan",
-                                  "render", "report",  "run",         "states",   "study"};
+                                  "eval",   "export",  "import",      "mutate",   "render",
+                                  "report", "run",     "study"};
 INSTANTIATE_TEST_SUITE_P(All, Golden, ::testing::ValuesIn(kFiles),
                          [](const auto& info) { return std::string(info.param); });
 

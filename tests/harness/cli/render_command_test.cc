@@ -67,30 +67,20 @@ class RenderCommand : public CommandTest {
 
 TEST_F(RenderCommand, WritesAVideoIntoTheRunsFolder) {
   WriteLonger(0.5);
-  const ProgramResult result = Expect(0, "render run --size 160x90 --fps 10 --forces --tracks --frames");
+  const ProgramResult result = Expect(0, "render run --size 160x90 --fps 10 --forces --tracks");
   EXPECT_THAT(result.err, HasSubstr("cut off after")) << "the log has no summary";
   EXPECT_THAT(result.out, StartsWith("run/video.mp4: 5 frames, 0.5 s, 160 x 90, "));
-  const std::string video = Read("run/video.mp4");
-  EXPECT_EQ(video.substr(4, 4), "ftyp");
+  EXPECT_EQ(Read("run/video.mp4").substr(4, 4), "ftyp");
   EXPECT_EQ(CountFiles("run"), 2);
-  EXPECT_EQ(
-      Expect(0,
-             "render run --size 160x90 --fps 10 --forces --tracks --frames --jobs 1 --out again.mp4 --quiet")
-          .out,
-      "");
-  EXPECT_EQ(Read("again.mp4"), video) << "the number of processes does not matter";
 }
 
-TEST_F(RenderCommand, WritesAStillOfTwoRuns) {
-  WriteLonger(0.5);
-  WriteRun(Path("other"), 0.3, {.only_what_must_be = true});
-  EXPECT_THAT(
-      Expect(0,
-             "render run --beside other --still 0.4 --out a.png --size 320x90 --camera follow --inset grasp")
-          .out,
-      StartsWith("a.png: 0.40 s"));
+TEST_F(RenderCommand, WritesAStillOfARunWithoutChecks) {
+  fs::remove_all(Path("run"));
+  WriteRun(Path("run"), 0.3, {.only_what_must_be = true});
+  EXPECT_THAT(Expect(0, "render run --still 0.2 --out a.png --size 160x90 --camera follow --inset grasp").out,
+              StartsWith("a.png: 0.20 s"));
   const Image image = ReadPng(Path("a.png"));
-  EXPECT_EQ(image.width, 320);
+  EXPECT_EQ(image.width, 160);
   EXPECT_EQ(image.height, 90);
 }
 
@@ -104,14 +94,6 @@ TEST_F(RenderCommand, DrawsWhateverDriverTheEnvironmentNames) {
   }
 }
 
-TEST_F(RenderCommand, TwoRunsInOneScene) {
-  WriteRun(Path("other"), 0.1);
-  Expect(0, "render run --ghost other --still 0.1 --out a.png --size 160x90 --camera robot --inset object");
-  EXPECT_EQ(ReadPng(Path("a.png")).width, 160) << "not two pictures";
-  EXPECT_THAT(Expect(0, "compare run other --video video.gif").out, HasSubstr("video.gif: 3 frames"));
-  EXPECT_THAT(Read("video.gif"), StartsWith("GIF89a"));
-}
-
 TEST_F(RenderCommand, AReportWithoutItsReplayIsSmaller) {
   Expect(0, "report run --out page.html");
   Expect(0, "report run --out without.html --no-replay");
@@ -120,19 +102,6 @@ TEST_F(RenderCommand, AReportWithoutItsReplayIsSmaller) {
   EXPECT_THAT(page, HasSubstr("id=\"replay-scene\""));
   EXPECT_THAT(without, Not(HasSubstr("replay-scene")));
   EXPECT_GT(page.size(), without.size() + 500'000) << "three.js and the robot's shapes";
-}
-
-TEST_F(RenderCommand, WritesWhatTheNameSays) {
-  for (const auto& [name, begin] : {std::pair("a.gif", "GIF89a"),
-                                    {"a.WEBM", "\x1a\x45\xdf\xa3"},
-                                    {"a.png", "\x89PNG"},
-                                    {"a.jpg", "\xff\xd8\xff"},
-                                    {"a.JPEG", "\xff\xd8\xff"}}) {
-    const bool video = std::string(name) == "a.gif" || std::string(name) == "a.WEBM";
-    Expect(0, Words{"render", "run", "--out", name} +
-                  (video ? "--size 64x64 --fps 20" : "--size 64x64 --still 0.1"));
-    EXPECT_THAT(Read(name), StartsWith(begin)) << name;
-  }
 }
 
 TEST_F(RenderCommand, TheEndOfTheLastStepIsPartOfTheRun) {

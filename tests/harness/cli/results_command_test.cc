@@ -1,4 +1,4 @@
-// A program, or arrays that it wrote, as one side of consistency; dexcheck states; dexcheck audit.
+// A program, or arrays that it wrote, as one side of consistency; eval --states; dexcheck audit.
 
 #include "tests/common/legged_robots.h"
 #include "tests/harness/cli/dexcheck_program.h"
@@ -44,7 +44,7 @@ TEST_F(Results, FaultsOfTheProgramAreFound) {
 }
 
 TEST_F(Results, OfFilesAgree) {
-  Expect(0, {"states", urdf_, "--count", "50", "--out", "states"});
+  Expect(0, {"eval", "--robot", urdf_, "--states", "50", "--out", "states"});
   EXPECT_EQ(ReadJson("states/layout.json").at("joints"), Json({"yaw", "shoulder", "elbow"}));
   const std::string lines = Read("states/states.jsonl");
   EXPECT_EQ(std::ranges::count(lines, '\n'), 50);
@@ -68,7 +68,7 @@ TEST_F(Results, OfFilesAgree) {
 
 /// The same results as lines of JSON in any order; an archive is refused with what to do.
 TEST_F(Results, OfLinesAgreeAndOfAnArchiveAreRefused) {
-  Expect(0, {"states", urdf_, "--count", "20", "--out", "states"});
+  Expect(0, {"eval", "--robot", urdf_, "--states", "20", "--out", "states"});
   ASSERT_EQ(RunProgram({kPython, kExamples + "arm.py", "states"}, {folder_.path()}).exit_code, 0);
   const std::string script = R"(
 import json, os, numpy as np
@@ -114,7 +114,7 @@ TEST_F(Results, FloatingBasesSayTheirConvention) {
   Expect(0, "consistency robot.urdf robot.xml --samples 20");
   Expect(0, "import robot.xml --out robot.toml");
   // Where another program's coordinates may be other ones.
-  Expect(0, "states robot.toml --count 1 --out states");
+  Expect(0, "eval --robot robot.toml --states 1 --out states");
   Write("states/results.jsonl", Json{{"id", 0}, {"g", std::vector<double>(18, 1.0)}}.dump() + "\n");
   const Json notes = RunJson(1, "consistency robot.toml --results states").at("notes");
   EXPECT_THAT(notes, ::testing::IsSupersetOf({HasSubstr("[x y z, qw qx qy qz"), HasSubstr("Pinocchio")}));
@@ -173,7 +173,7 @@ for line in sys.stdin:
   const Words compare = {"consistency", "top.xml", "--program", kPython + " top.py", "--samples", "50"};
   ExpectAgreement(RunJson(0, compare), 150);
 
-  Expect(0, "states top.xml --count 20 --out states");
+  Expect(0, "eval --robot top.xml --states 20 --out states");
   EXPECT_EQ(ReadJson("states/layout.json").at("balls"), Json({"pivot"}));
   ASSERT_EQ(RunProgram({kPython, "top.py", "states"}, {folder_.path()}).exit_code, 0);
   Expect(0, "consistency top.xml --results states");

@@ -29,8 +29,7 @@ mu = 0.6
 )";
 const std::string kContacts = "grasp.contacts_deg=[[125, 0], [90, 0], [-90, 0]]";
 const std::string kLine = "trajectory={ type = \"line\" }";
-const std::string kTask =
-    "task={ xyz = [0.25, -0.5, 0.631], support_height = 0.62, raise = 0.15, transport = [1, 0, 0] }";
+const std::string kTask = "task={ xyz = [0.25, -0.5, 0.631], raise = 0.15, transport = [1, 0, 0] }";
 const std::string kPush = "disturbance=[{ type = \"step\", body = \"object\" }]";
 
 /// A key of the document's tables with a default that is a value, written `like this`.
@@ -79,7 +78,7 @@ std::vector<Key> ListKeys() {
         .path = section + cells[1].substr(0, cells[1].find('`')), .otherwise = cells[4], .example = cells[5]};
     const bool of_task = section == "task.";
     key.before = {of_task ? kTask : section == "trajectory." ? start : kLine};
-    if (!of_task) key.before.push_back(kContacts);
+    key.before.push_back(kContacts);
     if (of_task) key.before.emplace_back("control.orientation=\"rotation\"");
     if (section == "disturbance.0.") key.before.push_back(kPush);
     // What some keys need to matter.
@@ -167,8 +166,7 @@ std::string ShowScenario(const Scenario& scenario) {
     const PickAndPlaceOptions& k = task->pick_and_place;
     text += ShowAll(task->X_Bo, task->arm_joints, k.raise, k.transport, k.approach_time, k.lower_time,
                     k.close_time, k.search_speed, k.grip_time, k.take_over_time, k.raise_time, k.arm_rate,
-                    k.transport_time, k.touch_force, k.overload, k.largest_push, k.attempts, k.plan.opening,
-                    k.plan.support);
+                    k.transport_time, k.touch_force, k.overload, k.largest_push, k.attempts, k.plan.opening);
   }
   if (const TrajectoryTask* const task = scenario.trajectory_task()) text += ShowTrajectory(task->trajectory);
   return text;
