@@ -62,10 +62,9 @@ Option AddSeedOption(Command command, std::uint64_t* seed,
 /// Adds --samples, of at most `most`, and --seed: the random states at which two descriptions are compared.
 template <typename Count>
 std::array<Option, 2> AddSampleOptions(Command command, std::uint64_t most, Count* samples,
-                                       std::uint64_t* seed) {
-  return {command.AddOption("--samples N", samples, "Number of random states")
-              .Check(WholeNumber(1, most))
-              .ShowDefault(),
+                                       std::uint64_t* seed,
+                                       const std::string& help = "Number of random states") {
+  return {command.AddOption("--samples N", samples, help).Check(WholeNumber(1, most)).ShowDefault(),
           AddSeedOption(command, seed, "Seed of the random states").ShowDefault()};
 }
 

@@ -334,8 +334,11 @@ void AddDiagnoseCommand(Command app) {
   Command command = app.AddCommand("diagnose", "Say why model and engine disagree, and what would repair it");
   AddFileOptions(command, "What may be wrong, instead of --robot and --mjcf: parameter file (TOML) or URDF",
                  "What is right: MJCF", request.get());
-  AddSampleOptions(command, kMaxSamples, &request->diagnosis.samples, &request->diagnosis.seed);
-  request->options.samples = 200;
+  constexpr int kSamplesOfVerdict = 200;
+  AddSampleOptions(command, kMaxSamples, &request->diagnosis.samples, &request->diagnosis.seed,
+                   fmt::format("Number of random states that a repair is fitted to; the verdict has {}",
+                               kSamplesOfVerdict));
+  request->options.samples = kSamplesOfVerdict;
   AddJudgingOptions(command, request.get());
   AddIgnoreOption(command, &request->ignore);
   AddJsonOption(command, "the results", &request->json_file);
