@@ -81,7 +81,7 @@ void AddHelpCommands(Command app, const CommandLine& line) {
   Command completion = app.AddCommand("completion", "Print completion for a shell, made from the help");
   const auto shell = std::make_shared<std::string>();
   completion.AddOption("SHELL", shell.get(), "bash").Required().OneOf({"bash"});
-  completion.SetAction([&line] {
+  completion.SetAction([&line, shell] {
     fmt::print("{}", MakeBashCompletion(line.Describe()));
     return kSuccess;
   });
