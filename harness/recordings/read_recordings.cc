@@ -124,6 +124,21 @@ void RecordingSet::TellSecond(const ReadOptions& options, double time, const Vec
   second_samples_ = 0;
 }
 
+double RecordingSet::CalcTimeError(const ReadRecording& one) const {
+  // When a torque acted is known to a row's time. All joints of a row have one time: what a joint's torque is
+  // off, over how fast it changes, is at least the error of time, whatever else is wrong.
+  double error = one.step / std::sqrt(12.0);
+  if (has_currents_ || joints_.size() < 2) return error;
+  constexpr double kAtMost = 8.0;  // positions, velocities and torques of a row may have times of their own
+  for (size_t place = 0; place < joints_.size(); ++place) {
+    const MatrixXd& G = one.fit->products(place);
+    const Index rate = one.fit->Find(place, {TorqueColumn::kRate, joints_[place]}), y = G.cols() - 1;
+    if (rate < 0 || !(G(rate, rate) > 0.0)) continue;
+    error = std::min(error, kAtMost * std::sqrt(std::max(0.0, G(y, y)) / G(rate, rate)));
+  }
+  return error;
+}
+
 double RecordingSet::CalcNoise(const ReadRecording& one, size_t place) const {
   const TorqueBalance& balance = *one.fit;
   const int joint = joints_[place];
@@ -143,9 +158,8 @@ double RecordingSet::CalcNoise(const ReadRecording& one, size_t place) const {
     variance += mean_square({TorqueColumn::kGravity, 0, k}) * Square(one.motion.base);
   if (one.motion.wrench.size() > 0)
     variance += balance.wrench_squares(place).dot(one.motion.wrench.cwiseAbs2()) / samples;
-  // When a torque acted is known to a row's time.
-  variance +=
-      mean_square({TorqueColumn::kRate, joint}) * Square(gains_[static_cast<Index>(place)] * one.step) / 12.0;
+  variance += mean_square({TorqueColumn::kRate, joint}) *
+              Square(gains_[static_cast<Index>(place)] * CalcTimeError(one));
   constexpr double kRounding = 1e-7;
   return std::sqrt(variance + Square(kRounding) * mean_square({TorqueColumn::kTorque, joint}) +
                    std::numeric_limits<double>::min());

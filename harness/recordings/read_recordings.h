@@ -88,6 +88,8 @@ class RecordingSet {
  private:
   void Read(Recording* recording, const ReadOptions& options, const std::function<bool(long rows)>& on_rows);
   void TellSecond(const ReadOptions& options, double time, const VectorXd& residual);
+  /// Of a row's time, s: a uniform distribution over a row, or less where the joints show it.
+  [[nodiscard]] double CalcTimeError(const ReadRecording& one) const;
   [[nodiscard]] double CalcNoise(const ReadRecording& one, size_t place) const;
   void MeasureNoise();
   /// From all recordings, with friction and an offset beside them.
