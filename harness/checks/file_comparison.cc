@@ -124,6 +124,7 @@ void CompareBeside(const DescriptionFile& first, const RobotDescription& robot, 
   const bool has_motors = std::ranges::any_of(
       constants.findings, [](const ConstantFinding& finding) { return finding.check == "motor_limit"; });
   if (!has_motors) CheckMotorsAndWheels(robot, other, &constants);
+  AppendTo(&comparison->without_effect, CompareWithoutEffect(robot, other));
   // Each shape of two MJCFs that can touch was compared.
   if (first.format() != RobotFormat::kMjcf)
     AppendTo(&comparison->without_effect, CompareShapes(robot, other));
@@ -210,6 +211,7 @@ void CompareTwoDescriptions(const DescriptionFile& first, const DescriptionFile&
                  &comparison->result.terms, held);
   AddOneSided(*comparison->model, completion.one_sided, &comparison->result.constants);
   for (const ConstantFinding& finding : missing) comparison->result.constants.Add(finding);
+  AppendTo(&comparison->without_effect, CompareWithoutEffect(a, b));
   AppendTo(&comparison->without_effect, CompareShapes(a, b));
   const RobotModel other(b.spec);
   AnalyticProvider of_a(*comparison->model, a.spec.source);

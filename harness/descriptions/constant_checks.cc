@@ -197,6 +197,34 @@ std::vector<std::string> CompareShapes(const RobotDescription& a, const RobotDes
   return {"shapes: their volume differs at " + JoinNames(differing)};
 }
 
+std::vector<std::string> CompareWithoutEffect(const RobotDescription& a, const RobotDescription& b) {
+  constexpr double kSame = 1e-3;  // of the larger number
+  constexpr double kNear = 1e-4;  // m
+  const auto differs = [](double x, double y) { return std::abs(x - y) > kSame * std::max(x, y); };
+  std::vector<std::string> lines, limits;
+  for (size_t i = 0; i < a.joints.size(); ++i) {
+    const auto other = std::ranges::find(b.spec.joints, a.spec.joints[i].name, &Joint::name);
+    if (other == b.spec.joints.end()) continue;
+    const double own = a.joints[i].velocity_limit;
+    const double there = b.joints[static_cast<size_t>(other - b.spec.joints.begin())].velocity_limit;
+    if (own > 0.0 && there > 0.0 && differs(own, there))
+      limits.push_back(fmt::format("{} ({:.6g} against {:.6g})", other->name, own, there));
+  }
+  if (!limits.empty()) lines.push_back("velocity limits: " + JoinNames(limits));
+
+  const Base &base = a.spec.base, &of_b = b.spec.base;
+  if (base.type != BaseType::kFixed || of_b.type != BaseType::kFixed) return lines;
+  if (!(base.body.mass > 0.0) || !(of_b.body.mass > 0.0)) return lines;
+  const std::string what = "base with all that is welded to it: ";
+  if (differs(base.body.mass, of_b.body.mass)) {
+    lines.push_back(fmt::format("{}mass {:.6g} against {:.6g} kg", what, base.body.mass, of_b.body.mass));
+  } else if (const double apart = (base.X_B0 * base.body.com - of_b.X_B0 * of_b.body.com).norm();
+             apart > kNear + kSame * base.body.com.norm()) {
+    lines.push_back(fmt::format("{}centre of mass, {:.4g} m apart", what, apart));
+  }
+  return lines;
+}
+
 void JudgeByTolerance(double tolerance, std::vector<CheckRecord>* records) {
   for (CheckRecord& record : *records) {
     record.bound = std::max(record.bound, tolerance);

@@ -77,6 +77,11 @@ void CheckMotorsAndWheels(const RobotDescription& a, const RobotDescription& b, 
 /// @return one line on those that differ.
 std::vector<std::string> CompareShapes(const RobotDescription& a, const RobotDescription& b);
 
+/// Compares what no term depends on: velocity limits where both files state them, and mass and centre of mass
+/// of a base that does not move, with all that is welded to it.
+/// @return a line on each that differs in the first three digits.
+std::vector<std::string> CompareWithoutEffect(const RobotDescription& a, const RobotDescription& b);
+
 /// Compares couplings of joints, in the place of the constant checks' findings that the engine has them.
 /// @param ignores none is a disagreement. @return a note on those that only the engine has, which are not
 /// compared.

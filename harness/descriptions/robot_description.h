@@ -37,6 +37,7 @@ struct DescribedJoint : WrittenRow {
   Pose X_PW = Pose::Identity();
   int line = 0;                        ///< Of the file; 0 when it is not known.
   std::optional<StatedForces> forces;  ///< Limits of the joint's motors; none where the file states none.
+  double velocity_limit = 0.0;         ///< rad/s or m/s; 0 where the file states none.
   double axis_length = 1.0;            ///< Of the axis as the file gives it.
 };
 

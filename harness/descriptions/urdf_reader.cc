@@ -217,6 +217,7 @@ class UrdfReader {
     // Files whose motors are not known state an effort of 0.
     const double most = limit == nullptr ? 0.0 : file_.ReadNumber(*limit, key, "effort", 0.0);
     if (most > 0.0) stated->forces = {-most, most};
+    if (limit != nullptr) stated->velocity_limit = file_.ReadNumber(*limit, key, "velocity", 0.0);
     added->lower = -kPi;
     added->upper = kPi;
     stated->states_range = joint.type != "continuous";

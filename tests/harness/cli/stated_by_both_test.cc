@@ -144,6 +144,28 @@ TEST_F(StatedByBoth, AGearIsNeverSilent) {
   }
 }
 
+TEST_F(StatedByBoth, VelocityLimitsAndABaseThatDoesNotMoveAreListed) {
+  WriteChanged("c.urdf", kUrdf, "upper=\"2\" effort=\"1\" velocity=\"1\"",
+               "upper=\"2\" effort=\"1\" velocity=\"1.5\"");
+  EXPECT_EQ(Compare(0, "a.urdf", "c.urdf").at("without_effect"),
+            Json::array({"velocity limits: shoulder (1 against 1.5)"}));
+  const auto with_stand = [&](const std::string& name, const std::string& mass, const std::string& x) {
+    WriteChanged(name, kUrdf, "<link name=\"stand\"/>",
+                 "<link name=\"stand\"><inertial><origin xyz=\"" + x + " 0 0\"/><mass value=\"" + mass +
+                     "\"/><inertia ixx=\"0.1\" iyy=\"0.1\" izz=\"0.1\" ixy=\"0\" ixz=\"0\" "
+                     "iyz=\"0\"/></inertial></link>");
+  };
+  with_stand("d.urdf", "4", "0");
+  with_stand("e.urdf", "4.1", "0");
+  with_stand("f.urdf", "4", "0.01");
+  const std::string base = "base with all that is welded to it: ";
+  EXPECT_EQ(Compare(0, "d.urdf", "e.urdf").at("without_effect"),
+            Json::array({base + "mass 4 against 4.1 kg"}));
+  EXPECT_EQ(Compare(0, "d.urdf", "f.urdf").at("without_effect"),
+            Json::array({base + "centre of mass, 0.01 m apart"}));
+  EXPECT_EQ(Compare(0, "d.urdf", "d.urdf").at("without_effect"), Json::array());
+}
+
 TEST_F(StatedByBoth, OptionsThatActOnNoTermAreListedAndCounted) {
   for (const auto& [option, line] :
        {std::pair("cone='elliptic'", "option cone: pyramidal in b.xml, elliptic in c.xml"),
