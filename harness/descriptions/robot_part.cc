@@ -249,7 +249,18 @@ std::vector<ConstantFinding> ListMissing(const RobotPart& common, const RobotDes
     const std::vector<int> match = MatchJoints(robot.spec, (is_of_a ? renamed : a).spec);
     for (size_t i = 0; i < match.size(); ++i) {
       const Joint& joint = robot.spec.joints[i];
-      if (match[i] >= 0) continue;
+      if (match[i] >= 0) {
+        const JointType other = (is_of_a ? renamed : a).spec.joints[static_cast<size_t>(match[i])].type;
+        if (is_of_a && joint.type != other) {
+          ConstantFinding& finding = findings.emplace_back();
+          finding.check = "joint_type";
+          finding.where = "joint " + joint.name;
+          finding.model = 1.0;
+          finding.effect = std::string(NameOf(joint.type)) + " in " + name(a) + ", " + NameOf(other) +
+                           " in " + name(b) + "; held at 0 in what is compared";
+        }
+        continue;
+      }
       const bool is_held = common.held.contains(joint.name);
       add(is_of_a, "joint " + joint.name,
           "with link " + joint.link + " of " + FormatNumber(joint.body.mass, 6) + " kg" +
@@ -281,6 +292,9 @@ std::optional<RobotPart> FindCommonPart(const RobotDescription& a, const RobotDe
     const auto missing = std::ranges::count(match, -1);
     std::vector<bool> is_gone(match.size(), false);
     for (size_t i = 0; i < match.size(); ++i) {
+      const Joint& joint = robot.spec.joints[i];
+      if (match[i] >= 0 && joint.type != other.spec.joints[static_cast<size_t>(match[i])].type)
+        part.held.emplace(joint.name, 0.0);
       if (match[i] >= 0 || is_gone[i]) continue;
       const std::vector<bool> subtree = ListSubtree(robot.spec, static_cast<int>(i));
       bool is_whole = true;  // nothing that hangs on it is both's
@@ -289,7 +303,7 @@ std::optional<RobotPart> FindCommonPart(const RobotDescription& a, const RobotDe
         part.left_out.push_back(robot.spec.joints[i].link);
         for (size_t k = 0; k < match.size(); ++k) is_gone[k] = is_gone[k] || subtree[k];
       } else {
-        part.held.emplace(robot.spec.joints[i].name, 0.0);
+        part.held.emplace(joint.name, 0.0);
       }
     }
     return missing;
@@ -297,7 +311,7 @@ std::optional<RobotPart> FindCommonPart(const RobotDescription& a, const RobotDe
   const std::ptrdiff_t of_a = find(a, renamed);
   const std::ptrdiff_t of_b = find(renamed, a);
   const bool is_most = 2 * of_a <= std::ssize(a.spec.joints) && 2 * of_b <= std::ssize(renamed.spec.joints);
-  if (part.empty() || (of_a > 0 && of_b > 0) || !is_most) return std::nullopt;
+  if (part.empty() || !is_most) return std::nullopt;
   return part;
 }
 

@@ -144,6 +144,16 @@ TEST_F(StatedByBoth, AGearIsNeverSilent) {
   }
 }
 
+TEST_F(StatedByBoth, AJointOfAnotherTypeIsADisagreement) {
+  WriteChanged("c.urdf", kUrdf, "name=\"elbow\" type=\"revolute\"", "name=\"elbow\" type=\"prismatic\"");
+  for (const char* other : {"a.urdf", "b.xml"}) {
+    const Json finding = Find(Compare(1, "c.urdf", other), "joint_type");
+    ASSERT_FALSE(finding.is_null()) << other;
+    EXPECT_EQ(finding.at("where"), "joint elbow");
+    EXPECT_THAT(finding.at("effect"), HasSubstr("prismatic in c.urdf, revolute in " + std::string(other)));
+  }
+}
+
 TEST_F(StatedByBoth, VelocityLimitsAndABaseThatDoesNotMoveAreListed) {
   WriteChanged("c.urdf", kUrdf, "upper=\"2\" effort=\"1\" velocity=\"1\"",
                "upper=\"2\" effort=\"1\" velocity=\"1.5\"");
