@@ -73,6 +73,8 @@ class Adapter {
   /// origin of the free body, or the hinge's axis) moves; also what accelerations become. `rates` has 0, 6 or
   /// 3 entries.
   void CalcBaseRates(const Vector3d& anchor_velocity, double yaw_rate, Eigen::Ref<VectorXd> rates) const;
+  /// Pose in Sigma_0 of the free joint's body, or of the hinge's anchor, along whose axes nothing turns.
+  [[nodiscard]] const Pose& X_0b() const { return X_0b_; }
   /// The anchor in Sigma_0, m.
   [[nodiscard]] const Vector3d anchor() const { return X_0b_.translation(); }
 

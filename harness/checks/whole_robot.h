@@ -1,0 +1,115 @@
+#pragma once
+
+// The robot and its object as the engine moves them, from the parameters: nothing rolls, nothing is level and
+// nothing is held by assumption.
+
+#include <mujoco/mujoco.h>
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "controller/dynamics/model_terms.h"
+#include "controller/model/robot_model.h"
+#include "harness/checks/rounding_scales.h"
+#include "harness/engine/adapter.h"
+
+namespace dexcheck {
+
+/// A force and a torque on one of the engine's bodies, in world axes.
+struct BodyForce {
+  int body = 0;
+  Vector3d point = Vector3d::Zero();   ///< Where the force acts, m.
+  Vector3d force = Vector3d::Zero();   ///< N.
+  Vector3d torque = Vector3d::Zero();  ///< N m.
+};
+
+/// The robot of a parameter file before the paper's constraint (1) reduces it: a base that moves as the
+/// engine's does, freely, in the plane or not at all, and the wheels of a differential drive as joints in
+/// front of the others. The base's frame is that of the engine's joints, so that the model's velocities are
+/// the engine's but for signs and their order.
+RobotModel MakeWholeRobot(const RobotModel& model, const Adapter& adapter);
+
+/// Equations of motion of the whole robot and its free object at the true state, in nu = [base; wheels;
+/// joints; object's velocity in the world; its angular velocity in its own axes]:
+///
+///   M nu_dot + C nu + g + F nu = tau + J^T f
+///
+/// Nothing allocates after construction.
+class WholeRobot {
+ public:
+  /// @param model parameters of the plant's robot. @param object of its object, if it has one. @param adapter
+  /// between that model and the engine; outlives this.
+  WholeRobot(const RobotModel& model, const MassProperties* object, const Adapter& adapter);
+
+  [[nodiscard]] const RobotModel& model() const { return model_; }
+  /// Entries of nu, 62 for the paper's robot and its torus; the robot's come first, 56.
+  [[nodiscard]] Eigen::Index size() const { return bias_.size(); }
+  [[nodiscard]] Eigen::Index robot_size() const { return terms_.size(); }
+
+  /// "base, along x", "joint NAME", "object, about its z": an entry of nu.
+  [[nodiscard]] std::string DescribeEntry(int entry) const;
+
+  /// Evaluates all terms at the engine's state. @param qpos, qvel as the engine's (nq, nv).
+  void SetState(const mjtNum* qpos, const mjtNum* qvel);
+  /// M of the robot's entries.
+  [[nodiscard]] const MatrixXd& M() const { return terms_.M(); }
+  /// C nu + g + F nu (size()).
+  [[nodiscard]] const VectorXd& bias() const { return bias_; }
+  /// result += M a (size()).
+  void AddInertia(const VectorXd& a, VectorXd* result) const;
+
+  /// The engine's velocities, accelerations (nv) in the order and signs of nu.
+  void ReadRates(const mjtNum* rates, VectorXd* nu) const;
+  /// The engine's forces on its velocities (nv) as forces on nu.
+  void ReadForces(const mjtNum* forces, VectorXd* result) const { ReadRates(forces, result); }
+  /// Forces on the robot's part of nu as the engine's (nv); other entries are zero.
+  void WriteForces(const VectorXd& forces, VectorXd* engine) const;
+  /// Where nu has the entries of tau' and xi: of wheels and joints; -1 of a base's.
+  [[nodiscard]] const std::vector<Eigen::Index>& motor_entries() const { return motor_entries_; }
+
+  /// Forgets all forces on bodies.
+  void ClearForces();
+  /// A force and a torque on one of the engine's bodies, at a point of the world. Bodies that are part of
+  /// neither robot nor object have none.
+  void AddForce(const BodyForce& one);
+  /// The same on a link of the parameter file's model, by the index of its joint; -1 is the base.
+  void AddLinkForce(int link, const BodyForce& one) { AddForce(link < 0 ? link : link + num_wheels_, one); }
+  void AddObjectForce(const BodyForce& one) { AddForce(kObject, one); }
+  /// result += J^T f of all of them, size += the sum of the magnitudes that this came from; both size().
+  void ProjectForces(VectorXd* result, VectorXd* size);
+
+  /// result += what M nu_dot and bias() are sums of, by entry: errors of rounding are relative to that.
+  void AddSizes(const VectorXd& nu_dot, VectorXd* result);
+
+ private:
+  struct Load {
+    Vector3d force = Vector3d::Zero(), moment = Vector3d::Zero();  // world, about the link's origin
+    double size = 0.0;                                             // sum of |force| + |moment| / length, N
+  };
+
+  /// Beside the indices of joints, and -1 for the base.
+  static constexpr int kNoLink = -2, kObject = -3;
+  void AddForce(int link, const BodyForce& one);
+  [[nodiscard]] double CalcObjectArm() const;  // m
+
+  const Adapter* adapter_;
+  int num_wheels_;
+  RobotModel model_;
+  ModelTerms terms_;
+  RoundingScales scales_;
+  std::optional<MassProperties> object_;
+  std::vector<int> base_dofs_;  // the engine's
+  MatrixXd base_rates_;         // the engine's rates of the base's joints from nu's
+  std::vector<int> dofs_;       // the engine's of wheels and joints, in nu's order
+  VectorXd signs_;              // of those
+  std::vector<Eigen::Index> motor_entries_;
+  std::vector<int> body_links_;  // by the engine's bodies; kNoLink, kObject
+  MatrixXd mass_scales_;         // of M's entries
+  VectorXd q_, nu_, bias_, work_;
+  Pose X_Bo_ = Pose::Identity();
+  std::vector<Load> loads_;  // of the base, then by joint
+  Load object_load_;
+};
+
+}  // namespace dexcheck
