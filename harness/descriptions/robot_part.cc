@@ -293,9 +293,13 @@ std::optional<RobotPart> FindCommonPart(const RobotDescription& a, const RobotDe
     std::vector<bool> is_gone(match.size(), false);
     for (size_t i = 0; i < match.size(); ++i) {
       const Joint& joint = robot.spec.joints[i];
-      if (match[i] >= 0 && joint.type != other.spec.joints[static_cast<size_t>(match[i])].type)
-        part.held.emplace(joint.name, 0.0);
-      if (match[i] >= 0 || is_gone[i]) continue;
+      if (match[i] >= 0) {
+        const JointType type = other.spec.joints[static_cast<size_t>(match[i])].type;
+        const bool can_be_held = joint.type != JointType::kBall && type != JointType::kBall;
+        if (joint.type != type && can_be_held) part.held.emplace(joint.name, 0.0);
+        continue;
+      }
+      if (is_gone[i]) continue;
       const std::vector<bool> subtree = ListSubtree(robot.spec, static_cast<int>(i));
       bool is_whole = true;  // nothing that hangs on it is both's
       for (size_t k = 0; k < match.size(); ++k) is_whole = is_whole && (!subtree[k] || match[k] < 0);
