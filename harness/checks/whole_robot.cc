@@ -3,7 +3,6 @@
 #include <cmath>
 #include <utility>
 
-#include "controller/common/text.h"
 #include "harness/engine/map_vector.h"
 
 namespace dexcheck {
@@ -86,11 +85,6 @@ WholeRobot::WholeRobot(const RobotModel& model, const MassProperties* object, co
   for (size_t k = 0; k < adapter.wheels().size(); ++k) {
     if (adapter.wheels()[k].axis.y() < 0.0) signs_[static_cast<Eigen::Index>(k)] = -1.0;
   }
-  // A floating base has entries of tau' without motors; a differential drive's are those of its wheels.
-  if (model.base().type != BaseType::kDifferentialDrive)
-    motor_entries_.assign(static_cast<size_t>(model.num_base_velocities()), -1);
-  for (Eigen::Index k = 0; k < signs_.size(); ++k) motor_entries_.push_back(base + k);
-
   body_links_.assign(static_cast<size_t>(engine.nbody), kNoLink);
   for (size_t link = 0; link < adapter.welded_bodies().size(); ++link) {
     const int index = link == 0 ? -1 : static_cast<int>(link) - 1 + num_wheels_;
@@ -107,24 +101,9 @@ WholeRobot::WholeRobot(const RobotModel& model, const MassProperties* object, co
   }
 
   const Eigen::Index n = terms_.size(), all = n + (object_ ? 6 : 0);
-  mass_scales_.resize(n, n);
-  for (Eigen::Index i = 0; i < n; ++i) {
-    for (Eigen::Index j = 0; j < n; ++j)
-      mass_scales_(i, j) = scales_.CalcMassScale(static_cast<int>(i), static_cast<int>(j));
-  }
   q_.setZero(model_.num_positions());
-  for (VectorXd* vector : {&nu_, &bias_, &work_}) vector->setZero(all);
+  for (VectorXd* vector : {&nu_, &bias_}) vector->setZero(all);
   loads_.resize(static_cast<size_t>(model_.num_joints()) + 1);
-}
-
-std::string WholeRobot::DescribeEntry(int entry) const {
-  const int base = model_.num_base_velocities(), n = model_.num_velocities();
-  const auto describe = [](const std::string& body, int k) {
-    return body + (k < 3 ? ", along " : ", about its ") + std::string(1, "xyz"[k % 3]);
-  };
-  if (entry >= n) return describe("object", entry - n);
-  if (entry >= base) return "joint " + Quote(model_.dof_name(entry - base));
-  return describe("base", base == 3 && entry == 2 ? 5 : entry);
 }
 
 void WholeRobot::SetState(const mjtNum* qpos, const mjtNum* qvel) {
@@ -188,9 +167,8 @@ void WholeRobot::ClearForces() {
   object_load_ = {};
 }
 
-void WholeRobot::AddForce(const BodyForce& one) { AddForce(body_links_[static_cast<size_t>(one.body)], one); }
-
-void WholeRobot::AddForce(int link, const BodyForce& one) {
+void WholeRobot::AddForce(const BodyForce& one) {
+  const int link = body_links_[static_cast<size_t>(one.body)];
   if (link == kNoLink) return;
   const Vector3d origin =
       link == kObject ? Vector3d(X_Bo_.translation()) : Vector3d(terms_.CalcLinkPose(link).translation());
@@ -238,19 +216,5 @@ void WholeRobot::ProjectForces(VectorXd* result, VectorXd* size) {
 }
 
 double WholeRobot::CalcObjectArm() const { return std::sqrt(object_->inertia.trace() / object_->mass); }
-
-void WholeRobot::AddSizes(const VectorXd& nu_dot, VectorXd* result) {
-  const Eigen::Index n = terms_.size();
-  work_.head(n) = nu_dot.head(n).cwiseAbs();
-  result->head(n).noalias() += mass_scales_ * work_.head(n);
-  for (int i = 0; i < static_cast<int>(n); ++i)
-    (*result)[i] += scales_.CalcGravityScale(i) + scales_.CalcCoriolisScale(i);
-  if (!object_) return;
-  const double force = object_->mass * (model_.gravity().norm() + nu_dot.segment<3>(n).norm());
-  const double omega = nu_.tail<3>().norm();
-  result->segment<3>(n).array() += force;
-  result->tail<3>().array() +=
-      force * CalcObjectArm() + object_->inertia.trace() * (nu_dot.tail<3>().norm() + omega * omega);
-}
 
 }  // namespace dexcheck

@@ -6,7 +6,6 @@
 #include <mujoco/mujoco.h>
 
 #include <optional>
-#include <string>
 #include <vector>
 
 #include "controller/dynamics/model_terms.h"
@@ -47,9 +46,6 @@ class WholeRobot {
   [[nodiscard]] Eigen::Index size() const { return bias_.size(); }
   [[nodiscard]] Eigen::Index robot_size() const { return terms_.size(); }
 
-  /// "base, along x", "joint NAME", "object, about its z": an entry of nu.
-  [[nodiscard]] std::string DescribeEntry(int entry) const;
-
   /// Evaluates all terms at the engine's state. @param qpos, qvel as the engine's (nq, nv).
   void SetState(const mjtNum* qpos, const mjtNum* qvel);
   /// M of the robot's entries.
@@ -65,22 +61,14 @@ class WholeRobot {
   void ReadForces(const mjtNum* forces, VectorXd* result) const { ReadRates(forces, result); }
   /// Forces on the robot's part of nu as the engine's (nv); other entries are zero.
   void WriteForces(const VectorXd& forces, VectorXd* engine) const;
-  /// Where nu has the entries of tau' and xi: of wheels and joints; -1 of a base's.
-  [[nodiscard]] const std::vector<Eigen::Index>& motor_entries() const { return motor_entries_; }
 
   /// Forgets all forces on bodies.
   void ClearForces();
   /// A force and a torque on one of the engine's bodies, at a point of the world. Bodies that are part of
   /// neither robot nor object have none.
   void AddForce(const BodyForce& one);
-  /// The same on a link of the parameter file's model, by the index of its joint; -1 is the base.
-  void AddLinkForce(int link, const BodyForce& one) { AddForce(link < 0 ? link : link + num_wheels_, one); }
-  void AddObjectForce(const BodyForce& one) { AddForce(kObject, one); }
   /// result += J^T f of all of them, size += the sum of the magnitudes that this came from; both size().
   void ProjectForces(VectorXd* result, VectorXd* size);
-
-  /// result += what M nu_dot and bias() are sums of, by entry: errors of rounding are relative to that.
-  void AddSizes(const VectorXd& nu_dot, VectorXd* result);
 
  private:
   struct Load {
@@ -90,7 +78,6 @@ class WholeRobot {
 
   /// Beside the indices of joints, and -1 for the base.
   static constexpr int kNoLink = -2, kObject = -3;
-  void AddForce(int link, const BodyForce& one);
   [[nodiscard]] double CalcObjectArm() const;  // m
 
   const Adapter* adapter_;
@@ -99,14 +86,12 @@ class WholeRobot {
   ModelTerms terms_;
   RoundingScales scales_;
   std::optional<MassProperties> object_;
-  std::vector<int> base_dofs_;  // the engine's
-  MatrixXd base_rates_;         // the engine's rates of the base's joints from nu's
-  std::vector<int> dofs_;       // the engine's of wheels and joints, in nu's order
-  VectorXd signs_;              // of those
-  std::vector<Eigen::Index> motor_entries_;
+  std::vector<int> base_dofs_;   // the engine's
+  MatrixXd base_rates_;          // the engine's rates of the base's joints from nu's
+  std::vector<int> dofs_;        // the engine's of wheels and joints, in nu's order
+  VectorXd signs_;               // of those
   std::vector<int> body_links_;  // by the engine's bodies; kNoLink, kObject
-  MatrixXd mass_scales_;         // of M's entries
-  VectorXd q_, nu_, bias_, work_;
+  VectorXd q_, nu_, bias_;
   Pose X_Bo_ = Pose::Identity();
   std::vector<Load> loads_;  // of the base, then by joint
   Load object_load_;

@@ -50,7 +50,7 @@ std::string MakeBashCompletion(const std::vector<CommandHelp>& commands) {
       "  local cur=${COMP_WORDS[COMP_CWORD]} command= word\n"
       "  for word in \"${COMP_WORDS[@]:1:COMP_CWORD-1}\"; do\n"
       "    case \"$command $word\" in\n";
-  // Of `case "$command $word"`, which makes "study" and then "run" the command "study run".
+  // Each pattern of `case "$command $word"` adds a word to a command: "run" after "study" makes "study run".
   for (const CommandHelp& command : commands) {
     if (command.name.empty()) continue;
     const size_t space = command.name.rfind(' ');

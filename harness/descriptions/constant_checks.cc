@@ -199,7 +199,7 @@ std::vector<std::string> CompareShapes(const RobotDescription& a, const RobotDes
 
 std::vector<std::string> CompareWithoutEffect(const RobotDescription& a, const RobotDescription& b) {
   constexpr double kSame = 1e-3;  // of the larger number
-  constexpr double kNear = 1e-4;  // m
+  constexpr double kNear = 1e-4;  // m; files print centres of mass to a tenth of a millimetre
   const auto differs = [](double x, double y) { return std::abs(x - y) > kSame * std::max(x, y); };
   std::vector<std::string> lines, limits;
   for (size_t i = 0; i < a.joints.size(); ++i) {

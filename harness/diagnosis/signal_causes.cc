@@ -166,7 +166,7 @@ class SignalGroup {
     return one;
   }
 
-  /// What a signal has besides what all have, after it.
+  /// Judges a signal for a fault of its own, after the fault that all signals share.
   [[nodiscard]] SignalVerdict JudgeBeside(size_t i, const CommonFault& common) const {
     const SignalVerdict& alone = verdicts_[i];
     if (alone.steps.rows.empty() || Transmit(common.fault, series_[i]).size() == 0) return alone;

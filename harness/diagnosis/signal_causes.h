@@ -21,8 +21,8 @@ struct SignalSeries {
   double noise = 0.0;             ///< Rounding of got - expected.
   /// When it differs first and last, of all steps, s; NaN where these steps alone tell.
   double from = std::numeric_limits<double>::quiet_NaN(), to = from;
-  /// What is less than so many times the noise says nothing, and so many times it may be left of what is
-  /// explained.
+  /// In units of the noise: the least error that a cause is looked for, and the most that an explanation may
+  /// leave.
   static constexpr double kFaint = 1e3, kLeft = 30.0;
 };
 

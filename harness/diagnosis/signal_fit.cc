@@ -144,7 +144,7 @@ SignalVerdict JudgeSignal(const SignalSeries& series, const std::vector<SignalSe
   const ArrayXd off = steps.Take(series.got) - steps.Take(series.expected);
   const double square = (off / series.noise).square().sum() / static_cast<double>(steps.size());
   const double floor = 1.0 + kSignalAccuracy * kSignalAccuracy * square;
-  // What is right at most steps, as beside lost samples, has no noise.
+  // A signal that is right at most steps has no noise: its few errors are samples that were lost.
   constexpr Index kRarest = 5;
   const bool differs_often = kRarest * (off.abs() > series.noise).count() >= off.size();
   const auto is_good = [&](const SignalFit& fit) {

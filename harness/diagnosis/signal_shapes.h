@@ -61,14 +61,14 @@ bool IsRefuted(const SignalSeries& series, const SignalSteps& steps, const Vecto
 std::string PlaceOf(const SignalName& name);
 /// Whether an output that goes on with this fraction of itself follows, and neither runs away nor ahead.
 bool IsDecay(double decay);
-/// What is looked for, each where what is before it explains nothing: sines fit much.
+/// The stages of the search. A stage is tried only where the one before explains nothing, as sines fit much.
 enum class SignalSearch {
   kPlain,
   kSines,  ///< A ripple over time.
   kTurns,  ///< A ripple over the position, as cogging and an eccentricity make it.
 };
 
-/// What may be added to a transmission's output: gain, offset, drift, lag and friction, and a ripple.
+/// Lists the candidates that add to a transmission's output: gain, offset, drift, lag, friction and a ripple.
 std::vector<Candidate> ListAdded(const SignalSeries& series, const SignalSteps& steps,
                                  const SignalShape& shape, SignalSearch search);
 

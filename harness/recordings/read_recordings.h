@@ -88,7 +88,8 @@ class RecordingSet {
  private:
   void Read(Recording* recording, const ReadOptions& options, const std::function<bool(long rows)>& on_rows);
   void TellSecond(const ReadOptions& options, double time, const VectorXd& residual);
-  /// Of a row's time, s: a uniform distribution over a row, or less where the joints show it.
+  /// Returns the standard deviation of a row's time, s: that of a uniform distribution over a row, or less
+  /// where the torques of a joint show that times are known better.
   [[nodiscard]] double CalcTimeError(const ReadRecording& one) const;
   [[nodiscard]] double CalcNoise(const ReadRecording& one, size_t place) const;
   void MeasureNoise();
