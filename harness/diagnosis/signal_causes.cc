@@ -173,10 +173,10 @@ class SignalGroup {
     std::vector<SignalSeries> others;
     for (const SignalSeries& other : series_)
       if (other.name.group == series_[i].name.group) others.push_back(ExpectFault(other, common));
-    SignalVerdict beside = JudgeSignal(ExpectFault(series_[i], common), others);
+    const SignalVerdict beside = JudgeSignal(ExpectFault(series_[i], common), others);
     const auto count = [](const SignalVerdict& of) { return of.fits.front().faults.size(); };
     const bool is_beside = beside.is_explained && (!alone.is_explained || count(beside) <= count(alone));
-    SignalVerdict best = is_beside ? std::move(beside) : alone;
+    SignalVerdict best = is_beside ? beside : alone;
     // Noise that is rounded, or less than the steps, has another deviation.
     if (common.fault.fault == "rounding to steps of" && best.is_explained && best.fits.front().is_noise)
       best.is_explained = false;

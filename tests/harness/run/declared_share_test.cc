@@ -25,7 +25,8 @@ RunResult Look(
 TEST(WeighDeclared, SaysHowMuchOfAnErrorItExplains) {
   ShippedRun run("offset", kExpectsMuch);
   const RunResult result = Look(&run);
-  EXPECT_THAT(result.attribution.evidence, HasSubstr("without what the scenario declares (actuation.delay = 0.001)"));
+  EXPECT_THAT(result.attribution.evidence,
+              HasSubstr("without what the scenario declares (actuation.delay = 0.001)"));
   EXPECT_THAT(result.attribution.evidence, HasSubstr("% of the error"));
 }
 
