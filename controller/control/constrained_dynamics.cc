@@ -141,8 +141,4 @@ const Prediction& GroundDynamics::Predict(const ModelTerms& robot, const GroundC
   return prediction_;
 }
 
-double GroundDynamics::CalcForceGain() const {
-  return 1.0 / std::sqrt(CalcSymmetricEigenvalues(half_.transpose() * half_)[0]);
-}
-
 }  // namespace dexcheck

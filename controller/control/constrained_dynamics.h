@@ -96,8 +96,6 @@ class GroundDynamics {
   [[nodiscard]] const TreeFactor& mass_factor() const { return factor_; }
   /// Whether the forces of all feet follow from the motion.
   [[nodiscard]] bool determines_forces() const { return constraints_.rank() == half_.cols(); }
-  /// |f| at most this times |a|_M of the acceleration that it makes, sqrt(kg); where forces are determined.
-  [[nodiscard]] double CalcForceGain() const;
 
  private:
   TreeFactor factor_;

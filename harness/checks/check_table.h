@@ -159,8 +159,6 @@ inline constexpr double kGraspOptimalityBound = 1e-4;
 
 // Values of checks that take more than a line (check_table.cc).
 
-/// What is left of (48), less what tilt, slip and sinking of the platform can make of it, relative.
-Evaluation EvaluateRobotDynamics(const StepAnalysis& step);
 /// A wheel's rim against the platform above it, (1), m/s.
 Evaluation EvaluateRolling(const StepAnalysis& step);
 /// Of a fingertip that touches: the plant's distance less that of the declared shapes, m.
@@ -172,6 +170,8 @@ std::string DescribeFingertip(const StepAnalysis& step, int part);
 /// How far a joint is beyond its range, rad or m.
 Evaluation EvaluateJointLimit(const StepAnalysis& step);
 std::string DescribeJoint(const StepAnalysis& step, int part);
+/// "joint r_elbow", of the equation of motion that is worst.
+std::string DescribeEntry(const StepAnalysis& step, int part);
 /// "r_palm and bench", of the step's largest force between bodies.
 std::string DescribeCollision(const StepAnalysis& step, int part);
 /// Movement of joints that do not carry the object, since the beginning, rad.

@@ -52,6 +52,7 @@ const DeclaredStep& DeclaredPlant::Follow(const StepRecord& step) {
   step_.force.setZero();
   step_.push.setZero();
   step_.object_wrench.setZero();
+  step_.pushes = {};
   if (!disturbances_.empty()) {
     const std::span<const Wrench> wrenches = disturbances_.Evaluate(step.time, state);
     for (const Wrench& w : wrenches) {
@@ -59,6 +60,7 @@ const DeclaredStep& DeclaredPlant::Follow(const StepRecord& step) {
     }
     AddRobotForce(wrenches, model_.robot(), step_.force);
     step_.object_wrench = CalcObjectWrench(wrenches, state.X_Bo);
+    step_.pushes = disturbances_.Evaluate(step.time, step.reading);
   }
   return step_;
 }

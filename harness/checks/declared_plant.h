@@ -4,6 +4,8 @@
 // a second time beside the loop: declared causes raise no alarm, and what is hidden from the scenario is
 // still found.
 
+#include <span>
+
 #include "controller/control/controller.h"
 #include "controller/control/grasp_model.h"
 #include "harness/checks/step_record.h"
@@ -24,6 +26,8 @@ struct DeclaredStep {
   VectorXd force;                     ///< Declared pushes on the robot, as forces on xi (n).
   Vector3d push = Vector3d::Zero();   ///< Sum of those forces, world, N.
   Vector6d object_wrench = Vector6d::Zero();  ///< And on the object, Sigma_o.
+  /// All of them, where they act on the plant's bodies.
+  std::span<const Wrench> pushes;
 };
 
 /// Follows a loop with all that its scenario declares. Nothing allocates after the first step.

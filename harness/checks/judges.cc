@@ -35,19 +35,11 @@ class IdleJointsJudge final : public StatefulJudge {
 
 }  // namespace
 
-Evaluation EvaluateRobotDynamics(const StepAnalysis& step) {
-  if (step.mass_factor == nullptr) return std::nullopt;
-  const double left = step.robot_residual_norm;
-  return CheckValue{Worst(0.0, left - step.uneven_force) / step.balanced, -1,
-                    step.uneven_force / step.balanced, left / step.balanced};
-}
-
 Evaluation EvaluateRolling(const StepAnalysis& step) {
   if (step.step->response.wheels.size() != 2) return std::nullopt;
   const Vector2d beyond = step.wheel_mismatch.cwiseAbs() - step.wheel_slip;
   const int wheel = IsWorse(beyond[1], beyond[0]) ? 1 : 0;
-  // A wheel rolls on another radius also while its platform sinks or tilts under a force that changes.
-  return CheckValue{Worst(0.0, beyond[wheel] - step.sinking), -1, step.wheel_slip[wheel] + step.sinking,
+  return CheckValue{Worst(0.0, beyond[wheel]), -1, step.wheel_slip[wheel],
                     std::abs(step.wheel_mismatch[wheel])};
 }
 
@@ -101,6 +93,8 @@ Evaluation EvaluateJointLimit(const StepAnalysis& step) {
 std::string DescribeJoint(const StepAnalysis& step, int part) {
   return "joint " + Quote(step.setup->model().joint(part).name);
 }
+
+std::string DescribeEntry(const StepAnalysis& step, int part) { return step.whole->DescribeEntry(part); }
 
 std::string DescribeCollision(const StepAnalysis& step, int /*part*/) {
   const mjModel& m = step.setup->engine();

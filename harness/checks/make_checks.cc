@@ -42,22 +42,21 @@ std::set<std::string_view> ListMissing(const Setup& setup, const JudgedLaw* law)
                      "orientation_dynamics", "fingertip_slip", "fingertip_slip_rate", "cone_use",
                      "contacts_lost", "penetration", "kappa"});
   const bool stands = !setup.feet().empty();
-  leave_out(joints && !stands, {"contact_force"});
+  leave_out(joints && !stands, {"reduced_acceleration", "contact_force"});
   leave_out(!stands, {"foot_slip", "foot_slip_rate", "foot_cone_use", "feet_lost", "foot_penetration",
                       "foot_distance"});
   leave_out(stands, {"base_tilt"});
   leave_out(!joints, {"joint_dynamics"});
   leave_out(!setup.start().bonds.empty(),
             {"fingertip_slip_rate", "cone_use", "contacts_lost", "penetration", "kappa"});
-  // Without a task and without feet every step is judged.
-  leave_out(scenario.pick_task() == nullptr && !stands, {"excluded"});
   leave_out(setup.adapter().wheels().empty(), {"wheel_slip", "wheel_slip_rate", "rolling", "traction_use"});
   leave_out(setup.model().base().type == BaseType::kFixed, {"base_tilt"});
   leave_out(!scenario.grasp.hemisphere, {"fingertip_rim"});
   leave_out(!setup.has_object(), {"inverse_dynamics_object"});
   leave_out(!HoldsIdleJoints(setup), {"idle_joints"});
   // A rigid plant's wheels roll, its base is upright and its equations are solved, whatever happens.
-  leave_out(rigid, {"wheel_slip", "rolling", "wheel_slip_rate", "traction_use", "base_tilt", "solver"});
+  leave_out(rigid, {"mass_matrix", "bias_force", "equations_of_motion", "wheel_slip", "rolling",
+                    "wheel_slip_rate", "traction_use", "base_tilt", "solver"});
   leave_out(setup.robots().watched_pairs.empty(), {"clearance", "collision"});
   leave_out(!LetsBodiesPush(scenario.plant, setup.engine()), {"collision"});
   const mjModel& engine = setup.engine();
@@ -79,9 +78,7 @@ std::map<std::string_view, const char*> ListDescriptions(const Setup& setup) {
         {"law_torque",
          "torques sent, and forces asked of the ground, against the law computed from the engine's terms, "
          "relative to the forces balanced"},
-        {"inverse_dynamics_robot",
-         "what is left of the equations of motion with the engine's accelerations and foot forces, against "
-         "the forces balanced"},
+        {"inverse_dynamics_robot", "the robot's part of that, against the forces balanced"},
         {"reduced_acceleration", "xi_dot of the robot on rigid feet that do not slip, against the engine's"},
         {"contact_force",
          "forces of the feet of that system against the engine's, relative to them and the weight; where "
@@ -89,18 +86,14 @@ std::map<std::string_view, const char*> ListDescriptions(const Setup& setup) {
         {"solver", "what the engine's solver left over of its own equations of motion"}};
   }
   if (setup.joints() != nullptr) {
-    return {
-        {"closed_loop_spectral_radius",
-         "largest eigenvalue of the errors of the joints under the scenario's gains, sampled as the "
-         "controller does it"},
-        {"law_torque",
-         "torques sent against the law of the joints computed from the engine's terms, relative to the "
-         "forces balanced"},
-        {"inverse_dynamics_robot",
-         "what is left of the equations of motion with the engine's accelerations, against the forces "
-         "balanced"},
-        {"reduced_acceleration", "accelerations of the joints that the torques mean, against the engine's"},
-        {"solver", "what the engine's solver left over of its own equations of motion"}};
+    return {{"closed_loop_spectral_radius",
+             "largest eigenvalue of the errors of the joints under the scenario's gains, sampled as the "
+             "controller does it"},
+            {"law_torque",
+             "torques sent against the law of the joints computed from the engine's terms, relative to the "
+             "forces balanced"},
+            {"inverse_dynamics_robot", "the robot's part of that, against the forces balanced"},
+            {"solver", "what the engine's solver left over of its own equations of motion"}};
   }
   if (!setup.start().bonds.empty())
     return {{"fingertip_slip", "distance of the joined points on fingertip and object"}};
@@ -141,9 +134,9 @@ std::vector<Judge> MakeChecks(const Setup& setup, const JudgedLaw* law) {
     judge.record.unit = info.unit;
     judge.record.bound = FindBound(info, setup.scenario());
     // A rigid plant integrates the equations that its forces are put into.
-    judge.record.same_source = setup.scenario().plant.type == PlantType::kRigid &&
-                               (info.category == CheckCategory::kInverseDynamics ||
-                                info.category == CheckCategory::kForwardDynamics);
+    judge.record.same_source =
+        setup.scenario().plant.type == PlantType::kRigid &&
+        (info.category == CheckCategory::kInverseDynamics || info.meaning.rank == Rank::kPrediction);
     const bool has_contacts = setup.joints() == nullptr && setup.start().bonds.empty();
     judge.record.is_empty = info.name == "contact_distance" && !has_contacts;
     const auto own = descriptions.find(info.name);

@@ -25,6 +25,12 @@ double CalcRobotMass(const RobotModel& model) {
 
 }  // namespace
 
+Vector2d CalcRollingTwist(const Base& base, const VectorXd& xi) {
+  if (base.velocity == DriveVelocity::kTwist) return xi.head<2>();
+  const double r = base.wheel_radius;
+  return {0.5 * r * (xi[0] + xi[1]), r * (xi[0] - xi[1]) / base.wheel_distance};
+}
+
 StepAnalyzer::PartialDynamics::PartialDynamics(const Setup& setup, ContactSet set)
     : grasp(setup.declared_model(), setup.fingertips(), setup.declared_model().object()->body,
             setup.surface(), set),
@@ -37,12 +43,20 @@ StepAnalyzer::StepAnalyzer(const Setup& setup)
       clearance_(setup.engine(), setup.plant_adapter(), setup.robots().solids, setup.robots().watched_pairs),
       kinematics_(MakeData(setup.engine())),
       actuation_(setup.model()),
-      dynamics_(setup.model(), static_cast<int>(setup.fingertips().size())),
-      compliance_(setup) {
+      dynamics_(setup.model(), static_cast<int>(setup.fingertips().size())) {
   const Eigen::Index n = setup.model().num_velocities();
   for (VectorXd* vector : {&now_.applied_force, &now_.bias, &now_.robot_residual, &now_.findings.xi_dot_model,
-                           &spin_force_, &held_force_, &moving_, &momentum_, &acceleration_error_})
+                           &acceleration_error_, &solver_force_, &joint_force_})
     vector->setZero(n);
+  if (setup.scenario().plant.type != PlantType::kRigid) {
+    const MassProperties* const object = setup.has_object() ? &setup.declared_object().body : nullptr;
+    whole_ = std::make_unique<WholeRobot>(setup.declared_model(), object, setup.plant_adapter());
+    now_.whole = whole_.get();
+    rolling_ = std::make_unique<VelocityMap>(setup.plant_adapter(), Coordinates::kReduced);
+    for (VectorXd* vector : {&nu_dot_, &whole_residual_, &whole_size_, &whole_left_, &whole_pushed_})
+      vector->setZero(whole_->size());
+    engine_force_.setZero(setup.engine().nv);
+  }
   now_.contact_mismatch.setZero(static_cast<Eigen::Index>(setup.fingertips().size()));
   least_ = RoundingScales(setup.model()).CalcLeastForces();
   now_.setup = &setup;
@@ -54,8 +68,6 @@ StepAnalyzer::StepAnalyzer(const Setup& setup)
   const std::span<const int> feet = setup.feet();
   now_.findings.foot_slip.resize(feet.size());
   if (feet.empty()) return;
-  contact_count_ = static_cast<int>(feet.size());
-  for (int i = 0; i < contact_count_; ++i) now_.touching |= ContactSet{1} << (i % 32);
   ground_ =
       std::make_unique<GroundContacts>(setup.declared_model(), feet, setup.joints()->gains.stance->height);
   ground_dynamics_ = std::make_unique<GroundDynamics>(setup.declared_model(), static_cast<int>(feet.size()));
@@ -70,10 +82,7 @@ void StepAnalyzer::Reset() {
     std::ranges::fill(*slips, SlipState{});
   findings.contacts_lost = 0;
   findings.least_cone_margin = std::numeric_limits<double>::infinity();
-  findings.excluded_steps = 0;
   steps_ = 0;
-  now_.is_transient = false;
-  changed_at_ = -std::numeric_limits<double>::infinity();
 }
 
 void StepAnalyzer::Begin(const StepRecord& step, const DeclaredStep& declared) {
@@ -137,28 +146,15 @@ void StepAnalyzer::Analyze() {
   const StepRecord& step = *now_.step;
   CompareMotors();
   FindContacts();
-  FindTransient();
+  FindTouching();
   if (ground_) FindFeet();
-  if (step.response.wheels.size() == 2) {
-    const std::vector<EngineWheel>& wheels = setup_->adapter().wheels();
-    now_.wheel_rates = {wheels[0].axis.y() * step.reading.qvel[wheels[0].dof],
-                        wheels[1].axis.y() * step.reading.qvel[wheels[1].dof]};
-    now_.wheel_mismatch =
-        CalcRollingMismatch(setup_->model().base(), step.reading.state.xi, now_.wheel_rates);
-    // A tyre that gives rolls on a radius that is smaller by as much.
-    for (Eigen::Index k = 0; k < 2; ++k) {
-      const BodyContact& wheel = step.response.wheels[static_cast<size_t>(k)];
-      now_.wheel_slip[k] = wheel.slip.norm() + Worst(0.0, -wheel.distance) * std::abs(now_.wheel_rates[k]);
-    }
-  }
-  CalcContactBias(*setup_, step, *now_.declared->model, &now_.contact_bias);
-  // The engine constrains J xi_dot, where the model has J xi_dot + J_dot xi.
-  if (ground_) now_.contact_bias = ground_->J_dot_xi();
+  if (step.response.wheels.size() == 2) CalcRolling();
+  CalcContactBias();
   CalcAppliedForce();
-  // Soft contacts become only in some milliseconds what rigid ones are at once.
-  if (!now_.is_transient) Predict();
-  if (now_.mass_factor != nullptr) CalcRobotResidual();
-  if (now_.mass_factor != nullptr && !now_.is_transient) ComparePrediction();
+  if (whole_) CalcWholeResidual();
+  Predict();
+  CalcRobotResidual();
+  ComparePrediction();
   if (setup_->has_object()) CalcObjectResidual();
   now_.begins_holding = step.command.handling.holding && !was_holding_;
   was_holding_ = step.command.handling.holding;
@@ -168,39 +164,66 @@ void StepAnalyzer::Analyze() {
   ++steps_;
 }
 
-void StepAnalyzer::FindTransient() {
-  const Handling& handling = now_.step->command.handling;
-  const double time = now_.step->time;
-  ContactSet touching = 0;
-  const std::vector<PlantContact>& contacts = now_.step->response.contacts;
-  for (size_t i = 0; i < contacts.size(); ++i) {
-    if (contacts[i].touching) touching |= ContactSet{1} << i;
-  }
-  const std::vector<GroundContact>& feet = now_.step->response.feet;
-  for (size_t i = 0; i < feet.size(); ++i) {
-    if (feet[i].force.z() > 0.0) touching |= ContactSet{1} << (i % 32);
-  }
+void StepAnalyzer::FindTouching() {
   const PlantResponse& response = now_.step->response;
-  const bool is_supported = !response.support_wrench.isZero(0.0);
-  // What is put down touches at one point, then at more; of feet of several points one may lift a little.
-  if (handling.contacts != handling_.contacts || touching != now_.touching ||
-      is_supported != now_.is_supported || response.contact_count != contact_count_)
-    changed_at_ = time;
-  contact_count_ = response.contact_count;
-  handling_ = handling;
-  now_.touching = touching;
-  now_.is_supported = is_supported;
-  const bool is_transient = (handling.partial || ground_) && time - changed_at_ < kTransient;
-  if (is_transient && !now_.is_transient) transient_since_ = time;
-  now_.is_transient = is_transient;
-  now_.transient_time = is_transient ? time - transient_since_ : 0.0;
-  if (is_transient) ++now_.findings.excluded_steps;
+  now_.touching = 0;
+  for (size_t i = 0; i < response.contacts.size(); ++i) {
+    if (response.contacts[i].touching) now_.touching |= ContactSet{1} << i;
+  }
+  for (size_t i = 0; i < response.feet.size(); ++i) {
+    if (response.feet[i].force.z() > 0.0) now_.touching |= ContactSet{1} << (i % 32);
+  }
+  now_.is_supported = !response.support_wrench.isZero(0.0);
+}
+
+void StepAnalyzer::CalcRolling() {
+  const StepRecord& step = *now_.step;
+  const Base& base = setup_->model().base();
+  const Vector2d twist = CalcRollingTwist(base, step.reading.state.xi);
+  const double turn = 0.5 * base.wheel_distance * twist[1];
+  // A platform that tilts about the axle turns its wheels as well.
+  Vector3d velocity, omega;
+  setup_->adapter().GetBaseMotion(step.reading.qpos.data(), step.reading.qvel.data(), &velocity, &omega);
+  const double tilting = omega.dot(step.reading.X_W0.linear().col(1));
+  for (Eigen::Index k = 0; k < 2; ++k) {
+    const EngineWheel& engine = setup_->adapter().wheels()[static_cast<size_t>(k)];
+    const BodyContact& wheel = step.response.wheels[static_cast<size_t>(k)];
+    now_.wheel_rates[k] = engine.axis.y() * step.reading.qvel[engine.dof] + tilting;
+    now_.wheel_mismatch[k] = twist[0] + (k == 0 ? turn : -turn) - base.wheel_radius * now_.wheel_rates[k];
+    // A tyre that gives rolls on a radius that is smaller by as much.
+    now_.wheel_slip[k] = wheel.slip.norm() + Worst(0.0, -wheel.distance) * std::abs(now_.wheel_rates[k]);
+  }
+}
+
+void StepAnalyzer::CalcContactBias() {
+  VectorXd& bias = now_.contact_bias;
+  if (ground_) {
+    bias = ground_->J_dot_xi();
+    return;
+  }
+  const GraspTerms& grasp = *now_.grasp;
+  const PlantOptions& plant = setup_->scenario().plant;
+  bias = grasp.slip_bias();
+  if (plant.type == PlantType::kRigid) {
+    // It holds (46) whole; half of it under semi-implicit Euler, whose velocities are those of half a step
+    // before.
+    bias *= plant.integrator == Integrator::kSemiImplicitEuler ? 0.5 : 0.0;
+    return;
+  }
+  const Vector6d& V_Bo = grasp.V_Bo();
+  Vector3d turning = V_Bo.tail<3>().cross(V_Bo.head<3>());
+  if (setup_->model().base().type == BaseType::kDifferentialDrive) {
+    const Vector6d V_B0 = now_.robot->CalcLinkVelocity(-1);
+    turning -= now_.step->reading.state.X_Bo.linear().transpose() * V_B0.tail<3>().cross(V_B0.head<3>());
+  }
+  bias.noalias() += grasp.G().topRows<3>().transpose() * turning;
 }
 
 void StepAnalyzer::CalcAppliedForce() {
   VectorXd& force = now_.applied_force;
   actuation_.CalcForce(now_.step->drive.tau, force);
   force += now_.declared->force;
+  joint_force_.setZero();
   const VectorXd& friction = now_.step->response.dry_friction;
   const VectorXd& limits = now_.step->response.stop_force;
   if (friction.size() == 0 && limits.size() == 0) return;
@@ -211,20 +234,22 @@ void StepAnalyzer::CalcAppliedForce() {
     const Eigen::Index entry = model.num_base_velocities() + k;
     // No more than the parameters say, and where they say: what else is there stays to be found.
     if (friction.size() > 0)
-      force[entry] += std::clamp(friction[entry], -joint.dry_friction, joint.dry_friction);
+      joint_force_[entry] += std::clamp(friction[entry], -joint.dry_friction, joint.dry_friction);
     if (limits.size() == 0 || joint.type == JointType::kBall) continue;
     const double q = now_.step->reading.state.q[model.position_index(j)];
-    if (q < joint.lower || q > joint.upper) force[entry] += limits[entry];
+    if (q < joint.lower || q > joint.upper) joint_force_[entry] += limits[entry];
   }
+  force += joint_force_;
 }
 
 void StepAnalyzer::Predict() {
   if (ground_) return PredictStance();
   const bool whole = now_.touching == AllContacts(now_.grasp->num_contacts());
-  if (handling_.partial && !whole && now_.touching != 0) return PredictPart();
+  const bool partial = now_.step->command.handling.partial;
+  if (partial && !whole && now_.touching != 0) return PredictPart();
   const bool holds = now_.grasp->num_contacts() > 0;
   const Prediction* prediction = nullptr;
-  if (holds && (!handling_.partial || (whole && !now_.is_supported))) {
+  if (holds && (!partial || (whole && !now_.is_supported))) {
     prediction = &dynamics_.Predict(*now_.robot, *now_.grasp, now_.applied_force, ObjectSupport::kHand,
                                     nullptr, &now_.declared->object_wrench);
   } else if (holds && whole) {
@@ -263,76 +288,69 @@ void StepAnalyzer::CalcRobotResidual() {
   const PlantResponse& response = now_.step->response;
   now_.bias = now_.robot->gravity() + now_.robot->friction();
   now_.bias.noalias() += now_.robot->C() * now_.robot->velocity();
-  // (48): M_bar' xi_dot + C_bar' xi + F_bar' + J_B'^T f_c - E_bar' tau'
   VectorXd& residual = now_.robot_residual;
-  residual = now_.bias - now_.applied_force;
-  residual.noalias() += now_.robot->M() * response.xi_dot;
-  residual.noalias() += now_.grasp->J_B().transpose() * now_.findings.f_c;
-  if (ground_) residual.noalias() -= ground_->J().transpose() * now_.findings.foot_force;
-  if (response.departure_force.size() > 0) residual += response.departure_force;
-  if (response.solver_force.size() > 0) residual -= response.solver_force;
-  if (response.wheels.size() == 2) {
-    // Friction of wheels that spin, which (48) has at the rates of (1): r (thetadot - thetadot of a wheel
-    // that rolls) is what is left of (1), the other way round.
-    spin_force_.setZero();
-    for (Eigen::Index k = 0; k < 2; ++k) {
-      const double damping =
-          setup_->engine().dof_damping[setup_->adapter().wheels()[static_cast<size_t>(k)].dof];
-      spin_force_[k] = -damping * now_.wheel_mismatch[k] / setup_->model().base().wheel_radius;
-    }
-    actuation_.CalcForce(spin_force_, spin_force_);
-    residual += spin_force_;
+  if (whole_ == nullptr) {
+    // (48): M_bar' xi_dot + C_bar' xi + F_bar' + J_B'^T f_c - E_bar' tau'
+    residual = now_.bias - now_.applied_force;
+    residual.noalias() += now_.robot->M() * response.xi_dot;
+    residual.noalias() += now_.grasp->J_B().transpose() * now_.findings.f_c;
   }
   const double least = Worst(kLeastBias * Norm(now_.applied_force), Norm(least_));
   now_.balanced = Worst(Norm(now_.bias), least, kTiny);
   now_.robot_residual_norm = Norm(residual);
-  now_.uneven_force = CalcUnevenForce() + CalcSwingForce();
-  now_.robot_solver = response.solver_force.size() > 0 ? Norm(response.solver_force) / now_.balanced : 0.0;
-  held_force_ = now_.bias - now_.applied_force;
-  compliance_.Follow(*now_.step, *now_.declared, now_.contact_bias, held_force_, now_.findings.f_c_model,
-                     now_.uneven_force, [this](const VectorXd& f) { return Norm(f); });
-  now_.acceleration_compliance = compliance_.motion() / now_.balanced;
-  now_.sinking = compliance_.sinking();
+  now_.robot_solver = Norm(solver_force_) / now_.balanced;
 }
 
-double StepAnalyzer::CalcUnevenForce() {
-  // In |.|_M^-1 the force of an acceleration a that all masses feel is at most a sqrt(m): a tilt by theta
-  // gives gravity g theta along the floor, and tyres that slip by v in a turn at w give 2 v w.
+void StepAnalyzer::CalcWholeResidual() {
   const StepRecord& step = *now_.step;
-  double slip = 0.0;
-  for (const BodyContact& wheel : step.response.wheels) slip = Worst(slip, wheel.slip.norm());
-  const double turn = step.response.wheels.empty()
-                          ? 0.0
-                          : std::abs(CalcRollingTwist(setup_->model().base(), step.reading.state.xi)[1]);
-  const double g = setup_->model().gravity().norm();
-  // Traction acts in the middle of how far a tyre has sunk, and not at the whole radius: f_t / r times half
-  // of that, with the robot's weight on a floor of mu <= 1.
-  double sunk = 0.0;
-  for (const BodyContact& wheel : step.response.wheels)
-    sunk += Worst(0.0, -0.5 * wheel.distance) * wheel.cone_use;
-  if (sunk > 0.0) {
-    sunk *=
-        mass_ * g / setup_->model().base().wheel_radius / std::sqrt(setup_->model().base_with_wheels().mass);
-  }
-  return (g * step.reading.departure.tilt + 2.0 * slip * turn) * std::sqrt(mass_) + sunk;
-}
+  const PlantResponse& response = step.response;
+  WholeRobot& whole = *whole_;
+  const Eigen::Index n = whole.robot_size();
+  whole.SetState(step.reading.qpos.data(), step.reading.qvel.data());
+  whole.ReadRates(response.qacc.data(), &nu_dot_);
+  whole.ReadForces(response.left_over.data(), &whole_left_);
+  now_.mass_error = whole.CompareMass(response.mass);
+  now_.bias_error = whole.CompareBias(response.bias);
 
-double StepAnalyzer::CalcSwingForce() {
-  // A platform that tilts at a rate gives all that turns with it, or moves on it, at v a Coriolis
-  // acceleration of at most twice that rate times |v|. Over all masses |v| is |.|_M of xi without the way
-  // forward, sqrt(2 E) of its kinetic energy.
-  const StepRecord& step = *now_.step;
-  if (step.response.wheels.size() != 2) return 0.0;
-  moving_ = step.reading.state.xi;
-  if (setup_->model().base().velocity == DriveVelocity::kTwist) {
-    moving_[0] = 0.0;
-  } else {
-    moving_.head<2>().array() -= moving_.head<2>().mean();
+  VectorXd& residual = whole_residual_;
+  residual = whole.bias() - whole_left_;
+  whole.AddInertia(nu_dot_, &residual);
+  whole_size_ = whole_left_.cwiseAbs();
+  whole.AddSizes(nu_dot_, &whole_size_);
+  // What motors, and joints' own friction and limits, give as far as the parameters have it.
+  const auto apply = [&](Eigen::Index entry, double force) {
+    residual[entry] -= force;
+    whole_size_[entry] += std::abs(force);
+  };
+  const std::vector<Eigen::Index>& entries = whole.motor_entries();
+  for (size_t i = 0; i < entries.size(); ++i) {
+    const auto k = static_cast<Eigen::Index>(i);
+    if (entries[i] >= 0) apply(entries[i], step.drive.tau[k] + joint_force_[k]);
   }
-  momentum_.noalias() = now_.robot->M() * moving_;
-  Vector3d velocity, omega;
-  setup_->adapter().GetBaseMotion(step.reading.qpos.data(), step.reading.qvel.data(), &velocity, &omega);
-  return 2.0 * omega.head<2>().norm() * std::sqrt(Worst(0.0, moving_.dot(momentum_)));
+  whole.ClearForces();
+  for (const BodyForce& force : response.forces) whole.AddForce(force);
+  for (const Wrench& push : now_.declared->pushes) {
+    const BodyForce force{-1, push.point, push.force, push.torque};
+    push.body == Wrench::kObject ? whole.AddObjectForce(force) : whole.AddLinkForce(push.body, force);
+  }
+  whole_pushed_.setZero();
+  whole.ProjectForces(&whole_pushed_, &whole_size_);
+  residual -= whole_pushed_;
+  now_.whole_residual = {0.0, -1};
+  for (Eigen::Index i = 0; i < residual.size(); ++i) {
+    const double left = std::abs(residual[i]) / Positive(whole_size_[i]);
+    if (IsWorse(left, now_.whole_residual.first)) now_.whole_residual = {left, static_cast<int>(i)};
+  }
+
+  // (48) and (19): the same in the paper's coordinates.
+  rolling_->SetState(step.reading.state.q, step.reading.state.xi);
+  whole.WriteForces(residual, &engine_force_);
+  rolling_->ProjectForce(engine_force_.data(), now_.robot_residual);
+  rolling_->ProjectForce(response.left_over.data(), solver_force_);
+  if (!setup_->has_object()) return;
+  const Matrix3d R_oB = step.reading.state.X_Bo.linear().transpose();
+  now_.object_residual << R_oB * residual.segment<3>(n), residual.tail<3>();
+  object_left_ << R_oB * whole_left_.segment<3>(n), whole_left_.tail<3>();
 }
 
 void StepAnalyzer::ComparePrediction() {
@@ -349,16 +367,12 @@ void StepAnalyzer::ComparePrediction() {
     const double scale = Worst(findings.foot_force.norm(), weight, kTiny);
     now_.contact_force_error =
         has_forces ? (findings.foot_force_model - findings.foot_force).norm() / scale : 0.0;
-    // J^T (f - f_model) is M_bar' times the accelerations' error.
-    now_.contact_force_compliance =
-        has_forces ? ground_dynamics_->CalcForceGain() * compliance_.motion() / scale : 0.0;
     return;
   }
   double scale = Worst(findings.f_c.norm(), kTiny);
   // Fingertips that only touch push with less than what they will bear.
-  if (handling_.partial) scale = Worst(scale, CalcWeight());
+  if (now_.step->command.handling.partial) scale = Worst(scale, CalcWeight());
   now_.contact_force_error = (findings.f_c_model - findings.f_c).norm() / scale;
-  now_.contact_force_compliance = compliance_.force() / scale;
 }
 
 double StepAnalyzer::CalcWeight() const {
@@ -378,11 +392,13 @@ void StepAnalyzer::CalcObjectResidual() {
     return Worst(wrench.head<3>().norm(), wrench.tail<3>().norm() / arm) /
            Worst(CalcWeight(), now_.findings.f_c.norm());
   };
-  now_.object_residual = body.M_hat * response.V_Bo_dot + body.C_hat * grasp.V_Bo() + body.N_o -
-                         grasp.G() * now_.findings.f_c - response.support_wrench - response.solver_residual -
-                         now_.declared->object_wrench;
+  if (whole_ == nullptr) {
+    now_.object_residual = body.M_hat * response.V_Bo_dot + body.C_hat * grasp.V_Bo() + body.N_o -
+                           grasp.G() * now_.findings.f_c - response.support_wrench -
+                           now_.declared->object_wrench;
+  }
   now_.object_residual_size = relative(now_.object_residual);
-  now_.object_solver = relative(response.solver_residual);
+  now_.object_solver = relative(object_left_);
 }
 
 }  // namespace dexcheck

@@ -13,17 +13,18 @@
 #include "controller/control/actuation.h"
 #include "controller/control/constrained_dynamics.h"
 #include "controller/handling/handling_controller.h"
-#include "harness/checks/contact_compliance.h"
 #include "harness/checks/declared_plant.h"
 #include "harness/checks/step_record.h"
+#include "harness/checks/whole_robot.h"
 #include "harness/engine/clearance.h"
+#include "harness/engine/velocity_map.h"
 #include "harness/scenario/setup.h"
 
 namespace dexcheck {
 
-/// How long inverse and forward dynamics are not judged after a contact has come, gone or been let go: soft
-/// contacts need some milliseconds to become what rigid ones are at once. s.
-inline constexpr double kTransient = 0.05;
+/// [v; w], m/s and rad/s, of a platform that rolls, (1). @param xi starts with the base's velocity.
+Vector2d CalcRollingTwist(const Base& base, const VectorXd& xi);
+
 /// Distances are judged from a place between half of this and this ago, s.
 inline constexpr double kSlipWindow = 10.0;
 
@@ -73,15 +74,15 @@ struct StepAnalysis {
   // Contacts.
   ContactSet touching = 0;      ///< Fingertips that touch the object, or feet that bear something.
   bool is_supported = false;    ///< Whether anything else does.
-  bool is_transient = false;    ///< Whether contacts of a task or a stance have just changed.
-  double transient_time = 0.0;  ///< How long it has been so in one go, s.
   bool begins_holding = false;  ///< Whether all fingertips should touch the object from this step on.
   bool is_window_end = false;  ///< Whether the window that distances are judged over moves on after the step.
   int contacts_missing = 0;    ///< Fingertips that do not touch.
   double penetration = 0.0;    ///< Deepest overlap of a fingertip and the object, m.
   /// Distance of each fingertip that touches, by the plant less by the declared shapes (N), m; else 0.
   VectorXd contact_mismatch;
-  VectorXd contact_bias;  ///< CalcContactBias (3N).
+  /// J_dot qvel of the plant's constraints at the fingertips (3N), or the feet, m/s^2: the model's rates of
+  /// velocities along axes that turn have w x v of object and platform, the engine's have not.
+  VectorXd contact_bias;
   SlipSummary fingertips, wheels, feet;
   double foot_gap = 0.0;          ///< Largest gap of a foot of a robot that stands and the ground, m.
   double foot_penetration = 0.0;  ///< Deepest overlap of a foot and the ground, m.
@@ -89,9 +90,10 @@ struct StepAnalysis {
   std::pair<double, int> foot_mismatch;
 
   // Wheels.
-  Vector2d wheel_rates = Vector2d::Zero();     ///< Of the right and left wheel, rad/s.
-  Vector2d wheel_mismatch = Vector2d::Zero();  ///< CalcRollingMismatch, m/s.
-  Vector2d wheel_slip = Vector2d::Zero();      ///< What of that slipping and sinking may be, m/s.
+  Vector2d wheel_rates = Vector2d::Zero();  ///< Of the right and left wheel against the ground, rad/s.
+  /// v +- w b / 2 - r thetadot of the right and the left wheel, (1), m/s.
+  Vector2d wheel_mismatch = Vector2d::Zero();
+  Vector2d wheel_slip = Vector2d::Zero();  ///< What of that slipping and tyres that give may be, m/s.
 
   // Dynamics: (48) and (19) with the plant's accelerations and contact forces.
   VectorXd applied_force;  ///< E_bar' tau' + pushes that are declared + dry friction and joint limits (n).
@@ -101,18 +103,20 @@ struct StepAnalysis {
   double balanced = 1.0;              ///< |bias|_M^-1, at least that of RoundingScales::CalcLeastForces.
   VectorXd robot_residual;            ///< M_bar' xi_dot + bias + J_B'^T f_c - applied_force (n) of (48).
   double robot_residual_norm = kNaN;  ///< Of that, |.|_M^-1.
-  double uneven_force = 0.0;          ///< Largest that tilt, slip and sinking of the platform can make of it.
+  /// The largest that is left of the equations of motion of the whole robot and its object (WholeRobot), over
+  /// the sizes that it is the sum of, and which entry of nu it is.
+  std::pair<double, int> whole_residual = {kNaN, -1};
+  /// Its M, and its Coriolis forces, gravity and friction, against the engine's, likewise.
+  std::pair<double, int> mass_error = {kNaN, -1}, bias_error = {kNaN, -1};
+  const WholeRobot* whole = nullptr;  ///< Null for a plant that is not the engine's.
   double robot_solver = kNaN;  ///< What the plant's solver left over for the robot, relative to `balanced`.
   Vector6d object_residual = Vector6d::Zero();  ///< M_hat V_o_dot + C_hat V_o + N_o - G f_c - ... of (19).
   double object_residual_size = kNaN;           ///< Relative, as forces at the contacts' arm.
   double object_solver = kNaN;                  ///< What the plant's solver left over, likewise.
 
-  // Prediction: what the rigid constrained system does under the same torques. Not in a transient.
-  double acceleration_error = kNaN;      ///< |xi_dot_model - xi_dot|_M relative to `balanced`.
-  double contact_force_error = kNaN;     ///< |f_c_model - f_c|, relative.
-  double acceleration_compliance = 0.0;  ///< What contacts that give can make of each.
-  double contact_force_compliance = 0.0;
-  double sinking = 0.0;  ///< How fast the platform sinks and tilts, m/s.
+  // What the rigid constrained system does under the same torques.
+  double acceleration_error = kNaN;   ///< |xi_dot_model - xi_dot|_M relative to `balanced`.
+  double contact_force_error = kNaN;  ///< |f_c_model - f_c|, relative.
 
   // Law, motors and sensors.
   double measurement_error =
@@ -134,8 +138,7 @@ struct StepAnalysis {
 /// contacts comes up for the first time.
 ///
 /// For a task, each step is predicted with the contacts that it has: (46) for the fingertips that touch, and
-/// an object that does not move while it lies on something. For kTransient after a contact of it has come,
-/// gone or been let go, or a foot's, there is no prediction.
+/// an object that does not move while it lies on something.
 class StepAnalyzer {
  public:
   explicit StepAnalyzer(const Setup& setup);
@@ -166,14 +169,14 @@ class StepAnalyzer {
   void MeasureClearance();
   void CompareMotors();
   void FindContacts();
-  void FindTransient();
+  void FindTouching();
+  void CalcRolling();
+  void CalcContactBias();
   void CalcAppliedForce();
   void Predict();
   void PredictPart();
   void CalcRobotResidual();
-  /// Of a platform that tilts, and on tyres that slip and sink, in |.|_M^-1.
-  [[nodiscard]] double CalcUnevenForce();
-  [[nodiscard]] double CalcSwingForce();
+  void CalcWholeResidual();
   void ComparePrediction();
   void CalcObjectResidual();
   void FindFeet();
@@ -198,18 +201,18 @@ class StepAnalyzer {
   MjDataPtr kinematics_;  // of a plant that has no bodies of the engine's
   ActuationMap actuation_;
   ConstrainedDynamics dynamics_;
+  std::unique_ptr<WholeRobot> whole_;     // null for a plant that is not the engine's
+  std::unique_ptr<VelocityMap> rolling_;  // likewise
+  VectorXd nu_dot_, whole_residual_, whole_size_, whole_left_, whole_pushed_;  // of nu
+  VectorXd engine_force_, solver_force_, joint_force_;                         // nv, n, n
+  Vector6d object_left_ = Vector6d::Zero();
   std::unique_ptr<GroundContacts> ground_;  // null for a robot that does not stand
   std::unique_ptr<GroundDynamics> ground_dynamics_;
   std::map<ContactSet, std::unique_ptr<PartialDynamics>> parts_;
-  PredictionCompliance compliance_;
-  Handling handling_;         // of the step before
-  int contact_count_ = 0;     // likewise, of all of the engine's; first the feet
-  bool was_holding_ = false;  // likewise
-  double changed_at_ = -std::numeric_limits<double>::infinity();  // the contacts, s
-  double transient_since_ = 0.0;                                  // s
+  bool was_holding_ = false;  // at the step before
   long steps_ = 0;
-  VectorXd spin_force_, held_force_, moving_, momentum_, acceleration_error_;  // n
-  VectorXd least_;  // n, RoundingScales::CalcLeastForces
+  VectorXd acceleration_error_;  // n
+  VectorXd least_;               // n, RoundingScales::CalcLeastForces
   VectorXd norm_work_;
 };
 

@@ -70,8 +70,7 @@ struct StepFindings {
   VectorXd foot_force, foot_force_model;
 
   // Of all steps so far.
-  long excluded_steps = 0;  ///< Whose balance and prediction were not judged: contacts had just changed.
-  long contacts_lost = 0;   ///< Contacts of fingertips that broke.
+  long contacts_lost = 0;                                              ///< Contacts of fingertips that broke.
   double least_cone_margin = std::numeric_limits<double>::infinity();  ///< Of a fingertip, N.
 };
 

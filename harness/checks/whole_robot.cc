@@ -3,7 +3,10 @@
 #include <cmath>
 #include <utility>
 
+#include "controller/common/text.h"
+#include "harness/base/worst.h"
 #include "harness/engine/map_vector.h"
+#include "harness/engine/mujoco_release.h"
 
 namespace dexcheck {
 namespace {
@@ -85,6 +88,11 @@ WholeRobot::WholeRobot(const RobotModel& model, const MassProperties* object, co
   for (size_t k = 0; k < adapter.wheels().size(); ++k) {
     if (adapter.wheels()[k].axis.y() < 0.0) signs_[static_cast<Eigen::Index>(k)] = -1.0;
   }
+  // A floating base has entries of tau' without motors; a differential drive's are those of its wheels.
+  if (model.base().type != BaseType::kDifferentialDrive)
+    motor_entries_.assign(static_cast<size_t>(model.num_base_velocities()), -1);
+  for (Eigen::Index k = 0; k < signs_.size(); ++k) motor_entries_.push_back(base + k);
+
   body_links_.assign(static_cast<size_t>(engine.nbody), kNoLink);
   for (size_t link = 0; link < adapter.welded_bodies().size(); ++link) {
     const int index = link == 0 ? -1 : static_cast<int>(link) - 1 + num_wheels_;
@@ -101,9 +109,48 @@ WholeRobot::WholeRobot(const RobotModel& model, const MassProperties* object, co
   }
 
   const Eigen::Index n = terms_.size(), all = n + (object_ ? 6 : 0);
+  mass_scales_.resize(n, n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    for (Eigen::Index j = 0; j < n; ++j)
+      mass_scales_(i, j) = scales_.CalcMassScale(static_cast<int>(i), static_cast<int>(j));
+  }
+  ListMass();
   q_.setZero(model_.num_positions());
-  for (VectorXd* vector : {&nu_, &bias_}) vector->setZero(all);
+  for (VectorXd* vector : {&nu_, &bias_, &engine_bias_}) vector->setZero(all);
+  sizes_.setZero(n);
   loads_.resize(static_cast<size_t>(model_.num_joints()) + 1);
+}
+
+void WholeRobot::ListMass() {
+  const mjModel& engine = adapter_->engine();
+  const Eigen::Index base = base_rates_.rows();
+  std::vector<Eigen::Index> entries(static_cast<size_t>(engine.nv), -1);
+  if (model_.base().type == BaseType::kFloating) {
+    for (Eigen::Index k = 0; k < base; ++k)
+      entries[static_cast<size_t>(base_dofs_[static_cast<size_t>(k)])] = k;
+  }
+  for (size_t k = 0; k < dofs_.size(); ++k)
+    entries[static_cast<size_t>(dofs_[k])] = base + static_cast<Eigen::Index>(k);
+  const auto sign = [&](Eigen::Index entry) { return entry < base ? 1.0 : signs_[entry - base]; };
+  for (int dof = 0; dof < engine.nv; ++dof) {
+    const Eigen::Index row = entries[static_cast<size_t>(dof)];
+    int steps = 0;
+    for (int other = dof; row >= 0 && other >= 0; other = engine.dof_parentid[other], ++steps) {
+      const Eigen::Index col = entries[static_cast<size_t>(other)];
+      const int address = FindMassEntry(engine, dof, steps);
+      if (col >= 0 && address >= 0) mass_entries_.push_back({row, col, address, sign(row) * sign(col)});
+    }
+  }
+}
+
+std::string WholeRobot::DescribeEntry(int entry) const {
+  const int base = model_.num_base_velocities(), n = model_.num_velocities();
+  const auto describe = [](const std::string& body, int k) {
+    return body + (k < 3 ? ", along " : ", about its ") + std::string(1, "xyz"[k % 3]);
+  };
+  if (entry >= n) return describe("object", entry - n);
+  if (entry >= base) return "joint " + Quote(model_.dof_name(entry - base));
+  return describe("base", base == 3 && entry == 2 ? 5 : entry);
 }
 
 void WholeRobot::SetState(const mjtNum* qpos, const mjtNum* qvel) {
@@ -167,8 +214,9 @@ void WholeRobot::ClearForces() {
   object_load_ = {};
 }
 
-void WholeRobot::AddForce(const BodyForce& one) {
-  const int link = body_links_[static_cast<size_t>(one.body)];
+void WholeRobot::AddForce(const BodyForce& one) { AddForce(body_links_[static_cast<size_t>(one.body)], one); }
+
+void WholeRobot::AddForce(int link, const BodyForce& one) {
   if (link == kNoLink) return;
   const Vector3d origin =
       link == kObject ? Vector3d(X_Bo_.translation()) : Vector3d(terms_.CalcLinkPose(link).translation());
@@ -216,5 +264,43 @@ void WholeRobot::ProjectForces(VectorXd* result, VectorXd* size) {
 }
 
 double WholeRobot::CalcObjectArm() const { return std::sqrt(object_->inertia.trace() / object_->mass); }
+
+std::pair<double, int> WholeRobot::CompareMass(const VectorXd& mass) const {
+  std::pair<double, int> worst(0.0, -1);
+  for (const MassEntry& one : mass_entries_) {
+    const double apart = std::abs(terms_.M()(one.row, one.col) - one.sign * mass[one.address]);
+    const double error = apart / Positive(mass_scales_(one.row, one.col));
+    if (IsWorse(error, worst.first)) worst = {error, static_cast<int>(one.row)};
+  }
+  return worst;
+}
+
+std::pair<double, int> WholeRobot::CompareBias(const VectorXd& bias) {
+  ReadForces(bias.data(), &engine_bias_);
+  std::pair<double, int> worst(0.0, -1);
+  for (int i = 0; i < static_cast<int>(terms_.size()); ++i) {
+    const double error = std::abs(bias_[i] - engine_bias_[i]) / Positive(CalcBiasSize(i));
+    if (IsWorse(error, worst.first)) worst = {error, i};
+  }
+  return worst;
+}
+
+double WholeRobot::CalcBiasSize(int entry) const {
+  return scales_.CalcGravityScale(entry) + scales_.CalcCoriolisScale(entry) +
+         std::abs(terms_.friction()[entry]);
+}
+
+void WholeRobot::AddSizes(const VectorXd& nu_dot, VectorXd* result) {
+  const Eigen::Index n = terms_.size();
+  sizes_ = nu_dot.head(n).cwiseAbs();
+  result->head(n).noalias() += mass_scales_ * sizes_;
+  for (int i = 0; i < static_cast<int>(n); ++i) (*result)[i] += CalcBiasSize(i);
+  if (!object_) return;
+  const double force = object_->mass * (model_.gravity().norm() + nu_dot.segment<3>(n).norm());
+  const double omega = nu_.tail<3>().norm();
+  result->segment<3>(n).array() += force;
+  result->tail<3>().array() +=
+      force * CalcObjectArm() + object_->inertia.trace() * (nu_dot.tail<3>().norm() + omega * omega);
+}
 
 }  // namespace dexcheck

@@ -6,22 +6,17 @@
 #include <mujoco/mujoco.h>
 
 #include <optional>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "controller/dynamics/model_terms.h"
 #include "controller/model/robot_model.h"
 #include "harness/checks/rounding_scales.h"
 #include "harness/engine/adapter.h"
+#include "harness/plant/plant.h"
 
 namespace dexcheck {
-
-/// A force and a torque on one of the engine's bodies, in world axes.
-struct BodyForce {
-  int body = 0;
-  Vector3d point = Vector3d::Zero();   ///< Where the force acts, m.
-  Vector3d force = Vector3d::Zero();   ///< N.
-  Vector3d torque = Vector3d::Zero();  ///< N m.
-};
 
 /// The robot of a parameter file before the paper's constraint (1) reduces it: a base that moves as the
 /// engine's does, freely, in the plane or not at all, and the wheels of a differential drive as joints in
@@ -46,6 +41,9 @@ class WholeRobot {
   [[nodiscard]] Eigen::Index size() const { return bias_.size(); }
   [[nodiscard]] Eigen::Index robot_size() const { return terms_.size(); }
 
+  /// "base, along x", "joint NAME", "object, about its z": an entry of nu.
+  [[nodiscard]] std::string DescribeEntry(int entry) const;
+
   /// Evaluates all terms at the engine's state. @param qpos, qvel as the engine's (nq, nv).
   void SetState(const mjtNum* qpos, const mjtNum* qvel);
   /// M of the robot's entries.
@@ -61,16 +59,38 @@ class WholeRobot {
   void ReadForces(const mjtNum* forces, VectorXd* result) const { ReadRates(forces, result); }
   /// Forces on the robot's part of nu as the engine's (nv); other entries are zero.
   void WriteForces(const VectorXd& forces, VectorXd* engine) const;
+  /// Where nu has the entries of tau' and xi: of wheels and joints; -1 of a base's.
+  [[nodiscard]] const std::vector<Eigen::Index>& motor_entries() const { return motor_entries_; }
+
+  // The engine's M and bias at the same state.
+  /// The largest difference of an entry of M from the engine's, over the size that the entry is summed up
+  /// from, and its row. @param mass the engine's entries (GetMassEntries). A planar base's, whose joints may
+  /// turn with it, are M_bar's alone.
+  [[nodiscard]] std::pair<double, int> CompareMass(const VectorXd& mass) const;
+  /// Likewise of bias(). @param bias the engine's forces (nv): Coriolis, gravity, less the passive ones.
+  [[nodiscard]] std::pair<double, int> CompareBias(const VectorXd& bias);
 
   /// Forgets all forces on bodies.
   void ClearForces();
   /// A force and a torque on one of the engine's bodies, at a point of the world. Bodies that are part of
   /// neither robot nor object have none.
   void AddForce(const BodyForce& one);
+  /// The same on a link of the parameter file's model, by the index of its joint; -1 is the base.
+  void AddLinkForce(int link, const BodyForce& one) { AddForce(link < 0 ? link : link + num_wheels_, one); }
+  void AddObjectForce(const BodyForce& one) { AddForce(kObject, one); }
   /// result += J^T f of all of them, size += the sum of the magnitudes that this came from; both size().
   void ProjectForces(VectorXd* result, VectorXd* size);
 
+  /// result += what M nu_dot and bias() are sums of, by entry: errors of rounding are relative to that.
+  void AddSizes(const VectorXd& nu_dot, VectorXd* result);
+
  private:
+  /// Where the engine has an entry of M, and the sign of its axes.
+  struct MassEntry {
+    Eigen::Index row, col;
+    int address;
+    double sign;
+  };
   struct Load {
     Vector3d force = Vector3d::Zero(), moment = Vector3d::Zero();  // world, about the link's origin
     double size = 0.0;                                             // sum of |force| + |moment| / length, N
@@ -78,7 +98,10 @@ class WholeRobot {
 
   /// Beside the indices of joints, and -1 for the base.
   static constexpr int kNoLink = -2, kObject = -3;
+  void AddForce(int link, const BodyForce& one);
   [[nodiscard]] double CalcObjectArm() const;  // m
+  [[nodiscard]] double CalcBiasSize(int entry) const;
+  void ListMass();
 
   const Adapter* adapter_;
   int num_wheels_;
@@ -86,12 +109,15 @@ class WholeRobot {
   ModelTerms terms_;
   RoundingScales scales_;
   std::optional<MassProperties> object_;
-  std::vector<int> base_dofs_;   // the engine's
-  MatrixXd base_rates_;          // the engine's rates of the base's joints from nu's
-  std::vector<int> dofs_;        // the engine's of wheels and joints, in nu's order
-  VectorXd signs_;               // of those
+  std::vector<int> base_dofs_;  // the engine's
+  MatrixXd base_rates_;         // the engine's rates of the base's joints from nu's
+  std::vector<int> dofs_;       // the engine's of wheels and joints, in nu's order
+  VectorXd signs_;              // of those
+  std::vector<Eigen::Index> motor_entries_;
   std::vector<int> body_links_;  // by the engine's bodies; kNoLink, kObject
-  VectorXd q_, nu_, bias_;
+  MatrixXd mass_scales_;         // of M's entries
+  std::vector<MassEntry> mass_entries_;
+  VectorXd q_, nu_, bias_, engine_bias_, sizes_;
   Pose X_Bo_ = Pose::Identity();
   std::vector<Load> loads_;  // of the base, then by joint
   Load object_load_;

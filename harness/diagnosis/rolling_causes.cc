@@ -2,7 +2,7 @@
 #include <cmath>
 #include <tuple>
 
-#include "harness/checks/contact_compliance.h"
+#include "harness/checks/step_analysis.h"
 #include "harness/diagnosis/run_causes.h"
 #include "harness/diagnosis/telling.h"
 
@@ -73,7 +73,7 @@ Causes ExplainRolling(const StepStore& store) {
       candidates[static_cast<size_t>(2 + wheel)].columns(row, 0) = rate;
     }
   }
-  // Slip and sinking change with the load, in some steps.
+  // Slip changes with the load, in some steps.
   constexpr double kAlike = 8.0;
   if (y.squaredNorm() <= static_cast<double>(y.size())) return {};
   const CauseOptions options{.most_terms = 3, .alike = std::min(kAlike, static_cast<double>(count))};

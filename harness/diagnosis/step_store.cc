@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "harness/checks/check_table.h"
+#include "harness/checks/rounding_scales.h"
 
 namespace dexcheck {
 namespace {
@@ -16,7 +17,7 @@ constexpr const char* kContactEntries[][2] = {
 constexpr Eigen::Index kContactSize = std::size(kContactEntries);
 constexpr Eigen::Index kObjectSize = 12, kTouchSize = 2;
 
-/// Wheels of right runs roll to this fraction of the check's bound, and what slipping and sinking are.
+/// Wheels of right runs roll to this fraction of the check's bound, and what slipping is.
 constexpr double kRollingRounding = 0.01;
 
 template <typename Range>
@@ -27,7 +28,11 @@ Eigen::Index CountOf(const Range& range) {
 }  // namespace
 
 StepStore::StepStore(const Setup& setup, const JudgedLaw* law, double rolling_bound)
-    : setup_(&setup), law_(law), rolling_bound_(rolling_bound), actuation_(setup.model()) {
+    : setup_(&setup),
+      law_(law),
+      rolling_bound_(rolling_bound),
+      root_mass_(std::sqrt(RoundingScales(setup.model()).total_mass())),
+      actuation_(setup.model()) {
   NameReadings();
   const RobotModel& model = setup.model();
   const Eigen::Index n = model.num_velocities(), m = CountOf(readings_);
@@ -178,7 +183,15 @@ void StepStore::Pack(const StepRecord& step, const StepAnalysis& now, Judged jud
     // As the bounds of the inverse dynamics have it, an entry.
     at(kNoise) << 1e-6 * now.balanced / std::sqrt(static_cast<double>(force_.size())),
         1e-9 * std::max(now.findings.f_c.norm(), 1e-3) / std::sqrt(6.0);
-    at(kUneven)[0] = now.uneven_force;
+    // The columns of causes are those of a platform that is level and rolls: gravity along a floor that
+    // tilts, and sideways in a turn, on all masses.
+    double slip = 0.0;
+    for (const BodyContact& wheel : response.wheels) slip = std::max(slip, wheel.slip.norm());
+    const double turn = response.wheels.empty()
+                            ? 0.0
+                            : std::abs(CalcRollingTwist(setup_->model().base(), step.reading.state.xi)[1]);
+    at(kUneven)[0] =
+        (setup_->model().gravity().norm() * step.reading.departure.tilt + 2.0 * slip * turn) * root_mass_;
   }
   at(kObjectResidual) = has_forces ? now.object_residual : Vector6d(Vector6d::Zero());
   const Pose& X_Bo = step.reading.state.X_Bo;
@@ -189,7 +202,7 @@ void StepStore::Pack(const StepRecord& step, const StepAnalysis& now, Judged jud
   at(kWheelMismatch) = now.wheel_mismatch;
   at(kWheelNoise).setZero();
   if (has_forces && response.wheels.size() == 2)
-    at(kWheelNoise) = now.wheel_slip.array() + now.sinking + kRollingRounding * rolling_bound_;
+    at(kWheelNoise) = now.wheel_slip.array() + kRollingRounding * rolling_bound_;
   at(kContactMismatch) = now.contact_mismatch;
   at(kContactMoment).setZero();
   for (size_t i = 0; i < std::min(response.contacts.size(), setup_->fingertips().size()); ++i) {

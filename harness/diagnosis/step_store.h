@@ -51,10 +51,10 @@ class StepStore {
     kObjectMotion,     ///< 12: V_Bo and V_Bo_dot.
     kDryFriction,      ///< n: what the plant says of it, beyond the declared; 0 where it says nothing.
     kNoise,            ///< 2: of an entry of the robot's residual, in |.|_M^-1, and of the object's, N.
-    kUneven,           ///< What tilt, slip and sinking of the platform can make of the robot's, in |.|_M^-1.
+    kUneven,           ///< What tilt and slip of the platform can make of a cause's column, in |.|_M^-1.
     kWheelRates,       ///< 2, right and left, rad/s.
-    kWheelMismatch,    ///< 2, CalcRollingMismatch, m/s.
-    kWheelNoise,       ///< 2: what of that slipping and sinking are, and rounding, m/s; 0 without wheels.
+    kWheelMismatch,    ///< 2, StepAnalysis::wheel_mismatch, m/s.
+    kWheelNoise,       ///< 2: what of that slipping is, and rounding, m/s; 0 without wheels.
     kContactMismatch,  ///< N: StepAnalysis::contact_mismatch, m.
     kContactMoment,    ///< 3N: n x f of the normal into the object and the force on it, world, N.
     kLawDifference,    ///< n, E_bar' (tau' - tau'_printed).
@@ -109,6 +109,7 @@ class StepStore {
   const Setup* setup_;
   const JudgedLaw* law_;
   double rolling_bound_;
+  double root_mass_;  // of the robot, sqrt(kg)
   ActuationMap actuation_;
   std::vector<SignalName> readings_, motors_;
   Eigen::Index offsets_[kSignalCount + 1] = {};

@@ -13,30 +13,6 @@ namespace {
 
 constexpr int kWorldBody = 0;
 
-/// result = M a of an a that is zero but on the base's dofs: `carrying` at the root, one after the other, and
-/// wheels that hang on these.
-void MultiplyBaseInertia(const mjModel& m, const mjData& d, std::span<const int> base_dofs, int carrying,
-                         const VectorXd& a, VectorXd* result) {
-  result->setZero();
-  if (base_dofs.empty()) return;
-  const int first = base_dofs.front();
-  const int root = m.body_rootid[m.dof_bodyid[first]];
-  for (int i = first; i < m.nv; ++i) {
-    if (m.body_rootid[m.dof_bodyid[i]] != root) continue;
-    const mjtNum* const entries = GetMassEntries(d);
-    (*result)[i] += entries[FindMassEntry(m, i, 0)] * a[i];
-    int depth = 0;  // dofs that this one hangs on
-    for (int other = m.dof_parentid[i]; other >= 0; other = m.dof_parentid[other]) ++depth;
-    const int root = FindMassEntry(m, i, depth);
-    const int above = root < 0 ? 0 : std::min(carrying, depth);
-    for (int k = 0; k < above; ++k) {
-      const double entry = entries[root - kTowardRoot * k];
-      (*result)[i] += entry * a[first + k];
-      (*result)[first + k] += entry * a[i];
-    }
-  }
-}
-
 }  // namespace
 
 Observer::Observer(const Adapter& adapter, std::span<const int> fingertips, const Surface& surface)
@@ -54,9 +30,7 @@ Observer::Observer(const Adapter& adapter, std::span<const int> fingertips, cons
   for (const EngineWheel& wheel : adapter.wheels()) {
     wheel_bodies_.push_back(adapter.engine().jnt_bodyid[wheel.joint]);
   }
-  M_qacc_.setZero(adapter.engine().nv);
   constraint_force_.setZero(adapter.engine().nv);
-  departure_.setZero(adapter.engine().nv);
 }
 
 Observer::BaseRates Observer::ReadBaseRates(const mjData& data) const {
@@ -117,8 +91,7 @@ void Observer::Read(const EngineSimulation& simulation, PlantResponse* response)
   map_.SetState(q_, xi_);
   ReadDryFriction(d, &response->dry_friction);
   ReadJointLimits(m, d, &response->stop_force);
-  ReadSolverResidual(m, d, response);
-  ReadDeparture(m, d, response);
+  ReadForces(m, d, response);
 }
 
 void Observer::ReadState(const mjData& data, MeasuredState* state) {
@@ -300,19 +273,6 @@ Vector6d Observer::ReadSupportWrench(const mjModel& m, const mjData& d) const {
   return wrench;
 }
 
-void Observer::ReadDeparture(const mjModel& m, const mjData& d, PlantResponse* response) {
-  // On the base's dofs qacc - T xi_dot - T_dot xi; on its joints' that is zero, as on all others.
-  map_.ExpandBias(constraint_force_.data());
-  departure_.setZero();
-  for (const int dof : map_.base_dofs()) departure_[dof] = d.qacc[dof] - constraint_force_[dof];
-  map_.Expand(response->xi_dot, constraint_force_.data());
-  for (const int dof : map_.base_dofs()) departure_[dof] -= constraint_force_[dof];
-  const auto carrying = static_cast<int>(map_.base_dofs().size() - adapter_->wheels().size());
-  MultiplyBaseInertia(m, d, map_.base_dofs(), carrying, departure_, &M_qacc_);
-  response->departure_force.resize(response->xi_dot.size());
-  map_.ProjectForce(M_qacc_.data(), response->departure_force);
-}
-
 void Observer::ReadDryFriction(const mjData& d, VectorXd* friction) const {
   if (d.nf == 0) return friction->resize(0);
   friction->setZero(adapter_->model().num_velocities());
@@ -344,19 +304,46 @@ Eigen::Index Observer::FindEntry(int dof) const {
   return joint == dofs.end() ? -1 : adapter_->model().num_base_velocities() + (joint - dofs.begin());
 }
 
-void Observer::ReadSolverResidual(const mjModel& m, const mjData& d, PlantResponse* response) {
-  mj_mulM(&m, &d, M_qacc_.data(), d.qacc);
+void Observer::ReadForces(const mjModel& m, const mjData& d, PlantResponse* response) {
+  response->qacc = Eigen::Map<const VectorXd>(d.qacc, m.nv);
+  response->mass = Eigen::Map<const VectorXd>(GetMassEntries(d), m.nM);
+  response->bias = Eigen::Map<const VectorXd>(d.qfrc_bias, m.nv) -
+                   Eigen::Map<const VectorXd>(d.qfrc_passive, m.nv) -
+                   Eigen::Map<const VectorXd>(d.qfrc_applied, m.nv);
+  VectorXd& left = response->left_over;
+  left.resize(m.nv);
+  mj_mulM(&m, &d, left.data(), d.qacc);
   constraint_force_.setZero();  // the engine leaves it alone where nothing is constrained
   // Not qfrc_constraint, which the engine makes fit. The call uses the data's scratch space alone.
   mj_mulJacTVec(&m, const_cast<mjData*>(&d), constraint_force_.data(), d.efc_force);
-  departure_ = M_qacc_ - Eigen::Map<const VectorXd>(d.qfrc_smooth, m.nv) - constraint_force_;
-  response->solver_force.resize(response->xi_dot.size());
-  map_.ProjectForce(departure_.data(), response->solver_force);
-  if (adapter_->object_body() < 0) return;
-  const int dof = adapter_->object_dof();
-  // The free joint's forces: in the world, then about the body's axes.
-  response->solver_residual << X_Bo_.linear().transpose() * departure_.segment<3>(dof),
-      departure_.segment<3>(dof + 3);
+  left -= Eigen::Map<const VectorXd>(d.qfrc_smooth, m.nv) + constraint_force_;
+
+  response->forces.clear();
+  for (int k = 0; k < d.ncon; ++k) {
+    const mjContact& c = d.contact[k];
+    if (c.efc_address < 0) continue;
+    const RotationMap frame(c.frame);
+    mjtNum force[6];  // on geom2, in the contact's frame
+    mj_contactForce(&m, &d, k, force);
+    BodyForce one{m.geom_bodyid[c.geom2], MapVector(c.pos), frame.transpose() * MapVector(force),
+                  frame.transpose() * MapVector(force + 3)};
+    response->forces.push_back(one);
+    response->forces.push_back({m.geom_bodyid[c.geom1], one.point, -one.force, -one.torque});
+  }
+  // Points that are joined: three rows along the world's axes, whose forces act on the first body's point.
+  for (int row = 0; row + 2 < d.ne; ++row) {
+    const int eq = d.efc_id[row];
+    if (m.eq_type[eq] != mjEQ_CONNECT) continue;
+    const Vector3d force = MapVector(d.efc_force + row);
+    const auto place = [&](int body, const mjtNum* anchor) {
+      return MapPose(d.xmat + 9 * body, d.xpos + 3 * body) * MapVector(anchor);
+    };
+    const int first = m.eq_obj1id[eq], second = m.eq_obj2id[eq];
+    const mjtNum* const anchors = m.eq_data + mjNEQDATA * eq;
+    response->forces.push_back({first, place(first, anchors), force, Vector3d::Zero()});
+    response->forces.push_back({second, place(second, anchors + 3), -force, Vector3d::Zero()});
+    row += 2;
+  }
 }
 
 void Observer::ReadContacts(const mjModel& m, const mjData& d, std::vector<PlantContact>* contacts) const {

@@ -54,9 +54,8 @@ class Observer {
   void ReadJointLimits(const mjModel& m, const mjData& d, VectorXd* force) const;
   /// Where xi has the joint of a degree of freedom; -1 when it is none of the robot's.
   [[nodiscard]] Eigen::Index FindEntry(int dof) const;
-  void ReadSolverResidual(const mjModel& m, const mjData& d, PlantResponse* response);
+  void ReadForces(const mjModel& m, const mjData& d, PlantResponse* response);
   [[nodiscard]] int FindFingertip(int geom) const;
-  void ReadDeparture(const mjModel& m, const mjData& d, PlantResponse* response);
   [[nodiscard]] BaseRates ReadBaseRates(const mjData& data) const;
 
   const Adapter* adapter_;
@@ -67,9 +66,8 @@ class Observer {
   std::vector<int> tip_sites_;
   std::vector<int> tip_geoms_;
   std::vector<int> tip_bodies_, wheel_bodies_;
-  VectorXd M_qacc_, constraint_force_;  // nv
+  VectorXd constraint_force_;  // nv
   VelocityMap map_;
-  VectorXd departure_;  // nv
   std::vector<ContactCoordinates> bond_kappa_;
   std::vector<int> bond_constraints_;
   // Of the last reading.

@@ -70,6 +70,14 @@ struct GroundContact : BodyContact {
   Vector3d force = Vector3d::Zero();  ///< Of the ground on the foot, world, N.
 };
 
+/// A force and a torque on one of the engine's bodies, in world axes.
+struct BodyForce {
+  int body = 0;
+  Vector3d point = Vector3d::Zero();   ///< Where the force acts, m.
+  Vector3d force = Vector3d::Zero();   ///< N.
+  Vector3d torque = Vector3d::Zero();  ///< N m.
+};
+
 /// Accelerations and forces of the same step, for the torques that were applied.
 struct PlantResponse {
   VectorXd xi_dot;                       ///< n.
@@ -81,20 +89,18 @@ struct PlantResponse {
   Vector6d support_wrench =
       Vector6d::Zero();        ///< On the object by all else than fingertips, Sigma_o, N, N m.
   double support_force = 0.0;  ///< Its upward part, N.
-  /// What the plant's solver left over of its own equation of motion of the object, as such a wrench.
-  Vector6d solver_residual = Vector6d::Zero();
   /// Of the engine; 0 of a plant that has none.
   int contact_count = 0, constraint_rows = 0;
   Collision collision;     ///< The largest; of a plant whose bodies push, see Clearance.
   VectorXd motor_torques;  ///< n, N m: what wheels and joints received from their motors, as tau'.
   /// n, N and N m, as forces on xi, empty where there are none: dry friction of the joints, and their limits.
   VectorXd dry_friction, stop_force;
-  /// n, N and N m: T^T M (qacc - T xi_dot - T_dot xi), the inertia of what xi_dot leaves out, a platform that
-  /// tilts or sinks and wheels that slip, on soft contacts. Empty for a plant that has nothing of the kind.
-  VectorXd departure_force;
-  /// n, N and N m: what the plant's solver left over of its own equation of motion of the robot; empty
-  /// likewise.
-  VectorXd solver_force;
+  // Of the engine, empty for a plant that has none.
+  VectorXd qacc;                  ///< Accelerations (nv).
+  VectorXd left_over;             ///< M qacc less all forces, by the engine's own numbers (nv).
+  VectorXd mass;                  ///< Entries of M as the engine keeps them (GetMassEntries).
+  VectorXd bias;                  ///< Coriolis forces, gravity and damping (nv).
+  std::vector<BodyForce> forces;  ///< Of contacts and of joined points, on each body that they act on.
 };
 
 /// A force and a torque that act on one body, in world axes.

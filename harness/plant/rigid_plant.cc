@@ -292,7 +292,6 @@ void RigidPlant::Read(PlantResponse* response) {
   response->wheels.assign(adapter_->wheels().size(), rolling);
   response->support_wrench.setZero();
   response->support_force = 0.0;
-  response->solver_residual.setZero();
   response->motor_torques = tau_;
 }
 

@@ -34,7 +34,6 @@ Json TaskToJson(const ClosedLoop& loop) {
                {"push_m", task.push()},
                {"torque_jump_max_N_m", loop.task()->torque_jump()},
                {"force_closure_margin", task.plan().margin},
-               {"excluded_steps", loop.record().findings.excluded_steps},
                {"phases", Json::array()}};
   for (const PhaseEntry& entry : task.history()) {
     json["phases"].push_back(

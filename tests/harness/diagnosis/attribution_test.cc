@@ -23,8 +23,8 @@ struct Step {
 constexpr Step kSteps[] = {{"inverse_dynamics_object", CheckCategory::kInverseDynamics},
                            {"inverse_dynamics_robot", CheckCategory::kInverseDynamics},
                            {"rolling"},
-                           {"reduced_acceleration", CheckCategory::kForwardDynamics},
-                           {"contact_force", CheckCategory::kForwardDynamics},
+                           {"reduced_acceleration"},
+                           {"contact_force"},
                            {"fingertip_slip"},
                            {"fingertip_slip_rate"},
                            {"wheel_slip"},
@@ -40,7 +40,6 @@ constexpr Step kSteps[] = {{"inverse_dynamics_object", CheckCategory::kInverseDy
                            {"joint_limit"},
                            {"clearance"},
                            {"collision"},
-                           {"excluded"},
                            {"actuator_effort"}};
 
 CheckRecord MakeCheck(const std::string& name, CheckCategory kind) {
@@ -176,7 +175,7 @@ TEST(Attribute, OfSeveralThatSlideTheFirstCounts) {
 
 TEST(Attribute, SlipWithoutSlidingIsSoftness) {
   for (const char* name : {"fingertip_slip", "fingertip_slip_rate", "wheel_slip", "wheel_slip_rate",
-                           "penetration", "kappa", "excluded"}) {
+                           "penetration", "kappa"}) {
     const AttributionResult result = FakeRun().Fail(name, 0.1).Fail("reduced_acceleration", 0.05).Explain();
     EXPECT_EQ(result.cause, Cause::kContactSoftness) << name;
     EXPECT_THAT(result.evidence, StartsWith(name));
