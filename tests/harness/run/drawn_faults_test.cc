@@ -69,7 +69,8 @@ TEST_P(DrawnFaults, AreNamed) {
   // Measured over many more: harness/diagnosis/README.md. Of 110 faults the part that is named scatters by
   // 3 %.
   EXPECT_GE(names.named, 0.8 * names.all);
-  EXPECT_GE(names.named + names.in_class, 0.93 * names.all);
+  // What shows in M alone, of a robot that stands still, is found and not named.
+  EXPECT_GE(names.named + names.in_class, 0.9 * names.all);
   EXPECT_LE(names.wrong, 0.04 * names.all);
 }
 INSTANTIATE_TEST_SUITE_P(Sets, DrawnFaults,
