@@ -46,7 +46,7 @@ StepAnalyzer::StepAnalyzer(const Setup& setup)
       dynamics_(setup.model(), static_cast<int>(setup.fingertips().size())) {
   const Eigen::Index n = setup.model().num_velocities();
   for (VectorXd* vector : {&now_.applied_force, &now_.bias, &now_.robot_residual, &now_.findings.xi_dot_model,
-                           &acceleration_error_, &solver_force_, &joint_force_})
+                           &acceleration_, &solver_force_, &joint_force_})
     vector->setZero(n);
   if (setup.scenario().plant.type != PlantType::kRigid) {
     const MassProperties* const object = setup.has_object() ? &setup.declared_object().body : nullptr;
@@ -356,9 +356,12 @@ void StepAnalyzer::CalcWholeResidual() {
 void StepAnalyzer::ComparePrediction() {
   const StepFindings& findings = now_.findings;
   // |a|_M = |L a|
-  acceleration_error_ = findings.xi_dot_model - now_.step->response.xi_dot;
-  now_.mass_factor->Multiply(acceleration_error_);
-  now_.acceleration_error = acceleration_error_.norm() / now_.balanced;
+  acceleration_ = findings.xi_dot_model;
+  now_.mass_factor->Multiply(acceleration_);
+  const double predicted = acceleration_.norm();
+  acceleration_ = findings.xi_dot_model - now_.step->response.xi_dot;
+  now_.mass_factor->Multiply(acceleration_);
+  now_.acceleration_error = acceleration_.norm() / Worst(now_.balanced, predicted);
   if (ground_) {
     // Where the rigid system does not determine the forces of single feet, their sum is xi_dot's.
     const bool has_forces = ground_dynamics_->determines_forces();

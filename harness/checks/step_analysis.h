@@ -115,7 +115,8 @@ struct StepAnalysis {
   double object_solver = kNaN;                  ///< What the plant's solver left over, likewise.
 
   // What the rigid constrained system does under the same torques.
-  double acceleration_error = kNaN;   ///< |xi_dot_model - xi_dot|_M relative to `balanced`.
+  /// |xi_dot_model - xi_dot|_M relative to |xi_dot_model|_M, or to `balanced` where that is more.
+  double acceleration_error = kNaN;
   double contact_force_error = kNaN;  ///< |f_c_model - f_c|, relative.
 
   // Law, motors and sensors.
@@ -211,8 +212,8 @@ class StepAnalyzer {
   std::map<ContactSet, std::unique_ptr<PartialDynamics>> parts_;
   bool was_holding_ = false;  // at the step before
   long steps_ = 0;
-  VectorXd acceleration_error_;  // n
-  VectorXd least_;               // n, RoundingScales::CalcLeastForces
+  VectorXd acceleration_;  // n
+  VectorXd least_;         // n, RoundingScales::CalcLeastForces
   VectorXd norm_work_;
 };
 

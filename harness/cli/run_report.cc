@@ -134,6 +134,15 @@ void PrintClearance(const Clearance& clearance) {
              nearest->time);
 }
 
+/// How far the paper's rigid contacts are from the plant's.
+void PrintRigidContacts(const RunChecks& checks) {
+  if (!checks.Has("reduced_acceleration") || !checks.Has("contact_force")) return;
+  const CheckRecord& acceleration = checks.Find("reduced_acceleration");
+  if (acceleration.count == 0) return;
+  fmt::print("rigid contacts explain accelerations to {:.1e}, contact forces to {:.1e}\n",
+             acceleration.worst, checks.Find("contact_force").worst);
+}
+
 void PrintSpeed(const ClosedLoop& loop, const RunResult& result) {
   const LoopTimes& times = loop.times();
   const double scale = 1e6 / static_cast<double>(std::max(loop.record().step, 1L));
@@ -182,6 +191,7 @@ void PrintRunReport(const Setup& setup, const ClosedLoop& loop, const RunResult&
     if (scenario.imperfections.actuation.saturates()) PrintLimits(loop.motors(), result.limited);
     if (loop.task() != nullptr) PrintTask(loop);
     if (loop.is_checking()) PrintClearance(*loop.checks().analysis().clearance);
+    if (loop.is_checking()) PrintRigidContacts(loop.checks());
     if (loop.is_checking()) PrintChecks(setup, loop, detail);
     PrintSpeed(loop, result);
     if (!folder.empty()) fmt::print("log and summary in {}\n", folder);

@@ -251,6 +251,7 @@ void ClosedLoop::Finish() {
 
 void ClosedLoop::Step() {
   record_.time = time();
+  const bool beside = checker_ && choice_.Next(Seconds(Clock::time_point{}, Clock::now()));
   MakeStep(record_.time);
   record_.error = CalcTrackingError(record_);
   if (follower_ != nullptr) record_.followed_kappa = follower_->followed_kappa();
@@ -258,7 +259,7 @@ void ClosedLoop::Step() {
   for (const ContactDrift& drift : record_.drift) largest_drift_.Raise(drift);
   ++record_.step;
   Finish();
-  if (checker_) {
+  if (beside) {
     checker_->Start(record_);
   } else {
     Check();

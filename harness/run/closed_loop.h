@@ -18,6 +18,7 @@
 #include "harness/plant/sensing.h"
 #include "harness/run/loop_parts.h"
 #include "harness/run/step_checker.h"
+#include "harness/run/thread_choice.h"
 #include "harness/scenario/setup.h"
 
 namespace dexcheck {
@@ -43,7 +44,7 @@ struct LoopTimes {
 ///     `----PlantResponse----> checks: all of it is one StepRecord
 ///
 /// Deterministic: with two threads the checks of a step are made beside the whole next step, on a copy of its
-/// record, and every number is the same. Nothing allocates in a step, except as the controller and RunChecks
+/// record, as long as that is the faster way (ThreadChoice), and every number is the same. Nothing allocates in a step, except as the controller and RunChecks
 /// say.
 class ClosedLoop {
  public:
@@ -139,6 +140,7 @@ class ClosedLoop {
   LoopTimes times_;
   ContactDrift largest_drift_;
   std::optional<StepChecker> checker_;  // none with one thread
+  ThreadChoice choice_;
 };
 
 }  // namespace dexcheck

@@ -63,7 +63,7 @@ TEST_F(JUnit, OfAnAudit) {
 
 TEST_F(JUnit, OfARun) {
   const JUnitFile good = RunForJUnit("run paper --set duration=0.05 --no-log", 0);
-  EXPECT_THAT(good.cases, Contains("dexcheck.run.paper.forward_dynamics contact_force"));
+  EXPECT_THAT(good.cases, Contains("dexcheck.run.paper.forward_dynamics constraint_force"));
   EXPECT_THAT(good.failures, IsEmpty());
   const JUnitFile bad =
       RunForJUnit("run paper --set duration=0.05 --set model.gravity=[0,0,-9.8] --no-log", 1);

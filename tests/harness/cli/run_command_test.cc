@@ -50,7 +50,8 @@ TEST_F(RunCommand, WritesAFolderThatHoldsAll) {
   EXPECT_TRUE(summary["tracking"].contains("orientation_error_max_rad"));
   for (const auto& [check, kind] : {std::pair("M_bar", "model"),
                                     {"inverse_dynamics_robot", "inverse_dynamics"},
-                                    {"reduced_acceleration", "forward_dynamics"},
+                                    {"constraint_force", "forward_dynamics"},
+                                    {"reduced_acceleration", "assumption"},
                                     {"wheel_slip", "assumption"}}) {
     const Json& entry = summary["checks"][check];
     for (const char* key : {"max", "rms", "bound", "at_time_s"})

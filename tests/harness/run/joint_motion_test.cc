@@ -29,7 +29,7 @@ TEST(JointMotionRun, PandaReachesToRounding) {
     EXPECT_FALSE(check.failed) << check.name << " " << check.worst;
   }
   for (const char* check :
-       {"law_torque", "inverse_dynamics_robot", "reduced_acceleration", "joint_dynamics"}) {
+       {"law_torque", "inverse_dynamics_robot", "equations_of_motion", "joint_dynamics"}) {
     EXPECT_EQ(run.loop().checks().Find(check).count, 3000) << check;
     EXPECT_LE(run.Worst(check), kRounding) << check;
   }

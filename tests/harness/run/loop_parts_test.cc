@@ -67,6 +67,22 @@ TEST(TwoThreads, GiveTheSameBits) {
   }
 }
 
+TEST(TwoThreads, AreUsedWhereTheyAreFaster) {
+  for (const double beside : {0.6, 3.0}) {  // of a step, where one thread takes 1
+    ThreadChoice choice;
+    double now = 1e5;
+    long count = 0;
+    constexpr long kSteps = 4 * ThreadChoice::kBlock * ThreadChoice::kBlocks;
+    for (long i = 0; i < kSteps; ++i) {
+      const bool is_beside = choice.Next(now);
+      now += is_beside ? beside : 1.0;
+      count += is_beside ? 1 : 0;
+    }
+    const double tried = 1.0 / static_cast<double>(ThreadChoice::kBlocks);
+    EXPECT_DOUBLE_EQ(static_cast<double>(count) / kSteps, beside < 1.0 ? 1.0 - tried : tried);
+  }
+}
+
 TEST_F(LoopPartsTest, AnotherPlantOfTheSameKindGivesTheSameBits) {
   parts_.plant = std::make_unique<ChangedPlant>(std::move(parts_.plant), 1.0);
   const StepRecord& step = Run();
