@@ -222,9 +222,20 @@ const CheckInfo kChecks[] = {
      "the object's part, as (19) has it: against the contact forces",
      {Cause::kUnmodelledForce, 24, Rank::kObjectBalance},
      {[](const Analysis& a) { return When(true, a.object_residual_size); }}},
+    {{"constraint_force", kForwardDynamics, "1"},
+     {1.0, "rounding of the row's place, rates and inertia over its R, computed for each row", Scaling::kNone,
+      "1, of rounding"},
+     "largest difference of the engine's force of a contact, limit, dry friction or joined point and its "
+     "documented law's under the same motion, over what rounding can make of it",
+     {Cause::kUnexplained, 42, Rank::kResidual},
+     {[](const Analysis& a) {
+        return const bool has_rows = a.constraint_law != nullptr && !a.constraint_law->forces().empty();
+        return has_rows ? At(a.constraint_force) : std::nullopt;
+      },
+      kAlways, DescribeConstraint}},
     // The paper's contacts are rigid. The engine's hold back a part of every force that changes, in
-    // proportion
-    // to 1 - d: measured 1e-6 and less in steady motion, 5e-2 in `curve-real`, 0.43 where fingertips touch.
+    // proportion to 1 - d: measured 1e-6 and less in steady motion, 5e-2 in `curve-real`, 0.43 where
+    // fingertips touch.
     {{"reduced_acceleration", kAssumption, "1"},
      {1.0, "all that is predicted: rigid contacts explain nothing any more"},
      "how far rigid contacts are from explaining the accelerations: xi_dot of the rigid constrained system "

@@ -172,6 +172,8 @@ Evaluation EvaluateJointLimit(const StepAnalysis& step);
 std::string DescribeJoint(const StepAnalysis& step, int part);
 /// "joint r_elbow", of the equation of motion that is worst.
 std::string DescribeEntry(const StepAnalysis& step, int part);
+/// "contact of r_fingertip_1 and torus", "limit of joint elbow".
+std::string DescribeConstraint(const StepAnalysis& step, int part);
 /// "r_palm and bench", of the step's largest force between bodies.
 std::string DescribeCollision(const StepAnalysis& step, int part);
 /// Movement of joints that do not carry the object, since the beginning, rad.

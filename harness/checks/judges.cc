@@ -96,6 +96,10 @@ std::string DescribeJoint(const StepAnalysis& step, int part) {
 
 std::string DescribeEntry(const StepAnalysis& step, int part) { return step.whole->DescribeEntry(part); }
 
+std::string DescribeConstraint(const StepAnalysis& step, int part) {
+  return step.constraint_law->DescribeRow(part);
+}
+
 std::string DescribeCollision(const StepAnalysis& step, int /*part*/) {
   const mjModel& m = step.setup->engine();
   const auto name_of = [&](int geom) {

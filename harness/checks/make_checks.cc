@@ -57,6 +57,7 @@ std::set<std::string_view> ListMissing(const Setup& setup, const JudgedLaw* law)
   // A rigid plant's wheels roll, its base is upright and its equations are solved, whatever happens.
   leave_out(rigid, {"mass_matrix", "bias_force", "equations_of_motion", "wheel_slip", "rolling",
                     "wheel_slip_rate", "traction_use", "base_tilt", "solver"});
+  leave_out(rigid || !ConstraintLaw::Applies(setup.engine()), {"constraint_force"});
   leave_out(setup.robots().watched_pairs.empty(), {"clearance", "collision"});
   leave_out(!LetsBodiesPush(scenario.plant, setup.engine()), {"collision"});
   const mjModel& engine = setup.engine();

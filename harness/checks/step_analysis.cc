@@ -49,9 +49,15 @@ StepAnalyzer::StepAnalyzer(const Setup& setup)
                            &acceleration_, &solver_force_, &joint_force_})
     vector->setZero(n);
   if (setup.scenario().plant.type != PlantType::kRigid) {
-    const MassProperties* const object = setup.has_object() ? &setup.declared_object().body : nullptr;
-    whole_ = std::make_unique<WholeRobot>(setup.declared_model(), object, setup.plant_adapter());
+    const ObjectModel* const object = setup.has_object() ? &setup.declared_object() : nullptr;
+    whole_ = std::make_unique<WholeRobot>(setup.declared_model(), object == nullptr ? nullptr : &object->body,
+                                          setup.plant_adapter());
     now_.whole = whole_.get();
+    if (ConstraintLaw::Applies(setup.engine())) {
+      constraint_law_ = std::make_unique<ConstraintLaw>(setup.declared_model(), object, setup.plant_adapter(),
+                                                        *whole_, setup.scenario().tolerance);
+    }
+    now_.constraint_law = constraint_law_.get();
     rolling_ = std::make_unique<VelocityMap>(setup.plant_adapter(), Coordinates::kReduced);
     for (VectorXd* vector : {&nu_dot_, &whole_residual_, &whole_size_, &whole_left_, &whole_pushed_})
       vector->setZero(whole_->size());
@@ -152,6 +158,10 @@ void StepAnalyzer::Analyze() {
   CalcContactBias();
   CalcAppliedForce();
   if (whole_) CalcWholeResidual();
+  if (constraint_law_) {
+    constraint_law_->SetStep(step.reading.qpos.data(), step.reading.qvel.data(), step.response);
+    now_.constraint_force = constraint_law_->FindWorst();
+  }
   Predict();
   CalcRobotResidual();
   ComparePrediction();

@@ -13,6 +13,7 @@
 #include "controller/control/actuation.h"
 #include "controller/control/constrained_dynamics.h"
 #include "controller/handling/handling_controller.h"
+#include "harness/checks/constraint_law.h"
 #include "harness/checks/declared_plant.h"
 #include "harness/checks/step_record.h"
 #include "harness/checks/whole_robot.h"
@@ -109,6 +110,9 @@ struct StepAnalysis {
   /// Its M, and its Coriolis forces, gravity and friction, against the engine's, likewise.
   std::pair<double, int> mass_error = {kNaN, -1}, bias_error = {kNaN, -1};
   const WholeRobot* whole = nullptr;  ///< Null for a plant that is not the engine's.
+  /// ConstraintLaw::FindWorst.
+  std::pair<double, int> constraint_force = {kNaN, -1};
+  const ConstraintLaw* constraint_law = nullptr;  ///< Null where the engine has none that it keeps to.
   double robot_solver = kNaN;  ///< What the plant's solver left over for the robot, relative to `balanced`.
   Vector6d object_residual = Vector6d::Zero();  ///< M_hat V_o_dot + C_hat V_o + N_o - G f_c - ... of (19).
   double object_residual_size = kNaN;           ///< Relative, as forces at the contacts' arm.
@@ -202,8 +206,9 @@ class StepAnalyzer {
   MjDataPtr kinematics_;  // of a plant that has no bodies of the engine's
   ActuationMap actuation_;
   ConstrainedDynamics dynamics_;
-  std::unique_ptr<WholeRobot> whole_;     // null for a plant that is not the engine's
-  std::unique_ptr<VelocityMap> rolling_;  // likewise
+  std::unique_ptr<WholeRobot> whole_;  // null for a plant that is not the engine's
+  std::unique_ptr<ConstraintLaw> constraint_law_;
+  std::unique_ptr<VelocityMap> rolling_;                                       // as whole_
   VectorXd nu_dot_, whole_residual_, whole_size_, whole_left_, whole_pushed_;  // of nu
   VectorXd engine_force_, solver_force_, joint_force_;                         // nv, n, n
   Vector6d object_left_ = Vector6d::Zero();

@@ -82,7 +82,11 @@ WholeRobot::WholeRobot(const RobotModel& model, const MassProperties* object, co
     adapter.CalcBaseRates(Vector3d::UnitY(), 0.0, base_rates_.col(1));
     adapter.CalcBaseRates(Vector3d::Zero(), 1.0, base_rates_.col(2));
   }
-  for (const EngineWheel& wheel : adapter.wheels()) dofs_.push_back(wheel.dof);
+  for (const EngineWheel& wheel : adapter.wheels()) {
+    joints_.push_back(wheel.joint);
+    dofs_.push_back(wheel.dof);
+  }
+  joints_.insert(joints_.end(), adapter.joint_ids().begin(), adapter.joint_ids().end());
   dofs_.insert(dofs_.end(), adapter.joint_dofs().begin(), adapter.joint_dofs().end());
   signs_.setOnes(static_cast<Eigen::Index>(dofs_.size()));
   for (size_t k = 0; k < adapter.wheels().size(); ++k) {
@@ -98,7 +102,8 @@ WholeRobot::WholeRobot(const RobotModel& model, const MassProperties* object, co
     const int index = link == 0 ? -1 : static_cast<int>(link) - 1 + num_wheels_;
     for (const int body : adapter.welded_bodies()[link]) body_links_[static_cast<size_t>(body)] = index;
   }
-  for (int b = 1; b < engine.nbody; ++b) {
+  for (int b = 0; b < engine.nbody; ++b) {
+    if (engine.body_weldid[b] == 0 && FindLink(b) == kNoLink) body_links_[static_cast<size_t>(b)] = kWorld;
     const int moving = engine.body_weldid[b];
     for (int k = 0; k < num_wheels_; ++k) {
       if (engine.jnt_bodyid[adapter.wheels()[static_cast<size_t>(k)].joint] == moving)
@@ -163,9 +168,7 @@ void WholeRobot::SetState(const mjtNum* qpos, const mjtNum* qvel) {
     q_[2] = std::atan2(X_W0.linear()(1, 0), X_W0.linear()(0, 0));
   }
   for (int j = 0; j < model_.num_joints(); ++j) {
-    const int joint = j < num_wheels_ ? adapter_->wheels()[static_cast<size_t>(j)].joint
-                                      : adapter_->joint_ids()[static_cast<size_t>(j - num_wheels_)];
-    const mjtNum* const position = qpos + engine.jnt_qposadr[joint];
+    const mjtNum* const position = qpos + engine.jnt_qposadr[engine_joint(j)];
     mju_copy(q_.data() + model_.position_index(j), position, CountPositions(model_.joint(j).type));
     if (j < num_wheels_) q_[model_.position_index(j)] *= signs_[j];
   }
@@ -217,9 +220,8 @@ void WholeRobot::ClearForces() {
 void WholeRobot::AddForce(const BodyForce& one) { AddForce(body_links_[static_cast<size_t>(one.body)], one); }
 
 void WholeRobot::AddForce(int link, const BodyForce& one) {
-  if (link == kNoLink) return;
-  const Vector3d origin =
-      link == kObject ? Vector3d(X_Bo_.translation()) : Vector3d(terms_.CalcLinkPose(link).translation());
+  if (link == kNoLink || link == kWorld) return;
+  const Vector3d origin = CalcLinkPose(link).translation();
   Load& load = link == kObject ? object_load_ : loads_[static_cast<size_t>(link + 1)];
   const Vector3d moment = one.torque + (one.point - origin).cross(one.force);
   load.force += one.force;

@@ -44,10 +44,23 @@ class WholeRobot {
   /// "base, along x", "joint NAME", "object, about its z": an entry of nu.
   [[nodiscard]] std::string DescribeEntry(int entry) const;
 
+  /// Beside links by the index of the joint that moves them, and -1 for the base.
+  static constexpr int kWorld = -2, kObject = -3, kNoLink = -4;
+  /// What one of the engine's bodies is part of; kNoLink where that is neither robot, object nor world.
+  [[nodiscard]] int FindLink(int body) const { return body_links_[static_cast<size_t>(body)]; }
+  /// The engine's joint of one of model().
+  [[nodiscard]] int engine_joint(int joint) const { return joints_[static_cast<size_t>(joint)]; }
+  /// What errors of M's entries are relative to.
+  [[nodiscard]] const MatrixXd& mass_scales() const { return mass_scales_; }
+
   /// Evaluates all terms at the engine's state. @param qpos, qvel as the engine's (nq, nv).
   void SetState(const mjtNum* qpos, const mjtNum* qvel);
   /// M of the robot's entries.
   [[nodiscard]] const MatrixXd& M() const { return terms_.M(); }
+  /// Pose of a link or the object in the world.
+  [[nodiscard]] Pose CalcLinkPose(int link) const {
+    return link == kObject ? X_Bo_ : terms_.CalcLinkPose(link);
+  }
   /// C nu + g + F nu (size()).
   [[nodiscard]] const VectorXd& bias() const { return bias_; }
   /// result += M a (size()).
@@ -96,8 +109,6 @@ class WholeRobot {
     double size = 0.0;                                             // sum of |force| + |moment| / length, N
   };
 
-  /// Beside the indices of joints, and -1 for the base.
-  static constexpr int kNoLink = -2, kObject = -3;
   void AddForce(int link, const BodyForce& one);
   [[nodiscard]] double CalcObjectArm() const;  // m
   [[nodiscard]] double CalcBiasSize(int entry) const;
@@ -111,6 +122,7 @@ class WholeRobot {
   std::optional<MassProperties> object_;
   std::vector<int> base_dofs_;  // the engine's
   MatrixXd base_rates_;         // the engine's rates of the base's joints from nu's
+  std::vector<int> joints_;     // the engine's of wheels and joints
   std::vector<int> dofs_;       // the engine's of wheels and joints, in nu's order
   VectorXd signs_;              // of those
   std::vector<Eigen::Index> motor_entries_;

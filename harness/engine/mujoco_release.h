@@ -351,6 +351,14 @@ inline mjtNum* NormalOf(CollisionContact* contact) { return contact->frame; }
 inline mjtNum* TangentOf(CollisionContact* contact) { return contact->frame + 3; }
 #endif
 
+/// solref of a contact's friction, which later releases may have differ from that of its normal.
+inline const mjtNum* GetFrictionReference(const mjContact& contact) {
+#if mjVERSION_HEADER >= 300
+  if (contact.solreffriction[0] != 0.0 || contact.solreffriction[1] != 0.0) return contact.solreffriction;
+#endif
+  return contact.solref;
+}
+
 /// How many contacts a collision function may fill for two geoms.
 inline int CountMostContacts([[maybe_unused]] const mjModel& m, [[maybe_unused]] int geom1,
                              [[maybe_unused]] int geom2, [[maybe_unused]] mjtNum margin) {

@@ -15,6 +15,25 @@ constexpr int kWorldBody = 0;
 
 }  // namespace
 
+void ReadConstraints(const mjData& d, PlantResponse* response) {
+  response->engine_contacts.resize(static_cast<size_t>(d.ncon));
+  for (int k = 0; k < d.ncon; ++k) {
+    const mjContact& c = d.contact[k];
+    EngineContact& contact = response->engine_contacts[static_cast<size_t>(k)];
+    contact.geom1 = c.geom1, contact.geom2 = c.geom2, contact.dim = c.dim;
+    contact.distance = c.dist, contact.margin = c.includemargin;
+    contact.position = MapVector(c.pos);
+    contact.frame = RotationMap(c.frame);
+    std::ranges::copy(c.friction, contact.friction.begin());
+    std::ranges::copy(c.solimp, contact.solimp.begin());
+    std::ranges::copy(c.solref, contact.solref.begin());
+    std::copy_n(GetFrictionReference(c), mjNREF, contact.solref_friction.begin());
+  }
+  response->rows.resize(static_cast<size_t>(d.nefc));
+  for (int i = 0; i < d.nefc; ++i)
+    response->rows[static_cast<size_t>(i)] = {d.efc_type[i], d.efc_id[i], d.efc_force[i]};
+}
+
 Observer::Observer(const Adapter& adapter, std::span<const int> fingertips, const Surface& surface)
     : adapter_(&adapter),
       fingertips_(fingertips.begin(), fingertips.end()),
@@ -92,6 +111,7 @@ void Observer::Read(const EngineSimulation& simulation, PlantResponse* response)
   ReadDryFriction(d, &response->dry_friction);
   ReadJointLimits(m, d, &response->stop_force);
   ReadForces(m, d, response);
+  ReadConstraints(d, response);
 }
 
 void Observer::ReadState(const mjData& data, MeasuredState* state) {

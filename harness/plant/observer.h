@@ -13,6 +13,9 @@
 
 namespace dexcheck {
 
+/// Copies the contacts and constraint rows of the step whose forces the engine has computed.
+void ReadConstraints(const mjData& data, PlantResponse* response);
+
 /// Reads states and accelerations of the simulation in q', xi, and the contacts of a grasp. Nothing allocates
 /// after construction, once the values that are read into have their sizes.
 class Observer {

@@ -2,6 +2,7 @@
 
 // The simulated plant: robot and object, driven by torques.
 
+#include <array>
 #include <cstdint>
 #include <span>
 #include <string>
@@ -78,6 +79,24 @@ struct BodyForce {
   Vector3d torque = Vector3d::Zero();  ///< N m.
 };
 
+/// Two geoms as the engine lets them touch.
+struct EngineContact {
+  int geom1 = -1, geom2 = -1;             ///< The engine's.
+  int dim = 0;                            ///< 1 without friction; 3, 4 or 6.
+  double distance = 0.0, margin = 0.0;    ///< m; forces act below the margin.
+  Vector3d position = Vector3d::Zero();   ///< World, m.
+  Matrix3d frame = Matrix3d::Identity();  ///< Rows: the normal from geom1 to geom2, and two tangents.
+  std::array<double, 5> friction{}, solimp{};
+  std::array<double, 2> solref{}, solref_friction{};  ///< Along the normal, and along the surface.
+};
+
+/// One row of the engine's constraints.
+struct ConstraintRow {
+  int type = 0;        ///< mjtConstraint.
+  int id = -1;         ///< Of its contact among the step's, or the engine's of a joint, dof or equality.
+  double force = 0.0;  ///< N or N m.
+};
+
 /// Accelerations and forces of the same step, for the torques that were applied.
 struct PlantResponse {
   VectorXd xi_dot;                       ///< n.
@@ -101,6 +120,8 @@ struct PlantResponse {
   VectorXd mass;                  ///< Entries of M as the engine keeps them (GetMassEntries).
   VectorXd bias;                  ///< Coriolis forces, gravity and damping (nv).
   std::vector<BodyForce> forces;  ///< Of contacts and of joined points, on each body that they act on.
+  std::vector<EngineContact> engine_contacts;
+  std::vector<ConstraintRow> rows;  ///< In the engine's order.
 };
 
 /// A force and a torque that act on one body, in world axes.

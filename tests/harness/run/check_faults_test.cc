@@ -69,6 +69,7 @@ const CheckFault kFaults[] = {
      {"duration=0.02", "model.template.arm.links.forearm.shapes.0.mass=1.5"}},
     {"inverse_dynamics_object", "hold", {"duration=0.02", "model.object.mass=0.21"}},
     {"contact_distance", "hold", {"duration=0.02"}, ThickenFingertip},
+    {"constraint_force", "paper-ramp", {"duration=0.02", "model.base.wheel_radius=0.100000001"}},
     {"reduced_acceleration", "hold", kSlippery},
     {"contact_force", "hold", kSlippery},
     {"fingertip_slip", "hold", kSlippery},
@@ -152,6 +153,14 @@ const LostNumber kLostNumbers[] = {
     {"force", "hold", "equations_of_motion",
      [](auto*, auto* r) {
        if (!r->forces.empty()) r->forces.front().force.x() = kNaN;
+     }},
+    {"row_force", "hold", "constraint_force",
+     [](auto*, auto* r) {
+       if (!r->rows.empty()) r->rows.front().force = kNaN;
+     }},
+    {"contact_tangent", "hold", "constraint_force",
+     [](auto*, auto* r) {
+       for (EngineContact& contact : r->engine_contacts) contact.frame(1, 0) = kNaN;
      }},
     {"xi_dot", "hold", "reduced_acceleration", [](auto*, auto* r) { r->xi_dot[0] = kNaN; }},
     {"contact_force", "hold", "contact_force", [](auto*, auto* r) { r->contacts[1].force.y() = kNaN; }},
