@@ -5,23 +5,10 @@
 #include "controller/common/types.h"
 #include "controller/control/grasp_model.h"
 #include "controller/control/joint_motion.h"
+#include "controller/control/reading.h"
 #include "controller/control/trajectory.h"
 
 namespace dexcheck {
-
-class GraspModel;
-
-/// What the hand feels, and the support.
-struct Touch {
-  ContactSet fingertips = 0;   ///< That touch the object.
-  double support_force = 0.0;  ///< Upward, on the object by what it lies on, N; of the step before.
-};
-
-/// What is measured at one instant.
-struct Reading {
-  MeasuredState state;
-  Touch touch;
-};
 
 /// What a step's contacts are commanded to be.
 struct Handling {

@@ -4,34 +4,16 @@
 
 #include <array>
 #include <cstddef>
-#include <cstdint>
 #include <span>
 #include <vector>
 
 #include "controller/common/types.h"
-#include "controller/contact/contact_geometry.h"
 #include "controller/control/grasp_terms.h"
 #include "controller/control/object_tracking.h"
+#include "controller/control/reading.h"
 #include "controller/dynamics/model_terms.h"
 
 namespace dexcheck {
-
-/// Fingertips of a grasp, bit i for the i-th.
-using ContactSet = std::uint32_t;
-
-/// All of `count` fingertips.
-constexpr ContactSet AllContacts(int count) { return (ContactSet{1} << count) - 1; }
-constexpr bool Contains(ContactSet set, size_t fingertip) { return (set >> fingertip & 1U) != 0; }
-
-/// State of robot, object and contacts at one instant, true or measured.
-struct MeasuredState {
-  VectorXd q;   ///< q' (p').
-  VectorXd xi;  ///< n.
-  Pose X_Bo = Pose::Identity();
-  Vector6d V_Bo = Vector6d::Zero();       ///< Body velocity, Sigma_o.
-  std::vector<ContactCoordinates> kappa;  ///< One for each fingertip of the grasp.
-  std::vector<double> overlap;            ///< Likewise, m; see CalcContactGeometry.
-};
 
 struct GraspModelOptions {
   /// kAngles evaluates the object's terms in X_o besides, on one branch of the angles.

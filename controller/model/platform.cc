@@ -1,5 +1,6 @@
 #include "controller/model/platform.h"
 
+#include <Eigen/LU>
 #include <cmath>
 
 #include "controller/common/errors.h"
@@ -64,31 +65,10 @@ Matrix2d CalcWheelRateMap(const Base& base) {
   return W;
 }
 
-Vector2d CalcWheelRates(const Base& base, const Vector2d& v) {
-  RequireDifferentialDrive(base);
-  if (base.velocity == DriveVelocity::kWheelRates) return v;
-  return CalcWheelRatesOfTwist(base, v);
-}
-
-Vector2d CalcWheelRatesOfTwist(const Base& base, const Vector2d& twist) {
-  // thetadot_r,l = (v_c +- w_c b/2) / r
-  const double turn = 0.5 * base.wheel_distance * twist[1];
-  return Vector2d(twist[0] + turn, twist[0] - turn) / base.wheel_radius;
-}
-
-Vector2d CalcTwist(const Base& base, const Vector2d& wheel_rates) {
-  // v_c = r (thetadot_r + thetadot_l) / 2,  w_c = r (thetadot_r - thetadot_l) / b
-  return {0.5 * base.wheel_radius * wheel_rates.sum(),
-          base.wheel_radius * (wheel_rates[0] - wheel_rates[1]) / base.wheel_distance};
-}
+Vector2d CalcWheelRates(const Base& base, const Vector2d& v) { return CalcWheelRateMap(base) * v; }
 
 Vector2d CalcDriveVelocity(const Base& base, const Vector2d& wheel_rates) {
-  RequireDifferentialDrive(base);
-  return base.velocity == DriveVelocity::kWheelRates ? wheel_rates : CalcTwist(base, wheel_rates);
-}
-
-Vector2d CalcDriveVelocityOfTwist(const Base& base, const Vector2d& twist) {
-  return base.velocity == DriveVelocity::kTwist ? twist : CalcWheelRatesOfTwist(base, twist);
+  return CalcWheelRateMap(base).inverse() * wheel_rates;
 }
 
 }  // namespace dexcheck

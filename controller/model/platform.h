@@ -38,10 +38,4 @@ Vector2d CalcWheelRates(const Base& base, const Vector2d& v);
 /// CalcPlatformConstraint.
 Vector2d CalcDriveVelocity(const Base& base, const Vector2d& wheel_rates);
 
-/// The same from the twist [v_c; w_c], m/s and rad/s, of a base that is known to be a differential drive; and
-/// between wheel rates and that twist.
-Vector2d CalcDriveVelocityOfTwist(const Base& base, const Vector2d& twist);
-Vector2d CalcWheelRatesOfTwist(const Base& base, const Vector2d& twist);
-Vector2d CalcTwist(const Base& base, const Vector2d& wheel_rates);
-
 }  // namespace dexcheck

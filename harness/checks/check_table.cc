@@ -229,7 +229,7 @@ const CheckInfo kChecks[] = {
      "documented law's under the same motion, over what rounding can make of it",
      {Cause::kUnexplained, 42, Rank::kResidual},
      {[](const Analysis& a) {
-        return const bool has_rows = a.constraint_law != nullptr && !a.constraint_law->forces().empty();
+        const bool has_rows = a.constraint_law != nullptr && !a.constraint_law->forces().empty();
         return has_rows ? At(a.constraint_force) : std::nullopt;
       },
       kAlways, DescribeConstraint}},

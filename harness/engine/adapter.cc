@@ -287,7 +287,9 @@ void Adapter::SetPositions(const Eigen::Ref<const VectorXd>& q, mjtNum* qpos) co
     mju_normalize4(pose + 3);
     return;
   }
-  const Pose X_WA = model_->CalcBasePose(q) * X_0b_;
+  // Sigma_0 moves over the floor and yaws, the joints' anchor with it.
+  const Vector3d origin = model_->base().X_B0.translation() + Vector3d(q[0], q[1], 0.0);
+  const Pose X_WA = Eigen::Translation3d(origin) * Eigen::AngleAxisd(q[2], Vector3d::UnitZ()) * X_0b_;
   if (base_is_free_) {
     WriteFreePose(X_WA, qpos + engine_->jnt_qposadr[base_joints_[0]]);
   } else {

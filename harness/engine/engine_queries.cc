@@ -1,6 +1,5 @@
 // What the engine has at the state set: poses, Jacobians, motions, object, contacts.
 
-#include "controller/model/rigid_body.h"
 #include "harness/engine/engine_terms.h"
 #include "harness/engine/map_vector.h"
 #include "harness/engine/mujoco_release.h"
@@ -66,8 +65,9 @@ std::vector<LinkInWorld> EngineTerms::links() const {
     for (const int body : welded) {
       const RotationMap R(d->ximat + 9 * body);
       const Vector3d arm = MapVector(d->xipos + 3 * body) - link.com;
+      // Parallel axes: m (|r|^2 1 - r r^T) besides.
       link.inertia += R * MapVector(m->body_inertia + 3 * body).asDiagonal() * R.transpose() +
-                      CalcPointInertia(m->body_mass[body], arm);
+                      m->body_mass[body] * (arm.squaredNorm() * Matrix3d::Identity() - arm * arm.transpose());
     }
   }
   return links;

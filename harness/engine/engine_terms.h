@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "controller/dynamics/model_terms.h"
+#include "controller/dynamics/term_types.h"
 #include "harness/engine/engine.h"
 #include "harness/engine/velocity_map.h"
 

@@ -4,7 +4,7 @@
 
 #include <vector>
 
-#include "controller/dynamics/model_terms.h"
+#include "controller/dynamics/term_types.h"
 #include "harness/engine/adapter.h"
 
 namespace dexcheck {

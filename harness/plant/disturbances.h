@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-#include "controller/control/grasp_model.h"
+#include "controller/control/reading.h"
 #include "controller/dynamics/model_terms.h"
 #include "harness/plant/imperfections.h"
 #include "harness/plant/plant.h"

@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "controller/model/platform.h"
 #include "harness/engine/map_vector.h"
 #include "harness/engine/velocity_map.h"
+#include "harness/plant/wheel_rates.h"
 
 namespace dexcheck {
 

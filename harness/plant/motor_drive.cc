@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "controller/common/text.h"
-#include "controller/model/platform.h"
+#include "harness/plant/wheel_rates.h"
 
 namespace dexcheck {
 namespace {
@@ -75,7 +75,8 @@ void MotorDrive::Apply(const VectorXd& tau, const VectorXd& xi, DriveOutput* out
 
 void MotorDrive::ReadRates(const VectorXd& xi) {
   rates_ = xi;
-  if (base_.type == BaseType::kDifferentialDrive) rates_.head<2>() = CalcWheelRates(base_, xi.head<2>());
+  if (base_.type != BaseType::kDifferentialDrive || base_.velocity == DriveVelocity::kWheelRates) return;
+  rates_.head<2>() = CalcWheelRatesOfTwist(base_, xi.head<2>());
 }
 
 void MotorDrive::Delay(VectorXd* tau) {

@@ -4,9 +4,9 @@
 #include <cmath>
 #include <limits>
 
-#include "controller/model/platform.h"
 #include "harness/engine/map_vector.h"
 #include "harness/engine/mujoco_release.h"
+#include "harness/plant/wheel_rates.h"
 
 namespace dexcheck {
 namespace {

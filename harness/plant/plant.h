@@ -10,8 +10,7 @@
 
 #include "controller/common/errors.h"
 #include "controller/common/types.h"
-#include "controller/control/controller.h"
-#include "controller/control/grasp_model.h"
+#include "controller/control/reading.h"
 #include "controller/model/robot_model.h"
 
 namespace dexcheck {

@@ -9,6 +9,7 @@
 #include "controller/object/so3.h"
 #include "harness/engine/map_vector.h"
 #include "harness/plant/disturbances.h"
+#include "harness/plant/wheel_rates.h"
 
 namespace dexcheck {
 namespace {

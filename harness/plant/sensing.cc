@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "controller/model/platform.h"
 #include "controller/object/so3.h"
+#include "harness/plant/wheel_rates.h"
 
 namespace dexcheck {
 namespace {
@@ -273,7 +273,7 @@ void Sensing::MeasureBase(const MeasuredState& true_state, MeasuredState* measur
         noise[i] = velocity_noise_[i] * velocity_stream_.Normal(k_, static_cast<std::uint64_t>(i));
       }
     }
-    measured->xi.head<2>() += CalcDriveVelocity(base_, noise);
+    measured->xi.head<2>() += base_.velocity == DriveVelocity::kTwist ? CalcTwist(base_, noise) : noise;
   }
   if (!options_.odometry) return;
   if (k_ == 0) {
@@ -298,7 +298,7 @@ void Sensing::AddVelocity(const Vector3d& v) {
     if (base_positions_ > 0) {
       const Vector3d heading(std::cos(state.q[2]), std::sin(state.q[2]), 0.0);
       state.q.head<2>() -= age * time_step_ * v.head<2>();
-      state.xi.head<2>() += CalcDriveVelocity(base_, Vector2d::Constant(v.dot(heading) / base_.wheel_radius));
+      state.xi.head<2>() += CalcDriveVelocityOfTwist(base_, {v.dot(heading), 0.0});
     }
     state.X_Bo.translation() -= (age + object_.FindAge(j)) * time_step_ * v;
     state.V_Bo.head<3>() += state.X_Bo.linear().transpose() * v;

@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "controller/control/controller.h"
+#include "controller/control/reading.h"
 #include "harness/plant/imperfections.h"
 #include "harness/plant/plant.h"
 #include "harness/plant/random_stream.h"

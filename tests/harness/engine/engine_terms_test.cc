@@ -8,6 +8,7 @@
 #include <memory>
 
 #include "controller/common/errors.h"
+#include "controller/dynamics/model_terms.h"
 #include "harness/engine/mujoco_release.h"
 #include "tests/common/matrix_near.h"
 #include "tests/common/paper_robot.h"
