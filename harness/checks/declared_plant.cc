@@ -50,14 +50,10 @@ const DeclaredStep& DeclaredPlant::Follow(const StepRecord& step) {
   model_.SetState(state);
   step_.model = &model_;
   step_.force.setZero();
-  step_.push.setZero();
   step_.object_wrench.setZero();
   step_.pushes = {};
   if (!disturbances_.empty()) {
     const std::span<const Wrench> wrenches = disturbances_.Evaluate(step.time, state);
-    for (const Wrench& w : wrenches) {
-      if (w.body != Wrench::kObject) step_.push += w.force;
-    }
     AddRobotForce(wrenches, model_.robot(), step_.force);
     step_.object_wrench = CalcObjectWrench(wrenches, state.X_Bo);
     step_.pushes = disturbances_.Evaluate(step.time, step.reading);

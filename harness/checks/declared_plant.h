@@ -24,7 +24,6 @@ struct DeclaredStep {
   VectorXd tau;                       ///< What the declared motors make of the command, tau' (n), N m.
   const GraspModel* model = nullptr;  ///< Terms of the plant's declared masses, at the true state.
   VectorXd force;                     ///< Declared pushes on the robot, as forces on xi (n).
-  Vector3d push = Vector3d::Zero();   ///< Sum of those forces, world, N.
   Vector6d object_wrench = Vector6d::Zero();  ///< And on the object, Sigma_o.
   /// All of them, where they act on the plant's bodies.
   std::span<const Wrench> pushes;
