@@ -20,6 +20,8 @@ double CalcContactScale(Scaling scaling, const PlantOptions& plant) {
   const double dt = plant.time_step;
   const double softness = 1.0 - plant.contact_impedance;
   switch (scaling) {
+    case Scaling::kSofter:
+      return Worst(softness, 1.0 - PlantOptions{}.contact_impedance);
     case Scaling::kCreep:
       return softness * dt;
     case Scaling::kLag:

@@ -237,13 +237,14 @@ const CheckInfo kChecks[] = {
     // proportion to 1 - d: measured 1e-6 and less in steady motion, 5e-2 in `curve-real`, 0.43 where
     // fingertips touch.
     {{"reduced_acceleration", kAssumption, "1"},
-     {1.0, "all that is predicted: rigid contacts explain nothing any more"},
+     {1.0, "all that motors balance or is predicted: rigid contacts explain nothing any more",
+      Scaling::kSofter, "1; 100 (1 - d) of softer contacts"},
      "how far rigid contacts are from explaining the accelerations: xi_dot of the rigid constrained system "
      "(46), (48) against the engine's",
      {Cause::kContactSoftness, 25, Rank::kPrediction},
      {[](const Analysis& a) { return When(true, a.acceleration_error); }}},
     {{"contact_force", kAssumption, "1"},
-     {1.0, "likewise"},
+     {1.0, "likewise", Scaling::kSofter, "1; 100 (1 - d) of softer contacts"},
      "the same of the contact forces: f_c of that system against the engine's, relative to |f_c|",
      {Cause::kContactSoftness, 26, Rank::kPrediction},
      {[](const Analysis& a) { return When(true, a.contact_force_error); }}},

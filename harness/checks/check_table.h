@@ -23,6 +23,7 @@ struct StepAnalysis;
 /// What a bound is proportional to; none of them for one that is rounding, or a fraction.
 enum class Scaling {
   kNone,
+  kSofter,           ///< 1 - d where contacts are softer than the shipped ones
   kCreep,            ///< (1 - d) dt
   kLag,              ///< dt
   kSquaredStep,      ///< dt^2

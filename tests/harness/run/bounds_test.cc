@@ -46,6 +46,8 @@ TEST(Bounds, FollowStepStiffnessAndGains) {
   const std::string step = "plant.time_step=0.002";
   const std::string soft = "plant.contact_impedance=0.9";
   const std::string slow = "plant.contact_time_constant=0.02";
+  expect("reduced_acceleration", {soft, step, slow}, 10.0);
+  expect("reduced_acceleration", {"plant.contact_impedance=0.999"}, 1.0);
   expect("penetration", {step}, 4.0);
   expect("penetration", {soft}, 10.0);
   // Softer than the step needs is no reason to forgive.
@@ -60,8 +62,8 @@ TEST(Bounds, FollowStepStiffnessAndGains) {
   expect("error_dynamics", {"control.natural_frequency=10"}, 4.0);
   expect("orientation_dynamics", {"control.natural_frequency=40"}, 0.25);
   expect("idle_joints", {"control.posture_frequency=20"}, 0.25);
-  for (const char* check : {"law_torque", "inverse_dynamics_robot", "inverse_dynamics_object", "cone_use",
-                            "solver", "reduced_acceleration"})
+  for (const char* check :
+       {"law_torque", "inverse_dynamics_robot", "inverse_dynamics_object", "cone_use", "solver"})
     expect(check, {soft, step, slow}, 1.0);
   EXPECT_DOUBLE_EQ(CalcRatio("error_dynamics", {"control.natural_frequency=0"}), 1.0);
 }
