@@ -10,6 +10,7 @@
 #include "harness/base/worst.h"
 #include "harness/engine/engine.h"
 #include "harness/engine/map_vector.h"
+#include "harness/engine/mujoco_release.h"
 #include "harness/engine/robot_tree.h"
 
 namespace dexcheck {
@@ -57,6 +58,8 @@ ConstraintLaw::ConstraintLaw(const RobotModel& model, const ObjectModel* object,
 
 void ConstraintLaw::FindGeoms(const mjData& reference) {
   const mjModel& m = adapter_->engine();
+  for (int pair = 0; pair < m.npair; ++pair)
+    pairs_[std::minmax({m.pair_geom1[pair], m.pair_geom2[pair]})] = pair;
   geoms_.resize(static_cast<size_t>(m.ngeom));
   const auto set_sphere = [this](int g, int link, const std::string& name, const Vector3d& center,
                                  double radius) {
@@ -220,6 +223,20 @@ void ConstraintLaw::AddMotion(const Link& link, const Vector3d& point, double po
   motion->error.row(1) += link.origin.error.row(1) + kSumErrors * turning;
 }
 
+EngineContact ConstraintLaw::TakePair(EngineContact contact) const {
+  const auto found = pairs_.find(std::minmax({contact.geom1, contact.geom2}));
+  if (found == pairs_.end()) return contact;
+  const mjModel& m = adapter_->engine();
+  const int pair = found->second;
+  contact.margin = m.pair_margin[pair] - m.pair_gap[pair];
+  for (int i = 0; i < 5; ++i)
+    contact.friction[static_cast<size_t>(i)] = Worst(mjMINMU, m.pair_friction[5 * pair + i]);
+  std::copy_n(m.pair_solimp + mjNIMP * pair, mjNIMP, contact.solimp.begin());
+  std::copy_n(m.pair_solref + mjNREF * pair, mjNREF, contact.solref.begin());
+  std::copy_n(GetFrictionReference(m, pair), mjNREF, contact.solref_friction.begin());
+  return contact;
+}
+
 ConstraintLaw::Place ConstraintLaw::FindPlace(const EngineContact& contact) {
   Place place{contact.position, contact.frame, contact.distance, 0.0, 0.0, 0.0, false};
   const Geom& first = geoms_[static_cast<size_t>(contact.geom1)];
@@ -353,7 +370,7 @@ void ConstraintLaw::SetConnection(size_t row) {
 void ConstraintLaw::SetContact(size_t row) {
   const mjModel& m = adapter_->engine();
   const ConstraintRow& it = response_->rows[row];
-  const EngineContact& contact = response_->engine_contacts[static_cast<size_t>(it.id)];
+  const EngineContact contact = TakePair(response_->engine_contacts[static_cast<size_t>(it.id)]);
   const int link1 = geoms_[static_cast<size_t>(contact.geom1)].link;
   const int link2 = geoms_[static_cast<size_t>(contact.geom2)].link;
   if (link1 == WholeRobot::kNoLink || link2 == WholeRobot::kNoLink) return;

@@ -6,6 +6,7 @@
 #include <mujoco/mujoco.h>
 
 #include <array>
+#include <map>
 #include <span>
 #include <string>
 #include <utility>
@@ -39,8 +40,9 @@ struct RowForce {
 ///
 /// w, J, the joints' limits and dry friction follow from the parameters, and so do the places at which
 /// spheres of fingertips, feet and wheels touch planes of the world, each other, or an object that is a
-/// sphere or torus. At all other contacts place and distance are the engine's. So are softness and friction,
-/// the direction of tangents, and which of the two nearest places on a torus is meant.
+/// sphere or torus. At all other contacts place and distance are the engine's. So are the direction of
+/// tangents, and which of the two nearest places on a torus is meant. Softness, margins and friction are
+/// those of the mjModel that the adapter has; of geoms that no <pair> lists they are the contact's.
 ///
 /// Bounds follow from the sizes of what y is the sum of, and from how errors of rotations, places and
 /// velocities grow along the chain of joints. Nothing allocates after construction.
@@ -103,6 +105,8 @@ class ConstraintLaw {
   Point Locate(int link, const Vector3d& in_link);
   static void AddMotion(const Link& link, const Vector3d& point, double point_error, double sign,
                         PointMotion* motion);
+  /// The contact with the parameters of its <pair>.
+  [[nodiscard]] EngineContact TakePair(EngineContact contact) const;
   [[nodiscard]] Place FindPlace(const EngineContact& contact);
   [[nodiscard]] InverseInertia AddWeights(int body1, int body2) const;
   void SetJointRow(size_t row);
@@ -118,6 +122,7 @@ class ConstraintLaw {
   const WholeRobot* whole_;
   double unit_;  // relative error of one operation
   std::vector<Geom> geoms_;
+  std::map<std::pair<int, int>, int> pairs_;        // by their geoms, the smaller number first
   std::vector<InverseInertia> body_weights_;        // by the engine's bodies, of their translation
   std::vector<InverseInertia> joint_weights_;       // by the engine's joints
   std::vector<int> joints_;                         // of the whole robot, by the engine's; -1 without

@@ -359,6 +359,15 @@ inline const mjtNum* GetFrictionReference(const mjContact& contact) {
   return contact.solref;
 }
 
+inline const mjtNum* GetFrictionReference(const mjModel& m, int pair) {
+  const mjtNum* const reference = m.pair_solref + mjNREF * pair;
+#if mjVERSION_HEADER >= 300
+  const mjtNum* const own = m.pair_solreffriction + mjNREF * pair;
+  if (own[0] != 0.0 || own[1] != 0.0) return own;
+#endif
+  return reference;
+}
+
 /// How many contacts a collision function may fill for two geoms.
 inline int CountMostContacts([[maybe_unused]] const mjModel& m, [[maybe_unused]] int geom1,
                              [[maybe_unused]] int geom2, [[maybe_unused]] mjtNum margin) {

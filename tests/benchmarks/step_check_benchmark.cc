@@ -146,6 +146,40 @@ void FollowClearanceOf(benchmark::State& state, const std::string& scenario, con
 BENCHMARK_CAPTURE(FollowClearanceOf, paper, "paper", "2")->Unit(benchmark::kMicrosecond);
 BENCHMARK_CAPTURE(FollowClearanceOf, lift, "lift", "40")->Unit(benchmark::kMicrosecond);
 
+/// The whole robot's terms along a shipped scenario, and with them the forces of all constraints.
+void FollowForcesOf(benchmark::State& state, const std::string& scenario, const std::string& duration,
+                    bool with_forces) {
+  const testing::ShippedRun shipped(scenario, {"duration=" + duration});
+  const Setup& setup = shipped.setup();
+  std::vector<VectorXd> qpos, qvel;
+  std::vector<PlantResponse> responses;
+  Runner runner(setup, /*check=*/false);
+  runner.Run(
+      [&](const StepRecord& step) {
+        qpos.push_back(step.reading.qpos);
+        qvel.push_back(step.reading.qvel);
+        responses.push_back(step.response);
+      },
+      [] { return false; });
+  const ObjectModel& object = setup.declared_object();
+  WholeRobot whole(setup.declared_model(), &object.body, setup.plant_adapter());
+  ConstraintLaw law(setup.declared_model(), &object, setup.plant_adapter(), whole);
+  size_t k = 0, rows = 0;
+  for (auto _ : state) {
+    k = (k + 1) % qpos.size();
+    whole.SetState(qpos[k].data(), qvel[k].data());
+    if (!with_forces) continue;
+    law.SetStep(qpos[k].data(), qvel[k].data(), responses[k]);
+    benchmark::DoNotOptimize(law.FindWorst());
+    rows += law.forces().size();
+  }
+  state.counters["rows"] = benchmark::Counter(static_cast<double>(rows), benchmark::Counter::kAvgIterations);
+}
+BENCHMARK_CAPTURE(FollowForcesOf, curve_terms, "curve", "0.5", false)->Unit(benchmark::kMicrosecond);
+BENCHMARK_CAPTURE(FollowForcesOf, curve_forces, "curve", "0.5", true)->Unit(benchmark::kMicrosecond);
+BENCHMARK_CAPTURE(FollowForcesOf, lift_terms, "lift", "12", false)->Unit(benchmark::kMicrosecond);
+BENCHMARK_CAPTURE(FollowForcesOf, lift_forces, "lift", "12", true)->Unit(benchmark::kMicrosecond);
+
 }  // namespace
 }  // namespace dexcheck
 

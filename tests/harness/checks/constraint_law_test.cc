@@ -123,14 +123,17 @@ Scene MakeScene(const Case& one, unsigned seed) {
           one.contact, reach, tube));
   text = ReplaceOnce(
       text, "</worldbody>",
-      fmt::format("<body name='thing' pos='0.3 0.2 0.4'><freejoint/><inertial pos='0 0 0' mass='0.7' "
-                  "diaginertia='0.002 0.003 0.004'/>{}</body></worldbody>"
-                  "<equality><connect body1='{}' body2='thing' anchor='0.03 0.1 -0.05' "
-                  "solref='0.03 1'/></equality>",
-                  one.torus
-                      ? fmt::format("<geom type='mesh' mesh='hull' user='{:.17g} {:.17g}'/>", ring, tube)
-                      : fmt::format("<geom type='sphere' size='{:.17g}'/>", radius),
-                  spec.joints.back().link));
+      fmt::format(
+          "<body name='thing' pos='0.3 0.2 0.4'><freejoint/><inertial pos='0 0 0' mass='0.7' "
+          "diaginertia='0.002 0.003 0.004'/>{}</body></worldbody>"
+          "<equality><connect body1='{}' body2='thing' anchor='0.03 0.1 -0.05' "
+          "solref='0.03 1'/></equality>"
+          "<contact><pair geom1='floor' geom2='thing' friction='0.7 0.5 0.01 0.001 0.001' "
+          "solref='0.03 0.8' margin='0.002' gap='0.001'/></contact>",
+          one.torus
+              ? fmt::format("<geom name='thing' type='mesh' mesh='hull' user='{:.17g} {:.17g}'/>", ring, tube)
+              : fmt::format("<geom name='thing' type='sphere' size='{:.17g}'/>", radius),
+          spec.joints.back().link));
   scene.engine = LoadMjcfText(text, "text");
   return scene;
 }
@@ -154,13 +157,14 @@ const char* KindOf(const ConstraintRow& row, const RowForce& force) {
 using Change = std::function<void(RobotSpec* spec, PlantResponse* response)>;
 
 /// Throws the scene about, and predicts its forces with parameters, or contacts, that are changed.
-Shown Predict(const Scene& scene, unsigned seed, const Change& change) {
+/// @param simulated what moves, where that is not the scene's own.
+Shown Predict(const Scene& scene, unsigned seed, const Change& change, const mjModel* simulated = nullptr) {
   PlantResponse response;
   RobotSpec spec = scene.spec;
   change(&spec, &response);
   const RobotModel model(std::move(spec));
-  const mjModel& m = *scene.engine;
-  const Adapter adapter(model, m, "text");
+  const mjModel& m = simulated == nullptr ? *scene.engine : *simulated;
+  const Adapter adapter(model, *scene.engine, "text");
   WholeRobot whole(model, &model.object()->body, adapter);
   ConstraintLaw law(model, &*model.object(), adapter, whole);
   const MjDataPtr data = MakeData(m);
@@ -282,6 +286,18 @@ TEST_P(ConstraintLawFault, IsFound) {
 
 INSTANTIATE_TEST_SUITE_P(All, ConstraintLawFault, ::testing::ValuesIn(kFaults),
                          [](const auto& info) { return info.param.name; });
+
+TEST(ConstraintLaw, HasThePairsOwnParameters) {
+  const Scene scene = MakeScene({"Drive", kDrive}, 3);
+  for (mjtNum* mjModel::*values : {&mjModel::pair_friction, &mjModel::pair_solref, &mjModel::pair_margin}) {
+    const MjModelPtr other(mj_copyModel(nullptr, scene.engine.get()));
+    ((*other).*values)[0] *= 1.0 + kOff;
+    const Shown shown = Predict(
+        scene, 3, [](auto*, auto*) {}, other.get());
+    EXPECT_GT(shown.worst, 1.0);
+    EXPECT_NE(shown.where.find("contact of floor and thing"), std::string::npos) << shown.where;
+  }
+}
 
 TEST(ConstraintLaw, SaysWhereItDoesNotApply) {
   const Scene scene = MakeScene({"Fixed", kFixed}, 1);
