@@ -227,7 +227,7 @@ const CheckInfo kChecks[] = {
       "1, of rounding"},
      "largest difference of the engine's force of a contact, limit, dry friction or joined point and its "
      "documented law's under the same motion, over what rounding can make of it",
-     {Cause::kUnexplained, 42, Rank::kResidual},
+     {Cause::kContactSoftness, 42, Rank::kResidual},
      {[](const Analysis& a) {
         const bool has_rows = a.constraint_law != nullptr && !a.constraint_law->forces().empty();
         return has_rows ? At(a.constraint_force) : std::nullopt;
