@@ -139,8 +139,8 @@ void PrintRigidContacts(const RunChecks& checks) {
   if (!checks.Has("reduced_acceleration") || !checks.Has("contact_force")) return;
   const CheckRecord& acceleration = checks.Find("reduced_acceleration");
   if (acceleration.count == 0) return;
-  fmt::print("rigid contacts explain accelerations to {:.1e}, contact forces to {:.1e}\n",
-             acceleration.worst, checks.Find("contact_force").worst);
+  fmt::print("rigid contacts explain accelerations to {:.1e}, contact forces to {:.1e}\n", acceleration.worst,
+             checks.Find("contact_force").worst);
 }
 
 void PrintSpeed(const ClosedLoop& loop, const RunResult& result) {

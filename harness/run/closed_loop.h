@@ -44,8 +44,8 @@ struct LoopTimes {
 ///     `----PlantResponse----> checks: all of it is one StepRecord
 ///
 /// Deterministic: with two threads the checks of a step are made beside the whole next step, on a copy of its
-/// record, as long as that is the faster way (ThreadChoice), and every number is the same. Nothing allocates in a step, except as the controller and RunChecks
-/// say.
+/// record, as long as that is the faster way (ThreadChoice), and every number is the same. Nothing allocates
+/// in a step, except as the controller and RunChecks say.
 class ClosedLoop {
  public:
   /// @param check whether to cross-check.

@@ -174,8 +174,8 @@ TEST(Attribute, OfSeveralThatSlideTheFirstCounts) {
 }
 
 TEST(Attribute, SlipWithoutSlidingIsSoftness) {
-  for (const char* name : {"fingertip_slip", "fingertip_slip_rate", "wheel_slip", "wheel_slip_rate",
-                           "penetration", "kappa"}) {
+  for (const char* name :
+       {"fingertip_slip", "fingertip_slip_rate", "wheel_slip", "wheel_slip_rate", "penetration", "kappa"}) {
     const AttributionResult result = FakeRun().Fail(name, 0.1).Fail("reduced_acceleration", 0.05).Explain();
     EXPECT_EQ(result.cause, Cause::kContactSoftness) << name;
     EXPECT_THAT(result.evidence, StartsWith(name));
