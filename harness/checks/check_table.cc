@@ -1,6 +1,7 @@
 #include "harness/checks/check_table.h"
 
 #include <algorithm>
+#include <limits>
 #include <map>
 
 #include "harness/base/worst.h"
@@ -43,6 +44,8 @@ constexpr double kShippedSoftness = 1.0 - 0.99;
 constexpr double kShippedCreep = kShippedSoftness * kShippedTimeConstant / 2.0 / 100.0 * kTipLoad;  // m/s
 constexpr double kShippedLag = kShippedTimeConstant / 2.0 * kSideways;                              // m/s
 constexpr double kShippedSinking = kShippedSoftness * kShippedTimeConstant * kShippedTimeConstant;  // s^2
+
+constexpr double kUnitRounding = std::numeric_limits<double>::epsilon();
 
 constexpr bool kOwn = true;       // FailureMeaning::is_own
 constexpr bool kRelative = true;  // Bound::is_relative
@@ -223,14 +226,15 @@ const CheckInfo kChecks[] = {
      {Cause::kUnmodelledForce, 24, Rank::kObjectBalance},
      {[](const Analysis& a) { return When(true, a.object_residual_size); }}},
     {{"constraint_force", kForwardDynamics, "1"},
-     {1.0, "rounding of the row's place, rates and inertia over its R, computed for each row", Scaling::kNone,
-      "1, of rounding"},
+     {kUnitRounding,
+      "one operation, of sizes that count the operations on the row's place, rates and inertia"},
      "largest difference of the engine's force of a contact, limit, dry friction or joined point and its "
-     "documented law's under the same motion, over what rounding can make of it",
+     "documented law's under the same motion, over the sizes that its rounding comes from",
      {Cause::kContactSoftness, 42, Rank::kResidual},
-     {[](const Analysis& a) {
+     {[](const Analysis& a) -> Evaluation {
         const bool has_rows = a.constraint_law != nullptr && !a.constraint_law->forces().empty();
-        return has_rows ? At(a.constraint_force) : std::nullopt;
+        if (!has_rows) return std::nullopt;
+        return CheckValue{kUnitRounding * a.constraint_force.first, a.constraint_force.second};
       },
       kAlways, DescribeConstraint}},
     // The paper's contacts are rigid. The engine's hold back a part of every force that changes, in
