@@ -38,7 +38,7 @@ inline constexpr const char* kGrows = " that grows by";
 }  // namespace force_fault
 
 /// Noise of one step: of the robot's rows s^2 1 + U U^T, of the object's that of each. s is rounding, and U
-/// has what a platform leaves that tilts, sinks and slips: the inertial forces of all links when it
+/// has what a platform leaves that tilts and slips: the inertial forces of all links when it
 /// accelerates in six ways, and torques of its wheels, each as large as the check's bound.
 struct StepNoise {
   Vector2d bounds = Vector2d::Ones();  ///< s and the object's at level 1.
