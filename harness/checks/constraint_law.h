@@ -42,7 +42,7 @@ struct RowForce {
 /// spheres of fingertips, feet and wheels touch planes of the world, each other, or an object that is a
 /// sphere or torus. At all other contacts place and distance are the engine's. So are the direction of
 /// tangents, and which of the two nearest places on a torus is meant. Softness, margins and friction are
-/// those of the mjModel that the adapter has; of geoms that no <pair> lists they are the contact's.
+/// those of the mjModel that the adapter has; of geoms that no pair of the MJCF lists they are the contact's.
 ///
 /// Bounds follow from the sizes of what y is the sum of, and from how errors of rotations, places and
 /// velocities grow along the chain of joints. Nothing allocates after construction.
@@ -105,7 +105,7 @@ class ConstraintLaw {
   Point Locate(int link, const Vector3d& in_link);
   static void AddMotion(const Link& link, const Vector3d& point, double point_error, double sign,
                         PointMotion* motion);
-  /// The contact with the parameters of its <pair>.
+  /// The contact with the parameters of its pair.
   [[nodiscard]] EngineContact TakePair(EngineContact contact) const;
   [[nodiscard]] Place FindPlace(const EngineContact& contact);
   [[nodiscard]] InverseInertia AddWeights(int body1, int body2) const;
