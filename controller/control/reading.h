@@ -1,6 +1,6 @@
 #pragma once
 
-// What is measured of robot, object and contacts at one instant.
+// The measurements of robot, object and contacts at one instant.
 
 #include <cstddef>
 #include <cstdint>
@@ -28,13 +28,13 @@ struct MeasuredState {
   std::vector<double> overlap;            ///< Likewise, m; see CalcContactGeometry.
 };
 
-/// What the hand feels, and the support.
+/// The contacts that the hand feels, and the force of the support.
 struct Touch {
   ContactSet fingertips = 0;   ///< That touch the object.
   double support_force = 0.0;  ///< Upward, on the object by what it lies on, N; of the step before.
 };
 
-/// What is measured at one instant.
+/// All measurements of one instant.
 struct Reading {
   MeasuredState state;
   Touch touch;

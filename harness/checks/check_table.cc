@@ -194,7 +194,7 @@ const CheckInfo kChecks[] = {
         return When(a.step->command.joints.q.size() > 0 && IsExpected(a), a.step->error.joints);
       },
       kRunning}},
-    // Of the whole robot at the true state, where what does not accelerate shows as well.
+    // These two compare the whole robot at the true state, where joints that do not accelerate show as well.
     {{"mass_matrix", kModel, "1"},
      {1e-13, "rounding: 16 eps for each joint of a chain of 25", Scaling::kNone, nullptr, kRelative},
      "M of the whole robot against the engine's, over the sizes that are summed",

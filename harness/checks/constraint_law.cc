@@ -319,7 +319,7 @@ void ConstraintLaw::SetJointRow(size_t row) {
   double side = 1.0, r = 0.0, r_error = 0.0;
   const mjtNum *solref = m.dof_solref + mjNREF * dof, *solimp = m.dof_solimp + mjNIMP * dof;
   if (is_limit) {
-    // Of a joint that is near both ends of its range the lower one comes first.
+    // The engine puts the lower limit first where a joint is near both ends of its range.
     const std::vector<ConstraintRow>& rows = response_->rows;
     const auto is_same = [&](size_t i) {
       return i < rows.size() && rows[i].type == it.type && rows[i].id == id;

@@ -14,7 +14,7 @@ namespace dexcheck {
 inline constexpr double kSumErrors = 8.0;  // of a sum of a few products, on both sides
 constexpr double Squared(double x) { return x * x; }
 
-/// What J qacc and J qvel of a point are, [linear; angular] each, in the world.
+/// The columns J qacc and J qvel of a point, [linear; angular] each, in the world.
 struct PointMotion {
   Eigen::Matrix<double, 6, 2> value = Eigen::Matrix<double, 6, 2>::Zero();
   Eigen::Array22d error = Eigen::Array22d::Zero();  ///< Of linear and angular part.
@@ -32,7 +32,8 @@ struct Softness {
   double d_error = 0.0;
 };
 
-/// Of a constraint at the distance r, less its margin. @param solref, solimp the engine's.
+/// Returns the softness of a constraint at the distance r, less its margin. @param solref, solimp the
+/// engine's.
 Softness CalcSoftness(const mjOption& option, const mjtNum* solref, const mjtNum* solimp, double r,
                       double r_error);
 
@@ -49,7 +50,7 @@ struct SoftCone {
            double r, double r_error);
   /// -y / R.
   [[nodiscard]] std::array<double, 6> CalcFreeForces() const;
-  /// What rounding can make of the force of a row. A projection moves two points no farther apart, in its
+  /// Returns the error of a row's force by rounding. A projection moves two points no farther apart, in its
   /// metric.
   [[nodiscard]] double CalcForceError(size_t row, double force) const;
 };

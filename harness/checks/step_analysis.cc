@@ -9,6 +9,7 @@
 
 #include "harness/base/worst.h"
 #include "harness/checks/rounding_scales.h"
+#include "harness/plant/wheel_rates.h"
 
 namespace dexcheck {
 namespace {
@@ -26,9 +27,8 @@ double CalcRobotMass(const RobotModel& model) {
 }  // namespace
 
 Vector2d CalcRollingTwist(const Base& base, const VectorXd& xi) {
-  if (base.velocity == DriveVelocity::kTwist) return xi.head<2>();
-  const double r = base.wheel_radius;
-  return {0.5 * r * (xi[0] + xi[1]), r * (xi[0] - xi[1]) / base.wheel_distance};
+  const Vector2d velocity = xi.head<2>();
+  return base.velocity == DriveVelocity::kTwist ? velocity : CalcTwist(base, velocity);
 }
 
 StepAnalyzer::PartialDynamics::PartialDynamics(const Setup& setup, ContactSet set)

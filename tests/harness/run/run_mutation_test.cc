@@ -133,7 +133,7 @@ INSTANTIATE_TEST_SUITE_P(Robots, OtherRobot, ::testing::Values("hand-curve", "pa
 
 // A motion of joints begins at rest, where their friction is nothing; the seventh never moves.
 TEST(RunCampaign, LooksOnWhereAFaultIsNotFound) {
-  RunMutationOptions options = MakeOptions(0.01, 0.01);
+  RunMutationOptions options = MakeOptions(0.0, 0.001);
   options.draws = 40;
   options.kinds = {"joint"};
   RunCampaign brief = MakeCampaign(options, "panda-reach", {"duration=1"});
@@ -146,7 +146,7 @@ TEST(RunCampaign, LooksOnWhereAFaultIsNotFound) {
     if (!is_still && !name.starts_with("joint panda_joint3: viscous friction")) continue;
     ASSERT_EQ(whole.mutants()[i].all.name, name);
     ASSERT_TRUE(brief.Run(i, kGoOn) && whole.Run(i, kGoOn));
-    EXPECT_EQ(brief.mutants()[i].killed, !is_still) << name;
+    EXPECT_FALSE(brief.mutants()[i].killed) << name;
     EXPECT_EQ(whole.mutants()[i].killed, !is_still) << name;
     EXPECT_EQ(whole.mutants()[i].no_effect, is_still) << name;
     ++(is_still ? still : moving);
