@@ -1,0 +1,166 @@
+#pragma once
+
+// What may be wrong in a file, as values: what kind of fault, of what, where, and what would be right.
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "harness/corrections/printed_robot.h"
+
+namespace dexcheck {
+
+/// A printed quantity of a joint or a link.
+enum class SiteKind {
+  // Of the joint that moves a link.
+  kCarrier,   ///< The link that carries it.
+  kPresence,  ///< The joint and its link are in one file only.
+  kName,
+  kType,
+  kPosition,
+  kRotation,
+  kAxis,
+  kAxisPoint,
+  kRange,
+  kMimic,
+  kDamping,  ///< From here on in the order of JointScalar.
+  kFriction,
+  kArmature,
+  kEffort,
+  kVelocity,
+  kStiffness,
+  kSpringAngle,
+  kGear,
+  // Of the link.
+  kMass,
+  kCom,
+  kInertia,
+  // Of the robot.
+  kGravity,
+};
+inline bool IsOfBody(SiteKind kind) { return kind >= SiteKind::kMass && kind <= SiteKind::kInertia; }
+inline SiteKind ToSite(JointScalar scalar) {
+  return static_cast<SiteKind>(static_cast<int>(SiteKind::kDamping) + static_cast<int>(scalar));
+}
+
+struct Site {
+  SiteKind kind;
+  int link;  ///< Of the first file; -1 - j for link j that the second file alone has.
+  bool operator==(const Site&) const = default;
+};
+
+enum class CorrectionKind {
+  kNumber,   ///< Other numbers.
+  kMissing,  ///< It is not stated.
+  kSurplus,  ///< It is stated here only.
+  // Of a vector.
+  kSign,
+  kSignOf,       ///< Component: the axis.
+  kPermutation,  ///< Component: of kPermutations.
+  kUnit,         ///< Component: of ListUnits.
+  // Of a rotation.
+  kDegrees,
+  kRadians,
+  kAngleSign,     ///< Component: the angle.
+  kAngleDegrees,  ///< Component: the angle.
+  kAnglesReversed,
+  kAnglesPermuted,  ///< Component: of kPermutations.
+  kEulerSequence,   ///< Component: of kSequences.
+  kMovingAxes,
+  kFixedAxes,
+  kTransposed,
+  kScalarFirst,
+  kScalarLast,
+  kMirror,      ///< Component: the axis.
+  kTurnOwn,     ///< Component: 3 axis + quarter turns - 1.
+  kTurnParent,  ///< Likewise.
+  kZero,        ///< The joint's zero is elsewhere.
+  // Of a place or a centre of mass, in another frame.
+  kAlongLink,
+  kAlongParent,
+  kInParent,
+  kToParent,
+  kAlongToParent,
+  kPlaceAdded,
+  kPlaceTaken,
+  kInChild,
+  kInertialAxes,
+  kToInertialAxes,
+  kInverse,  ///< The parent's pose in the link.
+  // Of an inertia.
+  kAboutOrigin,
+  kMovedTwice,
+  kAboutOriginAxes,
+  kAboutParent,
+  kProductSigns,
+  kProductSign,  ///< Component: xy, xz, yz.
+  kMoments,      ///< Component: of kPermutations.
+  kSixOrder,     ///< Component: of kSixOrders.
+  kSixOrderInverse,
+  kNoProducts,
+  kNoAxes,
+  kLinkAxes,
+  kFrame,  ///< The rotation of its frame: `rotation` says how.
+  kWithMass,
+  // Of whole inertials and joints.
+  kExchanged,
+  kOfOther,
+  kPartMissing,
+  kOtherAxis,
+};
+
+/// What a candidate is about.
+struct FileFault {
+  CorrectionKind kind = CorrectionKind::kNumber;
+  SiteKind of = SiteKind::kPosition;
+  int component = 0;
+  CorrectionKind rotation = CorrectionKind::kNumber;  ///< Of kFrame.
+  int other = -1;                                     ///< The link it is exchanged with, or whose it has.
+  bool in_second = false;                             ///< The second file has it.
+  bool whole = false;  ///< Of a body: its centre and inertia, of a place: position and rotation.
+};
+/// Whether two are the same at different places.
+bool IsSameFault(const FileFault& a, const FileFault& b);
+
+/// A link with the fault undone.
+struct LinkPatch {
+  int link;
+  PrintedLink right;
+};
+
+/// One way to put sites right.
+struct CorrectionCandidate {
+  FileFault fault;
+  int link = -1;
+  std::vector<Site> sites;
+  double bits = 0.0;  ///< Beyond those of which convention and where.
+  std::vector<LinkPatch> patches;
+  std::string values;  ///< "mass 1.9, 1.998 would be right"
+};
+
+/// Whether it pays for its digits, and not for a convention.
+inline bool IsNumber(const FileFault& fault) {
+  return fault.kind == CorrectionKind::kNumber || fault.kind == CorrectionKind::kZero ||
+         (fault.kind == CorrectionKind::kFrame && fault.rotation == CorrectionKind::kNumber);
+}
+
+/// Words for a fault, to be read behind "joint q1: " or "link l1: ".
+std::string DescribeFault(const FileFault& fault);
+const char* NameSite(SiteKind kind);
+
+inline constexpr int kPermutations[5][3] = {{1, 0, 2}, {2, 1, 0}, {0, 2, 1}, {1, 2, 0}, {2, 0, 1}};
+inline constexpr int kSixOrders[5][6] = {
+    {0, 3, 5, 1, 2, 4}, {0, 2, 5, 1, 3, 4}, {0, 1, 2, 5, 4, 3}, {0, 1, 2, 3, 5, 4}, {0, 1, 2, 4, 3, 5}};
+inline constexpr const char* kSequences[] = {"xyz", "XYZ", "zyx", "ZYX", "xzy", "yxz", "yzx", "zxy"};
+
+/// What makes a number of a quantity right that was taken in another unit.
+struct UnitFault {
+  double factor;
+  const char* words;
+};
+std::span<const UnitFault> ListUnits(SiteKind kind);
+
+/// Bits of a number of this size that is known to half a unit.
+double CountBits(double value, double half);
+
+}  // namespace dexcheck

@@ -1,0 +1,364 @@
+#include "harness/corrections/link_frames.h"
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+
+#include "harness/corrections/origin_fixes.h"
+
+namespace dexcheck {
+namespace {
+
+// Bits of what is wrong under a choice of a frame, as corrections of it would cost.
+constexpr double kWrongLine = 15.0;
+constexpr double kTurnedLine = 6.0;
+constexpr double kWrongBody = 15.0;
+constexpr double kConventionBits = 13.0;
+constexpr double kOtherJoint = 16.0;
+constexpr double kNumberOfOrigin = 24.0;
+constexpr double kWrongOrigin = 40.0;
+constexpr double kWrongRotation = 25.0;
+constexpr double kWrongLength = 14.0;
+constexpr double kRegistered = 7.0;
+constexpr double kManyFrames = 0.5;    ///< Another frame, where most links have one.
+constexpr double kSearchAbove = 30.0;  ///< Registration by what the link carries is tried.
+constexpr double kRounding = 2e-6;     ///< m, or rad, beside what digits leave open.
+
+/// The axis of a joint on a link, in both files' frames of the link.
+struct CarriedAxis {
+  bool turns;
+  Vector3d point_a, way_a, point_b, way_b;
+  double open_angle, open_length;
+};
+
+struct FrameState {
+  double cost = 0.0;
+  std::vector<Pose> X_ab;
+};
+
+struct FrameChoice {
+  double cost;
+  Pose X;
+};
+
+Vector3d RemoveAlong(const Vector3d& v, const Vector3d& way) { return v - way * way.dot(v); }
+
+class FrameChooser {
+ public:
+  FrameChooser(const PrintedPair& pair, const FrameOptions& options) : pair_(pair), options_(options) {
+    axes_.resize(pair.a().links.size());
+    for (const int link : pair.links()) {
+      if (!pair.IsPlaced(link)) continue;
+      AddAxis(link, link, Pose::Identity(), Pose::Identity(), {}, {});
+      const int j = pair.Partner(link);
+      AddAxis(pair.node(link).parent, link, pair.given(link).X, pair.other(j).X, pair.given(link).pose,
+              pair.other(j).pose);
+    }
+  }
+
+  std::vector<ChosenFrames> Run() {
+    constexpr double kAtFirst = 3.0;
+    constexpr double kFew = 30.0;
+    constexpr double kFraction = 0.3;
+    other_frame_ = kAtFirst;
+    std::vector<FrameState> states = Walk();
+    const auto others = CountOthers(states[0].X_ab);
+    const auto moving =
+        std::ranges::count_if(pair_.links(), [&](int link) { return Moves(pair_.a().link(link)); });
+    other_frame_ = others >= std::max(2.0, kFraction * static_cast<double>(moving)) ? kManyFrames : kFew;
+    states = Walk();
+    std::vector<ChosenFrames> frames;
+    for (FrameState& state : states) {
+      if (frames.size() == options_.choices) break;
+      const double bits = other_frame_ * CountOthers(state.X_ab);
+      frames.push_back({std::move(state.X_ab), bits});
+    }
+    return frames;
+  }
+
+ private:
+  static double CountOthers(const std::vector<Pose>& X_ab) {
+    return static_cast<double>(
+        std::ranges::count_if(X_ab, [](const Pose& X) { return !X.isApprox(Pose::Identity(), 1e-9); }));
+  }
+
+  void AddAxis(int carrier, int moved, const Pose& X, const Pose& Y, const PoseTolerance& x,
+               const PoseTolerance& y) {
+    const PrintedJoint& ours = pair_.a().link(moved).joint;
+    const PrintedJoint& theirs = pair_.b().link(pair_.Partner(moved)).joint;
+    if (ours.kind != theirs.kind || (ours.kind != JointKind::kHinge && ours.kind != JointKind::kSlide))
+      return;
+    axes_[static_cast<size_t>(carrier)].push_back({ours.kind == JointKind::kHinge, X * ours.anchor,
+                                                   X.linear() * ours.axis.normalized(), Y * theirs.anchor,
+                                                   Y.linear() * theirs.axis.normalized(), x.angle + y.angle,
+                                                   (x.length + y.length).norm()});
+  }
+
+  std::vector<FrameState> Walk() {
+    std::vector<FrameState> states(1);
+    states[0].X_ab.assign(pair_.a().links.size(), Pose::Identity());
+    std::vector<FrameState> next;
+    for (const int link : pair_.links()) {
+      if (!pair_.IsPlaced(link)) continue;
+      next.clear();
+      for (FrameState& state : states) {
+        const std::vector<FrameChoice> choices =
+            ListChoices(link, state.X_ab[static_cast<size_t>(pair_.node(link).parent)]);
+        for (const FrameChoice& choice : choices) {
+          FrameState& grown = next.emplace_back(state);
+          grown.cost += choice.cost;
+          grown.X_ab[static_cast<size_t>(link)] = choice.X;
+        }
+      }
+      std::ranges::stable_sort(next, {}, &FrameState::cost);
+      if (next.size() > options_.width) next.resize(options_.width);
+      states.swap(next);
+    }
+    return states;
+  }
+
+  /// Bits of what the link carries that is wrong when the second file's frame stands at X in the first one's.
+  [[nodiscard]] double Weigh(int link, const Pose& X) const {
+    double bits = 0.0;
+    const Matrix3d& R = X.linear();
+    for (const CarriedAxis& axis : axes_[static_cast<size_t>(link)]) {
+      const Vector3d way = R * axis.way_b;
+      const bool parallel = axis.way_a.cross(way).norm() <= kRounding + axis.open_angle;
+      if (!parallel) bits += kWrongLine;
+      if (parallel && axis.way_a.dot(way) < 0.0) bits += kTurnedLine;
+      if (axis.turns &&
+          axis.way_a.cross(X * axis.point_b - axis.point_a).norm() > kRounding + axis.open_length)
+        bits += kWrongLine;
+    }
+    const GivenNode& a = pair_.given(link);
+    const GivenNode& b = pair_.other(pair_.Partner(link));
+    if (a.body.mass == 0.0 || b.body.mass == 0.0) return bits;
+    constexpr double kSameInertia = 1e-5;
+    const Matrix3d open =
+        a.body_tolerance.inertia + R.cwiseAbs() * b.body_tolerance.inertia * R.cwiseAbs().transpose();
+    const Vector3d open_com = a.body_tolerance.com + R.cwiseAbs() * b.body_tolerance.com;
+    if (((X * b.body.com - a.body.com).cwiseAbs().array() > kRounding + open_com.array()).any())
+      bits += kWrongBody;
+    if (((R * b.body.inertia * R.transpose() - a.body.inertia).cwiseAbs().array() >
+         kSameInertia * std::abs(a.body.inertia.trace()) + open.array())
+            .any())
+      bits += kWrongBody;
+    return bits;
+  }
+
+  [[nodiscard]] static bool IsSame(const Pose& X, const Pose& Y, const PoseTolerance& open) {
+    return CalcAngle(X.linear().transpose() * Y.linear()) <= open.angle &&
+           ((X.translation() - Y.translation()).cwiseAbs().array() <= open.length.array()).all();
+  }
+
+  /// The first file's pose of a link with one origin of its chain another.
+  [[nodiscard]] Pose ReplaceOrigin(int link, int replaced, const Pose& X_origin) const {
+    Pose X = Pose::Identity();
+    for (const int k : pair_.node(link).chain)
+      X = X * (k == replaced ? X_origin : pair_.a().link(k).origin.CalcPose());
+    return X;
+  }
+
+  /// Poses that the first file's link has with a convention undone, or with another joint's origin, with
+  /// their bits.
+  [[nodiscard]] std::vector<FrameChoice> ListUndone(int link) const {
+    std::vector<FrameChoice> poses;
+    for (const int k : pair_.node(link).chain) {
+      const PrintedOrigin& origin = pair_.a().link(k).origin;
+      PrintedOrigin right = origin;
+      for (const OriginFix& fix : ListRotationFixes(origin)) {
+        right = origin;
+        FixRotation(fix, origin, &right);
+        poses.push_back({kConventionBits + fix.bits, ReplaceOrigin(link, k, right.CalcPose())});
+      }
+      if (origin.form != RotationForm::kMdh) {
+        right = origin;
+        for (const OriginFix& fix : ListVectorFixes(SiteKind::kPosition, origin.t)) {
+          right.t = FixVector(fix, SiteKind::kPosition, origin.t);
+          poses.push_back({kConventionBits + fix.bits, ReplaceOrigin(link, k, right.CalcPose())});
+        }
+      }
+      poses.push_back({kConventionBits, ReplaceOrigin(link, k, origin.CalcPose().inverse())});
+    }
+    for (const int other : pair_.links()) {
+      if (other == link || !pair_.IsPlaced(other) ||
+          pair_.a().link(other).joint.kind != pair_.a().link(link).joint.kind)
+        continue;
+      const int last = pair_.node(link).chain.back();
+      poses.push_back({kOtherJoint, ReplaceOrigin(link, last, pair_.a().link(other).origin.CalcPose())});
+    }
+    return poses;
+  }
+
+  /// Bits of the origin when both files have one frame.
+  [[nodiscard]] double WeighOrigin(int link, const Pose& X_right, const PoseTolerance& open,
+                                   const std::vector<FrameChoice>& undone) const {
+    const Pose& X = pair_.given(link).X;
+    if (std::ranges::any_of(undone,
+                            [&](const FrameChoice& choice) { return IsSame(choice.X, X_right, open); }))
+      return kConventionBits - 1.0;
+    double bits = kWrongOrigin;
+    const bool turned = CalcAngle(X.linear().transpose() * X_right.linear()) > open.angle;
+    const bool moved =
+        ((X.translation() - X_right.translation()).cwiseAbs().array() > open.length.array()).any();
+    if (!turned || !moved) bits = kNumberOfOrigin;
+    for (const int k : pair_.node(link).chain) {
+      const PrintedOrigin& origin = pair_.a().link(k).origin;
+      const Pose before = FindBefore(link, k);
+      const Pose after = (before * origin.CalcPose()).inverse() * X;
+      const Pose right = before.inverse() * X_right * after.inverse();
+      if (((right.translation() - origin.CalcPose().translation()).cwiseAbs().array() >
+           open.length.array() + 1e-7)
+              .any())
+        continue;
+      bits =
+          std::min(bits, origin.CalcRotation().isIdentity(1e-12) ? kConventionBits : kNumberOfOrigin + 2.0);
+    }
+    return bits;
+  }
+
+  [[nodiscard]] Pose FindBefore(int link, int end) const {
+    Pose X = Pose::Identity();
+    for (const int k : pair_.node(link).chain) {
+      if (k == end) break;
+      X = X * pair_.a().link(k).origin.CalcPose();
+    }
+    return X;
+  }
+
+  [[nodiscard]] std::vector<FrameChoice> ListChoices(int link, const Pose& X_ab_P) const {
+    constexpr size_t kKept = 4;
+    const GivenNode& given = pair_.given(link);
+    const GivenNode& other = pair_.other(pair_.Partner(link));
+    const Pose X_right = X_ab_P * other.X;
+    PoseTolerance open = given.pose;
+    open.angle += other.pose.angle + 1e-9;
+    open.length += X_ab_P.linear().cwiseAbs() * other.pose.length;
+    const PrintedLink& own = pair_.a().link(link);
+    const bool same_name = own.name == pair_.b().link(pair_.Partner(link)).name;
+    const bool is_held = own.joint.kind == JointKind::kFixed && same_name && other_frame_ > kManyFrames;
+    if (is_held || IsSame(given.X, X_right, open))
+      return {{is_held ? 0.0 : Weigh(link, Pose::Identity()), Pose::Identity()}};
+    const std::vector<FrameChoice> undone = ListUndone(link);
+    std::vector<FrameChoice> choices = {
+        {WeighOrigin(link, X_right, open, undone) + Weigh(link, Pose::Identity()), Pose::Identity()}};
+    const auto offer = [&](double bits, const Pose& X) { choices.push_back({bits + Weigh(link, X), X}); };
+    offer(other_frame_, given.X.inverse() * X_right);
+    for (const FrameChoice& pose : undone)
+      offer(pose.cost + std::min(other_frame_, 3.0), pose.X.inverse() * X_right);
+    std::ranges::stable_sort(choices, {}, &FrameChoice::cost);
+    if (choices[0].cost > kSearchAbove) {
+      Register(link, X_right, open, &choices);
+      std::ranges::stable_sort(choices, {}, &FrameChoice::cost);
+    }
+    // One of each frame.
+    std::vector<FrameChoice> kept;
+    for (const FrameChoice& choice : choices) {
+      if (kept.size() == kKept) break;
+      if (std::ranges::none_of(kept, [&](const FrameChoice& k) { return k.X.isApprox(choice.X, 1e-7); }))
+        kept.push_back(choice);
+    }
+    return kept;
+  }
+
+  /// Frames in which directions and points that the link carries are where the first file has them.
+  void Register(int link, const Pose& X_right, const PoseTolerance& open,
+                std::vector<FrameChoice>* choices) const {
+    const std::vector<CarriedAxis>& axes = axes_[static_cast<size_t>(link)];
+    const BodyNumbers& a = pair_.given(link).body;
+    const BodyNumbers& b = pair_.other(pair_.Partner(link)).body;
+    const bool has_bodies = a.mass != 0.0 && b.mass != 0.0;
+    for (const Matrix3d& R : ListTurns(axes, has_bodies ? &a : nullptr, has_bodies ? &b : nullptr)) {
+      Matrix3d normal = Matrix3d::Zero();
+      Vector3d sum = Vector3d::Zero();
+      for (const CarriedAxis& axis : axes) {
+        if (!axis.turns) continue;
+        const Matrix3d across = Matrix3d::Identity() - axis.way_a * axis.way_a.transpose();
+        normal += across;
+        sum += across * (axis.point_a - R * axis.point_b);
+      }
+      const auto offer = [&](const Vector3d& t) {
+        Pose X = Pose::Identity();
+        X.linear() = R;
+        X.translation() = t;
+        const Pose Z = X_right * X.inverse();
+        const Pose& own = pair_.given(link).X;
+        double bits = kRegistered + Weigh(link, X);
+        if (CalcAngle(own.linear().transpose() * Z.linear()) > kRounding + open.angle) bits += kWrongRotation;
+        bits += kWrongLength * static_cast<double>(((own.translation() - Z.translation()).cwiseAbs().array() >
+                                                    kRounding + open.length.array())
+                                                       .count());
+        choices->push_back({bits, X});
+      };
+      if (has_bodies) offer(a.com - R * b.com);
+      if (normal.isZero()) continue;
+      Eigen::CompleteOrthogonalDecomposition<Matrix3d> solver;
+      solver.setThreshold(1e-6);
+      offer(solver.compute(normal).solve(sum));
+    }
+  }
+
+  [[nodiscard]] static std::vector<Matrix3d> ListTurns(const std::vector<CarriedAxis>& axes,
+                                                       const BodyNumbers* a, const BodyNumbers* b) {
+    constexpr double kApart = 1e-5;  // m
+    constexpr size_t kMost = 8;
+    std::vector<std::pair<Vector3d, Vector3d>> ways;
+    for (const CarriedAxis& axis : axes) ways.emplace_back(axis.way_a, axis.way_b);
+    const auto add = [&](const Vector3d& u, const Vector3d& v) {
+      if (u.norm() > kApart && v.norm() > kApart) ways.emplace_back(u.normalized(), v.normalized());
+    };
+    if (a != nullptr && !axes.empty())
+      add(RemoveAlong(a->com - axes[0].point_a, axes[0].way_a),
+          RemoveAlong(b->com - axes[0].point_b, axes[0].way_b));
+    for (size_t i = 0; i < axes.size(); ++i) {
+      for (size_t k = i + 1; k < axes.size(); ++k)
+        add(RemoveAlong(axes[k].point_a - axes[i].point_a, axes[i].way_a),
+            RemoveAlong(axes[k].point_b - axes[i].point_b, axes[i].way_b));
+    }
+    if (ways.size() > kMost) ways.resize(kMost);
+    const auto frame = [](const Vector3d& x, const Vector3d& y) {
+      Matrix3d R;
+      R.col(0) = x;
+      R.col(1) = x.cross(y).normalized();
+      R.col(2) = x.cross(R.col(1));
+      return R;
+    };
+    std::vector<Matrix3d> turns;
+    for (size_t i = 0; i < ways.size(); ++i) {
+      for (size_t k = i + 1; k < ways.size(); ++k) {
+        for (const double sign : {1.0, -1.0}) {
+          if (ways[i].first.cross(ways[k].first).norm() < 1e-4 ||
+              ways[i].second.cross(ways[k].second).norm() < 1e-4)
+            continue;
+          turns.push_back(frame(ways[i].first, ways[k].first) *
+                          frame(ways[i].second, sign * ways[k].second).transpose());
+        }
+      }
+    }
+    if (a == nullptr) return turns;
+    const Matrix3d V = Eigen::SelfAdjointEigenSolver<Matrix3d>(a->inertia).eigenvectors();
+    const Matrix3d W = Eigen::SelfAdjointEigenSolver<Matrix3d>(b->inertia).eigenvectors();
+    for (int signs = 0; signs < 8; ++signs) {
+      const Vector3d s((signs & 1) != 0 ? 1.0 : -1.0, (signs & 2) != 0 ? 1.0 : -1.0,
+                       (signs & 4) != 0 ? 1.0 : -1.0);
+      const Matrix3d R = V * s.asDiagonal() * W.transpose();
+      if (R.determinant() > 0.0) turns.push_back(R);
+    }
+    return turns;
+  }
+
+  const PrintedPair& pair_;
+  FrameOptions options_;
+  std::vector<std::vector<CarriedAxis>> axes_;  // by link
+  double other_frame_ = 0.0;
+};
+
+}  // namespace
+
+std::vector<ChosenFrames> ChooseFrames(const PrintedPair& pair, const FrameOptions& options) {
+  return FrameChooser(pair, options).Run();
+}
+
+}  // namespace dexcheck

@@ -1,0 +1,288 @@
+#include "harness/corrections/link_match.h"
+
+#include <algorithm>
+#include <map>
+
+#include "controller/model/rigid_body.h"
+#include "harness/descriptions/alike_names.h"
+
+namespace dexcheck {
+namespace {
+
+/// The nearest link above that is in the set; -1 when there is none.
+int FindCarrier(const PrintedRobot& robot, int link, const std::vector<int>& other) {
+  for (link = robot.link(link).parent; link >= 0; link = robot.link(link).parent) {
+    if (other[static_cast<size_t>(link)] >= 0) break;
+  }
+  return link;
+}
+
+/// Moving links below a link with no other moving one between.
+void ListNext(const PrintedRobot& robot, int link, std::vector<int>* next) {
+  for (const int child : robot.link(link).children) {
+    if (Moves(robot.link(child))) {
+      next->push_back(child);
+    } else {
+      ListNext(robot, child, next);
+    }
+  }
+}
+
+int CountMoving(const PrintedRobot& robot, int link) {
+  int count = Moves(robot.link(link)) ? 1 : 0;
+  for (const int child : robot.link(link).children) count += CountMoving(robot, child);
+  return count;
+}
+
+class LinkMatcher {
+ public:
+  LinkMatcher(const PrintedRobot& a, const PrintedRobot& b) : a_(a), b_(b) {
+    match_.b_of_a.assign(a.links.size(), -1);
+    match_.a_of_b.assign(b.links.size(), -1);
+  }
+
+  LinkMatch Run(bool by_tree) {
+    std::map<std::string, int> links, joints;
+    for (int j = 0; j < b_.size(); ++j) {
+      links.emplace(b_.link(j).name, j);
+      if (Moves(b_.link(j))) joints.emplace(b_.link(j).joint.name, j);
+    }
+    for (int i = 0; i < a_.size(); ++i) {
+      if (const auto found = links.find(a_.link(i).name); found != links.end()) Take(i, found->second);
+    }
+    std::vector<int> by_joint;
+    for (int i = 0; i < a_.size(); ++i) {
+      const auto found = joints.find(a_.link(i).joint.name);
+      if (!Moves(a_.link(i)) || found == joints.end() || !Take(i, found->second)) continue;
+      by_joint.push_back(i);
+    }
+    MatchAlike(&by_joint);
+    MatchRoot();
+    if (by_tree || std::ranges::any_of(by_joint, [&](int i) { return !IsCarriedAlike(i); })) {
+      for (const int i : by_joint) {
+        match_.a_of_b[Index(match_.b_of_a[Index(i)])] = -1;
+        match_.b_of_a[Index(i)] = -1;
+      }
+    }
+    MatchTrees();
+    return std::move(match_);
+  }
+
+ private:
+  static size_t Index(int i) { return static_cast<size_t>(i); }
+
+  bool Take(int i, int j) {
+    if (match_.b_of_a[Index(i)] >= 0 || match_.a_of_b[Index(j)] >= 0) return false;
+    match_.b_of_a[Index(i)] = j;
+    match_.a_of_b[Index(j)] = i;
+    return true;
+  }
+
+  void MatchAlike(std::vector<int>* by_joint) {
+    std::vector<std::string> names, others;
+    std::vector<int> open, open_b;
+    for (int i = 0; i < a_.size(); ++i) {
+      if (!Moves(a_.link(i)) || match_.b_of_a[Index(i)] >= 0) continue;
+      names.push_back(a_.link(i).joint.name);
+      open.push_back(i);
+    }
+    for (int j = 0; j < b_.size(); ++j) {
+      if (!Moves(b_.link(j)) || match_.a_of_b[Index(j)] >= 0) continue;
+      others.push_back(b_.link(j).joint.name);
+      open_b.push_back(j);
+    }
+    const std::vector<std::string> alike = FindAlikeNames(names, others);
+    for (size_t k = 0; k < alike.size(); ++k) {
+      const auto found = std::ranges::find(others, alike[k]);
+      if (found != others.end() && Take(open[k], open_b[static_cast<size_t>(found - others.begin())]))
+        by_joint->push_back(open[k]);
+    }
+  }
+
+  /// The root is the other file's, or what stands or floats on it.
+  void MatchRoot() {
+    if (match_.b_of_a[0] >= 0) return;
+    const auto is_free = [](const PrintedRobot& robot, int link, const std::vector<int>& other) {
+      return other[Index(link)] < 0 && robot.link(link).parent == 0 && !Moves(robot.link(link));
+    };
+    std::vector<int> real;
+    for (int j = 0; j < b_.size(); ++j) {
+      if (is_free(b_, j, match_.a_of_b) && (b_.link(j).inertial || b_.link(j).joint.kind == JointKind::kFree))
+        real.push_back(j);
+    }
+    const bool floats =
+        std::ranges::any_of(real, [&](int j) { return b_.link(j).joint.kind == JointKind::kFree; });
+    const PrintedLink& root_b = b_.link(0);
+    const bool is_world = b_.format == RobotFormat::kMjcf || root_b.name == "world";
+    if (!real.empty() && is_world && !root_b.inertial &&
+        (match_.a_of_b[0] >= 0 || floats || real.size() == 1)) {
+      Take(0, real[0]);
+    } else if (match_.a_of_b[0] < 0) {
+      Take(0, 0);
+    }
+  }
+
+  [[nodiscard]] bool IsCarriedAlike(int i) const {
+    const int j = match_.b_of_a[Index(i)];
+    const int p = FindCarrier(a_, i, match_.b_of_a);
+    const int q = FindCarrier(b_, j, match_.a_of_b);
+    return (p < 0 ? -1 : match_.b_of_a[Index(p)]) == q || p < 0 || q < 0;
+  }
+
+  /// Pairs what hangs on links that are matched: of as many joints each, kinds and what they carry decide.
+  void MatchTrees() {
+    for (int i = 0; i < a_.size(); ++i) {
+      const int j = match_.b_of_a[Index(i)];
+      if (j < 0) continue;
+      std::vector<int> next, next_b;
+      ListNext(a_, i, &next);
+      ListNext(b_, j, &next_b);
+      std::erase_if(next, [&](int k) { return match_.b_of_a[Index(k)] >= 0; });
+      std::erase_if(next_b, [&](int k) { return match_.a_of_b[Index(k)] >= 0; });
+      for (const int k : next) {
+        const auto is_same = [&](int l) {
+          return match_.a_of_b[Index(l)] < 0 && a_.link(k).joint.kind == b_.link(l).joint.kind &&
+                 CountMoving(a_, k) == CountMoving(b_, l);
+        };
+        const auto found = std::ranges::find_if(next_b, is_same);
+        if (found != next_b.end()) {
+          Take(k, *found);
+        } else if (next.size() == 1 && next_b.size() == 1) {
+          Take(k, next_b[0]);
+        }
+      }
+    }
+  }
+
+  const PrintedRobot& a_;
+  const PrintedRobot& b_;
+  LinkMatch match_;
+};
+
+template <typename Measure, typename Tolerance>
+void AddHalves(PrintedOrigin* origin, const Measure& measure, Tolerance* tolerance) {
+  const auto nominal = measure();
+  VisitNumbers(origin, [&](double* number, double half) {
+    const double value = *number;
+    *number = value + half;
+    AddChange(nominal, measure(), tolerance);
+    *number = value;
+  });
+}
+
+}  // namespace
+
+bool Moves(const PrintedLink& link) {
+  return link.joint.kind == JointKind::kHinge || link.joint.kind == JointKind::kSlide ||
+         link.joint.kind == JointKind::kBall;
+}
+
+LinkMatch MatchLinks(const PrintedRobot& a, const PrintedRobot& b, bool by_tree) {
+  return LinkMatcher(a, b).Run(by_tree);
+}
+
+std::vector<Node> ListNodes(const PrintedRobot& robot, const std::vector<int>& other) {
+  std::vector<Node> nodes(robot.links.size());
+  std::vector<int> home(robot.links.size(), -1);  // the node that a link is part of; -1 of what is left out
+  for (int i = 0; i < robot.size(); ++i) {
+    const auto at = static_cast<size_t>(i);
+    const PrintedLink& link = robot.link(i);
+    const int above = link.parent < 0 ? -1 : home[static_cast<size_t>(link.parent)];
+    if (other[at] >= 0 || link.parent < 0) {
+      Node& node = nodes[at];
+      home[at] = node.link = i;
+      if (link.parent >= 0) {
+        int from = i;
+        for (; from >= 0 && (from == i || nodes[static_cast<size_t>(from)].link < 0);
+             from = robot.link(from).parent)
+          node.chain.insert(node.chain.begin(), from);
+        node.parent = from;
+      }
+    } else if (!Moves(link) && above >= 0) {
+      home[at] = above;
+    }
+    if (home[at] >= 0 && link.inertial) nodes[static_cast<size_t>(home[at])].parts.push_back(i);
+  }
+  return nodes;
+}
+
+Pose CalcNodePose(const PrintedRobot& robot, const Node& node) {
+  Pose X = Pose::Identity();
+  for (const int link : node.chain) X = X * robot.link(link).origin.CalcPose();
+  return X;
+}
+
+Pose CalcPartPose(const PrintedRobot& robot, const Node& node, int part) {
+  Pose X = Pose::Identity();
+  for (; part != node.link; part = robot.link(part).parent) X = robot.link(part).origin.CalcPose() * X;
+  return X;
+}
+
+BodyNumbers CalcNodeBody(const PrintedRobot& robot, const Node& node) {
+  BodyNumbers sum;
+  Matrix3d about_origin = Matrix3d::Zero();
+  for (const int part : node.parts) {
+    const PrintedInertial& inertial = *robot.link(part).inertial;
+    const Pose X = CalcPartPose(robot, node, part);
+    const Matrix3d R = X.linear() * inertial.origin.CalcRotation();
+    const Vector3d c = X * inertial.origin.t;
+    const Matrix3d I = R * ToTensor(inertial.I) * R.transpose();
+    if (node.parts.size() == 1) return {inertial.mass.value, c, I};
+    sum.mass += inertial.mass.value;
+    sum.com += inertial.mass.value * c;
+    about_origin += I + CalcPointInertia(inertial.mass.value, c);
+  }
+  if (sum.mass != 0.0) sum.com /= sum.mass;
+  sum.inertia = about_origin - CalcPointInertia(sum.mass, sum.com);
+  return sum;
+}
+
+void AddChange(const Pose& before, const Pose& after, PoseTolerance* tolerance) {
+  tolerance->length += (after.translation() - before.translation()).cwiseAbs();
+  tolerance->angle += CalcAngle(before.linear().transpose() * after.linear());
+}
+
+void AddChange(const BodyNumbers& before, const BodyNumbers& after, BodyNumbers* tolerance) {
+  tolerance->mass += std::abs(after.mass - before.mass);
+  tolerance->com += (after.com - before.com).cwiseAbs();
+  tolerance->inertia += (after.inertia - before.inertia).cwiseAbs();
+}
+
+PoseTolerance CalcPoseTolerance(const Node& node, PrintedRobot* robot) {
+  constexpr double kLeastAngle = 1e-8;
+  constexpr double kLeast = 1e-9;
+  PoseTolerance tolerance;
+  double reach = 1.0;
+  for (const int link : node.chain) {
+    AddHalves(
+        &robot->link(link).origin, [&] { return CalcNodePose(*robot, node); }, &tolerance);
+    reach += robot->link(link).origin.t.norm();
+  }
+  tolerance.angle += kLeastAngle;
+  tolerance.length.array() += kLeast * reach;
+  return tolerance;
+}
+
+BodyNumbers CalcBodyTolerance(const Node& node, PrintedRobot* robot) {
+  constexpr double kLeast = 1e-9;
+  BodyNumbers tolerance;
+  const BodyNumbers body = CalcNodeBody(*robot, node);
+  const auto measure = [&] { return CalcNodeBody(*robot, node); };
+  const auto add = [&](double* number, double half) {
+    const double value = *number;
+    *number = value + half;
+    AddChange(body, measure(), &tolerance);
+    *number = value;
+  };
+  for (const int part : node.parts) {
+    VisitNumbers(&*robot->link(part).inertial, add);
+    for (int link = part; link != node.link; link = robot->link(link).parent)
+      VisitNumbers(&robot->link(link).origin, add);
+  }
+  tolerance.mass += kLeast * std::abs(body.mass);
+  tolerance.com.array() += kLeast;
+  tolerance.inertia.array() += kLeast * std::abs(body.inertia.trace()) + 1e-15;
+  return tolerance;
+}
+
+}  // namespace dexcheck

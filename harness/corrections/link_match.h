@@ -1,0 +1,80 @@
+#pragma once
+
+// Which link of one file is which of another, and what of each moves as one.
+
+#include <vector>
+
+#include "harness/corrections/printed_robot.h"
+
+namespace dexcheck {
+
+/// By link of one file the link of the other; -1 where it has none.
+struct LinkMatch {
+  std::vector<int> b_of_a;
+  std::vector<int> a_of_b;
+};
+
+/// Matches links by name, then by their joints' names, then by those that are alike, then by the tree, which
+/// decides too where names contradict it.
+/// @param by_tree joints' names do not count.
+LinkMatch MatchLinks(const PrintedRobot& a, const PrintedRobot& b, bool by_tree = false);
+
+bool Moves(const PrintedLink& link);
+
+/// A link that both files have, and what is welded to it and only this file has.
+struct Node {
+  int link = -1;
+  int parent = -1;         ///< The link of the node that carries it; -1 for the root.
+  std::vector<int> chain;  ///< Links whose origins lead from there to it, itself last.
+  std::vector<int> parts;  ///< Links with an inertial that move with it.
+};
+
+/// The nodes of a robot by link; those of other links are empty (link -1). Links that move and that the other
+/// file lacks are left out with all that they carry.
+std::vector<Node> ListNodes(const PrintedRobot& robot, const std::vector<int>& other);
+
+/// Mass, centre and inertia about it in a link's frame, or what digits leave open of them.
+struct BodyNumbers {
+  double mass = 0.0;
+  Vector3d com = Vector3d::Zero();
+  Matrix3d inertia = Matrix3d::Zero();
+};
+
+/// A pose, and what digits leave open of it.
+struct PoseTolerance {
+  Vector3d length = Vector3d::Zero();
+  double angle = 0.0;
+};
+
+Pose CalcNodePose(const PrintedRobot& robot, const Node& node);
+/// Of the origins from a node's frame to the frame of one of its parts.
+Pose CalcPartPose(const PrintedRobot& robot, const Node& node, int part);
+BodyNumbers CalcNodeBody(const PrintedRobot& robot, const Node& node);
+/// What half units of the digits leave open of these. @param robot is changed and put back.
+PoseTolerance CalcPoseTolerance(const Node& node, PrintedRobot* robot);
+BodyNumbers CalcBodyTolerance(const Node& node, PrintedRobot* robot);
+
+/// Calls visit(number, half unit) for each number that is not exact.
+template <typename Visit>
+void VisitNumbers(PrintedOrigin* origin, const Visit& visit) {
+  for (int k = 0; k < 3; ++k) {
+    if (origin->half_t[k] > 0.0) visit(&origin->t[k], origin->half_t[k]);
+  }
+  for (int k = 0; k < 4; ++k) {
+    if (origin->half_r[k] > 0.0) visit(&origin->r[k], origin->half_r[k]);
+  }
+}
+template <typename Visit>
+void VisitNumbers(PrintedInertial* inertial, const Visit& visit) {
+  if (inertial->mass.half > 0.0) visit(&inertial->mass.value, inertial->mass.half);
+  for (int k = 0; k < 6; ++k) {
+    if (inertial->half_I[k] > 0.0) visit(&inertial->I[k], inertial->half_I[k]);
+  }
+  VisitNumbers(&inertial->origin, visit);
+}
+
+/// Adds |after - before|.
+void AddChange(const Pose& before, const Pose& after, PoseTolerance* tolerance);
+void AddChange(const BodyNumbers& before, const BodyNumbers& after, BodyNumbers* tolerance);
+
+}  // namespace dexcheck

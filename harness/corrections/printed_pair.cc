@@ -1,0 +1,304 @@
+#include "harness/corrections/printed_pair.h"
+
+#include <algorithm>
+#include <set>
+#include <utility>
+
+namespace dexcheck {
+namespace {
+
+std::vector<GivenNode> MeasureNodes(const std::vector<Node>& nodes, PrintedRobot* robot) {
+  std::vector<GivenNode> given(nodes.size());
+  for (const Node& node : nodes) {
+    if (node.link < 0) continue;
+    GivenNode& numbers = given[static_cast<size_t>(node.link)];
+    numbers.X = CalcNodePose(*robot, node);
+    numbers.pose = CalcPoseTolerance(node, robot);
+    numbers.body = CalcNodeBody(*robot, node);
+    numbers.body_tolerance = CalcBodyTolerance(node, robot);
+  }
+  return given;
+}
+
+/// Accuracy of frames that are found from what links carry, m and rad.
+constexpr double kFoundFrame = 2e-6;
+
+double CompareVectors(const Vector3d& difference, const Vector3d& open) {
+  return (difference.cwiseAbs().array() / open.array()).maxCoeff();
+}
+
+}  // namespace
+
+bool Differ(const PrintedScalar& a, const PrintedScalar& b) {
+  constexpr double kRounding = 1e-9;
+  return !(std::abs(a.value - b.value) <=
+           (a.half + b.half) * (1.0 + kRounding) + kRounding * std::abs(b.value));
+}
+
+PrintedPair::PrintedPair(PrintedRobot a, PrintedRobot b, bool by_tree) : a_(std::move(a)), b_(std::move(b)) {
+  match_ = MatchLinks(a_, b_, by_tree);
+  nodes_ = ListNodes(a_, match_.b_of_a);
+  nodes_b_ = ListNodes(b_, match_.a_of_b);
+  for (int i = 0; i < a_.size(); ++i) {
+    if (Partner(i) >= 0 && node(i).link >= 0 && node_b(Partner(i)).link >= 0) links_.push_back(i);
+  }
+  other_ = MeasureNodes(nodes_b_, &b_);
+  given_ = MeasureNodes(nodes_, &a_);
+  SetFrames(std::vector<Pose>(a_.links.size(), Pose::Identity()));
+}
+
+void PrintedPair::Measure() { given_ = MeasureNodes(nodes_, &a_); }
+
+bool PrintedPair::IsPlaced(int link) const {
+  const int other = Partner(link);
+  const int parent = node(link).parent;
+  return other >= 0 && parent >= 0 && node_b(other).parent >= 0 && Partner(parent) == node_b(other).parent;
+}
+
+void PrintedPair::SetFrames(std::vector<Pose> X_ab) {
+  X_ab_ = std::move(X_ab);
+  right_.assign(a_.links.size(), {});
+  frame_open_.assign(a_.links.size(), {});
+  for (const int link : links_) {
+    const int j = Partner(link);
+    const GivenNode& theirs = other(j);
+    const PrintedJoint& joint = b_.link(j).joint;
+    const Pose& X = X_ab_[static_cast<size_t>(link)];
+    const Matrix3d& R = X.linear();
+    const bool is_turned = !R.isIdentity(1e-12);
+    RightNode& right = right_[static_cast<size_t>(link)];
+    right.is_placed = IsPlaced(link);
+    if (right.is_placed) {
+      const Pose& X_ab_P = X_ab_[static_cast<size_t>(node(link).parent)];
+      right.X = X_ab_P * theirs.X * X.inverse();
+      right.pose = theirs.pose;
+      const PoseTolerance& carrier = frame_open_[static_cast<size_t>(node(link).parent)];
+      right.pose.length = X_ab_P.linear().cwiseAbs() * theirs.pose.length + carrier.length;
+      right.pose.length.array() += carrier.angle * theirs.X.translation().norm();
+      right.pose.angle += carrier.angle;
+      if (!X.isApprox(Pose::Identity(), 1e-12)) {
+        PoseTolerance& open = frame_open_[static_cast<size_t>(link)];
+        const GivenNode& ours = given_[static_cast<size_t>(link)];
+        open = right.pose;
+        open.length += ours.pose.length;
+        open.angle += ours.pose.angle;
+        if (!right.X.isApprox(ours.X, 1e-9)) {  // it was found from what the link carries
+          open.length.array() += kFoundFrame;
+          open.angle += kFoundFrame;
+        }
+        right.pose.length += open.length;
+        right.pose.angle += open.angle;
+      }
+    }
+    right.axis = R * joint.axis.normalized();
+    right.axis_tolerance = joint.half_axis.sum() / std::max(joint.axis.norm(), 1e-9) + 1e-8;
+    right.anchor = X * joint.anchor;
+    right.body = theirs.body;
+    right.body.com = X * theirs.body.com;
+    right.body.inertia = R * theirs.body.inertia * R.transpose();
+    right.body_tolerance = theirs.body_tolerance;
+    if (is_turned) {
+      const Matrix3d turn = R.cwiseAbs();
+      right.body_tolerance.com = turn * theirs.body_tolerance.com;
+      right.body_tolerance.inertia = turn * theirs.body_tolerance.inertia * turn.transpose();
+    }
+    const PoseTolerance& open = frame_open_[static_cast<size_t>(link)];
+    right.body_tolerance.com += open.length;
+    right.body_tolerance.com.array() += open.angle * theirs.body.com.norm();
+    right.body_tolerance.inertia.array() += 2.0 * open.angle * std::abs(theirs.body.inertia.trace());
+    right.axis_tolerance += open.angle;
+    right.anchor_tolerance = open.length.norm() + open.angle * joint.anchor.norm();
+  }
+}
+
+double PrintedPair::CompareNode(SiteKind kind, int link, const Pose& X, const PoseTolerance& pose,
+                                const BodyNumbers& body, const BodyNumbers& tolerance) const {
+  const RightNode& right = right_[static_cast<size_t>(link)];
+  switch (kind) {
+    case SiteKind::kPosition:
+      return CompareVectors(X.translation() - right.X.translation(), pose.length + right.pose.length);
+    case SiteKind::kRotation:
+      return CalcAngle(X.linear().transpose() * right.X.linear()) / (pose.angle + right.pose.angle);
+    case SiteKind::kMass:
+      return std::abs(body.mass - right.body.mass) / (tolerance.mass + right.body_tolerance.mass + 1e-15);
+    case SiteKind::kCom:
+      return CompareVectors(body.com - right.body.com, tolerance.com + right.body_tolerance.com);
+    case SiteKind::kInertia:
+      return ((body.inertia - right.body.inertia).cwiseAbs().array() /
+              (tolerance.inertia + right.body_tolerance.inertia).array())
+          .maxCoeff();
+    default:
+      return 0.0;
+  }
+}
+
+bool PrintedPair::States(const PrintedRobot& robot, JointScalar scalar) {
+  return std::ranges::any_of(robot.links, [&](const PrintedLink& link) {
+    const auto& number = link.joint.scalars[static_cast<size_t>(scalar)];
+    return number && number->value != 0.0;
+  });
+}
+
+std::optional<PrintedScalar> TakeScalar(const PrintedRobot& robot, const PrintedLink& link,
+                                        JointScalar scalar) {
+  const std::optional<PrintedScalar>& number = link.joint.scalars[static_cast<size_t>(scalar)];
+  if (number) return number;
+  switch (scalar) {
+    case JointScalar::kDamping:
+    case JointScalar::kFriction:
+    case JointScalar::kArmature:
+    case JointScalar::kStiffness:
+    case JointScalar::kSpringAngle:
+      return PrintedScalar{};
+    case JointScalar::kGear:
+      if (robot.has_motors) return PrintedScalar{};
+      return std::nullopt;
+    default:
+      return std::nullopt;
+  }
+}
+
+bool PrintedPair::IsCoupledAlike(int link) const {
+  // q1 = 2 q3 says what q3 = q1 / 2 says.
+  const auto find = [](const PrintedRobot& robot, const std::string& name) {
+    const auto found = std::ranges::find_if(
+        robot.links, [&](const PrintedLink& l) { return Moves(l) && l.joint.name == name; });
+    return found == robot.links.end() ? -1 : static_cast<int>(found - robot.links.begin());
+  };
+  const auto is_inverse = [&](int follower, int leader_b) {
+    const PrintedMimic& mimic = *a_.link(follower).joint.mimic;
+    const int leader = find(a_, mimic.leader);
+    if (leader < 0 || Partner(leader) != leader_b || a_.link(leader).joint.mimic) return false;
+    const std::optional<PrintedMimic>& other = b_.link(leader_b).joint.mimic;
+    constexpr double kSame = 1e-6;
+    return other && find(b_, other->leader) == Partner(follower) && !b_.link(Partner(follower)).joint.mimic &&
+           std::abs(mimic.multiplier.value * other->multiplier.value - 1.0) <= kSame &&
+           mimic.offset.value == 0.0 && other->offset.value == 0.0;
+  };
+  const PrintedJoint& ours = a_.link(link).joint;
+  const PrintedJoint& theirs = b_.link(Partner(link)).joint;
+  if (ours.mimic && !theirs.mimic) {
+    const int leader = find(a_, ours.mimic->leader);
+    return leader >= 0 && Partner(leader) >= 0 && is_inverse(link, Partner(leader));
+  }
+  if (!ours.mimic && theirs.mimic) {
+    const int leader_b = find(b_, theirs.mimic->leader);
+    const int follower = leader_b < 0 ? -1 : match_.a_of_b[static_cast<size_t>(leader_b)];
+    return follower >= 0 && a_.link(follower).joint.mimic && is_inverse(follower, Partner(link));
+  }
+  return false;
+}
+
+void PrintedPair::ListJointSites(int link, std::vector<Site>* sites) const {
+  const PrintedLink& given = a_.link(link);
+  const PrintedLink& other = b_.link(Partner(link));
+  const PrintedJoint& ours = given.joint;
+  const PrintedJoint& theirs = other.joint;
+  const auto add = [&](SiteKind kind) { sites->push_back({kind, link}); };
+  if (ours.kind != theirs.kind) {
+    add(SiteKind::kType);
+    return;
+  }
+  if (ours.kind != JointKind::kHinge && ours.kind != JointKind::kSlide) return;
+  const RightNode& right = right_[static_cast<size_t>(link)];
+  const Vector3d axis = ours.axis.normalized();
+  const double open = ours.half_axis.sum() / std::max(ours.axis.norm(), 1e-9) + right.axis_tolerance;
+  if (!((axis - right.axis).norm() <= open)) add(SiteKind::kAxis);
+  if (ours.kind == JointKind::kHinge) {
+    constexpr double kSame = 2e-6;  // m
+    const Vector3d apart = ours.anchor - right.anchor;
+    if (!((apart - right.axis * right.axis.dot(apart)).norm() <=
+          kSame + right.anchor_tolerance + given_[static_cast<size_t>(link)].pose.length.norm()))
+      add(SiteKind::kAxisPoint);
+  }
+  const bool ours_limit =
+      std::ranges::any_of(a_.links, [](const PrintedLink& l) { return l.joint.range.has_value(); });
+  const bool theirs_limit =
+      std::ranges::any_of(b_.links, [](const PrintedLink& l) { return l.joint.range.has_value(); });
+  if (ours.range && theirs.range) {
+    if (Differ((*ours.range)[0], (*theirs.range)[0]) || Differ((*ours.range)[1], (*theirs.range)[1]))
+      add(SiteKind::kRange);
+  } else if (ours.range.has_value() != theirs.range.has_value() && ours_limit && theirs_limit) {
+    add(SiteKind::kRange);
+  }
+  for (size_t k = 0; k < kNumJointScalars; ++k) {
+    const auto scalar = static_cast<JointScalar>(k);
+    const std::optional<PrintedScalar> x = TakeScalar(a_, given, scalar);
+    const std::optional<PrintedScalar> y = TakeScalar(b_, other, scalar);
+    if (scalar == JointScalar::kGear) {
+      // A file without motors is driven by forces at the joints: only the way of a motor counts there.
+      const auto turns_back = [](const std::optional<PrintedScalar>& gear) {
+        return gear && gear->value < 0.0;
+      };
+      const bool differs =
+          x && y ? Differ(*x, *y)
+                 : turns_back(x) || turns_back(y) || (x && x->value == 0.0) || (y && y->value == 0.0);
+      if (differs) add(SiteKind::kGear);
+    } else if (scalar == JointScalar::kSpringAngle) {
+      const auto is_spring = [](const PrintedJoint& joint) {
+        const auto& stiffness = joint.scalars[static_cast<size_t>(JointScalar::kStiffness)];
+        return stiffness && stiffness->value != 0.0;
+      };
+      if (is_spring(ours) && is_spring(theirs) && Differ(*x, *y)) add(SiteKind::kSpringAngle);
+    } else if (x && y && Differ(*x, *y)) {
+      add(ToSite(scalar));
+    }
+  }
+  if (IsCoupledAlike(link)) return;
+  if (ours.mimic.has_value() != theirs.mimic.has_value()) {
+    add(SiteKind::kMimic);
+  } else if (ours.mimic) {
+    const auto leads = [&](const PrintedLink& l) { return Moves(l) && l.joint.name == ours.mimic->leader; };
+    const auto leader = std::ranges::find_if(a_.links, leads);
+    const int partner = leader == a_.links.end() ? -1 : Partner(static_cast<int>(leader - a_.links.begin()));
+    const bool same_leader = partner >= 0 ? b_.link(partner).joint.name == theirs.mimic->leader
+                                          : ours.mimic->leader == theirs.mimic->leader;
+    if (!same_leader || Differ(ours.mimic->multiplier, theirs.mimic->multiplier) ||
+        Differ(ours.mimic->offset, theirs.mimic->offset))
+      add(SiteKind::kMimic);
+  }
+}
+
+std::vector<Site> PrintedPair::ListSites() const {
+  std::vector<Site> sites;
+  std::set<std::string> names, names_b;
+  for (const PrintedLink& link : a_.links) names.insert(link.joint.name);
+  for (const PrintedLink& link : b_.links) names_b.insert(link.joint.name);
+  for (const int link : links_) {
+    const int j = Partner(link);
+    const GivenNode& given = given_[static_cast<size_t>(link)];
+    if (IsPlaced(link)) {
+      for (const SiteKind kind : {SiteKind::kPosition, SiteKind::kRotation}) {
+        if (!(CompareNode(kind, link, given.X, given.pose, given.body, given.body_tolerance) <= 1.0))
+          sites.push_back({kind, link});
+      }
+      ListJointSites(link, &sites);
+    } else if (node(link).parent >= 0 && node_b(j).parent >= 0) {
+      sites.push_back({SiteKind::kCarrier, link});
+    }
+    const std::string& name = a_.link(link).joint.name;
+    const std::string& name_b = b_.link(j).joint.name;
+    if (Moves(a_.link(link)) && Moves(b_.link(j)) && name != name_b && names.contains(name_b) &&
+        names_b.contains(name))
+      sites.push_back({SiteKind::kName, link});
+    // A base that stands still needs no inertial.
+    const bool bears = !(link == 0 || j == 0) || (!node(link).parts.empty() && !node_b(j).parts.empty());
+    if (!bears || (node(link).parts.empty() && node_b(j).parts.empty())) continue;
+    for (const SiteKind kind : {SiteKind::kMass, SiteKind::kCom, SiteKind::kInertia}) {
+      if (!(CompareNode(kind, link, given.X, given.pose, given.body, given.body_tolerance) <= 1.0))
+        sites.push_back({kind, link});
+    }
+  }
+  for (int i = 0; i < a_.size(); ++i) {
+    if (Moves(a_.link(i)) && Partner(i) < 0) sites.push_back({SiteKind::kPresence, i});
+  }
+  for (int j = 0; j < b_.size(); ++j) {
+    if (Moves(b_.link(j)) && match_.a_of_b[static_cast<size_t>(j)] < 0)
+      sites.push_back({SiteKind::kPresence, -1 - j});
+  }
+  if (a_.gravity && b_.gravity && (*a_.gravity - *b_.gravity).cwiseAbs().maxCoeff() > 1e-9)
+    sites.push_back({SiteKind::kGravity, 0});
+  return sites;
+}
+
+}  // namespace dexcheck

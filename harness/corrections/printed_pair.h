@@ -1,0 +1,92 @@
+#pragma once
+
+// Two files of one robot: the second one's numbers in the link frames of the first, and where they differ.
+
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "harness/corrections/correction.h"
+#include "harness/corrections/link_match.h"
+
+namespace dexcheck {
+
+/// What is right of a link, in the first file's frames of it and of its parent, and what the second file's
+/// digits leave open of it.
+struct RightNode {
+  bool is_placed = false;  ///< Whether both files have it on the same link.
+  Pose X = Pose::Identity();
+  PoseTolerance pose;
+  Vector3d axis = Vector3d::UnitZ();
+  double axis_tolerance = 0.0;
+  Vector3d anchor = Vector3d::Zero();
+  double anchor_tolerance = 0.0;
+  BodyNumbers body, body_tolerance;
+};
+
+/// A link's numbers as the first file has them.
+struct GivenNode {
+  Pose X = Pose::Identity();
+  PoseTolerance pose;
+  BodyNumbers body, body_tolerance;
+};
+
+class PrintedPair {
+ public:
+  /// @param by_tree names of joints do not say which link is which.
+  PrintedPair(PrintedRobot a, PrintedRobot b, bool by_tree = false);
+
+  [[nodiscard]] const PrintedRobot& a() const { return a_; }
+  [[nodiscard]] PrintedRobot* mutable_a() { return &a_; }
+  [[nodiscard]] const PrintedRobot& b() const { return b_; }
+  [[nodiscard]] const LinkMatch& match() const { return match_; }
+  [[nodiscard]] const Node& node(int link) const { return nodes_[static_cast<size_t>(link)]; }
+  [[nodiscard]] const Node& node_b(int link) const { return nodes_b_[static_cast<size_t>(link)]; }
+  /// The link of the second file; -1 when it has none.
+  [[nodiscard]] int Partner(int link) const { return match_.b_of_a[static_cast<size_t>(link)]; }
+  /// Links of the first file that the second has too, parents first.
+  [[nodiscard]] const std::vector<int>& links() const { return links_; }
+  /// Whether both files have a link on the same one.
+  [[nodiscard]] bool IsPlaced(int link) const;
+
+  /// Pose of the second file's frame of a link in the first one's.
+  [[nodiscard]] const Pose& X_ab(int link) const { return X_ab_[static_cast<size_t>(link)]; }
+  void SetFrames(std::vector<Pose> X_ab);
+
+  [[nodiscard]] const RightNode& right(int link) const { return right_[static_cast<size_t>(link)]; }
+  [[nodiscard]] const GivenNode& given(int link) const { return given_[static_cast<size_t>(link)]; }
+  /// Numbers of the second file in its own frames.
+  [[nodiscard]] const GivenNode& other(int link) const { return other_[static_cast<size_t>(link)]; }
+
+  /// How far a number of the robot as it is now is from right, over what digits leave open; at most 1: it is
+  /// right.
+  [[nodiscard]] double CompareNode(SiteKind kind, int link, const Pose& X, const PoseTolerance& pose,
+                                   const BodyNumbers& body, const BodyNumbers& tolerance) const;
+  /// Measures the first file's numbers again. @pre links were changed.
+  void Measure();
+  /// All that differs.
+  [[nodiscard]] std::vector<Site> ListSites() const;
+  /// Whether a file states some number of this kind at any joint.
+  [[nodiscard]] static bool States(const PrintedRobot& robot, JointScalar scalar);
+
+ private:
+  void ListJointSites(int link, std::vector<Site>* sites) const;
+  [[nodiscard]] bool IsCoupledAlike(int link) const;
+
+  PrintedRobot a_, b_;
+  LinkMatch match_;
+  std::vector<Node> nodes_, nodes_b_;
+  std::vector<int> links_;
+  std::vector<Pose> X_ab_;
+  std::vector<PoseTolerance> frame_open_;  ///< What digits leave open of X_ab_.
+  std::vector<RightNode> right_;
+  std::vector<GivenNode> given_, other_;
+};
+
+/// Whether two scalars differ by more than their digits leave open.
+bool Differ(const PrintedScalar& a, const PrintedScalar& b);
+/// The number of a joint that counts where its file states none.
+std::optional<PrintedScalar> TakeScalar(const PrintedRobot& robot, const PrintedLink& link,
+                                        JointScalar scalar);
+
+}  // namespace dexcheck

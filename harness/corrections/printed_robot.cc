@@ -1,0 +1,168 @@
+#include "harness/corrections/printed_robot.h"
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+
+namespace dexcheck {
+namespace {
+
+/// Median of the half units of numbers that are no whole ones; 0 of few.
+double FindMedian(std::vector<double> halves) {
+  constexpr size_t kFew = 4;
+  if (halves.size() < kFew) return 0.0;
+  const auto middle = halves.begin() + static_cast<std::ptrdiff_t>(halves.size() / 2);
+  std::nth_element(halves.begin(), middle, halves.end());
+  return *middle;
+}
+
+bool IsWhole(double value) { return std::abs(value - std::round(value)) < 1e-12; }
+
+template <typename Vector>
+void Collect(const Vector& values, const Vector& halves, std::vector<double>* all) {
+  for (Eigen::Index i = 0; i < values.size(); ++i) {
+    if (!IsWhole(values[i])) all->push_back(halves[i]);
+  }
+}
+
+template <typename Vector>
+void Raise(const Vector& values, double least, Vector* halves) {
+  for (Eigen::Index i = 0; i < values.size(); ++i) {
+    if (!IsWhole(values[i])) (*halves)[i] = std::max((*halves)[i], least);
+  }
+}
+
+}  // namespace
+
+Matrix3d TurnAbout(int axis, double angle) {
+  return Eigen::AngleAxisd(angle, Vector3d::Unit(axis)).toRotationMatrix();
+}
+
+Matrix3d TurnRollPitchYaw(const Vector3d& angles) {
+  return TurnAbout(2, angles[2]) * TurnAbout(1, angles[1]) * TurnAbout(0, angles[0]);
+}
+
+std::array<Vector3d, 2> SolveRollPitchYaw(const Matrix3d& R) {
+  constexpr double kGimbal = 1e-7;
+  const double pitch = std::asin(std::clamp(-R(2, 0), -1.0, 1.0));
+  if (std::abs(std::cos(pitch)) > kGimbal) {
+    const Vector3d near(std::atan2(R(2, 1), R(2, 2)), pitch, std::atan2(R(1, 0), R(0, 0)));
+    return {near, Vector3d(near[0] + kPi, kPi - pitch, near[2] + kPi)};
+  }
+  const double sign = pitch > 0.0 ? 1.0 : -1.0;
+  const double turn = std::atan2(sign * R(0, 1), R(1, 1));
+  return {Vector3d(turn, pitch, 0.0), Vector3d(0.0, pitch, -sign * turn)};
+}
+
+Vector4d ToQuaternion(const Matrix3d& R) {
+  const Eigen::Quaterniond q(R);
+  const Vector4d wxyz(q.w(), q.x(), q.y(), q.z());
+  return q.w() < 0.0 ? Vector4d(-wxyz) : wxyz;
+}
+
+Matrix3d TurnQuaternion(const Vector4d& wxyz) {
+  const double length = wxyz.norm();
+  if (length == 0.0) return Matrix3d::Identity();
+  const Vector4d q = wxyz / length;
+  return Eigen::Quaterniond(q[0], q[1], q[2], q[3]).toRotationMatrix();
+}
+
+Vector3d CalcRotationVector(const Matrix3d& R) {
+  const Vector4d q = ToQuaternion(R);
+  const double sine = q.tail<3>().norm();
+  if (sine < 1e-15) return Vector3d::Zero();
+  return q.tail<3>() / sine * 2.0 * std::atan2(sine, q[0]);
+}
+
+double CalcAngle(const Matrix3d& R) { return CalcRotationVector(R).norm(); }
+
+Matrix3d ToTensor(const Vector6d& e) {
+  Matrix3d tensor;
+  tensor << e[0], e[3], e[4], e[3], e[1], e[5], e[4], e[5], e[2];
+  return tensor;
+}
+
+Vector6d ToEntries(const Matrix3d& I) {
+  Vector6d entries;
+  entries << I(0, 0), I(1, 1), I(2, 2), I(0, 1), I(0, 2), I(1, 2);
+  return entries;
+}
+
+Matrix3d PrintedOrigin::CalcRotation() const {
+  switch (form) {
+    case RotationForm::kNone:
+      return Matrix3d::Identity();
+    case RotationForm::kRollPitchYaw:
+      return TurnRollPitchYaw(r.head<3>());
+    case RotationForm::kQuaternion:
+      return TurnQuaternion(r);
+    case RotationForm::kMdh:
+      return X_before.linear() * TurnAbout(0, r[0]) * TurnAbout(2, r[1]);
+    case RotationForm::kEuler:
+      break;
+  }
+  Matrix3d R = Matrix3d::Identity();
+  for (int k = 0; k < 3; ++k) {
+    const char letter = sequence[static_cast<size_t>(k)];
+    const Matrix3d turn = TurnAbout(std::tolower(letter) - 'x', r[k]);
+    R = std::islower(static_cast<unsigned char>(letter)) != 0 ? Matrix3d(R * turn) : Matrix3d(turn * R);
+  }
+  return R;
+}
+
+Pose PrintedOrigin::CalcPose() const {
+  Pose X;
+  X.linear() = CalcRotation();
+  X.translation() = t;
+  X.makeAffine();
+  if (form == RotationForm::kMdh)
+    X.translation() = X_before * (TurnAbout(0, r[0]) * Vector3d(0.0, 0.0, t[2]) + Vector3d(t[0], 0.0, 0.0));
+  return X;
+}
+
+void PrintedOrigin::SetRotation(const Matrix3d& R) {
+  if (form == RotationForm::kMdh) {
+    t = CalcPose().translation();
+    X_before = Pose::Identity();
+  }
+  half_r.setConstant(half_r.maxCoeff());
+  if (form == RotationForm::kRollPitchYaw) {
+    r.head<3>() = SolveRollPitchYaw(R)[0];
+    return;
+  }
+  form = RotationForm::kQuaternion;
+  r = ToQuaternion(R);
+}
+
+int PrintedRobot::Add(PrintedLink added) {
+  const int index = size();
+  if (added.parent >= 0) link(added.parent).children.push_back(index);
+  links.push_back(std::move(added));
+  return index;
+}
+
+void LevelPrecision(PrintedRobot* robot) {
+  // At most a micrometre, and a hundredth of a milliradian: a file of few digits stays as it is.
+  constexpr double kMostTurn = 1e-5;
+  constexpr double kMostLength = 1e-6;
+  std::vector<double> turns, lengths, ranges;
+  for (const PrintedLink& link : robot->links) {
+    Collect(link.origin.r, link.origin.half_r, &turns);
+    Collect(link.origin.t, link.origin.half_t, &lengths);
+    if (!link.joint.range) continue;
+    for (const PrintedScalar& limit : *link.joint.range) {
+      if (limit.value != 0.0) ranges.push_back(limit.half);
+    }
+  }
+  const double turn = std::min(FindMedian(std::move(turns)), kMostTurn);
+  const double length = std::min(FindMedian(std::move(lengths)), kMostLength);
+  const double range = FindMedian(std::move(ranges));
+  for (PrintedLink& link : robot->links) {
+    Raise(link.origin.r, turn, &link.origin.half_r);
+    Raise(link.origin.t, length, &link.origin.half_t);
+    if (!link.joint.range) continue;
+    for (PrintedScalar& limit : *link.joint.range) limit.half = std::max(limit.half, range);
+  }
+}
+
+}  // namespace dexcheck

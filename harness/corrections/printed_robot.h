@@ -1,0 +1,129 @@
+#pragma once
+
+// A robot as its file prints it: every number with its precision, rotations in the file's own form, each link
+// in its own frame.
+
+#include <array>
+#include <map>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "controller/common/types.h"
+#include "harness/descriptions/robot_description.h"
+
+namespace dexcheck {
+
+using Vector4d = Eigen::Vector4d;
+
+/// A number and half a unit of its last digit; 0: it is exact.
+struct PrintedScalar {
+  double value = 0.0;
+  double half = 0.0;
+};
+
+/// How a file writes a rotation.
+enum class RotationForm {
+  kNone,          ///< It writes none.
+  kRollPitchYaw,  ///< R = Rz(yaw) Ry(pitch) Rx(roll), rad.
+  kEuler,         ///< Angles about `sequence`: small letters are moving axes, capitals fixed ones.
+  kQuaternion,    ///< w, x, y, z.
+  kMdh,           ///< alpha and q of a row of modified Denavit-Hartenberg parameters; t is (a, 0, d).
+};
+
+/// A pose as printed.
+struct PrintedOrigin {
+  Vector3d t = Vector3d::Zero(), half_t = Vector3d::Zero();  ///< m
+  Vector4d r = Vector4d::Zero(), half_r = Vector4d::Zero();  ///< Numbers of the form; angles in rad.
+  RotationForm form = RotationForm::kNone;
+  std::array<char, 3> sequence = {'x', 'y', 'z'};
+  Pose X_before = Pose::Identity();  ///< Of a row of a table, what stands before it.
+
+  [[nodiscard]] Matrix3d CalcRotation() const;
+  [[nodiscard]] Pose CalcPose() const;
+  /// Takes another rotation, in the form of a quaternion unless it is roll, pitch, yaw.
+  void SetRotation(const Matrix3d& R);
+};
+
+/// The mass and inertia of one element.
+struct PrintedInertial {
+  PrintedScalar mass;    ///< kg
+  PrintedOrigin origin;  ///< Centre of mass and the axes of the inertia, in the link's frame.
+  Vector6d I = Vector6d::Zero(), half_I = Vector6d::Zero();  ///< xx yy zz xy xz yz about the centre, kg m^2.
+};
+
+enum class JointKind { kFixed, kHinge, kSlide, kBall, kFree };
+
+struct PrintedMimic {
+  std::string leader;
+  PrintedScalar multiplier{1.0, 0.0}, offset;
+};
+
+/// A scalar of a joint; a file that does not state it has no value.
+enum class JointScalar {
+  kDamping,
+  kFriction,
+  kArmature,
+  kEffort,
+  kVelocity,
+  kStiffness,
+  kSpringAngle,
+  kGear
+};
+inline constexpr size_t kNumJointScalars = 8;
+
+struct PrintedJoint {
+  std::string name;
+  JointKind kind = JointKind::kFixed;
+  Vector3d axis = Vector3d::UnitZ(), half_axis = Vector3d::Zero();
+  Vector3d anchor = Vector3d::Zero();  ///< A point of the axis, in the link's frame, m.
+  std::optional<std::array<PrintedScalar, 2>> range;
+  std::array<std::optional<PrintedScalar>, kNumJointScalars> scalars;
+  std::optional<PrintedMimic> mimic;
+};
+
+struct PrintedLink {
+  std::string name;
+  int parent = -1;
+  std::vector<int> children;
+  PrintedOrigin origin;  ///< In the parent's frame, at zero.
+  PrintedJoint joint;    ///< That moves it.
+  std::optional<PrintedInertial> inertial;
+};
+
+struct PrintedRobot {
+  std::string source;
+  RobotFormat format = RobotFormat::kUrdf;
+  std::vector<PrintedLink> links;  ///< Parents before children; the first is the root.
+  std::optional<Vector3d> gravity;
+  bool has_motors = false;  ///< Whether the file states motors: a joint without a gear then has none.
+
+  [[nodiscard]] const PrintedLink& link(int index) const { return links[static_cast<size_t>(index)]; }
+  [[nodiscard]] PrintedLink& link(int index) { return links[static_cast<size_t>(index)]; }
+  [[nodiscard]] int size() const { return static_cast<int>(links.size()); }
+  /// Adds a link below another one. @return its index.
+  int Add(PrintedLink link);
+};
+
+/// Symmetric tensor of xx yy zz xy xz yz, and back.
+Matrix3d ToTensor(const Vector6d& entries);
+Vector6d ToEntries(const Matrix3d& tensor);
+
+/// Rotation of roll, pitch, yaw; both solutions of the other way (at a quarter turn of pitch, yaw or roll is
+/// 0).
+Matrix3d TurnRollPitchYaw(const Vector3d& angles);
+std::array<Vector3d, 2> SolveRollPitchYaw(const Matrix3d& R);
+Matrix3d TurnAbout(int axis, double angle);
+/// The quaternion w, x, y, z with w >= 0, and back (of any length).
+Vector4d ToQuaternion(const Matrix3d& R);
+Matrix3d TurnQuaternion(const Vector4d& wxyz);
+/// Rotation vector and angle.
+Vector3d CalcRotationVector(const Matrix3d& R);
+double CalcAngle(const Matrix3d& R);
+
+/// Numbers that were printed with more digits than the file's others of their kind are known no better: gives
+/// them the median half unit.
+void LevelPrecision(PrintedRobot* robot);
+
+}  // namespace dexcheck

@@ -1,0 +1,258 @@
+#include "harness/corrections/read_printed.h"
+
+#include <algorithm>
+
+#include "controller/common/text.h"
+#include "controller/model/rigid_body.h"
+#include "harness/descriptions/fault_search.h"
+#include "harness/descriptions/printed_digits.h"
+#include "harness/descriptions/urdf_file.h"
+#include "harness/engine/xml.h"
+
+namespace dexcheck {
+namespace {
+
+using Element = tinyxml2::XMLElement;
+
+std::optional<PrintedScalar> ReadUrdfScalar(const Element* element, const char* attribute) {
+  if (element == nullptr || element->Attribute(attribute) == nullptr) return std::nullopt;
+  return ReadPrintedScalar(element->Attribute(attribute));
+}
+
+PrintedOrigin ReadUrdfOrigin(const Element* element) {
+  PrintedOrigin origin;
+  const Element* const child = element == nullptr ? nullptr : element->FirstChildElement("origin");
+  origin.form = RotationForm::kRollPitchYaw;
+  if (child == nullptr) return origin;
+  std::tie(origin.t, origin.half_t) = ReadPrintedVector<3>(ReadAttribute(*child, "xyz"));
+  const auto [angles, halves] = ReadPrintedVector<3>(ReadAttribute(*child, "rpy"));
+  origin.r.head<3>() = angles;
+  origin.half_r.head<3>() = halves;
+  return origin;
+}
+
+std::optional<PrintedInertial> ReadUrdfInertial(const Element& link) {
+  const Element* const element = link.FirstChildElement("inertial");
+  if (element == nullptr) return std::nullopt;
+  const std::optional<PrintedScalar> mass = ReadUrdfScalar(element->FirstChildElement("mass"), "value");
+  if (!mass) return std::nullopt;
+  PrintedInertial inertial;
+  inertial.mass = *mass;
+  inertial.origin = ReadUrdfOrigin(element);
+  constexpr const char* kEntries[] = {"ixx", "iyy", "izz", "ixy", "ixz", "iyz"};
+  for (int k = 0; k < 6; ++k) {
+    const PrintedScalar entry =
+        ReadUrdfScalar(element->FirstChildElement("inertia"), kEntries[k]).value_or(PrintedScalar{});
+    inertial.I[k] = entry.value;
+    inertial.half_I[k] = entry.half;
+  }
+  return inertial;
+}
+
+JointKind FindUrdfKind(const std::string& type) {
+  if (type == "fixed") return JointKind::kFixed;
+  if (type == "prismatic") return JointKind::kSlide;
+  if (type == "floating" || type == "planar") return JointKind::kFree;
+  return JointKind::kHinge;
+}
+
+PrintedJoint ReadUrdfJoint(const UrdfJoint& joint) {
+  PrintedJoint printed;
+  printed.name = joint.name;
+  printed.kind = FindUrdfKind(joint.type);
+  printed.axis = Vector3d::UnitX();
+  if (const Element* const axis = joint.element->FirstChildElement("axis"))
+    std::tie(printed.axis, printed.half_axis) = ReadPrintedVector<3>(ReadAttribute(*axis, "xyz", "1 0 0"));
+  const Element* const limit = joint.element->FirstChildElement("limit");
+  const Element* const dynamics = joint.element->FirstChildElement("dynamics");
+  if (limit != nullptr && joint.type != "continuous")
+    printed.range = {ReadUrdfScalar(limit, "lower").value_or(PrintedScalar{}),
+                     ReadUrdfScalar(limit, "upper").value_or(PrintedScalar{})};
+  const auto take = [&](JointScalar scalar, const Element* element, const char* attribute) {
+    printed.scalars[static_cast<size_t>(scalar)] = ReadUrdfScalar(element, attribute);
+  };
+  take(JointScalar::kDamping, dynamics, "damping");
+  take(JointScalar::kFriction, dynamics, "friction");
+  take(JointScalar::kEffort, limit, "effort");
+  take(JointScalar::kVelocity, limit, "velocity");
+  if (const Element* const mimic = joint.element->FirstChildElement("mimic")) {
+    PrintedMimic& follows = printed.mimic.emplace();
+    follows.leader = ReadAttribute(*mimic, "joint");
+    follows.multiplier = ReadUrdfScalar(mimic, "multiplier").value_or(PrintedScalar{1.0, 0.0});
+    follows.offset = ReadUrdfScalar(mimic, "offset").value_or(PrintedScalar{});
+  }
+  return printed;
+}
+
+/// Half a unit of the last digit that a table needs for a number.
+PrintedScalar PrintShortest(double value) {
+  constexpr int kDigits = 12;
+  const std::optional<PrintedNumber> printed = ReadPrinted(FormatNumber(value, kDigits));
+  return printed ? PrintedScalar{value, printed->half_unit} : PrintedScalar{value, 0.0};
+}
+
+template <int N>
+Eigen::Matrix<double, N, 1> FindHalves(const Eigen::Matrix<double, N, 1>& values) {
+  return values.unaryExpr([](double value) { return PrintShortest(value).half; });
+}
+
+PrintedScalar PrintAngle(double angle) { return {angle, DegToRad(PrintShortest(RadToDeg(angle)).half)}; }
+
+PrintedOrigin PrintRow(const Joint& joint, const WrittenRow& row, const Pose& X_jP) {
+  PrintedOrigin origin;
+  if (row.is_plain) {
+    const Pose X_PL = X_jP.inverse() * joint.X_PB *
+                      CalcMdhTransform(joint.mdh.alpha, joint.mdh.a, joint.mdh.q, joint.mdh.d) * row.X_iL;
+    origin.form = RotationForm::kRollPitchYaw;
+    origin.t = X_PL.translation();
+    origin.r.head<3>() = SolveRollPitchYaw(X_PL.linear())[0];
+    origin.half_t = FindHalves<3>(origin.t);
+    for (int k = 0; k < 3; ++k) origin.half_r[k] = PrintAngle(origin.r[k]).half;
+    return origin;
+  }
+  origin.form = RotationForm::kMdh;
+  origin.X_before = X_jP.inverse() * joint.X_PB;
+  origin.r.head<2>() << joint.mdh.alpha, joint.mdh.q;
+  origin.half_r.head<2>() << PrintAngle(joint.mdh.alpha).half, PrintAngle(joint.mdh.q).half;
+  origin.t << joint.mdh.a, 0.0, joint.mdh.d;
+  origin.half_t = FindHalves<3>(origin.t);
+  return origin;
+}
+
+PrintedInertial PrintBody(const MassProperties& body) {
+  PrintedInertial inertial;
+  inertial.mass = PrintShortest(body.mass);
+  inertial.origin.form = RotationForm::kRollPitchYaw;
+  inertial.origin.t = body.com;
+  inertial.origin.half_t = FindHalves<3>(body.com);
+  inertial.I = ToEntries(body.inertia);
+  inertial.half_I = FindHalves<6>(inertial.I);
+  return inertial;
+}
+
+PrintedJoint PrintJoint(const Joint& joint, const DescribedJoint& stated, const std::vector<Joint>& all) {
+  PrintedJoint printed;
+  printed.name = joint.name;
+  printed.kind = joint.type == JointType::kRevolute    ? JointKind::kHinge
+                 : joint.type == JointType::kPrismatic ? JointKind::kSlide
+                                                       : JointKind::kBall;
+  printed.axis = stated.X_iL.linear().row(2).transpose();
+  printed.anchor = stated.X_iL.inverse().translation();
+  if (stated.states_range && printed.kind != JointKind::kBall)
+    printed.range = {PrintAngle(joint.lower), PrintAngle(joint.upper)};
+  const auto take = [&](JointScalar scalar, bool states, double value) {
+    if (states) printed.scalars[static_cast<size_t>(scalar)] = PrintShortest(value);
+  };
+  take(JointScalar::kDamping, stated.states_damping, joint.damping);
+  take(JointScalar::kFriction, stated.states_dry_friction, joint.dry_friction);
+  take(JointScalar::kArmature, stated.states_armature, joint.armature);
+  if (joint.coupling)
+    printed.mimic = {all[static_cast<size_t>(joint.coupling->leader)].name,
+                     PrintShortest(joint.coupling->multiplier), PrintShortest(joint.coupling->offset)};
+  return printed;
+}
+
+}  // namespace
+
+std::optional<PrintedScalar> ReadPrintedScalar(std::string_view text) {
+  const std::optional<PrintedNumber> number = ReadPrinted(Trim(text));
+  if (!number) return std::nullopt;
+  return PrintedScalar{number->value, number->half_unit};
+}
+
+template <int N>
+std::pair<Eigen::Matrix<double, N, 1>, Eigen::Matrix<double, N, 1>> ReadPrintedVector(std::string_view text) {
+  std::pair<Eigen::Matrix<double, N, 1>, Eigen::Matrix<double, N, 1>> numbers;
+  numbers.first.setZero();
+  numbers.second.setZero();
+  constexpr std::string_view kBlanks = " \t\r\n,";
+  for (int k = 0; k < N; ++k) {
+    const size_t begin = std::min(text.find_first_not_of(kBlanks), text.size());
+    text.remove_prefix(begin);
+    const size_t end = std::min(text.find_first_of(kBlanks), text.size());
+    if (const std::optional<PrintedScalar> number = ReadPrintedScalar(text.substr(0, end))) {
+      numbers.first[k] = number->value;
+      numbers.second[k] = number->half;
+    }
+    text.remove_prefix(end);
+  }
+  return numbers;
+}
+
+template std::pair<Vector3d, Vector3d> ReadPrintedVector<3>(std::string_view);
+template std::pair<Vector4d, Vector4d> ReadPrintedVector<4>(std::string_view);
+template std::pair<Vector6d, Vector6d> ReadPrintedVector<6>(std::string_view);
+
+PrintedRobot ReadPrintedUrdf(const std::string& text, const std::string& source) {
+  const UrdfFile file(text, source);
+  PrintedRobot robot;
+  robot.source = source;
+  robot.format = RobotFormat::kUrdf;
+  std::vector<std::pair<int, int>> open = {{file.root(), -1}};  // link of the file, parent here
+  while (!open.empty()) {
+    const auto [index, parent] = open.back();
+    open.pop_back();
+    const UrdfLink& link = file.link(index);
+    PrintedLink printed;
+    printed.name = link.name;
+    printed.parent = parent;
+    printed.inertial = ReadUrdfInertial(*link.element);
+    if (link.parent_joint >= 0) {
+      const UrdfJoint& joint = file.joint(link.parent_joint);
+      printed.joint = ReadUrdfJoint(joint);
+      printed.origin = ReadUrdfOrigin(joint.element);
+    }
+    const int added = robot.Add(std::move(printed));
+    for (auto child = link.child_joints.rbegin(); child != link.child_joints.rend(); ++child)
+      open.emplace_back(file.joint(*child).child, added);
+  }
+  return robot;
+}
+
+PrintedRobot PrintDescription(const RobotDescription& description) {
+  const RobotSpec& spec = description.spec;
+  PrintedRobot robot;
+  robot.source = spec.source;
+  robot.format = description.format;
+  if (description.states_gravity) robot.gravity = spec.gravity;
+  PrintedLink base;
+  base.name = spec.base.link;
+  if (spec.base.type != BaseType::kFixed) base.inertial = PrintBody(spec.base.body);
+  robot.Add(std::move(base));
+  for (size_t i = 0; i < spec.joints.size(); ++i) {
+    const Joint& joint = spec.joints[i];
+    const DescribedJoint& stated = description.joints[i];
+    Pose X_jP = Pose::Identity();
+    if (joint.parent >= 0) X_jP = description.joints[static_cast<size_t>(joint.parent)].X_iL;
+    PrintedLink link;
+    link.name = joint.link;
+    link.parent = joint.parent + 1;
+    link.joint = PrintJoint(joint, stated, spec.joints);
+    link.origin = PrintRow(joint, stated, X_jP);
+    if (link.origin.form == RotationForm::kMdh && !stated.X_iL.isApprox(Pose::Identity())) {
+      const Pose X = link.origin.CalcPose() * stated.X_iL;
+      link.origin.t = X.translation();
+      link.origin.form = RotationForm::kQuaternion;
+      link.origin.SetRotation(X.linear());
+    }
+    link.inertial = PrintBody(ExpressIn(joint.body, stated.X_iL.inverse()));
+    robot.Add(std::move(link));
+  }
+  return robot;
+}
+
+PrintedRobot ReadPrintedRobot(const DescriptionFile& file) {
+  PrintedRobot robot;
+  if (file.format() == RobotFormat::kUrdf) {
+    robot = ReadPrintedUrdf(file.text(), file.path().string());
+  } else if (file.format() == RobotFormat::kMjcf) {
+    robot = ReadPrintedMjcf(file.document(), *file.CopyEngine());
+  } else {
+    robot = PrintDescription(file.Describe());
+  }
+  robot.source = file.path().filename().string();
+  LevelPrecision(&robot);
+  return robot;
+}
+
+}  // namespace dexcheck

@@ -1,0 +1,319 @@
+#include <cmath>
+#include <map>
+
+#include "controller/common/text.h"
+#include "harness/corrections/read_printed.h"
+#include "harness/descriptions/mjcf_reader.h"
+#include "harness/engine/engine.h"
+#include "harness/engine/map_vector.h"
+#include "harness/engine/mjcf_passes.h"
+#include "harness/engine/xml.h"
+
+namespace dexcheck {
+namespace {
+
+using MjcfElement = tinyxml2::XMLElement;
+using Attributes = std::map<std::string, std::string>;
+
+/// What <default> says of each kind of element, by class.
+class DefaultClasses {
+ public:
+  explicit DefaultClasses(const MjcfElement& root) {
+    for (const MjcfElement* child : ListChildren(&root, "default")) Read(*child, {});
+  }
+
+  /// An element's attributes and those of its class. @param around the body's childclass.
+  [[nodiscard]] Attributes Complete(const MjcfElement& element, const std::string& around) const {
+    Attributes all;
+    const auto found = classes_.find(ReadAttribute(element, "class", around.empty() ? kMain : around));
+    if (found != classes_.end()) {
+      const auto kind = found->second.find(element.Name());
+      if (kind != found->second.end()) all = kind->second;
+    }
+    Take(element, &all);
+    return all;
+  }
+
+ private:
+  using Class = std::map<std::string, Attributes>;
+  static constexpr const char* kMain = "main";
+
+  static void Take(const MjcfElement& element, Attributes* all) {
+    for (const tinyxml2::XMLAttribute* at = element.FirstAttribute(); at != nullptr; at = at->Next())
+      (*all)[at->Name()] = at->Value();
+  }
+
+  void Read(const MjcfElement& element, const Class& around) {
+    const std::string name = ReadAttribute(element, "class", kMain);
+    Class own = around;
+    if (classes_.contains(name)) own = classes_[name];
+    for (const MjcfElement* child : ListChildren(&element)) {
+      if (std::string_view(child->Name()) != "default") Take(*child, &own[child->Name()]);
+    }
+    classes_[name] = own;
+    for (const MjcfElement* child : ListChildren(&element, "default")) Read(*child, own);
+  }
+
+  std::map<std::string, Class> classes_;
+};
+
+std::string Find(const Attributes& all, const char* name) {
+  const auto found = all.find(name);
+  return found == all.end() ? std::string() : found->second;
+}
+
+class PrintedMjcfReader {
+ public:
+  PrintedMjcfReader(const MjcfFile& mjcf, const mjModel& engine)
+      : root_(*mjcf.root()), engine_(engine), classes_(root_) {
+    for (const MjcfElement* compiler : ListChildren(&root_, "compiler")) {
+      if (compiler->Attribute("angle") != nullptr)
+        unit_ = ReadAttribute(*compiler, "angle") == "radian" ? 1.0 : kDegree;
+      const std::string sequence = ReadAttribute(*compiler, "eulerseq");
+      if (sequence.size() == 3) sequence_ = {sequence[0], sequence[1], sequence[2]};
+    }
+  }
+
+  PrintedRobot Read() {
+    robot_.format = RobotFormat::kMjcf;
+    robot_.gravity = MapVector(engine_.opt.gravity);
+    PrintedLink world;
+    world.name = "world";
+    robot_.Add(std::move(world));
+    for (const MjcfElement* part : ListChildren(&root_, "worldbody")) {
+      for (const MjcfElement* body : ListChildren(part, "body"))
+        ReadBody(*body, 0, ReadAttribute(*part, "childclass"));
+    }
+    ReadCouplings();
+    ReadMotors();
+    return std::move(robot_);
+  }
+
+ private:
+  static constexpr double kDegree = kPi / 180.0;
+
+  /// The engine's numbers have no digits: those of a text of seven.
+  static constexpr double kEngineDigits = 1e-7;
+
+  [[nodiscard]] PrintedOrigin ReadOrigin(const MjcfElement& element) const {
+    PrintedOrigin origin;
+    origin.form = RotationForm::kQuaternion;
+    origin.r[0] = 1.0;
+    std::tie(origin.t, origin.half_t) = ReadPrintedVector<3>(ReadAttribute(element, "pos"));
+    const auto turn = [&](const Matrix3d& R, double half) {
+      origin.r = ToQuaternion(R);
+      origin.half_r.setConstant(half);
+    };
+    if (element.Attribute("quat") != nullptr) {
+      std::tie(origin.r, origin.half_r) = ReadPrintedVector<4>(ReadAttribute(element, "quat"));
+    } else if (element.Attribute("euler") != nullptr) {
+      const auto [angles, halves] = ReadPrintedVector<3>(ReadAttribute(element, "euler"));
+      origin.form = RotationForm::kEuler;
+      origin.sequence = sequence_;
+      origin.r.setZero();
+      origin.r.head<3>() = angles * unit_;
+      origin.half_r.head<3>() = halves * unit_;
+    } else if (element.Attribute("axisangle") != nullptr) {
+      const auto [v, halves] = ReadPrintedVector<4>(ReadAttribute(element, "axisangle"));
+      turn(Eigen::AngleAxisd(v[3] * unit_, v.head<3>().normalized()).toRotationMatrix(),
+           std::max(halves.head<3>().maxCoeff(), halves[3] * unit_));
+    } else if (element.Attribute("xyaxes") != nullptr) {
+      const auto [v, halves] = ReadPrintedVector<6>(ReadAttribute(element, "xyaxes"));
+      Matrix3d R;
+      R.col(0) = v.head<3>().normalized();
+      R.col(1) = (v.tail<3>() - R.col(0) * R.col(0).dot(v.tail<3>())).normalized();
+      R.col(2) = R.col(0).cross(R.col(1));
+      turn(R, halves.maxCoeff());
+    } else if (element.Attribute("zaxis") != nullptr) {
+      const auto [v, halves] = ReadPrintedVector<3>(ReadAttribute(element, "zaxis"));
+      turn(Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), v).toRotationMatrix(), halves.maxCoeff());
+    }
+    return origin;
+  }
+
+  /// Gives a pose that was read otherwise than the engine compiled it the engine's numbers.
+  static void TakeEngine(const mjtNum* pos, const mjtNum* quat, PrintedOrigin* origin) {
+    constexpr double kSame = 1e-6;
+    const Matrix3d R = TurnQuaternion(Vector4d(quat[0], quat[1], quat[2], quat[3]));
+    const Vector3d t = MapVector(pos);
+    if ((origin->t - t).norm() <= kSame && CalcAngle(origin->CalcRotation().transpose() * R) <= kSame) return;
+    origin->t = t;
+    origin->half_t.setConstant(kEngineDigits);
+    origin->form = RotationForm::kQuaternion;
+    origin->r = ToQuaternion(R);
+    origin->half_r.setConstant(kEngineDigits);
+  }
+
+  [[nodiscard]] std::optional<PrintedInertial> ReadInertial(const MjcfElement& body, int id) const {
+    const MjcfElement* const element = body.FirstChildElement("inertial");
+    PrintedInertial inertial;
+    const double mass = engine_.body_mass[id];
+    if (element != nullptr) {
+      inertial.origin = ReadOrigin(*element);
+      inertial.mass = ReadPrintedScalar(ReadAttribute(*element, "mass")).value_or(PrintedScalar{});
+      if (element->Attribute("fullinertia") != nullptr) {
+        std::tie(inertial.I, inertial.half_I) = ReadPrintedVector<6>(ReadAttribute(*element, "fullinertia"));
+      } else {
+        const auto [moments, halves] = ReadPrintedVector<3>(ReadAttribute(*element, "diaginertia"));
+        inertial.I.head<3>() = moments;
+        inertial.half_I.head<3>() = halves;
+      }
+      constexpr double kSame = 1e-6;
+      if (std::abs(inertial.mass.value - mass) <= kSame * mass) return inertial;
+    }
+    if (mass <= 0.0) return std::nullopt;
+    // Its shapes' mass, or what a setting of the compiler made of it.
+    const MassProperties made = ReadEngineBody(engine_, id);
+    inertial = PrintedInertial{};
+    inertial.origin.form = RotationForm::kQuaternion;
+    inertial.origin.r[0] = 1.0;
+    inertial.mass = {made.mass, kEngineDigits * made.mass};
+    inertial.origin.t = made.com;
+    inertial.origin.half_t.setConstant(kEngineDigits);
+    inertial.I = ToEntries(made.inertia);
+    inertial.half_I.setConstant(kEngineDigits * made.inertia.trace());
+    return inertial;
+  }
+
+  [[nodiscard]] PrintedJoint ReadJoint(const MjcfElement& element, const std::string& around, int id) const {
+    PrintedJoint joint;
+    const Attributes all = classes_.Complete(element, around);
+    joint.name = NameOf(engine_, mjOBJ_JOINT, id);
+    switch (engine_.jnt_type[id]) {
+      case mjJNT_FREE:
+        joint.kind = JointKind::kFree;
+        return joint;
+      case mjJNT_BALL:
+        joint.kind = JointKind::kBall;
+        break;
+      case mjJNT_SLIDE:
+        joint.kind = JointKind::kSlide;
+        break;
+      default:
+        joint.kind = JointKind::kHinge;
+    }
+    const std::string axis = Find(all, "axis");
+    std::tie(joint.axis, joint.half_axis) = ReadPrintedVector<3>(axis.empty() ? "0 0 1" : axis);
+    joint.anchor = MapVector(engine_.jnt_pos + 3 * id);
+    const double unit = joint.kind == JointKind::kSlide ? 1.0 : unit_;
+    if (engine_.jnt_limited[id] != 0 && joint.kind != JointKind::kBall) {
+      const auto [range, halves] = ReadPrintedVector<3>(Find(all, "range"));
+      joint.range = {PrintedScalar{range[0] * unit, halves[0] * unit},
+                     PrintedScalar{range[1] * unit, halves[1] * unit}};
+    }
+    const auto take = [&](JointScalar scalar, const char* name, double factor) {
+      const std::optional<PrintedScalar> number = ReadPrintedScalar(Find(all, name));
+      joint.scalars[static_cast<size_t>(scalar)] =
+          number ? PrintedScalar{number->value * factor, number->half * factor} : PrintedScalar{};
+    };
+    take(JointScalar::kDamping, "damping", 1.0);
+    take(JointScalar::kFriction, "frictionloss", 1.0);
+    take(JointScalar::kArmature, "armature", 1.0);
+    take(JointScalar::kStiffness, "stiffness", 1.0);
+    if (joint.scalars[static_cast<size_t>(JointScalar::kStiffness)]->value != 0.0)
+      take(JointScalar::kSpringAngle, "springref", unit);
+    return joint;
+  }
+
+  /// Undoes a joint's reference: at zero it stands elsewhere than the file has its body.
+  void UndoReference(int id, PrintedLink* link) const {
+    const double reference = engine_.qpos0[engine_.jnt_qposadr[id]];
+    if (reference == 0.0 || (link->joint.kind != JointKind::kHinge && link->joint.kind != JointKind::kSlide))
+      return;
+    const Vector3d axis = link->joint.axis.normalized();
+    Pose X = Pose::Identity();
+    if (link->joint.kind == JointKind::kHinge) {
+      X = Eigen::Translation3d(link->joint.anchor) * Eigen::AngleAxisd(-reference, axis) *
+          Eigen::Translation3d(-link->joint.anchor);
+    } else {
+      X.translation() = -reference * axis;
+    }
+    X = link->origin.CalcPose() * X;
+    const double half = link->origin.half_r.maxCoeff();
+    link->origin.t = X.translation();
+    link->origin.SetRotation(X.linear());
+    link->origin.half_r.setConstant(half);
+  }
+
+  void ReadBody(const MjcfElement& body, int parent, std::string around) {
+    around = ReadAttribute(body, "childclass", around);
+    const int id = ++body_;
+    if (id >= engine_.nbody) return;
+    const std::string name = NameOf(engine_, mjOBJ_BODY, id);
+    PrintedOrigin origin = ReadOrigin(body);
+    TakeEngine(engine_.body_pos + 3 * id, engine_.body_quat + 4 * id, &origin);
+    const int first = engine_.body_jntadr[id];
+    const int count = engine_.body_jntnum[id];
+    int k = 0;
+    const auto add = [&](PrintedLink link) {
+      link.parent = parent;
+      link.name = k + 1 >= count ? name : name + ":" + link.joint.name;
+      link.origin.form = RotationForm::kQuaternion;
+      link.origin.r = Vector4d::UnitX();
+      if (k == 0) link.origin = origin;
+      if (count > 0) UndoReference(first + k, &link);
+      if (k + 1 >= count) link.inertial = ReadInertial(body, id);
+      parent = robot_.Add(std::move(link));
+      ++k;
+    };
+    for (const MjcfElement* child : ListChildren(&body)) {
+      const std::string_view kind = child->Name();
+      if ((kind != "joint" && kind != "freejoint") || k >= count) continue;
+      PrintedLink link;
+      link.joint = ReadJoint(*child, around, first + k);
+      add(std::move(link));
+    }
+    if (k == 0) add(PrintedLink{});
+    for (const MjcfElement* child : ListChildren(&body, "body")) ReadBody(*child, parent, around);
+  }
+
+  void ReadCouplings() {
+    for (const MjcfElement* equality : ListChildren(&root_, "equality")) {
+      for (const MjcfElement* element : ListChildren(equality, "joint")) {
+        const Attributes all = classes_.Complete(*element, "");
+        if (Find(all, "active") == "false" || Find(all, "joint2").empty()) continue;
+        const std::string polynomial = Find(all, "polycoef");
+        const auto [numbers, halves] = ReadPrintedVector<4>(polynomial.empty() ? "0 1 0 0 0" : polynomial);
+        for (PrintedLink& link : robot_.links) {
+          if (link.joint.name != Find(all, "joint1")) continue;
+          link.joint.mimic = {Find(all, "joint2"), {numbers[1], halves[1]}, {numbers[0], halves[0]}};
+        }
+      }
+    }
+  }
+
+  /// The sum of the gears of each joint's motors, and the largest force that all of them may exert.
+  void ReadMotors() {
+    for (int i = 0; i < engine_.nu; ++i) {
+      if (engine_.actuator_trntype[i] != mjTRN_JOINT) continue;
+      robot_.has_motors = true;
+      const std::string name = NameOf(engine_, mjOBJ_JOINT, engine_.actuator_trnid[2 * i]);
+      for (PrintedLink& link : robot_.links) {
+        if (link.joint.name != name || link.joint.kind == JointKind::kFixed) continue;
+        std::optional<PrintedScalar>& gear = link.joint.scalars[static_cast<size_t>(JointScalar::kGear)];
+        gear = PrintedScalar{(gear ? gear->value : 0.0) + engine_.actuator_gear[6 * i], 0.0};
+        const std::optional<std::pair<double, double>> limits = FindForceLimits(engine_, i);
+        std::optional<PrintedScalar>& effort = link.joint.scalars[static_cast<size_t>(JointScalar::kEffort)];
+        if (limits && std::abs(limits->first + limits->second) <= 1e-9 * std::abs(limits->second))
+          effort = PrintedScalar{(effort ? effort->value : 0.0) + std::abs(limits->second),
+                                 kEngineDigits * std::abs(limits->second)};
+      }
+    }
+  }
+
+  const MjcfElement& root_;
+  const mjModel& engine_;
+  DefaultClasses classes_;
+  double unit_ = kDegree;
+  std::array<char, 3> sequence_ = {'x', 'y', 'z'};
+  PrintedRobot robot_;
+  int body_ = 0;
+};
+
+}  // namespace
+
+PrintedRobot ReadPrintedMjcf(const MjcfFile& mjcf, const mjModel& engine) {
+  return PrintedMjcfReader(mjcf, engine).Read();
+}
+
+}  // namespace dexcheck

@@ -1,0 +1,260 @@
+// How many faults in files are named: robots drawn anew are written twice, by code that shares nothing with
+// the search, with faults in what is written. The files, and what was made, go to a folder with
+// DEXCHECK_DRAWN_FILES=FOLDER; another draw is made with DEXCHECK_DRAWN_SEED=N.
+
+#include "harness/corrections/corrections.h"
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <map>
+
+#include "tests/harness/corrections/drawn_files.h"
+
+namespace dexcheck::testing::corrections_test {
+namespace {
+
+enum class Score { kNamed, kClass, kMissed };
+
+/// Whether an item is at a fault's places, and at no others but those of the other faults.
+bool IsAtPlaces(const MadeFault& made, const std::vector<MadeFault>& all, const CorrectionItem& item) {
+  const auto has = [&](const std::string& place) {
+    return std::ranges::find(item.places, place) != item.places.end();
+  };
+  if (made.any_place) return std::ranges::any_of(made.places, has);
+  const auto is_made = [&](const std::string& place) {
+    return std::ranges::any_of(all, [&](const MadeFault& fault) {
+      return std::ranges::find(fault.places, place) != fault.places.end();
+    });
+  };
+  return std::ranges::all_of(made.places, has) && std::ranges::all_of(item.places, is_made);
+}
+
+bool IsOfKind(const MadeFault& made, const CorrectionItem& item) {
+  return std::ranges::find(made.kinds, item.fault.kind) != made.kinds.end();
+}
+
+/// Whether an item is about a fault's quantity: an inertial's, or an origin's, or its own.
+bool IsAbout(const MadeFault& made, const CorrectionItem& item) {
+  if (item.fault.of == made.of) return true;
+  if (item.fault.whole) return IsOfBody(item.fault.of) == IsOfBody(made.of);
+  return false;
+}
+
+Score Judge(const MadeFault& made, const std::vector<MadeFault>& all, const FileCorrections& found) {
+  Score best = Score::kMissed;
+  for (const CorrectionItem& item : found.items) {
+    if (IsAbout(made, item) && IsOfKind(made, item) && IsAtPlaces(made, all, item)) return Score::kNamed;
+    for (const CorrectionItem& rival : item.rivals) {
+      if (IsAbout(made, rival) && IsOfKind(made, rival) && IsAtPlaces(made, all, rival)) best = Score::kClass;
+    }
+  }
+  return best;
+}
+
+/// Items that are about no fault's quantity and place.
+int CountInvented(const std::vector<MadeFault>& made, const FileCorrections& found) {
+  int invented = 0;
+  for (const CorrectionItem& item : found.items) {
+    const bool is_made = std::ranges::any_of(made, [&](const MadeFault& fault) {
+      return IsAbout(fault, item) && std::ranges::any_of(item.places, [&](const std::string& place) {
+               return std::ranges::find(fault.places, place) != fault.places.end();
+             });
+    });
+    if (!is_made) ++invented;
+  }
+  return invented;
+}
+
+struct Case {
+  std::string a, b, end_a, end_b;
+  std::vector<MadeFault> made;
+};
+
+struct Tally {
+  int faults = 0, named = 0, in_class = 0, missed = 0, invented = 0, cases_with_invented = 0;
+};
+
+class Campaign {
+ public:
+  Campaign(unsigned seed, std::string name) : random_(seed), name_(std::move(name)) {
+    if (const char* const folder = std::getenv("DEXCHECK_DRAWN_FILES")) folder_ = folder;
+  }
+
+  /// Draws two files, the first with faults of these kinds; none where one of them does not show.
+  std::optional<Case> DrawCase(const std::vector<std::string>& faults) {
+    using Format = WrittenForm::Format;
+    DrawnRobot robot = DrawRobot(&random_);
+    WrittenForm form_a, form_b;
+    const auto draw = [&](int count) { return std::uniform_int_distribution(0, count - 1)(random_); };
+    form_a.format = draw(3) == 0 ? Format::kMjcf : Format::kUrdf;
+    form_b.format = draw(3) == 0 ? Format::kUrdf : Format::kMjcf;
+    if (std::ranges::find(faults, "gravity_number") != faults.end())
+      form_a.format = form_b.format = Format::kMjcf;
+    form_a.digits = 5 + draw(5);
+    form_b.digits = 5 + draw(5);
+    form_a.euler = draw(3) == 0;
+    form_b.euler = draw(3) == 0;
+    form_b.principal = draw(3) == 0;
+    form_b.seed = static_cast<unsigned>(random_());
+    if (form_b.format == Format::kMjcf) {
+      form_b.other_names = draw(2) == 0;
+      form_b.fuses = draw(3) == 0;
+      form_b.other_frames = draw(4) == 0;
+    }
+    DrawnRobot wrong = robot;
+    Case made;
+    for (const std::string& name : faults) {
+      std::optional<MadeFault> fault = MakeFault(name, form_a, &random_, &wrong);
+      if (!fault) return std::nullopt;
+      made.made.push_back(*std::move(fault));
+    }
+    if (made.made.size() == 2 && SharePlace(made.made[0], made.made[1])) return std::nullopt;
+    for (const MadeFault& fault : made.made) {
+      // A link that is missing cannot have a fault, and one of the names that are exchanged is another's.
+      if (made.made.size() == 2 && (fault.name.ends_with("missing") || fault.name == "names_exchanged"))
+        return std::nullopt;
+    }
+    made.a = WriteRobot(wrong, form_a);
+    made.b = WriteRobot(robot, form_b);
+    made.end_a = form_a.format == Format::kUrdf ? ".urdf" : ".xml";
+    made.end_b = form_b.format == Format::kUrdf ? ".urdf" : ".xml";
+    return made;
+  }
+
+  void Try(const Case& drawn) {
+    const std::string number = fmt::format("{}{:04}", name_, count_++);
+    if (!folder_.empty()) Store(drawn, number);
+    FileCorrections found;
+    try {
+      const DescriptionFile a("a" + drawn.end_a, drawn.a, {});
+      const DescriptionFile b("b" + drawn.end_b, drawn.b, {});
+      found = FindCorrections(a, b);
+    } catch (const std::exception& error) {
+      fmt::print("{} refused: {}\n", number, error.what());
+      ++refused;
+      return;
+    }
+    const int invented = CountInvented(drawn.made, found);
+    bool prints = invented > 0;
+    for (const MadeFault& fault : drawn.made) {
+      const Score score = Judge(fault, drawn.made, found);
+      prints = prints || score == Score::kMissed;
+      ++tally.faults;
+      ++(score == Score::kNamed ? tally.named : score == Score::kClass ? tally.in_class : tally.missed);
+      if (score == Score::kMissed) ++missed_by_name[fault.name];
+    }
+    tally.invented += invented;
+    tally.cases_with_invented += invented > 0 ? 1 : 0;
+    if (drawn.made.empty() && !found.agrees) prints = true;
+    if (!prints || std::getenv("DEXCHECK_DRAWN_SHOW") == nullptr) return;
+    fmt::print("{}{}{}:", number, drawn.end_a, drawn.end_b);
+    for (const MadeFault& fault : drawn.made)
+      fmt::print(" {} [{}]{}", fault.name, fmt::join(fault.places, ", "),
+                 Judge(fault, drawn.made, found) == Score::kMissed ? " MISSED" : "");
+    fmt::print("\n");
+    for (const CorrectionItem& item : found.items) {
+      fmt::print("    {:.0f}: {}\n", item.bits, DescribeItem(item, found.of_second));
+      for (const CorrectionItem& rival : item.rivals)
+        fmt::print("        or {}\n", DescribeItem(rival, found.of_second));
+    }
+    for (const std::string& left : found.unexplained) fmt::print("    not explained: {}\n", left);
+  }
+
+  std::mt19937* random() { return &random_; }
+  void Print() const {
+    fmt::print(
+        "{}: {} faults, {} named, {} class, {} missed; {} items that are not there in {} cases, {} refused\n",
+        name_, tally.faults, tally.named, tally.in_class, tally.missed, tally.invented,
+        tally.cases_with_invented, refused);
+  }
+
+  Tally tally;
+  int refused = 0;
+  std::map<std::string, int> missed_by_name;
+
+ private:
+  static bool IsWhole(const MadeFault& fault) {
+    return fault.name == "inertial_dropped" || fault.name.ends_with("exchanged") ||
+           fault.name.ends_with("missing");
+  }
+
+  static bool SharePlace(const MadeFault& a, const MadeFault& b) {
+    if (a.of != b.of && !(IsOfBody(a.of) && IsOfBody(b.of) && (IsWhole(a) || IsWhole(b)))) return false;
+    return std::ranges::any_of(a.places, [&](const std::string& place) {
+      return std::ranges::find(b.places, place) != b.places.end();
+    });
+  }
+
+  void Store(const Case& drawn, const std::string& number) const {
+    const std::filesystem::path at = folder_ / number;
+    std::filesystem::create_directories(at);
+    std::ofstream(at / ("a" + drawn.end_a)) << drawn.a;
+    std::ofstream(at / ("b" + drawn.end_b)) << drawn.b;
+    std::ofstream truth(at / "made");
+    for (const MadeFault& fault : drawn.made)
+      truth << fault.name << "|" << static_cast<int>(fault.of) << "|"
+            << fmt::format("{}", fmt::join(fault.places, ",")) << "\n";
+  }
+
+  std::mt19937 random_;
+  std::string name_;
+  std::filesystem::path folder_;
+  int count_ = 0;
+};
+
+unsigned TakeSeed(unsigned otherwise) {
+  const char* const seed = std::getenv("DEXCHECK_DRAWN_SEED");
+  return seed == nullptr ? otherwise : otherwise + static_cast<unsigned>(std::atoi(seed));
+}
+
+TEST(CorrectionCampaign, NamesSingleFaults) {
+  Campaign campaign(TakeSeed(101), "single");
+  constexpr int kOfEach = 3;
+  for (const std::string& name : ListFaultNames()) {
+    for (int k = 0, tries = 0; k < kOfEach && tries < 60; ++tries) {
+      const std::optional<Case> drawn = campaign.DrawCase({name});
+      if (!drawn) continue;
+      campaign.Try(*drawn);
+      ++k;
+    }
+  }
+  campaign.Print();
+  for (const auto& [name, count] : campaign.missed_by_name) fmt::print("  missed {}: {}\n", name, count);
+  EXPECT_GE(campaign.tally.named + campaign.tally.in_class, 0.96 * campaign.tally.faults);
+  EXPECT_LE(campaign.tally.cases_with_invented, 5);
+}
+
+TEST(CorrectionCampaign, NamesPairs) {
+  Campaign campaign(TakeSeed(202), "pair");
+  const std::vector<std::string> names = ListFaultNames();
+  constexpr int kPairs = 80;
+  for (int k = 0; k < kPairs;) {
+    const auto draw = [&] {
+      return names[std::uniform_int_distribution<size_t>(0, names.size() - 1)(*campaign.random())];
+    };
+    const std::optional<Case> drawn = campaign.DrawCase({draw(), draw()});
+    if (!drawn) continue;
+    campaign.Try(*drawn);
+    ++k;
+  }
+  campaign.Print();
+  for (const auto& [name, count] : campaign.missed_by_name) fmt::print("  missed {}: {}\n", name, count);
+  EXPECT_GE(campaign.tally.named + campaign.tally.in_class, 0.92 * campaign.tally.faults);
+  EXPECT_LE(campaign.tally.cases_with_invented, 6);
+}
+
+TEST(CorrectionCampaign, AgreesWithoutFaults) {
+  Campaign campaign(TakeSeed(303), "right");
+  constexpr int kRight = 40;
+  for (int k = 0; k < kRight; ++k) campaign.Try(*campaign.DrawCase({}));
+  campaign.Print();
+  EXPECT_EQ(campaign.tally.invented, 0);
+}
+
+}  // namespace
+}  // namespace dexcheck::testing::corrections_test
