@@ -13,8 +13,7 @@
 #include "harness/checks/file_comparison.h"
 #include "harness/descriptions/body_comparison.h"
 #include "harness/descriptions/description_match.h"
-#include "harness/descriptions/fault_search.h"
-#include "harness/descriptions/placement_difference.h"
+#include "harness/descriptions/link_frame_tree.h"
 
 namespace dexcheck {
 namespace {
@@ -147,12 +146,7 @@ class DigitJudge {
  public:
   DigitJudge(const MovedFile& a, const MovedFile& b, const RobotModel& model, double precision,
              DigitVerdict* verdict)
-      : a_(a),
-        b_(b),
-        pair_{a.nominal().sides[0], a.nominal().sides[1], verdict->files[0].file, verdict->files[1].file},
-        model_(model),
-        precision_(precision),
-        verdict_(*verdict) {}
+      : a_(a), b_(b), model_(model), precision_(precision), verdict_(*verdict) {}
 
   /// Keeps the findings that exceed the precision of both files.
   void JudgeConstants(ConstantChecks* constants) {
@@ -277,19 +271,13 @@ class DigitJudge {
       if (entry.term != term) continue;
       DigitExcess excess = {
           judged.name, WordsOf(entry.where), {"", "", entry.first, entry.second}, entry.units};
-      const std::optional<std::string> placement =
-          entry.where.kind == Location::Kind::kJoint
-              ? DescribeJointDifference(pair_, entry.where.first)
-              : DescribeFrameDifference(pair_, model_.frame(entry.where.first).name);
-      excess.placement = placement.value_or("");
-      excess.is_cause = placement.has_value();
+      excess.is_cause = true;
       verdict_.excesses.push_back(std::move(excess));
     }
   }
 
   const MovedFile& a_;
   const MovedFile& b_;
-  DescribedPair pair_;
   const RobotModel& model_;
   double precision_;
   DigitVerdict& verdict_;
@@ -307,16 +295,6 @@ void CompletePair(const std::vector<std::string>& ignore, const RobotPart& part,
   const bool is_named_by_second = second.format == RobotFormat::kMjcf && part.empty();
   CompleteEachOther(is_named_by_second ? &second : &first, is_named_by_second ? &first : &second, ignore);
   AddLinkFrames(&first, &second);
-}
-
-bool DigitVerdict::Concerns(const std::vector<std::string>& ids,
-                            const std::vector<std::string>& parts) const {
-  if (std::ranges::any_of(ids, [](const std::string& id) { return !id.starts_with("number."); })) return true;
-  return std::ranges::any_of(parts, [&](const std::string& part) {
-    return std::ranges::any_of(excesses, [&](const DigitExcess& excess) {
-      return excess.is_cause && (" " + excess.where + " ").find(" " + part + " ") != std::string::npos;
-    });
-  });
 }
 
 std::optional<DigitVerdict> JudgeByDigits(const std::array<const DescriptionFile*, 2>& files,

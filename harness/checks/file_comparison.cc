@@ -10,12 +10,13 @@
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
 #include "harness/base/worst.h"
+#include "harness/corrections/read_printed.h"
 #include "harness/descriptions/body_comparison.h"
 #include "harness/descriptions/compiled_inertias.h"
 #include "harness/descriptions/description_match.h"
 #include "harness/descriptions/engine_extras.h"
 #include "harness/descriptions/engine_provider.h"
-#include "harness/descriptions/fault_search.h"
+#include "harness/descriptions/link_frame_tree.h"
 #include "harness/descriptions/mjcf_reader.h"
 #include "harness/descriptions/read_description.h"
 #include "harness/descriptions/result_files.h"
@@ -185,11 +186,11 @@ void CompareWithEngine(const DescriptionFile& first, const DescriptionFile& seco
                                      {}, &comparison->result);
 }
 
-/// Two descriptions without the engine. @param missing what only one of them has.
+/// Two descriptions without the engine.
 void CompareTwoDescriptions(const DescriptionFile& first, const DescriptionFile& second,
-                            const UrdfOptions& urdf, const ConsistencyOptions& options, const RobotPart& part,
-                            const std::vector<ConstantFinding>& missing, const Progress& progress,
-                            Comparison* comparison) {
+                            const UrdfOptions& urdf, const ConsistencyOptions& options,
+                            const Progress& progress, Comparison* comparison) {
+  const RobotPart& part = options.part;
   RobotDescription a = first.Describe();
   RobotDescription b = second.Describe();
   int held = 0;
@@ -210,7 +211,6 @@ void CompareTwoDescriptions(const DescriptionFile& first, const DescriptionFile&
   CountRoundings((a.is_imported ? 1 : 0) + (b.is_imported ? 1 : 0), has_link_frames,
                  &comparison->result.terms, held);
   AddOneSided(*comparison->model, completion.one_sided, &comparison->result.constants);
-  for (const ConstantFinding& finding : missing) comparison->result.constants.Add(finding);
   AppendTo(&comparison->without_effect, CompareWithoutEffect(a, b));
   AppendTo(&comparison->without_effect, CompareShapes(a, b));
   const RobotModel other(b.spec);
@@ -222,15 +222,13 @@ void CompareTwoDescriptions(const DescriptionFile& first, const DescriptionFile&
 
 /// Part of two robots. Of an MJCF, the terms are those of what MuJoCo compiled, by the analytic model.
 void ComparePart(const DescriptionFile& first, const DescriptionFile& second, const UrdfOptions& urdf,
-                 const ConsistencyOptions& options, const RobotPart& part,
-                 const std::vector<ConstantFinding>& missing, const Progress& progress,
-                 Comparison* comparison) {
+                 const ConsistencyOptions& options, const Progress& progress, Comparison* comparison) {
   comparison->with_engine = false;
   if (second.format() == RobotFormat::kMjcf)
     comparison->notes.push_back("part of a robot: the terms of " + second.path().filename().string() +
                                 " are those of what MuJoCo compiled, by the analytic model; what an MJCF has "
                                 "besides the mechanism is not compared");
-  CompareTwoDescriptions(first, second, urdf, options, part, missing, progress, comparison);
+  CompareTwoDescriptions(first, second, urdf, options, progress, comparison);
 }
 
 /// A description whose terms stand first: the analytic model's, or of an MJCF the engine's.
@@ -264,7 +262,72 @@ void NoteConvention(const Reference& reference, LayoutProvider* provider,
                               ": this is its convention, and its key \"base\" can say so");
 }
 
+/// The causes of what differs between two mechanisms.
+std::optional<FileCauses> TryToExplain(const DescriptionFile& a, const DescriptionFile& b,
+                                       const ConsistencyOptions& options, const Comparison& comparison) {
+  const auto is_mechanism = [](const std::optional<RobotDescription>& robot) {
+    return robot && !robot->spec.object &&
+           (robot->spec.base.type == BaseType::kFixed || robot->spec.base.type == BaseType::kFloating);
+  };
+  const bool has_bodies = a.format() == RobotFormat::kBodies || b.format() == RobotFormat::kBodies;
+  if (has_bodies || !options.part.empty() || !is_mechanism(comparison.read_first) ||
+      !is_mechanism(comparison.read_second))
+    return std::nullopt;
+  PrintedRobot first = ReadPrintedRobot(a);
+  PrintedRobot second = ReadPrintedRobot(b);
+  LeaveOutUnstated(options.ignore, &first);
+  LeaveOutUnstated(options.ignore, &second);
+  return FindCauses(first, second);
+}
+
+/// Adds to each cause what a constant of it does to the motion, or which setting of a compiler made it.
+void AddEffects(const ConstantChecks& constants, FileCauses* causes) {
+  for (size_t i = 0; i < causes->causes.size(); ++i) {
+    FileCause& cause = causes->causes[i];
+    const auto finding = std::ranges::find_if(constants.findings, [&](const ConstantFinding& one) {
+      const auto is_there = [&](const std::string& place) {
+        return (one.where + " ").starts_with(place + " ");
+      };
+      return !one.effect.empty() && IsExplained(one.check, causes->corrections.items[i]) &&
+             std::ranges::any_of(cause.places, is_there);
+    });
+    if (finding != constants.findings.end()) cause.text += "; " + finding->effect;
+  }
+}
+
+/// Whether causes are fewer than two robots would have, and at most half of the joints have no partner.
+bool IsOneRobot(const FileCauses& causes, const RobotDescription& robot) {
+  constexpr size_t kFew = 3;
+  size_t lonely = 0;
+  for (const CorrectionItem& item : causes.corrections.items)
+    lonely += static_cast<size_t>(std::ranges::count(item.sites, SiteKind::kPresence, &Site::kind));
+  const size_t joints = robot.spec.joints.size();
+  return !causes.agrees && 2 * lonely <= joints &&
+         causes.causes.size() + causes.unexplained.size() <= std::max(kFew, joints);
+}
+
 }  // namespace
+
+void Comparison::JudgeByTolerance(double tolerance) {
+  dexcheck::JudgeByTolerance(tolerance, &result);
+  if (!causes) return;
+  const auto fails = [&](const char* name) {
+    return std::ranges::any_of(result.terms,
+                               [&](const CheckRecord& check) { return check.name == name && check.failed; });
+  };
+  const bool moves_wrong = fails("joint_axis") || fails("frame_pose") || fails("J");
+  LeaveOutWithin(
+      tolerance,
+      [&](SiteKind kind) {
+        if (kind == SiteKind::kCom) return fails("link_com");
+        if (kind == SiteKind::kInertia) return fails("link_inertia");
+        const bool is_place = kind == SiteKind::kPosition || kind == SiteKind::kRotation ||
+                              kind == SiteKind::kAxis || kind == SiteKind::kAxisPoint;
+        return !is_place || moves_wrong;
+      },
+      &*causes);
+  if (result.Agrees()) causes.reset();
+}
 
 Comparison CompareFiles(const std::filesystem::path& a, const std::filesystem::path& b,
                         const UrdfOptions& urdf, const ConsistencyOptions& options,
@@ -277,6 +340,8 @@ Comparison CompareFiles(const std::filesystem::path& a, const std::filesystem::p
 Comparison CompareFiles(DescriptionFile* a, DescriptionFile* b, const UrdfOptions& urdf,
                         const ConsistencyOptions& options, const Progress& progress) {
   // Terms of an MJCF are the engine's; bodies of a table are those that a file was made from.
+  const DescriptionFile& user_first = *a;
+  const DescriptionFile& user_second = *b;
   const auto rank = [](const DescriptionFile& file) {
     return file.format() == RobotFormat::kBodies ? 2 : file.format() == RobotFormat::kMjcf ? 1 : 0;
   };
@@ -292,29 +357,24 @@ Comparison CompareFiles(DescriptionFile* a, DescriptionFile* b, const UrdfOption
   comparison.read_second = second.TryToDescribe();
   try {
     if (!options.part.empty()) {
-      ComparePart(first, second, urdf, options, options.part, {}, progress, &comparison);
+      ComparePart(first, second, urdf, options, progress, &comparison);
     } else if (comparison.with_engine) {
       CompareWithEngine(first, second, urdf, options, progress, &comparison);
     } else {
-      CompareTwoDescriptions(first, second, urdf, options, {}, {}, progress, &comparison);
+      CompareTwoDescriptions(first, second, urdf, options, progress, &comparison);
     }
   } catch (const InputError& error) {
-    // Names of joints that were exchanged make another mechanism of one robot.
     if (!comparison.read_first || !comparison.read_second || !options.part.empty()) throw;
-    const std::vector<Hypothesis> why = ExplainDifference(*comparison.read_first, *comparison.read_second);
-    if (!why.empty()) throw InputError(std::string(error.what()) + "; " + why[0].text);
-    const std::optional<RobotPart> common = FindCommonPart(*comparison.read_first, *comparison.read_second);
-    if (!common) throw;
-    comparison.notes.clear();
-    comparison.not_compared.clear();
-    comparison.without_effect.clear();
-    const std::vector<ConstantFinding> missing =
-        ListMissing(*common, *comparison.read_first, *comparison.read_second);
-    ComparePart(first, second, urdf, options, *common, missing, progress, &comparison);
+    // Names that were exchanged, a joint that one file lacks and a joint of another type make another
+    // mechanism of one robot.
+    comparison.causes = TryToExplain(user_first, user_second, options, comparison);
+    if (!comparison.causes || !IsOneRobot(*comparison.causes, *comparison.read_first)) throw;
+    comparison.model.emplace(comparison.read_first->spec);
+    comparison.not_compared.push_back(std::string("terms: ") + error.what());
+    return comparison;
   }
-  for (std::optional<RobotDescription>* read : {&comparison.read_first, &comparison.read_second}) {
-    if (*read) LeaveOutIgnored(options.ignore, &**read);
-  }
+  comparison.causes = TryToExplain(user_first, user_second, options, comparison);
+  if (comparison.causes) AddEffects(comparison.result.constants, &*comparison.causes);
   NoteTermsOfFrames(&comparison);
   return comparison;
 }

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "harness/checks/consistency.h"
-#include "harness/descriptions/hypotheses.h"
+#include "harness/checks/file_causes.h"
 #include "harness/descriptions/printed_digits.h"
 #include "harness/descriptions/program_provider.h"
 #include "harness/descriptions/term_results.h"
@@ -34,10 +34,8 @@ struct DigitExcess {
   std::string check;
   std::string where;
   NumberPair numbers;
-  double units = 0.0;    ///< Difference relative to the precision; infinite where both numbers are exact.
-  std::string effect{};  ///< What a constant does that one file leaves out.
-  std::string
-      placement{};        ///< How a joint's or frame's placement differs, in words (placement_difference.h).
+  double units = 0.0;     ///< Difference relative to the precision; infinite where both numbers are exact.
+  std::string effect{};   ///< What a constant does that one file leaves out.
   bool is_cause = false;  ///< A constant, or a term of geometry or bodies, from which the other terms follow.
   /// Relative precision of a number that agrees within it, where that is too coarse for a verdict; 0
   /// elsewhere.
@@ -63,11 +61,6 @@ struct DigitVerdict {
   std::vector<DigitExcess> excesses;    ///< Causes first, the worst first.
   double largest_within = 0.0;          ///< Relative to its scale, the worst that the digits explain.
   LoosestNumber loosest;
-
-  /// Whether a hypothesis is about what exceeds them: single numbers that differ do so within the digits as
-  /// well.
-  [[nodiscard]] bool Concerns(const std::vector<std::string>& ids,
-                              const std::vector<std::string>& parts) const;
 };
 
 /// Judges what does not agree to rounding: a number of a file is known to half a unit of its last digit
@@ -99,13 +92,20 @@ struct Comparison {
   ConsistencyResult result;
   /// Where the two do not agree to rounding and were judged by their digits, which `result` then is.
   std::optional<DigitVerdict> digits;
-  std::vector<Hypothesis> hypotheses;  ///< Faults that would explain what differs.
+  /// Causes of what differs; none where terms alone are compared, and of robots on wheels or with an object.
+  std::optional<FileCauses> causes;
   /// As they were read; none of an MJCF that can be no description (with several free bodies).
   std::optional<RobotDescription> read_first, read_second;
+
+  /// Whether neither terms and constants nor printed numbers differ.
+  [[nodiscard]] bool Agrees() const { return result.Agrees() && (!causes || causes->agrees); }
+  /// Judges terms, constants and causes by a relative tolerance where that is wider than their bounds.
+  void JudgeByTolerance(double tolerance);
 };
 
-/// Compares constants and terms of two parameter files, URDFs or MJCFs. Of two MJCFs the second is the
-/// engine's.
+/// Compares constants and terms of two parameter files, URDFs or MJCFs, and explains how they differ. Of two
+/// MJCFs the second is the engine's. Files whose joints differ in kind, number or name are compared as far as
+/// causes explain it, without terms.
 /// @throws InputError for files that cannot be read, and for robots of two mechanisms.
 Comparison CompareFiles(
     const std::filesystem::path& a, const std::filesystem::path& b, const UrdfOptions& urdf,
@@ -136,10 +136,6 @@ Comparison CompareResults(const std::filesystem::path& file, const ResultsSource
 Comparison CompareFunctions(const std::filesystem::path& file, const TermFunctions& functions,
                             const UrdfOptions& urdf, const ConsistencyOptions& options);
 
-/// Tries the faults that people make on what differs between two files, after any judgement by a tolerance,
-/// which is given again: what agrees to it is no fault.
-void ExplainComparison(Comparison* comparison, double tolerance = 0.0);
-
 /// Numbers that were rounded when they were printed agree to so many digits at least.
 inline constexpr int kDigitsOfRoundedInput = 4;
 
@@ -154,7 +150,10 @@ struct Differences {
 Differences ListExcesses(const DigitVerdict& verdict, const std::string& first, const std::string& second);
 Differences SortDifferences(const Comparison& comparison);
 
-/// All of them in one list.
+/// Constants that differ and that no cause is about: what an MJCF states beside the mechanism.
+std::vector<std::string> ListOtherDifferences(const Comparison& comparison);
+
+/// The causes, or where there are none all differences, a line each.
 std::vector<std::string> ListDifferences(const Comparison& comparison);
 
 }  // namespace dexcheck

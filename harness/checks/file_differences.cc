@@ -9,7 +9,6 @@
 #include "controller/common/text.h"
 #include "harness/base/worst.h"
 #include "harness/checks/file_comparison.h"
-#include "harness/descriptions/body_comparison.h"
 
 namespace dexcheck {
 
@@ -19,7 +18,6 @@ constexpr double kExact = 1e9;  // times the printed precision, which is roundin
 
 /// The values of a number that differs, and by how much.
 std::string DescribeValues(const DigitExcess& excess, const std::string& first, const std::string& second) {
-  if (!excess.placement.empty()) return excess.placement;
   const std::string text = DescribeNumbers(excess.numbers, first, second);
   if (!excess.effect.empty()) return text + "; " + excess.effect;
   if (excess.too_loose > 0.0)
@@ -62,45 +60,6 @@ Differences ListExcesses(const DigitVerdict& verdict, const std::string& first, 
   return differences;
 }
 
-namespace {
-
-/// No convention of axes, frames and Jacobians explains anything where these agree.
-void LeaveOutKinematics(Comparison* comparison) {
-  constexpr const char* kTerms[] = {"joint_axis", "frame_pose", "J"};
-  constexpr const char* kIds[] = {"origin.", "rotation.", "place.", "axis.", "zero.", "table."};
-  const bool agrees = std::ranges::all_of(kTerms, [&](const char* term) {
-    return std::ranges::any_of(comparison->result.terms, [&](const CheckRecord& record) {
-      return record.name == term && !record.failed;
-    });
-  });
-  if (!agrees) return;
-  const auto is_kinematic = [&](const std::string& id) {
-    return std::ranges::any_of(kIds, [&](const char* begin) { return id.starts_with(begin); });
-  };
-  std::vector<Hypothesis>& hypotheses = comparison->hypotheses;
-  std::erase_if(hypotheses,
-                [&](const Hypothesis& one) { return std::ranges::all_of(one.ids, is_kinematic); });
-  // Numbers that are wrong besides are listed beside a convention alone.
-  if (std::ranges::all_of(hypotheses,
-                          [](const Hypothesis& one) { return one.ids[0].starts_with("number."); }))
-    hypotheses.clear();
-}
-
-}  // namespace
-
-void ExplainComparison(Comparison* comparison, double tolerance) {
-  if (comparison->result.Agrees() || !comparison->read_first || !comparison->read_second) return;
-  if (comparison->digits) tolerance = Worst(tolerance, comparison->digits->largest_within);
-  comparison->hypotheses = ExplainDifference(*comparison->read_first, *comparison->read_second,
-                                             Worst(tolerance, kHypothesisTolerance));
-  LeaveOutKinematics(comparison);
-  if (comparison->digits) {
-    std::erase_if(comparison->hypotheses, [&](const Hypothesis& hypothesis) {
-      return !comparison->digits->Concerns(hypothesis.ids, hypothesis.parts);
-    });
-  }
-}
-
 std::string DescribeNumbers(const NumberPair& numbers, const std::string& first, const std::string& second) {
   const std::string unit = numbers.unit.empty() ? "" : " " + numbers.unit;
   return fmt::format("{}{}{:.12g}{} in {}, {:.12g}{} in {}", numbers.component,
@@ -114,38 +73,6 @@ NumberPair TakeNumbers(const ConstantFinding& finding, const RobotModel& model) 
   return {NameComponent(finding.check, finding.entry), UnitOf(finding.check, is_prismatic), finding.model,
           finding.engine};
 }
-
-namespace {
-
-/// The number of each link's body that differs most, in the link's frame; none where the files cannot be
-/// compared so.
-std::vector<ConstantFinding> FindBodyDifferences(const Comparison& comparison) {
-  if (!comparison.read_first || !comparison.read_second) return {};
-  std::array<RobotDescription, 2> sides = {*comparison.read_first, *comparison.read_second};
-  std::vector<ConstantFinding> worst;
-  try {
-    CompletePair({}, {}, &sides);
-    for (const ConstantFinding& finding :
-         CompareBodies(sides[0], sides[1], RegisterLinks(sides[0], sides[1])).findings) {
-      const auto size = [](const ConstantFinding& one) {
-        return std::abs(one.model - one.engine) / one.scale;
-      };
-      const auto known = std::ranges::find_if(worst, [&](const ConstantFinding& one) {
-        return one.check == finding.check && one.location == finding.location;
-      });
-      if (known == worst.end()) {
-        worst.push_back(finding);
-      } else if (size(finding) > size(*known)) {
-        *known = finding;
-      }
-    }
-  } catch (const InputError&) {
-    return {};
-  }
-  return worst;
-}
-
-}  // namespace
 
 Differences SortDifferences(const Comparison& comparison) {
   const RobotModel& model = *comparison.model;
@@ -173,17 +100,8 @@ Differences SortDifferences(const Comparison& comparison) {
     const double worst = check == checks.end() ? 1.0 : check->worst;
     add_number(std::min(std::abs(finding.model - finding.engine) / size, worst), finding);
   }
-  std::vector<ConstantFinding> bodies;
-  if (!comparison.result.Agrees()) bodies = FindBodyDifferences(comparison);
   for (const CheckRecord& record : comparison.result.terms) {
     if (!record.failed) continue;
-    bool is_listed = false;
-    for (const ConstantFinding& finding : bodies) {
-      if (finding.check != record.name) continue;
-      add_number(std::abs(finding.model - finding.engine) / finding.scale, finding);
-      is_listed = true;
-    }
-    if (is_listed) continue;
     add(record.worst,
         fmt::format("{}: nearest the base: {}; worst: {}: {:.12g} in {}, {:.12g} in {} (sample {})",
                     record.name, Describe(record.first_failure, model, base),
@@ -194,7 +112,37 @@ Differences SortDifferences(const Comparison& comparison) {
   return differences;
 }
 
+std::vector<std::string> ListOtherDifferences(const Comparison& comparison) {
+  std::vector<std::string> lines;
+  const auto is_explained = [&](const std::string& check) {
+    return comparison.causes && IsExplained(check, *comparison.causes);
+  };
+  const RobotModel& model = *comparison.model;
+  const std::string first = comparison.first.filename().string();
+  const std::string second = comparison.second.filename().string();
+  for (const ConstantFinding& finding : comparison.result.constants.findings) {
+    if (is_explained(finding.check)) continue;
+    lines.push_back(fmt::format("{}: {}: {}{}{}", finding.check, finding.where,
+                                DescribeNumbers(TakeNumbers(finding, model), first, second),
+                                finding.effect.empty() ? "" : "; ", finding.effect));
+  }
+  for (const CheckRecord& record : comparison.result.terms) {
+    constexpr const char* kOfNumbers[] = {"joint_axis", "frame_pose", "link_com", "link_inertia"};
+    const bool is_of_numbers = std::ranges::find(kOfNumbers, record.name) != std::end(kOfNumbers);
+    if (record.failed && is_of_numbers && !is_explained(record.name))
+      lines.push_back(record.name + ": " +
+                      Describe(record.first_failure, model, model.num_base_velocities()));
+  }
+  return lines;
+}
+
 std::vector<std::string> ListDifferences(const Comparison& comparison) {
+  if (comparison.causes && !comparison.causes->agrees) {
+    std::vector<std::string> lines = ListLines(*comparison.causes);
+    for (const std::string& line : ListOtherDifferences(comparison))
+      lines.push_back("not explained: " + line);
+    return lines;
+  }
   Differences differences = SortDifferences(comparison);
   std::vector<std::string> lines = std::move(differences.real);
   lines.insert(lines.end(), differences.rounded.begin(), differences.rounded.end());

@@ -36,11 +36,10 @@ class AgreesWithMatcher {
       : file_(std::move(file)), options_(std::move(options)) {}
 
   bool MatchAndExplain(const TermFunctions& functions, ::testing::MatchResultListener* listener) const {
-    return Judge(CompareFunctions(file_, functions, options_.urdf, MakeOptions()), /*explain=*/false,
-                 listener);
+    return Judge(CompareFunctions(file_, functions, options_.urdf, MakeOptions()), listener);
   }
   bool MatchAndExplain(const std::filesystem::path& other, ::testing::MatchResultListener* listener) const {
-    return Judge(CompareFiles(other, file_, options_.urdf, MakeOptions()), /*explain=*/true, listener);
+    return Judge(CompareFiles(other, file_, options_.urdf, MakeOptions()), listener);
   }
 
   void DescribeTo(std::ostream* os) const { *os << "agrees with " << file_; }
@@ -55,13 +54,10 @@ class AgreesWithMatcher {
     return options;
   }
 
-  bool Judge(Comparison comparison, bool explain, ::testing::MatchResultListener* listener) const {
-    const double tolerance = options_.digits > 0 ? std::pow(10.0, -options_.digits) : 0.0;
-    if (tolerance > 0.0) JudgeByTolerance(tolerance, &comparison.result);
+  bool Judge(Comparison comparison, ::testing::MatchResultListener* listener) const {
+    if (options_.digits > 0) comparison.JudgeByTolerance(std::pow(10.0, -options_.digits));
     for (const std::string& line : ListDifferences(comparison)) *listener << "\n  " << line;
-    if (explain) ExplainComparison(&comparison, tolerance);
-    for (const Hypothesis& likely : comparison.hypotheses) *listener << "\n  likely: " << likely.text;
-    return comparison.result.Agrees();
+    return comparison.Agrees();
   }
 
   std::filesystem::path file_;

@@ -42,17 +42,16 @@ int Run(ConsistencyRequest request) {
   ResultFile json(request.json_file);
   ResultFile junit(request.junit_file);
   ProgressBar bar("comparing", request.options.samples, request.quiet);
-  Comparison comparison = Compare(request, [&](long samples) { return bar.GoOn(samples); });
+  const Comparison comparison = Compare(request, [&](long samples) { return bar.GoOn(samples); });
   bar.Finish();
-  if (!request.has_results()) ExplainComparison(&comparison, request.judging.Find().value_or(0.0));
   const ConsistencyResult& result = comparison.result;
   ExitCode code = request.IsWhole(result) ? kSuccess : kFailure;
-  if (!result.Agrees()) code = kDisagreement;
+  if (!comparison.Agrees()) code = kDisagreement;
   json.Write([&] { return ToText(request, comparison, code); });
   junit.Write([&] { return WriteJUnit(request, comparison); });
   if (!json.TakesStdout()) {
-    if (!request.quiet) PrintTable(request, comparison);
     PrintVerdict(request, comparison);
+    if (!request.quiet) PrintTable(request, comparison);
   }
   if (code == kFailure)
     return ReportFailure(

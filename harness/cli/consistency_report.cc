@@ -21,7 +21,7 @@ using Json = nlohmann::ordered_json;
 
 /// How two descriptions agree, or that they do not.
 const char* NameOutcome(const ConsistencyRequest& request, const Comparison& comparison) {
-  if (!comparison.result.Agrees()) return "differ";
+  if (!comparison.Agrees()) return "differ";
   if (comparison.digits) return "digits";
   return request.judging.Find() ? "tolerance" : "rounding";
 }
@@ -90,7 +90,6 @@ Json ToJson(const DigitVerdict& verdict) {
                                {"units", excess.units},
                                {"model", excess.numbers.first},
                                {"engine", excess.numbers.second}});
-    if (!excess.placement.empty()) json["exceeds"].back()["placement"] = excess.placement;
     if (excess.too_loose > 0.0) json["exceeds"].back()["precision"] = excess.too_loose;
   }
   if (!verdict.loosest.what.empty())
@@ -104,17 +103,43 @@ std::string DescribeLoosest(const LoosestNumber& loosest) {
   return fmt::format("; loosest: {}, compared to {:.2g} %", loosest.what, 100.0 * loosest.fraction);
 }
 
-/// The command that explains why two files differ; none where no command knows more.
-std::string SuggestExplanation(const ConsistencyRequest& request, const Comparison& comparison) {
-  const bool is_repairable = comparison.with_engine && comparison.read_first &&
-                             comparison.read_first->format != RobotFormat::kMjcf && !request.has_results() &&
-                             request.options.part.empty();
-  if (!is_repairable) return "";
-  std::string command = "dexcheck diagnose " + QuoteForShell(comparison.first.string()) + " " +
-                        QuoteForShell(comparison.second.string());
-  if (const std::optional<double> tolerance = request.judging.Find())
-    command += " --tolerance " + FormatNumber(*tolerance);
-  return command;
+Json ToJson(const FileCause& cause) {
+  Json json = {{"text", cause.text},           {"id", cause.id},
+               {"places", cause.places},       {"changes", Json::array()},
+               {"explained", cause.explained}, {"alternatives", Json::array()}};
+  const auto show = [](const std::optional<double>& value) { return value ? Json(*value) : Json(); };
+  for (const FileChange& change : cause.changes) {
+    Json& entry = json["changes"].emplace_back(Json{{"place", change.place}, {"quantity", change.quantity}});
+    if (!change.unit.empty()) entry["unit"] = change.unit;
+    entry["value"] = show(change.value);
+    entry["repair"] = show(change.repair);
+  }
+  for (const FileCause& other : cause.alternatives) json["alternatives"].push_back(ToJson(other));
+  return json;
+}
+
+/// Prints the causes, a line each, and how all else agrees. @returns whether there are any.
+bool PrintCauses(const ConsistencyRequest& request, const Comparison& comparison) {
+  if (!comparison.causes || comparison.causes->agrees) return false;
+  const FileCauses& causes = *comparison.causes;
+  fmt::print("DISAGREE: {} differs from {}.\n", causes.file, causes.reference);
+  const std::vector<std::string> lines = ListDifferences(comparison);
+  constexpr size_t kMostShown = 30;
+  for (size_t i = 0; i < std::min(lines.size(), kMostShown); ++i) {
+    fmt::print("{}\n", Wrap("  " + lines[i], 5));
+  }
+  if (lines.size() > kMostShown) fmt::print("  and {} more (--json)\n", lines.size() - kMostShown);
+  if (!request.exact && causes.unexplained.empty() && ListOtherDifferences(comparison).empty()) {
+    const std::string digits = comparison.digits
+                                   ? "within the printed digits (" + DescribeDigits(*comparison.digits) + ")"
+                                   : "to " + request.DescribeTolerance();
+    fmt::print("{}\n", Wrap("  everything else agrees " + digits, 5));
+  }
+  const bool is_first = causes.file == request.files.robot.filename().string();
+  fmt::print("  repair: dexcheck diagnose {} {} --write FILE\n",
+             QuoteForShell((is_first ? request.files.robot : request.files.mjcf).string()),
+             QuoteForShell((is_first ? request.files.mjcf : request.files.robot).string()));
+  return true;
 }
 
 }  // namespace
@@ -145,7 +170,7 @@ Comparison JudgeAsAsked(const ConsistencyRequest& request, const CompareBy& comp
   options.within_digits = !request.exact && !tolerance;
   options.precision = 0.01 * request.precision;
   Comparison comparison = compare(options);
-  if (tolerance) JudgeByTolerance(*tolerance, &comparison.result);
+  if (tolerance) comparison.JudgeByTolerance(*tolerance);
   return comparison;
 }
 
@@ -180,25 +205,17 @@ Json DescribeRecord(const CheckRecord& record, const RobotModel& model) {
   return json;
 }
 
-Json ListHypotheses(const std::vector<Hypothesis>& hypotheses) {
-  Json list = Json::array();
-  for (const Hypothesis& hypothesis : hypotheses) {
-    list.push_back({{"text", hypothesis.text},
-                    {"explained", hypothesis.explained},
-                    {"values", hypothesis.values},
-                    {"ids", hypothesis.ids},
-                    {"parts", hypothesis.parts}});
+void AddCauses(const Comparison& comparison, Json* json) {
+  (*json)["causes"] = Json::array();
+  (*json)["unexplained"] = Json::array();
+  if (comparison.Agrees()) return;
+  const bool has_causes = comparison.causes && !comparison.causes->agrees;
+  if (has_causes) {
+    for (const FileCause& cause : comparison.causes->causes) (*json)["causes"].push_back(ToJson(cause));
+    (*json)["unexplained"] = comparison.causes->unexplained;
   }
-  return list;
-}
-
-void PrintHypotheses(const std::vector<Hypothesis>& hypotheses) {
-  if (hypotheses.empty()) return;
-  fmt::print("LIKELY:\n");
-  for (const Hypothesis& hypothesis : hypotheses) {
-    fmt::print("  {}; explains {:.0f} %\n", hypothesis.text, 100.0 * hypothesis.explained);
-    for (const std::string& value : hypothesis.values) fmt::print("    {}\n", value);
-  }
+  for (const std::string& line : has_causes ? ListOtherDifferences(comparison) : ListDifferences(comparison))
+    (*json)["unexplained"].push_back(line);
 }
 
 void PrintTable(const ConsistencyRequest& request, const Comparison& comparison) {
@@ -242,7 +259,7 @@ void PrintTable(const ConsistencyRequest& request, const Comparison& comparison)
                             0));
 }
 
-void PrintVerdict(const ConsistencyRequest& request, const Comparison& comparison, bool suggest) {
+void PrintVerdict(const ConsistencyRequest& request, const Comparison& comparison) {
   const ConsistencyResult& result = comparison.result;
   if (!request.IsWhole(result)) {
     fmt::print("INTERRUPTED after {} of {} samples. So far:\n", result.samples, request.options.samples);
@@ -255,6 +272,7 @@ void PrintVerdict(const ConsistencyRequest& request, const Comparison& compariso
   };
   const std::string left_out = count(comparison.not_compared, "not compared") +
                                count(comparison.without_effect, "differ, do not act on these terms");
+  if (PrintCauses(request, comparison)) return;
   if (result.Agrees()) {
     if (comparison.digits) {
       fmt::print(
@@ -290,15 +308,12 @@ void PrintVerdict(const ConsistencyRequest& request, const Comparison& compariso
       fmt::print("  and {} more (--json)\n", differences.real.size() - shown);
     if (!differences.following.empty()) fmt::print("  {}\n", differences.following);
   }
-  PrintHypotheses(comparison.hypotheses);
   const size_t shown = std::min(differences.rounded.size(), kMostShown);
   if (shown > 0 && !differences.real.empty())
     fmt::print("To {} digits agree {} more:\n", differences.digits, differences.rounded.size());
   for (size_t i = 0; i < shown; ++i) fmt::print("  {}\n", differences.rounded[i]);
   if (shown < differences.rounded.size())
     fmt::print("  and {} more (--json)\n", differences.rounded.size() - shown);
-  const std::string command = suggest ? SuggestExplanation(request, comparison) : "";
-  if (!command.empty()) fmt::print("why: {}\n", command);
 }
 
 std::string ToText(const ConsistencyRequest& request, const Comparison& comparison, ExitCode code) {
@@ -336,7 +351,7 @@ std::string ToText(const ConsistencyRequest& request, const Comparison& comparis
   json["engine_notes"] = Json::array();
   for (const ConstantNote& note : result.constants.notes)
     json["engine_notes"].push_back({{"kind", note.kind}, {"text", note.text}});
-  json["hypotheses"] = ListHypotheses(comparison.hypotheses);
+  AddCauses(comparison, &json);
   return json.dump(2) + "\n";
 }
 
@@ -355,10 +370,9 @@ std::string WriteJUnit(const ConsistencyRequest& request, const Comparison& comp
         std::ranges::any_of(cases, [&](const JUnitCase& test) { return test.name == finding.check; });
     if (!has_case) cases.push_back({"constant", finding.check, finding.where, ""});
   }
-  std::string likely;
-  for (const Hypothesis& hypothesis : comparison.hypotheses) likely += "\nlikely: " + hypothesis.text;
-  for (JUnitCase& test : cases) {
-    if (!test.failure.empty()) test.failure += likely;
+  if (comparison.causes) {
+    for (const FileCause& cause : comparison.causes->causes)
+      cases.push_back({"cause", cause.id, cause.text, ""});
   }
   return WriteJUnit("dexcheck.consistency." + comparison.first.stem().string(), cases, result.seconds,
                     request.IsWhole(result) ? "" : "interrupted");

@@ -22,9 +22,9 @@ struct ConsistencyRequest : ComparisonRequest {
 
   /// What stands for B provides terms, and is no description.
   [[nodiscard]] bool has_results() const { return !source.program.empty() || !source.results.empty(); }
-  /// Whether all states were compared; results in files have their own.
+  /// Whether all states were compared; results in files have their own, and files of other joints none.
   [[nodiscard]] bool IsWhole(const ConsistencyResult& result) const {
-    return result.samples >= options.samples || !source.results.empty();
+    return result.samples >= options.samples || result.terms.empty() || !source.results.empty();
   }
 };
 
@@ -43,19 +43,15 @@ nlohmann::ordered_json DescribeRecord(const CheckRecord& record, const RobotMode
 
 /// Large results first fail, then where to look: what a person reads.
 void PrintTable(const ConsistencyRequest& request, const Comparison& comparison);
-/// Prints whether the two agree, and if not, in what and why.
-/// @param suggest whether the command that knows more is printed.
-void PrintVerdict(const ConsistencyRequest& request, const Comparison& comparison, bool suggest = true);
+/// Prints whether the two agree, and if not, why.
+void PrintVerdict(const ConsistencyRequest& request, const Comparison& comparison);
 /// The same as JSON.
 std::string ToText(const ConsistencyRequest& request, const Comparison& comparison, ExitCode code);
 
 /// The same as a JUnit document.
 std::string WriteJUnit(const ConsistencyRequest& request, const Comparison& comparison);
 
-/// Their lines, fractions and values.
-nlohmann::ordered_json ListHypotheses(const std::vector<Hypothesis>& hypotheses);
-
-/// "  LINE; explains 100 %", and what each values line says below it.
-void PrintHypotheses(const std::vector<Hypothesis>& hypotheses);
+/// Adds "causes" and "unexplained", which is all that differs where terms alone are compared.
+void AddCauses(const Comparison& comparison, nlohmann::ordered_json* json);
 
 }  // namespace dexcheck::cli

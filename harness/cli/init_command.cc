@@ -119,10 +119,9 @@ std::string WriteRunnable(const InitRequest& request, const RobotDescription& ro
   ConsistencyOptions options;
   options.samples = 100;
   options.within_digits = true;
-  const ConsistencyResult compared =
-      CompareFiles(folder / "robot.toml", folder / "robot.xml", {}, options).result;
+  const Comparison compared = CompareFiles(folder / "robot.toml", folder / "robot.xml", {}, options);
   std::optional<double> tolerance;
-  if (compared.Agrees()) tolerance = CalcTolerance(compared);
+  if (compared.Agrees()) tolerance = CalcTolerance(compared.result);
   *differ = !tolerance;
   constexpr int kHalvings = 4;
   std::string why;

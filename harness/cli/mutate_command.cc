@@ -6,8 +6,6 @@
 #include <vector>
 
 #include "controller/common/errors.h"
-#include "controller/model/parameter_reader.h"
-#include "harness/base/files.h"
 #include "harness/base/interrupts.h"
 #include "harness/cli/campaign_table.h"
 #include "harness/cli/commands.h"
@@ -75,11 +73,13 @@ int Run(MutateRequest request) {
     return MutateRun(request.run);
   }
   request.options.diagnose = !request.no_diagnosis;
-  const RobotModel model = ParseRobotModel(ReadBytes(request.files.robot), std::string(request.files.robot));
+  const DescriptionFile robot(request.files.robot);
+  if (robot.format() != RobotFormat::kToml)
+    throw InputError(request.files.robot.string() + ": must be a parameter file to be changed on purpose");
+  const MutatedPair pair(robot, DescriptionFile(request.files.mjcf));
+  const RobotModel& model = pair.model;
   RequireNoBalls(model, "when each number is changed on purpose");
-  const MjModelPtr engine = LoadMjcf(request.files.mjcf);
-  const std::string source = request.files.mjcf.string();
-  const Adapter adapter(model, *engine, source);
+  const Adapter adapter(model, *pair.engine, pair.source);
   CatchInterrupts();
   std::optional<OutputFile> json;
   if (!request.json_file.empty()) json.emplace(request.json_file);
@@ -87,7 +87,7 @@ int Run(MutateRequest request) {
   unchanged.samples = request.options.samples;
   unchanged.seed = request.options.seed;
   if (!CheckConsistency(adapter, unchanged, [](long) { return true; }).Agrees()) {
-    throw InputError(request.files.robot.string() + ": must agree with " + source +
+    throw InputError(request.files.robot.string() + ": must agree with " + pair.source +
                      " before it is changed on purpose (see dexcheck diagnose), got a disagreement");
   }
 
@@ -95,7 +95,7 @@ int Run(MutateRequest request) {
   std::vector<FormulaMutant> formulas = ListFormulaMutants(model);
   Campaign campaign{.faults = {},
                     .total = mutants.size() + formulas.size(),
-                    .names_causes = request.options.diagnose,
+                    .names_causes = request.options.diagnose && pair.reference.has_value(),
                     .head = {{"robot", request.files.robot.string()},
                              {"mjcf", request.files.mjcf.string()},
                              {"mujoco", mj_versionString()},
@@ -111,8 +111,8 @@ int Run(MutateRequest request) {
       return Describe(formulas[i]);
     }
     Mutant& mutant = mutants[i - formulas.size()];
-    TryMutant(model, *engine, source, request.options, &mutant);
-    return Describe(mutant, request.options.diagnose);
+    TryMutant(pair, request.options, &mutant);
+    return Describe(mutant, campaign.names_causes);
   });
   bar.Finish();
   if (json) json->Write(campaign.ToText());

@@ -97,7 +97,7 @@ std::string JudgeFiles(ScenarioFiles* files) {
   options.samples = 20;
   options.within_digits = true;
   const Comparison comparison = CompareFiles(files->robot, files->mjcf, {}, options);
-  if (!comparison.result.Agrees()) return ListDifferences(comparison).front();
+  if (!comparison.Agrees()) return ListDifferences(comparison).front();
   scenario.tolerance = CalcTolerance(comparison.result);
   if (scenario.tolerance > 0.0)
     Warn(fmt::format("{} and {} agree within the printed digits: the model is judged to {:.0e}",

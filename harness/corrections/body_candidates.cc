@@ -1,120 +1,325 @@
 #include <fmt/format.h>
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 
 #include "controller/model/rigid_body.h"
-#include "harness/corrections/body_part.h"
-#include "harness/corrections/origin_fixes.h"
+#include "harness/corrections/candidate_search.h"
 
 namespace dexcheck {
 namespace {
 
-/// A body without some of its parts, as far as it is one.
-std::optional<BodyNumbers> Subtract(const BodyNumbers& whole, const BodyNumbers& rest) {
-  constexpr double kLeastMass = 1e-9;
-  BodyNumbers part;
-  part.mass = whole.mass - rest.mass;
-  if (part.mass <= kLeastMass) return std::nullopt;
-  part.com = (whole.mass * whole.com - rest.mass * rest.com) / part.mass;
-  part.inertia = whole.inertia - rest.inertia - CalcPointInertia(rest.mass, rest.com - whole.com) -
-                 CalcPointInertia(part.mass, part.com - whole.com);
-  return part;
+using Kind = CorrectionKind;
+
+FileFault MakeWhole(Kind kind, bool in_second = false) {
+  FileFault fault{kind, SiteKind::kMass};
+  fault.whole = true;
+  fault.in_second = in_second;
+  return fault;
 }
 
-BodyNumbers Express(const BodyNumbers& body, const Pose& X) {
-  return {body.mass, X * body.com, X.linear() * body.inertia * X.linear().transpose()};
+/// Angles of roll, pitch or yaw of an inertial frame under which its inertia is right, by Gauss-Newton from
+/// the best of a grid.
+std::vector<double> SolveOneAngle(const PrintedOrigin& origin, int angle, const Matrix3d& I,
+                                  const Matrix3d& right, const Matrix3d& open) {
+  constexpr int kGrid = 24;
+  constexpr int kSteps = 8;
+  constexpr double kStep = 1e-6;
+  const auto measure = [&](double value) -> Vector6d {
+    Vector3d angles = origin.r.head<3>();
+    angles[angle] = value;
+    const Matrix3d R = TurnRollPitchYaw(angles);
+    return ToEntries(R * I * R.transpose() - right);
+  };
+  std::array<std::pair<double, double>, kGrid> starts;
+  for (int k = 0; k < kGrid; ++k) {
+    const double value = origin.r[angle] + 2.0 * kPi * k / kGrid;
+    starts[static_cast<size_t>(k)] = {measure(value).lpNorm<1>(), value};
+  }
+  std::ranges::sort(starts);
+  std::vector<double> solved;
+  for (size_t k = 0; k < 3 && solved.empty(); ++k) {
+    double value = starts[k].second;
+    for (int step = 0; step < kSteps; ++step) {
+      const Vector6d slope = (measure(value + kStep) - measure(value - kStep)) / (2.0 * kStep);
+      if (slope.squaredNorm() == 0.0) break;
+      value -= slope.dot(measure(value)) / slope.squaredNorm();
+    }
+    if ((measure(value).cwiseAbs().array() <= ToEntries(open).array() + 1e-9 * right.trace()).all())
+      solved.push_back(std::remainder(value, 2.0 * kPi));
+  }
+  return solved;
 }
 
 }  // namespace
 
-void CandidateSearch::SearchBody(int link) {
+struct CandidateSearch::Part {
+  int node;  ///< The link that carries the body,
+  int link;  ///< and that whose inertial it is.
+  bool is_fused;
+  double extra;  ///< Bits of which of several.
+  PrintedInertial given;
+  BodyNumbers right;  ///< What it would have to be alone, in its link's frame.
+  BodyNumbers open;   ///< What digits of both files leave open of that.
+  SiteMask wrong = 0;
+  EditFrames frames;
+
+  [[nodiscard]] bool IsWrong(SiteKind kind) const { return (wrong & MaskOf(kind)) != 0; }
+  /// A trial that must put right all of the body, if it is one of several parts.
+  [[nodiscard]] EditTrial Make(const FileFault& fault, double bits, std::string values = "") const {
+    SiteMask kinds = MaskOf(fault.of);
+    if (fault.whole) kinds = fault.kind == Kind::kCompiled ? kBodyMask : kBodyMask & ~MaskOf(SiteKind::kMass);
+    return {fault, extra + bits, is_fused ? kBodyMask : kinds, std::move(values)};
+  }
+  /// Whether an edit may put right what is wrong of it.
+  [[nodiscard]] bool Concerns(const FileFault& fault) const {
+    if (fault.kind == Kind::kCompiled) return wrong != 0;
+    if (!fault.whole) return IsWrong(fault.of);
+    return IsWrong(SiteKind::kCom) && IsWrong(SiteKind::kInertia);
+  }
+};
+
+std::optional<CandidateSearch::Part> CandidateSearch::MakePart(int link, int k) const {
   const Node& node = pair_.node(link);
   const RightNode& right = pair_.right(link);
-  const int j = pair_.Partner(link);
-  FileFault fault{CorrectionKind::kMissing, SiteKind::kMass};
-  fault.whole = true;
-  std::vector<Site> sites;
-  for (const SiteKind kind : {SiteKind::kMass, SiteKind::kCom, SiteKind::kInertia}) {
-    if (IsWrong(link, kind)) sites.push_back({kind, link});
+  Part part;
+  part.node = link;
+  part.link = k;
+  part.is_fused = node.parts.size() > 1 || k != link;
+  part.extra = part.is_fused ? std::log2(static_cast<double>(node.parts.size())) + 1.0 : 0.0;
+  part.given = *pair_.a().link(k).inertial;
+  part.open = pair_.given(link).body_tolerance;
+  AddChange(BodyNumbers{}, right.body_tolerance, &part.open);
+  part.right = right.body;
+  if (part.is_fused) {
+    Node rest = node;
+    std::erase(rest.parts, k);
+    const std::optional<BodyNumbers> alone = Subtract(right.body, CalcNodeBody(pair_.a(), rest));
+    if (!alone) return std::nullopt;
+    part.right = Express(*alone, CalcPartPose(pair_.a(), node, k).inverse());
+    part.open.com *= right.body.mass / alone->mass;
+    part.open.com.setConstant(part.open.com.maxCoeff());
+    part.open.inertia.setConstant(part.open.inertia.maxCoeff());
   }
-  if (node.parts.empty() || (pair_.given(link).body.mass == 0.0 && right.body.mass > 0.0)) {
+  const Matrix3d R = part.given.origin.CalcRotation();
+  const Matrix3d I = R * ToTensor(part.given.I) * R.transpose();
+  const auto add = [&](bool is_wrong, SiteKind kind) { part.wrong |= is_wrong ? MaskOf(kind) : 0; };
+  add(std::abs(part.given.mass.value - part.right.mass) > part.open.mass, SiteKind::kMass);
+  add(((part.given.origin.t - part.right.com).cwiseAbs().array() > part.open.com.array()).any(),
+      SiteKind::kCom);
+  add(((I - part.right.inertia).cwiseAbs().array() > part.open.inertia.array()).any(), SiteKind::kInertia);
+  if (k == link && pair_.Carrier(link) >= 0) {
+    part.frames.X_PL.push_back(pair_.given(link).X);
+    if (right.is_placed && !right.X.isApprox(part.frames.X_PL[0], 1e-6)) part.frames.X_PL.push_back(right.X);
+  } else if (k != link) {
+    part.frames.X_PL.push_back(pair_.a().link(k).origin.CalcPose());
+  }
+  for (const int child : pair_.links()) {
+    if (pair_.node(child).parent == link) part.frames.X_LC.push_back(pair_.given(child).X);
+  }
+  if (part.IsWrong(SiteKind::kMass) || part.IsWrong(SiteKind::kCom))
+    part.frames.right = {part.right.mass, part.right.com};
+  return part;
+}
+
+void CandidateSearch::SearchBody(int link) {
+  const size_t begin = found_.size();
+  const Node& node = pair_.node(link);
+  const RightNode& right = pair_.right(link);
+  const auto offer = [&](const FileFault& fault, std::string values, const LinkUndo& undo) {
     LinkPatch patch{link, pair_.a().link(link)};
-    PrintedInertial& made = patch.right.inertial.emplace();
-    made.mass.value = right.body.mass;
-    made.origin.t = right.body.com;
-    made.I = ToEntries(right.body.inertia);
-    Add(fault, link, sites, 3.0, {std::move(patch)},
-        fmt::format("mass {:.6g} would be right", right.body.mass));
+    undo(&patch.right);
+    Add({fault, 3.0, kBodyMask, std::move(values)}, link, ListBodySites(link), {std::move(patch)});
+  };
+  if (node.parts.empty() || (pair_.given(link).body.mass == 0.0 && right.body.mass > 0.0)) {
+    offer(MakeWhole(Kind::kMissing), fmt::format("mass {:.6g} would be right", right.body.mass),
+          [&](PrintedLink* made) {
+            PrintedInertial& inertial = made->inertial.emplace();
+            inertial.mass.value = right.body.mass;
+            inertial.origin.t = right.body.com;
+            inertial.I = ToEntries(right.body.inertia);
+          });
     if (node.parts.empty()) return;
   }
-  if (pair_.node_b(j).parts.empty()) {
-    LinkPatch patch{link, pair_.a().link(link)};
-    patch.right.inertial.reset();
-    fault.in_second = true;
-    Add(fault, link, sites, 3.0, {std::move(patch)}, "");
+  if (pair_.node_b(pair_.Partner(link)).parts.empty()) {
+    offer(MakeWhole(Kind::kMissing, true), "", [](PrintedLink* made) { made->inertial.reset(); });
     return;
   }
   SearchLostParts(link);
   SearchLoad(link);
   for (const int k : node.parts) {
-    Part part;
-    part.node = link;
-    part.link = k;
-    part.is_fused = node.parts.size() > 1 || k != link;
-    part.extra = part.is_fused ? std::log2(static_cast<double>(node.parts.size())) + 1.0 : 0.0;
-    part.given = *pair_.a().link(k).inertial;
-    part.open = pair_.given(link).body_tolerance;
-    AddChange(BodyNumbers{}, right.body_tolerance, &part.open);
-    part.right = right.body;
-    if (part.is_fused) {
-      Node rest = node;
-      std::erase(rest.parts, k);
-      const std::optional<BodyNumbers> alone = Subtract(right.body, CalcNodeBody(pair_.a(), rest));
-      if (!alone) continue;
-      part.right = Express(*alone, CalcPartPose(pair_.a(), node, k).inverse());
-      part.open.com *= right.body.mass / alone->mass;
-      part.open.com.setConstant(part.open.com.maxCoeff());
-      part.open.inertia.setConstant(part.open.inertia.maxCoeff());
-    }
-    const Matrix3d R = part.CalcAxes();
-    const Matrix3d I = R * ToTensor(part.given.I) * R.transpose();
-    part.mass_wrong = std::abs(part.given.mass.value - part.right.mass) > part.open.mass;
-    part.com_wrong =
-        ((part.given.origin.t - part.right.com).cwiseAbs().array() > part.open.com.array()).any();
-    part.inertia_wrong = ((I - part.right.inertia).cwiseAbs().array() > part.open.inertia.array()).any();
-    if (k == link && node.parent >= 0) {
-      part.origins.push_back(pair_.given(link).X);
-      if (right.is_placed && !right.X.isApprox(part.origins[0], 1e-6)) part.origins.push_back(right.X);
-    } else if (k != link) {
-      part.origins.push_back(pair_.a().link(k).origin.CalcPose());
-    }
-    if (part.mass_wrong) SearchMass(part);
-    if (part.com_wrong) SearchCom(part);
-    if (part.inertia_wrong) SearchInertia(part);
-    if (part.com_wrong + part.inertia_wrong > 0) SearchWhole(part);
-    if (part.is_fused && k == link) {
-      EditTrial number{{CorrectionKind::kNumber, SiteKind::kMass}, 90.0, kBodyMask};
-      number.fault.whole = true;
-      number.values = fmt::format(
-          "mass {:.6g}, {:.6g} would be right; centre of mass ({:.6g} {:.6g} {:.6g}), ({:.6g} {:.6g} {:.6g}) "
-          "would be right",
-          part.given.mass.value, part.right.mass, part.given.origin.t.x(), part.given.origin.t.y(),
-          part.given.origin.t.z(), part.right.com.x(), part.right.com.y(), part.right.com.z());
-      Try(number, k, [&](const PrintedLink&, PrintedLink* after) {
-        after->inertial->mass.value = part.right.mass;
-        after->inertial->origin.t = part.right.com;
-        after->inertial->I = ToEntries(R.transpose() * part.right.inertia * R);
+    if (const std::optional<Part> part = MakePart(link, k)) SearchPart(*part);
+  }
+  if (node.parts.size() > 1) {
+    SearchAllParts(link);
+    SearchTwoParts(link, begin);
+  }
+}
+
+void CandidateSearch::SearchPart(const Part& part) {
+  const PrintedLink& link = pair_.a().link(part.link);
+  for (const LinkEdit& edit : ListInertialEdits(link, part.frames)) {
+    if (!part.Concerns(edit.fault)) continue;
+    EditTrial trial = part.Make(edit.fault, edit.bits);
+    if (edit.fault.kind == Kind::kCompiled) trial.values = link.compiled->description;
+    if (edit.fault.kind == Kind::kLinkAxes) trial.fault = MakeLostAxes(part.given, true);
+    Try(trial, part.link, edit.undo);
+  }
+  const Vector3d& given = part.given.origin.t;
+  const BodyNumbers right = part.right;
+  if (part.IsWrong(SiteKind::kMass)) {
+    EditTrial number =
+        part.Make({Kind::kNumber, SiteKind::kMass}, CountBits(right.mass, part.open.mass),
+                  fmt::format("{:.6g}, {:.6g} would be right", part.given.mass.value, right.mass));
+    const auto take = [m = PrintedScalar{right.mass, part.open.mass}](PrintedLink* made) {
+      made->inertial->mass = m;
+    };
+    Try(number, part.link, take);
+    if (part.IsWrong(SiteKind::kInertia) && part.given.mass.value > 0.0) {  // a solid of another density
+      constexpr double kOfBoth = 8.0;  // two units, of mass and inertia, are as likely
+      number.bits += kOfBoth;
+      number.kinds |= MaskOf(SiteKind::kInertia);
+      number.values += ", with the inertia in proportion";
+      Try(number, part.link, [take, f = right.mass / part.given.mass.value](PrintedLink* made) {
+        take(made);
+        made->inertial->I *= f;
       });
     }
   }
-  if (node.parts.size() > 1) SearchAllParts(link);
+  if (part.IsWrong(SiteKind::kCom)) {
+    const double bits = CountEntries(3, given.data(), right.com.data(), part.open.com.data());
+    const std::string values =
+        DescribeEntries(kAxisNames, given.data(), right.com.data(), part.open.com.data());
+    const auto take = [c = right.com, open = part.open.com](PrintedLink* made) {
+      made->inertial->origin.t = c;
+      made->inertial->origin.half_t = open;
+    };
+    Try(part.Make({Kind::kNumber, SiteKind::kCom}, bits, values), part.link, take);
+    if (given.isZero()) Try(part.Make({Kind::kMissing, SiteKind::kCom}, 3.0, values), part.link, take);
+  }
+  if (part.IsWrong(SiteKind::kInertia)) SearchInertiaNumbers(part);
+  if (!part.is_fused || part.link != part.node) return;
+  constexpr double kTenNumbers = 90.0;
+  EditTrial number = part.Make(
+      MakeWhole(Kind::kNumber), kTenNumbers - part.extra,
+      fmt::format("mass {:.6g}, {:.6g} would be right; centre of mass ({:.6g} {:.6g} {:.6g}), ({:.6g} {:.6g} "
+                  "{:.6g}) would be right",
+                  part.given.mass.value, right.mass, given.x(), given.y(), given.z(), right.com.x(),
+                  right.com.y(), right.com.z()));
+  Try(number, part.link, [right](PrintedLink* made) {
+    const Matrix3d R = made->inertial->origin.CalcRotation();
+    made->inertial->mass.value = right.mass;
+    made->inertial->origin.t = right.com;
+    made->inertial->I = ToEntries(R.transpose() * right.inertia * R);
+  });
+}
+
+void CandidateSearch::SearchInertiaNumbers(const Part& part) {
+  const Matrix3d R = part.given.origin.CalcRotation();
+  const Matrix3d I = ToTensor(part.given.I);
+  const Matrix3d right = R.transpose() * part.right.inertia * R;
+  const Vector6d given6 = part.given.I;
+  const Vector6d right6 = ToEntries(right);
+  const Vector6d open =
+      ToEntries(R.isIdentity(1e-9) ? part.open.inertia
+                                   : Matrix3d(R.transpose().cwiseAbs() * part.open.inertia * R.cwiseAbs()));
+  const std::string values = DescribeEntries(kInertiaNames, given6.data(), right6.data(), open.data());
+  const auto offer = [&](Kind kind, double bits, const std::string& shown, int component = 0) {
+    Try(part.Make({kind, SiteKind::kInertia, component}, bits, shown), part.link,
+        [right6, open](PrintedLink* made) {
+          made->inertial->I = right6;
+          made->inertial->half_I = open;
+        });
+  };
+  offer(Kind::kNumber, CountEntries(6, given6.data(), right6.data(), open.data()), values);
+  const auto solve = [](const Matrix3d& tensor) -> Vector3d {
+    return Eigen::SelfAdjointEigenSolver<Matrix3d>(tensor).eigenvalues();
+  };
+  const bool same_moments = ((solve(I) - solve(right)).cwiseAbs().array() <= open.maxCoeff()).all();
+  if (given6.tail<3>().isZero()) {
+    if (((given6 - right6).head<3>().cwiseAbs().array() <= open.head<3>().array()).all())
+      offer(Kind::kNoProducts, 3.0, values);
+    if (same_moments) offer(Kind::kNoAxes, 5.0, "");
+  } else if (same_moments && R.isIdentity(1e-12)) {
+    // The same six numbers, of which one file turns the frame: it was lost, or made up.
+    const PrintedLink& other = pair_.b().link(pair_.Partner(part.node));
+    const bool same_numbers =
+        other.inertial && (other.inertial->I - given6).cwiseAbs().maxCoeff() <= open.maxCoeff();
+    offer(Kind::kNoAxes, same_numbers ? 0.0 : 13.0, "", 1);
+  }
+  if (part.given.origin.form != RotationForm::kRollPitchYaw) return;
+  for (int k = 0; k < 3; ++k) {
+    for (const double angle : SolveOneAngle(part.given.origin, k, I, part.right.inertia, part.open.inertia)) {
+      constexpr double kHalf = 1e-4;
+      Try(part.Make({Kind::kFrame, SiteKind::kInertia, k},
+                    1.0 + CountBits(std::abs(angle) > kHalf ? angle : 0.0, kHalf),
+                    fmt::format("{} of the inertial frame {:.6g}, {:.6g} would be right", kAngleNames[k],
+                                part.given.origin.r[k], angle)),
+          part.link, [k, angle](PrintedLink* made) { made->inertial->origin.r[k] = angle; });
+    }
+  }
+}
+
+/// One convention of all parts of a body.
+void CandidateSearch::SearchAllParts(int link) {
+  const Node& node = pair_.node(link);
+  std::vector<std::vector<LinkEdit>> lists;
+  for (const int part : node.parts) {
+    lists.push_back(ListInertialEdits(pair_.a().link(part), {true}));
+  }
+  for (const LinkEdit& first : lists[0]) {
+    std::vector<PlacedEdit> edits;
+    for (size_t k = 0; k < lists.size(); ++k) {
+      const auto found = std::ranges::find_if(
+          lists[k], [&](const LinkEdit& edit) { return IsSameFault(edit.fault, first.fault); });
+      if (found != lists[k].end()) edits.push_back({node.parts[k], found->undo});
+    }
+    if (edits.size() > 1) Try({first.fault, first.bits, kBodyMask}, link, edits);
+  }
+}
+
+/// A convention of one part, and a convention or a number of another part or of the same, where nothing
+/// simpler explains the body. @param begin the first candidate of this body.
+void CandidateSearch::SearchTwoParts(int link, size_t begin) {
+  constexpr size_t kMostParts = 6;
+  constexpr double kSimple = 30.0;
+  const Node& node = pair_.node(link);
+  const size_t wrong = ListBodySites(link).size();
+  for (size_t k = begin; k < found_.size(); ++k) {
+    if (found_[k].sites.size() == wrong && found_[k].bits < kSimple) return;
+  }
+  if (node.parts.size() > kMostParts) return;
+  PrintedRobot& robot = *pair_.mutable_a();
+  for (const int first : node.parts) {
+    const PrintedLink before = robot.link(first);
+    for (const LinkEdit& edit : ListInertialEdits(before, {true})) {
+      robot.link(first) = Carry(before, edit.undo);
+      for (const int second : node.parts) {
+        const std::optional<Part> part = MakePart(link, second);
+        // With one kind of number wrong it is explained by fewer than ten.
+        if (!part || part->wrong == 0 || (part->wrong & (part->wrong - 1)) != 0) continue;
+        size_t k = found_.size();
+        SearchPart(*part);
+        const auto is_same = [&](const CorrectionCandidate& c) {
+          return first == second && (c.fault.of == edit.fault.of || c.fault.whole || edit.fault.whole);
+        };
+        found_.erase(std::remove_if(found_.begin() + static_cast<std::ptrdiff_t>(k), found_.end(), is_same),
+                     found_.end());
+        for (; k < found_.size(); ++k) {
+          found_[k].beside = {edit.fault, first, edit.bits + part->extra};
+          if (first != second) found_[k].patches.push_back({first, robot.link(first)});
+        }
+      }
+      robot.link(first) = before;
+    }
+  }
 }
 
 /// A body that is missing here, as a load is.
 void CandidateSearch::SearchLoad(int link) {
-  constexpr double kBits =
-      60.0;  // of ten numbers; a mass and a centre that are wrong by themselves make no such body
+  // The ten numbers: a mass and a centre that are wrong by themselves make no such body.
+  constexpr double kBits = 60.0;
   const BodyNumbers& given = pair_.given(link).body;
   const std::optional<BodyNumbers> load = Subtract(pair_.right(link).body, given);
   const BodyNumbers& open = pair_.given(link).body_tolerance;
@@ -122,39 +327,23 @@ void CandidateSearch::SearchLoad(int link) {
   if (!FindPhysicalInconsistency({load->mass, load->com, 0.5 * (load->inertia + load->inertia.transpose())})
            .empty())
     return;
-  FileFault fault{CorrectionKind::kPartMissing, SiteKind::kMass};
-  fault.whole = true;
   const Vector3d& c = load->com;
-  AddBody(fault, link, kBits,
-          fmt::format("of {:.6g} kg at ({:.6g} {:.6g} {:.6g})", load->mass, c[0], c[1], c[2]));
+  Add({MakeWhole(Kind::kPartMissing), kBits, kBodyMask,
+       fmt::format("of {:.6g} kg at ({:.6g} {:.6g} {:.6g})", load->mass, c[0], c[1], c[2])},
+      link, ListBodySites(link));
 }
 
-void CandidateSearch::AddBody(const FileFault& fault, int link, double bits, std::string values) {
-  std::vector<Site> sites;
-  for (const SiteKind kind : {SiteKind::kMass, SiteKind::kCom, SiteKind::kInertia}) {
-    if (IsWrong(link, kind)) sites.push_back({kind, link});
-  }
-  Add(fault, link, std::move(sites), bits, {}, std::move(values));
-}
-
-/// Parts that only the second file has, without which it is what this file has.
+/// Parts that one file alone has, without which it is what the other file has.
 void CandidateSearch::SearchLostParts(int link) {
   const Node& theirs = pair_.node_b(pair_.Partner(link));
-  const GivenNode& given = pair_.given(link);
   const Node& ours = pair_.node(link);
-  const auto add = [&](int part, bool is_second, bool matches) {
-    if (!matches) return;
-    FileFault fault{CorrectionKind::kPartMissing, SiteKind::kMass};
-    fault.whole = true;
-    fault.in_second = is_second;
-    AddBody(fault, link, 3.0, is_second ? pair_.a().link(part).name : pair_.b().link(part).name);
-  };
-  const auto is_right = [&](const BodyNumbers& body) {
+  const GivenNode& given = pair_.given(link);
+  const auto add = [&](const PrintedRobot& robot, int part, bool is_second, const BodyNumbers& body) {
     for (const SiteKind kind : {SiteKind::kMass, SiteKind::kCom, SiteKind::kInertia}) {
-      if (!(pair_.CompareNode(kind, link, given.X, given.pose, body, given.body_tolerance) <= 1.0))
-        return false;
+      if (!(pair_.CompareNode(kind, link, given.X, given.pose, body, given.body_tolerance) <= 1.0)) return;
     }
-    return true;
+    Add({MakeWhole(Kind::kPartMissing, is_second), 3.0, kBodyMask, robot.link(part).name}, link,
+        ListBodySites(link));
   };
   for (const int part : theirs.parts) {
     if (part == theirs.link || theirs.parts.size() < 2) continue;
@@ -163,161 +352,16 @@ void CandidateSearch::SearchLostParts(int link) {
     // What the second file has without the part, against this file.
     const BodyNumbers body = Express(CalcNodeBody(pair_.b(), rest), pair_.X_ab(link));
     const BodyNumbers& right = pair_.right(link).body;
-    const BodyNumbers moved{right.mass + given.body.mass - body.mass, right.com + given.body.com - body.com,
-                            right.inertia + given.body.inertia - body.inertia};
-    add(part, false, is_right(moved));
+    add(pair_.b(), part, false,
+        {right.mass + given.body.mass - body.mass, right.com + given.body.com - body.com,
+         right.inertia + given.body.inertia - body.inertia});
   }
   for (const int part : ours.parts) {
     if (part == ours.link || ours.parts.size() < 2) continue;
     Node rest = ours;
     std::erase(rest.parts, part);
-    add(part, true, is_right(CalcNodeBody(pair_.a(), rest)));
+    add(pair_.a(), part, true, CalcNodeBody(pair_.a(), rest));
   }
-}
-
-void CandidateSearch::SearchMass(const Part& part) {
-  const SiteMask mask = part.Mask(MaskOf(SiteKind::kMass));
-  const std::span<const UnitFault> units = ListUnits(SiteKind::kMass);
-  for (size_t k = 0; k < units.size(); ++k) {
-    Try({{CorrectionKind::kUnit, SiteKind::kMass, static_cast<int>(k)}, part.extra, mask}, part.link,
-        [&](const PrintedLink& before, PrintedLink* after) {
-          after->inertial->mass.value = before.inertial->mass.value * units[k].factor;
-        });
-  }
-  Try({{CorrectionKind::kNumber, SiteKind::kMass},
-       part.extra + CountBits(part.right.mass, part.open.mass),
-       mask,
-       Demand::kAll,
-       fmt::format("{:.6g}, {:.6g} would be right", part.given.mass.value, part.right.mass)},
-      part.link,
-      [&](const PrintedLink&, PrintedLink* after) { after->inertial->mass.value = part.right.mass; });
-}
-
-void CandidateSearch::SearchCom(const Part& part) {
-  const SiteMask mask = part.Mask(MaskOf(SiteKind::kCom));
-  const Vector3d& given = part.given.origin.t;
-  const Vector3d& right = part.right.com;
-  const auto trial = [&](CorrectionKind kind, int component, double bits) {
-    return EditTrial{{kind, SiteKind::kCom, component}, part.extra + bits, mask};
-  };
-  for (const OriginFix& fix : ListVectorFixes(SiteKind::kCom, given)) {
-    Try(trial(fix.kind, fix.component, fix.bits), part.link,
-        [&](const PrintedLink& before, PrintedLink* after) {
-          after->inertial->origin.t = FixVector(fix, SiteKind::kCom, before.inertial->origin.t);
-        });
-  }
-  const Vector3d open = part.open.com;
-  EditTrial number =
-      trial(CorrectionKind::kNumber, 0, CountEntries(3, given.data(), right.data(), open.data()));
-  number.values = DescribeEntries(kAxisNames, given.data(), right.data(), open.data());
-  const auto take = [&](const PrintedLink&, PrintedLink* after) { after->inertial->origin.t = right; };
-  Try(number, part.link, take);
-  if (given.isZero()) {
-    EditTrial missing = number;
-    missing.fault.kind = CorrectionKind::kMissing;
-    missing.bits = part.extra + 3.0;
-    Try(missing, part.link, take);
-  }
-  const auto move = [&](CorrectionKind kind, double bits, const Pose& X) {
-    Try(trial(kind, 0, bits), part.link, [&](const PrintedLink& before, PrintedLink* after) {
-      after->inertial->origin.t = X * before.inertial->origin.t;
-    });
-  };
-  for (const Pose& X : part.origins) {
-    Pose turn = Pose::Identity();
-    turn.linear() = X.linear();
-    Pose shift = Pose::Identity();
-    shift.translation() = X.translation();
-    move(CorrectionKind::kInParent, 1.0, X.inverse());
-    if (!turn.linear().isIdentity(1e-9)) {
-      move(CorrectionKind::kAlongParent, 1.0, turn.inverse());
-      move(CorrectionKind::kToParent, 1.0, X);
-      move(CorrectionKind::kAlongToParent, 1.0, turn);
-    }
-    move(CorrectionKind::kPlaceAdded, 1.0, shift.inverse());
-    move(CorrectionKind::kPlaceTaken, 1.0, shift);
-  }
-  for (const int child : pair_.links()) {
-    if (pair_.node(child).parent == part.node) move(CorrectionKind::kInChild, 2.0, pair_.given(child).X);
-  }
-  Pose axes = Pose::Identity();
-  axes.linear() = part.CalcAxes();
-  if (axes.linear().isIdentity(1e-9)) return;
-  move(CorrectionKind::kInertialAxes, 2.0, axes);
-  move(CorrectionKind::kToInertialAxes, 2.0, axes.inverse());
-}
-
-/// What puts the centre of mass and the inertia right at once.
-void CandidateSearch::SearchWhole(const Part& part) {
-  const SiteMask mask = part.Mask(MaskOf(SiteKind::kCom) | MaskOf(SiteKind::kInertia));
-  const auto trial = [&](CorrectionKind kind, int component, double bits) {
-    EditTrial made{{kind, SiteKind::kCom, component}, part.extra + bits, mask};
-    made.fault.whole = true;
-    return made;
-  };
-  const auto move = [&](const EditTrial& made, const Matrix3d& M, const Vector3d& t) {
-    Try(made, part.link, [&](const PrintedLink& before, PrintedLink* after) {
-      PrintedInertial& inertial = *after->inertial;
-      const Matrix3d R = before.inertial->origin.CalcRotation();
-      const Matrix3d I = M * R * ToTensor(before.inertial->I) * R.transpose() * M.transpose();
-      inertial.origin.t = M * before.inertial->origin.t + t;
-      inertial.I = ToEntries(R.transpose() * I * R);
-    });
-  };
-  for (int k = 0; k < 3; ++k)
-    move(trial(CorrectionKind::kMirror, k, part.inertia_wrong ? 0.0 : 2.0), MakeMirror(k), Vector3d::Zero());
-  if (!part.inertia_wrong || !part.com_wrong) return;
-  for (const Pose& X : part.origins) {
-    const Pose inverse = X.inverse();
-    move(trial(CorrectionKind::kInParent, 0, 1.0), inverse.linear(), inverse.translation());
-    move(trial(CorrectionKind::kAlongParent, 0, 1.0), inverse.linear(), Vector3d::Zero());
-  }
-}
-
-/// One convention of all parts of a body.
-void CandidateSearch::SearchAllParts(int link) {
-  const Node& node = pair_.node(link);
-  const auto offer = [&](const FileFault& fault, const auto& edit) {
-    std::vector<LinkPatch> patches;
-    for (const int part : node.parts) {
-      patches.push_back({part, pair_.a().link(part)});
-      edit(&*patches.back().right.inertial);
-    }
-    TryPatches({fault, 0.0, kBodyMask}, link, std::move(patches));
-  };
-  for (int k = 0; k < 3; ++k)
-    offer({CorrectionKind::kSignOf, SiteKind::kCom, k},
-          [&](PrintedInertial* body) { body->origin.t[k] *= -1.0; });
-  offer({CorrectionKind::kSign, SiteKind::kCom}, [](PrintedInertial* body) { body->origin.t *= -1.0; });
-  const auto scale = [&](SiteKind kind, const auto& change) {
-    const std::span<const UnitFault> units = ListUnits(kind);
-    for (size_t k = 0; k < units.size(); ++k) {
-      const double f = units[k].factor;
-      offer({CorrectionKind::kUnit, kind, static_cast<int>(k)},
-            [&](PrintedInertial* body) { change(f, body); });
-    }
-  };
-  scale(SiteKind::kCom, [](double f, PrintedInertial* body) {
-    body->origin.t *= f;
-    body->origin.half_t *= std::abs(f);
-  });
-  scale(SiteKind::kMass, [](double f, PrintedInertial* body) {
-    body->mass.value *= f;
-    body->mass.half *= std::abs(f);
-  });
-  scale(SiteKind::kInertia, [](double f, PrintedInertial* body) {
-    body->I *= f;
-    body->half_I *= std::abs(f);
-  });
-  offer({CorrectionKind::kProductSigns, SiteKind::kInertia},
-        [](PrintedInertial* body) { body->I.tail<3>() *= -1.0; });
-  const auto shift = [](double sign, PrintedInertial* body) {
-    const Matrix3d R = body->origin.CalcRotation();
-    body->I += sign * ToEntries(R.transpose() * CalcPointInertia(body->mass.value, body->origin.t) * R);
-  };
-  offer({CorrectionKind::kAboutOrigin, SiteKind::kInertia},
-        [&](PrintedInertial* body) { shift(-1.0, body); });
-  offer({CorrectionKind::kMovedTwice, SiteKind::kInertia}, [&](PrintedInertial* body) { shift(1.0, body); });
 }
 
 }  // namespace dexcheck

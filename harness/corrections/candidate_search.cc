@@ -6,6 +6,8 @@
 #include <cmath>
 #include <utility>
 
+#include "controller/model/rigid_body.h"
+
 namespace dexcheck {
 namespace {
 
@@ -17,8 +19,14 @@ constexpr double kFar = 100.0;
 
 }  // namespace
 
-CandidateSearch::CandidateSearch(PrintedPair* pair, std::vector<Site> sites, bool is_second)
-    : pair_(*pair), sites_(std::move(sites)), is_second_(is_second) {
+/// A node that edits change.
+struct CandidateSearch::TriedNode {
+  int link;
+  bool is_placed = false, has_body = false;
+};
+
+CandidateSearch::CandidateSearch(PrintedPair* pair, std::vector<Site> sites, bool is_second, int* budget)
+    : pair_(*pair), sites_(std::move(sites)), is_second_(is_second), budget_(budget) {
   const PrintedRobot& a = pair_.a();
   wrong_.assign(a.links.size(), 0);
   poses_.resize(a.links.size());
@@ -35,187 +43,141 @@ CandidateSearch::CandidateSearch(PrintedPair* pair, std::vector<Site> sites, boo
   }
 }
 
-std::optional<double> CandidateSearch::CountLeft(double after, double before) {
+std::optional<double> CountLeft(double after, double before) {
   constexpr double kCorrected = 1e-4;  // of the change, which a correction may leave over
   if (after <= 1.0) return 0.0;
   if (after <= kCorrected * before) return std::log2(after);
   return std::nullopt;
 }
 
-bool CandidateSearch::Try(const EditTrial& trial, int link, const LinkEdit& edit) {
-  PrintedRobot& robot = *pair_.mutable_a();
-  PrintedLink before = robot.link(link);
-  PrintedLink after = before;
-  edit(before, &after);
-  robot.link(link) = after;
-  std::vector<Site> right;
-  double left = 0.0;
-  bool holds = true;
-  const auto visit = [&](int at) {
-    const Node& node = pair_.node(at);
-    const GivenNode& given = pair_.given(at);
-    const bool places =
-        std::ranges::find(poses_[static_cast<size_t>(link)], at) != poses_[static_cast<size_t>(link)].end();
-    const Pose X = places ? CalcNodePose(robot, node) : given.X;
-    const BodyNumbers body = CalcNodeBody(robot, node);
-    std::optional<GivenNode> open;  // with the digits of the edited link
-    for (const SiteKind kind : kNodeKinds) {
-      const bool is_wrong = IsWrong(at, kind);
-      if (!holds || (trial.kinds & MaskOf(kind)) == 0) continue;
-      if (!IsOfBody(kind) && !places) continue;
-      if (IsOfBody(kind) && (node.parts.empty() || bodies_[static_cast<size_t>(link)] != at)) continue;
-      double ratio = pair_.CompareNode(kind, at, X, given.pose, body, given.body_tolerance);
-      const double was = pair_.CompareNode(kind, at, given.X, given.pose, given.body, given.body_tolerance);
-      if (ratio > 1.0 && (ratio < kFar || ratio < 0.05 * was)) {
-        if (!open) {
-          open.emplace();
-          const auto measure = [&] {
-            return std::pair(CalcNodePose(robot, node), CalcNodeBody(robot, node));
-          };
-          const auto nominal = measure();
-          const auto add = [&] {
-            const auto moved = measure();
-            AddChange(nominal.first, moved.first, &open->pose);
-            AddChange(nominal.second, moved.second, &open->body_tolerance);
-          };
-          const auto move = [&](double* number, double half) {
-            *number += half;
-            add();
-            *number -= half;
-          };
-          const auto move_before = [&](double* number, double half) {
-            *number += half;
-            PrintedLink edited = before;
-            edit(before, &edited);
-            robot.link(link) = std::move(edited);
-            add();
-            robot.link(link) = after;
-            *number -= half;
-          };
-          const auto visit_link = [&](int k, bool inertial) {
-            PrintedLink& changed = k == link ? before : robot.link(k);
-            const auto visit_part = [&](auto* part) {
-              k == link ? VisitNumbers(part, move_before) : VisitNumbers(part, move);
-            };
-            inertial ? visit_part(&*changed.inertial) : visit_part(&changed.origin);
-          };
-          for (const int k : node.chain) visit_link(k, false);
-          for (const int part : node.parts) {
-            visit_link(part, true);
-            for (int k = part; k != node.link; k = robot.link(k).parent) visit_link(k, false);
-          }
-          open->pose.angle = std::max(open->pose.angle, 1e-8);
-          open->pose.length.array() += 1e-9;
-          open->body_tolerance.mass += 1e-9 * std::abs(body.mass);
-          open->body_tolerance.com.array() += 1e-9;
-          open->body_tolerance.inertia.array() += 1e-9 * std::abs(body.inertia.trace()) + 1e-15;
-        }
-        ratio = pair_.CompareNode(kind, at, X, open->pose, body, open->body_tolerance);
-      }
-      const std::optional<double> rest = CountLeft(ratio, was);
-      if (is_wrong && rest) {
-        right.push_back({kind, at});
-        left += 2.0 * *rest;
-      } else if (is_wrong ? trial.demand == Demand::kAll : !(ratio <= 1.0)) {
-        holds = false;
-      }
-    }
+std::vector<CandidateSearch::TriedNode> CandidateSearch::ListTried(
+    const std::vector<PlacedEdit>& edits) const {
+  std::vector<TriedNode> nodes;
+  const auto take = [&](int link) -> TriedNode& {
+    const auto found = std::ranges::find(nodes, link, &TriedNode::link);
+    return found == nodes.end() ? nodes.emplace_back(TriedNode{link}) : *found;
   };
-  for (const int at : poses_[static_cast<size_t>(link)]) visit(at);
-  const int body = bodies_[static_cast<size_t>(link)];
-  if (body >= 0 &&
-      std::ranges::find(poses_[static_cast<size_t>(link)], body) == poses_[static_cast<size_t>(link)].end())
-    visit(body);
-  robot.link(link) = std::move(before);
-  if (!holds || right.empty()) return false;
-  Add(trial.fault, link, std::move(right), trial.bits + left, {{link, std::move(after)}}, trial.values);
-  return true;
+  for (const PlacedEdit& edit : edits) {
+    for (const int at : PosesOf(edit.link)) take(at).is_placed = pair_.IsPlaced(at);
+    const int body = BodyOf(edit.link);
+    if (body >= 0) take(body).has_body = !pair_.node(body).parts.empty();
+  }
+  return nodes;
 }
 
-bool CandidateSearch::TryPatches(const EditTrial& trial, int link, std::vector<LinkPatch> patches) {
+bool CandidateSearch::Try(const EditTrial& trial, int place, const std::vector<PlacedEdit>& edits) {
+  if (*budget_ <= 0) return false;
+  --*budget_;
   PrintedRobot& robot = *pair_.mutable_a();
   std::vector<LinkPatch> before;
-  std::vector<int> nodes;
-  for (LinkPatch& patch : patches) {
-    before.push_back({patch.link, robot.link(patch.link)});
-    robot.link(patch.link) = patch.right;
-    const auto take = [&](int at) {
-      if (at >= 0 && std::ranges::find(nodes, at) == nodes.end()) nodes.push_back(at);
-    };
-    for (const int at : poses_[static_cast<size_t>(patch.link)]) take(at);
-    take(bodies_[static_cast<size_t>(patch.link)]);
+  for (const PlacedEdit& edit : edits) {
+    before.push_back({edit.link, robot.link(edit.link)});
+    edit.undo(&robot.link(edit.link));
   }
-  const auto places = [&](int at) {
-    return std::ranges::any_of(patches, [&](const LinkPatch& patch) {
-      const std::vector<int>& placed = poses_[static_cast<size_t>(patch.link)];
-      return std::ranges::find(placed, at) != placed.end();
-    });
-  };
-  const auto bears = [&](int at) {
-    return std::ranges::any_of(
-        patches, [&](const LinkPatch& patch) { return bodies_[static_cast<size_t>(patch.link)] == at; });
-  };
+  const std::vector<TriedNode> nodes = ListTried(edits);
   std::vector<Site> right;
-  bool holds = true;
-  for (const int at : nodes) {
-    const Node& node = pair_.node(at);
-    const GivenNode& given = pair_.given(at);
-    const Pose X = CalcNodePose(robot, node);
-    const BodyNumbers body = CalcNodeBody(robot, node);
-    PoseTolerance pose = given.pose;
-    BodyNumbers open = given.body_tolerance;
-    bool is_measured = false;
-    const bool is_placed = pair_.IsPlaced(at) && places(at);
-    const bool has_body = !node.parts.empty() && bears(at);
-    for (const SiteKind kind : kNodeKinds) {
-      if (!holds || (trial.kinds & MaskOf(kind)) == 0 || !(IsOfBody(kind) ? has_body : is_placed)) continue;
-      const double was = pair_.CompareNode(kind, at, given.X, given.pose, given.body, given.body_tolerance);
-      double ratio = pair_.CompareNode(kind, at, X, pose, body, open);
-      if (ratio > 1.0 && !is_measured && (ratio < kFar || ratio < 0.05 * was)) {
-        is_measured = true;
-        pose = CalcPoseTolerance(node, &robot);
-        open = CalcBodyTolerance(node, &robot);
-        ratio = pair_.CompareNode(kind, at, X, pose, body, open);
-      }
-      if (IsWrong(at, kind) && CountLeft(ratio, was)) {
-        right.push_back({kind, at});
-      } else if (!(ratio <= 1.0) && (!IsWrong(at, kind) || trial.demand == Demand::kAll)) {
-        holds = false;
+  double left = 0.0, rest = 1.0;
+  // What is far from right by the digits of the file as it is, is not looked at closer.
+  const auto judge = [&](bool is_close) {
+    for (const TriedNode& tried : nodes) {
+      const Node& node = pair_.node(tried.link);
+      const GivenNode& given = pair_.given(tried.link);
+      const GivenNode now = {
+          CalcNodePose(robot, node),
+          is_close && tried.is_placed ? CalcPoseTolerance(node, &robot) : given.pose,
+          CalcNodeBody(robot, node),
+          is_close && tried.has_body ? CalcBodyTolerance(node, &robot) : given.body_tolerance};
+      for (const SiteKind kind : kNodeKinds) {
+        if ((trial.kinds & MaskOf(kind)) == 0 || !(IsOfBody(kind) ? tried.has_body : tried.is_placed))
+          continue;
+        const bool is_wrong = IsWrong(tried.link, kind);
+        const double was = pair_.CompareNode(kind, tried.link);
+        const double ratio =
+            pair_.CompareNode(kind, tried.link, now.X, now.pose, now.body, now.body_tolerance);
+        const bool holds = is_close ? (is_wrong ? CountLeft(ratio, was).has_value() : ratio <= 1.0)
+                                    : ratio < kFar || ratio < 0.05 * was;
+        if (!holds && (!is_wrong || trial.needs_all)) return false;
+        if (!is_close || !is_wrong || !holds) continue;
+        right.push_back({kind, tried.link});
+        left += 2.0 * *CountLeft(ratio, was);
+        rest = std::max(rest, ratio);
       }
     }
+    return true;
+  };
+  bool holds = judge(false);
+  if (holds) {
+    for (size_t k = 0; k < edits.size(); ++k)
+      robot.link(edits[k].link) = Carry(before[k].right, edits[k].undo);
+    holds = judge(true) && !right.empty();
   }
-  for (LinkPatch& patch : before) robot.link(patch.link) = std::move(patch.right);
-  if (!holds || right.empty()) return false;
-  Add(trial.fault, link, std::move(right), trial.bits, std::move(patches), trial.values);
+  std::vector<LinkPatch> patches;
+  for (LinkPatch& patch : before) {
+    if (holds) patches.push_back({patch.link, robot.link(patch.link)});
+    robot.link(patch.link) = std::move(patch.right);
+  }
+  if (!holds) return false;
+  Add(trial, place, std::move(right), std::move(patches));
+  found_.back().bits += left;
+  found_.back().rest = rest;
   return true;
 }
 
-void CandidateSearch::Add(const FileFault& fault, int link, std::vector<Site> sites, double bits,
-                          std::vector<LinkPatch> patches, std::string values) {
-  found_.push_back({fault, link, std::move(sites), bits, std::move(patches), std::move(values)});
+void CandidateSearch::Add(const EditTrial& trial, int link, std::vector<Site> sites,
+                          std::vector<LinkPatch> patches) {
+  found_.push_back({trial.fault, link, std::move(sites), trial.bits, std::move(patches), trial.values});
 }
 
-void CandidateSearch::AddSimple(CorrectionKind kind, Site site, double bits, std::string values,
-                                const LinkEdit& edit) {
-  FileFault fault;
-  fault.kind = kind;
-  fault.of = site.kind;
-  LinkPatch patch{site.link, pair_.a().link(site.link)};
-  edit(pair_.a().link(site.link), &patch.right);
-  Add(fault, site.link, {site}, bits, {std::move(patch)}, std::move(values));
+void CandidateSearch::AddSimple(const EditTrial& trial, int link, const LinkUndo& undo) {
+  LinkPatch patch{link, pair_.a().link(link)};
+  undo(&patch.right);
+  Add(trial, link, {{trial.fault.of, link}}, {std::move(patch)});
+}
+
+std::vector<Site> CandidateSearch::ListBodySites(int link) const {
+  std::vector<Site> sites;
+  for (const SiteKind kind : {SiteKind::kMass, SiteKind::kCom, SiteKind::kInertia}) {
+    if (IsWrong(link, kind)) sites.push_back({kind, link});
+  }
+  return sites;
 }
 
 std::vector<CorrectionCandidate> CandidateSearch::Run() {
   for (const int link : pair_.links()) {
-    const SiteMask wrong = wrong_[static_cast<size_t>(link)];
+    const SiteMask wrong = WrongOf(link);
     if ((wrong & kPoseMask) != 0) SearchPlace(link);
     if ((wrong & ~(kPoseMask | kBodyMask)) != 0) SearchJoint(link);
     if ((wrong & kBodyMask) != 0) SearchBody(link);
   }
-  SearchNames();
+  SearchRobot();
   SearchExchanges();
-  SearchWelds();
+  for (const int link : pair_.links()) {
+    SearchAllOrigins(link);
+    SearchSecond(link);
+  }
+  for (int link = 0; link < pair_.a().size(); ++link) SearchWeld(link);
   return std::move(found_);
+}
+
+FileFault MakeLostAxes(const PrintedInertial& inertial, bool in_second) {
+  FileFault fault{CorrectionKind::kNoAxes, SiteKind::kInertia, inertial.I.tail<3>().isZero() ? 0 : 1};
+  fault.in_second = in_second;
+  return fault;
+}
+
+std::optional<BodyNumbers> Subtract(const BodyNumbers& whole, const BodyNumbers& rest) {
+  constexpr double kLeastMass = 1e-9;
+  BodyNumbers part;
+  part.mass = whole.mass - rest.mass;
+  if (part.mass <= kLeastMass) return std::nullopt;
+  part.com = (whole.mass * whole.com - rest.mass * rest.com) / part.mass;
+  part.inertia = whole.inertia - rest.inertia - CalcPointInertia(rest.mass, rest.com - whole.com) -
+                 CalcPointInertia(part.mass, part.com - whole.com);
+  return part;
+}
+
+BodyNumbers Express(const BodyNumbers& body, const Pose& X) {
+  return {body.mass, X * body.com, X.linear() * body.inertia * X.linear().transpose()};
 }
 
 namespace {

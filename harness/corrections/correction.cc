@@ -9,138 +9,212 @@
 namespace dexcheck {
 namespace {
 
-constexpr UnitFault kLengths[] = {{1e-3, "in mm"},
-                                  {1e-2, "in cm"},
-                                  {0.0254, "in inches"},
-                                  {1e3, "a thousandth (converted from mm twice)"},
-                                  {1e2, "a hundredth (converted from cm twice)"}};
+using Kind = CorrectionKind;
+
+constexpr double kPound = 0.45359237;
+constexpr UnitFault kLengths[] = {{1e-3, "mm", "in mm"},
+                                  {1e-2, "cm", "in cm"},
+                                  {0.0254, "inch", "in inches"},
+                                  {1e3, "per_1000", "a thousandth (converted from mm twice)"},
+                                  {1e2, "per_100", "a hundredth (converted from cm twice)"}};
 constexpr UnitFault kMasses[] = {
-    {1e-3, "in g"},   {0.45359237, "in pounds"},    {1e3, "a thousandth"}, {2.0, "halved"},
-    {0.5, "doubled"}, {0.1, "ten times too large"}, {10.0, "a tenth"},     {-1.0, "with the other sign"}};
-constexpr UnitFault kInertias[] = {
-    {1e-9, "in g mm^2"},          {1e-7, "in g cm^2"},     {1e-6, "in kg mm^2"},
-    {1e-4, "in kg cm^2"},         {1e-3, "in g m^2"},      {0.45359237 * 0.0254 * 0.0254, "in lb in^2"},
-    {1e9, "divided by 1e9"},      {1e6, "divided by 1e6"}, {1e4, "divided by 1e4"},
-    {1e3, "divided by 1000"},     {2.0, "halved"},         {0.5, "doubled"},
-    {0.1, "ten times too large"}, {10.0, "a tenth"}};
-constexpr UnitFault kRanges[] = {
-    {kPi / 180.0, "in degrees"}, {180.0 / kPi, "converted to radians twice"}, {1e-3, "in mm"}};
-constexpr UnitFault kDampings[] = {{180.0 / kPi, "per degree"},  {kPi / 180.0, "times pi/180"},
-                                   {1e-3, "times 1000"},         {1e3, "a thousandth"},
-                                   {0.1, "ten times too large"}, {10.0, "a tenth"}};
-constexpr UnitFault kArmatures[] = {
-    {1e-6, "in kg mm^2"}, {1e-7, "in g cm^2"}, {1e-4, "in kg cm^2"}, {1e-3, "times 1000"}};
-constexpr UnitFault kGears[] = {{-1.0, "with the other sign"}};
+    {1e-3, "g", "in g"},        {kPound, "lb", "in pounds"},          {1e3, "per_1000", "a thousandth"},
+    {2.0, "halved", "halved"},  {0.5, "doubled", "doubled"},          {0.1, "tenfold", "ten times too large"},
+    {10.0, "tenth", "a tenth"}, {-1.0, "sign", "with the other sign"}};
+constexpr UnitFault kInertias[] = {{1e-9, "g_mm2", "in g mm^2"},
+                                   {1e-7, "g_cm2", "in g cm^2"},
+                                   {1e-6, "kg_mm2", "in kg mm^2"},
+                                   {1e-4, "kg_cm2", "in kg cm^2"},
+                                   {1e-3, "g_m2", "in g m^2"},
+                                   {kPound * 0.0254 * 0.0254, "lb_in2", "in lb in^2"},
+                                   {kPound, "lb_m2", "in lb m^2"},
+                                   {1e9, "per_1e9", "divided by 1e9"},
+                                   {1e6, "per_1e6", "divided by 1e6"},
+                                   {1e4, "per_1e4", "divided by 1e4"},
+                                   {1e3, "per_1000", "divided by 1000"},
+                                   {2.0, "halved", "halved"},
+                                   {0.5, "doubled", "doubled"},
+                                   {0.1, "tenfold", "ten times too large"},
+                                   {10.0, "tenth", "a tenth"}};
+constexpr UnitFault kRanges[] = {{kPi / 180.0, "degrees", "in degrees"},
+                                 {180.0 / kPi, "radians", "converted to radians twice"},
+                                 {1e-3, "mm", "in mm"}};
+constexpr UnitFault kForces[] = {
+    {180.0 / kPi, "per_degree", "per degree"}, {kPi / 180.0, "per_radian", "times pi/180"},
+    {1e-3, "per_1e-3", "times 1000"},          {1e3, "per_1000", "a thousandth"},
+    {0.1, "tenfold", "ten times too large"},   {10.0, "tenth", "a tenth"}};
+constexpr UnitFault kArmatures[] = {{1e-6, "kg_mm2", "in kg mm^2"},
+                                    {1e-7, "g_cm2", "in g cm^2"},
+                                    {1e-4, "kg_cm2", "in kg cm^2"},
+                                    {1e-3, "g_m2", "times 1000"}};
+constexpr UnitFault kSignOnly[] = {{-1.0, "sign", "with the other sign"}};
+constexpr UnitFault kGravities[] = {{1e-3, "mm", "in mm/s^2"}};
 
 constexpr const char* kAxes[] = {"x", "y", "z"};
 constexpr const char* kAngles[] = {"roll", "pitch", "yaw"};
 constexpr const char* kProducts[] = {"ixy", "ixz", "iyz"};
+constexpr const char* kRowNumbers[] = {"alpha", "a", "q", "d"};
 constexpr const char* kPermuted[] = {"with x and y exchanged", "with x and z exchanged",
                                      "with y and z exchanged", "in the order y z x", "in the order z x y"};
+constexpr const char* kPermutedIds[] = {"swap_xy", "swap_xz", "swap_yz", "yzx", "zxy"};
 constexpr const char* kSixWords[] = {
     "with its six numbers read as xx xy xz yy yz zz", "with its six numbers read as xx xy yy xz yz zz",
     "with its products read as yz xz xy", "with its products read as xy yz xz",
     "with its products read as xz xy yz"};
+constexpr const char* kSixIds[] = {"by_rows", "by_columns", "products_yz_xz_xy", "products_xy_yz_xz",
+                                   "products_xz_xy_yz"};
 
-/// Words of a kind; "{}" stands for its component.
+/// What a quantity is called in a name and in words.
+struct SiteWords {
+  SiteKind kind;
+  const char* id;
+  const char* words;
+};
+constexpr SiteWords kSites[] = {{SiteKind::kCarrier, "carrier", "carrying link"},
+                                {SiteKind::kPresence, "joint", "joint"},
+                                {SiteKind::kName, "joint", "name"},
+                                {SiteKind::kType, "type", "type"},
+                                {SiteKind::kPosition, "origin", "position"},
+                                {SiteKind::kRotation, "rotation", "rotation"},
+                                {SiteKind::kAxis, "axis", "axis"},
+                                {SiteKind::kAxisPoint, "axis_point", "point of the axis"},
+                                {SiteKind::kRange, "range", "range"},
+                                {SiteKind::kMimic, "coupling", "mimic"},
+                                {SiteKind::kDamping, "damping", "damping"},
+                                {SiteKind::kFriction, "friction", "friction"},
+                                {SiteKind::kArmature, "armature", "armature"},
+                                {SiteKind::kEffort, "effort", "effort limit"},
+                                {SiteKind::kVelocity, "velocity", "velocity limit"},
+                                {SiteKind::kStiffness, "stiffness", "stiffness"},
+                                {SiteKind::kSpringAngle, "spring_reference", "spring's angle"},
+                                {SiteKind::kGear, "gear", "motor's gear"},
+                                {SiteKind::kMass, "mass", "mass"},
+                                {SiteKind::kCom, "com", "centre of mass"},
+                                {SiteKind::kInertia, "inertia", "inertia"},
+                                {SiteKind::kGravity, "gravity", "gravity"},
+                                {SiteKind::kConstraint, "constraint", "constraint"}};
+
+/// A kind in a name and in words; "{}" stands for its component.
 struct KindWords {
-  CorrectionKind kind;
+  Kind kind;
+  const char* id;
   const char* words;
 };
 constexpr KindWords kWords[] = {
-    {CorrectionKind::kNumber, "another value"},
-    {CorrectionKind::kMissing, "missing"},
-    {CorrectionKind::kSurplus, "stated only here"},
-    {CorrectionKind::kSign, "with the other sign"},
-    {CorrectionKind::kSignOf, "with the sign of {} turned around"},
-    {CorrectionKind::kDegrees, "with its angles in degrees"},
-    {CorrectionKind::kRadians, "with its angles converted to radians twice"},
-    {CorrectionKind::kAngleSign, "with the sign of {} turned around"},
-    {CorrectionKind::kAngleDegrees, "with {} in degrees"},
-    {CorrectionKind::kAnglesReversed, "with its angles in the order yaw, pitch, roll"},
-    {CorrectionKind::kMovingAxes, "as if its angles were about fixed axes, they are about moving ones"},
-    {CorrectionKind::kFixedAxes, "as if its angles were about moving axes, they are about fixed ones"},
-    {CorrectionKind::kTransposed, "transposed (inverse)"},
-    {CorrectionKind::kScalarFirst, "with a quaternion w x y z read as x y z w"},
-    {CorrectionKind::kScalarLast, "with a quaternion x y z w read as w x y z"},
-    {CorrectionKind::kMirror, "mirrored in {}"},
-    {CorrectionKind::kZero, "with another zero of the joint"},
-    {CorrectionKind::kAlongLink, "given along the link's own axes"},
-    {CorrectionKind::kAlongParent, "given along the parent's axes"},
-    {CorrectionKind::kInParent, "given in the parent's frame"},
-    {CorrectionKind::kToParent, "given in the link's frame, to be in the parent's"},
-    {CorrectionKind::kAlongToParent, "given along the link's axes, to be along the parent's"},
-    {CorrectionKind::kPlaceAdded, "with the place of its joint added"},
-    {CorrectionKind::kPlaceTaken, "with the place of its joint taken away"},
-    {CorrectionKind::kInChild, "given in the frame of a link that it carries"},
-    {CorrectionKind::kInertialAxes, "given along the axes of its inertia"},
-    {CorrectionKind::kToInertialAxes, "turned by the rotation of its inertial frame"},
-    {CorrectionKind::kInverse, "inverted (the parent's frame in the link's)"},
-    {CorrectionKind::kAboutOrigin, "about the link's origin instead of the centre of mass"},
-    {CorrectionKind::kMovedTwice, "moved to the centre of mass twice"},
-    {CorrectionKind::kAboutOriginAxes, "about the link's origin, along its own axes"},
-    {CorrectionKind::kAboutParent, "about the parent's origin"},
-    {CorrectionKind::kProductSigns, "with the signs of its products turned around"},
-    {CorrectionKind::kProductSign, "with the sign of {} turned around"},
-    {CorrectionKind::kNoProducts, "without its products"},
-    {CorrectionKind::kNoAxes, "without the rotation of its frame"},
-    {CorrectionKind::kLinkAxes, "with a rotation of its frame that is too much"},
-    {CorrectionKind::kWithMass, "not scaled with the mass"},
-    {CorrectionKind::kExchanged, "exchanged with that of"},
-    {CorrectionKind::kOfOther, "that of"},
-    {CorrectionKind::kPartMissing, "without a part that is welded to it"},
-    {CorrectionKind::kOtherAxis, "another axis"},
-};
+    {Kind::kNumber, "number", "another value"},
+    {Kind::kMissing, "missing", "missing"},
+    {Kind::kSurplus, "unneeded", "stated only here"},
+    {Kind::kSign, "sign", "with the other sign"},
+    {Kind::kSignOf, "sign_{}", "with the sign of {} turned around"},
+    {Kind::kPermutation, "{}", "{}"},
+    {Kind::kUnit, "{}", "{}"},
+    {Kind::kDegrees, "degrees", "with its angles in degrees"},
+    {Kind::kRadians, "radians", "with its angles converted to radians twice"},
+    {Kind::kAngleSign, "sign_{}", "with the sign of {} turned around"},
+    {Kind::kAngleDegrees, "degrees_{}", "with {} in degrees"},
+    {Kind::kAnglesReversed, "ypr", "with its angles in the order yaw, pitch, roll"},
+    {Kind::kAnglesPermuted, "angles_{}", "with its angles {}"},
+    {Kind::kEulerSequence, "sequence_{}", "with its angles taken in another order, {} would be right"},
+    {Kind::kMovingAxes, "meant_other_order",
+     "as if its angles were about fixed axes, they are about moving ones"},
+    {Kind::kFixedAxes, "other_order", "as if its angles were about moving axes, they are about fixed ones"},
+    {Kind::kTransposed, "transposed", "transposed (inverse)"},
+    {Kind::kScalarFirst, "xyzw", "with a quaternion x y z w read as w x y z"},
+    {Kind::kScalarLast, "wxyz", "with a quaternion w x y z read as x y z w"},
+    {Kind::kMirror, "mirror_{}", "mirrored in {}"},
+    {Kind::kTurnOwn, "turned_{}", "turned by {} of its own"},
+    {Kind::kTurnParent, "parent_turned_{}", "turned by {} of the parent"},
+    {Kind::kZero, "offset", "with another zero of the joint"},
+    {Kind::kAlongLink, "link_axes", "given along the link's own axes"},
+    {Kind::kAlongParent, "parent_axes", "given along the parent's axes"},
+    {Kind::kInParent, "parent_frame", "given in the parent's frame"},
+    {Kind::kToParent, "not_parent_frame", "given in the link's frame, to be in the parent's"},
+    {Kind::kAlongToParent, "not_parent_axes", "given along the link's axes, to be along the parent's"},
+    {Kind::kPlaceAdded, "joint_added", "with the place of its joint added"},
+    {Kind::kPlaceTaken, "joint_taken", "with the place of its joint taken away"},
+    {Kind::kInChild, "child_frame", "given in the frame of a link that it carries"},
+    {Kind::kInertialAxes, "inertia_axes", "given along the axes of its inertia"},
+    {Kind::kToInertialAxes, "turned_with_inertia", "turned by the rotation of its inertial frame"},
+    {Kind::kInverse, "inverse", "inverted (the parent's frame in the link's)"},
+    {Kind::kAboutOrigin, "about_origin", "about the link's origin instead of the centre of mass"},
+    {Kind::kMovedTwice, "moved_twice", "moved to the centre of mass twice"},
+    {Kind::kAboutOriginAxes, "about_origin_axes", "about the link's origin, along its own axes"},
+    {Kind::kAboutParent, "carrier_origin", "about the parent's origin"},
+    {Kind::kProductSigns, "product_sign", "with the signs of its products turned around"},
+    {Kind::kProductSign, "sign_{}", "with the sign of {} turned around"},
+    {Kind::kMoments, "moments_{}", "with its moments {}"},
+    {Kind::kSixOrder, "{}", "{}"},
+    {Kind::kSixOrderInverse, "inverse_{}", "{}"},
+    {Kind::kNoProducts, "no_products", "without its products"},
+    {Kind::kNoAxes, "no_axes", "without the rotation of its frame"},
+    {Kind::kLinkAxes, "frame_unneeded", "with a rotation of its frame that is too much"},
+    {Kind::kFrame, "frame_{}", "in a frame whose rotation is {}"},
+    {Kind::kWithMass, "not_with_mass", "not scaled with the mass"},
+    {Kind::kExchanged, "exchange", "exchanged with that of"},
+    {Kind::kOfOther, "other_link", "that of"},
+    {Kind::kPartMissing, "lost", "without a part that is welded to it"},
+    {Kind::kOtherAxis, "number", "another axis"},
+    {Kind::kCompiled, "compiled", "as a setting of the compiler made it"},
+    {Kind::kClassicRows, "classic",
+     "in classic (standard) Denavit-Hartenberg parameters, and read as modified ones"},
+    {Kind::kShiftedRows, "{}", "with alpha and a of the row {}"},
+    {Kind::kShiftedBodies, "shifted", "shifted by one in the list of bodies"}};
 
-std::string NameComponent(const FileFault& fault) {
+const KindWords& FindWords(Kind kind) { return *std::ranges::find(kWords, kind, &KindWords::kind); }
+
+/// The component in a name, or in words.
+std::string NameComponent(const FileFault& fault, bool is_id) {
   const auto at = static_cast<size_t>(fault.component);
   switch (fault.kind) {
-    case CorrectionKind::kAngleSign:
-    case CorrectionKind::kAngleDegrees:
+    case Kind::kUnit:
+      return is_id ? ListUnits(fault.of)[at].id : ListUnits(fault.of)[at].words;
+    case Kind::kPermutation:
+    case Kind::kAnglesPermuted:
+    case Kind::kMoments:
+      return is_id ? kPermutedIds[at] : kPermuted[at];
+    case Kind::kSixOrder:
+    case Kind::kSixOrderInverse:
+      return is_id ? kSixIds[at] : kSixWords[at];
+    case Kind::kEulerSequence:
+      return kSequences[at];
+    case Kind::kAngleSign:
+    case Kind::kAngleDegrees:
       return kAngles[at];
-    case CorrectionKind::kProductSign:
+    case Kind::kProductSign:
       return kProducts[at];
+    case Kind::kTurnOwn:
+    case Kind::kTurnParent: {
+      constexpr const char* kTurns[] = {"-90 degrees", "180 degrees", "90 degrees"};
+      constexpr const char* kIds[] = {"quarter_back", "half", "quarter"};
+      return is_id ? fmt::format("{}_{}", kIds[at % 3], kAxes[at / 3])
+                   : fmt::format("{} about {}", kTurns[at % 3], kAxes[at / 3]);
+    }
+    case Kind::kShiftedRows:
+      return is_id ? (at == 0 ? "shifted_down" : "shifted_up") : at == 0 ? "before" : "behind";
+    case Kind::kSignOf:
+      if (fault.of == SiteKind::kPosition && fault.whole) return kRowNumbers[at];
+      return kAxes[at % 3];
     default:
       return kAxes[at % 3];
   }
 }
 
 std::string DescribeKind(const FileFault& fault) {
-  const auto at = static_cast<size_t>(fault.component);
-  switch (fault.kind) {
-    case CorrectionKind::kUnit:
-      return ListUnits(fault.of)[at].words;
-    case CorrectionKind::kPermutation:
-      return kPermuted[at];
-    case CorrectionKind::kAnglesPermuted:
-      return fmt::format("with its angles {}", kPermuted[at]);
-    case CorrectionKind::kMoments:
-      return fmt::format("with its moments {}", kPermuted[at]);
-    case CorrectionKind::kSixOrder:
-    case CorrectionKind::kSixOrderInverse:
-      return kSixWords[at];
-    case CorrectionKind::kEulerSequence:
-      return fmt::format("with its angles taken in another order, {} would be right", kSequences[at]);
-    case CorrectionKind::kTurnOwn:
-    case CorrectionKind::kTurnParent:
-      return fmt::format("turned by {} degrees about {} {}",
-                         fault.component % 3 == 0   ? -90
-                         : fault.component % 3 == 1 ? 180
-                                                    : 90,
-                         fault.kind == CorrectionKind::kTurnOwn ? "its own" : "the parent's", kAxes[at / 3]);
-    case CorrectionKind::kExchanged:
-      if (fault.of == SiteKind::kName) return "exchanged";
-      break;
-    case CorrectionKind::kFrame: {
-      FileFault rotation = fault;
-      rotation.kind = fault.rotation;
-      return "in a frame whose rotation is " + DescribeKind(rotation);
-    }
-    default:
-      break;
+  if (fault.kind == Kind::kExchanged && fault.of == SiteKind::kName) return "exchanged";
+  std::string component;
+  if (fault.kind == Kind::kFrame) {
+    FileFault rotation = fault;
+    rotation.kind = fault.rotation;
+    component = DescribeKind(rotation);
+  } else {
+    component = NameComponent(fault, false);
   }
-  const auto* const found = std::ranges::find(kWords, fault.kind, &KindWords::kind);
-  return fmt::format(fmt::runtime(found->words), NameComponent(fault));
+  return fmt::format(fmt::runtime(FindWords(fault.kind).words), component);
+}
+
+std::string NameQuantity(const FileFault& fault) {
+  if (fault.whole) return IsOfBody(fault.of) ? "body" : "place";
+  return std::ranges::find(kSites, fault.of, &SiteWords::kind)->id;
 }
 
 }  // namespace
@@ -150,60 +224,45 @@ bool IsSameFault(const FileFault& a, const FileFault& b) {
          a.in_second == b.in_second && a.whole == b.whole;
 }
 
-const char* NameSite(SiteKind kind) {
-  switch (kind) {
-    case SiteKind::kCarrier:
-      return "carrying link";
-    case SiteKind::kPresence:
-      return "joint";
-    case SiteKind::kName:
-      return "name";
-    case SiteKind::kType:
-      return "type";
-    case SiteKind::kPosition:
-      return "position";
-    case SiteKind::kRotation:
-      return "rotation";
-    case SiteKind::kAxis:
-      return "axis";
-    case SiteKind::kAxisPoint:
-      return "point of the axis";
-    case SiteKind::kRange:
-      return "range";
-    case SiteKind::kMimic:
-      return "mimic";
-    case SiteKind::kDamping:
-      return "damping";
-    case SiteKind::kFriction:
-      return "friction";
-    case SiteKind::kArmature:
-      return "armature";
-    case SiteKind::kEffort:
-      return "effort limit";
-    case SiteKind::kVelocity:
-      return "velocity limit";
-    case SiteKind::kStiffness:
-      return "stiffness";
-    case SiteKind::kSpringAngle:
-      return "spring's angle";
-    case SiteKind::kGear:
-      return "motor's gear";
-    case SiteKind::kMass:
-      return "mass";
-    case SiteKind::kCom:
-      return "centre of mass";
-    case SiteKind::kInertia:
-      return "inertia";
-    case SiteKind::kGravity:
-      return "gravity";
-  }
-  return "";
-}
+const char* NameSite(SiteKind kind) { return std::ranges::find(kSites, kind, &SiteWords::kind)->words; }
 
 std::string DescribeFault(const FileFault& fault) {
   std::string what = NameSite(fault.of);
-  if (fault.whole) what = IsOfBody(fault.of) ? "inertial" : "origin";
+  if (fault.kind >= Kind::kClassicRows) {
+    what = fault.kind == Kind::kShiftedBodies ? "inertials" : "rows";
+  } else if (fault.whole) {
+    what = IsOfBody(fault.of) ? "inertial" : "origin";
+  }
   return fmt::format("{}{} {}", fault.in_second ? "in the second file, " : "", what, DescribeKind(fault));
+}
+
+std::string NameFault(const FileFault& fault) {
+  const std::string quantity = NameQuantity(fault);
+  switch (fault.kind) {
+    case Kind::kNumber:
+      if (fault.of == SiteKind::kGravity) return "gravity.value";
+      return "number." + quantity;
+    case Kind::kOtherAxis:
+      return fault.of == SiteKind::kGravity ? "gravity.axis" : "number.axis";
+    case Kind::kExchanged:
+      return "exchange." + quantity;
+    case Kind::kZero:
+      return "zero.offset";
+    case Kind::kPartMissing:
+      return "part.lost";
+    case Kind::kNoAxes:
+      return fault.component == 0 ? "inertia.no_axes" : "inertia.frame_missing";
+    case Kind::kShiftedBodies:
+      return "list.shifted";
+    default:
+      break;
+  }
+  FileFault component = fault;
+  if (fault.kind == Kind::kFrame) component.kind = fault.rotation;
+  std::string id = FindWords(component.kind).id;
+  id = fmt::format(fmt::runtime(id), NameComponent(component, true));
+  if (fault.kind == Kind::kFrame) id = "frame_" + id;
+  return (fault.kind >= Kind::kClassicRows ? "table" : quantity) + "." + id;
 }
 
 std::span<const UnitFault> ListUnits(SiteKind kind) {
@@ -222,11 +281,13 @@ std::span<const UnitFault> ListUnits(SiteKind kind) {
     case SiteKind::kStiffness:
     case SiteKind::kEffort:
     case SiteKind::kVelocity:
-      return kDampings;
+      return kForces;
     case SiteKind::kArmature:
       return kArmatures;
     case SiteKind::kGear:
-      return kGears;
+      return kSignOnly;
+    case SiteKind::kGravity:
+      return kGravities;
     default:
       return {};
   }

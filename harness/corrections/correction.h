@@ -2,6 +2,7 @@
 
 // What may be wrong in a file, as values: what kind of fault, of what, where, and what would be right.
 
+#include <functional>
 #include <span>
 #include <string>
 #include <vector>
@@ -37,11 +38,20 @@ enum class SiteKind {
   kInertia,
   // Of the robot.
   kGravity,
+  kConstraint,  ///< A constraint or spring between links.
 };
 inline bool IsOfBody(SiteKind kind) { return kind >= SiteKind::kMass && kind <= SiteKind::kInertia; }
+inline bool IsOfPose(SiteKind kind) { return kind == SiteKind::kPosition || kind == SiteKind::kRotation; }
 inline SiteKind ToSite(JointScalar scalar) {
   return static_cast<SiteKind>(static_cast<int>(SiteKind::kDamping) + static_cast<int>(scalar));
 }
+
+/// Kinds of sites, a bit each.
+using SiteMask = unsigned;
+constexpr SiteMask MaskOf(SiteKind kind) { return 1U << static_cast<unsigned>(kind); }
+inline constexpr SiteMask kBodyMask =
+    MaskOf(SiteKind::kMass) | MaskOf(SiteKind::kCom) | MaskOf(SiteKind::kInertia);
+inline constexpr SiteMask kPoseMask = MaskOf(SiteKind::kPosition) | MaskOf(SiteKind::kRotation);
 
 struct Site {
   SiteKind kind;
@@ -55,7 +65,7 @@ enum class CorrectionKind {
   kSurplus,  ///< It is stated here only.
   // Of a vector.
   kSign,
-  kSignOf,       ///< Component: the axis.
+  kSignOf,       ///< Component: the axis, or the number of a row (alpha, a, q, d).
   kPermutation,  ///< Component: of kPermutations.
   kUnit,         ///< Component: of ListUnits.
   // Of a rotation.
@@ -73,7 +83,7 @@ enum class CorrectionKind {
   kScalarLast,
   kMirror,      ///< Component: the axis.
   kTurnOwn,     ///< Component: 3 axis + quarter turns - 1.
-  kTurnParent,  ///< Likewise.
+  kTurnParent,  ///< Component: 3 axis + quarter turns - 1.
   kZero,        ///< The joint's zero is elsewhere.
   // Of a place or a centre of mass, in another frame.
   kAlongLink,
@@ -98,7 +108,7 @@ enum class CorrectionKind {
   kSixOrder,     ///< Component: of kSixOrders.
   kSixOrderInverse,
   kNoProducts,
-  kNoAxes,
+  kNoAxes,  ///< Component 1: the six numbers were along other axes, no principal ones.
   kLinkAxes,
   kFrame,  ///< The rotation of its frame: `rotation` says how.
   kWithMass,
@@ -107,6 +117,11 @@ enum class CorrectionKind {
   kOfOther,
   kPartMissing,
   kOtherAxis,
+  kCompiled,  ///< A setting of an MJCF's compiler changed what the text states.
+  // Of all rows of a table.
+  kClassicRows,
+  kShiftedRows,  ///< Component: 0: alpha and a of the row before, 1: of the row behind.
+  kShiftedBodies,
 };
 
 /// What a candidate is about.
@@ -122,10 +137,20 @@ struct FileFault {
 /// Whether two are the same at different places.
 bool IsSameFault(const FileFault& a, const FileFault& b);
 
+/// Gives a link what is right.
+using LinkUndo = std::function<void(PrintedLink*)>;
+
 /// A link with the fault undone.
 struct LinkPatch {
   int link;
   PrintedLink right;
+};
+
+/// A fault of a part, beside that of another part of the same body.
+struct FaultBeside {
+  FileFault fault;
+  int link;
+  double bits;
 };
 
 /// One way to put sites right.
@@ -135,7 +160,9 @@ struct CorrectionCandidate {
   std::vector<Site> sites;
   double bits = 0.0;  ///< Beyond those of which convention and where.
   std::vector<LinkPatch> patches;
-  std::string values;  ///< "mass 1.9, 1.998 would be right"
+  std::string values;                   ///< "mass 1.9, 1.998 would be right"
+  std::optional<FaultBeside> beside{};  ///< The sites are right only if this is undone too.
+  double rest = 1.0;  ///< How far sites are from right then, over what digits leave open; 1: they are right.
 };
 
 /// Whether it pays for its digits, and not for a convention.
@@ -146,6 +173,8 @@ inline bool IsNumber(const FileFault& fault) {
 
 /// Words for a fault, to be read behind "joint q1: " or "link l1: ".
 std::string DescribeFault(const FileFault& fault);
+/// A stable name: "inertia.about_origin", "com.mm", "number.mass", "exchange.body".
+std::string NameFault(const FileFault& fault);
 const char* NameSite(SiteKind kind);
 
 inline constexpr int kPermutations[5][3] = {{1, 0, 2}, {2, 1, 0}, {0, 2, 1}, {1, 2, 0}, {2, 0, 1}};
@@ -156,6 +185,7 @@ inline constexpr const char* kSequences[] = {"xyz", "XYZ", "zyx", "ZYX", "xzy", 
 /// What makes a number of a quantity right that was taken in another unit.
 struct UnitFault {
   double factor;
+  const char* id;
   const char* words;
 };
 std::span<const UnitFault> ListUnits(SiteKind kind);

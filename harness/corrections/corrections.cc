@@ -12,93 +12,74 @@
 #include "harness/corrections/link_frames.h"
 #include "harness/corrections/printed_pair.h"
 #include "harness/corrections/read_printed.h"
+#include "harness/corrections/whole_readings.h"
 
 namespace dexcheck {
 namespace {
 
 /// Gives `link` what `right` has otherwise than `before`.
-void Merge(const PrintedLink& before, const PrintedLink& right, PrintedLink* link) {
-  const auto merge_origin = [](const PrintedOrigin& from, const PrintedOrigin& to, PrintedOrigin* origin) {
-    if (from.t != to.t) {
-      origin->t = to.t;
-      origin->half_t = to.half_t;
-    }
-    if (from.r == to.r && from.form == to.form && from.sequence == to.sequence) return;
-    origin->r = to.r;
-    origin->half_r = to.half_r;
-    origin->form = to.form;
-    origin->sequence = to.sequence;
-    origin->X_before = to.X_before;
+void Merge(PrintedLink before, PrintedLink right, PrintedLink* link) {
+  const auto take = [](const auto& from, const auto& to, auto* member) {
+    if (!(from == to)) *member = to;
   };
-  merge_origin(before.origin, right.origin, &link->origin);
+  const auto merge = [](auto* from, auto* to, auto* merged) {
+    const std::vector<LinkNumber> given = ListNumbers(from), made = ListNumbers(to), at = ListNumbers(merged);
+    for (size_t k = 0; k < at.size(); ++k) {
+      if (*given[k].value == *made[k].value) continue;
+      *at[k].value = *made[k].value;
+      *at[k].half = *made[k].half;
+    }
+  };
+  const auto merge_origin = [&](PrintedOrigin* from, PrintedOrigin* to, PrintedOrigin* merged) {
+    const bool is_turned = from->r != to->r || from->form != to->form || from->sequence != to->sequence;
+    merge(from, to, merged);
+    if (!is_turned) return;
+    const Vector3d t = merged->t, half_t = merged->half_t;
+    *merged = *to;
+    merged->t = t;
+    merged->half_t = half_t;
+  };
+  merge_origin(&before.origin, &right.origin, &link->origin);
   if (!before.inertial || !right.inertial || !link->inertial) {
     if (before.inertial.has_value() != right.inertial.has_value()) link->inertial = right.inertial;
   } else {
-    if (before.inertial->mass.value != right.inertial->mass.value)
-      link->inertial->mass = right.inertial->mass;
-    merge_origin(before.inertial->origin, right.inertial->origin, &link->inertial->origin);
-    if (before.inertial->I != right.inertial->I) {
-      link->inertial->I = right.inertial->I;
-      link->inertial->half_I = right.inertial->half_I;
-    }
+    merge(&*before.inertial, &*right.inertial, &*link->inertial);
+    merge_origin(&before.inertial->origin, &right.inertial->origin, &link->inertial->origin);
   }
-  const PrintedJoint& joint = before.joint;
-  const PrintedJoint& to = right.joint;
-  if (joint.kind != to.kind) link->joint = to;
-  if (joint.name != to.name) link->joint.name = to.name;
-  if (joint.axis != to.axis) link->joint.axis = to.axis;
-  if (joint.anchor != to.anchor) link->joint.anchor = to.anchor;
-  const auto differ = [](const auto& x, const auto& y) {
-    return x.has_value() != y.has_value() || (x && x->value != y->value);
-  };
-  for (size_t k = 0; k < kNumJointScalars; ++k) {
-    if (differ(joint.scalars[k], to.scalars[k])) link->joint.scalars[k] = to.scalars[k];
-  }
-  const auto differ_in = [&](size_t k) {
-    return joint.range && to.range && (*joint.range)[k].value != (*to.range)[k].value;
-  };
-  if (joint.range.has_value() != to.range.has_value() || differ_in(0) || differ_in(1))
-    link->joint.range = to.range;
-  const bool same_mimic = joint.mimic.has_value() == to.mimic.has_value() &&
-                          (!joint.mimic || (joint.mimic->leader == to.mimic->leader &&
-                                            joint.mimic->multiplier.value == to.mimic->multiplier.value &&
-                                            joint.mimic->offset.value == to.mimic->offset.value));
-  if (!same_mimic) link->joint.mimic = to.mimic;
+  if (before.joint.kind != right.joint.kind) link->joint = right.joint;
+  take(before.joint.name, right.joint.name, &link->joint.name);
+  take(before.joint.axis, right.joint.axis, &link->joint.axis);
+  take(before.joint.anchor, right.joint.anchor, &link->joint.anchor);
+  take(before.joint.range, right.joint.range, &link->joint.range);
+  take(before.joint.mimic, right.joint.mimic, &link->joint.mimic);
+  for (size_t k = 0; k < kNumJointScalars; ++k)
+    take(before.joint.scalars[k], right.joint.scalars[k], &link->joint.scalars[k]);
 }
 
 std::string NamePlace(const PrintedPair& pair, int link, SiteKind kind) {
-  if (kind == SiteKind::kGravity) return "robot";
+  if (kind >= SiteKind::kGravity) return "robot";
   const PrintedLink& place = link >= 0 ? pair.a().link(link) : pair.b().link(-1 - link);
   if (IsOfBody(kind) || place.joint.name.empty()) return "link " + place.name;
   return "joint " + place.joint.name;
 }
 
-CorrectionItem MakeItem(const PrintedPair& pair, const Deal& deal, const std::vector<Site>& sites,
-                        const std::vector<CorrectionCandidate>& candidates) {
-  CorrectionItem item;
-  item.bits = deal.bits;
-  for (const size_t site : deal.sites) item.sites.push_back(sites[site]);
-  for (const size_t c : deal.candidates) {
-    const CorrectionCandidate& candidate = candidates[c];
-    item.fault = candidate.fault;
-    const bool is_exchange = candidate.fault.kind == CorrectionKind::kExchanged;
-    for (size_t k = 0; k < (is_exchange ? 1 : std::max<size_t>(candidate.patches.size(), 1)); ++k) {
-      const int link = k == 0 && candidate.patches.size() < 2 ? candidate.link : candidate.patches[k].link;
-      std::string place = NamePlace(pair, link, candidate.fault.of);
-      if (std::ranges::find(item.places, place) != item.places.end()) continue;
-      item.places.push_back(std::move(place));
-      item.values.push_back(candidate.values);
-    }
-    item.patches.insert(item.patches.end(), candidate.patches.begin(), candidate.patches.end());
-  }
-  return item;
-}
+/// Which sites were put right, and how far they may be from right since.
+struct SettledSite {
+  Site site;
+  double rest;
+};
 
 /// One direction: what of `a` is wrong.
 class OneWay {
  public:
-  OneWay(const PrintedRobot& a, const PrintedRobot& b, bool is_second, bool by_tree)
-      : pair_(a, b, by_tree), is_second_(is_second) {}
+  OneWay(const PrintedRobot& a, const PrintedRobot& b, bool is_second, bool by_tree, int* budget)
+      : pair_(a, b, by_tree), is_second_(is_second), budget_(budget) {}
+
+  /// What differs with the cheapest frames.
+  size_t CountSites() {
+    pair_.SetFrames(ChooseFrames(pair_)[0].X_ab);
+    return pair_.ListSites().size();
+  }
 
   FileCorrections Run() {
     constexpr double kCheap = 25.0;  // bits of one fault, under which other frames are not looked for
@@ -115,6 +96,7 @@ class OneWay {
       if (best->agrees || best->bits < kCheap) break;
     }
     best->of_second = is_second_;
+    best->is_bounded = *budget_ <= 0;
     return *std::move(best);
   }
 
@@ -122,41 +104,110 @@ class OneWay {
   FileCorrections Explain() {
     constexpr int kRounds = 3;
     FileCorrections result;
-    std::vector<Site> settled;  // with digits that a patch does not carry
+    settled_.clear();
+    std::vector<Site> all;
     for (int round = 0; round < kRounds; ++round) {
       std::vector<Site> sites = pair_.ListSites();
-      std::erase_if(sites,
-                    [&](const Site& site) { return std::ranges::find(settled, site) != settled.end(); });
+      std::erase_if(sites, [&](const Site& site) { return IsSettled(site); });
       result.agrees = result.agrees && sites.empty();
-      if (sites.empty()) break;
-      const std::vector<CorrectionCandidate> candidates = CandidateSearch(&pair_, sites, is_second_).Run();
-      const Cover cover = FindCover(sites, candidates, pair_.links().size());
       result.unexplained.clear();
+      if (sites.empty()) break;
+      for (const Site& site : sites) {
+        if (std::ranges::find(all, site) == all.end()) all.push_back(site);
+      }
+      const std::vector<CorrectionCandidate> candidates =
+          CandidateSearch(&pair_, sites, is_second_, budget_).Run();
+      const Cover cover = FindCover(sites, candidates, pair_.links().size());
       for (const size_t site : cover.left)
         result.unexplained.push_back(NamePlace(pair_, sites[site].link, sites[site].kind) + ": " +
                                      NameSite(sites[site].kind));
       if (cover.chosen.empty()) break;
       const PrintedRobot before = pair_.a();
       for (const ChosenDeal& chosen : cover.chosen) {
-        CorrectionItem& item = result.items.emplace_back(MakeItem(pair_, chosen.deal, sites, candidates));
-        AddRivals(chosen, sites, candidates, &item);
-        result.bits += item.bits;
-        for (const LinkPatch& patch : item.patches)
-          Merge(before.link(patch.link), patch.right, &pair_.mutable_a()->link(patch.link));
-        settled.insert(settled.end(), item.sites.begin(), item.sites.end());
+        std::vector<CorrectionItem> made = MakeItems(chosen.deal, sites, candidates);
+        AddRivals(chosen, sites, candidates, &made[0]);
+        AddLeafRival(candidates[chosen.deal.candidates[0]], &made[0]);
+        for (CorrectionItem& item : made) {
+          result.bits += item.bits;
+          result.items.push_back(std::move(item));
+        }
+        Apply(chosen.deal, before, candidates);
       }
       pair_.Measure();
     }
+    for (CorrectionItem& item : result.items)
+      item.explained = static_cast<double>(item.sites.size()) / static_cast<double>(all.size());
     constexpr double kUnexplained = 60.0;
     result.bits += kUnexplained * static_cast<double>(result.unexplained.size());
     return result;
+  }
+
+  /// Whether a site was put right and still is, as far as its correction left it.
+  [[nodiscard]] bool IsSettled(const Site& site) const {
+    constexpr double kMore = 2.0;
+    const auto settled = std::ranges::find(settled_, site, &SettledSite::site);
+    if (settled == settled_.end()) return false;
+    if (!IsOfBody(site.kind) && !IsOfPose(site.kind)) return true;
+    return settled->rest == 0.0 || pair_.CompareNode(site.kind, site.link) <= kMore * settled->rest;
+  }
+
+  void Apply(const Deal& deal, const PrintedRobot& before,
+             const std::vector<CorrectionCandidate>& candidates) {
+    for (const size_t c : deal.candidates) {
+      for (const LinkPatch& patch : candidates[c].patches)
+        Merge(before.link(patch.link), patch.right, &pair_.mutable_a()->link(patch.link));
+      // What has no patch stays as it is.
+      for (const Site& site : candidates[c].sites)
+        settled_.push_back({site, candidates[c].patches.empty() ? 0.0 : candidates[c].rest});
+    }
+  }
+
+  /// The item of a deal, and one of the fault beside it.
+  [[nodiscard]] std::vector<CorrectionItem> MakeItems(
+      const Deal& deal, const std::vector<Site>& sites,
+      const std::vector<CorrectionCandidate>& candidates) const {
+    CorrectionItem item;
+    item.bits = deal.bits;
+    for (const size_t site : deal.sites) item.sites.push_back(sites[site]);
+    for (const size_t c : deal.candidates) {
+      const CorrectionCandidate& candidate = candidates[c];
+      item.fault = candidate.fault;
+      const bool is_one = candidate.fault.kind == CorrectionKind::kExchanged || candidate.beside ||
+                          candidate.patches.size() < 2;
+      for (size_t k = 0; k < (is_one ? 1 : candidate.patches.size()); ++k) {
+        const int link = is_one ? candidate.link : candidate.patches[k].link;
+        std::string place = NamePlace(pair_, link, candidate.fault.of);
+        if (std::ranges::find(item.places, place) != item.places.end()) continue;
+        item.places.push_back(std::move(place));
+        item.values.push_back(candidate.values);
+      }
+      item.patches.insert(item.patches.end(), candidate.patches.begin(), candidate.patches.end());
+    }
+    const CorrectionCandidate& first = candidates[deal.candidates[0]];
+    item.in_second = is_second_ != item.fault.in_second;
+    item.id = NameFault(item.fault);
+    const bool is_root = first.link >= 0 && IsOfPose(item.fault.of) && pair_.Carrier(first.link) < 0 &&
+                         pair_.node(first.link).link == first.link;
+    if (is_root && deal.candidates.size() == 1)
+      item.id = item.id.starts_with("number.") ? "number.base" : "base." + item.id;
+    std::vector<CorrectionItem> items = {item};
+    if (first.beside) {
+      CorrectionItem other;
+      other.fault = first.beside->fault;
+      other.in_second = is_second_;
+      other.id = NameFault(other.fault);
+      other.places = {NamePlace(pair_, first.beside->link, other.fault.of)};
+      other.values = {""};
+      items.push_back(std::move(other));
+    }
+    return items;
   }
 
   void AddRivals(const ChosenDeal& chosen, const std::vector<Site>& sites,
                  const std::vector<CorrectionCandidate>& candidates, CorrectionItem* item) const {
     std::vector<std::string> told = {DescribeItem(*item, false)};
     for (const Deal& deal : chosen.rivals) {
-      CorrectionItem rival = MakeItem(pair_, deal, sites, candidates);
+      CorrectionItem rival = MakeItems(deal, sites, candidates)[0];
       if (deal.candidates.size() < chosen.deal.candidates.size() && IsSameFault(rival.fault, item->fault))
         continue;
       std::string text = DescribeItem(rival, false);
@@ -166,37 +217,98 @@ class OneWay {
     }
   }
 
+  /// Where frames of links are free, a link that carries nothing is as well placed otherwise along its axis
+  /// as its centre of mass is elsewhere.
+  void AddLeafRival(const CorrectionCandidate& candidate, CorrectionItem* item) const {
+    const int link = candidate.link;
+    if (candidate.fault.of != SiteKind::kCom || candidate.fault.kind != CorrectionKind::kNumber ||
+        item->places.size() != 1 || pair_.Carrier(link) < 0 ||
+        pair_.X_ab(link).isApprox(Pose::Identity(), 1e-9))
+      return;
+    const auto is_on = [&](int k) { return pair_.node(k).parent == link; };
+    if (std::ranges::any_of(pair_.links(), is_on)) return;
+    const Vector3d apart = pair_.right(link).body.com - pair_.given(link).body.com;
+    const PrintedJoint& joint = pair_.a().link(link).joint;
+    const double across = joint.axis.normalized().cross(apart).norm();
+    constexpr double kAlong = 1e-3;  // of the distance
+    if (joint.kind == JointKind::kHinge && across > kAlong * apart.norm() + 1e-6) return;
+    const Vector3d moved = pair_.given(link).X.linear() * apart;
+    CorrectionItem rival = *item;
+    rival.rivals.clear();
+    rival.patches.clear();
+    rival.fault.of = SiteKind::kPosition;
+    rival.id = NameFault(rival.fault);
+    rival.places = {NamePlace(pair_, link, SiteKind::kPosition)};
+    rival.values = {fmt::format("off by ({:.6g} {:.6g} {:.6g})", -moved[0], -moved[1], -moved[2])};
+    item->rivals.push_back(std::move(rival));
+  }
+
   PrintedPair pair_;
   bool is_second_;
+  int* budget_;
+  std::vector<SettledSite> settled_;
 };
+
+/// Tries readings of a whole file that put half of what differs right. @param found the best so far.
+void TryReadings(const PrintedRobot& a, const PrintedRobot& b, bool of_second, int* budget,
+                 FileCorrections* found) {
+  constexpr double kReading = 10.0;
+  constexpr double kClearer = 20.0;
+  const size_t sites = OneWay(a, b, false, false, budget).CountSites();
+  for (const WholeReading& reading : ListWholeReadings(of_second ? b : a)) {
+    OneWay way(of_second ? a : reading.robot, of_second ? reading.robot : b, false, false, budget);
+    if (2 * way.CountSites() > sites) continue;
+    FileCorrections read = way.Run();
+    if (read.bits + kReading + kClearer >= found->bits) continue;
+    CorrectionItem item;
+    item.fault = reading.fault;
+    item.fault.in_second = item.in_second = of_second;
+    item.id = NameFault(item.fault);
+    item.places = {"robot"};
+    item.values = {""};
+    item.bits = kReading;
+    item.explained = 1.0;
+    read.agrees = false;
+    read.bits += kReading;
+    read.items.insert(read.items.begin(), std::move(item));
+    *found = std::move(read);
+  }
+}
 
 }  // namespace
 
-FileCorrections FindCorrections(const PrintedRobot& a, const PrintedRobot& b) {
+FileCorrections FindCorrections(const PrintedRobot& a, const PrintedRobot& b,
+                                const CorrectionOptions& options) {
   constexpr double kOneFault = 16.0;
   constexpr double kClearer = 20.0;
-  FileCorrections first = OneWay(a, b, false, false).Run();
   constexpr double kSeveral = 40.0;
-  if (!first.agrees && first.bits > kSeveral) {
-    // Joints whose names were exchanged are others' by them.
-    FileCorrections by_tree = OneWay(a, b, false, true).Run();
-    if (!by_tree.agrees && by_tree.bits + kClearer < first.bits) first = std::move(by_tree);
+  int budget = options.trials;
+  FileCorrections best = OneWay(a, b, false, false, &budget).Run();
+  if (best.agrees || best.bits <= kOneFault) return best;
+  const auto take = [&](FileCorrections found) {
+    if (!found.agrees && found.bits + kClearer < best.bits) best = std::move(found);
+  };
+  // Joints whose names were exchanged are others' by them.
+  if (best.bits > kSeveral && MatchLinks(a, b, true).b_of_a != MatchLinks(a, b).b_of_a)
+    take(OneWay(a, b, false, true, &budget).Run());
+  take(OneWay(b, a, true, false, &budget).Run());
+  for (const bool of_second : {false, true}) {
+    if (best.bits > kSeveral) TryReadings(a, b, of_second, &budget, &best);
   }
-  if (first.agrees || first.bits <= kOneFault) return first;
-  FileCorrections second = OneWay(b, a, true, false).Run();
-  if (!second.agrees && second.bits + kClearer < first.bits) return second;
-  return first;
+  best.is_bounded = budget <= 0;
+  return best;
 }
 
-FileCorrections FindCorrections(const DescriptionFile& a, const DescriptionFile& b) {
-  return FindCorrections(ReadPrintedRobot(a), ReadPrintedRobot(b));
+FileCorrections FindCorrections(const DescriptionFile& a, const DescriptionFile& b,
+                                const CorrectionOptions& options) {
+  return FindCorrections(ReadPrintedRobot(a, &b), ReadPrintedRobot(b, &a), options);
 }
 
-std::string DescribeItem(const CorrectionItem& item, bool of_second) {
-  std::string text = of_second ? "in the second file, " : "";
-  std::string places = JoinNames(item.places);
-  const std::string fault = DescribeFault(item.fault);
-  text += fmt::format("{}: {}", places, fault);
+std::string DescribeItem(const CorrectionItem& item, bool /*of_second*/) {
+  FileFault fault = item.fault;
+  fault.in_second = false;
+  std::string text = fmt::format("{}{}: {}", item.in_second ? "in the second file, " : "",
+                                 JoinNames(item.places), DescribeFault(fault));
   // Values of a few places; one where they are the same at all.
   constexpr size_t kShown = 3;
   std::vector<std::string> values;

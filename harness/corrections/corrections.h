@@ -13,10 +13,13 @@ namespace dexcheck {
 /// A fault at one place or several, and what would explain the same as well.
 struct CorrectionItem {
   FileFault fault;
-  std::vector<std::string> places;  ///< "joint q1", "link l1".
+  std::string id;                   ///< A stable name of the kind: "inertia.about_origin", "number.mass".
+  bool in_second = false;           ///< The second file has the fault.
+  std::vector<std::string> places;  ///< "joint q1", "link l1"; "robot" of what is of all.
   std::vector<std::string> values;  ///< By place: "mass 1.9, 1.998 would be right"; empty of a convention.
-  std::vector<Site> sites;          ///< That it puts right.
-  std::vector<LinkPatch> patches;   ///< That do it.
+  std::vector<Site> sites;          ///< Sites that it puts right.
+  double explained = 0.0;           ///< Their share of all sites that differ, 0 to 1.
+  std::vector<LinkPatch> patches;   ///< Links with it undone.
   double bits = 0.0;
   std::vector<CorrectionItem> rivals;  ///< Within a factor of ten of its probability.
 };
@@ -27,14 +30,22 @@ struct FileCorrections {
   std::vector<CorrectionItem> items;     ///< The one that explains most first.
   std::vector<std::string> unexplained;  ///< "joint q1: position"
   double bits = 0.0;
+  bool is_bounded = false;  ///< The bound on the work was reached: more may be explained than is.
+};
+
+struct CorrectionOptions {
+  int trials = 60000;  ///< Edits that are tried at most, some microseconds each.
 };
 
 /// Finds what makes the files differ by more than their digits leave open. Corrections of the first file,
 /// unless the second is put right by fewer.
-FileCorrections FindCorrections(const PrintedRobot& a, const PrintedRobot& b);
-FileCorrections FindCorrections(const DescriptionFile& a, const DescriptionFile& b);
+FileCorrections FindCorrections(const PrintedRobot& a, const PrintedRobot& b,
+                                const CorrectionOptions& options = {});
+FileCorrections FindCorrections(const DescriptionFile& a, const DescriptionFile& b,
+                                const CorrectionOptions& options = {});
 
 /// One line: "joints q1, q2: rotation with its angles in degrees".
+/// @param of_second that of the result to which the item belongs.
 std::string DescribeItem(const CorrectionItem& item, bool of_second);
 
 }  // namespace dexcheck

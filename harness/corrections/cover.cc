@@ -104,7 +104,8 @@ class CoverFinder {
 
   [[nodiscard]] double CountBitsOf(size_t c) const {
     const CorrectionCandidate& candidate = candidates_[c];
-    return candidate.bits + (IsNumber(candidate.fault) ? kNumber : kConvention) + which_;
+    const double beside = candidate.beside ? kConvention + which_ + candidate.beside->bits : 0.0;
+    return candidate.bits + (IsNumber(candidate.fault) ? kNumber : kConvention) + which_ + beside;
   }
 
   /// The same convention, or the same numbers, at several places.
@@ -112,6 +113,7 @@ class CoverFinder {
     std::map<std::tuple<int, int, int, int, bool, bool, std::string>, std::vector<size_t>> groups;
     for (size_t c = 0; c < candidates_.size(); ++c) {
       const FileFault& fault = candidates_[c].fault;
+      if (candidates_[c].beside) continue;
       groups[{static_cast<int>(fault.kind), static_cast<int>(fault.of), fault.component,
               static_cast<int>(fault.rotation), fault.in_second, fault.whole,
               IsNumber(fault) ? candidates_[c].values : std::string()}]
@@ -132,8 +134,11 @@ class CoverFinder {
 
   /// What each place adds to a convention: a free value, or what it leaves over.
   [[nodiscard]] static bool PaysEach(const FileFault& fault) {
-    return fault.kind == CorrectionKind::kMissing || fault.kind == CorrectionKind::kSurplus ||
-           fault.kind == CorrectionKind::kNoProducts || fault.kind == CorrectionKind::kNoAxes;
+    using Kind = CorrectionKind;
+    if (fault.of == SiteKind::kAxis) return false;
+    return fault.kind == Kind::kMissing || fault.kind == Kind::kSurplus || fault.kind == Kind::kNoProducts ||
+           fault.kind == Kind::kNoAxes || fault.kind == Kind::kOfOther || fault.kind == Kind::kExchanged ||
+           fault.kind == Kind::kPartMissing;
   }
 
   [[nodiscard]] std::vector<Deal> ListDeals() const {

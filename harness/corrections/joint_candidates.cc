@@ -3,30 +3,30 @@
 #include <algorithm>
 #include <cmath>
 
+#include "controller/common/text.h"
 #include "harness/corrections/candidate_search.h"
-#include "harness/corrections/origin_fixes.h"
 
 namespace dexcheck {
 namespace {
 
-const char* NameJointKind(JointKind kind) {
-  switch (kind) {
-    case JointKind::kFixed:
-      return "fixed";
-    case JointKind::kHinge:
-      return "revolute";
-    case JointKind::kSlide:
-      return "prismatic";
-    case JointKind::kBall:
-      return "ball";
-    case JointKind::kFree:
-      return "free";
-  }
-  return "";
-}
+using Kind = CorrectionKind;
+
+constexpr const char* kJointKinds[] = {"fixed", "revolute", "prismatic", "ball", "free"};
+
+const char* NameKind(const PrintedLink& link) { return kJointKinds[static_cast<size_t>(link.joint.kind)]; }
 
 std::string DescribeRight(double given, double right) {
   return fmt::format("{:.6g}, {:.6g} would be right", given, right);
+}
+
+std::string ShowVector(const Vector3d& v) { return fmt::format("({:.6g} {:.6g} {:.6g})", v[0], v[1], v[2]); }
+
+std::string DescribeRight(const Vector3d& given, const Vector3d& right) {
+  return ShowVector(given) + ", " + ShowVector(right) + " would be right";
+}
+
+EditTrial MakeTrial(Kind kind, SiteKind of, double bits, std::string values = "", int component = 0) {
+  return {{kind, of, component}, bits, 0, std::move(values)};
 }
 
 }  // namespace
@@ -36,51 +36,39 @@ void CandidateSearch::SearchAxis(int link) {
   const RightNode& right = pair_.right(link);
   const Vector3d given = joint.axis.normalized();
   const double open = joint.half_axis.sum() / std::max(joint.axis.norm(), 1e-9) + right.axis_tolerance;
-  const Site site{SiteKind::kAxis, link};
-  const auto offer = [&](CorrectionKind kind, int component, double bits, const Vector3d& axis,
-                         double more = 0.0) {
+  const auto offer = [&](const FileFault& fault, double bits, const Vector3d& axis, double more = 0.0) {
     if ((axis - right.axis).norm() > open + more) return;
-    const std::string values =
-        kind == CorrectionKind::kSign
-            ? ""
-            : fmt::format("({:.6g} {:.6g} {:.6g}), ({:.6g} {:.6g} {:.6g}) would be right", joint.axis.x(),
-                          joint.axis.y(), joint.axis.z(), axis.x(), axis.y(), axis.z());
-    AddSimple(kind, site, bits, values,
-              [&](const PrintedLink&, PrintedLink* after) { after->joint.axis = axis; });
-    found_.back().fault.component = component;
+    const std::string values = fault.kind == Kind::kSign ? "" : DescribeRight(joint.axis, axis);
+    AddSimple({fault, bits, 0, values}, link, [axis](PrintedLink* made) { made->joint.axis = axis; });
   };
-  for (const OriginFix& fix : ListVectorFixes(SiteKind::kAxis, given)) {
-    if (fix.kind != CorrectionKind::kSignOf)
-      offer(fix.kind, fix.component, fix.bits, FixVector(fix, SiteKind::kAxis, given));
-  }
+  for (const auto& [fault, axis] : ListAxisEdits(given)) offer(fault, 0.0, axis);
   const GivenNode& numbers = pair_.given(link);
   const Matrix3d& R = numbers.X.linear();
   if (!R.isIdentity(1e-9)) {
-    offer(CorrectionKind::kAlongParent, 0, 0.0, R.transpose() * given, numbers.pose.angle);
-    offer(CorrectionKind::kAlongToParent, 0, 0.0, R * given, numbers.pose.angle);
+    offer({Kind::kAlongParent, SiteKind::kAxis}, 0.0, R.transpose() * given, numbers.pose.angle);
+    offer({Kind::kAlongToParent, SiteKind::kAxis}, 0.0, R * given, numbers.pose.angle);
   }
-  const bool is_default =
-      (given - Vector3d::UnitX()).norm() < 1e-12 && pair_.a().format == RobotFormat::kUrdf;
-  if (is_default) offer(CorrectionKind::kMissing, 0, 2.0, right.axis);
+  if ((given - Vector3d::UnitX()).norm() < 1e-12 && pair_.a().format == RobotFormat::kUrdf)
+    offer({Kind::kMissing, SiteKind::kAxis}, 0.5, right.axis);
   const bool is_simple = right.axis.cwiseAbs().maxCoeff() > 1.0 - 1e-6;
-  offer(CorrectionKind::kOtherAxis, 0, is_simple ? 3.0 : 25.0, right.axis);
+  offer({Kind::kOtherAxis, SiteKind::kAxis}, is_simple ? 3.0 : 25.0, right.axis);
 }
 
 void CandidateSearch::SearchRange(int link) {
   const PrintedJoint& joint = pair_.a().link(link).joint;
   const PrintedJoint& other = pair_.b().link(pair_.Partner(link)).joint;
-  const Site site{SiteKind::kRange, link};
-  const auto take = [&](const PrintedLink&, PrintedLink* after) { after->joint.range = other.range; };
+  const auto add = [&](Kind kind, double bits, const std::string& values, int component = 0) {
+    AddSimple(MakeTrial(kind, SiteKind::kRange, bits, values, component), link,
+              [range = other.range](PrintedLink* made) { made->joint.range = range; });
+  };
   if (!joint.range)
-    return AddSimple(
-        CorrectionKind::kMissing, site, 3.0,
-        fmt::format("{:.6g} to {:.6g} would be right", (*other.range)[0].value, (*other.range)[1].value),
-        take);
-  if (!other.range) return AddSimple(CorrectionKind::kSurplus, site, 3.0, "", take);
+    return add(
+        Kind::kMissing, 3.0,
+        fmt::format("{:.6g} to {:.6g} would be right", (*other.range)[0].value, (*other.range)[1].value));
+  if (!other.range) return add(Kind::kSurplus, 3.0, "");
   const PrintedScalar lower = (*joint.range)[0], upper = (*joint.range)[1];
   const PrintedScalar right_lower = (*other.range)[0], right_upper = (*other.range)[1];
-  const auto offer = [&](CorrectionKind kind, int component, const PrintedScalar& low,
-                         const PrintedScalar& high) {
+  const auto offer = [&](Kind kind, int component, const PrintedScalar& low, const PrintedScalar& high) {
     double left = 0.0;
     for (const auto& [fixed, right, was] :
          {std::tuple(low, right_lower, lower), std::tuple(high, right_upper, upper)}) {
@@ -90,35 +78,34 @@ void CandidateSearch::SearchRange(int link) {
       if (!rest) return;
       left += *rest;
     }
-    AddSimple(kind, site, left, "", take);
-    found_.back().fault.component = component;
+    add(kind, left, "", component);
   };
-  offer(CorrectionKind::kSign, 0, {-upper.value, upper.half}, {-lower.value, lower.half});
+  offer(Kind::kSign, 0, {-upper.value, upper.half}, {-lower.value, lower.half});
   const std::span<const UnitFault> units = ListUnits(SiteKind::kRange);
   for (size_t k = 0; k < units.size(); ++k) {
     const double f = units[k].factor;
-    offer(CorrectionKind::kUnit, static_cast<int>(k), {f * lower.value, f * lower.half},
+    offer(Kind::kUnit, static_cast<int>(k), {f * lower.value, f * lower.half},
           {f * upper.value, f * upper.half});
   }
   constexpr const char* kNames[] = {"lower limit", "upper limit"};
   const double given[] = {lower.value, upper.value};
   const double right[] = {right_lower.value, right_upper.value};
   const double open[] = {lower.half + right_lower.half + 1e-9, upper.half + right_upper.half + 1e-9};
-  AddSimple(CorrectionKind::kNumber, site, CountEntries(2, given, right, open),
-            DescribeEntries(kNames, given, right, open), take);
+  add(Kind::kNumber, CountEntries(2, given, right, open), DescribeEntries(kNames, given, right, open));
 }
 
 void CandidateSearch::SearchMimic(int link) {
   const PrintedJoint& joint = pair_.a().link(link).joint;
   const PrintedJoint& other = pair_.b().link(pair_.Partner(link)).joint;
-  const Site site{SiteKind::kMimic, link};
-  const auto take = [&](const PrintedLink&, PrintedLink* after) { after->joint.mimic = other.mimic; };
-  if (!joint.mimic)
-    return AddSimple(
-        CorrectionKind::kMissing, site, 3.0,
-        fmt::format("{:.6g} times {} would be right", other.mimic->multiplier.value, other.mimic->leader),
-        take);
-  if (!other.mimic) return AddSimple(CorrectionKind::kSurplus, site, 3.0, "", take);
+  const auto add = [&](Kind kind, double bits, const std::string& values) {
+    AddSimple(MakeTrial(kind, SiteKind::kMimic, bits, values), link,
+              [mimic = other.mimic](PrintedLink* made) { made->joint.mimic = mimic; });
+  };
+  const auto show = [](const PrintedMimic& mimic) {
+    return fmt::format("{:.6g} times {}", mimic.multiplier.value, mimic.leader);
+  };
+  if (!joint.mimic) return add(Kind::kMissing, 3.0, show(*other.mimic) + " would be right");
+  if (!other.mimic) return add(Kind::kSurplus, 3.0, show(*joint.mimic));
   std::string values;
   double bits = 1.0;
   const auto say = [&](const char* name, const PrintedScalar& x, const PrintedScalar& y) {
@@ -128,80 +115,78 @@ void CandidateSearch::SearchMimic(int link) {
   };
   say("multiplier", joint.mimic->multiplier, other.mimic->multiplier);
   say("offset", joint.mimic->offset, other.mimic->offset);
+  if (joint.mimic->multiplier.value == -other.mimic->multiplier.value &&
+      !Differ(joint.mimic->offset, other.mimic->offset))
+    add(Kind::kSign, 0.0, values);
   if (values.empty())
     values = fmt::format("follows {}, {} would be right", joint.mimic->leader, other.mimic->leader);
-  AddSimple(CorrectionKind::kNumber, site, bits, values, take);
+  add(Kind::kNumber, bits, values);
 }
 
 void CandidateSearch::SearchScalar(int link, JointScalar scalar) {
   const PrintedRobot& a = pair_.a();
   const PrintedRobot& b = pair_.b();
-  const PrintedLink& other = b.link(pair_.Partner(link));
-  const Site site{ToSite(scalar), link};
   const auto at = static_cast<size_t>(scalar);
-  const std::optional<PrintedScalar> given = TakeScalar(a, a.link(link), scalar);
-  const std::optional<PrintedScalar> right = TakeScalar(b, other, scalar);
-  const auto take = [&](const PrintedLink&, PrintedLink* after) { after->joint.scalars[at] = right; };
+  const bool has_motors = a.has_motors && b.has_motors;
+  const std::optional<PrintedScalar> given = TakeScalar(a.link(link), scalar, has_motors);
+  const std::optional<PrintedScalar> right = TakeScalar(b.link(pair_.Partner(link)), scalar, has_motors);
+  const auto add = [&](Kind kind, double bits, const std::string& values = "", int component = 0,
+                       bool in_second = false) {
+    EditTrial trial = MakeTrial(kind, ToSite(scalar), bits, values, component);
+    trial.fault.in_second = in_second;
+    AddSimple(trial, link, [at, right](PrintedLink* made) { made->joint.scalars[at] = right; });
+  };
   if (scalar == JointScalar::kGear) {
-    if (given && given->value == 0.0 && !(right && right->value == 0.0))
-      return AddSimple(CorrectionKind::kMissing, site, 0.0, "the joint has no motor", take);
-    if (right && right->value == 0.0 && !(given && given->value == 0.0)) {
-      AddSimple(CorrectionKind::kMissing, site, 4.0, "the joint has no motor", take);
-      found_.back().fault.in_second = true;
-      return;
-    }
-    if (!given || !right) {
-      AddSimple(CorrectionKind::kSign, site, 0.0, "", take);
-      found_.back().fault.in_second = !given;
-      return;
-    }
+    const bool has_none = given && given->value == 0.0, lacks_none = right && right->value == 0.0;
+    if (has_none && !lacks_none) return add(Kind::kMissing, 0.0, "the joint has no motor");
+    if (lacks_none && !has_none) return add(Kind::kMissing, 4.0, "the joint has no motor", 0, true);
+    if (!given || !right) return add(Kind::kSign, 0.0, "", 0, !given);
   }
   if (!given || !right) return;
+  // A number that a whole file lacks is missing in it, whatever it is.
+  constexpr double kColumn = 0.1;
   if (given->value == 0.0)
-    AddSimple(CorrectionKind::kMissing, site, 3.0, fmt::format("{:.6g} would be right", right->value), take);
+    add(Kind::kMissing, PrintedPair::States(a, scalar) ? 3.0 : kColumn,
+        fmt::format("{:.6g} would be right", right->value));
   if (right->value == 0.0)
-    AddSimple(CorrectionKind::kSurplus, site, PrintedPair::States(b, scalar) ? 5.0 : 3.0,
-              fmt::format("{:.6g}", given->value), take);
-  if (given->value == -right->value) AddSimple(CorrectionKind::kSign, site, 0.0, "", take);
-  const std::span<const UnitFault> units = ListUnits(site.kind);
+    add(Kind::kSurplus, PrintedPair::States(b, scalar) ? 5.0 : kColumn, fmt::format("{:.6g}", given->value));
+  if (given->value == -right->value) add(Kind::kSign, 0.0);
+  const std::span<const UnitFault> units = ListUnits(ToSite(scalar));
   for (size_t k = 0; k < units.size() && given->value != 0.0 && right->value != 0.0; ++k) {
     const double f = units[k].factor;
-    if (Differ({given->value * f, given->half * std::abs(f)}, *right)) continue;
-    AddSimple(CorrectionKind::kUnit, site, 1.0, "", take);
-    found_.back().fault.component = static_cast<int>(k);
+    if (!Differ({given->value * f, given->half * std::abs(f)}, *right))
+      add(Kind::kUnit, 1.0, "", static_cast<int>(k));
   }
-  AddSimple(CorrectionKind::kNumber, site, CountBits(right->value, right->half),
-            DescribeRight(given->value, right->value), take);
+  add(Kind::kNumber, CountBits(right->value, right->half), DescribeRight(given->value, right->value));
 }
 
 void CandidateSearch::SearchJoint(int link) {
   const PrintedLink& given = pair_.a().link(link);
   const PrintedLink& other = pair_.b().link(pair_.Partner(link));
+  const RightNode& right = pair_.right(link);
   if (IsWrong(link, SiteKind::kCarrier)) {
-    const int parent = pair_.node_b(pair_.Partner(link)).parent;
-    AddSimple(CorrectionKind::kNumber, {SiteKind::kCarrier, link}, 8.0,
-              fmt::format("{} carries it, {} would be right", pair_.a().link(pair_.node(link).parent).name,
-                          pair_.b().link(parent).name),
-              [](const PrintedLink&, PrintedLink*) {});
+    const auto name = [](const PrintedRobot& robot, int parent) {
+      return parent < 0 ? std::string("the world") : robot.link(parent).name;
+    };
+    const std::string values =
+        fmt::format("{} carries it, {} would be right", name(pair_.a(), pair_.node(link).parent),
+                    name(pair_.b(), pair_.node_b(pair_.Partner(link)).parent));
+    AddSimple(MakeTrial(Kind::kNumber, SiteKind::kCarrier, 8.0, values), link, [](PrintedLink*) {});
   }
-  if (IsWrong(link, SiteKind::kType)) {
-    AddSimple(CorrectionKind::kNumber, {SiteKind::kType, link}, 3.0,
-              fmt::format("{}, {} would be right", NameJointKind(given.joint.kind),
-                          NameJointKind(other.joint.kind)),
-              [&](const PrintedLink&, PrintedLink* after) {
-                after->joint = other.joint;
-                after->joint.axis = pair_.right(link).axis;
-                after->joint.anchor = pair_.right(link).anchor;
+  if (IsWrong(link, SiteKind::kType) && given.joint.kind != other.joint.kind) {
+    AddSimple(MakeTrial(Kind::kNumber, SiteKind::kType, 3.0,
+                        fmt::format("{}, {} would be right", NameKind(given), NameKind(other))),
+              link, [&](PrintedLink* made) {
+                made->joint = other.joint;
+                made->joint.axis = right.axis;
+                made->joint.anchor = right.anchor;
               });
   }
   if (IsWrong(link, SiteKind::kAxis)) SearchAxis(link);
   if (IsWrong(link, SiteKind::kAxisPoint)) {
-    const Vector3d& right = pair_.right(link).anchor;
     AddSimple(
-        CorrectionKind::kNumber, {SiteKind::kAxisPoint, link}, 20.0,
-        fmt::format("({:.6g} {:.6g} {:.6g}), ({:.6g} {:.6g} {:.6g}) would be right", given.joint.anchor.x(),
-                    given.joint.anchor.y(), given.joint.anchor.z(), right.x(), right.y(), right.z()),
-        [&](const PrintedLink&, PrintedLink* after) { after->joint.anchor = right; });
+        MakeTrial(Kind::kNumber, SiteKind::kAxisPoint, 20.0, DescribeRight(given.joint.anchor, right.anchor)),
+        link, [&](PrintedLink* made) { made->joint.anchor = right.anchor; });
   }
   if (IsWrong(link, SiteKind::kRange)) SearchRange(link);
   if (IsWrong(link, SiteKind::kMimic)) SearchMimic(link);
@@ -210,31 +195,47 @@ void CandidateSearch::SearchJoint(int link) {
   }
 }
 
-void CandidateSearch::SearchNames() {
+/// Names, joints that one file lacks, and what is of the whole robot.
+void CandidateSearch::SearchRobot() {
+  const PrintedRobot& a = pair_.a();
+  const PrintedRobot& b = pair_.b();
   for (const Site& site : sites_) {
+    const auto add = [&](Kind kind, double bits, const std::string& values, int component = 0) {
+      Add(MakeTrial(kind, site.kind, bits, values, component), site.link, {site});
+    };
     if (site.kind == SiteKind::kName) {
-      const std::string& right = pair_.b().link(pair_.Partner(site.link)).joint.name;
-      AddSimple(CorrectionKind::kExchanged, site, 1.0,
-                fmt::format("{} should be {}", pair_.a().link(site.link).joint.name, right),
-                [&](const PrintedLink&, PrintedLink* after) { after->joint.name = right; });
+      const std::string right = b.link(pair_.Partner(site.link)).joint.name;
+      AddSimple(MakeTrial(Kind::kExchanged, SiteKind::kName, 1.0,
+                          fmt::format("{} should be {}", a.link(site.link).joint.name, right)),
+                site.link, [right](PrintedLink* made) { made->joint.name = right; });
     } else if (site.kind == SiteKind::kPresence) {
       const bool second = site.link < 0;
-      const PrintedLink& link = second ? pair_.b().link(-1 - site.link) : pair_.a().link(site.link);
-      FileFault fault;
-      fault.kind = second ? CorrectionKind::kMissing : CorrectionKind::kSurplus;
-      fault.of = SiteKind::kPresence;
-      Add(fault, site.link, {site}, 3.0, {}, fmt::format("joint {}, link {}", link.joint.name, link.name));
+      const PrintedLink& link = second ? b.link(-1 - site.link) : a.link(site.link);
+      add(second ? Kind::kMissing : Kind::kSurplus, 3.0,
+          fmt::format("joint {}, link {}", link.joint.name, link.name));
+    } else if (site.kind == SiteKind::kType && site.link == 0 && a.floats && b.floats) {
+      const auto name = [](bool floats) { return floats ? "floating" : "fixed"; };
+      add(Kind::kNumber, 3.0, fmt::format("{} base, {} would be right", name(*a.floats), name(*b.floats)));
+    } else if (site.kind == SiteKind::kConstraint) {
+      const auto list = [](const PrintedRobot& robot, const PrintedRobot& other) {
+        std::vector<std::string> only;
+        std::ranges::set_difference(robot.constraints, other.constraints, std::back_inserter(only));
+        return only;
+      };
+      const std::vector<std::string> lacking = list(b, a), surplus = list(a, b);
+      if (!lacking.empty()) add(Kind::kMissing, 3.0, JoinNames(lacking));
+      if (lacking.empty()) add(Kind::kSurplus, 3.0, JoinNames(surplus));
     } else if (site.kind == SiteKind::kGravity) {
-      const Vector3d& given = *pair_.a().gravity;
-      const Vector3d& right = *pair_.b().gravity;
-      FileFault fault;
-      fault.of = SiteKind::kGravity;
-      fault.kind = (given + right).norm() <= 1e-9 ? CorrectionKind::kSign : CorrectionKind::kNumber;
+      const Vector3d& given = *a.gravity;
+      const Vector3d& right = *b.gravity;
       const Vector3d open = Vector3d::Constant(1e-6);
-      Add(fault, 0, {site},
-          fault.kind == CorrectionKind::kSign ? 0.0
-                                              : CountEntries(3, given.data(), right.data(), open.data()),
-          {}, DescribeEntries(kAxisNames, given.data(), right.data(), open.data()));
+      const double size = right.norm();
+      const std::string values = DescribeEntries(kAxisNames, given.data(), right.data(), open.data());
+      if ((given + right).norm() <= 1e-6 * size) add(Kind::kSign, 0.0, values);
+      if (given.isZero()) add(Kind::kMissing, 0.0, values);
+      if ((1e-3 * given - right).norm() <= 1e-6 * size) add(Kind::kUnit, 0.0, values);
+      if (std::abs(given.norm() - size) <= 1e-6 * size) add(Kind::kOtherAxis, 3.0, values);
+      add(Kind::kNumber, CountEntries(3, given.data(), right.data(), open.data()), values);
     }
   }
 }

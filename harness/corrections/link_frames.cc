@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "harness/corrections/origin_fixes.h"
+#include "harness/corrections/edits.h"
 
 namespace dexcheck {
 namespace {
@@ -18,6 +18,7 @@ constexpr double kWrongBody = 15.0;
 constexpr double kConventionBits = 13.0;
 constexpr double kOtherJoint = 16.0;
 constexpr double kNumberOfOrigin = 24.0;
+constexpr double kMissingPosition = 20.0;
 constexpr double kWrongOrigin = 40.0;
 constexpr double kWrongRotation = 25.0;
 constexpr double kWrongLength = 14.0;
@@ -50,7 +51,7 @@ class FrameChooser {
   FrameChooser(const PrintedPair& pair, const FrameOptions& options) : pair_(pair), options_(options) {
     axes_.resize(pair.a().links.size());
     for (const int link : pair.links()) {
-      if (!pair.IsPlaced(link)) continue;
+      if (pair.Carrier(link) < 0) continue;
       AddAxis(link, link, Pose::Identity(), Pose::Identity(), {}, {});
       const int j = pair.Partner(link);
       AddAxis(pair.node(link).parent, link, pair.given(link).X, pair.other(j).X, pair.given(link).pose,
@@ -67,7 +68,7 @@ class FrameChooser {
     const auto others = CountOthers(states[0].X_ab);
     const auto moving =
         std::ranges::count_if(pair_.links(), [&](int link) { return Moves(pair_.a().link(link)); });
-    other_frame_ = others >= std::max(2.0, kFraction * static_cast<double>(moving)) ? kManyFrames : kFew;
+    other_frame_ = others >= std::max(3.0, kFraction * static_cast<double>(moving)) ? kManyFrames : kFew;
     states = Walk();
     std::vector<ChosenFrames> frames;
     for (FrameState& state : states) {
@@ -101,7 +102,7 @@ class FrameChooser {
     states[0].X_ab.assign(pair_.a().links.size(), Pose::Identity());
     std::vector<FrameState> next;
     for (const int link : pair_.links()) {
-      if (!pair_.IsPlaced(link)) continue;
+      if (pair_.Carrier(link) < 0) continue;
       next.clear();
       for (FrameState& state : states) {
         const std::vector<FrameChoice> choices =
@@ -165,25 +166,17 @@ class FrameChooser {
   /// their bits.
   [[nodiscard]] std::vector<FrameChoice> ListUndone(int link) const {
     std::vector<FrameChoice> poses;
+    PrintedLink right;
     for (const int k : pair_.node(link).chain) {
       const PrintedOrigin& origin = pair_.a().link(k).origin;
-      PrintedOrigin right = origin;
-      for (const OriginFix& fix : ListRotationFixes(origin)) {
-        right = origin;
-        FixRotation(fix, origin, &right);
-        poses.push_back({kConventionBits + fix.bits, ReplaceOrigin(link, k, right.CalcPose())});
+      for (const LinkEdit& edit : ListOriginEdits(origin)) {
+        right.origin = origin;
+        edit.undo(&right);
+        poses.push_back({kConventionBits + edit.bits, ReplaceOrigin(link, k, right.origin.CalcPose())});
       }
-      if (origin.form != RotationForm::kMdh) {
-        right = origin;
-        for (const OriginFix& fix : ListVectorFixes(SiteKind::kPosition, origin.t)) {
-          right.t = FixVector(fix, SiteKind::kPosition, origin.t);
-          poses.push_back({kConventionBits + fix.bits, ReplaceOrigin(link, k, right.CalcPose())});
-        }
-      }
-      poses.push_back({kConventionBits, ReplaceOrigin(link, k, origin.CalcPose().inverse())});
     }
     for (const int other : pair_.links()) {
-      if (other == link || !pair_.IsPlaced(other) ||
+      if (other == link || pair_.Carrier(other) < 0 ||
           pair_.a().link(other).joint.kind != pair_.a().link(link).joint.kind)
         continue;
       const int last = pair_.node(link).chain.back();
@@ -204,6 +197,7 @@ class FrameChooser {
     const bool moved =
         ((X.translation() - X_right.translation()).cwiseAbs().array() > open.length.array()).any();
     if (!turned || !moved) bits = kNumberOfOrigin;
+    if (!turned && X.translation().isZero()) bits = kMissingPosition;
     for (const int k : pair_.node(link).chain) {
       const PrintedOrigin& origin = pair_.a().link(k).origin;
       const Pose before = FindBefore(link, k);
@@ -238,7 +232,9 @@ class FrameChooser {
     open.length += X_ab_P.linear().cwiseAbs() * other.pose.length;
     const PrintedLink& own = pair_.a().link(link);
     const bool same_name = own.name == pair_.b().link(pair_.Partner(link)).name;
-    const bool is_held = own.joint.kind == JointKind::kFixed && same_name && other_frame_ > kManyFrames;
+    const bool is_frame = own.is_frame || pair_.b().link(pair_.Partner(link)).is_frame;
+    const bool is_held =
+        own.joint.kind == JointKind::kFixed && same_name && (is_frame || other_frame_ > kManyFrames);
     if (is_held || IsSame(given.X, X_right, open))
       return {{is_held ? 0.0 : Weigh(link, Pose::Identity()), Pose::Identity()}};
     const std::vector<FrameChoice> undone = ListUndone(link);

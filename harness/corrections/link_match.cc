@@ -48,7 +48,12 @@ class LinkMatcher {
       if (Moves(b_.link(j))) joints.emplace(b_.link(j).joint.name, j);
     }
     for (int i = 0; i < a_.size(); ++i) {
-      if (const auto found = links.find(a_.link(i).name); found != links.end()) Take(i, found->second);
+      const auto found = links.find(a_.link(i).name);
+      if (found == links.end()) continue;
+      // A frame on a link has the name of no link that moves.
+      const PrintedLink& other = b_.link(found->second);
+      const bool is_frame = a_.link(i).is_frame || other.is_frame;
+      if (!is_frame || (!Moves(a_.link(i)) && !Moves(other))) Take(i, found->second);
     }
     std::vector<int> by_joint;
     for (int i = 0; i < a_.size(); ++i) {
@@ -151,6 +156,24 @@ class LinkMatcher {
           Take(k, next_b[0]);
         }
       }
+      MatchWelded(i, j);
+    }
+  }
+
+  /// Pairs bodies that are welded to a link under other names, where both files have as many, in their order.
+  void MatchWelded(int i, int j) {
+    const auto list = [](const PrintedRobot& robot, int link, const std::vector<int>& other) {
+      std::vector<int> welded;
+      for (const int k : robot.link(link).children) {
+        if (robot.link(k).inertial && robot.link(k).joint.kind == JointKind::kFixed && other[Index(k)] < 0)
+          welded.push_back(k);
+      }
+      return welded;
+    };
+    const std::vector<int> ours = list(a_, i, match_.b_of_a), theirs = list(b_, j, match_.a_of_b);
+    if (ours.size() != theirs.size()) return;
+    for (size_t k = 0; k < ours.size(); ++k) {
+      if (CountMoving(a_, ours[k]) == CountMoving(b_, theirs[k])) Take(ours[k], theirs[k]);
     }
   }
 
@@ -159,15 +182,17 @@ class LinkMatcher {
   LinkMatch match_;
 };
 
-template <typename Measure, typename Tolerance>
-void AddHalves(PrintedOrigin* origin, const Measure& measure, Tolerance* tolerance) {
+/// Adds what half units of these numbers change.
+template <typename Part, typename Measure, typename Tolerance>
+void AddHalves(Part* part, const Measure& measure, Tolerance* tolerance) {
   const auto nominal = measure();
-  VisitNumbers(origin, [&](double* number, double half) {
-    const double value = *number;
-    *number = value + half;
+  for (const LinkNumber& number : ListNumbers(part)) {
+    if (*number.half <= 0.0) continue;
+    const double value = *number.value;
+    *number.value = value + *number.half;
     AddChange(nominal, measure(), tolerance);
-    *number = value;
-  });
+    *number.value = value;
+  }
 }
 
 }  // namespace
@@ -191,13 +216,11 @@ std::vector<Node> ListNodes(const PrintedRobot& robot, const std::vector<int>& o
     if (other[at] >= 0 || link.parent < 0) {
       Node& node = nodes[at];
       home[at] = node.link = i;
-      if (link.parent >= 0) {
-        int from = i;
-        for (; from >= 0 && (from == i || nodes[static_cast<size_t>(from)].link < 0);
-             from = robot.link(from).parent)
-          node.chain.insert(node.chain.begin(), from);
-        node.parent = from;
-      }
+      int from = i;
+      for (; from >= 0 && (from == i || nodes[static_cast<size_t>(from)].link < 0);
+           from = robot.link(from).parent)
+        node.chain.insert(node.chain.begin(), from);
+      node.parent = from;
     } else if (!Moves(link) && above >= 0) {
       home[at] = above;
     }
@@ -268,16 +291,10 @@ BodyNumbers CalcBodyTolerance(const Node& node, PrintedRobot* robot) {
   BodyNumbers tolerance;
   const BodyNumbers body = CalcNodeBody(*robot, node);
   const auto measure = [&] { return CalcNodeBody(*robot, node); };
-  const auto add = [&](double* number, double half) {
-    const double value = *number;
-    *number = value + half;
-    AddChange(body, measure(), &tolerance);
-    *number = value;
-  };
   for (const int part : node.parts) {
-    VisitNumbers(&*robot->link(part).inertial, add);
+    AddHalves(&*robot->link(part).inertial, measure, &tolerance);
     for (int link = part; link != node.link; link = robot->link(link).parent)
-      VisitNumbers(&robot->link(link).origin, add);
+      AddHalves(&robot->link(link).origin, measure, &tolerance);
   }
   tolerance.mass += kLeast * std::abs(body.mass);
   tolerance.com.array() += kLeast;

@@ -24,7 +24,7 @@ bool Moves(const PrintedLink& link);
 /// A link that both files have, and what is welded to it and only this file has.
 struct Node {
   int link = -1;
-  int parent = -1;         ///< The link of the node that carries it; -1 for the root.
+  int parent = -1;         ///< The link of the node that carries it; -1: the world.
   std::vector<int> chain;  ///< Links whose origins lead from there to it, itself last.
   std::vector<int> parts;  ///< Links with an inertial that move with it.
 };
@@ -53,25 +53,6 @@ BodyNumbers CalcNodeBody(const PrintedRobot& robot, const Node& node);
 /// What half units of the digits leave open of these. @param robot is changed and put back.
 PoseTolerance CalcPoseTolerance(const Node& node, PrintedRobot* robot);
 BodyNumbers CalcBodyTolerance(const Node& node, PrintedRobot* robot);
-
-/// Calls visit(number, half unit) for each number that is not exact.
-template <typename Visit>
-void VisitNumbers(PrintedOrigin* origin, const Visit& visit) {
-  for (int k = 0; k < 3; ++k) {
-    if (origin->half_t[k] > 0.0) visit(&origin->t[k], origin->half_t[k]);
-  }
-  for (int k = 0; k < 4; ++k) {
-    if (origin->half_r[k] > 0.0) visit(&origin->r[k], origin->half_r[k]);
-  }
-}
-template <typename Visit>
-void VisitNumbers(PrintedInertial* inertial, const Visit& visit) {
-  if (inertial->mass.half > 0.0) visit(&inertial->mass.value, inertial->mass.half);
-  for (int k = 0; k < 6; ++k) {
-    if (inertial->half_I[k] > 0.0) visit(&inertial->I[k], inertial->half_I[k]);
-  }
-  VisitNumbers(&inertial->origin, visit);
-}
 
 /// Adds |after - before|.
 void AddChange(const Pose& before, const Pose& after, PoseTolerance* tolerance);

@@ -1,12 +1,36 @@
 #include <fmt/format.h>
 
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 
 #include "harness/corrections/candidate_search.h"
-#include "harness/corrections/origin_fixes.h"
 
 namespace dexcheck {
+namespace {
+
+bool TurnsQuarters(const Matrix3d& R) {
+  return (R.cwiseAbs().array() - R.cwiseAbs().array().round()).abs().maxCoeff() < 1e-4;
+}
+
+/// Bits of an angle: few of quarter turns.
+double CountAngle(double angle, double half) {
+  constexpr double kQuarter = 5.0;
+  const bool is_quarter = std::abs(std::remainder(angle, kPi / 2.0)) <= std::max(half, 1e-4);
+  return is_quarter ? kQuarter : CountBits(angle, half);
+}
+
+std::string ShowAngles(const Matrix3d& R) {
+  const Vector3d angles = SolveRollPitchYaw(R)[0];
+  return fmt::format("roll pitch yaw {:.6g} {:.6g} {:.6g}", angles[0], angles[1], angles[2]);
+}
+
+LinkUndo TakeRotation(const Matrix3d& R) {
+  return [R](PrintedLink* link) { link->origin.SetRotation(R); };
+}
+
+}  // namespace
 
 struct CandidateSearch::Origin {
   int link;       ///< Whose origin it is,
@@ -19,8 +43,13 @@ struct CandidateSearch::Origin {
   bool turned, moved;  ///< What is wrong of it.
   double open_angle;
   Vector3d open_length;
-  SiteMask rotation, position;  ///< What a change of it may put right.
-  Demand demand;
+
+  [[nodiscard]] EditTrial Make(CorrectionKind kind, SiteKind of, double bits, std::string values = "",
+                               bool whole = false) const {
+    EditTrial trial{{kind, of}, bits + extra, kPoseMask | kBodyMask, std::move(values), whole};
+    trial.fault.whole = whole;
+    return trial;
+  }
 };
 
 void CandidateSearch::SearchPlace(int link) {
@@ -50,68 +79,55 @@ void CandidateSearch::SearchPlace(int link) {
     origin.moved =
         ((X.translation() - origin.right.translation()).cwiseAbs().array() > origin.open_length.array())
             .any();
-    origin.rotation = one ? MaskOf(SiteKind::kRotation) : kPoseMask | kBodyMask;
-    origin.position = one ? MaskOf(SiteKind::kPosition) : kPoseMask | kBodyMask;
-    origin.demand = one ? Demand::kAll : Demand::kSome;
-    if (origin.given.form == RotationForm::kMdh) SearchRow(origin);
-    if (origin.turned && (one || !origin.moved)) {
-      SearchRotation(origin);
-      SearchRotationNumbers(origin);
+    EditFrames frames{false, {X}};
+    if (origin.turned) frames.X_PL.push_back(origin.right);
+    const bool turns = origin.turned && (one || !origin.moved);
+    const bool moves = origin.moved && (one || !origin.turned);
+    for (const LinkEdit& edit : ListOriginEdits(origin.given, frames)) {
+      const bool whole = edit.fault.whole;
+      const bool is_shift = edit.fault.kind == CorrectionKind::kInverse && moves;
+      const bool is_tried =
+          whole ? origin.given.form == RotationForm::kMdh || is_shift || (origin.turned && origin.moved)
+                : (edit.fault.of == SiteKind::kRotation ? turns : moves);
+      if (is_tried)
+        Try({edit.fault, edit.bits + origin.extra, kPoseMask | kBodyMask, "", whole}, k, edit.undo);
     }
-    if (origin.moved && (one || !origin.turned)) SearchPosition(origin);
-    if (origin.turned && origin.moved) SearchPose(origin);
+    if (origin.given.form == RotationForm::kMdh) {
+      SearchRowNumbers(origin);
+    } else {
+      if (moves) SearchPositionNumbers(origin);
+      if (origin.turned && origin.moved) SearchPoseNumbers(origin);
+    }
+    if (turns) SearchRotationNumbers(origin);
     before = before * X;
   }
-  if (one) SearchSecond(link);
-}
-
-void CandidateSearch::SearchRotation(const Origin& origin) {
-  const auto trial = [&](CorrectionKind kind, int component, double bits) {
-    return EditTrial{
-        {kind, SiteKind::kRotation, component}, bits + origin.extra, origin.rotation, origin.demand};
-  };
-  for (const OriginFix& fix : ListRotationFixes(origin.given)) {
-    Try(trial(fix.kind, fix.component, fix.bits), origin.link,
-        [&](const PrintedLink& before, PrintedLink* after) {
-          FixRotation(fix, before.origin, &after->origin);
-        });
-  }
-  const Matrix3d& R = origin.right.linear();
-  const Matrix3d given = origin.given.CalcRotation();
-  const auto turns_quarters = [](const Matrix3d& M) {
-    return (M.cwiseAbs().array() - M.cwiseAbs().array().round()).abs().maxCoeff() < 1e-4;
-  };
-  if (CalcAngle(R) <= origin.open_angle) {
-    Try(trial(CorrectionKind::kSurplus, 0, turns_quarters(given) ? 5.0 : 15.0), origin.link,
-        [](const PrintedLink&, PrintedLink* after) { after->origin.SetRotation(Matrix3d::Identity()); });
-  }
-  if (!given.isIdentity(1e-12)) return;
-  const bool quarters = turns_quarters(R);
-  EditTrial missing = trial(CorrectionKind::kMissing, 0, quarters ? 5.0 : 15.0);
-  const Vector3d angles = SolveRollPitchYaw(R)[0];
-  missing.values =
-      fmt::format("roll pitch yaw {:.6g} {:.6g} {:.6g} would be right", angles[0], angles[1], angles[2]);
-  Try(missing, origin.link, [&](const PrintedLink&, PrintedLink* after) { after->origin.SetRotation(R); });
 }
 
 void CandidateSearch::SearchRotationNumbers(const Origin& origin) {
   const Matrix3d given = origin.given.CalcRotation();
-  const Matrix3d& right = origin.right.linear();
+  const Matrix3d right = origin.right.linear();
   const double half = std::max(origin.open_angle, 1e-6);
   const Vector3d turn = CalcRotationVector(given.transpose() * right);
   const double angle = turn.norm();
-  const auto take = [&](const PrintedLink&, PrintedLink* after) { after->origin.SetRotation(right); };
   const auto offer = [&](CorrectionKind kind, double bits, std::string values) {
-    Try({{kind, SiteKind::kRotation}, bits + origin.extra, origin.rotation, origin.demand, std::move(values)},
-        origin.link, take);
+    Try(origin.Make(kind, SiteKind::kRotation, bits, std::move(values)), origin.link, TakeRotation(right));
   };
+  if (CalcAngle(right) <= origin.open_angle)
+    offer(CorrectionKind::kSurplus, TurnsQuarters(given) ? 5.0 : 15.0, "");
+  if (given.isIdentity(1e-12)) {
+    const Vector3d none = Vector3d::Zero(), angles = SolveRollPitchYaw(right)[0];
+    const Vector3d open = Vector3d::Constant(half);
+    const double bits = 4.0 + 0.35 * CountEntries(3, none.data(), angles.data(), open.data());
+    offer(CorrectionKind::kMissing, TurnsQuarters(right) ? 5.0 : bits, ShowAngles(right) + " would be right");
+  }
   const PrintedJoint& joint = pair_.a().link(origin.node).joint;
   const Vector3d axis = joint.axis.normalized();
   if (joint.kind == JointKind::kHinge && origin.is_last) {
     const double across = axis.cross(turn).norm();
     const std::optional<double> left = CountLeft(across / origin.open_angle, angle / origin.open_angle);
     if (left)
-      offer(CorrectionKind::kZero, 1.0 + 2.0 * *left + CountBits(angle, half),
+      offer(CorrectionKind::kZero,
+            1.0 + 2.0 * *left + (CalcAngle(right) <= half ? CountBits(0.0, half) : CountAngle(angle, half)),
             fmt::format("off by {:.6g} deg", RadToDeg(turn.dot(axis))));
   }
   bool is_one_angle = false;
@@ -147,7 +163,7 @@ void CandidateSearch::SearchRotationNumbers(const Origin& origin) {
     Vector3d rest = turn;
     rest[k] = 0.0;
     if (rest.norm() <= origin.open_angle)
-      offer(CorrectionKind::kNumber, 2.0 + CountBits(angle, half),
+      offer(CorrectionKind::kNumber, 2.0 + CountAngle(angle, half),
             fmt::format("turned about its own {} by {:.6g} deg", kAxisNames[k], -RadToDeg(turn[k])));
   }
   const Vector3d way = turn / angle;
@@ -157,151 +173,153 @@ void CandidateSearch::SearchRotationNumbers(const Origin& origin) {
                     way[1], way[2]));
 }
 
-void CandidateSearch::SearchPosition(const Origin& origin) {
+void CandidateSearch::SearchPositionNumbers(const Origin& origin) {
   const Vector3d& t = origin.given.t;
-  const Vector3d& right = origin.right.translation();
-  const auto trial = [&](CorrectionKind kind, int component, double bits) {
-    return EditTrial{
-        {kind, SiteKind::kPosition, component}, bits + origin.extra, origin.position, origin.demand};
-  };
-  if (origin.given.form == RotationForm::kMdh) return;
-  for (const OriginFix& fix : ListVectorFixes(SiteKind::kPosition, t)) {
-    Try(trial(fix.kind, fix.component, fix.bits), origin.link,
-        [&](const PrintedLink& before, PrintedLink* after) {
-          after->origin.t = FixVector(fix, SiteKind::kPosition, before.origin.t);
-        });
-  }
+  const Vector3d right = origin.right.translation();
   const Vector3d open = origin.open_length;
-  EditTrial number = trial(CorrectionKind::kNumber, 0, CountEntries(3, t.data(), right.data(), open.data()));
-  number.values = DescribeEntries(kAxisNames, t.data(), right.data(), open.data());
-  const auto take = [&](const PrintedLink&, PrintedLink* after) { after->origin.t = right; };
-  if (t.isZero()) {
-    EditTrial missing = number;
-    missing.fault.kind = CorrectionKind::kMissing;
-    missing.bits = 3.0 + origin.extra + (origin.is_last ? 0.0 : 8.0) + 0.25 * number.bits;
-    Try(missing, origin.link, take);
-  }
-  const auto turned = [&](CorrectionKind kind, const Matrix3d& R, double bits) {
-    if (R.isIdentity(1e-9)) return;
-    Try(trial(kind, 0, bits), origin.link,
-        [&](const PrintedLink& before, PrintedLink* after) { after->origin.t = R * before.origin.t; });
-  };
-  for (const Matrix3d& R : {origin.given.CalcRotation(), Matrix3d(origin.right.linear())}) {
-    turned(CorrectionKind::kAlongLink, R, 1.0);
-    turned(CorrectionKind::kAlongToParent, R.transpose(), 1.0);
-    turned(CorrectionKind::kInverse, -R.transpose(), 2.0);
-    if (!origin.turned) break;
-  }
-  Try(number, origin.link, take);
+  const double bits = CountEntries(3, t.data(), right.data(), open.data());
+  const std::string values = DescribeEntries(kAxisNames, t.data(), right.data(), open.data());
+  const auto take = [right](PrintedLink* link) { link->origin.t = right; };
+  if (t.isZero())
+    Try(origin.Make(CorrectionKind::kMissing, SiteKind::kPosition,
+                    3.0 + (origin.is_last ? 0.0 : 8.0) + 0.25 * (bits + origin.extra), values),
+        origin.link, take);
+  Try(origin.Make(CorrectionKind::kNumber, SiteKind::kPosition, bits, values), origin.link, take);
 }
 
-void CandidateSearch::SearchPose(const Origin& origin) {
-  const auto trial = [&](CorrectionKind kind, int component, double bits) {
-    EditTrial made{{kind, SiteKind::kPosition, component},
-                   bits + origin.extra,
-                   origin.rotation | origin.position,
-                   origin.demand};
-    made.fault.whole = true;
-    return made;
-  };
-  const auto set = [](const Pose& X, PrintedOrigin* origin_) {
-    origin_->SetRotation(X.linear());
-    origin_->t = X.translation();
-  };
-  Try(trial(CorrectionKind::kInverse, 0, 0.0), origin.link,
-      [&](const PrintedLink& before, PrintedLink* after) {
-        set(before.origin.CalcPose().inverse(), &after->origin);
-      });
-  for (int k = 0; k < 3; ++k) {
-    Try(trial(CorrectionKind::kMirror, k, 0.0), origin.link,
-        [&](const PrintedLink& before, PrintedLink* after) {
-          const Matrix3d M = MakeMirror(k);
-          after->origin.SetRotation(M * before.origin.CalcRotation() * M);
-          after->origin.t = M * before.origin.t;
-        });
-  }
-  const auto take = [&](const PrintedLink&, PrintedLink* after) { set(origin.right, &after->origin); };
-  const Vector3d angles = SolveRollPitchYaw(origin.right.linear())[0];
-  const Vector3d& t = origin.right.translation();
+void CandidateSearch::SearchPoseNumbers(const Origin& origin) {
+  const Vector3d t = origin.right.translation();
+  const Matrix3d R = origin.right.linear();
   const std::string values =
-      fmt::format("xyz {:.6g} {:.6g} {:.6g}, roll pitch yaw {:.6g} {:.6g} {:.6g} would be right", t[0], t[1],
-                  t[2], angles[0], angles[1], angles[2]);
-  if (origin.given.CalcPose().isApprox(Pose::Identity(), 1e-12)) {
-    EditTrial missing = trial(CorrectionKind::kMissing, 0, origin.is_last ? 25.0 : 33.0);
-    missing.values = values;
-    Try(missing, origin.link, take);
-  }
-  if (origin.is_alone) return;
-  EditTrial number = trial(CorrectionKind::kNumber, 0, 60.0);
-  number.values = values;
-  Try(number, origin.link, take);
+      fmt::format("xyz {:.6g} {:.6g} {:.6g}, {} would be right", t[0], t[1], t[2], ShowAngles(R));
+  const auto offer = [&](CorrectionKind kind, double bits) {
+    Try(origin.Make(kind, SiteKind::kPosition, bits, values, true), origin.link, [=](PrintedLink* link) {
+      link->origin.SetRotation(R);
+      link->origin.t = t;
+    });
+  };
+  if (origin.given.CalcPose().isApprox(Pose::Identity(), 1e-12))
+    offer(CorrectionKind::kMissing, origin.is_last ? 25.0 : 33.0);
+  if (!origin.is_alone) offer(CorrectionKind::kNumber, 60.0);
 }
 
-void CandidateSearch::SearchRow(const Origin& origin) {
+void CandidateSearch::SearchRowNumbers(const Origin& origin) {
   const Pose X = origin.given.X_before.inverse() * origin.right;
-  const Matrix3d& R = X.linear();
+  const Matrix3d R = X.linear();
   const double alpha = std::atan2(-R(1, 2), R(2, 2));
   const double q = std::atan2(-R(0, 1), R(0, 0));
   const double d = std::abs(std::cos(alpha)) > 0.5 ? X.translation().z() / std::cos(alpha)
                                                    : -X.translation().y() / std::sin(alpha);
   const double near = std::remainder(q - origin.given.r[1], 2.0 * kPi) + origin.given.r[1];
-  const double given[] = {origin.given.r[0], origin.given.t[0], origin.given.r[1], origin.given.t[2]};
-  const double right[] = {alpha, X.translation().x(), near, d};
+  const Vector4d given(origin.given.r[0], origin.given.t[0], origin.given.r[1], origin.given.t[2]);
+  const Vector4d right(alpha, X.translation().x(), near, d);
   const double length = std::max(origin.open_length.maxCoeff(), 1e-9);
-  const double open[] = {origin.open_angle, length, origin.open_angle, length};
+  const Vector4d open(origin.open_angle, length, origin.open_angle, length);
   constexpr const char* kNames[] = {"alpha", "a", "q", "d"};
-  const auto set = [](const double(&row)[4], PrintedOrigin* after) {
-    after->r[0] = row[0];
-    after->t[0] = row[1];
-    after->r[1] = row[2];
-    after->t[2] = row[3];
-  };
-  const auto trial = [&](CorrectionKind kind, int component, double bits) {
-    EditTrial made{{kind, SiteKind::kPosition, component}, bits, kPoseMask, Demand::kAll};
-    made.fault.whole = true;
-    return made;
-  };
-  EditTrial number = trial(CorrectionKind::kNumber, 0, CountEntries(4, given, right, open));
-  number.values = DescribeEntries(kNames, given, right, open);
-  Try(number, origin.link, [&](const PrintedLink&, PrintedLink* after) { set(right, &after->origin); });
-  for (int k = 0; k < 4; ++k) {
-    double row[] = {given[0], given[1], given[2], given[3]};
-    if (row[k] == 0.0) continue;
-    row[k] = -row[k];
-    EditTrial sign = trial(CorrectionKind::kSignOf, k, 1.0);
-    sign.values = kNames[k];
-    Try(sign, origin.link, [&](const PrintedLink&, PrintedLink* after) { set(row, &after->origin); });
-    row[k] = k % 2 == 0 ? DegToRad(given[k]) : given[k] * 1e-3;
-    EditTrial unit = trial(k % 2 == 0 ? CorrectionKind::kDegrees : CorrectionKind::kUnit, 0, 1.0);
-    unit.values = kNames[k];
-    Try(unit, origin.link, [&](const PrintedLink&, PrintedLink* after) { set(row, &after->origin); });
+  // Numbers are printed in degrees.
+  Vector4d shown(RadToDeg(given[0]), given[1], RadToDeg(given[2]), given[3]);
+  Vector4d shown_right(RadToDeg(right[0]), right[1], RadToDeg(right[2]), right[3]);
+  const Vector4d shown_open(RadToDeg(open[0]), open[1], RadToDeg(open[2]), open[3]);
+  Try(origin.Make(CorrectionKind::kNumber, SiteKind::kPosition,
+                  CountEntries(4, given.data(), right.data(), open.data()),
+                  DescribeEntries(kNames, shown.data(), shown_right.data(), shown_open.data()), true),
+      origin.link, [right](PrintedLink* link) {
+        link->origin.r.head<2>() << right[0], right[2];
+        link->origin.t << right[1], 0.0, right[3];
+      });
+}
+
+/// One convention of all origins that lead to parts of a link and to the joints on it.
+void CandidateSearch::SearchAllOrigins(int link) {
+  std::vector<int> origins;
+  bool has_welded = false;
+  SiteMask wrong = WrongOf(link) & kBodyMask;
+  for (int k = 0; k < pair_.a().size(); ++k) {
+    if (BodyOf(k) != link || k == link) continue;
+    has_welded = true;
+    origins.push_back(k);
+  }
+  for (const int child : pair_.links()) {
+    if (pair_.node(child).parent != link) continue;
+    has_welded = has_welded || pair_.node(child).chain.size() > 1;
+    wrong |= WrongOf(child) & kPoseMask;
+    for (const int k : pair_.node(child).chain) {
+      if (std::ranges::find(origins, k) == origins.end()) origins.push_back(k);
+    }
+  }
+  if (!has_welded || wrong == 0) return;
+  std::vector<std::pair<LinkEdit, std::vector<PlacedEdit>>> groups;
+  for (const int k : origins) {
+    for (const LinkEdit& edit : ListOriginEdits(pair_.a().link(k).origin)) {
+      const bool is_turn = edit.fault.kind == CorrectionKind::kTurnOwn ||
+                           edit.fault.kind == CorrectionKind::kTurnParent ||
+                           edit.fault.kind == CorrectionKind::kMirror;
+      if (edit.fault.whole || is_turn ||
+          (edit.fault.of == SiteKind::kPosition && pair_.a().link(k).origin.t.isZero()))
+        continue;
+      const auto is_same = [&](const auto& group) { return IsSameFault(group.first.fault, edit.fault); };
+      auto group = std::ranges::find_if(groups, is_same);
+      if (group == groups.end()) group = groups.insert(groups.end(), {edit, {}});
+      group->second.push_back({k, edit.undo});
+    }
+  }
+  for (const auto& [edit, edits] : groups) {
+    if (edits.size() > 1)
+      Try({edit.fault, edit.bits, kPoseMask | kBodyMask, "", false}, origins.back(), edits);
   }
 }
 
-/// Conventions of the second file's print that would explain a rotation.
-void CandidateSearch::SearchSecond(int link) {
-  if (!IsWrong(link, SiteKind::kRotation)) return;
-  const int j = pair_.Partner(link);
-  if (pair_.node_b(j).chain.size() != 1 || pair_.node(link).parent < 0) return;
-  const PrintedOrigin& theirs = pair_.b().link(j).origin;
-  const Matrix3d goal = pair_.X_ab(pair_.node(link).parent).linear().transpose() *
-                        pair_.given(link).X.linear() * pair_.X_ab(link).linear();
-  for (const OriginFix& fix : ListRotationFixes(theirs)) {
-    if (fix.kind == CorrectionKind::kTurnOwn || fix.kind == CorrectionKind::kTurnParent ||
-        fix.kind == CorrectionKind::kMirror || fix.kind == CorrectionKind::kTransposed ||
-        fix.kind == CorrectionKind::kAngleSign || fix.kind == CorrectionKind::kAngleDegrees)
-      continue;
-    const bool of_quaternion =
-        fix.kind == CorrectionKind::kScalarFirst || fix.kind == CorrectionKind::kScalarLast;
-    if (of_quaternion && theirs.form != RotationForm::kQuaternion) continue;
-    PrintedOrigin right = theirs;
-    FixRotation(fix, theirs, &right);
-    if (CalcAngle(right.CalcRotation().transpose() * goal) >
-        2.0 * (pair_.given(link).pose.angle + pair_.other(j).pose.angle))
-      continue;
-    FileFault fault{fix.kind, SiteKind::kRotation, fix.component};
-    fault.in_second = true;
-    Add(fault, link, {{SiteKind::kRotation, link}}, fix.bits + 4.0, {}, "");
+/// The origin of what is welded to a link, which shows in the body and in where joints on it stand.
+void CandidateSearch::SearchWeld(int link) {
+  const int home = BodyOf(link);
+  const PrintedRobot& a = pair_.a();
+  if (pair_.Partner(link) >= 0 || Moves(a.link(link)) || home < 0 || (WrongOf(home) & kBodyMask) == 0) return;
+  const PrintedOrigin origin = a.link(link).origin;
+  for (const LinkEdit& edit : ListOriginEdits(origin)) {
+    if (!edit.fault.whole) Try({edit.fault, edit.bits}, link, edit.undo);
+  }
+  // What its parts would have to be, in the frame that carries it.
+  const Node& node = pair_.node(home);
+  Node own = node;
+  Node others = node;
+  const auto is_below = [&](int part) {
+    for (; part >= 0 && part != link; part = a.link(part).parent) {
+    }
+    return part == link;
+  };
+  std::erase_if(own.parts, [&](int part) { return !is_below(part); });
+  std::erase_if(others.parts, is_below);
+  if (own.parts.empty()) return;
+  const BodyNumbers& whole = pair_.right(home).body;
+  const std::optional<BodyNumbers> alone = Subtract(whole, CalcNodeBody(a, others));
+  if (!alone) return;
+  const Pose X = CalcPartPose(a, node, link);
+  const BodyNumbers right = Express(*alone, origin.CalcPose() * X.inverse());
+  const BodyNumbers given = Express(CalcNodeBody(a, own), X.inverse());
+  const Vector3d t = right.com - origin.CalcRotation() * given.com;
+  const Vector3d open =
+      Vector3d::Constant(pair_.given(home).body_tolerance.com.norm() * whole.mass / alone->mass + 1e-6);
+  Try({{CorrectionKind::kNumber, SiteKind::kPosition},
+       CountEntries(3, origin.t.data(), t.data(), open.data()),
+       kPoseMask | kBodyMask,
+       DescribeEntries(kAxisNames, origin.t.data(), t.data(), open.data())},
+      link, [t, open](PrintedLink* part) {
+        part->origin.t = t;
+        part->origin.half_t = open;
+      });
+  const Matrix3d V = Eigen::SelfAdjointEigenSolver<Matrix3d>(right.inertia).eigenvectors();
+  const Matrix3d W = Eigen::SelfAdjointEigenSolver<Matrix3d>(given.inertia).eigenvectors();
+  const bool is_none = origin.CalcRotation().isIdentity(1e-12);
+  for (int signs = 0; signs < 8; ++signs) {
+    const Vector3d s((signs & 1) != 0 ? 1.0 : -1.0, (signs & 2) != 0 ? 1.0 : -1.0,
+                     (signs & 4) != 0 ? 1.0 : -1.0);
+    const Matrix3d R = V * s.asDiagonal() * W.transpose();
+    if (R.determinant() < 0.0) continue;
+    Try({{is_none ? CorrectionKind::kMissing : CorrectionKind::kNumber, SiteKind::kRotation},
+         is_none ? 8.0 : 40.0,
+         kPoseMask | kBodyMask,
+         ShowAngles(R) + " would be right"},
+        link, TakeRotation(R));
   }
 }
 

@@ -7,15 +7,15 @@
 namespace dexcheck {
 namespace {
 
+GivenNode MeasureNode(const Node& node, PrintedRobot* robot) {
+  return {CalcNodePose(*robot, node), CalcPoseTolerance(node, robot), CalcNodeBody(*robot, node),
+          CalcBodyTolerance(node, robot)};
+}
+
 std::vector<GivenNode> MeasureNodes(const std::vector<Node>& nodes, PrintedRobot* robot) {
   std::vector<GivenNode> given(nodes.size());
   for (const Node& node : nodes) {
-    if (node.link < 0) continue;
-    GivenNode& numbers = given[static_cast<size_t>(node.link)];
-    numbers.X = CalcNodePose(*robot, node);
-    numbers.pose = CalcPoseTolerance(node, robot);
-    numbers.body = CalcNodeBody(*robot, node);
-    numbers.body_tolerance = CalcBodyTolerance(node, robot);
+    if (node.link >= 0) given[static_cast<size_t>(node.link)] = MeasureNode(node, robot);
   }
   return given;
 }
@@ -36,6 +36,11 @@ bool Differ(const PrintedScalar& a, const PrintedScalar& b) {
 }
 
 PrintedPair::PrintedPair(PrintedRobot a, PrintedRobot b, bool by_tree) : a_(std::move(a)), b_(std::move(b)) {
+  // A URDF does not say what drives a joint.
+  if (a_.format == RobotFormat::kUrdf || b_.format == RobotFormat::kUrdf) {
+    for (PrintedRobot* const robot : {&a_, &b_})
+      std::erase_if(robot->constraints, [](const std::string& text) { return text.starts_with(kServo); });
+  }
   match_ = MatchLinks(a_, b_, by_tree);
   nodes_ = ListNodes(a_, match_.b_of_a);
   nodes_b_ = ListNodes(b_, match_.a_of_b);
@@ -49,66 +54,86 @@ PrintedPair::PrintedPair(PrintedRobot a, PrintedRobot b, bool by_tree) : a_(std:
 
 void PrintedPair::Measure() { given_ = MeasureNodes(nodes_, &a_); }
 
-bool PrintedPair::IsPlaced(int link) const {
-  const int other = Partner(link);
+void PrintedPair::MeasureOther(int link) {
+  const auto j = static_cast<size_t>(Partner(link));
+  other_[j] = MeasureNode(nodes_b_[j], &b_);
+  SetRight(link);
+}
+
+int PrintedPair::Carrier(int link) const {
   const int parent = node(link).parent;
-  return other >= 0 && parent >= 0 && node_b(other).parent >= 0 && Partner(parent) == node_b(other).parent;
+  return parent >= 0 && Partner(parent) >= 0 && Partner(parent) == node_b(Partner(link)).parent ? parent : -1;
+}
+
+bool PrintedPair::IsPlaced(int link) const {
+  if (Partner(link) < 0) return false;
+  const bool is_free =
+      a_.link(link).joint.kind == JointKind::kFree && b_.link(Partner(link)).joint.kind == JointKind::kFree;
+  if (is_free || Carrier(link) >= 0) return !is_free;
+  // A root that is not the other file's stands in the world as what the file has there.
+  const auto in_world = [](const PrintedRobot& robot, const Node& node, const std::vector<int>& other) {
+    return !robot.floats.value_or(false) && !Moves(robot.link(node.link)) &&
+           (node.parent < 0 || (node.parent == 0 && other[0] < 0));
+  };
+  return in_world(a_, node(link), match_.b_of_a) && in_world(b_, node_b(Partner(link)), match_.a_of_b);
 }
 
 void PrintedPair::SetFrames(std::vector<Pose> X_ab) {
   X_ab_ = std::move(X_ab);
   right_.assign(a_.links.size(), {});
   frame_open_.assign(a_.links.size(), {});
-  for (const int link : links_) {
-    const int j = Partner(link);
-    const GivenNode& theirs = other(j);
-    const PrintedJoint& joint = b_.link(j).joint;
-    const Pose& X = X_ab_[static_cast<size_t>(link)];
-    const Matrix3d& R = X.linear();
-    const bool is_turned = !R.isIdentity(1e-12);
-    RightNode& right = right_[static_cast<size_t>(link)];
-    right.is_placed = IsPlaced(link);
-    if (right.is_placed) {
-      const Pose& X_ab_P = X_ab_[static_cast<size_t>(node(link).parent)];
-      right.X = X_ab_P * theirs.X * X.inverse();
-      right.pose = theirs.pose;
-      const PoseTolerance& carrier = frame_open_[static_cast<size_t>(node(link).parent)];
-      right.pose.length = X_ab_P.linear().cwiseAbs() * theirs.pose.length + carrier.length;
-      right.pose.length.array() += carrier.angle * theirs.X.translation().norm();
-      right.pose.angle += carrier.angle;
-      if (!X.isApprox(Pose::Identity(), 1e-12)) {
-        PoseTolerance& open = frame_open_[static_cast<size_t>(link)];
-        const GivenNode& ours = given_[static_cast<size_t>(link)];
-        open = right.pose;
-        open.length += ours.pose.length;
-        open.angle += ours.pose.angle;
-        if (!right.X.isApprox(ours.X, 1e-9)) {  // it was found from what the link carries
-          open.length.array() += kFoundFrame;
-          open.angle += kFoundFrame;
-        }
-        right.pose.length += open.length;
-        right.pose.angle += open.angle;
+  for (const int link : links_) SetRight(link);
+}
+
+void PrintedPair::SetRight(int link) {
+  const int j = Partner(link);
+  const GivenNode& theirs = other(j);
+  const PrintedJoint& joint = b_.link(j).joint;
+  const Pose& X = X_ab_[static_cast<size_t>(link)];
+  const Matrix3d& R = X.linear();
+  RightNode& right = right_[static_cast<size_t>(link)];
+  PoseTolerance& open = frame_open_[static_cast<size_t>(link)];
+  right = {};
+  right.is_placed = IsPlaced(link);
+  if (right.is_placed) {
+    const int carrier = Carrier(link);
+    const Pose X_ab_P = carrier < 0 ? Pose::Identity() : X_ab_[static_cast<size_t>(carrier)];
+    const PoseTolerance open_P = carrier < 0 ? PoseTolerance{} : frame_open_[static_cast<size_t>(carrier)];
+    right.X = X_ab_P * theirs.X * X.inverse();
+    right.pose = theirs.pose;
+    right.pose.length = X_ab_P.linear().cwiseAbs() * theirs.pose.length + open_P.length;
+    right.pose.length.array() += open_P.angle * theirs.X.translation().norm();
+    right.pose.angle += open_P.angle;
+    if (!X.isApprox(Pose::Identity(), 1e-12)) {
+      const GivenNode& ours = given_[static_cast<size_t>(link)];
+      open = right.pose;
+      open.length += ours.pose.length;
+      open.angle += ours.pose.angle;
+      if (!right.X.isApprox(ours.X, 1e-9)) {  // it was found from what the link carries
+        open.length += ours.body_tolerance.com + R.cwiseAbs() * theirs.body_tolerance.com;
+        open.length.array() += kFoundFrame;
+        open.angle += kFoundFrame;
       }
+      right.pose.length += open.length;
+      right.pose.angle += open.angle;
     }
-    right.axis = R * joint.axis.normalized();
-    right.axis_tolerance = joint.half_axis.sum() / std::max(joint.axis.norm(), 1e-9) + 1e-8;
-    right.anchor = X * joint.anchor;
-    right.body = theirs.body;
-    right.body.com = X * theirs.body.com;
-    right.body.inertia = R * theirs.body.inertia * R.transpose();
-    right.body_tolerance = theirs.body_tolerance;
-    if (is_turned) {
-      const Matrix3d turn = R.cwiseAbs();
-      right.body_tolerance.com = turn * theirs.body_tolerance.com;
-      right.body_tolerance.inertia = turn * theirs.body_tolerance.inertia * turn.transpose();
-    }
-    const PoseTolerance& open = frame_open_[static_cast<size_t>(link)];
-    right.body_tolerance.com += open.length;
-    right.body_tolerance.com.array() += open.angle * theirs.body.com.norm();
-    right.body_tolerance.inertia.array() += 2.0 * open.angle * std::abs(theirs.body.inertia.trace());
-    right.axis_tolerance += open.angle;
-    right.anchor_tolerance = open.length.norm() + open.angle * joint.anchor.norm();
   }
+  right.axis = R * joint.axis.normalized();
+  right.axis_tolerance = joint.half_axis.sum() / std::max(joint.axis.norm(), 1e-9) + 1e-8 + open.angle;
+  right.anchor = X * joint.anchor;
+  right.anchor_tolerance = open.length.norm() + open.angle * joint.anchor.norm();
+  right.body = theirs.body;
+  right.body.com = X * theirs.body.com;
+  right.body.inertia = R * theirs.body.inertia * R.transpose();
+  right.body_tolerance = theirs.body_tolerance;
+  if (!R.isIdentity(1e-12)) {
+    const Matrix3d turn = R.cwiseAbs();
+    right.body_tolerance.com = turn * theirs.body_tolerance.com;
+    right.body_tolerance.inertia = turn * theirs.body_tolerance.inertia * turn.transpose();
+  }
+  right.body_tolerance.com += open.length;
+  right.body_tolerance.com.array() += open.angle * theirs.body.com.norm();
+  right.body_tolerance.inertia.array() += 2.0 * open.angle * std::abs(theirs.body.inertia.trace());
 }
 
 double PrintedPair::CompareNode(SiteKind kind, int link, const Pose& X, const PoseTolerance& pose,
@@ -132,6 +157,11 @@ double PrintedPair::CompareNode(SiteKind kind, int link, const Pose& X, const Po
   }
 }
 
+double PrintedPair::CompareNode(SiteKind kind, int link) const {
+  const GivenNode& own = given(link);
+  return CompareNode(kind, link, own.X, own.pose, own.body, own.body_tolerance);
+}
+
 bool PrintedPair::States(const PrintedRobot& robot, JointScalar scalar) {
   return std::ranges::any_of(robot.links, [&](const PrintedLink& link) {
     const auto& number = link.joint.scalars[static_cast<size_t>(scalar)];
@@ -139,23 +169,11 @@ bool PrintedPair::States(const PrintedRobot& robot, JointScalar scalar) {
   });
 }
 
-std::optional<PrintedScalar> TakeScalar(const PrintedRobot& robot, const PrintedLink& link,
-                                        JointScalar scalar) {
+std::optional<PrintedScalar> TakeScalar(const PrintedLink& link, JointScalar scalar, bool has_motors) {
   const std::optional<PrintedScalar>& number = link.joint.scalars[static_cast<size_t>(scalar)];
-  if (number) return number;
-  switch (scalar) {
-    case JointScalar::kDamping:
-    case JointScalar::kFriction:
-    case JointScalar::kArmature:
-    case JointScalar::kStiffness:
-    case JointScalar::kSpringAngle:
-      return PrintedScalar{};
-    case JointScalar::kGear:
-      if (robot.has_motors) return PrintedScalar{};
-      return std::nullopt;
-    default:
-      return std::nullopt;
-  }
+  const bool is_limit = scalar == JointScalar::kEffort || scalar == JointScalar::kVelocity;
+  if (number || is_limit || (scalar == JointScalar::kGear && !has_motors)) return number;
+  return PrintedScalar{};
 }
 
 bool PrintedPair::IsCoupledAlike(int link) const {
@@ -190,60 +208,36 @@ bool PrintedPair::IsCoupledAlike(int link) const {
 }
 
 void PrintedPair::ListJointSites(int link, std::vector<Site>* sites) const {
-  const PrintedLink& given = a_.link(link);
-  const PrintedLink& other = b_.link(Partner(link));
-  const PrintedJoint& ours = given.joint;
-  const PrintedJoint& theirs = other.joint;
+  const PrintedJoint& ours = a_.link(link).joint;
+  const PrintedJoint& theirs = b_.link(Partner(link)).joint;
   const auto add = [&](SiteKind kind) { sites->push_back({kind, link}); };
   if (ours.kind != theirs.kind) {
     add(SiteKind::kType);
     return;
   }
-  if (ours.kind != JointKind::kHinge && ours.kind != JointKind::kSlide) return;
+  if (!Moves(a_.link(link))) return;
   const RightNode& right = right_[static_cast<size_t>(link)];
-  const Vector3d axis = ours.axis.normalized();
+  const bool has_axis = ours.kind != JointKind::kBall;
   const double open = ours.half_axis.sum() / std::max(ours.axis.norm(), 1e-9) + right.axis_tolerance;
-  if (!((axis - right.axis).norm() <= open)) add(SiteKind::kAxis);
-  if (ours.kind == JointKind::kHinge) {
+  if (has_axis && !((ours.axis.normalized() - right.axis).norm() <= open)) add(SiteKind::kAxis);
+  if (ours.kind != JointKind::kSlide) {
     constexpr double kSame = 2e-6;  // m
-    const Vector3d apart = ours.anchor - right.anchor;
-    if (!((apart - right.axis * right.axis.dot(apart)).norm() <=
+    Vector3d apart = ours.anchor - right.anchor;
+    if (has_axis) apart -= right.axis * right.axis.dot(apart);
+    if (!(apart.norm() <=
           kSame + right.anchor_tolerance + given_[static_cast<size_t>(link)].pose.length.norm()))
       add(SiteKind::kAxisPoint);
   }
-  const bool ours_limit =
-      std::ranges::any_of(a_.links, [](const PrintedLink& l) { return l.joint.range.has_value(); });
-  const bool theirs_limit =
-      std::ranges::any_of(b_.links, [](const PrintedLink& l) { return l.joint.range.has_value(); });
+  const auto limits = [](const PrintedRobot& robot) {
+    return std::ranges::any_of(robot.links, [](const PrintedLink& l) { return l.joint.range.has_value(); });
+  };
   if (ours.range && theirs.range) {
     if (Differ((*ours.range)[0], (*theirs.range)[0]) || Differ((*ours.range)[1], (*theirs.range)[1]))
       add(SiteKind::kRange);
-  } else if (ours.range.has_value() != theirs.range.has_value() && ours_limit && theirs_limit) {
+  } else if (ours.range.has_value() != theirs.range.has_value() && limits(a_) && limits(b_)) {
     add(SiteKind::kRange);
   }
-  for (size_t k = 0; k < kNumJointScalars; ++k) {
-    const auto scalar = static_cast<JointScalar>(k);
-    const std::optional<PrintedScalar> x = TakeScalar(a_, given, scalar);
-    const std::optional<PrintedScalar> y = TakeScalar(b_, other, scalar);
-    if (scalar == JointScalar::kGear) {
-      // A file without motors is driven by forces at the joints: only the way of a motor counts there.
-      const auto turns_back = [](const std::optional<PrintedScalar>& gear) {
-        return gear && gear->value < 0.0;
-      };
-      const bool differs =
-          x && y ? Differ(*x, *y)
-                 : turns_back(x) || turns_back(y) || (x && x->value == 0.0) || (y && y->value == 0.0);
-      if (differs) add(SiteKind::kGear);
-    } else if (scalar == JointScalar::kSpringAngle) {
-      const auto is_spring = [](const PrintedJoint& joint) {
-        const auto& stiffness = joint.scalars[static_cast<size_t>(JointScalar::kStiffness)];
-        return stiffness && stiffness->value != 0.0;
-      };
-      if (is_spring(ours) && is_spring(theirs) && Differ(*x, *y)) add(SiteKind::kSpringAngle);
-    } else if (x && y && Differ(*x, *y)) {
-      add(ToSite(scalar));
-    }
-  }
+  ListConstantSites(link, sites);
   if (IsCoupledAlike(link)) return;
   if (ours.mimic.has_value() != theirs.mimic.has_value()) {
     add(SiteKind::kMimic);
@@ -259,21 +253,60 @@ void PrintedPair::ListJointSites(int link, std::vector<Site>* sites) const {
   }
 }
 
+void PrintedPair::ListConstantSites(int link, std::vector<Site>* sites) const {
+  const PrintedLink& ours = a_.link(link);
+  const PrintedLink& theirs = b_.link(Partner(link));
+  const auto is_spring = [](const PrintedLink& l) {
+    const auto& stiffness = l.joint.scalars[static_cast<size_t>(JointScalar::kStiffness)];
+    return stiffness && stiffness->value != 0.0;
+  };
+  const bool has_motors = a_.has_motors && b_.has_motors;
+  // A file without motors is driven by forces at the joints: only the way of a motor counts there.
+  const auto turns_back = [](const std::optional<PrintedScalar>& gear) { return gear && gear->value < 0.0; };
+  for (size_t k = 0; k < kNumJointScalars; ++k) {
+    const auto scalar = static_cast<JointScalar>(k);
+    const std::optional<PrintedScalar> x = TakeScalar(ours, scalar, has_motors);
+    const std::optional<PrintedScalar> y = TakeScalar(theirs, scalar, has_motors);
+    bool differs = x && y && Differ(*x, *y);
+    if (scalar == JointScalar::kGear && !(x && y)) differs = turns_back(x) || turns_back(y);
+    if (scalar == JointScalar::kSpringAngle) differs = differs && is_spring(ours) && is_spring(theirs);
+    if (differs) sites->push_back({ToSite(scalar), link});
+  }
+}
+
+void PrintedPair::ListRobotSites(std::vector<Site>* sites) const {
+  for (int i = 0; i < a_.size(); ++i) {
+    if (Moves(a_.link(i)) && Partner(i) < 0) sites->push_back({SiteKind::kPresence, i});
+  }
+  for (int j = 0; j < b_.size(); ++j) {
+    if (Moves(b_.link(j)) && match_.a_of_b[static_cast<size_t>(j)] < 0)
+      sites->push_back({SiteKind::kPresence, -1 - j});
+  }
+  if (a_.gravity && b_.gravity && (*a_.gravity - *b_.gravity).cwiseAbs().maxCoeff() > 1e-9)
+    sites->push_back({SiteKind::kGravity, 0});
+  // Free joints of two MJCFs are compared as those of links.
+  const bool is_link = a_.format == RobotFormat::kMjcf && b_.format == RobotFormat::kMjcf;
+  if (a_.floats && b_.floats && *a_.floats != *b_.floats && !is_link) sites->push_back({SiteKind::kType, 0});
+  if (a_.constraints != b_.constraints) sites->push_back({SiteKind::kConstraint, 0});
+}
+
 std::vector<Site> PrintedPair::ListSites() const {
   std::vector<Site> sites;
   std::set<std::string> names, names_b;
   for (const PrintedLink& link : a_.links) names.insert(link.joint.name);
   for (const PrintedLink& link : b_.links) names_b.insert(link.joint.name);
+  const auto compare = [&](SiteKind kind, int link) {
+    if (!(CompareNode(kind, link) <= 1.0)) sites.push_back({kind, link});
+  };
   for (const int link : links_) {
     const int j = Partner(link);
-    const GivenNode& given = given_[static_cast<size_t>(link)];
     if (IsPlaced(link)) {
-      for (const SiteKind kind : {SiteKind::kPosition, SiteKind::kRotation}) {
-        if (!(CompareNode(kind, link, given.X, given.pose, given.body, given.body_tolerance) <= 1.0))
-          sites.push_back({kind, link});
-      }
+      compare(SiteKind::kPosition, link);
+      compare(SiteKind::kRotation, link);
+    }
+    if (Carrier(link) >= 0) {
       ListJointSites(link, &sites);
-    } else if (node(link).parent >= 0 && node_b(j).parent >= 0) {
+    } else if (!IsPlaced(link) && node(link).parent >= 0 && node_b(j).parent >= 0) {
       sites.push_back({SiteKind::kCarrier, link});
     }
     const std::string& name = a_.link(link).joint.name;
@@ -284,20 +317,9 @@ std::vector<Site> PrintedPair::ListSites() const {
     // A base that stands still needs no inertial.
     const bool bears = !(link == 0 || j == 0) || (!node(link).parts.empty() && !node_b(j).parts.empty());
     if (!bears || (node(link).parts.empty() && node_b(j).parts.empty())) continue;
-    for (const SiteKind kind : {SiteKind::kMass, SiteKind::kCom, SiteKind::kInertia}) {
-      if (!(CompareNode(kind, link, given.X, given.pose, given.body, given.body_tolerance) <= 1.0))
-        sites.push_back({kind, link});
-    }
+    for (const SiteKind kind : {SiteKind::kMass, SiteKind::kCom, SiteKind::kInertia}) compare(kind, link);
   }
-  for (int i = 0; i < a_.size(); ++i) {
-    if (Moves(a_.link(i)) && Partner(i) < 0) sites.push_back({SiteKind::kPresence, i});
-  }
-  for (int j = 0; j < b_.size(); ++j) {
-    if (Moves(b_.link(j)) && match_.a_of_b[static_cast<size_t>(j)] < 0)
-      sites.push_back({SiteKind::kPresence, -1 - j});
-  }
-  if (a_.gravity && b_.gravity && (*a_.gravity - *b_.gravity).cwiseAbs().maxCoeff() > 1e-9)
-    sites.push_back({SiteKind::kGravity, 0});
+  ListRobotSites(&sites);
   return sites;
 }
 

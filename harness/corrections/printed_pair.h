@@ -38,6 +38,7 @@ class PrintedPair {
 
   [[nodiscard]] const PrintedRobot& a() const { return a_; }
   [[nodiscard]] PrintedRobot* mutable_a() { return &a_; }
+  [[nodiscard]] PrintedRobot* mutable_b() { return &b_; }
   [[nodiscard]] const PrintedRobot& b() const { return b_; }
   [[nodiscard]] const LinkMatch& match() const { return match_; }
   [[nodiscard]] const Node& node(int link) const { return nodes_[static_cast<size_t>(link)]; }
@@ -46,7 +47,9 @@ class PrintedPair {
   [[nodiscard]] int Partner(int link) const { return match_.b_of_a[static_cast<size_t>(link)]; }
   /// Links of the first file that the second has too, parents first.
   [[nodiscard]] const std::vector<int>& links() const { return links_; }
-  /// Whether both files have a link on the same one.
+  /// The link that carries a link in both files; -1 when it stands in the world, or they differ in that.
+  [[nodiscard]] int Carrier(int link) const;
+  /// Whether both files have a link on the same one, or in the world.
   [[nodiscard]] bool IsPlaced(int link) const;
 
   /// Pose of the second file's frame of a link in the first one's.
@@ -62,8 +65,12 @@ class PrintedPair {
   /// right.
   [[nodiscard]] double CompareNode(SiteKind kind, int link, const Pose& X, const PoseTolerance& pose,
                                    const BodyNumbers& body, const BodyNumbers& tolerance) const;
+  /// The same of the numbers as they were measured.
+  [[nodiscard]] double CompareNode(SiteKind kind, int link) const;
   /// Measures the first file's numbers again. @pre links were changed.
   void Measure();
+  /// Measures the second file's numbers of one link. @pre it was changed.
+  void MeasureOther(int link);
   /// All that differs.
   [[nodiscard]] std::vector<Site> ListSites() const;
   /// Whether a file states some number of this kind at any joint.
@@ -71,6 +78,9 @@ class PrintedPair {
 
  private:
   void ListJointSites(int link, std::vector<Site>* sites) const;
+  void ListConstantSites(int link, std::vector<Site>* sites) const;
+  void ListRobotSites(std::vector<Site>* sites) const;
+  void SetRight(int link);
   [[nodiscard]] bool IsCoupledAlike(int link) const;
 
   PrintedRobot a_, b_;
@@ -86,7 +96,7 @@ class PrintedPair {
 /// Whether two scalars differ by more than their digits leave open.
 bool Differ(const PrintedScalar& a, const PrintedScalar& b);
 /// The number of a joint that counts where its file states none.
-std::optional<PrintedScalar> TakeScalar(const PrintedRobot& robot, const PrintedLink& link,
-                                        JointScalar scalar);
+/// @param has_motors both files state motors: a joint without one has none.
+std::optional<PrintedScalar> TakeScalar(const PrintedLink& link, JointScalar scalar, bool has_motors);
 
 }  // namespace dexcheck

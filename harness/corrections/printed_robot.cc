@@ -44,7 +44,7 @@ Matrix3d TurnRollPitchYaw(const Vector3d& angles) {
 
 std::array<Vector3d, 2> SolveRollPitchYaw(const Matrix3d& R) {
   constexpr double kGimbal = 1e-7;
-  const double pitch = std::asin(std::clamp(-R(2, 0), -1.0, 1.0));
+  const double pitch = std::atan2(-R(2, 0), std::hypot(R(0, 0), R(1, 0)));
   if (std::abs(std::cos(pitch)) > kGimbal) {
     const Vector3d near(std::atan2(R(2, 1), R(2, 2)), pitch, std::atan2(R(1, 0), R(0, 0)));
     return {near, Vector3d(near[0] + kPi, kPi - pitch, near[2] + kPi)};
@@ -132,6 +132,20 @@ void PrintedOrigin::SetRotation(const Matrix3d& R) {
   }
   form = RotationForm::kQuaternion;
   r = ToQuaternion(R);
+}
+
+std::vector<LinkNumber> ListNumbers(PrintedOrigin* origin) {
+  std::vector<LinkNumber> numbers;
+  for (int k = 0; k < 3; ++k) numbers.push_back({&origin->t[k], &origin->half_t[k]});
+  for (int k = 0; k < 4; ++k) numbers.push_back({&origin->r[k], &origin->half_r[k]});
+  return numbers;
+}
+
+std::vector<LinkNumber> ListNumbers(PrintedInertial* inertial) {
+  std::vector<LinkNumber> numbers = ListNumbers(&inertial->origin);
+  numbers.push_back({&inertial->mass.value, &inertial->mass.half});
+  for (int k = 0; k < 6; ++k) numbers.push_back({&inertial->I[k], &inertial->half_I[k]});
+  return numbers;
 }
 
 int PrintedRobot::Add(PrintedLink added) {

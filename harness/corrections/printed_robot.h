@@ -21,6 +21,7 @@ using Vector4d = Eigen::Vector4d;
 struct PrintedScalar {
   double value = 0.0;
   double half = 0.0;
+  bool operator==(const PrintedScalar&) const = default;
 };
 
 /// How a file writes a rotation.
@@ -58,6 +59,7 @@ enum class JointKind { kFixed, kHinge, kSlide, kBall, kFree };
 struct PrintedMimic {
   std::string leader;
   PrintedScalar multiplier{1.0, 0.0}, offset;
+  bool operator==(const PrintedMimic&) const = default;
 };
 
 /// A scalar of a joint; a file that does not state it has no value.
@@ -83,21 +85,35 @@ struct PrintedJoint {
   std::optional<PrintedMimic> mimic;
 };
 
+/// What a setting of an MJCF's compiler made another body of.
+struct CompiledInertial {
+  std::string setting;      ///< "boundmass"
+  PrintedInertial stated;   ///< In the text.
+  std::string description;  ///< "mass 0.31 in the text, 0.5 in the engine"
+};
+
 struct PrintedLink {
   std::string name;
   int parent = -1;
   std::vector<int> children;
-  PrintedOrigin origin;  ///< In the parent's frame, at zero.
+  PrintedOrigin origin;  ///< In the parent's frame, or in the world, at zero.
   PrintedJoint joint;    ///< That moves it.
   std::optional<PrintedInertial> inertial;
+  std::optional<CompiledInertial> compiled;
+  bool is_frame = false;  ///< It is no link, but a frame on its parent.
 };
+
+/// How a constraint begins that is a servo in the place of a motor, as the motors of many MJCFs are.
+inline constexpr const char* kServo = "servo at";
 
 struct PrintedRobot {
   std::string source;
   RobotFormat format = RobotFormat::kUrdf;
   std::vector<PrintedLink> links;  ///< Parents before children; the first is the root.
   std::optional<Vector3d> gravity;
-  bool has_motors = false;  ///< Whether the file states motors: a joint without a gear then has none.
+  std::optional<bool> floats;            ///< Whether the root does; none where the file does not say it.
+  std::vector<std::string> constraints;  ///< Between links, and springs and dampers between joints.
+  bool has_motors = false;               ///< The file states motors.
 
   [[nodiscard]] const PrintedLink& link(int index) const { return links[static_cast<size_t>(index)]; }
   [[nodiscard]] PrintedLink& link(int index) { return links[static_cast<size_t>(index)]; }
@@ -105,6 +121,15 @@ struct PrintedRobot {
   /// Adds a link below another one. @return its index.
   int Add(PrintedLink link);
 };
+
+/// A printed number and half a unit of its last digit.
+struct LinkNumber {
+  double* value;
+  double* half;
+};
+/// Place and rotation; mass, centre, rotation and entries.
+std::vector<LinkNumber> ListNumbers(PrintedOrigin* origin);
+std::vector<LinkNumber> ListNumbers(PrintedInertial* inertial);
 
 /// Symmetric tensor of xx yy zz xy xz yz, and back.
 Matrix3d ToTensor(const Vector6d& entries);

@@ -1,10 +1,10 @@
 #include "harness/corrections/read_printed.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "controller/common/text.h"
 #include "controller/model/rigid_body.h"
-#include "harness/descriptions/fault_search.h"
 #include "harness/descriptions/printed_digits.h"
 #include "harness/descriptions/urdf_file.h"
 #include "harness/engine/xml.h"
@@ -98,18 +98,27 @@ Eigen::Matrix<double, N, 1> FindHalves(const Eigen::Matrix<double, N, 1>& values
 
 PrintedScalar PrintAngle(double angle) { return {angle, DegToRad(PrintShortest(RadToDeg(angle)).half)}; }
 
-PrintedOrigin PrintRow(const Joint& joint, const WrittenRow& row, const Pose& X_jP) {
+/// Roll, pitch and yaw as they may be printed: of the two solutions the one of fewer digits.
+PrintedOrigin PrintPose(const Pose& X) {
   PrintedOrigin origin;
-  if (row.is_plain) {
-    const Pose X_PL = X_jP.inverse() * joint.X_PB *
-                      CalcMdhTransform(joint.mdh.alpha, joint.mdh.a, joint.mdh.q, joint.mdh.d) * row.X_iL;
-    origin.form = RotationForm::kRollPitchYaw;
-    origin.t = X_PL.translation();
-    origin.r.head<3>() = SolveRollPitchYaw(X_PL.linear())[0];
-    origin.half_t = FindHalves<3>(origin.t);
-    for (int k = 0; k < 3; ++k) origin.half_r[k] = PrintAngle(origin.r[k]).half;
-    return origin;
+  origin.form = RotationForm::kRollPitchYaw;
+  origin.t = X.translation();
+  origin.half_t = FindHalves<3>(origin.t);
+  for (const Vector3d& angles : SolveRollPitchYaw(X.linear())) {
+    const Vector3d rpy = angles.unaryExpr([](double angle) { return std::remainder(angle, 2.0 * kPi); });
+    const Vector3d halves = FindHalves<3>(rpy);
+    if (origin.half_r.sum() > 0.0 && halves.sum() <= origin.half_r.sum()) continue;
+    origin.r.head<3>() = rpy;
+    origin.half_r.head<3>() = halves;
   }
+  return origin;
+}
+
+PrintedOrigin PrintRow(const Joint& joint, const WrittenRow& row, const Pose& X_jP) {
+  if (row.is_plain)
+    return PrintPose(X_jP.inverse() * joint.X_PB *
+                     CalcMdhTransform(joint.mdh.alpha, joint.mdh.a, joint.mdh.q, joint.mdh.d) * row.X_iL);
+  PrintedOrigin origin;
   origin.form = RotationForm::kMdh;
   origin.X_before = X_jP.inverse() * joint.X_PB;
   origin.r.head<2>() << joint.mdh.alpha, joint.mdh.q;
@@ -136,16 +145,19 @@ PrintedJoint PrintJoint(const Joint& joint, const DescribedJoint& stated, const 
   printed.kind = joint.type == JointType::kRevolute    ? JointKind::kHinge
                  : joint.type == JointType::kPrismatic ? JointKind::kSlide
                                                        : JointKind::kBall;
+  constexpr double kReadAxis = 1e-6;  // the reader turns rows to it
   printed.axis = stated.X_iL.linear().row(2).transpose();
+  if (stated.is_plain) printed.half_axis.setConstant(kReadAxis);
   printed.anchor = stated.X_iL.inverse().translation();
   if (stated.states_range && printed.kind != JointKind::kBall)
-    printed.range = {PrintAngle(joint.lower), PrintAngle(joint.upper)};
+    printed.range = {PrintShortest(joint.lower), PrintShortest(joint.upper)};
   const auto take = [&](JointScalar scalar, bool states, double value) {
     if (states) printed.scalars[static_cast<size_t>(scalar)] = PrintShortest(value);
   };
   take(JointScalar::kDamping, stated.states_damping, joint.damping);
   take(JointScalar::kFriction, stated.states_dry_friction, joint.dry_friction);
   take(JointScalar::kArmature, stated.states_armature, joint.armature);
+  take(JointScalar::kGear, !joint.coupling, 1.0);  // torques are controls
   if (joint.coupling)
     printed.mimic = {all[static_cast<size_t>(joint.coupling->leader)].name,
                      PrintShortest(joint.coupling->multiplier), PrintShortest(joint.coupling->offset)};
@@ -157,7 +169,12 @@ PrintedJoint PrintJoint(const Joint& joint, const DescribedJoint& stated, const 
 std::optional<PrintedScalar> ReadPrintedScalar(std::string_view text) {
   const std::optional<PrintedNumber> number = ReadPrinted(Trim(text));
   if (!number) return std::nullopt;
-  return PrintedScalar{number->value, number->half_unit};
+  PrintedScalar scalar{number->value, number->half_unit};
+  // A whole number is exact, unless it is written as a power of ten: 8.542e+06.
+  if (scalar.half == 0.0 && scalar.value != 0.0 && text.find_first_of("eE") != std::string_view::npos)
+    scalar.half = 0.5 * std::pow(10.0, std::floor(std::log10(std::abs(scalar.value))) + 1.0 -
+                                           std::max(number->digits, 3));
+  return scalar;
 }
 
 template <int N>
@@ -215,8 +232,12 @@ PrintedRobot PrintDescription(const RobotDescription& description) {
   robot.source = spec.source;
   robot.format = description.format;
   if (description.states_gravity) robot.gravity = spec.gravity;
+  const bool is_fixed = spec.base.type == BaseType::kFixed;
+  if (description.states_base && (is_fixed || spec.base.type == BaseType::kFloating))
+    robot.floats = !is_fixed;
   PrintedLink base;
   base.name = spec.base.link;
+  base.origin = PrintPose(spec.base.X_B0);
   if (spec.base.type != BaseType::kFixed) base.inertial = PrintBody(spec.base.body);
   robot.Add(std::move(base));
   for (size_t i = 0; i < spec.joints.size(); ++i) {
@@ -238,15 +259,52 @@ PrintedRobot PrintDescription(const RobotDescription& description) {
     link.inertial = PrintBody(ExpressIn(joint.body, stated.X_iL.inverse()));
     robot.Add(std::move(link));
   }
+  if (spec.base.type == BaseType::kDifferentialDrive) {
+    const Base& drive = spec.base;
+    for (const bool left : {true, false}) {
+      PrintedLink wheel;
+      wheel.joint.name = wheel.name = left ? drive.wheel_joint_left : drive.wheel_joint_right;
+      wheel.parent = 0;
+      wheel.joint.kind = JointKind::kHinge;
+      wheel.joint.axis = Vector3d::UnitY();
+      wheel.origin =
+          PrintPose(Pose(Eigen::Translation3d(0.0, (left ? 0.5 : -0.5) * drive.wheel_distance, 0.0)));
+      wheel.joint.scalars[static_cast<size_t>(JointScalar::kDamping)] = PrintShortest(drive.wheel.damping);
+      wheel.joint.scalars[static_cast<size_t>(JointScalar::kArmature)] = PrintShortest(drive.wheel.armature);
+      wheel.inertial = PrintBody({drive.wheel.mass, Vector3d::Zero(),
+                                  Matrix3d(Vector3d(drive.wheel.transverse_inertia, drive.wheel.spin_inertia,
+                                                    drive.wheel.transverse_inertia)
+                                               .asDiagonal())});
+      robot.Add(std::move(wheel));
+    }
+  }
+  for (const Frame& frame : spec.frames) {
+    PrintedLink link;
+    link.name = frame.name;
+    link.parent = frame.link + 1;
+    link.is_frame = true;
+    const Pose X_iL =
+        frame.link < 0 ? Pose::Identity() : description.joints[static_cast<size_t>(frame.link)].X_iL;
+    link.origin = PrintPose(X_iL.inverse() * frame.X_LF);
+    const auto has_name = [&](const PrintedLink& other) { return other.name == frame.name; };
+    if (std::ranges::none_of(robot.links, has_name)) robot.Add(std::move(link));
+  }
   return robot;
 }
 
-PrintedRobot ReadPrintedRobot(const DescriptionFile& file) {
+PrintedRobot ReadPrintedRobot(const DescriptionFile& file, const DescriptionFile* carrier) {
   PrintedRobot robot;
   if (file.format() == RobotFormat::kUrdf) {
     robot = ReadPrintedUrdf(file.text(), file.path().string());
   } else if (file.format() == RobotFormat::kMjcf) {
     robot = ReadPrintedMjcf(file.document(), *file.CopyEngine());
+  } else if (file.format() == RobotFormat::kBodies && carrier != nullptr &&
+             carrier->format() != RobotFormat::kBodies) {
+    robot = ReadPrintedRobot(*carrier);
+    for (const TabledBody& row : ReadBodyTable(file.text(), file.path().string())) {
+      const auto link = std::ranges::find(robot.links, row.link, &PrintedLink::name);
+      if (link != robot.links.end()) link->inertial = PrintBody(row.body);
+    }
   } else {
     robot = PrintDescription(file.Describe());
   }

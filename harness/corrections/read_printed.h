@@ -8,8 +8,10 @@
 namespace dexcheck {
 
 /// The robot of a file. Of an MJCF, bodies that state no inertial have the engine's, and so has what this
-/// reads otherwise than the engine. @throws InputError for what is no description.
-PrintedRobot ReadPrintedRobot(const DescriptionFile& file);
+/// reads otherwise than the engine.
+/// @param carrier whose robot has the bodies of a table of bodies. @throws InputError for what is no
+/// description, and for such a table without it.
+PrintedRobot ReadPrintedRobot(const DescriptionFile& file, const DescriptionFile* carrier = nullptr);
 
 /// Of a URDF's text. @throws InputError.
 PrintedRobot ReadPrintedUrdf(const std::string& text, const std::string& source);

@@ -1,8 +1,13 @@
+#include <fmt/format.h>
+
+#include <algorithm>
 #include <cmath>
 #include <map>
+#include <set>
 
 #include "controller/common/text.h"
 #include "harness/corrections/read_printed.h"
+#include "harness/descriptions/compiled_inertias.h"
 #include "harness/descriptions/mjcf_reader.h"
 #include "harness/engine/engine.h"
 #include "harness/engine/map_vector.h"
@@ -65,7 +70,7 @@ std::string Find(const Attributes& all, const char* name) {
 class PrintedMjcfReader {
  public:
   PrintedMjcfReader(const MjcfFile& mjcf, const mjModel& engine)
-      : root_(*mjcf.root()), engine_(engine), classes_(root_) {
+      : root_(*mjcf.root()), engine_(engine), classes_(root_), changes_(ListCompiledChanges(mjcf, engine)) {
     for (const MjcfElement* compiler : ListChildren(&root_, "compiler")) {
       if (compiler->Attribute("angle") != nullptr)
         unit_ = ReadAttribute(*compiler, "angle") == "radian" ? 1.0 : kDegree;
@@ -84,8 +89,13 @@ class PrintedMjcfReader {
       for (const MjcfElement* body : ListChildren(part, "body"))
         ReadBody(*body, 0, ReadAttribute(*part, "childclass"));
     }
-    ReadCouplings();
-    ReadMotors();
+    robot_.floats = engine_.njnt > 0 && engine_.jnt_type[0] == mjJNT_FREE;
+    AddFrames();
+    ReadEqualities();
+    ReadTendons();
+    ReadMotors(false);
+    ReadMotors(true);
+    std::ranges::sort(robot_.constraints);
     return std::move(robot_);
   }
 
@@ -144,27 +154,24 @@ class PrintedMjcfReader {
     origin->half_r.setConstant(kEngineDigits);
   }
 
-  [[nodiscard]] std::optional<PrintedInertial> ReadInertial(const MjcfElement& body, int id) const {
-    const MjcfElement* const element = body.FirstChildElement("inertial");
+  [[nodiscard]] PrintedInertial ReadStated(const MjcfElement& element) const {
     PrintedInertial inertial;
-    const double mass = engine_.body_mass[id];
-    if (element != nullptr) {
-      inertial.origin = ReadOrigin(*element);
-      inertial.mass = ReadPrintedScalar(ReadAttribute(*element, "mass")).value_or(PrintedScalar{});
-      if (element->Attribute("fullinertia") != nullptr) {
-        std::tie(inertial.I, inertial.half_I) = ReadPrintedVector<6>(ReadAttribute(*element, "fullinertia"));
-      } else {
-        const auto [moments, halves] = ReadPrintedVector<3>(ReadAttribute(*element, "diaginertia"));
-        inertial.I.head<3>() = moments;
-        inertial.half_I.head<3>() = halves;
-      }
-      constexpr double kSame = 1e-6;
-      if (std::abs(inertial.mass.value - mass) <= kSame * mass) return inertial;
+    inertial.origin = ReadOrigin(element);
+    inertial.mass = ReadPrintedScalar(ReadAttribute(element, "mass")).value_or(PrintedScalar{});
+    if (element.Attribute("fullinertia") != nullptr) {
+      std::tie(inertial.I, inertial.half_I) = ReadPrintedVector<6>(ReadAttribute(element, "fullinertia"));
+    } else {
+      const auto [moments, halves] = ReadPrintedVector<3>(ReadAttribute(element, "diaginertia"));
+      inertial.I.head<3>() = moments;
+      inertial.half_I.head<3>() = halves;
     }
-    if (mass <= 0.0) return std::nullopt;
-    // Its shapes' mass, or what a setting of the compiler made of it.
+    return inertial;
+  }
+
+  /// The engine's body: its shapes' mass, or what a setting of the compiler made of the text.
+  [[nodiscard]] PrintedInertial ReadMade(int id) const {
     const MassProperties made = ReadEngineBody(engine_, id);
-    inertial = PrintedInertial{};
+    PrintedInertial inertial;
     inertial.origin.form = RotationForm::kQuaternion;
     inertial.origin.r[0] = 1.0;
     inertial.mass = {made.mass, kEngineDigits * made.mass};
@@ -173,6 +180,31 @@ class PrintedMjcfReader {
     inertial.I = ToEntries(made.inertia);
     inertial.half_I.setConstant(kEngineDigits * made.inertia.trace());
     return inertial;
+  }
+
+  void ReadInertial(const MjcfElement& body, int id, PrintedLink* link) const {
+    constexpr double kSame = 1e-6;
+    const double mass = engine_.body_mass[id];
+    const MjcfElement* const element = body.FirstChildElement("inertial");
+    if (element != nullptr) link->inertial = ReadStated(*element);
+    const bool is_stated = element != nullptr && std::abs(link->inertial->mass.value - mass) <= kSame * mass;
+    CompiledInertial compiled;
+    for (const CompiledChange& change : changes_) {
+      if (change.body != NameOf(engine_, mjOBJ_BODY, id) || element == nullptr) continue;
+      const bool is_mass = change.stated.size() == 1;
+      const auto list = [](const std::vector<double>& numbers) {
+        return fmt::format("{:.6g}", fmt::join(numbers, " "));
+      };
+      compiled.setting = change.setting;
+      compiled.description +=
+          fmt::format("{}{}: {} {} in the text, {} in the engine", compiled.description.empty() ? "" : "; ",
+                      change.setting, is_mass ? "mass" : "moments", list(change.stated), list(change.made));
+      compiled.stated = *link->inertial;
+    }
+    if (!compiled.setting.empty()) link->compiled = compiled;
+    if (is_stated && compiled.setting.empty()) return;
+    link->inertial.reset();
+    if (mass > 0.0) link->inertial = ReadMade(id);
   }
 
   [[nodiscard]] PrintedJoint ReadJoint(const MjcfElement& element, const std::string& around, int id) const {
@@ -252,7 +284,7 @@ class PrintedMjcfReader {
       link.origin.r = Vector4d::UnitX();
       if (k == 0) link.origin = origin;
       if (count > 0) UndoReference(first + k, &link);
-      if (k + 1 >= count) link.inertial = ReadInertial(body, id);
+      if (k + 1 >= count) ReadInertial(body, id, &link);
       parent = robot_.Add(std::move(link));
       ++k;
     };
@@ -264,34 +296,91 @@ class PrintedMjcfReader {
       add(std::move(link));
     }
     if (k == 0) add(PrintedLink{});
+    for (const MjcfElement* site : ListChildren(&body, "site")) {
+      const std::string site_name = ReadAttribute(*site, "name");
+      const int number = mj_name2id(&engine_, mjOBJ_SITE, site_name.c_str());
+      if (site_name.empty() || number < 0) continue;
+      PrintedLink frame;
+      frame.name = site_name;
+      frame.parent = parent;
+      frame.is_frame = true;
+      frame.origin = ReadOrigin(*site);
+      TakeEngine(engine_.site_pos + 3 * number, engine_.site_quat + 4 * number, &frame.origin);
+      frames_.push_back(std::move(frame));
+    }
     for (const MjcfElement* child : ListChildren(&body, "body")) ReadBody(*child, parent, around);
   }
 
-  void ReadCouplings() {
+  /// Sites are frames on links; those that have a link's name are left out.
+  void AddFrames() {
+    for (PrintedLink& frame : frames_) {
+      if (std::ranges::find(robot_.links, frame.name, &PrintedLink::name) == robot_.links.end())
+        robot_.Add(std::move(frame));
+    }
+  }
+
+  void ReadEqualities() {
     for (const MjcfElement* equality : ListChildren(&root_, "equality")) {
-      for (const MjcfElement* element : ListChildren(equality, "joint")) {
+      for (const MjcfElement* element : ListChildren(equality)) {
         const Attributes all = classes_.Complete(*element, "");
-        if (Find(all, "active") == "false" || Find(all, "joint2").empty()) continue;
-        const std::string polynomial = Find(all, "polycoef");
-        const auto [numbers, halves] = ReadPrintedVector<4>(polynomial.empty() ? "0 1 0 0 0" : polynomial);
-        for (PrintedLink& link : robot_.links) {
-          if (link.joint.name != Find(all, "joint1")) continue;
-          link.joint.mimic = {Find(all, "joint2"), {numbers[1], halves[1]}, {numbers[0], halves[0]}};
+        if (Find(all, "active") == "false") continue;
+        if (std::string_view(element->Name()) == "joint" && !Find(all, "joint2").empty()) {
+          ReadCoupling(all);
+          continue;
         }
+        std::string text = element->Name();
+        for (const char* part : {"body1", "body2", "joint1", "tendon1", "tendon2", "geom1", "geom2"})
+          text += Find(all, part).empty() ? "" : " " + Find(all, part);
+        robot_.constraints.push_back(std::move(text));
       }
     }
   }
 
-  /// The sum of the gears of each joint's motors, and the largest force that all of them may exert.
-  void ReadMotors() {
+  void ReadCoupling(const Attributes& all) {
+    const std::string polynomial = Find(all, "polycoef");
+    const auto [numbers, halves] = ReadPrintedVector<4>(polynomial.empty() ? "0 1 0 0 0" : polynomial);
+    for (PrintedLink& link : robot_.links) {
+      if (link.joint.name == Find(all, "joint1"))
+        link.joint.mimic = {Find(all, "joint2"), {numbers[1], halves[1]}, {numbers[0], halves[0]}};
+    }
+  }
+
+  /// Tendons that exert forces.
+  void ReadTendons() {
+    for (int i = 0; i < engine_.ntendon; ++i) {
+      std::string text;
+      const auto add = [&](const char* name, double value) {
+        if (value != 0.0) text += fmt::format("{}{} {:.6g}", text.empty() ? " of " : ", ", name, value);
+      };
+      add("stiffness", engine_.tendon_stiffness[i]);
+      add("damping", engine_.tendon_damping[i]);
+      add("friction", engine_.tendon_frictionloss[i]);
+      if (engine_.tendon_limited[i] != 0) add("upper limit", engine_.tendon_range[2 * i + 1]);
+      if (!text.empty()) robot_.constraints.push_back("tendon " + NameOf(engine_, mjOBJ_TENDON, i) + text);
+    }
+  }
+
+  /// The sum of the gears of each joint's motors, and the largest force that all of them may exert. What is
+  /// no motor pulls at its joint whatever its control is.
+  void ReadMotors(bool servos) {
     for (int i = 0; i < engine_.nu; ++i) {
       if (engine_.actuator_trntype[i] != mjTRN_JOINT) continue;
       robot_.has_motors = true;
       const std::string name = NameOf(engine_, mjOBJ_JOINT, engine_.actuator_trnid[2 * i]);
+      const mjtNum* const bias = engine_.actuator_biasprm + mjNBIAS * i;
+      const bool is_servo = engine_.actuator_biastype[i] != mjBIAS_NONE && (bias[1] != 0.0 || bias[2] != 0.0);
+      if (!is_servo) motors_.insert(name);
+      if (is_servo && servos)
+        robot_.constraints.push_back(
+            fmt::format("{} joint {} (kp {:.6g}, kv {:.6g})",
+                        motors_.contains(name) ? "servo beside the motor of" : kServo, name, 0.0 - bias[1],
+                        0.0 - bias[2]));
       for (PrintedLink& link : robot_.links) {
         if (link.joint.name != name || link.joint.kind == JointKind::kFixed) continue;
         std::optional<PrintedScalar>& gear = link.joint.scalars[static_cast<size_t>(JointScalar::kGear)];
-        gear = PrintedScalar{(gear ? gear->value : 0.0) + engine_.actuator_gear[6 * i], 0.0};
+        if (is_servo != servos) continue;
+        if (!servos) gear = PrintedScalar{(gear ? gear->value : 0.0) + engine_.actuator_gear[6 * i], 0.0};
+        if (servos && !gear) gear = PrintedScalar{engine_.actuator_gear[6 * i], 0.0};
         const std::optional<std::pair<double, double>> limits = FindForceLimits(engine_, i);
         std::optional<PrintedScalar>& effort = link.joint.scalars[static_cast<size_t>(JointScalar::kEffort)];
         if (limits && std::abs(limits->first + limits->second) <= 1e-9 * std::abs(limits->second))
@@ -304,9 +393,12 @@ class PrintedMjcfReader {
   const MjcfElement& root_;
   const mjModel& engine_;
   DefaultClasses classes_;
+  std::vector<CompiledChange> changes_;
   double unit_ = kDegree;
   std::array<char, 3> sequence_ = {'x', 'y', 'z'};
   PrintedRobot robot_;
+  std::vector<PrintedLink> frames_;
+  std::set<std::string> motors_;  // joints that have one
   int body_ = 0;
 };
 

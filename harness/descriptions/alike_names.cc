@@ -7,7 +7,7 @@
 #include <map>
 
 #include "controller/common/text.h"
-#include "harness/descriptions/fault_search.h"
+#include "harness/descriptions/link_frame_tree.h"
 
 namespace dexcheck {
 
@@ -115,8 +115,8 @@ constexpr size_t kMostChildren = 12;
 /// A robot as far as it is matched: its tree, and where axes are in the base with all joints at zero.
 struct Tree {
   explicit Tree(const RobotDescription& robot) : spec(&robot.spec), described(&robot.joints) {
-    const std::vector<OwnRow> rows = ListOwnRows(robot);
-    poses = CalcOwnPoses(Pose::Identity(), rows);
+    const std::vector<JointInLinkFrames> rows = ListJointsInLinkFrames(robot);
+    poses = CalcLinkPoses(Pose::Identity(), rows);
     children.resize(rows.size() + 1);
     for (size_t i = 0; i < rows.size(); ++i) {
       axes.push_back(poses[i + 1].linear() * rows[i].axis);

@@ -5,7 +5,7 @@
 
 #include "controller/model/rigid_body.h"
 #include "harness/descriptions/description_match.h"
-#include "harness/descriptions/fault_search.h"
+#include "harness/descriptions/link_frame_tree.h"
 
 namespace dexcheck {
 namespace {
@@ -13,14 +13,6 @@ namespace {
 /// Radius of gyration, m.
 double CalcGyration(const MassProperties& body) {
   return std::sqrt(body.inertia.trace() / (2.0 * body.mass));
-}
-
-/// Sum of the relative distances of two centres of mass and of two inertias.
-double CalcDistance(const MassProperties& a, const MassProperties& b) {
-  const double length = std::max({CalcGyration(a), a.com.norm(), b.com.norm()});
-  const double inertia = std::max(a.inertia.norm(), b.inertia.norm());
-  const auto divide = [](double error, double scale) { return scale > 0.0 ? error / scale : error; };
-  return divide((a.com - b.com).norm(), length) + divide((a.inertia - b.inertia).norm(), inertia);
 }
 
 class BodyComparison : public ConstantComparison {
@@ -52,30 +44,6 @@ std::vector<Pose> PlaceLinkFrames(const RobotDescription& a, const RobotDescript
   return placed;
 }
 
-std::vector<Pose> RegisterLinks(const RobotDescription& a, const RobotDescription& b) {
-  constexpr double kNear = 1e-3;   // relative distance of bodies that are one, but for rounding
-  constexpr double kBetter = 0.5;  // of the distance, where the frames are chosen differently
-  const std::vector<int> b_of_a = MatchJoints(a.spec, b.spec);
-  const std::vector<OwnRow> rows_a = ListOwnRows(a);
-  const std::vector<OwnRow> rows_b = ListOwnRows(b);
-  std::vector<Pose> registered = PlaceLinkFrames(a, b);
-  std::vector<bool> is_placed(rows_a.size(), false);
-  for (size_t i = 0; i < rows_a.size(); ++i) {
-    if (b_of_a[i] < 0) continue;
-    const MassProperties& own = rows_a[i].body;
-    const MassProperties& other = rows_b[static_cast<size_t>(b_of_a[i])].body;
-    if (own.mass > 0.0 && other.mass > 0.0) {
-      const double distance = CalcDistance(own, other);
-      is_placed[i] =
-          distance > kNear && CalcDistance(own, ExpressIn(other, registered[i])) < kBetter * distance;
-    } else {
-      is_placed[i] = rows_a[i].parent >= 0 && is_placed[static_cast<size_t>(rows_a[i].parent)];
-    }
-    if (!is_placed[i]) registered[i].setIdentity();
-  }
-  return registered;
-}
-
 ConstantChecks CompareBodies(const RobotDescription& a, const RobotDescription& b,
                              const std::vector<Pose>& X_ab) {
   ConstantChecks result;
@@ -83,8 +51,8 @@ ConstantChecks CompareBodies(const RobotDescription& a, const RobotDescription& 
   BodyComparison comparison(model, &result);
   if (a.spec.base.type == BaseType::kFloating) comparison.CompareLink(-1, a.spec.base.body, b.spec.base.body);
   const std::vector<int> b_of_a = MatchJoints(a.spec, b.spec);
-  const std::vector<OwnRow> rows_a = ListOwnRows(a);
-  const std::vector<OwnRow> rows_b = ListOwnRows(b);
+  const std::vector<JointInLinkFrames> rows_a = ListJointsInLinkFrames(a);
+  const std::vector<JointInLinkFrames> rows_b = ListJointsInLinkFrames(b);
   for (size_t i = 0; i < rows_a.size(); ++i) {
     if (b_of_a[i] < 0) continue;
     const MassProperties& other = rows_b[static_cast<size_t>(b_of_a[i])].body;

@@ -14,10 +14,6 @@ namespace dexcheck {
 /// @param a, b as CompleteEachOther left them, here and below.
 std::vector<Pose> PlaceLinkFrames(const RobotDescription& a, const RobotDescription& b);
 
-/// Returns the same, but the identity where the link has nearly the same body in both files: an error of a
-/// joint that carries the link then does not count for the link.
-std::vector<Pose> RegisterLinks(const RobotDescription& a, const RobotDescription& b);
-
 /// Compares the centre of mass (check "link_com": x, y, z, m) and the inertia about it (check "link_inertia":
 /// xx, yy, zz, xy, xz, yz, kg m^2) of each link that has mass in both descriptions. All numbers are expressed
 /// in the link's own frame of `a`. Centres are relative to their distance from the link's origin or to the

@@ -15,7 +15,7 @@
 #include "controller/common/text.h"
 #include "controller/model/rigid_body.h"
 #include "harness/descriptions/description_match.h"
-#include "harness/descriptions/fault_search.h"
+#include "harness/descriptions/link_frame_tree.h"
 #include "harness/descriptions/mjcf_reader.h"
 #include "harness/engine/engine.h"
 #include "harness/engine/xml.h"

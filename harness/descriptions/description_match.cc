@@ -294,15 +294,6 @@ void TakeIgnored(const RobotSpec& robot, const std::vector<std::string>& ignore,
   }
 }
 
-void UndoOneSided(const std::vector<ConstantFinding>& one_sided, RobotSpec* spec) {
-  for (const ConstantFinding& finding : one_sided) {
-    for (const DescribedConstant& constant : ListDescribedConstants()) {
-      if (finding.check == constant.check)
-        spec->joints[static_cast<size_t>(finding.location.first)].*constant.value = finding.model;
-    }
-  }
-}
-
 void AddOneSided(const RobotModel& model, const std::vector<ConstantFinding>& one_sided,
                  ConstantChecks* constants) {
   if (one_sided.empty()) return;

@@ -48,9 +48,6 @@ Completion CompleteEachOther(RobotDescription* a, RobotDescription* b,
 Completion CompleteFromEngine(const mjModel& engine, const std::string& source, RobotDescription* robot,
                               const std::vector<std::string>& ignore = {}, bool is_table = false);
 
-/// Gives the joints back what their own file says where it leaves a constant out, which is none.
-void UndoOneSided(const std::vector<ConstantFinding>& one_sided, RobotSpec* spec);
-
 /// Adds what one description alone states to the constant checks, each with its effect on the motion.
 /// @param model of the robot with what both state.
 void AddOneSided(const RobotModel& model, const std::vector<ConstantFinding>& one_sided,

@@ -33,8 +33,6 @@ struct DescribedJoint : WrittenRow {
   bool states_dry_friction = true;
   bool states_armature = true;
 
-  /// The frame in which the file places the joint, in the parent's own: of a link that is welded to it.
-  Pose X_PW = Pose::Identity();
   int line = 0;                        ///< Of the file; 0 when it is not known.
   std::optional<StatedForces> forces;  ///< Limits of the joint's motors; none where the file states none.
   double velocity_limit = 0.0;         ///< rad/s or m/s; 0 where the file states none.

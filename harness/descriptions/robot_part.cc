@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
@@ -62,7 +61,6 @@ void HoldJoint(int index, double value, RobotDescription* robot) {
   for (size_t i = 0; i < spec.joints.size(); ++i) {
     // A joint that follows this one is held with it, and was before.
     if (spec.joints[i].coupling && spec.joints[i].coupling->leader == index) spec.joints[i].coupling.reset();
-    if (spec.joints[i].parent == index) robot->joints[i].X_PW = X_Pi * robot->joints[i].X_PW;
     weld(&spec.joints[i].parent, &spec.joints[i].X_PB);
   }
   for (Frame& frame : spec.frames) weld(&frame.link, &frame.X_LF);
@@ -126,29 +124,6 @@ void HoldFollowers(const RobotSpec& spec, std::map<std::string, double>* held) {
 bool HasLink(const RobotDescription& robot, const std::string& name) {
   return FindJoint(robot.spec, name, &Joint::link) >= 0 ||
          std::ranges::any_of(robot.parts, [&](const DescribedPart& part) { return part.name == name; });
-}
-
-double SumMasses(const RobotDescription& robot, const std::vector<bool>& is_in) {
-  double mass = 0.0;
-  for (size_t i = 0; i < is_in.size(); ++i) mass += is_in[i] ? robot.spec.joints[i].body.mass : 0.0;
-  return mass;
-}
-
-/// Whether what carries a joint that only `robot` has weighs, in `other`, what it does here without its
-/// subtree.
-bool LacksMass(const RobotDescription& robot, int joint, const RobotDescription& other) {
-  int carrier = robot.spec.joints[static_cast<size_t>(joint)].parent;
-  const auto mass_of = [](const RobotDescription& one, int link) {
-    return link < 0 ? one.spec.base.body.mass : one.spec.joints[static_cast<size_t>(link)].body.mass;
-  };
-  int there = -1;
-  for (; carrier >= 0; carrier = robot.spec.joints[static_cast<size_t>(carrier)].parent) {
-    there = FindJoint(other.spec, robot.spec.joints[static_cast<size_t>(carrier)].name);
-    if (there >= 0) break;
-  }
-  const double subtree = SumMasses(robot, ListSubtree(robot.spec, joint));
-  const double without = mass_of(other, there) - mass_of(robot, carrier);
-  return std::abs(without) < std::abs(without - subtree);
 }
 
 }  // namespace
@@ -227,96 +202,6 @@ std::vector<std::string> TakePart(const RobotPart& part, RobotDescription* a, Ro
   }
   if (!done.empty()) notes.push_back("left out: " + JoinNames(done));
   return notes;
-}
-
-std::vector<ConstantFinding> ListMissing(const RobotPart& common, const RobotDescription& a,
-                                         const RobotDescription& b) {
-  RobotDescription renamed = b;
-  TakeJointNames(a, &renamed);
-  const auto name = [](const RobotDescription& robot) {
-    return std::filesystem::path(robot.spec.source).filename().string();
-  };
-  std::vector<ConstantFinding> findings;
-  const auto add = [&](bool is_of_a, const std::string& where, const std::string& effect) {
-    ConstantFinding& finding = findings.emplace_back();
-    finding.check = "missing_joint";
-    finding.where = where;
-    (is_of_a ? finding.model : finding.engine) = 1.0;
-    finding.effect = "only in " + name(is_of_a ? a : b) + ", " + effect;
-  };
-  for (const bool is_of_a : {true, false}) {
-    const RobotDescription& robot = is_of_a ? a : renamed;
-    const std::vector<int> match = MatchJoints(robot.spec, (is_of_a ? renamed : a).spec);
-    for (size_t i = 0; i < match.size(); ++i) {
-      const Joint& joint = robot.spec.joints[i];
-      if (match[i] >= 0) {
-        const JointType other = (is_of_a ? renamed : a).spec.joints[static_cast<size_t>(match[i])].type;
-        if (is_of_a && joint.type != other) {
-          ConstantFinding& finding = findings.emplace_back();
-          finding.check = "joint_type";
-          finding.where = "joint " + joint.name;
-          finding.model = 1.0;
-          finding.effect = std::string(NameOf(joint.type)) + " in " + name(a) + ", " + NameOf(other) +
-                           " in " + name(b) + "; held at 0 in what is compared";
-        }
-        continue;
-      }
-      const bool is_held = common.held.contains(joint.name);
-      add(is_of_a, "joint " + joint.name,
-          "with link " + joint.link + " of " + FormatNumber(joint.body.mass, 6) + " kg" +
-              (is_held ? ", which does not move there (--lock " + joint.name + " says that it is meant)"
-                       : " (--ignore " + joint.link + " says that it is meant)"));
-    }
-  }
-  if (common.fixes_base) {
-    const bool floats_in_a = a.spec.base.type == BaseType::kFloating;
-    add(floats_in_a, "base " + (floats_in_a ? a : b).spec.base.link,
-        "where it floats (--only LINK compares what it carries)");
-  }
-  return findings;
-}
-
-std::optional<RobotPart> FindCommonPart(const RobotDescription& a, const RobotDescription& b) {
-  RobotDescription renamed = b;
-  TakeJointNames(a, &renamed);
-  for (const RobotDescription* robot : {&a, &b}) {
-    const BaseType type = robot->spec.base.type;
-    if ((type != BaseType::kFixed && type != BaseType::kFloating) || robot->spec.object) return std::nullopt;
-  }
-  RobotPart part;
-  const BaseType types[] = {a.spec.base.type, renamed.spec.base.type};
-  part.fixes_base = types[0] != types[1] && a.states_base && renamed.states_base &&
-                    (types[0] == BaseType::kFloating || types[1] == BaseType::kFloating);
-  const auto find = [&](const RobotDescription& robot, const RobotDescription& other) {
-    const std::vector<int> match = MatchJoints(robot.spec, other.spec);
-    const auto missing = std::ranges::count(match, -1);
-    std::vector<bool> is_gone(match.size(), false);
-    for (size_t i = 0; i < match.size(); ++i) {
-      const Joint& joint = robot.spec.joints[i];
-      if (match[i] >= 0) {
-        const JointType type = other.spec.joints[static_cast<size_t>(match[i])].type;
-        const bool can_be_held = joint.type != JointType::kBall && type != JointType::kBall;
-        if (joint.type != type && can_be_held) part.held.emplace(joint.name, 0.0);
-        continue;
-      }
-      if (is_gone[i]) continue;
-      const std::vector<bool> subtree = ListSubtree(robot.spec, static_cast<int>(i));
-      bool is_whole = true;  // nothing that hangs on it is both's
-      for (size_t k = 0; k < match.size(); ++k) is_whole = is_whole && (!subtree[k] || match[k] < 0);
-      if (is_whole && LacksMass(robot, static_cast<int>(i), other)) {
-        part.left_out.push_back(robot.spec.joints[i].link);
-        for (size_t k = 0; k < match.size(); ++k) is_gone[k] = is_gone[k] || subtree[k];
-      } else {
-        part.held.emplace(joint.name, 0.0);
-      }
-    }
-    return missing;
-  };
-  const std::ptrdiff_t of_a = find(a, renamed);
-  const std::ptrdiff_t of_b = find(renamed, a);
-  const bool is_most = 2 * of_a <= std::ssize(a.spec.joints) && 2 * of_b <= std::ssize(renamed.spec.joints);
-  if (part.empty() || !is_most) return std::nullopt;
-  return part;
 }
 
 }  // namespace dexcheck

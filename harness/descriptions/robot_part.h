@@ -31,15 +31,4 @@ void AddHeldJoint(const std::string& text, RobotPart* part);
 /// @throws InputError for names that neither of the two has, and where nothing is left that moves.
 std::vector<std::string> TakePart(const RobotPart& part, RobotDescription* a, RobotDescription* b, int* held);
 
-/// What of a common part (FindCommonPart) only one of the two has, as findings that tell its joints, links
-/// and masses, and how to say that it is meant; and joints that are of another type in the other.
-std::vector<ConstantFinding> ListMissing(const RobotPart& common, const RobotDescription& a,
-                                         const RobotDescription& b);
-
-/// The part that two robots have in common, where some joints, or how the base moves, are only one's: these
-/// joints are held at zero, or left out with what they carry where the other file has not the mass either.
-/// Joints of two types are held in both.
-/// @return nothing when both are alike in that, and when the other lacks more than half of one's joints.
-std::optional<RobotPart> FindCommonPart(const RobotDescription& a, const RobotDescription& b);
-
 }  // namespace dexcheck

@@ -169,11 +169,6 @@ class UrdfReader {
                                         "with links without inertials between"));
     }
     AddMovingJoint(joint, link, parent.joint, X_iJ);
-    robot_.joints.back().X_PW = parent.X_iL;
-    if (parent.joint >= 0) {
-      const Pose& X_iP = robot_.joints[static_cast<size_t>(parent.joint)].X_iL;
-      robot_.joints.back().X_PW = X_iP.inverse() * parent.X_iL;
-    }
     return {static_cast<int>(robot_.spec.joints.size()) - 1, robot_.joints.back().X_iL};
   }
 

@@ -1,11 +1,11 @@
 #include "harness/diagnosis/mutation.h"
 
 #include <algorithm>
-#include <cmath>
+#include <map>
 #include <optional>
 #include <utility>
 
-#include "controller/common/errors.h"
+#include "harness/corrections/read_printed.h"
 #include "harness/descriptions/analytic_provider.h"
 
 namespace dexcheck {
@@ -23,7 +23,7 @@ class MutantList {
       double change = scale * GetScale(spec_, parameter);
       // An inertia at the edge of what is possible may be changed to one side only.
       TryChange(spec_, parameter, &change);
-      Mutant& mutant = Add(DescribeGroup(parameter), {parameter});
+      Mutant& mutant = Add(DescribeGroup(parameter), parameter);
       mutant.change = [parameter, value, change](RobotSpec* spec) {
         SetValue(spec, parameter, value + change);
       };
@@ -34,14 +34,8 @@ class MutantList {
     const int joints = static_cast<int>(spec_.joints.size());
     for (int i = 0; i < joints; ++i) {
       const Joint& joint = spec_.joints[static_cast<size_t>(i)];
-      AddStructural("axis reversed", RepairKind::kAxisReversed, i, -1);
       AddShift("alpha a quarter turn off", {Kind::kAlpha, i, 0}, 0.5 * kPi);
       AddShift("home angle a quarter turn off", {Kind::kHomeAngle, i, 0}, 0.5 * kPi);
-      if (joint.parent >= 0) AddStructural("rows exchanged", RepairKind::kRowsSwapped, joint.parent, i);
-      for (int j = i + 1; j < joints; ++j) {
-        if (spec_.joints[static_cast<size_t>(j)].parent == joint.parent)
-          AddStructural("places exchanged", RepairKind::kPosesSwapped, i, j);
-      }
       AddShift("armature missing", {Kind::kArmature, i, 0}, -joint.armature);
       AddShift("damping missing", {Kind::kDamping, i, 0}, -joint.damping);
       AddBodies(i);
@@ -54,7 +48,7 @@ class MutantList {
   std::vector<Mutant> Take() { return std::move(mutants_); }
 
  private:
-  /// What is mistaken of a link's body as a whole. @param link by its joint; -1: the base.
+  /// Adds faults of a body as a whole. @param link by its joint; -1: the base.
   void AddBodies(int link) {
     AddScaledBody(link);
     AddBody("inertia about the frame's origin", link, [](MassProperties* body) {
@@ -72,26 +66,26 @@ class MutantList {
     });
   }
 
-  Mutant& Add(const std::string& kind, const std::vector<Parameter>& parameters) {
+  Mutant& Add(const std::string& kind, const Parameter& number, bool is_whole = false) {
     Mutant& mutant = mutants_.emplace_back();
     mutant.kind = kind;
-    mutant.expected.parameters = parameters;
-    mutant.name = DescribeShort(mutant.expected, spec_);
+    mutant.number = number;
+    mutant.name =
+        DescribePart(spec_, number) + ": " + (is_whole ? DescribeGroup(number) : DescribeQuantity(number));
     return mutant;
   }
 
   void AddShift(const std::string& kind, const Parameter& parameter, double shift) {
     if (shift == 0.0) return;
     const double value = GetValue(spec_, parameter) + shift;
-    Mutant& mutant = Add(kind, {parameter});
+    Mutant& mutant = Add(kind, parameter);
     mutant.change = [parameter, value](RobotSpec* spec) { SetValue(spec, parameter, value); };
   }
 
   /// A solid taken for one of a tenth more mass.
   void AddScaledBody(int link) {
     if (!(BodyOf(spec_, link).mass > 0.0)) return;
-    std::vector<Parameter> numbers = {{Kind::kMass, link, 0}, {Kind::kInertia, link, 0}};
-    Add("solid of another mass", numbers).change = [link](RobotSpec* spec) {
+    Add("solid of another mass", {Kind::kMass, link, 0}).change = [link](RobotSpec* spec) {
       constexpr double kRatio = 1.1;
       BodyOf(spec, link).mass *= kRatio;
       BodyOf(spec, link).inertia *= kRatio;
@@ -104,42 +98,43 @@ class MutantList {
     change(&changed);
     constexpr double kSame = 1e-9;  // of the trace: a tensor that the fault leaves as it is
     if ((changed.inertia - before).norm() <= kSame * before.trace()) return;
-    std::vector<Parameter> entries;
-    entries.reserve(6);
-    for (int k = 0; k < 6; ++k) entries.push_back({Kind::kInertia, link, k});
-    Mutant& mutant = Add(kind, entries);
-    mutant.change = [link, change](RobotSpec* spec) { change(&BodyOf(spec, link)); };
-  }
-
-  void AddStructural(const std::string& kind, RepairKind cause_kind, int joint, int other) {
-    Repair cause;
-    cause.kind = cause_kind;
-    cause.joint = joint;
-    cause.other = other;
-    RobotSpec changed = spec_;
-    Apply(cause, &changed);
-    if (IsSamePlacement(changed)) return;
-    Mutant& mutant = mutants_.emplace_back();
-    mutant.kind = kind;
-    mutant.expected = cause;
-    mutant.name = DescribeShort(cause, spec_);
-    mutant.change = [cause](RobotSpec* spec) { Apply(cause, spec); };
-  }
-
-  /// Whether two rows or places that were exchanged are alike.
-  [[nodiscard]] bool IsSamePlacement(const RobotSpec& changed) const {
-    for (size_t i = 0; i < spec_.joints.size(); ++i) {
-      const MdhRow& a = spec_.joints[i].mdh;
-      const MdhRow& b = changed.joints[i].mdh;
-      if (a.alpha != b.alpha || a.a != b.a || a.q != b.q || a.d != b.d) return false;
-      if (spec_.joints[i].X_PB.matrix() != changed.joints[i].X_PB.matrix()) return false;
-    }
-    return true;
+    Add(kind, {Kind::kInertia, link, 0}, /*is_whole=*/true).change = [link, change](RobotSpec* spec) {
+      change(&BodyOf(spec, link));
+    };
   }
 
   const RobotSpec& spec_;
   std::vector<Mutant> mutants_;
 };
+
+/// Files that agree are known better than to the digits of their numbers: takes these as exact.
+void TakeAsExact(PrintedRobot* robot) {
+  constexpr double kHalf = 1e-9;
+  const auto take_origin = [&](PrintedOrigin* origin) {
+    origin->half_t = origin->half_t.cwiseMin(kHalf);
+    origin->half_r = origin->half_r.cwiseMin(kHalf);
+  };
+  const auto take = [&](PrintedScalar* number) { number->half = std::min(number->half, kHalf); };
+  for (PrintedLink& link : robot->links) {
+    take_origin(&link.origin);
+    link.joint.half_axis = link.joint.half_axis.cwiseMin(kHalf);
+    for (auto& number : link.joint.scalars) {
+      if (number) take(&*number);
+    }
+    for (size_t k = 0; link.joint.range && k < 2; ++k) take(&(*link.joint.range)[k]);
+    if (!link.inertial) continue;
+    take(&link.inertial->mass);
+    take_origin(&link.inertial->origin);
+    link.inertial->half_I = link.inertial->half_I.cwiseMin(kHalf);
+  }
+}
+
+PrintedRobot PrintExactly(const RobotDescription& description) {
+  PrintedRobot robot = PrintDescription(description);
+  LeaveOutUnstated({}, &robot);
+  TakeAsExact(&robot);
+  return robot;
+}
 
 }  // namespace
 
@@ -168,25 +163,56 @@ std::vector<Mutant> ListMutants(const RobotSpec& spec, double scale) {
   return list.Take();
 }
 
-bool IsNamedBy(const Mutant& mutant, const Repair& cause) {
-  const Repair& expected = mutant.expected;
-  if (cause.kind != expected.kind) return false;
-  if (cause.kind != RepairKind::kParameters)
-    return cause.joint == expected.joint && cause.other == expected.other;
-  if (expected.parameters.size() == 1) return cause.parameters == expected.parameters;
-  const Parameter& named = cause.parameters.front();
-  const Parameter& changed = expected.parameters.front();
-  const bool several = changed.kind != expected.parameters.back().kind;
-  return named.kind == changed.kind && named.index == changed.index &&
-         (!several || cause.parameters.size() > 1);
+bool IsNamedBy(const RobotSpec& spec, const Parameter& number, const CorrectionItem& cause) {
+  using enum SiteKind;
+  static const std::map<Kind, SiteKind> kSites = {{Kind::kAlpha, kRotation},
+                                                  {Kind::kHomeAngle, kRotation},
+                                                  {Kind::kRotation, kRotation},
+                                                  {Kind::kA, kPosition},
+                                                  {Kind::kD, kPosition},
+                                                  {Kind::kPosition, kPosition},
+                                                  {Kind::kDamping, kDamping},
+                                                  {Kind::kArmature, kArmature},
+                                                  {Kind::kDryFriction, kFriction},
+                                                  {Kind::kLowerLimit, kRange},
+                                                  {Kind::kUpperLimit, kRange},
+                                                  {Kind::kMass, kMass},
+                                                  {Kind::kCom, kCom},
+                                                  {Kind::kInertia, kInertia},
+                                                  {Kind::kGravity, kGravity},
+                                                  {Kind::kFramePosition, kPosition},
+                                                  {Kind::kFrameRotation, kRotation},
+                                                  {Kind::kBasePosition, kPosition},
+                                                  {Kind::kBaseRotation, kRotation}};
+  const auto site = kSites.find(number.kind);
+  if (site == kSites.end()) return false;
+  std::string place = number.kind == Kind::kGravity ? "robot" : DescribePart(spec, number);
+  for (const std::string part : {"frame ", "base "}) {
+    if (place.starts_with(part)) place = "link " + place.substr(part.size());
+  }
+  if (std::ranges::find(cause.places, place) == cause.places.end()) return false;
+  // A solid of another mass has an inertia that goes with it.
+  if (cause.fault.kind == CorrectionKind::kWithMass) return number.kind == Kind::kMass;
+  if (cause.fault.whole) return IsOfBody(cause.fault.of) == IsOfBody(site->second);
+  return cause.fault.of == site->second;
 }
 
-void TryMutant(const RobotModel& model, const mjModel& engine, const std::string& engine_source,
-               const MutationOptions& options, Mutant* mutant) {
-  RobotSpec spec = model.spec();
-  mutant->change(&spec);
-  const std::optional<RobotModel> changed = TryModel(spec);
-  if (!changed) {
+MutatedPair::MutatedPair(const DescriptionFile& first, const DescriptionFile& second)
+    : robot(first.Describe()),
+      model(robot.spec),
+      engine(second.CopyEngine()),
+      source(second.path().string()) {
+  PrintedRobot printed = ReadPrintedRobot(second);
+  LeaveOutUnstated({}, &printed);
+  TakeAsExact(&printed);
+  if (FindCauses(PrintExactly(robot), printed).agrees) reference = std::move(printed);
+}
+
+void TryMutant(const MutatedPair& pair, const MutationOptions& options, Mutant* mutant) {
+  RobotDescription changed = pair.robot;
+  mutant->change(&changed.spec);
+  const std::optional<RobotModel> model = TryModel(changed.spec);
+  if (!model) {
     mutant->outcome = MutantOutcome::kRefused;
     return;
   }
@@ -194,25 +220,27 @@ void TryMutant(const RobotModel& model, const mjModel& engine, const std::string
   check.samples = options.samples;
   check.seed = options.seed;
   const ConsistencyResult result =
-      CheckConsistency(Adapter(*changed, engine, engine_source), check, [](long) { return true; });
+      CheckConsistency(Adapter(*model, *pair.engine, pair.source), check, [](long) { return true; });
   AddFailed(result.constants.records, &mutant->failed_checks);
   AddFailed(result.terms, &mutant->failed_checks);
   if (result.Agrees()) {
-    AnalyticProvider other(*changed, "changed", model);
-    const bool has_effect = HasEffect(model, &other, options.samples, options.seed);
+    AnalyticProvider other(*model, "changed", pair.model);
+    const bool has_effect = HasEffect(pair.model, &other, options.samples, options.seed);
     mutant->outcome = has_effect ? MutantOutcome::kSurvived : MutantOutcome::kNoEffect;
     return;
   }
   mutant->outcome = MutantOutcome::kKilled;
-  if (!options.diagnose) return;
-  const Diagnosis diagnosis = Diagnose(*changed, engine, engine_source, {}, [](const char*) { return true; });
-  mutant->explained = diagnosis.explained;
-  if (diagnosis.causes.empty()) return;
-  const Repair& first = diagnosis.causes.front();
-  mutant->named = DescribeShort(first, spec);
-  mutant->named_first = IsNamedBy(*mutant, first);
-  mutant->named_equal = std::any_of(first.equivalents.begin(), first.equivalents.end(),
-                                    [&](const Repair& equal) { return IsNamedBy(*mutant, equal); });
+  if (!options.diagnose || !pair.reference) return;
+  const FileCauses found = FindCauses(PrintExactly(changed), *pair.reference);
+  if (found.causes.empty()) return;
+  const CorrectionItem& first = found.corrections.items.front();
+  const auto names = [&](const CorrectionItem& item) {
+    return IsNamedBy(changed.spec, mutant->number, item);
+  };
+  mutant->named = found.causes.front().text;
+  mutant->explained = found.causes.front().explained;
+  mutant->named_first = names(first);
+  mutant->named_equal = std::ranges::any_of(first.rivals, names);
 }
 
 }  // namespace dexcheck

@@ -1,15 +1,17 @@
 #pragma once
 
-// Wrong models made on purpose: which of them the checks find, and whether the diagnosis names what was
-// changed.
+// Wrong models made on purpose: which of them the checks find, and whether the causes of two files that
+// differ name what was changed.
 
 #include <functional>
 #include <span>
 #include <string>
 #include <vector>
 
+#include "harness/checks/consistency.h"
+#include "harness/checks/file_causes.h"
 #include "harness/descriptions/dynamics_provider.h"
-#include "harness/diagnosis/diagnose.h"
+#include "harness/diagnosis/parameters.h"
 
 namespace dexcheck {
 
@@ -35,10 +37,10 @@ void AddFailed(std::span<const CheckRecord> records, std::string* names);
 /// A wrong model.
 struct Mutant : TriedFault {
   std::function<void(RobotSpec*)> change;
-  Repair expected;  ///< What the diagnosis should name, without values.
-  // What it says; for killed mutants.
-  std::string named;         ///< Its first cause, in short.
-  bool named_equal = false;  ///< The change is listed as an equal repair of the first cause.
+  Parameter number;  ///< The number that is wrong, or one of the vector or tensor.
+  // Found of mutants that the checks find.
+  std::string named;         ///< The first cause.
+  bool named_equal = false;  ///< The change is an alternative of the first cause.
   double explained = 0.0;
 };
 
@@ -49,23 +51,32 @@ struct MutationOptions {
   bool diagnose = true;
 };
 
-/// Every parameter of the model by itself, then changes of structure that a specification can express: an
-/// axis reversed, a quarter turn, two rows or places exchanged, two bodies exchanged, no armature, no
-/// damping, an inertia about the wrong point or in mirrored axes, gravity upside down.
+/// Lists every parameter of the model by itself, then faults of a joint or link as people make them: a
+/// quarter turn, no armature, no damping, an inertia about the wrong point or in mirrored axes, a solid of
+/// another mass, gravity upside down.
 ///
 /// A parameter changes by `scale` times itself; one that is zero by `scale` times 1 rad, 1 m, the trace of
 /// its tensor, the length of its vector, or its unit.
 std::vector<Mutant> ListMutants(const RobotSpec& spec, double scale);
 
-/// Whether a cause names what was changed: the same number, or any numbers of the same vector or tensor when
-/// several were changed; the same joints for changes of structure.
-bool IsNamedBy(const Mutant& mutant, const Repair& cause);
+/// Whether a cause is about the quantity and the place that were changed.
+bool IsNamedBy(const RobotSpec& spec, const Parameter& number, const CorrectionItem& cause);
 
 /// Whether another provider of a robot's terms has any other than the model at random states.
 bool HasEffect(const RobotModel& model, DynamicsProvider* other, int samples, std::uint64_t seed);
 
-/// Runs the checks, and the diagnosis, on a mutant.
-void TryMutant(const RobotModel& model, const mjModel& engine, const std::string& engine_source,
-               const MutationOptions& options, Mutant* mutant);
+/// Two files that agree, the first of which is changed.
+struct MutatedPair {
+  explicit MutatedPair(const DescriptionFile& first, const DescriptionFile& second);
+  RobotDescription robot;
+  RobotModel model;
+  MjModelPtr engine;
+  std::string source;  ///< Of the engine's model.
+  /// The second file as it prints its numbers; none where causes are not found in robots of this kind.
+  std::optional<PrintedRobot> reference;
+};
+
+/// Runs the checks on a mutant, and looks for the causes.
+void TryMutant(const MutatedPair& pair, const MutationOptions& options, Mutant* mutant);
 
 }  // namespace dexcheck

@@ -38,74 +38,50 @@ auto& TorusOf(Spec& spec) {
 struct ParameterTable {
   enum Part { kRow, kJoint, kLink, kFrame, kBase, kRobot, kObject };  ///< What a number belongs to.
   enum Form { kNumber, kAngle, kVector, kPosition, kRotation, kTensor };
-  enum Effect { kPlaces, kMovesNothing };
   struct Entry {
     const char* name;
-    const char* unit;
     Part part;
     Form form;
-    Effect effect;
     NumberPlace place;
-    const char* check = nullptr;  ///< The check of constants that reads it,
-    int entry = 0;                ///< and which of that check's numbers it is.
   };
   static const Entry kEntries[32];
 };
 
 /// In the order of the enumeration.
 constexpr ParameterTable::Entry ParameterTable::kEntries[] = {
-    {"alpha", "deg", kRow, kAngle, kPlaces, [](auto& s, int i) { return &JointAt(s, i).mdh.alpha; }},
-    {"a", "m", kRow, kNumber, kPlaces, [](auto& s, int i) { return &JointAt(s, i).mdh.a; }},
-    {"q (home angle)", "deg", kRow, kAngle, kPlaces, [](auto& s, int i) { return &JointAt(s, i).mdh.q; }},
-    {"d", "m", kRow, kNumber, kPlaces, [](auto& s, int i) { return &JointAt(s, i).mdh.d; }},
-    {"position", "m", kRow, kPosition, kPlaces, [](auto& s, int i) { return JointAt(s, i).X_PB.data(); }},
-    {"rotation", "deg", kRow, kRotation, kPlaces, [](auto& s, int i) { return JointAt(s, i).X_PB.data(); }},
-    {"damping", "N m s/rad", kJoint, kNumber, kMovesNothing,
-     [](auto& s, int i) { return &JointAt(s, i).damping; }},
-    {"armature", "kg m^2", kJoint, kNumber, kMovesNothing,
-     [](auto& s, int i) { return &JointAt(s, i).armature; }},
-    {"dry friction", "N m", kJoint, kNumber, kMovesNothing,
-     [](auto& s, int i) { return &JointAt(s, i).dry_friction; }, "joint_dry_friction"},
-    {"lower limit", "m", kJoint, kNumber, kMovesNothing, [](auto& s, int i) { return &JointAt(s, i).lower; },
-     "joint_range", 0},
-    {"upper limit", "m", kJoint, kNumber, kMovesNothing, [](auto& s, int i) { return &JointAt(s, i).upper; },
-     "joint_range", 1},
-    {"mass", "kg", kLink, kNumber, kMovesNothing, [](auto& s, int i) { return &BodyAt(s, i).mass; }},
-    {"centre of mass", "m", kLink, kVector, kMovesNothing,
-     [](auto& s, int i) { return BodyAt(s, i).com.data(); }},
-    {"inertia", "kg m^2", kLink, kTensor, kMovesNothing,
-     [](auto& s, int i) { return BodyAt(s, i).inertia.data(); }},
-    {"position", "m", kFrame, kPosition, kPlaces, [](auto& s, int i) { return FrameAt(s, i).X_LF.data(); }},
-    {"rotation", "deg", kFrame, kRotation, kPlaces, [](auto& s, int i) { return FrameAt(s, i).X_LF.data(); }},
-    {"fingertip radius", "m", kFrame, kNumber, kMovesNothing,
-     [](auto& s, int i) { return &*FrameAt(s, i).sphere_radius; }, "fingertip_radius"},
-    {"position", "m", kBase, kPosition, kPlaces, [](auto& s, int) { return s.base.X_B0.data(); }},
-    {"rotation", "deg", kBase, kRotation, kPlaces, [](auto& s, int) { return s.base.X_B0.data(); }},
-    {"wheel radius", "m", kBase, kNumber, kMovesNothing, [](auto& s, int) { return &s.base.wheel_radius; },
-     "wheel_radius"},
-    {"wheel distance", "m", kBase, kNumber, kMovesNothing,
-     [](auto& s, int) { return &s.base.wheel_distance; }, "wheel_distance"},
-    {"wheel mass", "kg", kBase, kNumber, kMovesNothing, [](auto& s, int) { return &s.base.wheel.mass; },
-     "wheel_mass"},
-    {"wheel spin inertia", "kg m^2", kBase, kNumber, kMovesNothing,
-     [](auto& s, int) { return &s.base.wheel.spin_inertia; }, "wheel_spin_inertia"},
-    {"wheel transverse inertia", "kg m^2", kBase, kNumber, kMovesNothing,
+    {"alpha", kRow, kAngle, [](auto& s, int i) { return &JointAt(s, i).mdh.alpha; }},
+    {"a", kRow, kNumber, [](auto& s, int i) { return &JointAt(s, i).mdh.a; }},
+    {"q (home angle)", kRow, kAngle, [](auto& s, int i) { return &JointAt(s, i).mdh.q; }},
+    {"d", kRow, kNumber, [](auto& s, int i) { return &JointAt(s, i).mdh.d; }},
+    {"position", kRow, kPosition, [](auto& s, int i) { return JointAt(s, i).X_PB.data(); }},
+    {"rotation", kRow, kRotation, [](auto& s, int i) { return JointAt(s, i).X_PB.data(); }},
+    {"damping", kJoint, kNumber, [](auto& s, int i) { return &JointAt(s, i).damping; }},
+    {"armature", kJoint, kNumber, [](auto& s, int i) { return &JointAt(s, i).armature; }},
+    {"dry friction", kJoint, kNumber, [](auto& s, int i) { return &JointAt(s, i).dry_friction; }},
+    {"lower limit", kJoint, kNumber, [](auto& s, int i) { return &JointAt(s, i).lower; }},
+    {"upper limit", kJoint, kNumber, [](auto& s, int i) { return &JointAt(s, i).upper; }},
+    {"mass", kLink, kNumber, [](auto& s, int i) { return &BodyAt(s, i).mass; }},
+    {"centre of mass", kLink, kVector, [](auto& s, int i) { return BodyAt(s, i).com.data(); }},
+    {"inertia", kLink, kTensor, [](auto& s, int i) { return BodyAt(s, i).inertia.data(); }},
+    {"position", kFrame, kPosition, [](auto& s, int i) { return FrameAt(s, i).X_LF.data(); }},
+    {"rotation", kFrame, kRotation, [](auto& s, int i) { return FrameAt(s, i).X_LF.data(); }},
+    {"fingertip radius", kFrame, kNumber, [](auto& s, int i) { return &*FrameAt(s, i).sphere_radius; }},
+    {"position", kBase, kPosition, [](auto& s, int) { return s.base.X_B0.data(); }},
+    {"rotation", kBase, kRotation, [](auto& s, int) { return s.base.X_B0.data(); }},
+    {"wheel radius", kBase, kNumber, [](auto& s, int) { return &s.base.wheel_radius; }},
+    {"wheel distance", kBase, kNumber, [](auto& s, int) { return &s.base.wheel_distance; }},
+    {"wheel mass", kBase, kNumber, [](auto& s, int) { return &s.base.wheel.mass; }},
+    {"wheel spin inertia", kBase, kNumber, [](auto& s, int) { return &s.base.wheel.spin_inertia; }},
+    {"wheel transverse inertia", kBase, kNumber,
      [](auto& s, int) { return &s.base.wheel.transverse_inertia; }},
-    {"wheel armature", "kg m^2", kBase, kNumber, kMovesNothing,
-     [](auto& s, int) { return &s.base.wheel.armature; }, "wheel_armature"},
-    {"wheel damping", "N m s/rad", kBase, kNumber, kMovesNothing,
-     [](auto& s, int) { return &s.base.wheel.damping; }, "wheel_damping"},
-    {"gravity", "m/s^2", kRobot, kVector, kMovesNothing, [](auto& s, int) { return s.gravity.data(); }},
-    {"mass", "kg", kObject, kNumber, kMovesNothing, [](auto& s, int) { return &s.object->body.mass; },
-     "object_mass"},
-    {"inertia", "kg m^2", kObject, kTensor, kMovesNothing,
-     [](auto& s, int) { return s.object->body.inertia.data(); }, "object_inertia"},
-    {"friction", "", kObject, kNumber, kMovesNothing, [](auto& s, int) { return &s.object->friction; },
-     "contact_friction"},
-    {"ring radius", "m", kObject, kNumber, kMovesNothing,
-     [](auto& s, int) { return &TorusOf(s).ring_radius; }, "object_shape", 0},
-    {"tube radius", "m", kObject, kNumber, kMovesNothing,
-     [](auto& s, int) { return &TorusOf(s).tube_radius; }, "object_shape", 1},
+    {"wheel armature", kBase, kNumber, [](auto& s, int) { return &s.base.wheel.armature; }},
+    {"wheel damping", kBase, kNumber, [](auto& s, int) { return &s.base.wheel.damping; }},
+    {"gravity", kRobot, kVector, [](auto& s, int) { return s.gravity.data(); }},
+    {"mass", kObject, kNumber, [](auto& s, int) { return &s.object->body.mass; }},
+    {"inertia", kObject, kTensor, [](auto& s, int) { return s.object->body.inertia.data(); }},
+    {"friction", kObject, kNumber, [](auto& s, int) { return &s.object->friction; }},
+    {"ring radius", kObject, kNumber, [](auto& s, int) { return &TorusOf(s).ring_radius; }},
+    {"tube radius", kObject, kNumber, [](auto& s, int) { return &TorusOf(s).tube_radius; }},
 };
 static_assert(std::size(ParameterTable::kEntries) == static_cast<size_t>(Kind::kObjectTubeRadius) + 1);
 
@@ -182,20 +158,6 @@ std::vector<Parameter> ListParameters(const RobotSpec& spec) {
   return all;
 }
 
-std::optional<Parameter> FindParameter(const RobotSpec& spec, const std::string& check, int part, int entry) {
-  if (check == "object_shape" && !std::holds_alternative<SolidTorus>(spec.object->shape)) return std::nullopt;
-  for (size_t i = 0; i < std::size(ParameterTable::kEntries); ++i) {
-    const ParameterTable::Entry& kind = ParameterTable::kEntries[i];
-    const bool is_one_of_several = check == "joint_range" || check == "object_shape";
-    if (kind.check == nullptr || check != kind.check || (is_one_of_several && entry != kind.entry)) continue;
-    static constexpr int kTensorEntries[9] = {0, 3, 4, 3, 1, 5, 4, 5, 2};
-    const bool is_of_part = kind.part == ParameterTable::kJoint || kind.part == ParameterTable::kFrame;
-    return Parameter{static_cast<Kind>(i), is_of_part ? part : -1,
-                     kind.form == ParameterTable::kTensor ? kTensorEntries[entry] : 0};
-  }
-  return std::nullopt;
-}
-
 double GetValue(const RobotSpec& spec, const Parameter& parameter) {
   const double* const place = EntryFor(parameter.kind).place.read(spec, parameter.index);
   if (!IsOfRotation(parameter)) return place[OffsetOf(parameter)];
@@ -216,8 +178,6 @@ void SetValue(RobotSpec* spec, const Parameter& parameter, double value) {
   if (IsTensor(parameter)) place[offset / 3 + 3 * (offset % 3)] = value;
 }
 
-Joint& JointOf(RobotSpec* spec, int joint) { return spec->joints[static_cast<size_t>(joint)]; }
-
 const MassProperties& BodyOf(const RobotSpec& spec, int link) { return BodyAt(spec, link); }
 MassProperties& BodyOf(RobotSpec* spec, int link) { return BodyAt(*spec, link); }
 
@@ -229,18 +189,6 @@ std::optional<RobotModel> TryModel(const RobotSpec& spec) {
   }
 }
 
-bool IsAngle(const RobotSpec& spec, const Parameter& parameter) {
-  const ParameterTable::Form form = EntryFor(parameter.kind).form;
-  const bool is_limit = parameter.kind == Kind::kLowerLimit || parameter.kind == Kind::kUpperLimit;
-  return form == ParameterTable::kAngle || form == ParameterTable::kRotation ||
-         (is_limit && spec.joints[static_cast<size_t>(parameter.index)].type == JointType::kRevolute);
-}
-
-bool IsGeometric(ParameterKind kind) { return EntryFor(kind).effect == ParameterTable::kPlaces; }
-bool IsRotation(ParameterKind kind) {
-  const ParameterTable::Form form = EntryFor(kind).form;
-  return IsGeometric(kind) && (form == ParameterTable::kAngle || form == ParameterTable::kRotation);
-}
 double GetScale(const RobotSpec& spec, const Parameter& p) {
   const double size = std::abs(GetValue(spec, p));
   if (IsTensor(p)) {
@@ -292,19 +240,6 @@ std::string DescribeQuantity(const Parameter& p) {
       break;
   }
   return DescribeGroup(p);
-}
-
-std::string UnitOf(const RobotSpec& spec, const Parameter& parameter) {
-  if (IsAngle(spec, parameter)) return "deg";
-  const Kind kind = parameter.kind;
-  const bool of_joint = kind == Kind::kDamping || kind == Kind::kArmature || kind == Kind::kDryFriction;
-  if (of_joint && spec.joints[static_cast<size_t>(parameter.index)].type == JointType::kPrismatic)
-    return kind == Kind::kDamping ? "N s/m" : kind == Kind::kArmature ? "kg" : "N";
-  return EntryFor(parameter.kind).unit;
-}
-
-double ToPrinted(const RobotSpec& spec, const Parameter& parameter, double value) {
-  return IsAngle(spec, parameter) ? RadToDeg(value) : value;
 }
 
 std::optional<RobotModel> TryChange(const RobotSpec& spec, const Parameter& number, double* change) {

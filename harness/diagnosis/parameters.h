@@ -1,6 +1,6 @@
 #pragma once
 
-// Every scalar parameter of the analytic model by itself: to change it, to compare it, to name it.
+// Every scalar parameter of the analytic model by itself: to change it, and to name it.
 
 #include <optional>
 #include <string>
@@ -50,12 +50,6 @@ struct Parameter {
   ParameterKind kind = ParameterKind::kMass;
   int index = -1;     ///< Joint, link (by its joint; -1 the base), or frame.
   int component = 0;  ///< Of a vector, of roll, pitch, yaw, or of the six entries of a tensor.
-
-  bool operator==(const Parameter&) const = default;
-  /// Whether they are of one vector or tensor.
-  [[nodiscard]] bool IsBeside(const Parameter& other) const {
-    return kind == other.kind && index == other.index;
-  }
 };
 
 /// All of them: joints first, in the file's order. What the model ignores (the body of a fixed base, the
@@ -63,28 +57,15 @@ struct Parameter {
 /// friction where there is none.
 std::vector<Parameter> ListParameters(const RobotSpec& spec);
 
-/// The number that a check of constants compares, when it can be read there at once. @param part joint or
-/// frame. @param entry which of the check's numbers.
-std::optional<Parameter> FindParameter(const RobotSpec& spec, const std::string& check, int part, int entry);
-
 /// In the units above. The setter leaves the specification unchecked; RobotModel's constructor checks it.
 double GetValue(const RobotSpec& spec, const Parameter& parameter);
 void SetValue(RobotSpec* spec, const Parameter& parameter, double value);
 
-/// The joint of a specification that is changed.
-Joint& JointOf(RobotSpec* spec, int joint);
 /// The body of a link, by its joint; -1: of the base.
 const MassProperties& BodyOf(const RobotSpec& spec, int link);
 MassProperties& BodyOf(RobotSpec* spec, int link);
 /// The model of a changed specification; none when there is no such robot.
 std::optional<RobotModel> TryModel(const RobotSpec& spec);
-
-/// Whether the value is an angle, which is printed in degrees.
-bool IsAngle(const RobotSpec& spec, const Parameter& parameter);
-/// Whether it moves links or frames.
-bool IsGeometric(ParameterKind kind);
-/// Whether it turns them.
-bool IsRotation(ParameterKind kind);
 
 /// A length or quantity that a change of the value can be compared with, positive: the value itself, or for a
 /// value of zero what stands beside it (the tensor's trace, the link's length, a radian).
@@ -106,9 +87,4 @@ std::string DescribePart(const RobotSpec& spec, const Parameter& parameter);
 std::string DescribeQuantity(const Parameter& parameter);
 /// The vector or tensor that a component belongs to: "centre of mass", "inertia"; otherwise DescribeQuantity.
 std::string DescribeGroup(const Parameter& parameter);
-/// Unit as printed: "deg", "m", "kg", ...
-std::string UnitOf(const RobotSpec& spec, const Parameter& parameter);
-/// The value in that unit.
-double ToPrinted(const RobotSpec& spec, const Parameter& parameter, double value);
-
 }  // namespace dexcheck

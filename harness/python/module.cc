@@ -39,7 +39,7 @@ using Input = Eigen::Ref<const VectorXd>;
 struct ComparisonResult {
   Comparison comparison;
 
-  [[nodiscard]] bool Agrees() const { return comparison.result.Agrees(); }
+  [[nodiscard]] bool Agrees() const { return comparison.Agrees(); }
 
   /// {"M_bar": {"max": ..., "bound": ..., "digits": ..., "pass": ..., "where": ...}, ...}
   [[nodiscard]] py::dict Terms() const {
@@ -62,11 +62,19 @@ struct ComparisonResult {
     return terms;
   }
 
-  [[nodiscard]] std::vector<std::string> Likely() const {
-    std::vector<std::string> lines;
-    for (const Hypothesis& hypothesis : comparison.hypotheses)
-      lines.push_back(fmt::format("{}; explains {:.0f} %", hypothesis.text, 100.0 * hypothesis.explained));
-    return lines;
+  /// Causes of what differs as dictionaries, those that explain most first.
+  [[nodiscard]] py::list Causes() const {
+    py::list causes;
+    if (!comparison.causes) return causes;
+    for (const FileCause& cause : comparison.causes->causes) {
+      py::dict entry;
+      entry["text"] = cause.text;
+      entry["id"] = cause.id;
+      entry["places"] = cause.places;
+      entry["explained"] = cause.explained;
+      causes.append(entry);
+    }
+    return causes;
   }
 
   [[nodiscard]] std::string Print() const {
@@ -77,7 +85,6 @@ struct ComparisonResult {
                          comparison.result.samples);
     std::string text = "DISAGREE: " + both;
     for (const std::string& line : ListDifferences(comparison)) text += "\n  " + line;
-    for (const std::string& line : Likely()) text += "\n  likely: " + line;
     return text;
   }
 };
@@ -135,18 +142,14 @@ class Robot {
     options.samples = samples;
     options.seed = seed;
     ComparisonResult result;
-    bool is_file = true;
     if (py::isinstance<Robot>(other)) {
       result.comparison = CompareFiles(file_, other.cast<const Robot&>().file_, urdf_, options);
     } else if (py::isinstance<py::str>(other) || py::hasattr(other, "__fspath__")) {
       result.comparison = CompareFiles(file_, other.cast<std::filesystem::path>(), urdf_, options);
     } else {
-      is_file = false;
       result.comparison = CompareFunctions(file_, TakeFunctions(other), urdf_, options);
     }
-    const double tolerance = digits > 0 ? std::pow(10.0, -digits) : 0.0;
-    if (tolerance > 0.0) JudgeByTolerance(tolerance, &result.comparison.result);
-    if (is_file) ExplainComparison(&result.comparison, tolerance);
+    if (digits > 0) result.comparison.JudgeByTolerance(std::pow(10.0, -digits));
     return result;
   }
 
@@ -234,8 +237,9 @@ PYBIND11_MODULE(_dexcheck, m) {
                              "By constant and term: max, bound, digits, pass, compared, where, values.")
       .def_property_readonly(
           "differences", [](const ComparisonResult& r) { return ListDifferences(r.comparison); },
-          "One line for each constant and term that differs.")
-      .def_property_readonly("likely", &ComparisonResult::Likely, "Faults that would explain it, in words.")
+          "One line for each cause; without causes, for each constant and term that differs.")
+      .def_property_readonly("causes", &ComparisonResult::Causes,
+                             "Why two files differ: text, id, places, explained (a fraction).")
       .def_property_readonly("notes", [](const ComparisonResult& r) { return r.comparison.notes; })
       .def("__repr__", &ComparisonResult::Print);
 

@@ -27,7 +27,7 @@ import tomllib
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
-CAUSE = re.compile(r"^(?: {2,4}\d+ {2}\S|\d+\. \S)", re.MULTILINE)
+CAUSE = re.compile(r"^(?: {2,4}\d+ {2}\S| {0,4}\d+\. \S)", re.MULTILINE)
 NUMBER = r"([-+]?[\d.]+(?:e[-+]?\d+)?)"
 SECONDS = 300  # of one command; against hangs only
 

@@ -66,7 +66,7 @@ def test_files_agree(panda):
     result = panda.compare(PANDA_MJCF, samples=50)
     assert result, result
     assert result.terms["M_bar"]["pass"] and result.terms["M_bar"]["compared"] >= 50 * 49
-    assert result.likely == [] and str(result).startswith("AGREE: ")
+    assert result.causes == [] and str(result).startswith("AGREE: ")
     assert panda.compare(dexcheck.load(PANDA_MJCF), samples=10)
 
 
@@ -79,9 +79,10 @@ def test_a_mistake_is_found_and_named(panda, tmp_path):
     result = dexcheck.load(wrong).compare(ARM, samples=20)
     assert not result
     assert not result.terms["M_bar"]["pass"]
-    assert any(line.startswith("M_bar: nearest the base: ") for line in result.differences)
-    assert any("products' sign" in line for line in result.likely), result
-    assert "likely" in str(result)
+    cause = result.causes[0]
+    assert cause["id"] == "inertia.product_sign" and cause["explained"] == 1.0, result
+    assert any("signs of its products" in line for line in result.differences)
+    assert cause["text"] in str(result)
 
 
 class OwnModel:

@@ -204,15 +204,15 @@ class Diagnosis(dict):
 
     def __repr__(self):
         lines = [cause["text"] for cause in self["causes"]]
+        lines += [f"not explained: {line}" for line in self["unexplained"]]
         return "\n  ".join([self["verdict"].upper() + f": {self['robot']} and {self['mjcf']}", *lines])
 
 
-def diagnose(a, b, *, digits=0, samples=None):
-    """Why two descriptions of one robot disagree: the smallest repairs that explain it."""
+def diagnose(a, b, *, digits=0):
+    """Why two descriptions of one robot disagree: the causes, each with the value that would be right."""
     with tempfile.TemporaryDirectory() as folder:
         file = os.path.join(folder, "diagnosis.json")
         words = ["diagnose", a, b, "--json", file, "--quiet"]
         words += ["--digits", digits] if digits else []
-        words += ["--samples", samples] if samples else []
         _execute(words)
         return Diagnosis(json.loads(Path(file).read_text()))

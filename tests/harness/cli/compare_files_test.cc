@@ -216,17 +216,16 @@ TEST_F(CompareFiles, WhatTheEngineMakesOfFullinertiaIsItsOwn) {
   EXPECT_FALSE(Compare(1, "wrong.urdf", "b.xml", "--exact").at("checks").at("link_inertia").at("pass"));
 }
 
-TEST_F(CompareFiles, ARealDifferenceIsInTheFirstLine) {
-  const std::string rounded = ApplyEdits(
-      kUrdf, {{"value=\"0.8\"", "value=\"0.800001\""}, {"upper=\"2\"", "upper=\"2.000001\""}});  // as printed
+TEST_F(CompareFiles, ARealDifferenceIsNamed) {
+  const std::string rounded = ReplaceOnce(kUrdf, "value=\"0.8\"", "value=\"0.800001\"");
   Write("rounded.urdf", rounded);
   WriteChanged("wrong.urdf", rounded, "upper=\"1\" ", "upper=\"1.5\" ");
   const auto verdict = [&](const std::string& file) {
-    return FirstLine(Expect(1, {"consistency", file, "a.urdf", "--samples", "20", "--quiet", "--exact"}).out);
+    return Expect(1, {"consistency", file, "a.urdf", "--samples", "20", "--quiet", "--exact"}).out;
   };
-  EXPECT_THAT(verdict("rounded.urdf"), AllOf(HasSubstr("5 digits"), Not(HasSubstr("joint"))));
-  EXPECT_THAT(verdict("wrong.urdf"), AllOf(HasSubstr("joint_range"), HasSubstr("joint elbow"),
-                                           HasSubstr("1.5"), HasSubstr("5 digits")));
+  EXPECT_THAT(FirstLine(verdict("rounded.urdf")), AllOf(HasSubstr("5 digits"), Not(HasSubstr("joint"))));
+  EXPECT_THAT(verdict("wrong.urdf"),
+              AllOf(HasSubstr("1. joint elbow: range"), HasSubstr("1.5"), Not(HasSubstr("2. "))));
 }
 
 TEST_F(CompareFiles, PartsWithoutANameGetOne) {
@@ -269,26 +268,29 @@ class PartOfRobot : public CommandTest {
 <axis xyz="0 0 1"/><limit lower="0" upper="0.04" effort="1" velocity="1"/></joint></robot>)";
 };
 
-TEST_F(PartOfRobot, TheCommonPartIsComparedAndTheRestIsADifference) {
+TEST_F(PartOfRobot, WhatOneFileLacksIsACause) {
   const Json results = Compare(1, "a.urdf", "b.xml");
-  EXPECT_TRUE(HasFinding(results, "missing_joint", "joint grip", 1.0, 0.0));
-  EXPECT_THAT(results.at("not_compared"), Contains(AllOf(HasSubstr("left out"), HasSubstr("finger"))));
-  EXPECT_GT(results.at("checks").at("M_bar").at("compared"), 0);
+  ASSERT_EQ(results.at("causes").size(), 1U) << results.at("causes");
+  EXPECT_EQ(results.at("causes")[0].at("id"), "joint.unneeded");
+  EXPECT_EQ(results.at("causes")[0].at("places"), Json({"joint grip"}));
+  EXPECT_THAT(results.at("not_compared"), Contains(AllOf(HasSubstr("terms: "), HasSubstr("grip"))));
   // Where the other file has its mass, the joint is held.
   WriteChanged("welded.xml", ReadFixture("pair.xml"), "diaginertia=\"0.01 0.011 0.012\"/>",
                "diaginertia=\"0.01 0.011 0.012\"/><body pos=\"0.25 0 0\"><inertial pos=\"0.02 0 0\" "
                "mass=\"0.1\" diaginertia=\"1e-4 2e-4 2e-4\"/></body>");
-  EXPECT_THAT(Compare(1, "a.urdf", "welded.xml").at("not_compared"),
-              Contains(AllOf(HasSubstr("held"), HasSubstr("grip at 0"))));
+  EXPECT_EQ(Compare(1, "a.urdf", "welded.xml").at("unexplained"), Json::array());
   Compare(0, "a.urdf", "welded.xml", "--lock grip");
   EXPECT_FALSE(Compare(1, "a.urdf", "welded.xml", "--lock grip=0.03").at("checks").at("link_com").at("pass"));
   EXPECT_FALSE(Compare(1, "a.urdf", "welded.xml", "--ignore finger").at("checks").at("link_mass").at("pass"));
   // What is wrong in the common part is found.
   WriteChanged("wrong.urdf", Read("a.urdf"), "value=\"0.8\"", "value=\"0.9\"");
-  EXPECT_TRUE(HasFinding(Compare(1, "wrong.urdf", "b.xml"), "link_mass", "link lower", 0.9, 0.8));
+  const Json wrong = Compare(1, "wrong.urdf", "b.xml").at("causes");
+  ASSERT_EQ(wrong.size(), 2U) << wrong;
+  EXPECT_EQ(wrong[1].at("id"), "number.mass");
+  EXPECT_EQ(wrong[1].at("places"), Json({"link lower"}));
 }
 
-TEST_F(PartOfRobot, ABaseThatOneFileWeldsIsHeld) {
+TEST_F(PartOfRobot, ABaseThatOneFileWeldsIsACause) {
   const std::string body =
       ReplaceOnce(ReadFixture("pair.xml"), "<body name=\"upper\" pos=\"0 0 0.1\">",
                   "<body name=\"stand\" pos=\"0 0 1\"><freejoint/><inertial pos=\"0 0 0\" mass=\"1\" "
@@ -297,8 +299,10 @@ TEST_F(PartOfRobot, ABaseThatOneFileWeldsIsHeld) {
   Write("floats.xml", floats);
   Write("welded.xml", ReplaceOnce(floats, "<freejoint/>", ""));
   const Json results = Compare(1, "welded.xml", "floats.xml");
-  EXPECT_TRUE(HasFinding(results, "missing_joint", "base stand", 0.0, 1.0));
-  EXPECT_THAT(results.at("not_compared"), Contains(HasSubstr("base")));
+  const Json& causes = results.at("causes");
+  ASSERT_EQ(causes.size(), 1U) << causes;
+  EXPECT_EQ(causes[0].at("text"), "link stand: type another value: fixed, free would be right");
+  EXPECT_THAT(results.at("not_compared"), Contains(HasSubstr("terms: ")));
 }
 
 TEST_F(PartOfRobot, OneSubtreeIsCompared) {

@@ -72,8 +72,8 @@ TEST_F(BodyTable, UnitsAndReferenceAreThoseOfItsHeader) {
   EXPECT_EQ(RunJson(1, "consistency arm.urdf wrong.csv").at("/digits/exceeds/0/where"_json_pointer),
             "link lower");
   WriteChanged("com.csv", Read("si.csv"), "origin", "com");
-  EXPECT_EQ(RunJson(1, "consistency arm.urdf com.csv").at("/hypotheses/0/ids/0"_json_pointer),
-            "inertia.moved_twice");
+  EXPECT_EQ(RunJson(1, "consistency arm.urdf com.csv").at("/digits/exceeds/0/check"_json_pointer),
+            "link_inertia");
 }
 
 TEST_F(BodyTable, WhatIsNoneIsRefused) {

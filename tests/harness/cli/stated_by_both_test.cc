@@ -21,9 +21,10 @@ class StatedByBoth : public CommandTest {
     }
     return found;
   }
-  /// The pair's MJCF with motors.
+  /// The pair's MJCF with motors of the elbow, and one of the shoulder.
   [[nodiscard]] std::string WithMotors(const std::string& motors) const {
-    return ReplaceOnce(kPair, "</mujoco>", "<actuator>" + motors + "</actuator></mujoco>");
+    return ReplaceOnce(kPair, "</mujoco>",
+                       "<actuator>" + motors + "<motor name='s' joint='shoulder'/></actuator></mujoco>");
   }
 
   const std::string kUrdf = ReadFixture("pair.urdf");
@@ -129,16 +130,38 @@ TEST_F(StatedByBoth, MotorsOfTwoMjcfsAreCompared) {
     Compare(0, "d.xml", "d.xml");
   }
   EXPECT_THAT(Compare(0, "c.xml", "b.xml").at("not_compared"),
-              Contains(HasSubstr("motors only in c.xml: m")));
+              Contains(HasSubstr("motors only in c.xml: m, s")));
 }
 
 // A gear is told beside a URDF, which has none, and contradicts a parameter file, whose torques are controls.
+TEST_F(StatedByBoth, AMotorThatIsMissingIsACause) {
+  Write("c.xml", ReplaceOnce(kPair, "</mujoco>", "<actuator><motor joint='elbow'/></actuator></mujoco>"));
+  Write("d.xml", WithMotors("<motor joint='elbow'/>"));
+  const Json causes = Compare(1, "c.xml", "d.xml").at("causes");
+  ASSERT_EQ(causes.size(), 1U) << causes;
+  EXPECT_EQ(causes[0].at("id"), "gear.missing");
+  EXPECT_EQ(causes[0].at("places"), Json({"joint shoulder"}));
+}
+
+TEST_F(StatedByBoth, ARangeThatOneFileLacksIsACause) {
+  WriteChanged("c.xml", kPair, "limited=\"true\" range=\"-1 1\"", "");
+  for (const auto& [a, b, id] :
+       {std::tuple("a.urdf", "c.xml", "range.unneeded"), std::tuple("c.xml", "a.urdf", "range.missing")}) {
+    const Json causes = Compare(1, a, b).at("causes");
+    ASSERT_EQ(causes.size(), 1U) << causes;
+    EXPECT_EQ(causes[0].at("id"), id);
+  }
+}
+
 TEST_F(StatedByBoth, AGearIsNeverSilent) {
   Expect(0, "import a.urdf --out a.toml");
   for (const char* const gear : {"-1", "1.01"}) {
     Write("c.xml", WithMotors("<motor name='m' joint='elbow' gear='" + std::string(gear) + "'/>"));
-    EXPECT_THAT(Compare(0, "a.urdf", "c.xml").at("not_compared"),
-                Contains(HasSubstr("m (gear " + std::string(gear) + ")")));
+    const bool turns_back = gear[0] == '-';
+    const Json results = Compare(turns_back ? 1 : 0, "a.urdf", "c.xml");
+    EXPECT_THAT(results.at("not_compared"), Contains(HasSubstr("m (gear " + std::string(gear) + ")")));
+    EXPECT_EQ(results.at("causes").size(), turns_back ? 1U : 0U);
+    if (turns_back) EXPECT_EQ(results.at("causes")[0].at("id"), "gear.sign");
     EXPECT_TRUE(
         HasFinding(Compare(1, "a.toml", "c.xml"), "motor_transmission", "actuator m", 1.0, std::stod(gear)));
   }
@@ -147,17 +170,19 @@ TEST_F(StatedByBoth, AGearIsNeverSilent) {
 TEST_F(StatedByBoth, AJointOfAnotherTypeIsADisagreement) {
   WriteChanged("c.urdf", kUrdf, "name=\"elbow\" type=\"revolute\"", "name=\"elbow\" type=\"prismatic\"");
   for (const char* other : {"a.urdf", "b.xml"}) {
-    const Json finding = Find(Compare(1, "c.urdf", other), "joint_type");
-    ASSERT_FALSE(finding.is_null()) << other;
-    EXPECT_EQ(finding.at("where"), "joint elbow");
-    EXPECT_THAT(finding.at("effect"), HasSubstr("prismatic in c.urdf, revolute in " + std::string(other)));
+    const Json causes = Compare(1, "c.urdf", other).at("causes");
+    ASSERT_EQ(causes.size(), 1U) << causes;
+    EXPECT_EQ(causes[0].at("id"), "number.type");
+    EXPECT_EQ(causes[0].at("places"), Json({"joint elbow"}));
+    EXPECT_THAT(causes[0].at("text"), HasSubstr("prismatic, revolute would be right"));
   }
 }
 
-TEST_F(StatedByBoth, VelocityLimitsAndABaseThatDoesNotMoveAreListed) {
+// No term depends on them, so they are listed besides.
+TEST_F(StatedByBoth, VelocityLimitsAndABaseThatDoesNotMoveAreCauses) {
   WriteChanged("c.urdf", kUrdf, "upper=\"2\" effort=\"1\" velocity=\"1\"",
                "upper=\"2\" effort=\"1\" velocity=\"1.5\"");
-  EXPECT_EQ(Compare(0, "a.urdf", "c.urdf").at("without_effect"),
+  EXPECT_EQ(Compare(1, "a.urdf", "c.urdf").at("without_effect"),
             Json::array({"velocity limits: shoulder (1 against 1.5)"}));
   const auto with_stand = [&](const std::string& name, const std::string& mass, const std::string& x) {
     WriteChanged(name, kUrdf, "<link name=\"stand\"/>",
@@ -169,9 +194,9 @@ TEST_F(StatedByBoth, VelocityLimitsAndABaseThatDoesNotMoveAreListed) {
   with_stand("e.urdf", "4.1", "0");
   with_stand("f.urdf", "4", "0.01");
   const std::string base = "base with all that is welded to it: ";
-  EXPECT_EQ(Compare(0, "d.urdf", "e.urdf").at("without_effect"),
+  EXPECT_EQ(Compare(1, "d.urdf", "e.urdf").at("without_effect"),
             Json::array({base + "mass 4 against 4.1 kg"}));
-  EXPECT_EQ(Compare(0, "d.urdf", "f.urdf").at("without_effect"),
+  EXPECT_EQ(Compare(1, "d.urdf", "f.urdf").at("without_effect"),
             Json::array({base + "centre of mass, 0.01 m apart"}));
   EXPECT_EQ(Compare(0, "d.urdf", "d.urdf").at("without_effect"), Json::array());
 }
@@ -240,14 +265,13 @@ TEST_F(StatedByBoth, AJointThatOneFileLacksIsADisagreementUntilItIsIgnored) {
   Write("tip.urdf", with_tip("0.1"));
   for (const char* const other : {"a.urdf", "b.xml"}) {
     SCOPED_TRACE(other);
-    const Json finding = Find(Compare(1, "tip.urdf", other), "missing_joint");
-    ASSERT_FALSE(finding.is_null());
-    EXPECT_EQ(finding.at("where"), "joint grip");
-    EXPECT_THAT(finding.at("effect"), AllOf(HasSubstr("only in tip.urdf"), HasSubstr("link tip of 0.1 kg"),
-                                            HasSubstr("--ignore tip")));
+    const Json causes = Compare(1, "tip.urdf", other).at("causes");
+    ASSERT_EQ(causes.size(), 1U) << causes;
+    EXPECT_THAT(causes[0].at("text"),
+                AllOf(HasSubstr("joint grip: joint stated only here"), HasSubstr("link tip")));
     Compare(0, "tip.urdf", other, "--ignore tip");
     Compare(1, other, "tip.urdf");
-    EXPECT_THAT(Expect(1, {"tip.urdf", other}).out, HasSubstr("missing_joint"));
+    EXPECT_THAT(Expect(1, {"tip.urdf", other}).out, HasSubstr("joint grip"));
   }
   // A frame that has no mass is a note.
   WriteChanged(
@@ -265,7 +289,7 @@ TEST_F(StatedByBoth, WhatIsIgnoredIsNoLikelyCause) {
   WriteChanged("right.urdf", damped, "damping=\"0.5\"", "damping=\"0.00872664625997165\"");
   const auto list = [](const Json& results) {
     std::string text;
-    for (const Json& one : results.at("hypotheses")) text += one.at("text").get<std::string>() + "\n";
+    for (const Json& one : results.at("causes")) text += one.at("text").get<std::string>() + "\n";
     return text;
   };
   EXPECT_THAT(list(Compare(1, "damped.urdf", "right.urdf")), HasSubstr("damping"));
@@ -281,8 +305,10 @@ TEST_F(StatedByBoth, PlacesThatAgreeAreNoLikelyCause) {
   Write("right.urdf", ReplaceOnce(far, "xyz=\"0.3 0 0\"", "xyz=\"0.3 -0.0008 0\""));
   const std::string moved = ReplaceOnce(far, "xyz=\"0.3 0 0\"", "xyz=\"0.3 0.0008 0\"");
   Write("wrong.urdf", ReplaceOnce(moved, "value=\"0.8\"", "value=\"0.9\""));
-  EXPECT_EQ(Compare(1, "wrong.urdf", "right.urdf", "--digits 3").at("hypotheses"), Json::array());
-  EXPECT_NE(Compare(1, "wrong.urdf", "right.urdf", "--exact").at("hypotheses"), Json::array());
+  const Json causes = Compare(1, "wrong.urdf", "right.urdf", "--digits 3").at("causes");
+  ASSERT_EQ(causes.size(), 1U) << causes;
+  EXPECT_EQ(causes[0].at("id"), "number.mass");
+  EXPECT_EQ(Compare(1, "wrong.urdf", "right.urdf", "--exact").at("causes").size(), 2U);
 }
 
 // 0.3 mm, divided by 1000, is near 0 as it is near any number.
@@ -290,11 +316,11 @@ TEST_F(StatedByBoth, AUnitIsNoLikelyCauseWhereTheRightNumberIsZero) {
   Write("right.urdf", ReplaceOnce(kUrdf, "<origin xyz=\"0.1 0 0\"/>", "<origin xyz=\"0 0 0\"/>"));
   Write("wrong.urdf", ReplaceOnce(kUrdf, "<origin xyz=\"0.1 0 0\"/>", "<origin xyz=\"0.0003 0 0\"/>"));
   const Json results = Compare(1, "wrong.urdf", "right.urdf");
-  for (const Json& one : results.at("hypotheses"))
+  for (const Json& one : results.at("causes"))
     EXPECT_THAT(one.at("text").get<std::string>(), Not(HasSubstr("mm")));
   // Where it is none, the unit is proposed.
   Write("wrong.urdf", ReplaceOnce(kUrdf, "<origin xyz=\"0.1 0 0\"/>", "<origin xyz=\"100 0 0\"/>"));
-  EXPECT_THAT(Compare(1, "wrong.urdf", "a.urdf").at("hypotheses").at(0).at("text").get<std::string>(),
+  EXPECT_THAT(Compare(1, "wrong.urdf", "a.urdf").at("causes").at(0).at("text").get<std::string>(),
               HasSubstr("mm"));
 }
 

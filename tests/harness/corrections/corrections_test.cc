@@ -86,7 +86,8 @@ class Campaign {
   }
 
   /// Draws two files, the first with faults of these kinds; none where one of them does not show.
-  std::optional<Case> DrawCase(const std::vector<std::string>& faults) {
+  /// @param beside_table the second file is a parameter file.
+  std::optional<Case> DrawCase(const std::vector<std::string>& faults, bool beside_table = false) {
     using Format = WrittenForm::Format;
     DrawnRobot robot = DrawRobot(&random_);
     WrittenForm form_a, form_b;
@@ -106,6 +107,14 @@ class Campaign {
       form_b.fuses = draw(3) == 0;
       form_b.other_frames = draw(4) == 0;
     }
+    if (beside_table) {
+      form_b = {};
+      form_b.format = Format::kToml;
+      form_b.digits = 6 + draw(4);
+      for (DrawnLink& link : robot.links) {  // a table states all ranges
+        if (!link.range) link.range = {-3.0, 3.0};
+      }
+    }
     DrawnRobot wrong = robot;
     Case made;
     for (const std::string& name : faults) {
@@ -113,16 +122,21 @@ class Campaign {
       if (!fault) return std::nullopt;
       made.made.push_back(*std::move(fault));
     }
-    if (made.made.size() == 2 && SharePlace(made.made[0], made.made[1])) return std::nullopt;
-    for (const MadeFault& fault : made.made) {
+    for (size_t i = 0; i < made.made.size(); ++i) {
+      const MadeFault& fault = made.made[i];
+      for (size_t k = 0; k < i; ++k) {
+        if (SharePlace(made.made[k], fault)) return std::nullopt;
+      }
       // A link that is missing cannot have a fault, and one of the names that are exchanged is another's.
-      if (made.made.size() == 2 && (fault.name.ends_with("missing") || fault.name == "names_exchanged"))
+      if (made.made.size() > 1 && (fault.name.ends_with("missing") || fault.name == "names_exchanged"))
         return std::nullopt;
+      // A parameter file does not state it.
+      if (beside_table && fault.of == SiteKind::kEffort) return std::nullopt;
     }
     made.a = WriteRobot(wrong, form_a);
     made.b = WriteRobot(robot, form_b);
-    made.end_a = form_a.format == Format::kUrdf ? ".urdf" : ".xml";
-    made.end_b = form_b.format == Format::kUrdf ? ".urdf" : ".xml";
+    made.end_a = EndOf(form_a);
+    made.end_b = EndOf(form_b);
     return made;
   }
 
@@ -229,29 +243,47 @@ TEST(CorrectionCampaign, NamesSingleFaults) {
   EXPECT_LE(campaign.tally.cases_with_invented, 5);
 }
 
+/// Draws so many cases of several faults each, and has them named.
+void TryMany(int cases, int faults, bool beside_table, Campaign* campaign) {
+  const std::vector<std::string> names = ListFaultNames();
+  while (cases > 0) {
+    std::vector<std::string> drawn;
+    for (int k = 0; k < faults; ++k)
+      drawn.push_back(names[std::uniform_int_distribution<size_t>(0, names.size() - 1)(*campaign->random())]);
+    const std::optional<Case> made = campaign->DrawCase(drawn, beside_table);
+    if (!made) continue;
+    campaign->Try(*made);
+    --cases;
+  }
+  campaign->Print();
+  for (const auto& [name, count] : campaign->missed_by_name) fmt::print("  missed {}: {}\n", name, count);
+}
+
 TEST(CorrectionCampaign, NamesPairs) {
   Campaign campaign(TakeSeed(202), "pair");
-  const std::vector<std::string> names = ListFaultNames();
-  constexpr int kPairs = 80;
-  for (int k = 0; k < kPairs;) {
-    const auto draw = [&] {
-      return names[std::uniform_int_distribution<size_t>(0, names.size() - 1)(*campaign.random())];
-    };
-    const std::optional<Case> drawn = campaign.DrawCase({draw(), draw()});
-    if (!drawn) continue;
-    campaign.Try(*drawn);
-    ++k;
-  }
-  campaign.Print();
-  for (const auto& [name, count] : campaign.missed_by_name) fmt::print("  missed {}: {}\n", name, count);
+  TryMany(80, 2, false, &campaign);
   EXPECT_GE(campaign.tally.named + campaign.tally.in_class, 0.92 * campaign.tally.faults);
   EXPECT_LE(campaign.tally.cases_with_invented, 6);
+}
+
+TEST(CorrectionCampaign, NamesTriples) {
+  Campaign campaign(TakeSeed(404), "triple");
+  TryMany(50, 3, false, &campaign);
+  EXPECT_GE(campaign.tally.named + campaign.tally.in_class, 0.88 * campaign.tally.faults);
+  EXPECT_LE(campaign.tally.cases_with_invented, 8);
+}
+
+TEST(CorrectionCampaign, NamesFaultsBesideParameterFiles) {
+  Campaign campaign(TakeSeed(505), "table");
+  TryMany(60, 1, true, &campaign);
+  EXPECT_GE(campaign.tally.named + campaign.tally.in_class, 0.95 * campaign.tally.faults);
+  EXPECT_LE(campaign.tally.cases_with_invented, 3);
 }
 
 TEST(CorrectionCampaign, AgreesWithoutFaults) {
   Campaign campaign(TakeSeed(303), "right");
   constexpr int kRight = 40;
-  for (int k = 0; k < kRight; ++k) campaign.Try(*campaign.DrawCase({}));
+  for (int k = 0; k < kRight; ++k) campaign.Try(*campaign.DrawCase({}, k % 4 == 0));
   campaign.Print();
   EXPECT_EQ(campaign.tally.invented, 0);
 }

@@ -241,6 +241,39 @@ class MjcfText {
   Writer w_;
 };
 
+/// A parameter file: a chain for each joint. It states no limits of motors.
+std::string WriteToml(const DrawnRobot& robot, const Writer& w) {
+  const auto list = [&](const auto& v) {
+    std::string text;
+    for (Eigen::Index i = 0; i < v.size(); ++i) text += (i > 0 ? ", " : "") + w.Number(v[i]);
+    return "[" + text + "]";
+  };
+  std::string text =
+      fmt::format("name = \"drawn\"\ngravity = [0, 0, {}]\n[base]\ntype = \"fixed\"\nlink = \"{}\"\n",
+                  w.Number(-robot.gravity), robot.links[0].name);
+  for (const DrawnLink& link : robot.links) {
+    if (link.parent < 0) continue;
+    const Matrix3d R = Turn(link.com_rpy);
+    text += fmt::format(
+        "[[chain]]\nparent = \"{}\"\nrows = [{{ joint = \"{}\", link = \"{}\", xyz = {}, rpy = {}, axis = "
+        "{}{} "
+        "}}]\n[chain.joints]\n\"{}\" = {{ {}damping = {}, armature = {}, dry_friction = {}{} "
+        "}}\n[chain.links.\"{}\"]\nmass = "
+        "{}\ncom = {}\ninertia = {}\n",
+        robot.links[static_cast<size_t>(link.parent)].name, link.joint, link.name, list(link.xyz),
+        list(link.rpy), list(link.axis), link.type == 's' ? ", type = \"prismatic\"" : "", link.joint,
+        link.range ? fmt::format("range = [{}, {}], ", w.Number((*link.range)[0]), w.Number((*link.range)[1]))
+                   : "",
+        w.Number(link.damping), w.Number(link.armature), w.Number(link.friction),
+        link.leader < 0
+            ? ""
+            : fmt::format(", mimic = {{ joint = \"{}\", multiplier = {} }}",
+                          robot.links[static_cast<size_t>(link.leader)].joint, w.Number(link.multiplier)),
+        link.name, w.Number(link.mass), list(link.com), list(Entries(R * Tensor(link.I) * R.transpose())));
+  }
+  return text;
+}
+
 // Faults.
 
 struct Spoiling {
@@ -518,6 +551,15 @@ double Compare(const DrawnLink& a, const DrawnLink& b) {
   return apart;
 }
 
+/// An MJCF has no joint at a link that is welded.
+void NamePlacesByLinks(const DrawnRobot& robot, MadeFault* made) {
+  for (std::string& place : made->places) {
+    for (const DrawnLink& link : robot.links) {
+      if (link.type == 'f' && place == "joint " + link.joint) place = "link " + link.name;
+    }
+  }
+}
+
 }  // namespace
 
 DrawnRobot DrawRobot(Random* random) {
@@ -579,7 +621,7 @@ DrawnRobot DrawRobot(Random* random) {
 
 std::string WriteRobot(const DrawnRobot& robot, const WrittenForm& form) {
   DrawnRobot written = robot;
-  if (form.fuses) Fuse(&written);
+  if (form.fuses || form.format == WrittenForm::Format::kToml) Fuse(&written);
   if (form.other_frames) {
     Random random(form.seed);
     std::vector<Pose> X;
@@ -593,7 +635,13 @@ std::string WriteRobot(const DrawnRobot& robot, const WrittenForm& form) {
     ChangeFrames(X, &written);
   }
   if (form.format == WrittenForm::Format::kUrdf) return WriteUrdf(written, Writer(form.digits));
+  if (form.format == WrittenForm::Format::kToml) return WriteToml(written, Writer(form.digits));
   return MjcfText(written, form).Write();
+}
+
+const char* EndOf(const WrittenForm& form) {
+  constexpr const char* kEnds[] = {".urdf", ".xml", ".toml"};
+  return kEnds[static_cast<size_t>(form.format)];
 }
 
 std::vector<std::string> ListFaultNames() {
@@ -641,6 +689,7 @@ std::optional<MadeFault> MakeFault(const std::string& name, const WrittenForm& f
     made.places = bodies ? std::vector<std::string>{"link " + a.name, "link " + b.name}
                          : std::vector<std::string>{"joint " + a.joint, "joint " + b.joint};
     made.any_place = true;
+    if (is_mjcf) NamePlacesByLinks(*robot, &made);
     return made;
   }
   if (name == "names_exchanged") {
@@ -706,11 +755,7 @@ std::optional<MadeFault> MakeFault(const std::string& name, const WrittenForm& f
   if (is_mjcf && (maker.of == SiteKind::kRotation || maker.of == SiteKind::kPosition)) {
     if (!form.euler && maker.of == SiteKind::kRotation)
       made.kinds.insert(made.kinds.end(), {Kind::kNumber, Kind::kMirror, Kind::kTransposed});
-    for (std::string& place : made.places) {
-      for (const DrawnLink& link : robot->links) {
-        if (link.type == 'f' && place == "joint " + link.joint) place = "link " + link.name;
-      }
-    }
+    NamePlacesByLinks(*robot, &made);
   }
   return made;
 }

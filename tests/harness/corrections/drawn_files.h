@@ -1,7 +1,7 @@
 #pragma once
 
-// Robots drawn at random and written as a URDF or an MJCF, and faults that are made in what is written. It
-// shares no code with what finds them.
+// Robots drawn at random and written as a URDF, an MJCF or a parameter file, and faults that are made in what
+// is written. It shares no code with what finds them.
 
 #include <array>
 #include <optional>
@@ -37,7 +37,7 @@ struct DrawnRobot {
 };
 
 struct WrittenForm {
-  enum class Format { kUrdf, kMjcf } format = Format::kUrdf;
+  enum class Format { kUrdf, kMjcf, kToml } format = Format::kUrdf;
   int digits = 6;
   bool other_names = false;   ///< Of bodies.
   bool other_frames = false;  ///< On every link, at random.
@@ -50,6 +50,8 @@ struct WrittenForm {
 
 DrawnRobot DrawRobot(std::mt19937* random);
 std::string WriteRobot(const DrawnRobot& robot, const WrittenForm& form);
+/// The end of the file's name: ".urdf".
+const char* EndOf(const WrittenForm& form);
 
 /// A fault that was made, and what names it.
 struct MadeFault {

@@ -4,15 +4,18 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <set>
+
 #include "controller/common/errors.h"
 #include "controller/dynamics/model_terms.h"
 #include "controller/model/parameter_reader.h"
 #include "controller/model/rigid_body.h"
 #include "harness/checks/consistency.h"
+#include "harness/checks/file_causes.h"
+#include "harness/corrections/read_printed.h"
 #include "harness/descriptions/audit.h"
 #include "harness/descriptions/description_match.h"
 #include "harness/descriptions/description_writer.h"
-#include "harness/descriptions/hypotheses.h"
 #include "harness/descriptions/mjcf_reader.h"
 #include "harness/descriptions/program_layout.h"
 #include "harness/engine/engine.h"
@@ -236,11 +239,14 @@ TEST(BallJoints, FaultsAreFound) {
   wrong.spec.joints[0].body.mass *= 1000.0;
   wrong.spec.joints[0].body.inertia *= 1000.0;
   wrong.parts.clear();
-  const std::vector<Hypothesis> hypotheses = ExplainDifference(wrong, mjcf);
-  ASSERT_EQ(hypotheses.size(), 2U);
-  EXPECT_EQ(hypotheses[0].ids, std::vector<std::string>{"mass.g"});
-  EXPECT_EQ(hypotheses[1].ids, std::vector<std::string>{"inertia.g_m2"});
-  for (const Hypothesis& one : hypotheses) EXPECT_EQ(one.parts, std::vector<std::string>{"upper"});
+  const FileCauses found = FindCauses(PrintDescription(wrong), PrintDescription(mjcf));
+  ASSERT_EQ(found.causes.size(), 2U) << ::testing::PrintToString(ListLines(found));
+  std::set<std::string> ids;
+  for (const FileCause& cause : found.causes) {
+    ids.insert(cause.id);
+    EXPECT_EQ(cause.places, std::vector<std::string>{"link upper"});
+  }
+  EXPECT_EQ(ids, (std::set<std::string>{"mass.g", "inertia.g_m2"}));
 }
 
 TEST(BallJoints, ALayoutHasFourPositionsAndThreeVelocities) {

@@ -90,33 +90,6 @@ TEST(RobotPart, ALinkIsLeftOutWithWhatItCarries) {
   for (const Frame& frame : a.spec.frames) EXPECT_LT(frame.link, 5);
 }
 
-// One file lacks the last two joints: with their mass welded on, or without it.
-TEST(RobotPart, TheCommonPartIsFound) {
-  const RobotDescription whole = Panda();
-  for (const bool is_welded : {false, true}) {
-    RobotDescription a = whole;
-    RobotDescription b = whole;
-    RobotPart cut;
-    if (is_welded) {
-      cut.held = {{JointName(whole, 5), 0.0}, {JointName(whole, 6), 0.0}};
-    } else {
-      cut.left_out = {whole.spec.joints[5].link};
-    }
-    int held = 0;
-    TakePart(cut, &a, &b, &held);
-    const std::optional<RobotPart> common = FindCommonPart(whole, b);
-    ASSERT_TRUE(common);
-    EXPECT_EQ(common->held, cut.held);
-    EXPECT_EQ(common->left_out, cut.left_out);
-    EXPECT_FALSE(common->fixes_base);
-  }
-  EXPECT_FALSE(FindCommonPart(whole, whole));
-  // Joints of other names are no part.
-  RobotDescription renamed = whole;
-  renamed.spec.joints[6].name = "other";
-  EXPECT_FALSE(FindCommonPart(whole, renamed));
-}
-
 TEST(RobotPart, NamesThatAreNotThereAreRefused) {
   for (const auto& change :
        {+[](RobotPart* part) { part->held["no"] = 0.0; }, +[](RobotPart* part) { part->only = "no"; },

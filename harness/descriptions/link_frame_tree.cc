@@ -1,14 +1,15 @@
+#include "harness/descriptions/link_frame_tree.h"
+
 #include <algorithm>
 #include <set>
 
 #include "controller/model/rigid_body.h"
 #include "harness/descriptions/description_match.h"
-#include "harness/descriptions/fault_search.h"
 
 namespace dexcheck {
 namespace {
 
-/// Of the own frame, which may stand beside the joint's axis, as an MJCF's does: to the row's place on it.
+/// Moves the own frame, which may stand beside the joint's axis as an MJCF's does, to the row's place on it.
 Eigen::Translation3d MoveToAxis(const RobotDescription& robot, int joint) {
   if (joint < 0) return Eigen::Translation3d(Vector3d::Zero());
   return Eigen::Translation3d(robot.joints[static_cast<size_t>(joint)].X_iL.inverse().translation());
@@ -24,88 +25,35 @@ bool HasParts(const RobotDescription& robot, int joint) {
 
 }  // namespace
 
-std::vector<OwnRow> ListOwnRows(const RobotDescription& robot) {
-  std::vector<OwnRow> rows;
+std::vector<JointInLinkFrames> ListJointsInLinkFrames(const RobotDescription& robot) {
+  std::vector<JointInLinkFrames> rows;
   for (size_t i = 0; i < robot.spec.joints.size(); ++i) {
     const Joint& joint = robot.spec.joints[i];
     const Pose X_iL = robot.joints[i].X_iL * MoveToAxis(robot, static_cast<int>(i));
     Pose X_jP = Pose::Identity();
     if (joint.parent >= 0)
       X_jP = robot.joints[static_cast<size_t>(joint.parent)].X_iL * MoveToAxis(robot, joint.parent);
-    OwnRow& row = rows.emplace_back();
+    JointInLinkFrames& row = rows.emplace_back();
     row.parent = joint.parent;
     row.is_revolute = joint.type != JointType::kPrismatic;
     row.X_PL = X_jP.inverse() * CalcRow(joint, joint.mdh) * X_iL;
-    row.X_PW = robot.joints[i].X_PW;
     row.axis = X_iL.linear().row(2).transpose();  // one of those that a ball joint turns about
     row.body = ExpressIn(joint.body, X_iL.inverse());
   }
   return rows;
 }
 
-std::vector<Pose> CalcOwnPoses(const Pose& X_W0, const std::vector<OwnRow>& rows) {
+std::vector<Pose> CalcLinkPoses(const Pose& X_W0, const std::vector<JointInLinkFrames>& rows) {
   std::vector<Pose> poses = {X_W0};
-  for (const OwnRow& row : rows) poses.push_back(poses[static_cast<size_t>(row.parent + 1)] * row.X_PL);
+  for (const JointInLinkFrames& row : rows)
+    poses.push_back(poses[static_cast<size_t>(row.parent + 1)] * row.X_PL);
   return poses;
 }
 
 std::vector<Pose> CalcZeroPoses(const RobotDescription& robot) {
   const Base& base = robot.spec.base;
   const Pose X_W0 = base.type == BaseType::kFloating ? Pose::Identity() : base.X_B0;
-  return CalcOwnPoses(X_W0, ListOwnRows(robot));
-}
-
-void TakeOwnRow(int index, const Pose& X_PL, const Vector3d& axis, RobotDescription* robot) {
-  Joint& joint = robot->spec.joints[static_cast<size_t>(index)];
-  Pose& X_iL = robot->joints[static_cast<size_t>(index)].X_iL;
-  const Pose X_Li = X_iL.inverse();
-  if (!X_Li.linear().col(2).isApprox(axis)) X_iL.linear() = MakeRotationFromZ(axis).transpose();
-  Pose X_jP = Pose::Identity();
-  if (joint.parent >= 0) X_jP = robot->joints[static_cast<size_t>(joint.parent)].X_iL;
-  joint.X_PB = X_jP * X_PL * X_iL.inverse();
-  joint.mdh = MdhRow{};
-  const Pose turn = X_iL * X_Li;
-  joint.body = ExpressIn(joint.body, turn);
-  const auto move = [&](int carrier, Pose* X) {
-    if (carrier == index) *X = turn * *X;
-  };
-  for (Joint& child : robot->spec.joints) move(child.parent, &child.X_PB);
-  for (Frame& frame : robot->spec.frames) move(frame.link, &frame.X_LF);
-  for (DescribedPart& part : robot->parts) move(part.joint, &part.X_iL);
-}
-
-std::vector<OwnRow> ReadRowsAs(const RobotDescription& robot, MdhRow (*change)(MdhRow), bool classic) {
-  std::vector<OwnRow> rows = ListOwnRows(robot);
-  std::vector<Pose> behind(rows.size(), Pose::Identity());  // of a classic row: what stands behind the joint
-  for (size_t i = 0; i < rows.size(); ++i) {
-    const Joint& joint = robot.spec.joints[i];
-    MdhRow mdh = change(joint.mdh);
-    if (classic) {
-      behind[i] = Eigen::Translation3d(mdh.a, 0.0, 0.0) * Eigen::AngleAxisd(mdh.alpha, Vector3d::UnitX());
-      mdh.a = mdh.alpha = 0.0;
-      rows[i].body = ExpressIn(joint.body, behind[i]);
-    }
-    const Pose before = joint.parent < 0 ? Pose::Identity() : behind[static_cast<size_t>(joint.parent)];
-    rows[i].X_PL = before * CalcRow(joint, mdh);
-  }
-  return rows;
-}
-
-std::vector<DescribedPart> ListParts(const RobotDescription& robot, int joint, const Pose& X_ab) {
-  std::vector<DescribedPart> parts;
-  for (const DescribedPart& part : robot.parts) {
-    if (part.joint != joint || !part.states_inertial) continue;
-    Pose X_RL = part.X_iL;
-    if (joint >= 0) {
-      const Pose& X_iL = robot.joints[static_cast<size_t>(joint)].X_iL;
-      X_RL = (X_iL * MoveToAxis(robot, joint)).inverse() * part.X_iL;
-    }
-    DescribedPart& own = parts.emplace_back(part);
-    own.X_iL = X_ab * X_RL;
-    own.body = ExpressIn(part.body, own.X_iL);
-    own.X_LC = own.X_iL * part.X_LC;
-  }
-  return parts;
+  return CalcLinkPoses(X_W0, ListJointsInLinkFrames(robot));
 }
 
 std::vector<LinkPlace> PlaceLinks(const RobotDescription& a, const RobotDescription& b) {

@@ -1,0 +1,469 @@
+#include "harness/corrections/edits.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "controller/model/rigid_body.h"
+
+namespace dexcheck {
+namespace {
+
+using Kind = CorrectionKind;
+constexpr double kDegree = kPi / 180.0;
+constexpr int kNumPermutations = 5;
+
+Matrix3d MakeMirror(int axis) {
+  Matrix3d mirror = Matrix3d::Identity();
+  mirror(axis, axis) = -1.0;
+  return mirror;
+}
+
+Matrix3d TurnMoving(const Vector3d& angles) {
+  return TurnAbout(0, angles[0]) * TurnAbout(1, angles[1]) * TurnAbout(2, angles[2]);
+}
+
+/// An edit of an origin by itself, which may be a link's or an inertial's.
+struct OriginEdit {
+  Kind kind;
+  int component;
+  double bits;
+  std::function<void(PrintedOrigin*)> undo;
+};
+
+/// Edits of a vector that is about any point.
+template <typename Offer>
+void ListVectorEdits(SiteKind kind, const Vector3d& given, const Offer& offer) {
+  offer(Kind::kSign, 0, Matrix3d(-Matrix3d::Identity()));
+  for (int k = 0; k < 3; ++k) {
+    if (given[k] != 0.0) offer(Kind::kSignOf, k, MakeMirror(k));
+  }
+  for (int k = 0; k < kNumPermutations; ++k) offer(Kind::kPermutation, k, MakePermutation(kPermutations[k]));
+  if (kind == SiteKind::kAxis) return;
+  const std::span<const UnitFault> units = ListUnits(kind);
+  for (size_t k = 0; k < units.size(); ++k)
+    offer(Kind::kUnit, static_cast<int>(k), Matrix3d(units[k].factor * Matrix3d::Identity()));
+}
+
+std::vector<OriginEdit> ListTurns(const PrintedOrigin& origin) {
+  std::vector<OriginEdit> edits;
+  const Matrix3d given = origin.CalcRotation();
+  if ((given - Matrix3d::Identity()).cwiseAbs().maxCoeff() < 1e-12) return edits;
+  // An edit of the angles, of one of them, or of the rotation.
+  const auto angles = [&](Kind kind, double bits, int component, const Matrix3d& M) {
+    edits.push_back({kind, component, bits, [M](PrintedOrigin* o) { o->r.head<3>() = M * o->r.head<3>(); }});
+  };
+  const auto turn = [&](Kind kind, double bits, int component, const auto& calc) {
+    edits.push_back(
+        {kind, component, bits, [calc](PrintedOrigin* o) { o->SetRotation(calc(o->CalcRotation())); }});
+  };
+  const bool has_angles = origin.form == RotationForm::kRollPitchYaw;
+  const Matrix3d one = Matrix3d::Identity();
+  if (has_angles || origin.form == RotationForm::kEuler || origin.form == RotationForm::kMdh) {
+    angles(Kind::kDegrees, 0.0, 0, kDegree * one);
+    angles(Kind::kRadians, 0.0, 0, one / kDegree);
+  }
+  if (has_angles || origin.form == RotationForm::kEuler) {
+    const bool several = (origin.r.head<3>().array().abs() > 1e-9).count() > 1;
+    angles(Kind::kSign, 0.0, 0, -one);
+    for (int k = 0; k < 3 && several; ++k) {
+      angles(Kind::kAngleSign, 0.0, k, MakeMirror(k));
+      Matrix3d degrees = one;
+      degrees(k, k) = kDegree;
+      angles(Kind::kAngleDegrees, 1.0, k, degrees);
+    }
+  }
+  if (has_angles) {
+    angles(Kind::kAnglesReversed, 0.0, 0, MakePermutation(kPermutations[1]));
+    for (const int k : {0, 2, 3, 4}) angles(Kind::kAnglesPermuted, 1.0, k, MakePermutation(kPermutations[k]));
+  }
+  for (int k = 0; k < static_cast<int>(std::size(kSequences)) && origin.form == RotationForm::kEuler; ++k) {
+    edits.push_back({Kind::kEulerSequence, k, 1.0,
+                     [k](PrintedOrigin* o) { std::copy_n(kSequences[k], 3, o->sequence.begin()); }});
+  }
+  edits.push_back({Kind::kMovingAxes, 0, 0.0, [](PrintedOrigin* o) {
+                     const bool is_printed = o->form == RotationForm::kRollPitchYaw;
+                     const Vector3d rpy =
+                         is_printed ? Vector3d(o->r.head<3>()) : SolveRollPitchYaw(o->CalcRotation())[0];
+                     o->SetRotation(TurnMoving(rpy));
+                   }});
+  turn(Kind::kFixedAxes, 0.0, 0,
+       [](const Matrix3d& R) { return TurnRollPitchYaw(-SolveRollPitchYaw(R.transpose())[0]); });
+  turn(Kind::kTransposed, 0.0, 0, [](const Matrix3d& R) { return Matrix3d(R.transpose()); });
+  for (const bool first : {true, false}) {
+    const double indirect = origin.form == RotationForm::kQuaternion ? 0.0 : 2.0;
+    edits.push_back({first ? Kind::kScalarFirst : Kind::kScalarLast, 0, indirect, [first](PrintedOrigin* o) {
+                       const bool is_printed = o->form == RotationForm::kQuaternion;
+                       const Vector4d q = is_printed ? o->r : ToQuaternion(o->CalcRotation());
+                       o->SetRotation(TurnQuaternion(first ? Vector4d(q[3], q[0], q[1], q[2])
+                                                           : Vector4d(q[1], q[2], q[3], q[0])));
+                     }});
+  }
+  for (int k = 0; k < 3; ++k) {
+    turn(Kind::kMirror, 0.0, k, [M = MakeMirror(k)](const Matrix3d& R) { return Matrix3d(M * R * M); });
+  }
+  for (int k = 0; k < 9; ++k) {
+    constexpr double kQuarters[] = {-1.0, 2.0, 1.0};
+    const Matrix3d back = TurnAbout(k / 3, -kQuarters[k % 3] * kPi / 2.0);
+    turn(Kind::kTurnOwn, 3.0, k, [back](const Matrix3d& R) { return Matrix3d(R * back); });
+    turn(Kind::kTurnParent, 3.5, k, [back](const Matrix3d& R) { return Matrix3d(back * R); });
+  }
+  return edits;
+}
+
+/// Conventions of a row of modified Denavit-Hartenberg parameters, number by number.
+void ListRowEdits(const PrintedOrigin& origin, std::vector<LinkEdit>* edits) {
+  const auto number = [](PrintedOrigin* o, int k) {
+    return k % 2 == 0 ? &o->r[k / 2] : &o->t[k == 1 ? 0 : 2];
+  };
+  PrintedOrigin row = origin;
+  for (int k = 0; k < 4; ++k) {
+    if (*number(&row, k) == 0.0) continue;
+    const auto scale = [&](Kind kind, int component, double bits, double factor) {
+      edits->push_back({{kind, SiteKind::kPosition, component}, bits, [=](PrintedLink* link) {
+                          *number(&link->origin, k) *= factor;
+                        }});
+      edits->back().fault.whole = true;
+    };
+    scale(Kind::kSignOf, k, 1.0, -1.0);
+    k % 2 == 0 ? scale(Kind::kDegrees, 0, 1.0, kDegree) : scale(Kind::kUnit, 0, 1.0, 1e-3);
+  }
+}
+
+/// Collects the edits of one inertial.
+class InertialEdits {
+ public:
+  InertialEdits(const PrintedLink& link, const EditFrames& frames)
+      : given_(*link.inertial), frames_(frames), R_(given_.origin.CalcRotation()) {
+    const auto is_turned = [](const Pose& X) { return !X.linear().isIdentity(1e-9); };
+    if (frames.is_own)
+      origins_.push_back(
+          {[](const PrintedLink& l) { return l.origin.CalcPose(); }, is_turned(link.origin.CalcPose())});
+    for (const Pose& X : frames.X_PL)
+      origins_.push_back({[X](const PrintedLink&) { return X; }, is_turned(X)});
+    if (link.compiled) {
+      Add({Kind::kCompiled, SiteKind::kMass}, 0.0,
+          [stated = link.compiled->stated](PrintedInertial* body, const PrintedLink&) { *body = stated; });
+      edits_.back().fault.whole = true;
+    }
+  }
+
+  std::vector<LinkEdit> Run() {
+    ListMasses();
+    ListCentres();
+    ListFrames();
+    ListTensors();
+    ListEntries();
+    return std::move(edits_);
+  }
+
+ private:
+  using Body = PrintedInertial;
+  using FindPose = std::function<Pose(const PrintedLink&)>;
+  /// The link in its parent's frame.
+  struct Origin {
+    FindPose find;
+    bool is_turned;
+  };
+
+  template <typename Change>
+  void Add(const FileFault& fault, double bits, const Change& change) {
+    edits_.push_back({fault, bits, [change](PrintedLink* link) { change(&*link->inertial, *link); }});
+  }
+
+  void ListMasses() {
+    const std::span<const UnitFault> units = ListUnits(SiteKind::kMass);
+    for (size_t k = 0; k < units.size(); ++k) {
+      Add({Kind::kUnit, SiteKind::kMass, static_cast<int>(k)}, 0.0,
+          [f = units[k].factor](Body* body, const PrintedLink&) { body->mass.value *= f; });
+    }
+  }
+
+  void ListCentres() {
+    ListVectorEdits(SiteKind::kCom, given_.origin.t, [&](Kind kind, int component, const Matrix3d& M) {
+      Add({kind, SiteKind::kCom, component}, 0.0,
+          [M](Body* body, const PrintedLink&) { body->origin.t = (M * body->origin.t).eval(); });
+    });
+    const auto move = [&](Kind kind, double bits, const FindPose& find, const auto& calc) {
+      Add({kind, SiteKind::kCom}, bits, [find, calc](Body* body, const PrintedLink& link) {
+        body->origin.t = calc(find(link), body->origin.t);
+      });
+    };
+    using Vector = Vector3d;
+    for (const auto& [find, is_turned] : origins_) {
+      move(Kind::kInParent, 1.0, find,
+           [](const Pose& X, const Vector& c) { return Vector(X.inverse() * c); });
+      move(Kind::kToParent, 1.0, find, [](const Pose& X, const Vector& c) { return Vector(X * c); });
+      if (!is_turned) continue;
+      move(Kind::kAlongParent, 1.0, find,
+           [](const Pose& X, const Vector& c) { return Vector(X.linear().transpose() * c); });
+      move(Kind::kAlongToParent, 1.0, find,
+           [](const Pose& X, const Vector& c) { return Vector(X.linear() * c); });
+      move(Kind::kPlaceAdded, 1.0, find,
+           [](const Pose& X, const Vector& c) { return Vector(c - X.translation()); });
+      move(Kind::kPlaceTaken, 1.0, find,
+           [](const Pose& X, const Vector& c) { return Vector(c + X.translation()); });
+    }
+    for (const Pose& X_LC : frames_.X_LC) {
+      move(
+          Kind::kInChild, 2.0, [X_LC](const PrintedLink&) { return X_LC; },
+          [](const Pose& X, const Vector& c) { return Vector(X * c); });
+    }
+    if (R_.isIdentity(1e-9)) return;
+    for (const bool to : {false, true}) {
+      Add({to ? Kind::kToInertialAxes : Kind::kInertialAxes, SiteKind::kCom}, 2.0,
+          [to](Body* body, const PrintedLink&) {
+            const Matrix3d R = body->origin.CalcRotation();
+            body->origin.t = ((to ? Matrix3d(R.transpose()) : R) * body->origin.t).eval();
+          });
+    }
+  }
+
+  /// The centre of mass and the inertia at once.
+  void ListFrames() {
+    const auto move = [&](Kind kind, int component, double bits, const FindPose& find) {
+      FileFault fault{kind, SiteKind::kCom, component};
+      fault.whole = true;
+      Add(fault, bits, [find](Body* body, const PrintedLink& link) {
+        const Pose X = find(link);
+        const Matrix3d R = body->origin.CalcRotation();
+        const Matrix3d Q = R.transpose() * X.linear() * R;
+        body->I = ToEntries(Q * ToTensor(body->I) * Q.transpose());
+        body->origin.t = (X.linear() * body->origin.t + X.translation()).eval();
+      });
+    };
+    for (int k = 0; k < 3; ++k) {
+      Pose mirror = Pose::Identity();
+      mirror.linear() = MakeMirror(k);
+      move(Kind::kMirror, k, 0.0, [mirror](const PrintedLink&) { return mirror; });
+    }
+    for (const Origin& origin : origins_) {
+      move(Kind::kInParent, 0, 1.0, [find = origin.find](const PrintedLink& l) { return find(l).inverse(); });
+      move(Kind::kAlongParent, 0, 1.0, [find = origin.find](const PrintedLink& l) {
+        Pose turn = Pose::Identity();
+        turn.linear() = find(l).linear().transpose();
+        return turn;
+      });
+    }
+  }
+
+  /// An edit of the tensor along the link's axes.
+  template <typename Calc>
+  void AddTensor(Kind kind, int component, double bits, const Calc& calc) {
+    Add({kind, SiteKind::kInertia, component}, bits, [calc](Body* body, const PrintedLink& link) {
+      const Matrix3d R = body->origin.CalcRotation();
+      const Matrix3d I = R * ToTensor(body->I) * R.transpose();
+      body->I = ToEntries(R.transpose() * calc(*body, I, link) * R);
+    });
+  }
+
+  void ListTensors() {
+    // The mass and centre as given, and as right.
+    for (const bool as_right : {false, true}) {
+      if (as_right && !frames_.right) continue;
+      const auto shift = [&](Kind kind, double bits, double sign, const FindPose& find) {
+        const std::pair<double, Vector3d> right = frames_.right.value_or(std::pair(0.0, Vector3d::Zero()));
+        AddTensor(kind, 0, bits, [=](const Body& body, const Matrix3d& I, const PrintedLink& link) {
+          const Pose X = find(link);
+          const double mass = as_right ? right.first : body.mass.value;
+          const Matrix3d moved = CalcPointInertia(mass, X * (as_right ? right.second : body.origin.t));
+          return Matrix3d(I + sign * (X.linear().transpose() * moved * X.linear()));
+        });
+      };
+      const auto none = [](const PrintedLink&) { return Pose(Pose::Identity()); };
+      shift(Kind::kAboutOrigin, 0.0, -1.0, none);
+      shift(Kind::kMovedTwice, 0.0, 1.0, none);
+      for (const Origin& origin : origins_) shift(Kind::kAboutParent, 1.0, -1.0, origin.find);
+    }
+    const auto turn = [&](Kind kind, int component, double bits, const auto& find) {
+      AddTensor(kind, component, bits, [find](const Body&, const Matrix3d& I, const PrintedLink& link) {
+        const Matrix3d M = find(link);
+        return Matrix3d(M * I * M.transpose());
+      });
+    };
+    for (const Origin& origin : origins_) {
+      if (!origin.is_turned) continue;
+      turn(Kind::kAlongParent, 0, 0.0,
+           [find = origin.find](const PrintedLink& l) { return Matrix3d(find(l).linear().transpose()); });
+      turn(Kind::kAlongToParent, 0, 1.0,
+           [find = origin.find](const PrintedLink& l) { return Matrix3d(find(l).linear()); });
+    }
+    for (int k = 0; k < 3; ++k)
+      turn(Kind::kMirror, k, 1.0, [M = MakeMirror(k)](const PrintedLink&) { return M; });
+    if (R_.isIdentity(1e-9)) return;
+    AddTensor(Kind::kLinkAxes, 0, 0.0,
+              [](const Body& body, const Matrix3d&, const PrintedLink&) { return ToTensor(body.I); });
+    AddTensor(Kind::kAboutOriginAxes, 0, 1.0, [](const Body& body, const Matrix3d& I, const PrintedLink&) {
+      const Matrix3d R = body.origin.CalcRotation();
+      const Matrix3d offset = CalcPointInertia(body.mass.value, R.transpose() * body.origin.t);
+      return Matrix3d(I - R * offset * R.transpose());
+    });
+    for (const OriginEdit& edit : ListTurns(given_.origin)) {
+      if (edit.kind == Kind::kTurnParent || edit.kind == Kind::kMirror) continue;
+      FileFault fault{Kind::kFrame, SiteKind::kInertia, edit.component};
+      fault.rotation = edit.kind;
+      Add(fault, edit.bits + 1.0,
+          [undo = edit.undo](Body* body, const PrintedLink&) { undo(&body->origin); });
+    }
+  }
+
+  /// Edits of the six numbers as printed.
+  void ListEntries() {
+    const auto entries = [&](Kind kind, int component, double bits, const auto& calc) {
+      Add({kind, SiteKind::kInertia, component}, bits,
+          [calc](Body* body, const PrintedLink&) { body->I = calc(body->I); });
+    };
+    const auto scale = [&](Kind kind, int component, double bits, const Vector6d& factors) {
+      entries(kind, component, bits, [factors](const Vector6d& I) { return I.cwiseProduct(factors).eval(); });
+    };
+    Vector6d signs = Vector6d::Ones();
+    signs.tail<3>().setConstant(-1.0);
+    scale(Kind::kProductSigns, 0, 0.0, signs);
+    for (int k = 0; k < 3; ++k) {
+      signs.setOnes();
+      signs[3 + k] = -1.0;
+      scale(Kind::kProductSign, k, 1.0, signs);
+    }
+    for (int k = 0; k < kNumPermutations; ++k) {
+      const Matrix3d P = MakePermutation(kPermutations[k]);
+      entries(Kind::kPermutation, k, 0.0,
+              [P](const Vector6d& I) { return ToEntries(P * ToTensor(I) * P.transpose()); });
+      entries(Kind::kMoments, k, 1.0, [P](Vector6d I) {
+        I.head<3>() = (P * I.head<3>()).eval();
+        return I;
+      });
+      for (const bool inverse : {false, true}) {
+        entries(inverse ? Kind::kSixOrderInverse : Kind::kSixOrder, k, 1.0, [k, inverse](const Vector6d& I) {
+          Vector6d ordered;
+          for (int i = 0; i < 6; ++i) {
+            const int to = kSixOrders[k][i];
+            ordered[inverse ? to : i] = I[inverse ? i : to];
+          }
+          return ordered;
+        });
+      }
+    }
+    const std::span<const UnitFault> units = ListUnits(SiteKind::kInertia);
+    for (size_t k = 0; k < units.size(); ++k)
+      scale(Kind::kUnit, static_cast<int>(k), 0.0, Vector6d::Constant(units[k].factor));
+    if (frames_.right && given_.mass.value > 0.0)
+      scale(Kind::kWithMass, 0, 0.0, Vector6d::Constant(frames_.right->first / given_.mass.value));
+  }
+
+  const PrintedInertial& given_;
+  const EditFrames& frames_;
+  Matrix3d R_;
+  std::vector<Origin> origins_;
+  std::vector<LinkEdit> edits_;
+};
+
+}  // namespace
+
+Matrix3d MakePermutation(const int (&p)[3]) {
+  Matrix3d P = Matrix3d::Zero();
+  for (int k = 0; k < 3; ++k) P(p[k], k) = 1.0;
+  return P;
+}
+
+std::vector<LinkEdit> ListRotationEdits(const PrintedOrigin& origin) {
+  std::vector<LinkEdit> edits;
+  for (const OriginEdit& edit : ListTurns(origin)) {
+    edits.push_back({{edit.kind, SiteKind::kRotation, edit.component},
+                     edit.bits,
+                     [undo = edit.undo](PrintedLink* link) { undo(&link->origin); }});
+  }
+  return edits;
+}
+
+std::vector<LinkEdit> ListOriginEdits(const PrintedOrigin& origin, const EditFrames& frames) {
+  std::vector<LinkEdit> edits = ListRotationEdits(origin);
+  if (origin.form == RotationForm::kMdh) {
+    ListRowEdits(origin, &edits);
+    return edits;
+  }
+  const auto add = [&](Kind kind, int component, double bits, bool whole, const auto& change) {
+    edits.push_back({{kind, SiteKind::kPosition, component}, bits, [change](PrintedLink* link) {
+                       change(&link->origin);
+                     }});
+    edits.back().fault.whole = whole;
+  };
+  const auto turn = [&](Kind kind, int component, double bits, const Matrix3d& M) {
+    add(kind, component, bits, false, [M](PrintedOrigin* o) { o->t = (M * o->t).eval(); });
+  };
+  ListVectorEdits(SiteKind::kPosition, origin.t,
+                  [&](Kind kind, int component, const Matrix3d& M) { turn(kind, component, 0.0, M); });
+  for (const Pose& X : frames.X_PL) {
+    const Matrix3d R = X.linear();
+    if (R.isIdentity(1e-9)) continue;
+    turn(Kind::kAlongLink, 0, 1.0, R);
+    turn(Kind::kAlongToParent, 0, 1.0, R.transpose());
+    turn(Kind::kInverse, 0, 2.0, -R.transpose());
+  }
+  add(Kind::kInverse, 0, 0.0, true, [](PrintedOrigin* o) {
+    const Pose X = o->CalcPose().inverse();
+    o->SetRotation(X.linear());
+    o->t = X.translation();
+  });
+  for (int k = 0; k < 3; ++k) {
+    add(Kind::kMirror, k, 0.0, true, [M = MakeMirror(k)](PrintedOrigin* o) {
+      o->SetRotation(M * o->CalcRotation() * M);
+      o->t = (M * o->t).eval();
+    });
+  }
+  return edits;
+}
+
+std::vector<LinkEdit> ListInertialEdits(const PrintedLink& link, const EditFrames& frames) {
+  return InertialEdits(link, frames).Run();
+}
+
+std::vector<std::pair<FileFault, Vector3d>> ListAxisEdits(const Vector3d& axis) {
+  std::vector<std::pair<FileFault, Vector3d>> edits;
+  ListVectorEdits(SiteKind::kAxis, axis, [&](Kind kind, int component, const Matrix3d& M) {
+    if (kind != Kind::kSignOf)
+      edits.emplace_back(FileFault{kind, SiteKind::kAxis, component}, Vector3d(M * axis));
+  });
+  return edits;
+}
+
+PrintedLink Carry(const PrintedLink& link, const LinkUndo& undo) {
+  const auto list = [](PrintedLink* of) {
+    std::vector<LinkNumber> numbers = ListNumbers(&of->origin);
+    if (!of->inertial) return numbers;
+    const std::vector<LinkNumber> more = ListNumbers(&*of->inertial);
+    numbers.insert(numbers.end(), more.begin(), more.end());
+    return numbers;
+  };
+  PrintedLink before = link;
+  PrintedLink after = link;
+  undo(&after);
+  const std::vector<LinkNumber> carried = list(&after);
+  std::vector<double> halves(carried.size(), 0.0);
+  for (const LinkNumber& number : list(&before)) {
+    if (*number.half <= 0.0) continue;
+    const double value = *number.value;
+    *number.value = value + *number.half;
+    PrintedLink moved = before;
+    undo(&moved);
+    *number.value = value;
+    const std::vector<LinkNumber> there = list(&moved);
+    // Numbers of one rotation may be others altogether: its angle bounds them.
+    const auto turn = [](const PrintedOrigin& a, const PrintedOrigin& b) {
+      return CalcAngle(a.CalcRotation().transpose() * b.CalcRotation());
+    };
+    const double angles[] = {
+        turn(after.origin, moved.origin),
+        after.inertial && moved.inertial ? turn(after.inertial->origin, moved.inertial->origin) : 0.0};
+    for (size_t k = 0; k < std::min(there.size(), carried.size()); ++k) {
+      const double apart = std::abs(*there[k].value - *carried[k].value);
+      const bool turns = k % 7 >= 3 && k < 14;
+      halves[k] += turns ? std::min(apart, angles[k / 7]) : apart;
+    }
+  }
+  // What depends on no number of before has the digits that the edit gave it.
+  for (size_t k = 0; k < carried.size(); ++k) {
+    if (halves[k] > 0.0) *carried[k].half = halves[k];
+  }
+  return after;
+}
+
+}  // namespace dexcheck

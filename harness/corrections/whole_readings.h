@@ -1,0 +1,20 @@
+#pragma once
+
+// Conventions of a whole file, each of which is another reading of all its rows or bodies.
+
+#include <vector>
+
+#include "harness/corrections/correction.h"
+
+namespace dexcheck {
+
+struct WholeReading {
+  FileFault fault;
+  PrintedRobot robot;  ///< As the file would be right, if it has this fault.
+};
+
+/// Rows of Denavit-Hartenberg parameters that are classic ones, or have alpha and a of their neighbours, and
+/// bodies that are shifted by one in their list.
+std::vector<WholeReading> ListWholeReadings(const PrintedRobot& robot);
+
+}  // namespace dexcheck

@@ -1,0 +1,243 @@
+// One case each of what is no number of a link: settings of a compiler, frames, rows of tables, mountings,
+// gravity, ball joints, servos, springs, couplings.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <regex>
+
+#include "harness/corrections/corrections.h"
+#include "harness/corrections/read_printed.h"
+#include "tests/common/files.h"
+#include "tests/common/paths.h"
+
+namespace dexcheck::testing::correction_cases_test {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+DescriptionFile Read(const std::string& name, const std::string& text) { return {name, text, {}}; }
+
+std::string Replace(std::string text, const std::string& from, const std::string& to) {
+  const size_t at = text.find(from);
+  EXPECT_NE(at, std::string::npos) << from;
+  return text.replace(at, from.size(), to);
+}
+
+std::vector<std::string> ListIds(const FileCorrections& found) {
+  std::vector<std::string> ids;
+  for (const CorrectionItem& item : found.items) ids.push_back(item.id);
+  return ids;
+}
+
+/// What both kinds of file say of one arm.
+const std::string kUrdf =
+    "<robot name='arm'><link name='base'/><link name='upper'><inertial><origin xyz='0.1 0.02 0.03'/><mass "
+    "value='2.13'/><inertia ixx='0.0104' iyy='0.0211' izz='0.0303' ixy='0.0011' ixz='0.0005' "
+    "iyz='-0.0007'/></inertial></link><link name='lower'><inertial><origin xyz='0.08 -0.01 0.02'/><mass "
+    "value='0.313'/><inertia ixx='0.00104' iyy='0.00231' izz='0.00283' ixy='0' ixz='0' "
+    "iyz='0'/></inertial></link><link name='tip'/><joint name='q1' type='revolute'><parent "
+    "link='base'/><child link='upper'/><origin xyz='0 0 0.3'/><axis xyz='0 0 1'/><limit lower='-1.5' "
+    "upper='1.7' effort='10' velocity='1'/></joint><joint name='q2' type='revolute'><parent "
+    "link='upper'/><child link='lower'/><origin xyz='0.4 0 0.01' rpy='0.3 -0.2 0.5'/><axis xyz='0 1 "
+    "0'/><limit lower='-1.1' upper='1.2' effort='10' velocity='1'/></joint><joint name='tool' "
+    "type='fixed'><parent link='lower'/><child link='tip'/><origin xyz='0.2 0.01 0' rpy='0 0 "
+    "0.4'/></joint></robot>";
+const std::string kMjcf =
+    "<mujoco><compiler angle='radian' eulerseq='XYZ'/><worldbody><body name='base'><body name='upper' "
+    "pos='0 0 0.3'><joint name='q1' axis='0 0 1' limited='true' range='-1.5 1.7'/><inertial pos='0.1 0.02 "
+    "0.03' mass='2.13' fullinertia='0.0104 0.0211 0.0303 0.0011 0.0005 -0.0007'/><body name='lower' pos='0.4 "
+    "0 0.01' euler='0.3 -0.2 0.5'><joint name='q2' axis='0 1 0' limited='true' range='-1.1 1.2'/><inertial "
+    "pos='0.08 -0.01 0.02' mass='0.313' diaginertia='0.00104 0.00231 0.00283'/><site name='tip' pos='0.2 "
+    "0.01 "
+    "0' euler='0 0 0.4'/></body></body></body></worldbody></mujoco>";
+
+FileCorrections Compare(const std::string& mjcf) {
+  return FindCorrections(Read("arm.urdf", kUrdf), Read("arm.xml", mjcf));
+}
+
+TEST(CorrectionCases, TheTwoFilesAgree) { EXPECT_TRUE(Compare(kMjcf).agrees); }
+
+// The text of both files says the same: the setting is the cause, with the text's number and the engine's.
+TEST(CorrectionCases, ASettingOfTheCompilerIsNamed) {
+  FileCorrections found = Compare(Replace(kMjcf, "angle=", "boundmass='0.5' angle="));
+  ASSERT_THAT(ListIds(found), ElementsAre("body.compiled"));
+  EXPECT_TRUE(found.items[0].in_second);
+  EXPECT_THAT(DescribeItem(found.items[0], false), AllOf(HasSubstr("lower"), HasSubstr("boundmass"),
+                                                         HasSubstr("0.313 in the text, 0.5 in the engine")));
+  EXPECT_EQ(found.items[0].explained, 1.0);
+  const std::string thin = Replace(kMjcf, "0.00104 0.00231 0.00283", "0.00104 0.00131 0.00283");
+  const DescriptionFile urdf = Read("arm.urdf", Replace(kUrdf, "iyy='0.00231'", "iyy='0.00131'"));
+  EXPECT_TRUE(FindCorrections(urdf, Read("arm.xml", Replace(thin, "0.00283", "0.00231"))).items.size() == 1);
+  found = FindCorrections(urdf, Read("arm.xml", Replace(thin, "angle=", "balanceinertia='true' angle=")));
+  ASSERT_THAT(ListIds(found), ElementsAre("body.compiled"));
+  EXPECT_THAT(DescribeItem(found.items[0], false), HasSubstr("balanceinertia"));
+}
+
+TEST(CorrectionCases, AFrameOnALinkIsCompared) {
+  const FileCorrections found = Compare(Replace(kMjcf, "euler='0 0 0.4'", "euler='0 0 0.9'"));
+  ASSERT_EQ(found.items.size(), 1U);
+  EXPECT_EQ(found.items[0].fault.of, SiteKind::kRotation);
+  EXPECT_THAT(found.items[0].places, ElementsAre("joint tool"));
+}
+
+TEST(CorrectionCases, AMountingIsNamed) {
+  const FileCorrections found =
+      Compare(Replace(kMjcf, "<body name='base'>", "<body name='base' euler='3.14159265 0 0'>"));
+  ASSERT_EQ(found.items.size(), 1U);
+  EXPECT_THAT(found.items[0].places, ElementsAre("link base"));
+  EXPECT_EQ(found.items[0].fault.of, SiteKind::kRotation);
+}
+
+TEST(CorrectionCases, GravityIsNamed) {
+  const auto compare = [](const std::string& gravity) {
+    const std::string option = "<option gravity='" + gravity + "'/><worldbody>";
+    return ListIds(
+        FindCorrections(Read("a.xml", Replace(kMjcf, "<worldbody>", option)), Read("b.xml", kMjcf)));
+  };
+  EXPECT_THAT(compare("0 0 9.81"), ElementsAre("gravity.sign"));
+  EXPECT_THAT(compare("0 0 0"), ElementsAre("gravity.missing"));
+  EXPECT_THAT(compare("0 0 -9810"), ElementsAre("gravity.mm"));
+  EXPECT_THAT(compare("0 -9.81 0"), ElementsAre("gravity.axis"));
+  EXPECT_THAT(compare("0 0 -9.7"), ElementsAre("gravity.value"));
+  EXPECT_TRUE(compare("0 0 -9.81").empty());
+}
+
+TEST(CorrectionCases, SpringsServosAndConstraintsAreNamed) {
+  EXPECT_THAT(ListIds(Compare(Replace(kMjcf, "axis='0 1 0'", "axis='0 1 0' stiffness='3.1'"))),
+              ElementsAre("stiffness.missing"));
+  const std::string servo = "<actuator><motor joint='q2'/><position joint='q2' kp='50'/></actuator></mujoco>";
+  FileCorrections found = Compare(Replace(kMjcf, "</mujoco>", servo));
+  ASSERT_THAT(ListIds(found), ElementsAre("constraint.missing"));
+  EXPECT_THAT(found.items[0].values[0], HasSubstr("servo beside the motor of joint q2 (kp 50"));
+  // A servo alone is what drives the joint.
+  EXPECT_TRUE(Compare(Replace(kMjcf, "</mujoco>", Replace(servo, "<motor joint='q2'/>", ""))).agrees);
+  const std::string weld =
+      "<equality><connect body1='lower' body2='base' anchor='0 0 0'/></equality></mujoco>";
+  found = Compare(Replace(kMjcf, "</mujoco>", weld));
+  ASSERT_THAT(ListIds(found), ElementsAre("constraint.missing"));
+  EXPECT_THAT(found.items[0].values[0], HasSubstr("connect lower base"));
+}
+
+TEST(CorrectionCases, ABallJointIsCompared) {
+  const std::string ball =
+      Replace(kMjcf, "axis='0 1 0' limited='true' range='-1.1 1.2'", "type='ball' damping='0.4'");
+  const DescriptionFile right = Read("right.xml", ball);
+  const auto compare = [&](const std::string& from, const std::string& to) {
+    return ListIds(FindCorrections(Read("wrong.xml", Replace(ball, from, to)), right));
+  };
+  EXPECT_THAT(compare("damping='0.4'", "damping='0.5'"), ElementsAre("number.damping"));
+  EXPECT_THAT(compare("damping='0.4'", "damping='0.4' pos='0 0 0.02'"), ElementsAre("number.axis_point"));
+  EXPECT_THAT(compare("mass='0.313'", "mass='313'"), ElementsAre("mass.g"));
+}
+
+TEST(CorrectionCases, ABaseThatFloatsIsNotWelded) {
+  const std::string floats =
+      Replace(kMjcf, "<body name='base'>",
+              "<body name='base'><freejoint/><inertial pos='0 0 0' mass='1' diaginertia='1 1 1'/>");
+  const std::string welded = Replace(floats, "<freejoint/>", "");
+  const FileCorrections found = FindCorrections(Read("a.xml", floats), Read("b.xml", welded));
+  ASSERT_THAT(ListIds(found), ElementsAre("number.type"));
+}
+
+// A limit that one file alone states, where it states others.
+TEST(CorrectionCases, OneSidedRangesDoNotAgree) {
+  EXPECT_THAT(ListIds(Compare(Replace(kMjcf, "limited='true' range='-1.1 1.2'", ""))),
+              ElementsAre("range.unneeded"));
+  const DescriptionFile half = Read("half.urdf", Replace(kUrdf, "lower='-1.1' upper='1.2'", "upper='1.2'"));
+  EXPECT_THAT(ListIds(FindCorrections(half, Read("arm.xml", kMjcf))), ElementsAre("number.range"));
+}
+
+// A number that is wrong twice over: what one correction leaves is looked at again.
+TEST(CorrectionCases, TwoFaultsOfOneWeldedBodyAreBothNamed) {
+  const std::string fused = Replace(kUrdf, "<link name='tip'/>",
+                                    "<link name='tip'><inertial><origin xyz='0.03 0.05 0.11'/><mass "
+                                    "value='0.713'/><inertia ixx='0.00113' iyy='0.00171' izz='0.00192' "
+                                    "ixy='0.0001' ixz='0.0002' iyz='-0.0001'/></inertial></link>");
+  const PrintedRobot right = ReadPrintedRobot(Read("right.urdf", fused));
+  // The same with one body in the place of the two.
+  const std::string mjcf = Replace(
+      Replace(kMjcf, "<site name='tip' pos='0.2 0.01 0' euler='0 0 0.4'/>",
+              "<body name='tip' pos='0.2 0.01 0' euler='0 0 0.4'><inertial pos='0.03 0.05 0.11' mass='0.713' "
+              "fullinertia='0.00113 0.00171 0.00192 0.0001 0.0002 -0.0001'/></body>"),
+      "body name='tip'", "body name='other'");
+  EXPECT_TRUE(FindCorrections(right, ReadPrintedRobot(Read("arm.xml", mjcf))).agrees);
+  std::string wrong = Replace(fused, "value='0.313'", "value='0.513'");
+  wrong = Replace(wrong, "xyz='0.03 0.05 0.11'", "xyz='0.03 -0.05 0.11'");
+  const FileCorrections found = FindCorrections(Read("wrong.urdf", wrong), Read("arm.xml", mjcf));
+  const std::vector<std::string> ids = ListIds(found);
+  EXPECT_THAT(ids, ::testing::UnorderedElementsAre("number.mass", "com.sign_y"));
+}
+
+// Tables of the Panda that were read by another convention.
+class Rows : public ::testing::Test {
+ protected:
+  Rows()
+      : right_(ReadPrintedRobot(DescriptionFile(SourcePath("/controller/parameters/panda.toml")))),
+        mjcf_(ReadPrintedRobot(DescriptionFile(SourcePath("/mjcf/panda.xml")))) {}
+
+  template <typename Change>
+  [[nodiscard]] std::vector<std::string> Find(const Change& change) const {
+    PrintedRobot wrong = right_;
+    for (int i = 0; i < wrong.size(); ++i) {
+      if (right_.link(i).origin.form == RotationForm::kMdh) change(i, &wrong);
+    }
+    return ListIds(FindCorrections(wrong, mjcf_));
+  }
+
+  PrintedRobot right_, mjcf_;
+};
+
+TEST_F(Rows, AgreeAsTheyAre) { EXPECT_TRUE(FindCorrections(right_, mjcf_).agrees); }
+
+TEST_F(Rows, ThatAreClassicAreNamed) {
+  const auto next = [&](int i) {
+    for (const int child : right_.link(i).children) {
+      if (right_.link(child).origin.form == RotationForm::kMdh) return right_.link(child).origin;
+    }
+    return PrintedOrigin{};
+  };
+  EXPECT_THAT(Find([&](int i, PrintedRobot* robot) {
+                const PrintedOrigin row = next(i);
+                PrintedLink& link = robot->link(i);
+                link.origin.r[0] = row.r[0];
+                link.origin.t[0] = row.t[0];
+                Pose X = Pose::Identity();
+                X.linear() = TurnAbout(0, row.r[0]);
+                X.translation().x() = row.t[0];
+                const Pose back = X.inverse();
+                if (link.inertial) {
+                  const Matrix3d R = back.linear() * link.inertial->origin.CalcRotation();
+                  link.inertial->origin.t = back * link.inertial->origin.t;
+                  link.inertial->origin.SetRotation(R);
+                }
+                for (const int child : link.children) {
+                  PrintedOrigin& frame = robot->link(child).origin;
+                  if (frame.form == RotationForm::kMdh) continue;
+                  frame.t = back * frame.t;
+                  frame.SetRotation(back.linear() * frame.CalcRotation());
+                }
+              }),
+              ElementsAre("table.classic"));
+}
+
+TEST_F(Rows, ThatAreShiftedAreNamed) {
+  EXPECT_THAT(Find([&](int i, PrintedRobot* robot) {
+                const PrintedOrigin& above = right_.link(right_.link(i).parent).origin;
+                const bool is_row = above.form == RotationForm::kMdh;
+                robot->link(i).origin.r[0] = is_row ? above.r[0] : 0.0;
+                robot->link(i).origin.t[0] = is_row ? above.t[0] : 0.0;
+              }),
+              ::testing::Contains("table.shifted_down"));
+}
+
+TEST_F(Rows, InDegreesOrMillimetresAreNamed) {
+  const auto ids = Find([](int i, PrintedRobot* robot) { robot->link(i).origin.r *= 180.0 / kPi; });
+  EXPECT_THAT(ids, ElementsAre("rotation.degrees"));
+  EXPECT_EQ(Find([](int i, PrintedRobot* robot) { robot->link(i).origin.r[0] *= -1.0; }).size(), 1U);
+}
+
+}  // namespace
+}  // namespace dexcheck::testing::correction_cases_test
