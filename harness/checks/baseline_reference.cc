@@ -60,7 +60,7 @@ void BaselineReference::CalcErrors(const LawSpec& spec, const LawTerms& terms, c
   V_d_dot_.tail<3>() = R_od * pose.omega_d_dot - omega.cross(omega_d);
 }
 
-Vector6d BaselineReference::CalcWrench(const LawTerms& terms) const {
+Vector6d BaselineReference::CalcWrench(const LawSpec& spec, const LawTerms& terms) const {
   const Matrix3d R = terms.X_Bo.linear();
   const auto turn = [&](const Vector6d& k) {
     Matrix6d K = k.asDiagonal();
@@ -68,15 +68,16 @@ Vector6d BaselineReference::CalcWrench(const LawTerms& terms) const {
     return K;
   };
   const Matrix6d K = turn(stiffness_.K);
-  const Vector6d stiff = turn(stiffness_.K.cwiseProduct(position_factor_)) * e_;
-  if (law_ != ControlLaw::kImpedance) return stiff + turn(stiffness_.D.cwiseProduct(velocity_factor_)) * V_e_;
+  const Vector6d stiff = turn(stiffness_.K.cwiseProduct(spec.position_factor)) * e_;
+  if (law_ != ControlLaw::kImpedance)
+    return stiff + turn(stiffness_.D.cwiseProduct(spec.velocity_factor)) * V_e_;
   // K v = k Lambda v with v^T Lambda v = 1: Q = Lambda [v1 .. v6]
   Vector6d k;
   Matrix6d V;
   DecomposeGeneralized(K, Lambda_, &k, &V);
   const Matrix6d Q = Lambda_ * V;
   const Vector6d roots = k.cwiseMax(0.0).cwiseSqrt();
-  return stiff + velocity_factor_[0] * 2.0 * stiffness_.damping_ratio *
+  return stiff + spec.velocity_factor[0] * 2.0 * stiffness_.damping_ratio *
                      (Q * roots.cwiseProduct(Q.transpose() * V_e_));
 }
 
@@ -99,7 +100,7 @@ bool BaselineReference::Evaluate(const LawSpec& spec, const LawReference& plain,
     F_o += terms.M_hat * V_dot + terms.C_hat_V;
   } else {
     CalcErrors(spec, terms, desired);
-    V_dot = Lambda_.llt().solve(CalcWrench(terms));
+    V_dot = Lambda_.llt().solve(CalcWrench(spec, terms));
     rates_.setZero();
     if (law_ != ControlLaw::kPdGravity) {
       V_dot += V_d_dot_;
@@ -130,41 +131,6 @@ bool BaselineReference::Evaluate(const LawSpec& spec, const LawReference& plain,
   plain.AddLeastForces(F_o, &f_c_);
   force_.noalias() += terms.J.transpose() * f_c_;
   return true;
-}
-
-void BaselineReference::CalcParts(const LawSpec& spec, const LawReference& plain, const LawTerms& terms,
-                                  const Matrix6Xd& G_dot, const DesiredMotion& desired,
-                                  const Eigen::Ref<const VectorXd>& F_N, MatrixXd* parts) {
-  if (law_ == ControlLaw::kOperationalSpace) return;
-  const VectorXd whole = force_;
-  const Vector6d one = Vector6d::Ones(), none = Vector6d::Zero();
-  const auto find = [&](const Vector6d& position, const Vector6d& velocity, const DesiredMotion& motion) {
-    position_factor_ = position;
-    velocity_factor_ = velocity;
-    Evaluate(spec, plain, terms, G_dot, motion, F_N);
-    return VectorXd(whole - force_);
-  };
-  const auto column = [&](LawPart part) { return parts->col(static_cast<int>(part)); };
-  DesiredMotion steady = desired;
-  steady.X_d_ddot.setZero();
-  for (const LawPart part : {LawPart::kCoordinateRate, LawPart::kGraspMapRate, LawPart::kJacobianRate,
-                             LawPart::kInertiaOfFeedForward, LawPart::kInertiaOfVelocity,
-                             LawPart::kInertiaOfPosition, LawPart::kInertiaOfRate})
-    column(part).setZero();
-  if (law_ == ControlLaw::kPdGravity)
-    for (const LawPart part : {LawPart::kCoriolis, LawPart::kFriction, LawPart::kObjectCoriolis})
-      column(part).setZero();
-  column(LawPart::kPositionFeedback) = find(none, one, desired);
-  column(LawPart::kVelocityFeedback) = find(one, none, desired);
-  column(LawPart::kFeedForward) = find(one, one, steady);
-  column(LawPart::kCoordinateRate) = whole - parts->leftCols(kLawPartCount).rowwise().sum();
-  for (int i = 0; i < 6; ++i) {
-    const Vector6d others = one - Vector6d::Unit(i);
-    const bool is_own = law_ != ControlLaw::kImpedance;
-    parts->col(kLawPartCount + i) = is_own ? find(one, others, desired) : VectorXd::Zero(whole.size());
-    parts->col(kLawPartCount + 6 + i) = find(others, one, desired);
-  }
-  find(one, one, desired);
 }
 
 }  // namespace dexcheck

@@ -26,13 +26,6 @@ class BaselineReference {
   bool Evaluate(const LawSpec& spec, const LawReference& plain, const LawTerms& terms, const Matrix6Xd& G_dot,
                 const DesiredMotion& desired, const Eigen::Ref<const VectorXd>& F_N);
 
-  /// Splits E_bar' tau' of the last Evaluate, whose arguments these are. @param parts n x kLawPartCount, of
-  /// (55): those that the law does not share with it get its own, and kCoordinateRate what is left. Then of
-  /// each entry of D and of K; an impedance has no D of its own.
-  void CalcParts(const LawSpec& spec, const LawReference& plain, const LawTerms& terms,
-                 const Matrix6Xd& G_dot, const DesiredMotion& desired, const Eigen::Ref<const VectorXd>& F_N,
-                 MatrixXd* parts);
-
   /// E_bar' tau' (n) and f_c (k).
   [[nodiscard]] const VectorXd& force() const { return force_; }
   [[nodiscard]] const VectorXd& f_c() const { return f_c_; }
@@ -40,12 +33,10 @@ class BaselineReference {
  private:
   [[nodiscard]] bool CalcInertia(const LawTerms& terms);
   void CalcErrors(const LawSpec& spec, const LawTerms& terms, const DesiredMotion& desired);
-  [[nodiscard]] Vector6d CalcWrench(const LawTerms& terms) const;
+  [[nodiscard]] Vector6d CalcWrench(const LawSpec& spec, const LawTerms& terms) const;
 
   ControlLaw law_;
   ObjectStiffness stiffness_;
-  Vector6d position_factor_ = Vector6d::Ones();  // of K
-  Vector6d velocity_factor_ = Vector6d::Ones();  // of D, or its first entry of an impedance's
   Eigen::LLT<MatrixXd> M_llt_, Lambda_c_llt_;
   MatrixXd M_inv_J_T_;                // n x k
   MatrixXd Lambda_c_inv_, Lambda_c_;  // k x k

@@ -116,7 +116,7 @@ const CheckInfo kChecks[] = {
      "tau' sent against (53)-(55) computed from the engine's terms, relative to the forces balanced and to "
      "the condition number of J_B'",
      {Cause::kControlLaw, 16, Rank::kLaw, kOwn},
-     {OfLaw<&LawErrors::torque>, kRunning | kUnsent}},
+     {OfLaw<&LawErrors::torque>, kAlways | kUnsent}},
     // Where contacts slip, (47) plans for xi_c and the rigid system starts from xi: C_bar' (xi - xi_c) and
     // J_dot (xi - xi_c) stay, slip speeds of some 1e-6 m/s against rates of the order of 1/s: measured 8e-10
     // in `curve`.

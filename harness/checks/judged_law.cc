@@ -49,8 +49,30 @@ double JudgedLaw::CalcTorqueError(const StepRecord& step, const LawTerms& terms,
   const double error = Norm(difference_) / scale_ / condition_number();
   // Less is rounding, which says nothing.
   differs_ = error > kLawTorqueBound;
-  if (differs_) CalcParts(step, terms);
+  Remember(step, terms);
   return error;
+}
+
+void JudgedLaw::Remember(const StepRecord& step, const LawTerms& terms) {
+  if (state_.force.size() > 0 && state_.time == step.time) return;  // known already
+  state_.time = step.time;
+  state_.q = terms.q;
+  state_.xi = terms.xi;
+  state_.object = {terms.X_Bo, terms.V_Bo, terms.X_o};
+  state_.force = force();
+  CopyDesired(&state_);
+  if (differs_ && history_.Wants()) {
+    LawSnapshot snapshot{
+        .inputs =
+            LawInputs{.now = state_, .terms = terms, .M = *terms.M, .C = *terms.C, .J_dot = *terms.J_dot},
+        .difference = difference_,
+        .noise = kLawTorqueBound * noise_scale()};
+    CopyInputs(step, &snapshot.inputs);
+    history_.Keep(std::move(snapshot));
+  } else if (differs_) {
+    history_.Skip();
+  }
+  history_.Remember(state_, control_step());
 }
 
 double JudgedLaw::CompareTorque(const StepRecord& step, const LawTerms& terms) {
@@ -71,8 +93,8 @@ class JudgedJointLaw final : public JudgedLaw {
         gains_(setup.joints()->gains),
         motion_(&setup.joints()->motion) {
     if (stands_) ground_.emplace(setup.model(), setup.feet(), gains_.stance->height);
-    for (VectorXd* vector :
-         {&force_, &demand_, &true_demand_, &commanded_force_, &coulomb_, &viscous_, &position_error_})
+    for (VectorXd* vector : {&force_, &demand_, &true_demand_, &commanded_force_, &coulomb_, &viscous_,
+                             &position_error_, &velocity_error_, &ground_force_})
       vector->setZero(setup.model().num_velocities());
     // Of the other laws the gain of a joint is the feedback in its torque.
     if (law_ != ControlLaw::kComputedTorque) return;
@@ -112,27 +134,62 @@ class JudgedJointLaw final : public JudgedLaw {
     return errors_;
   }
 
-  [[nodiscard]] int CountParts() const override { return kPartCount; }
-  [[nodiscard]] std::span<const LawPartName> ListParts() const override { return kParts; }
+  [[nodiscard]] std::span<const LawPartName> ListParts() const override { return ListJointLawParts(); }
+  void RemoveGain(size_t gain, LawInputs* inputs) const override {
+    const auto n = static_cast<size_t>(force_.size());
+    (gain < n ? inputs->velocity_error : inputs->now.position_error)[static_cast<Eigen::Index>(gain % n)] =
+        0.0;
+  }
+  [[nodiscard]] bool demands_acceleration() const override { return law_ == ControlLaw::kComputedTorque; }
+  [[nodiscard]] VectorXd CalcForce(LawInputs inputs) override {
+    const LawTerms& terms = inputs.Link();
+    desired_ = inputs.now.joints;
+    position_error_ = inputs.now.position_error;
+    velocity_error_ = inputs.velocity_error;
+    coulomb_ = inputs.coulomb;
+    viscous_ = inputs.viscous;
+    EvaluateForce(terms);
+    if (inputs.feeds_back_torques || inputs.feeds_back_by_diagonal) {
+      const VectorXd feedback =
+          gains_.K_v.cwiseProduct(velocity_error_) + gains_.K_p.cwiseProduct(position_error_);
+      force_ -= inputs.M * feedback;
+      force_ += inputs.feeds_back_torques ? feedback : inputs.M.diagonal().cwiseProduct(feedback);
+    }
+    if (inputs.ground_force.size() > 0) force_ -= inputs.ground_force;
+    return force_;
+  }
 
  protected:
   bool Evaluate(const StepRecord& step, const LawTerms& terms) override {
     JointDemand::EvaluateDesired(*motion_, step.time, 2.0 * velocity_age_, &desired_, &half_step_);
     CalcCompensation();
     CalcPositionError(stands_, desired_.q, terms.q, position_error_);
+    velocity_error_ = desired_.q_dot - terms.xi;
     const bool has_forces = EvaluateForce(terms);
     if (ground_ && step.command.demand.f_c.size() == ground_->J().rows()) {
       // (F - J^T f)_joints, with an f that has to balance F_b
       ground_->SetState(step.model->robot());
-      force_.noalias() -= ground_->J().transpose() * step.command.demand.f_c;
+      ground_force_.noalias() = ground_->J().transpose() * step.command.demand.f_c;
+      force_ -= ground_force_;
     }
     return has_forces;
+  }
+  void CopyDesired(LawStep* state) const override {
+    state->joints = desired_;
+    state->position_error = position_error_;
+  }
+  void CopyInputs(const StepRecord& step, LawInputs* inputs) const override {
+    inputs->velocity_error = velocity_error_;
+    inputs->coulomb = coulomb_;
+    inputs->viscous = viscous_;
+    if (ground_ && step.command.demand.f_c.size() == ground_->J().rows())
+      inputs->ground_force = ground_force_;
   }
   bool EvaluateForce(const LawTerms& terms) {
     force_ = terms.C_xi + terms.gravity + terms.friction + coulomb_ + viscous_;
     if (law_ == ControlLaw::kComputedTorque) {
       // M_bar' (q_d_ddot + K_v e_dot + K_p e) + C_bar' q_dot + F_bar' + tau_f
-      demand_ = desired_.q_ddot + gains_.K_v.cwiseProduct(desired_.q_dot - terms.xi) +
+      demand_ = desired_.q_ddot + gains_.K_v.cwiseProduct(velocity_error_) +
                 gains_.K_p.cwiseProduct(position_error_);
       force_.noalias() += *terms.M * demand_;
       return true;
@@ -145,51 +202,14 @@ class JudgedJointLaw final : public JudgedLaw {
       force_.noalias() += *terms.C * (desired_.q_dot - terms.xi);
     }
     force_ += gains_.K.cwiseProduct(position_error_);
-    force_ += gains_.D.cwiseProduct(desired_.q_dot - terms.xi);
+    force_ += gains_.D.cwiseProduct(velocity_error_);
     return true;
   }
   [[nodiscard]] const VectorXd& force() const override { return force_; }
   /// What the law sends may be much more than what it balances, and is rounded as that.
   [[nodiscard]] double CalcScale(double balanced) override { return Worst(balanced, Norm(force_)); }
-  void CalcParts(const StepRecord& /*step*/, const LawTerms& terms) override {
-    const bool computed = law_ == ControlLaw::kComputedTorque;
-    const bool moves = law_ != ControlLaw::kPdGravity;
-    const VectorXd& D = computed ? gains_.K_v : gains_.D;
-    const VectorXd& K = computed ? gains_.K_p : gains_.K;
-    const VectorXd rate = D.cwiseProduct(desired_.q_dot - terms.xi);
-    const VectorXd position = K.cwiseProduct(position_error_);
-    parts_.setZero(terms.xi.size(), CountColumns());
-    if (moves) parts_.col(0) = *terms.M * desired_.q_ddot;
-    parts_.col(1) = computed ? VectorXd(*terms.M * rate) : rate;
-    parts_.col(2) = computed ? VectorXd(*terms.M * position) : position;
-    if (moves) parts_.col(3) = terms.C_xi;
-    if (moves && !computed) parts_.col(3) += *terms.C * (desired_.q_dot - terms.xi);
-    parts_.col(4) = terms.gravity;
-    if (moves) parts_.col(5) = terms.friction;
-    parts_.col(6) = coulomb_;
-    parts_.col(7) = viscous_;
-    if (!computed) return;
-    const Eigen::Index n = rate.size();
-    parts_.middleCols(kPartCount, n) = *terms.M * rate.asDiagonal();
-    parts_.rightCols(n) = *terms.M * position.asDiagonal();
-  }
 
  private:
-  static constexpr int kPartCount = 8;
-  static constexpr LawPartName kParts[] = {
-      {"M_bar' q_d_ddot", "feed-forward acceleration", 1U},
-      {"K_v e_dot", "velocity feedback", 2U},
-      {"K_p e", "position feedback", 4U},
-      {"C_bar' q_dot", "Coriolis forces", 8U},
-      {"F_bar' (gravity)", "gravity", 16U},
-      {"F_bar' (friction)", "friction", 32U},
-      {"coulomb tanh(q_d_dot / coulomb_velocity)", "compensation of Coulomb friction", 64U},
-      {"viscous q_d_dot", "compensation of viscous friction", 128U},
-      {"K_v e_dot + K_p e", "feedback of both gains", 6U},
-      {"F_bar'", "gravity and friction", 48U},
-      {"tau_f", "compensation of friction", 192U},
-      {"tau'", "all torques", 255U}};
-
   [[nodiscard]] bool compensates() const { return gains_.coulomb.size() + gains_.viscous.size() > 0; }
   void CalcCompensation() {
     for (Eigen::Index i = 0; i < gains_.coulomb.size(); ++i)
@@ -230,7 +250,8 @@ class JudgedJointLaw final : public JudgedLaw {
   DesiredJoints desired_, half_step_;
   VectorXd force_, demand_, true_demand_, commanded_force_;  // n
   VectorXd coulomb_, viscous_;                               // n, what is compensated
-  VectorXd position_error_;                                  // n, q_d - q
+  VectorXd position_error_, velocity_error_;                 // n, q_d - q and q_d_dot - q_dot
+  VectorXd ground_force_;                                    // n, J^T f that the ground is asked for
   std::optional<GroundContacts> ground_;                     // of a robot that stands
   VectorXd q_, xi_;  // where the error dynamics have the joints; empty at first
 };

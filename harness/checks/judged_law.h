@@ -9,7 +9,7 @@
 #include "controller/control/actuation.h"
 #include "controller/control/constrained_dynamics.h"
 #include "controller/dynamics/tree_factor.h"
-#include "harness/checks/law_reference.h"
+#include "harness/checks/law_inputs.h"
 #include "harness/checks/step_analysis.h"
 #include "harness/checks/step_record.h"
 #include "harness/scenario/setup.h"
@@ -46,27 +46,34 @@ class JudgedLaw {
   /// that of the law.
   virtual const LawErrors& Compare(const StepRecord& step, const LawTerms& terms, const StepAnalysis& plant,
                                    bool as_commanded) = 0;
-  /// The torques alone, for a step that the motors refuse: nothing is known of what they would do.
+  /// The torques alone: of a step that the motors refuse, where nothing is known of what they would do, and
+  /// while everything settles.
   double CompareTorque(const StepRecord& step, const LawTerms& terms);
+  /// Motion of the object that is followed from now on, whose time is 0 at `begin`, s; null for that of the
+  /// scenario. The motion outlives its use.
+  virtual void Follow(const Trajectory* /*motion*/, double /*begin*/) {}
 
-  // Of the last step that was compared.
-
-  /// Whether its torques are not the law's.
+  /// Whether the torques of the last step that was compared are not the law's.
   [[nodiscard]] bool differs() const { return differs_; }
-  /// E_bar' (tau' - tau'_printed) (n), where they differ.
-  [[nodiscard]] const VectorXd& difference() const { return difference_; }
-  /// What rounding of that, times the bound of `law_torque`, is relative to, in |.|_M^-1.
+  /// What rounding of their difference, times the bound of `law_torque`, is relative to, in |.|_M^-1.
   [[nodiscard]] double noise_scale() const { return scale_ * condition_number(); }
-  /// The summands of E_bar' tau'_printed and what each gain by itself makes of it (n x CountColumns()), where
-  /// they differ.
-  [[nodiscard]] const MatrixXd& parts() const { return parts_; }
-  [[nodiscard]] int CountColumns() const { return CountParts() + static_cast<int>(gain_names_.size()); }
-  /// "K_p of x": the gains of the last columns.
-  [[nodiscard]] const std::vector<std::string>& gains() const { return gain_names_; }
-  /// Number of summands.
-  [[nodiscard]] virtual int CountParts() const = 0;
-  /// Which summands, or several that are one thing, have a name.
+  /// Steps whose torques were not the law's, since the last Forget.
+  [[nodiscard]] const LawHistory& history() const { return history_; }
+  void Forget() { history_.Forget(); }
+
+  // The law with changed inputs, and what it consists of.
+
+  /// E_bar' tau' (n); empty where these inputs have none.
+  [[nodiscard]] virtual VectorXd CalcForce(LawInputs inputs) = 0;
   [[nodiscard]] virtual std::span<const LawPartName> ListParts() const = 0;
+  /// "K_p of x".
+  [[nodiscard]] const std::vector<std::string>& gains() const { return gain_names_; }
+  /// Makes one of the gains zero.
+  virtual void RemoveGain(size_t gain, LawInputs* inputs) const = 0;
+  /// Whether the law demands an acceleration, which M_bar' makes a force.
+  [[nodiscard]] virtual bool demands_acceleration() const = 0;
+  /// Time between two steps at which it is computed, s.
+  [[nodiscard]] double control_step() const { return static_cast<double>(hold_) * time_step_; }
 
  protected:
   explicit JudgedLaw(const Setup& setup);
@@ -76,8 +83,10 @@ class JudgedLaw {
   /// What the torques' error is relative to. @param balanced |C_bar' xi + F_bar'|_M^-1.
   [[nodiscard]] virtual double CalcScale(double balanced) { return balanced; }
   [[nodiscard]] virtual double condition_number() const { return 1.0; }
-  /// `parts_`, of a step whose torques differ; after Evaluate.
-  virtual void CalcParts(const StepRecord& step, const LawTerms& terms) = 0;
+  /// What the last Evaluate had been asked to follow.
+  virtual void CopyDesired(LawStep* state) const = 0;
+  /// What else than terms and LawStep it was computed from.
+  virtual void CopyInputs(const StepRecord& step, LawInputs* inputs) const = 0;
   /// LawErrors::torque, after Evaluate, and `scale_`. @param factor of M_bar' = L^T L.
   double CalcTorqueError(const StepRecord& step, const LawTerms& terms, const TreeFactor& factor);
   /// |f|_M^-1 = |L^-T f|
@@ -93,13 +102,16 @@ class JudgedLaw {
   TreeFactor own_factor_;          // of the terms' M_bar'
   const TreeFactor* factor_ = nullptr;
   VectorXd difference_;  // n, E_bar' (tau' - tau'_printed)
-  MatrixXd parts_;
   std::vector<std::string> gain_names_;
   double scale_ = 1.0;
   LawErrors errors_;
 
  private:
+  void Remember(const StepRecord& step, const LawTerms& terms);
+
   bool differs_ = false;
+  LawStep state_;
+  LawHistory history_;
   VectorXd balanced_, work_;  // n
   VectorXd least_;            // n, RoundingScales::CalcLeastForces
 };

@@ -5,51 +5,6 @@
 #include "controller/object/so3.h"
 
 namespace dexcheck {
-namespace {
-
-constexpr unsigned Bit(LawPart part) { return 1U << static_cast<unsigned>(part); }
-
-constexpr unsigned kMotion = Bit(LawPart::kFeedForward) | Bit(LawPart::kVelocityFeedback) |
-                             Bit(LawPart::kPositionFeedback) | Bit(LawPart::kCoordinateRate);
-constexpr unsigned kInertia =
-    kMotion | Bit(LawPart::kGraspMapRate) | Bit(LawPart::kJacobianRate) | Bit(LawPart::kPosture);
-constexpr unsigned kObjectInertia = Bit(LawPart::kInertiaOfFeedForward) | Bit(LawPart::kInertiaOfVelocity) |
-                                    Bit(LawPart::kInertiaOfPosition) | Bit(LawPart::kInertiaOfRate);
-constexpr unsigned kObject = kObjectInertia | Bit(LawPart::kObjectCoriolis) | Bit(LawPart::kObjectGravity);
-// Robot and object are both to accelerate so.
-constexpr unsigned kFeedForward = Bit(LawPart::kFeedForward) | Bit(LawPart::kInertiaOfFeedForward);
-constexpr unsigned kVelocity = Bit(LawPart::kVelocityFeedback) | Bit(LawPart::kInertiaOfVelocity);
-constexpr unsigned kPosition = Bit(LawPart::kPositionFeedback) | Bit(LawPart::kInertiaOfPosition);
-constexpr unsigned kRate = Bit(LawPart::kCoordinateRate) | Bit(LawPart::kInertiaOfRate);
-
-constexpr LawPartName kLawParts[] = {
-    {"(M_bar' J^+ G^T + J^T G^+ M_hat) P^-1 X_d_ddot", "feed-forward acceleration", kFeedForward},
-    {"(M_bar' J^+ G^T + J^T G^+ M_hat) P^-1 K_v E_dot", "velocity feedback K_v", kVelocity},
-    {"(M_bar' J^+ G^T + J^T G^+ M_hat) P^-1 K_p E", "position feedback K_p", kPosition},
-    {"(M_bar' J^+ G^T + J^T G^+ M_hat) d/dt(P^-1) X_o_dot", "rate of P^-1", kRate},
-    {"M_bar' J^+ G_dot^T V_o", "G_dot", Bit(LawPart::kGraspMapRate)},
-    {"M_bar' J^+ J_dot xi_c", "J_dot", Bit(LawPart::kJacobianRate)},
-    {"M_bar' N sigma'", "null-space acceleration sigma'", Bit(LawPart::kPosture)},
-    {"C_bar' xi_c", "Coriolis forces C_bar'", Bit(LawPart::kCoriolis)},
-    {"F_bar' (gravity)", "gravity", Bit(LawPart::kGravity)},
-    {"F_bar' (friction)", "friction", Bit(LawPart::kFriction)},
-    {"J^T G^+ M_hat V_o_dot", "object's inertia M_o", kObjectInertia},
-    {"J^T G^+ C_hat V_o", "object's C_o", Bit(LawPart::kObjectCoriolis)},
-    {"J^T G^+ N_o", "object's gravity N_o", Bit(LawPart::kObjectGravity)},
-    {"J^T F_N", "internal force F_N", Bit(LawPart::kInternalForce)},
-    {"M_bar' xi_dot_d", "mass matrix M_bar'", kInertia},
-    {"M_bar' J^+ (...)", "acceleration without the null space", kInertia & ~Bit(LawPart::kPosture)},
-    {"(M_bar' J^+ G^T + J^T G^+ M_hat) V_o_dot", "demanded acceleration V_o_dot", kMotion | kObjectInertia},
-    {"(M_bar' J^+ G^T + J^T G^+ M_hat) P^-1 (K_v E_dot + K_p E)", "feedback of both gains",
-     kVelocity | kPosition},
-    {"F_bar'", "gravity and friction F_bar'", Bit(LawPart::kGravity) | Bit(LawPart::kFriction)},
-    {"J^T G^+ F_o", "object's wrench G^+ F_o", kObject},
-    {"J^T f_c", "contact forces J_B'^T f_c", kObject | Bit(LawPart::kInternalForce)},
-    {"tau'", "all torques", (1U << kLawPartCount) - 1U},
-};
-
-}  // namespace
-
 Matrix3d CalcAngleMap(const Vector3d& angles) {
   const double sb = std::sin(angles[1]), cb = std::cos(angles[1]);
   const double sg = std::sin(angles[2]), cg = std::cos(angles[2]);
@@ -72,8 +27,6 @@ LawSpec MakeLawSpec(const GraspControllerOptions& options) {
   return {options.gains, options.orientation, options.weight, options.posture};
 }
 
-std::span<const LawPartName> ListLawParts() { return kLawParts; }
-
 LawTerms::LawTerms(int num_positions, int num_velocities, int num_forces) {
   q.setZero(num_positions);
   xi.setZero(num_velocities);
@@ -94,8 +47,6 @@ LawReference::LawReference(int num_velocities, int num_forces) : llt_(num_forces
     vector->setZero(num_velocities);
   W_inv_J_T_.setZero(num_velocities, num_forces);
   G_.setZero(6, num_forces);
-  parts_.setZero(num_velocities, kLawPartCount);
-  demand_.fill(Vector6d::Zero());
 }
 
 bool LawReference::FactorJacobian(const LawSpec& spec, const LawTerms& terms) {
@@ -139,8 +90,8 @@ LawReference::Demand LawReference::CalcObjectAcceleration(const LawSpec& spec, c
 
   // v = R^T p_dot, hence v_dot = R^T p_ddot - omega x v
   const Vector3d p_dot = R_T.transpose() * v;
-  const auto K_v = spec.gains.K_v.array();
-  const auto K_p = spec.gains.K_p.array();
+  const auto K_v = spec.gains.K_v.array() * spec.velocity_factor.array();
+  const auto K_p = spec.gains.K_p.array() * spec.position_factor.array();
   feed_forward.head<3>() = R_T * desired.X_d_ddot.head<3>();
   velocity.head<3>() = R_T * (K_v.head<3>() * (desired.X_d_dot.head<3>() - p_dot).array()).matrix();
   position.head<3>() =
@@ -176,14 +127,13 @@ LawReference::Demand LawReference::CalcObjectAcceleration(const LawSpec& spec, c
 Vector6d LawReference::CalcDemand(const LawSpec& spec, const LawObject& object,
                                   const DesiredMotion& desired) {
   const Demand demand = CalcObjectAcceleration(spec, object, desired);
-  return demand[0] + demand[1] + demand[2] + demand[3];
+  return demand[0] + demand[1] + demand[2] + spec.rate_factor * demand[3];
 }
 
 bool LawReference::Evaluate(const LawSpec& spec, const LawTerms& terms, const DesiredMotion& desired,
                             const Eigen::Ref<const VectorXd>& F_N) {
   if (!FactorJacobian(spec, terms)) return false;
-  demand_ = CalcObjectAcceleration(spec, {terms.X_Bo, terms.V_Bo, terms.X_o}, desired);
-  V_Bo_dot_ = demand_[0] + demand_[1] + demand_[2] + demand_[3];
+  V_Bo_dot_ = CalcDemand(spec, {terms.X_Bo, terms.V_Bo, terms.X_o}, desired);
 
   // xi_c = xi - J^+ (J xi - G^T V_o)
   rates_.noalias() = -terms.J * terms.xi;
@@ -203,75 +153,23 @@ bool LawReference::Evaluate(const LawSpec& spec, const LawTerms& terms, const De
   // xi_dot_d = J^+ (G^T V_o_dot + G_dot^T V_o - J_dot xi_c) + N sigma', N = 1 - J^+ J
   rates_ = terms.G_dot_T_V - terms.J_dot_xi - slip_rates_;
   rates_.noalias() += terms.G.transpose() * V_Bo_dot_;
-  rates_.noalias() -= terms.J * sigma_prime_;
+  if (spec.projects) rates_.noalias() -= terms.J * sigma_prime_;
   ApplyPseudoinverse(&rates_, &xi_dot_d_);
   xi_dot_d_ += sigma_prime_;
 
   // f_c = G^+ F_o + F_N, F_o = M_hat V_o_dot + C_hat V_o + N_o
   f_c_ = F_N;
-  AddLeastForces(terms.M_hat * V_Bo_dot_ + terms.C_hat_V + terms.N_o, &f_c_);
+  const Vector6d F_o = terms.M_hat * V_Bo_dot_ + terms.C_hat_V + terms.N_o;
+  if (spec.transposes_grasp) {
+    f_c_.noalias() += G_.transpose() * F_o;
+  } else {
+    AddLeastForces(F_o, &f_c_);
+  }
 
   force_ = terms.C_xi + slip_coriolis_ + terms.gravity + terms.friction;
   force_.noalias() += *terms.M * xi_dot_d_;
   force_.noalias() += terms.J.transpose() * f_c_;
   return true;
-}
-
-const MatrixXd& LawReference::CalcParts(const LawTerms& terms, const Eigen::Ref<const VectorXd>& F_N) {
-  const auto part = [&](LawPart which) { return parts_.col(static_cast<Eigen::Index>(which)); };
-  // M_bar' J^+ rates
-  const auto set_motion = [&](LawPart which) {
-    ApplyPseudoinverse(&rates_, &motion_);
-    part(which).noalias() = *terms.M * motion_;
-  };
-  for (size_t i = 0; i < demand_.size(); ++i) {
-    rates_.noalias() = terms.G.transpose() * demand_[i];
-    set_motion(static_cast<LawPart>(i));
-  }
-  rates_ = terms.G_dot_T_V;
-  set_motion(LawPart::kGraspMapRate);
-  rates_ = -terms.J_dot_xi - slip_rates_;
-  set_motion(LawPart::kJacobianRate);
-  rates_.noalias() = terms.J * sigma_prime_;
-  ApplyPseudoinverse(&rates_, &motion_);
-  motion_ = sigma_prime_ - motion_;
-  part(LawPart::kPosture).noalias() = *terms.M * motion_;
-
-  part(LawPart::kCoriolis) = terms.C_xi + slip_coriolis_;
-  part(LawPart::kGravity) = terms.gravity;
-  part(LawPart::kFriction) = terms.friction;
-
-  // J^T G^+ wrench
-  const auto set_wrench = [&](LawPart which, const Vector6d& wrench) {
-    rates_.setZero();
-    AddLeastForces(wrench, &rates_);
-    part(which).noalias() = terms.J.transpose() * rates_;
-  };
-  for (size_t i = 0; i < demand_.size(); ++i) {
-    set_wrench(static_cast<LawPart>(static_cast<size_t>(LawPart::kInertiaOfFeedForward) + i),
-               terms.M_hat * demand_[i]);
-  }
-  set_wrench(LawPart::kObjectCoriolis, terms.C_hat_V);
-  set_wrench(LawPart::kObjectGravity, terms.N_o);
-  part(LawPart::kInternalForce).noalias() = terms.J.transpose() * F_N;
-  return parts_;
-}
-
-void LawReference::CalcGainParts(const LawSpec& spec, const LawTerms& terms, const DesiredMotion& desired,
-                                 Eigen::Ref<MatrixXd> parts) {
-  for (Eigen::Index i = 0; i < 12; ++i) {
-    LawSpec one = spec;
-    one.gains.K_v = i < 6 ? Vector6d(spec.gains.K_v[i] * Vector6d::Unit(i)) : Vector6d::Zero();
-    one.gains.K_p = i < 6 ? Vector6d::Zero() : Vector6d(spec.gains.K_p[i - 6] * Vector6d::Unit(i - 6));
-    const Demand demand = CalcObjectAcceleration(one, {terms.X_Bo, terms.V_Bo, terms.X_o}, desired);
-    const Vector6d V_dot = demand[i < 6 ? 1 : 2];
-    rates_.noalias() = terms.G.transpose() * V_dot;
-    ApplyPseudoinverse(&rates_, &motion_);
-    parts.col(i).noalias() = *terms.M * motion_;
-    rates_.setZero();
-    AddLeastForces(terms.M_hat * V_dot, &rates_);
-    parts.col(i).noalias() += terms.J.transpose() * rates_;
-  }
 }
 
 }  // namespace dexcheck

@@ -10,9 +10,6 @@
 //   xi_dot_d = J^+ (G_dot^T V_o + G^T V_o_dot - J_dot xi_c) + N sigma'              (47)
 //   f_c      = G^+ (M_hat V_o_dot + C_hat V_o + N_o) + F_N                          (49)
 //   E_bar' tau' = M_bar' xi_dot_d + C_bar' xi_c + F_bar' + J^T f_c                  (55)
-//
-// A difference of torques is told as one of the summands, each as generalised forces: they are formed only
-// when there is a difference.
 
 #include <Eigen/Cholesky>
 #include <array>
@@ -70,42 +67,15 @@ struct LawSpec {
   OrientationFeedback orientation = OrientationFeedback::kAngles;
   RedundancyWeight weight;
   PostureTask posture;
+  // What a wrong law may have otherwise: factors of each K_p and K_v, and of d/dt(P^-1) X_o_dot, whether
+  // sigma' is projected into the null space, and G^T in the place of G^+.
+  Vector6d position_factor = Vector6d::Ones(), velocity_factor = Vector6d::Ones();
+  double rate_factor = 1.0;
+  bool projects = true, transposes_grasp = false;
 };
 
 /// Of the scenario's law.
 LawSpec MakeLawSpec(const GraspControllerOptions& options);
-
-/// The summands of E_bar' tau'.
-enum class LawPart {
-  kFeedForward,       ///< M_bar' J^+ G^T P^-1 X_d_ddot
-  kVelocityFeedback,  ///< M_bar' J^+ G^T P^-1 K_v E_dot
-  kPositionFeedback,  ///< M_bar' J^+ G^T P^-1 K_p E
-  kCoordinateRate,    ///< M_bar' J^+ G^T d/dt(P^-1) X_o_dot; with rotation feedback what e_R's rates leave
-  kGraspMapRate,      ///< M_bar' J^+ G_dot^T V_o
-  kJacobianRate,      ///< - M_bar' J^+ J_dot xi_c
-  kPosture,           ///< M_bar' N sigma'
-  kCoriolis,          ///< C_bar' xi_c
-  kGravity,           ///< gravity's part of F_bar'
-  kFriction,          ///< friction's part of F_bar'
-  kInertiaOfFeedForward,  ///< J^T G^+ M_hat V_o_dot, of the first summand of V_o_dot,
-  kInertiaOfVelocity,     ///< of the second,
-  kInertiaOfPosition,     ///< of the third,
-  kInertiaOfRate,         ///< and of the fourth.
-  kObjectCoriolis,        ///< J^T G^+ C_hat V_o
-  kObjectGravity,         ///< J^T G^+ N_o
-  kInternalForce,         ///< J^T F_N
-  kCount
-};
-inline constexpr int kLawPartCount = static_cast<int>(LawPart::kCount);
-
-/// One summand, or several that are one thing, with the words that name it.
-struct LawPartName {
-  const char* symbol;
-  const char* name;
-  unsigned parts;  ///< Bits by LawPart.
-};
-/// Single summands first, then sums: whoever finds two equally good takes the first.
-std::span<const LawPartName> ListLawParts();
 
 /// The law at one state. Nothing allocates after construction.
 class LawReference {
@@ -119,14 +89,6 @@ class LawReference {
 
   /// V_o_dot that (55) demands of an object in this state, wherever the robot is.
   Vector6d CalcDemand(const LawSpec& spec, const LawObject& object, const DesiredMotion& desired);
-
-  /// The summands of E_bar' tau' (n x kLawPartCount) of the last Evaluate. @param terms, F_N the same again.
-  const MatrixXd& CalcParts(const LawTerms& terms, const Eigen::Ref<const VectorXd>& F_N);
-
-  /// What each entry of K_v, then of K_p, makes of E_bar' tau' of the last Evaluate, whose arguments these
-  /// are (n x 12).
-  void CalcGainParts(const LawSpec& spec, const LawTerms& terms, const DesiredMotion& desired,
-                     Eigen::Ref<MatrixXd> parts);
 
   /// E_bar' tau' (n).
   [[nodiscard]] const VectorXd& force() const { return force_; }
@@ -161,12 +123,10 @@ class LawReference {
   Eigen::LLT<MatrixXd> llt_, W_llt_;
   Eigen::LLT<Matrix6d> G_llt_;
   Matrix6Xd G_;
-  Demand demand_{};
   Vector6d V_Bo_dot_ = Vector6d::Zero();
   VectorXd rates_, slip_rates_, f_c_;                        // k
   VectorXd slip_coriolis_, slip_acceleration_;               // n
   VectorXd xi_c_, xi_dot_d_, motion_, sigma_prime_, force_;  // n
-  MatrixXd parts_;
   double condition_number_ = 0.0;
 };
 

@@ -166,6 +166,7 @@ class JudgedObjectLaw final : public JudgedLaw {
         options_(setup.MakeControllerOptions()),
         spec_(MakeLawSpec(options_)),
         trajectory_(setup.MakeTrajectory()),
+        motion_(trajectory_.get()),
         reference_(setup.model().num_velocities(), 3 * static_cast<int>(setup.fingertips().size())),
         error_(spec_, time_step_, velocity_age_) {
     const int n = setup.model().num_velocities();
@@ -174,10 +175,11 @@ class JudgedObjectLaw final : public JudgedLaw {
       baseline_.emplace(options_.law, options_.stiffness, n, k);
     work_n_.setZero(n);
     work_k_.setZero(k);
-    parts_.setZero(n, kLawPartCount + 12);
-    for (const char* gain : {baseline_ ? "D" : "K_v", baseline_ ? "K" : "K_p"})
+    for (const char* gain : {baseline_ ? "D" : "K_v", baseline_ ? "K" : "K_p"}) {
+      if (gain == std::string_view("D") && has_one_damping()) continue;
       for (const char* axis : {"x", "y", "z", "rotation 1", "rotation 2", "rotation 3"})
         gain_names_.push_back(std::string(gain) + " of " + axis);
+    }
   }
 
   /// Of (57): of the paper's law, and by algebra of that of operational space.
@@ -207,14 +209,40 @@ class JudgedObjectLaw final : public JudgedLaw {
     return errors_;
   }
 
-  [[nodiscard]] int CountParts() const override { return kLawPartCount; }
+  void Follow(const Trajectory* motion, double begin) override {
+    motion_ = motion == nullptr ? trajectory_.get() : motion;
+    begin_ = motion == nullptr ? 0.0 : begin;
+  }
   [[nodiscard]] std::span<const LawPartName> ListParts() const override { return ListLawParts(); }
+  void RemoveGain(size_t gain, LawInputs* inputs) const override {
+    LawSpec& spec = *inputs->spec;
+    if (has_one_damping()) gain += 6;
+    (gain < 6 ? spec.velocity_factor : spec.position_factor)[static_cast<Eigen::Index>(gain % 6)] = 0.0;
+  }
+  [[nodiscard]] bool demands_acceleration() const override {
+    return !baseline_ || options_.law == ControlLaw::kOperationalSpace;
+  }
+  [[nodiscard]] VectorXd CalcForce(LawInputs inputs) override {
+    const LawTerms& terms = inputs.Link();
+    const bool has_force = reference_.Evaluate(*inputs.spec, terms, inputs.now.desired, inputs.F_N) &&
+                           (!baseline_ || baseline_->Evaluate(*inputs.spec, reference_, terms, inputs.G_dot,
+                                                              inputs.now.desired, inputs.F_N));
+    if (!has_force) return {};
+    VectorXd result = force();
+    if (!inputs.exchanges_force_axes) return result;
+    const VectorXd& f_c = baseline_ ? baseline_->f_c() : reference_.f_c();
+    VectorXd change = VectorXd::Zero(f_c.size());
+    for (Eigen::Index i = 0; i < f_c.size(); i += 3)
+      change.segment<2>(i) << f_c[i + 1] - f_c[i], f_c[i] - f_c[i + 1];
+    result.noalias() += terms.J.transpose() * change;
+    return result;
+  }
 
  protected:
   bool Evaluate(const StepRecord& step, const LawTerms& terms) override {
     // Semi-implicit Euler steps like a leapfrog: velocities belong to the middle of the step before.
-    desired_ = trajectory_->Evaluate(step.time);
-    desired_.X_d_dot = trajectory_->Evaluate(step.time - velocity_age_).X_d_dot;
+    desired_ = motion_->Evaluate(step.time - begin_);
+    desired_.X_d_dot = motion_->Evaluate(step.time - begin_ - velocity_age_).X_d_dot;
     const VectorXd& F_N = step.command.demand.F_N;
     return reference_.Evaluate(spec_, terms, desired_, F_N) &&
            (!baseline_ ||
@@ -224,15 +252,17 @@ class JudgedObjectLaw final : public JudgedLaw {
     return baseline_ ? baseline_->force() : reference_.force();
   }
   [[nodiscard]] double condition_number() const override { return reference_.condition_number(); }
-  void CalcParts(const StepRecord& step, const LawTerms& terms) override {
-    const VectorXd& F_N = step.command.demand.F_N;
-    parts_.leftCols(kLawPartCount) = reference_.CalcParts(terms, F_N);
-    reference_.CalcGainParts(spec_, terms, desired_, parts_.rightCols(12));
-    if (baseline_)
-      baseline_->CalcParts(spec_, reference_, terms, step.model->grasp().G_dot(), desired_, F_N, &parts_);
+  void CopyDesired(LawStep* state) const override { state->desired = desired_; }
+  void CopyInputs(const StepRecord& step, LawInputs* inputs) const override {
+    inputs->G_dot = step.model->grasp().G_dot();
+    inputs->F_N = step.command.demand.F_N;
+    inputs->spec = spec_;
   }
 
  private:
+  /// An impedance's damping follows from its stiffness and one ratio.
+  [[nodiscard]] bool has_one_damping() const { return options_.law == ControlLaw::kImpedance; }
+
   /// What a rigid system does under some torques.
   struct Motion {
     const VectorXd* xi_dot;
@@ -302,6 +332,8 @@ class JudgedObjectLaw final : public JudgedLaw {
   GraspControllerOptions options_;
   LawSpec spec_;
   std::unique_ptr<Trajectory> trajectory_;
+  const Trajectory* motion_;
+  double begin_ = 0.0;  // s, of that motion
   LawReference reference_;
   std::optional<BaselineReference> baseline_;  // none for the paper's law
   ObjectErrorDynamics error_;

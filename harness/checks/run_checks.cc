@@ -114,6 +114,7 @@ void RunChecks::Forget() {
   for (const Judge& judge : judges_)
     if (judge.state) judge.state->Reset();
   analyzer_.Reset();
+  if (law_) law_->Forget();
 }
 
 bool RunChecks::Has(std::string_view name) const {
@@ -174,7 +175,21 @@ void RunChecks::Look(const StepRecord& step) {
 
 void RunChecks::JudgeSettling(const StepRecord& step) {
   Analyze(step);
+  if (CompareTorque(step)) analyzer_.SetLaw(&unsent_);
   Evaluate(CheckInfo::kSettling, step.time);
+}
+
+bool RunChecks::CompareTorque(const StepRecord& step) {
+  if (!law_ || !law_->IsComputed(step.command)) return false;
+  // Fingertips may still find their places, so contacts are the controller's.
+  (controller_ ? *controller_ : model_).SetState(*step.model, step.measured.state);
+  unsent_.torque = law_->CompareTorque(step, ReadLawTerms(step, /*contacts=*/false));
+  return true;
+}
+
+void RunChecks::FollowLaw(const StepRecord& step) {
+  Look(step);
+  CompareTorque(step);
 }
 
 void RunChecks::JudgeStep(const StepRecord& step) {
@@ -184,10 +199,11 @@ void RunChecks::JudgeStep(const StepRecord& step) {
 }
 
 void RunChecks::JudgeUnsent(const StepRecord& step) {
-  if (!law_ || !law_->IsComputed(step.command)) return;
-  JudgeModel(step);
+  const bool has_law = law_ && law_->IsComputed(step.command);
+  if (has_law) JudgeModel(step);
   Look(step);
-  unsent_.torque = law_->CompareTorque(step, ReadLawTerms(step));
+  if (!has_law) return;
+  unsent_.torque = law_->CompareTorque(step, ReadLawTerms(step, /*contacts=*/true));
   analyzer_.SetLaw(&unsent_);
   Evaluate(CheckInfo::kUnsent, step.time);
 }
@@ -197,9 +213,9 @@ void RunChecks::Analyze(const StepRecord& step) {
   analyzer_.Analyze();
 }
 
-const LawTerms& RunChecks::ReadLawTerms(const StepRecord& step) {
+const LawTerms& RunChecks::ReadLawTerms(const StepRecord& step, bool contacts) {
   const StepModelCheck& controller = controller_ ? *controller_ : model_;
-  const bool contacts = setup_->start().bonds.empty() && !controller_;
+  contacts = contacts && setup_->start().bonds.empty() && !controller_;
   ReadEngineTerms(controller.engine(), *step.model, step.measured.state, contacts, &law_terms_);
   return law_terms_;
 }
@@ -207,7 +223,8 @@ const LawTerms& RunChecks::ReadLawTerms(const StepRecord& step) {
 void RunChecks::CompareLaw(const StepRecord& step) {
   const bool as_commanded = declared_.is_ideal() && declared_step_->is_measured_right &&
                             step.drive.tau == step.command.tau && step.response.stop_force.size() == 0;
-  const LawErrors& errors = law_->Compare(step, ReadLawTerms(step), analysis(), as_commanded);
+  const LawErrors& errors =
+      law_->Compare(step, ReadLawTerms(step, /*contacts=*/true), analysis(), as_commanded);
   analyzer_.SetLaw(&errors);
   if (!law_->follows_error() || step.time < setup_->scenario().expect.from) return;
   position_by_law_ = Worst(position_by_law_, errors.position_by_law);

@@ -61,6 +61,10 @@ class RunChecks {
   /// also of those that are not.
   /// @returns the model at the true state.
   const GraspModel& Follow(const StepRecord& step);
+  /// JudgedLaw::Follow.
+  void FollowMotion(const Trajectory* motion, double begin) {
+    if (law_) law_->Follow(motion, begin);
+  }
   /// One more disturbance is declared from now on; between steps. Joints that only stiffness holds are not
   /// judged any more.
   void Expect(const DisturbanceOptions& disturbance);
@@ -73,6 +77,8 @@ class RunChecks {
   void JudgeEffort(const StepRecord& step, double time);
   /// Looks at a step that no check judges.
   void Look(const StepRecord& step);
+  /// Follows the law at a step that no check judges.
+  void FollowLaw(const StepRecord& step);
   /// While everything settles.
   void JudgeSettling(const StepRecord& step);
   /// Are the terms that the controller used the engine's?
@@ -100,7 +106,7 @@ class RunChecks {
   /// Whether a check of the motion failed at the last step.
   [[nodiscard]] bool differs() const { return differs_; }
   /// The law that torques are compared with; null where none is known.
-  [[nodiscard]] const JudgedLaw* law() const { return law_.get(); }
+  [[nodiscard]] JudgedLaw* law() const { return law_.get(); }
   /// Of the last step.
   [[nodiscard]] const StepAnalysis& analysis() const { return analyzer_.analysis(); }
 
@@ -111,7 +117,10 @@ class RunChecks {
   void Evaluate(CheckInfo::Moment moment, double time);
   void Add(const Judge& judge, CheckRecord* record, double time);
   /// The law's terms, of the engine at the measured state.
-  const LawTerms& ReadLawTerms(const StepRecord& step);
+  /// Compares the torques of a step of settling with the law's. @return whether there is a law.
+  bool CompareTorque(const StepRecord& step);
+  /// @param contacts whether those are the engine's.
+  const LawTerms& ReadLawTerms(const StepRecord& step, bool contacts);
   void CompareLaw(const StepRecord& step);
 
   const Setup* setup_;

@@ -111,11 +111,20 @@ void StepModelCheck::LeaveOutContacts() {
   for (size_t i = 0; i < own.size(); ++i) own[i].applies = !IsOfContacts(comparison_.entry(i));
 }
 
+std::optional<ObjectCoordinates> StepModelCheck::FindCoordinates(const GraspTerms& grasp) const {
+  if (!has_coordinates_ || !comparison_.model().object()) return std::nullopt;
+  return ObjectCoordinates{grasp.X_o(), grasp.X_o_dot()};
+}
+
+void StepModelCheck::SetState(const GraspModel& model, const MeasuredState& state) {
+  const std::optional<ObjectCoordinates> coordinates = FindCoordinates(model.grasp());
+  engine_.SetState(state.q, state.xi, state.X_Bo, state.V_Bo, coordinates ? &*coordinates : nullptr);
+}
+
 void StepModelCheck::Compare(const ModelTerms& robot, const GraspTerms& grasp, const MeasuredState& state,
                              const Pose& X_W0, double when) {
-  std::optional<ObjectCoordinates> coordinates;
   const bool has_object = comparison_.model().object().has_value();
-  if (has_object && has_coordinates_) coordinates = {grasp.X_o(), grasp.X_o_dot()};
+  const std::optional<ObjectCoordinates> coordinates = FindCoordinates(grasp);
   engine_.SetState(state.q, state.xi, state.X_Bo, state.V_Bo, coordinates ? &*coordinates : nullptr);
   controller_.Read(robot, grasp, state);
   comparison_.SetScales(robot, state.q, state.xi);

@@ -55,6 +55,9 @@ class StepModelCheck {
   /// There are bonds in the place of contacts, where the engine has nothing to compare with.
   void LeaveOutContacts();
 
+  /// Evaluates the engine's terms alone, without those of contacts.
+  void SetState(const GraspModel& model, const MeasuredState& state);
+
   /// Nothing allocates but for what fails first.
   /// @param robot, grasp evaluated at `state`, reduced coordinates, CalcDynamics included.
   /// @param X_W0 pose of Sigma_0 in the plant, tilt and height included: kappa was found there. Without a
@@ -67,6 +70,9 @@ class StepModelCheck {
   [[nodiscard]] const EngineProvider& engine() const { return engine_; }
 
  private:
+  /// X_o and its rate of the grasp, where the object's state is known by them.
+  [[nodiscard]] std::optional<ObjectCoordinates> FindCoordinates(const GraspTerms& grasp) const;
+
   bool has_coordinates_;
   bool with_contacts_ = true;
   EngineProvider engine_;

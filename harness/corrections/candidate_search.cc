@@ -77,7 +77,7 @@ bool CandidateSearch::Try(const EditTrial& trial, int place, const std::vector<P
   const std::vector<TriedNode> nodes = ListTried(edits);
   std::vector<Site> right;
   double left = 0.0, rest = 1.0;
-  // What is far from right by the digits of the file as it is, is not looked at closer.
+  // A number far from right by the digits of the file as it is, is not looked at closer.
   const auto judge = [&](bool is_close) {
     for (const TriedNode& tried : nodes) {
       const Node& node = pair_.node(tried.link);

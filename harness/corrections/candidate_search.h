@@ -15,7 +15,7 @@ namespace dexcheck {
 struct EditTrial {
   FileFault fault;
   double bits = 0.0;
-  SiteMask kinds = kPoseMask | kBodyMask;  ///< Of sites, that it may put right and must not put wrong.
+  SiteMask kinds = kPoseMask | kBodyMask;  ///< Sites that it may put right and must not put wrong.
   std::string values{};
   bool needs_all = true;  ///< All wrong sites of these kinds must be right then; otherwise some.
 };
@@ -113,7 +113,7 @@ inline constexpr const char* kInertiaNames[] = {"ixx", "iyy", "izz", "ixy", "ixz
 /// The rotation of an inertial's frame, which the other file turns and this one does not.
 FileFault MakeLostAxes(const PrintedInertial& inertial, bool in_second);
 
-/// What a body would be without others of its parts; none where no mass is left.
+/// A body without others of its parts; none where no mass is left.
 std::optional<BodyNumbers> Subtract(const BodyNumbers& whole, const BodyNumbers& rest);
 BodyNumbers Express(const BodyNumbers& body, const Pose& X);
 

@@ -64,7 +64,7 @@ constexpr const char* kSixWords[] = {
 constexpr const char* kSixIds[] = {"by_rows", "by_columns", "products_yz_xz_xy", "products_xy_yz_xz",
                                    "products_xz_xy_yz"};
 
-/// What a quantity is called in a name and in words.
+/// Names of a quantity: in an id and in words.
 struct SiteWords {
   SiteKind kind;
   const char* id;

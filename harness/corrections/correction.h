@@ -118,7 +118,7 @@ enum class CorrectionKind {
   kPartMissing,
   kOtherAxis,
   kCompiled,  ///< A setting of an MJCF's compiler changed what the text states.
-  // Of all rows of a table.
+  // All rows of a table, or all bodies of a list.
   kClassicRows,
   kShiftedRows,  ///< Component: 0: alpha and a of the row before, 1: of the row behind.
   kShiftedBodies,

@@ -56,8 +56,10 @@ void Merge(PrintedLink before, PrintedLink right, PrintedLink* link) {
     take(before.joint.scalars[k], right.joint.scalars[k], &link->joint.scalars[k]);
 }
 
-std::string NamePlace(const PrintedPair& pair, int link, SiteKind kind) {
+/// @param in_second the place has the second file's name.
+std::string NamePlace(const PrintedPair& pair, int link, SiteKind kind, bool in_second = false) {
   if (kind >= SiteKind::kGravity) return "robot";
+  if (in_second && link >= 0 && pair.Partner(link) >= 0) link = -1 - pair.Partner(link);
   const PrintedLink& place = link >= 0 ? pair.a().link(link) : pair.b().link(-1 - link);
   if (IsOfBody(kind) || place.joint.name.empty()) return "link " + place.name;
   return "joint " + place.joint.name;
@@ -75,7 +77,7 @@ class OneWay {
   OneWay(const PrintedRobot& a, const PrintedRobot& b, bool is_second, bool by_tree, int* budget)
       : pair_(a, b, by_tree), is_second_(is_second), budget_(budget) {}
 
-  /// What differs with the cheapest frames.
+  /// Counts the sites that differ with the cheapest frames.
   size_t CountSites() {
     pair_.SetFrames(ChooseFrames(pair_)[0].X_ab);
     return pair_.ListSites().size();
@@ -106,6 +108,7 @@ class OneWay {
     FileCorrections result;
     settled_.clear();
     std::vector<Site> all;
+    std::vector<std::string> unexplained;  // bodies of which all ten numbers are others
     for (int round = 0; round < kRounds; ++round) {
       std::vector<Site> sites = pair_.ListSites();
       std::erase_if(sites, [&](const Site& site) { return IsSettled(site); });
@@ -124,6 +127,13 @@ class OneWay {
       if (cover.chosen.empty()) break;
       const PrintedRobot before = pair_.a();
       for (const ChosenDeal& chosen : cover.chosen) {
+        if (IsBodyOfNumbers(candidates[chosen.deal.candidates[0]].fault)) {
+          for (const size_t c : chosen.deal.candidates)
+            unexplained.push_back(NamePlace(pair_, candidates[c].link, SiteKind::kMass) + ": inertial");
+          result.bits += chosen.deal.bits;
+          Apply(chosen.deal, before, candidates);
+          continue;
+        }
         std::vector<CorrectionItem> made = MakeItems(chosen.deal, sites, candidates);
         AddRivals(chosen, sites, candidates, &made[0]);
         AddLeafRival(candidates[chosen.deal.candidates[0]], &made[0]);
@@ -139,7 +149,12 @@ class OneWay {
       item.explained = static_cast<double>(item.sites.size()) / static_cast<double>(all.size());
     constexpr double kUnexplained = 60.0;
     result.bits += kUnexplained * static_cast<double>(result.unexplained.size());
+    result.unexplained.insert(result.unexplained.end(), unexplained.begin(), unexplained.end());
     return result;
+  }
+
+  static bool IsBodyOfNumbers(const FileFault& fault) {
+    return fault.kind == CorrectionKind::kNumber && fault.whole && IsOfBody(fault.of);
   }
 
   /// Whether a site was put right and still is, as far as its correction left it.
@@ -156,7 +171,7 @@ class OneWay {
     for (const size_t c : deal.candidates) {
       for (const LinkPatch& patch : candidates[c].patches)
         Merge(before.link(patch.link), patch.right, &pair_.mutable_a()->link(patch.link));
-      // What has no patch stays as it is.
+      // A site without a patch stays as it is.
       for (const Site& site : candidates[c].sites)
         settled_.push_back({site, candidates[c].patches.empty() ? 0.0 : candidates[c].rest});
     }
@@ -176,7 +191,7 @@ class OneWay {
                           candidate.patches.size() < 2;
       for (size_t k = 0; k < (is_one ? 1 : candidate.patches.size()); ++k) {
         const int link = is_one ? candidate.link : candidate.patches[k].link;
-        std::string place = NamePlace(pair_, link, candidate.fault.of);
+        std::string place = NamePlace(pair_, link, candidate.fault.of, candidate.fault.in_second);
         if (std::ranges::find(item.places, place) != item.places.end()) continue;
         item.places.push_back(std::move(place));
         item.values.push_back(candidate.values);
@@ -217,7 +232,7 @@ class OneWay {
     }
   }
 
-  /// Where frames of links are free, a link that carries nothing is as well placed otherwise along its axis
+  /// If frames of links are free, a link that carries nothing is as well placed otherwise along its axis
   /// as its centre of mass is elsewhere.
   void AddLeafRival(const CorrectionCandidate& candidate, CorrectionItem* item) const {
     const int link = candidate.link;

@@ -459,7 +459,7 @@ PrintedLink Carry(const PrintedLink& link, const LinkUndo& undo) {
       halves[k] += turns ? std::min(apart, angles[k / 7]) : apart;
     }
   }
-  // What depends on no number of before has the digits that the edit gave it.
+  // A number that depends on none of before has the digits that the edit gave it.
   for (size_t k = 0; k < carried.size(); ++k) {
     if (halves[k] > 0.0) *carried[k].half = halves[k];
   }

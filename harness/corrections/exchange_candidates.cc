@@ -143,7 +143,7 @@ void CandidateSearch::SearchSecond(int link) {
       EditTrial trial{edit.fault, edit.bits + (values.empty() ? kOfSecond : 0.0), mask, values};
       Kind& kind = trial.fault.kind == Kind::kFrame ? trial.fault.rotation : trial.fault.kind;
       trial.fault.in_second = kind != Kind::kRadians && kind != Kind::kLinkAxes;
-      // What would have to be lost there is lost here.
+      // A loss in this file is named, not a surplus in the other one.
       if (kind == Kind::kRadians) kind = Kind::kDegrees;
       if (kind == Kind::kLinkAxes) trial.fault = MakeLostAxes(*before.inertial, false);
       if (!trial.fault.in_second) trial.bits = edit.bits;
@@ -153,7 +153,7 @@ void CandidateSearch::SearchSecond(int link) {
   };
   if ((wrong & kPoseMask) != 0 && node.chain.size() == 1 && pair_.IsPlaced(link)) {
     for (const LinkEdit& edit : ListOriginEdits(before.origin)) {
-      // What both files may have as well is said of the first one.
+      // A fault that either file may have is one of the first.
       if (edit.fault.of != SiteKind::kRotation || edit.fault.kind >= Kind::kMirror ||
           edit.fault.kind == Kind::kTransposed || edit.fault.kind == Kind::kAngleSign ||
           edit.fault.kind == Kind::kAngleDegrees)

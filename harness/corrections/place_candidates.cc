@@ -118,7 +118,7 @@ void CandidateSearch::SearchRotationNumbers(const Origin& origin) {
     const Vector3d none = Vector3d::Zero(), angles = SolveRollPitchYaw(right)[0];
     const Vector3d open = Vector3d::Constant(half);
     const double bits = 4.0 + 0.35 * CountEntries(3, none.data(), angles.data(), open.data());
-    offer(CorrectionKind::kMissing, TurnsQuarters(right) ? 5.0 : bits, ShowAngles(right) + " would be right");
+    offer(CorrectionKind::kMissing, TurnsQuarters(right) ? 3.5 : bits, ShowAngles(right) + " would be right");
   }
   const PrintedJoint& joint = pair_.a().link(origin.node).joint;
   const Vector3d axis = joint.axis.normalized();
@@ -278,7 +278,7 @@ void CandidateSearch::SearchWeld(int link) {
   for (const LinkEdit& edit : ListOriginEdits(origin)) {
     if (!edit.fault.whole) Try({edit.fault, edit.bits}, link, edit.undo);
   }
-  // What its parts would have to be, in the frame that carries it.
+  // The right body of its parts, in the frame that carries it.
   const Node& node = pair_.node(home);
   Node own = node;
   Node others = node;

@@ -85,7 +85,7 @@ struct PrintedJoint {
   std::optional<PrintedMimic> mimic;
 };
 
-/// What a setting of an MJCF's compiler made another body of.
+/// An inertial that a setting of an MJCF's compiler changed.
 struct CompiledInertial {
   std::string setting;      ///< "boundmass"
   PrintedInertial stated;   ///< In the text.

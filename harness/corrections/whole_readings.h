@@ -10,7 +10,7 @@ namespace dexcheck {
 
 struct WholeReading {
   FileFault fault;
-  PrintedRobot robot;  ///< As the file would be right, if it has this fault.
+  PrintedRobot robot;  ///< The file with this fault undone.
 };
 
 /// Rows of Denavit-Hartenberg parameters that are classic ones, or have alpha and a of their neighbours, and

@@ -28,11 +28,20 @@ const char* NameOf(CauseOutcome outcome) {
 
 std::string Fault::Tell() const {
   if (fault == kUnknownFault) return place;
-  if (std::isnan(value)) return place + ": " + fault + (detail.empty() ? "" : " " + detail);
-  return place + ": " + fault + " " + FormatNumber(value, 6) +
-         (error > 0.0 && std::isfinite(error) ? " +- " + FormatNumber(error, 2) : "") + Unit(unit) +
-         (std::isinf(error) && detail.empty() ? ", a size that this motion does not show" : "") +
-         (detail.empty() ? "" : " " + detail);
+  const std::string where = place == "law" ? "" : place + ": ", more = detail.empty() ? "" : " " + detail;
+  if (std::isnan(value)) return where + fault + more;
+  const std::string size =
+      FormatNumber(value, 6) + (error > 0.0 && std::isfinite(error) ? " +- " + FormatNumber(error, 2) : "");
+  constexpr std::string_view kFactor = ", factor";
+  if (fault.ends_with(kFactor)) {
+    // The formula of the part is in JSON.
+    const std::string part =
+        where + fault.substr(0, std::min(fault.size() - kFactor.size(), fault.find(" (")));
+    if (value == 0.0) return part + " is missing" + more;
+    return part + (value == -1.0 ? " has the other sign" : " is multiplied by " + size) + more;
+  }
+  return where + fault + " " + size + Unit(unit) +
+         (std::isinf(error) && detail.empty() ? ", a size that this motion does not show" : "") + more;
 }
 
 void Explanation::SetOutcome() {
@@ -78,10 +87,10 @@ std::string Explanation::Tell() const {
   }
   // What holds all the time has no begin.
   if (std::isfinite(from)) text += TellWhen(*this);
-  if (rival.empty()) return text;
-  // Beyond this many digits a likelihood ratio says no more.
-  constexpr double kCertain = 20.0;
-  const double digits = std::min(log_odds / std::log(10.0), kCertain);
+  // A rival that is much less likely is of no interest to a reader.
+  constexpr double kMostDigits = 3.0;
+  const double digits = log_odds / std::log(10.0);
+  if (rival.empty() || digits > kMostDigits) return text;
   return text + "; rival: " + rival + ", 1e" + std::to_string(std::lround(digits)) + " times less likely";
 }
 

@@ -1,7 +1,10 @@
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
+#include "controller/common/text.h"
 #include "controller/dynamics/tree_factor.h"
+#include "harness/diagnosis/law_entries.h"
 #include "harness/diagnosis/run_causes.h"
 #include "harness/diagnosis/telling.h"
 
@@ -11,11 +14,12 @@ namespace {
 using Eigen::Index;
 
 // Summands agree with what a wrong law has of them to this fraction: it is computed from the same numbers.
-constexpr double kLawAccuracy = 1e-6;
+constexpr double kLawAccuracy = 1e-9;
 // What is left over may be this many times the noise and is explained all the same.
-constexpr double kMostLeft = 30.0;
-constexpr Index kMostLawSteps = 20;   // that are looked at
+constexpr double kMostLeft = 3.0;
 constexpr double kPlausible = 300.0;  // of factors, which are units mistaken at the most
+constexpr double kMostTurned = 3.0;   // of factors of the other sign
+constexpr double kWhole = 1e-3;       // that the amplitude of what is there as a whole may be off
 constexpr double kZero = 1e-6;        // a factor nearer to zero than this is one of a part that is missing
 
 /// Entries of tau' that belong together.
@@ -55,7 +59,7 @@ void DropRepeated(std::vector<unsigned>* parts_of, std::vector<Candidate>* candi
   const auto repeats = [&](size_t i, size_t of) {
     const Candidate &a = (*candidates)[of], &b = (*candidates)[i];
     const bool is_sum = parts[of] != 0 && (parts[i] & parts[of]) == parts[of];
-    const bool is_friction = b.fault == "viscous friction" && a.fault.starts_with("friction");
+    const bool is_friction = b.fault.ends_with("viscous friction") && a.fault.starts_with("friction");
     if (a.place != b.place || !(is_sum || is_friction)) return false;
     constexpr double kSame = 1e-10;
     const double product = a.columns.col(0).dot(b.columns.col(0));
@@ -85,8 +89,20 @@ class LawFactors {
 
   /// A factor that several have in common is no alternative to one of them.
   void DropAlternatives(CauseSelection* selection) const {
+    const auto is_friction = [&](size_t one, bool is_part) {
+      return (parts_[one] != 0) == is_part && candidates_[one].fault.find("friction") != std::string::npos;
+    };
     for (CauseTerm& term : selection->terms) {
+      // The friction that the law has, more or less of it, is no other friction.
+      for (auto& [same, amplitude] : term.same) {
+        if (!is_friction(term.candidate, /*is_part=*/false) || !is_friction(same, /*is_part=*/true)) continue;
+        term.error *= std::abs(amplitude[0] / term.amplitude[0]);
+        std::swap(term.candidate, same);
+        std::swap(term.amplitude, amplitude);
+      }
       std::erase_if(term.same, [&](const auto& same) {
+        if (is_friction(term.candidate, /*is_part=*/true) && is_friction(same.first, /*is_part=*/false))
+          return true;
         return std::ranges::any_of(selection->terms, [&](const CauseTerm& other) {
           return &other != &term &&
                  (Holds(other.candidate, same.first) || Holds(same.first, other.candidate));
@@ -139,102 +155,288 @@ class LawFactors {
   std::span<const Candidate> candidates_;
 };
 
+/// Steps at which the torques were not the law's, and what the explanation of their difference needs.
+class LawProblem {
+ public:
+  explicit LawProblem(const StepStore& store)
+      : model_(store.setup().model()), actuation_(model_), factor_(model_) {
+    ChooseSteps(store.law()->history().snapshots());
+    y_.resize(model_.num_velocities() * count());
+    y_ = CalcColumns(1, [](const LawSnapshot& step) -> MatrixXd { return step.difference; });
+  }
+
+  [[nodiscard]] const std::vector<const LawSnapshot*>& steps() const { return steps_; }
+  [[nodiscard]] Index count() const { return static_cast<Index>(steps_.size()); }
+  /// Of all steps. An explanation is looked for in the first rows, and has to hold in the others.
+  [[nodiscard]] const VectorXd& y() const { return y_; }
+  [[nodiscard]] Index rows() const { return model_.num_velocities() * fitted_; }
+
+  /// Whitened columns of all steps (n count x p). @param force of a step (n x p).
+  template <typename Force>
+  MatrixXd CalcColumns(Index p, const Force& force) {
+    const Index n = model_.num_velocities();
+    MatrixXd columns(n * count(), p);
+    for (Index k = 0; k < count(); ++k) {
+      const LawSnapshot& step = *steps_[static_cast<size_t>(k)];
+      MatrixXd own = force(step);
+      factor_.Compute(step.inputs.M);
+      for (Index i = 0; i < p; ++i) {
+        VectorXd column = own.col(i);
+        factor_.SolveTransposed(column);
+        // The bound is one of the norm.
+        columns.col(i).segment(k * n, n) = column * (std::sqrt(static_cast<double>(n)) / step.noise);
+      }
+    }
+    return columns;
+  }
+
+  /// What a force has in some torques alone.
+  [[nodiscard]] VectorXd KeepAt(const Place& place, const VectorXd& force) const {
+    if (place.is_balanced) return force;
+    VectorXd tau(force.size());
+    actuation_.CalcTorque(force, tau);
+    VectorXd own = VectorXd::Zero(force.size());
+    for (const Index entry : place.entries) own[entry] = tau[entry];
+    actuation_.CalcForce(own, own);
+    return own;
+  }
+
+ private:
+  /// The first steps, and others evenly; those with a past, if there are any. Of these every third is set
+  /// aside.
+  void ChooseSteps(const std::vector<LawSnapshot>& all) {
+    constexpr size_t kMost = 32, kFirst = 12, kPast = 16, kAside = 3;
+    std::vector<const LawSnapshot*> usable;
+    for (const LawSnapshot& step : all)
+      if (step.before.size() >= kPast) usable.push_back(&step);
+    if (usable.empty())
+      for (const LawSnapshot& step : all) usable.push_back(&step);
+    for (size_t i = 0; i < std::min(kFirst, usable.size()); ++i) steps_.push_back(usable[i]);
+    const size_t rest = usable.size() - steps_.size(), more = std::min(rest, kMost - kFirst);
+    for (size_t i = 1; i <= more; ++i) steps_.push_back(usable[kFirst - 1 + rest * i / more]);
+    std::vector<const LawSnapshot*> aside;
+    for (size_t i = 0; i < steps_.size(); ++i)
+      if (i % kAside == kAside - 1) aside.push_back(steps_[i]);
+    std::erase_if(steps_,
+                  [&](const LawSnapshot* step) { return std::ranges::find(aside, step) != aside.end(); });
+    fitted_ = static_cast<Index>(steps_.size());
+    steps_.insert(steps_.end(), aside.begin(), aside.end());
+  }
+
+  const RobotModel& model_;
+  ActuationMap actuation_;
+  TreeFactor factor_;
+  std::vector<const LawSnapshot*> steps_;  // those that are fitted, then the others
+  Index fitted_ = 0;
+  VectorXd y_;
+};
+
+/// The candidates of a law, with the summands that each is a factor of.
+class LawCandidates {
+ public:
+  LawCandidates(const StepStore& store, LawProblem* problem)
+      : store_(store), problem_(*problem), places_(ListPlaces(store)) {
+    JudgedLaw* const law = store.law();
+    for (const LawEntry& entry : ListLawEntries(store.setup(), law)) Add(entry);
+    AddFrictions();
+    std::vector<std::string> names;
+    for (const SignalName& motor : store.motors())
+      names.push_back("law of " + motor.place.substr(sizeof("motor ") - 1));
+    for (const LawEntry& entry : ListTorqueEntries(store.setup().model(), names, problem_.steps()))
+      Add(entry);
+    for (const FittedLawEntry& entry : ListFittedLawEntries(store.setup(), law)) AddFitted(entry);
+    DropRepeated(&parts_, &candidates_);
+  }
+
+  [[nodiscard]] const std::vector<Candidate>& candidates() const { return candidates_; }
+  /// Takes the rows that are not fitted out of the columns. @return them, by candidate.
+  std::vector<MatrixXd> SetAside() {
+    std::vector<MatrixXd> rows;
+    const Index fitted = problem_.rows();
+    for (Candidate& one : candidates_) {
+      rows.emplace_back(one.columns.bottomRows(one.columns.rows() - fitted));
+      one.columns.conservativeResize(fitted, Eigen::NoChange);
+    }
+    return rows;
+  }
+  [[nodiscard]] const std::vector<unsigned>& parts() const { return parts_; }
+
+ private:
+  Candidate& Add(const std::string& fault, const std::string& place, unsigned parts, MatrixXd columns) {
+    parts_.push_back(parts);
+    candidates_.push_back({.fault = fault, .place = place, .columns = std::move(columns)});
+    return candidates_.back();
+  }
+
+  void Add(const LawEntry& entry) {
+    const Index p = entry.force(*problem_.steps().front()).cols();
+    if (2 * p > problem_.rows()) return;  // it would explain anything
+    if (!entry.at_places) {
+      Limit(entry, &Add(entry.fault, entry.place, entry.parts, problem_.CalcColumns(p, entry.force)));
+      return;
+    }
+    for (const Place& place : places_) {
+      Limit(entry, &Add(entry.fault, place.name, entry.parts,
+                        problem_.CalcColumns(1, [&](const LawSnapshot& step) -> MatrixXd {
+                          return problem_.KeepAt(place, entry.force(step));
+                        })));
+    }
+  }
+
+  /// Says what the amplitude can be.
+  static void Limit(const LawEntry& entry, Candidate* one) {
+    one->unit = entry.unit;
+    one->nominal = entry.nominal;
+    if (entry.is_whole) {
+      one->is_possible = [](const VectorXd& a) { return std::abs(a[0] - 1.0) < kWhole; };
+    } else if (entry.nominal == 1.0 && entry.unit.empty()) {
+      one->scale = VectorXd::Constant(1, kPlausible);
+      one->is_possible = [](const VectorXd& a) {
+        return std::abs(a[0]) < kPlausible && 1.0 + a[0] > -kMostTurned;
+      };
+    }
+  }
+
+  /// Forces that a controller may add to single torques.
+  void AddFrictions() {
+    const RobotModel& model = store_.setup().model();
+    const ActuationMap actuation(model);
+    const Index n = model.num_velocities();
+    for (Index i = 0; i < n; ++i) {
+      const SignalName& motor = store_.motors()[static_cast<size_t>(i)];
+      const std::string place = "law of " + motor.place.substr(sizeof("motor ") - 1);
+      struct Kind {
+        const char* fault;
+        double (*size)(double rate);
+      };
+      constexpr Kind kKinds[] = {
+          {"torque", [](double) { return 1.0; }},
+          {"viscous friction", [](double rate) { return -rate; }},
+          {"compensation of viscous friction", [](double rate) { return rate; }},
+          {"dry friction", [](double rate) { return rate > 0.0   ? -1.0
+                                                    : rate < 0.0 ? 1.0
+                                                                 : 0.0; }},
+          {"compensation of dry friction", [](double rate) {
+             return rate > 0.0 ? 1.0 : rate < 0.0 ? -1.0 : 0.0;
+           }}};
+      for (const Kind& kind : kKinds) {
+        Candidate& one =
+            Add(kind.fault, place, 0, problem_.CalcColumns(1, [&](const LawSnapshot& step) -> MatrixXd {
+              VectorXd own(n);
+              actuation.CalcForce(VectorXd::Unit(n, i), own);
+              return kind.size(step.inputs.terms.xi[i]) * own;
+            }));
+        one.unit = motor.unit;
+        if (std::string_view(kind.fault) != "torque")
+          one.is_possible = [](const VectorXd& a) { return a[0] >= 0.0; };
+      }
+    }
+  }
+
+  /// The number that leaves least.
+  void AddFitted(const FittedLawEntry& entry) {
+    const auto column = [&](double number) {
+      return VectorXd(problem_.CalcColumns(
+          1, [&](const LawSnapshot& step) -> MatrixXd { return entry.force(step, number); }));
+    };
+    const VectorXd& y = problem_.y();
+    const auto amplitude = [&](const VectorXd& c) {
+      return entry.is_whole || c.squaredNorm() == 0.0 ? 1.0 : c.dot(y) / c.squaredNorm();
+    };
+    const auto left = [&](double log_number) {
+      const VectorXd c = column(std::exp(log_number));
+      return (y - amplitude(c) * c).squaredNorm();
+    };
+    constexpr int kGrid = 24, kSteps = 50;
+    const double low = std::log(entry.least), width = (std::log(entry.most) - low) / kGrid;
+    int best = 0;
+    double least = left(low);
+    for (int k = 1; k <= kGrid; ++k) {
+      const double now = left(low + k * width);
+      if (now < least) best = k, least = now;
+    }
+    constexpr double kGolden = 0.6180339887498949, kExplains = 0.5;  // of the difference
+    if (least > kExplains * y.squaredNorm()) return;
+    double a = low + std::max(best - 1, 0) * width, b = low + std::min(best + 1, kGrid) * width;
+    for (int k = 0; k < kSteps; ++k) {
+      const double c = b - kGolden * (b - a), d = a + kGolden * (b - a);
+      (left(c) < left(d) ? b : a) = left(c) < left(d) ? d : c;
+    }
+    // The sum of squares knows the number to half its digits alone: the rest by Gauss and Newton.
+    double number = std::exp(0.5 * (a + b));
+    constexpr int kIterations = 4;
+    constexpr double kChange = 1e-6;
+    for (int k = 0; k < kIterations; ++k) {
+      const VectorXd c = column(number);
+      const double size = amplitude(c), change = kChange * number;
+      MatrixXd slopes(y.size(), 2);
+      slopes << (column(number + change) - column(number - change)) * (size / (2.0 * change)), c;
+      const Index free = entry.is_whole ? 1 : 2;
+      const VectorXd step = slopes.leftCols(free).colPivHouseholderQr().solve(y - size * c);
+      number = std::clamp(number + step[0], entry.least, entry.most);
+    }
+    Candidate& one =
+        Add(entry.fault + " " + FormatNumber(number, 6) + (entry.unit.empty() ? "" : " " + entry.unit), "law",
+            0, column(number));
+    one.parameters = 1;
+    if (entry.is_whole) one.is_possible = [](const VectorXd& a_) { return std::abs(a_[0] - 1.0) < kWhole; };
+  }
+
+  const StepStore& store_;
+  LawProblem& problem_;
+  std::vector<Place> places_;
+  std::vector<Candidate> candidates_;
+  std::vector<unsigned> parts_;
+};
+
+/// What has several numbers and no unit has no size, and neither has what is there as a whole.
+Fault TellLaw(const Candidate& one, const VectorXd& amplitude, const VectorXd& error) {
+  const bool is_whole = one.is_possible && !one.is_possible(VectorXd::Constant(1, 2.0));
+  Fault fault = TellNumber(one, amplitude, error);
+  if (one.unit.empty() && (amplitude.size() > 1 || is_whole)) fault.value = kNaN;
+  if (is_whole) fault.error = 0.0;
+  return fault;
+}
+
 }  // namespace
 
 Causes ExplainLaw(const StepStore& store) {
   Causes causes;
-  if (store.size() == 0 || store.law() == nullptr) return causes;
-  const auto noise = store.Get(StepStore::kLawNoise);
+  if (store.size() == 0 || store.law() == nullptr || store.law()->history().snapshots().empty())
+    return causes;
+  const auto differs = store.Get(StepStore::kLawDiffers);
   std::vector<Index> steps;
   for (Index i = 0; i < store.size(); ++i)
-    if (noise(0, i) > 0.0) steps.push_back(i);
+    if (differs(0, i) > 0.0) steps.push_back(i);
   if (steps.empty()) return causes;
-  const auto count = static_cast<Index>(steps.size());
-  const Index used = std::min(count, kMostLawSteps);
 
-  const RobotModel& model = store.setup().model();
-  const Index n = model.num_velocities();
-  const ActuationMap actuation(model);
-  ModelTerms terms(model);
-  TreeFactor factor(model);
-  const std::vector<Place> places = ListPlaces(store);
-  const std::span<const LawPartName> names = store.law()->ListParts();
-  std::vector<Candidate> candidates;
-  std::vector<unsigned> parts_of;
-  const auto add = [&](const std::string& fault, const std::string& place, double nominal,
-                       unsigned parts) -> Candidate& {
-    parts_of.push_back(parts);
-    candidates.push_back(
-        {.fault = fault, .place = place, .nominal = nominal, .columns = MatrixXd::Zero(n * used, 1)});
-    if (nominal != 0.0) candidates.back().scale = VectorXd::Constant(1, kPlausible);
-    return candidates.back();
-  };
-  for (const LawPartName& name : names)
-    for (const Place& place : places) add(LawFactors::NameFactor(name), place.name, 1.0, name.parts);
-  for (const std::string& gain : store.law()->gains())
-    add("gain " + gain + ", factor", places.front().name, 1.0, 0);
-  // What a controller of another's may add.
-  for (Index i = 0; i < n; ++i) {
-    for (const char* fault : {"torque", "viscous friction", "dry friction"}) {
-      Candidate& one = add(fault, places[places.size() - static_cast<size_t>(n - i)].name, 0.0, 0);
-      one.unit = store.motors()[static_cast<size_t>(i)].unit;
-      if (std::string_view(fault) != "torque")
-        one.is_possible = [](const VectorXd& a) { return a[0] >= 0.0; };
-    }
-  }
-  VectorXd y(n * used);
-  for (Index k = 0; k < used; ++k) {
-    const Index step = steps[static_cast<size_t>(used == 1 ? 0 : k * (count - 1) / (used - 1))];
-    const VectorXd reading = store.Get(StepStore::kReading).col(step);
-    terms.SetState(reading.head(model.num_positions()), reading.segment(model.num_positions(), n));
-    terms.CalcDynamics();
-    factor.Compute(terms.M());
-    const auto whiten = [&](VectorXd f) {
-      factor.SolveTransposed(f);
-      // The bound is one of the norm.
-      return VectorXd(f * (std::sqrt(static_cast<double>(n)) / noise(0, step)));
-    };
-    y.segment(k * n, n) = whiten(store.Get(StepStore::kLawDifference).col(step));
-    const VectorXd flat = store.Get(StepStore::kLawParts).col(step);
-    const MatrixXd parts = flat.reshaped(n, store.law()->CountColumns());
-    size_t candidate = 0;
-    for (const LawPartName& name : names) {
-      VectorXd sum = VectorXd::Zero(n);
-      for (Index i = 0; i < store.law()->CountParts(); ++i)
-        if ((name.parts >> i & 1U) != 0) sum += parts.col(i);
-      VectorXd tau(n);
-      actuation.CalcTorque(sum, tau);
-      for (const Place& place : places) {
-        VectorXd own = VectorXd::Zero(n);
-        for (const Index entry : place.entries) own[entry] = tau[entry];
-        actuation.CalcForce(own, own);
-        if (place.is_balanced) own = sum;
-        candidates[candidate++].columns.col(0).segment(k * n, n) = whiten(own);
-      }
-    }
-    for (Index i = store.law()->CountParts(); i < parts.cols(); ++i)
-      candidates[candidate++].columns.col(0).segment(k * n, n) = whiten(parts.col(i));
-    for (Index i = 0; i < n; ++i) {
-      VectorXd own(n);
-      actuation.CalcForce(VectorXd::Unit(n, i), own);
-      own = whiten(own);
-      const double rate = terms.velocity()[i];
-      for (const double size : {1.0, -rate, rate > 0.0 ? -1.0 : rate < 0.0 ? 1.0 : 0.0})
-        candidates[candidate++].columns.col(0).segment(k * n, n) = size * own;
-    }
-  }
-  DropRepeated(&parts_of, &candidates);
+  LawProblem problem(store);
+  LawCandidates all(store, &problem);
+  const std::vector<MatrixXd> others = all.SetAside();
+  const std::vector<Candidate>& candidates = all.candidates();
+  const VectorXd y = problem.y().head(problem.rows());
   const double floor = 1.0 + kLawAccuracy * kLawAccuracy * y.squaredNorm() / static_cast<double>(y.size());
   CauseSelection selection = SelectCauses(y, candidates, {.most_terms = 4, .restarts = 0, .floor = floor});
-  const LawFactors factors(names, parts_of, candidates);
+  const LawFactors factors(store.law()->ListParts(), all.parts(), candidates);
   factors.DropAlternatives(&selection);
   causes = TellSelection(StartExplanation(store, CauseChannel::kLaw, steps), selection, candidates,
                          [&](const Candidate& one, const VectorXd& amplitude, const VectorXd& error) {
-                           Fault fault = TellNumber(one, amplitude, error);
-                           if (one.nominal != 0.0) factors.MakeWhole(one, selection, &fault);
+                           Fault fault = TellLaw(one, amplitude, error);
+                           if (one.nominal == 1.0 && one.unit.empty())
+                             factors.MakeWhole(one, selection, &fault);
                            return fault;
                          });
-  if (selection.left <= kMostLeft * std::sqrt(floor)) return causes;
+  VectorXd left = problem.y().tail(problem.y().size() - y.size());
+  for (const CauseTerm& term : selection.terms) left -= others[term.candidate] * term.amplitude;
+  const double most = kMostLeft * std::sqrt(floor);
+  // What has as many numbers as there are to explain explains anything.
+  constexpr Index kRowsPerNumber = 3;
+  Index numbers = 0;
+  for (const CauseTerm& term : selection.terms)
+    numbers += term.amplitude.size() + candidates[term.candidate].parameters;
+  const bool is_sure = numbers == 1 || kRowsPerNumber * numbers <= problem.rows();
+  const bool holds = is_sure && left.squaredNorm() <= most * most * static_cast<double>(left.size());
+  if (selection.left <= most && holds) return causes;
   // The nearest stands for all.
   causes.resize(1, StartExplanation(store, CauseChannel::kLaw, steps));
   causes.front().outcome = CauseOutcome::kNotExplained;

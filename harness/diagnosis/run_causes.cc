@@ -71,7 +71,7 @@ class PlausibleSizes {
 
   /// Whether such a fault can be. What is no size, and what motion does not show, is none.
   [[nodiscard]] bool CanBe(const Fault& fault) const {
-    if (fault.fault == kUnknownFault) return true;
+    if (fault.fault == kUnknownFault || std::isnan(fault.value)) return true;
     const bool is_factor = fault.unit.empty();
     const bool has_no_size =
         fault.value == 0.0 && !is_factor && (!(fault.error < kNever) || fault.error > 0.0);
@@ -93,7 +93,8 @@ class PlausibleSizes {
 void DropImpossible(const StepStore& store, Causes* causes) {
   const PlausibleSizes sizes(store);
   for (Explanation& one : *causes) {
-    if (one.faults.empty()) continue;
+    // A law can ask for anything.
+    if (one.faults.empty() || one.channel == CauseChannel::kLaw) continue;
     const std::string place = one.faults.front().place;
     const auto dropped = std::erase_if(one.faults, [&](const Fault& fault) { return !sizes.CanBe(fault); });
     if (dropped == 0) continue;

@@ -27,7 +27,7 @@ Eigen::Index CountOf(const Range& range) {
 
 }  // namespace
 
-StepStore::StepStore(const Setup& setup, const JudgedLaw* law, double rolling_bound)
+StepStore::StepStore(const Setup& setup, JudgedLaw* law, double rolling_bound)
     : setup_(&setup),
       law_(law),
       rolling_bound_(rolling_bound),
@@ -36,11 +36,9 @@ StepStore::StepStore(const Setup& setup, const JudgedLaw* law, double rolling_bo
   NameReadings();
   const RobotModel& model = setup.model();
   const Eigen::Index n = model.num_velocities(), m = CountOf(readings_);
-  const Eigen::Index parts = law_ == nullptr ? 0 : law_->CountColumns();
   const Eigen::Index tips = CountOf(setup.fingertips());
   const Eigen::Index sizes[kSignalCount] = {
-      1, n, n,        model.num_positions(), n, n, m, m, n, 6, 12, 12, n, 2, 1, 2, 2, 2, tips, 3 * tips,
-      n, 1, n * parts};
+      1, n, n, model.num_positions(), n, n, m, m, n, 6, 12, 12, n, 2, 1, 2, 2, 2, tips, 3 * tips, 1};
   for (int i = 0; i < kSignalCount; ++i) offsets_[i + 1] = offsets_[i] + sizes[i];
   before_.resize(offsets_[kSignalCount], kHistory);
   data_.resize(offsets_[kSignalCount], kCapacity);  // its pages are used only when something differs
@@ -209,11 +207,7 @@ void StepStore::Pack(const StepRecord& step, const StepAnalysis& now, Judged jud
     const PlantContact& contact = response.contacts[i];
     at(kContactMoment).segment<3>(3 * static_cast<Eigen::Index>(i)) = contact.normal.cross(contact.force);
   }
-  at(kLawNoise)[0] = 0.0;
-  if (now.law == nullptr || law_ == nullptr || !law_->differs()) return;
-  at(kLawNoise)[0] = kLawTorqueBound * law_->noise_scale();
-  at(kLawDifference) = law_->difference();
-  at(kLawParts) = law_->parts().reshaped();
+  at(kLawDiffers)[0] = now.law != nullptr && law_ != nullptr && law_->differs() ? 1.0 : 0.0;
 }
 
 void StepStore::Add(const StepRecord& step, const StepAnalysis& analysis, bool differs, Judged judged) {

@@ -57,14 +57,12 @@ class StepStore {
     kWheelNoise,       ///< 2: what of that slipping is, and rounding, m/s; 0 without wheels.
     kContactMismatch,  ///< N: StepAnalysis::contact_mismatch, m.
     kContactMoment,    ///< 3N: n x f of the normal into the object and the force on it, world, N.
-    kLawDifference,    ///< n, E_bar' (tau' - tau'_printed).
-    kLawNoise,         ///< Of that, in |.|_M^-1; 0 where the law is right or not known.
-    kLawParts,         ///< n times their number: the summands, where the law differs.
+    kLawDiffers,       ///< 1 where the torques are not the law's, else 0.
     kSignalCount
   };
 
   /// @param law of MakeJudgedLaw; null where none is known. @param rolling_bound of the check `rolling`, m/s.
-  StepStore(const Setup& setup, const JudgedLaw* law, double rolling_bound);
+  StepStore(const Setup& setup, JudgedLaw* law, double rolling_bound);
 
   /// @param differs whether a check fails at this step.
   void Add(const StepRecord& step, const StepAnalysis& analysis, bool differs, Judged judged = Judged::kAll);
@@ -92,7 +90,7 @@ class StepStore {
   [[nodiscard]] const std::vector<Span>& reading_spans() const { return reading_spans_; }
   /// Of the check `rolling`, m/s.
   [[nodiscard]] double rolling_bound() const { return rolling_bound_; }
-  [[nodiscard]] const JudgedLaw* law() const { return law_; }
+  [[nodiscard]] JudgedLaw* law() const { return law_; }
   [[nodiscard]] const std::vector<SignalName>& readings() const { return readings_; }
   [[nodiscard]] const std::vector<SignalName>& motors() const { return motors_; }
 
@@ -107,7 +105,7 @@ class StepStore {
   void Keep(Eigen::Index block, const Eigen::Ref<const VectorXd>& row);
 
   const Setup* setup_;
-  const JudgedLaw* law_;
+  JudgedLaw* law_;
   double rolling_bound_;
   double root_mass_;  // of the robot, sqrt(kg)
   ActuationMap actuation_;

@@ -11,7 +11,7 @@
 #include "controller/control/controller.h"
 #include "controller/control/grasp_controller.h"
 #include "controller/control/pseudoinverse.h"
-#include "harness/checks/law_reference.h"
+#include "harness/checks/law_inputs.h"
 #include "harness/diagnosis/equation_faults.h"
 #include "harness/scenario/setup.h"
 

@@ -73,6 +73,7 @@ bool ClosedLoop::Settle(const std::function<bool()>& should_stop) {
   const bool moving = setup_->scenario().start == Start::kMoving;
   if (moving && !StartMoving(trajectory_->Evaluate(0.0).X_d_dot.head<3>(), should_stop)) return false;
   if (trajectory_) controller_->Follow(*trajectory_);
+  if (checks_) checks_->FollowMotion(nullptr, 0.0);
   BeginRun();
   times_ = LoopTimes{};
   ForgetSteps();
@@ -97,6 +98,7 @@ bool ClosedLoop::SettleOn(const Trajectory& motion, double duration,
   const long count = std::lround(duration / dt);
   const long grip = std::lround(kFindsGrip / dt);
   controller_->Follow(motion);
+  if (checks_) checks_->FollowMotion(&motion, -duration);
   ForgetSteps();
   for (long i = 0; i < count; ++i) {
     if (should_stop()) return false;
@@ -114,14 +116,17 @@ bool ClosedLoop::SettleOn(const Trajectory& motion, double duration,
       checks_->JudgeSettling(record_);
       store_->Add(record_, checks_->analysis(), checks_->differs());
     } else if (checks_) {
-      checks_->Look(record_);
+      checks_->FollowLaw(record_);
       store_->Add(record_, checks_->analysis(), /*differs=*/false, StepStore::Judged::kSignals);
     }
     try {
       CheckGrasp();
     } catch (const RunFailure&) {
       // Why it does not hold: of a run that never begins, the first question is asked here.
-      if (checks_) checks_->JudgeModel(record_);
+      if (checks_) {
+        checks_->JudgeUnsent(record_);
+        store_->Add(record_, checks_->analysis(), checks_->differs(), StepStore::Judged::kSignals);
+      }
       throw;
     }
   }
@@ -182,14 +187,9 @@ void ClosedLoop::DriveMotors(double t) {
     Finish();
     if (checks_) checks_->JudgeEffort(record_, t);
     if (checks_) record_.true_model = &checks_->Follow(record_);
-    // Torques that are too large may be those of no law. While everything settles they follow another
-    // trajectory, but motors and sensors can be at fault.
+    // Torques that are too large may be those of no law, or motors and sensors can be at fault.
     if (checks_) {
-      if (is_running_) {
-        checks_->JudgeUnsent(record_);
-      } else {
-        checks_->Look(record_);
-      }
+      checks_->JudgeUnsent(record_);
       store_->Add(record_, checks_->analysis(), !is_running_ || checks_->differs(),
                   StepStore::Judged::kReadings);
     }

@@ -126,8 +126,8 @@ TEST(LawCheck, FactorsOfAllJointsAndOfOneAreToldWhole) {
   });
   std::string told;
   for (const Explanation& one : causes) told += one.Tell() + "\n";
-  EXPECT_THAT(told, HasSubstr("law of all but panda_joint2: gravity (F_bar' (gravity)), factor 0.8"));
-  EXPECT_THAT(told, HasSubstr("law of panda_joint2: gravity (F_bar' (gravity)), factor 0.5"));
+  EXPECT_THAT(told, HasSubstr("law of all but panda_joint2: gravity is multiplied by 0.8"));
+  EXPECT_THAT(told, HasSubstr("law of panda_joint2: gravity is multiplied by 0.5"));
 }
 
 TEST(LawCheck, AnErrorThatDoesNotFollowIsFound) {

@@ -32,7 +32,7 @@ std::vector<std::string> ListIds(const FileCorrections& found) {
   return ids;
 }
 
-/// What both kinds of file say of one arm.
+/// One arm, in both kinds of file.
 const std::string kUrdf =
     "<robot name='arm'><link name='base'/><link name='upper'><inertial><origin xyz='0.1 0.02 0.03'/><mass "
     "value='2.13'/><inertia ixx='0.0104' iyy='0.0211' izz='0.0303' ixy='0.0011' ixz='0.0005' "

@@ -121,6 +121,7 @@ TEST(DrawnFault, AreSummandsOfEveryLaw) {
     EXPECT_EQ(names.wrong, 0);
     sum.all += names.all;
     sum.named += names.named;
+    sum.in_class += names.in_class;
   };
   count("curve", {});
   for (const char* law : {"pd_gravity", "feedforward_pd", "impedance"})
@@ -133,8 +134,9 @@ TEST(DrawnFault, AreSummandsOfEveryLaw) {
     count("stand", {"settle=0.2", std::string("control.law=") + law, "control.stiffness=300",
                     "control.damping=10", "expect={}"});
   EXPECT_GE(sum.all, 120);
-  // Measured over 394 of them: 99 %.
-  EXPECT_GE(sum.named, 0.93 * sum.all);
+  // A constant torque at a joint that turns one way is a compensation of dry friction as well.
+  EXPECT_GE(sum.named, 0.8 * sum.all);
+  EXPECT_GE(sum.named + sum.in_class, 0.97 * sum.all);
 }
 
 // What is measured otherwise is none of the law's.

@@ -1,0 +1,259 @@
+#include "harness/diagnosis/law_entries.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "harness/diagnosis/law_entry_list.h"
+
+namespace dexcheck {
+namespace {
+
+/// X_o_dot.
+Vector6d CalcCoordinateRates(const LawObject& object) {
+  Vector6d rates;
+  rates << object.X_Bo.linear() * object.V_Bo.head<3>(),
+      CalcAngleMap(object.X_o.tail<3>()).inverse() * object.V_Bo.tail<3>();
+  return rates;
+}
+
+/// The errors of X_o, or of its rate, of another step. Orientations have such errors where they are angles.
+void ShiftPosition(const LawStep& then, LawInputs* inputs) {
+  if (inputs->spec->orientation == OrientationFeedback::kAngles)
+    inputs->now.desired.X_d += inputs->now.object.X_o - then.object.X_o;
+}
+void ShiftVelocity(const LawStep& then, LawInputs* inputs) {
+  if (inputs->spec->orientation == OrientationFeedback::kAngles)
+    inputs->now.desired.X_d_dot += CalcCoordinateRates(inputs->now.object) - CalcCoordinateRates(then.object);
+}
+
+}  // namespace
+
+std::vector<LawEntry> LawEntryList::Make() {
+  AddFactors();
+  AddOldSignals();
+  AddExchanges();
+  AddMatrices();
+  if (is_of_joints_) AddJointFaults();
+  if (is_of_joints_ && law_.demands_acceleration()) AddModelFaults();
+  if (!is_of_joints_) AddObjectFaults();
+  return std::move(entries_);
+}
+
+LawEntry& LawEntryList::Add(const std::string& fault, std::function<MatrixXd(const LawSnapshot&)> force) {
+  LawEntry& entry = entries_.emplace_back();
+  entry.fault = fault;
+  entry.force = std::move(force);
+  return entry;
+}
+
+LawEntry& LawEntryList::AddEdit(const std::string& fault, const Edit& edit) {
+  LawEntry& entry = Add(fault, MakeForce(edit));
+  entry.is_whole = true;
+  return entry;
+}
+
+std::function<MatrixXd(const LawSnapshot&)> LawEntryList::MakeForce(const Edit& edit) const {
+  return [law = &law_, edit](const LawSnapshot& step) -> MatrixXd {
+    LawInputs inputs = step.inputs;
+    edit(step, &inputs);
+    VectorXd force = law->CalcForce(std::move(inputs));
+    if (force.size() == 0) return VectorXd::Zero(step.difference.size());
+    return force - step.inputs.now.force;
+  };
+}
+
+void LawEntryList::AddFactors() {
+  for (const LawPartName& name : law_.ListParts()) {
+    if (name.is_of_acceleration && !law_.demands_acceleration()) continue;
+    LawEntry& entry = Add(std::string(name.name) + " (" + name.symbol + "), factor",
+                          [law = &law_, name](const LawSnapshot& step) -> MatrixXd {
+                            if (name.remove == nullptr) return step.inputs.now.force;
+                            LawInputs inputs = step.inputs;
+                            VectorXd whole = inputs.now.force;
+                            if (name.without != nullptr) {
+                              name.without(&inputs);
+                              whole = law->CalcForce(inputs);
+                            }
+                            name.remove(&inputs);
+                            const VectorXd force = law->CalcForce(std::move(inputs));
+                            if (force.size() == 0 || whole.size() == 0)
+                              return VectorXd::Zero(step.difference.size());
+                            return name.doubles ? force - whole : whole - force;
+                          });
+    entry.nominal = 1.0;
+    entry.parts = name.parts;
+    entry.at_places = true;
+  }
+  for (size_t gain = 0; gain < law_.gains().size(); ++gain) {
+    LawEntry& entry = Add("gain " + law_.gains()[gain] + ", factor",
+                          [law = &law_, gain](const LawSnapshot& step) -> MatrixXd {
+                            LawInputs inputs = step.inputs;
+                            law->RemoveGain(gain, &inputs);
+                            const VectorXd force = law->CalcForce(std::move(inputs));
+                            if (force.size() == 0) return VectorXd::Zero(step.difference.size());
+                            return step.inputs.now.force - force;
+                          });
+    entry.nominal = 1.0;
+  }
+}
+
+void LawEntryList::AddOldSignals() {
+  for (const size_t age : {1U, 2U, 3U, 4U, 5U, 8U, 10U}) {
+    const std::string when = age == 1 ? "of the step before" : fmt::format("of {} steps before", age);
+    const auto old = [age](const LawSnapshot& step) -> const LawStep* {
+      return step.before.size() >= age ? &step.before[age - 1] : nullptr;
+    };
+    LawEntry& torques = Add("torques " + when, [old](const LawSnapshot& step) -> MatrixXd {
+      const LawStep* const then = old(step);
+      if (then == nullptr) return VectorXd::Zero(step.difference.size());
+      return then->force - step.inputs.now.force;
+    });
+    torques.is_whole = true;
+    const auto add = [&](const std::string& what, void (*edit)(const LawStep&, LawInputs*)) {
+      AddEdit(what + " " + when, [old, edit](const LawSnapshot& step, LawInputs* inputs) {
+        if (const LawStep* const then = old(step)) edit(*then, inputs);
+      });
+    };
+    if (is_of_joints_) {
+      add("feedback", [](const LawStep& then, LawInputs* inputs) {
+        inputs->now.position_error = then.position_error;
+        inputs->velocity_error = then.joints.q_dot - then.xi;
+      });
+      add("measured velocity in the feedback", [](const LawStep& then, LawInputs* inputs) {
+        inputs->velocity_error = inputs->now.joints.q_dot - then.xi;
+      });
+      add("measured position in the feedback", [](const LawStep& then, LawInputs* inputs) {
+        inputs->now.position_error += inputs->now.q - then.q;
+      });
+      add("measured positions and velocities in the feedback", [](const LawStep& then, LawInputs* inputs) {
+        inputs->now.position_error += inputs->now.q - then.q;
+        inputs->velocity_error = inputs->now.joints.q_dot - then.xi;
+      });
+      add("desired motion", [](const LawStep& then, LawInputs* inputs) {
+        inputs->now.position_error += then.joints.q - inputs->now.joints.q;
+        inputs->velocity_error += then.joints.q_dot - inputs->now.joints.q_dot;
+        inputs->now.joints = then.joints;
+      });
+      add("desired position", [](const LawStep& then, LawInputs* inputs) {
+        inputs->now.position_error += then.joints.q - inputs->now.joints.q;
+      });
+      add("desired velocity", [](const LawStep& then, LawInputs* inputs) {
+        inputs->velocity_error += then.joints.q_dot - inputs->now.joints.q_dot;
+      });
+      add("desired acceleration",
+          [](const LawStep& then, LawInputs* inputs) { inputs->now.joints.q_ddot = then.joints.q_ddot; });
+    } else {
+      add("measured position of the object in the feedback",
+          [](const LawStep& then, LawInputs* inputs) { ShiftPosition(then, inputs); });
+      add("measured velocity of the object in the feedback",
+          [](const LawStep& then, LawInputs* inputs) { ShiftVelocity(then, inputs); });
+      add("measured object in the feedback", [](const LawStep& then, LawInputs* inputs) {
+        ShiftPosition(then, inputs);
+        ShiftVelocity(then, inputs);
+      });
+      add("desired motion",
+          [](const LawStep& then, LawInputs* inputs) { inputs->now.desired = then.desired; });
+      add("desired position",
+          [](const LawStep& then, LawInputs* inputs) { inputs->now.desired.X_d = then.desired.X_d; });
+      add("desired velocity",
+          [](const LawStep& then, LawInputs* inputs) { inputs->now.desired.X_d_dot = then.desired.X_d_dot; });
+      add("desired acceleration", [](const LawStep& then, LawInputs* inputs) {
+        inputs->now.desired.X_d_ddot = then.desired.X_d_ddot;
+      });
+    }
+  }
+}
+
+std::string LawEntryList::Name(Index entry) const {
+  const Index base = model_.num_base_velocities();
+  if (entry >= base) return model_.dof_name(static_cast<int>(entry - base));
+  if (model_.base().type != BaseType::kDifferentialDrive) return "base velocity " + std::to_string(entry);
+  return entry == 0 ? model_.base().wheel_joint_right : model_.base().wheel_joint_left;
+}
+
+std::vector<std::pair<Index, Index>> LawEntryList::ListPairs() const {
+  constexpr Index kFew = 12;
+  std::vector<std::pair<Index, Index>> pairs;
+  for (Index i = 0; i < n_; ++i)
+    for (Index j = i + 1; j < (n_ <= kFew ? n_ : std::min(n_, i + 2)); ++j) pairs.emplace_back(i, j);
+  return pairs;
+}
+
+void LawEntryList::AddExchanges() {
+  for (const auto& [i, j] : ListPairs()) {
+    const std::string both = Name(i) + " and " + Name(j);
+    LawEntry& torques = Add("torques of " + both + " exchanged",
+                            [this_model = &model_, i = i, j = j](const LawSnapshot& step) -> MatrixXd {
+                              const ActuationMap actuation(*this_model);
+                              VectorXd tau(step.difference.size());
+                              actuation.CalcTorque(step.inputs.now.force, tau);
+                              VectorXd change = VectorXd::Zero(tau.size());
+                              change[i] = tau[j] - tau[i];
+                              change[j] = -change[i];
+                              actuation.CalcForce(change, change);
+                              return change;
+                            });
+    torques.is_whole = true;
+    if (is_of_joints_) {
+      AddEdit("errors of " + both + " exchanged", [i = i, j = j](const LawSnapshot&, LawInputs* inputs) {
+        std::swap(inputs->now.position_error[i], inputs->now.position_error[j]);
+        std::swap(inputs->velocity_error[i], inputs->velocity_error[j]);
+      });
+    }
+    AddEdit("M_bar' without the coupling of " + both, [i = i, j = j](const LawSnapshot&, LawInputs* inputs) {
+      inputs->M(i, j) = inputs->M(j, i) = 0.0;
+    });
+  }
+}
+
+void LawEntryList::AddMatrices() {
+  AddEdit("diagonal of M_bar' alone", [](const LawSnapshot&, LawInputs* inputs) {
+    inputs->M = MatrixXd(inputs->M.diagonal().asDiagonal());
+  });
+  AddEdit("C_bar' transposed", [](const LawSnapshot& step, LawInputs* inputs) {
+    inputs->terms.C_xi = step.inputs.C.transpose() * step.inputs.terms.xi;
+    inputs->C.transposeInPlace();
+  });
+  AddEdit("diagonal of C_bar' alone", [](const LawSnapshot& step, LawInputs* inputs) {
+    inputs->terms.C_xi = step.inputs.C.diagonal().cwiseProduct(step.inputs.terms.xi);
+    inputs->C = MatrixXd(inputs->C.diagonal().asDiagonal());
+  });
+}
+
+void LawEntryList::AddObjectFaults() {
+  AddEdit("sigma' is not projected into the null space",
+          [](const LawSnapshot&, LawInputs* inputs) { inputs->spec->projects = false; });
+  LawEntry& velocity = Add("desired velocity in the feedback (K_v X_d_dot), factor",
+                           [law = &law_](const LawSnapshot& step) -> MatrixXd {
+                             LawInputs inputs = step.inputs;
+                             inputs.now.desired.X_d_dot.setZero();
+                             return step.inputs.now.force - law->CalcForce(std::move(inputs));
+                           });
+  velocity.nominal = 1.0;
+  AddEdit("tangential axes of the contact forces exchanged",
+          [](const LawSnapshot&, LawInputs* inputs) { inputs->exchanges_force_axes = true; });
+  AddEdit("G^T in the place of G^+",
+          [](const LawSnapshot&, LawInputs* inputs) { inputs->spec->transposes_grasp = true; });
+  AddEdit("weight M_bar' of the pseudoinverse of J_B'", [](const LawSnapshot&, LawInputs* inputs) {
+    inputs->spec->weight.kind = RedundancyWeight::Kind::kMass;
+  });
+  AddEdit("weight 1 of the pseudoinverse of J_B'", [](const LawSnapshot&, LawInputs* inputs) {
+    inputs->spec->weight.kind = RedundancyWeight::Kind::kIdentity;
+  });
+  if (model_.base().type != BaseType::kDifferentialDrive) return;
+  LawEntry& map = Add("no E_bar' between forces and torques",
+                      [this_model = &model_](const LawSnapshot& step) -> MatrixXd {
+                        VectorXd force(step.difference.size());
+                        ActuationMap(*this_model).CalcForce(step.inputs.now.force, force);
+                        return force - step.inputs.now.force;
+                      });
+  map.is_whole = true;
+}
+
+std::vector<LawEntry> ListLawEntries(const Setup& setup, JudgedLaw* law) {
+  return LawEntryList(setup, law).Make();
+}
+
+}  // namespace dexcheck

@@ -1,0 +1,63 @@
+#pragma once
+
+// How the list of a law's faults is made: what all laws have, what those of joints have, and those of the
+// object.
+
+#include <functional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "harness/diagnosis/law_entries.h"
+
+namespace dexcheck {
+
+/// Builds the list for one law.
+class LawEntryList {
+ public:
+  LawEntryList(const Setup& setup, JudgedLaw* law)
+      : model_(setup.model()),
+        law_(*law),
+        n_(model_.num_velocities()),
+        is_of_joints_(setup.joints() != nullptr) {
+    if (is_of_joints_) start_ = setup.start().q;
+  }
+
+  [[nodiscard]] std::vector<LawEntry> Make();
+
+ private:
+  using Index = Eigen::Index;
+  using Edit = std::function<void(const LawSnapshot&, LawInputs*)>;
+
+  LawEntry& Add(const std::string& fault, std::function<MatrixXd(const LawSnapshot&)> force);
+  /// A fault that is there or not.
+  LawEntry& AddEdit(const std::string& fault, const Edit& edit);
+  [[nodiscard]] std::function<MatrixXd(const LawSnapshot&)> MakeForce(const Edit& edit) const;
+  void AddFactors();
+  /// What is of some steps before.
+  void AddOldSignals();
+  [[nodiscard]] std::string Name(Index entry) const;
+  /// Pairs that may be taken for each other: all of a small robot, and neighbours of a large one.
+  [[nodiscard]] std::vector<std::pair<Index, Index>> ListPairs() const;
+  void AddExchanges();
+  void AddMatrices();
+  void AddJointFaults();
+  /// Terms of the model at another state than the measured one.
+  void AddDesiredStates();
+  void AddFriction();
+  /// The sum may have the error of this step, or not; what it was before the first step that was looked at is
+  /// not known.
+  void AddIntegrals();
+  /// Numbers of the model that the law goes by.
+  void AddModelFaults();
+  void AddObjectFaults();
+
+  const RobotModel& model_;
+  JudgedLaw& law_;
+  Index n_;
+  bool is_of_joints_;
+  VectorXd start_;
+  std::vector<LawEntry> entries_;
+};
+
+}  // namespace dexcheck
