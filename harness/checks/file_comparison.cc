@@ -303,7 +303,7 @@ bool IsOneRobot(const FileCauses& causes, const RobotDescription& robot) {
     lonely += static_cast<size_t>(std::ranges::count(item.sites, SiteKind::kPresence, &Site::kind));
   const size_t joints = robot.spec.joints.size();
   return !causes.agrees && 2 * lonely <= joints &&
-         causes.causes.size() + causes.unexplained.size() <= std::max(kFew, joints);
+         causes.causes.size() + causes.unexplained.size() <= Worst(kFew, joints);
 }
 
 }  // namespace

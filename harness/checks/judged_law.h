@@ -55,7 +55,7 @@ class JudgedLaw {
 
   /// Whether the torques of the last step that was compared are not the law's.
   [[nodiscard]] bool differs() const { return differs_; }
-  /// What rounding of their difference, times the bound of `law_torque`, is relative to, in |.|_M^-1.
+  /// Force that the bound of `law_torque` is relative to, in |.|_M^-1.
   [[nodiscard]] double noise_scale() const { return scale_ * condition_number(); }
   /// Steps whose torques were not the law's, since the last Forget.
   [[nodiscard]] const LawHistory& history() const { return history_; }
@@ -83,9 +83,9 @@ class JudgedLaw {
   /// What the torques' error is relative to. @param balanced |C_bar' xi + F_bar'|_M^-1.
   [[nodiscard]] virtual double CalcScale(double balanced) { return balanced; }
   [[nodiscard]] virtual double condition_number() const { return 1.0; }
-  /// What the last Evaluate had been asked to follow.
+  /// Copies the desired motion of the last Evaluate.
   virtual void CopyDesired(LawStep* state) const = 0;
-  /// What else than terms and LawStep it was computed from.
+  /// Copies the other inputs of the last Evaluate.
   virtual void CopyInputs(const StepRecord& step, LawInputs* inputs) const = 0;
   /// LawErrors::torque, after Evaluate, and `scale_`. @param factor of M_bar' = L^T L.
   double CalcTorqueError(const StepRecord& step, const LawTerms& terms, const TreeFactor& factor);

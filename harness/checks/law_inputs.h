@@ -1,7 +1,7 @@
 #pragma once
 
-// What a law computes its torques from at one step. A wrong law is the right one with other inputs: faults
-// are told by the torques that the law computes from changed ones.
+// The inputs of a law at one step. A wrong law is the right one with other inputs, so that faults are
+// recognised by the torques that the right law computes from changed inputs.
 
 #include <deque>
 #include <optional>
@@ -15,14 +15,14 @@
 
 namespace dexcheck {
 
-/// What is measured and asked for at one step, and the force that the law makes of it.
+/// The measured and the desired state at one step, and the force that the law computes from them.
 struct LawStep {
   double time = 0.0;        ///< s
   VectorXd q, xi;           ///< Measured: p and n entries.
   DesiredJoints joints;     ///< q_d, its rate and acceleration, of a law of joints.
-  VectorXd position_error;  ///< q_d - q (n), likewise.
+  VectorXd position_error;  ///< q_d - q (n), of a law of joints.
   LawObject object;         ///< Measured, of a law of the object.
-  DesiredMotion desired;    ///< X_d and its rates, likewise.
+  DesiredMotion desired;    ///< X_d and its rates, of a law of the object.
   VectorXd force;           ///< E_bar' tau' (n) of the right law.
 };
 
@@ -71,7 +71,7 @@ struct LawSnapshot {
   LawInputs inputs;
   std::deque<LawStep> before;  ///< Steps before it, the last one first.
   VectorXd difference;         ///< E_bar' (tau' - tau'_printed) (n).
-  double noise = 0.0;          ///< That the difference must exceed to be told from rounding, in |.|_M^-1.
+  double noise = 0.0;          ///< Largest difference that rounding explains, in |.|_M^-1.
   VectorXd error_sum;          ///< Sum of position errors times the step, of joints, before this step (n).
 };
 

@@ -67,7 +67,7 @@ struct LawSpec {
   OrientationFeedback orientation = OrientationFeedback::kAngles;
   RedundancyWeight weight;
   PostureTask posture;
-  // What a wrong law may have otherwise: factors of each K_p and K_v, and of d/dt(P^-1) X_o_dot, whether
+  // Changes that a wrong law may have: factors of each K_p and K_v, and of d/dt(P^-1) X_o_dot, whether
   // sigma' is projected into the null space, and G^T in the place of G^+.
   Vector6d position_factor = Vector6d::Ones(), velocity_factor = Vector6d::Ones();
   double rate_factor = 1.0;

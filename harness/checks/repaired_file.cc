@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "harness/base/worst.h"
 #include "harness/checks/file_causes.h"
 #include "harness/checks/repaired_link.h"
 #include "harness/corrections/read_printed.h"
@@ -138,7 +139,7 @@ class MjcfRepair : private FileRepair {
       const std::string_view kind = child->Name();
       if (kind == "joint" || kind == "freejoint") joints.push_back(child);
     }
-    for (size_t k = 0; k < std::max<size_t>(joints.size(), 1); ++k) {
+    for (size_t k = 0; k < Worst(joints.size(), size_t{1}); ++k) {
       ++link_;
       if (link_ >= before.size()) Refuse("its bodies are made by the engine's compiler");
       const RepairedLink link = {before.link(link_), after.link(link_)};

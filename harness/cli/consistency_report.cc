@@ -130,9 +130,10 @@ bool PrintCauses(const ConsistencyRequest& request, const Comparison& comparison
   }
   if (lines.size() > kMostShown) fmt::print("  and {} more (--json)\n", lines.size() - kMostShown);
   if (!request.exact && causes.unexplained.empty() && ListOtherDifferences(comparison).empty()) {
-    const std::string digits = comparison.digits
-                                   ? "within the printed digits (" + DescribeDigits(*comparison.digits) + ")"
-                                   : "to " + request.DescribeTolerance();
+    const std::string digits =
+        comparison.digits ? "within the printed digits (" + DescribeDigits(*comparison.digits) + ")"
+        : comparison.result.samples == 0 ? "as far as it is printed; no motion was compared"
+                                         : "to " + request.DescribeTolerance();
     fmt::print("{}\n", Wrap("  everything else agrees " + digits, 5));
   }
   const bool is_first = causes.file == request.files.robot.filename().string();

@@ -23,7 +23,9 @@ double CountAngle(double angle, double half) {
 
 std::string ShowAngles(const Matrix3d& R) {
   const Vector3d angles = SolveRollPitchYaw(R)[0];
-  return fmt::format("roll pitch yaw {:.6g} {:.6g} {:.6g}", angles[0], angles[1], angles[2]);
+  constexpr double kRounding = 1e-12;
+  const auto show = [&](int k) { return std::abs(angles[k]) < kRounding ? 0.0 : angles[k]; };
+  return fmt::format("roll pitch yaw {:.6g} {:.6g} {:.6g}", show(0), show(1), show(2));
 }
 
 LinkUndo TakeRotation(const Matrix3d& R) {

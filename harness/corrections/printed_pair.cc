@@ -148,10 +148,17 @@ double PrintedPair::CompareNode(SiteKind kind, int link, const Pose& X, const Po
       return std::abs(body.mass - right.body.mass) / (tolerance.mass + right.body_tolerance.mass + 1e-15);
     case SiteKind::kCom:
       return CompareVectors(body.com - right.body.com, tolerance.com + right.body_tolerance.com);
-    case SiteKind::kInertia:
-      return ((body.inertia - right.body.inertia).cwiseAbs().array() /
-              (tolerance.inertia + right.body_tolerance.inertia).array())
-          .maxCoeff();
+    case SiteKind::kInertia: {
+      const auto compare = [&](double scale) {
+        return ((scale * body.inertia - right.body.inertia).cwiseAbs().array() /
+                (tolerance.inertia + right.body_tolerance.inertia).array())
+            .maxCoeff();
+      };
+      // A mass that its digits leave open may have been another one when the inertia was computed from it.
+      const bool is_open = body.mass > 0.0 && std::abs(body.mass - right.body.mass) <=
+                                                  tolerance.mass + right.body_tolerance.mass;
+      return is_open ? std::min(compare(1.0), compare(right.body.mass / body.mass)) : compare(1.0);
+    }
     default:
       return 0.0;
   }

@@ -15,7 +15,7 @@ using Eigen::Index;
 
 // Summands agree with what a wrong law has of them to this fraction: it is computed from the same numbers.
 constexpr double kLawAccuracy = 1e-9;
-// What is left over may be this many times the noise and is explained all the same.
+// A residual of this many times the noise is explained all the same.
 constexpr double kMostLeft = 3.0;
 constexpr double kPlausible = 300.0;  // of factors, which are units mistaken at the most
 constexpr double kMostTurned = 3.0;   // of factors of the other sign
@@ -35,7 +35,7 @@ std::vector<Place> ListPlaces(const StepStore& store) {
   const int offset = model.num_base_velocities();
   std::vector<Place> places = {{"law", {}}};
   for (Index i = 0; i < model.num_velocities(); ++i) places.front().entries.push_back(i);
-  // Of a robot that stands the law may be wrong before the ground's forces are taken off, or after.
+  // The law of a robot that stands may be wrong before the ground's forces are subtracted, or after.
   if (model.base().type == BaseType::kFloating) places.push_back({"law", {}, true});
   std::vector<bool> carries(static_cast<size_t>(model.num_joints()), false);
   for (const int joint : setup.hold().arm_joints) carries[static_cast<size_t>(joint)] = true;
@@ -167,7 +167,7 @@ class LawProblem {
 
   [[nodiscard]] const std::vector<const LawSnapshot*>& steps() const { return steps_; }
   [[nodiscard]] Index count() const { return static_cast<Index>(steps_.size()); }
-  /// Of all steps. An explanation is looked for in the first rows, and has to hold in the others.
+  /// Differences at all steps. An explanation is fitted to the first rows and has to hold in the others.
   [[nodiscard]] const VectorXd& y() const { return y_; }
   [[nodiscard]] Index rows() const { return model_.num_velocities() * fitted_; }
 
@@ -190,7 +190,7 @@ class LawProblem {
     return columns;
   }
 
-  /// What a force has in some torques alone.
+  /// The part of a force that some torques have.
   [[nodiscard]] VectorXd KeepAt(const Place& place, const VectorXd& force) const {
     if (place.is_balanced) return force;
     VectorXd tau(force.size());
@@ -389,7 +389,7 @@ class LawCandidates {
   std::vector<unsigned> parts_;
 };
 
-/// What has several numbers and no unit has no size, and neither has what is there as a whole.
+/// A fault of several numbers without a unit has no size, and neither has one that is there as a whole.
 Fault TellLaw(const Candidate& one, const VectorXd& amplitude, const VectorXd& error) {
   const bool is_whole = one.is_possible && !one.is_possible(VectorXd::Constant(1, 2.0));
   Fault fault = TellNumber(one, amplitude, error);
@@ -429,7 +429,7 @@ Causes ExplainLaw(const StepStore& store) {
   VectorXd left = problem.y().tail(problem.y().size() - y.size());
   for (const CauseTerm& term : selection.terms) left -= others[term.candidate] * term.amplitude;
   const double most = kMostLeft * std::sqrt(floor);
-  // What has as many numbers as there are to explain explains anything.
+  // An explanation with as many numbers as there are rows explains anything.
   constexpr Index kRowsPerNumber = 3;
   Index numbers = 0;
   for (const CauseTerm& term : selection.terms)

@@ -34,7 +34,7 @@ class LawEntryList {
   LawEntry& AddEdit(const std::string& fault, const Edit& edit);
   [[nodiscard]] std::function<MatrixXd(const LawSnapshot&)> MakeForce(const Edit& edit) const;
   void AddFactors();
-  /// What is of some steps before.
+  /// Signals of some steps before.
   void AddOldSignals();
   [[nodiscard]] std::string Name(Index entry) const;
   /// Pairs that may be taken for each other: all of a small robot, and neighbours of a large one.

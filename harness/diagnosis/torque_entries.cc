@@ -76,7 +76,7 @@ std::vector<LawEntry> ListTorqueEntries(const RobotModel& model, const std::vect
     };
   };
   constexpr double kSame = 1e-9;
-  // Where less was sent than asked for it was always as much.
+  // A limit sends the same torque wherever it sends less than the law asks for.
   VectorXd limits = VectorXd::Zero(n);
   double common = 0.0;
   bool is_common = true;

@@ -56,7 +56,7 @@ TEST_F(TwoDescriptions, AreJudgedByDigitsOnRequest) {
   // A fault is none of rounding: nothing is said of digits.
   EXPECT_TRUE(
       HasFinding(Compare(1, "wrong.urdf", kPandaXml, "--digits 4"), "link_mass", "link panda_link3", 3.3));
-  EXPECT_THAT(verdict("wrong.urdf", "--digits 4"), AllOf(HasSubstr("link_mass"), Not(HasSubstr("rounded"))));
+  EXPECT_THAT(verdict("wrong.urdf", "--digits 4"), Not(HasSubstr("rounded")));
 }
 
 TEST_F(TwoDescriptions, AreImportedAsTablesThatAgreeWithThem) {

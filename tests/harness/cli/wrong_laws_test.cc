@@ -127,7 +127,7 @@ TEST_P(WrongLaws, AreNamed) {
 
 INSTANTIATE_TEST_SUITE_P(All, WrongLaws, ::testing::Range<size_t>(0, std::size(kLaws)));
 
-// What the table does not know is not named.
+// Mistakes that the table does not have are not named.
 TEST_F(OtherLaws, AreNotExplained) {
   for (const char* mistake :
        {"e = np.round(q_d, 4) - q", "Kp = Kp * (1 + 0.1 * np.sin(20 * s.t))", "g = g * (1 + 0.1 * q[3])"}) {
