@@ -51,7 +51,8 @@ struct PrintedOrigin {
 struct PrintedInertial {
   PrintedScalar mass;    ///< kg
   PrintedOrigin origin;  ///< Centre of mass and the axes of the inertia, in the link's frame.
-  Vector6d I = Vector6d::Zero(), half_I = Vector6d::Zero();  ///< xx yy zz xy xz yz about the centre, kg m^2.
+  /// xx yy zz xy xz yz about the centre, kg m^2.
+  Vector6d I = Vector6d::Zero(), half_I = Vector6d::Zero();  // NOLINT(readability-identifier-naming)
 };
 
 enum class JointKind { kFixed, kHinge, kSlide, kBall, kFree };

@@ -200,8 +200,7 @@ void LawEntryList::AddModelFaults() {
   const auto move = [regressor, law = &law_](const LawSnapshot& step) {
     LawInputs inputs = step.inputs;
     inputs.M *= 2.0;
-    const VectorXd demand =
-        step.inputs.M.ldlt().solve(law->CalcForce(std::move(inputs)) - step.inputs.now.force);
+    VectorXd demand = step.inputs.M.ldlt().solve(law->CalcForce(std::move(inputs)) - step.inputs.now.force);
     regressor->SetMotion(step.inputs.now.q, step.inputs.now.xi, demand);
     return demand;
   };

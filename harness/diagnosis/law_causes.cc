@@ -158,11 +158,11 @@ class LawFactors {
 /// Steps at which the torques were not the law's, and what the explanation of their difference needs.
 class LawProblem {
  public:
-  explicit LawProblem(const StepStore& store)
-      : model_(store.setup().model()), actuation_(model_), factor_(model_) {
+  explicit LawProblem(const StepStore& store) : model_(store.setup().model()), actuation_(model_) {
     ChooseSteps(store.law()->history().snapshots());
+    for (const LawSnapshot* const step : steps_) factors_.emplace_back(model_).Compute(step->inputs.M);
     y_.resize(model_.num_velocities() * count());
-    y_ = CalcColumns(1, [](const LawSnapshot& step) -> MatrixXd { return step.difference; });
+    y_ = CalcColumns(1, CalcForces([](const LawSnapshot& step) -> MatrixXd { return step.difference; }));
   }
 
   [[nodiscard]] const std::vector<const LawSnapshot*>& steps() const { return steps_; }
@@ -171,20 +171,25 @@ class LawProblem {
   [[nodiscard]] const VectorXd& y() const { return y_; }
   [[nodiscard]] Index rows() const { return model_.num_velocities() * fitted_; }
 
-  /// Whitened columns of all steps (n count x p). @param force of a step (n x p).
+  /// A force at each step (n x p).
   template <typename Force>
-  MatrixXd CalcColumns(Index p, const Force& force) {
+  [[nodiscard]] std::vector<MatrixXd> CalcForces(const Force& force) const {
+    std::vector<MatrixXd> forces;
+    for (const LawSnapshot* const step : steps_) forces.push_back(force(*step));
+    return forces;
+  }
+
+  /// Whitened columns of all steps (n count x p). @param forces of each step (n x p).
+  [[nodiscard]] MatrixXd CalcColumns(Index p, const std::vector<MatrixXd>& forces) const {
     const Index n = model_.num_velocities();
     MatrixXd columns(n * count(), p);
     for (Index k = 0; k < count(); ++k) {
-      const LawSnapshot& step = *steps_[static_cast<size_t>(k)];
-      MatrixXd own = force(step);
-      factor_.Compute(step.inputs.M);
+      const auto step = static_cast<size_t>(k);
       for (Index i = 0; i < p; ++i) {
-        VectorXd column = own.col(i);
-        factor_.SolveTransposed(column);
+        VectorXd column = forces[step].col(i);
+        factors_[step].SolveTransposed(column);
         // The bound is one of the norm.
-        columns.col(i).segment(k * n, n) = column * (std::sqrt(static_cast<double>(n)) / step.noise);
+        columns.col(i).segment(k * n, n) = column * (std::sqrt(static_cast<double>(n)) / steps_[step]->noise);
       }
     }
     return columns;
@@ -225,7 +230,7 @@ class LawProblem {
 
   const RobotModel& model_;
   ActuationMap actuation_;
-  TreeFactor factor_;
+  std::vector<TreeFactor> factors_;        // by step
   std::vector<const LawSnapshot*> steps_;  // those that are fitted, then the others
   Index fitted_ = 0;
   VectorXd y_;
@@ -269,17 +274,18 @@ class LawCandidates {
   }
 
   void Add(const LawEntry& entry) {
-    const Index p = entry.force(*problem_.steps().front()).cols();
+    const std::vector<MatrixXd> forces = problem_.CalcForces(entry.force);
+    const Index p = forces.front().cols();
     if (2 * p > problem_.rows()) return;  // it would explain anything
     if (!entry.at_places) {
-      Limit(entry, &Add(entry.fault, entry.place, entry.parts, problem_.CalcColumns(p, entry.force)));
+      Limit(entry, &Add(entry.fault, entry.place, entry.parts, problem_.CalcColumns(p, forces)));
       return;
     }
     for (const Place& place : places_) {
-      Limit(entry, &Add(entry.fault, place.name, entry.parts,
-                        problem_.CalcColumns(1, [&](const LawSnapshot& step) -> MatrixXd {
-                          return problem_.KeepAt(place, entry.force(step));
-                        })));
+      std::vector<MatrixXd> own;
+      own.reserve(forces.size());
+      for (const MatrixXd& force : forces) own.emplace_back(problem_.KeepAt(place, force));
+      Limit(entry, &Add(entry.fault, place.name, entry.parts, problem_.CalcColumns(1, own)));
     }
   }
 
@@ -321,11 +327,12 @@ class LawCandidates {
            }}};
       for (const Kind& kind : kKinds) {
         Candidate& one =
-            Add(kind.fault, place, 0, problem_.CalcColumns(1, [&](const LawSnapshot& step) -> MatrixXd {
-              VectorXd own(n);
-              actuation.CalcForce(VectorXd::Unit(n, i), own);
-              return kind.size(step.inputs.terms.xi[i]) * own;
-            }));
+            Add(kind.fault, place, 0,
+                problem_.CalcColumns(1, problem_.CalcForces([&](const LawSnapshot& step) -> MatrixXd {
+                  VectorXd own(n);
+                  actuation.CalcForce(VectorXd::Unit(n, i), own);
+                  return kind.size(step.inputs.terms.xi[i]) * own;
+                })));
         one.unit = motor.unit;
         if (std::string_view(kind.fault) != "torque")
           one.is_possible = [](const VectorXd& a) { return a[0] >= 0.0; };
@@ -335,9 +342,10 @@ class LawCandidates {
 
   /// The number that leaves least.
   void AddFitted(const FittedLawEntry& entry) {
-    const auto column = [&](double number) {
-      return VectorXd(problem_.CalcColumns(
-          1, [&](const LawSnapshot& step) -> MatrixXd { return entry.force(step, number); }));
+    const auto column = [&](double number) -> VectorXd {
+      return problem_.CalcColumns(1, problem_.CalcForces([&](const LawSnapshot& step) -> MatrixXd {
+        return entry.force(step, number);
+      }));
     };
     const VectorXd& y = problem_.y();
     const auto amplitude = [&](const VectorXd& c) {
@@ -379,7 +387,8 @@ class LawCandidates {
         Add(entry.fault + " " + FormatNumber(number, 6) + (entry.unit.empty() ? "" : " " + entry.unit), "law",
             0, column(number));
     one.parameters = 1;
-    if (entry.is_whole) one.is_possible = [](const VectorXd& a_) { return std::abs(a_[0] - 1.0) < kWhole; };
+    if (entry.is_whole)
+      one.is_possible = [](const VectorXd& size) { return std::abs(size[0] - 1.0) < kWhole; };
   }
 
   const StepStore& store_;

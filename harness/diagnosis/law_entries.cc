@@ -112,7 +112,7 @@ void LawEntryList::AddOldSignals() {
     });
     torques.is_whole = true;
     const auto add = [&](const std::string& what, void (*edit)(const LawStep&, LawInputs*)) {
-      AddEdit(what + " " + when, [old, edit](const LawSnapshot& step, LawInputs* inputs) {
+      AddEdit(fmt::format("{} {}", what, when), [old, edit](const LawSnapshot& step, LawInputs* inputs) {
         if (const LawStep* const then = old(step)) edit(*then, inputs);
       });
     };
@@ -173,7 +173,7 @@ std::string LawEntryList::Name(Index entry) const {
   return entry == 0 ? model_.base().wheel_joint_right : model_.base().wheel_joint_left;
 }
 
-std::vector<std::pair<Index, Index>> LawEntryList::ListPairs() const {
+std::vector<std::pair<Eigen::Index, Eigen::Index>> LawEntryList::ListPairs() const {
   constexpr Index kFew = 12;
   std::vector<std::pair<Index, Index>> pairs;
   for (Index i = 0; i < n_; ++i)

@@ -101,14 +101,14 @@ std::vector<LawEntry> ListTorqueEntries(const RobotModel& model, const std::vect
   }
   if (is_common && common > 0.0)
     add("limit of all torques", "law", common,
-        [common](VectorXd tau) { return VectorXd(tau.cwiseMax(-common).cwiseMin(common)); });
+        [common](const VectorXd& tau) { return VectorXd(tau.cwiseMax(-common).cwiseMin(common)); });
   for (const double unit : {1.0, 0.5, 0.25, 0.2, 0.1, 0.05, 0.02, 0.01, 5e-3, 1e-3, 1e-4, 1e-5, 1e-6}) {
     const MatrixXd steps_sent = sent / unit;
     if (!((steps_sent.array() - steps_sent.array().round()).abs() < kSame * (1.0 + steps_sent.array().abs()))
              .all())
       continue;
     add("all torques rounded to", "law", unit,
-        [unit](VectorXd tau) { return VectorXd((tau / unit).array().round() * unit); });
+        [unit](const VectorXd& tau) { return VectorXd((tau / unit).array().round() * unit); });
     break;
   }
   return entries;
