@@ -349,7 +349,7 @@ void CandidateSearch::SearchLostParts(int link) {
     if (part == theirs.link || theirs.parts.size() < 2) continue;
     Node rest = theirs;
     std::erase(rest.parts, part);
-    // What the second file has without the part, against this file.
+    // The second file's body without the part, against this file's.
     const BodyNumbers body = Express(CalcNodeBody(pair_.b(), rest), pair_.X_ab(link));
     const BodyNumbers& right = pair_.right(link).body;
     add(pair_.b(), part, false,

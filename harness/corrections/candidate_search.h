@@ -1,6 +1,6 @@
 #pragma once
 
-// What would put right what differs between two files.
+// The search for candidates: edits that correct quantities which differ between two files.
 
 #include <optional>
 #include <string>
@@ -74,7 +74,7 @@ class CandidateSearch {
   // body_candidates.cc
   void SearchBody(int link);
   struct Part;  ///< One inertial of a node, and what is right of it.
-  [[nodiscard]] std::optional<Part> MakePart(int node, int link) const;
+  [[nodiscard]] std::optional<Part> MakePart(int link, int k) const;
   void SearchPart(const Part& part);
   void SearchInertiaNumbers(const Part& part);
   void SearchAllParts(int link);

@@ -1,6 +1,6 @@
 #pragma once
 
-// What may be wrong in a file, as values: what kind of fault, of what, where, and what would be right.
+// Faults of a file as values: their kind, quantity and place, and the value that would be right.
 
 #include <functional>
 #include <span>
@@ -13,7 +13,7 @@ namespace dexcheck {
 
 /// A printed quantity of a joint or a link.
 enum class SiteKind {
-  // Of the joint that moves a link.
+  // Quantities of the joint that moves a link.
   kCarrier,   ///< The link that carries it.
   kPresence,  ///< The joint and its link are in one file only.
   kName,
@@ -32,11 +32,11 @@ enum class SiteKind {
   kStiffness,
   kSpringAngle,
   kGear,
-  // Of the link.
+  // Quantities of the link.
   kMass,
   kCom,
   kInertia,
-  // Of the robot.
+  // Quantities of the robot.
   kGravity,
   kConstraint,  ///< A constraint or spring between links.
 };
@@ -63,12 +63,12 @@ enum class CorrectionKind {
   kNumber,   ///< Other numbers.
   kMissing,  ///< It is not stated.
   kSurplus,  ///< It is stated here only.
-  // Of a vector.
+  // Faults of a vector.
   kSign,
   kSignOf,       ///< Component: the axis, or the number of a row (alpha, a, q, d).
   kPermutation,  ///< Component: of kPermutations.
   kUnit,         ///< Component: of ListUnits.
-  // Of a rotation.
+  // Faults of a rotation.
   kDegrees,
   kRadians,
   kAngleSign,     ///< Component: the angle.
@@ -85,7 +85,7 @@ enum class CorrectionKind {
   kTurnOwn,     ///< Component: 3 axis + quarter turns - 1.
   kTurnParent,  ///< Component: 3 axis + quarter turns - 1.
   kZero,        ///< The joint's zero is elsewhere.
-  // Of a place or a centre of mass, in another frame.
+  // Places and centres of mass in another frame.
   kAlongLink,
   kAlongParent,
   kInParent,
@@ -97,7 +97,7 @@ enum class CorrectionKind {
   kInertialAxes,
   kToInertialAxes,
   kInverse,  ///< The parent's pose in the link.
-  // Of an inertia.
+  // Faults of an inertia.
   kAboutOrigin,
   kMovedTwice,
   kAboutOriginAxes,
@@ -112,7 +112,7 @@ enum class CorrectionKind {
   kLinkAxes,
   kFrame,  ///< The rotation of its frame: `rotation` says how.
   kWithMass,
-  // Of whole inertials and joints.
+  // Faults of whole inertials and joints.
   kExchanged,
   kOfOther,
   kPartMissing,
@@ -124,7 +124,7 @@ enum class CorrectionKind {
   kShiftedBodies,
 };
 
-/// What a candidate is about.
+/// One fault of a file.
 struct FileFault {
   CorrectionKind kind = CorrectionKind::kNumber;
   SiteKind of = SiteKind::kPosition;
@@ -182,7 +182,7 @@ inline constexpr int kSixOrders[5][6] = {
     {0, 3, 5, 1, 2, 4}, {0, 2, 5, 1, 3, 4}, {0, 1, 2, 5, 4, 3}, {0, 1, 2, 3, 5, 4}, {0, 1, 2, 4, 3, 5}};
 inline constexpr const char* kSequences[] = {"xyz", "XYZ", "zyx", "ZYX", "xzy", "yxz", "yzx", "zxy"};
 
-/// What makes a number of a quantity right that was taken in another unit.
+/// A factor that corrects a number which was taken in another unit.
 struct UnitFault {
   double factor;
   const char* id;

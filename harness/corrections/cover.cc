@@ -132,7 +132,7 @@ class CoverFinder {
     return left;
   }
 
-  /// What each place adds to a convention: a free value, or what it leaves over.
+  /// Bits that each place adds to a convention, for a free value or a remainder.
   [[nodiscard]] static bool PaysEach(const FileFault& fault) {
     using Kind = CorrectionKind;
     if (fault.of == SiteKind::kAxis) return false;

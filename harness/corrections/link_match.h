@@ -47,10 +47,10 @@ struct PoseTolerance {
 };
 
 Pose CalcNodePose(const PrintedRobot& robot, const Node& node);
-/// Of the origins from a node's frame to the frame of one of its parts.
+/// Pose of the frame of one of its parts in a node's frame.
 Pose CalcPartPose(const PrintedRobot& robot, const Node& node, int part);
 BodyNumbers CalcNodeBody(const PrintedRobot& robot, const Node& node);
-/// What half units of the digits leave open of these. @param robot is changed and put back.
+/// Tolerance of these by the half units of the digits. @param robot is changed and put back.
 PoseTolerance CalcPoseTolerance(const Node& node, PrintedRobot* robot);
 BodyNumbers CalcBodyTolerance(const Node& node, PrintedRobot* robot);
 

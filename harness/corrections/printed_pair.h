@@ -11,7 +11,7 @@
 
 namespace dexcheck {
 
-/// What is right of a link, in the first file's frames of it and of its parent, and what the second file's
+/// The right values of a link, in the first file's frames of it and of its parent, and what the second file's
 /// digits leave open of it.
 struct RightNode {
   bool is_placed = false;  ///< Whether both files have it on the same link.

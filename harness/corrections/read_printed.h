@@ -13,13 +13,13 @@ namespace dexcheck {
 /// description, and for such a table without it.
 PrintedRobot ReadPrintedRobot(const DescriptionFile& file, const DescriptionFile* carrier = nullptr);
 
-/// Of a URDF's text. @throws InputError.
+/// Reads a URDF's text. @throws InputError.
 PrintedRobot ReadPrintedUrdf(const std::string& text, const std::string& source);
 
-/// Of an MJCF that is one document. @param engine what the engine compiled of it.
+/// Reads an MJCF that is one document. @param engine what the engine compiled of it.
 PrintedRobot ReadPrintedMjcf(const MjcfFile& mjcf, const mjModel& engine);
 
-/// Of a table, whose angles are in degrees: each number has the digits of its shortest decimal text.
+/// Reads a table, whose angles are in degrees: each number has the digits of its shortest decimal text.
 PrintedRobot PrintDescription(const RobotDescription& robot);
 
 /// Numbers between blanks or commas. A zero stands for each that is missing.

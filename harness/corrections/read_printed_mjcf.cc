@@ -20,7 +20,7 @@ namespace {
 using MjcfElement = tinyxml2::XMLElement;
 using Attributes = std::map<std::string, std::string>;
 
-/// What <default> says of each kind of element, by class.
+/// Attributes that a default gives each kind of element, by class.
 class DefaultClasses {
  public:
   explicit DefaultClasses(const MjcfElement& root) {

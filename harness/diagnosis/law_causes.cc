@@ -340,19 +340,21 @@ class LawCandidates {
     }
   }
 
-  /// The number that leaves least.
+  /// Adds the fault with the number that leaves least in the fitted rows.
   void AddFitted(const FittedLawEntry& entry) {
     const auto column = [&](double number) -> VectorXd {
       return problem_.CalcColumns(1, problem_.CalcForces([&](const LawSnapshot& step) -> MatrixXd {
         return entry.force(step, number);
       }));
     };
-    const VectorXd& y = problem_.y();
+    const Index rows = problem_.rows();
+    const VectorXd y = problem_.y().head(rows);
+    const auto fitted = [&](double number) -> VectorXd { return column(number).head(rows); };
     const auto amplitude = [&](const VectorXd& c) {
       return entry.is_whole || c.squaredNorm() == 0.0 ? 1.0 : c.dot(y) / c.squaredNorm();
     };
     const auto left = [&](double log_number) {
-      const VectorXd c = column(std::exp(log_number));
+      const VectorXd c = fitted(std::exp(log_number));
       return (y - amplitude(c) * c).squaredNorm();
     };
     constexpr int kGrid = 24, kSteps = 50;
@@ -368,17 +370,21 @@ class LawCandidates {
     double a = low + std::max(best - 1, 0) * width, b = low + std::min(best + 1, kGrid) * width;
     for (int k = 0; k < kSteps; ++k) {
       const double c = b - kGolden * (b - a), d = a + kGolden * (b - a);
-      (left(c) < left(d) ? b : a) = left(c) < left(d) ? d : c;
+      if (left(c) < left(d)) {
+        b = d;
+      } else {
+        a = c;
+      }
     }
     // The sum of squares knows the number to half its digits alone: the rest by Gauss and Newton.
     double number = std::exp(0.5 * (a + b));
     constexpr int kIterations = 4;
     constexpr double kChange = 1e-6;
     for (int k = 0; k < kIterations; ++k) {
-      const VectorXd c = column(number);
+      const VectorXd c = fitted(number);
       const double size = amplitude(c), change = kChange * number;
       MatrixXd slopes(y.size(), 2);
-      slopes << (column(number + change) - column(number - change)) * (size / (2.0 * change)), c;
+      slopes << (fitted(number + change) - fitted(number - change)) * (size / (2.0 * change)), c;
       const Index free = entry.is_whole ? 1 : 2;
       const VectorXd step = slopes.leftCols(free).colPivHouseholderQr().solve(y - size * c);
       number = std::clamp(number + step[0], entry.least, entry.most);

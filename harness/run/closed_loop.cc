@@ -125,6 +125,7 @@ bool ClosedLoop::SettleOn(const Trajectory& motion, double duration,
       // Why it does not hold: of a run that never begins, the first question is asked here.
       if (checks_) {
         checks_->JudgeUnsent(record_);
+        checks_->JudgeModel(record_);  // also of a run whose law is not known
         store_->Add(record_, checks_->analysis(), checks_->differs(), StepStore::Judged::kSignals);
       }
       throw;
