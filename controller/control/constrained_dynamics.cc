@@ -13,15 +13,13 @@ namespace {
 // which less than this is independent of the others loses half of its digits or more.
 constexpr double kMinPivotRatio = 1e-8;
 
-/// @param schur k x k, padded.
-void FactorIndependentConstraints(const MatrixXd& schur, Eigen::Index k, BlockCholesky* factor) {
+/// @param schur k x k.
+void FactorIndependentConstraints(const Eigen::Ref<const MatrixXd>& schur, Eigen::LLT<MatrixXd>* llt) {
   double smallest = 0.0;
-  if (factor->Factor(schur)) {
-    smallest = 1.0;
-    for (Eigen::Index i = 0; i < k; ++i) {
-      const double pivot = factor->pivot(i);
-      smallest = std::min(smallest, pivot * pivot / schur(i, i));
-    }
+  llt->compute(schur);
+  if (llt->info() == Eigen::Success) {
+    const auto pivots = llt->matrixLLT().diagonal().array();
+    smallest = std::min(1.0, (pivots.square() / schur.diagonal().array()).minCoeff());
   }
   if (smallest > kMinPivotRatio) return;
   throw SingularityError(
@@ -35,7 +33,7 @@ constexpr double kRedundant = 1e-8;
 }  // namespace
 
 ConstrainedDynamics::ConstrainedDynamics(const RobotModel& model, int num_contacts)
-    : factor_(model), schur_factor_(std::max(Eigen::Index{3} * num_contacts, Eigen::Index{0})) {
+    : factor_(model), schur_llt_(std::max(Eigen::Index{3} * num_contacts, Eigen::Index{0})) {
   Require(num_contacts >= 0, "number of contacts", "must not be negative", num_contacts);
   const Eigen::Index n = model.num_velocities();
   const Eigen::Index k = Eigen::Index{3} * num_contacts;
@@ -85,8 +83,8 @@ const Prediction& ConstrainedDynamics::Predict(const ModelTerms& robot, const Gr
   prediction_.f_c = grasp.slip_bias();
   if (contact_acceleration != nullptr) prediction_.f_c -= *contact_acceleration;
   for (const int i : rows_) prediction_.f_c += motion_[i] * half_.row(i).head(k).transpose();
-  FactorIndependentConstraints(schur_, k, &schur_factor_);
-  schur_factor_.Solve(prediction_.f_c);
+  FactorIndependentConstraints(schur_.topLeftCorner(k, k), &schur_llt_);
+  schur_llt_.solveInPlace(prediction_.f_c);
 
   // [xi_dot; V_Bo_dot] = M^-1/2 (M^-1/2 force - half f_c)
   for (const int i : rows_) motion_[i] -= half_.row(i).head(k).dot(prediction_.f_c);

@@ -5,7 +5,7 @@
 
 #include <Eigen/Cholesky>
 
-#include "controller/common/block_cholesky.h"
+#include "controller/common/gram_matrix.h"
 #include "controller/common/linear_algebra.h"
 #include "controller/common/types.h"
 #include "controller/contact/ground_contacts.h"
@@ -70,7 +70,7 @@ class ConstrainedDynamics {
   std::vector<int> rows_;
   RowMatrixXd half_;  // n + 6 x k, padded: [M_bar'^-1/2 J_B'^T; -M_hat^-1/2 G]
   MatrixXd schur_;    // k x k, padded
-  BlockCholesky schur_factor_;
+  Eigen::LLT<MatrixXd> schur_llt_;
   VectorXd motion_;  // n + 6, M^-1/2 of the forces without contact, then without those of contacts
   VectorXd bias_;    // n
   Prediction prediction_;

@@ -28,8 +28,9 @@ Pseudoinverse::Pseudoinverse(std::string name, Eigen::Index rows, Eigen::Index c
       W_solution_(columns, rows),
       gram_(J_T_.cols(), J_T_.cols()),
       work_(rows),
-      gram_factor_(rows),
-      W_llt_(columns) {
+      gram_llt_(rows),
+      W_llt_(columns),
+      L_inv_(rows, rows) {
   columns_ = entries_ = all_columns_;
 }
 
@@ -89,9 +90,12 @@ void Pseudoinverse::SetEntries(const std::vector<int>& entries) {
 void Pseudoinverse::FactorGram() {
   // J W^-1 J^T = L L^T
   condition_number_ = std::numeric_limits<double>::infinity();
-  if (gram_factor_.Factor(gram_)) {
+  gram_llt_.compute(gram_.topLeftCorner(work_.size(), work_.size()));
+  if (gram_llt_.info() == Eigen::Success) {
     // cond_2(J W^-1/2)^2 = cond_2(L L^T) <= tr(L L^T) tr((L L^T)^-1) = |L|^2 |L^-1|^2
-    condition_number_ = std::sqrt(gram_.diagonal().head(work_.size()).sum()) * gram_factor_.CalcInverseNorm();
+    L_inv_.setIdentity();
+    gram_llt_.matrixL().solveInPlace(L_inv_);
+    condition_number_ = std::sqrt(gram_.diagonal().head(work_.size()).sum()) * L_inv_.norm();
   }
   if (condition_number_ <= kMaxConditionNumber) return;
   throw SingularityError(
@@ -101,7 +105,7 @@ void Pseudoinverse::FactorGram() {
 
 void Pseudoinverse::Apply(const Eigen::Ref<const VectorXd>& y, Eigen::Ref<VectorXd> x) {
   work_ = y;
-  gram_factor_.Solve(work_);
+  gram_llt_.solveInPlace(work_);
   x.setZero();
   for (const int i : entries_) x[i] = W_inv_J_T_.row(i).head(work_.size()).dot(work_);
 }
@@ -110,7 +114,7 @@ void Pseudoinverse::Project(Eigen::Ref<VectorXd> x) {
   // N x = x - J^+ (J x)
   work_.setZero();
   for (const int i : columns_) work_ += x[i] * J_T_.row(i).head(work_.size()).transpose();
-  gram_factor_.Solve(work_);
+  gram_llt_.solveInPlace(work_);
   for (const int i : entries_) x[i] -= W_inv_J_T_.row(i).head(work_.size()).dot(work_);
 }
 

@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "controller/common/block_cholesky.h"
+#include "controller/common/gram_matrix.h"
 #include "controller/common/types.h"
 
 namespace dexcheck {
@@ -65,8 +65,8 @@ class Pseudoinverse {
   MatrixXd W_solution_;          // n x k, of any W
   MatrixXd gram_;                // k x k, padded: J W^-1 J^T, lower triangle
   VectorXd work_;                // k
-  BlockCholesky gram_factor_;
-  Eigen::LLT<MatrixXd> W_llt_;
+  Eigen::LLT<MatrixXd> gram_llt_, W_llt_;
+  MatrixXd L_inv_;  // k x k, of J W^-1 J^T = L L^T
   double condition_number_ = 0.0;
 };
 

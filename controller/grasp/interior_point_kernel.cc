@@ -27,212 +27,239 @@ constexpr double kProof = 1e-9;
 // small for bounds of very different sizes, so that G itself has to be looked at.
 constexpr double kSuspiciousDeterminant = 1e-10;
 
-/// g += factor rows^T y.
-void AddCombination(const std::array<Lanes3, kRows>& rows, const RowVector& y, double factor, Lanes3& g) {
-  for (std::size_t k = 0; k < kRows; ++k) {
-    for (std::size_t j = 0; j < 3; ++j) g[j] += rows[k][j] * (factor * y[k]);
-  }
+/// a^T J b with J = diag(1, -1, -1). det x = x^T J x is positive inside the cone {x0 >= |(x1, x2)|}.
+double CalcDotJ(const Vector3d& a, const Vector3d& b) { return a[0] * b[0] - a[1] * b[1] - a[2] * b[2]; }
+
+/// Inverse of the longest step along `d` that stays in the cone, from an interior point x; not positive if no
+/// step leaves it.
+double CalcInverseConeStep(const Vector3d& x, const Vector3d& d) {
+  // det(x + d / beta) = 0  <=>  beta^2 + 2 p beta + q = 0,  p = x^T J d / det x,  q = det d / det x.
+  const double det = CalcDotJ(x, x);
+  const double p = CalcDotJ(x, d) / det;
+  const double q = CalcDotJ(d, d) / det;
+  return std::sqrt(std::max(p * p - q, 0.0)) - p;
 }
+
+/// Sign of d slack / d x0 of the lower and the upper bound.
+Eigen::Array2d BoundSigns() { return {1.0, -1.0}; }
 
 }  // namespace
 
-void NormalEquations::Factor() {
-  for (std::size_t j = 0; j < kRows; ++j) diagonal_[j] = (*this)(j, j);
-  for (std::size_t j = 0; j < kRows; ++j) {
-    const double inv_pivot = 1.0 / (*this)(j, j);
-    inv_pivots_[j] = inv_pivot;
-    for (std::size_t i = j + 1; i < kRows; ++i) {
-      const double l = (*this)(i, j) * inv_pivot;
-      for (std::size_t k = j + 1; k <= i; ++k) (*this)(i, k) -= l * (*this)(k, j);
-    }
-    for (std::size_t i = j + 1; i < kRows; ++i) (*this)(i, j) *= inv_pivot;
-  }
+void InteriorPointContact::SetCenter(double target) {
+  const double mid = limits.mean();
+  x = {mid, 0.0, 0.0};
+  s = {2.0 * target / mid, 0.0, 0.0};
+  MeasureSlack();
+  z[0] = target / slack[0];
+  z[1] = s[0] + z[0] - w;
 }
 
-double NormalEquations::CalcScaledDeterminant() const {
-  double determinant = 1.0;
-  for (std::size_t j = 0; j < kRows; ++j) determinant /= inv_pivots_[j] * diagonal_[j];
-  return determinant;
+void InteriorPointContact::MeasureSlack() { slack = BoundSigns() * (x[0] - limits); }
+
+void InteriorPointContact::CalcScaling() {
+  // u = W e = (x + eta^2 J s) / sqrt(2 (k + x^T s)),  k = sqrt(det x det s) = det lambda,  eta^2 = det x / k.
+  const double det_x = CalcDotJ(x, x);
+  const double det_lambda = std::sqrt(det_x * CalcDotJ(s, s));
+  const double eta_squared = det_x / det_lambda;
+  const double eta = std::sqrt(eta_squared);
+  u_ = (x + eta_squared * Vector3d(s[0], -s[1], -s[2])) / std::sqrt(2.0 * (det_lambda + x.dot(s)));
+
+  // W = [u0, ut^T; ut, eta I + ut ut^T / (eta + u0)],  lambda = W s.
+  const Eigen::Vector2d ut = u_.tail<2>();
+  W_.row(0) = W_.col(0) = u_;
+  W_.bottomRightCorner<2, 2>() = eta * Eigen::Matrix2d::Identity() + ut * ut.transpose() / (eta + u_[0]);
+  lambda_ = W_ * s;
+
+  // R = I + r u u^T,  r = -d / (q (1 + q)),  q = sqrt(1 + d |u|^2),  R u = u / q.
+  const double d = (z / slack).sum();
+  const double q = std::sqrt(1.0 + d * u_.squaredNorm());
+  r_ = -d / (q * (1.0 + q));
+  K_ = W_ + r_ * (W_ * u_) * u_.transpose();
+  K_.row(0) = u_ / q;
+  M.noalias() = A * K_;
 }
 
-void NormalEquations::Solve(RowVector& b) {
-  for (std::size_t j = 0; j < kRows; ++j) {
-    for (std::size_t i = j + 1; i < kRows; ++i) b[i] -= (*this)(i, j) * b[j];
+void InteriorPointContact::Aim(double target, bool corrected) {
+  // aim = lambda \ (2 target e - dx_scaled o ds_scaled) - lambda.
+  Vector3d product(2.0 * target, 0.0, 0.0);
+  z_aim_ = target;
+  if (corrected) {
+    product[0] -= dx_scaled_.dot(ds_scaled_);
+    product.tail<2>() = -dx_scaled_[0] * ds_scaled_.tail<2>() - ds_scaled_[0] * dx_scaled_.tail<2>();
+    z_aim_ -= BoundSigns() * dx_[0] * dz_;
   }
-  for (std::size_t j = 0; j < kRows; ++j) b[j] *= inv_pivots_[j];
-  for (std::size_t j = kRows; j-- > 0;) {
-    for (std::size_t i = 0; i < j; ++i) b[i] -= (*this)(j, i) * b[j];
-  }
+  const double first = CalcDotJ(lambda_, product) / CalcDotJ(lambda_, lambda_);
+  aim_ << first, (product.tail<2>() - first * lambda_.tail<2>()) / lambda_[0];
+  aim_ -= lambda_;
+  z_aim_ /= slack;
 }
 
-InteriorPointKernel::InteriorPointKernel(int num_contacts)
-    : packs_(static_cast<std::size_t>((num_contacts + kLanes - 1) / kLanes)) {
-  for (Pack& pack : packs_) pack.A.fill(ZeroLanes3());
+void InteriorPointContact::CalcFreeDirection() {
+  // R (aim + pull u - W dual_residual), with R u = K^T e taken whole: pull u is large and R all but cancels
+  // it.
+  h = aim_ - W_ * dual_residual;
+  h += r_ * u_.dot(h) * u_ + (BoundSigns() * (z_aim_ - z)).sum() * K_.row(0).transpose();
+}
+
+double InteriorPointContact::SetDirection(const Vector6d& dy) {
+  const Vector3d g = h + M.transpose() * dy;
+  dx_ = K_ * g;
+  dx_scaled_ = g + r_ * u_.dot(g) * u_;
+  ds_scaled_ = aim_ - dx_scaled_;
+  // The linearised complementarity z dslack + slack dz = aim - slack z.
+  const Eigen::Array2d dslack = BoundSigns() * dx_[0];
+  dz_ = z_aim_ - z - z / slack * dslack;
+  const double bounds = std::max((-dslack / slack).maxCoeff(), (-dz_ / z).maxCoeff());
+  return std::max(
+      {bounds, CalcInverseConeStep(lambda_, dx_scaled_), CalcInverseConeStep(lambda_, ds_scaled_)});
+}
+
+void InteriorPointContact::Advance(double step, const Vector6d& dy) {
+  // ds = dual_residual - A^T dy - (dz_lower - dz_upper) e keeps the dual equation; W^-1 ds_scaled drifts.
+  s += step * (dual_residual - A.transpose() * dy);
+  s[0] -= step * (BoundSigns() * dz_).sum();
+  x += step * dx_;
+  slack += step * dx_[0] * BoundSigns();
+  z += step * dz_;
+}
+
+// With t1, t2 the eigenvalues of x o s / (2 rho), t1 + t2 = x^T s / rho and t1 t2 = det x det s / (2 rho)^2,
+// that is rho sum (t - 1 - log t), and t - 1 - log t <= (t - 1)^2 / t. For a bound, t = slack z / rho.
+double InteriorPointContact::CalcBarrierGap(double rho) const {
+  const double sum = x.dot(s) / rho;
+  const double product = CalcDotJ(x, x) * CalcDotJ(s, s) / (4.0 * rho * rho);
+  const Eigen::Array2d t = slack * z / rho;
+  return rho * (sum - 4.0 + sum / product + ((t - 1.0).square() / t).sum());
+}
+
+// max(lower h, upper h), h = g0 + |(g1, g2)|, g = A^T y.
+double InteriorPointContact::CalcSupport(const Vector6d& y) const {
+  const Vector3d g = A.transpose() * y;
+  return (limits * (g[0] + g.tail<2>().norm())).maxCoeff();
 }
 
 void InteriorPointKernel::Load(const GraspForceProblem& problem) {
   for (Eigen::Index i = 0; i < problem.num_contacts(); ++i) {
-    const Eigen::Index lane = i % kLanes;
-    const double inv_mu = 1.0 / problem.mu[i];
-    Pack& c = packs_[static_cast<std::size_t>(i) / kLanes];
-    c.mu[lane] = problem.mu[i];
-    c.w[lane] = inv_mu;
-    c.lower[lane] = problem.mu[i] * problem.f_min[i];
-    c.upper[lane] = problem.mu[i] * problem.f_max[i];
-    for (std::size_t k = 0; k < kRows; ++k) {
-      const auto row = problem.G.row(static_cast<Eigen::Index>(k)).segment<3>(3 * i);
-      c.A[k][0][lane] = row[2] * inv_mu;
-      c.A[k][1][lane] = row[0];
-      c.A[k][2][lane] = row[1];
-    }
+    InteriorPointContact& c = contacts_[static_cast<std::size_t>(i)];
+    const double mu = problem.mu[i];
+    c.w = 1.0 / mu;
+    c.limits = {mu * problem.f_min[i], mu * problem.f_max[i]};
+    c.A << problem.G.col(3 * i + 2) / mu, problem.G.middleCols<2>(3 * i);
   }
-  for (std::size_t k = 0; k < kRows; ++k) b_[k] = problem.F_o[static_cast<Eigen::Index>(k)];
+  b_ = problem.F_o;
 }
 
 // y = 0, every contact at the centre for a target that suits the costliest of them.
 void InteriorPointKernel::StartCold(double barrier_weight) {
   double target = barrier_weight;
-  for (const Pack& c : packs_) target = std::max(target, (0.25 * c.w * (c.lower + c.upper)).maxCoeff());
-  for (Pack& c : packs_) c.SetCenter(target);
-  y_.fill(0.0);
+  for (const InteriorPointContact& c : contacts_) target = std::max(target, 0.25 * c.w * c.limits.sum());
+  for (InteriorPointContact& c : contacts_) c.SetCenter(target);
+  y_.setZero();
 }
 
 // Measures the last iterate against the present bounds; false if it lies outside.
 bool InteriorPointKernel::StartWarm() {
   bool inside = true;
-  for (Pack& c : packs_) {
-    c.bounds.SetValue(c.x[0], c.lower, c.upper);
-    inside &= c.bounds.slack_lower.minCoeff() > 0.0 && c.bounds.slack_upper.minCoeff() > 0.0;
+  for (InteriorPointContact& c : contacts_) {
+    c.MeasureSlack();
+    inside &= c.slack.minCoeff() > 0.0;
   }
   return inside;
 }
 
 void InteriorPointKernel::CalcResiduals() {
   residual_ = b_;
-  gap_ = 0.0;
-  objective_ = 0.0;
-  Lanes largest_dual = Lanes::Zero();
-  for (Pack& c : packs_) {
-    Lanes3 g = {c.w - c.s[0] - (c.bounds.z_lower - c.bounds.z_upper), -c.s[1], -c.s[2]};
-    AddCombination(c.A, y_, -1.0, g);
-    for (std::size_t k = 0; k < kRows; ++k) residual_[k] -= CalcDot(c.A[k], c.x).sum();
-    c.dual_residual = g;
-    largest_dual = largest_dual.max(g[0].abs()).max(g[1].abs()).max(g[2].abs());
-    gap_ += (CalcDot(c.x, c.s) + c.bounds.CalcGap()).sum();
-    objective_ += (c.w * c.x[0]).sum();
+  gap_ = objective_ = max_dual_residual_ = 0.0;
+  for (InteriorPointContact& c : contacts_) {
+    residual_.noalias() -= c.A * c.x;
+    c.dual_residual = -c.s - c.A.transpose() * y_;
+    c.dual_residual[0] += c.w - (BoundSigns() * c.z).sum();
+    max_dual_residual_ = std::max(max_dual_residual_, c.dual_residual.cwiseAbs().maxCoeff());
+    gap_ += c.x.dot(c.s) + (c.slack * c.z).sum();
+    objective_ += c.w * c.x[0];
   }
-  max_dual_residual_ = largest_dual.maxCoeff();
-  max_residual_ = 0.0;
-  for (const double r : residual_) max_residual_ = std::max(max_residual_, std::abs(r));
-}
-
-// By how much y separates F_o from the wrenches that admissible forces give:
-//   b^T y - sum_i max_{x in C_i} (A_i^T y)^T x,   C_i = {x in K, lower <= x0 <= upper}.
-double InteriorPointKernel::CalcSeparation() const {
-  double separation = 0.0;
-  for (std::size_t k = 0; k < kRows; ++k) separation += b_[k] * y_[k];
-  for (const Pack& c : packs_) {
-    Lanes3 g = ZeroLanes3();
-    AddCombination(c.A, y_, 1.0, g);
-    separation -= c.CalcSupport(g).sum();
-  }
-  return separation;
 }
 
 // S = sum_i M_i M_i^T with M_i = A_i W_i R_i.
 void InteriorPointKernel::Factor() {
-  equations_.SetZero();
-  for (Pack& c : packs_) {
+  Eigen::Matrix<double, 6, 6> S = Eigen::Matrix<double, 6, 6>::Zero();
+  for (InteriorPointContact& c : contacts_) {
     c.CalcScaling();
-    for (std::size_t k = 0; k < kRows; ++k) {
-      const Lanes3& a = c.A[k];
-      Lanes3& m = c.M[k];
-      for (std::size_t j = 0; j < 3; ++j) m[j] = a[0] * c.K[0][j] + a[1] * c.K[1][j] + a[2] * c.K[2][j];
-      for (std::size_t l = 0; l <= k; ++l) equations_(k, l) += CalcDot(m, c.M[l]).sum();
-    }
+    S.noalias() += c.M * c.M.transpose();
   }
-  equations_.Factor();
+  diagonal_ = S.diagonal();
+  equations_.compute(S);
+}
+
+// Determinant of S after scaling it to a unit diagonal: one for rows of the constraint matrix at right
+// angles, zero for dependent ones.
+double InteriorPointKernel::CalcScaledDeterminant() const {
+  return equations_.vectorD().prod() / diagonal_.prod();
 }
 
 // Solves the Newton equations for the present aim; returns the longest step that stays inside.
 double InteriorPointKernel::CalcDirection() {
   // S dy = residual - sum_i M_i h_i,  h_i the direction for dy = 0.
   dy_ = residual_;
-  for (Pack& c : packs_) {
-    c.h = c.CalcFreeDirection();
-    for (std::size_t k = 0; k < kRows; ++k) dy_[k] -= CalcDot(c.M[k], c.h).sum();
+  for (InteriorPointContact& c : contacts_) {
+    c.CalcFreeDirection();
+    dy_.noalias() -= c.M * c.h;
   }
-  equations_.Solve(dy_);
-
-  // R_i^-1 dx_scaled = h_i + M_i^T dy.
-  Lanes inverse_step = Lanes::Zero();
-  for (Pack& c : packs_) {
-    Lanes3 g = c.h;
-    AddCombination(c.M, dy_, 1.0, g);
-    inverse_step = inverse_step.max(c.SetDirection(g));
-  }
-  return 1.0 / inverse_step.maxCoeff();
-}
-
-void InteriorPointKernel::Advance(double step) {
-  for (Pack& c : packs_) {
-    // ds = dual_residual - A^T dy - (dz_lower - dz_upper) e keeps the dual equation; W^-1 ds_scaled drifts.
-    Lanes3 ds = c.dual_residual;
-    ds[0] -= c.bounds.CalcMultiplierStep();
-    AddCombination(c.A, dy_, -1.0, ds);
-    for (std::size_t j = 0; j < 3; ++j) c.s[j] += step * ds[j];
-    for (std::size_t j = 0; j < 3; ++j) c.x[j] += step * c.dx[j];
-    c.bounds.Advance(step, c.dx[0]);
-  }
-  for (std::size_t k = 0; k < kRows; ++k) y_[k] += step * dy_[k];
+  dy_ = equations_.solve(dy_);
+  double inverse_step = 0.0;
+  for (InteriorPointContact& c : contacts_) inverse_step = std::max(inverse_step, c.SetDirection(dy_));
+  return 1.0 / inverse_step;
 }
 
 // Upper bound on the distance of the objective from its optimum.
 double InteriorPointKernel::CalcGap(double rho) const {
   double gap = 0.0;
-  for (const Pack& c : packs_) gap += c.CalcBarrierGap(rho).sum();
+  for (const InteriorPointContact& c : contacts_) gap += c.CalcBarrierGap(rho);
   return gap;
 }
 
+// Whether y separates F_o from the wrenches that admissible forces give:
+//   b^T y - sum_i max_{x in C_i} (A_i^T y)^T x > 0,   C_i = {x in K, lower <= x0 <= upper}.
 bool InteriorPointKernel::ProvesInfeasibility() const {
-  double size = 0.0;
-  for (const double y : y_) size += std::abs(y);
-  return CalcSeparation() > kProof * size;
+  double separation = b_.dot(y_);
+  for (const InteriorPointContact& c : contacts_) separation -= c.CalcSupport(y_);
+  return separation > kProof * y_.lpNorm<1>();
 }
 
 GraspForceStatus InteriorPointKernel::Iterate(const Matrix6Xd& G, const GraspForceOptions& options, bool warm,
                                               int& iterations) {
   const double rho = options.barrier_weight;
-  double size = 1.0;
-  for (const double b : b_) size = std::max(size, std::abs(b));
+  const double size = std::max(1.0, b_.cwiseAbs().maxCoeff());
+  const double degree = 4.0 * static_cast<double>(contacts_.size());  // two a cone, two a pair of bounds
   const double largest_gap = 0.5 * rho * options.slack_tolerance * options.slack_tolerance;
   double step = 1.0;
   for (int i = 0;; ++i, ++iterations) {
     CalcResiduals();
-    const bool feasible = max_residual_ <= options.residual_tolerance * size &&
+    const bool feasible = residual_.cwiseAbs().maxCoeff() <= options.residual_tolerance * size &&
                           max_dual_residual_ <= options.residual_tolerance;
     if (feasible && CalcGap(rho) <= largest_gap) return GraspForceStatus::kOptimal;
     if (!feasible && i > 0 && ProvesInfeasibility()) return GraspForceStatus::kInfeasible;
     if (i == options.max_iterations || !std::isfinite(gap_)) return GraspForceStatus::kNotConverged;
 
     Factor();
-    if (!warm && i == 0 && !(equations_.CalcScaledDeterminant() > kSuspiciousDeterminant)) RequireFullRank(G);
+    if (!warm && i == 0 && !(CalcScaledDeterminant() > kSuspiciousDeterminant)) RequireFullRank(G);
 
-    const double mu = gap_ / CalcDegree();
+    const double mu = gap_ / degree;
     const bool cautious = i >= kPatience;
     if (cautious) {
-      for (Pack& c : packs_) c.Aim(std::max(rho, 0.2 * mu));
+      for (InteriorPointContact& c : contacts_) c.Aim(std::max(rho, 0.2 * mu), false);
     } else {
       // A predictor aims at rho if near, else as far as it gets; the corrector allows for its second-order
       // error.
       const bool near = step == 1.0 && mu < kNearFactor * rho && mu > rho / kNearFactor;
-      for (Pack& c : packs_) c.Aim(near ? rho : 0.0);
+      for (InteriorPointContact& c : contacts_) c.Aim(near ? rho : 0.0, false);
       const double shortfall = 1.0 - std::min(1.0, CalcDirection());
       const double reachable = mu * std::max(kLeastCentering, shortfall * shortfall * shortfall);
-      for (Pack& c : packs_) c.AimCorrected(near ? rho : std::max(rho, reachable));
+      for (InteriorPointContact& c : contacts_) c.Aim(near ? rho : std::max(rho, reachable), true);
     }
     step = std::min(1.0, (cautious ? kCautiousFraction : kStepFraction) * CalcDirection());
-    Advance(step);
+    for (InteriorPointContact& c : contacts_) c.Advance(step, dy_);
+    y_ += step * dy_;
   }
 }
 
@@ -258,16 +285,13 @@ void InteriorPointKernel::Report(const GraspForceProblem& problem, const GraspFo
   const bool optimal = result.status == GraspForceStatus::kOptimal;
   result.objective = optimal ? objective_ : 0.0;
   result.duality_gap = optimal ? CalcGap(options.barrier_weight) : std::numeric_limits<double>::infinity();
-  double largest = 0.0;
-  for (const double y : y_) largest = std::max(largest, std::abs(y));
-  const double scale = result.status == GraspForceStatus::kInfeasible ? 1.0 / largest : 1.0;
-  for (std::size_t k = 0; k < kRows; ++k) result.y[static_cast<Eigen::Index>(k)] = scale * y_[k];
+  result.y = y_;
+  if (result.status == GraspForceStatus::kInfeasible) result.y /= y_.cwiseAbs().maxCoeff();
   result.f_c.setZero();
   if (!optimal) return;
   for (Eigen::Index i = 0; i < problem.num_contacts(); ++i) {
-    const Eigen::Index lane = i % kLanes;
-    const Lanes3& x = packs_[static_cast<std::size_t>(i) / kLanes].x;
-    result.f_c.segment<3>(3 * i) << x[1][lane], x[2][lane], x[0][lane] / problem.mu[i];
+    const Vector3d& x = contacts_[static_cast<std::size_t>(i)].x;
+    result.f_c.segment<3>(3 * i) << x[1], x[2], x[0] / problem.mu[i];
   }
 }
 

@@ -23,71 +23,97 @@
 // [NT] Y. Nesterov, M. Todd: Primal-dual interior-point methods for self-scaled cones, 1998.
 // [M] S. Mehrotra: On the implementation of a primal-dual interior point method, 1992.
 
-#include <array>
+#include <Eigen/Cholesky>
 #include <vector>
 
-#include "controller/grasp/contact_pack.h"
+#include "controller/common/types.h"
 #include "controller/grasp/grasp_force.h"
 
 namespace dexcheck::grasp_internal {
 
-inline constexpr std::size_t kRows = 6;  // of the equality constraints
-using RowVector = std::array<double, kRows>;
-
-/// S dy = b with S (6 x 6) symmetric positive definite, factored in place as L D L^T.
-class NormalEquations {
+/// One contact: its part of the problem, of the iterate and of the search direction, in the coordinates x.
+///
+/// W is the Nesterov-Todd scaling: symmetric, with W s = W^-1 x = lambda. With d the curvature of the bounds
+/// on x0, the Newton equations of one contact are (I + d u u^T) dx_scaled = aim + pull u + W (A^T dy -
+/// dual_residual) and ds_scaled = aim - dx_scaled, with u = W e and dx = W dx_scaled. R = (I + d u
+/// u^T)^(-1/2). Pairs are of the lower and the upper bound.
+class InteriorPointContact {
  public:
-  /// Entry of the lower triangle, col <= row.
-  double& operator()(std::size_t row, std::size_t col) { return S_[row * kRows + col]; }
-  void SetZero() { S_.fill(0.0); }
-  /// Replaces S by its factors.
-  void Factor();
-  /// Determinant of S after scaling it to a unit diagonal: one for rows of the constraint matrix at right
-  /// angles, zero for dependent ones. Not finite if a pivot vanished.
-  [[nodiscard]] double CalcScaledDeterminant() const;
-  /// Replaces b by S^-1 b.
-  void Solve(RowVector& b);
+  // The problem.
+  double w = 0.0;                 ///< Cost of x0, 1 / mu.
+  Eigen::Array2d limits;          ///< Of x0.
+  Eigen::Matrix<double, 6, 3> A;  ///< Columns of the equality constraints.
+
+  // The iterate.
+  Vector3d x, s;
+  Eigen::Array2d slack, z;  ///< Distances of x0 from its limits, and their multipliers.
+  Vector3d dual_residual;   ///< w e - A^T y - s - (z_lower - z_upper) e
+
+  // The scaling and the direction.
+  Eigen::Matrix<double, 6, 3> M;  ///< A W R
+  Vector3d h;                     ///< R^-1 dx_scaled for dy = 0.
+
+  /// Sets the cone's axis at the middle of the limits, with multipliers that satisfy the dual equation for
+  /// y = 0: x o s = 2 target e, slack_lower z_lower = target, and slack_upper z_upper >= target if 4 target
+  /// >= w (lower + upper).
+  void SetCenter(double target);
+  /// Computes the slacks from x and the limits.
+  void MeasureSlack();
+  /// Computes W, R and M at the present iterate.
+  void CalcScaling();
+  /// Aims the Newton step at x o s = 2 target e and slack z = target; with `corrected`, less the second-order
+  /// error of the direction last set [M].
+  void Aim(double target, bool corrected);
+  /// Computes h.
+  void CalcFreeDirection();
+  /// Sets the direction for dy; returns the inverse of the longest step that stays inside.
+  double SetDirection(const Vector6d& dy);
+  /// Takes `step` of the direction for dy.
+  void Advance(double step, const Vector6d& dy);
+  /// Part of the contact, at most, in the distance of the barrier objective from its optimum.
+  [[nodiscard]] double CalcBarrierGap(double rho) const;
+  /// Largest (A^T y)^T x over {x in K, lower <= x0 <= upper}.
+  [[nodiscard]] double CalcSupport(const Vector6d& y) const;
 
  private:
-  std::array<double, kRows * kRows> S_{};
-  RowVector diagonal_{}, inv_pivots_{};
+  Eigen::Matrix3d W_, K_;  // K = W R
+  Vector3d u_;             // W e
+  double r_ = 0.0;         // R = I + r u u^T
+  Vector3d lambda_;
+  Vector3d aim_;  // dx_scaled + ds_scaled
+  Eigen::Array2d z_aim_;
+  Vector3d dx_, dx_scaled_, ds_scaled_;
+  Eigen::Array2d dz_;
 };
 
-/// Solves problems with one number of contacts, in packs of four. Allocates in its constructor alone.
+/// Solves problems with one number of contacts. Allocates in its constructor alone.
 class InteriorPointKernel {
  public:
-  explicit InteriorPointKernel(int num_contacts);
+  explicit InteriorPointKernel(int num_contacts) : contacts_(static_cast<std::size_t>(num_contacts)) {}
   /// Solves a valid problem of the right size into `result`, whose vectors have the right size.
   void Solve(const GraspForceProblem& problem, const GraspForceOptions& options, GraspForceResult& result);
   /// Forgets the last solution.
   void Reset() { has_last_ = false; }
 
  private:
-  struct Pack : ContactPack {
-    std::array<Lanes3, kRows> A, M;  // the rows of A_i and of M_i = A_i W_i R_i
-    Lanes3 h;                        // R_i^-1 dx_scaled for dy = 0
-  };
-
-  /// The barrier's parameter: two for each cone, two for each pair of bounds.
-  [[nodiscard]] double CalcDegree() const { return static_cast<double>(4 * kLanes * packs_.size()); }
   void Load(const GraspForceProblem& problem);
   void StartCold(double barrier_weight);
   bool StartWarm();
   GraspForceStatus Iterate(const Matrix6Xd& G, const GraspForceOptions& options, bool warm, int& iterations);
   void CalcResiduals();
-  [[nodiscard]] double CalcSeparation() const;
   [[nodiscard]] double CalcGap(double rho) const;
   [[nodiscard]] bool ProvesInfeasibility() const;
   void Factor();
+  [[nodiscard]] double CalcScaledDeterminant() const;
   double CalcDirection();
-  void Advance(double step);
   void Report(const GraspForceProblem& problem, const GraspForceOptions& options,
               GraspForceResult& result) const;
 
-  std::vector<Pack> packs_;
-  RowVector b_{}, y_{}, dy_{}, residual_{};
-  NormalEquations equations_;
-  double gap_ = 0.0, objective_ = 0.0, max_residual_ = 0.0, max_dual_residual_ = 0.0;
+  std::vector<InteriorPointContact> contacts_;
+  Vector6d b_, y_, dy_, residual_;
+  Vector6d diagonal_;                                   // of sum_i M_i M_i^T
+  Eigen::LDLT<Eigen::Matrix<double, 6, 6>> equations_;  // the same, factored
+  double gap_ = 0.0, objective_ = 0.0, max_dual_residual_ = 0.0;
   bool has_last_ = false;
 };
 
