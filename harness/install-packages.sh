@@ -26,8 +26,6 @@ packages=(
   fonts-dejavu-core
   # pages: their plots, charts and replay, and the run's figures
   gnuplot-nox libjs-chart.js libjs-three
-  # the live window
-  libglfw3-dev
 )
 purpose=${1:-program}
 case $purpose in
@@ -43,7 +41,7 @@ if [[ $purpose == tests || $purpose == development ]]; then
     libgtest-dev libgmock-dev libbenchmark-dev coinor-csdp hdf5-tools
     sqlite3 slurm-wlm munge strace xz-utils
     chromium chromium-driver python3-numpy python3-h5py doxygen
-    xvfb xdotool imagemagick tmux bash-completion
+    tmux bash-completion
     # the Python module
     pybind11-dev python3-dev python3-pytest
     # what is packaged: hooks, the action, figures as PDF

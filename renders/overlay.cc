@@ -10,10 +10,11 @@ namespace dexcheck {
 namespace {
 
 using Align = Canvas::Align;
-using panel::kFaint;
-using panel::kText;
 
-const Color kPanel = panel::MakeGround(0.72F);
+const Color kText = MakeColor(0xf2f5f8);
+const Color kFaint = MakeColor(0xa9b5c2);
+const Color kMark = MakeColor(0xff9a3d);
+const Color kPanel = MakeColor(0x0e141c, 0.72F);
 const Color kRule = MakeColor(0xffffff, 0.14F);
 const Color kGood = MakeColor(0x3ddc84);
 const Color kBad = MakeColor(0xff5a52);
@@ -94,8 +95,8 @@ void Overlay::DrawPlot(const OverlayState& state, const Vector2d& corner, const 
     const double error = std::isfinite(sample.y()) ? std::max(sample.y(), state.error_low) : state.error_high;
     if (x >= left - 1e-9) path.emplace_back(x, row(std::log10(error)));
   }
-  canvas->StrokePath(path, 1.8 * s, panel::kMark);
-  if (!path.empty()) canvas->FillCircle(path.back(), 3.2 * s, panel::kMark);
+  canvas->StrokePath(path, 1.8 * s, kMark);
+  if (!path.empty()) canvas->FillCircle(path.back(), 3.2 * s, kMark);
 }
 
 double Overlay::CalcCoveredWidth(int width, int height) {

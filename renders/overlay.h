@@ -13,18 +13,6 @@
 
 namespace dexcheck {
 
-/// The colours of what is written over a scene: the panel and the live window's controls.
-namespace panel {
-
-inline const Color kText = MakeColor(0xf2f5f8);
-inline const Color kFaint = MakeColor(0xa9b5c2);
-inline const Color kMark = MakeColor(0xff9a3d);
-
-/// What text stands on; the more opaque, the less of the scene is seen.
-inline Color MakeGround(float opacity) { return MakeColor(0x0e141c, opacity); }
-
-}  // namespace panel
-
 /// A line of the key to what is drawn in the scene.
 struct LegendEntry {
   std::string text;

@@ -4,8 +4,8 @@
 #include <array>
 #include <cmath>
 
-#include "controller/common/gram_matrix.h"
 #include "controller/common/errors.h"
+#include "controller/common/gram_matrix.h"
 #include "controller/common/linear_algebra.h"
 #include "controller/common/text.h"
 

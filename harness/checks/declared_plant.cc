@@ -35,11 +35,6 @@ DeclaredPlant::DeclaredPlant(const Setup& setup, std::span<const Motor> motors)
   step_.force.setZero(setup.model().num_velocities());
 }
 
-void DeclaredPlant::Expect(const DisturbanceOptions& disturbance, const PartContext& context) {
-  disturbances_.Add(disturbance, context);
-  step_.is_ideal = false;
-}
-
 const DeclaredStep& DeclaredPlant::Follow(const StepRecord& step) {
   const MeasuredState& state = step.reading.state;
   sensing_.Measure(step.reading, &step_.measured);

@@ -39,8 +39,6 @@ class DeclaredPlant {
   [[nodiscard]] bool is_ideal() const { return step_.is_ideal; }
   /// Once at each step, those while everything comes to rest included. @param step its command is set.
   const DeclaredStep& Follow(const StepRecord& step);
-  /// One more push is declared from now on, of a plant that is ideal no more.
-  void Expect(const DisturbanceOptions& disturbance, const PartContext& context);
   /// Robot and object are elsewhere from now on, by `way` (m, world).
   void Translate(const Vector3d& way) { sensing_.Translate(way); }
   /// They move at `v` (m/s, world) more from now on.

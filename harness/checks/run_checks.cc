@@ -88,13 +88,6 @@ void RunChecks::CheckMeasuredState() {
   controller_->RaiseBounds(setup_->scenario().tolerance);
 }
 
-void RunChecks::Expect(const DisturbanceOptions& disturbance) {
-  declared_.Expect(disturbance, setup_->MakePartContext());
-  if (!controller_) CheckMeasuredState();
-  for (CheckRecord& record : records_)
-    if (record.name == "idle_joints") record.applies = false;
-}
-
 const GraspModel& RunChecks::Follow(const StepRecord& step) {
   declared_step_ = &declared_.Follow(step);
   if (!declared_step_->is_measured_right && !controller_) CheckMeasuredState();

@@ -65,9 +65,6 @@ class RunChecks {
   void FollowMotion(const Trajectory* motion, double begin) {
     if (law_) law_->Follow(motion, begin);
   }
-  /// One more disturbance is declared from now on; between steps. Joints that only stiffness holds are not
-  /// judged any more.
-  void Expect(const DisturbanceOptions& disturbance);
   /// Robot and object are elsewhere from now on, by `way` (m, world).
   void Translate(const Vector3d& way) { declared_.Translate(way); }
   /// They move at `v` (m/s, world) more from now on.

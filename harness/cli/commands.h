@@ -102,9 +102,8 @@ void AddReportCommand(Command app);
 /// @param line is described when the command runs.
 void AddHelpCommands(Command app, const CommandLine& line);
 void AddStudyCommand(Command app);
-/// Those of its commands that read a study's database: report, show, export, watch.
+/// Those of its commands that read a study's database: report, show, export.
 void AddStudyReadCommands(Command study);
-void AddViewCommand(Command app, const std::string& command_line);
 
 // What the commands that compare descriptions of a robot have in common.
 

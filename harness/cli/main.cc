@@ -63,7 +63,6 @@ int RunCommandLine(int argc, char** argv) {
   AddEngineComparisonCommand(comparing);
   const Command running = app.Under("Run and look");
   AddRunCommand(running, typed);
-  AddViewCommand(running, typed);
   AddReportCommand(running);
   AddRenderCommand(running);
   AddExportCommand(running);

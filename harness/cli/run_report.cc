@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "harness/base/check_record.h"
-#include "harness/base/interrupts.h"
 #include "harness/checks/check_table.h"
 #include "harness/cli/junit_file.h"
 #include "harness/cli/terminal.h"
@@ -167,8 +166,6 @@ void PrintCauses(const Causes& causes) {
 
 }  // namespace
 
-bool WasClosed(const RunResult& result) { return result.interrupted && !IsInterrupted(); }
-
 void PrintRunReport(const Setup& setup, const ClosedLoop& loop, const RunResult& result,
                     const std::string& folder, Detail detail) {
   const Scenario& scenario = setup.scenario();
@@ -208,13 +205,7 @@ void PrintRunReport(const Setup& setup, const ClosedLoop& loop, const RunResult&
                                     : "the run completed; nothing was checked.");
       return;
     case Verdict::kFailed:
-      if (WasClosed(result)) {
-        const bool holds = result.attribution.cause == Cause::kNone;
-        fmt::print("{} at t = {:.3f} s: {}\n", Paint(holds ? Tone::kGood : Tone::kBad, "CLOSED"), loop.time(),
-                   holds ? "no check has failed so far." : "DISAGREEMENT:");
-      } else {
-        fmt::print("{}: {}.\n", Paint(Tone::kBad, "FAILED"), result.failure);
-      }
+      fmt::print("{}: {}.\n", Paint(Tone::kBad, "FAILED"), result.failure);
       break;
     case Verdict::kDisagreement:
       fmt::print("{}:\n", Paint(Tone::kBad, "DISAGREEMENT"));

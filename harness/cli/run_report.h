@@ -13,9 +13,6 @@ enum class Detail {
   kAll,         ///< Each check.
 };
 
-/// The user closed the run's window before its end: no failure, a check may have failed all the same.
-bool WasClosed(const RunResult& result);
-
 /// Prints what a person wants to know of a run: verdict, tracking, checks, cause, speed, where the files are.
 /// @param folder empty when nothing was written.
 void PrintRunReport(const Setup& setup, const ClosedLoop& loop, const RunResult& result,

@@ -26,6 +26,12 @@ const char* NameOf(CauseOutcome outcome) {
   return kNames[static_cast<size_t>(outcome)];
 }
 
+std::string FormatVector(const Eigen::Ref<const VectorXd>& v, int digits) {
+  std::string text = "(";
+  for (Eigen::Index i = 0; i < v.size(); ++i) text += (i > 0 ? ", " : "") + FormatNumber(v[i], digits);
+  return text + ")";
+}
+
 std::string Fault::Tell() const {
   if (fault == kUnknownFault) return place;
   const std::string where = place == "law" ? "" : place + ": ", more = detail.empty() ? "" : " " + detail;

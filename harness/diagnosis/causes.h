@@ -26,6 +26,9 @@ struct Fault {
   [[nodiscard]] std::string Tell() const;
 };
 
+/// "(0.1, 0, -0.2)" with so many digits.
+std::string FormatVector(const Eigen::Ref<const VectorXd>& v, int digits);
+
 /// A fault that is none of those that are known.
 inline constexpr const char* kUnknownFault = "differs";
 

@@ -22,11 +22,7 @@ constexpr double kSoft = 0.1;
 // units of noise, and than this many times what theirs are, have begun, or ended.
 constexpr double kJumpNoise = 0.01, kJump = 5.0;
 
-std::string TellVector(const Eigen::Ref<const VectorXd>& v) {
-  std::string text = "(";
-  for (Index i = 0; i < v.size(); ++i) text += (i > 0 ? ", " : "") + FormatNumber(v[i], 4);
-  return text + ")";
-}
+std::string TellVector(const Eigen::Ref<const VectorXd>& v) { return FormatVector(v, 4); }
 
 /// What is not so many standard errors away from nothing shows no size.
 void RequireSize(Fault* fault) {

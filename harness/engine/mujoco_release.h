@@ -322,18 +322,6 @@ inline void CalcTendonVelocities(const mjModel& m, mjData* d) {
   }
 }
 
-/// How far a ray goes until it meets a geom, -1 when it meets none; static geoms and all bodies count.
-/// @param from x, y, z. @param along the direction. @param groups mjNGROUP flags. @param geom the one it
-/// meets, or -1.
-inline mjtNum CastRay(const mjModel& m, const mjData& d, const mjtNum* from, const mjtNum* along,
-                      const mjtByte* groups, int* geom) {
-#if mjVERSION_HEADER >= 3005000
-  return mj_ray(&m, &d, from, along, groups, 1, -1, geom, nullptr);
-#else
-  return mj_ray(&m, &d, from, along, groups, 1, -1, geom);
-#endif
-}
-
 // What collision functions get and fill.
 #if mjVERSION_HEADER >= 3009000
 using CollisionData = mjData;

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "harness/injection/injected_fault.h"
+#include "harness/plant/random_stream.h"
 
 namespace dexcheck {
 
@@ -17,9 +18,7 @@ namespace dexcheck {
 class Draw {
  public:
   explicit Draw(std::uint64_t seed) : random_(seed) {}
-  double Uniform(double low, double high) {
-    return low + (high - low) * static_cast<double>(random_() >> 11) * 0x1p-53;
-  }
+  double Uniform(double low, double high) { return low + (high - low) * DrawUnit(&random_); }
   /// Evenly over decades, with either sign.
   double Size(double low, double high) {
     const double size = Positive(low, high);

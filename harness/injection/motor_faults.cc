@@ -81,7 +81,7 @@ std::function<Transmit()> Noise(double size) {
     return [size, random = std::mt19937_64(7)](double u, double) mutable {
       // Of twelve even ones the sum has variance 1.
       double sum = -6.0;
-      for (int i = 0; i < 12; ++i) sum += static_cast<double>(random() >> 11) * 0x1p-53;
+      for (int i = 0; i < 12; ++i) sum += DrawUnit(&random);
       return u + size * sum;
     };
   };

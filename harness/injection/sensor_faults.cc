@@ -63,7 +63,7 @@ InjectedFault Noise(const FaultContext& context) {
       FaultAt(joint.name + ", position", "noise, standard deviation", deviation, 5.0 * deviation);
   fault.sensors = [i = joint.q, most](const Setup&) -> SensorFault {
     return [i, most, random = std::mt19937_64(5)](double, MeasuredState* state) mutable {
-      state->q[i] += most * (2.0 * static_cast<double>(random() >> 11) * 0x1p-53 - 1.0);
+      state->q[i] += most * (2.0 * DrawUnit(&random) - 1.0);
     };
   };
   return fault;

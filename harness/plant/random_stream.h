@@ -5,11 +5,17 @@
 
 #include <cmath>
 #include <cstdint>
+#include <random>
 #include <string_view>
 
 #include "controller/common/types.h"
 
 namespace dexcheck {
+
+/// Returns the number in [0, 1) that 64 random bits make: the same on every machine, which the standard
+/// library's distributions are not.
+inline double ToUnitInterval(std::uint64_t bits) { return static_cast<double>(bits >> 11U) * 0x1p-53; }
+inline double DrawUnit(std::mt19937_64* random) { return ToUnitInterval((*random)()); }
 
 /// Number k of a stream is a function of seed, name and k alone. Nothing is stored between calls.
 class RandomStream {
@@ -21,7 +27,7 @@ class RandomStream {
 
   /// Uniform in [0, 1), number `k` of the `channel` (a joint, an axis).
   [[nodiscard]] double Uniform(std::uint64_t k, std::uint64_t channel = 0) const {
-    return static_cast<double>(Draw(2 * k, channel) >> 11U) * 0x1p-53;
+    return ToUnitInterval(Draw(2 * k, channel));
   }
   /// Uniform in [-1, 1).
   [[nodiscard]] double Symmetric(std::uint64_t k, std::uint64_t channel = 0) const {
@@ -31,7 +37,7 @@ class RandomStream {
   [[nodiscard]] double Normal(std::uint64_t k, std::uint64_t channel = 0) const {
     // 1 - u lies in (0, 1], where the logarithm is finite.
     const double radius = std::sqrt(-2.0 * std::log(1.0 - Uniform(k, channel)));
-    const double angle = static_cast<double>(Draw(2 * k + 1, channel) >> 11U) * 0x1p-53;
+    const double angle = ToUnitInterval(Draw(2 * k + 1, channel));
     return radius * std::cos(2.0 * kPi * angle);
   }
 

@@ -184,6 +184,40 @@ std::vector<Push> FindPushes(const RecordingSet& recordings, const TorqueRows& r
   return pushes;
 }
 
+std::vector<TorqueFault> ListPushes(const RobotModel& model, const std::vector<int>& joints, const Push& when,
+                                    const MotionExtents& extents) {
+  constexpr double kMostAcceleration = 2.0 * 9.81;  // m/s^2
+  std::vector<TorqueFault> faults;
+  const auto add = [&](const std::string& fault, const std::string& place, const std::string& unit,
+                       Eigen::Index width, double most) -> TorqueFault& {
+    TorqueFault& one = faults.emplace_back();
+    one.kind = TorqueFault::kPush;
+    one.fault = fault;
+    one.place = place;
+    one.unit = unit;
+    one.push = when;
+    one.recording = when.recording;
+    one.parameters = 2;  // when it begins and ends
+    constexpr double kForce = 100.0;
+    one.scale = VectorXd::Constant(width, kForce);
+    one.is_possible = [most](const VectorXd& a) { return a.norm() <= most; };
+    return one;
+  };
+  for (int link = 0; link < model.num_joints(); ++link)
+    for (const bool has_moment : {false, true}) {
+      constexpr double kMostForce = 300.0;
+      TorqueFault& one = add("force", "link " + model.link_name(link), "N", has_moment ? 6 : 3, kMostForce);
+      one.push.link = link;
+      one.push.has_moment = has_moment;
+    }
+  add("acceleration", "base", "m/s^2", 3, kMostAcceleration);
+  for (const int joint : joints)
+    add("torque", "joint " + model.joint(joint).name,
+        model.joint(joint).type == JointType::kRevolute ? "N m" : "N", 1, extents.FindTorque(joint))
+        .push.joint = joint;
+  return faults;
+}
+
 Push FindTimes(const RecordingSet& recordings, const TorqueRows& rows, const VectorXd& left, Push push) {
   std::vector<const TorqueBalance::Block*> blocks;
   std::vector<Eigen::RowVectorXd> columns;

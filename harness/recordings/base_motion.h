@@ -17,6 +17,10 @@ double FindShaking(const RecordingSet& recordings, const TorqueRows& rows, const
 std::vector<Push> FindPushes(const RecordingSet& recordings, const TorqueRows& rows, const VectorXd& left,
                              size_t recording);
 
+/// Pushes during one stretch of time.
+std::vector<TorqueFault> ListPushes(const RobotModel& model, const std::vector<int>& joints, const Push& when,
+                                    const MotionExtents& extents);
+
 /// When a push begins and ends, near to when it is thought to: what it explains is most.
 /// @param left without it.
 Push FindTimes(const RecordingSet& recordings, const TorqueRows& rows, const VectorXd& left, Push push);

@@ -23,11 +23,7 @@ std::optional<TorqueColumn::Kind> FindNumber(const TorqueFault& fault, const Tor
   return std::nullopt;
 }
 
-std::string ShowVector(const VectorXd& v) {
-  std::string text = "(";
-  for (Index i = 0; i < v.size(); ++i) text += (i == 0 ? "" : ", ") + FormatNumber(v[i], 3);
-  return text + ")";
-}
+std::string ShowVector(const Eigen::Ref<const VectorXd>& v) { return FormatVector(v, 3); }
 
 }  // namespace
 
@@ -41,8 +37,8 @@ CauseDescription::JointNumber CauseDescription::CalcNumber(int joint, TorqueColu
   JointNumber number;
   for (const CauseTerm& term : estimator_.selection().terms) {
     const TorqueFault& fault = estimator_.faults()[term.candidate];
-    for (size_t k = 0; k < fault.columns.size(); ++k)
-      for (const ColumnPart& part : fault.columns[k]) {
+    for (size_t k = 0; k < fault.sums.size(); ++k)
+      for (const ColumnPart& part : fault.sums[k]) {
         if (part.joint != joint || FindNumber(fault, part.column) != kind) continue;
         // A gain has what it multiplies beside its own column.
         const double factor = fault.kind == TorqueFault::kTorqueGain ? part.factor : 1.0;
@@ -56,8 +52,8 @@ CauseDescription::JointNumber CauseDescription::CalcNumber(int joint, TorqueColu
 
 bool CauseDescription::TellWholeNumbers(FoundFault* found, Fault* told) const {
   const TorqueFault& fault = found->fault;
-  if (fault.columns.empty()) return false;
-  const auto kind = FindNumber(fault, fault.columns.front().front().column);
+  if (fault.sums.empty()) return false;
+  const auto kind = FindNumber(fault, fault.sums.front().front().column);
   if (!kind) return false;
   if (fault.index >= 0) {
     const JointNumber number = CalcNumber(fault.index, *kind);
@@ -73,13 +69,13 @@ bool CauseDescription::TellWholeNumbers(FoundFault* found, Fault* told) const {
     if (is_alone) alike.push_back(model_.joint(joint).name);
     is_shared = is_shared || !is_alone;
   }
-  if (fault.columns.size() == 1) {
+  if (fault.sums.size() == 1) {
     if (is_shared) told->place = (alike.size() == 1 ? "joint " : "joints ") + JoinNames(alike);
     return is_shared;
   }
   VectorXd whole(found->amplitude.size());
-  for (size_t k = 0; k < fault.columns.size(); ++k) {
-    const ColumnPart& part = fault.columns[k].front();
+  for (size_t k = 0; k < fault.sums.size(); ++k) {
+    const ColumnPart& part = fault.sums[k].front();
     const Joint& joint = model_.joint(part.joint);
     const TorqueColumn::Kind own = *FindNumber(fault, part.column);
     const JointNumber number = CalcNumber(part.joint, own);
@@ -102,12 +98,12 @@ bool CauseDescription::TellWholeNumbers(FoundFault* found, Fault* told) const {
 }
 
 double CauseDescription::StribeckVelocityOf(const TorqueFault& fault, const VectorXd& a) const {
-  const double v = set_[0].shape_velocities(fault.index, fault.columns.front().front().column.component);
+  const double v = set_[0].shape_velocities(fault.index, fault.sums.front().front().column.component);
   return a.size() == 1 ? v : v * std::sqrt(kFineRatio) * std::exp(a[1] / a[0]);
 }
 
 double CauseDescription::LimitOf(const TorqueFault& fault, const VectorXd& a) const {
-  const int component = fault.columns.front().front().column.component;
+  const int component = fault.sums.front().front().column.component;
   return FindCutOff(set_.refinements(), fault.index, component, set_[0].most_torque[fault.index]) *
          (1.0 + a[1] / a[0]);
 }

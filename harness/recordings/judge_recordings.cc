@@ -216,10 +216,7 @@ class Judge {
     }
     one.fraction = term.fraction;
     one.left = result_.left;
-    if (term.rival != SIZE_MAX) {
-      one.rival = estimator_.faults()[term.rival].place + ": " + estimator_.faults()[term.rival].fault;
-      one.log_odds = term.log_odds;
-    }
+    if (term.rival != SIZE_MAX) one.SetRival(estimator_.faults()[term.rival], term.log_odds);
     one.SetOutcome();
     if (IsDoubtful(fault, term)) one.outcome = CauseOutcome::kNotExplained;
     constexpr double kNone = std::numeric_limits<double>::quiet_NaN();

@@ -6,10 +6,10 @@
 #include <limits>
 #include <nlopt.hpp>
 #include <numeric>
-#include <random>
 
 #include "controller/common/errors.h"
 #include "controller/common/linear_algebra.h"
+#include "harness/plant/random_stream.h"
 #include "harness/recordings/torque_rows.h"
 
 namespace dexcheck {
@@ -38,7 +38,7 @@ std::vector<TorqueFault> ListDesignedFaults(const RobotModel& model, const std::
   std::vector<TorqueFault> faults = ListTorqueFaults(model, joints, 1);
   std::erase_if(faults, [](const TorqueFault& fault) {
     using enum TorqueFault::Kind;
-    const bool is_variant = fault.parameters > 0 || (fault.kind == kPayload && fault.columns.size() > 4);
+    const bool is_variant = fault.parameters > 0 || (fault.kind == kPayload && fault.sums.size() > 4);
     const bool is_of_all = fault.index < 0 && fault.kind != kGravity;
     const bool is_left_out = fault.kind == kDelay || fault.kind == kLoadFriction;
     return is_variant || is_of_all || is_left_out;
@@ -95,10 +95,9 @@ class MotionDesigner {
   /// The best of some motions that are drawn, by which noise and plausible sizes are set.
   std::vector<double> DrawFirst() {
     std::mt19937_64 random(options_.seed);
-    std::uniform_real_distribution<> uniform(-1.0, 1.0);
     const auto draw = [&] {
       std::vector<double> x(static_cast<size_t>(model_.num_joints()) * (kSeries + 1));
-      std::generate(x.begin(), x.end(), [&] { return uniform(random); });
+      std::generate(x.begin(), x.end(), [&] { return 2.0 * DrawUnit(&random) - 1.0; });
       return x;
     };
     std::vector<double> best = draw();
@@ -217,7 +216,7 @@ class MotionDesigner {
     if (fault.kind == kArmature) size = of_joint(limits_.acceleration[fault.index]);
     if (fault.kind == kZero) size = kAngle;
     if (fault.kind == kMass) size = kFraction * fault.nominal;
-    return VectorXd::Constant(static_cast<Index>(fault.columns.size()), size);
+    return VectorXd::Constant(static_cast<Index>(fault.sums.size()), size);
   }
 
   /// S I S of a part of an information matrix. @param first column of the faults.

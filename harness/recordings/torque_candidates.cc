@@ -2,9 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <numeric>
 
 #include "controller/common/linear_algebra.h"
-#include "harness/recordings/plausible_sizes.h"
 
 namespace dexcheck {
 namespace {
@@ -17,6 +18,14 @@ constexpr double kMostTorque = 1e4;
 
 /// How far from 1 a part may be that is there or not.
 constexpr double kWhole = 0.3;
+
+constexpr double kInfinite = std::numeric_limits<double>::infinity();
+constexpr double kG = 9.81;  // m/s^2
+
+/// Whether a vector, which is added to another one, is no longer than plausible.
+std::function<bool(const VectorXd&)> IsNoLonger(double most, const VectorXd& nominal) {
+  return [=](const VectorXd& a) { return (nominal + a).norm() <= most; };
+}
 
 /// The columns of a link by a change of its BodyVector.
 Parts BodyParts(int link, const BodyVector& change, int recording = -1) {
@@ -40,13 +49,25 @@ BodyVector CentreColumn(const MassProperties& body, int k) {
 class FaultList {
  public:
   FaultList(const RobotModel& model, const std::vector<int>& joints, int recordings,
-            const Refinements& refinements)
-      : model_(model), joints_(joints), recordings_(recordings), refinements_(refinements) {}
+            const Refinements& refinements, const MotionExtents& extents)
+      : model_(model),
+        joints_(joints),
+        recordings_(recordings),
+        refinements_(refinements),
+        extents_(extents) {}
 
   std::vector<TorqueFault> Make() {
     for (const int joint : joints_) AddJoint(joint);
     for (int link = 0; link < model_.num_joints(); ++link) AddLink(link);
     AddAll();
+    for (TorqueFault& one : faults_) {
+      if (one.most.size() == 0) continue;
+      one.is_possible = [nominal = one.nominal, most = one.most, own = one.is_possible](const VectorXd& a) {
+        VectorXd whole = a;
+        whole[0] += nominal;
+        return (whole.array().abs() <= most.array()).all() && (!own || own(a));
+      };
+    }
     return std::move(faults_);
   }
 
@@ -60,40 +81,53 @@ class FaultList {
     one.place = place;
     one.unit = unit;
     one.nominal = nominal;
-    one.columns = std::move(columns);
+    one.sums = std::move(columns);
     return one;
   }
-  /// Of one joint's row alone; of which the sum with the nominal value is not negative.
+  /// Adds a fault of one joint's row. @param is_positive whether its value cannot be negative. @param most
+  /// the largest value that is plausible.
   TorqueFault& AddAtJoint(TorqueFault::Kind kind, int joint, const std::string& fault,
-                          const std::string& unit, TorqueColumn column, double nominal, bool is_positive) {
+                          const std::string& unit, TorqueColumn column, double nominal, bool is_positive,
+                          double most) {
     TorqueFault& one =
         Add(kind, joint, fault, "joint " + model_.joint(joint).name, unit, {{{column, joint}}}, nominal);
     if (is_positive) one.least = VectorXd::Constant(1, -nominal);
+    one.most = VectorXd::Constant(1, most);
     return one;
   }
+
+  /// The largest torque of a joint for a unit of its motion. @param least motion that shows a ratio.
+  [[nodiscard]] double FindMostPer(int joint, const VectorXd& motion, double least) const {
+    return motion.size() > 0 ? extents_.FindTorque(joint) / std::max(least, motion[joint]) : kInfinite;
+  }
+  [[nodiscard]] double FindMostViscous(int joint) const { return FindMostPer(joint, extents_.speed, kSlow); }
 
   void AddJoint(int joint) {
     const Joint& modelled = model_.joint(joint);
     const bool turns = modelled.type == JointType::kRevolute;
     const std::string torque = turns ? "N m" : "N";
     const std::string rate = turns ? "N m s/rad" : "N s/m";
+    const double most = extents_.FindTorque(joint);
     using enum TorqueFault::Kind;
     AddAtJoint(kDryFriction, joint, "dry friction", torque, {TorqueColumn::kDry, joint},
-               modelled.dry_friction, true);
+               modelled.dry_friction, true, most);
     AddAtJoint(kViscousFriction, joint, "viscous friction", rate, {TorqueColumn::kViscous, joint},
-               modelled.damping, true);
+               modelled.damping, true, FindMostViscous(joint));
     const bool is_refined = refinements_.stribeck.contains(joint);
     if (is_refined) AddStribeck(joint, torque);
     for (int shape = 0; shape < (is_refined ? 1 + kSmoothShapes : kFrictionShapes); ++shape) {
       const bool is_stribeck = shape > kSmoothShapes;
       AddAtJoint(is_stribeck ? kStribeckFriction : kDryFriction, joint,
                  is_stribeck ? "Stribeck friction" : "dry friction", torque,
-                 {TorqueColumn::kFriction, joint, shape}, is_stribeck ? 0.0 : modelled.dry_friction, true)
+                 {TorqueColumn::kFriction, joint, shape}, is_stribeck ? 0.0 : modelled.dry_friction, true,
+                 most)
           .parameters = 1;
     }
     TorqueFault& spring = AddAtJoint(kSpring, joint, "spring", turns ? "N m/rad" : "N/m",
-                                     {TorqueColumn::kAngle, joint}, 0.0, true);
-    spring.columns.push_back({{{TorqueColumn::kOffset, joint}, joint}});
+                                     {TorqueColumn::kAngle, joint}, 0.0, true, kInfinite);
+    spring.sums.push_back({{{TorqueColumn::kOffset, joint}, joint}});
+    constexpr double kNear = 0.01;  // rad or m
+    spring.most = Vector2d(FindMostPer(joint, extents_.span, kNear), kInfinite);
     spring.scale = VectorXd::Constant(2, kMostTorque);
     spring.least = Eigen::Vector2d(0.0, -kMostTorque);
     // What is at rest further from the joint's range than its width is an offset that changes a little.
@@ -104,16 +138,16 @@ class FaultList {
       };
     }
     AddAtJoint(kLoadFriction, joint, "friction that grows with the load", "", {TorqueColumn::kLoad, joint},
-               0.0, true);
-    AddAtJoint(kOffset, joint, "torque offset", torque, {TorqueColumn::kOffset, joint}, 0.0, false);
+               0.0, true, 1.0);
+    AddAtJoint(kOffset, joint, "torque offset", torque, {TorqueColumn::kOffset, joint}, 0.0, false, most);
     AddAtJoint(kArmature, joint, "armature", turns ? "kg m^2" : "kg", {TorqueColumn::kAcceleration, joint},
-               modelled.armature, true);
-    AddAtJoint(kTorqueGain, joint, "torque gain", "", {TorqueColumn::kTorque, joint}, 1.0, false)
+               modelled.armature, true, FindMostPer(joint, extents_.acceleration, kSlow));
+    AddAtJoint(kTorqueGain, joint, "torque gain", "", {TorqueColumn::kTorque, joint}, 1.0, false, kMostGain)
         .is_possible = IsGain;
     TorqueFault& delay =
-        AddAtJoint(kDelay, joint, "delay of the torque", "s", {TorqueColumn::kRate, joint}, 0.0, false);
-    delay.columns[0][0].factor = -1.0;
-    delay.scale = DelayScale();
+        AddAtJoint(kDelay, joint, "delay of the torque", "s", {TorqueColumn::kRate, joint}, 0.0, false, 0.0);
+    delay.sums[0][0].factor = -1.0;
+    LimitDelay(&delay);
     const int limits = refinements_.limits.contains(joint) ? 2 : kCutOffs;
     for (int k = 0; k < limits && recordings_ == 1; ++k) {
       const TorqueColumn beyond{TorqueColumn::kCutOff, joint, 2 * k},
@@ -125,11 +159,13 @@ class FaultList {
         return std::abs(a[0] - 1.0) < kWhole && std::abs(a[1]) < kWhole;
       };
     }
-    Add(kBacklash, joint, "backlash", "joint " + modelled.name, turns ? "rad" : "m",
-        {{{{TorqueColumn::kBacklash, joint}, -1, -0.5}}})
-        .is_possible = [](const VectorXd& a) { return a[0] > 0.0; };
+    TorqueFault& backlash = Add(kBacklash, joint, "backlash", "joint " + modelled.name, turns ? "rad" : "m",
+                                {{{{TorqueColumn::kBacklash, joint}, -1, -0.5}}});
+    backlash.is_possible = [](const VectorXd& a) { return a[0] > 0.0; };
+    backlash.most = VectorXd::Constant(1, turns ? 0.2 : 0.02);
     Add(kZero, joint, "position offset", "joint " + modelled.name, turns ? "rad" : "m",
-        {{{{TorqueColumn::kPosition, joint}, -1, -1.0}}});
+        {{{{TorqueColumn::kPosition, joint}, -1, -1.0}}})
+        .most = VectorXd::Constant(1, std::min(turns ? kPi : 1.0, width > 0.0 ? width : kInfinite));
   }
 
   /// Of a velocity that is roughly known: the shape there, and what the logarithm of the velocity changes.
@@ -137,9 +173,11 @@ class FaultList {
     const TorqueColumn slow{TorqueColumn::kFriction, joint, 1 + kSmoothShapes};
     const TorqueColumn fast{TorqueColumn::kFriction, joint, 2 + kSmoothShapes};
     const double slope = 1.0 / std::log(kFineRatio);
-    Add(TorqueFault::kStribeckFriction, joint, "Stribeck friction", "joint " + model_.joint(joint).name, unit,
-        {{{slow, joint, 0.5}, {fast, joint, 0.5}}, {{slow, joint, -slope}, {fast, joint, slope}}})
-        .is_possible = [](const VectorXd& a) { return std::abs(a[1]) < a[0]; };
+    TorqueFault& one =
+        Add(TorqueFault::kStribeckFriction, joint, "Stribeck friction", "joint " + model_.joint(joint).name,
+            unit, {{{slow, joint, 0.5}, {fast, joint, 0.5}}, {{slow, joint, -slope}, {fast, joint, slope}}});
+    one.is_possible = [](const VectorXd& a) { return std::abs(a[1]) < a[0]; };
+    one.most = VectorXd::Constant(2, extents_.FindTorque(joint));
   }
 
   void AddLink(int link) {
@@ -174,7 +212,7 @@ class FaultList {
       changes.clear();
       for (int k = 4; k < TorqueRegressor::kBody; ++k) {
         changes.emplace_back(BodyVector::Unit(k));
-        inertia.columns.push_back(BodyParts(link, changes.back()));
+        inertia.sums.push_back(BodyParts(link, changes.back()));
       }
       constexpr double kGyration = 0.1;
       inertia.scale = VectorXd::Constant(6, body.mass * kGyration * kGyration);
@@ -200,10 +238,12 @@ class FaultList {
         TorqueFault& one =
             Add(TorqueFault::kPayload, link, "payload", "link " + model_.link_name(link), "kg", {});
         one.recording = recording;
-        for (int k = 0; k < width; ++k)
-          one.columns.push_back(BodyParts(link, BodyVector::Unit(k), recording));
+        for (int k = 0; k < width; ++k) one.sums.push_back(BodyParts(link, BodyVector::Unit(k), recording));
         one.scale = VectorXd::Constant(width, kMoment);
         one.scale[0] = kMass;
+        one.most = VectorXd::Constant(width, kInfinite);
+        one.most[0] = std::accumulate(model_.joints().begin(), model_.joints().end(), 0.0,
+                                      [](double sum, const Joint& each) { return sum + each.body.mass; });
         one.is_possible = is_near;
         // What the two are together can be.
         if (width == TorqueRegressor::kBody && IsBody(own))
@@ -226,20 +266,26 @@ class FaultList {
       AddInAll(kAllFriction, "dry and viscous friction", {TorqueColumn::kDry, TorqueColumn::kViscous});
       AddInAll(kAllOffsets, "torque offset", {TorqueColumn::kOffset}).is_possible = nullptr;
       faults_.back().scale = VectorXd::Constant(static_cast<Eigen::Index>(joints_.size()), kMostTorque);
-      Add(kDelay, -1, "delay of the torques", "all joints", "s", {delay}).scale = DelayScale();
-      Add(kTorqueGain, -1, "torque gain", "all joints", "", {gain}, 1.0).is_possible = IsGain;
+      LimitDelay(&Add(kDelay, -1, "delay of the torques", "all joints", "s", {delay}));
+      TorqueFault& all = Add(kTorqueGain, -1, "torque gain", "all joints", "", {gain}, 1.0);
+      all.is_possible = IsGain;
+      all.most = VectorXd::Constant(1, kMostGain);
     }
     TorqueFault& gravity = Add(kGravity, -1, "gravity", "world", "m/s^2", {});
-    for (int k = 0; k < 3; ++k) gravity.columns.push_back({{{TorqueColumn::kGravity, 0, k}, -1, 1.0}});
+    for (int k = 0; k < 3; ++k) gravity.sums.push_back({{{TorqueColumn::kGravity, 0, k}, -1, 1.0}});
     const double g = std::max(model_.gravity().norm(), 1.0);
     gravity.scale = VectorXd::Constant(3, g);
     gravity.is_ordinary = true;
+    constexpr double kGravityError = 1.02;
+    gravity.is_possible = IsNoLonger(kGravityError * std::max(kG, g), model_.gravity());
     constexpr double kSwing = 0.3;  // m, rad
+    const double swing = std::min(kSwing, kG / Square(refinements_.shaking));
     for (const int width : {6, 12}) {
       if (!(refinements_.shaking > 0.0)) break;
       TorqueFault& one = Add(kShaking, -1, width == 6 ? "shaking" : "shaking and tilting", "base", "m", {});
-      for (int k = 0; k < width; ++k) one.columns.push_back({{{TorqueColumn::kShaking, 0, k}}});
+      for (int k = 0; k < width; ++k) one.sums.push_back({{{TorqueColumn::kShaking, 0, k}}});
       one.scale = VectorXd::Constant(width, kSwing);
+      one.is_possible = IsNoLonger(swing, VectorXd::Zero(width));
       one.parameters = 1;
     }
   }
@@ -249,23 +295,39 @@ class FaultList {
     constexpr double kLeast = 0.05;
     return std::abs(1.0 + a[0]) > kLeast;
   }
-  static VectorXd DelayScale() { return VectorXd::Constant(1, 0.05); }  // s
+  /// No torque is recorded before it acts.
+  void LimitDelay(TorqueFault* delay) const {
+    constexpr double kUsual = 0.05, kLatest = 0.5;  // s
+    delay->scale = VectorXd::Constant(1, kUsual);
+    delay->least = VectorXd::Constant(1, -1.5 * extents_.step);
+    delay->most = VectorXd::Constant(1, kLatest);
+  }
 
   /// In every joint.
   TorqueFault& AddInAll(TorqueFault::Kind kind, const std::string& name,
                         const std::vector<TorqueColumn::Kind>& columns) {
     TorqueFault& one = Add(kind, -1, name, "all joints", "N m", {});
     for (const TorqueColumn::Kind column : columns)
-      for (const int joint : joints_) one.columns.push_back({{{column, joint}, joint}});
+      for (const int joint : joints_) one.sums.push_back({{{column, joint}, joint}});
     // In all of them, not in a few and by noise in the others.
     one.is_possible = [](const VectorXd& a) { return (a.array() > 0.0).all(); };
+    one.most.resize(static_cast<Eigen::Index>(one.sums.size()));
+    Eigen::Index k = 0;
+    for (const TorqueColumn::Kind column : columns)
+      for (const int joint : joints_)
+        one.most[k++] =
+            column == TorqueColumn::kViscous ? FindMostViscous(joint) : extents_.FindTorque(joint);
     return one;
   }
+
+  static constexpr double kMostGain = 1100.0;
+  static constexpr double kSlow = 0.1;  // rad/s or rad/s^2, m/s or m/s^2
 
   const RobotModel& model_;
   const std::vector<int>& joints_;
   int recordings_;
   const Refinements& refinements_;
+  const MotionExtents& extents_;
   std::vector<TorqueFault> faults_;
 };
 
@@ -315,16 +377,14 @@ BodyVector FindNearestBody(const BodyVector& body) {
 std::vector<TorqueFault> ListTorqueFaults(const RobotModel& model, const std::vector<int>& joints,
                                           int recordings, const Refinements& refinements,
                                           const MotionExtents& extents) {
-  std::vector<TorqueFault> faults = FaultList(model, joints, recordings, refinements).Make();
-  for (TorqueFault& fault : faults) LimitToPlausible(model, extents, refinements.shaking, &fault);
-  return faults;
+  return FaultList(model, joints, recordings, refinements, extents).Make();
 }
 
 static void ShiftCentre(const RobotModel& model, const Vector3d& shift, TorqueFault* centre) {
   MassProperties body = model.joint(centre->index).body;
   body.com += 0.5 * shift;
   for (int k = 0; k < 3; ++k)
-    centre->columns[static_cast<size_t>(k)] = BodyParts(centre->index, CentreColumn(body, k));
+    centre->sums[static_cast<size_t>(k)] = BodyParts(centre->index, CentreColumn(body, k));
 }
 
 static void PlacePayload(double mass, const Vector3d& h, TorqueFault* payload) {
@@ -340,48 +400,14 @@ static void PlacePayload(double mass, const Vector3d& h, TorqueFault* payload) {
     return change;
   };
   for (int k = 0; k < 4; ++k)
-    payload->columns[static_cast<size_t>(k)] = BodyParts(payload->index, column(k), payload->recording);
+    payload->sums[static_cast<size_t>(k)] = BodyParts(payload->index, column(k), payload->recording);
 }
 
 void PlaceMass(const RobotModel& model, const VectorXd& amplitude, TorqueFault* fault) {
   if (fault->is_possible && !fault->is_possible(amplitude)) return;
   if (fault->kind == TorqueFault::kCentre) ShiftCentre(model, amplitude, fault);
-  if (fault->kind == TorqueFault::kPayload && fault->columns.size() == 4)
+  if (fault->kind == TorqueFault::kPayload && fault->sums.size() == 4)
     PlacePayload(amplitude[0], amplitude.segment<3>(1), fault);
-}
-
-std::vector<TorqueFault> ListPushes(const RobotModel& model, const std::vector<int>& joints, const Push& when,
-                                    const MotionExtents& extents) {
-  std::vector<TorqueFault> faults;
-  const auto add = [&](const std::string& fault, const std::string& place,
-                       const std::string& unit) -> TorqueFault& {
-    TorqueFault& one = faults.emplace_back();
-    one.kind = TorqueFault::kPush;
-    one.fault = fault;
-    one.place = place;
-    one.unit = unit;
-    one.push = when;
-    one.recording = when.recording;
-    one.parameters = 2;  // when it begins and ends
-    constexpr double kForce = 100.0;
-    one.scale = VectorXd::Constant(1, kForce);
-    return one;
-  };
-  for (int link = 0; link < model.num_joints(); ++link)
-    for (const bool has_moment : {false, true}) {
-      TorqueFault& one = add("force", "link " + model.link_name(link), "N");
-      one.push.link = link;
-      one.push.has_moment = has_moment;
-      one.scale = one.scale.replicate(has_moment ? 6 : 3, 1).eval();
-    }
-  TorqueFault& base = add("acceleration", "base", "m/s^2");
-  base.scale = base.scale.replicate(3, 1).eval();
-  for (const int joint : joints)
-    add("torque", "joint " + model.joint(joint).name,
-        model.joint(joint).type == JointType::kRevolute ? "N m" : "N")
-        .push.joint = joint;
-  for (TorqueFault& fault : faults) LimitToPlausible(model, extents, 0.0, &fault);
-  return faults;
 }
 
 }  // namespace dexcheck

@@ -2,6 +2,7 @@
 
 // What may be wrong with a model of a recorded robot, and the columns that it leaves.
 
+#include <limits>
 #include <string>
 #include <utility>
 #include <vector>
@@ -30,8 +31,9 @@ struct Push {
   int joint = -1;  ///< -1 besides no link: the base.
 };
 
-/// A fault of the model at a place.
-struct TorqueFault {
+/// A fault of the model at a place. The columns of the candidate are made of its sums, in units of noise,
+/// when the estimator selects.
+struct TorqueFault : Candidate {
   enum Kind {
     kDryFriction,
     kAllDry,
@@ -56,16 +58,12 @@ struct TorqueFault {
     kShaking,
     kPush,
   };
-  Kind kind;
+  Kind kind = kDryFriction;
   int index = -1;  ///< Joint or link; -1 for all.
   int recording = -1;
-  std::string fault, place, unit;
-  double nominal = 0.0;
-  std::vector<std::vector<ColumnPart>> columns;  ///< None of a push.
-  VectorXd scale, least;                         ///< As Candidate's.
-  int parameters = 0;
-  std::function<bool(const VectorXd&)> is_possible;
-  bool is_ordinary = false;  ///< As Candidate's.
+  std::vector<std::vector<ColumnPart>> sums;  ///< One for each column; none of a push.
+  /// The largest plausible size of each amplitude with its nominal value; empty where is_possible says all.
+  VectorXd most = {};
   Push push = {};
 
   /// Of any shape, in one joint or in all.
@@ -82,6 +80,11 @@ struct MotionExtents {
   VectorXd acceleration;  ///< rad/s^2 or m/s^2
   VectorXd span;          ///< Of the position, rad or m.
   double step = 0.0;      ///< Between rows, s.
+
+  /// The torque of a joint; infinite where nothing was recorded.
+  [[nodiscard]] double FindTorque(int joint) const {
+    return torque.size() > 0 ? torque[joint] : std::numeric_limits<double>::infinity();
+  }
 };
 
 /// All that are tried of a model's recordings.
@@ -94,10 +97,6 @@ std::vector<TorqueFault> ListTorqueFaults(const RobotModel& model, const std::ve
 /// be, leave what they leave: inertias about the link's origin grow with the square of a distance.
 /// @param amplitude a shift, m; mass (kg) and mass times place (kg m).
 void PlaceMass(const RobotModel& model, const VectorXd& amplitude, TorqueFault* fault);
-
-/// Pushes during one stretch of time.
-std::vector<TorqueFault> ListPushes(const RobotModel& model, const std::vector<int>& joints, const Push& when,
-                                    const MotionExtents& extents);
 
 /// Whether there is a body of such mass, centre and inertia: its pseudo-inertia is positive.
 bool IsBody(const TorqueRegressor::BodyVector& body);

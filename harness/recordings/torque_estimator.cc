@@ -163,7 +163,7 @@ void TorqueEstimator::FindTimesOf(const CauseTerm& term) {
 }
 
 void TorqueEstimator::ScaleWhole(const std::vector<CauseTerm>& terms, TorqueFault* gain) const {
-  std::vector<ColumnPart>& parts = gain->columns.front();
+  std::vector<ColumnPart>& parts = gain->sums.front();
   parts.resize(1);
   for (const CauseTerm& term : terms) {
     const TorqueFault& found = faults_[term.candidate];
@@ -171,8 +171,8 @@ void TorqueEstimator::ScaleWhole(const std::vector<CauseTerm>& terms, TorqueFaul
                              found.kind == TorqueFault::kAllOffsets || found.kind == TorqueFault::kDelay ||
                              found.kind == TorqueFault::kPush;
     if (is_recorded) continue;
-    for (size_t k = 0; k < found.columns.size(); ++k)
-      for (ColumnPart part : found.columns[k]) {
+    for (size_t k = 0; k < found.sums.size(); ++k)
+      for (ColumnPart part : found.sums[k]) {
         if (part.joint >= 0 && part.joint != gain->index) continue;
         part.joint = gain->index;
         part.factor *= term.amplitude[static_cast<Index>(k)];
@@ -201,7 +201,7 @@ CauseSelection TorqueEstimator::SelectAmong() const {
   // A fault in all joints goes before several single ones, of which the first alone explains less.
   std::vector<bool> barred = barred_;
   for (const CauseTerm& term : best.terms)
-    if (faults_[term.candidate].index < 0 && faults_[term.candidate].columns.size() > 3)
+    if (faults_[term.candidate].index < 0 && faults_[term.candidate].sums.size() > 3)
       barred[term.candidate] = true;
   constexpr size_t kFew = 4;
   if (barred == barred_ || best.terms.size() > kFew) return best;
@@ -215,19 +215,11 @@ CauseSelection TorqueEstimator::SelectAmong(const std::vector<bool>& barred) con
   std::vector<Candidate> candidates;
   Index at = CountForced(*recordings_);
   for (const TorqueFault& fault : faults_) {
-    Candidate& one = candidates.emplace_back();
-    one.fault = fault.fault;
-    one.place = fault.place;
-    one.unit = fault.unit;
-    one.nominal = fault.nominal;
-    one.columns = R_.block(begin, at, rows, CountColumns(fault));
+    const Index count = CountColumns(fault);
+    Candidate& one = candidates.emplace_back(fault);
+    one.columns = R_.block(begin, at, rows, count);
     if (barred[candidates.size() - 1]) one.columns.setZero();
-    one.scale = fault.scale;
-    one.least = fault.least;
-    one.is_possible = fault.is_possible;
-    one.parameters = fault.parameters;
-    one.is_ordinary = fault.is_ordinary;
-    at += CountColumns(fault);
+    at += count;
   }
   CauseOptions options;
   for (size_t i = 0; i < faults_.size(); ++i) {

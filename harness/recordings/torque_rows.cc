@@ -13,7 +13,7 @@ Index CountForced(const RecordingSet& recordings) {
 
 Index CountColumns(const TorqueFault& fault) {
   if (fault.kind == TorqueFault::kPush) return fault.scale.size();
-  return static_cast<Index>(fault.columns.size());
+  return static_cast<Index>(fault.sums.size());
 }
 
 Index CountColumns(const std::vector<TorqueFault>& faults) {
@@ -28,8 +28,8 @@ Eigen::SparseMatrix<double> MapColumns(const TorqueBalance& balance, size_t plac
   std::vector<Eigen::Triplet<double>> entries;
   Index at = 0;
   for (const TorqueFault& fault : faults) {
-    for (size_t k = 0; k < fault.columns.size(); ++k)
-      for (const ColumnPart& one : fault.columns[k]) {
+    for (size_t k = 0; k < fault.sums.size(); ++k)
+      for (const ColumnPart& one : fault.sums[k]) {
         const bool is_here = (one.recording < 0 || static_cast<size_t>(one.recording) == recording) &&
                              (one.joint < 0 || one.joint == joint);
         const Index column = is_here ? balance.Find(place, one.column) : -1;

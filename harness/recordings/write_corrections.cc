@@ -31,8 +31,8 @@ Corrections Collect(const RobotModel& model, const RecordingJudgement& judgement
     const auto add_body = [&] {
       TorqueRegressor::BodyVector& body =
           corrections.bodies.emplace(fault.index, TorqueRegressor::BodyVector::Zero()).first->second;
-      for (size_t k = 0; k < fault.columns.size(); ++k)
-        for (const ColumnPart& part : fault.columns[k])
+      for (size_t k = 0; k < fault.sums.size(); ++k)
+        for (const ColumnPart& part : fault.sums[k])
           body[part.column.component] += part.factor * a[static_cast<Eigen::Index>(k)];
     };
     const auto add = [&](std::map<int, double>* values, int joint, double before, double change) {
@@ -50,7 +50,7 @@ Corrections Collect(const RobotModel& model, const RecordingJudgement& judgement
       case TorqueFault::kAllFriction:
       case TorqueFault::kArmature:
         for (Eigen::Index k = 0; k < a.size(); ++k) {
-          const TorqueColumn& column = fault.columns[static_cast<size_t>(k)].front().column;
+          const TorqueColumn& column = fault.sums[static_cast<size_t>(k)].front().column;
           const Joint& joint = model.joint(column.index);
           const bool is_viscous = column.kind == TorqueColumn::kViscous;
           if (column.kind == TorqueColumn::kAcceleration) {

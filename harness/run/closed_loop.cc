@@ -269,12 +269,6 @@ void ClosedLoop::Step() {
   if (task_ != nullptr) CheckTask();
 }
 
-void ClosedLoop::Disturb(const DisturbanceOptions& disturbance) {
-  Finish();
-  disturbances_.Add(disturbance, setup_->MakePartContext());
-  if (checks_) checks_->Expect(disturbance);
-}
-
 void ClosedLoop::CheckTask() const {
   const PickAndPlace& task = task_->task();
   if (task.is_done() && !task.failure().empty()) throw RunFailure(task.failure());

@@ -69,11 +69,6 @@ class ClosedLoop {
   /// Waits for the checks of the last step. @throws as Step.
   void Finish();
 
-  /// A disturbance of which the scenario does not tell, and the checks do; between steps, beginning at time()
-  /// or later.
-  /// @throws InputError when its body is neither a link nor the object.
-  void Disturb(const DisturbanceOptions& disturbance);
-
   /// The last step. It stays in its place. Its findings come with its checks.
   [[nodiscard]] const StepRecord& record() const { return record_; }
   /// Number of steps of the scenario's duration, the most that a task may take.

@@ -22,8 +22,6 @@ class Runner {
 
   [[nodiscard]] const ClosedLoop& loop() const { return loop_; }
   [[nodiscard]] const RunResult& result() const { return result_; }
-  /// From within Run's callbacks. @throws InputError as ClosedLoop::Disturb.
-  void Disturb(const DisturbanceOptions& disturbance) { loop_.Disturb(disturbance); }
 
   /// Settles, steps to the end or to a failure, and judges.
   /// @param after_step called with each step's record once its checks are made (ClosedLoop::SetObserver),

@@ -11,6 +11,7 @@
 #include <random>
 
 #include "controller/common/errors.h"
+#include "harness/plant/random_stream.h"
 
 namespace dexcheck {
 
@@ -34,10 +35,7 @@ std::uint32_t ScrambleDigits(std::uint32_t x, std::uint32_t seed) {
   return ReverseBits(x);
 }
 
-// What the standard's own distributions and std::shuffle draw, it leaves open.
-
-/// Even in [0, 1).
-double DrawUnit(std::mt19937_64* random) { return static_cast<double>((*random)() >> 11U) * 0x1p-53; }
+// The standard leaves open what std::shuffle draws.
 
 /// 0 to size - 1 in random order.
 void ShuffleNumbers(std::vector<size_t>* numbers, std::mt19937_64* random) {

@@ -241,7 +241,7 @@ TEST(JudgeCrane, ImpossibleSizesAreNoCauses) {
   const auto can_be = [&](TorqueFault::Kind kind, const VectorXd& amplitude) {
     const std::vector<TorqueFault> all = ListTorqueFaults(model, {0, 1, 2, 3}, 1, {}, extents);
     const auto one = std::ranges::find_if(all, [&](const TorqueFault& fault) {
-      return fault.kind == kind && static_cast<Eigen::Index>(fault.columns.size()) == amplitude.size();
+      return fault.kind == kind && static_cast<Eigen::Index>(fault.sums.size()) == amplitude.size();
     });
     return one != all.end() && one->is_possible(amplitude);
   };

@@ -279,7 +279,7 @@ TEST(Judge, WritesABodyThatCanBe) {
   RecordingJudgement judgement;
   for (const TorqueFault& fault : ListTorqueFaults(Panda(), {kLink}, 1)) {
     if (fault.index != kLink || fault.place != "link " + Panda().link_name(kLink)) continue;
-    VectorXd amplitude = VectorXd::Zero(static_cast<Eigen::Index>(fault.columns.size()));
+    VectorXd amplitude = VectorXd::Zero(static_cast<Eigen::Index>(fault.sums.size()));
     if (fault.kind == TorqueFault::kMass) amplitude[0] = -0.9 * fault.nominal;
     if (fault.kind == TorqueFault::kInertia) amplitude[0] = -0.5 * Panda().joint(kLink).body.inertia(0, 0);
     const bool is_second = !judgement.found.empty() && judgement.found.back().fault.kind == fault.kind;
