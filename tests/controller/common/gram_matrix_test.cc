@@ -1,10 +1,11 @@
+#include "controller/common/gram_matrix.h"
+
 #include <gtest/gtest.h>
 
 #include <numeric>
 #include <random>
 #include <vector>
 
-#include "controller/common/gram_matrix.h"
 #include "tests/common/matrix_near.h"
 
 namespace dexcheck::testing::gram_matrix_test {
