@@ -39,6 +39,22 @@ Vector3d ContactVector(const RowMatrixXd& rows, long row, long contact) {
   return rows.block<1, 3>(row, 3 * contact).transpose();
 }
 
+/// Adds the contact forces of a row, each in its friction cone.
+void AddForces(const RunFrames& run, long row, double meters_per_newton,
+               std::vector<Decoration>* decorations) {
+  if (run.contact_forces.size() == 0) return;
+  for (long k = 0; k < run.contacts(); ++k) {
+    const Vector3d p = ContactVector(run.contact_positions, row, k);
+    const Vector3d force = ContactVector(run.contact_forces, row, k);
+    if (!p.allFinite() || !force.allFinite() || force.isZero()) continue;
+    decorations->emplace_back(Arrow{p, p + meters_per_newton * force, kForceRadius, kForce});
+    if (run.contact_normals.size() == 0 || !(run.friction > 0.0)) continue;
+    const Vector3d normal = ContactVector(run.contact_normals, row, k);
+    if (!normal.allFinite() || normal.isZero()) continue;
+    decorations->emplace_back(Cone{p, normal.normalized(), kConeHeight, std::atan(run.friction), kCone});
+  }
+}
+
 }  // namespace
 
 Pose BodyPose(const mjData& data, int body) {
@@ -95,21 +111,6 @@ std::vector<Decoration> RunDecorator::Make(long row, const mjData& data) const {
     AddPaths(row, X_WO.translation(), &decorations);
   }
   return decorations;
-}
-
-void AddForces(const RunFrames& run, long row, double meters_per_newton,
-               std::vector<Decoration>* decorations) {
-  if (run.contact_forces.size() == 0) return;
-  for (long k = 0; k < run.contacts(); ++k) {
-    const Vector3d p = ContactVector(run.contact_positions, row, k);
-    const Vector3d force = ContactVector(run.contact_forces, row, k);
-    if (!p.allFinite() || !force.allFinite() || force.isZero()) continue;
-    decorations->emplace_back(Arrow{p, p + meters_per_newton * force, kForceRadius, kForce});
-    if (run.contact_normals.size() == 0 || !(run.friction > 0.0)) continue;
-    const Vector3d normal = ContactVector(run.contact_normals, row, k);
-    if (!normal.allFinite() || normal.isZero()) continue;
-    decorations->emplace_back(Cone{p, normal.normalized(), kConeHeight, std::atan(run.friction), kCone});
-  }
 }
 
 void RunDecorator::AddTracks(long row, const Pose& X_WO, std::vector<Decoration>* decorations) const {

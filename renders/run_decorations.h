@@ -43,10 +43,6 @@ class RunDecorator {
 /// none.
 double CalcMetersPerNewton(const RunFrames& run);
 
-/// Contact forces of a row, each in its friction cone.
-void AddForces(const RunFrames& run, long row, double meters_per_newton,
-               std::vector<Decoration>* decorations);
-
 /// The pose of a body in computed kinematics.
 Pose BodyPose(const mjData& data, int body);
 

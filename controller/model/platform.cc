@@ -67,8 +67,4 @@ Matrix2d CalcWheelRateMap(const Base& base) {
 
 Vector2d CalcWheelRates(const Base& base, const Vector2d& v) { return CalcWheelRateMap(base) * v; }
 
-Vector2d CalcDriveVelocity(const Base& base, const Vector2d& wheel_rates) {
-  return CalcWheelRateMap(base).inverse() * wheel_rates;
-}
-
 }  // namespace dexcheck

@@ -34,8 +34,4 @@ Matrix2d CalcWheelRateMap(const Base& base);
 /// Wheel rates [thetadot_r; thetadot_l], rad/s, from v. Throws as CalcPlatformConstraint.
 Vector2d CalcWheelRates(const Base& base, const Vector2d& v);
 
-/// v, as base.velocity says, from the wheel rates [thetadot_r; thetadot_l], rad/s. Throws as
-/// CalcPlatformConstraint.
-Vector2d CalcDriveVelocity(const Base& base, const Vector2d& wheel_rates);
-
 }  // namespace dexcheck

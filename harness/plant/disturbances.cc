@@ -29,14 +29,12 @@ int FindBody(const RobotModel& model, const DisturbanceOptions& options, const s
 
 Disturbances::Disturbances(std::span<const DisturbanceOptions> options, const PartContext& context)
     : robot_(*context.model) {
-  for (const DisturbanceOptions& one : options) Add(one, context);
-}
-
-void Disturbances::Add(const DisturbanceOptions& one, const PartContext& context) {
-  sources_.push_back(
-      {one, FindBody(*context.model, one, context.source), RandomStream(context.seed, one.key + ".begin"),
-       RandomStream(context.seed, one.key + ".size"), RandomStream(context.seed, one.key + ".noise")});
-  on_robot_ = on_robot_ || sources_.back().body != Wrench::kObject;
+  for (const DisturbanceOptions& one : options) {
+    sources_.push_back(
+        {one, FindBody(*context.model, one, context.source), RandomStream(context.seed, one.key + ".begin"),
+         RandomStream(context.seed, one.key + ".size"), RandomStream(context.seed, one.key + ".noise")});
+    on_robot_ = on_robot_ || sources_.back().body != Wrench::kObject;
+  }
   wrenches_.reserve(sources_.size());
 }
 

@@ -18,9 +18,6 @@ class Disturbances {
   /// @throws InputError when a body is neither a link nor the object.
   Disturbances(std::span<const DisturbanceOptions> options, const PartContext& context);
 
-  /// One more, between steps; allocates. @throws InputError as the constructor.
-  void Add(const DisturbanceOptions& one, const PartContext& context);
-
   [[nodiscard]] bool empty() const { return sources_.empty(); }
   /// Those that act from t on, s, in the model's pose of each body. @param state the plant's.
   std::span<const Wrench> Evaluate(double t, const MeasuredState& state);

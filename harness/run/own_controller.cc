@@ -65,10 +65,6 @@ std::filesystem::path FindControllerFile(const OwnControllerOptions& own) {
   return is_one && !is_command ? file : std::filesystem::path();
 }
 
-void WatchController(const Scenario& scenario) {
-  if (FindControllerFile(scenario.controller).extension() == ".so") ContinueWatched(NameOf(scenario));
-}
-
 std::unique_ptr<Controller> MakeOwnController(const Setup& setup, const Sampling& sampling) {
   const Scenario& scenario = setup.scenario();
   if (scenario.pick_task() != nullptr)
@@ -88,7 +84,7 @@ std::unique_ptr<Controller> MakeOwnController(const Setup& setup, const Sampling
                                scenario.controller};
   if (FindControllerFile(own.own).extension() != ".so")
     return std::make_unique<ProtocolController>(StartProgram(own), own);
-  WatchController(scenario);
+  ContinueWatched(NameOf(scenario));
   auto library = std::make_unique<ForeignLibrary>(own);
   if (library->Find<void>("dexcheck_protocol") == nullptr)
     return std::make_unique<LibraryController>(std::move(library), own);

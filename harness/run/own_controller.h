@@ -39,9 +39,6 @@ struct OwnControllerSetup {
 /// another version, or does not take a parameter; ControllerFailure when it fails at once.
 std::unique_ptr<Controller> MakeOwnController(const Setup& setup, const Sampling& sampling);
 
-/// Goes on watched (ContinueWatched) where the scenario's controller is a library.
-void WatchController(const Scenario& scenario);
-
 /// The file that a controller is: a library or a Python file; empty for a command.
 std::filesystem::path FindControllerFile(const OwnControllerOptions& own);
 

@@ -231,7 +231,7 @@ TEST(ComputedTorque, BothChoicesOfVGiveTheSameTorques) {
   VectorXd tau[2];
   for (const DriveVelocity velocity : {DriveVelocity::kTwist, DriveVelocity::kWheelRates}) {
     GraspScene scene(Hands::kRight, velocity);
-    scene.xi.head<2>() = CalcDriveVelocity(scene.model.base(), Vector2d(6.0, -4.0));
+    scene.xi.head<2>() = CalcWheelRateMap(scene.model.base()).inverse() * Vector2d(6.0, -4.0);
     for (int i = 2; i < scene.robot.size(); ++i) scene.xi[i] = 0.5 * std::sin(i);
     scene.SetState();
     ComputedTorque law(scene.model, 4, {RedundancyWeight::Kind::kMass, {}});

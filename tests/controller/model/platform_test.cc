@@ -101,7 +101,6 @@ TEST(PlatformByHand, FacingYWithTwist) {
   // A turning forward speed of 1 m/s: centripetal acceleration v_c w_c towards -x.
   EXPECT_TRUE(MatrixNear(platform.S_v_dot * v, Vector3d(-0.5, 0.0, 0.0), kRounding));
   EXPECT_TRUE(MatrixNear(CalcWheelRates(base, v), Vector2d(11.0, 9.0), kRounding));
-  EXPECT_TRUE(MatrixNear(CalcDriveVelocity(base, {11.0, 9.0}), v, kRounding));
   // 3 and 1 N m at r = 0.1 m push with 30 and 10 N: 40 N along +y and (30 - 10) 0.2 = 4 N m about z.
   const Vector2d tau(3.0, 1.0);
   EXPECT_TRUE(MatrixNear(platform.E_v * tau, Vector3d(0.0, 40.0, 4.0), kRounding));
@@ -118,7 +117,6 @@ TEST(PlatformByHand, FacingYWithWheelRates) {
   EXPECT_TRUE(MatrixNear(platform.S_v * v, Vector3d(0.0, 1.0, 0.5), kRounding));
   EXPECT_TRUE(MatrixNear(platform.S_v_dot * v, Vector3d(-0.5, 0.0, 0.0), kRounding));
   EXPECT_TRUE(MatrixNear(CalcWheelRates(base, v), v, kRounding));
-  EXPECT_TRUE(MatrixNear(CalcDriveVelocity(base, v), v, kRounding));
   // The wheel torques are the generalised forces on the wheel rates.
   EXPECT_TRUE(MatrixNear(platform.S_v_T_E_v, Matrix2d::Identity(), kRounding));
 }
@@ -159,12 +157,6 @@ TEST_P(PlatformTest, VirtualPowerBalances) {
     ASSERT_GT(std::abs(power), kVisible);
     EXPECT_NEAR((platform.E_v * tau).dot(platform.S_v * state.v), power, kRounding * TolScale());
     EXPECT_NEAR((platform.S_v_T_E_v * tau).dot(state.v), power, kRounding * TolScale());
-  }
-}
-
-TEST_P(PlatformTest, DriveVelocityInvertsWheelRates) {
-  for (const State& state : states_) {
-    EXPECT_TRUE(MatrixNear(CalcDriveVelocity(base_, CalcWheelRates(base_, state.v)), state.v, kRounding));
   }
 }
 
@@ -215,7 +207,7 @@ TEST_P(PlatformTest, RejectsWhatIsNotADifferentialDrive) {
   EXPECT_THROW(CalcWheelRateMap(base), std::invalid_argument);
   base = base_;
   base.wheel_distance = -0.4;
-  EXPECT_EQ(MessageOf<std::invalid_argument>([&] { return CalcDriveVelocity(base, Vector2d::Zero()); }),
+  EXPECT_EQ(MessageOf<std::invalid_argument>([&] { return CalcWheelRates(base, Vector2d::Zero()); }),
             "wheel_distance: must be positive, got -0.4");
 }
 
