@@ -12,9 +12,12 @@
 #include "renders/decoration.h"
 #include "renders/image.h"
 
+// Cairo chose these names.
+// NOLINTBEGIN(bugprone-reserved-identifier)
 struct _cairo;
 struct _cairo_font_face;
 struct _cairo_surface;
+// NOLINTEND(bugprone-reserved-identifier)
 
 namespace dexcheck {
 
