@@ -42,8 +42,8 @@ if [[ $purpose == tests || $purpose == development ]]; then
     sqlite3 slurm-wlm munge strace xz-utils
     chromium chromium-driver python3-numpy python3-h5py doxygen
     tmux bash-completion
-    # the Python module
-    pybind11-dev python3-dev python3-pytest
+    # the Python module's tests
+    python3-pytest
     # what is packaged: hooks, the action, figures as PDF
     pre-commit git curl poppler-utils
     # other physics engines

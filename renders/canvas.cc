@@ -133,7 +133,7 @@ void Canvas::DrawText(const Font& font, double size, const Vector2d& baseline, c
   const double width = MeasureWith(cairo_, font.face_.get(), mended, size);
   const double before = align == Align::kCenter ? 0.5 * width : align == Align::kRight ? width : 0.0;
   SetColor(cairo_, color);
-  // On whole pixels the letters of a line look alike in all frames.
+  // On whole pixels the letters of a line are drawn the same way in all frames.
   cairo_move_to(cairo_.get(), std::round(baseline.x() - before), std::round(baseline.y()));
   cairo_show_text(cairo_.get(), mended.c_str());
 }

@@ -1,6 +1,6 @@
 #pragma once
 
-// What is drawn into the scene besides the model's own geoms. Points in world coordinates, m.
+// Decorations: shapes drawn into the scene besides the model's own geoms. Points in world coordinates, m.
 
 #include <array>
 #include <variant>

@@ -14,7 +14,7 @@ namespace dexcheck {
 const Mesa& LoadMesa() {
   static const Mesa loaded = [] {
     const std::string name = "libOSMesa.so.8";
-    // What it has is there for the whole process: MuJoCo looks for Mesa so.
+    // The library's symbols are global, because MuJoCo looks for Mesa among them.
     void* const library = ::dlopen(name.c_str(), RTLD_NOW | RTLD_GLOBAL);
     if (library == nullptr) throw Error(name + ": cannot be loaded: " + ::dlerror());
     const auto find = [&](const char* function) {

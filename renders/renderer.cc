@@ -111,6 +111,8 @@ constexpr int kLargestWidth = 3840;
 constexpr int kLargestHeight = 2160;
 constexpr int kSmallest = 16;
 constexpr int kMostDecorations = 4000;
+// Sides of round geoms, and rings of them.
+constexpr int kSlices = 24, kStacks = 8;
 
 // MuJoCo loads its OpenGL functions into globals whenever a context is made.
 std::mutex context_mutex;
@@ -124,7 +126,6 @@ void CheckOptions(const RenderOptions& options) {
   check("height", options.height, kSmallest, kLargestHeight);
   check("samples", options.samples, 1, 4);
   check("shadow_size", options.shadow_size, 16, 8192);
-  check("slices", options.slices, 3, 128);
 }
 
 constexpr int kCourse = -1;
@@ -189,8 +190,8 @@ Renderer::Renderer(const mjModel& model, const RenderOptions& options)
   sized->vis.global.offheight = options.samples * options.height;
   sized->vis.quality.offsamples = 0;
   sized->vis.quality.shadowsize = options.shadow_size;
-  sized->vis.quality.numslices = options.slices;
-  sized->vis.quality.numstacks = RenderOptions::kStacks;
+  sized->vis.quality.numslices = kSlices;
+  sized->vis.quality.numstacks = kStacks;
   mjr_makeContext(sized.get(), &context_, mjFONTSCALE_100);
   mjr_setBuffer(mjFB_OFFSCREEN, &context_);
   meshes_.emplace(context_);

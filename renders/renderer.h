@@ -50,13 +50,10 @@ struct RenderOptions {
   std::string camera = "overview";  ///< A camera of the MJCF, or kCourseCamera.
   Viewpoint course;
   int shadow_size = 2048;  ///< Pixels of the shadow map.
-  /// Each pixel is the mean of samples x samples (1 to 4). Smooths edges of geoms, shadows and textures
-  /// alike, for the price that four-fold multisampling has in software, which leaves the shadows' edges
-  /// jagged.
+  /// Each pixel is the mean of samples x samples (1 to 4). This smooths the edges of geoms,
+  /// shadows and textures at the cost of four-fold multisampling in software, which would leave the edges of
+  /// shadows jagged.
   int samples = 2;
-  /// Round geoms are drawn with so many sides, and so many rings of them.
-  int slices = 24;
-  static constexpr int kStacks = 8;
   /// Moves what cameras of the MJCF see to the right by this fraction of the picture's width, to make room
   /// for a panel.
   double shift_right = 0.0;
@@ -84,13 +81,13 @@ class Renderer {
   /// Draws the state in `data`, whose kinematics, cameras and lights must be computed.
   Image Render(mjData& data, std::span<const Decoration> decorations = {});
 
-  /// The same from a camera that stands there.
+  /// Draws from a camera at the given viewpoint.
   Image Render(mjData& data, const Viewpoint& from, std::span<const Decoration> decorations = {});
-  /// At most as large as the options' picture.
+  /// Draws a picture at most as large as the options' one.
   Image Render(mjData& data, const Viewpoint& from, int width, int height,
                std::span<const Decoration> decorations);
 
-  /// The same from another camera.
+  /// Draws from a camera of the model.
   Image Render(mjData& data, const std::string& camera, int width, int height,
                std::span<const Decoration> decorations = {});
 

@@ -18,7 +18,7 @@ struct CheckSeries {
   std::vector<double> residuals;  ///< One a row; what is not a number counts as infinite.
 };
 
-/// What a video needs of a run: n rows, one a recorded instant. Everything but times and qpos may be empty.
+/// Data of a run for a video: n rows, one a recorded instant. Everything but times and qpos may be empty.
 struct RunFrames {
   std::string source;       ///< The run's folder or file, for messages.
   std::string title;        ///< Name of the scenario.
@@ -58,7 +58,7 @@ class CheckHistory {
  public:
   explicit CheckHistory(const RunFrames& run);
 
-  /// Where each category stands at `row`, in the order of kCheckCategories; none of a run without checks.
+  /// Status of each category at `row`, in the order of kCheckCategories; none for a run without checks.
   [[nodiscard]] std::vector<CategoryStatus> ListCategories(long row) const;
 
  private:

@@ -25,7 +25,7 @@ constexpr double kWidestInset = 0.45;  // of the picture's width
 constexpr double kDown = -0.5;         // of a look at the object, against 1 along the floor
 
 constexpr double kNarrowShift = 0.15;   // of the picture's width
-constexpr double kCourseMargin = 0.03;  // likewise
+constexpr double kCourseMargin = 0.03;  // fraction of the picture
 
 // A frame at k / fps belongs to the row recorded at that time even if the two quotients round differently.
 constexpr double kTimeRounding = 1e-9;
@@ -109,7 +109,7 @@ class VideoPainter::RunPainter {
     return render;
   }
 
-  /// What the whole run has to fit into: right of the panel, with a margin around.
+  /// Part of the picture for the whole run: right of the panel, with a margin around.
   [[nodiscard]] ViewEdges MakeEdges() const {
     const double top = std::tan(0.5 * DegToRad(model_.vis.global.fovy));
     const double side = top * options_.width / options_.height;
@@ -133,7 +133,7 @@ class VideoPainter::RunPainter {
     return name == own && mj_name2id(&model_, mjOBJ_CAMERA, own) < 0;
   }
 
-  /// What the camera "robot" or "object" sees; none for others.
+  /// Viewpoint of the camera "robot" or "object"; none for others.
   /// @param edges of the picture. data_ has the row's kinematics.
   [[nodiscard]] std::optional<Viewpoint> FindOwnView(const std::string& camera,
                                                      const ViewEdges& edges) const {

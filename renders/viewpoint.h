@@ -1,6 +1,6 @@
 #pragma once
 
-// Where to stand so that all of something is in the picture.
+// Viewpoints from which all of something is in the picture.
 
 #include <mujoco/mujoco.h>
 
@@ -20,13 +20,13 @@ struct Viewpoint {
   double elevation = 0.0;               ///< rad; negative looks down.
 };
 
-/// What must be in the picture.
+/// Sphere that must be in the picture.
 struct VisibleSphere {
   Vector3d center;  ///< World, m.
   double radius;    ///< m.
 };
 
-/// Where in the picture: tangents of the angles between the camera's axis and the edges, positive.
+/// Edges of a part of the picture: tangents of the angles between them and the camera's axis, positive.
 struct ViewEdges {
   double left, right, bottom, top;
 };
@@ -37,8 +37,7 @@ struct ViewEdges {
 Viewpoint FitViewpoint(std::span<const VisibleSphere> spheres, double azimuth, double elevation,
                        const ViewEdges& edges);
 
-/// Where a camera stands that sees all that moves, from the run's beginning to its end, from the right and
-/// ahead.
+/// Viewpoint that shows all that moves, from the run's beginning to its end, from the right and ahead.
 /// @param data scratch for kinematics.
 /// @throws std::invalid_argument when nothing in the model can move.
 Viewpoint FindCourse(const mjModel& model, const RunFrames& run, const ViewEdges& edges, mjData* data);
@@ -52,13 +51,13 @@ struct Way {
 /// @param data scratch for kinematics.
 Way FindWay(const mjModel& model, const RunFrames& run, mjData* data);
 
-/// Where a camera stands that sees all that moves at one instant.
+/// Viewpoint that shows all that moves at one instant.
 /// @param bearing of the view, rad.
 /// @param data whose kinematics are computed.
 /// @throws std::invalid_argument when nothing in the model can move.
 Viewpoint FindInstant(const mjModel& model, double bearing, const ViewEdges& edges, const mjData& data);
 
-/// Where a camera stands that sees a body and what is beside it from near by.
+/// Viewpoint close to a body that shows it and its surroundings.
 /// @param from in whose direction it stands, world, m.
 Viewpoint FindCloseUp(const mjModel& model, int body, const Vector3d& from, const mjData& data);
 

@@ -24,8 +24,7 @@ clone=/var/tmp/dexcheck
 git clone --quiet "file://$repository" "$root$clone"
 echo "Commit $(git -C "$root$clone" rev-parse --short HEAD), bare Debian $(cat "$root/etc/debian_version"), order: $order"
 
-mapfile -t commands < <(awk '/^## Quick start/ { on = 1 } on && /^```sh/ { code = 1; next } code && /^```/ { exit } code' \
-  "$repository/README.md")
+mapfile -t commands < <(awk '/^```sh/ { code = 1; next } /^```/ { code = 0 } code' "$repository/README.md")
 [[ ${#commands[@]} -eq 2 ]] || { echo "fresh_machine: README.md has ${#commands[@]} set-up commands, not two" >&2; exit 1; }
 user=root
 if [[ $order == reversed ]]; then

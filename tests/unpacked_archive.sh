@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # The archive on systems that have nothing: unpacked in bare roots of Debian 12 and 13, as nobody and without HOME, it runs,
-# draws, encodes, reports and compares; all libraries but glibc's are its own.
+# draws, encodes, reports and compares; all libraries but glibc's are its own. Then its wheel, installed there by pip without a
+# network: the same program, and the Python module with the NumPy of that Debian.
 #   tests/unpacked_archive.sh [ARCHIVE.tar.xz]    by default what cpack makes in build/release
 # Needs root, debootstrap, cpack, patchelf and poppler-utils; takes some minutes, so it is no part of the gate, but is run before
 # a release.
@@ -40,7 +41,37 @@ for package in ffmpeg libmujoco libosmesa6 libx264; do
   compgen -G "$scratch/unpacked/share/doc/dexcheck/licenses/$package*" >/dev/null || Fail "the licence of $package is not there"
 done
 
-# What nobody does in each root; $bin is the folder of the program.
+wheel_folder=$scratch/wheel
+mkdir "$wheel_folder"
+python3 "$repository/harness/packaging/make_wheel.py" "$archive" "$wheel_folder"
+
+# Commands of the wheel's user; $wheel is its file.
+cat >"$scratch/wheel.sh" <<'COMMANDS'
+set -eux
+python3 -m venv --system-site-packages tools
+tools/bin/pip install --no-index --no-cache-dir "$wheel"
+tools/bin/dexcheck version
+share=$(echo tools/lib/python3*/site-packages/dexcheck/_program/share/dexcheck)
+arm=$share/harness/descriptions/examples/arm.urdf
+tools/bin/dexcheck "$arm" "$arm" --quiet
+tools/bin/dexcheck run paper --set duration=0.2 --out run --quiet
+tools/bin/python - "$arm" <<'PYTHON'
+import sys
+
+import dexcheck
+import numpy as np
+
+robot = dexcheck.load(sys.argv[1])
+assert np.linalg.eigvalsh(robot.M(np.zeros(robot.nq))).min() > 0
+assert robot.compare({"M": robot.M, "g": robot.g}, samples=10)
+assert not robot.compare({"M": lambda q: 1.001 * robot.M(q)}, samples=10)
+assert robot.compare(sys.argv[1], samples=10)
+law = lambda s: s.gravity + s.M @ (400 * (s.q_d - s.q) + 40 * (s.v_d - s.v))
+assert "q" in dexcheck.run("panda-reach", law, set={"duration": 0.2}).log
+PYTHON
+COMMANDS
+
+# Commands of the archive's user, nobody, in each root; $bin is the folder of the program.
 cat >"$scratch/commands.sh" <<'COMMANDS'
 set -eux
 "$bin/dexcheck" version
@@ -86,5 +117,15 @@ for suite in bookworm trixie; do
   [[ -z $foreign ]] || Fail "these are not the archive's own: $foreign"
   mv commands.sh "$scratch/"
   cd /
+  sed -i "s/bookworm/$suite/g" "$root"/etc/apt/sources.list.d/* "$root/etc/apt/sources.list" 2>/dev/null || true
+  chroot "$root" sh -c "apt-get update && apt-get install --yes --no-install-recommends python3-venv python3-numpy" \
+    >"$scratch/$suite.txt" 2>&1 || { tail -20 "$scratch/$suite.txt"; exit 1; }
+  install -d -o nobody -g nogroup "$root/var/tmp/wheel"
+  cp "$wheel_folder"/*.whl "$scratch/wheel.sh" "$root/var/tmp/wheel/"
+  wheel=$(basename "$wheel_folder"/*.whl)
+  echo "$wheel with Python $(chroot "$root" python3 --version | cut -d ' ' -f 2)"
+  # Without a network of its own, as nobody, without HOME.
+  unshare --net chroot --userspec=nobody:nogroup "$root" env -i PATH=/usr/bin:/bin wheel="./$wheel" \
+    sh -c "cd /var/tmp/wheel && exec sh wheel.sh" >"$scratch/$suite.txt" 2>&1 || { tail -20 "$scratch/$suite.txt"; exit 1; }
 done
-echo "the archive runs on both"
+echo "the archive and its wheel run on both"

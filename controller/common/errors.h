@@ -46,12 +46,12 @@ void Require(bool condition, std::string_view name, std::string_view requirement
                               FormatNumber(static_cast<double>(value)));
 }
 
-/// The same for a number that must be finite and positive.
+/// Throws as Require unless the value is finite and positive.
 inline void RequirePositive(double value, std::string_view name) {
   Require(std::isfinite(value) && value > 0.0, name, "must be positive", value);
 }
 
-/// The same for one that must be finite and not negative.
+/// Throws as Require unless the value is finite and not negative.
 inline void RequireNotNegative(double value, std::string_view name) {
   Require(std::isfinite(value) && value >= 0.0, name, "must not be negative", value);
 }

@@ -39,7 +39,7 @@ inline void CalcGramMatrix(const RowMatrixXd& H, const RowMatrixXd& W_H, std::sp
   }
 }
 
-/// The same of H^T H.
+/// Lower triangle of A = H^T H over the rows listed, as above.
 inline void CalcGramMatrix(const RowMatrixXd& H, std::span<const int> rows, MatrixXd* A) {
   CalcGramMatrix(H, H, rows, A);
 }

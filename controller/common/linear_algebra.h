@@ -25,13 +25,13 @@ struct SymmetricEigen {
   MatrixXd vectors;
 };
 
-/// Of a symmetric matrix; its lower triangle is read.
+/// Decomposes a symmetric matrix, whose lower triangle is read.
 SymmetricEigen DecomposeSymmetric(const Eigen::Ref<const MatrixXd>& S);
 
 /// The eigenvalues alone, ascending.
 VectorXd CalcSymmetricEigenvalues(const Eigen::Ref<const MatrixXd>& S);
 
-/// Of a symmetric matrix of six rows, and allocates nothing: eigenvalues ascending, and the eigenvectors.
+/// Decomposes a symmetric 6 x 6 matrix without allocating: eigenvalues ascending, eigenvectors as columns.
 void DecomposeSymmetric(const Matrix6d& S, Vector6d* values, Matrix6d* vectors);
 
 /// K v = k Lambda v with v^T Lambda v = 1: k ascending and the v as columns, of K symmetric and Lambda
@@ -50,7 +50,7 @@ class LeastSquares {
   [[nodiscard]] Eigen::Index rank() const { return decomposition_.rank(); }
   /// The x of least norm among those that make |A x - b| least.
   [[nodiscard]] VectorXd Solve(const Eigen::Ref<const VectorXd>& b) const;
-  /// As Solve, of A^T.
+  /// The x of least norm among those that make |A^T x - b| least.
   [[nodiscard]] VectorXd SolveTransposed(const Eigen::Ref<const VectorXd>& b) const;
 
  private:

@@ -13,7 +13,7 @@ namespace dexcheck {
 
 /// Shortest decimal text that reads back as the same number.
 std::string FormatNumber(double value);
-/// The same with at most this many significant digits.
+/// Shortest decimal text of the number rounded to at most this many significant digits.
 std::string FormatNumber(double value, int digits);
 
 /// "[a, b, c]" of any range of numbers.
@@ -48,7 +48,7 @@ std::string SuggestNearest(std::string_view word, const std::vector<std::string>
 
 /// The text without these letters before and behind it.
 std::string_view Trim(std::string_view text, std::string_view blanks = " \t\r");
-/// With small letters, of ASCII alone.
+/// The text in lower case; only ASCII letters change.
 std::string ToLower(std::string text);
 
 /// The number that the whole text is; none when it is not one, or does not fit.

@@ -159,7 +159,7 @@ void Place(std::string_view path, Change mode, toml::node* value,
 /// TomlDocument::Override. "PATH+=VALUE" adds an entry to a list, which is made when it is not there;
 /// "PATH-=" removes a key that is there.
 void Assign(std::string_view assignment, toml::table* root) {
-  // As messages show it: of readable length, without control characters.
+  // Messages show the assignment shortened and without control characters.
   const bool removes = assignment.ends_with("-=");
   const std::string label =
       Abbreviate(removes ? "--unset " + std::string(assignment.substr(0, assignment.size() - 2))

@@ -132,7 +132,7 @@ MissingKeys& TomlValue::Note(const std::string& problem) const {
   const bool is_own = node_->source().path != nullptr;
   MissingKeys note{Locate(), is_own ? 0 : line(), path_, {}, problem};
   std::vector<MissingKeys>& all = context_->missing;
-  // What two arms are made from is read twice.
+  // A template of two arms is read twice, and notes its keys once.
   const auto same = std::ranges::find_if(all, [&](const MissingKeys& other) {
     return other.where == note.where && other.path == note.path && other.problem == problem;
   });

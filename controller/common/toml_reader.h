@@ -36,7 +36,7 @@ struct MissingKeys {
   std::string problem;
 };
 
-/// What all values of one file share.
+/// Data that all values of one file share.
 struct TomlContext {
   std::string source;                        ///< The file, for messages.
   SymbolTable symbols;                       ///< For quoted arithmetic.
@@ -71,7 +71,7 @@ class TomlValue {
   [[nodiscard]] bool AsFlag() const;
   [[nodiscard]] bool IsText() const { return node_->is_string(); }
   [[nodiscard]] bool IsTable() const { return node_->is_table(); }
-  /// As it might stand in the file, on one line.
+  /// The value as TOML on one line.
   [[nodiscard]] std::string Show() const;
   [[nodiscard]] std::string AsText() const;
   /// Text that can name a thing: 1 to 64 of the letters A-Z, a-z, digits, and _ - .
@@ -96,7 +96,7 @@ class TomlValue {
     return AsVector<N>();
   }
 
-  /// What stands beside the text in the list of choices.
+  /// The choice that the list pairs with this value's text.
   template <typename T>
   [[nodiscard]] T AsChoice(std::initializer_list<std::pair<std::string_view, T>> choices) const {
     if (is_missing_) return choices.begin()->second;
@@ -116,9 +116,9 @@ class TomlValue {
   [[noreturn]] void Fail(std::string_view requirement) const;
   /// Throws "FILE:LINE: PATH: problem".
   [[noreturn]] void Reject(std::string_view problem) const;
-  /// Of this table: that it does not have a key.
+  /// Notes that this table lacks a key.
   void NoteMissing(const std::string& key) const;
-  /// That it stands under a key which looks like another one.
+  /// Notes that this value's key looks like a misspelling of another one.
   void NoteMisspelt(const std::string& key) const;
 
  private:
@@ -199,7 +199,7 @@ class TomlDocument {
   ~TomlDocument() = default;
 
   [[nodiscard]] TomlTable Open() const;
-  /// What a function makes of the whole file. Whatever it throws, keys that are missing come first.
+  /// Returns what `function` returns for the whole file. Missing keys are reported before anything it throws.
   template <typename Function>
   auto Read(const Function& function) const {
     try {
@@ -217,7 +217,7 @@ class TomlDocument {
   /// numbers in the path count the entries of lists, from 0. A value that is not TOML is taken as text.
   /// @throws InputError when this is no assignment, or its path leads through what is no table or list.
   void Override(std::string_view assignment);
-  /// Sets a number in place of the file's, at a path as Override takes it. @throws InputError likewise.
+  /// Sets a number in place of the file's, at a path as Override takes it. @throws InputError as Override.
   void Set(std::string_view path, double number);
   /// Adds a symbol to those that quoted arithmetic may use from now on.
   void Define(const std::string& symbol, double value) { context_->symbols[symbol] = value; }

@@ -65,7 +65,7 @@ struct Pair {
   Matrix3d R_f;
   Vector3d e;     // from the fingertip's point to the object's
   Vector2d e_xy;  // tangential part of e, in the fingertip's Gauss frame
-  Vector2d n_xy;  // tangential part of the object's normal, likewise
+  Vector2d n_xy;  // tangential part of the object's normal, in the same frame
   double gap;
 };
 

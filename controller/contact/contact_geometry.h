@@ -77,13 +77,13 @@ double CalcRimDistance(double radius, const Vector3d& pole, const Vector3d& p);
 /// isolated point (two planes, or a fingertip flatter than the hollow it is in).
 Vector5d CalcKappaDot(const ContactGeometry& contact, const Vector6d& V);
 
-/// The same contact in well-conditioned charts: both alphas normalized (Surface::Normalize), psi turned with
-/// the Gauss frames when a chart changes, and in [-pi, pi].
+/// Expresses a contact in well-conditioned charts: both alphas are normalized (Surface::Normalize), psi turns
+/// with the Gauss frames when a chart changes and lies in [-pi, pi].
 ContactCoordinates NormalizeContact(const Surface& fingertip, const Surface& object,
                                     const ContactCoordinates& kappa);
 
-/// The same contact in given charts, psi turned with the Gauss frames. Throws std::invalid_argument for an
-/// unknown chart.
+/// Expresses a contact in the given charts; psi turns with the Gauss frames. Throws std::invalid_argument for
+/// an unknown chart.
 ContactCoordinates ChangeCharts(const Surface& fingertip, const Surface& object,
                                 const ContactCoordinates& kappa, int fingertip_chart, int object_chart);
 
@@ -115,7 +115,7 @@ ContactCoordinates IntegrateKappa(const Surface& fingertip, const Surface& objec
 /// stops: a few hundred rounding errors.
 inline constexpr double kContactConvergence = 1e-13;
 
-/// Where two surfaces meet.
+/// Contact that FindContact found between two surfaces.
 struct FoundContact {
   ContactCoordinates kappa;  ///< normalized
   double gap = 0.0;          ///< m along the common normal; negative where the bodies overlap
@@ -128,7 +128,7 @@ struct FoundContact {
 FoundContact FindContact(const Surface& fingertip, const Surface& object, const Pose& X_OF,
                          const ContactCoordinates& guess);
 
-/// As above without a guess: starts at the object's point closest to the fingertip frame's origin.
+/// Finds the contact without a guess: starts at the object's point closest to the fingertip frame's origin.
 FoundContact FindContact(const Surface& fingertip, const Surface& object, const Pose& X_OF);
 
 }  // namespace dexcheck

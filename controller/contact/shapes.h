@@ -35,7 +35,7 @@ class Cylinder final : public Surface {
   double radius_;
 };
 
-/// What sphere and ellipsoid share: u longitude and v latitude in two charts of the unit sphere, whose points
+/// Base of sphere and ellipsoid: u longitude and v latitude in two charts of the unit sphere, whose points
 /// are scaled by the semi-axes.
 class LatitudeSurface : public Surface {
  public:
@@ -80,7 +80,7 @@ class Box final : public Surface {
   explicit Box(const Vector3d& half_size);
   [[nodiscard]] const Vector3d& half_size() const { return half_size_; }
   [[nodiscard]] int num_charts() const override { return 6; }
-  /// Of a point that is nearest to an edge, the point of that edge on the face from which it is farther.
+  /// Projects a point that is nearest to an edge onto that edge, in the chart of the face farther from it.
   [[nodiscard]] SurfaceProjection Project(const Vector3d& p) const override;
   [[nodiscard]] bool Contains(const SurfacePoint& alpha, double margin) const override;
 

@@ -74,12 +74,12 @@ class Surface {
   /// (3x1, m, body frame) is farther than `tolerance` (m) from the surface.
   [[nodiscard]] SurfacePoint Locate(const Vector3d& p, double tolerance) const;
 
-  /// The same point in the coordinates of `chart`, periodic coordinates in [-pi, pi].
+  /// Expresses a point in the coordinates of `chart`, periodic coordinates in [-pi, pi].
   /// Throws std::invalid_argument for an unknown chart.
   [[nodiscard]] SurfacePoint ToChart(const SurfacePoint& alpha, int chart) const;
 
-  /// The same point with periodic coordinates in [-pi, pi], in its own chart if that holds it away from the
-  /// chart's edge, otherwise in one that does. Changing charts turns the Gauss frame about the normal.
+  /// Expresses a point with periodic coordinates in [-pi, pi], in its own chart if that holds it away from
+  /// the chart's edge, otherwise in one that does. Changing charts turns the Gauss frame about the normal.
   [[nodiscard]] SurfacePoint Normalize(const SurfacePoint& alpha) const;
 
   /// Whether the chart holds these coordinates, and an edge at which it ends is `margin` (m) away or more. A

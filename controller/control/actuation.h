@@ -15,7 +15,7 @@ class ActuationMap {
   /// force (n) = E_bar' tau' (n). Both may be the same vector. Throws std::invalid_argument when a size
   /// differs.
   void CalcForce(const Eigen::Ref<const VectorXd>& tau, Eigen::Ref<VectorXd> force) const;
-  /// tau' (n) = E_bar'^-1 force (n), likewise.
+  /// tau' (n) = E_bar'^-1 force (n), under the conditions of CalcForce.
   void CalcTorque(const Eigen::Ref<const VectorXd>& force, Eigen::Ref<VectorXd> tau) const;
 
  private:

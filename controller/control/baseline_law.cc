@@ -35,7 +35,8 @@ void ObjectSpaceInertia::Compute(const ModelTerms& robot, const GraspTerms& gras
     const double pivot = inverse_llt_.matrixLLT()(i, i);
     smallest = std::min(smallest, pivot * pivot / inverse_(i, i));
   }
-  // Of Lambda_c^-1, against its diagonal entry, the pivot that counts as regular; as ConstrainedDynamics.
+  // Smallest pivot of Lambda_c^-1, relative to its diagonal entry, that counts as regular; the value of
+  // ConstrainedDynamics.
   constexpr double kMinPivotRatio = 1e-8;
   if (!(smallest > kMinPivotRatio)) {
     throw SingularityError("J_B' has not full row rank, smallest independent part " + FormatNumber(smallest),

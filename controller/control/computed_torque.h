@@ -52,7 +52,7 @@ class ComputedTorque {
   /// not formed. @throws as SetDemand, without G.
   void SetMotion(const ModelTerms& robot, const GraspTerms& grasp, const Vector6d& V_Bo_dot,
                  const Eigen::Ref<const VectorXd>& sigma_prime);
-  /// The same without any contact, (18): xi_dot_d is sigma'.
+  /// Sets the motion without any contact, (18): xi_dot_d is sigma'.
   void SetFreeMotion(const ModelTerms& robot, const Eigen::Ref<const VectorXd>& sigma_prime);
 
   /// In the place of the first stage, what another law demands: F_o (Sigma_o) and E_bar' tau_0 (n); xi_dot_d
@@ -98,7 +98,8 @@ class ComputedTorque {
   VectorXd rates_;                          // k
 };
 
-/// sigma' of (47), which the paper leaves open: a damped posture for the motions that do not move the object,
+/// sigma' of (47), which the paper does not specify: a damped posture for the motions that do not move the
+/// object,
 ///   sigma' = acceleration + damping (xi_reference - xi) + stiffness [0; q_posture - q],
 /// entry by entry. The base has no posture; it follows because the arms pull toward theirs. Where the null
 /// space takes all of sigma' (an arm that holds nothing), critical damping is damping^2 = 4 stiffness; with

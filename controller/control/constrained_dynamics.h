@@ -22,7 +22,7 @@ struct Prediction {
   VectorXd f_c;                          ///< k, N, of finger on object, each in its Sigma_cf.
 };
 
-/// What bears the object.
+/// Support of the object's weight.
 enum class ObjectSupport {
   kHand,    ///< The contacts alone.
   kAtRest,  ///< Something that it lies on, so firmly that it does not move.
@@ -66,7 +66,7 @@ class ConstrainedDynamics {
   void CalcFreeForce(const ModelTerms& robot, const Eigen::Ref<const VectorXd>& force);
 
   TreeFactor factor_;
-  // Of J_B'^T those rows are used whose joints carry a fingertip, and then the object's six.
+  // Rows of J_B'^T whose joints carry a fingertip, followed by the object's six.
   std::vector<int> rows_;
   RowMatrixXd half_;  // n + 6 x k, padded: [M_bar'^-1/2 J_B'^T; -M_hat^-1/2 G]
   MatrixXd schur_;    // k x k, padded
@@ -90,7 +90,7 @@ class GroundDynamics {
   const Prediction& Predict(const ModelTerms& robot, const GroundContacts& ground,
                             const Eigen::Ref<const VectorXd>& force);
 
-  // Of the last Predict.
+  // Results of the last Predict.
 
   /// M_bar' = L^T L.
   [[nodiscard]] const TreeFactor& mass_factor() const { return factor_; }

@@ -1,6 +1,6 @@
 #pragma once
 
-// What stands in the loop between sensors and motors: a law, or a task that uses several.
+// A controller stands between sensors and motors: a control law, or a task that uses several.
 
 #include "controller/common/types.h"
 #include "controller/control/grasp_model.h"
@@ -10,14 +10,14 @@
 
 namespace dexcheck {
 
-/// What a step's contacts are commanded to be.
+/// Contacts that a step commands.
 struct Handling {
   bool partial = false;     ///< Contacts come and go, and the object may lie on something: a task.
   bool holding = true;      ///< All fingertips should touch the object.
   ContactSet contacts = 0;  ///< Of a task: fingertips that the law lets push.
 };
 
-/// What a law commands by its torques: what the rigid constrained system (46), (48) does under them.
+/// Motion and forces of the rigid constrained system (46), (48) under the torques of a control law.
 struct LawDemand {
   Vector6d V_Bo_dot = Vector6d::Zero();  ///< Of the object's body velocity, Sigma_o, m/s^2, rad/s^2.
   VectorXd xi_dot;                       ///< xi_dot_d (n) of (47).
@@ -27,18 +27,18 @@ struct LawDemand {
   VectorXd F_N;  ///< 3N, internal part of f_c; zero unless (49) splits it so.
 };
 
-/// Where a task is.
+/// Progress of a task.
 struct TaskProgress {
   int phase = -1;       ///< Number of the phase, in the task's own order; -1 without a task.
   double weight = 0.0;  ///< Part of the object's stated weight that the hand bears.
 };
 
-/// What a controller sends at one instant, and what it demands by that.
+/// Torques that a controller sends at one instant, and the motion that they are to cause.
 struct Command {
   VectorXd tau;           ///< tau' (n), N m: of the right and left wheel, then of the joints.
   DesiredMotion desired;  ///< Of the object; where it is, when it need not move.
   bool tracks = true;     ///< Whether the object should follow `desired`.
-  /// Of the joints, for a robot that holds nothing and follows a motion of them; empty otherwise.
+  /// Desired joints of a robot that holds nothing and follows a joint motion; empty otherwise.
   DesiredJoints joints;
   bool computes_joints = false;  ///< Whether `tau` was computed for them at this instant.
   LawDemand demand;

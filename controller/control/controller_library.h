@@ -44,7 +44,7 @@ class ControllerParameters {
   mutable std::vector<std::string> asked_;
 };
 
-/// What a controller may know before the run. References outlive the controller.
+/// Data that a controller may use before the run. References outlive the controller.
 struct ControllerContext {
   const RobotModel& model;
   const std::vector<int>& fingertips;  ///< Frames of the grasp.
@@ -65,8 +65,8 @@ struct ControllerContext {
 inline constexpr int kControllerInterface = 3;
 inline constexpr int kOldestControllerInterface = 2;
 
-/// What program and library must have in common, as text: the interface, and how the compiler lays out what
-/// is handed over.
+/// Text that must be equal in program and library: the interface's number, and the compiler's layout of the
+/// types that are passed.
 static inline std::string DescribeControllerInterface(int interface = kControllerInterface) {
   char text[160];
   std::snprintf(text, sizeof(text),

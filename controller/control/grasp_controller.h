@@ -23,7 +23,7 @@ class GraspForceError : public Error {
 /// @throws GraspForceError that says why, unless there is a solution.
 void RequireGraspForce(const GraspForceResult& result);
 
-/// What the controller may choose.
+/// Options of the grasp controller.
 struct GraspControllerOptions : GraspModelOptions {
   explicit GraspControllerOptions(const RobotModel& model) : posture(model) {}
 

@@ -53,7 +53,7 @@ class AlternatingModel {
  public:
   explicit AlternatingModel(const GraspModel& model) : models_{model, model} {}
 
-  /// As GraspModel::SetState; the model of the call before stays as it is.
+  /// Sets the state as GraspModel::SetState does; the model of the previous call is kept unchanged.
   void SetState(const MeasuredState& state) {
     const GraspModel& last = now();
     now_ = 1 - now_;

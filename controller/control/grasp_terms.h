@@ -1,6 +1,6 @@
 #pragma once
 
-// What a grasp adds to the robot's terms in one control step (sections 4.2 to 4.4): G, J_B', their rates
+// Terms that a grasp adds to the robot's in one control step (sections 4.2 to 4.4): G, J_B', their rates
 // along rolling contacts, and the object's terms. Fingers of one hand or of both, one hard-finger contact
 // each; n entries of xi, k = 3N of f_c = [f_c1; ..; f_cN].
 
@@ -38,8 +38,8 @@ class GraspTerms {
   /// @throws std::invalid_argument when sizes differ; what CalcKappaDot throws.
   void SetState(const ModelTerms& robot, const Vector6d& X_o, const Vector6d& X_o_dot,
                 std::span<const ContactCoordinates> kappa);
-  /// The same at a pose and a body velocity V_Bo, also where ZYZ angles are singular; coordinates() is then
-  /// not available.
+  /// Sets the state by a pose and a body velocity V_Bo, also where ZYZ angles are singular; coordinates() is
+  /// then not available.
   void SetPose(const ModelTerms& robot, const Pose& X_Bo, const Vector6d& V_Bo,
                std::span<const ContactCoordinates> kappa);
 

@@ -73,7 +73,7 @@ class JointLaw {
   /// others q_d_ddot.
   [[nodiscard]] const VectorXd& xi_dot_d() const { return xi_dot_d_; }
   [[nodiscard]] ControlLaw law() const { return law_; }
-  /// What the last torques ask of the ground (3m), world axes, N; empty for a base that is fixed.
+  /// Ground contact forces (3m) of the last torques, world axes, N; empty for a fixed base.
   [[nodiscard]] const VectorXd& ground_forces() const { return ground_forces_; }
   [[nodiscard]] const JointGains& gains() const { return gains_; }
 
@@ -87,7 +87,7 @@ class JointLaw {
   VectorXd ground_forces_;
 };
 
-/// What a motion of joints demands of a controller: the start until Begin, then q_d(t).
+/// Joints that a motion demands of a controller: its start until Begin, then q_d(t).
 class JointDemand {
  public:
   /// @param motion outlives this.

@@ -1,6 +1,6 @@
 #pragma once
 
-// What the joints of a robot that holds nothing should do: q_d(t), with its first two derivatives.
+// Desired joint motion of a robot that holds nothing: q_d(t), with its first two derivatives.
 
 #include <memory>
 #include <utility>
@@ -45,7 +45,7 @@ class JointMotion {
   JointMotion(const VectorXd& q_start, const std::vector<JointWayPoint>& points,
               const std::vector<JointOscillation>& oscillations);
 
-  /// Of a robot that stands: all of q_d is what that motion says, q' and xi with those of the base.
+  /// Takes all of q_d from a stance motion of a legged robot; q' and xi include those of the base.
   explicit JointMotion(std::shared_ptr<const StanceMotion> stance);
 
   [[nodiscard]] const VectorXd& q_start() const { return q_start_; }

@@ -44,7 +44,7 @@ struct ObjectErrors {
   Vector6d e = Vector6d::Zero();
   /// V_d - V_Bo, the desired body velocity less the object's. m/s, rad/s.
   Vector6d V_error = Vector6d::Zero();
-  /// Of the desired motion: d/dt V_d along the object's motion, m/s^2, rad/s^2.
+  /// Derivative of the desired twist V_d along the object's motion, m/s^2, rad/s^2.
   Vector6d V_d_dot = Vector6d::Zero();
 };
 

@@ -32,10 +32,11 @@ class Pseudoinverse {
   /// @throws std::invalid_argument when the shape differs, SingularityError with the condition number when J
   /// has not full row rank, as far as double precision can distinguish.
   void Factor(const Eigen::Ref<const MatrixXd>& J, std::span<const int> columns = {});
-  /// The same with W = diag(w). @throws std::invalid_argument also unless every entry of w (n) is positive.
+  /// Factors J with the weight W = diag(w). @throws std::invalid_argument also unless every entry of w (n) is
+  /// positive.
   void FactorDiagonal(const Eigen::Ref<const MatrixXd>& J, const Eigen::Ref<const VectorXd>& w,
                       std::span<const int> columns = {});
-  /// The same with any W (n x n); its lower triangle is read.
+  /// Factors J with any weight W (n x n), whose lower triangle is read.
   /// @throws std::invalid_argument also when W is not positive definite.
   void FactorWeighted(const Eigen::Ref<const MatrixXd>& J, const Eigen::Ref<const MatrixXd>& W);
 

@@ -18,7 +18,7 @@ constexpr double kDependent = 1e-9;   // of the largest pivot: rows that others 
 
 Eigen::Quaterniond ReadTurn(const Eigen::Ref<const VectorXd>& q) { return {q[3], q[4], q[5], q[6]}; }
 
-/// Of the columns of the joints.
+/// Decomposes the columns of J that belong to joints.
 LeastSquares SolveForJoints(const MatrixXd& J) {
   return LeastSquares(kDependent).Compute(J.rightCols(J.cols() - 6));
 }
@@ -99,7 +99,7 @@ void StanceMotion::Evaluate(double t, DesiredJoints* desired) const {
     robot.SetState(q, xi);
     ground.SetState(robot);
     for (int i = 0; i < ground.count(); ++i) {
-      // What touches the ground has moved by the centre's way and by theta x a, a = -r n.
+      // The contact point has moved by the centre's displacement plus theta x a, a = -r n.
       const Pose& X_start = X_WF_start_[static_cast<size_t>(i)];
       const Pose& X = ground.X_WF(i);
       const Vector3d theta = X_start.linear() * LogSo3(X_start.linear().transpose() * X.linear());

@@ -46,8 +46,8 @@ class StanceForces {
   VectorXd f_;
 };
 
-/// Where all joints are while the body follows a motion and the feet stay: q_d, xi_d, xi_dot_d of a floating
-/// base and its joints.
+/// Motion of all joints while the body follows a trajectory and the feet stay: q_d, xi_d, xi_dot_d of a
+/// floating base and its joints.
 class StanceMotion {
  public:
   /// @param q_start q', with all feet on the ground. @param body displacement of the base from there: x, y, z

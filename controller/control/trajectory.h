@@ -12,7 +12,7 @@
 
 namespace dexcheck {
 
-// What the object should do at one instant: in X_o, as the paper has it, and as a pose.
+// Desired motion of the object at one instant: in X_o, as the paper has it, and as a pose.
 
 /// X_d of (55) and its derivatives: [position in the world, m; ZYZ angles, rad].
 struct DesiredMotion {
@@ -21,7 +21,7 @@ struct DesiredMotion {
   Vector6d X_d_ddot = Vector6d::Zero();
 };
 
-/// The same without angles: of the desired frame d against the world B.
+/// Desired pose and its derivatives without angles: frame d relative to the world B.
 struct DesiredPose {
   Vector3d p_Bd, p_Bd_dot, p_Bd_ddot;  ///< m, m/s, m/s^2, in the world.
   Matrix3d R_Bd;
@@ -40,8 +40,8 @@ struct ScalarMotion {
 /// outside.
 ScalarMotion CalcMinJerk(double t, double duration);
 
-/// The same with least snap: s = 35 u^4 - 84 u^5 + 70 u^6 - 20 u^7. Its jerk does not jump at the ends
-/// either: that would make soft contacts vibrate.
+/// Minimum-snap motion: s = 35 u^4 - 84 u^5 + 70 u^6 - 20 u^7. Its jerk does not jump at the ends either:
+/// that would make soft contacts vibrate.
 ScalarMotion CalcMinSnap(double t, double duration);
 
 /// Motion whose speed rises from 0 to 1 in `duration` s like CalcMinJerk and stays there; s(0) = 0. Without

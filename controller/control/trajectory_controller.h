@@ -61,8 +61,8 @@ class ContactFollower {
 struct Sampling {
   double time_step = 0.0;  ///< Velocities belong to the middle of the step before (leapfrog), s; 0 for none.
   long hold = 1;           ///< Torques are computed at every hold-th Step and kept in between.
-  /// Where contacts are followed by (40) from the run's beginning on: how Steps follow each other. Otherwise
-  /// they are where the reading has them.
+  /// Timing of the steps when contacts are integrated by (40) from the run's beginning; without it contacts
+  /// are those of the reading.
   std::optional<StateTiming> contacts = std::nullopt;
 };
 
@@ -82,7 +82,7 @@ class TrajectoryController final : public Controller {
   /// kappa (39) of each contact that is followed; empty before Begin, and where contacts are measured.
   [[nodiscard]] const std::vector<ContactCoordinates>& followed_kappa() const { return followed_.kappa; }
 
-  /// What a command says at each step of a motion of the object that holds it, before its torques.
+  /// Fills in the parts of a command that do not depend on torques, for an object that is held and moved.
   static void BeginCommand(const Trajectory& motion, double t, double time_step, Command* command);
   /// X_d, X_d_ddot at t, and X_d_dot half a time step before.
   [[nodiscard]] static DesiredMotion EvaluateDesired(const Trajectory& motion, double t, double time_step);

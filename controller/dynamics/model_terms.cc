@@ -37,7 +37,7 @@ ModelTerms::ModelTerms(const RobotModel& model, Coordinates coordinates)
     add_mass(joint.body);
   }
   for (const Frame& frame : model.frames()) {
-    // Of reduced coordinates; the base of unreduced ones may have more.
+    // Chains count reduced coordinates; the base of unreduced ones may have more.
     std::vector<int>& chain = frame_chains_.emplace_back(model.ListMovingEntries(frame.link));
     chain.erase(chain.begin(), chain.begin() + model.num_base_velocities());
     for (int& entry : chain) entry += base_size_ - model.num_base_velocities();
@@ -54,6 +54,7 @@ ModelTerms::ModelTerms(const RobotModel& model, Coordinates coordinates)
   columns_.resize(static_cast<size_t>(size_));
   links_.resize(static_cast<size_t>(model.num_joints()) + 1);
   subtrees_.resize(links_.size());
+  forces_.resize(links_.size());
   const int path_length = PaddedPathLength(base_size_ + model.max_depth());
   path_.setZero(12, path_length);
   path_dofs_.assign(static_cast<size_t>(path_length), 0);
@@ -62,6 +63,7 @@ ModelTerms::ModelTerms(const RobotModel& model, Coordinates coordinates)
   path_C_row_.setZero(path_length);
   M_.setZero(size_, size_);
   C_.setZero(size_, size_);
+  coriolis_.setZero(size_);
   gravity_.setZero(size_);
   friction_.setZero(size_);
 }

@@ -33,17 +33,23 @@ class ModelTerms {
   /// M, C, and F's two parts at the state set before. Cost grows with joints times depth.
   void CalcDynamics();
 
+  /// M, F's two parts, and C velocity by the recursive Newton-Euler equations, at half the cost: C() stays as
+  /// it was. @throws std::invalid_argument for unreduced coordinates that have more entries.
+  void CalcMassAndCoriolis();
+
   [[nodiscard]] const RobotModel& model() const { return *model_; }
   /// Number of velocity coordinates: 50 (reduced) or 51 (unreduced) for the paper's robot.
   [[nodiscard]] int size() const { return size_; }
   /// xi or q_dot' as set before.
   [[nodiscard]] const VectorXd& velocity() const { return velocity_; }
 
-  // What CalcDynamics computed, each size x size or size.
+  // Results of CalcDynamics, each size x size or size.
   /// M of (16), or M_bar' of (18); symmetric positive definite; kg m^2, kg m, kg.
   [[nodiscard]] const MatrixXd& M() const { return M_; }
   /// C of (16), or C_bar' of (18): Christoffel choice, M_dot - 2 C is skew (Property 2).
   [[nodiscard]] const MatrixXd& C() const { return C_; }
+  /// C velocity, of CalcMassAndCoriolis, N m or N.
+  [[nodiscard]] const VectorXd& coriolis() const { return coriolis_; }
   /// Part of F due to gravity, N m or N.
   [[nodiscard]] const VectorXd& gravity() const { return gravity_; }
   /// Part of F due to viscous friction, N m or N.
@@ -58,8 +64,7 @@ class ModelTerms {
   /// V = [linear; angular]. Both 6 x size; every entry is written.
   void CalcFrameJacobian(int frame, Eigen::Ref<Matrix6Xd> J, Eigen::Ref<Matrix6Xd> J_dot) const;
 
-  /// The same of those columns alone whose coordinates move the frame; the others, zero in J_f, are left as
-  /// they are.
+  /// Calculates only the columns whose coordinates move the frame; the others, zero in J_f, are not written.
   void CalcFrameColumns(int frame, Eigen::Ref<Matrix6Xd> J, Eigen::Ref<Matrix6Xd> J_dot) const;
 
   /// Velocity of a link's frame, [linear; angular] of its origin in world axes, by the index of its joint; -1
@@ -77,7 +82,7 @@ class ModelTerms {
     Vector3d w_dot = Vector3d::Zero();
     Vector3d v_dot = Vector3d::Zero();
   };
-  /// Where a link is and how it moves: rotation, origin, twist.
+  /// State of a link: rotation, origin, twist.
   struct LinkState {
     Matrix3d R = Matrix3d::Identity();
     Vector3d p = Vector3d::Zero();
@@ -95,7 +100,12 @@ class ModelTerms {
 
     MassIntegrals& operator+=(const MassIntegrals& other);
   };
-  /// What the tree's recursion needs of a link's constant mass properties, about the link frame's origin.
+  /// Derivative of a link's twist at zero acceleration, and the force that this needs about the origin.
+  struct LinkForce {
+    Vector3d w_dot = Vector3d::Zero(), v_dot = Vector3d::Zero();
+    Vector3d moment = Vector3d::Zero(), force = Vector3d::Zero();
+  };
+  /// Constant mass properties of a link about its frame's origin, for the tree's recursion.
   struct LinkMass {
     double m;
     Vector3d mc;  // m times centre of mass
@@ -125,6 +135,11 @@ class ModelTerms {
   }
   static MassIntegrals CalcLinkIntegrals(const LinkMass& mass, const LinkState& state);
   void PushColumn(int depth, const Column& column, int dof);
+  void CalcCoriolis();
+  /// Sums the links' integrals up to the subtrees', and fills M, C if with_C, gravity and friction from them.
+  template <bool with_C>
+  void Fill();
+  template <bool with_C>
   void FillRowAndColumn(int depth, int dof, const Column& column, const MassIntegrals& subtree);
   void AddWheelsAndRotors();
   [[nodiscard]] const LinkState& link(int joint) const { return links_[static_cast<size_t>(joint + 1)]; }
@@ -147,6 +162,7 @@ class ModelTerms {
   std::vector<Column> columns_;          // base columns first
   std::vector<LinkState> links_;         // base first
   std::vector<MassIntegrals> subtrees_;  // base first
+  std::vector<LinkForce> forces_;        // base first
 
   // The columns from the base to the joint at hand, one row a component: w, v, w_dot, v_dot; padded.
   Eigen::Matrix<double, 12, Eigen::Dynamic, Eigen::RowMajor> path_;
@@ -155,6 +171,7 @@ class ModelTerms {
 
   MatrixXd M_;
   MatrixXd C_;
+  VectorXd coriolis_;
   VectorXd gravity_;
   VectorXd friction_;
 };

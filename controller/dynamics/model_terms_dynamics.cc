@@ -1,41 +1,48 @@
 // Dynamics: M, C and F by integrals over each joint's subtree (section 3).
 
 #include <cmath>
+#include <stdexcept>
 
 #include "controller/dynamics/model_terms.h"
 
 namespace dexcheck {
 namespace {
 
-/// S_i . (I S_j) and its kin for all columns i of the path at once. `column` and `row` are the forces of
-/// FillRowAndColumn; arrays are rows of path_ (w, v, w_dot, v_dot).
-void ProjectOnPath(int length, const double* __restrict path, Eigen::Index stride,
-                   const Vector6d& inertia_force, const Vector6d& column_force, const Vector3d& row_force,
-                   double* __restrict M, double* __restrict C_column, double* __restrict C_row) {
-  const double* __restrict w0 = path;
-  const double* __restrict w1 = path + stride;
-  const double* __restrict w2 = path + 2 * stride;
-  const double* __restrict v0 = path + 3 * stride;
-  const double* __restrict v1 = path + 4 * stride;
-  const double* __restrict v2 = path + 5 * stride;
-  const double* __restrict dw0 = path + 6 * stride;
-  const double* __restrict dw1 = path + 7 * stride;
-  const double* __restrict dw2 = path + 8 * stride;
-  const double* __restrict dv0 = path + 9 * stride;
-  const double* __restrict dv1 = path + 10 * stride;
-  const double* __restrict dv2 = path + 11 * stride;
-  const double f0 = inertia_force[0], f1 = inertia_force[1], f2 = inertia_force[2];
-  const double f3 = inertia_force[3], f4 = inertia_force[4], f5 = inertia_force[5];
-  const double g0 = column_force[0], g1 = column_force[1], g2 = column_force[2];
-  const double g3 = column_force[3], g4 = column_force[4], g5 = column_force[5];
-  const double h0 = row_force[0], h1 = row_force[1], h2 = row_force[2];
-  for (int k = 0; k < length; ++k) {
-    M[k] = w0[k] * f0 + w1[k] * f1 + w2[k] * f2 + v0[k] * f3 + v1[k] * f4 + v2[k] * f5;
-    C_column[k] = w0[k] * g0 + w1[k] * g1 + w2[k] * g2 + v0[k] * g3 + v1[k] * g4 + v2[k] * g5;
-    C_row[k] = dw0[k] * f0 + dw1[k] * f1 + dw2[k] * f2 + dv0[k] * f3 + dv1[k] * f4 + dv2[k] * f5 +
-               w0[k] * h0 + w1[k] * h1 + w2[k] * h2;
+/// S_i . (I S_j) and its kin for all columns i of the path at once: the arrays are rows of path_ (w, v,
+/// w_dot, v_dot), and the forces those of FillRowAndColumn.
+template <bool with_C>
+void ProjectOnPath(int length, const double* path, Eigen::Index stride, const Vector6d& inertia_force,
+                   const Vector6d& column_force, const Vector3d& row_force, double* M, double* C_column,
+                   double* C_row) {
+  using Block = Eigen::Array4d;
+  for (int k = 0; k < length; k += static_cast<int>(Block::SizeAtCompileTime)) {
+    Block m = Block::Zero(), column = Block::Zero(), row = Block::Zero();
+    for (int i = 0; i < 6; ++i) {
+      const Block S(path + i * stride + k);
+      m += inertia_force[i] * S;
+      if constexpr (!with_C) continue;
+      column += column_force[i] * S;
+      row += inertia_force[i] * Block(path + (6 + i) * stride + k);
+      if (i < 3) row += row_force[i] * S;
+    }
+    Block::Map(M + k) = m;
+    if constexpr (!with_C) continue;
+    Block::Map(C_column + k) = column;
+    Block::Map(C_row + k) = row;
   }
 }
+
+/// integral p x (w x p) = ((tr P) 1 - P) w. @param P its six entries.
+Vector3d TurnMass(const double* P, const Vector3d& w) {
+  return (P[0] + P[3] + P[5]) * w - Vector3d(P[0] * w[0] + P[1] * w[1] + P[2] * w[2],
+                                             P[1] * w[0] + P[3] * w[1] + P[4] * w[2],
+                                             P[2] * w[0] + P[4] * w[1] + P[5] * w[2]);
+}
+
+/// integral p x (w x p_dot) = ((tr Q) 1 - Q) w.
+Vector3d TurnMovingMass(const Matrix3d& Q, const Vector3d& w) { return Q.trace() * w - Q * w; }
+
+using RowMatrix3d = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
 
 }  // namespace
 
@@ -92,71 +99,103 @@ void ModelTerms::PushColumn(int depth, const Column& column, int dof) {
   path_dofs_[static_cast<size_t>(depth)] = dof;
 }
 
+template <bool with_C>
 void ModelTerms::FillRowAndColumn(int depth, int dof, const Column& column, const MassIntegrals& subtree) {
   const Eigen::Map<const Vector3d> mp(subtree.mp);
   const Eigen::Map<const Vector3d> h(subtree.h);
-  const double* P = subtree.P;
-  const double* Q = subtree.Q;
-  const double trace_P = P[0] + P[3] + P[5];
-  const double trace_Q = Q[0] + Q[4] + Q[8];
-
-  // I S = [integral p x (v + w x p); integral (v + w x p)],  with integral p x (w x p) = (tr P) w - P w
+  // I S = [integral p x (v + w x p); integral (v + w x p)]
   const auto apply_inertia = [&](const Vector3d& w, const Vector3d& v) {
     Vector6d force;
-    force[0] = trace_P * w[0] - (P[0] * w[0] + P[1] * w[1] + P[2] * w[2]);
-    force[1] = trace_P * w[1] - (P[1] * w[0] + P[3] * w[1] + P[4] * w[2]);
-    force[2] = trace_P * w[2] - (P[2] * w[0] + P[4] * w[1] + P[5] * w[2]);
-    force.head<3>() += mp.cross(v);
-    force.tail<3>() = subtree.m * v + w.cross(Vector3d(mp));
+    force << TurnMass(subtree.P, w) + mp.cross(v), subtree.m * v + w.cross(Vector3d(mp));
     return force;
   };
   const Vector6d inertia_force = apply_inertia(column.w, column.v);
-
-  // I S_dot + integral [p x (w x p_dot); w x p_dot],  with p x (w x p_dot) = ((tr Q) 1 - Q) w
-  Vector6d column_force = apply_inertia(column.w_dot, column.v_dot);
-  const Vector3d& w = column.w;
-  column_force[0] += trace_Q * w[0] - (Q[0] * w[0] + Q[1] * w[1] + Q[2] * w[2]);
-  column_force[1] += trace_Q * w[1] - (Q[3] * w[0] + Q[4] * w[1] + Q[5] * w[2]);
-  column_force[2] += trace_Q * w[2] - (Q[6] * w[0] + Q[7] * w[1] + Q[8] * w[2]);
-  column_force.tail<3>() += w.cross(Vector3d(h));
-
-  // The same operator transposed: ((tr Q) 1 - Q^T) w + h x v
-  Vector3d row_force = Vector3d(h).cross(column.v);
-  row_force[0] += trace_Q * w[0] - (Q[0] * w[0] + Q[3] * w[1] + Q[6] * w[2]);
-  row_force[1] += trace_Q * w[1] - (Q[1] * w[0] + Q[4] * w[1] + Q[7] * w[2]);
-  row_force[2] += trace_Q * w[2] - (Q[2] * w[0] + Q[5] * w[1] + Q[8] * w[2]);
-
-  const int padded = PaddedPathLength(depth + 1);
-  ProjectOnPath(padded, path_.data(), path_.cols(), inertia_force, column_force, row_force, path_M_.data(),
-                path_C_column_.data(), path_C_row_.data());
-  double* const M = M_.data();
-  double* const C = C_.data();
+  Vector6d column_force = Vector6d::Zero();
+  Vector3d row_force = Vector3d::Zero();
+  if constexpr (with_C) {
+    // I S_dot + integral [p x (w x p_dot); w x p_dot], and the same operator transposed
+    const Matrix3d Q = Eigen::Map<const RowMatrix3d>(subtree.Q);
+    column_force = apply_inertia(column.w_dot, column.v_dot);
+    column_force.head<3>() += TurnMovingMass(Q, column.w);
+    column_force.tail<3>() += column.w.cross(Vector3d(h));
+    row_force = TurnMovingMass(Q.transpose(), column.w) + Vector3d(h).cross(column.v);
+  }
+  ProjectOnPath<with_C>(PaddedPathLength(depth + 1), path_.data(), path_.cols(), inertia_force, column_force,
+                        row_force, path_M_.data(), path_C_column_.data(), path_C_row_.data());
   for (int k = 0; k <= depth; ++k) {
     const int other = path_dofs_[static_cast<size_t>(k)];
-    M[dof * size_ + other] = path_M_[k];
-    M[other * size_ + dof] = path_M_[k];
-    C[dof * size_ + other] = path_C_column_[k];
-    C[other * size_ + dof] = path_C_row_[k];
+    M_(other, dof) = M_(dof, other) = path_M_[k];
+    if constexpr (!with_C) continue;
+    C_(other, dof) = path_C_column_[k];
+    C_(dof, other) = path_C_row_[k];
   }
 }
 
 void ModelTerms::CalcDynamics() {
-  const int joints = model_->num_joints();
-  for (int i = 0; i <= joints; ++i) {
-    subtrees_[static_cast<size_t>(i)] =
-        CalcLinkIntegrals(masses_[static_cast<size_t>(i)], links_[static_cast<size_t>(i)]);
-  }
-  for (int i = joints - 1; i >= 0; --i) {
-    subtrees_[static_cast<size_t>(places_[static_cast<size_t>(i)].parent + 1)] +=
-        subtrees_[static_cast<size_t>(i + 1)];
-  }
+  for (size_t i = 0; i < links_.size(); ++i) subtrees_[i] = CalcLinkIntegrals(masses_[i], links_[i]);
+  Fill<true>();
+}
 
+void ModelTerms::CalcMassAndCoriolis() {
+  if (base_size_ > model_->num_base_velocities())
+    throw std::invalid_argument("CalcMassAndCoriolis: needs reduced coordinates");
+  for (size_t i = 0; i < links_.size(); ++i) subtrees_[i] = CalcLinkIntegrals(masses_[i], links_[i]);
+  CalcCoriolis();
+  Fill<false>();
+}
+
+void ModelTerms::CalcCoriolis() {
+  // Outward: the twist's derivative of each link at zero acceleration is the sum of S_dot_i velocity_i, and
+  // the force that it needs is integral [p x p_ddot; p_ddot] with p_ddot = v_dot + w_dot x p + w x p_dot.
+  const auto accelerate = [this](LinkForce* it, int begin, int count) {
+    for (int i = begin; i < begin + count; ++i) {
+      it->w_dot += velocity_[i] * columns_[static_cast<size_t>(i)].w_dot;
+      it->v_dot += velocity_[i] * columns_[static_cast<size_t>(i)].v_dot;
+    }
+  };
+  for (size_t i = 0; i < links_.size(); ++i) {
+    LinkForce& it = forces_[i];
+    if (i == 0) {
+      it = LinkForce{};
+      accelerate(&it, 0, base_size_);
+    } else {
+      const JointPlace& place = places_[i - 1];
+      it = forces_[static_cast<size_t>(place.parent + 1)];
+      accelerate(&it, base_size_ + model_->dof(static_cast<int>(i) - 1), CountVelocities(place.type));
+    }
+    const MassIntegrals& body = subtrees_[i];
+    const Vector3d mp(body.mp), h(body.h), &w = links_[i].w;
+    it.moment = TurnMass(body.P, it.w_dot) + mp.cross(it.v_dot) +
+                TurnMovingMass(Eigen::Map<const RowMatrix3d>(body.Q), w);
+    it.force = body.m * it.v_dot + it.w_dot.cross(mp) + w.cross(h);
+  }
+  // Inward: the forces of all links that a coordinate carries.
+  const auto project = [this](const LinkForce& it, int begin, int count) {
+    for (int i = begin; i < begin + count; ++i) {
+      const Column& S = columns_[static_cast<size_t>(i)];
+      coriolis_[i] = S.w.dot(it.moment) + S.v.dot(it.force);
+    }
+  };
+  for (size_t i = places_.size(); i > 0; --i) {
+    const LinkForce& it = forces_[i];
+    project(it, base_size_ + model_->dof(static_cast<int>(i) - 1), CountVelocities(places_[i - 1].type));
+    LinkForce& parent = forces_[static_cast<size_t>(places_[i - 1].parent + 1)];
+    parent.moment += it.moment;
+    parent.force += it.force;
+  }
+  project(forces_[0], 0, base_size_);
+}
+
+template <bool with_C>
+void ModelTerms::Fill() {
+  for (size_t i = places_.size(); i > 0; --i)
+    subtrees_[static_cast<size_t>(places_[i - 1].parent + 1)] += subtrees_[i];
   // Gravity's generalised force on column i: -(w_i . integral p x g + v_i . integral g)
   const Vector3d g = base_R_.transpose() * model_->gravity();
   const auto fill = [&](int depth, int dof, const MassIntegrals& subtree) {
     const Column& column = columns_[static_cast<size_t>(dof)];
     PushColumn(depth, column, dof);
-    FillRowAndColumn(depth, dof, column, subtree);
+    FillRowAndColumn<with_C>(depth, dof, column, subtree);
     const Eigen::Map<const Vector3d> mp(subtree.mp);
     gravity_[dof] = -(column.w.dot(mp.cross(g)) + subtree.m * column.v.dot(g));
   };

@@ -22,8 +22,8 @@ struct BaseMotion {
 /// Friction is no part of it. Nothing allocates after construction.
 class TorqueRegressor {
  public:
-  /// What the torques are linear in, of one link: its mass, mass times centre of mass (3), and the inertia
-  /// about the origin of its frame: xx, yy, zz, xy, xz, yz; in the axes of frame i.
+  /// Number of a link's parameters in which the torques are linear: its mass, mass times centre of mass (3),
+  /// and the inertia about the origin of its frame: xx, yy, zz, xy, xz, yz; in the axes of frame i.
   static constexpr int kBody = 10;
   using BodyVector = Eigen::Matrix<double, kBody, 1>;
 
@@ -42,7 +42,8 @@ class TorqueRegressor {
   void CalcBodyColumns(Eigen::Ref<MatrixXd> columns) const;
   /// Their derivatives by gravity (n x 3), world axes.
   void CalcGravityColumns(Eigen::Ref<MatrixXd> columns) const;
-  /// What balances a force (world axes) at a link's centre of mass and a moment on it: J^T, n x 6.
+  /// Joint torques that balance a force (world axes) at a link's centre of mass and a moment on it: J^T, n
+  /// x 6.
   void CalcForceColumns(int link, Eigen::Ref<MatrixXd> columns) const;
 
   /// Axes of a link's frame at that motion, in world axes.
@@ -55,7 +56,7 @@ class TorqueRegressor {
   static MassProperties Unpack(const BodyVector& vector);
 
  private:
-  /// Of a link's frame, world axes.
+  /// Motion of a link's frame, world axes.
   struct Link {
     Matrix3d R;
     Vector3d p, w, w_dot, a;  // a: of the origin, less gravity

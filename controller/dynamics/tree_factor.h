@@ -32,8 +32,7 @@ class TreeFactor {
   void SolveTransposed(Eigen::Ref<VectorXd> x) const;
   /// Each column of X (n x k, row-major) becomes L^-T times it.
   void SolveTransposedColumns(Eigen::Ref<RowMatrixXd> X) const;
-  /// The same of an X that has zeros but in some rows, which then has zeros there too; the other rows are
-  /// neither read nor written.
+  /// Multiplies an X by L^-T that is zero except in `rows`; the other rows are neither read nor written.
   /// @param rows ascending, and with each row those that its coordinate hangs on: chains from the base.
   void SolveTransposedColumns(std::span<const int> rows, Eigen::Ref<RowMatrixXd> X) const;
   /// |f|_M^-1 = sqrt(f^T M^-1 f) = |L^-T f|, the size of a force f (n) in the metric of the inertia.

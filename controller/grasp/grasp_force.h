@@ -38,7 +38,7 @@ struct GraspForceProblem {
   VectorXd f_min, f_max;  ///< Bounds on the normal forces f_i3, N, 0 <= f_min < f_max, in N.
 };
 
-/// What a GraspForceSolver minimises is the maximum-determinant objective of [23],
+/// Options of a GraspForceSolver, which minimises the maximum-determinant objective of [23],
 ///
 ///   sum_i f_i3 - rho [sum_i log det P_i + sum of log(slack) over all bounds].
 ///

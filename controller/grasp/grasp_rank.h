@@ -18,7 +18,8 @@ struct WeakestDirection {
   Vector6d n = Vector6d::Unit(0);  ///< Left singular vector of the smallest.
 };
 
-/// Of the columns of `G` (6 x n, rows in comparable units). Allocates nothing.
+/// Finds the direction that the columns of `G` (6 x n, rows in comparable units) span least. Allocates
+/// nothing.
 WeakestDirection FindWeakestDirection(const Eigen::Ref<const Matrix6Xd>& G);
 
 /// Throws SingularityError with the ratio of singular values unless G (6 x n, force rows first) has full row

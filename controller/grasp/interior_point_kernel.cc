@@ -11,8 +11,8 @@ namespace {
 
 // Fraction of the way to the boundary that a step may go.
 constexpr double kStepFraction = 0.99;
-// The same once a problem has taken kPatience iterations: corrected steps can cycle where the admissible
-// forces are few; uncorrected, shorter ones do not.
+// Step fraction after kPatience iterations: corrected steps can cycle where the admissible forces are few;
+// uncorrected, shorter ones do not.
 constexpr double kCautiousFraction = 0.7;
 constexpr int kPatience = 30;
 // Least fraction of the present complementarity that a corrected step aims at.

@@ -44,7 +44,7 @@ SerialChain::SerialChain(const RobotModel& model, int frame, std::span<const int
       continue;
     }
     joints_.push_back(index);
-    // What of the MDH row does not move stands before the joint: turns about and slides along z commute.
+    // The fixed part of the MDH row comes before the joint: rotations about and translations along z commute.
     const MdhRow& mdh = joint.mdh;
     held = held * CalcMdhTransform(mdh.alpha, mdh.a, revolute ? 0.0 : mdh.q, revolute ? mdh.d : 0.0);
     segments_.push_back({held, revolute, revolute ? mdh.q : mdh.d});

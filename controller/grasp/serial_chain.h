@@ -20,7 +20,7 @@ std::vector<std::vector<int>> ListOwnJoints(const RobotModel& model, std::span<c
 struct JointRange {
   VectorXd lower, upper;
 
-  /// The same less a margin at each end. @throws std::invalid_argument when that leaves a joint no range.
+  /// The range without a margin at each end. @throws std::invalid_argument when a joint then has none.
   [[nodiscard]] JointRange Shrink(double joint_margin) const;
   /// Smallest distance of an entry of q from the ends of its range; negative outside.
   [[nodiscard]] double CalcMargin(const VectorXd& q) const;
@@ -72,7 +72,7 @@ class SerialChain {
   JointRange range_;
 };
 
-/// Where a chain's frame should be.
+/// Desired pose of a chain's frame.
 struct ChainTarget {
   Pose X;                    ///< In the world.
   double length = 0.2;       ///< An error of one radian counts as this many m.

@@ -42,7 +42,7 @@ class PartialGrasp {
   std::vector<double> overlap_;
 };
 
-/// What the hand is to do at one instant. Every force in it may be changed steadily, so that torques do not
+/// Demand on the hand at one instant. Every force in it may be changed steadily, so that torques do not
 /// jump where one phase of a task follows another.
 struct HandlingDemand {
   ContactSet contacts = 0;  ///< Fingertips that push; none: (18) alone.

@@ -33,10 +33,9 @@ constexpr bool IsHolding(Phase phase) { return phase >= Phase::kGrip && phase <=
 struct PickAndPlaceOptions {
   Vector3d raise = Vector3d(0.0, 0.0, 0.15);  ///< World, m.
   Vector3d transport = Vector3d(1.0, 0.0, 0.0);
-  double approach_time =
-      2.0;                  ///< To over the object, s, or longer where it is far; as long for the way back.
-  double lower_time = 1.5;  ///< From there to around it, likewise.
-  double close_time = 0.6;  ///< To just off the contacts.
+  double approach_time = 2.0;   ///< To above the object and back, s each; longer for a far one.
+  double lower_time = 1.5;      ///< From there to around it; longer for a far one.
+  double close_time = 0.6;      ///< To just off the contacts.
   double search_speed = 0.006;  ///< From there on, m/s.
   double grip_time = 1.2;
   double take_over_time = 1.5;
@@ -79,13 +78,13 @@ class PickAndPlace {
   void Refuse(double t, const std::string& reason);
 
   [[nodiscard]] const HandlingDemand& demand() const { return demand_; }
-  /// Where the joints should be, and how stiffly; after the first Update.
+  /// Desired joints and the stiffness about them; after the first Update.
   [[nodiscard]] const PostureTask& posture() const { return posture_; }
   [[nodiscard]] Phase phase() const { return phase_; }
   [[nodiscard]] bool is_done() const { return phase_ == Phase::kDone; }
   /// Why the object was not brought; empty when it was, or may yet be.
   [[nodiscard]] const std::string& failure() const { return failure_; }
-  /// What went wrong in attempts that were followed by another.
+  /// Reason why the first attempt failed; empty without another attempt.
   [[nodiscard]] const std::string& first_failure() const { return first_failure_; }
   [[nodiscard]] const std::vector<PhaseEntry>& history() const { return history_; }
   [[nodiscard]] const PickPlan& plan() const { return plan_; }
@@ -114,7 +113,7 @@ class PickAndPlace {
   void StartMove(const VectorXd& from, const VectorXd& to, double t, double duration, bool steady = false);
   /// Along a path of the plan, or back.
   void StartPath(const VectorXd& from, const PosturePath& path, bool backwards, double t, double duration);
-  /// Where the hand stands above the object: as planned, or where it is to be put down.
+  /// Path of the hand above the object: as planned, or at the place where it is put down.
   [[nodiscard]] const PosturePath& rise() const { return carried_over_ ? plan_.landing : plan_.rise; }
   [[nodiscard]] bool MoveDone(double t) const { return t >= move_.begin + move_.duration; }
   [[nodiscard]] ScalarMotion EvaluateMove(double t) const;

@@ -15,8 +15,8 @@ namespace dexcheck {
 /// A smooth path of postures: per joint the polynomial through given knots.
 class PosturePath {
  public:
-  /// Where knot i of `count` lies on the path, from 0 to 1: dense at the ends, so that the polynomial does
-  /// not swing between them.
+  /// Path parameter of knot i of `count`, from 0 to 1: dense at the ends, so that the polynomial does not
+  /// swing between them.
   static double KnotPlace(int i, int count);
 
   PosturePath() = default;
@@ -68,11 +68,11 @@ struct PickPlan {
   VectorXd q_deep;      ///< Fingertips in the object.
 };
 
-/// The postures with which the hand takes the object at the given contacts. A sphere, a cylinder and a torus
-/// are held alike at any turn of the hand about the object's z axis: of turns by 15 degrees that one is taken
-/// which changes the arm's posture least and from which the way can be gone.
-/// @param X_Bo where the object lies. @param q q' to start from and to stay near to; of the fingers, where
-/// the search for contact begins.
+/// Postures with which the hand takes the object at the given contacts. A grasp of a sphere, a cylinder or a
+/// torus may turn about the object's z axis: of turns by 15 degrees, the feasible one that changes the arm's
+/// posture least is taken.
+/// @param X_Bo pose of the object. @param q q' at the start, from which the plan departs little; its entries
+/// of the fingers are where the search for contact begins.
 /// @throws std::invalid_argument as SolveFramePlacement and SolveFingerPlacement.
 PickPlan MakePickPlan(const RobotModel& model, const Hand& hand, const Surface& object, const Pose& X_Bo,
                       const Eigen::Ref<const VectorXd>& q, const PickPlanOptions& options);

@@ -26,13 +26,13 @@ class TomlDocument;
 /// @param rows filled with how the joints' rows are written, unless null.
 RobotModel ReadRobotModel(const std::filesystem::path& path, std::vector<WrittenRow>* rows = nullptr);
 
-/// The same for a text; `source` stands for the file in messages.
+/// Reads a robot from a text; `source` stands for the file in messages.
 /// @param overrides "PATH=VALUE" each, set in place of the file's values (TomlDocument::Override).
 RobotModel ParseRobotModel(std::string_view text, std::string_view source,
                            std::span<const std::string> overrides = {},
                            std::vector<WrittenRow>* rows = nullptr);
 
-/// The same for a text that is parsed already, which is half of the work.
+/// Reads a robot from a parsed document, which saves half of the work.
 RobotModel ParseRobotModel(TomlDocument document, std::string_view source,
                            std::span<const std::string> overrides, std::vector<WrittenRow>* rows = nullptr);
 

@@ -9,7 +9,7 @@
 
 namespace dexcheck {
 
-/// What rolling without slip makes of the platform, at one q_v and v.
+/// Rolling constraint of the platform at one q_v and v.
 struct PlatformConstraint {
   Eigen::RowVector3d A_v;               ///< A_v q_v_dot = 0, equations (1), (2).
   Eigen::Matrix<double, 3, 2> S_v;      ///< q_v_dot = S_v v, equation (12).

@@ -64,13 +64,12 @@ MassProperties Combine(const std::vector<MassProperties>& parts);
 /// value.
 std::string FindPhysicalInconsistency(const MassProperties& body);
 
-/// The same without the triangle inequality, which the dynamics do not need: M is positive definite without
-/// it.
+/// Describes a fault as above, except for the triangle inequality: M is positive definite without it.
 std::string FindUndefinedDynamics(const MassProperties& body);
 
 // Bodies and axes in other frames.
 
-/// The same body in another frame A, in which its own frame B stands at X_AB.
+/// Mass properties in a frame A, given those in B and the pose X_AB of B in A.
 MassProperties ExpressIn(const MassProperties& body, const Pose& X_AB);
 
 /// A rotation that turns z into the given unit vector; axes of coordinates are only permuted.

@@ -56,7 +56,7 @@ enum class DriveVelocity {
   kWheelRates,  ///< v = [thetadot_r, thetadot_l]: wheel rates, rad/s, positive rolls forward.
 };
 
-/// One of the two driving wheels; both are alike.
+/// One of the two driving wheels, which are identical.
 struct WheelProperties {
   double mass = 0.0;                ///< kg, centred on the axle at +-b/2.
   double spin_inertia = 0.0;        ///< About the axle, kg m^2.
@@ -144,7 +144,7 @@ struct ObjectModel {
   double friction = 0.0;  ///< mu of (21) between fingertip and object.
 };
 
-/// What a parameter file describes. Build with RobotModel(spec), which checks it.
+/// Robot as a parameter file describes it. RobotModel(spec) checks it.
 struct RobotSpec {
   std::string name;
   std::string source;                 ///< File, for messages.

@@ -21,7 +21,7 @@ Vector3d ReadPoint(TomlTable& table, std::string_view key) {
   return point ? point->AsVector<3>() : Vector3d::Zero();
 }
 
-/// Where a link's shape stands: `center`, and `axis` for a body of revolution or `rpy`.
+/// Pose of a link's shape: `center`, and `axis` for a body of revolution or `rpy`.
 Pose ReadShapePose(TomlTable& table, const Shape& shape) {
   Pose X_BS = Pose::Identity();
   X_BS.translation() = ReadPoint(table, "center");

@@ -17,7 +17,7 @@ struct Template {
   bool used = false;
 };
 
-/// What an entry says of the joint that it follows, and the prefix of its chain's names.
+/// Joint that an entry follows, and the prefix of its chain's names.
 struct Mimic {
   const MimicEntry* entry;
   std::string prefix;

@@ -96,7 +96,7 @@ Vector3d CalcAnyZyzAngles(const Matrix3d& R_Bo) {
   const double sin_beta = R_Bo.col(2).head<2>().norm();
   if (sin_beta >= kMinSinBeta) return CalcZyzAngles(R_Bo);
   RequireRotation(R_Bo, "R_Bo");
-  // R = Rz(alpha) Ry(beta) Rz(gamma); gamma is what is left after the other two.
+  // R = Rz(alpha) Ry(beta) Rz(gamma); gamma follows from the other two.
   const double alpha = sin_beta > 0.0 ? std::atan2(R_Bo(1, 2), R_Bo(0, 2)) : 0.0;
   const double beta = std::atan2(sin_beta, R_Bo(2, 2));
   const Matrix3d rest = CalcRotationZyz(Vector3d(alpha, beta, 0.0)).transpose() * R_Bo;

@@ -94,7 +94,7 @@ Matrix3d CalcLeftJacobianInverse(const Vector3d& phi) {
 
 Matrix3d CalcLeftJacobianDot(const Vector3d& phi, const Vector3d& phi_dot) {
   // d/dt J_l = a [phi_dot]x + b ([phi_dot]x [phi]x + [phi]x [phi_dot]x) + a_dot [phi]x + b_dot [phi]x^2,
-  // a_dot = (a'/theta) phi^T phi_dot, b_dot likewise.
+  // a_dot = (a'/theta) phi^T phi_dot, b_dot = (b'/theta) phi^T phi_dot.
   const JacobianCoefficients k = CalcJacobianCoefficients(phi.norm());
   const Matrix3d phi_x = Skew(phi);
   const Matrix3d phi_dot_x = Skew(phi_dot);

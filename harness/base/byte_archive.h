@@ -66,7 +66,7 @@ std::string PackBytes(const Values&... values) {
   return bytes;
 }
 
-/// What PackBytes was given. @throws Error when the bytes are cut short.
+/// Restores the values that PackBytes packed. @throws Error when the bytes are cut short.
 template <typename... Values>
 void UnpackBytes(std::string_view bytes, Values*... values) {
   (archive_detail::Take(&bytes, values), ...);

@@ -42,7 +42,7 @@ std::string Describe(const Location& where, const RobotModel& model, int base_ve
 /// A check has one number each step, which Add takes, or many numbers of two providers. Those are given to
 /// Compare one by one, or, where they are formed in bulk, to a ComparedTerm, which keeps the record.
 struct CheckRecord {
-  // What is checked.
+  // Quantity that is checked.
   std::string name;  ///< As in the log and in summary.json; of terms, as in NOTATION.md.
   CheckCategory kind = CheckCategory::kModel;
   std::string unit = "1";
@@ -52,7 +52,7 @@ struct CheckRecord {
   bool is_empty = false;     ///< Whether the robot has nothing that it compares, so that it is not shown.
   bool same_source = false;  ///< Both sides come from one file: agreement is no evidence.
 
-  // What came of it. "When" is the time in s of a step of a run, the number of a sample elsewhere.
+  // Result. "When" is the time in s of a step of a run, the number of a sample elsewhere.
   double last = 0.0;   ///< Value of the last step.
   double worst = 0.0;  ///< Largest value; infinity when something was not a number.
   /// At the same step, the value before what is known to come of the plant was taken off, and how much that
@@ -64,17 +64,17 @@ struct CheckRecord {
   double engine_value = 0.0;
   bool failed = false;     ///< Whether any value was above the bound, or was not a number.
   double failed_at = 0.0;  ///< When, for the first time.
-  /// Of the failures at that time, the one nearest the base: where to look first.
+  /// The failure nearest the base at that time: where to look first.
   Location first_failure;
-  std::string part;      ///< The same in words, when the check has parts.
+  std::string part;      ///< That location in words, when the check has parts.
   long comparisons = 0;  ///< Numbers.
   long count = 0;        ///< Steps.
   double sum_of_squares = 0.0;
 
   /// Adds the value of one step.
   void Add(double value, double when) { Add(value, when, value, 0.0); }
-  /// The same of a value from which something is taken off. @param before the value without that. @param
-  /// allowed how much of it is known to come of the plant.
+  /// Adds a value from which an allowance has been subtracted.
+  /// @param before the value before that. @param allowed the part that is known to come from the plant.
   void Add(double value, double when, double before, double allowed);
 
   /// Adds one of a step's numbers. `scale` is positive; the error is |model - engine| / scale. Returns it, or
@@ -83,7 +83,7 @@ struct CheckRecord {
     return CompareError(std::abs(model - engine) / scale, model, engine, location, when);
   }
 
-  /// The same with the relative error calculated before.
+  /// Adds a relative error that is calculated already.
   double CompareError(double error, double model, double engine, const Location& location, double when) {
     const bool failed_before = failed;
     if (Note(error, when)) {
@@ -144,8 +144,7 @@ struct CheckRecord {
   }
 
  private:
-  /// What is not a number counts as infinite, and fails whatever the bound is. Returns whether it is the
-  /// worst.
+  /// Records a value; NaN counts as infinite and fails any bound. Returns whether the value is the worst.
   bool Note(double value, double when) {
     const double size = std::isnan(value) ? std::numeric_limits<double>::infinity() : value;
     const bool is_worst = size > worst || comparisons == 0;
@@ -162,9 +161,9 @@ struct CheckRecord {
   }
 };
 
-// What results of checks come to: by category, as JSON.
+// Results of checks by category and as JSON.
 
-/// In the order in which they are shown.
+/// Categories in the order in which they are shown.
 inline constexpr std::array<CheckCategory, 5> kCheckCategories = {
     CheckCategory::kModel, CheckCategory::kLaw, CheckCategory::kInverseDynamics,
     CheckCategory::kForwardDynamics, CheckCategory::kAssumption};
@@ -193,10 +192,10 @@ std::string DescribeNumbers(const CheckRecord& check);
 /// is evaluated at each step (`timed`) rms, at_time_s and failed_at_s; residual and allowance where something
 /// was taken off. A timed check that was not reached has `reached` false in the place of max and pass.
 nlohmann::ordered_json ToJson(const CheckRecord& record, bool timed);
-/// The same back; JSON has no infinity, which is written as null. @throws nlohmann::json::exception.
+/// Reads a check from JSON, which has null for infinity. @throws nlohmann::json::exception.
 CheckRecord ReadCheck(const std::string& name, const nlohmann::json& json);
 
-/// Where one of the categories stands: the check that is nearest to its bound, or farthest beyond.
+/// Status of one category: the check that is nearest to its bound, or farthest beyond.
 struct CategoryStatus {
   explicit CategoryStatus(CheckCategory of = CheckCategory::kModel) : category(of) {}
 

@@ -38,14 +38,14 @@ struct Program {
   std::filesystem::path folder = {};  ///< That it works in; this process's when empty.
 };
 
-/// Of a program that cannot be run, and of a shell's command that there is not.
+/// Exit code of a program that cannot be run, and of a shell whose command does not exist.
 inline constexpr int kNotFoundExitCode = 127;
 
 /// The program of this name that is installed with this one, in libexec/dexcheck; the name alone where there
 /// is none.
 std::string FindProgram(const std::string& name);
 
-/// What a process writes to its standard error: a file in memory.
+/// File in memory that collects a process's standard error.
 class MessageFile {
  public:
   /// @throws Error when there is no memory for it.

@@ -101,7 +101,7 @@ std::optional<NamedFile> Identify(const std::filesystem::path& path) {
   return NamedFile{status.st_dev, status.st_ino, path};
 }
 
-/// The same file in a list, when it still has that name: numbers are given again.
+/// Finds the same file in a list, when it still has that name: inode numbers are reused.
 const NamedFile* Find(const std::vector<NamedFile>& files, const NamedFile& file) {
   const auto is_same = [&](const NamedFile& other) {
     if (other.device != file.device || other.number != file.number) return false;
@@ -117,7 +117,8 @@ struct FilesInUse {
   std::mutex mutex;
   std::vector<NamedFile> inputs;
   std::vector<NamedFile> targets;
-  std::vector<NamedFile> written;  // by this process, which may write them again
+  std::vector<NamedFile> written;              // by this process, which may write them again
+  std::vector<std::filesystem::path> partial;  // targets whose replacements are written, links followed
 };
 
 FilesInUse& AllFilesInUse() {
@@ -276,6 +277,12 @@ PartialFile::PartialFile(const std::filesystem::path& target) : path_(target), t
     if (error) Fail(error.message());
     RefuseInput();
   }
+  target_ = fs::weakly_canonical(MakeAbsolute(target_), error);
+  if (error) Fail(error.message());
+  FilesInUse& files = AllFilesInUse();
+  const std::scoped_lock lock(files.mutex);
+  if (std::ranges::find(files.partial, target_) != files.partial.end())
+    Fail("another output of this command is the same file");
   const std::string partial =
       target_.string() + ".partial-" + std::to_string(::getpid()) + "-" + std::to_string(count++);
   protection_.emplace(partial);
@@ -283,11 +290,9 @@ PartialFile::PartialFile(const std::filesystem::path& target) : path_(target), t
   if (descriptor < 0) Fail(std::strerror(errno));
   ::close(descriptor);
   partial_ = partial;
-  if (const std::optional<NamedFile> replaced = Identify(target_)) {
-    FilesInUse& files = AllFilesInUse();
-    const std::scoped_lock lock(files.mutex);
+  files.partial.push_back(target_);
+  if (const std::optional<NamedFile> replaced = Identify(target_))
     files.targets.push_back({replaced->device, replaced->number, path_});
-  }
 }
 
 PartialFile::~PartialFile() { Abort(); }
@@ -324,6 +329,7 @@ void PartialFile::Release() {
   const std::scoped_lock lock(files.mutex);
   const auto own = std::ranges::find(files.targets, path_, &NamedFile::name);
   if (own != files.targets.end()) files.targets.erase(own);
+  std::erase(files.partial, target_);
 }
 
 void PartialFile::RefuseInput() const {
@@ -336,6 +342,13 @@ void PartialFile::RefuseInput() const {
 
 void PartialFile::Fail(const std::string& reason) const {
   throw InputError(path_.string() + ": cannot be written: " + reason);
+}
+
+void WriteFile(const std::filesystem::path& path, std::string_view bytes) {
+  MakeFolder(path.parent_path());
+  PartialFile file(path);
+  file.Write(bytes);
+  file.Commit();
 }
 
 }  // namespace dexcheck

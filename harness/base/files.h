@@ -17,8 +17,8 @@
 
 namespace dexcheck {
 
-// What must not outlive the program when a signal ends it: files and folders under construction, and the
-// processes that write them.
+// Files and folders under construction, and the processes that write them: none outlives the program when a
+// signal ends it.
 
 /// While it lives, the file or folder of this name is removed when a signal ends the program; otherwise its
 /// owner removes or renames it. Only this process removes it, no child that it forks.
@@ -88,8 +88,8 @@ std::vector<std::filesystem::path> ListFolder(const std::filesystem::path& folde
 /// FNV-1a of 64 bits, as 16 hexadecimal digits: what a reader sees of bytes that differ.
 std::string HashBytes(std::string_view bytes);
 
-/// Where NAME is that is installed with this program, as seen from the folder above the program's own:
-/// "share/dexcheck". Links are followed; it need not exist.
+/// Path of a file or folder installed with this program. @param name relative to the folder above the
+/// program's own: "share/dexcheck". Links are followed; it need not exist.
 std::filesystem::path FindInstalled(const std::filesystem::path& name);
 
 /// ".png" of "Picture.PNG": the extension with its dot, in small letters; "" without one.
@@ -123,7 +123,7 @@ class PartialFile {
   PartialFile(const PartialFile&) = delete;
   PartialFile& operator=(const PartialFile&) = delete;
 
-  /// Where to write.
+  /// Path to write to.
   [[nodiscard]] const std::filesystem::path& partial() const { return partial_; }
 
   /// Puts these bytes into it, in the place of what was there. @throws InputError as the constructor.
@@ -148,6 +148,9 @@ class PartialFile {
   std::filesystem::path partial_;  // empty once committed or removed
   std::optional<TemporaryPath> protection_;
 };
+
+/// Writes a whole file, in a folder that is made where it is not there. @throws InputError as PartialFile.
+void WriteFile(const std::filesystem::path& path, std::string_view bytes);
 
 /// An owned file descriptor.
 class FileDescriptor {

@@ -35,7 +35,7 @@ std::optional<std::string> TakeMessage(std::string* received) {
   return message;
 }
 
-/// Of a process and its threads so far, s; 0 when there is none.
+/// Processor time of a process and its threads so far, s; 0 when the process does not exist.
 double ReadProcessorTime(pid_t pid) {
   clockid_t clock = 0;
   timespec time{};
@@ -78,7 +78,7 @@ bool ProcessPool::Work(int channel, int messages) const {
       const auto request = TakeMessage(&received);
       if (!request) continue;
       std::fflush(stderr);
-      // What an earlier job wrote is not this one's; should it stay, it is only a message.
+      // Messages of an earlier job are cleared; a failure to do so only affects messages.
       if (::ftruncate(messages, 0) == 0) ::lseek(messages, 0, SEEK_SET);
       if (!Send(channel, PackBytes(run_(*request)))) return false;
     }
@@ -142,7 +142,7 @@ std::optional<EndedJob> ProcessPool::Wait() {
     if (files[i].revents == 0) continue;
     Worker& worker = workers_[busy[i]];
     const std::string bytes = Receive(worker.process.channel(), kChunk);
-    if (bytes.empty()) return Bury(busy[i]);
+    if (bytes.empty()) return Reap(busy[i]);
     worker.received += bytes;
     auto result = TakeMessage(&worker.received);
     if (!result) continue;
@@ -153,7 +153,7 @@ std::optional<EndedJob> ProcessPool::Wait() {
   return std::nullopt;
 }
 
-EndedJob ProcessPool::Bury(size_t index) {
+EndedJob ProcessPool::Reap(size_t index) {
   Worker worker = std::move(workers_[index]);
   workers_.erase(workers_.begin() + static_cast<std::ptrdiff_t>(index));
   const ProcessEnd end = worker.process.Wait();

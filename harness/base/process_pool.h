@@ -56,7 +56,7 @@ class ProcessPool {
   bool Work(int channel, int messages) const;
   Worker MakeWorker() const;
   void EndSlowJobs();
-  EndedJob Bury(size_t index);
+  EndedJob Reap(size_t index);
 
   std::string what_;
   size_t size_;

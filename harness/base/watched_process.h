@@ -10,7 +10,7 @@ namespace dexcheck {
 void AllowWatching(int failure);
 
 /// Goes on in a copy of this process, while this one waits for it and passes on its end. An end that the copy
-/// did not announce by EndProgram is told in one line, "WHAT ended the program (exit code 0)", and is a
+/// did not announce by EndProgram is reported in one line, "WHAT ended the program (exit code 0)", and is a
 /// failure. Signals that are sent to this process reach the copy. Does nothing where main has not allowed it,
 /// in a copy, in a forked worker, and where there are other threads, which a copy would not have.
 /// @param what "controller law.so". @throws Error when no process can be made.

@@ -29,7 +29,7 @@ template <typename Derived>
   return values.size() > 0 ? values.template maxCoeff<Eigen::PropagateNaN>() : 0.0;
 }
 
-/// The largest magnitude of an entry, likewise.
+/// The largest magnitude of an entry; NaN when one is.
 template <typename Derived>
 [[nodiscard]] double MaxAbs(const Eigen::MatrixBase<Derived>& values) {
   return Largest(values.cwiseAbs());

@@ -126,7 +126,7 @@ void ConstraintLaw::FindWeights(const mjData& reference) {
   const MatrixXd W = M.llt().solve(MatrixXd::Identity(size, size));
   // The mean of x^T M^-1 x over the columns x. An error E of M makes y^T E y of it, with y = M^-1 x.
   MatrixXd M_error = M.cwiseAbs();
-  M_error.topLeftCorner(robot, robot) = whole_->mass_scales();
+  M_error.topLeftCorner(robot, robot) = whole_->CalcMassScales();
   M_error *= kTurnErrors * (whole_->model().max_depth() + 1);
   const auto calc_weight = [&](const MatrixXd& x) {
     const MatrixXd y = W * x;

@@ -114,38 +114,46 @@ WholeRobot::WholeRobot(const RobotModel& model, const MassProperties* object, co
   }
 
   const Eigen::Index n = terms_.size(), all = n + (object_ ? 6 : 0);
-  mass_scales_.resize(n, n);
-  for (Eigen::Index i = 0; i < n; ++i) {
-    for (Eigen::Index j = 0; j < n; ++j)
-      mass_scales_(i, j) = scales_.CalcMassScale(static_cast<int>(i), static_cast<int>(j));
+  for (VectorXd* vector : {&arms_, &moved_, &bias_sizes_}) vector->setZero(n);
+  for (int i = 0; i < static_cast<int>(n); ++i) {
+    arms_[i] = scales_.CalcVelocityScale(i);
+    moved_[i] = scales_.GetSubtreeMass(i) * arms_[i];
   }
   ListMass();
   q_.setZero(model_.num_positions());
   for (VectorXd* vector : {&nu_, &bias_, &engine_bias_}) vector->setZero(all);
-  sizes_.setZero(n);
   loads_.resize(static_cast<size_t>(model_.num_joints()) + 1);
 }
 
 void WholeRobot::ListMass() {
   const mjModel& engine = adapter_->engine();
   const Eigen::Index base = base_rates_.rows();
-  std::vector<Eigen::Index> entries(static_cast<size_t>(engine.nv), -1);
-  if (model_.base().type == BaseType::kFloating) {
-    for (Eigen::Index k = 0; k < base; ++k)
-      entries[static_cast<size_t>(base_dofs_[static_cast<size_t>(k)])] = k;
-  }
-  for (size_t k = 0; k < dofs_.size(); ++k)
-    entries[static_cast<size_t>(dofs_[k])] = base + static_cast<Eigen::Index>(k);
-  const auto sign = [&](Eigen::Index entry) { return entry < base ? 1.0 : signs_[entry - base]; };
-  for (int dof = 0; dof < engine.nv; ++dof) {
-    const Eigen::Index row = entries[static_cast<size_t>(dof)];
+  const auto find_dof = [&](int entry) {
+    if (entry >= base) return dofs_[static_cast<size_t>(entry - base)];
+    return model_.base().type == BaseType::kFloating ? base_dofs_[static_cast<size_t>(entry)] : -1;
+  };
+  const auto find_address = [&](int row, int col) {
     int steps = 0;
-    for (int other = dof; row >= 0 && other >= 0; other = engine.dof_parentid[other], ++steps) {
-      const Eigen::Index col = entries[static_cast<size_t>(other)];
-      const int address = FindMassEntry(engine, dof, steps);
-      if (col >= 0 && address >= 0) mass_entries_.push_back({row, col, address, sign(row) * sign(col)});
+    for (int dof = find_dof(row); dof >= 0; dof = engine.dof_parentid[dof], ++steps)
+      if (dof == find_dof(col)) return FindMassEntry(engine, find_dof(row), steps);
+    return -1;
+  };
+  const auto sign = [&](Eigen::Index entry) { return entry < base ? 1.0 : signs_[entry - base]; };
+  for (int row = 0; row < static_cast<int>(terms_.size()); ++row) {
+    for (const int col :
+         model_.ListMovingEntries(row < base ? -1 : model_.joint_of_dof(row - static_cast<int>(base)))) {
+      if (col <= row)
+        mass_entries_.push_back(
+            {row, col, scales_.CalcMassScale(row, col), find_address(row, col), sign(row) * sign(col)});
     }
   }
+}
+
+MatrixXd WholeRobot::CalcMassScales() const {
+  MatrixXd result(terms_.size(), terms_.size());
+  for (int i = 0; i < result.rows(); ++i)
+    for (int j = 0; j < result.cols(); ++j) result(i, j) = scales_.CalcMassScale(i, j);
+  return result;
 }
 
 std::string WholeRobot::DescribeEntry(int entry) const {
@@ -175,10 +183,12 @@ void WholeRobot::SetState(const mjtNum* qpos, const mjtNum* qvel) {
   ReadRates(qvel, &nu_);
   const Eigen::Index n = terms_.size();
   terms_.SetState(q_, nu_.head(n));
-  terms_.CalcDynamics();
+  terms_.CalcMassAndCoriolis();
   scales_.SetState(terms_, q_, nu_.head(n));
-  bias_.head(n) = terms_.gravity() + terms_.friction();
-  bias_.head(n).noalias() += terms_.C() * nu_.head(n);
+  bias_.head(n) = terms_.coriolis() + terms_.gravity() + terms_.friction();
+  const double acceleration = model_.gravity().norm() + scales_.acceleration();
+  for (Eigen::Index i = 0; i < n; ++i)
+    bias_sizes_[i] = Positive(moved_[i] * acceleration) + std::abs(terms_.friction()[i]);
   if (!object_) return;
   X_Bo_ = ReadFreePose(qpos + adapter_->object_qpos());
   const Vector3d omega = nu_.tail<3>();
@@ -187,7 +197,11 @@ void WholeRobot::SetState(const mjtNum* qpos, const mjtNum* qvel) {
 
 void WholeRobot::AddInertia(const VectorXd& a, VectorXd* result) const {
   const Eigen::Index n = terms_.size();
-  result->head(n).noalias() += terms_.M() * a.head(n);
+  for (const MassEntry& one : mass_entries_) {
+    const double entry = terms_.M()(one.row, one.col);
+    (*result)[one.row] += entry * a[one.col];
+    if (one.row != one.col) (*result)[one.col] += entry * a[one.row];
+  }
   if (!object_) return;
   result->segment<3>(n) += object_->mass * a.segment<3>(n);
   result->tail<3>() += object_->inertia * a.tail<3>();
@@ -242,8 +256,7 @@ void WholeRobot::ProjectForces(VectorXd* result, VectorXd* size) {
     } else {
       (*result)[at] += X.linear().col(2).dot(joint.type == JointType::kRevolute ? load.moment : load.force);
     }
-    for (int k = 0; k < CountVelocities(joint.type); ++k)
-      (*size)[at + k] += load.size * scales_.CalcVelocityScale(static_cast<int>(at) + k);
+    for (int k = 0; k < CountVelocities(joint.type); ++k) (*size)[at + k] += load.size * arms_[at + k];
     Load& parent = loads_[static_cast<size_t>(joint.parent + 1)];
     const Vector3d origin = terms_.CalcLinkPose(joint.parent).translation();
     parent.force += load.force;
@@ -257,7 +270,7 @@ void WholeRobot::ProjectForces(VectorXd* result, VectorXd* size) {
   } else if (base == 3) {
     result->head<3>() += Vector3d(load.force.x(), load.force.y(), load.moment.z());
   }
-  for (int i = 0; i < base; ++i) (*size)[i] += load.size * scales_.CalcVelocityScale(i);
+  size->head(base) += load.size * arms_.head(base);
   if (!object_) return;
   result->segment<3>(terms_.size()) += object_load_.force;
   result->tail<3>() += X_Bo_.linear().transpose() * object_load_.moment;
@@ -270,8 +283,9 @@ double WholeRobot::CalcObjectArm() const { return std::sqrt(object_->inertia.tra
 std::pair<double, int> WholeRobot::CompareMass(const VectorXd& mass) const {
   std::pair<double, int> worst(0.0, -1);
   for (const MassEntry& one : mass_entries_) {
+    if (one.address < 0) continue;
     const double apart = std::abs(terms_.M()(one.row, one.col) - one.sign * mass[one.address]);
-    const double error = apart / Positive(mass_scales_(one.row, one.col));
+    const double error = apart / one.scale;
     if (IsWorse(error, worst.first)) worst = {error, static_cast<int>(one.row)};
   }
   return worst;
@@ -281,22 +295,19 @@ std::pair<double, int> WholeRobot::CompareBias(const VectorXd& bias) {
   ReadForces(bias.data(), &engine_bias_);
   std::pair<double, int> worst(0.0, -1);
   for (int i = 0; i < static_cast<int>(terms_.size()); ++i) {
-    const double error = std::abs(bias_[i] - engine_bias_[i]) / Positive(CalcBiasSize(i));
+    const double error = std::abs(bias_[i] - engine_bias_[i]) / bias_sizes_[i];
     if (IsWorse(error, worst.first)) worst = {error, i};
   }
   return worst;
 }
 
-double WholeRobot::CalcBiasSize(int entry) const {
-  return scales_.CalcGravityScale(entry) + scales_.CalcCoriolisScale(entry) +
-         std::abs(terms_.friction()[entry]);
-}
-
-void WholeRobot::AddSizes(const VectorXd& nu_dot, VectorXd* result) {
+void WholeRobot::AddSizes(const VectorXd& nu_dot, VectorXd* result) const {
   const Eigen::Index n = terms_.size();
-  sizes_ = nu_dot.head(n).cwiseAbs();
-  result->head(n).noalias() += mass_scales_ * sizes_;
-  for (int i = 0; i < static_cast<int>(n); ++i) (*result)[i] += CalcBiasSize(i);
+  for (const MassEntry& one : mass_entries_) {
+    (*result)[one.row] += one.scale * std::abs(nu_dot[one.col]);
+    if (one.row != one.col) (*result)[one.col] += one.scale * std::abs(nu_dot[one.row]);
+  }
+  result->head(n) += bias_sizes_;
   if (!object_) return;
   const double force = object_->mass * (model_.gravity().norm() + nu_dot.segment<3>(n).norm());
   const double omega = nu_.tail<3>().norm();

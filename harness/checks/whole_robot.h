@@ -50,8 +50,8 @@ class WholeRobot {
   [[nodiscard]] int FindLink(int body) const { return body_links_[static_cast<size_t>(body)]; }
   /// The engine's joint of one of model().
   [[nodiscard]] int engine_joint(int joint) const { return joints_[static_cast<size_t>(joint)]; }
-  /// What errors of M's entries are relative to.
-  [[nodiscard]] const MatrixXd& mass_scales() const { return mass_scales_; }
+  /// What errors of M's entries are relative to (robot_size() x robot_size()).
+  [[nodiscard]] MatrixXd CalcMassScales() const;
 
   /// Evaluates all terms at the engine's state. @param qpos, qvel as the engine's (nq, nv).
   void SetState(const mjtNum* qpos, const mjtNum* qvel);
@@ -95,14 +95,15 @@ class WholeRobot {
   void ProjectForces(VectorXd* result, VectorXd* size);
 
   /// result += what M nu_dot and bias() are sums of, by entry: errors of rounding are relative to that.
-  void AddSizes(const VectorXd& nu_dot, VectorXd* result);
+  void AddSizes(const VectorXd& nu_dot, VectorXd* result) const;
 
  private:
-  /// Where the engine has an entry of M, and the sign of its axes.
+  /// An entry of M that the tree lets differ from zero, row >= col.
   struct MassEntry {
     Eigen::Index row, col;
-    int address;
-    double sign;
+    double scale;
+    int address;  // of the engine's; -1 where it has other coordinates
+    double sign;  // of its axes
   };
   struct Load {
     Vector3d force = Vector3d::Zero(), moment = Vector3d::Zero();  // world, about the link's origin
@@ -111,7 +112,6 @@ class WholeRobot {
 
   void AddForce(int link, const BodyForce& one);
   [[nodiscard]] double CalcObjectArm() const;  // m
-  [[nodiscard]] double CalcBiasSize(int entry) const;
   void ListMass();
 
   const Adapter* adapter_;
@@ -127,9 +127,9 @@ class WholeRobot {
   VectorXd signs_;              // of those
   std::vector<Eigen::Index> motor_entries_;
   std::vector<int> body_links_;  // by the engine's bodies; kNoLink, kObject
-  MatrixXd mass_scales_;         // of M's entries
   std::vector<MassEntry> mass_entries_;
-  VectorXd q_, nu_, bias_, engine_bias_, sizes_;
+  VectorXd arms_, moved_, bias_sizes_;  // n: CalcVelocityScale; times the mass that moves; of bias()
+  VectorXd q_, nu_, bias_, engine_bias_;
   Pose X_Bo_ = Pose::Identity();
   std::vector<Load> loads_;  // of the base, then by joint
   Load object_load_;

@@ -118,11 +118,17 @@ Json ToJson(const FileCause& cause) {
   return json;
 }
 
+/// A verdict's first line: its word painted, the rest wrapped.
+void PrintLine(bool is_good, const std::string& word, const std::string& rest) {
+  const std::string line = Wrap(word + rest, 2);
+  fmt::print("{}{}\n", Paint(is_good ? Tone::kGood : Tone::kBad, word), line.substr(word.size()));
+}
+
 /// Prints the causes, a line each, and how all else agrees. @returns whether there are any.
-bool PrintCauses(const ConsistencyRequest& request, const Comparison& comparison) {
+bool PrintCauses(const ConsistencyRequest& request, const Comparison& comparison, bool offers_repair) {
   if (!comparison.causes || comparison.causes->agrees) return false;
   const FileCauses& causes = *comparison.causes;
-  fmt::print("DISAGREE: {} differs from {}.\n", causes.file, causes.reference);
+  PrintLine(false, "DISAGREE", fmt::format(": {} differs from {}.", causes.file, causes.reference));
   const std::vector<std::string> lines = ListDifferences(comparison);
   constexpr size_t kMostShown = 30;
   for (size_t i = 0; i < std::min(lines.size(), kMostShown); ++i) {
@@ -136,6 +142,7 @@ bool PrintCauses(const ConsistencyRequest& request, const Comparison& comparison
                                          : "to " + request.DescribeTolerance();
     fmt::print("{}\n", Wrap("  everything else agrees " + digits, 5));
   }
+  if (!offers_repair) return true;
   const bool is_first = causes.file == request.files.robot.filename().string();
   fmt::print("  repair: dexcheck diagnose {} {} --write FILE\n",
              QuoteForShell((is_first ? request.files.robot : request.files.mjcf).string()),
@@ -260,7 +267,7 @@ void PrintTable(const ConsistencyRequest& request, const Comparison& comparison)
                             0));
 }
 
-void PrintVerdict(const ConsistencyRequest& request, const Comparison& comparison) {
+void PrintVerdict(const ConsistencyRequest& request, const Comparison& comparison, bool offers_repair) {
   const ConsistencyResult& result = comparison.result;
   if (!request.IsWhole(result)) {
     fmt::print("INTERRUPTED after {} of {} samples. So far:\n", result.samples, request.options.samples);
@@ -273,35 +280,41 @@ void PrintVerdict(const ConsistencyRequest& request, const Comparison& compariso
   };
   const std::string left_out = count(comparison.not_compared, "not compared") +
                                count(comparison.without_effect, "differ, do not act on these terms");
-  if (PrintCauses(request, comparison)) return;
+  if (PrintCauses(request, comparison, offers_repair)) return;
   if (result.Agrees()) {
     if (comparison.digits) {
-      fmt::print(
-          "AGREE within the printed digits ({}) in all {} terms{}; --exact asks for rounding alone{}.\n",
-          DescribeDigits(*comparison.digits), result.terms.size(),
-          DescribeLoosest(comparison.digits->loosest), left_out);
+      PrintLine(
+          true, "AGREE",
+          fmt::format(" within the printed digits ({}) in all {} terms{}; --exact asks for rounding alone{}.",
+                      DescribeDigits(*comparison.digits), result.terms.size(),
+                      DescribeLoosest(comparison.digits->loosest), left_out));
       return;
     }
-    fmt::print("AGREE: {} agree to {} in all {} terms{}.\n",
-               comparison.with_engine  ? "the analytic model and MuJoCo"
-               : request.has_results() ? "the description and the results"
-                                       : "the two descriptions",
-               request.DescribeTolerance(), result.terms.size(), left_out);
+    PrintLine(true, "AGREE",
+              fmt::format(": {} agree to {} in all {} terms{}.",
+                          comparison.with_engine  ? "the analytic model and MuJoCo"
+                          : request.has_results() ? "the description and the results"
+                                                  : "the two descriptions",
+                          request.DescribeTolerance(), result.terms.size(), left_out));
     return;
   }
   constexpr size_t kMostShown = 10;
   const Differences differences = SortDifferences(comparison);
   const std::string to_digits = fmt::format("agrees to {} digits", differences.digits);
   if (differences.real.empty()) {
-    fmt::print("DISAGREE: everything {}, as rounded numbers do; --digits {} judges by that{}.\n", to_digits,
-               differences.digits, left_out);
+    PrintLine(false, "DISAGREE",
+              fmt::format(": everything {}, as rounded numbers do; --digits {} judges by that{}.", to_digits,
+                          differences.digits, left_out));
   } else {
-    fmt::print("DISAGREE: {}", differences.real.front());
-    if (differences.real.size() > 1) fmt::print("; and in {} more", differences.real.size() - 1);
+    const std::string more = differences.real.size() > 1
+                                 ? fmt::format("; and in {} more", differences.real.size() - 1)
+                                 : std::string();
     const std::string within =
         comparison.digits ? "agrees within the printed digits (" + DescribeDigits(*comparison.digits) + ")"
                           : "agrees to " + request.DescribeTolerance();
-    fmt::print("; everything else {}{}.\n", differences.rounded.empty() ? within : to_digits, left_out);
+    PrintLine(false, "DISAGREE",
+              fmt::format(": {}{}; everything else {}{}.", differences.real.front(), more,
+                          differences.rounded.empty() ? within : to_digits, left_out));
     const size_t shown =
         comparison.digits ? std::min(differences.real.size(), kMostShown) : differences.real.size();
     for (size_t i = 1; i < shown; ++i) fmt::print("  {}\n", differences.real[i]);
@@ -333,6 +346,7 @@ std::string ToText(const ConsistencyRequest& request, const Comparison& comparis
                {"outcome", NameOutcome(request, comparison)}};
   json["notes"] = comparison.notes;
   for (const std::string& note : comparison.not_compared) json["notes"].push_back(note);
+  json["differences"] = ListDifferences(comparison);
   json["not_compared"] = comparison.not_compared;
   json["without_effect"] = comparison.without_effect;
   if (const std::optional<double> tolerance = request.judging.Find()) json["tolerance"] = *tolerance;

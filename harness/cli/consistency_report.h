@@ -44,7 +44,8 @@ nlohmann::ordered_json DescribeRecord(const CheckRecord& record, const RobotMode
 /// Large results first fail, then where to look: what a person reads.
 void PrintTable(const ConsistencyRequest& request, const Comparison& comparison);
 /// Prints whether the two agree, and if not, why.
-void PrintVerdict(const ConsistencyRequest& request, const Comparison& comparison);
+/// @param offers_repair whether the command that writes a corrected file follows the causes.
+void PrintVerdict(const ConsistencyRequest& request, const Comparison& comparison, bool offers_repair = true);
 /// The same as JSON.
 std::string ToText(const ConsistencyRequest& request, const Comparison& comparison, ExitCode code);
 

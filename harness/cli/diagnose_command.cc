@@ -58,7 +58,7 @@ std::string WriteRepair(const DiagnoseRequest& request, const DescriptionFile& f
   DescriptionFile repaired(path, std::move(text), request.urdf);
   const Comparison again = Compare(request, &repaired, second, [](long) { return !IsInterrupted(); });
   const std::string name = path.filename().string();
-  if (again.Agrees()) return name + " agrees with " + b;
+  if (again.Agrees()) return Paint(Tone::kGood, "REPAIRED") + ": " + name + " agrees with " + b;
   return fmt::format("{} still differs from {}: {}", name, b, ListDifferences(again).front());
 }
 
@@ -78,7 +78,7 @@ int Run(DiagnoseRequest request) {
       Compare(request, &first, &second, [&](long samples) { return bar.GoOn(samples); });
   bar.Finish();
   json.Write([&] { return ToText(request, comparison); });
-  if (!json.TakesStdout()) PrintVerdict(request, comparison);
+  if (!json.TakesStdout()) PrintVerdict(request, comparison, /*offers_repair=*/!output);
   if (IsInterrupted()) return ReportFailure("interrupted");
   if (output) {
     const std::string line = WriteRepair(request, first, &second, comparison, &*output);

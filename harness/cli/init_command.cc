@@ -16,9 +16,6 @@
 #include "harness/base/files.h"
 #include "harness/checks/file_comparison.h"
 #include "harness/cli/commands.h"
-#include "harness/cli/init_motion.h"
-#include "harness/cli/init_sources.h"
-#include "harness/cli/init_stance.h"
 #include "harness/cli/run_folder.h"
 #include "harness/descriptions/compiled_inertias.h"
 #include "harness/descriptions/description_match.h"
@@ -27,11 +24,18 @@
 #include "harness/engine/engine.h"
 #include "harness/engine/mjcf_passes.h"
 #include "harness/run/runner.h"
+#include "harness/scenario/runnable_robot.h"
+#include "harness/scenario/stand.h"
 
 namespace dexcheck::cli {
 namespace {
 
 namespace fs = std::filesystem;
+
+struct InitRequest {
+  fs::path robot, mjcf;
+  std::string from, out;
+};
 
 constexpr const char* kWorkflow =
     R"(# Compares the two descriptions at every push. In the place of OWNER and REVISION: where dexcheck lies.
@@ -69,14 +73,10 @@ std::string TryScenario(const fs::path& file) {
 /// that its joints move all the same.
 /// @param held why it is held whether or not there is a stance; empty where a stance is looked for.
 std::optional<Stand> StandOrHold(const mjModel& engine, const std::map<std::string, double>& limits,
-                                 const std::string& held, InitSources* sources) {
+                                 const std::string& held, RunnableRobot* sources) {
   const std::string source = sources->mjcf->source();
   const auto copy = [&] {
     return std::make_unique<MjcfFile>(sources->mjcf->PrintFor(CurrentFolder()), source);
-  };
-  const auto describe = [&](const MjcfFile& mjcf) {
-    // Its files are found from the source's folder, and of this copy from the working directory.
-    return DescriptionFile(source, mjcf.PrintFor(MakeAbsolute(source).parent_path()), {}).Describe();
   };
   Stand stand;
   std::unique_ptr<MjcfFile> mjcf;
@@ -87,7 +87,7 @@ std::optional<Stand> StandOrHold(const mjModel& engine, const std::map<std::stri
     stand = FindStand(engine, at_key == 1);
     mjcf = copy();
     PutOnFloor(engine, stand, mjcf.get());
-    robot = describe(*mjcf);
+    robot = Describe(source, *mjcf);
     AddFeet(stand, &robot);
     why = FindPosture(ParseRobotModel(WriteParameters(robot, source), source), limits, &stand);
     if (why.empty()) break;
@@ -96,7 +96,7 @@ std::optional<Stand> StandOrHold(const mjModel& engine, const std::map<std::stri
     mjcf = copy();
     HoldBase(engine.stat.extent, mjcf.get());
     LeaveOutBaseContacts(mjcf.get());
-    robot = describe(*mjcf);
+    robot = Describe(source, *mjcf);
   }
   sources->robot = std::move(robot);
   sources->mjcf = std::move(mjcf);
@@ -112,7 +112,7 @@ std::optional<Stand> StandOrHold(const mjModel& engine, const std::map<std::stri
 /// @returns why none does; empty when one does, or when the two files that were given differ.
 std::string WriteRunnable(const InitRequest& request, const RobotDescription& robot,
                           const std::string& parameters, const fs::path& folder, MjcfFile* mjcf,
-                          std::optional<Stand>* stand, InitMotion* motion, bool* differ) {
+                          std::optional<Stand>* stand, FirstMotion* motion, bool* differ) {
   TakeAssets(folder, mjcf);
   WriteFile(folder / "robot.xml", mjcf->Print());
   WriteFile(folder / "robot.toml", parameters);
@@ -128,15 +128,12 @@ std::string WriteRunnable(const InitRequest& request, const RobotDescription& ro
   for (int k = 0; k <= kHalvings; ++k) {
     const double rounded = tolerance.value_or(0.0);
     WriteFile(folder / "motion.toml", *stand ? WriteStandScenario(robot, **stand, rounded)
-                                             : WriteInitScenario(robot, *motion, rounded));
+                                             : WriteMotionScenario(robot, *motion, rounded));
     // Two files that differ are what a run shows.
     why = *differ && !request.mjcf.empty() ? "" : TryScenario(folder / "motion.toml");
     if (why.empty()) break;
     if (*stand) (*stand)->sway *= 0.5;
-    for (JointSpan& span : motion->spans) {
-      span.end = span.start + 0.5 * (span.end - span.start);
-      span.swing *= 0.5;
-    }
+    Shrink(motion);
   }
   WriteFile(folder / "gains.toml", WriteGainStudy(stand->has_value()));
   WriteFile(folder / ".github/workflows/dexcheck.yml", kWorkflow);
@@ -147,17 +144,9 @@ std::string WriteRunnable(const InitRequest& request, const RobotDescription& ro
 /// @returns why no motion that was tried passes; empty when the folder is made.
 std::string MakeRobotFolder(const InitRequest& request, const std::string& out, const std::string& held,
                             bool* stands) {
-  InitSources sources = ReadSources(request);
+  RunnableRobot sources = ReadRunnableRobot(request.robot, request.mjcf);
   RobotDescription& robot = sources.robot;
   const bool is_made = request.mjcf.empty() && robot.format == RobotFormat::kUrdf;
-  if (robot.spec.joints.empty()) throw InputError(request.robot.string() + ": has no joint that moves");
-  for (const Joint& joint : robot.spec.joints) {
-    if (joint.type == JointType::kBall)
-      throw InputError(request.robot.string() + ": joint " + Quote(joint.name) +
-                       ": must not be a ball joint in a run, whose law has one number for each joint");
-  }
-  if (robot.format == RobotFormat::kMjcf)
-    StateFriction(ReduceFriction(request.robot.string(), &robot), sources.mjcf.get());
   // What cannot be an MJCF is refused before there is a folder.
   MjModelPtr engine = Load(*sources.mjcf);
   const std::map<std::string, double> home = ReadHome(*engine), limits = ReadMotorLimits(*engine);
@@ -173,17 +162,16 @@ std::string MakeRobotFolder(const InitRequest& request, const std::string& out, 
   }
   if (!request.mjcf.empty()) {
     // Names are the MJCF's, and what the URDF has no place for.
-    RobotDescription other = DescriptionFile(request.mjcf, sources.mjcf->Print(), {}).Describe();
+    RobotDescription other = Describe(request.mjcf, *sources.mjcf);
     CompleteEachOther(&other, &robot);
     TakeCompiledInertias(*sources.mjcf, *engine, &robot);
   }
-  const RobotDescription stated = robot;
   FreeCoupledJoints(&robot);
   const std::string parameters = WriteParameters(robot, request.robot.filename().string());
-  InitMotion motion;
+  FirstMotion motion;
   if (!stand) {
     const std::string table = request.robot.string() + " as a parameter file";
-    motion = PlanInitMotion(stated, ParseRobotModel(parameters, table), limits, sources.rates, home);
+    motion = PlanFirstMotion(robot, ParseRobotModel(parameters, table), limits, sources.rates, home);
   }
   FreeMotors(stand ? stand->weak : motion.weak, sources.mjcf.get());
   const std::vector<std::string> overlaps =

@@ -293,9 +293,4 @@ int CopyScenario(const std::string& name, const std::string& out) {
   return 0;
 }
 
-void WriteFile(const std::filesystem::path& path, const std::string& text) {
-  MakeFolder(path.parent_path());
-  OutputFile(path).Write(text);
-}
-
 }  // namespace dexcheck::cli

@@ -118,7 +118,4 @@ bool IsTomlFile(const std::string& name);
 /// @returns the exit code. @throws InputError when there is none of that name, or files cannot be written.
 int CopyScenario(const std::string& name, const std::string& out);
 
-/// Writes a file of a folder, whole or not at all, and makes the folder.
-void WriteFile(const std::filesystem::path& path, const std::string& text);
-
 }  // namespace dexcheck::cli

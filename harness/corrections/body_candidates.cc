@@ -307,7 +307,7 @@ void CandidateSearch::SearchTwoParts(int link, size_t begin) {
         found_.erase(std::remove_if(found_.begin() + static_cast<std::ptrdiff_t>(k), found_.end(), is_same),
                      found_.end());
         for (; k < found_.size(); ++k) {
-          found_[k].beside = {edit.fault, first, edit.bits + part->extra};
+          found_[k].beside = {edit.fault, {first}, edit.bits + part->extra};
           if (first != second) found_[k].patches.push_back({first, robot.link(first)});
         }
       }

@@ -84,6 +84,7 @@ class CandidateSearch {
 
   // exchange_candidates.cc
   void SearchExchanges();
+  void SearchTurnedExchange(int n, int k, double which);
   void SearchCopy(int link, double which);
   void SearchSecond(int link);
 

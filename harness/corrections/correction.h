@@ -146,10 +146,10 @@ struct LinkPatch {
   PrintedLink right;
 };
 
-/// A fault of a part, beside that of another part of the same body.
+/// A fault at some links, beside another one of the same body or of the same places.
 struct FaultBeside {
   FileFault fault;
-  int link;
+  std::vector<int> links;
   double bits;
 };
 

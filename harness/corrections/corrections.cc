@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <optional>
+#include <set>
 #include <utility>
 
 #include "controller/common/text.h"
@@ -85,24 +86,68 @@ class OneWay {
 
   FileCorrections Run() {
     constexpr double kCheap = 25.0;  // bits of one fault, under which other frames are not looked for
-    std::vector<ChosenFrames> frames = ChooseFrames(pair_);
-    std::optional<FileCorrections> best;
     const PrintedRobot given = pair_.a();
+    std::vector<ChosenFrames> frames = ChooseFrames(pair_);
+    std::optional<Explanation> best;
     for (ChosenFrames& choice : frames) {
-      *pair_.mutable_a() = given;
-      pair_.Measure();
-      pair_.SetFrames(std::move(choice.X_ab));
-      FileCorrections found = Explain();
-      found.bits += found.agrees ? 0.0 : choice.bits;
-      if (!best || found.bits < best->bits - 1e-9) best = std::move(found);
-      if (best->agrees || best->bits < kCheap) break;
+      Explanation found = ExplainWith(given, std::move(choice));
+      if (!best || found.result.bits < best->result.bits - 1e-9) best = std::move(found);
+      if (best->result.agrees || best->result.bits < kCheap) break;
     }
-    best->of_second = is_second_;
-    best->is_bounded = *budget_ <= 0;
-    return *std::move(best);
+    if (!best->result.agrees && best->result.bits >= kCheap) ChangeFrames(given, &*best);
+    best->result.of_second = is_second_;
+    best->result.is_bounded = *budget_ <= 0;
+    return std::move(best->result);
   }
 
  private:
+  /// Corrections with one choice of frames.
+  struct Explanation {
+    ChosenFrames frames;
+    FileCorrections result;
+    std::set<int> doubtful;  ///< Links with numbers, or with what is not explained.
+  };
+
+  Explanation ExplainWith(const PrintedRobot& given, ChosenFrames frames) {
+    *pair_.mutable_a() = given;
+    pair_.Measure();
+    pair_.SetFrames(frames.X_ab);
+    doubtful_.clear();
+    FileCorrections found = Explain();
+    if (!found.agrees) found.bits += frames.bits;
+    return {std::move(frames), std::move(found), doubtful_};
+  }
+
+  /// Gives one link after another another frame where numbers explain it, and takes that which leaves the
+  /// cheapest explanation of all that then differs.
+  void ChangeFrames(const PrintedRobot& given, Explanation* best) {
+    constexpr int kMost = 40;      // explanations
+    constexpr double kLess = 0.5;  // bits
+    int count = 0;
+    const auto is_free = [&](int link) {
+      const auto is_other = [&](int k) {
+        return k >= 0 && !best->frames.X_ab[static_cast<size_t>(k)].isApprox(Pose::Identity(), 1e-9);
+      };
+      return pair_.Carrier(link) >= 0 && (is_other(link) || is_other(pair_.Carrier(link)));
+    };
+    for (bool improves = true; improves && count < kMost;) {
+      improves = false;
+      for (const int link : pair_.links()) {
+        const bool is_near = best->doubtful.contains(link) || best->doubtful.contains(pair_.Carrier(link));
+        if (!is_near || !is_free(link)) continue;
+        *pair_.mutable_a() = given;
+        pair_.Measure();
+        for (ChosenFrames& choice : ChangeFrame(pair_, best->frames, link)) {
+          if (++count > kMost) break;
+          Explanation found = ExplainWith(given, std::move(choice));
+          if (found.result.bits >= best->result.bits - kLess) continue;
+          *best = std::move(found);
+          improves = true;
+        }
+      }
+    }
+  }
+
   FileCorrections Explain() {
     constexpr int kRounds = 3;
     FileCorrections result;
@@ -114,6 +159,7 @@ class OneWay {
       std::erase_if(sites, [&](const Site& site) { return IsSettled(site); });
       result.agrees = result.agrees && sites.empty();
       result.unexplained.clear();
+      left_.clear();
       if (sites.empty()) break;
       for (const Site& site : sites) {
         if (std::ranges::find(all, site) == all.end()) all.push_back(site);
@@ -121,12 +167,18 @@ class OneWay {
       const std::vector<CorrectionCandidate> candidates =
           CandidateSearch(&pair_, sites, is_second_, budget_).Run();
       const Cover cover = FindCover(sites, candidates, pair_.links().size());
-      for (const size_t site : cover.left)
+      for (const size_t site : cover.left) {
+        doubtful_.insert(sites[site].link);
+        left_.push_back(sites[site]);
         result.unexplained.push_back(NamePlace(pair_, sites[site].link, sites[site].kind) + ": " +
                                      NameSite(sites[site].kind));
+      }
       if (cover.chosen.empty()) break;
       const PrintedRobot before = pair_.a();
       for (const ChosenDeal& chosen : cover.chosen) {
+        for (const size_t c : chosen.deal.candidates) {
+          if (IsNumber(candidates[c].fault)) doubtful_.insert(candidates[c].link);
+        }
         if (IsBodyOfNumbers(candidates[chosen.deal.candidates[0]].fault)) {
           for (const size_t c : chosen.deal.candidates)
             unexplained.push_back(NamePlace(pair_, candidates[c].link, SiteKind::kMass) + ": inertial");
@@ -139,18 +191,60 @@ class OneWay {
         AddLeafRival(candidates[chosen.deal.candidates[0]], &made[0]);
         for (CorrectionItem& item : made) {
           result.bits += item.bits;
-          result.items.push_back(std::move(item));
+          AddItem(std::move(item), &result.items);
         }
         Apply(chosen.deal, before, candidates);
       }
       pair_.Measure();
     }
+    WithdrawDoubtful(&result, &unexplained);
     for (CorrectionItem& item : result.items)
       item.explained = static_cast<double>(item.sites.size()) / static_cast<double>(all.size());
     constexpr double kUnexplained = 60.0;
     result.bits += kUnexplained * static_cast<double>(result.unexplained.size());
     result.unexplained.insert(result.unexplained.end(), unexplained.begin(), unexplained.end());
     return result;
+  }
+
+  /// Where the files have different frames on links, several free numbers at links that carry one another are
+  /// what another frame would leave: they are not explained. Neither are numbers that are corrected twice.
+  void WithdrawDoubtful(FileCorrections* result, std::vector<std::string>* unexplained) const {
+    constexpr double kFree = 24.0;  // bits of two entries
+    const auto is_free = [&](const CorrectionItem& item) {
+      const bool is_number = IsNumber(item.fault) || item.fault.kind == CorrectionKind::kOtherAxis;
+      if (!is_number || item.bits < kFree || item.sites.empty()) return false;
+      const int link = item.sites[0].link;
+      const bool is_geometry = IsOfPose(item.fault.of) || item.fault.of == SiteKind::kAxis ||
+                               item.fault.of == SiteKind::kAxisPoint || item.fault.of == SiteKind::kCom;
+      return is_geometry && link >= 0 && pair_.Carrier(link) >= 0 &&
+             !pair_.X_ab(link).isApprox(Pose::Identity(), 1e-9);
+    };
+    const auto is_near = [&](const Site& site, int link) {
+      return site.link == link ||
+             (site.link >= 0 && (pair_.Carrier(site.link) == link || pair_.Carrier(link) == site.link));
+    };
+    const auto is_doubtful = [&](const CorrectionItem& item) {
+      const auto is_other = [&](const CorrectionItem& other) {
+        if (&other == &item || other.sites.empty()) return false;
+        const bool is_again = IsNumber(item.fault) && IsNumber(other.fault) && item.places == other.places &&
+                              item.id == other.id && IsOfBody(item.fault.of);
+        return is_again || (is_free(item) && is_free(other) && is_near(item.sites[0], other.sites[0].link));
+      };
+      return std::ranges::any_of(result->items, is_other) ||
+             (is_free(item) && std::ranges::any_of(left_, [&](const Site& site) {
+                return !IsOfBody(site.kind) && is_near(site, item.sites[0].link);
+              }));
+    };
+    std::vector<CorrectionItem> kept;
+    for (const CorrectionItem& item : result->items) {
+      if (!is_doubtful(item)) {
+        kept.push_back(item);
+        continue;
+      }
+      const std::string text = item.places[0] + ": " + NameSite(item.fault.of);
+      if (std::ranges::find(*unexplained, text) == unexplained->end()) unexplained->push_back(text);
+    }
+    result->items = std::move(kept);
   }
 
   static bool IsBodyOfNumbers(const FileFault& fault) {
@@ -211,11 +305,32 @@ class OneWay {
       other.fault = first.beside->fault;
       other.in_second = is_second_;
       other.id = NameFault(other.fault);
-      other.places = {NamePlace(pair_, first.beside->link, other.fault.of)};
-      other.values = {""};
+      for (const int link : first.beside->links)
+        other.places.push_back(NamePlace(pair_, link, other.fault.of));
+      other.values.resize(other.places.size());
       items.push_back(std::move(other));
     }
     return items;
+  }
+
+  /// Adds an item, or its places to one of the same convention.
+  static void AddItem(CorrectionItem item, std::vector<CorrectionItem>* items) {
+    const auto is_same = [&](const CorrectionItem& other) {
+      return other.id == item.id && IsSameFault(other.fault, item.fault) && other.in_second == item.in_second;
+    };
+    const auto same = std::ranges::find_if(*items, is_same);
+    if (IsNumber(item.fault) || item.fault.kind == CorrectionKind::kExchanged || same == items->end()) {
+      items->push_back(std::move(item));
+      return;
+    }
+    for (size_t k = 0; k < item.places.size(); ++k) {
+      if (std::ranges::find(same->places, item.places[k]) != same->places.end()) continue;
+      same->places.push_back(item.places[k]);
+      same->values.push_back(item.values[k]);
+    }
+    same->bits += item.bits;
+    same->sites.insert(same->sites.end(), item.sites.begin(), item.sites.end());
+    same->patches.insert(same->patches.end(), item.patches.begin(), item.patches.end());
   }
 
   void AddRivals(const ChosenDeal& chosen, const std::vector<Site>& sites,
@@ -262,6 +377,8 @@ class OneWay {
   bool is_second_;
   int* budget_;
   std::vector<SettledSite> settled_;
+  std::set<int> doubtful_;  // of the explanation that is made
+  std::vector<Site> left_;  // that its last round does not explain
 };
 
 /// Tries readings of a whole file that put half of what differs right. @param found the best so far.

@@ -21,7 +21,9 @@ void TakeOf(const FileFault& fault, const PrintedLink& from, PrintedLink* to) {
   if (fault.whole && IsOfBody(fault.of)) {
     to->inertial = from.inertial;
   } else if (fault.whole) {
+    const Pose X_before = to->origin.X_before;  // of rows of a table
     to->origin = from.origin;
+    to->origin.X_before = X_before;
   } else if (fault.of == SiteKind::kMass) {
     to->inertial->mass = from.inertial->mass;
   } else if (fault.of == SiteKind::kCom) {
@@ -72,14 +74,51 @@ void CandidateSearch::SearchExchanges() {
           if ((both & MaskOf(kind)) != 0) offer(kind, false, MaskOf(kind));
         }
       }
-      if ((both & kPoseMask) == 0 || one.origin.form == RotationForm::kMdh) continue;
+      if ((both & kPoseMask) == 0) continue;
+      const bool is_row = one.origin.form == RotationForm::kMdh;
+      if (is_row != (two.origin.form == RotationForm::kMdh)) continue;
       offer(SiteKind::kPosition, true, kPoseMask);
+      if (is_row) continue;
+      if ((both & kPoseMask) == kPoseMask) SearchTurnedExchange(n, k, which);
       for (const SiteKind kind : {SiteKind::kPosition, SiteKind::kRotation}) {
         if ((both & MaskOf(kind)) != 0) offer(kind, false, MaskOf(kind));
       }
     }
   }
   for (const int n : pair_.links()) SearchCopy(n, which);
+}
+
+/// Two origins that are exchanged, one or both of which have a convention of their rotation beside.
+void CandidateSearch::SearchTurnedExchange(int n, int k, double which) {
+  const PrintedLink one = pair_.a().link(n);
+  const PrintedLink two = pair_.a().link(k);
+  FileFault fault{Kind::kExchanged, SiteKind::kPosition};
+  fault.other = k;
+  const auto take = [&](const PrintedLink& from, const LinkUndo& undo = {}) -> LinkUndo {
+    return [=, whole = FileFault{.kind = Kind::kExchanged, .whole = true}](PrintedLink* to) {
+      TakeOf(whole, from, to);
+      if (undo) undo(to);
+    };
+  };
+  const size_t begin = found_.size();
+  const bool are_placed = Try({fault, 0.0, MaskOf(SiteKind::kPosition)}, n, {{n, take(two)}, {k, take(one)}});
+  found_.resize(begin);
+  if (!are_placed) return;
+  fault.whole = true;
+  const EditTrial trial{fault, which, kPoseMask, two.name};
+  const auto offer = [&](const LinkEdit& edit, const LinkUndo& at_n, const LinkUndo& at_k,
+                         std::vector<int> links) {
+    if (!Try(trial, n, {{n, take(two, at_n)}, {k, take(one, at_k)}})) return;
+    found_.back().beside = {edit.fault, std::move(links), edit.bits};
+  };
+  const std::vector<LinkEdit> edits = ListRotationEdits(one.origin), others = ListRotationEdits(two.origin);
+  for (const LinkEdit& edit : others) {
+    offer(edit, edit.undo, {}, {n});
+    const auto is_same = [&](const LinkEdit& other) { return IsSameFault(other.fault, edit.fault); };
+    const auto same = std::ranges::find_if(edits, is_same);
+    if (same != edits.end()) offer(edit, edit.undo, same->undo, {n, k});
+  }
+  for (const LinkEdit& edit : edits) offer(edit, {}, edit.undo, {k});
 }
 
 /// A link that has what is right of another link, or what the file says of that.

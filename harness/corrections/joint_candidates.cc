@@ -38,10 +38,11 @@ void CandidateSearch::SearchAxis(int link) {
   const double open = joint.half_axis.sum() / std::max(joint.axis.norm(), 1e-9) + right.axis_tolerance;
   const auto offer = [&](const FileFault& fault, double bits, const Vector3d& axis, double more = 0.0) {
     if ((axis - right.axis).norm() > open + more) return;
-    const std::string values = fault.kind == Kind::kSign ? "" : DescribeRight(joint.axis, axis);
-    AddSimple({fault, bits, 0, values}, link, [axis](PrintedLink* made) { made->joint.axis = axis; });
+    AddSimple({fault, bits, 0, DescribeRight(joint.axis, axis)}, link,
+              [axis](PrintedLink* made) { made->joint.axis = axis; });
   };
   for (const auto& [fault, axis] : ListAxisEdits(given)) offer(fault, 0.0, axis);
+  const bool is_turned = (given + right.axis).norm() <= open;
   const GivenNode& numbers = pair_.given(link);
   const Matrix3d& R = numbers.X.linear();
   if (!R.isIdentity(1e-9)) {
@@ -51,7 +52,7 @@ void CandidateSearch::SearchAxis(int link) {
   if ((given - Vector3d::UnitX()).norm() < 1e-12 && pair_.a().format == RobotFormat::kUrdf)
     offer({Kind::kMissing, SiteKind::kAxis}, 0.5, right.axis);
   const bool is_simple = right.axis.cwiseAbs().maxCoeff() > 1.0 - 1e-6;
-  offer({Kind::kOtherAxis, SiteKind::kAxis}, is_simple ? 3.0 : 25.0, right.axis);
+  if (!is_turned) offer({Kind::kOtherAxis, SiteKind::kAxis}, is_simple ? 3.0 : 25.0, right.axis);
 }
 
 void CandidateSearch::SearchRange(int link) {
@@ -177,16 +178,18 @@ void CandidateSearch::SearchJoint(int link) {
     AddSimple(MakeTrial(Kind::kNumber, SiteKind::kType, 3.0,
                         fmt::format("{}, {} would be right", NameKind(given), NameKind(other))),
               link, [&](PrintedLink* made) {
+                const Vector3d axis = HasAxis(given) && HasAxis(other) ? given.joint.axis : right.axis;
                 made->joint = other.joint;
-                made->joint.axis = right.axis;
+                made->joint.axis = axis;
                 made->joint.anchor = right.anchor;
               });
   }
   if (IsWrong(link, SiteKind::kAxis)) SearchAxis(link);
-  if (IsWrong(link, SiteKind::kAxisPoint)) {
-    AddSimple(
-        MakeTrial(Kind::kNumber, SiteKind::kAxisPoint, 20.0, DescribeRight(given.joint.anchor, right.anchor)),
-        link, [&](PrintedLink* made) { made->joint.anchor = right.anchor; });
+  // Only an MJCF states a point of the axis; in other files it is the link's origin.
+  if (IsWrong(link, SiteKind::kAxisPoint) && pair_.a().format == RobotFormat::kMjcf) {
+    AddSimple(MakeTrial(Kind::kNumber, SiteKind::kAxisPoint, given.joint.anchor.isZero() ? 40.0 : 20.0,
+                        DescribeRight(given.joint.anchor, right.anchor)),
+              link, [&](PrintedLink* made) { made->joint.anchor = right.anchor; });
   }
   if (IsWrong(link, SiteKind::kRange)) SearchRange(link);
   if (IsWrong(link, SiteKind::kMimic)) SearchMimic(link);

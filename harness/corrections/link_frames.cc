@@ -26,6 +26,7 @@ constexpr double kRegistered = 7.0;
 constexpr double kManyFrames = 0.5;    ///< Another frame, where most links have one.
 constexpr double kSearchAbove = 30.0;  ///< Registration by what the link carries is tried.
 constexpr double kRounding = 2e-6;     ///< m, or rad, beside what digits leave open.
+constexpr double kSameFrame = 1e-4;    ///< m, or rad, between frames that are not tried both.
 
 /// The axis of a joint on a link, in both files' frames of the link.
 struct CarriedAxis {
@@ -73,13 +74,33 @@ class FrameChooser {
     std::vector<ChosenFrames> frames;
     for (FrameState& state : states) {
       if (frames.size() == options_.choices) break;
-      const double bits = other_frame_ * CountOthers(state.X_ab);
-      frames.push_back({std::move(state.X_ab), bits});
+      frames.push_back(Finish(std::move(state)));
+    }
+    return frames;
+  }
+
+  std::vector<ChosenFrames> Change(const ChosenFrames& chosen, int link) {
+    other_frame_ = chosen.each;
+    changed_ = link;
+    std::vector<ChosenFrames> frames;
+    for (FrameState& state : Walk(&chosen)) {
+      const Pose& X = state.X_ab[static_cast<size_t>(link)];
+      const auto is_same = [&](const ChosenFrames& other) {
+        const Pose& Y = other.X_ab[static_cast<size_t>(link)];
+        return (X.matrix() - Y.matrix()).cwiseAbs().maxCoeff() < kSameFrame;
+      };
+      if (!is_same(chosen) && std::ranges::none_of(frames, is_same))
+        frames.push_back(Finish(std::move(state)));
     }
     return frames;
   }
 
  private:
+  [[nodiscard]] ChosenFrames Finish(FrameState state) const {
+    const double bits = other_frame_ * CountOthers(state.X_ab);
+    return {std::move(state.X_ab), bits, other_frame_};
+  }
+
   static double CountOthers(const std::vector<Pose>& X_ab) {
     return static_cast<double>(
         std::ranges::count_if(X_ab, [](const Pose& X) { return !X.isApprox(Pose::Identity(), 1e-9); }));
@@ -97,12 +118,18 @@ class FrameChooser {
                                                    (x.length + y.length).norm()});
   }
 
-  std::vector<FrameState> Walk() {
+  /// @param kept frames that links have which the changed one does not carry.
+  std::vector<FrameState> Walk(const ChosenFrames* kept = nullptr) {
     std::vector<FrameState> states(1);
     states[0].X_ab.assign(pair_.a().links.size(), Pose::Identity());
+    if (kept != nullptr) states[0].X_ab = kept->X_ab;
+    std::vector<bool> is_chosen(states[0].X_ab.size(), kept == nullptr);
     std::vector<FrameState> next;
     for (const int link : pair_.links()) {
       if (pair_.Carrier(link) < 0) continue;
+      const bool is_carried = is_chosen[static_cast<size_t>(pair_.node(link).parent)];
+      is_chosen[static_cast<size_t>(link)] = is_carried || link == changed_;
+      if (!is_chosen[static_cast<size_t>(link)]) continue;
       next.clear();
       for (FrameState& state : states) {
         const std::vector<FrameChoice> choices =
@@ -176,9 +203,7 @@ class FrameChooser {
       }
     }
     for (const int other : pair_.links()) {
-      if (other == link || pair_.Carrier(other) < 0 ||
-          pair_.a().link(other).joint.kind != pair_.a().link(link).joint.kind)
-        continue;
+      if (other == link || pair_.Carrier(other) < 0) continue;
       const int last = pair_.node(link).chain.back();
       poses.push_back({kOtherJoint, ReplaceOrigin(link, last, pair_.a().link(other).origin.CalcPose())});
     }
@@ -245,15 +270,16 @@ class FrameChooser {
     for (const FrameChoice& pose : undone)
       offer(pose.cost + std::min(other_frame_, 3.0), pose.X.inverse() * X_right);
     std::ranges::stable_sort(choices, {}, &FrameChoice::cost);
-    if (choices[0].cost > kSearchAbove) {
+    if (choices[0].cost > kSearchAbove || link == changed_) {
       Register(link, X_right, open, &choices);
       std::ranges::stable_sort(choices, {}, &FrameChoice::cost);
     }
     // One of each frame.
     std::vector<FrameChoice> kept;
+    const double same = link == changed_ ? kSameFrame : 1e-7;
     for (const FrameChoice& choice : choices) {
-      if (kept.size() == kKept) break;
-      if (std::ranges::none_of(kept, [&](const FrameChoice& k) { return k.X.isApprox(choice.X, 1e-7); }))
+      if (kept.size() == (link == changed_ ? 2 : 1) * kKept) break;
+      if (std::ranges::none_of(kept, [&](const FrameChoice& k) { return k.X.isApprox(choice.X, same); }))
         kept.push_back(choice);
     }
     return kept;
@@ -349,12 +375,18 @@ class FrameChooser {
   FrameOptions options_;
   std::vector<std::vector<CarriedAxis>> axes_;  // by link
   double other_frame_ = 0.0;
+  int changed_ = -1;  // the link whose frame is to be another one
 };
 
 }  // namespace
 
 std::vector<ChosenFrames> ChooseFrames(const PrintedPair& pair, const FrameOptions& options) {
   return FrameChooser(pair, options).Run();
+}
+
+std::vector<ChosenFrames> ChangeFrame(const PrintedPair& pair, const ChosenFrames& chosen, int link,
+                                      const FrameOptions& options) {
+  return FrameChooser(pair, options).Change(chosen, link);
 }
 
 }  // namespace dexcheck

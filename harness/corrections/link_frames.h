@@ -17,6 +17,7 @@ struct FrameOptions {
 struct ChosenFrames {
   std::vector<Pose> X_ab;
   double bits = 0.0;
+  double each = 0.0;  ///< Bits of one of them.
 };
 
 /// The cheapest choices of frames, from the base outward, the cheapest first. A frame is the first
@@ -25,5 +26,10 @@ struct ChosenFrames {
 /// then wrong of the origin, of the body and of axes decide, and bits of another frame: few where most links
 /// have one.
 std::vector<ChosenFrames> ChooseFrames(const PrintedPair& pair, const FrameOptions& options = {});
+
+/// Choices in which one link has another frame than in `chosen`, each with the cheapest frames of the links
+/// that it carries. All other links keep theirs.
+std::vector<ChosenFrames> ChangeFrame(const PrintedPair& pair, const ChosenFrames& chosen, int link,
+                                      const FrameOptions& options = {});
 
 }  // namespace dexcheck

@@ -197,9 +197,10 @@ void AddHalves(Part* part, const Measure& measure, Tolerance* tolerance) {
 
 }  // namespace
 
-bool Moves(const PrintedLink& link) {
-  return link.joint.kind == JointKind::kHinge || link.joint.kind == JointKind::kSlide ||
-         link.joint.kind == JointKind::kBall;
+bool Moves(const PrintedLink& link) { return HasAxis(link) || link.joint.kind == JointKind::kBall; }
+
+bool HasAxis(const PrintedLink& link) {
+  return link.joint.kind == JointKind::kHinge || link.joint.kind == JointKind::kSlide;
 }
 
 LinkMatch MatchLinks(const PrintedRobot& a, const PrintedRobot& b, bool by_tree) {

@@ -20,6 +20,8 @@ struct LinkMatch {
 LinkMatch MatchLinks(const PrintedRobot& a, const PrintedRobot& b, bool by_tree = false);
 
 bool Moves(const PrintedLink& link);
+/// Whether a link turns about an axis or moves along one.
+bool HasAxis(const PrintedLink& link);
 
 /// A link that both files have, and what is welded to it and only this file has.
 struct Node {

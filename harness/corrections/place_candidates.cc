@@ -301,8 +301,10 @@ void CandidateSearch::SearchWeld(int link) {
   const Vector3d t = right.com - origin.CalcRotation() * given.com;
   const Vector3d open =
       Vector3d::Constant(pair_.given(home).body_tolerance.com.norm() * whole.mass / alone->mass + 1e-6);
-  Try({{CorrectionKind::kNumber, SiteKind::kPosition},
-       CountEntries(3, origin.t.data(), t.data(), open.data()),
+  const double bits = CountEntries(3, origin.t.data(), t.data(), open.data());
+  const bool is_missing = origin.t.isZero();
+  Try({{is_missing ? CorrectionKind::kMissing : CorrectionKind::kNumber, SiteKind::kPosition},
+       is_missing ? 3.0 + 0.25 * bits : bits,
        kPoseMask | kBodyMask,
        DescribeEntries(kAxisNames, origin.t.data(), t.data(), open.data())},
       link, [t, open](PrintedLink* part) {

@@ -218,15 +218,13 @@ void PrintedPair::ListJointSites(int link, std::vector<Site>* sites) const {
   const PrintedJoint& ours = a_.link(link).joint;
   const PrintedJoint& theirs = b_.link(Partner(link)).joint;
   const auto add = [&](SiteKind kind) { sites->push_back({kind, link}); };
-  if (ours.kind != theirs.kind) {
-    add(SiteKind::kType);
-    return;
-  }
-  if (!Moves(a_.link(link))) return;
+  if (ours.kind != theirs.kind) add(SiteKind::kType);
+  const bool has_axis = HasAxis(a_.link(link)) && HasAxis(b_.link(Partner(link)));
+  if (!Moves(a_.link(link)) || (ours.kind != theirs.kind && !has_axis)) return;
   const RightNode& right = right_[static_cast<size_t>(link)];
-  const bool has_axis = ours.kind != JointKind::kBall;
   const double open = ours.half_axis.sum() / std::max(ours.axis.norm(), 1e-9) + right.axis_tolerance;
   if (has_axis && !((ours.axis.normalized() - right.axis).norm() <= open)) add(SiteKind::kAxis);
+  if (ours.kind != theirs.kind) return;
   if (ours.kind != JointKind::kSlide) {
     constexpr double kSame = 2e-6;  // m
     Vector3d apart = ours.anchor - right.anchor;

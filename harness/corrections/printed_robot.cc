@@ -155,6 +155,33 @@ int PrintedRobot::Add(PrintedLink added) {
   return index;
 }
 
+namespace {
+
+/// Gives whole numbers among rounded ones as many significant digits as those have: 31 stands for 31.0000.
+void LevelWhole(PrintedRobot* robot) {
+  constexpr double kMost = 1e-4;  // of the number
+  std::vector<PrintedScalar*> whole;
+  std::vector<double> fractions;  // of half units in a unit of the first digit
+  const auto find_unit = [](double value) { return std::pow(10.0, std::floor(std::log10(std::abs(value)))); };
+  const auto add = [&](PrintedScalar* number) {
+    if (number->value == 0.0) return;
+    if (number->half == 0.0) whole.push_back(number);
+    if (number->half > 0.0) fractions.push_back(number->half / find_unit(number->value));
+  };
+  for (PrintedLink& link : robot->links) {
+    if (link.inertial) add(&link.inertial->mass);
+    for (std::optional<PrintedScalar>& number : link.joint.scalars) {
+      if (number) add(&*number);
+    }
+  }
+  if (fractions.size() < whole.size()) return;
+  const double fraction = FindMedian(std::move(fractions));
+  for (PrintedScalar* const number : whole)
+    number->half = std::min(fraction * find_unit(number->value), kMost * std::abs(number->value));
+}
+
+}  // namespace
+
 void LevelPrecision(PrintedRobot* robot) {
   // At most a micrometre, and a hundredth of a milliradian: a file of few digits stays as it is.
   constexpr double kMostTurn = 1e-5;
@@ -177,6 +204,7 @@ void LevelPrecision(PrintedRobot* robot) {
     if (!link.joint.range) continue;
     for (PrintedScalar& limit : *link.joint.range) limit.half = std::max(limit.half, range);
   }
+  LevelWhole(robot);
 }
 
 }  // namespace dexcheck

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "controller/common/errors.h"
@@ -58,6 +59,12 @@ inline std::string ReadAttribute(const tinyxml2::XMLElement& element, const char
                                  const std::string& otherwise = "") {
   const char* const value = element.Attribute(name);
   return value != nullptr ? value : otherwise;
+}
+
+/// Sets attributes by name.
+inline void SetAttributes(const std::vector<std::pair<const char*, std::string>>& attributes,
+                          tinyxml2::XMLElement* element) {
+  for (const auto& [name, value] : attributes) element->SetAttribute(name, value.c_str());
 }
 
 inline std::string PrintXml(const tinyxml2::XMLDocument& document) {

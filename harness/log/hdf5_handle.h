@@ -81,8 +81,8 @@ using Properties = Handle<H5Pclose>;
 class SilencedErrors {
  public:
   SilencedErrors() {
-    // Of a damaged file HDF5 cannot close what it holds, and would say so when the program ends. It listens
-    // to the first call only.
+    // HDF5 cannot close the objects of a damaged file, and would report it when the program ends. Only the
+    // first call has an effect.
     H5dont_atexit();
     H5Eget_auto2(H5E_DEFAULT, &function_, &data_);
     H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);

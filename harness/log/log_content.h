@@ -1,6 +1,6 @@
 #pragma once
 
-// What a log holds besides its rows: the signals, texts and files, as plain data.
+// Content of a log except its rows: the signals, texts and files, as plain data.
 
 #include <map>
 #include <string>

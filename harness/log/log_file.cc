@@ -52,7 +52,7 @@ class MemoryImage {
 
   /// By page number; page n begins at n * kPageSize.
   [[nodiscard]] const std::map<std::uint64_t, Page>& pages() const { return pages_; }
-  /// As HDF5 means the file to be, written or not.
+  /// Size that HDF5 has given the file, whether written yet or not.
   [[nodiscard]] std::uint64_t size() const { return size_; }
   void set_size(std::uint64_t size) { size_ = size; }
 
@@ -73,7 +73,7 @@ class MemoryImage {
   std::uint64_t size_ = 0;
 };
 
-/// What HDF5 holds of such a file: its own part first.
+/// HDF5's record of such a file; the library's own part comes first.
 struct MemoryFile {
   H5FD_t base;
   MemoryImage* image;

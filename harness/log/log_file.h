@@ -22,7 +22,7 @@ namespace dexcheck {
 /// Writes all bytes at the offset. @throws InputError as FailToWrite of this name.
 void WriteAt(const std::string& name, int descriptor, const void* bytes, size_t count, std::uint64_t offset);
 
-/// Copies bytes between files. @throws InputError likewise.
+/// Copies bytes between files. @throws InputError when that fails.
 void CopyBytes(const std::string& name, int from, std::uint64_t from_offset, int to, std::uint64_t to_offset,
                size_t count);
 

@@ -151,7 +151,7 @@ void RequireHdf5(const std::filesystem::path& path) {
 
 }  // namespace
 
-/// What is read of the file at once. Throws any std::exception of what is damaged.
+/// Content of the file that is read on opening. Throws any std::exception when it is damaged.
 class LogReader::File {
  public:
   explicit File(const std::filesystem::path& path)
@@ -211,7 +211,7 @@ class LogReader::File {
                 &room_left_);
   }
 
-  /// Of a dataset that is no signal.
+  /// Adds a dataset that is no signal.
   void AddFile(const std::string& name) {
     if (std::ranges::find(signals_, name, &SignalInfo::name) != signals_.end()) return;
     if (!IsPlainPath(name)) RefusePart(name, "is not a plain relative path");
@@ -245,7 +245,7 @@ class LogReader::File {
 
 namespace {
 
-/// What `work` returns. @throws InputError that names the log for whatever it throws.
+/// Returns what `work` returns. @throws InputError that names the log for any exception of `work`.
 template <typename Work>
 auto Guard(const std::filesystem::path& path, const Work& work) {
   try {

@@ -35,7 +35,7 @@ class LogReader {
   /// Names of the texts, sorted.
   [[nodiscard]] std::vector<std::string> ListTexts() const;
   [[nodiscard]] std::string ReadText(const std::string& name) const;
-  /// Likewise; empty when there is none of that name.
+  /// The text of that name; empty when there is none.
   [[nodiscard]] std::string FindText(const std::string& name) const;
 
   /// Relative names of the files embedded under a group, sorted; none is an error.

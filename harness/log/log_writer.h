@@ -50,7 +50,7 @@ class LogWriter {
   /// Creates the file.
   void StartRows();
 
-  /// Where this row's numbers of a signal go; NaN until they are written. Valid until EndRow or Flush.
+  /// This row's numbers of a signal, to be written; NaN before. Valid until EndRow or Flush.
   std::span<double> Row(int signal) {
     const Buffer& buffer = buffers_[static_cast<size_t>(signal)];
     return {buffer.begin + buffered_rows_ * buffer.width, buffer.width};

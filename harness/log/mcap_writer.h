@@ -35,7 +35,7 @@ class McapWriter {
     std::string topic, schema_name, schema;
     std::uint32_t messages = 0;
   };
-  /// Where a chunk lies, and what is in it.
+  /// Location and extent of a chunk.
   struct ChunkIndex {
     std::uint64_t first_time, last_time, start, length, index_length, size;
     std::map<std::uint16_t, std::uint64_t> message_indexes;  ///< Where each channel's is.

@@ -63,7 +63,7 @@ class ByteReader {
 
 constexpr const char* kFields[] = {"position", "velocity", "effort"};
 
-/// Of a field that is there.
+/// Requires one number a joint in a field that is present.
 void RequireCount(size_t count, size_t joints, const std::string& where, const char* field) {
   if (count != joints)
     throw InputError(where + ": " + field + ": must have " + std::to_string(joints) +
@@ -274,7 +274,7 @@ class McapRecording : public MessageRecording {
       const double time = kNanoseconds * static_cast<double>(reader.Take<std::uint64_t>());
       reader.Skip(8);
       TimedMessage message = Parse(parse, content.substr(22), time);
-      // Of several topics each field says whose it is.
+      // With several topics, each field is prefixed by its topic.
       if (topic_.empty())
         for (auto& field : message.fields) field.first = topic + "." + field.first;
       return message;

@@ -91,7 +91,7 @@ std::optional<double> ParseCell(std::string_view text) {
   return ParseNumber<double>(text.starts_with('+') ? text.substr(1) : text);
 }
 
-/// What stands outside of quotes, which open where a cell begins and are doubled inside (RFC 4180).
+/// The text outside of quotes, which open where a cell begins and are doubled inside (RFC 4180).
 /// @param is_open whether the text ends inside of quotes.
 std::string ListUnquoted(std::string_view text, bool* is_open) {
   std::string outside;
@@ -106,7 +106,7 @@ std::string ListUnquoted(std::string_view text, bool* is_open) {
   return outside;
 }
 
-/// Where the first cell's closing quote is; 0 for a cell without quotes.
+/// Position of the first cell's closing quote; 0 for a cell without quotes.
 size_t FindClosingQuote(std::string_view line) {
   size_t at = line.find_first_not_of(' ');
   if (at == std::string_view::npos || line[at] != '"') return 0;

@@ -17,8 +17,8 @@ class RecordingReader {
  public:
   virtual ~RecordingReader() = default;
 
-  /// Of the columns: a header's, a message's fields ("position.elbow"), a signal's ("tau.elbow"); empty texts
-  /// where the file names none. All rows have as many numbers.
+  /// Names of the columns: a header's, a message's fields ("position.elbow"), a signal's ("tau.elbow"); empty
+  /// texts where the file names none. All rows have as many numbers.
   [[nodiscard]] const std::vector<std::string>& names() const { return names_; }
   [[nodiscard]] bool has_names() const { return has_names_; }
   /// "CSV", "MCAP of sensor_msgs/msg/JointState", ...
@@ -26,7 +26,7 @@ class RecordingReader {
 
   /// The next row; numbers that it lacks are NaN. @return false at the end.
   virtual bool Next(std::vector<double>* row) = 0;
-  /// Of the last row: "FILE:LINE", "FILE: message 3".
+  /// Location of the last row: "FILE:LINE", "FILE: message 3".
   [[nodiscard]] virtual std::string Where() const = 0;
 
  protected:
@@ -73,8 +73,8 @@ struct TimedMessage {
 /// "effort.JOINT"; its own stamp is its time. @throws InputError "WHERE: ..." of bytes that are none.
 TimedMessage ParseJointState(std::string_view cdr, const std::string& where);
 
-/// The same of JSON: of a JointState, or of any object its numbers, "a.b.0"; `time` is kept unless it has a
-/// stamp.
+/// Reads a message in JSON: a JointState, or the numbers of any object, "a.b.0"; `time` is kept unless the
+/// message has a stamp.
 TimedMessage ParseJsonMessage(std::string_view json, double time, const std::string& where);
 
 // One for each kind of file.

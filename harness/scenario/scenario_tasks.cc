@@ -11,7 +11,7 @@ namespace dexcheck {
 namespace {
 
 /// Position and ZYZ angles; what is missing stays as it is.
-void ReadPose(TomlTable& table, Pose* pose) {
+void ReadPlace(TomlTable& table, Pose* pose) {
   if (const auto xyz = table.Find("xyz")) pose->translation() = xyz->AsVector<3>();
   if (const auto zyz = table.FindAngles<3>("zyz")) pose->linear() = CalcRotationZyz(*zyz);
 }
@@ -30,7 +30,7 @@ void ReadContacts(TomlTable& table, GraspOptions* grasp) {
     contacts.Reject("must have one contact for each of the " + std::to_string(grasp->fingertips.size()) +
                     " fingertips");
   }
-  ReadPose(table, &grasp->X_FO);
+  ReadPlace(table, &grasp->X_FO);
 }
 
 void ReadGrasp(const TomlValue& value, GraspOptions* grasp) {
@@ -151,7 +151,7 @@ PickTask ReadPickTask(const TomlValue& value) {
   PickTask task;
   PickAndPlaceOptions& pick = task.pick_and_place;
   (void)table.Get("xyz");
-  ReadPose(table, &task.X_Bo);
+  ReadPlace(table, &task.X_Bo);
   if (const auto joints = table.Find("arm_joints")) ReadValue(*joints, Range::kAny, &task.arm_joints);
   using Options = PickAndPlaceOptions;
   pick.raise.z() = pick.plan.raise = table.Get("raise").AsPositive();

@@ -12,6 +12,7 @@
 #include "controller/object/euler_zyz.h"
 #include "harness/engine/engine.h"
 #include "harness/engine/mujoco_release.h"
+#include "harness/plant/random_stream.h"
 
 namespace dexcheck {
 namespace {
@@ -110,9 +111,7 @@ FingerPlacement PlaceFingers(const Scenario& scenario, const RobotModel& model, 
 
 }  // namespace
 
-double DrawSymmetric(std::mt19937_64* random) {
-  return 2.0 * static_cast<double>((*random)() >> 11U) * 0x1p-53 - 1.0;
-}
+double DrawSymmetric(std::mt19937_64* random) { return 2.0 * DrawUnit(random) - 1.0; }
 
 void PlaceObject(const Pose& X_Bo, StartState* start) {
   start->X_Bo = X_Bo;

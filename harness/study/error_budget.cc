@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <type_traits>
 #include <utility>
 
 #include "controller/common/errors.h"
@@ -78,80 +79,6 @@ bool IsAt(const Value& value, const Value& rest) {
   return value == rest;
 }
 
-/// The sources among the keys of one part of a plant that is not ideal: those that are not at rest, which is
-/// where dropping puts them.
-template <typename Part>
-class SourceLister {
- public:
-  SourceLister(const Imperfections& imperfections, Part Imperfections::*part, std::vector<ErrorSource>* list)
-      : part_(part), is_(imperfections.*part), list_(list) {}
-
-  template <typename Value>
-  void Add(const char* name, Value Part::*member, bool acts_at_rest = true) {
-    if (IsAt(is_.*member, rest_.*member)) return;
-    list_->push_back({name, [part = part_, member](Imperfections* i) { (*i).*part.*member = Part().*member; },
-                      acts_at_rest});
-  }
-  /// What the first step draws is no error that lasts.
-  template <typename Value>
-  void AddNoise(const char* name, Value Part::*member) {
-    Add(name, member, /*acts_at_rest=*/false);
-  }
-
- private:
-  Part Imperfections::*part_;
-  const Part& is_;
-  Part rest_;
-  std::vector<ErrorSource>* list_;
-};
-
-void ListSensing(const Imperfections& all, std::vector<ErrorSource>* list) {
-  using S = SensingOptions;
-  SourceLister<S> lister(all, &Imperfections::sensing, list);
-  lister.Add("sensing.joint_counts", &S::joint_counts);
-  lister.AddNoise("sensing.joint_noise", &S::joint_noise);
-  lister.Add("sensing.velocity", &S::velocity);
-  lister.AddNoise("sensing.velocity_noise", &S::velocity_noise);
-  lister.Add("sensing.odometry", &S::odometry);
-  lister.AddNoise("sensing.object_position_noise", &S::object_position_noise);
-  lister.AddNoise("sensing.object_orientation_noise", &S::object_orientation_noise);
-  lister.Add("sensing.object_rate", &S::object_rate);
-  lister.Add("sensing.object_latency", &S::object_latency);
-  lister.Add("sensing.object_velocity", &S::object_velocity);
-  lister.Add("sensing.latency", &S::latency);
-}
-
-void ListActuation(const Imperfections& all, std::vector<ErrorSource>* list) {
-  using A = ActuationOptions;
-  SourceLister<A> lister(all, &Imperfections::actuation, list);
-  lister.Add("actuation.delay", &A::delay);
-  lister.Add("actuation.torque_step", &A::torque_step);
-  lister.Add("actuation.gain_error", &A::gain_error);
-  lister.Add("actuation.lag", &A::lag);
-  lister.Add("actuation.limit", &A::limit);
-  lister.Add("actuation.backlash", &A::backlash);
-  if (all.actuation.coulomb.Is(0.0) && all.actuation.stribeck.Is(0.0)) return;
-  list->push_back(
-      {"actuation.coulomb", [](Imperfections* i) { i->actuation.coulomb = i->actuation.stribeck = {}; }});
-}
-
-void ListMismatch(const Imperfections& all, std::vector<ErrorSource>* list) {
-  using M = MismatchOptions;
-  SourceLister<M> lister(all, &Imperfections::mismatch, list);
-  lister.Add("disturbance (slope)", &M::slope);
-  for (const Payload& payload : all.mismatch.payloads) {
-    list->push_back({payload.key + " (payload)", [key = payload.key](Imperfections* i) {
-                       std::erase_if(i->mismatch.payloads, [&](const Payload& p) { return p.key == key; });
-                     }});
-  }
-  lister.Add("mismatch.mass", &M::mass);
-  lister.Add("mismatch.mass_within", &M::mass_within);
-  lister.Add("mismatch.com", &M::com);
-  lister.Add("mismatch.damping", &M::damping);
-  lister.Add("mismatch.armature", &M::armature);
-  lister.Add("mismatch.friction", &M::friction);
-}
-
 /// Makes setups of one scenario with other imperfections; the scene is compiled once.
 class SetupMaker {
  public:
@@ -181,8 +108,39 @@ std::string NameUnit(const RobotModel& model) {
 
 std::vector<ErrorSource> ListErrorSources(const Imperfections& imperfections) {
   std::vector<ErrorSource> list;
-  ListSensing(imperfections, &list);
-  ListActuation(imperfections, &list);
+  // Keys that are not at rest, which is where dropping puts them. The first step draws of a noise what is no
+  // error that lasts.
+  const auto add = [&](const char* name, auto part, auto member, bool acts_at_rest = true) {
+    using Part = std::remove_cvref_t<decltype(imperfections.*part)>;
+    if (IsAt((imperfections.*part).*member, Part().*member)) return;
+    list.push_back({name, [=](Imperfections* i) { (i->*part).*member = Part().*member; }, acts_at_rest});
+  };
+  using S = SensingOptions;
+  using A = ActuationOptions;
+  using M = MismatchOptions;
+  constexpr auto kSensing = &Imperfections::sensing;
+  constexpr auto kActuation = &Imperfections::actuation;
+  constexpr auto kMismatch = &Imperfections::mismatch;
+  add("sensing.joint_counts", kSensing, &S::joint_counts);
+  add("sensing.joint_noise", kSensing, &S::joint_noise, false);
+  add("sensing.velocity", kSensing, &S::velocity);
+  add("sensing.velocity_noise", kSensing, &S::velocity_noise, false);
+  add("sensing.odometry", kSensing, &S::odometry);
+  add("sensing.object_position_noise", kSensing, &S::object_position_noise, false);
+  add("sensing.object_orientation_noise", kSensing, &S::object_orientation_noise, false);
+  add("sensing.object_rate", kSensing, &S::object_rate);
+  add("sensing.object_latency", kSensing, &S::object_latency);
+  add("sensing.object_velocity", kSensing, &S::object_velocity);
+  add("sensing.latency", kSensing, &S::latency);
+  add("actuation.delay", kActuation, &A::delay);
+  add("actuation.torque_step", kActuation, &A::torque_step);
+  add("actuation.gain_error", kActuation, &A::gain_error);
+  add("actuation.lag", kActuation, &A::lag);
+  add("actuation.limit", kActuation, &A::limit);
+  add("actuation.backlash", kActuation, &A::backlash);
+  if (const A& motors = imperfections.actuation; !motors.coulomb.Is(0.0) || !motors.stribeck.Is(0.0))
+    list.push_back(
+        {"actuation.coulomb", [](Imperfections* i) { i->actuation.coulomb = i->actuation.stribeck = {}; }});
   for (const DisturbanceOptions& one : imperfections.disturbances) {
     list.push_back({one.key + " (" + one.body + ")",
                     [key = one.key](Imperfections* i) {
@@ -190,7 +148,17 @@ std::vector<ErrorSource> ListErrorSources(const Imperfections& imperfections) {
                     },
                     /*acts_at_rest=*/false});
   }
-  ListMismatch(imperfections, &list);
+  add("disturbance (slope)", kMismatch, &M::slope);
+  for (const Payload& payload : imperfections.mismatch.payloads)
+    list.push_back({payload.key + " (payload)", [key = payload.key](Imperfections* i) {
+                      std::erase_if(i->mismatch.payloads, [&](const Payload& p) { return p.key == key; });
+                    }});
+  add("mismatch.mass", kMismatch, &M::mass);
+  add("mismatch.mass_within", kMismatch, &M::mass_within);
+  add("mismatch.com", kMismatch, &M::com);
+  add("mismatch.damping", kMismatch, &M::damping);
+  add("mismatch.armature", kMismatch, &M::armature);
+  add("mismatch.friction", kMismatch, &M::friction);
   return list;
 }
 

@@ -45,53 +45,13 @@ MjModelPtr MakeEngine(const StudyInputs& inputs) {
   return copy;
 }
 
-bool IsModelKey(const Variation& variation) { return IsOfModel(variation.key + "="); }
-
-/// Makes the trial's values of the varied keys in a document: those of the scenario, or those of the
-/// parameter file.
-template <typename Document>
-void SetKeys(const Study& study, const Trial& trial, bool of_model, Document* document) {
-  constexpr size_t kPrefix = std::string_view("model.").size();
-  for (size_t i = 0; i < study.variations.size(); ++i) {
-    const Variation& variation = study.variations[i];
-    if (IsModelKey(variation) != of_model) continue;
-    const std::string key = variation.key.substr(of_model ? kPrefix : 0);
-    // A text may be any value, and "KEY+" adds to a list.
-    if (variation.labels.empty() && !key.ends_with('+')) {
-      document->Set(key, trial.parameters[i]);
-    } else {
-      document->Override(key + "=" + FormatValue(variation, trial.parameters[i]));
-    }
-  }
-}
-
-/// The scenario and the robot from their texts: messages name their lines.
-Scenario ParseTrialScenario(const StudyInputs& inputs, const Trial& trial) {
-  std::vector<std::string> overrides = inputs.controller;
-  for (std::string& assignment : ListOverrides(inputs.study, trial))
-    overrides.push_back(std::move(assignment));
-  Scenario scenario =
-      ParseScenario(inputs.scenario_text, inputs.scenario_source, inputs.scenario_folder, overrides);
-  scenario.seed = trial.seed;
-  return scenario;
-}
-
-RobotModel MakeModel(const StudyInputs& inputs, const Trial& trial, const Scenario& scenario) {
+/// The robot is read again for a trial that changes it.
+Setup MakeSetup(const StudyInputs& inputs, const Scenario& scenario) {
   const std::string source = inputs.robot.string();
-  if (inputs.model_document && scenario.model_overrides == inputs.model_overrides) {
-    if (inputs.model) return *inputs.model;
-    try {
-      TomlDocument document = *inputs.model_document;
-      SetKeys(inputs.study, trial, /*of_model=*/true, &document);
-      return ParseRobotModel(std::move(document), source, {});
-    } catch (const InputError&) {
-    }
-  }
-  return ParseRobotModel(ReadBytes(source), source, ParseTrialScenario(inputs, trial).model_overrides);
-}
-
-Setup MakeSetup(const StudyInputs& inputs, const Trial& trial, const Scenario& scenario) {
-  return Setup(scenario, MakeModel(inputs, trial, scenario), inputs.mjcf, MakeEngine(inputs));
+  const bool is_read = inputs.model && scenario.model_overrides == inputs.model_overrides;
+  return Setup(scenario,
+               is_read ? *inputs.model : ParseRobotModel(ReadBytes(source), source, scenario.model_overrides),
+               inputs.mjcf, MakeEngine(inputs));
 }
 
 /// None of a loop that is not stable: nothing is left. Of a law that is not known they are not, either.
@@ -124,31 +84,34 @@ Outcome Classify(const Setup& setup, const RunResult& run, const TrialResult& re
 
 }  // namespace
 
-void StudyInputs::OpenScenario() {
-  ScenarioDocument document(scenario_text, scenario_source, scenario_folder);
-  for (const std::string& assignment : controller) document.Override(assignment);
-  for (const std::string& assignment : study.overrides) document.Override(assignment);
-  scenario_document = std::make_shared<const ScenarioDocument>(std::move(document));
+ScenarioDocument OpenScenario(const StudyInputs& inputs) {
+  ScenarioDocument document(inputs.scenario_text, inputs.scenario_source, inputs.scenario_folder);
+  for (const std::string& assignment : inputs.controller) document.Override(assignment);
+  for (const std::string& assignment : inputs.study.overrides) document.Override(assignment);
+  return document;
 }
 
 Scenario MakeTrialScenario(const StudyInputs& inputs, const Trial& trial) {
-  if (!inputs.scenario_document) return ParseTrialScenario(inputs, trial);
-  try {
-    ScenarioDocument document = *inputs.scenario_document;
-    SetKeys(inputs.study, trial, /*of_model=*/false, &document);
-    Scenario scenario = document.Read();
-    scenario.seed = trial.seed;
-    return scenario;
-  } catch (const InputError&) {
-    return ParseTrialScenario(inputs, trial);
+  ScenarioDocument document = inputs.scenario_document ? *inputs.scenario_document : OpenScenario(inputs);
+  for (size_t i = 0; i < trial.parameters.size(); ++i) {
+    const Variation& variation = inputs.study.variations[i];
+    // A text may be any value, and "KEY+" adds to a list.
+    if (variation.labels.empty() && !variation.key.ends_with('+')) {
+      document.Set(variation.key, trial.parameters[i]);
+    } else {
+      document.Override(variation.key + "=" + FormatValue(variation, trial.parameters[i]));
+    }
   }
+  Scenario scenario = document.Read();
+  scenario.seed = trial.seed;
+  return scenario;
 }
 
 TrialResult RunTrial(const StudyInputs& inputs, const Trial& trial) {
   TrialResult result;
   try {
     const Scenario scenario = MakeTrialScenario(inputs, trial);
-    const Setup setup = MakeSetup(inputs, trial, scenario);
+    const Setup setup = MakeSetup(inputs, scenario);
     Runner runner(setup, inputs.study.check);
     TrialMonitor monitor(setup, runner.loop().num_steps());
     const double limit = inputs.study.stop_error;
@@ -183,19 +146,14 @@ void CheckTrials(StudyInputs* inputs) {
   } else {
     trial = ListTrials(study).front();
   }
-  inputs->OpenScenario();
+  inputs->scenario_document = std::make_shared<const ScenarioDocument>(OpenScenario(*inputs));
   const Scenario first = MakeTrialScenario(*inputs, trial);
   MjModelPtr engine = LoadMjcf(inputs->mjcf);
   RemovePictures(&engine);
   inputs->engine = std::move(engine);
-  const Setup setup = MakeSetup(*inputs, trial, first);
-  const std::string robot = inputs->robot.string();
-  TomlDocument model(ReadBytes(robot), robot);
-  for (const std::string& assignment : first.model_overrides) model.Override(assignment);
-  inputs->model_document = std::make_shared<const TomlDocument>(std::move(model));
+  const Setup setup = MakeSetup(*inputs, first);
   inputs->model_overrides = first.model_overrides;
-  if (std::ranges::none_of(study.variations, IsModelKey))
-    inputs->model = std::make_shared<const RobotModel>(setup.model());
+  inputs->model = std::make_shared<const RobotModel>(setup.model());
   const Runner runner(setup, study.check);  // sensors and motors know more names than the setup
   inputs->controller_hash = HashController(first.controller);
   const std::vector<double> parameters = trial.parameters;

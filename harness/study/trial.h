@@ -15,8 +15,6 @@
 
 namespace dexcheck {
 
-class TomlDocument;
-
 /// A study with the files that its trials take.
 struct StudyInputs {
   Study study;
@@ -31,14 +29,12 @@ struct StudyInputs {
   // What all trials have, made once by CheckTrials; without it each trial makes its own.
   std::shared_ptr<const mjModel> engine;                      ///< The MJCF compiled.
   std::shared_ptr<const ScenarioDocument> scenario_document;  ///< With the study's overrides.
-  /// The parameter file parsed, with these overrides: the scenario's own and the study's.
-  std::shared_ptr<const TomlDocument> model_document;
+  std::shared_ptr<const RobotModel> model;  ///< Of the trials whose scenarios have these overrides.
   std::vector<std::string> model_overrides;
-  std::shared_ptr<const RobotModel> model;  ///< Read from it, of a study that varies no key of it.
-
-  /// Parses the scenario, for MakeTrialScenario. @throws InputError.
-  void OpenScenario();
 };
+
+/// The study's scenario with its overrides, which trials change. @throws InputError.
+ScenarioDocument OpenScenario(const StudyInputs& inputs);
 
 /// The scenario of one trial. @throws InputError as ParseScenario.
 Scenario MakeTrialScenario(const StudyInputs& inputs, const Trial& trial);

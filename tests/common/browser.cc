@@ -171,7 +171,7 @@ int Browser::WorkControls() const {
       set(control, old);
     };
     let i = 0;
-    // What a control draws anew is asked for anew.
+    // A control may redraw its page, so the elements are listed again.
     for (; i < Math.min(all().length, 300); ++i) work(all()[i]);
     window.isAlive = false;
     requestAnimationFrame(() => setTimeout(() => { window.isAlive = true; }));

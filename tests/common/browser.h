@@ -26,7 +26,7 @@ class Browser {
   /// Size in CSS pixels.
   void SetViewport(int width, int height, bool mobile = false) const;
   void SetDark(bool dark) const;
-  /// What the body of a function returns.
+  /// Returns the value of a function with this body.
   [[nodiscard]] nlohmann::json Run(const std::string& body) const;
   /// Runs the body until it returns true; false after `seconds`.
   [[nodiscard]] bool WaitFor(const std::string& body, double seconds = 120.0) const;

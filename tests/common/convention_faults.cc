@@ -19,7 +19,7 @@ Matrix3d ToTensor(const Numbers& n) {
   return I;
 }
 
-/// Of entries, from which one each is taken.
+/// The vector's entries at the three given indices.
 Vector3d Pick(const Vector3d& v, const std::array<int, 3>& from) {
   return {v[from[0]], v[from[1]], v[from[2]]};
 }

@@ -1,8 +1,7 @@
 #pragma once
 
-// What people do to the numbers of a description: other units, signs, orders, axes and frames. Every test
-// that spoils descriptions takes its faults from here. They are made by other code than that which finds
-// them.
+// Common modelling errors of descriptions: other units, signs, orders, axes and frames. All tests of faulty
+// descriptions use these. They share no code with the search for faults.
 
 #include <functional>
 #include <optional>
@@ -27,7 +26,7 @@ struct StatedLink {
   double armature = 0.0;
 };
 
-/// What of a file a fault is about.
+/// Part of a file that a fault changes.
 enum class FaultOf { kBody, kJoint, kConstant };
 
 struct ConventionFault {
@@ -45,7 +44,7 @@ const std::vector<ConventionFault>& ListConventionFaults();
 /// Throws std::out_of_range without a fault of this name.
 const ConventionFault& FindConventionFault(const std::string& name);
 
-/// What the parallel-axis theorem adds to a body's inertia about the origin of its frame: m (c.c 1 - c c^T).
+/// The parallel-axis term of a body's inertia about the origin of its frame: m (c.c 1 - c c^T).
 Matrix3d CalcOffset(const MassProperties& body);
 
 /// Ixx, Iyy, Izz, Ixy, Ixz, Iyz.

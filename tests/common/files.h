@@ -27,7 +27,7 @@ void WriteText(const std::filesystem::path& path, const std::string& text);
 
 /// The text with its first occurrence of `from` replaced; where there is none the test fails.
 std::string ReplaceFirst(std::string text, const std::string& from, const std::string& to);
-/// The same of its only occurrence: several fail the test, too.
+/// Replaces the only occurrence; none or several fail the test.
 std::string ReplaceOnce(const std::string& text, const std::string& from, const std::string& to);
 
 /// One place of a text, and what stands there instead.

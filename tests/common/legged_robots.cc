@@ -15,7 +15,7 @@ std::string Mirror(const std::string& xyz) {
   return x + " " + (y.starts_with("-") ? y.substr(1) : y == "0" ? y : "-" + y) + " " + z;
 }
 
-/// The same of roll, pitch and yaw.
+/// Mirrors roll, pitch and yaw.
 std::string MirrorTurn(const std::string& rpy) {
   std::istringstream in(rpy);
   std::string numbers[3];
@@ -27,7 +27,7 @@ std::string MirrorTurn(const std::string& rpy) {
   return numbers[0] + " " + numbers[1] + " " + numbers[2];
 }
 
-/// Of all links whose names begin so.
+/// Mirrors the turns of all links whose names have one of these prefixes.
 void MirrorTurns(const std::vector<std::string>& prefixes, std::vector<LeggedLink>* links) {
   for (LeggedLink& link : *links) {
     for (const std::string& prefix : prefixes) {

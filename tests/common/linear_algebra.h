@@ -8,7 +8,7 @@ namespace dexcheck::testing {
 
 using MatrixIn = Eigen::Ref<const Eigen::MatrixXd>;
 
-/// Of a square matrix, by elimination with partial pivoting.
+/// The inverse of a square matrix, by elimination with partial pivoting.
 Eigen::MatrixXd CalcInverse(const MatrixIn& A);
 /// The Moore-Penrose inverse, of any shape and rank.
 Eigen::MatrixXd CalcPseudoinverse(const MatrixIn& A);
@@ -20,7 +20,7 @@ Eigen::Index CalcRank(const MatrixIn& A);
 Eigen::VectorXd CalcSingularValues(const MatrixIn& A);
 /// An orthonormal basis of the nullspace of A, which has full row rank: one vector in each column.
 Eigen::MatrixXd CalcNullspace(const MatrixIn& A);
-/// Of a square matrix.
+/// The eigenvalues of a square matrix.
 Eigen::VectorXcd CalcEigenvalues(const MatrixIn& A);
 
 }  // namespace dexcheck::testing

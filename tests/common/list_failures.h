@@ -23,7 +23,7 @@ inline std::string ListFailures(const ConsistencyResult& result) {
   return failures;
 }
 
-/// Of a description against an engine's model. @param notes filled with what is not compared, unless null.
+/// Compares a description with an engine's model. @param notes receives what is not compared, unless null.
 inline std::string CompareWithEngine(const RobotDescription& robot, const mjModel& engine, long samples = 20,
                                      std::vector<std::string>* notes = nullptr) {
   const RobotModel model(robot.spec);

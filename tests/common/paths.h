@@ -1,6 +1,6 @@
 #pragma once
 
-// Where the tests find the project's files and what the build made. Only paths.cc knows folders of this
+// Paths of the project's files and of the build's products, for the tests. Only paths.cc has folders of this
 // machine, so that a compiled test serves every clone.
 
 #include <string>

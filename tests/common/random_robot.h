@@ -25,7 +25,7 @@ struct RandomRobotOptions {
 /// leaf.
 RobotSpec MakeRandomRobot(const RandomRobotOptions& options, std::mt19937* random);
 
-/// The same robot in MJCF: bodies with explicit inertias, joints about z, one site per frame.
+/// Writes a robot in MJCF: bodies with explicit inertias, joints about z, one site per frame.
 /// @param X_0b frame of the base's body in Sigma_0.
 std::string WriteMjcf(const RobotSpec& spec, bool planar_by_free_joint = true,
                       const Pose& X_0b = Pose::Identity());

@@ -23,7 +23,7 @@ template <typename ErrorType, typename Function>
   return ::testing::AssertionFailure() << "nothing was thrown";
 }
 
-/// What the exception of this type says that the function throws; "accepted" when it throws none.
+/// Message of the exception of this type that the function throws; "accepted" when it throws none.
 template <typename ErrorType, typename Function>
 std::string MessageOf(const Function& function) {
   try {

@@ -1,6 +1,6 @@
 #pragma once
 
-// What the fuzz targets share. Each is one LLVMFuzzerTestOneInput: libFuzzer's main calls it with inputs of
+// Helpers of the fuzz targets. Each is one LLVMFuzzerTestOneInput: libFuzzer's main calls it with inputs of
 // its own making (preset fuzz), replay.cc's main with those of the corpus (every other build).
 
 #include <cstdint>

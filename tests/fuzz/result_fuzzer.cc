@@ -1,4 +1,4 @@
-// What programs write: any bytes are arrays, terms of the right sizes, or an InputError that names the file.
+// Output of programs: any bytes are arrays, terms of the right sizes, or an InputError that names the file.
 
 #include "harness/descriptions/program_layout.h"
 #include "harness/descriptions/urdf_reader.h"

@@ -6,7 +6,7 @@
 namespace dexcheck::testing::fuzz {
 namespace {
 
-/// What has more trials is only read.
+/// Studies with more trials are only read.
 constexpr long kMostTrials = 2000;
 
 void UseStudy(const Study& study) {

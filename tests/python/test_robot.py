@@ -174,8 +174,8 @@ def raise_mistake(_):
 
 
 def test_a_call_costs_little():
-    """Of an arm of three joints the whole call, term included, costs less than NumPy's inverse of such a matrix, which is
-    13 us where a call is 3 to 5: a ratio of one run, since machines differ and are busy."""
+    """A term of an arm of three joints, call included, costs less than NumPy's inverse of a matrix of its size: a ratio of one
+    run, since machines differ and are busy."""
 
     def measure(call, calls=1000):
         return min(timeit.repeat(call, number=calls, repeat=30)) / calls

@@ -16,7 +16,7 @@ namespace {
 
 const Color kWhite = MakeColor(0xffffff);
 
-// Of a sum of thousands of terms.
+// Rounding of a sum of thousands of terms.
 constexpr double kRounding = 1e-10;
 
 /// Sum of what was drawn in white on black, in pixels.

@@ -13,7 +13,7 @@ namespace dexcheck::testing {
 /// @param model the shipped scene.
 RunFrames MakeKinematicRun(const mjModel& model, double duration, double step = 0.01);
 
-/// Where the torus is in a picture: the mean of its orange pixels, and how many there are.
+/// Location of the torus in a picture: the mean of its orange pixels, and how many there are.
 Vector3d FindTorus(const Image& image);
 
 }  // namespace dexcheck::testing

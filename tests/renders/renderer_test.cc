@@ -41,7 +41,7 @@ class RendererTest : public ::testing::Test {
     return options;
   }
 
-  /// Where a world point is in the picture, by the pinhole of the MJCF's camera.
+  /// Pixel of a world point, by the pinhole of the MJCF's camera.
   [[nodiscard]] Vector2d Project(const std::string& camera, const Vector3d& p_W) const {
     const int id = mj_name2id(model_.get(), mjOBJ_CAMERA, camera.c_str());
     const Vector3d eye(data_->cam_xpos + 3 * id);

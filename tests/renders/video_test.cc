@@ -115,7 +115,7 @@ TEST_F(VideoTest, CamerasOfItsOwnAreNearToRobotAndObject) {
   EXPECT_GT(torus.z(), 0.02 * kWidth * kHeight);
   EXPECT_NEAR(torus.x(), 0.5 * kWidth, 0.08 * kWidth) << "fingers hide parts of it";
   EXPECT_NEAR(torus.y(), 0.5 * kHeight, 0.1 * kHeight);
-  // As an inset, too, without moving the picture's own camera.
+  // The inset, too, leaves the picture's own camera in place.
   options.camera = kCourseCamera;
   const Image plain = Paint(options, 6.0);
   options.inset = kObjectCamera;
@@ -132,7 +132,7 @@ TEST_F(VideoTest, TheCourseCameraStandsStill) {
     VideoPainter painter(view_, options);
     const Image first = painter.Paint(0.0);
     const Image last = painter.Paint(2.7);  // the floor's pattern repeats each metre
-    // Where the robot is at either end, and the left border.
+    // Places of the robot at either end, and the left border.
     return std::array<double, 3>{Difference(first.rgb.data(), last.rgb.data(), 0, 50, 0, 100),
                                  Difference(first.rgb.data(), last.rgb.data(), 50, 100, 0, 100),
                                  Difference(first.rgb.data(), last.rgb.data(), 0, 4, 0, 100)};

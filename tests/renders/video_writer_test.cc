@@ -35,7 +35,7 @@ EncodingOptions MakeOptions() {
   return options;
 }
 
-/// Of one colour, which changes from frame to frame.
+/// A picture of one colour, which changes from frame to frame.
 Image MakeFrame(int number) {
   Image image(kWidth, kHeight);
   for (size_t i = 0; i < image.rgb.size(); i += 3) {
@@ -54,7 +54,7 @@ void WriteVideo(const fs::path& path, int frames) {
   EXPECT_EQ(video.frames(), frames);
 }
 
-/// Of a file with one stream.
+/// ffprobe's description of a file with one stream.
 nlohmann::json Probe(const fs::path& path) {
   const ProgramResult probe = RunProgram({DEXCHECK_FFPROBE, "-v", "error", "-count_frames", "-show_streams",
                                           "-show_format", "-of", "json", path.string()});

@@ -1,15 +1,20 @@
-"""Robots from parameter files, URDFs and MJCFs: their terms as NumPy arrays, whether two of them agree; and runs with
-controllers of one's own. The README of harness/python has examples."""
+"""Robots from parameter files, URDFs and MJCFs: their terms as NumPy arrays, whether two of them agree, whether one explains a
+recording; and runs with controllers of one's own. The README of harness/python has examples."""
 
 import importlib
 
-from .controller import Controller, RunError, serve
-
-_OF_RUNS = ("Run", "diagnose", "run", "study")
-__all__ = ["Controller", "RunError", "serve", *_OF_RUNS]
+_PLACES = {
+    "comparison": ("Cause", "Comparison", "Diagnosis", "Judgement", "diagnose", "judge"),
+    "controller": ("Controller", "InputError", "RunError", "serve"),
+    "robot": ("Log", "Robot", "__version__", "load"),
+    "runs": ("Run", "Study", "run", "study"),
+}
+__all__ = [name for names in _PLACES.values() for name in names if not name.startswith("_")]
 
 
 def __getattr__(name):
-    """The rest is loaded when it is used: a controller needs NumPy alone, in any version of Python."""
-    module = importlib.import_module(".runs" if name in _OF_RUNS else "._dexcheck", __name__)
-    return getattr(module, name)
+    """Loads a name when it is used first: to start the program needs none, to serve a controller those of controller.py."""
+    for place, names in _PLACES.items():
+        if name in names:
+            return getattr(importlib.import_module("." + place, __name__), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

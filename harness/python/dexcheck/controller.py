@@ -18,6 +18,10 @@ _MESSAGE = struct.Struct("=II")
 _AWAKE = 300e-6
 
 
+class InputError(ValueError):
+    """What is wrong with a file or an argument, in one line."""
+
+
 class RunError(RuntimeError):
     """A run or study that did not come to its end; what it says is the line of the program."""
 

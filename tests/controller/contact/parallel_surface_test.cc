@@ -35,7 +35,7 @@ TEST(ParallelSurface, OfATorusIsATorus) {
   }
 }
 
-// Where the chart's lines are not lines of curvature, K and M are full.
+// K and M are full matrices, because the chart's lines are not lines of curvature.
 TEST(ParallelSurface, OfAnEllipsoidMovesAsItsPointsDo) {
   const Ellipsoid ellipsoid(Vector3d(0.5, 0.7, 0.9));
   constexpr double kDistance = 0.05;

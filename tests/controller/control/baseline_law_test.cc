@@ -23,7 +23,7 @@ namespace {
 // Measured: forces 6e-13 N m (of 500), accelerations 1.8e-11 (of 1000).
 constexpr double kForceRounding = 5e-12;
 constexpr double kAccelerationRounding = 2e-10;
-// What a fault must exceed.
+// Least effect of a fault.
 constexpr double kFault = 1e-4;
 
 constexpr ControlLaw kBaselines[] = {ControlLaw::kPdGravity, ControlLaw::kFeedforwardPd,
@@ -66,7 +66,7 @@ class BaselineLawTest : public ::testing::Test {
     actuation_.CalcForce(tau, force);
     return force;
   }
-  /// What the rigid system does under E_bar' tau'.
+  /// Motion of the rigid system under E_bar' tau'.
   Prediction Answer(const VectorXd& force) { return dynamics_.Predict(scene_.robot, scene_.grasp, force); }
 
   DesiredMotion DrawDesired() {

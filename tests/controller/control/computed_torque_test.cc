@@ -162,7 +162,7 @@ TEST_P(LawTest, FaultyLawsDoNotFollowTheErrorDynamics) {
   EXPECT_GT(calc_error(Fault::kTransposedGrasp), 1e6 * kAccelerationRounding);
 }
 
-// The same on SO(3): the rotation error obeys (57) exactly.
+// On SO(3), too, the rotation error obeys (57) exactly.
 TEST_P(LawTest, RotationErrorFollowsTheErrorDynamics) {
   scene_.DrawVelocities(&random_, 1.0);
   DesiredMotion desired = DrawDesired(scene_, &random_);

@@ -29,7 +29,7 @@ VectorXd DrawForce(int n, std::mt19937* random) {
   return force;
 }
 
-/// What (48), (19) and (46) leave over.
+/// Residuals of (48), (19) and (46).
 struct Balance {
   Balance(const ModelTerms& robot, const GraspTerms& grasp, const VectorXd& force, const Prediction& p)
       : robot_residual(robot.M() * p.xi_dot + robot.C() * robot.velocity() + robot.gravity() +

@@ -27,10 +27,10 @@ constexpr double kRounding = 1e-14;
 // Five-point differences along motions of 1 m/s and 1 rad/s, which add up to about 10 rad/s at a fingertip:
 // truncation h^4 10^5 / 30 = 3e-13, rounding eps / h = 2e-12; measured 4e-12.
 constexpr double kStep = 1e-4, kDifference = 4e-11;
-// Where contacts roll and slip at 1 m/s their frames turn at about 100 rad/s: truncation h^4 100^5 / 30 =
-// 3e-8; measured 1e-8.
+// Frames of contacts that roll and slip at 1 m/s turn at about 100 rad/s: truncation h^4 100^5 / 30 = 3e-8;
+// measured 1e-8.
 constexpr double kFastDifference = 1e-7;
-// What a wrong formula must exceed.
+// Least effect of a wrong formula.
 constexpr double kVisible = 1e-3;
 
 /// The torus in the right hand; robot, object and contacts move at random and slip.

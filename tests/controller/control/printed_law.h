@@ -14,7 +14,7 @@
 
 namespace dexcheck::testing {
 
-/// What a faulty implementation might do.
+/// Fault of an implementation.
 enum class Fault {
   kNone,
   kNoPlatformRate,   ///< S_v_dot dropped: C_bar' = S'^T C S'.

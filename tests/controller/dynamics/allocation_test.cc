@@ -101,6 +101,8 @@ TEST_P(Allocation, NoneAfterConstruction) {
   for (int repeat = 0; repeat < 2; ++repeat) {
     EXPECT_EQ(Count([&] { terms_.SetState(q_, velocity_); }), 0) << "SetState";
     EXPECT_EQ(Count([&] { terms_.CalcDynamics(); }), 0) << "CalcDynamics";
+    if (GetParam().coordinates == Coordinates::kReduced)
+      EXPECT_EQ(Count([&] { terms_.CalcMassAndCoriolis(); }), 0) << "CalcMassAndCoriolis";
     EXPECT_EQ(Count([&] { energy = terms_.CalcEnergyAndMomentum(); }), 0) << "CalcEnergyAndMomentum";
     for (int frame = 0; frame < static_cast<int>(model_.frames().size()); ++frame) {
       EXPECT_EQ(Count([&] { terms_.CalcFrameJacobian(frame, J, J_dot); }), 0) << "CalcFrameJacobian";

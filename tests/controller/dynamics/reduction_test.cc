@@ -104,6 +104,38 @@ TEST_P(Reduction, ReducedTermsAreProjections) {
   }
 }
 
+// The recursive Newton-Euler equations give C's product with the velocity, without C; M, gravity and friction
+// are the same to the last bit.
+TEST(NewtonEuler, GivesTheProductOfC) {
+  std::mt19937 random(1720);
+  std::vector<RobotCase> cases = MakeRobotCases(318);
+  for (const BaseType base : {BaseType::kFixed, BaseType::kFloating}) {
+    const RandomRobotOptions options{.base = base, .joints = 30, .prismatic = 0.2, .ball = 0.3};
+    cases.push_back({"Balls", RobotModel(MakeRandomRobot(options, &random))});
+  }
+  for (const RobotCase& robot : cases) {
+    SCOPED_TRACE(robot.name);
+    ModelTerms whole(robot.model), recursive(robot.model);
+    for (int state = 0; state < 5; ++state) {
+      const VectorXd q = DrawPositions(robot.model, &random);
+      const VectorXd xi = DrawVelocities(whole.size(), &random);
+      whole.SetState(q, xi);
+      whole.CalcDynamics();
+      recursive.SetState(q, xi);
+      recursive.CalcMassAndCoriolis();
+      EXPECT_EQ(recursive.M(), whole.M());
+      EXPECT_EQ(recursive.gravity(), whole.gravity());
+      EXPECT_EQ(recursive.friction(), whole.friction());
+      const VectorXd expected = ScaleForceByMass(whole.C() * xi, whole.M());
+      ASSERT_GT(expected.norm(), 0.1);
+      EXPECT_TRUE(MatrixNear(ScaleForceByMass(recursive.coriolis(), whole.M()), expected, kRounding));
+    }
+  }
+  const RobotModel drive = ReadPaperRobot();
+  ModelTerms unreduced(drive, Coordinates::kUnreduced);
+  EXPECT_THROW(unreduced.CalcMassAndCoriolis(), std::invalid_argument);
+}
+
 // Neither where the robot stands nor where it looks changes M_bar' and C_bar', to the last bit, nor gravity's
 // part of F_bar' when gravity is vertical.
 TEST(PlatformPose, IsCyclic) {

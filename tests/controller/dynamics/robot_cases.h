@@ -23,7 +23,7 @@ struct RobotCase {
 
 inline void PrintTo(const RobotCase& robot, std::ostream* out) { *out << robot.name; }
 
-/// As the suffix of a test's name.
+/// Suffix of a test's name.
 inline std::string NameOf(const ::testing::TestParamInfo<RobotCase>& info) { return info.param.name; }
 
 /// A random tree on each kind of base that stands or drives, and the paper's robot with either v (12).

@@ -105,7 +105,7 @@ TEST_P(TorqueRegressorTest, ForceColumnsDoThePowerOfTheForce) {
   const Vector3d arm = terms.CalcLinkPose(link).linear() * model_.joint(link).body.com;
   Vector6d twist = velocity;
   twist.head<3>() += velocity.tail<3>().cross(arm);
-  // What balances a force does the opposite of its power.
+  // The power of the balancing torques is opposite to that of the force.
   EXPECT_TRUE(MatrixNear(columns.transpose() * motion_.qd, -twist, 1e-12 * (1.0 + twist.norm())));
 }
 

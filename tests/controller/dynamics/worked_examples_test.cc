@@ -96,7 +96,7 @@ TEST(TwoLinkArm, AgreesWithTheClosedForm) {
   }
 }
 
-// The same in numbers, elbow at a right angle, q1 = 0: link 2 points up.
+// Numbers by hand, elbow at a right angle, q1 = 0: link 2 points up.
 TEST(TwoLinkArm, AgreesWithNumbersByHand) {
   const RobotModel model(MakeTwoLinkArm());
   const ModelTerms terms = Evaluate(model, Vector2d(0.0, kPi / 2), Vector2d(2.0, 1.0));
@@ -206,8 +206,8 @@ TEST(Platform, AgreesWithTheClosedForm) {
   const Matrix2d M_bar{{m + 2.0 * I_s / (kr * kr), -m * c_y},
                        {-m * c_y, I_0 + I_s * kb * kb / (2.0 * kr * kr)}};
   EXPECT_TRUE(MatrixNear(terms.M(), M_bar, kRounding));
-  // What turns the motion of the centre of mass: its centripetal force along x, and the moment of that which
-  // acts at x = c_x. From (14): the (v, w) entry is S_v^T C_v S_v, the (w, v) entry S_v^T M_v S_v_dot.
+  // C_bar' has the centripetal force of the centre of mass along x, and the moment of the force that acts at
+  // x = c_x. From (14): the (v, w) entry is S_v^T C_v S_v, the (w, v) entry S_v^T M_v S_v_dot.
   //   C_bar' = m c_x w_c [0, -1; 1, 0]
   const Matrix2d C_bar{{0.0, -m * c_x * w_c}, {m * c_x * w_c, 0.0}};
   EXPECT_TRUE(MatrixNear(terms.C(), C_bar, kRounding));

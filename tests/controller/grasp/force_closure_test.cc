@@ -144,7 +144,7 @@ TEST(ForceClosureHandWorked, FourContactsOnTheEquator) {
 }
 
 TEST(ForceClosureHandWorked, CharacteristicLengthWeighsMoments) {
-  // The same grasp: doubling the length halves the margin as long as a moment is the weakest direction.
+  // For one grasp, doubling the length halves the margin as long as a moment is the weakest direction.
   const GraspForceProblem grasp = MakeEquatorGraspForceProblem(4, 0.8);
   ForceClosureOptions options;
   const double margin = CalcForceClosure(grasp.G, grasp.mu, options).margin;
@@ -197,8 +197,8 @@ TEST(ForceClosureRank, ContactsOnOneLineNeverReachThePolytope) {
         ASSERT_EQ(result.num_vertices, 0) << "offset " << offset << ", unit " << unit;
         ASSERT_EQ(result.margin, 0.0);
 
-        // As a functional on [force; moment / length] the direction is, up to its sign, the moment about the
-        // line.
+        // The direction, a functional on [force; moment / length], is the moment about the line up to its
+        // sign.
         Matrix6Xd scaled = G;
         scaled.bottomRows<3>() /= options.length;
         Vector6d n = result.direction;
@@ -217,8 +217,7 @@ TEST(ForceClosureRank, ContactsOnOneLineNeverReachThePolytope) {
 }
 
 TEST(ForceClosureRank, ContactsNearlyOnOneLineReachIt) {
-  // The same grasps with one contact a micrometre off the line, as seen from the middle of the line or
-  // nearby.
+  // Grasps with one contact a micrometre off the line, as seen from the middle of the line or nearby.
   std::mt19937_64 random(4);
   for (const double unit : kUnits) {
     for (int sample = 0; sample < 100; ++sample) {

@@ -318,7 +318,7 @@ TEST(ParameterTexts, AllMissingKeysAreReportedAtOnce) {
   change("gravity = [0.0, 0.0, -9.81]\n", "\n");
   change("friction = 0.8\n", "\n");
   change(kWaistRow, R"(link = "waist", alpha_dge = 0, a = 0,)");
-  // Of a template that two arms are made from.
+  // A template of two arms is reported once.
   change(kElbow, "elbow = { damping = 0.2 }");
   EXPECT_EQ(
       CatchProblem(text),

@@ -73,7 +73,7 @@ rows = [
                         Turn(Vector3d::UnitX(), -1.1);
     EXPECT_TRUE(MatrixNear(CalcOwnPose(model, 1, q).matrix(), second.matrix(), kRounding));
   }
-  // What the table gives in the link's own frame stands in frame i.
+  // The table's values in the link's own frame are converted to frame i.
   const Pose X_iL = Eigen::Translation3d(0.5, 0.0, 0.0) * Turn(Vector3d::UnitX(), 0.3);
   const MassProperties& body = model.joints()[0].body;
   const Vector3d com(0.1, 0.2, 0.3);

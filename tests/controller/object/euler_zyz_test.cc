@@ -22,7 +22,7 @@ constexpr double kInverseRounding = 3e-14;
 // Central differences with kStep: truncation kStep^2 / 6 times third derivatives (below 30), rounding eps /
 // kStep.
 constexpr double kStep = 1e-5, kDifference = 5e-10;
-// What a mutated model must exceed.
+// Least error of a mutated model.
 constexpr double kVisible = 1e-2;
 
 // [v; omega] of the motion X_o + t X_o_dot at t = 0 from poses alone: v = R^T p_dot, [omega]x = R^T R_dot.

@@ -24,7 +24,7 @@ constexpr double kStep = 1e-5, kDifference = 3e-9;
 // Second differences of order 4 with h = 3e-3: h^4 / 90 = 9e-13 times sixth derivatives (some hundreds),
 // rounding eps / h^2 = 2.5e-11 times lever arms and sums. Measured 2.4e-10.
 constexpr double kParticles = 2e-9;
-// What a mutated model must exceed.
+// Least error of a mutated model.
 constexpr double kVisible = 1e-2;
 
 ObjectTerms CalcTerms(const ObjectState& state) {
@@ -36,8 +36,9 @@ Vector6d CalcWrench(const ObjectTerms& terms, const ObjectState& state) {
   return terms.M_o * state.X_o_ddot + terms.C_o * state.X_o_dot + terms.N_o;
 }
 
-// The same wrench from Newton's second law for six particles that together have the object's mass properties.
-// Accelerations are second differences of positions, order 4; no angular velocity, no P, no inertia matrix.
+// Calculates the wrench by Newton's second law for six particles that together have the object's mass
+// properties. Accelerations are second differences of positions, order 4; no angular velocity, no P, no
+// inertia matrix.
 Vector6d CalcWrenchOnParticles(const ObjectState& state) {
   constexpr double h = 3e-3;
   constexpr std::array kWeights = {-1.0 / 12, 16.0 / 12, -30.0 / 12, 16.0 / 12, -1.0 / 12};

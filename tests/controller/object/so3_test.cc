@@ -20,7 +20,7 @@ constexpr double kJacobianRounding = 2e-14;
 // Central differences with kStep: truncation kStep^2 times third derivatives (< 10 here), rounding eps /
 // kStep.
 constexpr double kStep = 1e-5, kDifference = 1e-9;
-// What a mutated model must exceed.
+// Least error of a mutated model.
 constexpr double kVisible = 1e-3;
 
 // Around the switch to series at 0.1 rad, and up to pi.

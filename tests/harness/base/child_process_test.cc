@@ -20,7 +20,7 @@ std::string ReceiveAll(int channel) {
   return all;
 }
 
-TEST(ChildProcess, TellsAndIsTold) {
+TEST(ChildProcess, SendsAndReceives) {
   const std::string large(1 << 20, 'x');
   ChildProcess process("it", [&](int channel) { return Send(channel, Receive(channel, 4) + large); });
   EXPECT_TRUE(Send(process.channel(), "word"));

@@ -1,4 +1,4 @@
-// What a signal leaves behind: nothing that was under construction, and everything else.
+// A signal removes whatever is under construction, and nothing else.
 
 #include <gtest/gtest.h>
 #include <sys/wait.h>

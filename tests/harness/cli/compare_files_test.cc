@@ -314,16 +314,6 @@ TEST_F(PartOfRobot, OneSubtreeIsCompared) {
   Compare(1, "wrong.urdf", "b.xml", "--ignore finger --lock elbow=0.3");
 }
 
-TEST_F(PartOfRobot, WhatIsNotThereIsRefused) {
-  for (const char* option : {"--only nothing", "--lock nothing", "--ignore nothing"})
-    EXPECT_TRUE(Refused("consistency a.urdf b.xml " + std::string(option), {"nothing", "a.urdf", "b.xml"}))
-        << option;
-  EXPECT_TRUE(Refused("consistency a.urdf b.xml --lock grip=wide", {"--lock", "grip=wide"}));
-  EXPECT_TRUE(
-      Refused("consistency a.urdf b.xml --ignore finger --lock shoulder --lock elbow", {"nothing is left"}));
-  EXPECT_TRUE(Refused("consistency a.urdf --program cat --only lower", {"--only", "two files"}));
-}
-
 TEST_F(PartOfRobot, TwoNamesOfOneJointAreMatchedByStructure) {
   WriteChanged("named.xml", Read("b.xml"), "name=\"elbow\"", "name=\"wrist\"");
   Copy("pair.urdf");

@@ -226,11 +226,6 @@ TEST_F(MutateCommand, AllFaultsAreFoundAndCounted) {
   EXPECT_EQ(found->at("outcome"), "no effect");
 }
 
-TEST_F(MutateCommand, DisagreeingModelsAreNotMutated) {
-  WriteChanged("two.toml", Read("two.toml"), "mass = 1.5", "mass = 1.6");
-  EXPECT_TRUE(Refused("mutate --robot two.toml --mjcf two.xml", {"two.toml", "must agree with two.xml"}));
-}
-
 // Faults in a run: the same exit codes, a table, and JSON that a program reads.
 TEST_F(MutateCommand, CountsWhatIsFoundInARun) {
   // The hand does not move: what acts on velocities alone survives. It costs a fiftieth of the robot's
@@ -264,11 +259,6 @@ TEST_F(MutateCommand, GoesOnFromWhatAnInterruptedCampaignLeft) {
   Write("out.json", part.dump());
   ASSERT_LE(Run(command + " --draw-seed 2").exit_code, 1);
   EXPECT_NE(Json::parse(Read("out.json"))["faults"][0]["remark"], "taken");
-}
-
-TEST_F(MutateCommand, NamesAKindOfFaultThatThereIsNot) {
-  EXPECT_TRUE(Refused("mutate --run hold --set settle=0.2 --from 0.01 --kinds motor,wings --draws 1",
-                      {"--kinds", "\"wings\""}));
 }
 
 }  // namespace

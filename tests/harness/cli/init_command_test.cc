@@ -401,20 +401,5 @@ TEST_F(InitCommand, ARobotThatCannotPassIsRefused) {
   EXPECT_FALSE(Has("swims"));
 }
 
-TEST_F(InitCommand, RefusesInOneLine) {
-  Copy("two.toml");
-  Copy("pair.xml");
-  EXPECT_TRUE(Refused("init", {"init", "--from"}));
-  EXPECT_TRUE(Refused("init two.toml", {"two.toml", "URDF"}));
-  EXPECT_TRUE(Refused("init pair.xml pair.xml", {"pair.xml", "two MJCFs"}));
-  EXPECT_TRUE(Refused("init nothing.urdf", {"nothing.urdf"}));
-  EXPECT_TRUE(Refused("init --from papr", {"papr", "paper"}));
-  Write("floats.urdf", R"(<robot name="r"><link name="world"/><link name="l"><inertial><mass value="1"/>
-<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>
-<joint name="j" type="floating"><parent link="world"/><child link="l"/></joint></robot>)");
-  EXPECT_TRUE(Refused("init floats.urdf", {"floats.urdf", "no joint that moves"}));
-  EXPECT_FALSE(Has("floats"));
-}
-
 }  // namespace
 }  // namespace dexcheck::testing::init_command_test

@@ -137,25 +137,6 @@ TEST_F(JudgeCommand, ComparesTwoRecordings) {
   EXPECT_EQ(json["causes"][0]["second"]["place"], "joint panda_joint4");
 }
 
-TEST_F(JudgeCommand, RefusesWhatItCannotUnderstand) {
-  const auto refused = [&](const std::string& text, const std::vector<std::string>& parts) {
-    Write("bad.csv", text);
-    EXPECT_TRUE(IsRefused(Run(With("judge", "bad.csv")), parts));
-  };
-  refused("", {"bad.csv: is empty"});
-  refused("time,q1\n0,1\n", {"bad.csv: has no column that is known as a joint's torque"});
-  refused("a,b\n0,1\n", {"bad.csv: has no column of time"});
-  refused("time,q1,tau1\n0,1,2\n1,2\n", {"bad.csv:3: must have 3 numbers as the rows before, got 2"});
-  refused("time,q1,tau1\n0,1,2\n1,x,2\n", {"bad.csv:3: column q1: must be a number, got \"x\""});
-  const std::string model = SourcePath("/controller/parameters/panda.toml");
-  EXPECT_TRUE(
-      IsRefused(Run(Words("judge right.csv --describe") + Words{model}), {"MODEL comes before RECORDING"}));
-  EXPECT_TRUE(Refused("judge . none.csv", {"MODEL comes before RECORDING: judge none.csv ."}));
-  EXPECT_TRUE(Refused("judge none.toml right.csv", {"none.toml: ", "No such file"}));
-  EXPECT_TRUE(IsRefused(Run(With("judge", "none.csv")), {"none.csv: cannot be read"}));
-  EXPECT_TRUE(IsRefused(Run(With("judge", "right.csv --columns none.toml")), {"none.toml"}));
-}
-
 TEST_F(JudgeCommand, MakesAMotionToRecordThatTheModelExplains) {
   const std::string panda = SourcePath("/mjcf/panda.xml");
   const Words excite = Words{"excite", "--model", panda, "--motions", "100"};

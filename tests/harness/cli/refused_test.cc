@@ -91,9 +91,9 @@ class RefusedFolder : public CommandTest {
   }
 };
 
-constexpr const char* kGroups[] = {"CommandLine",  "RunsOptions", "ParameterFiles", "Mjcfs",
-                                   "Descriptions", "Programs",    "States",         "Grasps",
-                                   "JointMotions", "Logs",        "Pictures",       "Outputs"};
+constexpr const char* kGroups[] = {
+    "CommandLine", "RunsOptions",  "ParameterFiles", "Mjcfs",    "Descriptions", "Programs", "States",
+    "Grasps",      "JointMotions", "Logs",           "Pictures", "Recordings",   "Outputs"};
 
 class Refused : public RefusedFolder, public ::testing::WithParamInterface<const char*> {};
 

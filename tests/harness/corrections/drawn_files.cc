@@ -745,6 +745,8 @@ std::optional<MadeFault> MakeFault(const std::string& name, const WrittenForm& f
     maker.make(random, &robot->links[i]);
     if (Compare(robot->links[i], before.links[i]) > kVisible)
       made.places.push_back(PlaceOf(maker, robot->links[i]));
+    else
+      made.hardly.push_back(PlaceOf(maker, robot->links[i]));
   }
   if (made.places.empty()) {
     *robot = before;

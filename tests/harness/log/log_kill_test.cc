@@ -26,7 +26,7 @@ constexpr int kKills = 120;
 // On a busy machine many kills come too late; then more are tried.
 constexpr int kMaxKills = 20 * kKills;
 
-/// What the process reports while it lives.
+/// Progress that the process reports while it lives.
 struct Progress {
   std::atomic<bool> has_started{false};
   std::atomic<long> flushed{0};
@@ -106,7 +106,7 @@ void WaitFor(const Condition& condition) {
   }
 }
 
-/// What was found under the log's name.
+/// Counts of what was found under the log's name.
 struct Findings {
   int early = 0;    ///< Nothing: killed before the file was made.
   int amid = 0;     ///< Some of the rows.

@@ -190,7 +190,7 @@ TEST_F(LogReaderTest, WrongAndMissingPartsAreNamed) {
       << "as one of format 1";
 }
 
-/// Of the program as it was: signals, checks and keys have today's names, numbers their bits.
+/// A log of format 1 reads with today's names of signals, checks and keys, and with the same numbers.
 TEST_F(LogReaderTest, FormatOneHasTodaysNames) {
   const ProgramResult unpacked = RunProgram({"xz", "-dc", SourcePath("/tests/harness/log/format_1.h5.xz")});
   ASSERT_EQ(unpacked.exit_code, 0) << unpacked.err;

@@ -66,7 +66,7 @@ TEST_P(DrawnFaults, AreNamed) {
   SCOPED_TRACE(fmt::format("{} of {} named, {} in a class, {} wrong names", names.named, names.all,
                            names.in_class, names.wrong));
   EXPECT_GE(names.all, 3 * GetParam().draws / 2);
-  // Measured over many more: harness/diagnosis/README.md. Of 110 faults the part that is named scatters by
+  // Measured over many more: tests/benchmarks/README.md. Of 110 faults the part that is named scatters by
   // 3 %.
   EXPECT_GE(names.named, 0.8 * names.all);
   // What shows in M alone, of a robot that stands still, is found and not named.

@@ -1,4 +1,4 @@
-#include "harness/cli/init_motion.h"
+#include "harness/scenario/first_motion.h"
 
 #include <fmt/format.h>
 
@@ -16,21 +16,11 @@
 #include "harness/base/console.h"
 #include "harness/descriptions/description_writer.h"
 
-namespace dexcheck::cli {
+namespace dexcheck {
 namespace {
 
 constexpr double kHalf = 2.0;     // s, there, and as long back
 constexpr double kFastest = 1.6;  // of sines: the most that one is faster than the slowest of its kind
-
-/// Of each joint while all else is free, at zero: kg m^2 or kg.
-VectorXd CalcJointInertias(const RobotModel& model) {
-  ModelTerms terms(model);
-  VectorXd q = VectorXd::Zero(model.num_positions());
-  if (model.base().type == BaseType::kFloating) q[3] = 1.0;
-  terms.SetState(q, VectorXd::Zero(model.num_velocities()));
-  terms.CalcDynamics();
-  return MatrixXd(terms.M().inverse()).diagonal().cwiseInverse().tail(model.num_joints());
-}
 
 JointSpan ChooseSpan(const Joint& joint, bool states_range, double home, double fastest) {
   constexpr double kMargin = 0.2, kSwing = 1.0 / 3.0;  // of the range, at either end; of the way
@@ -52,17 +42,6 @@ JointSpan ChooseSpan(const Joint& joint, bool states_range, double home, double 
   return span;
 }
 
-/// A coupled joint goes with the one that leads it, unless its own range forbids it.
-JointSpan Follow(const Joint& joint, const JointSpan& leader, const JointSpan& own) {
-  const JointCoupling& coupling = *joint.coupling;
-  const JointSpan led{coupling.multiplier * leader.start + coupling.offset,
-                      coupling.multiplier * leader.end + coupling.offset, coupling.multiplier * leader.swing,
-                      leader.number};
-  const double swing = std::abs(led.swing);
-  const auto is_within = [&](double q) { return q - swing >= joint.lower && q + swing <= joint.upper; };
-  return is_within(led.start) && is_within(led.end) ? led : own;
-}
-
 std::vector<JointSpan> ChooseSpans(const RobotDescription& robot, const std::map<std::string, double>& rates,
                                    const std::map<std::string, double>& home) {
   std::vector<JointSpan> spans;
@@ -72,20 +51,15 @@ std::vector<JointSpan> ChooseSpans(const RobotDescription& robot, const std::map
       const auto found = numbers.find(joint.name);
       return found == numbers.end() ? otherwise : found->second;
     };
-    JointSpan span = ChooseSpan(joint, robot.joints[i].states_range, find(home, 0.0),
-                                find(rates, std::numeric_limits<double>::infinity()));
-    span.number = i;
-    if (joint.coupling && joint.coupling->leader < static_cast<int>(i))
-      span = Follow(joint, spans[static_cast<size_t>(joint.coupling->leader)], span);
-    spans.push_back(span);
+    spans.push_back(ChooseSpan(joint, robot.joints[i].states_range, find(home, 0.0),
+                               find(rates, std::numeric_limits<double>::infinity())));
   }
   return spans;
 }
 
 std::vector<JointOscillation> ListSwings(const std::vector<JointSpan>& spans) {
   std::vector<JointOscillation> swings;
-  for (size_t i = 0; i < spans.size(); ++i)
-    AddSwings(static_cast<int>(i), spans[i].swing, spans[i].number, &swings);
+  for (size_t i = 0; i < spans.size(); ++i) AddSwings(static_cast<int>(i), spans[i].swing, i, &swings);
   return swings;
 }
 
@@ -107,8 +81,7 @@ VectorXd CalcMotorUse(const RobotModel& model, const std::map<std::string, doubl
     motion.Evaluate(2.0 * kHalf * k / kParts, &desired);
     terms.SetState(desired.q, desired.q_dot);
     terms.CalcDynamics();
-    const VectorXd force =
-        terms.M() * desired.q_ddot + terms.C() * desired.q_dot + terms.friction() + terms.gravity();
+    const VectorXd force = CalcForce(terms, desired);
     for (Eigen::Index i = 0; i < force.size(); ++i) {
       const Joint& joint = model.joints()[static_cast<size_t>(i)];
       (*poses)[static_cast<size_t>(k)][joint.name] = desired.q[i];
@@ -162,6 +135,26 @@ spacing = "log"
 
 }  // namespace
 
+VectorXd CalcJointInertias(const RobotModel& model) {
+  ModelTerms terms(model);
+  VectorXd q = VectorXd::Zero(model.num_positions());
+  if (model.base().type == BaseType::kFloating) q[3] = 1.0;
+  terms.SetState(q, VectorXd::Zero(model.num_velocities()));
+  terms.CalcDynamics();
+  return MatrixXd(terms.M().inverse()).diagonal().cwiseInverse().tail(model.num_joints());
+}
+
+VectorXd CalcForce(const ModelTerms& terms, const DesiredJoints& desired) {
+  return terms.M() * desired.q_ddot + terms.C() * desired.q_dot + terms.friction() + terms.gravity();
+}
+
+void Shrink(FirstMotion* motion) {
+  for (JointSpan& span : motion->spans) {
+    span.end = span.start + 0.5 * (span.end - span.start);
+    span.swing *= 0.5;
+  }
+}
+
 void AddSwings(int joint, double amplitude, size_t number, std::vector<JointOscillation>* swings) {
   // Multiples of the golden ratio lie evenly, however many there are, and are no multiples of each other.
   const double part = std::fmod(0.618034 * static_cast<double>(number), 1.0);
@@ -172,11 +165,11 @@ void AddSwings(int joint, double amplitude, size_t number, std::vector<JointOsci
                        2.0 * kHalf});
 }
 
-InitMotion PlanInitMotion(const RobotDescription& robot, const RobotModel& model,
-                          const std::map<std::string, double>& limits,
-                          const std::map<std::string, double>& rates,
-                          const std::map<std::string, double>& home) {
-  InitMotion motion;
+FirstMotion PlanFirstMotion(const RobotDescription& robot, const RobotModel& model,
+                            const std::map<std::string, double>& limits,
+                            const std::map<std::string, double>& rates,
+                            const std::map<std::string, double>& home) {
+  FirstMotion motion;
   motion.spans = ChooseSpans(robot, rates, home);
   motion.frequency = ChooseFrequency(model);
   constexpr double kMostUse = 0.7, kFull = 0.9;
@@ -186,10 +179,7 @@ InitMotion PlanInitMotion(const RobotDescription& robot, const RobotModel& model
   // A motor that cannot hold the robot is none that a smaller motion helps.
   const auto too_much = [&] { return (hold.array() < kMostUse && most.array() > kMostUse).any(); };
   for (int k = 0; k < kHalvings && too_much(); ++k) {
-    for (JointSpan& span : motion.spans) {
-      span.end = span.start + 0.5 * (span.end - span.start);
-      span.swing *= 0.5;
-    }
+    Shrink(&motion);
     most = CalcMotorUse(model, limits, motion.spans, kParts, &motion.poses);
   }
   for (Eigen::Index i = 0; i < most.size(); ++i) {
@@ -256,7 +246,7 @@ damping_ratio = 1
 
 std::string WriteGainStudy(bool stands) { return fmt::format(kStudy, stands ? kEffort : kMargins); }
 
-std::string WriteInitScenario(const RobotDescription& robot, const InitMotion& motion, double tolerance) {
+std::string WriteMotionScenario(const RobotDescription& robot, const FirstMotion& motion, double tolerance) {
   const std::string start = ListJoints(robot, [&](size_t i) { return motion.spans[i].start; });
   const std::string end = ListJoints(robot, [&](size_t i) { return motion.spans[i].end; });
   const std::string text = fmt::format(
@@ -278,60 +268,4 @@ points = [
                        tolerance);
 }
 
-void MendForEngine(RobotDescription* robot) {
-  constexpr double kLeast = 1e-12;  // kg, kg m^2
-  std::vector<std::string> ranges, bodies, points;
-  for (size_t i = 0; i < robot->spec.joints.size(); ++i) {
-    Joint& joint = robot->spec.joints[i];
-    if (robot->joints[i].states_range && joint.lower >= joint.upper) {
-      robot->joints[i].states_range = false;
-      std::tie(joint.lower, joint.upper) = std::pair(-kPi, kPi);
-      ranges.push_back(joint.name);
-    }
-    const Matrix3d possible = FindNearestInertia(joint.body.inertia);
-    if (possible != joint.body.inertia) bodies.push_back(joint.link);
-    joint.body.inertia = possible;
-    if (joint.body.mass > kLeast && possible.trace() > kLeast) continue;
-    points.push_back(joint.link);
-    joint.body.mass = std::max(joint.body.mass, 1e-3);
-    joint.body.inertia += 1e-6 * Matrix3d::Identity();
-  }
-  if (!ranges.empty()) Warn("ranges of no width are left out: " + JoinNames(ranges));
-  if (!bodies.empty())
-    Warn("no body has the inertia that these links state, the nearest that one can have is written: " +
-         JoinNames(bodies));
-  if (!points.empty())
-    Warn("joints move these links, which have no mass or no inertia; 1 g and 1e-6 kg m^2 are written: " +
-         JoinNames(points));
-}
-
-std::vector<Joint> ReduceFriction(const std::string& source, RobotDescription* robot) {
-  constexpr double kLeast = 0.01;  // s
-  const RobotModel model = ParseRobotModel(WriteParameters(*robot, source), source);
-  const VectorXd inertia = CalcJointInertias(model);
-  std::vector<std::string> names;
-  std::vector<Joint> reduced;
-  for (int i = 0; i < model.num_joints(); ++i) {
-    Joint& joint = robot->spec.joints[static_cast<size_t>(i)];
-    const double most = inertia[i] / kLeast;
-    if (std::max(joint.damping, joint.dry_friction) <= most) continue;
-    names.push_back(
-        fmt::format("{} ({:.3g} to {:.3g})", joint.name, std::max(joint.damping, joint.dry_friction), most));
-    joint.damping = std::min(joint.damping, most);
-    joint.dry_friction = std::min(joint.dry_friction, most);
-    reduced.push_back(joint);
-  }
-  if (!names.empty()) Warn("friction that would stop a joint within 10 ms is reduced: " + JoinNames(names));
-  return reduced;
-}
-
-void FreeCoupledJoints(RobotDescription* robot) {
-  std::vector<std::string> names;
-  for (Joint& joint : robot->spec.joints) {
-    if (joint.coupling) names.push_back(joint.name);
-    joint.coupling.reset();
-  }
-  if (!names.empty()) Warn("joints that follow others get motors of their own: " + JoinNames(names));
-}
-
-}  // namespace dexcheck::cli
+}  // namespace dexcheck

@@ -9,37 +9,46 @@
 #include <vector>
 
 #include "controller/control/joint_motion.h"
+#include "controller/dynamics/model_terms.h"
 #include "controller/model/robot_model.h"
 #include "harness/descriptions/robot_description.h"
 
-namespace dexcheck::cli {
+namespace dexcheck {
+
+/// Positions by joint, rad or m, and several of them.
+using JointPositions = std::map<std::string, double>;
+using JointPoses = std::vector<JointPositions>;
 
 /// One joint's part of the motion: where it begins and where it goes, well within its range; rad or m.
 struct JointSpan {
   double start = 0.0;
   double end = 0.0;
   double swing = 0.0;  ///< Amplitude of both sines.
-  size_t number = 0;   ///< That gives their frequencies: of the joint, or of the one that leads it.
 };
 
-/// Postures by joint, rad or m.
-using JointPoses = std::vector<std::map<std::string, double>>;
-
 /// A motion there and back, and which motors it asks too much of.
-struct InitMotion {
+struct FirstMotion {
   std::vector<JointSpan> spans;   ///< One a joint.
-  JointPoses poses;               ///< Along it.
+  JointPoses poses;               ///< Postures along it.
   double frequency = 10.0;        ///< Natural frequency of its law, rad/s.
   std::vector<std::string> weak;  ///< Joints whose limit does not even hold the robot, or move it so little.
 };
 
 /// A motion within the joints' ranges, smaller where motors would be at their limits.
-/// @param limits of motors by joint, N m or N. @param rates largest, likewise, rad/s or m/s. @param home
+/// @param limits of motors by joint, N m or N. @param rates largest by joint, rad/s or m/s. @param home
 /// where it had best begin, by joint, rad or m; 0 for others.
-InitMotion PlanInitMotion(const RobotDescription& robot, const RobotModel& model,
-                          const std::map<std::string, double>& limits,
-                          const std::map<std::string, double>& rates,
-                          const std::map<std::string, double>& home);
+FirstMotion PlanFirstMotion(const RobotDescription& robot, const RobotModel& model,
+                            const std::map<std::string, double>& limits,
+                            const std::map<std::string, double>& rates, const JointPositions& home);
+
+/// Halves a motion.
+void Shrink(FirstMotion* motion);
+
+/// Inertia of each joint while all else is free, all at zero: kg m^2 or kg.
+VectorXd CalcJointInertias(const RobotModel& model);
+
+/// The force on the velocities that a motion asks for, N m or N. @param terms set to its state.
+VectorXd CalcForce(const ModelTerms& terms, const DesiredJoints& desired);
 
 /// Adds a slow sine and a fast one, which tell forces apart that a smooth way does not: a torque, an inertia
 /// and friction. @param amplitude of both. @param number that frequencies are chosen by, none the same.
@@ -53,6 +62,7 @@ std::string WriteSwings(const std::vector<JointOscillation>& swings, const char*
 
 /// "shoulder" = 0.1, "elbow" = 0: a number of each joint.
 std::string ListJoints(const RobotDescription& robot, const std::function<double(size_t joint)>& value);
+
 /// What one scenario has and another has not.
 struct MotionText {
   const char* title;
@@ -65,22 +75,10 @@ struct MotionText {
 std::string WriteScenario(const RobotDescription& robot, const MotionText& motion, double tolerance);
 
 /// The scenario of that motion. @param tolerance of runs; 0 for rounding.
-std::string WriteInitScenario(const RobotDescription& robot, const InitMotion& motion, double tolerance);
+std::string WriteMotionScenario(const RobotDescription& robot, const FirstMotion& motion, double tolerance);
 
 /// The study of its gains, for the best with margins that an arm needs.
 /// @param stands on feet, whose margins are not judged.
 std::string WriteGainStudy(bool stands);
 
-/// Changes what the engine refuses of a description that an MJCF is made of, and warns of it: ranges without
-/// width, inertias that no body has, of which the nearest stand, links that move and have no mass.
-void MendForEngine(RobotDescription* robot);
-
-/// Joints that follow others no longer do, since each has a motor of its own in a run; warns of it.
-void FreeCoupledJoints(RobotDescription* robot);
-
-/// Friction that stops a joint within less than 10 ms, which leaves its law no time to act and no delay that
-/// it stands, is reduced to what does so in that time; dry friction from 1 rad/s or 1 m/s.
-/// @returns the joints of which it warns.
-std::vector<Joint> ReduceFriction(const std::string& source, RobotDescription* robot);
-
-}  // namespace dexcheck::cli
+}  // namespace dexcheck
