@@ -1,5 +1,7 @@
 #pragma once
 
+#include <string_view>
+
 namespace dexcheck {
 
 /// What a disagreement of model and engine comes from.
@@ -30,5 +32,9 @@ enum class Cause {
 
 /// "model", "wheel slip", ...
 const char* NameOf(Cause cause);
+
+/// What a disagreement with this cause comes to, as a sentence without capital and full stop; that of an
+/// unexplained one where no cause has this name.
+const char* DescribeCause(std::string_view name);
 
 }  // namespace dexcheck

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
+#include <utility>
 
 #include "controller/control/joint_controller.h"
 #include "harness/base/worst.h"
@@ -53,22 +54,37 @@ double JudgedLaw::CalcTorqueError(const StepRecord& step, const LawTerms& terms,
   return error;
 }
 
+void JudgedLaw::FillStep(const StepRecord& step, const LawTerms& terms, LawStep* state) const {
+  state->time = step.time;
+  state->q = terms.q;
+  state->xi = terms.xi;
+  state->object = {terms.X_Bo, terms.V_Bo, terms.X_o};
+  state->force = force();
+  CopyDesired(state);
+}
+
+LawInputs JudgedLaw::CopyAll(const StepRecord& step, const LawTerms& terms, LawStep now) const {
+  LawInputs inputs{
+      .now = std::move(now), .terms = terms, .M = *terms.M, .C = *terms.C, .J_dot = *terms.J_dot};
+  CopyInputs(step, &inputs);
+  return inputs;
+}
+
+LawInputs JudgedLaw::MakeInputs(const StepRecord& step, const LawTerms& terms) {
+  const bool has_force = Evaluate(step, terms);
+  LawStep now;
+  FillStep(step, terms, &now);
+  if (!has_force) now.force.resize(0);
+  return CopyAll(step, terms, std::move(now));
+}
+
 void JudgedLaw::Remember(const StepRecord& step, const LawTerms& terms) {
   if (state_.force.size() > 0 && state_.time == step.time) return;  // known already
-  state_.time = step.time;
-  state_.q = terms.q;
-  state_.xi = terms.xi;
-  state_.object = {terms.X_Bo, terms.V_Bo, terms.X_o};
-  state_.force = force();
-  CopyDesired(&state_);
+  FillStep(step, terms, &state_);
   if (differs_ && history_.Wants()) {
-    LawSnapshot snapshot{
-        .inputs =
-            LawInputs{.now = state_, .terms = terms, .M = *terms.M, .C = *terms.C, .J_dot = *terms.J_dot},
-        .difference = difference_,
-        .noise = kLawTorqueBound * noise_scale()};
-    CopyInputs(step, &snapshot.inputs);
-    history_.Keep(std::move(snapshot));
+    history_.Keep({.inputs = CopyAll(step, terms, state_),
+                   .difference = difference_,
+                   .noise = kLawTorqueBound * noise_scale()});
   } else if (differs_) {
     history_.Skip();
   }

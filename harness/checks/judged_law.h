@@ -63,6 +63,8 @@ class JudgedLaw {
 
   // The law with changed inputs, and what it consists of.
 
+  /// The inputs of a step, with the force of the right law: empty where it has none.
+  [[nodiscard]] LawInputs MakeInputs(const StepRecord& step, const LawTerms& terms);
   /// E_bar' tau' (n); empty where these inputs have none.
   [[nodiscard]] virtual VectorXd CalcForce(LawInputs inputs) = 0;
   [[nodiscard]] virtual std::span<const LawPartName> ListParts() const = 0;
@@ -108,6 +110,9 @@ class JudgedLaw {
 
  private:
   void Remember(const StepRecord& step, const LawTerms& terms);
+  /// Copies the state and the force of the last Evaluate.
+  void FillStep(const StepRecord& step, const LawTerms& terms, LawStep* state) const;
+  [[nodiscard]] LawInputs CopyAll(const StepRecord& step, const LawTerms& terms, LawStep now) const;
 
   bool differs_ = false;
   LawStep state_;

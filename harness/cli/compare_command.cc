@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 #include <vector>
@@ -33,6 +32,14 @@ struct CompareRequest {
   std::string json;
   std::filesystem::path model, columns;  ///< Of recordings that are no runs.
 };
+
+/// "2.6e-15", "0", "infinite".
+std::string FormatShort(double value) {
+  if (!std::isfinite(value)) return "infinite";
+  if (value == 0.0) return "0";
+  const double size = std::abs(value);
+  return size >= 0.01 && size < 1e4 ? fmt::format("{:.3g}", value) : fmt::format("{:.1e}", value);
+}
 
 std::string Show(const std::optional<double>& value) { return value ? FormatShort(*value) : "-"; }
 
@@ -88,41 +95,6 @@ void Print(const CompareRequest& request, const RunComparison& comparison) {
   PrintSignals(comparison, request.all);
 }
 
-nlohmann::ordered_json ToJson(const CompareRequest& request, const RunComparison& comparison) {
-  nlohmann::ordered_json json;
-  json["runs"] = request.run_folders;
-  json["verdicts"] = comparison.verdicts;
-  json["tolerance"] = request.options.tolerance;
-  json["same"] = comparison.IsSame();
-  json["inputs"] = nlohmann::ordered_json::object();
-  for (const InputDifference& input : comparison.inputs) json["inputs"][input.name] = input.values;
-  const auto add = [&](const char* key, const std::vector<ComparedNumber>& numbers) {
-    json[key] = nlohmann::ordered_json::object();
-    for (const ComparedNumber& number : numbers) {
-      nlohmann::ordered_json values = nlohmann::ordered_json::array();
-      for (const std::optional<double>& value : number.values) {
-        values.push_back(value ? nlohmann::ordered_json(*value) : nlohmann::ordered_json());
-      }
-      json[key][number.name] = {{"unit", number.unit}, {"values", values}};
-    }
-  };
-  add("results", comparison.results);
-  add("checks", comparison.checks);
-  json["signals"] = nlohmann::ordered_json::array();
-  for (const SignalDifference& signal : comparison.signals) {
-    json["signals"].push_back({{"name", signal.name},
-                               {"column", signal.column},
-                               {"run", request.run_folders[signal.run]},
-                               {"unit", signal.unit},
-                               {"difference", signal.difference},
-                               {"size", signal.size},
-                               {"at_time_s", signal.at_time},
-                               {"differs", signal.differs}});
-  }
-  json["not_compared"] = comparison.not_compared;
-  return json;
-}
-
 int Run(const CompareRequest& request) {
   if (!request.model.empty()) {
     if (request.run_folders.size() != 2) throw InputError("--model: needs two recordings");
@@ -144,10 +116,8 @@ int Run(const CompareRequest& request) {
   const RunComparison comparison = CompareRuns(pointers, request.options);
   const bool prints = !json.TakesStdout();
   if (prints && !request.quiet) Print(request, comparison);
-  if (prints)
-    fmt::print("{}{}\n", request.quiet ? "" : "\n",
-               DescribeComparison(comparison, request.options.tolerance));
-  json.Write([&] { return ToJson(request, comparison).dump(1) + "\n"; });
+  if (prints) fmt::print("{}{}\n", request.quiet ? "" : "\n", DescribeComparison(comparison));
+  json.Write([&] { return ToJson(comparison, request.run_folders).dump(1) + "\n"; });
   page.Write([&] { return MakeComparisonPage(pointers, request.run_folders, comparison); });
   if (!request.page.empty() && prints && !request.quiet) fmt::print("page: {}\n", request.page);
   if (!request.tolerance || comparison.IsSame()) return kSuccess;

@@ -118,17 +118,11 @@ Json ToJson(const FileCause& cause) {
   return json;
 }
 
-/// A verdict's first line: its word painted, the rest wrapped.
-void PrintLine(bool is_good, const std::string& word, const std::string& rest) {
-  const std::string line = Wrap(word + rest, 2);
-  fmt::print("{}{}\n", Paint(is_good ? Tone::kGood : Tone::kBad, word), line.substr(word.size()));
-}
-
 /// Prints the causes, a line each, and how all else agrees. @returns whether there are any.
 bool PrintCauses(const ConsistencyRequest& request, const Comparison& comparison, bool offers_repair) {
   if (!comparison.causes || comparison.causes->agrees) return false;
   const FileCauses& causes = *comparison.causes;
-  PrintLine(false, "DISAGREE", fmt::format(": {} differs from {}.", causes.file, causes.reference));
+  PrintVerdict(Tone::kBad, "DISAGREE", fmt::format(": {} differs from {}.", causes.file, causes.reference));
   const std::vector<std::string> lines = ListDifferences(comparison);
   constexpr size_t kMostShown = 30;
   for (size_t i = 0; i < std::min(lines.size(), kMostShown); ++i) {
@@ -283,28 +277,28 @@ void PrintVerdict(const ConsistencyRequest& request, const Comparison& compariso
   if (PrintCauses(request, comparison, offers_repair)) return;
   if (result.Agrees()) {
     if (comparison.digits) {
-      PrintLine(
-          true, "AGREE",
+      PrintVerdict(
+          Tone::kGood, "AGREE",
           fmt::format(" within the printed digits ({}) in all {} terms{}; --exact asks for rounding alone{}.",
                       DescribeDigits(*comparison.digits), result.terms.size(),
                       DescribeLoosest(comparison.digits->loosest), left_out));
       return;
     }
-    PrintLine(true, "AGREE",
-              fmt::format(": {} agree to {} in all {} terms{}.",
-                          comparison.with_engine  ? "the analytic model and MuJoCo"
-                          : request.has_results() ? "the description and the results"
-                                                  : "the two descriptions",
-                          request.DescribeTolerance(), result.terms.size(), left_out));
+    PrintVerdict(Tone::kGood, "AGREE",
+                 fmt::format(": {} agree to {} in all {} terms{}.",
+                             comparison.with_engine  ? "the analytic model and MuJoCo"
+                             : request.has_results() ? "the description and the results"
+                                                     : "the two descriptions",
+                             request.DescribeTolerance(), result.terms.size(), left_out));
     return;
   }
   constexpr size_t kMostShown = 10;
   const Differences differences = SortDifferences(comparison);
   const std::string to_digits = fmt::format("agrees to {} digits", differences.digits);
   if (differences.real.empty()) {
-    PrintLine(false, "DISAGREE",
-              fmt::format(": everything {}, as rounded numbers do; --digits {} judges by that{}.", to_digits,
-                          differences.digits, left_out));
+    PrintVerdict(Tone::kBad, "DISAGREE",
+                 fmt::format(": everything {}, as rounded numbers do; --digits {} judges by that{}.",
+                             to_digits, differences.digits, left_out));
   } else {
     const std::string more = differences.real.size() > 1
                                  ? fmt::format("; and in {} more", differences.real.size() - 1)
@@ -312,9 +306,9 @@ void PrintVerdict(const ConsistencyRequest& request, const Comparison& compariso
     const std::string within =
         comparison.digits ? "agrees within the printed digits (" + DescribeDigits(*comparison.digits) + ")"
                           : "agrees to " + request.DescribeTolerance();
-    PrintLine(false, "DISAGREE",
-              fmt::format(": {}{}; everything else {}{}.", differences.real.front(), more,
-                          differences.rounded.empty() ? within : to_digits, left_out));
+    PrintVerdict(Tone::kBad, "DISAGREE",
+                 fmt::format(": {}{}; everything else {}{}.", differences.real.front(), more,
+                             differences.rounded.empty() ? within : to_digits, left_out));
     const size_t shown =
         comparison.digits ? std::min(differences.real.size(), kMostShown) : differences.real.size();
     for (size_t i = 1; i < shown; ++i) fmt::print("  {}\n", differences.real[i]);

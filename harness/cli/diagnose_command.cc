@@ -6,11 +6,11 @@
 
 #include "harness/base/console.h"
 #include "harness/base/interrupts.h"
-#include "harness/checks/repaired_file.h"
 #include "harness/cli/consistency_report.h"
 #include "harness/cli/output_file.h"
 #include "harness/cli/terminal.h"
 #include "harness/corrections/read_printed.h"
+#include "harness/corrections/write_repaired.h"
 #include "harness/engine/mjcf_file.h"
 
 namespace dexcheck::cli {
@@ -45,12 +45,13 @@ std::string WriteRepair(const DiagnoseRequest& request, const DescriptionFile& f
                                  QuoteForShell(second->path().string()),
                                  QuoteForShell(first.path().string()));
   }
-  PrintedRobot reference = ReadPrintedRobot(*second);
-  LeaveOutUnstated(request.ignore, &reference);
+  PrintedRobot printed = ReadPrintedRobot(first), reference = ReadPrintedRobot(*second);
+  for (PrintedRobot* const robot : {&printed, &reference}) LeaveOutUnstated(request.ignore, robot);
+  LeaveOutFrames(&printed, &reference);
   const std::filesystem::path path = request.repaired_file;
   std::string text;
   try {
-    text = WriteRepaired(first, request.urdf, reference, request.ignore, path.parent_path());
+    text = WriteRepaired(first, request.urdf, printed, reference, path.parent_path());
   } catch (const InputError& error) {
     return nothing + error.what();
   }

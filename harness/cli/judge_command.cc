@@ -100,7 +100,7 @@ void Print(const JudgeRequest& request, const RobotModel& model, const Recording
   const JudgementVerdict verdict = FindVerdict(model, judgement, recordings);
   std::string word = verdict.word;
   std::ranges::transform(word, word.begin(), [](unsigned char c) { return std::toupper(c); });
-  fmt::print("{}: {}\n", Paint(judgement.Agrees() ? Tone::kGood : Tone::kBad, word), verdict.sentence);
+  PrintVerdict(judgement.Agrees() ? Tone::kGood : Tone::kBad, word, ": " + verdict.sentence);
 }
 
 Json ToJson(const HeldPrediction& one) { return {{"numbers", one.numbers}, {"left", one.held_left}}; }
@@ -147,9 +147,10 @@ std::string ToText(const RobotModel& model, const RecordingJudgement& judgement,
 }
 
 /// Writes the model's file with what was found.
-void Correct(const RobotDescription& robot, const RecordingJudgement& judgement, const JudgeRequest& request,
-             bool says, OutputFile* file) {
-  const CorrectedFile corrected = WriteCorrections(robot, ReadBytes(request.model), judgement);
+void Correct(const RecordingJudgement& judgement, const JudgeRequest& request, bool says, OutputFile* file) {
+  const CorrectedFile corrected =
+      WriteCorrections(DescriptionFile(request.model, request.urdf), request.urdf, judgement,
+                       std::filesystem::path(request.corrected).parent_path());
   file->Write(corrected.text);
   if (!says || file->is_stdout()) return;
   fmt::print("{}: {} of {} causes are put right\n", request.corrected.string(), corrected.written.size(),
@@ -222,7 +223,7 @@ int Run(JudgeRequest request) {
   });
   bar.Finish();
   if (!IsInterrupted() && corrected)
-    Correct(*description, judgement, request, !request.quiet && !json.TakesStdout(), &*corrected);
+    Correct(judgement, request, !request.quiet && !json.TakesStdout(), &*corrected);
   json.Write([&] { return ToText(model, judgement, recordings); });
   page.Write([&] {
     const std::optional<ReplayData> replay = MakeMotionReplay(model, request.model, judgement);

@@ -154,11 +154,9 @@ void PrintSpeed(const ClosedLoop& loop, const RunResult& result) {
 
 /// What explains the residuals, numbered; those that nothing explains last.
 void PrintCauses(const Causes& causes) {
-  if (causes.empty()) return;
-  fmt::print("  causes\n");
   int number = 0;
   for (const Explanation& one : causes)
-    fmt::print("{}\n", Wrap(fmt::format("    {}  {}: {}", ++number, NameOf(one.channel), one.Tell()), 7));
+    fmt::print("{}\n", Wrap(fmt::format("  {}. {}: {}", ++number, NameOf(one.channel), one.Tell()), 5));
   const bool has_class = std::ranges::any_of(
       causes, [](const Explanation& one) { return one.outcome == CauseOutcome::kNamedClass; });
   if (has_class) fmt::print("    (what is not isolable here may be on another motion)\n");
@@ -205,15 +203,16 @@ void PrintRunReport(const Setup& setup, const ClosedLoop& loop, const RunResult&
                                     : "the run completed; nothing was checked.");
       return;
     case Verdict::kFailed:
-      fmt::print("{}: {}.\n", Paint(Tone::kBad, "FAILED"), result.failure);
+      PrintVerdict(Tone::kBad, "FAILED", ": " + result.failure + ".");
       break;
     case Verdict::kDisagreement:
-      fmt::print("{}:\n", Paint(Tone::kBad, "DISAGREEMENT"));
+      PrintVerdict(Tone::kBad, "DISAGREEMENT",
+                   fmt::format(": {}.", DescribeCause(NameOf(result.attribution.cause))));
       break;
   }
   if (result.attribution.cause == Cause::kNone) return;
-  fmt::print("  cause: {} ({})\n", NameOf(result.attribution.cause), result.attribution.evidence);
   PrintCauses(result.causes);
+  fmt::print("{}\n", Wrap("  evidence: " + result.attribution.evidence, 5));
   for (const ConstantFinding& finding : setup.constants().findings) {
     fmt::print("  {}: {}: {:.12g} in the model, {:.12g} in the MJCF\n", finding.check, finding.where,
                finding.model, finding.engine);

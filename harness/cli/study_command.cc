@@ -153,14 +153,6 @@ std::string ListNumbers(const std::vector<long>& numbers) {
   return text;
 }
 
-RunOptions MakeRunOptions(const StudyRequest& request, ProgressBar* bar) {
-  RunOptions options;
-  options.jobs = CountJobs(request.jobs);
-  options.is_interrupted = IsInterrupted;
-  options.report = [bar](long finished) { bar->Update(finished); };
-  return options;
-}
-
 /// Forgets trials that failed; of a search also what followed from them.
 void RemoveFailed(const Study& study, StudyStore* store) {
   if (!study.is_search()) {
@@ -174,13 +166,9 @@ void RemoveFailed(const Study& study, StudyStore* store) {
   }
 }
 
-/// Makes the trials that are missing. @return the numbers of those that still are.
-std::vector<long> MakeTrials(const StudyInputs& inputs, const std::vector<Trial>& trials,
-                             const StudyRequest& request, StudyStore* store) {
-  ProgressBar bar(inputs.study.name, static_cast<long>(trials.size()), request.quiet);
-  RunTrials(inputs, trials, MakeRunOptions(request, &bar), store);
-  // From the file that is there now under this name: what another program removed is not done.
-  const std::vector<long> done = StudyStore::Open(request.database).ListNumbers();
+/// Those of these trials that have no row.
+std::vector<long> ListMissing(const std::vector<Trial>& trials, const StudyStore& store) {
+  const std::vector<long> done = store.ListNumbers();
   std::vector<long> missing;
   for (const Trial& trial : trials) {
     if (!std::ranges::binary_search(done, trial.number)) missing.push_back(trial.number);
@@ -188,21 +176,11 @@ std::vector<long> MakeTrials(const StudyInputs& inputs, const std::vector<Trial>
   return missing;
 }
 
-/// The same for a search, of which only the batch at hand is known.
-std::vector<long> MakeSearch(const StudyInputs& inputs, const StudyRequest& request, StudyStore* store) {
-  ProgressBar bar(inputs.study.name, CountTrials(inputs.study), request.quiet);
-  RunSearch(inputs, MakeRunOptions(request, &bar), store);
-  SearchHistory history(inputs.study);
-  for (const TrialRow& row : StudyStore::Open(request.database).ReadRows()) history.Add(row);
-  std::vector<long> missing;
-  for (const Trial& trial : history.ListMissing()) missing.push_back(trial.number);
-  return missing;
-}
-
-StudyStore OpenDatabase(const StudyInputs& inputs, const StudyRequest& request) {
-  return StudyStore::OpenOrCreate(
-      request.database, IdentifyStudy(inputs), inputs.study,
-      [&](const std::vector<TrialRow>& rows) { return MakesRowsAgain(inputs, rows); });
+/// The trials that a search would make next, as far as its rows go.
+std::vector<Trial> ListNext(const StudyStore& store) {
+  SearchHistory history(store.study());
+  store.ForEachRow([&](const TrialRow& row) { history.Add(row); });
+  return history.ListMissing();
 }
 
 int RunStudy(const StudyRequest& request) {
@@ -213,24 +191,34 @@ int RunStudy(const StudyRequest& request) {
   const std::vector<Trial> trials =
       study.is_search() ? std::vector<Trial>() : SelectShard(ListTrials(study), request.shard);
   CheckTrials(&inputs);
-  StudyStore store = OpenDatabase(inputs, request);
+  StudyStore store = StudyStore::OpenOrCreate(
+      request.database, IdentifyStudy(inputs), study,
+      [&](const std::vector<TrialRow>& rows) { return MakesRowsAgain(inputs, rows); });
   if (!request.quiet && !store.change().empty()) fmt::print("{}: {}\n", request.database, store.change());
   CatchInterrupts();
   if (request.retry_failed) RemoveFailed(study, &store);
-  const std::vector<long> missing =
-      study.is_search() ? MakeSearch(inputs, request, &store) : MakeTrials(inputs, trials, request, &store);
+  ProgressBar bar(study.name, study.is_search() ? CountTrials(study) : static_cast<long>(trials.size()),
+                  request.quiet);
+  const RunOptions options{CountJobs(request.jobs), IsInterrupted,
+                           [&bar](long finished) { bar.Update(finished); }};
+  if (study.is_search())
+    RunSearch(inputs, options, &store);
+  else
+    RunTrials(inputs, trials, options, &store);
+  bar.Finish();
+  // From the file that is there now under this name: what another program removed is not done.
+  const StudyStore made = StudyStore::Open(request.database);
+  const std::vector<long> missing = ListMissing(study.is_search() ? ListNext(made) : trials, made);
   if (!missing.empty()) {
     const char* const why = IsInterrupted() ? "interrupted" : "another process has them";
     if (study.is_search()) {
       throw Error(fmt::format("{}: {} of at most {} trials are done ({}); the same command goes on",
-                              request.database, StudyStore::Open(request.database).ListNumbers().size(),
-                              CountTrials(study), why));
+                              request.database, made.ListNumbers().size(), CountTrials(study), why));
     }
     throw Error(fmt::format("{}: {} of {} trials are missing ({}): {}; the same command goes on with them",
                             request.database, missing.size(), trials.size(), why, ListNumbers(missing)));
   }
   if (request.quiet) return kSuccess;
-  const StudyStore made = StudyStore::Open(request.database);
   fmt::print("{}\n", Wrap(DescribeProgress(made), 2));
   fmt::print("{}", MakeGainCard(inputs, made.ReadRows(0, /*with_machine=*/false)));
   const std::map<Outcome, long> outcomes = made.CountOutcomes();
@@ -266,15 +254,11 @@ int MergeStudies(const std::string& out, const std::vector<std::string>& databas
   const StudyStore merged = StudyStore::Open(out);
   if (!quiet) fmt::print("{}\n", Wrap(DescribeProgress(merged), 2));
   if (first.study().is_search()) return kSuccess;
-  const long count = CountTrials(first.study());
-  const std::vector<long> done = merged.ListNumbers();
-  std::vector<long> missing;
-  for (long number = 0; number < count; ++number) {
-    if (!std::ranges::binary_search(done, number)) missing.push_back(number);
-  }
+  const std::vector<Trial> trials = ListTrials(first.study());
+  const std::vector<long> missing = ListMissing(trials, merged);
   if (missing.empty()) return kSuccess;
   throw Error(fmt::format("{}: {} of {} trials are missing: {}; merge again when they are done", out,
-                          missing.size(), count, ListNumbers(missing)));
+                          missing.size(), trials.size(), ListNumbers(missing)));
 }
 
 }  // namespace

@@ -56,6 +56,11 @@ std::string Wrap(std::string_view text, size_t indent) {
   }
 }
 
+void PrintVerdict(Tone tone, const std::string& word, const std::string& rest) {
+  const std::string line = Wrap(word + rest, 2);
+  fmt::print("{}{}\n", Paint(tone, word), line.substr(word.size()));
+}
+
 std::string FormatTable(std::string_view align, const std::vector<TableRow>& rows) {
   std::vector<size_t> widths(align.size(), 0);
   for (const TableRow& row : rows) {

@@ -35,6 +35,9 @@ enum class Tone { kGood, kBad, kFaint };
 /// and no TERM=dumb; otherwise as it is.
 std::string Paint(Tone tone, std::string_view text);
 
+/// Prints a verdict's word, painted, and what follows it, wrapped.
+void PrintVerdict(Tone tone, const std::string& word, const std::string& rest);
+
 /// A line on standard error that shows how far long work has come, never wider than the terminal; silent when
 /// standard error is no terminal.
 class ProgressBar {

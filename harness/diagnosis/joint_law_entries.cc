@@ -1,4 +1,4 @@
-// Faults of the laws of joints.
+// Faults of the laws of joints, and terms that any law takes at another state.
 
 #include <memory>
 #include <utility>
@@ -8,6 +8,38 @@
 #include "harness/diagnosis/law_entry_list.h"
 
 namespace dexcheck {
+namespace {
+
+/// Terms of the law's model that are taken at another state than the measured one.
+struct OtherState {
+  enum Terms : unsigned { kM = 1, kC = 2, kCoriolis = 4, kGravity = 8, kFriction = 16, kFeedback = 32 };
+  enum State { kDesired, kBefore, kTwoBefore, kStart };
+  const char* fault;
+  State state;
+  unsigned terms;
+  bool is_of_any_law = false;  // and not of laws of joints alone
+};
+constexpr unsigned kAllTerms = OtherState::kM | OtherState::kCoriolis | OtherState::kGravity;
+constexpr OtherState kOtherStates[] = {
+    {"M_bar' at the desired position", OtherState::kDesired, OtherState::kM},
+    {"gravity at the desired position", OtherState::kDesired, OtherState::kGravity},
+    {"Coriolis forces at the desired state", OtherState::kDesired, OtherState::kCoriolis},
+    {"M_bar', Coriolis forces and gravity at the desired state", OtherState::kDesired, kAllTerms},
+    {"M_bar', Coriolis forces, gravity and friction at the desired state", OtherState::kDesired,
+     kAllTerms | OtherState::kFriction},
+    {"measured state of the step before", OtherState::kBefore,
+     kAllTerms | OtherState::kFriction | OtherState::kFeedback},
+    {"measured state of 2 steps before", OtherState::kTwoBefore,
+     kAllTerms | OtherState::kFriction | OtherState::kFeedback},
+    {"M_bar' of the step before", OtherState::kBefore, OtherState::kM, true},
+    {"Coriolis forces of the step before", OtherState::kBefore, OtherState::kCoriolis},
+    {"gravity of the step before", OtherState::kBefore, OtherState::kGravity, true},
+    {"C_bar' of the step before", OtherState::kBefore, OtherState::kC},
+    {"M_bar' at the start", OtherState::kStart, OtherState::kM, true},
+    {"gravity at the start", OtherState::kStart, OtherState::kGravity, true},
+};
+
+}  // namespace
 
 void LawEntryList::AddJointFaults() {
   LawEntry& velocity = Add("desired velocity in the feedback (K_v q_d_dot), factor",
@@ -21,6 +53,10 @@ void LawEntryList::AddJointFaults() {
           [](const LawSnapshot& step, LawInputs* inputs) {
             inputs->terms.C_xi = step.inputs.C * step.inputs.now.joints.q_dot;
           });
+  AddEdit("velocity of the step before in the Coriolis forces",
+          [](const LawSnapshot& step, LawInputs* inputs) {
+            if (!step.before.empty()) inputs->terms.C_xi = inputs->C * step.before.front().xi;
+          });
   AddEdit("friction of the desired velocity",
           [this_model = &model_](const LawSnapshot& step, LawInputs* inputs) {
             for (int k = 0; k < this_model->num_dofs(); ++k)
@@ -30,15 +66,14 @@ void LawEntryList::AddJointFaults() {
           });
   for (Index i = 0; i < n_; ++i) {
     AddEdit(
-        "measured velocity of " + Name(i) + " with the other sign in the feedback",
+        "measured velocity of " + NameEntry(model_, i) + " with the other sign in the feedback",
         [i](const LawSnapshot&, LawInputs* inputs) { inputs->velocity_error[i] += 2.0 * inputs->now.xi[i]; });
     if (model_.num_positions() == n_)
-      AddEdit("measured position of " + Name(i) + " with the other sign in the feedback",
+      AddEdit("measured position of " + NameEntry(model_, i) + " with the other sign in the feedback",
               [i](const LawSnapshot&, LawInputs* inputs) {
                 inputs->now.position_error[i] += 2.0 * inputs->now.q[i];
               });
   }
-  AddDesiredStates();
   AddFriction();
   if (law_.demands_acceleration()) {
     AddEdit("feedback that M_bar' does not multiply, and gravity alone",
@@ -56,88 +91,34 @@ void LawEntryList::AddJointFaults() {
   AddIntegrals();
 }
 
-void LawEntryList::AddDesiredStates() {
-  if (model_.base().type != BaseType::kFixed || model_.num_positions() != n_) return;
+void LawEntryList::AddOtherStates() {
   const auto terms = std::make_shared<ModelTerms>(model_);
-  const auto nothing = [](const LawSnapshot&, LawInputs*) {};
-  const auto add = [&](const std::string& fault, const auto& place, const auto& edit, const auto& also) {
-    AddEdit(fault, [terms, place, edit, also](const LawSnapshot& step, LawInputs* inputs) {
-      const auto [q, v] = place(step);
-      terms->SetState(q, v);
+  const bool has_rates = model_.base().type == BaseType::kFixed && model_.num_positions() == n_;
+  for (const OtherState& one : kOtherStates) {
+    if (!one.is_of_any_law && !(is_of_joints_ && has_rates)) continue;
+    AddEdit(one.fault, [terms, one, start = start_](const LawSnapshot& step, LawInputs* inputs) {
+      const LawStep& now = step.inputs.now;
+      const size_t age = one.state == OtherState::kTwoBefore ? 2 : one.state == OtherState::kBefore ? 1 : 0;
+      const LawStep& then = age > 0 && step.before.size() >= age ? step.before[age - 1] : now;
+      if (one.state == OtherState::kStart) {
+        terms->SetState(start, VectorXd::Zero(now.xi.size()));
+      } else if (one.state == OtherState::kDesired) {
+        terms->SetState(now.joints.q, now.joints.q_dot);
+      } else {
+        terms->SetState(then.q, then.xi);
+      }
       terms->CalcDynamics();
-      edit(*terms, inputs);
-      also(step, inputs);
+      if ((one.terms & OtherState::kM) != 0) inputs->M = terms->M();
+      if ((one.terms & OtherState::kC) != 0) inputs->terms.C_xi = terms->C() * now.xi;
+      if ((one.terms & OtherState::kCoriolis) != 0) inputs->terms.C_xi = terms->C() * terms->velocity();
+      if ((one.terms & OtherState::kGravity) != 0) inputs->terms.gravity = terms->gravity();
+      if ((one.terms & OtherState::kFriction) != 0) inputs->terms.friction = terms->friction();
+      if ((one.terms & OtherState::kFeedback) == 0) return;
+      inputs->C = terms->C();
+      inputs->velocity_error = now.joints.q_dot - terms->velocity();
+      inputs->now.position_error += now.q - then.q;
     });
-  };
-  const auto desired = [](const LawSnapshot& step) {
-    return std::pair(step.inputs.now.joints.q, step.inputs.now.joints.q_dot);
-  };
-  const auto take_mass = [](const ModelTerms& at, LawInputs* inputs) { inputs->M = at.M(); };
-  const auto take_coriolis = [](const ModelTerms& at, LawInputs* inputs) {
-    inputs->terms.C_xi = at.C() * at.velocity();
-  };
-  const auto take_gravity = [](const ModelTerms& at, LawInputs* inputs) {
-    inputs->terms.gravity = at.gravity();
-  };
-  add("M_bar' at the desired position", desired, take_mass, nothing);
-  add("gravity at the desired position", desired, take_gravity, nothing);
-  add("Coriolis forces at the desired state", desired, take_coriolis, nothing);
-  add(
-      "M_bar', Coriolis forces and gravity at the desired state", desired,
-      [=](const ModelTerms& at, LawInputs* inputs) {
-        take_mass(at, inputs);
-        take_coriolis(at, inputs);
-        take_gravity(at, inputs);
-      },
-      nothing);
-  add(
-      "M_bar', Coriolis forces, gravity and friction at the desired state", desired,
-      [=](const ModelTerms& at, LawInputs* inputs) {
-        take_mass(at, inputs);
-        take_coriolis(at, inputs);
-        take_gravity(at, inputs);
-        inputs->terms.friction = at.friction();
-      },
-      nothing);
-  for (const size_t age : {1U, 2U}) {
-    const auto then = [age](const LawSnapshot& step) -> const LawStep& {
-      return step.before.size() >= age ? step.before[age - 1] : step.inputs.now;
-    };
-    add(
-        age == 1 ? "measured state of the step before" : "measured state of 2 steps before",
-        [then](const LawSnapshot& step) { return std::pair(then(step).q, then(step).xi); },
-        [](const ModelTerms& at, LawInputs* inputs) {
-          inputs->M = at.M();
-          inputs->C = at.C();
-          inputs->terms.C_xi = at.C() * at.velocity();
-          inputs->terms.gravity = at.gravity();
-          inputs->terms.friction = at.friction();
-          inputs->velocity_error = inputs->now.joints.q_dot - at.velocity();
-        },
-        [then](const LawSnapshot& step, LawInputs* inputs) {
-          inputs->now.position_error += inputs->now.q - then(step).q;
-        });
   }
-  const auto before = [](const LawSnapshot& step) {
-    const LawStep& then = step.before.empty() ? step.inputs.now : step.before.front();
-    return std::pair(then.q, then.xi);
-  };
-  add("M_bar' of the step before", before, take_mass, nothing);
-  add("Coriolis forces of the step before", before, take_coriolis, nothing);
-  add("gravity of the step before", before, take_gravity, nothing);
-  add(
-      "C_bar' of the step before", before,
-      [](const ModelTerms& at, LawInputs* inputs) { inputs->terms.C_xi = at.C() * inputs->now.xi; }, nothing);
-  AddEdit("velocity of the step before in the Coriolis forces",
-          [](const LawSnapshot& step, LawInputs* inputs) {
-            if (!step.before.empty()) inputs->terms.C_xi = inputs->C * step.before.front().xi;
-          });
-  const auto start = [q = start_](const LawSnapshot&) {
-    return std::pair(q, VectorXd(VectorXd::Zero(q.size())));
-  };
-  if (start_.size() != n_) return;
-  add("M_bar' at the start", start, take_mass, nothing);
-  add("gravity at the start", start, take_gravity, nothing);
 }
 
 void LawEntryList::AddFriction() {

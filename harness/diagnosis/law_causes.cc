@@ -5,6 +5,7 @@
 #include "controller/common/text.h"
 #include "controller/dynamics/tree_factor.h"
 #include "harness/diagnosis/law_entries.h"
+#include "harness/diagnosis/line_search.h"
 #include "harness/diagnosis/run_causes.h"
 #include "harness/diagnosis/telling.h"
 
@@ -21,36 +22,6 @@ constexpr double kPlausible = 300.0;  // of factors, which are units mistaken at
 constexpr double kMostTurned = 3.0;   // of factors of the other sign
 constexpr double kWhole = 1e-3;       // that the amplitude of what is there as a whole may be off
 constexpr double kZero = 1e-6;        // a factor nearer to zero than this is one of a part that is missing
-
-/// Entries of tau' that belong together.
-struct Place {
-  std::string name;
-  std::vector<Index> entries;
-  bool is_balanced = false;  ///< Whether the ground is asked to balance what the base has of it.
-};
-
-std::vector<Place> ListPlaces(const StepStore& store) {
-  const Setup& setup = store.setup();
-  const RobotModel& model = setup.model();
-  const int offset = model.num_base_velocities();
-  std::vector<Place> places = {{"law", {}}};
-  for (Index i = 0; i < model.num_velocities(); ++i) places.front().entries.push_back(i);
-  // The law of a robot that stands may be wrong before the ground's forces are subtracted, or after.
-  if (model.base().type == BaseType::kFloating) places.push_back({"law", {}, true});
-  std::vector<bool> carries(static_cast<size_t>(model.num_joints()), false);
-  for (const int joint : setup.hold().arm_joints) carries[static_cast<size_t>(joint)] = true;
-  for (const int tip : setup.fingertips()) {
-    const Frame& frame = model.frames()[static_cast<size_t>(tip)];
-    Place finger{"law of the finger of " + frame.name, {}};
-    for (int joint = frame.link; joint >= 0; joint = model.joints()[static_cast<size_t>(joint)].parent)
-      if (!carries[static_cast<size_t>(joint)]) finger.entries.push_back(offset + model.dof(joint));
-    if (finger.entries.size() > 1) places.push_back(finger);
-  }
-  for (Index i = 0; i < model.num_velocities(); ++i)
-    places.push_back(
-        {"law of " + store.motors()[static_cast<size_t>(i)].place.substr(sizeof("motor ") - 1), {i}});
-  return places;
-}
 
 /// A sum of which all but one summand vanish, and friction that the law has anyway, are no candidates besides
 /// those. @param parts of each candidate, bits by summand; 0 for what is added.
@@ -195,16 +166,7 @@ class LawProblem {
     return columns;
   }
 
-  /// The part of a force that some torques have.
-  [[nodiscard]] VectorXd KeepAt(const Place& place, const VectorXd& force) const {
-    if (place.is_balanced) return force;
-    VectorXd tau(force.size());
-    actuation_.CalcTorque(force, tau);
-    VectorXd own = VectorXd::Zero(force.size());
-    for (const Index entry : place.entries) own[entry] = tau[entry];
-    actuation_.CalcForce(own, own);
-    return own;
-  }
+  [[nodiscard]] const ActuationMap& actuation() const { return actuation_; }
 
  private:
   /// The first steps, and others evenly; those with a past, if there are any. Of these every third is set
@@ -240,10 +202,9 @@ class LawProblem {
 class LawCandidates {
  public:
   LawCandidates(const StepStore& store, LawProblem* problem)
-      : store_(store), problem_(*problem), places_(ListPlaces(store)) {
+      : problem_(*problem), places_(ListLawPlaces(store.setup())) {
     JudgedLaw* const law = store.law();
     for (const LawEntry& entry : ListLawEntries(store.setup(), law)) Add(entry);
-    AddFrictions();
     std::vector<std::string> names;
     for (const SignalName& motor : store.motors())
       names.push_back("law of " + motor.place.substr(sizeof("motor ") - 1));
@@ -281,10 +242,10 @@ class LawCandidates {
       Limit(entry, &Add(entry.fault, entry.place, entry.parts, problem_.CalcColumns(p, forces)));
       return;
     }
-    for (const Place& place : places_) {
+    for (const LawPlace& place : places_) {
       std::vector<MatrixXd> own;
       own.reserve(forces.size());
-      for (const MatrixXd& force : forces) own.emplace_back(problem_.KeepAt(place, force));
+      for (const MatrixXd& force : forces) own.emplace_back(KeepAt(problem_.actuation(), place, force));
       Limit(entry, &Add(entry.fault, place.name, entry.parts, problem_.CalcColumns(1, own)));
     }
   }
@@ -295,48 +256,13 @@ class LawCandidates {
     one->nominal = entry.nominal;
     if (entry.is_whole) {
       one->is_possible = [](const VectorXd& a) { return std::abs(a[0] - 1.0) < kWhole; };
+    } else if (entry.is_positive) {
+      one->is_possible = [](const VectorXd& a) { return a[0] >= 0.0; };
     } else if (entry.nominal == 1.0 && entry.unit.empty()) {
       one->scale = VectorXd::Constant(1, kPlausible);
       one->is_possible = [](const VectorXd& a) {
         return std::abs(a[0]) < kPlausible && 1.0 + a[0] > -kMostTurned;
       };
-    }
-  }
-
-  /// Forces that a controller may add to single torques.
-  void AddFrictions() {
-    const RobotModel& model = store_.setup().model();
-    const ActuationMap actuation(model);
-    const Index n = model.num_velocities();
-    for (Index i = 0; i < n; ++i) {
-      const SignalName& motor = store_.motors()[static_cast<size_t>(i)];
-      const std::string place = "law of " + motor.place.substr(sizeof("motor ") - 1);
-      struct Kind {
-        const char* fault;
-        double (*size)(double rate);
-      };
-      constexpr Kind kKinds[] = {
-          {"torque", [](double) { return 1.0; }},
-          {"viscous friction", [](double rate) { return -rate; }},
-          {"compensation of viscous friction", [](double rate) { return rate; }},
-          {"dry friction", [](double rate) { return rate > 0.0   ? -1.0
-                                                    : rate < 0.0 ? 1.0
-                                                                 : 0.0; }},
-          {"compensation of dry friction", [](double rate) {
-             return rate > 0.0 ? 1.0 : rate < 0.0 ? -1.0 : 0.0;
-           }}};
-      for (const Kind& kind : kKinds) {
-        Candidate& one =
-            Add(kind.fault, place, 0,
-                problem_.CalcColumns(1, problem_.CalcForces([&](const LawSnapshot& step) -> MatrixXd {
-                  VectorXd own(n);
-                  actuation.CalcForce(VectorXd::Unit(n, i), own);
-                  return kind.size(step.inputs.terms.xi[i]) * own;
-                })));
-        one.unit = motor.unit;
-        if (std::string_view(kind.fault) != "torque")
-          one.is_possible = [](const VectorXd& a) { return a[0] >= 0.0; };
-      }
     }
   }
 
@@ -357,27 +283,14 @@ class LawCandidates {
       const VectorXd c = fitted(std::exp(log_number));
       return (y - amplitude(c) * c).squaredNorm();
     };
-    constexpr int kGrid = 24, kSteps = 50;
-    const double low = std::log(entry.least), width = (std::log(entry.most) - low) / kGrid;
-    int best = 0;
-    double least = left(low);
-    for (int k = 1; k <= kGrid; ++k) {
-      const double now = left(low + k * width);
-      if (now < least) best = k, least = now;
-    }
-    constexpr double kGolden = 0.6180339887498949, kExplains = 0.5;  // of the difference
-    if (least > kExplains * y.squaredNorm()) return;
-    double a = low + std::max(best - 1, 0) * width, b = low + std::min(best + 1, kGrid) * width;
-    for (int k = 0; k < kSteps; ++k) {
-      const double c = b - kGolden * (b - a), d = a + kGolden * (b - a);
-      if (left(c) < left(d)) {
-        b = d;
-      } else {
-        a = c;
-      }
-    }
+    constexpr int kGrid = 24;
+    constexpr double kExplains = 0.5;  // of the difference
+    const double low = std::log(entry.least), high = std::log(entry.most), whole = y.squaredNorm();
+    const double best = FindMost([&](double log_number) { return -left(log_number); }, low, high,
+                                 (high - low) / kGrid, -whole);
+    if (left(best) > kExplains * whole) return;
     // The sum of squares knows the number to half its digits alone: the rest by Gauss and Newton.
-    double number = std::exp(0.5 * (a + b));
+    double number = std::clamp(std::exp(best), entry.least, entry.most);
     constexpr int kIterations = 4;
     constexpr double kChange = 1e-6;
     for (int k = 0; k < kIterations; ++k) {
@@ -397,9 +310,8 @@ class LawCandidates {
       one.is_possible = [](const VectorXd& size) { return std::abs(size[0] - 1.0) < kWhole; };
   }
 
-  const StepStore& store_;
   LawProblem& problem_;
-  std::vector<Place> places_;
+  std::vector<LawPlace> places_;
   std::vector<Candidate> candidates_;
   std::vector<unsigned> parts_;
 };

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "harness/diagnosis/law_entry_list.h"
@@ -28,13 +29,71 @@ void ShiftVelocity(const LawStep& then, LawInputs* inputs) {
     inputs->now.desired.X_d_dot += CalcCoordinateRates(inputs->now.object) - CalcCoordinateRates(then.object);
 }
 
+/// Entries of tau' that something drives begin here.
+Eigen::Index FindFirstDriven(const RobotModel& model) {
+  return model.base().type == BaseType::kFloating ? model.num_base_velocities() : 0;
+}
+
+struct JointTorque {
+  const char* fault;
+  double (*size)(double rate);  // of an amplitude of 1
+};
+constexpr JointTorque kJointTorques[] = {
+    {"torque", [](double) { return 1.0; }},
+    {"viscous friction", [](double rate) { return -rate; }},
+    {"compensation of viscous friction", [](double rate) { return rate; }},
+    {"dry friction", [](double rate) { return rate == 0.0 ? 0.0 : std::copysign(1.0, -rate); }},
+    {"compensation of dry friction",
+     [](double rate) { return rate == 0.0 ? 0.0 : std::copysign(1.0, rate); }}};
+
 }  // namespace
+
+std::string NameEntry(const RobotModel& model, Eigen::Index entry) {
+  const Base& base = model.base();
+  const Eigen::Index offset = model.num_base_velocities();
+  if (entry >= offset) return model.dof_name(static_cast<int>(entry - offset));
+  if (base.type != BaseType::kDifferentialDrive) return "base velocity " + std::to_string(entry);
+  return entry == 0 ? base.wheel_joint_right : base.wheel_joint_left;
+}
+
+std::vector<LawPlace> ListLawPlaces(const Setup& setup) {
+  const RobotModel& model = setup.model();
+  const int offset = model.num_base_velocities();
+  std::vector<LawPlace> places = {{"law", {}}};
+  for (Eigen::Index i = 0; i < model.num_velocities(); ++i) places.front().entries.push_back(i);
+  // The law of a robot that stands may be wrong before the ground's forces are subtracted, or after.
+  if (model.base().type == BaseType::kFloating) places.push_back({"law", {}, true});
+  std::vector<bool> carries(static_cast<size_t>(model.num_joints()), false);
+  for (const int joint : setup.hold().arm_joints) carries[static_cast<size_t>(joint)] = true;
+  for (const int tip : setup.fingertips()) {
+    const Frame& frame = model.frames()[static_cast<size_t>(tip)];
+    LawPlace finger{"law of the finger of " + frame.name, {}};
+    for (int joint = frame.link; joint >= 0; joint = model.joints()[static_cast<size_t>(joint)].parent)
+      if (!carries[static_cast<size_t>(joint)]) finger.entries.push_back(offset + model.dof(joint));
+    if (finger.entries.size() > 1) places.push_back(finger);
+  }
+  for (Eigen::Index i = FindFirstDriven(model); i < model.num_velocities(); ++i)
+    places.push_back({"law of " + NameEntry(model, i), {i}});
+  return places;
+}
+
+VectorXd KeepAt(const ActuationMap& actuation, const LawPlace& place, const VectorXd& force) {
+  if (place.is_balanced) return force;
+  VectorXd tau(force.size());
+  actuation.CalcTorque(force, tau);
+  VectorXd own = VectorXd::Zero(force.size());
+  for (const Eigen::Index entry : place.entries) own[entry] = tau[entry];
+  actuation.CalcForce(own, own);
+  return own;
+}
 
 std::vector<LawEntry> LawEntryList::Make() {
   AddFactors();
   AddOldSignals();
   AddExchanges();
   AddMatrices();
+  AddJointTorques();
+  AddOtherStates();
   if (is_of_joints_) AddJointFaults();
   if (is_of_joints_ && law_.demands_acceleration()) AddModelFaults();
   if (!is_of_joints_) AddObjectFaults();
@@ -111,10 +170,11 @@ void LawEntryList::AddOldSignals() {
       return then->force - step.inputs.now.force;
     });
     torques.is_whole = true;
+    torques.is_variant = age > 1;
     const auto add = [&](const std::string& what, void (*edit)(const LawStep&, LawInputs*)) {
       AddEdit(fmt::format("{} {}", what, when), [old, edit](const LawSnapshot& step, LawInputs* inputs) {
         if (const LawStep* const then = old(step)) edit(*then, inputs);
-      });
+      }).is_variant = age > 1;
     };
     if (is_of_joints_) {
       add("feedback", [](const LawStep& then, LawInputs* inputs) {
@@ -166,13 +226,6 @@ void LawEntryList::AddOldSignals() {
   }
 }
 
-std::string LawEntryList::Name(Index entry) const {
-  const Index base = model_.num_base_velocities();
-  if (entry >= base) return model_.dof_name(static_cast<int>(entry - base));
-  if (model_.base().type != BaseType::kDifferentialDrive) return "base velocity " + std::to_string(entry);
-  return entry == 0 ? model_.base().wheel_joint_right : model_.base().wheel_joint_left;
-}
-
 std::vector<std::pair<Eigen::Index, Eigen::Index>> LawEntryList::ListPairs() const {
   constexpr Index kFew = 12;
   std::vector<std::pair<Index, Index>> pairs;
@@ -183,7 +236,7 @@ std::vector<std::pair<Eigen::Index, Eigen::Index>> LawEntryList::ListPairs() con
 
 void LawEntryList::AddExchanges() {
   for (const auto& [i, j] : ListPairs()) {
-    const std::string both = Name(i) + " and " + Name(j);
+    const std::string both = NameEntry(model_, i) + " and " + NameEntry(model_, j);
     LawEntry& torques = Add("torques of " + both + " exchanged",
                             [this_model = &model_, i = i, j = j](const LawSnapshot& step) -> MatrixXd {
                               const ActuationMap actuation(*this_model);
@@ -196,6 +249,7 @@ void LawEntryList::AddExchanges() {
                               return change;
                             });
     torques.is_whole = true;
+    torques.is_variant = i > 0;
     if (is_of_joints_) {
       AddEdit("errors of " + both + " exchanged", [i = i, j = j](const LawSnapshot&, LawInputs* inputs) {
         std::swap(inputs->now.position_error[i], inputs->now.position_error[j]);
@@ -205,6 +259,26 @@ void LawEntryList::AddExchanges() {
     AddEdit("M_bar' without the coupling of " + both, [i = i, j = j](const LawSnapshot&, LawInputs* inputs) {
       inputs->M(i, j) = inputs->M(j, i) = 0.0;
     });
+  }
+}
+
+void LawEntryList::AddJointTorques() {
+  for (Index i = FindFirstDriven(model_); i < n_; ++i) {
+    const int dof = static_cast<int>(i) - model_.num_base_velocities();
+    const bool slides = dof >= 0 && model_.joints()[static_cast<size_t>(model_.joint_of_dof(dof))].type ==
+                                        JointType::kPrismatic;
+    for (const JointTorque& kind : kJointTorques) {
+      LawEntry& entry =
+          Add(kind.fault,
+              [actuation = ActuationMap(model_), size = kind.size, i](const LawSnapshot& step) -> MatrixXd {
+                VectorXd own(step.difference.size());
+                actuation.CalcForce(VectorXd::Unit(own.size(), i), own);
+                return size(step.inputs.terms.xi[i]) * own;
+              });
+      entry.place = "law of " + NameEntry(model_, i);
+      entry.unit = slides ? "N" : "N m";
+      entry.is_positive = &kind != &kJointTorques[0];
+    }
   }
 }
 

@@ -13,15 +13,28 @@
 
 namespace dexcheck {
 
+/// Entries of tau' that belong together.
+struct LawPlace {
+  std::string name;  ///< "law" for all, "law of panda_joint4", "law of the finger of rf1_tip".
+  std::vector<Eigen::Index> entries;
+  bool is_balanced = false;  ///< Whether the ground is asked to balance what the base has of it.
+};
+/// All torques, those of each finger, and each torque.
+std::vector<LawPlace> ListLawPlaces(const Setup& setup);
+/// The part of a force (n) that the torques of a place have.
+VectorXd KeepAt(const ActuationMap& actuation, const LawPlace& place, const VectorXd& force);
+
 /// A fault that a law may have.
 struct LawEntry {
   std::string fault;
   std::string place = "law";
   std::string unit = {};
-  double nominal = 0.0;    ///< Value of the right law.
-  unsigned parts = 0;      ///< Summands of LawPartName that a factor is of.
-  bool at_places = false;  ///< Some torques alone may have it.
-  bool is_whole = false;   ///< It is there as a whole: its amplitude is 1.
+  double nominal = 0.0;      ///< Value of the right law.
+  unsigned parts = 0;        ///< Summands of LawPartName that a factor is of.
+  bool at_places = false;    ///< Some torques alone may have it.
+  bool is_whole = false;     ///< It is there as a whole: its amplitude is 1.
+  bool is_positive = false;  ///< Its value is not negative.
+  bool is_variant = false;   ///< Another age, or another pair of joints, of an entry before it.
   /// E_bar' (tau' - tau'_printed) at a step of amplitude 1 (n x p).
   std::function<MatrixXd(const LawSnapshot&)> force;
 };

@@ -12,6 +12,9 @@
 
 namespace dexcheck {
 
+/// The joint or wheel of an entry of tau'.
+std::string NameEntry(const RobotModel& model, Eigen::Index entry);
+
 /// Builds the list for one law.
 class LawEntryList {
  public:
@@ -19,9 +22,8 @@ class LawEntryList {
       : model_(setup.model()),
         law_(*law),
         n_(model_.num_velocities()),
-        is_of_joints_(setup.joints() != nullptr) {
-    if (is_of_joints_) start_ = setup.start().q;
-  }
+        is_of_joints_(setup.joints() != nullptr),
+        start_(setup.start().q) {}
 
   [[nodiscard]] std::vector<LawEntry> Make();
 
@@ -36,18 +38,19 @@ class LawEntryList {
   void AddFactors();
   /// Signals of some steps before.
   void AddOldSignals();
-  [[nodiscard]] std::string Name(Index entry) const;
   /// Pairs that may be taken for each other: all of a small robot, and neighbours of a large one.
   [[nodiscard]] std::vector<std::pair<Index, Index>> ListPairs() const;
   void AddExchanges();
   void AddMatrices();
   void AddJointFaults();
   /// Terms of the model at another state than the measured one.
-  void AddDesiredStates();
+  void AddOtherStates();
   void AddFriction();
   /// The sum may have the error of this step, or not; what it was before the first step that was looked at is
   /// not known.
   void AddIntegrals();
+  /// Torques that a controller may add at single joints.
+  void AddJointTorques();
   /// Numbers of the model that the law goes by.
   void AddModelFaults();
   void AddObjectFaults();

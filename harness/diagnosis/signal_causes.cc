@@ -66,6 +66,15 @@ class SignalGroup {
     return std::find(members.begin(), members.end(), i) != members.end();
   }
 
+  /// Whether a fault of all would do in the place of the one fault of a signal.
+  [[nodiscard]] bool MayHave(size_t i, const Fault& of_all) const {
+    return verdicts_[i].is_explained && std::ranges::any_of(verdicts_[i].fits, [&](const SignalFit& fit) {
+             return fit.faults.size() == 1 && std::ranges::any_of(fit.same.front(), [&](const Fault& other) {
+                      return IsOne(other, of_all);
+                    });
+           });
+  }
+
   /// Faults that alone explain a signal, those of like value together.
   [[nodiscard]] std::vector<CommonFault> ListCommon() const {
     std::vector<CommonFault> all;
@@ -73,6 +82,12 @@ class SignalGroup {
       if (!verdicts_[i].is_explained) continue;
       for (const SignalFit& fit : verdicts_[i].fits)
         if (fit.faults.size() == 1 && !fit.is_noise) Collect(i, fit.faults.front(), &all);
+    }
+    // A signal of which nothing came may have any step that is large enough.
+    for (CommonFault& one : all) {
+      for (size_t i = 0; i < verdicts_.size(); ++i)
+        if (!Has(one.members, i) && one.groups.contains(series_[i].name.group) && MayHave(i, one.fault))
+          one.members.push_back(i);
     }
     return all;
   }

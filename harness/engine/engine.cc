@@ -272,7 +272,8 @@ MjModelPtr LoadMjcf(MjcfFile* document) {
     try {
       return LoadDocument(*document);
     } catch (const InputError&) {
-      return Load(path, nullptr, path);  // its refusal has the lines of the file
+      if (!std::filesystem::exists(path)) throw;  // a text in memory
+      return Load(path, nullptr, path);           // its refusal has the lines of the file
     }
   });
 }

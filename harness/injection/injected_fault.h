@@ -2,7 +2,8 @@
 
 // Faults that are made in a run on purpose: in what stands between controller and engine, in what acts on the
 // engine's bodies, in the controller and its model, without the judge being told. Do the checks find them,
-// and are they named? Nothing in this folder knows the signatures that they are recognised by.
+// and are they named? A law's faults are entries of the table that names them; of all others this folder does
+// not know the signatures that they are recognised by.
 
 #include <functional>
 #include <limits>

@@ -1,5 +1,7 @@
 #include <algorithm>
+#include <utility>
 
+#include "controller/control/trajectory_controller.h"
 #include "harness/diagnosis/equation_faults.h"
 #include "harness/diagnosis/parameters.h"
 #include "harness/injection/drawn_faults.h"
@@ -25,23 +27,56 @@ std::vector<FaultSet> ListNumberFaults(const Setup& setup, size_t count, double 
   return sets;
 }
 
+namespace {
+
+/// A law whose internal forces are chosen by other numbers.
+InjectedFault ChangeForces(const std::string& name, void (*change)(GraspControllerOptions*)) {
+  InjectedFault fault = FaultAt(name, Cause::kControlLaw);
+  fault.controller = [change](const Setup& own, std::unique_ptr<Controller> /*right*/,
+                              const IsOn& /*is_on*/) {
+    GraspControllerOptions options = own.MakeControllerOptions();
+    change(&options);
+    // Contacts are measured, as the judge takes them to be.
+    Sampling sampling = own.MakeSampling();
+    sampling.contacts.reset();
+    return std::make_unique<TrajectoryController>(own.model(), own.fingertips(), own.object().body,
+                                                  own.surface(), options, sampling);
+  };
+  return fault;
+}
+
+}  // namespace
+
 std::vector<FaultSet> ListLawFaults(const Setup& setup) {
   std::vector<FaultSet> sets;
-  for (const LawFault& law : ListLawFaults(!setup.adapter().wheels().empty())) {
-    const bool is_part = law.part != SIZE_MAX;
-    InjectedFault fault = FaultAt(law.name, Cause::kControlLaw);
-    fault.kind = is_part ? "law, one part" : "law, otherwise";
-    if (is_part) {
-      const LawPartName& part = ListLawParts()[law.part];
-      fault.truth = {{std::string(part.name) + " (" + part.symbol + "), factor", "law", law.factor,
-                      std::abs(law.factor - 1.0), "", ""}};
-    }
+  const auto add = [&](InjectedFault fault, const char* kind) {
+    fault.kind = kind;
+    fault.cause = Cause::kControlLaw;
     fault.needs_error = true;
-    fault.controller = [law](const Setup& own, std::unique_ptr<Controller> /*right*/, const IsOn& is_on) {
-      return std::make_unique<FaultyLaw>(own, law, is_on);
-    };
-    sets.push_back({fault});
+    sets.push_back({std::move(fault)});
+  };
+  const ScenarioLaw law(setup);
+  for (size_t i = 0; i < law.entries.size(); ++i) {
+    const LawEntry& entry = law.entries[i];
+    // A thousandth too large, left out, and gravity upside down.
+    constexpr double kSlightly = 1.001, kReversed = -1.0;
+    for (const double factor : {kSlightly, 0.0, kReversed}) {
+      const bool can_be = factor != kReversed || entry.fault.starts_with("gravity (");
+      if (entry.parts != 0 && can_be)
+        add(MakeLawFault(entry, i, factor - 1.0, std::nullopt), "law, one part");
+    }
+    if (!entry.is_whole || entry.is_variant) continue;
+    InjectedFault whole = MakeLawFault(entry, i, 1.0, std::nullopt);
+    whole.name = entry.fault;
+    whole.truth.clear();
+    add(std::move(whole), "law, otherwise");
   }
+  add(ChangeForces("the friction counted on times 1.1", [](auto* options) { options->mu *= 1.1; }),
+      "law, otherwise");
+  add(ChangeForces("f_min halved", [](auto* options) { options->f_min *= 0.5; }), "law, otherwise");
+  add(ChangeForces("the barrier's weight times 1.1",
+                   [](auto* options) { options->force.barrier_weight *= 1.1; }),
+      "law, otherwise");
   return sets;
 }
 
@@ -53,9 +88,8 @@ std::vector<FaultSet> ListEquationFaults(const Setup& setup) {
     if (equation.check == nullptr || (is_of_coordinates && !has_coordinates)) continue;
     InjectedFault fault = FaultAt(equation.name, Cause::kModel, equation.check);
     fault.kind = "equation";
-    fault.controller = [equation](const Setup& own, std::unique_ptr<Controller> /*right*/,
-                                  const IsOn& is_on) {
-      return std::make_unique<FaultyLaw>(own, equation, is_on);
+    fault.controller = [equation](const Setup& own, std::unique_ptr<Controller> right, const IsOn& is_on) {
+      return std::make_unique<FaultyLaw>(own, std::move(right), equation, is_on);
     };
     sets.push_back({fault});
   }

@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <limits>
 #include <optional>
 
 #include "controller/common/linear_algebra.h"
+#include "harness/diagnosis/line_search.h"
 
 namespace dexcheck {
 namespace {
@@ -110,23 +110,6 @@ double CalcExplained(const std::vector<BlockProducts>& blocks, double frequency)
   return b.dot(SolveLeastSquares(G, b));
 }
 
-/// Where a score is largest: of a grid, then by halving its step.
-double FindBest(const std::function<double(double)>& score, double begin, double end, double step) {
-  double best = begin, most = 0.0;
-  const auto try_one = [&](double x) {
-    const double value = score(x);
-    if (value > most) most = value, best = x;
-  };
-  for (int i = 0; begin + i * step < end; ++i) try_one(begin + i * step);
-  constexpr int kHalvings = 16;
-  for (int i = 0; i < kHalvings; ++i, step *= 0.5) {
-    const double centre = best;
-    try_one(centre - 0.5 * step);
-    try_one(centre + 0.5 * step);
-  }
-  return best;
-}
-
 constexpr double kFraction = 0.2;  // of what is left, that makes a motion of the base worth a look
 
 }  // namespace
@@ -142,7 +125,7 @@ double FindShaking(const RecordingSet& recordings, const TorqueRows& rows, const
   const double begin = kFewestCycles * cycle, end = kMostOfCycle * 2.0 * kPi / longest;
   if (!(begin < end)) return 0.0;
   const auto explained = [&](double frequency) { return CalcExplained(all.blocks, frequency); };
-  const double best = FindBest(explained, begin, end, kGrid * cycle);
+  const double best = FindMost(explained, begin, end, kGrid * cycle);
   return explained(best) > kFraction * all.left ? best : 0.0;
 }
 
@@ -248,9 +231,9 @@ Push FindTimes(const RecordingSet& recordings, const TorqueRows& rows, const Vec
   };
   constexpr double kGrid = 0.2;
   for (int twice = 0; twice < 2; ++twice) {
-    push.from = FindBest([&](double from) { return explained(from, push.to); }, push.from - beside,
+    push.from = FindMost([&](double from) { return explained(from, push.to); }, push.from - beside,
                          push.from + beside, kGrid * push.reach);
-    push.to = FindBest([&](double to) { return explained(push.from, to); }, push.to - beside,
+    push.to = FindMost([&](double to) { return explained(push.from, to); }, push.to - beside,
                        push.to + beside, kGrid * push.reach);
   }
   return push;

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "controller/common/errors.h"
+#include "harness/diagnosis/line_search.h"
 
 namespace dexcheck {
 namespace {
@@ -45,26 +46,18 @@ std::optional<VectorXd> CalcDifference(const Traces& first, const Traces& second
   return VectorXd(squares.cwiseQuotient(counts.cwiseMax(1.0)));
 }
 
-/// The delay at which the positions are most alike: over a grid, then by halving.
+/// The delay at which the positions are most alike.
 double FindDelay(const Traces& first, const Traces& second, Eigen::Index joints) {
-  const double length = first.back().time - first.front().time;
-  const double begin = second.front().time - first.front().time;
-  double step = length / static_cast<double>(first.size());
-  double best = begin, least = std::numeric_limits<double>::infinity();
-  const auto try_delay = [&](double delay) {
-    const std::optional<VectorXd> squares = CalcDifference(first, second, delay);
-    const double misfit = squares ? squares->head(joints).sum() : least;
-    if (misfit < least) least = misfit, best = delay;
-  };
-  const int half = static_cast<int>(first.size() / 2);
-  for (int i = -half; i <= half; ++i) try_delay(begin + i * step);
+  constexpr double kNever = -std::numeric_limits<double>::infinity();
   constexpr int kHalvings = 10;
-  for (int i = 0; i < kHalvings; ++i, step /= 2.0) {
-    const double centre = best;
-    try_delay(centre - 0.5 * step);
-    try_delay(centre + 0.5 * step);
-  }
-  return best;
+  const double length = first.back().time - first.front().time;
+  const double at_once = second.front().time - first.front().time;
+  const auto calc_likeness = [&](double delay) {
+    const std::optional<VectorXd> squares = CalcDifference(first, second, delay);
+    return squares ? -squares->head(joints).sum() : kNever;
+  };
+  return FindMost(calc_likeness, at_once - 0.5 * length, at_once + 0.5 * length,
+                  length / static_cast<double>(first.size()), kNever, kHalvings);
 }
 
 bool Differ(const Fault& a, const Fault& b) {

@@ -120,10 +120,7 @@ class PositionFaults {
 
   std::vector<PositionFault> List() {
     AddUnit();
-    faults_.push_back({.fault = {"torque gain", "all joints", -1.0, 0.0, "", "(the other sign)"},
-                       .factor = -1.0,
-                       .is_motion = false,
-                       .is_torque = true});
+    AddTorqueSign(-1);
     AddAlphabet();
     for (int joint = 0; joint < model_.num_joints(); ++joint) {
       if (!HasPosition(joint)) continue;
@@ -142,7 +139,13 @@ class PositionFaults {
     return recording_.FindColumn(RecordedQuantity::kTorque, joint) >= 0 ||
            recording_.FindColumn(RecordedQuantity::kCurrent, joint) >= 0;
   }
-  [[nodiscard]] std::string PlaceOf(int joint) const { return "joint " + model_.joint(joint).name; }
+  /// Adds a fault of a joint's motion; of all joints for -1.
+  PositionFault& Add(const std::string& fault, int joint, double value, const std::string& unit = "",
+                     const std::string& detail = "") {
+    const std::string place = joint < 0 ? "all joints" : "joint " + model_.joint(joint).name;
+    return faults_.emplace_back(
+        PositionFault{.fault = {fault, place, value, 0.0, unit, detail}, .joint = joint});
+  }
 
   /// Degrees: where no column has a unit, and what is read is more than a joint can turn.
   void AddUnit() {
@@ -155,56 +158,44 @@ class PositionFaults {
       const double most = std::max({std::abs(joint.lower), std::abs(joint.upper), kPi});
       is_beyond = is_beyond || begin_.largest()[one.joint] > kBeyond * most;
     }
-    if (is_beyond)
-      faults_.push_back({.fault = {"unit of the positions", "all joints", 180.0 / kPi, 0.0, "", "(degrees)"},
-                         .factor = kPi / 180.0});
+    if (is_beyond) Add("unit of the positions", -1, 180.0 / kPi, "", "(degrees)").factor = kPi / 180.0;
+  }
+
+  void AddTorqueSign(int joint) {
+    PositionFault& sign = Add("torque gain", joint, -1.0, "", "(the other sign)");
+    sign.factor = -1.0;
+    sign.is_motion = false;
+    sign.is_torque = true;
   }
 
   void AddNumbers(int joint) {
-    const std::string place = PlaceOf(joint);
-    const bool turns = model_.joint(joint).type == JointType::kRevolute;
     for (const double gain : {-1.0, 0.5, 0.8, 0.9, 0.98, 1.02, 1.1, 1.25, 2.0})
-      for (const bool has_right_rates : {true, false})
-        faults_.push_back(
-            {.fault = {"position gain", place, gain, 0.0, "", gain < 0.0 ? "(the other sign)" : ""},
-             .joint = joint,
-             .factor = 1.0 / gain,
-             .has_right_rates = has_right_rates});
+      for (const bool has_right_rates : {true, false}) {
+        PositionFault& one = Add("position gain", joint, gain, "", gain < 0.0 ? "(the other sign)" : "");
+        one.factor = 1.0 / gain;
+        one.has_right_rates = has_right_rates;
+      }
+    const bool turns = model_.joint(joint).type == JointType::kRevolute;
     for (const double offset : {0.1, 0.2, 0.35, 0.5, 0.7, 1.0, 1.4, kPi / 2.0, 2.0, kPi})
-      for (const double sign : {-1.0, 1.0})
-        if (turns)
-          faults_.push_back({.fault = {"position offset", place, sign * offset, 0.0, "rad", ""},
-                             .joint = joint,
-                             .offset = -sign * offset});
-    if (HasTorque(joint))
-      faults_.push_back({.fault = {"torque gain", place, -1.0, 0.0, "", "(the other sign)"},
-                         .joint = joint,
-                         .factor = -1.0,
-                         .is_motion = false,
-                         .is_torque = true});
+      for (const double value : {-offset, offset})
+        if (turns) Add("position offset", joint, value, "rad").offset = -value;
+    if (HasTorque(joint)) AddTorqueSign(joint);
   }
 
   void AddExchanges(int joint, int other) {
     std::vector<int> order = own_;
     std::swap(order[static_cast<size_t>(joint)], order[static_cast<size_t>(other)]);
-    const std::string with = " exchanged with that of " + model_.joint(other).name;
     const bool have_torques = HasTorque(joint) && HasTorque(other), is_in_range = begin_.IsInRange(order);
-    if (is_in_range)
-      faults_.push_back({.fault = {"position" + with, PlaceOf(joint), kNoSize, 0.0, "", ""},
-                         .joint = joint,
-                         .order = order});
-    if (have_torques)
-      faults_.push_back({.fault = {"torque" + with, PlaceOf(joint), kNoSize, 0.0, "", ""},
-                         .joint = joint,
-                         .order = order,
-                         .is_motion = false,
-                         .is_torque = true});
-    if (is_in_range && have_torques)
-      faults_.push_back({.fault = {"all columns exchanged with those of " + model_.joint(other).name,
-                                   PlaceOf(joint), kNoSize, 0.0, "", ""},
-                         .joint = joint,
-                         .order = order,
-                         .is_torque = true});
+    const auto add = [&](const std::string& what, const char* with, bool is_motion, bool is_torque) {
+      PositionFault& one = Add(what + with + model_.joint(other).name, joint, kNoSize);
+      one.order = order;
+      one.is_motion = is_motion;
+      one.is_torque = is_torque;
+    };
+    constexpr const char* kWith = " exchanged with that of ";
+    if (is_in_range) add("position", kWith, true, false);
+    if (have_torques) add("torque", kWith, false, true);
+    if (is_in_range && have_torques) add("all columns", " exchanged with those of ", true, true);
   }
 
   /// Messages of ROS have joints by name: a logger that forgets the names has them in that order.
@@ -216,10 +207,9 @@ class PositionFaults {
     if (order == own_ || !begin_.IsInRange(order)) return;
     std::string names;
     for (const int joint : order) names += (names.empty() ? "" : ", ") + model_.joint(joint).name;
-    faults_.push_back(
-        {.fault = {"columns in alphabetical order", "all joints", kNoSize, 0.0, "", "(" + names + ")"},
-         .order = order,
-         .is_torque = true});
+    PositionFault& one = Add("columns in alphabetical order", -1, kNoSize, "", "(" + names + ")");
+    one.order = order;
+    one.is_torque = true;
   }
 
   const RobotModel& model_;

@@ -9,12 +9,11 @@
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
-#include "harness/engine/xml.h"
+#include "harness/corrections/read_printed.h"
+#include "harness/corrections/write_repaired.h"
 
 namespace dexcheck {
 namespace {
-
-using tinyxml2::XMLElement;
 
 /// The model's numbers that change.
 struct Corrections {
@@ -87,131 +86,82 @@ std::string Join(const Vector& values, const char* separator) {
   return text;
 }
 
-/// xx, yy, zz, xy, xz, yz.
-Vector6d PackTensor(const Matrix3d& I) {
-  Vector6d entries;
-  entries << I(0, 0), I(1, 1), I(2, 2), I(0, 1), I(0, 2), I(1, 2);
-  return entries;
-}
-
-MassProperties Move(const MassProperties& body, const Pose& X) {
-  return {body.mass, X * body.com, X.linear() * body.inertia * X.linear().transpose()};
-}
-
-/// A link's body with what is added to it, in the frame of the part of that name.
-MassProperties Correct(const RobotDescription& robot, int link, const TorqueRegressor::BodyVector& change,
-                       CorrectedFile* file) {
-  const std::string& name = robot.spec.joints[static_cast<size_t>(link)].link;
-  const auto part = std::find_if(robot.parts.begin(), robot.parts.end(), [&](const DescribedPart& one) {
-    return one.name == name && one.joint == link;
-  });
-  const bool is_of_part = part != robot.parts.end();
-  const Pose X = is_of_part ? part->X_iL : Pose::Identity();
-  const MassProperties before =
-      is_of_part ? Move(part->body, X) : robot.spec.joints[static_cast<size_t>(link)].body;
-  TorqueRegressor::BodyVector after = TorqueRegressor::Pack(before) + change;
-  // Each correction is of a body that can be; several together need not be.
-  if (!IsBody(after) && IsBody(TorqueRegressor::Pack(before))) {
-    after = FindNearestBody(after);
-    file->left.push_back("link " + name +
-                         ": what was found is together no body that can be; the nearest one is written");
-  }
-  return Move(TorqueRegressor::Unpack(after), X.inverse());
-}
-
-/// The first element of that kind and name below one.
-XMLElement* Find(XMLElement* root, const char* kind, const std::string& name) {
-  for (XMLElement* one = root->FirstChildElement(); one != nullptr; one = one->NextSiblingElement()) {
-    const char* own = one->Attribute("name");
-    if (std::string_view(one->Name()) == kind && own != nullptr && name == own) return one;
-    if (XMLElement* below = Find(one, kind, name)) return below;
-  }
-  return nullptr;
-}
-
-XMLElement* GetChild(XMLElement* parent, const char* kind, bool is_first = false) {
-  if (XMLElement* child = parent->FirstChildElement(kind)) return child;
-  XMLElement* child = parent->GetDocument()->NewElement(kind);
-  if (is_first) {
-    parent->InsertFirstChild(child);
-  } else {
-    parent->InsertEndChild(child);
-  }
-  return child;
-}
-
-/// An XML file.
-class XmlCopy {
+/// A link's body with what is added to it, in the frame of its file.
+class CorrectedBody {
  public:
-  XmlCopy(const RobotDescription& robot, const std::string& text) : robot_(robot) {
-    ParseXml(text, robot.spec.source, &document_);
+  CorrectedBody(const RobotDescription& robot, int link)
+      : name_(robot.spec.joints[static_cast<size_t>(link)].link),
+        before_(robot.spec.joints[static_cast<size_t>(link)].body) {
+    const auto part = std::ranges::find_if(
+        robot.parts, [&](const DescribedPart& one) { return one.name == name_ && one.joint == link; });
+    if (part == robot.parts.end()) return;
+    X_ = part->X_iL;
+    before_ = ExpressIn(part->body, X_);
   }
 
-  std::string Write(const Corrections& corrections, CorrectedFile* file) {
-    const bool is_urdf = robot_.format == RobotFormat::kUrdf;
-    const auto set = [&](const std::map<int, double>& values, const char* urdf, const char* mjcf) {
-      for (const auto& [joint, value] : values) {
-        XMLElement* element = GetElement("joint", robot_.spec.joints[static_cast<size_t>(joint)].name);
-        if (is_urdf) element = GetChild(element, "dynamics");
-        element->SetAttribute(is_urdf ? urdf : mjcf, Show(value).c_str());
-      }
-    };
-    set(corrections.dry, "friction", "frictionloss");
-    set(corrections.viscous, "damping", "damping");
-    if (is_urdf) {
-      for (const auto& [joint, value] : corrections.armature)
-        MoveToLeft("joint " + robot_.spec.joints[static_cast<size_t>(joint)].name + ": armature", file);
-      if (corrections.gravity) MoveToLeft("world: gravity", file);
-    } else {
-      set(corrections.armature, "", "armature");
-      if (corrections.gravity)
-        GetChild(document_.RootElement(), "option", true)
-            ->SetAttribute("gravity", Join(*corrections.gravity, " ").c_str());
+  [[nodiscard]] MassProperties Add(const TorqueRegressor::BodyVector& change, CorrectedFile* file) const {
+    TorqueRegressor::BodyVector after = TorqueRegressor::Pack(before_) + change;
+    // Each correction is of a body that can be; several together need not be.
+    if (!IsBody(after) && IsBody(TorqueRegressor::Pack(before_))) {
+      after = FindNearestBody(after);
+      file->left.push_back("link " + name_ +
+                           ": what was found is together no body that can be; the nearest one is written");
     }
-    for (const auto& [link, change] : corrections.bodies) WriteBody(link, change, is_urdf, file);
-    return PrintXml(document_);
+    return ExpressIn(TorqueRegressor::Unpack(after), X_.inverse());
   }
 
  private:
-  XMLElement* GetElement(const char* kind, const std::string& name) {
-    XMLElement* element = Find(document_.RootElement(), kind, name);
-    if (element == nullptr)
-      throw InputError(
-          fmt::format("{}: {} {}: stands in no element of its own", robot_.spec.source, kind, Quote(name)));
-    return element;
-  }
-  /// What this format has no place for.
-  static void MoveToLeft(const std::string& what, CorrectedFile* file) {
-    std::erase(file->written, what);
-    file->left.push_back(what);
-  }
-
-  void WriteBody(int link, const TorqueRegressor::BodyVector& change, bool is_urdf, CorrectedFile* file) {
-    const MassProperties body = Correct(robot_, link, change, file);
-    XMLElement* inertial =
-        GetChild(GetElement(is_urdf ? "link" : "body", robot_.spec.joints[static_cast<size_t>(link)].link),
-                 "inertial", true);
-    const Vector6d tensor = PackTensor(body.inertia);
-    if (!is_urdf) {
-      for (const char* other : {"quat", "euler", "axisangle", "xyaxes", "zaxis", "diaginertia"})
-        inertial->DeleteAttribute(other);
-      inertial->SetAttribute("mass", Show(body.mass).c_str());
-      inertial->SetAttribute("pos", Join(body.com, " ").c_str());
-      inertial->SetAttribute("fullinertia", Join(tensor, " ").c_str());
-      return;
-    }
-    XMLElement* origin = GetChild(inertial, "origin");
-    origin->SetAttribute("xyz", Join(body.com, " ").c_str());
-    origin->SetAttribute("rpy", "0 0 0");
-    GetChild(inertial, "mass")->SetAttribute("value", Show(body.mass).c_str());
-    XMLElement* inertia = GetChild(inertial, "inertia");
-    constexpr const char* kEntries[] = {"ixx", "iyy", "izz", "ixy", "ixz", "iyz"};
-    for (int i = 0; i < 6; ++i) inertia->SetAttribute(kEntries[i], Show(tensor[i]).c_str());
-  }
-
-  const RobotDescription& robot_;
-  tinyxml2::XMLDocument document_;
+  std::string name_;
+  Pose X_ = Pose::Identity();  // of the part in frame i
+  MassProperties before_;      // in frame i
 };
+
+/// Says that the format has no place for a correction.
+void MoveToLeft(const std::string& what, CorrectedFile* file) {
+  std::erase(file->written, what);
+  file->left.push_back(what);
+}
+
+/// An XML file's robot with the corrections.
+PrintedRobot CorrectPrinted(const RobotDescription& robot, PrintedRobot printed,
+                            const Corrections& corrections, CorrectedFile* file) {
+  const bool is_urdf = robot.format == RobotFormat::kUrdf;
+  const auto find = [&](auto is_it, const std::string& what) -> PrintedLink& {
+    const auto link = std::ranges::find_if(printed.links, is_it);
+    if (link == printed.links.end())
+      throw InputError(
+          fmt::format("{}: {}: stands in no element of its own", robot.spec.source, Quote(what)));
+    return *link;
+  };
+  const auto set = [&](JointScalar scalar, const std::map<int, double>& values) {
+    for (const auto& [joint, value] : values) {
+      const std::string& name = robot.spec.joints[static_cast<size_t>(joint)].name;
+      find([&](const PrintedLink& one) { return one.joint.name == name; }, name)
+          .joint.scalars[static_cast<size_t>(scalar)] = PrintedScalar{value};
+    }
+  };
+  set(JointScalar::kFriction, corrections.dry);
+  set(JointScalar::kDamping, corrections.viscous);
+  if (!is_urdf) {
+    set(JointScalar::kArmature, corrections.armature);
+    if (corrections.gravity) printed.gravity = corrections.gravity;
+  } else {
+    for (const auto& [joint, value] : corrections.armature)
+      MoveToLeft("joint " + robot.spec.joints[static_cast<size_t>(joint)].name + ": armature", file);
+    if (corrections.gravity) MoveToLeft("world: gravity", file);
+  }
+  for (const auto& [link, change] : corrections.bodies) {
+    const std::string& name = robot.spec.joints[static_cast<size_t>(link)].link;
+    PrintedLink& one = find([&](const PrintedLink& each) { return each.name == name; }, name);
+    if (!one.inertial) one.inertial.emplace();
+    const MassProperties body = CorrectedBody(robot, link).Add(change, file);
+    const Matrix3d R = one.inertial->origin.CalcRotation();
+    one.inertial->mass.value = body.mass;
+    one.inertial->origin.t = body.com;
+    one.inertial->I = ToEntries(R.transpose() * body.inertia * R);
+  }
+  return printed;
+}
 
 /// A parameter file, in whose text single values are replaced.
 class TomlCopy {
@@ -232,11 +182,11 @@ class TomlCopy {
     set(corrections.viscous, "damping");
     set(corrections.armature, "armature");
     for (const auto& [link, change] : corrections.bodies) {
-      const MassProperties body = Correct(robot_, link, change, file);
+      const MassProperties body = CorrectedBody(robot_, link).Add(change, file);
       const toml::table& table = GetTable("links", robot_.spec.joints[static_cast<size_t>(link)].link);
       Set(table, "mass", Show(body.mass));
       Set(table, "com", "[" + Join(body.com, ", ") + "]");
-      Set(table, "inertia", "[" + Join(PackTensor(body.inertia), ", ") + "]");
+      Set(table, "inertia", "[" + Join(ToEntries(body.inertia), ", ") + "]");
     }
     if (corrections.gravity) Set(root_, "gravity", "[" + Join(*corrections.gravity, ", ") + "]");
     std::sort(edits_.begin(), edits_.end(), [](const Edit& a, const Edit& b) { return a.begin > b.begin; });
@@ -294,12 +244,17 @@ class TomlCopy {
 
 }  // namespace
 
-CorrectedFile WriteCorrections(const RobotDescription& robot, const std::string& text,
-                               const RecordingJudgement& judgement) {
+CorrectedFile WriteCorrections(const DescriptionFile& source, const UrdfOptions& urdf,
+                               const RecordingJudgement& judgement, const std::filesystem::path& folder) {
+  const RobotDescription robot = source.Describe();
   CorrectedFile file;
   const Corrections corrections = Collect(RobotModel(robot.spec), judgement, &file);
-  file.text = robot.format == RobotFormat::kToml ? TomlCopy(robot, text).Write(corrections, &file)
-                                                 : XmlCopy(robot, text).Write(corrections, &file);
+  if (robot.format == RobotFormat::kToml) {
+    file.text = TomlCopy(robot, source.text()).Write(corrections, &file);
+    return file;
+  }
+  const PrintedRobot before = ReadPrintedRobot(source);
+  file.text = WriteXml(source, urdf, before, CorrectPrinted(robot, before, corrections, &file), folder);
   return file;
 }
 

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "harness/descriptions/robot_description.h"
+#include "harness/descriptions/read_description.h"
 #include "harness/recordings/judge_recordings.h"
 
 namespace dexcheck {
@@ -19,9 +19,9 @@ struct CorrectedFile {
 };
 
 /// Friction, armature, bodies and gravity, as found, in the file's own numbers; comments stay.
-/// @param robot what the file says. @param text of the file.
+/// @param folder in which the text will stand: an MJCF finds its meshes from there.
 /// @throws InputError "FILE: ..." where a number stands in no place of its own, as in a template.
-CorrectedFile WriteCorrections(const RobotDescription& robot, const std::string& text,
-                               const RecordingJudgement& judgement);
+CorrectedFile WriteCorrections(const DescriptionFile& source, const UrdfOptions& urdf,
+                               const RecordingJudgement& judgement, const std::filesystem::path& folder);
 
 }  // namespace dexcheck

@@ -6,7 +6,6 @@
 #include <array>
 #include <cctype>
 #include <cerrno>
-#include <cmath>
 #include <cstring>
 #include <iterator>
 #include <memory>
@@ -18,6 +17,7 @@
 #include "harness/base/files.h"
 #include "harness/base/interrupts.h"
 #include "harness/checks/check_table.h"
+#include "harness/checks/failure_cause.h"
 #include "harness/report/page_frame.h"
 #include "renders/renderer.h"
 #include "renders/video.h"
@@ -81,172 +81,72 @@ Headline FindHeadline(const RunData& run) {
   const std::string verdict = run.FindSummaryText("/verdict");
   if (verdict == "failed")
     return {"fail", "FAILED", "The run could not be completed: " + run.FindSummaryText("/failure")};
-  if (verdict == "disagreement") {
-    const std::string cause = run.FindSummaryText("/attribution/cause");
-    return {"fail", "DISAGREEMENT",
-            cause == "model"         ? "The two descriptions of the robot differ."
-            : cause == "control law" ? "The torques are not those of the law, or do not do what is expected."
-                                     : "The engine does not do what the equations say."};
-  }
+  const auto say = [](const char* tone, const char* word, std::string sentence) {
+    sentence.front() = static_cast<char>(std::toupper(sentence.front()));
+    return Headline{tone, word, sentence + "."};
+  };
+  if (verdict == "disagreement")
+    return say("fail", "DISAGREEMENT", DescribeCause(run.FindSummaryText("/attribution/cause")));
   if (run.checks().empty()) return {"open", "NOT CHECKED", "The run completed; nothing was checked."};
-  std::string holds = DescribeWhatHolds(run.checks());
-  holds.front() = static_cast<char>(std::toupper(holds.front()));
-  return {"pass", "PASS", holds + "."};
+  return say("pass", "PASS", DescribeWhatHolds(run.checks()));
 }
 
-/// A value with its unit; 0 has none.
-std::string FormatWithUnit(double value, const std::string& unit) {
-  return FormatShort(value) + (unit == "1" || value == 0.0 ? "" : " " + unit);
+/// A category with its checks, as summaries have them; the page's script shows the numbers.
+Json MakeCategory(const RunData& run, CheckCategory category) {
+  CategoryStatus status(category);
+  Json checks = Json::array();
+  for (const CheckRecord& check : run.checks()) {
+    if (check.kind != category) continue;
+    status.Add(check);
+    const bool is_timed = IsTimed(check) || !IsReached(check);
+    checks.push_back({{"name", check.name}, {"status", is_timed ? DescribeStatus(check) : ""}});
+    checks.back().update(ToJson(check, is_timed));
+  }
+  return {{"name", NameOf(category)},
+          {"title", TitleOf(category)},
+          {"explanation", run.Explain(category)},
+          {"tone", status.failed > 0                     ? "fail"
+                   : status.checks == status.same_source ? "open"
+                                                         : "pass"},
+          {"word", status.Describe()},
+          {"checks", checks}};
 }
-
-/// Of what may not be there: null.
-Json OrNull(bool is_there, const Json& json) { return is_there ? json : Json(); }
 
 class Page {
  public:
   Page(const RunData& run, const PageContent& content) : run_(run), content_(content) {}
 
   std::string Make() {
-    Json json = {{"scenario", Text("scenario")},
-                 {"description", run_.FindSummaryText("/description")},
-                 {"version", Text("dexcheck_version")},
-                 {"verdict", MakeVerdict()},
-                 {"causes", run_.summary().value("causes", Json::array())},
-                 {"categories", Json::array()},
-                 {"tiles", MakeTiles()},
-                 {"gain_card", run_.FindSummaryText("/gain_card")},
-                 {"video", MakeVideo()},
-                 {"pictures", MakePictures()},
-                 {"inputs", MakeInputs()},
-                 {"files", Json::array()}};
+    const Headline headline = FindHeadline(run_);
+    Json summary = run_.summary();
+    summary.erase("checks");
+    Json json = {
+        {"scenario", Text("scenario")},
+        {"verdict", {{"tone", headline.tone}, {"word", headline.word}, {"sentence", headline.sentence}}},
+        {"end", run_.end()},
+        {"steps", run_.time().size()},
+        {"summary", std::move(summary)},
+        {"categories", Json::array()},
+        {"video", MakeVideo()},
+        {"pictures", MakePictures()},
+        {"texts", Json::object()},
+        {"files", Json::array()}};
+    for (const char* name :
+         {"command", "overrides", "seed", "robot", "mjcf", "dexcheck_version", "mujoco_version", "machine"})
+      json["texts"][name] = Text(name);
     for (const CheckCategory category : kCheckCategories)
-      json["categories"].push_back(MakeCategory(category));
+      json["categories"].push_back(MakeCategory(run_, category));
     AddFile("scenario.toml", "Scenario", true, &json["files"]);
     AddFile("robot/" + Text("robot"), "Parameters of the model: " + Text("robot"), false, &json["files"]);
     AddFile("mjcf/" + Text("mjcf"), "MJCF: " + Text("mjcf"), false, &json["files"]);
     const PlotGroup plots = {"", content_.figures, run_.time()};
-    return AssemblePlotPage(fmt::format("{}: {}", FindHeadline(run_).word, Text("scenario")), kRunJs,
+    return AssemblePlotPage(fmt::format("{}: {}", headline.word, Text("scenario")), kRunJs,
                             EmbedJson("run-page", json) + media_, {&plots, 1},
                             content_.scene.replay ? &*content_.scene.replay : nullptr);
   }
 
  private:
   std::string Text(const char* name) const { return run_.FindText(name); }
-
-  [[nodiscard]] Json MakeVerdict() const {
-    const Headline headline = FindHeadline(run_);
-    const std::string cause = run_.FindSummaryText("/attribution/cause");
-    const CheckRecord* const first = FindFirstFailure();
-    return {{"tone", headline.tone},
-            {"word", headline.word},
-            {"sentence", headline.sentence},
-            {"cause", cause == "none" ? "" : cause},
-            {"evidence", run_.FindSummaryText("/attribution/evidence")},
-            {"first_failure",
-             first == nullptr ? Json() : Json{{"check", first->name}, {"time", first->failed_at}}},
-            {"stopped_at", OrNull(run_.summary().value("interrupted", false), run_.end())}};
-  }
-
-  /// The check that failed first in time; null when none did in the run.
-  [[nodiscard]] const CheckRecord* FindFirstFailure() const {
-    const CheckRecord* first = nullptr;
-    for (const CheckRecord& check : run_.checks()) {
-      if (!check.failed || !IsTimed(check)) continue;
-      if (first == nullptr || check.failed_at < first->failed_at) first = &check;
-    }
-    return first;
-  }
-
-  /// A category with its checks.
-  [[nodiscard]] Json MakeCategory(CheckCategory category) const {
-    CategoryStatus status(category);
-    Json checks = Json::array();
-    for (const CheckRecord& check : run_.checks()) {
-      if (check.kind != category) continue;
-      status.Add(check);
-      checks.push_back(MakeCheck(check));
-    }
-    Json json = {{"name", NameOf(category)},
-                 {"title", TitleOf(category)},
-                 {"explanation", run_.Explain(category)},
-                 {"tone", status.failed > 0                     ? "fail"
-                          : status.checks == status.same_source ? "open"
-                                                                : "pass"},
-                 {"word", status.Describe()},
-                 {"extent", ""},
-                 {"checks", checks}};
-    if (status.is_asked()) {
-      json["extent"] =
-          fmt::format("{} check{}, at most {} of a bound", status.checks, status.checks == 1 ? "" : "s",
-                      FormatFraction(CalcFraction(status.nearest)));
-    }
-    if (status.not_reached > 0)
-      json["extent"] = fmt::format("{}{}{} not reached", json["extent"].get<std::string>(),
-                                   status.is_asked() ? "; " : "", status.not_reached);
-    return json;
-  }
-
-  [[nodiscard]] Json MakeCheck(const CheckRecord& check) const {
-    const double fraction = CalcFraction(check);
-    std::string where = check.part;
-    if (IsTimed(check)) where += fmt::format("{}{:.3f} s", where.empty() ? "" : ", ", check.at);
-    const std::string cause = run_.FindSummaryText(("/attribution/checks/" + check.name).c_str());
-    return {
-        {"name", check.name},
-        {"description", check.description},
-        {"failed", check.failed},
-        {"fails_from", OrNull(check.failed && IsTimed(check), check.failed_at)},
-        {"is_equal", !check.failed && IsReached(check) && !IsTimed(check)},
-        {"cause", check.failed ? cause : ""},
-        {"status", IsTimed(check) || !IsReached(check) ? DescribeStatus(check) : ""},
-        {"allowance",
-         check.allowance > 0.0 && !check.failed ? FormatWithUnit(check.allowance, check.unit) : ""},
-        {"worst",
-         IsReached(check) ? FormatWithUnit(check.failed ? check.worst : check.residual, check.unit) : "–"},
-        {"bound", FormatWithUnit(check.bound, check.unit)},
-        {"of_bound", IsReached(check) ? FormatFraction(fraction) : ""},
-        {"meter", 100.0 * std::clamp(std::isfinite(fraction) ? fraction : 1.0, 0.0, 1.0)},
-        {"where", where}};
-  }
-
-  /// Values and what they are.
-  [[nodiscard]] Json MakeTiles() const {
-    Json tiles = Json::array();
-    const auto add = [&](const std::string& value, const std::string& label) {
-      tiles.push_back({value, label});
-    };
-    const auto add_error = [&](const char* pointer, const char* unit, const char* label) {
-      const double value = run_.FindSummaryNumber(pointer);
-      add(std::isfinite(value) ? FormatShort(value) + unit : std::string("–"), label);
-    };
-    if (std::isfinite(run_.FindSummaryNumber("/tracking/joint_error_max_rad"))) {
-      add_error("/tracking/joint_error_max_rad", " rad", "largest error of a joint");
-    } else {
-      add_error("/tracking/position_error_max_m", " m", "largest position error of the object");
-      add_error("/tracking/orientation_error_max_rad", " rad", "largest orientation error");
-    }
-    const double simulated = run_.FindSummaryNumber("/simulated_s");
-    add(fmt::format("{:.4g} s", std::isfinite(simulated) ? simulated : run_.end()),
-        fmt::format("simulated, {} steps", run_.time().size()));
-    for (const CheckRecord& check : run_.checks()) {
-      if (check.name == "cone_use")
-        add(FormatFraction(check.worst), "of the fingertips' friction used, at most");
-    }
-    for (const nlohmann::json& one : run_.summary().value("torque_limited", nlohmann::json::array()))
-      add(fmt::format("{:.3g} s", one.value("time_s", 0.0)),
-          "torque limited: " + one.value("motor", std::string()));
-    // By class of bodies that should not touch.
-    const nlohmann::json clearance = run_.summary().value("clearance", nlohmann::json::object());
-    for (const auto& [pairs, nearest] : clearance.items()) {
-      std::string name = pairs;
-      std::replace(name.begin(), name.end(), '_', ' ');
-      add(fmt::format("{:.1f} mm", 1e3 * nearest.value("smallest_m", std::nan(""))),
-          fmt::format("{}: nearest are {}", name, nearest.value("bodies", "")));
-    }
-    const double factor = run_.FindSummaryNumber("/speed/real_time_factor");
-    if (std::isfinite(factor)) add(fmt::format("{:.2g} ×", factor), "real time");
-    return tiles;
-  }
 
   Json MakeVideo() {
     if (content_.video.empty()) return nullptr;
@@ -271,22 +171,6 @@ class Page {
     const std::vector<std::string> files = run_.log().ListFiles("inputs");
     if (std::ranges::find(files, name) == files.end()) return;
     list->push_back({{"title", title}, {"text", run_.log().ReadFile("inputs", name)}, {"open", open}});
-  }
-
-  /// Terms, texts, and whether a text is code.
-  [[nodiscard]] Json MakeInputs() const {
-    std::string overrides = Text("overrides");
-    while (overrides.ends_with('\n')) overrides.pop_back();
-    Json inputs = {{"Command", Text("command"), true},
-                   {"Overrides", overrides.empty() ? "none" : overrides, !overrides.empty()}};
-    constexpr std::array<std::array<const char*, 2>, 6> kTexts = {{{"Seed", "seed"},
-                                                                   {"Model", "robot"},
-                                                                   {"MJCF", "mjcf"},
-                                                                   {"dexcheck", "dexcheck_version"},
-                                                                   {"MuJoCo", "mujoco_version"},
-                                                                   {"Machine", "machine"}}};
-    for (const auto& [term, name] : kTexts) inputs.push_back({term, Text(name), false});
-    return inputs;
   }
 
   const RunData& run_;

@@ -40,24 +40,6 @@ std::string EmbedBytes(const std::string& id, std::string_view bytes) {
   return fmt::format("<script type=\"text/plain\" id=\"{}\">{}</script>\n", id, EncodeBase64(bytes));
 }
 
-std::string FormatShort(double value) {
-  if (!std::isfinite(value)) return "infinite";
-  if (value == 0.0) return "0";
-  const double size = std::abs(value);
-  return size >= 0.01 && size < 1e4 ? fmt::format("{:.3g}", value) : fmt::format("{:.1e}", value);
-}
-
-std::string FormatFraction(double fraction) {
-  if (!std::isfinite(fraction)) return "beyond any bound";
-  if (fraction == 0.0) return "0";
-  if (fraction > 10.0) return FormatShort(fraction) + " ×";
-  const double percent = 100.0 * fraction;
-  if (percent < 0.01) return "< 0.01 %";
-  // Two digits, but 99.7 % is not yet the whole bound, and 150 % is no power of ten.
-  if (percent >= 99.5) return fmt::format("{:.{}f} %", percent, percent < 100.0 ? 1 : 0);
-  return fmt::format("{:.2g} %", percent);
-}
-
 namespace {
 
 constexpr const char* kContentPolicy =

@@ -40,12 +40,6 @@ std::string EmbedJson(const std::string& id, const nlohmann::ordered_json& json)
 /// A script element that holds bytes as base64.
 std::string EmbedBytes(const std::string& id, std::string_view bytes);
 
-/// "2.6e-15", "0", "infinite".
-std::string FormatShort(double value);
-
-/// "4.5 %", "0", "over 1000 x": a check's value as a fraction of its bound.
-std::string FormatFraction(double fraction);
-
 /// A page that loads nothing.
 struct PageParts {
   std::string title;                 ///< Text.

@@ -244,6 +244,7 @@ VectorXd Resample(const VectorXd& time, const Eigen::Ref<const VectorXd>& values
 
 RunComparison CompareRuns(const std::vector<const RunData*>& runs, const RunComparisonOptions& options) {
   RunComparison comparison;
+  comparison.tolerance = options.tolerance;
   comparison.inputs = CompareInputs(runs);
   for (const RunData* run : runs) comparison.verdicts.push_back(DescribeVerdict(*run));
   comparison.results = CompareResults(runs);
@@ -265,7 +266,45 @@ RunComparison CompareRuns(const std::vector<const RunData*>& runs, const RunComp
   return comparison;
 }
 
-std::string DescribeComparison(const RunComparison& comparison, double tolerance) {
+nlohmann::ordered_json ToJson(const RunComparison& comparison, const std::vector<std::string>& names) {
+  using Json = nlohmann::ordered_json;
+  const SignalDifference* const first = comparison.FindFirst();
+  Json json = {{"runs", names},
+               {"verdicts", comparison.verdicts},
+               {"tolerance", comparison.tolerance},
+               {"same", comparison.IsSame()},
+               {"first", nullptr},
+               {"inputs", Json::object()},
+               {"results", Json::object()},
+               {"checks", Json::object()},
+               {"signals", Json::array()},
+               {"not_compared", comparison.not_compared}};
+  if (first != nullptr) json["first"] = {{"name", first->NameColumn()}, {"time_s", first->first_time}};
+  for (const InputDifference& input : comparison.inputs) json["inputs"][input.name] = input.values;
+  for (const auto& [key, numbers] :
+       {std::pair("results", &comparison.results), {"checks", &comparison.checks}}) {
+    for (const ComparedNumber& number : *numbers) {
+      Json values = Json::array();
+      for (const std::optional<double>& value : number.values)
+        values.push_back(value ? Json(*value) : Json());
+      json[key][number.name] = {{"unit", number.unit}, {"values", values}, {"fails", number.fails}};
+    }
+  }
+  for (const SignalDifference& signal : comparison.signals) {
+    json["signals"].push_back({{"name", signal.name},
+                               {"column", signal.column},
+                               {"run", names[signal.run]},
+                               {"unit", signal.unit},
+                               {"difference", signal.difference},
+                               {"size", signal.size},
+                               {"at_time_s", signal.at_time},
+                               {"differs", signal.differs}});
+  }
+  return json;
+}
+
+std::string DescribeComparison(const RunComparison& comparison) {
+  const double tolerance = comparison.tolerance;
   const size_t count = comparison.signals.size();
   if (count == 0) return "NOT COMPARED: no signal but time and checks is in all runs.";
   if (comparison.IsSame()) {

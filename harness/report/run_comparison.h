@@ -3,6 +3,7 @@
 // Recorded runs side by side: what differs in their inputs, their verdicts and checks, and their signals; and
 // the page of that.
 
+#include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
 #include <vector>
@@ -55,6 +56,7 @@ struct RunComparisonOptions {
 };
 
 struct RunComparison {
+  double tolerance = 0.0;  ///< That signals are judged by, relative to their sizes.
   std::vector<InputDifference> inputs;
   std::vector<std::string> verdicts;      ///< One for each run: "pass", "disagreement: wheel slip".
   std::vector<ComparedNumber> results;    ///< Tracking errors, duration, effort.
@@ -77,11 +79,14 @@ RunComparison CompareRuns(const std::vector<const RunData*>& runs, const RunComp
 VectorXd Resample(const VectorXd& time, const Eigen::Ref<const VectorXd>& values, const VectorXd& at);
 
 /// "SAME ...", or "DIFFERENT ..." with the signal that differs first: one line.
-std::string DescribeComparison(const RunComparison& comparison, double tolerance);
+std::string DescribeComparison(const RunComparison& comparison);
+
+/// What `compare --json` writes, and its page shows. @param names of the runs, such as their folders.
+nlohmann::ordered_json ToJson(const RunComparison& comparison, const std::vector<std::string>& names);
 
 /// A whole HTML document that loads nothing: verdict, inputs that differ, results and checks side by side,
 /// the signals that differ most, overlaid and subtracted.
-/// @param names what the runs are called, such as their folders.
+/// @param names of the runs, such as their folders.
 std::string MakeComparisonPage(const std::vector<const RunData*>& runs, const std::vector<std::string>& names,
                                const RunComparison& comparison);
 

@@ -26,7 +26,7 @@ JointSpan ChooseSpan(const Joint& joint, bool states_range, double home, double 
   constexpr double kMargin = 0.2, kSwing = 1.0 / 3.0;  // of the range, at either end; of the way
   const double most = joint.type == JointType::kPrismatic ? 0.05 : 0.3;
   const double width = states_range ? joint.upper - joint.lower : 2.0 * most;
-  // All turns are alike; those that are written stay between -pi and pi, as printed, too.
+  // All turns are the same; those that are written stay between -pi and pi, as printed, too.
   constexpr double kTurns = 1.4;
   if (!states_range) home = std::clamp(home, joint.lower + kTurns * most, joint.upper - kTurns * most);
   const double low = states_range ? joint.lower + kMargin * width : home - most;

@@ -50,7 +50,7 @@ VectorXd CalcJointInertias(const RobotModel& model);
 /// The force on the velocities that a motion asks for, N m or N. @param terms set to its state.
 VectorXd CalcForce(const ModelTerms& terms, const DesiredJoints& desired);
 
-/// Adds a slow sine and a fast one, which tell forces apart that a smooth way does not: a torque, an inertia
+/// Adds a slow sine and a fast one, which separate forces that a smooth way does not: a torque, an inertia
 /// and friction. @param amplitude of both. @param number that frequencies are chosen by, none the same.
 void AddSwings(int joint, double amplitude, size_t number, std::vector<JointOscillation>* swings);
 
@@ -63,7 +63,7 @@ std::string WriteSwings(const std::vector<JointOscillation>& swings, const char*
 /// "shoulder" = 0.1, "elbow" = 0: a number of each joint.
 std::string ListJoints(const RobotDescription& robot, const std::function<double(size_t joint)>& value);
 
-/// What one scenario has and another has not.
+/// The parts in which such scenarios differ.
 struct MotionText {
   const char* title;
   const char* description;

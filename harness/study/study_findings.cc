@@ -177,8 +177,7 @@ std::string MakeGainCard(const StudyInputs& inputs, const std::vector<TrialRow>&
       *std::ranges::find_if(rows, [&](const TrialRow& one) { return one.trial.number == number; });
   const Scenario scenario = MakeTrialScenario(inputs, row.trial);
   if (scenario.joint_task() == nullptr || scenario.controller.exists()) return "";
-  std::string card =
-      "# your gains:\n" + CommentLines(WriteJointControl(OpenScenario(inputs).Read(), 1.0));
+  std::string card = "# your gains:\n" + CommentLines(WriteJointControl(OpenScenario(inputs).Read(), 1.0));
   card += fmt::format("# best of {} points: {} {:.4g}{}\n", points.size(), Describe(study.objectives.front()),
                       ShowObjective(study, best), ShowUnit(study.objectives.front().expression));
   const auto& metrics = row.result.metrics;

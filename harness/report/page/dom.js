@@ -13,6 +13,19 @@ const ReadText = id => document.getElementById(id).textContent;
 const ReadJson = id => JSON.parse(ReadText(id));
 const ReadBytes = id => Uint8Array.from(atob(ReadText(id)), c => c.charCodeAt(0)).buffer;
 
+/** "2.6e-15", "0", "infinite": a number in three digits or two. */
+const ShowNumber = x => !Number.isFinite(x) ? 'infinite' : x === 0 ? '0' :
+  Math.abs(x) >= 0.01 && Math.abs(x) < 1e4 ? String(Number(x.toPrecision(3))) : x.toExponential(1);
+
+/** "4.5 %", "25 ×": a check's value as a fraction of its bound. 99.7 % is not yet the whole bound, and 150 % is no power of ten. */
+const ShowFraction = fraction => {
+  if (!Number.isFinite(fraction)) return 'beyond any bound';
+  if (fraction === 0 || fraction > 10) return ShowNumber(fraction) + (fraction > 10 ? ' ×' : '');
+  const percent = 100 * fraction;
+  if (percent < 0.01) return '< 0.01 %';
+  return (percent >= 99.5 ? percent.toFixed(percent < 100 ? 1 : 0) : Number(percent.toPrecision(2))) + ' %';
+};
+
 /** A value as its standard error lets it be told: null is any size. */
 const TellValue = (value, error, unit = '') => {
   const tail = unit ? ' ' + unit : '';

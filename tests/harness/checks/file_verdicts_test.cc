@@ -8,7 +8,7 @@
 #include <cstdlib>
 
 #include "harness/checks/file_comparison.h"
-#include "tests/harness/corrections/drawn_files.h"
+#include "tests/harness/corrections/drawn_faults.h"
 
 namespace dexcheck::testing::file_verdicts_test {
 namespace {

@@ -6,10 +6,12 @@
 
 #include <regex>
 
+#include "controller/common/errors.h"
 #include "harness/corrections/corrections.h"
 #include "harness/corrections/read_printed.h"
 #include "tests/common/files.h"
 #include "tests/common/paths.h"
+#include "tests/common/throws.h"
 
 namespace dexcheck::testing::correction_cases_test {
 namespace {
@@ -237,6 +239,13 @@ TEST_F(Rows, InDegreesOrMillimetresAreNamed) {
   const auto ids = Find([](int i, PrintedRobot* robot) { robot->link(i).origin.r *= 180.0 / kPi; });
   EXPECT_THAT(ids, ElementsAre("rotation.degrees"));
   EXPECT_EQ(Find([](int i, PrintedRobot* robot) { robot->link(i).origin.r[0] *= -1.0; }).size(), 1U);
+}
+
+TEST(MjcfInMemory, IsRefusedForTheEnginesReason) {
+  const char* const text =
+      "<mujoco><worldbody><body name='b'><joint name='q'/><inertial pos='0 0 0' mass='1' diaginertia='1 1 "
+      "9'/></body></worldbody></mujoco>";
+  EXPECT_TRUE(Throws<InputError>([&] { return Read("memory.xml", text).format(); }, "inertia must satisfy"));
 }
 
 }  // namespace

@@ -14,7 +14,7 @@
 #include <fstream>
 #include <map>
 
-#include "tests/harness/corrections/drawn_files.h"
+#include "tests/harness/corrections/drawn_faults.h"
 
 namespace dexcheck::testing::corrections_test {
 namespace {

@@ -122,108 +122,87 @@ TEST(Attribute, BlamesConstantsBeforeAllElse) {
   EXPECT_EQ(result.attributions.size(), 2U);
 }
 
-TEST(Attribute, ConstantsAloneAreEnough) {
-  const AttributionResult result = FakeRun().FailConstant("link_mass").Explain();
-  EXPECT_EQ(result.cause, Cause::kModel);
-  EXPECT_TRUE(result.attributions.empty());
+struct FailedAt {
+  const char* check;
+  double time;
+};
+/// Checks that fail, the cause of the run, how its evidence begins, and the causes of single checks.
+struct Attributed {
+  std::vector<FailedAt> failed;
+  Cause cause;
+  const char* evidence = "";
+  std::vector<std::pair<const char*, const char*>> causes = {};
+};
+
+class RunCause : public ::testing::TestWithParam<Attributed> {};
+
+TEST_P(RunCause, FollowsFromFailedChecks) {
+  FakeRun run;
+  for (const FailedAt& one : GetParam().failed) run.Fail(one.check, one.time);
+  const AttributionResult result = run.Explain();
+  EXPECT_EQ(result.cause, GetParam().cause);
+  EXPECT_THAT(result.evidence, StartsWith(GetParam().evidence));
+  for (const auto& [check, cause] : GetParam().causes) EXPECT_EQ(FindCause(result, check), cause);
 }
 
-TEST(Attribute, TellsTheModelCheckThatFailedFirst) {
-  const AttributionResult result =
-      FakeRun().Fail("M_bar", 0.5).Fail("gravity", 0.25).Fail("traction_use", 0.0).Explain();
-  EXPECT_EQ(result.cause, Cause::kModel);
-  EXPECT_EQ(result.evidence, "gravity 2 (bound 1), first above it at t = 0.25 s");
-  EXPECT_EQ(FindCause(result, "traction_use"), "model");
-}
-
-TEST(Attribute, WhereTheModelHoldsTheObjectsBalanceIsAForceThatNobodyHas) {
-  const AttributionResult result =
-      FakeRun().Fail("cone_use", 0.1).Fail("inverse_dynamics_object", 0.9).Explain();
-  EXPECT_EQ(result.cause, Cause::kUnmodelledForce);
-  EXPECT_THAT(result.evidence, StartsWith("inverse_dynamics_object"));
-}
-
-TEST(Attribute, SlidingOutweighsWhatGaveEarlier) {
-  const AttributionResult result = FakeRun()
-                                       .Fail("wheel_slip", 0.1)
-                                       .Fail("penetration", 0.2)
-                                       .Fail("base_tilt", 0.1)
-                                       .Fail("traction_use", 0.3)
-                                       .Explain();
-  EXPECT_EQ(result.cause, Cause::kWheelSlip);
-  EXPECT_THAT(result.evidence, StartsWith("traction_use"));
-  EXPECT_EQ(FindCause(result, "wheel_slip"), "wheel slip");
-  EXPECT_EQ(FindCause(result, "penetration"), "contact softness");
-  EXPECT_EQ(FindCause(result, "base_tilt"), "wheel slip");
-}
-
-TEST(Attribute, OfSeveralThatSlideTheFirstCounts) {
-  for (const bool wheels_first : {true, false}) {
-    const AttributionResult result = FakeRun()
-                                         .Fail("cone_use", wheels_first ? 0.2 : 0.1)
-                                         .Fail("traction_use", wheels_first ? 0.1 : 0.2)
-                                         .Explain();
-    EXPECT_EQ(result.cause, wheels_first ? Cause::kWheelSlip : Cause::kFingertipSlip);
-    EXPECT_EQ(FindCause(result, "cone_use"), "fingertip slip");
-    EXPECT_EQ(FindCause(result, "traction_use"), "wheel slip");
-  }
-  // At one time: the motor, which can make anything slide.
-  const AttributionResult result =
-      FakeRun().Fail("cone_use", 0.1).Fail("actuator_effort", 0.1).Fail("traction_use", 0.1).Explain();
-  EXPECT_EQ(result.cause, Cause::kActuatorLimit);
-}
-
-TEST(Attribute, SlipWithoutSlidingIsSoftness) {
-  for (const char* name :
-       {"fingertip_slip", "fingertip_slip_rate", "wheel_slip", "wheel_slip_rate", "penetration", "kappa"}) {
-    const AttributionResult result = FakeRun().Fail(name, 0.1).Fail("reduced_acceleration", 0.05).Explain();
-    EXPECT_EQ(result.cause, Cause::kContactSoftness) << name;
-    EXPECT_THAT(result.evidence, StartsWith(name));
-    EXPECT_EQ(FindCause(result, "reduced_acceleration"), "contact softness");
-  }
-}
-
-TEST(Attribute, WithoutABrokenAssumptionContactsGave) {
-  const AttributionResult result =
-      FakeRun().Fail("reduced_acceleration", 0.1).Fail("contact_force", 0.2).Explain();
-  EXPECT_EQ(result.cause, Cause::kContactSoftness);
-  EXPECT_THAT(result.evidence, StartsWith("reduced_acceleration"));
-  EXPECT_EQ(FindCause(result, "contact_force"), "contact softness");
-}
-
-TEST(Attribute, NeverSaysThatNoAssumptionBrokeWhereOneDid) {
-  const AttributionResult result = FakeRun().Fail("idle_joints", 0.1).Explain();
-  EXPECT_EQ(result.cause, Cause::kUnexplained);
-  EXPECT_THAT(result.evidence, StartsWith("idle_joints"));
-}
-
-TEST(Attribute, AForceOnTheRobotAndWhatSlidesAreToldByTime) {
-  for (const bool force_first : {true, false}) {
-    const AttributionResult result = FakeRun()
-                                         .Fail("inverse_dynamics_robot", force_first ? 0.1 : 0.2)
-                                         .Fail("traction_use", force_first ? 0.2 : 0.1)
-                                         .Fail("base_tilt", 0.05)
-                                         .Explain();
-    EXPECT_EQ(result.cause, force_first ? Cause::kUnmodelledForce : Cause::kWheelSlip);
-  }
-  // What slides in the same step tells; what pushes at a stop is the stop.
-  EXPECT_EQ(FakeRun().Fail("inverse_dynamics_robot", 0.1).Fail("cone_use", 0.1).Explain().cause,
-            Cause::kFingertipSlip);
-  // The balance has the stop's own push: what it lacks is another, which may push joints into their stops.
-  EXPECT_EQ(FakeRun().Fail("inverse_dynamics_robot", 0.1).Fail("joint_limit", 0.1).Explain().cause,
-            Cause::kUnmodelledForce);
-  EXPECT_EQ(FakeRun().Fail("inverse_dynamics_robot", 0.2).Fail("joint_limit", 0.1).Explain().cause,
-            Cause::kJointLimit);
-}
-
-TEST(Attribute, WheelsThatDoNotRollAsTheyShouldExplainForces) {
-  const AttributionResult result =
-      FakeRun().Fail("inverse_dynamics_robot", 0.1).Fail("rolling", 0.3).Explain();
-  EXPECT_EQ(result.cause, Cause::kWheelGeometry);
-  EXPECT_THAT(result.evidence, StartsWith("rolling"));
-  // Unless they slide.
-  EXPECT_EQ(FakeRun().Fail("traction_use", 0.1).Fail("rolling", 0.2).Explain().cause, Cause::kWheelSlip);
-}
+INSTANTIATE_TEST_SUITE_P(
+    Checks, RunCause,
+    ::testing::Values(
+        Attributed{{{"M_bar", 0.5}, {"gravity", 0.25}, {"traction_use", 0.0}},
+                   Cause::kModel,
+                   "gravity 2 (bound 1), first above it at t = 0.25 s",
+                   {{"traction_use", "model"}}},
+        // Where the model holds, the object's balance lacks a force.
+        Attributed{{{"cone_use", 0.1}, {"inverse_dynamics_object", 0.9}},
+                   Cause::kUnmodelledForce,
+                   "inverse_dynamics_object"},
+        // Sliding outweighs what gave earlier.
+        Attributed{
+            {{"wheel_slip", 0.1}, {"penetration", 0.2}, {"base_tilt", 0.1}, {"traction_use", 0.3}},
+            Cause::kWheelSlip,
+            "traction_use",
+            {{"wheel_slip", "wheel slip"}, {"penetration", "contact softness"}, {"base_tilt", "wheel slip"}}},
+        // Of several that slide the first counts; at one time the motor, which can make anything slide.
+        Attributed{{{"cone_use", 0.2}, {"traction_use", 0.1}},
+                   Cause::kWheelSlip,
+                   "traction_use",
+                   {{"cone_use", "fingertip slip"}}},
+        Attributed{{{"cone_use", 0.1}, {"traction_use", 0.2}},
+                   Cause::kFingertipSlip,
+                   "cone_use",
+                   {{"traction_use", "wheel slip"}}},
+        Attributed{{{"cone_use", 0.1}, {"actuator_effort", 0.1}, {"traction_use", 0.1}},
+                   Cause::kActuatorLimit},
+        // Slip without sliding, and predictions without a broken assumption, are softness.
+        Attributed{{{"fingertip_slip", 0.1}, {"reduced_acceleration", 0.05}},
+                   Cause::kContactSoftness,
+                   "fingertip_slip",
+                   {{"reduced_acceleration", "contact softness"}}},
+        Attributed{{{"wheel_slip_rate", 0.1}, {"reduced_acceleration", 0.05}},
+                   Cause::kContactSoftness,
+                   "wheel_slip_rate"},
+        Attributed{{{"kappa", 0.1}, {"reduced_acceleration", 0.05}}, Cause::kContactSoftness, "kappa"},
+        Attributed{{{"reduced_acceleration", 0.1}, {"contact_force", 0.2}},
+                   Cause::kContactSoftness,
+                   "reduced_acceleration",
+                   {{"contact_force", "contact softness"}}},
+        Attributed{{{"idle_joints", 0.1}}, Cause::kUnexplained, "idle_joints"},
+        // A force on the robot and what slides are told by time; what slides in the same step tells.
+        Attributed{{{"inverse_dynamics_robot", 0.1}, {"traction_use", 0.2}, {"base_tilt", 0.05}},
+                   Cause::kUnmodelledForce},
+        Attributed{{{"inverse_dynamics_robot", 0.2}, {"traction_use", 0.1}, {"base_tilt", 0.05}},
+                   Cause::kWheelSlip},
+        Attributed{{{"inverse_dynamics_robot", 0.1}, {"cone_use", 0.1}}, Cause::kFingertipSlip},
+        // The balance has the push of a joint's limit: what it lacks may push joints into their limits.
+        Attributed{{{"inverse_dynamics_robot", 0.1}, {"joint_limit", 0.1}}, Cause::kUnmodelledForce},
+        Attributed{{{"inverse_dynamics_robot", 0.2}, {"joint_limit", 0.1}}, Cause::kJointLimit},
+        // Wheels that roll otherwise explain forces, unless they slide.
+        Attributed{{{"inverse_dynamics_robot", 0.1}, {"rolling", 0.3}}, Cause::kWheelGeometry, "rolling"},
+        Attributed{{{"traction_use", 0.1}, {"rolling", 0.2}}, Cause::kWheelSlip},
+        Attributed{{{"solver", 0.1}, {"contact_force", 0.1}},
+                   Cause::kSolver,
+                   "solver",
+                   {{"contact_force", "solver"}}}));
 
 /// A fault of the balances.
 Explanation MakeForce(const std::string& fault, double from) {
@@ -310,12 +289,6 @@ TEST(Attribute, AnExpectationThatFailsHasAMeasuredCause) {
   EXPECT_EQ(result.cause, Cause::kDeclared);
   // Not known, for a law that is not followed.
   EXPECT_EQ(run.Explain().cause, Cause::kControlLaw);
-}
-
-TEST(Attribute, TheSolverIsBlamedForWhatItLeftOver) {
-  const AttributionResult result = FakeRun().Fail("solver", 0.1).Fail("contact_force", 0.1).Explain();
-  EXPECT_EQ(result.cause, Cause::kSolver);
-  EXPECT_EQ(FindCause(result, "contact_force"), "solver");
 }
 
 TEST(Attribute, EvidenceHasUnitPlaceAndTime) {

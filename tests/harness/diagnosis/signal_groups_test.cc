@@ -71,8 +71,11 @@ TEST(SignalCauses, SilentMotorIsOneOfAllThatRound) {
   for (const bool is_small : {true, false}) {
     Motors motors =
         MakeMotors([](const ArrayXd& u) { return Round(u, 0.01); }, [](const ArrayXd& u) { return u; });
-    if (is_small) motors.front().expected *= 1e-3;
-    motors.front().got.setZero();
+    // Five of the eight are silent where the steps are wide: more than those that show them.
+    for (size_t i = 0; i < (is_small ? 5 : 1); ++i) {
+      if (is_small) motors[i].expected *= 1e-3;
+      motors[i].got.setZero();
+    }
     const Causes causes = ExplainSignals(motors, CauseChannel::kActuation);
     SCOPED_TRACE(TextOf(causes));
     ASSERT_EQ(causes.size(), is_small ? 1u : 2u);

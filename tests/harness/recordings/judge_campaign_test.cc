@@ -68,9 +68,8 @@ TEST(JudgeCampaign, NamesDrawnFaults) {
       EXPECT_NE(one.rival, one.faults.front().place + ": " + one.faults.front().fault);
     ++counts[static_cast<int>(score)];
     constexpr const char* kNames[] = {"named", "class", "missed", "WRONG"};
-    if (score != Score::kNamed || asked != nullptr)
-      std::cout << i << " " << kNames[static_cast<int>(score)] << ":";
     if (score != Score::kNamed || asked != nullptr) {
+      std::cout << i << " " << kNames[static_cast<int>(score)] << ":";
       for (const RecordedFault& fault : faults)
         std::cout << " " << fault.place << ": " << fault.fault << " " << fault.value << ";";
       std::cout << Tell(judgement) << "\n";

@@ -83,41 +83,32 @@ RecordingJudgement JudgeWith(const RecordedTable& table, const std::vector<Chann
   return JudgeRecordings(Panda(), &recordings, options);
 }
 
-TEST(JudgeForces, AMeasuredWrenchIsNoCause) {
-  constexpr int kLink = 6;
-  const auto calc_force = [](double t, int k) { return k < 3 ? 10.0 * std::sin((k + 1.0) * t + k) : 0.0; };
-  const RecordedFault push = {.act = [&](double t, const mjModel& m, mjData* data) {
-    for (int k = 0; k < 3; ++k) data->xfrc_applied[6 * m.jnt_bodyid[kLink] + k] = calc_force(t, k);
-  }};
-  RecordedTable table = Record({push});
-  EXPECT_FALSE(Judge(table).Agrees());
-  const auto channels = AddColumns(RecordedQuantity::kWrench, 0, 6, calc_force, &table);
-  const RecordingJudgement judgement = JudgeWith(table, channels, {kLink}, {});
-  EXPECT_TRUE(judgement.Agrees()) << Tell(judgement);
-}
-
-TEST(JudgeForces, OnTwoLinksWithoutMomentsAreNoCause) {
-  const auto calc_force = [](int link, double t, int k) { return 10.0 * std::sin((k + 1.0) * t + k + link); };
-  const std::vector<int> links = {3, 6};
-  const RecordedFault push = {.act = [&](double t, const mjModel& m, mjData* data) {
-    for (const int link : links)
-      for (int k = 0; k < 3; ++k) data->xfrc_applied[6 * m.jnt_bodyid[link] + k] = calc_force(link, t, k);
-  }};
-  RecordedTable table = Record({push});
-  std::vector<Channel> channels;
-  for (int i = 0; i < 2; ++i) {
-    const auto calc = [&, i](double t, int k) { return calc_force(links[static_cast<size_t>(i)], t, k); };
-    const auto added = AddColumns(RecordedQuantity::kWrench, 6 * i, 3, calc, &table);
-    channels.insert(channels.end(), added.begin(), added.end());
+TEST(JudgeForces, MeasuredForcesAreNoCause) {
+  // Of one link with its moment, and of two without.
+  for (const std::vector<int>& links : {std::vector<int>{6}, {3, 6}}) {
+    const int width = links.size() == 1 ? 6 : 3;
+    const auto calc_force = [](int link, double t, int k) {
+      return k < 3 ? 10.0 * std::sin((k + 1.0) * t + k + link) : 0.0;
+    };
+    const RecordedFault push = {.act = [&](double t, const mjModel& m, mjData* data) {
+      for (const int link : links)
+        for (int k = 0; k < 3; ++k) data->xfrc_applied[6 * m.jnt_bodyid[link] + k] = calc_force(link, t, k);
+    }};
+    RecordedTable table = Record({push});
+    std::vector<Channel> channels;
+    for (size_t i = 0; i < links.size(); ++i) {
+      const auto calc = [&](double t, int k) { return calc_force(links[i], t, k); };
+      const auto added = AddColumns(RecordedQuantity::kWrench, 6 * static_cast<int>(i), width, calc, &table);
+      channels.insert(channels.end(), added.begin(), added.end());
+    }
+    for (size_t count = 0; count <= links.size(); ++count) {
+      const auto known = static_cast<std::ptrdiff_t>(count);
+      const RecordingJudgement judgement =
+          JudgeWith(table, {channels.begin(), channels.begin() + width * known},
+                    {links.begin(), links.begin() + known}, {.tries_positions = false});
+      EXPECT_EQ(judgement.Agrees(), count == links.size()) << count << Tell(judgement);
+    }
   }
-  const auto judge = [&](int count) {
-    return JudgeWith(table, {channels.begin(), channels.begin() + 3 * count},
-                     {links.begin(), links.begin() + count}, {.tries_positions = false});
-  };
-  EXPECT_FALSE(judge(0).Agrees());
-  EXPECT_FALSE(judge(1).Agrees()) << "one of them alone";
-  const RecordingJudgement judgement = judge(2);
-  EXPECT_TRUE(judgement.Agrees()) << Tell(judgement);
 }
 
 TEST(JudgeForces, ARecordedMotionOfTheBaseIsNoCause) {

@@ -5,30 +5,21 @@
 #include <gtest/gtest.h>
 
 #include "controller/common/errors.h"
-#include "harness/descriptions/read_description.h"
 #include "harness/engine/clearance.h"
-#include "harness/recordings/judge_recordings.h"
 #include "tests/common/files.h"
-#include "tests/common/paths.h"
 #include "tests/common/throws.h"
-#include "tests/harness/recordings/recorded_robot.h"
+#include "tests/harness/recordings/judge_panda.h"
 
 namespace dexcheck::testing::motion_design_test {
 namespace {
 
-constexpr const char* kMjcf = "mjcf/panda.xml";
-
-const RobotDescription& Panda() {
+const RobotDescription& PandaFile() {
   static const RobotDescription robot = ReadDescription(SourcePath("/controller/parameters/panda.toml"));
   return robot;
 }
-const RobotModel& PandaModel() {
-  static const RobotModel model(Panda().spec);
-  return model;
-}
 SelfContact MakeContact(const MotionLimits& limits) {
   std::vector<std::string> names;
-  for (const Joint& joint : Panda().spec.joints) names.push_back(joint.name);
+  for (const Joint& joint : PandaFile().spec.joints) names.push_back(joint.name);
   return SelfContact(LoadMjcf(std::filesystem::path(SourcePath(std::string("/") + kMjcf))), kMjcf, names,
                      0.5 * (limits.lower + limits.upper));
 }
@@ -50,7 +41,7 @@ VectorXd Follow(const SeriesMotion& motion, double time, int derivative) {
 }
 
 TEST(MotionDesign, StaysWithinLimitsAndRestsAtItsEnds) {
-  MotionLimits limits = ReadMotionLimits(Panda(), {});
+  MotionLimits limits = ReadMotionLimits(PandaFile(), {});
   limits.velocity[3] = 0.3;
   limits.acceleration[5] = 0.4;
   limits.torque = VectorXd::Constant(7, 87.0);
@@ -58,8 +49,8 @@ TEST(MotionDesign, StaysWithinLimitsAndRestsAtItsEnds) {
   SelfContact contact = MakeContact(limits);
   MotionDesignOptions options = Quick();
   options.calc_overlap = [&](const VectorXd& q) { return contact.CalcDepth(q); };
-  const MotionDesign design = DesignMotion(PandaModel(), limits, options);
-  TorqueRegressor regressor(PandaModel());
+  const MotionDesign design = DesignMotion(Panda(), limits, options);
+  TorqueRegressor regressor(Panda());
   VectorXd torque(7), largest_rate = VectorXd::Zero(7);
   for (double time = 0.0; time < design.motion.duration(); time += 0.01) {
     const VectorXd q = Follow(design.motion, time, 0), qd = Follow(design.motion, time, 1);
@@ -92,9 +83,9 @@ TEST(MotionDesign, StaysWithinLimitsAndRestsAtItsEnds) {
 }
 
 TEST(MotionDesign, SearchingTellsMoreThanDrawing) {
-  const MotionLimits limits = ReadMotionLimits(Panda(), {});
-  const MotionDesign drawn = DesignMotion(PandaModel(), limits, Quick(1));
-  const MotionDesign found = DesignMotion(PandaModel(), limits, Quick(400));
+  const MotionLimits limits = ReadMotionLimits(PandaFile(), {});
+  const MotionDesign drawn = DesignMotion(Panda(), limits, Quick(1));
+  const MotionDesign found = DesignMotion(Panda(), limits, Quick(400));
   EXPECT_GT(found.known_after, drawn.known_after);
   EXPECT_LT(ErrorOf(found, "mass"), ErrorOf(drawn, "mass"));
   EXPECT_LT(ErrorOf(found, "torque gain"), ErrorOf(drawn, "torque gain"));
@@ -103,8 +94,8 @@ TEST(MotionDesign, SearchingTellsMoreThanDrawing) {
 /// Standard error of a cause's size as the judge says it; infinite where it is not named.
 double JudgeError(std::vector<RecordedTable> tables, const std::string& fault, const std::string& place) {
   std::vector<Recording> recordings;
-  for (const RecordedTable& table : tables) recordings.push_back(ToRecording(PandaModel(), table));
-  const RecordingJudgement judgement = JudgeRecordings(PandaModel(), &recordings, {});
+  for (const RecordedTable& table : tables) recordings.push_back(ToRecording(Panda(), table));
+  const RecordingJudgement judgement = JudgeRecordings(Panda(), &recordings, {});
   for (const Explanation& one : judgement.causes)
     if (one.outcome == CauseOutcome::kNamed && one.faults[0].fault == fault && one.faults[0].place == place)
       return one.faults[0].error;
@@ -134,12 +125,12 @@ TEST(MotionDesign, AddsWhatARecordingDoesNotTell) {
   EXPECT_TRUE(std::isinf(JudgeError({first}, armature.fault, armature.place)));
 
   std::vector<Recording> recordings;
-  recordings.push_back(ToRecording(PandaModel(), first));
-  const RecordingSet recorded(PandaModel(), &recordings, {}, {});
+  recordings.push_back(ToRecording(Panda(), first));
+  const RecordingSet recorded(Panda(), &recordings, {}, {});
   MotionDesignOptions options = Quick(300);
   options.recorded = &recorded;
-  const MotionLimits limits = ReadMotionLimits(Panda(), {});
-  const MotionDesign design = DesignMotion(PandaModel(), limits, options);
+  const MotionLimits limits = ReadMotionLimits(PandaFile(), {});
+  const MotionDesign design = DesignMotion(Panda(), limits, options);
   EXPECT_GT(design.known_after, design.known_before);
 
   recording.motion = [&](double t, VectorXd* q, VectorXd* qd, VectorXd* qdd) {
@@ -150,9 +141,9 @@ TEST(MotionDesign, AddsWhatARecordingDoesNotTell) {
 }
 
 TEST(MotionDesign, CannotBeWithinImpossibleLimits) {
-  MotionLimits limits = ReadMotionLimits(Panda(), {});
+  MotionLimits limits = ReadMotionLimits(PandaFile(), {});
   limits.torque = VectorXd::Constant(7, 1e-6);
-  EXPECT_TRUE(Throws<InputError>([&] { return DesignMotion(PandaModel(), limits, Quick(50)); },
+  EXPECT_TRUE(Throws<InputError>([&] { return DesignMotion(Panda(), limits, Quick(50)); },
                                  "no motion within the limits was found"));
 }
 
@@ -160,18 +151,18 @@ TEST(MotionLimits, AreReadByJointOrForAll) {
   const TempFolder folder;
   const std::filesystem::path file = folder.path() / "limits.toml";
   WriteText(file, "[all]\nvelocity = 0.5\n[joints.panda_joint4]\nvelocity = 0.7\nlower = -2\nupper = -1\n");
-  const MotionLimits limits = ReadMotionLimits(Panda(), file);
+  const MotionLimits limits = ReadMotionLimits(PandaFile(), file);
   EXPECT_EQ(limits.velocity[0], 0.5);
   EXPECT_EQ(limits.velocity[3], 0.7);
   EXPECT_EQ(limits.upper[3], -1.0);
-  EXPECT_LT(limits.upper[0], Panda().spec.joints[0].upper);
+  EXPECT_LT(limits.upper[0], PandaFile().spec.joints[0].upper);
   for (const auto& [text, problem] : std::initializer_list<std::pair<const char*, const char*>>{
            {"[joints.elbow]\nvelocity = 1\n", "joints.elbow: is no joint of"},
            {"[all]\nvelocity = 0\n", "all.velocity: must be"},
            {"[all]\nlower = 1\nupper = 1\n", "lower must be less than upper"},
            {"[all]\nspeed = 1\n", "all.speed: unknown key"}}) {
     WriteText(file, text);
-    EXPECT_TRUE(Throws<InputError>([&] { return ReadMotionLimits(Panda(), file); }, problem)) << text;
+    EXPECT_TRUE(Throws<InputError>([&] { return ReadMotionLimits(PandaFile(), file); }, problem)) << text;
   }
 }
 

@@ -135,187 +135,175 @@ RecordedTable RecordRobot(const std::string& mjcf, const std::vector<RecordedFau
 
 namespace {
 
-using Kind = std::function<RecordedFault(const mjModel&, std::mt19937*)>;
-
-int DrawJoint(const mjModel& m, std::mt19937* random) {
-  return std::uniform_int_distribution<>(0, m.nv - 1)(*random);
+int DrawIndex(std::mt19937* random, int from, int to) {
+  return std::uniform_int_distribution<>(from, to)(*random);
 }
 
-/// Of torques that the joint usually needs.
-double UsualTorque(const mjModel& m, int joint) {
-  // Twelve times less at the wrist.
-  return joint < m.nv - 3 ? 10.0 : 1.0;
+/// Of torques that the joint usually needs: ten times less at the wrist.
+double UsualTorque(const mjModel& m, int joint) { return joint < m.nv - 3 ? 10.0 : 1.0; }
+
+/// A fault of one column of a joint: "tau." or "q.".
+RecordedFault ChangeColumn(const mjModel& m, const std::string& fault, const std::string& column, int joint,
+                           double value, double (*change)(double number, double value)) {
+  return {.fault = fault,
+          .place = "joint " + JointName(m, joint),
+          .value = value,
+          .record = [=, name = column + JointName(m, joint)](RecordedTable* table) {
+            for (double& number : table->Get(name)) number = change(number, value);
+          }};
+}
+double Add(double number, double value) { return number + value; }
+double Multiply(double number, double value) { return number * value; }
+
+/// More of a constant of a joint.
+template <mjtNum* mjModel::*constant>
+RecordedFault ChangeJoint(const mjModel& m, const char* fault, double largest, std::mt19937* random) {
+  const int joint = DrawIndex(random, 0, m.nv - 1);
+  const double value = UsualTorque(m, joint) * Draw(random, 0.05, largest);
+  return {fault, "joint " + JointName(m, joint), value, [=](mjModel* r) { (r->*constant)[joint] = value; }};
 }
 
-const std::vector<Kind>& ListKinds() {
-  static const std::vector<Kind> kKinds = {
-      [](const mjModel& m, std::mt19937* random) {
-        const int joint = DrawJoint(m, random);
-        const double value = UsualTorque(m, joint) * Draw(random, 0.05, 0.3);
-        return RecordedFault{"dry friction", "joint " + JointName(m, joint), value,
-                             [=](mjModel* r) { r->dof_frictionloss[joint] = value; }};
-      },
-      [](const mjModel& m, std::mt19937* random) {
-        const int joint = DrawJoint(m, random);
-        const double value = UsualTorque(m, joint) * Draw(random, 0.05, 0.5);
-        return RecordedFault{"viscous friction", "joint " + JointName(m, joint), value,
-                             [=](mjModel* r) { r->dof_damping[joint] = value; }};
-      },
-      [](const mjModel& m, std::mt19937* random) {
-        const int joint = DrawJoint(m, random);
-        const double value = UsualTorque(m, joint) * Draw(random, 0.05, 0.2);
-        return RecordedFault{"armature", "joint " + JointName(m, joint), value,
-                             [=](mjModel* r) { r->dof_armature[joint] = value; }};
-      },
-      [](const mjModel& m, std::mt19937* random) {
-        const int joint = DrawJoint(m, random);
-        const double value = DrawSign(random) * UsualTorque(m, joint) * Draw(random, 0.05, 0.3);
-        return RecordedFault{
-            "torque offset", "joint " + JointName(m, joint), value, {}, {}, [=](RecordedTable* table) {
-              for (double& tau : table->Get("tau." + JointName(m, joint))) tau += value;
-            }};
-      },
-      [](const mjModel& m, std::mt19937* random) {
-        const int joint = DrawJoint(m, random);
-        const double value = Draw(random, 0.7, 0.95);
-        return RecordedFault{
-            "torque gain", "joint " + JointName(m, joint), value, {}, {}, [=](RecordedTable* table) {
-              for (double& tau : table->Get("tau." + JointName(m, joint))) tau *= value;
-            }};
-      },
-      [](const mjModel& m, std::mt19937* random) {
-        const int joint = DrawJoint(m, random);
-        return RecordedFault{
-            "torque gain", "joint " + JointName(m, joint), -1.0, {}, {}, [=](RecordedTable* table) {
-              for (double& tau : table->Get("tau." + JointName(m, joint))) tau *= -1.0;
-            }};
-      },
-      [](const mjModel& m, std::mt19937* random) {
-        const int joint = std::uniform_int_distribution<>(0, m.nv - 2)(*random);
-        const int other = std::uniform_int_distribution<>(joint + 1, m.nv - 1)(*random);
-        return RecordedFault{"torque exchanged with that of " + JointName(m, other),
-                             "joint " + JointName(m, joint),
-                             kUnknown,
-                             {},
-                             {},
-                             [=](RecordedTable* table) {
-                               std::swap(table->Get("tau." + JointName(m, joint)),
-                                         table->Get("tau." + JointName(m, other)));
-                             }};
-      },
-      [](const mjModel&, std::mt19937* random) {
-        const int rows = std::uniform_int_distribution<>(4, 15)(*random);
-        return RecordedFault{
-            "delay of the torques", "all joints", 0.002 * rows, {}, {}, [=](RecordedTable* table) {
-              for (size_t i = 0; i < table->names.size(); ++i)
-                if (table->names[i].starts_with("tau.")) {
-                  std::vector<double>& tau = table->columns[i];
-                  for (size_t row = tau.size(); row-- > 0;)
-                    tau[row] = tau[row >= static_cast<size_t>(rows) ? row - static_cast<size_t>(rows) : 0];
-                }
-            }};
-      },
-      [](const mjModel& m, std::mt19937* random) {
-        const int joint = std::uniform_int_distribution<>(1, m.nv - 1)(*random);
-        const double value = DrawSign(random) * Draw(random, 0.02, 0.1);
-        return RecordedFault{
-            "position offset", "joint " + JointName(m, joint), value, {}, {}, [=](RecordedTable* table) {
-              for (double& q : table->Get("q." + JointName(m, joint))) q += value;
-            }};
-      },
-      [](const mjModel& m, std::mt19937* random) {
-        const int joint = std::uniform_int_distribution<>(1, m.nv - 2)(*random);
-        return RecordedFault{
-            "position gain", "joint " + JointName(m, joint), -1.0, {}, {}, [=](RecordedTable* table) {
-              for (const std::string& name : table->names)
-                if (name.ends_with("." + JointName(m, joint)) && !name.starts_with("tau"))
-                  for (double& q : table->Get(name)) q *= -1.0;
-            }};
-      },
-      [](const mjModel& m, std::mt19937* random) {
-        const int joint = std::uniform_int_distribution<>(1, m.nv - 2)(*random);
-        const int body = m.jnt_bodyid[joint];
-        const double factor = Draw(random, 1.1, 1.5);
-        return RecordedFault{"mass", "link " + LinkName(m, joint), factor * m.body_mass[body],
-                             [=](mjModel* r) {
-                               r->body_mass[body] *= factor;
-                               for (int k = 0; k < 3; ++k) r->body_inertia[3 * body + k] *= factor;
-                             }};
-      },
-      [](const mjModel& m, std::mt19937* random) {
-        const int joint = std::uniform_int_distribution<>(1, m.nv - 1)(*random);
-        const int body = m.jnt_bodyid[joint], axis = std::uniform_int_distribution<>(0, 2)(*random);
-        const double value = Draw(random, 0.02, 0.06);
-        return RecordedFault{"centre of mass", "link " + LinkName(m, joint), value,
-                             [=](mjModel* r) { r->body_ipos[3 * body + axis] += value; }};
-      },
-      [](const mjModel& m, std::mt19937* random) {
-        const int joint = m.nv - 1;
-        const int body = m.jnt_bodyid[joint];
-        const double mass = Draw(random, 0.3, 3.0);
-        const double place[3] = {Draw(random, -0.05, 0.05), Draw(random, -0.05, 0.05),
-                                 Draw(random, 0.1, 0.2)};
-        const double x = place[0], y = place[1], z = place[2];
-        return RecordedFault{
-            "payload", "link " + LinkName(m, joint), mass, [=](mjModel* r) {
-              // The link and a point mass, as one body: inertia of both about the common centre.
-              double* c = r->body_ipos + 3 * body;
-              const double m0 = r->body_mass[body], all = m0 + mass;
-              const Vector3d c0(c[0], c[1], c[2]), p(x, y, z), centre = (m0 * c0 + mass * p) / all;
-              Eigen::Quaterniond R(r->body_iquat[4 * body], r->body_iquat[4 * body + 1],
-                                   r->body_iquat[4 * body + 2], r->body_iquat[4 * body + 3]);
-              Matrix3d I = R.toRotationMatrix() *
-                           Vector3d(r->body_inertia[3 * body], r->body_inertia[3 * body + 1],
-                                    r->body_inertia[3 * body + 2])
-                               .asDiagonal() *
-                           R.toRotationMatrix().transpose();
-              const auto add = [&](double weight, const Vector3d& d) {
-                I += weight * (d.squaredNorm() * Matrix3d::Identity() - d * d.transpose());
-              };
-              add(m0, c0 - centre);
-              add(mass, p - centre);
-              const Eigen::SelfAdjointEigenSolver<Matrix3d> eigen(I);
-              Matrix3d axes = eigen.eigenvectors();
-              if (axes.determinant() < 0.0) axes.col(0) *= -1.0;
-              const Eigen::Quaterniond q(axes);
-              r->body_mass[body] = all;
-              for (int k = 0; k < 3; ++k)
-                c[k] = centre[k], r->body_inertia[3 * body + k] = eigen.eigenvalues()[k];
-              r->body_iquat[4 * body] = q.w(), r->body_iquat[4 * body + 1] = q.x(),
-                                r->body_iquat[4 * body + 2] = q.y(), r->body_iquat[4 * body + 3] = q.z();
-            }};
-      },
-      [](const mjModel&, std::mt19937* random) {
-        const double angle = Draw(random, 0.05, 1.5), direction = Draw(random, 0.0, 2.0 * kPi);
-        return RecordedFault{"gravity", "world", kUnknown, [=](mjModel* r) {
-                               const double g = -r->opt.gravity[2];
-                               r->opt.gravity[0] = g * std::sin(angle) * std::cos(direction);
-                               r->opt.gravity[1] = g * std::sin(angle) * std::sin(direction);
-                               r->opt.gravity[2] = -g * std::cos(angle);
-                             }};
-      },
-      [](const mjModel& m, std::mt19937* random) {
-        const int joint = std::uniform_int_distribution<>(2, m.nv - 1)(*random);
-        const int body = m.jnt_bodyid[joint];
-        const double from = Draw(random, 3.0, 14.0), to = from + Draw(random, 0.5, 3.0);
-        Vector3d force(Draw(random, -1.0, 1.0), Draw(random, -1.0, 1.0), Draw(random, -1.0, 1.0));
-        force *= Draw(random, 5.0, 30.0) / force.norm();
-        return RecordedFault{"force",
-                             "link " + LinkName(m, joint),
-                             force.norm(),
-                             {},
-                             [=](double t, const mjModel&, mjData* d) {
-                               if (t < from || t > to) return;
-                               for (int k = 0; k < 3; ++k) d->xfrc_applied[6 * body + k] = force[k];
-                             }};
-      },
+RecordedFault ExchangeTorques(const mjModel& m, std::mt19937* random) {
+  const int joint = DrawIndex(random, 0, m.nv - 2), other = DrawIndex(random, joint + 1, m.nv - 1);
+  const std::string a = JointName(m, joint), b = JointName(m, other);
+  return {.fault = "torque exchanged with that of " + b,
+          .place = "joint " + a,
+          .value = kUnknown,
+          .record = [=](RecordedTable* table) { std::swap(table->Get("tau." + a), table->Get("tau." + b)); }};
+}
+
+RecordedFault DelayTorques(const mjModel&, std::mt19937* random) {
+  const int rows = DrawIndex(random, 4, 15);
+  return {.fault = "delay of the torques",
+          .place = "all joints",
+          .value = 0.002 * rows,
+          .record = [=](RecordedTable* table) {
+            for (size_t i = 0; i < table->names.size(); ++i) {
+              std::vector<double>& tau = table->columns[i];
+              if (!table->names[i].starts_with("tau.")) continue;
+              std::copy_backward(tau.begin(), tau.end() - rows, tau.end());
+              std::fill_n(tau.begin(), rows, tau.front());
+            }
+          }};
+}
+
+RecordedFault ReversePositions(const mjModel& m, std::mt19937* random) {
+  const int joint = DrawIndex(random, 1, m.nv - 2);
+  RecordedFault fault = ChangeColumn(m, "position gain", "q.", joint, -1.0, Multiply);
+  fault.record = [name = JointName(m, joint)](RecordedTable* table) {
+    for (const std::string& column : table->names)
+      if (column.ends_with("." + name) && !column.starts_with("tau"))
+        for (double& q : table->Get(column)) q *= -1.0;
   };
-  return kKinds;
+  return fault;
 }
+
+RecordedFault ChangeMass(const mjModel& m, std::mt19937* random) {
+  const int joint = DrawIndex(random, 1, m.nv - 2), body = m.jnt_bodyid[joint];
+  const double factor = Draw(random, 1.1, 1.5);
+  return {"mass", "link " + LinkName(m, joint), factor * m.body_mass[body], [=](mjModel* r) {
+            r->body_mass[body] *= factor;
+            for (int k = 0; k < 3; ++k) r->body_inertia[3 * body + k] *= factor;
+          }};
+}
+
+RecordedFault MoveCenter(const mjModel& m, std::mt19937* random) {
+  const int joint = DrawIndex(random, 1, m.nv - 1), entry = 3 * m.jnt_bodyid[joint] + DrawIndex(random, 0, 2);
+  const double value = Draw(random, 0.02, 0.06);
+  return {"centre of mass", "link " + LinkName(m, joint), value,
+          [=](mjModel* r) { r->body_ipos[entry] += value; }};
+}
+
+/// A point mass at the last link. The two are one body: inertia of both about the common centre.
+RecordedFault AttachMass(const mjModel& m, std::mt19937* random) {
+  const int body = m.jnt_bodyid[m.nv - 1];
+  const double mass = Draw(random, 0.3, 3.0);
+  const double x = Draw(random, -0.05, 0.05), y = Draw(random, -0.05, 0.05), z = Draw(random, 0.1, 0.2);
+  return {"payload", "link " + LinkName(m, m.nv - 1), mass, [=](mjModel* r) {
+            Eigen::Map<Vector3d> c(r->body_ipos + 3 * body), moments(r->body_inertia + 3 * body);
+            double* const quat = r->body_iquat + 4 * body;
+            const double m0 = r->body_mass[body], all = m0 + mass;
+            const Vector3d p(x, y, z), d = p - c;
+            const Matrix3d R = Eigen::Quaterniond(quat[0], quat[1], quat[2], quat[3]).toRotationMatrix();
+            // Of two points d apart, with the reduced mass.
+            const Matrix3d I = R * moments.asDiagonal() * R.transpose() +
+                               m0 * mass / all * (d.squaredNorm() * Matrix3d::Identity() - d * d.transpose());
+            const Eigen::SelfAdjointEigenSolver<Matrix3d> eigen(I);
+            Matrix3d axes = eigen.eigenvectors();
+            if (axes.determinant() < 0.0) axes.col(0) *= -1.0;
+            const Eigen::Quaterniond q(axes);
+            r->body_mass[body] = all;
+            c += mass / all * d;
+            moments = eigen.eigenvalues();
+            quat[0] = q.w(), quat[1] = q.x(), quat[2] = q.y(), quat[3] = q.z();
+          }};
+}
+
+RecordedFault TurnGravity(const mjModel&, std::mt19937* random) {
+  const double angle = Draw(random, 0.05, 1.5), direction = Draw(random, 0.0, 2.0 * kPi);
+  return {"gravity", "world", kUnknown, [=](mjModel* r) {
+            const double g = -r->opt.gravity[2];
+            r->opt.gravity[0] = g * std::sin(angle) * std::cos(direction);
+            r->opt.gravity[1] = g * std::sin(angle) * std::sin(direction);
+            r->opt.gravity[2] = -g * std::cos(angle);
+          }};
+}
+
+RecordedFault PushLink(const mjModel& m, std::mt19937* random) {
+  const int joint = DrawIndex(random, 2, m.nv - 1), body = m.jnt_bodyid[joint];
+  const double from = Draw(random, 3.0, 14.0), to = from + Draw(random, 0.5, 3.0);
+  Vector3d force(Draw(random, -1.0, 1.0), Draw(random, -1.0, 1.0), Draw(random, -1.0, 1.0));
+  force *= Draw(random, 5.0, 30.0) / force.norm();
+  return {.fault = "force",
+          .place = "link " + LinkName(m, joint),
+          .value = force.norm(),
+          .act = [=](double t, const mjModel&, mjData* d) {
+            if (t < from || t > to) return;
+            for (int k = 0; k < 3; ++k) d->xfrc_applied[6 * body + k] = force[k];
+          }};
+}
+
+using Kind = RecordedFault (*)(const mjModel&, std::mt19937*);
+constexpr Kind kKinds[] = {
+    [](const mjModel& m, std::mt19937* random) {
+      return ChangeJoint<&mjModel::dof_frictionloss>(m, "dry friction", 0.3, random);
+    },
+    [](const mjModel& m, std::mt19937* random) {
+      return ChangeJoint<&mjModel::dof_damping>(m, "viscous friction", 0.5, random);
+    },
+    [](const mjModel& m, std::mt19937* random) {
+      return ChangeJoint<&mjModel::dof_armature>(m, "armature", 0.2, random);
+    },
+    [](const mjModel& m, std::mt19937* random) {
+      const int joint = DrawIndex(random, 0, m.nv - 1);
+      const double value = DrawSign(random) * UsualTorque(m, joint) * Draw(random, 0.05, 0.3);
+      return ChangeColumn(m, "torque offset", "tau.", joint, value, Add);
+    },
+    [](const mjModel& m, std::mt19937* random) {
+      const int joint = DrawIndex(random, 0, m.nv - 1);
+      return ChangeColumn(m, "torque gain", "tau.", joint, Draw(random, 0.7, 0.95), Multiply);
+    },
+    [](const mjModel& m, std::mt19937* random) {
+      return ChangeColumn(m, "torque gain", "tau.", DrawIndex(random, 0, m.nv - 1), -1.0, Multiply);
+    },
+    ExchangeTorques,
+    DelayTorques,
+    [](const mjModel& m, std::mt19937* random) {
+      const int joint = DrawIndex(random, 1, m.nv - 1);
+      const double value = DrawSign(random) * Draw(random, 0.02, 0.1);
+      return ChangeColumn(m, "position offset", "q.", joint, value, Add);
+    },
+    ReversePositions,
+    ChangeMass,
+    MoveCenter,
+    AttachMass,
+    TurnGravity,
+    PushLink,
+};
 
 }  // namespace
 
-int CountRecordedFaultKinds() { return static_cast<int>(ListKinds().size()); }
+int CountRecordedFaultKinds() { return static_cast<int>(std::size(kKinds)); }
 
 int PayloadKind() { return CountRecordedFaultKinds() - 3; }
 
@@ -323,7 +311,7 @@ RecordedFault DrawRecordedFault(const std::string& mjcf, int kind, std::mt19937*
   static std::map<std::string, MjModelPtr> models;
   MjModelPtr& model = models[mjcf];
   if (!model) model = LoadMjcf(std::filesystem::path(SourcePath("/" + mjcf)));
-  return ListKinds()[static_cast<size_t>(kind)](*model, random);
+  return kKinds[kind](*model, random);
 }
 
 void WriteCsv(const RecordedTable& table, const std::filesystem::path& path) {

@@ -388,33 +388,29 @@ TEST_F(Formats, ColumnsAreNamedInAFile) {
   EXPECT_EQ(recording.FindColumn(RecordedQuantity::kPosition, 0), 2);
   EXPECT_DOUBLE_EQ(recording.channels[2].scale, -kPi / 180.0);
   EXPECT_DOUBLE_EQ(recording.channels[2].offset, 0.5);
-  const auto problem = [&](const std::string& toml) {
-    return MessageOf<InputError>([&] { return open(toml); });
-  };
-  EXPECT_THAT(problem("t = 1\nq = [2, 9]\ntau = [4, 5]\n"),
-              HasSubstr("columns.toml:2: q[1]: must be a whole number from 1 to 5, got 9"));
-  EXPECT_THAT(problem("t = 1\nq = { columns = [2], unit = \"kg\" }\ntau = [4]\n"),
-              HasSubstr("q.unit: must be a unit of q, got \"kg\""));
-  EXPECT_THAT(problem("t = 1\nq = { columns = [2], joints = [\"elbow\"] }\ntau = [4]\n"),
-              HasSubstr("must be a joint of"));
-  EXPECT_THAT(problem("t = 1\nq = [2]\ntau = [2]\n"), HasSubstr("column 2 is both q and tau"));
-  EXPECT_THAT(problem("t = 1\nq = [2]\n"), HasSubstr("has no column that is known as a joint's torque"));
-  EXPECT_THAT(problem("t = 1\nq = [2]\ntau = [4]\ntorque = [5]\n"), HasSubstr("torque"));
-  const std::string some = "t = 1\nq = [2]\ntau = [4]\n";
   const auto forces = Write("columns.toml", "t = 1\n[[wrench]]\ncolumns = [3, 4, 5]\nlink = \"link 2\"\n");
   const Recording pushed = OpenRecordingOf(model, rows, forces, /*is_complete=*/false);
   ASSERT_EQ(pushed.wrenches.size(), 1U);
   EXPECT_EQ(pushed.channels.back().joint, 2) << "a force without a moment";
   EXPECT_THAT(DescribeColumns(model, pushed),
               HasSubstr("[[wrench]]\ncolumns = [3, 4, 5]\nlink = \"link 2\""));
-  EXPECT_THAT(problem(some + "wrench = [3]\n"), HasSubstr("wrench: must be a table, with a link"));
-  EXPECT_THAT(problem(some + "wrench = { columns = [3, 5], link = \"link 2\" }\n"),
-              HasSubstr("wrench.columns: must be 6 columns"));
-  EXPECT_THAT(problem(some + "wrench = { columns = [3], link = \"hand\" }\n"),
-              HasSubstr("wrench.link: must be a moving link of"));
-  EXPECT_THAT(problem(some + "wrench = { columns = [3], link = \"link 2\", axes = \"tool\" }\n"),
-              HasSubstr("wrench.axes: must be \"link\" or \"world\""));
-  EXPECT_THAT(problem(some + "base = [3, 5]\n"), HasSubstr("base: must be 7 columns"));
+  const std::string some = "t = 1\nq = [2]\ntau = [4]\n";
+  for (const auto& [toml, message] : std::vector<std::pair<std::string, const char*>>{
+           {"t = 1\nq = [2, 9]\ntau = [4, 5]\n",
+            "columns.toml:2: q[1]: must be a whole number from 1 to 5, got 9"},
+           {"t = 1\nq = { columns = [2], unit = \"kg\" }\ntau = [4]\n",
+            "q.unit: must be a unit of q, got \"kg\""},
+           {"t = 1\nq = { columns = [2], joints = [\"elbow\"] }\ntau = [4]\n", "must be a joint of"},
+           {"t = 1\nq = [2]\ntau = [2]\n", "column 2 is both q and tau"},
+           {"t = 1\nq = [2]\n", "has no column that is known as a joint's torque"},
+           {some + "torque = [5]\n", "torque"},
+           {some + "wrench = [3]\n", "wrench: must be a table, with a link"},
+           {some + "wrench = { columns = [3, 5], link = \"link 2\" }\n", "wrench.columns: must be 6 columns"},
+           {some + "wrench = { columns = [3], link = \"hand\" }\n", "wrench.link: must be a moving link of"},
+           {some + "wrench = { columns = [3], link = \"link 2\", axes = \"tool\" }\n",
+            "wrench.axes: must be \"link\" or \"world\""},
+           {some + "base = [3, 5]\n", "base: must be 7 columns"}})
+    EXPECT_THAT(MessageOf<InputError>([&, text = toml] { return open(text); }), HasSubstr(message));
 }
 
 }  // namespace

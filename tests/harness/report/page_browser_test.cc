@@ -53,7 +53,9 @@ class PageBrowserTest : public ::testing::Test {
     EXPECT_LT(place["bottom"], height) << width;
     EXPECT_LE(place["overflow"], 0) << width;
     EXPECT_THAT(place["text"].get<std::string>(), HasSubstr("DISAGREEMENT"));
-    EXPECT_THAT(place["text"].get<std::string>(), HasSubstr("wheel slip"));
+    for (const char* part :
+         {"Cause: wheel slip. Evidence: wheel_slip 0.004", "See it: wheel_slip fails from"})
+      EXPECT_THAT(place["text"].get<std::string>(), HasSubstr(part));
   }
 
   /// A high window, so that all plots are in view and thus drawn.
@@ -121,6 +123,13 @@ TEST_F(PageBrowserTest, ShowsVerdictAndPlotsWithoutErrors) {
   EXPECT_EQ(browser_.Run("const box = document.querySelectorAll('[data-plot]')[0];box.querySelector('.keys "
                          "button').click();return [0, 1].map(k => box.chart.isDatasetVisible(k));"),
             nlohmann::json({false, true}));
+  EXPECT_EQ(browser_.Run("return [0, 5e-5, 0.0669, 0.984, 0.997, 1, 1.5, 25, Infinity].map(ShowFraction);"),
+            nlohmann::json(
+                {"0", "< 0.01 %", "6.7 %", "98 %", "99.7 %", "100 %", "150 %", "25 ×", "beyond any bound"}));
+  EXPECT_EQ(browser_.Run("const row = [...document.querySelectorAll('.checks tr')].find(row => "
+                         "row.innerHTML.includes('wheel_slip'));return [row.className, "
+                         "row.children[2].textContent, row.children[4].textContent];"),
+            nlohmann::json({"fail", "4.0e-3 m", "400 %"}));
   // No id stands twice, and nothing was loaded.
   EXPECT_EQ(browser_.CountRepeatedIds(), 0);
   EXPECT_EQ(browser_.CountLoaded(), 0);

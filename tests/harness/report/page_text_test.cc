@@ -1,4 +1,4 @@
-// Data in pages, numbers as pages show them, and fewer points of a series, with its extremes.
+// Data in pages, and fewer points of a series, with its extremes.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -31,17 +31,6 @@ TEST(PageText, Base64HasTheVectorsOfRfc4648) {
   EXPECT_EQ(EncodeBase64("foo"), "Zm9v");
   EXPECT_EQ(EncodeBase64("foobar"), "Zm9vYmFy");
   EXPECT_EQ(EncodeBase64("\xff\xfe"), "//4=");
-}
-
-TEST(PageText, FractionsOfABoundAreNoPowersOfTen) {
-  EXPECT_EQ(FormatFraction(0.0), "0");
-  EXPECT_EQ(FormatFraction(5e-5), "< 0.01 %");
-  EXPECT_EQ(FormatFraction(0.0669), "6.7 %");
-  EXPECT_EQ(FormatFraction(0.984), "98 %");
-  EXPECT_EQ(FormatFraction(0.997), "99.7 %") << "not yet the whole bound";
-  EXPECT_EQ(FormatFraction(1.0), "100 %");
-  EXPECT_EQ(FormatFraction(1.5), "150 %");
-  EXPECT_EQ(FormatFraction(25.0), "25 ×");
 }
 
 VectorXd MakeTimes(long rows) { return VectorXd::LinSpaced(rows, 0.0, static_cast<double>(rows - 1)); }

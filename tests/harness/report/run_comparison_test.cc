@@ -74,7 +74,7 @@ TEST_F(RunComparisonTest, ASignalIsJudgedByTheSizeOfItsUnit) {
   EXPECT_TRUE(signal.differs);
   EXPECT_NEAR(signal.first_time, 0.41, 1e-12);
   EXPECT_FALSE(comparison.IsSame());
-  EXPECT_THAT(DescribeComparison(comparison, 4e-7),
+  EXPECT_THAT(DescribeComparison(comparison),
               HasSubstr("DIFFERENT: 1 of 1 signals, first object/X_o.x at 0.410 s"));
   comparison = Compare("a", "b", {6e-7, {}});
   EXPECT_TRUE(comparison.IsSame());

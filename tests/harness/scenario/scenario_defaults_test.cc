@@ -70,12 +70,12 @@ std::vector<Key> ListKeys() {
     }
     if (line.starts_with("### `")) section = "trajectory.";
     if (line.starts_with("    trajectory = ")) start = "trajectory=" + line.substr(17);
-    constexpr size_t kCells = 7;  // one before the first |
+    constexpr size_t kCells = 6;  // one before the first |
     if (!line.starts_with("| `") || line.find("| `", 1) == std::string::npos) continue;
     const std::vector<std::string> cells = SplitRow(line);
-    if (cells.size() != kCells || line.find("| `" + cells[4] + "` |") == std::string::npos) continue;
+    if (cells.size() != kCells || line.find("| `" + cells[3] + "` |") == std::string::npos) continue;
     Key key{
-        .path = section + cells[1].substr(0, cells[1].find('`')), .otherwise = cells[4], .example = cells[5]};
+        .path = section + cells[1].substr(0, cells[1].find('`')), .otherwise = cells[3], .example = cells[4]};
     const bool of_task = section == "task.";
     key.before = {of_task ? kTask : section == "trajectory." ? start : kLine};
     key.before.push_back(kContacts);

@@ -23,9 +23,9 @@ list_keys() {
     section ~ /^\[/ { section = substr(section, 2, length(section) - 2) ".0" }  # the first of a list of tables
     /^### `/ { section = "trajectory"; start = "-" }
     /^    [a-z]+ = / { start = $0; sub(/^ +/, "", start); sub(/ = /, "=", start) }
-    /^\| `/ && NF == 8 && section != "" {
+    /^\| `/ && NF == 7 && section != "" {
       keys = $2; gsub(/[`,]/, "", keys)
-      example = $6; gsub(/`/, "", example)
+      example = $5; gsub(/`/, "", example)
       print section, start, keys, example
     }' "$document"
 }

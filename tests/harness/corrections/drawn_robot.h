@@ -1,7 +1,7 @@
 #pragma once
 
-// Robots drawn at random and written as a URDF, an MJCF or a parameter file, and faults that are made in what
-// is written. It shares no code with what finds them.
+// Robots drawn at random and written as a URDF, an MJCF or a parameter file. This shares no code with what
+// reads them.
 
 #include <array>
 #include <optional>
@@ -10,9 +10,19 @@
 #include <vector>
 
 #include "controller/common/types.h"
-#include "harness/corrections/correction.h"
 
 namespace dexcheck::testing {
+
+using Random = std::mt19937;
+double Draw(Random* random, double low, double high);
+int DrawIndex(Random* random, int count);
+Vector3d DrawVector(Random* random, double size);
+/// The rotation of roll, pitch and yaw, and back.
+Matrix3d Turn(const Vector3d& rpy);
+Vector3d SolveAngles(const Matrix3d& R);
+/// The tensor of xx yy zz xy xz yz, and back.
+Matrix3d Tensor(const Vector6d& entries);
+Vector6d Entries(const Matrix3d& tensor);
 
 /// A link and the joint that carries it, as numbers to be written.
 struct DrawnLink {
@@ -52,22 +62,5 @@ DrawnRobot DrawRobot(std::mt19937* random);
 std::string WriteRobot(const DrawnRobot& robot, const WrittenForm& form);
 /// The end of the file's name: ".urdf".
 const char* EndOf(const WrittenForm& form);
-
-/// A fault that was made, and what names it.
-struct MadeFault {
-  std::string name;
-  SiteKind of = SiteKind::kMass;
-  std::vector<CorrectionKind> kinds;  ///< That say the same.
-  std::vector<std::string> places;    ///< "joint q1", "link l1": all of them, or of an exchange one.
-  std::vector<std::string> hardly;    ///< Where it changes little, and may be listed or not.
-  bool any_place = false;
-};
-
-/// Kinds of faults by name.
-std::vector<std::string> ListFaultNames();
-/// Makes a fault of a kind somewhere. @param form of the file that will have it. @return none where it does
-/// not show.
-std::optional<MadeFault> MakeFault(const std::string& name, const WrittenForm& form, std::mt19937* random,
-                                   DrawnRobot* robot);
 
 }  // namespace dexcheck::testing
