@@ -42,10 +42,10 @@ compare() {
 # What must be found: the test can fail.
 printf 'a\nb\nc\n' >"$scratch/real"
 for shown in '...\nb\nc' 'a\n...\nc' 'a\n...'; do
-  compare <(printf "$shown\n") "$scratch/real" || { echo "$shown is not found" && exit 1; }
+  compare <(printf '%b\n' "$shown") "$scratch/real" || { echo "$shown is not found" && exit 1; }
 done
 for shown in 'a\nc' 'a\nb' 'b\nc' '...\nd\n...' 'a\nb\nc\nd'; do
-  ! compare <(printf "$shown\n") "$scratch/real" >"$scratch/message" || { echo "$shown is found" && exit 1; }
+  ! compare <(printf '%b\n' "$shown") "$scratch/real" >"$scratch/message" || { echo "$shown is found" && exit 1; }
 done
 
 mkdir "$scratch/bin"

@@ -52,7 +52,7 @@ struct ControllerContext {
   const Surface& surface;              ///< Of the object, Sigma_o.
   /// Gains, weights, posture and forces of the scenario, and where the object starts.
   const GraspControllerOptions& options;
-  Sampling sampling;
+  Sampling sampling;  ///< Torques must be the same for sampling.hold calls of Step from the first one on.
   /// In a scenario that moves joints, the gains of its law; null otherwise. There the robot holds nothing: no
   /// fingertips, an object that stands for none, no coordinates of it, and no motion of it that Follow could
   /// mean. What the joints should do is in command->joints when Step is called.

@@ -77,7 +77,7 @@ struct dexcheck_hello {
   uint32_t protocol;
   uint32_t positions, velocities, contacts;
   uint32_t robot_bytes, scenario_bytes; /* of the texts that follow */
-  double time_step;                     /* s */
+  double time_step;                     /* between two requests, s */
   double K_v[6], K_p[6];                /* of (55), 1/s, 1/s^2 */
   double mu, f_min, f_max;              /* -, N, N */
   double barrier_weight;                /* of the grasp-force problem, N */

@@ -61,15 +61,4 @@ double CalcObjectPotentialEnergy(const MassProperties& object, const Vector3d& g
   return -object.mass * gravity.dot(p_Bo);
 }
 
-Vector6d CalcObjectMomentum(const MassProperties& object, const Pose& X_Bo, const Vector6d& V_Bo) {
-  RequireObject(object);
-  // [R m v; p x (R m v) + R I_o omega]
-  const Vector3d linear = X_Bo.linear() * (object.mass * V_Bo.head<3>());
-  const Vector3d spin = X_Bo.linear() * (object.inertia * V_Bo.tail<3>());
-  const Vector3d p_Bo = X_Bo.translation();
-  Vector6d momentum;
-  momentum << linear, p_Bo.cross(linear) + spin;
-  return momentum;
-}
-
 }  // namespace dexcheck

@@ -51,7 +51,4 @@ double CalcObjectKineticEnergy(const MassProperties& object, const Vector6d& V_B
 /// @param p_Bo centre of mass in the world frame, m.
 double CalcObjectPotentialEnergy(const MassProperties& object, const Vector3d& gravity, const Vector3d& p_Bo);
 
-/// Momentum in the world frame: [linear, N s; angular about the world's origin, N m s].
-Vector6d CalcObjectMomentum(const MassProperties& object, const Pose& X_Bo, const Vector6d& V_Bo);
-
 }  // namespace dexcheck

@@ -64,17 +64,30 @@ Evaluation At(const std::pair<double, int>& value) { return CheckValue{value.fir
 
 template <double LawErrors::*error>
 Evaluation OfLaw(const Analysis& a) {
-  return a.law == nullptr ? std::nullopt : When(true, a.law->*error);
+  return !a.law ? std::nullopt : When(true, (*a.law).*error);
 }
 
 Evaluation EvaluateDemand(const Analysis& a) {
-  if (a.law == nullptr) return std::nullopt;
+  if (!a.law) return std::nullopt;
   return CheckValue{a.law->demand, -1, a.law->demand_by_slip, a.law->demand_residual};
 }
 
 /// Optimality of the grasp force, judged where f_c is inside its cones and bounds.
 Evaluation EvaluateOptimality(const Analysis& a) {
-  return a.law == nullptr ? std::nullopt : When(!(a.law->grasp_cone > 0.0), a.law->grasp_optimality);
+  return !a.law ? std::nullopt : When(!(a.law->grasp_cone > 0.0), a.law->grasp_optimality);
+}
+
+/// Deepest overlap, m.
+template <typename Contact>
+double CalcDepth(const std::vector<Contact>& contacts) {
+  double depth = 0.0;
+  for (const Contact& contact : contacts) depth = Worst(depth, contact.touching ? -contact.distance : 0.0);
+  return depth;
+}
+
+/// Fingertips that do not touch.
+double CountMissing(const Analysis& a) {
+  return static_cast<double>(std::ranges::count(a.step->response.contacts, false, &PlantContact::touching));
 }
 
 bool IsHolding(const Analysis& a) { return a.step->command.handling.holding; }
@@ -86,9 +99,8 @@ Evaluation Tracked(const Analysis& a, double error, double by_hold) {
 }
 
 Evaluation EvaluateSolver(const Analysis& a) {
-  if (a.mass_factor == nullptr) return std::nullopt;
-  if (!a.setup->has_object()) return When(true, a.robot_solver);
-  return When(true, Worst(a.object_solver, a.robot_solver));
+  if (!a.setup->has_object()) return When(true, a.robot.solver);
+  return When(true, Worst(a.object.solver, a.robot.solver));
 }
 
 // name, category, unit;
@@ -107,7 +119,7 @@ const CheckInfo kChecks[] = {
      {0.0, "copied, or computed twice from the same numbers"},
      "measured state against the true one, beyond what the scenario declares",
      {Cause::kSensing, 15, Rank::kMeasurement, kOwn},
-     {[](const Analysis& a) { return When(true, a.measurement_error); }, kRunning | kUnsent}},
+     {EvaluateMeasurement, kRunning | kUnsent}},
     {{"law_torque", kLaw, "1"},
      {kLawTorqueBound,
       "rounding of the terms, 1e-15, through Gram matrices of condition number^2; the condition number is "
@@ -151,7 +163,7 @@ const CheckInfo kChecks[] = {
      {1e-14, "a gear's ratio, once and back: two roundings"},
      "torques that the joints received against those that were sent, relative to the largest",
      {Cause::kActuator, 19, Rank::kActuator, kOwn},
-     {[](const Analysis& a) { return When(true, a.torque_error); }}},
+     {EvaluateMotors}},
     // What law_demand leaves, over K_p = 400/s^2: 1e-8 of accelerations of some m/s^2, times a condition
     // number of some tens. Measured 1.2e-9 m in `curve`.
     {{"error_dynamics", kLaw, "m"},
@@ -171,14 +183,13 @@ const CheckInfo kChecks[] = {
       Scaling::kNone, "[expect] position + hold"},
      "object's position error, against what the scenario expects",
      {Cause::kControlLaw, 21, Rank::kResidual},
-     {[](const Analysis& a) { return Tracked(a, a.step->error.position.norm(), a.position_by_hold); },
+     {[](const Analysis& a) { return Tracked(a, a.step->error.position.norm(), a.by_hold.first); },
       kRunning}},
     {{"expect_orientation", kLaw, "rad"},
      {0.0, "likewise", Scaling::kNone, "[expect] orientation + hold"},
      "object's orientation error, against what the scenario expects",
      {Cause::kControlLaw, 22, Rank::kResidual},
-     {[](const Analysis& a) { return Tracked(a, a.step->error.orientation, a.orientation_by_hold); },
-      kRunning}},
+     {[](const Analysis& a) { return Tracked(a, a.step->error.orientation, a.by_hold.second); }, kRunning}},
     // Measured 1e-14 for the Panda.
     {{"joint_dynamics", kLaw, "rad"},
      {1e-11, "rounding of torques, over the least inertia that they drive and over K_p"},
@@ -199,32 +210,32 @@ const CheckInfo kChecks[] = {
      {1e-13, "rounding: 16 eps for each joint of a chain of 25", Scaling::kNone, nullptr, kRelative},
      "M of the whole robot against the engine's, over the sizes that are summed",
      {Cause::kModel, -9, Rank::kResidual},
-     {[](const Analysis& a) { return At(a.mass_error); }, kAlways, DescribeEntry}},
+     {[](const Analysis& a) { return At(a.whole.mass); }, kAlways, DescribeEntry}},
     {{"bias_force", kModel, "1"},
      {1e-13, "likewise", Scaling::kNone, nullptr, kRelative},
      "Coriolis forces, gravity and friction of the whole robot against the engine's, likewise",
      {Cause::kModel, -8, Rank::kResidual},
-     {[](const Analysis& a) { return At(a.bias_error); }, kAlways, DescribeEntry}},
+     {[](const Analysis& a) { return At(a.whole.bias); }, kAlways, DescribeEntry}},
     // Measured 5e-16 over the shipped scenarios, falls and spinning wheels included.
     {{"equations_of_motion", kInverseDynamics, "1"},
      {1e-13, "likewise", Scaling::kNone, nullptr, kRelative},
      "what is left of the equations of motion of the whole robot and its object with the engine's "
      "accelerations and forces, less what its solver left over, over the sizes that are summed",
      {Cause::kUnmodelledForce, 40, Rank::kDecisive},
-     {[](const Analysis& a) { return At(a.whole_residual); }, kAlways, DescribeEntry}},
+     {[](const Analysis& a) { return At(a.whole.residual); }, kAlways, DescribeEntry}},
     {{"inverse_dynamics_robot", kInverseDynamics, "1"},
      {1e-9, "rounding of forces that cancel, in the metric of the lightest links", Scaling::kNone, nullptr,
       kRelative},
      "the robot's part of that, as (48) has it: in xi, against the forces balanced",
      {Cause::kUnmodelledForce, 39, Rank::kDecisive},
-     {[](const Analysis& a) { return When(a.mass_factor != nullptr, a.robot_residual_norm / a.balanced); }}},
+     {[](const Analysis& a) { return When(true, a.robot.error); }}},
     // The object's dynamics have no other unknowns than its inertia and the contacts' geometry, which checks
     // of the model compare: where those hold, a force acts on the object that nobody has.
     {{"inverse_dynamics_object", kInverseDynamics, "1"},
      {1e-9, "rounding of the object's terms", Scaling::kNone, nullptr, kRelative},
      "the object's part, as (19) has it: against the contact forces",
      {Cause::kUnmodelledForce, 24, Rank::kObjectBalance},
-     {[](const Analysis& a) { return When(true, a.object_residual_size); }}},
+     {[](const Analysis& a) { return When(true, a.object.error); }}},
     {{"constraint_force", kForwardDynamics, "1"},
      {kUnitRounding,
       "one operation, of sizes that count the operations on the row's place, rates and inertia"},
@@ -232,9 +243,8 @@ const CheckInfo kChecks[] = {
      "documented law's under the same motion, over the sizes that its rounding comes from",
      {Cause::kContactSoftness, 42, Rank::kResidual},
      {[](const Analysis& a) -> Evaluation {
-        const bool has_rows = a.constraint_law != nullptr && !a.constraint_law->forces().empty();
-        if (!has_rows) return std::nullopt;
-        return CheckValue{kUnitRounding * a.constraint_force.first, a.constraint_force.second};
+        if (a.step->response.rows.empty()) return std::nullopt;
+        return CheckValue{kUnitRounding * a.whole.constraint.first, a.whole.constraint.second};
       },
       kAlways, DescribeConstraint}},
     // The paper's contacts are rigid. The engine's hold back a part of every force that changes, in
@@ -246,19 +256,19 @@ const CheckInfo kChecks[] = {
      "how far rigid contacts are from explaining the accelerations: xi_dot of the rigid constrained system "
      "(46), (48) against the engine's",
      {Cause::kContactSoftness, 25, Rank::kPrediction},
-     {[](const Analysis& a) { return When(true, a.acceleration_error); }}},
+     {[](const Analysis& a) { return When(true, a.rigid.acceleration); }}},
     {{"contact_force", kAssumption, "1"},
      {1.0, "likewise", Scaling::kSofter, "1; 100 (1 - d) of softer contacts"},
      "the same of the contact forces: f_c of that system against the engine's, relative to |f_c|",
      {Cause::kContactSoftness, 26, Rank::kPrediction},
-     {[](const Analysis& a) { return When(true, a.contact_force_error); }}},
+     {[](const Analysis& a) { return When(true, a.rigid.contact_force); }}},
     // Slip and use of the cone tell sliding from contacts that merely give.
     {{"fingertip_slip", kAssumption, "m"},
      {kSlipWindow * kShippedCreep, "the rate below, over the window, less the same", Scaling::kCreep,
       "10 s (1 - d) dt 2 m/s^2"},
      "how far a fingertip has slipped on the object in the last 5 to 10 s",
      {Cause::kContactSoftness, 6, Rank::kAssumption, kOwn, "cone_use"},
-     {[](const Analysis& a) { return When(IsHolding(a), a.fingertips.distance); }}},
+     {[](const Analysis& a) { return When(IsHolding(a), a.slip.fingertips.distance); }}},
     {{"fingertip_slip_rate", kAssumption, "m/s"},
      {kShippedCreep,
       "besides dt J_dot qvel, which is known and taken off: creep of a contact that sticks under f_t / m of "
@@ -266,17 +276,17 @@ const CheckInfo kChecks[] = {
       Scaling::kCreep, "(1 - d) dt 2 m/s^2"},
      "how fast a fingertip slips on the object, less what (46) and the engine's constraint differ by",
      {Cause::kContactSoftness, 7, Rank::kAssumption, kOwn, "cone_use"},
-     {[](const Analysis& a) { return When(IsHolding(a), a.fingertips.rate); }}},
+     {[](const Analysis& a) { return When(IsHolding(a), a.slip.fingertips.rate); }}},
     {{"wheel_slip", kAssumption, "m"},
      {kSlipWindow * kShippedLag, "the rate below, over the window", Scaling::kLag, "10 s dt 0.1 m/s^2"},
      "how far a wheel has slipped on the floor in the last 5 to 10 s, (1)",
      {Cause::kContactSoftness, 8, Rank::kAssumption, kOwn, "traction_use"},
-     {[](const Analysis& a) { return When(true, a.wheels.distance); }}},
+     {[](const Analysis& a) { return When(true, a.slip.wheels.distance); }}},
     {{"wheel_slip_rate", kAssumption, "m/s"},
      {kShippedLag, "tyres give sideways by v w / b, of v w up to 0.1 m/s^2", Scaling::kLag, "dt 0.1 m/s^2"},
      "how fast a wheel slips on the floor",
      {Cause::kContactSoftness, 9, Rank::kAssumption, kOwn, "traction_use"},
-     {[](const Analysis& a) { return When(true, a.wheels.rate); }}},
+     {[](const Analysis& a) { return When(true, a.slip.wheels.rate); }}},
     {{"rolling", kAssumption, "m/s"},
      {kShippedSoftness * kShippedTimeConstant * kRollLoad,
       "what a platform's tilt leaves of second order; slip is taken off", Scaling::kSinkingRate,
@@ -288,55 +298,55 @@ const CheckInfo kChecks[] = {
      {kSlipWindow * kShippedCreep, "as fingertip_slip", Scaling::kCreep, "10 s (1 - d) dt 2 m/s^2"},
      "how far a foot has slipped on the ground in the last 5 to 10 s",
      {Cause::kContactSoftness, 34, Rank::kAssumption, kOwn, "foot_cone_use"},
-     {[](const Analysis& a) { return When(true, a.feet.distance); }, kRunning}},
+     {[](const Analysis& a) { return When(true, a.slip.feet.distance); }, kRunning}},
     {{"foot_slip_rate", kAssumption, "m/s"},
      {kShippedCreep, "as fingertip_slip_rate", Scaling::kCreep, "(1 - d) dt 2 m/s^2"},
      "how fast a foot slips on the ground, less what (46) and the engine's constraint differ by",
      {Cause::kContactSoftness, 35, Rank::kAssumption, kOwn, "foot_cone_use"},
-     {[](const Analysis& a) { return When(true, a.feet.rate); }, kRunning}},
+     {[](const Analysis& a) { return When(true, a.slip.feet.rate); }, kRunning}},
     {{"foot_cone_use", kAssumption, "1"},
      {0.99, "1 slides; how a foot's contacts share its load is not determined"},
      "power of the friction at all contacts of a foot over the most that it can be; 1 slides",
      {Cause::kFootSlip, 36, Rank::kDecisive, kOwn},
-     {[](const Analysis& a) { return When(true, a.feet.cone_use); }}},
+     {[](const Analysis& a) { return When(true, a.slip.feet.cone_use); }}},
     {{"feet_lost", kAssumption, "m"},
      {kShippedSinking * kTipPress,
       "as foot_penetration; of more feet than hold the robot some may bear nothing", Scaling::kSinking,
       "4 (1 - d) dt^2 500 m/s^2"},
      "gap of a foot and the ground",
      {Cause::kFootSlip, 37, Rank::kDecisive, kOwn},
-     {[](const Analysis& a) { return When(true, a.foot_gap); }}},
+     {[](const Analysis& a) { return When(true, a.contacts.foot_gap); }}},
     {{"foot_penetration", kAssumption, "m"},
      {kShippedSinking * kTipPress, "as penetration", Scaling::kSinking, "4 (1 - d) dt^2 500 m/s^2"},
      "overlap of a foot and the ground",
      {Cause::kContactSoftness, 38, Rank::kAssumption, kOwn},
-     {[](const Analysis& a) { return When(true, a.foot_penetration); }}},
+     {[](const Analysis& a) { return When(true, CalcDepth(a.step->response.feet)); }}},
     {{"foot_distance", kAssumption, "m"},
      {1e-12, "rounding of poses over lengths of some m"},
      "distance of a foot and the ground: the plant's against that of the declared shapes",
      {Cause::kContactGeometry, -7, Rank::kObjectBalance, kOwn},
-     {[](const Analysis& a) { return At(a.foot_mismatch); }, kAlways, DescribeFoot}},
+     {[](const Analysis& a) { return At(a.contacts.foot_mismatch); }, kAlways, DescribeFoot}},
     {{"cone_use", kAssumption, "1"},
      {0.99, "1 slides"},
      "tangential force over mu times normal force at a fingertip; 1 slides, (21)",
      {Cause::kFingertipSlip, 2, Rank::kDecisive, kOwn},
-     {[](const Analysis& a) { return When(IsHolding(a), a.fingertips.cone_use); }}},
+     {[](const Analysis& a) { return When(IsHolding(a), a.slip.fingertips.cone_use); }}},
     {{"traction_use", kAssumption, "1"},
      {0.99, "1 slides"},
      "tangential force over mu times normal force at a wheel; 1 spins or skids",
      {Cause::kWheelSlip, 3, Rank::kDecisive, kOwn},
-     {[](const Analysis& a) { return When(true, a.wheels.cone_use); }}},
+     {[](const Analysis& a) { return When(true, a.slip.wheels.cone_use); }}},
     {{"contacts_lost", kAssumption, "1"},
      {0.0, "none"},
      "fingertips that do not touch the object",
      {Cause::kFingertipSlip, 4, Rank::kDecisive, kOwn},
-     {[](const Analysis& a) { return When(true, IsHolding(a) ? a.contacts_missing : 0); }}},
+     {[](const Analysis& a) { return When(true, IsHolding(a) ? CountMissing(a) : 0.0); }}},
     {{"penetration", kAssumption, "m"},
      {kShippedSinking * kTipPress, "the overlap at rest under f_n / m of 500 m/s^2", Scaling::kSinking,
       "4 (1 - d) dt^2 500 m/s^2"},
      "overlap of fingertip and object",
      {Cause::kContactSoftness, 5, Rank::kAssumption, kOwn},
-     {[](const Analysis& a) { return When(true, a.penetration); }}},
+     {[](const Analysis& a) { return When(true, CalcDepth(a.step->response.contacts)); }}},
     {{"contact_distance", kAssumption, "m"},
      {1e-12, "ten times where FindContact stops, 1e-13 rad over lengths of 1 m; rounding is some 1e-16"},
      "distance of a fingertip and the object: the plant's against that of the declared shapes",
@@ -391,7 +401,7 @@ const CheckInfo kChecks[] = {
      "how deep two bodies overlap that are not meant to touch",
      {Cause::kCollision, 12, Rank::kAssumption, kOwn},
      {[](const Analysis& a) { return At(a.deepest_overlap); }, kAlways | kUnsent,
-      [](const Analysis& a, int part) { return part < 0 ? "" : a.clearance->Describe(part); }}},
+      [](const StepAnalyzer& a, int part) { return part < 0 ? "" : a.clearance().Describe(part); }}},
     {{"collision", kAssumption, "N"},
      {0.0, "the model has no such contact"},
      "largest force between two bodies that are not meant to touch",

@@ -122,8 +122,8 @@ struct CheckInfo : CheckName {
   struct Judging {
     Evaluation (*evaluate)(const StepAnalysis& step) = nullptr;
     unsigned moments = kAlways;
-    std::string (*describe)(const StepAnalysis& step, int part) = nullptr;  ///< A value's part in words.
-    std::unique_ptr<StatefulJudge> (*make)(const Setup& setup) = nullptr;   ///< In the place of `evaluate`.
+    std::string (*describe)(const StepAnalyzer& now, int part) = nullptr;  ///< A value's part in words.
+    std::unique_ptr<StatefulJudge> (*make)(const Setup& setup) = nullptr;  ///< In the place of `evaluate`.
   };
   Judging by;
 };
@@ -160,23 +160,27 @@ inline constexpr double kGraspOptimalityBound = 1e-4;
 
 // Values of checks that take more than a line (check_table.cc).
 
+/// What was measured against what the declared sensing makes of the truth.
+Evaluation EvaluateMeasurement(const StepAnalysis& step);
+/// Largest torque that a joint received against the declared one, over the largest that was sent.
+Evaluation EvaluateMotors(const StepAnalysis& step);
 /// A wheel's rim against the platform above it, (1), m/s.
 Evaluation EvaluateRolling(const StepAnalysis& step);
 /// Of a fingertip that touches: the plant's distance less that of the declared shapes, m.
 Evaluation EvaluateContactDistance(const StepAnalysis& step);
 /// Of a hemispherical fingertip, m.
 Evaluation EvaluateRim(const StepAnalysis& step);
-std::string DescribeFoot(const StepAnalysis& step, int part);
-std::string DescribeFingertip(const StepAnalysis& step, int part);
+std::string DescribeFoot(const StepAnalyzer& now, int part);
+std::string DescribeFingertip(const StepAnalyzer& now, int part);
 /// How far a joint is beyond its range, rad or m.
 Evaluation EvaluateJointLimit(const StepAnalysis& step);
-std::string DescribeJoint(const StepAnalysis& step, int part);
+std::string DescribeJoint(const StepAnalyzer& now, int part);
 /// "joint r_elbow", of the equation of motion that is worst.
-std::string DescribeEntry(const StepAnalysis& step, int part);
+std::string DescribeEntry(const StepAnalyzer& now, int part);
 /// "contact of r_fingertip_1 and torus", "limit of joint elbow".
-std::string DescribeConstraint(const StepAnalysis& step, int part);
+std::string DescribeConstraint(const StepAnalyzer& now, int part);
 /// "r_palm and bench", of the step's largest force between bodies.
-std::string DescribeCollision(const StepAnalysis& step, int part);
+std::string DescribeCollision(const StepAnalyzer& now, int part);
 /// Movement of joints that do not carry the object, since the beginning, rad.
 std::unique_ptr<StatefulJudge> MakeIdleJointsJudge(const Setup& setup);
 /// kappa integrated by (40) from how fingertip and object moved, against where the contacts are, m.

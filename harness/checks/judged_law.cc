@@ -134,19 +134,19 @@ class JudgedJointLaw final : public JudgedLaw {
   }
   [[nodiscard]] bool IsComputed(const Command& command) const override { return command.computes_joints; }
 
-  const LawErrors& Compare(const StepRecord& step, const LawTerms& terms, const StepAnalysis& plant,
+  const LawErrors& Compare(const StepRecord& step, const LawTerms& terms, const StepAnalyzer& plant,
                            bool as_commanded) override {
     errors_ = LawErrors{};
     errors_.torque = CompareTorque(step, terms);
     if (!follows_error()) return errors_;
-    const VectorXd* predicted = &plant.findings.xi_dot_model;
+    const VectorXd* predicted = &plant.analysis().findings.xi_dot_model;
     if (!as_commanded || compensates()) {
       actuation_.CalcForce(step.command.tau, commanded_force_);
       // The rigid robot has no friction that this would compensate.
       commanded_force_ -= coulomb_ + viscous_;
       predicted = &commanded_.PredictFree(step.model->robot(), commanded_force_).xi_dot;
     }
-    FollowError(step, plant.declared->is_ideal ? predicted : nullptr);
+    FollowError(step, plant.analysis().declared->is_ideal ? predicted : nullptr);
     return errors_;
   }
 

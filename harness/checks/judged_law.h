@@ -44,7 +44,7 @@ class JudgedLaw {
   /// @param terms another provider's, at the measured state. @param plant the analysis of the same step.
   /// @param as_commanded whether nothing but the commanded torques moved the plant, so that its prediction is
   /// that of the law.
-  virtual const LawErrors& Compare(const StepRecord& step, const LawTerms& terms, const StepAnalysis& plant,
+  virtual const LawErrors& Compare(const StepRecord& step, const LawTerms& terms, const StepAnalyzer& plant,
                                    bool as_commanded) = 0;
   /// The torques alone: of a step that the motors refuse, where nothing is known of what they would do, and
   /// while everything settles.

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "controller/common/text.h"
@@ -35,46 +36,67 @@ class IdleJointsJudge final : public StatefulJudge {
 
 }  // namespace
 
+Evaluation EvaluateMeasurement(const StepAnalysis& step) {
+  constexpr double kOther = std::numeric_limits<double>::infinity();
+  const Reading &measured = step.step->measured, &declared = step.declared->measured;
+  const MeasuredState &a = measured.state, &b = declared.state;
+  double apart = measured.touch.fingertips == declared.touch.fingertips ? 0.0 : kOther;
+  apart = Worst(apart, std::abs(measured.touch.support_force - declared.touch.support_force));
+  apart = Worst(apart, MaxAbs(a.q - b.q), MaxAbs(a.xi - b.xi), MaxAbs(a.X_Bo.matrix() - b.X_Bo.matrix()),
+                MaxAbs(a.V_Bo - b.V_Bo));
+  for (size_t i = 0; i < b.kappa.size(); ++i) {
+    const ContactCoordinates &x = a.kappa[i], &y = b.kappa[i];
+    apart = Worst(apart, MaxAbs(x.CalcVector() - y.CalcVector()), std::abs(a.overlap[i] - b.overlap[i]));
+    if (x.alpha_f.chart != y.alpha_f.chart || x.alpha_o.chart != y.alpha_o.chart)
+      apart = Worst(apart, kOther);
+  }
+  return CheckValue{apart};
+}
+
+Evaluation EvaluateMotors(const StepAnalysis& step) {
+  const double largest = Worst(MaxAbs(step.step->command.tau), std::numeric_limits<double>::min());
+  return CheckValue{MaxAbs(step.step->response.motor_torques - step.declared->tau) / largest};
+}
+
 Evaluation EvaluateRolling(const StepAnalysis& step) {
   if (step.step->response.wheels.size() != 2) return std::nullopt;
-  const Vector2d beyond = step.wheel_mismatch.cwiseAbs() - step.wheel_slip;
+  const Vector2d beyond = step.wheels.mismatch.cwiseAbs() - step.wheels.slip;
   const int wheel = IsWorse(beyond[1], beyond[0]) ? 1 : 0;
-  return CheckValue{Worst(0.0, beyond[wheel]), -1, step.wheel_slip[wheel],
-                    std::abs(step.wheel_mismatch[wheel])};
+  return CheckValue{Worst(0.0, beyond[wheel]), -1, step.wheels.slip[wheel],
+                    std::abs(step.wheels.mismatch[wheel])};
 }
 
 Evaluation EvaluateContactDistance(const StepAnalysis& step) {
-  if (step.touching == 0 || !step.setup->start().bonds.empty()) return std::nullopt;
+  if (step.contacts.touching == 0 || !step.setup->start().bonds.empty()) return std::nullopt;
   CheckValue worst{0.0, 0};
-  for (int i = 0; i < step.grasp->num_contacts(); ++i) {
-    const double apart = std::abs(step.contact_mismatch[i]);
+  for (int i = 0; i < step.grasp().num_contacts(); ++i) {
+    const double apart = std::abs(step.contacts.mismatch[i]);
     if (IsWorse(apart, worst.value)) worst = {apart, i};
   }
   return worst;
 }
 
-std::string DescribeFoot(const StepAnalysis& step, int part) {
-  return part < 0
-             ? ""
-             : "foot " + Quote(step.setup->model().frame(step.setup->feet()[static_cast<size_t>(part)]).name);
+std::string DescribeFoot(const StepAnalyzer& now, int part) {
+  const Setup& setup = *now.analysis().setup;
+  return part < 0 ? "" : "foot " + Quote(setup.model().frame(setup.feet()[static_cast<size_t>(part)]).name);
 }
 
 Evaluation EvaluateRim(const StepAnalysis& step) {
   if (!step.step->command.handling.holding) return std::nullopt;
   const Vector3d& pole = *step.setup->scenario().grasp.hemisphere;
   CheckValue farthest;
-  for (int i = 0; i < step.grasp->num_contacts(); ++i) {
+  for (int i = 0; i < step.grasp().num_contacts(); ++i) {
     const SurfacePoint& alpha_f = step.step->reading.state.kappa[static_cast<size_t>(i)].alpha_f;
-    const Vector3d p = step.grasp->tip(i).Evaluate(alpha_f).p;
+    const Vector3d p = step.grasp().tip(i).Evaluate(alpha_f).p;
     const double past = -CalcRimDistance(p.norm(), pole, p);
     if (IsWorse(past, farthest.value)) farthest = {past, i};
   }
   return farthest;
 }
 
-std::string DescribeFingertip(const StepAnalysis& step, int part) {
-  const int frame = step.grasp->fingertips()[static_cast<size_t>(part)];
-  return "fingertip " + Quote(step.setup->model().frame(frame).name);
+std::string DescribeFingertip(const StepAnalyzer& now, int part) {
+  const int frame = now.analysis().grasp().fingertips()[static_cast<size_t>(part)];
+  return "fingertip " + Quote(now.analysis().setup->model().frame(frame).name);
 }
 
 Evaluation EvaluateJointLimit(const StepAnalysis& step) {
@@ -90,23 +112,23 @@ Evaluation EvaluateJointLimit(const StepAnalysis& step) {
   return farthest;
 }
 
-std::string DescribeJoint(const StepAnalysis& step, int part) {
-  return "joint " + Quote(step.setup->model().joint(part).name);
+std::string DescribeJoint(const StepAnalyzer& now, int part) {
+  return "joint " + Quote(now.analysis().setup->model().joint(part).name);
 }
 
-std::string DescribeEntry(const StepAnalysis& step, int part) { return step.whole->DescribeEntry(part); }
+std::string DescribeEntry(const StepAnalyzer& now, int part) { return now.whole()->DescribeEntry(part); }
 
-std::string DescribeConstraint(const StepAnalysis& step, int part) {
-  return step.constraint_law->DescribeRow(part);
+std::string DescribeConstraint(const StepAnalyzer& now, int part) {
+  return now.constraint_law()->DescribeRow(part);
 }
 
-std::string DescribeCollision(const StepAnalysis& step, int /*part*/) {
-  const mjModel& m = step.setup->engine();
+std::string DescribeCollision(const StepAnalyzer& now, int /*part*/) {
+  const mjModel& m = now.analysis().setup->engine();
   const auto name_of = [&](int geom) {
     const int body = m.geom_bodyid[geom];
     return body > 0 ? NameOf(m, mjOBJ_BODY, body) : NameOf(m, mjOBJ_GEOM, geom);
   };
-  const Collision& collision = step.step->response.collision;
+  const Collision& collision = now.analysis().step->response.collision;
   return name_of(collision.geom1) + " and " + name_of(collision.geom2);
 }
 
@@ -135,10 +157,10 @@ class KappaJudge final : public StatefulJudge {
       : kappa_(setup.fingertips().size()), next_kappa_(kappa_), last_(kappa_.size()) {}
 
   Evaluation Evaluate(const StepAnalysis& step) override {
-    if (step.begins_holding) has_kappa_ = false;
+    if (step.contacts.begins_holding) has_kappa_ = false;
     Evaluation value;
     if (step.step->command.handling.holding) value = CheckValue{Integrate(step)};
-    if (step.is_window_end) {
+    if (step.slip.is_window_end) {
       kappa_.swap(next_kappa_);
       next_kappa_ = step.step->reading.state.kappa;
     }
@@ -156,7 +178,7 @@ class KappaJudge final : public StatefulJudge {
 
   double Integrate(const StepAnalysis& step) {
     const MeasuredState& state = step.step->reading.state;
-    const Surface& object = step.grasp->surface();
+    const Surface& object = step.grasp().surface();
     double apart = 0.0;
     for (size_t i = 0; i < kappa_.size(); ++i) {
       const Vector5d change = CalcChange(step, i);
@@ -164,7 +186,7 @@ class KappaJudge final : public StatefulJudge {
         kappa_[i] = next_kappa_[i] = state.kappa[i];
         continue;
       }
-      const Surface& tip = step.grasp->tip(static_cast<int>(i));
+      const Surface& tip = step.grasp().tip(static_cast<int>(i));
       for (std::vector<ContactCoordinates>* integrated : {&kappa_, &next_kappa_}) {
         ContactCoordinates& kappa = (*integrated)[i];
         FollowCharts(tip, object, state.kappa[i], &kappa);
@@ -181,11 +203,11 @@ class KappaJudge final : public StatefulJudge {
 
   /// By (40), from how fingertip and object have moved since the last step, in the charts of now.
   Vector5d CalcChange(const StepAnalysis& step, size_t finger) {
-    const GraspTerms& grasp = *step.grasp;
+    const GraspTerms& grasp = step.grasp();
     const MeasuredState& state = step.step->reading.state;
     const ContactGeometry& contact = grasp.contacts()[finger].geometry;
-    const Pose X_0f = step.robot->CalcLinkPose(-1).inverse(Eigen::Isometry) *
-                      step.robot->CalcFramePose(grasp.fingertips()[finger]);
+    const Pose X_0f = step.terms().CalcLinkPose(-1).inverse(Eigen::Isometry) *
+                      step.terms().CalcFramePose(grasp.fingertips()[finger]);
     const Pose X_of = state.X_Bo.inverse(Eigen::Isometry) * step.step->reading.X_W0 * X_0f;
     const LastContact last = std::exchange(last_[finger], {state.kappa[finger], contact, X_of});
     if (!has_kappa_) return Vector5d::Zero();

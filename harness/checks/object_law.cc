@@ -192,19 +192,20 @@ class JudgedObjectLaw final : public JudgedLaw {
     return !command.handling.partial && command.force_solves > 0;
   }
 
-  const LawErrors& Compare(const StepRecord& step, const LawTerms& terms, const StepAnalysis& plant,
+  const LawErrors& Compare(const StepRecord& step, const LawTerms& terms, const StepAnalyzer& plant,
                            bool as_commanded) override {
     errors_ = LawErrors{};
     if (!Evaluate(step, terms)) return errors_;
-    const Motion moved = as_commanded ? Motion{&plant.findings.xi_dot_model, &plant.findings.V_Bo_dot_model,
-                                               &plant.findings.f_c_model, plant.mass_factor}
+    const Motion moved = as_commanded ? Motion{&plant.analysis().findings.xi_dot_model,
+                                               &plant.analysis().findings.V_Bo_dot_model,
+                                               &plant.analysis().findings.f_c_model, &plant.mass_factor()}
                                       : Predict(step);
     errors_.torque = CalcTorqueError(step, terms, *moved.mass_factor);
     if (!baseline_) CompareDemand(moved, /*has_slip=*/as_commanded);
     CompareGraspForce(terms, step.command.demand.F_N, baseline_ ? baseline_->f_c() : reference_.f_c());
     if (CalcSpectralRadius() && hold_ == 1) {
-      error_.Follow(step, terms, desired_, plant.declared->is_ideal ? moved.V_Bo_dot : nullptr, &reference_,
-                    &errors_);
+      error_.Follow(step, terms, desired_, plant.analysis().declared->is_ideal ? moved.V_Bo_dot : nullptr,
+                    &reference_, &errors_);
     }
     return errors_;
   }

@@ -137,7 +137,7 @@ void RunChecks::Add(const Judge& judge, CheckRecord* record, double time) {
     value = Worst(std::min(value, record->bound), value - found->explained);
   record->Add(value, time, found->residual.value_or(found->value), found->explained);
   if (judge.info->by.describe != nullptr && record->failed && !had_failed)
-    record->part = judge.info->by.describe(analysis(), found->part);
+    record->part = judge.info->by.describe(analyzer_, found->part);
   differs_ = differs_ || !(record->last <= record->bound);
 }
 
@@ -168,14 +168,14 @@ void RunChecks::Look(const StepRecord& step) {
 
 void RunChecks::JudgeSettling(const StepRecord& step) {
   Analyze(step);
-  if (CompareTorque(step)) analyzer_.SetLaw(&unsent_);
+  if (CompareTorque(step)) analyzer_.SetLaw(unsent_);
   Evaluate(CheckInfo::kSettling, step.time);
 }
 
 bool RunChecks::CompareTorque(const StepRecord& step) {
   if (!law_ || !law_->IsComputed(step.command)) return false;
   // Fingertips may still find their places, so contacts are the controller's.
-  (controller_ ? *controller_ : model_).SetState(*step.model, step.measured.state);
+  (controller_ ? *controller_ : model_).SetState(step.model->grasp(), step.measured.state);
   unsent_.torque = law_->CompareTorque(step, ReadLawTerms(step, /*contacts=*/false));
   return true;
 }
@@ -197,7 +197,7 @@ void RunChecks::JudgeUnsent(const StepRecord& step) {
   Look(step);
   if (!has_law) return;
   unsent_.torque = law_->CompareTorque(step, ReadLawTerms(step, /*contacts=*/true));
-  analyzer_.SetLaw(&unsent_);
+  analyzer_.SetLaw(unsent_);
   Evaluate(CheckInfo::kUnsent, step.time);
 }
 
@@ -217,8 +217,8 @@ void RunChecks::CompareLaw(const StepRecord& step) {
   const bool as_commanded = declared_.is_ideal() && declared_step_->is_measured_right &&
                             step.drive.tau == step.command.tau && step.response.stop_force.size() == 0;
   const LawErrors& errors =
-      law_->Compare(step, ReadLawTerms(step, /*contacts=*/true), analysis(), as_commanded);
-  analyzer_.SetLaw(&errors);
+      law_->Compare(step, ReadLawTerms(step, /*contacts=*/true), analyzer_, as_commanded);
+  analyzer_.SetLaw(errors);
   if (!law_->follows_error() || step.time < setup_->scenario().expect.from) return;
   position_by_law_ = Worst(position_by_law_, errors.position_by_law);
   orientation_by_law_ = Worst(orientation_by_law_, errors.orientation_by_law);

@@ -45,28 +45,25 @@ StepAnalyzer::StepAnalyzer(const Setup& setup)
       actuation_(setup.model()),
       dynamics_(setup.model(), static_cast<int>(setup.fingertips().size())) {
   const Eigen::Index n = setup.model().num_velocities();
-  for (VectorXd* vector : {&now_.applied_force, &now_.bias, &now_.robot_residual, &now_.findings.xi_dot_model,
+  for (VectorXd* vector : {&applied_force_, &bias_, &now_.robot.residual, &now_.findings.xi_dot_model,
                            &acceleration_, &solver_force_, &joint_force_})
     vector->setZero(n);
   if (setup.scenario().plant.type != PlantType::kRigid) {
     const ObjectModel* const object = setup.has_object() ? &setup.declared_object() : nullptr;
     whole_ = std::make_unique<WholeRobot>(setup.declared_model(), object == nullptr ? nullptr : &object->body,
                                           setup.plant_adapter());
-    now_.whole = whole_.get();
     if (ConstraintLaw::Applies(setup.engine())) {
       constraint_law_ = std::make_unique<ConstraintLaw>(setup.declared_model(), object, setup.plant_adapter(),
                                                         *whole_, setup.scenario().tolerance);
     }
-    now_.constraint_law = constraint_law_.get();
     rolling_ = std::make_unique<VelocityMap>(setup.plant_adapter(), Coordinates::kReduced);
     for (VectorXd* vector : {&nu_dot_, &whole_residual_, &whole_size_, &whole_left_, &whole_pushed_})
       vector->setZero(whole_->size());
     engine_force_.setZero(setup.engine().nv);
   }
-  now_.contact_mismatch.setZero(static_cast<Eigen::Index>(setup.fingertips().size()));
+  now_.contacts.mismatch.setZero(static_cast<Eigen::Index>(setup.fingertips().size()));
   least_ = RoundingScales(setup.model()).CalcLeastForces();
   now_.setup = &setup;
-  now_.clearance = &clearance_;
   now_.findings.f_c.setZero(3 * static_cast<Eigen::Index>(setup.fingertips().size()));
   now_.findings.f_c_model = now_.findings.f_c;
   now_.findings.fingertip_slip.resize(setup.fingertips().size());
@@ -94,37 +91,13 @@ void StepAnalyzer::Reset() {
 void StepAnalyzer::Begin(const StepRecord& step, const DeclaredStep& declared) {
   now_.step = &step;
   now_.declared = &declared;
-  now_.robot = &declared.model->robot();
-  now_.grasp = &declared.model->grasp();
-  now_.law = nullptr;
-  CompareMeasurement();
+  now_.law.reset();
   MeasureClearance();
 }
 
-void StepAnalyzer::SetLaw(const LawErrors* errors) {
+void StepAnalyzer::SetLaw(const LawErrors& errors) {
   now_.law = errors;
-  now_.position_by_hold = errors->position_by_hold;
-  now_.orientation_by_hold = errors->orientation_by_hold;
-}
-
-void StepAnalyzer::CompareMeasurement() {
-  const Reading& measured = now_.step->measured;
-  const Reading& declared = now_.declared->measured;
-  double apart = std::abs(measured.touch.support_force - declared.touch.support_force);
-  if (measured.touch.fingertips != declared.touch.fingertips) apart = std::numeric_limits<double>::infinity();
-  const MeasuredState& a = measured.state;
-  const MeasuredState& b = declared.state;
-  apart = Worst(apart, MaxAbs(a.q - b.q));
-  apart = Worst(apart, MaxAbs(a.xi - b.xi));
-  apart = Worst(apart, MaxAbs(a.X_Bo.matrix() - b.X_Bo.matrix()));
-  apart = Worst(apart, MaxAbs(a.V_Bo - b.V_Bo));
-  for (size_t i = 0; i < b.kappa.size(); ++i) {
-    const ContactCoordinates &x = a.kappa[i], &y = b.kappa[i];
-    apart = Worst(apart, MaxAbs(x.CalcVector() - y.CalcVector()), std::abs(a.overlap[i] - b.overlap[i]));
-    if (x.alpha_f.chart != y.alpha_f.chart || x.alpha_o.chart != y.alpha_o.chart)
-      apart = std::numeric_limits<double>::infinity();
-  }
-  now_.measurement_error = apart;
+  now_.by_hold = {errors.position_by_hold, errors.orientation_by_hold};
 }
 
 void StepAnalyzer::MeasureClearance() {
@@ -143,14 +116,8 @@ void StepAnalyzer::MeasureClearance() {
   now_.deepest_overlap = clearance_.FindDeepest();
 }
 
-void StepAnalyzer::CompareMotors() {
-  now_.torque_error = MaxAbs(now_.step->response.motor_torques - now_.declared->tau) /
-                      Worst(MaxAbs(now_.step->command.tau), kTiny);
-}
-
 void StepAnalyzer::Analyze() {
   const StepRecord& step = *now_.step;
-  CompareMotors();
   FindContacts();
   FindTouching();
   if (ground_) FindFeet();
@@ -160,15 +127,15 @@ void StepAnalyzer::Analyze() {
   if (whole_) CalcWholeResidual();
   if (constraint_law_) {
     constraint_law_->SetStep(step.reading.qpos.data(), step.reading.qvel.data(), step.response);
-    now_.constraint_force = constraint_law_->FindWorst();
+    now_.whole.constraint = constraint_law_->FindWorst();
   }
   Predict();
   CalcRobotResidual();
   ComparePrediction();
   if (setup_->has_object()) CalcObjectResidual();
-  now_.begins_holding = step.command.handling.holding && !was_holding_;
+  now_.contacts.begins_holding = step.command.handling.holding && !was_holding_;
   was_holding_ = step.command.handling.holding;
-  if (now_.begins_holding) ForgetSlip();
+  if (now_.contacts.begins_holding) ForgetSlip();
   FollowSlip();
   MoveWindow();
   ++steps_;
@@ -176,14 +143,13 @@ void StepAnalyzer::Analyze() {
 
 void StepAnalyzer::FindTouching() {
   const PlantResponse& response = now_.step->response;
-  now_.touching = 0;
+  now_.contacts.touching = 0;
   for (size_t i = 0; i < response.contacts.size(); ++i) {
-    if (response.contacts[i].touching) now_.touching |= ContactSet{1} << i;
+    if (response.contacts[i].touching) now_.contacts.touching |= ContactSet{1} << i;
   }
   for (size_t i = 0; i < response.feet.size(); ++i) {
-    if (response.feet[i].force.z() > 0.0) now_.touching |= ContactSet{1} << (i % 32);
+    if (response.feet[i].force.z() > 0.0) now_.contacts.touching |= ContactSet{1} << (i % 32);
   }
-  now_.is_supported = !response.support_wrench.isZero(0.0);
 }
 
 void StepAnalyzer::CalcRolling() {
@@ -198,20 +164,20 @@ void StepAnalyzer::CalcRolling() {
   for (Eigen::Index k = 0; k < 2; ++k) {
     const EngineWheel& engine = setup_->adapter().wheels()[static_cast<size_t>(k)];
     const BodyContact& wheel = step.response.wheels[static_cast<size_t>(k)];
-    now_.wheel_rates[k] = engine.axis.y() * step.reading.qvel[engine.dof] + tilting;
-    now_.wheel_mismatch[k] = twist[0] + (k == 0 ? turn : -turn) - base.wheel_radius * now_.wheel_rates[k];
+    now_.wheels.rates[k] = engine.axis.y() * step.reading.qvel[engine.dof] + tilting;
+    now_.wheels.mismatch[k] = twist[0] + (k == 0 ? turn : -turn) - base.wheel_radius * now_.wheels.rates[k];
     // A tyre that gives rolls on a radius that is smaller by as much.
-    now_.wheel_slip[k] = wheel.slip.norm() + Worst(0.0, -wheel.distance) * std::abs(now_.wheel_rates[k]);
+    now_.wheels.slip[k] = wheel.slip.norm() + Worst(0.0, -wheel.distance) * std::abs(now_.wheels.rates[k]);
   }
 }
 
 void StepAnalyzer::CalcContactBias() {
-  VectorXd& bias = now_.contact_bias;
+  VectorXd& bias = contact_bias_;
   if (ground_) {
     bias = ground_->J_dot_xi();
     return;
   }
-  const GraspTerms& grasp = *now_.grasp;
+  const GraspTerms& grasp = now_.grasp();
   const PlantOptions& plant = setup_->scenario().plant;
   bias = grasp.slip_bias();
   if (plant.type == PlantType::kRigid) {
@@ -223,14 +189,14 @@ void StepAnalyzer::CalcContactBias() {
   const Vector6d& V_Bo = grasp.V_Bo();
   Vector3d turning = V_Bo.tail<3>().cross(V_Bo.head<3>());
   if (setup_->model().base().type == BaseType::kDifferentialDrive) {
-    const Vector6d V_B0 = now_.robot->CalcLinkVelocity(-1);
+    const Vector6d V_B0 = now_.terms().CalcLinkVelocity(-1);
     turning -= now_.step->reading.state.X_Bo.linear().transpose() * V_B0.tail<3>().cross(V_B0.head<3>());
   }
   bias.noalias() += grasp.G().topRows<3>().transpose() * turning;
 }
 
 void StepAnalyzer::CalcAppliedForce() {
-  VectorXd& force = now_.applied_force;
+  VectorXd& force = applied_force_;
   actuation_.CalcForce(now_.step->drive.tau, force);
   force += now_.declared->force;
   joint_force_.setZero();
@@ -254,61 +220,61 @@ void StepAnalyzer::CalcAppliedForce() {
 
 void StepAnalyzer::Predict() {
   if (ground_) return PredictStance();
-  const bool whole = now_.touching == AllContacts(now_.grasp->num_contacts());
+  const bool whole = now_.contacts.touching == AllContacts(now_.grasp().num_contacts());
   const bool partial = now_.step->command.handling.partial;
-  if (partial && !whole && now_.touching != 0) return PredictPart();
-  const bool holds = now_.grasp->num_contacts() > 0;
+  if (partial && !whole && now_.contacts.touching != 0) return PredictPart();
+  const bool holds = now_.grasp().num_contacts() > 0;
   const Prediction* prediction = nullptr;
-  if (holds && (!partial || (whole && !now_.is_supported))) {
-    prediction = &dynamics_.Predict(*now_.robot, *now_.grasp, now_.applied_force, ObjectSupport::kHand,
-                                    nullptr, &now_.declared->object_wrench);
+  if (holds && (!partial || (whole && !IsSupported()))) {
+    prediction = &dynamics_.Predict(now_.terms(), now_.grasp(), applied_force_, ObjectSupport::kHand, nullptr,
+                                    &now_.declared->object_wrench);
   } else if (holds && whole) {
-    prediction = &dynamics_.Predict(*now_.robot, *now_.grasp, now_.applied_force, ObjectSupport::kAtRest);
+    prediction = &dynamics_.Predict(now_.terms(), now_.grasp(), applied_force_, ObjectSupport::kAtRest);
   } else {
-    prediction = &dynamics_.PredictFree(*now_.robot, now_.applied_force);
+    prediction = &dynamics_.PredictFree(now_.terms(), applied_force_);
   }
-  now_.findings.xi_dot_model = prediction->xi_dot;
-  now_.findings.V_Bo_dot_model = prediction->V_Bo_dot;
+  KeepPrediction(*prediction, dynamics_.mass_factor());
   now_.findings.f_c_model = prediction->f_c;
-  now_.mass_factor = &dynamics_.mass_factor();
+}
+
+void StepAnalyzer::KeepPrediction(const Prediction& prediction, const TreeFactor& factor) {
+  now_.findings.xi_dot_model = prediction.xi_dot;
+  now_.findings.V_Bo_dot_model = prediction.V_Bo_dot;
+  mass_factor_ = &factor;
 }
 
 void StepAnalyzer::PredictStance() {
-  const Prediction& prediction = ground_dynamics_->Predict(*now_.robot, *ground_, now_.applied_force);
-  now_.findings.xi_dot_model = prediction.xi_dot;
+  const Prediction& prediction = ground_dynamics_->Predict(now_.terms(), *ground_, applied_force_);
+  KeepPrediction(prediction, ground_dynamics_->mass_factor());
   now_.findings.foot_force_model = prediction.f_c;
-  now_.mass_factor = &ground_dynamics_->mass_factor();
 }
 
 void StepAnalyzer::PredictPart() {
-  std::unique_ptr<PartialDynamics>& part = parts_[now_.touching];
-  if (!part) part = std::make_unique<PartialDynamics>(*setup_, now_.touching);
-  part->grasp.SetState(*now_.robot, now_.step->reading.state);
-  const Prediction& prediction =
-      part->dynamics.Predict(*now_.robot, part->grasp.terms(), now_.applied_force,
-                             now_.is_supported ? ObjectSupport::kAtRest : ObjectSupport::kHand, nullptr,
-                             &now_.declared->object_wrench);
-  now_.findings.xi_dot_model = prediction.xi_dot;
-  now_.findings.V_Bo_dot_model = prediction.V_Bo_dot;
+  std::unique_ptr<PartialDynamics>& part = parts_[now_.contacts.touching];
+  if (!part) part = std::make_unique<PartialDynamics>(*setup_, now_.contacts.touching);
+  part->grasp.SetState(now_.terms(), now_.step->reading.state);
+  const Prediction& prediction = part->dynamics.Predict(
+      now_.terms(), part->grasp.terms(), applied_force_,
+      IsSupported() ? ObjectSupport::kAtRest : ObjectSupport::kHand, nullptr, &now_.declared->object_wrench);
+  KeepPrediction(prediction, part->dynamics.mass_factor());
   part->grasp.Scatter(prediction.f_c, now_.findings.f_c_model);
-  now_.mass_factor = &part->dynamics.mass_factor();
 }
 
 void StepAnalyzer::CalcRobotResidual() {
   const PlantResponse& response = now_.step->response;
-  now_.bias = now_.robot->gravity() + now_.robot->friction();
-  now_.bias.noalias() += now_.robot->C() * now_.robot->velocity();
-  VectorXd& residual = now_.robot_residual;
+  bias_ = now_.terms().gravity() + now_.terms().friction();
+  bias_.noalias() += now_.terms().C() * now_.terms().velocity();
+  VectorXd& residual = now_.robot.residual;
   if (whole_ == nullptr) {
     // (48): M_bar' xi_dot + C_bar' xi + F_bar' + J_B'^T f_c - E_bar' tau'
-    residual = now_.bias - now_.applied_force;
-    residual.noalias() += now_.robot->M() * response.xi_dot;
-    residual.noalias() += now_.grasp->J_B().transpose() * now_.findings.f_c;
+    residual = bias_ - applied_force_;
+    residual.noalias() += now_.terms().M() * response.xi_dot;
+    residual.noalias() += now_.grasp().J_B().transpose() * now_.findings.f_c;
   }
-  const double least = Worst(kLeastBias * Norm(now_.applied_force), Norm(least_));
-  now_.balanced = Worst(Norm(now_.bias), least, kTiny);
-  now_.robot_residual_norm = Norm(residual);
-  now_.robot_solver = Norm(solver_force_) / now_.balanced;
+  const double least = Worst(kLeastBias * Norm(applied_force_), Norm(least_));
+  now_.robot.balanced = Worst(Norm(bias_), least, kTiny);
+  now_.robot.error = Norm(residual) / now_.robot.balanced;
+  now_.robot.solver = Norm(solver_force_) / now_.robot.balanced;
 }
 
 void StepAnalyzer::CalcWholeResidual() {
@@ -319,8 +285,8 @@ void StepAnalyzer::CalcWholeResidual() {
   whole.SetState(step.reading.qpos.data(), step.reading.qvel.data());
   whole.ReadRates(response.qacc.data(), &nu_dot_);
   whole.ReadForces(response.left_over.data(), &whole_left_);
-  now_.mass_error = whole.CompareMass(response.mass);
-  now_.bias_error = whole.CompareBias(response.bias);
+  now_.whole.mass = whole.CompareMass(response.mass);
+  now_.whole.bias = whole.CompareBias(response.bias);
 
   VectorXd& residual = whole_residual_;
   residual = whole.bias() - whole_left_;
@@ -346,20 +312,20 @@ void StepAnalyzer::CalcWholeResidual() {
   whole_pushed_.setZero();
   whole.ProjectForces(&whole_pushed_, &whole_size_);
   residual -= whole_pushed_;
-  now_.whole_residual = {0.0, -1};
+  now_.whole.residual = {0.0, -1};
   for (Eigen::Index i = 0; i < residual.size(); ++i) {
     const double left = std::abs(residual[i]) / Positive(whole_size_[i]);
-    if (IsWorse(left, now_.whole_residual.first)) now_.whole_residual = {left, static_cast<int>(i)};
+    if (IsWorse(left, now_.whole.residual.first)) now_.whole.residual = {left, static_cast<int>(i)};
   }
 
   // (48) and (19): the same in the paper's coordinates.
   rolling_->SetState(step.reading.state.q, step.reading.state.xi);
   whole.WriteForces(residual, &engine_force_);
-  rolling_->ProjectForce(engine_force_.data(), now_.robot_residual);
+  rolling_->ProjectForce(engine_force_.data(), now_.robot.residual);
   rolling_->ProjectForce(response.left_over.data(), solver_force_);
   if (!setup_->has_object()) return;
   const Matrix3d R_oB = step.reading.state.X_Bo.linear().transpose();
-  now_.object_residual << R_oB * residual.segment<3>(n), residual.tail<3>();
+  now_.object.residual << R_oB * residual.segment<3>(n), residual.tail<3>();
   object_left_ << R_oB * whole_left_.segment<3>(n), whole_left_.tail<3>();
 }
 
@@ -367,25 +333,25 @@ void StepAnalyzer::ComparePrediction() {
   const StepFindings& findings = now_.findings;
   // |a|_M = |L a|
   acceleration_ = findings.xi_dot_model;
-  now_.mass_factor->Multiply(acceleration_);
+  mass_factor_->Multiply(acceleration_);
   const double predicted = acceleration_.norm();
   acceleration_ = findings.xi_dot_model - now_.step->response.xi_dot;
-  now_.mass_factor->Multiply(acceleration_);
-  now_.acceleration_error = acceleration_.norm() / Worst(now_.balanced, predicted);
+  mass_factor_->Multiply(acceleration_);
+  now_.rigid.acceleration = acceleration_.norm() / Worst(now_.robot.balanced, predicted);
   if (ground_) {
     // Where the rigid system does not determine the forces of single feet, their sum is xi_dot's.
     const bool has_forces = ground_dynamics_->determines_forces();
     // Of feet that leave the ground, what they should bear.
     const double weight = mass_ * setup_->model().gravity().norm();
     const double scale = Worst(findings.foot_force.norm(), weight, kTiny);
-    now_.contact_force_error =
+    now_.rigid.contact_force =
         has_forces ? (findings.foot_force_model - findings.foot_force).norm() / scale : 0.0;
     return;
   }
   double scale = Worst(findings.f_c.norm(), kTiny);
   // Fingertips that only touch push with less than what they will bear.
   if (now_.step->command.handling.partial) scale = Worst(scale, CalcWeight());
-  now_.contact_force_error = (findings.f_c_model - findings.f_c).norm() / scale;
+  now_.rigid.contact_force = (findings.f_c_model - findings.f_c).norm() / scale;
 }
 
 double StepAnalyzer::CalcWeight() const {
@@ -394,24 +360,24 @@ double StepAnalyzer::CalcWeight() const {
 
 void StepAnalyzer::CalcObjectResidual() {
   // (19), as forces at the contacts' arm
-  const GraspTerms& grasp = *now_.grasp;
+  const GraspTerms& grasp = now_.grasp();
   const PlantResponse& response = now_.step->response;
   const ObjectBodyTerms& body = grasp.body();
   // Of an object that is not held, its radius of gyration.
   const double arm = grasp.num_contacts() > 0
                          ? grasp.contacts()[0].geometry.g_o_cf.translation().norm()
                          : std::sqrt(body.M_hat.bottomRightCorner<3, 3>().trace() / body.M_hat(0, 0));
+  now_.object.balanced = Worst(CalcWeight(), now_.findings.f_c.norm());
   const auto relative = [&](const Vector6d& wrench) {
-    return Worst(wrench.head<3>().norm(), wrench.tail<3>().norm() / arm) /
-           Worst(CalcWeight(), now_.findings.f_c.norm());
+    return Worst(wrench.head<3>().norm(), wrench.tail<3>().norm() / arm) / now_.object.balanced;
   };
   if (whole_ == nullptr) {
-    now_.object_residual = body.M_hat * response.V_Bo_dot + body.C_hat * grasp.V_Bo() + body.N_o -
+    now_.object.residual = body.M_hat * response.V_Bo_dot + body.C_hat * grasp.V_Bo() + body.N_o -
                            grasp.G() * now_.findings.f_c - response.support_wrench -
                            now_.declared->object_wrench;
   }
-  now_.object_residual_size = relative(now_.object_residual);
-  now_.object_solver = relative(object_left_);
+  now_.object.error = relative(now_.object.residual);
+  now_.object.solver = relative(object_left_);
 }
 
 }  // namespace dexcheck

@@ -9,6 +9,8 @@
 #include <limits>
 #include <map>
 #include <memory>
+#include <optional>
+#include <utility>
 
 #include "controller/control/actuation.h"
 #include "controller/control/constrained_dynamics.h"
@@ -28,13 +30,6 @@ Vector2d CalcRollingTwist(const Base& base, const VectorXd& xi);
 
 /// Distances are judged from a place between half of this and this ago, s.
 inline constexpr double kSlipWindow = 10.0;
-
-/// The largest over the contacts of one kind.
-struct SlipSummary {
-  double distance = 0.0;  ///< Within the window, less creep, m; of bonds the distance of the joined points.
-  double rate = 0.0;      ///< Less creep, m/s.
-  double cone_use = 0.0;
-};
 
 inline constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
@@ -64,79 +59,90 @@ struct LawErrors {
   double position_by_hold = 0.0, orientation_by_hold = 0.0;
 };
 
-/// One step; n entries of xi, 3N of f_c.
+/// A value, and which part of the robot, which contact or pair of bodies it is of; -1 for none.
+using WorstPart = std::pair<double, int>;
+
+/// Which fingertips and feet touch.
+struct TouchFindings {
+  ContactSet touching = 0;      ///< Fingertips that touch the object, or feet that bear something.
+  bool begins_holding = false;  ///< Whether all fingertips should touch the object from this step on.
+  /// Distance of each fingertip that touches, by the plant less by the declared shapes (N), m; else 0.
+  VectorXd mismatch;
+  double foot_gap = 0.0;    ///< Largest gap of a foot of a robot that stands and the ground, m.
+  WorstPart foot_mismatch;  ///< Largest difference of a foot's distance by plant and declared shapes, m.
+};
+
+/// The largest over the contacts of one kind.
+struct SlipSummary {
+  double distance = 0.0;  ///< Within the window, less creep, m; of bonds the distance of the joined points.
+  double rate = 0.0;      ///< Less creep, m/s.
+  double cone_use = 0.0;
+};
+
+/// How contacts slip.
+struct SlipFindings {
+  SlipSummary fingertips, wheels, feet;
+  bool is_window_end = false;  ///< Whether the window that distances are judged over moves on after the step.
+};
+
+/// How the right and the left wheel of a platform roll, (1).
+struct RollingFindings {
+  Vector2d rates = Vector2d::Zero();     ///< Against the ground, rad/s.
+  Vector2d mismatch = Vector2d::Zero();  ///< v +- w b / 2 - r thetadot, m/s.
+  Vector2d slip = Vector2d::Zero();      ///< What of that slipping and tyres that give may be, m/s.
+};
+
+/// The whole robot and its object (WholeRobot) against the engine: relative errors, and the entry of nu or
+/// the row of the constraints that each is of.
+struct WholeErrors {
+  WorstPart residual = {kNaN, -1};    ///< Of the equations of motion, over the sizes that are summed.
+  WorstPart mass = {kNaN, -1};        ///< M against the engine's.
+  WorstPart bias = {kNaN, -1};        ///< Coriolis forces, gravity and friction against the engine's.
+  WorstPart constraint = {kNaN, -1};  ///< ConstraintLaw::FindWorst.
+};
+
+/// One of (48) and (19) with the plant's accelerations and contact forces.
+template <typename Vector>
+struct Balance {
+  /// M_bar' xi_dot + C_bar' xi + F_bar' + J_B'^T f_c - E_bar' tau' - ... (n), or M_hat V_o_dot + C_hat V_o +
+  /// N_o - G f_c - ... (6).
+  Vector residual;
+  /// What errors are relative to: |C_bar' xi + F_bar'|_M^-1, at least that of
+  /// RoundingScales::CalcLeastForces; the object's weight or the contact forces, N.
+  double balanced = 1.0;
+  double error = kNaN;   ///< The residual's size; of the object as forces at the contacts' arm. Relative.
+  double solver = kNaN;  ///< What the plant's solver left over, likewise.
+};
+
+/// Distance of the rigid constrained system under the same torques from the plant.
+struct RigidErrors {
+  /// |xi_dot_model - xi_dot|_M relative to |xi_dot_model|_M, or to the forces balanced where they are more.
+  double acceleration = kNaN;
+  double contact_force = kNaN;  ///< |f_c_model - f_c|, relative.
+};
+
+/// One step; n entries of xi, 3N of f_c. Its pointers are to what the loop has.
 struct StepAnalysis {
   const Setup* setup = nullptr;
   const StepRecord* step = nullptr;
   const DeclaredStep* declared = nullptr;
-  const ModelTerms* robot = nullptr;  ///< At the true state.
-  const GraspTerms* grasp = nullptr;  ///< Likewise.
+  TouchFindings contacts;
+  SlipFindings slip;
+  RollingFindings wheels;
+  Balance<VectorXd> robot;
+  Balance<Vector6d> object{.residual = Vector6d::Zero()};
+  WholeErrors whole;
+  RigidErrors rigid;
+  std::optional<LawErrors> law;   ///< Of torques that a known law computed at this step.
+  double spectral_radius = kNaN;  ///< Of the law's sampled closed loop, where it has error dynamics.
+  /// LawErrors::position_by_hold, orientation_by_hold of the last step whose law was judged.
+  std::pair<double, double> by_hold;
+  WorstPart deepest_overlap;  ///< Clearance::FindDeepest, of bodies that are not meant to touch.
+  StepFindings findings;      ///< For the step's record.
 
-  // Contacts.
-  ContactSet touching = 0;      ///< Fingertips that touch the object, or feet that bear something.
-  bool is_supported = false;    ///< Whether anything else does.
-  bool begins_holding = false;  ///< Whether all fingertips should touch the object from this step on.
-  bool is_window_end = false;  ///< Whether the window that distances are judged over moves on after the step.
-  int contacts_missing = 0;    ///< Fingertips that do not touch.
-  double penetration = 0.0;    ///< Deepest overlap of a fingertip and the object, m.
-  /// Distance of each fingertip that touches, by the plant less by the declared shapes (N), m; else 0.
-  VectorXd contact_mismatch;
-  /// J_dot qvel of the plant's constraints at the fingertips (3N), or the feet, m/s^2: the model's rates of
-  /// velocities along axes that turn have w x v of object and platform, the engine's have not.
-  VectorXd contact_bias;
-  SlipSummary fingertips, wheels, feet;
-  double foot_gap = 0.0;          ///< Largest gap of a foot of a robot that stands and the ground, m.
-  double foot_penetration = 0.0;  ///< Deepest overlap of a foot and the ground, m.
-  /// Largest difference of a foot's distance by the plant and by the declared shapes, m, and whose it is.
-  std::pair<double, int> foot_mismatch;
-
-  // Wheels.
-  Vector2d wheel_rates = Vector2d::Zero();  ///< Of the right and left wheel against the ground, rad/s.
-  /// v +- w b / 2 - r thetadot of the right and the left wheel, (1), m/s.
-  Vector2d wheel_mismatch = Vector2d::Zero();
-  Vector2d wheel_slip = Vector2d::Zero();  ///< What of that slipping and tyres that give may be, m/s.
-
-  // Dynamics: (48) and (19) with the plant's accelerations and contact forces.
-  VectorXd applied_force;  ///< E_bar' tau' + pushes that are declared + dry friction and joint limits (n).
-  VectorXd bias;           ///< C_bar' xi + F_bar' (n).
-  /// M_bar' = L^T L, of the last prediction; null before the first, and then nothing of the following is set.
-  const TreeFactor* mass_factor = nullptr;
-  double balanced = 1.0;              ///< |bias|_M^-1, at least that of RoundingScales::CalcLeastForces.
-  VectorXd robot_residual;            ///< M_bar' xi_dot + bias + J_B'^T f_c - applied_force (n) of (48).
-  double robot_residual_norm = kNaN;  ///< Of that, |.|_M^-1.
-  /// The largest that is left of the equations of motion of the whole robot and its object (WholeRobot), over
-  /// the sizes that it is the sum of, and which entry of nu it is.
-  std::pair<double, int> whole_residual = {kNaN, -1};
-  /// Its M, and its Coriolis forces, gravity and friction, against the engine's, likewise.
-  std::pair<double, int> mass_error = {kNaN, -1}, bias_error = {kNaN, -1};
-  const WholeRobot* whole = nullptr;  ///< Null for a plant that is not the engine's.
-  /// ConstraintLaw::FindWorst.
-  std::pair<double, int> constraint_force = {kNaN, -1};
-  const ConstraintLaw* constraint_law = nullptr;  ///< Null where the engine has none that it keeps to.
-  double robot_solver = kNaN;  ///< What the plant's solver left over for the robot, relative to `balanced`.
-  Vector6d object_residual = Vector6d::Zero();  ///< M_hat V_o_dot + C_hat V_o + N_o - G f_c - ... of (19).
-  double object_residual_size = kNaN;           ///< Relative, as forces at the contacts' arm.
-  double object_solver = kNaN;                  ///< What the plant's solver left over, likewise.
-
-  // What the rigid constrained system does under the same torques.
-  /// |xi_dot_model - xi_dot|_M relative to |xi_dot_model|_M, or to `balanced` where that is more.
-  double acceleration_error = kNaN;
-  double contact_force_error = kNaN;  ///< |f_c_model - f_c|, relative.
-
-  // Law, motors and sensors.
-  double measurement_error =
-      kNaN;                    ///< What was measured against what the declared sensing makes of the truth.
-  double torque_error = kNaN;  ///< Largest torque received against the declared one, over the largest.
-  const LawErrors* law = nullptr;  ///< Of torques that a known law computed at this step; null otherwise.
-  double spectral_radius = kNaN;   ///< Of the law's sampled closed loop, where it has error dynamics.
-  /// LawErrors, of the last step whose law was judged.
-  double position_by_hold = 0.0, orientation_by_hold = 0.0;
-
-  // Bodies that are not meant to touch.
-  const Clearance* clearance = nullptr;
-  std::pair<double, int> deepest_overlap;  ///< Clearance::FindDeepest.
-
-  StepFindings findings;  ///< For the step's record.
+  /// Terms at the true state.
+  [[nodiscard]] const ModelTerms& terms() const { return declared->model->robot(); }
+  [[nodiscard]] const GraspTerms& grasp() const { return declared->model->grasp(); }
 };
 
 /// Forms the analysis of each step. Nothing allocates after construction, except where a task's set of
@@ -156,12 +162,21 @@ class StepAnalyzer {
   void SetStep(const StepRecord& step) { now_.step = &step; }
   void SetSpectralRadius(double radius) { now_.spectral_radius = radius; }
   /// Keeps what was found of the same step's law.
-  void SetLaw(const LawErrors* errors);
+  void SetLaw(const LawErrors& errors);
   /// Forgets all steps so far, but for clearances: time begins anew.
   void Reset();
   void RestartClearance() { clearance_.Restart(); }
   /// Of the last step.
   [[nodiscard]] const StepAnalysis& analysis() const { return now_; }
+
+  // What it is formed with, at the last step.
+  /// M_bar' = L^T L, of the last prediction.
+  [[nodiscard]] const TreeFactor& mass_factor() const { return *mass_factor_; }
+  [[nodiscard]] const Clearance& clearance() const { return clearance_; }
+  /// Null for a plant that is not the engine's.
+  [[nodiscard]] const WholeRobot* whole() const { return whole_.get(); }
+  /// Null where the engine has no law that it keeps to.
+  [[nodiscard]] const ConstraintLaw* constraint_law() const { return constraint_law_.get(); }
 
  private:
   /// Contacts of a task, and how the rigid system behaves with them.
@@ -170,13 +185,14 @@ class StepAnalyzer {
     PartialGrasp grasp;
     ConstrainedDynamics dynamics;
   };
-  void CompareMeasurement();
   void MeasureClearance();
-  void CompareMotors();
   void FindContacts();
   void FindTouching();
   void CalcRolling();
+  /// J_dot qvel of the plant's constraints at the fingertips (3N), or the feet, m/s^2: the model's rates of
+  /// velocities along axes that turn have w x v of object and platform, the engine's have not.
   void CalcContactBias();
+  /// E_bar' tau' + pushes that are declared + dry friction and joint limits (n).
   void CalcAppliedForce();
   void Predict();
   void PredictPart();
@@ -193,15 +209,18 @@ class StepAnalyzer {
   void ForgetSlip();
   void MoveWindow();
   /// |f|_M^-1 = |L^-T f|
-  [[nodiscard]] double Norm(const VectorXd& force) {
-    return now_.mass_factor->CalcForceNorm(force, &norm_work_);
-  }
+  [[nodiscard]] double Norm(const VectorXd& force) { return mass_factor_->CalcForceNorm(force, &norm_work_); }
   [[nodiscard]] double CalcWeight() const;  // of the object, N
+  /// Whether anything but fingertips touches the object.
+  [[nodiscard]] bool IsSupported() const { return !now_.step->response.support_wrench.isZero(0.0); }
+  void KeepPrediction(const Prediction& prediction, const TreeFactor& factor);
 
   const Setup* setup_;
   double time_step_;
   double mass_;  // of the robot, kg
   StepAnalysis now_;
+  const TreeFactor* mass_factor_ = nullptr;
+  VectorXd contact_bias_, applied_force_, bias_;  // 3N; n; n, C_bar' xi + F_bar'
   Clearance clearance_;
   MjDataPtr kinematics_;  // of a plant that has no bodies of the engine's
   ActuationMap actuation_;

@@ -116,23 +116,22 @@ std::optional<ObjectCoordinates> StepModelCheck::FindCoordinates(const GraspTerm
   return ObjectCoordinates{grasp.X_o(), grasp.X_o_dot()};
 }
 
-void StepModelCheck::SetState(const GraspModel& model, const MeasuredState& state) {
-  const std::optional<ObjectCoordinates> coordinates = FindCoordinates(model.grasp());
+void StepModelCheck::SetState(const GraspTerms& grasp, const MeasuredState& state) {
+  const std::optional<ObjectCoordinates> coordinates = FindCoordinates(grasp);
   engine_.SetState(state.q, state.xi, state.X_Bo, state.V_Bo, coordinates ? &*coordinates : nullptr);
 }
 
 void StepModelCheck::Compare(const ModelTerms& robot, const GraspTerms& grasp, const MeasuredState& state,
                              const Pose& X_W0, double when) {
   const bool has_object = comparison_.model().object().has_value();
-  const std::optional<ObjectCoordinates> coordinates = FindCoordinates(grasp);
-  engine_.SetState(state.q, state.xi, state.X_Bo, state.V_Bo, coordinates ? &*coordinates : nullptr);
+  SetState(grasp, state);
   controller_.Read(robot, grasp, state);
   comparison_.SetScales(robot, state.q, state.xi);
   ScaleContext& scales = comparison_.scales();
   if (has_object) {
     const Vector6d& V = controller_.object().V_Bo;
     double rate = Worst(V.head<3>().norm(), V.tail<3>().norm());
-    if (coordinates) rate = Worst(rate, coordinates->X_o_dot.tail<3>().cwiseAbs().sum());
+    if (has_coordinates_) rate = Worst(rate, grasp.X_o_dot().tail<3>().cwiseAbs().sum());
     scales.object =
         CalcObjectScales(grasp.object(), grasp.gravity(), engine_.object().pose.col(3).norm(), rate);
   }

@@ -56,7 +56,7 @@ class StepModelCheck {
   void LeaveOutContacts();
 
   /// Evaluates the engine's terms alone, without those of contacts.
-  void SetState(const GraspModel& model, const MeasuredState& state);
+  void SetState(const GraspTerms& grasp, const MeasuredState& state);
 
   /// Nothing allocates but for what fails first.
   /// @param robot, grasp evaluated at `state`, reduced coordinates, CalcDynamics included.

@@ -185,7 +185,7 @@ void PrintRunReport(const Setup& setup, const ClosedLoop& loop, const RunResult&
     }
     if (scenario.imperfections.actuation.saturates()) PrintLimits(loop.motors(), result.limited);
     if (loop.task() != nullptr) PrintTask(loop);
-    if (loop.is_checking()) PrintClearance(*loop.checks().analysis().clearance);
+    if (loop.is_checking()) PrintClearance(loop.checks().clearance());
     if (loop.is_checking()) PrintRigidContacts(loop.checks());
     if (loop.is_checking()) PrintChecks(setup, loop, detail);
     PrintSpeed(loop, result);

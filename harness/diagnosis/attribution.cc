@@ -150,7 +150,7 @@ Cause AttributeExpectation(const CheckRecord& check, const CheckContext& context
   const bool position = check.name == "expect_position";
   const double by_law = position ? context.position_by_law : context.orientation_by_law;
   const Cause other = context.is_ideal ? Cause::kControlLaw : Cause::kDeclared;
-  if (by_law < 0.0) return other;
+  if (!(by_law >= 0.0)) return other;
   *evidence += "; (57) by itself leaves " + FormatNumber(by_law, 3) + " " + check.unit;
   if (by_law >= 0.5 * check.worst) return Cause::kControlLaw;
   *evidence += context.is_ideal ? ", contacts that give the rest"

@@ -258,7 +258,7 @@ void LawEntryList::AddExchanges() {
     }
     AddEdit("M_bar' without the coupling of " + both, [i = i, j = j](const LawSnapshot&, LawInputs* inputs) {
       inputs->M(i, j) = inputs->M(j, i) = 0.0;
-    });
+    }).is_variant = i > 0;
   }
 }
 

@@ -19,18 +19,38 @@ using Eigen::Index;
 /// A fault that several signals have, with the same value.
 struct CommonFault {
   Fault fault;
+  Index begin = 0;  ///< The first step that shows it.
   std::vector<size_t> members;
   std::set<std::string> groups;
 };
 
-/// Whether a fault of one signal is that of all: the same kind, with values that differ by no more than
-/// errors.
-bool IsOne(const Fault& fault, const Fault& of_all) {
-  constexpr double kSame = 1e-4;
-  if (fault.fault != of_all.fault || fault.unit != of_all.unit) return false;
-  return fault.detail == kOrMore ? of_all.value >= fault.value
-                                 : std::abs(fault.value - of_all.value) <=
-                                       kSame * std::abs(of_all.value) + 3.0 * (fault.error + of_all.error);
+double CalcRms(const VectorXd& x) { return x.norm() / std::sqrt(static_cast<double>(x.size())); }
+
+/// What remembers is not known where the steps before are not: there it is as it should be.
+void Ignore(const Fault& fault, const VectorXd& right, const SignalSeries& series, VectorXd* signal) {
+  const bool is_late = fault.fault == "delay";
+  if ((!is_late && fault.fault != "lag") ||
+      std::count(series.has_history.begin(), series.has_history.end(), true) < kFewestSteps)
+    return;
+  // What is late is known after its delay, and another delay may need it.
+  const double remembered = is_late ? fault.value : static_cast<double>(StepStore::kHistory);
+  double known = 0.0;  // steps since the last gap
+  for (Index i = 0; i < signal->size(); ++i, ++known) {
+    if (series.has_history[static_cast<size_t>(i)]) known = -1.0;
+    if (known >= 0.0 && known < remembered) (*signal)[i] = right[i];
+  }
+}
+
+/// The series of one of which this fault is expected.
+SignalSeries ExpectFault(const SignalSeries& series, const CommonFault& common) {
+  SignalSeries after = series;
+  after.from = after.to = std::numeric_limits<double>::quiet_NaN();
+  after.expected = Transmit(common.fault, series, common.begin);
+  Fault off = common.fault;
+  off.value += off.error;
+  after.noise = std::max(series.noise, CalcRms(Transmit(off, series, common.begin) - after.expected));
+  Ignore(common.fault, series.got, series, &after.expected);
+  return after;
 }
 
 /// The signals of one channel.
@@ -52,11 +72,11 @@ class SignalGroup {
     const std::optional<CommonFault> common = FindCommon();
     if (common) causes.push_back(TellCommon(*common));
     for (size_t i = 0; i < series_.size(); ++i) {
-      if (common && (Has(common->members, i) || IsLateOrientation(*common, i))) continue;
-      Causes own;
-      TellVerdict(verdicts_[i], channel_, &own);
-      if (common) SubtractCommon(common->fault, &own);
-      std::move(own.begin(), own.end(), std::back_inserter(causes));
+      if (!common) {
+        TellVerdict(verdicts_[i], channel_, &causes);
+      } else if (!Has(common->members, i) && !IsLateOrientation(*common, i)) {
+        TellVerdict(JudgeBeside(i, *common), channel_, &causes);
+      }
     }
     return causes;
   }
@@ -64,15 +84,6 @@ class SignalGroup {
  private:
   static bool Has(const std::vector<size_t>& members, size_t i) {
     return std::find(members.begin(), members.end(), i) != members.end();
-  }
-
-  /// Whether a fault of all would do in the place of the one fault of a signal.
-  [[nodiscard]] bool MayHave(size_t i, const Fault& of_all) const {
-    return verdicts_[i].is_explained && std::ranges::any_of(verdicts_[i].fits, [&](const SignalFit& fit) {
-             return fit.faults.size() == 1 && std::ranges::any_of(fit.same.front(), [&](const Fault& other) {
-                      return IsOne(other, of_all);
-                    });
-           });
   }
 
   /// Faults that alone explain a signal, those of like value together.
@@ -83,54 +94,50 @@ class SignalGroup {
       for (const SignalFit& fit : verdicts_[i].fits)
         if (fit.faults.size() == 1 && !fit.is_noise) Collect(i, fit.faults.front(), &all);
     }
-    // A signal of which nothing came may have any step that is large enough.
-    for (CommonFault& one : all) {
-      for (size_t i = 0; i < verdicts_.size(); ++i)
-        if (!Has(one.members, i) && one.groups.contains(series_[i].name.group) && MayHave(i, one.fault))
-          one.members.push_back(i);
-    }
     return all;
   }
 
   void Collect(size_t i, const Fault& fault, std::vector<CommonFault>* all) const {
-    auto same = std::ranges::find_if(*all, [&](const CommonFault& one) { return IsOne(fault, one.fault); });
-    if (same == all->end()) same = all->insert(all->end(), CommonFault{fault, {}, {}});
+    constexpr double kSame = 1e-4;
+    auto same = std::find_if(all->begin(), all->end(), [&](const CommonFault& one) {
+      return one.fault.fault == fault.fault && one.fault.unit == fault.unit &&
+             std::abs(one.fault.value - fault.value) <=
+                 kSame * std::abs(one.fault.value) + 3.0 * (fault.error + one.fault.error);
+    });
+    const Index begin = verdicts_[i].steps.first;
+    if (same == all->end()) same = all->insert(all->end(), CommonFault{fault, begin, {}, {}});
     if (fault.error < same->fault.error) same->fault = fault;
+    same->begin = std::min(same->begin, begin);
     same->members.push_back(i);
     same->groups.insert(series_[i].name.group);
   }
 
-  [[nodiscard]] std::optional<CommonFault> FindCommon() const {
-    constexpr size_t kSeveral = 3;
-    const std::vector<CommonFault> all = ListCommon();
-    const auto most =
-        std::ranges::max_element(all, {}, [](const CommonFault& one) { return one.members.size(); });
-    if (most == all.end() || most->members.size() < kSeveral) return std::nullopt;
-    size_t could = 0;
-    for (const std::string& group : most->groups) could += sizes_.at(group);
-    return 3 * most->members.size() < could ? std::nullopt : std::optional(*most);
+  /// Those that differ as that fault alone would make them, whatever else does as well.
+  void Absorb(CommonFault* common) const {
+    for (size_t i = 0; i < series_.size(); ++i) {
+      if (Has(common->members, i) || verdicts_[i].steps.rows.empty()) continue;
+      if (common->groups.count(series_[i].name.group) == 0) continue;
+      const SignalSeries after = ExpectFault(series_[i], *common);
+      const SignalSteps& steps = verdicts_[i].steps;
+      if (((steps.Take(after.got) - steps.Take(after.expected)).abs() <= SignalSeries::kLeft * after.noise)
+              .all())
+        common->members.push_back(i);
+    }
+    std::sort(common->members.begin(), common->members.end());
   }
 
-  /// Leaves what a signal has of its own: a second gain multiplies that of all, a second delay adds to
-  /// theirs. An explanation without the fault of all explains nothing, since the signal has that fault, too.
-  static void SubtractCommon(const Fault& common, Causes* own) {
-    const auto has_kind = [&](const Explanation& one) {
-      return std::ranges::any_of(one.faults, [&](const Fault& fault) { return fault.fault == common.fault; });
-    };
-    const bool has_any = std::ranges::any_of(*own, has_kind);
-    for (Explanation& one : *own) {
-      if (!has_any || one.faults.front().fault == kNoise) one.outcome = CauseOutcome::kNotExplained;
+  [[nodiscard]] std::optional<CommonFault> FindCommon() const {
+    constexpr size_t kSeveral = 3;
+    std::optional<CommonFault> most;
+    for (CommonFault& one : ListCommon()) {
+      if (one.members.size() < 2) continue;
+      if (Transmit(one.fault, series_.front()).size() > 0) Absorb(&one);
+      if (one.members.size() >= kSeveral && (!most || one.members.size() > most->members.size())) most = one;
     }
-    std::erase_if(*own, [&](const Explanation& one) {
-      return one.outcome != CauseOutcome::kNotExplained &&
-             std::ranges::any_of(one.faults, [&](const Fault& fault) { return IsOne(fault, common); });
-    });
-    for (Explanation& one : *own) {
-      for (Fault& fault : one.faults) {
-        if (fault.fault != common.fault || fault.detail == kOrMore) continue;
-        fault.value = fault.fault == "gain" ? fault.value / common.value : fault.value - common.value;
-      }
-    }
+    if (!most) return most;
+    size_t could = 0;
+    for (const std::string& group : most->groups) could += sizes_.at(group);
+    return 3 * most->members.size() < could ? std::nullopt : most;
   }
 
   /// Whether these are all groups that move.
@@ -139,7 +146,7 @@ class SignalGroup {
            (common.groups.size() > 2 || (common.groups.size() > 1 && common.groups.size() >= moving_.size()));
   }
 
-  /// Whether this is an orientation under a delay of all: only its change is kept, which shows no delay.
+  /// Of an orientation the change is kept, which shows no delay of its own.
   [[nodiscard]] bool IsLateOrientation(const CommonFault& common, size_t i) const {
     return common.fault.fault == "delay" && IsOfAll(common) && series_[i].name.group == "object orientation";
   }
@@ -157,6 +164,23 @@ class SignalGroup {
       one.ends = one.ends && steps.ends;
     }
     return one;
+  }
+
+  /// Judges a signal for a fault of its own, after the fault that all signals share.
+  [[nodiscard]] SignalVerdict JudgeBeside(size_t i, const CommonFault& common) const {
+    const SignalVerdict& alone = verdicts_[i];
+    if (alone.steps.rows.empty() || Transmit(common.fault, series_[i]).size() == 0) return alone;
+    std::vector<SignalSeries> others;
+    for (const SignalSeries& other : series_)
+      if (other.name.group == series_[i].name.group) others.push_back(ExpectFault(other, common));
+    const SignalVerdict beside = JudgeSignal(ExpectFault(series_[i], common), others);
+    const auto count = [](const SignalVerdict& of) { return of.fits.front().faults.size(); };
+    const bool is_beside = beside.is_explained && (!alone.is_explained || count(beside) <= count(alone));
+    SignalVerdict best = is_beside ? beside : alone;
+    // Noise that is rounded, or less than the steps, has another deviation.
+    if (common.fault.fault == "rounding to steps of" && best.is_explained && best.fits.front().is_noise)
+      best.is_explained = false;
+    return best;
   }
 
   std::vector<SignalSeries> series_;

@@ -11,12 +11,6 @@
 
 namespace dexcheck {
 
-/// The detail of a fault whose value is a lower bound.
-inline constexpr const char* kOrMore = "or more";
-
-/// The fault of a signal whose steps differ by what is random.
-inline constexpr const char* kNoise = "noise, standard deviation";
-
 /// One motor or one entry of a reading, step by step.
 struct SignalSeries {
   SignalName name;

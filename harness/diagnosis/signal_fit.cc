@@ -104,7 +104,7 @@ SignalFit MakeFit(const SignalSeries& series, const SignalSteps& steps, const Si
   }
   const double left = std::sqrt(fit.selection.residual.squaredNorm() / static_cast<double>(y.size()));
   if (left > SignalSeries::kLeft * std::sqrt(floor) && IsWhite(fit.selection.residual)) {
-    fit.faults.push_back({kNoise, place, left * series.noise,
+    fit.faults.push_back({"noise, standard deviation", place, left * series.noise,
                           left * series.noise / std::sqrt(2.0 * static_cast<double>(y.size())),
                           series.name.unit, ""});
     fit.same.emplace_back();
@@ -129,8 +129,8 @@ void AddSilence(const SignalSeries& series, double largest, SignalFit* dead) {
   const std::string& place = dead->faults.front().place;
   const std::string& unit = series.name.unit;
   if (series.name.group == "motors")
-    dead->same.front().push_back({"dead zone", place, largest, 0.0, unit, kOrMore});
-  dead->same.front().push_back({"rounding to steps of", place, 2.0 * largest, 0.0, unit, kOrMore});
+    dead->same.front().push_back({"dead zone", place, largest, 0.0, unit, "or more"});
+  dead->same.front().push_back({"rounding to steps of", place, 2.0 * largest, 0.0, unit, "or more"});
 }
 
 }  // namespace

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <string_view>
 #include <utility>
 
 namespace dexcheck {
@@ -22,9 +21,6 @@ VectorXd Shift(const VectorXd& signal, Index back) {
   return late;
 }
 
-/// What a transmission with this fault makes of a series, at all steps.
-VectorXd Transmit(std::string_view fault, double value, const SignalSeries& series);
-
 class ShapeList {
  public:
   ShapeList(const SignalSeries& series, const SignalSteps& steps)
@@ -42,7 +38,7 @@ class ShapeList {
          .unit = unit,
          .value = value,
          .parameters = parameters,
-         .output = Transmit(fault, value, series_),
+         .output = Transmit({fault, "", value, 0.0, "", ""}, series_),
          .has_gain = has_gain,
          .tried = tried});
   }
@@ -84,7 +80,7 @@ class ShapeList {
     if (less.empty()) return;
     std::nth_element(less.begin(), less.begin() + static_cast<std::ptrdiff_t>(less.size() / 2), less.end());
     const double zone = less[less.size() / 2];
-    if (zone > 0.0 && !IsRefuted(series_, steps_, Transmit("dead zone", zone, series_)))
+    if (zone > 0.0 && !IsRefuted(series_, steps_, Transmit({"dead zone", "", zone, 0.0, "", ""}, series_)))
       Add("dead zone", unit, zone, false);
   }
 
@@ -194,6 +190,22 @@ class ShapeList {
   std::vector<SignalShape> shapes_;
 };
 
+VectorXd TransmitAlways(const Fault& fault, const SignalSeries& series) {
+  const VectorXd& u = series.expected;
+  const ArrayXd size = u.array().abs();
+  const double value = fault.value;
+  if (fault.fault == "gain") return value * u;
+  if (fault.fault == "offset") return u.array() + value;
+  if (fault.fault == "stuck at") return VectorXd::Constant(u.size(), value);
+  if (fault.fault == "limit") return u.cwiseMin(value).cwiseMax(-value);
+  if (fault.fault == "dead zone") return u.array().sign() * (size - value).max(0.0);
+  if (fault.fault == "rounding to steps of") return value * (u.array() / value).round();
+  if (fault.fault != "delay") return {};
+  const Index last = u.size() - 1, whole = std::min(static_cast<Index>(value), last);
+  const VectorXd late = Shift(u, whole);
+  return late + (value - std::floor(value)) * (Shift(u, std::min(whole + 1, last)) - late);
+}
+
 /// Whether a step comes long after the one before it.
 bool IsAfterGap(const VectorXd& time, Index step) {
   return step == 0 || time[step] - time[step - 1] > 1.5 * (time[1] - time[0]);
@@ -207,19 +219,27 @@ VectorXd FollowAtDistance(double half, const SignalSeries& series) {
   return output;
 }
 
-VectorXd Transmit(std::string_view fault, double value, const SignalSeries& series) {
+}  // namespace
+
+VectorXd Transmit(const Fault& fault, const SignalSeries& series, Index begin) {
   const VectorXd& u = series.expected;
-  if (fault == "play") return FollowAtDistance(value, series);
-  if (fault == "stuck at") return VectorXd::Constant(u.size(), value);
-  if (fault == "limit") return u.cwiseMin(value).cwiseMax(-value);
-  if (fault == "dead zone") return u.array().sign() * (u.array().abs() - value).max(0.0);
-  if (fault == "rounding to steps of") return value * (u.array() / value).round();
-  const Index last = u.size() - 1, whole = std::min(static_cast<Index>(value), last);
-  const VectorXd late = Shift(u, whole);
-  return late + (value - std::floor(value)) * (Shift(u, std::min(whole + 1, last)) - late);
+  if (fault.fault == "play") return FollowAtDistance(fault.value, series);
+  const bool is_lag = fault.fault == "lag" && u.size() > 1;
+  VectorXd output = is_lag ? u : TransmitAlways(fault, series);
+  if (output.size() == 0) return output;
+  output.head(begin) = u.head(begin);
+  if (!is_lag) return output;
+  // Until it begins it keeps up.
+  const double decay = CalcDecay(fault, series);
+  if (begin == 0) output[0] = series.got[0];
+  for (Index i = std::max<Index>(begin, 1); i < u.size(); ++i)
+    output[i] = decay * output[i - 1] + (1.0 - decay) * u[i];
+  return output;
 }
 
-}  // namespace
+double CalcDecay(const Fault& lag, const SignalSeries& series) {
+  return std::exp(-(series.time[1] - series.time[0]) / lag.value);
+}
 
 SignalSteps FindSteps(const SignalSeries& series) {
   SignalSteps steps;

@@ -46,6 +46,12 @@ struct SignalShape {
   int changes = 0;
 };
 
+/// What this fault alone makes of a series from a step on, at all steps; empty for one that no signal follows
+/// from.
+VectorXd Transmit(const Fault& fault, const SignalSeries& series, Eigen::Index begin = 0);
+/// e^(-step / time) of a lag, of the step of a series.
+double CalcDecay(const Fault& lag, const SignalSeries& series);
+
 std::vector<SignalShape> ListShapes(const SignalSeries& series, const SignalSteps& steps,
                                     const std::vector<SignalSeries>& others);
 

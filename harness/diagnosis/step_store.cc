@@ -164,11 +164,11 @@ void StepStore::Pack(const StepRecord& step, const StepAnalysis& now, Judged jud
   at(kNoise).setZero();
   at(kUneven).setZero();
   at(kDryFriction).setZero();
-  if (has_forces && now.mass_factor != nullptr) {
+  if (has_forces) {
     // What motors did not give is theirs, and no force of its own.
     force_ = step.drive.tau - response.motor_torques;
     actuation_.CalcForce(force_, force_);
-    at(kRobotResidual) = now.robot_residual + force_;
+    at(kRobotResidual) = now.robot.residual + force_;
     if (response.dry_friction.size() == at(kDryFriction).size()) {
       at(kDryFriction) = response.dry_friction;
       for (int k = 0; k < setup_->model().num_dofs(); ++k) {
@@ -179,7 +179,7 @@ void StepStore::Pack(const StepRecord& step, const StepAnalysis& now, Judged jud
       }
     }
     // As the bounds of the inverse dynamics have it, an entry.
-    at(kNoise) << 1e-6 * now.balanced / std::sqrt(static_cast<double>(force_.size())),
+    at(kNoise) << 1e-6 * now.robot.balanced / std::sqrt(static_cast<double>(force_.size())),
         1e-9 * std::max(now.findings.f_c.norm(), 1e-3) / std::sqrt(6.0);
     // The columns of causes are those of a platform that is level and rolls: gravity along a floor that
     // tilts, and sideways in a turn, on all masses.
@@ -191,23 +191,23 @@ void StepStore::Pack(const StepRecord& step, const StepAnalysis& now, Judged jud
     at(kUneven)[0] =
         (setup_->model().gravity().norm() * step.reading.departure.tilt + 2.0 * slip * turn) * root_mass_;
   }
-  at(kObjectResidual) = has_forces ? now.object_residual : Vector6d(Vector6d::Zero());
+  at(kObjectResidual) = has_forces ? now.object.residual : Vector6d(Vector6d::Zero());
   const Pose& X_Bo = step.reading.state.X_Bo;
   at(kObjectPose).head<9>() = X_Bo.linear().reshaped();
   at(kObjectPose).tail<3>() = X_Bo.translation();
   at(kObjectMotion) << step.reading.state.V_Bo, response.V_Bo_dot;
-  at(kWheelRates) = now.wheel_rates;
-  at(kWheelMismatch) = now.wheel_mismatch;
+  at(kWheelRates) = now.wheels.rates;
+  at(kWheelMismatch) = now.wheels.mismatch;
   at(kWheelNoise).setZero();
   if (has_forces && response.wheels.size() == 2)
-    at(kWheelNoise) = now.wheel_slip.array() + kRollingRounding * rolling_bound_;
-  at(kContactMismatch) = now.contact_mismatch;
+    at(kWheelNoise) = now.wheels.slip.array() + kRollingRounding * rolling_bound_;
+  at(kContactMismatch) = now.contacts.mismatch;
   at(kContactMoment).setZero();
   for (size_t i = 0; i < std::min(response.contacts.size(), setup_->fingertips().size()); ++i) {
     const PlantContact& contact = response.contacts[i];
     at(kContactMoment).segment<3>(3 * static_cast<Eigen::Index>(i)) = contact.normal.cross(contact.force);
   }
-  at(kLawDiffers)[0] = now.law != nullptr && law_ != nullptr && law_->differs() ? 1.0 : 0.0;
+  at(kLawDiffers)[0] = now.law && law_ != nullptr && law_->differs() ? 1.0 : 0.0;
 }
 
 void StepStore::Add(const StepRecord& step, const StepAnalysis& analysis, bool differs, Judged judged) {

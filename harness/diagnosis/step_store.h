@@ -53,9 +53,9 @@ class StepStore {
     kNoise,            ///< 2: of an entry of the robot's residual, in |.|_M^-1, and of the object's, N.
     kUneven,           ///< What tilt and slip of the platform can make of a cause's column, in |.|_M^-1.
     kWheelRates,       ///< 2, right and left, rad/s.
-    kWheelMismatch,    ///< 2, StepAnalysis::wheel_mismatch, m/s.
+    kWheelMismatch,    ///< 2, RollingFindings::mismatch, m/s.
     kWheelNoise,       ///< 2: what of that slipping is, and rounding, m/s; 0 without wheels.
-    kContactMismatch,  ///< N: StepAnalysis::contact_mismatch, m.
+    kContactMismatch,  ///< N: TouchFindings::mismatch, m.
     kContactMoment,    ///< 3N: n x f of the normal into the object and the force on it, world, N.
     kLawDiffers,       ///< 1 where the torques are not the law's, else 0.
     kSignalCount

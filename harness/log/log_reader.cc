@@ -266,6 +266,8 @@ auto Guard(const std::filesystem::path& path, const Work& work) {
 
 LogReader::LogReader(const std::filesystem::path& path) : path_(path) {
   const hdf5::SilencedErrors silenced;
+  if (path.has_parent_path() && std::filesystem::is_regular_file(path.parent_path()))
+    throw InputError(path.parent_path().string() + ": must be the folder of a run, is a file");
   RequireHdf5(path);
   NoteInput(path);
   ChildProcess trial("reading a log", [&](int /*channel*/) {

@@ -56,21 +56,38 @@ void LibraryController::RequireInterface() const {
 }
 
 void LibraryController::Follow(const Trajectory& motion) {
+  steps_until_due_ = 0;
   library_->Guard([&] { controller_->Follow(motion); });
 }
 
 void LibraryController::Begin(double t, const Reading& reading) {
   if (joints_) joints_->Begin();
+  steps_until_due_ = 0;
   library_->Guard([&] { controller_->Begin(t, reading); }, ForeignLibrary::kPatience);
 }
 
 void LibraryController::Step(const Reading& reading, double t, Command* command) {
   if (joints_) {
     joints_->Fill(reading, t, command);
-    command->computes_joints = true;
+    command->computes_joints = steps_until_due_ == 0;
   }
   library_->Guard([&] { controller_->Step(reading, t, command); });
   RequireTorques(setup_.name, *command, setup_.model->num_velocities());
+  RequireHeld(command->tau);
+}
+
+void LibraryController::RequireHeld(const VectorXd& tau) {
+  const Sampling& sampling = setup_.sampling;
+  if (steps_until_due_ == 0) {
+    steps_until_due_ = sampling.hold;
+    held_ = tau;
+  }
+  --steps_until_due_;
+  if (tau != held_) {
+    throw ControllerFailure(fmt::format("{}: changed its torques within plant.control_step ({} s)",
+                                        setup_.name,
+                                        static_cast<double>(sampling.hold) * sampling.time_step));
+  }
 }
 
 }  // namespace dexcheck

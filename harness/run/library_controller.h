@@ -11,8 +11,8 @@
 
 namespace dexcheck {
 
-/// One behind controller/control/controller_library.h. What it throws ends the run, with its words;
-/// a torque of the wrong size likewise.
+/// A controller behind controller/control/controller_library.h. What it throws ends the run, with its words.
+/// So do a torque of the wrong size, and another torque before the control step is over.
 class LibraryController final : public Controller {
  public:
   /// @throws InputError when the library names no controller, was built for another interface, makes no
@@ -27,10 +27,13 @@ class LibraryController final : public Controller {
 
  private:
   void RequireInterface() const;
+  void RequireHeld(const VectorXd& tau);
 
   OwnControllerSetup setup_;
   ControllerParameters parameters_;
   std::optional<JointDemand> joints_;
+  long steps_until_due_ = 0;
+  VectorXd held_;                            // torques of the last control step, n
   std::unique_ptr<ForeignLibrary> library_;  // outlives the controller
   std::unique_ptr<Controller> controller_;
 };

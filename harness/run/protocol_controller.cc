@@ -39,7 +39,7 @@ void ProtocolController::Greet() {
   hello.contacts = count;
   hello.robot_bytes = static_cast<uint32_t>(setup_.robot_text.size());
   hello.scenario_bytes = static_cast<uint32_t>(setup_.scenario_text.size());
-  hello.time_step = setup_.sampling.time_step;
+  hello.time_step = setup_.sampling.time_step * static_cast<double>(setup_.sampling.hold);
   Eigen::Map<Vector6d>(hello.K_v) = setup_.options.gains.K_v;
   Eigen::Map<Vector6d>(hello.K_p) = setup_.options.gains.K_p;
   hello.mu = setup_.options.mu;
@@ -121,6 +121,7 @@ void ProtocolController::FillRequest(const Reading& reading, double t, const Com
 
 void ProtocolController::Begin(double /*t*/, const Reading& /*reading*/) {
   if (joints_) joints_->Begin();
+  steps_until_due_ = 0;
   peer_->Begin();
 }
 
@@ -130,13 +131,19 @@ void ProtocolController::Step(const Reading& reading, double t, Command* command
   command->handling = Handling{};
   command->force_seconds = 0.0;
   command->force_solves = 0;
+  const bool is_due = steps_until_due_ == 0;
   if (joints_) {
     joints_->Fill(reading, t, command);
-    command->computes_joints = true;
+    command->computes_joints = is_due;
   } else {
     command->desired = TrajectoryController::EvaluateDesired(*motion_, t, setup_.sampling.time_step);
   }
   model_.SetState(reading.state);
+  if (!is_due) {
+    --steps_until_due_;
+    return;
+  }
+  steps_until_due_ = setup_.sampling.hold - 1;
   FillRequest(reading, t, *command);
   peer_->Step({request_.data(), filled_}, torques_);
   const Eigen::Map<const VectorXd> all(torques_.data(), static_cast<Eigen::Index>(torques_.size()));

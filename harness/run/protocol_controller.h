@@ -12,14 +12,17 @@
 
 namespace dexcheck {
 
-/// Has a request and a reply at each step. Nothing allocates there.
+/// Has a request and a reply at each control step; torques are held in between. Nothing allocates there.
 class ProtocolController final : public Controller {
  public:
   /// Greets the other side and gives it its parameters.
   /// @throws InputError when it does not take them; else as ControllerPeer.
   ProtocolController(std::unique_ptr<ControllerPeer> peer, const OwnControllerSetup& setup);
 
-  void Follow(const Trajectory& motion) override { motion_ = &motion; }
+  void Follow(const Trajectory& motion) override {
+    motion_ = &motion;
+    steps_until_due_ = 0;
+  }
   void Begin(double t, const Reading& reading) override;
   void Step(const Reading& reading, double t, Command* command) override;
   [[nodiscard]] const GraspModel& model() const override { return model_; }
@@ -36,6 +39,7 @@ class ProtocolController final : public Controller {
   const Trajectory* motion_ = nullptr;
   std::optional<JointDemand> joints_;
   bool wants_terms_ = false;
+  long steps_until_due_ = 0;
   std::vector<double> request_;  // the message before it takes the place of one double
   size_t filled_ = 0;
   std::vector<double> torques_;  // n, and 3 N of F_N where it is reported

@@ -363,7 +363,7 @@ void RunRecorder::AddTaskSignals() {
 }
 
 void RunRecorder::AddCheckSignals() {
-  const Clearance& clearance = *checks_->analysis().clearance;
+  const Clearance& clearance = checks_->clearance();
   std::set<PairClass> classes;
   for (const WatchedPair& pair : clearance.pairs()) classes.insert(pair.pairs);
   std::vector<std::string> names;

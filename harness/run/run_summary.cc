@@ -192,7 +192,7 @@ Json MakeSummary(const Setup& setup, const ClosedLoop& loop, const RunResult& re
                            {"cone_margin_min", findings.least_cone_margin},
                            {"contacts_lost", findings.contacts_lost}};
   }
-  if (loop.is_checking()) json["clearance"] = ClearanceToJson(*loop.checks().analysis().clearance);
+  if (loop.is_checking()) json["clearance"] = ClearanceToJson(loop.checks().clearance());
   const LoopTimes& times = loop.times();
   const double steps = static_cast<double>(std::max(loop.record().step, 1L));
   const double microseconds = 1e6 / steps;

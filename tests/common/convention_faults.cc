@@ -392,9 +392,4 @@ Matrix3d CalcOffset(const MassProperties& body) {
   return body.mass * (body.com.squaredNorm() * Matrix3d::Identity() - body.com * body.com.transpose());
 }
 
-std::vector<double> ListInertia(const Matrix3d& inertia) {
-  const Numbers numbers = ToNumbers(inertia);
-  return {numbers.begin(), numbers.end()};
-}
-
 }  // namespace dexcheck::testing

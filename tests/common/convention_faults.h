@@ -47,7 +47,4 @@ const ConventionFault& FindConventionFault(const std::string& name);
 /// The parallel-axis term of a body's inertia about the origin of its frame: m (c.c 1 - c c^T).
 Matrix3d CalcOffset(const MassProperties& body);
 
-/// Ixx, Iyy, Izz, Ixy, Ixz, Iyz.
-std::vector<double> ListInertia(const Matrix3d& inertia);
-
 }  // namespace dexcheck::testing

@@ -124,13 +124,6 @@ TEST_F(RendererTest, PictureCanBeShifted) {
   EXPECT_NE(shifted.rgb, plain.rgb);
 }
 
-TEST_F(RendererTest, CamerasMoveAlong) {
-  const int id = mj_name2id(model_.get(), mjOBJ_CAMERA, "overview");
-  const double before = data_->cam_xpos[3 * id];
-  SetRow(*model_, run_, 10, data_.get());
-  EXPECT_NEAR(data_->cam_xpos[3 * id] - before, 0.1, 1e-12);
-}
-
 /// Mean of red minus blue over the pixels around a point.
 double Redness(const Image& image, const Vector2d& at) {
   double sum = 0.0;

@@ -81,22 +81,8 @@ TEST_F(RunFramesTest, CheckHistoryKeepsTheWorstPerBound) {
   EXPECT_EQ(at(2, 5).nearest.worst, 0.0);
   EXPECT_EQ(at(2, 10).nearest.worst, std::numeric_limits<double>::infinity());
   EXPECT_FALSE(at(3, 10).is_asked());
-}
-
-TEST_F(RunFramesTest, AllFiveCategoriesAreListed) {
-  run_.checks = {{"law_torque", CheckCategory::kLaw, 1e-9, std::vector<double>(11, 1e-10)},
-                 {"cone_use", CheckCategory::kAssumption, 0.9, std::vector<double>(11, 0.2)}};
-  run_.checks[0].residuals[4] = 2e-9;
-  const CheckHistory history(run_);
-  const std::vector<CategoryStatus> categories = history.ListCategories(10);
-  ASSERT_EQ(categories.size(), kCheckCategories.size());
-  for (size_t i = 0; i < categories.size(); ++i) EXPECT_EQ(categories[i].category, kCheckCategories[i]);
-  EXPECT_FALSE(categories[0].is_asked());
-  EXPECT_EQ(categories[1].nearest.name, "law_torque");
-  EXPECT_DOUBLE_EQ(categories[1].nearest.worst, 2e-9);
-  EXPECT_EQ(categories[1].failed, 1);
-  EXPECT_EQ(history.ListCategories(3)[1].failed, 0);
-  EXPECT_EQ(categories[4].failed, 0);
+  ASSERT_EQ(history.ListCategories(0).size(), kCheckCategories.size());
+  for (size_t i = 0; i < kCheckCategories.size(); ++i) EXPECT_EQ(at(i, 0).category, kCheckCategories[i]);
   run_.checks.clear();
   EXPECT_TRUE(CheckHistory(run_).ListCategories(3).empty());
 }

@@ -13,7 +13,6 @@
 #include <vector>
 
 #include "controller/common/errors.h"
-#include "harness/base/process_pool.h"
 #include "harness/engine/engine.h"
 #include "renders/renderer.h"
 #include "tests/common/files.h"
@@ -154,28 +153,6 @@ TEST_F(VideoTest, VideoDoesNotDependOnTheNumberOfProcesses) {
   options.workers = 3;
   ASSERT_TRUE(Video(folder_.path() / "three.mp4", view_, options));
   EXPECT_TRUE(ReadText(folder_.path() / "one.mp4") == ReadText(folder_.path() / "three.mp4"));
-}
-
-TEST_F(VideoTest, ProcessesDrawTheSameFramesByteForByte) {
-  VideoOptions options = MakeOptions();
-  options.forces = options.tracks = true;
-  options.inset = "grasp";
-  constexpr long kFrames = 5;
-  std::vector<Image> own;
-  {
-    VideoPainter painter(view_, options);
-    for (long frame = 0; frame < kFrames; ++frame)
-      own.push_back(painter.Paint(static_cast<double>(frame) / 10));
-  }
-  EXPECT_NE(own.front().rgb, own.back().rgb);
-  const auto paint = [&](size_t frame) {
-    const Image image = Paint(options, static_cast<double>(frame) / 10);
-    return std::string(image.rgb.begin(), image.rgb.end());
-  };
-  const auto compare = [&](size_t frame, const std::string& rgb) {
-    EXPECT_TRUE((std::vector<std::uint8_t>(rgb.begin(), rgb.end()) == own[frame].rgb)) << frame;
-  };
-  EXPECT_EQ(RunJobs("drawing", kFrames, 2, paint, compare, [] { return false; }), own.size());
 }
 
 TEST_F(VideoTest, FramesAreTheStillsOfTheirTimes) {

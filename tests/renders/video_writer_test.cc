@@ -230,14 +230,6 @@ TEST(PictureFile, WritesAPngOrNothing) {
   EXPECT_EQ(std::distance(fs::directory_iterator(folder.path()), fs::directory_iterator()), 1);
 }
 
-TEST(PictureFile, ReplacesAnExistingFileWhole) {
-  const TempFolder folder;
-  WriteText(folder.path() / "a.png", "old");
-  WritePng(folder.path() / "a.png", Image(3, 3));
-  EXPECT_EQ(ReadPng(folder.path() / "a.png").width, 3);
-  EXPECT_EQ(std::distance(fs::directory_iterator(folder.path()), {}), 1);
-}
-
 TEST(PictureFile, NamesTheFileThatIsNoPicture) {
   EXPECT_TRUE(Throws<InputError>([] { ReadPng("/nowhere/a.png"); }, "/nowhere/a.png: cannot be read"));
   const TempFolder folder;

@@ -33,8 +33,8 @@ class ParameterError(TypeError):
 class Robot:
     """What a controller may know before the run.
 
-    n velocities, p positions and N contacts; time_step, s; K_p and K_v: of the joints (n), or without a motion of joints
-    of the object (6); mu, f_min, f_max and barrier_weight of the grasp force; the texts of parameter file and scenario.
+    n velocities, p positions and N contacts; time_step between two calls, s; K_p and K_v: of the joints (n), or without a
+    motion of joints of the object (6); mu, f_min, f_max and barrier_weight of the grasp force; the texts of parameter file and scenario.
     """
 
     def __init__(self, connection):

@@ -19,14 +19,6 @@ void ExpectSame(const SurfaceGeometry& a, const SurfaceGeometry& b) {
   EXPECT_LE((a.T - b.T).norm(), kRounding * (1.0 + b.T.norm()));
 }
 
-TEST(ParallelSurface, OfASphereIsASphere) {
-  const Sphere sphere(0.5);
-  const Sphere larger(0.52);
-  for (const SurfacePoint& at : kPoints) {
-    ExpectSame(CalcParallelSurface(sphere.Evaluate(at), 0.02), larger.Evaluate(at));
-  }
-}
-
 TEST(ParallelSurface, OfATorusIsATorus) {
   const Torus torus(0.6, 0.2);
   const Torus thinner(0.6, 0.17);
@@ -58,18 +50,6 @@ TEST(ParallelSurface, OfAnEllipsoidMovesAsItsPointsDo) {
       EXPECT_NEAR(surface.R.col(1).dot(x_dot), surface.T.dot(rate), 1e-8);
     }
   }
-}
-
-TEST(ParallelSurface, MeetMidwayBetweenOverlappingBodies) {
-  const Sphere tip(0.01);
-  const Sphere object(0.05);
-  constexpr double kOverlap = 1e-3;
-  const ContactCoordinates kappa{{0.2, 0.1, 0}, {0.4, -0.3, 0}, 0.7};
-  const ContactGeometry contact = CalcContactGeometry(tip, object, kappa, kOverlap);
-  EXPECT_NEAR(contact.g_f_cf.translation().norm(), 0.01 - kOverlap / 2.0, kRounding);
-  EXPECT_NEAR(contact.g_o_cf.translation().norm(), 0.05 - kOverlap / 2.0, kRounding);
-  const Pose X_of = contact.g_o_cf * contact.g_f_cf.inverse();
-  EXPECT_NEAR(X_of.translation().norm(), 0.01 + 0.05 - kOverlap, kRounding);
 }
 
 }  // namespace

@@ -165,47 +165,6 @@ TEST(SurfaceTest, TorusByHand) {
   EXPECT_TRUE(MatrixNear(top.T, Eigen::RowVector2d(1.0 / 0.3, 0.0), 10.0 * kRounding));
 }
 
-TEST(SurfaceTest, EllipsoidHasItsKnownGaussianCurvature) {
-  const Vector3d axes(0.05, 0.03, 0.02);
-  const Ellipsoid ellipsoid(axes);
-  std::mt19937 random(3);
-  double largest_skew = 0.0;
-  for (int sample = 0; sample < kSamples; ++sample) {
-    const SurfacePoint alpha = DrawPoint(random, MakeEllipsoid(axes), sample % 2);
-    const SurfaceGeometry geometry = ellipsoid.Evaluate(alpha);
-    // 1 / (a b c sum p_i^2 / a_i^4)^2
-    const double h = geometry.p.cwiseQuotient(axes.cwiseAbs2()).squaredNorm();
-    const double expected = std::pow(1.0 / (axes.prod() * h), 2);
-    EXPECT_NEAR(geometry.K.determinant() / expected, 1.0, 100.0 * kRounding);
-    EXPECT_NEAR(geometry.K(0, 1), geometry.K(1, 0), kRounding * geometry.K.norm());
-    largest_skew = std::max(largest_skew, std::abs(geometry.M(0, 1)) / geometry.M.norm());
-  }
-  EXPECT_GT(largest_skew, 0.1) << "the chart should not be orthogonal";
-}
-
-// Integral of the Gaussian curvature over the chart u in [-pi, pi], |v| <= v_max by the midpoint rule.
-double IntegrateCurvature(const Surface& surface, double v_max, int nodes) {
-  double sum = 0.0;
-  const double du = 2.0 * kPi / nodes;
-  const double dv = 2.0 * v_max / nodes;
-  for (int i = 0; i < nodes; ++i) {
-    for (int j = 0; j < nodes; ++j) {
-      const SurfaceGeometry geometry = surface.Evaluate({-kPi + (i + 0.5) * du, -v_max + (j + 0.5) * dv, 0});
-      sum += geometry.K.determinant() * geometry.M.determinant() * du * dv;
-    }
-  }
-  return sum;
-}
-
-TEST(SurfaceTest, GaussBonnet) {
-  // Midpoint rule, second order in 1 / nodes; measured with 200 nodes 1.3e-4 (sphere), 3.4e-5 (ellipsoid).
-  constexpr double kMidpoint = 5e-4;
-  EXPECT_NEAR(IntegrateCurvature(Sphere(0.02), kPi / 2.0, 200), 4.0 * kPi, kMidpoint);
-  EXPECT_NEAR(IntegrateCurvature(Ellipsoid({0.05, 0.03, 0.02}), kPi / 2.0, 200), 4.0 * kPi, kMidpoint);
-  // The midpoint rule is exact for the torus, a trigonometric polynomial: rounding of a sum of 4e4 terms.
-  EXPECT_NEAR(IntegrateCurvature(Torus(0.035, 0.011), kPi, 200), 0.0, 4e4 * 1e-16);
-}
-
 TEST(SurfaceTest, ChartsAgreeOnThePointAndItsCurvatures) {
   std::mt19937 random(4);
   for (const NamedSurface& named : {MakeSphere(), MakeEllipsoid()}) {

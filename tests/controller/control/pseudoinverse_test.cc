@@ -136,41 +136,6 @@ TEST(Pseudoinverse, ColumnsThatAreNotListedAreZero) {
   }
 }
 
-TEST(Pseudoinverse, UnweightedIsTheMoorePenroseInverse) {
-  std::mt19937 random(3);
-  Case c(0, &random);
-  const MatrixXd expected = CalcPseudoinverse(c.J);
-  EXPECT_TRUE(MatrixNear(c.J_pinv.CalcMatrix(), expected, kRounding));
-}
-
-TEST(Pseudoinverse, HasTheLeastWeightedNorm) {
-  std::mt19937 random(4);
-  for (int kind = 0; kind < 3; ++kind) {
-    Case c(kind, &random);
-    const VectorXd y = DrawMatrix(kRows, 1, &random);
-    VectorXd x(kColumns);
-    c.J_pinv.Apply(y, x);
-    const double least = x.dot(c.W * x);
-    for (int trial = 0; trial < 20; ++trial) {
-      VectorXd change = DrawMatrix(kColumns, 1, &random);
-      c.J_pinv.Project(change);
-      const VectorXd other = x + change;
-      ASSERT_TRUE(MatrixNear(c.J * other, y, kRounding));
-      // The change is orthogonal to x in W: the squares add.
-      EXPECT_NEAR(other.dot(c.W * other), least + change.dot(c.W * change), 1e3 * kRounding);
-      EXPECT_GT(other.dot(c.W * other), least);
-    }
-  }
-}
-
-TEST(Pseudoinverse, AnotherWeightGivesAnotherInverse) {
-  std::mt19937 random(5);
-  Case c(2, &random);
-  Pseudoinverse unweighted("J", kRows, kColumns);
-  unweighted.Factor(c.J);
-  EXPECT_GT((unweighted.CalcMatrix() - c.J_pinv.CalcMatrix()).norm(), 1e-2);
-}
-
 TEST(Pseudoinverse, ConditionNumberIsABound) {
   std::mt19937 random(6);
   for (int kind = 0; kind < 3; ++kind) {

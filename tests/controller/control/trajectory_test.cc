@@ -251,27 +251,6 @@ TEST(Trajectory, SumAddsItsParts) {
   EXPECT_TRUE(MatrixNear(sum.X_d_ddot, circle.X_d_ddot + move.X_d_ddot, kRounding));
 }
 
-// beta is the angle of the object's axis against the vertical: added to a path it tilts the object about the
-// horizontal axis that follows the path.
-TEST(Trajectory, SumOfAPathAndATiltTiltsAboutAHorizontalAxis) {
-  const double tilt = DegToRad(30.0);
-  Vector6d rise = Vector6d::Zero();
-  rise[2] = 0.12;
-  rise[4] = tilt;
-  std::vector<std::unique_ptr<Trajectory>> parts;
-  parts.push_back(MakeCircleTrajectory(Vector6d::Zero(), {0.0, 0.9, 1.2}, 0.8));
-  parts.push_back(MakePointToPointTrajectory(Vector6d::Zero(), rise, 1.7));
-  const auto sum = MakeSumTrajectory(MakeStart(), std::move(parts));
-  const Vector6d end = sum->Evaluate(2.5).X_d;
-  const double turn = end[3] - MakeStart()[3];
-  EXPECT_GT(turn, 0.5);
-  EXPECT_NEAR(end[2] - MakeStart()[2], 0.12, kRounding);
-  const Vector3d axis(-std::sin(end[3]), std::cos(end[3]), 0.0);
-  const Matrix3d expected = Eigen::AngleAxisd(tilt, axis) * Eigen::AngleAxisd(turn, Vector3d::UnitZ()) *
-                            CalcRotationZyz(MakeStart().tail<3>());
-  EXPECT_TRUE(MatrixNear(CalcRotationZyz(end.tail<3>()), expected, kRounding));
-}
-
 TEST(Trajectory, RejectsWrongNumbers) {
   const Vector6d X = MakeStart();
   const auto rejects = [](const auto& make, const std::string& text) {

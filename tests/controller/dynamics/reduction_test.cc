@@ -4,7 +4,6 @@
 #include <gtest/gtest.h>
 
 #include "tests/common/finite_difference.h"
-#include "tests/common/linear_algebra.h"
 #include "tests/common/mass_scaling.h"
 #include "tests/common/matrix_near.h"
 #include "tests/common/reduction_map.h"
@@ -64,18 +63,6 @@ class Reduction : public ::testing::TestWithParam<RobotCase> {
 };
 
 INSTANTIATE_TEST_SUITE_P(Robots, Reduction, ::testing::ValuesIn(MakeRobotCases(317)), NameOf);
-
-TEST_P(Reduction, SSpansTheNullSpaceOfA) {
-  for (int state = 0; state < kStates; ++state) {
-    const Evaluation at(model_, &random_);
-    ASSERT_EQ(at.map.A.rows(), constrained_ ? 1 : 0);
-    ASSERT_EQ(CalcRank(at.map.S), model_.num_velocities());
-    if (!constrained_) continue;
-    ASSERT_EQ(CalcRank(at.map.A), 1);
-    const MatrixXd product = at.map.S.transpose() * at.map.A.transpose();
-    EXPECT_TRUE(MatrixNear(product, MatrixXd::Zero(model_.num_velocities(), 1), kRounding));
-  }
-}
 
 // M_bar' = S'^T M S',  C_bar' = S'^T C S' + S'^T M S'_dot,  F_bar' = S'^T F   (14), (18)
 TEST_P(Reduction, ReducedTermsAreProjections) {

@@ -160,21 +160,6 @@ TEST_P(PlatformTest, VirtualPowerBalances) {
   }
 }
 
-TEST(Platform, BothChoicesDescribeOneMotion) {
-  const Base by_twist = MakeBase(DriveVelocity::kTwist);
-  const Base by_wheels = MakeBase(DriveVelocity::kWheelRates);
-  const Matrix2d W = CalcWheelRateMap(by_twist);
-  for (const State& state : MakeStates(DriveVelocity::kTwist)) {
-    const PlatformConstraint twist = CalcPlatformConstraint(by_twist, state.q_v, state.v);
-    const PlatformConstraint wheels = CalcPlatformConstraint(by_wheels, state.q_v, W * state.v);
-    EXPECT_TRUE(MatrixNear(wheels.A_v, twist.A_v, 0.0));
-    EXPECT_TRUE(MatrixNear(wheels.E_v, twist.E_v, 0.0));
-    EXPECT_TRUE(MatrixNear(wheels.S_v * W, twist.S_v, kRounding));
-    EXPECT_TRUE(MatrixNear(wheels.S_v_dot * W, twist.S_v_dot, kRounding));
-    EXPECT_TRUE(MatrixNear(W.transpose() * wheels.S_v_T_E_v, twist.S_v_T_E_v, kRounding));
-  }
-}
-
 TEST_P(PlatformTest, MutatedSignsAreSeen) {
   const Vector2d tau(3.0, -1.7);
   const State state{{0.3, -0.2, 0.7},

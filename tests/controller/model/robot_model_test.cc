@@ -65,18 +65,6 @@ TEST(RobotModel, OrdersBranchesDepthFirst) {
   EXPECT_EQ(model.max_depth(), 3);
 }
 
-TEST(RobotModel, DepthFirstOrderKeepsTheChainToTheBase) {
-  const RobotModel model(MakeTree());
-  std::vector<int> chain(static_cast<size_t>(model.max_depth()), -1);
-  for (const int joint : model.depth_first()) {
-    const size_t depth = static_cast<size_t>(model.depth(joint));
-    chain[depth - 1] = joint;
-    for (size_t k = 0; k < depth; ++k) {
-      EXPECT_EQ(model.joint(chain[k]).parent, k == 0 ? -1 : chain[k - 1]);
-    }
-  }
-}
-
 TEST(RobotModel, CountsCoordinates) {
   RobotSpec spec = MakeTree();
   EXPECT_EQ(RobotModel(spec).num_positions(), 9);

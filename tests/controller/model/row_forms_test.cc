@@ -100,26 +100,6 @@ rows = [
   }
 }
 
-TEST(PlainRows, AreAsGoodAsModifiedOnes) {
-  const RobotModel modified = Read(R"([[chain]]
-parent = "base"
-rows = [
-  { joint = "j1", link = "l1", alpha = 0, a = 0, q = 0, d = 0.3 },
-  { joint = "j2", link = "l2", alpha_deg = 90, a = 0.2, q = 0, d = 0.1 },
-])" + kEntries);
-  const RobotModel plain = Read(R"([[chain]]
-parent = "base"
-rows = [
-  { joint = "j1", link = "l1", xyz = [0, 0, 0.3] },
-  { joint = "j2", link = "l2", xyz = [0.2, -0.1, 0], rpy_deg = [90, 0, 0] },
-])" + kEntries);
-  for (const int i : {0, 1}) {
-    EXPECT_TRUE(
-        MatrixNear(CalcOwnPose(modified, i, 0.4).matrix(), CalcOwnPose(plain, i, 0.4).matrix(), kRounding));
-    EXPECT_EQ(modified.joint(i).body.com, plain.joint(i).body.com);
-  }
-}
-
 const std::string kOneRow = R"([[chain]]
 parent = "base"
 rows = [{ joint = "a_b.c", link = "l1", xyz = [0, 0, 0] }, { joint = "j2", link = "l2", xyz = [1, 0, 0] }]

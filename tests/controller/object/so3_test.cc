@@ -86,15 +86,6 @@ TEST(So3, LogKeepsTheRelativeAccuracyOfSmallAngles) {
   EXPECT_TRUE(MatrixNear(1e9 * LogSo3(ExpSo3(phi)), 1e9 * phi, kRounding));
 }
 
-TEST(So3, TheTextbookLogLosesItsDigitsNearPi) {
-  // log = theta / (2 sin(theta)) (R - R^T): the reason for going through the quaternion.
-  const Vector3d phi = (kPi - 1e-6) * Vector3d(1, 2, -2) / 3.0;
-  const Matrix3d R = ExpSo3(phi);
-  const double theta = std::acos((R.trace() - 1.0) / 2.0);
-  const Matrix3d log_x = theta / (2 * std::sin(theta)) * (R - R.transpose());
-  EXPECT_GT((Vector3d(log_x(2, 1), log_x(0, 2), log_x(1, 0)) - phi).norm(), 1e3 * kRounding);
-}
-
 TEST(So3, LogOfAHalfTurnPicksOneSign) {
   Random random(3103);
   for (int i = 0; i < 20; ++i) {
@@ -161,20 +152,6 @@ TEST(So3, JacobianDotIsTheDerivativeOfTheJacobian) {
   }
 }
 
-TEST(So3, SeriesAndClosedFormsMeet) {
-  // Both sides of the switch; the functions move by about 1e-12 between the two angles.
-  const Vector3d axis = Vector3d(2, -1, 2) / 3.0;
-  const Vector3d phi_dot(0.5, 0.8, -0.3);
-  constexpr double kGap = 1e-12;
-  const Vector3d below = (0.1 - kGap) * axis;
-  const Vector3d above = (0.1 + kGap) * axis;
-  constexpr double kMeet = 3 * kGap;
-  EXPECT_TRUE(MatrixNear(ExpSo3(below), ExpSo3(above), kMeet));
-  EXPECT_TRUE(MatrixNear(CalcLeftJacobian(below), CalcLeftJacobian(above), kMeet));
-  EXPECT_TRUE(MatrixNear(CalcLeftJacobianInverse(below), CalcLeftJacobianInverse(above), kMeet));
-  EXPECT_TRUE(MatrixNear(CalcLeftJacobianDot(below, phi_dot), CalcLeftJacobianDot(above, phi_dot), kMeet));
-}
-
 TEST(So3, RejectsWhatIsNoRotation) {
   Matrix3d mirror = Matrix3d::Identity();
   mirror(2, 2) = -1.0;
@@ -232,85 +209,6 @@ TEST(OrientationError, RateIsTheDerivativeOfTheError) {
     EXPECT_GT((omega_d - omega_o - difference).norm(), kVisible);
     EXPECT_GT((error.omega_od - difference).norm(), kVisible);
   }
-}
-
-// A tracking experiment: the object starts almost half a turn away from a frame that turns with a varying
-// angular velocity, and its angular acceleration is chosen so that e_R_ddot = -2 w e_R_dot - w^2 e_R.
-class TrackingExperiment {
- public:
-  static constexpr double kW = 3.0;  // rad/s
-
-  struct State {
-    Matrix3d R_Bo, R_Bd;
-    Vector3d omega_o;
-  };
-
-  static Vector3d OmegaD(double t) { return {0.8 * std::cos(t), 0.5, -0.6 * std::sin(2 * t)}; }
-  static Vector3d OmegaDDot(double t) { return {-0.8 * std::sin(t), 0.0, -1.2 * std::cos(2 * t)}; }
-
-  explicit TrackingExperiment(bool with_jacobian_dot) : with_jacobian_dot_(with_jacobian_dot) {}
-
-  /// Largest deviation of e_R from (e_0 + (e_0_dot + w e_0) t) exp(-w t) over one second, rad.
-  [[nodiscard]] double Run(int steps) const {
-    State state{Matrix3d::Identity(), ExpSo3(Vector3d(2.4, -1.2, 1.2)), {0.3, 0.2, -0.5}};
-    const OrientationError start = CalcOrientationError(state.R_Bo, state.omega_o, state.R_Bd, OmegaD(0.0));
-    const double dt = 1.0 / steps;
-    double worst = 0.0;
-    for (int i = 0; i < steps; ++i) {
-      state = StepRungeKutta(state, i * dt, dt);
-      const double t = (i + 1) * dt;
-      const Vector3d e_R = CalcOrientationError(state.R_Bo, state.omega_o, state.R_Bd, OmegaD(t)).e_R;
-      const Vector3d expected = (start.e_R + (start.e_R_dot + kW * start.e_R) * t) * std::exp(-kW * t);
-      worst = std::max(worst, (e_R - expected).norm());
-    }
-    return worst;
-  }
-
- private:
-  [[nodiscard]] State CalcRate(const State& x, double t) const {
-    const OrientationError error = CalcOrientationError(x.R_Bo, x.omega_o, x.R_Bd, OmegaD(t));
-    const Vector3d e_R_ddot = -2 * kW * error.e_R_dot - kW * kW * error.e_R;
-    Vector3d omega_o_dot = CalcAngularAcceleration(error, OmegaD(t), OmegaDDot(t), e_R_ddot);
-    if (!with_jacobian_dot_) omega_o_dot += CalcLeftJacobianDot(error.e_R, error.e_R_dot) * error.e_R_dot;
-    return {x.R_Bo * Skew(x.omega_o), x.R_Bd * Skew(OmegaD(t)), omega_o_dot};
-  }
-
-  static State Add(const State& x, const State& rate, double dt) {
-    return {x.R_Bo + dt * rate.R_Bo, x.R_Bd + dt * rate.R_Bd, x.omega_o + dt * rate.omega_o};
-  }
-
-  // The inner stages leave SO(3) by dt^2; they are put back on it.
-  static State Project(State x) {
-    x.R_Bo = Eigen::Quaterniond(x.R_Bo).normalized().toRotationMatrix();
-    x.R_Bd = Eigen::Quaterniond(x.R_Bd).normalized().toRotationMatrix();
-    return x;
-  }
-
-  [[nodiscard]] State StepRungeKutta(const State& x, double t, double dt) const {
-    const State k1 = CalcRate(x, t);
-    const State k2 = CalcRate(Project(Add(x, k1, dt / 2)), t + dt / 2);
-    const State k3 = CalcRate(Project(Add(x, k2, dt / 2)), t + dt / 2);
-    const State k4 = CalcRate(Project(Add(x, k3, dt)), t + dt);
-    State next = Add(x, k1, dt / 6);
-    next = Add(next, k2, dt / 3);
-    next = Add(next, k3, dt / 3);
-    return Project(Add(next, k4, dt / 6));
-  }
-
-  bool with_jacobian_dot_;
-};
-
-TEST(OrientationError, ClosedLoopFollowsTheLinearSolution) {
-  // Runge-Kutta of order 4 with 5 ms; measured 4.2e-9 rad.
-  constexpr double kIntegration = 2e-8;
-  const TrackingExperiment experiment(true);
-  const double coarse = experiment.Run(100);
-  const double fine = experiment.Run(200);
-  EXPECT_LE(fine, kIntegration * TolScale());
-  // All that is left is the integrator's: half the step, a sixteenth of the error.
-  EXPECT_NEAR(coarse / fine, 16.0, 1.0);
-  // Without J_l_dot the closed loop is not linear.
-  EXPECT_GT(TrackingExperiment(false).Run(200), kVisible);
 }
 
 }  // namespace

@@ -112,7 +112,7 @@ TEST(LawCheck, FaultsFromOutsideTheTableAreNamed) {
       {[](const GraspModel& model, VectorXd* tau) {
          *tau -= 2.0 * (model.robot().C() * model.robot().velocity());
        },
-       "Coriolis forces has the other sign"},
+       "Coriolis forces is multiplied by -1"},
       {[](const GraspModel& model, VectorXd* tau) {
          const MatrixXd& C = model.robot().C();
          *tau += (C.transpose() - C) * model.robot().velocity();
@@ -127,7 +127,9 @@ TEST(LawCheck, FaultsFromOutsideTheTableAreNamed) {
        "torques of the step before"}};
   for (const auto& [change, name] : faults) {
     const Causes causes = ExplainTorques(change);
-    ASSERT_EQ(causes.size(), 1U) << name;
+    const auto is_of_law = [](const Explanation& one) { return one.channel == CauseChannel::kLaw; };
+    ASSERT_EQ(std::ranges::count_if(causes, is_of_law), 1)
+        << name;  // torques may be above a motor's limit, too
     EXPECT_EQ(causes.front().outcome, CauseOutcome::kNamed);
     EXPECT_THAT(causes.front().Tell(), HasSubstr(name));
   }

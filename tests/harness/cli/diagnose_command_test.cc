@@ -45,7 +45,7 @@ class DiagnoseCommand : public CommandTest {
   /// Writes the repaired file, which agrees with the other one.
   void ExpectRepaired(const std::string& a, const std::string& b, const std::string& repaired) {
     const ProgramResult result = Expect(1, {"diagnose", a, b, "--write", repaired});
-    EXPECT_THAT(result.out, HasSubstr("\n" + repaired + " agrees with "));
+    EXPECT_THAT(result.out, HasSubstr("\nREPAIRED: " + repaired + " agrees with "));
     Expect(0, {"consistency", repaired, b, "--samples", "20"});
   }
 };

@@ -100,6 +100,26 @@ INSTANTIATE_TEST_SUITE_P(OwnController, OwnJointLaw,
                                            SourcePath("/harness/examples/numpy_joint_law.py")),
                          [](const auto& info) { return info.index == 0 ? "Library" : "NumPy"; });
 
+TEST_F(OwnController, TorquesAreHeldForAControlStep) {
+  const Words reach = Words(
+      "run panda-reach --no-report --no-log --set duration=0.3 --set settle=0.1 --set "
+      "plant.control_step=0.004 "
+      "--controller");
+  const Words law = Words{SourcePath("/harness/examples/numpy_joint_law.py")};
+  const Json checks = RunJson(0, reach + law)["checks"];
+  const Json own =
+      RunJson(0, Words("run panda-reach --no-report --no-log --set duration=0.3 --set settle=0.1 "
+                       "--set plant.control_step=0.004"))["checks"];
+  // Both move alike, and not as with a torque at each step.
+  EXPECT_NEAR(checks["expect_joints"]["max"].get<double>(), own["expect_joints"]["max"].get<double>(), 1e-9);
+  const Json free =
+      RunJson(0, Words("run panda-reach --no-report --no-log --set duration=0.3 --set settle=0.1"))["checks"];
+  EXPECT_GT(own["expect_joints"]["max"].get<double>(), 1.1 * free["expect_joints"]["max"].get<double>());
+  const ProgramResult library = Run(reach + Words{JOINT_LAW_LIBRARY});
+  EXPECT_EQ(library.exit_code, 3);
+  EXPECT_THAT(library.err, HasSubstr("changed its torques within plant.control_step (0.004 s)"));
+}
+
 TEST_F(OwnController, AJointLawIsNoneForAGrasp) {
   EXPECT_TRUE(IsRefused(RunWith(JOINT_LAW_LIBRARY), {"joint_law.so", "[joint_motion]"}));
 }

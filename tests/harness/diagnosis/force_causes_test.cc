@@ -27,7 +27,7 @@ Causes Explain(int first, int every, int count, const Force& force) {
     const int k = (step++ - first) / every;
     if (step <= first || (step - 1 - first) % every != 0 || k >= count) return;
     StepAnalysis analysis = run.loop().checks().analysis();
-    analysis.robot_residual += force(k);
+    analysis.robot.residual += force(k);
     store.Add(run.step(), analysis, /*differs=*/true);
   });
   EXPECT_EQ(store.size(), count);

@@ -26,62 +26,99 @@ Motors MakeMotors(const std::function<ArrayXd(const ArrayXd&)>& common,
   return motors;
 }
 
+struct Beside {
+  std::string name;
+  Fault common, own;
+  std::function<ArrayXd(const ArrayXd&)> make_common, make_own;
+};
+
+class MotorBesideAll : public ::testing::TestWithParam<Beside> {};
+
+TEST_P(MotorBesideAll, BothAreNamed) {
+  const Beside& made = GetParam();
+  Fault common = made.common;
+  common.place = "all motors";
+  ExpectNamed(ExplainSignals(MakeMotors(made.make_common, made.make_own), CauseChannel::kActuation),
+              {common, made.own});
+}
+
 ArrayXd Delay(const ArrayXd& u, Index steps) {
   return MakeEach([&](Index i) { return Back(u, i, steps); });
 }
+/// What was sent before the first step is not known.
+ArrayXd DelayUnknown(const ArrayXd& u, Index steps) {
+  ArrayXd late = Delay(u, steps);
+  late.head(steps) += 0.1;
+  return late;
+}
 ArrayXd Round(const ArrayXd& u, double step) { return step * (u / step).round(); }
 
-Fault OfAll(Fault fault) {
-  fault.place = "all motors";
-  return fault;
-}
+INSTANTIATE_TEST_SUITE_P(
+    Faults, MotorBesideAll,
+    ::testing::Values(
+        Beside{"Gains", OfMotor("gain", 1.003), OfMotor("gain", 0.95),
+               [](const ArrayXd& u) { return ArrayXd(1.003 * u); },
+               [](const ArrayXd& u) { return ArrayXd(0.95 * u); }},
+        Beside{"RoundingAndGain", OfMotor("gain", 1.003), OfMotor("rounding to steps of", 0.04, "N m"),
+               [](const ArrayXd& u) { return ArrayXd(1.003 * u); },
+               [](const ArrayXd& u) { return Round(u, 0.04); }},
+        Beside{"DelayAndGain", OfMotor("delay", 3.0, "steps"), OfMotor("gain", 0.95),
+               [](const ArrayXd& u) { return Delay(u, 3); },
+               [](const ArrayXd& u) { return ArrayXd(0.95 * u); }},
+        Beside{"DelayAndLateOffset", OfMotor("delay", 3.0, "steps"), OfMotor("offset", 0.2, "N m"),
+               [](const ArrayXd& u) { return DelayUnknown(u, 3); },
+               [](const ArrayXd& u) {
+                 ArrayXd late = u;
+                 late.tail(kSteps / 2) += 0.2;
+                 return late;
+               }},
+        Beside{"DelayAndLimit", OfMotor("delay", 3.0, "steps"), OfMotor("limit", 1.2, "N m"),
+               [](const ArrayXd& u) { return Delay(u, 3); },
+               [](const ArrayXd& u) { return ArrayXd(u.min(1.2).max(-1.2)); }},
+        Beside{"Delays", OfMotor("delay", 1.0, "steps"), OfMotor("delay", 8.0, "steps"),
+               [](const ArrayXd& u) { return Delay(u, 1); }, [](const ArrayXd& u) { return Delay(u, 8); }},
+        Beside{"LagAndGain", OfMotor("lag", 5e-3, "s"), OfMotor("gain", 0.95),
+               [](const ArrayXd& u) { return MakeLag(u, 5e-3); },
+               [](const ArrayXd& u) { return ArrayXd(0.95 * u); }},
+        Beside{"LagAndOffset", OfMotor("lag", 5e-3, "s"), OfMotor("offset", 0.2, "N m"),
+               [](const ArrayXd& u) { return MakeLag(u, 5e-3); },
+               [](const ArrayXd& u) { return ArrayXd(u + 0.2); }},
+        Beside{"RoundingAndOffset", OfMotor("rounding to steps of", 0.01, "N m"),
+               OfMotor("offset", 0.3, "N m"), [](const ArrayXd& u) { return Round(u, 0.01); },
+               [](const ArrayXd& u) { return ArrayXd(u + 0.3); }}),
+    [](const ::testing::TestParamInfo<Beside>& info) { return info.param.name; });
 
-// A second gain and a second delay are those of one motor beside all.
-TEST(SignalCauses, OwnFaultOfTheSameKindIsNamedBesideThatOfAll) {
-  const auto scale = [](double by) { return [by](const ArrayXd& u) { return ArrayXd(by * u); }; };
-  ExpectNamed(ExplainSignals(MakeMotors(scale(1.003), scale(0.95)), CauseChannel::kActuation),
-              {OfAll(OfMotor("gain", 1.003)), OfMotor("gain", 0.95)});
-  const auto delay = [](Index by) { return [by](const ArrayXd& u) { return Delay(u, by); }; };
-  ExpectNamed(ExplainSignals(MakeMotors(delay(1), delay(8)), CauseChannel::kActuation),
-              {OfAll(OfMotor("delay", 1.0, "steps")), OfMotor("delay", 8.0, "steps")});
-}
-
-// What the steps or the gain of all make of a motor's own steps or noise has another size, and another name.
-TEST(SignalCauses, WhatDoesNotShowTheFaultOfAllIsNotExplained) {
-  using Make = std::function<ArrayXd(const ArrayXd&)>;
-  const std::vector<std::pair<Make, Make>> made = {
-      {[](const ArrayXd& u) { return Round(u, 0.01); }, [](const ArrayXd& u) { return Round(u, 0.217); }},
-      {[](const ArrayXd& u) { return Round(u, 0.05); },
-       [](const ArrayXd& u) { return ArrayXd(u + MakeNoise(0.01, 5)); }},
-      {[](const ArrayXd& u) { return ArrayXd(1.003 * u); }, [](const ArrayXd& u) { return Round(u, 0.04); }},
-      {[](const ArrayXd& u) { return Delay(u, 3); },
-       [](const ArrayXd& u) { return ArrayXd(u.min(1.2).max(-1.2)); }}};
-  for (const auto& [make_common, make_own] : made) {
-    const Causes causes = ExplainSignals(MakeMotors(make_common, make_own), CauseChannel::kActuation);
+// What its rounding by all leaves of a motor's own steps or noise has another size.
+TEST(SignalCauses, StepsAndNoiseBeforeTheStepsOfAllAreNotExplained) {
+  const std::vector<std::pair<double, std::function<ArrayXd(const ArrayXd&)>>> made = {
+      {0.01, [](const ArrayXd& u) { return Round(u, 0.217); }},
+      {0.05, [](const ArrayXd& u) { return ArrayXd(u + MakeNoise(0.01, 5)); }}};
+  for (const auto& [step, make_own] : made) {
+    const Causes causes =
+        ExplainSignals(MakeMotors([step = step](const ArrayXd& u) { return Round(u, step); }, make_own),
+                       CauseChannel::kActuation);
     SCOPED_TRACE(TextOf(causes));
     ASSERT_EQ(causes.size(), 2u);
-    EXPECT_EQ(causes.front().faults.front().place, "all motors");
-    EXPECT_EQ(causes.front().outcome, CauseOutcome::kNamed);
+    EXPECT_TRUE(
+        causes.front().faults.front().IsLike({"rounding to steps of", "all motors", step, 0.0, "N m", ""}));
     EXPECT_EQ(causes.back().outcome, CauseOutcome::kNotExplained);
   }
 }
 
 // A motor that gives nothing has the steps of all, if they are wide enough.
 TEST(SignalCauses, SilentMotorIsOneOfAllThatRound) {
-  for (const bool is_small : {true, false}) {
-    Motors motors =
-        MakeMotors([](const ArrayXd& u) { return Round(u, 0.01); }, [](const ArrayXd& u) { return u; });
-    // Five of the eight are silent where the steps are wide: more than those that show them.
-    for (size_t i = 0; i < (is_small ? 5 : 1); ++i) {
-      if (is_small) motors[i].expected *= 1e-3;
-      motors[i].got.setZero();
-    }
-    const Causes causes = ExplainSignals(motors, CauseChannel::kActuation);
-    SCOPED_TRACE(TextOf(causes));
-    ASSERT_EQ(causes.size(), is_small ? 1u : 2u);
-    EXPECT_TRUE(causes.front().faults.front().IsLike(OfAll(OfMotor("rounding to steps of", 0.01))));
-    if (!is_small) EXPECT_EQ(causes.back().faults.front().place, "motor elbow");
-  }
+  const auto round = [](const ArrayXd& u) { return Round(u, 0.01); };
+  const Causes causes = ExplainSignals(MakeMotors(round, [](const ArrayXd& u) { return ArrayXd(1e-3 * u); }),
+                                       CauseChannel::kActuation);
+  SCOPED_TRACE(TextOf(causes));
+  ASSERT_GE(causes.size(), 1u);
+  EXPECT_EQ(causes.front().faults.front().place, "all motors");
+  Motors motors = MakeMotors(round, [](const ArrayXd& u) { return u; });
+  motors.front().expected *= 1e-3;
+  motors.front().got.setZero();
+  const Causes all = ExplainSignals(motors, CauseChannel::kActuation);
+  SCOPED_TRACE(TextOf(all));
+  ExpectNamed(all, {{"rounding to steps of", "all motors", 0.01, 0.0, "N m", ""}});
 }
 
 // Of a robot without an object joints are all that moves.

@@ -147,15 +147,6 @@ TEST_F(LogFailures, VanishedFilesAndFoldersAreNoticed) {
             path.string() + ": cannot be written: it was removed");
 }
 
-TEST_F(LogFailures, FoldersThatVanishBeforeTheRowsAreNoticed) {
-  std::filesystem::create_directory(folder_.path() / "run");
-  const std::filesystem::path path = folder_.path() / "run/log.h5";
-  LogWriter log(path, 100);
-  std::filesystem::remove(folder_.path() / "run");
-  EXPECT_EQ(MessageOf<InputError>([&] { log.StartRows(); }),
-            path.string() + ": cannot be written: No such file or directory");
-}
-
 TEST_F(LogFailures, AnotherFileInItsPlaceIsNotReplaced) {
   SampleLog log(path_, 100, 10, 10);
   std::filesystem::rename(path_, folder_.path() / "moved.h5");

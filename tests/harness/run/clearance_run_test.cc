@@ -118,8 +118,7 @@ TEST(ClearanceOfARun, ATableBesideThePalmIsNot) {
   const HoldAtATable run(-0.001);
   EXPECT_EQ(run.result().verdict, Verdict::kPass)
       << run.result().failure << run.result().attribution.evidence;
-  EXPECT_NEAR(run.checks().analysis().clearance->nearest(PairClass::kRobotSurroundings).distance, 0.001,
-              1e-4);
+  EXPECT_NEAR(run.checks().clearance().nearest(PairClass::kRobotSurroundings).distance, 0.001, 1e-4);
   EXPECT_EQ(run.checks().Find("clearance").worst, 0.0);
 }
 
@@ -131,7 +130,7 @@ TEST(ClearanceOfARun, WhatMayTouchIsNotTold) {
 
 TEST(ClearanceOfARun, BodiesThatCollidePush) {
   const auto find = [](const HoldAtATable& run) {
-    return run.checks().analysis().clearance->nearest(PairClass::kRobotSurroundings).distance;
+    return run.checks().clearance().nearest(PairClass::kRobotSurroundings).distance;
   };
   // While everything settles the table pushes the palm out, or does not.
   EXPECT_LT(find(HoldAtATable(1e-4)), -9e-5);
@@ -218,7 +217,7 @@ class ClearScenarios : public ::testing::TestWithParam<const char*> {};
 TEST_P(ClearScenarios, KeepTheirBodiesApart) {
   ShippedRun run(GetParam(), {"duration=0.02", "settle=0.2"});
   const RunResult& result = run.Run();
-  const Clearance& clearance = *run.loop().checks().analysis().clearance;
+  const Clearance& clearance = run.loop().checks().clearance();
   EXPECT_GT(run.loop().checks().Find("clearance").count, 0);
   for (int i = 0; i < kPairClassCount; ++i) {
     const Clearance::Nearest& nearest = clearance.nearest(static_cast<PairClass>(i));
