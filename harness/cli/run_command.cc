@@ -42,6 +42,7 @@ struct RunRequest {
   bool video = false;
   bool quiet = false;
   bool all = false;  // checks are printed
+  bool gains = false;
   std::string json_file;
   bool list = false;
   std::string replay;
@@ -150,6 +151,10 @@ int RunScenario(const RunRequest& request) {
                      request.quiet ? Detail::kVerdict
                      : request.all ? Detail::kAll
                                    : Detail::kCategories);
+      if (request.gains)
+        fmt::print("\n{}", result.gain_card.empty()
+                               ? "no margins: they are those of a joint motion under its law\n"
+                               : result.gain_card);
       if (result.attribution.cause == Cause::kModel && files.scenario.model_overrides.empty())
         fmt::print("why: dexcheck diagnose {} {}\n", QuoteForShell(files.robot.string()),
                    QuoteForShell(files.mjcf.string()));
@@ -267,6 +272,9 @@ void AddRunCommand(Command app, const std::string& command_line) {
   Option junit = AddJUnitOption(command, &request->junit_file);
   Option no_log = command.AddFlag("--no-log", &request->no_log, "Write no files");
   Option quiet = command.AddFlag("--quiet", &request->quiet, "Print the verdict only");
+  Option gains = command.AddFlag(
+      "--gains", &request->gains,
+      "Print a joint motion's gains, its stability margins and the fastest gains with enough of them");
   Option all = command.AddFlag("--all", &request->all, "Print each check, not only a line for each category");
   Option json = AddJsonOption(command, "the summary", &request->json_file);
   Option(controller).Excludes(list);
@@ -276,7 +284,7 @@ void AddRunCommand(Command app, const std::string& command_line) {
   for (Option option : judging) option.Excludes(list).Excludes(replay);
   no_log.Excludes(video).Excludes(out);
   all.Excludes(quiet);
-  for (Option option : {out, set, unset, seed, no_check, video, no_report, no_log, junit, all, json}) {
+  for (Option option : {out, set, unset, seed, no_check, video, no_report, no_log, junit, all, gains, json}) {
     option.Excludes(replay).Excludes(list);
   }
   command.SetAction([=] {

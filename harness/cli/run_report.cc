@@ -190,7 +190,6 @@ void PrintRunReport(const Setup& setup, const ClosedLoop& loop, const RunResult&
     if (loop.is_checking()) PrintChecks(setup, loop, detail);
     PrintSpeed(loop, result);
     if (!folder.empty()) fmt::print("log and summary in {}\n", folder);
-    if (!result.gain_card.empty()) fmt::print("\n{}", result.gain_card);
     fmt::print("\n");
   }
   switch (result.verdict) {

@@ -50,6 +50,8 @@ auto Guard(const Function& function) -> decltype(function()) {
     last_error = std::string("i") + error.what();
   } catch (const std::exception& error) {
     last_error = std::string("v") + error.what();
+  } catch (...) {
+    last_error = "vno standard exception";
   }
   return {};
 }

@@ -12,6 +12,7 @@ namespace dexcheck {
 
 struct PythonObject;
 
+// Names are those of C. NOLINTBEGIN(readability-identifier-naming)
 extern "C" {
 
 /// The message of this thread's last failed call. The first character is its kind: 'i' for an InputError, 'v'
@@ -51,5 +52,6 @@ bool dexcheck_jacobian(PythonObject* robot, const char* frame, const double* q, 
 bool dexcheck_signal(PythonObject* log, const char* name, double* values);
 
 }  // extern "C"
+// NOLINTEND(readability-identifier-naming)
 
 }  // namespace dexcheck

@@ -214,6 +214,9 @@ std::string DescribeMargins(const JointMargins& margins) {
 
 void JudgeGains(const Setup& setup, const ClosedLoop& loop, RunResult* result) {
   if (setup.joints() == nullptr || !loop.knows_law() || loop.record().step == 0) return;
+  // Margins are those of the scenario's law, and these torques are not.
+  if (loop.is_checking() && loop.checks().Has("law_torque") && loop.checks().Find("law_torque").failed)
+    return;
   result->margins = CalcJointMargins(setup, setup.joints()->gains);
   if (!result->margins) return;
   std::string& card = result->gain_card;
@@ -225,6 +228,8 @@ void JudgeGains(const Setup& setup, const ClosedLoop& loop, RunResult* result) {
   card += "\n" + CommentLines(WriteJointControl(setup.scenario(), 1.0)) + DescribeMargins(*result->margins);
   const BestGains best = FindBestGains(setup);
   const bool found = best.factor > 0.0;
+  card +=
+      "# margins are the linearised loop's: without quantisation, noise, dry friction and torque limits\n";
   card += fmt::format("# best gains with margins of at least {} (gain) and {:.0f} degrees (phase): {}\n",
                       BestGains::kGain, RadToDeg(BestGains::kPhase), found ? "below" : "none found");
   if (!best.limited_by.empty()) card += "# limited by the " + best.limited_by + "\n";

@@ -1,5 +1,7 @@
 #include "harness/scenario/scenario.h"
 
+#include <cmath>
+
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
 #include "controller/common/toml_reader.h"
@@ -59,6 +61,10 @@ void ReadPlant(const TomlValue& value, const std::filesystem::path& folder, Scen
        POSITIVE_KEY(contact_impedance), POSITIVE_KEY(impratio), KEY(bonded), KEY(implicit_damping),
        POSITIVE_KEY(floor_friction), POSITIVE_KEY(finger_friction), KEY(collide)},
       &plant);
+  const double steps = plant.control_step / plant.time_step;
+  constexpr double kMostSteps = 1e6, kRounding = 1e-6;
+  if (std::abs(steps - std::round(steps)) > kRounding || steps > kMostSteps)
+    table.Get("control_step").Fail("must be a multiple of time_step, of at most a million");
   if (plant.contact_impedance >= 1.0) table.Get("contact_impedance").Fail("must be less than 1");
   if (const auto count = table.Find("noslip_iterations")) {
     plant.noslip_iterations = static_cast<int>(count->AsWhole(0, kMaxNoslipIterations));

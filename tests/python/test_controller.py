@@ -71,6 +71,12 @@ def test_an_exception_ends_the_run_in_one_line():
     with pytest.raises(dexcheck.RunError, match=r"RuntimeError: out of cheese \(test_controller.py:\d+\)") as raised:
         dexcheck.run("panda-reach", law, set=SHORT)
     assert "\n" not in str(raised.value) and "out of cheese" in str(raised.value.__cause__)
+    with pytest.raises(dexcheck.RunError, match="FileNotFoundError: .*none.csv"):
+        dexcheck.run("panda-reach", lambda s: open("none.csv"), set=SHORT)  # an OSError, but no end of the run
+    with pytest.raises(dexcheck.RunError, match="SystemExit"):
+        dexcheck.run("panda-reach", lambda s: __import__("sys").exit(0), set=SHORT)
+    with pytest.raises(dexcheck.RunError, match="real torques"):
+        dexcheck.run("panda-reach", lambda s: s.gravity + 1j, set=SHORT)
     with pytest.raises(dexcheck.RunError, match="must return 7 torques"):
         dexcheck.run("panda-reach", lambda s: 0.0, set=SHORT)
     with pytest.raises(dexcheck.InputError, match="none.toml"):

@@ -1,6 +1,8 @@
 """The Python module, as a robot's own tests would use it: python3 -m pytest tests/python"""
 
+import copy
 import os
+import pickle
 import re
 import timeit
 
@@ -163,10 +165,23 @@ def test_bad_input_is_refused(panda, tmp_path):
         panda.compare({"M": lambda q: np.eye(3)}, samples=1)
     with pytest.raises(dexcheck.InputError, match="must have one of M, c, g, h, friction"):
         panda.compare({})
+    with pytest.raises(dexcheck.InputError, match="'gravity': must be a function and one of"):
+        panda.compare({"M": panda.M, "gravity": panda.g})
+    with pytest.raises(dexcheck.InputError, match="g: must be real"):
+        panda.compare({"g": lambda q: panda.g(q) + 0j}, samples=1)
+    with pytest.raises(dexcheck.InputError, match="must be loaded with floating=False"):
+        dexcheck.load(ARM).compare(dexcheck.load(ARM, floating=True))
     with pytest.raises(RuntimeError, match="my own mistake"):
         panda.compare({"M": raise_mistake}, samples=1)
     with pytest.raises(ValueError, match='nowhere'):
         panda.pose("nowhere", np.zeros(7))
+
+
+def test_a_copy_is_a_robot_of_its_own(panda, state):
+    q, _ = state
+    copies = [copy.copy(panda), copy.deepcopy(panda), pickle.loads(pickle.dumps(panda))]
+    for one in copies:
+        np.testing.assert_array_equal(one.M(q), panda.M(q))
 
 
 def raise_mistake(_):

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from .controller import InputError
-from .program import execute
+from .program import as_path, execute
 from .robot import Robot
 
 _TERMS = ("M", "c", "g", "h", "friction")
@@ -52,18 +52,21 @@ class Comparison:
 
 def compare(robot, other, samples, seed, digits, ignore):
     """Robot.compare."""
-    words = ["consistency", robot.file, "--samples", samples, "--seed", seed, *_package_words(robot)]
+    words = ["consistency", robot.path, "--samples", samples, "--seed", seed, *_package_words(robot)]
     words += ["--digits", digits] if digits else []
-    words += [f"--ignore={','.join(ignore)}"] if ignore else []
+    words += [f"--ignore={ignore if isinstance(ignore, str) else ','.join(ignore)}"] if ignore else []
     name = Path(robot.file).name
     if isinstance(other, Robot):
-        other = other.file
+        if other.floating != robot.floating:
+            raise InputError(f"{other.file}: must be loaded with floating={robot.floating}, as {robot.file} is")
+        words += _package_words(other)
+        other = other.path
     if isinstance(other, (str, os.PathLike)):
-        words.insert(2, os.fspath(other))
+        words.insert(2, as_path(other))
         return Comparison(name, Path(other).name, _execute(words, robot))
     with tempfile.TemporaryDirectory() as folder:
         folder = os.path.join(folder, "results")
-        execute(["eval", "--robot", robot.file, "--states", samples, "--seed", seed, "--out", folder,
+        execute(["eval", "--robot", robot.path, "--states", samples, "--seed", seed, "--out", folder,
                  *(["--floating"] if robot.floating else [])])
         _save_terms(robot, other, folder)
         called = "functions" if isinstance(other, dict) else type(other).__name__
@@ -72,6 +75,10 @@ def compare(robot, other, samples, seed, digits, ignore):
 
 def _save_terms(robot, functions, folder):
     """Calls the functions of an object or a dictionary at the states of a folder, and writes what they return beside them."""
+    if isinstance(functions, dict):
+        for name, function in functions.items():
+            if name not in _TERMS or not callable(function):
+                raise InputError(f"functions: {name!r}: must be a function and one of {', '.join(_TERMS)}")
     find = functions.get if isinstance(functions, dict) else lambda name: getattr(functions, name, None)
     found = {name: find(name) for name in _TERMS if find(name) is not None}
     if not found:
@@ -81,7 +88,10 @@ def _save_terms(robot, functions, folder):
         shape = (robot.nv, robot.nv) if name == "M" else (robot.nv,)
         values = np.empty((len(q), *shape))
         for i in range(len(q)):
-            value = np.asarray(function(q[i]) if name in ("M", "g") else function(q[i], v[i]), float)
+            value = function(q[i]) if name in ("M", "g") else function(q[i], v[i])
+            if np.iscomplexobj(value):
+                raise InputError(f"{name}: must be real, got complex numbers")
+            value = np.asarray(value, float)
             if value.shape != shape:
                 raise InputError(f"{name}: must have {_print_shape(shape)} entries, got {_print_shape(value.shape)}")
             values[i] = value
@@ -106,6 +116,7 @@ class Diagnosis(dict):
 
 def diagnose(a, b, *, digits=0):
     """Why two descriptions of one robot disagree: the causes, each with the value that would be right."""
+    a, b = (one.path if isinstance(one, Robot) else as_path(one) for one in (a, b))
     return Diagnosis(_execute(["diagnose", a, b, "--quiet", *(["--digits", digits] if digits else [])]))
 
 
@@ -166,8 +177,8 @@ def judge(model, t, q, qd=None, tau=None, qdd=None, joints=None, current=None):
     if (tau is None) == (current is None):
         raise InputError("judge: must have one of tau and current")
     arrays = {"t": np.asarray(t, float)}
-    if len(arrays["t"]) == 0:
-        raise InputError("t: must not be empty")
+    if arrays["t"].ndim != 1 or arrays["t"].size == 0:
+        raise InputError(f"t: must not be empty, and have one entry a row, got shape {arrays['t'].shape}")
     columns = ['t = "t"']
     for key, values in {"q": q, "qd": qd, "qdd": qdd, "tau": tau, "current": current}.items():
         if values is None:
@@ -177,9 +188,9 @@ def judge(model, t, q, qd=None, tau=None, qdd=None, joints=None, current=None):
             raise InputError(f"{key}: must have {len(arrays['t'])} x {len(names)} entries, got {_print_shape(array.shape)}")
         arrays.update({f"{key}_{i}": array[:, i] for i in range(len(names))})
         columns.append(f"{key} = {{ columns = {json.dumps([f'{key}_{i}' for i in range(len(names))])}, "
-                       f"joints = {json.dumps(names)} }}")
+                       f"joints = {json.dumps(names, ensure_ascii=False)} }}")
     with tempfile.TemporaryDirectory() as folder:
         recording, table = os.path.join(folder, "recording.npz"), os.path.join(folder, "columns.toml")
         np.savez(recording, **arrays)
         Path(table).write_text("\n".join(columns) + "\n", encoding="utf8")
-        return Judgement(_execute(["judge", robot.file, recording, "--columns", table, *_package_words(robot)], robot))
+        return Judgement(_execute(["judge", robot.path, recording, "--columns", table, *_package_words(robot)], robot))

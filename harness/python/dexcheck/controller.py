@@ -213,9 +213,11 @@ def _serve_steps(connection, controller):
         kind, size = _MESSAGE.unpack(header)
         if kind == _STEP:
             _receive_into(connection, into)
-            tau = controller.step(state)
+            tau = _ask(controller.step, state)
             if controller.reports_F_N:
                 tau, F_N[:] = tau
+            if np.iscomplexobj(tau):
+                raise ValueError("step must return real torques, got complex ones")
             tau = np.asarray(tau, dtype=float)
             if tau.shape != shape:
                 raise ValueError(f"step must return {robot.n} torques, got an array of shape {tau.shape}")
@@ -224,12 +226,23 @@ def _serve_steps(connection, controller):
         elif kind == _SET_PARAMETERS:
             lines = _receive(connection, size).decode().splitlines()
             controller._set({name: value for name, _, value in (line.rpartition(" ") for line in lines)})
-            controller.start(robot)
+            _ask(controller.start, robot)
             connection.sendall(_MESSAGE.pack(_SET_PARAMETERS, 0))
         elif kind == _BEGIN:
-            controller.begin()
+            _ask(controller.begin)
         else:
             return
+
+
+class _LawFailure(Exception):
+    """An exception of a law, its cause: an OSError of a law is none of the connection's."""
+
+
+def _ask(function, *arguments):
+    try:
+        return function(*arguments)
+    except (Exception, SystemExit) as error:
+        raise _LawFailure from error
 
 
 def serve(connection, law):
@@ -240,7 +253,10 @@ def serve(connection, law):
         _serve_steps(connection, controller)
     except (EOFError, OSError):
         pass  # the run has ended
-    except Exception as error:  # whatever the law does wrong
+    except _LawFailure as failure:
+        _send_error(connection, describe(failure.__cause__))
+        return failure.__cause__
+    except Exception as error:  # what the law returned
         _send_error(connection, describe(error))
         return error
     finally:

@@ -18,7 +18,8 @@ _PASS, _DISAGREEMENT, _INPUT = 0, 1, 2
 def _find_program():
     """The environment's DEXCHECK, the program of this build or installation, or the one on the path."""
     folder = Path(__file__).resolve().parent
-    near = [folder / "_program/bin/dexcheck", *(folder.parents[depth] / "bin/dexcheck" for depth in (1, 3))]
+    above = [folder.parents[depth] for depth in (1, 3) if depth < len(folder.parents)]
+    near = [folder / "_program/bin/dexcheck", *(one / "bin/dexcheck" for one in above)]
     found = os.environ.get("DEXCHECK") or next((str(one) for one in near if one.is_file()), None)
     return found or shutil.which("dexcheck") or "dexcheck"
 
@@ -55,6 +56,12 @@ class _Server:
             os.waitpid(child, 0)
 
 
+def as_path(path):
+    """A path as a word of a command line, which no option looks like."""
+    text = os.fspath(path)
+    return "./" + text if text.startswith("-") else text
+
+
 def execute(words, controller=None, apart=False):
     """Runs the program. Returns its exit code, what it printed, and the exception of a law that runs here."""
     with tempfile.TemporaryDirectory() as folder, tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err:
@@ -64,8 +71,12 @@ def execute(words, controller=None, apart=False):
         elif controller is not None:
             server = _Server(controller, apart, folder)
             words = [*words, "--controller", "unix:" + server.path]
-        process = subprocess.Popen([_find_program(), *map(str, words)], stdin=subprocess.DEVNULL, stdout=out, stderr=err,
-                                   env={"DEXCHECK_PYTHON": sys.executable, **os.environ})
+        program = _find_program()
+        try:
+            process = subprocess.Popen([program, *map(str, words)], stdin=subprocess.DEVNULL, stdout=out, stderr=err,
+                                       env={"DEXCHECK_PYTHON": sys.executable, **os.environ})
+        except OSError as error:
+            raise RunError(f"{program}: cannot be run: {error.strerror}") from error
         try:
             if server is not None:
                 _serve_until_end(process, server)
@@ -79,7 +90,9 @@ def execute(words, controller=None, apart=False):
                 server.close()
         out.seek(0)
         err.seek(0)
-        printed, line = out.read().decode(), (err.read().decode().strip().splitlines() or [""])[-1]
+        printed = out.read().decode(errors="replace")
+        line = (err.read().decode(errors="replace").strip().splitlines() or [""])[-1]
+        line = line or (f"{program}: ended by signal {-code}" if code < 0 else f"{program}: exit code {code}, without a word")
         line = line.replace("unix:" + server.path, "of this process") if server else line
         if code == _INPUT:
             raise InputError(line) from (server.error if server else None)

@@ -70,10 +70,14 @@ class Robot(_Native):
 
     def __init__(self, file, floating=False, packages=()):
         self.file, self.floating = os.fspath(file), floating
-        self.packages = [os.fspath(one) for one in packages]
+        self.path = os.path.abspath(self.file)  # wherever the process goes
+        self.packages = [os.path.abspath(one) for one in ([packages] if isinstance(packages, (str, os.PathLike)) else packages)]
         super().__init__(_library.dexcheck_load(os.fsencode(file), floating, os.fsencode("\n".join(self.packages))))
         for key, value in self._facts.items():
             setattr(self, key, value)
+
+    def __reduce__(self):
+        return Robot, (self.path, self.floating, self.packages)  # a copy reads the file again
 
     def __repr__(self):
         return f"<dexcheck.Robot {self.name} of {self.file}: {len(self.joints)} joints>"
@@ -155,6 +159,12 @@ class Log(_Native):
     def __init__(self, file):
         self.file = os.fspath(file)
         super().__init__(_library.dexcheck_open_log(os.fsencode(file)))
+
+    def __reduce__(self):
+        return Log, (os.path.abspath(self.file),)
+
+    def __iter__(self):
+        return iter(self._facts["signals"])
 
     def keys(self):
         return list(self._facts["signals"])

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from .controller import InputError
 from .program import execute
 from .robot import Log
 
@@ -25,7 +26,7 @@ class Run:
 
     def __init__(self, folder, text, keep):
         self.folder, self._text, self._keep = Path(folder), text, keep
-        self.summary = json.loads((self.folder / "summary.json").read_text())
+        self.summary = json.loads((self.folder / "summary.json").read_text(encoding="utf8"))
         self.verdict, self.checks, self.causes = (self.summary.get(key) for key in ("verdict", "checks", "causes"))
         self.log = Log(self.folder / "log.h5")
 
@@ -83,6 +84,8 @@ def study(study, controller=None, *, vary=None, set=None, db=None, jobs=None):
     {"controller.stiffness": [100, 200]}. db: its database, which is kept. A law of this process is copied for each
     trial."""
     with tempfile.TemporaryDirectory() as folder:
+        if set and not vary:
+            raise InputError("study: set is for a grid of vary; a study's file has its own")
         if vary:
             study = _write_study(study, vary, set, folder)
         database = db or os.path.join(folder, "study.sqlite")
