@@ -160,7 +160,7 @@ inline constexpr double kGraspOptimalityBound = 1e-4;
 
 // Values of checks that take more than a line (check_table.cc).
 
-/// What was measured against what the declared sensing makes of the truth.
+/// The difference of the measured signals from those that the declared sensing makes of the truth.
 Evaluation EvaluateMeasurement(const StepAnalysis& step);
 /// Largest torque that a joint received against the declared one, over the largest that was sent.
 Evaluation EvaluateMotors(const StepAnalysis& step);

@@ -33,8 +33,8 @@ enum class Cause {
 /// "model", "wheel slip", ...
 const char* NameOf(Cause cause);
 
-/// What a disagreement with this cause comes to, as a sentence without capital and full stop; that of an
-/// unexplained one where no cause has this name.
+/// Returns the verdict on a disagreement with this cause, a sentence without capital and full stop; the one
+/// of an unexplained disagreement if no cause has this name.
 const char* DescribeCause(std::string_view name);
 
 }  // namespace dexcheck

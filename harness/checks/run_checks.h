@@ -106,7 +106,7 @@ class RunChecks {
   [[nodiscard]] JudgedLaw* law() const { return law_.get(); }
   /// Of the last step.
   [[nodiscard]] const StepAnalysis& analysis() const { return analyzer_.analysis(); }
-  /// Of bodies that are not meant to touch.
+  /// Distances of the bodies that must not touch.
   [[nodiscard]] const Clearance& clearance() const { return analyzer_.clearance(); }
 
  private:

@@ -107,7 +107,7 @@ struct Balance {
   /// M_bar' xi_dot + C_bar' xi + F_bar' + J_B'^T f_c - E_bar' tau' - ... (n), or M_hat V_o_dot + C_hat V_o +
   /// N_o - G f_c - ... (6).
   Vector residual;
-  /// What errors are relative to: |C_bar' xi + F_bar'|_M^-1, at least that of
+  /// The scale of the errors: |C_bar' xi + F_bar'|_M^-1, at least that of
   /// RoundingScales::CalcLeastForces; the object's weight or the contact forces, N.
   double balanced = 1.0;
   double error = kNaN;   ///< The residual's size; of the object as forces at the contacts' arm. Relative.
@@ -169,7 +169,7 @@ class StepAnalyzer {
   /// Of the last step.
   [[nodiscard]] const StepAnalysis& analysis() const { return now_; }
 
-  // What it is formed with, at the last step.
+  // Terms that the last step's analysis was formed with.
   /// M_bar' = L^T L, of the last prediction.
   [[nodiscard]] const TreeFactor& mass_factor() const { return *mass_factor_; }
   [[nodiscard]] const Clearance& clearance() const { return clearance_; }

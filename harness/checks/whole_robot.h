@@ -50,7 +50,7 @@ class WholeRobot {
   [[nodiscard]] int FindLink(int body) const { return body_links_[static_cast<size_t>(body)]; }
   /// The engine's joint of one of model().
   [[nodiscard]] int engine_joint(int joint) const { return joints_[static_cast<size_t>(joint)]; }
-  /// What errors of M's entries are relative to (robot_size() x robot_size()).
+  /// Scales of the errors of M's entries (robot_size() x robot_size()).
   [[nodiscard]] MatrixXd CalcMassScales() const;
 
   /// Evaluates all terms at the engine's state. @param qpos, qvel as the engine's (nq, nv).

@@ -206,8 +206,8 @@ class OneWay {
     return result;
   }
 
-  /// Where the files have different frames on links, several free numbers at links that carry one another are
-  /// what another frame would leave: they are not explained. Neither are numbers that are corrected twice.
+  /// Makes several free numbers at links that carry one another "not explained" if the files have different
+  /// frames there, since another frame would leave them, and so numbers that are corrected twice.
   void WithdrawDoubtful(FileCorrections* result, std::vector<std::string>* unexplained) const {
     constexpr double kFree = 24.0;  // bits of two entries
     const auto is_free = [&](const CorrectionItem& item) {

@@ -55,8 +55,8 @@ Vector6d CalcInertia(const PrintedInertial& body) {
   return ToEntries(R * ToTensor(body.I) * R.transpose());
 }
 
-/// Where a format states what is of a joint: an attribute of its element, or of a child as "limit/lower"; in
-/// a parameter file a key of an entry of "rows" or "joints". None where it has none.
+/// The places where a format states numbers of a joint: an attribute of its element, or of a child as
+/// "limit/lower"; in a parameter file a key of an entry of "rows" or "joints". None where it has none.
 struct JointKeys {
   const char* name;
   const char* types[5];  ///< By JointKind.

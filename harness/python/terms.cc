@@ -20,7 +20,7 @@
 
 namespace dexcheck {
 
-/// What Python holds: a robot or a log, with the text that it was given last.
+/// A robot or a log that Python holds, with the text that it got last.
 struct PythonObject {
   std::filesystem::path file;
   UrdfOptions urdf;

@@ -35,7 +35,7 @@ void dexcheck_free(PythonObject* object);
 /// A robot's name, joints, frames, nq, nv and notes; a log's rows and signals (name, unit, width, columns).
 const char* dexcheck_describe(PythonObject* object);
 
-/// What is impossible or suspicious in a robot's description: a list of lines.
+/// Impossible or suspicious things in a robot's description: a list of lines.
 const char* dexcheck_audit(PythonObject* robot);
 
 /// One term of a robot at positions q (nq) and velocities v (nv). @param term 'M' or 'C' (nv x nv), 'c', 'g',

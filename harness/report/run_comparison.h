@@ -81,7 +81,7 @@ VectorXd Resample(const VectorXd& time, const Eigen::Ref<const VectorXd>& values
 /// "SAME ...", or "DIFFERENT ..." with the signal that differs first: one line.
 std::string DescribeComparison(const RunComparison& comparison);
 
-/// What `compare --json` writes, and its page shows. @param names of the runs, such as their folders.
+/// The JSON of `compare --json`, which its page shows. @param names of the runs, such as their folders.
 nlohmann::ordered_json ToJson(const RunComparison& comparison, const std::vector<std::string>& names);
 
 /// A whole HTML document that loads nothing: verdict, inputs that differ, results and checks side by side,
