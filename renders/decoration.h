@@ -4,7 +4,6 @@
 
 #include <array>
 #include <variant>
-#include <vector>
 
 #include "controller/common/types.h"
 
@@ -30,19 +29,6 @@ struct Cone {
   Color color;
 };
 
-/// A path, drawn as a tube.
-struct Polyline {
-  std::vector<Vector3d> points;
-  double radius;  ///< m.
-  Color color;
-};
-
-struct Dot {
-  Vector3d center;
-  double radius;  ///< m.
-  Color color;
-};
-
-using Decoration = std::variant<Arrow, Cone, Polyline, Dot>;
+using Decoration = std::variant<Arrow, Cone>;
 
 }  // namespace dexcheck

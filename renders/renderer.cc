@@ -15,18 +15,12 @@ namespace dexcheck {
 namespace {
 
 constexpr int kConeSides = 48;
-constexpr int kTubeSides = 8;
-
-unsigned BeginList() {
-  const unsigned list = LoadMesa().glGenLists(1);
-  if (list == 0) throw Error("OpenGL: cannot make a display list");
-  LoadMesa().glNewList(list, GL_COMPILE);
-  return list;
-}
 
 /// Seen from both sides.
 unsigned MakeCone() {
-  const unsigned list = BeginList();
+  const unsigned list = LoadMesa().glGenLists(1);
+  if (list == 0) throw Error("OpenGL: cannot make a display list");
+  LoadMesa().glNewList(list, GL_COMPILE);
   LoadMesa().glBegin(GL_TRIANGLES);
   for (const bool outside : {true, false}) {
     const float sign = outside ? 1.0F : -1.0F;
@@ -50,60 +44,10 @@ unsigned MakeCone() {
 
 }  // namespace
 
-DisplayMeshes::DisplayMeshes(const mjrContext& context) : context_(context), cone_(MakeCone()) {}
+DisplayCone::DisplayCone(const mjrContext& context)
+    : list_(MakeCone()), mesh_(static_cast<int>(list_) - static_cast<int>(context.baseMesh)) {}
 
-DisplayMeshes::~DisplayMeshes() {
-  ClearTubes();
-  LoadMesa().glDeleteLists(cone_, 1);
-}
-
-int DisplayMeshes::ToMesh(unsigned list) const {
-  return static_cast<int>(list) - static_cast<int>(context_.baseMesh);
-}
-
-void DisplayMeshes::ClearTubes() {
-  for (const unsigned list : tubes_) LoadMesa().glDeleteLists(list, 1);
-  tubes_.clear();
-}
-
-int DisplayMeshes::AddTube(std::span<const Vector3d> points, double radius) {
-  Require(points.size() >= 2, "points of a tube", "must be at least two", static_cast<double>(points.size()));
-  const unsigned list = BeginList();
-  tubes_.push_back(list);
-  std::array<Vector3d, kTubeSides> previous;
-  Vector3d x = Vector3d::Zero();
-  for (size_t i = 0; i < points.size(); ++i) {
-    Vector3d along = points[std::min(i + 1, points.size() - 1)] - points[i == 0 ? 0 : i - 1];
-    if (along.isZero()) along = Vector3d::UnitZ();
-    along.normalize();
-    // The last ring's direction, turned as little as the path's bend requires.
-    x -= along.dot(x) * along;
-    x = x.norm() > 0.1 ? x.normalized() : along.unitOrthogonal();
-    const Vector3d y = along.cross(x);
-    std::array<Vector3d, kTubeSides> outward;
-    for (int k = 0; k < kTubeSides; ++k) {
-      const double angle = 2.0 * kPi * k / kTubeSides;
-      outward[static_cast<size_t>(k)] = std::cos(angle) * x + std::sin(angle) * y;
-    }
-    if (i > 0) {
-      const auto vertex = [&](size_t point, const Vector3d& normal) {
-        const Vector3d p = points[point] + radius * normal;
-        LoadMesa().glNormal3dv(normal.data());
-        LoadMesa().glVertex3dv(p.data());
-      };
-      LoadMesa().glBegin(GL_TRIANGLE_STRIP);
-      for (int k = 0; k <= kTubeSides; ++k) {
-        const auto side = static_cast<size_t>(k % kTubeSides);
-        vertex(i, outward[side]);
-        vertex(i - 1, previous[side]);
-      }
-      LoadMesa().glEnd();
-    }
-    previous = outward;
-  }
-  LoadMesa().glEndList();
-  return ToMesh(list);
-}
+DisplayCone::~DisplayCone() { LoadMesa().glDeleteLists(list_, 1); }
 
 namespace {
 
@@ -194,7 +138,7 @@ Renderer::Renderer(const mjModel& model, const RenderOptions& options)
   sized->vis.quality.numstacks = kStacks;
   mjr_makeContext(sized.get(), &context_, mjFONTSCALE_100);
   mjr_setBuffer(mjFB_OFFSCREEN, &context_);
-  meshes_.emplace(context_);
+  cone_.emplace(context_);
   scene_.flags[mjRND_SHADOW] = 1;
   scene_.flags[mjRND_REFLECTION] = 0;
   pixels_.resize(3 * static_cast<size_t>(options.samples * options.width) *
@@ -203,7 +147,7 @@ Renderer::Renderer(const mjModel& model, const RenderOptions& options)
 
 Renderer::~Renderer() {
   gl_->MakeCurrent();
-  meshes_.reset();
+  cone_.reset();
   mjr_freeContext(&context_);
   mjv_freeScene(&scene_);
 }
@@ -239,8 +183,7 @@ Image Renderer::Draw(mjData& data, mjvCamera view, int width, int height, double
     eye.frustum_center -= static_cast<float>(shift_right * visible);
   }
   FadeBody();
-  meshes_->ClearTubes();
-  AddDecorations(decorations, &*meshes_, &scene_);
+  AddDecorations(decorations, *cone_, &scene_);
   const mjrRect viewport = {0, 0, options_.samples * width, options_.samples * height};
   mjr_render(viewport, &scene_, &context_);
   mjr_readPixels(pixels_.data(), nullptr, viewport, &context_);
@@ -272,7 +215,7 @@ constexpr float kGlow = 0.35F;  // emission, so that colours stay recognisable i
 
 class GeomAdder {
  public:
-  GeomAdder(DisplayMeshes* meshes, mjvScene* scene) : meshes_(*meshes), scene_(*scene) {}
+  GeomAdder(const DisplayCone& cone, mjvScene* scene) : cone_(cone), scene_(*scene) {}
 
   void operator()(const Arrow& arrow) {
     const Vector3d along = arrow.to - arrow.from;
@@ -285,30 +228,13 @@ class GeomAdder {
 
   void operator()(const Cone& cone) {
     mjvGeom& geom = Add(mjGEOM_MESH, cone.color);
-    geom.dataid = meshes_.cone();
+    geom.dataid = cone_.mesh();
     const Vector3d x = cone.axis.unitOrthogonal();
     const Vector3d y = cone.axis.cross(x);
     const double radius = cone.height * std::tan(cone.half_angle);
     Matrix3d scaled;
     scaled << radius * x, radius * y, cone.height * cone.axis;
     Place(cone.apex, scaled, &geom);
-  }
-
-  void operator()(const Polyline& line) {
-    if (line.points.size() < 2) return;
-    mjvGeom& geom = Add(mjGEOM_MESH, line.color);
-    // Near the camera in floats: relative to the path's first point.
-    const Vector3d origin = line.points.front();
-    std::vector<Vector3d> points;
-    for (const Vector3d& point : line.points) points.push_back(point - origin);
-    geom.dataid = meshes_.AddTube(points, line.radius);
-    Place(origin, Matrix3d::Identity(), &geom);
-  }
-
-  void operator()(const Dot& dot) {
-    mjvGeom& geom = Add(mjGEOM_SPHERE, dot.color);
-    for (float& size : geom.size) size = static_cast<float>(dot.radius);
-    Place(dot.center, Matrix3d::Identity(), &geom);
   }
 
  private:
@@ -334,14 +260,14 @@ class GeomAdder {
     }
   }
 
-  DisplayMeshes& meshes_;
+  const DisplayCone& cone_;
   mjvScene& scene_;
 };
 
 }  // namespace
 
-void AddDecorations(std::span<const Decoration> decorations, DisplayMeshes* meshes, mjvScene* scene) {
-  GeomAdder adder(meshes, scene);
+void AddDecorations(std::span<const Decoration> decorations, const DisplayCone& cone, mjvScene* scene) {
+  GeomAdder adder(cone, scene);
   for (const Decoration& decoration : decorations) std::visit(adder, decoration);
 }
 

@@ -16,29 +16,21 @@
 
 namespace dexcheck {
 
-/// Shapes that MuJoCo's scenes lack, as OpenGL display lists. mjr_render draws a mesh by calling the list of
-/// its number, counted from the first mesh, so that such a shape is a geom of type mjGEOM_MESH with one of
-/// these numbers as its dataid. The context must be current in all calls.
-class DisplayMeshes {
+/// The shell of a cone about z that opens from the origin, of height 1 and radius 1 at its end, which
+/// MuJoCo's scenes lack, as an OpenGL display list. mjr_render draws a mesh by calling the list of its
+/// number, counted from the first mesh, so that the cone is a geom of type mjGEOM_MESH with this number as
+/// its dataid. The context must be current when it is made and destroyed.
+class DisplayCone {
  public:
-  explicit DisplayMeshes(const mjrContext& context);
-  ~DisplayMeshes();
-  DisplayMeshes(const DisplayMeshes&) = delete;
-  DisplayMeshes& operator=(const DisplayMeshes&) = delete;
-
-  /// Shell of a cone about z that opens from the origin: height 1, radius 1 at its end.
-  [[nodiscard]] int cone() const { return ToMesh(cone_); }
-
-  /// A tube along a path. @param points at least two, m; @param radius m.
-  int AddTube(std::span<const Vector3d> points, double radius);
-  void ClearTubes();
+  explicit DisplayCone(const mjrContext& context);
+  ~DisplayCone();
+  DisplayCone(const DisplayCone&) = delete;
+  DisplayCone& operator=(const DisplayCone&) = delete;
+  [[nodiscard]] int mesh() const { return mesh_; }
 
  private:
-  [[nodiscard]] int ToMesh(unsigned list) const;
-
-  const mjrContext& context_;
-  unsigned cone_;
-  std::vector<unsigned> tubes_;
+  unsigned list_;
+  int mesh_;
 };
 
 /// A camera that stands still where RenderOptions::course says; an MJCF's camera of this name comes first.
@@ -106,13 +98,13 @@ class Renderer {
   mjvPerturb perturb_;
   mjvScene scene_;
   mjrContext context_;
-  std::optional<DisplayMeshes> meshes_;
+  std::optional<DisplayCone> cone_;
   std::vector<std::uint8_t> pixels_;
 };
 
 /// Adds decorations to a scene.
-/// @param meshes gets the shapes that the engine does not have, which must outlive the drawing of the scene.
+/// @param cone which must outlive the drawing of the scene.
 /// @throws std::invalid_argument when the scene has no room for them.
-void AddDecorations(std::span<const Decoration> decorations, DisplayMeshes* meshes, mjvScene* scene);
+void AddDecorations(std::span<const Decoration> decorations, const DisplayCone& cone, mjvScene* scene);
 
 }  // namespace dexcheck

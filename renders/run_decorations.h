@@ -10,34 +10,12 @@
 
 namespace dexcheck {
 
-struct DecorationOptions {
-  bool forces = false;
-  bool tracks = false;
-};
+/// The contact forces of a row, each in its friction cone.
+/// @param meters_per_newton as CalcMetersPerNewton has it.
+std::vector<Decoration> MakeForces(const RunFrames& run, long row, double meters_per_newton);
 
-/// Makes what is drawn into the scene of a run: forces, tracks, paths.
-class RunDecorator {
- public:
-  /// @param data scratch for kinematics.
-  RunDecorator(const mjModel& model, const RunFrames& run, const DecorationOptions& options, mjData* data);
-
-  /// @param data the state of `row`, kinematics computed.
-  std::vector<Decoration> Make(long row, const mjData& data) const;
-
-  /// The key to the colours.
-  [[nodiscard]] std::vector<LegendEntry> MakeLegend() const;
-
- private:
-  void AddTracks(long row, const Pose& X_WO, std::vector<Decoration>* decorations) const;
-  void AddPaths(long row, const Vector3d& p_WO, std::vector<Decoration>* decorations) const;
-
-  const RunFrames& run_;
-  DecorationOptions options_;
-  int object_ = -1;  // body
-  double meters_per_newton_;
-  std::vector<long> sampled_;  // rows, evenly spread
-  std::vector<Pose> poses_;    // X_WO at the sampled rows
-};
+/// The key to their colours.
+std::vector<LegendEntry> MakeForceLegend(const RunFrames& run);
 
 /// How long the arrow of 1 N is drawn: the run's largest contact force fits beside a hand. 1 when there is
 /// none.

@@ -58,7 +58,7 @@ class VideoPainter::RunPainter {
         camera_(ChooseCamera()),
         data_(MakeData(model_)),
         renderer_(model_, MakeRenderOptions()),
-        decorator_(model_, run_, {options.forces, options.tracks}, data_.get()),
+        meters_per_newton_(CalcMetersPerNewton(run_)),
         checks_(run_),
         error_range_(ErrorRange(run_.position_errors)) {
     if (options.panel) overlay_.emplace();
@@ -76,7 +76,8 @@ class VideoPainter::RunPainter {
   Image Paint(double time) {
     const long row = run_.RowAt(run_.times.front() + time + kTimeRounding);
     SetRow(model_, run_, row, data_.get());
-    const std::vector<Decoration> decorations = decorator_.Make(row, *data_);
+    std::vector<Decoration> decorations;
+    if (options_.forces) decorations = MakeForces(run_, row, meters_per_newton_);
     const std::optional<Viewpoint> view = FindOwnView(camera_, MakeEdges());
     Image image = view ? renderer_.Render(*data_, *view, decorations) : renderer_.Render(*data_, decorations);
     if (!options_.inset.empty()) PlaceInset(PaintInset(decorations), &image);
@@ -162,7 +163,7 @@ class VideoPainter::RunPainter {
     state.history = MakeHistory(static_cast<size_t>(row));
     state.error_low = error_range_[0];
     state.error_high = error_range_[1];
-    state.legend = decorator_.MakeLegend();
+    if (options_.forces) state.legend = MakeForceLegend(run_);
     return state;
   }
 
@@ -193,7 +194,7 @@ class VideoPainter::RunPainter {
   int inset_height_ = 0;
   MjDataPtr data_;
   Renderer renderer_;
-  RunDecorator decorator_;
+  double meters_per_newton_;
   CheckHistory checks_;
   std::array<double, 2> error_range_;
   std::optional<Overlay> overlay_;

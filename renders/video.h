@@ -29,11 +29,9 @@ struct VideoOptions {
   std::string camera;
   std::string inset;    ///< A second camera, shown in the lower right corner; none when empty.
   bool forces = false;  ///< Contact forces with their friction cones.
-  /// Draws the contacts' tracks on the object, and the object's path beside the desired one.
-  bool tracks = false;
-  bool panel = true;  ///< Scenario, time, errors and checks.
-  int workers = 2;    ///< Processes that draw, each a frame of its own.
-  int samples = 2;    ///< See RenderOptions.
+  bool panel = true;    ///< Scenario, time, errors and checks.
+  int workers = 2;      ///< Processes that draw, each a frame of its own.
+  int samples = 2;      ///< See RenderOptions.
   int shadow_size = 2048;
 };
 

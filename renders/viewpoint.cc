@@ -72,13 +72,26 @@ constexpr double kElevation = DegToRad(-14.0);
 constexpr double kLeastRadius = 0.01;  // m, of a body that is seen from near by
 constexpr double kRoom = 1.9;          // of its radius, from its centre to the picture's upper edge
 
-/// Adds all geoms that can move. @return the mean of their places.
+/// By body: whether it can move, or carries a body that can, as the fixed link of an arm does.
+std::vector<bool> ListRobotBodies(const mjModel& model) {
+  std::vector<bool> bodies(static_cast<size_t>(model.nbody), false);
+  for (int body = model.nbody - 1; body > 0; --body) {  // a parent comes before its children
+    const auto at = static_cast<size_t>(body);
+    bodies[at] = bodies[at] || model.body_weldid[body] != 0;
+    if (bodies[at]) bodies[static_cast<size_t>(model.body_parentid[body])] = true;
+  }
+  bodies[0] = false;  // the world
+  return bodies;
+}
+
+/// Adds all geoms of a robot or an object. @return the mean of their places.
 Vector3d AddMovingGeoms(const mjModel& model, const mjData& data, std::vector<VisibleSphere>* spheres) {
   Vector3d sum = Vector3d::Zero();
   const size_t before = spheres->size();
+  const std::vector<bool> bodies = ListRobotBodies(model);
   for (int geom = 0; geom < model.ngeom; ++geom) {
-    const bool moves = model.body_weldid[model.geom_bodyid[geom]] != 0;
-    if (!moves || model.geom_type[geom] == mjGEOM_PLANE) continue;
+    const bool is_shown = bodies[static_cast<size_t>(model.geom_bodyid[geom])];
+    if (!is_shown || model.geom_type[geom] == mjGEOM_PLANE) continue;
     spheres->push_back({Vector3d(data.geom_xpos + 3 * geom), model.geom_rbound[geom]});
     sum += spheres->back().center;
   }

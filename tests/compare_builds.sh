@@ -36,7 +36,7 @@ for scenario in "${scenarios[@]}"; do
   [[ $what == same ]] || differing=$((differing + 1))
 done
 for run in hold panda-reach; do
-  Both mutate --run "$run" --numbers 20 --json results.json
+  Both mutate "$run" --numbers 20 --json results.json
   what=same
   diff <(jq -S . "$scratch/before/results.json") <(jq -S . "$scratch/after/results.json") >"$scratch/mutants.txt" ||
     what="$(head -6 "$scratch/mutants.txt")"

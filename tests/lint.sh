@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # Checks format and code without changing anything: clang-format looks at every source of the project, eslint at the
-# pages' scripts, cppcheck and clang-tidy at those of controller/, harness/ and renders/ that are asked for:
+# pages' scripts, the check of comments, cppcheck and clang-tidy at the sources of controller/, harness/ and renders/ that
+# are asked for:
 #   tests/lint.sh                     all
 #   tests/lint.sh SOURCE.cc...        these
 #   tests/lint.sh --since REV [MOST]  those changed since this commit of git, at most MOST of them, the largest changes first
@@ -11,17 +12,24 @@ cd "$root"
 harness/install-packages.sh development
 failed=0
 sources=("$@")
+commented=("$@")  # with headers, all of them
 folders=('controller/*.cc' 'harness/*.cc' 'renders/*.cc')
+headers=("${folders[@]/%.cc/.h}")
 if [[ ${1:-} == --since ]]; then
   git rev-parse --quiet --verify "$2^{commit}" >/dev/null || { echo "lint: $2: no such commit here" >&2; exit 2; }
   mapfile -t sources < <(git diff --numstat --no-renames --diff-filter=d "$2" -- "${folders[@]}" | sort -rn | cut -f 3)
+  mapfile -t commented < <(git diff --name-only --no-renames --diff-filter=d "$2" -- "${folders[@]}" "${headers[@]}")
   if [[ ${#sources[@]} -gt ${3:-1000000} ]]; then
     echo "${#sources[@]} sources have changed since $2; cppcheck and clang-tidy look at $3 of them"
     sources=("${sources[@]:0:$3}")
   fi
 elif [[ $# -eq 0 ]]; then
   mapfile -t sources < <(git ls-files "${folders[@]}")
+  mapfile -t commented < <(git ls-files "${folders[@]}" "${headers[@]}")
 fi
+
+# Lists comments that begin with a word that is no subject; fails if there are any.
+check_comments() { ! grep -nE '(^|[[:space:]])//[/<]* *(Of|What|As|Likewise)\b' /dev/null "$@"; }
 
 echo "clang-format"
 git ls-files '*.cc' '*.h' | xargs clang-format-14 --dry-run --Werror || failed=1
@@ -35,6 +43,9 @@ git ls-files 'harness/*.js' | NODE_PATH=${NODE_PATH:-/usr/share/nodejs} xargs es
   --parser-options=ecmaVersion:2022 --env browser,es2020 --global "${globals%,}" --rule "{no-undef: error, no-const-assign: error,
   no-dupe-keys: error, no-redeclare: [error, {builtinGlobals: false}], no-unreachable: error, no-unused-vars: [error, {varsIgnorePattern: '^(${shared//$'\n'/|})$'}],
   use-isnan: error, valid-typeof: error}" || failed=1
+
+echo "comments"
+check_comments "${commented[@]}" || failed=1
 
 [[ ${#sources[@]} -gt 0 ]] || exit "$failed"
 

@@ -259,16 +259,19 @@ JointEntry ReadJointEntry(const TomlValue& value) {
   if (!range) range = table.Miss("range");
   const Vector2d limits = unit * range->AsVector<2>();
   if (limits[0] > limits[1]) range->Fail("lower limit must not exceed upper limit");
-  const std::optional<TomlValue> dry_friction = table.Find("dry_friction");
+  const auto find = [&](const char* key) {
+    const std::optional<TomlValue> constant = table.Find(key);
+    return constant ? std::optional(constant->AsNotNegative()) : std::nullopt;
+  };
   const std::optional<TomlValue> mimic = table.Find("mimic");
   JointEntry entry{value,
                    *range,
                    unit != 1.0,
                    limits[0],
                    limits[1],
-                   table.Get("damping").AsNotNegative(),
-                   table.Get("armature").AsNotNegative(),
-                   dry_friction ? dry_friction->AsNotNegative() : 0.0,
+                   find("damping"),
+                   find("armature"),
+                   find("dry_friction"),
                    mimic ? std::optional(ReadMimic(*mimic)) : std::nullopt};
   table.RejectUnused();
   return entry;

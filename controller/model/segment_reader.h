@@ -63,12 +63,12 @@ struct MimicEntry {
 struct JointEntry {
   TomlValue value;
   TomlValue range;
-  bool range_is_angle;  ///< Given in degrees, so the joint must be revolute.
-  double lower;         ///< rad or m
-  double upper;         ///< rad or m
-  double damping;       ///< N m s/rad or N s/m
-  double armature;      ///< kg m^2 or kg
-  double dry_friction;  ///< N m or N
+  bool range_is_angle;                 ///< Given in degrees, so the joint must be revolute.
+  double lower;                        ///< rad or m
+  double upper;                        ///< rad or m
+  std::optional<double> damping;       ///< N m s/rad or N s/m
+  std::optional<double> armature;      ///< kg m^2 or kg
+  std::optional<double> dry_friction;  ///< N m or N
   std::optional<MimicEntry> mimic;
   bool used = false;  ///< A row of this name was found.
 };

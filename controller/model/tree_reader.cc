@@ -229,11 +229,14 @@ class TreeReader {
     const bool has_own_frame = !row.written.X_iL.isApprox(Pose::Identity(), 0.0);
     spec_.joints.push_back({chain.prefix + row.joint, chain.prefix + row.link, parent, row.type,
                             FromOwnFrame(parent, is_plain ? X_LB * row.X_before : X_LB), row.mdh, entry.lower,
-                            entry.upper, entry.damping, entry.armature,
+                            entry.upper, entry.damping.value_or(0.0), entry.armature.value_or(0.0),
                             has_own_frame ? ExpressIn(link.body, row.written.X_iL) : link.body,
-                            entry.dry_friction, std::nullopt});
+                            entry.dry_friction.value_or(0.0), std::nullopt});
     if (entry.mimic) mimics_.emplace(index, Mimic{&*entry.mimic, chain.prefix});
     rows_.push_back(row.written);
+    rows_.back().states_damping = entry.damping.has_value();
+    rows_.back().states_armature = entry.armature.has_value();
+    rows_.back().states_dry_friction = entry.dry_friction.has_value();
     joint_of_link_[chain.prefix + row.link] = index;
     return index;
   }

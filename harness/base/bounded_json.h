@@ -34,6 +34,13 @@ inline std::string DescribeJsonError(const nlohmann::json::exception& error) {
   return tag == std::string::npos ? message : message.substr(tag + 2);
 }
 
+/// JSON as the text of a file, which ends in a new line. Bytes that are no UTF-8, such as those of a file's
+/// name, are replaced.
+template <typename Json>
+std::string FormatJson(const Json& json, int indent = 2) {
+  return json.dump(indent, ' ', /*ensure_ascii=*/false, Json::error_handler_t::replace) + "\n";
+}
+
 /// The value of a text; discarded when the text is no JSON or is nested too deeply.
 template <typename Json = nlohmann::json>
 Json ParseJson(std::string_view text) {

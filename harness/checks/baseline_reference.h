@@ -1,9 +1,8 @@
 #pragma once
 
-// The laws that the paper's is compared with (controller/control/baseline_law.h), computed a second time:
-// with dense matrices, straight from the formulas, and from terms that another side evaluated. It shares the
-// formulas of no law with controller/control. What it takes of the controller's terms, C_bar', J_B_dot' and
-// G_dot, multiplies only V_d - V_o.
+// The baseline laws (controller/control/baseline_law.h), computed a second time: with dense matrices,
+// straight from the formulas, and from terms that another side evaluated. It shares no law's formulas with
+// controller/control. The controller's terms C_bar', J_B_dot' and G_dot multiply only V_d - V_o here.
 
 #include <Eigen/Cholesky>
 
@@ -14,7 +13,7 @@
 
 namespace dexcheck {
 
-/// One of those laws at one state. Nothing allocates after construction.
+/// One of the baseline laws at one state. Nothing allocates after construction.
 class BaselineReference {
  public:
   /// @throws std::invalid_argument for kComputedTorque.

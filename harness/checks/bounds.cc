@@ -1,4 +1,4 @@
-// How the bounds of check_table.cc scale with what a scenario changes.
+// Scaling of the bounds of check_table.cc with a scenario's changes.
 
 #include <algorithm>
 
@@ -9,13 +9,13 @@
 namespace dexcheck {
 namespace {
 
-// Those of the shipped scenarios.
+// Values of the shipped scenarios.
 constexpr double kShippedGain = 400.0;    // K_p, 1/s^2
 constexpr double kShippedPosture = 10.0;  // rad/s
 
 double Square(double x) { return x * x; }
 
-/// By the numbers of the engine's contacts, which a rigid plant has not.
+/// Returns the scale by the numbers of the engine's contacts, which a rigid plant has not.
 double CalcContactScale(Scaling scaling, const PlantOptions& plant) {
   const double dt = plant.time_step;
   const double softness = 1.0 - plant.contact_impedance;
@@ -41,7 +41,7 @@ double CalcGainScale(const Vector3d& K_p) {
   return K_p.minCoeff() > 0.0 ? kShippedGain / K_p.minCoeff() : 1.0;
 }
 
-/// What a bound is proportional to, over what that is for the shipped plant and gains.
+/// Returns the quantity that a bound is proportional to, over its value for the shipped plant and gains.
 double CalcScale(Scaling scaling, const Scenario& scenario) {
   const ControlOptions& control = scenario.control;
   if (scaling == Scaling::kPositionGain) return CalcGainScale(control.gains.K_p.head<3>());
@@ -65,7 +65,7 @@ double FindContactTimeConstant(const PlantOptions& plant) {
 
 double CalcBound(const CheckInfo& info, const Scenario& scenario) {
   const double bound = info.bound.shipped * CalcScale(info.bound.scaling, scenario);
-  // What is formed of several terms, parts of which cancel, has a digit less than they.
+  // A sum whose terms partly cancel has one digit less than its terms.
   constexpr double kLost = 10.0;
   return info.bound.is_relative ? Worst(bound, kLost * scenario.tolerance) : bound;
 }

@@ -18,15 +18,15 @@ namespace {
 //   along a tangent  v_dot = -b v - R f_t / impratio + J_dot qvel
 //                    at rest: v = tc d / 2 J_dot qvel - (1 - d) tc / 2 / impratio f_t / m
 //
-// J_dot qvel is what (46) has and the engine's constraint has not: at a fingertip the model's J_B_dot' xi -
+// J_dot qvel is in (46) and not in the engine's constraint: at a fingertip it is the model's J_B_dot' xi -
 // G_dot^T V_Bo, and the w x v of object and platform, whose velocities the model takes along axes that turn;
-// v w in a curve at a tyre. So fingertips that stick creep, tyres give sideways, the platform sinks and
-// tilts, each by a load f / m or an acceleration that is the same whatever the step is; each bound below is
-// that of the shipped plant (dt = 1 ms, d = 0.99, impratio = 100) and scales as its formula says.
-// Where the paper's assumptions are judged, tc is 2 dt, the least that the engine can step, and impratio 100:
-// contacts that a scenario makes softer than that need not be, and are found. Distances grow with time, at
-// rates that do not: distances are judged over the last kSlipWindow at most, with kSlipWindow times the
-// rate's bound.
+// at a tyre it is v w in a curve. Therefore fingertips that stick creep, tyres give sideways, and the
+// platform sinks and tilts, each by a load f / m or an acceleration that does not depend on the step. Each
+// bound below is that of the shipped plant (dt = 1 ms, d = 0.99, impratio = 100) and scales as its formula
+// says. The paper's assumptions are judged with a tc of 2 dt, the least that the engine can step, and an
+// impratio of 100: contacts that a scenario makes softer exceed the bounds. Distances grow with time and
+// their rates do not: distances are judged over the last kSlipWindow, with kSlipWindow times the rate's
+// bound.
 
 /// f_t / m up to which a fingertip may creep, m/s^2: 10 N on a phalanx of 50 g. `hold` has 6, `two-hands`
 /// 130.
@@ -59,7 +59,7 @@ Evaluation When(bool applies, double value, double explained = 0.0) {
   return CheckValue{value, -1, explained};
 }
 
-/// Which part it is of stands beside the value.
+/// Returns a value with the index of its part.
 Evaluation At(const std::pair<double, int>& value) { return CheckValue{value.first, value.second}; }
 
 template <double LawErrors::*error>
@@ -85,7 +85,7 @@ double CalcDepth(const std::vector<Contact>& contacts) {
   return depth;
 }
 
-/// Fingertips that do not touch.
+/// Counts the fingertips that do not touch.
 double CountMissing(const Analysis& a) {
   return static_cast<double>(std::ranges::count(a.step->response.contacts, false, &PlantContact::touching));
 }
@@ -93,7 +93,7 @@ double CountMissing(const Analysis& a) {
 bool IsHolding(const Analysis& a) { return a.step->command.handling.holding; }
 /// Whether the scenario's expectations begin.
 bool IsExpected(const Analysis& a) { return a.step->time >= a.setup->scenario().expect.from; }
-/// Of an object that follows its motion, where expectations have begun.
+/// Returns the tracking error of an object that follows its motion; none before expectations begin.
 Evaluation Tracked(const Analysis& a, double error, double by_hold) {
   return When(a.step->command.tracks && IsExpected(a), error, by_hold);
 }
@@ -106,10 +106,11 @@ Evaluation EvaluateSolver(const Analysis& a) {
 // name, category, unit;
 // bound: shipped, reason, scaling, formula, whether relative;
 // description;
-// what a failure means: cause, precedence, rank, whether its own, sharper check;
-// who evaluates it, when, and how its part is described
+// meaning of a failure: cause, precedence, rank, whether its own, sharper check;
+// evaluation, its moments, and the description of a part
 const CheckInfo kChecks[] = {
-    // Asked once, before anything moves. A radius of 1 never settles; so near to it an error takes 1e9 steps.
+    // The radius is judged once, before anything moves. A radius of 1 never settles; at this bound it takes
+    // 1e9 steps.
     {{"closed_loop_spectral_radius", kLaw, "1"},
      {1.0 - 1e-9, "an error that settles within 1e9 steps", Scaling::kNone, "1 - 1e-9"},
      "largest eigenvalue of (57) with the scenario's gains, sampled as the controller does it",
@@ -129,9 +130,8 @@ const CheckInfo kChecks[] = {
      "the condition number of J_B'",
      {Cause::kControlLaw, 16, Rank::kLaw, kOwn},
      {OfLaw<&LawErrors::torque>, kAlways | kUnsent}},
-    // Where contacts slip, (47) plans for xi_c and the rigid system starts from xi: C_bar' (xi - xi_c) and
-    // J_dot (xi - xi_c) stay, slip speeds of some 1e-6 m/s against rates of the order of 1/s: measured 8e-10
-    // in `curve`.
+    // C_bar' (xi - xi_c) and J_dot (xi - xi_c) remain where contacts slip, since (47) plans for xi_c and the
+    // rigid system starts from xi. Slip speeds are some 1e-6 m/s and rates some 1/s. Measured: 8e-10.
     {{"law_demand", kLaw, "1"},
      {1e-8, "C_bar' (xi - xi_c) and M_bar' J^+ J_dot (xi - xi_c), which slip makes, are taken off",
       Scaling::kNone, "1e-8 + 10 slip forces", kRelative},
@@ -164,8 +164,8 @@ const CheckInfo kChecks[] = {
      "torques that the joints received against those that were sent, relative to the largest",
      {Cause::kActuator, 19, Rank::kActuator, kOwn},
      {EvaluateMotors}},
-    // What law_demand leaves, over K_p = 400/s^2: 1e-8 of accelerations of some m/s^2, times a condition
-    // number of some tens. Measured 1.2e-9 m in `curve`.
+    // The bound is the remaining error of law_demand over K_p = 400/s^2: 1e-8 of accelerations of some m/s^2,
+    // times a condition number of some tens. Measured 1.2e-9 m in `curve`.
     {{"error_dynamics", kLaw, "m"},
      {1e-8, "what law_demand leaves is held by K_p alone", Scaling::kPositionGain, "4e-6 m/s^2 / K_p"},
      "object's position against (57) integrated beside the run, driven by the accelerations that the "
@@ -230,7 +230,7 @@ const CheckInfo kChecks[] = {
      {Cause::kUnmodelledForce, 39, Rank::kDecisive},
      {[](const Analysis& a) { return When(true, a.robot.error); }}},
     // The object's dynamics have no other unknowns than its inertia and the contacts' geometry, which checks
-    // of the model compare: where those hold, a force acts on the object that nobody has.
+    // of the model compare: where those hold, an unknown force acts on the object.
     {{"inverse_dynamics_object", kInverseDynamics, "1"},
      {1e-9, "rounding of the object's terms", Scaling::kNone, nullptr, kRelative},
      "the object's part, as (19) has it: against the contact forces",
@@ -247,9 +247,8 @@ const CheckInfo kChecks[] = {
         return CheckValue{kUnitRounding * a.whole.constraint.first, a.whole.constraint.second};
       },
       kAlways, DescribeConstraint}},
-    // The paper's contacts are rigid. The engine's hold back a part of every force that changes, in
-    // proportion to 1 - d: measured 1e-6 and less in steady motion, 5e-2 in `curve-real`, 0.43 where
-    // fingertips touch.
+    // The paper's contacts are rigid. The engine's delay a part of every changing force, in proportion to 1 -
+    // d: measured 1e-6 and less in steady motion, 5e-2 in `curve-real`, 0.43 where fingertips touch.
     {{"reduced_acceleration", kAssumption, "1"},
      {1.0, "all that motors balance or is predicted: rigid contacts explain nothing any more",
       Scaling::kSofter, "1; 100 (1 - d) of softer contacts"},
@@ -262,7 +261,7 @@ const CheckInfo kChecks[] = {
      "the same of the contact forces: f_c of that system against the engine's, relative to |f_c|",
      {Cause::kContactSoftness, 26, Rank::kPrediction},
      {[](const Analysis& a) { return When(true, a.rigid.contact_force); }}},
-    // Slip and use of the cone tell sliding from contacts that merely give.
+    // Slip and use of the cone distinguish sliding from contacts that only give.
     {{"fingertip_slip", kAssumption, "m"},
      {kSlipWindow * kShippedCreep, "the rate below, over the window, less the same", Scaling::kCreep,
       "10 s (1 - d) dt 2 m/s^2"},
@@ -380,16 +379,15 @@ const CheckInfo kChecks[] = {
      "movement since t = 0 of joints that do not carry the object",
      {},
      {.make = MakeIdleJointsJudge}},
-    // The engine's solver stops where its cost, a square, no longer falls but by rounding: measured 1.4e-5 of
-    // the forces where contacts come and go in `lift`, 1e-12 elsewhere.
+    // The engine's solver stops where its cost, a square, falls by rounding only: measured 1.4e-5 of the
+    // forces where contacts come and go in `lift`, 1e-12 elsewhere.
     {{"solver", kAssumption, "1"},
      {1e-4, "rounding of the solver's cost, under a root, where contacts come and go"},
      "what the engine's solver left over of its own equations of motion, of the object as "
      "inverse_dynamics_object, of the robot as inverse_dynamics_robot",
      {Cause::kSolver, -4, Rank::kDecisive, kOwn},
      {EvaluateSolver}},
-    // rad, m: rounding of a joint that rests exactly at the end of its range, as fingers of a closed gripper
-    // do.
+    // rad, m: rounding of a joint that rests exactly at the end of its range, as a closed gripper does.
     {{"joint_limit", kAssumption, "rad"},
      {1e-12, "a limit pushes; less is rounding"},
      "how far a joint is beyond its range, where a limit pushes that the model does not have",

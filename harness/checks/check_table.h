@@ -1,8 +1,8 @@
 #pragma once
 
-// The checks of a run, besides those of the model's terms: one entry says all that is fixed about a check,
-// and how its value is found in a step's analysis. Attribution, summary, log, report and the document's table
-// read these entries.
+// The checks of a run, except those of the model's terms. One entry holds everything that is fixed about a
+// check, and how its value follows from a step's analysis. Attribution, summary, log, report and the
+// document's table read these entries.
 
 #include <memory>
 #include <optional>
@@ -20,7 +20,7 @@ namespace dexcheck {
 class Setup;
 struct StepAnalysis;
 
-/// What a bound is proportional to; none of them for one that is rounding, or a fraction.
+/// Quantity that a bound is proportional to; kNone for rounding bounds and fractions.
 enum class Scaling {
   kNone,
   kSofter,           ///< 1 - d where contacts are softer than the shipped ones
@@ -37,39 +37,39 @@ enum class Scaling {
 /// Largest value that passes.
 struct Bound {
   double shipped = 0.0;     ///< With the shipped plant and gains.
-  const char* reason = "";  ///< Why it is that, in the document's table.
+  const char* reason = "";  ///< Why the bound has this value, in the document's table.
   Scaling scaling = Scaling::kNone;
-  const char* formula = nullptr;  ///< In the document's table; null where the number is all there is to it.
-  /// Compares model and plant relative to their own size: ten times a scenario's tolerance hold where that is
-  /// wider.
+  const char* formula = nullptr;  ///< In the document's table; null where the number says everything.
+  /// Whether the value is relative to model and plant: the bound is at least ten times the scenario's
+  /// tolerance.
   bool is_relative = false;
 
   /// The formula, or the number.
   [[nodiscard]] std::string Print() const;
 };
 
-/// What explains what: of the failed checks, those of the first of these ranks tell why, however late they
-/// failed.
+/// Rank of a failed check as an explanation of others: the first rank among the failed checks explains the
+/// run, however late it failed.
 enum class Rank {
-  kMeasurement,    ///< Whoever measures wrongly does what is wrong.
+  kMeasurement,    ///< A wrong measurement makes everything after it wrong.
   kLaw,            ///< Torques that are not the law's, or gains that cannot settle.
   kActuator,       ///< Torques that did not arrive.
   kObjectBalance,  ///< A force on the object that neither description has.
-  /// A limit, a contact that slides: from then on everything else is void. So it is from a force on the robot
-  /// on that neither description has, and with wheels that do not roll as they should; what came first tells.
+  /// A limit, or a contact that slides: everything after it is void. The same holds for a force on the robot
+  /// that neither description has, and for wheels that do not roll; among these the earliest explains.
   kDecisive,
   kAssumption,  ///< Contacts that give, a platform that tilts, a solver that stopped early.
-  /// By algebra the prediction differs from the engine's motion by what the inverse dynamics leave and by how
-  /// the contacts give, J_B' xi_dot + J_B_dot' xi - d/dt(G^T V_o): where the inverse dynamics hold, contacts
+  /// The prediction differs from the engine's motion by what the inverse dynamics leave and by how the
+  /// contacts give, J_B' xi_dot + J_B_dot' xi - d/dt(G^T V_o): where the inverse dynamics hold, contacts
   /// gave.
   kPrediction,
   kResidual,  ///< Nothing else failed.
 };
 
-/// What the failure of a check says of its cause.
+/// Cause that the failure of a check points to.
 struct FailureMeaning {
-  Cause cause = Cause::kNone;  ///< kNone: nothing by itself, it follows from the cause of the run.
-  /// Of checks that failed at one time, the one with the smallest number tells the run's cause.
+  Cause cause = Cause::kNone;  ///< kNone: the failure follows from the cause of the run.
+  /// Order among checks that failed at one time: the smallest number is the run's cause.
   int precedence = 0;
   Rank rank = Rank::kAssumption;
   /// Whether the failure has this cause whatever else happened in the run; otherwise it has the run's.
@@ -81,8 +81,9 @@ struct FailureMeaning {
 /// Value of a check at one step.
 struct CheckValue {
   double value = 0.0;
-  int part = -1;           ///< Which joint, fingertip or pair of bodies it is of; -1 for none.
-  double explained = 0.0;  ///< How much of it is known to come of the plant: taken off above the bound.
+  int part = -1;  ///< Joint, fingertip or pair of bodies that has the value; -1 for none.
+  double explained =
+      0.0;  ///< Part of the value that is known to come from the plant; subtracted above the bound.
   /// The value before an allowance was taken off.
   std::optional<double> residual = {};
 };
@@ -98,7 +99,7 @@ class StatefulJudge {
   virtual void Reset() = 0;
 };
 
-/// What a check is called, as in log and summary.
+/// Name of a check in log and summary, with its category and unit.
 struct CheckName {
   std::string_view name;
   CheckCategory category = CheckCategory::kModel;
@@ -111,7 +112,7 @@ struct CheckInfo : CheckName {
   enum Moment : unsigned {
     kSettling = 1U,  ///< At each step while everything settles.
     kRunning = 2U,   ///< At each step of the run.
-    kUnsent = 4U,    ///< Of torques that were not sent because they are above a motor's limit.
+    kUnsent = 4U,    ///< For torques that were not sent because they are above a motor's limit.
     kBefore = 8U,    ///< Before each step, which does not come when the check fails.
     kAlways = kSettling | kRunning,
   };
@@ -133,19 +134,19 @@ std::span<const CheckInfo> ListChecks();
 /// The entry of that name; null for checks of the model.
 const CheckInfo* FindCheck(std::string_view name);
 
-/// Words for what holds of a run whose checks passed, by those that were evaluated and are evidence: "model,
-/// law, inverse and forward dynamics, assumptions hold at every step"; and then what was not judged.
+/// Describes what holds of a run whose checks passed, by the evaluated checks that are evidence: "model, law,
+/// inverse and forward dynamics, assumptions hold at every step"; then what was not judged.
 [[nodiscard]] std::string DescribeWhatHolds(std::span<const CheckRecord> checks);
 
 /// tc of the scenario's contacts, s: twice the time step unless it says otherwise.
 [[nodiscard]] double FindContactTimeConstant(const PlantOptions& plant);
-/// The bound of a check in that scenario, but for what the scenario itself says under [bounds] and [expect].
+/// Returns the bound of a check in that scenario, without the scenario's own [bounds] and [expect].
 [[nodiscard]] double CalcBound(const CheckInfo& info, const Scenario& scenario);
-/// A bound that the scenario itself states: for the plant and the gains of its file. Where these are set
-/// otherwise the bound follows by its formula, unless it is set, too.
+/// Returns a bound that the scenario itself states for the plant and the gains of its file. Where these are
+/// set otherwise the bound follows by its formula, unless the bound is set as well.
 [[nodiscard]] double CalcStatedBound(const CheckInfo& info, const BoundOverride& stated,
                                      const Scenario& scenario);
-/// Whether the scenario's bounds are those of checks. @throws InputError.
+/// Checks that each of the scenario's bounds has the name of a check. @throws InputError.
 void RequireKnownBounds(const Scenario& scenario);
 
 // Bounds of the law. The engine's terms agree with the model's to some 1e-15 of their scales; the
@@ -166,9 +167,9 @@ Evaluation EvaluateMeasurement(const StepAnalysis& step);
 Evaluation EvaluateMotors(const StepAnalysis& step);
 /// A wheel's rim against the platform above it, (1), m/s.
 Evaluation EvaluateRolling(const StepAnalysis& step);
-/// Of a fingertip that touches: the plant's distance less that of the declared shapes, m.
+/// Distance of a fingertip that touches by the plant, less its distance by the declared shapes, m.
 Evaluation EvaluateContactDistance(const StepAnalysis& step);
-/// Of a hemispherical fingertip, m.
+/// Distance of a contact beyond the rim of a hemispherical fingertip, m; negative before the rim.
 Evaluation EvaluateRim(const StepAnalysis& step);
 std::string DescribeFoot(const StepAnalyzer& now, int part);
 std::string DescribeFingertip(const StepAnalyzer& now, int part);

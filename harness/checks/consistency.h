@@ -24,10 +24,10 @@ struct ConsistencyOptions {
   long samples = 10000;
   std::uint64_t seed = 1;
   StateRange range;
-  ModelViewFactory make_view = MakeModelView;  ///< What stands for the model.
-  ObjectFormulas object;                       ///< What stands for the object's equations.
-  std::vector<std::string> ignore;             ///< What two files need not share: kIgnorable.
-  RobotPart part;                              ///< Of two files; all of it when it is empty.
+  ModelViewFactory make_view = MakeModelView;  ///< Makes the model's side of the comparison.
+  ObjectFormulas object;                       ///< Makes the object's equations.
+  std::vector<std::string> ignore;             ///< Constants that two files need not share: kIgnorable.
+  RobotPart part;                              ///< Part of the two files to compare; empty: the whole robot.
   /// Whether two files agree whose numbers differ by no more than their printed precision.
   bool within_digits = false;
   /// Coarsest precision, relative to a number's size, to which such a number still counts as agreement.
@@ -38,7 +38,7 @@ struct ConsistencyResult {
   ConstantChecks constants;
   std::vector<CheckRecord> terms;
   std::vector<std::string> not_compared;  ///< Names of terms that one of the two lacks.
-  long samples = 0;                       ///< Compared: fewer than requested when `progress` said stop.
+  long samples = 0;  ///< Number compared: fewer than requested when `progress` ended the work.
   double seconds = 0.0;
 
   [[nodiscard]] bool Agrees() const;
@@ -57,12 +57,12 @@ ConsistencyResult CheckConsistency(const Adapter& adapter, const ConsistencyOpti
 ConsistencyResult CompareDescriptions(const RobotDescription& a, const RobotDescription& b,
                                       const ConsistencyOptions& options, const Progress& progress);
 
-/// What a program, results in files or functions have, against a description.
-/// @param feed gives the states. @param asker whose terms are compared.
+/// Compares the terms of a program, results in files or functions with a description's. @param feed gives the
+/// states.
 ConsistencyResult CompareProviders(const RobotModel& model, DynamicsProvider* first, DynamicsProvider* second,
                                    const StateFeed& feed, const Progress& progress);
 
-/// States as CheckConsistency draws them, without what only some terms need. The model outlives the feed.
+/// States as CheckConsistency draws them, without quantities of single terms. The model outlives the feed.
 inline StateFeed FeedRandomStates(const RobotModel& model, const ConsistencyOptions& options) {
   return FeedRandomStates(model, options.samples, options.range, options.seed);
 }
@@ -72,8 +72,8 @@ inline StateFeed FeedRandomStates(const RobotModel& model, const ConsistencyOpti
 bool AgreeAtFirst(const RobotModel& model, DynamicsProvider* a, DynamicsProvider* b, const StateFeed& feed,
                   double tolerance = 0.0);
 
-/// The convention of a floating base, other than the one that it speaks, under which a provider that
-/// disagrees would agree in all its terms.
+/// Returns the convention of a floating base, other than the stated one, under which a provider that
+/// disagrees would agree in all its terms; none if there is none.
 /// @param make_feed states to compare at; the first few are used.
 std::optional<BaseConvention> FindOtherConvention(const RobotModel& model, DynamicsProvider* reference,
                                                   LayoutProvider* provider,

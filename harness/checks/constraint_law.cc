@@ -113,8 +113,7 @@ void ConstraintLaw::FindWeights(const mjData& reference) {
     for (int b = 1; b < m.nbody; ++b) {
       const int link = whole_->FindLink(b);
       if (link == WholeRobot::kWorld || link == WholeRobot::kNoLink) continue;
-      // A body that is alone a link has the link's centre of mass; of several that are welded each has its
-      // own.
+      // A body that is the only one of a link has the link's centre of mass; welded bodies have their own.
       const bool is_alone = link >= 0 && m.body_mass[b] > 0.0 && num_bodies[static_cast<size_t>(link)] == 1;
       const Vector3d center = is_alone ? Locate(link, whole_->model().joint(link).body.com).position
                                        : MapVector(reference.xipos + 3 * b);
@@ -124,7 +123,7 @@ void ConstraintLaw::FindWeights(const mjData& reference) {
     }
   }
   const MatrixXd W = M.llt().solve(MatrixXd::Identity(size, size));
-  // The mean of x^T M^-1 x over the columns x. An error E of M makes y^T E y of it, with y = M^-1 x.
+  // The mean of x^T M^-1 x over the columns x. An error E of M changes it by y^T E y, with y = M^-1 x.
   MatrixXd M_error = M.cwiseAbs();
   M_error.topLeftCorner(robot, robot) = whole_->CalcMassScales();
   M_error *= kTurnErrors * (whole_->model().max_depth() + 1);
@@ -189,7 +188,7 @@ const ConstraintLaw::Link& ConstraintLaw::Follow(int link) {
       slid = it.X.linear().col(2) * rates_.row(at);
     } else {
       turned = it.X.linear().col(2) * rates_.row(at);
-      // The angle itself has an error where it counts many turns.
+      // The angle itself has a rounding error that grows with the number of turns.
       it.turn_error += std::abs(qpos_[adapter_->engine().jnt_qposadr[whole_->engine_joint(link)]]);
     }
     const double swing = it.turn_error * (position - parent.X.translation()).norm();
@@ -257,8 +256,8 @@ ConstraintLaw::Place ConstraintLaw::FindPlace(const EngineContact& contact) {
     double reach = second.radius, along_ring = 0.0;
     error += goal.error;
     if (second.shape == Shape::kTorus) {
-      // A torus is a ball that is rolled around its ring, nearest where the ring is or opposite: the engine
-      // means the one at its own distance.
+      // A torus is a ball that is rolled around its ring, nearest on this side or opposite: the engine's
+      // contact is the one at its own distance.
       Vector3d outward = goal.link->X.linear().transpose() * (center.position - goal.position);
       outward.z() = 0.0;
       const double rho = outward.norm();

@@ -20,32 +20,33 @@ namespace dexcheck {
 /// Force of one row of the constraints, N or N m.
 struct RowForce {
   double law = 0.0;
-  double bound = 0.0;  ///< What rounding can make of its difference from the engine's.
-  /// False where no law is stated here: of another kind of row, or on a body beside robot, object and world.
+  double bound = 0.0;  ///< Largest difference from the engine's force that rounding explains.
+  /// False for rows of another kind, and on bodies other than robot, object and world: no law is stated.
   bool is_predicted = false;
   bool has_own_place = true;  ///< Place, distance and normal follow from the parameters; else the engine's.
 };
 
 /// The engine's constraints at one step. A row has the velocity v = J qvel, the acceleration a = J qacc and
-/// the distance r, less its margin. With K, B and the impedance d(r) of its solref and solimp, and the
-/// inverse inertia w of what it joins, at the reference pose, the engine documents
+/// the distance r, less its margin. K, B and the impedance d(r) come from its solref and solimp, and w is the
+/// inverse inertia of the joined bodies at the reference pose. The engine documents
 ///
 ///   y = a + B v + K d r,  R = w (1 - d) / d
 ///   f = max(0, -y / R)   contacts without friction, joint limits, edges of friction pyramids
 ///   f = -y / R           joined points; dry friction, within the joint's own
 ///   f = the point of the friction cone that is nearest to -y / R, in the metric of R
 ///
-/// which needs no state of the row. Along a contact's tangents K = 0, and R is smaller by impratio and
-/// (mu_j / mu_1)^2; the edges of a pyramid share R = 2 mu_1^2 (1 + mu_1^2) w (1 - d) / d / impratio.
+/// No row needs a state of its own. Along a contact's tangents K = 0, and R is smaller by the factors
+/// impratio and (mu_j / mu_1)^2; the edges of a pyramid share R = 2 mu_1^2 (1 + mu_1^2) w (1 - d) / d /
+/// impratio.
 ///
-/// w, J, the joints' limits and dry friction follow from the parameters, and so do the places at which
-/// spheres of fingertips, feet and wheels touch planes of the world, each other, or an object that is a
-/// sphere or torus. At all other contacts place and distance are the engine's. So are the direction of
-/// tangents, and which of the two nearest places on a torus is meant. Softness, margins and friction are
-/// those of the mjModel that the adapter has; of geoms that no pair of the MJCF lists they are the contact's.
+/// w, J, the joints' limits and dry friction follow from the parameters. So do the places at which spheres of
+/// fingertips, feet and wheels touch planes of the world, each other, or an object that is a sphere or torus.
+/// At all other contacts place and distance are the engine's; the direction of tangents and the choice
+/// between the two nearest places on a torus are always the engine's. Softness, margins and friction come
+/// from the adapter's mjModel, or from the contact where no pair of the MJCF lists its geoms.
 ///
-/// Bounds follow from the sizes of what y is the sum of, and from how errors of rotations, places and
-/// velocities grow along the chain of joints. Nothing allocates after construction.
+/// Bounds follow from the sizes of the terms that are summed to y, and from how errors of rotations, places
+/// and velocities grow along the chain of joints. Nothing allocates after construction.
 class ConstraintLaw {
  public:
   /// @param model of the plant's robot. @param object its object, if it has one. @param adapter between that

@@ -23,7 +23,7 @@ void CalcPlaceScales(const RoundingScales& robot, const ContactGeometry& contact
   const double least = 0.5 * sum.trace() - std::hypot(half, 0.5 * (sum(0, 1) + sum(1, 0)));
   const double moved = contact.fingertip.K.norm() / least;
   const double length = robot.world_length();
-  // On a flat object hardly anything turns the normal but what the search for the contact leaves.
+  // On a flat object hardly anything turns the normal except the error of the search for the contact.
   const double left = kContactConvergence / CalcRoundingBound(robot.depth(), 1.0);
   scales->normal = Worst(1.0 + contact.object.K.norm() * moved * length, left);
   scales->position = (1.0 + moved) * length;
@@ -100,7 +100,7 @@ void EvaluateContact(const Contact& contact, const Pose& shift, size_t index, En
   engine.frame[ContactValues::kOverlap] = -touch.distance;
   engine.frame.tail<12>() = (X_oW * X_cf).matrix().topRows<3>().reshaped();
 
-  // Sigma_cf by the engine's normal; where its x axis points about the normal is a convention.
+  // Sigma_cf has the engine's normal; the direction of its x axis about the normal is a convention.
   Matrix3d R_cf;
   R_cf.col(2) = touch.normal;
   R_cf.col(1) = touch.normal.cross(X_cf.linear().col(0)).normalized();
@@ -160,7 +160,8 @@ Pose ContactCheck::CalcObjectPose(const ContactCoordinates& kappa, const Pose& X
 }
 
 void ContactCheck::Compare(const VectorXd& q, const VectorXd& xi, StateSource* source, long sample) {
-  // Away from the sphere's poles and where a torus is convex, so that the bodies touch at one point only.
+  // The contact is away from the sphere's poles and where a torus is convex, so that bodies touch at one
+  // point.
   ContactCoordinates kappa;
   kappa.alpha_f = {source->Draw(-kPi, kPi), source->Draw(-1.0, 1.0), 0};
   kappa.alpha_o = {source->Draw(-kPi, kPi), source->Draw(-1.0, 1.0), 0};

@@ -13,15 +13,15 @@
 
 namespace dexcheck {
 
-/// Evaluates the contact of one of the compared frames by the engine: its narrow phase and the motion of the
-/// two bodies that touch, and what of the model's values follows from the contact alone.
-/// @param contact by the model. @param shift carries the projected robot to where the plant has it.
+/// Evaluates the contact of one of the compared frames by the engine: its narrow phase, the motion of the two
+/// bodies that touch, and the model's values that follow from the contact alone. @param contact by the model.
+/// @param shift carries the projected robot to its place in the plant.
 void EvaluateContact(const Contact& contact, const Pose& shift, size_t index, EngineProvider* engine,
                      ContactValues* model, ScaleContext* scales);
 
 // The contact equations (22)-(40) against the engine's motion of the two bodies that touch.
 
-/// The model's contact equations. Checks of checks put wrong ones in their place.
+/// The model's contact equations. Tests of the checks replace them by wrong ones.
 struct ContactFormulas {
   std::function<ContactGeometry(const Surface&, const Surface&, const ContactCoordinates&)> geometry =
       [](const Surface& fingertip, const Surface& object, const ContactCoordinates& kappa) {
@@ -38,14 +38,13 @@ struct ContactFormulas {
   std::function<Vector5d(const ContactGeometry&, const Vector6d&)> kappa_dot = CalcKappaDot;
 };
 
-/// Puts the object against a fingertip at random contact coordinates and compares, with the engine's narrow
-/// phase and the motion of its two bodies: g_o_cf, G, J_B', and whether Sigma_cf, moved by (40), stays one
-/// frame on both.
+/// Puts the object against a fingertip at random contact coordinates. Compares g_o_cf, G and J_B' with the
+/// engine's narrow phase and the motion of its two bodies, and whether Sigma_cf, moved by (40), stays one
+/// frame.
 class ContactCheck {
  public:
   /// @param fingertip a frame that carries a sphere.
-  /// @throws InputError unless the fingertip can touch and the object is a free torus or another smooth
-  /// solid.
+  /// @throws InputError unless the fingertip can touch and the object is a free torus or another smooth one.
   ContactCheck(const Adapter& adapter, int fingertip, ContactFormulas formulas = {});
 
   /// One contact at q', xi.
@@ -66,7 +65,7 @@ class ContactCheck {
     void Read(Term term, Eigen::Ref<MatrixXd> out) override { ReadValues(term, out); }
   };
 
-  /// Where these contact coordinates put the object, in the engine's world.
+  /// Pose of the object in the engine's world at these contact coordinates.
   [[nodiscard]] Pose CalcObjectPose(const ContactCoordinates& kappa, const Pose& X_cf) const;
 
   int fingertip_;

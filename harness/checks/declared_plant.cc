@@ -5,8 +5,8 @@
 namespace dexcheck {
 namespace {
 
-/// A controller that follows its contacts has others than the true ones, too, and joints with dry friction do
-/// not do what any law here plans.
+/// The plant is not ideal either for a controller that follows its contacts, since these are not the true
+/// ones, and for joints with dry friction, which no law here plans for.
 bool IsIdeal(const Setup& setup) {
   const std::vector<Joint>& joints = setup.model().joints();
   return setup.scenario().imperfections.is_ideal() &&

@@ -1,8 +1,7 @@
 #pragma once
 
-// What a scenario itself declares of its plant (faults of sensing and motors, pushes, other masses), computed
-// a second time beside the loop: declared causes raise no alarm, and what is hidden from the scenario is
-// still found.
+// The plant that a scenario declares (faults of sensing and motors, pushes, other masses), computed a second
+// time beside the loop: declared causes raise no alarm, and faults that the scenario hides are still found.
 
 #include <span>
 
@@ -16,32 +15,32 @@
 
 namespace dexcheck {
 
-/// What is declared of one step. Of an ideal plant that is what the loop itself has.
+/// Declared effects of one step. For an ideal plant they are the loop's own values.
 struct DeclaredStep {
-  bool is_ideal = true;               ///< Nothing is declared.
-  Reading measured;                   ///< What the declared sensing makes of the true state.
-  bool is_measured_right = true;      ///< Whether that is what was measured.
-  VectorXd tau;                       ///< What the declared motors make of the command, tau' (n), N m.
-  const GraspModel* model = nullptr;  ///< Terms of the plant's declared masses, at the true state.
-  VectorXd force;                     ///< Declared pushes on the robot, as forces on xi (n).
-  Vector6d object_wrench = Vector6d::Zero();  ///< And on the object, Sigma_o.
-  /// All of them, where they act on the plant's bodies.
+  bool is_ideal = true;           ///< Nothing is declared.
+  Reading measured;               ///< Measurement that the declared sensing makes of the true state.
+  bool is_measured_right = true;  ///< Whether the loop measured the same.
+  VectorXd tau;                   ///< Torques that the declared motors make of the command, tau' (n), N m.
+  const GraspModel* model = nullptr;          ///< Terms of the plant's declared masses, at the true state.
+  VectorXd force;                             ///< Declared pushes on the robot, as forces on xi (n).
+  Vector6d object_wrench = Vector6d::Zero();  ///< Declared pushes on the object, Sigma_o.
+  /// All declared pushes, where they act on the plant's bodies.
   std::span<const Wrench> pushes;
 };
 
 /// Follows a loop with all that its scenario declares. Nothing allocates after the first step.
 class DeclaredPlant {
  public:
-  /// @throws InputError when the scenario names what is not there.
+  /// @throws InputError when the scenario names a part that is not there.
   DeclaredPlant(const Setup& setup, std::span<const Motor> motors);
 
   /// Whether nothing is declared.
   [[nodiscard]] bool is_ideal() const { return step_.is_ideal; }
-  /// Once at each step, those while everything comes to rest included. @param step its command is set.
+  /// Follows one step, including those while everything comes to rest. @param step its command is set.
   const DeclaredStep& Follow(const StepRecord& step);
-  /// Robot and object are elsewhere from now on, by `way` (m, world).
+  /// Moves robot and object by `way` (m, world) from now on.
   void Translate(const Vector3d& way) { sensing_.Translate(way); }
-  /// They move at `v` (m/s, world) more from now on.
+  /// Adds `v` (m/s, world) to the velocity of robot and object from now on.
   void AddVelocity(const Vector3d& v) { sensing_.AddVelocity(v); }
 
  private:

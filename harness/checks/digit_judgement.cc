@@ -28,7 +28,7 @@ constexpr double kDiagonalisation = 1e-6;
 
 bool IsCause(Term term) { return std::ranges::find(kCauses, term) != std::end(kCauses); }
 
-/// Which number of which part a constant check compares.
+/// Check, kind of part, name and index of the number that a constant check compares.
 using ConstantKey = std::tuple<std::string, Location::Kind, std::string, int>;
 
 ConstantKey KeyOf(const ConstantFinding& finding, const RobotSpec& spec) {
@@ -38,7 +38,7 @@ ConstantKey KeyOf(const ConstantFinding& finding, const RobotSpec& spec) {
           is_of_base ? "" : spec.joints[static_cast<size_t>(first)].name, finding.entry};
 }
 
-/// Constants and bodies in which two descriptions differ.
+/// Lists the constants and bodies in which two descriptions differ.
 std::vector<ConstantFinding> ListDifferentNumbers(const RobotDescription& a, const RobotDescription& b) {
   std::vector<ConstantFinding> findings = CheckConstants(a, b).findings;
   const std::vector<ConstantFinding> bodies = CompareBodies(a, b).findings;
@@ -56,7 +56,7 @@ struct MovedPair {
   std::array<RobotDescription, 2> sides;
 };
 
-/// One file's numbers, moved: its terms by a provider each, and how far its constants move.
+/// One file with moved numbers: a provider for each draw, and the changes of its constants.
 class MovedFile {
  public:
   MovedFile(const PrintedSpread& own, const RobotDescription& other, size_t side,
@@ -90,8 +90,7 @@ class MovedFile {
     return side_ == 0 ? MovedPair(own, other_, ignore_, part_) : MovedPair(other_, own, ignore_, part_);
   }
 
-  /// The engine's diagonalised tensor is as good as the file's. A larger change is no
-  /// rounding.
+  /// The engine's diagonalised tensor is as good as the file's. A larger change is no rounding.
   void TakeDiagonalisation(const RobotDescription& stated) {
     const MovedPair pair = Complete(stated);
     const ConstantChecks bodies = CompareBodies(nominal_->sides[side_], pair.sides[side_]);
@@ -108,7 +107,7 @@ class MovedFile {
     return {first, MakeProvider(pair.sides[1])};
   }
 
-  /// Nothing where a moved tensor, of few digits, has negative moments.
+  /// Returns nothing where a moved tensor of few digits has negative moments.
   std::optional<TermComparison::Copy> TryToCopy(const MovedPair& pair) {
     try {
       return MakeCopy(pair);
@@ -247,8 +246,7 @@ class DigitJudge {
     return false;
   }
 
-  /// Takes note of the precision of a number that agrees. A number whose precision is too coarse is no
-  /// agreement.
+  /// Notes the precision of a number that agrees. A number with too coarse a precision does not agree.
   bool IsTooLoose(DigitExcess excess, double fraction) {
     if (fraction > verdict_.loosest.fraction)
       verdict_.loosest = {NameQuantity(excess.check) + " of " + excess.where, fraction};

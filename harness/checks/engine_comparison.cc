@@ -70,11 +70,11 @@ class EngineComparisonRun {
     }
   }
 
-  /// What cannot be evaluated is named and left out.
+  /// Adds a provider; one that cannot be evaluated is named as absent and left out.
   void Add(const std::string& name, const std::function<ProviderPtr()>& make) {
     try {
       ProviderPtr provider = make();
-      // One state, so that what cannot answer is left out before the comparison.
+      // One state suffices to leave out providers that cannot answer before the comparison.
       DynamicsState state;
       state.q.setZero(model_.num_positions());
       state.xi.setZero(model_.num_velocities());
@@ -116,7 +116,7 @@ class EngineComparisonRun {
     return std::make_unique<ProgramProvider>(command, robot_, options_.program_options);
   }
 
-  /// An MJCF, or the URDF as MuJoCo's importer should have it.
+  /// Returns the MJCF, or the URDF in the form that MuJoCo's importer needs.
   const std::filesystem::path& MujocoFile() {
     if (!mujoco_file_.empty()) return mujoco_file_;
     if (!options_.mjcf.empty()) {
@@ -134,7 +134,7 @@ class EngineComparisonRun {
     return mujoco_file_;
   }
 
-  /// What MuJoCo makes of a file; a refusal speaks of the file that the user knows.
+  /// Loads a file into MuJoCo; a refusal names the file that the user knows.
   [[nodiscard]] MjModelPtr Load(const std::filesystem::path& path) const {
     if (path == file_.path()) return file_.CopyEngine();
     try {
@@ -190,7 +190,8 @@ class EngineComparisonRun {
       const auto other = std::ranges::find(compiled.spec.joints, joint.name, &Joint::name);
       if (other == compiled.spec.joints.end()) return;
       const auto j = static_cast<size_t>(other - compiled.spec.joints.begin());
-      // From the compiled joint's frame over the link's own, which both know.
+      // The bodies are moved from the compiled joint's frame to the link's own, through the frame that both
+      // have.
       const MassProperties body =
           ExpressIn(other->body, completed.joints[i].X_iL * compiled.joints[j].X_iL.inverse());
       const double size = joint.body.inertia.norm();
@@ -202,7 +203,7 @@ class EngineComparisonRun {
          completed});
   }
 
-  /// What the engine counts among its passive forces, as friction, and no description has.
+  /// Notes the passive forces that the engine counts as friction and that no description has.
   void NoteOtherForces(const Adapter& adapter) {
     constexpr const char* kChecks[] = {"joint_spring", "tendon_spring", "tendon_damping", "fluid"};
     std::vector<std::string> parts;

@@ -31,14 +31,14 @@ std::optional<std::string> FindSetting(const RobotDescription& robot, DynamicsPr
 
 // One robot in several engines: the terms of all of them at the same states, each pair compared.
 
-/// Where engines are found, and what they read.
+/// Search paths of the engines, and their inputs.
 struct EngineComparisonOptions {
   /// Names of ListEngineComparisonEngines; empty: all that are there.
   std::vector<std::string> engines;
   /// Programs of the user's own, "NAME=COMMAND".
   std::vector<std::string> programs;
-  std::filesystem::path mjcf;             ///< What MuJoCo reads instead of the robot's file; may be empty.
-  std::filesystem::path programs_folder;  ///< With the programs that come with dexcheck.
+  std::filesystem::path mjcf;             ///< File that MuJoCo reads instead of the robot's; may be empty.
+  std::filesystem::path programs_folder;  ///< Folder of the programs that come with dexcheck.
   std::filesystem::path node_modules;     ///< Folder in which npm installed MuJoCo 3; may be empty.
   ProgramOptions program_options = {.seconds = 60.0};  ///< Node and large engines start slowly.
   ConsistencyOptions states;
@@ -48,18 +48,18 @@ struct EngineComparisonOptions {
   double tolerance = 1e-6;
 };
 
-/// Name of an engine, and what it is: "analytic", "mujoco", "mujoco3", "bullet", "kdl", "simbody".
+/// Name of an engine, and its description: "analytic", "mujoco", "mujoco3", "bullet", "kdl", "simbody".
 struct EngineComparisonEngine {
   std::string name;
   std::string description;
 };
 const std::vector<EngineComparisonEngine>& ListEngineComparisonEngines();
 
-/// What all engines together say.
+/// Results of all engines together.
 struct EngineComparisonResult {
-  std::vector<std::string> names;   ///< Of the providers, as they call themselves.
+  std::vector<std::string> names;   ///< The providers' own names.
   std::vector<std::string> absent;  ///< "kdl: why it is not compared".
-  bool lacks_requested = false;     ///< One of them was requested by name.
+  bool lacks_requested = false;     ///< Whether one of them was requested by name.
   std::vector<std::string> notes;
   std::vector<ComparedPair> pairs;  ///< Judged by the tolerance.
   std::vector<std::vector<size_t>>
@@ -71,7 +71,7 @@ struct EngineComparisonResult {
 };
 
 /// Compares the engines. @param robot the description of `file`, whose analytic model is the first of them.
-/// @throws InputError for names that are none, and when fewer than two are left.
+/// @throws InputError for unknown names, and when fewer than two engines are left.
 EngineComparisonResult RunEngineComparison(const DescriptionFile& file, const RobotDescription& robot,
                                            const EngineComparisonOptions& options,
                                            const std::function<bool(long)>& progress);

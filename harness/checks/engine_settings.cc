@@ -37,7 +37,7 @@ MassProperties DropInertia(const DescribedPart& part) {
   return body;
 }
 
-/// As if the inertia had been given about the link's origin: what belongs to the centre of mass is taken off.
+/// Reads the inertia as if it were given about the link's origin: subtracts m (|c|^2 1 - c c^T).
 MassProperties ReadAboutOrigin(const DescribedPart& part) {
   MassProperties body = part.body;
   const Vector3d& c = body.com;
@@ -55,7 +55,7 @@ void ScaleDamping(double factor, RobotDescription* robot) {
   for (Joint& joint : robot->spec.joints) joint.damping *= factor;
 }
 
-/// Euler's step with damping taken at its end has M + h D in the place of M.
+/// Euler's step with damping taken at its end has M + h D instead of M.
 void AddImplicitDamping(double step, RobotDescription* robot) {
   for (Joint& joint : robot->spec.joints) joint.armature += step * joint.damping;
 }

@@ -4,19 +4,19 @@
 
 namespace dexcheck {
 
-/// What a disagreement of model and engine comes from.
+/// Cause of a disagreement of model and engine.
 enum class Cause {
   kNone,
-  kModel,          ///< The two descriptions differ: constants, kinematics, dynamics, contact geometry.
-  kSensing,        ///< The controller was told what is not so.
-  kControlLaw,     ///< The torques are not those of the law, or the law with these gains does not do what is
-                   ///< expected.
-  kActuator,       ///< The motors gave other torques than were sent.
-  kActuatorLimit,  ///< A motor could not give its torque.
-  kJointLimit,     ///< A joint reached the end of its range.
-  kFingertipSlip,  ///< A fingertip slides: its force is at the edge of the friction cone.
-  kFootSlip,       ///< A foot slides or leaves the ground.
-  kWheelSlip,      ///< A wheel slides: assumption (1), rolling without slipping.
+  kModel,            ///< The two descriptions differ: constants, kinematics, dynamics, contact geometry.
+  kSensing,          ///< The controller's measurements are wrong.
+  kControlLaw,       ///< The torques are not those of the law, or the law with these gains misses the
+                     ///< expectations.
+  kActuator,         ///< The motors gave other torques than were sent.
+  kActuatorLimit,    ///< A motor could not give its torque.
+  kJointLimit,       ///< A joint reached the end of its range.
+  kFingertipSlip,    ///< A fingertip slides: its force is at the edge of the friction cone.
+  kFootSlip,         ///< A foot slides or leaves the ground.
+  kWheelSlip,        ///< A wheel slides: assumption (1), rolling without slipping.
   kContactSoftness,  ///< Contacts give or creep without sliding.
   kTilt,             ///< The platform does not stay level.
   kSolver,           ///< The engine's solver stopped before its forces fit its motion.
@@ -24,9 +24,9 @@ enum class Cause {
   kSlope,            ///< The floor is not level: gravity points elsewhere.
   kContactGeometry,  ///< A fingertip or the object has another shape.
   kWheelGeometry,    ///< The wheels' radius or distance is another.
-  kCollision,        ///< Two bodies touch that are not meant to.
+  kCollision,        ///< Two bodies touch that must not.
   kFingertipRim,     ///< A contact has rolled past the rim of a hemispherical fingertip.
-  kDeclared,         ///< What the scenario declares of plant, motors and sensors.
+  kDeclared,         ///< The scenario's declarations on plant, motors and sensors.
   kUnexplained,      ///< None of these was seen.
 };
 

@@ -59,11 +59,13 @@ std::vector<FileChange> ListChanges(const PrintedRobot& robot, const CorrectionI
     }
     const auto add = [&](const NamedNumber& number, std::optional<double> value,
                          std::optional<double> repair) {
+      constexpr double kRounding = 1e-12;
       const bool is_of_link = number.quantity == "mass" || number.quantity.starts_with("inerti") ||
                               number.quantity.starts_with("centre");
-      const std::string place = is_of_link ? "link " + given.name : "joint " + given.joint.name;
-      changes.push_back(
-          {place, number.quantity, number.unit, value, repair, sizes[NameVector(number.quantity)]});
+      const double size = sizes[NameVector(number.quantity)];
+      if (repair && std::abs(*repair) <= kRounding * size) repair = 0.0;
+      changes.push_back({NamePlace(given, is_of_link ? SiteKind::kMass : SiteKind::kPosition),
+                         number.quantity, number.unit, value, repair, size});
     };
     for (const NamedNumber& number : after) {
       const std::optional<double> value = FindNumber(before, number.quantity);
@@ -76,19 +78,20 @@ std::vector<FileChange> ListChanges(const PrintedRobot& robot, const CorrectionI
   return changes;
 }
 
-/// @param of_second the second file is `corrected`.
-FileCause MakeCause(const PrintedRobot& corrected, const PrintedRobot& reference, bool of_second,
-                    CorrectionItem item) {
+/// @param robot that the item's patches are of.
+/// @param name_file names the file that has the fault, where it is not the one that is to be corrected.
+FileCause MakeCause(const PrintedRobot& robot, CorrectionItem item,
+                    const std::function<std::string(const CorrectionItem&)>& name_file) {
   FileCause cause;
-  const bool is_of_reference = item.in_second != of_second;
+  const std::string file = name_file(item);
   item.in_second = false;
-  cause.text = (is_of_reference ? "in " + reference.source + ", " : "") + DescribeItem(item, of_second);
+  cause.text = (file.empty() ? "" : "in " + file + ", ") + DescribeItem(item, false);
   cause.id = item.id;
   cause.places = item.places;
-  cause.changes = ListChanges(corrected, item);
+  cause.changes = ListChanges(robot, item);
   cause.explained = item.explained;
   for (const CorrectionItem& rival : item.rivals)
-    cause.alternatives.push_back(MakeCause(corrected, reference, of_second, rival));
+    cause.alternatives.push_back(MakeCause(robot, rival, name_file));
   return cause;
 }
 
@@ -146,9 +149,6 @@ void LeaveOutUnstated(const std::vector<std::string>& ignore, PrintedRobot* robo
       std::optional<PrintedScalar>& number = link.joint.scalars[static_cast<size_t>(limit)];
       if (number && number->value == 0.0) number.reset();
     }
-    const auto& range = link.joint.range;
-    if (robot->format == RobotFormat::kToml && range && (*range)[0].value == -kPi && (*range)[1].value == kPi)
-      link.joint.range.reset();
   }
 }
 
@@ -199,19 +199,47 @@ bool IsExplained(const std::string& check, const CorrectionItem& cause) {
   });
 }
 
+namespace {
+
+/// A joint of a table that states no range has half a turn to both sides: beside a table such a range is
+/// none.
+void LeaveOutHalfTurns(PrintedRobot* a, PrintedRobot* b) {
+  if (a->format != RobotFormat::kToml && b->format != RobotFormat::kToml) return;
+  const auto is_end = [](const PrintedScalar& end, double half_turn) {
+    return std::abs(end.value - half_turn) <= end.half + 1e-12;
+  };
+  for (PrintedRobot* const robot : {a, b}) {
+    for (PrintedLink& link : robot->links) {
+      auto& range = link.joint.range;
+      if (range && is_end((*range)[0], -kPi) && is_end((*range)[1], kPi)) range.reset();
+    }
+  }
+}
+
+}  // namespace
+
 FileCauses FindCauses(PrintedRobot a, PrintedRobot b) {
   LeaveOutFrames(&a, &b);
+  LeaveOutHalfTurns(&a, &b);
   FileCauses found;
   found.corrections = FindCorrections(a, b);
+  const std::vector<CorrectionItem>& items = found.corrections.items;
   const bool of_second = found.corrections.of_second;
-  const PrintedRobot& corrected = of_second ? b : a;
-  const PrintedRobot& reference = of_second ? a : b;
+  const bool is_in_reference = !items.empty() && std::ranges::all_of(items, [&](const CorrectionItem& item) {
+    return item.in_second != of_second;
+  });
+  found.of_second = of_second != is_in_reference;
+  const PrintedRobot& corrected = found.of_second ? b : a;
+  const PrintedRobot& reference = found.of_second ? a : b;
   found.agrees = found.corrections.agrees;
   found.file = corrected.source;
   found.reference = reference.source;
   found.unexplained = found.corrections.unexplained;
-  for (const CorrectionItem& item : found.corrections.items)
-    found.causes.push_back(MakeCause(corrected, reference, of_second, item));
+  const auto name_file = [&](const CorrectionItem& item) {
+    return item.in_second == found.of_second ? std::string() : reference.source;
+  };
+  for (const CorrectionItem& item : items)
+    found.causes.push_back(MakeCause(of_second ? b : a, item, name_file));
   return found;
 }
 

@@ -43,7 +43,8 @@ struct FileCause {
 /// The causes by which two files differ.
 struct FileCauses {
   bool agrees = true;
-  std::string file;                      ///< Name of the file that is corrected,
+  bool of_second = false;                ///< The second file is to be corrected.
+  std::string file;                      ///< Name of the file that is to be corrected,
   std::string reference;                 ///< and of the other one.
   std::vector<FileCause> causes;         ///< The one that explains most first.
   std::vector<std::string> unexplained;  ///< "joint q1: position"
@@ -51,10 +52,10 @@ struct FileCauses {
 };
 
 /// Takes out of a robot the constants of joints that two files need not share (kIgnorable), and numbers that
-/// state nothing: a limit of effort or velocity of 0, and in a table a range of half a turn to both sides.
+/// state nothing: a limit of effort or velocity of 0.
 void LeaveOutUnstated(const std::vector<std::string>& ignore, PrintedRobot* robot);
 
-/// Takes out of each robot the frames that are links in the other one, where they may be welded to others.
+/// Takes out of each robot the frames that are links in the other one, unless links of one name carry both.
 void LeaveOutFrames(PrintedRobot* a, PrintedRobot* b);
 
 /// Whether a constant or term that differs (ConstantFinding::check) follows from a cause.

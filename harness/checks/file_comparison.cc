@@ -29,7 +29,7 @@ void AppendTo(std::vector<std::string>* notes, const std::vector<std::string>& m
   notes->insert(notes->end(), more.begin(), more.end());
 }
 
-/// What moves in a scene and is no part of the robot.
+/// Notes the joints of a scene that are no part of the robot.
 void NoteOthers(const Adapter& adapter, Comparison* comparison) {
   std::vector<std::string> names;
   for (const int joint : adapter.other_joints())
@@ -51,13 +51,12 @@ void NoteTermsOfFrames(Comparison* comparison) {
                                        JoinNames(names));
 }
 
-/// Counts roundings that the bounds of the table of terms do not know: kStep for each step along a chain, of
-/// both sides together, of which a rotation on one side has kRotation.
-/// - A table that dexcheck import wrote has those of its writing. For each row: a product of three
-/// transforms,
-///   the decomposition into three angles (one more product), and their composition when it is read (two), six
-///   rotations in all; and the angles as short decimals, each within 8 pi eps (FormatTidy).
-/// - A link's frame is placed by both chains at zero, as many roundings again.
+/// Widens bounds by roundings that the table of terms does not count: kStep for each step along a chain, of
+/// both sides together, and kRotation for a rotation on one side.
+/// - A table that dexcheck import wrote has for each row a product of three transforms, the decomposition
+/// into three angles (one more product), and their composition when it is read (two): six rotations in all.
+/// Its angles are short decimals, each within 8 pi eps (FormatTidy).
+/// - A link's frame is placed by both chains at zero, with as many roundings again.
 void CountRoundings(int imported, bool has_link_frames, std::vector<CheckRecord>* records, int held = 0) {
   constexpr double kStep = 16.0;
   constexpr double kRotation = 8.0;
@@ -69,15 +68,14 @@ void CountRoundings(int imported, bool has_link_frames, std::vector<CheckRecord>
   }
 }
 
-/// What brings a description and an engine's model together.
+/// Changes that bring a description and an engine's model together.
 struct EngineCompletion {
   Completion completion;
   bool has_link_frames = false;
 };
 
 /// Completes a description, and gives it frames of links and the inertias that the engine compiled. A robot
-/// on wheels, one with an object, and a parameter file of another mechanism are left for the adapter to
-/// match.
+/// on wheels, one with an object, and a parameter file of another mechanism are left to the adapter.
 EngineCompletion Complete(const ConsistencyOptions& options, const MjcfFile& mjcf, const mjModel& engine,
                           bool is_table, Comparison* comparison, RobotDescription* robot) {
   const std::string file = comparison->second.filename().string();
@@ -116,7 +114,7 @@ void NoteForceRanges(const DescriptionFile& file, const RobotDescription& other,
                                          JoinNames(names));
 }
 
-/// Compares motors, wheels and shapes, and names what the compilers of MJCFs changed.
+/// Compares motors, wheels and shapes, and names the changes that compilers of MJCFs made.
 /// @param robot the first description, with the second's names.
 void CompareBeside(const DescriptionFile& first, const RobotDescription& robot, const DescriptionFile& second,
                    Comparison* comparison) {
@@ -138,7 +136,7 @@ void CompareBeside(const DescriptionFile& first, const RobotDescription& robot, 
   }
 }
 
-/// A description against the engine.
+/// Compares a description with the engine.
 void CompareWithEngine(const DescriptionFile& first, const DescriptionFile& second, const UrdfOptions& urdf,
                        const ConsistencyOptions& options, const Progress& progress, Comparison* comparison) {
   const std::string file = comparison->second.filename().string();
@@ -175,7 +173,7 @@ void CompareWithEngine(const DescriptionFile& first, const DescriptionFile& seco
     AddExtras(*extras, &constants);
   }
   if (comparison->read_second) CompareBeside(first, robot, second, comparison);
-  // An MJCF's notes are about what CompareExtras compares.
+  // The notes of an MJCF concern quantities that CompareExtras compares.
   if (format != RobotFormat::kMjcf) AppendTo(&comparison->notes, robot.notes);
   AppendTo(&comparison->not_compared, completion.not_compared);
   AppendTo(&comparison->notes, completion.notes);
@@ -186,7 +184,7 @@ void CompareWithEngine(const DescriptionFile& first, const DescriptionFile& seco
                                      {}, &comparison->result);
 }
 
-/// Two descriptions without the engine.
+/// Compares two descriptions without the engine.
 void CompareTwoDescriptions(const DescriptionFile& first, const DescriptionFile& second,
                             const UrdfOptions& urdf, const ConsistencyOptions& options,
                             const Progress& progress, Comparison* comparison) {
@@ -207,7 +205,7 @@ void CompareTwoDescriptions(const DescriptionFile& first, const DescriptionFile&
   const bool has_link_frames = AddLinkFrames(&a, &b);
   comparison->model.emplace(a.spec);
   comparison->result = CompareDescriptions(a, b, options, progress);
-  // A held joint is a step of its chain that the model has no more.
+  // A held joint is a step of its chain that the model no longer has.
   CountRoundings((a.is_imported ? 1 : 0) + (b.is_imported ? 1 : 0), has_link_frames,
                  &comparison->result.terms, held);
   AddOneSided(*comparison->model, completion.one_sided, &comparison->result.constants);
@@ -220,7 +218,7 @@ void CompareTwoDescriptions(const DescriptionFile& first, const DescriptionFile&
                                      &comparison->result);
 }
 
-/// Part of two robots. Of an MJCF, the terms are those of what MuJoCo compiled, by the analytic model.
+/// Compares a part of two robots. An MJCF's terms are the analytic model's with MuJoCo's numbers.
 void ComparePart(const DescriptionFile& first, const DescriptionFile& second, const UrdfOptions& urdf,
                  const ConsistencyOptions& options, const Progress& progress, Comparison* comparison) {
   comparison->with_engine = false;
@@ -248,7 +246,7 @@ struct Reference {
   std::unique_ptr<DynamicsProvider> provider;
 };
 
-/// What is worth knowing of a base whose convention is the other side's.
+/// Notes the convention of the base where the other side chose it.
 void NoteConvention(const Reference& reference, LayoutProvider* provider,
                     const std::function<StateFeed()>& make_feed, Comparison* comparison) {
   if (!provider->layout().is_floating()) return;
@@ -262,7 +260,7 @@ void NoteConvention(const Reference& reference, LayoutProvider* provider,
                               ": this is its convention, and its key \"base\" can say so");
 }
 
-/// The causes of what differs between two mechanisms.
+/// The causes of the differences between two mechanisms.
 std::optional<FileCauses> TryToExplain(const DescriptionFile& a, const DescriptionFile& b,
                                        const ConsistencyOptions& options, const Comparison& comparison) {
   const auto is_mechanism = [](const std::optional<RobotDescription>& robot) {
@@ -280,7 +278,7 @@ std::optional<FileCauses> TryToExplain(const DescriptionFile& a, const Descripti
   return FindCauses(first, second);
 }
 
-/// Adds to each cause what a constant of it does to the motion, or which setting of a compiler made it.
+/// Adds to each cause the effect of its constant on the motion, or the compiler's setting that made it.
 void AddEffects(const ConstantChecks& constants, FileCauses* causes) {
   for (size_t i = 0; i < causes->causes.size(); ++i) {
     FileCause& cause = causes->causes[i];

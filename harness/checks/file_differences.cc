@@ -41,8 +41,8 @@ Differences ListExcesses(const DigitVerdict& verdict, const std::string& first, 
       continue;
     }
     const std::string values = DescribeValues(excess, first, second);
-    // The same two numbers, or a constant that one file leaves out, are one fault of many joints: the worst
-    // stands for all.
+    // One line stands for all joints with the same two numbers, or with a constant that one file leaves out:
+    // the worst. They are one fault of many joints.
     const bool is_left_out = excess.effect.find(" states it") != std::string::npos;
     const auto [line, is_new] =
         repeated.emplace(excess.check + (is_left_out ? "" : values), std::pair(lines.size(), 0));
@@ -94,7 +94,7 @@ Differences SortDifferences(const Comparison& comparison) {
                            finding.effect.empty() ? "" : "; ", finding.effect));
   };
   for (const ConstantFinding& finding : comparison.result.constants.findings) {
-    // A check has another scale than the larger of the two where zero is a proper value.
+    // The scale of a check may differ from the larger of the two numbers, where zero is a valid value.
     const double size = Worst(std::abs(finding.model), std::abs(finding.engine));
     const auto check = std::ranges::find(checks, finding.check, &CheckRecord::name);
     const double worst = check == checks.end() ? 1.0 : check->worst;

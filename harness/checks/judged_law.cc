@@ -48,7 +48,7 @@ double JudgedLaw::CalcTorqueError(const StepRecord& step, const LawTerms& terms,
   actuation_.CalcForce(step.command.tau, difference_);
   difference_ -= force();
   const double error = Norm(difference_) / scale_ / condition_number();
-  // Less is rounding, which says nothing.
+  // A smaller error is rounding.
   differs_ = error > kLawTorqueBound;
   Remember(step, terms);
   return error;
@@ -112,7 +112,7 @@ class JudgedJointLaw final : public JudgedLaw {
     for (VectorXd* vector : {&force_, &demand_, &true_demand_, &commanded_force_, &coulomb_, &viscous_,
                              &position_error_, &velocity_error_, &ground_force_})
       vector->setZero(setup.model().num_velocities());
-    // Of the other laws the gain of a joint is the feedback in its torque.
+    // Only computed torque has gains here: the gain of a joint in other laws is the feedback in its torque.
     if (law_ != ControlLaw::kComputedTorque) return;
     for (const char* gain : {"K_v", "K_p"})
       for (int i = 0; i < setup.model().num_velocities(); ++i) {
@@ -142,7 +142,7 @@ class JudgedJointLaw final : public JudgedLaw {
     const VectorXd* predicted = &plant.analysis().findings.xi_dot_model;
     if (!as_commanded || compensates()) {
       actuation_.CalcForce(step.command.tau, commanded_force_);
-      // The rigid robot has no friction that this would compensate.
+      // The rigid robot has no friction to compensate.
       commanded_force_ -= coulomb_ + viscous_;
       predicted = &commanded_.PredictFree(step.model->robot(), commanded_force_).xi_dot;
     }
@@ -222,7 +222,7 @@ class JudgedJointLaw final : public JudgedLaw {
     return true;
   }
   [[nodiscard]] const VectorXd& force() const override { return force_; }
-  /// What the law sends may be much more than what it balances, and is rounded as that.
+  /// The scale of rounding is the torque itself where it is much larger than the forces that it balances.
   [[nodiscard]] double CalcScale(double balanced) override { return Worst(balanced, Norm(force_)); }
 
  private:
@@ -250,8 +250,8 @@ class JudgedJointLaw final : public JudgedLaw {
     }
     errors_.error_dynamics = MaxAbs(q_ - truth.q);
     CalcDemand(q_, xi_, &demand_);
-    // What the plant's robot did beyond the rigid prediction. Where the controller measures otherwise, its
-    // torques arrive otherwise and the robot is pushed, all of that drives the error as well.
+    // The plant's motion beyond the rigid prediction is added. Where the controller measures otherwise, where
+    // its torques arrive otherwise or the robot is pushed, all of that drives the error as well.
     demand_ += step.response.xi_dot;
     if (predicted == nullptr) CalcDemand(truth.q, truth.xi, &true_demand_);
     demand_ -= predicted != nullptr ? *predicted : true_demand_;
@@ -265,7 +265,7 @@ class JudgedJointLaw final : public JudgedLaw {
   const JointMotion* motion_;
   DesiredJoints desired_, half_step_;
   VectorXd force_, demand_, true_demand_, commanded_force_;  // n
-  VectorXd coulomb_, viscous_;                               // n, what is compensated
+  VectorXd coulomb_, viscous_;                               // n, compensated friction
   VectorXd position_error_, velocity_error_;                 // n, q_d - q and q_d_dot - q_dot
   VectorXd ground_force_;                                    // n, J^T f that the ground is asked for
   std::optional<GroundContacts> ground_;                     // of a robot that stands

@@ -1,6 +1,6 @@
 #pragma once
 
-// A law as the checks judge it: computed a second time, from the terms of another provider.
+// A control law as the checks judge it: computed a second time, from the terms of another provider.
 
 #include <memory>
 #include <optional>
@@ -16,25 +16,24 @@
 
 namespace dexcheck {
 
-/// Largest magnitude of the eigenvalues of (57), per time step, when the command is held for `hold` steps: 1
-/// and more does not settle. Over all six axes. @param velocity_age by how much velocities are older than
-/// positions, s: half a time step where velocities step first and positions by them, 0 where both step
-/// together.
+/// Returns the largest magnitude of the eigenvalues of (57) over all six axes, per time step, when the
+/// command is held for `hold` steps; a loop with 1 or more does not settle. @param velocity_age by how much
+/// velocities are older than positions, s: half a time step where velocities step first and positions by
+/// them, 0 where both step together.
 double CalcSampledRadius(const ObjectGains& gains, double time_step, long hold, double velocity_age);
 
 /// One law: reference torques, demanded accelerations, error dynamics, and the spectral radius of the sampled
-/// closed loop. A law has of these what it has.
+/// closed loop. A law may lack some of them.
 class JudgedLaw {
  public:
   virtual ~JudgedLaw() = default;
 
-  /// Of the scenario's gains; none where the closed loop has no error dynamics of its own.
+  /// Spectral radius by the scenario's gains; none where the closed loop has no error dynamics of its own.
   [[nodiscard]] virtual std::optional<double> CalcSpectralRadius() const = 0;
-  /// Whether the rigid system answers with what the law demands of it: the paper's does.
+  /// Whether the rigid system answers with the accelerations that the law demands, as under the paper's law.
   [[nodiscard]] virtual bool has_demand() const { return false; }
   /// Whether the error dynamics can be integrated beside the run: no foot holds the robot back, and the
-  /// controller computes anew at every step, in the way that velocities of the middle of the step before
-  /// need.
+  /// controller computes at every step, with velocities of the middle of the step before.
   [[nodiscard]] bool follows_error() const {
     return CalcSpectralRadius().has_value() && hold_ == 1 && !accelerates_within_step() && !stands_;
   }
@@ -46,10 +45,9 @@ class JudgedLaw {
   /// that of the law.
   virtual const LawErrors& Compare(const StepRecord& step, const LawTerms& terms, const StepAnalyzer& plant,
                                    bool as_commanded) = 0;
-  /// The torques alone: of a step that the motors refuse, where nothing is known of what they would do, and
-  /// while everything settles.
+  /// Compares the torques alone, for a step that the motors refuse, and while everything settles.
   double CompareTorque(const StepRecord& step, const LawTerms& terms);
-  /// Motion of the object that is followed from now on, whose time is 0 at `begin`, s; null for that of the
+  /// Follows this motion of the object from now on, whose time is 0 at `begin`, s; null for that of the
   /// scenario. The motion outlives its use.
   virtual void Follow(const Trajectory* /*motion*/, double /*begin*/) {}
 
@@ -61,7 +59,7 @@ class JudgedLaw {
   [[nodiscard]] const LawHistory& history() const { return history_; }
   void Forget() { history_.Forget(); }
 
-  // The law with changed inputs, and what it consists of.
+  // The law with changed inputs, and its parts.
 
   /// The inputs of a step, with the force of the right law: empty where it has none.
   [[nodiscard]] LawInputs MakeInputs(const StepRecord& step, const LawTerms& terms);
@@ -82,7 +80,7 @@ class JudgedLaw {
   /// E_bar' tau' (n) of the reference law; false when it has none.
   virtual bool Evaluate(const StepRecord& step, const LawTerms& terms) = 0;
   [[nodiscard]] virtual const VectorXd& force() const = 0;
-  /// What the torques' error is relative to. @param balanced |C_bar' xi + F_bar'|_M^-1.
+  /// Scale of the torques' error. @param balanced |C_bar' xi + F_bar'|_M^-1.
   [[nodiscard]] virtual double CalcScale(double balanced) { return balanced; }
   [[nodiscard]] virtual double condition_number() const { return 1.0; }
   /// Copies the desired motion of the last Evaluate.
@@ -93,14 +91,14 @@ class JudgedLaw {
   double CalcTorqueError(const StepRecord& step, const LawTerms& terms, const TreeFactor& factor);
   /// |f|_M^-1 = |L^-T f|
   double Norm(const VectorXd& f) { return factor_->CalcForceNorm(f, &work_); }
-  /// Whether a plant that does not step by Euler's method.
+  /// Whether the plant does not step by Euler's method.
   [[nodiscard]] bool accelerates_within_step() const { return velocity_age_ == 0.0; }
 
   double time_step_, velocity_age_;  // s
   long hold_;                        // steps
-  bool stands_;                      // the ground takes part in what the errors do
+  bool stands_;                      // the ground takes part in the error dynamics
   ActuationMap actuation_;
-  ConstrainedDynamics commanded_;  // what the controller's rigid system does under the commanded torques
+  ConstrainedDynamics commanded_;  // the controller's rigid system under the commanded torques
   TreeFactor own_factor_;          // of the terms' M_bar'
   const TreeFactor* factor_ = nullptr;
   VectorXd difference_;  // n, E_bar' (tau' - tau'_printed)

@@ -140,8 +140,8 @@ std::unique_ptr<StatefulJudge> MakeIdleJointsJudge(const Setup& setup) {
 
 namespace {
 
-/// What moves a body from one pose to the next, in the middle of the way, as a body twist times the time it
-/// takes; to the second order of the angle.
+/// Returns the displacement of a body from one pose to the next as a body twist times time, in the middle of
+/// the way; exact to the second order of the angle.
 Vector6d CalcDisplacement(const Pose& from, const Pose& to) {
   const Pose X = from.inverse(Eigen::Isometry) * to;
   const Matrix3d& R = X.linear();
@@ -201,7 +201,7 @@ class KappaJudge final : public StatefulJudge {
     return apart;
   }
 
-  /// By (40), from how fingertip and object have moved since the last step, in the charts of now.
+  /// Returns the change of kappa by (40) since the last step, by the motion of fingertip and object.
   Vector5d CalcChange(const StepAnalysis& step, size_t finger) {
     const GraspTerms& grasp = step.grasp();
     const MeasuredState& state = step.step->reading.state;
@@ -215,7 +215,7 @@ class KappaJudge final : public StatefulJudge {
     const auto change = [&](const ContactGeometry& at) {
       return CalcKappaDot(at, CalcRelativeTwist(at, moved, Vector6d::Zero()));
     };
-    // By one end of the step alone the error would be of the order of dt, as large as what contacts creep.
+    // One end of the step alone would leave an error of the order of dt, as large as the creep of contacts.
     const SurfacePoint& alpha_f = state.kappa[finger].alpha_f;
     const SurfacePoint& alpha_o = state.kappa[finger].alpha_o;
     if (last.kappa.alpha_f.chart == alpha_f.chart && last.kappa.alpha_o.chart == alpha_o.chart)
@@ -227,7 +227,7 @@ class KappaJudge final : public StatefulJudge {
                   change(CalcContactGeometry(tip, grasp.surface(), began, state.overlap[finger])));
   }
 
-  /// Integrated from (40) since the window's beginning, and since the next one's.
+  /// kappa integrated by (40) since the window's beginning, and since the next one's.
   std::vector<ContactCoordinates> kappa_, next_kappa_;
   std::vector<LastContact> last_;
   bool has_kappa_ = false;

@@ -58,7 +58,7 @@ struct LawPartName {
   void (*remove)(LawInputs*);             ///< Takes it out of the law; null for all torques.
   bool doubles = false;                   ///< `remove` makes it twice as large instead.
   bool is_of_acceleration = false;        ///< Laws without a demanded acceleration do not have it.
-  void (*without)(LawInputs*) = nullptr;  ///< Takes out beforehand what is no part of it.
+  void (*without)(LawInputs*) = nullptr;  ///< Takes out other parts beforehand.
 };
 /// Summands of the laws of the object: single ones first, then sums. Of two that are equally good the first
 /// is the name.

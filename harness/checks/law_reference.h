@@ -42,7 +42,7 @@ struct LawTerms {
   VectorXd G_dot_T_V;           ///< G_dot^T V_Bo (k).
   Pose X_Bo = Pose::Identity();
   Vector6d V_Bo = Vector6d::Zero();
-  Vector6d X_o = Vector6d::Zero();  ///< Of X_Bo, on the law's branch of the angles; kAngles only.
+  Vector6d X_o = Vector6d::Zero();  ///< Coordinates of X_Bo, on the law's branch of the angles; kAngles only.
   Matrix6d M_hat = Matrix6d::Zero();
   Vector6d C_hat_V = Vector6d::Zero();
   Vector6d N_o = Vector6d::Zero();
@@ -54,27 +54,27 @@ struct LawTerms {
   LawTerms(int num_positions, int num_velocities, int num_forces);
 };
 
-/// The object's part of it.
+/// The object's part of LawTerms.
 struct LawObject {
   Pose X_Bo = Pose::Identity();
   Vector6d V_Bo = Vector6d::Zero();
   Vector6d X_o = Vector6d::Zero();  ///< kAngles only.
 };
 
-/// What the law is meant to be.
+/// Specification of the correct law, with the changes that make a wrong one.
 struct LawSpec {
   ObjectGains gains;
   OrientationFeedback orientation = OrientationFeedback::kAngles;
   RedundancyWeight weight;
   PostureTask posture;
-  // Changes that a wrong law may have: factors of each K_p and K_v, and of d/dt(P^-1) X_o_dot, whether
-  // sigma' is projected into the null space, and G^T in the place of G^+.
+  // Changes that a wrong law may have: factors of each K_p and K_v, and of d/dt(P^-1) X_o_dot, whether sigma'
+  // is projected into the null space, and G^T instead of G^+.
   Vector6d position_factor = Vector6d::Ones(), velocity_factor = Vector6d::Ones();
   double rate_factor = 1.0;
   bool projects = true, transposes_grasp = false;
 };
 
-/// Of the scenario's law.
+/// Returns the specification of the scenario's law.
 LawSpec MakeLawSpec(const GraspControllerOptions& options);
 
 /// The law at one state. Nothing allocates after construction.
@@ -98,7 +98,7 @@ class LawReference {
   [[nodiscard]] const VectorXd& sigma_prime() const { return sigma_prime_; }
   /// Bound on the condition number of J W^-1/2: sqrt(trace(A) trace(A^-1)) of A = J W^-1 J^T.
   [[nodiscard]] double condition_number() const { return condition_number_; }
-  /// Force C_bar' (xi_c - xi) and acceleration J^+ J_dot (xi_c - xi) (n): by what (46), (48) differ from
+  /// Force C_bar' (xi_c - xi) and acceleration J^+ J_dot (xi_c - xi) (n), by which (46), (48) differ from
   /// (47), (55) where contacts slip.
   [[nodiscard]] const VectorXd& slip_coriolis() const { return slip_coriolis_; }
   [[nodiscard]] const VectorXd& slip_acceleration() const { return slip_acceleration_; }

@@ -10,9 +10,9 @@ namespace {
 
 using Names = std::initializer_list<std::string_view>;
 
-/// Whether nothing but stiffness holds joints that do not carry the object: whatever is not ideal moves them,
-/// and so do the Coriolis forces and the friction that kPdGravity leaves to it. The least motion in the
-/// metric of M_bar' has them in it.
+/// Whether only stiffness holds joints that do not carry the object. Imperfections move them, and so do the
+/// Coriolis forces and the friction that kPdGravity leaves to it; the least motion in the metric of M_bar'
+/// contains them.
 bool HoldsIdleJoints(const Setup& setup) {
   const ControlOptions& control = setup.scenario().control;
   return !setup.hold().idle_joints.empty() && setup.scenario().imperfections.is_ideal() &&
@@ -62,7 +62,7 @@ std::set<std::string_view> ListMissing(const Setup& setup, const JudgedLaw* law)
   leave_out(!LetsBodiesPush(scenario.plant, setup.engine()), {"collision"});
   const mjModel& engine = setup.engine();
   const auto* const limited = engine.actuator_ctrllimited;
-  // What a scenario lets be cut off is no fault of the run.
+  // Torques that a scenario lets be cut off are no fault of the run.
   leave_out(std::none_of(limited, limited + engine.nu, [](auto flag) { return flag != 0; }) ||
                 scenario.imperfections.actuation.saturates(),
             {"actuator_effort"});
@@ -101,7 +101,7 @@ std::map<std::string_view, const char*> ListDescriptions(const Setup& setup) {
   return {};
 }
 
-/// What the scenario itself says of a bound.
+/// Returns the bound of a check, with the scenario's own [bounds] and [expect].
 double FindBound(const CheckInfo& info, const Scenario& scenario) {
   double bound = CalcBound(info, scenario);
   if (info.name == "expect_position") bound = scenario.expect.position.value_or(0.0);

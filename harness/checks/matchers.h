@@ -5,8 +5,8 @@
 //   EXPECT_THAT("robot.urdf", dexcheck::testing::AgreesWith("robot.xml"));
 //   EXPECT_THAT(my_functions, dexcheck::testing::AgreesWith("robot.urdf", {.digits = 9}));
 //
-// (the second with dexcheck::TermFunctions). What differs is listed with its place and both values, and the
-// fault that explains it is named.
+// (the second with dexcheck::TermFunctions). Differences are listed with place and both values, and the fault
+// that explains them is named.
 
 #include <gmock/gmock.h>
 

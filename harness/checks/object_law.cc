@@ -31,8 +31,8 @@ void CalcApart(const Pose& a, const Pose& b, double* position, double* orientati
 
 // (57) integrated beside a run.
 
-/// The object as (57) leads it from t = 0 on: by itself, driven by what the plant did beyond the prediction,
-/// and driven by what is held during a step. Each steps as the plant does.
+/// The object under (57) from t = 0 on: by itself, driven by the plant's motion beyond the prediction, and
+/// driven by the quantities that are held during a step. Each steps as the plant does.
 class ObjectErrorDynamics {
  public:
   /// @param velocity_age by how much velocities are older than positions, s; 0 of a plant that accelerates
@@ -40,9 +40,9 @@ class ObjectErrorDynamics {
   ObjectErrorDynamics(const LawSpec& spec, double time_step, double velocity_age)
       : spec_(spec), time_step_(time_step), velocity_age_(velocity_age) {}
 
-  /// The next step. @param terms of the law. @param predicted V_o_dot of the rigid system under the torques;
-  /// null where torques, readings or pushes are not those of the law: all of what the object did beyond what
-  /// its true error demands then drives (57). @param errors gets the distances from the true object.
+  /// Follows the next step. @param terms of the law. @param predicted V_o_dot of the rigid system under the
+  /// torques; null where torques, readings or pushes are not those of the law: then (57) is driven by the
+  /// object's motion beyond the demand of its true error. @param errors gets the distances.
   void Follow(const StepRecord& step, const LawTerms& terms, const DesiredMotion& desired,
               const Vector6d* predicted, LawReference* law, LawErrors* errors);
 
@@ -52,11 +52,10 @@ class ObjectErrorDynamics {
     Vector6d V_dot = Vector6d::Zero();  // from this step to the next
   };
   [[nodiscard]] bool accelerates_within_step() const { return velocity_age_ == 0.0; }
-  /// (57) by itself, and driven by what is held during a step, from the step before to this one.
+  /// Follows (57) by itself, and driven by the held quantities, from the step before to this one.
   void FollowHeld(const LawObject& truth, const DesiredMotion& desired, LawReference* law);
   void UpdateAngles(LawObject* object) const;
-  /// As the plant steps, to the next step. @param change half of the change of p_ddot (world) and omega_dot
-  /// within the step.
+  /// Moves one step as the plant does. @param change half the step's change of p_ddot (world) and omega_dot.
   void Move(const Vector6d& change, Followed* one) const;
   /// p_ddot (world) and omega_dot.
   static Vector6d CalcWorldAcceleration(const Followed& one);
@@ -64,7 +63,7 @@ class ObjectErrorDynamics {
   LawSpec spec_;
   double time_step_, velocity_age_;
   bool has_begun_ = false;
-  Followed followed_, undisturbed_, held_;  // (57) driven by all, by nothing, by what is held
+  Followed followed_, undisturbed_, held_;  // (57) driven by everything, by nothing, by held quantities
   Followed before_;                         // the plant's object, a step before
 };
 
@@ -101,7 +100,7 @@ void ObjectErrorDynamics::Follow(const StepRecord& step, const LawTerms& terms, 
     UpdateAngles(&one->object);
     one->V_dot = law->CalcDemand(spec_, one->object, desired);
   }
-  // What the plant's object did beyond the rigid prediction.
+  // The motion of the plant's object beyond the rigid prediction is added.
   followed_.V_dot +=
       step.response.V_Bo_dot - (predicted == nullptr ? law->CalcDemand(spec_, truth, desired) : *predicted);
 }
@@ -148,17 +147,16 @@ void ObjectErrorDynamics::Move(const Vector6d& change, Followed* one) const {
   object->V_Bo << object->X_Bo.linear().transpose() * p_dot, omega;
 }
 
-// What F_N is judged by follows from the solver's options, which no scenario changes.
+// The bounds of F_N follow from the solver's options, which no scenario changes.
 static_assert(kGraspNullBound >= 10.0 * GraspForceOptions{}.residual_tolerance);
 static_assert(kGraspOptimalityBound == 10.0 * GraspForceOptions{}.slack_tolerance);
-// What slip changes in accelerations and forces, over the condition number, against the forces that it
-// changes.
+// Slip's changes of accelerations and forces, over the condition number, relative to these forces.
 constexpr double kSlipFraction = 10.0;
 constexpr double kSmallest = std::numeric_limits<double>::min();
 
 /// Computes the scenario's law at each step from the other provider's terms, the scenario's gains and its
-/// trajectory. Of the controller it takes F_N, which the law may choose, X_o's angles on the law's branch
-/// (checks of the model compare their pose), and C_bar', J_B_dot' where they multiply what slips.
+/// trajectory. It takes from the controller F_N, which the law may choose, X_o's angles on the law's branch
+/// (checks of the model compare their pose), and C_bar', J_B_dot', which multiply only the slip.
 class JudgedObjectLaw final : public JudgedLaw {
  public:
   explicit JudgedObjectLaw(const Setup& setup)
@@ -182,7 +180,7 @@ class JudgedObjectLaw final : public JudgedLaw {
     }
   }
 
-  /// Of (57): of the paper's law, and by algebra of that of operational space.
+  /// (57) is the error dynamics of the paper's law and, by algebra, of operational space control.
   [[nodiscard]] std::optional<double> CalcSpectralRadius() const override {
     if (baseline_ && options_.law != ControlLaw::kOperationalSpace) return std::nullopt;
     return CalcSampledRadius(spec_.gains, time_step_, hold_, velocity_age_);
@@ -264,7 +262,7 @@ class JudgedObjectLaw final : public JudgedLaw {
   /// An impedance's damping follows from its stiffness and one ratio.
   [[nodiscard]] bool has_one_damping() const { return options_.law == ControlLaw::kImpedance; }
 
-  /// What a rigid system does under some torques.
+  /// Motion of a rigid system under some torques.
   struct Motion {
     const VectorXd* xi_dot;
     const Vector6d* V_Bo_dot;
@@ -272,8 +270,8 @@ class JudgedObjectLaw final : public JudgedLaw {
     const TreeFactor* mass_factor;
   };
 
-  /// What the controller's rigid system does under the commanded torques. Measured rates need not fit
-  /// together: what (47), (55) plan for is xi_c, nearest to xi without slip. With C_bar' xi_c and J_dot xi_c
+  /// Predicts the motion of the controller's rigid system under the commanded torques. Measured rates need
+  /// not fit together: (47), (55) plan for xi_c, nearest to xi without slip. With C_bar' xi_c and J_dot xi_c
   /// in (48), (46) the rigid system does exactly what is demanded.
   Motion Predict(const StepRecord& step) {
     actuation_.CalcForce(step.command.tau, work_n_);
@@ -284,8 +282,8 @@ class JudgedObjectLaw final : public JudgedLaw {
     return {&prediction.xi_dot, &prediction.V_Bo_dot, &prediction.f_c, &commanded_.mass_factor()};
   }
 
-  /// @param has_slip whether the rigid system starts from xi, and not from xi_c, as (47) plans: where
-  /// contacts slip the two differ, which is taken off.
+  /// @param has_slip whether the rigid system starts from xi, and not from xi_c, as (47) plans: the
+  /// difference by slip is then subtracted.
   void CompareDemand(const Motion& moved, bool has_slip) {
     // |a|_M = |L a|
     work_n_ = *moved.xi_dot - reference_.xi_dot_d();

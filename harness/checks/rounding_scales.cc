@@ -9,8 +9,7 @@ namespace dexcheck {
 namespace {
 
 // Rounding errors of one joint's step outward, in eps of the coordinates' size: a rotation of three products
-// and sums per entry on either side, and the engine's normalised quaternion. Errors of successive joints add
-// up.
+// and sums per entry on either side, and the engine's normalised quaternion. Joints add up.
 constexpr double kErrorsPerJoint = 16.0;
 
 double RowReach(const Joint& joint) {
@@ -36,15 +35,16 @@ double CalcReach(const RobotModel& model) {
   return farthest;
 }
 
-/// An arm is the difference of points in the world, with a few rounding errors of their coordinates' size
-/// however short it is; a bound allows as many of the arm's own for each joint of a chain.
+/// Returns the length of an arm, m. An arm is the difference of points in the world, with a few rounding
+/// errors of their coordinates' size, however short it is; a bound allows as many of the arm's own per joint
+/// of a chain.
 double CalcArm(const RobotModel& model, double reach) {
   constexpr double kErrorsOfWorld = 4.0;
   double world = reach + model.base().X_B0.translation().norm();
   if (model.base().type != BaseType::kFixed) world += std::sqrt(3.0) * StateRange{}.area;
   const double arm = Worst(reach, kErrorsOfWorld * world / (kErrorsPerJoint * (model.max_depth() + 1)));
   if (arm > 0.0) return arm;
-  // All lies at one point: an inertia has the arm at which its mass would have it.
+  // All points coincide: an inertia has the arm at which its mass would have it.
   double squared = 0.0;
   for (int i = 0; i < model.num_joints(); ++i) {
     const MassProperties& body = model.joint(i).body;
@@ -71,7 +71,7 @@ RoundingScales::RoundingScales(const RobotModel& model)
       arm_(CalcArm(model, reach_)) {
   squared_rate_.assign(static_cast<size_t>(model.num_joints()) + 1, 0.0);
   subtree_mass_.assign(static_cast<size_t>(model.num_joints()) + 1, 0.0);
-  // An inertia that no mass within reach has counts as the mass that would have it there.
+  // An inertia that no mass within reach has counts as the mass that would have it at this arm.
   const auto count_mass = [this](const MassProperties& body) {
     return Worst(body.mass, body.inertia.trace() / (arm_ * arm_));
   };

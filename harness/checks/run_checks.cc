@@ -28,9 +28,9 @@ void ReadEngineContacts(const EngineProvider& engine, LawTerms* terms) {
   }
 }
 
-/// By the engine: all that the table of terms has evaluated on its side. What multiplies only the slip,
-/// C_bar' and J_B_dot', and X_o's branch of the angles are the model's.
-/// @param contacts whether the engine has contacts to compare; bonds it has not, and theirs are the model's.
+/// Reads the law's terms by the engine: all that the table of terms has evaluated on its side. C_bar' and
+/// J_B_dot', which multiply only the slip, and X_o's branch of the angles are the model's.
+/// @param contacts whether the engine has contacts to compare; it has no bonds, whose terms are the model's.
 /// @param terms keeps pointers into model and engine.
 void ReadEngineTerms(const EngineProvider& engine, const GraspModel& model, const MeasuredState& state,
                      bool contacts, LawTerms* terms) {
@@ -82,8 +82,7 @@ RunChecks::RunChecks(const Setup& setup, std::span<const Motor> motors, bool kno
 void RunChecks::CheckMeasuredState() {
   controller_.emplace(setup_->controller_adapter(), setup_->fingertips(),
                       setup_->scenario().control.orientation);
-  // What is measured of robot, object and contacts need not fit together: contacts are compared at the true
-  // state.
+  // Measured robot, object and contacts need not fit together: contacts are compared at the true state.
   controller_->LeaveOutContacts();
   controller_->RaiseBounds(setup_->scenario().tolerance);
 }
@@ -132,7 +131,7 @@ void RunChecks::Add(const Judge& judge, CheckRecord* record, double time) {
   if (!found) return;
   const bool had_failed = record->failed;
   double value = found->value;
-  // As it is up to the bound, and above it less what is known to be in it.
+  // The value counts in full up to the bound; above the bound its explained part is subtracted.
   if (!found->residual && found->explained != 0.0 && !std::isnan(value))
     value = Worst(std::min(value, record->bound), value - found->explained);
   record->Add(value, time, found->residual.value_or(found->value), found->explained);

@@ -1,6 +1,6 @@
 #pragma once
 
-// Which checks a run has: nothing else asks what kind of run it is.
+// The checks that a run has: nothing else depends on the kind of run.
 
 #include <memory>
 #include <optional>
@@ -21,15 +21,14 @@ namespace dexcheck {
 struct Judge {
   const CheckInfo* info = nullptr;
   std::unique_ptr<StatefulJudge> state;  ///< Null for a check without a memory.
-  CheckRecord record;                    ///< Without what came of it.
+  CheckRecord record;                    ///< Name and bound; its results stand in RunChecks.
 
   [[nodiscard]] Evaluation Evaluate(const StepAnalysis& step) const {
     return state ? state->Evaluate(step) : info->by.evaluate(step);
   }
 };
 
-/// The law of a run; null for a task, or where it is not known. @param knows_law whether the controller's law
-/// is the scenario's.
+/// The law of a run; null for a task or an unknown law. @param knows_law whether it is the scenario's.
 std::unique_ptr<JudgedLaw> MakeJudgedLaw(const Setup& setup, bool knows_law);
 
 /// The checks of a run, in the order of log and summary, each with its bound. @param law of MakeJudgedLaw.
@@ -38,18 +37,18 @@ std::vector<Judge> MakeChecks(const Setup& setup, const JudgedLaw* law);
 
 // All checks of a run, at every step.
 
-/// What is known beside the checks of why one failed.
+/// Facts beside the checks that explain why one failed.
 struct CheckContext {
-  /// Largest errors of the object that (57) by itself would leave while the expectations are asked, m and
-  /// rad: below zero where it is not integrated.
+  /// Largest errors of the object that (57) by itself would leave while expectations apply, m and rad; below
+  /// zero where it is not integrated.
   double position_by_law = -1.0, orientation_by_law = -1.0;
   bool is_ideal = true;  ///< The scenario declares no imperfection of the plant.
-  /// `actuator_effort` where the scenario lets torques be cut off: no fault, but what others may come from.
+  /// `actuator_effort` where the scenario lets torques be cut off: no fault, but a possible cause of others.
   std::optional<CheckRecord> limited;
 };
 
-/// The checks of one run, with what went worst. Each step is followed first, and judged then. Nothing
-/// allocates in a step, except as StepAnalyzer and where a check of the model fails for the first time.
+/// The checks of one run, with their worst values. Each step is followed first, and judged then. Nothing
+/// allocates in a step, except in StepAnalyzer and where a check of the model fails for the first time.
 class RunChecks {
  public:
   /// @param motors of the plant. @param knows_law whether the controller's law is the scenario's; otherwise
@@ -57,36 +56,36 @@ class RunChecks {
   /// @throws InputError as EngineTerms and MakeChecks.
   RunChecks(const Setup& setup, std::span<const Motor> motors, bool knows_law = true);
 
-  /// What the scenario declares of the step, whose command is set: once at each step, before it is judged,
-  /// also of those that are not.
+  /// Follows the scenario's declarations for the step, whose command is set: once at each step, before it is
+  /// judged, also for steps that are not judged.
   /// @returns the model at the true state.
   const GraspModel& Follow(const StepRecord& step);
   /// JudgedLaw::Follow.
   void FollowMotion(const Trajectory* motion, double begin) {
     if (law_) law_->Follow(motion, begin);
   }
-  /// Robot and object are elsewhere from now on, by `way` (m, world).
+  /// Moves robot and object by `way` (m, world) from now on.
   void Translate(const Vector3d& way) { declared_.Translate(way); }
-  /// They move at `v` (m/s, world) more from now on.
+  /// Adds `v` (m/s, world) to the velocity of robot and object from now on.
   void AddVelocity(const Vector3d& v) { declared_.AddVelocity(v); }
 
-  /// Before a step that the motors may refuse. @param time of the step, s.
+  /// Judges the effort before a step that the motors may refuse. @param time of the step, s.
   void JudgeEffort(const StepRecord& step, double time);
   /// Looks at a step that no check judges.
   void Look(const StepRecord& step);
   /// Follows the law at a step that no check judges.
   void FollowLaw(const StepRecord& step);
-  /// While everything settles.
+  /// Judges a step while everything settles.
   void JudgeSettling(const StepRecord& step);
-  /// Are the terms that the controller used the engine's?
+  /// Compares the terms that the controller used with the engine's.
   void JudgeModel(const StepRecord& step);
-  /// All else, after JudgeModel.
+  /// Judges everything else, after JudgeModel.
   void JudgeStep(const StepRecord& step);
-  /// Model and torques alone, of torques that were not sent because they are above a motor's limit.
+  /// Judges model and torques alone, where torques were not sent because they are above a motor's limit.
   void JudgeUnsent(const StepRecord& step);
   /// Forgets motion and forces of all steps so far, but for the checks that failed: time begins anew.
   void Reset();
-  /// The same for the checks that failed, too.
+  /// Forgets as Reset, and the checks that failed as well.
   void Forget();
 
   [[nodiscard]] std::span<const CheckRecord> model_checks() const { return model_.records(); }
@@ -104,7 +103,7 @@ class RunChecks {
   [[nodiscard]] bool differs() const { return differs_; }
   /// The law that torques are compared with; null where none is known.
   [[nodiscard]] JudgedLaw* law() const { return law_.get(); }
-  /// Of the last step.
+  /// Analysis of the last step.
   [[nodiscard]] const StepAnalysis& analysis() const { return analyzer_.analysis(); }
   /// Distances of the bodies that must not touch.
   [[nodiscard]] const Clearance& clearance() const { return analyzer_.clearance(); }
@@ -115,17 +114,16 @@ class RunChecks {
   /// Evaluates the checks of that moment.
   void Evaluate(CheckInfo::Moment moment, double time);
   void Add(const Judge& judge, CheckRecord* record, double time);
-  /// The law's terms, of the engine at the measured state.
   /// Compares the torques of a step of settling with the law's. @return whether there is a law.
   bool CompareTorque(const StepRecord& step);
-  /// @param contacts whether those are the engine's.
+  /// Returns the law's terms by the engine at the measured state. @param contacts whether these are its, too.
   const LawTerms& ReadLawTerms(const StepRecord& step, bool contacts);
   void CompareLaw(const StepRecord& step);
 
   const Setup* setup_;
   StepModelCheck model_;
-  /// Of the controller's terms at the measured state, by an engine without the scenario's mismatch, where
-  /// that is not the true one.
+  /// Compares the controller's terms at the measured state, by an engine without the scenario's mismatch,
+  /// where the measured state is not the true one.
   std::optional<StepModelCheck> controller_;
   DeclaredPlant declared_;
   const DeclaredStep* declared_step_ = nullptr;  // of the step

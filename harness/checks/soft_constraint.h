@@ -17,10 +17,10 @@ constexpr double Squared(double x) { return x * x; }
 /// The columns J qacc and J qvel of a point, [linear; angular] each, in the world.
 struct PointMotion {
   Eigen::Matrix<double, 6, 2> value = Eigen::Matrix<double, 6, 2>::Zero();
-  Eigen::Array22d error = Eigen::Array22d::Zero();  ///< Of linear and angular part.
+  Eigen::Array22d error = Eigen::Array22d::Zero();  ///< Errors of the linear and the angular part.
 };
 
-/// Inverse inertia of what a constraint joins, 1/kg or 1/(kg m^2).
+/// Inverse inertia of the bodies that a constraint joins, 1/kg or 1/(kg m^2).
 struct InverseInertia {
   double value = 0.0;
   double error = 0.0;  ///< Relative.
@@ -32,8 +32,7 @@ struct Softness {
   double d_error = 0.0;
 };
 
-/// Returns the softness of a constraint at the distance r, less its margin. @param solref, solimp the
-/// engine's.
+/// Returns a constraint's softness at the distance r, less its margin. @param solref, solimp the engine's.
 Softness CalcSoftness(const mjOption& option, const mjtNum* solref, const mjtNum* solimp, double r,
                       double r_error);
 
@@ -50,7 +49,7 @@ struct SoftCone {
            double r, double r_error);
   /// -y / R.
   [[nodiscard]] std::array<double, 6> CalcFreeForces() const;
-  /// Returns the error of a row's force by rounding. A projection moves two points no farther apart, in its
+  /// Returns the rounding error of a row's force. A projection moves two points no farther apart, in its
   /// metric.
   [[nodiscard]] double CalcForceError(size_t row, double force) const;
 };

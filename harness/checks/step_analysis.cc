@@ -15,7 +15,7 @@ namespace dexcheck {
 namespace {
 
 constexpr double kTiny = std::numeric_limits<double>::min();
-/// Of the motors' forces, where gravity does not act.
+/// Least scale relative to the motors' forces, where gravity does not act.
 constexpr double kLeastBias = 1e-3;
 
 double CalcRobotMass(const RobotModel& model) {
@@ -181,8 +181,8 @@ void StepAnalyzer::CalcContactBias() {
   const PlantOptions& plant = setup_->scenario().plant;
   bias = grasp.slip_bias();
   if (plant.type == PlantType::kRigid) {
-    // It holds (46) whole; half of it under semi-implicit Euler, whose velocities are those of half a step
-    // before.
+    // A rigid plant holds (46) whole; half of it under semi-implicit Euler, whose velocities are half a step
+    // old.
     bias *= plant.integrator == Integrator::kSemiImplicitEuler ? 0.5 : 0.0;
     return;
   }
@@ -208,7 +208,7 @@ void StepAnalyzer::CalcAppliedForce() {
     const int j = model.joint_of_dof(k);
     const Joint& joint = model.joint(j);
     const Eigen::Index entry = model.num_base_velocities() + k;
-    // No more than the parameters say, and where they say: what else is there stays to be found.
+    // Friction counts up to the parameters' value, at their joints: other friction stays in the residual.
     if (friction.size() > 0)
       joint_force_[entry] += std::clamp(friction[entry], -joint.dry_friction, joint.dry_friction);
     if (limits.size() == 0 || joint.type == JointType::kBall) continue;
@@ -293,7 +293,7 @@ void StepAnalyzer::CalcWholeResidual() {
   whole.AddInertia(nu_dot_, &residual);
   whole_size_ = whole_left_.cwiseAbs();
   whole.AddSizes(nu_dot_, &whole_size_);
-  // What motors, and joints' own friction and limits, give as far as the parameters have it.
+  // The forces of motors, joint friction and joint limits are subtracted, as far as the parameters have them.
   const auto apply = [&](Eigen::Index entry, double force) {
     residual[entry] -= force;
     whole_size_[entry] += std::abs(force);
@@ -339,9 +339,9 @@ void StepAnalyzer::ComparePrediction() {
   mass_factor_->Multiply(acceleration_);
   now_.rigid.acceleration = acceleration_.norm() / Worst(now_.robot.balanced, predicted);
   if (ground_) {
-    // Where the rigid system does not determine the forces of single feet, their sum is xi_dot's.
+    // The sum of the forces is xi_dot's where the rigid system does not determine the forces of single feet.
     const bool has_forces = ground_dynamics_->determines_forces();
-    // Of feet that leave the ground, what they should bear.
+    // The scale includes the weight, which feet that leave the ground should bear.
     const double weight = mass_ * setup_->model().gravity().norm();
     const double scale = Worst(findings.foot_force.norm(), weight, kTiny);
     now_.rigid.contact_force =
@@ -349,7 +349,7 @@ void StepAnalyzer::ComparePrediction() {
     return;
   }
   double scale = Worst(findings.f_c.norm(), kTiny);
-  // Fingertips that only touch push with less than what they will bear.
+  // Fingertips that only touch push with less than their later load.
   if (now_.step->command.handling.partial) scale = Worst(scale, CalcWeight());
   now_.rigid.contact_force = (findings.f_c_model - findings.f_c).norm() / scale;
 }
@@ -363,7 +363,7 @@ void StepAnalyzer::CalcObjectResidual() {
   const GraspTerms& grasp = now_.grasp();
   const PlantResponse& response = now_.step->response;
   const ObjectBodyTerms& body = grasp.body();
-  // Of an object that is not held, its radius of gyration.
+  // The arm is the radius of gyration of an object that is not held.
   const double arm = grasp.num_contacts() > 0
                          ? grasp.contacts()[0].geometry.g_o_cf.translation().norm()
                          : std::sqrt(body.M_hat.bottomRightCorner<3, 3>().trace() / body.M_hat(0, 0));

@@ -1,6 +1,6 @@
 #pragma once
 
-// What several checks share at a step: each quantity is computed once, and has one name.
+// Quantities that several checks share at a step: each is computed once, and has one name.
 //
 // Errors of forces and accelerations of the robot are measured in the metric of its own inertia, in which
 // metres and radians, arms and phalanges weigh what they weigh: |a|_M = sqrt(a^T M_bar' a), |f|_M^-1 =
@@ -28,21 +28,21 @@ namespace dexcheck {
 /// [v; w], m/s and rad/s, of a platform that rolls, (1). @param xi starts with the base's velocity.
 Vector2d CalcRollingTwist(const Base& base, const VectorXd& xi);
 
-/// Distances are judged from a place between half of this and this ago, s.
+/// Length of the slip window, s: distances are judged from a moment between half of it and all of it ago.
 inline constexpr double kSlipWindow = 10.0;
 
 inline constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
-/// What one step says of the law. Each is relative to what rounding, or the named tolerance, can explain.
-/// Errors begin as NaN, so that a check of one that nobody set fails; allowances begin as 0.
+/// Errors of the law at one step, each relative to the error that rounding, or the named tolerance, can
+/// explain. Errors begin as NaN, so that a check of an error that was never set fails; allowances begin as 0.
 struct LawErrors {
   /// |E_bar' (tau' - tau'_printed)| against the forces that the motors balance, both in the metric of the
   /// robot's inertia, over the condition number of J_B'.
   double torque = kNaN;
-  /// xi_dot, V_o_dot and f_c of the rigid system (46), (48) under tau' against what (47), (49), (55) demand,
-  /// likewise; forces relative to |f_c|. The largest of them.
+  /// Largest difference of xi_dot, V_o_dot and f_c of the rigid system (46), (48) under tau' from the values
+  /// that (47), (49), (55) demand, in the same metric; forces relative to |f_c|.
   double demand = kNaN;
-  /// The same with what contacts that slip make of it, and how much that is.
+  /// `demand` with the effect of contacts that slip included, and the size of that effect.
   double demand_residual = kNaN, demand_by_slip = 0.0;
   /// F_N by its certificate: the largest entry of G F_N, and how far f_c is outside its cones and bounds,
   /// both over max(1 N, |f_c|); the slope that the objective has left within null(G), over max(1, all of it).
@@ -50,23 +50,21 @@ struct LawErrors {
   /// Object's position, m, or largest distance of a joint, rad or m, against the error dynamics integrated
   /// from t = 0 and driven by the accelerations that the prediction missed.
   double error_dynamics = kNaN;
-  double orientation_dynamics = kNaN;  ///< The object's orientation likewise, rad.
-  /// How far from its desired pose the object would be if (57) alone drove it, m and rad: what the gains
-  /// leave.
+  double orientation_dynamics = kNaN;  ///< The same difference of the object's orientation, rad.
+  /// Distance of the object from its desired pose if (57) alone drove it, m and rad.
   double position_by_law = kNaN, orientation_by_law = kNaN;
-  /// How far what the plant accelerates within a step, while torques and demand are held, leads away from
-  /// (57), m and rad.
+  /// Distance from (57) by the plant's acceleration within a step, while torques are held, m and rad.
   double position_by_hold = 0.0, orientation_by_hold = 0.0;
 };
 
-/// A value, and which part of the robot, which contact or pair of bodies it is of; -1 for none.
+/// A value, and the index of its part of the robot, contact or pair of bodies; -1 for none.
 using WorstPart = std::pair<double, int>;
 
 /// Which fingertips and feet touch.
 struct TouchFindings {
   ContactSet touching = 0;      ///< Fingertips that touch the object, or feet that bear something.
   bool begins_holding = false;  ///< Whether all fingertips should touch the object from this step on.
-  /// Distance of each fingertip that touches, by the plant less by the declared shapes (N), m; else 0.
+  /// Distance of each fingertip that touches, by the plant less by the declared shapes (N), m; 0 for others.
   VectorXd mismatch;
   double foot_gap = 0.0;    ///< Largest gap of a foot of a robot that stands and the ground, m.
   WorstPart foot_mismatch;  ///< Largest difference of a foot's distance by plant and declared shapes, m.
@@ -89,15 +87,15 @@ struct SlipFindings {
 struct RollingFindings {
   Vector2d rates = Vector2d::Zero();     ///< Against the ground, rad/s.
   Vector2d mismatch = Vector2d::Zero();  ///< v +- w b / 2 - r thetadot, m/s.
-  Vector2d slip = Vector2d::Zero();      ///< What of that slipping and tyres that give may be, m/s.
+  Vector2d slip = Vector2d::Zero();      ///< Part of it that slip and tyres that give can explain, m/s.
 };
 
-/// The whole robot and its object (WholeRobot) against the engine: relative errors, and the entry of nu or
-/// the row of the constraints that each is of.
+/// The whole robot and its object (WholeRobot) against the engine: relative errors, each with its entry of nu
+/// or its row.
 struct WholeErrors {
-  WorstPart residual = {kNaN, -1};    ///< Of the equations of motion, over the sizes that are summed.
-  WorstPart mass = {kNaN, -1};        ///< M against the engine's.
-  WorstPart bias = {kNaN, -1};        ///< Coriolis forces, gravity and friction against the engine's.
+  WorstPart residual = {kNaN, -1};  ///< Residual of the equations of motion, over the sizes that are summed.
+  WorstPart mass = {kNaN, -1};      ///< M against the engine's.
+  WorstPart bias = {kNaN, -1};      ///< Coriolis forces, gravity and friction against the engine's.
   WorstPart constraint = {kNaN, -1};  ///< ConstraintLaw::FindWorst.
 };
 
@@ -110,18 +108,18 @@ struct Balance {
   /// The scale of the errors: |C_bar' xi + F_bar'|_M^-1, at least that of
   /// RoundingScales::CalcLeastForces; the object's weight or the contact forces, N.
   double balanced = 1.0;
-  double error = kNaN;   ///< The residual's size; of the object as forces at the contacts' arm. Relative.
-  double solver = kNaN;  ///< What the plant's solver left over, likewise.
+  double error = kNaN;   ///< Relative size of the residual; for the object, forces at the contacts' arm.
+  double solver = kNaN;  ///< Relative size of the remaining error of the plant's solver.
 };
 
 /// Distance of the rigid constrained system under the same torques from the plant.
 struct RigidErrors {
-  /// |xi_dot_model - xi_dot|_M relative to |xi_dot_model|_M, or to the forces balanced where they are more.
+  /// xi_dot_model - xi_dot|_M relative to |xi_dot_model|_M, or to the balanced forces where they are larger.
   double acceleration = kNaN;
   double contact_force = kNaN;  ///< |f_c_model - f_c|, relative.
 };
 
-/// One step; n entries of xi, 3N of f_c. Its pointers are to what the loop has.
+/// Analysis of one step; n entries of xi, 3N of f_c. Its pointers refer to the loop's own data.
 struct StepAnalysis {
   const Setup* setup = nullptr;
   const StepRecord* step = nullptr;
@@ -133,11 +131,11 @@ struct StepAnalysis {
   Balance<Vector6d> object{.residual = Vector6d::Zero()};
   WholeErrors whole;
   RigidErrors rigid;
-  std::optional<LawErrors> law;   ///< Of torques that a known law computed at this step.
-  double spectral_radius = kNaN;  ///< Of the law's sampled closed loop, where it has error dynamics.
+  std::optional<LawErrors> law;   ///< Errors of a known law that computed the torques of this step.
+  double spectral_radius = kNaN;  ///< That of the law's sampled closed loop; NaN without error dynamics.
   /// LawErrors::position_by_hold, orientation_by_hold of the last step whose law was judged.
   std::pair<double, double> by_hold;
-  WorstPart deepest_overlap;  ///< Clearance::FindDeepest, of bodies that are not meant to touch.
+  WorstPart deepest_overlap;  ///< Clearance::FindDeepest, for bodies that must not touch.
   StepFindings findings;      ///< For the step's record.
 
   /// Terms at the true state.
@@ -154,19 +152,19 @@ class StepAnalyzer {
  public:
   explicit StepAnalyzer(const Setup& setup);
 
-  /// The next step, whose torques are set: measurements, and the clearance of bodies.
+  /// Begins the next step, whose torques are set: measurements, and the clearance of bodies.
   void Begin(const StepRecord& step, const DeclaredStep& declared);
-  /// The same step, whose response was read: motion and forces.
+  /// Completes the analysis of the same step once its response was read: motion and forces.
   void Analyze();
-  /// The next step's torques, which may be refused.
+  /// Sets the next step's torques, which may be refused.
   void SetStep(const StepRecord& step) { now_.step = &step; }
   void SetSpectralRadius(double radius) { now_.spectral_radius = radius; }
-  /// Keeps what was found of the same step's law.
+  /// Sets the errors of the same step's law.
   void SetLaw(const LawErrors& errors);
   /// Forgets all steps so far, but for clearances: time begins anew.
   void Reset();
   void RestartClearance() { clearance_.Restart(); }
-  /// Of the last step.
+  /// Analysis of the last step.
   [[nodiscard]] const StepAnalysis& analysis() const { return now_; }
 
   // Terms that the last step's analysis was formed with.
@@ -175,7 +173,7 @@ class StepAnalyzer {
   [[nodiscard]] const Clearance& clearance() const { return clearance_; }
   /// Null for a plant that is not the engine's.
   [[nodiscard]] const WholeRobot* whole() const { return whole_.get(); }
-  /// Null where the engine has no law that it keeps to.
+  /// The law of the engine's constraints; null where ConstraintLaw does not apply.
   [[nodiscard]] const ConstraintLaw* constraint_law() const { return constraint_law_.get(); }
 
  private:
@@ -189,8 +187,8 @@ class StepAnalyzer {
   void FindContacts();
   void FindTouching();
   void CalcRolling();
-  /// J_dot qvel of the plant's constraints at the fingertips (3N), or the feet, m/s^2: the model's rates of
-  /// velocities along axes that turn have w x v of object and platform, the engine's have not.
+  /// Calculates J_dot qvel of the plant's constraints at the fingertips (3N), or the feet, m/s^2: the w x v
+  /// of object and platform, which the model's rates have along axes that turn and the engine's have not.
   void CalcContactBias();
   /// E_bar' tau' + pushes that are declared + dry friction and joint limits (n).
   void CalcAppliedForce();
@@ -201,8 +199,8 @@ class StepAnalyzer {
   void ComparePrediction();
   void CalcObjectResidual();
   void FindFeet();
-  /// The largest, over the bodies that stand, of the friction at their contacts over the most that it can be,
-  /// each contact weighed with its slip: one that bears next to nothing may slide where the body does not.
+  /// Returns the largest use of the friction cone over the bodies that stand. Each contact is weighted with
+  /// its slip, since a contact that bears almost nothing may slide where the body does not.
   [[nodiscard]] double CalcFootUse() const;
   void PredictStance();
   void FollowSlip();

@@ -10,7 +10,7 @@
 namespace dexcheck {
 namespace {
 
-/// Of a grasp, or of a robot that holds nothing, all of whose frames are of interest.
+/// Frames of the grasp; all frames for a robot that holds nothing.
 std::vector<int> ListFrames(const RobotModel& model, std::span<const int> fingertips) {
   if (fingertips.empty()) return ListIndices(model.frames().size());
   return {fingertips.begin(), fingertips.end()};

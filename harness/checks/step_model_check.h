@@ -1,6 +1,6 @@
 #pragma once
 
-// The category "model" at every step of a run: are the controller's terms the engine's?
+// The category "model" at every step of a run: whether the controller's terms are the engine's.
 
 #include <optional>
 #include <span>
@@ -34,33 +34,32 @@ class ControllerProvider : public AnalyticProvider {
 };
 
 /// Compares the terms that the controller has evaluated with the engine's at the projected state (no tilt,
-/// rolling wheels), and remembers the worst of the run. What random states have beyond this (M unreduced, the
-/// matrix C_bar', link inertias) needs no run.
+/// rolling wheels), and remembers the worst of the run. Terms that only random states compare (M unreduced,
+/// the matrix C_bar', link inertias) need no run.
 class StepModelCheck {
  public:
   /// @param fingertips frames of the grasp; none for a robot that holds nothing, all of whose frames are then
-  /// compared. @param orientation kAngles when the grasp's state is set by X_o,
-  /// whose terms are then compared besides.
-  /// @throws InputError as EngineTerms.
+  /// compared. @param orientation kAngles when the grasp's state is set by X_o, whose terms are then compared
+  /// as well. @throws InputError as EngineTerms.
   StepModelCheck(const Adapter& adapter, std::span<const int> fingertips, OrientationFeedback orientation);
 
   /// One for each term asked, in the table's order.
   [[nodiscard]] std::span<const CheckRecord> records() const { return comparison_.records(); }
-  /// Every bound is at least this: what a scenario's tolerance asks for.
+  /// Raises every bound to at least this, the scenario's tolerance.
   void RaiseBounds(double least);
-  /// Whether Compare includes the contacts' terms: not while a fingertip is far from the object.
+  /// Sets whether Compare includes the contacts' terms: not while a fingertip is far from the object.
   void IncludeContacts(bool include) { with_contacts_ = include; }
-  /// Takes what is worse in the records of another such check, of the terms that it compares.
+  /// Takes over the worse records of another such check, for the terms that it compares.
   void Merge(const StepModelCheck& other);
-  /// There are bonds in the place of contacts, where the engine has nothing to compare with.
+  /// Leaves out the contacts' terms, where bonds replace contacts and the engine has nothing to compare.
   void LeaveOutContacts();
 
   /// Evaluates the engine's terms alone, without those of contacts.
   void SetState(const GraspTerms& grasp, const MeasuredState& state);
 
-  /// Nothing allocates but for what fails first.
+  /// Compares the terms. Nothing allocates except for the first failure.
   /// @param robot, grasp evaluated at `state`, reduced coordinates, CalcDynamics included.
-  /// @param X_W0 pose of Sigma_0 in the plant, tilt and height included: kappa was found there. Without a
+  /// @param X_W0 pose of Sigma_0 in the plant, tilt and height included, where kappa was found. Without a
   /// plant, robot.CalcLinkPose(-1).
   /// @param when time of the step, s.
   void Compare(const ModelTerms& robot, const GraspTerms& grasp, const MeasuredState& state, const Pose& X_W0,

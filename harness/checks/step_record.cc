@@ -9,9 +9,8 @@
 namespace dexcheck {
 namespace {
 
-/// Followed and measured contact farther apart than this have nothing to do with each other any more, and one
-/// may lie at the pole of the other's chart, m. Less than from a chart's margin to its pole, 4 mm on a
-/// fingertip of 9 mm.
+/// Distance of followed and measured contact beyond which they are unrelated, m: one may lie at the pole of
+/// the other's chart. It is less than from a chart's margin to its pole, 4 mm on a fingertip of 9 mm.
 constexpr double kStray = 1e-3;
 
 double CalcDistance(const Surface& surface, const SurfacePoint& a, const SurfacePoint& b) {

@@ -17,8 +17,8 @@ bool IsVelocity(TermParts parts) {
   return parts == TermParts::kVelocity || parts == TermParts::kVelocityPair;
 }
 
-/// Where along its axis a joint stands is a choice of frames: the first's point becomes the foot of the
-/// perpendicular from the second's. A ball has one place.
+/// Moves each joint's point to the foot of the perpendicular from the second's point: the position along an
+/// axis is a choice of frames. A ball joint has one position.
 void MoveAlongAxes(const RobotModel& model, const MatrixXd& second, MatrixXd* first) {
   for (Eigen::Index i = 0; i < first->cols(); ++i) {
     if (model.joint(model.joint_of_dof(static_cast<int>(i))).type == JointType::kBall) continue;
@@ -51,7 +51,7 @@ TermComparison::TermComparison(const RobotModel& model, Asker asker, std::vector
   if (is_reduced_) FormCoupling();
   for (const TermEntry& entry : ListTerms()) {
     if ((entry.askers & asker) == 0) continue;
-    // What a program has is known at its first result.
+    // A program states the terms that it has only with its first result.
     bool is_shared = asker == kAskedOfPrograms;
     for (size_t b = 1; b < providers_.size(); ++b) is_shared = is_shared || Shares(entry, 0, b);
     if (!is_shared) continue;

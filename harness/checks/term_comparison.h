@@ -13,18 +13,18 @@
 
 namespace dexcheck {
 
-/// Two of the providers, and the records of their terms; `model_value` of a record is that of the first.
+/// Two of the providers, and the records of their terms; a record's `model_value` is the first provider's.
 struct ComparedPair {
   size_t first = 0;
   size_t second = 0;
   std::vector<CheckRecord> terms;
 };
 
-/// A number of the first pair that differs by more than what other providers leave open.
+/// A number of the first pair that differs by more than the uncertainty of the other providers allows.
 struct Excess {
   size_t term = 0;  ///< Its record's index.
   Location where;
-  double units = 0.0;  ///< Of what is left open, the bound included.
+  double units = 0.0;  ///< Difference relative to the uncertainty, the bound included.
   double first = 0.0, second = 0.0;
   double when = 0.0;
 };
@@ -38,41 +38,40 @@ class TermComparison {
   /// @param frames whose Jacobians are compared. @param contacts how many of the first of them have contacts.
   TermComparison(const RobotModel& model, Asker asker, std::vector<DynamicsProvider*> providers,
                  std::vector<int> frames, size_t contacts = 0);
-  /// Of all frames of the model.
+  /// Compares all frames of the model.
   TermComparison(const RobotModel& model, Asker asker, std::vector<DynamicsProvider*> providers);
 
-  /// The first pair's robots again, by other providers.
+  /// The first pair's robots once more, by other providers.
   struct Copy {
     DynamicsProvider* first;
     DynamicsProvider* second;
   };
-  /// Copies of robots whose numbers are known to some digits: one with the nominal numbers, `draws` with
-  /// those of one robot moved at random within what is left open, and `others`, which are as good as the
-  /// nominal one.
+  /// Copies of robots whose numbers are known to some digits: one with the nominal numbers, `draws` with one
+  /// robot's numbers moved at random within their precision, and `others`, as good as the nominal one.
   struct Spread {
     Copy nominal;
     std::vector<Copy> draws;
     std::vector<Copy> others;
   };
-  /// From now on the first pair's errors are relative to U = scale * bound + sum over the spreads of (the
-  /// coverage of d - d_nominal over the draws + sum |d - d_nominal| over the others), with d = first - second
-  /// of a copy, and its bounds are 1. The coverage is the largest value over the draws where one number acts
-  /// on the entry, and three times the root mean square elsewhere and for all terms that are no causes.
+  /// Makes the first pair's errors relative to U from now on, with bounds of 1. U = scale * bound + sum over
+  /// the spreads of (the coverage of d - d_nominal over the draws + sum |d - d_nominal| over the others),
+  /// with d = first - second of a copy. The coverage is the largest value over the draws where one number
+  /// acts on the entry, and three times the root mean square elsewhere and for all terms that are no causes.
   /// @param causes terms from which the others follow.
   void CompareWithin(const std::vector<Spread>& spreads, std::span<const Term> causes);
-  /// The worst of each place whose error is above 1; none before CompareWithin.
+  /// The worst entry of each place whose error is above 1; empty before CompareWithin.
   [[nodiscard]] const std::vector<Excess>& excesses() const { return excesses_; }
-  /// The entry of the causes that was compared most loosely of those that differ by more than rounding and by
-  /// no more than U: `units` is U relative to the term's scale. None where there is no such entry.
+  /// The entry of the causes with the coarsest comparison among those that differ by more than rounding and
+  /// by no more than U: `units` is U relative to the term's scale. None where there is no such entry.
   [[nodiscard]] const std::optional<Excess>& loosest() const { return loosest_; }
 
-  /// What scales are formed of. Nothing else is known of the state.
+  /// Everything that scales are formed from. Nothing else is known of the state.
   [[nodiscard]] ScaleContext& scales() { return scales_; }
-  /// At `q`, `xi`, where `terms` are evaluated.
+  /// Sets the scales at `q`, `xi`, where `terms` are evaluated.
   void SetScales(const ModelTerms& terms, const Eigen::Ref<const VectorXd>& q,
                  const Eigen::Ref<const VectorXd>& xi);
-  /// Compares at the state that the providers are set to. Nothing allocates but at the first state, and when
-  /// a new worst case is stored.
+  /// Compares at the state that the providers are set to. Nothing allocates except at the first state, and
+  /// when a new worst case is stored.
   /// @param contacts whether the contacts' terms are among them.
   void Compare(double when, bool contacts = true);
 
@@ -83,13 +82,13 @@ class TermComparison {
 
   [[nodiscard]] const RobotModel& model() const { return *scales_.model; }
   [[nodiscard]] const std::vector<DynamicsProvider*>& providers() const { return providers_; }
-  /// Of the first two: one for each term asked that both may have, in the table's order.
+  /// Records of the first two providers: one for each requested term that both may have, in order.
   [[nodiscard]] std::span<const CheckRecord> records() const { return pairs_.front().terms; }
   [[nodiscard]] std::span<CheckRecord> records() { return pairs_.front().terms; }
   [[nodiscard]] const TermEntry& entry(size_t record) const { return *terms_[record].entry; }
-  /// All pairs with the terms of which numbers were compared; (0, 1), (0, 2), ..., (1, 2), ...
+  /// Returns all pairs with the terms that were compared; (0, 1), (0, 2), ..., (1, 2), ...
   [[nodiscard]] std::vector<ComparedPair> TakePairs() const;
-  /// Terms asked that no pair has in common.
+  /// Lists the requested terms that no pair has in common.
   [[nodiscard]] std::vector<std::string> ListNotCompared() const;
 
  private:

@@ -25,7 +25,7 @@ constexpr double kLeastRate = 1e-3;
 
 int FirstLink(const RobotModel& model) { return model.base().type == BaseType::kFixed ? 0 : -1; }
 
-/// Of a vector over the velocities.
+/// Scales a vector over the velocities.
 template <auto kScale>
 void ScaleVelocities(const C& c, S scale) {
   for (int i = 0; i < scale.rows(); ++i) scale(i, 0) = (c.robot.*kScale)(i);

@@ -1,7 +1,7 @@
 #pragma once
 
-// What is compared between two providers of a robot's terms at a state: one entry for each term. `run`,
-// `consistency`, `engines`, `diagnose` and `mutate` ask the entries that are marked as theirs.
+// The terms that two providers of a robot are compared in at a state: one entry for each term. `run`,
+// `consistency`, `engines`, `diagnose` and `mutate` compare the entries that are marked as theirs.
 
 #include <span>
 #include <vector>
@@ -14,17 +14,17 @@ namespace dexcheck {
 
 /// Who asks for a term.
 enum Asker : unsigned {
-  kAskedByRun = 1,          ///< Every step, of what the controller has evaluated.
+  kAskedByRun = 1,          ///< Every step, for the terms that the controller has evaluated.
   kAskedByConsistency = 2,  ///< Two descriptions, at random states of robot and object.
   kAskedByContacts = 4,     ///< Random contacts of one fingertip.
-  kAskedOfPrograms = 8,     ///< What the protocol of programs, results in files and other engines have.
+  kAskedOfPrograms = 8,     ///< Terms of the protocol of programs, results in files and other engines.
 };
 
-/// What the columns of a term's matrix belong to; its rows are the numbers of each.
+/// Parts that the columns of a term's matrix belong to; its rows are the numbers of each part.
 enum class TermParts {
   kWhole,
   kJoint,          ///< One column for each of its velocities.
-  kLink,           ///< That moves, the base first.
+  kLink,           ///< Links that move, the base first.
   kModelFrame,     ///< Every frame of the model.
   kFrame,          ///< Frames whose Jacobians are compared;
   kFrameColumns,   ///< n columns of each.
@@ -38,7 +38,7 @@ enum class TermParts {
 
 /// Sizes that the object's rounding errors are relative to.
 struct ObjectScales {
-  double place = 1.0;  ///< Of its position, m.
+  double place = 1.0;  ///< Scale of its position, m.
   double rate = 1.0;   ///< m/s and rad/s
   double mass = 1.0;
   double inertia = 1.0;
@@ -47,16 +47,16 @@ struct ObjectScales {
 
 /// Sizes that a contact's rounding errors are relative to.
 struct ContactScales {
-  double normal = 1.0;    ///< Of directions.
+  double normal = 1.0;    ///< Scale of directions.
   double position = 1.0;  ///< m
-  double moment = 1.0;    ///< Of a force's moment about Sigma_o, m.
-  double J_B = 1.0;       ///< Beside that of the column's velocity.
+  double moment = 1.0;    ///< Scale of a force's moment about Sigma_o, m.
+  double J_B = 1.0;       ///< Scale beside that of the column's velocity.
   double J_B_dot_xi = 1.0;
   double G_dot_T_V = 1.0;
   double relative_twist = 1.0;
 };
 
-/// Everything that scales are formed of, at one state.
+/// Everything that scales are formed from, at one state.
 struct ScaleContext {
   explicit ScaleContext(const RobotModel& described)
       : model(&described), robot(described), robot_at_w(described) {}
@@ -73,8 +73,8 @@ struct ScaleContext {
   const MatrixXd* second = nullptr;
 };
 
-/// The size of what is summed up to form each number of a term, so that one bound holds for all; infinite for
-/// what is not compared. `scale` holds ones.
+/// Sets the size of the terms that are summed to form each number, so that one bound holds for all; infinite
+/// for numbers that are not compared. `scale` holds ones.
 using ScaleFunction = void (*)(const ScaleContext&, Eigen::Ref<MatrixXd> scale);
 
 /// One entry of the table.
@@ -85,7 +85,7 @@ struct TermEntry {
   const char* equation;
   TermParts parts;
   Eigen::Index rows;  ///< Numbers of each part.
-  unsigned askers;    ///< Of Asker.
+  unsigned askers;    ///< A sum of Asker values.
   double factor;      ///< Geometric quantities (poses, Jacobians are one) that its formation chains.
   ScaleFunction scale = nullptr;           ///< Null for ones.
   bool is_scaled_once = false;             ///< The scale is the same at all states.
@@ -107,7 +107,7 @@ inline bool IsOfContacts(const TermEntry& entry) {
 /// Rows and columns of a term's matrix.
 std::pair<Eigen::Index, Eigen::Index> CalcShape(const TermEntry& entry, const ScaleContext& context);
 
-/// Where the number in a row and column belongs.
+/// Returns the location of the number in a row and column.
 Location FindLocation(const TermEntry& entry, const ScaleContext& context, Eigen::Index row,
                       Eigen::Index col);
 

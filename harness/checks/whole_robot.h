@@ -1,7 +1,7 @@
 #pragma once
 
-// The robot and its object as the engine moves them, from the parameters: nothing rolls, nothing is level and
-// nothing is held by assumption.
+// The robot and its object as the engine moves them, from the parameters, without assumptions on rolling, a
+// level platform or a held object.
 
 #include <mujoco/mujoco.h>
 
@@ -18,10 +18,10 @@
 
 namespace dexcheck {
 
-/// The robot of a parameter file before the paper's constraint (1) reduces it: a base that moves as the
+/// Makes the robot of a parameter file before the paper's constraint (1) reduces it: a base that moves as the
 /// engine's does, freely, in the plane or not at all, and the wheels of a differential drive as joints in
 /// front of the others. The base's frame is that of the engine's joints, so that the model's velocities are
-/// the engine's but for signs and their order.
+/// the engine's except for signs and order.
 RobotModel MakeWholeRobot(const RobotModel& model, const Adapter& adapter);
 
 /// Equations of motion of the whole robot and its free object at the true state, in nu = [base; wheels;
@@ -44,9 +44,9 @@ class WholeRobot {
   /// "base, along x", "joint NAME", "object, about its z": an entry of nu.
   [[nodiscard]] std::string DescribeEntry(int entry) const;
 
-  /// Beside links by the index of the joint that moves them, and -1 for the base.
+  /// Numbers of FindLink beside the index of a link's joint and -1 for the base.
   static constexpr int kWorld = -2, kObject = -3, kNoLink = -4;
-  /// What one of the engine's bodies is part of; kNoLink where that is neither robot, object nor world.
+  /// Returns the part that one of the engine's bodies belongs to; kNoLink for other bodies.
   [[nodiscard]] int FindLink(int body) const { return body_links_[static_cast<size_t>(body)]; }
   /// The engine's joint of one of model().
   [[nodiscard]] int engine_joint(int joint) const { return joints_[static_cast<size_t>(joint)]; }
@@ -72,29 +72,29 @@ class WholeRobot {
   void ReadForces(const mjtNum* forces, VectorXd* result) const { ReadRates(forces, result); }
   /// Forces on the robot's part of nu as the engine's (nv); other entries are zero.
   void WriteForces(const VectorXd& forces, VectorXd* engine) const;
-  /// Where nu has the entries of tau' and xi: of wheels and joints; -1 of a base's.
+  /// Entries of nu that tau' and xi have, for wheels and joints; -1 for a base's.
   [[nodiscard]] const std::vector<Eigen::Index>& motor_entries() const { return motor_entries_; }
 
   // The engine's M and bias at the same state.
-  /// The largest difference of an entry of M from the engine's, over the size that the entry is summed up
-  /// from, and its row. @param mass the engine's entries (GetMassEntries). A planar base's, whose joints may
-  /// turn with it, are M_bar's alone.
+  /// Returns the largest difference of an entry of M from the engine's, over the size that the entry is
+  /// summed up from, and its row. @param mass the engine's entries (GetMassEntries). The joints of a planar
+  /// base may turn with it, so that its entries are compared in M_bar alone.
   [[nodiscard]] std::pair<double, int> CompareMass(const VectorXd& mass) const;
-  /// Likewise of bias(). @param bias the engine's forces (nv): Coriolis, gravity, less the passive ones.
+  /// Compares bias() the same way. @param bias the engine's (nv): Coriolis, gravity, less passive forces.
   [[nodiscard]] std::pair<double, int> CompareBias(const VectorXd& bias);
 
   /// Forgets all forces on bodies.
   void ClearForces();
-  /// A force and a torque on one of the engine's bodies, at a point of the world. Bodies that are part of
-  /// neither robot nor object have none.
+  /// Adds a force and a torque on one of the engine's bodies, at a point of the world. Bodies that are part
+  /// of neither robot nor object are passed over.
   void AddForce(const BodyForce& one);
-  /// The same on a link of the parameter file's model, by the index of its joint; -1 is the base.
+  /// Adds a force on a link of the parameter file's model, by the index of its joint; -1 is the base.
   void AddLinkForce(int link, const BodyForce& one) { AddForce(link < 0 ? link : link + num_wheels_, one); }
   void AddObjectForce(const BodyForce& one) { AddForce(kObject, one); }
-  /// result += J^T f of all of them, size += the sum of the magnitudes that this came from; both size().
+  /// Adds J^T f of all forces to `result`, and the sum of its summands' magnitudes to `size`; both size().
   void ProjectForces(VectorXd* result, VectorXd* size);
 
-  /// result += what M nu_dot and bias() are sums of, by entry: errors of rounding are relative to that.
+  /// Adds the sizes of the terms of M nu_dot and bias() by entry: rounding errors are relative to that.
   void AddSizes(const VectorXd& nu_dot, VectorXd* result) const;
 
  private:

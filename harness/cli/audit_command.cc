@@ -31,7 +31,7 @@ struct AuditRequest {
 
 Json ConditionToJson(double value) { return std::isfinite(value) ? Json(value) : Json("infinity"); }
 
-std::string ToText(const AuditRequest& request, const RobotDescription& robot, const AuditResult& result) {
+Json ToJson(const AuditRequest& request, const RobotDescription& robot, const AuditResult& result) {
   Json json = {{"robot", request.robot.string()},
                {"verdict", result.IsGood() ? "pass" : "disagreement"},
                {"condition_number", ConditionToJson(result.condition)}};
@@ -48,7 +48,7 @@ std::string ToText(const AuditRequest& request, const RobotDescription& robot, c
   }
   json["notes"] = robot.notes;
   for (const std::string& note : ListLoadNotes()) json["notes"].push_back(note);
-  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+  return json;
 }
 
 std::string FormatCondition(double condition) {
@@ -107,7 +107,7 @@ int Run(const AuditRequest& request) {
   ResultFile json(request.json_file);
   ResultFile junit(request.junit_file);
   const AuditResult result = AuditRobot(robot);
-  json.Write([&] { return ToText(request, robot, result); });
+  json.Write([&] { return ToJson(request, robot, result); });
   junit.Write([&] { return WriteAuditJUnit(request, result); });
   if (!json.TakesStdout()) Print(request, robot, result);
   return result.IsGood() ? kSuccess : kDisagreement;

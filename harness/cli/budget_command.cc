@@ -25,7 +25,7 @@ struct BudgetRequest {
   bool quiet = false;
 };
 
-/// Of a law that is not known there is none.
+/// The prediction; there is none of a law that is not known.
 std::string ShowPredicted(const ErrorSize& size) {
   return std::isfinite(size.rms) ? fmt::format("{:.2e}", size.rms) : "-";
 }
@@ -68,7 +68,7 @@ int Run(const BudgetRequest& request) {
   const ErrorBudget budget =
       CalcErrorBudget(files.scenario, files.robot, files.mjcf, CountJobs(request.jobs), progress);
   if (bar) bar->Finish();
-  json.Write([&] { return ToJson(budget).dump(2) + "\n"; });
+  json.Write([&] { return ToJson(budget); });
   page.Write([&] { return MakeBudgetPage(budget); });
   if (!json.TakesStdout() && !page.TakesStdout()) {
     if (!request.quiet) Print(budget);

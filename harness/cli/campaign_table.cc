@@ -94,7 +94,7 @@ void Campaign::Make(std::uint64_t jobs, ProgressBar* bar,
   const auto run = [&](size_t i) {
     const CampaignFault fault = make(i);
     return PackBytes(fault.kind, fault.name, fault.outcome, fault.cause_right, fault.part_named,
-                     fault.exception, fault.details.dump());
+                     fault.exception, FormatJson(fault.details));
   };
   const auto take = [&](size_t /*i*/, const std::string& result) {
     CampaignFault& fault = faults.emplace_back();
@@ -137,7 +137,7 @@ void Campaign::Print(bool quiet) const {
   fmt::print("{}\n", Wrap(verdict + ".", 2));
 }
 
-std::string Campaign::ToText() const {
+Json Campaign::ToJson() const {
   Json json = head;
   json["complete"] = faults.size() == total;
   json["kinds"] = Json::object();
@@ -159,7 +159,7 @@ std::string Campaign::ToText() const {
     one.update(fault.details);
     json["faults"].push_back(one);
   }
-  return json.dump(2) + "\n";
+  return json;
 }
 
 ExitCode Campaign::ToExitCode() const {

@@ -1,7 +1,7 @@
 #pragma once
 
-// What a campaign of faults that were made on purpose came to: one table and one JSON, whether the faults are
-// of descriptions or of a run.
+// The result of a campaign of faults that were made on purpose: one table and one JSON, whether the faults
+// are of descriptions or of a run.
 
 #include <cstdint>
 #include <filesystem>
@@ -44,8 +44,8 @@ struct Campaign {
   void Make(std::uint64_t jobs, ProgressBar* bar, const std::function<CampaignFault(size_t fault)>& make);
   /// Prints a line for each kind of fault, the exceptions, and the verdict; the verdict alone when quiet.
   void Print(bool quiet) const;
-  /// The text of a file: `head`, "complete", "kinds" and "faults".
-  [[nodiscard]] std::string ToText() const;
+  /// The JSON that a file gets: `head`, "complete", "kinds" and "faults".
+  [[nodiscard]] Json ToJson() const;
   /// 3 when not all were made, which is said on standard error; else 1 when one survived.
   [[nodiscard]] ExitCode ToExitCode() const;
 };

@@ -1,6 +1,7 @@
 #include "harness/cli/command_line.h"
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <sstream>
@@ -8,6 +9,7 @@
 #include "controller/common/text.h"
 #include "harness/base/console.h"
 #include "harness/base/files.h"
+#include "harness/cli/help_examples.h"
 #include "harness/cli/terminal.h"
 
 namespace dexcheck::cli {
@@ -90,6 +92,10 @@ Option& Option::ShowDefault() {
   return *this;
 }
 
+bool Option::is_given() const { return option_->count() > 0; }
+
+std::string Option::name() const { return option_->get_name(); }
+
 template <typename Value>
 Option Command::AddOption(const std::string& name, Value* value, const std::string& help) {
   const size_t blank = name.find(' ');
@@ -116,7 +122,7 @@ Command Command::AddCommand(const std::string& name, const std::string& help) {
   CLI::App* const command = app_->add_subcommand(name, help);
   // Which it would have of the program otherwise.
   command->group(heading_.empty() ? "Subcommands" : heading_);
-  command->footer("");
+  command->footer(FindExamples((app_->get_parent() != nullptr ? app_->get_name() + " " : "") + name));
   return {command, exit_code_};
 }
 
@@ -132,7 +138,15 @@ namespace {
 class HelpFormatter : public CLI::Formatter {
  public:
   std::string make_option(const CLI::Option* option, bool is_positional) const override {
+    // The option beside a positional argument means the same.
+    if (!is_positional && option->get_positional()) return "";
     return Wrap(Formatter::make_option(option, is_positional), get_column_width()) + "\n";
+  }
+  /// Name of the value, and the default; which options go together is said when they do not.
+  std::string make_option_opts(const CLI::Option* option) const override {
+    if (option->get_positional()) return "";
+    const std::string text = Formatter::make_option_opts(option);
+    return text.substr(0, std::min(text.find(" Needs:"), text.find(" Excludes:")));
   }
   std::string make_subcommand(const CLI::App* command) const override {
     return Wrap(Formatter::make_subcommand(command), get_column_width()) + "\n";
@@ -161,7 +175,7 @@ void DescribeCommand(const CLI::App& app, const std::string& name, std::vector<C
     OptionHelp one;
     one.is_positional = option->get_positional();
     if (one.is_positional) {
-      one.names = {option->get_single_name()};
+      one.names = {option->get_name(true)};
     } else {
       for (const std::string& word : option->get_snames()) one.names.push_back("-" + word);
       for (const std::string& word : option->get_lnames()) one.names.push_back("--" + word);
@@ -244,16 +258,34 @@ int CommandLine::Run(int argc, char** argv) {
     std::fputs(help.str().c_str(), stdout);
     return exit_code;
   } catch (const CLI::ParseError& error) {
-    throw UsageError(Explain(error.what()));
+    throw UsageError(Explain(error.what()) + NameHelp());
+  } catch (const UsageError& error) {
+    throw UsageError(error.what() + NameHelp());
   }
+}
+
+std::string CommandLine::NameHelp() const {
+  std::string words = app_->get_name();
+  for (const CLI::App* at = app_.get(); !at->get_subcommands().empty();) {
+    at = at->get_subcommands().front();
+    words += " " + at->get_name();
+  }
+  return " (see " + words + " --help)";
 }
 
 std::string CommandLine::Explain(const std::string& what) const {
   const std::vector<std::string> unknown = app_->remaining(/*recurse=*/true);
-  if (unknown.empty()) return what;
-  const std::string& word = unknown.front();
   const std::vector<CLI::App*> chosen = app_->get_subcommands();
   const CLI::App& place = chosen.empty() ? *app_ : *chosen.front();
+  if (unknown.empty()) {
+    std::string text = what;
+    for (const CLI::Option* option : place.get_options()) {  // "A" and not "--robot", which means the same
+      const size_t at = option->get_positional() ? text.find(option->get_name()) : std::string::npos;
+      if (at != std::string::npos) text.replace(at, option->get_name().size(), option->get_name(true));
+    }
+    return text;
+  }
+  const std::string& word = unknown.front();
   const bool is_option = word.starts_with("-");
   std::vector<std::string> known;
   if (is_option) {

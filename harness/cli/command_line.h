@@ -30,7 +30,7 @@ class UsageError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// What is wrong with a value as typed; empty when nothing is.
+/// A check says what is wrong with a value as typed; empty when nothing is.
 using ValueCheck = std::function<std::string(const std::string& value)>;
 
 /// Accepts decimal whole numbers from `least` to `most`.
@@ -61,6 +61,9 @@ class Option {
   Option& Delimiter(char delimiter);
   /// The help prints the value that the variable has now.
   Option& ShowDefault();
+  /// Whether the command line has it.
+  [[nodiscard]] bool is_given() const;
+  [[nodiscard]] std::string name() const;  ///< "--out"
 
  private:
   friend class Command;
@@ -72,21 +75,22 @@ class Option {
 class Command {
  public:
   /// @param name of an option with its dashes and, as the help shows it, the name of its value, "--out DIR";
-  /// of a positional argument its name alone. @param value lives as long as the command; what it holds is the
-  /// default. Its type is one of those at the end of command_line.cc: texts, paths, numbers and lists of
-  /// them.
+  /// of a positional argument its name alone, or with an option that means the same, "A,--robot". @param
+  /// value lives as long as the command; what it holds is the default. Its type is one of those at the end of
+  /// command_line.cc: texts, paths, numbers and lists of them.
   template <typename Value>
   Option AddOption(const std::string& name, Value* value, const std::string& help);
   Option AddFlag(const std::string& name, bool* value, const std::string& help);
   /// A word that says what the command does already.
   Option AddFlag(const std::string& name, const std::string& help);
 
-  /// The same command, whose next commands stand under this heading in the help.
+  /// This command again, whose next commands stand under this heading in the help.
   [[nodiscard]] Command Under(const std::string& heading) const;
   Command AddCommand(const std::string& name, const std::string& help);
   /// One of its commands must be given.
   void RequireCommand();
-  /// What runs when the command is given; its exit code is the program's. @throws UsageError.
+  /// Sets the function that runs when the command is given; its exit code is the program's. @throws
+  /// UsageError.
   void SetAction(const std::function<int()>& action);
 
  private:
@@ -127,6 +131,8 @@ class CommandLine {
 
  private:
   [[nodiscard]] std::string Explain(const std::string& what) const;
+  /// " (see dexcheck study run --help)", of the command that was given.
+  [[nodiscard]] std::string NameHelp() const;
   std::unique_ptr<CLI::App> app_;
   int exit_code_ = kSuccess;
 };

@@ -9,15 +9,16 @@
 
 namespace dexcheck::cli {
 
-Option AddRobotOptions(Command command, RobotFiles* files) {
-  files->robot = FindShippedFile("controller/parameters/assistant_robot.toml");
-  files->mjcf = FindShippedFile("mjcf/scene.xml");
-  Option robot =
-      command.AddOption("--robot FILE.toml", &files->robot, "Parameter file (TOML) of the analytic model");
-  Option mjcf = command.AddOption("--mjcf FILE.xml", &files->mjcf, "The same robot for the engine");
-  robot.Needs(mjcf);
-  mjcf.Needs(robot);
-  return robot;
+void RobotFiles::TakeShipped() {
+  if (!robot.empty() || !mjcf.empty()) return;
+  robot = FindShippedFile("controller/parameters/assistant_robot.toml");
+  mjcf = FindShippedFile("mjcf/scene.xml");
+}
+
+std::array<Option, 2> AddFileOptions(Command command, const std::string& help_a, const std::string& help_b,
+                                     RobotFiles* files) {
+  return {command.AddOption("A,--robot", &files->robot, help_a),
+          command.AddOption("B,--mjcf", &files->mjcf, help_b)};
 }
 
 Option AddJsonOption(Command command, const std::string& what, std::string* file) {

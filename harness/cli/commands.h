@@ -17,33 +17,37 @@
 
 namespace dexcheck::cli {
 
-/// The two files that describe one robot; the shipped pair by default.
+/// The two files that describe one robot.
 struct RobotFiles {
   std::filesystem::path robot;
   std::filesystem::path mjcf;
+
+  /// Takes the shipped pair where no file was given.
+  void TakeShipped();
 };
 
-/// Adds --robot and --mjcf, both or neither. @return the first of them.
-Option AddRobotOptions(Command command, RobotFiles* files);
+/// Adds the positional arguments A and B, which --robot and --mjcf name, too. @returns both.
+std::array<Option, 2> AddFileOptions(Command command, const std::string& help_a, const std::string& help_b,
+                                     RobotFiles* files);
 
 /// A controller of the user's own in the place of a scenario's.
 struct OwnController {
   std::string run;          ///< As the scenario's key controller.run, in the current folder; empty for none.
   double time_limit = 0.0;  ///< s; 0 for the scenario's.
-  /// As ParseScenario takes it. @returns none without a controller.
+  /// Assignments as ParseScenario takes them. @returns none without a controller.
   [[nodiscard]] std::vector<std::string> List() const;
 };
 
 /// Adds --controller and --controller-time-limit. @returns the first.
 Option AddControllerOptions(Command command, OwnController* controller);
 
-/// What is changed in a scenario.
+/// Changes of a scenario.
 struct Overrides {
   std::vector<std::string> set;    ///< "KEY=VALUE"
   std::vector<std::string> unset;  ///< "KEY"
   OwnController controller;
   [[nodiscard]] bool empty() const { return set.empty() && unset.empty() && controller.run.empty(); }
-  /// As ParseScenario takes them: what is removed first.
+  /// Assignments as ParseScenario takes them: those that remove a key come first.
   [[nodiscard]] std::vector<std::string> List() const;
 };
 
@@ -105,7 +109,7 @@ void AddStudyCommand(Command app);
 /// Those of its commands that read a study's database: report, show, export.
 void AddStudyReadCommands(Command study);
 
-// What the commands that compare descriptions of a robot have in common.
+// Options that the commands which compare descriptions of a robot have in common.
 
 /// --digits and --tolerance: how published numbers, which are rounded when printed, are judged.
 struct ToleranceOptions {
@@ -132,9 +136,8 @@ inline std::array<Option, 2> AddToleranceOptions(Command command, ToleranceOptio
   return {digits, tolerance};
 }
 
-/// What is compared, and where the results go.
+/// A comparison: its two sides, and where the results go.
 struct ComparisonRequest {
-  std::string a, b;  ///< Two descriptions; none with --robot and --mjcf.
   RobotFiles files;
   UrdfOptions urdf;
   ToleranceOptions judging;
@@ -142,12 +145,15 @@ struct ComparisonRequest {
   std::string junit_file;
   bool quiet = false;
 
-  /// Puts A and B where --robot and --mjcf would stand. @param command for messages.
+  /// Takes the shipped pair where no file was given. @param command for messages.
+  /// @throws InputError when one file was given.
   void TakeFiles(const std::string& command) {
-    if (a.empty()) return;
-    if (b.empty())
-      throw InputError(command + ": takes two files, got " + a + "; init, audit, judge take one");
-    files = {a, b};
+    files.TakeShipped();
+    if (files.robot.empty()) throw InputError(command + ": B needs A, the file that may be wrong");
+    if (files.mjcf.empty()) {
+      throw InputError(command + ": takes two files, got " + files.robot.string() +
+                       "; init, audit, judge take one");
+    }
   }
   /// To what two files agree.
   [[nodiscard]] std::string DescribeTolerance() const {
@@ -155,14 +161,6 @@ struct ComparisonRequest {
     return tolerance ? FormatNumber(*tolerance, 6) : "rounding";
   }
 };
-
-/// Adds --robot and --mjcf, and A and B in their place.
-inline void AddFileOptions(Command command, const std::string& help_a, const std::string& help_b,
-                           ComparisonRequest* request) {
-  const Option robot = AddRobotOptions(command, &request->files);
-  command.AddOption("A", &request->a, help_a).TypeName("FILE").Excludes(robot);
-  command.AddOption("B", &request->b, help_b).TypeName("FILE");
-}
 
 /// Two recordings against each other, by a model of the robot.
 struct RecordingPair {

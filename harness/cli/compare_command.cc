@@ -117,7 +117,7 @@ int Run(const CompareRequest& request) {
   const bool prints = !json.TakesStdout();
   if (prints && !request.quiet) Print(request, comparison);
   if (prints) fmt::print("{}{}\n", request.quiet ? "" : "\n", DescribeComparison(comparison));
-  json.Write([&] { return ToJson(comparison, request.run_folders).dump(1) + "\n"; });
+  json.Write([&] { return ToJson(comparison, request.run_folders); });
   page.Write([&] { return MakeComparisonPage(pointers, request.run_folders, comparison); });
   if (!request.page.empty() && prints && !request.quiet) fmt::print("page: {}\n", request.page);
   if (!request.tolerance || comparison.IsSame()) return kSuccess;
@@ -145,7 +145,7 @@ void AddCompareCommand(Command app) {
                  "Only these signals; * stands for any text: object/*,tau")
       .Delimiter(',')
       .Repeatable();
-  command.AddOption("--out FILE.html", &request->page,
+  command.AddOption("--page FILE.html", &request->page,
                     "Write a page with the signals overlaid and subtracted");
   const Option model =
       command.AddOption("--model MODEL", &request->model,

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 
@@ -11,25 +12,41 @@
 #include "harness/base/interrupts.h"
 #include "harness/checks/consistency.h"
 #include "harness/cli/commands.h"
-#include "harness/cli/consistency_report.h"
+#include "harness/cli/file_repair.h"
 #include "harness/cli/output_file.h"
 #include "harness/cli/terminal.h"
+#include "harness/corrections/read_printed.h"
+#include "harness/report/files_page.h"
 
 namespace dexcheck::cli {
 namespace {
 
-/// Puts A and B where --robot and --mjcf would stand.
 void TakeFiles(ConsistencyRequest* request) {
   if (!request->has_results()) return request->TakeFiles("consistency");
-  if (request->a.empty() || !request->b.empty()) {
+  const RobotFiles& files = request->files;
+  if (files.robot.empty() || !files.mjcf.empty()) {
     throw InputError("consistency: one file must be given beside --program or --results, got " +
-                     std::string(request->a.empty() ? "none" : "two"));
+                     std::string(files.robot.empty() ? "none" : "two"));
   }
-  request->files.robot = request->a;
+}
+
+std::string MakePage(const ConsistencyRequest& request, const Comparison& comparison, ExitCode code) {
+  const DescriptionFile first(request.files.robot, request.urdf);
+  const DescriptionFile second(request.files.mjcf, request.urdf);
+  nlohmann::ordered_json result = ToJson(request, comparison, code);
+  for (size_t i = 0; i < result["causes"].size(); ++i) {
+    for (const Site& site : comparison.causes->corrections.items[i].sites)
+      result["causes"][i]["sites"].push_back(NameSite(site.kind));
+  }
+  return MakeFilesPage(ReadPrintedRobot(first, &second), ReadPrintedRobot(second, &first), result);
 }
 
 int Run(ConsistencyRequest request) {
   TakeFiles(&request);
+  if (!request.page_file.empty()) {
+    RequirePageName(request.page_file);
+    if (request.has_results()) throw InputError("consistency: --page must have two files");
+  }
   for (const std::string& joint : request.lock) AddHeldJoint(joint, &request.options.part);
   for (const std::string& name : request.ignore) {
     const bool is_word =
@@ -41,17 +58,20 @@ int Run(ConsistencyRequest request) {
   CatchInterrupts();
   ResultFile json(request.json_file);
   ResultFile junit(request.junit_file);
+  ResultFile page(request.page_file);
   ProgressBar bar("comparing", request.options.samples, request.quiet);
   const Comparison comparison = Compare(request, [&](long samples) { return bar.GoOn(samples); });
   bar.Finish();
   const ConsistencyResult& result = comparison.result;
   ExitCode code = request.IsWhole(result) ? kSuccess : kFailure;
   if (!comparison.Agrees()) code = kDisagreement;
-  json.Write([&] { return ToText(request, comparison, code); });
+  json.Write([&] { return ToJson(request, comparison, code); });
   junit.Write([&] { return WriteJUnit(request, comparison); });
+  page.Write([&] { return MakePage(request, comparison, code); });
   if (!json.TakesStdout()) {
-    PrintVerdict(request, comparison);
+    PrintVerdict(request, comparison, OfferRepair(request, comparison));
     if (!request.quiet) PrintTable(request, comparison);
+    if (!request.page_file.empty()) fmt::print("page: {}\n", request.page_file);
   }
   if (code == kFailure)
     return ReportFailure(
@@ -65,10 +85,8 @@ void AddConsistencyCommand(Command app) {
   constexpr std::uint64_t kMaxSamples = 1000000000;
   const auto request = std::make_shared<ConsistencyRequest>();
   Command command = app.AddCommand("consistency", "Compare every term of model and engine at random states");
-  AddFileOptions(command,
-                 "One of two descriptions of a robot, instead of --robot and --mjcf: parameter file (TOML), "
-                 "URDF or MJCF",
-                 "The other one", request.get());
+  AddFileOptions(command, "A description of a robot: parameter file (TOML), URDF or MJCF",
+                 "Another one of the same robot; without both, the shipped pair", &request->files);
   const Option program = command.AddOption(
       "--program CMD", &request->source.program,
       "Command of a program that provides terms, instead of B (harness/descriptions/README.md)");
@@ -85,6 +103,8 @@ void AddConsistencyCommand(Command app) {
   AddSampleOptions(command, kMaxSamples, &request->options.samples, &request->options.seed);
   AddJsonOption(command, "the results", &request->json_file);
   AddJUnitOption(command, &request->junit_file);
+  command.AddOption("--page FILE.html", &request->page_file,
+                    "Write a page that loads nothing: both robots in one view, what differs, and the causes");
   AddJudgingOptions(command, request.get());
   command
       .AddOption("--ignore WORD,...", &request->ignore,

@@ -42,7 +42,7 @@ std::string DescribeDigits(const DigitVerdict& verdict) {
   return text;
 }
 
-/// Of two that agree to rounding all is listed.
+/// Returns whether all checks are listed: those of two that agree to rounding are.
 bool ListsAll(const Comparison& comparison) { return comparison.result.Agrees() && !comparison.digits; }
 
 /// A line for each; else one for what differs, with its place, and the names of all that agrees in one way.
@@ -119,7 +119,7 @@ Json ToJson(const FileCause& cause) {
 }
 
 /// Prints the causes, a line each, and how all else agrees. @returns whether there are any.
-bool PrintCauses(const ConsistencyRequest& request, const Comparison& comparison, bool offers_repair) {
+bool PrintCauses(const ConsistencyRequest& request, const Comparison& comparison, const std::string& repair) {
   if (!comparison.causes || comparison.causes->agrees) return false;
   const FileCauses& causes = *comparison.causes;
   PrintVerdict(Tone::kBad, "DISAGREE", fmt::format(": {} differs from {}.", causes.file, causes.reference));
@@ -136,11 +136,7 @@ bool PrintCauses(const ConsistencyRequest& request, const Comparison& comparison
                                          : "to " + request.DescribeTolerance();
     fmt::print("{}\n", Wrap("  everything else agrees " + digits, 5));
   }
-  if (!offers_repair) return true;
-  const bool is_first = causes.file == request.files.robot.filename().string();
-  fmt::print("  repair: dexcheck diagnose {} {} --write FILE\n",
-             QuoteForShell((is_first ? request.files.robot : request.files.mjcf).string()),
-             QuoteForShell((is_first ? request.files.mjcf : request.files.robot).string()));
+  if (!repair.empty()) fmt::print("  repair: {}\n", repair);
   return true;
 }
 
@@ -238,13 +234,14 @@ void PrintTable(const ConsistencyRequest& request, const Comparison& comparison)
   list("differs, does not act on these terms", comparison.without_effect);
   list("worth knowing", comparison.notes);
   std::vector<TableRow> rows;
-  AddRecords("constant", result.constants.records, comparison, nullptr, &rows);
+  const std::vector<CheckRecord>& constants = result.constants.records;
+  if (!constants.empty()) AddRecords("constant", constants, comparison, nullptr, &rows);
   if (!result.constants.notes.empty()) {
     rows.push_back({{},
                     fmt::format("{} notes on what only a run has (contacts, solver, motors' limits): --json",
                                 result.constants.notes.size())});
   }
-  rows.emplace_back();
+  if (!rows.empty()) rows.emplace_back();
   AddRecords("term", result.terms, comparison, &model, &rows);
   fmt::print("{}", FormatTable(ListsAll(comparison) ? "<>>>><" : "<>><", rows));
   const std::string bounds = request.judging.Find()
@@ -261,7 +258,8 @@ void PrintTable(const ConsistencyRequest& request, const Comparison& comparison)
                             0));
 }
 
-void PrintVerdict(const ConsistencyRequest& request, const Comparison& comparison, bool offers_repair) {
+void PrintVerdict(const ConsistencyRequest& request, const Comparison& comparison,
+                  const std::string& repair) {
   const ConsistencyResult& result = comparison.result;
   if (!request.IsWhole(result)) {
     fmt::print("INTERRUPTED after {} of {} samples. So far:\n", result.samples, request.options.samples);
@@ -274,7 +272,7 @@ void PrintVerdict(const ConsistencyRequest& request, const Comparison& compariso
   };
   const std::string left_out = count(comparison.not_compared, "not compared") +
                                count(comparison.without_effect, "differ, do not act on these terms");
-  if (PrintCauses(request, comparison, offers_repair)) return;
+  if (PrintCauses(request, comparison, repair)) return;
   if (result.Agrees()) {
     if (comparison.digits) {
       PrintVerdict(
@@ -324,7 +322,7 @@ void PrintVerdict(const ConsistencyRequest& request, const Comparison& compariso
     fmt::print("  and {} more (--json)\n", differences.rounded.size() - shown);
 }
 
-std::string ToText(const ConsistencyRequest& request, const Comparison& comparison, ExitCode code) {
+Json ToJson(const ConsistencyRequest& request, const Comparison& comparison, ExitCode code) {
   const RobotModel& model = *comparison.model;
   const ConsistencyResult& result = comparison.result;
   Json json = {{"robot", comparison.first.string()},
@@ -361,7 +359,7 @@ std::string ToText(const ConsistencyRequest& request, const Comparison& comparis
   for (const ConstantNote& note : result.constants.notes)
     json["engine_notes"].push_back({{"kind", note.kind}, {"text", note.text}});
   AddCauses(comparison, &json);
-  return json.dump(2) + "\n";
+  return json;
 }
 
 std::string WriteJUnit(const ConsistencyRequest& request, const Comparison& comparison) {
@@ -373,7 +371,7 @@ std::string WriteJUnit(const ConsistencyRequest& request, const Comparison& comp
   };
   for (const CheckRecord& record : result.constants.records) add("constant", record);
   for (const CheckRecord& record : result.terms) add("term", record);
-  // What the engine's model alone has belongs to no check of its own.
+  // A constant that the engine's model alone has belongs to no check of its own.
   for (const ConstantFinding& finding : result.constants.findings) {
     const bool has_case =
         std::ranges::any_of(cases, [&](const JUnitCase& test) { return test.name == finding.check; });

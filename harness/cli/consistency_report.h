@@ -1,6 +1,6 @@
 #pragma once
 
-// What is compared by consistency, what was found, and how that is printed.
+// The request of `consistency`, its results, and how they are printed.
 
 #include <nlohmann/json.hpp>
 #include <string>
@@ -11,16 +11,17 @@
 
 namespace dexcheck::cli {
 
-/// What is compared, at how many states.
+/// The two sides of a comparison, and the number of states.
 struct ConsistencyRequest : ComparisonRequest {
   ResultsSource source;  ///< What stands for B and provides terms.
   ConsistencyOptions options;
+  std::string page_file;            ///< Where the page of two files goes; empty for none.
   std::vector<std::string> lock;    ///< "JOINT" or "JOINT=VALUE".
   std::vector<std::string> ignore;  ///< Words of kIgnorable, and links.
   bool exact = false;               ///< Two files agree to rounding only, whatever digits they print.
   double precision = 1.0;           ///< Coarsest printed precision that counts as agreement, per cent.
 
-  /// What stands for B provides terms, and is no description.
+  /// Returns whether B is a source of terms, and no description.
   [[nodiscard]] bool has_results() const { return !source.program.empty() || !source.results.empty(); }
   /// Whether all states were compared; results in files have their own, and files of other joints none.
   [[nodiscard]] bool IsWhole(const ConsistencyResult& result) const {
@@ -44,12 +45,12 @@ nlohmann::ordered_json DescribeRecord(const CheckRecord& record, const RobotMode
 /// Large results first fail, then where to look: what a person reads.
 void PrintTable(const ConsistencyRequest& request, const Comparison& comparison);
 /// Prints whether the two agree, and if not, why.
-/// @param offers_repair whether the command that writes a corrected file follows the causes.
-void PrintVerdict(const ConsistencyRequest& request, const Comparison& comparison, bool offers_repair = true);
-/// The same as JSON.
-std::string ToText(const ConsistencyRequest& request, const Comparison& comparison, ExitCode code);
+/// @param repair the command that writes a corrected file; empty if there is none.
+void PrintVerdict(const ConsistencyRequest& request, const Comparison& comparison, const std::string& repair);
+/// Returns the results as JSON.
+nlohmann::ordered_json ToJson(const ConsistencyRequest& request, const Comparison& comparison, ExitCode code);
 
-/// The same as a JUnit document.
+/// Writes the results as a JUnit document.
 std::string WriteJUnit(const ConsistencyRequest& request, const Comparison& comparison);
 
 /// Adds "causes" and "unexplained", which is all that differs where terms alone are compared.

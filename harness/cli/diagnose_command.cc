@@ -6,11 +6,9 @@
 
 #include "harness/base/console.h"
 #include "harness/base/interrupts.h"
-#include "harness/cli/consistency_report.h"
+#include "harness/cli/file_repair.h"
 #include "harness/cli/output_file.h"
 #include "harness/cli/terminal.h"
-#include "harness/corrections/read_printed.h"
-#include "harness/corrections/write_repaired.h"
 #include "harness/engine/mjcf_file.h"
 
 namespace dexcheck::cli {
@@ -20,7 +18,7 @@ struct DiagnoseRequest : ConsistencyRequest {
   std::string repaired_file;
 };
 
-std::string ToText(const DiagnoseRequest& request, const Comparison& comparison) {
+nlohmann::ordered_json ToJson(const DiagnoseRequest& request, const Comparison& comparison) {
   nlohmann::ordered_json json = {{"robot", request.files.robot.string()},
                                  {"mjcf", request.files.mjcf.string()},
                                  {"mujoco", mj_versionString()},
@@ -29,7 +27,7 @@ std::string ToText(const DiagnoseRequest& request, const Comparison& comparison)
   json["notes"] = ListLoadNotes();
   for (const std::string& note : comparison.notes) json["notes"].push_back(note);
   AddCauses(comparison, &json);
-  return json.dump(2) + "\n";
+  return json;
 }
 
 /// Writes the first file with its causes corrected, and compares it with the second. @returns the last line.
@@ -40,21 +38,18 @@ std::string WriteRepair(const DiagnoseRequest& request, const DescriptionFile& f
   const std::string b = second->path().filename().string();
   if (comparison.Agrees()) return nothing + a + " agrees with " + b;
   if (!comparison.causes || comparison.causes->causes.empty()) return nothing + "no cause is known";
-  if (comparison.causes->file != a) {
-    return nothing + fmt::format("fewer corrections repair {}: dexcheck diagnose {} {} --write FILE", b,
-                                 QuoteForShell(second->path().string()),
-                                 QuoteForShell(first.path().string()));
+  if (comparison.causes->of_second) {
+    const std::string command = OfferRepair(request, comparison);
+    return nothing + "the cause is in " + b + (command.empty() ? "" : "; it is repaired by " + command);
   }
-  PrintedRobot printed = ReadPrintedRobot(first), reference = ReadPrintedRobot(*second);
-  for (PrintedRobot* const robot : {&printed, &reference}) LeaveOutUnstated(request.ignore, robot);
-  LeaveOutFrames(&printed, &reference);
   const std::filesystem::path path = request.repaired_file;
   std::string text;
   try {
-    text = WriteRepaired(first, request.urdf, printed, reference, path.parent_path());
+    text = Repair(request, first, *second, path.parent_path()).text;
   } catch (const InputError& error) {
     return nothing + error.what();
   }
+  if (text == first.text()) return nothing + "no cause of these is one that can be written";
   output->Write(text);
   DescriptionFile repaired(path, std::move(text), request.urdf);
   const Comparison again = Compare(request, &repaired, second, [](long) { return !IsInterrupted(); });
@@ -78,8 +73,8 @@ int Run(DiagnoseRequest request) {
   const Comparison comparison =
       Compare(request, &first, &second, [&](long samples) { return bar.GoOn(samples); });
   bar.Finish();
-  json.Write([&] { return ToText(request, comparison); });
-  if (!json.TakesStdout()) PrintVerdict(request, comparison, /*offers_repair=*/!output);
+  json.Write([&] { return ToJson(request, comparison); });
+  if (!json.TakesStdout()) PrintVerdict(request, comparison, output ? "" : OfferRepair(request, comparison));
   if (IsInterrupted()) return ReportFailure("interrupted");
   if (output) {
     const std::string line = WriteRepair(request, first, &second, comparison, &*output);
@@ -93,10 +88,8 @@ int Run(DiagnoseRequest request) {
 void AddDiagnoseCommand(Command app) {
   const auto request = std::make_shared<DiagnoseRequest>();
   Command command = app.AddCommand("diagnose", "Say why two descriptions differ, and repair the first");
-  AddFileOptions(command,
-                 "The description that may be wrong, instead of --robot and --mjcf: parameter file (TOML), "
-                 "URDF or MJCF",
-                 "The other one", request.get());
+  AddFileOptions(command, "The description that may be wrong: parameter file (TOML), URDF or MJCF",
+                 "Another one of the same robot; without both, the shipped pair", &request->files);
   AddUrdfOptions(command, &request->urdf);
   AddJudgingOptions(command, request.get());
   AddIgnoreOption(command, &request->ignore);

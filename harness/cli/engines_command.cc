@@ -118,8 +118,7 @@ void PrintVerdict(const EnginesRequest& request, const EngineComparisonResult& r
   for (const std::string& setting : result.settings) fmt::print("  {}\n", setting);
 }
 
-std::string ToText(const EnginesRequest& request, const RobotModel& model,
-                   const EngineComparisonResult& result) {
+Json ToJson(const EnginesRequest& request, const RobotModel& model, const EngineComparisonResult& result) {
   Json json = {{"robot", request.robot.string()},
                {"verdict", result.Agrees() ? "pass" : "disagreement"},
                {"samples", result.samples},
@@ -142,7 +141,7 @@ std::string ToText(const EnginesRequest& request, const RobotModel& model,
     }
     json["pairs"].push_back(entry);
   }
-  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+  return json;
 }
 
 /// A case for each pair and term.
@@ -175,7 +174,7 @@ int Run(EnginesRequest request) {
   const bool is_whole = result.samples >= request.options.states.samples && !result.lacks_requested;
   ExitCode code = is_whole ? kSuccess : kFailure;
   if (!result.Agrees()) code = kDisagreement;
-  json.Write([&] { return ToText(request, model, result); });
+  json.Write([&] { return ToJson(request, model, result); });
   junit.Write([&] { return WriteEnginesJUnit(request, model, result); });
   if (!json.TakesStdout()) {
     if (!request.quiet) PrintTable(request, model, result);

@@ -45,8 +45,8 @@ MatrixXd ReadTerm(DynamicsProvider* provider, Term term, Eigen::Index rows, Eige
   return numbers;
 }
 
-/// Of each frame its pose, J_f, and J_f_dot xi, which is the acceleration at constant xi in the frame's own
-/// axes without their turning: R^T d/dt (R v) - omega x v.
+/// Adds of each frame its pose, J_f, and J_f_dot xi, which is the acceleration at constant xi in the frame's
+/// own axes without their turning: R^T d/dt (R v) - omega x v.
 void AddFrames(const RobotModel& model, const VectorXd& xi, DynamicsProvider* provider, Json* out) {
   const auto count = static_cast<Eigen::Index>(model.frames().size());
   const Eigen::Index n = xi.size();
@@ -69,8 +69,8 @@ void AddFrames(const RobotModel& model, const VectorXd& xi, DynamicsProvider* pr
   (*out)["frames"] = frames;
 }
 
-/// What model and engine have alike, of the robot alone: M_bar, C_bar_xi, gravity, friction, F_bar, bias,
-/// energies and momenta, fingertip_pose, and pose, J_f, J_f_dot_xi of each frame.
+/// Adds the terms that model and engine both have, of the robot alone: M_bar, C_bar_xi, gravity, friction,
+/// F_bar, bias, energies and momenta, fingertip_pose, and pose, J_f, J_f_dot_xi of each frame.
 void AddSharedTerms(const RobotModel& model, const State& state, DynamicsProvider* provider, Json* out) {
   DynamicsState at;
   at.q = state.q;
@@ -128,8 +128,8 @@ void AddUnreducedTerms(const RobotModel& model, const State& state, Json* out) {
   (*out)["F"] = ToList(terms.gravity() + terms.friction());
 }
 
-/// What Pinocchio has at the same state of a floating base: [x y z, qx qy qz qw], the origin's velocity in
-/// the base's axes.
+/// Adds Pinocchio's coordinates at the same state of a floating base: [x y z, qx qy qz qw], the origin's
+/// velocity in the base's axes.
 void AddPinocchioTerms(const ModelTerms& terms, const State& state, Json* out) {
   const BaseConversion conversion({.position = BaseConvention::Position::kXyzXyzw, .linear_in_base = true});
   TermResults converted;
@@ -398,7 +398,7 @@ int Run(const EvalRequest& request) {
     EngineProvider provider(adapter, "engine");
     AddSharedTerms(model, state, &provider, &out["engine"]);
   }
-  OutputFile(request.out).Write(out.dump(1) + "\n");
+  OutputFile(request.out).Write(FormatJson(out, /*indent=*/1));
   return kSuccess;
 }
 
@@ -409,12 +409,13 @@ void AddEvalCommand(Command app) {
   const auto request = std::make_shared<EvalRequest>();
   Command command = app.AddCommand(
       "eval", "Print every term at one state, as JSON; or write random states for your own program");
-  const Option robot =
-      command.AddOption("--robot FILE.toml", &request->robot,
-                        "Parameter file (TOML) of the analytic model; with --states a URDF or an MJCF, too");
+  const Option robot = command.AddOption(
+      "ROBOT,--robot", &request->robot,
+      "Parameter file (TOML) of the analytic model, the shipped one by default; with --states a URDF or an "
+      "MJCF, too");
   const Option mjcf =
       command
-          .AddOption("--mjcf FILE.xml", &request->mjcf,
+          .AddOption("MJCF,--mjcf", &request->mjcf,
                      "The same robot for the engine: adds the engine's values of the terms as \"engine\"")
           .Needs(robot);
   const Option state =
@@ -436,7 +437,7 @@ void AddEvalCommand(Command app) {
                             .Excludes(mjcf)
                             .Excludes(json);
   AddSeedOption(command, &request->seed, "Seed of the random states").ShowDefault().Needs(states);
-  command.AddFlag("--floating", &request->urdf.floating, "The root of a URDF floats").Needs(states);
+  AddUrdfOptions(command, &request->urdf);
   command.SetAction([=] { return Run(*request); });
 }
 

@@ -112,7 +112,7 @@ int Run(MotionRequest request) {
   bar.Finish();
   const bool complete = !IsInterrupted();
   motion.Write([&] { return WriteMotion(model, design.motion, request.options.rate); });
-  json.Write([&] { return ToJson(model, design, complete).dump(2) + "\n"; });
+  json.Write([&] { return ToJson(model, design, complete); });
   if (!json.TakesStdout() && !motion.TakesStdout()) {
     if (!request.quiet) Print(request, model, design);
     fmt::print("{}: {} of {} combinations of sizes are known to a third of what is plausible, {} before.\n",
@@ -128,7 +128,7 @@ void AddExciteCommand(Command app) {
   const auto request = std::make_shared<MotionRequest>();
   Command command = app.AddCommand(
       "excite", "Make a motion to record with a robot, in which errors of its model show best within limits");
-  command.AddOption("--model FILE", &request->model, "The robot: a parameter file, URDF or MJCF").Required();
+  command.AddOption("MODEL,--model", &request->model, "The robot: a parameter file, URDF or MJCF").Required();
   command.AddOption("--out FILE.csv", &request->motion_file,
                     "The motion: t, q, qd, qdd and the model's torques");
   command

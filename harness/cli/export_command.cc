@@ -174,8 +174,7 @@ nlohmann::ordered_json ToJson(const LogReader& log, const std::vector<SignalInfo
 
 int Run(const ExportRequest& request) {
   if (!request.list && request.csv_file.empty() && request.mcap_file.empty() && request.json_file.empty()) {
-    throw InputError(
-        "export: --csv FILE.csv or --list is required, or --mcap FILE.mcap (see dexcheck export --help)");
+    throw InputError("export: --csv FILE.csv or --list is required, or --mcap FILE.mcap");
   }
   const LogReader log(request.run_folder / "log.h5");
   const std::vector<SignalInfo> signals = ListWanted(log, request);
@@ -183,7 +182,7 @@ int Run(const ExportRequest& request) {
   std::optional<McapWriter> messages;
   if (!request.mcap_file.empty()) messages.emplace(request.mcap_file);
   if (request.list) PrintList(log, signals);
-  json.Write([&] { return ToJson(log, signals).dump(1) + "\n"; });
+  json.Write([&] { return ToJson(log, signals); });
   if (!request.csv_file.empty()) WriteCsv(log, signals, request);
   if (messages) WriteMcap(log, signals, request, &*messages);
   WarnOfCut(request.run_folder, log);

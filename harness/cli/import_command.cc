@@ -27,7 +27,7 @@ struct ImportRequest {
   bool motors = false;
 };
 
-/// What was read, and what of it was left out.
+/// Writes what was read, and what of it was left out.
 void WriteJson(const ImportRequest& request, const RobotDescription* robot,
                const std::vector<MjcfChange>& changes) {
   Json json = {{"source", request.source.string()}, {"out", request.out}};
@@ -47,7 +47,7 @@ void WriteJson(const ImportRequest& request, const RobotDescription* robot,
     json["changes"].push_back(
         {{"file", change.file}, {"line", change.line}, {"word", change.word}, {"what", change.what}});
   }
-  OutputFile(request.json_file).Write(json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
+  OutputFile(request.json_file).Write(FormatJson(json));
 }
 
 /// The copy or table, unless the JSON takes its place on standard output.
@@ -71,7 +71,7 @@ int WriteCopy(const ImportRequest& request) {
     StateNewDefaults(&mjcf);
   }
   if (request.motors) AddMotors(&mjcf, limits);
-  // What cannot be loaded must not be written.
+  // A file that cannot be loaded must not be written.
   LoadMjcfText(mjcf.PrintFor(CurrentFolder()), request.source.string());
   const std::filesystem::path to = MakeAbsolute(request.out).parent_path();
   std::error_code error;
@@ -89,7 +89,7 @@ int Run(const ImportRequest& request) {
   if (request.downgrade || request.motors) return WriteCopy(request);
   const RobotDescription robot = ReadSource(request);
   const std::string text = WriteParameters(robot, request.source.filename().string());
-  // What cannot be read back must not be written: a name that is too long, for example.
+  // A file that cannot be read back must not be written: with a name that is too long, for example.
   ParseRobotModel(text, request.source.string() + " as a parameter file");
   WriteOut(request, text);
   if (!request.json_file.empty()) WriteJson(request, &robot, {});

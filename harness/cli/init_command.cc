@@ -147,7 +147,7 @@ std::string MakeRobotFolder(const InitRequest& request, const std::string& out, 
   RunnableRobot sources = ReadRunnableRobot(request.robot, request.mjcf);
   RobotDescription& robot = sources.robot;
   const bool is_made = request.mjcf.empty() && robot.format == RobotFormat::kUrdf;
-  // What cannot be an MJCF is refused before there is a folder.
+  // A robot that cannot be an MJCF is refused before there is a folder.
   MjModelPtr engine = Load(*sources.mjcf);
   const std::map<std::string, double> home = ReadHome(*engine), limits = ReadMotorLimits(*engine);
   std::optional<Stand> stand;

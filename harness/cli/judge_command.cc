@@ -84,17 +84,16 @@ void Print(const JudgeRequest& request, const RobotModel& model, const Recording
                                one.faults.front().Tell(), 100.0 * one.fraction);
     }
     if (!nearest.empty()) fmt::print("{}\n", Wrap(nearest, 2));
-    const auto tell = [](const HeldPrediction& one) {
+    const auto describe = [](const HeldPrediction& one) {
       return fmt::format("{} number{} {:.3g} times the noise", one.numbers,
                          one.numbers == 1 ? " leaves" : "s leave", one.held_left);
     };
-    // Of a short recording nothing is held out.
+    // A short recording is not divided: nothing is held out.
     if (judgement.by_all.held_left > 0.0)
-      fmt::print("{}\n",
-                 Wrap(fmt::format("held out: the causes' {}; least squares of all that the motion tells "
-                                  "of bodies, friction, offsets and armatures: {}",
-                                  tell(judgement.by_causes), tell(judgement.by_all)),
-                      2));
+      fmt::print("{}\n", Wrap(fmt::format("held-out quarter: the causes' {}; a least-squares fit of every "
+                                          "body, friction, offset and armature: {}",
+                                          describe(judgement.by_causes), describe(judgement.by_all)),
+                              2));
     fmt::print("\n");
   }
   const JudgementVerdict verdict = FindVerdict(model, judgement, recordings);
@@ -105,8 +104,8 @@ void Print(const JudgeRequest& request, const RobotModel& model, const Recording
 
 Json ToJson(const HeldPrediction& one) { return {{"numbers", one.numbers}, {"left", one.held_left}}; }
 
-std::string ToText(const RobotModel& model, const RecordingJudgement& judgement,
-                   const std::vector<Recording>& recordings) {
+Json ToJson(const RobotModel& model, const RecordingJudgement& judgement,
+            const std::vector<Recording>& recordings) {
   const JudgementVerdict verdict = FindVerdict(model, judgement, recordings);
   Json json = {{"model", model.spec().source},
                {"verdict", verdict.word},
@@ -127,6 +126,7 @@ std::string ToText(const RobotModel& model, const RecordingJudgement& judgement,
                               {"residual", one.residual},
                               {"left", one.left},
                               {"noise", one.noise},
+                              {"hidden", one.hidden},
                               {"held_residual", one.held_residual},
                               {"held_left", one.held_left}});
     if (one.drive_gain != 0.0) json["joints"].back()["drive_gain"] = one.drive_gain;
@@ -143,7 +143,7 @@ std::string ToText(const RobotModel& model, const RecordingJudgement& judgement,
       json["causes"][json["causes"].size() - judgement.found.size() + i]["parts"].push_back(
           dexcheck::ToJson(part));
   json["notes"] = judgement.notes;
-  return json.dump(2) + "\n";
+  return json;
 }
 
 /// Writes the model's file with what was found.
@@ -199,7 +199,7 @@ int Run(JudgeRequest request) {
   options.frames = frames;
   const bool is_live = request.recording == "-";
   if (is_live) {
-    // What comes in as it is recorded is told as it comes.
+    // Rows that come in as they are recorded are reported as they come.
     constexpr size_t kAhead = 1000;
     options.ahead = kAhead;
     if (!request.quiet && !json.TakesStdout())
@@ -224,11 +224,10 @@ int Run(JudgeRequest request) {
   bar.Finish();
   if (!IsInterrupted() && corrected)
     Correct(judgement, request, !request.quiet && !json.TakesStdout(), &*corrected);
-  json.Write([&] { return ToText(model, judgement, recordings); });
+  json.Write([&] { return ToJson(model, judgement, recordings); });
   page.Write([&] {
     const std::optional<ReplayData> replay = MakeMotionReplay(model, request.model, judgement);
-    return MakeJudgePage(model, judgement, Json::parse(ToText(model, judgement, recordings)),
-                         replay ? &*replay : nullptr);
+    return MakeJudgePage(model, judgement, ToJson(model, judgement, recordings), replay ? &*replay : nullptr);
   });
   if (!json.TakesStdout()) {
     if (IsInterrupted()) fmt::print("INTERRUPTED. So far:\n");
@@ -300,7 +299,7 @@ int CompareTwoRecordings(const RecordingPair& pair) {
   });
   bar.Finish();
   if (IsInterrupted()) return ReportFailure("interrupted");
-  json.Write([&] { return ToJson(model, pair, comparison).dump(2) + "\n"; });
+  json.Write([&] { return ToJson(model, pair, comparison); });
   if (!json.TakesStdout()) Print(model, pair, comparison);
   return comparison.causes.empty() ? kSuccess : kDisagreement;
 }

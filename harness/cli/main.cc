@@ -36,7 +36,7 @@ int Refuse(const std::string& problem) {
   return kInputError;
 }
 
-/// What a call of the system said. When it was about printing, it names standard output.
+/// Describes an error of the system; one of printing names standard output.
 std::string Explain(const std::system_error& error) {
   return std::ferror(stdout) != 0 ? "standard output: cannot be written: " + error.code().message()
                                   : error.what();
@@ -85,7 +85,7 @@ int Run(int argc, char** argv) {
     FlushOutput();
     return exit_code;
   } catch (const UsageError& error) {
-    return Refuse(std::string(error.what()) + " (see dexcheck --help)");
+    return Refuse(error.what());
   } catch (const InputError& error) {
     return Refuse(error.what());
   } catch (const std::system_error& error) {
@@ -110,7 +110,7 @@ void HandleSignalsFirst() { dexcheck::HandleSignals(dexcheck::cli::kFailure); }
 [[gnu::section(".preinit_array"), gnu::used]] void (*const kFirst)() = HandleSignalsFirst;
 }  // namespace
 
-// What a handler of exceptions throws is want of memory. NOLINTNEXTLINE(bugprone-exception-escape)
+// A handler of exceptions throws for want of memory alone. NOLINTNEXTLINE(bugprone-exception-escape)
 int main(int argc, char** argv) {
   dexcheck::OccupyStandardStreams();
   dexcheck::cli::UseInstalledFonts();

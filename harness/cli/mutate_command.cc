@@ -62,16 +62,20 @@ CampaignFault Describe(const FormulaMutant& mutant) {
   return fault;
 }
 
+/// Makes faults in a run of the scenario that stands in the place of two files.
+int RunInScenario(MutateRequest request) {
+  request.run.scenario = request.files.robot;
+  request.run.options.scale = request.options.scale;
+  const bool draws = request.run.options.draws > 0;
+  request.run.options.looks_on = !request.duration && !draws;
+  request.run.options.duration = request.duration.value_or(draws ? 0.0 : request.run.options.duration);
+  request.run.json_file = request.json_file;
+  request.run.quiet = request.quiet;
+  return MutateRun(request.run);
+}
+
 int Run(MutateRequest request) {
-  if (!request.run.scenario.empty()) {
-    request.run.options.scale = request.options.scale;
-    const bool draws = request.run.options.draws > 0;
-    request.run.options.looks_on = !request.duration && !draws;
-    request.run.options.duration = request.duration.value_or(draws ? 0.0 : request.run.options.duration);
-    request.run.json_file = request.json_file;
-    request.run.quiet = request.quiet;
-    return MutateRun(request.run);
-  }
+  request.files.TakeShipped();
   request.options.diagnose = !request.no_diagnosis;
   const DescriptionFile robot(request.files.robot);
   if (robot.format() != RobotFormat::kToml)
@@ -81,8 +85,7 @@ int Run(MutateRequest request) {
   RequireNoBalls(model, "when each number is changed on purpose");
   const Adapter adapter(model, *pair.engine, pair.source);
   CatchInterrupts();
-  std::optional<OutputFile> json;
-  if (!request.json_file.empty()) json.emplace(request.json_file);
+  ResultFile json(request.json_file);
   ConsistencyOptions unchanged;
   unchanged.samples = request.options.samples;
   unchanged.seed = request.options.seed;
@@ -115,8 +118,8 @@ int Run(MutateRequest request) {
     return Describe(mutant, campaign.names_causes);
   });
   bar.Finish();
-  if (json) json->Write(campaign.ToText());
-  if (request.json_file != "-") campaign.Print(request.quiet);
+  json.Write([&] { return campaign.ToJson(); });
+  if (!json.TakesStdout()) campaign.Print(request.quiet);
   return campaign.ToExitCode();
 }
 
@@ -127,79 +130,76 @@ void AddMutateCommand(Command app) {
   Command command = app.AddCommand(
       "mutate",
       "Change every number and equation of the model on purpose: which faults are found and named?");
-  Option robot = AddRobotOptions(command, &request->files);
-  command.AddOption("--scale", &request->options.scale, "Change of a number, relative to it")
-      .TypeName("X")
+  const std::array<Option, 2> files = AddFileOptions(
+      command,
+      "Scenario whose run gets the faults: numbers, equations, laws, plants; with B a parameter file",
+      "The same robot for the engine; without both, the shipped pair", &request->files);
+  command.AddOption("--scale X", &request->options.scale, "Change of a number, relative to it")
       .Check(NumberFrom(1e-9, 0.5))
       .ShowDefault();
-  Option run =
+  std::vector<Option> of_runs;
+  for (const Option option : AddOverrideOptions(command, &request->run.overrides)) of_runs.push_back(option);
+  of_runs.push_back(
       command
-          .AddOption("--run", &request->run.scenario,
-                     "Make faults in a run of this scenario instead: numbers, equations, laws, plants")
-          .TypeName("SCENARIO");
-  for (Option option : AddOverrideOptions(command, &request->run.overrides)) option.Needs(run);
-  command
-      .AddOption("--from", &request->run.options.from,
-                 "In a run: when the fault begins, s; in a motion of joints it is there from the first")
-      .TypeName("T")
-      .Check(NumberFrom(0.0, 1e4))
-      .Needs(run)
-      .ShowDefault();
-  command
-      .AddOption("--duration", &request->duration,
-                 "In a run: how long it is looked at, s (default 0.1; faults that are "
-                 "drawn in a motion of joints, or not found, are looked at to its end)")
-      .TypeName("T")
-      .Check(NumberFrom(1e-3, 1e4))
-      .Needs(run);
-  command
-      .AddOption("--numbers", &request->run.options.parameters,
-                 "In a run: how many numbers of the model are changed, evenly out of all")
-      .TypeName("N")
-      .Check(WholeNumber(0, 100000))
-      .Needs(run)
-      .ShowDefault();
-  Option draws =
+          .AddOption("--from T", &request->run.options.from,
+                     "In a run: when the fault begins, s; in a motion of joints it is there from the first")
+          .Check(NumberFrom(0.0, 1e4))
+          .ShowDefault());
+  of_runs.push_back(
       command
-          .AddOption("--draws", &request->run.options.draws,
-                     "In a run: sets of faults whose places, sizes and times are drawn, and whether "
-                     "they are named, in the place of the others")
-          .TypeName("N")
-          .Check(WholeNumber(1, 100000))
-          .Needs(run);
-  command.AddOption("--together", &request->run.options.together, "With --draws: faults at once")
-      .TypeName("N")
+          .AddOption("--duration T", &request->duration,
+                     "In a run: how long it is looked at, s (default 0.1; faults that are drawn "
+                     "in a motion of joints, or not found, are looked at to its end)")
+          .Check(NumberFrom(1e-3, 1e4)));
+  of_runs.push_back(command
+                        .AddOption("--numbers N", &request->run.options.parameters,
+                                   "In a run: how many numbers of the model are changed, evenly out of all")
+                        .Check(WholeNumber(0, 100000))
+                        .ShowDefault());
+  const Option draws = command
+                           .AddOption("--draws N", &request->run.options.draws,
+                                      "In a run: sets of faults whose places, sizes and times are drawn, and "
+                                      "whether they are named, in the place of the others")
+                           .Check(WholeNumber(1, 100000));
+  of_runs.push_back(draws);
+  command.AddOption("--together N", &request->run.options.together, "With --draws: faults at once")
       .Check(WholeNumber(1, 5))
       .Needs(draws)
       .ShowDefault();
-  command.AddOption("--draw-seed", &request->run.options.seed, "In a run: what is drawn")
-      .TypeName("N")
-      .Check(WholeNumber(0, 1000000))
-      .Needs(run)
-      .ShowDefault();
-  command
-      .AddOption(
-          "--kinds", &request->run.options.kinds,
-          "In a run: out of which kinds of faults is drawn: motor, sensor, joint, body, floor, wheels, "
-          "contact, solver, law (default: all)")
-      .TypeName("KIND,...")
-      .Delimiter(',')
-      .Needs(run);
-  const auto states = AddSampleOptions(command, 1000, &request->options.samples, &request->options.seed);
-  Option no_diagnosis = command.AddFlag("--no-diagnosis", &request->no_diagnosis,
-                                        "Only whether each is found, not what is named");
-  robot.Excludes(run);
-  for (Option option : states) option.Excludes(run);
-  no_diagnosis.Excludes(run);
-  command
-      .AddOption("--page", &request->run.page_file,
-                 "In a run: an HTML page with what was made, what was found, and how it was named")
-      .TypeName("FILE")
-      .Needs(run);
+  of_runs.push_back(command.AddOption("--draw-seed N", &request->run.options.seed, "In a run: what is drawn")
+                        .Check(WholeNumber(0, 1000000))
+                        .ShowDefault());
+  of_runs.push_back(
+      command
+          .AddOption(
+              "--kinds KIND,...", &request->run.options.kinds,
+              "In a run: out of which kinds of faults is drawn: motor, sensor, joint, body, floor, wheels, "
+              "contact, solver, law (default: all)")
+          .Delimiter(','));
+  std::vector<Option> of_files;
+  for (const Option option :
+       AddSampleOptions(command, 1000, &request->options.samples, &request->options.seed))
+    of_files.push_back(option);
+  of_files.push_back(command.AddFlag("--no-diagnosis", &request->no_diagnosis,
+                                     "Only whether each is found, not what is named"));
+  of_runs.push_back(
+      command.AddOption("--page FILE.html", &request->run.page_file,
+                        "In a run: an HTML page with what was made, what was found, and how it was named"));
   AddJobsOption(command, "Faults", &request->run.jobs);
   AddJsonOption(command, "the results, from which an interrupted campaign goes on,", &request->json_file);
   command.AddFlag("--quiet", &request->quiet, "Print the verdict only");
-  command.SetAction([=] { return Run(*request); });
+  command.SetAction([=] {
+    const bool in_run = files[0].is_given() && !files[1].is_given();
+    for (const Option& option : in_run ? of_files : of_runs) {
+      if (option.is_given())
+        throw UsageError("mutate: " + option.name() +
+                         (in_run ? " is of two files, got the scenario " : " is of a scenario's run, got ") +
+                         (in_run                ? request->files.robot.string()
+                          : files[0].is_given() ? "two files"
+                                                : "no scenario"));
+    }
+    return in_run ? RunInScenario(*request) : Run(*request);
+  });
 }
 
 }  // namespace dexcheck::cli

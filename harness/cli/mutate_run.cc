@@ -16,7 +16,7 @@
 namespace dexcheck::cli {
 namespace {
 
-/// What the table does not say: that a fault was not found, or that its cause or name is another.
+/// Describes what the table does not say: that a fault was not found, or that its cause or name is another.
 std::string DescribeException(const RunMutant& mutant) {
   const std::string& name = mutant.all.name;
   if (mutant.refused) return fmt::format("refused: {}: {}", name, mutant.failure);
@@ -65,8 +65,8 @@ CampaignFault Describe(const RunMutant& mutant) {
   return fault;
 }
 
-/// Of drawn faults, by the number of those of a set that are found alone: how many are named, and in how many
-/// sets each is named as well as when it is alone.
+/// Prints for drawn faults, by the number of those of a set that are found alone, how many are named, and in
+/// how many sets each is named as well as when it is alone.
 void PrintScores(const Campaign& campaign, int together) {
   constexpr const char* kNames[] = {"right", "in_class", "not_explained", "wrong"};
   struct Count {
@@ -97,10 +97,7 @@ void PrintScores(const Campaign& campaign, int together) {
 int MutateRun(const MutateRunRequest& request) {
   const ScenarioFiles files = FindScenario(request.scenario, request.overrides.List(), /*seed=*/0);
   CatchInterrupts();
-  std::optional<OutputFile> json;
-  if (!request.json_file.empty()) json.emplace(request.json_file);
-  std::optional<OutputFile> page;
-  if (!request.page_file.empty()) page.emplace(request.page_file);
+  ResultFile json(request.json_file), page(request.page_file);
   RunCampaign runs(files.scenario, files.robot, files.mjcf, request.options, IsInterrupted);
   const RunMutationOptions& options = request.options;
   Campaign campaign{.faults = {},
@@ -116,16 +113,17 @@ int MutateRun(const MutateRunRequest& request) {
                              {"together", options.together},
                              {"draw_seed", options.seed}}};
   campaign.Resume(request.json_file, {files.scenario.source, files.robot, files.mjcf});
-  ProgressBar bar("changing", static_cast<long>(campaign.total), request.quiet || request.json_file == "-");
+  ProgressBar bar("changing", static_cast<long>(campaign.total), request.quiet || json.TakesStdout());
   campaign.Make(request.jobs, &bar, [&](size_t i) {
     runs.Run(i, [] { return false; });
     return Describe(runs.mutants()[i]);
   });
   bar.Finish();
-  if (json) json->Write(campaign.ToText());
-  if (page) page->Write(MakeCampaignPage(Json::parse(campaign.ToText())));
-  if (request.json_file != "-") campaign.Print(request.quiet);
-  if (request.json_file != "-" && request.options.draws > 0) PrintScores(campaign, request.options.together);
+  json.Write([&] { return campaign.ToJson(); });
+  page.Write([&] { return MakeCampaignPage(campaign.ToJson()); });
+  if (json.TakesStdout()) return campaign.ToExitCode();
+  campaign.Print(request.quiet);
+  if (request.options.draws > 0) PrintScores(campaign, request.options.together);
   return campaign.ToExitCode();
 }
 

@@ -4,7 +4,9 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <type_traits>
 
+#include "harness/base/bounded_json.h"
 #include "harness/base/files.h"
 
 namespace dexcheck::cli {
@@ -23,7 +25,7 @@ class OutputFile {
   /// @throws InputError like the constructor; what stood under the path before is then untouched.
   void Write(const std::string& text);
 
-  /// The same in pieces: Append any number of times, then Finish, without which no file appears.
+  /// Write in pieces: Append any number of times, then Finish, without which no file appears.
   void Append(const std::string& text);
   void Finish();
 
@@ -44,10 +46,15 @@ class ResultFile {
   explicit ResultFile(const std::string& path) {
     if (!path.empty()) file_.emplace(path);
   }
-  /// Writes the text that a function makes, if there is a file.
-  template <typename MakeText>
-  void Write(const MakeText& make_text) {
-    if (file_) file_->Write(make_text());
+  /// Writes the text or the JSON that a function makes, if there is a file.
+  template <typename Make>
+  void Write(const Make& make) {
+    if (!file_) return;
+    if constexpr (std::is_same_v<decltype(make()), std::string>) {
+      file_->Write(make());
+    } else {
+      file_->Write(FormatJson(make()));
+    }
   }
   /// The results take standard output: other text would spoil them.
   [[nodiscard]] bool TakesStdout() const { return file_ && file_->is_stdout(); }

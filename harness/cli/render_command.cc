@@ -72,7 +72,7 @@ ExitCode Run(RenderRequest request) {
       json["frames"] = CountFrames(run, request.video.fps);
       json["frames_per_second"] = request.video.fps;
     }
-    summary.Write([&] { return json.dump(1) + "\n"; });
+    summary.Write([&] { return json; });
   }
   if (!request.quiet) WarnOfCut(request.run_folder, LogReader(request.run_folder / "log.h5"));
   return kSuccess;
@@ -97,7 +97,6 @@ void AddRenderCommand(Command app) {
       .Check(WholeNumber(1, kMostFramesPerSecond))
       .ShowDefault();
   command.AddFlag("--forces", &request->video.forces, "Draw contact forces and friction cones");
-  command.AddFlag("--tracks", &request->video.tracks, "Draw the contacts' tracks and the object's path");
   command.AddFlag("--no-panel", &request->no_panel, "Leave out the panel with time, errors and checks");
   command.AddFlag("--quiet", &request->quiet, "Print nothing");
   AddJsonOption(command, "what was drawn", &request->json_file);

@@ -7,6 +7,7 @@
 
 #include "harness/cli/commands.h"
 #include "harness/cli/output_file.h"
+#include "harness/cli/run_folder.h"
 #include "harness/report/page.h"
 
 namespace dexcheck::cli {
@@ -34,7 +35,7 @@ void AddReportCommand(Command app) {
   const auto request = std::make_shared<ReportRequest>();
   Command command = app.AddCommand("report", "Write a recorded run's report: one page and its figures");
   command.AddOption("RUN_DIR", &request->run_folder, "Folder of the run").Required().TypeName("");
-  command.AddOption("--out FILE.html", &request->out,
+  command.AddOption("--page FILE.html", &request->out,
                     "Write only the page, here (default: report.html and figures/ in RUN_DIR)");
   command.AddFlag("--no-replay", &request->no_replay, "Leave out the replay in three dimensions");
   command.AddFlag("--quiet", &request->quiet, "Print nothing");
@@ -46,13 +47,12 @@ void AddReportCommand(Command app) {
     ResultFile json_file(request->json_file);
     ResultFile tex_file(request->tex_file);
     RequirePageName(request->out);
+    RequireKind(request->run_folder, "run's folder");
     ReportFiles files = MakeReportFiles(request->run_folder);
     if (!request->out.empty()) files = {request->out, {}};
     WriteRunReport(request->run_folder, files, request->no_replay ? MakeStillScene : MakeRunScene);
     json_file.Write([&] {
-      const nlohmann::ordered_json json = {{"page", files.page.string()},
-                                           {"figures", files.figures.string()}};
-      return json.dump(1) + "\n";
+      return nlohmann::ordered_json{{"page", files.page.string()}, {"figures", files.figures.string()}};
     });
     tex_file.Write([&] { return MakeTexTable(RunData(request->run_folder)); });
     const bool prints = !json_file.TakesStdout() && !tex_file.TakesStdout();

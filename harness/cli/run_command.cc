@@ -136,7 +136,7 @@ int RunScenario(const RunRequest& request) {
     result.attribution.evidence = difference;
   }
 
-  const std::string summary = MakeSummary(setup, runner.loop(), result).dump(2) + "\n";
+  const std::string summary = FormatJson(MakeSummary(setup, runner.loop(), result));
   if (recorder) recorder->Close(summary);
   if (folder) OutputFile(folder->path() / "summary.json").Write(summary);
   if (folder && !result.gain_card.empty())
@@ -280,7 +280,7 @@ void AddRunCommand(Command app, const std::string& command_line) {
   Option(controller).Excludes(list);
   scenario.Excludes(list).Excludes(replay);
   list.Excludes(replay);
-  // What would be ignored is refused.
+  // Options that would be ignored are refused.
   for (Option option : judging) option.Excludes(list).Excludes(replay);
   no_log.Excludes(video).Excludes(out);
   all.Excludes(quiet);

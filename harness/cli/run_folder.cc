@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cerrno>
 #include <cmath>
@@ -76,7 +77,8 @@ std::vector<std::string> Supersede(const std::filesystem::path& file, std::vecto
   return overrides;
 }
 
-/// What a scenario needs. @throws InputError that names the scenario and its key, when it is not there.
+/// Requires a file that a scenario names. @throws InputError that names the scenario and its key, when it is
+/// not there.
 void RequireFile(const Scenario& scenario, const char* key, const std::string& file) {
   if (file.empty() || ::access(file.c_str(), R_OK) == 0) return;
   throw InputError(
@@ -248,13 +250,39 @@ std::vector<std::string> ShippedKind::ListNames() const {
 }
 
 std::filesystem::path ShippedKind::Find(const std::string& name_or_file) const {
-  if (IsTomlFile(name_or_file)) return name_or_file;
+  if (IsTomlFile(name_or_file)) {
+    RequireKind(name_or_file, name);
+    return name_or_file;
+  }
   const std::vector<std::string> known = ListNames();
   if (std::ranges::find(known, name_or_file) != known.end())
     return FindShippedFile(folder) / (name_or_file + ".toml");
   const std::string where = *listed != '\0' ? listed : fmt::format("{}", fmt::join(known, ", "));
   throw InputError(fmt::format("{} {}: is neither shipped ({}) nor a TOML file{}", name, Quote(name_or_file),
                                where, SuggestNearest(name_or_file, known)));
+}
+
+void RequireKind(const std::filesystem::path& file, std::string_view wanted) {
+  struct FileKind {
+    const char* name;
+    const char* key;  // no other kind has it
+    const char* taken_by;
+  };
+  static constexpr std::array<FileKind, 3> kKinds = {{{"scenario", "duration", "; `dexcheck run` takes it"},
+                                                      {"study", "vary", "; `dexcheck study` takes it"},
+                                                      {"parameter file of a robot", "gravity", ""}}};
+  std::error_code ignored;
+  if (file.extension() != ".toml" || !std::filesystem::is_regular_file(file, ignored)) return;
+  std::optional<TomlDocument> document;
+  try {
+    document.emplace(ReadBytes(file.string()), file.string());
+  } catch (const InputError&) {
+    return;
+  }
+  const auto found = std::ranges::find_if(
+      kKinds, [&](const FileKind& kind) { return document->Open().Find(kind.key).has_value(); });
+  if (found != kKinds.end() && found->name != wanted)
+    throw InputError(fmt::format("{} is a {}{}", file.string(), found->name, found->taken_by));
 }
 
 bool IsTomlFile(const std::string& name) {
@@ -267,7 +295,7 @@ int CopyScenario(const std::string& name, const std::string& out) {
   const std::vector<std::string> parts = ListMjcfFiles(files.mjcf);
   const RunFolder folder(out.empty() ? source.stem().string() : out, "");
   std::string text = ReadBytes(source.string());
-  // As the scenario writes the files: from its own folder.
+  // The scenario writes the files' paths from its own folder.
   const auto refer = [&](const std::string& stated, const char* table, const char* key,
                          const std::filesystem::path& file) {
     const std::string own = file.filename().string();

@@ -81,7 +81,7 @@ class RecordedRun {
   [[nodiscard]] const ScenarioFiles& files() const { return files_; }
   [[nodiscard]] long rows() const { return log_.rows(); }
   [[nodiscard]] bool was_checked() const;
-  /// What the bits depended on, as DescribeMachine says; empty when the log does not have it.
+  /// The machine that the bits depended on, as DescribeMachine says; empty when the log does not have it.
   [[nodiscard]] std::string machine() const { return log_.FindText("machine"); }
   [[nodiscard]] ReplayDifference Compare(const std::filesystem::path& other_log) const;
   [[nodiscard]] const LogReader& log() const { return log_; }
@@ -110,6 +110,12 @@ struct ShippedKind {
 };
 inline constexpr ShippedKind kScenarios = {"scenario", "harness/shipped/scenarios", "dexcheck run --list"};
 inline constexpr ShippedKind kStudies = {"study", "harness/shipped/studies", ""};
+
+/// @throws InputError that names the kind of a TOML file when it is another one: "FILE is a study; `dexcheck
+/// study` takes it". A file that cannot be read, or is of no known kind, passes: whoever reads it says what
+/// is wrong.
+/// @param wanted "scenario", "study" or "parameter file of a robot"; another word where none of them will do.
+void RequireKind(const std::filesystem::path& file, std::string_view wanted);
 
 /// Whether this names a file, and nothing that is shipped.
 bool IsTomlFile(const std::string& name);

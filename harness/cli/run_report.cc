@@ -59,7 +59,10 @@ void PrintCategory(CheckCategory kind, const ClosedLoop& loop) {
   }
   if (passing.is_asked())
     PrintCheck(passing.nearest, passing.checks == 1 ? "" : std::to_string(passing.checks));
-  if (passing.not_reached > 0) fmt::print("  {:<17}{:>3} not reached\n", NameOf(kind), passing.not_reached);
+  const bool is_asked =
+      passing.is_asked() || !failing.empty();  // contacts of an arm that touches nothing are not
+  if (is_asked && passing.not_reached > 0)
+    fmt::print("  {:<17}{:>3} not reached\n", NameOf(kind), passing.not_reached);
   for (const CheckRecord& check : failing) PrintCheck(check);
 }
 
@@ -128,7 +131,7 @@ void PrintClearance(const Clearance& clearance) {
     if (one.pair >= 0 && (nearest == nullptr || one.distance < nearest->distance)) nearest = &one;
   }
   if (nearest == nullptr) return;
-  fmt::print("not meant to touch: {}, {:.1f} mm {} at t = {:.3f} s\n", clearance.Describe(nearest->pair),
+  fmt::print("smallest clearance: {}, {:.1f} mm {} at t = {:.3f} s\n", clearance.Describe(nearest->pair),
              1e3 * std::abs(nearest->distance), nearest->distance < 0.0 ? "into each other" : "apart",
              nearest->time);
 }
@@ -152,7 +155,7 @@ void PrintSpeed(const ClosedLoop& loop, const RunResult& result) {
       scale * times.controller, scale * times.cross_check, scale * result.recording_seconds);
 }
 
-/// What explains the residuals, numbered; those that nothing explains last.
+/// Prints the causes that explain the residuals, numbered; those that nothing explains last.
 void PrintCauses(const Causes& causes) {
   int number = 0;
   for (const Explanation& one : causes)

@@ -17,7 +17,7 @@ namespace dexcheck::cli {
 namespace {
 
 void WriteJson(const std::string& file, const nlohmann::ordered_json& json) {
-  if (!file.empty()) OutputFile(file).Write(json.dump(2) + "\n");
+  if (!file.empty()) OutputFile(file).Write(FormatJson(json));
 }
 
 int ShowTrial(const std::string& database, long number, const std::string& json) {
@@ -55,7 +55,7 @@ void AddStudyReadCommands(Command study) {
 
   Command report = study.AddCommand("report", "Write an HTML page of a study's results");
   add_database(report);
-  report.AddOption("--out FILE.html", out.get(), "The page (DB.html by default); - for standard output");
+  report.AddOption("--page FILE.html", out.get(), "The page (DB.html by default); - for standard output");
   const auto json = std::make_shared<std::string>();
   AddJsonOption(report, "the same data", json.get());
   report.SetAction([=] {

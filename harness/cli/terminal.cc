@@ -92,7 +92,7 @@ constexpr int kUsualColumns = 80;  // of a terminal that does not report them
 constexpr int kWidestBar = 40;
 constexpr int kNarrowestBar = 8;
 constexpr std::chrono::milliseconds kRedrawEvery(100);
-// Before, what is left is not estimated: the first steps touch memory for the first time.
+// The time left is not estimated before: the first steps touch memory for the first time.
 constexpr double kLeastElapsed = 0.5;  // s
 
 }  // namespace
@@ -115,7 +115,7 @@ std::string ProgressBar::MakeLine(long done, Clock::time_point now) const {
     const double rate = static_cast<double>(done - first_done_) / elapsed;
     left = fmt::format(", {:.0f} s left", static_cast<double>(total_ - done) / rate);
   }
-  // What matters least goes first: the count, then the label's end, then the bar.
+  // The least important goes first: the count, then the label's end, then the bar.
   const auto room = [&](size_t used) { return columns - static_cast<int>(used) - 3; };  // " [" and "]"
   std::string label = label_;
   if (room(label.size() + end.size() + count.size() + left.size()) >= kNarrowestBar) end += count;

@@ -1,6 +1,6 @@
 #pragma once
 
-// What standard output and standard error are: terminals, how wide, and whether they take colours.
+// Standard output and standard error: whether they are terminals, how wide, and whether they take colours.
 
 #include <chrono>
 #include <optional>
@@ -13,7 +13,7 @@ namespace dexcheck::cli {
 /// Columns of the terminal that a descriptor leads to, now; 0 when it is none or does not report them.
 int CountColumns(int descriptor);
 
-/// What every line of a table, and of text without long paths, fits.
+/// Most columns of a line of a table, and of text without long paths.
 inline constexpr size_t kColumns = 80;
 
 /// Lines of at most kColumns, broken at blanks; those after the first of each are indented. A word that is
@@ -49,7 +49,7 @@ class ProgressBar {
   ProgressBar& operator=(const ProgressBar&) = delete;
 
   void Update(long done);
-  /// The same. @returns whether to go on: not once the program was interrupted.
+  /// Update. @returns whether to go on: not once the program was interrupted.
   bool GoOn(long done);
   /// Clears the line.
   void Finish();

@@ -52,6 +52,13 @@ std::vector<double> SolveOneAngle(const PrintedOrigin& origin, int angle, const 
   return solved;
 }
 
+void TakeBody(const BodyNumbers& body, PrintedLink* link) {
+  PrintedInertial& inertial = link->inertial.emplace();
+  inertial.mass.value = body.mass;
+  inertial.origin.t = body.com;
+  inertial.I = ToEntries(body.inertia);
+}
+
 }  // namespace
 
 struct CandidateSearch::Part {
@@ -134,18 +141,23 @@ void CandidateSearch::SearchBody(int link) {
   };
   if (node.parts.empty() || (pair_.given(link).body.mass == 0.0 && right.body.mass > 0.0)) {
     offer(MakeWhole(Kind::kMissing), fmt::format("mass {:.6g} would be right", right.body.mass),
-          [&](PrintedLink* made) {
-            PrintedInertial& inertial = made->inertial.emplace();
-            inertial.mass.value = right.body.mass;
-            inertial.origin.t = right.body.com;
-            inertial.I = ToEntries(right.body.inertia);
-          });
+          [&](PrintedLink* made) { TakeBody(right.body, made); });
     if (node.parts.empty()) return;
   }
-  if (pair_.node_b(pair_.Partner(link)).parts.empty()) {
+  const Node& theirs = pair_.node_b(pair_.Partner(link));
+  if (theirs.parts.empty()) {
     offer(MakeWhole(Kind::kMissing, true), "", [](PrintedLink* made) { made->inertial.reset(); });
     return;
   }
+  const auto is_from_shapes = [](const PrintedRobot& robot, const Node& of) {
+    return std::ranges::any_of(of.parts, [&](int part) { return robot.link(part).is_from_shapes; });
+  };
+  constexpr const char* kFromShapes = "MuJoCo computed it from the shapes";
+  if (is_from_shapes(pair_.a(), node))
+    offer(MakeWhole(Kind::kMissing), kFromShapes, [&](PrintedLink* made) { TakeBody(right.body, made); });
+  if (is_from_shapes(pair_.b(), theirs))
+    offer(MakeWhole(Kind::kMissing, true), kFromShapes,
+          [&](PrintedLink* made) { TakeBody(right.body, made); });
   SearchLostParts(link);
   SearchLoad(link);
   for (const int k : node.parts) {
@@ -201,12 +213,10 @@ void CandidateSearch::SearchPart(const Part& part) {
   if (part.IsWrong(SiteKind::kInertia)) SearchInertiaNumbers(part);
   if (!part.is_fused || part.link != part.node) return;
   constexpr double kTenNumbers = 90.0;
-  EditTrial number = part.Make(
-      MakeWhole(Kind::kNumber), kTenNumbers - part.extra,
-      fmt::format("mass {:.6g}, {:.6g} would be right; centre of mass ({:.6g} {:.6g} {:.6g}), ({:.6g} {:.6g} "
-                  "{:.6g}) would be right",
-                  part.given.mass.value, right.mass, given.x(), given.y(), given.z(), right.com.x(),
-                  right.com.y(), right.com.z()));
+  EditTrial number =
+      part.Make(MakeWhole(Kind::kNumber), kTenNumbers - part.extra,
+                fmt::format("mass {:.6g}, {:.6g} would be right; centre of mass ({}), ({}) would be right",
+                            part.given.mass.value, right.mass, ShowVector(given), ShowVector(right.com)));
   Try(number, part.link, [right](PrintedLink* made) {
     const Matrix3d R = made->inertial->origin.CalcRotation();
     made->inertial->mass.value = right.mass;
@@ -242,7 +252,7 @@ void CandidateSearch::SearchInertiaNumbers(const Part& part) {
       offer(Kind::kNoProducts, 3.0, values);
     if (same_moments) offer(Kind::kNoAxes, 5.0, "");
   } else if (same_moments && R.isIdentity(1e-12)) {
-    // The same six numbers, of which one file turns the frame: it was lost, or made up.
+    // Both files print six equal numbers and one turns their frame: the rotation was lost, or made up.
     const PrintedLink& other = pair_.b().link(pair_.Partner(part.node));
     const bool same_numbers =
         other.inertial && (other.inertial->I - given6).cwiseAbs().maxCoeff() <= open.maxCoeff();
@@ -327,9 +337,8 @@ void CandidateSearch::SearchLoad(int link) {
   if (!FindPhysicalInconsistency({load->mass, load->com, 0.5 * (load->inertia + load->inertia.transpose())})
            .empty())
     return;
-  const Vector3d& c = load->com;
   Add({MakeWhole(Kind::kPartMissing), kBits, kBodyMask,
-       fmt::format("of {:.6g} kg at ({:.6g} {:.6g} {:.6g})", load->mass, c[0], c[1], c[2])},
+       fmt::format("of {:.6g} kg at ({})", load->mass, ShowVector(load->com))},
       link, ListBodySites(link));
 }
 

@@ -208,6 +208,12 @@ std::string DescribeEntries(std::span<const char* const> names, const double* gi
   return text;
 }
 
+std::string ShowVector(const Vector3d& v) {
+  constexpr double kRounding = 1e-9;
+  const auto show = [&](double x) { return ShowZero(x, kRounding * v.norm()); };
+  return fmt::format("{:.6g} {:.6g} {:.6g}", show(v[0]), show(v[1]), show(v[2]));
+}
+
 double CountEntries(size_t count, const double* given, const double* right, const double* open) {
   double bits = 1.0;
   for (const size_t k : ListDiffering(count, given, right, open))

@@ -87,6 +87,7 @@ class CandidateSearch {
   void SearchTurnedExchange(int n, int k, double which);
   void SearchCopy(int link, double which);
   void SearchSecond(int link);
+  [[nodiscard]] PrintedLink TakeRight(int link, SiteMask mask) const;
 
   PrintedPair& pair_;
   std::vector<Site> sites_;
@@ -105,6 +106,8 @@ std::optional<double> CountLeft(double after, double before);
 /// "x 0.1, 0.2 would be right" of each entry that differs by more than the tolerance.
 std::string DescribeEntries(std::span<const char* const> names, const double* given, const double* right,
                             const double* open);
+/// "0.1 0 -0.2": entries that are rounding beside the largest are 0.
+std::string ShowVector(const Vector3d& v);
 /// The bits of these entries.
 double CountEntries(size_t count, const double* given, const double* right, const double* open);
 inline constexpr const char* kAxisNames[] = {"x", "y", "z"};

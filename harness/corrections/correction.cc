@@ -155,8 +155,7 @@ constexpr KindWords kWords[] = {
     {Kind::kPartMissing, "lost", "without a part that is welded to it"},
     {Kind::kOtherAxis, "number", "another axis"},
     {Kind::kCompiled, "compiled", "as a setting of the compiler made it"},
-    {Kind::kClassicRows, "classic",
-     "in classic (standard) Denavit-Hartenberg parameters, and read as modified ones"},
+    {Kind::kClassicRows, "{}", "{}"},
     {Kind::kShiftedRows, "{}", "with alpha and a of the row {}"},
     {Kind::kShiftedBodies, "shifted", "shifted by one in the list of bodies"}};
 
@@ -189,6 +188,10 @@ std::string NameComponent(const FileFault& fault, bool is_id) {
       return is_id ? fmt::format("{}_{}", kIds[at % 3], kAxes[at / 3])
                    : fmt::format("{} about {}", kTurns[at % 3], kAxes[at / 3]);
     }
+    case Kind::kClassicRows:
+      if (is_id) return at == 0 ? "classic" : "modified";
+      return at == 0 ? "in classic (standard) Denavit-Hartenberg parameters, and read as modified ones"
+                     : "in modified Denavit-Hartenberg parameters, and read as classic ones (key convention)";
     case Kind::kShiftedRows:
       return is_id ? (at == 0 ? "shifted_down" : "shifted_up") : at == 0 ? "before" : "behind";
     case Kind::kSignOf:
@@ -222,6 +225,12 @@ std::string NameQuantity(const FileFault& fault) {
 bool IsSameFault(const FileFault& a, const FileFault& b) {
   return a.kind == b.kind && a.of == b.of && a.component == b.component && a.rotation == b.rotation &&
          a.in_second == b.in_second && a.whole == b.whole;
+}
+
+std::string NamePlace(const PrintedLink& link, SiteKind kind) {
+  if (link.is_frame) return "frame " + link.name;
+  if (IsOfBody(kind) || link.joint.name.empty()) return "link " + link.name;
+  return "joint " + link.joint.name;
 }
 
 const char* NameSite(SiteKind kind) { return std::ranges::find(kSites, kind, &SiteWords::kind)->words; }

@@ -119,7 +119,7 @@ enum class CorrectionKind {
   kOtherAxis,
   kCompiled,  ///< A setting of an MJCF's compiler changed what the text states.
   // All rows of a table, or all bodies of a list.
-  kClassicRows,
+  kClassicRows,  ///< Component: 1: they are modified ones.
   kShiftedRows,  ///< Component: 0: alpha and a of the row before, 1: of the row behind.
   kShiftedBodies,
 };
@@ -165,7 +165,7 @@ struct CorrectionCandidate {
   double rest = 1.0;  ///< How far sites are from right then, over what digits leave open; 1: they are right.
 };
 
-/// Whether it pays for its digits, and not for a convention.
+/// Returns whether a fault pays for its digits, and not for a convention.
 inline bool IsNumber(const FileFault& fault) {
   return fault.kind == CorrectionKind::kNumber || fault.kind == CorrectionKind::kZero ||
          (fault.kind == CorrectionKind::kFrame && fault.rotation == CorrectionKind::kNumber);
@@ -176,6 +176,8 @@ std::string DescribeFault(const FileFault& fault);
 /// A stable name: "inertia.about_origin", "com.mm", "number.mass", "exchange.body".
 std::string NameFault(const FileFault& fault);
 const char* NameSite(SiteKind kind);
+/// Names the place of a quantity of a link: "link l1", "joint q1", or "frame tip".
+std::string NamePlace(const PrintedLink& link, SiteKind kind);
 
 inline constexpr int kPermutations[5][3] = {{1, 0, 2}, {2, 1, 0}, {0, 2, 1}, {1, 2, 0}, {2, 0, 1}};
 inline constexpr int kSixOrders[5][6] = {

@@ -61,9 +61,7 @@ void Merge(PrintedLink before, PrintedLink right, PrintedLink* link) {
 std::string NamePlace(const PrintedPair& pair, int link, SiteKind kind, bool in_second = false) {
   if (kind >= SiteKind::kGravity) return "robot";
   if (in_second && link >= 0 && pair.Partner(link) >= 0) link = -1 - pair.Partner(link);
-  const PrintedLink& place = link >= 0 ? pair.a().link(link) : pair.b().link(-1 - link);
-  if (IsOfBody(kind) || place.joint.name.empty()) return "link " + place.name;
-  return "joint " + place.joint.name;
+  return NamePlace(link >= 0 ? pair.a().link(link) : pair.b().link(-1 - link), kind);
 }
 
 /// Which sites were put right, and how far they may be from right since.
@@ -189,6 +187,7 @@ class OneWay {
         std::vector<CorrectionItem> made = MakeItems(chosen.deal, sites, candidates);
         AddRivals(chosen, sites, candidates, &made[0]);
         AddLeafRival(candidates[chosen.deal.candidates[0]], &made[0]);
+        AddTurnRival(candidates[chosen.deal.candidates[0]], &made[0]);
         for (CorrectionItem& item : made) {
           result.bits += item.bits;
           AddItem(std::move(item), &result.items);
@@ -206,8 +205,9 @@ class OneWay {
     return result;
   }
 
-  /// Makes several free numbers at links that carry one another "not explained" if the files have different
-  /// frames there, since another frame would leave them, and so numbers that are corrected twice.
+  /// Makes several free numbers at one link or at links that carry one another "not explained" if the files
+  /// have different frames there, since they follow from the choice of the frame, and so numbers that are
+  /// corrected twice.
   void WithdrawDoubtful(FileCorrections* result, std::vector<std::string>* unexplained) const {
     constexpr double kFree = 24.0;  // bits of two entries
     const auto is_free = [&](const CorrectionItem& item) {
@@ -219,6 +219,19 @@ class OneWay {
       return is_geometry && link >= 0 && pair_.Carrier(link) >= 0 &&
              !pair_.X_ab(link).isApprox(Pose::Identity(), 1e-9);
     };
+    // The inertia turned, or six other numbers.
+    const auto is_of_inertia = [](const CorrectionItem& item) {
+      using Kind = CorrectionKind;
+      const Kind kind = item.fault.kind;
+      return item.fault.of == SiteKind::kInertia && !item.sites.empty() &&
+             (IsNumber(item.fault) || kind == Kind::kFrame || kind == Kind::kNoAxes ||
+              kind == Kind::kAlongParent || kind == Kind::kAlongToParent || kind == Kind::kMirror);
+    };
+    // A link's frame was chosen wrongly if its centre of mass and its inertia are both wrong in it.
+    const auto is_of_frame = [&](const CorrectionItem& one, const CorrectionItem& other) {
+      return is_free(one) && one.fault.of == SiteKind::kCom && is_of_inertia(other) &&
+             one.sites[0].link == other.sites[0].link;
+    };
     const auto is_near = [&](const Site& site, int link) {
       return site.link == link ||
              (site.link >= 0 && (pair_.Carrier(site.link) == link || pair_.Carrier(link) == site.link));
@@ -228,7 +241,8 @@ class OneWay {
         if (&other == &item || other.sites.empty()) return false;
         const bool is_again = IsNumber(item.fault) && IsNumber(other.fault) && item.places == other.places &&
                               item.id == other.id && IsOfBody(item.fault.of);
-        return is_again || (is_free(item) && is_free(other) && is_near(item.sites[0], other.sites[0].link));
+        return is_again || is_of_frame(item, other) || is_of_frame(other, item) ||
+               (is_free(item) && is_free(other) && is_near(item.sites[0], other.sites[0].link));
       };
       return std::ranges::any_of(result->items, is_other) ||
              (is_free(item) && std::ranges::any_of(left_, [&](const Site& site) {
@@ -290,7 +304,9 @@ class OneWay {
         item.places.push_back(std::move(place));
         item.values.push_back(candidate.values);
       }
-      item.patches.insert(item.patches.end(), candidate.patches.begin(), candidate.patches.end());
+      // A patch of this file would copy the other one's fault.
+      if (!candidate.fault.in_second)
+        item.patches.insert(item.patches.end(), candidate.patches.begin(), candidate.patches.end());
     }
     const CorrectionCandidate& first = candidates[deal.candidates[0]];
     item.in_second = is_second_ != item.fault.in_second;
@@ -369,7 +385,23 @@ class OneWay {
     rival.fault.of = SiteKind::kPosition;
     rival.id = NameFault(rival.fault);
     rival.places = {NamePlace(pair_, link, SiteKind::kPosition)};
-    rival.values = {fmt::format("off by ({:.6g} {:.6g} {:.6g})", -moved[0], -moved[1], -moved[2])};
+    rival.values = {fmt::format("off by ({})", ShowVector(-moved))};
+    item->rivals.push_back(std::move(rival));
+  }
+
+  /// If frames of links are free, another axis is as well a link that is turned otherwise with all it
+  /// carries.
+  void AddTurnRival(const CorrectionCandidate& candidate, CorrectionItem* item) const {
+    const int link = candidate.link;
+    if (candidate.fault.kind != CorrectionKind::kOtherAxis || link < 0 || item->places.size() != 1 ||
+        pair_.Carrier(link) < 0 || pair_.X_ab(link).isApprox(Pose::Identity(), 1e-9))
+      return;
+    CorrectionItem rival = *item;
+    rival.rivals.clear();
+    rival.patches.clear();
+    rival.fault = {CorrectionKind::kNumber, SiteKind::kRotation};
+    rival.id = NameFault(rival.fault);
+    rival.values = {""};
     item->rivals.push_back(std::move(rival));
   }
 

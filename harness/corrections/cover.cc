@@ -108,7 +108,7 @@ class CoverFinder {
     return candidate.bits + (IsNumber(candidate.fault) ? kNumber : kConvention) + which_ + beside;
   }
 
-  /// The same convention, or the same numbers, at several places.
+  /// Groups candidates of one convention, or of equal numbers, at several places.
   void MakeGroups() {
     std::map<std::tuple<int, int, int, int, bool, bool, std::string>, std::vector<size_t>> groups;
     for (size_t c = 0; c < candidates_.size(); ++c) {

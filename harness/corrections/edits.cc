@@ -58,11 +58,9 @@ std::vector<OriginEdit> ListTurns(const PrintedOrigin& origin) {
   };
   const bool has_angles = origin.form == RotationForm::kRollPitchYaw;
   const Matrix3d one = Matrix3d::Identity();
-  if (has_angles || origin.form == RotationForm::kEuler || origin.form == RotationForm::kMdh) {
+  if (has_angles || origin.form == RotationForm::kEuler) {
     angles(Kind::kDegrees, 0.0, 0, kDegree * one);
     angles(Kind::kRadians, 0.0, 0, one / kDegree);
-  }
-  if (has_angles || origin.form == RotationForm::kEuler) {
     const bool several = (origin.r.head<3>().array().abs() > 1e-9).count() > 1;
     angles(Kind::kSign, 0.0, 0, -one);
     for (int k = 0; k < 3 && several; ++k) {
@@ -110,8 +108,15 @@ std::vector<OriginEdit> ListTurns(const PrintedOrigin& origin) {
   return edits;
 }
 
-/// Conventions of a row of modified Denavit-Hartenberg parameters, number by number.
-void ListRowEdits(const PrintedOrigin& origin, std::vector<LinkEdit>* edits) {
+/// Lists conventions of a row of modified Denavit-Hartenberg parameters: of its two angles, and of each
+/// number.
+std::vector<LinkEdit> ListRowEdits(const PrintedOrigin& origin) {
+  std::vector<LinkEdit> edits;
+  for (const bool twice : {false, true}) {
+    edits.push_back({{twice ? Kind::kRadians : Kind::kDegrees, SiteKind::kRotation},
+                     0.0,
+                     [f = twice ? 1.0 / kDegree : kDegree](PrintedLink* link) { link->origin.r *= f; }});
+  }
   const auto number = [](PrintedOrigin* o, int k) {
     return k % 2 == 0 ? &o->r[k / 2] : &o->t[k == 1 ? 0 : 2];
   };
@@ -119,14 +124,15 @@ void ListRowEdits(const PrintedOrigin& origin, std::vector<LinkEdit>* edits) {
   for (int k = 0; k < 4; ++k) {
     if (*number(&row, k) == 0.0) continue;
     const auto scale = [&](Kind kind, int component, double bits, double factor) {
-      edits->push_back({{kind, SiteKind::kPosition, component}, bits, [=](PrintedLink* link) {
-                          *number(&link->origin, k) *= factor;
-                        }});
-      edits->back().fault.whole = true;
+      edits.push_back({{kind, SiteKind::kPosition, component}, bits, [=](PrintedLink* link) {
+                         *number(&link->origin, k) *= factor;
+                       }});
+      edits.back().fault.whole = true;
     };
-    scale(Kind::kSignOf, k, 1.0, -1.0);
+    scale(Kind::kSignOf, k, 0.0, -1.0);
     k % 2 == 0 ? scale(Kind::kDegrees, 0, 1.0, kDegree) : scale(Kind::kUnit, 0, 1.0, 1e-3);
   }
+  return edits;
 }
 
 /// Collects the edits of one inertial.
@@ -271,7 +277,12 @@ class InertialEdits {
       };
       const auto none = [](const PrintedLink&) { return Pose(Pose::Identity()); };
       shift(Kind::kAboutOrigin, 0.0, -1.0, none);
-      shift(Kind::kMovedTwice, 0.0, 1.0, none);
+      // Numbers that a body can have are more often right, and the other file's about the origin.
+      constexpr double kPossible = 6.0;
+      const bool is_possible = FindPhysicalInconsistency({given_.mass.value, given_.origin.t,
+                                                          R_ * ToTensor(given_.I) * R_.transpose()})
+                                   .empty();
+      shift(Kind::kMovedTwice, is_possible ? kPossible : 0.0, 1.0, none);
       for (const Origin& origin : origins_) shift(Kind::kAboutParent, 1.0, -1.0, origin.find);
     }
     const auto turn = [&](Kind kind, int component, double bits, const auto& find) {
@@ -375,11 +386,8 @@ std::vector<LinkEdit> ListRotationEdits(const PrintedOrigin& origin) {
 }
 
 std::vector<LinkEdit> ListOriginEdits(const PrintedOrigin& origin, const EditFrames& frames) {
+  if (origin.form == RotationForm::kMdh) return ListRowEdits(origin);
   std::vector<LinkEdit> edits = ListRotationEdits(origin);
-  if (origin.form == RotationForm::kMdh) {
-    ListRowEdits(origin, &edits);
-    return edits;
-  }
   const auto add = [&](Kind kind, int component, double bits, bool whole, const auto& change) {
     edits.push_back({{kind, SiteKind::kPosition, component}, bits, [change](PrintedLink* link) {
                        change(&link->origin);

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 #include "harness/corrections/candidate_search.h"
@@ -124,7 +125,9 @@ void CandidateSearch::SearchTurnedExchange(int n, int k, double which) {
 /// A link that has what is right of another link, or what the file says of that.
 void CandidateSearch::SearchCopy(int link, double which) {
   const PrintedLink& one = pair_.a().link(link);
-  if ((WrongOf(link) & kBodyMask) == 0 || !one.inertial || pair_.node(link).parts.size() != 1) return;
+  // Robots have equal parts: a single quantity that differs, or an inertial that one file lacks, is no copy.
+  if (std::popcount(WrongOf(link) & kBodyMask) < 2 || !(pair_.right(link).body.mass > 0.0)) return;
+  if (!one.inertial || pair_.node(link).parts.size() != 1) return;
   const BodyNumbers& given = pair_.given(link).body;
   const BodyNumbers& open = pair_.given(link).body_tolerance;
   const BodyNumbers right = pair_.right(link).body;
@@ -155,6 +158,18 @@ void CandidateSearch::SearchCopy(int link, double which) {
   }
 }
 
+/// The link with the rotation, or the inertia, that would be right.
+PrintedLink CandidateSearch::TakeRight(int link, SiteMask mask) const {
+  PrintedLink made = pair_.a().link(link);
+  if ((mask & kPoseMask) != 0) {
+    made.origin.SetRotation(pair_.right(link).X.linear());
+  } else if (made.inertial) {
+    const Matrix3d R = made.inertial->origin.CalcRotation();
+    made.inertial->I = ToEntries(R.transpose() * pair_.right(link).body.inertia * R);
+  }
+  return made;
+}
+
 /// Conventions of the second file's print that would explain what differs at a link.
 void CandidateSearch::SearchSecond(int link) {
   constexpr double kOfSecond = 4.0;
@@ -164,6 +179,7 @@ void CandidateSearch::SearchSecond(int link) {
   if (wrong == 0) return;
   PrintedLink& there = pair_.mutable_b()->link(j);
   const PrintedLink before = there;
+  const PrintedLink right_pose = TakeRight(link, kPoseMask), right_body = TakeRight(link, kBodyMask);
   const auto offer = [&](const LinkEdit& edit, SiteMask mask, const std::string& values) {
     if (*budget_ <= 0 || (wrong & mask) == 0) return;
     --*budget_;
@@ -185,8 +201,12 @@ void CandidateSearch::SearchSecond(int link) {
       // A loss in this file is named, not a surplus in the other one.
       if (kind == Kind::kRadians) kind = Kind::kDegrees;
       if (kind == Kind::kLinkAxes) trial.fault = MakeLostAxes(*before.inertial, false);
-      if (!trial.fault.in_second) trial.bits = edit.bits;
-      Add(trial, link, std::move(right));
+      std::vector<LinkPatch> patches;
+      if (!trial.fault.in_second) {
+        trial.bits = edit.bits;
+        patches.push_back({link, (mask & kPoseMask) != 0 ? right_pose : right_body});
+      }
+      Add(trial, link, std::move(right), std::move(patches));
     }
     there = before;
   };

@@ -19,10 +19,8 @@ std::string DescribeRight(double given, double right) {
   return fmt::format("{:.6g}, {:.6g} would be right", given, right);
 }
 
-std::string ShowVector(const Vector3d& v) { return fmt::format("({:.6g} {:.6g} {:.6g})", v[0], v[1], v[2]); }
-
 std::string DescribeRight(const Vector3d& given, const Vector3d& right) {
-  return ShowVector(given) + ", " + ShowVector(right) + " would be right";
+  return fmt::format("({}), ({}) would be right", ShowVector(given), ShowVector(right));
 }
 
 EditTrial MakeTrial(Kind kind, SiteKind of, double bits, std::string values = "", int component = 0) {
@@ -158,7 +156,9 @@ void CandidateSearch::SearchScalar(int link, JointScalar scalar) {
     if (!Differ({given->value * f, given->half * std::abs(f)}, *right))
       add(Kind::kUnit, 1.0, "", static_cast<int>(k));
   }
-  add(Kind::kNumber, CountBits(right->value, right->half), DescribeRight(given->value, right->value));
+  // A number that the file does not state is missing, and no other value.
+  if (a.link(link).joint.scalars[at])
+    add(Kind::kNumber, CountBits(right->value, right->half), DescribeRight(given->value, right->value));
 }
 
 void CandidateSearch::SearchJoint(int link) {

@@ -21,12 +21,7 @@ double CountAngle(double angle, double half) {
   return is_quarter ? kQuarter : CountBits(angle, half);
 }
 
-std::string ShowAngles(const Matrix3d& R) {
-  const Vector3d angles = SolveRollPitchYaw(R)[0];
-  constexpr double kRounding = 1e-12;
-  const auto show = [&](int k) { return std::abs(angles[k]) < kRounding ? 0.0 : angles[k]; };
-  return fmt::format("roll pitch yaw {:.6g} {:.6g} {:.6g}", show(0), show(1), show(2));
-}
+std::string ShowAngles(const Matrix3d& R) { return "roll pitch yaw " + ShowVector(SolveRollPitchYaw(R)[0]); }
 
 LinkUndo TakeRotation(const Matrix3d& R) {
   return [R](PrintedLink* link) { link->origin.SetRotation(R); };
@@ -114,9 +109,12 @@ void CandidateSearch::SearchRotationNumbers(const Origin& origin) {
   const auto offer = [&](CorrectionKind kind, double bits, std::string values) {
     Try(origin.Make(kind, SiteKind::kRotation, bits, std::move(values)), origin.link, TakeRotation(right));
   };
-  if (CalcAngle(right) <= origin.open_angle)
-    offer(CorrectionKind::kSurplus, TurnsQuarters(given) ? 5.0 : 15.0, "");
-  if (given.isIdentity(1e-12)) {
+  // A row has its own candidates, but for a turn of what stands before it.
+  const bool is_row =
+      origin.given.form == RotationForm::kMdh && origin.given.X_before.linear().isIdentity(1e-12);
+  if (!is_row && CalcAngle(right) <= origin.open_angle)
+    offer(CorrectionKind::kSurplus, TurnsQuarters(given) ? 5.0 : 8.0, "");
+  if (!is_row && given.isIdentity(1e-12)) {
     const Vector3d none = Vector3d::Zero(), angles = SolveRollPitchYaw(right)[0];
     const Vector3d open = Vector3d::Constant(half);
     const double bits = 4.0 + 0.35 * CountEntries(3, none.data(), angles.data(), open.data());
@@ -132,6 +130,7 @@ void CandidateSearch::SearchRotationNumbers(const Origin& origin) {
             1.0 + 2.0 * *left + (CalcAngle(right) <= half ? CountBits(0.0, half) : CountAngle(angle, half)),
             fmt::format("off by {:.6g} deg", RadToDeg(turn.dot(axis))));
   }
+  if (is_row) return;
   bool is_one_angle = false;
   if (origin.given.form == RotationForm::kRollPitchYaw) {
     const Vector3d r = origin.given.r.head<3>();
@@ -171,8 +170,7 @@ void CandidateSearch::SearchRotationNumbers(const Origin& origin) {
   const Vector3d way = turn / angle;
   constexpr double kThreeAngles = 33.0;
   offer(CorrectionKind::kNumber, kThreeAngles,
-        fmt::format("turned by {:.6g} deg about ({:.4g} {:.4g} {:.4g}) of its own", -RadToDeg(angle), way[0],
-                    way[1], way[2]));
+        fmt::format("turned by {:.6g} deg about ({}) of its own", -RadToDeg(angle), ShowVector(way)));
 }
 
 void CandidateSearch::SearchPositionNumbers(const Origin& origin) {
@@ -192,8 +190,7 @@ void CandidateSearch::SearchPositionNumbers(const Origin& origin) {
 void CandidateSearch::SearchPoseNumbers(const Origin& origin) {
   const Vector3d t = origin.right.translation();
   const Matrix3d R = origin.right.linear();
-  const std::string values =
-      fmt::format("xyz {:.6g} {:.6g} {:.6g}, {} would be right", t[0], t[1], t[2], ShowAngles(R));
+  const std::string values = fmt::format("xyz {}, {} would be right", ShowVector(t), ShowAngles(R));
   const auto offer = [&](CorrectionKind kind, double bits) {
     Try(origin.Make(kind, SiteKind::kPosition, bits, values, true), origin.link, [=](PrintedLink* link) {
       link->origin.SetRotation(R);

@@ -65,7 +65,7 @@ class PrintedPair {
   /// right.
   [[nodiscard]] double CompareNode(SiteKind kind, int link, const Pose& X, const PoseTolerance& pose,
                                    const BodyNumbers& body, const BodyNumbers& tolerance) const;
-  /// The same of the numbers as they were measured.
+  /// Compares the numbers as they were measured.
   [[nodiscard]] double CompareNode(SiteKind kind, int link) const;
   /// Measures the first file's numbers again. @pre links were changed.
   void Measure();

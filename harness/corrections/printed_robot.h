@@ -101,7 +101,10 @@ struct PrintedLink {
   PrintedJoint joint;    ///< That moves it.
   std::optional<PrintedInertial> inertial;
   std::optional<CompiledInertial> compiled;
-  bool is_frame = false;  ///< It is no link, but a frame on its parent.
+  /// Its row read by the modified convention, if the file says that its rows are classic ones.
+  std::optional<PrintedOrigin> as_modified;
+  bool is_frame = false;        ///< It is no link, but a frame on its parent.
+  bool is_from_shapes = false;  ///< The file states no inertial: the engine computed it from the shapes.
 };
 
 /// How a constraint begins that is a servo in the place of a motor, as the motors of many MJCFs are.

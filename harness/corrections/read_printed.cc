@@ -104,6 +104,7 @@ PrintedOrigin PrintPose(const Pose& X) {
   origin.form = RotationForm::kRollPitchYaw;
   origin.t = X.translation();
   origin.half_t = FindHalves<3>(origin.t);
+  if (X.linear().isIdentity(0.0)) return origin;
   for (const Vector3d& angles : SolveRollPitchYaw(X.linear())) {
     const Vector3d rpy = angles.unaryExpr([](double angle) { return std::remainder(angle, 2.0 * kPi); });
     const Vector3d halves = FindHalves<3>(rpy);
@@ -251,6 +252,12 @@ PrintedRobot PrintDescription(const RobotDescription& description) {
     link.joint = PrintJoint(joint, stated, spec.joints);
     link.origin = PrintRow(joint, stated, X_jP);
     if (link.origin.form == RotationForm::kMdh && !stated.X_iL.isApprox(Pose::Identity())) {
+      PrintedOrigin& modified = link.as_modified.emplace(link.origin);
+      const Matrix3d R = stated.X_iL.linear();
+      modified.r[0] = std::atan2(R(2, 1), R(2, 2));
+      modified.t.x() = stated.X_iL.translation().x();
+      modified.half_r[0] = PrintAngle(modified.r[0]).half;
+      modified.half_t = FindHalves<3>(modified.t);
       const Pose X = link.origin.CalcPose() * stated.X_iL;
       link.origin.t = X.translation();
       link.origin.form = RotationForm::kQuaternion;

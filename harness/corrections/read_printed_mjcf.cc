@@ -205,6 +205,7 @@ class PrintedMjcfReader {
     if (is_stated && compiled.setting.empty()) return;
     link->inertial.reset();
     if (mass > 0.0) link->inertial = ReadMade(id);
+    link->is_from_shapes = element == nullptr && mass > 0.0;
   }
 
   [[nodiscard]] PrintedJoint ReadJoint(const MjcfElement& element, const std::string& around, int id) const {

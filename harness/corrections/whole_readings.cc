@@ -62,6 +62,18 @@ PrintedRobot ReadClassic(const PrintedRobot& robot) {
   return read;
 }
 
+/// In a modified row alpha and a stand before the joint, which turns about the link's own z axis.
+PrintedRobot ReadModified(PrintedRobot robot) {
+  for (PrintedLink& link : robot.links) {
+    if (!link.as_modified) continue;
+    link.origin = *link.as_modified;
+    link.as_modified.reset();
+    link.joint.axis = Vector3d::UnitZ();
+    link.joint.anchor.setZero();
+  }
+  return robot;
+}
+
 }  // namespace
 
 std::vector<WholeReading> ListWholeReadings(const PrintedRobot& robot) {
@@ -81,6 +93,8 @@ std::vector<WholeReading> ListWholeReadings(const PrintedRobot& robot) {
     readings.push_back({{CorrectionKind::kShiftedRows, SiteKind::kPosition, 0}, TakeTwists(robot, behind)});
     readings.push_back({{CorrectionKind::kShiftedRows, SiteKind::kPosition, 1}, TakeTwists(robot, before)});
   }
+  if (std::ranges::any_of(robot.links, [](const PrintedLink& link) { return link.as_modified.has_value(); }))
+    readings.push_back({{CorrectionKind::kClassicRows, SiteKind::kPosition, 1}, ReadModified(robot)});
   std::vector<int> bodies;
   for (int i = 0; i < robot.size(); ++i) {
     if (robot.link(i).inertial && robot.link(i).parent >= 0) bodies.push_back(i);

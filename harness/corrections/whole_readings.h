@@ -13,8 +13,8 @@ struct WholeReading {
   PrintedRobot robot;  ///< The file with this fault undone.
 };
 
-/// Rows of Denavit-Hartenberg parameters that are classic ones, or have alpha and a of their neighbours, and
-/// bodies that are shifted by one in their list.
+/// Lists rows of Denavit-Hartenberg parameters read by the other convention, or with alpha and a of their
+/// neighbours, and bodies that are shifted by one in their list.
 std::vector<WholeReading> ListWholeReadings(const PrintedRobot& robot);
 
 }  // namespace dexcheck

@@ -20,24 +20,34 @@ namespace {
 
 using XmlElement = tinyxml2::XMLElement;
 
-/// Corrects the first cause, and looks again.
-PrintedRobot RepairRobot(PrintedRobot robot, const PrintedRobot& reference) {
+/// Corrects the first cause, and looks again. @param agrees set to whether nothing is left.
+/// @param changes set to whether anything was corrected.
+PrintedRobot RepairRobot(PrintedRobot robot, const PrintedRobot& reference, bool* agrees, bool* changes) {
+  *agrees = *changes = false;
   for (int round = 0; round < 2 * robot.size(); ++round) {
     const FileCorrections found = FindCorrections(robot, reference);
+    *agrees = found.agrees;
     if (found.of_second) break;
-    const auto item =
-        std::ranges::find_if(found.items, [](const CorrectionItem& one) { return !one.patches.empty(); });
+    const auto is_reading = [](const CorrectionItem& one) {
+      return one.fault.kind >= CorrectionKind::kClassicRows;
+    };
+    const auto has_patch = [](const CorrectionItem& one) { return !one.patches.empty(); };
+    // The patches beside another reading of the file are of the robot that was so read.
+    if (std::ranges::any_of(found.items, is_reading)) break;
+    const auto item = std::ranges::find_if(found.items, has_patch);
     if (item == found.items.end()) break;
+    *changes = true;
     for (const LinkPatch& patch : item->patches) robot.link(patch.link) = patch.right;
   }
   return robot;
 }
 
-/// Twelve digits, which hide the rounding of what was computed.
-std::string Format(double value) {
+/// Prints twelve digits, which hide the rounding of what was computed.
+/// @param size the largest number of its vector.
+std::string Format(double value, double size = 0.0) {
   constexpr int kDigits = 12;
-  constexpr double kRounding = 1e-15;
-  return FormatNumber(std::abs(value) < kRounding ? 0.0 : value, kDigits);
+  constexpr double kRounding = 1e-12;
+  return FormatNumber(std::abs(value) < kRounding * std::max(size, 1e-3) ? 0.0 : value, kDigits);
 }
 
 bool IsTurned(const PrintedOrigin& x, const PrintedOrigin& y) {
@@ -105,7 +115,8 @@ class RepairWriter {
   template <typename Vector>
   [[nodiscard]] std::string JoinVector(const Vector& values) const {
     std::string text;
-    for (const double value : values) text += (text.empty() ? "" : keys_.between) + Format(value);
+    const double size = values.cwiseAbs().maxCoeff();
+    for (const double value : values) text += (text.empty() ? "" : keys_.between) + Format(value, size);
     return fmt::format(fmt::runtime(keys_.list), text);
   }
 
@@ -243,6 +254,7 @@ class MjcfRepair final : private RepairWriter {
     for (XmlElement* world : ListChildren(mjcf_.root(), "worldbody")) {
       for (XmlElement* body : ListChildren(world, "body")) WriteBody(body);
     }
+    for (XmlElement* world : ListChildren(mjcf_.root(), "worldbody")) WriteFrames(world);
     if (after_.gravity && after_.gravity != before_.gravity)
       SetAttribute(mjcf_.root(), "option/gravity", JoinVector(*after_.gravity));
     return mjcf_.PrintFor(folder);
@@ -273,16 +285,31 @@ class MjcfRepair final : private RepairWriter {
       const bool has_reference = joint != nullptr && joint->Attribute("ref") != nullptr;
       RefuseIf((joint != joints[0] || has_reference) && IsOther(before.origin, after.origin), before,
                "the place of its body");
-      if (before.origin.t != after.origin.t) SetAttribute(body, "pos", JoinVector(after.origin.t));
-      if (IsTurned(before.origin, after.origin)) {
-        DropRotation(body);
-        SetAttribute(body, "quat", JoinVector(ToQuaternion(after.origin.CalcRotation())));
-      }
+      WriteOrigin(before.origin, after.origin, body);
       element_ = joint;
       if (joint != nullptr) WriteJoint(link_);
       if (IsOther(before.inertial, after.inertial)) WriteInertial(after, body);
     }
     for (XmlElement* child : ListChildren(body, "body")) WriteBody(child);
+  }
+
+  /// Writes the sites of a body and of all bodies on it.
+  void WriteFrames(XmlElement* body) {
+    for (XmlElement* site : ListChildren(body, "site")) {
+      const std::string name = ReadAttribute(*site, "name");
+      const auto is_it = [&](const PrintedLink& link) { return link.is_frame && link.name == name; };
+      const auto frame = std::ranges::find_if(before_.links, is_it);
+      if (frame != before_.links.end())
+        WriteOrigin(frame->origin, after_.link(static_cast<int>(frame - before_.links.begin())).origin, site);
+    }
+    for (XmlElement* child : ListChildren(body, "body")) WriteFrames(child);
+  }
+
+  void WriteOrigin(const PrintedOrigin& before, const PrintedOrigin& after, XmlElement* element) const {
+    if (before.t != after.t) SetAttribute(element, "pos", JoinVector(after.t));
+    if (!IsTurned(before, after)) return;
+    DropRotation(element);
+    SetAttribute(element, "quat", JoinVector(ToQuaternion(after.CalcRotation())));
   }
 
   static void DropRotation(XmlElement* element) {
@@ -317,7 +344,9 @@ class TableRepair final : private RepairWriter {
     for (int i = 1; i < before_.size(); ++i) {
       const PrintedLink& before = before_.link(i);
       const PrintedLink& after = after_.link(i);
-      if (IsOther(before.origin, after.origin)) WriteRow(before, after.origin);
+      if (IsOther(before.origin, after.origin)) {
+        before.is_frame ? WriteFrame(before, after.origin) : WriteRow(before, after.origin);
+      }
       if (IsOther(before.inertial, after.inertial)) WriteBody(before, after);
       WriteJoint(i);
     }
@@ -353,7 +382,7 @@ class TableRepair final : private RepairWriter {
         return {entry, begin + own, states};
       }
     }
-    Refuse(fmt::format("{} is not among the {} of a chain of its own", name, key));
+    Refuse(fmt::format("{} is not among the {} of its chain", name, key));
   }
 
   void Set(const Entry& entry, const char* key, const std::string& value) {
@@ -385,9 +414,36 @@ class TableRepair final : private RepairWriter {
       Set(row, "d", Format(origin.t[2]));
       return;
     }
-    Remove(row, "rpy_deg");
-    Set(row, "xyz", JoinVector(origin.t));
-    Set(row, "rpy", JoinVector(Vector3d(origin.r.head<3>())));
+    SetPose(row, link.origin, origin);
+  }
+
+  /// Writes an entry of the file's "frame", or of a chain's "frames".
+  void WriteFrame(const PrintedLink& frame, const PrintedOrigin& origin) {
+    const auto set = [&](const toml::array* entries, const std::string& begin, const std::string& prefix) {
+      for (size_t k = 0; entries != nullptr && k < entries->size(); ++k) {
+        const toml::table& entry = *entries->get(k)->as_table();
+        if (prefix + entry["name"].value_or(std::string()) != frame.name) continue;
+        SetPose({&entry, begin + std::to_string(k), false}, frame.origin, origin);
+        return true;
+      }
+      return false;
+    };
+    if (set(root_["frame"].as_array(), "frame.", "")) return;
+    const toml::array* const chains = root_["chain"].as_array();
+    for (size_t i = 0; chains != nullptr && i < chains->size(); ++i) {
+      const toml::table& chain = *chains->get(i)->as_table();
+      if (set(chain["frames"].as_array(), fmt::format("chain.{}.frames.", i),
+              chain["prefix"].value_or(std::string())))
+        return;
+    }
+    Refuse("frame " + frame.name + " must be written by hand");
+  }
+
+  void SetPose(const Entry& entry, const PrintedOrigin& before, const PrintedOrigin& origin) {
+    if (before.t != origin.t) Set(entry, "xyz", JoinVector(origin.t));
+    if (!IsTurned(before, origin)) return;
+    Remove(entry, "rpy_deg");
+    Set(entry, "rpy", JoinVector(Vector3d(origin.r.head<3>())));
   }
 
   /// Gives a pose the form of a row of modified parameters behind X_before, if it has one.
@@ -420,12 +476,19 @@ class TableRepair final : private RepairWriter {
 
 }  // namespace
 
-std::string WriteRepaired(const DescriptionFile& file, const UrdfOptions& urdf, const PrintedRobot& printed,
-                          const PrintedRobot& reference, const std::filesystem::path& folder) {
-  const PrintedRobot after = RepairRobot(printed, reference);
-  if (file.format() == RobotFormat::kToml) return TableRepair(file, printed, after).Write();
-  if (file.format() != RobotFormat::kBodies) return WriteXml(file, urdf, printed, after, folder);
-  throw InputError(file.path().string() + ": cannot be repaired: it is a table of bodies");
+RepairedFile WriteRepaired(const DescriptionFile& file, const UrdfOptions& urdf, const PrintedRobot& printed,
+                           const PrintedRobot& reference, const std::filesystem::path& folder) {
+  if (file.format() == RobotFormat::kBodies)
+    throw InputError(file.path().string() + ": cannot be repaired: it is a table of bodies");
+  RepairedFile repaired;
+  bool changes = false;
+  const PrintedRobot after = RepairRobot(printed, reference, &repaired.agrees, &changes);
+  if (!changes)
+    throw InputError(file.path().filename().string() +
+                     ": cannot be repaired: its causes must be corrected by hand");
+  repaired.text = file.format() == RobotFormat::kToml ? TableRepair(file, printed, after).Write()
+                                                      : WriteXml(file, urdf, printed, after, folder);
+  return repaired;
 }
 
 std::string WriteXml(const DescriptionFile& file, const UrdfOptions& urdf, const PrintedRobot& before,

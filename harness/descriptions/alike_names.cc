@@ -173,7 +173,7 @@ class StructureMatch {
   [[nodiscard]] double CompareNumbers(size_t i, size_t j) const {
     const Joint& x = a_.spec->joints[i];
     const Joint& y = b_.spec->joints[j];
-    // Where a joint's frame is along its axis is each file's own choice.
+    // Each file chooses freely where a joint's frame is along its axis.
     const Vector3d apart = a_.poses[i + 1].translation() - b_.poses[j + 1].translation();
     double cost = 0.5 * (a_.axes[i] - b_.axes[j]).norm() +
                   apart.cross(a_.axes[i]).norm() / std::max(a_.length, b_.length) +

@@ -170,7 +170,7 @@ void AnalyticProvider::ReadAccelerations(Eigen::Ref<MatrixXd> out) const {
       V += J->col(col) * xi_[col];
       A += J_dot->col(col) * xi_[col];
     }
-    // Of the axes' own turn: R^T d/dt (R v) = v_dot + omega x v; omega x omega = 0.
+    // The axes turn, too: R^T d/dt (R v) = v_dot + omega x v; omega x omega = 0.
     A.head<3>() += V.tail<3>().cross(V.head<3>());
     out.col(static_cast<Eigen::Index>(i)) = A;
   }

@@ -1,6 +1,6 @@
 #pragma once
 
-// What a check sees of the analytic model. Checks of checks put a view with a fault in its place.
+// A view of the analytic model, as checks see it. Checks of checks put a view with a fault in its place.
 
 #include <functional>
 #include <memory>
@@ -70,11 +70,12 @@ struct ObjectFormulas {
   std::function<Pose(const Vector6d&)> pose = CalcObjectPose;
 };
 
-/// Where entries of one model are in another: joints and frames are matched by name.
+/// Maps entries of one model to those of another: joints and frames are matched by name.
 struct CoordinateMap {
   /// The model's own. @param frames whose Jacobians are compared.
   CoordinateMap(const RobotModel& model, std::vector<int> frames);
-  /// Of `model`, for each entry of `coordinates`. @throws InputError when a joint has no counterpart.
+  /// Finds the entry of `model` for each of `coordinates`. @throws InputError when a joint has no
+  /// counterpart.
   CoordinateMap(const RobotModel& model, const RobotModel& coordinates);
 
   bool is_identity = true;

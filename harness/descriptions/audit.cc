@@ -147,7 +147,7 @@ class JointAudit {
         .minCoeff();
   }
 
-  /// What each joint moves, in the end.
+  /// Audits the mass that each joint moves.
   void AuditLoads() {
     const size_t count = spec_.joints.size();
     std::vector<double> mass(count, 0.0);

@@ -1,4 +1,4 @@
-// Bodies: can they be, do they fit their geometry, are left and right alike?
+// Bodies: are they possible, do they fit their geometry, are left and right equal?
 
 #include <fmt/format.h>
 
@@ -22,8 +22,8 @@ namespace {
 std::string Format(double value) { return fmt::format("{:.4g}", value); }
 std::string Format(const Vector3d& v) { return fmt::format("[{:.4g}, {:.4g}, {:.4g}]", v[0], v[1], v[2]); }
 
-/// Of [S, m c; m c^T, m] with S = tr(I_o) / 2 - I_o about the link's origin: positive for every body that
-/// fills a volume.
+/// Least eigenvalue of [S, m c; m c^T, m] with S = tr(I_o) / 2 - I_o about the link's origin: positive for
+/// every body that fills a volume.
 double CalcLeastPseudoInertia(const MassProperties& body) {
   const Matrix3d second = 0.5 * body.inertia.trace() * Matrix3d::Identity() - body.inertia +
                           body.mass * body.com * body.com.transpose();

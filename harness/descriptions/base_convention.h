@@ -32,8 +32,8 @@ std::string Describe(const BaseConvention& convention);
 /// All that there are; the default first.
 std::vector<BaseConvention> ListBaseConventions();
 
-/// Of a floating base with joints behind it, the state and terms in another convention. The base's entries
-/// come first: 7 of q', 6 of xi.
+/// Converts state and terms of a floating base with joints behind it to another convention. The base's
+/// entries come first: 7 of q', 6 of xi.
 class BaseConversion {
  public:
   explicit BaseConversion(const BaseConvention& convention) : convention_(convention) {}

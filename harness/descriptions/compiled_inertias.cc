@@ -208,7 +208,7 @@ std::optional<std::string> TakeCompiledInertias(const MjcfFile& mjcf, const mjMo
     const bool is_base = place.a < 0;
     Joint* const joint = is_base ? nullptr : &robot->spec.joints[static_cast<size_t>(place.a)];
     MassProperties& own = is_base ? robot->spec.base.body : joint->body;
-    // What the compiler changed, along the axes of the description's frame.
+    // The compiler's change, along the axes of the description's frame.
     Matrix3d change = Matrix3d::Zero();
     for (const DescribedPart& part : compiled.parts) {
       const auto body = static_cast<size_t>(FindByName(engine, mjOBJ_BODY, part.name));

@@ -1,6 +1,6 @@
 #pragma once
 
-// What MuJoCo's compiler makes of the inertias that an MJCF states as fullinertia.
+// Inertias that an MJCF states as fullinertia, as MuJoCo's compiler changes them.
 
 #include <mujoco/mujoco.h>
 

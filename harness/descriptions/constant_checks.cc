@@ -229,7 +229,7 @@ void JudgeByTolerance(double tolerance, std::vector<CheckRecord>* records) {
   for (CheckRecord& record : *records) {
     record.bound = std::max(record.bound, tolerance);
     record.failed = !(record.worst <= record.bound);
-    // Where the narrower bound was left first says nothing now.
+    // The place that first exceeded the narrower bound means nothing now.
     if (record.failed) record.first_failure = record.where;
   }
 }

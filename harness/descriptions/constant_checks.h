@@ -1,7 +1,7 @@
 #pragma once
 
-// What can be compared without motion, before anything else: masses, joints, wheels, fingertips, object,
-// options.
+// Constants that are compared without motion, before anything else: masses, joints, wheels, fingertips,
+// object, options.
 
 #include <algorithm>
 #include <limits>
@@ -89,7 +89,7 @@ std::vector<std::string> CheckCouplings(const Adapter& adapter, bool ignores, Co
 
 /// Judges checks by a relative tolerance where that is wider than their bound.
 void JudgeByTolerance(double tolerance, std::vector<CheckRecord>* records);
-/// The same of a result, whose findings are then those that the tolerance leaves.
+/// Judges a result by a tolerance; its findings are then those that exceed it.
 void JudgeByTolerance(double tolerance, ConstantChecks* constants);
 
 // Numbers of a model against another description's or the engine's, one check after the other.

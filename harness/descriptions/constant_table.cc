@@ -37,7 +37,7 @@ bool HasForceLimit(const mjModel& m, int motor) { return m.actuator_forcelimited
 
 constexpr unsigned kAllJoints = kRobotJoint | kWheelJoint | kFreeJoint;
 
-// What is compared of two models alone has no neutral value.
+// A constant that is compared between two models alone has no neutral value.
 constexpr Constant kConstants[] = {
     {"joint_damping", P::kJoint, "damping", &mjModel::dof_damping, Index::kDof, 1, 0.0, kFreeJoint},
     {"joint_armature", P::kJoint, "armature", &mjModel::dof_armature, Index::kDof, 1, 0.0, kFreeJoint},
@@ -165,7 +165,7 @@ int FindCouplingConstraint(const mjModel& engine, int joint) {
 
 std::optional<JointCoupling> FindEngineCoupling(const mjModel& engine, int joint) {
   JointCoupling found{joint, 1.0, 0.0};
-  // Of joints that follow one another in a circle, none is the leader.
+  // Joints that follow one another in a circle have no leader.
   for (int count = 0; count <= engine.neq; ++count) {
     const int eq = FindCouplingConstraint(engine, found.leader);
     if (eq < 0) return count > 0 ? std::optional(found) : std::nullopt;

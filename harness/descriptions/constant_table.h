@@ -21,7 +21,7 @@ namespace dexcheck {
 /// A part of an engine's model.
 enum class EnginePart { kJoint, kActuator, kTendon, kConstraint };
 
-/// What a joint carries.
+/// Roles of a joint, by the part that it carries.
 enum JointRole : unsigned {
   kRobotJoint = 1,
   kWheelJoint = 2,
@@ -35,7 +35,7 @@ struct DescribedConstant {
   bool DescribedJoint::*states;
   double Joint::*value;
   mjtNum* mjModel::*engine;  ///< By dof.
-  /// What it does at most, where least inertia is moved: ": rates of elbow decay within 0.1 s".
+  /// Describes its largest effect, where least inertia is moved: ": rates of elbow decay within 0.1 s".
   std::string (*describe_effect)(const Joint& joint, double value, double least_inertia);
 };
 
@@ -64,7 +64,7 @@ void MakeNeutral(const Constant& constant, int part, mjModel* engine);
 /// Gives a part the neutral value of all its constants, of joints of those that belong to the role.
 void MakeIdle(EnginePart kind, int part, unsigned role, mjModel* engine);
 
-/// What an actuator has of what a plain torque on its joint has, which is the control.
+/// A property of an actuator that a plain torque on its joint, which equals the control, has not.
 struct MotorProperty {
   const char* check;
   double plain;

@@ -20,7 +20,7 @@ namespace {
 
 std::string FileName(const RobotSpec& spec) { return std::filesystem::path(spec.source).filename().string(); }
 
-/// What each of the two takes from the other.
+/// Lets each of the two take from the other what it does not state.
 class Matching {
  public:
   Matching(RobotDescription* a, RobotDescription* b, const std::vector<std::string>& ignore)

@@ -18,13 +18,13 @@ std::vector<int> MatchJoints(const RobotSpec& a, const RobotSpec& b);
 /// Whether a word of kIgnorable is among them.
 bool Ignores(const std::string& word, const std::vector<std::string>& ignore);
 
-/// What one of two descriptions took from the other.
+/// Constants that one of two descriptions took from the other.
 struct Completion {
   std::vector<std::string> notes;         ///< One line each: what was done.
   std::vector<std::string> not_compared;  ///< One line each: what only one of them states, or is ignored.
   std::vector<std::string>
       unstated;  ///< Names of the checks of constants that one of them states nothing of.
-  /// What only one of them states and what acts on the motion, where the other one has none: a disagreement.
+  /// Disagreements: constants that act on the motion and that only one of them states.
   /// `model` is the number of `a`, `engine` that of `b`; `location` is the joint of `a`.
   std::vector<ConstantFinding> one_sided;
 };
@@ -43,7 +43,7 @@ void LeaveOutIgnored(const std::vector<std::string>& ignore, RobotDescription* r
 Completion CompleteEachOther(RobotDescription* a, RobotDescription* b,
                              const std::vector<std::string>& ignore = {});
 
-/// The same of a description and an engine's model, whose names it takes; `a` is the description.
+/// Completes a description by an engine's model, whose names it takes; `a` is the description.
 /// @param is_table a parameter file states all: only what is ignored is taken over.
 Completion CompleteFromEngine(const mjModel& engine, const std::string& source, RobotDescription* robot,
                               const std::vector<std::string>& ignore = {}, bool is_table = false);

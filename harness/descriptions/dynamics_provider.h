@@ -19,7 +19,7 @@ enum class Term {
   kLinkInertia,      ///< 9 x links, about the centre of mass in world axes.
   kFramePose,        ///< 12 x frames of the model: rotation, origin, world.
   kJ,                ///< 6 x n of each frame compared, side by side: body Jacobian in the frame's own axes.
-  kJDotXi,           ///< 6 x frames compared: acceleration of the origin at constant xi, likewise.
+  kJDotXi,           ///< 6 x frames compared: acceleration of the origin at constant xi, in its own axes.
   kM,                ///< In unreduced coordinates.
   kMBar,             ///< n x n
   kCBarXi,           ///< n
@@ -69,11 +69,12 @@ class DynamicsProvider {
   DynamicsProvider(const DynamicsProvider&) = delete;
   DynamicsProvider& operator=(const DynamicsProvider&) = delete;
 
-  /// What it is called in a report.
+  /// Its name in a report.
   [[nodiscard]] virtual const std::string& name() const = 0;
   /// Evaluates what the terms are made of.
   virtual void SetState(const DynamicsState& state) = 0;
-  /// Whether it has this term at the state set. What one of two providers lacks is not compared.
+  /// Returns whether it has this term at the state set. A term that one of two providers lacks is not
+  /// compared.
   [[nodiscard]] virtual bool Has(Term term) const = 0;
   /// Writes a term that it has, in the order of Term, at the state set. `out` has the term's shape, and at
   /// first zeros: entries that are always zero need not be written.

@@ -44,8 +44,8 @@ struct Part {
   }
 };
 
-/// What the table has of a part; of joints those constants that belong to the role and stand in no
-/// description.
+/// Reads the constants that the table has for a part; for joints those that belong to the role and stand in
+/// no description.
 Part ReadPart(const mjModel& m, EnginePart kind, int id, unsigned role) {
   Part part;
   for (const Constant& constant : ListConstants()) {
@@ -227,7 +227,7 @@ class ExtrasComparison {
     return lines;
   }
 
-  /// Motors that one has and the other lacks: of those that are no plain torques the constant checks tell.
+  /// Motors that one has and the other lacks. Those that are no plain torques are in the constant checks.
   [[nodiscard]] std::vector<std::string> ListLoneMotors(const std::string& file_a,
                                                         const std::string& file_b) const {
     std::vector<std::string> lines;

@@ -1,6 +1,6 @@
 #pragma once
 
-// What an MJCF has besides the mechanism that a description states: motors, springs, tendons,
+// Parts of an MJCF besides the mechanism that a description states: motors, springs, tendons,
 // constraints, flags, a fluid, and whatever acts on the joint that carries a floating base.
 
 #include <mujoco/mujoco.h>
@@ -21,7 +21,7 @@ namespace dexcheck {
 /// @return a line for the report; none when there are no such motors.
 std::optional<std::string> SetAsideMotors(const std::string& source, mjModel* engine);
 
-/// What two MJCFs have besides the mechanism, compared with each other.
+/// The parts of two MJCFs besides the mechanism, compared with each other.
 struct Extras {
   ConstantChecks differences;               ///< Parts of one name that both have, whose numbers differ.
   ConstantChecks of_first;                  ///< Findings of the first one's constant checks besides them.

@@ -103,7 +103,7 @@ class EngineOnly {
     for (const double number : ReadConstant(constant, engine_, joint)) {
       const auto said = static_cast<std::ptrdiff_t>(findings.size());
       Expect(constant.check, where, *constant.neutral, number, 0.0, at);
-      // What the six coordinates of a free joint have in common is said once.
+      // A constant that all six coordinates of a free joint share is said once.
       if (carries_base &&
           std::any_of(findings.begin(), findings.begin() + said, [&](const ConstantFinding& other) {
             return other.check == constant.check && other.where == where && other.engine == number;
@@ -138,7 +138,7 @@ class EngineOnly {
     }
   }
 
-  /// What later releases of the engine add to the mechanism's forces and inertias.
+  /// Finds forces and inertias that later releases of the engine add to the mechanism.
   void FindNewerForces() {
     for (const NewerForce& force : kNewerForces) {
       const mjtNum* const values = engine_.*force.values;
@@ -184,7 +184,7 @@ class EngineOnly {
     });
   }
 
-  /// What a floating robot may stand on: shapes on whose body the model has a frame.
+  /// Returns whether a floating robot may stand on a shape: the model has a frame on its body.
   [[nodiscard]] bool IsFoot(int geom) const {
     const std::vector<int>& sites = adapter_.frame_sites();
     return adapter_.model().base().type == BaseType::kFloating && std::ranges::any_of(sites, [&](int site) {

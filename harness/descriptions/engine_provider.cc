@@ -135,7 +135,7 @@ void EngineProvider::Read(Term term, Eigen::Ref<MatrixXd> out) {
       return;
     case Term::kLinkCom:
     case Term::kLinkInertia:
-      // Of a fixed base, which is the first, there is nothing to compare.
+      // A fixed base, which is the first, has nothing to compare.
       for (Eigen::Index i = 1; i <= out.cols(); ++i) {
         const LinkInWorld& link = links_[links_.size() - static_cast<size_t>(i)];
         if (term == Term::kLinkCom) {
@@ -215,7 +215,7 @@ ObjectRates CalcObjectRates(const Vector6d& X_o, const Vector6d& X_o_dot) {
   rates.P_inv.bottomRightCorner<3, 3>() = W;
   const Vector3d v = R.transpose() * X_o_dot.head<3>();
   rates.bias << -omega.cross(v), omega_dot;
-  // Of pose and velocity rounding is taken out of the quaternion first.
+  // Rounding is taken out of the quaternion first.
   mju_normalize4(rotation);
   mju_quat2Mat(R.data(), rotation);
   rates.X_Bo.linear() = R;

@@ -38,14 +38,14 @@ class EngineProvider : public MechanismProvider {
   EngineProvider(const Adapter& adapter, std::string name);
   /// With an engine's model of its own. @throws InputError as Adapter does.
   EngineProvider(const RobotSpec& robot, MjModelPtr engine, const std::string& source, std::string name);
-  /// Of a run: a grasp with its contacts, or with no fingertips a robot that holds nothing, all frames.
+  /// Evaluates terms of a run: a grasp with its contacts, or without fingertips a robot that holds nothing.
   /// @param has_coordinates whether the object's state is known by X_o.
   /// @throws InputError as EngineTerms.
   EngineProvider(const Adapter& adapter, std::span<const int> fingertips, bool has_coordinates);
 
   /// The object's state in the engine is built by its own quaternion algebra.
   void SetState(const DynamicsState& state) override;
-  /// The same of a run. @param coordinates of the object; null when it is not known by them.
+  /// Sets the state of a run. @param coordinates of the object; null when it is not known by them.
   void SetState(const VectorXd& q, const VectorXd& xi, const Pose& X_Bo, const Vector6d& V_Bo,
                 const ObjectCoordinates* coordinates);
   [[nodiscard]] bool Has(Term term) const override;

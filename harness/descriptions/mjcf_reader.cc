@@ -40,7 +40,7 @@ class MjcfDescriptionReader {
   }
 
  private:
-  /// Where a body is: the joint that moves it (-1 the base) and its frame in that joint's frame i.
+  /// Place of a body: the joint that moves it (-1 the base) and its frame in that joint's frame i.
   struct Place {
     int joint = -1;
     Pose X_iL = Pose::Identity();
@@ -48,7 +48,7 @@ class MjcfDescriptionReader {
 
   [[nodiscard]] bool IsBase(int body) const { return engine_.body_weldid[body] == 0; }
 
-  /// Of a floating robot the bodies that it carries; otherwise all but those that float.
+  /// A floating robot has the bodies that it carries; another one has all but those that float.
   [[nodiscard]] bool IsOfRobot(int body) const {
     const int root = engine_.body_rootid[body];
     if (floating_ > 0) return root == floating_;

@@ -15,11 +15,11 @@ namespace dexcheck {
 /// joint, masses, couplings by equality/joint, named sites. A body's own frame is kept
 /// (DescribedJoint::X_iL); frame i stands at the joint's anchor. A body with several joints becomes as many
 /// links, of which the last carries the mass. What a table has no place for is noted.
-/// Of several trees, the robot is the one with the most joints (robot_tree.h).
+/// Reads the tree with the most joints as the robot (robot_tree.h).
 /// @throws InputError for free joints within it, and where nothing moves.
 RobotDescription ReadMjcfDescription(const mjModel& engine, const std::string& source);
 
-/// What one body of the engine's has, in its own frame.
+/// Mass properties of one of the engine's bodies, in its own frame.
 MassProperties ReadEngineBody(const mjModel& engine, int body);
 
 /// The text of an MJCF without what has no effect on the mechanism: looks, contacts, actuators.

@@ -25,7 +25,7 @@ struct FileNumber : PrintedNumber {
   bool is_of_body = false;
 };
 
-/// What is printed in the place of a number.
+/// Returns the text that is printed in the place of a number.
 using Replace = std::function<std::string(const FileNumber&, std::string_view text)>;
 
 /// Attributes of URDFs and MJCFs whose numbers describe the mechanism. Inertias of an MJCF are not among
@@ -163,7 +163,7 @@ class NumberedFile {
  protected:
   /// All numbers that describe the mechanism.
   virtual void Visit(const std::function<void(const FileNumber&)>& visit) const = 0;
-  /// As the file has it. @param undiagonalized PrintedSpread::undiagonalized.
+  /// Reads the numbers of the file. @param undiagonalized PrintedSpread::undiagonalized.
   virtual RobotDescription ReadNominal(std::optional<RobotDescription>* undiagonalized) const = 0;
   /// With its numbers moved; none where that is no robot.
   [[nodiscard]] virtual std::optional<RobotDescription> ReadMoved(Mover mover) const = 0;

@@ -1,6 +1,6 @@
 #pragma once
 
-// What the numbers printed in a file leave open: each is known to half a unit of its last digit.
+// The precision of numbers printed in a file: each is known to half a unit of its last digit.
 
 #include <array>
 #include <optional>

@@ -20,7 +20,7 @@ using Clock = std::chrono::steady_clock;
 
 // A mass matrix of a thousand joints is 20 MB of text.
 constexpr size_t kLongestResult = size_t{1} << 26;
-// Of standard error: enough for the last line of a traceback.
+// Bytes of standard error that are kept: enough for the last line of a traceback.
 constexpr size_t kKeptMessages = 4096;
 
 void Close(int* descriptor) {

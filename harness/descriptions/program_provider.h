@@ -70,7 +70,7 @@ class ProgramProvider : public LayoutProvider {
   ProgramProvider(const std::string& command, const RobotDescription& robot,
                   const ProgramOptions& options = {});
 
-  /// As it calls itself, or its command.
+  /// The name that it gives itself, or its command.
   [[nodiscard]] const std::string& name() const override { return name_; }
   TermResults Evaluate(long sample, const VectorXd& q, const VectorXd& xi) override;
 

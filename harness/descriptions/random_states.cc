@@ -14,7 +14,7 @@ double StateSource::Draw(double low, double high) {
 }
 
 Eigen::Vector4d StateSource::DrawTurn(double widest) {
-  // A direction by its height and longitude, all alike.
+  // A uniformly distributed direction, by its height and longitude.
   const double z = Draw(-1.0, 1.0);
   const double longitude = Draw(-kPi, kPi);
   const double half = 0.5 * Draw(0.0, widest);
@@ -31,7 +31,7 @@ void StateSource::DrawPositions(VectorXd* q) {
   }
   if (model_->base().type == BaseType::kFloating) {
     for (int i = 0; i < 3; ++i) (*q)[i] = Draw(-range_.area, range_.area);
-    // Any rotation, all alike [Shoemake, Uniform random rotations, Graphics Gems III, 1992].
+    // A uniformly distributed rotation [Shoemake, Uniform random rotations, Graphics Gems III, 1992].
     const double u = Draw(0.0, 1.0);
     const double first = Draw(0.0, 2.0 * kPi);
     const double second = Draw(0.0, 2.0 * kPi);

@@ -9,7 +9,7 @@
 
 namespace dexcheck {
 
-/// Where random states lie.
+/// Bounds of random states.
 struct StateRange {
   double joint_speed = 5.0;   ///< Revolute joints, yaw, and each angular rate of the base, at most, rad/s.
   double linear_speed = 2.0;  ///< Base and prismatic joints, at most, m/s.

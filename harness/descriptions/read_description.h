@@ -37,9 +37,9 @@ RobotDescription PlaceBodies(const std::vector<TabledBody>& bodies, const std::s
 
 // Files that describe a robot, each opened once.
 
-/// What kind of description a text holds: XML whose root element is <robot> or <mujoco>, or else a parameter
-/// file, or a table of bodies when its name ends in .csv. XML without a root element has the format of the
-/// name's end, so that an empty .xml is no parameter file.
+/// Finds the kind of description that a text holds: XML whose root element is <robot> or <mujoco>, or else a
+/// parameter file, or a table of bodies when its name ends in .csv. XML without a root element has the format
+/// of the name's end, so that an empty .xml is no parameter file.
 /// @throws InputError "FILE: must be ..." for other XML.
 RobotFormat FindFormat(std::string_view text, const std::filesystem::path& path);
 
@@ -48,16 +48,16 @@ class DescriptionFile {
  public:
   /// @throws InputError for a file that cannot be read; also for a URDF or a parameter file that is none.
   explicit DescriptionFile(std::filesystem::path path, const UrdfOptions& options = {});
-  /// The same of a text that stands for the file's.
+  /// Reads a text that stands for the file's.
   DescriptionFile(std::filesystem::path path, std::string text, const UrdfOptions& options);
 
   [[nodiscard]] const std::filesystem::path& path() const { return path_; }
   [[nodiscard]] RobotFormat format() const { return format_; }
   [[nodiscard]] const std::string& text() const { return text_; }
-  /// What the file says. @throws InputError for an MJCF that can be no description (with several free
-  /// bodies).
+  /// Returns the robot that the file describes. @throws InputError for an MJCF that can be no description
+  /// (with several free bodies).
   [[nodiscard]] RobotDescription Describe() const;
-  /// The same; none of such an MJCF.
+  /// Returns the robot, or nothing for such an MJCF.
   [[nodiscard]] std::optional<RobotDescription> TryToDescribe() const;
   /// Puts the bodies on another file's robot. @pre the format is kBodies. @throws InputError as PlaceBodies.
   void PlaceOn(const RobotDescription& other);
@@ -77,13 +77,13 @@ class DescriptionFile {
   RobotFormat format_;
   std::optional<RobotDescription> description_;  // of a parameter file or URDF, or of bodies once placed
   std::vector<TabledBody> bodies_;               // of a table of bodies
-  std::optional<RobotDescription> carrier_;      // likewise
+  std::optional<RobotDescription> carrier_;      // of a table of bodies
   std::unique_ptr<MjcfFile> document_;           // of an MJCF
-  MjModelPtr engine_;                            // likewise
+  MjModelPtr engine_;                            // of an MJCF
   std::map<std::string, double> force_ranges_;   // FindForceRanges of an MJCF, which the engine may not know
 };
 
-/// What one file says. @throws InputError as DescriptionFile.
+/// Reads the robot of one file. @throws InputError as DescriptionFile.
 RobotDescription ReadDescription(const std::filesystem::path& path, const UrdfOptions& options = {});
 
 }  // namespace dexcheck

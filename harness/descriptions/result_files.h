@@ -24,7 +24,7 @@ StateTable DrawStates(const RobotDescription& robot, long count, const StateRang
 /// A line {"id":0,"q":[...],"v":[...]} for each state.
 std::string WriteStateLines(const StateTable& states);
 
-/// What layout.json says: the robot, and in which layout states are written and results are expected.
+/// Writes layout.json: the robot, and the layout in which states are written and results are expected.
 std::string WriteLayout(const RobotDescription& robot, const std::string& origin);
 
 /// Results in a folder beside the states they belong to: q.npy (N x num_positions) and v.npy (N x n) in the

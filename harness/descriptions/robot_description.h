@@ -1,6 +1,6 @@
 #pragma once
 
-// What a file says of a robot, beside what stands in its place where the file says nothing.
+// A robot as a file describes it, and which constants the file does not state.
 
 #include <map>
 #include <optional>
@@ -25,13 +25,9 @@ struct StatedForces {
   double upper = 0.0;
 };
 
-/// What a file says of a joint and its link, beside the specification: how its row is written, too.
+/// The row of a joint and its link as the file writes it, beside the specification.
 struct DescribedJoint : WrittenRow {
-  // Which constants the file states. What it does not state is zero in the specification, or a range of +-pi.
-  bool states_range = true;
-  bool states_damping = true;
-  bool states_dry_friction = true;
-  bool states_armature = true;
+  bool states_range = true;  ///< Whether the file states one. Otherwise it is +-pi in the specification.
 
   int line = 0;                        ///< Of the file; 0 when it is not known.
   std::optional<StatedForces> forces;  ///< Limits of the joint's motors; none where the file states none.
@@ -100,8 +96,8 @@ void LetBaseFloat(RobotDescription* robot);
 /// base's link becomes a frame. @return false when the base has no such frame.
 bool MoveBaseTo(const std::string& frame, RobotDescription* robot);
 
-/// What q' and xi of a floating base and of ball joints are, in this convention and in that of other
-/// libraries: notes.
+/// Returns notes on q' and xi of a floating base and of ball joints, in this convention and in those of other
+/// libraries.
 std::vector<std::string> DescribeCoordinates(const RobotDescription& robot);
 
 }  // namespace dexcheck

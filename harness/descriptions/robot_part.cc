@@ -18,7 +18,7 @@ int FindJoint(const RobotSpec& spec, const std::string& name, std::string Joint:
   return found == spec.joints.end() ? -1 : static_cast<int>(found - spec.joints.begin());
 }
 
-/// Of each joint, whether it is `root` or hangs on it.
+/// Returns for each joint whether it is `root` or hangs on it.
 std::vector<bool> ListSubtree(const RobotSpec& spec, int root) {
   std::vector<bool> is_in(spec.joints.size(), false);
   for (size_t i = 0; i < spec.joints.size(); ++i) {
@@ -87,7 +87,7 @@ bool LeaveOut(const std::string& link, RobotDescription* robot) {
   return true;
 }
 
-/// Where the other robot has the link of a base that floats here, in its world.
+/// Fixes a floating base where the other robot has its link, in its world.
 void FixBase(const RobotDescription& other, RobotDescription* robot) {
   Base& base = robot->spec.base;
   if (base.type != BaseType::kFloating) return;
@@ -144,7 +144,7 @@ std::vector<std::string> TakePart(const RobotPart& part, RobotDescription* a, Ro
                                   int* held) {
   const std::vector<std::string> of_b = ListJointNames(*b);
   std::vector<std::string> notes = TakeJointNames(*a, b);
-  // What one of the two calls a joint is as good as what the other calls it.
+  // Either file's name of a joint may be given.
   const auto translate = [&](const std::string& name) {
     const auto found = std::ranges::find(of_b, name);
     return found == of_b.end() ? name : b->spec.joints[static_cast<size_t>(found - of_b.begin())].name;

@@ -13,7 +13,7 @@
 
 namespace dexcheck {
 
-/// What of two robots is compared. Names are those of either file.
+/// The part of two robots that is compared. Names are those of either file.
 struct RobotPart {
   std::string only;  ///< Link or joint: what it does not move is held, and the base does not move.
   std::map<std::string, double> held;  ///< Joints that do not move, and where they are held, rad or m.

@@ -59,7 +59,7 @@ class UrdfFile {
   // Numbers of elements. @param key what messages begin with: "joint "elbow": ".
   // @throws InputError for an attribute that is missing or no such number.
   double ReadNumber(const tinyxml2::XMLElement& element, const std::string& key, const char* attribute) const;
-  /// Of an attribute that may be missing.
+  /// Reads an attribute that may be missing.
   double ReadNumber(const tinyxml2::XMLElement& element, const std::string& key, const char* attribute,
                     double otherwise) const;
   Vector3d ReadVector(const tinyxml2::XMLElement& element, const std::string& key, const char* attribute,

@@ -77,7 +77,7 @@ class UrdfReader {
   }
 
  private:
-  /// Where a link is: the joint that moves it (-1 the base) and its own frame in that joint's frame i.
+  /// Place of a link: the joint that moves it (-1 the base) and its own frame in that joint's frame i.
   struct Place {
     int joint;
     Pose X_iL;

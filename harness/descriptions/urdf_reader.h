@@ -13,7 +13,7 @@
 namespace dexcheck {
 
 struct UrdfOptions {
-  /// Where "package://NAME/..." lies: folders that contain NAME, or that are NAME. When there are some,
+  /// Folders of "package://NAME/...": they contain NAME, or are NAME. When there are some,
   /// meshes that are missing are noted; dynamics need none.
   std::vector<std::filesystem::path> packages;
   /// The root link moves freely. Otherwise it is fixed when it is called "world", floats when the only joint

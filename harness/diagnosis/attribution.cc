@@ -27,21 +27,21 @@ const CheckRecord* FindFailed(std::span<const CheckRecord> checks, std::string_v
   return nullptr;
 }
 
-/// What the failure of a check means; nothing for one that has no entry.
+/// Returns the meaning of a check's failure; nothing for one that has no entry.
 FailureMeaning MeaningOf(std::string_view check) {
   const CheckInfo* info = FindCheck(check);
   return info == nullptr ? FailureMeaning{} : info->meaning;
 }
 
-std::string Tell(const CheckRecord& check) {
+std::string Describe(const CheckRecord& check) {
   return check.name + " " + FormatNumber(check.worst, 3) + (check.unit == "1" ? "" : " " + check.unit) +
          " (bound " + FormatNumber(check.bound, 3) +
          "), first above it at t = " + FormatNumber(check.failed_at, 3) + " s" +
          (check.part.empty() ? "" : ", " + check.part);
 }
 
-/// Whether an entry tells more of the cause than another one: by rank, then by time, then by precedence.
-bool TellsMore(const Entry& a, const Entry& b) {
+/// Returns whether an entry comes before another one: by rank, then by time, then by precedence.
+bool ComesBefore(const Entry& a, const Entry& b) {
   if (a.meaning.rank != b.meaning.rank) return a.meaning.rank < b.meaning.rank;
   if (a.time != b.time) return a.time < b.time;
   return a.meaning.precedence < b.meaning.precedence;
@@ -66,7 +66,7 @@ Entry MakeFact(const CheckRecord& check, const FailureMeaning& meaning) {
   return {Observe(place, what, check.failed_at), meaning, check.failed_at, &check};
 }
 
-/// What an explanation of that channel means.
+/// Returns the meaning of an explanation of that channel.
 FailureMeaning MeaningOf(CauseChannel channel) {
   static const FailureMeaning kMeanings[] = {
       {Cause::kSensing, 0, Rank::kMeasurement},    {Cause::kActuator, 0, Rank::kActuator},
@@ -86,10 +86,10 @@ std::vector<Entry> ListFaults(const Causes& causes, std::span<const CheckRecord>
       const Entry failed{{}, MeaningOf(check.name), check.failed_at, &check};
       const bool is_of_it = check.failed && failed.meaning.cause == entry.meaning.cause;
       if (!is_of_it || failed.meaning.rank > entry.meaning.rank) continue;
-      if (entry.check != nullptr && !TellsMore(failed, entry)) continue;
+      if (entry.check != nullptr && !ComesBefore(failed, entry)) continue;
       entry.meaning = failed.meaning, entry.time = failed.time, entry.check = failed.check;
     }
-    // What bounds allow need not be explained.
+    // A residual within its bounds need not be explained.
     if (entry.check == nullptr && one.outcome == CauseOutcome::kNotExplained)
       entry.meaning.rank = Rank::kResidual;
     entries.push_back(entry);
@@ -112,7 +112,7 @@ void AddFacts(std::span<const CheckRecord> steps, std::vector<Entry>* entries) {
                                    [&](const Entry& other) { return other.meaning.cause == meaning.cause; });
     if (same == entries->end()) {
       entries->push_back(fact);
-    } else if (same->one.outcome == CauseOutcome::kObserved && TellsMore(fact, *same)) {
+    } else if (same->one.outcome == CauseOutcome::kObserved && ComesBefore(fact, *same)) {
       *same = fact;
     }
   }
@@ -140,12 +140,12 @@ bool ComesFrom(const Entry& limit, const Entry& entry) {
   if (entry.check == nullptr) return false;
   const bool is_motion =
       entry.check->kind == CheckCategory::kLaw || entry.check->kind == CheckCategory::kAssumption;
-  return is_motion && TellsMore(limit, entry);
+  return is_motion && ComesBefore(limit, entry);
 }
 
-/// What an expectation that alone fails comes from: the gains, if (57) by itself leaves most of the error,
-/// and what drives it otherwise. By algebra that is what contacts give, or what the scenario asks for of the
-/// plant.
+/// Returns the cause of an expectation that alone fails: the gains, if (57) by itself leaves most of the
+/// error, and what drives it otherwise. By algebra that is what contacts give, or what the scenario asks for
+/// of the plant.
 Cause AttributeExpectation(const CheckRecord& check, const CheckContext& context, std::string* evidence) {
   const bool position = check.name == "expect_position";
   const double by_law = position ? context.position_by_law : context.orientation_by_law;
@@ -166,7 +166,7 @@ Cause AttributeOne(const CheckRecord& check, Cause run, std::span<const CheckRec
   return FindFailed(steps, meaning.sharper) != nullptr ? MeaningOf(meaning.sharper).cause : meaning.cause;
 }
 
-/// Where the model itself is wrong: puts that first.
+/// Puts a wrong model before everything else.
 bool AttributeModel(const ConstantChecks& constants, std::span<const CheckRecord> model,
                     std::span<const CheckRecord> steps, AttributionResult* result, Causes* causes) {
   if (!constants.findings.empty()) {
@@ -185,7 +185,7 @@ bool AttributeModel(const ConstantChecks& constants, std::span<const CheckRecord
     for (const CheckRecord& check : model)
       if (check.failed && (first == nullptr || check.failed_at < first->failed_at)) first = &check;
     if (first == nullptr || FindFailed(steps, "measurement") != nullptr) return false;
-    result->evidence = Tell(*first);
+    result->evidence = Describe(*first);
     causes->insert(causes->begin(), MakeFact(*first, {.cause = Cause::kModel}).one);
   }
   // The law is judged by the engine's terms, and goes by the model's.
@@ -201,7 +201,7 @@ std::vector<Entry> ListAll(std::span<const CheckRecord> steps, const CheckContex
   std::vector<Entry> entries = ListFaults(causes, steps);
   AddFacts(steps, &entries);
   PutWheelsBeforeForces(&entries);
-  std::stable_sort(entries.begin(), entries.end(), TellsMore);
+  std::stable_sort(entries.begin(), entries.end(), ComesBefore);
   if (entries.empty()) {
     const auto any = std::find_if(steps.begin(), steps.end(), [](const CheckRecord& c) { return c.failed; });
     entries.push_back(MakeFact(*any, {.cause = Cause::kUnexplained}));
@@ -215,16 +215,16 @@ std::vector<Entry> ListAll(std::span<const CheckRecord> steps, const CheckContex
   return entries;
 }
 
-/// Of the first entry: which check says so, and what was measured of it.
-void TellFirst(const Entry& first, std::span<const CheckRecord> steps, const CheckContext& context,
-               AttributionResult* result, Causes* causes) {
+/// Adds which check shows the first entry, and what was measured there.
+void AddEvidence(const Entry& first, std::span<const CheckRecord> steps, const CheckContext& context,
+                 AttributionResult* result, Causes* causes) {
   const CheckRecord* check = first.check;
   for (const CheckRecord& other : steps)  // of a fault that bounds of its own check allow
     if (check == nullptr && other.failed) check = &other;
   result->cause = first.meaning.cause;
   if (result->cause == Cause::kUnmodelledForce && Names(*causes, "slope")) result->cause = Cause::kSlope;
   if (check == nullptr) return;
-  result->evidence = Tell(*check);
+  result->evidence = Describe(*check);
   result->check = check->name;
   if (first.one.outcome != CauseOutcome::kObserved) {
     result->evidence += "; " + TellCauses(*causes, first.one.channel);
@@ -251,7 +251,7 @@ AttributionResult Attribute(const ConstantChecks& constants, std::span<const Che
     const std::vector<Entry> entries = ListAll(steps, context, *causes);
     causes->clear();
     for (const Entry& entry : entries) causes->push_back(entry.one);
-    TellFirst(entries.front(), steps, context, &result, causes);
+    AddEvidence(entries.front(), steps, context, &result, causes);
   }
   for (const std::span<const CheckRecord> checks : {model, steps}) {
     for (const CheckRecord& check : checks)

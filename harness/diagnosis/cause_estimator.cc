@@ -26,13 +26,13 @@ class Search {
         candidates_(candidates),
         options_(options),
         rows_(options.rows > 0.0 ? options.rows : static_cast<double>(y.size())),
-        samples_(rows_ / options.alike),
-        columns_(candidates, y, std::sqrt(options.floor * options.alike), options.independent) {}
+        samples_(rows_ / options.noise_block_size),
+        columns_(candidates, y, std::sqrt(options.floor * options.noise_block_size), options.independent) {}
 
   CauseSelection Run() {
     double criterion = Score(y_.squaredNorm(), 0.0, 0);
     if (const Best first = FindBest({}); !IsNoise({}) && first.criterion < criterion) criterion = Grow(first);
-    // What was the best alone need not be part of the best set. Of many candidates that takes long.
+    // The best single one need not be part of the best set. With many candidates that search takes long.
     constexpr size_t kFew = 100;
     const bool may_be_fewer = chosen_.size() > 1 && candidates_.size() < kFew;
     if (options_.restarts > 0 && !chosen_.empty() && (may_be_fewer || !IsNoise(chosen_))) {
@@ -50,7 +50,7 @@ class Search {
       chosen_ = best;
     }
     const std::vector<size_t> best = chosen_;
-    // Where columns are off themselves it begins so only if nothing was found.
+    // With inexact columns the search begins so only if nothing was found.
     const bool may_be_others = best.empty() ? !IsNoise(best) : best.size() > 1 && options_.floor <= 1.0;
     if (!options_.start.empty() && may_be_others && !SearchLimit::IsOver()) {
       chosen_ = Thin(options_.start);
@@ -141,7 +141,7 @@ class Search {
     return Score(CalcResidual(CalcRange(set)).squaredNorm(), CountParameters(set), set.size());
   }
 
-  /// What columns leave of y. @param Q of their range.
+  /// Returns y without its part in the range of Q.
   [[nodiscard]] VectorXd CalcResidual(const MatrixXd& Q) const { return y_ - Q * (Q.transpose() * y_); }
 
   /// Whether what these leave over is no more than noise.
@@ -195,7 +195,7 @@ class Search {
     return columns_.visible(candidate).basis * SolveLeastSquares(own, CalcResidual(Q), options_.independent);
   }
 
-  /// Whether it and those can be, all at once.
+  /// Returns whether all of them are possible at once.
   [[nodiscard]] bool CanBe(size_t candidate, const std::vector<size_t>& beside) const {
     std::vector<size_t> set = beside;
     set.push_back(candidate);
@@ -213,7 +213,7 @@ class Search {
     return true;
   }
 
-  /// Of a set: amplitudes of the visible columns, their covariance, and what they leave.
+  /// The fit of a set: amplitudes of the visible columns, their covariance, and the residual.
   struct Solution {
     VectorXd amplitude;
     MatrixXd covariance;
@@ -229,7 +229,8 @@ class Search {
     found.amplitude = scaled.colPivHouseholderQr().solve(y_).cwiseQuotient(size);
     found.residual = y_ - C * found.amplitude;
     const double freedom = std::max(1.0, rows_ - static_cast<double>(C.cols()));
-    found.variance = std::max(options_.floor, found.residual.squaredNorm() / freedom) * options_.alike;
+    found.variance =
+        std::max(options_.floor, found.residual.squaredNorm() / freedom) * options_.noise_block_size;
     found.covariance = size.cwiseInverse().asDiagonal() * CalcPseudoinverse(scaled.transpose() * scaled) *
                        size.cwiseInverse().asDiagonal() * found.variance;
     return found;
@@ -349,7 +350,7 @@ class Search {
     return result;
   }
 
-  /// What would do in its place.
+  /// Finds the candidates that would do in its place.
   void Compare(size_t place, double criterion, double all, CauseTerm* term) const {
     const std::vector<size_t> others = Without(place);
     term->fraction = all > 0.0 ? CalcResidual(CalcRange(others)).squaredNorm() / all : 0.0;

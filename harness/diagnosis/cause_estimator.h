@@ -42,7 +42,7 @@ struct Candidate {
   VectorXd least;
   /// Whether an amplitude can be: no mass is negative. Empty for all.
   std::function<bool(const VectorXd&)> is_possible;
-  /// Whether it is as likely as a simpler one that explains no less: a spring that does not move is a torque.
+  /// It is as likely as a simpler one that explains no less: a spring that does not move is a torque.
   bool is_ordinary = false;
 };
 
@@ -76,9 +76,9 @@ struct CauseOptions {
   std::vector<size_t> start;
   /// Mean square of what no explanation need explain: noise, and what the columns are off themselves.
   double floor = 1.0;
-  /// Rows whose noise is one and the same: 1 where each has its own. N / alike are counted then.
-  double alike = 1.0;
-  /// Of which y and the columns are sums with the same products; 0 for those of y.
+  /// Rows whose noise is one and the same: 1 where each has its own. N / noise_block_size are counted then.
+  double noise_block_size = 1.0;
+  /// Number of samples, where y and the columns are sums with the same products; 0 for the rows of y.
   double rows = 0.0;
   /// Part of a column beside others that counts: less is rounding.
   double independent = 1e-7;

@@ -43,8 +43,13 @@ std::string Fault::Tell() const {
     // The formula of the part is in JSON.
     const std::string part =
         where + fault.substr(0, std::min(fault.size() - kFactor.size(), fault.find(" (")));
-    if (value == 0.0) return part + " is missing" + more;
-    return part + (value == -1.0 ? " has the other sign" : " is multiplied by " + size) + more;
+    const bool is_plural = part.ends_with('s') && !part.ends_with("ss");
+    const std::string be = is_plural ? " are " : " is ";
+    if (value == 0.0) return part + be + "missing" + more;
+    const double rounding = std::max(5e-6, 3.0 * error);  // of the six digits that are printed
+    if (std::abs(value + 1.0) < rounding)
+      return part + (is_plural ? " have" : " has") + " the other sign" + more;
+    return part + be + "multiplied by " + size + more;
   }
   return where + fault + " " + size + Unit(unit) +
          (std::isinf(error) && detail.empty() ? ", a size that this motion does not show" : "") + more;
@@ -68,7 +73,7 @@ void Explanation::SetOutcome() {
 namespace {
 
 /// ", from 0.2 s", ", 0.2 to 0.5 s"; of what is not seen "between 0.2 and 0.3".
-std::string TellWhen(const Explanation& one) {
+std::string FormatInterval(const Explanation& one) {
   const auto tell = [](double earliest, double latest) {
     return latest > earliest ? "between " + FormatNumber(earliest, 4) + " and " + FormatNumber(latest, 4)
                              : FormatNumber(earliest, 4);
@@ -91,8 +96,8 @@ std::string Explanation::Tell() const {
     if (faults.size() > kMostTold) text += " or " + std::to_string(faults.size() - kMostTold) + " more";
     if (faults.size() > 1) text += ": not isolable from each other on this motion";
   }
-  // What holds all the time has no begin.
-  if (std::isfinite(from)) text += TellWhen(*this);
+  // A fault that is always there has no begin.
+  if (std::isfinite(from)) text += FormatInterval(*this);
   // A rival that is much less likely is of no interest to a reader.
   constexpr double kMostDigits = 3.0;
   const double digits = log_odds / std::log(10.0);

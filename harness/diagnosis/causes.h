@@ -1,6 +1,6 @@
 #pragma once
 
-// What a run's residuals are explained by.
+// The causes that explain a run's residuals.
 
 #include <nlohmann/json_fwd.hpp>
 #include <string>
@@ -20,7 +20,7 @@ struct Fault {
   std::string unit;    ///< Empty for a factor.
   std::string detail;  ///< Its direction, or what else belongs to it; empty for nothing.
 
-  /// Whether it is the same kind at the same place.
+  /// Returns whether it is the same kind at the same place.
   [[nodiscard]] bool IsLike(const Fault& other) const { return fault == other.fault && place == other.place; }
   /// "motor r_elbow: torque gain 0.99 +- 1e-12".
   [[nodiscard]] std::string Tell() const;
@@ -32,7 +32,8 @@ std::string FormatVector(const Eigen::Ref<const VectorXd>& v, int digits);
 /// A fault that is none of those that are known.
 inline constexpr const char* kUnknownFault = "differs";
 
-/// Where residuals are compared: what one of them shows, the others do not; and what checks observe.
+/// The places at which residuals are compared, each of which shows faults of its own; and what checks
+/// observe.
 enum class CauseChannel { kMeasurement, kActuation, kLaw, kContact, kRolling, kBalance, kObservation };
 /// "measurement", "actuation", "law", "contact", "rolling", "balance", "observation".
 const char* NameOf(CauseChannel channel);
@@ -70,7 +71,8 @@ struct Explanation {
   [[nodiscard]] std::string Tell() const;
 };
 
-/// As summaries of runs and judgements have them: null for infinite, and for the time of what holds always.
+/// Returns the form of summaries of runs and judgements: null for infinite, and for the time of what holds
+/// always.
 nlohmann::ordered_json ToJson(const Fault& fault);
 nlohmann::ordered_json ToJson(const Explanation& one);
 
@@ -79,7 +81,7 @@ using Causes = std::vector<Explanation>;
 
 /// Whether the first fault of one of them is called so.
 bool Names(const Causes& causes, std::string_view fault);
-/// Of one channel, in words; empty for none.
+/// Returns the causes of one channel in words; empty for none.
 std::string TellCauses(const Causes& causes, CauseChannel channel);
 
 }  // namespace dexcheck

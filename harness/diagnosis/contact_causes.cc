@@ -8,14 +8,14 @@ namespace {
 
 using Eigen::Index;
 
-// Of a distance, m, and of how the point that is nearest moves when a radius changes. What is hardly more
-// says nothing.
+// Rounding of a distance, m, and of how the nearest point moves when a radius changes. A mismatch that is
+// hardly more says nothing.
 constexpr double kDistanceNoise = 1e-14, kFaintest = 1e-12;
 constexpr double kRadiusAccuracy = 1e-4;
-// What is left may be this fraction of what there was.
+// The residual may be this fraction of what there was.
 constexpr double kExplainsDistance = 0.99;
 
-/// What is nearer by d when it is larger by d: a fingertip, or the object for all of them.
+/// A body whose contacts come nearer by d when it is larger by d: a fingertip, or the object for all of them.
 std::vector<Candidate> ListShapes(const Setup& setup, Index tips, Index steps, double noise) {
   std::vector<Candidate> candidates;
   for (Index i = 0; i < tips; ++i) {
@@ -51,11 +51,11 @@ Causes ExplainContacts(const StepStore& store) {
       ListShapes(store.setup(), mismatch.rows(), mismatch.cols(), noise);
   const VectorXd y = (mismatch / noise).reshaped();
   const CauseSelection selection =
-      SelectCauses(y, candidates, {.alike = static_cast<double>(mismatch.cols())});
+      SelectCauses(y, candidates, {.noise_block_size = static_cast<double>(mismatch.cols())});
   std::vector<Index> steps(static_cast<size_t>(mismatch.cols()));
   std::iota(steps.begin(), steps.end(), 0);
-  return TellSelection(StartExplanation(store, CauseChannel::kContact, steps), selection, candidates,
-                       TellNumber, selection.left <= 1.0 || selection.fraction >= kExplainsDistance);
+  return DescribeSelection(StartExplanation(store, CauseChannel::kContact, steps), selection, candidates,
+                           DescribeNumber, selection.left <= 1.0 || selection.fraction >= kExplainsDistance);
 }
 
 }  // namespace dexcheck

@@ -13,7 +13,7 @@ namespace {
 
 using Robot = RobotEquations;
 
-/// Of a view without the wheels' constraint the terms have another size.
+/// A view without the wheels' constraint has terms of another size.
 bool IsReduced(const Robot& t) { return t.M.rows() == t.model.num_velocities(); }
 
 /// C_bar' = S^T C S + S^T M S_dot of (14), without the second term.

@@ -22,7 +22,7 @@ struct RobotEquations {
   VectorXd& friction;
 };
 
-// What is wrong of an equation, by what it is of.
+// The change of an equation, by the object that it describes.
 
 struct RobotChange {
   void (*make)(const RobotEquations&);
@@ -49,11 +49,11 @@ struct EnergyChange {
 struct ObjectPoseChange {
   void (*make)(const Vector6d& X_o, Pose*);
 };
-/// Of the object's dynamics in X_o.
+/// Changes the object's dynamics in X_o.
 struct ObjectChange {
   void (*make)(ObjectTerms*);
 };
-/// Of the object's dynamics in its body velocity.
+/// Changes the object's dynamics in its body velocity.
 struct ObjectBodyChange {
   void (*make)(ObjectBodyTerms*);
 };

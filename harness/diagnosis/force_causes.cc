@@ -32,7 +32,7 @@ struct Part {
 Part ExplainPart(const StepStore& store, StepForces* forces, const Segment& segment, const Part* known) {
   Part part;
   ForceProblem problem(store, forces, segment);
-  if (known != nullptr) problem.Know(known->terms);
+  if (known != nullptr) problem.FixTerms(known->terms);
   part.is_explained = problem.ExplainConstant(segment, &part.causes);
   part.is_exact = problem.is_exact();
   part.terms = problem.terms();
@@ -52,8 +52,8 @@ Segment Concatenate(const std::vector<Segment>& parts, size_t begin, size_t coun
   return whole;
 }
 
-/// Of long runs blocks of steps are kept with gaps between them, and what changes there is not seen: parts
-/// that only gaps divide are one as far as the same faults explain them. None where one is not explained.
+/// Joins parts that only gaps divide, as far as the same faults explain them: long runs keep blocks of steps
+/// with gaps between them, whose changes are not seen. Returns none where one part is not explained.
 std::vector<Segment> JoinAcrossGaps(const StepStore& store, StepForces* forces,
                                     const std::vector<Segment>& parts) {
   const auto is_gap = [&](size_t part) {
@@ -75,7 +75,7 @@ std::vector<Segment> JoinAcrossGaps(const StepStore& store, StepForces* forces,
   for (size_t begin = 0; begin < parts.size() && joined.size() <= kMostSegments;) {
     const Part first = explain(begin, 1);
     if (!first.is_explained || SearchLimit::IsOver()) return {};
-    // What leaves more than rounding where its first part does not has something else in it.
+    // A stretch that leaves more than rounding where its first part does not has something else in it.
     const auto is_one = [&](size_t count) {
       const Part part = explain(begin, count);
       return part.is_explained && (part.is_exact || !first.is_exact);
@@ -113,7 +113,7 @@ Causes ExplainParts(const StepStore& store, StepForces* forces, const std::vecto
     if (SearchLimit::IsOver()) return {};
     if (simplest.is_explained) {
       Part beside = ExplainPart(store, forces, segments[i], &simplest);
-      // What has the same faults by itself, and no more of them, knows them better.
+      // A stretch that has the same faults by itself, and no more of them, knows them better.
       const auto& own = parts[i].causes;
       if (std::all_of(simplest.causes.begin(), simplest.causes.end(), [&](const auto& one) {
             return std::any_of(own.begin(), own.end(), [&](const auto& other) { return IsSame(one, other); });
@@ -131,7 +131,7 @@ Causes ExplainParts(const StepStore& store, StepForces* forces, const std::vecto
         same->to = one.to;
         same->ends = one.ends;
         same->unseen_after = one.unseen_after;
-        // What tells fewer faults apart, or the size of the same one better.
+        // The better one has fewer faults, or a smaller error of the same one.
         const auto rank = [](const auto& of) { return std::pair(of.faults.size(), of.faults.front().error); };
         if (rank(one) < rank(*same)) same->faults = one.faults, same->outcome = one.outcome;
       }
@@ -158,8 +158,8 @@ Causes ExplainForces(const StepStore& store) {
   ForceProblem problem(store, &forces, whole);
   const bool is_explained = problem.ExplainConstant(whole, &causes);
   const bool is_exact = is_explained && problem.is_exact();
-  constexpr size_t kHeap = 3;  // so many faults may be fewer that begin one after another
-  if ((is_exact && causes.size() < kHeap) || SearchLimit::IsOver()) return causes;
+  constexpr size_t kFewestForSegments = 3;  // so many faults may be fewer that begin one after another
+  if ((is_exact && causes.size() < kFewestForSegments) || SearchLimit::IsOver()) return causes;
   const bool are_many = parts.size() > kMostSegments;
   const std::vector<Segment> few = are_many ? JoinAcrossGaps(store, &forces, parts) : parts;
   Causes found;

@@ -161,7 +161,7 @@ void StepForces::AddJoints(std::vector<Candidate>* candidates) {
              VectorXd(-rate[i] * f));
     const double sign = rate[i] > 0.0 ? 1.0 : rate[i] < 0.0 ? -1.0 : 0.0;
     if (joint != nullptr) {
-      // Where the plant says it, also of a joint that sticks. The largest is told.
+      // The plant says it, also for a joint that sticks. The largest value is reported.
       const double known = store_.Get(StepStore::kDryFriction)(i, step_);
       Candidate& bearing = Next(candidates, kBearing, place, force, 0.0, VectorXd::Ones(1));
       bearing.nominal = std::max(bearing.nominal, std::abs(known));
@@ -180,7 +180,7 @@ void StepForces::AddJoints(std::vector<Candidate>* candidates) {
     candidate.is_ordinary = true;
     if (candidate.fitted.size() == 0) candidate.fitted = Vector2d(at, at);
     candidate.fitted = Vector2d(std::min(at, candidate.fitted[0]), std::max(at, candidate.fitted[1]));
-    // Where the joint hardly moves, only the torque there may show: that any stiffness makes.
+    // A joint that hardly moves may show only its torque there, which any stiffness makes.
     const bool is_still = candidate.fitted[1] - candidate.fitted[0] <= kStill;
     candidate.is_possible = [at, is_still](const VectorXd& a) {
       const bool is_hidden = is_still && std::abs(a[0] + at * a[1]) <= kStill * a.norm();

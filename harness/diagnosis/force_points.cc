@@ -74,7 +74,7 @@ Candidate MakeCandidate(const Body& body, const Vector3d& p) {
   return candidate;
 }
 
-/// Where a force acts that explains most of y.
+/// The point at which a force explains most of y.
 class PointFit {
  public:
   PointFit(const VectorXd& y, const Body& body) : y_(&y), body_(&body) {

@@ -31,7 +31,8 @@ void AddForcesAtPoints(const VectorXd& y, const std::vector<Turns>& turns, doubl
 Candidate MakeForceAtPoint(const ForceAtPoint& force, const std::vector<Turns>& turns,
                            const std::vector<Candidate>& candidates);
 
-/// Where it acts beside other faults. @param start what is known of it. @param beside columns of the others.
+/// Returns the force and its point beside other faults. @param start the first guess. @param beside columns
+/// of the others.
 /// @returns none where there is no such point.
 std::optional<ForceAtPoint> RefinePoint(const VectorXd& y, const std::vector<Turns>& turns, double reach,
                                         const ForceAtPoint& start, const MatrixXd& beside,

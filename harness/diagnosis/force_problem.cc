@@ -15,7 +15,7 @@ using namespace force_fault;
 
 // Columns agree with what a fault does to this fraction: platforms tilt, and wheels slip, by as much.
 constexpr double kAccuracy = 1e-4;
-// What is left over may be this many times the noise and is explained all the same.
+// A residual of this many times the noise is explained all the same.
 constexpr double kLeft = 3.0;
 // And of what there is to explain, squared, at least this fraction.
 constexpr double kLeastFraction = 0.99;
@@ -34,10 +34,10 @@ void SetBegin(const StepStore& store, const Segment& all, double since, Explanat
   one->from = later.from, one->unseen_before = later.unseen_before;
 }
 
-/// What a push that grows is told by.
+/// Returns the key of a push that grows.
 std::string NameGrowing(const Candidate& push) { return push.place + push.fault + kGrows; }
 
-/// What pushes as it is, whatever moves.
+/// Returns whether a candidate pushes independently of the motion.
 bool IsPush(const Candidate& one) {
   return one.fault == "torque" || one.fault == kForce || one.fault == "moment";
 }
@@ -52,7 +52,7 @@ ForceProblem::ForceProblem(const StepStore& store, StepForces* forces, const Seg
   for (Index i = 0; i < steps_; ++i)
     used_.push_back(segment[static_cast<size_t>(steps_ == 1 ? 0 : i * (count - 1) / (steps_ - 1))]);
   forces->SetGravity(forces->model().gravity());
-  // What the columns are off hides what is smaller on the same side, robot or object.
+  // Errors of the columns hide what is smaller on the same side, robot or object.
   level_.setConstant(level);
   Build();
   first_level_ = level * (1.0 + (kAccuracy * CalcSizes(whole_y_)).array().square()).sqrt();
@@ -66,7 +66,7 @@ bool ForceProblem::IsExplained(double fraction, double left) const {
   return fraction >= kLeastFraction && left <= kLeft;
 }
 
-void ForceProblem::Know(const Terms& known) {
+void ForceProblem::FixTerms(const Terms& known) {
   known_ = known;
   Complete();
 }
@@ -88,18 +88,18 @@ bool ForceProblem::ExplainConstant(const Segment& segment, Causes* causes) {
     }
   }
   if (ExplainJoint(segment, selection, causes)) return true;
-  Causes told =
-      TellSelection(StartExplanation(store_, CauseChannel::kBalance, segment), selection, candidates_,
-                    [&](const Candidate& one, const VectorXd& amplitude, const VectorXd& error) {
-                      return MakeForceFault(one, amplitude, error, forces_->model().gravity());
-                    });
-  for (size_t i = 0; i < told.size(); ++i) {
+  Causes found =
+      DescribeSelection(StartExplanation(store_, CauseChannel::kBalance, segment), selection, candidates_,
+                        [&](const Candidate& one, const VectorXd& amplitude, const VectorXd& error) {
+                          return MakeForceFault(one, amplitude, error, forces_->model().gravity());
+                        });
+  for (size_t i = 0; i < found.size(); ++i) {
     const CauseTerm& term = selection.terms[i];
     const Candidate& one = candidates_[term.candidate];
     if (one.fault.ends_with(kGrows))
-      SetBegin(store_, segment, CalcGrowthBegin(term.amplitude, one.nominal), &told[i]);
+      SetBegin(store_, segment, CalcGrowthBegin(term.amplitude, one.nominal), &found[i]);
   }
-  std::move(told.begin(), told.end(), std::back_inserter(*causes));
+  std::move(found.begin(), found.end(), std::back_inserter(*causes));
   return true;
 }
 
@@ -115,7 +115,7 @@ bool ForceProblem::ExplainJoint(const Segment& segment, const CauseSelection& se
     const bool leaves_noise = torque.residual.squaredNorm() <= static_cast<double>(y_.size());
     const bool is_joint = is_of_one && candidates_[torque.candidate].place == place;
     if (!is_joint && (is_exact_ || !leaves_noise)) continue;
-    Explanation one = TellFree(segment, torque);
+    Explanation one = DescribeFree(segment, torque);
     for (const CauseTerm& term : selection.terms)
       one.faults.push_back(MakeForceFault(candidates_[term.candidate], term.amplitude, term.error,
                                           forces_->model().gravity()));
@@ -128,14 +128,14 @@ bool ForceProblem::ExplainJoint(const Segment& segment, const CauseSelection& se
 void ForceProblem::ExplainChanging(const Segment& segment, Causes* causes) const {
   const std::vector<Free> all = FitAll({"torque", kForce, "moment", "force and moment"});
   if (all.empty()) return;
-  Explanation one = TellFree(segment, all.front());
+  Explanation one = DescribeFree(segment, all.front());
   if (!IsExplained(one.fraction, one.left)) one.outcome = CauseOutcome::kNotExplained;
   for (size_t i = 1; i < all.size() && one.rival.empty(); ++i) {
     const double odds = 0.5 * (all[i].criterion - all.front().criterion);
     if (odds >= kEqualLogOdds) {
       one.SetRival(candidates_[all[i].candidate], odds);
     } else {
-      one.faults.push_back(TellFree(segment, all[i]).faults.front());
+      one.faults.push_back(DescribeFree(segment, all[i]).faults.front());
     }
   }
   causes->push_back(one);
@@ -167,7 +167,7 @@ ForceProblem::Free ForceProblem::FitFree(size_t index) const {
   return free;
 }
 
-Explanation ForceProblem::TellFree(const Segment& segment, const Free& free) const {
+Explanation ForceProblem::DescribeFree(const Segment& segment, const Free& free) const {
   const Candidate& candidate = candidates_[free.candidate];
   Explanation one = StartExplanation(store_, CauseChannel::kBalance, segment);
   one.fraction = 1.0 - free.residual.squaredNorm() / y_.squaredNorm();
@@ -223,9 +223,9 @@ void ForceProblem::AddGrowing() {
   std::copy_if(candidates_.begin(), candidates_.end(), std::back_inserter(pushes), IsPush);
   if (!growing_.empty())
     std::erase_if(pushes, [&](const Candidate& one) { return growing_.count(NameGrowing(one)) == 0; });
-  // Of many not each time of their begin is tried.
+  // With many of them, not each time of their begin is tried.
   const auto skipped = static_cast<Index>(pushes.size()) * steps_ / kMostGrowing;
-  // Of one step they are there to be known only.
+  // With one step they are only there to be known.
   for (Index first = 0; first + 1 < std::max<Index>(2, steps_); first += 1 + skipped) {
     for (const Candidate& push : pushes) candidates_.push_back(MakeGrowing(push, first, skipped));
     if (growth_ == Growth::kBefore) break;
@@ -258,7 +258,7 @@ Candidate ForceProblem::MakeGrowing(const Candidate& push, Index first, Index sk
     const auto at = push.columns.middleRows(k * rows, rows);
     growing.columns.middleRows(k * rows, rows) << (time_of(k) - growing.nominal) * at, at;
   }
-  // Where it began before all that is kept, it did not show yet.
+  // A push that began before all that is kept did not show yet.
   MatrixXd shows = push.columns.middleRows(first * rows, rows);
   noise_[static_cast<size_t>(first)].ChangeLevel(level_, Vector2d::Ones(), shows);
   const double earliest = (first > skipped ? time_of(first - 1 - skipped) : time(0, 0)) - slack;
@@ -333,7 +333,7 @@ CauseSelection ForceProblem::Select() {
     level = lower;
   }
   if (!IsExplained(best.fraction, best.left) || is_exact_ || SearchLimit::IsOver()) return best;
-  // Only what was left has told how much noise there is: more faults that leave but rounding are likelier.
+  // The noise level was estimated from the residual: more faults that leave but rounding are likelier.
   if (CauseSelection exact = select(least_level_); is_exact_) return exact;
   return select(level);
 }
@@ -372,9 +372,9 @@ bool ForceProblem::RefineCenters(const CauseSelection& selection) {
 }
 
 CauseSelection ForceProblem::SelectOnce() {
-  // Of one step several faults explain anything.
+  // A single step cannot distinguish faults.
   const CauseOptions options{.most_terms = std::min<size_t>(5, used_.size()),
-                             .alike = static_cast<double>(steps_)};
+                             .noise_block_size = static_cast<double>(steps_)};
   CauseSelection selection = SelectCauses(y_, candidates_, options);
   if (!SearchLimit::IsOver() && RefinePoints(selection)) selection = SelectCauses(y_, candidates_, options);
   if (!SearchLimit::IsOver() && RefineCenters(selection)) selection = SelectCauses(y_, candidates_, options);

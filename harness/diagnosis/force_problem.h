@@ -1,6 +1,6 @@
 #pragma once
 
-// What a part of the steps leaves of the balances, and what explains it.
+// The residual of the balances in some of the steps, and its explanation.
 
 #include <initializer_list>
 #include <set>
@@ -21,7 +21,7 @@ inline constexpr double kFaint = 0.01;
 /// One residual and what explains it.
 class ForceProblem {
  public:
-  /// What grows: from before these steps on, or from between any two of them.
+  /// Pushes that grow: from before these steps on, or from between any two of them.
   enum class Growth { kBefore, kWithin };
   /// @param level of the noise, in bounds of the checks.
   ForceProblem(const StepStore& store, StepForces* forces, const Segment& segment, double level = 1.0,
@@ -32,7 +32,7 @@ class ForceProblem {
   /// Whether what is left is noise, or next to nothing beside what there was.
   [[nodiscard]] bool IsExplained(double fraction, double left) const;
 
-  /// Of the last explanation: what was selected, and how large each is; forces at points by themselves.
+  /// The terms of the last explanation with their sizes; forces at points by themselves.
   struct Terms {
     std::vector<CauseTerm> amplitudes;
     std::vector<ForceAtPoint> points;
@@ -40,7 +40,7 @@ class ForceProblem {
   };
   [[nodiscard]] const Terms& terms() const { return terms_; }
   /// Faults that are there, as other steps have shown.
-  void Know(const Terms& known);
+  void FixTerms(const Terms& known);
 
   /// Faults that do not change.
   bool ExplainConstant(const Segment& segment, Causes* causes);
@@ -61,16 +61,16 @@ class ForceProblem {
   [[nodiscard]] Free FitFree(size_t index) const;
   /// All candidates of these faults, the most likely first.
   [[nodiscard]] std::vector<Free> FitAll(std::initializer_list<const char*> faults) const;
-  /// What is free at each step has no size, and is a class of all that may act there: a range that ends, a
-  /// cable.
-  [[nodiscard]] Explanation TellFree(const Segment& segment, const Free& free) const;
+  /// A fault that is free at each step has no size, and is a class of all that may act there: a range that
+  /// ends, a cable.
+  [[nodiscard]] Explanation DescribeFree(const Segment& segment, const Free& free) const;
   /// Residual and candidates with the gravity that is known.
   void Build();
   /// Their noise becomes another.
   void SetLevel(const Vector2d& level);
-  /// What is known goes off the residual, and forces at points are added that explain the rest.
+  /// Subtracts the known terms from the residual, and adds forces at points that explain the rest.
   void Complete();
-  /// Of each push others that grow evenly: by so much a second, and what it is when the run ends.
+  /// Adds pushes that grow evenly: their growth a second, and their size when the run ends.
   void AddGrowing();
   /// Only those that were selected, from each time on. @returns whether there are any.
   bool NarrowGrowing(const CauseSelection& selection);
@@ -88,7 +88,7 @@ class ForceProblem {
   [[nodiscard]] CauseSelection Select();
   /// Beside other faults a force acts elsewhere than by itself.
   bool RefinePoints(const CauseSelection& selection);
-  /// What a centre of mass changes grows with its square, too.
+  /// Corrects columns of a centre of mass, whose effect grows with its square, too.
   bool RefineCenters(const CauseSelection& selection);
   [[nodiscard]] CauseSelection SelectOnce();
 

@@ -15,16 +15,16 @@ using namespace force_fault;
 
 // Gravity whose size differs by less than this fraction of its change only points elsewhere.
 constexpr double kTilted = 0.2;
-// Of a spring, by its torque: less shows only the torque, 1 / rad or 1 / m.
+// A spring's stiffness by its torque: less shows only the torque, 1 / rad or 1 / m.
 constexpr double kSoft = 0.1;
 
 // Residuals whose change from one step to the next is further from that of the steps around than this, in
 // units of noise, and than this many times what theirs are, have begun, or ended.
 constexpr double kJumpNoise = 0.01, kJump = 5.0;
 
-std::string TellVector(const Eigen::Ref<const VectorXd>& v) { return FormatVector(v, 4); }
+std::string ShowVector(const Eigen::Ref<const VectorXd>& v) { return FormatVector(v, 4); }
 
-/// What is not so many standard errors away from nothing shows no size.
+/// A value within so many standard errors of zero shows no size.
 void RequireSize(Fault* fault) {
   constexpr double kErrors = 5.0;
   if (kErrors * fault->error > std::abs(fault->value)) fault->error = std::numeric_limits<double>::infinity();
@@ -39,7 +39,7 @@ Fault MakeGrowing(const Candidate& candidate, const VectorXd& a, const VectorXd&
               size == 1 ? rate[0] : rate.norm(),
               error.size() > 0 ? error.head(size).norm() : 0.0,
               candidate.unit,
-              size == 1 ? "" : TellVector(rate) + " "};
+              size == 1 ? "" : ShowVector(rate) + " "};
   RequireSize(&fault);
   fault.detail += "since " + FormatNumber(CalcGrowthBegin(a, candidate.nominal), 4) + " s";
   return fault;
@@ -53,7 +53,7 @@ struct DifferingStep {
   Vector2d apart;   // how far that is from the neighbours' changes
 };
 
-/// Of a step's rows, the root mean square of the robot's and of the object's.
+/// Returns the root mean square of a step's rows, the robot's and the object's.
 Vector2d CalcSizes(const VectorXd& y) {
   const Index n = y.size() - 6;
   return {y.head(n).norm() / std::sqrt(static_cast<double>(n)), y.tail<6>().norm() / std::sqrt(6.0)};
@@ -73,7 +73,8 @@ std::vector<DifferingStep> ListDiffering(const StepStore& store, StepForces* for
     }
     before = y;
   }
-  // What grows evenly changes as one of its neighbours does, even where it begins to, or between two jumps.
+  // A push that grows evenly changes as one of its neighbours does, even where it begins, or between two
+  // jumps.
   for (size_t k = 0; k < steps.size(); ++k)
     for (const size_t other : {k - 2, k - 1, k + 1, k + 2})
       if (other < steps.size() && steps[other].follows)
@@ -118,22 +119,22 @@ Fault MakeForceFault(const Candidate& candidate, const VectorXd& a, const Vector
         a[0] > kSoft * std::abs(a[1]) ? "relaxed at " + FormatNumber(a[1] / a[0], 4) : "of any stiffness";
     fault.value = std::max(0.0, fault.value);
   } else if (candidate.fault == "tether") {
-    if (a[0] != 0.0) fault.detail = "to " + TellVector(a.tail<3>() / a[0]) + " m";
+    if (a[0] != 0.0) fault.detail = "to " + ShowVector(a.tail<3>() / a[0]) + " m";
   } else if (candidate.fault == "payload") {
-    if (a[0] != 0.0) fault.detail = "at " + TellVector(a.segment<3>(1) / a[0]) + " m of its centre of mass";
+    if (a[0] != 0.0) fault.detail = "at " + ShowVector(a.segment<3>(1) / a[0]) + " m of its centre of mass";
   } else if (a.size() >= 3) {
     const Index size = candidate.fault == "inertia" ? 6 : 3;
     fault.value = a.head(size).norm();
     if (error.size() >= size) fault.error = error.head(size).norm();
-    fault.detail = TellVector(a.head(size));
+    fault.detail = ShowVector(a.head(size));
     if (candidate.fault == kForceAtPoint) fault.detail += " " + candidate.detail;
     if (candidate.fault == kForceAtPointInAxes) {
       const Vector3d f = a.head<3>();
       fault.fault = kForceAtPoint;
-      fault.detail += " in its axes, at " + TellVector(f.cross(Vector3d(a.tail<3>())) / f.squaredNorm()) +
+      fault.detail += " in its axes, at " + ShowVector(f.cross(Vector3d(a.tail<3>())) / f.squaredNorm()) +
                       " m of its centre of mass";
     }
-    if (candidate.fault == "force and moment") fault.detail += " and " + TellVector(a.tail<3>()) + " N m";
+    if (candidate.fault == "force and moment") fault.detail += " and " + ShowVector(a.tail<3>()) + " N m";
   }
   if (candidate.fault == kForceInAxes || candidate.fault == kMomentInAxes) {
     fault.fault = candidate.fault == kForceInAxes ? kForce : "moment";
@@ -143,7 +144,7 @@ Fault MakeForceFault(const Candidate& candidate, const VectorXd& a, const Vector
   } else if (candidate.fault == kGravitySize) {
     fault.fault = kGravity;
     fault.value = std::abs(a[0]);
-    fault.detail = TellVector(Vector3d::Zero() + a[0] * gravity.normalized());  // no -0
+    fault.detail = ShowVector(Vector3d::Zero() + a[0] * gravity.normalized());  // no -0
   } else if (candidate.fault == kMassWithInertia) {
     fault.fault = "mass";
     fault.detail = "and its inertia by the same factor";

@@ -30,7 +30,8 @@ void DropRepeated(std::vector<unsigned>* parts_of, std::vector<Candidate>* candi
   const auto repeats = [&](size_t i, size_t of) {
     const Candidate &a = (*candidates)[of], &b = (*candidates)[i];
     const bool is_sum = parts[of] != 0 && (parts[i] & parts[of]) == parts[of];
-    const bool is_friction = b.fault.ends_with("viscous friction") && a.fault.starts_with("friction");
+    const bool is_friction =
+        b.fault.ends_with("viscous friction") && a.fault.starts_with("compensation of friction");
     if (a.place != b.place || !(is_sum || is_friction)) return false;
     constexpr double kSame = 1e-10;
     const double product = a.columns.col(0).dot(b.columns.col(0));
@@ -317,9 +318,9 @@ class LawCandidates {
 };
 
 /// A fault of several numbers without a unit has no size, and neither has one that is there as a whole.
-Fault TellLaw(const Candidate& one, const VectorXd& amplitude, const VectorXd& error) {
+Fault DescribeLaw(const Candidate& one, const VectorXd& amplitude, const VectorXd& error) {
   const bool is_whole = one.is_possible && !one.is_possible(VectorXd::Constant(1, 2.0));
-  Fault fault = TellNumber(one, amplitude, error);
+  Fault fault = DescribeNumber(one, amplitude, error);
   if (one.unit.empty() && (amplitude.size() > 1 || is_whole)) fault.value = kNaN;
   if (is_whole) fault.error = 0.0;
   return fault;
@@ -346,13 +347,13 @@ Causes ExplainLaw(const StepStore& store) {
   CauseSelection selection = SelectCauses(y, candidates, {.most_terms = 4, .restarts = 0, .floor = floor});
   const LawFactors factors(store.law()->ListParts(), all.parts(), candidates);
   factors.DropAlternatives(&selection);
-  causes = TellSelection(StartExplanation(store, CauseChannel::kLaw, steps), selection, candidates,
-                         [&](const Candidate& one, const VectorXd& amplitude, const VectorXd& error) {
-                           Fault fault = TellLaw(one, amplitude, error);
-                           if (one.nominal == 1.0 && one.unit.empty())
-                             factors.MakeWhole(one, selection, &fault);
-                           return fault;
-                         });
+  causes = DescribeSelection(StartExplanation(store, CauseChannel::kLaw, steps), selection, candidates,
+                             [&](const Candidate& one, const VectorXd& amplitude, const VectorXd& error) {
+                               Fault fault = DescribeLaw(one, amplitude, error);
+                               if (one.nominal == 1.0 && one.unit.empty())
+                                 factors.MakeWhole(one, selection, &fault);
+                               return fault;
+                             });
   VectorXd left = problem.y().tail(problem.y().size() - y.size());
   for (const CauseTerm& term : selection.terms) left -= others[term.candidate] * term.amplitude;
   const double most = kMostLeft * std::sqrt(floor);

@@ -187,9 +187,7 @@ bool IsNamedBy(const RobotSpec& spec, const Parameter& number, const CorrectionI
   const auto site = kSites.find(number.kind);
   if (site == kSites.end()) return false;
   std::string place = number.kind == Kind::kGravity ? "robot" : DescribePart(spec, number);
-  for (const std::string part : {"frame ", "base "}) {
-    if (place.starts_with(part)) place = "link " + place.substr(part.size());
-  }
+  if (place.starts_with("base ")) place = "link " + place.substr(5);
   if (std::ranges::find(cause.places, place) == cause.places.end()) return false;
   // A solid of another mass has an inertia that goes with it.
   if (cause.fault.kind == CorrectionKind::kWithMass) return number.kind == Kind::kMass;

@@ -10,7 +10,7 @@ namespace {
 
 using Kind = ParameterKind;
 
-/// Where a specification has a number, or the first of a vector, tensor or pose.
+/// The place of a number in a specification, or of the first of a vector, tensor or pose.
 struct NumberPlace {
   template <typename Place>
   constexpr NumberPlace(Place place) : read(place), write(place) {}
@@ -94,7 +94,7 @@ int CountComponents(Kind kind) {
   return form == ParameterTable::kTensor ? 6 : form >= ParameterTable::kVector ? 3 : 1;
 }
 
-/// Of Ixx, Iyy, Izz, Ixy, Ixz, Iyz in a 3x3 matrix, of x, y, z of a vector or in a pose's 4x4 matrix.
+/// Returns the place of Ixx, Iyy, Izz, Ixy, Ixz, Iyz in a 3x3 matrix, of x, y, z in a vector or a 4x4 pose.
 size_t OffsetOf(const Parameter& p) {
   static constexpr size_t kEntries[] = {0, 4, 8, 3, 6, 7};
   const auto k = static_cast<size_t>(p.component);

@@ -83,7 +83,7 @@ RobotModel ChangeNumber(RobotSpec spec, const Parameter& number, double scale);
 /// The part of the robot: "joint r_elbow", "link r_forearm", "frame rf1_tip", "base platform", "object
 /// torus", "gravity".
 std::string DescribePart(const RobotSpec& spec, const Parameter& parameter);
-/// What of it: "alpha", "mass", "centre of mass x", "Ixy".
+/// The quantity: "alpha", "mass", "centre of mass x", "Ixy".
 std::string DescribeQuantity(const Parameter& parameter);
 /// The vector or tensor that a component belongs to: "centre of mass", "inertia"; otherwise DescribeQuantity.
 std::string DescribeGroup(const Parameter& parameter);

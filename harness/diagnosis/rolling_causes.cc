@@ -11,7 +11,7 @@ namespace {
 
 using Eigen::Index;
 
-// What is left may be this fraction of what there was: wheels that slip do so with the load.
+// The residual may be this fraction of what there was: wheels that slip do so with the load.
 constexpr double kExplains = 0.99;
 // Noise is taken for this many times what the explanation leaves.
 constexpr double kLevel = 5.0;
@@ -76,7 +76,8 @@ Causes ExplainRolling(const StepStore& store) {
   // Slip changes with the load, in some steps.
   constexpr double kAlike = 8.0;
   if (y.squaredNorm() <= static_cast<double>(y.size())) return {};
-  const CauseOptions options{.most_terms = 3, .alike = std::min(kAlike, static_cast<double>(count))};
+  const CauseOptions options{.most_terms = 3,
+                             .noise_block_size = std::min(kAlike, static_cast<double>(count))};
   CauseSelection selection = SelectWheels(y, &candidates, options);
   const bool explained = selection.fraction >= kExplains;
   if (!explained && !fails) return {};
@@ -85,8 +86,8 @@ Causes ExplainRolling(const StepStore& store) {
     for (Candidate& one : candidates) one.columns /= level;
     selection = SelectWheels(y, &candidates, options);
   }
-  return TellSelection(StartExplanation(store, CauseChannel::kRolling, steps), selection, candidates,
-                       TellNumber, explained);
+  return DescribeSelection(StartExplanation(store, CauseChannel::kRolling, steps), selection, candidates,
+                           DescribeNumber, explained);
 }
 
 }  // namespace dexcheck

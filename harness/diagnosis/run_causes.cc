@@ -12,7 +12,7 @@
 namespace dexcheck {
 namespace {
 
-/// Contacts that are elsewhere are told by their shapes.
+/// Contacts elsewhere are reported as other shapes.
 void DropConsequencesOfShapes(Causes* causes) {
   std::erase_if(*causes, [](const Explanation& one) {
     return one.channel == CauseChannel::kBalance && !one.faults.empty() &&

@@ -75,7 +75,7 @@ class AddedList {
     both << (steps_.Take(series_.got, 1) - output_).matrix(),
         (steps_.Take(series_.expected, 1) - output_).matrix();
     Add("lag", "s", both.leftCols(1), 0.0, is_lag);
-    // Of any gain and offset, got_t - u_t = 1 (got_(t-1) - u_t) - gain (u_(t-1) - u_t).
+    // With any gain and offset, got_t - u_t = 1 (got_(t-1) - u_t) - gain (u_(t-1) - u_t).
     Add("lag", "s", both, 0.0, is_lag);
   }
 

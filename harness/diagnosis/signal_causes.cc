@@ -26,13 +26,13 @@ struct CommonFault {
 
 double CalcRms(const VectorXd& x) { return x.norm() / std::sqrt(static_cast<double>(x.size())); }
 
-/// What remembers is not known where the steps before are not: there it is as it should be.
+/// A fault with memory is not known where the steps before are not: there the signal is taken as right.
 void Ignore(const Fault& fault, const VectorXd& right, const SignalSeries& series, VectorXd* signal) {
   const bool is_late = fault.fault == "delay";
   if ((!is_late && fault.fault != "lag") ||
       std::count(series.has_history.begin(), series.has_history.end(), true) < kFewestSteps)
     return;
-  // What is late is known after its delay, and another delay may need it.
+  // A late signal is known after its delay, and another delay may need it.
   const double remembered = is_late ? fault.value : static_cast<double>(StepStore::kHistory);
   double known = 0.0;  // steps since the last gap
   for (Index i = 0; i < signal->size(); ++i, ++known) {
@@ -60,7 +60,7 @@ class SignalGroup {
       : series_(std::move(series)), channel_(channel) {
     for (const SignalSeries& one : series_) {
       verdicts_.push_back(JudgeSignal(one, series_));
-      // What never changes shows no delay.
+      // A signal that never changes shows no delay.
       if (one.expected.maxCoeff() - one.expected.minCoeff() > SignalSeries::kFaint * one.noise)
         ++moving_[one.name.group];
       ++sizes_[one.name.group];
@@ -70,12 +70,12 @@ class SignalGroup {
   [[nodiscard]] Causes Explain() const {
     Causes causes;
     const std::optional<CommonFault> common = FindCommon();
-    if (common) causes.push_back(TellCommon(*common));
+    if (common) causes.push_back(DescribeCommon(*common));
     for (size_t i = 0; i < series_.size(); ++i) {
       if (!common) {
-        TellVerdict(verdicts_[i], channel_, &causes);
+        AddExplanations(verdicts_[i], channel_, &causes);
       } else if (!Has(common->members, i) && !IsLateOrientation(*common, i)) {
-        TellVerdict(JudgeBeside(i, *common), channel_, &causes);
+        AddExplanations(JudgeBeside(i, *common), channel_, &causes);
       }
     }
     return causes;
@@ -146,12 +146,12 @@ class SignalGroup {
            (common.groups.size() > 2 || (common.groups.size() > 1 && common.groups.size() >= moving_.size()));
   }
 
-  /// Of an orientation the change is kept, which shows no delay of its own.
+  /// An orientation is kept as a change, which shows no delay of its own.
   [[nodiscard]] bool IsLateOrientation(const CommonFault& common, size_t i) const {
     return common.fault.fault == "delay" && IsOfAll(common) && series_[i].name.group == "object orientation";
   }
 
-  [[nodiscard]] Explanation TellCommon(const CommonFault& common) const {
+  [[nodiscard]] Explanation DescribeCommon(const CommonFault& common) const {
     Explanation one = StartExplanation(verdicts_[common.members.front()], channel_);
     std::string groups;
     for (const std::string& group : common.groups) groups += (groups.empty() ? "" : ", ") + group;
@@ -189,7 +189,7 @@ class SignalGroup {
   std::map<std::string, size_t> sizes_, moving_;
 };
 
-/// Of the joint that this velocity moves; empty for one of a ball joint.
+/// Returns the positions of the joint that has this velocity; empty for a ball joint.
 VectorXd FindPositions(const StepStore& store, Index velocity) {
   const RobotModel& model = store.setup().model();
   const int joint = model.joint_of_dof(static_cast<int>(velocity) - model.num_base_velocities());

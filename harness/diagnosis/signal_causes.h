@@ -26,7 +26,7 @@ struct SignalSeries {
   static constexpr double kFaint = 1e3, kLeft = 30.0;
 };
 
-/// What explains got - expected of the signals of one channel: a transmission (none, a delay, a limit, a dead
+/// Explains got - expected of the signals of one channel: a transmission (none, a delay, a limit, a dead
 /// zone, steps, the signal of another one, a stuck value, play), with gain, offset, friction, drift, lag or a
 /// ripple of its result, or noise. One for each fault; none where nothing differs. A fault that several have
 /// alone and with the same value is told once.

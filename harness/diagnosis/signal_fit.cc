@@ -32,7 +32,7 @@ Fault MakeFault(const Candidate& candidate, const VectorXd& amplitude, const Vec
     fault.value = amplitude.norm();
     fault.error = error.norm();
   } else if (decay > 0.0 && (candidate.fault == "gain" || candidate.fault == "offset")) {
-    // Of what a lag is sent: its own output has (1 - d) of it.
+    // The gain is of the lag's input: its output has (1 - d) of it.
     fault.value = candidate.nominal + amplitude[0] / (1.0 - decay);
     fault.error /= 1.0 - decay;
   }
@@ -53,7 +53,7 @@ bool IsWhite(const VectorXd& residual) {
   return residual.cwiseAbs().maxCoeff() < kMost * std::sqrt(square / static_cast<double>(count));
 }
 
-/// Of a shape, and of when the fault begins and ends, beside what is added.
+/// Returns the cost of a shape and of the times at which the fault begins and ends, beside what is added.
 double CalcCost(const SignalSeries& series, const SignalSteps& steps, const SignalShape& shape, size_t added,
                 const SignalFit& fit) {
   const double log_rows = std::log(static_cast<double>(steps.size()));
@@ -123,7 +123,8 @@ std::string NamesOf(const std::vector<Fault>& faults) {
   return text;
 }
 
-/// Of a signal of which nothing came: any dead zone that is wide enough, any step that is large enough.
+/// Adds the alternatives of a silent signal: any dead zone that is wide enough, any step that is large
+/// enough.
 void AddSilence(const SignalSeries& series, double largest, SignalFit* dead) {
   if (dead->faults.size() != 1) return;
   const std::string& place = dead->faults.front().place;
@@ -172,7 +173,7 @@ SignalVerdict JudgeSignal(const SignalSeries& series, const std::vector<SignalSe
     const std::string name = NamesOf(fit.faults);
     if (std::find(names.begin(), names.end(), name) != names.end()) continue;
     names.push_back(name);
-    // What has more faults has simpler ones as a special case.
+    // An explanation with more faults has simpler ones as a special case.
     const bool is_wider = !verdict.fits.empty() && fit.faults.size() > verdict.fits.front().faults.size();
     if (is_wider && odds < kEqualLogOdds) continue;
     if (verdict.fits.empty() || (odds < kEqualLogOdds && is_good(fit))) {
@@ -204,7 +205,7 @@ Explanation StartExplanation(const SignalVerdict& verdict, CauseChannel channel)
 }
 
 /// One explanation for each fault, with what would do in its place.
-void TellVerdict(const SignalVerdict& verdict, CauseChannel channel, Causes* causes) {
+void AddExplanations(const SignalVerdict& verdict, CauseChannel channel, Causes* causes) {
   if (verdict.steps.rows.empty()) return;
   Explanation whole = StartExplanation(verdict, channel);
   if (!verdict.is_explained || verdict.fits.empty()) {
@@ -221,7 +222,7 @@ void TellVerdict(const SignalVerdict& verdict, CauseChannel channel, Causes* cau
     one.faults = {best.faults[place]};
     one.faults.insert(one.faults.end(), best.same[place].begin(), best.same[place].end());
     for (size_t i = 1; i < verdict.fits.size(); ++i) {
-      // Of several faults that are replaced together, the first of the others stands for all.
+      // Several faults that are replaced together are represented by the first of the others.
       const std::vector<Fault>& others = verdict.fits[i].faults;
       for (size_t k = 0; k < (single ? std::min<size_t>(1, others.size()) : others.size()); ++k) {
         one.faults.push_back(others[k]);

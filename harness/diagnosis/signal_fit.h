@@ -1,6 +1,6 @@
 #pragma once
 
-// What explains one signal: a transmission, and what is added to it.
+// The explanation of one signal: a transmission, and what is added to it.
 
 #include <optional>
 #include <string>
@@ -39,6 +39,6 @@ SignalVerdict JudgeSignal(const SignalSeries& series, const std::vector<SignalSe
 /// An explanation without faults.
 Explanation StartExplanation(const SignalVerdict& verdict, CauseChannel channel);
 /// One explanation for each fault, with what would do in its place.
-void TellVerdict(const SignalVerdict& verdict, CauseChannel channel, Causes* causes);
+void AddExplanations(const SignalVerdict& verdict, CauseChannel channel, Causes* causes);
 
 }  // namespace dexcheck

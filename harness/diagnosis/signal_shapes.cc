@@ -69,7 +69,7 @@ class ShapeList {
   void AddLimits() {
     const std::string& unit = series_.name.unit;
     const double most = got_.abs().maxCoeff();
-    // Where a joint is has no largest size: encoders count on.
+    // Positions have no limit: encoders count on.
     const bool has_limit = series_.name.group != "joint positions";
     if (has_limit && most > 0.0 && most < u_.abs().maxCoeff()) Add("limit", unit, most, false);
     if (series_.name.group != "motors") return;
@@ -110,7 +110,7 @@ class ShapeList {
     }
     // Multiples of what is hardly more than rounding are any values.
     if (!(step > 1e2 * exact)) return;
-    // Of those that the largest may be as many of, the one that leaves least.
+    // The best step is the one that leaves least, with the largest value as many of it.
     const double count_of_largest = std::round(largest / step);
     double least = std::numeric_limits<double>::infinity();
     const int tried = rounding > exact ? 100 : 0;  // on each side
@@ -149,7 +149,7 @@ class ShapeList {
       Add("stuck at", series_.name.unit, got_[0], false);
   }
 
-  /// What is moved follows at a distance, on both sides.
+  /// The moved part follows at a distance, on both sides.
   void AddPlay() {
     const ArrayXd off = got_ - u_;
     const double half = off.abs().maxCoeff();
@@ -163,7 +163,7 @@ class ShapeList {
   [[nodiscard]] std::vector<SignalShape> Take() { return std::move(shapes_); }
 
  private:
-  /// Of what has only one value: of any step that is large enough and divides it, the largest.
+  /// Adds the largest step that divides a signal of only one value.
   void AddOneStep() {
     constexpr double kCoarsest = 2.0 * kPi / 1024.0;  // rad or m, of the coarsest encoders of robots' joints
     const double least = 2.0 * (got_ - u_).abs().maxCoeff();
@@ -250,7 +250,7 @@ SignalSteps FindSteps(const SignalSeries& series) {
   for (Index i = first; i <= last; ++i)
     if (series.has_history[static_cast<size_t>(i)]) steps.rows.push_back(i);
   if (first > last) return steps;
-  // What is over so soon is looked at all the same, and what came before was as it is at the first.
+  // Short events are kept; the history before the first sample is taken as constant.
   if (static_cast<Index>(steps.rows.size()) < kFewestSteps) {
     steps.rows.clear();
     for (Index i = first; i <= last; ++i) steps.rows.push_back(i);

@@ -1,6 +1,6 @@
 #pragma once
 
-// What a motor or a sensor may make of its signal: candidates for what it gave.
+// The shapes that a motor or a sensor may give its signal.
 
 #include <string>
 #include <vector>
@@ -33,7 +33,7 @@ struct SignalSteps {
 
 SignalSteps FindSteps(const SignalSeries& series);
 
-/// What a transmission makes of the signal, before gain and offset.
+/// The output of a transmission, before gain and offset.
 struct SignalShape {
   std::string fault;  // empty for the signal itself
   std::string unit, detail;
@@ -46,7 +46,7 @@ struct SignalShape {
   int changes = 0;
 };
 
-/// What this fault alone makes of a series from a step on, at all steps; empty for one that no signal follows
+/// Returns the output of this fault alone from a step on, at all steps; empty for one that no signal follows
 /// from.
 VectorXd Transmit(const Fault& fault, const SignalSeries& series, Eigen::Index begin = 0);
 /// e^(-step / time) of a lag, of the step of a series.

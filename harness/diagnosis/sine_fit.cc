@@ -43,7 +43,7 @@ class SineSearch {
   }
 
  private:
-  /// What a sine of this frequency leaves of y.
+  /// Returns the residual of y beside a sine of this frequency.
   double Try(double frequency) {
     const double w = 2.0 * kPi * frequency;
     columns_.col(0) = (w * x_).sin();

@@ -1,6 +1,6 @@
 #pragma once
 
-// What a step leaves of the balances, and what faults of size 1 would leave, both whitened.
+// The residual of the balances at a step, and the columns of faults of size 1, both whitened.
 
 #include <string>
 #include <vector>
@@ -20,20 +20,20 @@ inline constexpr const char* kBearing = "dry friction of the bearing";
 inline constexpr const char* kStuckBearing = "dry friction of a bearing that sticks";
 inline constexpr const char* kForce = "force at its centre of mass";
 inline constexpr const char* kForceInAxes = "force at its centre of mass, in its axes";
-/// Of one direction in the world, and of one that turns with the body.
+/// A force of one direction in the world, and of one that turns with the body.
 inline constexpr const char* kForceAtPoint = "force";
 inline constexpr const char* kForceAtPointInAxes = "force, in its axes";
 inline constexpr const char* kMomentInAxes = "moment, in its axes";
 inline constexpr const char* kMassWithInertia = "mass and inertia";
 inline constexpr const char* kCenter = "centre of mass off by";
-/// Where what it does to the inertia does not show.
+/// A centre of mass whose effect on the inertia does not show.
 inline constexpr const char* kCenterAlone = "centre of mass off by, alone";
 inline constexpr const char* kGravity = "gravity off by";
 /// Along itself.
 inline constexpr const char* kGravitySize = "size of gravity off by";
 inline constexpr const char* kWorld = "world";  // its place
 inline constexpr const char* kContact = "contact further along the normal by";
-/// What follows the name of a force, a moment or a torque that grows evenly in time.
+/// The ending of the name of a force, a moment or a torque that grows evenly in time.
 inline constexpr const char* kGrows = " that grows by";
 }  // namespace force_fault
 
@@ -102,7 +102,7 @@ class StepForces {
   /// Plausible sizes of `count` amplitudes: that times the weight or mass of all.
   [[nodiscard]] VectorXd Weights(Eigen::Index count) const { return VectorXd::Constant(count, weight_); }
   [[nodiscard]] VectorXd Masses(Eigen::Index count) const { return VectorXd::Constant(count, mass_); }
-  /// Of a centre of mass, and of the inertia about the old one.
+  /// Plausible sizes of a centre of mass, and of the inertia about the old one.
   [[nodiscard]] VectorXd Moved() const;
   Candidate& AddForceAtPoint(std::vector<Candidate>* candidates, const std::string& place);
   void AddRobot(Candidate* candidate, const Eigen::Ref<const MatrixXd>& f) const;
@@ -115,7 +115,7 @@ class StepForces {
   void AddObjectForces(std::vector<Candidate>* candidates);
   void AddGravity(std::vector<Candidate>* candidates);
   void AddWheels(std::vector<Candidate>* candidates);
-  /// What contacts do that are not where they are declared to be: n x f on object and finger.
+  /// Adds contacts that are not where they are declared to be: n x f on object and finger.
   void AddContacts(std::vector<Candidate>* candidates);
 
   const StepStore& store_;

@@ -9,7 +9,7 @@
 namespace dexcheck {
 namespace {
 
-/// What one fingertip's contact adds to a reading.
+/// The entries of a reading that one fingertip's contact adds.
 constexpr const char* kContactEntries[][2] = {
     {"contact u on the object", "rad"},    {"contact v on the object", "rad"},
     {"contact u on the fingertip", "rad"}, {"contact v on the fingertip", "rad"},
@@ -124,7 +124,7 @@ void StepStore::PackReading(const Reading& reading, const Reading& declared,
   entries.setZero();
   entries.head(p) = state.q;
   entries.segment(p, n) = state.xi;
-  // Of the orientation, the rotation from the declared one: log(R_declared^T R).
+  // The orientation is kept as the rotation from the declared one: log(R_declared^T R).
   const Matrix3d R = declared.state.X_Bo.linear().transpose() * state.X_Bo.linear();
   entries.segment<kObjectSize>(p + n) << state.X_Bo.translation(), 0.5 * (R(2, 1) - R(1, 2)),
       0.5 * (R(0, 2) - R(2, 0)), 0.5 * (R(1, 0) - R(0, 1)), state.V_Bo;
@@ -165,7 +165,7 @@ void StepStore::Pack(const StepRecord& step, const StepAnalysis& now, Judged jud
   at(kUneven).setZero();
   at(kDryFriction).setZero();
   if (has_forces) {
-    // What motors did not give is theirs, and no force of its own.
+    // Torques that motors did not give are their fault, and no force of its own.
     force_ = step.drive.tau - response.motor_torques;
     actuation_.CalcForce(force_, force_);
     at(kRobotResidual) = now.robot.residual + force_;
@@ -178,7 +178,7 @@ void StepStore::Pack(const StepRecord& step, const StepAnalysis& now, Judged jud
         force -= std::clamp(force, -declared, declared);
       }
     }
-    // As the bounds of the inverse dynamics have it, an entry.
+    // The bounds of the inverse dynamics have it so, by entry.
     at(kNoise) << 1e-6 * now.robot.balanced / std::sqrt(static_cast<double>(force_.size())),
         1e-9 * std::max(now.findings.f_c.norm(), 1e-3) / std::sqrt(6.0);
     // The columns of causes are those of a platform that is level and rolls: gravity along a floor that

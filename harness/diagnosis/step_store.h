@@ -31,8 +31,8 @@ class StepStore {
   /// Torques pass a gear once and back.
   static constexpr double kTorqueRounding = 1e-14;
 
-  /// What of a step can be judged: all; no forces, as of the first contacts; no torques either, which a motor
-  /// refused.
+  /// The parts of a step that can be judged: all; no forces, as of the first contacts; no torques either,
+  /// which a motor refused.
   enum class Judged { kAll, kSignals, kReadings };
 
   /// Signals of a step, and their sizes: n of xi, m of a reading.
@@ -88,7 +88,7 @@ class StepStore {
   };
   [[nodiscard]] const std::vector<Span>& motor_spans() const { return motor_spans_; }
   [[nodiscard]] const std::vector<Span>& reading_spans() const { return reading_spans_; }
-  /// Of the check `rolling`, m/s.
+  /// Residual of the check `rolling`, m/s.
   [[nodiscard]] double rolling_bound() const { return rolling_bound_; }
   [[nodiscard]] JudgedLaw* law() const { return law_; }
   [[nodiscard]] const std::vector<SignalName>& readings() const { return readings_; }

@@ -13,7 +13,7 @@ Explanation StartExplanation(const StepStore& store, CauseChannel channel,
   start.to = time(0, steps.back());
   start.ends = steps.back() + kLast < store.size();
   const double time_step = store.setup().scenario().plant.time_step;
-  // What lies between two steps that are kept, beside the one that is seen.
+  // The time between two steps that are kept, beside the one that is seen.
   const auto find_gap = [&](Eigen::Index after) {
     const double apart = time(0, after) - time(0, after - 1);
     return apart > 1.5 * time_step ? apart - time_step : 0.0;
@@ -23,7 +23,7 @@ Explanation StartExplanation(const StepStore& store, CauseChannel channel,
   return start;
 }
 
-Fault TellNumber(const Candidate& candidate, const VectorXd& amplitude, const VectorXd& error) {
+Fault DescribeNumber(const Candidate& candidate, const VectorXd& amplitude, const VectorXd& error) {
   return {candidate.fault,
           candidate.place,
           candidate.nominal + amplitude[0],
@@ -32,8 +32,9 @@ Fault TellNumber(const Candidate& candidate, const VectorXd& amplitude, const Ve
           ""};
 }
 
-Causes TellSelection(const Explanation& start, const CauseSelection& selection,
-                     std::span<const Candidate> candidates, const TellCandidate& tell, bool is_explained) {
+Causes DescribeSelection(const Explanation& start, const CauseSelection& selection,
+                         std::span<const Candidate> candidates, const DescribeCandidate& tell,
+                         bool is_explained) {
   Causes causes;
   for (const CauseTerm& term : selection.terms) {
     Explanation& one = causes.emplace_back(start);

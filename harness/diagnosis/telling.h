@@ -17,16 +17,17 @@ Explanation StartExplanation(const StepStore& store, CauseChannel channel,
                              const std::vector<Eigen::Index>& steps);
 
 /// How a candidate with this amplitude is told. @param error empty where it is not known.
-using TellCandidate =
+using DescribeCandidate =
     std::function<Fault(const Candidate& candidate, const VectorXd& amplitude, const VectorXd& error)>;
 
 /// One number: the nominal value and the amplitude.
-Fault TellNumber(const Candidate& candidate, const VectorXd& amplitude, const VectorXd& error);
+Fault DescribeNumber(const Candidate& candidate, const VectorXd& amplitude, const VectorXd& error);
 
-/// As `start`, an explanation for each candidate that is chosen, with what would do in its place.
+/// Returns copies of `start`, an explanation for each candidate that is chosen, with what would do in its
+/// place.
 /// @param is_explained whether that is enough.
-Causes TellSelection(const Explanation& start, const CauseSelection& selection,
-                     std::span<const Candidate> candidates, const TellCandidate& tell,
-                     bool is_explained = true);
+Causes DescribeSelection(const Explanation& start, const CauseSelection& selection,
+                         std::span<const Candidate> candidates, const DescribeCandidate& tell,
+                         bool is_explained = true);
 
 }  // namespace dexcheck

@@ -26,7 +26,7 @@ Visible FindVisible(const Candidate& candidate, double noise) {
     if (!(size > 0.0) || (is_bounded && size * scale[0] < noise)) return {};
     return {C, MatrixXd::Identity(1, 1), VectorXd::Ones(1)};
   }
-  // Of C diag(scale) = U S V^T those with S above the noise.
+  // The visible ones are those of C diag(scale) = U S V^T with S above the noise.
   const VectorXd size = C.colwise().norm().transpose();
   const VectorXd unit =
       is_bounded ? scale : VectorXd(size.unaryExpr([](double s) { return s > 0.0 ? 1.0 / s : 0.0; }));
@@ -129,7 +129,7 @@ double VisibleColumns::CalcExactly(size_t candidate, const MatrixXd& Q, VectorXd
     const double size = own.col(k).norm();
     if (!(size > independent_ * sizes_[begin + k])) continue;
     own.col(k) /= size;
-    // By subtraction, since squares that nearly cancel say nothing of what is left.
+    // The residual is subtracted, since squares that nearly cancel have no digits left.
     r -= own.col(k).dot(r) * own.col(k);
     for (Index j = k + 1; j < own.cols(); ++j) own.col(j) -= own.col(k).dot(own.col(j)) * own.col(k);
   }

@@ -9,7 +9,7 @@
 
 namespace dexcheck {
 
-/// What of a candidate shows above the noise: amplitudes are basis * a.
+/// The part of a candidate that shows above the noise: amplitudes are basis * a.
 struct Visible {
   MatrixXd columns;  // N x r
   MatrixXd basis;    // p x r
@@ -35,7 +35,7 @@ class VisibleColumns {
   }
   /// Without its columns.
   [[nodiscard]] const Visible& visible(size_t candidate) const { return visible_[candidate]; }
-  /// Of these, side by side.
+  /// Returns the columns of these, side by side.
   [[nodiscard]] MatrixXd Collect(const std::vector<size_t>& set) const;
 
   /// Square of what each candidate leaves of y beside others, to 1e-8 of `floor` and itself.

@@ -12,7 +12,7 @@
 namespace dexcheck {
 namespace {
 
-/// The body that carries the joints which move `body`: itself, or the one it is welded to.
+/// Returns the body that carries the joints which move `body`: itself, or the one it is welded to.
 int MovingBody(const mjModel& engine, int body) { return engine.body_weldid[body]; }
 
 bool IsRound(int geom_type) {
@@ -20,7 +20,8 @@ bool IsRound(int geom_type) {
          geom_type == mjGEOM_ELLIPSOID;
 }
 
-/// Radius that a body rolls on: of its round geoms that can touch something, or of all when none can.
+/// Returns the radius that a body rolls on: of its round geoms that can touch something, or of all if none
+/// can.
 double CalcRollingRadius(const mjModel& engine, int body) {
   double touching = 0.0;
   double any = 0.0;
@@ -35,7 +36,7 @@ double CalcRollingRadius(const mjModel& engine, int body) {
 
 constexpr int kNoBody = -1;
 
-/// By JointType.
+/// Types of the engine's joints by JointType.
 constexpr std::array<std::pair<mjtJoint, const char*>, 3> kJointKinds = {
     {{mjJNT_HINGE, "hinge"}, {mjJNT_SLIDE, "slide"}, {mjJNT_BALL, "ball"}}};
 
@@ -45,8 +46,8 @@ bool HasJointBehind(const mjModel& engine, int joint) {
   return joint + 1 < engine.body_jntadr[body] + engine.body_jntnum[body];
 }
 
-/// The body of a joint's link: by name, or by the joint when the MJCF gives the body none. Of several joints
-/// that one body has, only the last moves it; the others' links have no body.
+/// Returns the body of a joint's link: by name, or by the joint when the MJCF gives the body none. Only the
+/// last of several joints of one body moves it; the others' links have no body.
 template <typename Need>
 int FindLinkBody(const mjModel& engine, const Joint& joint, int joint_id, const Need& need) {
   if (joint_id >= 0) {
@@ -57,7 +58,7 @@ int FindLinkBody(const mjModel& engine, const Joint& joint, int joint_id, const 
   return need(mjOBJ_BODY, "body", joint.link);
 }
 
-/// The wheels' and base's joints of an MJCF are known by name or place; everything else must be in the
+/// Lists the wheels' and base's joints of an MJCF, known by name or place; all others must be in the
 /// parameters.
 std::set<int> ListBaseJoints(const RobotModel& model, const mjModel& engine) {
   std::set<int> joints;
@@ -88,7 +89,7 @@ void Adapter::MatchJoints(const std::string& engine_source) {
   const mjModel& engine = *engine_;
   const auto fail = [&](const std::string& problem) { throw InputError(engine_source + ": " + problem); };
 
-  // First what is missing in either description, in one line.
+  // The missing parts of either description are listed first, in one line.
   std::vector<std::string> only_in_model;
   std::set<int> known = ListBaseJoints(*model_, engine);
   const auto need = [&](mjtObj type, const std::string& kind, const std::string& name) {
@@ -136,7 +137,7 @@ void Adapter::MatchJoints(const std::string& engine_source) {
     fail(problem);
   }
 
-  // Then that each joint is of one kind and moves the link of one name, carried by the same parent.
+  // Each joint must have one kind, move the link of one name, and hang on the same parent.
   for (int i = 0; i < model_->num_joints(); ++i) {
     const Joint& joint = model_->joint(i);
     const int id = joint_ids_[static_cast<size_t>(i)];

@@ -1,7 +1,7 @@
 #pragma once
 
-// Between the two worlds: which joint, body and site of the engine's model is which of the analytic model,
-// and how coordinates and velocities translate.
+// The map between the two worlds: which joint, body and site of the engine's model is which of the analytic
+// model, and how coordinates and velocities translate.
 
 #include <mujoco/mujoco.h>
 
@@ -15,21 +15,20 @@
 
 namespace dexcheck {
 
-/// A driving wheel as the MJCF has it: everything is read from the engine's model, nothing from the
-/// parameters.
+/// A driving wheel of the MJCF, read from the engine's model alone and not from the parameters.
 struct EngineWheel {
   int joint = -1;
   int dof = -1;
-  double radius = 0.0;       ///< Of the round geom that touches the floor, m.
+  double radius = 0.0;       ///< Radius of the round geom that touches the floor, m.
   Vector3d center{0, 0, 0};  ///< In Sigma_0 at the reference pose, m.
   Vector3d axis{0, 1, 0};    ///< Hinge axis in Sigma_0; +y makes positive rates roll forward.
 };
 
 /// Matches the analytic model with an engine's model by joint and body names and maps q', xi to qpos, qvel.
 ///
-/// q_i is the engine's position of the joint of the same name, and of a ball joint its quaternion. The base's
+/// q_i is the engine's position of the joint of the same name; a ball joint has its quaternion. The base's
 /// q_v = 0 is the pose that the MJCF gives to the base's body. The base may move by a free joint, or by two
-/// slides and a hinge; a differential drive has a hinge per wheel besides. A floating base's Sigma_0 is the
+/// slides and a hinge; a differential drive also has a hinge per wheel. A floating base's Sigma_0 is the
 /// frame of its body, which moves by a free joint: its q_v and v are the engine's. qvel = T velocity, where T
 /// has dense base columns and one entry per joint.
 class Adapter {
@@ -45,48 +44,47 @@ class Adapter {
   [[nodiscard]] const std::vector<int>& joint_ids() const { return joint_ids_; }
   /// Engine's dof address of each velocity of the model's joints.
   [[nodiscard]] const std::vector<int>& joint_dofs() const { return joint_dofs_; }
-  /// Engine's body id of each link: base first, then by joint; -1 for links between several joints that one
-  /// body has.
+  /// Engine's body id of each link: base first, then by joint; -1 between several joints of one body.
   [[nodiscard]] const std::vector<int>& link_bodies() const { return link_bodies_; }
   /// All engine bodies that move as one with a link (welded to it), by the link's index + 1.
   [[nodiscard]] const std::vector<std::vector<int>>& welded_bodies() const { return welded_bodies_; }
-  /// Engine's site of each frame of the model; -1 of one that has its link's name and no site, and is the
-  /// frame of the link's body.
+  /// Engine's site of each frame of the model; -1 for a frame without a site that has its link's name, and is
+  /// the frame of the link's body.
   [[nodiscard]] const std::vector<int>& frame_sites() const { return frame_sites_; }
   /// Engine's geom of a fingertip (FindTipSphere). @throws InputError unless it can touch.
   [[nodiscard]] int RequireTipGeom(int frame) const;
   /// Engine's body of the object; -1 without one.
   [[nodiscard]] int object_body() const { return object_body_; }
-  /// Where qpos and qvel have the joint that moves it; -1 without one.
+  /// Addresses in qpos and qvel of the joint that moves it; -1 without one.
   [[nodiscard]] int object_qpos() const { return object_qpos_; }
   [[nodiscard]] int object_dof() const { return object_dof_; }
   /// Right and left wheel; empty unless the base is a differential drive.
   [[nodiscard]] const std::vector<EngineWheel>& wheels() const { return wheels_; }
 
   /// Engine's joints that are no part of the robot, since nothing joins them to it (robot_tree.h): objects in
-  /// the scene beside a robot whose base is fixed or floats. Terms leave them out.
+  /// the scene beside a robot whose base is fixed or floats. They have no terms.
   [[nodiscard]] const std::vector<int>& other_joints() const { return other_joints_; }
 
   /// Engine's joints that move the base: none, a free joint, or slide, slide, hinge.
   [[nodiscard]] const std::vector<int>& base_joints() const { return base_joints_; }
-  /// Rates of those joints' dofs when the base yaws and its anchor (the point whose velocity the joints have:
-  /// origin of the free body, or the hinge's axis) moves; also what accelerations become. `rates` has 0, 6 or
-  /// 3 entries.
+  /// Calculates the rates of those joints' dofs when the base yaws and its anchor moves; the same map takes
+  /// accelerations. The anchor is the point whose velocity the joints have: the free body's origin, or the
+  /// hinge's axis. `rates` has 0, 6 or 3 entries.
   void CalcBaseRates(const Vector3d& anchor_velocity, double yaw_rate, Eigen::Ref<VectorXd> rates) const;
-  /// Pose in Sigma_0 of the free joint's body, or of the hinge's anchor, along whose axes nothing turns.
+  /// Pose in Sigma_0 of the free joint's body, or of the hinge's anchor, which has axes along Sigma_0's.
   [[nodiscard]] const Pose& X_0b() const { return X_0b_; }
   /// The anchor in Sigma_0, m.
   [[nodiscard]] const Vector3d anchor() const { return X_0b_.translation(); }
 
-  /// Robot's part of qpos for q' (rolling leaves no mark on the wheels' angles, which are set to zero).
+  /// Sets the robot's part of qpos for q'. Wheel angles are set to zero, since q' does not have them.
   void SetPositions(const Eigen::Ref<const VectorXd>& q, mjtNum* qpos) const;
 
-  /// q' from the engine's qpos: of a floating base its pose; otherwise yaw and midpoint, tilt is dropped.
+  /// Reads q' from the engine's qpos: a floating base's pose; otherwise yaw and midpoint, without the tilt.
   void GetPositions(const mjtNum* qpos, Eigen::Ref<VectorXd> q) const;
   /// Pose of Sigma_0 in the world, tilt and height included.
   [[nodiscard]] Pose GetBasePose(const mjtNum* qpos) const;
-  /// Motion of the base's anchor in world axes, from the rates of its joints: linear and angular velocity
-  /// from qvel, or linear and angular acceleration from qacc.
+  /// Reads the motion of the base's anchor in world axes from the rates of its joints: linear and angular
+  /// velocity from qvel, or linear and angular acceleration from qacc.
   void GetBaseMotion(const mjtNum* qpos, const mjtNum* rates, Vector3d* linear, Vector3d* angular) const;
 
  private:

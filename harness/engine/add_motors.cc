@@ -22,7 +22,7 @@ namespace {
 
 using tinyxml2::XMLElement;
 
-/// Of all actuators of a joint, the strongest's.
+/// Returns the force limit of a joint's strongest actuator, N m or N; none where no actuator has one.
 std::optional<double> FindJointLimit(const mjModel& m, int joint) {
   std::optional<double> largest;
   for (int i = 0; i < m.nu; ++i) {
@@ -34,7 +34,7 @@ std::optional<double> FindJointLimit(const mjModel& m, int joint) {
   return largest;
 }
 
-/// What names actuators or their controls, and all actuators.
+/// Deletes all actuators, and the sensors and controls that name them.
 void DeleteActuators(XMLElement* root) {
   for (XMLElement* section : ListChildren(root, "actuator")) root->DeleteChild(section);
   for (XMLElement* section : ListChildren(root, "sensor")) {
@@ -47,7 +47,7 @@ void DeleteActuators(XMLElement* root) {
 
 constexpr const char* kForceRange = "actuatorfrcrange";
 
-/// Of default classes, by name; a class without one has that around it.
+/// Reads the force range of each default class, by name; a class without one has that of the class around it.
 void ReadClasses(const XMLElement& section, std::string range, std::map<std::string, std::string>* classes) {
   const XMLElement* const joint = section.FirstChildElement("joint");
   if (joint != nullptr) range = ReadAttribute(*joint, kForceRange, range);
@@ -123,7 +123,7 @@ void AddMotors(MjcfFile* mjcf, const std::map<std::string, double>& limits) {
       throw InputError(source + ": joint " + NameOf(m, mjOBJ_JOINT, joint) +
                        ": must have a name, so that it can have a motor");
     }
-    // Defaults are the file's; all that a motor could take of them is stated.
+    // Defaults belong to the file: all attributes that a motor could take from them are stated.
     XMLElement* const motor = actuators->InsertNewChildElement("motor");
     motor->SetAttribute("name", name);
     motor->SetAttribute("joint", name);

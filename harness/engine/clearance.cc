@@ -15,15 +15,15 @@ Pose ReadBody(const BodyPoses& bodies, int body) {
   return MapPose(bodies.rotations + 9 * body, bodies.positions + 3 * body);
 }
 
-/// How far a point within `reach` of the frame's origin moved at the most: a rotation's difference from
-/// another stretches by its Frobenius norm over sqrt(2).
+/// Returns the largest motion of a point within `reach` of the frame's origin, m: the difference of two
+/// rotations stretches by its Frobenius norm over sqrt(2).
 double BoundMotion(const Pose& from, const Pose& to, double reach) {
   return (to.translation() - from.translation()).norm() +
          std::sqrt(0.5) * (to.linear() - from.linear()).norm() * reach;
 }
 
-/// From G's origin to the farthest point that turns with the solid, m: what is round about a point, or about
-/// a line's points, is as far from others as these are.
+/// Returns the distance from G's origin to the farthest point that turns with the solid, m. A solid that is
+/// round about a point, or about a line's points, is as far from others as these are.
 double CalcTurningReach(const Solid& s) {
   if (s.shape == Solid::Shape::kSphere) return 0.0;
   if (s.shape == Solid::Shape::kCapsule) return s.size[1];
@@ -34,7 +34,7 @@ bool IsRoundAboutZ(const Solid& s) {
   return s.shape != Solid::Shape::kBox && s.shape != Solid::Shape::kEllipsoid;
 }
 
-/// BoundMotion of what is round about the axis through the frame's origin: turning about it moves nothing.
+/// BoundMotion of a solid that is round about an axis through the frame's origin, whose turn moves nothing.
 double BoundRoundMotion(const Pose& from, const Pose& to, const Vector3d& axis, double reach) {
   return (to.translation() - from.translation()).norm() +
          ((to.linear() - from.linear()) * axis).norm() * reach;
@@ -59,7 +59,7 @@ Vector3d FindAxis(const Solid& s, bool* any) {
   return IsRoundAboutZ(s) && z.cross(p).norm() < kOnAxis ? z : Vector3d(Vector3d::Zero());
 }
 
-/// How far the heights of points within `reach` of the frame's origin changed at the most.
+/// Returns the largest change of the heights of points within `reach` of the frame's origin, m.
 double BoundRise(const Pose& from, const Pose& to, const Vector3d& normal, double reach) {
   return std::abs(normal.dot(to.translation() - from.translation())) +
          ((to.linear() - from.linear()).transpose() * normal).norm() * reach;
@@ -79,7 +79,7 @@ Clearance::Frame Clearance::FrameOf(const mjModel& engine, const WatchedPair& pa
 Clearance::Clearance(const mjModel& engine, const Adapter& adapter, const Solids& solids,
                      std::vector<WatchedPair> pairs)
     : solids_(&solids), pairs_(std::move(pairs)), states_(pairs_.size()) {
-  // Of a base that does not move the two frames are one.
+  // The two frames are one where the base does not move.
   const int base = adapter.link_bodies().front();
   base_body_ = base > 0 && engine.body_weldid[base] != 0 ? base : 0;
   std::vector<MovingBody> moving(static_cast<size_t>(engine.nbody));
@@ -153,7 +153,7 @@ void Clearance::FollowBodies(const BodyPoses& bodies) {
       body.last[frame] = X;
     }
   }
-  // Both bodies of a pair may move, but of a plane that stands still and another the other alone.
+  // Both bodies of a pair may move, but only one where the other is a plane that stands still.
   for (const Frame frame : kFrames) travel_[frame] += (frame == kOverPlanes ? 1.0 : 2.0) * most[frame];
   has_begun_ = true;
 }
@@ -166,7 +166,7 @@ void Clearance::Update(const BodyPoses& bodies, double time) {
     while (!due.empty() && due.front().travel <= travel_[frame]) {
       std::pop_heap(due.begin(), due.end(), later);
       Due& next = due.back();
-      // Of one that overlaps by rounding alone the budget may be less than what travel_ resolves.
+      // The budget of a pair that overlaps by rounding alone may be less than travel_ resolves.
       next.travel = std::nextafter(travel_[frame] + CalcBudget(next.pair, bodies, time),
                                    std::numeric_limits<double>::infinity());
       std::push_heap(due.begin(), due.end(), later);
@@ -187,7 +187,7 @@ double Clearance::BoundChange(int index, const Pose& X_AB) const {
   const Pose& before = states_[static_cast<size_t>(index)].X_AB;
   const Solid& a = solid(pair.a);
   const Solid& b = solid(pair.b);
-  // The plane is seen from the other, or the other from the plane.
+  // The motion is that of the plane in the other's frame, or of the other in the plane's.
   if (b.shape == Solid::Shape::kPlane) {
     return BoundRise(before.inverse(Eigen::Isometry), X_AB.inverse(Eigen::Isometry), Vector3d::UnitZ(),
                      CalcTurningReach(a));
@@ -195,7 +195,7 @@ double Clearance::BoundChange(int index, const Pose& X_AB) const {
   if (a.shape == Solid::Shape::kPlane) {
     return BoundRise(before, X_AB, Vector3d::UnitZ(), CalcTurningReach(b));
   }
-  // Either is seen from the other: so a wheel that spins does not seem to swing the other around it.
+  // Either body's frame may be used: a wheel that spins does not swing the other around it.
   return std::min(BoundSolid(b, before, X_AB),
                   BoundSolid(a, before.inverse(Eigen::Isometry), X_AB.inverse(Eigen::Isometry)));
 }
@@ -211,7 +211,7 @@ double Clearance::CalcBudget(int index, const BodyPoses& bodies, double time) {
   const WatchedPair& pair = pairs_[static_cast<size_t>(index)];
   State& state = states_[static_cast<size_t>(index)];
   const double smallest = nearest_[static_cast<size_t>(pair.pairs)].distance;
-  // What need not be known of a pair that stays above it.
+  // A distance above this level need not be known.
   double level = std::max(0.0, smallest - kResolution);
   const Solid& a = solid(pair.a);
   const Solid& b = solid(pair.b);

@@ -1,6 +1,6 @@
 #pragma once
 
-// Which bodies come near to each other that should not touch.
+// Distances between bodies that should not touch.
 
 #include <array>
 #include <limits>
@@ -15,12 +15,12 @@
 
 namespace dexcheck {
 
-/// Pairs of bodies, by what they belong to.
+/// Classes of pairs, by the owners of the two bodies.
 enum class PairClass {
   kRobotItself,
   kRobotObject,
   kRobotFloor,         ///< Planes of bodies that do not move.
-  kRobotSurroundings,  ///< All else: a table.
+  kRobotSurroundings,  ///< Any other body, such as a table.
   kObjectSurroundings,
 };
 inline constexpr int kPairClassCount = 5;
@@ -34,30 +34,29 @@ struct WatchedPair {
   PairClass pairs = PairClass::kRobotItself;
 };
 
-/// Names of two bodies that may touch; of the world's own geoms, the geom's.
+/// Names of two bodies that may touch; for the world's own geoms, the geom's name.
 using AllowedPair = std::pair<std::string, std::string>;
 
-/// All pairs but those
+/// Lists all pairs except those
 /// - of one body, or of bodies welded to each other, or of two that do not move;
 /// - of neighbours: bodies on either side of a joint, also over a link whose two joints meet in one point;
-/// - whose contact the MJCF declares, or excludes; of the object and of wheels also by contype and
-/// conaffinity;
+/// - whose contact the MJCF declares, or excludes; for the object and wheels also by contype and conaffinity;
 /// - of wheels and planes, on which they roll;
 /// - that are allowed.
 /// @throws InputError when an allowed body is none of the MJCF's. @param source for messages.
 std::vector<WatchedPair> ListWatchedPairs(const mjModel& engine, const Adapter& adapter, const Solids& solids,
                                           const std::vector<AllowedPair>& allowed, const std::string& source);
 
-/// Where the engine's bodies are, as mjData has it (xpos, xmat).
+/// Poses of the engine's bodies, as in mjData (xpos, xmat).
 struct BodyPoses {
   const double* positions;  ///< Origins, 3 each, m.
   const double* rotations;  ///< Row by row, 9 each.
 };
 
-/// Follows how far the solids of watched pairs are apart while bodies move. A pair is measured again when its
-/// bodies may have come near enough to matter: at what they moved at the most, of all bodies, since it was
-/// measured. So most steps measure nothing, no overlap is missed in any of them, and the smallest distance of
-/// a class is known to kResolution. Nothing allocates after construction.
+/// Follows the distances between the solids of watched pairs while bodies move. A pair is measured again when
+/// its bodies may have come near enough to matter, by the largest motion of any body since its last
+/// measurement. Therefore most steps measure nothing, no overlap is missed in any step, and the smallest
+/// distance of a class is known to kResolution. Nothing allocates after construction.
 class Clearance {
  public:
   /// m
@@ -74,7 +73,7 @@ class Clearance {
   Clearance(const mjModel& engine, const Adapter& adapter, const Solids& solids,
             std::vector<WatchedPair> pairs);
 
-  /// The bodies are there.
+  /// Updates the distances for these poses. @param time s.
   void Update(const BodyPoses& bodies, double time);
   /// Forgets the smallest distances so far: time begins anew.
   void Restart();
@@ -82,19 +81,18 @@ class Clearance {
   [[nodiscard]] const std::vector<WatchedPair>& pairs() const { return pairs_; }
   [[nodiscard]] const Solid& solid(int index) const { return solids_->list[static_cast<size_t>(index)]; }
   [[nodiscard]] const Nearest& nearest(PairClass pairs) const { return nearest_[static_cast<size_t>(pairs)]; }
-  /// Of the pairs that overlap in the last update the deepest: depth, m, 0 for none, to kResolution; and
-  /// which.
+  /// Returns the depth of the deepest overlap in the last update, m, to kResolution, or 0; and its pair.
   [[nodiscard]] std::pair<double, int> FindDeepest() const;
-  /// Distances that were measured, so far.
+  /// Number of distances that were measured so far.
   [[nodiscard]] long measured() const { return measured_; }
-  /// Pairs that were looked at, so far: measured, or found to be far enough apart still.
+  /// Number of pairs that were looked at so far: measured, or found to be far enough apart still.
   [[nodiscard]] long looked_at() const { return looked_at_; }
   /// "r_palm and bench".
   [[nodiscard]] std::string Describe(int pair) const;
 
  private:
-  /// In which frame the motion of a pair's bodies is bounded: where the robot itself is concerned, that of
-  /// its base, so that driving changes nothing; over planes that stand still, along their normals alone.
+  /// Frame in which the motion of a pair's bodies is bounded: the base's where the robot itself is concerned,
+  /// so that driving changes nothing; over planes that stand still, along their normals alone.
   enum Frame { kOfBase, kOfWorld, kOverPlanes, kFrameCount };
   static constexpr std::array<Frame, kFrameCount> kFrames = {kOfBase, kOfWorld, kOverPlanes};
   struct MovingBody {
@@ -119,11 +117,11 @@ class Clearance {
   [[nodiscard]] Frame FrameOf(const mjModel& engine, const WatchedPair& pair) const;
   [[nodiscard]] Vector3d CalcAxisOfAll(int body) const;
   void FollowBodies(const BodyPoses& bodies);
-  /// By how much a pair's distance can have changed since it was measured, m.
+  /// Bounds the change of a pair's distance since its last measurement, m.
   [[nodiscard]] double BoundChange(int pair, const Pose& X_AB) const;
-  /// What their distance is not less than, from their origins and reaches, m.
+  /// Returns a lower bound of the distance of two solids, from their origins and reaches, m.
   [[nodiscard]] static double BoundDistance(const Solid& a, const Solid& b, const Pose& X_AB);
-  /// How far the pair may come nearer before it matters.
+  /// Returns how far the pair may approach before it matters, m.
   [[nodiscard]] double CalcBudget(int pair, const BodyPoses& bodies, double time);
   [[nodiscard]] Pose PoseOf(int solid, const BodyPoses& bodies) const;
   void Note(int pair, double distance, double time);
@@ -144,13 +142,13 @@ class Clearance {
   long measured_ = 0, looked_at_ = 0;
 };
 
-// Whether a robot's bodies overlap in a posture.
+// Overlaps of a robot's bodies in a posture.
 
-/// By the collision shapes of an MJCF, and those of what stands around the robot.
+/// Overlaps by the collision shapes of an MJCF, those around the robot included.
 class SelfContact {
  public:
   /// @param joints names of joints with one position, in the order of postures. Pairs of bodies that overlap
-  /// at `usual` always do, as neighbours may, and are left out.
+  /// at `usual` overlap always, as neighbours may, and are left out.
   /// @throws InputError when the MJCF has none of such a name. @param source of messages.
   SelfContact(MjModelPtr model, const std::string& source, const std::vector<std::string>& joints,
               const VectorXd& usual);

@@ -19,7 +19,7 @@ namespace {
 
 // The arrays of an mjModel stand one after the other in its one buffer.
 
-/// What an array's row belongs to: "name_bodyadr" has "nbody" rows.
+/// Name of an array, and of the size that counts its rows: "name_bodyadr" has "nbody" rows.
 struct ArrayName {
   std::string_view name;
   std::string_view rows;
@@ -39,7 +39,7 @@ void ForEachArray(mjModel* m, const Visit& visit) {
 }
 #undef DEXCHECK_VISIT
 
-/// Where the next array begins that may begin at `offset`: each is at a multiple of 64 bytes.
+/// Returns the first offset from `offset` on at which an array may begin, a multiple of 64 bytes.
 inline size_t AlignArray(size_t offset) {
   constexpr size_t kAlignment = 64;
   return (offset + kAlignment - 1) / kAlignment * kAlignment;
@@ -89,7 +89,7 @@ void ForEachKindOfName(mjModel* m, const Visit& visit) {
   });
 }
 
-/// Where the engine first looks for a name. @param slots of its kind.
+/// Returns the slot at which the engine first looks for a name. @param slots of its kind.
 size_t HashName(const char* name, size_t slots) {
   uint64_t hash = 5381;
   for (; *name != '\0'; ++name) hash = (hash * 33) ^ static_cast<uint64_t>(*name);
@@ -135,7 +135,7 @@ void FillPair(mjModel* m, int pair, const std::pair<int, int>& geoms) {
   }
 }
 
-// Of the largest distance between two bodies that hang on one another.
+// Radii relative to the largest distance between two bodies that hang on one another.
 constexpr double kRodRadius = 0.04;
 constexpr double kBallRadius = 0.07;
 constexpr double kLeastLength = 1e-4;  // m
@@ -144,7 +144,7 @@ constexpr int kFirstHiddenGroup = 3;   // the engine shows groups 0 to 2
 constexpr float kRodColor[4] = {0.80F, 0.82F, 0.85F, 1.0F};
 constexpr float kBallColor[4] = {0.30F, 0.50F, 0.78F, 1.0F};
 constexpr float kDiffuse = 0.7F;  // of the headlight
-constexpr float kAmbient = 0.4F;  // likewise; a floor, seen at an angle, has little else
+constexpr float kAmbient = 0.4F;  // of the headlight; a floor, seen at an angle, has little else
 
 /// A rod between two places of a body, or a ball where they are one, in the body's frame.
 struct Bone {
@@ -169,7 +169,7 @@ bool FloatsFreely(const mjModel& m, int body) {
   return m.body_jntnum[body] > 0 && m.jnt_type[m.body_jntadr[body]] == mjJNT_FREE;
 }
 
-/// Of a model without lights, or with lamps that reach one place only: the engine's own headlight leaves it
+/// Brightens a model without lights, or with lamps that reach one place only, which the headlight leaves
 /// dark.
 void Brighten(mjModel* m) {
   for (int light = 0; light < m->nlight; ++light) {
@@ -290,7 +290,7 @@ size_t RemovePictures(MjModelPtr* model) {
   if (m.ntex == 0) return 0;
   const auto before = static_cast<size_t>(m.nbuffer);
   *model = MakeResizedCopy(m, [](mjModel* smaller) { smaller->ntex = smaller->ntexdata = 0; });
-  // In later releases a material has several. An empty array lies where the next one begins: names tell them.
+  // Names distinguish arrays at one address: an empty array lies where the next one begins.
   ForEachArray(model->get(), [&]<typename Number>(Number*& array, size_t rows, size_t columns,
                                                   const ArrayName& array_name) {
     if constexpr (std::is_same_v<Number, int>) {
@@ -355,7 +355,7 @@ MjModelPtr MakeVisible(MjModelPtr model) {
   for (const int geom : geoms) {
     if (all_hidden) model->geom_group[geom] = 0;
   }
-  // Of a robot of feet alone nothing else would be seen.
+  // Shapes suffice on half of the moving bodies: a robot of feet alone would be invisible.
   int moving = 0, shaped = 0;
   for (int body = 1; body < model->nbody; ++body) {
     if (model->body_jntnum[body] == 0) continue;

@@ -32,7 +32,7 @@ constexpr int kEngineFailureExitCode = 3;
 // Without these the engine writes MUJOCO_LOG.TXT into the working directory.
 void InstallMessageHandlers() {
   mju_user_warning = [](const char* message) {
-    // Without the place; CheckFinite names it.
+    // This warning has no place; CheckFinite names it.
     if (std::strstr(message, "XML contains a 'NaN'") != nullptr) return;
     std::fprintf(stderr, "dexcheck: MuJoCo warning: %s\n", message);
   };
@@ -55,7 +55,7 @@ void PrepareEngine() {
   InstallExactCollision();
 }
 
-/// What was said of the files that were loaded; commands load a file more than once.
+/// Notes on the files that were loaded; commands load a file more than once.
 struct LoadNotes {
   std::mutex mutex;
   std::vector<std::string> texts;
@@ -82,7 +82,7 @@ std::string OneLine(std::string text) {
   return text;
 }
 
-/// What to do about what the engine's compiler refuses.
+/// Returns advice on a refusal of the engine's compiler; empty where there is none.
 std::string Advise(const std::string& message) {
   for (const char* unresolved :
        {"not found in", "unrecognized name", "unknown default", "invalid qpos size"}) {
@@ -133,7 +133,7 @@ MjModelPtr LoadDocument(const MjcfFile& mjcf) {
   return LoadText(mjcf.PrintFor(CurrentFolder()), mjcf.source());
 }
 
-/// Entries of M that are zero as the bodies stand may not be left out of it: their masses may be moved.
+/// Keeps entries of M that are zero for the compiled masses, since the masses may be changed.
 void LeaveBodiesGeneral(MjcfFile* mjcf) {
   if (!kHasSimpleBodies) return;
   VisitElements(mjcf->root(), [](tinyxml2::XMLElement* element) {
@@ -142,7 +142,7 @@ void LeaveBodiesGeneral(MjcfFile* mjcf) {
   });
 }
 
-/// @param load what loads it when nothing need be changed.
+/// @param load loads the file when nothing need be changed.
 template <typename Load>
 MjModelPtr LoadAdapted(MjcfFile* mjcf, const Load& load) {
   AdaptMjcf(mjcf);
@@ -169,14 +169,14 @@ constexpr std::string_view kIntegers =
     " nuser_jnt nuser_geom nuser_site nuser_cam nuser_tendon nuser_actuator nuser_sensor group contype"
     " conaffinity condim priority subgrid offwidth offheight shadowsize offsamples numslices numstacks"
     " numquads nrow ncol dim";
-/// Those that are sizes of memory, and the most that is accepted of them: each model fits into some 1 GB.
+/// Attributes that are sizes of memory, with the largest accepted value: each model fits into some 1 GB.
 constexpr std::pair<std::string_view, double> kSizes[] = {
     {"width height nrow ncol offwidth offheight shadowsize", 1 << 13},
     {"njmax nconmax nuserdata nkey nuser_body nuser_jnt nuser_geom nuser_site nuser_cam nuser_tendon"
      " nuser_actuator nuser_sensor",
      1 << 20},
     {"nstack", 1 << 26}};
-/// Those of which there may be fewer numbers than the most. At a blank behind the last one, 2.2.2 reads that
+/// Attributes that may have fewer numbers than the most. At a blank after the last number, 2.2.2 reads it
 /// once more: "1 " as a friction of 1 1 0.0001.
 constexpr std::string_view kOpenLists =
     "o_solref o_solimp solref solimp solreflimit solimplimit solreffriction solimpfriction"
@@ -199,14 +199,14 @@ bool IsNumbers(const char* text, bool integer) {
   return !integer || count == 1;
 }
 
-/// The most of an attribute that is a size; infinite for others.
+/// Returns the largest value of an attribute that is a size; infinite for others.
 double MostOf(std::string_view name) {
   const auto* const size =
       std::ranges::find_if(kSizes, [&](const auto& one) { return IsAmong(one.first, name); });
   return size == std::end(kSizes) ? std::numeric_limits<double>::infinity() : size->second;
 }
 
-/// The product of a text's numbers.
+/// Returns the product of a text's numbers.
 double Multiply(const char* text) {
   double product = 1.0;
   for (char* end = nullptr;; text = end) {

@@ -1,4 +1,4 @@
-// What the engine has at the state set: poses, Jacobians, motions, object, contacts.
+// Queries of the engine at the state set: poses, Jacobians, motions, object, contacts.
 
 #include "harness/engine/engine_terms.h"
 #include "harness/engine/map_vector.h"
@@ -8,7 +8,7 @@ namespace dexcheck {
 namespace {
 
 /// Gap up to which CalcTouch looks for the nearest points, m: much more than contacts are compared at, and
-/// not more than the engine's general method for convex bodies bears.
+/// within the range of the engine's general method for convex bodies.
 constexpr double kTouchMargin = 0.1;
 
 }  // namespace
@@ -65,7 +65,7 @@ std::vector<LinkInWorld> EngineTerms::links() const {
     for (const int body : welded) {
       const RotationMap R(d->ximat + 9 * body);
       const Vector3d arm = MapVector(d->xipos + 3 * body) - link.com;
-      // Parallel axes: m (|r|^2 1 - r r^T) besides.
+      // The parallel-axis theorem adds m (|r|^2 1 - r r^T).
       link.inertia += R * MapVector(m->body_inertia + 3 * body).asDiagonal() * R.transpose() +
                       m->body_mass[body] * (arm.squaredNorm() * Matrix3d::Identity() - arm * arm.transpose());
     }

@@ -11,9 +11,8 @@
 namespace dexcheck {
 namespace {
 
-/// qfrc_passive, those of tendons included, after positions (mj_comPos) and velocities (mj_comVel): springs,
-/// damping, fluid. The engine's mj_passive alone takes the tendons' lengths and rates as they happen to
-/// stand.
+/// Calculates qfrc_passive, tendons included, after positions (mj_comPos) and velocities (mj_comVel):
+/// springs, damping, fluid. The engine's mj_passive alone uses old lengths and rates of tendons.
 void CalcPassiveForces(const mjModel& model, mjData* data) {
   if (model.ntendon > 0) {
     mj_tendon(&model, data);
@@ -22,15 +21,14 @@ void CalcPassiveForces(const mjModel& model, mjData* data) {
   mj_passive(&model, data);
 }
 
-/// Dofs from `dof` to the root, itself included.
+/// Lists the dofs from `dof` to the root, itself included.
 int CountAncestors(const mjModel& model, int dof) {
   int count = 0;
   for (int i = dof; i >= 0; i = model.dof_parentid[i]) ++count;
   return count;
 }
 
-/// Whether passive forces depend on where geoms stand: of tendons that wrap around them, of a fluid that
-/// flows about them.
+/// Whether passive forces depend on the places of geoms: tendons wrap around them, a fluid flows about them.
 bool ForcesNeedGeoms(const mjModel& model) {
   const auto is_geom = [](int type) { return type == mjWRAP_SPHERE || type == mjWRAP_CYLINDER; };
   if (std::any_of(model.wrap_type, model.wrap_type + model.nwrap, is_geom)) return true;
@@ -86,7 +84,7 @@ EngineTerms::EngineTerms(const Adapter& adapter, std::span<const int> fingertips
 }
 
 void EngineTerms::DropGeoms() {
-  // Those that touch are placed by CalcTouch. Hardly any robot has forces that need the others.
+  // Geoms that touch are placed by CalcTouch. Forces depend on the others in hardly any robot.
   if (!ForcesNeedGeoms(*engine_)) engine_->ngeom = 0;
 }
 
@@ -274,8 +272,7 @@ void EngineTerms::CalcForces() {
   map_.ProjectForce(force_nv_.data(), coriolis_);
   if (has_object_) object_coriolis_ = force_nv_.segment<6>(adapter_->object_dof());
 
-  // A dof moves the centre of mass of what it carries by v + omega x p, both about the whole tree's centre of
-  // mass.
+  // A dof moves its subtree's centre of mass by v + omega x p, both about the whole tree's centre of mass.
   const Vector3d g = MapVector(adapter_->engine().opt.gravity);
   for (int i = 0; i < m->nv; ++i) {
     const int body = m->dof_bodyid[i];

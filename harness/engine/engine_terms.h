@@ -13,17 +13,17 @@ namespace dexcheck {
 
 /// Motion of a point of a body at constant xi and V_Bo, world axes.
 struct EngineMotion {
-  Vector3d p = Vector3d::Zero();      ///< Where the point is, m.
+  Vector3d p = Vector3d::Zero();      ///< Position of the point, m.
   Vector3d v = Vector3d::Zero();      ///< m/s
-  Vector3d omega = Vector3d::Zero();  ///< Of the body, rad/s.
+  Vector3d omega = Vector3d::Zero();  ///< Angular velocity of the body, rad/s.
   Vector3d a = Vector3d::Zero();      ///< m/s^2
-  Vector3d alpha = Vector3d::Zero();  ///< Of the body, rad/s^2.
+  Vector3d alpha = Vector3d::Zero();  ///< Angular acceleration of the body, rad/s^2.
 
-  /// The same of another point of the body, at `point` in the world.
+  /// Returns the motion of another point of the body, at `point` in the world.
   [[nodiscard]] EngineMotion MoveTo(const Vector3d& point) const;
 };
 
-/// Where the engine's narrow phase has a fingertip and the object meet.
+/// Contact of a fingertip and the object by the engine's narrow phase.
 struct EngineTouch {
   bool found = false;
   double distance = 0.0;                 ///< m, negative when the bodies overlap.
@@ -37,8 +37,7 @@ struct MassEntry {
   int col;
 };
 
-/// Mass properties of a link in the world at the state set: centre of mass, and inertia about it in world
-/// axes.
+/// Mass properties of a link at the state set: centre of mass, and inertia about it, in world axes.
 struct LinkInWorld {
   double mass = 0.0;
   Vector3d com = Vector3d::Zero();
@@ -47,14 +46,14 @@ struct LinkInWorld {
 
 /// The engine's own values of the analytic model's terms, in the same coordinates. Works in a private copy of
 /// the engine's model and data, at states without tilt and with rolling wheels, so that a disagreement is a
-/// disagreement of models. Only what the engine's tree can have different from zero is formed, so that every
-/// step of a run can afford it; whole matrices are expanded from that. What is const, or has "whole" in its
-/// description, is for single states. The rest does not allocate after construction.
+/// disagreement of models. Only entries that can differ from zero by the engine's tree are formed, which is
+/// fast enough for every step of a run; whole matrices are expanded from them. Functions that are const, or
+/// have "whole" in their description, are for single states. The others do not allocate after construction.
 class EngineTerms {
  public:
-  /// All frames, no contacts. The object, if there is one that moves by a free joint, has its terms too.
+  /// Evaluates all frames, and the object if there is one that moves by a free joint; no contacts.
   EngineTerms(const Adapter& adapter, Coordinates coordinates);
-  /// Reduced coordinates; of the frames only these fingertips, with their contacts.
+  /// Evaluates these fingertips alone, with their contacts, in reduced coordinates.
   /// @throws InputError when a fingertip has no sphere that can touch, or the object does not move by a free
   /// joint alone or cannot touch.
   EngineTerms(const Adapter& adapter, std::span<const int> fingertips);
@@ -66,7 +65,7 @@ class EngineTerms {
   void SetState(const Eigen::Ref<const VectorXd>& q, const Eigen::Ref<const VectorXd>& velocity,
                 const Pose& X_Bo = Pose::Identity(), const Vector6d& V_Bo = Vector6d::Zero());
 
-  /// n, entries of the velocity.
+  /// Number n of velocity coordinates.
   [[nodiscard]] int size() const { return map_.size(); }
   /// T^T M T: entries that can differ from zero, column by column, and their values.
   [[nodiscard]] const std::vector<MassEntry>& mass_entries() const { return mass_entries_; }
@@ -75,17 +74,18 @@ class EngineTerms {
   [[nodiscard]] MatrixXd M() const;
   /// Coriolis and centrifugal forces T^T (bias(q, qvel) without gravity + M T_dot velocity) = C velocity.
   [[nodiscard]] const VectorXd& coriolis() const { return coriolis_; }
-  /// T^T of the weights of what each dof moves.
+  /// T^T of the weights that each dof moves.
   [[nodiscard]] const VectorXd& gravity() const { return gravity_; }
-  /// Minus T^T of the engine's passive forces: damping, and whatever else the MJCF has (springs, fluid).
+  /// Minus T^T of the engine's passive forces: damping, and all others of the MJCF (springs, fluid).
   [[nodiscard]] const VectorXd& friction() const { return friction_; }
-  /// C(velocity) w, which only C's matrix knows; both at the q' of SetState. With the forces c(x) = C(x) x,
+  /// Calculates C(velocity) w, which depends on the choice of C's matrix; both at the q' of SetState. With
+  /// the forces c(x) = C(x) x,
   ///   C(x) w = (c(x + w) - c(x - w)) / 4 + T^T M (T_dot(x) w - T_dot(w) x) / 2,
-  /// since without the second part, which is zero where velocities are rates of coordinates, the Christoffel
-  /// choice has C(x) w = C(w) x. Changes what depends on the velocity: call it last.
+  /// since the Christoffel choice has C(x) w = C(w) x but for the second part, which is zero where velocities
+  /// are rates of coordinates. Changes the quantities that depend on the velocity: call it last.
   void CalcCoriolisProduct(const Eigen::Ref<const VectorXd>& velocity, const Eigen::Ref<const VectorXd>& w,
                            Eigen::Ref<VectorXd> result);
-  /// Of the robot.
+  /// Energy and momentum of the robot.
   [[nodiscard]] const EnergyAndMomentum& energy_and_momentum() const { return energy_; }
 
   /// Links, base first.
@@ -109,7 +109,7 @@ class EngineTerms {
 
   // The object: M_hat V_dot + C_hat V + N_o = F_o, in Sigma_o.
   [[nodiscard]] Pose ObjectPose() const;
-  /// Body velocity, back from the engine's.
+  /// Body velocity, from the engine's velocities.
   [[nodiscard]] Vector6d ObjectVelocity() const;
   [[nodiscard]] EngineMotion ObjectMotion() const;
   [[nodiscard]] Matrix6d ObjectInertia() const;
@@ -120,16 +120,15 @@ class EngineTerms {
   /// Rows of a point's velocity by V_Bo, world axes.
   [[nodiscard]] Eigen::Matrix<double, 3, 6> CalcObjectJacobian(const Vector3d& point) const;
 
-  /// The narrow phase on a fingertip's frame and the object, with the robot carried by `shift` from where it
-  /// is.
+  /// Calculates the narrow phase of a fingertip's frame and the object, with the robot moved by `shift`.
   [[nodiscard]] EngineTouch CalcTouch(int frame, const Pose& shift);
 
  private:
-  /// What moves a frame.
+  /// Coordinates that move a frame.
   struct Chain {
     int tip_geom = -1;             ///< Sphere of a fingertip that can touch.
-    std::vector<int> coordinates;  ///< The base's first.
-    std::vector<int> dofs;         ///< The engine's, of the joints among them.
+    std::vector<int> coordinates;  ///< The base's come first.
+    std::vector<int> dofs;         ///< The engine's dofs of the joints among them.
   };
 
   EngineTerms(const Adapter& adapter, Coordinates coordinates, std::span<const int> frames);
@@ -166,8 +165,8 @@ class EngineTerms {
   VectorXd q_;
 
   /// An entry of M_bar' among the joints (column -1) or with a column of the base, at two places in mass_:
-  /// its own and its mirror image's. The address (FindMassEntry) is that of the entry, or of the joint's with
-  /// the base's first dof; the following dofs' are before it.
+  /// its own and its mirror image's. The address (FindMassEntry) belongs to the entry, or to the joint's
+  /// entry with the base's first dof; the following dofs' entries are before it.
   struct MassSource {
     int address;
     int column;

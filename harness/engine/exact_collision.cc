@@ -25,7 +25,8 @@ Pose TorusPose(const mjModel& m, const mjData& d, int geom) {
   return MapPose(d.xmat + 9 * body, d.xpos + 3 * body);
 }
 
-/// @param X where the contacts' numbers stand in the world. @return how many they are.
+/// Fills the engine's contacts. @param X frame of the contacts' numbers in the world. @return how many they
+/// are.
 int PlaceContacts(const Pose& X, std::span<const ExactContact> contacts, CollisionContact* found) {
   for (const ExactContact& contact : contacts) {
     const Vector3d position = X * contact.position;
@@ -62,7 +63,7 @@ int CollideCylinderGeom(const mjModel* m, CollisionData* d, CollisionContact* co
 int CollideEllipsoidGeom(const mjModel* m, CollisionData* d, CollisionContact* con, int g1, int g2,
                          mjtNum margin) {
   const auto collide = [&](const Vector3d& center, double radius, const Vector3d& semi_axes) {
-    // Out of reach the nearest point need not be found.
+    // The nearest point need not be found out of reach.
     if (center.norm() > semi_axes.maxCoeff() + radius + margin) return ExactContact{};
     return CollideSphereEllipsoid(center, radius, semi_axes);
   };
@@ -166,7 +167,7 @@ ExactContact CollideSphereEllipsoid(const Vector3d& center, double sphere_radius
   }
   const double left = 1.0 - on_sphere.squaredNorm();
   if (left > 1e-8) {
-    // In the plane of the longer axes: the shortest one's part is what is left.
+    // The problem in the plane of the longer axes: the rest is the part of the shortest one.
     Eigen::Index shortest = 0;
     a2.minCoeff(&shortest);
     on_sphere[shortest] = std::sqrt(left);

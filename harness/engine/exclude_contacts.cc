@@ -24,8 +24,8 @@ namespace dexcheck {
 
 namespace {
 
-/// Adds the exclusions of pairs of bodies, those that have names; explicit pairs, which they do not stop, go.
-/// @returns "base_link and link_1" of each.
+/// Adds the exclusions of pairs of bodies that have names, and deletes explicit pairs, which exclusions do
+/// not stop. @returns "base_link and link_1" of each.
 std::vector<std::string> Exclude(const mjModel& m, const std::set<std::pair<int, int>>& pairs,
                                  MjcfFile* mjcf) {
   std::vector<std::string> names;
@@ -64,14 +64,15 @@ bool AreNeighbours(const mjModel& m, int one, int other) {
          m.body_weldid[m.body_parentid[other_root]] == root;
 }
 
-/// All that moves is the robot, be it several trees on the world, as fingers are. With the world, or what
-/// stands on it, it is a matter of the motion, unless they overlap before it begins.
+/// Whether the contact of two bodies may be excluded. Every moving body is the robot, also in several trees
+/// on the world, as fingers are. A contact with the world, or with bodies on it, depends on the motion,
+/// unless they overlap before it begins.
 bool MayBeExcluded(const mjModel& m, int one, int other, bool at_start) {
   const int moving = (m.body_weldid[one] != 0 ? 1 : 0) + (m.body_weldid[other] != 0 ? 1 : 0);
   return moving == 2 || (moving == 1 && (at_start || m.body_rootid[one] == m.body_rootid[other]));
 }
 
-/// What the engine lets touch; it pushes apart what is as near as their margin.
+/// Adds the pairs that the engine lets touch and that are nearer than their margin.
 void AddContacts(const mjModel& m, const mjData& data, bool at_start, std::set<std::pair<int, int>>* pairs) {
   for (int i = 0; i < data.ncon; ++i) {
     const mjContact& contact = data.contact[i];
@@ -81,7 +82,7 @@ void AddContacts(const mjModel& m, const mjData& data, bool at_start, std::set<s
   }
 }
 
-/// What a run's clearance is of: shapes that the engine does not let touch, too.
+/// Adds the pairs that a run's clearance finds overlapping, also shapes that the engine lets not touch.
 void AddOverlaps(const mjModel& m, const mjData& data, const Solids& solids, bool at_start,
                  std::set<std::pair<int, int>>* pairs) {
   constexpr double kNear = 1e-3;  // m, which a run's motion is off by
@@ -93,7 +94,7 @@ void AddOverlaps(const mjModel& m, const mjData& data, const Solids& solids, boo
     for (size_t k = 0; k < i; ++k) {
       const Solid& b = solids.list[k];
       const std::pair bodies = std::minmax(a.body, b.body);
-      // The engine and the clearance leave out neighbours, but not a link and what it turns on in the world.
+      // Engine and clearance leave out neighbours, but not a link and the fixed body that it turns on.
       const bool is_left_out = AreNeighbours(m, a.body, b.body) && !(at_start && bodies.first == 0);
       if (!MayBeExcluded(m, a.body, b.body, at_start) || is_left_out || pairs->count(bodies) > 0) continue;
       const Pose X_WA = pose(a), X_WB = pose(b);
@@ -155,7 +156,7 @@ void DeleteSections(const char* name, MjcfFile* mjcf) {
   }
 }
 
-/// Actuators and sensors of tendons, and what constraints touch: the sections themselves are gone.
+/// Deletes actuators and sensors that refer to tendons and constraints, whose sections are gone.
 void DeleteUsers(MjcfFile* mjcf) {
   for (const char* name : {"actuator", "sensor"}) {
     for (XMLElement* section : ListChildren(mjcf->root(), name)) {
@@ -173,7 +174,7 @@ void DeleteWord(XMLElement* element, const char* attribute, MjcfFile* mjcf) {
   element->DeleteAttribute(attribute);
 }
 
-/// With it go the key frames, whose numbers are those of all joints, and its sensors.
+/// Deletes the joint with its sensors, and all key frames, which have numbers of all joints.
 void DeleteJoint(XMLElement* joint, MjcfFile* mjcf) {
   const std::string name = ReadAttribute(*joint, "name");
   for (XMLElement* section : ListChildren(mjcf->root(), "sensor")) {
@@ -215,7 +216,7 @@ void KeepMechanism(MjcfFile* mjcf) {
 
 namespace {
 
-/// What names an element that is gone.
+/// Deletes the elements that refer to one of these names.
 void DeleteNaming(const std::set<std::string>& names, MjcfFile* mjcf) {
   for (const char* kind : {"actuator", "sensor", "contact"}) {
     for (XMLElement* section : ListChildren(mjcf->root(), kind)) {

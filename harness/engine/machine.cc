@@ -20,8 +20,8 @@
 namespace dexcheck {
 namespace {
 
-/// Those that libm's selectors of code check (ifunc-avx-fma4.h, ifunc-fma.h, ifunc-fma4.h, ifunc-sse4_1.h),
-/// as far as they are in use: the processor may have them and the system, or GLIBC_TUNABLES, not allow them.
+/// Features that libm's selectors of code check (ifunc-avx-fma4.h, ifunc-fma.h, ifunc-fma4.h,
+/// ifunc-sse4_1.h), if they are in use: the system, or GLIBC_TUNABLES, may disable features of the processor.
 std::string DescribeProcessor() {
 #if defined(__x86_64__)
   std::string text = "x86_64";
@@ -39,7 +39,7 @@ std::string DescribeProcessor() {
 #endif
 }
 
-/// What the compiler was allowed to use.
+/// Describes the compiler and the instructions that it was allowed to use.
 std::string DescribeBuild() {
   std::string text = "compiled by " __VERSION__;
 #if defined(__AVX__)

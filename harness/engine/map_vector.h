@@ -8,7 +8,7 @@
 
 namespace dexcheck {
 
-/// Three numbers of the engine.
+/// Returns three numbers of the engine as a vector.
 inline Vector3d MapVector(const mjtNum* v) { return {v[0], v[1], v[2]}; }
 
 /// A rotation of the engine, row by row.
@@ -29,7 +29,7 @@ inline Pose ReadPose(const mjtNum* position, const mjtNum* wxyz) {
   return X;
 }
 
-/// Pose that a free joint's seven entries of qpos mean: origin, then a quaternion.
+/// Returns the pose that a free joint's seven entries of qpos state: origin, then a quaternion.
 inline Pose ReadFreePose(const mjtNum* qpos) { return ReadPose(qpos, qpos + 3); }
 
 inline void WriteFreePose(const Pose& X, mjtNum* qpos) {

@@ -19,13 +19,13 @@
 namespace dexcheck {
 namespace {
 
-/// Beyond this the engine takes no coordinate of an STL.
+/// Largest coordinate of an STL that the engine accepts.
 constexpr double kLargestCoordinate = 1 << 30;
 
 /// The vertices of a mesh.
 class Cloud {
  public:
-  /// @return whether the engine can compute with it.
+  /// Adds a point. @return whether the engine can compute with it.
   bool Add(const Eigen::Vector3d& p) {
     if (!(p.cwiseAbs().maxCoeff() <= kLargestCoordinate)) return false;  // nan too
     points_.push_back(p);
@@ -33,8 +33,8 @@ class Cloud {
   }
   [[nodiscard]] size_t size() const { return points_.size(); }
 
-  /// Whether there is no tetrahedron in it, so that the engine's hull (qhull) is none: each corner is the
-  /// point farthest from those before.
+  /// Whether a mesh has no tetrahedron, and so no hull by the engine (qhull): each corner is the point
+  /// farthest from those before.
   [[nodiscard]] bool IsFlat() const {
     if (points_.size() < 4) return true;
     const auto farthest = [&](const auto& distance) {

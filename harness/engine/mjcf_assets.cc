@@ -18,7 +18,7 @@ constexpr const char* kTextureFiles[] = {"file",     "fileright", "fileleft", "f
 
 bool Is(const XMLElement& element, std::string_view name) { return name == element.Name(); }
 
-/// What elements of a class get that do not say it themselves.
+/// Attributes that elements take from their default class where they do not state them.
 class DefaultClasses {
  public:
   /// @param section the `default` of the file, or one within it.
@@ -59,7 +59,7 @@ class DefaultClasses {
   std::map<std::string, Class> classes_;
 };
 
-/// What stands around a geom.
+/// Body and classes that contain a geom.
 struct Surroundings {
   std::string body;
   std::string child_class;
@@ -95,7 +95,7 @@ class AssetSieve {
     }
   }
 
-  /// As the engine does, by the file's name where there is none.
+  /// Returns the name that the engine gives an asset: the file's where the asset states none.
   static std::string NameOf(const XMLElement& asset) {
     const std::filesystem::path file = ReadAttribute(asset, "file");
     return ReadAttribute(asset, "name", file.stem().string());
@@ -121,7 +121,7 @@ class AssetSieve {
     }
   }
 
-  /// A texture keeps its place, with one colour.
+  /// Replaces a texture whose files are at fault by one colour in its place.
   void SieveTexture(XMLElement* texture) {
     textures_.insert(NameOf(*texture));
     for (const char* side : kTextureFiles) {
@@ -197,7 +197,7 @@ class AssetSieve {
     return density == nullptr || std::strtod(density, nullptr) != 0.0;
   }
 
-  /// Materials and textures that no asset is called.
+  /// Deletes references to materials and textures that no asset defines.
   void DropLooks(XMLElement* element) {
     const auto drop = [&](const char* attribute, const std::set<std::string>& known) {
       const char* const name = element->Attribute(attribute);
@@ -209,7 +209,7 @@ class AssetSieve {
     if (Is(*element, "material")) drop("texture", textures_);
   }
 
-  /// Pairs, sensors and the like of geoms that are gone.
+  /// Deletes pairs, sensors and other references to geoms that are gone.
   void DropReferences(XMLElement* section) {
     for (XMLElement* child : ListChildren(section)) {
       for (const char* attribute : {"geom", "geom1", "geom2", "objname", "refname"}) {

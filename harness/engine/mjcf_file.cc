@@ -46,8 +46,7 @@ MjcfFile::MjcfFile(const std::filesystem::path& file, const std::string* text)
   Parse(text != nullptr ? *text : ReadBytes(file));
   if (IsUrdf()) return;
   while (XMLElement* const include = FindInclude(root_)) Splice(include);
-  // As the files themselves: what is not where the file that is loaded has it lies beside the one that names
-  // it.
+  // An asset that is not where the loaded file has it is looked for beside the file that names it.
   for (const AssetFile& asset : ListAssetFiles(root_)) {
     NoteInput(folder_ / asset.path);
     const Place place = ReadPlace(*asset.element);

@@ -1,7 +1,6 @@
 #pragma once
 
-// An MJCF as one document: what it includes is joined, passes change it (mjcf_passes.h), and it is written
-// again in one piece.
+// An MJCF as one document: included files are joined, passes change it (mjcf_passes.h), and it is written.
 
 #include <deque>
 #include <filesystem>
@@ -17,7 +16,7 @@ class XMLElement;
 
 namespace dexcheck {
 
-/// What was done with one word of a file.
+/// A change of one word of a file.
 struct MjcfChange {
   std::string file;
   int line = 0;
@@ -25,25 +24,25 @@ struct MjcfChange {
   std::string what;  ///< "left out: forces of actuators, since MuJoCo 3.0.0"
 };
 
-/// Where an MJCF's assets are, as its `compiler` elements say.
+/// Folders of an MJCF's assets, as its `compiler` elements state.
 struct AssetFolders {
   std::string meshes;  ///< Height fields and skins too.
   std::string textures;
-  bool strips_paths = false;  ///< The engine then takes a file's name only, without its folder.
+  bool strips_paths = false;  ///< Whether the engine takes a file's name only, without its folder.
 
   void Read(const tinyxml2::XMLElement& compiler);
-  /// A file of that name, from the MJCF's folder.
+  /// Returns the path of a file of that name, relative to the MJCF's folder.
   [[nodiscard]] std::filesystem::path Find(const std::string& folder, const std::string& name) const;
 };
 
-/// The elements of an MJCF and of the files that it includes, and where each stood.
+/// The elements of an MJCF and of the files that it includes, with the place of each.
 class MjcfFile {
  public:
-  /// What is included takes the place of its `include`.
+  /// Reads a file; an included file takes the place of its `include`.
   /// @param text of the file, where it was read already.
   /// @throws InputError when a file cannot be read, is not XML, or is included twice.
   explicit MjcfFile(const std::filesystem::path& file, const std::string* text = nullptr);
-  /// A text, whose files are found from the working directory; its `include` elements stay.
+  /// Reads a text, whose files are found from the working directory; its `include` elements stay.
   /// @param source its name in messages. @throws InputError.
   MjcfFile(std::string_view text, const std::string& source);
   ~MjcfFile();
@@ -52,24 +51,24 @@ class MjcfFile {
 
   /// The element `mujoco`.
   [[nodiscard]] tinyxml2::XMLElement* root() const { return root_; }
-  /// Whether it has a `worldbody`: parts for `include` have none.
+  /// Whether the document has a `worldbody`: parts for `include` have none.
   [[nodiscard]] bool HasWorld() const;
-  /// Whether it is no MJCF but a URDF, which the engine reads too.
+  /// Whether the document is a URDF, which the engine reads too.
   [[nodiscard]] bool IsUrdf() const;
   [[nodiscard]] const std::string& source() const { return source_; }
-  /// From which its files are found; absolute.
+  /// Folder from which its files are found; absolute.
   [[nodiscard]] const std::filesystem::path& folder() const { return folder_; }
   /// The files that it includes, relative to its folder.
   [[nodiscard]] const std::vector<std::string>& included() const { return included_; }
-  /// "FILE:LINE" of an element; that of the root for one that was added since.
+  /// Returns "FILE:LINE" of an element; the root's for one that was added since.
   [[nodiscard]] std::string FindPlace(const tinyxml2::XMLElement& element) const;
-  /// Notes what was done with a word of this element.
+  /// Notes a change of a word of this element.
   void Note(const tinyxml2::XMLElement& element, const std::string& word, const std::string& what);
   [[nodiscard]] const std::vector<MjcfChange>& changes() const { return changes_; }
   /// "robot.xml: left out: forces of actuators: <joint kv> (7), ...; left out: ...": all changes in one line.
   [[nodiscard]] std::string SummarizeChanges() const;
   [[nodiscard]] std::string Print() const;
-  /// As a file in another folder has to say it: the folders of its meshes and textures are found from there.
+  /// Prints the document for a file in another folder: the paths of its meshes and textures start there.
   [[nodiscard]] std::string PrintFor(const std::filesystem::path& folder) const;
 
  private:
@@ -80,7 +79,7 @@ class MjcfFile {
 
   void Parse(std::string_view text);
   void Splice(tinyxml2::XMLElement* include);
-  /// A copy in this document of an element of another file.
+  /// Returns a copy in this document of an element of another file.
   [[nodiscard]] tinyxml2::XMLElement* Clone(const tinyxml2::XMLElement& element, const std::string* file);
   [[nodiscard]] Place ReadPlace(const tinyxml2::XMLElement& element) const;
 
@@ -94,12 +93,12 @@ class MjcfFile {
   std::vector<MjcfChange> changes_;
 };
 
-/// What was said so far, on standard error, of the files that this process loaded (LoadMjcf): what was left
-/// out of them for this release of the engine, and the engine's own warnings. For the JSON of commands.
+/// Lists the messages so far, on standard error, about the files that this process loaded (LoadMjcf): words
+/// left out of them for this release of the engine, and the engine's own warnings.
 std::vector<std::string> ListLoadNotes();
 
-/// Files of an MJCF model: the file itself, what it includes, and those of its meshes, height fields and
-/// textures that exist, as paths relative to its folder; itself first.
+/// Lists the files of an MJCF model: the file itself first, included files, and those of its meshes, height
+/// fields and textures that exist, as paths relative to its folder.
 /// @throws InputError as MjcfFile, and when one lies outside that folder.
 std::vector<std::string> ListMjcfFiles(const std::filesystem::path& mjcf);
 

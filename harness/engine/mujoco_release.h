@@ -1,7 +1,7 @@
 #pragma once
 
-// What differs between MuJoCo's releases, as far as dexcheck's code touches it: everything that must be
-// written in two ways stands here. Debian 12 has 2.2.2.
+// Differences between MuJoCo's releases that dexcheck's code depends on: everything that must be written in
+// two ways stands here. Debian 12 has 2.2.2.
 //
 // | since | what |
 // |---|---|
@@ -25,8 +25,7 @@
 // | 3.11  | of bodies whose frame is their inertial frame, the attribute simple leaves entries out of M |
 // | 3.11  | actuators may have several controls and forces |
 //
-// What an MJCF says in another way since a release (limits by default, ...) stands in newer_words.cc and
-// newer_mjcf.cc.
+// Changes of the MJCF format (limits by default, ...) stand in newer_words.cc and newer_mjcf.cc.
 
 #include <mujoco/mujoco.h>
 
@@ -41,14 +40,14 @@ namespace dexcheck {
 static_assert(mjVERSION_HEADER == 222 || mjVERSION_HEADER >= 320,
               "dexcheck is written for MuJoCo 2.2.2 and 3.2 or newer");
 
-/// How many elements a model has.
+/// Type of the number of a model's elements.
 #if mjVERSION_HEADER >= 3005000
 using EngineSize = mjtSize;
 #else
 using EngineSize = int;
 #endif
 
-/// Whether something acts: jnt_limited, actuator_ctrllimited. A byte, or in later releases a bool.
+/// Type of a flag such as jnt_limited, actuator_ctrllimited: a byte, or in later releases a bool.
 using EngineFlag = std::remove_pointer_t<decltype(mjModel::jnt_limited)>;
 
 /// Whether geoms may collide by their masks (contype, conaffinity), and whether those of <pair>s may. An
@@ -60,7 +59,7 @@ inline bool CollidesByType(const mjModel& m) {
          std::any_of(m.geom_conaffinity, m.geom_conaffinity + m.ngeom, is_set);
 }
 inline bool CollidesByPair(const mjModel& /*m*/) { return true; }
-/// The option's value, and how to make it that of "all", which it is where there is none.
+/// The option's value, and the setting of "all", which is fixed where there is no such option.
 inline int GetCollisionOption(const mjModel& /*m*/) { return 0; }
 inline void LetBothCollide(mjModel* /*m*/) {}
 #else
@@ -70,7 +69,7 @@ inline int GetCollisionOption(const mjModel& m) { return m.opt.collision; }
 inline void LetBothCollide(mjModel* m) { m->opt.collision = mjCOL_ALL; }
 #endif
 
-/// By equality constraint: whether it acts when a run starts.
+/// Member that says of each equality constraint whether it is active when a run starts.
 #if mjVERSION_HEADER >= 300
 inline constexpr auto kEqualityActive = &mjModel::eq_active0;
 #else
@@ -85,7 +84,7 @@ inline constexpr int kSensorNoiseFlag = 0;
 inline constexpr int kSensorNoiseFlag = mjENBL_SENSORNOISE;
 #endif
 
-/// How the general collider of convex bodies ends: most iterations, and tolerance, m.
+/// Limits of the general collider of convex bodies: most iterations, and tolerance, m.
 #if mjVERSION_HEADER >= 323
 inline int GetColliderIterations(const mjOption& option) { return option.ccd_iterations; }
 inline mjtNum GetColliderTolerance(const mjOption& option) { return option.ccd_tolerance; }
@@ -94,7 +93,7 @@ inline int GetColliderIterations(const mjOption& option) { return option.mpr_ite
 inline mjtNum GetColliderTolerance(const mjOption& option) { return option.mpr_tolerance; }
 #endif
 
-/// Whether a light shines everywhere alike.
+/// Whether a light is directional: the same everywhere.
 inline bool IsDirectional(const mjModel& m, int light) {
 #if mjVERSION_HEADER >= 333
   return m.light_type[light] == mjLIGHT_DIRECTIONAL;
@@ -103,7 +102,7 @@ inline bool IsDirectional(const mjModel& m, int light) {
 #endif
 }
 
-/// What the engine warned of. Its information is an int, or in later releases a size.
+/// Describes a warning of the engine. Its information is an int, or in later releases a size.
 template <typename Info>
 std::string DescribeWarning(const char* (*text)(int, Info), const mjData& d, int warning) {
   return text(warning, static_cast<Info>(d.warning[warning].lastinfo));
@@ -112,7 +111,7 @@ inline std::string DescribeWarning(const mjData& d, int warning) {
   return DescribeWarning(mju_warningText, d, warning);
 }
 
-/// Later releases take a frame for its body's when the two are within 1e-6; here it stays where it is.
+/// Keeps frames where they are: later releases take a frame within 1e-6 of its body's for the body's own.
 inline void KeepNearFrames([[maybe_unused]] mjModel* m) {
 #if mjVERSION_HEADER >= 320
   std::fill_n(m->body_sameframe, m->nbody, mjtByte{0});
@@ -130,7 +129,7 @@ inline bool HasPlugin([[maybe_unused]] const char* name) {
 #endif
 }
 
-/// Lets a drawn geom reach from one point to another.
+/// Stretches a drawn geom from one point to another.
 inline void MakeConnector(int type, mjtNum width, const mjtNum* from, const mjtNum* to, mjvGeom* geom) {
 #if mjVERSION_HEADER >= 320
   mjv_connector(geom, type, width, from, to);
@@ -139,14 +138,14 @@ inline void MakeConnector(int type, mjtNum width, const mjtNum* from, const mjtN
 #endif
 }
 
-/// "2.2.2" of 222, "3.12.1" of 3012001.
+/// Returns "2.2.2" for 222, "3.12.1" for 3012001.
 inline std::string FormatRelease(int version) {
   const int base = version < 1000 ? 10 : 1000;
   return std::to_string(version / (base * base)) + "." + std::to_string(version / base % base) + "." +
          std::to_string(version % base);
 }
 
-/// Puts a text as a file of that name into an empty file system in memory.
+/// Adds a text as a file of that name to an empty file system in memory.
 inline void AddFile(const char* name, const std::string& text, mjVFS* vfs) {
   const auto size = static_cast<int>(text.size());
 #if mjVERSION_HEADER >= 320
@@ -157,7 +156,7 @@ inline void AddFile(const char* name, const std::string& text, mjVFS* vfs) {
 #endif
 }
 
-/// How pairs and exclusions name their two bodies, which 2.2.2 counts from 1.
+/// Number of the first body in the signatures of pairs and exclusions: 1 in 2.2.2.
 inline constexpr int kFirstBody = mjVERSION_HEADER >= 300 ? 0 : 1;
 inline int MakeSignature(int body1, int body2) { return ((body1 + kFirstBody) << 16) + body2 + kFirstBody; }
 inline std::pair<int, int> ReadSignature(int signature) {
@@ -179,18 +178,17 @@ inline int* GetNameSlots([[maybe_unused]] const mjModel& m) {
 #endif
 }
 
-/// Of geom_sameframe, site_sameframe: whether it stands in its body's inertial frame, or (3.2) along its
-/// axes.
+/// Whether geom_sameframe or site_sameframe states the body's inertial frame, or (3.2) its axes.
 inline bool IsInertialFrame(int sameframe) { return sameframe == 2 || sameframe == 4; }
 
-/// Of a geom that is no plugin's.
+/// Marks a geom as one without a plugin.
 inline void DetachPlugin([[maybe_unused]] int geom, [[maybe_unused]] mjModel* m) {
 #if mjVERSION_HEADER >= 320
   m->geom_plugin[geom] = -1;
 #endif
 }
 
-/// Lets geoms that may touch be found without the bodies' trees of geoms, which fit those of the compiler.
+/// Lets contacts be found without the bodies' trees of geoms, which fit only the compiler's geoms.
 inline void DropGeomTrees([[maybe_unused]] mjModel* m) {
 #if mjVERSION_HEADER >= 320
   std::fill_n(m->body_bvhadr, m->nbody, -1);
@@ -198,7 +196,7 @@ inline void DropGeomTrees([[maybe_unused]] mjModel* m) {
 #endif
 }
 
-/// The first actuator that has not one control and one force, as all have in 2.2.2; -1 when there is none.
+/// Returns the first actuator without exactly one control and one force, which all have in 2.2.2; -1 if none.
 inline int FindWideActuator([[maybe_unused]] const mjModel& m) {
 #if mjVERSION_HEADER >= 3011000
   for (int i = 0; i < m.nactuator; ++i) {
@@ -208,7 +206,7 @@ inline int FindWideActuator([[maybe_unused]] const mjModel& m) {
   return -1;
 }
 
-/// What an MJCF may say.
+/// Features of the MJCF format.
 inline constexpr bool kHasFrames = mjVERSION_HEADER >= 320;
 inline constexpr bool kHasImplicitFast = mjVERSION_HEADER >= 300;
 inline constexpr bool kHasPolynomials = mjVERSION_HEADER >= 3007000;
@@ -248,7 +246,7 @@ inline constexpr std::array<NewerForce, 0> kNewerForces = {};
 inline constexpr std::array<NewerPart, 0> kNewerParts = {};
 #endif
 
-/// Takes out the elastic forces of flexes. @return how many flexes there are.
+/// Removes the elastic forces of flexes. @return the number of flexes.
 inline int LeaveOutFlexes([[maybe_unused]] mjModel* m) {
 #if mjVERSION_HEADER >= 3012000
   std::fill_n(m->flex_stiffness, m->nflexstiffness, 0.0);
@@ -261,7 +259,7 @@ inline int LeaveOutFlexes([[maybe_unused]] mjModel* m) {
 #endif
 }
 
-/// The mass matrix at the positions that mj_kinematics and mj_comPos have placed.
+/// Calculates the mass matrix at the positions that mj_kinematics and mj_comPos have set.
 inline void MakeMass(const mjModel& m, mjData* d) {
 #if mjVERSION_HEADER >= 330
   mj_makeM(&m, d);
@@ -270,7 +268,7 @@ inline void MakeMass(const mjModel& m, mjData* d) {
 #endif
 }
 
-/// Its entries that can differ from zero: of each dof with itself and those that it hangs on.
+/// Entries of it that can differ from zero: of each dof with itself and with the dofs that it hangs on.
 inline const mjtNum* GetMassEntries(const mjData& d) {
 #if mjVERSION_HEADER >= 3011000
   return d.M;
@@ -279,10 +277,10 @@ inline const mjtNum* GetMassEntries(const mjData& d) {
 #endif
 }
 
-/// How an address among them changes from a dof to the one that it hangs on, in the row of one dof.
+/// Change of an entry's address from a dof to the one that it hangs on, in the row of one dof.
 inline constexpr int kTowardRoot = mjVERSION_HEADER >= 3011000 ? -1 : 1;
 
-/// Where the entry of a dof and the one `steps` toward the root stands among them; -1 when it is always zero.
+/// Returns the address of a dof's entry with the one `steps` toward the root; -1 when it is always zero.
 inline int FindMassEntry(const mjModel& m, int dof, int steps) {
 #if mjVERSION_HEADER >= 3011000
   return steps < m.M_rownnz[dof] ? m.M_rowadr[dof] + m.M_rownnz[dof] - 1 - steps : -1;
@@ -300,7 +298,7 @@ inline void ExpandMass(const mjModel& m, const mjData& d, mjtNum* M) {
 #endif
 }
 
-/// ten_velocity = ten_J qvel, as mj_tendon left the Jacobian.
+/// Calculates ten_velocity = ten_J qvel, with the Jacobian that mj_tendon left.
 inline void CalcTendonVelocities(const mjModel& m, mjData* d) {
 #if mjVERSION_HEADER >= 3006000
   const int* const starts = m.ten_J_rowadr;
@@ -322,7 +320,7 @@ inline void CalcTendonVelocities(const mjModel& m, mjData* d) {
   }
 }
 
-// What collision functions get and fill.
+// Arguments of collision functions.
 #if mjVERSION_HEADER >= 3009000
 using CollisionData = mjData;
 using CollisionContact = mjPreContact;
@@ -339,7 +337,7 @@ inline mjtNum* NormalOf(CollisionContact* contact) { return contact->frame; }
 inline mjtNum* TangentOf(CollisionContact* contact) { return contact->frame + 3; }
 #endif
 
-/// solref of a contact's friction, which later releases may have differ from that of its normal.
+/// Returns the solref of a contact's friction, which in later releases may differ from that of its normal.
 inline const mjtNum* GetFrictionReference(const mjContact& contact) {
 #if mjVERSION_HEADER >= 300
   if (contact.solreffriction[0] != 0.0 || contact.solreffriction[1] != 0.0) return contact.solreffriction;
@@ -356,7 +354,7 @@ inline const mjtNum* GetFrictionReference(const mjModel& m, int pair) {
   return reference;
 }
 
-/// How many contacts a collision function may fill for two geoms.
+/// Returns the number of contacts that a collision function may fill for two geoms.
 inline int CountMostContacts([[maybe_unused]] const mjModel& m, [[maybe_unused]] int geom1,
                              [[maybe_unused]] int geom2, [[maybe_unused]] mjtNum margin) {
 #if mjVERSION_HEADER >= 3008000
@@ -366,7 +364,7 @@ inline int CountMostContacts([[maybe_unused]] const mjModel& m, [[maybe_unused]]
 #endif
 }
 
-/// Fills what a collision function says of a contact; the engine completes the tangents.
+/// Fills a contact of a collision function; the engine completes the tangents.
 /// @param position, normal x, y, z in the world; the normal points from the first geom to the second.
 inline void FillContact(mjtNum distance, const mjtNum* position, const mjtNum* normal,
                         CollisionContact* contact) {

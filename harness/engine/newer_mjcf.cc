@@ -70,9 +70,9 @@ class Schema {
       if (is_body) path->back()->children["worldbody"] = element;
     }
     if (is_recursive) element->children[name] = element;
-    // Where bodies may stand, but in no schema that is printed.
+    // These elements may stand wherever bodies may, but no printed schema has them.
     if (is_body && kHasFrames) element->children["frame"] = element->children["replicate"] = element;
-    // Understood by the reader before the schema.
+    // The reader resolves `include` before the schema applies.
     element->children["include"] = &include_;
     path->push_back(element);
   }
@@ -81,7 +81,7 @@ class Schema {
   SchemaElement include_{{"file"}, {}};
 };
 
-/// Attributes of 2.2.2 that later releases do not have, and those that say the same there, if any.
+/// Attributes of 2.2.2 that later releases lack, with their equivalents there, if any.
 struct OlderWord {
   std::string_view element;
   const char* attribute;
@@ -183,7 +183,7 @@ class Downgrade {
     if (is_gone("compiler", "exactmeshinertia")) ReplaceMeshInertia(element);
   }
 
-  /// Where any two geoms may touch that a <pair> or their masks let touch, the option says which of both.
+  /// Applies the option `collision`, which says whether pairs, masks or both let geoms touch, and deletes it.
   void ReplaceCollision(XMLElement* option) {
     const std::string value = option->Attribute("collision");
     option->DeleteAttribute("collision");
@@ -215,7 +215,7 @@ class Downgrade {
   void ReplaceValues(XMLElement* element) {
     const std::string_view name = element->Name();
     if (name == "compiler") {
-      // Both directories at once.
+      // This attribute sets both directories.
       if (const char* folder = element->Attribute("assetdir")) {
         const std::string assets = folder;
         for (const char* each : {"meshdir", "texturedir"}) {

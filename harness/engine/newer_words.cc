@@ -8,7 +8,7 @@
 namespace dexcheck {
 namespace {
 
-// What later releases added: the schemas of MuJoCo from 2.3.0 to 3.12.0, compared with that of 2.2.2.
+// Words that later releases added: the schemas of MuJoCo from 2.3.0 to 3.12.0, compared with that of 2.2.2.
 
 using enum MjcfEffect;
 
@@ -18,7 +18,7 @@ constexpr std::string_view kExpand =
 constexpr std::string_view kActuatorInertia = "give it to the joint, as armature or damping";
 
 constexpr NewerWord kWords[] = {
-    // What acts on the dynamics, or on nothing with a certain value.
+    // Words that act on the dynamics, or on nothing when they have a certain value.
     {"frame", "", "3.1.0", kDynamics, "", kExpand},
     {"replicate", "", "3.1.5", kDynamics, "", kExpand},
     {"attach model", "", "3.2.0", kDynamics, "", kExpand},
@@ -40,7 +40,7 @@ constexpr NewerWord kWords[] = {
     {"flag", "spring damper", "3.3.6", kDynamics, "enable",
      "the flag passive switches springs and dampers together"},
     {"*", "armature damping", "3.7.0", kDynamics, "0", kActuatorInertia},
-    // What acts on no term, or on motors and contacts alone.
+    // Words that act on no term, or on motors and contacts alone.
     {"layer", "", "3.2.5", kNone},
     {"rgb", "", "3.2.1", kNone},
     {"dcmotor", "", "3.7.0", kActuators},

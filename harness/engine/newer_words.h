@@ -1,12 +1,12 @@
 #pragma once
 
-// What MJCFs say since releases of MuJoCo after 2.2.2.
+// Words of MJCFs that releases of MuJoCo after 2.2.2 added.
 
 #include <string_view>
 
 namespace dexcheck {
 
-/// What a newer element or attribute acts on.
+/// Quantities that a newer element or attribute acts on.
 enum class MjcfEffect {
   kNone,       ///< Looks, sensors, memory, names.
   kContacts,   ///< Contacts, solver, integration in time: no term of the free robot.
@@ -14,14 +14,14 @@ enum class MjcfEffect {
   kDynamics,   ///< M, C v, gravity, friction, or the mechanism itself.
 };
 
-/// Elements, or attributes that each of the elements has, which 2.2.2 does not have.
+/// Elements that 2.2.2 does not have, or attributes that it does not have in any of these elements.
 struct NewerWord {
   std::string_view elements;    ///< Separated by blanks; "*" stands for all, "a/b" for b in a.
   std::string_view attributes;  ///< Empty for the elements themselves.
   std::string_view since;       ///< Release, "3.1.4".
   MjcfEffect effect;
-  std::string_view neutral = {};  ///< Value with which it acts on nothing; empty: none is known.
-  std::string_view advice = {};   ///< What to do, when it acts on the dynamics.
+  std::string_view neutral = {};  ///< Value with which it has no effect; empty if none is known.
+  std::string_view advice = {};   ///< Remedy when it acts on the dynamics.
 };
 
 /// The word's entry; nullptr when it is not known. @param attribute empty for the element itself.

@@ -27,7 +27,7 @@ void ReadHull(const mjModel& m, int geom, Solid* solid) {
   }
 }
 
-/// False for what has no shape here.
+/// Reads the shape of a geom; false for a geom without a shape here.
 bool ReadShape(const mjModel& m, int geom, Solid* solid) {
   using enum Solid::Shape;
   const Vector3d& size = solid->size;
@@ -75,8 +75,8 @@ bool ReadShape(const mjModel& m, int geom, Solid* solid) {
   }
 }
 
-/// Whether a geom is there to be seen only: what is not of the group that collides in a body that has such
-/// geoms, or of the others a mesh that touches nothing in a body whose other geoms do.
+/// Whether a geom is only visible: one outside the collision group in a body that has such geoms, or a mesh
+/// without contacts in a body whose other geoms have some.
 bool IsLooks(const mjModel& m, int geom) {
   const int body = m.geom_bodyid[geom], first = m.body_geomadr[body];
   const auto any = [&](const auto& is) {

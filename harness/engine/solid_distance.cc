@@ -1,6 +1,6 @@
-// Distance of two solids: by the algorithm of Gilbert, Johnson and Keerthi on their difference, A - B, whose
-// distance from the origin it is. Spheres and capsules are a point and a segment with a radius, so that what
-// the algorithm sees has few corners.
+// Distance of two solids by the algorithm of Gilbert, Johnson and Keerthi: the distance of their difference,
+// A - B, from the origin. Spheres and capsules are a point and a segment with a radius, so that the
+// algorithm's shapes have few corners.
 
 #include <algorithm>
 #include <cmath>
@@ -13,7 +13,7 @@ namespace {
 
 using enum Solid::Shape;
 
-/// Of a distance, m.
+/// Accuracy of a distance, m.
 constexpr double kAccuracy = 1e-7;
 constexpr int kMostIterations = 64;
 /// The difference's corners are of this order at least, m: smaller simplices are points.
@@ -25,7 +25,7 @@ constexpr int kNearPlaces = 32;
 constexpr int kRingSearch = 30;  // halves a place's width to 1e-6 of it by golden sections
 constexpr int kDescent = 60;
 
-/// What a radius is added to.
+/// Returns the radius that rounds a solid's core, m; 0 for solids without one.
 double RadiusOf(const Solid& solid) {
   if (solid.shape == kSphere || solid.shape == kCapsule) return solid.size[0];
   return solid.shape == kTorus ? solid.size[1] : 0.0;
@@ -201,7 +201,7 @@ double CalcCoreDepth(const Difference& difference) {
   const Vector3d& between = difference.X_AB.translation();
   if (between.norm() > 0.0) consider(-between.normalized());
   for (const int axis : {0, 1, 2}) {
-    // Of a rounded side: from the axis to the other's centre.
+    // The direction of a rounded side leads from the axis to the other's centre.
     const Vector3d along_a = Vector3d::Unit(axis);
     const Vector3d along_b = difference.X_AB.linear().col(axis);
     for (const Vector3d& along : {along_a, along_b}) {
@@ -221,7 +221,7 @@ double CalcCoreDepth(const Difference& difference) {
     if (across.norm() < kAccuracy) break;
     if (!consider((best - step * across.normalized()).normalized())) step *= 0.5;
   }
-  // Of bodies that are apart the opposite of their distance.
+  // The depth of bodies that are apart is the negative of their distance.
   return depth;
 }
 

@@ -72,7 +72,7 @@ void VelocityMap::SetState(const Eigen::Ref<const VectorXd>& q, const Eigen::Ref
   }
   const BaseMotion motion = CalcBaseMotion(velocity, heading);
   // T_dot velocity: reduced columns turn with the heading, so Sigma_0's origin accelerates sideways; the
-  // anchor feels its centripetal acceleration besides. The yaw rate does not change.
+  // anchor also has its centripetal acceleration. The yaw rate does not change.
   const bool turns = base_size_ == 2;
   const Vector3d acceleration =
       turns ? Vector3d(motion.yaw * heading.dot(motion.linear) * left) : Vector3d::Zero();

@@ -78,7 +78,7 @@ class PairLister {
     }
     return anchor;
   }
-  /// Of the anchor before; -1 before the first.
+  /// Returns the anchor that carries a body's anchor; -1 for the first.
   [[nodiscard]] int AnchorBefore(int body) const {
     const int parent = m_.body_parentid[AnchorOf(body)];
     return parent > 0 ? AnchorOf(parent) : -1;

@@ -14,7 +14,7 @@
 
 namespace dexcheck {
 
-/// Whether a word is one of those that blanks separate; an empty one where there are none.
+/// Whether a word is one of the words that blanks separate; an empty word where there are none.
 inline bool IsAmong(std::string_view words, std::string_view word) {
   return (" " + std::string(words) + " ").find(" " + std::string(word) + " ") != std::string::npos;
 }
@@ -26,8 +26,8 @@ inline void ParseXml(std::string_view text, const std::string& shown, tinyxml2::
                    document->ErrorName());
 }
 
-/// The child elements, of one name or all, as they are now: a loop over them may delete each.
-/// @param parent none has no children.
+/// Returns the child elements, of one name or all, as they are now: a loop over them may delete each.
+/// @param parent null has no children.
 template <typename Element>
 std::vector<Element*> ListChildren(Element* parent, const char* name = nullptr) {
   std::vector<Element*> children;
@@ -39,8 +39,8 @@ std::vector<Element*> ListChildren(Element* parent, const char* name = nullptr) 
   return children;
 }
 
-/// Calls visit for an element and all below it, in the order of the file, without recursion: the depth is the
-/// file's choice. What visit adds below an element is visited too.
+/// Calls visit for an element and all below it, in the order of the file, without recursion, since a file may
+/// be of any depth. Elements that visit adds below an element are visited as well.
 template <typename Element, typename Visit>
 void VisitElements(Element* root, const Visit& visit) {
   for (Element* element = root; element != nullptr;) {

@@ -60,7 +60,7 @@ class PaperLaw final : public Controller {
                      J.transpose() * result.f_c;
     command->tau.resize(xi.size());
     actuation_.CalcTorque(force, command->tau);
-    // What the checks of the law need.
+    // The checks of the law need this.
     command->demand.F_N = result.f_c - least;
     command->force_solves = 1;
   }

@@ -176,7 +176,7 @@ InjectedFault Push(const FaultContext& context) {
   return fault;
 }
 
-/// As strong at the end of the run as others are.
+/// A force that is as strong at the end of the run as others are.
 InjectedFault GrowingForce(const FaultContext& context) {
   const Body body = DrawBody(context);
   const double begin = context.draw->Uniform(0.0, 0.3 * context.duration);

@@ -10,7 +10,7 @@
 namespace dexcheck {
 namespace {
 
-/// Of each set a generator of its own.
+/// Makes a generator for one set.
 Draw MakeDraw(const DrawOptions& options, size_t set) { return Draw(options.seed * 1000003 + set); }
 
 /// Whether both name the same place, are both of a law, or one is of a wheel and the other of both wheels.
@@ -92,7 +92,7 @@ std::vector<FaultSet> DrawFaults(const Setup& setup, const DrawOptions& options)
       if (tries == kMost)
         throw InputError(setup.scenario().source + ": --together: must be fewer, no " +
                          std::to_string(options.together) + " of these faults are of different places");
-      // What has no size is no part of a set: what would be named of it?
+      // A fault without a size is no part of a set: nothing of it could be named.
       InjectedFault one = MakeOne(kinds[draw.Index(kinds.size())], context);
       if (options.together > 1 && one.truth.empty()) continue;
       const bool is_taken = std::any_of(set.begin(), set.end(),
@@ -123,7 +123,7 @@ bool HasValue(const Fault& named, const Fault& truth) {
   return std::abs(named.value - truth.value) <= std::max(kNear * truth.error, 3.0 * named.error);
 }
 
-/// What all have, each of them has.
+/// A fault of all is a fault of each.
 bool IsOfAll(const Fault& fault) {
   return fault.place.starts_with("all ") || fault.place.starts_with("everything ");
 }

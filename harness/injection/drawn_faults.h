@@ -39,10 +39,10 @@ std::vector<FaultSet> ListEquationFaults(const Setup& setup);
 /// How the explanations of a run compare with what was wrong in it.
 struct NamingScore {
   int right = 0;     ///< Named: kind, place, and value within 5 % of the change or 3 standard errors.
-  int in_class = 0;  ///< Named with others that this motion does not tell apart.
+  int in_class = 0;  ///< Named with others that are indistinguishable on this motion.
   int not_explained = 0;
   int wrong = 0;  ///< Single names, or values, of what was not so.
-  /// Of each fault: itself, "a class", another one by its single name, or "nothing".
+  /// The name that each fault got: its own, "a class", another one's single name, or "nothing".
   std::vector<std::string> named_as = {};
   std::vector<CauseOutcome> outcomes = {};  ///< Of each fault.
 };

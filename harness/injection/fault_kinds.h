@@ -14,7 +14,7 @@
 
 namespace dexcheck {
 
-/// What is drawn; the same on every machine.
+/// Random draws, the same on every machine.
 class Draw {
  public:
   explicit Draw(std::uint64_t seed) : random_(seed) {}
@@ -35,7 +35,7 @@ class Draw {
   std::mt19937_64 random_;
 };
 
-/// What a fault is drawn for.
+/// The run that a fault is drawn for.
 struct FaultContext {
   const Setup& setup;
   double duration;      ///< Of the run, s.
@@ -63,11 +63,11 @@ struct FaultKind {
 
 std::span<const FaultKind> ListMotorFaultKinds();
 std::span<const FaultKind> ListSensorFaultKinds();
-/// Of joints, links and object.
+/// Lists faults of joints, links and object.
 std::span<const FaultKind> ListBodyFaultKinds();
-/// Of floor, wheels, contacts and solver.
+/// Lists faults of floor, wheels, contacts and solver.
 std::span<const FaultKind> ListWorldFaultKinds();
-/// Of laws of every kind.
+/// Lists faults of laws of every kind.
 std::span<const FaultKind> ListLawFaultKinds();
 
 /// A fault with a size. @param change by which it changes its value.

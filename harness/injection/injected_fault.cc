@@ -18,7 +18,7 @@ std::function<void(Arguments...)> InTurn(std::function<void(Arguments...)> a,
   };
 }
 
-/// The same of what is made for each run.
+/// InTurn for functions that are made for each run.
 template <typename Change>
 std::function<Change(const Setup&)> MakeInTurn(const std::function<Change(const Setup&)>& a,
                                                const std::function<Change(const Setup&)>& b) {
@@ -64,7 +64,7 @@ void FaultyPlant::BeginStep() {
 void FaultyPlant::EndStep(const Eigen::Ref<const VectorXd>& tau) {
   EngineSimulation& simulation = plant_->simulation();
   const double since = clock_->Since(begin_, clock_->time);
-  // What remembers knows what was before it began.
+  // A fault with memory knows what was before it began.
   tau_ = tau;
   if (motors_) motors_(since, &tau_);
   if (!(since >= 0.0)) return plant_->EndStep(tau);

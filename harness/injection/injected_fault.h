@@ -37,9 +37,9 @@ struct InjectedFault {
   std::string part = {};       ///< What evidence or failed checks should name; empty for nothing.
   /// How it should be named; `error` is by how much it changes its value. Empty for what has no size.
   std::vector<Fault> truth = {};
-  /// Whether it is there before the robot settles: a step of the contacts' geometry would throw it.
+  /// It is there before the robot settles: a step of the contacts' geometry would throw it.
   bool from_start = false;
-  /// Whether it shows only where feedback has something to correct.
+  /// It shows only where feedback has something to correct.
   bool needs_error = false;
   std::function<void(const Setup&, mjModel*)> engine = {};             ///< Changes bodies and constraints.
   std::function<void(const mjModel&, double t, mjData*)> forces = {};  ///< Adds to xfrc_applied.
@@ -92,7 +92,7 @@ class FaultyPlant final : public Plant {
   VectorXd tau_;
 };
 
-/// A controller that tells the time.
+/// A controller that reports the time.
 class ClockedController final : public Controller {
  public:
   ClockedController(std::unique_ptr<Controller> controller, std::shared_ptr<RunClock> clock)

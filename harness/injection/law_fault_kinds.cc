@@ -39,7 +39,7 @@ bool IsPart(const FaultContext& context, const LawEntry& entry) {
   if (entry.parts == 0) return false;
   if (IsPaperLaw(context)) return true;
   const auto begins = [&](const char* name) { return entry.fault.starts_with(name); };
-  if (begins("friction")) return KnowsMotion(context);
+  if (begins("compensation of friction")) return KnowsMotion(context);
   if (begins("compensation of Coulomb friction"))
     return context.setup.joints() != nullptr && context.setup.joints()->gains.coulomb.size() > 0;
   return begins("gravity (") || begins("position feedback") || begins("velocity feedback");

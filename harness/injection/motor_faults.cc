@@ -34,7 +34,7 @@ double TorqueOf(const FaultContext& context, int entry) {
   return std::max(std::abs(context.tau[entry]), 1e-6);
 }
 
-/// Of one motor, or of all for no entry. @param make a transmission that remembers nothing yet.
+/// Changes one motor, or all for no entry. @param make a transmission that remembers nothing yet.
 InjectedFault ChangeMotors(const FaultContext& context, std::optional<int> entry, const std::string& name,
                            double value, double change, const std::function<Transmit()>& make) {
   InjectedFault fault = FaultAt(entry ? NameMotor(context, *entry) : "all motors", name, value, change);
@@ -79,7 +79,7 @@ std::function<Transmit()> Lag(double time, double time_step) {
 std::function<Transmit()> Noise(double size) {
   return [size]() -> Transmit {
     return [size, random = std::mt19937_64(7)](double u, double) mutable {
-      // Of twelve even ones the sum has variance 1.
+      // The sum of twelve uniform numbers has variance 1.
       double sum = -6.0;
       for (int i = 0; i < 12; ++i) sum += DrawUnit(&random);
       return u + size * sum;
@@ -105,7 +105,7 @@ InjectedFault Gain(const FaultContext& context) {
                       Pure([gain](double u, double) { return gain * u; }));
 }
 
-/// Of the engine's own actuator, after all that is sent.
+/// Changes the gain of the engine's own actuator.
 InjectedFault EngineGain(const FaultContext& context) {
   const double gain = 1.0 + context.draw->Size(0.005, 0.2);
   const std::string joint = context.DrawJoint().name;

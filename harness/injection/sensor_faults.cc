@@ -28,7 +28,7 @@ InjectedFault Sensor(const std::string& place, const std::string& name, double v
   return fault;
 }
 
-/// Of an encoder: rad or m.
+/// Draws an offset of an encoder, rad or m.
 double DrawOffset(const FaultContext& context) { return context.draw->Size(1e-5, 1e-3); }
 
 InjectedFault Offset(const FaultContext& context) {
@@ -117,7 +117,7 @@ InjectedFault ObjectEntry(const FaultContext& context) {
       });
 }
 
-/// What is measured of one fingertip's contact.
+/// Changes one measured number of a fingertip's contact.
 InjectedFault Contact(const FaultContext& context) {
   const double offset = DrawOffset(context);
   const size_t tip = context.draw->Index(context.setup.fingertips().size());

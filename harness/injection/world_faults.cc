@@ -33,7 +33,7 @@ InjectedFault Gravity(const FaultContext& context) {
 
 // Wheels, from before the robot settles.
 
-/// What of a wheel, 0 the right one or 1, touches the floor gets a radius that is larger by `by`, m.
+/// Enlarges the radius of what touches the floor of a wheel, 0 the right one or 1, by `by`, m.
 void ScaleWheel(const Setup& setup, mjModel* m, size_t wheel, double by) {
   const int body = m->jnt_bodyid[setup.adapter().wheels()[wheel].joint];
   for (int i = 0; i < m->body_geomnum[body]; ++i) {

@@ -19,11 +19,11 @@ class Disturbances {
   Disturbances(std::span<const DisturbanceOptions> options, const PartContext& context);
 
   [[nodiscard]] bool empty() const { return sources_.empty(); }
-  /// Those that act from t on, s, in the model's pose of each body. @param state the plant's.
+  /// Returns the wrenches that act from t on, s, in the model's pose of each body. @param state the plant's.
   std::span<const Wrench> Evaluate(double t, const MeasuredState& state);
-  /// The same at the same points of the plant's bodies, which tilt and sink with its platform.
+  /// Returns them at the same points of the plant's bodies, which tilt and sink with its platform.
   std::span<const Wrench> Evaluate(double t, const PlantReading& reading);
-  /// By which factor a disturbance's wrench acts at t.
+  /// Returns the factor by which a disturbance's wrench acts at t, s.
   [[nodiscard]] double CalcSize(size_t disturbance, double t) const;
 
  private:

@@ -10,8 +10,7 @@
 
 namespace dexcheck {
 
-/// The engine's simulation as plant. Nothing allocates in a step, once the values that are read into have
-/// their sizes.
+/// The engine's simulation as plant. Nothing allocates in a step, once the results have their sizes.
 class EnginePlant final : public Plant {
  public:
   /// @param fingertips frames of the grasp. @param surface of the object; outlives this, as does the adapter.
@@ -27,7 +26,7 @@ class EnginePlant final : public Plant {
   /// See Observer.
   void SetFeet(std::span<const int> frames) { observer_.SetFeet(frames); }
 
-  /// Geoms that should not touch, and that do push: what they push with is read.
+  /// Watches geoms that should not touch and that push each other: their forces are read.
   void WatchCollisions(std::span<const std::pair<int, int>> geoms);
 
   [[nodiscard]] double time_step() const override { return simulation_.time_step(); }
@@ -39,7 +38,7 @@ class EnginePlant final : public Plant {
   void EndStep(const Eigen::Ref<const VectorXd>& tau) override;
   void Read(PlantResponse* response) override;
 
-  /// For what acts in the engine and is no part of the scenario.
+  /// Simulation, for effects in the engine that are no part of the scenario.
   [[nodiscard]] EngineSimulation& simulation() { return simulation_; }
 
   void Place(const Eigen::Ref<const VectorXd>& q, const Pose& X_Bo) override;

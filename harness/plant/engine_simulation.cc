@@ -42,7 +42,7 @@ EngineSimulation::EngineSimulation(const Adapter& adapter, bool implicit_damping
     damping.setZero();
     model_->opt.integrator = mjINT_EULER;
   }
-  // Whoever commands torques keeps to the limits; friction comes on top.
+  // The sender of torques observes the limits; friction is added to the torques.
   std::fill_n(model_->actuator_ctrllimited, model_->nu, 0);
   std::fill_n(model_->actuator_forcelimited, model_->nu, 0);
   if (adapter.model().base().type == BaseType::kFloating) motors_.assign(6, -1);
@@ -69,7 +69,7 @@ void EngineSimulation::Push(std::span<const Wrench> wrenches) {
   for (const Wrench& w : wrenches) {
     const int body = w.body == Wrench::kObject ? adapter_->object_body()
                                                : adapter_->link_bodies()[static_cast<size_t>(w.body + 1)];
-    // The engine's act at the centre of mass.
+    // The engine's forces act at the centre of mass.
     const Vector3d arm = w.point - Eigen::Map<const Vector3d>(data_->xipos + 3 * body);
     Eigen::Map<Vector3d>(data_->xfrc_applied + 6 * body) += w.force;
     Eigen::Map<Vector3d>(data_->xfrc_applied + 6 * body + 3) += w.torque + arm.cross(w.force);
@@ -93,7 +93,7 @@ std::vector<Motor> EngineSimulation::ListMotors() const {
     }
     const double gear = std::abs(model_->actuator_gear[6 * motor]);
     double limit = std::numeric_limits<double>::infinity();
-    // The engine cuts off the control and, of a motor with gain 1, the force alike.
+    // The engine cuts off the control and, for a motor with gain 1, the force as well.
     const auto cut = [&](auto limited, const mjtNum* range) {
       if (limited != 0) limit = std::min(limit, gear * std::min(-range[0], range[1]));
     };

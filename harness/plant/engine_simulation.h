@@ -12,7 +12,7 @@
 
 namespace dexcheck {
 
-/// Engine state that determines everything after it.
+/// State of the engine that determines everything after it.
 struct EngineState {
   VectorXd qpos, qvel, act, qacc_warmstart;
   double time = 0.0;
@@ -27,8 +27,8 @@ struct EngineState {
 /// After EndStep, data() still has accelerations, contacts and forces of the step, at the state before it.
 class EngineSimulation {
  public:
-  /// @param implicit_damping integrate as the MJCF says, and joint damping as the engine's Euler does, which
-  /// changes velocities by other than dt qacc; otherwise by Euler with explicit forces, as in (48).
+  /// @param implicit_damping integrates as the MJCF states, with joint damping as in the engine's Euler,
+  /// whose changes of velocities are not dt qacc; otherwise by Euler with explicit forces, as in (48).
   /// @throws InputError when a joint or wheel has no motor or several.
   EngineSimulation(const Adapter& adapter, bool implicit_damping);
 
@@ -40,18 +40,18 @@ class EngineSimulation {
   [[nodiscard]] double time_step() const { return model_->opt.timestep; }
 
   void BeginStep();
-  /// tau' (n), N m: of the right and left wheel, then of the joints.
+  /// Sets tau' (n), N m: of the right and left wheel, then of the joints.
   void SetTorques(const Eigen::Ref<const VectorXd>& tau);
-  /// Forces and torques on bodies, instead of those before.
+  /// Sets forces and torques on bodies; replaces the earlier ones.
   void Push(std::span<const Wrench> wrenches);
   /// The torques that wheels and joints received in the last step, as tau' (n), N m.
   void ReadMotorTorques(VectorXd* tau) const;
-  /// By entry of tau'.
+  /// Lists the motors by entry of tau'.
   [[nodiscard]] std::vector<Motor> ListMotors() const;
   /// @throws DivergenceError when the engine warned or the state is not finite.
   void EndStep();
 
-  /// Changes the model that is simulated, which is this simulation's own, and what the engine derives of it.
+  /// Changes this simulation's own model, and the quantities that the engine derives from it.
   void Change(const std::function<void(mjModel*)>& change);
 
   [[nodiscard]] EngineState GetState() const;
@@ -64,14 +64,14 @@ class EngineSimulation {
   MjModelPtr model_;  // the adapter's, but for the damping
   MjDataPtr data_;
   bool is_pushed_ = false;
-  VectorXd damping_;         // nv, N m s/rad; what is not integrated implicitly
+  VectorXd damping_;         // nv, N m s/rad; not integrated implicitly
   std::vector<int> motors_;  // by entry of tau'; -1 for those of a floating base
-  std::vector<int> dofs_;    // likewise
+  std::vector<int> dofs_;    // by entry of tau', as motors_
 };
 
-/// One of the engine's contacts. @param first whether the body whose slip it is stands first in it.
+/// Returns one of the engine's contacts. @param first whether the body whose slip it is stands first in it.
 BodyContact ReadContact(const mjModel& m, const mjData& d, int contact, bool first);
-/// The contact of `body` with `other`, after the step's forces are known.
+/// Returns the contact of `body` with `other`, once the step's forces are known.
 BodyContact ReadBodyContact(const mjModel& m, const mjData& d, int body, int other);
 
 }  // namespace dexcheck

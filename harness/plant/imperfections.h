@@ -1,6 +1,6 @@
 #pragma once
 
-// What a scenario declares of a plant that is not ideal: faults of sensing and motors, disturbances, and an
+// A plant that is not ideal, as a scenario declares it: faults of sensing and motors, disturbances, and an
 // engine whose masses are not those that the controller knows. The defaults are the ideal plant.
 
 #include <cmath>
@@ -16,19 +16,19 @@ namespace dexcheck {
 
 /// One number for each of several named things: joints, motors, links.
 struct ByName {
-  double all = 0.0;  ///< For those that no group names.
-  /// A name, or how names begin, or "all"; later ones win.
+  double all = 0.0;  ///< Value for names in no group.
+  /// A name, the beginning of names, or "all"; later ones win.
   std::vector<std::pair<std::string, double>> groups;
   std::string key;  ///< For messages: "sensing.joint_noise".
 
   /// Whether everything has this value.
   [[nodiscard]] bool Is(double value) const;
-  /// The numbers of these names. @param source the file, for messages.
+  /// Returns the numbers of these names. @param source the file, for messages.
   /// @throws InputError when a group fits none of the names.
   [[nodiscard]] VectorXd Resolve(std::span<const std::string> names, const std::string& source) const;
 };
 
-/// Longest delay, in steps: what the buffers of sensing and motors are made for.
+/// Longest delay, in steps: the size of the buffers of sensing and motors.
 inline constexpr long kMaxDelaySteps = 1000;
 
 /// Number of whole steps in a time that ParseScenario has accepted.
@@ -41,26 +41,27 @@ enum class VelocitySource {
   kKalman,       ///< By a Kalman filter from the measured position.
 };
 
-/// How measurements differ from the true state.
+/// Differences of the measurements from the true state.
 struct SensingOptions {
-  ByName joint_counts;    ///< Of an encoder, per turn (per metre of a prismatic joint); 0 is exact.
+  ByName joint_counts;    ///< Counts of an encoder per turn (per metre of a prismatic joint); 0 is exact.
   ByName joint_noise;     ///< Standard deviation of a joint's position, rad, before the encoder counts.
-  ByName velocity_noise;  ///< Of a joint's or wheel's rate where it is measured, rad/s.
-  VelocitySource velocity = VelocitySource::kMeasured;  ///< Of the joints.
-  double velocity_cutoff = 0.0;  ///< Of the low pass after differencing, Hz; 0 for none.
+  ByName velocity_noise;  ///< Standard deviation of the rate of a joint or wheel where it is measured, rad/s.
+  VelocitySource velocity = VelocitySource::kMeasured;  ///< Source of the joints' velocities.
+  double velocity_cutoff = 0.0;  ///< Cutoff of the low pass after differencing, Hz; 0 for none.
   double kalman_acceleration =
       0.0;                ///< Standard deviation that the filter expects of accelerations, rad/s^2.
   bool odometry = false;  ///< The base's pose is integrated from its wheels' rates.
 
   double object_position_noise = 0.0;                          ///< Standard deviation of each axis, m.
-  double object_orientation_noise = 0.0;                       ///< Likewise, rad.
+  double object_orientation_noise = 0.0;                       ///< Standard deviation about each axis, rad.
   double object_rate = 0.0;                                    ///< Poses a second; 0 for one at each step.
   double object_latency = 0.0;                                 ///< Age of the pose, s.
   VelocitySource object_velocity = VelocitySource::kMeasured;  ///< kMeasured: comes with the pose.
-  double object_velocity_cutoff = 0.0;                         ///< As velocity_cutoff, Hz.
-  double object_acceleration = 0.0;                            ///< As kalman_acceleration, m/s^2 and rad/s^2.
+  double object_velocity_cutoff = 0.0;  ///< Cutoff of its low pass after differencing, Hz; 0 for none.
+  double object_acceleration =
+      0.0;  ///< Standard deviation that its filter expects of accelerations, m/s^2 and rad/s^2.
 
-  double contact_force_noise = 0.0;  ///< Of the support's force, N.
+  double contact_force_noise = 0.0;  ///< Standard deviation of the support's force, N.
   double latency = 0.0;              ///< Age of all measurements, s; a whole number of time steps.
 
   double contact_error = 0.0;  ///< Error of each contact's measured place on the object, rad.
@@ -69,20 +70,20 @@ struct SensingOptions {
   [[nodiscard]] bool is_exact() const;
 };
 
-/// What the motors make of the torques that are sent.
+/// Differences of the delivered torques from those that are sent.
 struct ActuationOptions {
   ByName torque_step;               ///< Torques are whole multiples of this, N m; 0 is exact.
   ByName gain_error;                ///< Relative.
   ByName lag;                       ///< Time constant of the motor's torque, s.
   ByName coulomb;                   ///< Dry friction of a moving joint, N m.
-  ByName stribeck;                  ///< By how much it is larger near standstill, N m.
+  ByName stribeck;                  ///< Additional dry friction near standstill, N m.
   ByName backlash;                  ///< Free play, rad.
   double stribeck_velocity = 0.05;  ///< Rate at which stribeck has fallen to 1/e, rad/s.
   double delay = 0.0;               ///< s.
   bool saturate = false;            ///< A motor delivers its limit when more is commanded.
-  ByName limit;                     ///< In the place of the motor's own, N m, and saturates; 0 for its own.
+  ByName limit;  ///< Limit that replaces the motor's own, N m, and saturates; 0 for its own.
 
-  /// Whether torques above a motor's limit are cut off there, and do not end the run.
+  /// Whether torques above a motor's limit are cut off there; otherwise they end the run.
   [[nodiscard]] bool saturates() const { return saturate || !limit.Is(0.0); }
   [[nodiscard]] bool is_exact() const;
 };
@@ -93,24 +94,24 @@ struct DisturbanceOptions {
     kPulse,  ///< For `duration`.
     kStep,   ///< From `begin` on, or for `duration`.
     kSine,   ///< sin(2 pi frequency (t - begin)) times the wrench.
-    kNoise,  ///< Random with variance 1 times the wrench, no faster than `frequency`.
+    kNoise,  ///< Random with variance 1 times the wrench, with no frequencies above `frequency`.
   };
   Kind kind = Kind::kPulse;
   std::string body;                    ///< A link, or the object.
   Vector3d force = Vector3d::Zero();   ///< N.
   Vector3d torque = Vector3d::Zero();  ///< N m.
-  Vector3d at = Vector3d::Zero();      ///< Where the force acts, in the body's frame, m.
+  Vector3d at = Vector3d::Zero();      ///< Point of action of the force, in the body's frame, m.
   bool in_body_frame = false;  ///< Force and torque turn with the body; otherwise they are the world's.
   double begin = 0.0;          ///< s.
   double duration = 0.0;       ///< s; 0 until the end.
-  double period = 0.0;         ///< It comes again after this, s; 0 does not.
+  double period = 0.0;         ///< Time after which it repeats, s; 0 does not.
   double frequency = 0.0;      ///< Hz.
-  double begin_within = 0.0;   ///< It begins at random up to this later, s.
+  double begin_within = 0.0;   ///< Its beginning is delayed by a random time up to this, s.
   double size_within = 0.0;    ///< Its size is drawn from 1 -+ this.
   std::string key;             ///< For messages: "disturbance.0".
 };
 
-/// A mass that is fixed to a link of the plant and that the controller does not know.
+/// A mass that is fixed to a link of the plant and unknown to the controller.
 struct Payload {
   std::string body;
   double mass = 0.0;               ///< kg, a point.
@@ -118,14 +119,13 @@ struct Payload {
   std::string key;                 ///< For messages.
 };
 
-/// By what the engine's robot differs from the one that the controller knows.
+/// Differences of the engine's robot from the robot that the controller knows.
 struct MismatchOptions {
-  ByName mass{.all = 1.0};      ///< Factor of a link's mass and inertia.
-  ByName mass_within;           ///< The factor is drawn from 1 -+ this, times `mass`.
-  ByName damping{.all = 1.0};   ///< Factor of a joint's viscous friction.
-  ByName armature{.all = 1.0};  ///< Factor of a joint's rotor inertia.
-  std::vector<std::pair<std::string, Vector3d>>
-      com;  ///< By how much a link's centre of mass is elsewhere, m.
+  ByName mass{.all = 1.0};                            ///< Factor of a link's mass and inertia.
+  ByName mass_within;                                 ///< The factor is drawn from 1 -+ this, times `mass`.
+  ByName damping{.all = 1.0};                         ///< Factor of a joint's viscous friction.
+  ByName armature{.all = 1.0};                        ///< Factor of a joint's rotor inertia.
+  std::vector<std::pair<std::string, Vector3d>> com;  ///< Displacement of a link's centre of mass, m.
   std::vector<Payload> payloads;
   Vector2d slope = Vector2d::Zero();  ///< Rise of the floor along x and y, rad.
   std::optional<double> friction;     ///< mu of fingertips on the object, instead of the model's.
@@ -133,17 +133,17 @@ struct MismatchOptions {
   [[nodiscard]] bool is_none() const;
 };
 
-/// All of it.
+/// All imperfections of a scenario.
 struct Imperfections {
   SensingOptions sensing;
   ActuationOptions actuation;
   std::vector<DisturbanceOptions> disturbances;
   MismatchOptions mismatch;
 
-  /// "sensing.latency = 0.002" for each key that the scenario has: what a verdict should say.
+  /// "sensing.latency = 0.002" for each key of the scenario: the text of a verdict.
   std::vector<std::string> declared;
 
-  /// Whether the plant is the ideal one, whatever keys there are.
+  /// Whether the plant is the ideal one, whatever keys are set.
   [[nodiscard]] bool is_ideal() const;
 };
 

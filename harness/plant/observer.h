@@ -1,6 +1,6 @@
 #pragma once
 
-// What the engine's state means in the paper's coordinates.
+// The engine's state in the paper's coordinates.
 
 #include <span>
 #include <vector>
@@ -25,22 +25,21 @@ class Observer {
   /// @throws InputError when a fingertip or the object has no geom that touches.
   Observer(const Adapter& adapter, std::span<const int> fingertips, const Surface& surface);
 
-  /// The contacts are bonds at these coordinates, made by these constraints of the engine, one for each
-  /// fingertip.
+  /// Makes the contacts bonds at these coordinates, held by these constraints, one for each fingertip.
   void SetBonds(std::span<const ContactCoordinates> kappa, std::span<const int> constraints);
 
-  /// The robot stands on these frames.
+  /// Sets the frames on which the robot stands.
   void SetFeet(std::span<const int> frames);
 
-  /// Everything but the support's force; between BeginStep and EndStep.
+  /// Reads everything except the support's force; between BeginStep and EndStep.
   void Read(const EngineSimulation& simulation, PlantReading* reading);
 
-  /// Everything but the motors' torques; after EndStep, of the step whose reading was read last.
+  /// Reads everything except the motors' torques; after EndStep, for the step whose reading was read last.
   void Read(const EngineSimulation& simulation, PlantResponse* response);
 
  private:
   void ReadFeet(const mjModel& m, const mjData& d, std::vector<GroundContact>* feet) const;
-  /// Of the feet on that body the one nearest to a place; -1 without one.
+  /// Returns the foot on that body that is nearest to a place; -1 without one.
   [[nodiscard]] int FindFoot(const mjModel& m, const mjData& d, int body, const Vector3d& place) const;
   struct BaseRates {
     Vector3d velocity = Vector3d::Zero();  // of Sigma_0's origin, world
@@ -55,7 +54,7 @@ class Observer {
   [[nodiscard]] Vector6d ReadSupportWrench(const mjModel& m, const mjData& d) const;
   void ReadDryFriction(const mjData& d, VectorXd* friction) const;
   void ReadJointLimits(const mjModel& m, const mjData& d, VectorXd* force) const;
-  /// Where xi has the joint of a degree of freedom; -1 when it is none of the robot's.
+  /// Returns the entry of xi of a degree of freedom's joint; -1 when it is none of the robot's.
   [[nodiscard]] Eigen::Index FindEntry(int dof) const;
   void ReadForces(const mjModel& m, const mjData& d, PlantResponse* response);
   [[nodiscard]] int FindFingertip(int geom) const;
@@ -73,7 +72,7 @@ class Observer {
   VelocityMap map_;
   std::vector<ContactCoordinates> bond_kappa_;
   std::vector<int> bond_constraints_;
-  // Of the last reading.
+  // Values of the last reading.
   VectorXd qpos_;  // nq
   VectorXd q_, xi_;
   double phi_ = 0.0;

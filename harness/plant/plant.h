@@ -15,18 +15,18 @@
 
 namespace dexcheck {
 
-// What is read of a plant in one step: its true state before it is driven, and its response.
+// Values that are read from a plant in one step: its true state before it is driven, and its response.
 
 /// Motion of the base that the paper's coordinates leave out.
 struct BaseDeparture {
   double tilt = 0.0;    ///< Angle of the base's z axis against the vertical, rad.
-  double height = 0.0;  ///< Of Sigma_0's origin against the model's, m.
+  double height = 0.0;  ///< Height of Sigma_0's origin above the model's, m.
 };
 
 /// The true state at the beginning of a step.
 struct PlantReading {
-  /// In the paper's coordinates: tilt and height of the base, which q' does not have, are dropped; kappa is
-  /// where the plant's fingertips touch. Of a fingertip that is far from the object, kappa is the nearest
+  /// The state in the paper's coordinates, without tilt and height of the base, which q' does not have; kappa
+  /// is where the plant's fingertips touch. For a fingertip that is far from the object, kappa is the nearest
   /// place and the overlap -kFar.
   MeasuredState state;
   Touch touch;
@@ -34,29 +34,29 @@ struct PlantReading {
   Pose X_W0 = Pose::Identity();  ///< Pose of Sigma_0 in the world, tilt and height included.
   VectorXd qpos;                 ///< MuJoCo's positions (nq), which draw the scene.
   VectorXd qvel;                 ///< MuJoCo's velocities (nv).
-  /// Of MuJoCo's bodies: origin (3) and rotation, row by row (9), each; empty for a plant that has none.
+  /// Origin (3) and rotation, row by row (9), of each of MuJoCo's bodies; empty for a plant without them.
   VectorXd body_positions, body_rotations;
 
-  /// Gap between fingertip and object from which on they are just far apart, m.
+  /// Gap between fingertip and object from which on they count as far apart, m.
   static constexpr double kFar = 5e-3;
 };
 
-/// One fingertip's contact as the plant has it.
+/// Contact of one fingertip in the plant.
 struct PlantContact {
   bool touching = false;
   Vector3d position = Vector3d::Zero();  ///< World, m.
   Vector3d normal = Vector3d::Zero();    ///< World, from the fingertip into the object.
   double distance = 0.0;                 ///< m, negative when the bodies overlap.
-  Vector3d force = Vector3d::Zero();     ///< World, N, of finger on object.
+  Vector3d force = Vector3d::Zero();     ///< Force of the finger on the object, world, N.
 };
 
-/// What two bodies push each other with that should not touch.
+/// Forces between two bodies that should not touch.
 struct Collision {
   double force = 0.0;          ///< N
   int geom1 = -1, geom2 = -1;  ///< The engine's.
 };
 
-/// How the engine has two bodies touch; the deepest contact when there are several.
+/// Contact of two bodies in the engine; the deepest contact when there are several.
 struct BodyContact {
   bool touching = false;
   double distance = 0.0;             ///< m, negative when the bodies overlap.
@@ -67,18 +67,18 @@ struct BodyContact {
 
 /// A foot's contact with the ground.
 struct GroundContact : BodyContact {
-  Vector3d force = Vector3d::Zero();  ///< Of the ground on the foot, world, N.
+  Vector3d force = Vector3d::Zero();  ///< Force of the ground on the foot, world, N.
 };
 
 /// A force and a torque on one of the engine's bodies, in world axes.
 struct BodyForce {
   int body = 0;
-  Vector3d point = Vector3d::Zero();   ///< Where the force acts, m.
+  Vector3d point = Vector3d::Zero();   ///< Point of action of the force, m.
   Vector3d force = Vector3d::Zero();   ///< N.
   Vector3d torque = Vector3d::Zero();  ///< N m.
 };
 
-/// Two geoms as the engine lets them touch.
+/// Contact of two geoms in the engine.
 struct EngineContact {
   int geom1 = -1, geom2 = -1;             ///< The engine's.
   int dim = 0;                            ///< 1 without friction; 3, 4 or 6.
@@ -92,7 +92,7 @@ struct EngineContact {
 /// One row of the engine's constraints.
 struct ConstraintRow {
   int type = 0;        ///< mjtConstraint.
-  int id = -1;         ///< Of its contact among the step's, or the engine's of a joint, dof or equality.
+  int id = -1;         ///< Index of its contact in the step, or the engine's id of a joint, dof or equality.
   double force = 0.0;  ///< N or N m.
 };
 
@@ -103,22 +103,23 @@ struct PlantResponse {
   std::vector<PlantContact> contacts;    ///< By fingertip.
   std::vector<BodyContact> fingertips;   ///< How the fingertips slip on the object.
   std::vector<BodyContact> wheels;       ///< How the right and left wheel slip on the floor.
-  std::vector<GroundContact> feet;       ///< Of a robot that stands, by foot.
+  std::vector<GroundContact> feet;       ///< Feet of a robot that stands.
   Vector6d support_wrench =
-      Vector6d::Zero();        ///< On the object by all else than fingertips, Sigma_o, N, N m.
+      Vector6d::Zero();        ///< Wrench on the object from everything except fingertips, Sigma_o, N, N m.
   double support_force = 0.0;  ///< Its upward part, N.
-  /// Of the engine; 0 of a plant that has none.
+  /// Counts of the engine; 0 for a plant without it.
   int contact_count = 0, constraint_rows = 0;
-  Collision collision;     ///< The largest; of a plant whose bodies push, see Clearance.
-  VectorXd motor_torques;  ///< n, N m: what wheels and joints received from their motors, as tau'.
+  Collision collision;     ///< The largest, for a plant whose bodies push; see Clearance.
+  VectorXd motor_torques;  ///< n, N m: torques that wheels and joints received from their motors, as tau'.
   /// n, N and N m, as forces on xi, empty where there are none: dry friction of the joints, and their limits.
   VectorXd dry_friction, stop_force;
-  // Of the engine, empty for a plant that has none.
-  VectorXd qacc;                  ///< Accelerations (nv).
-  VectorXd left_over;             ///< M qacc less all forces, by the engine's own numbers (nv).
-  VectorXd mass;                  ///< Entries of M as the engine keeps them (GetMassEntries).
-  VectorXd bias;                  ///< Coriolis forces, gravity and damping (nv).
-  std::vector<BodyForce> forces;  ///< Of contacts and of joined points, on each body that they act on.
+  // Quantities of the engine, empty for a plant without it.
+  VectorXd qacc;  ///< Accelerations (nv).
+  VectorXd
+      left_over;  ///< M qacc less all forces, by the engine's own numbers (nv): the solver's remaining error.
+  VectorXd mass;  ///< Entries of M as the engine keeps them (GetMassEntries).
+  VectorXd bias;  ///< Coriolis forces, gravity and damping (nv).
+  std::vector<BodyForce> forces;  ///< Forces of contacts and of joined points on each body.
   std::vector<EngineContact> engine_contacts;
   std::vector<ConstraintRow> rows;  ///< In the engine's order.
 };
@@ -127,7 +128,7 @@ struct PlantResponse {
 struct Wrench {
   static constexpr int kObject = -2;
   int body = kObject;                  ///< Index of the joint that moves the link; -1 is the base.
-  Vector3d point = Vector3d::Zero();   ///< Where the force acts, m.
+  Vector3d point = Vector3d::Zero();   ///< Point of action of the force, m.
   Vector3d force = Vector3d::Zero();   ///< N.
   Vector3d torque = Vector3d::Zero();  ///< N m.
 };
@@ -146,8 +147,8 @@ class RunFailure : public Error {
 
 /// The motor of one entry of tau'.
 struct Motor {
-  std::string name;    ///< Of its joint.
-  double limit = 0.0;  ///< Of |tau'|, N m; infinity without.
+  std::string name;    ///< Name of its joint.
+  double limit = 0.0;  ///< Limit of |tau'|, N m; infinity without.
 };
 
 /// One plant. A step has two halves, so that a controller can be put between them:
@@ -162,15 +163,15 @@ class Plant {
   Plant(const Plant&) = delete;
   Plant& operator=(const Plant&) = delete;
 
-  /// s.
+  /// Time step, s.
   [[nodiscard]] virtual double time_step() const = 0;
-  /// By entry of tau'.
+  /// Motors by entry of tau'.
   [[nodiscard]] virtual std::span<const Motor> motors() const = 0;
 
   virtual void BeginStep() = 0;
-  /// What the plant is; between BeginStep and EndStep.
+  /// Reads the true state; between BeginStep and EndStep.
   virtual void Read(PlantReading* reading) = 0;
-  /// Pushes that act besides during the step whose torques come next.
+  /// Adds pushes that act during the step whose torques come next.
   /// @throws InputError when there are any and this kind of plant takes none.
   virtual void Push(std::span<const Wrench> wrenches) {
     if (!wrenches.empty()) throw InputError("disturbance: this plant takes no pushes");
@@ -178,15 +179,15 @@ class Plant {
   /// @param tau tau' (n), N m: of the right and left wheel, then of the joints.
   /// @throws DivergenceError when there is no state afterwards.
   virtual void EndStep(const Eigen::Ref<const VectorXd>& tau) = 0;
-  /// How it responded; after EndStep, of a step whose reading was read.
+  /// Reads the response; after EndStep, for a step whose reading was read.
   virtual void Read(PlantResponse* response) = 0;
 
   // Between steps.
 
-  /// Robot and object at rest at q' and X_Bo.
+  /// Puts robot and object at rest at q' and X_Bo.
   virtual void Place(const Eigen::Ref<const VectorXd>& q, const Pose& X_Bo) = 0;
-  /// Adds v (m/s, world) to the velocity of everything: the platform drives straight ahead at it, wheels
-  /// rolling, and what it carries goes along. @param state last read.
+  /// Adds v (m/s, world) to the velocity of robot and object: the platform drives straight ahead at v with
+  /// rolling wheels. @param state last read.
   virtual void AddVelocity(const MeasuredState& state, const Vector3d& v) = 0;
   /// Moves robot and object by `way` (m, world, horizontal).
   virtual void Translate(const Vector3d& way) = 0;
@@ -195,7 +196,7 @@ class Plant {
   Plant() = default;
 };
 
-/// What every part of a loop is made with that must make the same numbers again.
+/// Inputs of every part of a loop that must make the same numbers again.
 struct PartContext {
   const RobotModel* model = nullptr;
   size_t num_contacts = 0;
@@ -204,7 +205,7 @@ struct PartContext {
   std::string source;  ///< The scenario's file, for messages.
 };
 
-/// How the rigid plant steps.
+/// Integration method of the rigid plant.
 enum class Integrator {
   kRungeKutta4,  ///< Four evaluations, fourth order for the torques given; velocities and positions of one
                  ///< time.

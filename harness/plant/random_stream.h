@@ -1,7 +1,7 @@
 #pragma once
 
-// Random numbers by counter: one stream for each source, so that a source that is switched off leaves the
-// numbers of the others as they were.
+// Random numbers by counter: one stream for each source, so that a source that is switched off does not
+// change the numbers of the others.
 
 #include <cmath>
 #include <cstdint>
@@ -12,20 +12,20 @@
 
 namespace dexcheck {
 
-/// Returns the number in [0, 1) that 64 random bits make: the same on every machine, which the standard
-/// library's distributions are not.
+/// Converts 64 random bits to a number in [0, 1), the same on every machine; the standard library's
+/// distributions differ between machines.
 inline double ToUnitInterval(std::uint64_t bits) { return static_cast<double>(bits >> 11U) * 0x1p-53; }
 inline double DrawUnit(std::mt19937_64* random) { return ToUnitInterval((*random)()); }
 
 /// Number k of a stream is a function of seed, name and k alone. Nothing is stored between calls.
 class RandomStream {
  public:
-  /// @param source names what is drawn: "sensing.joint_noise".
+  /// @param source name of the drawn quantity: "sensing.joint_noise".
   RandomStream(std::uint64_t seed, std::string_view source) : key_(Mix(seed + kGolden)) {
     for (const char c : source) key_ = Mix(key_ ^ static_cast<unsigned char>(c));
   }
 
-  /// Uniform in [0, 1), number `k` of the `channel` (a joint, an axis).
+  /// Returns number `k` of the `channel` (a joint, an axis), uniform in [0, 1).
   [[nodiscard]] double Uniform(std::uint64_t k, std::uint64_t channel = 0) const {
     return ToUnitInterval(Draw(2 * k, channel));
   }

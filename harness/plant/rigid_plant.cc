@@ -14,12 +14,12 @@
 namespace dexcheck {
 namespace {
 
-/// 1/s. Of Runge-Kutta's method; the stages of a step are off the constraints by h^2 and more, so a rate that
-/// grew as the step shrinks would cost two orders.
+/// Rate w of Runge-Kutta's method, 1/s. The stages of a step are off the constraints by h^2 and more, so a
+/// rate that grew as the step shrinks would cost two orders.
 constexpr double kStabilisationRate = 20.0;
 
 std::unique_ptr<Surface> MakeHeldSurface(const RobotModel& model, bool holds) {
-  // What is not held needs a surface only to have one.
+  // An object that is not held needs a surface only to have one.
   return holds ? MakeSurface(model.object()->shape) : std::make_unique<Sphere>(1.0);
 }
 
@@ -287,7 +287,7 @@ void RigidPlant::Read(PlantResponse* response) {
     tip.cone_use = contact.touching ? tangential / (mu * f.z()) : 0.0;
     tip.cone_margin = mu * f.z() - tangential;
   }
-  // They roll.
+  // The wheels roll.
   BodyContact rolling;
   rolling.touching = true;
   response->wheels.assign(adapter_->wheels().size(), rolling);

@@ -6,13 +6,13 @@
 //   [xi_dot; V_o_dot; f_c] by ConstrainedDynamics under E_bar' tau' and pushes, both held during a time step
 //
 // Bodies are rigid, wheels roll and fingertips stick and stay closed, whatever the forces are: friction
-// cones, normal forces and traction are reported and limit nothing. Where integration drifts off the
-// constraints it is led back: with r = J_B' xi - G^T V_o and the gaps g between the bodies,
+// cones, normal forces and traction are reported and limit nothing. Drift of the integration off the
+// constraints is corrected: with r = J_B' xi - G^T V_o and the gaps g between the bodies,
 //
 //   d/dt r = -2 w r + [0; 0; w^2 g]            per contact
 //
 // which on the constraints is (46). w is constant for Runge-Kutta's method, 20/s, and 1 / (2 h) for Euler's,
-// h the time step: the contact that engines have, with a time constant of 2 h.
+// h the time step: the contact of engines, with a time constant of 2 h.
 
 #include <memory>
 #include <span>
@@ -58,7 +58,7 @@ class RigidPlant final : public Plant {
 
   /// Kinetic and potential energy of robot and object at the state, J.
   [[nodiscard]] double CalcEnergy();
-  /// Work of motors and pushes less what friction took, over all steps, J; to the integrator's order.
+  /// Work of motors and pushes less the loss by friction, over all steps, J; to the integrator's order.
   [[nodiscard]] double work() const { return work_; }
 
  private:
@@ -84,9 +84,9 @@ class RigidPlant final : public Plant {
                            VectorXd* q_dot) const;
   /// Terms and rates at a state whose object has turned by `turn` since the step's beginning.
   void Evaluate(const State& state, const Vector3d& turn, Rate* rate);
-  /// The same of a robot that holds nothing, whose terms are evaluated.
+  /// Evaluates them for a robot that holds nothing, whose terms are evaluated.
   void EvaluateFree(const State& state, Rate* rate);
-  /// Keeps what Evaluate has found for the response.
+  /// Stores the results of Evaluate for the response.
   void KeepResponse();
   void StepRungeKutta();
   void StepEuler();
@@ -118,7 +118,7 @@ class RigidPlant final : public Plant {
   double work_ = 0.0;
   double time_ = 0.0;
 
-  // Of the last step, at its beginning.
+  // Values of the last step, at its beginning.
   Pose X_Bo_before_ = Pose::Identity();
   std::vector<Pose> g_o_cf_before_;
   std::vector<double> gaps_before_;

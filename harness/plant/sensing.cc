@@ -19,10 +19,10 @@ Vector3d DrawNormal(const RandomStream& stream, std::uint64_t k) {
   return {stream.Normal(k, 0), stream.Normal(k, 1), stream.Normal(k, 2)};
 }
 
-// What a filter expects of the object's velocity before the first step, m/s and rad/s.
+// Standard deviation that a filter expects of the object's velocity before the first step, m/s and rad/s.
 constexpr double kStartSpread = 0.1;
 
-/// Wheels, then joints: by the entries of tau'.
+/// Lists the names of wheels, then of joints, by the entries of tau'.
 std::vector<std::string> ListNames(const RobotModel& model, bool wheels) {
   std::vector<std::string> names;
   const Base& base = model.base();
@@ -33,7 +33,7 @@ std::vector<std::string> ListNames(const RobotModel& model, bool wheels) {
   return names;
 }
 
-/// Rates below this are none, rad/s.
+/// Rates below this count as zero, rad/s.
 constexpr double kStandstill = 1e-30;
 
 Reading MakeReading(const PartContext& context) {

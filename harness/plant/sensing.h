@@ -17,19 +17,18 @@ struct ObjectMotion {
   Vector6d V_Bo = Vector6d::Zero();  ///< Sigma_o.
 };
 
-/// A camera that sees the object: with noise, now and then, and late. Nothing allocates after construction.
+/// A camera that sees the object with noise, periodically and late. Nothing allocates after construction.
 class ObjectSensor {
  public:
   /// @param options those that begin with object_.
   ObjectSensor(const SensingOptions& options, double time_step, std::uint64_t seed);
 
   [[nodiscard]] bool is_exact() const { return is_exact_; }
-  /// What is measured of the true motion at step k = 0, 1, ...
+  /// Returns the measurement of the true motion at step k = 0, 1, ...
   ObjectMotion Measure(const ObjectMotion& true_motion, std::uint64_t k);
-  /// Everything is elsewhere from now on, by `way` (m, world).
+  /// Moves everything by `way` (m, world) from now on.
   void Translate(const Vector3d& way);
-  /// The object moves at `v` (m/s, world) more from step k on: what is remembered becomes as if it always
-  /// had.
+  /// Adds `v` (m/s, world) to the object's velocity from step k on: remembered values change with it.
   void AddVelocity(const Vector3d& v, std::uint64_t k);
   /// Age of the pose that is measured at step k, steps.
   [[nodiscard]] double FindAge(std::uint64_t k) const;
@@ -46,7 +45,7 @@ class ObjectSensor {
   double time_step_;
   RandomStream position_noise_, orientation_noise_;
   long period_ = 1;                    // steps from one pose to the next
-  std::vector<ObjectMotion> delayed_;  // ring of what was seen
+  std::vector<ObjectMotion> delayed_;  // ring of poses seen
   double low_pass_ = 1.0;
   ObjectMotion seen_;  // last of all
   bool has_seen_ = false;
@@ -57,20 +56,20 @@ class ObjectSensor {
   KalmanGains position_gains_, orientation_gains_;
 };
 
-/// Stands between the plant and the controller: encoders, tachometers, odometry, a camera, a latency. Two of
-/// them that are made alike measure the same of the same true states: a check makes its own. Nothing
-/// allocates after construction, once `measurement` has its sizes.
+/// The sensors between the plant and the controller: encoders, tachometers, odometry, a camera, a latency.
+/// Two objects of the same options make the same measurements of the same true states: a check makes its own.
+/// Nothing allocates after construction, once `measurement` has its sizes.
 class Sensing {
  public:
-  /// @throws InputError when the options name what the robot does not have.
+  /// @throws InputError when the options name parts that the robot does not have.
   Sensing(const SensingOptions& options, const PartContext& context);
 
-  /// What is measured of the true state; once at each step, from the first one on.
+  /// Measures the true state; once at each step, from the first one on.
   void Measure(const PlantReading& true_reading, Reading* measured);
-  /// Robot and object are elsewhere from now on, by `way` (m, world): what is remembered moves along.
+  /// Moves robot and object by `way` (m, world) from now on, remembered values included.
   void Translate(const Vector3d& way);
-  /// Platform and object move at `v` (m/s, world) more from now on, as a run that starts moving does: what is
-  /// remembered becomes as if they always had.
+  /// Adds `v` (m/s, world) to the velocity of platform and object from now on, for a run that starts moving:
+  /// remembered values become as if they had always moved so.
   void AddVelocity(const Vector3d& v);
 
  private:

@@ -27,13 +27,13 @@ class KalmanGains {
   KalmanGains(double sigma, double R, double time_step)
       : dt_(time_step), q_(sigma * sigma * time_step * time_step), R_(R) {}
 
-  /// One step on: P = F P F^T + Q, F = [1 dt; 0 1], Q = sigma^2 dt^2 [dt; 1] [dt; 1]^T.
+  /// Predicts one step: P = F P F^T + Q, F = [1 dt; 0 1], Q = sigma^2 dt^2 [dt; 1] [dt; 1]^T.
   void Predict() {
     xx_ += dt_ * (2.0 * xv_ + dt_ * vv_) + q_ * dt_ * dt_;
     xv_ += dt_ * vv_ + q_ * dt_;
     vv_ += q_;
   }
-  /// A position was measured: the gains of position and velocity on the innovation.
+  /// Corrects by a measured position: sets the gains of position and velocity on the innovation.
   void Correct() {
     S_ = xx_ + R_;
     k_x_ = xx_ / S_;
@@ -42,7 +42,7 @@ class KalmanGains {
     xv_ -= k_x_ * xv_;
     xx_ -= k_x_ * xx_;
   }
-  /// The position is known as well as it is measured, the velocity not at all beyond `spread`.
+  /// Begins with a position as exact as its measurement, and a velocity with standard deviation `spread`.
   void Reset(double spread) {
     xx_ = R_;
     xv_ = 0.0;
@@ -60,7 +60,7 @@ class KalmanGains {
   double k_x_ = 0.0, k_v_ = 0.0, S_ = 0.0;
 };
 
-/// That filter of one coordinate.
+/// A Kalman filter of one coordinate with KalmanGains.
 class VelocityFilter {
  public:
   VelocityFilter() = default;
@@ -84,7 +84,7 @@ class VelocityFilter {
   }
   [[nodiscard]] double x() const { return x_; }
   [[nodiscard]] double v() const { return v_; }
-  /// Measured less predicted, and the variance that it should have.
+  /// Measured less predicted position, and the variance that it should have.
   [[nodiscard]] double innovation() const { return innovation_; }
   [[nodiscard]] double innovation_variance() const { return gains_.S(); }
 

@@ -1,7 +1,7 @@
 #pragma once
 
-// Twist and wheel rates of a differential drive as the plant has them: a wheel at y on the axle rolls at
-// (v - w y) / r. The controller has formulas of its own (controller/model/platform.h).
+// Twist and wheel rates of a differential drive in the plant: a wheel at y on the axle rolls at (v - w y) /
+// r. The controller has formulas of its own (controller/model/platform.h).
 
 #include "controller/model/robot_model.h"
 
@@ -13,7 +13,7 @@ inline Vector2d CalcWheelRatesOfTwist(const Base& base, const Vector2d& twist) {
   return Vector2d(twist[0] + twist[1] * y, twist[0] - twist[1] * y) / base.wheel_radius;
 }
 
-/// The twist at which the wheels roll so.
+/// Returns the twist at which the wheels have these rates.
 inline Vector2d CalcTwist(const Base& base, const Vector2d& rates) {
   const double r = base.wheel_radius;
   return {0.5 * r * rates.sum(), r * (rates[0] - rates[1]) / base.wheel_distance};

@@ -13,6 +13,7 @@
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
 #include "controller/dynamics/model_terms.h"
+#include "harness/base/bounded_json.h"
 #include "harness/base/version.h"
 #include "harness/descriptions/audit.h"
 #include "harness/descriptions/read_description.h"
@@ -80,7 +81,7 @@ Json DescribeLog(const LogReader& log) {
 }
 
 const char* Keep(PythonObject* object, const Json& json) {
-  object->text = json.dump();
+  object->text = FormatJson(json, /*indent=*/-1);
   return object->text.c_str();
 }
 

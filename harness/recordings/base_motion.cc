@@ -45,7 +45,7 @@ std::vector<Push> FindWindows(const VectorXd& squares, const std::vector<TorqueB
     const auto stays = [&](Index at) { return at >= 0 && at < rest.size() && rest[at] > kStays * usual; };
     while (stays(first - 1) || stays(first - 2)) --first;
     while (stays(last + 1) || stays(last + 2)) ++last;
-    // What stands out half of the time is no push.
+    // A residual that stands out half of the time is no push.
     const Push push = TrimWindow(squares, first, last, blocks);
     // Windows of smoothing overlap, so that what acts shows in more than one sample.
     if (last - first <= squares.size() / 2 && push.from < push.to) windows.push_back(push);
@@ -54,8 +54,8 @@ std::vector<Push> FindWindows(const VectorXd& squares, const std::vector<TorqueB
   return windows;
 }
 
-/// What a constant acceleration of the base leaves in a block: products of its three columns, of all joints,
-/// and with what is left.
+/// The effect of a constant acceleration of the base in a block: products of its three columns, of all
+/// joints, and with what is left.
 struct BlockProducts {
   double from = 0.0, to = 0.0;  // s
   Matrix3d squares = Matrix3d::Zero();
@@ -137,7 +137,7 @@ static std::optional<double> FindStep(const RecordingSet& recordings, const Torq
   double most = kFraction * all.left;
   Matrix3d G = Matrix3d::Zero();
   Vector3d b = Vector3d::Zero();
-  // What holds nearly all the time is gravity.
+  // An acceleration that holds nearly all the time is gravity.
   for (size_t i = all.blocks.size(); i-- > 1 + all.blocks.size() / 10;) {
     G += all.blocks[i].squares;
     b += all.blocks[i].products;
@@ -160,7 +160,7 @@ std::vector<Push> FindPushes(const RecordingSet& recordings, const TorqueRows& r
   for (Push& when : pushes) {
     when.recording = static_cast<int>(recording);
     when.reach = recordings[recording].reach;
-    // What goes on at the end does not end there.
+    // A push that goes on at the end does not end there.
     if (when.to >= blocks.back().from) when.to = blocks.back().to + when.reach;
     if (when.from <= blocks.front().to) when.from = blocks.front().from - when.reach;
   }

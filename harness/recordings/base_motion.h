@@ -1,6 +1,6 @@
 #pragma once
 
-// What acts on a robot for a while, and how a base may move that a recording takes to be at rest.
+// Forces that act on a robot for a while, and motions of a base that a recording takes to be at rest.
 
 #include <vector>
 

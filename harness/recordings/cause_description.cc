@@ -37,6 +37,13 @@ CauseDescription::JointNumber CauseDescription::CalcNumber(int joint, TorqueColu
   JointNumber number;
   for (const CauseTerm& term : estimator_.selection().terms) {
     const TorqueFault& fault = estimator_.faults()[term.candidate];
+    if (fault.HasVelocity()) {
+      if (fault.index != joint || FindNumber(fault, fault.sums[0][0].column) != kind) continue;
+      number.change += term.amplitude[0];
+      number.variance += Square(term.error[0]);
+      ++number.terms;
+      continue;
+    }
     for (size_t k = 0; k < fault.sums.size(); ++k)
       for (const ColumnPart& part : fault.sums[k]) {
         if (part.joint != joint || FindNumber(fault, part.column) != kind) continue;
@@ -50,7 +57,7 @@ CauseDescription::JointNumber CauseDescription::CalcNumber(int joint, TorqueColu
   return number;
 }
 
-bool CauseDescription::TellWholeNumbers(FoundFault* found, Fault* told) const {
+bool CauseDescription::AddWholeNumbers(FoundFault* found, Fault* told) const {
   const TorqueFault& fault = found->fault;
   if (fault.sums.empty()) return false;
   const auto kind = FindNumber(fault, fault.sums.front().front().column);
@@ -97,7 +104,7 @@ bool CauseDescription::TellWholeNumbers(FoundFault* found, Fault* told) const {
   return is_shared;
 }
 
-double CauseDescription::StribeckVelocityOf(const TorqueFault& fault, const VectorXd& a) const {
+double CauseDescription::ShapeVelocityOf(const TorqueFault& fault, const VectorXd& a) const {
   const double v = set_[0].shape_velocities(fault.index, fault.sums.front().front().column.component);
   return a.size() == 1 ? v : v * std::sqrt(kFineRatio) * std::exp(a[1] / a[0]);
 }
@@ -114,10 +121,13 @@ Fault CauseDescription::Describe(const TorqueFault& fault, const VectorXd& a, Ve
   one.fault = fault.fault;
   one.place = fault.place;
   one.unit = fault.unit;
-  const bool is_number =
-      a.size() == 1 || fault.kind == TorqueFault::kSpring || fault.kind == TorqueFault::kStribeckFriction;
+  const bool is_number = a.size() == 1 || fault.kind == TorqueFault::kSpring || fault.HasVelocity();
   one.value = is_number ? fault.nominal + a[0] : a.norm();
-  one.error = is_number ? error[0] : error.norm();
+  // A combination that does not show leaves the others their size.
+  const bool shows_some = !is_number && fault.kind != TorqueFault::kPayload &&
+                          error.array().isFinite().any() && !error.array().isFinite().all();
+  const VectorXd shown = shows_some ? VectorXd(error.array().isFinite().select(error, 0.0)) : error;
+  one.error = is_number ? error[0] : shown.norm();
   const auto vector = ShowVector;
   using enum TorqueFault::Kind;
   if (fault.kind == kPayload) {
@@ -164,10 +174,11 @@ Fault CauseDescription::Describe(const TorqueFault& fault, const VectorXd& a, Ve
   } else if (fault.kind == kTorqueGain && std::abs(one.value + 1.0) < 0.2) {
     one.detail = "(the other sign)";
   } else if (fault.kind == kStribeckFriction) {
-    one.detail = "below about " + FormatNumber(StribeckVelocityOf(fault, a), 2) + " per s";
+    one.detail = "below about " + FormatNumber(ShapeVelocityOf(fault, a), 2) + " per s";
   } else if (!is_number) {
     one.detail = vector(a) + (fault.kind == kPush ? " at its centre of mass in world axes" : "");
   }
+  if (shows_some) one.detail += ", as far as this motion shows it";
   if (fault.recording >= 0 && names_.size() > 1)
     one.detail += " in " + names_[static_cast<size_t>(fault.recording)];
   return one;

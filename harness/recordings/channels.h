@@ -57,7 +57,7 @@ struct DeclaredPayload {
   Vector3d com = Vector3d::Zero();  ///< In frame i, m.
 };
 
-/// Where a measured wrench acts on the robot.
+/// The place at which a measured wrench acts on the robot.
 struct WrenchPlace {
   int link = -1;
   Vector3d point = Vector3d::Zero();  ///< In frame i, m: what the moment is about.

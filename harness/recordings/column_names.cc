@@ -18,7 +18,7 @@ constexpr std::pair<RecordedQuantity, std::string_view> kWords[] = {
     {RecordedQuantity::kAcceleration, " qdd ddq acc acceleration qacc qddot "},
     {RecordedQuantity::kTorque, " tau torque torques effort efforts trq force "},
     {RecordedQuantity::kCurrent, " current currents amps i "}};
-/// What is commanded is no measurement.
+/// Commanded values are no measurement.
 constexpr std::string_view kCommanded =
     " cmd command commanded des desired target setpoint ref reference d error ext ";
 
@@ -75,7 +75,7 @@ size_t FindName(const std::string& name, const std::string& own) {
   return std::string::npos;
 }
 
-/// What a column's name says.
+/// The meaning of a column's name.
 struct NamedColumn {
   std::optional<RecordedQuantity> quantity;
   int joint = -1;
@@ -160,7 +160,8 @@ std::string WithoutUnit(std::string name) {
   return name.substr(0, name.find_last_not_of(' ') + 1);
 }
 
-/// Of a base's pose, by the last word and those before it; -1 for none. A run's log calls it "q.qw".
+/// Returns the number of a base's pose, by the last word and those before it; -1 for none. A run's log calls
+/// it "q.qw".
 int FindPoseComponent(const std::vector<std::string>& words) {
   constexpr std::string_view kComponents[] = {"x", "y", "z", "qw", "qx", "qy", "qz"};
   const auto has = [&](std::string_view list) {

@@ -1,6 +1,6 @@
 #pragma once
 
-// What the names of a recording's columns say: words that logs use, joints, units.
+// The meaning of the names of a recording's columns: words that logs use, joints, units.
 
 #include <span>
 #include <string>

@@ -35,7 +35,7 @@ std::optional<VectorXd> CalcDifference(const Traces& first, const Traces& second
     own << one.q, one.measured;
     if (squares.size() == 0) squares = counts = VectorXd::Zero(own.size());
     ++overlap;
-    // Where friction holds a joint its torque is not known.
+    // A joint that friction holds has no known torque.
     for (Eigen::Index i = 0; i < own.size(); ++i) {
       if (!std::isfinite(own[i]) || !std::isfinite((*other)[i])) continue;
       squares[i] += ((*other)[i] - own[i]) * ((*other)[i] - own[i]);

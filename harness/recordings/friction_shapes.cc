@@ -6,17 +6,20 @@
 
 namespace dexcheck {
 
-MatrixXd ListShapeVelocities(const VectorXd& speeds, const std::map<int, double>& stribeck) {
-  constexpr double kSmooth[] = {0.1, 0.3, 1.0}, kSlowest = 0.05, kRatio = 1.8;
+MatrixXd ListShapeVelocities(const VectorXd& speeds, const std::map<int, double>& stribeck,
+                             const std::map<int, double>& smooth) {
+  constexpr double kSmooth[] = {0.03, 0.1, 0.3, 1.0}, kSlowest = 0.05, kRatio = 1.8;
   MatrixXd velocities = MatrixXd::Zero(speeds.size(), kFrictionShapes);
   for (int joint = 0; joint < speeds.size(); ++joint) {
     const double speed = std::max(speeds[joint], std::numeric_limits<double>::min());
-    for (int i = 0; i < kSmoothShapes; ++i) velocities(joint, 1 + i) = kSmooth[i] * speed;
-    const auto known = stribeck.find(joint);
-    for (int i = 0; i < kStribeckShapes; ++i)
-      velocities(joint, 1 + kSmoothShapes + i) = known == stribeck.end()
-                                                     ? kSlowest * std::pow(kRatio, i) * speed
-                                                     : known->second * std::pow(kFineRatio, i - 0.5);
+    const auto fill = [&](int first, int count, const std::map<int, double>& known, const auto& usual) {
+      const auto own = known.find(joint);
+      for (int i = 0; i < count; ++i)
+        velocities(joint, first + i) =
+            own == known.end() ? usual(i) * speed : own->second * std::pow(kFineRatio, i - 0.5);
+    };
+    fill(1, kSmoothShapes, smooth, [&](int i) { return kSmooth[i]; });
+    fill(1 + kSmoothShapes, kStribeckShapes, stribeck, [](int i) { return kSlowest * std::pow(kRatio, i); });
   }
   return velocities;
 }

@@ -20,8 +20,14 @@ using Eigen::Index;
 
 /// Times the noise: more than errors of derivatives, known to a factor of two, can be.
 constexpr double kFar = 5.0;
-/// Of what the model does not explain: a cause that explains less is no reason to read again.
+/// Fraction of the residual that a cause must explain to justify another reading.
 constexpr double kMuch = 0.05;
+
+/// Velocities that are read again need no more digits: a reading knows how friction changes with them.
+double RoundToPercent(double velocity) {
+  constexpr double kSteps = 100.0;  // of a percent, in the logarithm
+  return std::exp(std::round(kSteps * std::log(velocity)) / kSteps);
+}
 
 /// A fault of the recording itself, that holds all the time.
 Explanation MakeCause(const Fault& fault) {
@@ -29,6 +35,24 @@ Explanation MakeCause(const Fault& fault) {
   one.channel = CauseChannel::kMeasurement;
   one.from = one.to = std::numeric_limits<double>::quiet_NaN();
   one.faults = {fault};
+  return one;
+}
+
+/// A fault of the recorded positions. An offset of the joint that a fixed base carries is gravity that is
+/// turned about its axis.
+Explanation MakeCause(const RobotModel& model, const PositionFault& found) {
+  Explanation one = MakeCause(found.fault);
+  const bool is_offset = found.offset != 0.0 && found.joint >= 0 && model.joint(found.joint).parent < 0;
+  if (!is_offset || model.base().type != BaseType::kFixed) return one;
+  const Joint& joint = model.joint(found.joint);
+  const Vector3d axis = model.base().X_B0.linear() * joint.X_PB.linear() *
+                        Eigen::AngleAxisd(joint.mdh.alpha, Vector3d::UnitX()) * Vector3d::UnitZ();
+  const Vector3d turned = Eigen::AngleAxisd(-found.offset, axis) * model.gravity();
+  constexpr double kLittle = 1e-3;
+  if ((turned - model.gravity()).norm() < kLittle * model.gravity().norm()) return one;
+  one.faults.push_back({"gravity", "world", turned.norm(), 0.0, "m/s^2",
+                        FormatVector(turned, 3) + ", or a base that is turned as far"});
+  one.SetOutcome();
   return one;
 }
 
@@ -48,6 +72,7 @@ class Judge {
     result_.unjudged = set_.ListUnjudged();
     result_.rows = set_.rows();
     result_.notes = set_.notes();
+    result_.has_other_times = set_.has_other_times();
     for (const Fault& fault : set_.faults()) result_.causes.push_back(MakeCause(fault));
     Tell();
     return std::move(result_);
@@ -98,6 +123,8 @@ class Judge {
       if (set_.has_currents())
         joint.drive_gain = set_.gain(part.place) / (1.0 + amplitudes[static_cast<Index>(part.place)]);
       joint.torque = CalcMeasured(part);
+      joint.modelled = CalcSize(part, ModelledOf(part));
+      joint.hidden = estimator_.CalcHidden(joint.noise, joint.left, part.samples);
       const ReadRecording& recording = set_[part.recording];
       FillTraces(part, *recording.fit, first_fit[part.recording], before, after);
       FillTraces(other, *recording.held, first_held[part.recording], held_before, held_after);
@@ -116,15 +143,24 @@ class Judge {
     Refinements& next = result_.refinements;
     next.shaking = set_.refinements().shaking;
     next.gravity = set_.refinements().gravity;
+    next.advances_velocities = set_.refinements().advances_velocities;
     const size_t own = result_.causes.size() - result_.found.size();
+    const double beyond = 1.0 - result_.explained;
     for (size_t i = 0; i < result_.found.size(); ++i) {
       const TorqueFault& fault = result_.found[i].fault;
       const VectorXd& amplitude = result_.found[i].amplitude;
-      if (result_.causes[own + i].fraction < kMuch) continue;
+      const double fraction = result_.causes[own + i].fraction;
+      if (fraction < kMuch && (result_.IsWhole() || fraction < 2.0 * beyond)) continue;
       if (fault.kind == TorqueFault::kZero && std::abs(amplitude[0]) > kLittle)
         next.offsets[fault.index] = amplitude[0];
-      if (fault.kind == TorqueFault::kStribeckFriction)
-        next.stribeck[fault.index] = description_.StribeckVelocityOf(fault, amplitude);
+      if (fault.kind == TorqueFault::kStribeckFriction || fault.kind == TorqueFault::kDryFriction) {
+        const TorqueColumn& shape = fault.sums.front().front().column;
+        auto& known = fault.kind == TorqueFault::kDryFriction ? next.smooth : next.stribeck;
+        if (shape.kind == TorqueColumn::kFriction && shape.component != kSlipShape)
+          known[fault.index] = RoundToPercent(description_.ShapeVelocityOf(fault, amplitude));
+      }
+      if (const double turn = FindTurn(fault, amplitude); fault.kind == TorqueFault::kCentre && turn != 0.0)
+        next.offsets.try_emplace(fault.index, turn);
       if (fault.kind == TorqueFault::kSaturation)
         next.limits[fault.index] = description_.LimitOf(fault, amplitude);
       if (fault.kind == TorqueFault::kGravity && !result_.IsWhole()) next.gravity = amplitude;
@@ -133,6 +169,17 @@ class Judge {
           next.delays[joint] += std::lround(amplitude[0] / set_.step());
     }
     if (!result_.IsWhole() && next.shaking == 0.0) next.shaking = FindShaking(set_, estimator_.rows(), left);
+  }
+  /// Returns the position offset, rad, that moves a link's centre of mass like this about its joint; 0 for
+  /// none. To first order the two look alike, so that the next reading compares them at this size.
+  [[nodiscard]] double FindTurn(const TorqueFault& fault, const VectorXd& amplitude) const {
+    if (fault.kind != TorqueFault::kCentre || set_.model().joint(fault.index).type != JointType::kRevolute)
+      return 0.0;
+    constexpr double kSame = 0.1;
+    const Vector3d com = set_.model().joint(fault.index).body.com;
+    const Vector2d before = com.head<2>(), after = (com + amplitude).head<2>();
+    if (std::abs(after.norm() - before.norm()) > kSame * before.norm()) return 0.0;
+    return std::atan2(after.x() * before.y() - after.y() * before.x(), after.dot(before));
   }
   /// Root mean square of the measured torque: of y, the model's torque and friction.
   double CalcMeasured(const TorqueRows::Part& part) const {
@@ -144,7 +191,12 @@ class Judge {
     } else {
       b[b.size() - 1] = 1.0;
     }
-    return std::sqrt(std::max(0.0, b.dot(balance.products(part.place) * b)) / std::max(1.0, part.samples));
+    return CalcSize(part, b);
+  }
+  /// Returns the root mean square of a sum of a joint's columns, N m or N. @param b the factor of each.
+  [[nodiscard]] double CalcSize(const TorqueRows::Part& part, const VectorXd& b) const {
+    const MatrixXd& products = set_[part.recording].fit->products(part.place);
+    return std::sqrt(std::max(0.0, b.dot(products * b)) / std::max(1.0, part.samples));
   }
 
   [[nodiscard]] VectorXd ModelledOf(const TorqueRows::Part& part) const {
@@ -206,10 +258,10 @@ class Judge {
     }
     FoundFault found{fault, term.amplitude, term.error};
     one.faults.push_back(description_.Describe(fault, term.amplitude, term.error));
-    const bool is_shared = description_.TellWholeNumbers(&found, &one.faults.front());
+    const bool is_shared = description_.AddWholeNumbers(&found, &one.faults.front());
     for (const auto& [candidate, amplitude] : term.same) {
       const TorqueFault& other = estimator_.faults()[candidate];
-      // Where each joint's gain is sought, the model's bodies are the scale by which it is told.
+      // With each joint's gain sought, the model's bodies are the scale that shows it.
       if (is_shared && (other.kind == fault.kind || other.IsOfLoad())) continue;
       Fault same = description_.Describe(other, amplitude, {});
       if (!same.IsLike(one.faults.front())) one.faults.push_back(std::move(same));
@@ -233,11 +285,18 @@ class Judge {
   }
 
   /// Whether more than noise is left, so that something else is at work, and it explains little, or where far
-  /// more is left not far more: a wrong mass fits a little of any. Friction is named all the same: drives
-  /// have more shapes of it than are tried.
+  /// more is left not far more: a wrong mass fits a little of any. Dry and viscous friction are named all the
+  /// same, since drives have more shapes of it than are tried; a further shape that explains little is not.
   [[nodiscard]] bool IsDoubtful(const TorqueFault& fault, const CauseTerm& term) const {
-    if (fault.IsFriction() || result_.left <= kMostNoise) return false;
+    constexpr double kErrors = 3.0;  // standard errors from zero
+    const VectorXd shown = term.error.array().isFinite().select(term.error, 0.0);
+    const Index sizes = fault.HasVelocity() || fault.kind == TorqueFault::kSpring ? 1 : term.amplitude.size();
+    if (term.amplitude.head(sizes).norm() < kErrors * shown.head(sizes).norm()) return true;
+    if (result_.left <= kMostNoise) return false;
     const double left = 1.0 - estimator_.selection().fraction;
+    if (fault.IsFriction())
+      return (fault.kind == TorqueFault::kStribeckFriction || fault.kind == TorqueFault::kLoadFriction) &&
+             term.fraction - left < kMuch;
     // Measured, no bounds: the nearest cause of drawn torques that were cut off explains less than the last.
     constexpr double kMost = 100.0;
     return (term.fraction - left < kMuch && fault.kind > TorqueFault::kArmature) ||
@@ -265,8 +324,12 @@ size_t RecordingJudgement::CountExplaining() const {
   }));
 }
 
+bool RecordingJudgement::IsHidden() const {
+  return std::ranges::all_of(balances, [](const JointJudgement& one) { return one.hidden >= one.modelled; });
+}
+
 bool RecordingJudgement::Agrees() const {
-  return causes.empty() && IsWhole() && std::ranges::none_of(unjudged, &UnjudgedJoint::moves);
+  return causes.empty() && IsWhole() && !IsHidden() && std::ranges::none_of(unjudged, &UnjudgedJoint::moves);
 }
 
 namespace {
@@ -280,6 +343,14 @@ bool MayBeOtherwise(const RecordingJudgement& judgement) {
   return judgement.explained < kWell || judgement.left > kFar || judgement.causes.size() > 3;
 }
 
+/// Sum over the joints of the logarithm of what is left.
+double CalcLeft(const RecordingJudgement& judgement) {
+  double sum = 0.0;
+  for (const JointJudgement& joint : judgement.balances)
+    sum += std::log(std::max(joint.left, std::numeric_limits<double>::min()));
+  return sum;
+}
+
 /// Whether a judgement with so many faults of positions undone explains more, or the same with fewer numbers.
 bool IsBetter(const RecordingJudgement& one, size_t faults, const RecordingJudgement& other,
               size_t other_faults) {
@@ -288,13 +359,7 @@ bool IsBetter(const RecordingJudgement& one, size_t faults, const RecordingJudge
   if (one.IsWhole())
     return one.by_causes.numbers + static_cast<long>(faults) <
            other.by_causes.numbers + static_cast<long>(other_faults);
-  const auto left = [](const RecordingJudgement& judgement) {
-    double sum = 0.0;
-    for (const JointJudgement& joint : judgement.balances)
-      sum += std::log(std::max(joint.left, std::numeric_limits<double>::min()));
-    return sum;
-  };
-  return left(one) < left(other);
+  return CalcLeft(one) < CalcLeft(other);
 }
 
 /// Opens all of them again, with a change of their channels; false where that cannot be.
@@ -310,8 +375,9 @@ bool Reopen(std::vector<Recording>* recordings, const std::function<void(Recordi
 }  // namespace
 
 RecordingJudgement JudgeRecordings(const RobotModel& model, std::vector<Recording>* recordings,
-                                   const JudgeOptions& options,
+                                   const JudgeOptions& as_asked,
                                    const std::function<bool(long rows)>& on_rows) {
+  JudgeOptions options = as_asked;
   bool goes_on = true;
   const auto count = [&](long rows) { return goes_on = !on_rows || on_rows(rows); };
   RecordingJudgement judgement = Judge(model, recordings, options, count).Run();
@@ -320,6 +386,17 @@ RecordingJudgement JudgeRecordings(const RobotModel& model, std::vector<Recordin
   const auto undo = [&](Recording* one) {
     for (const PositionFault& fault : faults) fault.Undo(one);
   };
+  // A simulator's forces are those of the velocity that it has at a step, a robot's those of the position's
+  // time.
+  if (judgement.has_other_times && Reopen(recordings, undo)) {
+    options.refinements.advances_velocities = true;
+    RecordingJudgement other = Judge(model, recordings, options, count).Run();
+    if (goes_on && CalcLeft(other) < CalcLeft(judgement)) {
+      judgement = std::move(other);
+    } else {
+      options.refinements.advances_velocities = false;
+    }
+  }
   constexpr size_t kMostFaults = 3;
   RecordingJudgement best = judgement;
   std::vector<PositionFault> best_faults;
@@ -348,12 +425,12 @@ RecordingJudgement JudgeRecordings(const RobotModel& model, std::vector<Recordin
     next.refinements = judgement.refinements;
     if (!Reopen(recordings, undo)) break;
     RecordingJudgement again = Judge(model, recordings, next, count).Run();
-    // What a reading leaves out is no reason to find nothing.
+    // Rows that a reading leaves out are no reason to find nothing.
     if (again.Agrees()) break;
     judgement = std::move(again);
   }
   for (const PositionFault& fault : faults)
-    judgement.causes.insert(judgement.causes.begin(), MakeCause(fault.fault));
+    judgement.causes.insert(judgement.causes.begin(), MakeCause(model, fault));
   return judgement;
 }
 

@@ -18,9 +18,11 @@ struct JointJudgement {
   int joint = -1;
   double samples = 0.0;
   double torque = 0.0;                          ///< Measured.
+  double modelled = 0.0;                        ///< The model's.
   double residual = 0.0;                        ///< Measured less the model's.
   double left = 0.0;                            ///< Of that, beyond the causes.
   double noise = 0.0;                           ///< What noise and derivatives make of it.
+  double hidden = 0.0;                          ///< Error of the model's torque that noise may hide.
   double held_residual = 0.0, held_left = 0.0;  ///< The same in the quarter that no cause was found with.
   double drive_gain = 0.0;                      ///< N m/A, where currents were recorded; otherwise 0.
 };
@@ -53,13 +55,16 @@ struct RecordingJudgement {
   std::vector<TorqueTrace> traces;
   std::vector<std::string> notes;
   long rows = 0;
-  Refinements refinements;  ///< With which a further reading would tell more.
+  bool has_other_times = false;  ///< Velocities were recorded at other times than positions.
+  Refinements refinements;       ///< With which a further reading would tell more.
 
   /// Causes that are more than the nearest that is known.
   [[nodiscard]] size_t CountExplaining() const;
   /// Beside the causes no more than noise is left.
   [[nodiscard]] bool IsWhole() const;
-  /// All joints that move are judged, and what is left is noise, with no cause.
+  /// Noise may hide an error as large as the torque itself, at every joint.
+  [[nodiscard]] bool IsHidden() const;
+  /// All joints that move are judged, and what is left is noise, with no cause, beside which errors show.
   [[nodiscard]] bool Agrees() const;
 };
 

@@ -10,6 +10,25 @@
 
 namespace dexcheck {
 
+namespace {
+
+/// Returns " of 0.1 N m at elbow, where an error below 0.2 N m (3 % of its torque) would not show", for the
+/// joint where that is the largest part.
+std::string DescribeNoise(const RecordingJudgement& judgement, const RobotModel& robot) {
+  static constexpr double kNone = 1e-300;  // N m or N, of a joint that the model gives no torque
+  const auto part_of = [](const JointJudgement& one) { return one.hidden / std::max(one.modelled, kNone); };
+  const JointJudgement& worst = *std::ranges::max_element(judgement.balances, {}, part_of);
+  const Joint& joint = robot.joint(worst.joint);
+  const std::string share = worst.hidden < worst.modelled
+                                ? fmt::format("{:.2g} % of its torque", 100.0 * part_of(worst))
+                                : std::string("more than its torque");
+  return fmt::format(" of {:.2g} {} at {}, where an error below {:.2g} {} ({}) would not show", worst.noise,
+                     joint.type == JointType::kRevolute ? "N m" : "N", joint.name, worst.hidden,
+                     joint.type == JointType::kRevolute ? "N m" : "N", share);
+}
+
+}  // namespace
+
 JudgementVerdict MakeVerdict(const RecordingJudgement& judgement, const RobotModel& robot,
                              const std::string& recording) {
   const std::string& model = robot.name();
@@ -28,7 +47,12 @@ JudgementVerdict MakeVerdict(const RecordingJudgement& judgement, const RobotMod
   const std::string causes_do = fmt::format("{} cause{}", count, count == 1 ? " does" : "s do");
   JudgementVerdict verdict;
   if (judgement.Agrees()) {
-    verdict = {"explained", fmt::format("{} explains {}: what is left is noise", model, recording)};
+    verdict = {"explained", fmt::format("{} explains {}: what is left is noise{}", model, recording,
+                                        DescribeNoise(judgement, robot))};
+  } else if (judgement.causes.empty() && judgement.IsWhole() && judgement.IsHidden()) {
+    verdict = {"partly explained", fmt::format("what {} leaves of {} is noise, beside which no error of the "
+                                               "model would show",
+                                               model, recording)};
   } else if (judgement.causes.empty() && judgement.IsWhole()) {
     std::vector<std::string> judged;
     for (const JointJudgement& one : judgement.balances)

@@ -238,7 +238,7 @@ class MotionDesigner {
     return Scale(information, 0);
   }
 
-  /// Of what is forbidden, by how much.
+  /// Returns by how much limits are exceeded.
   [[nodiscard]] double CalcExcess(const SeriesMotion& motion, const VectorXd& largest) const {
     double excess = (largest.cwiseQuotient(limits_.torque).array() - 1.0).max(0.0).sum();
     if (!options_.calc_overlap) return excess;

@@ -45,8 +45,8 @@ struct MotionDesignOptions {
   std::uint64_t seed = 1;
   /// How far bodies overlap in a posture, m; empty for what is not known.
   std::function<double(const VectorXd& q)> calc_overlap;
-  /// What is known already: the motion adds to it. Its noise is expected again; without it, noise of 1 % of
-  /// each joint's usual torque.
+  /// The information that is known already: the motion adds to it. Its noise is expected again; without it,
+  /// noise of 1 % of each joint's usual torque.
   const RecordingSet* recorded = nullptr;
   std::function<bool(int evaluations)> go_on;  ///< False ends the search with the best so far.
 };
@@ -68,7 +68,7 @@ struct MotionDesign {
   int evaluations = 0;
 };
 
-/// What the model says that a motion takes, with friction, N m or N. @param q, qd, qdd by joint.
+/// Returns the model's torques of a motion, with friction, N m or N. @param q, qd, qdd by joint.
 VectorXd CalcMotionTorques(const VectorXd& q, const VectorXd& qd, const VectorXd& qdd,
                            TorqueRegressor* regressor);
 

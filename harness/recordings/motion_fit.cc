@@ -146,7 +146,7 @@ MatrixXd MotionFit::CalcCoefficients(size_t centre, size_t half, int order) cons
   const double t = rows_ahead_[centre][time];
   const auto m = static_cast<Eigen::Index>(2 * half + 1);
   const double scale = static_cast<double>(half) * step_;
-  // Of rows that are equally far apart it is the same everywhere.
+  // Equally spaced rows have the same coefficients everywhere.
   constexpr double kEven = 1e-3;
   bool is_even = true;
   for (size_t k = 0; k <= 2 * half && is_even; ++k) {
@@ -234,6 +234,15 @@ void MotionFit::AverageFriction(int joint, const VectorXd& times, const VectorXd
   sample_.slowest[joint] = moves ? slowest : 0.0;
 }
 
+void MotionFit::AdvanceVelocities(MatrixXd* fitted) const {
+  for (const auto& [joint, lag] : velocity_lags_) {
+    auto polynomial = fitted->col(ChannelOf(RecordedQuantity::kVelocity, joint));
+    // Horner's scheme, once for each coefficient: p(t + lag) in powers of t.
+    for (int low = refinements_.advances_velocities ? 0 : 1; low < kOrder; ++low)
+      for (int k = kOrder - 1; k >= low; --k) polynomial[k] += lag * polynomial[k + 1];
+  }
+}
+
 size_t MotionFit::CalcReach() const {
   long most = 0;
   for (const auto& [joint, delay] : refinements_.delays) most = std::max(most, std::abs(delay));
@@ -253,7 +262,8 @@ double MotionFit::CalcTorqueRate(int joint, size_t centre, const Eigen::Ref<cons
 bool MotionFit::Emit(size_t centre, const Receiver& receive) {
   const MatrixXd window = GetWindow(centre, half_);
   const MatrixXd C = CalcCoefficients(centre, half_, kOrder);
-  const MatrixXd fitted = C * window;
+  MatrixXd fitted = C * window;
+  AdvanceVelocities(&fitted);
   const int time = ChannelOf(RecordedQuantity::kTime, -1);
   sample_.time = rows_ahead_[centre][time];
   const VectorXd times = window.col(time).array() - sample_.time;
@@ -310,7 +320,7 @@ void MotionFit::CalcSpeeds() {
     count += 1.0;
   }
   const VectorXd speeds = (squares / std::max(1.0, count)).cwiseSqrt();
-  shape_velocities_ = ListShapeVelocities(speeds, refinements_.stribeck);
+  shape_velocities_ = ListShapeVelocities(speeds, refinements_.stribeck, refinements_.smooth);
   constexpr double kSlow = 2e-3, kMoving = 0.2;
   constexpr double kHeld = 2e-3;  // rad or m, that a joint gives under its friction
   noise_.rest = noise_.rest.cwiseMax(kSlow * speeds);
@@ -322,7 +332,7 @@ void MotionFit::CalcSpeeds() {
 
 std::vector<bool> MotionFit::IsJudged(const RecordedSample& sample) const {
   std::vector<bool> judged(moves_.size());
-  // Where a torque reaches its limit, what is smoothed is neither the one nor the other.
+  // A torque that reaches its limit within a window is neither the one nor the other.
   constexpr double kFew = 0.02;
   for (size_t joint = 0; joint < judged.size(); ++joint) {
     const auto at = static_cast<Eigen::Index>(joint);
@@ -339,7 +349,7 @@ void MotionFit::Run(const Receiver& receive) {
   for (;;) {
     for (; next + reach < rows_ahead_.size(); next += stride_)
       if (IsWhole(next, reach) && !Emit(next, receive)) return;
-    // What no window needs any more makes room.
+    // Rows that no window needs any more make room.
     while (next > reach && !rows_ahead_.empty()) {
       rows_ahead_.pop_front();
       segments_.pop_front();
@@ -362,6 +372,13 @@ std::vector<std::string> MotionFit::ListNotes() const {
   for (const auto& [joint, count] : wraps_)
     note(count, "times the position of " + model_->joint(joint).name +
                     " passes from one end of a turn to the other: unwrapped");
+  std::vector<double> lags;
+  for (const auto& [joint, lag] : velocity_lags_) lags.push_back(lag / step_);
+  if (!lags.empty())
+    notes.push_back(
+        fmt::format("{}: velocities are {:.2g} rows {} than positions: accelerations are those at the "
+                    "positions' times",
+                    recording_->name, std::abs(Median(lags)), Median(lags) > 0.0 ? "earlier" : "later"));
   if (stands_) notes.push_back(recording_->name + ": the robot stands: torques alone are compared");
   note(gaps_, fmt::format("gaps longer than {:.3g} s: nothing is smoothed across them", kGap * step_));
   notes.push_back(fmt::format(

@@ -20,14 +20,17 @@ inline double Square(double x) { return x * x; }
 /// 0 of none.
 double Median(std::vector<double> values);
 
-/// What a first reading told, so that the next has columns that fit better.
+/// The results of a first reading, so that the next has columns that fit better.
 struct Refinements {
   std::map<int, double> offsets;        ///< Of joints' positions, rad or m.
   std::map<int, double> stribeck;       ///< Velocities below which joints have more friction, rad/s or m/s.
+  std::map<int, double> smooth;         ///< Velocities over which joints' dry friction turns, rad/s or m/s.
   std::map<int, double> limits;         ///< Torques at which joints' were cut off, N m or N.
   std::map<int, long> delays;           ///< Of joints' torques, rows.
   Vector3d gravity = Vector3d::Zero();  ///< What it is more than the model's, m/s^2, world.
   double shaking = 0.0;                 ///< Angular frequency of the base, rad/s; 0 where it rests.
+  /// Forces follow from the velocities at the positions' times, and not from those recorded with them.
+  bool advances_velocities = false;
   bool operator==(const Refinements&) const = default;
 };
 
@@ -83,7 +86,7 @@ class MotionFit {
   /// By joint: whether a sample says what moves it. Where friction holds a joint that moves at other times,
   /// it does not; nor does it where a joint of which dry friction is known turns or rests within a window.
   [[nodiscard]] std::vector<bool> IsJudged(const RecordedSample& sample) const;
-  /// Of shapes of friction, by the root mean square of the joints' velocities.
+  /// Velocities of the shapes of friction, by the root mean square of the joints' velocities.
   [[nodiscard]] const MatrixXd& shape_velocities() const { return shape_velocities_; }
   [[nodiscard]] const VectorXd& most_torque() const { return sample_.most_torque; }
   /// Root mean square of the entries of M_bar'.
@@ -95,8 +98,10 @@ class MotionFit {
   }  ///< That is smoothed over, s.
   [[nodiscard]] long rows() const { return rows_; }
   [[nodiscard]] bool stands() const { return stands_; }  ///< No joint moves, in all of the recording.
-  /// What was done with the rows, for the report.
+  /// Says how the rows were treated, for the report.
   [[nodiscard]] std::vector<std::string> ListNotes() const;
+  /// Whether velocities were recorded up to two rows before or after positions.
+  [[nodiscard]] bool has_other_times() const { return !velocity_lags_.empty(); }
 
  private:
   static constexpr int kOrder = 4;      // of the polynomials
@@ -118,9 +123,11 @@ class MotionFit {
   /// Whether the whole recording was read ahead and no joint moves.
   [[nodiscard]] bool Stands() const;
   void CheckVelocities();
-  /// What is wrong with a joint's velocities, if they are not its position's derivative.
-  [[nodiscard]] std::optional<Fault> CheckVelocity(int joint, const std::vector<size_t>& centres,
-                                                   size_t half) const;
+  /// Returns what is wrong with a joint's velocities, if they are not its position's derivative. A lag of
+  /// less than two rows is no fault: it is kept in velocity_lags_.
+  std::optional<Fault> CheckVelocity(int joint, const std::vector<size_t>& centres, size_t half);
+  /// Moves the velocities' polynomials to the positions' times, or their accelerations alone (Refinements).
+  void AdvanceVelocities(MatrixXd* fitted) const;
   [[nodiscard]] std::vector<size_t> ListCentres(size_t half) const;
   /// (order + 1) x rows of the window: of the polynomial about the centre, in powers of the time.
   [[nodiscard]] MatrixXd CalcCoefficients(size_t centre, size_t half, int order) const;
@@ -128,7 +135,7 @@ class MotionFit {
   [[nodiscard]] bool IsWhole(size_t centre, size_t half) const;
   [[nodiscard]] int ChannelOf(RecordedQuantity quantity, int joint) const;
   [[nodiscard]] double FindQuantum(Eigen::Index channel) const;
-  /// Of a base whose pose was recorded, by the polynomials.
+  /// Returns the motion of a base whose pose was recorded, by the polynomials.
   [[nodiscard]] BaseMotion CalcBase(const MatrixXd& fitted) const;
   void CheckBase(Row* row) const;
   /// Averages the shapes of a joint's friction over a window. @param rate coefficients of its velocity.
@@ -154,8 +161,9 @@ class MotionFit {
   std::deque<long> segments_;  // of each row ahead
   std::vector<double> numbers_;
   Row last_;
-  std::map<int, double> turned_;  // by joint: what unwrapping adds, rad
-  std::map<int, long> wraps_;     // by joint
+  std::map<int, double> turned_;         // by joint: what unwrapping adds, rad
+  std::map<int, long> wraps_;            // by joint
+  std::map<int, double> velocity_lags_;  // by joint: how much later than its velocity its position is, s
   bool stands_ = false;
   long segment_ = 0, rows_ = 0, held_ = 0, held_run_ = 0, doubled_ = 0, empty_ = 0, gaps_ = 0;
   bool has_ended_ = false;

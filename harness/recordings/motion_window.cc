@@ -160,8 +160,7 @@ bool MotionFit::Stands() const {
   return !recording_->Has(RecordedQuantity::kBase);
 }
 
-std::optional<Fault> MotionFit::CheckVelocity(int joint, const std::vector<size_t>& centres,
-                                              size_t half) const {
+std::optional<Fault> MotionFit::CheckVelocity(int joint, const std::vector<size_t>& centres, size_t half) {
   constexpr double kOff = 0.1, kShows = 5.0, kLate = 1.5, kErrors = 6.0, kExplains = 0.5;
   const int position = ChannelOf(RecordedQuantity::kPosition, joint),
             velocity = ChannelOf(RecordedQuantity::kVelocity, joint);
@@ -191,8 +190,15 @@ std::optional<Fault> MotionFit::CheckVelocity(int joint, const std::vector<size_
   if (!(G(1, 1) > kShows * noise(1, 1))) return std::nullopt;
   const Vector2d x = right.ldlt().solve(b);
   const double left = std::max(0.0, squares - x.dot(b)), without = std::max(0.0, squares - gain * b[0]);
-  const double error =
-      std::sqrt(left / right(1, 1) / std::max(1.0, static_cast<double>(centres.size()) - 2.0));
+  // Windows that overlap have the same noise.
+  const auto windows = static_cast<double>(rows_ahead_.size()) / static_cast<double>(2 * half + 1);
+  const auto count = static_cast<double>(centres.size());
+  const double error = std::sqrt(left / right(1, 1) / std::max(1.0, std::min(windows, count) - 2.0) *
+                                 std::min(windows, count) / count);
+  // A logger may read velocities half a step before positions, as a leapfrog has them.
+  constexpr double kLeast = 0.1;  // rows
+  if (std::abs(x[1]) > std::max(kErrors * error, kLeast * step_) && std::abs(x[1]) < kLate * step_)
+    velocity_lags_[joint] = x[1];
   if (x[1] < kLate * step_ || x[1] < kErrors * error || without - left < kExplains * without)
     return std::nullopt;
   return Fault{"velocity lag", place, x[1], error, "s", "(late or filtered)"};
@@ -227,6 +233,7 @@ void MotionFit::CheckVelocities() {
     faults_.resize(1);
   }
   if (faults_.empty()) return;
+  velocity_lags_.clear();
   std::vector<Channel> kept;
   std::vector<Eigen::Index> columns;
   for (size_t i = 0; i < recording_->channels.size(); ++i) {
@@ -262,7 +269,7 @@ MatrixXd MotionFit::CalcInertia(const std::vector<size_t>& centres) {
 }
 
 void MotionFit::ChooseWindow(const std::vector<size_t>& all) {
-  // What accelerations are derived from, and how often.
+  // The source of the accelerations, and the order of the derivative.
   const bool has_acceleration = recording_->Has(RecordedQuantity::kAcceleration);
   const bool has_velocity = recording_->Has(RecordedQuantity::kVelocity);
   const RecordedQuantity source = has_acceleration ? RecordedQuantity::kAcceleration
@@ -298,7 +305,7 @@ void MotionFit::ChooseWindow(const std::vector<size_t>& all) {
     const double count = static_cast<double>(centres.size());
     const VectorXd squares = (variance + bias.cwiseMax(0.0)) / count;
     const double score = (inertia_.array().square().matrix() * squares).sum();
-    // Where nothing moves, torques alone tell, over a time as short as a push.
+    // A robot at rest shows torques alone, over a time as short as a push.
     if (!(score < best) || (stands_ && std::isfinite(best))) continue;
     best = score;
     half_ = half;

@@ -34,7 +34,7 @@ class Begin {
     has_currents_ = motion.has_currents();
     motion.Run([&](const RecordedSample& sample) {
       samples_.push_back(sample);
-      // Where friction holds a joint, its torque says nothing.
+      // A joint that friction holds has a torque that says nothing.
       const std::vector<bool> judged = motion.IsJudged(sample);
       for (const int joint : joints_)
         if (!judged[static_cast<size_t>(joint)])

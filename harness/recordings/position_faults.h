@@ -10,7 +10,7 @@
 
 namespace dexcheck {
 
-/// What was done to positions or torques, and how to undo it.
+/// A fault of recorded positions or torques, and how to undo it.
 struct PositionFault {
   Fault fault;
   int joint = -1;                     ///< -1 for all.

@@ -79,11 +79,11 @@ void RecordingSet::Read(Recording* recording, const ReadOptions& options,
     constexpr long kEvery = 4;
     if (samples == 0) begin = sample.time;
     const long stretch = std::lround(std::floor((sample.time - begin) / kStretch));
-    // Of a robot that stands, only when something acts is of interest.
+    // A robot that stands is of interest only when something acts.
     const bool is_held = stretch % kEvery == kEvery - 1 && !motion.stands();
     TorqueBalance& balance = is_held ? *one.held : *one.fit;
     balance.Add(sample, motion.IsJudged(sample));
-    TellSecond(options, sample.time, balance.residual());
+    ReportSecond(options, sample.time, balance.residual());
     ++samples;
     return samples % 1024 != 0 || !on_rows || on_rows(rows_ + motion.rows());
   });
@@ -103,6 +103,7 @@ void RecordingSet::Read(Recording* recording, const ReadOptions& options,
                      ": has no forces of the ground: links are taken to touch nothing; wrench in a file of "
                      "--columns gives them, or leave the torques of those that touch out of tau");
   for (const std::string& note : motion.ListNotes()) notes_.push_back(note);
+  has_other_times_ = has_other_times_ || motion.has_other_times();
   for (const Fault& fault : motion.faults()) faults_.push_back(fault);
   one.motion = motion.noise();
   one.moves = motion.moves();
@@ -114,7 +115,7 @@ void RecordingSet::Read(Recording* recording, const ReadOptions& options,
   one.most_torque = motion.most_torque();
 }
 
-void RecordingSet::TellSecond(const ReadOptions& options, double time, const VectorXd& residual) {
+void RecordingSet::ReportSecond(const ReadOptions& options, double time, const VectorXd& residual) {
   if (!options.on_second) return;
   if (second_samples_ == 0) second_ = VectorXd::Zero(residual.size()), second_begin_ = time;
   second_ += residual.cwiseAbs2();
@@ -152,7 +153,10 @@ double RecordingSet::CalcNoise(const ReadRecording& one, size_t place) const {
     variance += Square(one.inertia(joint, other) * one.motion.acceleration[other]);
     variance += mean_square({TorqueColumn::kPosition, other}) * Square(one.motion.smooth_position[other]);
   }
-  // Where it holds a joint, it is anything up to that.
+  // An integrator may have the friction of a velocity half a row away.
+  variance += mean_square({TorqueColumn::kAcceleration, joint}) *
+              Square(0.5 * one.step * model_->joint(joint).damping);
+  // Dry friction that holds a joint is anything up to its largest value.
   if (!one.moves[static_cast<size_t>(joint)]) variance += Square(model_->joint(joint).dry_friction);
   for (int k = 0; k < 3; ++k)
     variance += mean_square({TorqueColumn::kGravity, 0, k}) * Square(one.motion.base);
@@ -185,7 +189,7 @@ void RecordingSet::EstimateGains() {
     const Index current = first.Find(place, {TorqueColumn::kCurrent, joints_[place]});
     MatrixXd G = MatrixXd::Zero(first.products(place).rows(), first.products(place).cols());
     for (const ReadRecording& one : read_) G += one.fit->products(place);
-    // Of the current by the model's torque, where that shows beside friction.
+    // The current for each N m of the model's torque, where that shows beside friction.
     const auto solve = [&](const std::vector<Index>& columns) {
       return SolveLeastSquares(G(columns, columns), VectorXd(G(columns, current)));
     };
@@ -193,7 +197,7 @@ void RecordingSet::EstimateGains() {
       return G(current, current) - solve(columns).dot(VectorXd(G(columns, current)));
     };
     const double inverse = solve(at)[0];
-    // What the model's torque explains of the current: of what friction leaves, and of all.
+    // The part of the current that the model's torque explains: beside friction, and of all.
     constexpr double kShows = 0.5, kLeastOfAll = 0.03;
     const double without = left({at.begin() + 1, at.end()}), with = left(at);
     const bool is_told = inverse > 0.0 && without > (1.0 + kShows) * with &&

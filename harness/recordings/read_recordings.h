@@ -57,7 +57,7 @@ class RecordingSet {
   [[nodiscard]] const RobotModel& model() const { return *model_; }
   [[nodiscard]] size_t size() const { return read_.size(); }
   [[nodiscard]] const ReadRecording& operator[](size_t recording) const { return read_[recording]; }
-  /// What the next search takes for noise.
+  /// The noise that the next search assumes.
   [[nodiscard]] double& weight(size_t recording, size_t place) {
     return read_[recording].weight[static_cast<Eigen::Index>(place)];
   }
@@ -74,20 +74,22 @@ class RecordingSet {
   /// Gains that became others than were estimated are not known. @return whether there are any.
   bool DropUnknownGains();
 
-  /// What sizes of faults are held against.
+  /// Returns the extents with which sizes of faults are compared.
   [[nodiscard]] MotionExtents CalcExtents() const;
   [[nodiscard]] const Refinements& refinements() const { return refinements_; }  ///< As was told.
   [[nodiscard]] double step() const { return step_; }  ///< The longest between rows, s.
   [[nodiscard]] long rows() const { return rows_; }
   [[nodiscard]] const std::vector<std::string>& notes() const { return notes_; }
+  /// Whether a recording has velocities of other times than positions.
+  [[nodiscard]] bool has_other_times() const { return has_other_times_; }
   /// Joints with a position, without a torque or with one that says nothing.
   [[nodiscard]] std::vector<UnjudgedJoint> ListUnjudged() const;
-  /// Of the recordings themselves: velocities that are not the positions' derivatives.
+  /// Faults of the recordings themselves: velocities that are not the positions' derivatives.
   [[nodiscard]] const std::vector<Fault>& faults() const { return faults_; }
 
  private:
   void Read(Recording* recording, const ReadOptions& options, const std::function<bool(long rows)>& on_rows);
-  void TellSecond(const ReadOptions& options, double time, const VectorXd& residual);
+  void ReportSecond(const ReadOptions& options, double time, const VectorXd& residual);
   /// Returns the standard deviation of a row's time, s: that of a uniform distribution over a row, or less
   /// where the torques of a joint show that times are known better.
   [[nodiscard]] double CalcTimeError(const ReadRecording& one) const;
@@ -108,6 +110,7 @@ class RecordingSet {
   VectorXd gains_, first_gains_;  // by place
   long rows_ = 0;
   std::vector<std::string> notes_;
+  bool has_other_times_ = false;
   std::vector<Fault> faults_;
   VectorXd second_;  // squares since a time
   double second_begin_ = 0.0;

@@ -56,7 +56,7 @@ class TorqueBalance {
   TorqueBalance(const RobotModel& model, const std::vector<int>& joints, bool has_currents,
                 const Refinements& refinements = {});
 
-  /// Where the samples' wrenches act.
+  /// Sets the places at which the samples' wrenches act.
   void SetWrenches(const std::vector<WrenchPlace>& places);
   /// sum over samples of the squared entries of the columns by which a joint balances the wrenches (6 each).
   [[nodiscard]] VectorXd wrench_squares(size_t place) const {
@@ -84,7 +84,7 @@ class TorqueBalance {
 
   [[nodiscard]] const std::vector<int>& joints() const { return joints_; }
   [[nodiscard]] const std::vector<Block>& blocks() const { return blocks_; }
-  /// Of a judged joint (by its place among these), its columns; y stands behind them.
+  /// Returns the columns of a judged joint (by its place among these); y stands behind them.
   [[nodiscard]] const std::vector<TorqueColumn>& columns(size_t place) const { return columns_[place]; }
   /// -1 where its row has none.
   [[nodiscard]] Eigen::Index Find(size_t place, const TorqueColumn& column) const;
@@ -99,7 +99,7 @@ class TorqueBalance {
   static constexpr size_t kMostBlocks = 512;
 
   void ListColumns(bool has_currents);
-  /// What balances a force at each wrench's point and a moment, in its axes: n x 6 each.
+  /// Returns the torques that balance a force at each wrench's point and a moment, in its axes: n x 6 each.
   [[nodiscard]] MatrixXd CalcWrenchColumns();
   void CalcShakingColumns(const RecordedSample& sample);
   /// The model's, at a joint.

@@ -113,10 +113,13 @@ class FaultList {
                modelled.dry_friction, true, most);
     AddAtJoint(kViscousFriction, joint, "viscous friction", rate, {TorqueColumn::kViscous, joint},
                modelled.damping, true, FindMostViscous(joint));
-    const bool is_refined = refinements_.stribeck.contains(joint);
-    if (is_refined) AddStribeck(joint, torque);
-    for (int shape = 0; shape < (is_refined ? 1 + kSmoothShapes : kFrictionShapes); ++shape) {
+    const bool has_stribeck = refinements_.stribeck.contains(joint);
+    const bool has_smooth = refinements_.smooth.contains(joint);
+    if (has_stribeck) AddKnownShape(kStribeckFriction, joint, "Stribeck friction", torque, 0.0);
+    if (has_smooth) AddKnownShape(kDryFriction, joint, "dry friction", torque, modelled.dry_friction);
+    for (int shape = 0; shape < kFrictionShapes; ++shape) {
       const bool is_stribeck = shape > kSmoothShapes;
+      if (is_stribeck ? has_stribeck : has_smooth && shape != kSlipShape) continue;
       AddAtJoint(is_stribeck ? kStribeckFriction : kDryFriction, joint,
                  is_stribeck ? "Stribeck friction" : "dry friction", torque,
                  {TorqueColumn::kFriction, joint, shape}, is_stribeck ? 0.0 : modelled.dry_friction, true,
@@ -130,7 +133,7 @@ class FaultList {
     spring.most = Vector2d(FindMostPer(joint, extents_.span, kNear), kInfinite);
     spring.scale = VectorXd::Constant(2, kMostTorque);
     spring.least = Eigen::Vector2d(0.0, -kMostTorque);
-    // What is at rest further from the joint's range than its width is an offset that changes a little.
+    // A spring at rest further from the joint's range than its width is an offset that changes a little.
     const double middle = 0.5 * (modelled.lower + modelled.upper), width = modelled.upper - modelled.lower;
     if (std::isfinite(width) && width > 0.0) {
       spring.is_possible = [middle, width](const VectorXd& a) {
@@ -168,15 +171,20 @@ class FaultList {
         .most = VectorXd::Constant(1, std::min(turns ? kPi : 1.0, width > 0.0 ? width : kInfinite));
   }
 
-  /// Of a velocity that is roughly known: the shape there, and what the logarithm of the velocity changes.
-  void AddStribeck(int joint, const std::string& unit) {
-    const TorqueColumn slow{TorqueColumn::kFriction, joint, 1 + kSmoothShapes};
-    const TorqueColumn fast{TorqueColumn::kFriction, joint, 2 + kSmoothShapes};
+  /// Adds friction whose velocity is roughly known: the shape there, and what the logarithm of the velocity
+  /// changes.
+  void AddKnownShape(TorqueFault::Kind kind, int joint, const std::string& fault, const std::string& unit,
+                     double nominal) {
+    const int first = kind == TorqueFault::kStribeckFriction ? 1 + kSmoothShapes : 1;
+    const TorqueColumn slow{TorqueColumn::kFriction, joint, first};
+    const TorqueColumn fast{TorqueColumn::kFriction, joint, first + 1};
     const double slope = 1.0 / std::log(kFineRatio);
-    TorqueFault& one =
-        Add(TorqueFault::kStribeckFriction, joint, "Stribeck friction", "joint " + model_.joint(joint).name,
-            unit, {{{slow, joint, 0.5}, {fast, joint, 0.5}}, {{slow, joint, -slope}, {fast, joint, slope}}});
-    one.is_possible = [](const VectorXd& a) { return std::abs(a[1]) < a[0]; };
+    TorqueFault& one = Add(
+        kind, joint, fault, "joint " + model_.joint(joint).name, unit,
+        {{{slow, joint, 0.5}, {fast, joint, 0.5}}, {{slow, joint, -slope}, {fast, joint, slope}}}, nominal);
+    one.is_possible = [nominal](const VectorXd& a) {
+      return nominal + a[0] > 0.0 && std::abs(a[1]) < std::abs(a[0]);
+    };
     one.most = VectorXd::Constant(2, extents_.FindTorque(joint));
   }
 
@@ -189,7 +197,13 @@ class FaultList {
       return [vector, is_real, changes](const VectorXd& a) {
         BodyVector changed = vector;
         for (size_t k = 0; k < changes.size(); ++k) changed += a[static_cast<Eigen::Index>(k)] * changes[k];
-        return !is_real || IsBody(changed);
+        if (!is_real || IsBody(changed)) return true;
+        // Moments that the motion does not show may be larger as well.
+        constexpr double kUnseen = 1e-6;
+        const double most = changes.size() == 6 ? a.head<3>().maxCoeff() : 0.0;
+        for (int k = 0; k < 3 && most > 0.0; ++k)
+          if (std::abs(a[k]) < kUnseen * most) changed[4 + k] += most;
+        return IsBody(changed);
       };
     };
     using enum TorqueFault::Kind;
@@ -221,7 +235,7 @@ class FaultList {
     AddPayload(link);
   }
 
-  /// What the model does not have at a link that carries no other one.
+  /// Adds payloads at a link that carries no other one.
   void AddPayload(int link) {
     for (int joint = 0; joint < model_.num_joints(); ++joint)
       if (model_.joint(joint).parent == link) return;
@@ -245,7 +259,7 @@ class FaultList {
         one.most[0] = std::accumulate(model_.joints().begin(), model_.joints().end(), 0.0,
                                       [](double sum, const Joint& each) { return sum + each.body.mass; });
         one.is_possible = is_near;
-        // What the two are together can be.
+        // Link and payload together are a possible body.
         if (width == TorqueRegressor::kBody && IsBody(own))
           one.is_possible = [=](const VectorXd& a) { return is_near(a) && IsBody(own + BodyVector(a)); };
         one.is_ordinary = width == 4;
@@ -344,7 +358,7 @@ Eigen::Matrix4d PackPseudoInertia(const BodyVector& body) {
        body[8], body[9], body[6];
   // clang-format on
   Eigen::Matrix4d pseudo;
-  // Of second moments: half the trace of I less I.
+  // The second moments are half the trace of I less I.
   pseudo << 0.5 * I.trace() * Matrix3d::Identity() - I, body.segment<3>(1), body.segment<3>(1).transpose(),
       body[0];
   return pseudo;

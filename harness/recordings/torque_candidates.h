@@ -1,6 +1,6 @@
 #pragma once
 
-// What may be wrong with a model of a recorded robot, and the columns that it leaves.
+// The possible faults of a model of a recorded robot, and their columns.
 
 #include <limits>
 #include <string>
@@ -66,9 +66,13 @@ struct TorqueFault : Candidate {
   VectorXd most = {};
   Push push = {};
 
-  /// Of any shape, in one joint or in all.
+  /// Friction of any shape, in one joint or in all.
   [[nodiscard]] bool IsFriction() const { return kind <= kLoadFriction; }
-  /// Of bodies, gravity, positions or springs: what a torque depends on beside the drive's own numbers.
+  /// Friction whose second amplitude is a change of its velocity's logarithm, times the first.
+  [[nodiscard]] bool HasVelocity() const {
+    return kind == kStribeckFriction || (kind == kDryFriction && sums.size() == 2);
+  }
+  /// A fault of bodies, gravity, positions or springs: all but the drive's own numbers.
   [[nodiscard]] bool IsOfLoad() const { return kind == kSpring || (kind >= kZero && kind <= kGravity); }
 };
 

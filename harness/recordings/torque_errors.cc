@@ -50,7 +50,7 @@ VectorXd CalcClusteredErrors(const TorqueRows& rows, const VectorXd& left,
       to->scores.noalias() += some.transpose() * left.segment(part.begin + begin, end - begin);
     };
     add(0, part.size, &by_joint.emplace(part.place, none).first->second);
-    // What is within blocks is of no stretch.
+    // Rows within blocks belong to no stretch.
     add(0, part.within,
         &by_time.emplace(std::pair(static_cast<size_t>(part.begin), Index{-1}), none).first->second);
     const Index blocks = part.size - part.within;

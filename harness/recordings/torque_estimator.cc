@@ -57,10 +57,11 @@ TorqueEstimator::TorqueEstimator(RecordingSet* recordings, size_t most_causes)
     Select();
   } while (recordings_->DropUnknownGains());
   if (AddPushes()) {
-    barred_.resize(faults_.size(), false);
+    excluded_.resize(faults_.size(), false);
     Select();
   }
-  while (BarSeconds()) Select();
+  while (ExcludeSeconds()) Select();
+  ExcludeUnseen();
   WidenErrors();
 }
 
@@ -88,12 +89,20 @@ void TorqueEstimator::ListFaults() {
   std::erase_if(faults_, [&](const TorqueFault& one) {
     return (recordings_->has_currents() &&
             (one.kind == TorqueFault::kTorqueGain || one.kind == TorqueFault::kSaturation)) ||
-           ((*recordings_)[0].stands && one.kind == TorqueFault::kSaturation);
+           ((*recordings_)[0].stands && one.kind == TorqueFault::kSaturation) || IsTooFast(one);
   });
-  barred_.clear();
-  // Where drives' gains are sought, the model's bodies are the scale by which they are told.
+  excluded_.clear();
+  // With drives' gains sought, the model's bodies are the scale that shows them.
   for (const TorqueFault& one : faults_)
-    barred_.push_back(recordings_->has_currents() && one.IsOfLoad() && one.kind != TorqueFault::kPayload);
+    excluded_.push_back(recordings_->has_currents() && one.IsOfLoad() && one.kind != TorqueFault::kPayload);
+}
+
+bool TorqueEstimator::IsTooFast(const TorqueFault& fault) const {
+  if (fault.kind != TorqueFault::kStribeckFriction) return false;
+  constexpr double kRows = 8.0, kPeak = 3.0;  // MotionExtents' are peaks
+  const double step = recordings_->CalcExtents().acceleration[fault.index] / kPeak * recordings_->step();
+  const ReadRecording& first = (*recordings_)[0];
+  return first.shape_velocities(fault.index, fault.sums.front().front().column.component) < kRows * step;
 }
 
 void TorqueEstimator::Select() {
@@ -101,18 +110,19 @@ void TorqueEstimator::Select() {
   recordings_->ResetWeights();
   constexpr int kRounds = 6;
   constexpr double kLeastGain = 0.9;  // of what was estimated before, taken away at once
-  // Of the square of what no cause explains: so much is left of a drive that is not known well.
+  // Times the noise's square: so much is left of a drive that is not known well.
   constexpr double kFarFromKnown = 2.0;
   bool is_known = true;
   for (int round = 0; round < kRounds; ++round) {
     rows_ = MakeTorqueRows(*recordings_, faults_, /*is_held=*/false);
     Compress();
-    // Where more than noise is left, what no cause explains weighs as noise does, and is alike.
+    // A residual that no cause explains weighs as noise does, and is correlated.
     const double before = std::exchange(
-        alike_, round > 0 && is_known ? alike_ : CalcAlike(Fit(is_known ? Part::kUsual : Part::kAll)));
+        block_size_,
+        round > 0 && is_known ? block_size_ : CalcBlockSize(Fit(is_known ? Part::kUsual : Part::kAll)));
     floor_ = is_known ? 1.0 : kFarFromKnown;
     selection_ = SelectAmong();
-    if (round + 1 == kRounds || (round > 1 && std::abs(alike_ - before) < 0.2 * before)) break;
+    if (round + 1 == kRounds || (round > 1 && std::abs(block_size_ - before) < 0.2 * before)) break;
     const VectorXd left = CalcLeft(selection_.terms);
     is_known = IsNoise(left);
     Relinearise();
@@ -197,19 +207,19 @@ Index TorqueEstimator::CountForcedRows() const {
 }
 
 CauseSelection TorqueEstimator::SelectAmong() const {
-  CauseSelection best = SelectAmong(barred_);
+  CauseSelection best = SelectAmong(excluded_);
   // A fault in all joints goes before several single ones, of which the first alone explains less.
-  std::vector<bool> barred = barred_;
+  std::vector<bool> excluded = excluded_;
   for (const CauseTerm& term : best.terms)
     if (faults_[term.candidate].index < 0 && faults_[term.candidate].sums.size() > 3)
-      barred[term.candidate] = true;
+      excluded[term.candidate] = true;
   constexpr size_t kFew = 4;
-  if (barred == barred_ || best.terms.size() > kFew) return best;
-  CauseSelection other = SelectAmong(barred);
+  if (excluded == excluded_ || best.terms.size() > kFew) return best;
+  CauseSelection other = SelectAmong(excluded);
   return other.criterion < best.criterion ? other : best;
 }
 
-CauseSelection TorqueEstimator::SelectAmong(const std::vector<bool>& barred) const {
+CauseSelection TorqueEstimator::SelectAmong(const std::vector<bool>& excluded) const {
   const Index width = R_.cols();
   const Index begin = CountForcedRows(), rows = R_.rows() - begin;
   std::vector<Candidate> candidates;
@@ -218,20 +228,20 @@ CauseSelection TorqueEstimator::SelectAmong(const std::vector<bool>& barred) con
     const Index count = CountColumns(fault);
     Candidate& one = candidates.emplace_back(fault);
     one.columns = R_.block(begin, at, rows, count);
-    if (barred[candidates.size() - 1]) one.columns.setZero();
+    if (excluded[candidates.size() - 1]) one.columns.setZero();
     at += count;
   }
   CauseOptions options;
   for (size_t i = 0; i < faults_.size(); ++i) {
     const TorqueFault& fault = faults_[i];
-    if (fault.parameters > 0 || barred[i]) continue;
+    if (fault.parameters > 0 || excluded[i]) continue;
     if (IsPart(fault, Part::kUsual) || fault.kind == TorqueFault::kArmature) options.start.push_back(i);
   }
   options.most_terms = most_causes_;
   options.restarts = 0;
   options.exchanges_pairs = false;
   options.rows = rows_.samples;
-  options.alike = alike_;
+  options.noise_block_size = block_size_;
   options.floor = floor_;
   options.independent = kIndependent;
   return SelectCauses(R_.col(width - 1).tail(rows), candidates, options);
@@ -265,9 +275,9 @@ VectorXd TorqueEstimator::CalcLeft(const std::vector<CauseTerm>& terms) const {
   return rows_.CalcLeft(CalcAmplitudes(terms));
 }
 
-bool TorqueEstimator::BarSeconds() {
+bool TorqueEstimator::ExcludeSeconds() {
   bool has_any = false;
-  // What is attached in all recordings is the link's own.
+  // A payload in all recordings is the link's own.
   std::vector<const CauseTerm*> payloads;
   for (const CauseTerm& term : selection_.terms)
     if (faults_[term.candidate].kind == TorqueFault::kPayload && faults_[term.candidate].recording >= 0)
@@ -275,22 +285,42 @@ bool TorqueEstimator::BarSeconds() {
   if (payloads.size() > 1 && payloads.size() >= recordings_->size()) {
     const auto least =
         std::ranges::min_element(payloads, {}, [](const CauseTerm* one) { return one->amplitude[0]; });
-    barred_[(*least)->candidate] = has_any = true;
+    excluded_[(*least)->candidate] = has_any = true;
   }
   std::vector<std::tuple<TorqueFault::Kind, int, int, double>> seen;
   for (const CauseTerm& term : selection_.terms) {
     const TorqueFault& one = faults_[term.candidate];
     const bool is_shape = one.kind == TorqueFault::kDryFriction ||
-                          one.kind == TorqueFault::kStribeckFriction || one.kind == TorqueFault::kSaturation;
+                          one.kind == TorqueFault::kStribeckFriction ||
+                          one.kind == TorqueFault::kSaturation || one.kind == TorqueFault::kMass;
     if (one.kind != TorqueFault::kPush && !is_shape) continue;
     const std::tuple what(one.kind, one.index, one.push.recording, one.push.from);
     if (std::find(seen.begin(), seen.end(), what) == seen.end()) {
       seen.push_back(what);
     } else {
-      barred_[term.candidate] = has_any = true;
+      excluded_[term.candidate] = has_any = true;
     }
   }
   return has_any;
+}
+
+void TorqueEstimator::ExcludeUnseen() {
+  if (!IsNoise(CalcLeft({}))) return;
+  constexpr int kTimes = 3;
+  for (int i = 0; i < kTimes; ++i) {
+    bool has_any = false;
+    for (const CauseTerm& term : selection_.terms)
+      if (!term.error.array().isFinite().all()) excluded_[term.candidate] = has_any = true;
+    if (!has_any) return;
+    Select();
+  }
+}
+
+double TorqueEstimator::CalcHidden(double noise, double left, double samples) const {
+  const double candidates = std::log(static_cast<double>(faults_.size()));
+  const double needed = 2.0 * (std::log(rows_.samples / block_size_) + 2.0 * candidates) * block_size_;
+  return std::sqrt(std::max(0.0, Square(noise) - Square(left)) +
+                   Square(noise) * needed / std::max(1.0, samples));
 }
 
 double TorqueEstimator::CalcRms(const TorqueRows& rows, const VectorXd& left) const {
@@ -308,7 +338,8 @@ bool TorqueEstimator::IsPart(const TorqueFault& fault, Part part) {
   using enum TorqueFault::Kind;
   if (part == Part::kAll) return fault.kind != kPush;
   const bool is_usual = fault.kind == kDryFriction || fault.kind == kViscousFriction || fault.kind == kOffset;
-  if (part == Part::kUsual || is_usual) return is_usual && (part == Part::kUsual || fault.parameters == 0);
+  if (part == Part::kUsual || is_usual)
+    return is_usual && (part == Part::kUsual || (fault.parameters == 0 && !fault.HasVelocity()));
   return fault.kind == kArmature || (fault.kind >= kMass && fault.kind <= kInertia);
 }
 
@@ -334,7 +365,7 @@ VectorXd TorqueEstimator::FitAmplitudes(Part part, Index* rank) const {
     qr.setThreshold(kIndependent);
     *rank = qr.compute(C).rank();
   }
-  // What the motion hardly tells stays of plausible size.
+  // Amplitudes that the motion hardly shows stay of plausible size.
   C.conservativeResize(C.rows() + width, Eigen::NoChange);
   C.bottomRows(width).setIdentity();
   VectorXd right = VectorXd::Zero(C.rows());
@@ -346,7 +377,7 @@ VectorXd TorqueEstimator::FitAmplitudes(Part part, Index* rank) const {
 
 VectorXd TorqueEstimator::Fit(Part part) const { return rows_.CalcLeft(FitAmplitudes(part, nullptr)); }
 
-double TorqueEstimator::CalcAlike(const VectorXd& left) const {
+double TorqueEstimator::CalcBlockSize(const VectorXd& left) const {
   double blocks = 0.0, of_blocks = 0.0, next = 0.0;
   for (const TorqueRows::Part& part : rows_.parts) {
     const auto values = left.segment(part.begin + part.within, part.size - part.within);
@@ -368,6 +399,8 @@ double TorqueEstimator::CalcAlike(const VectorXd& left) const {
 
 bool TorqueEstimator::AddPushes() {
   const VectorXd left = CalcLeft(selection_.terms);
+  // Beside other causes, noise that stands out for a while is theirs.
+  if (!selection_.terms.empty() && CalcRms(rows_, left) <= 1.0) return false;
   const size_t before = faults_.size();
   const MotionExtents extents = recordings_->CalcExtents();
   for (size_t r = 0; r < recordings_->size(); ++r)

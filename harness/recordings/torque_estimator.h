@@ -32,49 +32,58 @@ class TorqueEstimator {
   /// Amplitudes of a least-squares fit of drives' gains and such faults. Plausible sizes are a prior.
   /// @param rank how many of them the motion tells; null where it is not asked for.
   [[nodiscard]] VectorXd FitAmplitudes(Part part, Eigen::Index* rank) const;
-  /// What these terms leave, by row.
+  /// Returns the residual of these terms, by row.
   [[nodiscard]] VectorXd CalcLeft(const std::vector<CauseTerm>& terms) const;
-  /// Of what is left of such rows, in units of noise.
+  /// Returns the largest root mean square error of a joint's torque that the search may pass over, N m or N:
+  /// what is missing to the noise that is assumed, and what one more cause must explain. @param noise, left
+  /// of the joint, N m or N. @param samples of it.
+  [[nodiscard]] double CalcHidden(double noise, double left, double samples) const;
+  /// Returns the root mean square of a residual of such rows, in units of noise.
   [[nodiscard]] double CalcRms(const TorqueRows& rows, const VectorXd& left) const;
 
  private:
   void ListFaults();
+  /// Stribeck friction through whose velocity the joint passes within a few rows: how a joint turns looks
+  /// like it.
+  [[nodiscard]] bool IsTooFast(const TorqueFault& fault) const;
   /// Errors are no less than those by which stretches of time, or joints, disagree.
   void WidenErrors();
   void Select();
-  /// What products of faults leave is linear in each once the others are known.
+  /// Computes columns of products of faults anew: they are linear in each once the others are known.
   void Relinearise();
   /// When a push begins and ends, for all that may have pushed then.
   void FindTimesOf(const CauseTerm& term);
   /// A gain's column: the torque of the model and of these causes, where the robot has them.
   void ScaleWhole(const std::vector<CauseTerm>& terms, TorqueFault* gain) const;
   void Weigh(const VectorXd& left);
-  /// As many rows as there are independent ones.
+  /// Makes R_, with as many rows as there are independent ones.
   void Compress();
-  /// Of these, those that columns which are part of every explanation have.
+  /// Number of those rows that belong to columns of every explanation.
   [[nodiscard]] Eigen::Index CountForcedRows() const;
   [[nodiscard]] CauseSelection SelectAmong() const;
-  [[nodiscard]] CauseSelection SelectAmong(const std::vector<bool>& barred) const;
+  [[nodiscard]] CauseSelection SelectAmong(const std::vector<bool>& excluded) const;
   [[nodiscard]] std::vector<Eigen::Index> ListFirstColumns() const;
-  /// One stretch of time has one push, a joint one shape of its dry friction, and some recording no payload:
-  /// others would share the force.
-  bool BarSeconds();
+  /// One stretch of time has one push, a joint one shape of its dry friction, a link one mass, and some
+  /// recording no payload: others would share the force.
+  bool ExcludeSeconds();
+  /// Leaves out causes whose size the motion does not show where the model alone leaves no more than noise.
+  void ExcludeUnseen();
   [[nodiscard]] static bool IsPart(const TorqueFault& fault, Part part);
-  /// What they leave.
+  /// Returns the residual of that fit.
   [[nodiscard]] VectorXd Fit(Part part) const;
   [[nodiscard]] bool IsNoise(const VectorXd& left) const { return CalcRms(rows_, left) <= kMostNoise; }
   /// How many samples say the same, by how alike blocks are that follow one another.
-  [[nodiscard]] double CalcAlike(const VectorXd& left) const;
+  [[nodiscard]] double CalcBlockSize(const VectorXd& left) const;
   /// Adds what may have pushed for a while; false when nothing stands out.
   bool AddPushes();
 
   RecordingSet* recordings_;
   size_t most_causes_;
   std::vector<TorqueFault> faults_;
-  std::vector<bool> barred_;  // of these
+  std::vector<bool> excluded_;  // of these
   TorqueRows rows_;
-  double alike_ = 1.0, floor_ = 1.0;  // CauseOptions'
-  MatrixXd R_;                        // with the products of rows_
+  double block_size_ = 1.0, floor_ = 1.0;  // CauseOptions'
+  MatrixXd R_;                             // with the products of rows_
   CauseSelection selection_;
 };
 

@@ -46,7 +46,7 @@ namespace {
 
 using Entries = std::vector<Eigen::Triplet<double>>;
 
-/// What a polynomial of order four over [-1, 1] makes of a step at 0, at its centre.
+/// The value at its centre of a polynomial of order four over [-1, 1] that is fitted to a step at 0.
 double SmoothStep(double u) {
   if (std::abs(u) >= 1.0) return u > 0.0 ? 1.0 : 0.0;
   const double s = u * u;

@@ -40,21 +40,21 @@ struct TorqueRows {
 TorqueRows MakeTorqueRows(const RecordingSet& recordings, const std::vector<TorqueFault>& faults,
                           bool is_held);
 
-/// What faults leave in a joint's row, but for pushes, by the columns of its balance, y last: rows times this
+/// Maps faults but for pushes to the columns of a joint's balance, y last: rows times this
 /// are their columns.
 Eigen::SparseMatrix<double> MapColumns(const TorqueBalance& balance, size_t place, size_t recording,
                                        const std::vector<TorqueFault>& faults);
 
 /// How much of a push acts in a block, on average.
 double CalcShare(const Push& push, const TorqueBalance::Block& block);
-/// What it leaves in a joint's row of a block in which all of it acts.
+/// Returns its columns in a joint's row of a block in which all of it acts.
 Eigen::RowVectorXd CalcPushColumns(const RecordingSet& recordings, const Push& push,
                                    const TorqueRows::Part& part, size_t block);
 
 /// Columns of the errors of drives' gains, one for each joint where currents were recorded.
 Eigen::Index CountForced(const RecordingSet& recordings);
 Eigen::Index CountColumns(const TorqueFault& fault);
-/// Of all of them.
+/// Returns the number of columns of all of them.
 Eigen::Index CountColumns(const std::vector<TorqueFault>& faults);
 
 }  // namespace dexcheck

@@ -48,7 +48,7 @@ Corrections Collect(const RobotModel& model, const RecordingJudgement& judgement
       case TorqueFault::kAllDry:
       case TorqueFault::kAllFriction:
       case TorqueFault::kArmature:
-        for (Eigen::Index k = 0; k < a.size(); ++k) {
+        for (Eigen::Index k = 0; k < (fault.HasVelocity() ? 1 : a.size()); ++k) {
           const TorqueColumn& column = fault.sums[static_cast<size_t>(k)].front().column;
           const Joint& joint = model.joint(column.index);
           const bool is_viscous = column.kind == TorqueColumn::kViscous;
@@ -200,7 +200,7 @@ class TomlCopy {
     std::string text;
   };
 
-  /// Of a joint or link: [chain.joints] NAME, with the chain's prefix or without.
+  /// Finds the table of a joint or link: [chain.joints] NAME, with the chain's prefix or without.
   const toml::table& GetTable(const char* kind, const std::string& name) const {
     const toml::array* chains = root_["chain"].as_array();
     for (size_t i = 0; chains != nullptr && i < chains->size(); ++i) {

@@ -48,7 +48,7 @@ struct Figure {
   bool printed = false;   ///< Drawn as a picture for print, too.
 };
 
-/// What an axis shows, from below to above. With two axes the curves of the left one are in the upper half
+/// Range of an axis, from below to above. With two axes the curves of the left one are in the upper half
 /// and those of the right one in the lower half, so that none hides another by chance.
 std::array<double, 2> CalcAxisRange(const Figure& figure, bool right_axis);
 
@@ -74,7 +74,7 @@ class Thinning {
 
   /// First and last time of each interval, s.
   [[nodiscard]] const std::vector<double>& times() const { return times_; }
-  /// As many numbers as times(). Where an interval has finite values, others are left out.
+  /// Values of a series, as many as times(). Where an interval has finite values, others are left out.
   /// @param values one for each row of the run.
   [[nodiscard]] std::vector<double> Apply(const VectorXd& values) const;
   [[nodiscard]] bool keeps_all() const { return starts_.empty(); }

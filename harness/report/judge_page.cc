@@ -151,7 +151,7 @@ VectorXd CollectTimes(const Traces& traces, double begin) {
   return times;
 }
 
-/// For each joint its torques, and below them what is left of these.
+/// For each joint its torques, and below them their residuals.
 std::vector<Figure> MakeFigures(const RobotModel& model, const RecordingJudgement& judgement, int recording,
                                 const Traces& traces) {
   // Most of what noise makes stays within so many of its standard deviations.

@@ -12,8 +12,8 @@
 
 namespace dexcheck {
 
-/// What a page counts a recording's times from: its begin where it is one of several, or has a clock's time;
-/// otherwise 0.
+/// Time from which a page counts a recording's times: its begin where it is one of several, or has a clock's
+/// time; otherwise 0.
 double FindTimeBegin(const RecordingJudgement& judgement, int recording);
 
 /// The first recording's: with the shapes of an MJCF, otherwise with rods between the joints. None for a
@@ -24,8 +24,8 @@ std::optional<ReplayData> MakeMotionReplay(const RobotModel& model, const std::f
 
 // The page of a judged recording.
 
-/// A whole HTML document that loads nothing: the verdict, the causes and what the motion does not tell apart,
-/// each joint's torques over time with what is left of them and the noise, and the recorded motion.
+/// A whole HTML document that loads nothing: the verdict, the causes and those that the motion does not
+/// distinguish, each joint's torques over time with their residuals and the noise, and the recorded motion.
 /// @param model that judged. @param json of the judgement, as `judge --json` writes it.
 /// @param replay of the first recording; none where it cannot be drawn.
 std::string MakeJudgePage(const RobotModel& model, const RecordingJudgement& judgement,

@@ -38,7 +38,6 @@ std::vector<Picture> DrawConfigurations(const RecordedFrames& run, bool holds,
   constexpr double kLongWay = 1.0;  // m, on which one wants to see how far it came
   const MjDataPtr data = MakeData(*run.model);
   if (FindWay(*run.model, run.frames, data.get()).length > kLongWay) options.inset = kCourseCamera;
-  options.tracks = true;
   options.panel = false;
   VideoPainter painter({run.model.get(), &run.frames}, options);
   const std::string who = holds ? "Robot and object" : "Robot";

@@ -21,7 +21,7 @@ std::string MakeCampaignPage(const nlohmann::ordered_json& campaign);
 
 // The page of evidence.
 
-// What of a run is seen in space: pictures and the replay of its page.
+// The run as it is seen in space: pictures and the replay of its page.
 
 /// A picture of the run.
 struct Picture {
@@ -41,7 +41,7 @@ struct RunScene {
 /// @throws InputError that names the log and what is wrong with it.
 RunScene MakeRunScene(const RunData& run, const std::filesystem::path& folder);
 
-/// What stands in the page besides the run.
+/// Content of the page besides the run.
 struct PageContent {
   std::vector<Figure> figures;  ///< Plots that can be zoomed.
   RunScene scene;               ///< Pictures and replay.
@@ -56,7 +56,7 @@ std::string MakePage(const RunData& run, const PageContent& content);
 
 // The report of a recorded run: a page and its figures.
 
-/// Where a report goes.
+/// Files of a report.
 struct ReportFiles {
   std::filesystem::path page;
   std::filesystem::path figures;  ///< Folder for the figures' PDF and PNG files; empty for none.

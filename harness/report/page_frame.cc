@@ -85,7 +85,7 @@ namespace {
 
 static_assert(std::endian::native == std::endian::little, "browsers read the numbers in this order");
 
-/// Of all plots together: about 3 MB of base64.
+/// Most numbers of all plots together: about 3 MB of base64.
 constexpr long kMostNumbers = 560'000;
 constexpr long kFewestPoints = 1000;
 

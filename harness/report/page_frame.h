@@ -20,7 +20,8 @@ extern const char* const kRunJs;
 extern const char* const kCampaignJs;
 extern const char* const kComparisonJs;
 extern const char* const kJudgeJs;
-extern const char* const kPageJs;  ///< Needs kChartsJs.
+extern const char* const kFilesJs;  ///< Needs kThreeJs.
+extern const char* const kPageJs;   ///< Needs kChartsJs.
 extern const char* const kReplayHtml;
 extern const char* const kReplayJs;
 extern const char* const kThreeJs;

@@ -8,7 +8,9 @@
 
 #include "controller/object/euler_zyz.h"
 #include "harness/engine/engine.h"
+#include "renders/renderer.h"
 #include "renders/run_decorations.h"
+#include "renders/viewpoint.h"
 
 namespace dexcheck {
 
@@ -21,7 +23,7 @@ static_assert(std::endian::native == std::endian::little, "browsers read the num
 constexpr int kVisibleGroups = 3;          // those that the engine shows by default
 constexpr double kQuaternionUnit = 32767;  // of a 2-byte number
 constexpr double kTimeUnit = 1e6;          // times in microseconds' resolution, which keeps their text short
-constexpr double kShapeUnit = 1e6;         // sizes in micrometres' resolution, likewise
+constexpr double kShapeUnit = 1e6;         // sizes in micrometres' resolution, too
 
 double Round(double value, double unit) { return std::round(unit * value) / unit; }
 
@@ -75,7 +77,8 @@ class ReplayMaker {
            model_.geom_type[geom] != mjGEOM_HFIELD;
   }
 
-  /// As the engine does it: a geom's own colour, unless it is the default one and the geom has a material.
+  /// The colour that the engine shows: a geom's own, unless it is the default one and the geom has a
+  /// material.
   [[nodiscard]] std::array<float, 4> Color(int geom) const {
     const float* const own = model_.geom_rgba + 4 * geom;
     constexpr std::array<float, 4> kDefault = {0.5F, 0.5F, 0.5F, 1.0F};
@@ -178,9 +181,11 @@ class ReplayMaker {
     }
   }
 
-  /// Cameras of the model as they stand at the beginning, with the part that they go along with.
+  /// Cameras of the model as they stand at the beginning, with the part that they go along with; one that
+  /// sees the whole run where the model has none.
   void AddCameras() {
     json_["cameras"] = Json::array();
+    if (model_.ncam == 0 && !parts_.empty()) AddCourse();
     for (int id = 0; id < model_.ncam; ++id) {
       const Vector3d p(data_->cam_xpos + 3 * id);
       const Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> R(data_->cam_xmat + 9 * id);
@@ -194,7 +199,21 @@ class ReplayMaker {
     json_["parts"] = parts_.size() + 1;
   }
 
-  /// Of each frame and part: position, and quaternion w, x, y, z.
+  void AddCourse() {
+    constexpr double kFovy = 40.0, kAspect = 16.0 / 9.0;
+    const double up = std::tan(0.5 * DegToRad(kFovy)), side = kAspect * up;
+    const MjDataPtr data = MakeData(model_);
+    const Viewpoint view = FindCourse(model_, run_, {side, side, up, up}, data.get());
+    const Vector3d forward(std::cos(view.elevation) * std::cos(view.azimuth),
+                           std::cos(view.elevation) * std::sin(view.azimuth), std::sin(view.elevation));
+    json_["cameras"].push_back({{"name", kCourseCamera},
+                                {"position", ToJson(view.look_at - view.distance * forward)},
+                                {"forward", ToJson(forward)},
+                                {"fovy", kFovy},
+                                {"part", 0}});
+  }
+
+  /// Adds of each frame and part its position, and quaternion w, x, y, z.
   void AddMotion() {
     std::vector<Pose> poses;
     for (const long row : rows_) {
@@ -250,7 +269,7 @@ class ReplayMaker {
     object["desired_quaternions"] = AddRows(quaternions);
   }
 
-  /// Where each phase of a task begins.
+  /// Adds the begin of each phase of a task.
   void AddPhases() {
     json_["phases"] = Json::array();
     for (size_t row = 0; row < run_.phases.size(); ++row) {
@@ -265,7 +284,7 @@ class ReplayMaker {
     bytes_.append(chars.data(), chars.size());
   }
 
-  /// Where the next 4-byte number begins.
+  /// Fills up with zeros to where a 4-byte number may begin, and returns this place.
   size_t Align() {
     while (bytes_.size() % 4 != 0) bytes_ += '\0';
     return bytes_.size();
@@ -329,7 +348,7 @@ TriangleMesh Cluster(const TriangleMesh& mesh, double size) {
     std::array<int, 3> corners;
     for (size_t k = 0; k < 3; ++k) corners[k] = where[static_cast<size_t>(face[k])];
     if (corners[0] == corners[1] || corners[1] == corners[2] || corners[2] == corners[0]) continue;
-    // The same face whichever corner it begins with.
+    // A face is the same whichever corner it begins with.
     std::rotate(corners.begin(), std::ranges::min_element(corners), corners.end());
     if (known.insert(corners).second) coarse.faces.push_back(corners);
   }

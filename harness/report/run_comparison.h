@@ -12,7 +12,7 @@
 
 namespace dexcheck {
 
-/// One input of the runs, where not all are alike.
+/// One input in which the runs differ.
 struct InputDifference {
   std::string name;
   std::vector<std::string> values;  ///< One for each run; of a file its size and checksum.

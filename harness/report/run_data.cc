@@ -12,6 +12,7 @@
 #include "harness/engine/compiled_model.h"
 #include "harness/engine/mjcf_file.h"
 #include "harness/engine/mjcf_passes.h"
+#include "harness/scenario/runnable_robot.h"
 
 namespace dexcheck {
 namespace {
@@ -45,7 +46,7 @@ RunData::RunData(const std::filesystem::path& run_dir) : log_(run_dir / "log.h5"
 }
 
 const char* RunData::Explain(CheckCategory category) const {
-  // Where an object is held, and where joints follow a motion of their own.
+  // First where an object is held, then where joints follow a motion of their own.
   static constexpr const char* kWords[][2] = {
       {"same state, both descriptions", "same state, both descriptions"},
       {"engine's motion in the model's equations", "engine's motion in the model's equations"},
@@ -150,7 +151,14 @@ MjModelPtr ReadModel(const LogReader& log) {
   log.ExtractFiles("inputs", folder.path());
   const std::filesystem::path mjcf = FindEmbedded(log, "mjcf", folder.path());
   try {
-    return MakeVisible(LoadMjcf(mjcf));
+    MjModelPtr model = LoadMjcf(mjcf);
+    const auto* const types = model->tex_type;
+    if (std::find(types, types + model->ntex, mjTEXTURE_SKYBOX) == types + model->ntex) {
+      MjcfFile file(mjcf);  // pictures without a sky are black
+      AddSky(&file);
+      model = Load(file);
+    }
+    return MakeVisible(std::move(model));
   } catch (const InputError& error) {
     throw InputError(log.path().string() + ": " + error.what());
   }

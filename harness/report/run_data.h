@@ -21,14 +21,14 @@ class RunData {
   explicit RunData(const std::filesystem::path& run_dir);
 
   [[nodiscard]] const LogReader& log() const { return log_; }
-  /// Of each row, s.
+  /// Times of the rows, s.
   [[nodiscard]] const VectorXd& time() const { return time_; }
   [[nodiscard]] double end() const { return time_[time_.size() - 1]; }
   /// Null when it was not recorded.
   [[nodiscard]] const SignalInfo* Find(const std::string& signal) const { return log_.Find(signal); }
   /// Whether the robot holds nothing, and its joints follow a motion of their own.
   [[nodiscard]] bool moves_joints() const { return Find("joints/q_d") != nullptr; }
-  /// What a category compares in this run, in a few words.
+  /// Describes in a few words what a category compares in this run.
   [[nodiscard]] const char* Explain(CheckCategory category) const;
   /// Name of a column: its own, or its number.
   [[nodiscard]] static std::string NameColumn(const SignalInfo& signal, int column);
@@ -62,7 +62,7 @@ std::string DescribeCut(const LogReader& log);
 /// The check that a signal "check/NAME" belongs to, without values. @throws InputError that names what lacks.
 CheckRecord ReadCheckInfo(const LogReader& log, const SignalInfo& signal);
 
-/// Where the robot ("robot") or the model ("mjcf") that a log names lies, once its files are unpacked.
+/// Path of the robot ("robot") or the model ("mjcf") that a log names, once its files are unpacked.
 /// @throws InputError when the log holds no such file, or the model names files outside its folder.
 std::filesystem::path FindEmbedded(const LogReader& log, const std::string& kind,
                                    const std::filesystem::path& unpacked);

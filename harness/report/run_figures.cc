@@ -11,11 +11,11 @@ namespace {
 
 constexpr double kLeastSpan = 0.02;  // m, rad
 
-/// Where the sine of beta is less than this, a rotation by 1e-4 rad can turn alpha and gamma by 1e-2 rad and
-/// more.
+/// Least sine of beta of good angles: where it is less, a rotation by 1e-4 rad can turn alpha and gamma by
+/// 1e-2 rad and more.
 constexpr double kSingularSine = 0.01;
 
-/// What a reader of ZYZ angles has to know; nothing while beta keeps away from 0 and pi.
+/// A note for readers of ZYZ angles; nothing while beta keeps away from 0 and pi.
 /// @param beta the second ZYZ angle at each row, rad.
 std::string NoteOnAngles(const VectorXd& beta) {
   if (beta.size() == 0 || beta.array().sin().abs().minCoeff() >= kSingularSine) return "";
@@ -94,7 +94,7 @@ class MotionFigures {
     Add(b);
   }
 
-  /// Of a robot that holds nothing: where its joints are, should be, and how far they are from there.
+  /// Adds for a robot that holds nothing where its joints are, should be, and how far they are from there.
   void AddJoints() {
     const int count = WidthOf("joints/q_d");
     if (count == 0 || count > WidthOf("q") || WidthOf("joints/error") != count) return;
@@ -141,8 +141,8 @@ class MotionFigures {
          .printed = true});
   }
 
-  /// Whether it is one of the fingers that hold the object. They are distinguished by what stands before the
-  /// underscore; another robot's, if that is not the same of all fingertips.
+  /// A joint grasps where it is one of the fingers that hold the object. They are distinguished by what
+  /// stands before the underscore; another robot's, if that is not the same of all fingertips.
   [[nodiscard]] bool Grasps(const std::string& joint) const {
     const SignalInfo* const contacts = run_.Find("contact/overlap");
     if (contacts == nullptr || contacts->columns.empty()) return false;

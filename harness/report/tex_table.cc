@@ -11,7 +11,7 @@
 namespace dexcheck {
 namespace {
 
-/// As text, whatever it is; "s^2" has its exponent.
+/// Escapes any text for LaTeX; "s^2" has its exponent.
 std::string EscapeTex(std::string_view text) {
   std::string escaped;
   for (const char c : text) {

@@ -20,9 +20,9 @@ constexpr double kFindsGrip = 0.1;       // s after it, judged, but forgotten if
 constexpr double kLargestSkew = 1e-2;    // rad between the platform's heading and the way ahead
 constexpr double kSettleMoving = 0.5;    // s
 constexpr double kLargestTilt = 0.2;     // rad, of a robot that still stands
-constexpr double kLargestSink = 0.02;    // m, likewise
+constexpr double kLargestSink = 0.02;    // m, of a robot that still stands
 constexpr double kLeastUpright = 0.5;    // cosine of the tilt of a body that stands on feet
-constexpr double kLeastHeight = 0.5;     // of the height at the start, likewise
+constexpr double kLeastHeight = 0.5;     // of the height at the start, of a body that stands on feet
 constexpr double kGraspTimeout = 0.005;  // s without all fingertips on the object: lost
 
 }  // namespace
@@ -107,7 +107,7 @@ bool ClosedLoop::SettleOn(const Trajectory& motion, double duration,
     MakeStep(t);
     if (checks_) checks_->JudgeEffort(record_, t);
     if (checks_) record_.true_model = &checks_->Follow(record_);
-    // The first contact is rough; what goes wrong later has a cause that the checks should tell.
+    // The first contact is rough; later errors have a cause that the checks should report.
     if (checks_ && i == grip) {
       checks_->Forget();
       store_->Reset();
@@ -122,7 +122,7 @@ bool ClosedLoop::SettleOn(const Trajectory& motion, double duration,
     try {
       CheckGrasp();
     } catch (const RunFailure&) {
-      // Why it does not hold: of a run that never begins, the first question is asked here.
+      // A run that never begins is judged here, for the reason of its failure.
       if (checks_) {
         checks_->JudgeUnsent(record_);
         checks_->JudgeModel(record_);  // also of a run whose law is not known
@@ -142,7 +142,7 @@ bool ClosedLoop::StartMoving(const Vector3d& v, const std::function<bool()>& sho
   velocity.head<3>() = v;
   if (!SettleOn(*MakeLineTrajectory(setup_->start().X_o, velocity, 0.0), kSettleMoving, should_stop))
     return false;
-  // Back to where it began: on a level floor every place is alike.
+  // The robot moves back to where it began: all places of a level floor are the same.
   const double dt = plant_->time_step();
   const Vector3d way = static_cast<double>(std::lround(kSettleMoving / dt)) * dt * v;
   plant_->Translate(-way);
@@ -188,7 +188,7 @@ void ClosedLoop::DriveMotors(double t) {
     Finish();
     if (checks_) checks_->JudgeEffort(record_, t);
     if (checks_) record_.true_model = &checks_->Follow(record_);
-    // Torques that are too large may be those of no law, or motors and sensors can be at fault.
+    // Torques that are too large may be those of no law, or motors and sensors may be at fault.
     if (checks_) {
       checks_->JudgeUnsent(record_);
       store_->Add(record_, checks_->analysis(), !is_running_ || checks_->differs(),

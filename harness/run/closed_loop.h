@@ -32,9 +32,9 @@ class GraspLost : public RunFailure {
 /// Time spent in each part, s.
 struct LoopTimes {
   double plant = 0.0;
-  double controller = 0.0;   ///< Reading the plant included.
+  double controller = 0.0;   ///< Includes reading the plant.
   double grasp_force = 0.0;  ///< Part of controller.
-  double cross_check = 0.0;  ///< Reading the plant's response included.
+  double cross_check = 0.0;  ///< Includes reading the plant's response.
   long solves = 0;           ///< Grasp-force problems.
 };
 
@@ -44,44 +44,44 @@ struct LoopTimes {
 ///     `----PlantResponse----> checks: all of it is one StepRecord
 ///
 /// Deterministic: with two threads the checks of a step are made beside the whole next step, on a copy of its
-/// record, as long as that is the faster way (ThreadChoice), and every number is the same. Nothing allocates
-/// in a step, except as the controller and RunChecks say.
+/// record, as long as that is faster (ThreadChoice), and every number is the same. Nothing allocates in a
+/// step, except in the controller and RunChecks as they state.
 class ClosedLoop {
  public:
   /// @param check whether to cross-check.
-  /// @throws InputError when the scenario asks for what cannot be.
+  /// @throws InputError when the scenario's demands cannot be met.
   ClosedLoop(const Setup& setup, bool check) : ClosedLoop(setup, check, MakeLoopParts(setup)) {}
-  /// The same with other parts than the scenario's own.
+  /// Makes the loop with other parts than the scenario's own.
   ClosedLoop(const Setup& setup, bool check, LoopParts parts);
 
-  /// Holds the object until all has come to rest (and then moves on, for a moving start): call once, before
-  /// the first Step, at t = 0.
+  /// Holds the object until everything has come to rest (and then moves on, for a moving start): call once,
+  /// before the first Step, at t = 0.
   /// @param should_stop asked before each step of settling.
-  /// @return whether all came to rest; false when it was stopped before. @throws as Step.
+  /// @return whether everything came to rest; false when it was stopped before. @throws as Step.
   bool Settle(const std::function<bool()>& should_stop = [] { return false; });
 
-  /// Each step goes there once its checks are made, in order, also one that fails after the first: with two
-  /// threads a step later than it was made.
+  /// Sets the function that gets each step once its checks are made, in order, including one that fails after
+  /// the first; with two threads a step later than it was made.
   void SetObserver(std::function<void(const StepRecord&)> observe) { observe_ = std::move(observe); }
-  /// One step. @throws RunFailure, DivergenceError, GraspForceError, SingularityError. What the step saw up
-  /// to then can be read.
+  /// Makes one step. @throws RunFailure, DivergenceError, GraspForceError, SingularityError. The values of
+  /// the step up to then can be read.
   void Step();
   /// Waits for the checks of the last step. @throws as Step.
   void Finish();
 
-  /// The last step. It stays in its place. Its findings come with its checks.
+  /// The last step, at a fixed address. Its findings come with its checks.
   [[nodiscard]] const StepRecord& record() const { return record_; }
   /// Number of steps of the scenario's duration, the most that a task may take.
   [[nodiscard]] long num_steps() const { return num_steps_; }
-  /// Whether there is nothing left to do.
+  /// Whether the run is complete.
   [[nodiscard]] bool is_finished() const { return record_.step >= num_steps_ || controller_->is_done(); }
-  /// Time that the next step begins at, s.
+  /// Time of the next step's beginning, s.
   [[nodiscard]] double time() const { return static_cast<double>(record_.step) * plant_->time_step(); }
 
   [[nodiscard]] bool is_checking() const { return checks_.has_value(); }
   /// Only when checking.
   [[nodiscard]] const RunChecks& checks() const { return checks_.value(); }
-  /// The steps that differ, likewise.
+  /// The steps that differ. Only when checking.
   [[nodiscard]] const StepStore& store() const { return store_.value(); }
   /// The controller of a task; null unless the scenario is one.
   [[nodiscard]] const PickAndPlaceController* task() const { return task_; }
@@ -89,7 +89,7 @@ class ClosedLoop {
   /// Whether the controller's law is the scenario's.
   [[nodiscard]] bool knows_law() const { return knows_law_; }
   [[nodiscard]] std::span<const Motor> motors() const { return plant_->motors(); }
-  /// Of a controller that follows its contacts, over all of them and all steps.
+  /// Largest drift of a controller that follows its contacts, over all of them and all steps.
   [[nodiscard]] const ContactDrift& largest_drift() const { return largest_drift_; }
 
  private:
@@ -97,13 +97,13 @@ class ClosedLoop {
   bool StartMoving(const Vector3d& v, const std::function<bool()>& should_stop);
   bool SettleOn(const Trajectory& motion, double duration, const std::function<bool()>& should_stop);
   void BeginRun();
-  /// ControlStep as far as it comes.
+  /// Makes ControlStep as far as it comes.
   void MakeStep(double t);
-  /// Time begins anew for checks and causes.
+  /// Lets time begin anew for checks and causes.
   void ForgetSteps();
-  /// The checks of the step, in this thread.
+  /// Makes the checks of the step in this thread.
   void Check();
-  /// All checks of a step of the run.
+  /// Makes all checks of a step of the run.
   void Judge(StepRecord* step);
   void Observe(const StepRecord& step) const;
   void ControlStep(double t);
@@ -118,7 +118,7 @@ class ClosedLoop {
   std::function<void(double t, MeasuredState* measured)> hidden_sensor_fault_;
   std::unique_ptr<Controller> controller_;
   const PickAndPlaceController* task_ = nullptr;    // is controller_, or null
-  const TrajectoryController* follower_ = nullptr;  // likewise
+  const TrajectoryController* follower_ = nullptr;  // is controller_, or null
   MotorDrive drive_;
   Disturbances disturbances_;
   std::optional<RunChecks> checks_;

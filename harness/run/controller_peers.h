@@ -18,17 +18,17 @@ class ControllerPeer {
  public:
   virtual ~ControllerPeer() = default;
 
-  /// @param joint_gains K_p, K_v (2 n); empty with contacts. @returns what it wants and reports.
-  /// @throws InputError for another protocol; ControllerFailure when it does not answer. So do all others.
+  /// @param joint_gains K_p, K_v (2 n); empty with contacts. @returns the flags of its answer: requests and
+  /// reports. @throws InputError for another protocol; ControllerFailure without an answer, as in all calls.
   virtual uint32_t Greet(const dexcheck_hello& hello, std::span<const double> joint_gains) = 0;
-  /// To one that wants them. @throws InputError when it refuses one.
+  /// Sends the parameters to a side that wants them. @throws InputError when it refuses one.
   virtual void SetParameters() = 0;
   virtual void Begin() = 0;
-  /// @param request the doubles of STEP behind one that is free for its header. @param torques that it sends.
+  /// @param request the doubles of STEP, after one that is free for its header. @param torques the answer.
   virtual void Step(std::span<double> request, std::span<double> torques) = 0;
 };
 
-/// A program that runs while this exists, or what listens at a socket ("unix:PATH").
+/// A program that runs while this object exists, or the listener at a socket ("unix:PATH").
 class ProgramPeer final : public ControllerPeer {
  public:
   /// Starts the program. @throws InputError when that is not possible.
@@ -46,10 +46,10 @@ class ProgramPeer final : public ControllerPeer {
   void SetTimeLimit(double seconds);
   void Send(const void* data, size_t size);
   void Receive(void* data, size_t size);
-  /// @returns the message; one of an error becomes `Failure`.
+  /// Returns the message; an error message is thrown as `Failure`.
   template <typename Failure>
   dexcheck_message ReceiveMessage();
-  /// What became of the program, in words; waits for it a little.
+  /// Describes how the program ended, after a short wait; empty while it runs.
   std::string TellEnd();
 
   OwnControllerSetup setup_;
@@ -72,7 +72,7 @@ class LibraryPeer final : public ControllerPeer {
  private:
   std::unique_ptr<ForeignLibrary> library_;
   OwnControllerSetup setup_;
-  // What the library may keep.
+  // Data to which the library may keep pointers.
   dexcheck_hello hello_{};
   std::vector<double> joint_gains_;
   void* controller_ = nullptr;

@@ -10,7 +10,7 @@
 namespace dexcheck {
 namespace {
 
-/// What the check comes to in another scenario; none where it cannot be run.
+/// Returns the check's value in another scenario; none where that cannot be run.
 std::optional<double> Repeat(const Scenario& scenario, const std::string& check,
                              const std::filesystem::path& robot, const std::filesystem::path& mjcf,
                              const std::function<bool()>& should_stop) {
@@ -25,7 +25,7 @@ std::optional<double> Repeat(const Scenario& scenario, const std::string& check,
   }
 }
 
-/// The run's cause is this one, and so is that of failures that have none of their own.
+/// Sets the cause of the run, and of failures that have none of their own.
 void SetCause(Cause cause, RunResult* result) {
   for (Attribution& one : result->attribution.attributions)
     if (one.cause == result->attribution.cause) one.cause = cause;

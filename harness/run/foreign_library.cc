@@ -14,14 +14,14 @@
 namespace dexcheck {
 namespace {
 
-/// In a time limit. Looks are counted, not time, so that a process that was stopped for a while hangs in
-/// nothing.
+/// Number of looks of the timer in a time limit. Looks are counted instead of time, so that a process that
+/// was stopped for a while does not fail.
 constexpr int kLooks = 4;
 
-/// What a timer of the process looks at.
+/// State that a timer of the process reads.
 struct {
   int libraries = 0;
-  std::string line;            // what is said of a call that does not return
+  std::string line;            // message for a call that does not return
   std::atomic<long> call = 0;  // 1, 3, ... while one is made
   std::atomic<int> patience = 1;
   std::atomic<long> seen = 0;
@@ -35,7 +35,7 @@ void LookAtCall(int /*signal*/) {
   if (call % 2 == 1 && timed.looks >= kLooks * timed.patience) FailAtOnce(timed.line);
 }
 
-/// Every so many seconds; 0 for no more.
+/// Sets the period of the timer, s; 0 stops it.
 void SetTimer(double seconds) {
   timeval period{};
   period.tv_sec = static_cast<time_t>(seconds);

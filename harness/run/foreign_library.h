@@ -11,9 +11,9 @@
 
 namespace dexcheck {
 
-/// Loaded while it exists. What it throws comes back as a ControllerFailure. A call that does not return in
-/// time ends the program with one line, and so does a crash where the process is watched (ContinueWatched).
-/// Calls are made one at a time in a process.
+/// A library, loaded while this object exists. Exceptions in it are thrown again as ControllerFailure. A call
+/// that does not return in time ends the program with one line, and so does a crash where the process is
+/// watched (ContinueWatched). Calls are made one at a time in a process.
 class ForeignLibrary {
  public:
   /// Making a controller and its first look at the robot may take this many times the limit of a step.
@@ -22,13 +22,13 @@ class ForeignLibrary {
   /// @throws InputError when it cannot be loaded.
   explicit ForeignLibrary(const OwnControllerSetup& setup);
 
-  /// Null when there is none of this name.
+  /// Returns the function of this name; null when there is none.
   template <typename Function>
   [[nodiscard]] Function* Find(const char* name) const {
     return reinterpret_cast<Function*>(FindSymbol(name));
   }
 
-  /// @param patience how many times the time limit the work may take. @throws ControllerFailure.
+  /// Calls the work. @param patience how many times the time limit it may take. @throws ControllerFailure.
   template <typename Work>
   void Guard(const Work& work, int patience = 1) const {
     const TimedCall call(patience);
@@ -42,7 +42,7 @@ class ForeignLibrary {
   }
 
  private:
-  /// Looks at the calls as long as there are libraries.
+  /// Watches the calls as long as there are libraries.
   struct Timer {
     explicit Timer(const OwnControllerSetup& setup);
     ~Timer();

@@ -33,7 +33,7 @@ MatrixXd Differentiate(VectorXd x, const Function& f) {
   return derivative;
 }
 
-/// Where the motion is judged: each place once.
+/// Lists the postures in which the motion is judged, each once.
 std::vector<VectorXd> ListPostures(const Setup& setup) {
   std::vector<VectorXd> postures = {setup.start().q};
   DesiredJoints at;
@@ -44,7 +44,7 @@ std::vector<VectorXd> ListPostures(const Setup& setup) {
   return postures;
 }
 
-/// When the scenario's law is evaluated, and by how much torques and all that is measured are late.
+/// Returns the sampling of the scenario's law, with the delays of torques and measurements.
 SampledLoop FindTiming(const Scenario& scenario) {
   SampledLoop loop;
   loop.time_step = scenario.plant.time_step;
@@ -166,7 +166,7 @@ std::string WriteJointControl(const Scenario& scenario, double factor) {
   std::string text = fmt::format("[control]\nlaw = \"{}\"\n", NameOf(scenario.control.law));
   const auto add = [&](const char* key, const ByName& numbers, double times) {
     if (numbers.key.empty()) return;
-    // Down to three digits, so that they are not above what was found.
+    // Values are rounded down to three digits, so that they do not exceed the best ones.
     const auto show = [&](double value) {
       if (times == 1.0 || value == 0.0) return FormatNumber(value, 6);
       const double digit = std::pow(10.0, std::floor(std::log10(value * times)) - 2.0);
@@ -214,7 +214,7 @@ std::string DescribeMargins(const JointMargins& margins) {
 
 void JudgeGains(const Setup& setup, const ClosedLoop& loop, RunResult* result) {
   if (setup.joints() == nullptr || !loop.knows_law() || loop.record().step == 0) return;
-  // Margins are those of the scenario's law, and these torques are not.
+  // Margins belong to the scenario's law, and these torques do not.
   if (loop.is_checking() && loop.checks().Has("law_torque") && loop.checks().Find("law_torque").failed)
     return;
   result->margins = CalcJointMargins(setup, setup.joints()->gains);

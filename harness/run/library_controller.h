@@ -11,12 +11,12 @@
 
 namespace dexcheck {
 
-/// A controller behind controller/control/controller_library.h. What it throws ends the run, with its words.
-/// So do a torque of the wrong size, and another torque before the control step is over.
+/// A controller behind controller/control/controller_library.h. An exception in it ends the run, with its
+/// words. A torque of the wrong size, and another torque before the control step is over, end it as well.
 class LibraryController final : public Controller {
  public:
   /// @throws InputError when the library names no controller, was built for another interface, makes no
-  /// controller, or asks for none of a parameter.
+  /// controller, or does not read one of the parameters.
   LibraryController(std::unique_ptr<ForeignLibrary> library, const OwnControllerSetup& setup);
 
   void Follow(const Trajectory& motion) override;

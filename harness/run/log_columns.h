@@ -16,9 +16,9 @@ struct LogColumns {
   std::string units;  ///< One for each column, separated by ", "; one alone when all have it.
 };
 
-/// Of qpos: "JOINT" of hinges and slides, "JOINT.x" to "JOINT.z" and "JOINT.qw" to "JOINT.qz" of free joints.
+/// Columns of qpos: "JOINT", and of free joints "JOINT.x" to "JOINT.z" and "JOINT.qw" to "JOINT.qz".
 LogColumns ListPositionColumns(const mjModel& model);
-/// Of qvel: "JOINT", "JOINT.v_x" to "JOINT.v_z" (world) and "JOINT.w_x" to "JOINT.w_z" (body).
+/// Columns of qvel: "JOINT", "JOINT.v_x" to "JOINT.v_z" (world) and "JOINT.w_x" to "JOINT.w_z" (body).
 LogColumns ListVelocityColumns(const mjModel& model);
 
 /// Units of quantities of the base's coordinates followed by the joints'.

@@ -1,6 +1,6 @@
 #pragma once
 
-// What a scenario puts into the loop.
+// The parts of the loop that a scenario names.
 
 #include <filesystem>
 #include <functional>
@@ -18,8 +18,7 @@
 
 namespace dexcheck {
 
-/// Plant, controller and what stands between them. Any of them may be exchanged, or wrapped, before a loop is
-/// made of them.
+/// Plant, controller and the parts between them. Any may be exchanged, or wrapped, before a loop is made.
 struct LoopParts {
   std::unique_ptr<Plant> plant;
   std::unique_ptr<Controller> controller;
@@ -27,20 +26,20 @@ struct LoopParts {
   const TrajectoryController* follower = nullptr;  ///< The controller, when it follows its contacts by (40).
   bool knows_law = true;                           ///< Whether the controller's law is the scenario's.
   int threads = 1;                                 ///< 2: checks have a thread of their own.
-  SearchOptions search;                            ///< Of what explains a run whose checks fail.
+  SearchOptions search;                            ///< Options of the search for causes of failed checks.
   SensingOptions sensing;
   ActuationOptions actuation;
   std::vector<DisturbanceOptions> disturbances;
-  /// Changes the measured state at time t besides, as no scenario declares; empty for nothing.
+  /// Changes the measured state at time t in a way that no scenario declares; empty for no change.
   std::function<void(double t, MeasuredState* measured)> hidden_sensor_fault;
 };
 
-/// The parts that the scenario names, robot and object where it starts.
+/// Makes the parts that the scenario names, with robot and object where it starts.
 /// A controller of the user's own has the scenario's law when the scenario names one.
-/// @throws InputError as EnginePlant and MakeOwnController; what the controllers' constructors throw.
+/// @throws InputError as EnginePlant and MakeOwnController; the errors of the controllers' constructors.
 LoopParts MakeLoopParts(const Setup& setup);
 
-/// The controller of the scenario's law or task, also where a user's own takes its place.
+/// Makes the controller of the scenario's law or task, also where a user's own replaces it.
 std::unique_ptr<Controller> MakeScenarioLaw(const Setup& setup);
 
 }  // namespace dexcheck

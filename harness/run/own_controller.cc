@@ -16,7 +16,7 @@
 namespace dexcheck {
 namespace {
 
-/// The texts of robot and scenario, with what a run changes in them.
+/// The texts of robot and scenario, with a run's changes.
 std::string MakeRobotText(const Setup& setup) {
   const std::string& source = setup.model().spec().source;
   return ApplyOverrides(ReadBytes(source), source, setup.scenario().model_overrides);
@@ -28,10 +28,10 @@ std::string MakeScenarioText(const Scenario& scenario) {
   return ApplyOverrides(scenario.text, scenario.source, overrides);
 }
 
-/// For messages.
+/// Name of the controller in messages.
 std::string NameOf(const Scenario& scenario) { return "controller " + scenario.controller.run; }
 
-/// What runs a Python file: the module's own main program.
+/// Returns the program that runs a Python file: the main program of the Python module.
 std::filesystem::path FindPythonMain(const std::string& name) {
   std::error_code error;
   const std::filesystem::path program = std::filesystem::read_symlink("/proc/self/exe", error).parent_path();

@@ -1,6 +1,6 @@
 #pragma once
 
-// Controllers that the user brings along: shared libraries, Python files and programs.
+// Controllers of the user's own: shared libraries, Python files and programs.
 
 #include <filesystem>
 #include <memory>
@@ -13,13 +13,13 @@
 
 namespace dexcheck {
 
-/// A controller of the user's own failed; of no use any more.
+/// A failure of a controller of the user's own, which cannot be used any more.
 class ControllerFailure : public RunFailure {
  public:
   using RunFailure::RunFailure;
 };
 
-/// What a controller of one's own is given.
+/// Inputs of a controller of the user's own.
 struct OwnControllerSetup {
   std::string name;  ///< For messages: "controller law.so".
   const RobotModel* model = nullptr;
@@ -28,24 +28,24 @@ struct OwnControllerSetup {
   const Surface* surface = nullptr;
   GraspControllerOptions options;
   Sampling sampling;
-  const JointPlan* joints = nullptr;  ///< Of a scenario that moves joints.
-  std::string robot_text;             ///< The parameter file, with what is changed in it.
-  std::string scenario_text;          ///< The scenario, likewise.
+  const JointPlan* joints = nullptr;  ///< Plan of a scenario that moves joints; else null.
+  std::string robot_text;             ///< The parameter file, with the changes made to it.
+  std::string scenario_text;          ///< The scenario, with the changes made to it.
   OwnControllerOptions own;
 };
 
-/// The scenario's own controller, which exists.
-/// @throws InputError when the scenario has none for it to do, when it cannot be loaded or started, is of
+/// Makes the scenario's own controller, which must be stated.
+/// @throws InputError when the scenario has no work for it, when it cannot be loaded or started, is of
 /// another version, or does not take a parameter; ControllerFailure when it fails at once.
 std::unique_ptr<Controller> MakeOwnController(const Setup& setup, const Sampling& sampling);
 
-/// The file that a controller is: a library or a Python file; empty for a command.
+/// Returns the file of a controller: a library or a Python file; empty for a command.
 std::filesystem::path FindControllerFile(const OwnControllerOptions& own);
 
-/// Of that file's bytes; empty for a command.
+/// Returns the hash of that file's bytes; empty for a command.
 std::string HashController(const OwnControllerOptions& own);
 
-/// The error of a controller that does not take a parameter. @param why such as "takes no parameters".
+/// Throws the error of a controller that does not take a parameter. @param why such as "takes no parameters".
 [[noreturn]] void RejectParameter(const OwnControllerSetup& setup, const std::string& parameter,
                                   const std::string& why);
 

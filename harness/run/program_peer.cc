@@ -17,12 +17,12 @@
 namespace dexcheck {
 namespace {
 
-// How much more time than for an answer a program has to start.
+// Factor of the time limit for the start of a program.
 constexpr double kGreetingFraction = 10.0;
-// Time in which a program that has closed its output may end, s, before it is asked no more.
+// Time in which a program that has closed its output may end, s.
 constexpr double kEndTime = 0.5;
-// To sleep and be woken by another core takes longer than many laws do: a wait is awake so long, if the last
-// one was over by then. Where it was not, the law is slow, or its process has to wait for a core.
+// Time of waiting awake, if the last wait was over by then: to sleep and be woken by another core takes
+// longer than many laws. After a longer wait the law is slow, or its process waits for a core.
 constexpr std::chrono::microseconds kAwake(300);
 
 timeval ToTime(double seconds) {

@@ -12,7 +12,7 @@
 
 namespace dexcheck {
 
-/// Has a request and a reply at each control step; torques are held in between. Nothing allocates there.
+/// Exchanges request and reply at each control step; torques are held in between. Nothing allocates there.
 class ProtocolController final : public Controller {
  public:
   /// Greets the other side and gives it its parameters.
@@ -35,12 +35,12 @@ class ProtocolController final : public Controller {
   std::unique_ptr<ControllerPeer> peer_;
   GraspModel model_;
   VectorXd sigma_prime_;                            // n
-  Matrix2d wheels_inverse_ = Matrix2d::Identity();  // of E_bar'
+  Matrix2d wheels_inverse_ = Matrix2d::Identity();  // inverse of the wheels' block of E_bar'
   const Trajectory* motion_ = nullptr;
   std::optional<JointDemand> joints_;
   bool wants_terms_ = false;
   long steps_until_due_ = 0;
-  std::vector<double> request_;  // the message before it takes the place of one double
+  std::vector<double> request_;  // the message, with one double before it for the header
   size_t filled_ = 0;
   std::vector<double> torques_;  // n, and 3 N of F_N where it is reported
 };

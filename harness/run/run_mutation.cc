@@ -13,13 +13,13 @@
 namespace dexcheck {
 namespace {
 
-// Where the object is where it should be, feedback is nothing whatever its gains are: laws are judged from an
-// error on, m and rad, that comes within some steps. It takes 4 mm/s^2 at 20 rad/s, far below what softens
-// contacts or makes wheels slip.
+// Start error by which laws are judged, m and rad: feedback is zero whatever its gains are while the object
+// follows exactly. The error comes within some steps, by 4 mm/s^2 at 20 rad/s, far below accelerations that
+// soften contacts or make wheels slip.
 constexpr double kOffset = 1e-5;
 constexpr double kOffsetTime = 5e-3;  // s
 
-/// A trajectory that begins later, and goes a little off from a time on.
+/// A trajectory that begins later, and is offset a little from some time on.
 class LaterTrajectory final : public Trajectory {
  public:
   LaterTrajectory(std::unique_ptr<Trajectory> whole, double later, double offset, double begin)
@@ -58,7 +58,7 @@ void InjectFault(const Setup& setup, const InjectedFault& fault, double begin, L
   parts->plant =
       std::make_unique<FaultyPlant>(setup, std::unique_ptr<EnginePlant>(engine), fault, clock, begin);
   if (fault.sensors) {
-    // What remembers knows what was before it began.
+    // The change is called before the fault begins as well, since its memory must know the time before.
     parts->hidden_sensor_fault = [clock, change = fault.sensors(setup), begin, wrong = MeasuredState()](
                                      double t, MeasuredState* state) mutable {
       wrong = *state;
@@ -112,7 +112,7 @@ RunCampaign::RunCampaign(const Scenario& scenario, std::filesystem::path robot, 
   if (scenario.joint_task() == nullptr && begin_ == 0.0) MoveToStart(should_stop);
   std::string failure = RunWithoutFault(should_stop);
   if (!failure.empty() && start_) {
-    // What checks know of contacts begins with contacts at rest, which they are not where forces change fast.
+    // The checks' memory begins with contacts at rest, which they are not where forces change fast.
     start_.reset();
     tau_.resize(0);
     begin_ = options_.from;
@@ -136,7 +136,7 @@ void RunCampaign::MakeSetups() {
   }
   // Even a run that is looked at from its beginning starts settled, one step in.
   options_.from = std::max(options_.from, scenario_.plant.time_step);
-  // What sensors and motors remember is no part of the plant's state.
+  // The memory of sensors and motors is no part of the plant's state.
   if (!scenario_.imperfections.is_ideal()) begin_ = options_.from;
   setup_ = MakeSetup(MakeScenario(options_.from, options_.duration, 0.0), nullptr);
   offset_setup_ = MakeSetup(MakeScenario(options_.from, options_.duration, kOffset), nullptr);
@@ -159,7 +159,7 @@ void RunCampaign::ListFaults() {
     return add(DrawFaults(*setup_, draw));
   }
   add(ListNumberFaults(*setup_, static_cast<size_t>(options_.parameters), options_.scale));
-  // Those of another law are not known.
+  // The fault lists know only the paper's law.
   const bool is_paper_law = !scenario_.controller.exists() &&
                             scenario_.control.law == ControlLaw::kComputedTorque &&
                             scenario_.joint_task() == nullptr;
@@ -213,7 +213,7 @@ std::string RunCampaign::RunWithoutFault(const std::function<bool()>& should_sto
   for (const Setup* setup : {setup_.get(), offset_setup_.get()}) {
     if (setup == nullptr || should_stop()) continue;
     RunMutant none;
-    // With the injector in place, and nothing injected.
+    // This run has the injector in place, and no fault.
     InjectedFault nothing;
     nothing.engine = [](const Setup&, mjModel*) {};
     LoopParts parts = MakeLoopParts(*setup);
@@ -315,15 +315,14 @@ bool RunCampaign::Run(size_t index, const std::function<bool()>& should_stop) {
     fewer.all = JoinAll(fewer.faults);
     VectorXd its_way;
     if (!RunFault(fewer.all, &fewer, &its_way, should_stop)) return false;
-    // What comes after the others have ended the run is not in it: without it all is the same, bit by bit.
+    // A fault that begins after the others have ended the run is not in it: all is the same, bit by bit.
     if (its_way != way || fewer.causes != mutant.causes) continue;
     fewer.all.name += "; too late: " + mutant.faults[i].name;
     mutant = {.faults = fewer.faults, .all = fewer.all};
     return Run(index, should_stop);
   }
   const VectorXd& right = mutant.all.needs_error && offset_way_.size() > 0 ? offset_way_ : way_;
-  // What is wrong in the plant alone is explained by forces, down to a millionth of those that are balanced
-  // (StepStore's noise).
+  // Faults in the plant alone are explained by forces, down to a millionth of those balanced (StepStore).
   constexpr double kExplained = 1e-6;
   const bool is_of_law = mutant.all.model || mutant.all.controller;
   const double unseen = is_of_law ? 0.0 : kExplained;
@@ -344,7 +343,7 @@ bool RunCampaign::LookOn(RunMutant* mutant, const std::function<bool()>& should_
   }
   whole_->mutants_ = {{.faults = mutant->faults, .all = mutant->all}};
   const bool is_done = whole_->Run(0, should_stop);
-  // A motion may end where it began, where its way is no scale for what has no effect.
+  // A motion may end where it began: its displacement then is no scale for the effect of a fault.
   const RunMutant& later = whole_->mutants_.front();
   if (later.killed || !mutant->no_effect) *mutant = later;
   return is_done;

@@ -6,24 +6,24 @@
 
 namespace dexcheck {
 
-/// Which faults are made in a run, and how long each is looked at.
+/// Faults to make in a run, and the time for which each is observed.
 struct RunMutationOptions {
-  /// The fault begins at this time of the scenario, s. In a motion of joints it is there from the first,
-  /// and this is added to `duration`.
+  /// Time of the scenario at which the fault begins, s. In a motion of joints the fault is there from the
+  /// first step, and this is added to `duration`.
   double from = 0.5;
-  double duration = 0.1;  ///< How long it is looked at, s; 0 for all of a motion of joints, 0.1 s of others.
-  /// What is not found by then is looked at up to the end of a motion of joints, which begins at rest.
+  double duration = 0.1;  ///< Time of observation, s; 0 for a whole motion of joints, 0.1 s of other motions.
+  /// Whether a fault that is not found by then is observed up to the end of a motion of joints.
   bool looks_on = false;
-  int parameters = 40;  ///< Numbers of the model that are changed, evenly out of all of them.
-  double scale = 1e-3;  ///< By how much, relative to GetScale.
+  int parameters = 40;  ///< Number of the model's numbers to change, evenly out of all of them.
+  double scale = 1e-3;  ///< Size of the change, relative to GetScale.
   bool laws = true;
   bool equations = true;
   bool plants =
       true;  ///< One fault of each kind in plant, motors, sensors and law, its place and size drawn.
-  std::vector<std::string> kinds = {};  ///< Of FaultKind::kind, out of which is drawn; empty for all.
-  /// Sets of faults whose places, sizes and times are drawn, in the place of all of these; 0 for none.
+  std::vector<std::string> kinds = {};  ///< Kinds of faults to draw from (FaultKind::kind); empty for all.
+  /// Number of sets of faults whose places, sizes and times are drawn, in place of all of these; 0 for none.
   int draws = 0;
-  int together = 1;  ///< Faults of a set.
+  int together = 1;  ///< Number of faults in a set.
   std::uint64_t seed = 1;
 };
 

@@ -60,7 +60,7 @@ void Put(const Eigen::DenseBase<Derived>& from, Row to) {
   Copy(from, to);
 }
 
-/// Of each entry of a list of the step a number or a vector, one after the other.
+/// Writes a number or a vector for each entry of a list of the step, one after the other.
 template <typename List, typename Get>
 auto Each(List list, Get get) {
   return [list, get](const StepRecord& step, Row row) {

@@ -1,6 +1,6 @@
 #pragma once
 
-// Which quantities of a run go into its log.
+// The quantities of a run that its log records.
 
 #include <filesystem>
 #include <functional>
@@ -13,11 +13,11 @@
 
 namespace dexcheck {
 
-/// Where a run's inputs lie, to be kept in the log.
+/// Files of a run's inputs, which the log keeps.
 struct RunInputs {
   std::filesystem::path robot;
   std::filesystem::path mjcf;
-  std::string command;  ///< As it was typed.
+  std::string command;  ///< The command line.
 };
 
 /// Writes log.h5 of one run.
@@ -34,11 +34,11 @@ class RunRecorder {
 
  private:
   using Source = std::function<void(const StepRecord& step, std::span<double> row)>;
-  /// One quantity. @param width its numbers. @param columns their names, if they have any. @param numbers
-  /// attributes.
+  /// Adds one quantity. @param width its numbers. @param columns their names, if they have any. @param
+  /// numbers attributes.
   void Add(const std::string& name, const std::string& unit, const std::string& description, int width,
            std::vector<std::string> columns, Source source, std::map<std::string, double> numbers = {});
-  /// One that is a single number.
+  /// Adds a quantity that is a single number.
   void AddNumber(const std::string& name, const std::string& unit, const std::string& description,
                  Source source);
   void AddStateSignals();

@@ -17,7 +17,7 @@ double Rms(double squares, long count) {
   return count > 0 ? std::sqrt(squares / static_cast<double>(count)) : 0.0;
 }
 
-/// Of the object.
+/// Converts the object's tracking statistics.
 Json TrackingToJson(const TrackingStatistics& tracking) {
   return {{"position_error_max_m", tracking.position_max()},
           {"position_error_rms_m", tracking.position_rms()},
@@ -42,7 +42,7 @@ Json TaskToJson(const ClosedLoop& loop) {
   return json;
 }
 
-/// By class of pairs that there are: the smallest distance, of which bodies, and when.
+/// Lists the smallest distance of each class of pairs, with bodies and time.
 Json ClearanceToJson(const Clearance& clearance) {
   Json json = Json::object();
   for (int i = 0; i < kPairClassCount; ++i) {

@@ -1,6 +1,6 @@
 #pragma once
 
-// What a run comes to: verdict, tracking, checks, attribution, speed.
+// Summary of a run: verdict, tracking, checks, attribution, speed.
 
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -29,7 +29,7 @@ class TrackingStatistics {
   [[nodiscard]] double position_rms() const;
   [[nodiscard]] double orientation_max() const { return orientation_max_; }
   [[nodiscard]] double orientation_rms() const;
-  /// Of the joint that is farthest from where it should be.
+  /// Largest error of a joint, rad or m.
   [[nodiscard]] double joints_max() const { return joints_max_; }
   [[nodiscard]] double joints_rms() const;
 
@@ -43,39 +43,39 @@ class TrackingStatistics {
   long count_ = 0;
 };
 
-/// What a motor's limit took of its torque.
+/// Torque that a motor's limit cut off.
 struct LimitedTorque {
-  double time = 0.0;   ///< How long in all, s.
-  double first = 0.0;  ///< When it began, s.
+  double time = 0.0;   ///< Total duration, s.
+  double first = 0.0;  ///< Time of its beginning, s.
   double most = 0.0;   ///< N m, N.
 };
 
-/// A finished run, or as far as it came.
+/// A finished run, or a run up to its failure.
 struct RunResult {
   Verdict verdict = Verdict::kPass;
-  std::string failure;             ///< Why it ended early; empty when it did not.
-  bool interrupted = false;        ///< By the user.
-  bool grasp_lost = false;         ///< It ended because a fingertip left the object.
-  bool controller_failed = false;  ///< It ended because a controller of the user's own failed.
+  std::string failure;             ///< Reason of an early end; empty when there was none.
+  bool interrupted = false;        ///< Whether the user ended the run.
+  bool grasp_lost = false;         ///< Whether it ended because a fingertip left the object.
+  bool controller_failed = false;  ///< Whether it ended because a controller of the user's own failed.
   TrackingStatistics tracking;
   double peak_effort = 0.0;             ///< Largest |tau'| sent over its motor's limit.
-  std::string busiest_motor;            ///< Whose that is.
+  std::string busiest_motor;            ///< Motor with that effort.
   std::vector<LimitedTorque> limited;   ///< By entry of tau'; empty where torques arrive as they are sent.
-  std::optional<JointMargins> margins;  ///< Of a motion of joints, where JudgeGains was asked.
-  std::string gain_card;                ///< Likewise.
+  std::optional<JointMargins> margins;  ///< Margins of a motion of joints, after JudgeGains.
+  std::string gain_card;                ///< Gains as TOML, after JudgeGains.
   AttributionResult attribution;
-  Causes causes;  ///< What explains the residuals, and the facts that checks observed.
+  Causes causes;  ///< Causes that explain the residuals, and the facts that checks observed.
   double recording_seconds = 0.0;
-  double wall_seconds = 0.0;  ///< Of all steps, recording included.
+  double wall_seconds = 0.0;  ///< Time of all steps, recording included.
 };
 
-/// Takes in a step of dt (s).
+/// Adds a step of dt (s).
 void AddLimits(const StepRecord& step, double dt, std::vector<LimitedTorque>* limited);
 
-/// The verdict and its attribution. Call when the last step is done.
+/// Sets the verdict and its attribution. Call when the last step is done.
 void Judge(const Setup& setup, const ClosedLoop& loop, const SearchOptions& search, RunResult* result);
 
-/// Keys as README.md lists them for summary.json; lengths m, angles rad.
+/// Returns the summary with the keys that README.md lists for summary.json; lengths m, angles rad.
 nlohmann::ordered_json MakeSummary(const Setup& setup, const ClosedLoop& loop, const RunResult& result);
 
 }  // namespace dexcheck

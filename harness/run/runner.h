@@ -10,13 +10,13 @@
 
 namespace dexcheck {
 
-/// One run from the first contact to its verdict. What goes wrong in the simulation ends the run and becomes
-/// part of the result; what is wrong with the input is thrown.
+/// One run from the first contact to its verdict. Errors of the simulation end the run and become part of the
+/// result; errors of the input are thrown.
 class Runner {
  public:
   /// @throws InputError as ClosedLoop.
   Runner(const Setup& setup, bool check) : setup_(&setup), loop_(setup, check) {}
-  /// The same with other parts than the scenario's own.
+  /// Makes a run with other parts than the scenario's own.
   Runner(const Setup& setup, bool check, LoopParts parts)
       : setup_(&setup), search_(parts.search), loop_(setup, check, std::move(parts)) {}
 

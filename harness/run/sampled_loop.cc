@@ -16,7 +16,7 @@ using Eigen::MatrixXcd;
 using Eigen::VectorXcd;
 
 /// Moves `values` into a chain of `length` blocks of as many rows that begins at `first`, the newest first,
-/// and takes out what came in `length` steps ago.
+/// and takes out the values of `length` steps ago.
 void Shift(Index first, Index length, MatrixXd* x, MatrixXd* values) {
   const Index n = values->rows();
   for (Index i = 0; i < length; ++i) x->middleRows(first + i * n, n).swap(*values);
@@ -27,9 +27,9 @@ class LoopChain {
  public:
   explicit LoopChain(const LinearLoop& loop);
 
-  /// Number of entries of a state: q, v, the filtered rate, the lag, what was sent and measured before.
+  /// Number of entries of a state: q, v, the filtered rate, the lag, earlier commands and measurements.
   [[nodiscard]] Index size() const { return size_; }
-  /// Measures, at the beginning of a step. @returns K q + V v of what is measured (n x columns).
+  /// Measures, at the beginning of a step. @returns K q + V v of the measurements (n x columns).
   MatrixXd Measure(MatrixXd* x) const;
   /// The rest of the step. @param c torques sent (n x columns).
   void Move(const MatrixXd& c, MatrixXd* x) const;
@@ -45,7 +45,7 @@ class LoopChain {
 
 LoopChain::LoopChain(const LinearLoop& loop) : loop_(loop), n_(loop.M.rows()) {
   const double h = loop.timing.time_step;
-  // As motors mix the torques of two steps where the delay is no whole number of them.
+  // The delay mixes the torques of two steps where it is no whole number of steps, as motors do.
   constexpr double kRounding = 1e-9;
   const double steps = loop.timing.delay / h;
   const double whole = std::floor(steps + kRounding * std::max(1.0, steps));
@@ -89,7 +89,7 @@ MatrixXd LoopChain::Delay(const MatrixXd& c, MatrixXd* x) const {
   const Index first = size_ - (late_ + 1) * n_;
   MatrixXd late = c;
   Shift(first, late_, x, &late);
-  // The last place holds what was sent one step earlier.
+  // The last block holds the command of one step earlier.
   auto last = x->bottomRows(n_);
   MatrixXd mixed = (1.0 - fraction_) * late + fraction_ * last;
   last = late;
@@ -128,7 +128,7 @@ SampledSystem CalcSampledSystem(const LinearLoop& loop) {
     if (k == 0) system.C = law.leftCols(size);
     chain.Move(c, &x);
   }
-  // From a delay, a lag or a filter that is not there nothing follows.
+  // Entries of a delay, a lag or a filter that the loop does not have are removed.
   std::vector<Index> kept;
   for (Index i = 0; i < size; ++i)
     if (!x.col(i).isZero(0.0) || !system.C.col(i).isZero(0.0)) kept.push_back(i);
@@ -147,13 +147,13 @@ void StabilityMargins::Narrow(const StabilityMargins& other) {
 
 namespace {
 
-/// L = -1 / factor.
+/// Adds the gain margin at L = -1 / factor.
 void AddGain(double factor, StabilityMargins* margins) {
   if (factor > 1.0) margins->gain = std::min(margins->gain, factor);
   if (factor < 1.0) margins->least_gain = std::max(margins->least_gain, factor);
 }
 
-/// At rest and at half the rate of sampling L is real.
+/// Adds an end of the frequencies, at rest or half the sampling rate, where L is real.
 void AddEnd(Complex L, StabilityMargins* margins) {
   if (L.real() < 0.0 && std::abs(L.imag()) < 1e-6 * std::abs(L)) AddGain(1.0 / std::abs(L), margins);
 }
@@ -163,7 +163,7 @@ void AddEnd(Complex L, StabilityMargins* margins) {
 StabilityMargins FindMargins(const std::vector<double>& w, const std::vector<Complex>& L) {
   StabilityMargins margins;
   for (size_t i = 0; i + 1 < w.size(); ++i) {
-    // From one to the next: by how much log |L| and the angle, measured from -1, change.
+    // Changes of log |L| and of the angle, measured from -1, from one frequency to the next.
     const double size = std::log(std::abs(L[i])), to_size = std::log(std::abs(L[i + 1]));
     const double angle = std::arg(-L[i]), turn = std::arg(L[i + 1] / L[i]);
     if ((size < 0.0) != (to_size < 0.0)) {
@@ -216,7 +216,7 @@ LoopMargins CalcMargins(const SampledSystem& system, bool together) {
   const std::vector<double> w = ListFrequencies(system.period);
   std::vector<std::vector<Complex>> own(static_cast<size_t>(n)), loci(together ? own.size() : 0);
   MatrixXcd shifted;
-  // S, or its diagonal in a diagonal matrix where no more is wanted.
+  // Returns S, or its diagonal in a diagonal matrix where only that is needed.
   const auto evaluate = [&](Complex z) {
     shifted = R;
     shifted.diagonal().array() -= z;
@@ -242,7 +242,7 @@ LoopMargins CalcMargins(const SampledSystem& system, bool together) {
   }
   for (const std::vector<Complex>& L : own) margins.loops.push_back(FindMargins(w, L));
   for (const std::vector<Complex>& L : loci) margins.together.Narrow(FindMargins(w, L));
-  // What stands still: a spring that is too weak to hold what falls.
+  // The static limit counts too: a spring may be too weak to hold a load.
   const MatrixXcd S = evaluate(1.0);
   for (Index i = 0; i < n; ++i) AddEnd(1.0 / S(i, i) - 1.0, &margins.loops[static_cast<size_t>(i)]);
   if (!together) return margins;

@@ -7,8 +7,8 @@
 //   v <- v + h M^-1 (tau - D v - G q),  q <- q + h v
 //
 // (a plant by Runge-Kutta's method: the same to fourth order, q and v together). Rates may be filtered, and
-// all that is measured late. Every m steps, T = m h, the law sends c = -(K q + V v) of what was measured;
-// motors hold it, are late with it and lag behind it. One period is linear in its state and in c,
+// all measurements may be late. Every m steps, T = m h, the law sends c = -(K q + V v) of its measurements;
+// motors hold it, with a delay and a lag. One period is linear in its state and in c,
 //
 //   x <- A x + B c,  c = -C x
 //
@@ -26,12 +26,12 @@
 
 namespace dexcheck {
 
-/// When the law is evaluated, and what is late.
+/// Sampling of the law, with delays.
 struct SampledLoop {
   double time_step = 1e-3;  ///< h, s.
   long hold = 1;            ///< m, steps that torques are held.
-  double delay = 0.0;       ///< Of the torques, s.
-  long latency = 0;         ///< Age of what is measured, steps.
+  double delay = 0.0;       ///< Delay of the torques, s.
+  long latency = 0;         ///< Age of the measurements, steps.
   double low_pass =
       1.0;  ///< Fraction of a rate's change that its filter lets through at each step; 1 for no filter.
   [[nodiscard]] double period() const { return static_cast<double>(hold) * time_step; }
@@ -53,39 +53,38 @@ struct SampledSystem {
 };
 SampledSystem CalcSampledSystem(const LinearLoop& loop);
 
-/// How far a loop is from instability.
+/// Distances of a loop from instability.
 struct StabilityMargins {
   double gain = std::numeric_limits<double>::infinity();   ///< Least factor above 1 that makes it unstable.
-  double least_gain = 0.0;                                 ///< Largest factor below 1 that does.
-  double phase = kPi;                                      ///< Least lag or lead that does, rad.
-  double delay = std::numeric_limits<double>::infinity();  ///< Least delay that does, s.
+  double least_gain = 0.0;                                 ///< Largest factor below 1 that makes it unstable.
+  double phase = kPi;                                      ///< Least lag or lead that makes it unstable, rad.
+  double delay = std::numeric_limits<double>::infinity();  ///< Least delay that makes it unstable, s.
 
-  /// The smaller of each.
+  /// Keeps the smaller of each margin.
   void Narrow(const StabilityMargins& other);
 };
 
-/// Of a stable loop, from its return ratio. @param w ascending, rad/s, close enough that L hardly turns from
-/// one to the next. Between two, log L is linear in log w. @param L at each w.
+/// Returns the margins of a stable loop, from its return ratio. @param w ascending, rad/s, close enough that
+/// L hardly turns from one to the next. Between two, log L is linear in log w. @param L at each w.
 StabilityMargins FindMargins(const std::vector<double>& w, const std::vector<std::complex<double>>& L);
 
 /// Margins of a loop.
 struct LoopMargins {
   double radius = 0.0;                  ///< Largest |eigenvalue| of A - B C.
-  std::vector<StabilityMargins> loops;  ///< Of each torque by itself, the others as they are.
-  StabilityMargins together;            ///< Of all torques by the same factor, angle or delay.
+  std::vector<StabilityMargins> loops;  ///< Margins of each torque by itself, the other loops closed.
+  StabilityMargins together;            ///< Margins of all torques by the same factor, angle or delay.
   [[nodiscard]] bool is_stable() const { return radius < 1.0; }
 };
-/// Without margins where it is not stable. @param together whether those of all torques are wanted, most of
-/// the time that it takes.
+/// Returns the margins; only the radius where the loop is not stable. @param together whether to compute
+/// those of all torques, which takes most of the time.
 LoopMargins CalcMargins(const SampledSystem& system, bool together = true);
 
-/// Margins of a motion of joints, of the loops of all of them, each broken at its torque with the others
-/// closed, in the postures of the start and of the motion's points: the least of each margin, and whose it
-/// is.
+/// Margins of a motion of joints: the least of each margin, and its joint, over all loops, each broken at its
+/// torque with the others closed, in the postures of the start and of the motion's points.
 struct JointMargins {
-  double radius = 0.0;        ///< Largest spectral radius; there are no margins from 1 on.
-  StabilityMargins least;     ///< Of one torque at a time.
-  StabilityMargins together;  ///< Of the same factor, angle or delay at all torques.
+  double radius = 0.0;        ///< Largest spectral radius; from 1 on there are no margins.
+  StabilityMargins least;     ///< Margins of one torque at a time.
+  StabilityMargins together;  ///< Margins of the same factor, angle or delay at all torques.
   std::string gain_joint, phase_joint, delay_joint;
   [[nodiscard]] bool is_stable() const { return radius < 1.0; }
 };

@@ -32,7 +32,7 @@ void StepChecker::Await() {
 }
 
 void StepChecker::AwaitChange(State from) const {
-  // Sleeping and waking takes longer than a step: awake for some of them, but in nobody else's way.
+  // Sleeping and waking takes longer than a step: the thread spins for some of them, and yields its core.
   constexpr int kSpins = 5000, kAlone = 200;
   for (int i = 0; i < kSpins; ++i) {
     if (state_.load(std::memory_order_acquire) != from) return;

@@ -9,28 +9,28 @@
 
 namespace dexcheck {
 
-/// Checks of one step at a time in a thread of their own, on a copy of its record (and of the controller's
-/// model, unless that is at two places by turns), so that the next step can go on.
+/// Makes the checks of one step at a time in a thread of its own, on a copy of its record (and of the
+/// controller's model, unless the controller alternates between two models), so that the next step can go on.
 class StepChecker {
  public:
-  /// @param like a record whose model says what copies look like. @param check makes the checks of a copy.
+  /// @param like a record whose model has the form of the copies. @param check makes the checks of a copy.
   StepChecker(const StepRecord& like, std::function<void(StepRecord*)> check);
   ~StepChecker();
   StepChecker(const StepChecker&) = delete;
   StepChecker& operator=(const StepChecker&) = delete;
 
-  /// Begins with a step. Await comes before the next.
+  /// Begins with a step. Await must come before the next.
   void Start(const StepRecord& step);
-  /// Until the checks are made. @throws what they threw.
+  /// Waits until the checks are made. @throws their exceptions.
   void Await();
   /// Whether Await has not been called since Start.
   [[nodiscard]] bool is_pending() const { return is_pending_; }
-  /// The copy, with what the checks made of it.
+  /// The copy, with the results of the checks.
   [[nodiscard]] const StepRecord& step() const { return step_; }
 
  private:
   enum State : int { kIdle, kWorking, kQuit };
-  /// Until the state is another: a millisecond or so awake, then asleep.
+  /// Waits until the state changes: a millisecond or so awake, then asleep.
   void AwaitChange(State from) const;
   void Set(State state);
   void Run();

@@ -2,9 +2,9 @@
 
 namespace dexcheck {
 
-/// Chooses whether checks have a thread of their own, by which way took less time lately: on a machine that
-/// is busy with other work two threads wait for each other longer than one takes. Steps come in blocks; one
-/// block tries the thread, one goes without it, and those that follow go the faster way.
+/// Chooses whether checks have a thread of their own, by which way was faster lately: on a machine that is
+/// busy with other work two threads wait for each other longer than one takes. Steps come in blocks; one
+/// block tries the thread, one goes without it, and those that follow use the faster way.
 class ThreadChoice {
  public:
   static constexpr long kBlock = 32, kBlocks = 64;

@@ -128,7 +128,7 @@ class Bodies {
     });
   }
 
-  /// Where each link's frame is in the engine's body of it.
+  /// Pose of each link's frame in the engine's body of it.
   void FindLinkFrames() {
     const RobotModel& model = adapter_->model();
     const VectorXd q = VectorXd::Zero(model.num_positions());
@@ -223,7 +223,7 @@ void ApplyMismatch(const MismatchOptions& options, std::uint64_t seed, const std
   if (!options.slope.isZero(0.0)) plant->gravity = TiltGravity(plant->gravity, options.slope);
   std::copy_n(plant->gravity.data(), 3, engine->opt.gravity);
 
-  // What the engine derives from masses. The points of its bonds stay where they are.
+  // The engine derives more from masses. The points of its bonds stay where they are.
   const std::vector<mjtNum> bonds(engine->eq_data, engine->eq_data + mjNEQDATA * engine->neq);
   const MjDataPtr data = MakeData(*engine);
   mj_setConst(engine, data.get());

@@ -1,7 +1,7 @@
 #pragma once
 
-// What a run is: plant, model, grasp, trajectory, controller, checks. Read from a TOML file; the shipped ones
-// are in harness/shipped/scenarios.
+// The description of a run: plant, model, grasp, trajectory, controller, checks. Read from a TOML file; the
+// shipped ones are in harness/shipped/scenarios.
 
 #include <cstdint>
 #include <filesystem>
@@ -32,7 +32,7 @@ enum class Start {
   kRest,    ///< Settled at rest; X_d takes off at t = 0 as its formula says.
 };
 
-/// What simulates robot and object.
+/// The plant that simulates robot and object.
 enum class PlantType {
   kEngine,  ///< MuJoCo.
   kRigid,   ///< The paper's own equations, (46) and (48).
@@ -62,7 +62,7 @@ struct PlantOptions {
   }
 };
 
-/// Where and how the object is held.
+/// Place and manner in which the object is held.
 struct GraspOptions {
   std::vector<std::string> fingertips;  ///< Frames.
   std::vector<SurfacePoint> contacts;   ///< Of the object, one for each fingertip.
@@ -73,7 +73,7 @@ struct GraspOptions {
   std::vector<std::pair<std::string, double>> joints;  ///< Posture, rad; other joints are 0.
 };
 
-/// Where the controller's contact coordinates (39) come from.
+/// Source of the controller's contact coordinates (39).
 enum class ContactSource {
   kExact,       ///< From the geometry of fingertips and object at each step.
   kIntegrated,  ///< From (40), integrated since t = 0.
@@ -129,7 +129,7 @@ struct JointNumbers {
   std::string key;                                      ///< For messages.
 };
 
-/// What a robot with a floating base stands on, and how its body moves there.
+/// The feet on which a robot with a floating base stands, and how its body moves there.
 struct StanceTask {
   struct Point {
     double time = 0.0;                   ///< s.
@@ -234,7 +234,7 @@ struct Scenario {
   }
 };
 
-/// What makes a controller of one's own the scenario's: "PATH=VALUE" each.
+/// Assignments, "PATH=VALUE" each, that make a controller of one's own the scenario's.
 /// @param run, folder as OwnControllerOptions has them.
 std::vector<std::string> NameController(const std::string& run, const std::filesystem::path& folder);
 
@@ -251,7 +251,7 @@ class ScenarioDocument {
   /// @param assignment "PATH=VALUE", as users write it; "model.PATH=VALUE" reaches into the parameter file.
   /// @throws InputError as TomlDocument::Override.
   void Override(const std::string& assignment);
-  /// The same for a number. @throws InputError as Override.
+  /// Override for a number. @throws InputError as Override.
   void Set(const std::string& path, double value);
   /// @throws InputError, one line that names file, line, key and value.
   [[nodiscard]] Scenario Read() const;

@@ -7,7 +7,7 @@
 namespace dexcheck {
 namespace {
 
-/// Of a model's tilted gravity: a robot on wheels holds no steeper floor.
+/// Largest tilt of a model's gravity: a robot on wheels holds no steeper floor.
 constexpr double kLargestSlope = DegToRad(30.0);
 /// A factor drawn from 1 -+ this or less stays positive.
 constexpr double kLargestSpread = 0.99;
@@ -28,7 +28,7 @@ void ReadDelay(TomlTable& table, std::string_view key, double time_step, bool wh
   }
 }
 
-/// Where velocities come from, and what a Kalman filter needs to know besides.
+/// Reads the source of velocities, and what a Kalman filter needs to know besides.
 void ReadSource(TomlTable& table, const char* key, const char* acceleration, VelocitySource* source) {
   ReadChoice<VelocitySource>(table, key,
                              {{"measured", VelocitySource::kMeasured},

@@ -17,7 +17,7 @@
 
 namespace dexcheck {
 
-/// What a number may be.
+/// Range of a number.
 enum class Range { kAny, kNotNegative, kPositive };
 
 /// One key. The type of the member says what the value is: a number, a flag, three numbers, numbers by name,

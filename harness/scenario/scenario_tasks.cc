@@ -178,7 +178,7 @@ void Refuse(const Scenario& scenario, std::initializer_list<std::pair<bool, cons
   }
 }
 
-/// What the task takes from the rest of the scenario. @throws InputError when that does not fit.
+/// Copies what the task takes from the rest of the scenario. @throws InputError when that does not fit.
 void FinishPickTask(const Scenario& scenario, PickTask* task) {
   Refuse(scenario, {{scenario.start != Start::kRest, "start: must be \"rest\" for a task"},
                     {scenario.plant.type != PlantType::kEngine,

@@ -12,14 +12,14 @@
 namespace dexcheck {
 namespace {
 
-/// What the terms of an object are evaluated of where there is none: numbers that nobody reads.
+/// An object in the place of none, so that its terms are numbers that nobody reads.
 const ObjectModel& NoObject() {
   static const ObjectModel none{
       .name = "", .shape = SolidSphere{1.0}, .body = {1.0, Vector3d::Zero(), Matrix3d::Identity()}};
   return none;
 }
 
-/// What holds nothing needs no surface of its own.
+/// A robot that holds nothing needs no surface of its own.
 std::unique_ptr<Surface> MakeObjectSurface(const Scenario& scenario, const RobotModel& model) {
   if (scenario.joint_task() != nullptr) return std::make_unique<Sphere>(1.0);
   try {

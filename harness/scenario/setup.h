@@ -24,25 +24,25 @@ class Setup {
   /// @param robot parameter file. @param mjcf scene.
   /// @throws InputError when a file, a name or a value cannot be used.
   Setup(const Scenario& scenario, const std::filesystem::path& robot, const std::filesystem::path& mjcf);
-  /// The same with the scene compiled already, which is most of the work. @param mjcf names it in messages.
+  /// A setup with the scene compiled already, which is most of the work. @param mjcf names it in messages.
   Setup(const Scenario& scenario, const std::filesystem::path& robot, const std::filesystem::path& mjcf,
         MjModelPtr engine);
-  /// The same with the robot read already. Overrides of its parameters are not applied again.
+  /// A setup with the robot read already, too. Overrides of its parameters are not applied again.
   Setup(const Scenario& scenario, RobotModel model, const std::filesystem::path& mjcf, MjModelPtr engine);
 
-  /// As it was read, but for what its seed varies and its task plans.
+  /// The scenario as it was read, but for what its seed varies and its task plans.
   [[nodiscard]] const Scenario& scenario() const { return scenario_; }
   [[nodiscard]] const RobotPair& robots() const { return robots_; }
   [[nodiscard]] const Hold& hold() const { return hold_; }
   [[nodiscard]] const StartState& start() const { return start_; }
-  /// What the joints of a robot that holds nothing should do; null for other tasks.
+  /// The motion that joints of a robot that holds nothing should follow; null for other tasks.
   [[nodiscard]] const JointPlan* joints() const { return joints_ ? &*joints_ : nullptr; }
   /// Frames that a robot with a floating base stands on; none for others.
   [[nodiscard]] std::span<const int> feet() const {
     return joints_ && joints_->gains.stance ? std::span<const int>(joints_->gains.stance->feet)
                                             : std::span<const int>();
   }
-  /// Of the object; of a robot that holds nothing, any.
+  /// Surface of the object; any of a robot that holds nothing.
   [[nodiscard]] const Surface& surface() const { return *surface_; }
 
   [[nodiscard]] const RobotModel& model() const { return robots_.model; }
@@ -54,16 +54,16 @@ class Setup {
   [[nodiscard]] bool has_object() const { return model().object().has_value(); }
   [[nodiscard]] const ObjectModel& object() const;
 
-  /// What the engine's robot is: model(), but for a mismatch that the scenario declares.
+  /// The engine's robot: model(), but for a mismatch that the scenario declares.
   [[nodiscard]] const RobotModel& declared_model() const {
     return robots_.declared ? robots_.declared->plant : model();
   }
   [[nodiscard]] const ObjectModel& declared_object() const;
-  /// Of declared_model() and engine().
+  /// Maps declared_model() to engine().
   [[nodiscard]] const Adapter& plant_adapter() const {
     return robots_.declared ? robots_.declared->plant_adapter : adapter();
   }
-  /// Of model() and an engine without the mismatch.
+  /// Compares model() with an engine without the mismatch.
   [[nodiscard]] const Adapter& controller_adapter() const {
     return robots_.declared ? robots_.declared->controller_adapter : adapter();
   }
@@ -72,7 +72,7 @@ class Setup {
   [[nodiscard]] std::unique_ptr<Trajectory> MakeTrajectory() const;
   /// For the parts of a loop.
   [[nodiscard]] PartContext MakePartContext() const;
-  /// Of a model of its controller's; of a robot that holds nothing, without X_o.
+  /// A controller's model; of a robot that holds nothing, without X_o.
   [[nodiscard]] GraspModelOptions MakeModelOptions() const;
   /// When its controller is evaluated.
   [[nodiscard]] Sampling MakeSampling() const;

@@ -236,7 +236,7 @@ void MakeBonds(const Scenario& scenario, const Hold& hold, const Surface& surfac
     GetEqualityActive(m)[found] = 1;
     SetStiffness(m.pair_solref[0], scenario.plant.contact_impedance, m.eq_solref + mjNREF * found,
                  m.eq_solimp + mjNIMP * found);
-    // The same point in both bodies.
+    // One point in both bodies.
     const Vector3d on_object = contact.g_o_cf.translation();
     const Vector3d p_B = start->X_Bo * on_object;
     const Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> R(data->xmat + 9 * body);

@@ -14,7 +14,7 @@
 
 namespace dexcheck {
 
-/// What holds the object: nothing, of a robot that follows a motion of its joints.
+/// The fingers that hold the object: none, of a robot that follows a motion of its joints.
 struct Hold {
   std::vector<int> fingertips;   ///< Frames of the grasp.
   std::vector<int> arm_joints;   ///< On the chains to several of them, from the base outward.
@@ -28,7 +28,7 @@ struct StartState {
   Pose X_Bo = Pose::Identity();
   Vector6d X_o = Vector6d::Zero();  ///< On the branch with beta > 0.
 
-  // Of fingertips that hang on the object by ball joints, by fingertip; empty without.
+  // Points of fingertips that hang on the object by ball joints, by fingertip; empty without.
   std::vector<Bond> bonds;
   std::vector<int> bond_constraints;  ///< The engine's that do it.
   std::vector<ContactCoordinates> kappa;
@@ -47,7 +47,7 @@ Hold FindHold(const Scenario& scenario, const RobotModel& model);
 /// scenario then has the varied one. @throws InputError when they do not.
 StartState SolveGrasp(const RobotModel& model, const Surface& surface, const Hold& hold, Scenario* scenario);
 
-/// Where a task begins. The scenario gets the object's random place, `hold` the hand.
+/// The begin of a task. The scenario gets the object's random place, `hold` the hand.
 /// @throws InputError for a name that is none.
 StartState PlacePickTask(const RobotModel& model, const Surface& surface, Hold* hold, Scenario* scenario);
 
@@ -55,11 +55,11 @@ StartState PlacePickTask(const RobotModel& model, const Surface& surface, Hold* 
 void MakeBonds(const Scenario& scenario, const Hold& hold, const Surface& surface, RobotPair* robots,
                StartState* start);
 
-/// Where the fingertip with this pose in the object's frame touches. @param frame of the model.
+/// The point at which the fingertip with this pose in the object's frame touches. @param frame of the model.
 ContactCoordinates FindTipContact(const RobotModel& model, int frame, const Surface& surface,
                                   const Pose& X_of);
 
-/// What the joints of a robot that holds nothing should do.
+/// The motion that joints of a robot that holds nothing should follow.
 struct JointPlan {
   JointMotion motion;
   JointGains gains;

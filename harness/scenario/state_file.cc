@@ -94,7 +94,8 @@ class StateReader {
     return names.empty() ? "" : " (of which each ball joint, " + Abbreviate(names) + ", has";
   }
 
-  /// Of a floating base and of ball joints: any length but zero will do, since they are normalised.
+  /// Quaternions of a floating base and of ball joints may have any length but zero, since they are
+  /// normalised.
   void CheckQuaternions(const RobotModel& model, const VectorXd& q) const {
     const auto check = [&](int first, const std::string& owner) {
       if (q.segment<4>(first).norm() > 0.0) return;

@@ -27,7 +27,7 @@ struct ContactState {
   double friction = 0.0;  ///< mu of (21).
 };
 
-/// What the law (47) to (57) should do at that state.
+/// The aims of the law (47) to (57) at that state.
 struct LawState {
   Vector6d X_d, X_d_dot, X_d_ddot;  ///< Desired motion of the object, m and rad.
   Vector6d K_p, K_v;                ///< 1/s^2, 1/s.
@@ -52,7 +52,7 @@ struct State {
 /// is never ignored.
 State ReadState(const std::string& file, const RobotModel& model);
 
-/// The same for a text; `source` stands for the file in messages.
+/// Reads a text; `source` stands for the file in messages.
 State ParseState(std::string_view text, const std::string& source, const RobotModel& model);
 
 }  // namespace dexcheck

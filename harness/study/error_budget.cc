@@ -19,7 +19,7 @@ namespace {
 constexpr ErrorSize kNoPrediction{std::numeric_limits<double>::quiet_NaN(),
                                   std::numeric_limits<double>::quiet_NaN()};
 
-/// Of one run, by step: of the object's position, or of each joint that follows a motion of its own.
+/// Errors of one run, by step: of the object's position, or of each joint that follows a motion of its own.
 struct Measured {
   Errors errors;
   std::vector<std::vector<double>> predicted;  ///< Values of errors, by source; of the ideal run.
@@ -97,7 +97,7 @@ class SetupMaker {
   MjModelPtr engine_;
 };
 
-/// Of the joints' errors.
+/// Unit of the joints' errors.
 std::string NameUnit(const RobotModel& model) {
   const bool slides = std::ranges::any_of(
       model.joints(), [](const Joint& joint) { return joint.type == JointType::kPrismatic; });
@@ -345,7 +345,7 @@ void ErrorPrediction::Step(const VectorXd& d) {
   errors_.Append(e_);
   e_ddot_ = -(K_v_ * e_dot_.array() + K_p_ * e_.array());
   if (!is_decoupled_) {
-    // What the springs and dampers add to the forces, M^-1 (force + bias - bias).
+    // Springs and dampers add to the forces, M^-1 (force + bias - bias).
     force_ = e_ddot_ + dynamics_.bias();
     e_ddot_ = dynamics_.PredictFree(model_.robot(), force_).xi_dot;
   }

@@ -51,7 +51,7 @@ struct BudgetEntry {
   double interaction = 0.0;
   std::string failure;  ///< Why one of its two runs ended early; empty when none did.
 
-  /// Whether it makes another error in company than alone: more than kInteracts.
+  /// A source interacts where it makes another error in company than alone, by more than kInteracts.
   [[nodiscard]] bool interacts() const { return interaction > kInteracts; }
   static constexpr double kInteracts = 0.1;
 };
@@ -95,16 +95,16 @@ struct Errors {
   }
 };
 
-/// What a plant that is not ideal makes of the tracking error, to first order: along the run of an ideal one
-/// it computes at each step what would be measured, what the law would send then, what the motors would
-/// deliver, and how the rigid system (19), (46), (48) with the plant's own masses and pushes would
+/// Predicts to first order what a plant that is not ideal makes of the tracking error: along the run of an
+/// ideal one it computes at each step what would be measured, what the law would send then, what the motors
+/// would deliver, and how the rigid system (19), (46), (48) with the plant's own masses and pushes would
 /// accelerate. That acceleration less the ideal one, d, drives the error. Of the object's position, with the
 /// gains of (57),
 ///
 ///   e_ddot + K_v e_dot + K_p e = -d,   e = X_d - X_o
 ///
-/// and likewise of the joints that follow a motion of their own, e = q_d - q, by computed torque. The other
-/// laws of joints leave e_ddot = -d - M^-1 (K e + D e_dot).
+/// and in the same way of the joints that follow a motion of their own, e = q_d - q, by computed torque. The
+/// other laws of joints leave e_ddot = -d - M^-1 (K e + D e_dot).
 class ErrorPrediction {
  public:
   /// @param setup of the scenario with its imperfections; outlives this.

@@ -25,7 +25,7 @@ Outcome ParseOutcome(const std::string& name) {
   throw std::invalid_argument("no outcome is called " + Quote(name) + SuggestNearest(name, known));
 }
 
-/// Of trials that were not held, the earlier the larger: from 1 to 2.
+/// Violation of trials that were not held, the earlier the larger: from 1 to 2.
 double CalcEarliness(const TrialResult& result) {
   const double time = result.metrics[kSimulatedTime];
   return 1.0 + 1.0 / (1.0 + (std::isfinite(time) ? std::max(time, 0.0) : 0.0));

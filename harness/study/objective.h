@@ -1,6 +1,6 @@
 #pragma once
 
-// What a study wants: objectives and constraints as expressions of metrics, judged over all trials of a
+// The wishes of a study: objectives and constraints as expressions of metrics, judged over all trials of a
 // point.
 
 #include <span>
@@ -11,7 +11,7 @@
 
 namespace dexcheck {
 
-/// What becomes of an objective's values at the trials of one point, one for each seed.
+/// How one value is made of an objective's values at the trials of one point, one for each seed.
 enum class Aggregate { kMean, kWorst, kQuantile };
 
 /// An expression of metrics that is to be small, or large.
@@ -56,7 +56,7 @@ double EvaluateMetrics(const std::string& expression, const TrialResult& result)
 /// the more the earlier they ended.
 double CalcViolation(const Constraint& constraint, const TrialResult& result);
 
-/// What a point comes to.
+/// The judgement of a point.
 struct Judgement {
   std::vector<double>
       objectives;  ///< To be minimised (of `maximize` with the other sign); infinite where a trial failed.

@@ -35,7 +35,7 @@ std::uint32_t ScrambleDigits(std::uint32_t x, std::uint32_t seed) {
   return ReverseBits(x);
 }
 
-// The standard leaves open what std::shuffle draws.
+// The standard does not say what std::shuffle draws.
 
 /// 0 to size - 1 in random order.
 void ShuffleNumbers(std::vector<size_t>* numbers, std::mt19937_64* random) {

@@ -58,7 +58,7 @@ Estimate CalcProbability(long failures, long trials);
 
 // Which of a study's keys matters for what.
 
-/// What the points of a study with `method = "morris"` show of one quantity.
+/// Effects on one quantity that the points of a study with `method = "morris"` show.
 struct Sensitivity {
   std::string expression;             ///< Of metrics.
   std::vector<MorrisEffect> effects;  ///< By key; empty where no two points of a step have a value.
@@ -68,7 +68,7 @@ struct Sensitivity {
   [[nodiscard]] std::vector<size_t> ListByImportance() const;
 };
 
-/// Of a point's trials the mean is taken.
+/// Analyses the means of the points' trials.
 Sensitivity AnalyseSensitivity(const Study& study, const std::vector<TrialRow>& rows,
                                const std::string& expression);
 

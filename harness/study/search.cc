@@ -7,7 +7,7 @@
 namespace dexcheck {
 namespace {
 
-/// Where a search begins, as `[search] start` says.
+/// The begin of a search, as `[search] start` says.
 UnitPoint FindStart(const Study& study) {
   const std::vector<double>& values = study.search.start_values;
   UnitPoint start(study.variations.size(), 0.5);
@@ -42,10 +42,10 @@ void SearchHistory::AskNext() {
 void SearchHistory::Add(const TrialRow& row) {
   if (row.trial.number < first_of_batch()) return;
   rows_.insert_or_assign(row.trial.number, row);
-  TellWhatIsDone();
+  ObserveWhatIsDone();
 }
 
-void SearchHistory::TellWhatIsDone() {
+void SearchHistory::ObserveWhatIsDone() {
   // A batch that the limit cut short is not judged: the search is over.
   while (!batch_.empty()) {
     std::vector<JudgedPoint> judged;
@@ -73,7 +73,7 @@ void SearchHistory::TellWhatIsDone() {
       batch_.clear();
       return;
     }
-    searcher_->Tell(judgements);
+    searcher_->Observe(judgements);
     AskNext();
   }
 }

@@ -1,7 +1,7 @@
 #pragma once
 
-// Searches with an ask-and-tell interface: which points of the unit cube come next, and what the last ones
-// came to.
+// Searches that are asked for points and observe results: which points of the unit cube come next, and what
+// the last ones came to.
 
 #include <map>
 #include <memory>
@@ -25,8 +25,8 @@ class Searcher {
 
   /// The points of the next batch, to be tried in any order; none when the search is over.
   [[nodiscard]] virtual std::vector<UnitPoint> Ask() = 0;
-  /// What the points of the last batch came to, in its order.
-  virtual void Tell(const std::vector<Judgement>& judgements) = 0;
+  /// Takes in the judgements of the last batch's points, in its order.
+  virtual void Observe(const std::vector<Judgement>& judgements) = 0;
 };
 
 /// The search of these settings.
@@ -67,7 +67,7 @@ class SearchHistory {
 
  private:
   void AskNext();
-  void TellWhatIsDone();
+  void ObserveWhatIsDone();
 
   Study study_;
   std::unique_ptr<Searcher> searcher_;

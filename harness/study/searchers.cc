@@ -38,7 +38,7 @@ double CalcPenalised(const Judgement& judgement) {
 /// All points of a generation are known.
 struct GenerationIsNamed {};
 
-/// What a generation's evaluations are made of.
+/// Evaluations of a generation.
 struct Generation {
   size_t size = 0;
   std::vector<UnitPoint> points;            ///< Named so far.
@@ -91,7 +91,7 @@ class CmaEsSearcher : public Searcher {
     return queried;
   }
 
-  void Tell(const std::vector<Judgement>& judgements) override {
+  void Observe(const std::vector<Judgement>& judgements) override {
     std::vector<std::vector<double>> values;
     for (const Judgement& judgement : judgements) values.push_back({CalcPenalised(judgement)});
     if (population_.size() == 0) {
@@ -119,7 +119,7 @@ struct Descent {
   std::vector<double> values;  ///< Of the points that were tried.
 };
 
-/// What one call of NLopt's function needs.
+/// State of one call of NLopt's function.
 struct Replay {
   const Descent* descent;
   size_t next = 0;
@@ -155,7 +155,7 @@ class NelderMeadSearcher : public Searcher {
     return points;
   }
 
-  void Tell(const std::vector<Judgement>& judgements) override {
+  void Observe(const std::vector<Judgement>& judgements) override {
     for (size_t i = 0; i < judgements.size(); ++i) {
       Descent& descent = *queried_[i];
       descent.values.push_back(FindValue(descent, judgements[i]));

@@ -1,6 +1,6 @@
 #pragma once
 
-// What a study is: a scenario, the keys that are varied, and the list of trials that follows from both.
+// A study: a scenario, the keys that are varied, and the list of trials that follows from both.
 
 #include <cstdint>
 #include <string>
@@ -14,7 +14,7 @@ namespace dexcheck {
 struct Variation {
   std::string key;             ///< As --set takes it.
   std::vector<double> values;  ///< Of a grid; empty in sampled studies.
-  /// Of a key whose values are texts: values and parameters are then their numbers, from 0. Empty for
+  /// Texts of a key whose values are texts; values and parameters are then their numbers, from 0. Empty for
   /// numbers.
   std::vector<std::string> labels;
   double from = 0.0;  ///< Ends of the range.
@@ -112,7 +112,7 @@ std::vector<double> ValuesAt(const std::vector<Variation>& variations, const std
 /// A value of the key as --set takes it.
 std::string FormatValue(const Variation& variation, double value);
 
-/// What makes the study's scenario into this trial: "PATH=VALUE" each.
+/// Assignments, "PATH=VALUE" each, that make the study's scenario this trial.
 std::vector<std::string> ListOverrides(const Study& study, const Trial& trial);
 
 }  // namespace dexcheck

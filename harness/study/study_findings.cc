@@ -32,7 +32,7 @@ std::string DescribeValues(const Study& study, const std::vector<double>& values
   return text;
 }
 
-/// Of a point that is the best: which of its keys would go on past their ranges.
+/// Names those keys of the best point that would go on past their ranges.
 std::string DescribeEdges(const Study& study, const std::vector<double>& values) {
   constexpr double kAtEnd = 1e-3;  // of the range
   std::string text;
@@ -96,7 +96,7 @@ std::string ShowSpread(std::vector<double> values) {
   return fmt::format("{:.3g} ({:.3g} to {:.3g})", median, values.front(), values.back());
 }
 
-/// Of a study that compares what has no order, laws for example, each in several trials: what came of each.
+/// Outcome for each value of a key without an order, of laws for example, each in several trials.
 std::vector<std::string> DescribeSpreads(const Study& study, const std::vector<TrialRow>& rows) {
   std::vector<std::string> findings;
   if (study.is_search() || study.variations.size() != 1 || CountTrialsOfPoint(study) < 2) return findings;
@@ -123,7 +123,7 @@ std::vector<std::string> DescribeSpreads(const Study& study, const std::vector<T
   return findings;
 }
 
-/// Of a sample with constraints: how probable a failure is.
+/// Probability of a failure in a sample with constraints.
 std::string DescribeFailures(const Study& study, const std::vector<TrialRow>& rows) {
   long failures = 0;
   for (const TrialRow& row : rows) {
@@ -139,8 +139,8 @@ std::string DescribeFailures(const Study& study, const std::vector<TrialRow>& ro
           : "; it holds for a random sample, a more even one scatters less");
 }
 
-/// What keeps points that would be better than `best`, or came to no end, from being feasible: by how many
-/// trials.
+/// Names what keeps points that would be better than `best`, or came to no end, from being feasible, by how
+/// many trials.
 std::string DescribeLimits(const Study& study, const std::vector<TrialRow>& rows,
                            const std::vector<JudgedPoint>& points, double best) {
   std::map<std::string, int> limits;

@@ -1,6 +1,6 @@
 #pragma once
 
-// What a study finds, in sentences.
+// Findings of a study, in sentences.
 
 #include <functional>
 #include <nlohmann/json.hpp>
@@ -18,32 +18,32 @@ namespace dexcheck {
 /// A point's objective as the user wrote it: of `maximize` with its own sign again.
 double ShowObjective(const Study& study, const JudgedPoint& point, size_t objective = 0);
 
-/// What the trials say to the study's question, one sentence each; empty for a study without one.
+/// Answers of the trials to the study's question, one sentence each; empty for a study without one.
 /// @param rows of all trials that are done.
 std::vector<std::string> ListFindings(const Study& study, const std::vector<TrialRow>& rows);
 
-/// Of a study of a motion of joints with one objective: TOML that may take the place of the scenario's
-/// [control], with the best point's gains; your gains, the metrics and what keeps other points from being
-/// better as comments. Empty of another study, and where no point is feasible.
+/// The best gains of a study of a motion of joints with one objective: TOML that may take the place of the
+/// scenario's [control], with the best point's gains; your gains, the metrics and what keeps other points
+/// from being better as comments. Empty of another study, and where no point is feasible.
 std::string MakeGainCard(const StudyInputs& inputs, const std::vector<TrialRow>& rows);
 
 /// Lines: how far a study has come, its outcomes, and what is found so far.
 std::string DescribeProgress(const StudyStore& store);
 
-// What a study looks like elsewhere: what came of it as data, its pages, and its rows for other programs.
+// A study for others: its results as data, its pages, and its rows for other programs.
 
 /// Most trials whose numbers are in a page; of more the trials of points that a hash draws, and the best.
 constexpr size_t kMostShown = 20000;
 
 struct StudySummary {
-  /// What the study is, how far it has come, outcomes, findings, the best points and sensitivities. Its keys
+  /// The study, how far it has come, outcomes, findings, the best points and sensitivities. Its keys
   /// are in the README.
   nlohmann::ordered_json json;
   /// Doubles, row by row, of the trials that are shown: the numbers of json["columns"].
   std::string values;
 };
 
-/// Of all trials that are done.
+/// Summarises all trials that are done.
 StudySummary SummariseStudy(const StudyStore& store);
 
 /// One HTML page that loads nothing else: what the study finds, outcomes and metrics over the varied keys,

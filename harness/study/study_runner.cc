@@ -59,7 +59,7 @@ class TrialMaker {
   using Clock = std::chrono::steady_clock;
   static constexpr std::chrono::milliseconds kTogether{200};
 
-  /// As many as end in kTogether, by what is known of it, and one for each job.
+  /// Number of trials that end in kTogether, by what is known of it, and one for each job.
   void ClaimSome() {
     if (pool_.IsFull() || !claimed_.empty() || waiting_.empty()) return;
     std::map<long, Trial> some;
@@ -74,7 +74,7 @@ class TrialMaker {
   }
 
   void Take(EndedTrial* ended) {
-    if (ended->killed_from_outside && !Bury(ended)) return;
+    if (ended->killed_from_outside && !GiveUp(ended)) return;
     ended->row.machine = machine_;
     rows_.push_back(std::move(ended->row));
   }
@@ -90,7 +90,7 @@ class TrialMaker {
 
   /// Whether a trial whose process was killed from outside is given up. With all others when it is this
   /// program that is ended; else it is tried once more, when others are done.
-  bool Bury(EndedTrial* ended) {
+  bool GiveUp(EndedTrial* ended) {
     const Trial& trial = ended->row.trial;
     const bool again = ++tries_[trial.number] < kMostTries;
     if (again || options_.is_interrupted()) store_->Release({trial.number});

@@ -95,7 +95,7 @@ void StudyStore::Create(const StudyIdentity& identity, const Study& study) {
   for (size_t i = 0; i < identity.size(); ++i) insert.bind(static_cast<int>(i) + 1, identity[i].second);
   insert.exec();
   database_->exec("CREATE TABLE trials (" + JoinColumns(study, "{} {}") + ")");
-  // Of trials that are running: who has them.
+  // A trial that is running belongs to a process.
   database_->exec("CREATE TABLE claims (trial INTEGER PRIMARY KEY, process TEXT NOT NULL)");
   transaction.commit();
 }
@@ -246,7 +246,7 @@ TrialRow StudyStore::ReadRow(const SQLite::Statement& select, bool with_machine)
     const SQLite::Column value = select.getColumn(column);
     if (!is_number(value)) reject(variation.key, "must be a number");
     row.trial.parameters.push_back(value);
-    // Of a key of texts the number of one of them.
+    // A key of texts has the number of one of them.
     const auto count = static_cast<double>(variation.labels.size());
     const double number = row.trial.parameters.back();
     if (count > 0.0 && !(number >= 0.0 && number < count && number == std::floor(number)))

@@ -72,10 +72,11 @@ bool IsRunningHere(const std::string& process);
 // A study's database: table `study` says what the study is, table `trials` has a row for each finished trial.
 // Each row is one transaction, so that the file is whole whenever a process is killed.
 
-/// What a study is, column by column. Rows of studies that differ in any of them do not belong together.
+/// The identity of a study, column by column. Rows of studies that differ in any of them do not belong
+/// together.
 using StudyIdentity = std::vector<std::pair<std::string, std::string>>;
 
-/// Of a database's tables.
+/// Version of a database's tables.
 inline constexpr const char* kStudyLayout = "2";
 
 /// @throws InputError when a file cannot be read.
@@ -128,7 +129,7 @@ class StudyStore {
   [[nodiscard]] const std::string& name() const { return database_->getFilename(); }
   [[nodiscard]] const StudyIdentity& identity() const { return identity_; }
   [[nodiscard]] const std::string& Identify(const std::string& column) const;
-  /// As the file has it.
+  /// The study as the file has it.
   [[nodiscard]] const Study& study() const { return study_; }
   /// Throws InputError that names the first column, or key of the study, in which this study is another one.
   void RequireSame(const StudyIdentity& other) const;
@@ -177,7 +178,7 @@ class StudyStore {
 
   std::unique_ptr<SqliteFile> database_;
   std::unique_ptr<SQLite::Statement> insert_;        // prepared once
-  mutable std::unique_ptr<SQLite::Statement> find_;  // likewise
+  mutable std::unique_ptr<SQLite::Statement> find_;  // prepared once, too
   StudyIdentity identity_;
   Study study_;
   std::string change_;

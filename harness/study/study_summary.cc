@@ -36,6 +36,10 @@ class Summary {
     for (const TrialRow& row : rows_) {
       if (row.result.outcome == Outcome::kTracked) tracked_.push_back(&row);
     }
+    for (int i = 0; i < kNumMetrics; ++i) {
+      const auto metric = static_cast<Metric>(i);
+      if (IsNeeded(metric)) columns_.push_back(metric);
+    }
     std::ranges::stable_sort(tracked_, [&](const TrialRow* a, const TrialRow* b) {
       return a->result.metrics[error_] < b->result.metrics[error_];
     });
@@ -81,13 +85,20 @@ class Summary {
       add(static_cast<double>(row->trial.seed));
       add(static_cast<double>(row->result.outcome));
       for (const double parameter : row->trial.parameters) add(parameter);
-      for (const double metric : row->result.metrics) add(metric);
+      for (const Metric metric : columns_) add(row->result.metrics[metric]);
     }
     return bytes;
   }
 
  private:
   [[nodiscard]] bool of_joints() const { return error_ == kJointErrorRms; }
+
+  /// Whether the page has a column for a metric: it shows the metric, or a trial has a value of it.
+  [[nodiscard]] bool IsNeeded(Metric metric) const {
+    return metric == error_ || metric == kEnergy || std::ranges::find(metrics_, metric) != metrics_.end() ||
+           std::ranges::any_of(
+               rows_, [&](const TrialRow& row) { return std::isfinite(row.result.metrics[metric]); });
+  }
 
   [[nodiscard]] Json ListOutcomes() const {
     std::array<long, kOutcomes.size()> counts{};
@@ -124,8 +135,8 @@ class Summary {
     best_.push_back(&row);
   }
 
-  /// Of a study that says what it wants: points that fulfil the constraints, by the objective; of several
-  /// objectives those that no other point beats in all.
+  /// Fills in for a study that says what it wants the points that fulfil the constraints, by the objective;
+  /// of several objectives those that no other point beats in all.
   void FillByObjectives(Json* best) {
     const std::vector<JudgedPoint> points = JudgePoints(study_, rows_);
     const bool is_one = study_.objectives.size() == 1;
@@ -153,7 +164,7 @@ class Summary {
     }
   }
 
-  /// Of any other: trials by their error.
+  /// Fills in for any other study the trials by their error.
   void FillByError(Json* best) {
     if (tracked_.empty()) return;
     std::vector<const TrialRow*> admitted = tracked_;
@@ -249,8 +260,7 @@ class Summary {
       if (!variation.labels.empty()) column["labels"] = variation.labels;
       columns.push_back(column);
     }
-    for (int i = 0; i < kNumMetrics; ++i) {
-      const auto metric = static_cast<Metric>(i);
+    for (const Metric metric : columns_) {
       columns.push_back({{"name", kMetrics[metric].name}, {"label", LabelOf(metric)}});
       if (kMetrics[metric].is_better_large) columns.back()["larger_is_better"] = true;
     }
@@ -284,6 +294,7 @@ class Summary {
   std::vector<TrialRow> rows_;
   Metric error_;                          // that says how good the trials are
   std::vector<Metric> metrics_;           // to be shown
+  std::vector<Metric> columns_;           // that the page has of each trial
   std::vector<const TrialRow*> tracked_;  // least error first
   std::vector<const TrialRow*> shown_;    // by number
   std::vector<const TrialRow*> best_;     // in the table of the best

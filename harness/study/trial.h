@@ -23,10 +23,11 @@ struct StudyInputs {
   std::filesystem::path scenario_folder;
   std::filesystem::path robot;
   std::filesystem::path mjcf;
-  /// What makes the study's controller, if it names one, the scenario's: as NameController has it.
+  /// Assignments that make the study's controller, if it names one, the scenario's: as NameController has
+  /// them.
   std::vector<std::string> controller;
   std::string controller_hash;  ///< As HashController has it; set by CheckTrials.
-  // What all trials have, made once by CheckTrials; without it each trial makes its own.
+  // Parts that all trials have, made once by CheckTrials; without it each trial makes its own.
   std::shared_ptr<const mjModel> engine;                      ///< The MJCF compiled.
   std::shared_ptr<const ScenarioDocument> scenario_document;  ///< With the study's overrides.
   std::shared_ptr<const RobotModel> model;  ///< Of the trials whose scenarios have these overrides.
@@ -58,7 +59,7 @@ class TrialMonitor {
   /// Takes in a step.
   void Record(const StepRecord& step);
 
-  /// Of the last step: of the object's position, m, or of a motion of joints the largest, rad or m.
+  /// Error of the last step: of the object's position, m, or of a motion of joints the largest, rad or m.
   [[nodiscard]] double error() const { return error_; }
 
   /// All metrics of the steps so far, those of `tracking` included.

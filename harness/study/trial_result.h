@@ -1,6 +1,6 @@
 #pragma once
 
-// What a trial comes to.
+// The result of a trial.
 
 #include <array>
 #include <cstddef>

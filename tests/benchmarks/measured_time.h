@@ -10,7 +10,7 @@ namespace dexcheck {
 
 struct MeasuredTime {
   double wall = 0.0;       ///< s
-  double processor = 0.0;  ///< Of this process and of its children that have ended, s.
+  double processor = 0.0;  ///< Time of this process and of its children that have ended, s.
 };
 
 inline double ProcessorSeconds() {

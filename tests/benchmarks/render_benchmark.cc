@@ -1,6 +1,6 @@
-// What a video costs beyond MuJoCo's own drawing: the same frames drawn by mjr_render and mjr_readPixels
-// alone, and as a video with panel and encoding. Both with two processes. Processor time, because the wall
-// clock also counts others' work.
+// Measures the cost of a video beyond MuJoCo's own drawing: the same frames drawn by mjr_render and
+// mjr_readPixels alone, and as a video with panel and encoding. Both use two processes. The benchmark counts
+// processor time, because the wall clock also counts other programs' work.
 //
 // render_benchmark [FRAMES]
 

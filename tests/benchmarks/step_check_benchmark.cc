@@ -121,7 +121,7 @@ void FollowClearance(benchmark::State& state) {
 }
 BENCHMARK(FollowClearance)->Unit(benchmark::kMicrosecond);
 
-/// The same along a shipped scenario.
+/// Follows the clearance along a shipped scenario.
 void FollowClearanceOf(benchmark::State& state, const std::string& scenario, const std::string& duration) {
   const testing::ShippedRun shipped(scenario, {"duration=" + duration});
   const Setup& setup = shipped.setup();

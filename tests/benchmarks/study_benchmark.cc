@@ -1,11 +1,11 @@
-// What a study's trial costs beyond its closed loop: the same run as a bare loop in this process, its models
-// loaded before, and as a trial with all that belongs to it: process, models, metrics, database. In turns, so
-// that others' work falls on both alike. Then how much faster two at a time are than one after the other.
+// Measures the cost of a study's trial beyond its closed loop: the same run as a bare loop in this process,
+// its models loaded before, and as a trial with process, models, metrics and database. Both are run in turns,
+// so that other programs' work affects both. Then it compares two trials at a time with one after the other.
 //
 // study_benchmark [REPETITIONS]
 //
-// With rows, what many of them cost: the page, a merge of four parts, and a resumption with nothing to do,
-// each by the program itself; wall time, processor time and most memory.
+// With rows, it measures the cost of many rows: the page, a merge of four parts, and a resumption with
+// nothing to do, each by the program itself; wall time, processor time and largest memory.
 //
 // study_benchmark rows N DEXCHECK
 
@@ -176,7 +176,7 @@ void MeasureRows(long count, const std::string& program) {
              1e-6 * static_cast<double>(std::filesystem::file_size(file("all.sqlite"))));
   Time("resume with nothing to do",
        {program, "study", "run", file("study.toml"), "--db", file("all.sqlite"), "--quiet"});
-  Time("page", {program, "study", "report", file("all.sqlite"), "--out", file("page.html")});
+  Time("page", {program, "study", "report", file("all.sqlite"), "--page", file("page.html")});
   fmt::print("  page of {:.1f} MB\n",
              1e-6 * static_cast<double>(std::filesystem::file_size(file("page.html"))));
 }

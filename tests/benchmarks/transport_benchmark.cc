@@ -1,6 +1,6 @@
-// What a controller of one's own costs a step beyond its law: a step of each kind, less the model that is
-// evaluated in it. The laws are those of harness/examples, or do nothing, so that what is left is what
-// they compute and the way there and back.
+// Measures the cost of a step of a user's own controller beyond its law: a step of each kind, less the model
+// that is evaluated in it. The laws are those of harness/examples, or do nothing, so that the rest is their
+// computation and the transport.
 
 #include <fmt/format.h>
 

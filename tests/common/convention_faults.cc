@@ -245,7 +245,7 @@ void AddCentres(Faults* list) {
 void AddMasses(Faults* list) {
   const struct {
     Unit unit;
-    const char* inertia;  ///< What the inertia looks like when it has the same factor.
+    const char* inertia;  ///< The text of the inertia when it has the same factor.
   } units[] = {{{1e3, "as if in g", "g"}, "g_m2"},
                {{1.0 / 0.45359237, "as if in lb", "lb"}, "lb_m2"},
                {{1e-3, "divided by 1000", "per_1000"}, "per_1000"},

@@ -20,7 +20,7 @@ struct StatedLink {
   Matrix3d R_LC = Matrix3d::Identity();     ///< Axes along which the file gives the inertia.
   Vector3d axis = Vector3d::UnitZ();        ///< In the link's own frame.
   std::optional<Pose> X_LD = std::nullopt;  ///< The next joint's frame, where there is one.
-  double lower = 0.0;                       ///< Of the range, rad.
+  double lower = 0.0;                       ///< Lower end of the range, rad.
   double upper = 0.0;
   double damping = 0.0;
   double armature = 0.0;
@@ -30,7 +30,7 @@ struct StatedLink {
 enum class FaultOf { kBody, kJoint, kConstant };
 
 struct ConventionFault {
-  std::string name;  ///< What is wrong, and how: "inertia halved".
+  std::string name;  ///< Name of the fault: "inertia halved".
   std::string text;  ///< The words that must name it.
   std::function<void(StatedLink*)> make;
   FaultOf of = FaultOf::kBody;

@@ -11,12 +11,12 @@ namespace dexcheck::testing {
 struct LeggedLink {
   std::string name;
   std::string parent;  ///< Empty for the one that floats.
-  std::string xyz;     ///< Where the joint stands in the parent's frame, m.
-  std::string rpy;     ///< And how it is turned, rad.
+  std::string xyz;     ///< Position of the joint in the parent's frame, m.
+  std::string rpy;     ///< Its rotation, rad.
   std::string axis;
   double mass;  ///< kg
   std::string com;
-  std::string com_rpy;    ///< Of the principal axes.
+  std::string com_rpy;    ///< Rotation of the principal axes.
   std::string moments;    ///< Principal, kg m^2.
   bool has_joint = true;  ///< Otherwise it is welded to the parent.
 };

@@ -22,7 +22,7 @@ struct ProgramResult {
 };
 
 struct ProgramOptions {
-  std::filesystem::path folder;                                       ///< Where it runs; here unless given.
+  std::filesystem::path folder;  ///< Working folder; this process's unless given.
   std::vector<std::pair<std::string, std::string>> environment = {};  ///< Added to this process's.
   std::optional<rlim_t> largest_file = {};  ///< Bytes; more in one file is SIGXFSZ, as after `ulimit -f`.
   std::optional<std::filesystem::path> out = {};  ///< Standard output goes into this file instead.

@@ -18,7 +18,7 @@ namespace dexcheck::testing {
 struct UrdfPart {
   std::string link;
   std::string joint;       ///< Empty for the root.
-  int parent = -1;         ///< Of the list; -1 for the root.
+  int parent = -1;         ///< Index in the list; -1 for the root.
   bool moves = false;      ///< Otherwise it is welded to its parent, or the root.
   bool slides = false;     ///< Its zero is a place, no angle.
   bool has_body = false;   ///< States an inertial.

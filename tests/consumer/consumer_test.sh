@@ -31,7 +31,7 @@ CXX=clang++ CC=clang "$cmake" -S "$here" -B "$scratch/build" -G Ninja -DCMAKE_PR
 "$scratch/build/print_terms" "$robot" >"$scratch/terms.txt"
 awk 'NR == 1 { gsub(/ +/, ","); sub(/^,/, ""); print "{\"q\":[" $0 "],\"xi\":[1,1,1,1,1,1,1]}" }' \
   "$scratch/terms.txt" >"$scratch/state.json"
-"$scratch/prefix/bin/dexcheck" eval --robot "$robot" --state "$scratch/state.json" --out "$scratch/eval.json"
+"$scratch/prefix/bin/dexcheck" eval "$robot" --state "$scratch/state.json" --out "$scratch/eval.json"
 paste <(tail -n +2 "$scratch/terms.txt" | tr -s ' ' '\n' | grep .) \
   <(awk '/"M_bar"|"C_bar"/ { inside = 1 } /^ ]/ { inside = 0 } inside' "$scratch/eval.json" | grep -oE '^ +-?[0-9][^,]*' |
     tr -d ' ') >"$scratch/both.txt"

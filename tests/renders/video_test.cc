@@ -146,7 +146,7 @@ TEST_F(VideoTest, TheCourseCameraStandsStill) {
 
 TEST_F(VideoTest, VideoDoesNotDependOnTheNumberOfProcesses) {
   VideoOptions options = MakeOptions();
-  options.forces = options.tracks = true;
+  options.forces = true;
   options.inset = "grasp";
   options.workers = 1;
   ASSERT_TRUE(Video(folder_.path() / "one.mp4", view_, options));
@@ -166,7 +166,7 @@ TEST_F(VideoTest, FramesAreTheStillsOfTheirTimes) {
 TEST_F(VideoTest, LostContactsAreNotDrawn) {
   VideoOptions options = MakeOptions(/*panel=*/false);
   options.camera = "grasp";
-  options.forces = options.tracks = true;
+  options.forces = true;
   const Image all = Paint(options, 0.5);
   run_.contact_positions.block(20, 0, 31, 3).setConstant(std::numeric_limits<double>::quiet_NaN());
   const Image fewer = Paint(options, 0.5);
@@ -200,7 +200,7 @@ TEST_F(VideoTest, BadInputIsRefusedAndLeavesNothing) {
   EXPECT_TRUE(Throws<InputError>(video(options), "camera: no \"sideways\""));
   run_.object_body = "teapot";
   options = MakeOptions();
-  options.tracks = true;
+  options.camera = kObjectCamera;
   EXPECT_TRUE(Throws<InputError>(video(options), "kinematic run: object: no body \"teapot\" in the model"));
   run_.times.clear();
   EXPECT_TRUE(

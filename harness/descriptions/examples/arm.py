@@ -5,7 +5,7 @@
 
 or, without a running program, over files:
 
-    dexcheck eval --robot arm.urdf --states 1000 --out states
+    dexcheck eval arm.urdf --states 1000 --out states
     python3 arm.py states
     dexcheck consistency arm.urdf --results states
 """

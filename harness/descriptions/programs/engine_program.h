@@ -38,7 +38,7 @@ std::vector<UrdfBody> ReadUrdfTree(const std::string& path);
 
 // A physics engine as a program of the protocol in harness/descriptions/README.md: ENGINE ROBOT.urdf
 
-/// What the first request says of the robot, beside its file.
+/// Facts about the robot in the first request, beside its file.
 struct RobotFacts {
   bool floats = false;
   Eigen::Vector3d gravity = Eigen::Vector3d::Zero();  ///< m/s^2, world axes.

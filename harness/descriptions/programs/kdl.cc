@@ -42,7 +42,7 @@ class KdlRobot : public EngineRobot {
         throw std::runtime_error("KDL does not take link " + bodies[i].name);
       }
     }
-    // Where KDL has each joint.
+    // Places of the joints in KDL's order.
     for (size_t i = 1; i < bodies.size(); ++i)
       places_.push_back(
           static_cast<Eigen::Index>(GetTreeElementQNr(tree_.getSegment(bodies[i].name)->second)));

@@ -66,7 +66,7 @@ class SimbodyRobot : public EngineRobot {
  private:
   void Add(const UrdfBody& body, bool floats) {
     if (body.motion == Motion::kRoot) {
-      // What stands still needs no mass.
+      // A body that stands still needs no mass.
       SimTK::MobilizedBody& ground = matter_.updGround();
       mobilized_.push_back(
           floats ? SimTK::MobilizedBody(SimTK::MobilizedBody::Free(ground, MakeBody(body)))

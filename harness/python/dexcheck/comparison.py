@@ -66,8 +66,8 @@ def compare(robot, other, samples, seed, digits, ignore):
         return Comparison(name, Path(other).name, _execute(words, robot))
     with tempfile.TemporaryDirectory() as folder:
         folder = os.path.join(folder, "results")
-        execute(["eval", "--robot", robot.path, "--states", samples, "--seed", seed, "--out", folder,
-                 *(["--floating"] if robot.floating else [])])
+        execute(["eval", robot.path, "--states", samples, "--seed", seed, "--out", folder,
+                 *(["--floating"] if robot.floating else []), *_package_words(robot)])
         _save_terms(robot, other, folder)
         called = "functions" if isinstance(other, dict) else type(other).__name__
         return Comparison(name, called, _execute([*words, "--results", folder], robot))

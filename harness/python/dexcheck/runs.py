@@ -4,6 +4,7 @@ import csv
 import io
 import json
 import os
+import re
 import tempfile
 from pathlib import Path
 
@@ -92,6 +93,8 @@ def study(study, controller=None, *, vary=None, set=None, db=None, jobs=None):
         words = ["study", "run", study, "--db", database] + ([] if jobs is None else ["--jobs", jobs])
         _, findings = execute(words, controller, apart=True)
         _, text = execute(["study", "export", database, "--out", "-"])
+        if not db:  # it is gone at the end
+            findings = re.sub(r"\s+in\s+" + re.escape(database), "", findings)
         return Study(text, findings.strip())
 
 

@@ -26,6 +26,15 @@ const MakeCharts = () => {
     return `rgb(${mix(255, 65, 8)},${mix(255, 182, 29)},${mix(204, 196, 88)})`;
   };
 
+  // Ends of an axis for these numbers; none where all are one.
+  const EndsOf = (numbers, log) => {
+    const finite = numbers.filter(x => Number.isFinite(x) && (!log || x > 0));
+    const least = finite.reduce((a, b) => Math.min(a, b), Infinity), most = finite.reduce((a, b) => Math.max(a, b), -Infinity);
+    if (!(most > least)) return [];
+    const room = 0.04 * (log ? Math.log(most / least) : most - least);
+    return log ? [least * Math.exp(-room), most * Math.exp(room)] : [least >= 0 ? Math.max(least - room, 0) : least - room, most + room];
+  };
+
   // An axis: {label, labels (texts of 0, 1, ..), log}.
   const MakeAxis = (axis, least, most) => {
     const scale = {title: {display: true, text: axis.label}, ticks: {maxRotation: 50}};
@@ -73,7 +82,7 @@ const MakeCharts = () => {
       {label: 'trials', data: points, order: 2, backgroundColor: points.map(p => p.color), pointRadius: points.length > 3000 ? 1.5 : 3.5}]},
     options: {onClick: Choose(choose), plugins: {legend: {...Legend(lines.length > 0),
       labels: {boxWidth: 14, filter: item => lines.some(line => line.label === item.text)}}, tooltip: Tip(describe)},
-      scales: {x: MakeAxis(x), y: MakeAxis(y)}}
+      scales: {x: MakeAxis(x, ...EndsOf(points.map(p => p.x), x.log)), y: MakeAxis(y, ...EndsOf(points.map(p => p.y), y.log))}}
   });
 
   // Cells {x: [from, to], y: [from, to], row, color}.

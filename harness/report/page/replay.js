@@ -474,12 +474,7 @@
   if (scene3d.cameras.length > 0) {
     look(scene3d.cameras[0]);
   } else {
-    const middle = new THREE.Vector3();
-    for (let part = 1; part < scene3d.parts; ++part) middle.addScaledVector(bones[part].position, 1 / Math.max(moving, 1));
-    const far = Math.max(...bones.slice(1).map(bone => bone.position.distanceTo(middle)), 0.3);
-    controls.target.copy(middle);
-    camera.position.set(2.4, -1.8, 1.1).multiplyScalar(far).add(middle);
-    followed = bones[followedPart].position.clone();
+    camera.position.set(2.4, -1.8, 1.1);
   }
   showTime(clock.time);
   box.replay = {THREE, scene, camera, controls, renderer, bones, groups, draw, resize, look: k => look(scene3d.cameras[k])};

@@ -99,8 +99,8 @@ INSTANTIATE_TEST_SUITE_P(
         {"MissingKey", "friction = 0.8", "", R"(object: missing key "friction")", "[object]"},
         {"MissingAngle", kWaistRow, R"(link = "waist", a = 0, q_deg = 0,)",
          R"(chain[0].rows[0]: missing key "alpha_deg")"},
-        {"MissingArmature", kElbow, "elbow = { range = [-0.1, 2.5], damping = 0.2 }",
-         R"(template.arm.joints.elbow: missing key "armature")"},
+        {"MissingRange", kElbow, "elbow = { damping = 0.2 }",
+         R"(template.arm.joints.elbow: missing key "range")"},
         {"MissingInertia", "carpus    = { shapes = " + kCarpus, "carpus = { mass = 0.25, com = [0, 0, 0]",
          R"(template.arm.links.carpus: missing key "inertia")"},
         {"MissingAtTheTop", "gravity = [0.0, 0.0, -9.81]", "", R"(missing key "gravity")", "#"},
@@ -325,7 +325,7 @@ TEST(ParameterTexts, AllMissingKeysAreReportedAtOnce) {
       FillInLines(R"(robot.toml:1: missing key "gravity"; line {alpha_dge}: chain[0].rows[0].alpha_dge: )"
                   R"(unknown key, did you mean "alpha_deg"?; line {alpha_dge}: chain[0].rows[0]: )"
                   R"(missing key "q_deg"; line {elbow = {}: template.arm.joints.elbow: missing key )"
-                  R"("range", "armature"; line {[object]}: object: missing key "friction")",
+                  R"("range"; line {[object]}: object: missing key "friction")",
                   text));
 }
 

@@ -67,7 +67,7 @@ INSTANTIATE_TEST_SUITE_P(
                        ::testing::Values("angles", "rotation")),
     [](const auto& info) { return std::string(std::get<0>(info.param)) + "_" + std::get<1>(info.param); });
 
-// What knows the motion follows the moving target; what does not lags behind it.
+// A law that uses the desired motion follows the moving target; one that does not lags behind it.
 TEST(BaselineRun, FeedForwardFollowsTheCurveAndPdAloneLags) {
   const auto measure = [](const std::string& law) {
     ShippedRun run("curve", {"control.law=" + law, "expect={ from = 0 }", "duration=2.5", "settle=0.5"});

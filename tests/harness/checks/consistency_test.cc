@@ -111,7 +111,7 @@ TEST(Consistency, BoundsStaySmallOnLongChains) {
   }
 }
 
-// Of a few joints' random velocities one is now and then far smaller than the other.
+// One of a few joints' random velocities is now and then far smaller than the others.
 TEST(Consistency, HoldsForVelocitiesOfDifferentSize) {
   std::mt19937 random(304);
   for (int index = 0; index < 12; ++index) {

@@ -29,7 +29,7 @@ struct Case {
   BaseType base;
   bool torus = true;         ///< Else the object is a sphere.
   const char* option = "";   ///< Attributes of <option>.
-  const char* contact = "";  ///< Of all geoms.
+  const char* contact = "";  ///< Attributes of all geoms for contacts.
   double ball = 0.0;
   bool free_joint = true;
 };
@@ -138,7 +138,7 @@ Scene MakeScene(const Case& one, unsigned seed) {
   return scene;
 }
 
-/// What some steps have shown.
+/// Results of some steps.
 struct Shown {
   double worst = 0.0;
   std::string where;

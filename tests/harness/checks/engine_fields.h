@@ -1,6 +1,6 @@
 #pragma once
 
-// What becomes of every number of the engine's model: no field of an MJCF may change a force unseen.
+// The effect of every number of the engine's model: no field of an MJCF may change a force unseen.
 
 #include <sstream>
 #include <string>
@@ -13,8 +13,9 @@ enum class FieldClass {
   kCompared,    ///< With the analytic model: by a constant or a term of `consistency`.
   kReported,    ///< The analytic model has nothing like it: anything but the neutral value is a finding.
   kOverridden,  ///< The plant sets it (scenario), whatever the MJCF says; a note says so where it differs.
-  kJudged,    ///< Of the plant alone, contacts and solver: a note names it, and the checks of a run judge it.
-  kNoEffect,  ///< On motion and forces, as long as nothing is reported.
+  kJudged,  ///< Concerns the plant alone, contacts and solver: a note names it, and the checks of a run judge
+            ///< it.
+  kNoEffect,  ///< Does not change motion and forces, as long as nothing is reported.
 };
 
 /// A field of mjModel ("body_mass"), mjOption ("opt.timestep") or mjStatistic ("stat.extent").

@@ -190,7 +190,7 @@ class Subject {
     motion.Add(d->qvel, m->nv);
     return motion;
   }
-  /// The same of the model that a run makes of it: nothing when no run has this robot.
+  /// Moves the model that a run makes of it: nothing when no run has this robot.
   [[nodiscard]] Motion MoveAsInRun(const mjModel& engine) const {
     if (!model_.object()) return {};
     static const Scenario scenario = ReadShippedScenario("hold");

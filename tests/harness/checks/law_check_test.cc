@@ -63,7 +63,7 @@ TEST(LawCheck, TorquesThatDoNotArriveAreTheActuators) {
   EXPECT_THAT(result.attribution.evidence, HasSubstr("all motors: gain 0.999"));
 }
 
-/// What explains torques of the joints' law to which this is added.
+/// Returns the causes of torques of the joints' law to which this change is made.
 Causes ExplainTorques(const std::function<void(const GraspModel& model, VectorXd* tau)>& change) {
   const ShippedRun shipped("panda-reach", {"duration=0.2", "settle=0.1", "expect.joints=1"});
   LoopParts parts = MakeLoopParts(shipped.setup());
@@ -91,7 +91,7 @@ TEST(LawCheck, ASearchThatIsStoppedSaysSo) {
   EXPECT_THAT(result.attribution.evidence, HasSubstr("search for causes was stopped after 0 s"));
 }
 
-// Of a factor of all joints and one of a single joint each is told whole.
+// A factor of all joints and one of a single joint are each reported in full.
 TEST(LawCheck, FactorsOfAllJointsAndOfOneAreToldWhole) {
   const Causes causes = ExplainTorques([](const GraspModel& model, VectorXd* tau) {
     const VectorXd& gravity = model.robot().gravity();
@@ -112,7 +112,7 @@ TEST(LawCheck, FaultsFromOutsideTheTableAreNamed) {
       {[](const GraspModel& model, VectorXd* tau) {
          *tau -= 2.0 * (model.robot().C() * model.robot().velocity());
        },
-       "Coriolis forces is multiplied by -1"},
+       "Coriolis forces have the other sign"},
       {[](const GraspModel& model, VectorXd* tau) {
          const MatrixXd& C = model.robot().C();
          *tau += (C.transpose() - C) * model.robot().velocity();

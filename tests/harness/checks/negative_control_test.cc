@@ -106,7 +106,8 @@ std::set<std::string> FindChangedParts(const RobotSpec& a, const RobotSpec& b) {
   return parts;
 }
 
-/// What a person reads first: the parts named by findings and by each failed term's failure nearest the base.
+/// Lists the parts that a person reads first: those of findings, and of each failed term's failure nearest
+/// the base.
 std::string ListNamedParts(const ConsistencyResult& result, const RobotModel& model) {
   std::string text;
   for (const ConstantFinding& finding : result.constants.findings) text += finding.where + "; ";

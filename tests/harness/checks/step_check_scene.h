@@ -11,7 +11,7 @@
 
 namespace dexcheck::testing {
 
-/// What the controller of one robot and grasp evaluates, and its check against the shipped scene.
+/// Evaluated terms of a controller of one robot and grasp, and their check against the shipped scene.
 class CheckedController {
  public:
   CheckedController(const RobotSpec& spec, const Torus& torus, std::span<const int> fingertips,

@@ -21,7 +21,7 @@ namespace {
 constexpr double kRingRadius = 0.035;
 constexpr double kTubeRadius = 0.011;
 
-// What the project asks of every step.
+// Largest error that the project accepts at every step.
 constexpr double kModelLimit = 1e-10;
 
 const CheckRecord& FindRecord(std::span<const CheckRecord> records, const std::string& name) {

@@ -86,7 +86,7 @@ class WholeRobotTest : public ::testing::TestWithParam<Case> {
     whole_->SetState(data_->qpos, data_->qvel);
   }
 
-  /// Of an nv-vector, in nu.
+  /// Converts an nv-vector to nu.
   [[nodiscard]] VectorXd Read(const mjtNum* rates) const {
     VectorXd nu(whole_->size());
     whole_->ReadRates(rates, &nu);

@@ -31,7 +31,7 @@ TEST_F(CompareFiles, ADescriptionIsOpenedOnce) {
   Write("c.urdf", kUrdf);
   for (const char* arguments :
        {"consistency a.urdf c.urdf --samples 5", "consistency a.urdf b.xml --samples 5",
-        "consistency b.xml b.xml --samples 5", "diagnose --robot a.urdf --mjcf b.xml",
+        "consistency b.xml b.xml --samples 5", "diagnose a.urdf b.xml",
         "engines b.xml --engines analytic,mujoco --samples 5",
         "engines a.urdf --engines analytic,mujoco --samples 5", "audit a.urdf", "audit b.xml"}) {
     SCOPED_TRACE(arguments);
@@ -71,7 +71,7 @@ TEST_F(CompareFiles, WhatOneAloneHasIsADisagreementUnlessItIsIgnored) {
     EXPECT_EQ(finding.at("model"), 0.0);
     EXPECT_EQ(finding.at("engine"), addition.value);
     EXPECT_THAT(finding.at("effect"), HasSubstr(addition.effect));
-    // Of everything else nothing is hidden by it.
+    // The addition hides nothing else.
     for (const auto& [name, check] : results.at("checks").items())
       EXPECT_EQ(check.at("pass"), name != addition.check) << name;
 
@@ -117,7 +117,7 @@ TEST_F(CompareFiles, OneWayLeadsToEachResult) {
   }
 }
 
-// What consistency, diagnose and a run say of one pair of files is one verdict, whatever the one change is.
+// One change of a pair of files has one verdict in consistency, diagnose and a run.
 TEST_F(CompareFiles, HaveOneVerdictInEachCommand) {
   Copy("pair.urdf");
   Copy("pair.xml");
@@ -183,7 +183,7 @@ TEST_F(CompareFiles, ABodyThatNoneCanBeIsComparedAndNoted) {
   }
 }
 
-// Of this chain's axes the table's angles leave 1.1e-14.
+// The table's angles leave 1.1e-14 of this chain's axes.
 TEST_F(CompareFiles, ATableThatWasImportedAgreesWithWhatItIsOf) {
   Write("turned.urdf", R"(<robot name="r"><link name="b"/>
 <link name="l0"><inertial><mass value="0.77"/>
@@ -201,6 +201,17 @@ TEST_F(CompareFiles, ATableThatWasImportedAgreesWithWhatItIsOf) {
   const Json itself = Compare(0, "turned.urdf", "turned.urdf");
   EXPECT_DOUBLE_EQ(itself.at("checks").at("joint_axis").at("bound"), kBound);
   EXPECT_GT(imported.at("checks").at("joint_axis").at("max"), kBound);
+}
+
+// Half a turn to both sides is what a table states of a joint without a range.
+TEST_F(CompareFiles, HalfATurnIsNoRangeBesideATable) {
+  WriteChanged("turn.toml", ReadFixture("two.toml"), "[-2.0, 2.0]",
+               "[-3.141592653589793, 3.141592653589793]");
+  WriteChanged("turn.xml", ReadFixture("two.xml"), "-2 2", "-3.14159 3.14159");
+  WriteChanged("other.xml", ReadFixture("two.xml"), "-2 2", "-3.1 3.14159");
+  Compare(0, "turn.toml", "turn.xml");
+  Compare(0, "turn.xml", "turn.toml");
+  EXPECT_EQ(Compare(1, "turn.toml", "other.xml").at("causes").size(), 1);
 }
 
 // A slender body, whose principal axes MuJoCo finds to 1e-8 at best.
@@ -274,7 +285,7 @@ TEST_F(PartOfRobot, WhatOneFileLacksIsACause) {
   EXPECT_EQ(results.at("causes")[0].at("id"), "joint.unneeded");
   EXPECT_EQ(results.at("causes")[0].at("places"), Json({"joint grip"}));
   EXPECT_THAT(results.at("not_compared"), Contains(AllOf(HasSubstr("terms: "), HasSubstr("grip"))));
-  // Where the other file has its mass, the joint is held.
+  // The joint is held where the other file has its mass.
   WriteChanged("welded.xml", ReadFixture("pair.xml"), "diaginertia=\"0.01 0.011 0.012\"/>",
                "diaginertia=\"0.01 0.011 0.012\"/><body pos=\"0.25 0 0\"><inertial pos=\"0.02 0 0\" "
                "mass=\"0.1\" diaginertia=\"1e-4 2e-4 2e-4\"/></body>");
@@ -282,7 +293,7 @@ TEST_F(PartOfRobot, WhatOneFileLacksIsACause) {
   Compare(0, "a.urdf", "welded.xml", "--lock grip");
   EXPECT_FALSE(Compare(1, "a.urdf", "welded.xml", "--lock grip=0.03").at("checks").at("link_com").at("pass"));
   EXPECT_FALSE(Compare(1, "a.urdf", "welded.xml", "--ignore finger").at("checks").at("link_mass").at("pass"));
-  // What is wrong in the common part is found.
+  // A fault in the common part is found.
   WriteChanged("wrong.urdf", Read("a.urdf"), "value=\"0.8\"", "value=\"0.9\"");
   const Json wrong = Compare(1, "wrong.urdf", "b.xml").at("causes");
   ASSERT_EQ(wrong.size(), 2U) << wrong;

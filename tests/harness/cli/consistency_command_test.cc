@@ -66,7 +66,7 @@ TEST_F(ConsistencyCommand, ChangedNumberIsADisagreement) {
   EXPECT_TRUE(HasFinding(results, "link_mass", "link panda_link3", 3.3, 3.228604));
 }
 
-// What only the MJCF has is a disagreement, whatever it is.
+// Any addition of the MJCF alone is a disagreement.
 TEST_F(ConsistencyCommand, WhatOnlyTheMjcfHasIsADisagreement) {
   struct Addition {
     std::string text;

@@ -1,4 +1,4 @@
-// What the log says of contacts can be read back: coordinates and charts give the contact points.
+// Contacts can be read back from the log: coordinates and charts give the contact points.
 
 #include <gtest/gtest.h>
 

@@ -132,7 +132,7 @@ class CommandTest : public ::testing::Test {
     EXPECT_EQ(result.exit_code, exit_code) << arguments[0] << ": " << result.out << result.err;
     return result;
   }
-  /// What the command prints with --json, and nothing else.
+  /// Returns the output of the command with --json.
   [[nodiscard]] Json RunJson(int exit_code, const Words& arguments) const {
     return Json::parse(Expect(exit_code, arguments + Words{"--json", "-"}).out);
   }

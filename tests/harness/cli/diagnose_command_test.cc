@@ -22,7 +22,7 @@ class DiagnoseCommand : public CommandTest {
     Write(name, text);
   }
 
-  /// What diagnose says of two files, which disagree.
+  /// Returns the JSON of diagnose for two files that disagree.
   [[nodiscard]] Json Diagnose(const std::string& a, const std::string& b,
                               const Words& more = std::vector<std::string>()) const {
     return RunJson(1, Words{"diagnose", a, b} + more);
@@ -119,7 +119,7 @@ TEST_F(DiagnoseCommand, NamesConventionsAndNumbers) {
   EXPECT_NEAR(causes[0].at("explained").get<double>() + causes[1].at("explained").get<double>(), 1.0, 1e-9);
   EXPECT_GT(causes[1].at("explained"), 0.0);
   ExpectRepaired("arm.urdf", folder + "/arm.xml", "repaired.urdf");
-  // What hangs on an axis stays where it is, so that nothing is left.
+  // Links that hang on an axis stay in place, so that no difference remains.
   text = ReplaceOnce(right, "axis xyz=\"0 1 0\"", "axis xyz=\"0 -1 0\"");
   Write("axes.urdf", ReplaceOnce(text, "axis xyz=\"1 0 0\"", "axis xyz=\"-1 0 0\""));
   const Json axes = Diagnose("axes.urdf", folder + "/arm.xml");
@@ -146,6 +146,48 @@ TEST_F(DiagnoseCommand, WritesNothingWhereNothingCanBeRepaired) {
   EXPECT_THAT(Expect(1, {"diagnose", arm, folder + "/armature.xml", "--write", "out.urdf"}).out,
               HasSubstr("out.urdf is not written: arm.urdf: cannot be repaired: joint shoulder: armature"));
   EXPECT_FALSE(Has("out.urdf"));
+}
+
+// The causes are in the second file: nothing is written over the first one's right numbers, and the command
+// that repairs the second one does.
+TEST_F(DiagnoseCommand, CopiesNoFaultOfTheSecondFile) {
+  const std::string folder = SourcePath("/harness/descriptions/examples/field_cases/");
+  for (const char* const name : {"rpy_lost.xml", "about_origin.urdf", "inertials_lost.xml"}) {
+    SCOPED_TRACE(name);
+    const std::string b = folder + name;
+    const std::string command = "dexcheck diagnose " + b + " " + folder + "arm.urdf --write FILE";
+    EXPECT_THAT(Expect(1, {"diagnose", folder + "arm.urdf", b, "--write", "out.urdf"}).out,
+                AllOf(HasSubstr("the cause is in " + std::string(name)), Not(HasSubstr("repair: "))));
+    EXPECT_FALSE(Has("out.urdf"));
+    EXPECT_THAT(RunJson(1, {"diagnose", folder + "arm.urdf", b}).at("causes").at(0).at("changes"),
+                ::testing::IsEmpty());
+    ExpectRepaired(b, folder + "arm.urdf", "repaired" + std::filesystem::path(name).extension().string());
+  }
+}
+
+// A frame stands in a list of its own, and is repaired there.
+TEST_F(DiagnoseCommand, RepairsAFrame) {
+  WriteChanged("bad.toml", ReadText(kPandaToml), "xyz = [0.0, 0.0, 0.107]", "xyz = [0.0, 0.0, 0.117]");
+  const Json causes = Diagnose("bad.toml", kPandaXml).at("causes");
+  ASSERT_EQ(causes.size(), 1U) << causes;
+  EXPECT_EQ(causes[0].at("places"), Json({"frame panda_flange"}));
+  EXPECT_EQ(causes[0].at("changes").at(0).at("place"), "frame panda_flange");
+  ExpectRepaired("bad.toml", kPandaXml, "repaired.toml");
+}
+
+// Constants that a table does not state are not stated; all else is compared.
+TEST_F(DiagnoseCommand, ReadsATableWithoutConstants) {
+  std::string text = ReadText(kPandaToml);
+  for (const char* const part : {", armature = 0.0", ",  damping = 0.003", ", damping = 0.003"}) {
+    for (size_t at = 0; (at = text.find(part, at)) != std::string::npos;)
+      text.erase(at, std::string(part).size());
+  }
+  ASSERT_EQ(text.find("armature = "), std::string::npos);
+  Write("bare.toml", text);
+  Expect(0, {"diagnose", "bare.toml", kPandaXml, "--ignore", "damping,armature"});
+  const Json causes = Diagnose("bare.toml", kPandaXml).at("causes");
+  ASSERT_EQ(causes.size(), 1U) << causes;
+  EXPECT_EQ(causes[0].at("id"), "damping.missing");
 }
 
 // Names of two joints that were exchanged are one cause.
@@ -204,7 +246,7 @@ class MutateCommand : public CommandTest {
 };
 
 TEST_F(MutateCommand, AllFaultsAreFoundAndCounted) {
-  const Json results = RunJson(0, "mutate --robot two.toml --mjcf two.xml");
+  const Json results = RunJson(0, "mutate two.toml two.xml");
   EXPECT_TRUE(results.at("complete").get<bool>());
   for (const auto& [kind, row] : results.at("kinds").items()) {
     EXPECT_EQ(row.at("survived"), 0) << kind;
@@ -230,8 +272,7 @@ TEST_F(MutateCommand, AllFaultsAreFoundAndCounted) {
 TEST_F(MutateCommand, CountsWhatIsFoundInARun) {
   // The hand does not move: what acts on velocities alone survives. It costs a fiftieth of the robot's
   // `hold`.
-  const Json json =
-      RunJson(1, "mutate --run hand-hold --set settle=0.2 --from 0.01 --duration 0.01 --numbers 4");
+  const Json json = RunJson(1, "mutate hand-hold --set settle=0.2 --from 0.01 --duration 0.01 --numbers 4");
   EXPECT_EQ(json["complete"], true);
   EXPECT_GT(json["kinds"]["all"]["survived"], 0);
   EXPECT_EQ(json["kinds"]["number"]["cause_right"], 4);
@@ -239,10 +280,10 @@ TEST_F(MutateCommand, CountsWhatIsFoundInARun) {
   EXPECT_EQ(json["faults"].size(), json["kinds"]["all"]["faults"].get<size_t>());
 }
 
-// What an interrupted campaign left is taken, by one that was asked for the same.
+// A campaign continues from the results of an interrupted one with the same options.
 TEST_F(MutateCommand, GoesOnFromWhatAnInterruptedCampaignLeft) {
   const std::string command =
-      "mutate --run hold --set settle=0.2 --from 0.01 --duration 0.01 --kinds body --draws 6 --json out.json";
+      "mutate hold --set settle=0.2 --from 0.01 --duration 0.01 --kinds body --draws 6 --json out.json";
   ASSERT_LE(Run(command).exit_code, 1);
   const Json whole = Json::parse(Read("out.json"));
   Json part = whole;

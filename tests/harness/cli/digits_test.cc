@@ -123,7 +123,7 @@ TEST_F(Digits, AreAgreementOnlyToTheStatedPrecision) {
   Expect(0, "consistency zero.urdf small.urdf --precision 30");
 }
 
-// What differs is told in the frames of the files: a joint's origin or its axis, or a frame on its link.
+// Differences are reported in the frames of the files: a joint's origin or its axis, or a frame on its link.
 TEST_F(Digits, APlacementIsToldAsItsFileHasIt) {
   const std::string right = MakeFinger(R"(ixx="0.000123" iyy="0.000234" izz="0.000245" ixy="0")");
   Write("right.urdf", right);
@@ -174,7 +174,7 @@ TEST_F(Digits, AMistakeIsTheOnlyCause) {
     EXPECT_THAT(FirstCause(out), HasSubstr("link panda_link3"));
     EXPECT_THAT(out, Not(HasSubstr("  2. ")));
     EXPECT_LE(std::ranges::count(out, '\n'), 24);
-    // What agrees is a list of names.
+    // Quantities that agree are a list of names.
     const std::string whole = Expect(1, "consistency wrong.urdf " + kPandaXml + " --samples 50").out;
     EXPECT_LE(std::ranges::count(whole, '\n'), 48);
     EXPECT_THAT(whole, AllOf(HasSubstr("DIFFERS at "), HasSubstr("  ok: ")));

@@ -25,7 +25,7 @@ void ExpectAllPairsAgree(const Json& json, size_t engines, double tolerance) {
       EXPECT_LE(record.at("max").get<double>(), tolerance)
           << both << " " << term << " " << record.at("where");
       EXPECT_GT(record.at("compared").get<long>(), 100) << both;
-      // What is zero on both sides says nothing; gravity has no part along x.
+      // A zero on both sides proves nothing; gravity has no part along x.
       if (term == "M_bar" || term == "C_bar_xi") {
         EXPECT_NE(record.at("first").get<double>(), 0.0) << both << " " << term;
       }
@@ -38,7 +38,7 @@ class EngineComparison : public CommandTest {
   [[nodiscard]] Json Compare(int exit_code, const Words& arguments) const {
     return RunJson(exit_code, Words("engines") + arguments);
   }
-  /// What explains an engine that stands apart is one of the settings that are named.
+  /// One of the listed settings explains an engine that stands apart.
   static void ExpectSetting(const Json& json, const std::vector<std::string>& parts) {
     for (const std::string& part : parts) EXPECT_THAT(json.at("settings").dump(), HasSubstr(part));
   }
@@ -49,7 +49,7 @@ class EngineComparison : public CommandTest {
 constexpr double kOfEngines = 1e-12;
 constexpr double kOfCompiledInertias = 1e-6;
 
-// As of consistency: what is ignored the engine takes over from the robot.
+// The engine takes ignored constants over from the robot, as in consistency.
 TEST_F(EngineComparison, WhatIsIgnoredNeedNotBeShared) {
   Copy("two.xml");
   Write("other.xml", ApplyEdits(Read("two.xml"), {{"armature=\"0.02\"", "armature=\"0.05\""},
@@ -102,7 +102,7 @@ TEST_F(EngineComparison, TheSettingThatExplainsIsNamed) {
   expect({"np.cross(omega, I @ omega))", "0 * omega)"}, "no setting");
 }
 
-/// What an MJCF adds to a URDF is named as the reason why MuJoCo stands apart.
+/// Additions of an MJCF to a URDF are named as the reason why MuJoCo stands apart.
 TEST_F(EngineComparison, ArmatureOfTheMjcfIsNamed) {
   Write("panda.urdf", MakePandaUrdf());
   WriteChanged("panda.xml", ReadText(kPandaXml), "armature=\"0\"", "armature=\"0.1\"");
@@ -128,7 +128,7 @@ TEST_F(EngineComparison, BallJointsOnAFloatingBaseAgree) {
   ExpectAllPairsAgree(Compare(0, "doll.xml --samples 20 --engines analytic,mujoco"), 2, kOfEngines);
 }
 
-/// What an engine refuses is named by file and link, with what to do.
+/// A refusal of an engine is named by file and link, with a remedy.
 TEST_F(EngineComparison, ALinkThatAnEngineRefusesIsNamed) {
   Write("light.urdf",
         R"(<robot name="light"><link name="foot"/><link name="leg"><inertial>

@@ -42,7 +42,7 @@ MatrixXd ToMatrix(const Json& rows) {
 
 class EvalCommand : public CommandTest {
  protected:
-  /// What eval says of this state.
+  /// Returns the output of eval for this state.
   [[nodiscard]] Json Evaluate(const Json& state, const Words& options = "--out -") const {
     Write("state.json", state.dump());
     const ProgramResult result = Expect(0, Words("eval --state state.json") + options);

@@ -1,6 +1,5 @@
-// What can go wrong around a run: plants that explode, models that the engine rejects, disks that fill,
-// folders that may not be written, logs that were cut or damaged. Exit codes and one line say so; nothing
-// crashes.
+// Failures around a run: plants that explode, models that the engine rejects, disks that fill, folders
+// without permission, logs that were cut or damaged. Each gives an exit code and one line; nothing crashes.
 
 #include <sys/mount.h>
 #include <unistd.h>
@@ -196,10 +195,10 @@ TEST_F(FaultInjection, FoldersThatMayNotBeWrittenAreNamed) {
   EXPECT_EQ(CountFiles("run"), 2) << "log and summary, as before";
 }
 
-/// What reads a run's log.
-constexpr const char* kReaders[] = {"run --replay run", "report run --out page.html",
+/// Commands that read a run's log.
+constexpr const char* kReaders[] = {"run --replay run", "report run --page page.html",
                                     "export run --csv all.csv",
-                                    "render run --still 0 --size 64x64 --forces --tracks --out still.png"};
+                                    "render run --still 0 --size 64x64 --forces --out still.png"};
 
 class DamagedLogs : public FaultInjection {
  protected:

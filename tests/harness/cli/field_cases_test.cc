@@ -61,7 +61,8 @@ class BodyTable : public CommandTest {
   const std::string kTable = ReadText(kFolder + "/cad.csv");
 };
 
-// The same tensors about the links' origins, in SI, between semicolons, and what is no table.
+// The table has the same tensors about the links' origins, in SI, between semicolons; another file is no
+// table.
 TEST_F(BodyTable, UnitsAndReferenceAreThoseOfItsHeader) {
   Write("si.csv",
         "# inertia: origin\nLink;Mass (kg);X (m);Y;Z;Lxx (kg m2);Lyy;Lzz;Lxy;Lxz;Lyz\n"

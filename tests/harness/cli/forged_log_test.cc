@@ -36,7 +36,7 @@ class ForgedLog : public CommandTest {
 
   /// Whether all commands that unpack the log refuse it, and leave nothing.
   ::testing::AssertionResult AllRefuse(const std::string& part) const {
-    for (const char* command : {"run --replay run", "render run", "report run --out page.html"}) {
+    for (const char* command : {"run --replay run", "render run", "report run --page page.html"}) {
       ::testing::AssertionResult refused = Refused(command, {part});
       if (!refused) return refused << " from " << command;
     }

@@ -10,7 +10,7 @@ struct HeldObject {
   const char* body;
   const char* geom;   ///< MJCF: attributes of its geom.
   const char* asset;  ///< MJCF besides.
-  const char* shape;  ///< Of the parameter file.
+  const char* shape;  ///< Shape in the parameter file.
 };
 
 void PrintTo(const HeldObject& object, std::ostream* out) { *out << object.body; }
@@ -77,7 +77,7 @@ TEST_P(HeldObjects, AreRunReportedAndDrawn) {
     EXPECT_GT(checks[check]["max"].get<double>(), 0.0) << check;
   Expect(0, "report run");
   EXPECT_THAT(Read("run/report.html"), HasSubstr("contact_frame"));
-  Expect(0, "render run --still 0.2 --forces --tracks --size 160x120 --camera grasp --out still.png");
+  Expect(0, "render run --still 0.2 --forces --size 160x120 --camera grasp --out still.png");
   EXPECT_GT(std::filesystem::file_size(Path("still.png")), 1000U);
 }
 

@@ -99,7 +99,7 @@ TEST_F(TwoDescriptions, ACopyForAnOlderEngineFindsItsFilesFromAnotherFolder) {
   }
 }
 
-// What is included is copied too, and named by its own file and line.
+// Included files are copied too, and named by their own file and line.
 TEST_F(TwoDescriptions, ACopyIsOfOnePiece) {
   const auto write = [&](const std::string& name, const std::string& text) {
     Write(name, "<mujoco>\n" + text + "</mujoco>");
@@ -127,7 +127,7 @@ TEST_F(TwoDescriptions, ACopyIsOfOnePiece) {
   }
 }
 
-// As published robots have them: servos, a tendon, two actuators at one joint, defaults, key frames, sensors.
+// Published robots have servos, a tendon, two actuators at one joint, defaults, key frames, sensors.
 TEST_F(TwoDescriptions, ACopyWithMotorsIsRun) {
   Write("servos.xml", R"(<mujoco>
   <compiler angle="radian"/>

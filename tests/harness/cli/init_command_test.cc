@@ -38,7 +38,7 @@ TEST_F(InitCommand, MakesAFolderOfAUrdfThatRuns) {
     EXPECT_EQ(RunJson(0, {"run", "pair/better.toml", "--no-log", "--set", "duration=0.5"}).at("verdict"),
               "pass");
   }
-  // What is there is not written over.
+  // Existing files are not overwritten.
   EXPECT_TRUE(Refused("init pair.urdf", {"pair", "--out"}));
 }
 
@@ -48,7 +48,7 @@ TEST_F(InitCommand, TakesTheUsersMjcfWithMotors) {
   Expect(0, "init pair.urdf pair.xml --out both");
   EXPECT_THAT(Read("both/robot.xml"), HasSubstr("<motor"));
   EXPECT_EQ(RunMotion(0, "both").at("verdict"), "pass");
-  // Of an MJCF alone, too.
+  // An MJCF alone suffices as well.
   Expect(0, "init pair.xml --out alone");
   EXPECT_EQ(RunMotion(0, "alone").at("verdict"), "pass");
   // Few digits in one of the two are a tolerance of the run.
@@ -72,7 +72,7 @@ TEST_F(InitCommand, MotorsHaveTheLimitsThatTheFilesState) {
   EXPECT_THAT(Read("both/robot.xml"), HasSubstr(limit));
   Expect(0, "init pair.xml --out none");
   EXPECT_THAT(Read("none/robot.xml"), Not(HasSubstr("ctrlrange")));
-  // Of an MJCF for a later release, its own or its class's.
+  // The limits of an MJCF for a later release are its own or its class's.
   WriteChanged(
       "newer.xml", ReadFixture("pair.xml"), "<worldbody>",
       "<default><default class='strong'><joint actuatorfrcrange='-7 7'/></default></default><worldbody>");
@@ -125,7 +125,7 @@ TEST_F(InitCommand, ALinkDoesNotTouchTheBaseThatItTurnsOn) {
   EXPECT_EQ(RunMotion(0, "stands").at("verdict"), "pass");
 }
 
-// What acts on joints beside motors is no part of a run's model, and is said.
+// Effects on joints other than motors are no part of a run's model, and are listed.
 TEST_F(InitCommand, LeavesOutWhatActsBesideMotors) {
   WriteChanged("held.xml", ReadFixture("pair.xml"), "<joint name=\"elbow\"",
                "<joint stiffness=\"3\" name=\"elbow\"");
@@ -166,7 +166,7 @@ TEST_F(InitCommand, AFaultThatNoMotionShowsIsNoSurvivor) {
   <limit lower="-2" upper="2" effort="1" velocity="1"/></joint></robot>)");
   Expect(0, "init spin.urdf");
   EXPECT_EQ(RunMotion(0, "spin").at("verdict"), "pass");
-  const std::string said = Expect(0, "mutate --run spin/motion.toml --numbers 0 --kinds body").out;
+  const std::string said = Expect(0, "mutate spin/motion.toml --numbers 0 --kinds body").out;
   EXPECT_THAT(said, HasSubstr("no effect: link upper: mass"));
 }
 
@@ -188,8 +188,8 @@ TEST_F(InitCommand, MovesAsMotorsCan) {
   EXPECT_EQ(RunMotion(0, "weak").at("verdict"), "pass");
 }
 
-// Where friction holds a joint, and where it turns, a torque says nothing of the model; forces act where feet
-// touch the ground, which an MJCF says by its spheres.
+// A torque proves nothing where friction holds a joint, or where the joint turns back; forces act where feet
+// touch the ground, which an MJCF declares by its spheres.
 TEST_F(InitCommand, ARobotWithDryFrictionExplainsItsOwnLog) {
   WriteChanged("rubs.xml", ReadFixture("biped.xml"), "armature=\"0.01\"",
                "armature=\"0.01\" frictionloss=\"0.03\"");
@@ -199,7 +199,7 @@ TEST_F(InitCommand, ARobotWithDryFrictionExplainsItsOwnLog) {
     EXPECT_THAT(Expect(0, {"judge", model, "run/log.h5"}).out, HasSubstr("EXPLAINED"));
 }
 
-// As published humanoids have them: joints' defaults that the joint of the base takes, and parked bodies.
+// Published humanoids have defaults of joints that the joint of the base takes, and parked bodies.
 TEST_F(InitCommand, WhatIsNoPartOfTheRobotIsLeftOut) {
   const std::string text = ReadFixture("biped.xml");
   const std::string sensor = "<sensor><jointpos joint=\"lid\"/></sensor>";
@@ -223,8 +223,7 @@ TEST_F(InitCommand, MeshesLieBesideARobotThatFloats) {
   EXPECT_THAT(Read("biped/robot.xml"), HasSubstr("assets/1-tetra.obj"));
 }
 
-// A run's clearance is of shapes that the engine does not let touch, too.
-// What is written is read again: as TOML, as XML, and as the names of columns.
+// Names are read again from TOML, from XML, and from the names of columns.
 TEST_F(InitCommand, AnyNamesOfJoints) {
   for (const auto& [first, second] : {std::pair("t", "a;b"), {"a&quot;b,c", "=g\\h'"}, {"a\u00e4", "time"}}) {
     SCOPED_TRACE(first);
@@ -256,10 +255,10 @@ TEST_F(InitCommand, ABodyMayHaveTwoJoints) {
                "<joint name=\"rail\" type=\"slide\" axis=\"1 0 0\"/><joint name=\"shoulder\"");
   Expect(0, "init rail.xml");
   EXPECT_EQ(RunMotion(0, "rail").at("verdict"), "pass");
-  Expect(0, "mutate --run rail/motion.toml --draws 3 --kinds body --duration 0.05 --quiet");
+  Expect(0, "mutate rail/motion.toml --draws 3 --kinds body --duration 0.05 --quiet");
 }
 
-// Of a ball joint a run's law has no number.
+// A run's law has no number for a ball joint.
 TEST_F(InitCommand, HoldsBallJoints) {
   WriteChanged("balls.xml", ReadFixture("pair.xml"), "<joint name=\"elbow\"",
                "<joint type=\"ball\"/><joint name=\"elbow\"");
@@ -281,7 +280,7 @@ TEST_F(InitCommand, ReducesFrictionThatAStepCannotCarry) {
               HasSubstr("friction that would stop a joint within 10 ms is reduced: elbow"));
   EXPECT_EQ(RunMotion(0, "stuck").at("verdict"), "pass");
   Expect(0, "budget stuck/motion.toml --set actuation.delay=0.002 --set sensing.joint_counts=4096");
-  // Of an MJCF likewise.
+  // An MJCF is treated the same way.
   WriteChanged("light.xml", ReadFixture("pair.xml"), "<joint name=\"elbow\"",
                "<joint damping=\"500\" name=\"elbow\"");
   EXPECT_THAT(Expect(0, "init light.xml").err, HasSubstr("10 ms is reduced: elbow (500"));
@@ -345,7 +344,7 @@ TEST_F(InitCommand, CopiesShippedScenarios) {
   }
 }
 
-// What floats in the MJCF has a root in the URDF that is not said to move.
+// A floating body of the MJCF may be a root of the URDF that is not declared to move.
 TEST_F(InitCommand, AUrdfBesideAFloatingMjcfFloats) {
   Write("a.xml", R"(<mujoco><compiler angle="radian"/><worldbody><body name="base" pos="0 0 1"><freejoint/>
 <inertial pos="0.01 0 0" mass="4" diaginertia="0.05 0.06 0.07"/><body name="arm" pos="0.1 0 0.05">
@@ -392,7 +391,7 @@ TEST_F(InitCommand, ItsFirstRunTouchesNothing) {
   EXPECT_EQ(RunMotion(0, "mast").at("verdict"), "pass");
 }
 
-// What no motion makes pass is said before anything is written.
+// A robot that no motion makes pass is refused before anything is written.
 TEST_F(InitCommand, ARobotThatCannotPassIsRefused) {
   WriteChanged("swims.xml", ReadFixture("pair.xml"), "<worldbody>",
                "<option density=\"1000\" viscosity=\"0.1\"/><worldbody>");

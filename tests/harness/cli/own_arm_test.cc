@@ -43,7 +43,7 @@ TEST_F(OwnArm, IsRunReportedDrawnAndReplayed) {
   Expect(0, "run --replay run");
 }
 
-// As descriptions that were made for dynamics often are.
+// Descriptions that were made for dynamics often have no shapes.
 TEST_F(OwnArm, WithoutShapesHasAPageToo) {
   const std::string inertial = R"(<inertial pos="0.1 0 0.05" mass="1" diaginertia="0.02 0.02 0.02"/>)";
   WriteArm({{R"(<geom type="cylinder" size="0.05 0.2" mass="3"/>)", inertial},
@@ -83,7 +83,7 @@ TEST_F(OwnArm, WithDryFrictionIsRun) {
       Refused("run own.toml --no-log --set plant.type=rigid", {"plant.type", "dry friction", "\"turn\""}));
 }
 
-// As the fingers of a closed gripper do: rounding puts it beyond its range, by 2e-19 m here.
+// Rounding puts the fingers of a closed gripper beyond their range, by 2e-19 m here.
 TEST_F(OwnArm, AJointMayRestAtTheEndOfItsRange) {
   WriteArm({{"range=\"-0.2 0.3\"", "range=\"0 0.3\""}});
   Write("own.toml", ApplyEdits(kScenario, {{"lift = 0.1, ", ""}, {", lift = -0.1", ""}}));

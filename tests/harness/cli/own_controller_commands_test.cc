@@ -58,7 +58,7 @@ TEST_F(OwnControllerCommands, AScenarioNamesItAndALogKnowsIt) {
   std::filesystem::copy_file(JOINT_LAW_LIBRARY, Path("copy.so"));
   EXPECT_THAT(Expect(0, "run --replay run --controller ./copy.so").out, HasSubstr("IDENTICAL"));
   Expect(1, Words("run --replay run --controller") + Words{JOINT_PD_LIBRARY});
-  // Of two files that are the same only the name differs; of a changed one the hash too.
+  // Two files that are the same differ in the name only; a changed one differs in the hash too.
   WriteScenario("copied.toml", "copy.so", "");
   Expect(0, "run copied.toml --no-report --out copied");
   const std::string same = Expect(0, "compare run copied").out;
@@ -103,7 +103,7 @@ TEST_P(OwnLawEverywhere, HasABudget) {
   EXPECT_GT(own["all"]["rms"], 0.0);
   for (const char* error : {"ideal", "all", "sum", "predicted"})
     EXPECT_NEAR(own[error]["rms"], right[error]["rms"], 1e-6 * right[error]["rms"].get<double>()) << error;
-  // What a law that nobody names would send is not predicted.
+  // The torques of a law without a name are not predicted.
   const Json unnamed = RunJson(0, Words("budget own.toml --jobs 2 --unset control.law") + Own());
   EXPECT_TRUE(unnamed["predicted"]["rms"].is_null());
   EXPECT_NEAR(unnamed["all"]["rms"], own["all"]["rms"], 1e-12);
@@ -113,7 +113,7 @@ TEST_P(OwnLawEverywhere, HasABudget) {
 
 TEST_P(OwnLawEverywhere, IsWhereFaultsAreMade) {
   const Words mutate =
-      "mutate --run own.toml --duration 0.2 --numbers 2 --jobs 2 --unset sensing --unset actuation";
+      "mutate own.toml --duration 0.2 --numbers 2 --jobs 2 --unset sensing --unset actuation";
   const Json own = RunJson(0, mutate + Own());
   EXPECT_GT(own["faults"].size(), 2U);
   const Json unnamed = RunJson(0, mutate + Words("--unset control.law --kinds motor --draws 2") + Own());
@@ -192,7 +192,7 @@ TEST_P(OwnParameters, AreKeysOfAStudy) {
   EXPECT_GT(soft, 2.0 * stiff);
   EXPECT_GT(stiff, 0.0);
   EXPECT_THAT(first["command"].get<std::string>(), HasSubstr("--controller"));
-  Expect(0, "study report gains.sqlite --out gains.html");
+  Expect(0, "study report gains.sqlite --page gains.html");
   // The rows belong to this controller: to its name, and to its file.
   const std::filesystem::path own = GetParam().controller;
   const std::string copy = "copy" + own.extension().string();

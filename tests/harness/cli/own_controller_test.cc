@@ -206,7 +206,7 @@ TEST_F(OwnController, WhatALibraryEndsCostsItsTrial) {
 TEST_F(OwnController, LibrariesThatAreNoneAreRefused) {
   EXPECT_TRUE(IsRefused(RunWith(OTHER_INTERFACE_LIBRARY), {"interface", "0, of another time"}));
   EXPECT_TRUE(IsRefused(RunWith(NO_CONTROLLER_LIBRARY), {"no controller"}));
-  // Of the interface before there were parameters: it works, without them.
+  // A library of the interface before there were parameters works, without them.
   EXPECT_EQ(RunWith(OLD_INTERFACE_LIBRARY).exit_code, 0);
   EXPECT_TRUE(IsRefused(RunWith(OLD_INTERFACE_LIBRARY, "--no-log --set controller.gain=3"),
                         {"old_interface.so", "controller.gain", "asks for no parameters"}));
@@ -259,7 +259,7 @@ TEST_F(OwnPythonFile, WhatARunDoesNotReachIsNotGood) {
   const ProgramResult result = RunLaw(
       "import dexcheck\nclass Law(dexcheck.Controller):\n  def step(self, s): raise KeyError('cheese')\n");
   EXPECT_EQ(result.exit_code, 3);
-  EXPECT_THAT(result.out, HasSubstr("not reached"));
+  EXPECT_THAT(result.out, HasSubstr("0.000 of 0.100 s simulated"));
   const Json checks = ReadChecks();
   for (const char* check : {"law_torque", "inverse_dynamics_robot", "joint_limit"}) {
     EXPECT_EQ(checks[check]["reached"], false) << check;

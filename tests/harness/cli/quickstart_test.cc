@@ -1,5 +1,4 @@
-// What harness/quickstart.sh requests of dexcheck, with a build and a program that only print their
-// arguments.
+// Calls of harness/quickstart.sh to dexcheck, with a build and a program that only print their arguments.
 
 #include <gtest/gtest.h>
 

@@ -30,7 +30,7 @@ std::vector<std::string> GetTexts(const toml::table& row, const char* key) {
   return texts;
 }
 
-/// What a row of the table says of a file: its name and its text, from what it was.
+/// Returns the text of a file with a row's changes.
 std::string ChangeText(std::string text, const toml::table& row) {
   const std::vector<std::string> change = GetTexts(row, "change");
   for (size_t i = 0; i + 1 < change.size(); i += 2) text = ReplaceOnce(text, change[i], change[i + 1]);
@@ -92,8 +92,9 @@ class RefusedFolder : public CommandTest {
 };
 
 constexpr const char* kGroups[] = {
-    "CommandLine", "RunsOptions",  "ParameterFiles", "Mjcfs",    "Descriptions", "Programs", "States",
-    "Grasps",      "JointMotions", "Logs",           "Pictures", "Recordings",   "Outputs"};
+    "CommandLine", "RunsOptions", "ParameterFiles", "Mjcfs",    "Descriptions", "Programs",
+    "States",      "Grasps",      "JointMotions",   "Logs",     "Pictures",     "Recordings",
+    "Outputs",     "Scenarios",   "Studies",        "Searches", "Databases",    "Kinds"};
 
 class Refused : public RefusedFolder, public ::testing::WithParamInterface<const char*> {};
 
@@ -117,7 +118,7 @@ TEST_P(Refused, InOneLineThatNamesWhatIsWrong) {
 INSTANTIATE_TEST_SUITE_P(All, Refused, ::testing::ValuesIn(kGroups),
                          [](const auto& info) { return std::string(info.param); });
 
-// The same files unchanged are good, whatever the table says of them.
+// The unchanged files are good.
 TEST_F(RefusedFolder, GoodFilesAreAccepted) {
   Expect(0, "consistency two.toml two.xml --samples 5 --json out.json");
   EXPECT_EQ(ReadJson("out.json").at("verdict"), "pass");
@@ -132,7 +133,7 @@ TEST_F(RefusedFolder, StatesThatNoTableHolds) {
        {std::pair(std::string(500000, '[') + std::string(500000, ']'), "more than 32 brackets"),
         {R"({"q": ")" + std::string(5000, 'x') + R"(", "xi": [0, 1]})", "xxx..."}}) {
     Write("state.json", text);
-    EXPECT_TRUE(Refused("eval --robot two.toml --state state.json", {"state.json: ", part}));
+    EXPECT_TRUE(Refused("eval two.toml --state state.json", {"state.json: ", part}));
   }
 }
 
@@ -141,7 +142,7 @@ TEST_F(RefusedFolder, AnObjectThatNoFingertipsTouch) {
         Read("two.toml") +
             "[object]\nbody = \"ball\"\nshape = \"sphere\"\nradius = 0.1\nmass = 0.2\nfriction = 0.5\n");
   Write("state.json", R"({"q": [0, 1], "xi": [0, 1], "kappa": [[0, 0, 0, 0, 0]]})");
-  EXPECT_TRUE(Refused("eval --robot two.toml --state state.json", {"state.json: ", "0 fingertips", "3"}));
+  EXPECT_TRUE(Refused("eval two.toml --state state.json", {"state.json: ", "0 fingertips", "3"}));
 }
 
 TEST_F(RefusedFolder, AMobileBaseWithoutAFreeJoint) {

@@ -13,7 +13,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// What a log leaves out, or has wrong.
+/// Missing or wrong parts of a log.
 struct Flaw {
   bool no_qpos = false;
   bool no_mjcf = false;
@@ -67,7 +67,7 @@ class RenderCommand : public CommandTest {
 
 TEST_F(RenderCommand, WritesAVideoIntoTheRunsFolder) {
   WriteLonger(0.5);
-  const ProgramResult result = Expect(0, "render run --size 160x90 --fps 10 --forces --tracks");
+  const ProgramResult result = Expect(0, "render run --size 160x90 --fps 10 --forces");
   EXPECT_THAT(result.err, HasSubstr("cut off after")) << "the log has no summary";
   EXPECT_THAT(result.out, StartsWith("run/video.mp4: 5 frames, 0.5 s, 160 x 90, "));
   EXPECT_EQ(Read("run/video.mp4").substr(4, 4), "ftyp");
@@ -95,8 +95,8 @@ TEST_F(RenderCommand, DrawsWhateverDriverTheEnvironmentNames) {
 }
 
 TEST_F(RenderCommand, AReportWithoutItsReplayIsSmaller) {
-  Expect(0, "report run --out page.html");
-  Expect(0, "report run --out without.html --no-replay");
+  Expect(0, "report run --page page.html");
+  Expect(0, "report run --page without.html --no-replay");
   const std::string page = Read("page.html");
   const std::string without = Read("without.html");
   EXPECT_THAT(page, HasSubstr("id=\"replay-scene\""));

@@ -66,7 +66,7 @@ TEST_F(Results, OfFilesAgree) {
   EXPECT_TRUE(Refused(command, {"states/M.npy", "50 x 3 x 3", "50 x 3"}));
 }
 
-/// The same results as lines of JSON in any order; an archive is refused with what to do.
+/// Results as lines of JSON in any order agree; an archive is refused with a remedy.
 TEST_F(Results, OfLinesAgreeAndOfAnArchiveAreRefused) {
   Expect(0, {"eval", "--robot", urdf_, "--states", "20", "--out", "states"});
   ASSERT_EQ(RunProgram({kPython, kExamples + "arm.py", "states"}, {folder_.path()}).exit_code, 0);
@@ -113,8 +113,8 @@ TEST_F(Results, FloatingBasesSayTheirConvention) {
   Write("robot.xml", WriteLeggedMjcf("quadruped", links));
   Expect(0, "consistency robot.urdf robot.xml --samples 20");
   Expect(0, "import robot.xml --out robot.toml");
-  // Where another program's coordinates may be other ones.
-  Expect(0, "eval --robot robot.toml --states 1 --out states");
+  // Another program's coordinates may be different here.
+  Expect(0, "eval robot.toml --states 1 --out states");
   Write("states/results.jsonl", Json{{"id", 0}, {"g", std::vector<double>(18, 1.0)}}.dump() + "\n");
   const Json notes = RunJson(1, "consistency robot.toml --results states").at("notes");
   EXPECT_THAT(notes, ::testing::IsSupersetOf({HasSubstr("[x y z, qw qx qy qz"), HasSubstr("Pinocchio")}));
@@ -125,8 +125,7 @@ TEST_F(Results, FloatingBasesSayTheirConvention) {
   std::vector<double> xi = {0.1, 0.2, 0.3, 0.4, 0.5, 0.6};
   xi.resize(18, 0.2);
   Write("state.json", Json{{"q", q}, {"xi", xi}}.dump());
-  const Json model =
-      Json::parse(Expect(0, "eval --robot robot.toml --mjcf robot.xml --state state.json").out);
+  const Json model = Json::parse(Expect(0, "eval robot.toml robot.xml --state state.json").out);
   const Json& pinocchio = model.at("pinocchio");
   EXPECT_EQ(pinocchio.at("q").get<std::vector<double>>()[3], 0.6);
   EXPECT_EQ(pinocchio.at("q").get<std::vector<double>>()[6], 0.8);
@@ -173,7 +172,7 @@ for line in sys.stdin:
   const Words compare = {"consistency", "top.xml", "--program", kPython + " top.py", "--samples", "50"};
   ExpectAgreement(RunJson(0, compare), 150);
 
-  Expect(0, "eval --robot top.xml --states 20 --out states");
+  Expect(0, "eval top.xml --states 20 --out states");
   EXPECT_EQ(ReadJson("states/layout.json").at("balls"), Json({"pivot"}));
   ASSERT_EQ(RunProgram({kPython, "top.py", "states"}, {folder_.path()}).exit_code, 0);
   Expect(0, "consistency top.xml --results states");

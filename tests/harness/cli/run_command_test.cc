@@ -76,7 +76,7 @@ TEST_F(RunCommand, WritesAFolderThatHoldsAll) {
   EXPECT_EQ(qpos.cols(), 7 + 50 + 7);
   EXPECT_NE(qpos.row(0), qpos.row(199));
 
-  // The same again from the log alone.
+  // The log alone suffices to repeat the run.
   EXPECT_THAT(Expect(0, "run --replay run").out, StartsWith("IDENTICAL: 200 "));
 
   // Nothing that is there is overwritten.

@@ -50,7 +50,7 @@ TEST_F(StatedByBoth, WhatACompilerChangedIsADisagreementThatNamesItsSetting) {
     EXPECT_NEAR(finding.at("model"), setting.stated, 1e-9);
     EXPECT_NEAR(finding.at("engine"), setting.made, 1e-9);
     EXPECT_THAT(finding.at("effect"), HasSubstr(setting.name));
-    // Of two MJCFs, whichever has it.
+    // The order of two MJCFs does not matter.
     const Json reversed = Find(Compare(1, "c.xml", "b.xml"), setting.check);
     ASSERT_FALSE(reversed.is_null());
     EXPECT_NEAR(reversed.at("model"), setting.made, 1e-9);
@@ -246,7 +246,7 @@ TEST_F(StatedByBoth, TheRadiusOfAWheelIsCompared) {
   WriteChanged("other.urdf", cart, "radius='0.1'", "radius='0.08'");
   EXPECT_TRUE(HasFinding(Compare(1, "other.urdf", "cart.urdf", "--floating"), "wheel_radius",
                          "joint roll on link cart", 0.08, 0.1));
-  // Of a link that is no wheel the shape is told.
+  // The shape of a link that is no wheel is listed.
   WriteChanged("other.xml", scene, "size='0.1 0.02'", "size='0.1 0.03'");
   EXPECT_THAT(Compare(0, "cart.urdf", "other.xml").at("without_effect"), Contains(HasSubstr("shapes")));
 }
@@ -318,7 +318,7 @@ TEST_F(StatedByBoth, AUnitIsNoLikelyCauseWhereTheRightNumberIsZero) {
   const Json results = Compare(1, "wrong.urdf", "right.urdf");
   for (const Json& one : results.at("causes"))
     EXPECT_THAT(one.at("text").get<std::string>(), Not(HasSubstr("mm")));
-  // Where it is none, the unit is proposed.
+  // The unit is proposed where it is not the file's.
   Write("wrong.urdf", ReplaceOnce(kUrdf, "<origin xyz=\"0.1 0 0\"/>", "<origin xyz=\"100 0 0\"/>"));
   EXPECT_THAT(Compare(1, "wrong.urdf", "a.urdf").at("causes").at(0).at("text").get<std::string>(),
               HasSubstr("mm"));
@@ -327,7 +327,7 @@ TEST_F(StatedByBoth, AUnitIsNoLikelyCauseWhereTheRightNumberIsZero) {
 /// A flywheel: one body on a joint of that kind, its centre of mass there; URDF and MJCF.
 struct OnePoint {
   const char* name;
-  const char* joints;  ///< Of the MJCF.
+  const char* joints;  ///< Joints of the MJCF.
   double mass, inertia;
 };
 

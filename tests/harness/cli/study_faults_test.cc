@@ -53,7 +53,7 @@ TEST_F(StudyCommand, TrialsHaveATimeLimit) {
   EXPECT_EQ(rows[0].result.outcome, Outcome::kTimedOut);
   EXPECT_THAT(rows[0].result.failure, HasSubstr("trial_time_limit, 0.5 s"));
   EXPECT_EQ(rows[1].result.outcome, Outcome::kTracked);
-  const ProgramResult report = Expect(0, "study report a.sqlite --out -");
+  const ProgramResult report = Expect(0, "study report a.sqlite --page -");
   EXPECT_THAT(report.out, HasSubstr("timed out"));
 }
 

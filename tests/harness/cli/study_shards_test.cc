@@ -44,7 +44,7 @@ TEST_F(StudyCommand, AMergeWithAConflictLeavesNothing) {
   const std::string conflict = "b.sqlite: trial 4 has another result than in ";
   EXPECT_TRUE(Refused("study merge all.sqlite a.sqlite b.sqlite", {conflict + "a.sqlite"}));
   EXPECT_EQ(list(), before);
-  // What was there stays as it was.
+  // An existing database stays as it was.
   Make("all.sqlite", {"--shard", "2/3"});
   const std::string all = Dump("all.sqlite");
   EXPECT_TRUE(Refused("study merge all.sqlite a.sqlite b.sqlite", {conflict}));

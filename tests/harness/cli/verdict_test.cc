@@ -33,7 +33,7 @@ TEST_F(Verdict, StandsWithoutATemporaryFolder) {
   for (const char* what : {"dexcheck: no video: TMPDIR: ", "dexcheck: no report: TMPDIR: "})
     EXPECT_THAT(result.err, HasSubstr(what));
   EXPECT_TRUE(IsRecorded());
-  // Where it is not optional, one line says so.
+  // One line names the folder where it is not optional.
   for (const char* command : {"run --replay run", "report run"})
     EXPECT_TRUE(IsRefused(Run(command, options), {"TMPDIR", missing}));
 }
@@ -84,7 +84,7 @@ TEST(StandardOutput, FullIsNoticedByWhateverPrints) {
   }
 }
 
-// What a scenario declares is no fault of the law: the run without it shows how much it explains.
+// A declared imperfection is no fault of the law: the run without it shows how much it explains.
 TEST_F(Verdict, ADeclaredMismatchIsTheCauseOfAMissedExpectation) {
   const Json result = RunJson(
       1, "run paper --no-log --set duration=0.3 --set 'mismatch.mass={ torso = 1.03 }'")["attribution"];

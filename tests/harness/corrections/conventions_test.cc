@@ -310,7 +310,7 @@ class Campaign {
     return false;
   }
 
-  /// Of a fault of several quantities, those that show: no unit changes a centre of mass at the origin.
+  /// Lists the visible ids of a fault of several quantities: no unit changes a centre of mass at the origin.
   static std::vector<std::string> ListVisible(const ConventionFault& fault, const Robot& robot,
                                               const StatedUrdf& spoilt) {
     std::vector<std::string> ids = fault.ids;
@@ -417,7 +417,7 @@ std::vector<Robot> ListRobots() {
 }
 
 TEST(ConventionCampaign, FaultsAreNamedOrLeftOpen) {
-  // Of so many faults one, another at the next robot.
+  // One fault in so many is tried, another one for the next robot.
   const char* const asked = std::getenv("DEXCHECK_CAMPAIGN_SAMPLE");
   const size_t sample = asked == nullptr ? 12 : std::max<size_t>(1, std::strtoul(asked, nullptr, 10));
   constexpr std::pair<const char*, const char*> kPairs[] = {

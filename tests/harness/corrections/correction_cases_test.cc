@@ -83,6 +83,11 @@ TEST(CorrectionCases, AFrameOnALinkIsCompared) {
   ASSERT_EQ(found.items.size(), 1U);
   EXPECT_EQ(found.items[0].fault.of, SiteKind::kRotation);
   EXPECT_THAT(found.items[0].places, ElementsAre("joint tool"));
+  // Of two MJCFs it is a frame in both.
+  const FileCorrections frames = FindCorrections(
+      Read("a.xml", Replace(kMjcf, "euler='0 0 0.4'", "euler='0 0 0.9'")), Read("b.xml", kMjcf));
+  ASSERT_EQ(frames.items.size(), 1U);
+  EXPECT_THAT(frames.items[0].places, ElementsAre("frame tip"));
 }
 
 TEST(CorrectionCases, AMountingIsNamed) {
@@ -159,7 +164,7 @@ TEST(CorrectionCases, TwoFaultsOfOneWeldedBodyAreBothNamed) {
                                     "value='0.713'/><inertia ixx='0.00113' iyy='0.00171' izz='0.00192' "
                                     "ixy='0.0001' ixz='0.0002' iyz='-0.0001'/></inertial></link>");
   const PrintedRobot right = ReadPrintedRobot(Read("right.urdf", fused));
-  // The same with one body in the place of the two.
+  // The other file has one body instead of the two.
   const std::string mjcf = Replace(
       Replace(kMjcf, "<site name='tip' pos='0.2 0.01 0' euler='0 0 0.4'/>",
               "<body name='tip' pos='0.2 0.01 0' euler='0 0 0.4'><inertial pos='0.03 0.05 0.11' mass='0.713' "
@@ -225,6 +230,26 @@ TEST_F(Rows, ThatAreClassicAreNamed) {
               ElementsAre("table.classic"));
 }
 
+// The file's word is not the rows'.
+TEST_F(Rows, ThatTheFileCallsClassicAreNamed) {
+  const std::string classic = Replace(ReadText(SourcePath("/controller/parameters/panda.toml")),
+                                      "prefix = \"panda_\"", "prefix = \"panda_\"\nconvention = \"classic\"");
+  EXPECT_THAT(ListIds(FindCorrections(ReadPrintedRobot(Read("classic.toml", classic)), mjcf_)),
+              ElementsAre("table.modified"));
+}
+
+TEST_F(Rows, WithAnAngleOfTheOtherSignAreNamed) {
+  for (const char* const joint : {"panda_joint4", "panda_joint5"}) {
+    PrintedRobot wrong = right_;
+    std::ranges::find_if(wrong.links, [&](const PrintedLink& link) {
+      return link.joint.name == joint;
+    })->origin.r[0] *= -1.0;
+    const FileCorrections found = FindCorrections(wrong, mjcf_);
+    ASSERT_THAT(ListIds(found), ElementsAre("place.sign_alpha"));
+    EXPECT_TRUE(found.items[0].rivals.empty());
+  }
+}
+
 TEST_F(Rows, ThatAreShiftedAreNamed) {
   EXPECT_THAT(Find([&](int i, PrintedRobot* robot) {
                 const PrintedOrigin& above = right_.link(right_.link(i).parent).origin;
@@ -239,6 +264,22 @@ TEST_F(Rows, InDegreesOrMillimetresAreNamed) {
   const auto ids = Find([](int i, PrintedRobot* robot) { robot->link(i).origin.r *= 180.0 / kPi; });
   EXPECT_THAT(ids, ElementsAre("rotation.degrees"));
   EXPECT_EQ(Find([](int i, PrintedRobot* robot) { robot->link(i).origin.r[0] *= -1.0; }).size(), 1U);
+}
+
+// The fault is in the second file: the first is right, and no patch makes it wrong.
+TEST(FaultsOfTheSecondFile, AreNamedThereWithoutAPatch) {
+  const std::string folder = SourcePath("/harness/descriptions/examples/field_cases/");
+  const DescriptionFile arm(folder + "arm.urdf");
+  const auto expect = [&](const std::string& name, const std::string& id, size_t places) {
+    const FileCorrections found = FindCorrections(arm, DescriptionFile(folder + name));
+    ASSERT_THAT(ListIds(found), ElementsAre(id)) << name;
+    EXPECT_TRUE(found.items[0].in_second) << name;
+    EXPECT_EQ(found.items[0].places.size(), places) << name;
+    EXPECT_TRUE(found.items[0].patches.empty()) << name;
+  };
+  expect("rpy_lost.xml", "inertia.no_axes", 1);
+  expect("about_origin.urdf", "inertia.about_origin", 2);
+  expect("inertials_lost.xml", "body.missing", 3);
 }
 
 TEST(MjcfInMemory, IsRefusedForTheEnginesReason) {

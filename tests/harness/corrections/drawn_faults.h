@@ -17,7 +17,7 @@ struct MadeFault {
   SiteKind of = SiteKind::kMass;
   std::vector<CorrectionKind> kinds;  ///< That say the same.
   std::vector<std::string> places;    ///< "joint q1", "link l1": all of them, or of an exchange one.
-  std::vector<std::string> hardly;    ///< Where it changes little, and may be listed or not.
+  std::vector<std::string> hardly;    ///< Places with little change, which may be listed or not.
   bool any_place = false;
 };
 

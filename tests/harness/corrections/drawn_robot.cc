@@ -22,8 +22,10 @@ Matrix3d Turn(const Vector3d& rpy) {
       .toRotationMatrix();
 }
 Vector3d SolveAngles(const Matrix3d& R) {
-  return {std::atan2(R(2, 1), R(2, 2)), std::asin(std::clamp(-R(2, 0), -1.0, 1.0)),
-          std::atan2(R(1, 0), R(0, 0))};
+  constexpr double kGimbal = 1e-9;
+  const double pitch = std::asin(std::clamp(-R(2, 0), -1.0, 1.0));
+  if (std::hypot(R(2, 1), R(2, 2)) < kGimbal) return {0.0, pitch, std::atan2(-R(0, 1), R(1, 1))};
+  return {std::atan2(R(2, 1), R(2, 2)), pitch, std::atan2(R(1, 0), R(0, 0))};
 }
 Matrix3d Tensor(const Vector6d& e) {
   Matrix3d I;

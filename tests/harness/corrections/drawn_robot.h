@@ -49,13 +49,13 @@ struct DrawnRobot {
 struct WrittenForm {
   enum class Format { kUrdf, kMjcf, kToml } format = Format::kUrdf;
   int digits = 6;
-  bool other_names = false;   ///< Of bodies.
+  bool other_names = false;   ///< Whether bodies have other names.
   bool other_frames = false;  ///< On every link, at random.
   bool fuses = false;         ///< Fixed links are part of what carries them.
   bool euler = false;         ///< In place of quaternions.
   bool principal = false;     ///< Moments and a quaternion in place of a full tensor.
   bool motors = false;
-  unsigned seed = 0;  ///< Of the frames.
+  unsigned seed = 0;  ///< Seed of the frames.
 };
 
 DrawnRobot DrawRobot(std::mt19937* random);

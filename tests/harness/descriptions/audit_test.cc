@@ -133,7 +133,7 @@ INSTANTIATE_TEST_SUITE_P(
                   R"(suspicious name: joint Left its name is that of "left" but for case and punctuation)"}),
     CaseName());
 
-// What each finding does to M is said: a point mass on the axis leaves it singular.
+// Each finding names its effect on M: a point mass on the axis leaves it singular.
 TEST(Audit, SaysWhatItDoesToTheMassMatrix) {
   const std::string point = R"(<robot name="point"><link name="base"/>
   <link name="rotor"><inertial><origin xyz="0 0 0.1"/><mass value="1"/>

@@ -116,7 +116,7 @@ class Stubborn : public LayoutProvider {
   [[nodiscard]] const std::string& name() const override { return model_.name(); }
 
   TermResults Evaluate(long, const VectorXd& q, const VectorXd& xi) override {
-    // What reaches it are numbers as the convention that it is taken to speak has them.
+    // The provider gets numbers in the convention that it is taken to use.
     const VectorXd positions = layout().WritePositions(q);
     const VectorXd velocities = layout().WriteVelocities(q, xi);
     VectorXd own_q = positions;

@@ -94,7 +94,7 @@ TEST(CoupledJoints, FaultsInTablesAreNamed) {
   expect("dry_friction = 0.4", "dry_friction = -0.4", "dry_friction");
 }
 
-// The same gripper for the engine: a0 + a1 q of equality/joint, the right finger's of the left one.
+// The gripper in MJCF: a0 + a1 q of equality/joint, the right finger's by the left one.
 constexpr const char* kGripperMjcf = R"(<mujoco><compiler angle="radian"/><worldbody><body name="arm">
   <body name="palm" pos="0 0 0.1">
     <joint name="wrist" axis="1 0 0" damping="0.1" armature="0.01" frictionloss="0.4" limited="true" range="-1 1"/>

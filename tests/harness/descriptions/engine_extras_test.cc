@@ -1,5 +1,5 @@
-// What two MJCFs have besides the mechanism (motors, springs, tendons, constraints, flags), compared with
-// each other; and motors beside a URDF.
+// Parts of two MJCFs besides the mechanism (motors, springs, tendons, constraints, flags), compared with each
+// other; and motors beside a URDF.
 
 #include "harness/descriptions/engine_extras.h"
 
@@ -150,7 +150,7 @@ TEST_F(TwoMjcfs, MayBothBeWithoutGravitysFlag) {
   EXPECT_THAT(List(Compare(kArm, off)), HasSubstr("disable_flag: Gravity: 0 in a.xml, 1 in b.xml"));
 }
 
-// What <joint type="free"> takes from the defaults of <joint>.
+// A joint of type "free" takes some defaults of joints.
 TEST_F(TwoMjcfs, CompareWhatActsOnTheJointOfTheBase) {
   const std::string damped = ReplaceOnce(kArm, R"(<body name="upper"><joint name="shoulder" axis="0 1 0"/>)",
                                          R"(<body name="upper"><joint type="free" limited="false"/>)");

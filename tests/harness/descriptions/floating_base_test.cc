@@ -108,7 +108,8 @@ TEST_P(LeggedRobots, FaultsOfTheBaseAreFound) {
   expect(fmt::format(R"(<mass value="{}"/>)", link.mass), R"(<mass value="5"/>)", "link_mass");
 }
 
-// What publishers call a floating base: an empty footprint, a joint of the type "floating", the name "world".
+// Publishers declare a floating base by an empty footprint, a joint of the type "floating", or the name
+// "world".
 TEST_P(LeggedRobots, RootsThatPublishersWrite) {
   const std::string base = links_[0].name;
   const auto with_root = [&](const std::string& root) {

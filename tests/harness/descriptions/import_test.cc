@@ -109,7 +109,7 @@ TEST(Import, OfTheShippedPandaReadsBackToTheSameModel) {
   const RobotModel imported = ParseRobotModel(text, "imported.toml");
   ExpectSameModel(RobotModel(robot.spec), imported, &random);
   ExpectSameModel(ReadRobotModel(SourcePath("/controller/parameters/panda.toml")), imported, &random);
-  // What a person would have written.
+  // The text is one that a person would write.
   EXPECT_THAT(text, HasSubstr(R"({ joint = "panda_joint1", link = "panda_link1", xyz = [0, 0, 0.333] },)"));
   EXPECT_THAT(text, HasSubstr(R"(rpy = ["-pi / 2", 0, 0])"));
   EXPECT_THAT(text, HasSubstr("mass = 3.228604\ncom = [0.027518, 0.039252, -0.066502]\n"));
@@ -146,7 +146,7 @@ TEST(MjcfDescription, IsTheEnginesModel) {
   const Adapter adapter(model, *engine, "odd.xml");
   const ConsistencyResult result = CheckConsistency(adapter, options, [](long) { return true; });
   for (const CheckRecord& record : result.terms) EXPECT_FALSE(record.failed) << record.name;
-  // What tables have no place for, and the description has.
+  // Tables have no place for some parts of the description.
   std::vector<std::string> found;
   for (const ConstantFinding& finding : result.constants.findings) found.push_back(finding.check);
   EXPECT_THAT(found, ElementsAre("equality_constraint"));
@@ -188,7 +188,7 @@ TEST(MjcfDescription, OneBodyThatFloatsIsARobot) {
   EXPECT_TRUE(CompareFiles(table, file, {}, options).result.Agrees());
 }
 
-// As `dexcheck` names them: "#" and the number in the engine's model.
+// The names are `dexcheck`'s: "#" and the number in the engine's model.
 TEST(MjcfDescription, JointsAndBodiesWithoutNamesAreCounted) {
   const TempFolder folder;
   const std::filesystem::path file = folder.path() / "arm.xml";
@@ -208,7 +208,7 @@ TEST(MjcfDescription, JointsAndBodiesWithoutNamesAreCounted) {
   EXPECT_TRUE(CompareFiles(table, file, {}, options).result.Agrees());
 }
 
-// What is in a URDF costs no more than what is in a table: both become the same analytic model.
+// A URDF's numbers cost no more than a table's: both become the same analytic model.
 TEST(ImportedRobot, IsOfTheTablesSize) {
   std::mt19937 random(50);
   RandomRobotOptions robot;

@@ -1,4 +1,4 @@
-// What the digits of a file leave open.
+// Uncertainty by the printed digits of a file.
 
 #include "harness/descriptions/printed_digits.h"
 

@@ -215,7 +215,7 @@ TEST(Urdf, KeepsAnyNameInATable) {
   EXPECT_EQ(table.joints()[2].parent, 1);
 }
 
-// What counts is the body that a part is welded to; published robots have many such parts.
+// Only the body that a part is welded to must be possible; published robots have many impossible parts.
 TEST(Urdf, TakesPartsThatNoBodyCanBe) {
   const std::string point =
       R"(<mass value="0.2"/><inertia ixx="0" ixy="0" ixz="0" iyy="0" iyz="0" izz="0"/>)";
@@ -241,7 +241,7 @@ TEST(Urdf, LeavesOutMaterialsThatAreNotUnique) {
   EXPECT_EQ(WriteParameters(twice, "hand.urdf"), WriteParameters(once, "hand.urdf"));
 }
 
-// What only a body that no robot can have stands against is still read by the audit.
+// A file that is refused for an impossible body alone is still read by the audit.
 TEST(Urdf, ARefusalOfABodyPointsToTheAudit) {
   const TempFolder folder;
   const auto read = [&](const std::string& original, const std::string& changed) -> std::string {

@@ -152,7 +152,7 @@ INSTANTIATE_TEST_SUITE_P(
                    Cause::kModel,
                    "gravity 2 (bound 1), first above it at t = 0.25 s",
                    {{"traction_use", "model"}}},
-        // Where the model holds, the object's balance lacks a force.
+        // The object's balance lacks a force where the model holds.
         Attributed{{{"cone_use", 0.1}, {"inverse_dynamics_object", 0.9}},
                    Cause::kUnmodelledForce,
                    "inverse_dynamics_object"},
@@ -162,7 +162,7 @@ INSTANTIATE_TEST_SUITE_P(
             Cause::kWheelSlip,
             "traction_use",
             {{"wheel_slip", "wheel slip"}, {"penetration", "contact softness"}, {"base_tilt", "wheel slip"}}},
-        // Of several that slide the first counts; at one time the motor, which can make anything slide.
+        // The first of several slips counts; at one time the motor, which can make anything slide.
         Attributed{{{"cone_use", 0.2}, {"traction_use", 0.1}},
                    Cause::kWheelSlip,
                    "traction_use",
@@ -245,7 +245,7 @@ TEST(Attribute, RanksFactsAmongFaults) {
   }
 }
 
-// What a fact makes void is neither a fault nor a fact of its own.
+// A failure that a fact makes void is neither a fault nor a fact of its own.
 TEST(Attribute, AForceAfterWheelsSlideIsTheirs) {
   FakeRun run;
   run.Fail("traction_use", 0.1).Fail("inverse_dynamics_robot", 0.2).Fail("rolling", 0.2);
@@ -350,19 +350,6 @@ TEST(CheckTable, SaysWhatEachFailureMeansWithoutTies) {
   std::sort(precedences.begin(), precedences.end());
   EXPECT_EQ(std::adjacent_find(precedences.begin(), precedences.end()), precedences.end());
   EXPECT_EQ(FindCheck("M_bar"), nullptr);
-}
-
-TEST(NameOf, CausesHaveDifferentNames) {
-  std::vector<std::string> names;
-  for (const Cause cause :
-       {Cause::kNone, Cause::kModel, Cause::kActuatorLimit, Cause::kJointLimit, Cause::kFingertipSlip,
-        Cause::kWheelSlip, Cause::kContactSoftness, Cause::kTilt, Cause::kSolver, Cause::kSensing,
-        Cause::kControlLaw, Cause::kActuator, Cause::kUnmodelledForce, Cause::kSlope, Cause::kWheelGeometry,
-        Cause::kCollision, Cause::kUnexplained}) {
-    names.emplace_back(NameOf(cause));
-  }
-  std::sort(names.begin(), names.end());
-  EXPECT_EQ(std::adjacent_find(names.begin(), names.end()), names.end());
 }
 
 }  // namespace

@@ -23,12 +23,12 @@ constexpr double kErrors = 4.0;
 // Sums over 200 rows, whose terms are of size 1: their rounding.
 constexpr double kRounding = 1e-10;
 
-/// What columns of full rank leave over of x: x - C (C^T C)^-1 C^T x.
+/// Returns the rest of x beyond columns of full rank: x - C (C^T C)^-1 C^T x.
 VectorXd CalcLeftOver(const VectorXd& x, const MatrixXd& C) {
   return x - C * SolveDense(C.transpose() * C, C.transpose() * x);
 }
 
-/// What is drawn; every test has one of its own.
+/// Random numbers; every test has a seed of its own.
 class Random {
  public:
   explicit Random(unsigned seed) : random_(seed) {}
@@ -68,7 +68,7 @@ std::vector<size_t> ChosenOf(const CauseSelection& selection) {
   return chosen;
 }
 
-/// Of the candidate; a term of its own where it was not chosen, which is not so anywhere.
+/// Returns the candidate's term, or an empty one where it was not chosen, which occurs in no test.
 CauseTerm TermOf(const CauseSelection& selection, size_t candidate) {
   for (const CauseTerm& term : selection.terms)
     if (term.candidate == candidate) return term;
@@ -145,7 +145,6 @@ TEST(CauseEstimator, FractionsAndResidualAreThoseOfTheFit) {
   EXPECT_NEAR(TermOf(selection, 4).fraction, CalcLeft(y, a) / y.squaredNorm(), kRounding);
 }
 
-// log odds = N/2 (log(1 + |r_other|^2 / N) - log(1 + |r|^2 / N)), where both have one amplitude.
 // |y|^2 is 1e28: what is left of it, 1e4, is less than its rounding.
 TEST(CauseEstimator, WhatIsLeftOfLargeResidualsIsNotTheirRounding) {
   Random random(20);
@@ -159,6 +158,7 @@ TEST(CauseEstimator, WhatIsLeftOfLargeResidualsIsNotTheirRounding) {
   EXPECT_NEAR(selection.criterion, expected, 1.0);
 }
 
+// log odds = N/2 (log(1 + |r_other|^2 / N) - log(1 + |r|^2 / N)), where both have one amplitude.
 TEST(CauseEstimator, WhatExplainsItWorseIsTheRival) {
   for (const double apart : {0.0, 0.05, 0.2, 0.35, 0.5, 1.0}) {
     SCOPED_TRACE(apart);
@@ -213,7 +213,7 @@ TEST(CauseEstimator, NoiseIsNotExplained) {
   for (unsigned seed = 0; seed < kSeeds; ++seed) {
     const VectorXd noise = Random(1000 + seed).Normal();
     named += Select(noise, candidates).terms.empty() ? 0 : 1;
-    // The same noise hides no fault that there is.
+    // This noise hides no real fault.
     found += ChosenOf(Select(noise + candidates[5].columns, candidates)) == std::vector<size_t>{5} ? 1 : 0;
   }
   EXPECT_LE(named, kSeeds / 100);
@@ -229,7 +229,7 @@ TEST(CauseEstimator, NoFrictionIsNegative) {
   const CauseTerm positive = TermOf(Select(2.0 * c + noise, candidates), 10);
   ExpectAmplitude(positive, 2.0, c.norm());
   EXPECT_TRUE(Select(-2.0 * c + noise, candidates).terms.empty());
-  // What explains it nearly as well is taken, and the friction is no member of its class.
+  // The best other explanation is taken, and the friction is no member of its class.
   candidates[20].columns = c + 0.1 * random.Normal();
   const CauseSelection other = Select(-2.0 * c + noise, candidates);
   const CauseTerm negative = TermOf(other, 20);
@@ -261,7 +261,7 @@ TEST(CauseEstimator, WhatIsTooFaintToShowIsNotEstimated) {
     SCOPED_TRACE(is_bounded);
     Random random(7);
     std::vector<Candidate> candidates = random.Candidates();
-    // Of plausible size 1 the second column adds a fifth of the noise to the sum over all rows.
+    // With the plausible size 1, the second column adds a fifth of the noise to the sum over all rows.
     MatrixXd& C = candidates[10].columns;
     C.conservativeResize(kRows, 2);
     C.col(1) = 0.2 * random.Normal().normalized();
@@ -315,17 +315,18 @@ TEST(CauseEstimator, RowsOfOneNoiseWidenTheErrors) {
   Random random(10);
   const std::vector<Candidate> candidates = random.Candidates();
   const VectorXd y = 3.0 * candidates[10].columns - 4.0 * candidates[20].columns + random.Normal();
-  const CauseSelection own = Select(y, candidates), alike = Select(y, candidates, {.alike = kAlike});
+  const CauseSelection own = Select(y, candidates),
+                       alike = Select(y, candidates, {.noise_block_size = kAlike});
   ASSERT_EQ(ChosenOf(own), (std::vector<size_t>{10, 20}));
   ASSERT_EQ(ChosenOf(alike), (std::vector<size_t>{10, 20}));
   for (const size_t fault : {10u, 20u}) {
     EXPECT_EQ(TermOf(alike, fault).amplitude[0], TermOf(own, fault).amplitude[0]);
     EXPECT_NEAR(TermOf(alike, fault).error[0], std::sqrt(kAlike) * TermOf(own, fault).error[0], kRounding);
   }
-  // What is beyond doubt with 200 rows is not with 200 that are 2.
+  // A cause that is certain with 200 rows is not with 200 that are worth 2.
   const VectorXd small = candidates[10].columns + random.Normal();
   EXPECT_EQ(ChosenOf(Select(small, candidates)), std::vector<size_t>{10});
-  EXPECT_TRUE(Select(small, candidates, {.alike = 100.0}).terms.empty());
+  EXPECT_TRUE(Select(small, candidates, {.noise_block_size = 100.0}).terms.empty());
 }
 
 // c3 = c1 + c2 + d is the best one alone. Of 1.5 c1 + c2 it is left behind when c2 follows; to c1 + c2

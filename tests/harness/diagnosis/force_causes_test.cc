@@ -1,5 +1,4 @@
-// What explains the balances, step by step of the estimator, on a right run to whose residuals forces are
-// added.
+// Causes of the balances, step by step of the estimator, on a right run with forces added to the residuals.
 
 #include <gtest/gtest.h>
 
@@ -82,7 +81,7 @@ constexpr double kTimeStep = 1e-3;  // s
 INSTANTIATE_TEST_SUITE_P(
     All, SeveralForces,
     ::testing::Values(
-        // What the columns of a large fault hide shows once only rounding is noise.
+        // A small force that the columns of a large fault hide appears once only rounding is noise.
         Pushes{"SmallBesideLarge",
                4,
                [](int) -> VectorXd { return Torque(1, 1.0) + Torque(4, 5e-5); },
@@ -104,14 +103,14 @@ INSTANTIATE_TEST_SUITE_P(
                  return Torque(1, 0.7) + Torque(3, 2.5 * 4 * kTimeStep * std::max(0.0, k - 13.4));
                },
                {TorqueAt(2, 0.7), GrowingAt(4, 2.5)}},
-        // What grows changes more from step to step than what begins beside it.
+        // A growing force changes more from step to step than one that begins beside it.
         Pushes{"ForAWhileBesideGrowing",
                1,
                [](int k) -> VectorXd {
                  return Torque(1, 0.05 * k + 0.02) + Torque(3, 9 <= k && k < 17 ? 0.1 : 0.0);
                },
                {GrowingAt(2, 0.05 / kTimeStep), TorqueAt(4, 0.1)}},
-        // Of two jumps that follow each other neither is taken for how the other one's neighbours change.
+        // Neither of two successive jumps is taken for the change of the other one's neighbours.
         Pushes{
             "BeginsBeforeAnotherEnds",
             1,
@@ -119,7 +118,7 @@ INSTANTIATE_TEST_SUITE_P(
             {TorqueAt(2, 0.7), TorqueAt(4, 0.4)}}),
     [](const ::testing::TestParamInfo<Pushes>& info) { return info.param.name; });
 
-// Of a single step several faults explain anything: made-up torques are none of them.
+// Several faults explain anything in a single step: made-up torques are none of them.
 TEST(ForceCauses, OfOneStepNoSeveralFaultsAreNamed) {
   for (int draw = 0; draw < 20; ++draw) {
     const Causes causes = Explain(200 + draw, 4, 1, [&](int) -> VectorXd {

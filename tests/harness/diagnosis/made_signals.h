@@ -38,7 +38,7 @@ inline ArrayXd CalcTorque() {
   return 2.0 * (2.0 * kPi * 12.0 * t + 0.4).sin() + 0.8 * (2.0 * kPi * 29.0 * t + 1.0).sin() + 0.1;
 }
 
-/// Of one sign.
+/// Torques of one sign.
 inline ArrayXd CalcPositiveTorque() { return 4.0 + CalcTorque(); }
 
 /// That of another motor, which is unlike.
@@ -70,7 +70,7 @@ inline Causes Explain(const SignalSeries& series) {
   return ExplainSignals({series, other}, CauseChannel::kActuation);
 }
 
-/// What a motor gives that does this: `got` as a function of the step.
+/// Returns the torques of a motor with this fault: `got` as a function of the step.
 inline ArrayXd MakeEach(const std::function<double(Index)>& got) {
   ArrayXd all(kSteps);
   for (Index i = 0; i < kSteps; ++i) all[i] = got(i);
@@ -128,7 +128,7 @@ inline std::vector<std::string> NamesOf(const Explanation& explanation) {
   return names;
 }
 
-/// Of the class; NaN where it is no member.
+/// Returns the value of a member of the class; NaN for others.
 inline double ValueOf(const Explanation& explanation, const std::string& name) {
   for (const Fault& fault : explanation.faults)
     if (fault.fault == name) return fault.value;

@@ -24,49 +24,41 @@ struct Files {
   const char* name;
   RobotModel (*read)();
   const char* mjcf;
-  size_t formulas;
+  size_t formulas, terms;
+  bool spoils_all;  // terms of the engine
 };
 
 class WrongEquations : public ::testing::TestWithParam<Files> {};
 
-TEST_P(WrongEquations, AreAllFoundByTheCheckThatTheyBelongTo) {
+// A term on both sides of its own comparison, or one that nothing can spoil, would say "ok" for ever.
+TEST_P(WrongEquations, AreFoundByTheirCheckAndFailEveryTerm) {
   const RobotModel model = GetParam().read();
   const MjModelPtr engine = LoadMjcf(SourcePath(GetParam().mjcf));
-  const Adapter adapter(model, *engine, "mjcf");
-  std::vector<FormulaMutant> mutants = ListFormulaMutants(model);
-  EXPECT_GE(mutants.size(), GetParam().formulas);
-  for (FormulaMutant& mutant : mutants) {
-    RunFormulaMutant(adapter, kSamples, &mutant);
-    EXPECT_EQ(mutant.outcome, MutantOutcome::kKilled) << mutant.name;
-    EXPECT_TRUE(mutant.named_first) << mutant.name << ": " << mutant.failed_checks;
-  }
-}
-
-// A term on both sides of its own comparison, or one that nothing can spoil, would say "ok" for ever.
-TEST(FormulaMutants, FailEveryTermThatConsistencyCompares) {
-  const RobotModel model = ReadPaperRobot();
-  const MjModelPtr engine = LoadMjcf(SourcePath("/mjcf/scene.xml"));
   const Adapter adapter(model, *engine, "mjcf");
   ConsistencyOptions options;
   options.samples = kSamples;
   std::set<std::string> names;
   for (const CheckRecord& record : CheckConsistency(adapter, options, [](long) { return true; }).terms)
     names.insert(record.name);
-  EXPECT_GE(names.size(), 20U);
-  for (FormulaMutant& mutant : ListFormulaMutants(model)) {
+  EXPECT_GE(names.size(), GetParam().terms);
+  std::vector<FormulaMutant> mutants = ListFormulaMutants(model);
+  EXPECT_GE(mutants.size(), GetParam().formulas);
+  for (FormulaMutant& mutant : mutants) {
     RunFormulaMutant(adapter, kSamples, &mutant);
+    EXPECT_EQ(mutant.outcome, MutantOutcome::kKilled) << mutant.name;
+    EXPECT_TRUE(mutant.named_first) << mutant.name << ": " << mutant.failed_checks;
     std::istringstream failed(mutant.failed_checks);
     for (std::string name; failed >> name;) names.erase(name);
   }
-  EXPECT_THAT(names, ::testing::IsEmpty());
+  if (GetParam().spoils_all) EXPECT_THAT(names, ::testing::IsEmpty());
 }
 
 INSTANTIATE_TEST_SUITE_P(
     Robots, WrongEquations,
-    ::testing::Values(Files{"Assistant", [] { return ReadPaperRobot(); }, "/mjcf/scene.xml", 85},
+    ::testing::Values(Files{"Assistant", [] { return ReadPaperRobot(); }, "/mjcf/scene.xml", 85, 20, true},
                       Files{"AssistantWheelRates", [] { return ReadPaperRobot(DriveVelocity::kWheelRates); },
-                            "/mjcf/scene.xml", 85},
-                      Files{"Panda", [] { return ReadPanda(); }, "/mjcf/panda.xml", 24}),
+                            "/mjcf/scene.xml", 85, 20, false},
+                      Files{"Panda", [] { return ReadPanda(); }, "/mjcf/panda.xml", 24, 10, false}),
     [](const auto& info) { return info.param.name; });
 
 TEST(ContactCheck, AgreesAtRandomContacts) {
@@ -124,7 +116,7 @@ MutatedPair ReadPandaPair() {
                      DescriptionFile(SourcePath("/mjcf/panda.xml")));
 }
 
-// What is changed of the Panda's table is named with its place and its quantity.
+// A change of the Panda's table is named with its place and its quantity.
 TEST(Mutants, OfThePandaAreNamed) {
   const MutatedPair pair = ReadPandaPair();
   int found = 0, named = 0;

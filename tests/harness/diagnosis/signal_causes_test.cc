@@ -31,7 +31,7 @@ Case MakeCase(const std::string& name, std::vector<Fault> faults,
           std::move(faults)};
 }
 
-/// Of what moves with CalcRate().
+/// Makes friction of a motion with CalcRate().
 Case MakeFriction(const std::string& name, const Fault& fault, const std::function<double(double)>& force) {
   return {name,
           [force] {
@@ -61,7 +61,7 @@ SignalSeries MakePosition(const ArrayXd& expected, const ArrayXd& got) {
   return series;
 }
 
-/// What follows at a distance, on both sides.
+/// Returns a position that follows at a distance, on both sides.
 ArrayXd MakePlay(double half) {
   ArrayXd got = CalcPosition();
   for (Index i = 1; i < kSteps; ++i)
@@ -166,7 +166,7 @@ struct Unknown {
   std::function<SignalSeries()> make;
 };
 
-/// What a motor gives that takes something of another signal, or of a power of its own.
+/// Makes a motor whose torque contains another signal, or a power of its own.
 Unknown MakeUnknown(const std::string& name, const std::function<ArrayXd()>& added) {
   return {name, [added] { return MakeMoving(CalcTorque() + added()); }};
 }
@@ -179,7 +179,7 @@ Unknown MakeLost(const std::string& name, bool reads_zero) {
           }};
 }
 
-// What is no fault that is known gets no other one's name.
+// An unknown fault does not get the name of a known one.
 class UnknownFault : public ::testing::TestWithParam<Unknown> {};
 
 TEST_P(UnknownFault, IsNotExplained) {
@@ -249,8 +249,7 @@ TEST(SignalCauses, DeadZoneIsNotOver) {
   EXPECT_TRUE(causes.front().faults.front().IsLike(OfMotor("offset", -0.1)));
 }
 
-// Of a torque that hardly changes, a gain leaves 1e-7 of what an offset does, which is far more than
-// rounding.
+// A gain leaves 1e-7 of the offset of a torque that hardly changes, which is far more than rounding.
 TEST(SignalCauses, OffsetOfWhatHardlyChangesIsNoGain) {
   const ArrayXd u = 1.0 + 3e-8 * CalcTorque();
   const Causes causes = Explain(MakeSeries(u, u + 0.01));
@@ -286,11 +285,11 @@ TEST(SignalCauses, RoundingIsNeverNamed) {
       const ArrayXd change = size * noise / patterns[i].abs().maxCoeff() * patterns[i];
       const Causes causes = Explain(MakeSeries(u, u + change));
       SCOPED_TRACE(std::to_string(i) + ", " + std::to_string(size) + ": " + TextOf(causes));
-      // What is smaller than rounding is nothing at all.
+      // A change below rounding is nothing at all.
       EXPECT_EQ(causes.size(), size < 1.0 ? 0u : 1u);
       for (const Explanation& one : causes) EXPECT_EQ(one.outcome, CauseOutcome::kNotExplained);
     }
-    // The same pattern is named where it is a fault.
+    // The pattern is named where it is a fault.
     const Causes causes = Explain(MakeSeries(u, u + 0.1 * patterns[i]));
     ASSERT_EQ(causes.size(), 1u);
     EXPECT_NE(causes.front().outcome, CauseOutcome::kNotExplained) << i << ": " << TextOf(causes);
@@ -370,7 +369,7 @@ TEST(SignalCauses, RestingReadingIsStuckOrOff) {
   }
 }
 
-// Of a torque it is a limit as well.
+// A limit is a candidate for a torque.
 TEST(SignalCauses, PositionHasNoLimit) {
   const ArrayXd got = ArrayXd::Constant(kSteps, 0.9);
   EXPECT_THAT(NamesOf(Explain(MakeSeries(CalcPositiveTorque(), got)).front()), ::testing::Contains("limit"));

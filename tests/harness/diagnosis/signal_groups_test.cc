@@ -1,4 +1,4 @@
-// What all motors have alike is told once, and what one of them has besides is judged beside that.
+// A fault that all motors share is reported once, and a further fault of one motor is judged beside it.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -45,7 +45,7 @@ TEST_P(MotorBesideAll, BothAreNamed) {
 ArrayXd Delay(const ArrayXd& u, Index steps) {
   return MakeEach([&](Index i) { return Back(u, i, steps); });
 }
-/// What was sent before the first step is not known.
+/// The commands before the first step are unknown.
 ArrayXd DelayUnknown(const ArrayXd& u, Index steps) {
   ArrayXd late = Delay(u, steps);
   late.head(steps) += 0.1;
@@ -88,7 +88,7 @@ INSTANTIATE_TEST_SUITE_P(
                [](const ArrayXd& u) { return ArrayXd(u + 0.3); }}),
     [](const ::testing::TestParamInfo<Beside>& info) { return info.param.name; });
 
-// What its rounding by all leaves of a motor's own steps or noise has another size.
+// Rounding by all changes the size of a motor's own steps or noise.
 TEST(SignalCauses, StepsAndNoiseBeforeTheStepsOfAllAreNotExplained) {
   const std::vector<std::pair<double, std::function<ArrayXd(const ArrayXd&)>>> made = {
       {0.01, [](const ArrayXd& u) { return Round(u, 0.217); }},
@@ -121,7 +121,7 @@ TEST(SignalCauses, SilentMotorIsOneOfAllThatRound) {
   ExpectNamed(all, {{"rounding to steps of", "all motors", 0.01, 0.0, "N m", ""}});
 }
 
-// Of a robot without an object joints are all that moves.
+// Joints are all that moves in a robot without an object.
 TEST(SignalCauses, DelayOfAllThatMovesIsOfEverything) {
   for (const bool has_object : {false, true}) {
     Motors readings =

@@ -268,7 +268,7 @@ TEST_P(AdapterTest, VelocitiesAreDerivativesOfPositions) {
 
 TEST_P(AdapterTest, BiasIsTheDerivativeOfTheMap) {
   constexpr double kStep = 1e-5;
-  // As above; measured at most 2.4e-10.
+  // The tolerance follows as above; measured at most 2.4e-10.
   constexpr double kDifferences = 2e-9;
   for (const Coordinates coordinates : AllCoordinates()) {
     VelocityMap map(adapter(), coordinates);

@@ -90,7 +90,8 @@ TEST(SolidDistance, ReportsHowDeepBodiesOverlap) {
   }
 }
 
-// What is apart stays apart when both grow by less than the distance, and touches when one grows by more.
+// Solids that are apart stay apart when both grow by less than the distance, and touch when one grows by
+// more.
 TEST(SolidDistance, IsBetweenABoundOfEitherSide) {
   std::mt19937 random(3);
   std::normal_distribution<double> draw;
@@ -229,7 +230,7 @@ TEST_F(ClearanceTest, MissesNoOverlapAndMeasuresFew) {
   }
   EXPECT_GT(overlapped, 2);
   EXPECT_GT(pairs.size(), 1000U);
-  // Of all pairs a hundredth a step.
+  // At most a hundredth of all pairs is measured in a step.
   EXPECT_LT(clearance.measured() - before, static_cast<long>(pairs.size()) * kSteps / 100);
 }
 

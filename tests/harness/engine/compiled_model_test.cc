@@ -126,7 +126,7 @@ TEST(RemoveLooks, KeepsWhatAnythingRefersTo) {
   EXPECT_GT(contacts, 0);
 }
 
-// What follows the array of the materials, which has no rows, stays as it is.
+// The arrays after that of the materials, which has no rows, stay as they are.
 TEST(RemovePictures, OfAModelWithoutMaterialsLeavesItsMotors) {
   MjModelPtr model = LoadMjcfText(R"(
     <mujoco>

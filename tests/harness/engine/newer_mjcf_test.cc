@@ -64,7 +64,7 @@ std::vector<double> CalcTerms(const std::string& text) {
   return {*GetMassEntries(*data), data->qfrc_bias[0], data->qfrc_passive[0]};
 }
 
-/// What later releases have is new to 2.2.2 alone.
+/// Words of later releases are new to 2.2.2 alone.
 #define NEEDS_2_2_2() \
   if (mjVERSION_HEADER != 222) GTEST_SKIP() << "needs MuJoCo 2.2.2, this is " << mj_versionString()
 
@@ -101,7 +101,7 @@ INSTANTIATE_TEST_SUITE_P(
         Words{.sensor = R"(delay="0.1" nsample="3")"}, Words{.root = "<sensor><e_kinetic/></sensor>\n"},
         Words{.root = "<sensor><contact geom1=\"a\"/><plugin/></sensor><extension><plugin/></extension>\n"}));
 
-/// What acts on the dynamics is refused in one line, with its place, since when it is, and what to do.
+/// Words that act on the dynamics are refused in one line, with place, release and remedy.
 struct Refused {
   Words words;
   std::string message;
@@ -167,7 +167,7 @@ TEST(NewerMjcf, WhatIsNoMjcfIsNamed) {
   EXPECT_TRUE(Throws<InputError>([] { Downgrade("<model/>", "f"); }, "f: must be an MJCF"));
 }
 
-/// As later releases take it; 2.2.2 asks for "limited".
+/// A range limits, as in later releases; 2.2.2 requires "limited".
 TEST(NewerMjcf, ARangeLimits) {
   for (const auto& [words, limited] : {std::pair("", 1), std::pair(R"(limited="false")", 0)}) {
     const MjModelPtr model =
@@ -178,7 +178,7 @@ TEST(NewerMjcf, ARangeLimits) {
   }
 }
 
-// What 2.2.2 alone says, as the release that reads it does.
+// Words that only 2.2.2 has are read by later releases, with the same effect.
 TEST(OlderMjcf, IsReadByLaterReleases) {
   const std::string words =
       WriteMjcf({.compiler = R"(convexhull="true" exactmeshinertia="false")",

@@ -160,12 +160,12 @@ double HeightAfterFall(bool exact) {
 TEST(TorusCollision, BallFallsThroughTheHole) {
   // Free fall from 0.1 m for 0.5 s ends at 0.1 - g t^2 / 2 = -1.13 m (Euler's first step adds g t dt / 2).
   EXPECT_NEAR(HeightAfterFall(true), 0.1 - 0.5 * 9.81 * 0.25, 0.005);
-  // The same mesh without the mark is its convex hull: the ball stays on it.
+  // Without the mark the same mesh is its convex hull: the ball stays on it.
   EXPECT_GT(HeightAfterFall(false), 0.0);
 }
 
-// What is seen of the shipped objects is what touches: the meshes' vertices lie on the surface that the mark
-// describes, in the body's frame.
+// The visible shape of the shipped objects is their contact shape: the meshes' vertices lie on the surface
+// that the mark describes, in the body's frame.
 TEST(TorusCollision, ShippedMeshesShowTheSurface) {
   constexpr double kFloats = 1e-6;  // coordinates of some 0.3 m as floats, and the engine's own rotation
   for (const char* scene : {"scene.xml", "ring_scene.xml"}) {

@@ -1,4 +1,4 @@
-// What the motors make of torques against what their keys mean: delays, transfer functions, steps, friction.
+// Torques of the motors against the meaning of their keys: delays, transfer functions, steps, friction.
 
 #include "harness/plant/motor_drive.h"
 
@@ -28,7 +28,7 @@ class MotorDriveTest : public ::testing::Test {
   [[nodiscard]] MotorDrive Make(const ActuationOptions& options) const {
     return {motors_, options, PartContext{&model_, 4, kDt, 1, "s.toml"}};
   }
-  /// Of a joint: what the motor gives for u.
+  /// Returns the torque that a joint's motor delivers for u.
   double Give(MotorDrive& drive, double u) {
     tau_[kJoint] = u;
     drive.Apply(tau_, xi_, &output_);

@@ -130,7 +130,7 @@ TEST_F(RigidPlantTest, EnergyRateIsThePowerOfTheMotorsToRounding) {
     energy = next;
   }
   EXPECT_GT(largest, 1e-3);
-  // Of energies of some 600 J, whose sums round to some 1e-12 J.
+  // The energies are some 600 J, and their sums round to some 1e-12 J.
   EXPECT_LT(worst, 1e-11);
 }
 
@@ -253,13 +253,13 @@ TEST(RigidRun, PushesMoveItAsTheEngine) {
   const double most = 1e-3 * 2.0 * 20.0;
   const VectorXd apart = rigid - finish(kRigid, true);
   EXPECT_LT(apart.norm(), most * moved);
-  // Of first order in the step: half the step leaves half of it, but for such a fraction of what is left.
+  // The error is of first order: half the step leaves half of it, but for such a fraction of the rest.
   const std::string kHalf = "plant.time_step=5e-4";
   const VectorXd half = finish(kEuler, true, kHalf) - finish(kRigid, true, kHalf);
   EXPECT_LT((2.0 * half - apart).norm(), 2.0 * most * apart.norm());
 }
 
-/// Where the object and the robot are at the end of a run.
+/// Returns the positions of object and robot at the end of a run.
 VectorXd Finish(std::vector<std::string> overrides) {
   overrides.insert(overrides.end(), {"duration=1.0", "settle=0.5"});
   ShippedRun run("paper-ramp", overrides);
@@ -304,7 +304,7 @@ TEST(RigidRun, EveryScenarioThatItTakesPasses) {
   EXPECT_GE(passed, 12);
 }
 
-// What a scenario changes in the parameter file makes it the scene's robot; what --set changes, the
+// Changes of the parameter file by the scenario apply to the scene's robot; changes by --set apply to the
 // controller's alone.
 TEST(RigidRun, IsOfTheScenariosRobot) {
   const ShippedRun ring("two-hands", {kRigid, "model.object.mass=1.1"});

@@ -1,4 +1,5 @@
-// What sensing measures against what its keys mean: variances, transfer functions, delays, innovations.
+// Measurements against the meaning of the keys of sensing: variances, transfer functions, delays,
+// innovations.
 
 #include "harness/plant/sensing.h"
 

@@ -19,8 +19,12 @@ RobotDescription Crane() { return ReadDescription(SourcePath("/tests/cases/robot
 
 constexpr const char* kJoints[] = {"swivel", "lift", "fold", "roll"};
 
+constexpr double kStep = 0.004;  // s
+
 /// Torques of Newton-Euler along sines, with noise of 1e-5 rad, 1e-3 rad/s and 0.01 N m.
-RecordedTable Record(const RobotDescription& robot, bool stands = false) {
+/// @param lag of the velocities, s. @param torque_noise N m.
+RecordedTable Record(const RobotDescription& robot, bool stands = false, double lag = 0.0,
+                     double torque_noise = 0.01) {
   const RobotModel model(robot.spec);
   TorqueRegressor regressor(model);
   std::mt19937 random(7);
@@ -31,8 +35,8 @@ RecordedTable Record(const RobotDescription& robot, bool stands = false) {
   table.columns.resize(13);
   const auto noise = [&](double size) { return std::normal_distribution<>(0.0, size)(random); };
   for (int row = 0; row < 4000; ++row) {
-    const double t = 0.004 * row;
-    VectorXd q(4), qd(4), qdd(4), tau(4);
+    const double t = kStep * row;
+    VectorXd q(4), qd(4), qdd(4), tau(4), recorded = VectorXd::Zero(4);
     q << 0.1, -0.5, 0.7, 0.2;
     qd.setZero();
     qdd.setZero();
@@ -41,6 +45,7 @@ RecordedTable Record(const RobotDescription& robot, bool stands = false) {
         const double w = 2.0 * kPi * (0.13 + 0.03 * joint) * k, phase = joint + 2.0 * k, size = 0.5 / k;
         q[joint] += size * std::sin(w * t + phase);
         qd[joint] += size * w * std::cos(w * t + phase);
+        recorded[joint] += size * w * std::cos(w * (t - lag) + phase);
         qdd[joint] -= size * w * w * std::sin(w * t + phase);
       }
     regressor.SetMotion(q, qd, qdd);
@@ -48,8 +53,8 @@ RecordedTable Record(const RobotDescription& robot, bool stands = false) {
     table.columns[0].push_back(t);
     for (Eigen::Index i = 0; i < 4; ++i) {
       table.columns[static_cast<size_t>(1 + i)].push_back(q[i] + noise(1e-5));
-      table.columns[static_cast<size_t>(5 + i)].push_back(qd[i] + noise(1e-3));
-      table.columns[static_cast<size_t>(9 + i)].push_back(tau[i] + noise(0.01));
+      table.columns[static_cast<size_t>(5 + i)].push_back(recorded[i] + noise(1e-3));
+      table.columns[static_cast<size_t>(9 + i)].push_back(tau[i] + noise(torque_noise));
     }
   }
   return table;
@@ -75,6 +80,40 @@ TEST(JudgeCrane, ARightRecordingIsExplained) {
   const RecordingJudgement judgement = JudgeCrane(Record(Crane()));
   EXPECT_TRUE(judgement.Agrees()) << Tell(judgement);
   EXPECT_TRUE(judgement.unjudged.empty());
+}
+
+// Simulators with a leapfrog log velocities so.
+TEST(JudgeCrane, VelocitiesHalfAStepBeforePositionsAreNoCause) {
+  for (const double lag : {0.5 * kStep, -0.5 * kStep}) {
+    const RecordingJudgement judgement = JudgeCrane(Record(Crane(), /*stands=*/false, lag));
+    EXPECT_TRUE(judgement.Agrees()) << Tell(judgement);
+    EXPECT_THAT(judgement.notes, ::testing::Contains(HasSubstr("0.5 rows")));
+  }
+}
+
+TEST(JudgeCrane, TheVerdictSaysHowLargeAnErrorNoiseHides) {
+  const RobotModel model(Crane().spec);
+  const auto judge = [&](double noise) { return JudgeCrane(Record(Crane(), /*stands=*/false, 0.0, noise)); };
+  const auto tell = [&](const RecordingJudgement& judgement) {
+    return MakeVerdict(judgement, model, "recording.csv");
+  };
+  const RecordingJudgement quiet = judge(0.01), loud = judge(1000.0);
+  for (const JointJudgement& one : quiet.balances) {
+    EXPECT_GT(one.hidden, 0.0);
+    EXPECT_LT(one.hidden, 0.1 * one.modelled);
+  }
+  EXPECT_THAT(tell(quiet).sentence, HasSubstr("% of its torque) would not show"));
+  // Beside a noise of 1 kN m nothing can be seen at any joint.
+  EXPECT_TRUE(loud.IsWhole() && loud.IsHidden() && !loud.Agrees()) << Tell(loud);
+  EXPECT_EQ(tell(loud).word, "partly explained");
+}
+
+TEST(JudgeCrane, DryFrictionThatTurnsSlowlyIsOneCause) {
+  RecordedTable table = Record(Crane());
+  const std::vector<double>& rate = table.Get("qd.lift");
+  std::vector<double>& torque = table.Get("tau.lift");
+  for (size_t i = 0; i < rate.size(); ++i) torque[i] += std::tanh(rate[i] / 0.03);
+  EXPECT_TRUE(NamesOnly(JudgeCrane(table), "dry friction", "joint lift", 1.0));
 }
 
 TEST(JudgeCrane, AJointThatMovesAndIsNotJudgedIsInTheVerdict) {

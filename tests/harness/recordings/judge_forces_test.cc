@@ -12,7 +12,7 @@
 namespace dexcheck::testing::judge_forces_test {
 namespace {
 
-/// What a base that is accelerated does to all bodies.
+/// Returns the effect of an accelerated base on all bodies.
 RecordedFault Accelerate(const std::function<Vector3d(double t)>& acceleration) {
   return {.act = [=](double t, const mjModel& model, mjData* data) {
     const Vector3d a = acceleration(t);
@@ -84,7 +84,7 @@ RecordingJudgement JudgeWith(const RecordedTable& table, const std::vector<Chann
 }
 
 TEST(JudgeForces, MeasuredForcesAreNoCause) {
-  // Of one link with its moment, and of two without.
+  // The forces are those of one link with its moment, or of two without.
   for (const std::vector<int>& links : {std::vector<int>{6}, {3, 6}}) {
     const int width = links.size() == 1 ? 6 : 3;
     const auto calc_force = [](int link, double t, int k) {
@@ -147,7 +147,7 @@ TEST(ClusteredVariances, OfAMeanAreThoseOfTheClustersMeans) {
     expected += 0.25 * sum * sum / 12.0;
   }
   EXPECT_NEAR(CalcClusteredVariances(clusters)[0], expected, 1e-14);
-  // What one cluster alone tells is not told by what clusters disagree.
+  // A value from one cluster alone does not follow from the disagreement of clusters.
   EXPECT_EQ(CalcClusteredVariances({clusters[0], {MatrixXd::Zero(1, 1), VectorXd::Zero(1)}})[0], 0.0);
 }
 

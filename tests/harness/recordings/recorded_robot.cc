@@ -139,7 +139,7 @@ int DrawIndex(std::mt19937* random, int from, int to) {
   return std::uniform_int_distribution<>(from, to)(*random);
 }
 
-/// Of torques that the joint usually needs: ten times less at the wrist.
+/// Returns the torque that a joint usually needs: ten times less at the wrist.
 double UsualTorque(const mjModel& m, int joint) { return joint < m.nv - 3 ? 10.0 : 1.0; }
 
 /// A fault of one column of a joint: "tau." or "q.".
@@ -225,7 +225,7 @@ RecordedFault AttachMass(const mjModel& m, std::mt19937* random) {
             const double m0 = r->body_mass[body], all = m0 + mass;
             const Vector3d p(x, y, z), d = p - c;
             const Matrix3d R = Eigen::Quaterniond(quat[0], quat[1], quat[2], quat[3]).toRotationMatrix();
-            // Of two points d apart, with the reduced mass.
+            // The inertia of two points d apart has the reduced mass.
             const Matrix3d I = R * moments.asDiagonal() * R.transpose() +
                                m0 * mass / all * (d.squaredNorm() * Matrix3d::Identity() - d * d.transpose());
             const Eigen::SelfAdjointEigenSolver<Matrix3d> eigen(I);

@@ -25,7 +25,7 @@ struct RecordedTable {
 
 /// A fault of the robot or of the recording.
 struct RecordedFault {
-  std::string fault, place;  ///< As it should be named.
+  std::string fault, place;  ///< Names that the judge should report.
   double value = 0.0;        ///< NaN where its size is not compared.
   std::function<void(mjModel*)> change = {};
   std::function<void(double t, const mjModel&, mjData*)> act = {};
@@ -36,10 +36,10 @@ struct RecordingOptions {
   double duration = 20.0;      ///< s
   double step = 0.002;         ///< Between rows, s; a multiple of the engine's.
   int encoder_bits = 12;       ///< 0 for exact positions.
-  double torque_noise = 0.02;  ///< Of each joint's usual torque.
+  double torque_noise = 0.02;  ///< Fraction of each joint's usual torque.
   bool has_velocities = false;
   double velocity_noise = 0.005;  ///< rad/s
-  /// Of all joints at a time; empty for sines that are drawn.
+  /// Motion of all joints at a time; empty for sines that are drawn.
   std::function<void(double t, VectorXd* q, VectorXd* qd, VectorXd* qdd)> motion = {};
 };
 
@@ -50,13 +50,13 @@ RecordedTable RecordRobot(const std::string& mjcf, const std::vector<RecordedFau
 /// One fault of each kind in turn, its place and size drawn.
 RecordedFault DrawRecordedFault(const std::string& mjcf, int kind, std::mt19937* random);
 int CountRecordedFaultKinds();
-/// Of them: a mass at the last link.
+/// Returns one of these kinds: a mass at the last link.
 int PayloadKind();
 
 /// With a header.
 void WriteCsv(const RecordedTable& table, const std::filesystem::path& path);
 
-/// As the judge takes it.
+/// Converts to the judge's form.
 Recording ToRecording(const RobotModel& model, const RecordedTable& table);
 
 }  // namespace dexcheck::testing

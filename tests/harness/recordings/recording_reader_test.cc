@@ -82,7 +82,7 @@ TEST_F(Formats, TextWithAndWithoutHeaders) {
   }
   EXPECT_THAT(OpenRecording(Write("named.csv", "t,a,b,c,d\n" + Rows(",")))->names(),
               ElementsAre("t", "a", "b", "c", "d"));
-  // As RFC 4180 has it: separators, quotes and ends of lines in quotes.
+  // RFC 4180 allows separators, quotes and ends of lines in quotes.
   const auto quoted =
       OpenRecording(Write("quoted.csv", "t,\"a;b,c\",\"d\"\"e\",\"f\ng\",\"'=h\"\n" + Rows(",")));
   EXPECT_THAT(quoted->names(), ElementsAre("t", "a;b,c", "d\"e", "f\ng", "=h"));

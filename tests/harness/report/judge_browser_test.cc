@@ -35,7 +35,7 @@ class JudgeBrowserTest : public ::testing::Test {
     for (const int width : {360, 768, 1280}) {
       browser_.SetViewport(width, 900, false);
       EXPECT_LE(browser_.Run("return document.documentElement.scrollWidth - innerWidth;"), 0) << width;
-      // What a table has beyond its card can be scrolled to.
+      // A table that is wider than its card can be scrolled.
       EXPECT_EQ(browser_.Run(
                     "return [...document.querySelectorAll('.card, .verdict, .tiles b, p, h1, h3')]  "
                     ".filter(c => c.scrollWidth > c.clientWidth && getComputedStyle(c).overflowX !== 'auto' "

@@ -33,7 +33,7 @@ RecordingJudgement Record(std::mt19937* random) {
   return judgement;
 }
 
-/// Of the links of the joints at the kept instants.
+/// Reads the positions of the links at the kept instants.
 std::vector<float> ReadPositions(const ReplayData& replay) {
   const auto parts = replay.json["parts"].get<size_t>() - 1;
   std::vector<float> all(3 * parts * replay.json["times"].size()), links;
@@ -51,7 +51,7 @@ std::optional<ReplayData> Replay(const std::string& file, const RecordingJudgeme
   return MakeMotionReplay(RobotModel(ReadDescription(path).spec), path, judgement);
 }
 
-// Of a stretch that was held out, what is around it has the time, too.
+// The rows around a stretch that was held out have the time, too.
 TEST(JudgeReplay, TimesIncrease) {
   std::mt19937 random(11);
   RecordingJudgement judgement = Record(&random);

@@ -159,7 +159,7 @@ void WriteVideo(const std::filesystem::path& path) {
   video.Finish();
 }
 
-// Of a page without the replay, which would compete for the processor.
+// Makes a page without the replay, which would compete for the processor.
 RunScene MakeNoScene(const RunData& /*run*/, const std::filesystem::path& /*folder*/) { return {}; }
 
 TEST_F(PageBrowserTest, NoTileIsNarrowerThanItsWords) {
@@ -174,7 +174,7 @@ TEST_F(PageBrowserTest, NoTileIsNarrowerThanItsWords) {
   }
 }
 
-// What a table has beyond its card can be scrolled to.
+// A table that is wider than its card can be scrolled.
 TEST_F(PageBrowserTest, AComparisonsTablesStayInTheirCards) {
   const RunData run(folder_.path());
   const std::filesystem::path file = folder_.path() / "comparison.html";

@@ -1,4 +1,4 @@
-// What the replay in a run's page is made from.
+// Data of the replay in a run's page.
 
 #include "harness/report/replay.h"
 
@@ -29,7 +29,7 @@ TEST(MakeReplayData, AddsAtMostThreeMegabytesForTenSeconds) {
 }
 
 TEST(MakeReplayData, ShowsWhatTheEngineShows) {
-  // Of six geoms one is of a hidden group and one transparent; the bodies b and c are welded together.
+  // One of the six geoms is in a hidden group and one is transparent; the bodies b and c are welded together.
   const MjModelPtr model = LoadMjcfText(R"(<mujoco>
     <asset><material name="red" rgba="1 0 0 1"/></asset>
     <worldbody>

@@ -1,4 +1,4 @@
-// What a report's files hold.
+// Contents of a report's files.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -26,7 +26,7 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::json;
 
-/// What the page is made of.
+/// Returns the data of the page.
 Json ReadData(const std::string& page) {
   const std::string begin = "id=\"run-page\">";
   const size_t at = page.find(begin) + begin.size();

@@ -63,7 +63,7 @@ INSTANTIATE_TEST_SUITE_P(
         Fault{"slippery_floor", "paper-ramp", {"duration=2", "plant.floor_friction=0.1"}, Cause::kWheelSlip}),
     [](const ::testing::TestParamInfo<Fault>& info) { return info.param.name; });
 
-// What the scenario makes of the plant is compared, not what the MJCF was before.
+// The comparison uses the plant as the scenario changes it, not the MJCF's.
 TEST(ConstantsAsSimulated, HaveTheFrictionOfTheScenario) {
   const auto differs = [](const std::vector<std::string>& overrides) {
     const ShippedRun run("hold", overrides);
@@ -131,7 +131,7 @@ TEST(HiddenSensorFault, ThatEndsTheRunAtOnceIsToldWhereItIs) {
   EXPECT_EQ(causes[1].faults.front().place, "joint panda_joint6, position");
 }
 
-// Of a long run not all steps are kept, and still it is known when.
+// Not all steps of a long run are kept, and still the times are known.
 TEST(HiddenSensorFault, IsToldFromItsFirstStepToItsLast) {
   const ShippedRun run("panda-reach", {"duration=2.5"});
   ClosedLoop loop = MakeSensorFault(run.setup(), [](double t, MeasuredState* state) {

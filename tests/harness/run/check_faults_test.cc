@@ -14,12 +14,12 @@ namespace {
 
 const std::string kRobot = SourcePath("/controller/parameters/assistant_robot.toml");
 
-/// What makes a check fail.
+/// A fault that makes a check fail.
 struct CheckFault {
   const char* check;
   const char* scenario;
   std::vector<std::string> overrides;
-  void (*change)(mjModel*) = nullptr;  ///< Of the plant besides, beyond what a scenario can.
+  void (*change)(mjModel*) = nullptr;  ///< Change of the plant alone that no scenario can make.
 };
 
 void PrintTo(const CheckFault& fault, std::ostream* out) { *out << fault.check; }
@@ -112,7 +112,7 @@ TEST_P(CheckFaults, FailTheirCheck) {
   const std::string mjcf = scenario.mjcf_file.empty() ? SourcePath("/mjcf/scene.xml") : scenario.mjcf_file;
   const dexcheck::Setup setup(scenario, scenario.model_file.empty() ? kRobot : scenario.model_file, mjcf);
   LoopParts parts = MakeLoopParts(setup);
-  // Of the simulation alone, after the scenario has set what it sets.
+  // The change applies to the simulation alone, after the scenario's own changes.
   if (fault.change != nullptr) dynamic_cast<EnginePlant&>(*parts.plant).simulation().Change(fault.change);
   Runner runner(setup, /*check=*/true, std::move(parts));
   const RunResult& result = runner.Run([](const StepRecord&) {}, [] { return false; });
@@ -125,7 +125,7 @@ TEST_P(CheckFaults, FailTheirCheck) {
 INSTANTIATE_TEST_SUITE_P(All, CheckFaults, ::testing::ValuesIn(kFaults),
                          [](const auto& info) { return std::string(info.param.check); });
 
-// Of the narrow phases that are this project's own. HeldObjects has those of cylinders and ellipsoids.
+// These narrow phases are this project's own. HeldObjects has those of cylinders and ellipsoids.
 INSTANTIATE_TEST_SUITE_P(OwnCollision, CheckFaults,
                          ::testing::Values(CheckFault{
                              "contact_distance", "hold", {"duration=0.02"}, ThickenTube}),
@@ -303,7 +303,7 @@ TEST(SlipWindow, ForgetsWhatWasLongAgo) {
   EXPECT_GT(check.worst, 1e-6);
   EXPECT_NEAR(check.at, 10.0, 5.1);
   EXPECT_NEAR(check.last / check.worst, 0.6, 0.01);
-  // What is recorded goes on from t = 0.
+  // The recorded distance continues from t = 0.
   EXPECT_NEAR((slip.distance - slip.window).norm() / slip.distance.norm(), 6.0 / 16.0, 0.01);
 }
 

@@ -75,7 +75,7 @@ class HoldAtATable {
  private:
   static constexpr double kHalf = 0.02;  // m
 
-  /// Where the palm's body is while the object is held.
+  /// Returns the pose of the palm's body while the object is held.
   static Pose FindPalm() {
     const ShippedRun run("hold");
     const mjModel& m = run.setup().engine();
@@ -135,7 +135,7 @@ TEST(ClearanceOfARun, BodiesThatCollidePush) {
   // While everything settles the table pushes the palm out, or does not.
   EXPECT_LT(find(HoldAtATable(1e-4)), -9e-5);
   EXPECT_GT(find(HoldAtATable(1e-4, {"plant.collide=true"})), -2e-5);
-  // The same plant with the table out of reach is the plant that it was.
+  // With the table out of reach, the same plant is the plant that it was.
   const HoldAtATable apart(-0.01, {"plant.collide=true"});
   EXPECT_EQ(apart.result().verdict, Verdict::kPass)
       << apart.result().failure << apart.result().attribution.evidence;

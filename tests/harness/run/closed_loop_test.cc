@@ -1,4 +1,4 @@
-// What theory says of the closed loop: error dynamics (57), orders of convergence, no allocation.
+// Theory of the closed loop: error dynamics (57), orders of convergence, no allocation.
 
 #include <gtest/gtest.h>
 
@@ -52,13 +52,13 @@ TEST_P(ErrorDynamics, FollowTheClosedFormOfEquation57) {
 INSTANTIATE_TEST_SUITE_P(GainSets, ErrorDynamics,
                          ::testing::Values(Gains{20.0, 1.0}, Gains{10.0, 0.7}, Gains{6.0, 1.5}));
 
-/// What the engine does besides what the rigid model predicts, the largest of a run. The checks compare it
-/// less what soft contacts are known to hold back.
+/// Largest differences of the engine's motion from the rigid model's prediction in a run. The checks compare
+/// them less the known effect of soft contacts.
 struct Discrepancies {
   double acceleration = 0.0;  ///< |xi_dot - prediction|, m/s^2 and rad/s^2.
   double force = 0.0;         ///< |f_c - prediction| / |f_c|.
   double slip = 0.0;          ///< m
-  double position = 0.0;      ///< Of the object from its trajectory, m.
+  double position = 0.0;      ///< Distance of the object from its trajectory, m.
 };
 
 Discrepancies Measure(const std::string& scenario, const std::vector<std::string>& overrides) {

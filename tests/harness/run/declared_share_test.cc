@@ -1,4 +1,4 @@
-// What a scenario declares is weighed only where nothing else explains the failure.
+// Declared imperfections are considered only where nothing else explains the failure.
 
 #include "harness/run/declared_share.h"
 

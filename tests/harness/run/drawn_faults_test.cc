@@ -13,7 +13,7 @@ namespace {
 
 const auto kAll = [](const RunMutant&) { return true; };
 
-/// What became of faults that are seen.
+/// Number of detected faults by outcome.
 struct Names {
   int all = 0, named = 0, in_class = 0, wrong = 0;
 
@@ -114,8 +114,8 @@ TEST(DrawnFault, AreNoMoreThanThereArePlaces) {
   EXPECT_THROW(MakeCampaign(DrawOf(1, 4, {"wheels"})), InputError);
 }
 
-// Of the paper's law, of those that it is compared with, and of laws of joints: which summand, of which
-// joint, finger or wheel, and its factor.
+// Faults of the paper's law, of those that it is compared with, and of laws of joints: the summand, the
+// joint, finger or wheel, and the factor.
 TEST(DrawnFault, AreSummandsOfEveryLaw) {
   Names sum;
   const auto count = [&sum](const char* scenario, const std::vector<std::string>& overrides) {
@@ -131,7 +131,7 @@ TEST(DrawnFault, AreSummandsOfEveryLaw) {
     count("curve", {std::string("control.law=") + law, "expect={}"});
   for (const char* law : {"computed_torque", "pd_gravity", "feedforward_pd"})
     count("panda-reach", {std::string("control.law=") + law, "expect={}"});
-  // What the base has of a wrong summand, the ground's forces balance.
+  // The ground's forces balance the base's part of a wrong summand.
   count("stand", {"settle=0.2"});
   for (const char* law : {"pd_gravity", "feedforward_pd"})
     count("stand", {"settle=0.2", std::string("control.law=") + law, "control.stiffness=300",
@@ -142,7 +142,7 @@ TEST(DrawnFault, AreSummandsOfEveryLaw) {
   EXPECT_GE(sum.named + sum.in_class, 0.97 * sum.all);
 }
 
-// What is measured otherwise is none of the law's.
+// A wrong measurement is no fault of the law.
 TEST(DrawnFault, AreLawsOfJointsBesideWrongSensors) {
   RunCampaign campaign = MakeCampaign(DrawOf(12, 2, {"law", "sensor"}), "panda-reach");
   int of_both = 0;
@@ -161,7 +161,7 @@ bool GrowsVisibly(const Fault& fault) {
          fault.place != "joint panda_joint1";
 }
 
-// What grows is named with its growth, and when it began to, alone and beside other forces.
+// A growing force is named with its growth and the time of its beginning, alone and beside other forces.
 TEST(DrawnFault, AreForcesThatGrow) {
   for (const int together : {1, 2}) {
     RunMutationOptions options = DrawOf(60 * together, together, {"joint", "body"});
@@ -192,8 +192,8 @@ TEST(DrawnFault, AreForcesThatGrow) {
   }
 }
 
-// What grows on a body that hardly shows it has begun long before it is seen, and is not taken for what else
-// leaves as little there.
+// A force that grows on a body that hardly shows it begins long before it is seen. It is not taken for
+// another fault that leaves as little there.
 TEST(DrawnFault, MayGrowBeforeTheyShow) {
   RunMutationOptions options = DrawOf(300, 1, {"body"});
   options.seed = 5;
@@ -211,7 +211,7 @@ TEST(DrawnFault, MayGrowBeforeTheyShow) {
   EXPECT_GE(grow, 2);
 }
 
-// Of all of a motion blocks of steps are kept: what begins in one of them is not spread over those before.
+// Blocks of steps are kept for a whole motion: a fault that begins in one is not spread over earlier ones.
 TEST(DrawnFault, MayBeginInAllOfAMotion) {
   RunMutationOptions options;
   options.draws = 60;
@@ -255,7 +255,7 @@ TEST(DrawnFault, AreOfContacts) {
   EXPECT_EQ(names.named, names.all);
 }
 
-// Where sensors and motors remember, faults begin in the middle of a run.
+// Faults begin in the middle of a run where sensors and motors have a memory.
 TEST(DrawnFault, AreNamedAmongDeclaredImperfections) {
   RunMutationOptions options = DrawOf(15, 1, {"motor", "body"});
   options.from = 0.3;

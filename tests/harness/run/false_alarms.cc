@@ -26,7 +26,7 @@
 namespace dexcheck::testing {
 namespace {
 
-/// What a scenario is expected to come to: "none" but where an assumption breaks on purpose.
+/// Expected cause of a scenario: "none" unless an assumption breaks on purpose.
 const std::map<std::string, std::string> kExpectedCause = {{"paper-rest", "wheel slip"}};
 /// A fraction of the bound from which on a check is told, below an alarm.
 constexpr double kNear = 0.5;
@@ -102,8 +102,8 @@ Options ReadOptions(int argc, char** argv) {
   return options;
 }
 
-/// What a scenario may declare of sensing, motors and plant without breaking the paper's assumptions: of
-/// "<a..b>" a number is drawn, evenly over decades, of "<a|b>" one of both. Those of the object last.
+/// Declarations of sensing, motors and plant that do not break the paper's assumptions: "<a..b>" stands for a
+/// number drawn evenly over decades, "<a|b>" for one of both. The object's come last.
 const std::vector<std::vector<std::string>> kDeclared = {
     {"sensing.joint_counts=<16384|65536|1048576>"},
     {"sensing.joint_counts=<65536|1048576>", "sensing.velocity=kalman",

@@ -33,7 +33,7 @@ TEST(FingertipRim, IsAQuarterTurnFromThePole) {
 
 const std::vector<std::string> kRoll = {"duration=0.6", "settle=0.3"};
 
-/// Where each contact is on its fingertip, as a direction.
+/// Returns the direction of each contact on its fingertip.
 std::vector<Vector3d> FindDirections(const StepRecord& step) {
   std::vector<Vector3d> directions;
   const GraspTerms& grasp = step.model->grasp();

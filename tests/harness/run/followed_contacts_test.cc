@@ -15,7 +15,7 @@ std::vector<std::string> Roll(const std::vector<std::string>& more) {
   return overrides;
 }
 
-/// Where contacts really roll, without slip, all that is left is the integrator's error, of second order.
+/// Contacts that roll without slip drift only by the integrator's error, of second order.
 TEST(FollowedContacts, DriftWithTheSquareOfTheStepWhereNothingSlips) {
   const auto drift = [](const char* step) {
     ShippedRun run("reorient", Roll({"plant.type=rigid", std::string("plant.time_step=") + step}));

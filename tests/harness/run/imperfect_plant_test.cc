@@ -31,7 +31,7 @@ const Known kKnown[] = {
     {"joint_noise", {"sensing.joint_noise=1e-6"}},
     {"differenced", {"sensing.velocity=differenced", "sensing.velocity_cutoff=50"}},
     {"kalman", {"sensing.velocity=kalman", "sensing.kalman_acceleration=20", "sensing.joint_noise=1e-6"}},
-    // What the filter leaves of the rates of joints at rest is a denormal number.
+    // The filter's rates of joints at rest are denormal numbers.
     {"kalman_of_joints_that_stick",
      {"sensing.velocity=kalman", "sensing.kalman_acceleration=20", "sensing.joint_counts=1048576",
       "actuation.coulomb=0.05"}},
@@ -81,7 +81,7 @@ const Known kKnown[] = {
     {"joint_constants", {"mismatch.damping=1.2", "mismatch.armature=0.9"}},
 };
 
-/// The same asked for of the scenario: nothing to find. The same hidden: found.
+/// Declared in the scenario, the imperfection leaves nothing to find; hidden, it is found.
 class KnownCauses : public ::testing::TestWithParam<Known> {};
 
 TEST_P(KnownCauses, CryNoWolf) {

@@ -101,7 +101,7 @@ TEST_P(JointMarginsOfARun, AreWhereAllTorquesTurn) {
   };
   EXPECT_TRUE(IsStable(late(kInside)));
   EXPECT_FALSE(IsStable(late(kOutside)));
-  // What the scenario has already of it is taken off.
+  // The delay that the scenario already has is subtracted.
   EXPECT_NEAR(FindMarginsOf(late(0.5)).together.delay, 0.5 * margins.together.delay,
               0.01 * margins.together.delay);
   EXPECT_FALSE(FindMarginsOf(late(kOutside)).is_stable());

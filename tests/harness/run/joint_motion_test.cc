@@ -80,13 +80,14 @@ TEST_P(JointLaws, CompensateFriction) {
   std::vector<std::string> keys = {"duration=1", "expect={}", std::string("control.law=") + GetParam()};
   const double without = FindError(0.5, keys);
   keys.insert(keys.end(), {"control.coulomb=0.5", "control.coulomb_velocity=0.02"});
-  // What pd_gravity does not know of the motion leaves more than friction does.
+  // pd_gravity does not use the desired motion, which leaves a larger error than friction does.
   EXPECT_LT(FindError(0.5, keys), (GetParam() == std::string("pd_gravity") ? 1.0 : 0.2) * without);
   // On a robot without it, it is an error that the law asks for.
   EXPECT_GT(FindError(0.0, keys), 1e-5);
 }
 
-// What a scenario lets be cut off is told, and no fault; where the arm must follow, it is why it does not.
+// Torques that a scenario lets be cut off are reported, and no fault; where the arm must follow, they are the
+// cause.
 TEST(JointMotionRun, LimitedTorquesAreDeclared) {
   const std::vector<std::string> keys = {"duration=1", "actuation.limit={ panda_joint2 = 11 }"};
   const auto with = [&](const char* key) {

@@ -21,7 +21,7 @@ std::vector<std::string> ListPhases(const PickAndPlace& task) {
 const std::vector<std::string> kWholeTask = {"approach",  "close",   "grip",     "take over", "carry",
                                              "hand over", "release", "withdraw", "done"};
 
-// As shipped the task takes 1 ms a step; it succeeds and fails likewise with half as many.
+// The shipped task takes 1 ms a step; it succeeds and fails in the same way with half as many.
 const std::string kCoarse = "plant.time_step=0.002";
 
 class LiftTest : public ::testing::Test {
@@ -211,7 +211,7 @@ TEST(LiftScenario, AllocatesOnlyWherePhasesChange) {
     loop.Step();
     if (counter.count() > 0) ++allocating;
   }
-  // Of some 12 000 steps those that begin a phase or a movement, or see a set of contacts for the first time.
+  // Some of 12 000 steps allocate: those that begin a phase or a movement, or see a set of contacts first.
   EXPECT_GT(allocating, 0);
   EXPECT_LT(allocating, 40);
 }

@@ -99,7 +99,7 @@ TEST_F(LoopPartsTest, AWrongLawMovesTheObjectButIsNoFaultOfTheModel) {
   EXPECT_EQ(runner_->result().failure, "");
   EXPECT_LE(Worst("inverse_dynamics_robot"), 1e-5);
   EXPECT_GT(runner_->result().tracking.position_max(), 1e-6);
-  // What the law demanded is not what happened.
+  // The motion is not the one that the law demanded.
   EXPECT_GT((step.response.xi_dot - step.command.demand.xi_dot).norm(), 1e-3);
 }
 

@@ -31,7 +31,7 @@ TEST(StabilityMargins, AreThoseOfATextbook) {
   const StabilityMargins margins = evaluate(10.0);
   EXPECT_NEAR(margins.gain, 3.0, 3.0 * kGrid);
   EXPECT_EQ(margins.least_gain, 0.0);
-  // Where w^2 (w^2 + 1) (w^2 + 25) = K^2.
+  // The crossing is at w^2 (w^2 + 1) (w^2 + 25) = K^2.
   double low = 0.1, high = 10.0;
   for (int i = 0; i < 60; ++i) {
     const double middle = 0.5 * (low + high), x = middle * middle;
@@ -70,7 +70,7 @@ TEST(SampledLoop, HasTheClosedFormsOfAServo) {
     EXPECT_NEAR(one.gain, gain, 1e-6 * gain);
     const double crossing = omega * std::sqrt(2.0 * zeta * zeta + std::sqrt(4.0 * std::pow(zeta, 4) + 1.0));
     const double phase = std::atan(2.0 * zeta * crossing / omega);
-    // What sampling takes is of the order of the angle of a step.
+    // Sampling reduces the phase by about the angle of a step.
     EXPECT_LT(one.phase, phase);
     EXPECT_GT(one.phase, phase - crossing * T);
     EXPECT_NEAR(one.delay, phase / crossing, T);

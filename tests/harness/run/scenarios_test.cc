@@ -86,7 +86,7 @@ TEST(ShippedScenarios, AHandOnThePandaHoldsTurnsAndCarriesABall) {
   }
 }
 
-// What is left of slip is the softness of contacts alone, where the object moves along and turns (w x v).
+// The remaining slip is the softness of contacts alone, where the object moves along and turns (w x v).
 TEST(ShippedScenarios, SlipOfAMovedObjectGoesWithSoftness) {
   const auto slip = [](const std::string& impedance) {
     ShippedRun run("hand-curve", {"duration=1.5", "settle=0.5", "plant.time_step=0.002",

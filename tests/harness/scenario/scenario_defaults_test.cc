@@ -53,7 +53,7 @@ std::vector<std::string> SplitRow(const std::string& row) {
   return cells;
 }
 
-/// What stands between the first backticks of a heading, without brackets.
+/// Returns the text between the first backticks of a heading, without brackets.
 std::string FindSection(const std::string& heading) {
   const size_t begin = heading.find_first_not_of("# `[");
   return heading.substr(begin, heading.find_first_of("`]", begin) - begin);
@@ -81,7 +81,7 @@ std::vector<Key> ListKeys() {
     key.before.push_back(kContacts);
     if (of_task) key.before.emplace_back("control.orientation=\"rotation\"");
     if (section == "disturbance.0.") key.before.push_back(kPush);
-    // What some keys need to matter.
+    // Other keys that some keys need to matter.
     for (const auto& [type, motion] : {std::pair("line", "velocity"), std::pair("oscillation", "xyz")}) {
       const std::string path = std::string("trajectory.") + motion;
       const bool has_type = start.find(type) != std::string::npos;
@@ -138,7 +138,7 @@ std::string ShowImperfections(const Imperfections& all) {
   return text;
 }
 
-/// Where the trajectory is at some times.
+/// Prints the trajectory at some times.
 std::string ShowTrajectory(const TrajectoryMaker& make) {
   std::string text;
   for (const double t : {0.1, 0.7, 3.0}) text += Show(make(Vector6d::Zero())->Evaluate(t).X_d);
@@ -183,7 +183,7 @@ TEST(ScenarioDefaults, AreThoseOfTheDocument) {
   EXPECT_GE(keys.size(), 70U);
   for (const Key& key : keys) {
     EXPECT_EQ(Read(key, key.otherwise), Read(key, "")) << key.path << " = " << key.otherwise;
-    // What the default is compared in has the key.
+    // The scenario in which the default is compared has the key.
     if (key.example == key.otherwise) continue;
     EXPECT_NE(Read(key, key.example), Read(key, "")) << key.path << " = " << key.example;
   }

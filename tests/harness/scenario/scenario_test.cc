@@ -6,7 +6,6 @@
 #include "harness/engine/mjcf_file.h"
 #include "tests/common/files.h"
 #include "tests/common/paths.h"
-#include "tests/common/throws.h"
 #include "tests/harness/run/shipped_run.h"
 
 namespace dexcheck::testing::scenario_test {
@@ -38,6 +37,7 @@ TEST(ReadScenario, TurnsFrequencyAndDampingIntoGains) {
       "paper", {"control.natural_frequency=[1, 2, 3, 4, 5, 6]", "control.damping_ratio=0.5"});
   EXPECT_EQ(scenario.control.gains.K_p[2], 9.0);
   EXPECT_EQ(scenario.control.gains.K_v[2], 3.0);
+  EXPECT_THROW(ReadShippedScenario("paper", {"control.K_p=3"}), InputError) << "it has a frequency already";
 }
 
 TEST(ReadScenario, ReadsWhatIsNotIdeal) {
@@ -76,138 +76,6 @@ TEST(Scenario, AllMissingKeysAreReportedAtOnce) {
             "\"trajectory\"");
   // A value that is wrong as well is reported when nothing is missing any more.
   EXPECT_EQ(problem("name = \"mine\"\nsettle = 1e9"), "new.toml:1: missing key \"duration\", \"start\"");
-}
-
-struct BadInput {
-  const char* name;
-  std::vector<std::string> overrides;
-  const char* message;
-};
-
-void PrintTo(const BadInput& bad, std::ostream* out) { *out << bad.name; }
-
-class BadScenarios : public ::testing::TestWithParam<BadInput> {};
-
-TEST_P(BadScenarios, AreRefusedInOneLine) {
-  try {
-    ShippedRun run("paper", GetParam().overrides);
-    FAIL() << "was accepted";
-  } catch (const InputError& error) {
-    const std::string message = error.what();
-    EXPECT_NE(message.find(GetParam().message), std::string::npos) << message;
-    EXPECT_EQ(message.find('\n'), std::string::npos) << message;
-  }
-}
-
-INSTANTIATE_TEST_SUITE_P(
-    NotIdeal, BadScenarios,
-    ::testing::Values(
-        BadInput{"negative_noise",
-                 {"sensing.joint_noise=-1e-3"},
-                 "sensing.joint_noise: must not be negative, got -0.001"},
-        BadInput{"negative_noise_of_a_group",
-                 {"sensing.joint_noise={ rf = -1 }"},
-                 "sensing.joint_noise.rf: must not be negative, got -1"},
-        BadInput{"no_such_joint",
-                 {"sensing.joint_noise={ r_elbov = 1 }"},
-                 "sensing.joint_noise: fits no name of the robot (\"r_elbow\"?), got \"r_elbov\""},
-        BadInput{"no_such_motor",
-                 {"actuation.coulomb={ x = 1 }"},
-                 "actuation.coulomb: fits no name of the robot, got \"x\""},
-        BadInput{"long_latency",
-                 {"sensing.latency=1.001"},
-                 "sensing.latency: must be at most 1000 time steps, which the buffer holds, got 1.001"},
-        BadInput{"long_delay",
-                 {"actuation.delay=2"},
-                 "actuation.delay: must be at most 1000 time steps, which the buffer holds, got 2"},
-        BadInput{"half_a_sample",
-                 {"sensing.latency=0.0015"},
-                 "sensing.latency: must be a whole number of time steps, got 0.0015"},
-        BadInput{"fast_camera",
-                 {"sensing.object_rate=1500"},
-                 "sensing.object_rate: must be at most one pose a time step, got 1500"},
-        BadInput{"filter_without_size",
-                 {"sensing.velocity=kalman"},
-                 "sensing: missing key \"kalman_acceleration\""},
-        BadInput{"unknown_source",
-                 {"sensing.velocity=guessed"},
-                 "sensing.velocity: must be one of \"measured\", \"differenced\", \"kalman\""},
-        BadInput{"unknown_body",
-                 {"disturbance=[{ type = 'step', body = 'r_forarm' }]"},
-                 "disturbance.0.body: is no link of the robot and not the object (\"r_forearm\"?), got "
-                 "\"r_forarm\""},
-        BadInput{"pulse_without_end",
-                 {"disturbance=[{ type = 'pulse', body = 'object' }]"},
-                 "disturbance[0]: missing key \"duration\""},
-        BadInput{"period_too_short",
-                 {"disturbance=[{ type = 'pulse', body = 'object', duration = 1, period = 0.5 }]"},
-                 "disturbance[0].period: must not be shorter than the duration, got 0.5"},
-        BadInput{"payload_on_the_object",
-                 {"disturbance=[{ type = 'payload', body = 'object', mass = 1 }]"},
-                 "disturbance.0.body: is no link of the robot, got \"object\""},
-        BadInput{
-            "steep", {"disturbance=[{ type = 'slope', slope_deg = [31, 0] }]"}, "must be at most 30 degrees"},
-        BadInput{"no_such_link",
-                 {"mismatch.mass={ r_fore_arm = 1.05 }"},
-                 "mismatch.mass: fits no name of the robot (\"r_forearm\"?), got \"r_fore_arm\""},
-        BadInput{"massless", {"mismatch.mass=0"}, "mismatch.mass: must be positive, got 0"},
-        BadInput{
-            "too_random", {"mismatch.mass_within=1"}, "mismatch.mass_within: must be at most 0.99, got 1"},
-        BadInput{"unknown_key", {"actuation.lags=1"}, "actuation.lags"}),
-    [](const ::testing::TestParamInfo<BadInput>& info) { return info.param.name; });
-
-INSTANTIATE_TEST_SUITE_P(
-    All, BadScenarios,
-    ::testing::Values(
-        BadInput{"no_assignment", {"duration"}, "--set duration: must be PATH=VALUE"},
-        BadInput{
-            "negative_duration", {"duration=-1"}, "--set duration=-1: duration: must be positive, got -1"},
-        BadInput{"endless_settling", {"settle=1e9"}, "--set settle=1e9: settle: must be at most 100 s"},
-        BadInput{"settling_never", {"settle=inf"}, "settle: must be"},
-        BadInput{"settling_in_tiny_steps",
-                 {"plant.time_step=1e-9", "duration=1e-6"},
-                 "settle: must be at most 1e8 time steps"},
-        BadInput{"unknown_key",
-                 {"plant.time_stop=1"},
-                 "plant.time_stop: unknown key, did you mean \"time_step\"?"},
-        BadInput{"unknown_table", {"plants.time_step=1"}, "plants: unknown key"},
-        BadInput{"text_for_number", {"plant.impratio=much"}, "plant.impratio: must be a number"},
-        BadInput{
-            "path_through_number", {"duration.x=1"}, "--set duration.x=1: \"duration\" is no table or list"},
-        BadInput{"no_such_entry", {"grasp.fingertips.7=rf1_tip"}, "is no entry of a list of 4"},
-        BadInput{"no_such_fingertip", {"grasp.fingertips.0=rf9_tip"}, "\"rf9_tip\" is no fingertip"},
-        BadInput{"fingertip_twice", {"grasp.fingertips.0=rf2_tip"}, "\"rf2_tip\" is named twice"},
-        BadInput{"no_such_joint", {"grasp.joints_deg.elbow=3"}, "\"elbow\" is no joint"},
-        BadInput{"no_such_frame", {"grasp.frame=palm"}, "\"palm\" is no frame"},
-        BadInput{"too_few_contacts", {"grasp.contacts_deg=[[0, 0]]"}, "one contact for each of the 4"},
-        BadInput{"out_of_reach", {"grasp.xyz=[0, 0, 0.5]"}, "do not reach their contacts"},
-        BadInput{"gains_twice", {"control.K_p=3"}, "K_p"},
-        BadInput{"force_bounds", {"control.f_max=0.5"}, "f_max: must be greater than f_min"},
-        BadInput{"impedance", {"plant.contact_impedance=1"}, "contact_impedance: must be less than 1"},
-        BadInput{"no_such_bound", {"bounds.slip=1"}, "bounds.slip: no check has this name"},
-        BadInput{"bad_trajectory", {"trajectory.type=loop"}, "trajectory.type: must be one of"},
-        BadInput{"unknown_law", {"control.law=pid"}, "control.law: must be one of"},
-        BadInput{"law_without_stiffness",
-                 {"control.stiffness=100"},
-                 "control.stiffness: has no meaning for the law \"computed_torque\""},
-        BadInput{"impedance_with_damping",
-                 {"control.law=impedance", "control.damping=100"},
-                 "control.damping: has no meaning for the law \"impedance\""},
-        BadInput{"negative_stiffness",
-                 {"control.law=pd_gravity", "control.stiffness=[1, 1, -1, 1, 1, 1]"},
-                 "control.stiffness: must not be negative"},
-        BadInput{"unknown_plant", {"plant.type=soft"}, "plant.type: must be one of"},
-        BadInput{"engine_key_of_a_rigid_plant",
-                 {"plant.type=rigid", "plant.impratio=3"},
-                 "plant.impratio: has no meaning for a rigid plant"},
-        BadInput{"model_value", {"model.object.mass=-1"}, "object.mass"},
-        BadInput{"model_key", {"model.object.weight=1"}, "object.weight: unknown key"},
-        BadInput{"singular_angles", {"grasp.zyz_deg=[90, -105, 0]"}, "take \"rotation\""}),
-    [](const ::testing::TestParamInfo<BadInput>& info) { return info.param.name; });
-
-TEST(ReadScenario, RefusesAMovingStartThatIsNoneBeforeItRuns) {
-  EXPECT_THROW(ShippedRun("paper", {"trajectory.velocity=[0, 1, 0]"}), InputError);
-  EXPECT_THROW(ShippedRun("paper", {"trajectory.turning=[0.1, 0, 0]"}), InputError);
 }
 
 TEST(ListMjcfFiles, FollowsIncludesAndAssets) {

@@ -39,7 +39,7 @@ TEST(Objective, AggregatesOverTheTrialsOfAPoint) {
   EXPECT_EQ(Judge(MakeObjective("energy", Aggregate::kQuantile, 0.5), results), 2.0);
   EXPECT_EQ(Judge(MakeObjective("energy", Aggregate::kQuantile, 0.51), results), 3.0);
   EXPECT_EQ(Judge(MakeObjective("energy", Aggregate::kQuantile, 1.0), results), 4.0);
-  // What is to be large is minimised with the other sign: its worst is the least.
+  // A metric to maximise is minimised with the other sign: its worst is the least.
   Objective maximize = MakeObjective("energy", Aggregate::kWorst);
   maximize.maximize = true;
   EXPECT_EQ(Judge(maximize, results), -1.0);

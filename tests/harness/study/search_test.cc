@@ -47,7 +47,7 @@ std::vector<JudgedPoint> RunSearch(const Search& search, const UnitPoint& start,
       judgements.push_back({{function(point)}, 0.0});
       points.push_back({static_cast<long>(points.size()), point, judgements.back()});
     }
-    searcher->Tell(judgements);
+    searcher->Observe(judgements);
   }
   return points;
 }
@@ -186,7 +186,7 @@ TEST(Search, TheFrontIsWhatNoPointBeats) {
   EXPECT_GT(front.size(), 1U);
 }
 
-// Where constraints do not hold, less violation leads back.
+// Less violation leads back where constraints do not hold.
 TEST(Search, LeavesWhatIsForbidden) {
   Search search = MakeSearch(SearchMethod::kCmaEs, 320);
   const auto searcher = MakeSearcher(search, {0.9, 0.9});
@@ -198,7 +198,7 @@ TEST(Search, LeavesWhatIsForbidden) {
       judgements.push_back({{-x[0]}, violation});
       if (violation <= 0.0) best = std::min(best, -x[0]);
     }
-    searcher->Tell(judgements);
+    searcher->Observe(judgements);
   }
   EXPECT_LT(best, -0.28);
 }

@@ -32,7 +32,7 @@ inline TrialRow MakeTrialRow(const Trial& trial, double metric = 0.0) {
   return row;
 }
 
-/// What a database says of a study, with one text in all other columns.
+/// Returns a database's identity of a study, with one text in all other columns.
 inline StudyIdentity MakeIdentity(const Study& study, const std::string& other = "text") {
   return {{"layout", kStudyLayout},   {"name", study.name},
           {"study", study.text},      {"scenario", other},

@@ -141,7 +141,7 @@ TEST_F(StudyPageBrowserTest, APartOfManyTrialsHasEverySeed) {
   EXPECT_THAT(Text("trials-text"), HasSubstr(std::to_string(5000 - added) + " trials are left out"));
 }
 
-// What it draws, how it filters, sorts and leads to a trial; by the keyboard too.
+// The page draws, filters, sorts and leads to a trial; by the keyboard too.
 TEST_F(StudyPageBrowserTest, LooksCloserAtItsTrials) {
   Open(kGrid);
   EXPECT_EQ(Text("explore-count"), "12 of 12 trials");
@@ -171,7 +171,7 @@ TEST_F(StudyPageBrowserTest, LooksCloserAtItsTrials) {
   EXPECT_THAT(Text("explore-budget"), HasSubstr("dexcheck budget offset --set control.K_p=1000"));
   const std::string scatter = "Chart.getChart(document.getElementById('explore-scatter'))";
   EXPECT_EQ(Run("return " + scatter + ".data.datasets[0].data.map(p => p.row);"), (std::vector<int>{5}));
-  // Of two metrics with their front; all are the same, so that one point beats all others.
+  // Two metrics are drawn with their front; all are the same, so that one point beats all others.
   choose("x", Run("return String([...document.getElementById('explore-x').options].find(o => o.text === "
                   "'energy, J').value);"));
   EXPECT_EQ(Run("return " + scatter + ".data.datasets[1].label;"), "Pareto front, 1 trials");

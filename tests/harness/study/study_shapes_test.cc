@@ -21,7 +21,7 @@ namespace {
 
 struct Shape {
   std::string name;
-  std::string text;  ///< Of the study, behind its name and scenario.
+  std::string text;  ///< Text of the study after its name and scenario.
 };
 
 std::string Vary(const std::string& key, const std::string& values) {
@@ -162,7 +162,7 @@ TEST_F(StudyPage, BestIsByTheObjectiveAmongWhatTheConstraintsAdmit) {
   EXPECT_EQ(largest["rows"][0]["cells"], (std::vector<double>{100.0, 200.0, 0.5})) << "K_p, K_v, energy";
   EXPECT_EQ(ListBest(best("energy < 0", kWish)), std::vector<long>());
   EXPECT_THAT(ListBest(best("energy > 0.3", "")), ::testing::UnorderedElementsAre(0, 1));
-  // Of two that speak against each other all are in the front; of two that go together one is.
+  // Two contradicting objectives have all in the front; two that agree have one.
   const std::string two = kWish + "[[objective]]\nmaximize = 'overshoot'\n";
   EXPECT_EQ(ListBest(best("held", two)), (std::vector<long>{4, 3, 1, 0}));
   EXPECT_EQ(ListBest(best("held", kWish + "[[objective]]\nminimize = 'overshoot'\n")), std::vector<long>{4});

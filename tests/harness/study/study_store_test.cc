@@ -105,7 +105,7 @@ TEST_F(StudyStoreTest, AnotherStudyIsRefused) {
   EXPECT_NO_THROW({ const StudyStore same = Open(); });
 }
 
-// What makes no other trials may be edited.
+// Texts that change no trial may be edited.
 TEST_F(StudyStoreTest, TheDatabaseTakesOverWhatNoRowDependsOn) {
   Open().Add(MakeRow(0));
   const std::string edited =

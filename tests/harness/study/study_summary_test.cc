@@ -1,4 +1,4 @@
-// What a page and `report --json` have of a study, from a database that somebody else may have written.
+// Data of a study for its page and `report --json`, from a database of unknown origin.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -30,7 +30,7 @@ Study Parse(const std::string& text) {
 const std::string kGrid =
     "[[vary]]\nkey = 'control.K_p'\nvalues = [1, 2]\n[[vary]]\nkey = 'control.K_v'\nvalues = [20, 200]\n";
 
-/// Of a database with one text in all columns, the study itself and its scenario excepted.
+/// Summarises a database with one text in all columns, except the study itself and its scenario.
 /// @param of_joints its trials have errors of joints, and none of an object.
 StudySummary Summarise(const Study& study, const std::string& text, bool of_joints = false) {
   const TempFolder folder;

@@ -1,4 +1,4 @@
-// What trials come to; every shipped study can be run, and what trials share changes none.
+// Results of trials; every shipped study can be run, and shared parts change no trial.
 
 #include "harness/study/trial.h"
 
