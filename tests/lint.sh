@@ -29,7 +29,7 @@ elif [[ $# -eq 0 ]]; then
 fi
 
 # Lists comments that begin with a word that is no subject; fails if there are any.
-check_comments() { ! grep -nE '(^|[[:space:]])//[/<]* *(Of|What|As|Likewise)\b' /dev/null "$@"; }
+check_comments() { ! grep -nE '^[[:space:]]*//[/<]* *(Of|What|As|Likewise)\b' /dev/null "$@"; }
 
 echo "clang-format"
 git ls-files '*.cc' '*.h' | xargs clang-format-14 --dry-run --Werror || failed=1

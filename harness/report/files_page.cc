@@ -26,7 +26,7 @@ Json DescribePose(const Pose& X) {
 /// follow from I_x = m (a_y^2 + a_z^2) / 5. Where no such body exists, the axis is 0.
 Json MakeEllipsoid(const PrintedInertial& inertial) {
   const Eigen::SelfAdjointEigenSolver<Matrix3d> principal(ToTensor(inertial.I));
-  const Vector3d moments = principal.eigenvalues();
+  const Vector3d& moments = principal.eigenvalues();
   Matrix3d axes = principal.eigenvectors();
   if (axes.determinant() < 0.0) axes.col(0) = -axes.col(0);
   Pose X = inertial.origin.CalcPose();

@@ -83,7 +83,7 @@ TEST(CorrectionCases, AFrameOnALinkIsCompared) {
   ASSERT_EQ(found.items.size(), 1U);
   EXPECT_EQ(found.items[0].fault.of, SiteKind::kRotation);
   EXPECT_THAT(found.items[0].places, ElementsAre("joint tool"));
-  // Of two MJCFs it is a frame in both.
+  // Both MJCFs have it as a frame.
   const FileCorrections frames = FindCorrections(
       Read("a.xml", Replace(kMjcf, "euler='0 0 0.4'", "euler='0 0 0.9'")), Read("b.xml", kMjcf));
   ASSERT_EQ(frames.items.size(), 1U);
