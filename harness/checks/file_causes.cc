@@ -152,23 +152,42 @@ void LeaveOutUnstated(const std::vector<std::string>& ignore, PrintedRobot* robo
   }
 }
 
-void LeaveOutFrames(PrintedRobot* a, PrintedRobot* b) {
-  const auto leave_out = [](const PrintedRobot& other, PrintedRobot* robot) {
-    for (int i = robot->size() - 1; i > 0; --i) {
-      const bool is_link = std::ranges::any_of(other.links, [&](const PrintedLink& link) {
-        return !link.is_frame && link.name == robot->link(i).name;
-      });
-      if (!robot->link(i).is_frame || !is_link) continue;
-      // Frames carry nothing and stand last, so that links keep their numbers.
-      for (PrintedLink& link : robot->links) {
-        std::erase(link.children, i);
-        for (int& child : link.children) child -= child > i ? 1 : 0;
-      }
-      robot->links.erase(robot->links.begin() + i);
+namespace {
+
+/// Takes out of a robot the frames that are links in the other one, unless links of one name carry both.
+void LeaveOutFrames(const PrintedRobot& other, PrintedRobot* robot) {
+  for (int i = robot->size() - 1; i > 0; --i) {
+    const bool is_link = std::ranges::any_of(other.links, [&](const PrintedLink& link) {
+      return !link.is_frame && link.name == robot->link(i).name;
+    });
+    if (!robot->link(i).is_frame || !is_link) continue;
+    // Frames carry nothing and stand last, so that links keep their numbers.
+    for (PrintedLink& link : robot->links) {
+      std::erase(link.children, i);
+      for (int& child : link.children) child -= child > i ? 1 : 0;
     }
+    robot->links.erase(robot->links.begin() + i);
+  }
+}
+
+/// Takes out of a robot ranges of half a turn to both sides.
+void LeaveOutHalfTurns(PrintedRobot* robot) {
+  const auto is_end = [](const PrintedScalar& end, double half_turn) {
+    return std::abs(end.value - half_turn) <= end.half + 1e-12;
   };
-  leave_out(*b, a);
-  leave_out(*a, b);
+  for (PrintedLink& link : robot->links) {
+    auto& range = link.joint.range;
+    if (range && is_end((*range)[0], -kPi) && is_end((*range)[1], kPi)) range.reset();
+  }
+}
+
+}  // namespace
+
+void LeaveOutUnshared(PrintedRobot* a, PrintedRobot* b) {
+  LeaveOutFrames(*b, a);
+  LeaveOutFrames(*a, b);
+  if (a->format != RobotFormat::kToml && b->format != RobotFormat::kToml) return;
+  for (PrintedRobot* const robot : {a, b}) LeaveOutHalfTurns(robot);
 }
 
 bool IsExplained(const std::string& check, const CorrectionItem& cause) {
@@ -199,28 +218,8 @@ bool IsExplained(const std::string& check, const CorrectionItem& cause) {
   });
 }
 
-namespace {
-
-/// A joint of a table that states no range has half a turn to both sides: beside a table such a range is
-/// none.
-void LeaveOutHalfTurns(PrintedRobot* a, PrintedRobot* b) {
-  if (a->format != RobotFormat::kToml && b->format != RobotFormat::kToml) return;
-  const auto is_end = [](const PrintedScalar& end, double half_turn) {
-    return std::abs(end.value - half_turn) <= end.half + 1e-12;
-  };
-  for (PrintedRobot* const robot : {a, b}) {
-    for (PrintedLink& link : robot->links) {
-      auto& range = link.joint.range;
-      if (range && is_end((*range)[0], -kPi) && is_end((*range)[1], kPi)) range.reset();
-    }
-  }
-}
-
-}  // namespace
-
 FileCauses FindCauses(PrintedRobot a, PrintedRobot b) {
-  LeaveOutFrames(&a, &b);
-  LeaveOutHalfTurns(&a, &b);
+  LeaveOutUnshared(&a, &b);
   FileCauses found;
   found.corrections = FindCorrections(a, b);
   const std::vector<CorrectionItem>& items = found.corrections.items;

@@ -55,8 +55,10 @@ struct FileCauses {
 /// state nothing: a limit of effort or velocity of 0.
 void LeaveOutUnstated(const std::vector<std::string>& ignore, PrintedRobot* robot);
 
-/// Takes out of each robot the frames that are links in the other one, unless links of one name carry both.
-void LeaveOutFrames(PrintedRobot* a, PrintedRobot* b);
+/// Takes out of both robots what says nothing beside the other one: frames that are links there, unless links
+/// of one name carry both, and beside a table ranges of half a turn to both sides, which a table states of a
+/// joint without a range.
+void LeaveOutUnshared(PrintedRobot* a, PrintedRobot* b);
 
 /// Whether a constant or term that differs (ConstantFinding::check) follows from a cause.
 bool IsExplained(const std::string& check, const CorrectionItem& cause);

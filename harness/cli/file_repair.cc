@@ -12,7 +12,7 @@ RepairedFile Repair(const ConsistencyRequest& request, const DescriptionFile& fi
                     const DescriptionFile& other, const std::filesystem::path& folder) {
   PrintedRobot printed = ReadPrintedRobot(file), reference = ReadPrintedRobot(other);
   for (PrintedRobot* const robot : {&printed, &reference}) LeaveOutUnstated(request.ignore, robot);
-  LeaveOutFrames(&printed, &reference);
+  LeaveOutUnshared(&printed, &reference);
   return WriteRepaired(file, request.urdf, printed, reference, folder);
 }
 

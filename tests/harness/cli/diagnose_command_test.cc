@@ -165,6 +165,16 @@ TEST_F(DiagnoseCommand, CopiesNoFaultOfTheSecondFile) {
   }
 }
 
+// Half a turn to both sides, beside a joint without a range, is left in the table that is repaired.
+TEST_F(DiagnoseCommand, LeavesHalfATurnInATable) {
+  std::string text =
+      ReplaceOnce(ReadFixture("two.toml"), "[-2.0, 2.0]", "[-3.141592653589793, 3.141592653589793]");
+  Write("bad.toml", ReplaceOnce(text, "mass = 1.5", "mass = 1.7"));
+  WriteChanged("free.xml", ReadFixture("two.xml"), "limited=\"true\" range=\"-2 2\"", "limited=\"false\"");
+  ExpectRepaired("bad.toml", "free.xml", "repaired.toml");
+  EXPECT_THAT(Read("repaired.toml"), HasSubstr("-3.14159"));
+}
+
 // A frame stands in a list of its own, and is repaired there.
 TEST_F(DiagnoseCommand, RepairsAFrame) {
   WriteChanged("bad.toml", ReadText(kPandaToml), "xyz = [0.0, 0.0, 0.107]", "xyz = [0.0, 0.0, 0.117]");
