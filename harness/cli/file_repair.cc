@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 
 #include "controller/common/errors.h"
-#include "harness/cli/terminal.h"
+#include "harness/base/console.h"
 #include "harness/corrections/read_printed.h"
 
 namespace dexcheck::cli {
