@@ -21,7 +21,7 @@ std::string DescribeValues(const DigitExcess& excess, const std::string& first, 
   const std::string text = DescribeNumbers(excess.numbers, first, second);
   if (!excess.effect.empty()) return text + "; " + excess.effect;
   if (excess.too_loose > 0.0)
-    return text + fmt::format("; the printed digits tell it to {:.2g} % only", 100.0 * excess.too_loose);
+    return text + fmt::format("; the printed digits give it to {:.2g} % only", 100.0 * excess.too_loose);
   if (excess.units >= kExact) return text + "; both numbers are exact";
   return text + fmt::format("; {:.3g} times the printed precision", excess.units);
 }

@@ -56,7 +56,7 @@ void AddRecords(const char* title, const std::vector<CheckRecord>& records, cons
             fmt::format("{:.1e}", record.bound), std::to_string(CountDigits(record.worst)), "ok"}});
     return;
   }
-  std::map<std::string, std::string> alike;
+  std::map<std::string, std::string> agreeing;
   rows->push_back({{title, "worst error", "bound", ""}});
   for (const CheckRecord& record : records) {
     if (record.failed) {
@@ -66,11 +66,11 @@ void AddRecords(const char* title, const std::vector<CheckRecord>& records, cons
                                                                      places->num_base_velocities())}});
     } else {
       const bool is_within = comparison.digits && comparison.digits->units.contains(record.name);
-      std::string& names = alike[is_within ? "within digits" : "ok"];
+      std::string& names = agreeing[is_within ? "within digits" : "ok"];
       names += (names.empty() ? ": " : ", ") + record.name;
     }
   }
-  for (const auto& [outcome, names] : alike) rows->push_back({{}, fmt::format("  {}{}", outcome, names)});
+  for (const auto& [outcome, names] : agreeing) rows->push_back({{}, fmt::format("  {}{}", outcome, names)});
 }
 
 Json ToJson(const DigitVerdict& verdict) {

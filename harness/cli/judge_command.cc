@@ -78,10 +78,10 @@ void Print(const JudgeRequest& request, const RobotModel& model, const Recording
     std::string nearest;
     for (const Explanation& one : judgement.causes) {
       if (one.outcome != CauseOutcome::kNotExplained || one.faults.empty())
-        fmt::print("{}\n", Wrap(fmt::format("  {:2}  {}", ++number, one.Tell()), 6));
+        fmt::print("{}\n", Wrap(fmt::format("  {:2}  {}", ++number, one.Describe()), 6));
       else
         nearest += fmt::format("{}{} ({:.2g} %)", nearest.empty() ? "not explained; nearest: " : ", ",
-                               one.faults.front().Tell(), 100.0 * one.fraction);
+                               one.faults.front().Describe(), 100.0 * one.fraction);
     }
     if (!nearest.empty()) fmt::print("{}\n", Wrap(nearest, 2));
     const auto describe = [](const HeldPrediction& one) {
@@ -249,7 +249,7 @@ Json ToJson(const RobotModel& model, const RecordingPair& pair, const RecordingC
         {{"joint", model.joint(one.joint).name}, {"position", one.position}, {"torque", one.torque}});
   json["causes"] = Json::array();
   for (const CauseDifference& one : comparison.causes) {
-    Json cause = {{"text", one.Tell()}};
+    Json cause = {{"text", one.Describe()}};
     if (one.first) cause["first"] = dexcheck::ToJson(*one.first);
     if (one.second) cause["second"] = dexcheck::ToJson(*one.second);
     json["causes"].push_back(cause);
@@ -270,7 +270,7 @@ void Print(const RobotModel& model, const RecordingPair& pair, const RecordingCo
   }
   int number = 0;
   for (const CauseDifference& one : comparison.causes)
-    fmt::print("{}\n", Wrap(fmt::format("  {:2}  {}", ++number, one.Tell()), 6));
+    fmt::print("{}\n", Wrap(fmt::format("  {:2}  {}", ++number, one.Describe()), 6));
   if (comparison.causes.empty()) {
     fmt::print("{}: what {} does not explain is the same in both.\n", Paint(Tone::kGood, "SAME"),
                model.name());
@@ -323,7 +323,7 @@ void AddJudgeCommand(Command app) {
   AddUrdfOptions(command, &request->urdf);
   AddJsonOption(command, "the judgement", &request->json_file);
   command.AddOption("--page FILE.html", &request->page_file,
-                    "Write a page that loads nothing: torques and what is left of them, causes");
+                    "Write a page that loads nothing: torques, residuals, causes");
   command.AddFlag("--quiet", &request->quiet, "No progress, and causes and verdict only");
   command.SetAction([=] { return Run(*request); });
 }

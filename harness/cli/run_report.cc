@@ -159,7 +159,7 @@ void PrintSpeed(const ClosedLoop& loop, const RunResult& result) {
 void PrintCauses(const Causes& causes) {
   int number = 0;
   for (const Explanation& one : causes)
-    fmt::print("{}\n", Wrap(fmt::format("  {}. {}: {}", ++number, NameOf(one.channel), one.Tell()), 5));
+    fmt::print("{}\n", Wrap(fmt::format("  {}. {}: {}", ++number, NameOf(one.channel), one.Describe()), 5));
   const bool has_class = std::ranges::any_of(
       causes, [](const Explanation& one) { return one.outcome == CauseOutcome::kNamedClass; });
   if (has_class) fmt::print("    (what is not isolable here may be on another motion)\n");

@@ -68,7 +68,7 @@ struct CandidateSearch::Part {
   double extra;  ///< Bits of which of several.
   PrintedInertial given;
   BodyNumbers right;  ///< What it would have to be alone, in its link's frame.
-  BodyNumbers open;   ///< What digits of both files leave open of that.
+  BodyNumbers open;   ///< Tolerances that the digits of both files give them.
   SiteMask wrong = 0;
   EditFrames frames;
 

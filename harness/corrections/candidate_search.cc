@@ -13,7 +13,7 @@ namespace {
 
 constexpr SiteKind kNodeKinds[] = {SiteKind::kPosition, SiteKind::kRotation, SiteKind::kMass, SiteKind::kCom,
                                    SiteKind::kInertia};
-/// Over what digits leave open of the file as it is: what is farther off is right only if little of it is
+/// Relative to the tolerances of the file as it is: what is farther off is right only if little of it is
 /// left.
 constexpr double kFar = 100.0;
 

@@ -162,7 +162,8 @@ struct CorrectionCandidate {
   std::vector<LinkPatch> patches;
   std::string values;                   ///< "mass 1.9, 1.998 would be right"
   std::optional<FaultBeside> beside{};  ///< The sites are right only if this is undone too.
-  double rest = 1.0;  ///< How far sites are from right then, over what digits leave open; 1: they are right.
+  double rest =
+      1.0;  ///< How far sites are from right then, relative to the digits' tolerances; 1: they are right.
 };
 
 /// Returns whether a fault pays for its digits, and not for a convention.

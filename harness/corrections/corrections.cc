@@ -351,14 +351,14 @@ class OneWay {
 
   void AddRivals(const ChosenDeal& chosen, const std::vector<Site>& sites,
                  const std::vector<CorrectionCandidate>& candidates, CorrectionItem* item) const {
-    std::vector<std::string> told = {DescribeItem(*item, false)};
+    std::vector<std::string> texts = {DescribeItem(*item, false)};
     for (const Deal& deal : chosen.rivals) {
       CorrectionItem rival = MakeItems(deal, sites, candidates)[0];
       if (deal.candidates.size() < chosen.deal.candidates.size() && IsSameFault(rival.fault, item->fault))
         continue;
       std::string text = DescribeItem(rival, false);
-      if (std::ranges::find(told, text) != told.end()) continue;
-      told.push_back(std::move(text));
+      if (std::ranges::find(texts, text) != texts.end()) continue;
+      texts.push_back(std::move(text));
       item->rivals.push_back(std::move(rival));
     }
   }

@@ -37,7 +37,7 @@ struct CorrectionOptions {
   int trials = 60000;  ///< Edits that are tried at most, some microseconds each.
 };
 
-/// Finds what makes the files differ by more than their digits leave open. Corrections of the first file,
+/// Finds what makes the files differ by more than their digits allow. Corrections of the first file,
 /// unless the second is put right by fewer.
 FileCorrections FindCorrections(const PrintedRobot& a, const PrintedRobot& b,
                                 const CorrectionOptions& options = {});

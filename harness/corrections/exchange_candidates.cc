@@ -140,7 +140,7 @@ void CandidateSearch::SearchCopy(int link, double which) {
     const bool is_other = other.mass > 0.0 && is_near(std::abs(given.mass - other.mass), open.mass) &&
                           is_near((given.com - other.com).norm(), open.com.norm()) &&
                           is_near((given.inertia - other.inertia).norm(), open.inertia.norm());
-    // Two links that are alike say nothing, nor does a link whose frame alone differs.
+    // Two equal links say nothing, nor does a link whose frame alone differs.
     const BodyNumbers& own = pair_.other(pair_.Partner(link)).body;
     const BodyNumbers& theirs = pair_.other(pair_.Partner(k)).body;
     const bool is_twin = is_near((own.com - theirs.com).norm(), open.com.norm()) &&

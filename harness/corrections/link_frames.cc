@@ -25,7 +25,7 @@ constexpr double kWrongLength = 14.0;
 constexpr double kRegistered = 7.0;
 constexpr double kManyFrames = 0.5;    ///< Another frame, where most links have one.
 constexpr double kSearchAbove = 30.0;  ///< Registration by what the link carries is tried.
-constexpr double kRounding = 2e-6;     ///< m, or rad, beside what digits leave open.
+constexpr double kRounding = 2e-6;     ///< m, or rad, added to the digits' tolerance.
 constexpr double kSameFrame = 1e-4;    ///< m, or rad, between frames that are not tried both.
 
 /// The axis of a joint on a link, in both files' frames of the link.

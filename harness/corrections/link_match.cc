@@ -96,9 +96,9 @@ class LinkMatcher {
       others.push_back(b_.link(j).joint.name);
       open_b.push_back(j);
     }
-    const std::vector<std::string> alike = FindAlikeNames(names, others);
-    for (size_t k = 0; k < alike.size(); ++k) {
-      const auto found = std::ranges::find(others, alike[k]);
+    const std::vector<std::string> similar = FindAlikeNames(names, others);
+    for (size_t k = 0; k < similar.size(); ++k) {
+      const auto found = std::ranges::find(others, similar[k]);
       if (found != others.end() && Take(open[k], open_b[static_cast<size_t>(found - others.begin())]))
         by_joint->push_back(open[k]);
     }
@@ -209,7 +209,8 @@ LinkMatch MatchLinks(const PrintedRobot& a, const PrintedRobot& b, bool by_tree)
 
 std::vector<Node> ListNodes(const PrintedRobot& robot, const std::vector<int>& other) {
   std::vector<Node> nodes(robot.links.size());
-  std::vector<int> home(robot.links.size(), -1);  // the node that a link is part of; -1 of what is left out
+  std::vector<int> home(robot.links.size(),
+                        -1);  // the node that a link is part of; -1 of links that are left out
   for (int i = 0; i < robot.size(); ++i) {
     const auto at = static_cast<size_t>(i);
     const PrintedLink& link = robot.link(i);

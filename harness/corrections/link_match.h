@@ -14,7 +14,7 @@ struct LinkMatch {
   std::vector<int> a_of_b;
 };
 
-/// Matches links by name, then by their joints' names, then by those that are alike, then by the tree, which
+/// Matches links by name, then by their joints' names, then by similar names, then by the tree, which
 /// decides too where names contradict it.
 /// @param by_tree joints' names do not count.
 LinkMatch MatchLinks(const PrintedRobot& a, const PrintedRobot& b, bool by_tree = false);
@@ -35,14 +35,14 @@ struct Node {
 /// file lacks are left out with all that they carry.
 std::vector<Node> ListNodes(const PrintedRobot& robot, const std::vector<int>& other);
 
-/// Mass, centre and inertia about it in a link's frame, or what digits leave open of them.
+/// Mass, centre and inertia about it in a link's frame, or the tolerances that digits give them.
 struct BodyNumbers {
   double mass = 0.0;
   Vector3d com = Vector3d::Zero();
   Matrix3d inertia = Matrix3d::Zero();
 };
 
-/// A pose, and what digits leave open of it.
+/// A pose and the tolerance that digits give it.
 struct PoseTolerance {
   Vector3d length = Vector3d::Zero();
   double angle = 0.0;

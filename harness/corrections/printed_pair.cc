@@ -154,7 +154,7 @@ double PrintedPair::CompareNode(SiteKind kind, int link, const Pose& X, const Po
                 (tolerance.inertia + right.body_tolerance.inertia).array())
             .maxCoeff();
       };
-      // A mass that its digits leave open may have been another one when the inertia was computed from it.
+      // A mass within its digits' tolerance may have been another one when the inertia was computed from it.
       const bool is_open = body.mass > 0.0 && std::abs(body.mass - right.body.mass) <=
                                                   tolerance.mass + right.body_tolerance.mass;
       return is_open ? std::min(compare(1.0), compare(right.body.mass / body.mass)) : compare(1.0);

@@ -11,8 +11,8 @@
 
 namespace dexcheck {
 
-/// The right values of a link, in the first file's frames of it and of its parent, and what the second file's
-/// digits leave open of it.
+/// The right values of a link, in the first file's frames of it and of its parent, and the
+/// tolerances that the second file's digits give them.
 struct RightNode {
   bool is_placed = false;  ///< Whether both files have it on the same link.
   Pose X = Pose::Identity();
@@ -61,8 +61,8 @@ class PrintedPair {
   /// Numbers of the second file in its own frames.
   [[nodiscard]] const GivenNode& other(int link) const { return other_[static_cast<size_t>(link)]; }
 
-  /// How far a number of the robot as it is now is from right, over what digits leave open; at most 1: it is
-  /// right.
+  /// How far a number of the robot as it is now is from right, relative to its digits' tolerance; at most 1:
+  /// it is right.
   [[nodiscard]] double CompareNode(SiteKind kind, int link, const Pose& X, const PoseTolerance& pose,
                                    const BodyNumbers& body, const BodyNumbers& tolerance) const;
   /// Compares the numbers as they were measured.
@@ -88,12 +88,12 @@ class PrintedPair {
   std::vector<Node> nodes_, nodes_b_;
   std::vector<int> links_;
   std::vector<Pose> X_ab_;
-  std::vector<PoseTolerance> frame_open_;  ///< What digits leave open of X_ab_.
+  std::vector<PoseTolerance> frame_open_;  ///< Tolerance that digits give X_ab_.
   std::vector<RightNode> right_;
   std::vector<GivenNode> given_, other_;
 };
 
-/// Whether two scalars differ by more than their digits leave open.
+/// Whether two scalars differ by more than their digits allow.
 bool Differ(const PrintedScalar& a, const PrintedScalar& b);
 /// The number of a joint that counts where its file states none.
 /// @param has_motors both files state motors: a joint without one has none.

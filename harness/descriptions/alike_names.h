@@ -1,6 +1,6 @@
 #pragma once
 
-// Which joint of one file is which of another: by names that are alike ("panda_joint1" and "joint1",
+// Which joint of one file is which of another: by similar names ("panda_joint1" and "joint1",
 // "LeftKnee" and "left_knee"), or by the tree, and then by numbers.
 
 #include <string>
@@ -20,9 +20,9 @@ std::vector<std::string> FindAlikeNames(const std::vector<std::string>& names,
 
 std::vector<std::string> ListJointNames(const RobotDescription& robot);
 
-/// Gives the joints of a description the names that another file has for them, when those are alike, or else
-/// when one tree is the other's (MatchByStructure). @return a note that lists them; none when nothing was
-/// renamed.
+/// Gives the joints of a description the names that another file has for them, when those are similar, or
+/// else when one tree is the other's (MatchByStructure). @return a note that lists them; none when nothing
+/// was renamed.
 std::vector<std::string> TakeJointNames(const RobotDescription& other, RobotDescription* robot);
 
 /// Joint of `b` for each of `a`, such that kinds of joints and what hangs on what are the same. A name that

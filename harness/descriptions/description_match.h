@@ -35,7 +35,7 @@ void TakeIgnored(const RobotSpec& robot, const std::vector<std::string>& ignore,
 /// Takes out of a description what need not agree, as if its file did not state it.
 void LeaveOutIgnored(const std::vector<std::string>& ignore, RobotDescription* robot);
 
-/// Gives the joints of `b` the names of `a` when they are alike, and completes either description by what
+/// Gives the joints of `b` the names of `a` when they are similar, and completes either description by what
 /// only the other one states: gravity, constants of joints, names of links whose joints have one name; frames
 /// that only one has are dropped.
 /// @param ignore what need not agree, of kIgnorable: `b` takes those of `a`.

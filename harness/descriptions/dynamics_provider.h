@@ -119,7 +119,7 @@ struct ContactValues {
 /// over columns takes several times as long for.
 void CopyColumns(const Eigen::Ref<const MatrixXd>& columns, Eigen::Index first, Eigen::Ref<MatrixXd> out);
 
-/// A provider that has a whole mechanism: what analytic model and engine keep alike.
+/// A provider that has a whole mechanism: what analytic model and engine share.
 class MechanismProvider : public DynamicsProvider {
  public:
   explicit MechanismProvider(std::string name) : name_(std::move(name)) {}

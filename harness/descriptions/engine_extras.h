@@ -36,7 +36,7 @@ struct Extras {
 Extras CompareExtras(const RobotDescription& first, MjModelPtr first_engine, const std::string& file,
                      const Adapter& second, mjModel* engine, const std::string& other);
 
-/// Puts them into the second one's constant checks: what both constant checks find alike is taken back, what
+/// Puts them into the second one's constant checks: what both constant checks find equal is taken back, what
 /// only the first one's finds is a difference the other way round.
 void AddExtras(const Extras& extras, ConstantChecks* constants);
 

@@ -97,7 +97,7 @@ std::vector<Entry> ListFaults(const Causes& causes, std::span<const CheckRecord>
   return entries;
 }
 
-/// Adds one fact of each cause that no fault explains; of two checks of one fact the sharper one tells it.
+/// Adds one fact of each cause that no fault explains; of two checks of one fact the sharper one states it.
 void AddFacts(std::span<const CheckRecord> steps, std::vector<Entry>* entries) {
   const double void_from = FindVoid(steps);
   for (const CheckRecord& check : steps) {
@@ -227,7 +227,7 @@ void AddEvidence(const Entry& first, std::span<const CheckRecord> steps, const C
   result->evidence = Describe(*check);
   result->check = check->name;
   if (first.one.outcome != CauseOutcome::kObserved) {
-    result->evidence += "; " + TellCauses(*causes, first.one.channel);
+    result->evidence += "; " + DescribeCauses(*causes, first.one.channel);
   } else if (first.meaning.rank == Rank::kResidual && first.meaning.cause == Cause::kControlLaw) {
     result->cause = AttributeExpectation(*check, context, &result->evidence);
     causes->front().faults.front().fault = NameOf(result->cause);

@@ -27,14 +27,14 @@ struct AttributionResult {
   std::vector<Attribution> attributions;  ///< Of each failed check.
 };
 
-/// From when on what is left of the balances and of the wheels' rolling is no fault's, s; endless for never:
+/// From when on the remainder of the balances and of the wheels' rolling is no fault's, s; endless for never:
 /// wheels slide, the solver stopped early, or two bodies touch that should not.
 double FindVoid(std::span<const CheckRecord> steps);
 
 /// Attributes the failed checks of a run. Model checks compare both sides at one and the same state: when one
 /// fails, the model is the cause of everything else. Otherwise the cause is what came first of what is
-/// decisive, a fault or an observed fact; sliding shows at the edge of the friction cone, and tells slip from
-/// contacts that merely give.
+/// decisive, a fault or an observed fact; sliding shows at the edge of the friction cone, and distinguishes
+/// slip from contacts that merely give.
 /// @param model checks of the model's terms. @param causes faults that explain the residuals; gets the facts,
 /// and is ranked: the first one is the run's cause, unless the scenario declares what makes it.
 AttributionResult Attribute(const ConstantChecks& constants, std::span<const CheckRecord> model,

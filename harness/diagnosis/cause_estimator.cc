@@ -92,7 +92,7 @@ class Search {
     std::erase_if(set, [&](size_t i) { return columns_.CountOf(i) != 1; });
     while (!set.empty()) {
       const Solution found = Solve(set);
-      // The square of what is left grows by so much without each.
+      // The square of the remainder grows by so much without each.
       const double squares = found.residual.squaredNorm();
       const VectorXd more =
           found.amplitude.cwiseAbs2().cwiseQuotient(found.covariance.diagonal()) * found.variance;

@@ -29,7 +29,7 @@ struct Candidate {
   std::string fault;     ///< "torque gain".
   std::string place;     ///< "motor r_elbow".
   std::string unit;      ///< Of the value; empty for a factor.
-  std::string detail;    ///< What else is told of it: "at 4.77 Hz".
+  std::string detail;    ///< More about it: "at 4.77 Hz".
   double nominal = 0.0;  ///< The value without the fault: the amplitude is added to it.
   MatrixXd columns;      ///< N x p.
   int parameters = 0;    ///< That were fitted beforehand, besides the amplitudes.
@@ -61,7 +61,7 @@ struct CauseTerm {
 struct CauseSelection {
   std::vector<CauseTerm> terms;  ///< The one that explains most first.
   double fraction = 0.0;         ///< Of |y|^2 that they explain.
-  double left = 0.0;             ///< Root mean square of what is left over, in units of noise.
+  double left = 0.0;             ///< Root mean square of the remainder, in units of noise.
   double criterion = 0.0;
   VectorXd residual;  ///< What is left over (N).
 };
@@ -84,7 +84,7 @@ struct CauseOptions {
   double independent = 1e-7;
 };
 
-/// Candidates whose likelihoods differ by less than this factor are told as equals, natural logarithm.
+/// Candidates whose likelihoods differ by less than this factor count as equal, natural logarithm.
 inline constexpr double kEqualLogOdds = 5.0;
 
 /// See above. @param y (N). @param candidates each with N rows.

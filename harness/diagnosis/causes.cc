@@ -32,7 +32,7 @@ std::string FormatVector(const Eigen::Ref<const VectorXd>& v, int digits) {
   return text + ")";
 }
 
-std::string Fault::Tell() const {
+std::string Fault::Describe() const {
   if (fault == kUnknownFault) return place;
   const std::string where = place == "law" ? "" : place + ": ", more = detail.empty() ? "" : " " + detail;
   if (std::isnan(value)) return where + fault + more;
@@ -74,25 +74,26 @@ namespace {
 
 /// ", from 0.2 s", ", 0.2 to 0.5 s"; of what is not seen "between 0.2 and 0.3".
 std::string FormatInterval(const Explanation& one) {
-  const auto tell = [](double earliest, double latest) {
+  const auto show = [](double earliest, double latest) {
     return latest > earliest ? "between " + FormatNumber(earliest, 4) + " and " + FormatNumber(latest, 4)
                              : FormatNumber(earliest, 4);
   };
-  const std::string from = tell(one.from - one.unseen_before, one.from);
+  const std::string from = show(one.from - one.unseen_before, one.from);
   if (!one.ends) return ", from " + from + " s";
-  return ", " + from + " to " + tell(one.to, one.to + one.unseen_after) + " s";
+  return ", " + from + " to " + show(one.to, one.to + one.unseen_after) + " s";
 }
 
 }  // namespace
 
-std::string Explanation::Tell() const {
+std::string Explanation::Describe() const {
   std::string text;
   if (outcome == CauseOutcome::kNotExplained) {
-    text = "not explained" + (faults.empty() ? std::string() : "; nearest: " + faults.front().Tell()) + " (" +
-           FormatNumber(100.0 * fraction, 3) + " %, " + FormatNumber(left, 3) + " times the noise is left)";
+    text = "not explained" + (faults.empty() ? std::string() : "; nearest: " + faults.front().Describe()) +
+           " (" + FormatNumber(100.0 * fraction, 3) + " %, " + FormatNumber(left, 3) +
+           " times the noise is left)";
   } else {
     for (size_t i = 0; i < std::min(faults.size(), kMostTold); ++i)
-      text += (i == 0 ? "" : " or ") + faults[i].Tell();
+      text += (i == 0 ? "" : " or ") + faults[i].Describe();
     if (faults.size() > kMostTold) text += " or " + std::to_string(faults.size() - kMostTold) + " more";
     if (faults.size() > 1) text += ": not isolable from each other on this motion";
   }
@@ -111,7 +112,7 @@ nlohmann::ordered_json ToJson(const Fault& fault) {
 }
 
 nlohmann::ordered_json ToJson(const Explanation& one) {
-  nlohmann::ordered_json json = {{"text", one.Tell()},
+  nlohmann::ordered_json json = {{"text", one.Describe()},
                                  {"channel", NameOf(one.channel)},
                                  {"outcome", NameOf(one.outcome)},
                                  {"faults", nlohmann::ordered_json::array()},
@@ -134,10 +135,10 @@ bool Names(const Causes& causes, std::string_view fault) {
   });
 }
 
-std::string TellCauses(const Causes& causes, CauseChannel channel) {
+std::string DescribeCauses(const Causes& causes, CauseChannel channel) {
   std::string text;
   for (const Explanation& one : causes)
-    if (one.channel == channel) text += (text.empty() ? "" : "; ") + one.Tell();
+    if (one.channel == channel) text += (text.empty() ? "" : "; ") + one.Describe();
   return text;
 }
 

@@ -23,7 +23,7 @@ struct Fault {
   /// Returns whether it is the same kind at the same place.
   [[nodiscard]] bool IsLike(const Fault& other) const { return fault == other.fault && place == other.place; }
   /// "motor r_elbow: torque gain 0.99 +- 1e-12".
-  [[nodiscard]] std::string Tell() const;
+  [[nodiscard]] std::string Describe() const;
 };
 
 /// "(0.1, 0, -0.2)" with so many digits.
@@ -40,7 +40,7 @@ const char* NameOf(CauseChannel channel);
 
 enum class CauseOutcome {
   kNamed,         ///< One fault explains it, and no other one does.
-  kNamedClass,    ///< Several do, which this motion does not tell apart.
+  kNamedClass,    ///< Several do, which this motion does not distinguish.
   kNotExplained,  ///< None does.
   kObserved,      ///< A fact that is no parameter of a fault: a contact slides, a joint is at its limit.
 };
@@ -68,7 +68,7 @@ struct Explanation {
   /// One fault is named once, and whether there are several.
   void SetOutcome();
   /// In a line.
-  [[nodiscard]] std::string Tell() const;
+  [[nodiscard]] std::string Describe() const;
 };
 
 /// Returns the form of summaries of runs and judgements: null for infinite, and for the time of what holds
@@ -82,6 +82,6 @@ using Causes = std::vector<Explanation>;
 /// Whether the first fault of one of them is called so.
 bool Names(const Causes& causes, std::string_view fault);
 /// Returns the causes of one channel in words; empty for none.
-std::string TellCauses(const Causes& causes, CauseChannel channel);
+std::string DescribeCauses(const Causes& causes, CauseChannel channel);
 
 }  // namespace dexcheck

@@ -29,7 +29,7 @@ class ForceProblem {
 
   /// Whether the last explanation leaves no more than rounding.
   [[nodiscard]] bool is_exact() const { return is_exact_; }
-  /// Whether what is left is noise, or next to nothing beside what there was.
+  /// Whether the remainder is noise, or next to nothing beside what there was.
   [[nodiscard]] bool IsExplained(double fraction, double left) const;
 
   /// The terms of the last explanation with their sizes; forces at points by themselves.
@@ -106,7 +106,7 @@ class ForceProblem {
   Terms known_, terms_;
   Vector2d first_level_, level_, least_level_;  // StepForces::SetLevel
   std::vector<StepNoise> noise_;                // of each step
-  std::vector<Turns> turns_;                    // likewise
+  std::vector<Turns> turns_;                    // by the same index
 };
 
 }  // namespace dexcheck

@@ -35,8 +35,8 @@ struct SearchOptions {
   double seconds = 2.0;
 };
 
-/// All: measurement, actuation, law, contact, rolling, balance. What no robot like this one can have is told
-/// as not explained.
+/// All: measurement, actuation, law, contact, rolling, balance. What no robot like this one can have is
+/// listed as not explained.
 /// @param void_from of FindVoid, s: wheels and balances are explained up to then.
 /// @param stopped whether the search ended before it was done, by its limit or by the user.
 Causes ExplainRun(const StepStore& store, double void_from, const SearchOptions& options = {},

@@ -19,7 +19,7 @@ struct SignalSeries {
   VectorXd rate, position;        ///< Of what it moves; empty for none.
   std::vector<bool> has_history;  ///< Whether the steps before each are those before it here.
   double noise = 0.0;             ///< Rounding of got - expected.
-  /// When it differs first and last, of all steps, s; NaN where these steps alone tell.
+  /// When it differs first and last, of all steps, s; NaN where these steps alone show it.
   double from = std::numeric_limits<double>::quiet_NaN(), to = from;
   /// In units of the noise: the least error that a cause is looked for, and the most that an explanation may
   /// leave.
@@ -29,7 +29,7 @@ struct SignalSeries {
 /// Explains got - expected of the signals of one channel: a transmission (none, a delay, a limit, a dead
 /// zone, steps, the signal of another one, a stuck value, play), with gain, offset, friction, drift, lag or a
 /// ripple of its result, or noise. One for each fault; none where nothing differs. A fault that several have
-/// alone and with the same value is told once.
+/// alone and with the same value is listed once.
 Causes ExplainSignals(std::vector<SignalSeries> series, CauseChannel channel);
 /// All motors, and all readings.
 Causes ExplainSignals(const StepStore& store);

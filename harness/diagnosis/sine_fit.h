@@ -12,7 +12,7 @@ struct Sine {
   MatrixXd columns;        ///< N x 2, of size 1.
 };
 
-/// @param y N. @param x N, in any order, not all alike. Looked for from half a period in all of x to two
+/// @param y N. @param x N, in any order, not all equal. Looked for from half a period in all of x to two
 /// values a period.
 Sine FindSine(const Eigen::ArrayXd& y, const Eigen::ArrayXd& x);
 

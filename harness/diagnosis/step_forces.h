@@ -14,7 +14,7 @@
 
 namespace dexcheck {
 
-/// Faults that are told otherwise than their candidates are called.
+/// Faults whose words differ from their candidates' names.
 namespace force_fault {
 inline constexpr const char* kBearing = "dry friction of the bearing";
 inline constexpr const char* kStuckBearing = "dry friction of a bearing that sticks";
@@ -76,7 +76,7 @@ class StepForces {
   [[nodiscard]] double reach() const { return reach_; }
   /// Which way links and object are turned at that step.
   [[nodiscard]] Turns ListTurns() const;
-  /// Whether the checks of the balances fail, or what is left is more than noise.
+  /// Whether the checks of the balances fail, or the remainder is more than noise.
   [[nodiscard]] bool Differs(const VectorXd& residual) const;
   [[nodiscard]] VectorXd CalcResidual() const;
   /// Adds this step's rows to each candidate: `begin` is the first of them.

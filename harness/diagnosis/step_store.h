@@ -41,7 +41,7 @@ class StepStore {
     kTauDeclared,      ///< n, N m: what the declared motors make of the command.
     kTauReceived,      ///< n, N m
     kPosition,         ///< q', as it is.
-    kVelocity,         ///< n, xi likewise.
+    kVelocity,         ///< n, in the order of xi.
     kAcceleration,     ///< n
     kDeclaredReading,  ///< m, what the declared sensing makes of the truth.
     kReading,          ///< m, what was measured.

@@ -33,16 +33,16 @@ Fault DescribeNumber(const Candidate& candidate, const VectorXd& amplitude, cons
 }
 
 Causes DescribeSelection(const Explanation& start, const CauseSelection& selection,
-                         std::span<const Candidate> candidates, const DescribeCandidate& tell,
+                         std::span<const Candidate> candidates, const DescribeCandidate& describe,
                          bool is_explained) {
   Causes causes;
   for (const CauseTerm& term : selection.terms) {
     Explanation& one = causes.emplace_back(start);
     one.fraction = selection.terms.size() == 1 ? selection.fraction : term.fraction;
     one.left = selection.left;
-    one.faults.push_back(tell(candidates[term.candidate], term.amplitude, term.error));
+    one.faults.push_back(describe(candidates[term.candidate], term.amplitude, term.error));
     for (const auto& [same, amplitude] : term.same)
-      one.faults.push_back(tell(candidates[same], amplitude, {}));
+      one.faults.push_back(describe(candidates[same], amplitude, {}));
     one.SetOutcome();
     if (!is_explained) one.outcome = CauseOutcome::kNotExplained;
     if (term.rival != SIZE_MAX) one.SetRival(candidates[term.rival], term.log_odds);

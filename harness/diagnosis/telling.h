@@ -1,6 +1,6 @@
 #pragma once
 
-// How explanations of all channels begin, and how what was selected is told.
+// How explanations of all channels begin, and how what was selected is described.
 
 #include <functional>
 #include <span>
@@ -16,7 +16,7 @@ namespace dexcheck {
 Explanation StartExplanation(const StepStore& store, CauseChannel channel,
                              const std::vector<Eigen::Index>& steps);
 
-/// How a candidate with this amplitude is told. @param error empty where it is not known.
+/// Describes a candidate with this amplitude. @param error empty where it is not known.
 using DescribeCandidate =
     std::function<Fault(const Candidate& candidate, const VectorXd& amplitude, const VectorXd& error)>;
 
@@ -27,7 +27,7 @@ Fault DescribeNumber(const Candidate& candidate, const VectorXd& amplitude, cons
 /// place.
 /// @param is_explained whether that is enough.
 Causes DescribeSelection(const Explanation& start, const CauseSelection& selection,
-                         std::span<const Candidate> candidates, const DescribeCandidate& tell,
+                         std::span<const Candidate> candidates, const DescribeCandidate& describe,
                          bool is_explained = true);
 
 }  // namespace dexcheck

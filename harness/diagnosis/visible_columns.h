@@ -16,7 +16,7 @@ struct Visible {
   VectorXd unit;     // p, of the amplitudes: diag(unit)^-1 basis is orthonormal
 };
 
-/// Standard errors of the amplitudes (p), infinite for those that the visible ones do not tell. @param
+/// Standard errors of the amplitudes (p), infinite for those that the visible ones do not determine. @param
 /// covariance of these (r x r).
 VectorXd CalcErrors(const Visible& visible, const MatrixXd& covariance);
 

@@ -1,7 +1,7 @@
 #pragma once
 
 // Faults that are made in a run on purpose: in what stands between controller and engine, in what acts on the
-// engine's bodies, in the controller and its model, without the judge being told. Do the checks find them,
+// engine's bodies, in the controller and its model, unknown to the judge. Do the checks find them,
 // and are they named? A law's faults are entries of the table that names them; of all others this folder does
 // not know the signatures that they are recognised by.
 

@@ -55,7 +55,7 @@ std::vector<Push> FindWindows(const VectorXd& squares, const std::vector<TorqueB
 }
 
 /// The effect of a constant acceleration of the base in a block: products of its three columns, of all
-/// joints, and with what is left.
+/// joints, and with the residual.
 struct BlockProducts {
   double from = 0.0, to = 0.0;  // s
   Matrix3d squares = Matrix3d::Zero();
@@ -95,7 +95,7 @@ Blocks MakeBlocks(const RecordingSet& recordings, const TorqueRows& rows, const 
   return all;
 }
 
-/// Squares of what is left that accelerations of this frequency explain.
+/// Squares of the residual that accelerations of this frequency explain.
 double CalcExplained(const std::vector<BlockProducts>& blocks, double frequency) {
   Matrix6d G = Matrix6d::Zero();
   Vector6d b = Vector6d::Zero();
@@ -110,7 +110,7 @@ double CalcExplained(const std::vector<BlockProducts>& blocks, double frequency)
   return b.dot(SolveLeastSquares(G, b));
 }
 
-constexpr double kFraction = 0.2;  // of what is left, that makes a motion of the base worth a look
+constexpr double kFraction = 0.2;  // of the residual, that makes a motion of the base worth a look
 
 }  // namespace
 

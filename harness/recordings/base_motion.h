@@ -8,11 +8,11 @@
 
 namespace dexcheck {
 
-/// The angular frequency (rad/s) at which an acceleration of the base explains most of what is left, over
+/// The angular frequency (rad/s) at which an acceleration of the base explains most of the residual, over
 /// blocks of time; 0 where none explains a fifth of it, or a base's pose was recorded.
 double FindShaking(const RecordingSet& recordings, const TorqueRows& rows, const VectorXd& left);
 
-/// The few stretches of a recording in which what is left stands out, and the one to its end in which a
+/// The few stretches of a recording in which the residual stands out, and the one to its end in which a
 /// constant acceleration of the base, or a tilt, explains most of it and a fifth of all.
 std::vector<Push> FindPushes(const RecordingSet& recordings, const TorqueRows& rows, const VectorXd& left,
                              size_t recording);

@@ -28,8 +28,8 @@ std::string ShowVector(const Eigen::Ref<const VectorXd>& v) { return FormatVecto
 }  // namespace
 
 bool FoundFault::HasSize() const {
-  const VectorXd told = error.array().isFinite().select(error, 0.0);
-  return amplitude.norm() > std::max(told.norm(), std::numeric_limits<double>::min()) &&
+  const VectorXd finite = error.array().isFinite().select(error, 0.0);
+  return amplitude.norm() > std::max(finite.norm(), std::numeric_limits<double>::min()) &&
          (!fault.is_possible || fault.is_possible(amplitude));
 }
 
@@ -57,7 +57,7 @@ CauseDescription::JointNumber CauseDescription::CalcNumber(int joint, TorqueColu
   return number;
 }
 
-bool CauseDescription::AddWholeNumbers(FoundFault* found, Fault* told) const {
+bool CauseDescription::AddWholeNumbers(FoundFault* found, Fault* shown) const {
   const TorqueFault& fault = found->fault;
   if (fault.sums.empty()) return false;
   const auto kind = FindNumber(fault, fault.sums.front().front().column);
@@ -65,19 +65,19 @@ bool CauseDescription::AddWholeNumbers(FoundFault* found, Fault* told) const {
   if (fault.index >= 0) {
     const JointNumber number = CalcNumber(fault.index, *kind);
     if (number.terms < 2) return false;
-    told->value = fault.nominal + number.change;
-    told->error = std::sqrt(number.variance);
+    shown->value = fault.nominal + number.change;
+    shown->error = std::sqrt(number.variance);
     return true;
   }
-  std::vector<std::string> alike;
+  std::vector<std::string> names;
   bool is_shared = false;
   for (const int joint : set_.joints()) {
     const bool is_alone = CalcNumber(joint, *kind).terms < 2;
-    if (is_alone) alike.push_back(model_.joint(joint).name);
+    if (is_alone) names.push_back(model_.joint(joint).name);
     is_shared = is_shared || !is_alone;
   }
   if (fault.sums.size() == 1) {
-    if (is_shared) told->place = (alike.size() == 1 ? "joint " : "joints ") + JoinNames(alike);
+    if (is_shared) shown->place = (names.size() == 1 ? "joint " : "joints ") + JoinNames(names);
     return is_shared;
   }
   VectorXd whole(found->amplitude.size());
@@ -99,8 +99,8 @@ bool CauseDescription::AddWholeNumbers(FoundFault* found, Fault* told) const {
                                                                  : "N s/m",
                             ""});
   }
-  told->value = whole.norm();
-  told->detail = ShowVector(whole);
+  shown->value = whole.norm();
+  shown->detail = ShowVector(whole);
   return is_shared;
 }
 

@@ -32,7 +32,7 @@ class CauseDescription {
   [[nodiscard]] Fault Describe(const TorqueFault& fault, const VectorXd& amplitude, VectorXd error) const;
   /// Says each joint's whole number: "all joints" only of those that have no more of their own.
   /// @return whether the number has several parts.
-  bool AddWholeNumbers(FoundFault* found, Fault* told) const;
+  bool AddWholeNumbers(FoundFault* found, Fault* shown) const;
   /// Velocity of a shape of friction, rad/s or m/s.
   [[nodiscard]] double ShapeVelocityOf(const TorqueFault& fault, const VectorXd& amplitude) const;
   /// Torque of a saturation, N m or N.

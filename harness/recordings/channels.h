@@ -83,8 +83,8 @@ struct Recording {
 /// Opens a recording. Columns are found by a header's words and the joints' names or numbers; a file of
 /// columns (TOML) says it otherwise, and may name the files itself.
 /// @param columns a file of columns; empty for none.
-/// @throws InputError, one line, for columns that cannot be told, that are missing, or that two quantities
-/// share.
+/// @throws InputError, one line, for columns that cannot be identified, that are missing, or that two
+/// quantities share.
 /// @param is_complete whether time, positions and torques or currents must be there.
 /// @param frames in which a file of columns gives payloads and wrenches.
 Recording OpenRecordingOf(const RobotModel& model, const std::filesystem::path& path,

@@ -46,7 +46,7 @@ std::optional<VectorXd> CalcDifference(const Traces& first, const Traces& second
   return VectorXd(squares.cwiseQuotient(counts.cwiseMax(1.0)));
 }
 
-/// The delay at which the positions are most alike.
+/// The delay at which the positions agree best.
 double FindDelay(const Traces& first, const Traces& second, Eigen::Index joints) {
   constexpr double kNever = -std::numeric_limits<double>::infinity();
   constexpr int kHalvings = 10;
@@ -89,10 +89,10 @@ std::vector<CauseDifference> CompareCauses(const RecordingJudgement& first,
 
 }  // namespace
 
-std::string CauseDifference::Tell() const {
-  if (!second) return first->Tell() + " in the first, none in the second";
-  if (!first) return second->Tell() + " in the second, none in the first";
-  return first->Tell() + " in the first, " + second->Tell() + " in the second";
+std::string CauseDifference::Describe() const {
+  if (!second) return first->Describe() + " in the first, none in the second";
+  if (!first) return second->Describe() + " in the second, none in the first";
+  return first->Describe() + " in the first, " + second->Describe() + " in the second";
 }
 
 RecordingComparison CompareRecordings(const RobotModel& model, std::vector<Recording>* recordings,

@@ -22,13 +22,13 @@ struct JointDifference {
 struct CauseDifference {
   std::optional<Fault> first, second;
   /// "joint elbow: dry friction 0.3 +- 0.01 N m in the second, none in the first".
-  [[nodiscard]] std::string Tell() const;
+  [[nodiscard]] std::string Describe() const;
 };
 
 struct RecordingComparison {
   RecordingJudgement first, second;
-  bool is_same_motion = false;  ///< Whether the positions are alike; otherwise only causes are compared.
-  double delay = 0.0;           ///< Of the second against the first, s.
+  bool is_same_motion = false;          ///< Whether the positions agree; otherwise only causes are compared.
+  double delay = 0.0;                   ///< Of the second against the first, s.
   std::vector<JointDifference> joints;  ///< None of different motions.
   std::vector<CauseDifference> causes;
 };

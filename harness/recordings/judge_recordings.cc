@@ -74,12 +74,12 @@ class Judge {
     result_.notes = set_.notes();
     result_.has_other_times = set_.has_other_times();
     for (const Fault& fault : set_.faults()) result_.causes.push_back(MakeCause(fault));
-    Tell();
+    ReportSeconds();
     return std::move(result_);
   }
 
  private:
-  void Tell() {
+  void ReportSeconds() {
     const CauseSelection& selection = estimator_.selection();
     const VectorXd amplitudes = estimator_.CalcAmplitudes(selection.terms);
     const VectorXd before = estimator_.CalcLeft({}), after = estimator_.CalcLeft(selection.terms);
@@ -171,7 +171,7 @@ class Judge {
     if (!result_.IsWhole() && next.shaking == 0.0) next.shaking = FindShaking(set_, estimator_.rows(), left);
   }
   /// Returns the position offset, rad, that moves a link's centre of mass like this about its joint; 0 for
-  /// none. To first order the two look alike, so that the next reading compares them at this size.
+  /// none. To first order the two look the same, so that the next reading compares them at this size.
   [[nodiscard]] double FindTurn(const TorqueFault& fault, const VectorXd& amplitude) const {
     if (fault.kind != TorqueFault::kCentre || set_.model().joint(fault.index).type != JointType::kRevolute)
       return 0.0;
@@ -277,7 +277,8 @@ class Judge {
       one.faults = {{"no cause of a possible size", fault.place, kNone, 0.0, "", ""}};
       one.rival.clear();
     } else if (Fault& first = one.faults.front(); std::isinf(first.error)) {
-      first = {fault.fault, fault.place, kNone, 0.0, fault.unit, "of a size that this motion does not tell"};
+      first = {fault.fault, fault.place, kNone,
+               0.0,         fault.unit,  "of a size that this motion does not determine"};
     }
     found.is_named = one.outcome == CauseOutcome::kNamed;
     result_.causes.push_back(std::move(one));
@@ -343,7 +344,7 @@ bool MayBeOtherwise(const RecordingJudgement& judgement) {
   return judgement.explained < kWell || judgement.left > kFar || judgement.causes.size() > 3;
 }
 
-/// Sum over the joints of the logarithm of what is left.
+/// Sum over the joints of the residual's logarithm.
 double CalcLeft(const RecordingJudgement& judgement) {
   double sum = 0.0;
   for (const JointJudgement& joint : judgement.balances)

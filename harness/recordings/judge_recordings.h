@@ -49,14 +49,14 @@ struct RecordingJudgement {
   std::vector<FoundFault> found;  ///< The same.
   double explained = 0.0;         ///< Fraction of the residual, squared.
   double left = 0.0;              ///< Root mean square of the rest, in units of noise.
-  /// By the causes; by a plain least-squares fit of all bodies' numbers that the motion tells, friction,
+  /// By the causes; by a plain least-squares fit of all bodies' numbers that the motion determines, friction,
   /// offsets and armatures.
   HeldPrediction by_causes, by_all;
   std::vector<TorqueTrace> traces;
   std::vector<std::string> notes;
   long rows = 0;
   bool has_other_times = false;  ///< Velocities were recorded at other times than positions.
-  Refinements refinements;       ///< With which a further reading would tell more.
+  Refinements refinements;       ///< With which a further reading would find more.
 
   /// Causes that are more than the nearest that is known.
   [[nodiscard]] size_t CountExplaining() const;
@@ -64,7 +64,7 @@ struct RecordingJudgement {
   [[nodiscard]] bool IsWhole() const;
   /// Noise may hide an error as large as the torque itself, at every joint.
   [[nodiscard]] bool IsHidden() const;
-  /// All joints that move are judged, and what is left is noise, with no cause, beside which errors show.
+  /// All joints that move are judged, and the residual is noise, with no cause, beside which errors show.
   [[nodiscard]] bool Agrees() const;
 };
 

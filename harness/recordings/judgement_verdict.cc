@@ -47,7 +47,7 @@ JudgementVerdict MakeVerdict(const RecordingJudgement& judgement, const RobotMod
   const std::string causes_do = fmt::format("{} cause{}", count, count == 1 ? " does" : "s do");
   JudgementVerdict verdict;
   if (judgement.Agrees()) {
-    verdict = {"explained", fmt::format("{} explains {}: what is left is noise{}", model, recording,
+    verdict = {"explained", fmt::format("{} explains {}: the rest is noise{}", model, recording,
                                         DescribeNoise(judgement, robot))};
   } else if (judgement.causes.empty() && judgement.IsWhole() && judgement.IsHidden()) {
     verdict = {"partly explained", fmt::format("what {} leaves of {} is noise, beside which no error of the "
@@ -57,8 +57,8 @@ JudgementVerdict MakeVerdict(const RecordingJudgement& judgement, const RobotMod
     std::vector<std::string> judged;
     for (const JointJudgement& one : judgement.balances)
       if (one.recording == 0) judged.push_back(name_of(one.joint));
-    verdict = {"partly explained", fmt::format("{} explains {} at {}: what is left is noise", model,
-                                               recording, JoinNames(judged))};
+    verdict = {"partly explained",
+               fmt::format("{} explains {} at {}: the rest is noise", model, recording, JoinNames(judged))};
   } else if (are_velocities_alone && judgement.IsWhole()) {
     verdict = {"differs", fmt::format("{} explains the torques of {}; its velocities are not the positions' "
                                       "derivatives and are not used",

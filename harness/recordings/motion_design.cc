@@ -33,7 +33,7 @@ std::vector<int> ListJoints(const RobotModel& model) {
   return joints;
 }
 
-/// Faults whose sizes a motion is to tell: one candidate for each number.
+/// Faults whose sizes a motion is to determine: one candidate for each number.
 std::vector<TorqueFault> ListDesignedFaults(const RobotModel& model, const std::vector<int>& joints) {
   std::vector<TorqueFault> faults = ListTorqueFaults(model, joints, 1);
   std::erase_if(faults, [](const TorqueFault& fault) {

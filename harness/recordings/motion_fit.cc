@@ -32,7 +32,7 @@ MotionFit::MotionFit(const RobotModel& model, Recording* recording, size_t ahead
   while (rows_ahead_.size() < ahead && Fill()) {
   }
   Analyse();
-  // Logs have zeros where a drive tells no torque.
+  // Logs have zeros where a drive reports no torque.
   std::erase_if(judged_, [&](int joint) {
     return moves_[static_cast<size_t>(joint)] && noise_.torque[joint] == 0.0 &&
            sample_.most_torque[joint] == 0.0;

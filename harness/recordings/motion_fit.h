@@ -47,8 +47,8 @@ struct RecordedSample {
   VectorXd direction;                 ///< Sign of the velocity, averaged as the torque is; 0 at rest.
   VectorXd slowest;                   ///< Row's speed the way that the first goes; negative where it turns.
   VectorXd beyond;                    ///< Share of the rows whose torque is beyond a limit that is known.
-  MatrixXd friction;                  ///< Other shapes of it, n x kFrictionShapes, likewise.
-  Vector2d swing = Vector2d::Zero();  ///< Sine and cosine of a base that shakes, averaged likewise.
+  MatrixXd friction;                  ///< Other shapes of it, n x kFrictionShapes.
+  Vector2d swing = Vector2d::Zero();  ///< Sine and cosine of a base that shakes, averaged.
 };
 
 /// Standard deviations, by joint.

@@ -59,7 +59,7 @@ void MotionFit::Analyse() {
   constexpr double kLongest = 0.5;
   if (step_ > kLongest)
     throw InputError(
-        fmt::format("{}: time: a row every {:.4g} s tells no motion; its unit may be another", name, step_));
+        fmt::format("{}: time: a row every {:.4g} s shows no motion; its unit may be another", name, step_));
   for (size_t i = 1; i < rows_ahead_.size(); ++i) {
     if (steps[i - 1] > kGap * step_) ++segment_, ++gaps_;
     segments_[i] = segment_;
@@ -205,7 +205,7 @@ std::optional<Fault> MotionFit::CheckVelocity(int joint, const std::vector<size_
 }
 
 void MotionFit::CheckVelocities() {
-  // Over a time in which noise of positions tells accelerations, too.
+  // Over a time in which noise of positions determines accelerations, too.
   constexpr double kWindow = 0.1;  // s to each side
   constexpr size_t kLeast = 8, kMost = 64;
   const size_t half =
@@ -216,7 +216,7 @@ void MotionFit::CheckVelocities() {
     if (ChannelOf(RecordedQuantity::kVelocity, joint) >= 0) ++recorded;
     if (const std::optional<Fault> fault = CheckVelocity(joint, centres, half)) faults_.push_back(*fault);
   }
-  // One fault of all joints is told once.
+  // One fault of all joints is listed once.
   constexpr double kAlike = 0.1;
   const auto is_alike = [&](const Fault& one) {
     return one.fault == faults_.front().fault &&

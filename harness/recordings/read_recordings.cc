@@ -74,7 +74,7 @@ void RecordingSet::Read(Recording* recording, const ReadOptions& options,
   long samples = 0;
   double begin = 0.0;
   motion.Run([&](const RecordedSample& sample) {
-    // Shorter than most pushes: what is held out tells nothing of when they were.
+    // Shorter than most pushes: what is held out says nothing of when they were.
     constexpr double kStretch = 0.25;  // s
     constexpr long kEvery = 4;
     if (samples == 0) begin = sample.time;
@@ -276,7 +276,7 @@ std::vector<UnjudgedJoint> RecordingSet::ListUnjudged() const {
       if (std::ranges::none_of(read_, has_position)) continue;
       reason = has_currents_ ? "no current of it is recorded" : "no torque of it is recorded, or only zeros";
     } else if (!IsJudged(place)) {
-      reason = "its motion does not tell its drive's gain beside its friction";
+      reason = "its motion does not determine its drive's gain beside its friction";
     } else if (std::ranges::none_of(read_, has_samples)) {
       reason = "friction holds it at every sample";
     } else {

@@ -26,8 +26,8 @@ struct ReadOptions {
 struct UnjudgedJoint {
   int joint = -1;
   bool moves = true;
-  bool has_no_gain = false;  ///< Its current does not tell its torque.
-  std::string reason;        ///< "its motion does not tell its drive's gain beside its friction".
+  bool has_no_gain = false;  ///< Its current does not determine its torque.
+  std::string reason;        ///< "its motion does not determine its drive's gain beside its friction".
 };
 
 /// One recording: a quarter of it, in stretches, is kept for the end.
@@ -68,7 +68,7 @@ class RecordingSet {
   /// Joints whose drives' gains are known.
   [[nodiscard]] std::vector<int> ListJudged() const;
   [[nodiscard]] bool IsJudged(size_t place) const { return gain(place) != 0.0; }
-  /// N m/A of a joint's drive, 1 of torques; 0 where the motion does not tell it.
+  /// N m/A of a joint's drive, 1 of torques; 0 where the motion does not determine it.
   [[nodiscard]] double gain(size_t place) const { return gains_[static_cast<Eigen::Index>(place)]; }
   void DivideGains(const Eigen::Ref<const VectorXd>& factors);
   /// Gains that became others than were estimated are not known. @return whether there are any.
@@ -76,7 +76,7 @@ class RecordingSet {
 
   /// Returns the extents with which sizes of faults are compared.
   [[nodiscard]] MotionExtents CalcExtents() const;
-  [[nodiscard]] const Refinements& refinements() const { return refinements_; }  ///< As was told.
+  [[nodiscard]] const Refinements& refinements() const { return refinements_; }  ///< As given.
   [[nodiscard]] double step() const { return step_; }  ///< The longest between rows, s.
   [[nodiscard]] long rows() const { return rows_; }
   [[nodiscard]] const std::vector<std::string>& notes() const { return notes_; }

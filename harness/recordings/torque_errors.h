@@ -8,15 +8,15 @@
 
 namespace dexcheck {
 
-/// Some rows of a regression: C^T C (p x p) and C^T r, of what is left of y.
+/// Some rows of a regression: C^T C (p x p) and C^T r, of the residual of y.
 struct RowCluster {
   MatrixXd products;
   VectorXd scores;
 };
 
-/// Variances of least-squares amplitudes (p) whose rows have errors that are alike within clusters, whatever
+/// Variances of least-squares amplitudes (p) whose rows have errors that agree within clusters, whatever
 /// they are. [Bell McCaffrey 2002] (bias-reduced linearisation, CR2): errors that are white give, on average,
-/// what they give without clusters. What one cluster alone tells of an amplitude is left out.
+/// what they give without clusters. What one cluster alone says of an amplitude is left out.
 VectorXd CalcClusteredVariances(const std::vector<RowCluster>& clusters);
 
 /// Errors of amplitudes of such columns, by how far stretches of each recording disagree about them, or

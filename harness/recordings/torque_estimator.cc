@@ -82,7 +82,8 @@ void TorqueEstimator::WidenErrors() {
 
 void TorqueEstimator::ListFaults() {
   const std::vector<int> judged = recordings_->ListJudged();
-  if (judged.empty()) throw InputError("the recordings tell no joint's drive gain: nothing can be judged");
+  if (judged.empty())
+    throw InputError("the recordings determine no joint's drive gain: nothing can be judged");
   faults_ = ListTorqueFaults(recordings_->model(), judged, static_cast<int>(recordings_->size()),
                              recordings_->refinements(), recordings_->CalcExtents());
   // Torques that hold a robot still reach no limit.

@@ -13,7 +13,7 @@ namespace dexcheck {
 inline constexpr double kMostNoise = 2.0;
 
 /// The search is repeated until it settles: what no cause explains weighs as noise does in the next round,
-/// samples that are alike count once, drives' gains are corrected, and products of faults are made linear
+/// equal samples count once, drives' gains are corrected, and products of faults are made linear
 /// anew.
 class TorqueEstimator {
  public:
@@ -30,7 +30,7 @@ class TorqueEstimator {
   /// offsets, which no robot is without; all faults, of pushes those that were selected.
   enum class Part { kPlain, kUsual, kAll };
   /// Amplitudes of a least-squares fit of drives' gains and such faults. Plausible sizes are a prior.
-  /// @param rank how many of them the motion tells; null where it is not asked for.
+  /// @param rank how many of them the motion determines; null where it is not asked for.
   [[nodiscard]] VectorXd FitAmplitudes(Part part, Eigen::Index* rank) const;
   /// Returns the residual of these terms, by row.
   [[nodiscard]] VectorXd CalcLeft(const std::vector<CauseTerm>& terms) const;
@@ -72,7 +72,7 @@ class TorqueEstimator {
   /// Returns the residual of that fit.
   [[nodiscard]] VectorXd Fit(Part part) const;
   [[nodiscard]] bool IsNoise(const VectorXd& left) const { return CalcRms(rows_, left) <= kMostNoise; }
-  /// How many samples say the same, by how alike blocks are that follow one another.
+  /// How many samples say the same, by how similar blocks are that follow one another.
   [[nodiscard]] double CalcBlockSize(const VectorXd& left) const;
   /// Adds what may have pushed for a while; false when nothing stands out.
   bool AddPushes();

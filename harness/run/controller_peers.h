@@ -50,7 +50,7 @@ class ProgramPeer final : public ControllerPeer {
   template <typename Failure>
   dexcheck_message ReceiveMessage();
   /// Describes how the program ended, after a short wait; empty while it runs.
-  std::string TellEnd();
+  std::string ReportEnd();
 
   OwnControllerSetup setup_;
   FileDescriptor socket_;

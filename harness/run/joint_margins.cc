@@ -205,7 +205,7 @@ std::string DescribeMargins(const JointMargins& margins) {
   return fmt::format(
       "# margins, one torque at a time:\n#   gain {:.2f} ({})\n#   phase {:.1f} degrees ({})\n"
       "#   delay {:.2f} ms ({})\n"
-      "# margins, all torques alike: gain {:.2f}, phase {:.1f} degrees, delay {:.2f} ms\n",
+      "# margins, all torques equally: gain {:.2f}, phase {:.1f} degrees, delay {:.2f} ms\n",
       one.gain, margins.gain_joint, RadToDeg(one.phase), margins.phase_joint, 1e3 * one.delay,
       margins.delay_joint, all.gain, RadToDeg(all.phase), 1e3 * all.delay);
 }

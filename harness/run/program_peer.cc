@@ -112,10 +112,10 @@ ProgramPeer::~ProgramPeer() {
   const dexcheck_message end{DEXCHECK_END, 0};
   (void)!::send(socket_.get(), &end, sizeof(end), MSG_NOSIGNAL | MSG_DONTWAIT);
   socket_.Close();
-  TellEnd();
+  ReportEnd();
 }
 
-std::string ProgramPeer::TellEnd() {
+std::string ProgramPeer::ReportEnd() {
   if (!process_) return "";
   const std::optional<ProcessEnd> end = process_->WaitFor(kEndTime);
   return end ? end->Describe() : "";
@@ -129,7 +129,7 @@ void ProgramPeer::Send(const void* data, size_t size) {
     if (sent < 0 && (errno == EAGAIN || errno == EWOULDBLOCK))
       throw ControllerFailure(setup_.name + ": read nothing for " + FormatNumber(time_limit_) + " s");
     if (sent < 0) {
-      const std::string end = TellEnd();
+      const std::string end = ReportEnd();
       throw ControllerFailure(setup_.name + ": " + (end.empty() ? "closed its standard input" : end));
     }
     from += sent;
@@ -149,7 +149,7 @@ void ProgramPeer::Receive(void* data, size_t size) {
     if (got < 0 && (errno == EAGAIN || errno == EWOULDBLOCK))
       throw ControllerFailure(setup_.name + ": did not answer within " + FormatNumber(time_limit_) + " s");
     if (got <= 0) {
-      const std::string end = TellEnd();
+      const std::string end = ReportEnd();
       throw ControllerFailure(setup_.name + ": " + (end.empty() ? "closed its standard output" : end));
     }
     to += got;

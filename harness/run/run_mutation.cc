@@ -249,7 +249,7 @@ bool RunCampaign::RunLoop(const Setup& setup, LoopParts parts, RunMutant* mutant
   mutant->evidence = result.attribution.evidence;
   mutant->score = ScoreNames(mutant->truth, mutant->all.truth, result.causes);
   for (const Explanation& one : result.causes)
-    mutant->causes += (mutant->causes.empty() ? "" : "; ") + one.Tell();
+    mutant->causes += (mutant->causes.empty() ? "" : "; ") + one.Describe();
   mutant->failure = result.failure;
   AddFailed(runner.loop().checks().model_checks(), &mutant->failed_checks);
   AddFailed(runner.loop().checks().motion_checks(), &mutant->failed_checks);

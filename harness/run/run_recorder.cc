@@ -342,7 +342,8 @@ void RunRecorder::AddFollowedContacts() {
   };
   add("contact/drift_object", "m", "distance of law/kappa's points on the object from contact/kappa's",
       &ContactDrift::object);
-  add("contact/drift_fingertip", "m", "likewise of the points on the fingertips", &ContactDrift::fingertip);
+  add("contact/drift_fingertip", "m", "of the points on the fingertips, integrated",
+      &ContactDrift::fingertip);
   add("contact/drift_psi", "rad", "psi of law/kappa against contact/kappa's", &ContactDrift::psi);
 }
 
@@ -369,8 +370,8 @@ void RunRecorder::AddCheckSignals() {
   std::vector<std::string> names;
   for (const PairClass pairs : classes) names.emplace_back(NameOf(pairs));
   if (!classes.empty()) {
-    Add("clearance/smallest", "m", "smallest distance so far of bodies that are not meant to touch",
-        CountOf(names), names, [&clearance, classes](const StepRecord& /*step*/, Row row) {
+    Add("clearance/smallest", "m", "smallest distance so far of bodies that must not touch", CountOf(names),
+        names, [&clearance, classes](const StepRecord& /*step*/, Row row) {
           size_t i = 0;
           for (const PairClass pairs : classes) row[i++] = clearance.nearest(pairs).distance;
         });

@@ -256,7 +256,7 @@ points = [
   {{ time = 2, joints = {{ {} }} }},
   {{ time = 4, joints = {{ {} }} }},
 ]
-# What only moves one way hardly tells a torque from an inertia or from friction.
+# What only moves one way hardly separates a torque from an inertia or from friction.
 {})",
       start, end, start, WriteSwings(ListSwings(motion.spans), "joint", [&](int i) {
         return robot.spec.joints[static_cast<size_t>(i)].name;

@@ -47,7 +47,7 @@ struct RobotPair {
   std::vector<WatchedPair> watched_pairs;  ///< and those pairs that should not touch.
 };
 
-/// Whether bodies that are not meant to touch push each other: as the scenario says, or by the MJCF's masks.
+/// Whether bodies that must not touch push each other: as the scenario says, or by the MJCF's masks.
 bool LetsBodiesPush(const PlantOptions& plant, const mjModel& engine);
 
 /// The geoms of the pairs that are watched.

@@ -76,7 +76,7 @@ Causes ExplainTorques(const std::function<void(const GraspModel& model, VectorXd
 TEST(LawCheck, ASmallTorqueIsNoZero) {
   const Causes causes = ExplainTorques([](const GraspModel&, VectorXd* tau) { (*tau)[3] += 1e-6; });
   ASSERT_FALSE(causes.empty());
-  EXPECT_NEAR(causes.front().faults.front().value, 1e-6, 1e-9) << causes.front().Tell();
+  EXPECT_NEAR(causes.front().faults.front().value, 1e-6, 1e-9) << causes.front().Describe();
   EXPECT_EQ(causes.front().faults.front().place, "law of panda_joint4");
 }
 
@@ -99,7 +99,7 @@ TEST(LawCheck, FactorsOfAllJointsAndOfOneAreToldWhole) {
     (*tau)[1] -= 0.3 * gravity[1];
   });
   std::string told;
-  for (const Explanation& one : causes) told += one.Tell() + "\n";
+  for (const Explanation& one : causes) told += one.Describe() + "\n";
   EXPECT_THAT(told, HasSubstr("law of all but panda_joint2: gravity is multiplied by 0.8"));
   EXPECT_THAT(told, HasSubstr("law of panda_joint2: gravity is multiplied by 0.5"));
 }
@@ -131,7 +131,7 @@ TEST(LawCheck, FaultsFromOutsideTheTableAreNamed) {
     ASSERT_EQ(std::ranges::count_if(causes, is_of_law), 1)
         << name;  // torques may be above a motor's limit, too
     EXPECT_EQ(causes.front().outcome, CauseOutcome::kNamed);
-    EXPECT_THAT(causes.front().Tell(), HasSubstr(name));
+    EXPECT_THAT(causes.front().Describe(), HasSubstr(name));
   }
 }
 

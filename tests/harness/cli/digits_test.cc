@@ -119,7 +119,7 @@ TEST_F(Digits, AreAgreementOnlyToTheStatedPrecision) {
   Write("small.urdf", MakeFinger(R"(ixx="0.000123" iyy="0.000234" izz="0.000245" ixy="0.00001")"));
   EXPECT_EQ(Compare(1, "zero.urdf", "small.urdf").at("outcome"), "differ");
   EXPECT_THAT(Expect(1, "zero.urdf small.urdf --quiet").out,
-              HasSubstr("the printed digits tell it to 20 % only"));
+              HasSubstr("the printed digits give it to 20 % only"));
   Expect(0, "consistency zero.urdf small.urdf --precision 30");
 }
 

@@ -42,10 +42,10 @@ Explanation MakeNotExplained(std::vector<Fault> nearest) {
 }
 
 TEST(FaultTest, IsToldWithErrorUnitAndDetail) {
-  EXPECT_EQ(MakeGain().Tell(), "motor r_elbow: gain 0.99 +- 0.001");
-  EXPECT_EQ(MakeOffset().Tell(), "motor r_elbow: offset -0.05 N m");
+  EXPECT_EQ(MakeGain().Describe(), "motor r_elbow: gain 0.99 +- 0.001");
+  EXPECT_EQ(MakeOffset().Describe(), "motor r_elbow: offset -0.05 N m");
   Fault ripple = {"ripple", "motor r_elbow", 0.061234567, 0.00123456, "N m", "at 41.3 Hz"};
-  EXPECT_EQ(ripple.Tell(), "motor r_elbow: ripple 0.0612346 +- 0.0012 N m at 41.3 Hz");
+  EXPECT_EQ(ripple.Describe(), "motor r_elbow: ripple 0.0612346 +- 0.0012 N m at 41.3 Hz");
 }
 
 // Gravity of another size along itself has one amplitude, and the name of one that points elsewhere.
@@ -53,7 +53,7 @@ TEST(ForceFaultTest, SizeOfGravityIsGravity) {
   const Candidate candidate{.fault = force_fault::kGravitySize, .place = "world", .unit = "m/s^2"};
   const Fault fault = MakeForceFault(candidate, VectorXd::Constant(1, -0.3), VectorXd::Constant(1, 0.01),
                                      Vector3d(0.0, 0.0, -9.81));
-  EXPECT_EQ(fault.Tell(), "world: gravity off by 0.3 +- 0.01 m/s^2 (0, 0, 0.3)");
+  EXPECT_EQ(fault.Describe(), "world: gravity off by 0.3 +- 0.01 m/s^2 (0, 0, 0.3)");
 }
 
 TEST(ExplanationTest, SameKindAndPlaceIsOneName) {
@@ -71,35 +71,35 @@ TEST(ExplanationTest, SameKindAndPlaceIsOneName) {
 
 TEST(ExplanationTest, IsToldInALine) {
   Explanation one = MakeExplanation({MakeGain()});
-  EXPECT_EQ(one.Tell(), "motor r_elbow: gain 0.99 +- 0.001, from 0.25 s");
+  EXPECT_EQ(one.Describe(), "motor r_elbow: gain 0.99 +- 0.001, from 0.25 s");
   one.ends = true;
-  EXPECT_EQ(one.Tell(), "motor r_elbow: gain 0.99 +- 0.001, 0.25 to 1.5 s");
+  EXPECT_EQ(one.Describe(), "motor r_elbow: gain 0.99 +- 0.001, 0.25 to 1.5 s");
   one.rival = "delay";
   one.log_odds = 4.605;  // log(1e2)
-  EXPECT_EQ(one.Tell(),
+  EXPECT_EQ(one.Describe(),
             "motor r_elbow: gain 0.99 +- 0.001, 0.25 to 1.5 s; rival: delay, 1e2 times less likely");
   one.log_odds = 1e6;
-  EXPECT_THAT(one.Tell(), EndsWith("1.5 s"));
+  EXPECT_THAT(one.Describe(), EndsWith("1.5 s"));
 }
 
 TEST(ExplanationTest, ClassIsToldByItsFirstFour) {
   std::vector<Fault> faults = {MakeGain(), MakeOffset()};
   EXPECT_EQ(
-      MakeExplanation(faults).Tell(),
+      MakeExplanation(faults).Describe(),
       "motor r_elbow: gain 0.99 +- 0.001 or motor r_elbow: offset -0.05 N m: not isolable from each other on "
       "this motion, from 0.25 s");
   for (const char* name : {"drift", "lag", "delay", "limit"})
     faults.push_back({name, "motor r_elbow", 1.0, 0.0, "", ""});
-  const std::string text = MakeExplanation(faults).Tell();
+  const std::string text = MakeExplanation(faults).Describe();
   EXPECT_THAT(text, HasSubstr("lag 1 or 2 more: not isolable"));
   EXPECT_THAT(text, Not(HasSubstr("delay")));
 }
 
 TEST(ExplanationTest, NotExplainedIsToldWithTheNearest) {
-  EXPECT_EQ(MakeNotExplained({MakeOffset()}).Tell(),
+  EXPECT_EQ(MakeNotExplained({MakeOffset()}).Describe(),
             "not explained; nearest: motor r_elbow: offset -0.05 N m (50 %, 40 times the noise is left), "
             "from 0.25 s");
-  EXPECT_EQ(MakeNotExplained({}).Tell(), "not explained (50 %, 40 times the noise is left), from 0.25 s");
+  EXPECT_EQ(MakeNotExplained({}).Describe(), "not explained (50 %, 40 times the noise is left), from 0.25 s");
 }
 
 TEST(CausesTest, NamesIsOfTheFirstFaultOfWhatIsExplained) {
@@ -114,9 +114,10 @@ TEST(CausesTest, NamesIsOfTheFirstFaultOfWhatIsExplained) {
 TEST(CausesTest, AreToldByChannel) {
   Causes causes = {MakeExplanation({MakeGain()}), MakeExplanation({MakeOffset()}), MakeNotExplained({})};
   causes[1].channel = CauseChannel::kMeasurement;
-  EXPECT_EQ(TellCauses(causes, CauseChannel::kActuation), causes[0].Tell() + "; " + causes[2].Tell());
-  EXPECT_EQ(TellCauses(causes, CauseChannel::kMeasurement), causes[1].Tell());
-  EXPECT_EQ(TellCauses(causes, CauseChannel::kLaw), "");
+  EXPECT_EQ(DescribeCauses(causes, CauseChannel::kActuation),
+            causes[0].Describe() + "; " + causes[2].Describe());
+  EXPECT_EQ(DescribeCauses(causes, CauseChannel::kMeasurement), causes[1].Describe());
+  EXPECT_EQ(DescribeCauses(causes, CauseChannel::kLaw), "");
 }
 
 /// A gain of 0.9: its error is the change, so that 5 % of it are 0.005.

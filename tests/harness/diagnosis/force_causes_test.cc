@@ -62,7 +62,7 @@ class SeveralForces : public ::testing::TestWithParam<Pushes> {};
 
 TEST_P(SeveralForces, AreNamed) {
   const Causes causes = Explain(200, GetParam().every, 24, GetParam().force);
-  SCOPED_TRACE(TellCauses(causes, CauseChannel::kBalance));
+  SCOPED_TRACE(DescribeCauses(causes, CauseChannel::kBalance));
   ASSERT_EQ(causes.size(), GetParam().faults.size());
   double last = 0.0;
   for (const Fault& fault : GetParam().faults) {
@@ -70,7 +70,7 @@ TEST_P(SeveralForces, AreNamed) {
       const Fault& first = each.faults.front();
       return first.IsLike(fault) && std::abs(first.value - fault.value) <= 1e-3 * fault.value;
     });
-    ASSERT_NE(one, causes.end()) << fault.Tell();
+    ASSERT_NE(one, causes.end()) << fault.Describe();
     EXPECT_EQ(one->outcome, GetParam().outcome);
     EXPECT_GE(one->from, last);
     last = one->from;
@@ -126,7 +126,7 @@ TEST(ForceCauses, OfOneStepNoSeveralFaultsAreNamed) {
       for (int i = 0; i < 7; ++i) torques[i] = 0.1 * ((7 * i * i + 3 * draw * i + 5 * draw) % 11 - 5);
       return torques;
     });
-    SCOPED_TRACE(TellCauses(causes, CauseChannel::kBalance));
+    SCOPED_TRACE(DescribeCauses(causes, CauseChannel::kBalance));
     EXPECT_LE(causes.size(), 1U);
   }
 }
@@ -138,9 +138,9 @@ TEST(ForceCauses, TorqueOfAJointThatRestsMayBeASprings) {
     const bool rests = joint == 6;
     const Causes causes = Explain(200, 8, 24, [=](int) { return Torque(joint, 0.5); });
     ASSERT_EQ(causes.size(), 1U);
-    ASSERT_NE(Find(causes[0], "torque"), nullptr) << causes[0].Tell();
+    ASSERT_NE(Find(causes[0], "torque"), nullptr) << causes[0].Describe();
     const Fault* const spring = Find(causes[0], "spring");
-    ASSERT_EQ(spring != nullptr, rests) << causes[0].Tell();
+    ASSERT_EQ(spring != nullptr, rests) << causes[0].Describe();
     if (rests) EXPECT_EQ(spring->detail, "of any stiffness");
   }
 }

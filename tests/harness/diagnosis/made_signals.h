@@ -61,7 +61,7 @@ inline SignalSeries MakeSeries(const ArrayXd& expected, const ArrayXd& got) {
 
 inline SignalSeries MakeSeries(const ArrayXd& got) { return MakeSeries(CalcTorque(), got); }
 
-inline std::string TextOf(const Causes& causes) { return TellCauses(causes, CauseChannel::kActuation); }
+inline std::string TextOf(const Causes& causes) { return DescribeCauses(causes, CauseChannel::kActuation); }
 
 inline Causes Explain(const SignalSeries& series) {
   SignalSeries other = series;
@@ -108,12 +108,12 @@ inline void ExpectNamed(const Causes& causes, const std::vector<Fault>& faults) 
       return one.outcome == CauseOutcome::kNamed && one.faults.front().IsLike(fault);
     });
     if (named == causes.end()) {
-      ADD_FAILURE() << fault.Tell() << " is not named";
+      ADD_FAILURE() << fault.Describe() << " is not named";
       continue;
     }
     const Fault& told = named->faults.front();
     EXPECT_EQ(named->faults.size(), 1u);
-    EXPECT_TRUE(HasValue(told, fault.value)) << told.Tell() << " against " << fault.value;
+    EXPECT_TRUE(HasValue(told, fault.value)) << told.Describe() << " against " << fault.value;
     EXPECT_EQ(told.unit, fault.unit);
     // An error that is as large as the value would let anything pass.
     EXPECT_LE(told.error, 0.2 * std::abs(told.value));

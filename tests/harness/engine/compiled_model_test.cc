@@ -38,7 +38,7 @@ TEST_P(SameMotion, WithAndWithoutLooks) {
   const size_t pictures = RemovePictures(&bare);
   EXPECT_GE(pictures, static_cast<size_t>(full->ntexdata));
   EXPECT_EQ(pictures > 0, full->ntex > 0);
-  EXPECT_EQ(RemovePictures(&bare), 0U) << "likewise";
+  EXPECT_EQ(RemovePictures(&bare), 0U);
   for (int i = 0; i < bare->nmat; ++i) EXPECT_EQ(bare->mat_texid[i], -1);
   const MjModelPtr copy(mj_copyModel(nullptr, bare.get()));  // as the plant does
   const MjDataPtr a = MakeData(*full);

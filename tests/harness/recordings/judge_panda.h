@@ -31,7 +31,7 @@ inline RecordingJudgement Judge(const RecordedTable& table) {
 
 inline std::string Tell(const RecordingJudgement& judgement) {
   std::string text;
-  for (const Explanation& one : judgement.causes) text += "\n    " + one.Tell();
+  for (const Explanation& one : judgement.causes) text += "\n    " + one.Describe();
   return text.empty() ? (judgement.Agrees() ? " explained" : " not explained") : text;
 }
 

@@ -151,7 +151,7 @@ TEST(ClearanceOfARun, BodiesThatCollideByTheirMasksPush) {
     EXPECT_EQ(run.checks().Find("collision").part, "r_palm and bench");
     EXPECT_EQ(run.result().attribution.cause, Cause::kCollision) << run.result().attribution.evidence;
     for (const Explanation& one : run.result().causes)
-      EXPECT_NE(one.channel, CauseChannel::kBalance) << one.Tell();
+      EXPECT_NE(one.channel, CauseChannel::kBalance) << one.Describe();
   }
 }
 

@@ -230,7 +230,7 @@ bool Try(const Choice& choice, std::map<std::string, Largest>* largest) {
   const bool right = expected == kExpectedCause.end() ? cause == "none" && (cut || result.failure.empty())
                                                       : cause == expected->second;
   for (const Explanation& one : expected == kExpectedCause.end() ? result.causes : Causes())
-    fmt::print("CAUSE {}: {}\n", choice.Describe(), one.Tell());
+    fmt::print("CAUSE {}: {}\n", choice.Describe(), one.Describe());
   if (!right) {
     fmt::print("ALARM {}: {}: {} {}\n", choice.Describe(), cause, result.attribution.evidence,
                result.failure);

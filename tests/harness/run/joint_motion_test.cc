@@ -135,7 +135,7 @@ TEST(JointMotionRun, AFaultOfTheCompensationIsNamed) {
     const std::unique_ptr<Runner> runner = RunParts(setup, std::move(parts));
     const RunResult& result = runner->result();
     EXPECT_EQ(result.attribution.cause, Cause::kControlLaw) << result.attribution.evidence;
-    ASSERT_EQ(result.causes.front().faults.size(), 1U) << result.causes.front().Tell();
+    ASSERT_EQ(result.causes.front().faults.size(), 1U) << result.causes.front().Describe();
     const Fault& fault = result.causes.front().faults.front();
     EXPECT_NE(fault.fault.find(is_coulomb ? "coulomb tanh" : "viscous q_d_dot"), std::string::npos)
         << fault.fault;
