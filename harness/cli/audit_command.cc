@@ -57,15 +57,20 @@ std::string FormatCondition(double condition) {
 
 void Print(const AuditRequest& request, const RobotDescription& robot, const AuditResult& result) {
   const std::string file = request.robot.filename().string();
-  if (!request.quiet) {
-    fmt::print("{}: {}, {} joints, {} links\ncondition number of M: {} (median of random states)\n\n",
-               robot.spec.name, file, robot.spec.joints.size(), robot.parts.size(),
-               FormatCondition(result.condition));
-  }
-  size_t counted = 0;
+  const auto counted = std::ranges::count_if(
+      result.findings, [](const AuditFinding& finding) { return finding.level != AuditLevel::kNote; });
+  Answer answer{.word = "GOOD", .sentence = "nothing that a robot cannot have, and nothing suspicious."};
+  if (counted > 0)
+    answer = {Answer::Tone::kBad, "FOUND",
+              fmt::format("{} {}.", counted,
+                          counted == 1 ? "thing that a robot cannot have or that looks like a fault"
+                                       : "things that a robot cannot have or that look like faults")};
+  PrintAnswer(answer);
+  if (request.quiet) return;
+  fmt::print("\n{}: {}, {} joints, {} links\ncondition number of M: {} (median of random states)\n\n",
+             robot.spec.name, file, robot.spec.joints.size(), robot.parts.size(),
+             FormatCondition(result.condition));
   for (const AuditFinding& finding : result.findings) {
-    if (finding.level != AuditLevel::kNote) ++counted;
-    if (request.quiet) continue;
     std::string line = fmt::format("{:<11}{}: {} {}", NameOf(finding.level),
                                    finding.line > 0 ? fmt::format("{}:{}", file, finding.line) : file,
                                    Abbreviate(finding.where), finding.text);
@@ -75,17 +80,8 @@ void Print(const AuditRequest& request, const RobotDescription& robot, const Aud
     }
     fmt::print("{}\n", Wrap(line, 11));
   }
-  for (const std::string& note : robot.notes) {
-    if (!request.quiet) fmt::print("{}\n", Wrap(fmt::format("{:<11}{}: {}", "note", file, note), 11));
-  }
-  if (counted == 0) {
-    fmt::print("{}GOOD: nothing that a robot cannot have, and nothing suspicious.\n",
-               request.quiet ? "" : "\n");
-  } else {
-    const char* const things = counted == 1 ? "thing that a robot cannot have or that looks like a fault"
-                                            : "things that a robot cannot have or that look like faults";
-    fmt::print("{}FOUND: {} {}.\n", request.quiet ? "" : "\n", counted, things);
-  }
+  for (const std::string& note : robot.notes)
+    fmt::print("{}\n", Wrap(fmt::format("{:<11}{}: {}", "note", file, note), 11));
 }
 
 /// A case for each kind of check, which fails with all that it found.

@@ -15,6 +15,7 @@
 #include "harness/base/process_pool.h"
 #include "harness/base/version.h"
 #include "harness/cli/commands.h"
+#include "harness/cli/terminal.h"
 
 namespace dexcheck::cli {
 namespace {
@@ -112,29 +113,32 @@ void Campaign::Make(std::uint64_t jobs, ProgressBar* bar,
 void Campaign::Print(bool quiet) const {
   const std::vector<Row> rows = SumUp(faults);
   const Row& all = rows.back();
-  if (!quiet) {
-    size_t width = 15;
-    for (const Row& row : rows) width = std::max(width, row.kind.size() + 1);
-    fmt::print("{:<{}}{:>7}{:>6}{:>8}{:>10}{:>9}{:>6}{:>10}\n", "what was wrong", width, "faults", "found",
-               "refused", "no effect", "survived", "cause", all.with_part > 0 ? "part" : "");
-    for (const Row& row : rows) {
-      const auto [found, refused, no_effect, survived] = row.outcomes;
-      fmt::print("{:<{}}{:>7}{:>6}{:>8}{:>10}{:>9}{:>6}{:>10}\n", row.kind, width, row.faults, found, refused,
-                 no_effect, survived, row.cause_right,
-                 row.with_part > 0 ? fmt::format("{} of {}", row.part_named, row.with_part) : "");
-    }
-    for (const CampaignFault& fault : faults) {
-      if (!fault.exception.empty()) fmt::print("{}\n", Wrap(fault.exception, 2));
-    }
-    fmt::print("\n");
+  const bool are_all = all.outcomes[3] == 0;
+  Answer answer{are_all ? Answer::Tone::kGood : Answer::Tone::kBad, are_all ? "ALL FOUND" : "SURVIVORS"};
+  answer.sentence = fmt::format("{} of {} faults that are possible and have an effect were found",
+                                all.outcomes[0], all.outcomes[0] + all.outcomes[3]);
+  if (names_causes) answer.sentence += fmt::format("; the cause is right in {}", all.cause_right);
+  if (all.with_part > 0)
+    answer.sentence += fmt::format(", the part in {} of {}", all.part_named, all.with_part);
+  answer.sentence += ".";
+  if (faults.size() < total)
+    answer.remarks.push_back(fmt::format("interrupted after {} of {} faults", faults.size(), total));
+  PrintAnswer(answer);
+  if (quiet) return;
+  std::vector<TableRow> table = {{},
+                                 {{"what was wrong", "faults", "found", "refused", "no effect", "survived",
+                                   "cause", all.with_part > 0 ? "part" : ""}}};
+  for (const Row& row : rows) {
+    TableRow& line = table.emplace_back();
+    line.cells = {row.kind, std::to_string(row.faults)};
+    for (const int count : row.outcomes) line.cells.push_back(std::to_string(count));
+    line.cells.push_back(std::to_string(row.cause_right));
+    line.cells.push_back(row.with_part > 0 ? fmt::format("{} of {}", row.part_named, row.with_part) : "");
   }
-  if (faults.size() < total) fmt::print("INTERRUPTED after {} of {} faults. So far:\n", faults.size(), total);
-  std::string verdict = fmt::format("{}: {} of {} faults that are possible and have an effect were found",
-                                    all.outcomes[3] == 0 ? "ALL FOUND" : "SURVIVORS", all.outcomes[0],
-                                    all.outcomes[0] + all.outcomes[3]);
-  if (names_causes) verdict += fmt::format("; the cause is right in {}", all.cause_right);
-  if (all.with_part > 0) verdict += fmt::format(", the part in {} of {}", all.part_named, all.with_part);
-  fmt::print("{}\n", Wrap(verdict + ".", 2));
+  fmt::print("{}", FormatTable("<>>>>>>>", table));
+  for (const CampaignFault& fault : faults) {
+    if (!fault.exception.empty()) fmt::print("{}\n", Wrap(fault.exception, 2));
+  }
 }
 
 Json Campaign::ToJson() const {

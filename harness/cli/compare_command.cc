@@ -77,6 +77,7 @@ void PrintSignals(const RunComparison& comparison, bool all) {
 }
 
 void Print(const CompareRequest& request, const RunComparison& comparison) {
+  fmt::print("\n");
   for (size_t i = 0; i < request.run_folders.size(); ++i) {
     fmt::print("{}  {}: {}\n", static_cast<char>('A' + i), request.run_folders[i], comparison.verdicts[i]);
   }
@@ -115,8 +116,8 @@ int Run(const CompareRequest& request) {
   ResultFile json(request.json), page(request.page);
   const RunComparison comparison = CompareRuns(pointers, request.options);
   const bool prints = !json.TakesStdout();
+  if (prints) PrintAnswer(MakeAnswer(comparison));
   if (prints && !request.quiet) Print(request, comparison);
-  if (prints) fmt::print("{}{}\n", request.quiet ? "" : "\n", DescribeComparison(comparison));
   json.Write([&] { return ToJson(comparison, request.run_folders); });
   page.Write([&] { return MakeComparisonPage(pointers, request.run_folders, comparison); });
   if (!request.page.empty() && prints && !request.quiet) fmt::print("page: {}\n", request.page);

@@ -118,26 +118,50 @@ Json ToJson(const FileCause& cause) {
   return json;
 }
 
-/// Prints the causes, a line each, and how all else agrees. @returns whether there are any.
-bool PrintCauses(const ConsistencyRequest& request, const Comparison& comparison, const std::string& repair) {
-  if (!comparison.causes || comparison.causes->agrees) return false;
+/// Returns the answer for files whose causes are known.
+Answer AnswerByCauses(const ConsistencyRequest& request, const Comparison& comparison) {
   const FileCauses& causes = *comparison.causes;
-  PrintVerdict(Tone::kBad, "DISAGREE", fmt::format(": {} differs from {}.", causes.file, causes.reference));
-  const std::vector<std::string> lines = ListDifferences(comparison);
-  constexpr size_t kMostShown = 30;
-  for (size_t i = 0; i < std::min(lines.size(), kMostShown); ++i) {
-    fmt::print("{}\n", Wrap("  " + lines[i], 5));
+  Answer answer{Answer::Tone::kBad, "DISAGREE", causes.file + " differs from " + causes.reference + "."};
+  for (const FileCause& cause : causes.causes) {
+    std::string& text =
+        answer.causes.emplace_back(fmt::format("{}; explains {:.3g} %", cause.text, 100.0 * cause.explained));
+    for (const FileCause& other : cause.alternatives) text += "\n     or, just as well: " + other.text;
   }
-  if (lines.size() > kMostShown) fmt::print("  and {} more (--json)\n", lines.size() - kMostShown);
-  if (!request.exact && causes.unexplained.empty() && ListOtherDifferences(comparison).empty()) {
+  std::vector<std::string> unexplained = causes.unexplained;
+  for (const std::string& line : ListOtherDifferences(comparison)) unexplained.push_back(line);
+  for (const std::string& line : unexplained) answer.remarks.push_back("not explained: " + line);
+  if (!request.exact && unexplained.empty()) {
     const std::string digits =
         comparison.digits ? "within the printed digits (" + DescribeDigits(*comparison.digits) + ")"
         : comparison.result.samples == 0 ? "as far as it is printed; no motion was compared"
                                          : "to " + request.DescribeTolerance();
-    fmt::print("{}\n", Wrap("  everything else agrees " + digits, 5));
+    answer.remarks.push_back("everything else agrees " + digits);
   }
-  if (!repair.empty()) fmt::print("  repair: {}\n", repair);
-  return true;
+  return answer;
+}
+
+/// Returns the answer for terms that differ, without causes: each difference, the real ones first.
+Answer AnswerByTerms(const ConsistencyRequest& request, const Comparison& comparison,
+                     const std::string& left_out) {
+  const Differences differences = SortDifferences(comparison);
+  Answer answer{Answer::Tone::kBad, "DISAGREE", {}, differences.real, {}};
+  const std::string to_digits = fmt::format("agrees to {} digits", differences.digits);
+  if (differences.real.empty()) {
+    answer.sentence = fmt::format("everything {}, as rounded numbers do; --digits {} judges by that{}.",
+                                  to_digits, differences.digits, left_out);
+    answer.causes = differences.rounded;
+    return answer;
+  }
+  const std::string within =
+      comparison.digits ? "agrees within the printed digits (" + DescribeDigits(*comparison.digits) + ")"
+                        : "agrees to " + request.DescribeTolerance();
+  const size_t count = differences.real.size();
+  const std::string quantities =
+      count == 1 ? "1 quantity differs" : fmt::format("{} quantities differ", count);
+  answer.sentence = fmt::format("{}; everything else {}{}.", quantities,
+                                differences.rounded.empty() ? within : to_digits, left_out);
+  if (!differences.following.empty()) answer.remarks.push_back(differences.following);
+  return answer;
 }
 
 }  // namespace
@@ -219,7 +243,7 @@ void AddCauses(const Comparison& comparison, Json* json) {
 void PrintTable(const ConsistencyRequest& request, const Comparison& comparison) {
   const RobotModel& model = *comparison.model;
   const ConsistencyResult& result = comparison.result;
-  fmt::print("{}: {} against {}{}\n{} random states (seed {}), {:.1f} s\n\n", model.name(),
+  fmt::print("\n{}: {} against {}{}\n{} random states (seed {}), {:.1f} s\n\n", model.name(),
              comparison.first.filename().string(), comparison.second.filename().string(),
              comparison.with_engine ? std::string(", MuJoCo ") + mj_versionString() : "", result.samples,
              request.options.seed, result.seconds);
@@ -258,12 +282,9 @@ void PrintTable(const ConsistencyRequest& request, const Comparison& comparison)
                             0));
 }
 
-void PrintVerdict(const ConsistencyRequest& request, const Comparison& comparison,
+Answer MakeAnswer(const ConsistencyRequest& request, const Comparison& comparison,
                   const std::string& repair) {
   const ConsistencyResult& result = comparison.result;
-  if (!request.IsWhole(result)) {
-    fmt::print("INTERRUPTED after {} of {} samples. So far:\n", result.samples, request.options.samples);
-  }
   const auto count = [](const std::vector<std::string>& notes, const char* what) {
     std::string names;
     for (const std::string& note : notes)
@@ -272,54 +293,28 @@ void PrintVerdict(const ConsistencyRequest& request, const Comparison& compariso
   };
   const std::string left_out = count(comparison.not_compared, "not compared") +
                                count(comparison.without_effect, "differ, do not act on these terms");
-  if (PrintCauses(request, comparison, repair)) return;
-  if (result.Agrees()) {
-    if (comparison.digits) {
-      PrintVerdict(
-          Tone::kGood, "AGREE",
-          fmt::format(" within the printed digits ({}) in all {} terms{}; --exact asks for rounding alone{}.",
-                      DescribeDigits(*comparison.digits), result.terms.size(),
-                      DescribeLoosest(comparison.digits->loosest), left_out));
-      return;
-    }
-    PrintVerdict(Tone::kGood, "AGREE",
-                 fmt::format(": {} agree to {} in all {} terms{}.",
-                             comparison.with_engine  ? "the analytic model and MuJoCo"
-                             : request.has_results() ? "the description and the results"
-                                                     : "the two descriptions",
-                             request.DescribeTolerance(), result.terms.size(), left_out));
-    return;
-  }
-  constexpr size_t kMostShown = 10;
-  const Differences differences = SortDifferences(comparison);
-  const std::string to_digits = fmt::format("agrees to {} digits", differences.digits);
-  if (differences.real.empty()) {
-    PrintVerdict(Tone::kBad, "DISAGREE",
-                 fmt::format(": everything {}, as rounded numbers do; --digits {} judges by that{}.",
-                             to_digits, differences.digits, left_out));
+  Answer answer{.word = "AGREE"};
+  if (comparison.causes && !comparison.causes->agrees) {
+    answer = AnswerByCauses(request, comparison);
+  } else if (!result.Agrees()) {
+    answer = AnswerByTerms(request, comparison, left_out);
+  } else if (comparison.digits) {
+    answer.sentence =
+        fmt::format("all {} terms agree within the printed digits ({}){}; --exact asks for rounding alone{}.",
+                    result.terms.size(), DescribeDigits(*comparison.digits),
+                    DescribeLoosest(comparison.digits->loosest), left_out);
   } else {
-    const std::string more = differences.real.size() > 1
-                                 ? fmt::format("; and in {} more", differences.real.size() - 1)
-                                 : std::string();
-    const std::string within =
-        comparison.digits ? "agrees within the printed digits (" + DescribeDigits(*comparison.digits) + ")"
-                          : "agrees to " + request.DescribeTolerance();
-    PrintVerdict(Tone::kBad, "DISAGREE",
-                 fmt::format(": {}{}; everything else {}{}.", differences.real.front(), more,
-                             differences.rounded.empty() ? within : to_digits, left_out));
-    const size_t shown =
-        comparison.digits ? std::min(differences.real.size(), kMostShown) : differences.real.size();
-    for (size_t i = 1; i < shown; ++i) fmt::print("  {}\n", differences.real[i]);
-    if (shown < differences.real.size())
-      fmt::print("  and {} more (--json)\n", differences.real.size() - shown);
-    if (!differences.following.empty()) fmt::print("  {}\n", differences.following);
+    answer.sentence = fmt::format("{} agree to {} in all {} terms{}.",
+                                  comparison.with_engine  ? "the analytic model and MuJoCo"
+                                  : request.has_results() ? "the description and the results"
+                                                          : "the two descriptions",
+                                  request.DescribeTolerance(), result.terms.size(), left_out);
   }
-  const size_t shown = std::min(differences.rounded.size(), kMostShown);
-  if (shown > 0 && !differences.real.empty())
-    fmt::print("To {} digits agree {} more:\n", differences.digits, differences.rounded.size());
-  for (size_t i = 0; i < shown; ++i) fmt::print("  {}\n", differences.rounded[i]);
-  if (shown < differences.rounded.size())
-    fmt::print("  and {} more (--json)\n", differences.rounded.size() - shown);
+  if (!repair.empty()) answer.remarks.push_back("repair: " + repair);
+  if (!request.IsWhole(result))
+    answer.remarks.push_back(
+        fmt::format("interrupted: these are {} of {} samples", result.samples, request.options.samples));
+  return answer;
 }
 
 Json ToJson(const ConsistencyRequest& request, const Comparison& comparison, ExitCode code) {

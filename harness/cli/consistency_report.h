@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "harness/base/answer.h"
 #include "harness/checks/file_comparison.h"
 #include "harness/cli/commands.h"
 
@@ -44,9 +45,9 @@ nlohmann::ordered_json DescribeRecord(const CheckRecord& record, const RobotMode
 
 /// Large results first fail, then where to look: what a person reads.
 void PrintTable(const ConsistencyRequest& request, const Comparison& comparison);
-/// Prints whether the two agree, and if not, why.
+/// Returns whether the two agree, and if not, why.
 /// @param repair the command that writes a corrected file; empty if there is none.
-void PrintVerdict(const ConsistencyRequest& request, const Comparison& comparison, const std::string& repair);
+Answer MakeAnswer(const ConsistencyRequest& request, const Comparison& comparison, const std::string& repair);
 /// Returns the results as JSON.
 nlohmann::ordered_json ToJson(const ConsistencyRequest& request, const Comparison& comparison, ExitCode code);
 

@@ -74,7 +74,8 @@ int Run(DiagnoseRequest request) {
       Compare(request, &first, &second, [&](long samples) { return bar.GoOn(samples); });
   bar.Finish();
   json.Write([&] { return ToJson(request, comparison); });
-  if (!json.TakesStdout()) PrintVerdict(request, comparison, output ? "" : OfferRepair(request, comparison));
+  if (!json.TakesStdout())
+    PrintAnswer(MakeAnswer(request, comparison, output ? "" : OfferRepair(request, comparison)));
   if (IsInterrupted()) return ReportFailure("interrupted");
   if (output) {
     const std::string line = WriteRepair(request, first, &second, comparison, &*output);

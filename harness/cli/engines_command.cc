@@ -57,7 +57,7 @@ std::vector<std::string> NamesOf(const std::vector<size_t>& group, const EngineC
 
 void PrintTable(const EnginesRequest& request, const RobotModel& model,
                 const EngineComparisonResult& result) {
-  fmt::print("{}: {}\n{} random states (seed {}), {} engines\n\n", model.name(),
+  fmt::print("\n{}: {}\n{} random states (seed {}), {} engines\n\n", model.name(),
              request.robot.filename().string(), result.samples, request.options.states.seed,
              result.names.size());
   for (const std::string& note : result.notes) fmt::print("{}\n", Wrap("  " + note, 4));
@@ -102,20 +102,19 @@ void PrintTable(const EnginesRequest& request, const RobotModel& model,
   fmt::print("\n{}\n", Wrap(legend, 0));
 }
 
-void PrintVerdict(const EnginesRequest& request, const EngineComparisonResult& result) {
-  if (result.samples < request.options.states.samples) {
-    fmt::print("INTERRUPTED after {} of {} states. So far:\n", result.samples,
-               request.options.states.samples);
+Answer AnswerForEngines(const EnginesRequest& request, const EngineComparisonResult& result) {
+  Answer answer{.word = "AGREE",
+                .sentence = JoinNames(result.names) + " agree in all terms that they share."};
+  if (!result.Agrees()) {
+    answer = {Answer::Tone::kBad, "DISAGREE", "these do not give the same terms.", {}, result.settings};
+    for (const std::vector<size_t>& group : result.groups)
+      answer.causes.push_back(JoinNames(NamesOf(group, result)) +
+                              (group.size() > 1 ? " agree" : " stands alone"));
   }
-  if (result.Agrees()) {
-    fmt::print("AGREE: {} agree in all terms that they share.\n", JoinNames(result.names));
-    return;
-  }
-  fmt::print("DISAGREE:\n");
-  for (const std::vector<size_t>& group : result.groups) {
-    fmt::print("  {}{}\n", JoinNames(NamesOf(group, result)), group.size() > 1 ? " agree" : " stands alone");
-  }
-  for (const std::string& setting : result.settings) fmt::print("  {}\n", setting);
+  if (result.samples < request.options.states.samples)
+    answer.remarks.push_back(fmt::format("interrupted: these are {} of {} states", result.samples,
+                                         request.options.states.samples));
+  return answer;
 }
 
 Json ToJson(const EnginesRequest& request, const RobotModel& model, const EngineComparisonResult& result) {
@@ -177,8 +176,8 @@ int Run(EnginesRequest request) {
   json.Write([&] { return ToJson(request, model, result); });
   junit.Write([&] { return WriteEnginesJUnit(request, model, result); });
   if (!json.TakesStdout()) {
+    PrintAnswer(AnswerForEngines(request, result));
     if (!request.quiet) PrintTable(request, model, result);
-    PrintVerdict(request, result);
   }
   if (code == kFailure)
     return ReportFailure(result.lacks_requested

@@ -35,11 +35,11 @@ struct JudgeRequest {
 
 std::string Number(double value) { return fmt::format("{:.3g}", value); }
 
-JudgementVerdict FindVerdict(const RobotModel& model, const RecordingJudgement& judgement,
-                             const std::vector<Recording>& recordings) {
+Answer AnswerFor(const RobotModel& model, const RecordingJudgement& judgement,
+                 const std::vector<Recording>& recordings) {
   const bool is_one = recordings.size() == 1;
-  return MakeVerdict(judgement, model,
-                     is_one ? recordings.front().name : std::to_string(recordings.size()) + " recordings");
+  return MakeAnswer(judgement, model,
+                    is_one ? recordings.front().name : std::to_string(recordings.size()) + " recordings");
 }
 
 void PrintBalances(const RobotModel& model, const RecordingJudgement& judgement,
@@ -60,56 +60,24 @@ void PrintBalances(const RobotModel& model, const RecordingJudgement& judgement,
   }
 }
 
-void Print(const JudgeRequest& request, const RobotModel& model, const RecordingJudgement& judgement,
-           const std::vector<Recording>& recordings) {
-  if (!request.quiet) {
-    for (const std::string& note : judgement.notes) fmt::print("{}\n", Wrap(note, 2));
-    fmt::print("\n");
-    PrintBalances(model, judgement, recordings);
-  }
-  if (!judgement.causes.empty()) {
-    fmt::print(
-        "{}\n",
-        Wrap(fmt::format(
-                 "causes (explain {:.4g} % of what the model does not; {:.3g} times the noise is left)",
-                 100.0 * judgement.explained, judgement.left),
-             2));
-    int number = 0;
-    std::string nearest;
-    for (const Explanation& one : judgement.causes) {
-      if (one.outcome != CauseOutcome::kNotExplained || one.faults.empty())
-        fmt::print("{}\n", Wrap(fmt::format("  {:2}  {}", ++number, one.Describe()), 6));
-      else
-        nearest += fmt::format("{}{} ({:.2g} %)", nearest.empty() ? "not explained; nearest: " : ", ",
-                               one.faults.front().Describe(), 100.0 * one.fraction);
-    }
-    if (!nearest.empty()) fmt::print("{}\n", Wrap(nearest, 2));
-    const auto describe = [](const HeldPrediction& one) {
-      return fmt::format("{} number{} {:.3g} times the noise", one.numbers,
-                         one.numbers == 1 ? " leaves" : "s leave", one.held_left);
-    };
-    // A short recording is not divided: nothing is held out.
-    if (judgement.by_all.held_left > 0.0)
-      fmt::print("{}\n", Wrap(fmt::format("held-out quarter: the causes' {}; a least-squares fit of every "
-                                          "body, friction, offset and armature: {}",
-                                          describe(judgement.by_causes), describe(judgement.by_all)),
-                              2));
-    fmt::print("\n");
-  }
-  const JudgementVerdict verdict = FindVerdict(model, judgement, recordings);
-  std::string word = verdict.word;
-  std::ranges::transform(word, word.begin(), [](unsigned char c) { return std::toupper(c); });
-  PrintVerdict(judgement.Agrees() ? Tone::kGood : Tone::kBad, word, ": " + verdict.sentence);
+/// Prints what stands below the verdict.
+void PrintDetails(const RobotModel& model, const RecordingJudgement& judgement,
+                  const std::vector<Recording>& recordings) {
+  fmt::print("\n");
+  PrintBalances(model, judgement, recordings);
+  for (const std::string& note : judgement.notes) fmt::print("{}\n", Wrap(note, 2));
 }
 
 Json ToJson(const HeldPrediction& one) { return {{"numbers", one.numbers}, {"left", one.held_left}}; }
 
 Json ToJson(const RobotModel& model, const RecordingJudgement& judgement,
             const std::vector<Recording>& recordings) {
-  const JudgementVerdict verdict = FindVerdict(model, judgement, recordings);
+  const Answer answer = AnswerFor(model, judgement, recordings);
+  std::string word = answer.word;
+  std::ranges::transform(word, word.begin(), [](unsigned char c) { return std::tolower(c); });
   Json json = {{"model", model.spec().source},
-               {"verdict", verdict.word},
-               {"verdict_text", verdict.sentence},
+               {"verdict", word},
+               {"verdict_text", answer.sentence},
                {"rows", judgement.rows},
                {"explained", judgement.explained},
                {"left", judgement.left},
@@ -146,17 +114,18 @@ Json ToJson(const RobotModel& model, const RecordingJudgement& judgement,
   return json;
 }
 
-/// Writes the model's file with what was found.
-void Correct(const RecordingJudgement& judgement, const JudgeRequest& request, bool says, OutputFile* file) {
+/// Writes the model's file with what was found. @returns what was corrected, and what was not.
+std::vector<std::string> Correct(const RecordingJudgement& judgement, const JudgeRequest& request,
+                                 OutputFile* file) {
   const CorrectedFile corrected =
       WriteCorrections(DescriptionFile(request.model, request.urdf), request.urdf, judgement,
                        std::filesystem::path(request.corrected).parent_path());
   file->Write(corrected.text);
-  if (!says || file->is_stdout()) return;
-  fmt::print("{}: {} of {} causes are put right\n", request.corrected.string(), corrected.written.size(),
-             judgement.found.size());
-  for (const std::string& one : corrected.left) fmt::print("  not in it: {}\n", one);
-  fmt::print("\n");
+  std::vector<std::string> remarks = {fmt::format("{}: {} of {} causes are corrected",
+                                                  request.corrected.string(), corrected.written.size(),
+                                                  judgement.found.size())};
+  for (const std::string& one : corrected.left) remarks.push_back("not in it: " + one);
+  return remarks;
 }
 
 /// @throws UsageError when MODEL and RECORDING stand the other way round.
@@ -222,16 +191,19 @@ int Run(JudgeRequest request) {
     return !IsInterrupted();
   });
   bar.Finish();
-  if (!IsInterrupted() && corrected)
-    Correct(judgement, request, !request.quiet && !json.TakesStdout(), &*corrected);
+  std::vector<std::string> written;
+  if (!IsInterrupted() && corrected) written = Correct(judgement, request, &*corrected);
   json.Write([&] { return ToJson(model, judgement, recordings); });
   page.Write([&] {
     const std::optional<ReplayData> replay = MakeMotionReplay(model, request.model, judgement);
     return MakeJudgePage(model, judgement, ToJson(model, judgement, recordings), replay ? &*replay : nullptr);
   });
-  if (!json.TakesStdout()) {
-    if (IsInterrupted()) fmt::print("INTERRUPTED. So far:\n");
-    Print(request, model, judgement, recordings);
+  if (!json.TakesStdout() && !(corrected && corrected->is_stdout())) {
+    Answer answer = AnswerFor(model, judgement, recordings);
+    if (IsInterrupted()) answer.remarks.emplace_back("interrupted: the later rows were not judged");
+    answer.remarks.insert(answer.remarks.end(), written.begin(), written.end());
+    PrintAnswer(answer);
+    if (!request.quiet) PrintDetails(model, judgement, recordings);
   }
   if (IsInterrupted()) return ReportFailure("interrupted");
   return judgement.Agrees() ? kSuccess : kDisagreement;
@@ -259,25 +231,25 @@ Json ToJson(const RobotModel& model, const RecordingPair& pair, const RecordingC
 
 void Print(const RobotModel& model, const RecordingPair& pair, const RecordingComparison& comparison) {
   const std::string first = pair.first.filename().string(), second = pair.second.filename().string();
-  if (!pair.quiet && comparison.is_same_motion) {
-    fmt::print("{} is {:.4g} s after {}.\n\n", second, comparison.delay, first);
-    std::vector<TableRow> rows = {{{"difference, rms", "position", "torque"}}};
-    for (const JointDifference& one : comparison.joints)
-      rows.push_back({{model.joint(one.joint).name, Number(one.position), Number(one.torque)}});
-    fmt::print("{}\n", FormatTable("<>>", rows));
-  } else if (!pair.quiet) {
-    fmt::print("The motions are not the same: only what explains them is compared.\n\n");
-  }
-  int number = 0;
-  for (const CauseDifference& one : comparison.causes)
-    fmt::print("{}\n", Wrap(fmt::format("  {:2}  {}", ++number, one.Describe()), 6));
+  Answer answer;
   if (comparison.causes.empty()) {
-    fmt::print("{}: what {} does not explain is the same in both.\n", Paint(Tone::kGood, "SAME"),
-               model.name());
+    answer.word = "SAME";
+    answer.sentence = fmt::format("what {} does not explain is the same in both.", model.name());
   } else {
-    fmt::print("{}{}: {} and {} are of robots that differ.\n", pair.quiet ? "" : "\n",
-               Paint(Tone::kBad, "DIFFER"), first, second);
+    answer.tone = Answer::Tone::kBad;
+    answer.word = "DIFFER";
+    answer.sentence = fmt::format("{} and {} are of robots that differ.", first, second);
   }
+  for (const CauseDifference& one : comparison.causes) answer.causes.push_back(one.Describe());
+  answer.remarks.push_back(comparison.is_same_motion
+                               ? fmt::format("{} is {:.4g} s after {}", second, comparison.delay, first)
+                               : "the motions are not the same: only what explains them is compared");
+  PrintAnswer(answer);
+  if (pair.quiet || !comparison.is_same_motion) return;
+  std::vector<TableRow> rows = {{{"difference, rms", "position", "torque"}}};
+  for (const JointDifference& one : comparison.joints)
+    rows.push_back({{model.joint(one.joint).name, Number(one.position), Number(one.torque)}});
+  fmt::print("\n{}", FormatTable("<>>", rows));
 }
 
 }  // namespace

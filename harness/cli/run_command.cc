@@ -25,6 +25,7 @@
 #include "harness/report/run_data.h"
 #include "harness/run/declared_share.h"
 #include "harness/run/joint_margins.h"
+#include "harness/run/run_answer.h"
 
 namespace dexcheck::cli {
 namespace {
@@ -136,28 +137,31 @@ int RunScenario(const RunRequest& request) {
     result.attribution.evidence = difference;
   }
 
-  const std::string summary = FormatJson(MakeSummary(setup, runner.loop(), result));
-  if (recorder) recorder->Close(summary);
-  if (folder) OutputFile(folder->path() / "summary.json").Write(summary);
+  const nlohmann::ordered_json summary = MakeSummary(setup, runner.loop(), result);
+  const std::string text = FormatJson(summary);
+  if (recorder) recorder->Close(text);
+  if (folder) OutputFile(folder->path() / "summary.json").Write(text);
   if (folder && !result.gain_card.empty())
     OutputFile(folder->path() / "gain_card.toml").Write(result.gain_card);
   junit.Write([&] { return WriteJUnit(setup, runner.loop(), result); });
   const ExitCode verdict = ToExitCode(result);
   std::exception_ptr unprinted;
   try {
-    if (!request.json_file.empty()) OutputFile(request.json_file).Write(summary);
+    if (!request.json_file.empty()) OutputFile(request.json_file).Write(text);
     if (request.json_file != "-") {
-      PrintRunReport(setup, runner.loop(), result, folder ? folder->path().string() : "",
-                     request.quiet ? Detail::kVerdict
-                     : request.all ? Detail::kAll
-                                   : Detail::kCategories);
+      Answer answer = MakeRunAnswer(summary, ListChecksOf(runner.loop()));
+      if (result.attribution.cause == Cause::kModel && files.scenario.model_overrides.empty())
+        answer.remarks.push_back(fmt::format("why: dexcheck diagnose {} {}",
+                                             QuoteForShell(files.robot.string()),
+                                             QuoteForShell(files.mjcf.string())));
+      PrintAnswer(answer);
+      if (!request.quiet)
+        PrintRunReport(setup, runner.loop(), result, folder ? folder->path().string() : "",
+                       request.all ? Detail::kAll : Detail::kCategories);
       if (request.gains)
         fmt::print("\n{}", result.gain_card.empty()
                                ? "no margins: they are those of a joint motion under its law\n"
                                : result.gain_card);
-      if (result.attribution.cause == Cause::kModel && files.scenario.model_overrides.empty())
-        fmt::print("why: dexcheck diagnose {} {}\n", QuoteForShell(files.robot.string()),
-                   QuoteForShell(files.mjcf.string()));
     }
     FlushOutput();
   } catch (const std::exception&) {

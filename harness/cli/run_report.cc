@@ -7,12 +7,22 @@
 #include <span>
 #include <vector>
 
+#include "controller/common/text.h"
 #include "harness/base/check_record.h"
 #include "harness/checks/check_table.h"
 #include "harness/cli/junit_file.h"
 #include "harness/cli/terminal.h"
 
 namespace dexcheck::cli {
+std::vector<CheckRecord> ListChecksOf(const ClosedLoop& loop) {
+  std::vector<CheckRecord> all;
+  if (!loop.is_checking()) return all;
+  for (const std::span<const CheckRecord> records :
+       {loop.checks().model_checks(), loop.checks().motion_checks()})
+    std::ranges::copy_if(records, std::back_inserter(all), &CheckRecord::applies);
+  return all;
+}
+
 namespace {
 
 std::string PaintStatus(const CheckRecord& check) {
@@ -20,33 +30,27 @@ std::string PaintStatus(const CheckRecord& check) {
   return check.failed ? Paint(Tone::kBad, status) : status == "ok" ? Paint(Tone::kGood, status) : status;
 }
 
-/// @param count of the checks that the row stands for; empty for one.
-void PrintCheck(const CheckRecord& check, const std::string& count = "") {
+/// Adds a check's line to the table.
+/// @param count number of the checks that the line stands for; empty for one.
+void AddCheck(const CheckRecord& check, const std::string& count, std::vector<TableRow>* rows) {
   if (!check.applies || check.is_empty) return;
-  fmt::print("  {:<17}{:>3} {:<28}", NameOf(check.kind), count, check.name);
+  TableRow& row = rows->emplace_back();
+  row.cells = {NameOf(check.kind), count, check.name};
   if (!IsReached(check)) {
-    fmt::print("{:>8}  {}\n", "-", PaintStatus(check));
+    row.cells.insert(row.cells.end(), {"-", "", "", PaintStatus(check)});
     return;
   }
-  fmt::print("{:>8.1e}{:>8.0e}  {:<4} {}\n", check.failed ? check.worst : check.residual, check.bound,
-             check.unit == "1" ? "" : check.unit, PaintStatus(check));
-  if (check.residual > check.bound && !check.failed)
-    fmt::print("{:22}with an allowance of {:.1e}\n", "", check.allowance);
-  if (check.failed) fmt::print("{:22}from {:.3f} s\n", "", check.failed_at);
+  const std::string allowed =
+      check.residual > check.bound && !check.failed ? fmt::format(", {:.1e} allowed", check.allowance) : "";
+  const std::string from = check.failed ? fmt::format(" {:.3f} s", check.failed_at) : "";
+  row.cells.insert(row.cells.end(), {fmt::format("{:.1e}", check.failed ? check.worst : check.residual),
+                                     fmt::format("{:.0e}", check.bound), check.unit == "1" ? "" : check.unit,
+                                     PaintStatus(check) + from + allowed});
 }
 
-/// Checks of the model and of the motion that the run has.
-std::vector<CheckRecord> ListChecksOf(const ClosedLoop& loop) {
-  std::vector<CheckRecord> all;
-  for (const std::span<const CheckRecord> records :
-       {loop.checks().model_checks(), loop.checks().motion_checks()})
-    std::ranges::copy_if(records, std::back_inserter(all), &CheckRecord::applies);
-  return all;
-}
-
-/// One line for what passes of a category, with the check that came nearest to its bound, and each that
-/// fails.
-void PrintCategory(CheckCategory kind, const ClosedLoop& loop) {
+/// Adds one line for what passes of a category, with the check that came nearest to its bound, and each check
+/// that fails.
+void AddCategory(CheckCategory kind, const ClosedLoop& loop, std::vector<TableRow>* rows) {
   CategoryStatus passing{kind};
   std::vector<CheckRecord> failing;
   for (const CheckRecord& check : ListChecksOf(loop)) {
@@ -57,33 +61,39 @@ void PrintCategory(CheckCategory kind, const ClosedLoop& loop) {
       passing.Add(check);
     }
   }
+  for (const CheckRecord& check : failing) AddCheck(check, "", rows);
   if (passing.is_asked())
-    PrintCheck(passing.nearest, passing.checks == 1 ? "" : std::to_string(passing.checks));
+    AddCheck(passing.nearest, passing.checks == 1 ? "" : std::to_string(passing.checks), rows);
   const bool is_asked =
       passing.is_asked() || !failing.empty();  // contacts of an arm that touches nothing are not
   if (is_asked && passing.not_reached > 0)
-    fmt::print("  {:<17}{:>3} not reached\n", NameOf(kind), passing.not_reached);
-  for (const CheckRecord& check : failing) PrintCheck(check);
+    rows->push_back({{NameOf(kind), std::to_string(passing.not_reached), "not reached"}});
 }
 
 void PrintChecks(const Setup& setup, const ClosedLoop& loop, Detail detail) {
-  fmt::print("\n  {:<17}    {:<28}{:>8}{:>8}\n", "category",
-             detail == Detail::kAll ? "check" : "checks, nearest to its bound", "worst", "bound");
+  const bool all = detail == Detail::kAll;
+  std::vector<TableRow> rows = {
+      {{"category", "", all ? "check" : "checks, nearest to its bound", "worst", "bound"}}};
   const auto& constants = setup.constants().records;
   const auto differs = std::ranges::count_if(constants, [](const CheckRecord& r) { return r.failed; });
-  fmt::print("  {:<17}{:>3} {:<28}{:>8}{:>8}       {}\n", "model", constants.size(), "constants", differs, 0,
-             differs > 0 ? Paint(Tone::kBad, "FAILS") : Paint(Tone::kGood, "ok"));
-  if (detail == Detail::kAll) {
-    for (const CheckRecord& check : ListChecksOf(loop)) PrintCheck(check);
+  rows.push_back({{"model", std::to_string(constants.size()), "constants", std::to_string(differs), "0", "",
+                   differs > 0 ? Paint(Tone::kBad, "FAILS") : Paint(Tone::kGood, "ok")}});
+  if (all) {
+    for (const CheckRecord& check : ListChecksOf(loop)) AddCheck(check, "", &rows);
   } else {
-    for (const CheckCategory kind : kCheckCategories) {
-      PrintCategory(kind, loop);
-    }
-    fmt::print("  (--all lists each check)\n");
+    for (const CheckCategory kind : kCheckCategories) AddCategory(kind, loop, &rows);
   }
-  const std::span<const CheckRecord> settling = loop.checks().settling_failures();
-  if (!settling.empty()) fmt::print("\n  while settling, before t = 0:\n");
-  for (const CheckRecord& check : settling) PrintCheck(check);
+  fmt::print("\n{}", FormatTable("<><>><<", rows));
+  if (!all) fmt::print("(--all lists each check)\n");
+  std::vector<std::string> names;
+  double from = 0.0;
+  for (const CheckRecord& check : loop.checks().settling_failures()) {
+    names.push_back(check.name);
+    from = std::min(from, check.failed_at);
+  }
+  if (!names.empty())
+    fmt::print("{}\n",
+               Wrap(fmt::format("fails while settling, from {:.3f} s: {}", from, JoinNames(names)), 2));
 }
 
 /// "approach 0.0, close 3.4, ..." with the time each began.
@@ -155,78 +165,33 @@ void PrintSpeed(const ClosedLoop& loop, const RunResult& result) {
       scale * times.controller, scale * times.cross_check, scale * result.recording_seconds);
 }
 
-/// Prints the causes that explain the residuals, numbered; those that nothing explains last.
-void PrintCauses(const Causes& causes) {
-  int number = 0;
-  for (const Explanation& one : causes)
-    fmt::print("{}\n", Wrap(fmt::format("  {}. {}: {}", ++number, NameOf(one.channel), one.Describe()), 5));
-  const bool has_class = std::ranges::any_of(
-      causes, [](const Explanation& one) { return one.outcome == CauseOutcome::kNamedClass; });
-  if (has_class) fmt::print("    (what is not isolable here may be on another motion)\n");
-}
-
 }  // namespace
 
 void PrintRunReport(const Setup& setup, const ClosedLoop& loop, const RunResult& result,
                     const std::string& folder, Detail detail) {
   const Scenario& scenario = setup.scenario();
-  if (detail != Detail::kVerdict) {
-    fmt::print("{}\n", Wrap(scenario.name + ": " + scenario.description, 2));
-    fmt::print("{:.3f} of {:.3f} s simulated, {} steps of {} ms\n", loop.time(), scenario.duration,
-               loop.record().step, 1e3 * scenario.plant.time_step);
-    if (scenario.tolerance > 0.0) fmt::print("judged to a relative tolerance of {:g}\n", scenario.tolerance);
-    if (!scenario.imperfections.is_ideal()) {
-      for (const std::string& key : scenario.imperfections.declared) fmt::print("declared: {}\n", key);
-    }
-    if (loop.record().step > 0) PrintTracking(scenario, result.tracking);
-    if (scenario.control.kappa == ContactSource::kIntegrated) {
-      const ContactDrift& drift = loop.largest_drift();
-      fmt::print(
-          "contacts followed by (40): off by {:.2e} m on the object, {:.2e} m on the fingertip, "
-          "{:.2e} rad in psi\n",
-          drift.object, drift.fingertip, drift.psi);
-    }
-    if (scenario.imperfections.actuation.saturates()) PrintLimits(loop.motors(), result.limited);
-    if (loop.task() != nullptr) PrintTask(loop);
-    if (loop.is_checking()) PrintClearance(loop.checks().clearance());
-    if (loop.is_checking()) PrintRigidContacts(loop.checks());
-    if (loop.is_checking()) PrintChecks(setup, loop, detail);
-    PrintSpeed(loop, result);
-    if (!folder.empty()) fmt::print("log and summary in {}\n", folder);
-    fmt::print("\n");
-  }
-  switch (result.verdict) {
-    case Verdict::kPass:
-      fmt::print("{}: {}\n", Paint(Tone::kGood, "PASS"),
-                 loop.is_checking() ? DescribeWhatHolds(ListChecksOf(loop)) +
-                                          (scenario.imperfections.is_ideal()
-                                               ? "."
-                                               : ",\nwith what the scenario asks of the plant counted in.")
-                                    : "the run completed; nothing was checked.");
-      return;
-    case Verdict::kFailed:
-      PrintVerdict(Tone::kBad, "FAILED", ": " + result.failure + ".");
-      break;
-    case Verdict::kDisagreement:
-      PrintVerdict(Tone::kBad, "DISAGREEMENT",
-                   fmt::format(": {}.", DescribeCause(NameOf(result.attribution.cause))));
-      break;
-  }
-  if (result.attribution.cause == Cause::kNone) return;
-  PrintCauses(result.causes);
-  fmt::print("{}\n", Wrap("  evidence: " + result.attribution.evidence, 5));
-  for (const ConstantFinding& finding : setup.constants().findings) {
-    fmt::print("  {}: {}: {:.12g} in the model, {:.12g} in the MJCF\n", finding.check, finding.where,
-               finding.model, finding.engine);
-  }
-  const std::vector<ConstantFinding>& findings = setup.constants().findings;
-  const bool has_servos = std::ranges::any_of(
-      findings, [](const ConstantFinding& finding) { return finding.check.starts_with("motor_"); });
-  if (has_servos)
+  fmt::print("\n{}\n", Wrap(scenario.name + ": " + scenario.description, 2));
+  fmt::print("{:.3f} of {:.3f} s simulated, {} steps of {} ms\n", loop.time(), scenario.duration,
+             loop.record().step, 1e3 * scenario.plant.time_step);
+  if (scenario.tolerance > 0.0) fmt::print("judged to a relative tolerance of {:g}\n", scenario.tolerance);
+  for (const std::string& key : scenario.imperfections.declared) fmt::print("declared: {}\n", key);
+  if (loop.record().step > 0) PrintTracking(scenario, result.tracking);
+  if (scenario.control.kappa == ContactSource::kIntegrated) {
+    const ContactDrift& drift = loop.largest_drift();
     fmt::print(
-        "  A run sends torques: each actuator must be a <motor> of gear 1, not a servo or a muscle; dexcheck "
-        "import "
-        "FILE.xml --motors --out COPY.xml writes such a copy.\n");
+        "contacts followed by (40): off by {:.2e} m on the object, {:.2e} m on the fingertip, "
+        "{:.2e} rad in psi\n",
+        drift.object, drift.fingertip, drift.psi);
+  }
+  if (scenario.imperfections.actuation.saturates()) PrintLimits(loop.motors(), result.limited);
+  if (loop.task() != nullptr) PrintTask(loop);
+  if (loop.is_checking()) {
+    PrintClearance(loop.checks().clearance());
+    PrintRigidContacts(loop.checks());
+    PrintChecks(setup, loop, detail);
+  }
+  PrintSpeed(loop, result);
+  if (!folder.empty()) fmt::print("log and summary in {}\n", folder);
 }
 
 std::string WriteJUnit(const Setup& setup, const ClosedLoop& loop, const RunResult& result) {

@@ -56,9 +56,15 @@ std::string Wrap(std::string_view text, size_t indent) {
   }
 }
 
-void PrintVerdict(Tone tone, const std::string& word, const std::string& rest) {
-  const std::string line = Wrap(word + rest, 2);
-  fmt::print("{}{}\n", Paint(tone, word), line.substr(word.size()));
+void PrintAnswer(const Answer& answer) {
+  constexpr size_t kMostShown = 30;
+  const std::string line = Wrap(answer.word + ": " + answer.sentence, 2);
+  fmt::print("{}{}\n", Paint(answer.tone, answer.word), line.substr(answer.word.size()));
+  for (size_t i = 0; i < std::min(answer.causes.size(), kMostShown); ++i)
+    fmt::print("{}\n", Wrap(fmt::format("  {}. {}", i + 1, answer.causes[i]), 5));
+  if (answer.causes.size() > kMostShown)
+    fmt::print("  and {} more (--json)\n", answer.causes.size() - kMostShown);
+  for (const std::string& remark : answer.remarks) fmt::print("{}\n", Wrap("  " + remark, 5));
 }
 
 std::string FormatTable(std::string_view align, const std::vector<TableRow>& rows) {

@@ -8,6 +8,8 @@
 #include <string_view>
 #include <vector>
 
+#include "harness/base/answer.h"
+
 namespace dexcheck::cli {
 
 /// Columns of the terminal that a descriptor leads to, now; 0 when it is none or does not report them.
@@ -29,14 +31,14 @@ struct TableRow {
 /// to the right.
 std::string FormatTable(std::string_view align, const std::vector<TableRow>& rows);
 
-enum class Tone { kGood, kBad, kFaint };
+using Tone = Answer::Tone;
 
 /// The text in a colour when standard output is a terminal and the environment has no NO_COLOR (no-color.org)
 /// and no TERM=dumb; otherwise as it is.
 std::string Paint(Tone tone, std::string_view text);
 
-/// Prints a verdict's word, painted, and what follows it, wrapped.
-void PrintVerdict(Tone tone, const std::string& word, const std::string& rest);
+/// Prints a verdict, its causes with their numbers, and its remarks, wrapped.
+void PrintAnswer(const Answer& answer);
 
 /// A line on standard error that shows how far long work has come, never wider than the terminal; silent when
 /// standard error is no terminal.

@@ -122,7 +122,9 @@ constexpr QuantityWords kQuantities[] = {
     {"joint_damping", "damping", "N m s/rad", "N s/m"},
     {"joint_dry_friction", "dry friction", "N m", "N"},
     {"joint_armature", "armature", "kg m^2", "kg"},
-    {"joint_coupling", "coupling", "", "", {"leader", "multiplier", "offset"}}};
+    {"joint_coupling", "coupling", "", "", {"leader", "multiplier", "offset"}},
+    {"wheel_mass", "mass", "kg", "kg"},
+    {"wheel_spin_inertia", "spin inertia", "kg m^2", "kg m^2"}};
 
 const QuantityWords* FindWords(const std::string& check) {
   const auto* const found = std::ranges::find(kQuantities, std::string_view(check), &QuantityWords::check);

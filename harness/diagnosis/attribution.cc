@@ -166,20 +166,48 @@ Cause AttributeOne(const CheckRecord& check, Cause run, std::span<const CheckRec
   return FindFailed(steps, meaning.sharper) != nullptr ? MeaningOf(meaning.sharper).cause : meaning.cause;
 }
 
+/// Lists the numbers that differ between the two descriptions, those that differ most first. Places at which
+/// one number has the same two values stand in one line.
+Causes ListConstants(std::vector<ConstantFinding> findings) {
+  const auto fraction = [](const ConstantFinding& one) {
+    return std::abs(one.model - one.engine) / std::max(std::abs(one.model), std::abs(one.engine));
+  };
+  std::stable_sort(findings.begin(), findings.end(), [&](const ConstantFinding& a, const ConstantFinding& b) {
+    return fraction(a) > fraction(b);
+  });
+  Causes causes;
+  std::vector<bool> is_listed(findings.size(), false);
+  for (size_t i = 0; i < findings.size(); ++i) {
+    if (is_listed[i]) continue;
+    const ConstantFinding& one = findings[i];
+    std::vector<std::string> places;
+    for (size_t k = i; k < findings.size(); ++k) {
+      const ConstantFinding& other = findings[k];
+      if (other.check != one.check || other.entry != one.entry || other.model != one.model ||
+          other.engine != one.engine)
+        continue;
+      is_listed[k] = true;
+      places.push_back(other.where);
+    }
+    const std::string component = NameComponent(one.check, one.entry);
+    std::string unit = UnitOf(one.check, /*is_prismatic=*/false);
+    if (unit != UnitOf(one.check, /*is_prismatic=*/true)) unit.clear();
+    const std::string after = unit.empty() ? "" : " " + unit;
+    const std::string text = NameQuantity(one.check) + (component.empty() ? "" : " " + component) + " of " +
+                             JoinNames(places) + ": " + FormatNumber(one.model, 12) + after +
+                             " in the model, " + FormatNumber(one.engine, 12) + after + " in the MJCF";
+    causes.push_back(Observe(text, {kUnknownFault, "", one.model, 0.0, unit, ""}, -kNever));
+  }
+  return causes;
+}
+
 /// Puts a wrong model before everything else.
 bool AttributeModel(const ConstantChecks& constants, std::span<const CheckRecord> model,
                     std::span<const CheckRecord> steps, AttributionResult* result, Causes* causes) {
   if (!constants.findings.empty()) {
-    const ConstantFinding& finding = constants.findings.front();
-    result->evidence = finding.check + ": " + finding.where + ": " + FormatNumber(finding.model) +
-                       " in the model, " + FormatNumber(finding.engine) + " in the MJCF";
-    const Fault what{NameOf(Cause::kModel),
-                     "",
-                     finding.model,
-                     0.0,
-                     "",
-                     "(" + FormatNumber(finding.engine) + " in the MJCF)"};
-    causes->insert(causes->begin(), Observe(finding.check + ": " + finding.where, what, -kNever));
+    const Causes facts = ListConstants(constants.findings);
+    result->evidence = facts.front().Describe();
+    causes->insert(causes->begin(), facts.begin(), facts.end());
   } else {
     const CheckRecord* first = nullptr;
     for (const CheckRecord& check : model)

@@ -27,10 +27,37 @@ std::string DescribeNoise(const RecordingJudgement& judgement, const RobotModel&
                      joint.type == JointType::kRevolute ? "N m" : "N", share);
 }
 
+/// Lists the causes, the nearest ones of what nothing explains, and how well both predict what was held out.
+void AddCauses(const RecordingJudgement& judgement, Answer* answer) {
+  std::string nearest;
+  for (const Explanation& one : judgement.causes) {
+    if (one.outcome != CauseOutcome::kNotExplained || one.faults.empty())
+      answer->causes.push_back(one.Describe());
+    else
+      nearest += fmt::format("{}{} ({:.2g} %)", nearest.empty() ? "not explained; nearest: " : ", ",
+                             one.faults.front().Describe(), 100.0 * one.fraction);
+  }
+  if (!nearest.empty()) answer->remarks.push_back(nearest);
+  if (judgement.causes.empty()) return;
+  answer->remarks.push_back(
+      fmt::format("the causes explain {:.4g} % of what the model does not; {:.3g} times the noise remains",
+                  100.0 * judgement.explained, judgement.left));
+  // A short recording is not divided: nothing is held out.
+  const auto describe = [](const HeldPrediction& one) {
+    return fmt::format("{} number{} {:.3g} times the noise", one.numbers,
+                       one.numbers == 1 ? " leaves" : "s leave", one.held_left);
+  };
+  if (judgement.by_all.held_left > 0.0)
+    answer->remarks.push_back(
+        fmt::format("held-out quarter: the causes' {}; a least-squares fit of every body, friction, offset "
+                    "and armature: {}",
+                    describe(judgement.by_causes), describe(judgement.by_all)));
+}
+
 }  // namespace
 
-JudgementVerdict MakeVerdict(const RecordingJudgement& judgement, const RobotModel& robot,
-                             const std::string& recording) {
+Answer MakeAnswer(const RecordingJudgement& judgement, const RobotModel& robot,
+                  const std::string& recording) {
   const std::string& model = robot.name();
   const auto name_of = [&](int joint) { return robot.joint(joint).name; };
   std::string not_judged;
@@ -45,36 +72,39 @@ JudgementVerdict MakeVerdict(const RecordingJudgement& judgement, const RobotMod
   });
   const size_t count = judgement.CountExplaining();
   const std::string causes_do = fmt::format("{} cause{}", count, count == 1 ? " does" : "s do");
-  JudgementVerdict verdict;
+  Answer answer{.tone = judgement.Agrees() ? Answer::Tone::kGood : Answer::Tone::kBad};
+  const auto say = [&](const char* word, std::string sentence) {
+    answer.word = word, answer.sentence = std::move(sentence);
+  };
   if (judgement.Agrees()) {
-    verdict = {"explained", fmt::format("{} explains {}: the rest is noise{}", model, recording,
-                                        DescribeNoise(judgement, robot))};
+    say("EXPLAINED", fmt::format("{} explains {}: the rest is noise{}", model, recording,
+                                 DescribeNoise(judgement, robot)));
   } else if (judgement.causes.empty() && judgement.IsWhole() && judgement.IsHidden()) {
-    verdict = {"partly explained", fmt::format("what {} leaves of {} is noise, beside which no error of the "
-                                               "model would show",
-                                               model, recording)};
+    say("PARTLY EXPLAINED", fmt::format("what {} leaves of {} is noise, beside which no error of the "
+                                        "model would show",
+                                        model, recording));
   } else if (judgement.causes.empty() && judgement.IsWhole()) {
     std::vector<std::string> judged;
     for (const JointJudgement& one : judgement.balances)
       if (one.recording == 0) judged.push_back(name_of(one.joint));
-    verdict = {"partly explained",
-               fmt::format("{} explains {} at {}: the rest is noise", model, recording, JoinNames(judged))};
+    say("PARTLY EXPLAINED",
+        fmt::format("{} explains {} at {}: the rest is noise", model, recording, JoinNames(judged)));
   } else if (are_velocities_alone && judgement.IsWhole()) {
-    verdict = {"differs", fmt::format("{} explains the torques of {}; its velocities are not the positions' "
-                                      "derivatives and are not used",
-                                      model, recording)};
+    say("DIFFERS", fmt::format("{} explains the torques of {}; its velocities are not the positions' "
+                               "derivatives and are not used",
+                               model, recording));
   } else if (count == 0) {
-    verdict = {"not explained",
-               fmt::format("{} does not explain {}, and no cause that is known does", model, recording)};
+    say("NOT EXPLAINED",
+        fmt::format("{} does not explain {}, and no cause that is known does", model, recording));
   } else {
-    verdict = {"differs",
-               fmt::format("{} does not explain {}; {}{}", model, recording, causes_do,
-                           judgement.IsWhole() ? ""
-                                               : fmt::format(" by {:.3g} %, and more than noise is left",
-                                                             100.0 * judgement.explained))};
+    say("DIFFERS", fmt::format("{} does not explain {}; {}{}", model, recording, causes_do,
+                               judgement.IsWhole() ? ""
+                                                   : fmt::format(" by {:.3g} %, and more than noise is left",
+                                                                 100.0 * judgement.explained)));
   }
-  verdict.sentence += not_judged + ".";
-  return verdict;
+  answer.sentence += not_judged + ".";
+  AddCauses(judgement, &answer);
+  return answer;
 }
 
 }  // namespace dexcheck

@@ -4,17 +4,14 @@
 
 #include <string>
 
+#include "harness/base/answer.h"
 #include "harness/recordings/judge_recordings.h"
 
 namespace dexcheck {
 
-struct JudgementVerdict {
-  std::string word;      ///< "explained", "partly explained", "not explained" or "differs".
-  std::string sentence;  ///< Ends with the joints that are not judged, and why.
-};
-
+/// Returns EXPLAINED, PARTLY EXPLAINED, NOT EXPLAINED or DIFFERS, with the joints that are not judged, and
+/// the causes.
 /// @param recording its name.
-JudgementVerdict MakeVerdict(const RecordingJudgement& judgement, const RobotModel& model,
-                             const std::string& recording);
+Answer MakeAnswer(const RecordingJudgement& judgement, const RobotModel& robot, const std::string& recording);
 
 }  // namespace dexcheck

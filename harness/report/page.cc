@@ -19,6 +19,7 @@
 #include "harness/checks/check_table.h"
 #include "harness/checks/failure_cause.h"
 #include "harness/report/page_frame.h"
+#include "harness/run/run_answer.h"
 #include "renders/renderer.h"
 #include "renders/video.h"
 #include "renders/video_writer.h"
@@ -64,30 +65,12 @@ using Json = nlohmann::ordered_json;
 
 constexpr std::uintmax_t kLargestEmbeddedVideo = 20'000'000;  // bytes
 
-/// The verdict in the words of the page.
-struct Headline {
-  const char* tone;  ///< CSS class.
-  std::string word;
-  std::string sentence;
-};
-
-Headline FindHeadline(const RunData& run) {
-  if (run.is_cut_off()) {
-    return {
-        "open", "NO VERDICT",
-        fmt::format("The run was cut off after {:.3f} s; what was recorded until then is below.", run.end())};
-  }
-  const std::string verdict = run.FindSummaryText("/verdict");
-  if (verdict == "failed")
-    return {"fail", "FAILED", "The run could not be completed: " + run.FindSummaryText("/failure")};
-  const auto say = [](const char* tone, const char* word, std::string sentence) {
-    sentence.front() = static_cast<char>(std::toupper(sentence.front()));
-    return Headline{tone, word, sentence + "."};
-  };
-  if (verdict == "disagreement")
-    return say("fail", "DISAGREEMENT", DescribeCause(run.FindSummaryText("/attribution/cause")));
-  if (run.checks().empty()) return {"open", "NOT CHECKED", "The run completed; nothing was checked."};
-  return say("pass", "PASS", DescribeWhatHolds(run.checks()));
+/// The verdict; none of a run that was cut off.
+Answer FindAnswer(const RunData& run) {
+  if (!run.is_cut_off()) return MakeRunAnswer(run.summary(), run.checks());
+  return {
+      Answer::Tone::kOpen, "NO VERDICT",
+      fmt::format("the run was cut off after {:.3f} s; what was recorded until then is below.", run.end())};
 }
 
 /// A category with its checks, as summaries have them; the page's script shows the numbers.
@@ -116,12 +99,13 @@ class Page {
   Page(const RunData& run, const PageContent& content) : run_(run), content_(content) {}
 
   std::string Make() {
-    const Headline headline = FindHeadline(run_);
+    Answer answer = FindAnswer(run_);
+    answer.sentence.front() = static_cast<char>(std::toupper(answer.sentence.front()));
     Json summary = run_.summary();
     summary.erase("checks");
     Json json = {
         {"scenario", Text("scenario")},
-        {"verdict", {{"tone", headline.tone}, {"word", headline.word}, {"sentence", headline.sentence}}},
+        {"verdict", {{"tone", NameOf(answer.tone)}, {"word", answer.word}, {"sentence", answer.sentence}}},
         {"end", run_.end()},
         {"steps", run_.time().size()},
         {"summary", std::move(summary)},
@@ -139,7 +123,7 @@ class Page {
     AddFile("robot/" + Text("robot"), "Parameters of the model: " + Text("robot"), false, &json["files"]);
     AddFile("mjcf/" + Text("mjcf"), "MJCF: " + Text("mjcf"), false, &json["files"]);
     const PlotGroup plots = {"", content_.figures, run_.time()};
-    return AssemblePlotPage(fmt::format("{}: {}", headline.word, Text("scenario")), kRunJs,
+    return AssemblePlotPage(fmt::format("{}: {}", answer.word, Text("scenario")), kRunJs,
                             EmbedJson("run-page", json) + media_, {&plots, 1},
                             content_.scene.replay ? &*content_.scene.replay : nullptr);
   }

@@ -303,21 +303,25 @@ nlohmann::ordered_json ToJson(const RunComparison& comparison, const std::vector
   return json;
 }
 
-std::string DescribeComparison(const RunComparison& comparison) {
+Answer MakeAnswer(const RunComparison& comparison) {
   const double tolerance = comparison.tolerance;
   const size_t count = comparison.signals.size();
-  if (count == 0) return "NOT COMPARED: no signal but time and checks is in all runs.";
+  if (count == 0)
+    return {Answer::Tone::kOpen, "NOT COMPARED", "no signal but time and checks is in all runs."};
   if (comparison.IsSame()) {
-    return tolerance == 0.0
-               ? fmt::format("SAME: {} signals are equal bit for bit.", count)
-               : fmt::format("SAME: {} signals differ by at most {:g} of their size.", count, tolerance);
+    return {Answer::Tone::kGood, "SAME",
+            tolerance == 0.0
+                ? fmt::format("{} signals are equal bit for bit.", count)
+                : fmt::format("{} signals differ by at most {:g} of their size.", count, tolerance)};
   }
+  Answer answer{Answer::Tone::kBad, "DIFFERENT", "the signals agree; verdict or duration differs."};
   const SignalDifference* const first = comparison.FindFirst();
-  if (first == nullptr) return "DIFFERENT: verdict or duration.";
+  if (first == nullptr) return answer;
   const auto differing = std::ranges::count_if(comparison.signals,
                                                [](const SignalDifference& signal) { return signal.differs; });
-  return fmt::format("DIFFERENT: {} of {} signals, first {} at {:.3f} s.", differing, count,
-                     first->NameColumn(), first->first_time);
+  answer.sentence = fmt::format("{} of {} signals, first {} at {:.3f} s.", differing, count,
+                                first->NameColumn(), first->first_time);
+  return answer;
 }
 
 }  // namespace dexcheck

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "harness/base/answer.h"
 #include "harness/report/run_data.h"
 
 namespace dexcheck {
@@ -78,8 +79,8 @@ RunComparison CompareRuns(const std::vector<const RunData*>& runs, const RunComp
 /// Values of a signal's column at the times of another run, by lines between its rows; not-a-number outside.
 VectorXd Resample(const VectorXd& time, const Eigen::Ref<const VectorXd>& values, const VectorXd& at);
 
-/// "SAME ...", or "DIFFERENT ..." with the signal that differs first: one line.
-std::string DescribeComparison(const RunComparison& comparison);
+/// Returns SAME, or DIFFERENT with the signal that differs first.
+Answer MakeAnswer(const RunComparison& comparison);
 
 /// The JSON of `compare --json`, which its page shows. @param names of the runs, such as their folders.
 nlohmann::ordered_json ToJson(const RunComparison& comparison, const std::vector<std::string>& names);

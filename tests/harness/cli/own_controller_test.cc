@@ -128,8 +128,8 @@ TEST_F(OwnController, AnUnknownLawIsNotChecked) {
   const ProgramResult result = RunWith(PAPER_LAW_LIBRARY);
   EXPECT_EQ(result.exit_code, 0) << result.err;
   EXPECT_THAT(result.out,
-              HasSubstr("PASS: model, motors and sensors, inverse and forward dynamics, assumptions "
-                        "hold at every step; not judged: law."));
+              HasSubstr("PASS: model, motors and sensors, inverse and forward dynamics, assumptions hold\n"
+                        "  at every step; not judged: law."));
   const Json checks = ReadChecks();
   for (const char* check : {"law_torque", "law_demand", "grasp_null_space", "grasp_cone", "grasp_optimality",
                             "closed_loop_spectral_radius", "error_dynamics"})

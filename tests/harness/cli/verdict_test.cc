@@ -97,7 +97,7 @@ TEST_F(Verdict, ADeclaredMismatchIsTheCauseOfAMissedExpectation) {
 TEST_F(Verdict, ARigidPlantIsNoEvidenceOfItsOwnEquations) {
   const ProgramResult run = Expect(0, "run paper-rigid --no-report --set duration=0.02 --out run");
   EXPECT_THAT(run.out, HasSubstr("same source"));
-  EXPECT_THAT(run.out, HasSubstr("not judged: inverse dynamics (model and plant are one file)"));
+  EXPECT_THAT(run.out, HasSubstr("not judged: inverse dynamics\n  (model and plant are one file)"));
   EXPECT_EQ(ReadJson("run/summary.json")["checks"]["contact_force"]["same_source"], true);
 }
 

@@ -116,7 +116,7 @@ TEST(Attribute, BlamesConstantsBeforeAllElse) {
                                        .Fail("cone_use", 0.0)
                                        .Explain();
   EXPECT_EQ(result.cause, Cause::kModel);
-  EXPECT_EQ(result.evidence, "link_mass: link r_forearm: 1.5 in the model, 1.25 in the MJCF");
+  EXPECT_EQ(result.evidence, "mass of link r_forearm: 1.5 kg in the model, 1.25 kg in the MJCF");
   EXPECT_EQ(FindCause(result, "M_bar"), "model");
   EXPECT_EQ(FindCause(result, "cone_use"), "model");
   EXPECT_EQ(result.attributions.size(), 2U);

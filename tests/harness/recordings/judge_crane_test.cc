@@ -95,7 +95,7 @@ TEST(JudgeCrane, TheVerdictSaysHowLargeAnErrorNoiseHides) {
   const RobotModel model(Crane().spec);
   const auto judge = [&](double noise) { return JudgeCrane(Record(Crane(), /*stands=*/false, 0.0, noise)); };
   const auto tell = [&](const RecordingJudgement& judgement) {
-    return MakeVerdict(judgement, model, "recording.csv");
+    return MakeAnswer(judgement, model, "recording.csv");
   };
   const RecordingJudgement quiet = judge(0.01), loud = judge(1000.0);
   for (const JointJudgement& one : quiet.balances) {
@@ -105,7 +105,7 @@ TEST(JudgeCrane, TheVerdictSaysHowLargeAnErrorNoiseHides) {
   EXPECT_THAT(tell(quiet).sentence, HasSubstr("% of its torque) would not show"));
   // Beside a noise of 1 kN m nothing can be seen at any joint.
   EXPECT_TRUE(loud.IsWhole() && loud.IsHidden() && !loud.Agrees()) << Tell(loud);
-  EXPECT_EQ(tell(loud).word, "partly explained");
+  EXPECT_EQ(tell(loud).word, "PARTLY EXPLAINED");
 }
 
 TEST(JudgeCrane, DryFrictionThatTurnsSlowlyIsOneCause) {
@@ -122,8 +122,8 @@ TEST(JudgeCrane, AJointThatMovesAndIsNotJudgedIsInTheVerdict) {
   const RecordingJudgement judgement = JudgeCrane(table);
   EXPECT_TRUE(judgement.causes.empty()) << Tell(judgement);
   EXPECT_FALSE(judgement.Agrees());
-  const JudgementVerdict verdict = MakeVerdict(judgement, RobotModel(Crane().spec), "recording.csv");
-  EXPECT_EQ(verdict.word, "partly explained");
+  const Answer verdict = MakeAnswer(judgement, RobotModel(Crane().spec), "recording.csv");
+  EXPECT_EQ(verdict.word, "PARTLY EXPLAINED");
   EXPECT_THAT(verdict.sentence, HasSubstr("not judged: fold (no torque of it is recorded"));
   // One that rests all the time is no reason for doubt.
   RecordedTable standing = Record(Crane(), /*stands=*/true);
