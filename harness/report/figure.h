@@ -43,6 +43,7 @@ struct Figure {
   std::optional<double> bound = {};  ///< A dashed line at this value.
   std::optional<double> band = {};   ///< What lies this far from 0 is shaded; on pages only.
   bool below = false;                ///< Stands below the figure before it, of the same thing; on pages only.
+  bool answers = false;              ///< Stands first, and the figures that do not are folded; on pages only.
   std::vector<Curve> curves = {};
   std::string note = {};  ///< What the reader has to know; may be empty.
   bool printed = false;   ///< Drawn as a picture for print, too.

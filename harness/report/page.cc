@@ -29,8 +29,8 @@ namespace dexcheck {
 
 namespace {
 
-/// @param holds whether an object, as in the paper's figures.
-std::vector<Picture> DrawConfigurations(const RecordedFrames& run, bool holds,
+/// @param holds whether an object. @param is_papers whether they are the paper's figures.
+std::vector<Picture> DrawConfigurations(const RecordedFrames& run, bool holds, bool is_papers,
                                         const std::filesystem::path& folder) {
   VideoOptions options;
   options.width = 960;
@@ -43,8 +43,8 @@ std::vector<Picture> DrawConfigurations(const RecordedFrames& run, bool holds,
   VideoPainter painter({run.model.get(), &run.frames}, options);
   const std::string who = holds ? "Robot and object" : "Robot";
   const std::array<Picture, 2> pictures = {
-      {{folder / "fig11a.png", holds ? "11 (a)" : "", who + " at the beginning"},
-       {folder / "fig11b.png", holds ? "11 (b)" : "", who + " at the end"}}};
+      {{folder / "fig11a.png", is_papers ? "11 (a)" : "", who + " at the beginning"},
+       {folder / "fig11b.png", is_papers ? "11 (b)" : "", who + " at the end"}}};
   WritePng(pictures[0].file, painter.Paint(0.0));
   WritePng(pictures[1].file, painter.Paint(run.frames.duration()));
   return {pictures.begin(), pictures.end()};
@@ -55,7 +55,7 @@ std::vector<Picture> DrawConfigurations(const RecordedFrames& run, bool holds,
 RunScene MakeRunScene(const RunData& run, const std::filesystem::path& folder) {
   if (run.Find("engine/qpos") == nullptr) return {};
   const RecordedFrames frames = ReadRecordedFrames(run.log());
-  return {DrawConfigurations(frames, !run.moves_joints(), folder),
+  return {DrawConfigurations(frames, !run.moves_joints(), run.is_papers(), folder),
           MakeReplayData(*frames.model, frames.frames)};
 }
 
@@ -103,17 +103,21 @@ class Page {
     answer.sentence.front() = static_cast<char>(std::toupper(answer.sentence.front()));
     Json summary = run_.summary();
     summary.erase("checks");
-    Json json = {
-        {"scenario", Text("scenario")},
-        {"verdict", {{"tone", NameOf(answer.tone)}, {"word", answer.word}, {"sentence", answer.sentence}}},
-        {"end", run_.end()},
-        {"steps", run_.time().size()},
-        {"summary", std::move(summary)},
-        {"categories", Json::array()},
-        {"video", MakeVideo()},
-        {"pictures", MakePictures()},
-        {"texts", Json::object()},
-        {"files", Json::array()}};
+    Json json = {{"scenario", Text("scenario")},
+                 {"verdict",
+                  {{"tone", NameOf(answer.tone)},
+                   {"word", answer.word},
+                   {"sentence", answer.sentence},
+                   {"causes", answer.causes},
+                   {"remarks", answer.remarks}}},
+                 {"end", run_.end()},
+                 {"steps", run_.time().size()},
+                 {"summary", std::move(summary)},
+                 {"categories", Json::array()},
+                 {"video", MakeVideo()},
+                 {"pictures", MakePictures()},
+                 {"texts", Json::object()},
+                 {"files", Json::array()}};
     for (const char* name :
          {"command", "overrides", "seed", "robot", "mjcf", "dexcheck_version", "mujoco_version", "machine"})
       json["texts"][name] = Text(name);

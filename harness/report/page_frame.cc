@@ -109,17 +109,11 @@ std::string EmbedPlots(std::span<const PlotGroup> groups) {
     for (const double t : thinning.times()) one["times"].push_back(RoundTime(t));
     one["plots"] = nlohmann::ordered_json::array();
     for (const Figure& figure : group.figures) {
-      nlohmann::ordered_json plot = {{"name", figure.name},
-                                     {"panel", figure.panel},
-                                     {"title", figure.title},
-                                     {"note", figure.note},
-                                     {"label", figure.label},
-                                     {"right", figure.right_label},
-                                     {"log", figure.log},
-                                     {"bound", nullptr},
-                                     {"band", nullptr},
-                                     {"below", figure.below},
-                                     {"range", CalcAxisRange(figure, false)}};
+      nlohmann::ordered_json plot = {
+          {"name", figure.name},   {"panel", figure.panel},     {"title", figure.title},
+          {"note", figure.note},   {"label", figure.label},     {"right", figure.right_label},
+          {"log", figure.log},     {"bound", nullptr},          {"band", nullptr},
+          {"below", figure.below}, {"answers", figure.answers}, {"range", CalcAxisRange(figure, false)}};
       if (!figure.right_label.empty()) plot["right_range"] = CalcAxisRange(figure, true);
       if (figure.bound) plot["bound"] = *figure.bound;
       if (figure.band) plot["band"] = *figure.band;

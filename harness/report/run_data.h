@@ -44,6 +44,8 @@ class RunData {
   [[nodiscard]] double FindSummaryNumber(const char* pointer) const;
   /// Failed ones first, then by fraction of the bound, largest first.
   [[nodiscard]] const std::vector<CheckRecord>& checks() const { return checks_; }
+  /// Returns whether the run is one of the paper's, whose figures have the paper's numbers.
+  [[nodiscard]] bool is_papers() const { return FindText("scenario").starts_with("paper"); }
 
  private:
   void ReadChecksOfSummary();

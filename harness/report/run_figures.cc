@@ -43,8 +43,13 @@ class MotionFigures {
     AddTorques();
     AddForces();
     AddErrors();
+    AddTorqueUse();
     AddFrictionUse();
     AddContactDrift();
+    if (!run_.is_papers()) {
+      for (Figure& figure : figures_) figure.panel.clear();
+    }
+    std::stable_partition(figures_.begin(), figures_.end(), [](const Figure& one) { return one.answers; });
     return std::move(figures_);
   }
 
@@ -110,6 +115,7 @@ class MotionFigures {
                   .title = "Errors of the joints",
                   .label = "error (rad, m)",
                   .log = true,
+                  .answers = true,
                   .printed = true};
     for (int k = 0; k < count; ++k) {
       const std::string joint = NameColumn("joints/q_d", k);
@@ -263,6 +269,7 @@ class MotionFigures {
          .title = "Error of the object against its desired motion",
          .label = "error (m, rad)",
          .log = true,
+         .answers = true,
          .curves = {{.label = "position (m)", .values = Read("object/position_error").col(0)},
                     {.label = "orientation (rad)",
                      .values = Read("object/orientation_error").col(0),
@@ -284,12 +291,25 @@ class MotionFigures {
     }
   }
 
+  void AddTorqueUse() {
+    constexpr const char* kEffort = "check/actuator_effort";
+    if (!Has(kEffort)) return;
+    Add({.name = "torque_use",
+         .title = "Largest torque as a fraction of its motor's limit",
+         .label = "|τ| / limit",
+         .least_span = 0.1,
+         .bound = 1.0,
+         .answers = true,
+         .curves = {{.label = "largest of all motors", .values = Read(kEffort).col(0)}}});
+  }
+
   void AddFrictionUse() {
     Figure figure{.name = "friction_use",
                   .title = "Tangential force as a fraction of what friction can hold",
                   .label = "|f_t| / (μ f_n)",
                   .least_span = 0.1,
-                  .bound = 1.0};
+                  .bound = 1.0,
+                  .answers = true};
     AddColumns("contact/cone_use", "", 0, 0, false, &figure);
     AddColumns("wheel/cone_use", "", static_cast<int>(figure.curves.size()), 0, false, &figure);
     Add(figure);

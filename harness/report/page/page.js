@@ -280,12 +280,15 @@
     if (plot.note) Add(box, Add(Make('p', '', {className: 'soft'}), Make('small', plot.note)));
     return box;
   });
+  const Grid = (group, answers) => Add(Make('div', '', {className: 'grid'}),
+    ...boxes.filter((box, i) => plots[i].times === group.times && !plots[i].below && plots[i].answers === answers));
   const whole = Make('button', 'Show the whole run', {type: 'button', onclick: () => showAll()});
   Add(document.getElementById('plots'), Make('h2', 'Plots'), Add(Make('div', '', {className: 'tools'}), whole, Make('span',
     'Drag to zoom (all plots follow), Shift-drag to move, double-click for the whole run; on a touch screen use two fingers. Names ' +
     'switch curves on and off.', {className: 'soft'})), ...groups.flatMap(group => [
     ...(group.title ? [Make('h3', group.title, {className: 'group'})] : []),
-    Add(Make('div', '', {className: 'grid'}), ...boxes.filter((box, i) => plots[i].times === group.times && !plots[i].below))]));
+    ...(plots.some(plot => plot.answers) ? [Grid(group, true), Add(Make('details', '', {className: 'more'}), Make('summary', 'All other plots'),
+      Grid(group, false))] : [Grid(group, false)])]));
   const watcher = new IntersectionObserver(entries => {
     for (const entry of entries) {
       if (!entry.isIntersecting || entry.target.chart) continue;
@@ -295,6 +298,7 @@
   }, {rootMargin: '400px'});
   for (const box of boxes) watcher.observe(box);
   addEventListener('beforeprint', () => {
+    for (const fold of document.querySelectorAll('.more')) fold.open = true;
     for (const box of boxes) if (!box.chart) draw(box, plots[Number(box.dataset.plot)]);
   });
   for (const button of document.querySelectorAll('[data-time]')) {

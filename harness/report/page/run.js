@@ -23,9 +23,10 @@
   };
 
   Add(document.querySelector('h1'), Make('b', run.scenario), summary.description ? ' – ' + summary.description : '');
-  const {verdict} = run, {cause, evidence, checks: causes_of_checks} = summary.attribution ?? {};
+  const {verdict} = run, {checks: causes_of_checks} = summary.attribution ?? {};
   const box = AddVerdict(verdict.tone, verdict.word, Make('p', verdict.sentence));
-  if (cause && cause !== 'none') Add(box, Add(Make('p', 'Cause: '), Make('b', cause), `. Evidence: ${evidence}.`));
+  if (verdict.causes.length) Add(box, Add(Make('ol'), ...verdict.causes.map(cause => Make('li', cause))));
+  Add(box, ...verdict.remarks.map(remark => Make('p', remark[0].toUpperCase() + remark.slice(1) + '.')));
   const first = checks.filter(check => Fails(check) && 'failed_at_s' in check).sort((a, b) => a.failed_at_s - b.failed_at_s)[0];
   if (first) Add(box, Add(Make('p'), TimeButton(`See it: ${first.name} fails from`, first.failed_at_s)));
   if (summary.interrupted) Add(box, Make('p', `The run was stopped by hand after ${run.end.toFixed(3)} s.`));
