@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Checks the documents: documents_test.sh DEXCHECK. Relative links of all Markdown files lead to files and headings that
-# exist, README.md is short, and the commands that it lists are those that the program has.
+# exist, README.md is short, the commands that it lists are those that the program has, and sentences are short.
 set -euo pipefail
 
 dexcheck=$1
@@ -43,6 +43,14 @@ list_broken_links() {
 # Lines that git leaves where it could not merge.
 list_conflicts() { grep -nE '^(<{7}|={7}|>{7}|\|{7})( |$)' /dev/null "$@" || true; }
 
+# The length in words of each sentence outside code, tables and headings; items of a list are sentences.
+list_sentences() {
+  awk '/^```/ { code = !code; print "\n"; next } code || /^    / { next } /^[|#]/ || NF == 0 { print "\n"; next }
+    { sub(/^ *([-*]|[0-9]+\.) /, "\n"); gsub(/\]\([^)]*\)/, "]"); gsub(/[.!?:] /, "&\n"); print }' "$@" |
+    awk 'NF == 0 { if (words > 2) print words; words = 0; next } { words += NF } /[.!?:][)"*]* *$/ { if (words > 2) print words
+      words = 0 } END { if (words > 2) print words }'
+}
+
 # What must be found: the test can fail.
 scratch=$(mktemp -d)
 trap 'rm -r "$scratch"' EXIT
@@ -50,6 +58,9 @@ printf 'a\n<<''<<<<< HEAD\nb\n===''====\nc\n>>''>>>>> merge\n' >"$scratch/confli
 [[ $(list_conflicts "$scratch/conflict.md" | wc -l) -eq 3 ]] || fail "conflicts are not found"
 printf '# Here\n[a](b.md) [c](#there) [d](#here) [e](https://nowhere.example)\n' >"$scratch/bad.md"
 [[ $(list_broken_links "$scratch/bad.md" | wc -l) -eq 2 ]] || fail "broken links are not found"
+
+printf 'A sentence of %s\nwords. And three more.\n' "$(seq -s ' ' 33)" >"$scratch/long.md"
+[[ $(list_sentences "$scratch/long.md" | tr '\n' ' ') == '37 3 ' ]] || fail "lengths of sentences are wrong"
 
 mapfile -t documents < <(find "$root" -name '*.md' -not -path "$root/build/*" -not -path "$root/runs/*" \
   -not -path "$root/out/*" -not -path "$root/.cache/*" | sort)
@@ -65,6 +76,13 @@ done
 conflicts=$(list_conflicts "${documents[@]}")
 [[ -z $conflicts ]] || fail "$conflicts"
 
+read -r mean longest < <(list_sentences "${documents[@]}" |
+  awk '{ sum += $1; if ($1 > most) most = $1 } END { printf "%.1f %d\n", sum / NR, most }')
+((longest <= 35)) || fail "the longest sentence has $longest words, more than 35"
+awk -v mean="$mean" 'BEGIN { exit !(mean > 5 && mean <= 16) }' || fail "a sentence has $mean words on average, more than 16"
+words=$(cat "${documents[@]}" | wc -w)
+((words <= 25000)) || fail "the documents have $words words, more than 25,000"
+
 lines=$(wc -l <"$root/README.md")
 ((lines <= longest_readme)) || fail "README.md has $lines lines, more than $longest_readme"
 
@@ -75,5 +93,5 @@ sed -nE 's/^\| `dexcheck ([a-z-]+)` .*/\1/p' "$root/README.md" | sort >"$scratch
 diff "$scratch/listed" "$scratch/known" >"$scratch/difference" ||
   fail "README.md (<) and dexcheck --help (>) have other commands:"$'\n'"$(cat "$scratch/difference")"
 
-[[ $status -ne 0 ]] || echo "${#documents[@]} documents, $links links, $lines lines of README.md"
+[[ $status -ne 0 ]] || echo "${#documents[@]} documents, $links links, $words words, $mean a sentence, $lines lines of README.md"
 exit $status

@@ -29,7 +29,13 @@ elif [[ $# -eq 0 ]]; then
 fi
 
 # Lists comments that begin with a word that is no subject; fails if there are any.
-check_comments() { ! grep -nE '^[[:space:]]*//[/<]* *(Of|What|As|Likewise)\b' /dev/null "$@"; }
+check_comments() {
+  ! grep -nE '^[[:space:]]*//[/<]* *(Of|What|As|Likewise)\b' /dev/null "$@"
+}
+# Words that readers had to decode; old logs have signals of such names.
+check_words() {
+  ! grep -nwE '[Tt]old|[Tt]ells?|alike|likewise|what is left|leaves? open|not meant' /dev/null "$@" | grep -vF '"told'
+}
 
 echo "clang-format"
 git ls-files '*.cc' '*.h' | xargs clang-format-14 --dry-run --Werror || failed=1
@@ -46,6 +52,7 @@ git ls-files 'harness/*.js' | NODE_PATH=${NODE_PATH:-/usr/share/nodejs} xargs es
 
 echo "comments"
 check_comments "${commented[@]}" || failed=1
+check_words $(git ls-files 'controller/*.cc' 'controller/*.h' 'harness/*.cc' 'harness/*.h' 'renders/*.cc' 'renders/*.h') || failed=1
 
 [[ ${#sources[@]} -gt 0 ]] || exit "$failed"
 
