@@ -1,16 +1,15 @@
 #include "harness/corrections/write_repaired.h"
 
 #include <fmt/format.h>
-#include <toml++/toml.h>
 
 #include <algorithm>
 #include <cmath>
 #include <optional>
 
 #include "controller/common/errors.h"
-#include "controller/common/text.h"
-#include "controller/common/toml_reader.h"
 #include "harness/corrections/corrections.h"
+#include "harness/corrections/repair_writer.h"
+#include "harness/corrections/table_repair.h"
 #include "harness/descriptions/urdf_file.h"
 #include "harness/engine/mjcf_file.h"
 #include "harness/engine/xml.h"
@@ -42,40 +41,6 @@ PrintedRobot RepairRobot(PrintedRobot robot, const PrintedRobot& reference, bool
   return robot;
 }
 
-/// Prints twelve digits, which hide the rounding of what was computed.
-/// @param size the largest number of its vector.
-std::string Format(double value, double size = 0.0) {
-  constexpr int kDigits = 12;
-  constexpr double kRounding = 1e-12;
-  return FormatNumber(std::abs(value) < kRounding * std::max(size, 1e-3) ? 0.0 : value, kDigits);
-}
-
-bool IsTurned(const PrintedOrigin& x, const PrintedOrigin& y) {
-  return x.r != y.r || x.form != y.form || x.sequence != y.sequence;
-}
-bool IsOther(const PrintedOrigin& x, const PrintedOrigin& y) { return x.t != y.t || IsTurned(x, y); }
-bool IsOther(const std::optional<PrintedInertial>& x, const std::optional<PrintedInertial>& y) {
-  if (!x || !y) return x.has_value() != y.has_value();
-  return x->mass.value != y->mass.value || x->I != y->I || IsOther(x->origin, y->origin);
-}
-
-/// The inertia along the link's axes: xx yy zz xy xz yz.
-Vector6d CalcInertia(const PrintedInertial& body) {
-  const Matrix3d R = body.origin.CalcRotation();
-  return ToEntries(R * ToTensor(body.I) * R.transpose());
-}
-
-/// The places where a format states numbers of a joint: an attribute of its element, or of a child as
-/// "limit/lower"; in a parameter file a key of an entry of "rows" or "joints". None where it has none.
-struct JointKeys {
-  const char* name;
-  const char* types[5];  ///< By JointKind.
-  const char* axis;
-  const char* anchor;
-  const char* scalars[kNumJointScalars];  ///< By JointScalar.
-  const char* between = " ";              ///< Numbers of a list,
-  const char* list = "{}";                ///< which stand in this.
-};
 constexpr JointKeys kUrdfKeys = {"name",
                                  {"fixed", "revolute", "prismatic", nullptr, nullptr},
                                  "axis/xyz",
@@ -88,88 +53,6 @@ constexpr JointKeys kMjcfKeys = {
     "axis",
     "pos",
     {"damping", "frictionloss", "armature", nullptr, nullptr, "stiffness", nullptr, nullptr}};
-constexpr JointKeys kTableKeys = {
-    nullptr,
-    {},
-    "rows/axis",
-    nullptr,
-    {"joints/damping", "joints/dry_friction", "joints/armature", nullptr, nullptr, nullptr, nullptr, nullptr},
-    ", ",
-    "[{}]"};
-
-/// Writes what differs of the links of a robot into a file of one format.
-class RepairWriter {
- public:
-  RepairWriter(const DescriptionFile& file, const JointKeys& keys, const PrintedRobot& before,
-               const PrintedRobot& after)
-      : before_(before), after_(after), file_(file.path().filename().string()), keys_(keys) {}
-
- protected:
-  ~RepairWriter() = default;
-  /// Sets what a path of JointKeys names of the joint that moves a link.
-  virtual void SetOfJoint(const PrintedLink& link, const std::string& path, const std::string& value) = 0;
-  virtual void WriteRange(const PrintedLink& link, double lower, double upper) = 0;
-  virtual void WriteMimic(const PrintedLink& link, const std::optional<PrintedMimic>& /*mimic*/) {
-    RefuseIf(true, link, "its coupling");
-  }
-  template <typename Vector>
-  [[nodiscard]] std::string JoinVector(const Vector& values) const {
-    std::string text;
-    const double size = values.cwiseAbs().maxCoeff();
-    for (const double value : values) text += (text.empty() ? "" : keys_.between) + Format(value, size);
-    return fmt::format(fmt::runtime(keys_.list), text);
-  }
-
-  [[noreturn]] void Refuse(const std::string& why) const {
-    throw InputError(file_ + ": cannot be repaired: " + why);
-  }
-  void RefuseIf(bool is_changed, const PrintedLink& link, const char* what) const {
-    if (is_changed) Refuse(fmt::format("joint {}: {} must be written by hand", link.joint.name, what));
-  }
-
-  /// All of a joint but its origin.
-  void WriteJoint(int i) {
-    const PrintedLink& given = before_.link(i);
-    const PrintedJoint& before = given.joint;
-    const PrintedJoint& after = after_.link(i).joint;
-    const auto set = [&](bool is_other, const char* path, const char* what, const auto& format) {
-      if (!is_other) return;
-      RefuseIf(path == nullptr, given, what);
-      SetOfJoint(given, path, format());
-    };
-    set(after.kind != before.kind, keys_.types[static_cast<size_t>(after.kind)] == nullptr ? nullptr : "type",
-        "its type", [&] { return std::string(keys_.types[static_cast<size_t>(after.kind)]); });
-    set(after.axis != before.axis, keys_.axis, "its axis", [&] { return JoinVector(after.axis); });
-    set(after.anchor != before.anchor, keys_.anchor, "a point of its axis",
-        [&] { return JoinVector(after.anchor); });
-    const auto find = [](const std::optional<std::array<PrintedScalar, 2>>& range) {
-      return range ? std::optional(std::pair((*range)[0].value, (*range)[1].value)) : std::nullopt;
-    };
-    if (const auto range = find(after.range); range != find(before.range)) {
-      RefuseIf(!range, given, "a range that is too much");
-      WriteRange(after_.link(i), range->first, range->second);
-    }
-    for (size_t k = 0; k < kNumJointScalars; ++k) {
-      const double was = before.scalars[k] ? before.scalars[k]->value : 0.0;
-      const double is = after.scalars[k] ? after.scalars[k]->value : 0.0;
-      set(was != is, keys_.scalars[k], NameSite(ToSite(static_cast<JointScalar>(k))),
-          [&] { return Format(is); });
-    }
-    const auto state = [](const std::optional<PrintedMimic>& m) {
-      return m ? std::optional(std::tuple(m->leader, m->multiplier.value, m->offset.value)) : std::nullopt;
-    };
-    if (state(before.mimic) != state(after.mimic)) WriteMimic(given, after.mimic);
-    set(after.name != before.name, keys_.name, "its name", [&] { return after.name; });
-  }
-
-  const PrintedRobot& before_;
-  const PrintedRobot& after_;
-
- private:
-  std::string file_;
-  const JointKeys& keys_;
-};
-
 /// Sets an attribute of an element, or of the child that the path names, which is made where it is missing.
 void SetAttribute(XmlElement* element, std::string_view path, const std::string& text) {
   for (size_t slash = path.find('/'); slash != std::string_view::npos; slash = path.find('/')) {
@@ -331,149 +214,6 @@ class MjcfRepair final : private RepairWriter {
   XmlElement* element_ = nullptr;  // of the joint that is written
 };
 
-/// Assignments to keys of a parameter file.
-class TableRepair final : private RepairWriter {
- public:
-  TableRepair(const DescriptionFile& file, const PrintedRobot& before, const PrintedRobot& after)
-      : RepairWriter(file, kTableKeys, before, after),
-        source_(file.path().string()),
-        text_(file.text()),
-        root_(toml::parse(text_)) {}
-
-  std::string Write() {
-    for (int i = 1; i < before_.size(); ++i) {
-      const PrintedLink& before = before_.link(i);
-      const PrintedLink& after = after_.link(i);
-      if (IsOther(before.origin, after.origin)) {
-        before.is_frame ? WriteFrame(before, after.origin) : WriteRow(before, after.origin);
-      }
-      if (IsOther(before.inertial, after.inertial)) WriteBody(before, after);
-      WriteJoint(i);
-    }
-    if (before_.link(0).inertial && IsOther(before_.link(0).inertial, after_.link(0).inertial))
-      Refuse("the base's numbers must be written by hand");
-    return ApplyOverrides(text_, source_, assignments_);
-  }
-
- private:
-  /// A table of the file and the path that leads to it: "chain.0.rows.3".
-  struct Entry {
-    const toml::table* table;
-    std::string path;
-    bool states_convention;  ///< Of its chain's rows.
-  };
-
-  /// The row, or the entry below `key`, of a joint or link of that name.
-  [[nodiscard]] Entry Find(const std::string& key, const std::string& name) const {
-    const toml::array* const chains = root_["chain"].as_array();
-    for (size_t i = 0; chains != nullptr && i < chains->size(); ++i) {
-      const toml::table& chain = *chains->get(i)->as_table();
-      const std::string prefix = chain["prefix"].value_or(std::string());
-      if (!name.starts_with(prefix)) continue;
-      const std::string own = name.substr(prefix.size());
-      const std::string begin = fmt::format("chain.{}.{}.", i, key);
-      const bool states = chain.contains("convention");
-      if (const toml::array* const rows = chain[key].as_array()) {
-        for (size_t k = 0; k < rows->size(); ++k) {
-          const toml::table* const row = rows->get(k)->as_table();
-          if ((*row)["joint"].value_or(std::string()) == own) return {row, begin + std::to_string(k), states};
-        }
-      } else if (const toml::table* const entry = chain[key][own].as_table()) {
-        return {entry, begin + own, states};
-      }
-    }
-    Refuse(fmt::format("{} is not among the {} of its chain", name, key));
-  }
-
-  void Set(const Entry& entry, const char* key, const std::string& value) {
-    assignments_.push_back(entry.path + "." + key + "=" + value);
-  }
-  void Remove(const Entry& entry, const char* key) {
-    if (entry.table->contains(key)) assignments_.push_back(entry.path + "." + key + "-=");
-  }
-  void SetOfJoint(const PrintedLink& link, const std::string& path, const std::string& value) override {
-    const size_t slash = path.find('/');
-    Set(Find(path.substr(0, slash), link.joint.name), path.substr(slash + 1).c_str(), value);
-  }
-  void WriteRange(const PrintedLink& link, double lower, double upper) override {
-    const Entry entry = Find("joints", link.joint.name);
-    Remove(entry, "range_deg");
-    Set(entry, "range", JoinVector(Vector2d(lower, upper)));
-  }
-
-  void WriteRow(const PrintedLink& link, PrintedOrigin origin) {
-    const Entry row = Find("rows", link.joint.name);
-    if (link.origin.form == RotationForm::kMdh) FindRow(link.origin.X_before, &origin);
-    RefuseIf(origin.form != link.origin.form || row.states_convention, link, "its row");
-    if (origin.form == RotationForm::kMdh) {
-      Remove(row, "alpha_deg");
-      Remove(row, "q_deg");
-      Set(row, "alpha", Format(origin.r[0]));
-      Set(row, "q", Format(origin.r[1]));
-      Set(row, "a", Format(origin.t[0]));
-      Set(row, "d", Format(origin.t[2]));
-      return;
-    }
-    SetPose(row, link.origin, origin);
-  }
-
-  /// Writes an entry of the file's "frame", or of a chain's "frames".
-  void WriteFrame(const PrintedLink& frame, const PrintedOrigin& origin) {
-    const auto set = [&](const toml::array* entries, const std::string& begin, const std::string& prefix) {
-      for (size_t k = 0; entries != nullptr && k < entries->size(); ++k) {
-        const toml::table& entry = *entries->get(k)->as_table();
-        if (prefix + entry["name"].value_or(std::string()) != frame.name) continue;
-        SetPose({&entry, begin + std::to_string(k), false}, frame.origin, origin);
-        return true;
-      }
-      return false;
-    };
-    if (set(root_["frame"].as_array(), "frame.", "")) return;
-    const toml::array* const chains = root_["chain"].as_array();
-    for (size_t i = 0; chains != nullptr && i < chains->size(); ++i) {
-      const toml::table& chain = *chains->get(i)->as_table();
-      if (set(chain["frames"].as_array(), fmt::format("chain.{}.frames.", i),
-              chain["prefix"].value_or(std::string())))
-        return;
-    }
-    Refuse("frame " + frame.name + " must be written by hand");
-  }
-
-  void SetPose(const Entry& entry, const PrintedOrigin& before, const PrintedOrigin& origin) {
-    if (before.t != origin.t) Set(entry, "xyz", JoinVector(origin.t));
-    if (!IsTurned(before, origin)) return;
-    Remove(entry, "rpy_deg");
-    Set(entry, "rpy", JoinVector(Vector3d(origin.r.head<3>())));
-  }
-
-  /// Gives a pose the form of a row of modified parameters behind X_before, if it has one.
-  static void FindRow(const Pose& X_before, PrintedOrigin* origin) {
-    constexpr double kSame = 1e-9;
-    const Pose X = X_before.inverse() * origin->CalcPose();
-    const Matrix3d R = X.linear();  // Rot(x, alpha) Rot(z, q)
-    const double alpha = std::atan2(-R(1, 2), R(2, 2));
-    const double d = Vector3d(0.0, -std::sin(alpha), std::cos(alpha)).dot(X.translation());
-    PrintedOrigin row;
-    row.form = RotationForm::kMdh;
-    row.X_before = X_before;
-    row.r.head<2>() << alpha, std::atan2(-R(0, 1), R(0, 0));
-    row.t << X.translation().x(), 0.0, d;
-    if (row.CalcPose().isApprox(origin->CalcPose(), kSame)) *origin = row;
-  }
-
-  void WriteBody(const PrintedLink& before, const PrintedLink& after) {
-    const Entry entry = Find("links", before.name);
-    RefuseIf(!entry.table->contains("mass") || !after.inertial, before, "its link");
-    Set(entry, "mass", Format(after.inertial->mass.value));
-    Set(entry, "com", JoinVector(after.inertial->origin.t));
-    Set(entry, "inertia", JoinVector(CalcInertia(*after.inertial)));
-  }
-
-  std::string source_, text_;
-  toml::table root_;
-  std::vector<std::string> assignments_;
-};
-
 }  // namespace
 
 RepairedFile WriteRepaired(const DescriptionFile& file, const UrdfOptions& urdf, const PrintedRobot& printed,
@@ -486,7 +226,7 @@ RepairedFile WriteRepaired(const DescriptionFile& file, const UrdfOptions& urdf,
   if (!changes)
     throw InputError(file.path().filename().string() +
                      ": cannot be repaired: its causes must be corrected by hand");
-  repaired.text = file.format() == RobotFormat::kToml ? TableRepair(file, printed, after).Write()
+  repaired.text = file.format() == RobotFormat::kToml ? WriteTable(file, printed, after)
                                                       : WriteXml(file, urdf, printed, after, folder);
   return repaired;
 }
