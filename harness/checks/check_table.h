@@ -69,8 +69,6 @@ enum class Rank {
 /// Cause that the failure of a check points to.
 struct FailureMeaning {
   Cause cause = Cause::kNone;  ///< kNone: the failure follows from the cause of the run.
-  /// Order among checks that failed at one time: the smallest number is the run's cause.
-  int precedence = 0;
   Rank rank = Rank::kAssumption;
   /// Whether the failure has this cause whatever else happened in the run; otherwise it has the run's.
   bool is_own = false;

@@ -40,11 +40,11 @@ std::string Describe(const CheckRecord& check) {
          (check.part.empty() ? "" : ", " + check.part);
 }
 
-/// Returns whether an entry comes before another one: by rank, then by time, then by precedence.
+/// Returns whether an entry comes before another one: by rank, then by time, then by cause.
 bool ComesBefore(const Entry& a, const Entry& b) {
   if (a.meaning.rank != b.meaning.rank) return a.meaning.rank < b.meaning.rank;
   if (a.time != b.time) return a.time < b.time;
-  return a.meaning.precedence < b.meaning.precedence;
+  return a.meaning.cause < b.meaning.cause;
 }
 
 Explanation Observe(const std::string& place, const Fault& what, double from) {
@@ -69,9 +69,9 @@ Entry MakeFact(const CheckRecord& check, const FailureMeaning& meaning) {
 /// Returns the meaning of an explanation of that channel.
 FailureMeaning MeaningOf(CauseChannel channel) {
   static const FailureMeaning kMeanings[] = {
-      {Cause::kSensing, 0, Rank::kMeasurement},    {Cause::kActuator, 0, Rank::kActuator},
-      {Cause::kControlLaw, 0, Rank::kLaw},         {Cause::kContactGeometry, 0, Rank::kObjectBalance},
-      {Cause::kWheelGeometry, 0, Rank::kDecisive}, {Cause::kUnmodelledForce, 0, Rank::kDecisive}};
+      {Cause::kSensing, Rank::kMeasurement},    {Cause::kActuator, Rank::kActuator},
+      {Cause::kControlLaw, Rank::kLaw},         {Cause::kContactGeometry, Rank::kObjectBalance},
+      {Cause::kWheelGeometry, Rank::kDecisive}, {Cause::kUnmodelledForce, Rank::kDecisive}};
   return kMeanings[static_cast<size_t>(channel)];
 }
 
