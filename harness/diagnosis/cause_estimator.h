@@ -51,8 +51,8 @@ struct CauseTerm {
   size_t candidate = 0;
   VectorXd amplitude, error;  ///< p, with standard errors: infinite where nothing is known of it.
   double fraction = 0.0;      ///< Of |y|^2 that is left over without it.
-  /// Candidates that would do as well in its place with no more columns, and their amplitudes there: not
-  /// isolable from it.
+  /// Candidates that would do as well in its place with no more columns, and their amplitudes there: the
+  /// motion does not separate them.
   std::vector<std::pair<size_t, VectorXd>> same;
   size_t rival = SIZE_MAX;  ///< The next best in its place; SIZE_MAX for none.
   double log_odds = 0.0;    ///< Against the rival, natural logarithm.

@@ -95,7 +95,7 @@ std::string Explanation::Describe() const {
     for (size_t i = 0; i < std::min(faults.size(), kMostTold); ++i)
       text += (i == 0 ? "" : " or ") + faults[i].Describe();
     if (faults.size() > kMostTold) text += " or " + std::to_string(faults.size() - kMostTold) + " more";
-    if (faults.size() > 1) text += ": not isolable from each other on this motion";
+    if (faults.size() > 1) text += " (this motion does not separate them)";
   }
   // A fault that is always there has no begin.
   if (std::isfinite(from)) text += FormatInterval(*this);
@@ -103,7 +103,7 @@ std::string Explanation::Describe() const {
   constexpr double kMostDigits = 3.0;
   const double digits = log_odds / std::log(10.0);
   if (rival.empty() || digits > kMostDigits) return text;
-  return text + "; rival: " + rival + ", 1e" + std::to_string(std::lround(digits)) + " times less likely";
+  return text + "; " + FormatNumber(std::pow(10.0, std::round(digits))) + " times less likely: " + rival;
 }
 
 nlohmann::ordered_json ToJson(const Fault& fault) {

@@ -47,7 +47,7 @@ enum class CauseOutcome {
 /// "named", "class", "not explained", "observed".
 const char* NameOf(CauseOutcome outcome);
 
-/// One fault, or several that are not isolable from each other.
+/// One fault, or several that the motion does not separate.
 struct Explanation {
   CauseChannel channel = CauseChannel::kActuation;
   CauseOutcome outcome = CauseOutcome::kNamed;

@@ -18,7 +18,7 @@ import subprocess
 
 import pytest
 
-DISAGREE = 1  # exit code of dexcheck; 0 agrees, all others tell of no comparison
+DISAGREE = 1  # exit code of dexcheck; 0 agrees, others made no comparison
 
 
 def pytest_addoption(parser):

@@ -124,7 +124,7 @@ class Cause:
     """What explains a part of what a model does not; of a class the likeliest.
 
     fault, place, value, unit, detail; error: standard error of the value, infinite where the motion does not determine it;
-    text; outcome: "named", "class" (others do as well) or "not explained"; others: that this motion does not tell apart from
+    text; outcome: "named", "class" (others do as well) or "not explained"; others: that this motion does not separate from
     it; rival; time: (from, to) in s, None for always.
     """
 

@@ -31,7 +31,7 @@
         return cell;
       }), Make('td', all, {className: 'value number'})));
     }
-    AddSection('Names', Make('p', `${right} of ${names.length} faults that have a size are named with kind, place and value. A class is one of several that this motion does not tell apart.`, {className: 'soft'}),
+    AddSection('Names', Make('p', `${right} of ${names.length} faults that have a size are named with kind, place and value. A class is one of several that this motion does not separate.`, {className: 'soft'}),
       Add(Make('div', '', {className: 'card scroll'}), matrix));
   }
   AddSection('Kinds', Add(Make('div', '', {className: 'card scroll'}), Table(['kind', 'made', 'found', 'survived', 'without effect', 'cause right'],

@@ -26,7 +26,7 @@ const ShowFraction = fraction => {
   return (percent >= 99.5 ? percent.toFixed(percent < 100 ? 1 : 0) : Number(percent.toPrecision(2))) + ' %';
 };
 
-/** A value as its standard error lets it be told: null is any size. */
+/** A value with the digits that its standard error leaves: null is any size. */
 const TellValue = (value, error, unit = '') => {
   const tail = unit ? ' ' + unit : '';
   if (error === null || value === null) return 'of any size';
@@ -34,8 +34,8 @@ const TellValue = (value, error, unit = '') => {
   const Short = (x, digits) => String(Number(x.toPrecision(Math.min(Math.max(digits, 1), 6))));
   return Short(value, digits) + (error > 0 ? ` ± ${Short(error, 2)}` : '') + tail;
 };
-const TellOdds = odds => odds > 46 ? 'more than 1e20' : Number(Math.exp(odds).toPrecision(1)).toLocaleString('en', {maximumFractionDigits: 0, notation: odds > 12 ? 'scientific' : 'standard'}).replace('E', 'e');
-/** Causes with their faults, which one motion does not tell apart, rivals and times: {outcome, faults, rival, log_odds, when, parts}.
+const ShowOdds = odds => odds > 46 ? 'more than 1e20' : Number(Math.exp(odds).toPrecision(1)).toLocaleString('en', {maximumFractionDigits: 0, notation: odds > 12 ? 'scientific' : 'standard'}).replace('E', 'e');
+/** Causes with their faults, which one motion does not separate, rivals and times: {outcome, faults, rival, log_odds, when, parts}.
     @param columns [[head, cause => cell]] besides. */
 const CauseTable = (causes, columns = []) => {
   const Fault = (fault, parts) => Add(Make('div'), Make('b', `${fault.place}: ${fault.fault}`),
@@ -66,10 +66,10 @@ const CauseTable = (causes, columns = []) => {
   return Table(['#', 'fault', ...columns.map(([head]) => head), 'nearest other', ...(has_time ? ['when, s'] : [])], causes.map((cause, i) => ({
     className: cause.outcome === 'named' ? '' : 'open', cells: [String(i + 1),
       Add(Make('div', '', {className: 'faults'}), ...(cause.outcome === 'named' ? [] : [Make('small', cause.outcome === 'not explained' ? 'not explained; nearest:' :
-        cause.faults.length > 1 ? 'one of, not isolable from each other:' : 'of a size that this motion does not tell:')]),
+        cause.faults.length > 1 ? 'one of these, which this motion does not separate:' : 'of a size that this motion does not show:')]),
         ...cause.faults.map((fault, k) => Fault(fault, k === 0 && cause.parts)), ...(cause.parts ? [Parts(cause.parts)] : [])),
       ...columns.map(([, Cell]) => Cell(cause)),
-      Make('small', cause.rival ? `${cause.rival}, ${TellOdds(cause.log_odds)} times less likely` : ''),
+      Make('small', cause.rival ? `${cause.rival}, ${ShowOdds(cause.log_odds)} times less likely` : ''),
       ...(has_time ? [cause.when ? When(cause.when) : 'always'] : [])]})), 99);
 };
 

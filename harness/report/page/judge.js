@@ -1,4 +1,4 @@
-// The page of a judged recording: verdict, causes, what the motion does not tell apart, joints, notes. page.js draws the plots.
+// The page of a judged recording: verdict, causes, what the motion does not separate, joints, notes. page.js draws the plots.
 'use strict';
 (() => {
   const data = ReadJson('judgement');
@@ -29,7 +29,7 @@
   const Meter = cause => Add(Make('div', Percent(Part(cause)), {className: 'number'}),
     Add(Make('span', '', {className: 'meter accent'}), Make('i', '', {style: `width: ${100 * Part(cause)}%`})));
   if (causes.length) {
-    AddSection('Causes', Make('p', 'The one that explains most first, each with its standard error. Faults of one row are not told apart by this motion.', {className: 'soft'}),
+    AddSection('Causes', Make('p', 'The one that explains most first, each with its standard error. This motion does not separate the faults of one row.', {className: 'soft'}),
       Card('scroll', CauseTable(causes.map(cause => {
         const begin = data.begins[Math.max(cause.recording, 0)];
         const place = several && cause.recording >= 0 ? `in ${data.recordings[cause.recording]}` : '';
@@ -51,7 +51,7 @@
         const cell = Make('td', '', {className: 'cell ' + kind});
         if (!kind) return cell;
         const text = {named: 'the only one that explains it', same: 'explains it as well as the others of this column'}[kind] ??
-          `${TellOdds(cause.log_odds)} times less likely`;
+          `${ShowOdds(cause.log_odds)} times less likely`;
         cell.title = `cause ${i + 1}: ${row}: ${text}`;
         return Add(cell, Make('i', is_rival ? '1e' + Math.round(Math.min(cause.log_odds / Math.LN10, 20)) : kind === 'named' ? '●' : at === 0 ? '◆' : '◇', {role: 'img', ariaLabel: text}));
       })));

@@ -57,7 +57,7 @@
     ...(Number.isFinite(speed.real_time_factor) ? [[`${Digits(speed.real_time_factor, 2)} ×`, 'real time']] : []),
   ].map(([value, label]) => Card('', Make('b', value), Make('span', label))));
 
-  // What explains the residuals. Faults of one row are not told apart by this motion.
+  // What explains the residuals. This motion does not separate the faults of one row.
   if (summary.causes?.length) {
     AddSection('Causes', Card('scroll', CauseTable(summary.causes.map(cause => ({...cause, when: [cause.from_s, cause.ends ? cause.to_s : null]})), [['where seen', cause => cause.channel],
       ['explained', cause => `${Number((100 * cause.fraction).toPrecision(3))} %`]])));

@@ -77,7 +77,7 @@ TEST(ExplanationTest, IsToldInALine) {
   one.rival = "delay";
   one.log_odds = 4.605;  // log(1e2)
   EXPECT_EQ(one.Describe(),
-            "motor r_elbow: gain 0.99 +- 0.001, 0.25 to 1.5 s; rival: delay, 1e2 times less likely");
+            "motor r_elbow: gain 0.99 +- 0.001, 0.25 to 1.5 s; 100 times less likely: delay");
   one.log_odds = 1e6;
   EXPECT_THAT(one.Describe(), EndsWith("1.5 s"));
 }
@@ -86,12 +86,12 @@ TEST(ExplanationTest, ClassIsToldByItsFirstFour) {
   std::vector<Fault> faults = {MakeGain(), MakeOffset()};
   EXPECT_EQ(
       MakeExplanation(faults).Describe(),
-      "motor r_elbow: gain 0.99 +- 0.001 or motor r_elbow: offset -0.05 N m: not isolable from each other on "
-      "this motion, from 0.25 s");
+      "motor r_elbow: gain 0.99 +- 0.001 or motor r_elbow: offset -0.05 N m (this motion does not separate "
+      "them), from 0.25 s");
   for (const char* name : {"drift", "lag", "delay", "limit"})
     faults.push_back({name, "motor r_elbow", 1.0, 0.0, "", ""});
   const std::string text = MakeExplanation(faults).Describe();
-  EXPECT_THAT(text, HasSubstr("lag 1 or 2 more: not isolable"));
+  EXPECT_THAT(text, HasSubstr("lag 1 or 2 more (this motion"));
   EXPECT_THAT(text, Not(HasSubstr("delay")));
 }
 

@@ -169,7 +169,7 @@ TEST_F(JudgeBrowserTest, ClassesAndClocksAreTold) {
             nlohmann::json({"explanation|1|2", "link a: mass|◆|1e3", "link b: </script>|◇|",
                             "link c: mass|1e3|", "link b: mass||●"}));
   const std::string causes = TextOf("#causes ~ .card");
-  EXPECT_THAT(causes, ::testing::HasSubstr("one of, not isolable from each other:"));
+  EXPECT_THAT(causes, ::testing::HasSubstr("one of these, which this motion does not separate:"));
   EXPECT_THAT(causes, ::testing::HasSubstr("1 ± 0.1 kg"));
   EXPECT_THAT(causes, ::testing::HasSubstr("of any size"));
   EXPECT_THAT(causes, ::testing::HasSubstr("1.000 to 3.000")) << "from the recording's begin";
