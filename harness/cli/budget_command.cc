@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "harness/base/interrupts.h"
 #include "harness/cli/commands.h"
@@ -25,34 +26,30 @@ struct BudgetRequest {
   bool quiet = false;
 };
 
-/// The prediction; there is none of a law that is not known.
-std::string ShowPredicted(const ErrorSize& size) {
-  return std::isfinite(size.rms) ? fmt::format("{:.2e}", size.rms) : "-";
-}
+/// Returns a prediction or an error in two digits; "-" where a law is not known, so that there is none.
+std::string Show(double value) { return std::isfinite(value) ? fmt::format("{:.2e}", value) : "-"; }
 
 void Print(const ErrorBudget& budget) {
   fmt::print("{}: RMS and largest {}, {}\n\n", budget.scenario,
              budget.of_joints ? "error of a joint" : "position error of the object", budget.unit);
-  fmt::print("  {:<27}{:>9}{:>9}{:>10}{:>11}{:>12}\n", "source", "alone", "largest",
-             budget.of_joints ? "predicted" : "by (57)", "without it", "interaction");
+  std::vector<TableRow> rows = {{{"source", "alone", "largest", budget.of_joints ? "predicted" : "by (57)",
+                                  "without it", "interaction"}}};
   for (const BudgetEntry& e : budget.entries) {
     if (!e.failure.empty()) {
-      fmt::print("  {:<27}{}\n", e.name, e.failure);
+      rows.push_back({{e.name}, e.failure});
       continue;
     }
-    fmt::print("  {:<27}{:>9.2e}{:>9.2e}{:>10}{:>11.2e}{:>9.0f} %{}\n", e.name, e.alone.rms, e.alone.max,
-               ShowPredicted(e.predicted), e.without.rms, 100.0 * e.interaction, e.interacts() ? "!" : "");
+    rows.push_back({{e.name, Show(e.alone.rms), Show(e.alone.max), Show(e.predicted.rms), Show(e.without.rms),
+                     fmt::format("{:.0f} %{}", 100.0 * e.interaction, e.interacts() ? "!" : " ")}});
   }
-  const auto row = [](const char* name, const ErrorSize& size) {
-    fmt::print("  {:<27}{:>9.2e}{:>9.2e}\n", name, size.rms, size.max);
-  };
-  row("none of them", budget.ideal);
+  rows.push_back({{"none of them", Show(budget.ideal.rms), Show(budget.ideal.max)}});
   // Errors up to where a run ended early are none of the motion's.
-  if (!budget.is_complete()) return fmt::print("\n");
-  fmt::print("  {:<27}{:>9.2e}{:>9.2e}{:>10}\n", "sum of the above", budget.sum.rms, budget.sum.max,
-             ShowPredicted(budget.predicted));
-  row("all together", budget.all);
-  fmt::print("\n");
+  if (budget.is_complete()) {
+    rows.push_back(
+        {{"sum of the above", Show(budget.sum.rms), Show(budget.sum.max), Show(budget.predicted.rms)}});
+    rows.push_back({{"all together", Show(budget.all.rms), Show(budget.all.max)}});
+  }
+  fmt::print("{}\n", FormatTable("<>>>>>", rows));
 }
 
 int Run(const BudgetRequest& request) {

@@ -43,19 +43,23 @@ std::string FormatShort(double value) {
 
 std::string Show(const std::optional<double>& value) { return value ? FormatShort(*value) : "-"; }
 
+std::string ShowUnit(const std::string& unit) { return unit == "1" ? "" : unit; }
+
+/// Prints a line for each number: a value of each run, marked where it fails, and its ratios to the first.
 void PrintNumbers(const std::vector<ComparedNumber>& numbers, bool all) {
-  size_t width = 0;
-  for (const ComparedNumber& number : numbers) width = std::max(width, number.name.size());
+  std::vector<TableRow> rows;
+  std::string align = "<";
   for (const ComparedNumber& number : numbers) {
     if (!all && !number.fails_anywhere()) continue;
-    std::string line = fmt::format("  {:<{}}", number.name, width);
+    TableRow& row = rows.emplace_back();
+    row.cells = {"  " + number.name};
+    align = "<" + std::string(number.values.size(), '>') + "<" + std::string(number.values.size() - 1, '<');
     for (size_t i = 0; i < number.values.size(); ++i)
-      line += fmt::format("  {:>9}{}", Show(number.values[i]), number.fails[i] ? "!" : " ");
-    line += fmt::format("  {:<4}", number.unit == "1" ? "" : number.unit);
-    for (size_t i = 1; i < number.values.size(); ++i)
-      line += fmt::format("  x {:<8}", Show(number.CalcRatio(i)));
-    fmt::print("{}\n", Wrap(line, width + 4));
+      row.cells.push_back(Show(number.values[i]) + (number.fails[i] ? "!" : " "));
+    row.cells.push_back(ShowUnit(number.unit));
+    for (size_t i = 1; i < number.values.size(); ++i) row.cells.push_back("x " + Show(number.CalcRatio(i)));
   }
+  fmt::print("{}", FormatTable(align, rows));
 }
 
 void PrintSignals(const RunComparison& comparison, bool all) {
@@ -63,15 +67,14 @@ void PrintSignals(const RunComparison& comparison, bool all) {
       comparison.signals, [](const SignalDifference& signal) { return signal.difference == 0.0; });
   fmt::print("\nsignals: {} of {} are equal bit for bit; differences, over sizes\n", equal,
              comparison.signals.size());
-  size_t printed = 0;
+  std::vector<TableRow> rows;
   for (const SignalDifference& signal : comparison.signals) {
-    if (!all && (signal.difference == 0.0 || printed++ == kMostPrinted)) break;
-    const std::string line =
-        fmt::format("  {} - A  {:<28} {:>9} {:<7} {:>9}  at {:.3f} s", static_cast<char>('A' + signal.run),
-                    signal.NameColumn(), FormatShort(signal.difference),
-                    signal.unit == "1" ? "" : signal.unit, FormatShort(signal.fraction()), signal.at_time);
-    fmt::print("{}\n", Wrap(line, 9));
+    if (!all && (signal.difference == 0.0 || rows.size() == kMostPrinted)) break;
+    rows.push_back({{fmt::format("  {} - A", static_cast<char>('A' + signal.run)), signal.NameColumn(),
+                     FormatShort(signal.difference), ShowUnit(signal.unit), FormatShort(signal.fraction()),
+                     fmt::format("at {:.3f} s", signal.at_time)}});
   }
+  fmt::print("{}", FormatTable("<<><><", rows));
   if (!comparison.not_compared.empty())
     fmt::print("  {} signals are not in all runs\n", comparison.not_compared.size());
 }
