@@ -147,8 +147,9 @@ Answer AnswerByTerms(const ConsistencyRequest& request, const Comparison& compar
   Answer answer{Answer::Tone::kBad, "DISAGREE", {}, differences.real, {}};
   const std::string to_digits = fmt::format("agrees to {} digits", differences.digits);
   if (differences.real.empty()) {
-    answer.sentence = fmt::format("everything {}, as rounded numbers do; --digits {} judges by that{}.",
-                                  to_digits, differences.digits, left_out);
+    answer.sentence =
+        fmt::format("everything agrees to {} digits, but not to rounding; --digits {} accepts that{}.",
+                    differences.digits, differences.digits, left_out);
     answer.causes = differences.rounded;
     return answer;
   }

@@ -241,9 +241,12 @@ void Print(const RobotModel& model, const RecordingPair& pair, const RecordingCo
     answer.sentence = fmt::format("{} and {} are of robots that differ.", first, second);
   }
   for (const CauseDifference& one : comparison.causes) answer.causes.push_back(one.Describe());
-  answer.remarks.push_back(comparison.is_same_motion
-                               ? fmt::format("{} is {:.4g} s after {}", second, comparison.delay, first)
-                               : "the motions are not the same: only what explains them is compared");
+  constexpr double kLeast = 1e-6;  // s
+  if (!comparison.is_same_motion)
+    answer.remarks.emplace_back("the motions are not the same: only what explains them is compared");
+  else if (std::abs(comparison.delay) > kLeast)
+    answer.remarks.push_back(fmt::format("{} is {:.4g} s {} {}", second, std::abs(comparison.delay),
+                                         comparison.delay > 0.0 ? "after" : "before", first));
   PrintAnswer(answer);
   if (pair.quiet || !comparison.is_same_motion) return;
   std::vector<TableRow> rows = {{{"difference, rms", "position", "torque"}}};

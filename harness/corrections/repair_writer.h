@@ -20,10 +20,10 @@
 
 namespace dexcheck {
 
-/// Prints twelve digits, which hide the rounding of what was computed.
+/// Prints ten digits, which hide the rounding of what was computed.
 /// @param size the largest number of its vector.
 inline std::string Format(double value, double size = 0.0) {
-  constexpr int kDigits = 12;
+  constexpr int kDigits = 10;
   constexpr double kRounding = 1e-12;
   return FormatNumber(std::abs(value) < kRounding * std::max(size, 1e-3) ? 0.0 : value, kDigits);
 }

@@ -8,6 +8,8 @@
 
 #include "controller/common/errors.h"
 #include "harness/corrections/corrections.h"
+#include "harness/corrections/link_frames.h"
+#include "harness/corrections/printed_pair.h"
 #include "harness/corrections/repair_writer.h"
 #include "harness/corrections/table_repair.h"
 #include "harness/descriptions/urdf_file.h"
@@ -39,6 +41,34 @@ PrintedRobot RepairRobot(PrintedRobot robot, const PrintedRobot& reference, bool
     for (const LinkPatch& patch : item->patches) robot.link(patch.link) = patch.right;
   }
   return robot;
+}
+
+/// Takes the reference's numbers in the place of those that a correction computed from rounded ones, where
+/// both are one within the tolerance of their digits: computed numbers have more digits than are known.
+void TakeDigits(const PrintedRobot& before, const PrintedRobot& reference, PrintedRobot* robot) {
+  PrintedPair pair(*robot, reference);
+  pair.SetFrames(ChooseFrames(pair)[0].X_ab);
+  for (const int i : pair.links()) {
+    PrintedLink& link = robot->link(i);
+    const PrintedLink& old = before.link(i);
+    const RightNode& right = pair.right(i);
+    const auto is_right = [&](SiteKind kind) { return pair.CompareNode(kind, i) <= 1.0; };
+    if (link.inertial && old.inertial && pair.node(i).parts == std::vector{i}) {
+      PrintedInertial& body = *link.inertial;
+      if (body.mass.value != old.inertial->mass.value && is_right(SiteKind::kMass))
+        body.mass.value = right.body.mass;
+      if (body.origin.t != old.inertial->origin.t && is_right(SiteKind::kCom)) body.origin.t = right.body.com;
+      if (body.I != old.inertial->I && is_right(SiteKind::kInertia)) {
+        const Matrix3d R = body.origin.CalcRotation();
+        body.I = ToEntries(R.transpose() * right.body.inertia * R);
+      }
+    }
+    if (!right.is_placed || pair.node(i).chain.size() > 1 || link.origin.form == RotationForm::kMdh) continue;
+    if (link.origin.t != old.origin.t && is_right(SiteKind::kPosition)) link.origin.t = right.X.translation();
+    if (link.origin.form == RotationForm::kRollPitchYaw && link.origin.r != old.origin.r &&
+        is_right(SiteKind::kRotation))
+      link.origin.SetRotation(right.X.linear());
+  }
 }
 
 constexpr JointKeys kUrdfKeys = {"name",
@@ -222,7 +252,8 @@ RepairedFile WriteRepaired(const DescriptionFile& file, const UrdfOptions& urdf,
     throw InputError(file.path().string() + ": cannot be repaired: it is a table of bodies");
   RepairedFile repaired;
   bool changes = false;
-  const PrintedRobot after = RepairRobot(printed, reference, &repaired.agrees, &changes);
+  PrintedRobot after = RepairRobot(printed, reference, &repaired.agrees, &changes);
+  if (repaired.agrees) TakeDigits(printed, reference, &after);
   if (!changes)
     throw InputError(file.path().filename().string() +
                      ": cannot be repaired: its causes must be corrected by hand");

@@ -49,7 +49,11 @@ std::string Fault::Describe() const {
     const double rounding = std::max(5e-6, 3.0 * error);  // of the six digits that are printed
     if (std::abs(value + 1.0) < rounding)
       return part + (is_plural ? " have" : " has") + " the other sign" + more;
-    return part + be + "multiplied by " + size + more;
+    // Shows how far a factor is from 1, however near it is.
+    const double off = std::abs(value - 1.0);
+    const int digits = off > 0.0 ? std::clamp(3 - static_cast<int>(std::floor(std::log10(off))), 6, 15) : 6;
+    const bool is_near = digits > 6 && off > 3.0 * error;
+    return part + be + "multiplied by " + (is_near ? FormatNumber(value, digits) : size) + more;
   }
   return where + fault + " " + size + Unit(unit) +
          (std::isinf(error) && detail.empty() ? ", a size that this motion does not show" : "") + more;

@@ -70,6 +70,7 @@ class Judge {
   RecordingJudgement Run() {
     result_.joints = set_.joints();
     result_.unjudged = set_.ListUnjudged();
+    result_.rests = std::ranges::none_of(set_.joints(), [this](int joint) { return set_.Moves(joint); });
     result_.rows = set_.rows();
     result_.notes = set_.notes();
     result_.has_other_times = set_.has_other_times();
@@ -330,7 +331,8 @@ bool RecordingJudgement::IsHidden() const {
 }
 
 bool RecordingJudgement::Agrees() const {
-  return causes.empty() && IsWhole() && !IsHidden() && std::ranges::none_of(unjudged, &UnjudgedJoint::moves);
+  return causes.empty() && IsWhole() && !IsHidden() && !rests &&
+         std::ranges::none_of(unjudged, &UnjudgedJoint::moves);
 }
 
 namespace {

@@ -55,6 +55,7 @@ struct RecordingJudgement {
   std::vector<TorqueTrace> traces;
   std::vector<std::string> notes;
   long rows = 0;
+  bool rests = false;            ///< No joint moves: only gravity at one posture shows.
   bool has_other_times = false;  ///< Velocities were recorded at other times than positions.
   Refinements refinements;       ///< With which a further reading would find more.
 
@@ -64,7 +65,7 @@ struct RecordingJudgement {
   [[nodiscard]] bool IsWhole() const;
   /// Noise may hide an error as large as the torque itself, at every joint.
   [[nodiscard]] bool IsHidden() const;
-  /// All joints that move are judged, and the residual is noise, with no cause, beside which errors show.
+  /// Joints move, all that do are judged, and the residual is noise, with no cause, beside which errors show.
   [[nodiscard]] bool Agrees() const;
 };
 

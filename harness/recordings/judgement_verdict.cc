@@ -39,9 +39,12 @@ void AddCauses(const RecordingJudgement& judgement, Answer* answer) {
   }
   if (!nearest.empty()) answer->remarks.push_back(nearest);
   if (judgement.causes.empty()) return;
-  answer->remarks.push_back(
-      fmt::format("the causes explain {:.4g} % of what the model does not; {:.3g} times the noise remains",
-                  100.0 * judgement.explained, judgement.left));
+  constexpr double kLeast = 5e-3;
+  if (judgement.explained > kLeast)
+    answer->remarks.push_back(
+        fmt::format("{} {:.4g} % of what the model does not; {:.3g} times the noise remains",
+                    answer->causes.empty() ? "the nearest would explain" : "the causes explain",
+                    100.0 * judgement.explained, judgement.left));
   // A short recording is not divided: nothing is held out.
   const auto describe = [](const HeldPrediction& one) {
     return fmt::format("{} number{} {:.3g} times the noise", one.numbers,
@@ -83,6 +86,11 @@ Answer MakeAnswer(const RecordingJudgement& judgement, const RobotModel& robot,
     say("PARTLY EXPLAINED", fmt::format("what {} leaves of {} is noise, beside which no error of the "
                                         "model would show",
                                         model, recording));
+  } else if (judgement.causes.empty() && judgement.IsWhole() && judgement.rests) {
+    say("PARTLY EXPLAINED",
+        fmt::format("no joint of {} moves: {} explains its gravity there, and nothing else "
+                    "was tested",
+                    recording, model));
   } else if (judgement.causes.empty() && judgement.IsWhole()) {
     std::vector<std::string> judged;
     for (const JointJudgement& one : judgement.balances)

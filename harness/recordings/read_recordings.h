@@ -84,6 +84,8 @@ class RecordingSet {
   [[nodiscard]] bool has_other_times() const { return has_other_times_; }
   /// Joints with a position, without a torque or with one that says nothing.
   [[nodiscard]] std::vector<UnjudgedJoint> ListUnjudged() const;
+  /// Whether its position changes by more than noise in any recording.
+  [[nodiscard]] bool Moves(int joint) const;
   /// Faults of the recordings themselves: velocities that are not the positions' derivatives.
   [[nodiscard]] const std::vector<Fault>& faults() const { return faults_; }
 
@@ -97,8 +99,6 @@ class RecordingSet {
   void MeasureNoise();
   /// From all recordings, with friction and an offset beside them.
   void EstimateGains();
-  /// Whether its position changes by more than noise in any recording.
-  [[nodiscard]] bool Moves(int joint) const;
 
   const RobotModel* model_;
   std::string first_name_;
