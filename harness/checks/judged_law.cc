@@ -34,6 +34,7 @@ JudgedLaw::JudgedLaw(const Setup& setup)
       velocity_age_(setup.scenario().plant.velocity_age()),
       hold_(Worst(1L, std::lround(setup.scenario().plant.control_step / time_step_))),
       stands_(!setup.feet().empty()),
+      torque_bound_(CalcBound(*FindCheck("law_torque"), setup.scenario())),
       actuation_(setup.model()),
       commanded_(setup.model(), static_cast<int>(setup.fingertips().size())),
       own_factor_(setup.model()) {
@@ -48,8 +49,10 @@ double JudgedLaw::CalcTorqueError(const StepRecord& step, const LawTerms& terms,
   actuation_.CalcForce(step.command.tau, difference_);
   difference_ -= force();
   const double error = Norm(difference_) / scale_ / condition_number();
-  // A smaller error is rounding.
-  differs_ = error > kLawTorqueBound;
+  // A smaller error is rounding, and beside errors above the bound what rounded parameters make.
+  if (!exceeds_ && error > torque_bound_) Forget();
+  exceeds_ = exceeds_ || error > torque_bound_;
+  differs_ = error > (exceeds_ ? torque_bound_ : kLawTorqueBound);
   Remember(step, terms);
   return error;
 }

@@ -97,6 +97,7 @@ class JudgedLaw {
   double time_step_, velocity_age_;  // s
   long hold_;                        // steps
   bool stands_;                      // the ground takes part in the error dynamics
+  double torque_bound_;              // of law_torque, as the scenario's tolerance raises it
   ActuationMap actuation_;
   ConstrainedDynamics commanded_;  // the controller's rigid system under the commanded torques
   TreeFactor own_factor_;          // of the terms' M_bar'
@@ -112,7 +113,7 @@ class JudgedLaw {
   void FillStep(const StepRecord& step, const LawTerms& terms, LawStep* state) const;
   [[nodiscard]] LawInputs CopyAll(const StepRecord& step, const LawTerms& terms, LawStep now) const;
 
-  bool differs_ = false;
+  bool differs_ = false, exceeds_ = false;
   LawStep state_;
   LawHistory history_;
   VectorXd balanced_, work_;  // n

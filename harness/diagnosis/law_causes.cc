@@ -4,6 +4,7 @@
 
 #include "controller/common/text.h"
 #include "controller/dynamics/tree_factor.h"
+#include "harness/checks/check_table.h"
 #include "harness/diagnosis/law_entries.h"
 #include "harness/diagnosis/line_search.h"
 #include "harness/diagnosis/run_causes.h"
@@ -134,7 +135,16 @@ class LawProblem {
     ChooseSteps(store.law()->history().snapshots());
     for (const LawSnapshot* const step : steps_) factors_.emplace_back(model_).Compute(step->inputs.M);
     y_.resize(model_.num_velocities() * count());
-    y_ = CalcColumns(1, CalcForces([](const LawSnapshot& step) -> MatrixXd { return step.difference; }));
+    const auto differences = CalcForces([](const LawSnapshot& step) -> MatrixXd { return step.difference; });
+    y_ = CalcColumns(1, differences);
+    // Numbers that files print with few digits make a difference of their own beside a larger one.
+    const double tolerated = CalcBound(*FindCheck("law_torque"), store.setup().scenario()) / kLawTorqueBound;
+    const auto by_step = y_.reshaped(model_.num_velocities(), count()).colwise().norm();
+    constexpr double kMuch = 10.0;
+    if (!(by_step.maxCoeff() > kMuch * tolerated * std::sqrt(static_cast<double>(model_.num_velocities()))))
+      return;
+    noise_ = tolerated;
+    y_ = CalcColumns(1, differences);
   }
 
   [[nodiscard]] const std::vector<const LawSnapshot*>& steps() const { return steps_; }
@@ -161,7 +171,8 @@ class LawProblem {
         VectorXd column = forces[step].col(i);
         factors_[step].SolveTransposed(column);
         // The bound is one of the norm.
-        columns.col(i).segment(k * n, n) = column * (std::sqrt(static_cast<double>(n)) / steps_[step]->noise);
+        columns.col(i).segment(k * n, n) =
+            column * (std::sqrt(static_cast<double>(n)) / (noise_ * steps_[step]->noise));
       }
     }
     return columns;
@@ -196,6 +207,7 @@ class LawProblem {
   std::vector<TreeFactor> factors_;        // by step
   std::vector<const LawSnapshot*> steps_;  // those that are fitted, then the others
   Index fitted_ = 0;
+  double noise_ = 1.0;  // of the steps' noise
   VectorXd y_;
 };
 
@@ -345,15 +357,6 @@ Causes ExplainLaw(const StepStore& store) {
   const VectorXd y = problem.y().head(problem.rows());
   const double floor = 1.0 + kLawAccuracy * kLawAccuracy * y.squaredNorm() / static_cast<double>(y.size());
   CauseSelection selection = SelectCauses(y, candidates, {.most_terms = 4, .restarts = 0, .floor = floor});
-  const LawFactors factors(store.law()->ListParts(), all.parts(), candidates);
-  factors.DropAlternatives(&selection);
-  causes = DescribeSelection(StartExplanation(store, CauseChannel::kLaw, steps), selection, candidates,
-                             [&](const Candidate& one, const VectorXd& amplitude, const VectorXd& error) {
-                               Fault fault = DescribeLaw(one, amplitude, error);
-                               if (one.nominal == 1.0 && one.unit.empty())
-                                 factors.MakeWhole(one, selection, &fault);
-                               return fault;
-                             });
   VectorXd left = problem.y().tail(problem.y().size() - y.size());
   for (const CauseTerm& term : selection.terms) left -= others[term.candidate] * term.amplitude;
   const double most = kMostLeft * std::sqrt(floor);
@@ -364,6 +367,15 @@ Causes ExplainLaw(const StepStore& store) {
     numbers += term.amplitude.size() + candidates[term.candidate].parameters;
   const bool is_sure = numbers == 1 || kRowsPerNumber * numbers <= problem.rows();
   const bool holds = is_sure && left.squaredNorm() <= most * most * static_cast<double>(left.size());
+  const LawFactors factors(store.law()->ListParts(), all.parts(), candidates);
+  factors.DropAlternatives(&selection);
+  causes = DescribeSelection(StartExplanation(store, CauseChannel::kLaw, steps), selection, candidates,
+                             [&](const Candidate& one, const VectorXd& amplitude, const VectorXd& error) {
+                               Fault fault = DescribeLaw(one, amplitude, error);
+                               if (one.nominal == 1.0 && one.unit.empty())
+                                 factors.MakeWhole(one, selection, &fault);
+                               return fault;
+                             });
   if (selection.left <= most && holds) return causes;
   // The nearest stands for all.
   causes.resize(1, StartExplanation(store, CauseChannel::kLaw, steps));
