@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cmath>
 #include <random>
-#include <string>
 
 #include "controller/contact/shapes.h"
 #include "harness/engine/engine.h"
@@ -104,49 +103,6 @@ TEST(TorusCollision, EngineContactIsTheClosedForm) {
     EXPECT_TRUE(MatrixNear(Eigen::Map<const Vector3d>(contact.frame), sign * normal, 1e-12));
   }
   EXPECT_GT(touching, 50);
-}
-
-/// Distance of the deepest contact between the ball at `center` and a ring of capsules inscribed in the
-/// torus's circle.
-double CapsuleRingDistance(int capsules, const Vector3d& center) {
-  std::string geoms;
-  for (int k = 0; k < capsules; ++k) {
-    const double a = 2.0 * kPi * k / capsules;
-    const double b = 2.0 * kPi * (k + 1) / capsules;
-    geoms +=
-        fmt::format(R"(<geom type="capsule" size="{}" fromto="{:.17g} {:.17g} 0 {:.17g} {:.17g} 0"/>)", kTube,
-                    kRing * std::cos(a), kRing * std::sin(a), kRing * std::cos(b), kRing * std::sin(b));
-  }
-  const MjModelPtr model = LoadMjcfText(
-      fmt::format(
-          R"(<mujoco><size nconmax="500"/><worldbody><body>{}</body><body pos="{:.17g} {:.17g} {:.17g}">)"
-          R"(<freejoint/><geom type="sphere" size="{}"/></body></worldbody></mujoco>)",
-          geoms, center.x(), center.y(), center.z(), kBall),
-      "capsule ring");
-  const MjDataPtr data = MakeData(*model);
-  mj_fwdPosition(model.get(), data.get());
-  double deepest = std::numeric_limits<double>::infinity();
-  for (int i = 0; i < data->ncon; ++i) deepest = std::min(deepest, data->contact[i].dist);
-  return deepest;
-}
-
-TEST(TorusCollision, CapsuleRingConvergesToIt) {
-  // Above a capsule's middle, where the polygon is farthest (R (1 - cos(pi/N))) inside the circle.
-  for (const double elevation : {0.3, 1.2, 2.6}) {
-    double previous = 0.0;
-    for (const int capsules : {24, 48, 96}) {
-      const double middle = kPi / capsules;
-      const double rho = kRing + 0.019 * std::cos(elevation);
-      const Vector3d center(rho * std::cos(middle), rho * std::sin(middle), 0.019 * std::sin(elevation));
-      ExactContact contacts[2];
-      ASSERT_GE(CollideSphereTorus(center, kBall, kRing, kTube, 0.0, contacts), 1);
-      const double error = std::abs(CapsuleRingDistance(capsules, center) - contacts[0].distance);
-      EXPECT_LE(error, kRing * (1.0 - std::cos(kPi / capsules)) * 1.001);
-      EXPECT_GT(error, 1e-9);
-      if (previous > 0.0) EXPECT_NEAR(previous / error, 4.0, 0.3) << "second order in the capsules' length";
-      previous = error;
-    }
-  }
 }
 
 double HeightAfterFall(bool exact) {
