@@ -1,14 +1,11 @@
 #include <gtest/gtest.h>
 
-#include <array>
 #include <vector>
 
 #include "controller/contact/adjoint.h"
 #include "controller/contact/grasp_map.h"
-#include "tests/common/allocation_counter.h"
 #include "tests/common/linear_algebra.h"
 #include "tests/common/matrix_near.h"
-#include "tests/common/throws.h"
 #include "tests/controller/contact/test_finger.h"
 
 namespace dexcheck::testing::contact_jacobian_test {
@@ -103,57 +100,6 @@ TEST_F(ContactJacobianTest, RateMatchesDifferencesWhileTheFingerRolls) {
     without_rolling = std::max(without_rolling, (rows_dot - expected).norm());
   }
   EXPECT_GT(without_rolling, 1e6 * kDifference);
-}
-
-TEST_F(ContactJacobianTest, WrongSizesAreAClearError) {
-  const std::vector<RollingFinger> motions = MakeMotions();
-  const Contact contact = motions[0].CalcContact(0.0);
-  const Matrix6Xd J_f = motions[0].CalcBodyJacobian(0.0);
-  const auto calc = [&](Eigen::Index rows, Eigen::Index columns, Eigen::Index rate_columns) {
-    return [&, rows, columns, rate_columns] {
-      MatrixXd out(rows, columns);
-      CalcContactJacobianDot(contact, J_f, J_f.leftCols(rate_columns), out);
-    };
-  };
-  using Invalid = std::invalid_argument;
-  EXPECT_TRUE(Throws<Invalid>(calc(4, 4, 4), "rows of the contact Jacobian"));
-  EXPECT_TRUE(Throws<Invalid>(calc(3, 5, 4), "columns of the contact Jacobian"));
-  EXPECT_TRUE(Throws<Invalid>(calc(3, 4, 3), "columns of J_f_dot"));
-}
-
-// One control step's worth of contact terms for four fingers and 50 coordinates.
-TEST_F(ContactJacobianTest, AControlStepDoesNotAllocate) {
-  const std::vector<RollingFinger> motions = MakeMotions();
-  const Pose X_OF = motions[1].CalcObjectPose(0.0).inverse() * motions[1].CalcFingertipPose(0.0);
-  const Matrix6Xd J_f = Matrix6Xd::Ones(6, 50);
-  std::array<Contact, 4> contacts;
-  Matrix6Xd G(6, 12);
-  MatrixXd J_B(12, 50);
-
-  const AllocationCounter probe_counter;
-  const VectorXd probe = DrawVector(random_, 7);
-  ASSERT_GT(probe.norm(), 0.0);
-  ASSERT_GT(probe_counter.count(), 0) << "the counter must work";
-
-  const AllocationCounter counter;
-  ContactCoordinates kappa = FindContact(blunt_tip_, torus_, X_OF).kappa;
-  for (Contact& contact : contacts) {
-    const auto twist = [](double, const ContactGeometry& geometry) {
-      return CalcRelativeTwist(geometry, Vector6d::Ones(), Vector6d::Zero());
-    };
-    kappa = IntegrateKappa(blunt_tip_, torus_, kappa, 0.0, 1e-3, twist);
-    contact.geometry = CalcContactGeometry(blunt_tip_, torus_, kappa);
-    contact.kappa_dot = CalcKappaDot(contact.geometry, twist(0.0, contact.geometry));
-  }
-  CalcGraspMap(contacts, G);
-  CalcGraspMapDot(contacts, G);
-  Eigen::Index row = 0;
-  for (const Contact& contact : contacts) {
-    CalcContactJacobian(contact, J_f, J_B.middleRows(row, 3));
-    CalcContactJacobianDot(contact, J_f, J_f, J_B.middleRows(row, 3));
-    row += 3;
-  }
-  EXPECT_EQ(counter.count(), 0);
 }
 
 // Runs recorded before stay the same: of each entry the products are added up in the same order.
