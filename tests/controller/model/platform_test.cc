@@ -3,13 +3,11 @@
 #include <gtest/gtest.h>
 
 #include <random>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
 #include "tests/common/linear_algebra.h"
 #include "tests/common/matrix_near.h"
-#include "tests/common/throws.h"
 
 namespace dexcheck::testing::platform_test {
 namespace {
@@ -181,19 +179,6 @@ TEST_P(PlatformTest, MutatedSignsAreSeen) {
   EXPECT_GT(std::abs((E_v * tau).dot(good.S_v * state.v) - power), kVisible);
   // phi_dot with the wrong sign.
   EXPECT_GT((-good.S_v_dot - CalcSDotByDifference(base_, state)).norm(), kVisible);
-}
-
-TEST_P(PlatformTest, RejectsWhatIsNotADifferentialDrive) {
-  Base base = base_;
-  base.type = BaseType::kPlanar;
-  EXPECT_THROW(CalcPlatformConstraint(base, Vector3d::Zero(), Vector2d::Zero()), std::invalid_argument);
-  base = base_;
-  base.wheel_radius = 0.0;
-  EXPECT_THROW(CalcWheelRateMap(base), std::invalid_argument);
-  base = base_;
-  base.wheel_distance = -0.4;
-  EXPECT_EQ(MessageOf<std::invalid_argument>([&] { return CalcWheelRates(base, Vector2d::Zero()); }),
-            "wheel_distance: must be positive, got -0.4");
 }
 
 }  // namespace
