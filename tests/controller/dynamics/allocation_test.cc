@@ -2,8 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <cstdlib>
-#include <memory>
 #include <string>
 #include <vector>
 
@@ -12,48 +10,6 @@
 
 namespace dexcheck::testing::allocation_test {
 namespace {
-
-// Keeps the compiler from leaving out an allocation that nobody uses.
-void Use(const volatile void* pointer) {
-  static const volatile void* volatile sink = nullptr;
-  sink = pointer;
-  static_cast<void>(sink);
-}
-
-TEST(AllocationCounter, CountsEveryKind) {
-  const auto count = [](const auto& allocate) {
-    const AllocationCounter counter;
-    allocate();
-    return counter.count();
-  };
-  EXPECT_EQ(count([] {}), 0);
-  EXPECT_EQ(count([] { Use(std::make_unique<double>(1.0).get()); }), 1);
-  EXPECT_EQ(count([] { Use(std::vector<double>(100).data()); }), 1);
-  EXPECT_EQ(count([] { Use(VectorXd(100).data()); }), 1);
-  EXPECT_EQ(count([] { Use(MatrixXd::Zero(10, 10).eval().data()); }), 1);
-  EXPECT_EQ(count([] {
-              void* const p = std::malloc(8);
-              Use(p);
-              std::free(p);
-            }),
-            1);
-  EXPECT_EQ(count([] {
-              void* const p = std::calloc(8, 8);
-              Use(p);
-              std::free(p);
-            }),
-            1);
-  EXPECT_EQ(count([] {
-              void* const p = std::aligned_alloc(64, 640);
-              Use(p);
-              std::free(p);
-            }),
-            1);
-  struct alignas(64) Aligned {
-    double entries[8];
-  };
-  EXPECT_EQ(count([] { Use(std::make_unique<Aligned>().get()); }), 1);
-}
 
 std::vector<RobotCase> MakeCases() {
   std::vector<RobotCase> cases;
