@@ -5,12 +5,9 @@
 #include <array>
 #include <cmath>
 #include <functional>
-#include <stdexcept>
 
-#include "controller/object/euler_zyz.h"
 #include "tests/common/linear_algebra.h"
 #include "tests/common/matrix_near.h"
-#include "tests/common/throws.h"
 #include "tests/controller/object/object_states.h"
 
 namespace dexcheck::testing::object_dynamics_test {
@@ -187,17 +184,6 @@ TEST(ObjectDynamics, TermsAreFiniteWhereZyzIsSingular) {
   const ObjectTerms terms = CalcTerms(state);
   EXPECT_TRUE(MatrixNear(CalcWrench(terms, state), CalcWrenchOnParticles(state), kParticles));
   EXPECT_EQ(CalcRank(terms.M_o), 5);
-}
-
-TEST(ObjectDynamics, RejectsABodyThatIsNotAnObject) {
-  MassProperties object = MakeObject();
-  object.mass = 0.0;
-  EXPECT_THROW(CalcObjectTerms(object, kGravity, Vector6d::Zero(), Vector6d::Zero()), std::invalid_argument);
-  object = MakeObject();
-  object.com = Vector3d(0.0, 0.01, 0.0);
-  EXPECT_EQ(MessageOf<std::invalid_argument>(
-                [&] { CalcObjectBodyTerms(object, kGravity, Matrix3d::Identity(), Vector6d::Zero()); }),
-            "object com: must be zero (Sigma_o stands at the centre of mass), got 0.01");
 }
 
 }  // namespace

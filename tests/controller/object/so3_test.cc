@@ -98,20 +98,6 @@ TEST(So3, LogOfAHalfTurnPicksOneSign) {
   }
 }
 
-TEST(So3, LeftJacobianIsTheMeanRotation) {
-  // J_l(phi) = integral of exp(s phi) over s in [0, 1], here by Simpson's rule; its error is (theta/n)^4 /
-  // 180.
-  constexpr int kPanels = 2000;
-  constexpr double kQuadrature = 1e-13;
-  Random random(3104);
-  for (const double angle : kAngles) {
-    const Vector3d phi = angle * random.Axis();
-    Matrix3d sum = Matrix3d::Identity() + RotationByEigen(phi);
-    for (int i = 1; i < kPanels; ++i) sum += (i % 2 == 1 ? 4.0 : 2.0) * RotationByEigen(phi * i / kPanels);
-    EXPECT_TRUE(MatrixNear(CalcLeftJacobian(phi), sum / (3.0 * kPanels), kQuadrature)) << "angle " << angle;
-  }
-}
-
 TEST(So3, JacobianIdentities) {
   Random random(3105);
   for (const double angle : kAngles) {
@@ -160,18 +146,6 @@ TEST(So3, RejectsWhatIsNoRotation) {
   EXPECT_THROW(LogSo3(Matrix3d::Constant(std::nan(""))), std::invalid_argument);
   EXPECT_THROW(CalcLeftJacobianInverse({0.0, 0.0, 2 * kPi}), std::invalid_argument);
   EXPECT_NO_THROW(LogSo3(ExpSo3({1, 2, 3}).cast<float>().cast<double>()));
-}
-
-TEST(OrientationError, ByHand) {
-  // The desired frame stands 0.3 rad ahead about z and turns at 1 rad/s, the object at 0.4 rad/s.
-  const OrientationError error =
-      CalcOrientationError(Matrix3d::Identity(), {0, 0, 0.4}, ExpSo3({0, 0, 0.3}), {0, 0, 1.0});
-  EXPECT_TRUE(MatrixNear(error.e_R, Vector3d(0, 0, 0.3), kRounding));
-  EXPECT_TRUE(MatrixNear(error.omega_od, Vector3d(0, 0, 0.6), kRounding));
-  EXPECT_TRUE(MatrixNear(error.e_R_dot, Vector3d(0, 0, 0.6), kRounding));
-  // About one axis omega_o_dot = omega_d_dot - e_R_ddot.
-  EXPECT_TRUE(MatrixNear(CalcAngularAcceleration(error, {0, 0, 1.0}, {0, 0, 0.5}, {0, 0, -2.0}),
-                         Vector3d(0, 0, 2.5), kRounding));
 }
 
 TEST(OrientationError, DoesNotDependOnTheWorldFrame) {
