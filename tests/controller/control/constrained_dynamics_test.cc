@@ -1,4 +1,4 @@
-// (45) to (52): the rigid system of robot and object.
+// (45) to (49): the rigid system of robot and object.
 
 #include "controller/control/constrained_dynamics.h"
 
@@ -40,42 +40,6 @@ struct Balance {
   VectorXd robot_residual, object_residual, contact_residual;
 };
 
-/// M_tilde X_o_ddot + C_tilde X_o_dot + N_tilde = G J_B'^+T E_bar' tau', (52), with the null-space motions
-/// sigma and sigma' (n) of (47). N' sigma'' is left out: N' = 0 for J_B' of full row rank.
-struct ObjectSpaceTerms {
-  Matrix6d M_tilde;
-  Matrix6d C_tilde;
-  Vector6d N_tilde;
-  Matrix6Xd G_J_T;  // G J_B'^+T (6 x n), (50)
-};
-
-ObjectSpaceTerms CalcObjectSpaceTerms(const ModelTerms& robot, const GraspTerms& grasp,
-                                      const Pseudoinverse& J_B_pinv, const Eigen::Ref<const VectorXd>& sigma,
-                                      const Eigen::Ref<const VectorXd>& sigma_prime) {
-  const ObjectTerms& o = grasp.coordinates();
-  const MatrixXd J_plus = J_B_pinv.CalcMatrix();
-  const MatrixXd N = J_B_pinv.CalcProjector();
-  // H = J_B'^+ G^T
-  const MatrixXd H = J_plus * grasp.G().transpose();
-  const MatrixXd H_P_inv = H * o.P_inv;
-  const VectorXd N_sigma = N * sigma;
-
-  ObjectSpaceTerms terms;
-  terms.G_J_T = H.transpose();
-  // M_tilde = M_o + G J^+T M_bar' J^+ G^T P^-1
-  terms.M_tilde = o.M_o + terms.G_J_T * robot.M() * H_P_inv;
-  // C_tilde = C_o + G J^+T (M_bar' J^+ (G_dot^T P^-1 + G^T d/dt(P^-1) - J_dot J^+ G^T P^-1) + C_bar' J^+ G^T
-  // P^-1)
-  const MatrixXd H_rate = J_plus * (grasp.G_dot().transpose() * o.P_inv +
-                                    grasp.G().transpose() * o.P_inv_dot - grasp.J_B_dot() * H_P_inv);
-  terms.C_tilde = o.C_o + terms.G_J_T * (robot.M() * H_rate + robot.C() * H_P_inv);
-  // N_tilde = N_o + G J^+T (F_bar' - M_bar' J^+ J_dot N sigma + M_bar' N sigma' + C_bar' N sigma)
-  const VectorXd null_acceleration = N * sigma_prime - J_plus * (grasp.J_B_dot() * N_sigma);
-  terms.N_tilde = o.N_o + terms.G_J_T * (robot.gravity() + robot.friction() + robot.M() * null_acceleration +
-                                         robot.C() * N_sigma);
-  return terms;
-}
-
 class PredictionTest : public ::testing::TestWithParam<Hands> {
  protected:
   /// Velocities and forces at random, and what the whole system answers with.
@@ -102,25 +66,6 @@ TEST_P(PredictionTest, SatisfiesAllThreeEquations) {
     EXPECT_TRUE(
         MatrixNear(balance.contact_residual, VectorXd::Zero(scene_.num_forces()), kAccelerationRounding));
   }
-}
-
-// (52) holds for any torques, with sigma = xi and the null-space part of the acceleration as sigma'.
-TEST_P(PredictionTest, ObjectSpaceDynamicsHoldInTheWholeSystem) {
-  std::mt19937 random(4);
-  const Prediction& p = Draw(&random);
-  const Vector6d X_o_ddot = CalcCoordinateAcceleration(scene_.grasp, p.V_Bo_dot);
-  Pseudoinverse pinv("J_B'", scene_.num_forces(), scene_.robot.size());
-  pinv.Factor(scene_.grasp.J_B());
-  const auto calc_residual = [&](const VectorXd& sigma, const VectorXd& sigma_prime) -> Vector6d {
-    const ObjectSpaceTerms t = CalcObjectSpaceTerms(scene_.robot, scene_.grasp, pinv, sigma, sigma_prime);
-    return t.M_tilde * X_o_ddot + t.C_tilde * scene_.X_o_dot + t.N_tilde - t.G_J_T * force_;
-  };
-  // Measured 5e-12.
-  constexpr double kTolerance = 5e-11;
-  EXPECT_TRUE(MatrixNear(calc_residual(scene_.xi, p.xi_dot), Vector6d::Zero(), kTolerance));
-  // Wrong null-space motions do not satisfy it.
-  EXPECT_GT(calc_residual(VectorXd::Zero(scene_.robot.size()), p.xi_dot).norm(), 1e3 * kTolerance);
-  EXPECT_GT(calc_residual(scene_.xi, VectorXd::Zero(scene_.robot.size())).norm(), 1e3 * kTolerance);
 }
 
 // (47): pseudoinverse and projector give back the motion that satisfies the constraint.
@@ -212,19 +157,6 @@ TEST(ConstrainedDynamics, OneFingerPushesABall) {
   EXPECT_TRUE(MatrixNear(s.xi_dot, Vector3d((kPush - f) / 6.0, 0.0, 0.0), kTolerance));
 }
 
-TEST(ConstrainedDynamics, TermsByPoseAreThoseByCoordinates) {
-  GraspScene scene;
-  std::mt19937 random(6);
-  scene.DrawVelocities(&random, 1.0);
-  GraspTerms by_pose(scene.model, scene.fingertips, scene.object, scene.surface);
-  by_pose.SetPose(scene.robot, CalcObjectPose(scene.X_o), scene.grasp.V_Bo(), scene.kappa);
-  EXPECT_TRUE(MatrixNear(by_pose.G(), scene.grasp.G(), 0.0));
-  EXPECT_TRUE(MatrixNear(by_pose.G_dot(), scene.grasp.G_dot(), 0.0));
-  EXPECT_TRUE(MatrixNear(by_pose.J_B_dot(), scene.grasp.J_B_dot(), 0.0));
-  EXPECT_TRUE(MatrixNear(by_pose.body().N_o, scene.grasp.body().N_o, 0.0));
-  EXPECT_TRUE(MatrixNear(by_pose.slip_bias(), scene.grasp.slip_bias(), 0.0));
-}
-
 TEST(ConstrainedDynamics, RejectsContactsThatDependOnEachOther) {
   GraspScene scene;
   const std::vector<int> twice = {scene.fingertips[0], scene.fingertips[0]};
@@ -235,16 +167,6 @@ TEST(ConstrainedDynamics, RejectsContactsThatDependOnEachOther) {
   const VectorXd force = VectorXd::Zero(scene.robot.size());
   EXPECT_TRUE(Throws<SingularityError>([&] { return dynamics.Predict(scene.robot, grasp, force); },
                                        "contact constraints depend on each other"));
-}
-
-TEST(ConstrainedDynamics, RejectsWrongSizes) {
-  GraspScene scene;
-  ConstrainedDynamics dynamics(scene.model, 3);
-  const VectorXd force = VectorXd::Zero(scene.robot.size());
-  EXPECT_TRUE(Throws<std::invalid_argument>([&] { return dynamics.Predict(scene.robot, scene.grasp, force); },
-                                            "number of contact forces"));
-  EXPECT_TRUE(Throws<std::invalid_argument>(
-      [&] { return dynamics.Predict(scene.robot, scene.grasp, VectorXd::Zero(3)); }, "length of force"));
 }
 
 // E_bar' = diag(S_v^T E_v, 1), for both choices of v.

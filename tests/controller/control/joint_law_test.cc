@@ -9,7 +9,6 @@
 #include "controller/control/constrained_dynamics.h"
 #include "controller/control/joint_controller.h"
 #include "controller/control/joint_motion.h"
-#include "tests/common/allocation_counter.h"
 #include "tests/common/matrix_near.h"
 #include "tests/common/paper_robot.h"
 
@@ -108,27 +107,6 @@ TEST_F(JointLawTest, FrictionIsCompensatedAlongTheDesiredRate) {
     }
     EXPECT_TRUE(MatrixNear(CalcTorque(law, desired_), expected, kTorqueRounding));
   }
-}
-
-TEST_F(JointLawTest, AllocatesNothing) {
-  gains_.coulomb = gains_.viscous = gains_.D;
-  JointLaw law(model_, ControlLaw::kFeedforwardPd, gains_);
-  const AllocationCounter counter;
-  law.CalcTorque(robot_, q_, xi_, desired_);
-  EXPECT_EQ(counter.count(), 0);
-}
-
-TEST_F(JointLawTest, RefusesWhatItCannotDrive) {
-  EXPECT_THROW(JointLaw(ReadPaperRobot(), ControlLaw::kComputedTorque, gains_), std::invalid_argument);
-  EXPECT_THROW(JointLaw(model_, ControlLaw::kImpedance, gains_), std::invalid_argument);
-  JointGains wrong = gains_;
-  wrong.coulomb.setOnes(6);
-  EXPECT_THROW(JointLaw(model_, ControlLaw::kComputedTorque, wrong), std::invalid_argument);
-  wrong = gains_;
-  wrong.coulomb_velocity = 0.0;
-  EXPECT_THROW(JointLaw(model_, ControlLaw::kComputedTorque, wrong), std::invalid_argument);
-  gains_.K_v.resize(6);
-  EXPECT_THROW(JointLaw(model_, ControlLaw::kComputedTorque, gains_), std::invalid_argument);
 }
 
 // Seven joints: one more than a block of the trajectories that the motion is made of.

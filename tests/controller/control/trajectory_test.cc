@@ -11,7 +11,6 @@
 
 #include "controller/common/errors.h"
 #include "controller/object/euler_zyz.h"
-#include "tests/common/allocation_counter.h"
 #include "tests/common/finite_difference.h"
 #include "tests/common/matrix_near.h"
 #include "tests/common/throws.h"
@@ -249,31 +248,6 @@ TEST(Trajectory, SumAddsItsParts) {
   EXPECT_TRUE(MatrixNear(sum.X_d, circle.X_d + move.X_d - MakeStart(), kRounding));
   EXPECT_TRUE(MatrixNear(sum.X_d_dot, circle.X_d_dot + move.X_d_dot, kRounding));
   EXPECT_TRUE(MatrixNear(sum.X_d_ddot, circle.X_d_ddot + move.X_d_ddot, kRounding));
-}
-
-TEST(Trajectory, RejectsWrongNumbers) {
-  const Vector6d X = MakeStart();
-  const auto rejects = [](const auto& make, const std::string& text) {
-    return Throws<std::invalid_argument>([&] { make(); }, text);
-  };
-  EXPECT_TRUE(rejects([&] { MakeLineTrajectory(X, X, -1.0); }, "ramp_time"));
-  EXPECT_TRUE(rejects([&] { MakePointToPointTrajectory(X, X, 0.0); }, "duration"));
-  EXPECT_TRUE(rejects([&] { MakeOscillationTrajectory(X, X, 0.0, 1.0); }, "frequency"));
-  EXPECT_TRUE(rejects([&] { MakeOscillationTrajectory(X, X, 1.0, 1.0, 1.9); }, "end_time"));
-  EXPECT_TRUE(rejects([&] { MakeWeaveTrajectory(X, {0.0, 1.0, 1.0}, 0.1, 0.0); }, "wavelength"));
-  EXPECT_TRUE(rejects([&] { MakeCircleTrajectory(X, {0.0, 1.0, 1.0}, 0.0); }, "radius"));
-  EXPECT_TRUE(rejects([&] { MakeWayPointTrajectory(X, {}); }, "number of way-points"));
-  EXPECT_TRUE(rejects([&] { MakeWayPointTrajectory(X, {{1.0, X}, {1.0, X}}); }, "time of way-point"));
-  EXPECT_TRUE(rejects([&] { MakeSumTrajectory(X, {}); }, "number of parts"));
-}
-
-TEST(Trajectory, EvaluationDoesNotAllocate) {
-  for (const auto& [name, trajectory] : MakeAll()) {
-    const AllocationCounter counter;
-    const DesiredMotion motion = trajectory->Evaluate(1.0);
-    EXPECT_EQ(counter.count(), 0) << name;
-    EXPECT_GT(motion.X_d.norm(), 0.1);
-  }
 }
 
 std::unique_ptr<Trajectory> Parse(const std::string& text) {
