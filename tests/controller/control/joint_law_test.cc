@@ -9,6 +9,7 @@
 #include "controller/control/constrained_dynamics.h"
 #include "controller/control/joint_controller.h"
 #include "controller/control/joint_motion.h"
+#include "tests/common/allocation_counter.h"
 #include "tests/common/matrix_near.h"
 #include "tests/common/paper_robot.h"
 
@@ -107,6 +108,14 @@ TEST_F(JointLawTest, FrictionIsCompensatedAlongTheDesiredRate) {
     }
     EXPECT_TRUE(MatrixNear(CalcTorque(law, desired_), expected, kTorqueRounding));
   }
+}
+
+TEST_F(JointLawTest, AllocatesNothing) {
+  gains_.coulomb = gains_.viscous = gains_.D;
+  JointLaw law(model_, ControlLaw::kFeedforwardPd, gains_);
+  const AllocationCounter counter;
+  law.CalcTorque(robot_, q_, xi_, desired_);
+  EXPECT_EQ(counter.count(), 0);
 }
 
 // Seven joints: one more than a block of the trajectories that the motion is made of.

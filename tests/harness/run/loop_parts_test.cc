@@ -1,32 +1,14 @@
-// The loop takes any plant and any controller, and its record tells what each was told and did.
+// The loop computes the same on one thread and on two, and its record has what each part was told and did.
 
 #include <gtest/gtest.h>
 
 #include <utility>
 
 #include "harness/run/runner.h"
-#include "tests/harness/run/changed_parts.h"
 #include "tests/harness/run/shipped_run.h"
 
 namespace dexcheck::testing::loop_parts_test {
 namespace {
-
-class LoopPartsTest : public ::testing::Test {
- protected:
-  LoopPartsTest() : shipped_("curve", {"duration=0.1"}), parts_(MakeLoopParts(shipped_.setup())) {}
-
-  const StepRecord& Run() {
-    runner_ = RunParts(shipped_.setup(), std::move(parts_));
-    return runner_->loop().record();
-  }
-  [[nodiscard]] double Worst(std::string_view check) const {
-    return runner_->loop().checks().Find(check).worst;
-  }
-
-  ShippedRun shipped_;
-  LoopParts parts_;
-  std::unique_ptr<Runner> runner_;
-};
 
 // Each check's value at each step, of tasks too, and how a run ends that fails.
 TEST(TwoThreads, GiveTheSameBits) {
@@ -83,28 +65,10 @@ TEST(TwoThreads, AreUsedWhereTheyAreFaster) {
   }
 }
 
-TEST_F(LoopPartsTest, AnotherPlantOfTheSameKindGivesTheSameBits) {
-  parts_.plant = std::make_unique<ChangedPlant>(std::move(parts_.plant), 1.0);
-  const StepRecord& step = Run();
-  shipped_.Run();
-  EXPECT_EQ(step.reading.qpos, shipped_.step().reading.qpos);
-  EXPECT_EQ(step.command.tau, shipped_.step().command.tau);
-  EXPECT_EQ(step.findings.xi_dot_model, shipped_.step().findings.xi_dot_model);
-}
-
-TEST_F(LoopPartsTest, AWrongLawMovesTheObjectButIsNoFaultOfTheModel) {
-  parts_.controller = std::make_unique<ChangedController>(
-      std::move(parts_.controller), [](const GraspModel&, Command* command) { command->tau *= 0.999; });
-  const StepRecord& step = Run();
-  EXPECT_EQ(runner_->result().failure, "");
-  EXPECT_LE(Worst("inverse_dynamics_robot"), 1e-5);
-  EXPECT_GT(runner_->result().tracking.position_max(), 1e-6);
-  // The motion is not the one that the law demanded.
-  EXPECT_GT((step.response.xi_dot - step.command.demand.xi_dot).norm(), 1e-3);
-}
-
-TEST_F(LoopPartsTest, TheRecordHasWhatTheLawDemandedAndWhatCameOfIt) {
-  const StepRecord& step = Run();
+TEST(StepRecord, HasWhatTheLawDemandedAndWhatCameOfIt) {
+  ShippedRun run("curve", {"duration=0.1"});
+  run.Run();
+  const StepRecord& step = run.step();
   EXPECT_EQ(step.step, 100);
   EXPECT_NEAR(step.time, 0.099, 1e-12);
   const double scale = step.findings.f_c.norm();
