@@ -102,36 +102,5 @@ TEST_F(ContactJacobianTest, RateMatchesDifferencesWhileTheFingerRolls) {
   EXPECT_GT(without_rolling, 1e6 * kDifference);
 }
 
-// Runs recorded before stay the same: of each entry the products are added up in the same order.
-TEST_F(ContactJacobianTest, ChainsColumnsHaveTheBitsOfTheWholeProduct) {
-  constexpr ColumnRun kRuns[] = {{0, 4}, {11, 7}, {30, 1}};
-  for (const Eigen::Index forces : {9, 12}) {  // the rows' places in memory decide how they are added up
-    Matrix6Xd J_f = Matrix6Xd::Zero(6, 37);
-    Matrix6Xd J_f_dot = J_f;
-    for (const ColumnRun& run : kRuns) {
-      for (Eigen::Index col = run.begin; col < run.begin + run.count; ++col) {
-        J_f.col(col) = DrawVector(random_, 6);
-        J_f_dot.col(col) = DrawVector(random_, 6);
-      }
-    }
-    MatrixXd whole(forces, 37), whole_dot(forces, 37);
-    MatrixXd chain = MatrixXd::Zero(forces, 37), chain_dot = chain;
-    Eigen::Index row = 0;
-    for (const RollingFinger& motion : MakeMotions()) {
-      if (row == forces) break;
-      const Contact contact = motion.CalcContact(0.1);
-      CalcContactJacobian(contact, J_f, whole.middleRows(row, 3));
-      CalcContactJacobianDot(contact, J_f, J_f_dot, whole_dot.middleRows(row, 3));
-      CalcContactJacobian(contact, J_f, chain.middleRows(row, 3), kRuns);
-      CalcContactJacobianDot(contact, J_f, J_f_dot, chain_dot.middleRows(row, 3), kRuns);
-      row += 3;
-    }
-    ASSERT_EQ(row, forces);
-    ASSERT_GT(whole_dot.norm(), 1.0);
-    EXPECT_TRUE(chain == whole);
-    EXPECT_TRUE(chain_dot == whole_dot);
-  }
-}
-
 }  // namespace
 }  // namespace dexcheck::testing::contact_jacobian_test

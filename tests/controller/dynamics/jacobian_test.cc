@@ -148,27 +148,6 @@ TEST_P(Jacobian, LinkVelocityIsTheDerivativeOfTheLinksPose) {
   EXPECT_GT(largest, kVisible);
 }
 
-// A joint's axis displaced by a milliradian, and rates taken along another motion, are seen.
-TEST_P(Jacobian, MutationsAreSeen) {
-  RobotSpec spec = model_.spec();
-  spec.joints.back().mdh.alpha += 1e-3;
-  const RobotModel bent(spec);
-  ModelTerms other(bent, GetParam().coordinates);
-  terms_.SetState(q_, velocity_);
-  other.SetState(q_, velocity_);
-  Matrix6Xd J(6, terms_.size());
-  Matrix6Xd J_dot(6, terms_.size());
-  Matrix6Xd J_bent(6, terms_.size());
-  Matrix6Xd J_dot_bent(6, terms_.size());
-  const int last = frames_ - 1;
-  terms_.CalcFrameJacobian(last, J, J_dot);
-  other.CalcFrameJacobian(last, J_bent, J_dot_bent);
-  EXPECT_GT((J - J_bent).cwiseAbs().maxCoeff(), 1e-5);
-  const Matrix6Xd wrong_motion =
-      Differentiate([&](double t) -> Matrix6Xd { return CalcJacobian(last, q_ - t * q_dot_); }, kStateStep);
-  EXPECT_GT((J_dot - wrong_motion).cwiseAbs().maxCoeff(), kVisible);
-}
-
 // A mobile base is placed by q_v; a rotation that its poses would not show must not be accepted silently.
 TEST(BasePose, OfAMobileBaseIsNotTurned) {
   std::mt19937 random(3);

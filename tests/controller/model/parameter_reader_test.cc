@@ -113,35 +113,6 @@ TEST_F(AssistantRobot, PutsJointsAndMassesInPlaceAtHome) {
   }
 }
 
-TEST_F(AssistantRobot, ReadsJointsWheelsAndObject) {
-  const Joint& elbow = model_.joint(model_.FindJoint("l_elbow"));
-  EXPECT_EQ(elbow.lower, -0.1);
-  EXPECT_EQ(elbow.upper, 2.5);
-  EXPECT_EQ(elbow.damping, 0.2);
-  EXPECT_EQ(elbow.armature, 0.02);
-  EXPECT_EQ(model_.link_name(elbow.parent), "l_upper_arm");
-
-  // A disc of 1.5 kg, radius 0.1 and width 0.04: m r^2/2 and m (3 r^2 + w^2)/12.
-  const Base& base = model_.base();
-  EXPECT_EQ(base.X_B0.translation(), Vector3d(0.0, 0.0, 0.1));
-  EXPECT_EQ(base.velocity, DriveVelocity::kTwist);
-  EXPECT_EQ(base.wheel_distance, 0.4);
-  EXPECT_NEAR(base.wheel.spin_inertia, 0.0075, kRounding);
-  EXPECT_NEAR(base.wheel.transverse_inertia, 0.00395, kRounding);
-  EXPECT_EQ(base.wheel.damping, 0.02);
-  EXPECT_EQ(base.wheel.armature, 0.004);
-  EXPECT_EQ(base.wheel_joint_right, "wheel_right");
-  EXPECT_EQ(base.wheel_joint_left, "wheel_left");
-
-  ASSERT_TRUE(model_.object());
-  EXPECT_EQ(model_.object()->name, "torus");
-  EXPECT_EQ(std::get<SolidTorus>(model_.object()->shape).ring_radius, 0.035);
-  EXPECT_EQ(std::get<SolidTorus>(model_.object()->shape).tube_radius, 0.011);
-  EXPECT_EQ(model_.object()->friction, 0.8);
-  // m (R^2 + 3/4 r^2)
-  EXPECT_NEAR(model_.object()->body.inertia(2, 2), 0.2 * (0.001225 + 0.75 * 0.000121), kRounding);
-}
-
 TEST(Panda, StandsStraightUpAtHome) {
   const RobotModel model = ReadRobotModel(kParameters / "panda.toml");
   EXPECT_EQ(model.num_positions(), 7);
