@@ -104,28 +104,6 @@ TEST(Overlay, PlotRisesWithTheError) {
   EXPECT_NEAR(mean_row(std::numeric_limits<double>::quiet_NaN()), high, 0.5) << "what is no number is worst";
 }
 
-TEST(Overlay, GrowsWithThePictureAndStaysInItsCorner) {
-  Overlay overlay;
-  const OverlayState state = MakeState();
-  for (const int height : {90, 360, 720, 1080}) {
-    Image image(height * 16 / 9, height);
-    std::ranges::fill(image.rgb, std::uint8_t{255});
-    overlay.Draw(state, &image);
-    int right = 0;
-    int bottom = 0;
-    for (int y = 0; y < image.height; ++y) {
-      for (int x = 0; x < image.width; ++x) {
-        if (image.Pixel(x, y)[0] > 200) continue;
-        right = std::max(right, x);
-        bottom = std::max(bottom, y);
-      }
-    }
-    EXPECT_NEAR(right, (20.0 + 316.0) * height / 720.0, 2.0);
-    EXPECT_LT(bottom, height / 2);
-    EXPECT_GT(bottom, height / 8);
-  }
-}
-
 TEST(Overlay, ShortensATitleThatIsTooLong) {
   Overlay overlay;
   OverlayState state = MakeState();

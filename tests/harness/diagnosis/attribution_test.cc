@@ -291,14 +291,6 @@ TEST(Attribute, AnExpectationThatFailsHasAMeasuredCause) {
   EXPECT_EQ(run.Explain().cause, Cause::kControlLaw);
 }
 
-TEST(Attribute, EvidenceHasUnitPlaceAndTime) {
-  FakeRun run;
-  run.Fail("fingertip_slip", 0.125);
-  run.step("fingertip_slip").unit = "m";
-  run.step("fingertip_slip").part = "rf2_tip";
-  EXPECT_EQ(run.Explain().evidence, "fingertip_slip 2 m (bound 1), first above it at t = 0.125 s, rf2_tip");
-}
-
 // Whichever checks fail, in whichever order: there is a cause, each failed check gets one, and the check that
 // the run's cause is taken from has the same.
 TEST(Attribute, NeverContradictsItself) {

@@ -71,40 +71,6 @@ TEST(CollideSphereTorus, BallInTheHoleTouchesBothSides) {
   EXPECT_NEAR(contacts[1].distance, 0.0, kRounding);
 }
 
-TEST(TorusCollision, EngineContactIsTheClosedForm) {
-  const MjModelPtr model = LoadBallAndTorus(kBall, true);
-  const MjDataPtr data = MakeData(*model);
-  const Torus torus(kRing, kTube);
-  std::mt19937 random(5);
-  std::uniform_real_distribution<double> draw(-1.0, 1.0);
-  int touching = 0;
-  for (int i = 0; i < 500; ++i) {
-    Eigen::Quaterniond rotation(draw(random), draw(random), draw(random), draw(random));
-    rotation.normalize();
-    const Vector3d origin(draw(random), draw(random), draw(random));
-    const Vector3d in_torus = 0.05 * Vector3d(draw(random), draw(random), draw(random));
-    const Vector3d ball = origin + rotation * in_torus;
-    mju_copy3(data->qpos, origin.data());
-    const double quaternion[4] = {rotation.w(), rotation.x(), rotation.y(), rotation.z()};
-    mju_copy4(data->qpos + 3, quaternion);
-    mju_copy3(data->qpos + 7, ball.data());
-    mj_fwdPosition(model.get(), data.get());
-    const SurfaceProjection expected = torus.Project(in_torus);
-    const double distance = expected.distance - kBall;
-    ASSERT_EQ(data->ncon > 0, distance <= 0.0);
-    if (data->ncon == 0) continue;
-    ++touching;
-    const mjContact& contact = data->contact[0];
-    const SurfaceGeometry surface = torus.Evaluate(expected.alpha);
-    // The engine's poses carry rounding of world coordinates of about one metre.
-    EXPECT_NEAR(contact.dist, distance, 10.0 * kRounding);
-    const Vector3d normal = rotation * surface.R.col(2);
-    const double sign = contact.geom1 == mj_name2id(model.get(), mjOBJ_GEOM, "ball") ? -1.0 : 1.0;
-    EXPECT_TRUE(MatrixNear(Eigen::Map<const Vector3d>(contact.frame), sign * normal, 1e-12));
-  }
-  EXPECT_GT(touching, 50);
-}
-
 double HeightAfterFall(bool exact) {
   const MjModelPtr model = LoadBallAndTorus(kBall, exact, /*torus_fixed=*/true);
   const MjDataPtr data = MakeData(*model);

@@ -11,7 +11,6 @@
 
 #include "controller/control/trajectory_controller.h"
 #include "harness/plant/engine_plant.h"
-#include "tests/common/matrix_near.h"
 #include "tests/harness/run/shipped_run.h"
 
 namespace dexcheck::testing::rigid_plant_test {
@@ -129,30 +128,6 @@ TEST_F(RigidPlantTest, ContactsStayClosedAndRoll) {
     EXPECT_LT(gap, fourth ? 5e-10 : 5e-5);
     EXPECT_LT(slip, fourth ? 1e-8 : 1e-2);
   }
-}
-
-TEST_F(RigidPlantTest, RespondsWithTheForcesThatBalanceTheObject) {
-  const std::unique_ptr<RigidPlant> plant = MakePlant(1e-3);
-  PlantReading reading;
-  PlantResponse response;
-  Step(plant.get(), MakeTorques(), &reading);
-  plant->Read(&response);
-  // m (p_ddot - g) = sum of forces
-  const MassProperties& body = setup_.object().body;
-  const Vector3d v = reading.state.V_Bo.head<3>();
-  const Vector3d omega = reading.state.V_Bo.tail<3>();
-  Vector3d force = -body.mass * reading.state.X_Bo.linear() * (response.V_Bo_dot.head<3>() + omega.cross(v));
-  force += body.mass * setup_.model().gravity();
-  ASSERT_GT(force.norm(), 0.1);
-  // Whoever looks at the wheels finds both, and no slip.
-  ASSERT_EQ(response.wheels.size(), setup_.adapter().wheels().size());
-  for (const BodyContact& wheel : response.wheels) EXPECT_EQ(wheel.slip.norm(), 0.0);
-  for (const PlantContact& contact : response.contacts) {
-    EXPECT_TRUE(contact.touching);
-    EXPECT_GT(contact.force.dot(contact.normal), 0.0);
-    force += contact.force;
-  }
-  EXPECT_TRUE(MatrixNear(force, Vector3d::Zero().eval(), 1e-9));
 }
 
 // A push on a link and one on the object: known to the checks, and the engine's robot goes where the rigid

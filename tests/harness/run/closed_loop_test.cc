@@ -140,16 +140,5 @@ TEST(ClosedLoop, StepsWithoutAllocation) {
   }
 }
 
-TEST(ClosedLoop, TorquesCanBeHeldForSeveralSteps) {
-  ShippedRun run("hold", {"duration=0.1", "plant.control_step=0.01"});
-  VectorXd last;
-  int changes = 0;
-  run.Run([&] {
-    if (last.size() > 0 && run.step().command.tau != last) ++changes;
-    last = run.step().command.tau;
-  });
-  EXPECT_EQ(changes, 9);
-}
-
 }  // namespace
 }  // namespace dexcheck::testing::closed_loop_test

@@ -211,20 +211,5 @@ TEST(ShippedScenarios, OtherGraspsPassToo) {
   }
 }
 
-TEST(ShippedScenarios, EitherOrientationErrorWorks) {
-  ShippedRun run("curve", {"duration=2", "control.orientation=rotation"});
-  const RunResult& result = run.Run();
-  EXPECT_TRUE(Passes(result));
-  EXPECT_LE(result.tracking.orientation_max(), 1e-5);
-}
-
-TEST(ShippedScenarios, WheelRatesServeAsWell) {
-  ShippedRun run("paper-ramp",
-                 {"duration=1", "model.base.velocity=wheel_rates", "control.weight={ platform = 0.005 }"});
-  const RunResult& result = run.Run();
-  EXPECT_TRUE(Passes(result));
-  EXPECT_LE(result.tracking.position_max(), 1e-7);
-}
-
 }  // namespace
 }  // namespace dexcheck::testing::scenarios_test
