@@ -320,22 +320,6 @@ TEST(PostureTask, ByHand) {
       Throws<std::invalid_argument>([&] { task.CalcAcceleration(q, xi, sigma_prime); }, "length of damping"));
 }
 
-// With W = 1 an arm that holds nothing gets exactly its own entries of sigma'.
-TEST(PostureTask, IdleArmGetsItsWholeTask) {
-  GraspScene scene(Hands::kRight);
-  std::mt19937 random(5);
-  scene.DrawVelocities(&random, 1.0);
-  const VectorXd sigma_prime = DrawVector(scene.robot.size(), 5.0, &random);
-  ComputedTorque law(scene.model, 4);
-  law.SetDemand(scene.robot, scene.grasp, Vector6d::Ones(), sigma_prime);
-  for (int i = 0; i < scene.robot.size(); ++i) {
-    if (!scene.grasp.J_B().col(i).isZero(0.0)) continue;
-    EXPECT_EQ(law.xi_dot_d()[i], sigma_prime[i]) << i;
-  }
-  EXPECT_TRUE(scene.grasp.J_B().col(11).isZero(0.0));  // l_shoulder_pitch
-  EXPECT_FALSE(scene.grasp.J_B().col(4).isZero(0.0));  // r_shoulder_pitch
-}
-
 TEST(ComputedTorque, RefusesAGraspWithoutFullRank) {
   GraspScene scene;
   // Two contacts leave the object free to turn about the line through them.

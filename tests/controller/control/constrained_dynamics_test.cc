@@ -21,13 +21,6 @@ namespace {
 constexpr double kForceRounding = 1e-12;
 constexpr double kAccelerationRounding = 2e-10;
 
-VectorXd DrawForce(int n, std::mt19937* random) {
-  std::normal_distribution<double> normal(0.0, 0.1);
-  VectorXd force(n);
-  for (double& entry : force) entry = normal(*random);
-  return force;
-}
-
 /// Residuals of (48), (19) and (46).
 struct Balance {
   Balance(const ModelTerms& robot, const GraspTerms& grasp, const VectorXd& force, const Prediction& p)
@@ -45,7 +38,7 @@ class PredictionTest : public ::testing::TestWithParam<Hands> {
   /// Velocities and forces at random, and what the whole system answers with.
   const Prediction& Draw(std::mt19937* random) {
     scene_.DrawVelocities(random, 1.0);
-    force_ = DrawForce(scene_.robot.size(), random);
+    force_ = DrawVector(scene_.robot.size(), 0.2, random);
     return dynamics_.Predict(scene_.robot, scene_.grasp, force_);
   }
   GraspScene scene_{GetParam()};
@@ -66,26 +59,6 @@ TEST_P(PredictionTest, SatisfiesAllThreeEquations) {
     EXPECT_TRUE(
         MatrixNear(balance.contact_residual, VectorXd::Zero(scene_.num_forces()), kAccelerationRounding));
   }
-}
-
-// (47): pseudoinverse and projector give back the motion that satisfies the constraint.
-TEST_P(PredictionTest, Equation47ReproducesTheMotion) {
-  std::mt19937 random(5);
-  const Prediction& p = Draw(&random);
-  const Vector6d X_o_ddot = CalcCoordinateAcceleration(scene_.grasp, p.V_Bo_dot);
-  const ObjectTerms& o = scene_.grasp.coordinates();
-  const MatrixXd G_T = scene_.grasp.G().transpose();
-  const MatrixXd G_T_dot = scene_.grasp.G_dot().transpose();
-  Pseudoinverse pinv("J_B'", scene_.num_forces(), scene_.robot.size());
-  pinv.FactorWeighted(scene_.grasp.J_B(), scene_.robot.M());
-  const MatrixXd J_plus = pinv.CalcMatrix();
-  const MatrixXd N = pinv.CalcProjector();
-  const VectorXd xi = J_plus * G_T * o.P_inv * scene_.X_o_dot + N * scene_.xi;
-  EXPECT_TRUE(MatrixNear(xi, scene_.xi, kForceRounding));
-  const VectorXd xi_dot = J_plus * (G_T_dot * o.P_inv * scene_.X_o_dot + G_T * o.P_inv_dot * scene_.X_o_dot +
-                                    G_T * o.P_inv * X_o_ddot - scene_.grasp.J_B_dot() * xi) +
-                          N * p.xi_dot;
-  EXPECT_TRUE(MatrixNear(xi_dot, p.xi_dot, kAccelerationRounding));
 }
 
 std::string NameHands(const ::testing::TestParamInfo<Hands>& info) {
@@ -175,7 +148,7 @@ TEST(ActuationMap, IsEBar) {
     const RobotModel model = ReadPaperRobot(velocity);
     const ActuationMap actuation(model);
     std::mt19937 random(7);
-    const VectorXd tau = DrawForce(model.num_velocities(), &random);
+    const VectorXd tau = DrawVector(model.num_velocities(), 0.2, &random);
     MatrixXd E_bar = MatrixXd::Identity(tau.size(), tau.size());
     E_bar.topLeftCorner<2, 2>() =
         CalcPlatformConstraint(model.base(), Vector3d(0.1, 0.2, 0.3), Vector2d(0.4, 0.5)).S_v_T_E_v;

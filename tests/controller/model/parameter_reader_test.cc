@@ -72,9 +72,6 @@ TEST_F(AssistantRobot, HasThePapersCoordinates) {
   std::vector<std::string> names;
   for (const Joint& joint : model_.joints()) names.push_back(joint.name);
   EXPECT_EQ(names, expected);
-}
-
-TEST_F(AssistantRobot, OrdersItsFingertips) {
   std::vector<std::string> tips;
   for (const int tip : model_.fingertips()) tips.push_back(model_.frame(tip).name);
   EXPECT_THAT(tips, ElementsAre("rf1_tip", "rf2_tip", "rf3_tip", "rf4_tip", "lf1_tip", "lf2_tip", "lf3_tip",

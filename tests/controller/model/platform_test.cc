@@ -158,28 +158,5 @@ TEST_P(PlatformTest, VirtualPowerBalances) {
   }
 }
 
-TEST_P(PlatformTest, MutatedSignsAreSeen) {
-  const Vector2d tau(3.0, -1.7);
-  const State state{{0.3, -0.2, 0.7},
-                    GetParam() == DriveVelocity::kTwist ? Vector2d(0.8, 0.6) : Vector2d(9.2, 6.8)};
-  const PlatformConstraint good = CalcPlatformConstraint(base_, state.q_v, state.v);
-  const Vector2d wheel_rates = CalcWheelRates(base_, state.v);
-  const double power = tau.dot(wheel_rates);
-
-  // Heading turned the other way in A_v and in S_v.
-  const Eigen::RowVector3d A_v(-good.A_v[0], good.A_v[1], 0.0);
-  EXPECT_GT((A_v * good.S_v).norm(), kVisible);
-  Eigen::Matrix<double, 3, 2> S_v = good.S_v;
-  S_v.row(1) *= -1.0;
-  EXPECT_GT(CalcContactPointSpeed(state.q_v, S_v * state.v, wheel_rates), kVisible);
-  // Right and left wheel exchanged.
-  EXPECT_GT(CalcContactPointSpeed(state.q_v, good.S_v * state.v, wheel_rates.reverse()), kVisible);
-  Eigen::Matrix<double, 3, 2> E_v = good.E_v;
-  E_v.row(2) *= -1.0;
-  EXPECT_GT(std::abs((E_v * tau).dot(good.S_v * state.v) - power), kVisible);
-  // phi_dot with the wrong sign.
-  EXPECT_GT((-good.S_v_dot - CalcSDotByDifference(base_, state)).norm(), kVisible);
-}
-
 }  // namespace
 }  // namespace dexcheck::testing::platform_test

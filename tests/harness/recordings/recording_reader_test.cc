@@ -87,11 +87,8 @@ TEST_F(Formats, TextWithAndWithoutHeaders) {
       OpenRecording(Write("quoted.csv", "t,\"a;b,c\",\"d\"\"e\",\"f\ng\",\"'=h\"\n" + Rows(",")));
   EXPECT_THAT(quoted->names(), ElementsAre("t", "a;b,c", "d\"e", "f\ng", "=h"));
   ExpectRows(quoted.get());
-}
-
-TEST_F(Formats, NumbersOnLinesOfTheirOwn) {
-  std::string text = Rows("\n");
-  ExpectRows(OpenRecording(Write("column.txt", text), "", 5).get());
+  // Numbers on lines of their own.
+  ExpectRows(OpenRecording(Write("column.txt", Rows("\n")), "", 5).get());
 }
 
 TEST_F(Formats, TextThatIsNone) {
