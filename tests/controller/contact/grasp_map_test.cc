@@ -57,20 +57,6 @@ TEST(AdjointTest, IsTheBodyTwistOfTheMovedFrame) {
   EXPECT_TRUE(MatrixNear(Differentiate(along), CalcAdjoint(g) * CalcTwistCross(V), kDifference));
 }
 
-TEST(GraspMapTest, SingleContactByHand) {
-  // Contact at (0.05, 0, 0) of a sphere: at psi = 0 the contact frame is x = +y, y = -z, z = -x of the
-  // object, so f = (-f_3, f_1, -f_2) and tau = p x f = 0.05 (0, f_2, f_1).
-  const Contact contact = MakeContact(Sphere(0.009), Sphere(0.05), {});
-  MatrixXd expected(6, 3);
-  expected << 0.0, 0.0, -1.0,  //
-      1.0, 0.0, 0.0,           //
-      0.0, -1.0, 0.0,          //
-      0.0, 0.0, 0.0,           //
-      0.0, 0.05, 0.0,          //
-      0.05, 0.0, 0.0;
-  EXPECT_TRUE(MatrixNear(CalcG({contact}), expected, kRounding));
-}
-
 // The wrench on the object from force and moment arm in the object frame, without any adjoint.
 TEST(GraspMapTest, WrenchIsForceAndMomentArm) {
   std::mt19937 random(52);

@@ -35,14 +35,6 @@ Vector6d CalcBodyVelocityByDifference(const ObjectState& state) {
   return V_Bo;
 }
 
-TEST(EulerZyz, RotationByHand) {
-  // Three quarter turns: Rot(y) Rot(z) sends x to y, y to z, z to x; Rot(z) then turns y to -x, x to y.
-  Matrix3d R;
-  R << -1, 0, 0, 0, 0, 1, 0, 1, 0;
-  EXPECT_TRUE(MatrixNear(CalcRotationZyz(Vector3d::Constant(kPi / 2)), R, kRounding));
-  EXPECT_TRUE(MatrixNear(CalcZyzAngles(R), Vector3d::Constant(kPi / 2), kRounding));
-}
-
 TEST(EulerZyz, RotationIsTheProductOfElementaryRotations) {
   for (const ObjectState& state : MakeObjectStates(4101, 50)) {
     EXPECT_TRUE(MatrixNear(CalcRotationZyz(state.X_o.tail<3>()), RotationByEigen(state.X_o), kRounding));
@@ -77,25 +69,6 @@ TEST(EulerZyz, PrincipalAnglesLieInTheirRange) {
     EXPECT_LE(std::abs(zyz[2]), kPi);
     EXPECT_TRUE(MatrixNear(CalcRotationZyz(zyz), R, kRounding));
   }
-}
-
-TEST(EulerZyz, PInverseByHand) {
-  // beta = pi/2, alpha = gamma = 0: the object's z axis along world x, its x axis down.
-  // alpha_dot turns about world z = -x of the object, beta_dot about y, gamma_dot about z.
-  Vector6d X_o;
-  X_o << 1, 2, 3, 0, kPi / 2, 0;
-  Matrix6d P_inv = Matrix6d::Zero();
-  P_inv.topLeftCorner<3, 3>() << 0, 0, -1, 0, 1, 0, 1, 0, 0;
-  P_inv.bottomRightCorner<3, 3>() << -1, 0, 0, 0, 1, 0, 0, 0, 1;
-  EXPECT_TRUE(MatrixNear(CalcPInverse(X_o), P_inv, kRounding));
-  EXPECT_TRUE(MatrixNear(CalcP(X_o), P_inv.transpose(), kRounding));  // Orthogonal just here.
-  // With gamma_dot = 3 the world's vertical moves by -3 z x (-x) = 3 y in the object.
-  Vector6d X_o_dot = Vector6d::Zero();
-  X_o_dot[5] = 3.0;
-  Matrix6d P_inv_dot = Matrix6d::Zero();
-  P_inv_dot.topLeftCorner<3, 3>() << 0, 3, 0, 0, 0, 3, 0, 0, 0;
-  P_inv_dot.bottomRightCorner<3, 3>() << 0, 3, 0, 3, 0, 0, 0, 0, 0;
-  EXPECT_TRUE(MatrixNear(CalcPInverseDot(X_o, X_o_dot), P_inv_dot, kRounding));
 }
 
 TEST(EulerZyz, PInverseGivesTheBodyVelocity) {

@@ -18,6 +18,7 @@
 #include "tests/common/matrix_near.h"
 #include "tests/common/paths.h"
 #include "tests/common/random_robot.h"
+#include "tests/common/refused_text.h"
 
 namespace dexcheck::testing::adapter_test {
 namespace {
@@ -219,9 +220,8 @@ TEST_P(AdapterTest, TermsAreTheModels) {
   }
 }
 
-class FreeAdapterTest : public AdapterTest {};
-
-TEST_P(FreeAdapterTest, TiltIsDroppedFromPositions) {
+TEST_P(AdapterTest, TiltIsDroppedFromPositions) {
+  if (GetParam().base == BaseType::kFixed || !GetParam().free_joint) return;
   const VectorXd q = DrawPositions();
   VectorXd qpos = CalcQpos(q);
   // A turn about a horizontal axis through Sigma_0's origin leaves x_c, y_c; phi is the heading of its x
@@ -239,9 +239,8 @@ TEST_P(FreeAdapterTest, TiltIsDroppedFromPositions) {
   EXPECT_TRUE(MatrixNear(back, q, kRounding));
 }
 
-class WheeledAdapterTest : public AdapterTest {};
-
-TEST_P(WheeledAdapterTest, WheelsRollWithoutSlip) {
+TEST_P(AdapterTest, WheelsRollWithoutSlip) {
+  if (!HasWheels(GetParam())) return;
   VelocityMap map(adapter(), Coordinates::kReduced);
   for (int trial = 0; trial < kTrials; ++trial) {
     const VectorXd q = DrawPositions();
@@ -258,9 +257,8 @@ TEST_P(WheeledAdapterTest, WheelsRollWithoutSlip) {
 }
 
 // v = [thetadot_r, thetadot_l] are the rates of the wheels' hinges themselves.
-class WheelRatesAdapterTest : public AdapterTest {};
-
-TEST_P(WheelRatesAdapterTest, AreTheHinges) {
+TEST_P(AdapterTest, WheelRatesAreTheHinges) {
+  if (GetParam().velocity != DriveVelocity::kWheelRates) return;
   VelocityMap map(adapter(), Coordinates::kReduced);
   const VectorXd xi = DrawVelocities(map.size());
   map.SetState(DrawPositions(), xi);
@@ -272,22 +270,7 @@ TEST_P(WheelRatesAdapterTest, AreTheHinges) {
   }
 }
 
-std::vector<Case> Select(const std::function<bool(const Case&)>& wanted) {
-  std::vector<Case> cases;
-  for (const Case& one : MakeCases()) {
-    if (wanted(one)) cases.push_back(one);
-  }
-  return cases;
-}
-
-std::string PrintName(const ::testing::TestParamInfo<Case>& info) { return info.param.name; }
-bool IsFree(const Case& one) { return one.base != BaseType::kFixed && one.free_joint; }
-bool HasWheelRates(const Case& one) { return one.velocity == DriveVelocity::kWheelRates; }
-
-INSTANTIATE_TEST_SUITE_P(Bases, AdapterTest, ::testing::ValuesIn(MakeCases()), PrintName);
-INSTANTIATE_TEST_SUITE_P(Bases, FreeAdapterTest, ::testing::ValuesIn(Select(IsFree)), PrintName);
-INSTANTIATE_TEST_SUITE_P(Bases, WheeledAdapterTest, ::testing::ValuesIn(Select(HasWheels)), PrintName);
-INSTANTIATE_TEST_SUITE_P(Bases, WheelRatesAdapterTest, ::testing::ValuesIn(Select(HasWheelRates)), PrintName);
+INSTANTIATE_TEST_SUITE_P(Bases, AdapterTest, ::testing::ValuesIn(MakeCases()), CaseName());
 
 TEST(ShippedAdapter, LeavesTheObjectAlone) {
   const RobotModel model = ReadRobotModel(SourcePath("/controller/parameters/assistant_robot.toml"));
