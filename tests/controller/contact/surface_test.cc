@@ -134,23 +134,6 @@ TEST(SurfaceTest, ExchangedChartOrderTurnsTheNormalInward) {
   EXPECT_TRUE(MatrixNear(geometry.K, -Matrix2d::Identity(), kRounding));
 }
 
-TEST(SurfaceTest, TorusByHand) {
-  const Torus torus(0.3, 0.1);
-  const SurfaceGeometry outer = torus.Evaluate({0.0, 0.0, 0});
-  EXPECT_TRUE(MatrixNear(outer.p, Vector3d(0.4, 0.0, 0.0), kRounding));
-  EXPECT_TRUE(MatrixNear(outer.R.col(2), Vector3d::UnitX(), kRounding));
-  EXPECT_TRUE(MatrixNear(outer.K, Vector2d(2.5, 10.0).asDiagonal().toDenseMatrix(), 10.0 * kRounding));
-  const SurfaceGeometry inner = torus.Evaluate({0.0, kPi, 0});
-  EXPECT_TRUE(MatrixNear(inner.p, Vector3d(0.2, 0.0, 0.0), kRounding));
-  EXPECT_TRUE(MatrixNear(inner.R.col(2), -Vector3d::UnitX(), kRounding));
-  // The hole is hollow along the ring: curvature -1 / (R - r).
-  EXPECT_TRUE(MatrixNear(inner.K, Vector2d(-5.0, 10.0).asDiagonal().toDenseMatrix(), 10.0 * kRounding));
-  const SurfaceGeometry top = torus.Evaluate({0.0, kPi / 2.0, 0});
-  EXPECT_TRUE(MatrixNear(top.M, Vector2d(0.3, 0.1).asDiagonal().toDenseMatrix(), kRounding));
-  // sin(v) / (R + r cos v)
-  EXPECT_TRUE(MatrixNear(top.T, Eigen::RowVector2d(1.0 / 0.3, 0.0), 10.0 * kRounding));
-}
-
 TEST(SurfaceTest, ChartsAgreeOnThePointAndItsCurvatures) {
   std::mt19937 random(4);
   for (const NamedSurface& named : {MakeSphere(), MakeEllipsoid()}) {

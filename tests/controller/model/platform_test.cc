@@ -105,20 +105,6 @@ TEST(PlatformByHand, FacingYWithTwist) {
   EXPECT_TRUE(MatrixNear(platform.S_v_T_E_v * tau, Vector2d(40.0, 4.0), kRounding));
 }
 
-TEST(PlatformByHand, FacingYWithWheelRates) {
-  const Base base = MakeBase(DriveVelocity::kWheelRates);
-  const Vector2d v(11.0, 9.0);
-  const PlatformConstraint platform = CalcPlatformConstraint(base, {3.0, -2.0, kPi / 2}, v);
-  Eigen::Matrix<double, 3, 2> S_v;
-  S_v << 0.0, 0.0, 0.05, 0.05, 0.25, -0.25;
-  EXPECT_TRUE(MatrixNear(platform.S_v, S_v, kRounding));
-  EXPECT_TRUE(MatrixNear(platform.S_v * v, Vector3d(0.0, 1.0, 0.5), kRounding));
-  EXPECT_TRUE(MatrixNear(platform.S_v_dot * v, Vector3d(-0.5, 0.0, 0.0), kRounding));
-  EXPECT_TRUE(MatrixNear(CalcWheelRates(base, v), v, kRounding));
-  // The wheel torques are the generalised forces on the wheel rates.
-  EXPECT_TRUE(MatrixNear(platform.S_v_T_E_v, Matrix2d::Identity(), kRounding));
-}
-
 TEST_P(PlatformTest, SSpansTheNullSpaceOfA) {
   for (const State& state : states_) {
     const PlatformConstraint platform = CalcPlatformConstraint(base_, state.q_v, state.v);

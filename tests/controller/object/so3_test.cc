@@ -46,23 +46,6 @@ Matrix3d RotationByEigen(const Vector3d& phi) {
   return Eigen::AngleAxisd(theta, phi / theta).toRotationMatrix();
 }
 
-TEST(So3, ByHand) {
-  Matrix3d quarter_turn;
-  quarter_turn << 0, -1, 0, 1, 0, 0, 0, 0, 1;
-  EXPECT_TRUE(MatrixNear(ExpSo3({0, 0, kPi / 2}), quarter_turn, kRounding));
-  EXPECT_TRUE(MatrixNear(LogSo3(quarter_turn), Vector3d(0, 0, kPi / 2), kRounding));
-  // A third of a turn about (1, 1, 1) sends x to y, y to z, z to x.
-  Matrix3d cycle;
-  cycle << 0, 0, 1, 1, 0, 0, 0, 1, 0;
-  const Vector3d third = Vector3d::Constant(2 * kPi / 3 / std::sqrt(3.0));
-  EXPECT_TRUE(MatrixNear(ExpSo3(third), cycle, kRounding));
-  EXPECT_TRUE(MatrixNear(LogSo3(cycle), third, kRounding));
-  // At theta = pi about z: a = 2/pi^2, b = 1/pi^2, so J_l = [0, -2/pi, 0; 2/pi, 0, 0; 0, 0, 1].
-  Matrix3d J_l;
-  J_l << 0, -2 / kPi, 0, 2 / kPi, 0, 0, 0, 0, 1;
-  EXPECT_TRUE(MatrixNear(CalcLeftJacobian({0, 0, kPi}), J_l, kRounding));
-}
-
 TEST(So3, ExpAgreesWithAngleAxis) {
   Random random(3101);
   for (const double angle : kAngles) {
