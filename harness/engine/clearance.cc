@@ -207,7 +207,6 @@ double Clearance::BoundDistance(const Solid& a, const Solid& b, const Pose& X_AB
 }
 
 double Clearance::CalcBudget(int index, const BodyPoses& bodies, double time) {
-  ++looked_at_;
   const WatchedPair& pair = pairs_[static_cast<size_t>(index)];
   State& state = states_[static_cast<size_t>(index)];
   const double smallest = nearest_[static_cast<size_t>(pair.pairs)].distance;

@@ -85,8 +85,6 @@ class Clearance {
   [[nodiscard]] std::pair<double, int> FindDeepest() const;
   /// Number of distances that were measured so far.
   [[nodiscard]] long measured() const { return measured_; }
-  /// Number of pairs that were looked at so far: measured, or found to be far enough apart still.
-  [[nodiscard]] long looked_at() const { return looked_at_; }
   /// "r_palm and bench".
   [[nodiscard]] std::string Describe(int pair) const;
 
@@ -139,7 +137,7 @@ class Clearance {
   std::array<Nearest, kPairClassCount> nearest_;
   std::vector<int> overlapping_;
   bool has_begun_ = false;
-  long measured_ = 0, looked_at_ = 0;
+  long measured_ = 0;
 };
 
 // Overlaps of a robot's bodies in a posture.

@@ -5,7 +5,6 @@
 #include "controller/common/text.h"
 #include "controller/contact/shapes.h"
 #include "controller/model/platform.h"
-#include "controller/object/object_dynamics.h"
 #include "controller/object/so3.h"
 #include "harness/engine/map_vector.h"
 #include "harness/plant/disturbances.h"
@@ -177,7 +176,6 @@ void RigidPlant::Evaluate(const State& state, const Vector3d& turn, Rate* rate) 
   for (size_t i = 0; i < gaps_.size(); ++i) {
     rate->kappa_dot.segment<5>(5 * static_cast<Eigen::Index>(i)) = grasp_.contacts()[i].kappa_dot;
   }
-  rate->power = state.xi.dot(pushed_) + state.V_Bo.dot(on_object) - state.xi.dot(robot_.friction());
 }
 
 void RigidPlant::EvaluateFree(const State& state, Rate* rate) {
@@ -185,7 +183,6 @@ void RigidPlant::EvaluateFree(const State& state, Rate* rate) {
   AddRobotForce(wrenches_, robot_, pushed_);
   CalcCoordinateRates(state.q, state.xi, &rate->q_dot);
   rate->xi_dot = dynamics_.PredictFree(robot_, pushed_).xi_dot;
-  rate->power = state.xi.dot(pushed_) - state.xi.dot(robot_.friction());
 }
 
 void RigidPlant::KeepResponse() {
@@ -233,8 +230,6 @@ void RigidPlant::StepRungeKutta() {
   k2_.p_dot = mean(k1_.p_dot, k2_.p_dot, k3_.p_dot, k4_.p_dot);
   k2_.turn_dot = mean(k1_.turn_dot, k2_.turn_dot, k3_.turn_dot, k4_.turn_dot);
   k2_.V_Bo_dot = mean(k1_.V_Bo_dot, k2_.V_Bo_dot, k3_.V_Bo_dot, k4_.V_Bo_dot);
-  k2_.power = (k1_.power + 2.0 * k2_.power + 2.0 * k3_.power + k4_.power) / 6.0;
-  work_ += h * k2_.power;
   Displace(state_, k2_, h, &stage_);
   std::swap(state_, stage_);
 }
@@ -249,7 +244,6 @@ void RigidPlant::StepEuler() {
   const Vector3d omega = state_.V_Bo.tail<3>();
   const Vector3d p_dot = R * (v + h * (k1_.V_Bo_dot.head<3>() + omega.cross(v)));
   const Vector3d new_omega = omega + h * k1_.V_Bo_dot.tail<3>();
-  work_ += h * k1_.power;
   state_.xi += h * k1_.xi_dot;
   CalcCoordinateRates(state_.q, state_.xi, &k1_.q_dot);
   state_.q += h * k1_.q_dot;
@@ -313,15 +307,6 @@ void RigidPlant::AddVelocity(const MeasuredState& /*state*/, const Vector3d& v) 
 void RigidPlant::Translate(const Vector3d& way) {
   state_.q.head<2>() += way.head<2>();
   state_.X_Bo.translation() += way;
-}
-
-double RigidPlant::CalcEnergy() {
-  robot_.SetState(state_.q, state_.xi);
-  robot_.CalcDynamics();
-  const EnergyAndMomentum energy = robot_.CalcEnergyAndMomentum();
-  if (!holds_) return energy.kinetic + energy.potential;
-  return energy.kinetic + energy.potential + CalcObjectKineticEnergy(grasp_.object(), state_.V_Bo) +
-         CalcObjectPotentialEnergy(grasp_.object(), grasp_.gravity(), state_.X_Bo.translation());
 }
 
 }  // namespace dexcheck

@@ -56,11 +56,6 @@ class RigidPlant final : public Plant {
   void AddVelocity(const MeasuredState& state, const Vector3d& v) override;
   void Translate(const Vector3d& way) override;
 
-  /// Kinetic and potential energy of robot and object at the state, J.
-  [[nodiscard]] double CalcEnergy();
-  /// Work of motors and pushes less the loss by friction, over all steps, J; to the integrator's order.
-  [[nodiscard]] double work() const { return work_; }
-
  private:
   struct State {
     VectorXd q, xi;
@@ -76,7 +71,6 @@ class RigidPlant final : public Plant {
     Vector6d V_Bo_dot = Vector6d::Zero();
     VectorXd kappa_dot;  // 5 each
     VectorXd f_c;        // k, N
-    double power = 0.0;  // W
   };
 
   void FindContacts();
@@ -115,7 +109,6 @@ class RigidPlant final : public Plant {
   std::vector<Wrench> wrenches_;  // held during a step
   VectorXd tau_;                  // n
   VectorXd stabilisation_;        // k, m/s^2
-  double work_ = 0.0;
   double time_ = 0.0;
 
   // Values of the last step, at its beginning.

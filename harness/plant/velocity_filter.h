@@ -35,9 +35,9 @@ class KalmanGains {
   }
   /// Corrects by a measured position: sets the gains of position and velocity on the innovation.
   void Correct() {
-    S_ = xx_ + R_;
-    k_x_ = xx_ / S_;
-    k_v_ = xv_ / S_;
+    const double S = xx_ + R_;  // variance of the innovation
+    k_x_ = xx_ / S;
+    k_v_ = xv_ / S;
     vv_ -= k_v_ * xv_;
     xv_ -= k_x_ * xv_;
     xx_ -= k_x_ * xx_;
@@ -51,13 +51,11 @@ class KalmanGains {
 
   [[nodiscard]] double k_x() const { return k_x_; }
   [[nodiscard]] double k_v() const { return k_v_; }  ///< 1/s.
-  /// Variance that the innovation should have.
-  [[nodiscard]] double S() const { return S_; }
 
  private:
   double dt_ = 0.0, q_ = 0.0, R_ = 0.0;
   double xx_ = 0.0, xv_ = 0.0, vv_ = 0.0;
-  double k_x_ = 0.0, k_v_ = 0.0, S_ = 0.0;
+  double k_x_ = 0.0, k_v_ = 0.0;
 };
 
 /// A Kalman filter of one coordinate with KalmanGains.
@@ -72,26 +70,22 @@ class VelocityFilter {
     gains_.Reset(kStartSpread);
     x_ = y;
     v_ = v;
-    innovation_ = 0.0;
   }
   void Update(double y) {
     gains_.Predict();
     gains_.Correct();
     x_ += dt_ * v_;
-    innovation_ = y - x_;
-    x_ += gains_.k_x() * innovation_;
-    v_ += gains_.k_v() * innovation_;
+    const double innovation = y - x_;
+    x_ += gains_.k_x() * innovation;
+    v_ += gains_.k_v() * innovation;
   }
   [[nodiscard]] double x() const { return x_; }
   [[nodiscard]] double v() const { return v_; }
-  /// Measured less predicted position, and the variance that it should have.
-  [[nodiscard]] double innovation() const { return innovation_; }
-  [[nodiscard]] double innovation_variance() const { return gains_.S(); }
 
  private:
   KalmanGains gains_;
   double dt_ = 0.0;
-  double x_ = 0.0, v_ = 0.0, innovation_ = 0.0;
+  double x_ = 0.0, v_ = 0.0;
 };
 
 }  // namespace dexcheck

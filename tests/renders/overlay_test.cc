@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 #include <string>
 
@@ -71,59 +70,6 @@ TEST(Overlay, DotsShowTheChecksThatPassAndFail) {
   Image infinite(900, 720);
   overlay.Draw(state, &infinite);
   EXPECT_NEAR(CountSaturated(infinite, 0), 78, 15);
-}
-
-TEST(Overlay, PlotRisesWithTheError) {
-  Overlay overlay;
-  OverlayState state = MakeState();
-  state.categories.clear();
-  state.error_low = 1e-9;
-  state.error_high = 1e-6;
-  const auto mean_row = [&](double error) {
-    state.history = {{-1.0, error}, {1.0, error}};
-    Image image(900, 720);
-    overlay.Draw(state, &image);
-    double sum = 0.0;
-    int count = 0;
-    for (int y = 0; y < image.height; ++y) {
-      for (int x = 0; x < image.width; ++x) {
-        const std::uint8_t* p = image.Pixel(x, y);
-        if (p[0] < 200 || p[2] > 120) continue;
-        sum += y;
-        ++count;
-      }
-    }
-    EXPECT_GT(count, 200);
-    return sum / count;
-  };
-  const double low = mean_row(1e-9);
-  const double middle = mean_row(1e-9 * std::pow(10.0, 1.5));
-  const double high = mean_row(1e-6);
-  EXPECT_GT(low, middle + 20.0);
-  EXPECT_NEAR(middle, 0.5 * (low + high), 1.0) << "the scale is logarithmic";
-  EXPECT_NEAR(mean_row(std::numeric_limits<double>::quiet_NaN()), high, 0.5) << "what is no number is worst";
-}
-
-TEST(Overlay, GrowsWithThePictureAndStaysInItsCorner) {
-  Overlay overlay;
-  const OverlayState state = MakeState();
-  for (const int height : {90, 360, 720, 1080}) {
-    Image image(height * 16 / 9, height);
-    std::ranges::fill(image.rgb, std::uint8_t{255});
-    overlay.Draw(state, &image);
-    int right = 0;
-    int bottom = 0;
-    for (int y = 0; y < image.height; ++y) {
-      for (int x = 0; x < image.width; ++x) {
-        if (image.Pixel(x, y)[0] > 200) continue;
-        right = std::max(right, x);
-        bottom = std::max(bottom, y);
-      }
-    }
-    EXPECT_NEAR(right, (20.0 + 316.0) * height / 720.0, 2.0);
-    EXPECT_LT(bottom, height / 2);
-    EXPECT_GT(bottom, height / 8);
-  }
 }
 
 TEST(Overlay, ShortensATitleThatIsTooLong) {

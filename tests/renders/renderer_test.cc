@@ -6,14 +6,12 @@
 
 #include <cmath>
 #include <cstdlib>
-#include <stdexcept>
 
 #include "controller/common/errors.h"
 #include "harness/engine/engine.h"
 #include "renders/run_decorations.h"
 #include "renders/video.h"
 #include "renders/video_writer.h"
-#include "tests/common/files.h"
 #include "tests/common/paths.h"
 #include "tests/common/throws.h"
 #include "tests/renders/kinematic_run.h"
@@ -202,22 +200,6 @@ TEST_F(RendererTest, NamesCamerasThatExist) {
       Throws<InputError>([&] { renderer.Render(*data_, "", 64, 36); }, "camera: no \"\" in the model"));
   const MjModelPtr empty = LoadMjcfText("<mujoco><worldbody><geom size=\"1\"/></worldbody></mujoco>", "ball");
   EXPECT_TRUE(Throws<InputError>([&] { Renderer r(*empty, MakeOptions("top")); }, "which has no cameras"));
-}
-
-TEST_F(RendererTest, RefusesSizesThatCannotBeDrawn) {
-  const auto expect = [&](void (*spoil)(RenderOptions*), const std::string& message) {
-    RenderOptions options = MakeOptions("top");
-    spoil(&options);
-    EXPECT_TRUE(Throws<std::invalid_argument>([&] { Renderer renderer(*model_, options); }, message));
-  };
-  expect([](RenderOptions* o) { o->width = 0; }, "width: must be from 16 to 3840, got 0");
-  expect([](RenderOptions* o) { o->height = 100000; }, "height: must be from 16 to 2160");
-  expect([](RenderOptions* o) { o->samples = 9; }, "samples: must be from 1 to 4");
-  Renderer renderer(*model_, MakeOptions("top"));
-  EXPECT_TRUE(Throws<std::invalid_argument>([&] { renderer.Render(*data_, "top", 640, 36); },
-                                            "width: must fit into the renderer's picture"));
-  const std::vector<Decoration> many(5000, Arrow{Vector3d::Zero(), Vector3d::UnitZ(), 0.01, {}});
-  EXPECT_TRUE(Throws<std::invalid_argument>([&] { renderer.Render(*data_, many); }, "decorations: must fit"));
 }
 
 // A frame as a video shows it. With DEXCHECK_WRITE_GOLDEN in the environment the picture is written anew

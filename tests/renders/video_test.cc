@@ -4,7 +4,6 @@
 
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <filesystem>
@@ -206,11 +205,6 @@ TEST_F(VideoTest, BadInputIsRefusedAndLeavesNothing) {
   EXPECT_TRUE(
       Throws<InputError>(video(MakeOptions()), "kinematic run: time: the run has no recorded instants"));
   EXPECT_TRUE(fs::is_empty(folder_.path()));
-}
-
-TEST_F(VideoTest, CountsFrames) {
-  EXPECT_EQ(CountFrames(view_, 30), 15);
-  EXPECT_EQ(CountFrames(view_, 1), 1) << "at least one";
 }
 
 }  // namespace

@@ -4,13 +4,9 @@
 
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <filesystem>
 #include <nlohmann/json.hpp>
-#include <random>
-#include <stdexcept>
 #include <string>
-#include <vector>
 
 #include "controller/common/errors.h"
 #include "tests/common/files.h"
@@ -98,44 +94,6 @@ TEST(VideoWriter, WritesWhatBrowsersPlay) {
   }
 }
 
-TEST(VideoWriter, IndexStandsBeforeTheData) {
-  const TempFolder folder;
-  WriteVideo(folder.path() / "a.mp4", 5);
-  const std::string bytes = ReadText(folder.path() / "a.mp4");
-  std::vector<std::string> boxes;
-  for (size_t at = 0; at + 8 <= bytes.size();) {
-    size_t size = 0;
-    for (size_t k = 0; k < 4; ++k) size = size << 8U | static_cast<unsigned char>(bytes[at + k]);
-    boxes.push_back(bytes.substr(at + 4, 4));
-    ASSERT_GE(size, 8);
-    at += size;
-  }
-  const auto place = [&](const char* name) { return std::ranges::find(boxes, name) - boxes.begin(); };
-  ASSERT_LT(place("mdat"), static_cast<long>(boxes.size()));
-  EXPECT_LT(place("moov"), place("mdat"));
-}
-
-TEST(VideoWriter, SameFramesGiveTheSameBytes) {
-  // Frames with detail, and other contents of the heap each time: the encoder must depend on neither address
-  // nor chance.
-  const TempFolder folder;
-  std::mt19937 random(7);
-  std::vector<Image> frames(5, Image(kWidth, kHeight));
-  for (Image& frame : frames) {
-    for (std::uint8_t& value : frame.rgb) value = static_cast<std::uint8_t>(100 + random() % 64);
-  }
-  std::string first;
-  for (unsigned k = 0; k < 20; ++k) {
-    const std::vector<char> shift(1 + 1000 * k, static_cast<char>(k));
-    VideoWriter video(folder.path() / "a.mp4", MakeOptions());
-    for (const Image& frame : frames) video.Write(Image(frame));
-    video.Finish();
-    const std::string bytes = ReadText(folder.path() / "a.mp4");
-    if (first.empty()) first = bytes;
-    ASSERT_TRUE(bytes == first) << "video " << k;
-  }
-}
-
 TEST(VideoWriter, RefusesNamesOfOtherFormats) {
   const TempFolder folder;
   for (const char* name : {"a.avi", "a.png", "a", "mp4", "a.mp4.txt"}) {
@@ -185,24 +143,6 @@ TEST(VideoWriter, AFullDiskLeavesNothing) {
   EXPECT_TRUE(fs::is_empty(folder.path()));
 }
 
-TEST(VideoWriter, RefusesWhatH264CannotTake) {
-  const TempFolder folder;
-  const auto expect = [&](void (*spoil)(EncodingOptions*), const std::string& message) {
-    EncodingOptions options = MakeOptions();
-    spoil(&options);
-    EXPECT_TRUE(
-        Throws<std::invalid_argument>([&] { VideoWriter video(folder.path() / "a.mp4", options); }, message));
-  };
-  expect([](EncodingOptions* o) { o->width = 129; },
-         "video width: must be even and from 2 to 16384, got 129");
-  expect([](EncodingOptions* o) { o->height = 0; }, "video height: must be even");
-  expect([](EncodingOptions* o) { o->fps = 0; }, "frames a second: must be from 1 to 240, got 0");
-  EXPECT_TRUE(fs::is_empty(folder.path()));
-  VideoWriter video(folder.path() / "a.mp4", MakeOptions());
-  EXPECT_TRUE(
-      Throws<std::invalid_argument>([&] { video.Write(Image(2, 2)); }, "frame width: must be the video's"));
-}
-
 /// Colours that change smoothly over the picture; odd sizes, as a user may want.
 Image MakePicture() {
   Image image(51, 33);
@@ -228,15 +168,6 @@ TEST(PictureFile, WritesAPngOrNothing) {
   EXPECT_TRUE(Throws<InputError>([&] { WritePng("/nowhere/a.png", MakePicture()); },
                                  "/nowhere/a.png: cannot be written: No such file"));
   EXPECT_EQ(std::distance(fs::directory_iterator(folder.path()), fs::directory_iterator()), 1);
-}
-
-TEST(PictureFile, NamesTheFileThatIsNoPicture) {
-  EXPECT_TRUE(Throws<InputError>([] { ReadPng("/nowhere/a.png"); }, "/nowhere/a.png: cannot be read"));
-  const TempFolder folder;
-  WritePng(folder.path() / "a.png", MakePicture());
-  const std::string text = ReadText(folder.path() / "a.png");
-  WriteText(folder.path() / "a.png", text.substr(0, text.size() / 2));
-  EXPECT_TRUE(Throws<InputError>([&] { ReadPng(folder.path() / "a.png"); }, "a.png: cannot be read"));
 }
 
 }  // namespace

@@ -5,9 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <cmath>
 #include <random>
-#include <stdexcept>
 #include <vector>
 
 namespace dexcheck::testing::viewpoint_test {
@@ -56,16 +54,6 @@ TEST(FitViewpoint, HasAllInThePictureAndNoRoomToSpare) {
     EXPECT_NEAR(FindClearance(spheres, view, edges, 0.0), 0.0, kRounding) << i;
     EXPECT_LT(FindClearance(spheres, view, edges, 0.01), -1e-4) << "nearer is too near";
   }
-}
-
-TEST(FitViewpoint, LooksAtTheMiddle) {
-  const Viewpoint view = FitViewpoint(std::vector<VisibleSphere>{{{1, 2, 3}, 0.5}}, 0.3, -0.2, {1, 1, 1, 1});
-  EXPECT_TRUE(view.look_at.isApprox(Vector3d(1, 2, 3), kRounding));
-  EXPECT_NEAR(view.distance, 0.5 * std::sqrt(2.0), kRounding);
-}
-
-TEST(FitViewpoint, NeedsSomethingToSee) {
-  EXPECT_THROW(FitViewpoint({}, 0, 0, {1, 1, 1, 1}), std::invalid_argument);
 }
 
 }  // namespace

@@ -1,14 +1,11 @@
 #include <gtest/gtest.h>
 
-#include <array>
 #include <vector>
 
 #include "controller/contact/adjoint.h"
 #include "controller/contact/grasp_map.h"
-#include "tests/common/allocation_counter.h"
 #include "tests/common/linear_algebra.h"
 #include "tests/common/matrix_near.h"
-#include "tests/common/throws.h"
 #include "tests/controller/contact/test_finger.h"
 
 namespace dexcheck::testing::contact_jacobian_test {
@@ -103,88 +100,6 @@ TEST_F(ContactJacobianTest, RateMatchesDifferencesWhileTheFingerRolls) {
     without_rolling = std::max(without_rolling, (rows_dot - expected).norm());
   }
   EXPECT_GT(without_rolling, 1e6 * kDifference);
-}
-
-TEST_F(ContactJacobianTest, WrongSizesAreAClearError) {
-  const std::vector<RollingFinger> motions = MakeMotions();
-  const Contact contact = motions[0].CalcContact(0.0);
-  const Matrix6Xd J_f = motions[0].CalcBodyJacobian(0.0);
-  const auto calc = [&](Eigen::Index rows, Eigen::Index columns, Eigen::Index rate_columns) {
-    return [&, rows, columns, rate_columns] {
-      MatrixXd out(rows, columns);
-      CalcContactJacobianDot(contact, J_f, J_f.leftCols(rate_columns), out);
-    };
-  };
-  using Invalid = std::invalid_argument;
-  EXPECT_TRUE(Throws<Invalid>(calc(4, 4, 4), "rows of the contact Jacobian"));
-  EXPECT_TRUE(Throws<Invalid>(calc(3, 5, 4), "columns of the contact Jacobian"));
-  EXPECT_TRUE(Throws<Invalid>(calc(3, 4, 3), "columns of J_f_dot"));
-}
-
-// One control step's worth of contact terms for four fingers and 50 coordinates.
-TEST_F(ContactJacobianTest, AControlStepDoesNotAllocate) {
-  const std::vector<RollingFinger> motions = MakeMotions();
-  const Pose X_OF = motions[1].CalcObjectPose(0.0).inverse() * motions[1].CalcFingertipPose(0.0);
-  const Matrix6Xd J_f = Matrix6Xd::Ones(6, 50);
-  std::array<Contact, 4> contacts;
-  Matrix6Xd G(6, 12);
-  MatrixXd J_B(12, 50);
-
-  const AllocationCounter probe_counter;
-  const VectorXd probe = DrawVector(random_, 7);
-  ASSERT_GT(probe.norm(), 0.0);
-  ASSERT_GT(probe_counter.count(), 0) << "the counter must work";
-
-  const AllocationCounter counter;
-  ContactCoordinates kappa = FindContact(blunt_tip_, torus_, X_OF).kappa;
-  for (Contact& contact : contacts) {
-    const auto twist = [](double, const ContactGeometry& geometry) {
-      return CalcRelativeTwist(geometry, Vector6d::Ones(), Vector6d::Zero());
-    };
-    kappa = IntegrateKappa(blunt_tip_, torus_, kappa, 0.0, 1e-3, twist);
-    contact.geometry = CalcContactGeometry(blunt_tip_, torus_, kappa);
-    contact.kappa_dot = CalcKappaDot(contact.geometry, twist(0.0, contact.geometry));
-  }
-  CalcGraspMap(contacts, G);
-  CalcGraspMapDot(contacts, G);
-  Eigen::Index row = 0;
-  for (const Contact& contact : contacts) {
-    CalcContactJacobian(contact, J_f, J_B.middleRows(row, 3));
-    CalcContactJacobianDot(contact, J_f, J_f, J_B.middleRows(row, 3));
-    row += 3;
-  }
-  EXPECT_EQ(counter.count(), 0);
-}
-
-// Runs recorded before stay the same: of each entry the products are added up in the same order.
-TEST_F(ContactJacobianTest, ChainsColumnsHaveTheBitsOfTheWholeProduct) {
-  constexpr ColumnRun kRuns[] = {{0, 4}, {11, 7}, {30, 1}};
-  for (const Eigen::Index forces : {9, 12}) {  // the rows' places in memory decide how they are added up
-    Matrix6Xd J_f = Matrix6Xd::Zero(6, 37);
-    Matrix6Xd J_f_dot = J_f;
-    for (const ColumnRun& run : kRuns) {
-      for (Eigen::Index col = run.begin; col < run.begin + run.count; ++col) {
-        J_f.col(col) = DrawVector(random_, 6);
-        J_f_dot.col(col) = DrawVector(random_, 6);
-      }
-    }
-    MatrixXd whole(forces, 37), whole_dot(forces, 37);
-    MatrixXd chain = MatrixXd::Zero(forces, 37), chain_dot = chain;
-    Eigen::Index row = 0;
-    for (const RollingFinger& motion : MakeMotions()) {
-      if (row == forces) break;
-      const Contact contact = motion.CalcContact(0.1);
-      CalcContactJacobian(contact, J_f, whole.middleRows(row, 3));
-      CalcContactJacobianDot(contact, J_f, J_f_dot, whole_dot.middleRows(row, 3));
-      CalcContactJacobian(contact, J_f, chain.middleRows(row, 3), kRuns);
-      CalcContactJacobianDot(contact, J_f, J_f_dot, chain_dot.middleRows(row, 3), kRuns);
-      row += 3;
-    }
-    ASSERT_EQ(row, forces);
-    ASSERT_GT(whole_dot.norm(), 1.0);
-    EXPECT_TRUE(chain == whole);
-    EXPECT_TRUE(chain_dot == whole_dot);
-  }
 }
 
 }  // namespace

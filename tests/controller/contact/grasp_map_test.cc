@@ -8,7 +8,6 @@
 #include "controller/contact/adjoint.h"
 #include "tests/common/linear_algebra.h"
 #include "tests/common/matrix_near.h"
-#include "tests/common/throws.h"
 #include "tests/controller/contact/test_finger.h"
 
 namespace dexcheck::testing::grasp_map_test {
@@ -56,20 +55,6 @@ TEST(AdjointTest, IsTheBodyTwistOfTheMovedFrame) {
   // d/dt Ad_g = Ad_g ad_V along g(t) = g exp(V t)
   const auto along = [&](double t) { return MatrixXd(CalcAdjoint(g * CalcScrewMotion(V, t))); };
   EXPECT_TRUE(MatrixNear(Differentiate(along), CalcAdjoint(g) * CalcTwistCross(V), kDifference));
-}
-
-TEST(GraspMapTest, SingleContactByHand) {
-  // Contact at (0.05, 0, 0) of a sphere: at psi = 0 the contact frame is x = +y, y = -z, z = -x of the
-  // object, so f = (-f_3, f_1, -f_2) and tau = p x f = 0.05 (0, f_2, f_1).
-  const Contact contact = MakeContact(Sphere(0.009), Sphere(0.05), {});
-  MatrixXd expected(6, 3);
-  expected << 0.0, 0.0, -1.0,  //
-      1.0, 0.0, 0.0,           //
-      0.0, -1.0, 0.0,          //
-      0.0, 0.0, 0.0,           //
-      0.0, 0.05, 0.0,          //
-      0.05, 0.0, 0.0;
-  EXPECT_TRUE(MatrixNear(CalcG({contact}), expected, kRounding));
 }
 
 // The wrench on the object from force and moment arm in the object frame, without any adjoint.
@@ -129,18 +114,6 @@ TEST(GraspMapTest, RateMatchesDifferencesForMovingContacts) {
   CalcGraspMapDot(contacts_at(0.0), G_dot);
   ASSERT_GT(G_dot.norm(), 1.0);
   EXPECT_TRUE(MatrixNear(G_dot, Differentiate([&](double t) { return CalcG(contacts_at(t)); }), kDifference));
-}
-
-TEST(GraspMapTest, WrongSizesAreAClearError) {
-  const std::vector<Contact> contacts = MakeTorusGrasp({90.0, -90.0});
-  Matrix6Xd G(6, 5);
-  const auto calc = [&](std::span<const Contact> some, bool rate) {
-    return [&G, some, rate] { rate ? CalcGraspMapDot(some, G) : CalcGraspMap(some, G); };
-  };
-  for (const bool rate : {false, true}) {
-    EXPECT_TRUE(Throws<std::invalid_argument>(calc(contacts, rate), "columns of the grasp map"));
-    EXPECT_TRUE(Throws<std::invalid_argument>(calc({}, rate), "number of contacts"));
-  }
 }
 
 }  // namespace

@@ -134,37 +134,6 @@ TEST(SurfaceTest, ExchangedChartOrderTurnsTheNormalInward) {
   EXPECT_TRUE(MatrixNear(geometry.K, -Matrix2d::Identity(), kRounding));
 }
 
-TEST(SurfaceTest, SphereByHand) {
-  constexpr double kRadius = 0.5;
-  const SurfaceGeometry geometry = Sphere(kRadius).Evaluate({0.0, kPi / 6.0, 0});
-  const double c = std::sqrt(3.0) / 2.0;
-  EXPECT_TRUE(MatrixNear(geometry.p, Vector3d(0.5 * c, 0.0, 0.25), kRounding));
-  Matrix3d R;
-  R << 0.0, -0.5, c, 1.0, 0.0, 0.0, 0.0, c, 0.5;
-  EXPECT_TRUE(MatrixNear(geometry.R, R, kRounding));
-  EXPECT_TRUE(MatrixNear(geometry.M, Vector2d(kRadius * c, kRadius).asDiagonal().toDenseMatrix(), kRounding));
-  EXPECT_TRUE(MatrixNear(geometry.K, 2.0 * Matrix2d::Identity(), kRounding));
-  // tan(v) / rho
-  EXPECT_TRUE(MatrixNear(geometry.T, Eigen::RowVector2d(2.0 / std::sqrt(3.0), 0.0), kRounding));
-}
-
-TEST(SurfaceTest, TorusByHand) {
-  const Torus torus(0.3, 0.1);
-  const SurfaceGeometry outer = torus.Evaluate({0.0, 0.0, 0});
-  EXPECT_TRUE(MatrixNear(outer.p, Vector3d(0.4, 0.0, 0.0), kRounding));
-  EXPECT_TRUE(MatrixNear(outer.R.col(2), Vector3d::UnitX(), kRounding));
-  EXPECT_TRUE(MatrixNear(outer.K, Vector2d(2.5, 10.0).asDiagonal().toDenseMatrix(), 10.0 * kRounding));
-  const SurfaceGeometry inner = torus.Evaluate({0.0, kPi, 0});
-  EXPECT_TRUE(MatrixNear(inner.p, Vector3d(0.2, 0.0, 0.0), kRounding));
-  EXPECT_TRUE(MatrixNear(inner.R.col(2), -Vector3d::UnitX(), kRounding));
-  // The hole is hollow along the ring: curvature -1 / (R - r).
-  EXPECT_TRUE(MatrixNear(inner.K, Vector2d(-5.0, 10.0).asDiagonal().toDenseMatrix(), 10.0 * kRounding));
-  const SurfaceGeometry top = torus.Evaluate({0.0, kPi / 2.0, 0});
-  EXPECT_TRUE(MatrixNear(top.M, Vector2d(0.3, 0.1).asDiagonal().toDenseMatrix(), kRounding));
-  // sin(v) / (R + r cos v)
-  EXPECT_TRUE(MatrixNear(top.T, Eigen::RowVector2d(1.0 / 0.3, 0.0), 10.0 * kRounding));
-}
-
 TEST(SurfaceTest, ChartsAgreeOnThePointAndItsCurvatures) {
   std::mt19937 random(4);
   for (const NamedSurface& named : {MakeSphere(), MakeEllipsoid()}) {
@@ -233,6 +202,51 @@ TEST(SurfaceTest, BadInputIsAClearError) {
   EXPECT_TRUE(Throws<Invalid>([&] { return sphere.ToChart({0.0, 0.0, 0}, -1); }, "chart"));
   EXPECT_TRUE(Throws<Invalid>([&] { return sphere.Locate({0.0, 0.0, 0.021}, 1e-4); }, "distance"));
   EXPECT_EQ(sphere.Locate({0.0, 0.0, 0.02001}, 1e-4).chart, 1);
+}
+
+// Parallel surfaces are those of contacts of bodies that overlap.
+constexpr double kParallelRounding = 1e-13;
+constexpr SurfacePoint kPoints[] = {{0.3, 0.2, 0}, {-1.1, 0.7, 0}, {2.0, -0.5, 0}};
+
+void ExpectSame(const SurfaceGeometry& a, const SurfaceGeometry& b) {
+  EXPECT_LE((a.p - b.p).norm(), kParallelRounding);
+  EXPECT_LE((a.R - b.R).norm(), kParallelRounding);
+  EXPECT_LE((a.M - b.M).norm(), kParallelRounding);
+  EXPECT_LE((a.K - b.K).norm(), kParallelRounding * b.K.norm());
+  EXPECT_LE((a.T - b.T).norm(), kParallelRounding * (1.0 + b.T.norm()));
+}
+
+TEST(ParallelSurface, OfATorusIsATorus) {
+  const Torus torus(0.6, 0.2);
+  const Torus thinner(0.6, 0.17);
+  for (const SurfacePoint& at : kPoints) {
+    ExpectSame(CalcParallelSurface(torus.Evaluate(at), -0.03), thinner.Evaluate(at));
+  }
+}
+
+// K and M are full matrices, because the chart's lines are not lines of curvature.
+TEST(ParallelSurface, OfAnEllipsoidMovesAsItsPointsDo) {
+  const Ellipsoid ellipsoid(Vector3d(0.5, 0.7, 0.9));
+  constexpr double kDistance = 0.05;
+  constexpr double kStep = 1e-6;  // central differences: errors of 1e-12 / kStep
+  for (const SurfacePoint& at : kPoints) {
+    const SurfaceGeometry surface = CalcParallelSurface(ellipsoid.Evaluate(at), kDistance);
+    EXPECT_GT(std::abs(ellipsoid.Evaluate(at).K(0, 1)), 1e-3);
+    for (int k = 0; k < 2; ++k) {
+      SurfacePoint ahead = at;
+      SurfacePoint behind = at;
+      (k == 0 ? ahead.u : ahead.v) += kStep;
+      (k == 0 ? behind.u : behind.v) -= kStep;
+      const SurfaceGeometry a = CalcParallelSurface(ellipsoid.Evaluate(ahead), kDistance);
+      const SurfaceGeometry b = CalcParallelSurface(ellipsoid.Evaluate(behind), kDistance);
+      const Vector2d rate = surface.M.col(k);
+      const auto xy = surface.R.leftCols<2>();
+      EXPECT_LE(((a.p - b.p) / (2.0 * kStep) - xy * rate).norm(), 1e-8);
+      EXPECT_LE(((a.R.col(2) - b.R.col(2)) / (2.0 * kStep) - xy * (surface.K * rate)).norm(), 1e-8);
+      const Vector3d x_dot = (a.R.col(0) - b.R.col(0)) / (2.0 * kStep);
+      EXPECT_NEAR(surface.R.col(1).dot(x_dot), surface.T.dot(rate), 1e-8);
+    }
+  }
 }
 
 // A box: six flat charts that end at its edges.

@@ -12,7 +12,6 @@
 #include "controller/control/constrained_dynamics.h"
 #include "controller/object/euler_zyz.h"
 #include "controller/object/so3.h"
-#include "tests/common/allocation_counter.h"
 #include "tests/common/linear_algebra.h"
 #include "tests/common/matrix_near.h"
 #include "tests/controller/control/grasp_scene.h"
@@ -247,26 +246,6 @@ TEST_F(BaselineLawTest, ErrorsChangeAsTheirRatesSay) {
     EXPECT_TRUE(MatrixNear(errors.e.tail<3>(),
                            LogSo3(scene_.grasp.X_Bo().linear().transpose() * CalcRotationZyz(X_d.tail<3>())),
                            1e-14));
-  }
-}
-
-TEST_F(BaselineLawTest, RefusesWhatCannotBe) {
-  EXPECT_THROW(BaselineLaw(scene_.model, 4, ControlLaw::kComputedTorque, {}), std::invalid_argument);
-  EXPECT_THROW(BaselineLaw(scene_.model, 0, ControlLaw::kImpedance, {}), std::invalid_argument);
-  BaselineLaw law(scene_.model, 4, ControlLaw::kImpedance, {});
-  EXPECT_THROW(law.SetDemand(scene_.robot, scene_.grasp, {}, VectorXd::Zero(3)), std::invalid_argument);
-}
-
-TEST_F(BaselineLawTest, DemandsWithoutAllocation) {
-  scene_.DrawVelocities(&random_, 0.1);
-  const DesiredMotion desired = DrawDesired();
-  const VectorXd sigma_prime = DrawSigmaPrime();
-  for (const ControlLaw which : kBaselines) {
-    BaselineLaw law(scene_.model, 4, which, MakeOptions());
-    law.SetDemand(scene_.robot, scene_.grasp, desired, sigma_prime);
-    const AllocationCounter counter;
-    law.SetDemand(scene_.robot, scene_.grasp, desired, sigma_prime);
-    EXPECT_EQ(counter.count(), 0) << NameOf(which);
   }
 }
 

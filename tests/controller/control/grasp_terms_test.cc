@@ -5,18 +5,15 @@
 
 #include <gtest/gtest.h>
 
-#include <functional>
 #include <random>
 #include <stdexcept>
 #include <vector>
 
 #include "controller/contact/contact_geometry.h"
 #include "controller/object/euler_zyz.h"
-#include "tests/common/allocation_counter.h"
 #include "tests/common/finite_difference.h"
 #include "tests/common/matrix_near.h"
 #include "tests/common/reduction_map.h"
-#include "tests/common/throws.h"
 #include "tests/controller/control/grasp_scene.h"
 
 namespace dexcheck::testing::grasp_terms_test {
@@ -179,13 +176,6 @@ TEST_F(Bonds, PoseAndCoordinatesGiveTheSameTerms) {
   EXPECT_THROW(static_cast<void>(by_pose.coordinates()), std::logic_error);
 }
 
-TEST_F(Bonds, AllocateOnlyWhenTheyAreSet) {
-  SetBonds(MakeBonds());
-  const AllocationCounter counter;
-  scene_.grasp.SetState(scene_.robot, scene_.X_o, scene_.X_o_dot, scene_.kappa);
-  EXPECT_EQ(counter.count(), 0);
-}
-
 using Overlaps = GraspTermsTest;
 
 const std::vector<double> kOverlaps = {1e-3, 2e-3, 5e-4, 3e-3};  // m
@@ -223,32 +213,6 @@ TEST_F(Overlaps, RatesMatchDifferences) {
   EXPECT_TRUE(MatrixNear(scene_.grasp.G_dot(), G_dot, kFastDifference));
   EXPECT_GT((J_B_dot - J_B_dot_rigid).norm(), kVisible);
   EXPECT_GT((G_dot - G_dot_rigid).norm(), kVisible);
-}
-
-using Misuse = GraspTermsTest;
-
-TEST_F(Misuse, WrongCountsAreNamed) {
-  const std::vector<Bond> bonds(3);
-  const std::vector<double> overlaps(5);
-  const auto run = [](const std::function<void()>& call) { return [call] { call(); }; };
-  EXPECT_TRUE(Throws<std::invalid_argument>(run([&] { scene_.grasp.SetBonds(bonds); }), "number of bonds"));
-  EXPECT_TRUE(
-      Throws<std::invalid_argument>(run([&] { scene_.grasp.SetOverlaps(overlaps); }), "number of overlaps"));
-  scene_.kappa.pop_back();
-  EXPECT_TRUE(Throws<std::invalid_argument>(run([&] { scene_.SetState(); }), "number of kappa"));
-  const RobotModel other = ReadPanda();
-  ModelTerms robot(other);
-  robot.SetState(VectorXd::Zero(other.num_positions()), VectorXd::Zero(robot.size()));
-  EXPECT_TRUE(Throws<std::invalid_argument>(
-      run([&] { scene_.grasp.SetState(robot, X_o_, scene_.X_o_dot, kappa_); }), "entries of xi"));
-}
-
-TEST_F(Misuse, FingertipsMustBeThereAndCarrySpheres) {
-  const auto make = [&](const std::vector<int>& fingertips) {
-    return [&, fingertips] { return GraspTerms(scene_.model, fingertips, scene_.object, scene_.surface); };
-  };
-  EXPECT_TRUE(Throws<std::invalid_argument>(make({scene_.model.FindFrame("r_palm_frame")}),
-                                            "r_palm_frame carries no sphere"));
 }
 
 }  // namespace

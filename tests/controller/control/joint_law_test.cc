@@ -118,19 +118,6 @@ TEST_F(JointLawTest, AllocatesNothing) {
   EXPECT_EQ(counter.count(), 0);
 }
 
-TEST_F(JointLawTest, RefusesWhatItCannotDrive) {
-  EXPECT_THROW(JointLaw(ReadPaperRobot(), ControlLaw::kComputedTorque, gains_), std::invalid_argument);
-  EXPECT_THROW(JointLaw(model_, ControlLaw::kImpedance, gains_), std::invalid_argument);
-  JointGains wrong = gains_;
-  wrong.coulomb.setOnes(6);
-  EXPECT_THROW(JointLaw(model_, ControlLaw::kComputedTorque, wrong), std::invalid_argument);
-  wrong = gains_;
-  wrong.coulomb_velocity = 0.0;
-  EXPECT_THROW(JointLaw(model_, ControlLaw::kComputedTorque, wrong), std::invalid_argument);
-  gains_.K_v.resize(6);
-  EXPECT_THROW(JointLaw(model_, ControlLaw::kComputedTorque, gains_), std::invalid_argument);
-}
-
 // Seven joints: one more than a block of the trajectories that the motion is made of.
 TEST(JointMotion, GoesThroughItsPoints) {
   std::mt19937 random(21);

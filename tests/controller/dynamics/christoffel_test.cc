@@ -22,8 +22,6 @@ constexpr double kRounding = 2e-13;
 constexpr double kFingerRounding = 1e-11;
 // Energies and momenta add up to some 400 J, kg m/s, kg m^2/s; measured 3e-13.
 constexpr double kSumRounding = 2e-12;
-// A mutated model must miss by far more.
-constexpr double kVisible = 1e-4;
 
 std::vector<RobotCase> MakeCases() {
   std::vector<RobotCase> cases;
@@ -137,43 +135,6 @@ TEST_P(Christoffel, EnergyAndMomentumAreSumsOverBodies) {
     EXPECT_TRUE(MatrixNear(result.linear_momentum, linear, kSumRounding)) << "linear momentum";
     EXPECT_TRUE(MatrixNear(result.angular_momentum, angular, kSumRounding)) << "angular momentum";
   }
-}
-
-TEST_P(Christoffel, MutatedModelsAndWrongSymbolsAreSeen) {
-  Draw();
-  const MatrixXd M = terms_.M();
-  const auto differ = [&](const MatrixXd& A, const MatrixXd& B) {
-    return ScaleByMass(A - B, M).cwiseAbs().maxCoeff();
-  };
-
-  // The last link's centre of mass a millimetre away.
-  RobotSpec shifted = model_.spec();
-  shifted.joints.back().body.com.x() += 1e-3;
-  const LagrangeTerms other = CalcLagrangeTerms(RobotModel(shifted), q_, q_dot_);
-  EXPECT_GT(differ(M, other.M), kVisible);
-  EXPECT_GT(differ(terms_.C(), other.C), kVisible);
-  EXPECT_GT(ScaleForceByMass(terms_.gravity() - other.gravity, M).cwiseAbs().maxCoeff(), kVisible);
-
-  // Spin of the wheels, and the heading along which they roll.
-  if (model_.base().type == BaseType::kDifferentialDrive) {
-    RobotSpec still = model_.spec();
-    still.base.wheel.armature += 0.01;
-    const LagrangeTerms heavier = CalcLagrangeTerms(RobotModel(still), q_, q_dot_);
-    EXPECT_GT(differ(M, heavier.M), kVisible);
-    EXPECT_GT(differ(terms_.C(), heavier.C), kVisible);
-  }
-
-  // C without its part skew in i and j has the same power, its transpose the same symmetric part, and a C
-  // that adds u (q_dot turned by a right angle)^T gives the same C q_dot: none is the Christoffel choice.
-  const MatrixXd C = terms_.C();
-  EXPECT_GT(differ(C, 0.5 * (C + C.transpose())), kVisible);
-  EXPECT_GT(differ(C, C.transpose()), kVisible);
-  VectorXd normal = VectorXd::Zero(q_.size());
-  normal[0] = q_dot_[1];
-  normal[1] = -q_dot_[0];
-  const MatrixXd same_force = C + M.col(0) * normal.transpose();
-  ASSERT_LT((same_force * q_dot_ - C * q_dot_).norm(), 1e-10);
-  EXPECT_GT(differ(C, same_force), kVisible);
 }
 
 }  // namespace

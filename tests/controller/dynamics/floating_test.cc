@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include "controller/dynamics/model_terms.h"
-#include "controller/model/parameter_reader.h"
 #include "controller/model/rigid_body.h"
 #include "tests/common/matrix_near.h"
 #include "tests/common/random_robot.h"
@@ -163,28 +162,6 @@ TEST_F(FloatingBase, HasTheCoriolisMatrixOfItsForces) {
   coriolis(x);
   EXPECT_TRUE(MatrixNear(terms.C() * w, quarter + 0.5 * terms.M() * s, 1e2 * kRounding));
   EXPECT_GT((terms.M() * s).norm(), 1.0);
-}
-
-TEST_F(FloatingBase, IsReadFromAParameterFile) {
-  const std::string text = R"(name = "free"
-gravity = [0, 0, -9.81]
-[base]
-type = "floating"
-link = "body"
-mass = 2
-com = [0, 0, 0]
-inertia = [1, 1, 1, 0, 0, 0]
-[[chain]]
-parent = "body"
-rows = [{ joint = "j", link = "l", xyz = [1, 0, 0], axis = "x" }]
-[chain.joints]
-j = { range = [-1, 1], damping = 0, armature = 0 }
-[chain.links]
-l = { mass = 1, com = [0, 0, 0], inertia = [1, 1, 1, 0, 0, 0] }
-)";
-  const RobotModel model = ParseRobotModel(text, "free.toml");
-  EXPECT_EQ(model.num_positions(), 8);
-  EXPECT_EQ(model.num_velocities(), 7);
 }
 
 }  // namespace

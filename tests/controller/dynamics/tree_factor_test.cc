@@ -51,19 +51,14 @@ void ExpectFactors(const RobotModel& model, unsigned seed) {
   EXPECT_LE((terms.M() * x - F.col(0)).norm(), kTolerance * F.col(0).norm() * 1e3);
 }
 
-TEST(TreeFactor, FactorsThePaperRobotsMassMatrix) {
+TEST(TreeFactor, FactorsMassMatrices) {
   ExpectFactors(ReadPaperRobot(DriveVelocity::kTwist), 1);
   ExpectFactors(ReadPaperRobot(DriveVelocity::kWheelRates), 2);
-}
-
-TEST(TreeFactor, FactorsRandomRobots) {
-  for (unsigned seed = 1; seed <= 10; ++seed) {
-    std::mt19937 random(seed);
-    RandomRobotOptions options;
-    options.base = seed % 3 == 0   ? BaseType::kFixed
-                   : seed % 3 == 1 ? BaseType::kPlanar
-                                   : BaseType::kDifferentialDrive;
-    ExpectFactors(RobotModel(MakeRandomRobot(options, &random)), seed);
+  for (const BaseType base : {BaseType::kFixed, BaseType::kPlanar, BaseType::kDifferentialDrive}) {
+    for (unsigned seed = 1; seed <= 3; ++seed) {
+      std::mt19937 random(seed);
+      ExpectFactors(RobotModel(MakeRandomRobot({.base = base}, &random)), seed);
+    }
   }
 }
 

@@ -1,6 +1,5 @@
 #include "controller/grasp/force_closure.h"
 
-#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -8,7 +7,6 @@
 #include <random>
 
 #include "controller/grasp/grasp_force.h"
-#include "tests/common/matchers.h"
 #include "tests/common/matrix_near.h"
 #include "tests/controller/grasp/random_grasp.h"
 
@@ -190,25 +188,6 @@ TEST(ForceClosureRank, MuchFrictionTakesNone) {
   // Normal forces count beside a friction of any size: what is far from singular with mu = 1 stays so.
   const GraspForceProblem grasp = MakeEquatorGraspForceProblem(4, 1e11);
   EXPECT_GE(CalcForceClosure(grasp.G, grasp.mu).num_vertices, 7);
-}
-
-TEST(ForceClosureErrors, NameTheValue) {
-  const GraspForceProblem grasp = MakeEquatorGraspForceProblem(4, 0.5);
-  const auto Call = [&](const Matrix6Xd& G, const VectorXd& mu, const ForceClosureOptions& options) {
-    return [=] { CalcForceClosure(G, mu, options); };
-  };
-  const ForceClosureOptions options;
-  ForceClosureOptions no_length;
-  no_length.length = 0.0;
-  Matrix6Xd G = grasp.G;
-  EXPECT_THAT(Call(G, VectorXd::Zero(4), options),
-              ThrowsMessage<std::invalid_argument>(HasSubstr("mu: must be positive")));
-  EXPECT_THAT(Call(G, VectorXd::Ones(3), options),
-              ThrowsMessage<std::invalid_argument>(HasSubstr("G: must have three")));
-  EXPECT_THAT(Call(G, grasp.mu, no_length), ThrowsMessage<std::invalid_argument>(HasSubstr("length")));
-  G(0, 0) = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_THAT(Call(G, grasp.mu, options),
-              ThrowsMessage<std::invalid_argument>(HasSubstr("G: must be finite")));
 }
 
 }  // namespace

@@ -1,6 +1,5 @@
 // Inverse kinematics of an arm against the forward kinematics of the robot's terms, an independent route.
 
-#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -10,7 +9,6 @@
 #include "controller/grasp/finger_placement.h"
 #include "controller/handling/pick_plan.h"
 #include "tests/common/linear_algebra.h"
-#include "tests/common/matchers.h"
 #include "tests/common/matrix_near.h"
 #include "tests/common/paper_robot.h"
 #include "tests/common/random_robot.h"
@@ -185,31 +183,6 @@ TEST(FramePlacementOfRandomRobots, FollowsTheForwardKinematics) {
     }
   }
   EXPECT_GT(prismatic, 10);
-}
-
-TEST_F(FramePlacementTest, RejectsWhatCannotBeUsed) {
-  const int palm = model_.FindFrame("r_palm_frame");
-  const std::vector<int> joints = ListArm("r");
-  const VectorXd q = VectorXd::Zero(model_.num_positions());
-  const Pose X = CalcFramePose(q, palm);
-  const auto solve = [&](const std::vector<int>& list, const Pose& pose,
-                         const FramePlacementOptions& options) {
-    return [=, this] { SolveFramePlacement(model_, palm, pose, list, q, q, options); };
-  };
-  std::vector<int> other = joints;
-  other.push_back(model_.FindJoint("l_elbow"));
-  EXPECT_THAT(solve(other, X, {}),
-              ThrowsMessage<std::invalid_argument>(HasSubstr("each must move frame r_palm_frame, once")));
-  other.back() = joints.front();
-  EXPECT_THAT(solve(other, X, {}), ThrowsMessage<std::invalid_argument>(HasSubstr("once")));
-  EXPECT_THAT(solve({}, X, {}), ThrowsMessage<std::invalid_argument>(HasSubstr("joints")));
-  EXPECT_THAT(solve(joints, X, {.joint_margin = 0.7}),
-              ThrowsMessage<std::invalid_argument>(HasSubstr("joint_margin: must leave each joint a range")));
-  EXPECT_THAT(solve(joints, X, {.num_starts = 0}),
-              ThrowsMessage<std::invalid_argument>(HasSubstr("num_starts")));
-  Pose scaled = X;
-  scaled.linear() *= 1.1;
-  EXPECT_THAT(solve(joints, scaled, {}), ThrowsMessage<std::invalid_argument>(HasSubstr("X_BF")));
 }
 
 }  // namespace

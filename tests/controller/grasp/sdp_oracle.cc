@@ -77,27 +77,4 @@ int RunCsdp(const std::filesystem::path& file) {
   return status == -1 ? -1 : WEXITSTATUS(status);
 }
 
-SdpSolution SolveSdp(const GraspForceProblem& problem, const std::filesystem::path& folder) {
-  // csdp's exit codes: 0 solved, 1 primal infeasible, 2 dual infeasible (its dual is this format's primal), 3
-  // solved to less than full accuracy.
-  constexpr int kSolved = 0;
-  constexpr int kDualInfeasible = 2;
-  const std::filesystem::path file = folder / "grasp.dat-s";
-  WriteSdp(problem, file);
-  SdpSolution solution;
-  const int code = RunCsdp(file);
-  if (code == kDualInfeasible) solution.status = SdpStatus::kInfeasible;
-  if (code != kSolved) return solution;
-
-  const ForceSpace space = CalcForceSpace(problem);
-  std::ifstream in(file.string() + ".sol");
-  VectorXd x(space.basis.cols());
-  for (double& value : x) in >> value;
-  if (!in) return solution;
-  solution.status = SdpStatus::kOptimal;
-  solution.f_c = space.offset + space.basis * x;
-  solution.objective = CalcCost(problem).dot(solution.f_c);
-  return solution;
-}
-
 }  // namespace dexcheck::testing

@@ -8,14 +8,6 @@
 
 namespace dexcheck::testing {
 
-enum class SdpStatus { kOptimal, kInfeasible, kOther };
-
-struct SdpSolution {
-  SdpStatus status = SdpStatus::kOther;
-  VectorXd f_c;            ///< 3N
-  double objective = 0.0;  ///< sum_i f_i3
-};
-
 /// Writes `problem` in SDPA's sparse format: with f_c = G^+ F_o + Z x, the columns of Z a basis of null(G),
 /// minimise the sum of normal forces over x subject to P_i(f_ci) >= 0 (2 x 2 blocks) and all bounds (a
 /// diagonal block).
@@ -24,8 +16,5 @@ void WriteSdp(const GraspForceProblem& problem, const std::filesystem::path& fil
 /// Runs csdp on a file written by WriteSdp, in the file's folder; returns csdp's exit code. The solution
 /// lands in `file` with ".sol" appended.
 int RunCsdp(const std::filesystem::path& file);
-
-/// Solves `problem` with csdp, with files in `folder`.
-SdpSolution SolveSdp(const GraspForceProblem& problem, const std::filesystem::path& folder);
 
 }  // namespace dexcheck::testing

@@ -7,7 +7,6 @@
 #include <random>
 
 #include "controller/control/constrained_dynamics.h"
-#include "tests/common/allocation_counter.h"
 #include "tests/common/matrix_near.h"
 #include "tests/controller/control/grasp_scene.h"
 
@@ -179,27 +178,6 @@ TEST_F(HandlingControllerTest, RefusesWhatCannotBe) {
   demand_.contacts = kAll;
   demand_.weight = 1000.0;
   EXPECT_THROW(CalcTorque(), GraspForceError);
-}
-
-TEST_F(HandlingControllerTest, AllocatesForNewSetsOfContactsOnly) {
-  SetState(/*object_rests=*/true);
-  demand_.grip = 1.0;
-  CalcTorque();
-  {
-    const AllocationCounter counter;
-    CalcTorque();
-    EXPECT_EQ(counter.count(), 0U);
-  }
-  demand_.grip = 0.0;
-  demand_.contacts = 5;
-  {
-    const AllocationCounter counter;
-    CalcTorque();
-    EXPECT_GT(counter.count(), 0U);
-  }
-  const AllocationCounter counter;
-  CalcTorque();
-  EXPECT_EQ(counter.count(), 0U);
 }
 
 }  // namespace

@@ -3,13 +3,11 @@
 #include <gtest/gtest.h>
 
 #include <random>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
 #include "tests/common/linear_algebra.h"
 #include "tests/common/matrix_near.h"
-#include "tests/common/throws.h"
 
 namespace dexcheck::testing::platform_test {
 namespace {
@@ -107,20 +105,6 @@ TEST(PlatformByHand, FacingYWithTwist) {
   EXPECT_TRUE(MatrixNear(platform.S_v_T_E_v * tau, Vector2d(40.0, 4.0), kRounding));
 }
 
-TEST(PlatformByHand, FacingYWithWheelRates) {
-  const Base base = MakeBase(DriveVelocity::kWheelRates);
-  const Vector2d v(11.0, 9.0);
-  const PlatformConstraint platform = CalcPlatformConstraint(base, {3.0, -2.0, kPi / 2}, v);
-  Eigen::Matrix<double, 3, 2> S_v;
-  S_v << 0.0, 0.0, 0.05, 0.05, 0.25, -0.25;
-  EXPECT_TRUE(MatrixNear(platform.S_v, S_v, kRounding));
-  EXPECT_TRUE(MatrixNear(platform.S_v * v, Vector3d(0.0, 1.0, 0.5), kRounding));
-  EXPECT_TRUE(MatrixNear(platform.S_v_dot * v, Vector3d(-0.5, 0.0, 0.0), kRounding));
-  EXPECT_TRUE(MatrixNear(CalcWheelRates(base, v), v, kRounding));
-  // The wheel torques are the generalised forces on the wheel rates.
-  EXPECT_TRUE(MatrixNear(platform.S_v_T_E_v, Matrix2d::Identity(), kRounding));
-}
-
 TEST_P(PlatformTest, SSpansTheNullSpaceOfA) {
   for (const State& state : states_) {
     const PlatformConstraint platform = CalcPlatformConstraint(base_, state.q_v, state.v);
@@ -158,42 +142,6 @@ TEST_P(PlatformTest, VirtualPowerBalances) {
     EXPECT_NEAR((platform.E_v * tau).dot(platform.S_v * state.v), power, kRounding * TolScale());
     EXPECT_NEAR((platform.S_v_T_E_v * tau).dot(state.v), power, kRounding * TolScale());
   }
-}
-
-TEST_P(PlatformTest, MutatedSignsAreSeen) {
-  const Vector2d tau(3.0, -1.7);
-  const State state{{0.3, -0.2, 0.7},
-                    GetParam() == DriveVelocity::kTwist ? Vector2d(0.8, 0.6) : Vector2d(9.2, 6.8)};
-  const PlatformConstraint good = CalcPlatformConstraint(base_, state.q_v, state.v);
-  const Vector2d wheel_rates = CalcWheelRates(base_, state.v);
-  const double power = tau.dot(wheel_rates);
-
-  // Heading turned the other way in A_v and in S_v.
-  const Eigen::RowVector3d A_v(-good.A_v[0], good.A_v[1], 0.0);
-  EXPECT_GT((A_v * good.S_v).norm(), kVisible);
-  Eigen::Matrix<double, 3, 2> S_v = good.S_v;
-  S_v.row(1) *= -1.0;
-  EXPECT_GT(CalcContactPointSpeed(state.q_v, S_v * state.v, wheel_rates), kVisible);
-  // Right and left wheel exchanged.
-  EXPECT_GT(CalcContactPointSpeed(state.q_v, good.S_v * state.v, wheel_rates.reverse()), kVisible);
-  Eigen::Matrix<double, 3, 2> E_v = good.E_v;
-  E_v.row(2) *= -1.0;
-  EXPECT_GT(std::abs((E_v * tau).dot(good.S_v * state.v) - power), kVisible);
-  // phi_dot with the wrong sign.
-  EXPECT_GT((-good.S_v_dot - CalcSDotByDifference(base_, state)).norm(), kVisible);
-}
-
-TEST_P(PlatformTest, RejectsWhatIsNotADifferentialDrive) {
-  Base base = base_;
-  base.type = BaseType::kPlanar;
-  EXPECT_THROW(CalcPlatformConstraint(base, Vector3d::Zero(), Vector2d::Zero()), std::invalid_argument);
-  base = base_;
-  base.wheel_radius = 0.0;
-  EXPECT_THROW(CalcWheelRateMap(base), std::invalid_argument);
-  base = base_;
-  base.wheel_distance = -0.4;
-  EXPECT_EQ(MessageOf<std::invalid_argument>([&] { return CalcWheelRates(base, Vector2d::Zero()); }),
-            "wheel_distance: must be positive, got -0.4");
 }
 
 }  // namespace

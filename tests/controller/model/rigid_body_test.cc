@@ -132,15 +132,6 @@ TEST(Combine, TwoHalvesMakeTheWhole) {
   EXPECT_FALSE(MatrixNear(2.0 * CalcMassProperties(half, 1.0, left).inertia, whole.inertia, 1e-2));
 }
 
-TEST(Combine, PointMassesByHand) {
-  // 1 kg at x = -3 and 3 kg at x = 1: centre at 0, I_y = I_z = 9 + 3.
-  const MassProperties body = Combine(
-      {{1.0, Vector3d(-3.0, 0.0, 0.0), Matrix3d::Zero()}, {3.0, Vector3d(1.0, 0.0, 0.0), Matrix3d::Zero()}});
-  EXPECT_EQ(body.mass, 4.0);
-  EXPECT_EQ(body.com, Vector3d(0.0, 0.0, 0.0));
-  EXPECT_EQ(body.inertia, Matrix3d(Vector3d(0.0, 12.0, 12.0).asDiagonal()));
-}
-
 TEST(Combine, NothingWeighsNothing) {
   EXPECT_EQ(Combine({}).mass, 0.0);
   EXPECT_EQ(FindPhysicalInconsistency(Combine({})), "");

@@ -46,23 +46,6 @@ Matrix3d RotationByEigen(const Vector3d& phi) {
   return Eigen::AngleAxisd(theta, phi / theta).toRotationMatrix();
 }
 
-TEST(So3, ByHand) {
-  Matrix3d quarter_turn;
-  quarter_turn << 0, -1, 0, 1, 0, 0, 0, 0, 1;
-  EXPECT_TRUE(MatrixNear(ExpSo3({0, 0, kPi / 2}), quarter_turn, kRounding));
-  EXPECT_TRUE(MatrixNear(LogSo3(quarter_turn), Vector3d(0, 0, kPi / 2), kRounding));
-  // A third of a turn about (1, 1, 1) sends x to y, y to z, z to x.
-  Matrix3d cycle;
-  cycle << 0, 0, 1, 1, 0, 0, 0, 1, 0;
-  const Vector3d third = Vector3d::Constant(2 * kPi / 3 / std::sqrt(3.0));
-  EXPECT_TRUE(MatrixNear(ExpSo3(third), cycle, kRounding));
-  EXPECT_TRUE(MatrixNear(LogSo3(cycle), third, kRounding));
-  // At theta = pi about z: a = 2/pi^2, b = 1/pi^2, so J_l = [0, -2/pi, 0; 2/pi, 0, 0; 0, 0, 1].
-  Matrix3d J_l;
-  J_l << 0, -2 / kPi, 0, 2 / kPi, 0, 0, 0, 0, 1;
-  EXPECT_TRUE(MatrixNear(CalcLeftJacobian({0, 0, kPi}), J_l, kRounding));
-}
-
 TEST(So3, ExpAgreesWithAngleAxis) {
   Random random(3101);
   for (const double angle : kAngles) {
@@ -95,20 +78,6 @@ TEST(So3, LogOfAHalfTurnPicksOneSign) {
     if (axis[largest] < 0.0) axis = -axis;
     const Matrix3d half_turn = 2.0 * axis * axis.transpose() - Matrix3d::Identity();
     EXPECT_TRUE(MatrixNear(LogSo3(half_turn), kPi * axis, kRounding));
-  }
-}
-
-TEST(So3, LeftJacobianIsTheMeanRotation) {
-  // J_l(phi) = integral of exp(s phi) over s in [0, 1], here by Simpson's rule; its error is (theta/n)^4 /
-  // 180.
-  constexpr int kPanels = 2000;
-  constexpr double kQuadrature = 1e-13;
-  Random random(3104);
-  for (const double angle : kAngles) {
-    const Vector3d phi = angle * random.Axis();
-    Matrix3d sum = Matrix3d::Identity() + RotationByEigen(phi);
-    for (int i = 1; i < kPanels; ++i) sum += (i % 2 == 1 ? 4.0 : 2.0) * RotationByEigen(phi * i / kPanels);
-    EXPECT_TRUE(MatrixNear(CalcLeftJacobian(phi), sum / (3.0 * kPanels), kQuadrature)) << "angle " << angle;
   }
 }
 
@@ -160,18 +129,6 @@ TEST(So3, RejectsWhatIsNoRotation) {
   EXPECT_THROW(LogSo3(Matrix3d::Constant(std::nan(""))), std::invalid_argument);
   EXPECT_THROW(CalcLeftJacobianInverse({0.0, 0.0, 2 * kPi}), std::invalid_argument);
   EXPECT_NO_THROW(LogSo3(ExpSo3({1, 2, 3}).cast<float>().cast<double>()));
-}
-
-TEST(OrientationError, ByHand) {
-  // The desired frame stands 0.3 rad ahead about z and turns at 1 rad/s, the object at 0.4 rad/s.
-  const OrientationError error =
-      CalcOrientationError(Matrix3d::Identity(), {0, 0, 0.4}, ExpSo3({0, 0, 0.3}), {0, 0, 1.0});
-  EXPECT_TRUE(MatrixNear(error.e_R, Vector3d(0, 0, 0.3), kRounding));
-  EXPECT_TRUE(MatrixNear(error.omega_od, Vector3d(0, 0, 0.6), kRounding));
-  EXPECT_TRUE(MatrixNear(error.e_R_dot, Vector3d(0, 0, 0.6), kRounding));
-  // About one axis omega_o_dot = omega_d_dot - e_R_ddot.
-  EXPECT_TRUE(MatrixNear(CalcAngularAcceleration(error, {0, 0, 1.0}, {0, 0, 0.5}, {0, 0, -2.0}),
-                         Vector3d(0, 0, 2.5), kRounding));
 }
 
 TEST(OrientationError, DoesNotDependOnTheWorldFrame) {

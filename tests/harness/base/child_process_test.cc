@@ -8,46 +8,10 @@
 
 #include <cerrno>
 #include <csignal>
-#include <stdexcept>
 #include <vector>
 
 namespace dexcheck::testing::child_process_test {
 namespace {
-
-std::string ReceiveAll(int channel) {
-  std::string all;
-  for (std::string part = Receive(channel, 1000); !part.empty(); part = Receive(channel, 1000)) all += part;
-  return all;
-}
-
-TEST(ChildProcess, SendsAndReceives) {
-  const std::string large(1 << 20, 'x');
-  ChildProcess process("it", [&](int channel) { return Send(channel, Receive(channel, 4) + large); });
-  EXPECT_TRUE(Send(process.channel(), "word"));
-  EXPECT_EQ(ReceiveAll(process.channel()), "word" + large);
-  const ProcessEnd end = process.Wait();
-  EXPECT_TRUE(end.has_succeeded());
-  EXPECT_EQ(end.signal, 0);
-  EXPECT_EQ(process.pid(), -1);
-}
-
-TEST(ChildProcess, EndsInManyWays) {
-  const auto end_of = [](const std::function<bool(int)>& work) {
-    ChildProcess process("it", work);
-    EXPECT_EQ(ReceiveAll(process.channel()), "");
-    return process.Wait();
-  };
-  EXPECT_FALSE(end_of([](int) { return false; }).has_succeeded());
-  EXPECT_FALSE(end_of([](int) -> bool { throw std::runtime_error("no"); }).has_succeeded());
-  const ProcessEnd crash = end_of([](int) {
-    std::signal(SIGSEGV, SIG_DFL);
-    return ::raise(SIGSEGV) == 0;
-  });
-  EXPECT_FALSE(crash.has_succeeded());
-  EXPECT_EQ(crash.signal, SIGSEGV);
-  EXPECT_EQ(crash.Describe("by itself"), "Segmentation fault");
-  EXPECT_EQ(end_of([](int) { return false; }).Describe("by itself"), "by itself");
-}
 
 TEST(ChildProcess, RunsPrograms) {
   int ends[2];

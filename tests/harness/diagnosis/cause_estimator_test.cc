@@ -367,14 +367,5 @@ TEST(CauseEstimator, TwoAreExchangedAtOnce) {
   EXPECT_EQ(ChosenOf(Select(y, candidates)), (std::vector<size_t>{10, 20}));
 }
 
-TEST(CauseEstimator, NoMoreTermsThanAreAskedFor) {
-  Random random(12);
-  const std::vector<Candidate> candidates = random.Candidates();
-  VectorXd y = random.Normal();
-  for (size_t i = 0; i < 4; ++i) y += 3.0 * candidates[i].columns;
-  EXPECT_EQ(Select(y, candidates, {.most_terms = 4}).terms.size(), 4u);
-  EXPECT_EQ(Select(y, candidates, {.most_terms = 2}).terms.size(), 2u);
-}
-
 }  // namespace
 }  // namespace dexcheck::testing::cause_estimator_test

@@ -41,11 +41,23 @@ Explanation MakeNotExplained(std::vector<Fault> nearest) {
   return one;
 }
 
-TEST(FaultTest, IsToldWithErrorUnitAndDetail) {
-  EXPECT_EQ(MakeGain().Describe(), "motor r_elbow: gain 0.99 +- 0.001");
-  EXPECT_EQ(MakeOffset().Describe(), "motor r_elbow: offset -0.05 N m");
-  Fault ripple = {"ripple", "motor r_elbow", 0.061234567, 0.00123456, "N m", "at 41.3 Hz"};
+// Each with its size, unit, detail, time and what else may be; golden files have whole lines.
+TEST(ExplanationTest, IsToldInALine) {
+  const Fault ripple = {"ripple", "motor r_elbow", 0.061234567, 0.00123456, "N m", "at 41.3 Hz"};
   EXPECT_EQ(ripple.Describe(), "motor r_elbow: ripple 0.0612346 +- 0.0012 N m at 41.3 Hz");
+  Explanation one = MakeExplanation({MakeGain()});
+  EXPECT_THAT(one.Describe(), EndsWith("from 0.25 s"));
+  one.ends = true;
+  one.rival = "delay";
+  one.log_odds = 4.605;  // log(1e2)
+  EXPECT_THAT(one.Describe(), EndsWith("0.25 to 1.5 s; rival: delay, 1e2 times less likely"));
+  std::vector<Fault> faults = {MakeGain(), MakeOffset()};
+  for (const char* name : {"drift", "lag", "delay", "limit"})
+    faults.push_back({name, "motor r_elbow", 1.0, 0.0, "", ""});
+  EXPECT_THAT(MakeExplanation(faults).Describe(),
+              AllOf(HasSubstr("lag 1 or 2 more: not isolable"), Not(HasSubstr("delay"))));
+  EXPECT_THAT(MakeNotExplained({MakeOffset()}).Describe(),
+              AllOf(StartsWith("not explained; nearest: motor r_elbow: offset"), HasSubstr("50 %")));
 }
 
 // Gravity of another size along itself has one amplitude, and the name of one that points elsewhere.
@@ -69,39 +81,6 @@ TEST(ExplanationTest, SameKindAndPlaceIsOneName) {
   EXPECT_EQ(two.faults[1].value, MakeOffset().value);
 }
 
-TEST(ExplanationTest, IsToldInALine) {
-  Explanation one = MakeExplanation({MakeGain()});
-  EXPECT_EQ(one.Describe(), "motor r_elbow: gain 0.99 +- 0.001, from 0.25 s");
-  one.ends = true;
-  EXPECT_EQ(one.Describe(), "motor r_elbow: gain 0.99 +- 0.001, 0.25 to 1.5 s");
-  one.rival = "delay";
-  one.log_odds = 4.605;  // log(1e2)
-  EXPECT_EQ(one.Describe(),
-            "motor r_elbow: gain 0.99 +- 0.001, 0.25 to 1.5 s; 100 times less likely: delay");
-  one.log_odds = 1e6;
-  EXPECT_THAT(one.Describe(), EndsWith("1.5 s"));
-}
-
-TEST(ExplanationTest, ClassIsToldByItsFirstFour) {
-  std::vector<Fault> faults = {MakeGain(), MakeOffset()};
-  EXPECT_EQ(
-      MakeExplanation(faults).Describe(),
-      "motor r_elbow: gain 0.99 +- 0.001 or motor r_elbow: offset -0.05 N m (this motion does not separate "
-      "them), from 0.25 s");
-  for (const char* name : {"drift", "lag", "delay", "limit"})
-    faults.push_back({name, "motor r_elbow", 1.0, 0.0, "", ""});
-  const std::string text = MakeExplanation(faults).Describe();
-  EXPECT_THAT(text, HasSubstr("lag 1 or 2 more (this motion"));
-  EXPECT_THAT(text, Not(HasSubstr("delay")));
-}
-
-TEST(ExplanationTest, NotExplainedIsToldWithTheNearest) {
-  EXPECT_EQ(MakeNotExplained({MakeOffset()}).Describe(),
-            "not explained; nearest: motor r_elbow: offset -0.05 N m (50 %, 40 times the noise is left), "
-            "from 0.25 s");
-  EXPECT_EQ(MakeNotExplained({}).Describe(), "not explained (50 %, 40 times the noise is left), from 0.25 s");
-}
-
 TEST(CausesTest, NamesIsOfTheFirstFaultOfWhatIsExplained) {
   const Causes causes = {MakeExplanation({MakeGain(), MakeOffset()}),
                          MakeNotExplained({{"lag", "", 0, 0, "", ""}}), MakeNotExplained({})};
@@ -109,15 +88,6 @@ TEST(CausesTest, NamesIsOfTheFirstFaultOfWhatIsExplained) {
   EXPECT_FALSE(Names(causes, "offset"));  // its second
   EXPECT_FALSE(Names(causes, "lag"));     // the nearest of what is not explained
   EXPECT_FALSE(Names({}, "gain"));
-}
-
-TEST(CausesTest, AreToldByChannel) {
-  Causes causes = {MakeExplanation({MakeGain()}), MakeExplanation({MakeOffset()}), MakeNotExplained({})};
-  causes[1].channel = CauseChannel::kMeasurement;
-  EXPECT_EQ(DescribeCauses(causes, CauseChannel::kActuation),
-            causes[0].Describe() + "; " + causes[2].Describe());
-  EXPECT_EQ(DescribeCauses(causes, CauseChannel::kMeasurement), causes[1].Describe());
-  EXPECT_EQ(DescribeCauses(causes, CauseChannel::kLaw), "");
 }
 
 /// A gain of 0.9: its error is the change, so that 5 % of it are 0.005.

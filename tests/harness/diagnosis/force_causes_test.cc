@@ -58,65 +58,60 @@ Fault GrowingAt(int joint, double value) {
   return {"torque that grows by", "joint panda_joint" + std::to_string(joint), value, 0.0, "N m/s", ""};
 }
 
-class SeveralForces : public ::testing::TestWithParam<Pushes> {};
+constexpr double kTimeStep = 1e-3;  // s
+const Pushes kPushes[] = {
+    // A small force that the columns of a large fault hide appears once only rounding is noise.
+    {"SmallBesideLarge",
+     4,
+     [](int) -> VectorXd { return Torque(1, 1.0) + Torque(4, 5e-5); },
+     {TorqueAt(2, 1.0), TorqueAt(5, 5e-5)}},
+    {"OneAfterAnother",
+     4,
+     [](int k) { return k < 11 ? Torque(1, 0.7) : Torque(3, 0.4); },
+     {TorqueAt(2, 0.7), TorqueAt(4, 0.4)}},
+    // A torque of a joint that turns one way is its dry friction as well.
+    {"StepOfOne",
+     4,
+     [](int k) { return Torque(2, k < 9 ? 0.3 : 0.9); },
+     {TorqueAt(3, 0.3), TorqueAt(3, 0.9)},
+     CauseOutcome::kNamedClass},
+    // Most steps between two that are kept are not known, and the growth may begin there.
+    {"GrowingLater",
+     4,
+     [](int k) -> VectorXd {
+       return Torque(1, 0.7) + Torque(3, 2.5 * 4 * kTimeStep * std::max(0.0, k - 13.4));
+     },
+     {TorqueAt(2, 0.7), GrowingAt(4, 2.5)}},
+    // A growing force changes more from step to step than one that begins beside it.
+    {"ForAWhileBesideGrowing",
+     1,
+     [](int k) -> VectorXd { return Torque(1, 0.05 * k + 0.02) + Torque(3, 9 <= k && k < 17 ? 0.1 : 0.0); },
+     {GrowingAt(2, 0.05 / kTimeStep), TorqueAt(4, 0.1)}},
+    // Neither of two successive jumps is taken for the change of the other one's neighbours.
+    {"BeginsBeforeAnotherEnds",
+     1,
+     [](int k) -> VectorXd { return Torque(1, k < 15 ? 0.7 : 0.0) + Torque(3, k < 14 ? 0.0 : 0.4); },
+     {TorqueAt(2, 0.7), TorqueAt(4, 0.4)}}};
 
-TEST_P(SeveralForces, AreNamed) {
-  const Causes causes = Explain(200, GetParam().every, 24, GetParam().force);
-  SCOPED_TRACE(DescribeCauses(causes, CauseChannel::kBalance));
-  ASSERT_EQ(causes.size(), GetParam().faults.size());
-  double last = 0.0;
-  for (const Fault& fault : GetParam().faults) {
-    const auto one = std::ranges::find_if(causes, [&](const Explanation& each) {
-      const Fault& first = each.faults.front();
-      return first.IsLike(fault) && std::abs(first.value - fault.value) <= 1e-3 * fault.value;
-    });
-    ASSERT_NE(one, causes.end()) << fault.Describe();
-    EXPECT_EQ(one->outcome, GetParam().outcome);
-    EXPECT_GE(one->from, last);
-    last = one->from;
+TEST(ForceCauses, SeveralAreNamed) {
+  for (const Pushes& pushes : kPushes) {
+    SCOPED_TRACE(pushes.name);
+    const Causes causes = Explain(200, pushes.every, 24, pushes.force);
+    SCOPED_TRACE(DescribeCauses(causes, CauseChannel::kBalance));
+    ASSERT_EQ(causes.size(), pushes.faults.size());
+    double last = 0.0;
+    for (const Fault& fault : pushes.faults) {
+      const auto one = std::ranges::find_if(causes, [&](const Explanation& each) {
+        const Fault& first = each.faults.front();
+        return first.IsLike(fault) && std::abs(first.value - fault.value) <= 1e-3 * fault.value;
+      });
+      ASSERT_NE(one, causes.end()) << fault.Describe();
+      EXPECT_EQ(one->outcome, pushes.outcome);
+      EXPECT_GE(one->from, last);
+      last = one->from;
+    }
   }
 }
-
-constexpr double kTimeStep = 1e-3;  // s
-INSTANTIATE_TEST_SUITE_P(
-    All, SeveralForces,
-    ::testing::Values(
-        // A small force that the columns of a large fault hide appears once only rounding is noise.
-        Pushes{"SmallBesideLarge",
-               4,
-               [](int) -> VectorXd { return Torque(1, 1.0) + Torque(4, 5e-5); },
-               {TorqueAt(2, 1.0), TorqueAt(5, 5e-5)}},
-        Pushes{"OneAfterAnother",
-               4,
-               [](int k) { return k < 11 ? Torque(1, 0.7) : Torque(3, 0.4); },
-               {TorqueAt(2, 0.7), TorqueAt(4, 0.4)}},
-        // A torque of a joint that turns one way is its dry friction as well.
-        Pushes{"StepOfOne",
-               4,
-               [](int k) { return Torque(2, k < 9 ? 0.3 : 0.9); },
-               {TorqueAt(3, 0.3), TorqueAt(3, 0.9)},
-               CauseOutcome::kNamedClass},
-        // Most steps between two that are kept are not known, and the growth may begin there.
-        Pushes{"GrowingLater",
-               4,
-               [](int k) -> VectorXd {
-                 return Torque(1, 0.7) + Torque(3, 2.5 * 4 * kTimeStep * std::max(0.0, k - 13.4));
-               },
-               {TorqueAt(2, 0.7), GrowingAt(4, 2.5)}},
-        // A growing force changes more from step to step than one that begins beside it.
-        Pushes{"ForAWhileBesideGrowing",
-               1,
-               [](int k) -> VectorXd {
-                 return Torque(1, 0.05 * k + 0.02) + Torque(3, 9 <= k && k < 17 ? 0.1 : 0.0);
-               },
-               {GrowingAt(2, 0.05 / kTimeStep), TorqueAt(4, 0.1)}},
-        // Neither of two successive jumps is taken for the change of the other one's neighbours.
-        Pushes{
-            "BeginsBeforeAnotherEnds",
-            1,
-            [](int k) -> VectorXd { return Torque(1, k < 15 ? 0.7 : 0.0) + Torque(3, k < 14 ? 0.0 : 0.4); },
-            {TorqueAt(2, 0.7), TorqueAt(4, 0.4)}}),
-    [](const ::testing::TestParamInfo<Pushes>& info) { return info.param.name; });
 
 // Several faults explain anything in a single step: made-up torques are none of them.
 TEST(ForceCauses, OfOneStepNoSeveralFaultsAreNamed) {

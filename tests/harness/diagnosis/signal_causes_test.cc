@@ -180,32 +180,29 @@ Unknown MakeLost(const std::string& name, bool reads_zero) {
 }
 
 // An unknown fault does not get the name of a known one.
-class UnknownFault : public ::testing::TestWithParam<Unknown> {};
-
-TEST_P(UnknownFault, IsNotExplained) {
-  const Causes causes = Explain(GetParam().make());
-  SCOPED_TRACE(TextOf(causes));
-  ASSERT_EQ(causes.size(), 1u);
-  EXPECT_EQ(causes.front().outcome, CauseOutcome::kNotExplained);
+TEST(SignalCauses, UnknownFaultsAreNotExplained) {
+  const Unknown kUnknown[] = {
+      MakeUnknown("Crosstalk", [] { return ArrayXd(0.03 * CalcOtherTorque()); }),
+      MakeUnknown("GainWherePositive", [] { return ArrayXd(0.05 * CalcTorque().max(0.0)); }),
+      MakeUnknown("Square", [] { return ArrayXd(0.02 * CalcTorque().square()); }),
+      MakeUnknown("Cube", [] { return ArrayXd(-0.004 * CalcTorque().cube()); }),
+      MakeUnknown("SmoothDryFriction", [] { return ArrayXd(-0.06 * (CalcRate() / 0.05).tanh()); }),
+      MakeUnknown("FrictionOfTheSquaredRate", [] { return ArrayXd(-0.2 * CalcRate() * CalcRate().abs()); }),
+      MakeUnknown("Spring", [] { return ArrayXd(-0.4 * CalcPosition()); }),
+      MakeUnknown("Chirp",
+                  [] {
+                    const ArrayXd t = CalcTime();
+                    return ArrayXd(0.1 * (2.0 * kPi * (10.0 * t + 600.0 * t.square())).sin());
+                  }),
+      MakeLost("LostSamplesAreZero", true),
+      MakeLost("LostSamplesAreOld", false)};
+  for (const Unknown& one : kUnknown) {
+    const Causes causes = Explain(one.make());
+    SCOPED_TRACE(one.name + ": " + TextOf(causes));
+    ASSERT_EQ(causes.size(), 1u);
+    EXPECT_EQ(causes.front().outcome, CauseOutcome::kNotExplained);
+  }
 }
-
-INSTANTIATE_TEST_SUITE_P(
-    All, UnknownFault,
-    ::testing::Values(
-        MakeUnknown("Crosstalk", [] { return ArrayXd(0.03 * CalcOtherTorque()); }),
-        MakeUnknown("GainWherePositive", [] { return ArrayXd(0.05 * CalcTorque().max(0.0)); }),
-        MakeUnknown("Square", [] { return ArrayXd(0.02 * CalcTorque().square()); }),
-        MakeUnknown("Cube", [] { return ArrayXd(-0.004 * CalcTorque().cube()); }),
-        MakeUnknown("SmoothDryFriction", [] { return ArrayXd(-0.06 * (CalcRate() / 0.05).tanh()); }),
-        MakeUnknown("FrictionOfTheSquaredRate", [] { return ArrayXd(-0.2 * CalcRate() * CalcRate().abs()); }),
-        MakeUnknown("Spring", [] { return ArrayXd(-0.4 * CalcPosition()); }),
-        MakeUnknown("Chirp",
-                    [] {
-                      const ArrayXd t = CalcTime();
-                      return ArrayXd(0.1 * (2.0 * kPi * (10.0 * t + 600.0 * t.square())).sin());
-                    }),
-        MakeLost("LostSamplesAreZero", true), MakeLost("LostSamplesAreOld", false)),
-    [](const ::testing::TestParamInfo<Unknown>& info) { return info.param.name; });
 
 // Friction brakes.
 TEST(SignalCauses, NoFrictionDrives) {

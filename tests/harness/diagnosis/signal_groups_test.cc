@@ -1,6 +1,5 @@
 // A fault that all motors share is reported once, and a further fault of one motor is judged beside it.
 
-#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <functional>
@@ -32,16 +31,6 @@ struct Beside {
   std::function<ArrayXd(const ArrayXd&)> make_common, make_own;
 };
 
-class MotorBesideAll : public ::testing::TestWithParam<Beside> {};
-
-TEST_P(MotorBesideAll, BothAreNamed) {
-  const Beside& made = GetParam();
-  Fault common = made.common;
-  common.place = "all motors";
-  ExpectNamed(ExplainSignals(MakeMotors(made.make_common, made.make_own), CauseChannel::kActuation),
-              {common, made.own});
-}
-
 ArrayXd Delay(const ArrayXd& u, Index steps) {
   return MakeEach([&](Index i) { return Back(u, i, steps); });
 }
@@ -53,40 +42,41 @@ ArrayXd DelayUnknown(const ArrayXd& u, Index steps) {
 }
 ArrayXd Round(const ArrayXd& u, double step) { return step * (u / step).round(); }
 
-INSTANTIATE_TEST_SUITE_P(
-    Faults, MotorBesideAll,
-    ::testing::Values(
-        Beside{"Gains", OfMotor("gain", 1.003), OfMotor("gain", 0.95),
-               [](const ArrayXd& u) { return ArrayXd(1.003 * u); },
-               [](const ArrayXd& u) { return ArrayXd(0.95 * u); }},
-        Beside{"RoundingAndGain", OfMotor("gain", 1.003), OfMotor("rounding to steps of", 0.04, "N m"),
-               [](const ArrayXd& u) { return ArrayXd(1.003 * u); },
-               [](const ArrayXd& u) { return Round(u, 0.04); }},
-        Beside{"DelayAndGain", OfMotor("delay", 3.0, "steps"), OfMotor("gain", 0.95),
-               [](const ArrayXd& u) { return Delay(u, 3); },
-               [](const ArrayXd& u) { return ArrayXd(0.95 * u); }},
-        Beside{"DelayAndLateOffset", OfMotor("delay", 3.0, "steps"), OfMotor("offset", 0.2, "N m"),
-               [](const ArrayXd& u) { return DelayUnknown(u, 3); },
-               [](const ArrayXd& u) {
-                 ArrayXd late = u;
-                 late.tail(kSteps / 2) += 0.2;
-                 return late;
-               }},
-        Beside{"DelayAndLimit", OfMotor("delay", 3.0, "steps"), OfMotor("limit", 1.2, "N m"),
-               [](const ArrayXd& u) { return Delay(u, 3); },
-               [](const ArrayXd& u) { return ArrayXd(u.min(1.2).max(-1.2)); }},
-        Beside{"Delays", OfMotor("delay", 1.0, "steps"), OfMotor("delay", 8.0, "steps"),
-               [](const ArrayXd& u) { return Delay(u, 1); }, [](const ArrayXd& u) { return Delay(u, 8); }},
-        Beside{"LagAndGain", OfMotor("lag", 5e-3, "s"), OfMotor("gain", 0.95),
-               [](const ArrayXd& u) { return MakeLag(u, 5e-3); },
-               [](const ArrayXd& u) { return ArrayXd(0.95 * u); }},
-        Beside{"LagAndOffset", OfMotor("lag", 5e-3, "s"), OfMotor("offset", 0.2, "N m"),
-               [](const ArrayXd& u) { return MakeLag(u, 5e-3); },
-               [](const ArrayXd& u) { return ArrayXd(u + 0.2); }},
-        Beside{"RoundingAndOffset", OfMotor("rounding to steps of", 0.01, "N m"),
-               OfMotor("offset", 0.3, "N m"), [](const ArrayXd& u) { return Round(u, 0.01); },
-               [](const ArrayXd& u) { return ArrayXd(u + 0.3); }}),
-    [](const ::testing::TestParamInfo<Beside>& info) { return info.param.name; });
+const Beside kBeside[] = {
+    {"Gains", OfMotor("gain", 1.003), OfMotor("gain", 0.95),
+     [](const ArrayXd& u) { return ArrayXd(1.003 * u); }, [](const ArrayXd& u) { return ArrayXd(0.95 * u); }},
+    {"RoundingAndGain", OfMotor("gain", 1.003), OfMotor("rounding to steps of", 0.04, "N m"),
+     [](const ArrayXd& u) { return ArrayXd(1.003 * u); }, [](const ArrayXd& u) { return Round(u, 0.04); }},
+    {"DelayAndGain", OfMotor("delay", 3.0, "steps"), OfMotor("gain", 0.95),
+     [](const ArrayXd& u) { return Delay(u, 3); }, [](const ArrayXd& u) { return ArrayXd(0.95 * u); }},
+    {"DelayAndLateOffset", OfMotor("delay", 3.0, "steps"), OfMotor("offset", 0.2, "N m"),
+     [](const ArrayXd& u) { return DelayUnknown(u, 3); },
+     [](const ArrayXd& u) {
+       ArrayXd late = u;
+       late.tail(kSteps / 2) += 0.2;
+       return late;
+     }},
+    {"DelayAndLimit", OfMotor("delay", 3.0, "steps"), OfMotor("limit", 1.2, "N m"),
+     [](const ArrayXd& u) { return Delay(u, 3); },
+     [](const ArrayXd& u) { return ArrayXd(u.min(1.2).max(-1.2)); }},
+    {"Delays", OfMotor("delay", 1.0, "steps"), OfMotor("delay", 8.0, "steps"),
+     [](const ArrayXd& u) { return Delay(u, 1); }, [](const ArrayXd& u) { return Delay(u, 8); }},
+    {"LagAndGain", OfMotor("lag", 5e-3, "s"), OfMotor("gain", 0.95),
+     [](const ArrayXd& u) { return MakeLag(u, 5e-3); }, [](const ArrayXd& u) { return ArrayXd(0.95 * u); }},
+    {"LagAndOffset", OfMotor("lag", 5e-3, "s"), OfMotor("offset", 0.2, "N m"),
+     [](const ArrayXd& u) { return MakeLag(u, 5e-3); }, [](const ArrayXd& u) { return ArrayXd(u + 0.2); }},
+    {"RoundingAndOffset", OfMotor("rounding to steps of", 0.01, "N m"), OfMotor("offset", 0.3, "N m"),
+     [](const ArrayXd& u) { return Round(u, 0.01); }, [](const ArrayXd& u) { return ArrayXd(u + 0.3); }}};
+
+TEST(SignalCauses, MotorBesideAllIsNamedWithThem) {
+  for (const Beside& made : kBeside) {
+    SCOPED_TRACE(made.name);
+    Fault common = made.common;
+    common.place = "all motors";
+    ExpectNamed(ExplainSignals(MakeMotors(made.make_common, made.make_own), CauseChannel::kActuation),
+                {common, made.own});
+  }
+}
 
 // Rounding by all changes the size of a motor's own steps or noise.
 TEST(SignalCauses, StepsAndNoiseBeforeTheStepsOfAllAreNotExplained) {

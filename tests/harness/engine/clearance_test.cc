@@ -234,37 +234,6 @@ TEST_F(ClearanceTest, MissesNoOverlapAndMeasuresFew) {
   EXPECT_LT(clearance.measured() - before, static_cast<long>(pairs.size()) * kSteps / 100);
 }
 
-// A robot that drives on a floor changes none of its own distances, nor those over the floor, and a wheel is
-// round.
-TEST_F(ClearanceTest, DrivingLooksAtNoMorePairsThanStanding) {
-  constexpr int kSteps = 500;
-  std::vector<WatchedPair> pairs = List();
-  std::erase_if(pairs, [](const WatchedPair& pair) {
-    return pair.pairs == PairClass::kRobotSurroundings || pair.pairs == PairClass::kObjectSurroundings;
-  });
-  Clearance clearance(*engine_, adapter_, solids_, pairs);
-  const MjDataPtr data = MakeData(*engine_);
-  mj_kinematics(engine_.get(), data.get());
-  const int base = adapter_.link_bodies().front();
-  const double* const start = data->qpos + engine_->jnt_qposadr[engine_->body_jntadr[base]];
-  clearance.Update({data->xpos, data->xmat}, 0.0);
-  const long begin = clearance.looked_at();
-  const double x_start = start[0];
-  // 1 m/s in steps of 1 ms, the wheels rolling, and the object beside it as fast.
-  VectorXd rate = VectorXd::Zero(engine_->nv);
-  rate[engine_->body_dofadr[base]] = 1e-3;
-  rate[engine_->body_dofadr[adapter_.object_body()]] = 1e-3;
-  for (const EngineWheel& wheel : adapter_.wheels()) rate[wheel.dof] = 1e-2;
-  for (int step = 1; step <= kSteps; ++step) {
-    mj_integratePos(engine_.get(), data->qpos, rate.data(), 1.0);
-    mj_kinematics(engine_.get(), data.get());
-    clearance.Update({data->xpos, data->xmat}, step);
-  }
-  EXPECT_NEAR(start[0] - x_start, 0.5, 1e-9);
-  EXPECT_GT(begin, 500);
-  EXPECT_LT(clearance.looked_at() - begin, kSteps);
-}
-
 TEST_F(ClearanceTest, TimeBeginsAnew) {
   Clearance clearance(*engine_, adapter_, solids_, List());
   const MjDataPtr data = MakeData(*engine_);

@@ -9,6 +9,7 @@
 #include <cstring>
 #include <string>
 
+#include "controller/common/types.h"
 #include "harness/engine/engine.h"
 #include "harness/engine/mujoco_release.h"
 #include "tests/common/files.h"
@@ -26,49 +27,48 @@ namespace {
   return ::testing::AssertionSuccess();
 }
 
-class SameMotion : public ::testing::TestWithParam<const char*> {};
-
-TEST_P(SameMotion, WithAndWithoutLooks) {
-  const MjModelPtr full = LoadMjcf(SourcePath(GetParam()));
-  MjModelPtr bare(mj_copyModel(nullptr, full.get()));
-  const int removed = RemoveLooks(&bare);
-  EXPECT_GT(removed, 10);
-  EXPECT_EQ(bare->ngeom + removed, full->ngeom);
-  EXPECT_EQ(RemoveLooks(&bare), 0) << "nothing is left to remove";
-  const size_t pictures = RemovePictures(&bare);
-  EXPECT_GE(pictures, static_cast<size_t>(full->ntexdata));
-  EXPECT_EQ(pictures > 0, full->ntex > 0);
-  EXPECT_EQ(RemovePictures(&bare), 0U);
-  for (int i = 0; i < bare->nmat; ++i) EXPECT_EQ(bare->mat_texid[i], -1);
-  const MjModelPtr copy(mj_copyModel(nullptr, bare.get()));  // as the plant does
-  const MjDataPtr a = MakeData(*full);
-  const MjDataPtr b = MakeData(*copy);
-  const int key = mj_name2id(full.get(), mjOBJ_KEY, "grasp_ready");
-  if (key >= 0) {
-    mj_resetDataKeyframe(full.get(), a.get(), key);
-    mj_resetDataKeyframe(copy.get(), b.get(), key);
-  }
-  int contacts = 0;
-  constexpr int kSteps = 300;
-  for (int step = 0; step < kSteps; ++step) {
-    for (int i = 0; i < full->nu; ++i) a->ctrl[i] = b->ctrl[i] = 0.3 * std::sin(0.01 * step + i);
-    mj_step(full.get(), a.get());
-    mj_step(copy.get(), b.get());
-    ASSERT_TRUE(SameBits("qpos", a->qpos, b->qpos, full->nq)) << "step " << step;
-    ASSERT_TRUE(SameBits("qvel", a->qvel, b->qvel, full->nv)) << "step " << step;
-    ASSERT_TRUE(SameBits("qacc", a->qacc, b->qacc, full->nv)) << "step " << step;
-    ASSERT_EQ(a->ncon, b->ncon) << "step " << step;
-    contacts += a->ncon;
-    for (int i = 0; i < a->ncon; ++i) {
-      EXPECT_EQ(NameOf(*full, mjOBJ_GEOM, a->contact[i].geom1),
-                NameOf(*copy, mjOBJ_GEOM, b->contact[i].geom1));
-      ASSERT_TRUE(SameBits("contact", a->contact[i].pos, b->contact[i].pos, 3)) << "step " << step;
+TEST(RemoveLooks, LeavesTheSameMotion) {
+  for (const char* const scene : {"/mjcf/scene.xml", "/mjcf/panda.xml"}) {
+    SCOPED_TRACE(scene);
+    const MjModelPtr full = LoadMjcf(SourcePath(scene));
+    MjModelPtr bare(mj_copyModel(nullptr, full.get()));
+    const int removed = RemoveLooks(&bare);
+    EXPECT_GT(removed, 10);
+    EXPECT_EQ(bare->ngeom + removed, full->ngeom);
+    EXPECT_EQ(RemoveLooks(&bare), 0) << "nothing is left to remove";
+    const size_t pictures = RemovePictures(&bare);
+    EXPECT_GE(pictures, static_cast<size_t>(full->ntexdata));
+    EXPECT_EQ(pictures > 0, full->ntex > 0);
+    EXPECT_EQ(RemovePictures(&bare), 0U);
+    for (int i = 0; i < bare->nmat; ++i) EXPECT_EQ(bare->mat_texid[i], -1);
+    const MjModelPtr copy(mj_copyModel(nullptr, bare.get()));  // as the plant does
+    const MjDataPtr a = MakeData(*full);
+    const MjDataPtr b = MakeData(*copy);
+    const int key = mj_name2id(full.get(), mjOBJ_KEY, "grasp_ready");
+    if (key >= 0) {
+      mj_resetDataKeyframe(full.get(), a.get(), key);
+      mj_resetDataKeyframe(copy.get(), b.get(), key);
     }
+    int contacts = 0;
+    constexpr int kSteps = 300;
+    for (int step = 0; step < kSteps; ++step) {
+      for (int i = 0; i < full->nu; ++i) a->ctrl[i] = b->ctrl[i] = 0.3 * std::sin(0.01 * step + i);
+      mj_step(full.get(), a.get());
+      mj_step(copy.get(), b.get());
+      ASSERT_TRUE(SameBits("qpos", a->qpos, b->qpos, full->nq)) << "step " << step;
+      ASSERT_TRUE(SameBits("qvel", a->qvel, b->qvel, full->nv)) << "step " << step;
+      ASSERT_TRUE(SameBits("qacc", a->qacc, b->qacc, full->nv)) << "step " << step;
+      ASSERT_EQ(a->ncon, b->ncon) << "step " << step;
+      contacts += a->ncon;
+      for (int i = 0; i < a->ncon; ++i) {
+        EXPECT_EQ(NameOf(*full, mjOBJ_GEOM, a->contact[i].geom1),
+                  NameOf(*copy, mjOBJ_GEOM, b->contact[i].geom1));
+        ASSERT_TRUE(SameBits("contact", a->contact[i].pos, b->contact[i].pos, 3)) << "step " << step;
+      }
+    }
+    if (key >= 0) EXPECT_GT(contacts, kSteps) << "without contacts this says little";
   }
-  if (key >= 0) EXPECT_GT(contacts, kSteps) << "without contacts this says little";
 }
-
-INSTANTIATE_TEST_SUITE_P(Scenes, SameMotion, ::testing::Values("/mjcf/scene.xml", "/mjcf/panda.xml"));
 
 // Each geom of a body that falls on a floor is used by something other than drawing, but for one.
 TEST(RemoveLooks, KeepsWhatAnythingRefersTo) {

@@ -19,14 +19,6 @@ struct Words {
   std::string compiler, option, flag, root, joint, geom, body, in_body, actuator, tendon, sensor;
 };
 
-void PrintTo(const Words& words, std::ostream* out) {
-  for (const std::string* word :
-       {&words.compiler, &words.option, &words.flag, &words.root, &words.joint, &words.geom, &words.body,
-        &words.in_body, &words.actuator, &words.tendon, &words.sensor}) {
-    *out << *word;
-  }
-}
-
 std::string WriteMjcf(const Words& words) {
   return "<mujoco>\n<compiler angle=\"radian\" autolimits=\"true\" " + words.compiler + "/>\n<option " +
          words.option + "><flag " + words.flag + "/></option>\n" + words.root +
@@ -68,73 +60,70 @@ std::vector<double> CalcTerms(const std::string& text) {
 #define NEEDS_2_2_2() \
   if (mjVERSION_HEADER != 222) GTEST_SKIP() << "needs MuJoCo 2.2.2, this is " << mj_versionString()
 
-class LeftOut : public ::testing::TestWithParam<Words> {};
+const Words kLeftOut[] = {
+    {.joint = R"(actuatorfrcrange="-5 5")"},
+    {.joint = R"(actuatorgravcomp="true")"},
+    {.joint = R"(stiffness="0 0 0")"},
+    {.option = R"(integrator="implicitfast")"},
+    {.option = R"(ls_iterations="20" ccd_iterations="30")"},
+    {.flag = R"(eulerdamp="disable" nativeccd="enable")"},
+    {.flag = R"(damper="enable")"},
+    {.compiler = R"(saveinertial="true" alignfree="false")"},
+    {.root = "<size memory=\"1M\"/>\n"},
+    {.root = "<visual><global bvactive=\"false\"/></visual>\n"},
+    {.root = "<default><camera resolution=\"64 48\"/></default>\n"},
+    {.geom = R"(surfacevel="1 0 0")"},
+    {.body = R"(gravcomp="0")"},
+    {.in_body = R"(<light intensity="2"/>)"},
+    {.in_body = R"(<body name="b" sleep="never"/>)"},
+    {.actuator = R"(kv="3" dampratio="1" inheritrange="0")"},
+    {.actuator = R"(armature="0.0")"},
+    {.tendon = R"(armature="0" actuatorfrcrange="-1 1")"},
+    {.sensor = R"(delay="0.1" nsample="3")"},
+    {.root = "<sensor><e_kinetic/></sensor>\n"},
+    {.root = "<sensor><contact geom1=\"a\"/><plugin/></sensor><extension><plugin/></extension>\n"}};
 
-TEST_P(LeftOut, ThePendulumStays) {
+TEST(NewerMjcf, ThePendulumStaysWhereNewWordsAreLeftOut) {
   NEEDS_2_2_2();
-  const std::string newer = WriteMjcf(GetParam());
-  EXPECT_EQ(CalcTerms(newer), CalcTerms(kPlain));
-  const Copy copy = Downgrade(newer, "newer");
-  EXPECT_FALSE(copy.changes.empty());
-  const std::vector<double> terms = CalcTerms(copy.text);
-  EXPECT_EQ(terms, CalcTerms(kPlain));
-  for (const double term : terms) EXPECT_NE(term, 0.0);
-  // The copy is for 2.2.2 already.
-  EXPECT_TRUE(Downgrade(copy.text, "copy").changes.empty());
+  for (const Words& words : kLeftOut) {
+    const std::string newer = WriteMjcf(words);
+    SCOPED_TRACE(newer);
+    EXPECT_EQ(CalcTerms(newer), CalcTerms(kPlain));
+    const Copy copy = Downgrade(newer, "newer");
+    EXPECT_FALSE(copy.changes.empty());
+    const std::vector<double> terms = CalcTerms(copy.text);
+    EXPECT_EQ(terms, CalcTerms(kPlain));
+    for (const double term : terms) EXPECT_NE(term, 0.0);
+    // The copy is for 2.2.2 already.
+    EXPECT_TRUE(Downgrade(copy.text, "copy").changes.empty());
+  }
 }
-
-INSTANTIATE_TEST_SUITE_P(
-    NewerMjcf, LeftOut,
-    ::testing::Values(
-        Words{.joint = R"(actuatorfrcrange="-5 5")"}, Words{.joint = R"(actuatorgravcomp="true")"},
-        Words{.joint = R"(stiffness="0 0 0")"}, Words{.option = R"(integrator="implicitfast")"},
-        Words{.option = R"(ls_iterations="20" ccd_iterations="30")"},
-        Words{.flag = R"(eulerdamp="disable" nativeccd="enable")"}, Words{.flag = R"(damper="enable")"},
-        Words{.compiler = R"(saveinertial="true" alignfree="false")"},
-        Words{.root = "<size memory=\"1M\"/>\n"},
-        Words{.root = "<visual><global bvactive=\"false\"/></visual>\n"},
-        Words{.root = "<default><camera resolution=\"64 48\"/></default>\n"},
-        Words{.geom = R"(surfacevel="1 0 0")"}, Words{.body = R"(gravcomp="0")"},
-        Words{.in_body = R"(<light intensity="2"/>)"}, Words{.in_body = R"(<body name="b" sleep="never"/>)"},
-        Words{.actuator = R"(kv="3" dampratio="1" inheritrange="0")"}, Words{.actuator = R"(armature="0.0")"},
-        Words{.tendon = R"(armature="0" actuatorfrcrange="-1 1")"},
-        Words{.sensor = R"(delay="0.1" nsample="3")"}, Words{.root = "<sensor><e_kinetic/></sensor>\n"},
-        Words{.root = "<sensor><contact geom1=\"a\"/><plugin/></sensor><extension><plugin/></extension>\n"}));
 
 /// Words that act on the dynamics are refused in one line, with place, release and remedy.
 struct Refused {
   Words words;
   std::string message;
 };
-void PrintTo(const Refused& refused, std::ostream* out) { PrintTo(refused.words, out); }
-class NotLeftOut : public ::testing::TestWithParam<Refused> {};
+const Refused kRefused[] = {
+    {{.body = R"(gravcomp="1")"},
+     "newer.xml:5: <body gravcomp>: acts on the dynamics, since MuJoCo 2.3.1: it "
+     "holds a part of the weight"},
+    {{.tendon = R"(armature="0.1")"}, "<fixed armature>: acts on the dynamics, since MuJoCo 3.3.1"},
+    {{.actuator = R"(armature="0.1")"}, "<position armature>: acts on the dynamics, since MuJoCo 3.7.0"},
+    {{.flag = R"(damper="disable")"}, "<flag damper>: acts on the dynamics, since MuJoCo 3.3.6"},
+    {{.joint = R"(stiffness="0 1")"}, "<joint stiffness>: acts on the dynamics: 2.2.2 has the first"},
+    {{.in_body = R"(<frame pos="0 0 1"/>)"},
+     "<frame>: acts on the dynamics, since MuJoCo 3.1.0: load the file"},
+    {{.in_body = "<plugin/>"}, "<plugin>: acts on the dynamics, since MuJoCo 2.3.0"},
+    {{.in_body = R"(<replicate count="2"/>)"}, "<replicate>: acts on the dynamics"},
+    {{.joint = R"(springiness="1")"}, "<joint springiness>: is neither in 2.2.2 nor known to be newer"},
+    {{.in_body = "<wing/>"}, "<wing>: is neither in 2.2.2 nor known to be newer"}};
 
-TEST_P(NotLeftOut, IsNamed) {
+TEST(NewerMjcf, WordsThatActOnTheDynamicsAreNamed) {
   NEEDS_2_2_2();
-  EXPECT_TRUE(
-      Throws<InputError>([] { Downgrade(WriteMjcf(GetParam().words), "newer.xml"); }, GetParam().message));
+  for (const auto& [words, message] : kRefused)
+    EXPECT_TRUE(Throws<InputError>([text = WriteMjcf(words)] { Downgrade(text, "newer.xml"); }, message));
 }
-
-INSTANTIATE_TEST_SUITE_P(
-    NewerMjcf, NotLeftOut,
-    ::testing::Values(Refused{{.body = R"(gravcomp="1")"},
-                              "newer.xml:5: <body gravcomp>: acts on the dynamics, since MuJoCo 2.3.1: it "
-                              "holds a part of the weight"},
-                      Refused{{.tendon = R"(armature="0.1")"},
-                              "<fixed armature>: acts on the dynamics, since MuJoCo 3.3.1"},
-                      Refused{{.actuator = R"(armature="0.1")"},
-                              "<position armature>: acts on the dynamics, since MuJoCo 3.7.0"},
-                      Refused{{.flag = R"(damper="disable")"},
-                              "<flag damper>: acts on the dynamics, since MuJoCo 3.3.6"},
-                      Refused{{.joint = R"(stiffness="0 1")"},
-                              "<joint stiffness>: acts on the dynamics: 2.2.2 has the first"},
-                      Refused{{.in_body = R"(<frame pos="0 0 1"/>)"},
-                              "<frame>: acts on the dynamics, since MuJoCo 3.1.0: load the file"},
-                      Refused{{.in_body = "<plugin/>"}, "<plugin>: acts on the dynamics, since MuJoCo 2.3.0"},
-                      Refused{{.in_body = R"(<replicate count="2"/>)"}, "<replicate>: acts on the dynamics"},
-                      Refused{{.joint = R"(springiness="1")"},
-                              "<joint springiness>: is neither in 2.2.2 nor known to be newer"},
-                      Refused{{.in_body = "<wing/>"}, "<wing>: is neither in 2.2.2 nor known to be newer"}));
 
 TEST(NewerMjcf, TheNewDefaultIsStated) {
   const Copy copy = Downgrade("<mujoco><worldbody/></mujoco>", "newer");

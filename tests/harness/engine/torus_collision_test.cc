@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cmath>
 #include <random>
-#include <string>
 
 #include "controller/contact/shapes.h"
 #include "harness/engine/engine.h"
@@ -70,83 +69,6 @@ TEST(CollideSphereTorus, BallInTheHoleTouchesBothSides) {
   EXPECT_TRUE(MatrixNear(contacts[0].normal, -contacts[1].normal, kRounding));
   EXPECT_NEAR(contacts[0].distance, 0.0, kRounding);
   EXPECT_NEAR(contacts[1].distance, 0.0, kRounding);
-}
-
-TEST(TorusCollision, EngineContactIsTheClosedForm) {
-  const MjModelPtr model = LoadBallAndTorus(kBall, true);
-  const MjDataPtr data = MakeData(*model);
-  const Torus torus(kRing, kTube);
-  std::mt19937 random(5);
-  std::uniform_real_distribution<double> draw(-1.0, 1.0);
-  int touching = 0;
-  for (int i = 0; i < 500; ++i) {
-    Eigen::Quaterniond rotation(draw(random), draw(random), draw(random), draw(random));
-    rotation.normalize();
-    const Vector3d origin(draw(random), draw(random), draw(random));
-    const Vector3d in_torus = 0.05 * Vector3d(draw(random), draw(random), draw(random));
-    const Vector3d ball = origin + rotation * in_torus;
-    mju_copy3(data->qpos, origin.data());
-    const double quaternion[4] = {rotation.w(), rotation.x(), rotation.y(), rotation.z()};
-    mju_copy4(data->qpos + 3, quaternion);
-    mju_copy3(data->qpos + 7, ball.data());
-    mj_fwdPosition(model.get(), data.get());
-    const SurfaceProjection expected = torus.Project(in_torus);
-    const double distance = expected.distance - kBall;
-    ASSERT_EQ(data->ncon > 0, distance <= 0.0);
-    if (data->ncon == 0) continue;
-    ++touching;
-    const mjContact& contact = data->contact[0];
-    const SurfaceGeometry surface = torus.Evaluate(expected.alpha);
-    // The engine's poses carry rounding of world coordinates of about one metre.
-    EXPECT_NEAR(contact.dist, distance, 10.0 * kRounding);
-    const Vector3d normal = rotation * surface.R.col(2);
-    const double sign = contact.geom1 == mj_name2id(model.get(), mjOBJ_GEOM, "ball") ? -1.0 : 1.0;
-    EXPECT_TRUE(MatrixNear(Eigen::Map<const Vector3d>(contact.frame), sign * normal, 1e-12));
-  }
-  EXPECT_GT(touching, 50);
-}
-
-/// Distance of the deepest contact between the ball at `center` and a ring of capsules inscribed in the
-/// torus's circle.
-double CapsuleRingDistance(int capsules, const Vector3d& center) {
-  std::string geoms;
-  for (int k = 0; k < capsules; ++k) {
-    const double a = 2.0 * kPi * k / capsules;
-    const double b = 2.0 * kPi * (k + 1) / capsules;
-    geoms +=
-        fmt::format(R"(<geom type="capsule" size="{}" fromto="{:.17g} {:.17g} 0 {:.17g} {:.17g} 0"/>)", kTube,
-                    kRing * std::cos(a), kRing * std::sin(a), kRing * std::cos(b), kRing * std::sin(b));
-  }
-  const MjModelPtr model = LoadMjcfText(
-      fmt::format(
-          R"(<mujoco><size nconmax="500"/><worldbody><body>{}</body><body pos="{:.17g} {:.17g} {:.17g}">)"
-          R"(<freejoint/><geom type="sphere" size="{}"/></body></worldbody></mujoco>)",
-          geoms, center.x(), center.y(), center.z(), kBall),
-      "capsule ring");
-  const MjDataPtr data = MakeData(*model);
-  mj_fwdPosition(model.get(), data.get());
-  double deepest = std::numeric_limits<double>::infinity();
-  for (int i = 0; i < data->ncon; ++i) deepest = std::min(deepest, data->contact[i].dist);
-  return deepest;
-}
-
-TEST(TorusCollision, CapsuleRingConvergesToIt) {
-  // Above a capsule's middle, where the polygon is farthest (R (1 - cos(pi/N))) inside the circle.
-  for (const double elevation : {0.3, 1.2, 2.6}) {
-    double previous = 0.0;
-    for (const int capsules : {24, 48, 96}) {
-      const double middle = kPi / capsules;
-      const double rho = kRing + 0.019 * std::cos(elevation);
-      const Vector3d center(rho * std::cos(middle), rho * std::sin(middle), 0.019 * std::sin(elevation));
-      ExactContact contacts[2];
-      ASSERT_GE(CollideSphereTorus(center, kBall, kRing, kTube, 0.0, contacts), 1);
-      const double error = std::abs(CapsuleRingDistance(capsules, center) - contacts[0].distance);
-      EXPECT_LE(error, kRing * (1.0 - std::cos(kPi / capsules)) * 1.001);
-      EXPECT_GT(error, 1e-9);
-      if (previous > 0.0) EXPECT_NEAR(previous / error, 4.0, 0.3) << "second order in the capsules' length";
-      previous = error;
-    }
-  }
 }
 
 double HeightAfterFall(bool exact) {

@@ -1,4 +1,4 @@
-// Writers that are refused: by the file system, or for a caller's fault.
+// Writers that the file system refuses.
 
 #include <gmock/gmock.h>
 #include <unistd.h>
@@ -168,69 +168,6 @@ TEST_F(LogFailures, RelativePathsStayWhereTheyWere) {
     log.Close();
   }
   EXPECT_TRUE(IsSample(LogReader(path_), 5));
-}
-
-using Misuse = LogFailures;
-
-TEST_F(Misuse, NamesMustBePlainAndFree) {
-  LogWriter log(path_, 10);
-  const auto add = [&](const std::string& name) {
-    return MessageOf<std::invalid_argument>([&] { log.AddSignal({name, "m", "", 1, {}, {}}); });
-  };
-  for (const char* name : {"", "/x", "x/", "a//b", "a/../b", ".", "a/./b", "a\nb", "a,b"}) {
-    EXPECT_THAT(add(name), StartsWith("signal \"")) << name;
-  }
-  EXPECT_EQ(log.AddSignal({"a/b", "m", "", 1, {}, {}}), 1);
-  for (const char* name : {"time", "a", "a/b", "a/b/c", "meta", "meta/x", "time/x"}) {
-    EXPECT_THAT(add(name), EndsWith("is taken in the log")) << name;
-  }
-  EXPECT_EQ(log.AddSignal({"a/bc", "m", "", 1, {}, {}}), 2);
-  const auto embed = [&](const std::string& group, const std::string& name) {
-    return MessageOf<std::invalid_argument>([&] { log.EmbedFile(group, name, "x"); });
-  };
-  EXPECT_THAT(embed("a/b", "c"), EndsWith("is taken in the log"));
-  EXPECT_THAT(embed("inputs", "../c"), StartsWith("embedded file \"../c\""));
-  EXPECT_THAT(embed("inputs", "/etc/passwd"), StartsWith("embedded file \"/etc/passwd\""));
-  EXPECT_THAT(embed("", "c"), StartsWith("group \"\""));
-  log.EmbedFile("inputs", "c", "x");
-  EXPECT_THAT(embed("inputs", "c"), EndsWith("is taken in the log"));
-  EXPECT_THAT(embed("inputs", "c/d"), EndsWith("is taken in the log"));
-}
-
-TEST_F(Misuse, SignalsMustFitTheirColumns) {
-  LogWriter log(path_, 10);
-  const auto add = [&](const SignalInfo& signal) {
-    return MessageOf<std::invalid_argument>([&] { log.AddSignal(signal); });
-  };
-  EXPECT_THAT(add({"x", "m", "", 0, {}, {}}), HasSubstr("width: must be at least 1, got 0"));
-  EXPECT_THAT(add({"x", "m", "", 2, {"a"}, {}}), HasSubstr("columns: must be none or one for each number"));
-  EXPECT_THAT(add({"x", "m", "", 1, {}, {{"unit", 1.0}}}), HasSubstr("attribute \"unit\""));
-  EXPECT_THAT(add({"x", std::string("m\0", 2), "", 1, {}, {}}), HasSubstr("zero byte"));
-  EXPECT_THAT(MessageOf<std::invalid_argument>([&] { log.SetText("t", std::string(1, '\0')); }),
-              HasSubstr("zero byte"));
-  EXPECT_THAT(MessageOf<std::invalid_argument>([&] { log.SetText("", "x"); }), HasSubstr("name"));
-}
-
-TEST_F(Misuse, CallsMustComeInOrder) {
-  const auto message = [](const auto& call) { return MessageOf<std::invalid_argument>(call); };
-  EXPECT_THAT(message([&] { LogWriter(path_, 0); }), HasSubstr("max_rows"));
-  EXPECT_THAT(message([&] { LogWriter(path_, 1, 0); }), HasSubstr("rows_per_flush"));
-  LogWriter log(path_, 2);
-  EXPECT_THAT(message([&] { log.EndRow(); }), EndsWith("the rows have not been started"));
-  EXPECT_THAT(message([&] { log.Close(); }), EndsWith("the rows have not been started"));
-  StartSample(&log);
-  EXPECT_THAT(message([&] { log.StartRows(); }), EndsWith("the rows have been started"));
-  EXPECT_THAT(message([&] {
-                log.AddSignal({"x", "m", "", 1, {}, {}});
-              }),
-              EndsWith("the rows have been started"));
-  EXPECT_THAT(message([&] { log.EndRow(); }), HasSubstr("time of a row: must be finite, got nan"));
-  WriteSampleRows(2, &log);
-  EXPECT_THAT(message([&] { WriteSampleRow(&log); }), HasSubstr("must not exceed max_rows"));
-  log.Close();
-  EXPECT_THAT(message([&] { log.Flush(); }), EndsWith("the log is closed"));
-  EXPECT_THAT(message([&] { log.SetText("a", "b"); }), EndsWith("the log is closed"));
-  EXPECT_TRUE(IsSample(LogReader(path_), 2));
 }
 
 }  // namespace

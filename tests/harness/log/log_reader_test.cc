@@ -57,56 +57,6 @@ TEST_F(LogReaderTest, FilesComeBackWithTheirBytes) {
               HasSubstr("log.h5/a: cannot be made: Not a directory"));
 }
 
-TEST_F(LogReaderTest, UnknownNamesAreNamed) {
-  WriteSampleLog(path_, 3, 3);
-  const LogReader log(path_);
-  const std::string file = path_.string() + ": ";
-  EXPECT_EQ(MessageOf<InputError>([&] { (void)log.ReadSignal("object/X"); }),
-            file + "no signal \"object/X\", did you mean \"object/X_o\"?");
-  EXPECT_EQ(MessageOf<InputError>([&] { (void)log.ReadSignal("object"); }), file + "no signal \"object\"");
-  EXPECT_EQ(MessageOf<InputError>([&] { (void)log.ReadText("scenari"); }),
-            file + "no text \"scenari\", did you mean \"scenario\"?");
-  for (const char* group : {"outputs", "object", "check/M_bar", "inputs/scenario.toml", "meta", ""}) {
-    EXPECT_EQ(MessageOf<InputError>([&] { (void)log.ListFiles(group); }),
-              file + "no group of files \"" + group + "\"");
-  }
-  EXPECT_EQ(MessageOf<InputError>([&] { (void)log.ReadFile("inputs", "mjcf"); }),
-            file + "no embedded file \"inputs/mjcf\"");
-}
-
-TEST_F(LogReaderTest, ManySignalsOfManySizes) {
-  constexpr int kSignals = 700;
-  {
-    LogWriter log(path_, 3, 2);
-    for (int i = 1; i <= kSignals; ++i) {
-      log.AddSignal({"group_" + std::to_string(i % 13) + "/signal_" + std::to_string(i),
-                     "m",
-                     "",
-                     i % 41 + 1,
-                     std::vector<std::string>(static_cast<size_t>(i % 41 + 1), "a column"),
-                     {}});
-    }
-    log.AddSignal({"wide", "m", "", 20000, {}, {}});
-    log.StartRows();
-    for (int row = 0; row < 3; ++row) {
-      log.Row(0)[0] = row;
-      for (int i = 1; i <= kSignals; ++i) log.Row(i).back() = i + 1e-3 * row;
-      log.Row(kSignals + 1).front() = row;
-      log.EndRow();
-    }
-    log.Close();
-  }
-  const LogReader log(path_);
-  ASSERT_EQ(log.signals().size(), kSignals + 2U);
-  for (int i = 1; i <= kSignals; ++i) {
-    const SignalInfo& signal = log.signals()[static_cast<size_t>(i)];
-    ASSERT_EQ(signal.width, i % 41 + 1);
-    ASSERT_EQ(log.ReadSignal(signal.name)(2, i % 41), i + 2e-3);
-    ASSERT_EQ(signal.columns.size(), static_cast<size_t>(signal.width));
-  }
-  EXPECT_EQ(log.ReadSignal("wide").cols(), 20000);
-}
-
 TEST_F(LogReaderTest, FilesThatAreNoLogsAreRefused) {
   const std::string file = path_.string() + ": ";
   EXPECT_EQ(Open(), file + "cannot be read: No such file or directory");

@@ -9,7 +9,6 @@
 #include "tests/common/allocation_counter.h"
 #include "tests/common/files.h"
 #include "tests/common/matchers.h"
-#include "tests/common/run_program.h"
 #include "tests/harness/log/sample_log.h"
 
 namespace dexcheck::testing::log_writer_test {
@@ -150,31 +149,6 @@ TEST_F(LogWriterTest, RowsAllocateNothing) {
   EXPECT_EQ(counter.count(), 0);
   EXPECT_FALSE(ReadText(path_).empty());
   EXPECT_GT(counter.count(), 0) << "the counter does not count";
-}
-
-TEST_F(LogWriterTest, AnOtherProgramReadsIt) {
-  {
-    SampleLog log(path_, 40, 8, 20);
-    for (const char* state : {"unfinished", "finished"}) {
-      const ProgramResult dump =
-          RunProgram({DEXCHECK_H5DUMP, "--attribute=object/X_o/columns", "--attribute=meta/scenario",
-                      "--dataset=check/M_bar", "--format=%.17g", path_});
-      EXPECT_EQ(dump.exit_code, 0) << state << dump.err;
-      EXPECT_EQ(dump.err, "") << state;
-      // Rows 14 and 15 of check/M_bar; "theta" among the columns.
-      EXPECT_THAT(dump.out, HasSubstr("14.533333333333333")) << state;
-      EXPECT_THAT(dump.out, HasSubstr("\"theta\"")) << state;
-      EXPECT_THAT(dump.out, HasSubstr("zeile")) << state;
-      if (log.rows() == 20) {
-        WriteSampleRows(1, &log);
-        log.Close();
-      }
-    }
-  }
-  const ProgramResult header = RunProgram({DEXCHECK_H5DUMP, "--header", path_});
-  EXPECT_THAT(header.out, HasSubstr("DATASET \"X_o\""));
-  EXPECT_THAT(header.out, HasSubstr("SIMPLE { ( 21, 6 ) / ( 21, 6 ) }"));
-  EXPECT_THAT(header.out, HasSubstr("H5T_IEEE_F64LE"));
 }
 
 }  // namespace

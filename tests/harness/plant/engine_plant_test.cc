@@ -4,8 +4,6 @@
 
 #include <gtest/gtest.h>
 
-#include <algorithm>
-
 #include "harness/plant/sensing.h"
 #include "tests/common/matrix_near.h"
 #include "tests/harness/run/shipped_run.h"
@@ -54,17 +52,6 @@ TEST_F(EnginePlantTest, ReadsWhereRobotAndObjectWerePlaced) {
   EXPECT_EQ(response_.fingertips.size(), 4U);
   EXPECT_EQ(response_.wheels.size(), 2U);
   EXPECT_EQ(response_.support_force, 0.0);
-}
-
-TEST_F(EnginePlantTest, MotorsGiveWhatIsSentToThem) {
-  for (Eigen::Index i = 0; i < tau_.size(); ++i) {
-    const double limit = plant_.motors()[static_cast<size_t>(i)].limit;
-    tau_[i] = (i % 2 == 0 ? 0.3 : -0.2) * std::min(limit, 1.0);
-  }
-  Step();
-  EXPECT_TRUE(MatrixNear(response_.motor_torques, tau_, kRounding));
-  EXPECT_EQ(plant_.motors().size(), static_cast<size_t>(tau_.size()));
-  EXPECT_EQ(plant_.motors()[0].name, setup_.model().base().wheel_joint_right);
 }
 
 // Accelerations are those of the step: v(t + dt) = v(t) + dt a. V_Bo is in axes that turn meanwhile, and

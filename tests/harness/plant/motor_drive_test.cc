@@ -96,14 +96,6 @@ TEST_F(MotorDriveTest, LagHasItsTransferFunction) {
   }
 }
 
-TEST_F(MotorDriveTest, TheImpulseThroughALagIsThatOfTheCommand) {
-  MotorDrive drive = Make({.lag = {.all = 4e-3}});
-  (void)Give(drive, 0.0);
-  double sum = 0.0;
-  for (int k = 0; k < 200; ++k) sum += Give(drive, k < 10 ? 2.0 : 0.0);
-  EXPECT_NEAR(sum, 20.0, 1e-12);
-}
-
 TEST_F(MotorDriveTest, StepsAndGainErrors) {
   MotorDrive drive = Make(
       {.torque_step = {.all = 0.25}, .gain_error = {.groups = {{motors_[kJoint].name, 0.02}}, .key = "k"}});

@@ -1,5 +1,4 @@
-// Measurements against the meaning of the keys of sensing: variances, transfer functions, delays,
-// innovations.
+// Measurements against the meaning of the keys of sensing: variances, transfer functions, delays.
 
 #include "harness/plant/sensing.h"
 
@@ -46,14 +45,6 @@ class SensingTest : public ::testing::Test {
   PlantReading truth_;
   Reading measured_;
 };
-
-TEST_F(SensingTest, WithoutFaultsTheTrueStateIsMeasured) {
-  Sensing sensing = Make({});
-  Measure(sensing);
-  EXPECT_EQ(measured_.state.q, truth_.state.q);
-  EXPECT_EQ(measured_.state.xi, truth_.state.xi);
-  EXPECT_EQ(measured_.state.X_Bo.matrix(), truth_.state.X_Bo.matrix());
-}
 
 TEST_F(SensingTest, QuantisationHasTheVarianceOfAnEvenError) {
   const double step = 2.0 * kPi / 4096.0;
@@ -234,50 +225,6 @@ TEST_F(SensingTest, OdometryIntegratesTheWheels) {
   sensing.Translate(Vector3d(-1.0, -2.0, 0.0));
   Measure(sensing);
   EXPECT_NEAR(measured_.state.q[0], v / w * (std::sin(0.8) - std::sin(0.3)), 1e-3);
-}
-
-TEST(VelocityFilter, InnovationsOfItsOwnModelAreWhiteAndAsLargeAsItSays) {
-  constexpr double kSigma = 3.0, kNoise = 1e-4;
-  VelocityFilter filter(kSigma, kNoise * kNoise, kDt);
-  const RandomStream acceleration(5, "a"), noise(5, "n");
-  double x = 0.0, v = 0.0;
-  filter.Reset(0.0, 0.0);
-  constexpr std::uint64_t kSettle = 2000, kSteps = 40000;
-  double variance = 0.0, last = 0.0;
-  double lags[3] = {0.0, 0.0, 0.0};
-  std::vector<double> innovations;
-  for (std::uint64_t k = 0; k < kSettle + kSteps; ++k) {
-    v += kDt * kSigma * acceleration.Normal(k);
-    x += kDt * v;
-    filter.Update(x + kNoise * noise.Normal(k));
-    if (k < kSettle) continue;
-    innovations.push_back(filter.innovation() / std::sqrt(filter.innovation_variance()));
-    variance += innovations.back() * innovations.back();
-    last = filter.v() - v;
-  }
-  for (size_t i = 3; i < innovations.size(); ++i) {
-    for (size_t lag = 1; lag <= 3; ++lag) lags[lag - 1] += innovations[i] * innovations[i - lag];
-  }
-  const double spread = 5.0 / std::sqrt(static_cast<double>(kSteps));
-  EXPECT_NEAR(variance / kSteps, 1.0, std::sqrt(2.0) * spread);
-  for (const double sum : lags) EXPECT_NEAR(sum / kSteps, 0.0, spread);
-  EXPECT_LT(std::abs(last), 0.2);
-
-  // A filter that expects too little of the motion has innovations that are neither.
-  VelocityFilter slow(0.01 * kSigma, kNoise * kNoise, kDt);
-  slow.Reset(0.0, 0.0);
-  x = v = 0.0;
-  double product = 0.0, square = 0.0, before = 0.0;
-  for (std::uint64_t k = 0; k < kSettle + kSteps; ++k) {
-    v += kDt * kSigma * acceleration.Normal(k);
-    x += kDt * v;
-    slow.Update(x + kNoise * noise.Normal(k));
-    const double innovation = slow.innovation() / std::sqrt(slow.innovation_variance());
-    product += innovation * before;
-    square += innovation * innovation;
-    before = innovation;
-  }
-  EXPECT_GT(product / square, 10.0 * spread);
 }
 
 TEST_F(SensingTest, AGroupThatIsNoJointIsRefused) {

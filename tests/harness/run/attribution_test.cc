@@ -1,67 +1,18 @@
-// Faults seeded in model or plant: each must be found, and blamed on the right one.
+// What is compared, how runs fail, faults of sensors that nobody declares, and the share of what is declared.
 
-#include <gtest/gtest.h>
+#include <gmock/gmock.h>
 
 #include <algorithm>
 #include <functional>
 #include <utility>
 
 #include "harness/diagnosis/signal_causes.h"
+#include "harness/run/declared_share.h"
+#include "tests/common/matchers.h"
 #include "tests/harness/run/shipped_run.h"
 
 namespace dexcheck::testing::attribution_test {
 namespace {
-
-struct Fault {
-  const char* name;
-  const char* scenario;
-  std::vector<std::string> overrides;
-  Cause cause;
-};
-
-void PrintTo(const Fault& fault, std::ostream* out) { *out << fault.name; }
-
-class SeededFaults : public ::testing::TestWithParam<Fault> {};
-
-TEST_P(SeededFaults, AreBlamedOnTheirCause) {
-  const Fault& fault = GetParam();
-  ShippedRun run(fault.scenario, fault.overrides);
-  const RunResult& result = run.Run();
-  EXPECT_NE(result.verdict, Verdict::kPass);
-  EXPECT_STREQ(NameOf(result.attribution.cause), NameOf(fault.cause))
-      << result.attribution.evidence << "; " << result.failure;
-  for (const Attribution& one : result.attribution.attributions) {
-    EXPECT_EQ(one.cause == Cause::kModel, fault.cause == Cause::kModel) << one.check;
-  }
-}
-
-INSTANTIATE_TEST_SUITE_P(
-    All, SeededFaults,
-    ::testing::Values(
-        Fault{"object_mass", "curve", {"duration=0.2", "model.object.mass=0.21"}, Cause::kModel},
-        Fault{"link_inertia",
-              "curve",
-              {"duration=0.2", "model.template.arm.links.forearm.shapes.0.radius=0.036"},
-              Cause::kModel},
-        Fault{"link_length", "curve", {"duration=0.2", "model.lengths.L_7=0.2503"}, Cause::kModel},
-        Fault{"misplaced_contact", "curve", {"duration=0.2", "control.contact_error_deg=2"}, Cause::kSensing},
-        Fault{"low_fingertip_friction",
-              "curve",
-              {"duration=1", "mismatch.friction=0.18"},
-              Cause::kFingertipSlip},
-        Fault{"soft_contacts",
-              "curve",
-              {"duration=1", "plant.contact_time_constant=0.02", "plant.contact_impedance=0.9"},
-              Cause::kContactSoftness},
-        Fault{
-            "creeping_contacts", "paper-ramp", {"duration=4.5", "plant.impratio=1"}, Cause::kContactSoftness},
-        Fault{"joint_limit",
-              "two-hands",
-              {"duration=5.5", "grasp.contacts_deg.3=[-121, 109]"},
-              Cause::kJointLimit},
-        Fault{"ring_radius", "two-hands", {"duration=0.1", "model.object.ring_radius=0.2503"}, Cause::kModel},
-        Fault{"slippery_floor", "paper-ramp", {"duration=2", "plant.floor_friction=0.1"}, Cause::kWheelSlip}),
-    [](const ::testing::TestParamInfo<Fault>& info) { return info.param.name; });
 
 // The comparison uses the plant as the scenario changes it, not the MJCF's.
 TEST(ConstantsAsSimulated, HaveTheFrictionOfTheScenario) {
@@ -84,33 +35,29 @@ struct Failure {
   const char* message;
 };
 
-void PrintTo(const Failure& failure, std::ostream* out) { *out << failure.name; }
+const Failure kFailures[] = {
+    {"motor_limit",
+     {"duration=1", "control.natural_frequency=100", "start_error.xyz=[0, 0, 0.05]"},
+     "is at its limit"},
+    {"not_finite", {"duration=1", "start_error.xyz=[1e308, 0, 0]"}, "not finite"},
+    {"fall",
+     {"duration=5", "plant.floor_friction=3",
+      "trajectory={ type = 'circle', speed = 3, radius = 1.5, ramp_time = 5 }"},
+     "the robot fell"},
+    {"lost_grasp",
+     {"plant.finger_friction=0.15", "control.weight={ platform = 1e8, arm = 1e8 }"},
+     "the grasp is lost"},
+    {"no_forces", {"duration=1", "control.f_max=0.3", "control.f_min=0"}, "contact forces"}};
 
-class Failures : public ::testing::TestWithParam<Failure> {};
-
-TEST_P(Failures, EndTheRunWithTheirReason) {
-  ShippedRun run("paper-ramp", GetParam().overrides);
-  const RunResult& result = run.Run();
-  EXPECT_EQ(result.verdict, Verdict::kFailed);
-  EXPECT_NE(result.failure.find(GetParam().message), std::string::npos) << result.failure;
+TEST(Failures, EndTheRunWithTheirReason) {
+  for (const Failure& failure : kFailures) {
+    SCOPED_TRACE(failure.name);
+    ShippedRun run("paper-ramp", failure.overrides);
+    const RunResult& result = run.Run();
+    EXPECT_EQ(result.verdict, Verdict::kFailed);
+    EXPECT_THAT(result.failure, HasSubstr(failure.message));
+  }
 }
-
-INSTANTIATE_TEST_SUITE_P(
-    All, Failures,
-    ::testing::Values(
-        Failure{"motor_limit",
-                {"duration=1", "control.natural_frequency=100", "start_error.xyz=[0, 0, 0.05]"},
-                "is at its limit"},
-        Failure{"not_finite", {"duration=1", "start_error.xyz=[1e308, 0, 0]"}, "not finite"},
-        Failure{"fall",
-                {"duration=5", "plant.floor_friction=3",
-                 "trajectory={ type = 'circle', speed = 3, radius = 1.5, ramp_time = 5 }"},
-                "the robot fell"},
-        Failure{"lost_grasp",
-                {"plant.finger_friction=0.15", "control.weight={ platform = 1e8, arm = 1e8 }"},
-                "the grasp is lost"},
-        Failure{"no_forces", {"duration=1", "control.f_max=0.3", "control.f_min=0"}, "contact forces"}),
-    [](const ::testing::TestParamInfo<Failure>& info) { return info.param.name; });
 
 /// A Panda with a hidden fault of its sensors.
 ClosedLoop MakeSensorFault(const Setup& setup, std::function<void(double t, MeasuredState*)> fault) {
@@ -148,6 +95,37 @@ TEST(HiddenSensorFault, IsToldFromItsFirstStepToItsLast) {
   EXPECT_NEAR(late.from, 1.321, 1e-9);
   EXPECT_NEAR(late.to, 1.9, 1e-9);
   EXPECT_TRUE(late.ends);
+}
+
+// Declared imperfections are considered only where nothing else explains the failure.
+const std::vector<std::string> kExpectsMuch = {"duration=0.1", "settle=0.3", "expect.from=0",
+                                               "expect.position=1e-9", "actuation.delay=0.001"};
+
+RunResult Look(
+    ShippedRun* run, const std::function<bool()>& should_stop = [] { return false; }) {
+  RunResult result = run->Run();
+  WeighDeclared(run->setup(), run->loop(), SourcePath("/controller/parameters/assistant_robot.toml"),
+                SourcePath("/mjcf/scene.xml"), should_stop, &result);
+  return result;
+}
+
+TEST(WeighDeclared, SaysHowMuchOfAnErrorItExplains) {
+  ShippedRun run("offset", kExpectsMuch);
+  const RunResult result = Look(&run);
+  EXPECT_THAT(result.attribution.evidence,
+              HasSubstr("without what the scenario declares (actuation.delay = 0.001)"));
+  EXPECT_THAT(result.attribution.evidence, HasSubstr("% of the error"));
+}
+
+TEST(WeighDeclared, SaysNothingWhenItIsStopped) {
+  ShippedRun run("offset", kExpectsMuch);
+  EXPECT_THAT(Look(&run, [] { return true; }).attribution.evidence, Not(HasSubstr("without what")));
+}
+
+TEST(WeighDeclared, RepeatsNothingWhereAnotherCauseWasFound) {
+  ShippedRun run("curve", {"duration=0.05", "settle=0.2", "actuation.delay=0.001", "model.object.mass=0.21"});
+  const RunResult result = Look(&run, []() -> bool { throw std::logic_error("was repeated"); });
+  EXPECT_EQ(result.attribution.cause, Cause::kModel);
 }
 
 }  // namespace

@@ -131,6 +131,8 @@ TEST(DrawnFault, AreSummandsOfEveryLaw) {
     count("curve", {std::string("control.law=") + law, "expect={}"});
   for (const char* law : {"computed_torque", "pd_gravity", "feedforward_pd"})
     count("panda-reach", {std::string("control.law=") + law, "expect={}"});
+  // With a compensation of friction, which is two summands more.
+  count("panda-reach", {"expect={}", "control.coulomb=0.5", "control.viscous=0.3"});
   // The ground's forces balance the base's part of a wrong summand.
   count("stand", {"settle=0.2"});
   for (const char* law : {"pd_gravity", "feedforward_pd"})

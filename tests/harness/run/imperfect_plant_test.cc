@@ -1,5 +1,4 @@
-// A plant that is not ideal: what the scenario asks for is known to the checks, what is hidden from it is
-// found.
+// A plant that is not ideal: what the scenario asks for is known to the checks.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -16,6 +15,11 @@ const std::vector<std::string> kShort = {"duration=0.2", "settle=0.3", "expect={
 std::vector<std::string> With(std::vector<std::string> base, const std::vector<std::string>& more) {
   base.insert(base.end(), more.begin(), more.end());
   return base;
+}
+
+std::string Push(const std::string& body) {
+  return "disturbance=[{type='pulse',body='" + body +
+         "',force=[1,2,3],torque=[0.1,0,0.2],begin=0.05,duration=0.05}]";
 }
 
 /// Something that a scenario may ask for.
@@ -79,23 +83,39 @@ const Known kKnown[] = {
     {"mass_within", {"mismatch.mass_within=0.03"}},
     {"com", {"mismatch.com={ r_forearm = [0.005, 0, 0] }"}},
     {"joint_constants", {"mismatch.damping=1.2", "mismatch.armature=0.9"}},
+    {"errors_of_rotations", {"control.orientation=rotation"}},
+    {"rates_of_wheels",
+     {"model.base.velocity=wheel_rates", "control.weight={ platform = 0.005 }"},
+     "paper-ramp"},
+    {"arm",
+     {"sensing={ joint_counts = 4096, velocity = 'differenced', velocity_cutoff = 60 }",
+      "actuation={ delay = 0.002, torque_step = 0.01 }", "mismatch={ mass = 1.05 }",
+      "disturbance=[{ type = 'step', body = 'panda_link5', force = [0, 2, 0] }]"},
+     "panda-reach"},
+    {"held_torques_of_an_arm", {"plant.control_step=0.004"}, "panda-reach"},
+    // Robot and ground take up what is declared, wherever it acts.
+    {"push_on_trunk", {Push("trunk")}, "stand"},
+    {"push_on_shank", {Push("fl_shank")}, "stand"},
+    {"sway",
+     {"stance.points=[]", "stance.oscillations=[{axis='x',amplitude=0.03,frequency=1.5,ramp_time=1}]"},
+     "stand"},
 };
 
-/// Declared in the scenario, the imperfection leaves nothing to find; hidden, it is found.
+/// Declared in the scenario, the imperfection leaves nothing to find. Campaigns hide such, which are found.
 class KnownCauses : public ::testing::TestWithParam<Known> {};
 
 TEST_P(KnownCauses, CryNoWolf) {
   ShippedRun run(GetParam().scenario, With(kShort, GetParam().overrides), 1);
   const RunResult& result = run.Run();
-  EXPECT_EQ(result.verdict, Verdict::kPass) << result.failure << result.attribution.evidence;
+  EXPECT_TRUE(Passes(result));
   for (const CheckRecord& check : run.loop().checks().motion_checks()) {
     EXPECT_FALSE(check.failed) << check.name << " " << check.worst << " at " << check.at;
   }
   for (const CheckRecord& check : run.loop().checks().model_checks()) {
     EXPECT_FALSE(check.failed) << check.name << " " << check.worst << " " << check.part;
   }
-  // It does something: the object is no longer where the ideal plant has it.
-  EXPECT_GT(result.tracking.position_max(), 1e-9);
+  // It does something: object or joints are no longer where the ideal plant has them.
+  EXPECT_GT(result.tracking.position_max() + result.tracking.joints_max(), 1e-9);
 }
 
 INSTANTIATE_TEST_SUITE_P(All, KnownCauses, ::testing::ValuesIn(kKnown),
@@ -126,98 +146,6 @@ TEST(KnownNoise, DoesNotBlindTheDemandOfTheLaw) {
   }
 }
 
-/// A loop with the imperfections of one scenario in it, judged by another that does not have them.
-RunResult RunHidden(const std::vector<std::string>& hidden) {
-  const ShippedRun judged("curve", kShort);
-  const ShippedRun other("curve", With(kShort, hidden));
-  LoopParts parts = MakeLoopParts(judged.setup());
-  LoopParts faulty = MakeLoopParts(other.setup());
-  parts.sensing = faulty.sensing;
-  parts.actuation = faulty.actuation;
-  parts.disturbances = faulty.disturbances;
-  parts.plant = std::move(faulty.plant);
-  Runner runner(judged.setup(), /*check=*/true, std::move(parts));
-  return runner.Run([](const StepRecord&) {}, [] { return false; });
-}
-
-struct Hidden {
-  const char* name;
-  std::vector<std::string> overrides;
-  Cause cause;
-};
-void PrintTo(const Hidden& hidden, std::ostream* out) { *out << hidden.name; }
-
-class HiddenCauses : public ::testing::TestWithParam<Hidden> {};
-
-TEST_P(HiddenCauses, AreFound) {
-  const RunResult result = RunHidden(GetParam().overrides);
-  EXPECT_NE(result.verdict, Verdict::kPass);
-  EXPECT_STREQ(NameOf(result.attribution.cause), NameOf(GetParam().cause))
-      << result.failure << " " << result.attribution.evidence;
-}
-
-INSTANTIATE_TEST_SUITE_P(
-    All, HiddenCauses,
-    ::testing::Values(
-        Hidden{"encoders", {"sensing.joint_counts=65536"}, Cause::kSensing},
-        Hidden{"noise", {"sensing.joint_noise=1e-7"}, Cause::kSensing},
-        Hidden{"latency", {"sensing.latency=0.001"}, Cause::kSensing},
-        Hidden{"gain", {"actuation.gain_error={ r_elbow = 1e-3 }"}, Cause::kActuator},
-        Hidden{"delay", {"actuation.delay=5e-4"}, Cause::kActuator},
-        Hidden{"friction", {"actuation.coulomb={ r_elbow = 0.05 }"}, Cause::kActuator},
-        Hidden{"push_on_link",
-               {"disturbance=[{ type = 'step', body = 'r_forearm', force = [0, 1, 0], begin = 0.05 }]"},
-               Cause::kUnmodelledForce},
-        Hidden{"push_on_object",
-               {"disturbance=[{ type = 'step', body = 'object', force = [0, 0, 0.2], begin = 0.05 }]"},
-               Cause::kUnmodelledForce},
-        Hidden{"mass", {"mismatch.mass={ r_forearm = 1.05 }"}, Cause::kUnmodelledForce}),
-    [](const ::testing::TestParamInfo<Hidden>& info) { return info.param.name; });
-
-TEST(ImperfectPlant, ZeroSettingsGiveTheSameBits) {
-  ShippedRun without("curve", kShort);
-  ShippedRun with("curve", With(kShort, {"sensing.joint_counts=0",
-                                         "sensing.joint_noise=0",
-                                         "sensing.latency=0",
-                                         "sensing.object_rate=0",
-                                         "sensing.velocity_cutoff=30",
-                                         "sensing.velocity_noise=0",
-                                         "sensing.object_position_noise=0",
-                                         "sensing.object_orientation_noise=0",
-                                         "sensing.object_latency=0",
-                                         "sensing.contact_force_noise=0",
-                                         "sensing.odometry=false",
-                                         "actuation.delay=0",
-                                         "actuation.gain_error=0",
-                                         "actuation.backlash=0",
-                                         "actuation.stribeck=0",
-                                         "mismatch.damping=1",
-                                         "actuation.lag={ rf = 0 }",
-                                         "actuation.coulomb=0",
-                                         "actuation.torque_step=0",
-                                         "mismatch.mass=1",
-                                         "mismatch.mass_within=0",
-                                         "mismatch.com={ r_forearm = [0, 0, 0] }",
-                                         "disturbance=[]"}));
-  EXPECT_EQ(without.Run().verdict, Verdict::kPass);
-  EXPECT_EQ(with.Run().verdict, Verdict::kPass);
-  EXPECT_EQ(with.step().reading.qpos, without.step().reading.qpos);
-  EXPECT_EQ(with.step().reading.qvel, without.step().reading.qvel);
-  EXPECT_EQ(with.step().command.tau, without.step().command.tau);
-  EXPECT_EQ(with.step().findings.xi_dot_model, without.step().findings.xi_dot_model);
-}
-
-TEST(ImperfectPlant, TheSameSeedGivesTheSameRun) {
-  const std::vector<std::string> noisy =
-      With(kShort, {"sensing.joint_noise=1e-6", "mismatch.mass_within=0.03"});
-  ShippedRun first("curve", noisy, 3), second("curve", noisy, 3), other("curve", noisy, 4);
-  first.Run();
-  second.Run();
-  other.Run();
-  EXPECT_EQ(first.step().reading.qpos, second.step().reading.qpos);
-  EXPECT_NE(first.step().reading.qpos, other.step().reading.qpos);
-}
-
 TEST(ImperfectPlant, WhatIsTooBadForTheExpectationIsStillSaid) {
   ShippedRun run("curve", {"duration=0.2", "settle=0.3", "mismatch.mass={ r_forearm = 1.2 }"});
   const RunResult& result = run.Run();
@@ -229,7 +157,7 @@ TEST(ImperfectPlant, WhatIsTooBadForTheExpectationIsStillSaid) {
 TEST(ImperfectPlant, CurveRealDoesWhatItExpects) {
   ShippedRun run("curve-real", {"duration=3.3"});  // the first push included
   const RunResult& result = run.Run();
-  EXPECT_EQ(result.verdict, Verdict::kPass) << result.failure << result.attribution.evidence;
+  EXPECT_TRUE(Passes(result));
   EXPECT_GT(result.tracking.position_max(), 1e-4);
   EXPECT_GE(run.setup().scenario().imperfections.declared.size(), 6U);
 }

@@ -1,32 +1,14 @@
-// The loop takes any plant and any controller, and its record tells what each was told and did.
+// The loop computes the same on one thread and on two.
 
 #include <gtest/gtest.h>
 
 #include <utility>
 
 #include "harness/run/runner.h"
-#include "tests/harness/run/changed_parts.h"
 #include "tests/harness/run/shipped_run.h"
 
 namespace dexcheck::testing::loop_parts_test {
 namespace {
-
-class LoopPartsTest : public ::testing::Test {
- protected:
-  LoopPartsTest() : shipped_("curve", {"duration=0.1"}), parts_(MakeLoopParts(shipped_.setup())) {}
-
-  const StepRecord& Run() {
-    runner_ = RunParts(shipped_.setup(), std::move(parts_));
-    return runner_->loop().record();
-  }
-  [[nodiscard]] double Worst(std::string_view check) const {
-    return runner_->loop().checks().Find(check).worst;
-  }
-
-  ShippedRun shipped_;
-  LoopParts parts_;
-  std::unique_ptr<Runner> runner_;
-};
 
 // Each check's value at each step, of tasks too, and how a run ends that fails.
 TEST(TwoThreads, GiveTheSameBits) {
@@ -81,41 +63,6 @@ TEST(TwoThreads, AreUsedWhereTheyAreFaster) {
     const double tried = 1.0 / static_cast<double>(ThreadChoice::kBlocks);
     EXPECT_DOUBLE_EQ(static_cast<double>(count) / kSteps, beside < 1.0 ? 1.0 - tried : tried);
   }
-}
-
-TEST_F(LoopPartsTest, AnotherPlantOfTheSameKindGivesTheSameBits) {
-  parts_.plant = std::make_unique<ChangedPlant>(std::move(parts_.plant), 1.0);
-  const StepRecord& step = Run();
-  shipped_.Run();
-  EXPECT_EQ(step.reading.qpos, shipped_.step().reading.qpos);
-  EXPECT_EQ(step.command.tau, shipped_.step().command.tau);
-  EXPECT_EQ(step.findings.xi_dot_model, shipped_.step().findings.xi_dot_model);
-}
-
-TEST_F(LoopPartsTest, AWrongLawMovesTheObjectButIsNoFaultOfTheModel) {
-  parts_.controller = std::make_unique<ChangedController>(
-      std::move(parts_.controller), [](const GraspModel&, Command* command) { command->tau *= 0.999; });
-  const StepRecord& step = Run();
-  EXPECT_EQ(runner_->result().failure, "");
-  EXPECT_LE(Worst("inverse_dynamics_robot"), 1e-5);
-  EXPECT_GT(runner_->result().tracking.position_max(), 1e-6);
-  // The motion is not the one that the law demanded.
-  EXPECT_GT((step.response.xi_dot - step.command.demand.xi_dot).norm(), 1e-3);
-}
-
-TEST_F(LoopPartsTest, TheRecordHasWhatTheLawDemandedAndWhatCameOfIt) {
-  const StepRecord& step = Run();
-  EXPECT_EQ(step.step, 100);
-  EXPECT_NEAR(step.time, 0.099, 1e-12);
-  const double scale = step.findings.f_c.norm();
-  ASSERT_GT(scale, 1.0);
-  // The engine's contacts are soft: measured 3e-7.
-  EXPECT_LT((step.findings.f_c - step.command.demand.f_c).norm(), 1e-5 * scale);
-  EXPECT_LT((step.response.xi_dot - step.command.demand.xi_dot).norm(), 1e-3);
-  EXPECT_LT((step.response.V_Bo_dot - step.command.demand.V_Bo_dot).norm(), 1e-4);
-  EXPECT_LT((step.response.motor_torques - step.drive.tau).norm(), 1e-12 * step.drive.tau.norm());
-  EXPECT_EQ(step.drive.tau, step.command.tau);
-  EXPECT_EQ(step.measured.state.q, step.reading.state.q);
 }
 
 }  // namespace

@@ -2,6 +2,8 @@
 
 // Runs of shipped scenarios.
 
+#include <gtest/gtest.h>
+
 #include <memory>
 #include <string>
 #include <vector>
@@ -15,6 +17,12 @@ inline Scenario ReadShippedScenario(const std::string& name, const std::vector<s
   const std::filesystem::path folder = testing::SourcePath("/harness/shipped/scenarios");
   const std::string file = (folder / (name + ".toml")).string();
   return ParseScenario(ReadTextFile(file), file, folder, overrides);
+}
+
+/// Success when a run passed; else why not.
+inline ::testing::AssertionResult Passes(const RunResult& result) {
+  if (result.verdict == Verdict::kPass) return ::testing::AssertionSuccess();
+  return ::testing::AssertionFailure() << result.failure << result.attribution.evidence;
 }
 
 /// A scenario's setup and runner.

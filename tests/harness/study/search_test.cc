@@ -8,7 +8,6 @@
 #include <cmath>
 #include <cstdlib>
 #include <functional>
-#include <memory>
 #include <random>
 #include <string>
 #include <vector>
@@ -77,13 +76,6 @@ TEST(Search, FindsTheMinimum) {
   }
 }
 
-TEST(Search, LocalSearchesRunSideBySide) {
-  Search search = MakeSearch(SearchMethod::kNelderMead, 400);
-  search.starts = 5;
-  const auto searcher = MakeSearcher(search, {0.5, 0.5, 0.5});
-  EXPECT_EQ(searcher->Ask().size(), 5U);
-}
-
 // Two valleys: one local search ends in the nearer, worse one, several find the other.
 TEST(Search, SeveralStartsFindTheBetterValley) {
   const Function valleys = [](const UnitPoint& x) {
@@ -150,20 +142,6 @@ TEST(Search, ATenthOfAGridsTrialsIsEnough) {
     }
     EXPECT_EQ(found, seeds) << "function " << i;
   }
-}
-
-TEST(Search, TheSeedDecides) {
-  Search search = MakeSearch(SearchMethod::kCmaEs, 64);
-  const auto values = [&] {
-    std::vector<std::vector<double>> all;
-    for (const JudgedPoint& point : RunSearch(search, {0.1, 0.2, 0.3}, Ellipsoid))
-      all.push_back(point.values);
-    return all;
-  };
-  const auto first = values();
-  EXPECT_EQ(first, values());
-  search.seed = 4;
-  EXPECT_NE(first, values());
 }
 
 // The front against its definition, of points at random, a fifth of which are not feasible.

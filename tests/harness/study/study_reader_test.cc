@@ -3,12 +3,10 @@
 #include <gtest/gtest.h>
 
 #include <array>
-#include <cmath>
 
 #include "controller/common/errors.h"
 #include "harness/study/study.h"
 #include "tests/common/files.h"
-#include "tests/common/throws.h"
 
 namespace dexcheck::testing::study_reader_test {
 namespace {
@@ -71,25 +69,6 @@ TEST(StudyReader, TrialsAreTheProductTheLastKeyFastest) {
                                                                        "control.K_p=10", "control.K_v=4.5"}));
 }
 
-TEST(StudyReader, SamplesStayInTheirRanges) {
-  for (const std::string method : {"sobol", "latin_hypercube"}) {
-    const Study study = ParseStudy("name = \"s\"\nscenario = \"hold\"\n[sample]\nmethod = \"" + method +
-                                       "\"\ncount = 64\n[[vary]]\nkey = \"a\"\nfrom = 1\nto = 100\nspacing = "
-                                       "\"log\"\n[[vary]]\nkey = \"b\"\nfrom = -2\nto = 2\n",
-                                   "study.toml");
-    const std::vector<Trial> trials = ListTrials(study);
-    ASSERT_EQ(trials.size(), 64u);
-    int low_half = 0;
-    for (const Trial& trial : trials) {
-      EXPECT_GE(trial.parameters[0], 1.0);
-      EXPECT_LE(trial.parameters[0], 100.0);
-      EXPECT_LE(std::abs(trial.parameters[1]), 2.0);
-      if (trial.parameters[0] < 10.0) ++low_half;
-    }
-    EXPECT_EQ(low_half, 32) << "even in the logarithm";
-  }
-}
-
 TEST(StudyReader, TruthsAndListsAreValuesToo) {
   const Study study =
       ParseStudy(ReplaceOnce(kStudy, "values = [5, 4.5]", "values = [true, false, [1, 0, 0]]"), "study.toml");
@@ -129,13 +108,6 @@ TEST(StudyReader, ReadsASearch) {
   ASSERT_EQ(study.constraints.size(), 2U);
   EXPECT_EQ(study.constraints[1].fraction, 0.9);
   EXPECT_EQ(CountTrials(study), 96);
-}
-
-TEST(StudyReader, ASobolSequenceHasFewKeys) {
-  std::string text = "name = \"s\"\nscenario = \"hold\"\n[sample]\ncount = 4\nmethod = \"sobol\"\n";
-  for (int i = 0; i < 65; ++i) text += "[[vary]]\nkey = \"k" + std::to_string(i) + "\"\nfrom = 0\nto = 1\n";
-  EXPECT_TRUE(Throws<InputError>([&] { return ParseStudy(text, "study.toml"); },
-                                 "a Sobol sequence varies at most 64 keys"));
 }
 
 TEST(StudyReader, SamplesChooseAmongValues) {

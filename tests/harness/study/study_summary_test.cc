@@ -176,22 +176,5 @@ TEST(StudyFindings, ReportsWhatIsWantedWithItsUnitAndItsEdge) {
                           "control.K_p: a wider range may give a better one."));
 }
 
-// A grid has ends, too, where it has more than two values.
-TEST(StudyFindings, ReportsTheEdgeOfAGrid) {
-  const Study study = Parse(
-      "[[objective]]\nminimize = 'settling_time'\n[[vary]]\nkey = 'control.K_p'\nvalues = [1, 2, 3]\n"
-      "[[vary]]\nkey = 'control.K_v'\nvalues = [10, 20, 30]\n"
-      "[[vary]]\nkey = 'plant.impratio'\nvalues = [1, 10]\n");
-  std::vector<TrialRow> rows;
-  for (const Trial& trial : ListTrials(study)) {
-    rows.emplace_back().trial = trial;
-    rows.back().result.metrics[kSettlingTime] =
-        4.0 - trial.parameters[0] + std::abs(trial.parameters[1] - 20.0) + trial.parameters[2];
-  }
-  EXPECT_THAT(ListFindings(study, rows),
-              ::testing::Contains(::testing::EndsWith(
-                  "At an end of its range is control.K_p: a wider range may give a better one.")));
-}
-
 }  // namespace
 }  // namespace dexcheck::testing::study_summary_test

@@ -1,17 +1,22 @@
+// Contact coordinates by search, through changes of chart and by integration.
+
+#include "controller/contact/contact_geometry.h"
+
 #include <gtest/gtest.h>
 
 #include "controller/common/errors.h"
-#include "controller/contact/contact_geometry.h"
 #include "tests/common/matrix_near.h"
 #include "tests/common/throws.h"
 #include "tests/controller/contact/contact_fixtures.h"
 
-namespace dexcheck::testing::find_contact_test {
+namespace dexcheck::testing::contact_geometry_test {
 namespace {
 
 constexpr int kSamples = 100;
 // Newton's stopping bound, 1e-13 relative; measured 9.1e-14.
 constexpr double kConverged = 9e-13;
+// Rounding of a few dozen operations on numbers of order one.
+constexpr double kRounding = 1e-13;
 
 struct Placement {
   ContactCoordinates kappa;
@@ -93,5 +98,59 @@ TEST(FindContactTest, ImpossibleInputIsAClearError) {
       Throws<SingularityError>([&] { return FindContact(ball, plane, X_OF, far_side); }, "no contact found"));
 }
 
+TEST(NormalizeContactTest, ChartChangesDoNotMoveTheBodies) {
+  std::mt19937 random(31);
+  int changes = 0;
+  for (const SurfacePair& pair : MakeAllPairs()) {
+    const Surface& fingertip = *pair.first.surface;
+    const Surface& object = *pair.second.surface;
+    SCOPED_TRACE(pair.first.name + " on " + pair.second.name);
+    for (int sample = 0; sample < 50; ++sample) {
+      const ContactCoordinates kappa = {DrawPoint(random, pair.first, sample % 2),
+                                        DrawPoint(random, pair.second, (sample / 2) % object.num_charts()),
+                                        DrawUniform(random, -6.0, 6.0)};
+      const ContactCoordinates normalized = NormalizeContact(fingertip, object, kappa);
+      EXPECT_TRUE(MatrixNear(CalcTouchingPose(fingertip, object, normalized).matrix(),
+                             CalcTouchingPose(fingertip, object, kappa).matrix(), kRounding));
+      EXPECT_LE(std::abs(normalized.psi), kPi);
+      changes += normalized.alpha_f.chart != kappa.alpha_f.chart ? 1 : 0;
+      changes += normalized.alpha_o.chart != kappa.alpha_o.chart ? 1 : 0;
+    }
+  }
+  EXPECT_GT(changes, 50);
+}
+
+// Pose error after one second of rolling a blunt fingertip over an ellipsoid, against a fine reference.
+double CalcIntegrationError(int steps) {
+  const Ellipsoid fingertip({0.008, 0.007, 0.010});
+  const Ellipsoid object({0.05, 0.03, 0.02});
+  // Given in the bodies' frames, so that the motion does not depend on the charts.
+  const auto twist = [](double t, const ContactGeometry& contact) {
+    const Vector3d slip_o(0.01 * std::sin(t), 0.005, 0.0);
+    const Vector3d omega_f(2.0 * std::cos(t), 1.0, std::sin(3.0 * t));
+    Vector6d V;
+    V << contact.g_o_cf.linear().transpose() * slip_o, contact.g_f_cf.linear().transpose() * omega_f;
+    V(2) = 0.0;
+    return V;
+  };
+  const auto integrate = [&](int count) {
+    ContactCoordinates kappa = {{0.3, 0.2, 0}, {0.8, 0.4, 0}, 0.5};
+    const double dt = 1.0 / count;
+    for (int i = 0; i < count; ++i) kappa = IntegrateKappa(fingertip, object, kappa, i * dt, dt, twist);
+    return CalcTouchingPose(fingertip, object, kappa);
+  };
+  static const Pose reference = integrate(4096);
+  return (integrate(steps).matrix() - reference.matrix()).norm();
+}
+
+TEST(IntegrateKappaTest, IsOfFourthOrder) {
+  const double coarse = CalcIntegrationError(64);
+  const double middle = CalcIntegrationError(128);
+  const double fine = CalcIntegrationError(256);
+  EXPECT_GT(fine, 1e-13) << "the errors compared must stand above rounding";
+  EXPECT_NEAR(std::log2(coarse / middle), 4.0, 0.3);
+  EXPECT_NEAR(std::log2(middle / fine), 4.0, 0.3);
+}
+
 }  // namespace
-}  // namespace dexcheck::testing::find_contact_test
+}  // namespace dexcheck::testing::contact_geometry_test
