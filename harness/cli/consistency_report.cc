@@ -9,9 +9,9 @@
 #include "controller/common/text.h"
 #include "harness/base/check_record.h"
 #include "harness/base/console.h"
-#include "harness/checks/consistency.h"
 #include "harness/cli/junit_file.h"
 #include "harness/cli/terminal.h"
+#include "harness/comparison/consistency.h"
 #include "harness/engine/engine.h"
 
 namespace dexcheck::cli {

@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "harness/checks/file_comparison.h"
 #include "harness/cli/commands.h"
+#include "harness/comparison/file_comparison.h"
 
 namespace dexcheck::cli {
 

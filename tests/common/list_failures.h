@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "controller/model/parameter_reader.h"
-#include "harness/checks/consistency.h"
-#include "harness/descriptions/constant_checks.h"
+#include "harness/comparison/consistency.h"
+#include "harness/comparison/constant_checks.h"
 
 namespace dexcheck::testing {
 

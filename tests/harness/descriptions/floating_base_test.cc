@@ -7,9 +7,9 @@
 
 #include "controller/common/errors.h"
 #include "controller/model/parameter_reader.h"
-#include "harness/checks/consistency.h"
-#include "harness/checks/file_comparison.h"
-#include "harness/descriptions/description_match.h"
+#include "harness/comparison/consistency.h"
+#include "harness/comparison/description_match.h"
+#include "harness/comparison/file_comparison.h"
 #include "harness/descriptions/description_writer.h"
 #include "harness/descriptions/mjcf_reader.h"
 #include "harness/descriptions/read_description.h"

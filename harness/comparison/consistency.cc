@@ -1,0 +1,125 @@
+#include "harness/comparison/consistency.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+#include "controller/common/errors.h"
+#include "harness/base/worst.h"
+#include "harness/descriptions/engine_provider.h"
+
+namespace dexcheck {
+
+namespace {
+
+/// Compares at all states; constants are the caller's.
+ConsistencyResult CompareTerms(const StateFeed& feed, const Progress& progress, TermComparison* comparison) {
+  const auto start = std::chrono::steady_clock::now();
+  ConsistencyResult result;
+  result.samples = CompareAtStates(feed, progress, comparison);
+  result.terms = comparison->TakePairs().front().terms;
+  result.not_compared = comparison->ListNotCompared();
+  result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  return result;
+}
+
+ConsistencyResult CompareAtRandomStates(const ConsistencyOptions& options, const Progress& progress,
+                                        TermComparison* comparison) {
+  const RobotModel& model = comparison->model();
+  return CompareTerms(FeedRandomStates(model, options.samples, options.range, options.seed,
+                                       comparison->needs_second_velocity(), model.object().has_value()),
+                      progress, comparison);
+}
+
+}  // namespace
+
+bool ConsistencyResult::Agrees() const {
+  const auto good = [](const CheckRecord& record) { return !record.failed; };
+  return std::ranges::all_of(constants.records, good) && std::ranges::all_of(terms, good);
+}
+
+ConsistencyResult CheckConsistency(const Adapter& adapter, const ConsistencyOptions& options,
+                                   const Progress& progress) {
+  AnalyticProvider model(adapter.model(), "model", options.make_view, options.object);
+  EngineProvider engine(adapter, "engine");
+  TermComparison comparison(adapter.model(), kAskedByConsistency, {&model, &engine});
+  ConsistencyResult result = CompareAtRandomStates(options, progress, &comparison);
+  result.constants = CheckConstants(adapter);
+  return result;
+}
+
+ConsistencyResult CompareDescriptions(const RobotDescription& a, const RobotDescription& b,
+                                      const ConsistencyOptions& options, const Progress& progress) {
+  const RobotModel model_a(a.spec);
+  const RobotModel model_b(b.spec);
+  AnalyticProvider first(model_a, a.spec.source);
+  AnalyticProvider second(model_b, b.spec.source, model_a);
+  TermComparison comparison(model_a, kAskedByConsistency, {&first, &second});
+  ConsistencyResult result = CompareAtRandomStates(options, progress, &comparison);
+  result.constants = CheckConstants(a, b);
+  return result;
+}
+
+ConsistencyResult CompareProviders(const RobotModel& model, DynamicsProvider* first, DynamicsProvider* second,
+                                   const StateFeed& feed, const Progress& progress) {
+  TermComparison comparison(model, kAskedOfPrograms, {first, second});
+  return CompareTerms(feed, progress, &comparison);
+}
+
+bool AgreeAtFirst(const RobotModel& model, DynamicsProvider* a, DynamicsProvider* b, const StateFeed& feed,
+                  double tolerance) {
+  constexpr long kStates = 3;
+  const ConsistencyResult result =
+      CompareProviders(model, a, b, feed, [](long samples) { return samples < kStates; });
+  return !result.terms.empty() && std::ranges::all_of(result.terms, [&](const CheckRecord& record) {
+    return record.worst <= Worst(record.bound, tolerance);
+  });
+}
+
+std::optional<BaseConvention> FindOtherConvention(const RobotModel& model, DynamicsProvider* reference,
+                                                  LayoutProvider* provider,
+                                                  const std::function<StateFeed()>& make_feed) {
+  const BaseConvention spoken = provider->layout().convention();
+  std::optional<BaseConvention> found;
+  for (const BaseConvention& convention : ListBaseConventions()) {
+    if (convention == spoken || found) continue;
+    provider->set_convention(convention);
+    try {
+      if (AgreeAtFirst(model, reference, provider, make_feed())) found = convention;
+    } catch (const Error&) {
+      break;  // a program may not bear what it did not request
+    }
+  }
+  provider->set_convention(spoken);
+  return found;
+}
+
+namespace {
+
+constexpr int kMostDigits = 16;
+
+}  // namespace
+
+int CountDigits(double error) {
+  for (int digits = kMostDigits; digits > 0; --digits) {
+    if (error <= std::pow(10.0, -digits)) return digits;
+  }
+  return 0;
+}
+
+int CountDigits(const ConsistencyResult& result) {
+  int digits = kMostDigits;
+  for (const std::vector<CheckRecord>* records : {&result.constants.records, &result.terms}) {
+    for (const CheckRecord& record : *records) {
+      if (record.failed) digits = std::min(digits, CountDigits(record.worst));
+    }
+  }
+  return digits;
+}
+
+void JudgeByTolerance(double tolerance, ConsistencyResult* result) {
+  JudgeByTolerance(tolerance, &result->constants);
+  JudgeByTolerance(tolerance, &result->terms);
+}
+
+}  // namespace dexcheck

@@ -1,0 +1,156 @@
+#pragma once
+
+// Constants that are compared without motion, before anything else: masses, joints, wheels, fingertips,
+// object, options.
+
+#include <algorithm>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "harness/base/check_record.h"
+#include "harness/base/worst.h"
+#include "harness/descriptions/robot_description.h"
+#include "harness/engine/adapter.h"
+
+namespace dexcheck {
+
+/// Two readers of decimal numbers form at most short sums and products of them.
+inline constexpr double kConstantRounding = 64.0 * std::numeric_limits<double>::epsilon();
+
+/// One constant in which the parameter file and the MJCF differ.
+struct ConstantFinding {
+  std::string check;  ///< Name of the check, such as "link_mass".
+  std::string where;  ///< Part of the robot, such as "link r_forearm".
+  double model = 0.0;
+  double engine = 0.0;
+  Location location;
+  int entry = 0;  ///< Which of the numbers that the check compares there: of a vector, a range, a 3x3 tensor.
+  bool engine_only = false;  ///< The analytic model has no such number: it takes the neutral value.
+  std::string effect{};      ///< What it does to the motion, when one of the two leaves it out.
+  double scale = 0.0;        ///< Size that the difference is relative to; 0: the larger of the two numbers.
+};
+
+/// Returns a check's quantity in words, "centre of mass" of "link_com"; the check's name where it has none.
+std::string NameQuantity(const std::string& check);
+/// Returns the component of a vector, tensor or range that an entry is: "Ixx" of entry 0 of "link_inertia";
+/// empty where the quantity is one number.
+std::string NameComponent(const std::string& check, int entry);
+/// Returns the unit of a check's numbers, "kg"; empty where it is not known.
+std::string UnitOf(const std::string& check, bool is_prismatic);
+
+/// Something that the MJCF sets and the analytic model has no number for, and that is no disagreement: it
+/// belongs to the plant of a run, which overrides it or whose checks judge it.
+struct ConstantNote {
+  std::string kind;  ///< As in ListEngineFields, such as "contact_pair".
+  std::string text;  ///< With the element's name and all its numbers.
+};
+
+struct ConstantChecks {
+  std::vector<CheckRecord> records;
+  std::vector<ConstantFinding> findings;  ///< Every disagreement, in the file's order.
+  std::vector<ConstantNote> notes;
+
+  /// The check of that name, a new one when there is none.
+  CheckRecord* Define(const std::string& check);
+  /// Adds a disagreement, and its error to its check.
+  void Add(ConstantFinding finding);
+};
+
+/// Compares constants: mass of each link; damping, armature and range of each joint; gravity; the wheels'
+/// radius, place, axis, mass, inertia, damping and armature; the floor they stand on; fingertip radii; the
+/// object's mass, inertia, centre of mass, shape and friction; and finds whatever the MJCF has that the
+/// analytic model lacks. engine_fields.h says of each field of the engine's model how it is seen.
+ConstantChecks CheckConstants(const Adapter& adapter);
+
+/// Compares what both descriptions state: gravity, mass of each link; damping, dry friction, armature, range
+/// and coupling of each joint. Locations are those of `a`.
+/// @param a, b as CompleteEachOther left them.
+ConstantChecks CheckConstants(const RobotDescription& a, const RobotDescription& b);
+
+/// Compares the limits of the motors of joints, and the radii of wheels, where both descriptions state them.
+/// Wheels are the last links of joints without limits, with a round shape about the joint's axis, on a base
+/// that moves.
+/// @param a, b with joints of the same names.
+void CheckMotorsAndWheels(const RobotDescription& a, const RobotDescription& b, ConstantChecks* constants);
+
+/// Compares the volumes of the links' shapes where both descriptions have them, on which no term depends.
+/// @return one line on those that differ.
+std::vector<std::string> CompareShapes(const RobotDescription& a, const RobotDescription& b);
+
+/// Compares what no term depends on: velocity limits where both files state them, and mass and centre of mass
+/// of a base that does not move, with all that is welded to it.
+/// @return a line on each that differs in the first three digits.
+std::vector<std::string> CompareWithoutEffect(const RobotDescription& a, const RobotDescription& b);
+
+/// Compares couplings of joints, in the place of the constant checks' findings that the engine has them.
+/// @param ignores none is a disagreement. @return a note on those that only the engine has, which are not
+/// compared.
+std::vector<std::string> CheckCouplings(const Adapter& adapter, bool ignores, ConstantChecks* constants);
+
+/// Judges checks by a relative tolerance where that is wider than their bound.
+void JudgeByTolerance(double tolerance, std::vector<CheckRecord>* records);
+/// Judges a result by a tolerance; its findings are then those that exceed it.
+void JudgeByTolerance(double tolerance, ConstantChecks* constants);
+
+// Numbers of a model against another description's or the engine's, one check after the other.
+
+inline Location AtLink(int link) { return {Location::Kind::kLink, link, -1}; }
+inline Location AtJoint(int joint) { return {Location::Kind::kJoint, joint, -1}; }
+
+class ConstantComparison {
+ protected:
+  ConstantComparison(const RobotModel& model, ConstantChecks* result) : model_(model), result_(*result) {}
+
+  /// Compares relative to the larger of the two, or to `scale` where zero is a proper value.
+  void Compare(const std::string& check, const Location& where, double model, double engine,
+               double scale = 0.0) {
+    CheckRecord* const record = result_.Define(check);
+    entry_ = check == last_check_ && where == last_location_ ? entry_ + 1 : 0;
+    last_check_ = check;
+    last_location_ = where;
+    const double size = Worst(std::abs(model), std::abs(engine), scale);
+    const double error = record->Compare(model, engine, size > 0.0 ? size : 1.0, where, -1);
+    if (error > kConstantRounding) {
+      result_.findings.push_back(
+          {check, DescribeWhere(where), model, engine, where, entry_, false, {}, size});
+    }
+  }
+  [[nodiscard]] std::string DescribeWhere(const Location& where) const {
+    return Describe(where, model_, model_.num_base_velocities());
+  }
+  void CompareGravity(const Vector3d& other) {
+    for (int k = 0; k < 3; ++k)
+      Compare("gravity_vector", {}, model_.gravity()[k], other[k], model_.gravity().norm());
+  }
+  /// @param mass_of of the other's link, by this model's joint; -1 the base.
+  template <typename MassOf>
+  void CompareMasses(const MassOf& mass_of) {
+    for (int link = model_.base().type == BaseType::kFixed ? 0 : -1; link < model_.num_joints(); ++link) {
+      Compare("link_mass", AtLink(link), link < 0 ? model_.base_with_wheels().mass : JointOf(link).body.mass,
+              mass_of(link));
+    }
+  }
+  /// @param leader of `own`, as the other one counts joints.
+  void CompareCouplings(int joint, const JointCoupling& own, int leader, const JointCoupling& other) {
+    Compare(kCoupling, AtJoint(joint), leader, other.leader);
+    Compare(kCoupling, AtJoint(joint), own.multiplier, other.multiplier);
+    Compare(kCoupling, AtJoint(joint), own.offset, other.offset);
+  }
+  /// Only one of the two has it.
+  void AddCoupling(int joint, double model, double engine, const std::string& effect) {
+    result_.Add({kCoupling, DescribeWhere(AtJoint(joint)), model, engine, AtJoint(joint), 1, false, effect});
+  }
+  [[nodiscard]] const Joint& JointOf(int joint) const { return model_.joint(joint); }
+
+  static constexpr const char* kCoupling = "joint_coupling";
+  const RobotModel& model_;
+  ConstantChecks& result_;
+
+ private:
+  std::string last_check_;
+  Location last_location_;
+  int entry_ = 0;
+};
+
+}  // namespace dexcheck
