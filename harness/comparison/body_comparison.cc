@@ -117,8 +117,7 @@ void NameCompiledChanges(const std::vector<CompiledChange>& changes,
       if (std::abs(made[i] - stated[i]) > std::abs(made[k] - stated[k])) k = i;
     }
     constants->Add({"compiled_inertia", where, side == 0 ? made[k] : stated[k],
-                    side == 0 ? stated[k] : made[k], AtLink(joint_first), static_cast<int>(k), false,
-                    effect});
+                    side == 0 ? stated[k] : made[k], AtLink(joint_first), static_cast<int>(k), effect});
   }
   for (const auto& [setting, line] : first_of)
     notes->push_back(line.first + (line.second > 0 ? fmt::format(", and {} more", line.second) : ""));

@@ -6,6 +6,7 @@
 
 #include "controller/common/errors.h"
 #include "harness/base/worst.h"
+#include "harness/comparison/engine_constants.h"
 #include "harness/descriptions/engine_provider.h"
 
 namespace dexcheck {
@@ -38,12 +39,17 @@ bool ConsistencyResult::Agrees() const {
   return std::ranges::all_of(constants.records, good) && std::ranges::all_of(terms, good);
 }
 
-ConsistencyResult CheckConsistency(const Adapter& adapter, const ConsistencyOptions& options,
-                                   const Progress& progress) {
+ConsistencyResult CompareTermsWithEngine(const Adapter& adapter, const ConsistencyOptions& options,
+                                         const Progress& progress) {
   AnalyticProvider model(adapter.model(), "model", options.make_view, options.object);
   EngineProvider engine(adapter, "engine");
   TermComparison comparison(adapter.model(), kAskedByConsistency, {&model, &engine});
-  ConsistencyResult result = CompareAtRandomStates(options, progress, &comparison);
+  return CompareAtRandomStates(options, progress, &comparison);
+}
+
+ConsistencyResult CheckConsistency(const Adapter& adapter, const ConsistencyOptions& options,
+                                   const Progress& progress) {
+  ConsistencyResult result = CompareTermsWithEngine(adapter, options, progress);
   result.constants = CheckConstants(adapter);
   return result;
 }

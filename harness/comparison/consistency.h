@@ -47,7 +47,10 @@ struct ConsistencyResult {
 /// Called after each sample with the number done; its false ends the work early.
 using Progress = std::function<bool(long)>;
 
-/// Constants of model and engine, then all terms of robot and object at random states over the joint ranges.
+/// Compares all terms of robot and object with the engine's, at random states over the joint ranges.
+ConsistencyResult CompareTermsWithEngine(const Adapter& adapter, const ConsistencyOptions& options,
+                                         const Progress& progress);
+/// Compares these terms, and the constants of model and engine.
 ConsistencyResult CheckConsistency(const Adapter& adapter, const ConsistencyOptions& options,
                                    const Progress& progress);
 

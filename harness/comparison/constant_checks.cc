@@ -4,15 +4,17 @@
 
 #include <array>
 #include <cmath>
-#include <initializer_list>
+#include <filesystem>
 #include <optional>
 #include <string_view>
 #include <utility>
 
 #include "controller/common/text.h"
+#include "controller/dynamics/model_terms.h"
 #include "harness/base/worst.h"
 #include "harness/comparison/description_match.h"
 #include "harness/descriptions/constant_table.h"
+#include "harness/descriptions/random_states.h"
 
 namespace dexcheck {
 namespace {
@@ -38,70 +40,60 @@ double FindWheelRadius(const RobotDescription& robot, int joint) {
   return radius;
 }
 
-/// Two descriptions, in what both state.
-class DescriptionConstants : public ConstantComparison {
- public:
-  DescriptionConstants(const RobotModel& model, const RobotDescription& a, const RobotDescription& b,
-                       ConstantChecks* result)
-      : ConstantComparison(model, result), a_(a), b_(b), b_of_a_(MatchJoints(a.spec, b.spec)) {}
+}  // namespace
 
-  void Run() {
-    if (a_.states_gravity && b_.states_gravity) CompareGravity(b_.spec.gravity);
-    const RobotModel other(b_.spec);
-    CompareMasses([&](int link) { return link < 0 ? other.base_with_wheels().mass : Other(link).body.mass; });
-    for (const DescribedConstant& constant : ListDescribedConstants())
-      CompareStated(constant.check, constant.states, {constant.value});
-    CompareStated("joint_range", &DescribedJoint::states_range, {&Joint::lower, &Joint::upper});
-    for (int i = 0; i < model_.num_joints(); ++i) CompareCoupling(i, JointOf(i).coupling, Other(i).coupling);
-    CompareMotorsAndWheels();
-  }
-
-  void CompareMotorsAndWheels() {
-    for (int i = 0; i < model_.num_joints(); ++i) {
-      const auto own = static_cast<size_t>(i);
-      if (b_of_a_[own] < 0) continue;
-      const auto other = static_cast<size_t>(b_of_a_[own]);
-      CompareForces(i, a_.joints[own].forces, b_.joints[other].forces);
-      const double radius = FindWheelRadius(a_, i);
-      const double other_radius = FindWheelRadius(b_, b_of_a_[own]);
-      if (radius > 0.0 && other_radius > 0.0) Compare("wheel_radius", AtJoint(i), radius, other_radius);
+StatedConstants ReadStated(const RobotDescription& robot, const RobotSpec& reference) {
+  const RobotModel model(robot.spec);
+  const std::vector<int> order = MatchJoints(reference, robot.spec);
+  const StatedConstants all = ReadStated(model);
+  StatedConstants stated{
+      std::filesystem::path(robot.spec.source).filename().string(), {}, {all.masses[0]}, {}};
+  if (robot.states_gravity) stated.gravity = all.gravity;
+  for (const int joint : order) {
+    if (joint < 0) {
+      stated.masses.push_back(0.0);
+      stated.joints.emplace_back();
+      continue;
     }
-  }
-
- private:
-  /// A limit that is the same both ways is one number.
-  void CompareForces(int joint, const std::optional<StatedForces>& own,
-                     const std::optional<StatedForces>& other) {
-    if (!own || !other) return;
-    const auto is_even = [](const StatedForces& forces) { return forces.lower == -forces.upper; };
-    if (!is_even(*own) || !is_even(*other)) Compare("motor_limit", AtJoint(joint), own->lower, other->lower);
-    Compare("motor_limit", AtJoint(joint), own->upper, other->upper);
-  }
-  [[nodiscard]] const Joint& Other(int joint) const {
-    return b_.spec.joints[static_cast<size_t>(b_of_a_[static_cast<size_t>(joint)])];
-  }
-  void CompareStated(const char* check, bool DescribedJoint::*states,
-                     std::initializer_list<double Joint::*> numbers) {
-    for (int i = 0; i < model_.num_joints(); ++i) {
-      const auto own = static_cast<size_t>(i);
-      if (!(a_.joints[own].*states) || !(b_.joints[static_cast<size_t>(b_of_a_[own])].*states)) continue;
-      for (double Joint::*const number : numbers)
-        Compare(check, AtJoint(i), JointOf(i).*number, Other(i).*number);
+    const auto i = static_cast<size_t>(joint);
+    const DescribedJoint& own = robot.joints[i];
+    stated.masses.push_back(all.masses[i + 1]);
+    StatedConstants::OfJoint& one = stated.joints.emplace_back(all.joints[i]);
+    for (size_t k = 0; k < one.numbers.size(); ++k) {
+      if (!(own.*ListDescribedConstants()[k].states)) one.numbers[k].reset();
     }
+    if (!own.states_range) one.range.reset();
+    if (one.coupling)
+      one.coupling->leader = static_cast<int>(std::ranges::find(order, one.coupling->leader) - order.begin());
+    one.forces = own.forces;
+    one.wheel_radius = FindWheelRadius(robot, joint);
   }
-  void CompareCoupling(int joint, const std::optional<JointCoupling>& own,
-                       const std::optional<JointCoupling>& other) {
-    if (own && other) {
-      CompareCouplings(joint, *own, b_of_a_[static_cast<size_t>(own->leader)], *other);
-    } else if (own || other) {
-      AddCoupling(joint, own ? own->multiplier : 0.0, other ? other->multiplier : 0.0, "");
-    }
-  }
+  return stated;
+}
 
-  const RobotDescription& a_;
-  const RobotDescription& b_;
-  std::vector<int> b_of_a_;
-};
+namespace {
+
+MechanismComparison Compare(const RobotModel& model, const RobotDescription& a, const RobotDescription& b,
+                            ConstantChecks* result) {
+  return {model, ReadStated(a, a.spec), ReadStated(b, a.spec), result};
+}
+
+/// Returns the least inertia that each velocity of a robot moves, of M_jj at some states.
+VectorXd FindLeastInertia(const RobotModel& model) {
+  constexpr int kStates = 20;
+  ModelTerms terms(model);
+  StateSource source(model, {}, 1);
+  VectorXd q = VectorXd::Zero(model.num_positions());
+  VectorXd inertia;
+  for (int i = 0; i < kStates; ++i) {
+    source.DrawPositions(&q);
+    terms.SetState(q, VectorXd::Zero(model.num_velocities()));
+    terms.CalcDynamics();
+    const VectorXd diagonal = terms.M().diagonal();
+    inertia = i == 0 ? diagonal : inertia.cwiseMin(diagonal).eval();
+  }
+  return inertia;
+}
 
 /// A check's quantity, its components, and its unit for hinges and for slides.
 struct QuantityWords {
@@ -167,16 +159,124 @@ void ConstantChecks::Add(ConstantFinding finding) {
   findings.push_back(std::move(finding));
 }
 
+void StatedConstants::LeaveOut(const std::vector<std::string>& ignore) {
+  for (OfJoint& joint : joints) {
+    for (size_t k = 0; k < joint.numbers.size(); ++k) {
+      if (Ignores(ListDescribedConstants()[k].word, ignore)) joint.numbers[k].reset();
+    }
+    if (Ignores("coupling", ignore)) joint.coupling.reset();
+  }
+}
+
+StatedConstants ReadStated(const RobotModel& model) {
+  StatedConstants stated{model.spec().source, model.gravity(), {model.base_with_wheels().mass}, {}};
+  for (const Joint& joint : model.joints()) {
+    stated.masses.push_back(joint.body.mass);
+    StatedConstants::OfJoint& one = stated.joints.emplace_back();
+    for (const DescribedConstant& constant : ListDescribedConstants())
+      one.numbers.emplace_back(joint.*constant.value);
+    one.range = {joint.lower, joint.upper};
+    one.coupling = joint.coupling;
+  }
+  return stated;
+}
+
+void MechanismComparison::CompareShared() {
+  for (int k = 0; a_.gravity && b_.gravity && k < 3; ++k)
+    Compare("gravity_vector", {}, (*a_.gravity)[k], (*b_.gravity)[k], a_.gravity->norm());
+  for (size_t i = model_.base().type == BaseType::kFixed ? 1 : 0; i < a_.masses.size(); ++i)
+    Compare("link_mass", AtLink(static_cast<int>(i) - 1), a_.masses[i], b_.masses[i]);
+  for (size_t k = 0; k < ListDescribedConstants().size(); ++k) {
+    for (size_t i = 0; i < a_.joints.size(); ++i) {
+      const std::optional<double>&own = a_.joints[i].numbers[k], &other = b_.joints[i].numbers[k];
+      if (own && other)
+        Compare(ListDescribedConstants()[k].check, AtJoint(static_cast<int>(i)), *own, *other);
+    }
+  }
+  for (size_t i = 0; i < a_.joints.size(); ++i) {
+    const auto &own = a_.joints[i].range, &other = b_.joints[i].range;
+    for (size_t k = 0; own && other && k < 2; ++k)
+      Compare("joint_range", AtJoint(static_cast<int>(i)), (*own)[k], (*other)[k]);
+  }
+}
+
+void MechanismComparison::AddOneSided() {
+  std::optional<VectorXd> inertia;
+  for (size_t k = 0; k < ListDescribedConstants().size(); ++k) {
+    const DescribedConstant& constant = ListDescribedConstants()[k];
+    for (size_t i = 0; i < a_.joints.size(); ++i) {
+      const std::optional<double>&own = a_.joints[i].numbers[k], &other = b_.joints[i].numbers[k];
+      const double value = own ? *own : other.value_or(0.0);
+      if (own.has_value() == other.has_value() || value == 0.0) continue;
+      // An effect is largest where least inertia is moved.
+      if (!inertia) inertia = FindLeastInertia(model_);
+      const auto joint = static_cast<int>(i);
+      const double least = inertia
+                               ->segment(model_.num_base_velocities() + model_.dof(joint),
+                                         CountVelocities(JointOf(joint).type))
+                               .minCoeff();
+      result_.Add({constant.check, DescribeWhere(AtJoint(joint)), own.value_or(0.0), other.value_or(0.0),
+                   AtJoint(joint), 0,
+                   "only " + (own ? a_ : b_).file + " states it" +
+                       constant.describe_effect(JointOf(joint), value, least)});
+    }
+  }
+}
+
+void MechanismComparison::CompareCouplings(bool by_engine) {
+  constexpr const char* kCheck = "joint_coupling";
+  std::vector<std::string> only_there;
+  for (int i = 0; i < model_.num_joints(); ++i) {
+    const auto &own = a_.joints[static_cast<size_t>(i)].coupling,
+               &other = b_.joints[static_cast<size_t>(i)].coupling;
+    if (own && other) {
+      Compare(kCheck, AtJoint(i), own->leader, other->leader);
+      Compare(kCheck, AtJoint(i), own->multiplier, other->multiplier);
+      Compare(kCheck, AtJoint(i), own->offset, other->offset);
+    } else if (other && by_engine) {
+      only_there.push_back(JointOf(i).name);
+    } else if (own || other) {
+      result_.Add(
+          {kCheck, DescribeWhere(AtJoint(i)), own ? own->multiplier : 0.0, other ? other->multiplier : 0.0,
+           AtJoint(i), 1,
+           by_engine ? "only " + a_.file + " states it: it follows " + JointOf(own->leader).name : ""});
+    }
+  }
+  if (!only_there.empty())
+    result_.not_compared.push_back("coupled joints: only the MJCF couples " + JoinNames(only_there) +
+                                   "; terms are compared with all joints free");
+}
+
+void MechanismComparison::CompareMotorsAndWheels() {
+  for (size_t i = 0; i < a_.joints.size(); ++i) {
+    const StatedConstants::OfJoint &own = a_.joints[i], &other = b_.joints[i];
+    const Location at = AtJoint(static_cast<int>(i));
+    if (own.forces && other.forces) {
+      // A limit that is the same both ways is one number.
+      const auto is_even = [](const StatedForces& forces) { return forces.lower == -forces.upper; };
+      if (!is_even(*own.forces) || !is_even(*other.forces))
+        Compare("motor_limit", at, own.forces->lower, other.forces->lower);
+      Compare("motor_limit", at, own.forces->upper, other.forces->upper);
+    }
+    if (own.wheel_radius > 0.0 && other.wheel_radius > 0.0)
+      Compare("wheel_radius", at, own.wheel_radius, other.wheel_radius);
+  }
+}
+
 ConstantChecks CheckConstants(const RobotDescription& a, const RobotDescription& b) {
   const RobotModel model(a.spec);
   ConstantChecks result;
-  DescriptionConstants(model, a, b, &result).Run();
+  MechanismComparison comparison = Compare(model, a, b, &result);
+  comparison.CompareShared();
+  comparison.CompareCouplings(/*by_engine=*/false);
+  comparison.CompareMotorsAndWheels();
+  comparison.AddOneSided();
   return result;
 }
 
 void CheckMotorsAndWheels(const RobotDescription& a, const RobotDescription& b, ConstantChecks* constants) {
   const RobotModel model(a.spec);
-  DescriptionConstants(model, a, b, constants).CompareMotorsAndWheels();
+  Compare(model, a, b, constants).CompareMotorsAndWheels();
 }
 
 std::vector<std::string> CompareShapes(const RobotDescription& a, const RobotDescription& b) {

@@ -1,17 +1,18 @@
 #pragma once
 
-// Constants that are compared without motion, before anything else: masses, joints, wheels, fingertips,
-// object, options.
+// Constants that are compared without motion, before anything else: gravity, masses, joints, couplings. Each
+// side is read into one form, in which a constant that its file does not state is absent.
 
-#include <algorithm>
+#include <array>
 #include <limits>
+#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "harness/base/check_record.h"
 #include "harness/base/worst.h"
 #include "harness/descriptions/robot_description.h"
-#include "harness/engine/adapter.h"
 
 namespace dexcheck {
 
@@ -26,9 +27,8 @@ struct ConstantFinding {
   double engine = 0.0;
   Location location;
   int entry = 0;  ///< Which of the numbers that the check compares there: of a vector, a range, a 3x3 tensor.
-  bool engine_only = false;  ///< The analytic model has no such number: it takes the neutral value.
-  std::string effect{};      ///< What it does to the motion, when one of the two leaves it out.
-  double scale = 0.0;        ///< Size that the difference is relative to; 0: the larger of the two numbers.
+  std::string effect{};  ///< What it does to the motion, when one of the two leaves it out.
+  double scale = 0.0;    ///< Size that the difference is relative to; 0: the larger of the two numbers.
 };
 
 /// Returns a check's quantity in words, "centre of mass" of "link_com"; the check's name where it has none.
@@ -50,6 +50,7 @@ struct ConstantChecks {
   std::vector<CheckRecord> records;
   std::vector<ConstantFinding> findings;  ///< Every disagreement, in the file's order.
   std::vector<ConstantNote> notes;
+  std::vector<std::string> not_compared;  ///< What only one of the two has, a line each.
 
   /// The check of that name, a new one when there is none.
   CheckRecord* Define(const std::string& check);
@@ -57,14 +58,9 @@ struct ConstantChecks {
   void Add(ConstantFinding finding);
 };
 
-/// Compares constants: mass of each link; damping, armature and range of each joint; gravity; the wheels'
-/// radius, place, axis, mass, inertia, damping and armature; the floor they stand on; fingertip radii; the
-/// object's mass, inertia, centre of mass, shape and friction; and finds whatever the MJCF has that the
-/// analytic model lacks. engine_fields.h says of each field of the engine's model how it is seen.
-ConstantChecks CheckConstants(const Adapter& adapter);
-
-/// Compares what both descriptions state: gravity, mass of each link; damping, dry friction, armature, range
-/// and coupling of each joint. Locations are those of `a`.
+/// Compares two descriptions: gravity, mass of each link; damping, dry friction, armature, range and coupling
+/// of each joint. Damping, friction or armature that one of them alone states is a finding, with its effect
+/// on the motion. Locations are those of `a`.
 /// @param a, b as CompleteEachOther left them.
 ConstantChecks CheckConstants(const RobotDescription& a, const RobotDescription& b);
 
@@ -83,11 +79,6 @@ std::vector<std::string> CompareShapes(const RobotDescription& a, const RobotDes
 /// @return a line on each that differs in the first three digits.
 std::vector<std::string> CompareWithoutEffect(const RobotDescription& a, const RobotDescription& b);
 
-/// Compares couplings of joints, in the place of the constant checks' findings that the engine has them.
-/// @param ignores none is a disagreement. @return a note on those that only the engine has, which are not
-/// compared.
-std::vector<std::string> CheckCouplings(const Adapter& adapter, bool ignores, ConstantChecks* constants);
-
 /// Judges checks by a relative tolerance where that is wider than their bound.
 void JudgeByTolerance(double tolerance, std::vector<CheckRecord>* records);
 /// Judges a result by a tolerance; its findings are then those that exceed it.
@@ -99,7 +90,7 @@ inline Location AtLink(int link) { return {Location::Kind::kLink, link, -1}; }
 inline Location AtJoint(int joint) { return {Location::Kind::kJoint, joint, -1}; }
 
 class ConstantComparison {
- protected:
+ public:
   ConstantComparison(const RobotModel& model, ConstantChecks* result) : model_(model), result_(*result) {}
 
   /// Compares relative to the larger of the two, or to `scale` where zero is a proper value.
@@ -112,38 +103,14 @@ class ConstantComparison {
     const double size = Worst(std::abs(model), std::abs(engine), scale);
     const double error = record->Compare(model, engine, size > 0.0 ? size : 1.0, where, -1);
     if (error > kConstantRounding) {
-      result_.findings.push_back(
-          {check, DescribeWhere(where), model, engine, where, entry_, false, {}, size});
+      result_.findings.push_back({check, DescribeWhere(where), model, engine, where, entry_, {}, size});
     }
   }
   [[nodiscard]] std::string DescribeWhere(const Location& where) const {
     return Describe(where, model_, model_.num_base_velocities());
   }
-  void CompareGravity(const Vector3d& other) {
-    for (int k = 0; k < 3; ++k)
-      Compare("gravity_vector", {}, model_.gravity()[k], other[k], model_.gravity().norm());
-  }
-  /// @param mass_of of the other's link, by this model's joint; -1 the base.
-  template <typename MassOf>
-  void CompareMasses(const MassOf& mass_of) {
-    for (int link = model_.base().type == BaseType::kFixed ? 0 : -1; link < model_.num_joints(); ++link) {
-      Compare("link_mass", AtLink(link), link < 0 ? model_.base_with_wheels().mass : JointOf(link).body.mass,
-              mass_of(link));
-    }
-  }
-  /// @param leader of `own`, as the other one counts joints.
-  void CompareCouplings(int joint, const JointCoupling& own, int leader, const JointCoupling& other) {
-    Compare(kCoupling, AtJoint(joint), leader, other.leader);
-    Compare(kCoupling, AtJoint(joint), own.multiplier, other.multiplier);
-    Compare(kCoupling, AtJoint(joint), own.offset, other.offset);
-  }
-  /// Only one of the two has it.
-  void AddCoupling(int joint, double model, double engine, const std::string& effect) {
-    result_.Add({kCoupling, DescribeWhere(AtJoint(joint)), model, engine, AtJoint(joint), 1, false, effect});
-  }
   [[nodiscard]] const Joint& JointOf(int joint) const { return model_.joint(joint); }
 
-  static constexpr const char* kCoupling = "joint_coupling";
   const RobotModel& model_;
   ConstantChecks& result_;
 
@@ -151,6 +118,48 @@ class ConstantComparison {
   std::string last_check_;
   Location last_location_;
   int entry_ = 0;
+};
+
+/// The constants of a mechanism that one side states, joints in the order of the model that both are
+/// compared in.
+struct StatedConstants {
+  struct OfJoint {
+    std::vector<std::optional<double>> numbers;  ///< By ListDescribedConstants.
+    std::optional<std::array<double, 2>> range;
+    std::optional<JointCoupling> coupling;
+    std::optional<StatedForces> forces = {};  ///< Of the joint's motors.
+    double wheel_radius = 0.0;                ///< Radius of the wheel that the joint turns, m; 0 without one.
+  };
+  std::string file;
+  std::optional<Vector3d> gravity;
+  std::vector<double> masses;  ///< Of the base with all that is welded to it, then by joint.
+  std::vector<OfJoint> joints;
+
+  /// Takes out what two files need not share, of kIgnorable.
+  void LeaveOut(const std::vector<std::string>& ignore);
+};
+
+/// Reads a model, whose joints are in their own order, as if its file stated all.
+StatedConstants ReadStated(const RobotModel& model);
+/// Reads a description. @param reference whose joints of the same names have the order.
+StatedConstants ReadStated(const RobotDescription& robot, const RobotSpec& reference);
+
+/// Compares what two sides state.
+class MechanismComparison : public ConstantComparison {
+ public:
+  MechanismComparison(const RobotModel& model, StatedConstants a, StatedConstants b, ConstantChecks* result)
+      : ConstantComparison(model, result), a_(std::move(a)), b_(std::move(b)) {}
+
+  /// Compares gravity, masses, constants and ranges that both state.
+  void CompareShared();
+  /// Adds constants that act on the motion and that one of the two alone states, each with its effect.
+  void AddOneSided();
+  /// @param by_engine the second is an engine's model, whose own couplings are noted and no finding.
+  void CompareCouplings(bool by_engine);
+  void CompareMotorsAndWheels();
+
+ private:
+  StatedConstants a_, b_;
 };
 
 }  // namespace dexcheck

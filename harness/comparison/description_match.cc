@@ -8,12 +8,9 @@
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
-#include "controller/dynamics/model_terms.h"
-#include "harness/base/worst.h"
 #include "harness/descriptions/alike_names.h"
 #include "harness/descriptions/constant_table.h"
 #include "harness/descriptions/mjcf_reader.h"
-#include "harness/descriptions/random_states.h"
 #include "harness/engine/engine.h"
 
 namespace dexcheck {
@@ -97,7 +94,6 @@ class Matching {
   void TakeGravity() {
     if (a_.states_gravity == b_.states_gravity) return;
     (a_.states_gravity ? b_ : a_).spec.gravity = (a_.states_gravity ? a_ : b_).spec.gravity;
-    result_.unstated.emplace_back("gravity_vector");
     result_.not_compared.push_back("gravity: only " + FileName((a_.states_gravity ? a_ : b_).spec) +
                                    " states it, " + FormatNumbers(a_.spec.gravity));
   }
@@ -122,34 +118,13 @@ class Matching {
     for (size_t i = 0; i < b_of_a_.size(); ++i) visit(i, static_cast<size_t>(b_of_a_[i]));
   }
 
-  /// The check has nothing to say when one of the two states the constant nowhere.
-  void NoteUnstated(const char* check, bool DescribedJoint::*states) {
-    for (const RobotDescription* const robot : {&a_, &b_}) {
-      if (std::ranges::any_of(robot->joints, [&](const DescribedJoint& joint) { return joint.*states; })) {
-        continue;
-      }
-      result_.unstated.emplace_back(check);
-      return;
-    }
-  }
-
   void Take(const DescribedConstant& constant) {
     ForJoints([&](size_t i, size_t j) {
-      const bool in_a = a_.joints[i].*constant.states;
-      if (in_a == b_.joints[j].*constant.states) return;
       double& own = a_.spec.joints[i].*constant.value;
       double& other = b_.spec.joints[j].*constant.value;
-      if (own != other) {
-        ConstantFinding& finding = result_.one_sided.emplace_back();
-        finding.check = constant.check;
-        finding.location = {Location::Kind::kJoint, static_cast<int>(i), -1};
-        finding.model = own;
-        finding.engine = other;
-        finding.effect = "only " + FileName((in_a ? a_ : b_).spec) + " states it";
-      }
-      (in_a ? other : own) = in_a ? own : other;
+      if (!(a_.joints[i].*constant.states)) own = other;
+      if (!(b_.joints[j].*constant.states)) other = own;
     });
-    NoteUnstated(constant.check, constant.states);
   }
 
   void Ignore(const DescribedConstant& constant) {
@@ -161,7 +136,6 @@ class Matching {
       other = own;
       a_.joints[i].*constant.states = b_.joints[j].*constant.states = false;
     });
-    result_.unstated.emplace_back(constant.check);
     result_.not_compared.push_back(std::string(constant.word) + ": ignored" +
                                    (names.empty() ? ""
                                                   : ", though it differs at " + JoinNames(names) +
@@ -194,7 +168,6 @@ class Matching {
       silent.lower = stated.lower;
       silent.upper = stated.upper;
     });
-    NoteUnstated("joint_range", &DescribedJoint::states_range);
     for (const auto& [source, names] : taken)
       result_.not_compared.push_back("range: only " + source + " states it, for " + JoinNames(names));
   }
@@ -263,13 +236,7 @@ Completion CompleteFromEngine(const mjModel& engine, const std::string& source, 
         joint.*constant.value = (engine.*constant.engine)[dof];
     }
   }
-  Completion completion = CompleteEachOther(&other, robot, ignore);
-  const std::vector<int> own = MatchJoints(other.spec, robot->spec);
-  for (ConstantFinding& finding : completion.one_sided) {
-    std::swap(finding.model, finding.engine);
-    finding.location.first = own[static_cast<size_t>(finding.location.first)];
-  }
-  return completion;
+  return CompleteEachOther(&other, robot, ignore);
 }
 
 void TakeIgnored(const RobotSpec& robot, const std::vector<std::string>& ignore, mjModel* engine) {
@@ -281,36 +248,6 @@ void TakeIgnored(const RobotSpec& robot, const std::vector<std::string>& ignore,
       for (int k = 0; k < CountVelocities(joint.type); ++k)
         (engine->*constant.engine)[engine->jnt_dofadr[id] + k] = joint.*constant.value;
     }
-  }
-}
-
-void AddOneSided(const RobotModel& model, const std::vector<ConstantFinding>& one_sided,
-                 ConstantChecks* constants) {
-  if (one_sided.empty()) return;
-  // An effect is largest where least inertia is moved: the least of M_jj over some states.
-  constexpr int kStates = 20;
-  const int base = model.num_base_velocities();
-  ModelTerms terms(model);
-  StateSource source(model, {}, 1);
-  VectorXd q = VectorXd::Zero(model.num_positions());
-  VectorXd inertia;
-  for (int i = 0; i < kStates; ++i) {
-    source.DrawPositions(&q);
-    terms.SetState(q, VectorXd::Zero(model.num_velocities()));
-    terms.CalcDynamics();
-    const VectorXd diagonal = terms.M().diagonal();
-    inertia = i == 0 ? diagonal : inertia.cwiseMin(diagonal).eval();
-  }
-  for (ConstantFinding finding : one_sided) {
-    const Joint& joint = model.joint(finding.location.first);
-    const int first = base + model.dof(finding.location.first);
-    const double M_jj = inertia.segment(first, CountVelocities(joint.type)).minCoeff();
-    const double value = Worst(finding.model, finding.engine);
-    for (const DescribedConstant& constant : ListDescribedConstants()) {
-      if (finding.check == constant.check) finding.effect += constant.describe_effect(joint, value, M_jj);
-    }
-    finding.where = Describe(finding.location, model, base);
-    constants->Add(std::move(finding));
   }
 }
 

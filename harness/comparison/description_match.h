@@ -7,7 +7,6 @@
 #include <string>
 #include <vector>
 
-#include "harness/comparison/constant_checks.h"
 #include "harness/descriptions/robot_description.h"
 
 namespace dexcheck {
@@ -19,11 +18,6 @@ bool Ignores(const std::string& word, const std::vector<std::string>& ignore);
 struct Completion {
   std::vector<std::string> notes;         ///< One line each: what was done.
   std::vector<std::string> not_compared;  ///< One line each: what only one of them states, or is ignored.
-  std::vector<std::string>
-      unstated;  ///< Names of the checks of constants that one of them states nothing of.
-  /// Disagreements: constants that act on the motion and that only one of them states.
-  /// `model` is the number of `a`, `engine` that of `b`; `location` is the joint of `a`.
-  std::vector<ConstantFinding> one_sided;
 };
 
 /// The other way round, for a robot that more than two share: the engine takes over what is ignored.
@@ -44,10 +38,5 @@ Completion CompleteEachOther(RobotDescription* a, RobotDescription* b,
 /// @param is_table a parameter file states all: only what is ignored is taken over.
 Completion CompleteFromEngine(const mjModel& engine, const std::string& source, RobotDescription* robot,
                               const std::vector<std::string>& ignore = {}, bool is_table = false);
-
-/// Adds what one description alone states to the constant checks, each with its effect on the motion.
-/// @param model of the robot with what both state.
-void AddOneSided(const RobotModel& model, const std::vector<ConstantFinding>& one_sided,
-                 ConstantChecks* constants);
 
 }  // namespace dexcheck

@@ -1,13 +1,12 @@
+#include "harness/comparison/engine_constants.h"
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <optional>
 #include <vector>
 
-#include "controller/common/text.h"
 #include "harness/base/worst.h"
-#include "harness/comparison/constant_checks.h"
-#include "harness/comparison/engine_extras.h"
 #include "harness/descriptions/constant_table.h"
 #include "harness/descriptions/mjcf_reader.h"
 #include "harness/engine/engine.h"
@@ -21,87 +20,49 @@ namespace {
 constexpr double kSamePlace = 1e-9;  // m; two decimal numbers for one point
 constexpr double kMissing = std::numeric_limits<double>::quiet_NaN();
 
-/// A model and the engine's.
-class EngineConstants : public ConstantComparison {
+/// Reads an engine's model, joints in the order of the analytic one.
+StatedConstants ReadStated(const Adapter& adapter) {
+  const mjModel& m = adapter.engine();
+  StatedConstants stated;
+  stated.gravity = MapVector(m.opt.gravity);
+  for (const std::vector<int>& bodies : adapter.welded_bodies()) {
+    double& mass = stated.masses.emplace_back(0.0);
+    for (const int body : bodies) mass += m.body_mass[body];
+  }
+  for (int i = 0; i < adapter.model().num_joints(); ++i) {
+    StatedConstants::OfJoint& one = stated.joints.emplace_back();
+    const int id = adapter.joint_ids()[static_cast<size_t>(i)];
+    const int count = CountVelocities(adapter.model().joint(i).type);
+    for (const DescribedConstant& constant : ListDescribedConstants()) {
+      const mjtNum* const first = m.*constant.engine + m.jnt_dofadr[id];
+      // All have one number in an MJCF.
+      one.numbers.emplace_back(
+          *std::find_if(first, first + count - 1, [&](double x) { return x != *first; }));
+    }
+    // Without a limit the range of the other side only says where to draw states.
+    if (m.jnt_limited[id] != 0) one.range = {m.jnt_range[2 * id], m.jnt_range[2 * id + 1]};
+    one.coupling = FindEngineCoupling(m, id);
+    if (!one.coupling) continue;
+    const auto leader = std::ranges::find(adapter.joint_ids(), one.coupling->leader);
+    one.coupling->leader =
+        leader == adapter.joint_ids().end() ? -1 : static_cast<int>(leader - adapter.joint_ids().begin());
+  }
+  return stated;
+}
+
+/// Wheels, fingertips and the object of a model and of the engine's.
+class PlantComparison : public ConstantComparison {
  public:
-  EngineConstants(const Adapter& adapter, ConstantChecks* result)
+  PlantComparison(const Adapter& adapter, ConstantChecks* result)
       : ConstantComparison(adapter.model(), result), adapter_(adapter), engine_(adapter.engine()) {}
 
   void Run() {
-    CompareGravity(MapVector(engine_.opt.gravity));
-    CompareMasses([&](int link) {
-      double mass = 0.0;
-      for (const int b : adapter_.welded_bodies()[static_cast<size_t>(link + 1)])
-        mass += engine_.body_mass[b];
-      return mass;
-    });
-    CompareJoints();
     if (!adapter_.wheels().empty()) CompareWheels();
     CompareFingertips();
     if (model_.object()) CompareObject(*model_.object());
-    FindEngineOnly(adapter_, &result_);
-  }
-
-  std::vector<std::string> CompareJointCouplings(bool ignores) {
-    std::vector<std::string> only_there;
-    std::vector<std::string> constraints;
-    for (int i = 0; i < model_.num_joints(); ++i) {
-      const std::optional<JointCoupling>& own = JointOf(i).coupling;
-      const int id = adapter_.joint_ids()[static_cast<size_t>(i)];
-      const std::optional<JointCoupling> other = FindEngineCoupling(engine_, id);
-      if (other && (own || ignores))
-        constraints.push_back("constraint " +
-                              NameOf(engine_, mjOBJ_EQUALITY, FindCouplingConstraint(engine_, id)));
-      if (ignores || (!own && !other)) continue;
-      if (!own) {
-        only_there.push_back(JointOf(i).name);
-      } else if (!other) {
-        AddCoupling(i, own->multiplier, 0.0,
-                    "only " + model_.spec().source + " states it: it follows " + JointOf(own->leader).name);
-      } else {
-        const auto leader = std::ranges::find(adapter_.joint_ids(), other->leader);
-        const bool is_known = leader != adapter_.joint_ids().end();
-        const int index = is_known ? static_cast<int>(leader - adapter_.joint_ids().begin()) : -1;
-        CompareCouplings(i, *own, own->leader, {index, other->multiplier, other->offset});
-      }
-    }
-    TakeBackConstraints(constraints);
-    if (only_there.empty()) return {};
-    return {"coupled joints: only the MJCF couples " + JoinNames(only_there) +
-            "; terms are compared with all joints free"};
   }
 
  private:
-  void CompareJoints() {
-    const std::vector<int>& dofs = adapter_.joint_dofs();
-    for (const DescribedConstant& constant : ListDescribedConstants()) {
-      for (int i = 0; i < model_.num_dofs(); ++i) {
-        const int joint = model_.joint_of_dof(i);
-        Compare(constant.check, AtJoint(joint), JointOf(joint).*constant.value,
-                (engine_.*constant.engine)[dofs[static_cast<size_t>(i)]]);
-      }
-    }
-    for (int i = 0; i < model_.num_joints(); ++i) {
-      const int id = adapter_.joint_ids()[static_cast<size_t>(i)];
-      if (!engine_.jnt_limited[id]) continue;  // then the parameter file's range is only where to sample
-      Compare("joint_range", AtJoint(i), JointOf(i).lower, engine_.jnt_range[2 * id]);
-      Compare("joint_range", AtJoint(i), JointOf(i).upper, engine_.jnt_range[2 * id + 1]);
-    }
-  }
-
-  /// Constraints that the description has as couplings are not the engine's alone. The check goes with the
-  /// last of its findings.
-  void TakeBackConstraints(const std::vector<std::string>& constraints) {
-    constexpr const char* kCheck = "equality_constraint";
-    if (constraints.empty()) return;
-    std::erase_if(result_.findings, [&](const ConstantFinding& finding) {
-      return finding.check == kCheck && std::ranges::find(constraints, finding.where) != constraints.end();
-    });
-    if (std::ranges::none_of(result_.findings,
-                             [&](const ConstantFinding& finding) { return finding.check == kCheck; }))
-      std::erase_if(result_.records, [&](const CheckRecord& record) { return record.name == kCheck; });
-  }
-
   void CompareWheels() {
     const Base& base = model_.base();
     const auto each = [&](const char* check, const auto& compare) {
@@ -273,14 +234,27 @@ class EngineConstants : public ConstantComparison {
 
 }  // namespace
 
-ConstantChecks CheckConstants(const Adapter& adapter) {
+ConstantChecks CheckConstants(const Adapter& adapter, const EngineParts& parts, const FirstFile& first) {
   ConstantChecks result;
-  EngineConstants(adapter, &result).Run();
+  StatedConstants a =
+      first.robot != nullptr ? ReadStated(*first.robot, first.robot->spec) : ReadStated(adapter.model());
+  StatedConstants b = ReadStated(adapter);
+  a.LeaveOut(first.ignore);
+  b.LeaveOut(first.ignore);
+  b.file = first.second_file;
+  MechanismComparison mechanism(adapter.model(), std::move(a), std::move(b), &result);
+  mechanism.CompareShared();
+  PlantComparison(adapter, &result).Run();
+  CompareParts(first.parts, parts.parts, &result);
+  result.notes = parts.notes;
+  if (!first.is_file) return result;
+  mechanism.AddOneSided();
+  mechanism.CompareCouplings(/*by_engine=*/true);
   return result;
 }
 
-std::vector<std::string> CheckCouplings(const Adapter& adapter, bool ignores, ConstantChecks* constants) {
-  return EngineConstants(adapter, constants).CompareJointCouplings(ignores);
+ConstantChecks CheckConstants(const Adapter& adapter) {
+  return CheckConstants(adapter, ListEngineParts(adapter), {});
 }
 
 }  // namespace dexcheck

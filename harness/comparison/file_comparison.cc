@@ -12,7 +12,9 @@
 #include "harness/base/worst.h"
 #include "harness/comparison/body_comparison.h"
 #include "harness/comparison/description_match.h"
-#include "harness/comparison/engine_extras.h"
+#include "harness/comparison/engine_constants.h"
+#include "harness/comparison/engine_contacts.h"
+#include "harness/comparison/engine_parts.h"
 #include "harness/corrections/read_printed.h"
 #include "harness/descriptions/compiled_inertias.h"
 #include "harness/descriptions/engine_provider.h"
@@ -72,6 +74,7 @@ void CountRoundings(int imported, bool has_link_frames, std::vector<CheckRecord>
 struct EngineCompletion {
   Completion completion;
   bool has_link_frames = false;
+  bool states_all = false;  ///< A table whose constants were not completed.
 };
 
 /// Completes a description, and gives it frames of links and the inertias that the engine compiled. A robot
@@ -96,6 +99,7 @@ EngineCompletion Complete(const ConsistencyOptions& options, const MjcfFile& mjc
     }
   }
   result.completion = CompleteFromEngine(engine, file, robot, options.ignore, is_table);
+  result.states_all = is_table;
   return result;
 }
 
@@ -136,6 +140,21 @@ void CompareBeside(const DescriptionFile& first, const RobotDescription& robot, 
   }
 }
 
+/// Lists the parts that the first of two MJCFs has besides its mechanism, notes what else the two have, and
+/// takes parts that both have out of the second one.
+std::vector<EnginePart> ListFirstParts(const DescriptionFile& first, const RobotDescription& written,
+                                       const EngineParts& parts, mjModel* engine, Comparison* comparison) {
+  const MjModelPtr own_engine = first.CopyEngine();
+  const RobotModel model(written.spec);
+  EngineParts own = ListEngineParts(Adapter(model, *own_engine, first.path().string()), {false, true});
+  const std::string file = first.path().filename(), other = comparison->second.filename();
+  comparison->without_effect = CompareOptions(own_engine->opt, engine->opt, file, other);
+  AppendTo(&comparison->without_effect, CompareContacts(own.notes, parts.notes));
+  AppendTo(&comparison->not_compared, ListLoneMotors(own.parts, parts.parts, file, other));
+  AppendTo(&comparison->not_compared, LeaveOutShared(own.parts, parts.parts, *own_engine, engine));
+  return std::move(own.parts);
+}
+
 /// Compares a description with the engine.
 void CompareWithEngine(const DescriptionFile& first, const DescriptionFile& second, const UrdfOptions& urdf,
                        const ConsistencyOptions& options, const Progress& progress, Comparison* comparison) {
@@ -144,36 +163,28 @@ void CompareWithEngine(const DescriptionFile& first, const DescriptionFile& seco
   RobotDescription robot = written;
   const MjModelPtr engine = second.CopyEngine();
   const RobotFormat format = first.format();
-  if (format == RobotFormat::kUrdf) {
-    const std::optional<std::string> motors = SetAsideMotors(file, engine.get());
-    if (motors) comparison->not_compared.push_back(*motors);
-  }
   const EngineCompletion completed =
       Complete(options, second.document(), *engine, format == RobotFormat::kToml, comparison, &robot);
   const Completion& completion = completed.completion;
   comparison->model.emplace(robot.spec);
   const Adapter adapter(*comparison->model, *engine, comparison->second.string());
-  std::optional<Extras> extras;
-  if (format == RobotFormat::kMjcf) {
-    extras = CompareExtras(written, first.CopyEngine(), first.path().string(), adapter, engine.get(), file);
-    comparison->without_effect = extras->without_effect;
-    AppendTo(&comparison->not_compared, extras->not_compared);
-  }
-  comparison->result = CheckConsistency(adapter, options, progress);
+  const EngineParts parts =
+      ListEngineParts(adapter, {format == RobotFormat::kUrdf, true, Ignores("coupling", options.ignore)});
+  if (!parts.motors.empty())
+    comparison->not_compared.push_back("motors: only " + file +
+                                       " says how they make their forces (servos, muscles, transmissions, "
+                                       "gears): " +
+                                       JoinNames(parts.motors));
+  FirstFile stated{true, completed.states_all ? nullptr : &robot, options.ignore, file};
+  if (format == RobotFormat::kMjcf)
+    stated.parts = ListFirstParts(first, written, parts, engine.get(), comparison);
+  comparison->result = CompareTermsWithEngine(adapter, options, progress);
   CountRoundings(robot.is_imported ? 1 : 0, completed.has_link_frames, &comparison->result.terms);
   ConstantChecks& constants = comparison->result.constants;
-  std::erase_if(constants.records, [&](const CheckRecord& record) {
-    return !record.failed && std::ranges::find(completion.unstated, record.name) != completion.unstated.end();
-  });
-  AddOneSided(*comparison->model, completion.one_sided, &constants);
-  AppendTo(&comparison->not_compared,
-           CheckCouplings(adapter, Ignores("coupling", options.ignore), &constants));
-  if (extras) {
-    AppendTo(&comparison->without_effect, CompareContacts(extras->of_first, constants));
-    AddExtras(*extras, &constants);
-  }
+  constants = CheckConstants(adapter, parts, stated);
+  AppendTo(&comparison->not_compared, constants.not_compared);
   if (comparison->read_second) CompareBeside(first, robot, second, comparison);
-  // The notes of an MJCF concern quantities that CompareExtras compares.
+  // The notes of an MJCF concern quantities that CompareParts compares.
   if (format != RobotFormat::kMjcf) AppendTo(&comparison->notes, robot.notes);
   AppendTo(&comparison->not_compared, completion.not_compared);
   AppendTo(&comparison->notes, completion.notes);
@@ -208,7 +219,6 @@ void CompareTwoDescriptions(const DescriptionFile& first, const DescriptionFile&
   // A held joint is a step of its chain that the model no longer has.
   CountRoundings((a.is_imported ? 1 : 0) + (b.is_imported ? 1 : 0), has_link_frames,
                  &comparison->result.terms, held);
-  AddOneSided(*comparison->model, completion.one_sided, &comparison->result.constants);
   AppendTo(&comparison->without_effect, CompareWithoutEffect(a, b));
   AppendTo(&comparison->without_effect, CompareShapes(a, b));
   const RobotModel other(b.spec);

@@ -3,12 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <limits>
 
 namespace dexcheck {
 namespace {
 
-using P = EnginePart;
+using P = PartKind;
 using Index = Constant::Index;
 
 std::string DescribeDamping(const Joint& joint, double value, double least_inertia) {
@@ -123,34 +122,18 @@ std::vector<double> ReadConstant(const Constant& constant, const mjModel& m, int
   return numbers;
 }
 
-void MakeNeutral(const Constant& constant, int part, mjModel* m) {
-  if (!constant.neutral) return;
-  const auto [first, count] = FindNumbers(constant, *m, part);
-  const int changed = constant.index == Index::kPart ? 1 : count;
-  std::visit(
-      [&, at = first](auto array) {
-        using Number = std::remove_pointer_t<std::remove_reference_t<decltype(m->*array)>>;
-        std::fill_n(m->*array + at, changed, static_cast<Number>(*constant.neutral));
-      },
-      constant.array);
-}
-
-void MakeIdle(EnginePart kind, int id, unsigned role, mjModel* m) {
+void MakeIdle(PartKind kind, int id, unsigned role, mjModel* m) {
   for (const Constant& constant : ListConstants()) {
-    if (constant.part == kind && (constant.roles & role) != 0) MakeNeutral(constant, id, m);
+    if (constant.part != kind || (constant.roles & role) == 0 || !constant.neutral) continue;
+    const auto [first, count] = FindNumbers(constant, *m, id);
+    const int changed = constant.index == Index::kPart ? 1 : count;
+    std::visit(
+        [&, at = first](auto array) {
+          using Number = std::remove_pointer_t<std::remove_reference_t<decltype(m->*array)>>;
+          std::fill_n(m->*array + at, changed, static_cast<Number>(*constant.neutral));
+        },
+        constant.array);
   }
-}
-
-std::array<MotorProperty, 5> ReadMotor(const mjModel& m, int i) {
-  const int transmission = m.actuator_trntype[i];
-  const bool has_gain = m.actuator_gaintype[i] == mjGAIN_FIXED && m.actuator_gear[6 * i] != 0.0;
-  const double gain = has_gain ? m.actuator_gainprm[mjNGAIN * i] : std::numeric_limits<double>::quiet_NaN();
-  return {{{"motor_transmission", mjTRN_JOINT,
-            static_cast<double>(transmission == mjTRN_JOINTINPARENT ? mjTRN_JOINT : transmission)},
-           {"motor_transmission", 1.0, m.actuator_gear[6 * i]},
-           {"motor_dynamics", mjDYN_NONE, static_cast<double>(m.actuator_dyntype[i])},
-           {"motor_gain", 1.0, gain},
-           {"motor_bias", mjBIAS_NONE, static_cast<double>(m.actuator_biastype[i])}}};
 }
 
 int FindCouplingConstraint(const mjModel& engine, int joint) {

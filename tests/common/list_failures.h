@@ -7,7 +7,7 @@
 
 #include "controller/model/parameter_reader.h"
 #include "harness/comparison/consistency.h"
-#include "harness/comparison/constant_checks.h"
+#include "harness/comparison/engine_constants.h"
 
 namespace dexcheck::testing {
 
@@ -31,8 +31,8 @@ inline std::string CompareWithEngine(const RobotDescription& robot, const mjMode
   ConsistencyOptions options;
   options.samples = samples;
   ConsistencyResult result = CheckConsistency(adapter, options, [](long) { return true; });
-  const std::vector<std::string> found = CheckCouplings(adapter, /*ignores=*/false, &result.constants);
-  if (notes != nullptr) *notes = found;
+  result.constants = CheckConstants(adapter, ListEngineParts(adapter, {false, true}), {true});
+  if (notes != nullptr) *notes = result.constants.not_compared;
   return ListFailures(result);
 }
 

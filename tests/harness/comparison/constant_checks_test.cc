@@ -1,7 +1,5 @@
 // Every kind of constant that the MJCF can have otherwise than the parameters is found and named.
 
-#include "harness/comparison/constant_checks.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -9,6 +7,7 @@
 #include <ostream>
 
 #include "controller/model/parameter_reader.h"
+#include "harness/comparison/engine_constants.h"
 #include "harness/engine/engine.h"
 #include "tests/common/files.h"
 #include "tests/common/paths.h"

@@ -16,6 +16,7 @@
 #include <mujoco/mjxmacro.h>
 
 #include "harness/comparison/consistency.h"
+#include "harness/comparison/engine_constants.h"
 #include "harness/engine/engine.h"
 #include "harness/engine/mujoco_release.h"
 #include "tests/common/files.h"

@@ -1,7 +1,7 @@
 // Parts of two MJCFs besides the mechanism (motors, springs, tendons, constraints, flags), compared with each
 // other; and motors beside a URDF.
 
-#include "harness/comparison/engine_extras.h"
+#include "harness/comparison/engine_parts.h"
 
 #include <gmock/gmock.h>
 
@@ -9,7 +9,7 @@
 #include "tests/common/files.h"
 #include "tests/common/matchers.h"
 
-namespace dexcheck::testing::engine_extras_test {
+namespace dexcheck::testing::engine_parts_test {
 namespace {
 
 constexpr const char* kArm = R"(<mujoco>
@@ -186,4 +186,4 @@ TEST_F(TwoMjcfs, MotorsBesideAUrdfAreNotCompared) {
 }
 
 }  // namespace
-}  // namespace dexcheck::testing::engine_extras_test
+}  // namespace dexcheck::testing::engine_parts_test

@@ -1,15 +1,18 @@
+#include "harness/comparison/engine_contacts.h"
+
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <set>
 #include <span>
 #include <string>
+#include <utility>
 
+#include "controller/common/text.h"
 #include "harness/base/worst.h"
-#include "harness/comparison/engine_extras.h"
-#include "harness/descriptions/constant_table.h"
 #include "harness/engine/engine.h"
 #include "harness/engine/exact_collision.h"
 #include "harness/engine/mujoco_release.h"
@@ -26,147 +29,22 @@ std::string List(const mjtNum* values, int count) {
   return fmt::format("{:.17g}", fmt::join(values, values + count, " "));
 }
 
-class EngineOnly {
+class ContactReader {
  public:
-  EngineOnly(const Adapter& adapter, ConstantChecks* result)
-      : adapter_(adapter), engine_(adapter.engine()), result_(result) {}
+  ContactReader(const Adapter& adapter, EngineParts* list)
+      : adapter_(adapter), engine_(adapter.engine()), list_(*list) {}
 
   void Run() {
-    FindJoints();
-    Expect("fluid", "robot", 0.0, engine_.opt.density);
-    Expect("fluid", "robot", 0.0, engine_.opt.viscosity);
-    FindParts(EnginePart::kTendon, mjOBJ_TENDON, "tendon", engine_.ntendon);
-    FindParts(EnginePart::kConstraint, mjOBJ_EQUALITY, "constraint", engine_.neq);
-    FindMotors();
-    FindNewerForces();
-    FindFlags();
-    ComparePairs();
-    if (!adapter_.wheels().empty()) CompareFloor();
+    AddPairs();
+    if (!adapter_.wheels().empty()) AddFloor();
     NoteContactsByType();
     NoteSettings();
   }
 
  private:
-  /// A number that must be `neutral`.
-  void Expect(const std::string& check, const std::string& where, double neutral, double engine,
-              double tolerance = 0.0, const Location& at = {}) {
-    CheckRecord* const record = result_->Define(check);
-    double error = std::abs(engine - neutral);
-    if (error <= tolerance) error = 0.0;
-    // How large a force may be that should not be there is nothing that a relative tolerance says.
-    if (tolerance == 0.0 && error > 0.0) error /= Worst(std::abs(engine), std::abs(neutral));
-    if (!(record->CompareError(error, neutral, engine, at, -1) <= kConstantRounding))
-      result_->findings.push_back({check, where, neutral, engine, at, 0, true});
-  }
+  void Note(const std::string& kind, std::string text) { list_.notes.push_back({kind, std::move(text)}); }
 
-  void Note(const std::string& kind, std::string text) { result_->notes.push_back({kind, std::move(text)}); }
-
-  [[nodiscard]] std::string Name(mjtObj type, const char* kind, int id) const {
-    return std::string(kind) + " " + NameOf(engine_, type, id);
-  }
-  [[nodiscard]] std::string GeomName(int geom) const { return Name(mjOBJ_GEOM, "geom", geom); }
-
-  /// Joints that carry the base or the object: nothing holds or drives them. And springs, dry friction and
-  /// limits where the analytic model has none.
-  void FindJoints() {
-    struct OwnedJoint {
-      int id;
-      JointRole role;
-      Location at;
-    };
-    std::vector<OwnedJoint> joints;
-    for (const int joint : adapter_.base_joints())
-      joints.push_back({joint, kFreeJoint, {Location::Kind::kLink, -1, -1}});
-    for (int k = 0; k < static_cast<int>(adapter_.wheels().size()); ++k)
-      joints.push_back(
-          {adapter_.wheels()[static_cast<size_t>(k)].joint, kWheelJoint, {Location::Kind::kWheel, k, -1}});
-    for (int i = 0; i < adapter_.model().num_joints(); ++i)
-      joints.push_back(
-          {adapter_.joint_ids()[static_cast<size_t>(i)], kRobotJoint, {Location::Kind::kJoint, i, -1}});
-    const int object = adapter_.object_body();
-    for (int k = 0; object >= 0 && k < engine_.body_jntnum[object]; ++k)
-      joints.push_back({engine_.body_jntadr[object] + k, kFreeJoint, {Location::Kind::kObject, -1, -1}});
-    for (const Constant& constant : ListConstants()) {
-      if (constant.part != EnginePart::kJoint || !constant.neutral) continue;
-      for (const OwnedJoint& joint : joints) {
-        if ((constant.roles & joint.role) != 0) FindJoint(constant, joint.id, joint.at);
-      }
-    }
-  }
-
-  void FindJoint(const Constant& constant, int joint, const Location& at) {
-    if (constant.applies != nullptr && !constant.applies(engine_, joint)) return;
-    std::string where = Describe(at, adapter_.model(), adapter_.model().num_base_velocities());
-    const bool carries_base = at.kind == Location::Kind::kLink;
-    if (carries_base)
-      where = (engine_.jnt_type[joint] == mjJNT_FREE ? "free joint of " : "joints of ") + where;
-    std::vector<ConstantFinding>& findings = result_->findings;
-    for (const double number : ReadConstant(constant, engine_, joint)) {
-      const auto said = static_cast<std::ptrdiff_t>(findings.size());
-      Expect(constant.check, where, *constant.neutral, number, 0.0, at);
-      // A constant that all six coordinates of a free joint share is said once.
-      if (carries_base &&
-          std::any_of(findings.begin(), findings.begin() + said, [&](const ConstantFinding& other) {
-            return other.check == constant.check && other.where == where && other.engine == number;
-          }))
-        findings.resize(static_cast<size_t>(said));
-    }
-  }
-
-  /// Parts of which each constant must have its neutral value.
-  void FindParts(EnginePart part, mjtObj type, const char* kind, EngineSize count) {
-    for (int i = 0; i < count; ++i) {
-      for (const Constant& constant : ListConstants()) {
-        if (constant.part != part || !constant.neutral) continue;
-        Expect(constant.check, Name(type, kind, i), *constant.neutral,
-               ReadConstant(constant, engine_, i).front());
-      }
-    }
-  }
-
-  /// A motor is a torque on its joint, and its control is that torque: its gear is 1.
-  void FindMotors() {
-    for (int i = 0; i < engine_.nu; ++i) {
-      const std::string where = Name(mjOBJ_ACTUATOR, "actuator", i);
-      for (const MotorProperty& property : ReadMotor(engine_, i))
-        Expect(property.check, where, property.plain, property.value);
-      if (engine_.actuator_ctrllimited[i] != 0)
-        Note("motor_limit",
-             fmt::format("{}: control from {}", where, List(engine_.actuator_ctrlrange + 2 * i, 2)));
-      if (engine_.actuator_forcelimited[i] != 0)
-        Note("motor_limit",
-             fmt::format("{}: force from {}", where, List(engine_.actuator_forcerange + 2 * i, 2)));
-    }
-  }
-
-  /// Finds forces and inertias that later releases of the engine add to the mechanism.
-  void FindNewerForces() {
-    for (const NewerForce& force : kNewerForces) {
-      const mjtNum* const values = engine_.*force.values;
-      for (int i = 0; i < CountElements(engine_, force.type) * force.columns; ++i) {
-        const std::string element = NameOf(engine_, force.type, i / force.columns);
-        Expect(force.check, element + ": " + force.name, 0.0, values[i]);
-      }
-    }
-    for (const NewerPart& part : kNewerParts)
-      Expect("newer_part", part.name, 0.0, static_cast<double>(engine_.*part.count));
-  }
-
-  void FindFlags() {
-    // Sensors measure only; so do the energy, the comparison with the inverse dynamics and sensors' noise.
-    constexpr int kHarmlessToDisable = mjDSBL_SENSOR;
-    constexpr int kHarmlessToEnable = mjENBL_ENERGY | mjENBL_FWDINV | kSensorNoiseFlag;
-    const auto find = [&](const char* check, std::span<const char* const> names, int flags, int harmless) {
-      for (size_t i = 0; i < names.size(); ++i) {
-        const int flag = 1 << i;
-        if ((flag & harmless) == 0) Expect(check, names[i], 0.0, (flags & flag) != 0 ? 1.0 : 0.0);
-      }
-      const int unknown = flags & ~((1 << names.size()) - 1);
-      Expect(check, "unknown flag", 0.0, unknown);
-    };
-    find("disable_flag", {mjDISABLESTRING, mjNDISABLE}, engine_.opt.disableflags, kHarmlessToDisable);
-    find("enable_flag", {mjENABLESTRING, mjNENABLE}, engine_.opt.enableflags, kHarmlessToEnable);
-  }
+  [[nodiscard]] std::string GeomName(int geom) const { return "geom " + NameOf(engine_, mjOBJ_GEOM, geom); }
 
   [[nodiscard]] bool IsObject(int geom) const {
     return adapter_.object_body() >= 0 && engine_.geom_bodyid[geom] == adapter_.object_body();
@@ -201,26 +79,29 @@ class EngineOnly {
 
   /// Explicit contact pairs: nothing acts at a distance, fingers and wheels are hard, and all else of the
   /// robot but feet that touches the world slides without friction.
-  void ComparePairs() {
+  void AddPairs() {
     std::set<int> meshes;
     for (int pair = 0; pair < engine_.npair; ++pair) {
-      const std::string where = Name(mjOBJ_PAIR, "pair", pair);
+      const std::string where = "pair " + NameOf(engine_, mjOBJ_PAIR, pair);
+      EnginePart& part = list_.parts.emplace_back(EnginePart{where, where, where});
       const int geoms[2] = {engine_.pair_geom1[pair], engine_.pair_geom2[pair]};
       const mjtNum* const friction = engine_.pair_friction + 5 * pair;
       const int dim = engine_.pair_dim[pair];
-      Expect("contact_margin", where, 0.0, engine_.pair_margin[pair]);
-      Expect("contact_margin", where, 0.0, engine_.pair_gap[pair]);
+      part.numbers = {{"contact_margin", "margin", engine_.pair_margin[pair], 0.0},
+                      {"contact_margin", "gap", engine_.pair_gap[pair], 0.0}};
       for (int k = 0; k < 2; ++k) {
         const int own = geoms[k];
         const int other = geoms[1 - k];
         if (engine_.geom_type[own] == mjGEOM_MESH || engine_.geom_type[own] == mjGEOM_HFIELD)
           meshes.insert(own);
         const bool hard = (IsFingertip(own) && IsObject(other)) || (IsWheel(own) && IsWorld(other));
-        if (hard) Expect("contact_dimension", where, kHardContact, dim);
+        if (hard)
+          part.numbers.push_back({"contact_dimension", "dimension", static_cast<double>(dim), kHardContact});
         const bool has_friction = IsWorld(other) && !IsWorld(own) && !IsObject(own) && !IsWheel(own) &&
                                   !IsFingertip(own) && !IsFoot(own);
         if (has_friction)
-          Expect("contact_rubbing", where, 0.0, dim > 1 ? Worst(friction[0], friction[1]) : 0.0);
+          part.numbers.push_back(
+              {"contact_rubbing", "friction", dim > 1 ? Worst(friction[0], friction[1]) : 0.0, 0.0});
       }
       Note("contact_pair",
            fmt::format("{}: {} and {}: dimension {}, friction {}, margin {:.17g}, gap {:.17g}", where,
@@ -255,7 +136,7 @@ class EngineOnly {
   }
 
   /// The wheels are round about the axle and stand on a level floor.
-  void CompareFloor() {
+  void AddFloor() {
     const MjDataPtr data = MakeDataWithoutContacts(engine_);
     mj_kinematics(&engine_, data.get());
     const auto place = [&](int geom) {
@@ -264,18 +145,22 @@ class EngineOnly {
     const auto axis = [&](int geom) {
       return Vector3d(Eigen::Map<const RowMatrix3d>(data->geom_xmat + 9 * geom).col(2));
     };
+    const auto add = [&](const char* check, int geom, double expected, double value, double tolerance) {
+      EnginePart& part = list_.parts.emplace_back(EnginePart{"shape " + GeomName(geom), "", GeomName(geom)});
+      part.numbers = {{check, GeomName(geom), value, expected, tolerance}};
+    };
     for (const EngineWheel& wheel : adapter_.wheels()) {
       const Vector3d center = adapter_.model().base().X_B0 * wheel.center;
       const double tolerance = kConstantRounding * Worst(1.0, center.norm());
       for (int geom = 0; geom < engine_.ngeom; ++geom) {
         if (engine_.geom_bodyid[geom] != engine_.jnt_bodyid[wheel.joint] || !Touches(geom)) continue;
-        Expect("wheel_geom_place", GeomName(geom), 0.0, (place(geom) - center).norm(), tolerance);
+        add("wheel_geom_place", geom, 0.0, (place(geom) - center).norm(), tolerance);
         if (engine_.geom_type[geom] != mjGEOM_SPHERE)
-          Expect("wheel_geom_place", GeomName(geom), 1.0, std::abs(axis(geom).dot(wheel.axis)), tolerance);
+          add("wheel_geom_place", geom, 1.0, std::abs(axis(geom).dot(wheel.axis)), tolerance);
         for (const int floor : FindFloors(geom)) {
-          Expect("floor_pose", GeomName(floor), 1.0, axis(floor).z(), tolerance);
-          Expect("floor_pose", GeomName(floor), 0.0, axis(floor).head<2>().norm(), tolerance);
-          Expect("floor_pose", GeomName(floor), center.z() - wheel.radius, place(floor).z(), tolerance);
+          add("floor_pose", floor, 1.0, axis(floor).z(), tolerance);
+          add("floor_pose", floor, 0.0, axis(floor).head<2>().norm(), tolerance);
+          add("floor_pose", floor, center.z() - wheel.radius, place(floor).z(), tolerance);
         }
       }
     }
@@ -343,11 +228,39 @@ class EngineOnly {
 
   const Adapter& adapter_;
   const mjModel& engine_;
-  ConstantChecks* result_;
+  EngineParts& list_;
 };
 
 }  // namespace
 
-void FindEngineOnly(const Adapter& adapter, ConstantChecks* result) { EngineOnly(adapter, result).Run(); }
+void AddContacts(const Adapter& adapter, EngineParts* list) { ContactReader(adapter, list).Run(); }
+
+std::vector<std::string> CompareContacts(const std::vector<ConstantNote>& first,
+                                         const std::vector<ConstantNote>& second) {
+  std::vector<std::string> lines;
+  for (const auto& [kind, word] : {std::pair("contacts_by_type", "contacts by contype and conaffinity"),
+                                   {"contact_pair", "contact pairs"},
+                                   {"mesh_contacts", "meshes that touch"}}) {
+    std::map<std::string, std::string> texts[2];
+    for (const size_t side : {0U, 1U}) {
+      for (const ConstantNote& note : side == 0 ? first : second) {
+        const size_t end = std::min(note.text.find(" ("), note.text.find(": "));
+        if (note.kind == kind) texts[side][note.text.substr(0, end)] += note.text;
+      }
+    }
+    std::vector<std::string> differing;
+    for (const size_t side : {0U, 1U}) {
+      for (const auto& [name, text] : texts[side]) {
+        const auto other = texts[1 - side].find(name);
+        const bool is_missing = other == texts[1 - side].end();
+        if (is_missing || (side == 0 && other->second != text)) differing.push_back(name);
+      }
+    }
+    if (!differing.empty())
+      lines.push_back(std::string(word) + ": shapes, places, friction or parameters differ at " +
+                      Abbreviate(JoinNames(differing)));
+  }
+  return lines;
+}
 
 }  // namespace dexcheck
