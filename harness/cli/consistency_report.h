@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "harness/cli/commands.h"
-#include "harness/comparison/file_comparison.h"
+#include "harness/comparison/results_comparison.h"
 
 namespace dexcheck::cli {
 

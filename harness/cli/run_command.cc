@@ -19,7 +19,7 @@
 #include "harness/cli/run_folder.h"
 #include "harness/cli/run_report.h"
 #include "harness/cli/terminal.h"
-#include "harness/comparison/file_comparison.h"
+#include "harness/comparison/file_differences.h"
 #include "harness/engine/machine.h"
 #include "harness/report/page.h"
 #include "harness/report/run_data.h"

@@ -14,7 +14,7 @@ namespace dexcheck {
 namespace {
 
 /// Compares at all states; constants are the caller's.
-ConsistencyResult CompareTerms(const StateFeed& feed, const Progress& progress, TermComparison* comparison) {
+ConsistencyResult CompareAll(const StateFeed& feed, const Progress& progress, TermComparison* comparison) {
   const auto start = std::chrono::steady_clock::now();
   ConsistencyResult result;
   result.samples = CompareAtStates(feed, progress, comparison);
@@ -24,14 +24,6 @@ ConsistencyResult CompareTerms(const StateFeed& feed, const Progress& progress, 
   return result;
 }
 
-ConsistencyResult CompareAtRandomStates(const ConsistencyOptions& options, const Progress& progress,
-                                        TermComparison* comparison) {
-  const RobotModel& model = comparison->model();
-  return CompareTerms(FeedRandomStates(model, options.samples, options.range, options.seed,
-                                       comparison->needs_second_velocity(), model.object().has_value()),
-                      progress, comparison);
-}
-
 }  // namespace
 
 bool ConsistencyResult::Agrees() const {
@@ -39,37 +31,27 @@ bool ConsistencyResult::Agrees() const {
   return std::ranges::all_of(constants.records, good) && std::ranges::all_of(terms, good);
 }
 
-ConsistencyResult CompareTermsWithEngine(const Adapter& adapter, const ConsistencyOptions& options,
-                                         const Progress& progress) {
-  AnalyticProvider model(adapter.model(), "model", options.make_view, options.object);
-  EngineProvider engine(adapter, "engine");
-  TermComparison comparison(adapter.model(), kAskedByConsistency, {&model, &engine});
-  return CompareAtRandomStates(options, progress, &comparison);
+ConsistencyResult CompareTerms(const RobotModel& model, DynamicsProvider* first, DynamicsProvider* second,
+                               const ConsistencyOptions& options, const Progress& progress) {
+  TermComparison comparison(model, kAskedByConsistency, {first, second});
+  return CompareAll(FeedRandomStates(model, options.samples, options.range, options.seed,
+                                     comparison.needs_second_velocity(), model.object().has_value()),
+                    progress, &comparison);
 }
 
 ConsistencyResult CheckConsistency(const Adapter& adapter, const ConsistencyOptions& options,
                                    const Progress& progress) {
-  ConsistencyResult result = CompareTermsWithEngine(adapter, options, progress);
+  AnalyticProvider model(adapter.model(), "model", options.make_view, options.object);
+  EngineProvider engine(adapter, "engine");
+  ConsistencyResult result = CompareTerms(adapter.model(), &model, &engine, options, progress);
   result.constants = CheckConstants(adapter);
-  return result;
-}
-
-ConsistencyResult CompareDescriptions(const RobotDescription& a, const RobotDescription& b,
-                                      const ConsistencyOptions& options, const Progress& progress) {
-  const RobotModel model_a(a.spec);
-  const RobotModel model_b(b.spec);
-  AnalyticProvider first(model_a, a.spec.source);
-  AnalyticProvider second(model_b, b.spec.source, model_a);
-  TermComparison comparison(model_a, kAskedByConsistency, {&first, &second});
-  ConsistencyResult result = CompareAtRandomStates(options, progress, &comparison);
-  result.constants = CheckConstants(a, b);
   return result;
 }
 
 ConsistencyResult CompareProviders(const RobotModel& model, DynamicsProvider* first, DynamicsProvider* second,
                                    const StateFeed& feed, const Progress& progress) {
   TermComparison comparison(model, kAskedOfPrograms, {first, second});
-  return CompareTerms(feed, progress, &comparison);
+  return CompareAll(feed, progress, &comparison);
 }
 
 bool AgreeAtFirst(const RobotModel& model, DynamicsProvider* a, DynamicsProvider* b, const StateFeed& feed,

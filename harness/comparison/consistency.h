@@ -47,18 +47,13 @@ struct ConsistencyResult {
 /// Called after each sample with the number done; its false ends the work early.
 using Progress = std::function<bool(long)>;
 
-/// Compares all terms of robot and object with the engine's, at random states over the joint ranges.
-ConsistencyResult CompareTermsWithEngine(const Adapter& adapter, const ConsistencyOptions& options,
-                                         const Progress& progress);
-/// Compares these terms, and the constants of model and engine.
+/// Compares all terms that two providers have in common, at random states over the model's joint ranges.
+/// `model_value` of a record is that of `first`, `engine_value` that of `second`.
+ConsistencyResult CompareTerms(const RobotModel& model, DynamicsProvider* first, DynamicsProvider* second,
+                               const ConsistencyOptions& options, const Progress& progress);
+/// Compares the terms and constants of a model and an engine.
 ConsistencyResult CheckConsistency(const Adapter& adapter, const ConsistencyOptions& options,
                                    const Progress& progress);
-
-/// Constants that both state, then all terms of two descriptions at random states over the ranges of `a`.
-/// `model_value` of a record is that of `a`, `engine_value` that of `b`; locations are those of `a`.
-/// @param a, b as CompleteEachOther left them.
-ConsistencyResult CompareDescriptions(const RobotDescription& a, const RobotDescription& b,
-                                      const ConsistencyOptions& options, const Progress& progress);
 
 /// Compares the terms of a program, results in files or functions with a description's. @param feed gives the
 /// states.

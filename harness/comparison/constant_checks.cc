@@ -129,16 +129,19 @@ std::string NameQuantity(const std::string& check) {
   return words != nullptr ? words->name : check;
 }
 
-std::string NameComponent(const std::string& check, int entry) {
-  const QuantityWords* const words = FindWords(check);
-  const bool has = words != nullptr && entry >= 0 && entry < static_cast<int>(words->components.size());
-  const char* const name = has ? words->components[static_cast<size_t>(entry)] : nullptr;
+std::string NameComponent(const ConstantFinding& finding) {
+  const QuantityWords* const words = FindWords(finding.check);
+  const bool has =
+      words != nullptr && finding.entry >= 0 && finding.entry < static_cast<int>(words->components.size());
+  const char* const name = has ? words->components[static_cast<size_t>(finding.entry)] : nullptr;
   return name != nullptr ? name : "";
 }
 
-std::string UnitOf(const std::string& check, bool is_prismatic) {
-  const QuantityWords* const words = FindWords(check);
-  if (words == nullptr) return "";
+std::string UnitOf(const ConstantFinding& finding, const RobotModel& model) {
+  const QuantityWords* const words = FindWords(finding.check);
+  if (words == nullptr || finding.entry < 0) return "";
+  const bool is_prismatic = finding.location.kind == Location::Kind::kJoint &&
+                            model.joint(finding.location.first).type == JointType::kPrismatic;
   return is_prismatic ? words->prismatic_unit : words->unit;
 }
 

@@ -19,25 +19,30 @@ namespace dexcheck {
 /// Two readers of decimal numbers form at most short sums and products of them.
 inline constexpr double kConstantRounding = 64.0 * std::numeric_limits<double>::epsilon();
 
-/// One constant in which the parameter file and the MJCF differ.
+/// One number in which two files, or a model and an engine, differ.
 struct ConstantFinding {
   std::string check;  ///< Name of the check, such as "link_mass".
   std::string where;  ///< Part of the robot, such as "link r_forearm".
   double model = 0.0;
   double engine = 0.0;
   Location location;
-  int entry = 0;  ///< Which of the numbers that the check compares there: of a vector, a range, a 3x3 tensor.
-  std::string effect{};  ///< What it does to the motion, when one of the two leaves it out.
-  double scale = 0.0;    ///< Size that the difference is relative to; 0: the larger of the two numbers.
+  /// Which of the numbers that the check compares there: of a vector, a range, a 3x3 tensor; -1 of a term.
+  int entry = 0;
+  std::string effect{};   ///< What it does to the motion, when one of the two leaves it out.
+  double scale = 0.0;     ///< Size that the difference is relative to; 0: the larger of the two numbers.
+  double units = 0.0;     ///< Difference relative to the printed precision; infinite between exact numbers.
+  bool is_cause = false;  ///< A constant, or a term of geometry or bodies, from which the other terms follow.
+  /// Relative precision of a number that agrees within it, where that is too coarse for a verdict; else 0.
+  double too_loose = 0.0;
 };
 
 /// Returns a check's quantity in words, "centre of mass" of "link_com"; the check's name where it has none.
 std::string NameQuantity(const std::string& check);
-/// Returns the component of a vector, tensor or range that an entry is: "Ixx" of entry 0 of "link_inertia";
+/// Returns the component of a vector, tensor or range that a number is: "Ixx" of entry 0 of "link_inertia";
 /// empty where the quantity is one number.
-std::string NameComponent(const std::string& check, int entry);
-/// Returns the unit of a check's numbers, "kg"; empty where it is not known.
-std::string UnitOf(const std::string& check, bool is_prismatic);
+std::string NameComponent(const ConstantFinding& finding);
+/// Returns the unit of a number, "kg"; empty where it is not known. @param model whose locations it has.
+std::string UnitOf(const ConstantFinding& finding, const RobotModel& model);
 
 /// Something that the MJCF sets and the analytic model has no number for, and that is no disagreement: it
 /// belongs to the plant of a run, which overrides it or whose checks judge it.

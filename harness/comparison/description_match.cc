@@ -10,6 +10,7 @@
 #include "controller/common/text.h"
 #include "harness/descriptions/alike_names.h"
 #include "harness/descriptions/constant_table.h"
+#include "harness/descriptions/link_frame_tree.h"
 #include "harness/descriptions/mjcf_reader.h"
 #include "harness/engine/engine.h"
 
@@ -150,7 +151,9 @@ class Matching {
   }
 
   void IgnoreEfforts() {
-    for (RobotDescription* const robot : {&a_, &b_}) LeaveOutIgnored({"effort"}, robot);
+    for (RobotDescription* const robot : {&a_, &b_}) {
+      for (DescribedJoint& joint : robot->joints) joint.forces.reset();
+    }
     result_.not_compared.emplace_back("effort: ignored");
   }
 
@@ -202,19 +205,6 @@ bool Ignores(const std::string& word, const std::vector<std::string>& ignore) {
   return std::ranges::find(ignore, word) != ignore.end();
 }
 
-void LeaveOutIgnored(const std::vector<std::string>& ignore, RobotDescription* robot) {
-  for (size_t i = 0; i < robot->joints.size(); ++i) {
-    Joint& joint = robot->spec.joints[i];
-    for (const DescribedConstant& constant : ListDescribedConstants()) {
-      if (!Ignores(constant.word, ignore)) continue;
-      joint.*constant.value = 0.0;
-      robot->joints[i].*constant.states = false;
-    }
-    if (Ignores("coupling", ignore)) joint.coupling.reset();
-    if (Ignores("effort", ignore)) robot->joints[i].forces.reset();
-  }
-}
-
 Completion CompleteEachOther(RobotDescription* a, RobotDescription* b,
                              const std::vector<std::string>& ignore) {
   const std::vector<std::string> renamed = TakeJointNames(*a, b);
@@ -224,19 +214,37 @@ Completion CompleteEachOther(RobotDescription* a, RobotDescription* b,
 }
 
 Completion CompleteFromEngine(const mjModel& engine, const std::string& source, RobotDescription* robot,
-                              const std::vector<std::string>& ignore, bool is_table) {
-  RobotDescription other = is_table ? *robot : ReadMjcfDescription(engine, source);
-  if (is_table) {
-    other.spec.source = source;
-    for (Joint& joint : other.spec.joints) {
-      const int id = FindByName(engine, mjOBJ_JOINT, joint.name);
-      if (id < 0) continue;
-      const int dof = engine.jnt_dofadr[id];
-      for (const DescribedConstant& constant : ListDescribedConstants())
-        joint.*constant.value = (engine.*constant.engine)[dof];
+                              const std::vector<std::string>& ignore) {
+  RobotDescription other = ReadMjcfDescription(engine, source);
+  return CompleteEachOther(&other, robot, ignore);
+}
+
+Completion CompleteTable(const mjModel& engine, const std::string& source, RobotDescription* robot,
+                         const std::vector<std::string>& ignore) {
+  RobotDescription other = *robot;
+  other.spec.source = source;
+  for (Joint& joint : other.spec.joints) {
+    const int id = FindByName(engine, mjOBJ_JOINT, joint.name);
+    for (const DescribedConstant& constant : ListDescribedConstants()) {
+      if (id >= 0) joint.*constant.value = (engine.*constant.engine)[engine.jnt_dofadr[id]];
     }
   }
   return CompleteEachOther(&other, robot, ignore);
+}
+
+Completion CompletePair(const std::vector<std::string>& ignore, const RobotPart& part,
+                        std::array<RobotDescription, 2>* sides) {
+  auto& [first, second] = *sides;
+  std::vector<std::string> of_part;
+  int held = 0;
+  if (!part.empty()) of_part = TakePart(part, &first, &second, &held);
+  const bool is_named_by_second = second.format == RobotFormat::kMjcf && part.empty();
+  Completion completion =
+      CompleteEachOther(is_named_by_second ? &second : &first, is_named_by_second ? &first : &second, ignore);
+  completion.not_compared.insert(completion.not_compared.begin(), of_part.begin(), of_part.end());
+  completion.has_link_frames = AddLinkFrames(&first, &second);
+  completion.held = held;
+  return completion;
 }
 
 void TakeIgnored(const RobotSpec& robot, const std::vector<std::string>& ignore, mjModel* engine) {

@@ -1,3 +1,5 @@
+#include "harness/comparison/digit_judgement.h"
+
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -12,7 +14,6 @@
 #include "harness/base/worst.h"
 #include "harness/comparison/body_comparison.h"
 #include "harness/comparison/description_match.h"
-#include "harness/comparison/file_comparison.h"
 #include "harness/descriptions/link_frame_tree.h"
 
 namespace dexcheck {
@@ -188,11 +189,8 @@ class DigitJudge {
   void JudgeTerms(const TermComparison& comparison, std::vector<CheckRecord>* terms) {
     std::optional<size_t> too_loose;
     if (const std::optional<Excess>& loosest = comparison.loosest()) {
-      DigitExcess excess = {comparison.records()[loosest->term].name,
-                            WordsOf(loosest->where),
-                            {"", "", loosest->first, loosest->second},
-                            1.0};
-      excess.is_cause = true;
+      ConstantFinding excess = MakeExcess(comparison, *loosest);
+      excess.units = 1.0;
       if (IsTooLoose(std::move(excess), loosest->units)) too_loose = loosest->term;
     }
     for (size_t i = 0; i < comparison.records().size(); ++i) {
@@ -238,8 +236,8 @@ class DigitJudge {
     const double open = FindOpen(finding) + rounding * size;
     const double units = CalcUnits(finding, rounding * size);
     RaiseTo(units, &verdict_.units[finding.check]);
-    DigitExcess excess = {finding.check, finding.where, TakeNumbers(finding, model_), units};
-    excess.effect = finding.effect;
+    ConstantFinding excess = finding;
+    excess.units = units;
     excess.is_cause = true;
     if (units <= 1.0 + kTie) return !IsTooLoose(excess, open / size);
     verdict_.excesses.push_back(std::move(excess));
@@ -247,7 +245,7 @@ class DigitJudge {
   }
 
   /// Notes the precision of a number that agrees. A number with too coarse a precision does not agree.
-  bool IsTooLoose(DigitExcess excess, double fraction) {
+  bool IsTooLoose(ConstantFinding excess, double fraction) {
     if (fraction > verdict_.loosest.fraction)
       verdict_.loosest = {NameQuantity(excess.check) + " of " + excess.where, fraction};
     if (fraction <= precision_) return false;
@@ -256,21 +254,27 @@ class DigitJudge {
     return true;
   }
 
+  [[nodiscard]] ConstantFinding MakeExcess(const TermComparison& comparison, const Excess& entry) const {
+    ConstantFinding excess = {comparison.records()[entry.term].name,
+                              WordsOf(entry.where),
+                              entry.first,
+                              entry.second,
+                              entry.where,
+                              -1};
+    excess.units = entry.units;
+    excess.is_cause = IsCause(comparison.entry(entry.term).term);
+    return excess;
+  }
+
   void AddExcesses(const TermComparison& comparison, size_t term) {
     const CheckRecord& judged = comparison.records()[term];
     if (!IsCause(comparison.entry(term).term)) {
-      verdict_.excesses.push_back({judged.name,
-                                   WordsOf(judged.where),
-                                   {"", "", judged.model_value, judged.engine_value},
-                                   judged.worst});
+      const Excess worst{term, judged.where, judged.worst, judged.model_value, judged.engine_value};
+      verdict_.excesses.push_back(MakeExcess(comparison, worst));
       return;
     }
     for (const Excess& entry : comparison.excesses()) {
-      if (entry.term != term) continue;
-      DigitExcess excess = {
-          judged.name, WordsOf(entry.where), {"", "", entry.first, entry.second}, entry.units};
-      excess.is_cause = true;
-      verdict_.excesses.push_back(std::move(excess));
+      if (entry.term == term) verdict_.excesses.push_back(MakeExcess(comparison, entry));
     }
   }
 
@@ -283,17 +287,6 @@ class DigitJudge {
 };
 
 }  // namespace
-
-void CompletePair(const std::vector<std::string>& ignore, const RobotPart& part,
-                  std::array<RobotDescription, 2>* sides) {
-  auto& [first, second] = *sides;
-  int held = 0;
-  if (!part.empty()) TakePart(part, &first, &second, &held);
-  // Joints are called as in an MJCF, as the comparison calls them.
-  const bool is_named_by_second = second.format == RobotFormat::kMjcf && part.empty();
-  CompleteEachOther(is_named_by_second ? &second : &first, is_named_by_second ? &first : &second, ignore);
-  AddLinkFrames(&first, &second);
-}
 
 std::optional<DigitVerdict> JudgeByDigits(const std::array<const DescriptionFile*, 2>& files,
                                           const UrdfOptions& urdf, const ConsistencyOptions& options,
@@ -321,10 +314,10 @@ std::optional<DigitVerdict> JudgeByDigits(const std::array<const DescriptionFile
     judge.JudgeConstants(&result->constants);
     judge.JudgeBodies();
     judge.JudgeTerms(comparison, &result->terms);
-    if (std::ranges::none_of(verdict.excesses, &DigitExcess::is_cause)) {
-      for (DigitExcess& excess : verdict.excesses) excess.is_cause = true;
+    if (std::ranges::none_of(verdict.excesses, &ConstantFinding::is_cause)) {
+      for (ConstantFinding& excess : verdict.excesses) excess.is_cause = true;
     }
-    std::ranges::stable_sort(verdict.excesses, [](const DigitExcess& x, const DigitExcess& y) {
+    std::ranges::stable_sort(verdict.excesses, [](const ConstantFinding& x, const ConstantFinding& y) {
       return x.is_cause != y.is_cause ? x.is_cause : x.units > y.units;
     });
     return verdict;

@@ -15,6 +15,7 @@
 #include "harness/base/worst.h"
 #include "harness/comparison/description_match.h"
 #include "harness/comparison/engine_constants.h"
+#include "harness/comparison/engine_settings.h"
 #include "harness/descriptions/description_writer.h"
 #include "harness/descriptions/engine_provider.h"
 #include "harness/descriptions/mjcf_reader.h"

@@ -231,6 +231,51 @@ class ContactReader {
   EngineParts& list_;
 };
 
+/// An option that acts on no term at a given state.
+struct EngineOption {
+  const char* name;
+  std::vector<double> (*read)(const mjOption& option);
+  std::vector<const char*> words = {};  // of the values 0, 1, ...
+};
+
+template <auto kMember, int kCount = 1>
+std::vector<double> ReadOption(const mjOption& option) {
+  if constexpr (kCount == 1) {
+    return {static_cast<double>(option.*kMember)};
+  } else {
+    return {option.*kMember, option.*kMember + kCount};
+  }
+}
+
+const std::vector<EngineOption> kOptions = {
+    {"timestep", ReadOption<&mjOption::timestep>},
+    {"integrator", ReadOption<&mjOption::integrator>, {"Euler", "RK4", "implicit", "implicitfast"}},
+    {"cone", ReadOption<&mjOption::cone>, {"pyramidal", "elliptic"}},
+    {"impratio", ReadOption<&mjOption::impratio>},
+    {"solver", ReadOption<&mjOption::solver>, {"PGS", "CG", "Newton"}},
+    {"jacobian", ReadOption<&mjOption::jacobian>, {"dense", "sparse", "auto"}},
+    {"iterations", ReadOption<&mjOption::iterations>},
+    {"tolerance", ReadOption<&mjOption::tolerance>},
+    {"noslip_iterations", ReadOption<&mjOption::noslip_iterations>},
+    {"noslip_tolerance", ReadOption<&mjOption::noslip_tolerance>},
+    {"iterations of the collider",
+     [](const mjOption& option) {
+       return std::vector<double>{static_cast<double>(GetColliderIterations(option))};
+     }},
+    {"tolerance of the collider",
+     [](const mjOption& option) { return std::vector<double>{GetColliderTolerance(option)}; }},
+    {"wind", ReadOption<&mjOption::wind, 3>},
+    {"magnetic", ReadOption<&mjOption::magnetic, 3>},
+    {"o_margin", ReadOption<&mjOption::o_margin>},
+    {"o_solref", ReadOption<&mjOption::o_solref, mjNREF>},
+    {"o_solimp", ReadOption<&mjOption::o_solimp, mjNIMP>}};
+
+std::string Show(const EngineOption& option, const std::vector<double>& values) {
+  const auto word = static_cast<size_t>(values.front());
+  if (values.size() == 1 && word < option.words.size()) return option.words[word];
+  return fmt::format("{:g}", fmt::join(values, " "));
+}
+
 }  // namespace
 
 void AddContacts(const Adapter& adapter, EngineParts* list) { ContactReader(adapter, list).Run(); }
@@ -259,6 +304,18 @@ std::vector<std::string> CompareContacts(const std::vector<ConstantNote>& first,
     if (!differing.empty())
       lines.push_back(std::string(word) + ": shapes, places, friction or parameters differ at " +
                       Abbreviate(JoinNames(differing)));
+  }
+  return lines;
+}
+
+std::vector<std::string> CompareOptions(const mjOption& first, const mjOption& second,
+                                        const std::string& first_file, const std::string& second_file) {
+  std::vector<std::string> lines;
+  for (const EngineOption& option : kOptions) {
+    const auto own = option.read(first), other = option.read(second);
+    if (own != other)
+      lines.push_back(fmt::format("option {}: {} in {}, {} in {}", option.name, Show(option, own), first_file,
+                                  Show(option, other), second_file));
   }
   return lines;
 }

@@ -20,4 +20,8 @@ void AddContacts(const Adapter& adapter, EngineParts* list);
 std::vector<std::string> CompareContacts(const std::vector<ConstantNote>& first,
                                          const std::vector<ConstantNote>& second);
 
+/// Compares options that act on steps, contacts and solvers alone. @return a line on each that differs.
+std::vector<std::string> CompareOptions(const mjOption& first, const mjOption& second,
+                                        const std::string& first_file, const std::string& second_file);
+
 }  // namespace dexcheck

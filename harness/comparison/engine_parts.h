@@ -40,7 +40,7 @@ struct EnginePart {
   unsigned role = kRobotJoint;
 };
 
-/// What a list of parts leaves out, since it is compared otherwise.
+/// Parts that a list leaves out, since they are compared otherwise.
 struct PartOptions {
   bool leaves_out_motors = false;  ///< How motors make their forces: a URDF has no place for it.
   /// Couplings of joints (equality/joint) that the model has, too,
@@ -72,9 +72,5 @@ std::vector<std::string> LeaveOutShared(const std::vector<EnginePart>& first,
 std::vector<std::string> ListLoneMotors(const std::vector<EnginePart>& first,
                                         const std::vector<EnginePart>& second, const std::string& first_file,
                                         const std::string& second_file);
-
-/// Compares options that act on steps, contacts and solvers alone. @return a line on each that differs.
-std::vector<std::string> CompareOptions(const mjOption& first, const mjOption& second,
-                                        const std::string& first_file, const std::string& second_file);
 
 }  // namespace dexcheck

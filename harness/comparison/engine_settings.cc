@@ -1,7 +1,8 @@
+#include "harness/comparison/engine_settings.h"
+
 #include <utility>
 
 #include "controller/common/errors.h"
-#include "harness/comparison/engine_comparison.h"
 
 namespace dexcheck {
 namespace {

@@ -70,37 +70,43 @@ void CountRoundings(int imported, bool has_link_frames, std::vector<CheckRecord>
   }
 }
 
-/// Changes that bring a description and an engine's model together.
-struct EngineCompletion {
+bool IsMechanism(const RobotDescription& robot) {
+  const BaseType base = robot.spec.base.type;
+  return (base == BaseType::kFixed || base == BaseType::kFloating) && !robot.spec.object;
+}
+
+/// The robots of two files, brought to the same statements.
+struct FilePair {
+  RobotDescription first;
+  /// None where only the adapter finds the first robot in the second file's engine: a robot on wheels or with
+  /// an object, and a parameter file of another mechanism.
+  std::optional<RobotDescription> second;
   Completion completion;
-  bool has_link_frames = false;
-  bool states_all = false;  ///< A table whose constants were not completed.
 };
 
-/// Completes a description, and gives it frames of links and the inertias that the engine compiled. A robot
-/// on wheels, one with an object, and a parameter file of another mechanism are left to the adapter.
-EngineCompletion Complete(const ConsistencyOptions& options, const MjcfFile& mjcf, const mjModel& engine,
-                          bool is_table, Comparison* comparison, RobotDescription* robot) {
-  const std::string file = comparison->second.filename().string();
-  const BaseType base = robot->spec.base.type;
-  EngineCompletion result;
-  if ((base == BaseType::kFixed || base == BaseType::kFloating) && !robot->spec.object) {
-    RobotDescription completed = *robot;
+/// @param engine the second file's; null where it is compared as a description.
+FilePair Complete(const DescriptionFile& first, const DescriptionFile& second, const mjModel* engine,
+                  const ConsistencyOptions& options, Comparison* comparison) {
+  const std::string file = second.path().filename().string();
+  FilePair pair{first.Describe(), {}, {}};
+  if (engine == nullptr || IsMechanism(pair.first)) {
     try {
-      result.completion = CompleteFromEngine(engine, file, &completed, options.ignore);
-      RobotDescription compiled = ReadMjcfDescription(engine, file);
-      result.has_link_frames = AddLinkFrames(&completed, &compiled);
-      const std::optional<std::string> inertias = TakeCompiledInertias(mjcf, engine, &completed);
-      if (inertias) comparison->notes.push_back(*inertias);
-      *robot = std::move(completed);
-      return result;
+      std::array<RobotDescription, 2> sides = {
+          pair.first, engine == nullptr ? second.Describe() : ReadMjcfDescription(*engine, file)};
+      pair.completion = CompletePair(options.ignore, options.part, &sides);
+      if (engine != nullptr) {
+        const auto inertias = TakeCompiledInertias(second.document(), *engine, &sides[0]);
+        if (inertias) comparison->notes.push_back(*inertias);
+      }
+      pair.first = std::move(sides[0]);
+      pair.second = std::move(sides[1]);
+      return pair;
     } catch (const InputError&) {
-      if (!is_table) throw;
+      if (engine == nullptr || first.format() != RobotFormat::kToml) throw;
     }
   }
-  result.completion = CompleteFromEngine(engine, file, robot, options.ignore, is_table);
-  result.states_all = is_table;
-  return result;
+  pair.completion = CompleteTable(*engine, file, &pair.first, options.ignore);
+  return pair;
 }
 
 /// Notes joints whose actuatorfrcrange, a word of later engines, is not the limit that the other file states.
@@ -118,34 +124,28 @@ void NoteForceRanges(const DescriptionFile& file, const RobotDescription& other,
                                          JoinNames(names));
 }
 
-/// Compares motors, wheels and shapes, and names the changes that compilers of MJCFs made.
-/// @param robot the first description, with the second's names.
-void CompareBeside(const DescriptionFile& first, const RobotDescription& robot, const DescriptionFile& second,
-                   Comparison* comparison) {
+/// Compares motors and wheels with an engine's, and names the changes that compilers of MJCFs made.
+/// @param robots with the names of joints of the second.
+void CompareBesideEngine(const std::array<const DescriptionFile*, 2>& files,
+                         const std::array<const RobotDescription*, 2>& robots, Comparison* comparison) {
   ConstantChecks& constants = comparison->result.constants;
-  const RobotDescription& other = *comparison->read_second;
   const bool has_motors = std::ranges::any_of(
       constants.findings, [](const ConstantFinding& finding) { return finding.check == "motor_limit"; });
-  if (!has_motors) CheckMotorsAndWheels(robot, other, &constants);
-  AppendTo(&comparison->without_effect, CompareWithoutEffect(robot, other));
-  // Each shape of two MJCFs that can touch was compared.
-  if (first.format() != RobotFormat::kMjcf)
-    AppendTo(&comparison->without_effect, CompareShapes(robot, other));
+  if (!has_motors) CheckMotorsAndWheels(*robots[0], *robots[1], &constants);
   for (const size_t side : {0U, 1U}) {
-    const DescriptionFile& file = side == 0 ? first : second;
-    NoteForceRanges(file, side == 0 ? other : robot, comparison);
-    if (file.format() != RobotFormat::kMjcf) continue;
-    NameCompiledChanges(ListCompiledChanges(file.document(), *file.CopyEngine()), {&robot, &other}, side,
-                        &constants, &comparison->notes);
+    NoteForceRanges(*files[side], *robots[1 - side], comparison);
+    if (files[side]->format() != RobotFormat::kMjcf) continue;
+    NameCompiledChanges(ListCompiledChanges(files[side]->document(), *files[side]->CopyEngine()), robots,
+                        side, &constants, &comparison->notes);
   }
 }
 
 /// Lists the parts that the first of two MJCFs has besides its mechanism, notes what else the two have, and
 /// takes parts that both have out of the second one.
-std::vector<EnginePart> ListFirstParts(const DescriptionFile& first, const RobotDescription& written,
-                                       const EngineParts& parts, mjModel* engine, Comparison* comparison) {
+std::vector<EnginePart> ListFirstParts(const DescriptionFile& first, const EngineParts& parts,
+                                       mjModel* engine, Comparison* comparison) {
   const MjModelPtr own_engine = first.CopyEngine();
-  const RobotModel model(written.spec);
+  const RobotModel model(first.Describe().spec);
   EngineParts own = ListEngineParts(Adapter(model, *own_engine, first.path().string()), {false, true});
   const std::string file = first.path().filename(), other = comparison->second.filename();
   comparison->without_effect = CompareOptions(own_engine->opt, engine->opt, file, other);
@@ -155,128 +155,73 @@ std::vector<EnginePart> ListFirstParts(const DescriptionFile& first, const Robot
   return std::move(own.parts);
 }
 
-/// Compares a description with the engine.
-void CompareWithEngine(const DescriptionFile& first, const DescriptionFile& second, const UrdfOptions& urdf,
-                       const ConsistencyOptions& options, const Progress& progress, Comparison* comparison) {
+/// Compares a description's constants with those of an engine's model, and takes out of it what both have.
+ConstantChecks CompareEngineConstants(const DescriptionFile& first, const FilePair& pair,
+                                      const ConsistencyOptions& options, const Adapter& adapter,
+                                      mjModel* engine, Comparison* comparison) {
   const std::string file = comparison->second.filename().string();
-  const RobotDescription written = first.Describe();
-  RobotDescription robot = written;
-  const MjModelPtr engine = second.CopyEngine();
-  const RobotFormat format = first.format();
-  const EngineCompletion completed =
-      Complete(options, second.document(), *engine, format == RobotFormat::kToml, comparison, &robot);
-  const Completion& completion = completed.completion;
-  comparison->model.emplace(robot.spec);
-  const Adapter adapter(*comparison->model, *engine, comparison->second.string());
-  const EngineParts parts =
-      ListEngineParts(adapter, {format == RobotFormat::kUrdf, true, Ignores("coupling", options.ignore)});
+  const EngineParts parts = ListEngineParts(
+      adapter, {first.format() == RobotFormat::kUrdf, true, Ignores("coupling", options.ignore)});
   if (!parts.motors.empty())
     comparison->not_compared.push_back("motors: only " + file +
                                        " says how they make their forces (servos, muscles, transmissions, "
                                        "gears): " +
                                        JoinNames(parts.motors));
-  FirstFile stated{true, completed.states_all ? nullptr : &robot, options.ignore, file};
-  if (format == RobotFormat::kMjcf)
-    stated.parts = ListFirstParts(first, written, parts, engine.get(), comparison);
-  comparison->result = CompareTermsWithEngine(adapter, options, progress);
-  CountRoundings(robot.is_imported ? 1 : 0, completed.has_link_frames, &comparison->result.terms);
-  ConstantChecks& constants = comparison->result.constants;
-  constants = CheckConstants(adapter, parts, stated);
+  FirstFile stated{true, pair.second ? &pair.first : nullptr, options.ignore, file};
+  if (first.format() == RobotFormat::kMjcf) stated.parts = ListFirstParts(first, parts, engine, comparison);
+  ConstantChecks constants = CheckConstants(adapter, parts, stated);
   AppendTo(&comparison->not_compared, constants.not_compared);
-  if (comparison->read_second) CompareBeside(first, robot, second, comparison);
-  // The notes of an MJCF concern quantities that CompareParts compares.
-  if (format != RobotFormat::kMjcf) AppendTo(&comparison->notes, robot.notes);
-  AppendTo(&comparison->not_compared, completion.not_compared);
-  AppendTo(&comparison->notes, completion.notes);
-  NoteOthers(adapter, comparison);
-  AnalyticProvider model(adapter.model(), "model", options.make_view, options.object);
-  EngineProvider of_engine(adapter, "engine");
-  comparison->digits = JudgeByDigits({&first, &second}, urdf, options, &model, &of_engine, *comparison->model,
-                                     {}, &comparison->result);
+  return constants;
 }
 
-/// Compares two descriptions without the engine.
-void CompareTwoDescriptions(const DescriptionFile& first, const DescriptionFile& second,
-                            const UrdfOptions& urdf, const ConsistencyOptions& options,
-                            const Progress& progress, Comparison* comparison) {
-  const RobotPart& part = options.part;
-  RobotDescription a = first.Describe();
-  RobotDescription b = second.Describe();
-  int held = 0;
-  if (!part.empty()) {
-    AppendTo(&comparison->not_compared, TakePart(part, &a, &b, &held));
-    comparison->read_first = a;
-    comparison->read_second = b;
+/// Compares constants and terms. The second file's are the engine's where it has one.
+void CompareTwo(const DescriptionFile& first, const DescriptionFile& second, const UrdfOptions& urdf,
+                const ConsistencyOptions& options, const Progress& progress, Comparison* comparison) {
+  const MjModelPtr engine = comparison->with_engine ? second.CopyEngine() : nullptr;
+  const FilePair pair = Complete(first, second, engine.get(), options, comparison);
+  const RobotDescription& robot = pair.first;
+  const Completion& completion = pair.completion;
+  const RobotModel& model = comparison->model.emplace(robot.spec);
+  AnalyticProvider of_first(model, robot.spec.source, options.make_view, options.object);
+  std::optional<Adapter> adapter;
+  std::optional<RobotModel> other_model;
+  std::unique_ptr<DynamicsProvider> of_second;
+  ConstantChecks constants;
+  if (engine) {
+    adapter.emplace(model, *engine, second.path().string());
+    constants = CompareEngineConstants(first, pair, options, *adapter, engine.get(), comparison);
+    of_second = std::make_unique<EngineProvider>(*adapter, "engine");
+  } else {
+    constants = CheckConstants(robot, *pair.second);
+    other_model.emplace(pair.second->spec);
+    of_second = std::make_unique<AnalyticProvider>(*other_model, pair.second->spec.source, model);
   }
-  const Completion completion = CompleteEachOther(&a, &b, options.ignore);
-  for (const auto& notes : {a.notes, b.notes, completion.notes}) {
-    AppendTo(&comparison->notes, notes);
-  }
-  AppendTo(&comparison->not_compared, completion.not_compared);
-  const bool has_link_frames = AddLinkFrames(&a, &b);
-  comparison->model.emplace(a.spec);
-  comparison->result = CompareDescriptions(a, b, options, progress);
+  comparison->result = CompareTerms(model, &of_first, of_second.get(), options, progress);
+  comparison->result.constants = std::move(constants);
   // A held joint is a step of its chain that the model no longer has.
-  CountRoundings((a.is_imported ? 1 : 0) + (b.is_imported ? 1 : 0), has_link_frames,
-                 &comparison->result.terms, held);
-  AppendTo(&comparison->without_effect, CompareWithoutEffect(a, b));
-  AppendTo(&comparison->without_effect, CompareShapes(a, b));
-  const RobotModel other(b.spec);
-  AnalyticProvider of_a(*comparison->model, a.spec.source);
-  AnalyticProvider of_b(other, b.spec.source, *comparison->model);
-  comparison->digits = JudgeByDigits({&first, &second}, urdf, options, &of_a, &of_b, *comparison->model, part,
-                                     &comparison->result);
-}
-
-/// Compares a part of two robots. An MJCF's terms are the analytic model's with MuJoCo's numbers.
-void ComparePart(const DescriptionFile& first, const DescriptionFile& second, const UrdfOptions& urdf,
-                 const ConsistencyOptions& options, const Progress& progress, Comparison* comparison) {
-  comparison->with_engine = false;
-  if (second.format() == RobotFormat::kMjcf)
-    comparison->notes.push_back("part of a robot: the terms of " + second.path().filename().string() +
-                                " are those of what MuJoCo compiled, by the analytic model; what an MJCF has "
-                                "besides the mechanism is not compared");
-  CompareTwoDescriptions(first, second, urdf, options, progress, comparison);
-}
-
-/// A description whose terms stand first: the analytic model's, or of an MJCF the engine's.
-struct Reference {
-  Reference(const DescriptionFile& file, Comparison* comparison) : robot(file.Describe()) {
-    comparison->first = file.path();
-    comparison->notes = robot.notes;
-    comparison->model.emplace(robot.spec);
-    if (file.format() == RobotFormat::kMjcf) {
-      provider =
-          std::make_unique<EngineProvider>(robot.spec, file.CopyEngine(), file.path().string(), "MuJoCo");
-    } else {
-      provider = std::make_unique<AnalyticProvider>(*comparison->model, file.path().filename().string());
-    }
+  const int imported = (robot.is_imported ? 1 : 0) + (pair.second && pair.second->is_imported ? 1 : 0);
+  CountRoundings(imported, completion.has_link_frames, &comparison->result.terms, completion.held);
+  // Each shape of two MJCFs that can touch was compared, and what the notes of one concern.
+  const bool is_whole = engine && first.format() == RobotFormat::kMjcf;
+  const std::optional<RobotDescription>& other = engine ? comparison->read_second : pair.second;
+  if (other) {
+    AppendTo(&comparison->without_effect, CompareWithoutEffect(robot, *other));
+    if (!is_whole) AppendTo(&comparison->without_effect, CompareShapes(robot, *other));
+    if (engine) CompareBesideEngine({&first, &second}, {&robot, &*other}, comparison);
   }
-  RobotDescription robot;
-  std::unique_ptr<DynamicsProvider> provider;
-};
-
-/// Notes the convention of the base where the other side chose it.
-void NoteConvention(const Reference& reference, LayoutProvider* provider,
-                    const std::function<StateFeed()>& make_feed, Comparison* comparison) {
-  if (!provider->layout().is_floating()) return;
-  comparison->notes.push_back("the other side's base is taken as " +
-                              Describe(provider->layout().convention()));
-  if (comparison->result.Agrees()) return;
-  const std::optional<BaseConvention> other =
-      FindOtherConvention(*comparison->model, reference.provider.get(), provider, make_feed);
-  if (!other) return;
-  comparison->notes.push_back("all its terms agree with its base taken as " + Describe(*other) +
-                              ": this is its convention, and its key \"base\" can say so");
+  if (!is_whole) AppendTo(&comparison->notes, robot.notes);
+  if (!engine) AppendTo(&comparison->notes, pair.second->notes);
+  AppendTo(&comparison->notes, completion.notes);
+  AppendTo(&comparison->not_compared, completion.not_compared);
+  if (adapter) NoteOthers(*adapter, comparison);
+  comparison->digits = JudgeByDigits({&first, &second}, urdf, options, &of_first, of_second.get(), model,
+                                     options.part, &comparison->result);
 }
 
 /// The causes of the differences between two mechanisms.
 std::optional<FileCauses> TryToExplain(const DescriptionFile& a, const DescriptionFile& b,
                                        const ConsistencyOptions& options, const Comparison& comparison) {
-  const auto is_mechanism = [](const std::optional<RobotDescription>& robot) {
-    return robot && !robot->spec.object &&
-           (robot->spec.base.type == BaseType::kFixed || robot->spec.base.type == BaseType::kFloating);
-  };
+  const auto is_mechanism = [](const auto& robot) { return robot && IsMechanism(*robot); };
   const bool has_bodies = a.format() == RobotFormat::kBodies || b.format() == RobotFormat::kBodies;
   if (has_bodies || !options.part.empty() || !is_mechanism(comparison.read_first) ||
       !is_mechanism(comparison.read_second))
@@ -360,17 +305,16 @@ Comparison CompareFiles(DescriptionFile* a, DescriptionFile* b, const UrdfOption
   Comparison comparison;
   comparison.first = first.path();
   comparison.second = second.path();
-  comparison.with_engine = second.format() == RobotFormat::kMjcf;
+  const bool is_mjcf = second.format() == RobotFormat::kMjcf;
+  comparison.with_engine = is_mjcf && options.part.empty();
+  if (is_mjcf && !comparison.with_engine)
+    comparison.notes.push_back("part of a robot: the terms of " + second.path().filename().string() +
+                               " are those of what MuJoCo compiled, by the analytic model; what an MJCF has "
+                               "besides the mechanism is not compared");
   comparison.read_first = first.TryToDescribe();
   comparison.read_second = second.TryToDescribe();
   try {
-    if (!options.part.empty()) {
-      ComparePart(first, second, urdf, options, progress, &comparison);
-    } else if (comparison.with_engine) {
-      CompareWithEngine(first, second, urdf, options, progress, &comparison);
-    } else {
-      CompareTwoDescriptions(first, second, urdf, options, progress, &comparison);
-    }
+    CompareTwo(first, second, urdf, options, progress, &comparison);
   } catch (const InputError& error) {
     if (!comparison.read_first || !comparison.read_second || !options.part.empty()) throw;
     // Names that were exchanged, a joint that one file lacks and a joint of another type make another
@@ -398,53 +342,6 @@ double CalcTolerance(const ConsistencyResult& result) {
   if (worst == 0.0) return 0.0;
   const double unit = std::pow(10.0, std::floor(std::log10(kOtherRates * worst)));
   return std::ceil(kOtherRates * worst / unit) * unit;
-}
-
-Comparison CompareResults(const std::filesystem::path& file, const ResultsSource& source,
-                          const UrdfOptions& urdf, const ConsistencyOptions& options,
-                          const Progress& progress) {
-  Comparison comparison;
-  const Reference reference(DescriptionFile(file, urdf), &comparison);
-  std::unique_ptr<LayoutProvider> provider;
-  std::function<StateFeed()> make_feed = [&] { return FeedRandomStates(*comparison.model, options); };
-  if (source.results.empty()) {
-    comparison.second = "the program";
-    provider = std::make_unique<ProgramProvider>(source.program, reference.robot, source.program_options);
-  } else {
-    comparison.second = source.results;
-    auto results = std::make_unique<ResultFiles>(source.results, reference.robot);
-    make_feed = [&read = *results] {
-      return [&read](DynamicsState* state) { return read.ReadState(state); };
-    };
-    provider = std::move(results);
-  }
-  AppendTo(&comparison.notes, DescribeCoordinates(reference.robot));
-  comparison.result =
-      CompareProviders(*comparison.model, reference.provider.get(), provider.get(), make_feed(), progress);
-  if (!comparison.result.not_compared.empty())
-    comparison.not_compared.push_back("terms without results: " + JoinNames(comparison.result.not_compared));
-  if (provider->is_reduced()) {
-    comparison.notes.push_back(
-        "joints that follow others have no coordinate there: compared are T^T M T and T^T of the "
-        "forces, with xi = T xi_free");
-  }
-  NoteConvention(reference, provider.get(), make_feed, &comparison);
-  return comparison;
-}
-
-Comparison CompareFunctions(const std::filesystem::path& file, const TermFunctions& functions,
-                            const UrdfOptions& urdf, const ConsistencyOptions& options) {
-  if (!functions.M && !functions.c && !functions.g && !functions.h && !functions.friction) {
-    throw InputError(functions.name + ": must have one of M, c, g, h, friction");
-  }
-  Comparison comparison;
-  const Reference reference(DescriptionFile(file, urdf), &comparison);
-  comparison.second = functions.name;
-  FunctionProvider provider(functions, comparison.model->num_velocities());
-  comparison.result =
-      CompareProviders(*comparison.model, reference.provider.get(), &provider,
-                       FeedRandomStates(*comparison.model, options), [](long) { return true; });
-  return comparison;
 }
 
 }  // namespace dexcheck

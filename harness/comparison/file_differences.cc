@@ -1,3 +1,5 @@
+#include "harness/comparison/file_differences.h"
+
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -8,7 +10,6 @@
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
 #include "harness/base/worst.h"
-#include "harness/comparison/file_comparison.h"
 
 namespace dexcheck {
 
@@ -16,9 +17,25 @@ namespace {
 
 constexpr double kExact = 1e9;  // times the printed precision, which is rounding then
 
+/// Returns "Ixx: 0.0002 kg m^2 in a.urdf, 0.0001 kg m^2 in b.urdf".
+std::string DescribeNumbers(const ConstantFinding& finding, const Comparison& comparison) {
+  const std::string component = NameComponent(finding);
+  const std::string name = UnitOf(finding, *comparison.model);
+  const std::string unit = name.empty() ? "" : " " + name;
+  return fmt::format("{}{}{:.12g}{} in {}, {:.12g}{} in {}", component, component.empty() ? "" : ": ",
+                     finding.model, unit, comparison.first.filename().string(), finding.engine, unit,
+                     comparison.second.filename().string());
+}
+
+/// Returns the check, the place and the numbers of a finding, and its effect.
+std::string DescribeFinding(const ConstantFinding& finding, const Comparison& comparison) {
+  return fmt::format("{}: {}: {}{}{}", finding.check, finding.where, DescribeNumbers(finding, comparison),
+                     finding.effect.empty() ? "" : "; ", finding.effect);
+}
+
 /// The values of a number that differs, and by how much.
-std::string DescribeValues(const DigitExcess& excess, const std::string& first, const std::string& second) {
-  const std::string text = DescribeNumbers(excess.numbers, first, second);
+std::string DescribeValues(const ConstantFinding& excess, const Comparison& comparison) {
+  const std::string text = DescribeNumbers(excess, comparison);
   if (!excess.effect.empty()) return text + "; " + excess.effect;
   if (excess.too_loose > 0.0)
     return text + fmt::format("; the printed digits give it to {:.2g} % only", 100.0 * excess.too_loose);
@@ -26,21 +43,20 @@ std::string DescribeValues(const DigitExcess& excess, const std::string& first, 
   return text + fmt::format("; {:.3g} times the printed precision", excess.units);
 }
 
-}  // namespace
-
-Differences ListExcesses(const DigitVerdict& verdict, const std::string& first, const std::string& second) {
+/// Lists the numbers that exceed the printed precision, the worst first.
+Differences ListExcesses(const Comparison& comparison) {
   Differences differences;
   std::vector<std::string>& lines = differences.real;
   std::vector<std::string> following;
   std::map<std::string, std::pair<size_t, int>> repeated;  // its line, and at how many more places it is
   double most = 0.0;
-  for (const DigitExcess& excess : verdict.excesses) {
+  for (const ConstantFinding& excess : comparison.digits->excesses) {
     if (!excess.is_cause) {
       if (std::ranges::find(following, excess.check) == following.end()) following.push_back(excess.check);
       most = Worst(most, excess.units);
       continue;
     }
-    const std::string values = DescribeValues(excess, first, second);
+    const std::string values = DescribeValues(excess, comparison);
     // One line stands for all joints with the same two numbers, or with a constant that one file leaves out:
     // the worst. They are one fault of many joints.
     const bool is_left_out = excess.effect.find(" states it") != std::string::npos;
@@ -60,27 +76,13 @@ Differences ListExcesses(const DigitVerdict& verdict, const std::string& first, 
   return differences;
 }
 
-std::string DescribeNumbers(const NumberPair& numbers, const std::string& first, const std::string& second) {
-  const std::string unit = numbers.unit.empty() ? "" : " " + numbers.unit;
-  return fmt::format("{}{}{:.12g}{} in {}, {:.12g}{} in {}", numbers.component,
-                     numbers.component.empty() ? "" : ": ", numbers.first, unit, first, numbers.second, unit,
-                     second);
-}
-
-NumberPair TakeNumbers(const ConstantFinding& finding, const RobotModel& model) {
-  const bool is_prismatic = finding.location.kind == Location::Kind::kJoint &&
-                            model.joint(finding.location.first).type == JointType::kPrismatic;
-  return {NameComponent(finding.check, finding.entry), UnitOf(finding.check, is_prismatic), finding.model,
-          finding.engine};
-}
+}  // namespace
 
 Differences SortDifferences(const Comparison& comparison) {
   const RobotModel& model = *comparison.model;
   const int base = model.num_base_velocities();
-  const std::string first = comparison.first.filename().string();
-  const std::string second = comparison.second.filename().string();
   const std::vector<CheckRecord>& checks = comparison.result.constants.records;
-  if (comparison.digits) return ListExcesses(*comparison.digits, first, second);
+  if (comparison.digits) return ListExcesses(comparison);
   Differences differences;
   const auto add = [&](double error, std::string line) {
     const int digits = CountDigits(error);
@@ -88,26 +90,23 @@ Differences SortDifferences(const Comparison& comparison) {
     if (is_rounded) differences.digits = std::min(differences.digits, digits);
     (is_rounded ? differences.rounded : differences.real).push_back(std::move(line));
   };
-  const auto add_number = [&](double error, const ConstantFinding& finding) {
-    add(error, fmt::format("{}: {}: {}{}{}", finding.check, finding.where,
-                           DescribeNumbers(TakeNumbers(finding, model), first, second),
-                           finding.effect.empty() ? "" : "; ", finding.effect));
-  };
   for (const ConstantFinding& finding : comparison.result.constants.findings) {
     // The scale of a check may differ from the larger of the two numbers, where zero is a valid value.
     const double size = Worst(std::abs(finding.model), std::abs(finding.engine));
     const auto check = std::ranges::find(checks, finding.check, &CheckRecord::name);
     const double worst = check == checks.end() ? 1.0 : check->worst;
-    add_number(std::min(std::abs(finding.model - finding.engine) / size, worst), finding);
+    add(std::min(std::abs(finding.model - finding.engine) / size, worst),
+        DescribeFinding(finding, comparison));
   }
   for (const CheckRecord& record : comparison.result.terms) {
     if (!record.failed) continue;
     add(record.worst,
-        fmt::format("{}: nearest the base: {}; worst: {}: {:.12g} in {}, {:.12g} in {} (sample {})",
-                    record.name, Describe(record.first_failure, model, base),
-                    Describe(record.where, model, base), record.model_value,
-                    comparison.with_engine ? "the model" : first, record.engine_value,
-                    comparison.with_engine ? "MuJoCo" : second, static_cast<long>(record.at)));
+        fmt::format(
+            "{}: nearest the base: {}; worst: {}: {:.12g} in {}, {:.12g} in {} (sample {})", record.name,
+            Describe(record.first_failure, model, base), Describe(record.where, model, base),
+            record.model_value, comparison.with_engine ? "the model" : comparison.first.filename().string(),
+            record.engine_value, comparison.with_engine ? "MuJoCo" : comparison.second.filename().string(),
+            static_cast<long>(record.at)));
   }
   return differences;
 }
@@ -118,13 +117,8 @@ std::vector<std::string> ListOtherDifferences(const Comparison& comparison) {
     return comparison.causes && IsExplained(check, *comparison.causes);
   };
   const RobotModel& model = *comparison.model;
-  const std::string first = comparison.first.filename().string();
-  const std::string second = comparison.second.filename().string();
   for (const ConstantFinding& finding : comparison.result.constants.findings) {
-    if (is_explained(finding.check)) continue;
-    lines.push_back(fmt::format("{}: {}: {}{}{}", finding.check, finding.where,
-                                DescribeNumbers(TakeNumbers(finding, model), first, second),
-                                finding.effect.empty() ? "" : "; ", finding.effect));
+    if (!is_explained(finding.check)) lines.push_back(DescribeFinding(finding, comparison));
   }
   for (const CheckRecord& record : comparison.result.terms) {
     constexpr const char* kOfNumbers[] = {"joint_axis", "frame_pose", "link_com", "link_inertia"};

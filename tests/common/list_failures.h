@@ -36,6 +36,16 @@ inline std::string CompareWithEngine(const RobotDescription& robot, const mjMode
   return ListFailures(result);
 }
 
+/// Compares two descriptions as CompleteEachOther left them, at random states.
+inline ConsistencyResult CompareDescriptions(const RobotDescription& a, const RobotDescription& b,
+                                             const ConsistencyOptions& options) {
+  const RobotModel model_a(a.spec), model_b(b.spec);
+  AnalyticProvider first(model_a, a.spec.source), second(model_b, b.spec.source, model_a);
+  ConsistencyResult result = CompareTerms(model_a, &first, &second, options, [](long) { return true; });
+  result.constants = CheckConstants(a, b);
+  return result;
+}
+
 /// A parameter file's text as a description, without its parts.
 inline RobotDescription ReadTable(const std::string& text, const std::string& source = "robot.toml") {
   RobotDescription table;

@@ -5,7 +5,7 @@
 
 #include <gmock/gmock.h>
 
-#include "harness/comparison/file_comparison.h"
+#include "harness/comparison/file_differences.h"
 #include "tests/common/files.h"
 #include "tests/common/matchers.h"
 

@@ -7,7 +7,7 @@
 
 #include <cstdlib>
 
-#include "harness/comparison/file_comparison.h"
+#include "harness/comparison/file_differences.h"
 #include "tests/harness/corrections/drawn_faults.h"
 
 namespace dexcheck::testing::file_verdicts_test {

@@ -25,7 +25,7 @@ std::string ListFailures(RobotDescription a, RobotDescription b, long samples = 
   CompleteEachOther(&a, &b);
   ConsistencyOptions options;
   options.samples = samples;
-  return testing::ListFailures(CompareDescriptions(a, b, options, [](long) { return true; }));
+  return testing::ListFailures(CompareDescriptions(a, b, options));
 }
 
 RobotDescription ReadPandaTable() { return ReadDescription(SourcePath("/controller/parameters/panda.toml")); }

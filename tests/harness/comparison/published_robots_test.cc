@@ -6,7 +6,7 @@
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 
-#include "harness/comparison/file_comparison.h"
+#include "harness/comparison/file_differences.h"
 #include "harness/descriptions/description_writer.h"
 #include "harness/descriptions/read_description.h"
 #include "tests/common/files.h"

@@ -12,7 +12,7 @@
 #include "harness/comparison/consistency.h"
 #include "harness/comparison/description_match.h"
 #include "harness/comparison/engine_constants.h"
-#include "harness/comparison/file_comparison.h"
+#include "harness/comparison/file_differences.h"
 #include "harness/descriptions/description_writer.h"
 #include "harness/descriptions/mjcf_reader.h"
 #include "harness/descriptions/read_description.h"
