@@ -95,16 +95,6 @@ int CountDigits(double error) {
   return 0;
 }
 
-int CountDigits(const ConsistencyResult& result) {
-  int digits = kMostDigits;
-  for (const std::vector<CheckRecord>* records : {&result.constants.records, &result.terms}) {
-    for (const CheckRecord& record : *records) {
-      if (record.failed) digits = std::min(digits, CountDigits(record.worst));
-    }
-  }
-  return digits;
-}
-
 void JudgeByTolerance(double tolerance, ConsistencyResult* result) {
   JudgeByTolerance(tolerance, &result->constants);
   JudgeByTolerance(tolerance, &result->terms);

@@ -36,8 +36,8 @@ class Matching {
     TakeNames();
     for (const DescribedConstant& constant : ListDescribedConstants())
       Ignores(constant.word, ignore_) ? Ignore(constant) : Take(constant);
-    if (Ignores("coupling", ignore_)) IgnoreCouplings();
-    if (Ignores("effort", ignore_)) IgnoreEfforts();
+    IgnoreAll("coupling", [](Joint* joint, DescribedJoint*) { joint->coupling.reset(); });
+    IgnoreAll("effort", [](Joint*, DescribedJoint* joint) { joint->forces.reset(); });
     TakeRanges();
     DropFrames();
     return std::move(result_);
@@ -143,18 +143,14 @@ class Matching {
                                                         "; terms are with that of " + FileName(a_.spec)));
   }
 
-  void IgnoreCouplings() {
+  /// @param forget takes what the word means out of a joint.
+  template <typename Forget>
+  void IgnoreAll(const std::string& word, const Forget& forget) {
+    if (!Ignores(word, ignore_)) return;
     for (RobotDescription* const robot : {&a_, &b_}) {
-      for (Joint& joint : robot->spec.joints) joint.coupling.reset();
+      for (size_t i = 0; i < robot->joints.size(); ++i) forget(&robot->spec.joints[i], &robot->joints[i]);
     }
-    result_.not_compared.emplace_back("coupling: ignored");
-  }
-
-  void IgnoreEfforts() {
-    for (RobotDescription* const robot : {&a_, &b_}) {
-      for (DescribedJoint& joint : robot->joints) joint.forces.reset();
-    }
-    result_.not_compared.emplace_back("effort: ignored");
+    result_.not_compared.push_back(word + ": ignored");
   }
 
   void TakeRanges() {

@@ -158,7 +158,6 @@ class DigitJudge {
       if (!record.failed) continue;
       record.failed = std::ranges::any_of(
           constants->findings, [&](const ConstantFinding& finding) { return finding.check == record.name; });
-      if (!record.failed) RaiseTo(record.worst, &verdict_.largest_within);
     }
   }
 
@@ -199,10 +198,7 @@ class DigitJudge {
       if (record == terms->end() || !record->failed) continue;
       RaiseTo(judged.worst, &verdict_.units[record->name]);
       record->failed = judged.failed || failed_bodies_.contains(record->name) || too_loose == i;
-      if (!judged.failed) {
-        RaiseTo(record->worst, &verdict_.largest_within);
-        continue;
-      }
+      if (!judged.failed) continue;
       record->where = judged.where;
       record->first_failure = judged.first_failure;
       record->part = judged.part;

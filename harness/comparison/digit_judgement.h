@@ -27,7 +27,6 @@ struct DigitVerdict {
   std::map<std::string, double>
       units;  ///< Worst excess of each check that does not agree to rounding, in units of its precision.
   std::vector<ConstantFinding> excesses;  ///< Numbers and terms; causes first, the worst first.
-  double largest_within = 0.0;  ///< Largest error that the printed precision explains, relative to its scale.
   LoosestNumber loosest;
 };
 

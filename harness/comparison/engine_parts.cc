@@ -48,22 +48,15 @@ std::array<PartNumber, 5> ReadMotor(const mjModel& m, int i) {
 }
 
 std::vector<std::string> ListTargets(const mjModel& m, int actuator) {
-  const int* const targets = m.actuator_trnid + 2 * actuator;
-  switch (m.actuator_trntype[actuator]) {
-    case mjTRN_JOINT:
-    case mjTRN_JOINTINPARENT:
-      return {NameOf(m, mjOBJ_JOINT, targets[0])};
-    case mjTRN_TENDON:
-      return {NameOf(m, mjOBJ_TENDON, targets[0])};
-    case mjTRN_SLIDERCRANK:
-      return {NameOf(m, mjOBJ_SITE, targets[0]), NameOf(m, mjOBJ_SITE, targets[1])};
-    case mjTRN_SITE:
-      return {NameOf(m, mjOBJ_SITE, targets[0])};
-    case mjTRN_BODY:
-      return {NameOf(m, mjOBJ_BODY, targets[0])};
-    default:
-      return {};
-  }
+  static const std::map<int, mjtObj> kTypes = {
+      {mjTRN_JOINT, mjOBJ_JOINT},   {mjTRN_JOINTINPARENT, mjOBJ_JOINT}, {mjTRN_SLIDERCRANK, mjOBJ_SITE},
+      {mjTRN_TENDON, mjOBJ_TENDON}, {mjTRN_SITE, mjOBJ_SITE},           {mjTRN_BODY, mjOBJ_BODY}};
+  const int transmission = m.actuator_trntype[actuator];
+  const auto type = kTypes.find(transmission);
+  std::vector<std::string> names;
+  for (int k = 0; type != kTypes.end() && k < (transmission == mjTRN_SLIDERCRANK ? 2 : 1); ++k)
+    names.push_back(NameOf(m, type->second, m.actuator_trnid[2 * actuator + k]));
+  return names;
 }
 
 std::vector<std::string> ListTied(const mjModel& m, int constraint) {

@@ -19,6 +19,12 @@ constexpr const char* kScalars[][2] = {
 constexpr const char* kSlideUnits[] = {"N s/m", "N", "kg", "N", "m/s", "N/m", "m", ""};
 static_assert(std::size(kScalars) == kNumJointScalars);
 
+/// A number of a link or of the joint that moves it, as its file prints it.
+struct NamedNumber {
+  std::string quantity;  ///< "mass", "centre of mass x", "position z", "upper limit".
+  std::string unit;      ///< Empty of a pure number.
+  double value = 0.0;
+};
 void AddOrigin(const std::string& of, const char* position, const PrintedOrigin& origin,
                std::vector<NamedNumber>* numbers) {
   if (origin.form == RotationForm::kMdh) {
@@ -39,6 +45,46 @@ void AddOrigin(const std::string& of, const char* position, const PrintedOrigin&
     if (origin.form == RotationForm::kEuler)
       numbers->push_back({fmt::format("{}euler {}", of, k + 1), "rad", origin.r[k]});
   }
+}
+
+/// Lists all numbers that a link states; a rotation's are those of the file's own form.
+std::vector<NamedNumber> NameNumbers(const PrintedLink& link) {
+  std::vector<NamedNumber> numbers;
+  const PrintedJoint& joint = link.joint;
+  const bool is_slide = joint.kind == JointKind::kSlide;
+  AddOrigin("", "position", link.origin, &numbers);
+  for (int k = 0; k < 3 && joint.kind != JointKind::kFixed; ++k)
+    numbers.push_back({fmt::format("axis {}", "xyz"[k]), "", joint.axis[k]});
+  for (int k = 0; k < 3; ++k) {
+    if (!joint.anchor.isZero())
+      numbers.push_back({fmt::format("point of the axis {}", "xyz"[k]), "m", joint.anchor[k]});
+  }
+  for (const size_t k : {0U, 1U}) {
+    if (joint.range)
+      numbers.push_back(
+          {k == 0 ? "lower limit" : "upper limit", is_slide ? "m" : "rad", (*joint.range)[k].value});
+  }
+  for (size_t k = 0; k < kNumJointScalars; ++k) {
+    if (joint.scalars[k])
+      numbers.push_back(
+          {kScalars[k][0], is_slide ? kSlideUnits[k] : kScalars[k][1], joint.scalars[k]->value});
+  }
+  if (joint.mimic) {
+    numbers.push_back({"mimic multiplier", "", joint.mimic->multiplier.value});
+    numbers.push_back({"mimic offset", is_slide ? "m" : "rad", joint.mimic->offset.value});
+  }
+  if (!link.inertial) return numbers;
+  numbers.push_back({"mass", "kg", link.inertial->mass.value});
+  AddOrigin("inertial ", "centre of mass", link.inertial->origin, &numbers);
+  for (int k = 0; k < 6; ++k)
+    numbers.push_back({fmt::format("inertia {}", kInertiaNames[k]), "kg m^2", link.inertial->I[k]});
+  return numbers;
+}
+
+/// Returns the number of that name; none where there is none.
+std::optional<double> FindNumber(const std::vector<NamedNumber>& numbers, const std::string& quantity) {
+  const auto found = std::ranges::find(numbers, quantity, &NamedNumber::quantity);
+  return found == numbers.end() ? std::nullopt : std::optional(found->value);
 }
 
 /// Name of the vector or tensor that a number belongs to.
@@ -96,44 +142,6 @@ FileCause MakeCause(const PrintedRobot& robot, CorrectionItem item,
 }
 
 }  // namespace
-
-std::vector<NamedNumber> NameNumbers(const PrintedLink& link) {
-  std::vector<NamedNumber> numbers;
-  const PrintedJoint& joint = link.joint;
-  const bool is_slide = joint.kind == JointKind::kSlide;
-  AddOrigin("", "position", link.origin, &numbers);
-  for (int k = 0; k < 3 && joint.kind != JointKind::kFixed; ++k)
-    numbers.push_back({fmt::format("axis {}", "xyz"[k]), "", joint.axis[k]});
-  for (int k = 0; k < 3; ++k) {
-    if (!joint.anchor.isZero())
-      numbers.push_back({fmt::format("point of the axis {}", "xyz"[k]), "m", joint.anchor[k]});
-  }
-  for (const size_t k : {0U, 1U}) {
-    if (joint.range)
-      numbers.push_back(
-          {k == 0 ? "lower limit" : "upper limit", is_slide ? "m" : "rad", (*joint.range)[k].value});
-  }
-  for (size_t k = 0; k < kNumJointScalars; ++k) {
-    if (joint.scalars[k])
-      numbers.push_back(
-          {kScalars[k][0], is_slide ? kSlideUnits[k] : kScalars[k][1], joint.scalars[k]->value});
-  }
-  if (joint.mimic) {
-    numbers.push_back({"mimic multiplier", "", joint.mimic->multiplier.value});
-    numbers.push_back({"mimic offset", is_slide ? "m" : "rad", joint.mimic->offset.value});
-  }
-  if (!link.inertial) return numbers;
-  numbers.push_back({"mass", "kg", link.inertial->mass.value});
-  AddOrigin("inertial ", "centre of mass", link.inertial->origin, &numbers);
-  for (int k = 0; k < 6; ++k)
-    numbers.push_back({fmt::format("inertia {}", kInertiaNames[k]), "kg m^2", link.inertial->I[k]});
-  return numbers;
-}
-
-std::optional<double> FindNumber(const std::vector<NamedNumber>& numbers, const std::string& quantity) {
-  const auto found = std::ranges::find(numbers, quantity, &NamedNumber::quantity);
-  return found == numbers.end() ? std::nullopt : std::optional(found->value);
-}
 
 void LeaveOutUnstated(const std::vector<std::string>& ignore, PrintedRobot* robot) {
   constexpr std::pair<const char*, JointScalar> kWords[] = {{"damping", JointScalar::kDamping},

@@ -12,17 +12,6 @@
 
 namespace dexcheck {
 
-/// A number of a link or of the joint that moves it, as its file prints it.
-struct NamedNumber {
-  std::string quantity;  ///< "mass", "centre of mass x", "position z", "upper limit".
-  std::string unit;      ///< Empty of a pure number.
-  double value = 0.0;
-};
-/// Lists all numbers that a link states; a rotation's are those of the file's own form.
-std::vector<NamedNumber> NameNumbers(const PrintedLink& link);
-/// Returns the number of that name; none where there is none.
-std::optional<double> FindNumber(const std::vector<NamedNumber>& numbers, const std::string& quantity);
-
 /// A number of a file, and its value with the cause corrected.
 struct FileChange {
   std::string place, quantity, unit;

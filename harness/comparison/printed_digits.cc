@@ -4,7 +4,6 @@
 #include <cmath>
 #include <functional>
 #include <map>
-#include <memory>
 #include <random>
 #include <sstream>
 
@@ -137,57 +136,6 @@ class Mover {
   const Values& exact_;
 };
 
-/// One file's numbers.
-class NumberedFile {
- public:
-  virtual ~NumberedFile() = default;
-  [[nodiscard]] PrintedSpread Draw(int count, const Values& exact) const {
-    PrintedSpread spread;
-    spread.digits = CountDigits(exact);
-    spread.nominal = ReadNominal(&spread.undiagonalized);
-    for (int k = 0; k < count; ++k) {
-      std::optional<RobotDescription> moved = ReadMoved(Mover(static_cast<unsigned>(k), exact));
-      if (moved) spread.draws.push_back(*std::move(moved));
-    }
-    return spread;
-  }
-
-  [[nodiscard]] Values ListValues() const {
-    Values values;
-    Visit([&](const FileNumber& number) {
-      if (!number.is_of_body) ++values[std::abs(number.value)];
-    });
-    return values;
-  }
-
- protected:
-  /// All numbers that describe the mechanism.
-  virtual void Visit(const std::function<void(const FileNumber&)>& visit) const = 0;
-  /// Reads the numbers of the file. @param undiagonalized PrintedSpread::undiagonalized.
-  virtual RobotDescription ReadNominal(std::optional<RobotDescription>* undiagonalized) const = 0;
-  /// With its numbers moved; none where that is no robot.
-  [[nodiscard]] virtual std::optional<RobotDescription> ReadMoved(Mover mover) const = 0;
-
-  [[nodiscard]] PrintedDigits CountDigits(const Values& exact) const {
-    PrintedDigits digits;
-    Visit([&](const FileNumber& number) {
-      if (IsExact(number, exact)) return;
-      digits.fewest = digits.count == 0 ? number.digits : std::min(digits.fewest, number.digits);
-      digits.most = Worst(digits.most, number.digits);
-      ++digits.count;
-    });
-    return digits;
-  }
-};
-
-/// A replacement that replaces nothing.
-Replace AsReplace(const std::function<void(const FileNumber&)>& visit) {
-  return [&visit](const FileNumber& number, std::string_view text) {
-    visit(number);
-    return std::string(text);
-  };
-}
-
 /// Changes the parts of a description; bodies are those of the parts again.
 template <typename Change>
 void ChangeParts(const mjModel& engine, const std::vector<const Element*>& inertials, RobotDescription* robot,
@@ -215,25 +163,80 @@ Matrix3d MoveTensor(const Element& inertial, const char* attribute, Mover* mover
   return tensor;
 }
 
-class NumberedMjcf : public NumberedFile {
+/// One file's numbers: an MJCF's mechanism, or a URDF, parameter file or table of bodies as it stands.
+class NumberedFile {
  public:
-  explicit NumberedMjcf(const DescriptionFile& file)
-      : source_(file.path().string()), text_(ReduceToMechanism(file.document())) {}
-
- protected:
-  void Visit(const std::function<void(const FileNumber&)>& visit) const override {
-    const MjcfFile mjcf(text_, source_);
-    VisitElements(mjcf.root(), [&](Element* element) {
-      for (const char* attribute : {"diaginertia", "fullinertia"})
-        ReplaceNumbers(ReadAttribute(*element, attribute), true, AsReplace(visit));
-    });
-    ReplaceInXml(mjcf.root(), AsReplace(visit));
+  NumberedFile(const DescriptionFile& file, const UrdfOptions& options)
+      : file_(file),
+        options_(options),
+        is_mjcf_(file.format() == RobotFormat::kMjcf),
+        text_(is_mjcf_ ? ReduceToMechanism(file.document()) : file.text()) {
+    options_.keep_impossible = true;
   }
 
-  RobotDescription ReadNominal(std::optional<RobotDescription>* undiagonalized) const override {
-    const MjcfFile mjcf(text_, source_);
-    const MjModelPtr engine = LoadMjcfText(text_, source_);
-    RobotDescription robot = ReadMjcfDescription(*engine, source_);
+  [[nodiscard]] PrintedSpread Draw(int count, const Values& exact) const {
+    PrintedSpread spread;
+    spread.digits = CountDigits(exact);
+    spread.nominal = is_mjcf_ ? ReadMjcf(&spread.undiagonalized) : file_.Describe();
+    for (int k = 0; k < count; ++k) {
+      std::optional<RobotDescription> moved = ReadMoved(Mover(static_cast<unsigned>(k), exact));
+      if (moved) spread.draws.push_back(*std::move(moved));
+    }
+    return spread;
+  }
+
+  [[nodiscard]] Values ListValues() const {
+    Values values;
+    Visit([&](const FileNumber& number) {
+      if (!number.is_of_body) ++values[std::abs(number.value)];
+    });
+    return values;
+  }
+
+ private:
+  /// Returns the text with the numbers replaced that describe the mechanism, but for inertias of an MJCF.
+  [[nodiscard]] std::string ReplaceAll(const Replace& replace) const {
+    if (file_.format() == RobotFormat::kToml) return ReplaceInToml(text_, replace);
+    if (file_.format() == RobotFormat::kBodies) return ReplaceInBodies(text_, replace);
+    tinyxml2::XMLDocument document;
+    ParseXml(text_, file_.path().string(), &document);
+    ReplaceInXml(document.RootElement(), replace);
+    return PrintXml(document);
+  }
+
+  /// Visits all numbers that describe the mechanism.
+  void Visit(const std::function<void(const FileNumber&)>& visit) const {
+    const Replace look = [&](const FileNumber& number, std::string_view text) {
+      visit(number);
+      return std::string(text);
+    };
+    if (is_mjcf_) {
+      const MjcfFile mjcf(text_, file_.path().string());
+      VisitElements(mjcf.root(), [&](Element* element) {
+        for (const char* attribute : {"diaginertia", "fullinertia"})
+          ReplaceNumbers(ReadAttribute(*element, attribute), true, look);
+      });
+    }
+    static_cast<void>(ReplaceAll(look));
+  }
+
+  [[nodiscard]] PrintedDigits CountDigits(const Values& exact) const {
+    PrintedDigits digits;
+    Visit([&](const FileNumber& number) {
+      if (IsExact(number, exact)) return;
+      digits.fewest = digits.count == 0 ? number.digits : std::min(digits.fewest, number.digits);
+      digits.most = Worst(digits.most, number.digits);
+      ++digits.count;
+    });
+    return digits;
+  }
+
+  /// @param undiagonalized PrintedSpread::undiagonalized.
+  RobotDescription ReadMjcf(std::optional<RobotDescription>* undiagonalized) const {
+    const std::string source = file_.path().string();
+    const MjcfFile mjcf(text_, source);
+    const MjModelPtr engine = LoadMjcfText(text_, source);
+    RobotDescription robot = ReadMjcfDescription(*engine, source);
     RobotDescription stated = robot;
     bool has_tensor = false;
     ChangeParts(*engine, ListInertials(mjcf, *engine), &stated,
@@ -247,12 +250,22 @@ class NumberedMjcf : public NumberedFile {
     return robot;
   }
 
-  [[nodiscard]] std::optional<RobotDescription> ReadMoved(Mover mover) const override {
-    const MjcfFile mjcf(text_, source_);
-    ReplaceInXml(mjcf.root(), mover.AsReplace());
-    const MjModelPtr engine = LoadMjcfText(mjcf.Print(), source_);
-    RobotDescription robot = ReadMjcfDescription(*engine, source_);
-    ChangeParts(*engine, ListInertials(mjcf, *engine), &robot,
+  /// Reads the file with its numbers moved; none where that is no robot.
+  [[nodiscard]] std::optional<RobotDescription> ReadMoved(Mover mover) const {
+    const std::string text = ReplaceAll(mover.AsReplace());
+    if (!is_mjcf_) {
+      try {
+        DescriptionFile moved(file_.path(), text, options_);
+        if (file_.carrier()) moved.PlaceOn(*file_.carrier());
+        return moved.Describe();
+      } catch (const InputError&) {
+        return std::nullopt;  // a parameter file's bodies must be some: of a slender one that may fail
+      }
+    }
+    const std::string source = file_.path().string();
+    const MjModelPtr engine = LoadMjcfText(text, source);
+    RobotDescription robot = ReadMjcfDescription(*engine, source);
+    ChangeParts(*engine, ListInertials(MjcfFile(text_, source), *engine), &robot,
                 [&](const Element& inertial, DescribedPart* part) {
                   const Matrix3d R = part->X_LC.linear();
                   part->body.inertia += R * MoveTensor(inertial, "diaginertia", &mover) * R.transpose();
@@ -261,53 +274,11 @@ class NumberedMjcf : public NumberedFile {
     return robot;
   }
 
- private:
-  std::string source_;
-  std::string text_;
-};
-
-/// A URDF or a parameter file, read as it stands.
-class NumberedText : public NumberedFile {
- public:
-  NumberedText(const DescriptionFile& file, const UrdfOptions& options) : file_(file), options_(options) {
-    options_.keep_impossible = true;
-  }
-
- protected:
-  void Visit(const std::function<void(const FileNumber&)>& visit) const override {
-    static_cast<void>(ReplaceAll(AsReplace(visit)));
-  }
-
-  RobotDescription ReadNominal(std::optional<RobotDescription>*) const override { return file_.Describe(); }
-
-  [[nodiscard]] std::optional<RobotDescription> ReadMoved(Mover mover) const override {
-    try {
-      DescriptionFile moved(file_.path(), ReplaceAll(mover.AsReplace()), options_);
-      if (file_.carrier()) moved.PlaceOn(*file_.carrier());
-      return moved.Describe();
-    } catch (const InputError&) {
-      return std::nullopt;  // a parameter file's bodies must be some: of a slender one that may fail
-    }
-  }
-
- private:
-  [[nodiscard]] std::string ReplaceAll(const Replace& replace) const {
-    if (file_.format() == RobotFormat::kToml) return ReplaceInToml(file_.text(), replace);
-    if (file_.format() == RobotFormat::kBodies) return ReplaceInBodies(file_.text(), replace);
-    tinyxml2::XMLDocument document;
-    ParseXml(file_.text(), file_.path().string(), &document);
-    ReplaceInXml(document.RootElement(), replace);
-    return PrintXml(document);
-  }
-
   const DescriptionFile& file_;
   UrdfOptions options_;
+  bool is_mjcf_;
+  std::string text_;
 };
-
-std::unique_ptr<NumberedFile> MakeNumbered(const DescriptionFile& file, const UrdfOptions& options) {
-  if (file.format() == RobotFormat::kMjcf) return std::make_unique<NumberedMjcf>(file);
-  return std::make_unique<NumberedText>(file, options);
-}
 
 }  // namespace
 
@@ -315,12 +286,9 @@ std::optional<std::array<PrintedSpread, 2>> DrawWithinDigits(
     const std::array<const DescriptionFile*, 2>& files, const UrdfOptions& options, int count) {
   std::array<PrintedSpread, 2> spreads;
   try {
-    std::array<std::unique_ptr<NumberedFile>, 2> numbered;
-    std::array<Values, 2> values;
-    for (size_t i = 0; i < 2; ++i) {
-      numbered[i] = MakeNumbered(*files[i], options);
-      values[i] = numbered[i]->ListValues();
-    }
+    const std::array<NumberedFile, 2> numbered = {NumberedFile(*files[0], options),
+                                                  NumberedFile(*files[1], options)};
+    const std::array<Values, 2> values = {numbered[0].ListValues(), numbered[1].ListValues()};
     for (size_t i = 0; i < 2; ++i) {
       // Those that stand in the other file as often at least.
       Values exact = values[i];
@@ -328,7 +296,7 @@ std::optional<std::array<PrintedSpread, 2>> DrawWithinDigits(
         const auto other = values[1 - i].find(value.first);
         return other == values[1 - i].end() || other->second < value.second;
       });
-      spreads[i] = numbered[i]->Draw(count, exact);
+      spreads[i] = numbered[i].Draw(count, exact);
       spreads[i].digits.file = files[i]->path().filename().string();
       if (spreads[i].draws.empty()) return std::nullopt;
     }

@@ -31,31 +31,21 @@ constexpr DescribedConstant kDescribed[] = {
 
 bool HasSpring(const mjModel& m, int joint) { return m.jnt_stiffness[joint] != 0.0; }
 bool HasLimit(const mjModel& m, int joint) { return m.jnt_limited[joint] != 0; }
-bool HasControlLimit(const mjModel& m, int motor) { return m.actuator_ctrllimited[motor] != 0; }
-bool HasForceLimit(const mjModel& m, int motor) { return m.actuator_forcelimited[motor] != 0; }
-
-constexpr unsigned kAllJoints = kRobotJoint | kWheelJoint | kFreeJoint;
+bool LimitsControl(const mjModel& m, int motor) { return m.actuator_ctrllimited[motor] != 0; }
+bool LimitsForce(const mjModel& m, int motor) { return m.actuator_forcelimited[motor] != 0; }
 
 // A constant that is compared between two models alone has no neutral value.
 constexpr Constant kConstants[] = {
-    {"joint_damping", P::kJoint, "damping", &mjModel::dof_damping, Index::kDof, 1, 0.0, kFreeJoint},
-    {"joint_armature", P::kJoint, "armature", &mjModel::dof_armature, Index::kDof, 1, 0.0, kFreeJoint},
-    {"joint_limited", P::kJoint, "limited", &mjModel::jnt_limited, Index::kPart, 1, 0.0,
+    {"joint_damping", P::kJoint, "damping", &mjModel::dof_damping, Index::kDof, 1, 0.0, nullptr, kFreeJoint},
+    {"joint_armature", P::kJoint, "armature", &mjModel::dof_armature, Index::kDof, 1, 0.0, nullptr,
+     kFreeJoint},
+    {"joint_limited", P::kJoint, "limited", &mjModel::jnt_limited, Index::kPart, 1, 0.0, nullptr,
      kFreeJoint | kWheelJoint},
-    {"joint_spring", P::kJoint, "stiffness", &mjModel::jnt_stiffness, Index::kPart, 1, 0.0, kAllJoints},
-    {"joint_spring",
-     P::kJoint,
-     "springref",
-     &mjModel::qpos_spring,
-     Index::kPosition,
-     1,
-     {},
-     kAllJoints,
-     HasSpring},
+    {"joint_spring", P::kJoint, "stiffness", &mjModel::jnt_stiffness, Index::kPart, 1, 0.0},
+    {"joint_spring", P::kJoint, "springref", &mjModel::qpos_spring, Index::kPosition, 1, {}, HasSpring},
     {"joint_dry_friction", P::kJoint, "frictionloss", &mjModel::dof_frictionloss, Index::kDof, 1, 0.0,
-     kFreeJoint | kWheelJoint},
-    {"joint_limit_margin", P::kJoint, "margin", &mjModel::jnt_margin, Index::kPart, 1, 0.0, kAllJoints,
-     HasLimit},
+     nullptr, kFreeJoint | kWheelJoint},
+    {"joint_limit_margin", P::kJoint, "margin", &mjModel::jnt_margin, Index::kPart, 1, 0.0, HasLimit},
     {"motor_transmission", P::kActuator, "transmission", &mjModel::actuator_trntype, Index::kPart, 1,
      mjTRN_JOINT},
     {"motor_transmission", P::kActuator, "gear", &mjModel::actuator_gear, Index::kPart, 6, 1.0},
@@ -72,8 +62,7 @@ constexpr Constant kConstants[] = {
      Index::kPart,
      2,
      {},
-     kAllJoints,
-     HasControlLimit},
+     LimitsControl},
     {"motor_limit",
      P::kActuator,
      "forcerange",
@@ -81,8 +70,7 @@ constexpr Constant kConstants[] = {
      Index::kPart,
      2,
      {},
-     kAllJoints,
-     HasForceLimit},
+     LimitsForce},
     {"tendon_spring", P::kTendon, "stiffness", &mjModel::tendon_stiffness, Index::kPart, 1, 0.0},
     {"tendon_spring", P::kTendon, "springlength", &mjModel::tendon_lengthspring, Index::kPart, 2},
     {"tendon_damping", P::kTendon, "damping", &mjModel::tendon_damping, Index::kPart, 1, 0.0},

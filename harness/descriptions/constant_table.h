@@ -47,8 +47,8 @@ struct Constant {
   enum class Index { kPart, kPosition, kDof } index = Index::kPart;  ///< What the array is by.
   int count = 1;                                                     ///< Numbers of each part.
   std::optional<double> neutral = {};  ///< With it the part does nothing; of several numbers the first.
-  unsigned roles = kRobotJoint | kWheelJoint | kFreeJoint;     ///< Which joints must have the neutral value.
   bool (*applies)(const mjModel& engine, int part) = nullptr;  ///< Whether it means anything; null: always.
+  unsigned roles = kRobotJoint | kWheelJoint | kFreeJoint;     ///< Which joints must have the neutral value.
 };
 
 /// All of them.
