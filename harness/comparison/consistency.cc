@@ -82,22 +82,12 @@ std::optional<BaseConvention> FindOtherConvention(const RobotModel& model, Dynam
   return found;
 }
 
-namespace {
-
-constexpr int kMostDigits = 16;
-
-}  // namespace
-
 int CountDigits(double error) {
+  constexpr int kMostDigits = 16;
   for (int digits = kMostDigits; digits > 0; --digits) {
     if (error <= std::pow(10.0, -digits)) return digits;
   }
   return 0;
-}
-
-void JudgeByTolerance(double tolerance, ConsistencyResult* result) {
-  JudgeByTolerance(tolerance, &result->constants);
-  JudgeByTolerance(tolerance, &result->terms);
 }
 
 }  // namespace dexcheck

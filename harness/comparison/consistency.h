@@ -83,8 +83,4 @@ std::optional<BaseConvention> FindOtherConvention(const RobotModel& model, Dynam
 /// largest n with error <= 10^-n, at most 16.
 int CountDigits(double error);
 
-/// Judges every check by a relative tolerance where that is wider than its bound: bounds, failures and
-/// findings are those of the tolerance afterwards.
-void JudgeByTolerance(double tolerance, ConsistencyResult* result);
-
 }  // namespace dexcheck

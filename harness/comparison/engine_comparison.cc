@@ -226,12 +226,7 @@ class EngineComparisonRun {
     TermComparison comparison(model_, kAskedOfPrograms, providers);
     result_.samples = CompareAtStates(MakeFeed(), progress, &comparison);
     result_.pairs = comparison.TakePairs();
-    for (ComparedPair& pair : result_.pairs) {
-      for (CheckRecord& record : pair.terms) {
-        record.bound = Worst(record.bound, options_.tolerance);
-        record.failed = !(record.worst <= record.bound);
-      }
-    }
+    for (ComparedPair& pair : result_.pairs) JudgeByTolerance(options_.tolerance, &pair.terms);
   }
 
   /// Each provider joins the first group with all of which it agrees.

@@ -89,7 +89,7 @@ class PlantComparison : public ConstantComparison {
       compare(base.wheel.mass, engine_.body_mass[engine_.jnt_bodyid[w.joint]]);
     });
     each("wheel_spin_inertia", [&](Wheel w, double, auto&& compare) {
-      compare(base.wheel.spin_inertia, CalcWheelInertia(engine_, w).spin);
+      compare(base.wheel.spin_inertia, CalcSpinInertia(engine_, w));
     });
     each("wheel_damping",
          [&](Wheel w, double, auto&& compare) { compare(base.wheel.damping, engine_.dof_damping[w.dof]); });

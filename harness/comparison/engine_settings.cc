@@ -3,105 +3,87 @@
 #include <utility>
 
 #include "controller/common/errors.h"
+#include "controller/model/rigid_body.h"
 
 namespace dexcheck {
 namespace {
 
-/// Makes the bodies anew from their parts, each changed in its own frame.
-void ChangeParts(const std::function<MassProperties(const DescribedPart&)>& change, RobotDescription* robot) {
+using Change = std::function<void(RobotDescription*)>;
+
+/// Returns what makes the bodies anew from their parts, each changed by `change(R, body)`: R turns the axes
+/// along which the file gives the inertia into the link's.
+template <typename ChangeBody>
+Change ChangeParts(const ChangeBody& change) {
+  return [change](RobotDescription* robot) {
+    for (DescribedPart& part : robot->parts) {
+      change(Matrix3d(part.X_LC.linear()), &part.body);
+      part.states_inertial = part.body.mass > 0.0 || part.body.inertia != Matrix3d::Zero();
+    }
+    FuseParts(robot);
+  };
+}
+
+template <typename ChangeJoint>
+Change ChangeJoints(const ChangeJoint& change) {
+  return [change](RobotDescription* robot) {
+    for (Joint& joint : robot->spec.joints) change(&joint);
+  };
+}
+
+/// Euler's step with damping taken at its end has M + h D instead of M.
+Change AddImplicitDamping(double step) {
+  return ChangeJoints([step](Joint* joint) { joint->armature += step * joint->damping; });
+}
+
+void DropWeldedParts(RobotDescription* robot) {
+  std::vector<bool> seen(robot->spec.joints.size() + 1, false);
   for (DescribedPart& part : robot->parts) {
-    part.body = change(part);
+    const auto place = static_cast<size_t>(part.joint + 1);
+    if (seen[place]) part.body = {0.0, Vector3d::Zero(), Matrix3d::Zero()};
     part.states_inertial = part.body.mass > 0.0 || part.body.inertia != Matrix3d::Zero();
+    seen[place] = true;
   }
   FuseParts(robot);
 }
 
-/// Along the axes in which the file gives it, as if these were the link's.
-MassProperties DropRotation(const DescribedPart& part) {
-  MassProperties body = part.body;
-  const Matrix3d R = part.X_LC.linear();
-  body.inertia = R.transpose() * body.inertia * R;
-  return body;
-}
-
-MassProperties DropProducts(const DescribedPart& part) {
-  const Matrix3d R = part.X_LC.linear();
-  const Matrix3d own = R.transpose() * part.body.inertia * R;
-  MassProperties body = part.body;
-  body.inertia = R * Matrix3d(own.diagonal().asDiagonal()) * R.transpose();
-  return body;
-}
-
-MassProperties DropInertia(const DescribedPart& part) {
-  MassProperties body = part.body;
-  body.inertia.setZero();
-  return body;
-}
-
-/// Reads the inertia as if it were given about the link's origin: subtracts m (|c|^2 1 - c c^T).
-MassProperties ReadAboutOrigin(const DescribedPart& part) {
-  MassProperties body = part.body;
-  const Vector3d& c = body.com;
-  body.inertia -= body.mass * (c.squaredNorm() * Matrix3d::Identity() - c * c.transpose());
-  return body;
+Change SetGravity(double g) {
+  return [g](RobotDescription* robot) {
+    if (robot->spec.gravity.norm() > 0.0) robot->spec.gravity *= g / robot->spec.gravity.norm();
+  };
 }
 
 /// A way to read or treat the robot.
 struct Setting {
   std::string text;
-  std::function<void(RobotDescription*)> apply;
+  Change apply;
 };
 
-void ScaleDamping(double factor, RobotDescription* robot) {
-  for (Joint& joint : robot->spec.joints) joint.damping *= factor;
-}
-
-/// Euler's step with damping taken at its end has M + h D instead of M.
-void AddImplicitDamping(double step, RobotDescription* robot) {
-  for (Joint& joint : robot->spec.joints) joint.armature += step * joint.damping;
-}
-
-void DropWeldedParts(RobotDescription* robot) {
-  std::vector<bool> seen(robot->spec.joints.size() + 1, false);
-  ChangeParts(
-      [&](const DescribedPart& part) {
-        const auto place = static_cast<size_t>(part.joint + 1);
-        const bool is_welded = seen[place];
-        seen[place] = true;
-        return is_welded ? MassProperties{0.0, Vector3d::Zero(), Matrix3d::Zero()} : part.body;
-      },
-      robot);
-}
-
 std::vector<Setting> ListSettings() {
-  std::vector<Setting> settings;
-  const auto add = [&](const std::string& text, std::function<void(RobotDescription*)> apply) {
-    settings.push_back({text, std::move(apply)});
+  return {
+      {"viscous damping of joints left out", ChangeJoints([](Joint* joint) { joint->damping = 0.0; })},
+      {"armature left out", ChangeJoints([](Joint* joint) { joint->armature = 0.0; })},
+      {"damping taken at the end of a step of 2 ms (M + h D)", AddImplicitDamping(0.002)},
+      {"damping taken at the end of a step of 1 ms (M + h D)", AddImplicitDamping(0.001)},
+      {"the rotations (rpy) of the inertials not read",
+       ChangeParts([](const Matrix3d& R, MassProperties* body) {
+         body->inertia = R.transpose() * body->inertia * R;
+       })},
+      {"products of inertia left out", ChangeParts([](const Matrix3d& R, MassProperties* body) {
+         const Matrix3d own = R.transpose() * body->inertia * R;
+         body->inertia = R * Matrix3d(own.diagonal().asDiagonal()) * R.transpose();
+       })},
+      {"inertias left out, masses kept",
+       ChangeParts([](const Matrix3d&, MassProperties* body) { body->inertia.setZero(); })},
+      {"inertias read as about the links' origins", ChangeParts([](const Matrix3d&, MassProperties* body) {
+         body->inertia -= CalcPointInertia(body->mass, body->com);
+       })},
+      {"the masses of links on fixed joints lost in fusing", DropWeldedParts},
+      {"no gravity", [](RobotDescription* robot) { robot->spec.gravity.setZero(); }},
+      {"gravity upwards", [](RobotDescription* robot) { robot->spec.gravity *= -1.0; }},
+      {"gravity of 9.800000 m/s^2", SetGravity(9.8)},
+      {"gravity of 9.806650 m/s^2", SetGravity(9.80665)},
+      {"gravity of 9.810000 m/s^2", SetGravity(9.81)},
   };
-  add("viscous damping of joints left out", [](RobotDescription* robot) { ScaleDamping(0.0, robot); });
-  add("armature left out", [](RobotDescription* robot) {
-    for (Joint& joint : robot->spec.joints) joint.armature = 0.0;
-  });
-  for (const double step : {0.002, 0.001}) {
-    add(step == 0.002 ? "damping taken at the end of a step of 2 ms (M + h D)"
-                      : "damping taken at the end of a step of 1 ms (M + h D)",
-        [step](RobotDescription* robot) { AddImplicitDamping(step, robot); });
-  }
-  add("the rotations (rpy) of the inertials not read",
-      [](RobotDescription* robot) { ChangeParts(DropRotation, robot); });
-  add("products of inertia left out", [](RobotDescription* robot) { ChangeParts(DropProducts, robot); });
-  add("inertias left out, masses kept", [](RobotDescription* robot) { ChangeParts(DropInertia, robot); });
-  add("inertias read as about the links' origins",
-      [](RobotDescription* robot) { ChangeParts(ReadAboutOrigin, robot); });
-  add("the masses of links on fixed joints lost in fusing", DropWeldedParts);
-  add("no gravity", [](RobotDescription* robot) { robot->spec.gravity.setZero(); });
-  add("gravity upwards", [](RobotDescription* robot) { robot->spec.gravity *= -1.0; });
-  for (const double g : {9.8, 9.80665, 9.81}) {
-    add("gravity of " + std::to_string(g) + " m/s^2", [g](RobotDescription* robot) {
-      if (robot->spec.gravity.norm() > 0.0) robot->spec.gravity *= g / robot->spec.gravity.norm();
-    });
-  }
-  return settings;
 }
 
 }  // namespace

@@ -262,7 +262,8 @@ bool IsOneRobot(const FileCauses& causes, const RobotDescription& robot) {
 }  // namespace
 
 void Comparison::JudgeByTolerance(double tolerance) {
-  dexcheck::JudgeByTolerance(tolerance, &result);
+  dexcheck::JudgeByTolerance(tolerance, &result.constants);
+  dexcheck::JudgeByTolerance(tolerance, &result.terms);
   if (!causes) return;
   const auto fails = [&](const char* name) {
     return std::ranges::any_of(result.terms,
