@@ -28,7 +28,7 @@ struct ConstantFinding {
   Location location;
   /// Which of the numbers that the check compares there: of a vector, a range, a 3x3 tensor; -1 of a term.
   int entry = 0;
-  std::string effect{};   ///< What it does to the motion, when one of the two leaves it out.
+  std::string effect{};   ///< Its effect on the motion, when one of the two leaves it out.
   double scale = 0.0;     ///< Size that the difference is relative to; 0: the larger of the two numbers.
   double units = 0.0;     ///< Difference relative to the printed precision; infinite between exact numbers.
   bool is_cause = false;  ///< A constant, or a term of geometry or bodies, from which the other terms follow.
@@ -47,7 +47,7 @@ std::string UnitOf(const ConstantFinding& finding, const RobotModel& model);
 /// Something that the MJCF sets and the analytic model has no number for, and that is no disagreement: it
 /// belongs to the plant of a run, which overrides it or whose checks judge it.
 struct ConstantNote {
-  std::string kind;  ///< As in ListEngineFields, such as "contact_pair".
+  std::string kind;  ///< A kind of ListEngineFields, such as "contact_pair".
   std::string text;  ///< With the element's name and all its numbers.
 };
 
@@ -55,7 +55,7 @@ struct ConstantChecks {
   std::vector<CheckRecord> records;
   std::vector<ConstantFinding> findings;  ///< Every disagreement, in the file's order.
   std::vector<ConstantNote> notes;
-  std::vector<std::string> not_compared;  ///< What only one of the two has, a line each.
+  std::vector<std::string> not_compared;  ///< Parts that only one of the two has, a line each.
 
   /// The check of that name, a new one when there is none.
   CheckRecord* Define(const std::string& check);
@@ -132,12 +132,12 @@ struct StatedConstants {
     std::vector<std::optional<double>> numbers;  ///< By ListDescribedConstants.
     std::optional<std::array<double, 2>> range;
     std::optional<JointCoupling> coupling;
-    std::optional<StatedForces> forces = {};  ///< Of the joint's motors.
+    std::optional<StatedForces> forces = {};  ///< Limits of the joint's motors.
     double wheel_radius = 0.0;                ///< Radius of the wheel that the joint turns, m; 0 without one.
   };
   std::string file;
   std::optional<Vector3d> gravity;
-  std::vector<double> masses;  ///< Of the base with all that is welded to it, then by joint.
+  std::vector<double> masses;  ///< The base with all that is welded to it, then each joint's link.
   std::vector<OfJoint> joints;
 
   /// Takes out what two files need not share, of kIgnorable.

@@ -20,7 +20,7 @@ ConstantChecks CheckConstants(const Adapter& adapter);
 /// The file that is compared with an MJCF.
 struct FirstFile {
   bool is_file = false;                     ///< Otherwise a run's model, which states all but couplings.
-  const RobotDescription* robot = nullptr;  ///< As CompleteFromEngine left it; null: its file states all.
+  const RobotDescription* robot = nullptr;  ///< Its robot, as CompletePair left it; null: it states all.
   std::vector<std::string> ignore = {};     ///< Constants that the two files need not share: kIgnorable.
   std::string second_file = {};             ///< The MJCF's name.
   std::vector<EnginePart> parts = {};       ///< Parts besides the mechanism, of another MJCF.
