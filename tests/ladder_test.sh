@@ -41,7 +41,7 @@ list_releases() {
   local members='qM|dof_Madr|eq_active|ten_J|mpr_iterations|mpr_tolerance|n?names_map|body_bvh[a-z]*|geom_plugin|body_gravcomp'
   local names='mj_fullM|mj_crb|mju_warningText|mj_makeEmptyFileVFS|mj_addBufferVFS|mjv_makeConnector|mjv_connector|mj_ray|mj_maxContact|mjCOL_[A-Z]+'
   (cd "$1" && grep -rnE "(->|\.)($members)\>|opt\.collision|mjENBL_SENSORNOISE|\<($names)\>" harness renders tests \
-    --include='*.h' --include='*.cc' | grep -vE '^harness/engine/mujoco_release\.h:|^tests/harness/checks/engine_fields\.h:') || true
+    --include='*.h' --include='*.cc' | grep -vE '^harness/engine/mujoco_release\.h:|^tests/harness/comparison/engine_fields\.h:') || true
 }
 
 root=$1

@@ -6,8 +6,8 @@
 #include "controller/contact/contact_geometry.h"
 #include "controller/contact/grasp_map.h"
 #include "controller/contact/shapes.h"
-#include "harness/checks/term_comparison.h"
-#include "harness/checks/term_table.h"
+#include "harness/comparison/term_comparison.h"
+#include "harness/comparison/term_table.h"
 #include "harness/descriptions/engine_provider.h"
 #include "harness/descriptions/random_states.h"
 

@@ -8,7 +8,7 @@
 #include "controller/control/joint_controller.h"
 #include "harness/base/worst.h"
 #include "harness/checks/check_table.h"
-#include "harness/checks/rounding_scales.h"
+#include "harness/comparison/rounding_scales.h"
 
 namespace dexcheck {
 

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "harness/base/worst.h"
-#include "harness/checks/rounding_scales.h"
+#include "harness/comparison/rounding_scales.h"
 #include "harness/plant/wheel_rates.h"
 
 namespace dexcheck {

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "controller/control/grasp_controller.h"
-#include "harness/checks/term_comparison.h"
+#include "harness/comparison/term_comparison.h"
 #include "harness/descriptions/analytic_provider.h"
 #include "harness/descriptions/engine_provider.h"
 

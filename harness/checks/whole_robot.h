@@ -12,7 +12,7 @@
 
 #include "controller/dynamics/model_terms.h"
 #include "controller/model/robot_model.h"
-#include "harness/checks/rounding_scales.h"
+#include "harness/comparison/rounding_scales.h"
 #include "harness/engine/adapter.h"
 #include "harness/plant/plant.h"
 

@@ -4,8 +4,8 @@
 
 #include "harness/base/files.h"
 #include "harness/base/process_pool.h"
-#include "harness/checks/consistency.h"
 #include "harness/cli/run_folder.h"
+#include "harness/comparison/consistency.h"
 
 namespace dexcheck::cli {
 

@@ -10,11 +10,11 @@
 
 #include "controller/common/errors.h"
 #include "harness/base/interrupts.h"
-#include "harness/checks/consistency.h"
 #include "harness/cli/commands.h"
 #include "harness/cli/file_repair.h"
 #include "harness/cli/output_file.h"
 #include "harness/cli/terminal.h"
+#include "harness/comparison/consistency.h"
 #include "harness/corrections/read_printed.h"
 #include "harness/report/files_page.h"
 

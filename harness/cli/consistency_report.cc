@@ -9,9 +9,10 @@
 #include "controller/common/text.h"
 #include "harness/base/check_record.h"
 #include "harness/base/console.h"
-#include "harness/checks/consistency.h"
 #include "harness/cli/junit_file.h"
 #include "harness/cli/terminal.h"
+#include "harness/comparison/consistency.h"
+#include "harness/comparison/file_differences.h"
 #include "harness/engine/engine.h"
 
 namespace dexcheck::cli {
@@ -73,7 +74,7 @@ void AddRecords(const char* title, const std::vector<CheckRecord>& records, cons
   for (const auto& [outcome, names] : agreeing) rows->push_back({{}, fmt::format("  {}{}", outcome, names)});
 }
 
-Json ToJson(const DigitVerdict& verdict) {
+Json ToJson(const DigitVerdict& verdict, const RobotModel& model) {
   Json json = {{"states", verdict.states},
                {"files", Json::array()},
                {"units", Json::object()},
@@ -82,14 +83,14 @@ Json ToJson(const DigitVerdict& verdict) {
     json["files"].push_back(
         {{"file", file.file}, {"numbers", file.count}, {"fewest", file.fewest}, {"most", file.most}});
   for (const auto& [check, units] : verdict.units) json["units"][check] = units;
-  for (const DigitExcess& excess : verdict.excesses) {
+  for (const ConstantFinding& excess : verdict.excesses) {
     json["exceeds"].push_back({{"check", excess.check},
                                {"where", excess.where},
-                               {"component", excess.numbers.component},
-                               {"unit", excess.numbers.unit},
+                               {"component", NameComponent(excess)},
+                               {"unit", UnitOf(excess, &model)},
                                {"units", excess.units},
-                               {"model", excess.numbers.first},
-                               {"engine", excess.numbers.second}});
+                               {"model", excess.model},
+                               {"engine", excess.engine}});
     if (excess.too_loose > 0.0) json["exceeds"].back()["precision"] = excess.too_loose;
   }
   if (!verdict.loosest.what.empty())
@@ -342,7 +343,7 @@ Json ToJson(const ConsistencyRequest& request, const Comparison& comparison, Exi
   for (const auto* records : {&result.constants.records, &result.terms}) {
     for (const CheckRecord& record : *records) json["checks"][record.name] = DescribeRecord(record, model);
   }
-  if (comparison.digits) json["digits"] = ToJson(*comparison.digits);
+  if (comparison.digits) json["digits"] = ToJson(*comparison.digits, model);
   json["findings"] = Json::array();
   for (const ConstantFinding& finding : result.constants.findings) {
     json["findings"].push_back({{"check", finding.check},

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "harness/base/answer.h"
-#include "harness/checks/file_comparison.h"
 #include "harness/cli/commands.h"
+#include "harness/comparison/results_comparison.h"
 
 namespace dexcheck::cli {
 

@@ -9,6 +9,7 @@
 #include "harness/cli/file_repair.h"
 #include "harness/cli/output_file.h"
 #include "harness/cli/terminal.h"
+#include "harness/comparison/file_differences.h"
 #include "harness/engine/mjcf_file.h"
 
 namespace dexcheck::cli {

@@ -10,11 +10,11 @@
 #include "controller/common/text.h"
 #include "harness/base/files.h"
 #include "harness/base/interrupts.h"
-#include "harness/checks/engine_comparison.h"
 #include "harness/cli/consistency_report.h"
 #include "harness/cli/junit_file.h"
 #include "harness/cli/output_file.h"
 #include "harness/cli/terminal.h"
+#include "harness/comparison/engine_comparison.h"
 #include "harness/descriptions/read_description.h"
 
 namespace dexcheck::cli {

@@ -1,11 +1,11 @@
 #include "harness/corrections/read_printed.h"
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 
 #include "controller/common/text.h"
 #include "controller/model/rigid_body.h"
-#include "harness/descriptions/printed_digits.h"
 #include "harness/descriptions/urdf_file.h"
 #include "harness/engine/xml.h"
 
@@ -166,6 +166,36 @@ PrintedJoint PrintJoint(const Joint& joint, const DescribedJoint& stated, const 
 }
 
 }  // namespace
+
+std::optional<PrintedNumber> ReadPrinted(std::string_view text) {
+  constexpr int kFewestDigits = 3;
+  constexpr int kFewestDecimals = 4;  // of a whole number that a program printed
+  if (text.starts_with('+')) text.remove_prefix(1);
+  PrintedNumber number;
+  const char* const end = text.data() + text.size();
+  const auto [stop, error] = std::from_chars(text.data(), end, number.value);
+  if (error != std::errc() || stop != end || !std::isfinite(number.value)) return std::nullopt;
+  const size_t exponent = std::min(text.find_first_of("eE"), text.size());
+  const std::string_view mantissa = text.substr(0, exponent);
+  const size_t point = std::min(mantissa.find('.'), mantissa.size());
+  int power = 0;
+  if (exponent < text.size()) {
+    std::string_view rest = text.substr(exponent + 1);
+    if (rest.starts_with('+')) rest.remove_prefix(1);
+    std::from_chars(rest.data(), end, power);
+  }
+  int decimals = -power;
+  for (size_t i = 0; i < mantissa.size(); ++i) {
+    if (std::isdigit(static_cast<unsigned char>(mantissa[i])) == 0) continue;
+    if (i > point) ++decimals;
+    if (number.digits > 0 || mantissa[i] != '0') ++number.digits;
+  }
+  if (number.value == std::floor(number.value) && decimals < kFewestDecimals) return number;
+  // A zero has no significant digit, and is known to its last decimal.
+  if (number.value != 0.0) decimals += std::max(kFewestDigits - number.digits, 0);
+  number.half_unit = 0.5 * std::pow(10.0, -decimals);
+  return number;
+}
 
 std::optional<PrintedScalar> ReadPrintedScalar(std::string_view text) {
   const std::optional<PrintedNumber> number = ReadPrinted(Trim(text));

@@ -2,6 +2,11 @@
 
 // Files read as they print their numbers.
 
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+
 #include "harness/corrections/printed_robot.h"
 #include "harness/descriptions/read_description.h"
 
@@ -21,6 +26,19 @@ PrintedRobot ReadPrintedMjcf(const MjcfFile& mjcf, const mjModel& engine);
 
 /// Reads a table, whose angles are in degrees: each number has the digits of its shortest decimal text.
 PrintedRobot PrintDescription(const RobotDescription& robot);
+
+/// Digits of one decimal number as it is printed.
+struct PrintedNumber {
+  double value = 0.0;
+  int digits = 0;          ///< Significant ones.
+  double half_unit = 0.0;  ///< To which it is known; 0: it is exact.
+};
+
+/// Reads a decimal number, which is known to half a unit of its last digit. A number stands for at least
+/// three significant digits: people type 0.5 and 0.0001, and mean 0.500 and 0.000100. A whole number with
+/// fewer than four decimals (0, 1, 90.0) is exact.
+/// @return nothing where the text is no decimal number.
+std::optional<PrintedNumber> ReadPrinted(std::string_view text);
 
 /// Numbers between blanks or commas. A zero stands for each that is missing.
 template <int N>

@@ -1,3 +1,5 @@
+#include "harness/descriptions/body_table.h"
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -7,7 +9,6 @@
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
 #include "harness/descriptions/alike_names.h"
-#include "harness/descriptions/read_description.h"
 
 namespace dexcheck {
 namespace {

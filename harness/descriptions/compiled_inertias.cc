@@ -1,20 +1,16 @@
 #include "harness/descriptions/compiled_inertias.h"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <filesystem>
 #include <limits>
-#include <map>
 #include <sstream>
 
 #include "controller/common/text.h"
 #include "controller/model/rigid_body.h"
-#include "harness/descriptions/description_match.h"
 #include "harness/descriptions/link_frame_tree.h"
 #include "harness/descriptions/mjcf_reader.h"
 #include "harness/engine/engine.h"
@@ -137,64 +133,6 @@ std::vector<CompiledChange> ListCompiledChanges(const MjcfFile& mjcf, const mjMo
               &changes);
   }
   return changes;
-}
-
-namespace {
-
-/// The joint that moves a body; none of what the description does not have. -1 is the base.
-std::optional<int> FindJointOf(const std::string& body, const RobotDescription& robot) {
-  const auto part = std::ranges::find(robot.parts, body, &DescribedPart::name);
-  return part == robot.parts.end() ? std::nullopt : std::optional(part->joint);
-}
-
-const MassProperties& FindBody(int joint, const RobotSpec& spec) {
-  return joint < 0 ? spec.base.body : spec.joints[static_cast<size_t>(joint)].body;
-}
-
-}  // namespace
-
-void NameCompiledChanges(const std::vector<CompiledChange>& changes,
-                         const std::array<const RobotDescription*, 2>& robots, size_t side,
-                         ConstantChecks* constants, std::vector<std::string>* notes) {
-  constexpr double kSame = 0.01;  // of what the text states, which the other file prints with other digits
-  const RobotDescription& own = *robots[side];
-  const RobotDescription& other = *robots[1 - side];
-  const std::string file = std::filesystem::path(own.spec.source).filename().string();
-  const std::vector<int> match = MatchJoints(own.spec, other.spec);
-  std::map<std::string, std::pair<std::string, int>> first_of;  // by setting, and how many more
-  for (const CompiledChange& change : changes) {
-    const bool is_mass = change.stated.size() == 1;
-    const std::string effect =
-        fmt::format("{} of {}'s compiler changed the {} of {} from {:.6g} to {:.6g} {}", change.setting, file,
-                    is_mass ? "mass" : "moments of inertia", change.body, fmt::join(change.stated, ", "),
-                    fmt::join(change.made, ", "), is_mass ? "kg" : "kg m^2");
-    const auto [line, is_new] = first_of.emplace(change.setting, std::pair(effect, 0));
-    line->second.second += is_new ? 0 : 1;
-    const std::optional<int> joint = FindJointOf(change.body, own);
-    if (!joint || (*joint >= 0 && match[static_cast<size_t>(*joint)] < 0)) continue;
-    const int joint_there = *joint < 0 ? -1 : match[static_cast<size_t>(*joint)];
-    const RobotSpec& first = robots[0]->spec;
-    const int joint_first = side == 0 ? *joint : joint_there;
-    const std::string where =
-        "link " + (joint_first < 0 ? first.base.link : first.joints[static_cast<size_t>(joint_first)].link);
-    if (is_mass) {
-      for (ConstantFinding& finding : constants->findings) {
-        if (finding.check == "link_mass" && finding.where == where) finding.effect = effect;
-      }
-      continue;
-    }
-    const Vector3d stated(change.stated.data()), made(change.made.data());
-    const Vector3d there = CalcMoments(FindBody(joint_there, other.spec).inertia);
-    const double apart = (there - stated).norm();
-    if (apart > kSame * stated.norm() || apart >= (there - made).norm()) continue;
-    Eigen::Index k = 0;
-    (made - stated).cwiseAbs().maxCoeff(&k);
-    constants->Add({"compiled_inertia", where, side == 0 ? made[k] : stated[k],
-                    side == 0 ? stated[k] : made[k], AtLink(joint_first), static_cast<int>(k), false,
-                    effect});
-  }
-  for (const auto& [setting, line] : first_of)
-    notes->push_back(line.first + (line.second > 0 ? fmt::format(", and {} more", line.second) : ""));
 }
 
 std::optional<std::string> TakeCompiledInertias(const MjcfFile& mjcf, const mjModel& engine,

@@ -4,12 +4,10 @@
 
 #include <mujoco/mujoco.h>
 
-#include <array>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "harness/descriptions/constant_checks.h"
 #include "harness/descriptions/robot_description.h"
 #include "harness/engine/mjcf_file.h"
 
@@ -39,13 +37,6 @@ struct CompiledChange {
 
 /// Bodies whose stated mass or inertia is not that of the engine's model.
 std::vector<CompiledChange> ListCompiledChanges(const MjcfFile& mjcf, const mjModel& engine);
-
-/// Names what the compiler changed: in a note, at findings of masses, and by findings of inertias where the
-/// other description has what the text states.
-/// @param robots both descriptions, with joints of the same names. @param side of the MJCF: 0 or 1.
-void NameCompiledChanges(const std::vector<CompiledChange>& changes,
-                         const std::array<const RobotDescription*, 2>& robots, size_t side,
-                         ConstantChecks* constants, std::vector<std::string>* notes);
 
 /// The engine has principal moments and axes, and finds them of a tensor to 1e-8 of its size or, for slender
 /// bodies, 1e-6. Gives each body of a description whose inertia is, to rounding, the one that the MJCF states

@@ -3,12 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <limits>
 
 namespace dexcheck {
 namespace {
 
-using P = EnginePart;
+using P = PartKind;
 using Index = Constant::Index;
 
 std::string DescribeDamping(const Joint& joint, double value, double least_inertia) {
@@ -32,31 +31,21 @@ constexpr DescribedConstant kDescribed[] = {
 
 bool HasSpring(const mjModel& m, int joint) { return m.jnt_stiffness[joint] != 0.0; }
 bool HasLimit(const mjModel& m, int joint) { return m.jnt_limited[joint] != 0; }
-bool HasControlLimit(const mjModel& m, int motor) { return m.actuator_ctrllimited[motor] != 0; }
-bool HasForceLimit(const mjModel& m, int motor) { return m.actuator_forcelimited[motor] != 0; }
-
-constexpr unsigned kAllJoints = kRobotJoint | kWheelJoint | kFreeJoint;
+bool LimitsControl(const mjModel& m, int motor) { return m.actuator_ctrllimited[motor] != 0; }
+bool LimitsForce(const mjModel& m, int motor) { return m.actuator_forcelimited[motor] != 0; }
 
 // A constant that is compared between two models alone has no neutral value.
 constexpr Constant kConstants[] = {
-    {"joint_damping", P::kJoint, "damping", &mjModel::dof_damping, Index::kDof, 1, 0.0, kFreeJoint},
-    {"joint_armature", P::kJoint, "armature", &mjModel::dof_armature, Index::kDof, 1, 0.0, kFreeJoint},
-    {"joint_limited", P::kJoint, "limited", &mjModel::jnt_limited, Index::kPart, 1, 0.0,
+    {"joint_damping", P::kJoint, "damping", &mjModel::dof_damping, Index::kDof, 1, 0.0, nullptr, kFreeJoint},
+    {"joint_armature", P::kJoint, "armature", &mjModel::dof_armature, Index::kDof, 1, 0.0, nullptr,
+     kFreeJoint},
+    {"joint_limited", P::kJoint, "limited", &mjModel::jnt_limited, Index::kPart, 1, 0.0, nullptr,
      kFreeJoint | kWheelJoint},
-    {"joint_spring", P::kJoint, "stiffness", &mjModel::jnt_stiffness, Index::kPart, 1, 0.0, kAllJoints},
-    {"joint_spring",
-     P::kJoint,
-     "springref",
-     &mjModel::qpos_spring,
-     Index::kPosition,
-     1,
-     {},
-     kAllJoints,
-     HasSpring},
+    {"joint_spring", P::kJoint, "stiffness", &mjModel::jnt_stiffness, Index::kPart, 1, 0.0},
+    {"joint_spring", P::kJoint, "springref", &mjModel::qpos_spring, Index::kPosition, 1, {}, HasSpring},
     {"joint_dry_friction", P::kJoint, "frictionloss", &mjModel::dof_frictionloss, Index::kDof, 1, 0.0,
-     kFreeJoint | kWheelJoint},
-    {"joint_limit_margin", P::kJoint, "margin", &mjModel::jnt_margin, Index::kPart, 1, 0.0, kAllJoints,
-     HasLimit},
+     nullptr, kFreeJoint | kWheelJoint},
+    {"joint_limit_margin", P::kJoint, "margin", &mjModel::jnt_margin, Index::kPart, 1, 0.0, HasLimit},
     {"motor_transmission", P::kActuator, "transmission", &mjModel::actuator_trntype, Index::kPart, 1,
      mjTRN_JOINT},
     {"motor_transmission", P::kActuator, "gear", &mjModel::actuator_gear, Index::kPart, 6, 1.0},
@@ -73,8 +62,7 @@ constexpr Constant kConstants[] = {
      Index::kPart,
      2,
      {},
-     kAllJoints,
-     HasControlLimit},
+     LimitsControl},
     {"motor_limit",
      P::kActuator,
      "forcerange",
@@ -82,8 +70,7 @@ constexpr Constant kConstants[] = {
      Index::kPart,
      2,
      {},
-     kAllJoints,
-     HasForceLimit},
+     LimitsForce},
     {"tendon_spring", P::kTendon, "stiffness", &mjModel::tendon_stiffness, Index::kPart, 1, 0.0},
     {"tendon_spring", P::kTendon, "springlength", &mjModel::tendon_lengthspring, Index::kPart, 2},
     {"tendon_damping", P::kTendon, "damping", &mjModel::tendon_damping, Index::kPart, 1, 0.0},
@@ -123,34 +110,18 @@ std::vector<double> ReadConstant(const Constant& constant, const mjModel& m, int
   return numbers;
 }
 
-void MakeNeutral(const Constant& constant, int part, mjModel* m) {
-  if (!constant.neutral) return;
-  const auto [first, count] = FindNumbers(constant, *m, part);
-  const int changed = constant.index == Index::kPart ? 1 : count;
-  std::visit(
-      [&, at = first](auto array) {
-        using Number = std::remove_pointer_t<std::remove_reference_t<decltype(m->*array)>>;
-        std::fill_n(m->*array + at, changed, static_cast<Number>(*constant.neutral));
-      },
-      constant.array);
-}
-
-void MakeIdle(EnginePart kind, int id, unsigned role, mjModel* m) {
+void MakeIdle(PartKind kind, int id, unsigned role, mjModel* m) {
   for (const Constant& constant : ListConstants()) {
-    if (constant.part == kind && (constant.roles & role) != 0) MakeNeutral(constant, id, m);
+    if (constant.part != kind || (constant.roles & role) == 0 || !constant.neutral) continue;
+    const auto [first, count] = FindNumbers(constant, *m, id);
+    const int changed = constant.index == Index::kPart ? 1 : count;
+    std::visit(
+        [&, at = first](auto array) {
+          using Number = std::remove_pointer_t<std::remove_reference_t<decltype(m->*array)>>;
+          std::fill_n(m->*array + at, changed, static_cast<Number>(*constant.neutral));
+        },
+        constant.array);
   }
-}
-
-std::array<MotorProperty, 5> ReadMotor(const mjModel& m, int i) {
-  const int transmission = m.actuator_trntype[i];
-  const bool has_gain = m.actuator_gaintype[i] == mjGAIN_FIXED && m.actuator_gear[6 * i] != 0.0;
-  const double gain = has_gain ? m.actuator_gainprm[mjNGAIN * i] : std::numeric_limits<double>::quiet_NaN();
-  return {{{"motor_transmission", mjTRN_JOINT,
-            static_cast<double>(transmission == mjTRN_JOINTINPARENT ? mjTRN_JOINT : transmission)},
-           {"motor_transmission", 1.0, m.actuator_gear[6 * i]},
-           {"motor_dynamics", mjDYN_NONE, static_cast<double>(m.actuator_dyntype[i])},
-           {"motor_gain", 1.0, gain},
-           {"motor_bias", mjBIAS_NONE, static_cast<double>(m.actuator_biastype[i])}}};
 }
 
 int FindCouplingConstraint(const mjModel& engine, int joint) {

@@ -6,7 +6,6 @@
 
 #include <mujoco/mujoco.h>
 
-#include <array>
 #include <optional>
 #include <span>
 #include <string>
@@ -18,8 +17,8 @@
 
 namespace dexcheck {
 
-/// A part of an engine's model.
-enum class EnginePart { kJoint, kActuator, kTendon, kConstraint };
+/// A kind of parts of an engine's model.
+enum class PartKind { kJoint, kActuator, kTendon, kConstraint };
 
 /// Roles of a joint, by the part that it carries.
 enum JointRole : unsigned {
@@ -42,14 +41,14 @@ struct DescribedConstant {
 /// A number, or a few, that each part of a kind has in an engine's model.
 struct Constant {
   const char* check;
-  EnginePart part;
+  PartKind part;
   const char* name;  ///< As an MJCF writes it, or what it is.
   std::variant<mjtNum * mjModel::*, int * mjModel::*, EngineFlag * mjModel::*> array;
   enum class Index { kPart, kPosition, kDof } index = Index::kPart;  ///< What the array is by.
   int count = 1;                                                     ///< Numbers of each part.
   std::optional<double> neutral = {};  ///< With it the part does nothing; of several numbers the first.
-  unsigned roles = kRobotJoint | kWheelJoint | kFreeJoint;     ///< Which joints must have the neutral value.
   bool (*applies)(const mjModel& engine, int part) = nullptr;  ///< Whether it means anything; null: always.
+  unsigned roles = kRobotJoint | kWheelJoint | kFreeJoint;     ///< Which joints must have the neutral value.
 };
 
 /// All of them.
@@ -59,18 +58,8 @@ std::span<const DescribedConstant> ListDescribedConstants();
 
 /// The numbers of a constant of one part; zeros where it means nothing.
 std::vector<double> ReadConstant(const Constant& constant, const mjModel& engine, int part);
-/// Gives a part the neutral value, if the constant has one.
-void MakeNeutral(const Constant& constant, int part, mjModel* engine);
 /// Gives a part the neutral value of all its constants, of joints of those that belong to the role.
-void MakeIdle(EnginePart kind, int part, unsigned role, mjModel* engine);
-
-/// A property of an actuator that a plain torque on its joint, which equals the control, has not.
-struct MotorProperty {
-  const char* check;
-  double plain;
-  double value;  ///< Not a number when no gain is comparable.
-};
-std::array<MotorProperty, 5> ReadMotor(const mjModel& engine, int actuator);
+void MakeIdle(PartKind kind, int part, unsigned role, mjModel* engine);
 
 /// The active equality/joint of first order that makes a joint of the engine's model follow another one; -1
 /// when there is none.

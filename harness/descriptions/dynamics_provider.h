@@ -12,7 +12,7 @@ namespace dexcheck {
 
 /// The terms, in the order in which they are shown: what stands above explains what stands below. Each is a
 /// matrix in the coordinates q', xi of one model, n = dim xi; what it is, and how it is compared, says the
-/// table of terms (harness/checks/term_table.h).
+/// table of terms (harness/comparison/term_table.h).
 enum class Term {
   kJointAxis,        ///< 6 x velocities of joints: direction and a point of the axis, world.
   kLinkCom,          ///< 3 x links, world.

@@ -4,7 +4,6 @@
 #include <set>
 
 #include "controller/model/rigid_body.h"
-#include "harness/descriptions/description_match.h"
 
 namespace dexcheck {
 namespace {

@@ -1,6 +1,6 @@
 #pragma once
 
-// A table of bodies as CAD programs export it: masses, centres of mass and inertias of links, no joints.
+// Files that describe a robot, each opened once.
 
 #include <filesystem>
 #include <map>
@@ -10,32 +10,12 @@
 #include <string_view>
 #include <vector>
 
+#include "harness/descriptions/body_table.h"
 #include "harness/descriptions/robot_description.h"
 #include "harness/descriptions/urdf_reader.h"
 #include "harness/engine/engine.h"
 
 namespace dexcheck {
-
-/// One row.
-struct TabledBody {
-  std::string link;
-  MassProperties body;  ///< In the link's own frame.
-  int line = 0;
-};
-
-/// Reads lines of values between commas or semicolons under a header of "link", "mass [g]", "com_x [mm]",
-/// "com_y", "com_z", "ixx [g*mm^2]", "iyy", "izz", "ixy", "ixz", "iyz". A column without a unit has that of
-/// the column before of its kind, or is in SI. Inertias are about the centre of mass, unless a line before
-/// says "# inertia: origin".
-/// @throws InputError "SOURCE:LINE: ..." for what is missing or no number.
-std::vector<TabledBody> ReadBodyTable(const std::string& text, const std::string& source);
-
-/// The other description's robot with these bodies in the place of its links' own.
-/// @throws InputError when it has none of the links.
-RobotDescription PlaceBodies(const std::vector<TabledBody>& bodies, const std::string& source,
-                             const RobotDescription& other);
-
-// Files that describe a robot, each opened once.
 
 /// Finds the kind of description that a text holds: XML whose root element is <robot> or <mujoco>, or else a
 /// parameter file, or a table of bodies when its name ends in .csv. XML without a root element has the format

@@ -139,6 +139,17 @@ std::vector<std::string> DescribeBalls(const RobotDescription& robot) {
 
 }  // namespace
 
+std::vector<int> MatchJoints(const RobotSpec& a, const RobotSpec& b) {
+  std::map<std::string, int> index_of;
+  for (const Joint& joint : b.joints) index_of.emplace(joint.name, static_cast<int>(index_of.size()));
+  std::vector<int> match;
+  for (const Joint& joint : a.joints) {
+    const auto found = index_of.find(joint.name);
+    match.push_back(found == index_of.end() ? -1 : found->second);
+  }
+  return match;
+}
+
 RobotSpec AddSpheres(const RobotDescription& robot) {
   RobotSpec spec = robot.spec;
   for (const auto& [frame, radius] : robot.spheres) spec.frames[frame].sphere_radius = radius;

@@ -71,6 +71,9 @@ struct RobotDescription {
   std::map<size_t, double> spheres;
 };
 
+/// Index in `b` of each joint of `a`, by name; -1 where there is none.
+std::vector<int> MatchJoints(const RobotSpec& a, const RobotSpec& b);
+
 /// The robot with these spheres as its frames', as one that touches the ground with them needs.
 RobotSpec AddSpheres(const RobotDescription& robot);
 

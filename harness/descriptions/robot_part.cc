@@ -6,7 +6,6 @@
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
 #include "harness/descriptions/alike_names.h"
-#include "harness/descriptions/description_match.h"
 
 namespace dexcheck {
 namespace {

@@ -8,7 +8,6 @@
 #include <string>
 #include <vector>
 
-#include "harness/descriptions/constant_checks.h"
 #include "harness/descriptions/robot_description.h"
 
 namespace dexcheck {

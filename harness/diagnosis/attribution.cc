@@ -189,9 +189,8 @@ Causes ListConstants(std::vector<ConstantFinding> findings) {
       is_listed[k] = true;
       places.push_back(other.where);
     }
-    const std::string component = NameComponent(one.check, one.entry);
-    std::string unit = UnitOf(one.check, /*is_prismatic=*/false);
-    if (unit != UnitOf(one.check, /*is_prismatic=*/true)) unit.clear();
+    const std::string component = NameComponent(one);
+    const std::string unit = UnitOf(one, nullptr);
     const std::string after = unit.empty() ? "" : " " + unit;
     const std::string text = NameQuantity(one.check) + (component.empty() ? "" : " " + component) + " of " +
                              JoinNames(places) + ": " + FormatNumber(one.model, 12) + after +

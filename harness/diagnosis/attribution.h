@@ -9,7 +9,7 @@
 #include "harness/base/check_record.h"
 #include "harness/checks/failure_cause.h"
 #include "harness/checks/run_checks.h"
-#include "harness/descriptions/constant_checks.h"
+#include "harness/comparison/constant_checks.h"
 #include "harness/diagnosis/causes.h"
 
 namespace dexcheck {

@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "harness/checks/consistency.h"
-#include "harness/checks/file_causes.h"
+#include "harness/comparison/consistency.h"
+#include "harness/comparison/file_causes.h"
 #include "harness/descriptions/dynamics_provider.h"
 #include "harness/diagnosis/parameters.h"
 

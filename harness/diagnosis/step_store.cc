@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "harness/checks/check_table.h"
-#include "harness/checks/rounding_scales.h"
+#include "harness/comparison/rounding_scales.h"
 
 namespace dexcheck {
 namespace {

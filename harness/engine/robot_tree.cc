@@ -64,7 +64,7 @@ int FindTipSphere(const mjModel& engine, int site, double within) {
   return nearest <= within ? found : -1;
 }
 
-WheelInertia CalcWheelInertia(const mjModel& engine, const EngineWheel& wheel) {
+double CalcSpinInertia(const mjModel& engine, const EngineWheel& wheel) {
   const int body = engine.jnt_bodyid[wheel.joint];
   mjtNum axis[3];
   mjtNum inverse[4];
@@ -73,7 +73,7 @@ WheelInertia CalcWheelInertia(const mjModel& engine, const EngineWheel& wheel) {
   const mjtNum* moments = engine.body_inertia + 3 * body;
   double spin = 0.0;
   for (int k = 0; k < 3; ++k) spin += moments[k] * axis[k] * axis[k];
-  return {spin, 0.5 * (moments[0] + moments[1] + moments[2] - spin)};
+  return spin;
 }
 
 }  // namespace dexcheck

@@ -34,12 +34,7 @@ int FindTree(const mjModel& engine, int joint);
 /// among all there when none can; -1 without one, or when its centre is farther away than `within`, m.
 int FindTipSphere(const mjModel& engine, int site, double within = std::numeric_limits<double>::infinity());
 
-/// Moments of inertia of a wheel's body, kg m^2.
-struct WheelInertia {
-  double spin = 0.0;        ///< About its hinge.
-  double transverse = 0.0;  ///< Mean of the moments about the axes normal to it.
-};
-
-WheelInertia CalcWheelInertia(const mjModel& engine, const EngineWheel& wheel);
+/// Calculates the moment of inertia of a wheel's body about its hinge, kg m^2.
+double CalcSpinInertia(const mjModel& engine, const EngineWheel& wheel);
 
 }  // namespace dexcheck

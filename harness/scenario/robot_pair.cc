@@ -8,6 +8,7 @@
 #include "controller/common/text.h"
 #include "controller/model/parameter_reader.h"
 #include "harness/base/files.h"
+#include "harness/comparison/engine_constants.h"
 #include "harness/engine/compiled_model.h"
 #include "harness/engine/mujoco_release.h"
 

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "controller/model/robot_model.h"
-#include "harness/descriptions/constant_checks.h"
+#include "harness/comparison/constant_checks.h"
 #include "harness/engine/adapter.h"
 #include "harness/engine/clearance.h"
 #include "harness/engine/engine.h"

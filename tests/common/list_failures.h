@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "controller/model/parameter_reader.h"
-#include "harness/checks/consistency.h"
-#include "harness/descriptions/constant_checks.h"
+#include "harness/comparison/consistency.h"
+#include "harness/comparison/engine_constants.h"
 
 namespace dexcheck::testing {
 
@@ -31,9 +31,19 @@ inline std::string CompareWithEngine(const RobotDescription& robot, const mjMode
   ConsistencyOptions options;
   options.samples = samples;
   ConsistencyResult result = CheckConsistency(adapter, options, [](long) { return true; });
-  const std::vector<std::string> found = CheckCouplings(adapter, /*ignores=*/false, &result.constants);
-  if (notes != nullptr) *notes = found;
+  result.constants = CheckConstants(adapter, ListEngineParts(adapter, {false, true}), {true});
+  if (notes != nullptr) *notes = result.constants.not_compared;
   return ListFailures(result);
+}
+
+/// Compares two descriptions as CompleteEachOther left them, at random states.
+inline ConsistencyResult CompareDescriptions(const RobotDescription& a, const RobotDescription& b,
+                                             const ConsistencyOptions& options) {
+  const RobotModel model_a(a.spec), model_b(b.spec);
+  AnalyticProvider first(model_a, a.spec.source), second(model_b, b.spec.source, model_a);
+  ConsistencyResult result = CompareTerms(model_a, &first, &second, options, [](long) { return true; });
+  result.constants = CheckConstants(a, b);
+  return result;
 }
 
 /// A parameter file's text as a description, without its parts.

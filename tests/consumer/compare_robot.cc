@@ -7,7 +7,7 @@
 #include <string>
 
 #include "controller/model/parameter_reader.h"
-#include "harness/checks/consistency.h"
+#include "harness/comparison/consistency.h"
 #include "harness/engine/adapter.h"
 #include "harness/engine/engine.h"
 

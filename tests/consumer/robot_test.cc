@@ -5,7 +5,7 @@
 #include <string>
 
 #include "controller/dynamics/model_terms.h"
-#include "harness/checks/matchers.h"
+#include "harness/comparison/matchers.h"
 #include "harness/descriptions/read_description.h"
 
 namespace {

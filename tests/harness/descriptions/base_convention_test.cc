@@ -7,7 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "controller/common/errors.h"
-#include "harness/checks/consistency.h"
+#include "harness/comparison/consistency.h"
 #include "harness/descriptions/urdf_reader.h"
 #include "harness/log/npy_file.h"
 #include "tests/common/evaluate_terms.h"

@@ -5,7 +5,7 @@
 
 #include "controller/common/errors.h"
 #include "controller/model/parameter_reader.h"
-#include "harness/checks/consistency.h"
+#include "harness/comparison/consistency.h"
 #include "harness/descriptions/description_writer.h"
 #include "harness/descriptions/mjcf_reader.h"
 #include "harness/engine/engine.h"

@@ -9,10 +9,10 @@
 #include "controller/common/errors.h"
 #include "controller/dynamics/model_terms.h"
 #include "controller/model/parameter_reader.h"
-#include "harness/checks/consistency.h"
-#include "harness/checks/file_comparison.h"
-#include "harness/descriptions/constant_checks.h"
-#include "harness/descriptions/description_match.h"
+#include "harness/comparison/consistency.h"
+#include "harness/comparison/description_match.h"
+#include "harness/comparison/engine_constants.h"
+#include "harness/comparison/file_differences.h"
 #include "harness/descriptions/description_writer.h"
 #include "harness/descriptions/mjcf_reader.h"
 #include "harness/descriptions/read_description.h"
@@ -150,8 +150,8 @@ TEST(MjcfDescription, IsTheEnginesModel) {
   std::vector<std::string> found;
   for (const ConstantFinding& finding : result.constants.findings) found.push_back(finding.check);
   EXPECT_THAT(found, ElementsAre("equality_constraint"));
-  ConstantChecks constants = result.constants;
-  EXPECT_THAT(CheckCouplings(adapter, /*ignores=*/false, &constants), IsEmpty());
+  const ConstantChecks constants = CheckConstants(adapter, ListEngineParts(adapter, {false, true}), {true});
+  EXPECT_THAT(constants.not_compared, IsEmpty());
   EXPECT_TRUE(constants.findings.empty());
   for (const CheckRecord& record : constants.records) EXPECT_FALSE(record.failed) << record.name;
   EXPECT_EQ(robot.spec.joints[1].dry_friction, 0.7);

@@ -12,7 +12,7 @@
 #include "controller/common/errors.h"
 #include "controller/model/parameter_reader.h"
 #include "controller/model/rigid_body.h"
-#include "harness/descriptions/description_match.h"
+#include "harness/comparison/description_match.h"
 #include "harness/descriptions/description_writer.h"
 #include "harness/descriptions/read_description.h"
 #include "harness/engine/engine.h"
