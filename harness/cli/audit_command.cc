@@ -87,7 +87,8 @@ void Print(const AuditRequest& request, const RobotDescription& robot, const Aud
 /// A case for each kind of check, which fails with all that it found.
 std::string WriteAuditJUnit(const AuditRequest& request, const AuditResult& result) {
   std::vector<JUnitCase> cases;
-  for (const char* check : {"mass", "inertia", "density", "com", "mirror", "load", "range", "axis", "name"})
+  for (const char* check :
+       {"mass", "inertia", "density", "com", "mirror", "load", "offset", "range", "axis", "name"})
     cases.push_back({"audit", check, "", ""});
   for (const AuditFinding& finding : result.findings) {
     auto test = std::ranges::find(cases, finding.check, &JUnitCase::name);

@@ -37,7 +37,7 @@ void AddCheck(const CheckRecord& check, const std::string& count, std::vector<Ta
   TableRow& row = rows->emplace_back();
   row.cells = {NameOf(check.kind), count, check.name};
   if (!IsReached(check)) {
-    row.cells.insert(row.cells.end(), {"-", "", "", PaintStatus(check)});
+    row.cells.insert(row.cells.end(), {"-", "", "", "unreached"});
     return;
   }
   const std::string allowed =
@@ -76,14 +76,18 @@ void PrintChecks(const Setup& setup, const ClosedLoop& loop, Detail detail) {
       {{"category", "", all ? "check" : "checks, nearest to its bound", "worst", "bound"}}};
   const auto& constants = setup.constants().records;
   const auto differs = std::ranges::count_if(constants, [](const CheckRecord& r) { return r.failed; });
-  rows.push_back({{"model", std::to_string(constants.size()), "constants", std::to_string(differs), "0", "",
-                   differs > 0 ? Paint(Tone::kBad, "FAILS") : Paint(Tone::kGood, "ok")}});
+  rows.push_back({{"model", std::to_string(constants.size()),
+                   all ? fmt::format("{} constants", constants.size()) : "constants", std::to_string(differs),
+                   "0", "", differs > 0 ? Paint(Tone::kBad, "FAILS") : Paint(Tone::kGood, "ok")}});
   if (all) {
     for (const CheckRecord& check : ListChecksOf(loop)) AddCheck(check, "", &rows);
   } else {
     for (const CheckCategory kind : kCheckCategories) AddCategory(kind, loop, &rows);
   }
-  fmt::print("\n{}", FormatTable("<><>><<", rows));
+  if (all) {  // each line is one check
+    for (TableRow& row : rows) row.cells.erase(row.cells.begin() + 1);
+  }
+  fmt::print("\n{}", FormatTable(all ? "<<>><<" : "<><>><<", rows));
   if (!all) fmt::print("(--all lists each check)\n");
   std::vector<std::string> names;
   double from = 0.0;

@@ -18,6 +18,7 @@ namespace dexcheck {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kLongest = 10.0;  // m, of an offset or a slide
 
 /// The whole bodies that joints move, some of which no body can have.
 struct Bodies {
@@ -98,6 +99,7 @@ class JointAudit {
 
   void Run() {
     for (size_t i = 0; i < spec_.joints.size(); ++i) {
+      AuditOffset(i);
       AuditRange(i);
       AuditAxis(i);
     }
@@ -112,6 +114,14 @@ class JointAudit {
         AuditFinding{level, check, "joint " + spec_.joints[joint].name, line, text});
   }
 
+  void AuditOffset(size_t i) {
+    const Joint& joint = spec_.joints[i];
+    const double length = joint.X_PB.translation().norm() + std::abs(joint.mdh.a) + std::abs(joint.mdh.d);
+    if (length > kLongest)
+      Add(AuditLevel::kSuspicious, "offset", i,
+          "stands " + FormatNumber(length, 3) + " m from the joint before it: as if lengths were in mm");
+  }
+
   void AuditRange(size_t i) {
     const Joint& joint = spec_.joints[i];
     if (!robot_.joints[i].states_range) return;
@@ -119,7 +129,6 @@ class JointAudit {
     const bool is_revolute = joint.type != JointType::kPrismatic;
     const double widest = std::max(std::abs(joint.lower), std::abs(joint.upper));
     constexpr double kMostTurns = 8.0 * kPi;  // four turns either way; 30 degrees are more
-    constexpr double kLongest = 10.0;         // m
     if (joint.lower == joint.upper) {
       Add(AuditLevel::kSuspicious, "range", i, "range " + range + ": the joint cannot move");
     } else if (is_revolute && widest > kMostTurns) {

@@ -35,7 +35,10 @@ double CalcLeastPseudoInertia(const MassProperties& body) {
 class BodyAudit {
  public:
   BodyAudit(const RobotDescription& robot, std::vector<AuditFinding>* findings)
-      : robot_(robot), findings_(*findings) {}
+      : robot_(robot), findings_(*findings) {
+    for (const Joint& joint : robot.spec.joints)
+      reach_ += joint.X_PB.translation().norm() + std::abs(joint.mdh.a) + std::abs(joint.mdh.d);
+  }
 
   void Run() {
     for (const DescribedPart& part : robot_.parts) AuditPart(part);
@@ -56,6 +59,13 @@ class BodyAudit {
     }
     if (!AuditInertia(part) || body.mass <= 0.0) return;
     AuditSize(part);
+    // Far beyond all joints: centres of mass in mm or cm.
+    constexpr double kFar = 3.0, kLink = 1.0;  // m, of a link without further joints
+    if (body.com.norm() > kFar * (reach_ + kLink))
+      Add(AuditLevel::kSuspicious, "com", part,
+          "has its centre of mass " + Format(body.com.norm()) +
+              " m from its frame, beyond the robot's reach of " + Format(reach_) +
+              " m: as if it were in mm or cm");
     if (!part.shapes.empty()) AuditGeometry(part);
   }
 
@@ -167,6 +177,7 @@ class BodyAudit {
 
   const RobotDescription& robot_;
   std::vector<AuditFinding>& findings_;
+  double reach_ = 0.0;  // m, sum of the joints' offsets
 };
 
 /// Words that stand for one side, and the other side's.

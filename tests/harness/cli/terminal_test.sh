@@ -60,12 +60,12 @@ colours() { script -qec "$*" /dev/null | grep -c $'\033\[[0-9;]*m' || true; }
 "${run[@]}" >folded.txt
 "${run[@]}" --all >all.txt
 for question in model law inverse_dynamics forward_dynamics assumption; do
-  [[ $(grep -cE "^  $question +([0-9]+ )?[a-z_]" folded.txt) -ge 1 ]] || fail "no line for $question: $(cat folded.txt)"
+  [[ $(grep -cE "^$question +([0-9]+ +)?[a-z_]" folded.txt) -ge 1 ]] || fail "no line for $question: $(cat folded.txt)"
 done
 [[ $(grep -cE ' ok$' folded.txt) -eq 6 ]] || fail "passing checks are not folded: $(cat folded.txt)"
 [[ $(grep -cE ' ok$' all.txt) -gt 25 ]] || fail "--all does not list the checks: $(cat all.txt)"
 "${run[@]}" --set bounds.cone_use=0.01 >failing.txt && fail "a bound of 0.01 holds"
-grep -qE '^  assumption +cone_use .*FAILS' failing.txt || fail "a failing check is folded away: $(cat failing.txt)"
+grep -qE '^assumption +cone_use .*FAILS' failing.txt || fail "a failing check is folded away: $(cat failing.txt)"
 "${run[@]}" --json | python3 -c 'import json, sys; s = json.load(sys.stdin); assert s["verdict"] == "pass" and s["checks"]["M_bar"]["pass"]' ||
   fail "--json is not the summary"
 

@@ -50,12 +50,12 @@ TEST(ExplanationTest, IsToldInALine) {
   one.ends = true;
   one.rival = "delay";
   one.log_odds = 4.605;  // log(1e2)
-  EXPECT_THAT(one.Describe(), EndsWith("0.25 to 1.5 s; rival: delay, 1e2 times less likely"));
+  EXPECT_THAT(one.Describe(), EndsWith("0.25 to 1.5 s; 100 times less likely: delay"));
   std::vector<Fault> faults = {MakeGain(), MakeOffset()};
   for (const char* name : {"drift", "lag", "delay", "limit"})
     faults.push_back({name, "motor r_elbow", 1.0, 0.0, "", ""});
   EXPECT_THAT(MakeExplanation(faults).Describe(),
-              AllOf(HasSubstr("lag 1 or 2 more: not isolable"), Not(HasSubstr("delay"))));
+              AllOf(HasSubstr("lag 1 or 2 more (this motion"), Not(HasSubstr("delay"))));
   EXPECT_THAT(MakeNotExplained({MakeOffset()}).Describe(),
               AllOf(StartsWith("not explained; nearest: motor r_elbow: offset"), HasSubstr("50 %")));
 }

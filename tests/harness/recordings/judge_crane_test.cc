@@ -128,7 +128,10 @@ TEST(JudgeCrane, AJointThatMovesAndIsNotJudgedIsInTheVerdict) {
   // One that rests all the time is no reason for doubt.
   RecordedTable standing = Record(Crane(), /*stands=*/true);
   *std::find(standing.names.begin(), standing.names.end(), "tau.fold") = "temperature";
-  EXPECT_TRUE(JudgeCrane(standing).Agrees()) << Tell(JudgeCrane(standing));
+  const RecordingJudgement rested = JudgeCrane(standing);
+  EXPECT_TRUE(rested.rests && rested.IsWhole()) << Tell(rested);
+  EXPECT_THAT(MakeAnswer(rested, RobotModel(Crane().spec), "recording.csv").sentence,
+              HasSubstr("no joint of recording.csv moves"));
 }
 
 TEST(JudgeCrane, EachJointsWholeGainIsTold) {

@@ -53,8 +53,7 @@ class PageBrowserTest : public ::testing::Test {
     EXPECT_LT(place["bottom"], height) << width;
     EXPECT_LE(place["overflow"], 0) << width;
     EXPECT_THAT(place["text"].get<std::string>(), HasSubstr("DISAGREEMENT"));
-    for (const char* part :
-         {"Evidence: wheel_slip 0.004", "See it: wheel_slip fails from"})
+    for (const char* part : {"Evidence: wheel_slip 0.004", "See it: wheel_slip fails from"})
       EXPECT_THAT(place["text"].get<std::string>(), HasSubstr(part));
   }
 
@@ -62,6 +61,9 @@ class PageBrowserTest : public ::testing::Test {
   void OpenWithAllPlots() {
     browser_.SetViewport(1280, 9000);
     browser_.Open(folder_.path() / "report.html");
+    ASSERT_TRUE(
+        browser_.Run("for (const fold of document.querySelectorAll('.more')) fold.open = true; return true;")
+            .get<bool>());
     ASSERT_TRUE(browser_.WaitFor(kAllDrawn));
   }
 
@@ -101,8 +103,9 @@ TEST_F(PageBrowserTest, ShowsVerdictAndPlotsWithoutErrors) {
   // The plots have the log's numbers: x actual and desired, near t = 1 s, where a row for each pixel is
   // drawn.
   const nlohmann::json points = browser_.Run(
-      "const sets = document.querySelectorAll('[data-plot]')[0].chart.data.datasets;return sets.map(set => "
-      "set.data.find(point => point.x >= 1));");
+      "const sets = [...document.querySelectorAll('[data-plot]')].find(box => "
+      "box.textContent.includes('along "
+      "x')).chart.data.datasets;return sets.map(set => set.data.find(point => point.x >= 1));");
   ASSERT_EQ(points.size(), 2);
   for (size_t k = 0; k < points.size(); ++k) {
     const double t = points[k]["x"];
