@@ -10,7 +10,7 @@ struct Answer {
   enum class Tone { kGood, kOpen, kBad };
 
   Tone tone = Tone::kGood;
-  std::string word;                  ///< "AGREE", "PASS".
+  std::string word;                       ///< "AGREE", "PASS".
   std::string sentence = {};              ///< With its full stop, in lower case.
   std::vector<std::string> causes = {};   ///< A line each; they are numbered.
   std::vector<std::string> remarks = {};  ///< Evidence, or what to do next; a line each.

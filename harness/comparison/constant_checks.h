@@ -117,6 +117,7 @@ class ConstantComparison {
   }
   [[nodiscard]] const Joint& JointOf(int joint) const { return model_.joint(joint); }
 
+ protected:
   const RobotModel& model_;
   ConstantChecks& result_;
 

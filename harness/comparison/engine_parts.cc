@@ -334,6 +334,7 @@ std::vector<std::string> LeaveOutShared(const std::vector<EnginePart>& first,
     }
   }
   std::vector<std::string> lines;
+  lines.reserve(names.size() + 1);
   for (const auto& [check, elements] : names)
     lines.push_back(check + ": left out on both sides, at " + JoinNames(elements));
   const int flexes = LeaveOutFlexes(engine);

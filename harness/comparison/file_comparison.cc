@@ -105,7 +105,7 @@ FilePair Complete(const DescriptionFile& first, const DescriptionFile& second, c
       if (engine == nullptr || first.format() != RobotFormat::kToml) throw;
     }
   }
-  pair.completion = CompleteTable(*engine, file, &pair.first, options.ignore);
+  if (engine != nullptr) pair.completion = CompleteTable(*engine, file, &pair.first, options.ignore);
   return pair;
 }
 

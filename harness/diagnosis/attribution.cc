@@ -1,5 +1,7 @@
 #include "harness/diagnosis/attribution.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -192,9 +194,9 @@ Causes ListConstants(std::vector<ConstantFinding> findings) {
     const std::string component = NameComponent(one);
     const std::string unit = UnitOf(one, nullptr);
     const std::string after = unit.empty() ? "" : " " + unit;
-    const std::string text = NameQuantity(one.check) + (component.empty() ? "" : " " + component) + " of " +
-                             JoinNames(places) + ": " + FormatNumber(one.model, 12) + after +
-                             " in the model, " + FormatNumber(one.engine, 12) + after + " in the MJCF";
+    const std::string text = fmt::format("{}{}{} of {}: {:.12g}{} in the model, {:.12g}{} in the MJCF",
+                                         NameQuantity(one.check), component.empty() ? "" : " ", component,
+                                         JoinNames(places), one.model, after, one.engine, after);
     causes.push_back(Observe(text, {kUnknownFault, "", one.model, 0.0, unit, ""}, -kNever));
   }
   return causes;
