@@ -69,7 +69,7 @@ int Run(ConsistencyRequest request) {
   junit.Write([&] { return WriteJUnit(request, comparison); });
   page.Write([&] { return MakePage(request, comparison, code); });
   if (!json.TakesStdout()) {
-    PrintAnswer(MakeAnswer(request, comparison, OfferRepair(request, comparison)));
+    PrintAnswer(MakeAnswer(request, comparison, TryRepair(request, comparison)));
     if (!request.quiet) PrintTable(request, comparison);
     if (!request.page_file.empty()) fmt::print("page: {}\n", request.page_file);
   }

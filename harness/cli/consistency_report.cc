@@ -120,7 +120,9 @@ Json ToJson(const FileCause& cause) {
 }
 
 /// Returns the answer for files whose causes are known.
-Answer AnswerByCauses(const ConsistencyRequest& request, const Comparison& comparison) {
+/// @param left what would still differ with the causes corrected; empty for nothing known.
+Answer AnswerByCauses(const ConsistencyRequest& request, const Comparison& comparison,
+                      const std::string& left) {
   const FileCauses& causes = *comparison.causes;
   Answer answer{Answer::Tone::kBad, "DISAGREE", causes.file + " differs from " + causes.reference + "."};
   for (const FileCause& cause : causes.causes) {
@@ -131,7 +133,9 @@ Answer AnswerByCauses(const ConsistencyRequest& request, const Comparison& compa
   std::vector<std::string> unexplained = causes.unexplained;
   for (const std::string& line : ListOtherDifferences(comparison)) unexplained.push_back(line);
   for (const std::string& line : unexplained) answer.remarks.push_back("not explained: " + line);
-  if (!request.exact && unexplained.empty()) {
+  if (!left.empty()) {
+    answer.remarks.push_back("with that corrected, they still differ: " + left);
+  } else if (!request.exact && unexplained.empty()) {
     const std::string digits =
         comparison.digits ? "within the printed digits (" + DescribeDigits(*comparison.digits) + ")"
         : comparison.result.samples == 0 ? "as far as it is printed; no motion was compared"
@@ -285,7 +289,7 @@ void PrintTable(const ConsistencyRequest& request, const Comparison& comparison)
 }
 
 Answer MakeAnswer(const ConsistencyRequest& request, const Comparison& comparison,
-                  const std::string& repair) {
+                  const RepairTrial& repair) {
   const ConsistencyResult& result = comparison.result;
   const auto count = [](const std::vector<std::string>& notes, const char* what) {
     std::string names;
@@ -297,7 +301,7 @@ Answer MakeAnswer(const ConsistencyRequest& request, const Comparison& compariso
                                count(comparison.without_effect, "differ, do not act on these terms");
   Answer answer{.word = "AGREE"};
   if (comparison.causes && !comparison.causes->agrees) {
-    answer = AnswerByCauses(request, comparison);
+    answer = AnswerByCauses(request, comparison, repair.left);
   } else if (!result.Agrees()) {
     answer = AnswerByTerms(request, comparison, left_out);
   } else if (comparison.digits) {
@@ -312,7 +316,7 @@ Answer MakeAnswer(const ConsistencyRequest& request, const Comparison& compariso
                                                           : "the two descriptions",
                                   request.DescribeTolerance(), result.terms.size(), left_out);
   }
-  if (!repair.empty()) answer.remarks.push_back("repair: " + repair);
+  if (!repair.command.empty()) answer.remarks.push_back("repair: " + repair.command);
   if (!request.IsWhole(result))
     answer.remarks.push_back(
         fmt::format("interrupted: these are {} of {} samples", result.samples, request.options.samples));

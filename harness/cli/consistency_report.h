@@ -45,9 +45,14 @@ nlohmann::ordered_json DescribeRecord(const CheckRecord& record, const RobotMode
 
 /// Large results first fail, then where to look: what a person reads.
 void PrintTable(const ConsistencyRequest& request, const Comparison& comparison);
+/// The result of a repair that was tried in memory.
+struct RepairTrial {
+  std::string command = {};  ///< Writes the corrected file; empty if the file would still differ.
+  std::string left = {};     ///< What would still differ; empty for nothing, or where none can be written.
+};
+
 /// Returns whether the two agree, and if not, why.
-/// @param repair the command that writes a corrected file; empty if there is none.
-Answer MakeAnswer(const ConsistencyRequest& request, const Comparison& comparison, const std::string& repair);
+Answer MakeAnswer(const ConsistencyRequest& request, const Comparison& comparison, const RepairTrial& repair);
 /// Returns the results as JSON.
 nlohmann::ordered_json ToJson(const ConsistencyRequest& request, const Comparison& comparison, ExitCode code);
 

@@ -40,7 +40,7 @@ std::string WriteRepair(const DiagnoseRequest& request, const DescriptionFile& f
   if (comparison.Agrees()) return nothing + a + " agrees with " + b;
   if (!comparison.causes || comparison.causes->causes.empty()) return nothing + "no cause is known";
   if (comparison.causes->of_second) {
-    const std::string command = OfferRepair(request, comparison);
+    const std::string command = TryRepair(request, comparison).command;
     return nothing + "the cause is in " + b + (command.empty() ? "" : "; it is repaired by " + command);
   }
   const std::filesystem::path path = request.repaired_file;
@@ -76,7 +76,7 @@ int Run(DiagnoseRequest request) {
   bar.Finish();
   json.Write([&] { return ToJson(request, comparison); });
   if (!json.TakesStdout())
-    PrintAnswer(MakeAnswer(request, comparison, output ? "" : OfferRepair(request, comparison)));
+    PrintAnswer(MakeAnswer(request, comparison, output ? RepairTrial() : TryRepair(request, comparison)));
   if (IsInterrupted()) return ReportFailure("interrupted");
   if (output) {
     const std::string line = WriteRepair(request, first, &second, comparison, &*output);

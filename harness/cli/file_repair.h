@@ -15,7 +15,7 @@ namespace dexcheck::cli {
 RepairedFile Repair(const ConsistencyRequest& request, const DescriptionFile& file,
                     const DescriptionFile& other, const std::filesystem::path& folder);
 
-/// Returns the command that repairs the file in which the causes are; empty if it would not repair it.
-std::string OfferRepair(const ConsistencyRequest& request, const Comparison& comparison);
+/// Repairs the file in which the causes are in memory, and compares it again.
+RepairTrial TryRepair(const ConsistencyRequest& request, const Comparison& comparison);
 
 }  // namespace dexcheck::cli
