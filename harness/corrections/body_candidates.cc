@@ -140,7 +140,7 @@ void CandidateSearch::SearchBody(int link) {
     Add({fault, 3.0, kBodyMask, std::move(values)}, link, ListBodySites(link), {std::move(patch)});
   };
   if (node.parts.empty() || (pair_.given(link).body.mass == 0.0 && right.body.mass > 0.0)) {
-    offer(MakeWhole(Kind::kMissing), fmt::format("mass {:.6g} would be right", right.body.mass),
+    offer(MakeWhole(Kind::kMissing), fmt::format("mass {:.6g} in the other file", right.body.mass),
           [&](PrintedLink* made) { TakeBody(right.body, made); });
     if (node.parts.empty()) return;
   }
@@ -183,7 +183,7 @@ void CandidateSearch::SearchPart(const Part& part) {
   if (part.IsWrong(SiteKind::kMass)) {
     EditTrial number =
         part.Make({Kind::kNumber, SiteKind::kMass}, CountBits(right.mass, part.open.mass),
-                  fmt::format("{:.6g}, {:.6g} would be right", part.given.mass.value, right.mass));
+                  fmt::format("{:.6g} here, {:.6g} in the other file", part.given.mass.value, right.mass));
     const auto take = [m = PrintedScalar{right.mass, part.open.mass}](PrintedLink* made) {
       made->inertial->mass = m;
     };
@@ -213,10 +213,11 @@ void CandidateSearch::SearchPart(const Part& part) {
   if (part.IsWrong(SiteKind::kInertia)) SearchInertiaNumbers(part);
   if (!part.is_fused || part.link != part.node) return;
   constexpr double kTenNumbers = 90.0;
-  EditTrial number =
-      part.Make(MakeWhole(Kind::kNumber), kTenNumbers - part.extra,
-                fmt::format("mass {:.6g}, {:.6g} would be right; centre of mass ({}), ({}) would be right",
-                            part.given.mass.value, right.mass, ShowVector(given), ShowVector(right.com)));
+  EditTrial number = part.Make(
+      MakeWhole(Kind::kNumber), kTenNumbers - part.extra,
+      fmt::format(
+          "mass {:.6g} here, {:.6g} in the other file; centre of mass ({}) here, ({}) in the other file",
+          part.given.mass.value, right.mass, ShowVector(given), ShowVector(right.com)));
   Try(number, part.link, [right](PrintedLink* made) {
     const Matrix3d R = made->inertial->origin.CalcRotation();
     made->inertial->mass.value = right.mass;
@@ -264,8 +265,8 @@ void CandidateSearch::SearchInertiaNumbers(const Part& part) {
       constexpr double kHalf = 1e-4;
       Try(part.Make({Kind::kFrame, SiteKind::kInertia, k},
                     1.0 + CountBits(std::abs(angle) > kHalf ? angle : 0.0, kHalf),
-                    fmt::format("{} of the inertial frame {:.6g}, {:.6g} would be right", kAngleNames[k],
-                                part.given.origin.r[k], angle)),
+                    fmt::format("{} of the inertial frame {:.6g} here, {:.6g} in the other file",
+                                kAngleNames[k], part.given.origin.r[k], angle)),
           part.link, [k, angle](PrintedLink* made) { made->inertial->origin.r[k] = angle; });
     }
   }

@@ -203,8 +203,8 @@ std::string DescribeEntries(std::span<const char* const> names, const double* gi
                             const double* open) {
   std::string text;
   for (const size_t k : ListDiffering(names.size(), given, right, open))
-    text += fmt::format("{}{} {:.6g}, {:.6g} would be right", text.empty() ? "" : "; ", names[k], given[k],
-                        ShowZero(right[k], open[k]));
+    text += fmt::format("{}{} {:.6g} here, {:.6g} in the other file", text.empty() ? "" : "; ", names[k],
+                        given[k], ShowZero(right[k], open[k]));
   return text;
 }
 

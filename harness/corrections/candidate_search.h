@@ -103,7 +103,7 @@ class CandidateSearch {
 /// nothing.
 std::optional<double> CountLeft(double after, double before);
 
-/// "x 0.1, 0.2 would be right" of each entry that differs by more than the tolerance.
+/// "x 0.1 here, 0.2 in the other file" of each entry that differs by more than the tolerance.
 std::string DescribeEntries(std::span<const char* const> names, const double* given, const double* right,
                             const double* open);
 /// "0.1 0 -0.2": entries that are rounding beside the largest are 0.

@@ -101,9 +101,9 @@ struct KindWords {
   const char* words;
 };
 constexpr KindWords kWords[] = {
-    {Kind::kNumber, "number", "another value"},
+    {Kind::kNumber, "number", "differs"},
     {Kind::kMissing, "missing", "missing"},
-    {Kind::kSurplus, "unneeded", "stated only here"},
+    {Kind::kSurplus, "unneeded", "not in the other file"},
     {Kind::kSign, "sign", "with the other sign"},
     {Kind::kSignOf, "sign_{}", "with the sign of {} turned around"},
     {Kind::kPermutation, "{}", "{}"},
@@ -114,7 +114,7 @@ constexpr KindWords kWords[] = {
     {Kind::kAngleDegrees, "degrees_{}", "with {} in degrees"},
     {Kind::kAnglesReversed, "ypr", "with its angles in the order yaw, pitch, roll"},
     {Kind::kAnglesPermuted, "angles_{}", "with its angles {}"},
-    {Kind::kEulerSequence, "sequence_{}", "with its angles taken in another order, {} would be right"},
+    {Kind::kEulerSequence, "sequence_{}", "with its angles taken in another order, not {}"},
     {Kind::kMovingAxes, "meant_other_order",
      "as if its angles were about fixed axes, they are about moving ones"},
     {Kind::kFixedAxes, "other_order", "as if its angles were about moving axes, they are about fixed ones"},
@@ -153,7 +153,7 @@ constexpr KindWords kWords[] = {
     {Kind::kExchanged, "exchange", "exchanged with that of"},
     {Kind::kOfOther, "other_link", "that of"},
     {Kind::kPartMissing, "lost", "without a part that is welded to it"},
-    {Kind::kOtherAxis, "number", "another axis"},
+    {Kind::kOtherAxis, "number", "differs"},
     {Kind::kCompiled, "compiled", "as a setting of the compiler made it"},
     {Kind::kClassicRows, "{}", "{}"},
     {Kind::kShiftedRows, "{}", "with alpha and a of the row {}"},

@@ -160,7 +160,7 @@ struct CorrectionCandidate {
   std::vector<Site> sites;
   double bits = 0.0;  ///< Beyond those of which convention and where.
   std::vector<LinkPatch> patches;
-  std::string values;                   ///< "mass 1.9, 1.998 would be right"
+  std::string values;                   ///< "mass 1.9 here, 1.998 in the other file"
   std::optional<FaultBeside> beside{};  ///< The sites are right only if this is undone too.
   double rest =
       1.0;  ///< How far sites are from right then, relative to the digits' tolerances; 1: they are right.

@@ -16,11 +16,11 @@ constexpr const char* kJointKinds[] = {"fixed", "revolute", "prismatic", "ball",
 const char* NameKind(const PrintedLink& link) { return kJointKinds[static_cast<size_t>(link.joint.kind)]; }
 
 std::string DescribeRight(double given, double right) {
-  return fmt::format("{:.6g}, {:.6g} would be right", given, right);
+  return fmt::format("{:.6g} here, {:.6g} in the other file", given, right);
 }
 
 std::string DescribeRight(const Vector3d& given, const Vector3d& right) {
-  return fmt::format("({}), ({}) would be right", ShowVector(given), ShowVector(right));
+  return fmt::format("({}) here, ({}) in the other file", ShowVector(given), ShowVector(right));
 }
 
 EditTrial MakeTrial(Kind kind, SiteKind of, double bits, std::string values = "", int component = 0) {
@@ -63,7 +63,7 @@ void CandidateSearch::SearchRange(int link) {
   if (!joint.range)
     return add(
         Kind::kMissing, 3.0,
-        fmt::format("{:.6g} to {:.6g} would be right", (*other.range)[0].value, (*other.range)[1].value));
+        fmt::format("{:.6g} to {:.6g} in the other file", (*other.range)[0].value, (*other.range)[1].value));
   if (!other.range) return add(Kind::kSurplus, 3.0, "");
   const PrintedScalar lower = (*joint.range)[0], upper = (*joint.range)[1];
   const PrintedScalar right_lower = (*other.range)[0], right_upper = (*other.range)[1];
@@ -103,7 +103,7 @@ void CandidateSearch::SearchMimic(int link) {
   const auto show = [](const PrintedMimic& mimic) {
     return fmt::format("{:.6g} times {}", mimic.multiplier.value, mimic.leader);
   };
-  if (!joint.mimic) return add(Kind::kMissing, 3.0, show(*other.mimic) + " would be right");
+  if (!joint.mimic) return add(Kind::kMissing, 3.0, show(*other.mimic) + " in the other file");
   if (!other.mimic) return add(Kind::kSurplus, 3.0, show(*joint.mimic));
   std::string values;
   double bits = 1.0;
@@ -118,7 +118,7 @@ void CandidateSearch::SearchMimic(int link) {
       !Differ(joint.mimic->offset, other.mimic->offset))
     add(Kind::kSign, 0.0, values);
   if (values.empty())
-    values = fmt::format("follows {}, {} would be right", joint.mimic->leader, other.mimic->leader);
+    values = fmt::format("follows {} here, {} in the other file", joint.mimic->leader, other.mimic->leader);
   add(Kind::kNumber, bits, values);
 }
 
@@ -146,7 +146,7 @@ void CandidateSearch::SearchScalar(int link, JointScalar scalar) {
   constexpr double kColumn = 0.1;
   if (given->value == 0.0)
     add(Kind::kMissing, PrintedPair::States(a, scalar) ? 3.0 : kColumn,
-        fmt::format("{:.6g} would be right", right->value));
+        fmt::format("{:.6g} in the other file", right->value));
   if (right->value == 0.0)
     add(Kind::kSurplus, PrintedPair::States(b, scalar) ? 5.0 : kColumn, fmt::format("{:.6g}", given->value));
   if (given->value == -right->value) add(Kind::kSign, 0.0);
@@ -170,13 +170,13 @@ void CandidateSearch::SearchJoint(int link) {
       return parent < 0 ? std::string("the world") : robot.link(parent).name;
     };
     const std::string values =
-        fmt::format("{} carries it, {} would be right", name(pair_.a(), pair_.node(link).parent),
+        fmt::format("{} carries it here, {} in the other file", name(pair_.a(), pair_.node(link).parent),
                     name(pair_.b(), pair_.node_b(pair_.Partner(link)).parent));
     AddSimple(MakeTrial(Kind::kNumber, SiteKind::kCarrier, 8.0, values), link, [](PrintedLink*) {});
   }
   if (IsWrong(link, SiteKind::kType) && given.joint.kind != other.joint.kind) {
     AddSimple(MakeTrial(Kind::kNumber, SiteKind::kType, 3.0,
-                        fmt::format("{}, {} would be right", NameKind(given), NameKind(other))),
+                        fmt::format("{} here, {} in the other file", NameKind(given), NameKind(other))),
               link, [&](PrintedLink* made) {
                 const Vector3d axis = HasAxis(given) && HasAxis(other) ? given.joint.axis : right.axis;
                 made->joint = other.joint;
@@ -218,7 +218,8 @@ void CandidateSearch::SearchRobot() {
           fmt::format("joint {}, link {}", link.joint.name, link.name));
     } else if (site.kind == SiteKind::kType && site.link == 0 && a.floats && b.floats) {
       const auto name = [](bool floats) { return floats ? "floating" : "fixed"; };
-      add(Kind::kNumber, 3.0, fmt::format("{} base, {} would be right", name(*a.floats), name(*b.floats)));
+      add(Kind::kNumber, 3.0,
+          fmt::format("{} base here, {} in the other file", name(*a.floats), name(*b.floats)));
     } else if (site.kind == SiteKind::kConstraint) {
       const auto list = [](const PrintedRobot& robot, const PrintedRobot& other) {
         std::vector<std::string> only;

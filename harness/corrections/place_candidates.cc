@@ -118,7 +118,8 @@ void CandidateSearch::SearchRotationNumbers(const Origin& origin) {
     const Vector3d none = Vector3d::Zero(), angles = SolveRollPitchYaw(right)[0];
     const Vector3d open = Vector3d::Constant(half);
     const double bits = 4.0 + 0.35 * CountEntries(3, none.data(), angles.data(), open.data());
-    offer(CorrectionKind::kMissing, TurnsQuarters(right) ? 3.5 : bits, ShowAngles(right) + " would be right");
+    offer(CorrectionKind::kMissing, TurnsQuarters(right) ? 3.5 : bits,
+          ShowAngles(right) + " in the other file");
   }
   const PrintedJoint& joint = pair_.a().link(origin.node).joint;
   const Vector3d axis = joint.axis.normalized();
@@ -149,7 +150,7 @@ void CandidateSearch::SearchRotationNumbers(const Origin& origin) {
       is_one_angle = true;
       const double value = std::abs(solved[k]) <= half ? 0.0 : solved[k];
       offer(CorrectionKind::kNumber, 1.0 + std::min(CountBits(value, half), CountBits(angle, half)),
-            fmt::format("{} {:.6g}, {:.6g} would be right", kAngleNames[k], r[k], value));
+            fmt::format("{} {:.6g} here, {:.6g} in the other file", kAngleNames[k], r[k], value));
     }
     for (const Vector3d& angles : SolveRollPitchYaw(right)) {
       if (is_one_angle) break;
@@ -190,7 +191,7 @@ void CandidateSearch::SearchPositionNumbers(const Origin& origin) {
 void CandidateSearch::SearchPoseNumbers(const Origin& origin) {
   const Vector3d t = origin.right.translation();
   const Matrix3d R = origin.right.linear();
-  const std::string values = fmt::format("xyz {}, {} would be right", ShowVector(t), ShowAngles(R));
+  const std::string values = fmt::format("xyz {}, {} in the other file", ShowVector(t), ShowAngles(R));
   const auto offer = [&](CorrectionKind kind, double bits) {
     Try(origin.Make(kind, SiteKind::kPosition, bits, values, true), origin.link, [=](PrintedLink* link) {
       link->origin.SetRotation(R);
@@ -319,7 +320,7 @@ void CandidateSearch::SearchWeld(int link) {
     Try({{is_none ? CorrectionKind::kMissing : CorrectionKind::kNumber, SiteKind::kRotation},
          is_none ? 8.0 : 40.0,
          kPoseMask | kBodyMask,
-         ShowAngles(R) + " would be right"},
+         ShowAngles(R) + " in the other file"},
         link, TakeRotation(R));
   }
 }

@@ -312,7 +312,7 @@ TEST_F(PartOfRobot, ABaseThatOneFileWeldsIsACause) {
   const Json results = Compare(1, "welded.xml", "floats.xml");
   const Json& causes = results.at("causes");
   ASSERT_EQ(causes.size(), 1U) << causes;
-  EXPECT_EQ(causes[0].at("text"), "link stand: type another value: fixed, free would be right");
+  EXPECT_EQ(causes[0].at("text"), "link stand: type differs: fixed here, free in the other file");
   EXPECT_THAT(results.at("not_compared"), Contains(HasSubstr("terms: ")));
 }
 
