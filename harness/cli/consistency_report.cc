@@ -304,17 +304,22 @@ Answer MakeAnswer(const ConsistencyRequest& request, const Comparison& compariso
     answer = AnswerByCauses(request, comparison, repair.left);
   } else if (!result.Agrees()) {
     answer = AnswerByTerms(request, comparison, left_out);
-  } else if (comparison.digits) {
-    answer.sentence =
-        fmt::format("all {} terms agree within the printed digits ({}){}; --exact asks for rounding alone{}.",
-                    result.terms.size(), DescribeDigits(*comparison.digits),
-                    DescribeLoosest(comparison.digits->loosest), left_out);
   } else {
-    answer.sentence = fmt::format("{} agree to {} in all {} terms{}.",
-                                  comparison.with_engine  ? "the analytic model and MuJoCo"
-                                  : request.has_results() ? "the description and the results"
-                                                          : "the two descriptions",
-                                  request.DescribeTolerance(), result.terms.size(), left_out);
+    const std::string terms = result.terms.size() == 1
+                                  ? "the only compared term, " + result.terms.front().name
+                                  : fmt::format("all {} terms", result.terms.size());
+    if (comparison.digits) {
+      answer.sentence =
+          fmt::format("{} agree{} within the printed digits ({}){}; --exact asks for rounding alone{}.",
+                      terms, result.terms.size() == 1 ? "s" : "", DescribeDigits(*comparison.digits),
+                      DescribeLoosest(comparison.digits->loosest), left_out);
+    } else {
+      answer.sentence = fmt::format("{} agree to {} in {}{}.",
+                                    comparison.with_engine  ? "the analytic model and MuJoCo"
+                                    : request.has_results() ? "the description and the results"
+                                                            : "the two descriptions",
+                                    request.DescribeTolerance(), terms, left_out);
+    }
   }
   if (!repair.command.empty()) answer.remarks.push_back("repair: " + repair.command);
   if (!request.IsWhole(result))
