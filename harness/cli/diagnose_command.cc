@@ -75,8 +75,11 @@ int Run(DiagnoseRequest request) {
       Compare(request, &first, &second, [&](long samples) { return bar.GoOn(samples); });
   bar.Finish();
   json.Write([&] { return ToJson(request, comparison); });
-  if (!json.TakesStdout())
-    PrintAnswer(MakeAnswer(request, comparison, output ? RepairTrial() : TryRepair(request, comparison)));
+  if (!json.TakesStdout()) {
+    RepairTrial repair = TryRepair(request, comparison);
+    if (output) repair.command.clear();  // it is being written
+    PrintAnswer(MakeAnswer(request, comparison, repair));
+  }
   if (IsInterrupted()) return ReportFailure("interrupted");
   if (output) {
     const std::string line = WriteRepair(request, first, &second, comparison, &*output);

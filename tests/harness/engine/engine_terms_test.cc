@@ -1,4 +1,4 @@
-// What the engine's terms refuse, and their friction with tendons. adapter_test.cc compares all terms with
+// Refusals of the engine's terms, and their friction with tendons. adapter_test.cc compares all terms with
 // the analytic model's.
 
 #include "harness/engine/engine_terms.h"

@@ -151,7 +151,7 @@ TEST(ShippedScenarios, PaperRestSpinsTheWheels) {
   ExpectModelAgrees(run.loop());
 }
 
-// Where the object turns against the fingertips about the bonds, J_B_dot' counts.
+// J_B_dot' counts where the object turns against the fingertips about the bonds.
 TEST(ShippedScenarios, BondedFingertipsNeitherSlipNorRoll) {
   ShippedRun straight("bonded", {"duration=3"});
   ExpectBondedPass(straight, straight.Run());
