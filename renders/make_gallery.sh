@@ -21,10 +21,10 @@ still runs/carried --still 8.5 --inset grasp --out two-hands.png
 "$dexcheck" study run laws --db laws.sqlite
 "$dexcheck" study report laws.sqlite --page laws.html
 chromium --headless --hide-scrollbars --window-size=1180,3000 --screenshot=page.png laws.html
-convert page.png -crop 1160x468+10+975 +repage -colors 64 laws.png
+convert page.png -crop 1160x500+10+975 +repage -colors 64 laws.png
 
 # two-files.png is cut from the page of a Panda and a copy with three errors; consistency ends with exit code 1.
-sed -e 's/name="panda_joint6"/& axis="0 0 -1"/; s/pos="0.027518 0.039252/pos="0.027518 0.089252/; s/-0.0825 0.384/-0.0825 0.424/' \
+sed -e 's/joint name="panda_joint6"/& axis="0 0 -1"/; s/pos="0.027518 0.039252/pos="0.027518 0.089252/; s/-0.0825 0.384/-0.0825 0.424/' \
   "$root/mjcf/panda.xml" >panda.xml
 "$dexcheck" "$root/controller/parameters/panda.toml" panda.xml --page two-files.html || [[ $? -eq 1 ]]
 chromium --headless --hide-scrollbars --window-size=1180,760 --screenshot=page.png two-files.html

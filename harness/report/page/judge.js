@@ -57,7 +57,7 @@
       })));
     }
     const Mark = (kind, mark, words) => Add(Make('span', '', {className: 'cell ' + kind}), Make('i', mark), ' ' + words);
-    AddSection('Isolability', Add(Make('p', '', {className: 'soft legend'}), 'Columns are the causes above. ', Mark('named', '●', 'the only one that explains it'), Mark('same', '◆', 'one of a class'),
+    AddSection('Alternatives', Add(Make('p', '', {className: 'soft legend'}), 'Columns are the causes above. ', Mark('named', '●', 'the only one that explains it'), Mark('same', '◆', 'one of a class'),
       Mark('same', '◇', 'explains it as well'), Mark('rival', '1e3', 'so many times less likely')), Card('scroll', matrix));
   }
 
