@@ -1,4 +1,5 @@
-// Compared quantities, how runs fail, faults of sensors that nobody declares, and the share of what is declared.
+// Compared quantities, how runs fail, faults of sensors that nobody declares, and the share of what is
+// declared.
 
 #include <gmock/gmock.h>
 
