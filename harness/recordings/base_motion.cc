@@ -194,10 +194,17 @@ std::vector<TorqueFault> ListPushes(const RobotModel& model, const std::vector<i
       one.push.has_moment = has_moment;
     }
   add("acceleration", "base", "m/s^2", 3, kMostAcceleration);
-  for (const int joint : joints)
-    add("torque", "joint " + model.joint(joint).name,
-        model.joint(joint).type == JointType::kRevolute ? "N m" : "N", 1, extents.FindTorque(joint))
-        .push.joint = joint;
+  for (const int joint : joints) {
+    const std::string place = "joint " + model.joint(joint).name;
+    const char* const unit = model.joint(joint).type == JointType::kRevolute ? "N m" : "N";
+    add("torque", place, unit, 1, extents.FindTorque(joint)).push.joint = joint;
+    TorqueFault& stuck = add("stuck torque", place, unit, 2, 0.0);
+    stuck.push.joint = joint;
+    stuck.push.is_stuck = true;
+    stuck.scale[1] = 1.0;
+    constexpr double kWhole = 0.1;
+    stuck.is_possible = [](const VectorXd& a) { return std::abs(a[1] - 1.0) < kWhole; };
+  }
   return faults;
 }
 

@@ -158,6 +158,9 @@ Fault CauseDescription::Describe(const TorqueFault& fault, const VectorXd& a, Ve
         fmt::format("at {} Hz, along its axes {}", FormatNumber(set_.refinements().shaking / (2.0 * kPi), 4),
                     vector(Vector3d(size(0), size(1), size(2))));
     if (a.size() > 6) one.detail += ", about them " + vector(Vector3d(size(3), size(4), size(5))) + " rad";
+  } else if (fault.kind == kStuckTorque || (fault.kind == kPush && fault.push.is_stuck)) {
+    one.value = a[0];
+    one.error = error[0];
   } else if (fault.kind == kPush && fault.push.has_moment) {
     one.value = a.head<3>().norm();
     one.error = error.head<3>().norm();

@@ -11,7 +11,7 @@
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
 #include "harness/recordings/base_motion.h"
-#include "harness/recordings/position_faults.h"
+#include "harness/recordings/nonlinear_search.h"
 
 namespace dexcheck {
 namespace {
@@ -38,10 +38,20 @@ Explanation MakeCause(const Fault& fault) {
   return one;
 }
 
-/// A fault of the recorded positions. An offset of the joint that a fixed base carries is gravity that is
-/// turned about its axis.
-Explanation MakeCause(const RobotModel& model, const PositionFault& found) {
+/// A fault of the recording or of the model's geometry. An offset of the joint that a fixed base carries is
+/// gravity that is turned about its axis.
+Explanation MakeCause(const RobotModel& model, const LinkFrames& frames, const NonlinearFault& found) {
   Explanation one = MakeCause(found.fault);
+  if (found.IsOfModel()) {
+    one.channel = CauseChannel::kBalance;
+    const int parent = model.joint(found.joint).parent;
+    const Matrix3d R = frames.Find(parent).linear();
+    one.faults.front().detail = (found.number == NonlinearFault::Number::kPlacement
+                                     ? "moved by " + FormatVector(R.transpose() * found.shift, 3) + " m"
+                                     : "turned by " + FormatVector(R.transpose() * found.turn, 3) + " rad") +
+                                " in " + frames.NameOf(model.link_name(parent));
+    if (!found.shows_all) one.faults.front().detail += ", as far as this motion shows it";
+  }
   const bool is_offset = found.offset != 0.0 && found.joint >= 0 && model.joint(found.joint).parent < 0;
   if (!is_offset || model.base().type != BaseType::kFixed) return one;
   const Joint& joint = model.joint(found.joint);
@@ -294,14 +304,15 @@ class Judge {
     const VectorXd shown = term.error.array().isFinite().select(term.error, 0.0);
     const Index sizes = fault.HasVelocity() || fault.kind == TorqueFault::kSpring ? 1 : term.amplitude.size();
     if (term.amplitude.head(sizes).norm() < kErrors * shown.head(sizes).norm()) return true;
-    if (result_.left <= kMostNoise) return false;
+    if (result_.IsWhole()) return false;
     const double left = 1.0 - estimator_.selection().fraction;
+    constexpr double kMostLeft = 0.1;
     if (fault.IsFriction())
       return (fault.kind == TorqueFault::kStribeckFriction || fault.kind == TorqueFault::kLoadFriction) &&
              term.fraction - left < kMuch;
     // Measured, no bounds: the nearest cause of drawn torques that were cut off explains less than the last.
     constexpr double kMost = 100.0;
-    return (term.fraction - left < kMuch && fault.kind > TorqueFault::kArmature) ||
+    return ((left > kMostLeft || term.fraction - left < kMuch) && fault.kind > TorqueFault::kArmature) ||
            (result_.left > kFar && fault.kind != TorqueFault::kPayload && term.fraction <= kMost * left);
   }
 
@@ -326,27 +337,23 @@ size_t RecordingJudgement::CountExplaining() const {
   }));
 }
 
-bool RecordingJudgement::IsHidden() const {
-  return std::ranges::all_of(balances, [](const JointJudgement& one) { return one.hidden >= one.modelled; });
-}
+bool RecordingJudgement::IsHidden() const { return std::ranges::all_of(balances, &JointJudgement::IsHidden); }
 
 bool RecordingJudgement::Agrees() const {
-  return causes.empty() && IsWhole() && !IsHidden() && !rests &&
+  return causes.empty() && IsWhole() && std::ranges::none_of(balances, &JointJudgement::IsHidden) && !rests &&
          std::ranges::none_of(unjudged, &UnjudgedJoint::moves);
 }
 
 namespace {
 
-/// Whether other positions, or another order of columns, may say more simply what was found, or what was not.
+/// Whether a nonlinear fault may say more simply what was found, or what was not.
 bool MayBeOtherwise(const RecordingJudgement& judgement) {
-  constexpr double kWell = 0.95;
-  constexpr long kFewNumbers = 2;
+  constexpr long kFewNumbers = 1;
   if (std::ranges::any_of(judgement.unjudged, &UnjudgedJoint::has_no_gain)) return true;
-  if (judgement.IsWhole()) return judgement.by_causes.numbers > kFewNumbers;
-  return judgement.explained < kWell || judgement.left > kFar || judgement.causes.size() > 3;
+  return !judgement.IsWhole() || judgement.by_causes.numbers > kFewNumbers;
 }
 
-/// Sum over the joints of the residual's logarithm.
+/// Returns the sum over the joints of the residual's logarithm.
 double CalcLeft(const RecordingJudgement& judgement) {
   double sum = 0.0;
   for (const JointJudgement& joint : judgement.balances)
@@ -354,15 +361,42 @@ double CalcLeft(const RecordingJudgement& judgement) {
   return sum;
 }
 
-/// Whether a judgement with so many faults of positions undone explains more, or the same with fewer numbers.
-bool IsBetter(const RecordingJudgement& one, size_t faults, const RecordingJudgement& other,
-              size_t other_faults) {
+/// Whether a judgement leaves so much less in the logarithm, of one joint and of all. Less than noise is no
+/// better than noise.
+bool LeavesLess(const RecordingJudgement& one, const RecordingJudgement& other, double of_joint,
+                double of_all) {
+  double most = 0.0, all = 0.0;
+  for (size_t i = 0; i < std::min(one.balances.size(), other.balances.size()); ++i) {
+    const auto left = [i](const RecordingJudgement& of) {
+      return std::max({of.balances[i].left, of.balances[i].noise, std::numeric_limits<double>::min()});
+    };
+    const double fall = std::log(left(other) / left(one));
+    most = std::max(most, fall);
+    all += fall;
+  }
+  return most > of_joint && all > of_all;
+}
+
+/// Returns the numbers of nonlinear faults; a wrong geometry of the model is rarer than a wrong body.
+long CountNumbers(const std::vector<NonlinearFault>& faults) {
+  constexpr long kRarer = 2;
+  long count = 0;
+  for (const NonlinearFault& one : faults) count += one.CountNumbers() + (one.IsOfModel() ? kRarer : 0);
+  return count;
+}
+
+/// Whether a judgement with these faults undone explains more, or the same with fewer numbers.
+bool IsBetter(const RecordingJudgement& one, const std::vector<NonlinearFault>& faults,
+              const RecordingJudgement& other, const std::vector<NonlinearFault>& other_faults) {
   if (one.unjudged.size() != other.unjudged.size()) return one.unjudged.size() < other.unjudged.size();
   if (one.IsWhole() != other.IsWhole()) return one.IsWhole();
+  const long numbers = CountNumbers(faults), other_numbers = CountNumbers(other_faults);
+  constexpr double kWorse = 0.1;  // in the logarithm
   if (one.IsWhole())
-    return one.by_causes.numbers + static_cast<long>(faults) <
-           other.by_causes.numbers + static_cast<long>(other_faults);
-  return CalcLeft(one) < CalcLeft(other);
+    return CalcLeft(one) < CalcLeft(other) + kWorse * static_cast<double>(one.balances.size()) &&
+           one.by_causes.numbers + numbers < other.by_causes.numbers + other_numbers;
+  constexpr double kMuchOfNumber = 0.25, kMuch = 0.4;
+  return LeavesLess(one, other, kMuch, kMuchOfNumber * static_cast<double>(numbers - other_numbers));
 }
 
 /// Opens all of them again, with a change of their channels; false where that cannot be.
@@ -385,9 +419,15 @@ RecordingJudgement JudgeRecordings(const RobotModel& model, std::vector<Recordin
   const auto count = [&](long rows) { return goes_on = !on_rows || on_rows(rows); };
   RecordingJudgement judgement = Judge(model, recordings, options, count).Run();
   if (!goes_on) return judgement;
-  std::vector<PositionFault> faults;
+  std::vector<NonlinearFault> faults;
   const auto undo = [&](Recording* one) {
-    for (const PositionFault& fault : faults) fault.Undo(one);
+    for (const NonlinearFault& fault : faults) fault.Undo(one);
+  };
+  RobotModel corrected = model;
+  const auto correct = [&] {
+    RobotSpec spec = model.spec();
+    for (const NonlinearFault& fault : faults) fault.Undo(&spec);
+    corrected = RobotModel(std::move(spec));
   };
   // A simulator's forces are those of the velocity that it has at a step, a robot's those of the position's
   // time.
@@ -402,7 +442,7 @@ RecordingJudgement JudgeRecordings(const RobotModel& model, std::vector<Recordin
   }
   constexpr size_t kMostFaults = 3;
   RecordingJudgement best = judgement;
-  std::vector<PositionFault> best_faults;
+  std::vector<NonlinearFault> best_faults;
   while (goes_on && options.tries_positions && faults.size() < kMostFaults && MayBeOtherwise(judgement)) {
     if (!recordings->front().reopen) {
       best.notes.push_back(
@@ -412,28 +452,30 @@ RecordingJudgement JudgeRecordings(const RobotModel& model, std::vector<Recordin
     }
     Recording begin = recordings->front().reopen();
     undo(&begin);
-    const std::optional<PositionFault> fault = FindPositionFault(model, std::move(begin));
-    const auto is_like = [&](const PositionFault& one) { return one.fault.IsLike(fault->fault); };
+    const std::optional<NonlinearFault> fault = FindNonlinearFault(corrected, std::move(begin));
+    const auto is_like = [&](const NonlinearFault& one) { return one.fault.IsLike(fault->fault); };
     if (!fault || std::ranges::any_of(faults, is_like)) break;
     faults.push_back(*fault);
     if (!Reopen(recordings, undo)) break;
-    judgement = Judge(model, recordings, options, count).Run();
-    if (IsBetter(judgement, faults.size(), best, best_faults.size())) best = judgement, best_faults = faults;
+    correct();
+    judgement = Judge(corrected, recordings, options, count).Run();
+    if (IsBetter(judgement, faults, best, best_faults)) best = judgement, best_faults = faults;
   }
   judgement = std::move(best);
   faults = std::move(best_faults);
+  correct();
   constexpr int kReadings = 5;
   JudgeOptions next = options;
   for (int i = 1; i < kReadings && goes_on && judgement.refinements != next.refinements; ++i) {
     next.refinements = judgement.refinements;
     if (!Reopen(recordings, undo)) break;
-    RecordingJudgement again = Judge(model, recordings, next, count).Run();
+    RecordingJudgement again = Judge(corrected, recordings, next, count).Run();
     // Rows that a reading leaves out are no reason to find nothing.
     if (again.Agrees()) break;
     judgement = std::move(again);
   }
-  for (const PositionFault& fault : faults)
-    judgement.causes.insert(judgement.causes.begin(), MakeCause(model, fault));
+  for (const NonlinearFault& fault : faults)
+    judgement.causes.insert(judgement.causes.begin(), MakeCause(model, options.frames, fault));
   return judgement;
 }
 

@@ -25,6 +25,9 @@ struct JointJudgement {
   double hidden = 0.0;                          ///< Error of the model's torque that noise may hide.
   double held_residual = 0.0, held_left = 0.0;  ///< The same in the quarter that no cause was found with.
   double drive_gain = 0.0;                      ///< N m/A, where currents were recorded; otherwise 0.
+
+  /// Whether noise may hide an error of a fifth of the model's torque.
+  [[nodiscard]] bool IsHidden() const { return hidden >= 0.2 * modelled; }
 };
 
 /// How well a set of numbers predicts the quarter that it was not fitted to.
@@ -63,9 +66,10 @@ struct RecordingJudgement {
   [[nodiscard]] size_t CountExplaining() const;
   /// Beside the causes no more than noise is left.
   [[nodiscard]] bool IsWhole() const;
-  /// Noise may hide an error as large as the torque itself, at every joint.
+  /// Noise may hide such errors at every joint.
   [[nodiscard]] bool IsHidden() const;
-  /// Joints move, all that do are judged, and the residual is noise, with no cause, beside which errors show.
+  /// Joints move, all that do are judged, and the residual is noise, with no cause, beside which errors of
+  /// every joint show.
   [[nodiscard]] bool Agrees() const;
 };
 

@@ -83,8 +83,8 @@ Answer MakeAnswer(const RecordingJudgement& judgement, const RobotModel& robot,
     say("EXPLAINED", fmt::format("{} explains {}: the rest is noise{}", model, recording,
                                  DescribeNoise(judgement, robot)));
   } else if (judgement.causes.empty() && judgement.IsWhole() && judgement.IsHidden()) {
-    say("PARTLY EXPLAINED", fmt::format("what {} leaves of {} is noise, beside which no error of the "
-                                        "model would show",
+    say("PARTLY EXPLAINED", fmt::format("what {} leaves of {} is noise, which would hide an error of a "
+                                        "fifth of any joint's torque",
                                         model, recording));
   } else if (judgement.causes.empty() && judgement.IsWhole() && judgement.rests) {
     say("PARTLY EXPLAINED",
@@ -92,11 +92,14 @@ Answer MakeAnswer(const RecordingJudgement& judgement, const RobotModel& robot,
                     "was tested",
                     recording, model));
   } else if (judgement.causes.empty() && judgement.IsWhole()) {
-    std::vector<std::string> judged;
+    std::vector<std::string> judged, hidden;
     for (const JointJudgement& one : judgement.balances)
-      if (one.recording == 0) judged.push_back(name_of(one.joint));
+      if (one.recording == 0) (one.IsHidden() ? hidden : judged).push_back(name_of(one.joint));
     say("PARTLY EXPLAINED",
         fmt::format("{} explains {} at {}: the rest is noise", model, recording, JoinNames(judged)));
+    if (!hidden.empty())
+      answer.sentence +=
+          fmt::format("; noise at {} would hide an error of a fifth of the torque", JoinNames(hidden));
   } else if (are_velocities_alone && judgement.IsWhole()) {
     say("DIFFERS", fmt::format("{} explains the torques of {}; its velocities are not the positions' "
                                "derivatives and are not used",

@@ -147,6 +147,10 @@ class FaultList {
                modelled.armature, true, FindMostPer(joint, extents_.acceleration, kSlow));
     AddAtJoint(kTorqueGain, joint, "torque gain", "", {TorqueColumn::kTorque, joint}, 1.0, false, kMostGain)
         .is_possible = IsGain;
+    TorqueFault& stuck =
+        Add(kStuckTorque, joint, "stuck torque", "joint " + modelled.name, torque,
+            {{{{TorqueColumn::kOffset, joint}, joint}}, {{{TorqueColumn::kTorque, joint}, joint, -1.0}}});
+    stuck.is_possible = IsStuck;
     TorqueFault& delay =
         AddAtJoint(kDelay, joint, "delay of the torque", "s", {TorqueColumn::kRate, joint}, 0.0, false, 0.0);
     delay.sums[0][0].factor = -1.0;
@@ -308,6 +312,11 @@ class FaultList {
   static bool IsGain(const VectorXd& a) {
     constexpr double kLeast = 0.05;
     return std::abs(1.0 + a[0]) > kLeast;
+  }
+  /// Whether the recorded torque has nothing of the model's.
+  static bool IsStuck(const VectorXd& a) {
+    constexpr double kWhole = 0.05;
+    return std::abs(a[1] - 1.0) < kWhole;
   }
   /// No torque is recorded before it acts.
   void LimitDelay(TorqueFault* delay) const {

@@ -21,14 +21,17 @@ struct ColumnPart {
 };
 
 /// A force on a link (three columns, world axes, at its centre of mass; six with a moment), a torque at a
-/// joint, or an acceleration of the base (three columns), for a time.
+/// joint, a torque of it that is stuck (two columns), or an acceleration of the base (three columns), for a
+/// time.
 struct Push {
   int recording = 0;
   double from = 0.0, to = 0.0;  ///< s
   double reach = 0.0;           ///< Over which smoothing spreads its begin and end to each side, s.
   int link = -1;
   bool has_moment = false;
-  int joint = -1;  ///< -1 besides no link: the base.
+  int joint = -1;         ///< -1 besides no link: the base.
+  bool is_stuck = false;  ///< The joint's recorded torque is a constant instead of what it was.
+  int window = -1;        ///< The stretch of time in which it was found; its candidates share that.
 };
 
 /// A fault of the model at a place. The columns of the candidate are made of its sums, in units of noise,
@@ -46,6 +49,7 @@ struct TorqueFault : Candidate {
     kOffset,
     kArmature,
     kTorqueGain,
+    kStuckTorque,
     kDelay,
     kZero,
     kSaturation,

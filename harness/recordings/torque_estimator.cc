@@ -89,8 +89,11 @@ void TorqueEstimator::ListFaults() {
   // Torques that hold a robot still reach no limit.
   std::erase_if(faults_, [&](const TorqueFault& one) {
     return (recordings_->has_currents() &&
-            (one.kind == TorqueFault::kTorqueGain || one.kind == TorqueFault::kSaturation)) ||
-           ((*recordings_)[0].stands && one.kind == TorqueFault::kSaturation) || IsTooFast(one);
+            (one.kind == TorqueFault::kTorqueGain || one.kind == TorqueFault::kSaturation ||
+             one.kind == TorqueFault::kStuckTorque)) ||
+           ((*recordings_)[0].stands &&
+            (one.kind == TorqueFault::kSaturation || one.kind == TorqueFault::kStuckTorque)) ||
+           IsTooFast(one);
   });
   excluded_.clear();
   // With drives' gains sought, the model's bodies are the scale that shows them.
@@ -166,11 +169,8 @@ void TorqueEstimator::Relinearise() {
 void TorqueEstimator::FindTimesOf(const CauseTerm& term) {
   VectorXd others = CalcAmplitudes(selection_.terms);
   others.segment(ListFirstColumns()[term.candidate], term.amplitude.size()).setZero();
-  const Push before = faults_[term.candidate].push;
-  const Push found = FindTimes(*recordings_, rows_, rows_.CalcLeft(others), before);
-  for (TorqueFault& one : faults_)
-    if (one.kind == TorqueFault::kPush && one.recording == before.recording && one.push.from == before.from)
-      one.push.from = found.from, one.push.to = found.to;
+  Push& push = faults_[term.candidate].push;
+  push = FindTimes(*recordings_, rows_, rows_.CalcLeft(others), push);
 }
 
 void TorqueEstimator::ScaleWhole(const std::vector<CauseTerm>& terms, TorqueFault* gain) const {
@@ -180,7 +180,7 @@ void TorqueEstimator::ScaleWhole(const std::vector<CauseTerm>& terms, TorqueFaul
     const TorqueFault& found = faults_[term.candidate];
     const bool is_recorded = found.kind == TorqueFault::kTorqueGain || found.kind == TorqueFault::kOffset ||
                              found.kind == TorqueFault::kAllOffsets || found.kind == TorqueFault::kDelay ||
-                             found.kind == TorqueFault::kPush;
+                             found.kind == TorqueFault::kStuckTorque || found.kind == TorqueFault::kPush;
     if (is_recorded) continue;
     for (size_t k = 0; k < found.sums.size(); ++k)
       for (ColumnPart part : found.sums[k]) {
@@ -288,14 +288,14 @@ bool TorqueEstimator::ExcludeSeconds() {
         std::ranges::min_element(payloads, {}, [](const CauseTerm* one) { return one->amplitude[0]; });
     excluded_[(*least)->candidate] = has_any = true;
   }
-  std::vector<std::tuple<TorqueFault::Kind, int, int, double>> seen;
+  std::vector<std::tuple<TorqueFault::Kind, int, int>> seen;
   for (const CauseTerm& term : selection_.terms) {
     const TorqueFault& one = faults_[term.candidate];
     const bool is_shape = one.kind == TorqueFault::kDryFriction ||
                           one.kind == TorqueFault::kStribeckFriction ||
                           one.kind == TorqueFault::kSaturation || one.kind == TorqueFault::kMass;
     if (one.kind != TorqueFault::kPush && !is_shape) continue;
-    const std::tuple what(one.kind, one.index, one.push.recording, one.push.from);
+    const std::tuple what(one.kind, one.index, one.push.window);
     if (std::find(seen.begin(), seen.end(), what) == seen.end()) {
       seen.push_back(what);
     } else {
@@ -404,10 +404,15 @@ bool TorqueEstimator::AddPushes() {
   if (!selection_.terms.empty() && CalcRms(rows_, left) <= 1.0) return false;
   const size_t before = faults_.size();
   const MotionExtents extents = recordings_->CalcExtents();
+  int windows = 0;
   for (size_t r = 0; r < recordings_->size(); ++r)
-    for (const Push& when : FindPushes(*recordings_, rows_, left, r))
-      for (TorqueFault& one : ListPushes(recordings_->model(), recordings_->joints(), when, extents))
+    for (Push when : FindPushes(*recordings_, rows_, left, r)) {
+      when.window = windows++;
+      for (TorqueFault& one : ListPushes(recordings_->model(), recordings_->joints(), when, extents)) {
+        one.push = FindTimes(*recordings_, rows_, left, one.push);
         faults_.push_back(std::move(one));
+      }
+    }
   return faults_.size() > before;
 }
 

@@ -51,7 +51,7 @@ class TorqueEstimator {
   void Select();
   /// Computes columns of products of faults anew: they are linear in each once the others are known.
   void Relinearise();
-  /// When a push begins and ends, for all that may have pushed then.
+  /// Moves the begin and end of a push to where it explains most.
   void FindTimesOf(const CauseTerm& term);
   /// A gain's column: the torque of the model and of these causes, where the robot has them.
   void ScaleWhole(const std::vector<CauseTerm>& terms, TorqueFault* gain) const;

@@ -135,8 +135,14 @@ Eigen::RowVectorXd CalcPushColumns(const RecordingSet& recordings, const Push& p
   } else if (push.joint < 0) {
     // To be accelerated is to weigh the other way.
     columns = -block.gravity.row(place) / block.samples;
-  } else if (recordings.joints()[part.place] == push.joint) {
-    columns[0] = 1.0;
+  } else {
+    columns.setZero(push.is_stuck ? 2 : 1);
+    if (recordings.joints()[part.place] == push.joint) {
+      columns[0] = 1.0;
+      const Index torque = part.balance->Find(part.place, {TorqueColumn::kTorque, push.joint});
+      if (push.is_stuck && block.counts[part.place] > 0.0)
+        columns[1] = -block.sums[part.place][torque] / block.counts[part.place];
+    }
   }
   return columns * (std::sqrt(block.counts[part.place]) / recordings[part.recording].weight[place]);
 }

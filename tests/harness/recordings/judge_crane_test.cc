@@ -154,12 +154,45 @@ TEST(JudgeCrane, EachJointsWholeGainIsTold) {
   EXPECT_GE(told, 3U) << Tell(judgement);
 }
 
-TEST(JudgeCrane, APositionGainOfTwoPercentIsFound) {
-  RecordedTable table = Record(Crane());
-  Change(&table, "q.lift", [](double x) { return 1.02 * x; });
-  const RecordingJudgement judgement = JudgeCrane(table);
-  ASSERT_TRUE(NamesOnly(judgement, "position gain", "joint lift", 1.02));
-  EXPECT_NEAR(judgement.causes[0].faults[0].value, 1.02, 0.002);
+// Faults in which torques are not linear: each is one cause, and the only one.
+TEST(JudgeCrane, WrongPositionsClocksAndGeometryAreNamed) {
+  struct Case {
+    std::string fault, place;
+    double value;
+    std::function<void(RecordedTable*)> record;
+    std::function<void(Joint*)> robot = nullptr;  // of the fold joint
+    double near = 0.02;
+  };
+  const auto scale = [](const std::string& column, double factor) {
+    return [=](RecordedTable* table) { Change(table, column, [=](double x) { return factor * x; }); };
+  };
+  const Eigen::AngleAxisd turned(0.1, Vector3d::UnitX());
+  const auto turn = [&](Joint* joint) { joint->X_PB = joint->X_PB * Pose(turned); };
+  const auto stuck = [](RecordedTable* table) {
+    std::vector<double>& torque = table->Get("tau.fold");
+    std::fill(torque.begin() + 1500, torque.begin() + 1900, torque[1500]);
+  };
+  const Case cases[] = {
+      {"position gain", "joint lift", 1.02, scale("q.lift", 1.02), nullptr, 0.002},
+      {"unit of the position", "joint fold", 180.0 / kPi, scale("q.fold", 180.0 / kPi)},
+      {"clock", "all joints", 1.01, scale("time", 1.01), nullptr, 0.002},
+      {"placement", "joint fold", 0.03, {}, [](Joint* joint) { joint->X_PB.translation().x() += 0.03; }},
+      {"orientation", "joint fold", 0.1, {}, turn},
+      {"stuck torque", "joint fold", std::numeric_limits<double>::quiet_NaN(), stuck},
+  };
+  for (const Case& one : cases) {
+    SCOPED_TRACE(one.fault);
+    RobotDescription robot = Crane();
+    if (one.robot) one.robot(&robot.spec.joints[2]);
+    RecordedTable table = Record(robot);
+    if (one.record) one.record(&table);
+    const RecordingJudgement judgement = JudgeCrane(table);
+    ASSERT_EQ(judgement.causes.size(), 1U) << Tell(judgement);
+    const Fault& fault = judgement.causes[0].faults[0];
+    EXPECT_EQ(fault.place + ": " + fault.fault, one.place + ": " + one.fault);
+    EXPECT_EQ(judgement.causes[0].outcome, CauseOutcome::kNamed);
+    if (!std::isnan(one.value)) EXPECT_NEAR(fault.value, one.value, one.near * one.value);
+  }
 }
 
 TEST(JudgeCrane, APushOfARobotThatStandsHasItsTimes) {

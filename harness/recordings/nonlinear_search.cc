@@ -1,0 +1,256 @@
+#include "harness/recordings/nonlinear_search.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "controller/common/linear_algebra.h"
+
+namespace dexcheck {
+namespace {
+
+using Eigen::Index;
+
+/// The begin of a recording, and how well the model explains it.
+class Begin {
+ public:
+  Begin(const RobotModel& model, Recording* recording) : model_(model) {
+    constexpr size_t kRows = 3000;
+    MotionFit motion(model, recording, kRows);
+    joints_ = motion.joints();
+    has_currents_ = motion.has_currents();
+    velocity_faults_ = motion.faults();
+    motion.Run([&](const RecordedSample& sample) {
+      samples_.push_back(sample);
+      // A joint that friction holds has a torque that says nothing.
+      const std::vector<bool> judged = motion.IsJudged(sample);
+      for (const int joint : joints_)
+        if (!judged[static_cast<size_t>(joint)])
+          samples_.back().torque[joint] = std::numeric_limits<double>::quiet_NaN();
+      return samples_.size() < kRows;
+    });
+  }
+
+  [[nodiscard]] size_t size() const { return samples_.size(); }
+  /// Whether recorded velocities are the derivatives of positions that have this gain undone.
+  [[nodiscard]] bool HasRatesOf(const Fault& gain) const {
+    constexpr double kNear = 0.1;
+    return std::ranges::any_of(velocity_faults_, [&](const Fault& rate) {
+      return rate.place == gain.place && std::abs(rate.value * gain.value - 1.0) < kNear;
+    });
+  }
+  /// Lowest and highest positions (n x 2).
+  [[nodiscard]] MatrixXd CalcRanges() const {
+    MatrixXd ranges = MatrixXd::Zero(model_.num_joints(), 2);
+    if (!samples_.empty()) ranges << samples_.front().q, samples_.front().q;
+    for (const RecordedSample& sample : samples_)
+      ranges << ranges.col(0).cwiseMin(sample.q), ranges.col(1).cwiseMax(sample.q);
+    return ranges;
+  }
+  /// Returns what friction, an offset and a current's scale leave of each joint's torque beside the model's
+  /// (samples x joints), at every such sample; 0 where it is not judged.
+  MatrixXd CalcResiduals(const NonlinearFault& undone, size_t every) {
+    std::optional<RobotModel> changed;
+    if (undone.IsOfModel()) {
+      RobotSpec spec = model_.spec();
+      undone.Undo(&spec);
+      changed.emplace(std::move(spec));
+    }
+    TorqueRegressor regressor(changed ? *changed : model_);
+    const Index count = static_cast<Index>((samples_.size() + every - 1) / every);
+    const auto joints = static_cast<Index>(joints_.size());
+    std::vector<MatrixXd> columns(joints_.size(), MatrixXd::Zero(count, kColumns));
+    MatrixXd measured = MatrixXd::Zero(count, joints);
+    VectorXd torques(model_.num_joints());
+    for (Index i = 0; i < count; ++i) {
+      RecordedSample sample = samples_[static_cast<size_t>(i) * every];
+      undone.Undo(&sample);
+      regressor.SetMotion(sample.q, sample.qd, sample.qdd, sample.base);
+      regressor.CalcTorques(torques);
+      for (Index place = 0; place < joints; ++place) {
+        const int joint = joints_[static_cast<size_t>(place)];
+        if (std::isnan(sample.torque[joint])) continue;
+        // A current's scale is free.
+        measured(i, place) = sample.torque[joint] - (has_currents_ ? 0.0 : torques[joint]);
+        columns[static_cast<size_t>(place)].row(i) << 1.0, sample.direction[joint], sample.qd[joint],
+            has_currents_ ? torques[joint] : 0.0;
+      }
+    }
+    for (Index place = 0; place < joints; ++place) {
+      const MatrixXd& Z = columns[static_cast<size_t>(place)];
+      auto y = measured.col(place);
+      y -= (Z * SolveLeastSquares(Z.transpose() * Z, Z.transpose() * y)).eval();
+    }
+    return measured;
+  }
+
+ private:
+  static constexpr Index kColumns = 4;  // offset, direction, velocity, the model's torque
+
+  const RobotModel& model_;
+  std::vector<int> joints_;
+  bool has_currents_ = false;
+  std::vector<Fault> velocity_faults_;
+  std::vector<RecordedSample> samples_;
+};
+
+/// Returns the sum over joints of the logarithm of the residual.
+double CalcMisfit(const MatrixXd& residuals) {
+  double misfit = 0.0;
+  for (Index place = 0; place < residuals.cols(); ++place)
+    misfit += std::log(residuals.col(place).norm() + std::numeric_limits<double>::min());
+  return misfit;
+}
+
+using Number = NonlinearFault::Number;
+
+/// Changes a fault's numbers. @param axes 3 x 2: about which the joint turns.
+void Change(const VectorXd& change, const MatrixXd& axes, NonlinearFault* fault) {
+  switch (fault->number) {
+    case Number::kNone:
+      break;
+    case Number::kGain:
+      fault->factor *= 1.0 + change[0];
+      break;
+    case Number::kOffset:
+      fault->offset += change[0];
+      break;
+    case Number::kClock:
+      fault->clock *= 1.0 + change[0];
+      break;
+    case Number::kPlacement:
+      fault->shift += change;
+      break;
+    case Number::kOrientation:
+    case Number::kAxis:
+      fault->turn += axes * change;
+      break;
+  }
+}
+
+/// Returns the size of a fault's numbers, as it is said.
+double CalcValue(const NonlinearFault& fault) {
+  switch (fault.number) {
+    case Number::kNone:
+      return fault.fault.value;
+    case Number::kGain:
+      return 1.0 / fault.factor;
+    case Number::kOffset:
+      return -fault.offset;
+    case Number::kClock:
+      return 1.0 / fault.clock;
+    case Number::kPlacement:
+      return fault.shift.norm();
+    case Number::kOrientation:
+    case Number::kAxis:
+      return fault.turn.norm();
+  }
+  return 0.0;
+}
+
+/// Two directions in its parent's frame, orthogonal to a joint's axis (3 x 2).
+MatrixXd FindPlane(const RobotModel& model, int joint) {
+  const Joint& one = model.joint(joint);
+  const Vector3d axis =
+      one.X_PB.linear() * Eigen::AngleAxisd(one.mdh.alpha, Vector3d::UnitX()) * Vector3d::UnitZ();
+  const Vector3d first = axis.unitOrthogonal();
+  return (MatrixXd(3, 2) << first, axis.cross(first)).finished();
+}
+
+/// Moves a fault's numbers to where it explains most, by Gauss and Newton's method. @param every of so many
+/// samples one counts. @param settled the misfit that a step less gains. @return the misfit there.
+double Refine(const RobotModel& model, size_t every, double settled, Begin* begin, NonlinearFault* fault) {
+  MatrixXd residuals = begin->CalcResiduals(*fault, every);
+  double misfit = CalcMisfit(residuals);
+  if (fault->number == Number::kNone) return misfit;
+  const MatrixXd plane = fault->joint >= 0 ? FindPlane(model, fault->joint) : MatrixXd();
+  constexpr int kSteps = 10;
+  constexpr double kDifference = 1e-5, kLeastPart = 0.05, kUnseen = 1e-5;
+  double gained = 1.0;
+  for (int i = 0; i < kSteps && gained > settled; ++i) {
+    const VectorXd weights =
+        residuals.colwise().norm().cwiseMax(std::numeric_limits<double>::min()).cwiseInverse();
+    const VectorXd e = (residuals * weights.asDiagonal()).reshaped();
+    MatrixXd J(e.size(), fault->CountNumbers());
+    for (Index k = 0; k < J.cols(); ++k) {
+      NonlinearFault near = *fault;
+      Change(kDifference * VectorXd::Unit(J.cols(), k), plane, &near);
+      J.col(k) = ((begin->CalcResiduals(near, every) * weights.asDiagonal()).reshaped() - e) / kDifference;
+    }
+    // A direction that the motion does not show stays as it is.
+    MatrixXd H = J.transpose() * J;
+    const double least = kUnseen * H.diagonal().maxCoeff();
+    fault->shows_all = CalcSymmetricEigenvalues(H)[0] > least;
+    H.diagonal().array() += least;
+    const VectorXd step = -SolveLeastSquares(H, J.transpose() * e);
+    gained = 0.0;
+    for (double part = 1.0; part > kLeastPart && gained == 0.0; part *= 0.5) {
+      NonlinearFault near = *fault;
+      Change(part * step, plane, &near);
+      MatrixXd left = begin->CalcResiduals(near, every);
+      const double then = CalcMisfit(left);
+      if (!(then < misfit)) continue;
+      gained = misfit - then;
+      misfit = then;
+      residuals = std::move(left);
+      *fault = std::move(near);
+    }
+  }
+  fault->fault.value = CalcValue(*fault);
+  return misfit;
+}
+
+/// Whether a fault's numbers are such as occur.
+bool IsPlausible(const NonlinearFault& fault) {
+  constexpr double kFarthest = 0.3, kMostTurn = 0.5;  // m, rad
+  // A clock runs a little fast or slow, or has another rate.
+  constexpr double kDrift = 0.05;
+  const double octaves = fault.clock > 0.0 ? std::log2(fault.clock) : 0.5;
+  return fault.shift.norm() <= kFarthest && fault.turn.norm() <= kMostTurn &&
+         std::abs(octaves - std::round(octaves)) <= kDrift &&
+         (fault.number != Number::kGain || fault.factor > 0.0);
+}
+
+}  // namespace
+
+std::optional<NonlinearFault> FindNonlinearFault(const RobotModel& model, Recording recording) {
+  Begin begin(model, &recording);
+  std::vector<NonlinearFault> all = ListNonlinearFaults(model, recording, begin.CalcRanges());
+  // A few samples say which are worth all of them: of each kind and place the best number.
+  constexpr size_t kFewSamples = 100, kFewFaults = 10;
+  const size_t few = std::max<size_t>(1, begin.size() / kFewSamples);
+  constexpr double kRoughly = 1e-3, kWell = 1e-6;
+  std::vector<std::pair<double, NonlinearFault>> faults;
+  for (NonlinearFault& one : all) {
+    const double misfit = CalcMisfit(begin.CalcResiduals(one, few));
+    const auto same = std::ranges::find_if(faults, [&](const auto& known) {
+      const NonlinearFault& other = known.second;
+      return one.number != Number::kNone && one.number == other.number && one.joint == other.joint &&
+             one.has_right_rates == other.has_right_rates;
+    });
+    if (same == faults.end()) {
+      faults.emplace_back(misfit, std::move(one));
+    } else if (misfit < same->first) {
+      *same = {misfit, std::move(one)};
+    }
+  }
+  for (auto& [misfit, fault] : faults) misfit = Refine(model, few, kRoughly, &begin, &fault);
+  std::ranges::sort(faults, {}, &std::pair<double, NonlinearFault>::first);
+  faults.resize(std::min(faults.size(), kFewFaults));
+  // The residual falls by a factor of three, of one joint or spread over several; with numbers something is
+  // always explained.
+  constexpr double kMuch = 1.1, kMuchOfNumber = 0.1;
+  const double as_read = CalcMisfit(begin.CalcResiduals({}, 1));
+  double best = as_read;
+  std::optional<NonlinearFault> found;
+  for (auto& [of_few, fault] : faults) {
+    const double misfit = Refine(model, 1, kWell, &begin, &fault);
+    const double most = as_read - (fault.number != Number::kNone ? kMuchOfNumber : kMuch);
+    if (misfit < std::min(best, most) && IsPlausible(fault)) best = misfit, found = std::move(fault);
+  }
+  if (found && found->factor != 1.0 && begin.HasRatesOf(found->fault)) found->has_right_rates = true;
+  return found;
+}
+
+}  // namespace dexcheck
