@@ -11,7 +11,7 @@
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
 #include "harness/recordings/base_motion.h"
-#include "harness/recordings/nonlinear_search.h"
+#include "harness/recordings/readings.h"
 
 namespace dexcheck {
 namespace {
@@ -27,43 +27,6 @@ constexpr double kMuch = 0.05;
 double RoundToPercent(double velocity) {
   constexpr double kSteps = 100.0;  // of a percent, in the logarithm
   return std::exp(std::round(kSteps * std::log(velocity)) / kSteps);
-}
-
-/// A fault of the recording itself, that holds all the time.
-Explanation MakeCause(const Fault& fault) {
-  Explanation one;
-  one.channel = CauseChannel::kMeasurement;
-  one.from = one.to = std::numeric_limits<double>::quiet_NaN();
-  one.faults = {fault};
-  return one;
-}
-
-/// A fault of the recording or of the model's geometry. An offset of the joint that a fixed base carries is
-/// gravity that is turned about its axis.
-Explanation MakeCause(const RobotModel& model, const LinkFrames& frames, const NonlinearFault& found) {
-  Explanation one = MakeCause(found.fault);
-  if (found.IsOfModel()) {
-    one.channel = CauseChannel::kBalance;
-    const int parent = model.joint(found.joint).parent;
-    const Matrix3d R = frames.Find(parent).linear();
-    one.faults.front().detail = (found.number == NonlinearFault::Number::kPlacement
-                                     ? "moved by " + FormatVector(R.transpose() * found.shift, 3) + " m"
-                                     : "turned by " + FormatVector(R.transpose() * found.turn, 3) + " rad") +
-                                " in " + frames.NameOf(model.link_name(parent));
-    if (!found.shows_all) one.faults.front().detail += ", as far as this motion shows it";
-  }
-  const bool is_offset = found.offset != 0.0 && found.joint >= 0 && model.joint(found.joint).parent < 0;
-  if (!is_offset || model.base().type != BaseType::kFixed) return one;
-  const Joint& joint = model.joint(found.joint);
-  const Vector3d axis = model.base().X_B0.linear() * joint.X_PB.linear() *
-                        Eigen::AngleAxisd(joint.mdh.alpha, Vector3d::UnitX()) * Vector3d::UnitZ();
-  const Vector3d turned = Eigen::AngleAxisd(-found.offset, axis) * model.gravity();
-  constexpr double kLittle = 1e-3;
-  if ((turned - model.gravity()).norm() < kLittle * model.gravity().norm()) return one;
-  one.faults.push_back({"gravity", "world", turned.norm(), 0.0, "m/s^2",
-                        FormatVector(turned, 3) + ", or a base that is turned as far"});
-  one.SetOutcome();
-  return one;
 }
 
 /// One judgement, put into words.
@@ -296,9 +259,10 @@ class Judge {
     result_.found.push_back(std::move(found));
   }
 
-  /// Whether more than noise is left, so that something else is at work, and it explains little, or where far
-  /// more is left not far more: a wrong mass fits a little of any. Dry and viscous friction are named all the
-  /// same, since drives have more shapes of it than are tried; a further shape that explains little is not.
+  /// Whether more than noise is left, so that something else is at work, and all causes or this one explain
+  /// little, or where far more is left not far more: a wrong mass fits a little of any. Dry and viscous
+  /// friction are named all the same, since drives have more shapes of it than are tried; a further shape
+  /// that explains little is not.
   [[nodiscard]] bool IsDoubtful(const TorqueFault& fault, const CauseTerm& term) const {
     constexpr double kErrors = 3.0;  // standard errors from zero
     const VectorXd shown = term.error.array().isFinite().select(term.error, 0.0);
@@ -312,7 +276,7 @@ class Judge {
              term.fraction - left < kMuch;
     // Measured, no bounds: the nearest cause of drawn torques that were cut off explains less than the last.
     constexpr double kMost = 100.0;
-    return ((left > kMostLeft || term.fraction - left < kMuch) && fault.kind > TorqueFault::kArmature) ||
+    return left > kMostLeft || (term.fraction - left < kMuch && fault.kind > TorqueFault::kArmature) ||
            (result_.left > kFar && fault.kind != TorqueFault::kPayload && term.fraction <= kMost * left);
   }
 
@@ -344,139 +308,15 @@ bool RecordingJudgement::Agrees() const {
          std::ranges::none_of(unjudged, &UnjudgedJoint::moves);
 }
 
-namespace {
-
-/// Whether a nonlinear fault may say more simply what was found, or what was not.
-bool MayBeOtherwise(const RecordingJudgement& judgement) {
-  constexpr long kFewNumbers = 1;
-  if (std::ranges::any_of(judgement.unjudged, &UnjudgedJoint::has_no_gain)) return true;
-  return !judgement.IsWhole() || judgement.by_causes.numbers > kFewNumbers;
-}
-
-/// Returns the sum over the joints of the residual's logarithm.
-double CalcLeft(const RecordingJudgement& judgement) {
-  double sum = 0.0;
-  for (const JointJudgement& joint : judgement.balances)
-    sum += std::log(std::max(joint.left, std::numeric_limits<double>::min()));
-  return sum;
-}
-
-/// Whether a judgement leaves so much less in the logarithm, of one joint and of all. Less than noise is no
-/// better than noise.
-bool LeavesLess(const RecordingJudgement& one, const RecordingJudgement& other, double of_joint,
-                double of_all) {
-  double most = 0.0, all = 0.0;
-  for (size_t i = 0; i < std::min(one.balances.size(), other.balances.size()); ++i) {
-    const auto left = [i](const RecordingJudgement& of) {
-      return std::max({of.balances[i].left, of.balances[i].noise, std::numeric_limits<double>::min()});
-    };
-    const double fall = std::log(left(other) / left(one));
-    most = std::max(most, fall);
-    all += fall;
-  }
-  return most > of_joint && all > of_all;
-}
-
-/// Returns the numbers of nonlinear faults; a wrong geometry of the model is rarer than a wrong body.
-long CountNumbers(const std::vector<NonlinearFault>& faults) {
-  constexpr long kRarer = 2;
-  long count = 0;
-  for (const NonlinearFault& one : faults) count += one.CountNumbers() + (one.IsOfModel() ? kRarer : 0);
-  return count;
-}
-
-/// Whether a judgement with these faults undone explains more, or the same with fewer numbers.
-bool IsBetter(const RecordingJudgement& one, const std::vector<NonlinearFault>& faults,
-              const RecordingJudgement& other, const std::vector<NonlinearFault>& other_faults) {
-  if (one.unjudged.size() != other.unjudged.size()) return one.unjudged.size() < other.unjudged.size();
-  if (one.IsWhole() != other.IsWhole()) return one.IsWhole();
-  const long numbers = CountNumbers(faults), other_numbers = CountNumbers(other_faults);
-  constexpr double kWorse = 0.1;  // in the logarithm
-  if (one.IsWhole())
-    return CalcLeft(one) < CalcLeft(other) + kWorse * static_cast<double>(one.balances.size()) &&
-           one.by_causes.numbers + numbers < other.by_causes.numbers + other_numbers;
-  constexpr double kMuchOfNumber = 0.25, kMuch = 0.4;
-  return LeavesLess(one, other, kMuch, kMuchOfNumber * static_cast<double>(numbers - other_numbers));
-}
-
-/// Opens all of them again, with a change of their channels; false where that cannot be.
-bool Reopen(std::vector<Recording>* recordings, const std::function<void(Recording*)>& change) {
-  for (Recording& one : *recordings) {
-    if (!one.reopen) return false;
-    one = one.reopen();
-    change(&one);
-  }
-  return true;
-}
-
-}  // namespace
-
 RecordingJudgement JudgeRecordings(const RobotModel& model, std::vector<Recording>* recordings,
-                                   const JudgeOptions& as_asked,
+                                   const JudgeOptions& options,
                                    const std::function<bool(long rows)>& on_rows) {
-  JudgeOptions options = as_asked;
-  bool goes_on = true;
-  const auto count = [&](long rows) { return goes_on = !on_rows || on_rows(rows); };
-  RecordingJudgement judgement = Judge(model, recordings, options, count).Run();
-  if (!goes_on) return judgement;
-  std::vector<NonlinearFault> faults;
-  const auto undo = [&](Recording* one) {
-    for (const NonlinearFault& fault : faults) fault.Undo(one);
+  const auto judge = [&](const RobotModel& corrected, const Refinements& refinements, const auto& count) {
+    JudgeOptions refined = options;
+    refined.refinements = refinements;
+    return Judge(corrected, recordings, refined, count).Run();
   };
-  RobotModel corrected = model;
-  const auto correct = [&] {
-    RobotSpec spec = model.spec();
-    for (const NonlinearFault& fault : faults) fault.Undo(&spec);
-    corrected = RobotModel(std::move(spec));
-  };
-  // A simulator's forces are those of the velocity that it has at a step, a robot's those of the position's
-  // time.
-  if (judgement.has_other_times && Reopen(recordings, undo)) {
-    options.refinements.advances_velocities = true;
-    RecordingJudgement other = Judge(model, recordings, options, count).Run();
-    if (goes_on && CalcLeft(other) < CalcLeft(judgement)) {
-      judgement = std::move(other);
-    } else {
-      options.refinements.advances_velocities = false;
-    }
-  }
-  constexpr size_t kMostFaults = 3;
-  RecordingJudgement best = judgement;
-  std::vector<NonlinearFault> best_faults;
-  while (goes_on && options.tries_positions && faults.size() < kMostFaults && MayBeOtherwise(judgement)) {
-    if (!recordings->front().reopen) {
-      best.notes.push_back(
-          recordings->front().name +
-          ": is read once: other signs, units, offsets and orders of positions are not tried");
-      break;
-    }
-    Recording begin = recordings->front().reopen();
-    undo(&begin);
-    const std::optional<NonlinearFault> fault = FindNonlinearFault(corrected, std::move(begin));
-    const auto is_like = [&](const NonlinearFault& one) { return one.fault.IsLike(fault->fault); };
-    if (!fault || std::ranges::any_of(faults, is_like)) break;
-    faults.push_back(*fault);
-    if (!Reopen(recordings, undo)) break;
-    correct();
-    judgement = Judge(corrected, recordings, options, count).Run();
-    if (IsBetter(judgement, faults, best, best_faults)) best = judgement, best_faults = faults;
-  }
-  judgement = std::move(best);
-  faults = std::move(best_faults);
-  correct();
-  constexpr int kReadings = 5;
-  JudgeOptions next = options;
-  for (int i = 1; i < kReadings && goes_on && judgement.refinements != next.refinements; ++i) {
-    next.refinements = judgement.refinements;
-    if (!Reopen(recordings, undo)) break;
-    RecordingJudgement again = Judge(corrected, recordings, next, count).Run();
-    // Rows that a reading leaves out are no reason to find nothing.
-    if (again.Agrees()) break;
-    judgement = std::move(again);
-  }
-  for (const NonlinearFault& fault : faults)
-    judgement.causes.insert(judgement.causes.begin(), MakeCause(model, options.frames, fault));
-  return judgement;
+  return Readings(model, recordings, options, on_rows, judge).Run();
 }
 
 }  // namespace dexcheck

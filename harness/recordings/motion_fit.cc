@@ -106,6 +106,7 @@ bool MotionFit::Fill() {
     last_ = row;
     rows_ahead_.push_back(row);
     segments_.push_back(segment_);
+    if (most_alone_.size() > 0) ReplaceWrongSamples(rows_ahead_.size() < 3 ? 0 : rows_ahead_.size() - 3);
     return true;
   }
   return false;

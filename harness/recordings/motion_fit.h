@@ -135,6 +135,11 @@ class MotionFit {
   [[nodiscard]] bool IsWhole(size_t centre, size_t half) const;
   [[nodiscard]] int ChannelOf(RecordedQuantity quantity, int joint) const;
   [[nodiscard]] double FindQuantum(Eigen::Index channel) const;
+  /// Sets how far a row's torque must be from four that agree to be a wrong sample, by what most rows have.
+  void MeasureSteadiness();
+  /// Replaces wrong samples of a row that is ahead by the mean of those beside it.
+  void ReplaceWrongSamples(size_t row);
+  void ReportWrongSamples();
   /// Returns the motion of a base whose pose was recorded, by the polynomials.
   [[nodiscard]] BaseMotion CalcBase(const MatrixXd& fitted) const;
   void CheckBase(Row* row) const;
@@ -163,6 +168,8 @@ class MotionFit {
   Row last_;
   std::map<int, double> turned_;         // by joint: what unwrapping adds, rad
   std::map<int, long> wraps_;            // by joint
+  VectorXd most_alone_;                  // by channel: MeasureSteadiness; empty before
+  std::map<int, long> wrong_;            // by joint: samples that were replaced
   std::map<int, double> velocity_lags_;  // by joint: how much later than its velocity its position is, s
   bool stands_ = false;
   long segment_ = 0, rows_ = 0, held_ = 0, held_run_ = 0, doubled_ = 0, empty_ = 0, gaps_ = 0;

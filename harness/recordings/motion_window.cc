@@ -44,6 +44,48 @@ double MotionFit::FindQuantum(Eigen::Index channel) const {
   return static_cast<double>(whole) > kNearlyAll * static_cast<double>(rows_ahead_.size() - 1) ? least : 0.0;
 }
 
+void MotionFit::MeasureSteadiness() {
+  constexpr double kTimes = 8.0, kQuanta = 3.0;
+  most_alone_ = VectorXd::Zero(last_.size());
+  for (const int joint : judged_) {
+    const int channel = ChannelOf(Effort(), joint);
+    std::vector<double> bends;
+    for (size_t i = 1; i + 1 < rows_ahead_.size(); ++i)
+      bends.push_back(std::abs(rows_ahead_[i][channel] -
+                               0.5 * (rows_ahead_[i - 1][channel] + rows_ahead_[i + 1][channel])));
+    most_alone_[channel] = std::max(kTimes * Median(bends), kQuanta * FindQuantum(channel));
+  }
+  for (size_t i = 0; i < rows_ahead_.size(); ++i) ReplaceWrongSamples(i);
+}
+
+void MotionFit::ReplaceWrongSamples(size_t row) {
+  constexpr double kAgree = 0.3;  // of the distance
+  constexpr size_t kBeside = 2;
+  if (rows_ahead_.size() <= 2 * kBeside) return;
+  const size_t last = rows_ahead_.size() - 1;
+  const size_t first = std::min(row < kBeside ? 0 : row - kBeside, last - 2 * kBeside);
+  for (const int joint : judged_) {
+    const int channel = ChannelOf(Effort(), joint);
+    const auto at = [&](size_t i) { return rows_ahead_[i][channel]; };
+    const double mean = 0.5 * (at(row > 0 ? row - 1 : 1) + at(row < last ? row + 1 : last - 1));
+    const double alone = std::abs(at(row) - mean);
+    double apart = 0.0;
+    for (size_t i = first; i <= first + 2 * kBeside; ++i)
+      if (i != row) apart = std::max(apart, std::abs(at(i) - mean));
+    if (!(alone > most_alone_[channel] && apart < kAgree * alone)) continue;
+    rows_ahead_[row][channel] = mean;
+    ++wrong_[joint];
+  }
+}
+
+void MotionFit::ReportWrongSamples() {
+  constexpr double kFew = 0.002;  // of the rows: these are noise
+  for (const auto& [joint, count] : wrong_)
+    if (const double share = static_cast<double>(count) / static_cast<double>(rows_); share > kFew)
+      faults_.push_back({"lost or wrong samples of the torque", "joint " + model_->joint(joint).name,
+                         100.0 * share, 0.0, "%", "(not used)"});
+}
+
 void MotionFit::Analyse() {
   const std::string& name = recording_->name;
   constexpr size_t kFewest = 16;
@@ -64,6 +106,7 @@ void MotionFit::Analyse() {
     if (steps[i - 1] > kGap * step_) ++segment_, ++gaps_;
     segments_[i] = segment_;
   }
+  MeasureSteadiness();
   const Eigen::Index n = model_->num_joints();
   for (VectorXd* vector :
        {&noise_.position, &noise_.velocity, &noise_.torque, &noise_.smooth_position, &noise_.smooth_torque,
@@ -118,6 +161,7 @@ void MotionFit::Analyse() {
   for (int k = 0; k < 7 && recording_->Has(RecordedQuantity::kBase); ++k)
     base[k / 3 > 0 ? 1 : 0] += Square(sigma[ChannelOf(RecordedQuantity::kBase, k)]);
   CheckVelocities();
+  ReportWrongSamples();
   stands_ = Stands();
   inertia_ = CalcInertia(centres);
   ChooseWindow(centres);

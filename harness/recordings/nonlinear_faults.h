@@ -13,7 +13,7 @@ namespace dexcheck {
 
 /// A fault of a recording, or of the model's geometry, and how to undo it.
 struct NonlinearFault {
-  /// What is estimated beside the kind of fault.
+  /// The numbers that are estimated beside the kind of fault.
   enum class Number { kNone, kGain, kOffset, kClock, kPlacement, kOrientation, kAxis };
 
   Fault fault;

@@ -214,7 +214,8 @@ bool IsPlausible(const NonlinearFault& fault) {
 
 }  // namespace
 
-std::optional<NonlinearFault> FindNonlinearFault(const RobotModel& model, Recording recording) {
+std::optional<NonlinearFault> FindNonlinearFault(const RobotModel& model, Recording recording,
+                                                 bool of_model) {
   Begin begin(model, &recording);
   std::vector<NonlinearFault> all = ListNonlinearFaults(model, recording, begin.CalcRanges());
   // A few samples say which are worth all of them: of each kind and place the best number.
@@ -223,6 +224,7 @@ std::optional<NonlinearFault> FindNonlinearFault(const RobotModel& model, Record
   constexpr double kRoughly = 1e-3, kWell = 1e-6;
   std::vector<std::pair<double, NonlinearFault>> faults;
   for (NonlinearFault& one : all) {
+    if (one.IsOfModel() != of_model) continue;
     const double misfit = CalcMisfit(begin.CalcResiduals(one, few));
     const auto same = std::ranges::find_if(faults, [&](const auto& known) {
       const NonlinearFault& other = known.second;

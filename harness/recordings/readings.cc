@@ -1,0 +1,212 @@
+#include "harness/recordings/readings.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "controller/common/text.h"
+#include "harness/recordings/nonlinear_search.h"
+
+namespace dexcheck {
+
+Explanation MakeCause(const Fault& fault) {
+  Explanation one;
+  one.channel = CauseChannel::kMeasurement;
+  one.from = one.to = std::numeric_limits<double>::quiet_NaN();
+  one.faults = {fault};
+  return one;
+}
+
+namespace {
+
+/// A fault of the recording or of the model's geometry. An offset of the joint that a fixed base carries is
+/// gravity that is turned about its axis.
+Explanation MakeCause(const RobotModel& model, const LinkFrames& frames, const NonlinearFault& found) {
+  Explanation one = MakeCause(found.fault);
+  if (found.IsOfModel()) {
+    one.channel = CauseChannel::kBalance;
+    const int parent = model.joint(found.joint).parent;
+    const Matrix3d R = frames.Find(parent).linear();
+    one.faults.front().detail = (found.number == NonlinearFault::Number::kPlacement
+                                     ? "moved by " + FormatVector(R.transpose() * found.shift, 3) + " m"
+                                     : "turned by " + FormatVector(R.transpose() * found.turn, 3) + " rad") +
+                                " in " + frames.NameOf(model.link_name(parent));
+    if (!found.shows_all) one.faults.front().detail += ", as far as this motion shows it";
+  }
+  const bool is_offset = found.offset != 0.0 && found.joint >= 0 && model.joint(found.joint).parent < 0;
+  if (!is_offset || model.base().type != BaseType::kFixed) return one;
+  const Joint& joint = model.joint(found.joint);
+  const Vector3d axis = model.base().X_B0.linear() * joint.X_PB.linear() *
+                        Eigen::AngleAxisd(joint.mdh.alpha, Vector3d::UnitX()) * Vector3d::UnitZ();
+  const Vector3d turned = Eigen::AngleAxisd(-found.offset, axis) * model.gravity();
+  constexpr double kLittle = 1e-3;
+  if ((turned - model.gravity()).norm() < kLittle * model.gravity().norm()) return one;
+  one.faults.push_back({"gravity", "world", turned.norm(), 0.0, "m/s^2",
+                        FormatVector(turned, 3) + ", or a base that is turned as far"});
+  one.SetOutcome();
+  return one;
+}
+
+/// Whether a nonlinear fault may say more simply what was found, or what was not.
+bool MayBeOtherwise(const RecordingJudgement& judgement) {
+  constexpr long kFewNumbers = 1;
+  if (std::ranges::any_of(judgement.unjudged, &UnjudgedJoint::has_no_gain)) return true;
+  return !judgement.IsWhole() || judgement.by_causes.numbers > kFewNumbers;
+}
+
+/// Returns the sum over the joints of the residual's logarithm.
+double CalcLeft(const RecordingJudgement& judgement) {
+  double sum = 0.0;
+  for (const JointJudgement& joint : judgement.balances)
+    sum += std::log(std::max(joint.left, std::numeric_limits<double>::min()));
+  return sum;
+}
+
+/// Whether a judgement leaves so much less in the logarithm, of one joint and of all. Less than noise is no
+/// better than noise.
+bool LeavesLess(const RecordingJudgement& one, const RecordingJudgement& other, double of_joint,
+                double of_all) {
+  double most = 0.0, all = 0.0;
+  for (size_t i = 0; i < std::min(one.balances.size(), other.balances.size()); ++i) {
+    const auto left = [i](const RecordingJudgement& of) {
+      return std::max({of.balances[i].left, of.balances[i].noise, std::numeric_limits<double>::min()});
+    };
+    const double fall = std::log(left(other) / left(one));
+    most = std::max(most, fall);
+    all += fall;
+  }
+  return most > of_joint && all > of_all;
+}
+
+/// Returns how many numbers explain a reading; a wrong geometry of the model is rarer than a wrong body.
+long CountNumbers(const Readings::Reading& reading) {
+  constexpr long kRarer = 2;
+  long count = reading.judgement.by_causes.numbers;
+  for (const NonlinearFault& one : reading.faults)
+    count += one.CountNumbers() + (one.IsOfModel() ? kRarer : 0);
+  return count;
+}
+
+/// Whether a reading explains more, or the same with fewer numbers.
+bool IsBetter(const Readings::Reading& one, const Readings::Reading& other) {
+  const RecordingJudgement &a = one.judgement, &b = other.judgement;
+  if (a.unjudged.size() != b.unjudged.size()) return a.unjudged.size() < b.unjudged.size();
+  if (a.IsWhole() != b.IsWhole()) return a.IsWhole();
+  const long more = CountNumbers(one) - CountNumbers(other);
+  constexpr double kWorse = 0.1, kMuchOfNumber = 0.25, kMuch = 0.4;  // in the logarithm
+  if (a.IsWhole())
+    return more < 0 && CalcLeft(a) < CalcLeft(b) + kWorse * static_cast<double>(a.balances.size());
+  return LeavesLess(a, b, kMuch, kMuchOfNumber * static_cast<double>(more));
+}
+
+RobotModel Correct(const RobotModel& model, const std::vector<NonlinearFault>& faults) {
+  RobotSpec spec = model.spec();
+  for (const NonlinearFault& fault : faults) fault.Undo(&spec);
+  return RobotModel(std::move(spec));
+}
+
+}  // namespace
+
+Readings::Readings(const RobotModel& model, std::vector<Recording>* recordings, const JudgeOptions& options,
+                   const OnRows& on_rows, JudgeOnce judge)
+    : model_(model),
+      recordings_(recordings),
+      options_(options),
+      judge_(std::move(judge)),
+      count_([this, on_rows](long rows) { return goes_on_ = !on_rows || on_rows(rows); }),
+      refinements_(options.refinements) {}
+
+bool Readings::Reopen(const std::vector<NonlinearFault>& faults) {
+  for (Recording& one : *recordings_) {
+    if (!one.reopen) return false;
+    one = one.reopen();
+    for (const NonlinearFault& fault : faults) fault.Undo(&one);
+  }
+  return true;
+}
+
+RecordingJudgement Readings::Judge(const std::vector<NonlinearFault>& faults,
+                                   const Refinements& refinements) {
+  return judge_(Correct(model_, faults), refinements, count_);
+}
+
+RecordingJudgement Readings::Run() {
+  Reading reading{Judge({}, refinements_)};
+  AdvanceVelocities(&reading);
+  Search(/*of_model=*/false, &reading);
+  Refine(&reading);
+  Search(/*of_model=*/true, &reading);
+  // Beside much that nothing explains, a number explains a part of anything.
+  constexpr double kFar = 5.0;  // times the noise
+  for (const NonlinearFault& fault : reading.faults) {
+    Explanation one = MakeCause(model_, options_.frames, fault);
+    if (fault.number != NonlinearFault::Number::kNone && reading.judgement.left > kFar)
+      one.outcome = CauseOutcome::kNotExplained;
+    reading.judgement.causes.insert(reading.judgement.causes.begin(), std::move(one));
+  }
+  return std::move(reading.judgement);
+}
+
+void Readings::AdvanceVelocities(Reading* reading) {
+  // A simulator's forces are those of the velocity that it has at a step, a robot's those of the position's
+  // time.
+  if (!goes_on_ || !reading->judgement.has_other_times || !Reopen({})) return;
+  refinements_.advances_velocities = true;
+  RecordingJudgement other = Judge({}, refinements_);
+  if (goes_on_ && CalcLeft(other) < CalcLeft(reading->judgement)) {
+    reading->judgement = std::move(other);
+  } else {
+    refinements_.advances_velocities = false;
+  }
+}
+
+void Readings::Search(bool of_model, Reading* best) {
+  constexpr size_t kMostFaults = 3;
+  Reading now = *best;
+  // A wrong geometry looks like wrong numbers of positions.
+  if (of_model)
+    std::erase_if(now.faults,
+                  [](const NonlinearFault& one) { return one.number != NonlinearFault::Number::kNone; });
+  while (goes_on_ && options_.tries_positions && now.faults.size() < kMostFaults &&
+         MayBeOtherwise(now.judgement)) {
+    if (!recordings_->front().reopen) {
+      if (!of_model)
+        best->judgement.notes.push_back(
+            recordings_->front().name +
+            ": is read once: other signs, units, offsets and orders of positions are not tried");
+      return;
+    }
+    Recording begin = recordings_->front().reopen();
+    for (const NonlinearFault& fault : now.faults) fault.Undo(&begin);
+    const std::optional<NonlinearFault> fault =
+        FindNonlinearFault(Correct(model_, now.faults), std::move(begin), of_model);
+    const auto is_like = [&](const NonlinearFault& one) { return one.fault.IsLike(fault->fault); };
+    if (!fault || std::ranges::any_of(now.faults, is_like)) return;
+    now.faults.push_back(*fault);
+    if (!Reopen(now.faults)) return;
+    now.judgement = Judge(now.faults, refinements_);
+    // Of a wrong geometry something always explains a part.
+    if (of_model) Refine(&now);
+    const bool replaces_others =
+        now.judgement.IsWhole() && now.judgement.by_causes.numbers < CountNumbers(*best);
+    const bool is_better = (!of_model || replaces_others) && IsBetter(now, *best);
+    if (is_better) *best = now;
+    if (of_model || (!is_better && fault->number != NonlinearFault::Number::kNone)) return;
+  }
+}
+
+void Readings::Refine(Reading* reading) {
+  constexpr int kReadings = 5;
+  Refinements known = refinements_;
+  for (int i = 1; i < kReadings && goes_on_ && reading->judgement.refinements != known; ++i) {
+    known = reading->judgement.refinements;
+    if (!Reopen(reading->faults)) return;
+    RecordingJudgement again = Judge(reading->faults, known);
+    // Rows that a reading leaves out are no reason to find nothing.
+    if (again.Agrees()) return;
+    reading->judgement = std::move(again);
+  }
+}
+
+}  // namespace dexcheck
