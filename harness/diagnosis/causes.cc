@@ -32,12 +32,19 @@ std::string FormatVector(const Eigen::Ref<const VectorXd>& v, int digits) {
   return text + ")";
 }
 
+/// Returns a number with two digits of its standard error, and none beyond these.
+static std::string ShowSize(double value, double error) {
+  if (!(error > 0.0) || !std::isfinite(error)) return FormatNumber(value, 6);
+  const auto order = [](double x) { return static_cast<int>(std::floor(std::log10(x))); };
+  const int digits = value == 0.0 ? 1 : std::clamp(order(std::abs(value)) - order(error) + 2, 1, 6);
+  return FormatNumber(value, digits) + " +- " + FormatNumber(error, 2);
+}
+
 std::string Fault::Describe() const {
   if (fault == kUnknownFault) return place;
   const std::string where = place == "law" ? "" : place + ": ", more = detail.empty() ? "" : " " + detail;
   if (std::isnan(value)) return where + fault + more;
-  const std::string size =
-      FormatNumber(value, 6) + (error > 0.0 && std::isfinite(error) ? " +- " + FormatNumber(error, 2) : "");
+  const std::string size = ShowSize(value, error);
   constexpr std::string_view kFactor = ", factor";
   if (fault.ends_with(kFactor)) {
     // The formula of the part is in JSON.

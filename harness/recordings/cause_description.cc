@@ -23,7 +23,11 @@ std::optional<TorqueColumn::Kind> FindNumber(const TorqueFault& fault, const Tor
   return std::nullopt;
 }
 
-std::string ShowVector(const Eigen::Ref<const VectorXd>& v) { return FormatVector(v, 3); }
+/// Entries that are rounding are 0.
+std::string ShowVector(const Eigen::Ref<const VectorXd>& v) {
+  const double rounding = 1e-9 * v.cwiseAbs().maxCoeff();
+  return FormatVector(v.unaryExpr([=](double x) { return std::abs(x) < rounding ? 0.0 : x; }), 3);
+}
 
 }  // namespace
 
@@ -99,8 +103,15 @@ bool CauseDescription::AddWholeNumbers(FoundFault* found, Fault* shown) const {
                                                                  : "N s/m",
                             ""});
   }
-  shown->value = whole.norm();
+  shown->value = whole.mean();
   shown->detail = ShowVector(whole);
+  if (fault.kind == TorqueFault::kAllFriction) {
+    // Sizes of two units have no mean.
+    const Index half = whole.size() / 2;
+    shown->value = std::numeric_limits<double>::quiet_NaN();
+    shown->detail =
+        fmt::format("{} N m and {} N m s/rad", ShowVector(whole.head(half)), ShowVector(whole.tail(half)));
+  }
   return is_shared;
 }
 
@@ -122,12 +133,15 @@ Fault CauseDescription::Describe(const TorqueFault& fault, const VectorXd& a, Ve
   one.place = fault.place;
   one.unit = fault.unit;
   const bool is_number = a.size() == 1 || fault.kind == TorqueFault::kSpring || fault.HasVelocity();
-  one.value = is_number ? fault.nominal + a[0] : a.norm();
+  const bool is_of_joints = fault.index < 0 && fault.sums.size() > 1 && fault.sums.front().front().joint >= 0;
+  one.value = is_number ? fault.nominal + a[0] : is_of_joints ? a.mean() : a.norm();
   // A combination that does not show leaves the others their size.
   const bool shows_some = !is_number && fault.kind != TorqueFault::kPayload &&
                           error.array().isFinite().any() && !error.array().isFinite().all();
   const VectorXd shown = shows_some ? VectorXd(error.array().isFinite().select(error, 0.0)) : error;
-  one.error = is_number ? error[0] : shown.norm();
+  one.error = is_number      ? error[0]
+              : is_of_joints ? shown.norm() / static_cast<double>(a.size())
+                             : shown.norm();
   const auto vector = ShowVector;
   using enum TorqueFault::Kind;
   if (fault.kind == kPayload) {

@@ -34,27 +34,24 @@ void AddCauses(const RecordingJudgement& judgement, Answer* answer) {
     if (one.outcome != CauseOutcome::kNotExplained || one.faults.empty())
       answer->causes.push_back(one.Describe());
     else
-      nearest += fmt::format("{}{} ({:.2g} %)", nearest.empty() ? "not explained; nearest: " : ", ",
-                             one.faults.front().Describe(), 100.0 * one.fraction);
+      nearest += fmt::format("{}{} ({:.0f} %)", nearest.empty() ? "not explained; nearest: " : ", ",
+                             one.faults.front().Describe(), 100.0 * std::min(1.0, one.fraction));
   }
   if (!nearest.empty()) answer->remarks.push_back(nearest);
   if (judgement.causes.empty()) return;
   constexpr double kLeast = 5e-3;
   if (judgement.explained > kLeast)
     answer->remarks.push_back(
-        fmt::format("{} {:.4g} % of what the model does not; {:.3g} times the noise remains",
+        fmt::format("{} {:.4g} % of the difference; {:.2g} times the noise remains",
                     answer->causes.empty() ? "the nearest would explain" : "the causes explain",
                     100.0 * judgement.explained, judgement.left));
   // A short recording is not divided: nothing is held out.
-  const auto describe = [](const HeldPrediction& one) {
-    return fmt::format("{} number{} {:.3g} times the noise", one.numbers,
-                       one.numbers == 1 ? " leaves" : "s leave", one.held_left);
-  };
   if (judgement.by_all.held_left > 0.0)
-    answer->remarks.push_back(
-        fmt::format("held-out quarter: the causes' {}; a least-squares fit of every body, friction, offset "
-                    "and armature: {}",
-                    describe(judgement.by_causes), describe(judgement.by_all)));
+    answer->remarks.push_back(fmt::format(
+        "in a quarter that was held out, {:.2g} times the noise remains beside {} number{}, and "
+        "{:.2g} times beside {} numbers of bodies, frictions, offsets and armatures",
+        judgement.by_causes.held_left, judgement.by_causes.numbers,
+        judgement.by_causes.numbers == 1 ? "" : "s", judgement.by_all.held_left, judgement.by_all.numbers));
 }
 
 }  // namespace

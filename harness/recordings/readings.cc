@@ -141,6 +141,7 @@ RecordingJudgement Readings::Run() {
   constexpr double kFar = 5.0;  // times the noise
   for (const NonlinearFault& fault : reading.faults) {
     Explanation one = MakeCause(model_, options_.frames, fault);
+    reading.judgement.by_causes.numbers += fault.CountNumbers();
     if (fault.number != NonlinearFault::Number::kNone && reading.judgement.left > kFar)
       one.outcome = CauseOutcome::kNotExplained;
     reading.judgement.causes.insert(reading.judgement.causes.begin(), std::move(one));
