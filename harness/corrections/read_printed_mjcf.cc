@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <set>
 
 #include "controller/common/text.h"
@@ -18,59 +17,10 @@ namespace dexcheck {
 namespace {
 
 using MjcfElement = tinyxml2::XMLElement;
-using Attributes = std::map<std::string, std::string>;
-
-/// Attributes that a default gives each kind of element, by class.
-class DefaultClasses {
- public:
-  explicit DefaultClasses(const MjcfElement& root) {
-    for (const MjcfElement* child : ListChildren(&root, "default")) Read(*child, {});
-  }
-
-  /// An element's attributes and those of its class. @param around the body's childclass.
-  [[nodiscard]] Attributes Complete(const MjcfElement& element, const std::string& around) const {
-    Attributes all;
-    const auto found = classes_.find(ReadAttribute(element, "class", around.empty() ? kMain : around));
-    if (found != classes_.end()) {
-      const auto kind = found->second.find(element.Name());
-      if (kind != found->second.end()) all = kind->second;
-    }
-    Take(element, &all);
-    return all;
-  }
-
- private:
-  using Class = std::map<std::string, Attributes>;
-  static constexpr const char* kMain = "main";
-
-  static void Take(const MjcfElement& element, Attributes* all) {
-    for (const tinyxml2::XMLAttribute* at = element.FirstAttribute(); at != nullptr; at = at->Next())
-      (*all)[at->Name()] = at->Value();
-  }
-
-  void Read(const MjcfElement& element, const Class& around) {
-    const std::string name = ReadAttribute(element, "class", kMain);
-    Class own = around;
-    if (classes_.contains(name)) own = classes_[name];
-    for (const MjcfElement* child : ListChildren(&element)) {
-      if (std::string_view(child->Name()) != "default") Take(*child, &own[child->Name()]);
-    }
-    classes_[name] = own;
-    for (const MjcfElement* child : ListChildren(&element, "default")) Read(*child, own);
-  }
-
-  std::map<std::string, Class> classes_;
-};
-
-std::string Find(const Attributes& all, const char* name) {
-  const auto found = all.find(name);
-  return found == all.end() ? std::string() : found->second;
-}
-
 class PrintedMjcfReader {
  public:
   PrintedMjcfReader(const MjcfFile& mjcf, const mjModel& engine)
-      : root_(*mjcf.root()), engine_(engine), classes_(root_), changes_(ListCompiledChanges(mjcf, engine)) {
+      : root_(*mjcf.root()), engine_(engine), classes_(&root_), changes_(ListCompiledChanges(mjcf, engine)) {
     for (const MjcfElement* compiler : ListChildren(&root_, "compiler")) {
       if (compiler->Attribute("angle") != nullptr)
         unit_ = ReadAttribute(*compiler, "angle") == "radian" ? 1.0 : kDegree;
@@ -104,6 +54,13 @@ class PrintedMjcfReader {
 
   /// The engine's numbers have no digits: those of a text of seven.
   static constexpr double kEngineDigits = 1e-7;
+
+  /// An attribute of an element, its own or its class's; empty without one.
+  [[nodiscard]] std::string FindText(const MjcfElement& element, const std::string& around,
+                                     const char* name) const {
+    const char* const text = classes_.Find(element, around, name);
+    return text == nullptr ? "" : text;
+  }
 
   [[nodiscard]] PrintedOrigin ReadOrigin(const MjcfElement& element) const {
     PrintedOrigin origin;
@@ -210,7 +167,7 @@ class PrintedMjcfReader {
 
   [[nodiscard]] PrintedJoint ReadJoint(const MjcfElement& element, const std::string& around, int id) const {
     PrintedJoint joint;
-    const Attributes all = classes_.Complete(element, around);
+    const auto find = [&](const char* name) { return FindText(element, around, name); };
     joint.name = NameOf(engine_, mjOBJ_JOINT, id);
     switch (engine_.jnt_type[id]) {
       case mjJNT_FREE:
@@ -225,17 +182,17 @@ class PrintedMjcfReader {
       default:
         joint.kind = JointKind::kHinge;
     }
-    const std::string axis = Find(all, "axis");
+    const std::string axis = find("axis");
     std::tie(joint.axis, joint.half_axis) = ReadPrintedVector<3>(axis.empty() ? "0 0 1" : axis);
     joint.anchor = MapVector(engine_.jnt_pos + 3 * id);
     const double unit = joint.kind == JointKind::kSlide ? 1.0 : unit_;
     if (engine_.jnt_limited[id] != 0 && joint.kind != JointKind::kBall) {
-      const auto [range, halves] = ReadPrintedVector<3>(Find(all, "range"));
+      const auto [range, halves] = ReadPrintedVector<3>(find("range"));
       joint.range = {PrintedScalar{range[0] * unit, halves[0] * unit},
                      PrintedScalar{range[1] * unit, halves[1] * unit}};
     }
     const auto take = [&](JointScalar scalar, const char* name, double factor) {
-      const std::optional<PrintedScalar> number = ReadPrintedScalar(Find(all, name));
+      const std::optional<PrintedScalar> number = ReadPrintedScalar(find(name));
       joint.scalars[static_cast<size_t>(scalar)] =
           number ? PrintedScalar{number->value * factor, number->half * factor} : PrintedScalar{};
     };
@@ -323,26 +280,25 @@ class PrintedMjcfReader {
   void ReadEqualities() {
     for (const MjcfElement* equality : ListChildren(&root_, "equality")) {
       for (const MjcfElement* element : ListChildren(equality)) {
-        const Attributes all = classes_.Complete(*element, "");
-        if (Find(all, "active") == "false") continue;
-        if (std::string_view(element->Name()) == "joint" && !Find(all, "joint2").empty()) {
-          ReadCoupling(all);
+        const auto find = [&](const char* name) { return FindText(*element, "", name); };
+        if (find("active") == "false") continue;
+        if (std::string_view(element->Name()) == "joint" && !find("joint2").empty()) {
+          ReadCoupling(find("joint1"), find("joint2"), find("polycoef"));
           continue;
         }
         std::string text = element->Name();
         for (const char* part : {"body1", "body2", "joint1", "tendon1", "tendon2", "geom1", "geom2"})
-          text += Find(all, part).empty() ? "" : " " + Find(all, part);
+          text += find(part).empty() ? "" : " " + find(part);
         robot_.constraints.push_back(std::move(text));
       }
     }
   }
 
-  void ReadCoupling(const Attributes& all) {
-    const std::string polynomial = Find(all, "polycoef");
+  void ReadCoupling(const std::string& joint, const std::string& leader, const std::string& polynomial) {
     const auto [numbers, halves] = ReadPrintedVector<4>(polynomial.empty() ? "0 1 0 0 0" : polynomial);
     for (PrintedLink& link : robot_.links) {
-      if (link.joint.name == Find(all, "joint1"))
-        link.joint.mimic = {Find(all, "joint2"), {numbers[1], halves[1]}, {numbers[0], halves[0]}};
+      if (link.joint.name == joint)
+        link.joint.mimic = {leader, {numbers[1], halves[1]}, {numbers[0], halves[0]}};
     }
   }
 

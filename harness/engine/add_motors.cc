@@ -45,27 +45,17 @@ void DeleteActuators(XMLElement* root) {
   DeleteControls(root);
 }
 
-constexpr const char* kForceRange = "actuatorfrcrange";
-
-/// Reads the force range of each default class, by name; a class without one has that of the class around it.
-void ReadClasses(const XMLElement& section, std::string range, std::map<std::string, std::string>* classes) {
-  const XMLElement* const joint = section.FirstChildElement("joint");
-  if (joint != nullptr) range = ReadAttribute(*joint, kForceRange, range);
-  (*classes)[ReadAttribute(section, "class", "main")] = range;
-  for (const XMLElement* inner : ListChildren(&section, "default")) ReadClasses(*inner, range, classes);
-}
-
-void ReadJoints(const XMLElement& body, std::string child_class,
-                const std::map<std::string, std::string>& classes, std::map<std::string, double>* limits) {
+void ReadForceRanges(const XMLElement& body, std::string child_class, const DefaultClasses& classes,
+                     std::map<std::string, double>* limits) {
   child_class = ReadAttribute(body, "childclass", child_class);
   for (const XMLElement* joint : ListChildren(&body, "joint")) {
-    const auto found = classes.find(ReadAttribute(*joint, "class", child_class));
-    std::istringstream range(ReadAttribute(*joint, kForceRange, found == classes.end() ? "" : found->second));
+    const char* const range = classes.Find(*joint, child_class, "actuatorfrcrange");
+    std::istringstream numbers(range == nullptr ? "" : range);
     double low = 0.0, high = 0.0;
-    if (range >> low >> high) (*limits)[ReadAttribute(*joint, "name")] = std::min(-low, high);
+    if (numbers >> low >> high) (*limits)[ReadAttribute(*joint, "name")] = std::min(-low, high);
   }
   for (const XMLElement* inner : ListChildren(&body, "body"))
-    ReadJoints(*inner, child_class, classes, limits);
+    ReadForceRanges(*inner, child_class, classes, limits);
 }
 
 }  // namespace
@@ -96,12 +86,10 @@ void DeleteControls(XMLElement* root) {
 }
 
 std::map<std::string, double> FindForceRanges(const MjcfFile& mjcf) {
-  std::map<std::string, std::string> classes;
   std::map<std::string, double> limits;
   const XMLElement* const root = mjcf.root();
-  for (const XMLElement* section : ListChildren(root, "default")) ReadClasses(*section, "", &classes);
   for (const XMLElement* world : ListChildren(root, "worldbody"))
-    ReadJoints(*world, "main", classes, &limits);
+    ReadForceRanges(*world, "", DefaultClasses(root), &limits);
   std::erase_if(limits, [](const auto& limit) { return !(limit.second > 0.0); });
   return limits;
 }

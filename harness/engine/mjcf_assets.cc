@@ -18,47 +18,6 @@ constexpr const char* kTextureFiles[] = {"file",     "fileright", "fileleft", "f
 
 bool Is(const XMLElement& element, std::string_view name) { return name == element.Name(); }
 
-/// Attributes that elements take from their default class where they do not state them.
-class DefaultClasses {
- public:
-  /// @param section the `default` of the file, or one within it.
-  void Read(const XMLElement& section, const std::string& parent) {
-    const std::string name = ReadAttribute(section, "class", parent.empty() ? "main" : "");
-    if (parent.empty()) top_ = name;
-    classes_[name].parent = parent;
-    classes_[name].sections.push_back(&section);
-    for (const XMLElement* child : ListChildren(&section, "default")) Read(*child, name);
-  }
-
-  /// The attribute of an element, its own or of its class; nullptr without one.
-  /// @param child_class of the bodies around it.
-  [[nodiscard]] const char* Find(const XMLElement& element, const std::string& child_class,
-                                 const char* attribute) const {
-    if (const char* own = element.Attribute(attribute)) return own;
-    std::string name = ReadAttribute(element, "class", child_class);
-    if (name.empty()) name = top_;
-    for (size_t depth = 0; depth <= classes_.size(); ++depth) {
-      const auto found = classes_.find(name);
-      if (found == classes_.end()) break;
-      for (const XMLElement* section : found->second.sections) {
-        const XMLElement* const words = section->FirstChildElement(element.Name());
-        const char* const value = words != nullptr ? words->Attribute(attribute) : nullptr;
-        if (value != nullptr) return value;
-      }
-      name = found->second.parent;
-    }
-    return nullptr;
-  }
-
- private:
-  struct Class {
-    std::string parent;
-    std::vector<const XMLElement*> sections;
-  };
-  std::string top_ = "main";
-  std::map<std::string, Class> classes_;
-};
-
 /// Body and classes that contain a geom.
 struct Surroundings {
   std::string body;
@@ -69,11 +28,10 @@ struct Surroundings {
 
 class AssetSieve {
  public:
-  explicit AssetSieve(MjcfFile* mjcf) : mjcf_(*mjcf) {}
+  explicit AssetSieve(MjcfFile* mjcf) : mjcf_(*mjcf), defaults_(mjcf->root()) {}
 
   void Run() {
     VisitElements(mjcf_.root(), [&](XMLElement* element) { ReadSettings(*element); });
-    for (XMLElement* section : ListChildren(mjcf_.root(), "default")) defaults_.Read(*section, "");
     for (XMLElement* section : ListChildren(mjcf_.root(), "asset")) SieveAssets(section);
     for (XMLElement* section : ListChildren(mjcf_.root(), "worldbody")) SieveBody(section, {});
     VisitElements(mjcf_.root(), [&](XMLElement* element) { DropLooks(element); });

@@ -41,6 +41,36 @@ std::filesystem::path AssetFolders::Find(const std::string& folder, const std::s
   return std::filesystem::path(folder) / (strips_paths ? path.filename() : path);
 }
 
+DefaultClasses::DefaultClasses(const XMLElement* root) {
+  for (const XMLElement* section : ListChildren(root, "default")) Read(*section, "");
+}
+
+void DefaultClasses::Read(const XMLElement& section, const std::string& parent) {
+  const std::string name = ReadAttribute(section, "class", parent.empty() ? "main" : "");
+  if (parent.empty()) top_ = name;
+  classes_[name].parent = parent;
+  classes_[name].sections.push_back(&section);
+  for (const XMLElement* child : ListChildren(&section, "default")) Read(*child, name);
+}
+
+const char* DefaultClasses::Find(const XMLElement& element, const std::string& child_class,
+                                 const char* attribute) const {
+  if (const char* own = element.Attribute(attribute)) return own;
+  std::string name = ReadAttribute(element, "class", child_class);
+  if (name.empty()) name = top_;
+  for (size_t depth = 0; depth <= classes_.size(); ++depth) {
+    const auto found = classes_.find(name);
+    if (found == classes_.end()) break;
+    for (const XMLElement* section : found->second.sections) {
+      const XMLElement* const words = section->FirstChildElement(element.Name());
+      const char* const value = words != nullptr ? words->Attribute(attribute) : nullptr;
+      if (value != nullptr) return value;
+    }
+    name = found->second.parent;
+  }
+  return nullptr;
+}
+
 MjcfFile::MjcfFile(const std::filesystem::path& file, const std::string* text)
     : source_(file.string()), folder_(MakeAbsolute(file).parent_path()) {
   Parse(text != nullptr ? *text : ReadBytes(file));

@@ -4,6 +4,7 @@
 
 #include <deque>
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -33,6 +34,28 @@ struct AssetFolders {
   void Read(const tinyxml2::XMLElement& compiler);
   /// Returns the path of a file of that name, relative to the MJCF's folder.
   [[nodiscard]] std::filesystem::path Find(const std::string& folder, const std::string& name) const;
+};
+
+/// Attributes that elements take from their default class where they do not state them.
+class DefaultClasses {
+ public:
+  /// @param root the element `mujoco`.
+  explicit DefaultClasses(const tinyxml2::XMLElement* root);
+
+  /// Returns the attribute of an element, its own or that of its class; nullptr without one.
+  /// @param child_class of the bodies around it; empty for none.
+  [[nodiscard]] const char* Find(const tinyxml2::XMLElement& element, const std::string& child_class,
+                                 const char* attribute) const;
+
+ private:
+  struct Class {
+    std::string parent;
+    std::vector<const tinyxml2::XMLElement*> sections;
+  };
+  void Read(const tinyxml2::XMLElement& section, const std::string& parent);
+
+  std::string top_ = "main";
+  std::map<std::string, Class> classes_;
 };
 
 /// The elements of an MJCF and of the files that it includes, with the place of each.
