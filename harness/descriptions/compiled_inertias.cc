@@ -14,6 +14,7 @@
 #include "harness/descriptions/link_frame_tree.h"
 #include "harness/descriptions/mjcf_reader.h"
 #include "harness/engine/engine.h"
+#include "harness/engine/mjcf_passes.h"
 #include "harness/engine/xml.h"
 
 namespace dexcheck {
@@ -21,13 +22,9 @@ namespace dexcheck {
 using tinyxml2::XMLElement;
 
 std::vector<const XMLElement*> ListInertials(const MjcfFile& mjcf, const mjModel& engine) {
-  std::vector<const XMLElement*> inertials = {nullptr};
-  for (const XMLElement* world : ListChildren(static_cast<const XMLElement*>(mjcf.root()), "worldbody")) {
-    VisitElements(world, [&](const XMLElement* element) {
-      if (std::string_view(element->Name()) == "body")
-        inertials.push_back(element->FirstChildElement("inertial"));
-    });
-  }
+  std::vector<const XMLElement*> inertials;
+  for (const XMLElement* body : ListBodies(mjcf))
+    inertials.push_back(body == nullptr ? nullptr : body->FirstChildElement("inertial"));
   if (static_cast<int>(inertials.size()) != engine.nbody) inertials.clear();
   return inertials;
 }

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <map>
 #include <optional>
 #include <sstream>
@@ -129,24 +128,31 @@ void AddMotors(MjcfFile* mjcf, const std::map<std::string, double>& limits) {
                  std::to_string(motors) + (motors == 1 ? " motor" : " motors"));
 }
 
+std::vector<XMLElement*> ListBodies(const MjcfFile& mjcf) {
+  // The engine numbers bodies from the root on, each before its children.
+  std::vector<XMLElement*> bodies = {nullptr};
+  for (XMLElement* world : ListChildren(mjcf.root(), "worldbody")) {
+    VisitElements(world, [&](XMLElement* element) {
+      if (std::string_view(element->Name()) == "body") bodies.push_back(element);
+    });
+  }
+  return bodies;
+}
+
 void NameParts(MjcfFile* mjcf) {
-  int joint = 0, body = 1;
-  // The engine numbers bodies from the root on, each before its children, and joints by their bodies.
-  const std::function<void(tinyxml2::XMLElement*)> name_children = [&](tinyxml2::XMLElement* parent) {
-    const auto name = [](tinyxml2::XMLElement* element, int number) {
-      if (ReadAttribute(*element, "name").empty())
-        element->SetAttribute("name", fmt::format("#{}", number).c_str());
-    };
-    for (tinyxml2::XMLElement* child : ListChildren(parent, "body")) {
-      name(child, body++);
-      for (tinyxml2::XMLElement* own : ListChildren(child)) {
-        const std::string_view kind = own->Name();
-        if (kind == "joint" || kind == "freejoint") name(own, joint++);
-      }
-      name_children(child);
-    }
+  const auto name = [](XMLElement* element, int number) {
+    if (ReadAttribute(*element, "name").empty())
+      element->SetAttribute("name", fmt::format("#{}", number).c_str());
   };
-  for (tinyxml2::XMLElement* world : ListChildren(mjcf->root(), "worldbody")) name_children(world);
+  int joint = 0, number = 0;
+  for (XMLElement* body : ListBodies(*mjcf)) {
+    if (body != nullptr) name(body, number);
+    ++number;
+    for (XMLElement* own : ListChildren(body)) {
+      const std::string_view kind = own->Name();
+      if (kind == "joint" || kind == "freejoint") name(own, joint++);
+    }
+  }
 }
 
 }  // namespace dexcheck

@@ -65,6 +65,10 @@ void HoldBase(double lift, MjcfFile* mjcf);
 /// States a solver that iterates until rounding, since a run's checks see the error of an early end.
 void RequireExactSolver(MjcfFile* mjcf);
 
+/// Lists the elements of an MJCF's bodies by the engine's numbers; the first is null. Where elements make
+/// bodies of their own there are fewer.
+std::vector<tinyxml2::XMLElement*> ListBodies(const MjcfFile& mjcf);
+
 /// Names joints and bodies that have no name by the engine's numbers: "#1".
 void NameParts(MjcfFile* mjcf);
 

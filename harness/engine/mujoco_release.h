@@ -163,38 +163,8 @@ inline std::pair<int, int> ReadSignature(int signature) {
   return {(signature >> 16) - kFirstBody, (signature & 0xffff) - kFirstBody};
 }
 
-/// The table by which names are found: two slots for each element of the model, -1 in those that are free;
-/// none in 2.2.2. @param elements all that can have a name.
-inline void SetNameSlots([[maybe_unused]] size_t elements, [[maybe_unused]] mjModel* m) {
-#if mjVERSION_HEADER >= 320
-  m->nnames_map = static_cast<EngineSize>(2 * elements);
-#endif
-}
-inline int* GetNameSlots([[maybe_unused]] const mjModel& m) {
-#if mjVERSION_HEADER >= 320
-  return m.names_map;
-#else
-  return nullptr;
-#endif
-}
-
 /// Whether geom_sameframe or site_sameframe states the body's inertial frame, or (3.2) its axes.
 inline bool IsInertialFrame(int sameframe) { return sameframe == 2 || sameframe == 4; }
-
-/// Marks a geom as one without a plugin.
-inline void DetachPlugin([[maybe_unused]] int geom, [[maybe_unused]] mjModel* m) {
-#if mjVERSION_HEADER >= 320
-  m->geom_plugin[geom] = -1;
-#endif
-}
-
-/// Lets contacts be found without the bodies' trees of geoms, which fit only the compiler's geoms.
-inline void DropGeomTrees([[maybe_unused]] mjModel* m) {
-#if mjVERSION_HEADER >= 320
-  std::fill_n(m->body_bvhadr, m->nbody, -1);
-  std::fill_n(m->body_bvhnum, m->nbody, 0);
-#endif
-}
 
 /// Returns the first actuator without exactly one control and one force, which all have in 2.2.2; -1 if none.
 inline int FindWideActuator([[maybe_unused]] const mjModel& m) {

@@ -4,12 +4,13 @@
 
 #include <algorithm>
 #include <limits>
+#include <memory>
 #include <nlohmann/json.hpp>
 #include <vector>
 
 #include "harness/base/files.h"
 #include "harness/descriptions/read_description.h"
-#include "harness/engine/compiled_model.h"
+#include "harness/engine/visible_model.h"
 #include "harness/report/page_frame.h"
 
 namespace dexcheck {
@@ -91,8 +92,9 @@ std::optional<ReplayData> MakeMotionReplay(const RobotModel& model, const std::f
                                     [](const Joint& joint) { return joint.type == JointType::kBall; });
   if (has_ball || model.base().type != BaseType::kFixed) return std::nullopt;
   const bool is_mjcf = FindFormat(ReadBytes(file), file) == RobotFormat::kMjcf;
-  const MjModelPtr scene =
-      MakeVisible(is_mjcf ? LoadMjcf(file) : LoadMjcfText(SkeletonText(model).Make(), file.string()));
+  const auto mjcf = is_mjcf ? std::make_unique<MjcfFile>(file)
+                            : std::make_unique<MjcfFile>(SkeletonText(model).Make(), file.string());
+  const MjModelPtr scene = LoadVisible(mjcf.get());
   RunFrames frames;
   frames.source = file.string();
   frames.title = model.name();

@@ -9,9 +9,9 @@
 #include "controller/handling/pick_and_place.h"
 #include "harness/base/bounded_json.h"
 #include "harness/base/files.h"
-#include "harness/engine/compiled_model.h"
 #include "harness/engine/mjcf_file.h"
 #include "harness/engine/mjcf_passes.h"
+#include "harness/engine/visible_model.h"
 #include "harness/scenario/runnable_robot.h"
 
 namespace dexcheck {
@@ -151,14 +151,9 @@ MjModelPtr ReadModel(const LogReader& log) {
   log.ExtractFiles("inputs", folder.path());
   const std::filesystem::path mjcf = FindEmbedded(log, "mjcf", folder.path());
   try {
-    MjModelPtr model = LoadMjcf(mjcf);
-    const auto* const types = model->tex_type;
-    if (std::find(types, types + model->ntex, mjTEXTURE_SKYBOX) == types + model->ntex) {
-      MjcfFile file(mjcf);  // pictures without a sky are black
-      AddSky(&file);
-      model = Load(file);
-    }
-    return MakeVisible(std::move(model));
+    MjcfFile file(mjcf);
+    AddSky(&file);  // pictures without one are black
+    return LoadVisible(&file);
   } catch (const InputError& error) {
     throw InputError(log.path().string() + ": " + error.what());
   }

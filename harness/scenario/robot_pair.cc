@@ -9,7 +9,7 @@
 #include "controller/model/parameter_reader.h"
 #include "harness/base/files.h"
 #include "harness/comparison/engine_constants.h"
-#include "harness/engine/compiled_model.h"
+#include "harness/engine/contact_pairs.h"
 #include "harness/engine/mujoco_release.h"
 
 namespace dexcheck {
@@ -86,10 +86,8 @@ void WatchBodies(const Scenario& scenario, const std::string& mjcf, RobotPair* r
   const PlantOptions& plant = scenario.plant;
   robots->watched_pairs = ListWatchedPairs(*robots->engine, *robots->adapter, robots->solids,
                                            plant.allowed_collision_pairs, scenario.source);
-  if (!LetsBodiesPush(plant, *robots->engine)) return;
-  robots->solids = ListSolids(*robots->engine);  // the same, with the numbers that their geoms have now
   if (!plant.collide) return;
-  robots->engine = AddContactPairs(*robots->engine, ListGeoms(*robots));
+  robots->engine = AddContactPairs(*robots->engine, ListGeoms(*robots), mjcf);
   robots->adapter = std::make_unique<Adapter>(robots->model, *robots->engine, mjcf);
 }
 
@@ -126,7 +124,7 @@ std::vector<std::pair<int, int>> ListPushingGeoms(const RobotPair& robots) {
     std::vector<int> geoms = {shape.geom};
     for (int i = 0; i < m.body_geomnum[shape.body]; ++i) {
       const int geom = m.body_geomadr[shape.body] + i;
-      if (!is_shape[static_cast<size_t>(geom)]) geoms.push_back(geom);
+      if (!is_shape[static_cast<size_t>(geom)] && CanTouch(m, geom)) geoms.push_back(geom);
     }
     return geoms;
   };
@@ -144,11 +142,6 @@ RobotPair::RobotPair(const Scenario& scenario, RobotModel the_model, const std::
       rigid(ReadRigidModel(scenario, model.spec().source)) {
   RequireUsable(scenario, model);
   solids = ListSolids(*engine);
-  std::vector<int> pushing;
-  if (LetsBodiesPush(scenario.plant, *engine)) {
-    for (const Solid& solid : solids.list) pushing.push_back(solid.geom);
-  }
-  RemoveLooks(&engine, pushing);
   adapter = std::make_unique<Adapter>(model, *engine, mjcf.string());
   RequireNothingElse(*adapter, mjcf.string());
   ApplyFriction(scenario.plant, engine.get());

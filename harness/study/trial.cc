@@ -10,7 +10,6 @@
 #include "controller/common/text.h"
 #include "controller/model/parameter_reader.h"
 #include "harness/base/files.h"
-#include "harness/engine/compiled_model.h"
 #include "harness/run/joint_margins.h"
 #include "harness/run/runner.h"
 
@@ -148,9 +147,7 @@ void CheckTrials(StudyInputs* inputs) {
   }
   inputs->scenario_document = std::make_shared<const ScenarioDocument>(OpenScenario(*inputs));
   const Scenario first = MakeTrialScenario(*inputs, trial);
-  MjModelPtr engine = LoadMjcf(inputs->mjcf);
-  RemovePictures(&engine);
-  inputs->engine = std::move(engine);
+  inputs->engine = LoadMjcf(inputs->mjcf);
   const Setup setup = MakeSetup(*inputs, first);
   inputs->model_overrides = first.model_overrides;
   inputs->model = std::make_shared<const RobotModel>(setup.model());
