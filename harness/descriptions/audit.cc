@@ -12,6 +12,7 @@
 #include "controller/dynamics/model_terms.h"
 #include "controller/model/rigid_body.h"
 #include "harness/descriptions/alike_names.h"
+#include "harness/descriptions/compiled_inertias.h"
 #include "harness/descriptions/random_states.h"
 
 namespace dexcheck {
@@ -102,7 +103,9 @@ class JointAudit {
       AuditOffset(i);
       AuditRange(i);
       AuditAxis(i);
+      AuditDamping(i);
     }
+    AuditBodiesAlike();
     AuditLoads();
     AuditNames();
   }
@@ -120,6 +123,34 @@ class JointAudit {
     if (length > kLongest)
       Add(AuditLevel::kSuspicious, "offset", i,
           "stands " + FormatNumber(length, 3) + " m from the joint before it: as if lengths were in mm");
+    const double angle = robot_.joints[i].largest_angle;
+    if (angle > 2.0 * kPi)
+      Add(AuditLevel::kSuspicious, "offset", i,
+          "is turned by " + FormatNumber(angle, 4) + " rad: as if angles were in degrees");
+  }
+
+  void AuditDamping(size_t i) {
+    constexpr double kMost = 1e4;  // N m s/rad or N s/m, far beyond any gear or rail
+    if (spec_.joints[i].damping > kMost)
+      Add(AuditLevel::kSuspicious, "damping", i,
+          "has a damping of " + FormatNumber(spec_.joints[i].damping, 4) + ": nothing would move it");
+  }
+
+  /// Placeholders: several links with one mass and one inertia.
+  void AuditBodiesAlike() {
+    constexpr size_t kFewest = 3;
+    const size_t count = spec_.joints.size();
+    if (count < kFewest) return;
+    const MassProperties& first = spec_.joints.front().body;
+    const bool are_alike = first.mass > 0.0 && std::ranges::all_of(spec_.joints, [&](const Joint& one) {
+                             return one.body.mass == first.mass &&
+                                    CalcMoments(one.body.inertia).isApprox(CalcMoments(first.inertia));
+                           });
+    if (are_alike)
+      Add(AuditLevel::kNote, "mass", 0,
+          "and all others move " + FormatNumber(first.mass, 4) +
+              " kg with the same inertia: as if nobody had "
+              "measured them");
   }
 
   void AuditRange(size_t i) {

@@ -33,6 +33,7 @@ struct DescribedJoint : WrittenRow {
   std::optional<StatedForces> forces;  ///< Limits of the joint's motors; none where the file states none.
   double velocity_limit = 0.0;         ///< rad/s or m/s; 0 where the file states none.
   double axis_length = 1.0;            ///< Of the axis as the file gives it.
+  double largest_angle = 0.0;          ///< Of the roll, pitch and yaw that the file gives, rad.
 };
 
 /// Geometry of a part, as the file gives it.

@@ -217,13 +217,14 @@ Vector3d UrdfFile::ReadVector(const Element& element, const std::string& key, co
   }
 }
 
-Pose UrdfFile::ReadOrigin(const Element& element, const std::string& key) const {
+Pose UrdfFile::ReadOrigin(const Element& element, const std::string& key, double* largest_angle) const {
   Pose X = Pose::Identity();
   const Element* const origin = element.FirstChildElement("origin");
   if (origin == nullptr) return X;
   X.translation() = ReadVector(*origin, key, "xyz", Vector3d::Zero());
   if (origin->Attribute("rpy") == nullptr) return X;
   const Vector3d rpy = ReadVector(*origin, key, "rpy", Vector3d::Zero());
+  if (largest_angle != nullptr) *largest_angle = rpy.cwiseAbs().maxCoeff();
   urdf::Rotation q;
   q.setFromRPY(rpy[0], rpy[1], rpy[2]);
   X.linear() = Eigen::Quaterniond(q.w, q.x, q.y, q.z).toRotationMatrix();

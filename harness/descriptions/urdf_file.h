@@ -65,7 +65,9 @@ class UrdfFile {
   Vector3d ReadVector(const tinyxml2::XMLElement& element, const std::string& key, const char* attribute,
                       const Vector3d& otherwise) const;
   /// The pose that the child `origin` of an element gives; the identity without one.
-  [[nodiscard]] Pose ReadOrigin(const tinyxml2::XMLElement& element, const std::string& key) const;
+  /// @param largest_angle of roll, pitch and yaw, rad; unchanged where none are given.
+  [[nodiscard]] Pose ReadOrigin(const tinyxml2::XMLElement& element, const std::string& key,
+                                double* largest_angle = nullptr) const;
 
   /// Shapes of a link that can touch, or else those that are seen. Dynamics need none: nothing behind a
   /// broken one is read.

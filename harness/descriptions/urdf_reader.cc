@@ -155,7 +155,8 @@ class UrdfReader {
   Place ReadJoint(const UrdfJoint& joint, const Place& parent) {
     const std::string& link = file_.link(joint.child).name;
     const std::string key = KeyOf(joint);
-    const Pose X_iJ = parent.X_iL * file_.ReadOrigin(*joint.element, key);
+    double largest_angle = 0.0;
+    const Pose X_iJ = parent.X_iL * file_.ReadOrigin(*joint.element, key, &largest_angle);
     if (!X_iJ.matrix().allFinite()) file_.Fail(joint.line, key + "origin: must be finite");
     if (joint.type == "fixed") {
       robot_.spec.frames.push_back({link, parent.joint, X_iJ, std::nullopt});
@@ -169,6 +170,7 @@ class UrdfReader {
                                         "with links without inertials between"));
     }
     AddMovingJoint(joint, link, parent.joint, X_iJ);
+    robot_.joints.back().largest_angle = largest_angle;
     return {static_cast<int>(robot_.spec.joints.size()) - 1, robot_.joints.back().X_iL};
   }
 
