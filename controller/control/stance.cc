@@ -32,12 +32,6 @@ void CalcRateMaps(const Vector3d& angles, const Vector3d& rates, Matrix3d* E, Ma
       -cr * rates[0], -sr * cp * rates[0] - cr * sp * rates[1];
 }
 
-Matrix3d CalcTurn(const Vector3d& angles) {
-  return (Eigen::AngleAxisd(angles[2], Vector3d::UnitZ()) * Eigen::AngleAxisd(angles[1], Vector3d::UnitY()) *
-          Eigen::AngleAxisd(angles[0], Vector3d::UnitX()))
-      .toRotationMatrix();
-}
-
 }  // namespace
 
 StanceForces::StanceForces(const RobotModel& model, const Stance& stance)
@@ -81,7 +75,7 @@ void StanceMotion::Evaluate(double t, DesiredJoints* desired) const {
   const Vector3d angles = body.q.tail<3>(), rates = body.q_dot.tail<3>();
   Matrix3d E, E_dot;
   CalcRateMaps(angles, rates, &E, &E_dot);
-  const Eigen::Quaterniond turn(CalcTurn(angles) * ReadTurn(q_start_).toRotationMatrix());
+  const Eigen::Quaterniond turn(TurnRollPitchYaw(angles) * ReadTurn(q_start_).toRotationMatrix());
   const Matrix3d R_start = ReadTurn(q_start_).toRotationMatrix().transpose();
   VectorXd& q = desired->q;
   q = q_start_;

@@ -39,9 +39,8 @@ TorqueRegressor::TorqueRegressor(const RobotModel& model) : model_(&model), qdd_
 }
 
 TorqueRegressor::BodyVector TorqueRegressor::Pack(const MassProperties& body) {
-  const Matrix3d I = body.inertia + CalcPointInertia(body.mass, body.com);
   BodyVector vector;
-  vector << body.mass, body.mass * body.com, I(0, 0), I(1, 1), I(2, 2), I(0, 1), I(0, 2), I(1, 2);
+  vector << body.mass, body.mass * body.com, ToEntries(body.inertia + CalcPointInertia(body.mass, body.com));
   return vector;
 }
 

@@ -72,8 +72,18 @@ Vector3d CalcPrincipalMoments(const Matrix3d& inertia) {
 
 }  // namespace
 
-Matrix3d MakeTensor(const std::array<double, 6>& I) {
+Matrix3d ToTensor(const Vector6d& I) {
   return Matrix3d{{I[0], I[3], I[4]}, {I[3], I[1], I[5]}, {I[4], I[5], I[2]}};
+}
+
+Vector6d ToEntries(const Matrix3d& I) {
+  return Vector6d{{I(0, 0), I(1, 1), I(2, 2), I(0, 1), I(0, 2), I(1, 2)}};
+}
+
+Matrix3d TurnRollPitchYaw(const Vector3d& angles) {
+  return (Eigen::AngleAxisd(angles[2], Vector3d::UnitZ()) * Eigen::AngleAxisd(angles[1], Vector3d::UnitY()) *
+          Eigen::AngleAxisd(angles[0], Vector3d::UnitX()))
+      .toRotationMatrix();
 }
 
 Matrix3d CalcUniformInertia(const Shape& shape, double mass) {

@@ -43,8 +43,12 @@ struct SolidEllipsoid {
 };
 using Shape = std::variant<SolidSphere, SolidCylinder, SolidCapsule, SolidBox, SolidTorus, SolidEllipsoid>;
 
-/// Symmetric tensor of its entries xx, yy, zz, xy, xz, yz.
-Matrix3d MakeTensor(const std::array<double, 6>& entries);
+/// Symmetric tensor of its entries xx, yy, zz, xy, xz, yz, and back.
+Matrix3d ToTensor(const Vector6d& entries);
+Vector6d ToEntries(const Matrix3d& tensor);
+
+/// Rotation of roll, pitch, yaw: R_z(yaw) R_y(pitch) R_x(roll).
+Matrix3d TurnRollPitchYaw(const Vector3d& angles);
 
 /// Rotational inertia of a uniform solid about its centre of mass, in its own axes, kg m^2.
 Matrix3d CalcUniformInertia(const Shape& shape, double mass);

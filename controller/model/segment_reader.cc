@@ -10,10 +10,7 @@ namespace {
 constexpr double kUnitVectorAllowance = 1e-4;
 
 Matrix3d ReadRotation(TomlTable& table) {
-  const Vector3d rpy = table.FindAngles<3>("rpy").value_or(Vector3d::Zero());
-  return (Eigen::AngleAxisd(rpy.z(), Vector3d::UnitZ()) * Eigen::AngleAxisd(rpy.y(), Vector3d::UnitY()) *
-          Eigen::AngleAxisd(rpy.x(), Vector3d::UnitX()))
-      .toRotationMatrix();
+  return TurnRollPitchYaw(table.FindAngles<3>("rpy").value_or(Vector3d::Zero()));
 }
 
 Vector3d ReadPoint(TomlTable& table, std::string_view key) {
@@ -132,10 +129,7 @@ Shape ReadShape(TomlTable& table) {
   return SolidSphere{table.Get("radius").AsPositive()};
 }
 
-Matrix3d ReadInertia(const TomlValue& value) {
-  const Vector6d I = value.AsVector<6>();
-  return MakeTensor({I[0], I[1], I[2], I[3], I[4], I[5]});
-}
+Matrix3d ReadInertia(const TomlValue& value) { return ToTensor(value.AsVector<6>()); }
 
 MassProperties ReadBody(TomlTable& table) {
   table.RejectTogether("shapes", {"mass", "com", "inertia", "bodies"});

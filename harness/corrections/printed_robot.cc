@@ -38,10 +38,6 @@ Matrix3d TurnAbout(int axis, double angle) {
   return Eigen::AngleAxisd(angle, Vector3d::Unit(axis)).toRotationMatrix();
 }
 
-Matrix3d TurnRollPitchYaw(const Vector3d& angles) {
-  return TurnAbout(2, angles[2]) * TurnAbout(1, angles[1]) * TurnAbout(0, angles[0]);
-}
-
 std::array<Vector3d, 2> SolveRollPitchYaw(const Matrix3d& R) {
   constexpr double kGimbal = 1e-7;
   const double pitch = std::atan2(-R(2, 0), std::hypot(R(0, 0), R(1, 0)));
@@ -75,18 +71,6 @@ Vector3d CalcRotationVector(const Matrix3d& R) {
 }
 
 double CalcAngle(const Matrix3d& R) { return CalcRotationVector(R).norm(); }
-
-Matrix3d ToTensor(const Vector6d& e) {
-  Matrix3d tensor;
-  tensor << e[0], e[3], e[4], e[3], e[1], e[5], e[4], e[5], e[2];
-  return tensor;
-}
-
-Vector6d ToEntries(const Matrix3d& I) {
-  Vector6d entries;
-  entries << I(0, 0), I(1, 1), I(2, 2), I(0, 1), I(0, 2), I(1, 2);
-  return entries;
-}
 
 Matrix3d PrintedOrigin::CalcRotation() const {
   switch (form) {

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "controller/common/types.h"
+#include "controller/model/rigid_body.h"
 #include "harness/descriptions/robot_description.h"
 
 namespace dexcheck {
@@ -135,13 +136,7 @@ struct LinkNumber {
 std::vector<LinkNumber> ListNumbers(PrintedOrigin* origin);
 std::vector<LinkNumber> ListNumbers(PrintedInertial* inertial);
 
-/// Symmetric tensor of xx yy zz xy xz yz, and back.
-Matrix3d ToTensor(const Vector6d& entries);
-Vector6d ToEntries(const Matrix3d& tensor);
-
-/// Rotation of roll, pitch, yaw; both solutions of the other way (at a quarter turn of pitch, yaw or roll is
-/// 0).
-Matrix3d TurnRollPitchYaw(const Vector3d& angles);
+/// Both solutions for roll, pitch, yaw of a rotation; at a quarter turn of pitch, yaw or roll is 0.
 std::array<Vector3d, 2> SolveRollPitchYaw(const Matrix3d& R);
 Matrix3d TurnAbout(int axis, double angle);
 /// The quaternion w, x, y, z with w >= 0, and back (of any length).

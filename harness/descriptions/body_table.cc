@@ -149,9 +149,9 @@ class BodyTableReader {
     row.body.mass = number(kMass);
     if (row.body.mass < 0.0) Fail("mass: must not be negative");
     row.body.com << number(kComX), number(kComX + 1), number(kComX + 2);
-    std::array<double, 6> n{};
-    for (size_t k = 0; k < n.size(); ++k) n[k] = number(kIxx + k);
-    row.body.inertia = MakeTensor(n);
+    Vector6d n;
+    for (size_t k = 0; k < 6; ++k) n[static_cast<Eigen::Index>(k)] = number(kIxx + k);
+    row.body.inertia = ToTensor(n);
     if (about_origin_) row.body.inertia -= CalcPointInertia(row.body.mass, row.body.com);
   }
 

@@ -45,7 +45,7 @@ std::optional<std::array<double, kCount>> ReadNumbers(const XMLElement& element,
 
 std::optional<Matrix3d> ReadTensor(const XMLElement& inertial) {
   const auto full = ReadNumbers<6>(inertial, "fullinertia");
-  if (full) return MakeTensor(*full);
+  if (full) return ToTensor(Vector6d(full->data()));
   const auto moments = ReadNumbers<3>(inertial, "diaginertia");
   if (moments) return Matrix3d(Vector3d(moments->data()).asDiagonal());
   return std::nullopt;

@@ -179,12 +179,9 @@ class ParameterWriter {
   }
 
   void WriteBody(const MassProperties& body) {
-    const Matrix3d& I = body.inertia;
-    Vector6d entries;
-    entries << I(0, 0), I(1, 1), I(2, 2), I(0, 1), I(0, 2), I(1, 2);
     text_ += "mass = " + FormatTidy(body.mass, body.mass) +
              "\ncom = " + FormatTidyList(body.com, body.com.norm()) +
-             "\ninertia = " + FormatTidyList(entries, I.trace()) + "\n";
+             "\ninertia = " + FormatTidyList(ToEntries(body.inertia), body.inertia.trace()) + "\n";
   }
 
   void WriteFrame(const Frame& frame) {

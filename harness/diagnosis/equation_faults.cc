@@ -200,12 +200,7 @@ const EquationFault kEquations[] = {
     {"rotation of the object transposed", "object_pose", nullptr,
      ObjectPoseChange{[](const Vector6d&, Pose* X) { X->linear().transposeInPlace(); }}},
     {"X_o read as roll, pitch, yaw", "object_pose", nullptr,
-     ObjectPoseChange{[](const Vector6d& X_o, Pose* X) {
-       X->linear() =
-           (Eigen::AngleAxisd(X_o[5], Vector3d::UnitZ()) * Eigen::AngleAxisd(X_o[4], Vector3d::UnitY()) *
-            Eigen::AngleAxisd(X_o[3], Vector3d::UnitX()))
-               .toRotationMatrix();
-     }}},
+     ObjectPoseChange{[](const Vector6d& X_o, Pose* X) { X->linear() = TurnRollPitchYaw(X_o.tail<3>()); }}},
     {"N_o with the wrong sign", nullptr, "N_o", ObjectBodyChange{[](ObjectBodyTerms* t) { t->N_o *= -1.0; }}},
     {"object without gyroscopic terms", nullptr, "C_hat_V",
      ObjectBodyChange{[](ObjectBodyTerms* t) { t->C_hat.setZero(); }}},

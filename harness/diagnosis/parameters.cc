@@ -114,12 +114,6 @@ Vector3d ToRpy(const Matrix3d& R) {
   return {std::atan2(R(2, 1), R(2, 2)), pitch, std::atan2(R(1, 0), R(0, 0))};
 }
 
-Matrix3d FromRpy(const Vector3d& rpy) {
-  return (Eigen::AngleAxisd(rpy.z(), Vector3d::UnitZ()) * Eigen::AngleAxisd(rpy.y(), Vector3d::UnitY()) *
-          Eigen::AngleAxisd(rpy.x(), Vector3d::UnitX()))
-      .toRotationMatrix();
-}
-
 }  // namespace
 
 std::vector<Parameter> ListParameters(const RobotSpec& spec) {
@@ -170,7 +164,7 @@ void SetValue(RobotSpec* spec, const Parameter& parameter, double value) {
     auto R = Eigen::Map<Eigen::Matrix4d>(place).topLeftCorner<3, 3>();
     Vector3d rpy = ToRpy(R);
     rpy[parameter.component] = value;
-    R = FromRpy(rpy);
+    R = TurnRollPitchYaw(rpy);
     return;
   }
   const size_t offset = OffsetOf(parameter);

@@ -147,10 +147,7 @@ InjectedFault CenterOfMass(const FaultContext& context) {
 InjectedFault Inertia(const FaultContext& context) {
   const Body body = ObjectBody(context);
   const double factor = 1.0 + context.draw->Positive(0.05, 1.0);
-  Eigen::Matrix<double, 6, 1> entries;
-  const Matrix3d& I = body.mass->inertia;
-  entries << I(0, 0), I(1, 1), I(2, 2), I(0, 1), I(0, 2), I(1, 2);
-  const double change = (factor - 1.0) * entries.norm();
+  const double change = (factor - 1.0) * ToEntries(body.mass->inertia).norm();
   InjectedFault fault = FaultAt(body.place, "inertia", change, change);
   fault.engine = [name = body.name, factor](const Setup&, mjModel* m) {
     const int id = FindId(*m, mjOBJ_BODY, name);
