@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "controller/common/errors.h"
+#include "controller/common/text.h"
 #include "harness/base/files.h"
 #include "renders/cairo_surface.h"
 
@@ -31,21 +32,6 @@ CairoPtr MakeCairo(cairo_surface_t* surface) {
 void SetColor(const CairoPtr& cairo, const Color& color) {
   cairo_set_source_rgba(cairo.get(), static_cast<double>(color[0]), static_cast<double>(color[1]),
                         static_cast<double>(color[2]), static_cast<double>(color[3]));
-}
-
-/// UTF-8 that Cairo takes: what is none is a question mark.
-std::string MendUtf8(const std::string& text) {
-  std::string mended;
-  for (size_t at = 0; at < text.size();) {
-    const auto lead = static_cast<unsigned char>(text[at]);
-    size_t length = lead < 0x80 ? 1 : lead >= 0xf0 ? 4 : lead >= 0xe0 ? 3 : lead >= 0xc2 ? 2 : 0;
-    for (size_t k = 1; k < length; ++k) {
-      if (at + k >= text.size() || (static_cast<unsigned char>(text[at + k]) & 0xc0U) != 0x80U) length = 0;
-    }
-    mended += length > 0 ? text.substr(at, length) : "?";
-    at += std::max<size_t>(length, 1);
-  }
-  return mended;
 }
 
 double MeasureWith(const CairoPtr& cairo, cairo_font_face_t* face, const std::string& text, double size) {

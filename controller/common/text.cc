@@ -26,6 +26,25 @@ size_t CalcEditDistance(std::string_view a, std::string_view b) {
   return row[b.size()];
 }
 
+/// Bytes of the character of UTF-8 that begins the text; 0 when there is none.
+size_t CountUtf8(std::string_view text) {
+  const auto byte = [&](size_t i) { return static_cast<unsigned char>(text[i]); };
+  const unsigned char first = byte(0);
+  const size_t length = first < 0x80   ? 1
+                        : first < 0xc2 ? 0
+                        : first < 0xe0 ? 2
+                        : first < 0xf0 ? 3
+                        : first < 0xf5 ? 4
+                                       : 0;
+  if (length > text.size()) return 0;
+  for (size_t i = 1; i < length; ++i) {
+    if ((byte(i) & 0xc0U) != 0x80) return 0;
+  }
+  const bool is_no_character = (first == 0xe0 && byte(1) < 0xa0) || (first == 0xed && byte(1) > 0x9f) ||
+                               (first == 0xf0 && byte(1) < 0x90) || (first == 0xf4 && byte(1) > 0x8f);
+  return is_no_character ? 0 : length;
+}
+
 }  // namespace
 
 std::string FormatNumber(double value) {
@@ -41,6 +60,16 @@ std::string FormatNumber(double value, int digits) {
   const std::to_chars_result result =
       std::to_chars(buffer.data(), buffer.data() + buffer.size(), value, std::chars_format::general, digits);
   return {buffer.data(), result.ptr};
+}
+
+std::string MendUtf8(std::string_view text) {
+  std::string mended;
+  while (!text.empty()) {
+    const size_t length = CountUtf8(text);
+    mended += length > 0 ? text.substr(0, length) : "?";
+    text.remove_prefix(std::max<size_t>(length, 1));
+  }
+  return mended;
 }
 
 std::string Abbreviate(std::string_view text) {

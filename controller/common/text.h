@@ -27,6 +27,9 @@ std::string FormatNumbers(const Range& values) {
   return text + "]";
 }
 
+/// The text with '?' for each byte that is no UTF-8.
+std::string MendUtf8(std::string_view text);
+
 /// The text on one line of bounded length: control characters become '?', a long text ends in "...".
 std::string Abbreviate(std::string_view text);
 

@@ -76,25 +76,6 @@ class NestingScanner {
   int dots_ = 0;
 };
 
-/// Bytes of the character of UTF-8 that begins the text; 0 when there is none, or one that TOML has not.
-size_t CountUtf8(std::string_view text) {
-  const auto byte = [&](size_t i) { return static_cast<unsigned char>(text[i]); };
-  const unsigned char first = byte(0);
-  const size_t length = first < 0x80   ? 1
-                        : first < 0xc2 ? 0
-                        : first < 0xe0 ? 2
-                        : first < 0xf0 ? 3
-                        : first < 0xf5 ? 4
-                                       : 0;
-  if (length > text.size()) return 0;
-  for (size_t i = 1; i < length; ++i) {
-    if ((byte(i) & 0xc0U) != 0x80) return 0;
-  }
-  const bool is_no_character = (first == 0xe0 && byte(1) < 0xa0) || (first == 0xed && byte(1) > 0x9f) ||
-                               (first == 0xf0 && byte(1) < 0x90) || (first == 0xf4 && byte(1) > 0x8f);
-  return is_no_character ? 0 : length;
-}
-
 void CheckSize(size_t size, std::string_view source) {
   if (size <= TomlDocument::kMaxSize) return;
   throw InputError(std::string(source) + ": must be at most " + std::to_string(TomlDocument::kMaxSize) +
@@ -276,19 +257,14 @@ std::string ApplyOverrides(const std::string& text, const std::string& source,
 
 std::string QuoteToml(std::string_view text) {
   std::string quoted = "\"";
-  for (size_t i = 0; i < text.size();) {
-    const auto c = static_cast<unsigned char>(text[i]);
-    const size_t length = CountUtf8(text.substr(i));
-    if (c < 0x20 || c == 0x7f) {
-      constexpr std::string_view kDigits = "0123456789abcdef";
-      quoted += std::string("\\u00") + kDigits[c >> 4U] + kDigits[c & 15U];
-    } else if (length == 0) {
-      quoted += '?';
-    } else {
-      if (c == '"' || c == '\\') quoted += '\\';
-      quoted += text.substr(i, length);
+  for (const char c : MendUtf8(text)) {
+    if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) {
+      quoted += "\\u00";
+      for (const int digit : {c >> 4, c & 15}) quoted += "0123456789abcdef"[digit];
+      continue;
     }
-    i += std::max<size_t>(length, 1);
+    if (c == '"' || c == '\\') quoted += '\\';
+    quoted += c;
   }
   return quoted + "\"";
 }
