@@ -40,13 +40,6 @@ std::vector<Decoration> MakeForces(const RunFrames& run, long row, double meters
   return decorations;
 }
 
-Pose BodyPose(const mjData& data, int body) {
-  Pose X = Pose::Identity();
-  X.translation() = Eigen::Map<const Vector3d>(data.xpos + 3 * body);
-  X.linear() = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(data.xmat + 9 * body);
-  return X;
-}
-
 void SetRow(const mjModel& model, const RunFrames& run, long row, mjData* data) {
   mju_copy(data->qpos, run.qpos.row(row).data(), static_cast<int>(model.nq));
   mj_kinematics(&model, data);

@@ -21,9 +21,6 @@ std::vector<LegendEntry> MakeForceLegend(const RunFrames& run);
 /// none.
 double CalcMetersPerNewton(const RunFrames& run);
 
-/// The pose of a body in computed kinematics.
-Pose BodyPose(const mjData& data, int body);
-
 /// Puts a row of a run into `data` and computes what drawing needs.
 void SetRow(const mjModel& model, const RunFrames& run, long row, mjData* data);
 

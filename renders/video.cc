@@ -8,6 +8,7 @@
 #include "controller/common/text.h"
 #include "harness/base/process_pool.h"
 #include "harness/engine/engine.h"
+#include "harness/engine/map_vector.h"
 #include "renders/canvas.h"
 #include "renders/overlay.h"
 #include "renders/renderer.h"

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "controller/common/errors.h"
+#include "harness/engine/map_vector.h"
 #include "renders/run_decorations.h"
 
 namespace dexcheck {

@@ -148,7 +148,7 @@ void ConstraintLaw::FindAnchors(const mjData& reference) {
   for (int eq = 0; eq < m.neq; ++eq) {
     if (m.eq_type[eq] != mjEQ_CONNECT) continue;
     for (const auto& [side, body] : {std::pair(0, m.eq_obj1id[eq]), std::pair(1, m.eq_obj2id[eq])}) {
-      const Pose X = MapPose(reference.xmat + 9 * body, reference.xpos + 3 * body);
+      const Pose X = BodyPose(reference, body);
       anchors_[static_cast<size_t>(eq)][static_cast<size_t>(side)] =
           Follow(whole_->FindLink(body)).X.inverse(Eigen::Isometry) *
           (X * MapVector(m.eq_data + mjNEQDATA * eq + 3 * side));

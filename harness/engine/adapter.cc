@@ -218,7 +218,7 @@ void Adapter::MatchBase(const std::string& engine_source) {
   mj_kinematics(&engine, data.get());
   const Pose& X_B0 = model_->base().X_B0;
   if (base_is_free_) {
-    X_0b_ = X_B0.inverse() * MapPose(data->xmat + 9 * body, data->xpos + 3 * body);
+    X_0b_ = X_B0.inverse() * BodyPose(*data, body);
   } else {
     reference_anchor_ = MapVector(data->xanchor + 3 * (first + 2));
     X_0b_ = X_B0.inverse() * Eigen::Translation3d(reference_anchor_);

@@ -24,7 +24,7 @@ EngineMotion EngineMotion::MoveTo(const Vector3d& point) const {
 
 Pose EngineTerms::FramePose(int frame) const {
   const int site = adapter_->frame_sites()[static_cast<size_t>(frame)];
-  if (site < 0) return MapPose(data_->xmat + 9 * body_of(frame), data_->xpos + 3 * body_of(frame));
+  if (site < 0) return BodyPose(*data_, body_of(frame));
   return MapPose(data_->site_xmat + 9 * site, data_->site_xpos + 3 * site);
 }
 
@@ -121,9 +121,7 @@ EngineMotion EngineTerms::FrameMotion(int frame) const {
 
 Matrix3d EngineTerms::ObjectRotation() const { return RotationMap(data_->xmat + 9 * object_body_); }
 
-Pose EngineTerms::ObjectPose() const {
-  return MapPose(data_->xmat + 9 * object_body_, data_->xpos + 3 * object_body_);
-}
+Pose EngineTerms::ObjectPose() const { return BodyPose(*data_, object_body_); }
 
 Vector6d EngineTerms::ObjectVelocity() const {
   const EngineMotion motion = ObjectMotion();

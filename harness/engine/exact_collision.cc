@@ -20,10 +20,7 @@ constexpr double kLyingFlat = 1e-3;
 
 /// Pose of the body, which is a torus's frame: the engine turns a mesh geom's own frame to the mesh's
 /// principal axes.
-Pose TorusPose(const mjModel& m, const mjData& d, int geom) {
-  const int body = m.geom_bodyid[geom];
-  return MapPose(d.xmat + 9 * body, d.xpos + 3 * body);
-}
+Pose TorusPose(const mjModel& m, const mjData& d, int geom) { return BodyPose(d, m.geom_bodyid[geom]); }
 
 /// Fills the engine's contacts. @param X frame of the contacts' numbers in the world. @return how many they
 /// are.

@@ -21,6 +21,11 @@ inline Pose MapPose(const mjtNum* rotation, const mjtNum* position) {
   return X;
 }
 
+/// Returns where the kinematics have a body.
+inline Pose BodyPose(const mjData& data, int body) {
+  return MapPose(data.xmat + 9 * body, data.xpos + 3 * body);
+}
+
 /// @param wxyz a quaternion of any length.
 inline Pose ReadPose(const mjtNum* position, const mjtNum* wxyz) {
   Pose X = Pose::Identity();

@@ -13,6 +13,14 @@ namespace {
 
 constexpr int kWorldBody = 0;
 
+/// Force and torque of a contact on its second geom, along the world's axes.
+std::pair<Vector3d, Vector3d> ReadForce(const mjModel& m, const mjData& d, int contact) {
+  mjtNum wrench[6];  // in the contact's frame
+  mj_contactForce(&m, &d, contact, wrench);
+  const RotationMap frame(d.contact[contact].frame);
+  return {frame.transpose() * MapVector(wrench), frame.transpose() * MapVector(wrench + 3)};
+}
+
 }  // namespace
 
 void ReadConstraints(const mjData& d, PlantResponse* response) {
@@ -209,10 +217,8 @@ void Observer::ReadBonds(const mjModel& m, const mjData& d, std::vector<PlantCon
       if (d.efc_type[row] != mjCNSTR_EQUALITY || d.efc_id[row] != eq) continue;
       // Three rows along the world's axes: place of the first body's point against the second's, and the
       // force on the first.
-      const int body = m.eq_obj2id[eq];
-      const RotationMap R(d.xmat + 9 * body);
       contact.touching = true;
-      contact.position = MapVector(d.xpos + 3 * body) + R * MapVector(m.eq_data + mjNEQDATA * eq + 3);
+      contact.position = BodyPose(d, m.eq_obj2id[eq]) * MapVector(m.eq_data + mjNEQDATA * eq + 3);
       contact.distance = MapVector(d.efc_pos + row).norm();
       contact.force = -MapVector(d.efc_force + row);
       break;
@@ -251,9 +257,7 @@ void Observer::ReadFeet(const mjModel& m, const mjData& d, std::vector<GroundCon
     const Vector3d others = contact.force;
     if (!contact.touching || c.dist < contact.distance)
       static_cast<BodyContact&>(contact) = ReadContact(m, d, k, first);
-    mjtNum force[6];  // on geom2, in the contact's frame
-    mj_contactForce(&m, &d, k, force);
-    contact.force = others + (first ? -1.0 : 1.0) * (RotationMap(c.frame).transpose() * MapVector(force));
+    contact.force = others + (first ? -1.0 : 1.0) * ReadForce(m, d, k).first;
   }
 }
 
@@ -282,10 +286,7 @@ Vector6d Observer::ReadSupportWrench(const mjModel& m, const mjData& d) const {
     const bool first = m.geom_bodyid[c.geom1] == object;
     if (!first && m.geom_bodyid[c.geom2] != object) continue;
     if (FindFingertip(first ? c.geom2 : c.geom1) >= 0) continue;
-    const RotationMap frame(c.frame);
-    mjtNum contact_force[6];  // on geom2, in the contact's frame
-    mj_contactForce(&m, &d, k, contact_force);
-    const Vector3d force = (first ? -1.0 : 1.0) * (frame.transpose() * MapVector(contact_force));
+    const Vector3d force = (first ? -1.0 : 1.0) * ReadForce(m, d, k).first;
     const Vector3d arm = MapVector(c.pos) - X_Bo_.translation();
     wrench.head<3>() += X_Bo_.linear().transpose() * force;
     wrench.tail<3>() += X_Bo_.linear().transpose() * arm.cross(force);
@@ -342,11 +343,8 @@ void Observer::ReadForces(const mjModel& m, const mjData& d, PlantResponse* resp
   for (int k = 0; k < d.ncon; ++k) {
     const mjContact& c = d.contact[k];
     if (c.efc_address < 0) continue;
-    const RotationMap frame(c.frame);
-    mjtNum force[6];  // on geom2, in the contact's frame
-    mj_contactForce(&m, &d, k, force);
-    BodyForce one{m.geom_bodyid[c.geom2], MapVector(c.pos), frame.transpose() * MapVector(force),
-                  frame.transpose() * MapVector(force + 3)};
+    const auto [force, torque] = ReadForce(m, d, k);
+    BodyForce one{m.geom_bodyid[c.geom2], MapVector(c.pos), force, torque};
     response->forces.push_back(one);
     response->forces.push_back({m.geom_bodyid[c.geom1], one.point, -one.force, -one.torque});
   }
@@ -355,9 +353,7 @@ void Observer::ReadForces(const mjModel& m, const mjData& d, PlantResponse* resp
     const int eq = d.efc_id[row];
     if (m.eq_type[eq] != mjEQ_CONNECT) continue;
     const Vector3d force = MapVector(d.efc_force + row);
-    const auto place = [&](int body, const mjtNum* anchor) {
-      return MapPose(d.xmat + 9 * body, d.xpos + 3 * body) * MapVector(anchor);
-    };
+    const auto place = [&](int body, const mjtNum* anchor) { return BodyPose(d, body) * MapVector(anchor); };
     const int first = m.eq_obj1id[eq], second = m.eq_obj2id[eq];
     const mjtNum* const anchors = m.eq_data + mjNEQDATA * eq;
     response->forces.push_back({first, place(first, anchors), force, Vector3d::Zero()});
@@ -376,15 +372,12 @@ void Observer::ReadContacts(const mjModel& m, const mjData& d, std::vector<Plant
       const bool second = c.geom2 == tip_geoms_[i] && m.geom_bodyid[c.geom1] == adapter_->object_body();
       if (!first && !second) continue;
       if (contact.touching && c.dist >= contact.distance) continue;
-      const RotationMap frame(c.frame);
       const double sign = first ? 1.0 : -1.0;
-      mjtNum force[6];  // on geom2, in the contact's frame
-      mj_contactForce(&m, &d, k, force);
       contact.touching = true;
       contact.distance = c.dist;
       contact.position = MapVector(c.pos);
-      contact.normal = sign * frame.row(0).transpose();
-      contact.force = sign * (frame.transpose() * MapVector(force));
+      contact.normal = sign * RotationMap(c.frame).row(0).transpose();
+      contact.force = sign * ReadForce(m, d, k).first;
     }
   }
 }

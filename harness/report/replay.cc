@@ -8,6 +8,7 @@
 
 #include "controller/object/euler_zyz.h"
 #include "harness/engine/engine.h"
+#include "harness/engine/map_vector.h"
 #include "renders/renderer.h"
 #include "renders/run_decorations.h"
 #include "renders/viewpoint.h"
@@ -115,10 +116,7 @@ class ReplayMaker {
     const auto name = kNames.find(model_.geom_type[geom]);
     if (name == kNames.end()) return;
     const int body = model_.geom_bodyid[geom];
-    Pose X_WG = Pose::Identity();
-    X_WG.translation() = Eigen::Map<const Vector3d>(data_->geom_xpos + 3 * geom);
-    X_WG.linear() =
-        Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(data_->geom_xmat + 9 * geom);
+    const Pose X_WG = MapPose(data_->geom_xmat + 9 * geom, data_->geom_xpos + 3 * geom);
     const Pose X_PG = BodyPose(*data_, model_.body_weldid[body]).inverse() * X_WG;
     const std::array<float, 4> color = Color(geom);
     const int material = model_.geom_matid[geom];
@@ -188,7 +186,7 @@ class ReplayMaker {
     if (model_.ncam == 0 && !parts_.empty()) AddCourse();
     for (int id = 0; id < model_.ncam; ++id) {
       const Vector3d p(data_->cam_xpos + 3 * id);
-      const Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> R(data_->cam_xmat + 9 * id);
+      const RotationMap R(data_->cam_xmat + 9 * id);
       const int body = model_.cam_bodyid[id];
       json_["cameras"].push_back({{"name", NameOf(model_, mjOBJ_CAMERA, id)},
                                   {"position", ToJson(p)},

@@ -49,7 +49,7 @@ std::map<int, std::vector<Place>> ListPlaces(const mjModel& m, const mjData& dat
     if (m.body_rootid[body] != base || !CanTouch(m, geom)) continue;
     const double radius = m.geom_type[geom] == mjGEOM_BOX ? 0.0 : m.geom_size[3 * geom];
     const Pose X_body = ReadPose(m.geom_pos + 3 * geom, m.geom_quat + 4 * geom);
-    const Pose X_W = MapPose(data.xmat + 9 * body, data.xpos + 3 * body);
+    const Pose X_W = BodyPose(data, body);
     for (const Vector3d& p : ListPlaces(m, geom)) {
       const Vector3d p_body = X_body * p;
       places[body].push_back({{"", geom, p_body, radius}, X_W * p_body - radius * Vector3d::UnitZ()});

@@ -11,6 +11,7 @@
 #include "controller/grasp/finger_placement.h"
 #include "controller/object/euler_zyz.h"
 #include "harness/engine/engine.h"
+#include "harness/engine/map_vector.h"
 #include "harness/engine/mujoco_release.h"
 #include "harness/plant/random_stream.h"
 
@@ -239,8 +240,8 @@ void MakeBonds(const Scenario& scenario, const Hold& hold, const Surface& surfac
     // One point in both bodies.
     const Vector3d on_object = contact.g_o_cf.translation();
     const Vector3d p_B = start->X_Bo * on_object;
-    const Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> R(data->xmat + 9 * body);
-    const Vector3d on_finger = R.transpose() * (p_B - Eigen::Map<const Vector3d>(data->xpos + 3 * body));
+    const Pose X_f = BodyPose(*data, body);
+    const Vector3d on_finger = X_f.linear().transpose() * (p_B - X_f.translation());
     std::copy_n(on_finger.data(), 3, m.eq_data + mjNEQDATA * found);
     std::copy_n(on_object.data(), 3, m.eq_data + mjNEQDATA * found + 3);
   }

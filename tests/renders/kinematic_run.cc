@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "harness/engine/engine.h"
+#include "harness/engine/map_vector.h"
 #include "renders/run_decorations.h"
 
 namespace dexcheck::testing {
