@@ -295,11 +295,9 @@ std::string ReduceToMechanism(const MjcfFile& mjcf) {
     if (!keeps(name, {"compiler", "option", "size", "default", "asset", "worldbody", "equality"}))
       root->DeleteChild(child);
   }
-  for (tinyxml2::XMLElement* equality : ListChildren(root, "equality")) {
-    for (tinyxml2::XMLElement* child : ListChildren(equality)) {
-      if (std::string_view(child->Name()) != "joint") equality->DeleteChild(child);
-    }
-  }
+  DeleteInSections(root, {"equality"}, [](const tinyxml2::XMLElement& child) {
+    return std::string_view(child.Name()) != "joint";
+  });
   bool has_mesh = false;
   for (tinyxml2::XMLElement* world : ListChildren(root, "worldbody")) {
     VisitElements(world, [&](tinyxml2::XMLElement* body) {
@@ -320,11 +318,9 @@ std::string ReduceToMechanism(const MjcfFile& mjcf) {
     element->DeleteAttribute("material");
     element->DeleteAttribute("rgba");
   });
-  for (tinyxml2::XMLElement* asset : ListChildren(root, "asset")) {
-    for (tinyxml2::XMLElement* child : ListChildren(asset)) {
-      if (!has_mesh || std::string_view(child->Name()) != "mesh") asset->DeleteChild(child);
-    }
-  }
+  DeleteInSections(root, {"asset"}, [&](const tinyxml2::XMLElement& child) {
+    return !has_mesh || std::string_view(child.Name()) != "mesh";
+  });
   return reduced.Print();
 }
 

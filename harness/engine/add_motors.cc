@@ -35,12 +35,9 @@ std::optional<double> FindJointLimit(const mjModel& m, int joint) {
 
 /// Deletes all actuators, and the sensors and controls that name them.
 void DeleteActuators(XMLElement* root) {
-  for (XMLElement* section : ListChildren(root, "actuator")) root->DeleteChild(section);
-  for (XMLElement* section : ListChildren(root, "sensor")) {
-    for (XMLElement* sensor : ListChildren(section)) {
-      if (sensor->Attribute("actuator") != nullptr) section->DeleteChild(sensor);
-    }
-  }
+  DeleteChildren(root, "actuator", [](const XMLElement&) { return true; });
+  DeleteInSections(root, {"sensor"},
+                   [](const XMLElement& sensor) { return sensor.Attribute("actuator") != nullptr; });
   DeleteControls(root);
 }
 

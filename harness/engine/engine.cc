@@ -327,6 +327,12 @@ int FindByName(const mjModel& model, mjtObj type, const std::string& name) {
   return number < CountElements(model, type) && (own == nullptr || *own == '\0') ? number : -1;
 }
 
+bool AreExcluded(const mjModel& model, int body, int other) {
+  return std::any_of(model.exclude_signature, model.exclude_signature + model.nexclude, [&](int excluded) {
+    return excluded == MakeSignature(body, other) || excluded == MakeSignature(other, body);
+  });
+}
+
 bool CanTouch(const mjModel& model, int geom) {
   for (int pair = 0; pair < model.npair; ++pair) {
     if (model.pair_geom1[pair] == geom || model.pair_geom2[pair] == geom) return true;

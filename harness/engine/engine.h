@@ -44,6 +44,8 @@ std::string NameOf(const mjModel& model, mjtObj type, int id);
 /// Returns the body, joint or site of a name as NameOf gives it: "#ID" is one without a name. -1 if none.
 int FindByName(const mjModel& model, mjtObj type, const std::string& name);
 
+/// Whether the MJCF excludes the contacts of two bodies.
+bool AreExcluded(const mjModel& model, int body, int other);
 /// Whether a geom takes part in contacts: by an explicit pair, or by its contype or conaffinity.
 bool CanTouch(const mjModel& model, int geom);
 

@@ -43,19 +43,11 @@ std::vector<std::string> Exclude(const mjModel& m, const std::set<std::pair<int,
     const int geom = mj_name2id(&m, mjOBJ_GEOM, ReadAttribute(pair, attribute).c_str());
     return geom < 0 ? -1 : m.geom_bodyid[geom];
   };
-  for (tinyxml2::XMLElement* contact : ListChildren(mjcf->root(), "contact")) {
-    for (tinyxml2::XMLElement* pair : ListChildren(contact, "pair")) {
-      if (pairs.contains(std::minmax({find_body(*pair, "geom1"), find_body(*pair, "geom2")})))
-        contact->DeleteChild(pair);
-    }
-  }
-  return names;
-}
-
-bool IsExcluded(const mjModel& m, int one, int other) {
-  return std::any_of(m.exclude_signature, m.exclude_signature + m.nexclude, [&](int excluded) {
-    return excluded == MakeSignature(one, other) || excluded == MakeSignature(other, one);
+  DeleteInSections(mjcf->root(), {"contact"}, [&](const tinyxml2::XMLElement& pair) {
+    return std::string_view(pair.Name()) == "pair" &&
+           pairs.contains(std::minmax({find_body(pair, "geom1"), find_body(pair, "geom2")}));
   });
+  return names;
 }
 
 bool AreNeighbours(const mjModel& m, int one, int other) {
@@ -86,9 +78,7 @@ void AddContacts(const mjModel& m, const mjData& data, bool at_start, std::set<s
 void AddOverlaps(const mjModel& m, const mjData& data, const Solids& solids, bool at_start,
                  std::set<std::pair<int, int>>* pairs) {
   constexpr double kNear = 1e-3;  // m, which a run's motion is off by
-  const auto pose = [&](const Solid& s) {
-    return Pose(MapPose(data.xmat + 9 * s.body, data.xpos + 3 * s.body) * s.X_BG);
-  };
+  const auto pose = [&](const Solid& s) { return Pose(BodyPose(data, s.body) * s.X_BG); };
   for (size_t i = 0; i < solids.list.size(); ++i) {
     const Solid& a = solids.list[i];
     for (size_t k = 0; k < i; ++k) {
@@ -114,7 +104,7 @@ std::vector<std::string> ExcludeBaseContacts(MjcfFile* mjcf) {
     const int base = m.body_parentid[body];
     if (base == 0 || m.body_weldid[base] != 0 || m.body_weldid[body] == 0) continue;
     const bool can_touch = m.body_geomnum[base] > 0 && m.body_geomnum[body] > 0;
-    if (can_touch && !IsExcluded(m, base, body)) pairs.emplace(base, body);
+    if (can_touch && !AreExcluded(m, base, body)) pairs.emplace(base, body);
   }
   return Exclude(m, pairs, mjcf);
 }
@@ -158,14 +148,9 @@ void DeleteSections(const char* name, MjcfFile* mjcf) {
 
 /// Deletes actuators and sensors that refer to tendons and constraints, whose sections are gone.
 void DeleteUsers(MjcfFile* mjcf) {
-  for (const char* name : {"actuator", "sensor"}) {
-    for (XMLElement* section : ListChildren(mjcf->root(), name)) {
-      for (XMLElement* part : ListChildren(section)) {
-        const std::string_view kind = part->Name();
-        if (part->Attribute("tendon") != nullptr || kind.starts_with("tendon")) section->DeleteChild(part);
-      }
-    }
-  }
+  DeleteInSections(mjcf->root(), {"actuator", "sensor"}, [](const XMLElement& part) {
+    return part.Attribute("tendon") != nullptr || std::string_view(part.Name()).starts_with("tendon");
+  });
 }
 
 void DeleteWord(XMLElement* element, const char* attribute, MjcfFile* mjcf) {
@@ -174,15 +159,17 @@ void DeleteWord(XMLElement* element, const char* attribute, MjcfFile* mjcf) {
   element->DeleteAttribute(attribute);
 }
 
+void DeleteKeyFrames(MjcfFile* mjcf) {
+  DeleteChildren(mjcf->root(), "keyframe", [](const XMLElement&) { return true; });
+}
+
 /// Deletes the joint with its sensors, and all key frames, which have numbers of all joints.
 void DeleteJoint(XMLElement* joint, MjcfFile* mjcf) {
   const std::string name = ReadAttribute(*joint, "name");
-  for (XMLElement* section : ListChildren(mjcf->root(), "sensor")) {
-    for (XMLElement* part : ListChildren(section)) {
-      if (!name.empty() && ReadAttribute(*part, "joint") == name) section->DeleteChild(part);
-    }
-  }
-  for (XMLElement* section : ListChildren(mjcf->root(), "keyframe")) mjcf->root()->DeleteChild(section);
+  DeleteInSections(mjcf->root(), {"sensor"}, [&](const XMLElement& part) {
+    return !name.empty() && ReadAttribute(part, "joint") == name;
+  });
+  DeleteKeyFrames(mjcf);
   joint->Parent()->DeleteChild(joint);
 }
 
@@ -218,16 +205,12 @@ namespace {
 
 /// Deletes the elements that refer to one of these names.
 void DeleteNaming(const std::set<std::string>& names, MjcfFile* mjcf) {
-  for (const char* kind : {"actuator", "sensor", "contact"}) {
-    for (XMLElement* section : ListChildren(mjcf->root(), kind)) {
-      for (XMLElement* part : ListChildren(section)) {
-        bool is_user = false;
-        for (const auto* word = part->FirstAttribute(); word != nullptr; word = word->Next())
-          is_user |= std::string_view(word->Name()) != "name" && names.contains(word->Value());
-        if (is_user) section->DeleteChild(part);
-      }
-    }
-  }
+  DeleteInSections(mjcf->root(), {"actuator", "sensor", "contact"}, [&](const XMLElement& part) {
+    bool is_user = false;
+    for (const auto* word = part.FirstAttribute(); word != nullptr; word = word->Next())
+      is_user |= std::string_view(word->Name()) != "name" && names.contains(word->Value());
+    return is_user;
+  });
 }
 
 }  // namespace
@@ -259,7 +242,7 @@ void LeaveOutOthers(const mjModel& engine, MjcfFile* mjcf) {
   }
   if (others.empty()) return;
   DeleteNaming(names, mjcf);
-  for (XMLElement* section : ListChildren(mjcf->root(), "keyframe")) mjcf->root()->DeleteChild(section);
+  DeleteKeyFrames(mjcf);
 }
 
 void HoldBase(double lift, MjcfFile* mjcf) {

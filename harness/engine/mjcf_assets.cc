@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cstdlib>
 #include <map>
 #include <set>
@@ -35,9 +36,8 @@ class AssetSieve {
     for (XMLElement* section : ListChildren(mjcf_.root(), "asset")) SieveAssets(section);
     for (XMLElement* section : ListChildren(mjcf_.root(), "worldbody")) SieveBody(section, {});
     VisitElements(mjcf_.root(), [&](XMLElement* element) { DropLooks(element); });
-    for (const char* name : {"contact", "sensor", "tendon", "equality", "custom"}) {
-      for (XMLElement* section : ListChildren(mjcf_.root(), name)) DropReferences(section);
-    }
+    DeleteInSections(mjcf_.root(), {"contact", "sensor", "tendon", "equality", "custom"},
+                     [&](const XMLElement& child) { return RefersToRemoved(child); });
   }
 
  private:
@@ -167,16 +167,15 @@ class AssetSieve {
     if (Is(*element, "material")) drop("texture", textures_);
   }
 
-  /// Deletes pairs, sensors and other references to geoms that are gone.
-  void DropReferences(XMLElement* section) {
-    for (XMLElement* child : ListChildren(section)) {
-      for (const char* attribute : {"geom", "geom1", "geom2", "objname", "refname"}) {
-        if (!removed_.contains(ReadAttribute(*child, attribute))) continue;
-        mjcf_.Note(*child, "<" + std::string(child->Name()) + ">", "left out with its geom");
-        section->DeleteChild(child);
-        break;
-      }
-    }
+  /// Whether a pair, sensor or other element refers to a geom that is gone, which it then notes.
+  [[nodiscard]] bool RefersToRemoved(const XMLElement& child) {
+    const auto refers = [&](const char* attribute) {
+      return removed_.contains(ReadAttribute(child, attribute));
+    };
+    constexpr const char* kReferences[] = {"geom", "geom1", "geom2", "objname", "refname"};
+    if (std::ranges::none_of(kReferences, refers)) return false;
+    mjcf_.Note(child, "<" + std::string(child.Name()) + ">", "left out with its geom");
+    return true;
   }
 
   struct Shape {

@@ -38,7 +38,7 @@ class PairLister {
     const int body_b = BodyOf(b);
     if (RootOf(body_a) == RootOf(body_b) || (IsStatic(body_a) && IsStatic(body_b))) return false;
     const bool known = IsRobot(body_a) || IsRobot(body_b) || IsObject(body_a) || IsObject(body_b);
-    if (!known || AreNeighbours(body_a, body_b) || AreExcluded(body_a, body_b)) return false;
+    if (!known || AreNeighbours(body_a, body_b) || AreExcluded(m_, body_a, body_b)) return false;
     if ((wheels_.count(body_a) > 0 && IsPlane(b)) || (wheels_.count(body_b) > 0 && IsPlane(a))) return false;
     return declared_.count({a, b}) == 0;
   }
@@ -87,12 +87,6 @@ class PairLister {
     const int anchor_a = AnchorOf(a);
     const int anchor_b = AnchorOf(b);
     return anchor_a == anchor_b || AnchorBefore(a) == anchor_b || AnchorBefore(b) == anchor_a;
-  }
-  [[nodiscard]] bool AreExcluded(int a, int b) const {
-    const int signature = MakeSignature(a, b);
-    const int other = MakeSignature(b, a);
-    return std::any_of(m_.exclude_signature, m_.exclude_signature + m_.nexclude,
-                       [&](int excluded) { return excluded == signature || excluded == other; });
   }
 
   const mjModel& m_;

@@ -5,6 +5,7 @@
 #include <tinyxml2.h>
 
 #include <algorithm>
+#include <initializer_list>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -37,6 +38,22 @@ std::vector<Element*> ListChildren(Element* parent, const char* name = nullptr) 
     children.push_back(child);
   }
   return children;
+}
+
+/// Deletes the child elements, of one name or all, that `goes` names.
+template <typename Goes>
+void DeleteChildren(tinyxml2::XMLElement* parent, const char* name, const Goes& goes) {
+  for (tinyxml2::XMLElement* child : ListChildren(parent, name)) {
+    if (goes(*child)) parent->DeleteChild(child);
+  }
+}
+
+/// Deletes the elements that `goes` names in all of a document's sections of these names.
+template <typename Goes>
+void DeleteInSections(tinyxml2::XMLElement* root, std::initializer_list<const char*> sections,
+                      const Goes& goes) {
+  for (const char* name : sections)
+    for (tinyxml2::XMLElement* section : ListChildren(root, name)) DeleteChildren(section, nullptr, goes);
 }
 
 /// Calls visit for an element and all below it, in the order of the file, without recursion, since a file may
