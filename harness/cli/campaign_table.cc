@@ -9,7 +9,6 @@
 
 #include "controller/common/toml_reader.h"
 #include "harness/base/bounded_json.h"
-#include "harness/base/byte_archive.h"
 #include "harness/base/files.h"
 #include "harness/base/interrupts.h"
 #include "harness/base/process_pool.h"
@@ -52,6 +51,17 @@ std::vector<Row> SumUp(const std::vector<CampaignFault>& faults) {
   return rows;
 }
 
+Json ToJson(const CampaignFault& fault) {
+  Json json = {{"kind", fault.kind},
+               {"name", fault.name},
+               {"outcome", kOutcomes[static_cast<size_t>(fault.outcome)]},
+               {"cause_right", fault.cause_right},
+               {"remark", fault.exception}};
+  if (fault.part_named) json["part_named"] = *fault.part_named;
+  json.update(fault.details);
+  return json;
+}
+
 constexpr const char* kOwnKeys[] = {"kind", "name", "outcome", "cause_right", "part_named", "remark"};
 
 CampaignFault ReadFault(const Json& json) {
@@ -92,22 +102,13 @@ void Campaign::Resume(const std::string& json_file, const std::vector<std::files
 
 void Campaign::Make(std::uint64_t jobs, ProgressBar* bar,
                     const std::function<CampaignFault(size_t fault)>& make) {
-  const auto run = [&](size_t i) {
-    const CampaignFault fault = make(i);
-    return PackBytes(fault.kind, fault.name, fault.outcome, fault.cause_right, fault.part_named,
-                     fault.exception, FormatJson(fault.details));
-  };
+  const size_t done = faults.size();
+  const auto run = [&](size_t i) { return FormatJson(cli::ToJson(make(done + i))); };
   const auto take = [&](size_t /*i*/, const std::string& result) {
-    CampaignFault& fault = faults.emplace_back();
-    std::string details;
-    UnpackBytes(result, &fault.kind, &fault.name, &fault.outcome, &fault.cause_right, &fault.part_named,
-                &fault.exception, &details);
-    fault.details = Json::parse(details);
+    faults.push_back(ReadFault(Json::parse(result)));
     bar->Update(static_cast<long>(faults.size()));
   };
-  const size_t done = faults.size();
-  RunJobs(
-      "a fault", total - done, CountJobs(jobs), [&](size_t i) { return run(done + i); }, take, IsInterrupted);
+  RunJobs("a fault", total - done, CountJobs(jobs), run, take, IsInterrupted);
 }
 
 void Campaign::Print(bool quiet) const {
@@ -153,16 +154,7 @@ Json Campaign::ToJson() const {
                                {"part_named", row.part_named}, {"with_a_part", row.with_part}};
   }
   json["faults"] = Json::array();
-  for (const CampaignFault& fault : faults) {
-    Json one = {{"kind", fault.kind},
-                {"name", fault.name},
-                {"outcome", kOutcomes[static_cast<size_t>(fault.outcome)]},
-                {"cause_right", fault.cause_right},
-                {"remark", fault.exception}};
-    if (fault.part_named) one["part_named"] = *fault.part_named;
-    one.update(fault.details);
-    json["faults"].push_back(one);
-  }
+  for (const CampaignFault& fault : faults) json["faults"].push_back(cli::ToJson(fault));
   return json;
 }
 

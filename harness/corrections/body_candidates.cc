@@ -218,12 +218,7 @@ void CandidateSearch::SearchPart(const Part& part) {
       fmt::format(
           "mass {:.6g} here, {:.6g} in the other file; centre of mass ({}) here, ({}) in the other file",
           part.given.mass.value, right.mass, ShowVector(given), ShowVector(right.com)));
-  Try(number, part.link, [right](PrintedLink* made) {
-    const Matrix3d R = made->inertial->origin.CalcRotation();
-    made->inertial->mass.value = right.mass;
-    made->inertial->origin.t = right.com;
-    made->inertial->I = ToEntries(R.transpose() * right.inertia * R);
-  });
+  Try(number, part.link, GiveBody(right));
 }
 
 void CandidateSearch::SearchInertiaNumbers(const Part& part) {

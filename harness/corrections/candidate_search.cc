@@ -176,6 +176,15 @@ std::optional<BodyNumbers> Subtract(const BodyNumbers& whole, const BodyNumbers&
   return part;
 }
 
+LinkUndo GiveBody(const BodyNumbers& body) {
+  return [body](PrintedLink* made) {
+    const Matrix3d R = made->inertial->origin.CalcRotation();
+    made->inertial->mass.value = body.mass;
+    made->inertial->origin.t = body.com;
+    made->inertial->I = ToEntries(R.transpose() * body.inertia * R);
+  };
+}
+
 BodyNumbers Express(const BodyNumbers& body, const Pose& X) {
   return {body.mass, X * body.com, X.linear() * body.inertia * X.linear().transpose()};
 }

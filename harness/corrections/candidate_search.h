@@ -120,5 +120,7 @@ FileFault MakeLostAxes(const PrintedInertial& inertial, bool in_second);
 /// A body without others of its parts; none where no mass is left.
 std::optional<BodyNumbers> Subtract(const BodyNumbers& whole, const BodyNumbers& rest);
 BodyNumbers Express(const BodyNumbers& body, const Pose& X);
+/// Gives a link's inertial the numbers of a body, along the axes that it has.
+LinkUndo GiveBody(const BodyNumbers& body);
 
 }  // namespace dexcheck

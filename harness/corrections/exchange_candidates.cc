@@ -149,12 +149,7 @@ void CandidateSearch::SearchCopy(int link, double which) {
     EditTrial trial{{Kind::kOfOther, SiteKind::kMass}, which + (copied ? 0.0 : 1.0), kBodyMask, two.name};
     trial.fault.whole = true;
     trial.fault.other = k;
-    Try(trial, link, [right](PrintedLink* made) {
-      const Matrix3d R = made->inertial->origin.CalcRotation();
-      made->inertial->mass.value = right.mass;
-      made->inertial->origin.t = right.com;
-      made->inertial->I = ToEntries(R.transpose() * right.inertia * R);
-    });
+    Try(trial, link, GiveBody(right));
   }
 }
 

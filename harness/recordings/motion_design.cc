@@ -5,7 +5,6 @@
 #include <cmath>
 #include <limits>
 #include <nlopt.hpp>
-#include <numeric>
 
 #include "controller/common/errors.h"
 #include "controller/common/linear_algebra.h"
@@ -27,12 +26,6 @@ Vector3d Rise(double s) {
           60.0 * s * (1.0 + s * (2.0 * s - 3.0))};
 }
 
-std::vector<int> ListJoints(const RobotModel& model) {
-  std::vector<int> joints(static_cast<size_t>(model.num_joints()));
-  std::iota(joints.begin(), joints.end(), 0);
-  return joints;
-}
-
 /// Faults whose sizes a motion is to determine: one candidate for each number.
 std::vector<TorqueFault> ListDesignedFaults(const RobotModel& model, const std::vector<int>& joints) {
   std::vector<TorqueFault> faults = ListTorqueFaults(model, joints, 1);
@@ -52,7 +45,7 @@ class MotionDesigner {
       : model_(model),
         limits_(limits),
         options_(options),
-        joints_(ListJoints(model)),
+        joints_(ListIndices(model.num_joints())),
         faults_(ListDesignedFaults(model, joints_)),
         regressor_(model),
         best_{SeriesMotion(0.5 * (limits.lower + limits.upper), options.duration), {}, {}} {
