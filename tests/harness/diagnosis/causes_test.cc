@@ -44,7 +44,7 @@ Explanation MakeNotExplained(std::vector<Fault> nearest) {
 // Each with its size, unit, detail, time and what else may be; golden files have whole lines.
 TEST(ExplanationTest, IsToldInALine) {
   const Fault ripple = {"ripple", "motor r_elbow", 0.061234567, 0.00123456, "N m", "at 41.3 Hz"};
-  EXPECT_EQ(ripple.Describe(), "motor r_elbow: ripple 0.0612346 +- 0.0012 N m at 41.3 Hz");
+  EXPECT_EQ(ripple.Describe(), "motor r_elbow: ripple 0.0612 +- 0.0012 N m at 41.3 Hz");
   Explanation one = MakeExplanation({MakeGain()});
   EXPECT_THAT(one.Describe(), EndsWith("from 0.25 s"));
   one.ends = true;
