@@ -290,9 +290,12 @@ class Judge {
 }  // namespace
 
 bool RecordingJudgement::IsWhole() const {
-  return !balances.empty() && std::all_of(balances.begin(), balances.end(), [](const JointJudgement& one) {
-    return one.left <= kMostNoise * one.noise;
-  });
+  // The noise of accelerations is known to a factor of two; how well the motion is predicted says more.
+  constexpr double kMuchBetter = 1.5;
+  const bool is_beaten = by_all.held_left > 0.0 && by_causes.held_left > kMuchBetter * by_all.held_left;
+  return !balances.empty() && !is_beaten &&
+         std::all_of(balances.begin(), balances.end(),
+                     [](const JointJudgement& one) { return one.left <= kMostNoise * one.noise; });
 }
 
 size_t RecordingJudgement::CountExplaining() const {

@@ -64,7 +64,8 @@ struct RecordingJudgement {
 
   /// Causes that are more than the nearest that is known.
   [[nodiscard]] size_t CountExplaining() const;
-  /// Beside the causes no more than noise is left.
+  /// Beside the causes no more than noise is left, and a fit of all numbers predicts the quarter that was
+  /// held out no better.
   [[nodiscard]] bool IsWhole() const;
   /// Noise may hide such errors at every joint.
   [[nodiscard]] bool IsHidden() const;

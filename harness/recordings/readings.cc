@@ -187,7 +187,7 @@ void Readings::Search(bool of_model, Reading* best) {
     now.faults.push_back(*fault);
     if (!Reopen(now.faults)) return;
     now.judgement = Judge(now.faults, refinements_);
-    // Of a wrong geometry something always explains a part.
+    // A wrong geometry always explains a part of something.
     if (of_model) Refine(&now);
     const bool replaces_others =
         now.judgement.IsWhole() && now.judgement.by_causes.numbers < CountNumbers(*best);
