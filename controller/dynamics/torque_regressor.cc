@@ -103,20 +103,21 @@ void TorqueRegressor::CalcTorques(Eigen::Ref<VectorXd> torques) const {
 }
 
 void TorqueRegressor::CalcBodyColumns(Eigen::Ref<MatrixXd> columns) const {
+  for (int i = 0; i < size(); ++i) CalcBodyColumns(i, columns.middleCols<kBody>(kBody * i));
+}
+
+void TorqueRegressor::CalcBodyColumns(int i, Eigen::Ref<MatrixXd> columns) const {
   columns.setZero();
-  for (int i = 0; i < size(); ++i) {
-    const Link& link = links_[static_cast<size_t>(i)];
-    const auto A = WrenchColumns(link.R.transpose() * link.w, link.R.transpose() * link.w_dot,
-                                 link.R.transpose() * link.a);
-    for (const int j : chains_[static_cast<size_t>(i)]) {
-      const Vector3d z = link.R.transpose() * axis(j);
-      const Vector3d r = link.R.transpose() * (link.p - links_[static_cast<size_t>(j)].p);
-      auto row = columns.block<1, kBody>(j, kBody * i);
-      if (is_revolute(j)) {
-        row = z.cross(r).transpose() * A.topRows<3>() + z.transpose() * A.bottomRows<3>();
-      } else {
-        row = z.transpose() * A.topRows<3>();
-      }
+  const Link& link = links_[static_cast<size_t>(i)];
+  const auto A = WrenchColumns(link.R.transpose() * link.w, link.R.transpose() * link.w_dot,
+                               link.R.transpose() * link.a);
+  for (const int j : chains_[static_cast<size_t>(i)]) {
+    const Vector3d z = link.R.transpose() * axis(j);
+    const Vector3d r = link.R.transpose() * (link.p - links_[static_cast<size_t>(j)].p);
+    if (is_revolute(j)) {
+      columns.row(j) = z.cross(r).transpose() * A.topRows<3>() + z.transpose() * A.bottomRows<3>();
+    } else {
+      columns.row(j) = z.transpose() * A.topRows<3>();
     }
   }
 }

@@ -40,6 +40,8 @@ class TorqueRegressor {
   /// Their derivatives by each link's BodyVector (n x kBody n, by link), with CalcTorques = sum over them and
   /// armatures.
   void CalcBodyColumns(Eigen::Ref<MatrixXd> columns) const;
+  /// Those of one link (n x kBody).
+  void CalcBodyColumns(int link, Eigen::Ref<MatrixXd> columns) const;
   /// Their derivatives by gravity (n x 3), world axes.
   void CalcGravityColumns(Eigen::Ref<MatrixXd> columns) const;
   /// Joint torques that balance a force (world axes) at a link's centre of mass and a moment on it: J^T, n
