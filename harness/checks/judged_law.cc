@@ -29,12 +29,36 @@ double CalcSampledRadius(const ObjectGains& gains, double time_step, long hold, 
   return std::pow(radius, 1.0 / h);
 }
 
+void ReadTerms(const GraspModel& model, const VectorXd& q, const VectorXd& xi, LawTerms* terms) {
+  const ModelTerms& robot = model.robot();
+  const GraspTerms& grasp = model.grasp();
+  terms->q = q;
+  terms->xi = xi;
+  terms->M = &robot.M();
+  terms->C = &robot.C();
+  terms->C_xi = robot.C() * xi;
+  terms->gravity = robot.gravity();
+  terms->friction = robot.friction();
+  terms->J = grasp.J_B();
+  terms->J_dot = &grasp.J_B_dot();
+  terms->J_dot_xi = grasp.J_B_dot() * xi;
+  terms->G = grasp.G();
+  terms->G_dot_T_V = grasp.G_dot().transpose() * grasp.V_Bo();
+  terms->X_Bo = grasp.X_Bo();
+  terms->V_Bo = grasp.V_Bo();
+  if (model.has_coordinates()) terms->X_o = grasp.X_o();
+  terms->M_hat = grasp.body().M_hat;
+  terms->C_hat_V = grasp.body().C_hat * grasp.V_Bo();
+  terms->N_o = grasp.body().N_o;
+}
+
 JudgedLaw::JudgedLaw(const Setup& setup)
     : time_step_(setup.scenario().plant.time_step),
       velocity_age_(setup.scenario().plant.velocity_age()),
       hold_(Worst(1L, std::lround(setup.scenario().plant.control_step / time_step_))),
       stands_(!setup.feet().empty()),
       torque_bound_(CalcBound(*FindCheck("law_torque"), setup.scenario())),
+      has_digits_(setup.scenario().tolerance > 0.0),
       actuation_(setup.model()),
       commanded_(setup.model(), static_cast<int>(setup.fingertips().size())),
       own_factor_(setup.model()) {
@@ -83,7 +107,23 @@ LawInputs JudgedLaw::MakeInputs(const StepRecord& step, const LawTerms& terms) {
 
 void JudgedLaw::Remember(const StepRecord& step, const LawTerms& terms) {
   if (state_.force.size() > 0 && state_.time == step.time) return;  // known already
+  if (!has_digits_) return RememberEvaluated(step, terms);
+  // The law has the controller's numbers: beside faults, digits that the engine's lack would look like some.
+  LawTerms own = terms;
+  ReadTerms(*step.model, terms.q, terms.xi, &own);
+  Evaluate(step, own);
+  actuation_.CalcForce(step.command.tau, difference_);
+  difference_ -= force();
+  differs_ = differs_ && Norm(difference_) > kLawTorqueBound * noise_scale();
+  RememberEvaluated(step, own);
+  Evaluate(step, terms);
+  actuation_.CalcForce(step.command.tau, difference_);
+  difference_ -= force();
+}
+
+void JudgedLaw::RememberEvaluated(const StepRecord& step, const LawTerms& terms) {
   FillStep(step, terms, &state_);
+  state_.sent = state_.force + difference_;
   if (differs_ && history_.Wants()) {
     history_.Keep({.inputs = CopyAll(step, terms, state_),
                    .difference = difference_,

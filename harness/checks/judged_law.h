@@ -22,6 +22,9 @@ namespace dexcheck {
 /// them, 0 where both step together.
 double CalcSampledRadius(const ObjectGains& gains, double time_step, long hold, double velocity_age);
 
+/// Reads the terms of a law at a state from the controller's own model. @param terms keeps pointers into it.
+void ReadTerms(const GraspModel& model, const VectorXd& q, const VectorXd& xi, LawTerms* terms);
+
 /// One law: reference torques, demanded accelerations, error dynamics, and the spectral radius of the sampled
 /// closed loop. A law may lack some of them.
 class JudgedLaw {
@@ -98,6 +101,7 @@ class JudgedLaw {
   long hold_;                        // steps
   bool stands_;                      // the ground takes part in the error dynamics
   double torque_bound_;              // of law_torque, as the scenario's tolerance raises it
+  bool has_digits_;                  // the model is the engine's within the digits that files print
   ActuationMap actuation_;
   ConstrainedDynamics commanded_;  // the controller's rigid system under the commanded torques
   TreeFactor own_factor_;          // of the terms' M_bar'
@@ -109,6 +113,8 @@ class JudgedLaw {
 
  private:
   void Remember(const StepRecord& step, const LawTerms& terms);
+  /// By these terms, after Evaluate.
+  void RememberEvaluated(const StepRecord& step, const LawTerms& terms);
   /// Copies the state and the force of the last Evaluate.
   void FillStep(const StepRecord& step, const LawTerms& terms, LawStep* state) const;
   [[nodiscard]] LawInputs CopyAll(const StepRecord& step, const LawTerms& terms, LawStep now) const;

@@ -24,6 +24,7 @@ struct LawStep {
   LawObject object;         ///< Measured, of a law of the object.
   DesiredMotion desired;    ///< X_d and its rates, of a law of the object.
   VectorXd force;           ///< E_bar' tau' (n) of the right law.
+  VectorXd sent;            ///< The same of the torques that were sent.
 };
 
 /// All that the force is computed from. Changes of it are faults of the law.

@@ -1,10 +1,12 @@
 // Faults of the laws of joints, and terms that any law takes at another state.
 
+#include <fmt/format.h>
+
+#include <algorithm>
 #include <memory>
 #include <utility>
 
 #include "controller/dynamics/model_terms.h"
-#include "controller/dynamics/torque_regressor.h"
 #include "harness/diagnosis/law_entry_list.h"
 
 namespace dexcheck {
@@ -39,54 +41,51 @@ constexpr OtherState kOtherStates[] = {
     {"gravity at the start", OtherState::kStart, OtherState::kGravity, true},
 };
 
+constexpr double kLeastShare = 0.01;  // of the new value in a filter that is slower than any
+
 }  // namespace
 
 void LawEntryList::AddJointFaults() {
-  LawEntry& velocity = Add("desired velocity in the feedback (K_v q_d_dot), factor",
-                           [law = &law_](const LawSnapshot& step) -> MatrixXd {
-                             LawInputs inputs = step.inputs;
-                             inputs.velocity_error -= inputs.now.joints.q_dot;
-                             return step.inputs.now.force - law->CalcForce(std::move(inputs));
-                           });
-  velocity.nominal = 1.0;
-  AddEdit("Coriolis forces of the desired velocity (C_bar' q_d_dot)",
-          [](const LawSnapshot& step, LawInputs* inputs) {
-            inputs->terms.C_xi = step.inputs.C * step.inputs.now.joints.q_dot;
-          });
-  AddEdit("velocity of the step before in the Coriolis forces",
-          [](const LawSnapshot& step, LawInputs* inputs) {
-            if (!step.before.empty()) inputs->terms.C_xi = inputs->C * step.before.front().xi;
-          });
-  AddEdit("friction of the desired velocity",
-          [this_model = &model_](const LawSnapshot& step, LawInputs* inputs) {
-            for (int k = 0; k < this_model->num_dofs(); ++k)
-              inputs->terms.friction[k + this_model->num_base_velocities()] =
-                  this_model->joint(this_model->joint_of_dof(k)).damping *
-                  step.inputs.now.joints.q_dot[k + this_model->num_base_velocities()];
-          });
+  AddFactor("desired velocity in the feedback (K_v q_d_dot), factor",
+            [](const LawAtStep&, LawInputs* inputs) { inputs->velocity_error -= inputs->now.joints.q_dot; });
+  AddEdit(
+      "Coriolis forces of the desired velocity (C_bar' q_d_dot)",
+      [](const LawAtStep&, LawInputs* inputs) { inputs->terms.C_xi = inputs->C * inputs->now.joints.q_dot; });
+  AddEdit("Coriolis forces of the measured velocity (C_bar' q_dot)",
+          [](const LawAtStep&, LawInputs* inputs) { inputs->C.setZero(); });
+  AddEdit("velocity of the step before in the Coriolis forces", [](const LawAtStep& at, LawInputs* inputs) {
+    if (!at.step.before.empty()) inputs->terms.C_xi = inputs->C * at.step.before.front().xi;
+  });
+  AddEdit("friction of the desired velocity", [this_model = &model_](const LawAtStep&, LawInputs* inputs) {
+    for (int k = 0; k < this_model->num_dofs(); ++k)
+      inputs->terms.friction[k + this_model->num_base_velocities()] =
+          this_model->joint(this_model->joint_of_dof(k)).damping *
+          inputs->now.joints.q_dot[k + this_model->num_base_velocities()];
+  });
   for (Index i = 0; i < n_; ++i) {
     AddEdit(
         "measured velocity of " + NameEntry(model_, i) + " with the other sign in the feedback",
-        [i](const LawSnapshot&, LawInputs* inputs) { inputs->velocity_error[i] += 2.0 * inputs->now.xi[i]; });
+        [i](const LawAtStep&, LawInputs* inputs) { inputs->velocity_error[i] += 2.0 * inputs->now.xi[i]; });
     if (model_.num_positions() == n_)
       AddEdit("measured position of " + NameEntry(model_, i) + " with the other sign in the feedback",
-              [i](const LawSnapshot&, LawInputs* inputs) {
+              [i](const LawAtStep&, LawInputs* inputs) {
                 inputs->now.position_error[i] += 2.0 * inputs->now.q[i];
               });
   }
   AddFriction();
+  AddFilters();
   if (law_.demands_acceleration()) {
     AddEdit("feedback that M_bar' does not multiply, and gravity alone",
-            [](const LawSnapshot&, LawInputs* inputs) {
+            [](const LawAtStep&, LawInputs* inputs) {
               inputs->feeds_back_torques = true;
               inputs->now.joints.q_ddot.setZero();
               inputs->terms.C_xi.setZero();
               inputs->terms.friction.setZero();
             });
     AddEdit("feedback that M_bar' does not multiply",
-            [](const LawSnapshot&, LawInputs* inputs) { inputs->feeds_back_torques = true; });
+            [](const LawAtStep&, LawInputs* inputs) { inputs->feeds_back_torques = true; });
     AddEdit("feedback that the diagonal of M_bar' multiplies",
-            [](const LawSnapshot&, LawInputs* inputs) { inputs->feeds_back_by_diagonal = true; });
+            [](const LawAtStep&, LawInputs* inputs) { inputs->feeds_back_by_diagonal = true; });
   }
   AddIntegrals();
 }
@@ -96,10 +95,11 @@ void LawEntryList::AddOtherStates() {
   const bool has_rates = model_.base().type == BaseType::kFixed && model_.num_positions() == n_;
   for (const OtherState& one : kOtherStates) {
     if (!one.is_of_any_law && !(is_of_joints_ && has_rates)) continue;
-    AddEdit(one.fault, [terms, one, start = start_](const LawSnapshot& step, LawInputs* inputs) {
-      const LawStep& now = step.inputs.now;
+    AddEdit(one.fault, [terms, one, start = start_](const LawAtStep& at, LawInputs* inputs) {
+      const LawStep& now = at.inputs.now;
+      const auto& before = at.step.before;
       const size_t age = one.state == OtherState::kTwoBefore ? 2 : one.state == OtherState::kBefore ? 1 : 0;
-      const LawStep& then = age > 0 && step.before.size() >= age ? step.before[age - 1] : now;
+      const LawStep& then = age > 0 && before.size() >= age ? before[age - 1] : now;
       if (one.state == OtherState::kStart) {
         terms->SetState(start, VectorXd::Zero(now.xi.size()));
       } else if (one.state == OtherState::kDesired) {
@@ -138,98 +138,145 @@ void LawEntryList::AddFriction() {
        [](const LawStep& now) { return VectorXd(now.joints.q_dot); }},
   };
   for (const Kind& kind : kKinds) {
-    LawEntry& entry = Add(kind.fault, [size = kind.size](const LawSnapshot& step) -> MatrixXd {
-      return size(step.inputs.now);
-    });
+    LawEntry& entry =
+        Add(kind.fault, [size = kind.size](const LawAtStep& at) -> MatrixXd { return size(at.inputs.now); });
     entry.unit = kind.unit;
   }
+  for (const bool is_desired : {false, true}) {
+    LawEntry& entry = Add(fmt::format("friction of all joints as tanh of the {} velocity over",
+                                      is_desired ? "desired" : "measured"),
+                          nullptr);
+    entry.unit = "N m";
+    entry.shape_unit = "rad/s";
+    for (const double width : {1e-3, 3e-3, 1e-2, 3e-2, 0.1, 0.3, 1.0})
+      entry.starts.emplace_back(Eigen::Vector2d(1.0, width));
+    entry.change = [is_desired](const LawAtStep& at, const VectorXd& sizes) {
+      const VectorXd& v = is_desired ? at.inputs.now.joints.q_dot : at.inputs.now.xi;
+      return VectorXd(sizes[0] * (v / std::clamp(sizes[1], 1e-4, 1.0)).array().tanh());
+    };
+  }
+  if (law_.demands_acceleration()) return;
+  Add("additional Coriolis forces (C_bar' q_dot), times",
+      [](const LawAtStep& at) -> MatrixXd { return at.inputs.terms.C_xi; });
+  Add("additional friction term, times",
+      [](const LawAtStep& at) -> MatrixXd { return at.inputs.terms.friction; });
+  Add("additional M_bar' q_d_ddot, times",
+      [](const LawAtStep& at) -> MatrixXd { return at.inputs.M * at.inputs.now.joints.q_ddot; });
+}
+
+void LawEntryList::AddFilters() {
+  // x_k = x_(k-1) + a (u_k - x_(k-1)) from the oldest step that is remembered on. @param first x of that.
+  const auto filter = [](const LawAtStep& at, double a, VectorXd first, const auto& get) {
+    const auto& before = at.step.before;
+    a = std::clamp(a, kLeastShare, 1.0);
+    for (size_t k = before.size() - 1; k-- > 0;) first += a * (get(before[k]) - first);
+    first += a * (get(at.inputs.now) - first);
+    return first;
+  };
+  const auto add = [&](const std::string& of, const auto& change) {
+    LawEntry& entry = Add("filter of the " + of + ", share of the new one", nullptr);
+    entry.is_positive = true;
+    entry.plausible = 1.0;
+    for (const double share : {0.03, 0.1, 0.3, 0.6, 0.9})
+      entry.starts.emplace_back(VectorXd::Constant(1, share));
+    entry.change = [change](const LawAtStep& at, const VectorXd& sizes) -> VectorXd {
+      if (at.step.before.empty()) return VectorXd::Zero(at.force.size());
+      return change(at, sizes[0]);
+    };
+  };
+  add("torques", [filter](const LawAtStep& at, double a) {
+    const LawStep* const now = &at.inputs.now;
+    return VectorXd(
+        filter(at, a, at.step.before.back().sent,
+               [&](const LawStep& one) -> const VectorXd& { return &one == now ? at.force : one.force; }) -
+        at.force);
+  });
+  struct Signal {
+    const char* name;
+    VectorXd (*get)(const LawStep&);
+    VectorXd& (*open)(LawInputs*);
+  };
+  const auto velocity = [](LawInputs* inputs) -> VectorXd& { return inputs->velocity_error; };
+  const auto position = [](LawInputs* inputs) -> VectorXd& { return inputs->now.position_error; };
+  const auto acceleration = [](LawInputs* inputs) -> VectorXd& { return inputs->now.joints.q_ddot; };
+  const Signal signals[] = {
+      {"measured velocity in the feedback", [](const LawStep& now) { return VectorXd(-now.xi); }, velocity},
+      {"desired velocity in the feedback", [](const LawStep& now) { return now.joints.q_dot; }, velocity},
+      {"velocity error", [](const LawStep& now) { return VectorXd(now.joints.q_dot - now.xi); }, velocity},
+      {"measured position in the feedback", [](const LawStep& now) { return VectorXd(-now.q); }, position},
+      {"position error", [](const LawStep& now) { return now.position_error; }, position},
+      {"desired acceleration", [](const LawStep& now) { return now.joints.q_ddot; }, acceleration}};
+  if (model_.num_positions() != n_) return;
+  const auto terms = std::make_shared<ModelTerms>(model_);
+  for (const Signal& signal : signals) {
+    add(signal.name, [filter, terms, signal](const LawAtStep& at, double a) {
+      // The torques of the first step show what the filter was then.
+      const LawStep& first = at.step.before.back();
+      LawInputs then = at.inputs;
+      terms->SetState(first.q, first.xi);
+      terms->CalcDynamics();
+      then.M = terms->M();
+      const LawAtStep right(at.step, then, at.law);
+      MatrixXd slopes(at.force.size(), at.force.size());
+      for (Index i = 0; i < slopes.cols(); ++i) {
+        LawInputs more = then;
+        signal.open(&more)[i] += 1.0;
+        slopes.col(i) = right.CalcChange(more);
+      }
+      const VectorXd lag = slopes.colPivHouseholderQr().solve(first.sent - first.force);
+      LawInputs changed = at.inputs;
+      signal.open(&changed) += filter(at, a, signal.get(first) + lag, signal.get) - signal.get(at.inputs.now);
+      return at.CalcChange(changed);
+    });
+  }
+}
+
+void LawEntryList::AddSignalExchanges(const std::string& both, Index i, Index j) {
+  struct Kind {
+    const char* signals;
+    bool is_position, is_velocity;
+  };
+  for (const Kind& kind : {Kind{"errors", true, true}, Kind{"position errors", true, false},
+                           Kind{"velocity errors", false, true}})
+    AddEdit(fmt::format("{} of {} exchanged", kind.signals, both),
+            [kind, i, j](const LawAtStep&, LawInputs* inputs) {
+              if (kind.is_position) std::swap(inputs->now.position_error[i], inputs->now.position_error[j]);
+              if (kind.is_velocity) std::swap(inputs->velocity_error[i], inputs->velocity_error[j]);
+            });
+  // Where the law demands an acceleration at rest, torques that are exchanged would look so, too.
+  if (!law_.demands_acceleration())
+    AddEdit("gravity of " + both + " exchanged", [i, j](const LawAtStep&, LawInputs* inputs) {
+      std::swap(inputs->terms.gravity[i], inputs->terms.gravity[j]);
+    });
 }
 
 void LawEntryList::AddIntegrals() {
   const double step_time = law_.control_step();
   for (const double now : {step_time, 0.0}) {
-    const auto sum = [now](const LawSnapshot& step) {
-      const Index n = step.difference.size();
+    const auto sum = [now](const LawAtStep& at) {
+      const Index n = at.force.size();
       MatrixXd columns = MatrixXd::Identity(n, 1 + n);
-      columns.col(0) = step.error_sum + now * step.inputs.now.position_error;
+      columns.col(0) = at.step.error_sum + now * at.inputs.now.position_error;
       columns.rightCols(n).setIdentity();
       return columns;
     };
     Add("integral of the position error, as a torque, gain", sum).unit = "N m/(rad s)";
-    const auto each = [sum](const LawSnapshot& step) {
-      const Index n = step.difference.size();
-      const MatrixXd one = sum(step);
+    const auto each = [sum](const LawAtStep& at) {
+      const Index n = at.force.size();
+      const MatrixXd one = sum(at);
       MatrixXd columns = MatrixXd::Identity(n, 2 * n);
       columns.leftCols(n) = one.col(0).asDiagonal();
       columns.rightCols(n).setIdentity();
       return columns;
     };
     Add("integral of the position errors, as torques, a gain for each", each);
-    if (law_.demands_acceleration())
-      Add("integral of the position errors, a gain for each",
-          [each](const LawSnapshot& step) -> MatrixXd { return step.inputs.M * each(step); });
     if (!law_.demands_acceleration()) continue;
-    Add("integral of the position error, gain", [sum](const LawSnapshot& step) -> MatrixXd {
-      return step.inputs.M * sum(step);
+    Add("integral of the position errors, a gain for each",
+        [each](const LawAtStep& at) -> MatrixXd { return at.inputs.M * each(at); });
+    Add("integral of the position error, gain", [sum](const LawAtStep& at) -> MatrixXd {
+      return at.inputs.M * sum(at);
     }).unit = "1/s^3";
   }
-}
-
-void LawEntryList::AddModelFaults() {
-  if (model_.base().type != BaseType::kFixed || model_.num_positions() != n_) return;
-  const auto regressor = std::make_shared<TorqueRegressor>(model_);
-  const auto move = [regressor, law = &law_](const LawSnapshot& step) {
-    LawInputs inputs = step.inputs;
-    inputs.M *= 2.0;
-    VectorXd demand = step.inputs.M.ldlt().solve(law->CalcForce(std::move(inputs)) - step.inputs.now.force);
-    regressor->SetMotion(step.inputs.now.q, step.inputs.now.xi, demand);
-    return demand;
-  };
-  constexpr int kBody = TorqueRegressor::kBody;
-  for (int link = 0; link < model_.num_joints(); ++link) {
-    const MassProperties body = model_.joint(link).body;
-    const auto columns = [regressor, move, link](const LawSnapshot& step) {
-      move(step);
-      MatrixXd all(step.difference.size(), kBody * regressor->size());
-      regressor->CalcBodyColumns(all);
-      return MatrixXd(all.middleCols<kBody>(kBody * link));
-    };
-    const std::string place = "link " + model_.joint(link).link + " of the law's model";
-    MassProperties heavier = body;
-    heavier.mass += 1.0;
-    const auto one = TorqueRegressor::Pack(heavier) - TorqueRegressor::Pack(body);
-    LawEntry& mass = Add(
-        "mass", [columns, change = TorqueRegressor::BodyVector(one)](const LawSnapshot& step) -> MatrixXd {
-          return columns(step) * change;
-        });
-    mass.place = place;
-    mass.unit = "kg";
-    mass.nominal = body.mass;
-    Add("inertial (ten numbers)", [columns](const LawSnapshot& step) -> MatrixXd {
-      return columns(step);
-    }).place = place;
-  }
-  Add("gravity vector", [regressor, move](const LawSnapshot& step) -> MatrixXd {
-    move(step);
-    MatrixXd columns(step.difference.size(), 3);
-    regressor->CalcGravityColumns(columns);
-    return columns;
-  }).place = "law's model";
-  Add("armatures", [move](const LawSnapshot& step) -> MatrixXd {
-    return MatrixXd(move(step).asDiagonal());
-  }).place = "law's model";
-  for (int joint = 0; joint < model_.num_joints(); ++joint) {
-    LawEntry& armature = Add("armature", [move, joint](const LawSnapshot& step) -> MatrixXd {
-      return VectorXd(move(step)[joint] * VectorXd::Unit(step.difference.size(), joint));
-    });
-    armature.place = "joint " + model_.joint(joint).name + " of the law's model";
-    armature.unit = "kg m^2";
-    armature.nominal = model_.joint(joint).armature;
-  }
-  LawEntry& same = Add("armature of all joints, more by",
-                       [move](const LawSnapshot& step) -> MatrixXd { return move(step); });
-  same.place = "law's model";
-  same.unit = "kg m^2";
 }
 
 }  // namespace dexcheck

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <utility>
 
+#include "harness/diagnosis/equation_faults.h"
 #include "harness/diagnosis/law_entry_list.h"
 
 namespace dexcheck {
@@ -95,12 +96,26 @@ std::vector<LawEntry> LawEntryList::Make() {
   AddJointTorques();
   AddOtherStates();
   if (is_of_joints_) AddJointFaults();
-  if (is_of_joints_ && law_.demands_acceleration()) AddModelFaults();
+  if (is_of_joints_) AddModelFaults();
   if (!is_of_joints_) AddObjectFaults();
   return std::move(entries_);
 }
 
-LawEntry& LawEntryList::Add(const std::string& fault, std::function<MatrixXd(const LawSnapshot&)> force) {
+VectorXd LawAtStep::CalcChange(const LawInputs& changed) const {
+  VectorXd other = law(changed);
+  if (other.size() == 0 || force.size() == 0) return VectorXd::Zero(step.difference.size());
+  return other - force;
+}
+
+const VectorXd& LawAtStep::demand() const {
+  if (demand_.size() > 0) return demand_;
+  LawInputs heavier = inputs;
+  heavier.M *= 2.0;
+  demand_ = step.inputs.M.ldlt().solve(CalcChange(heavier));
+  return demand_;
+}
+
+LawEntry& LawEntryList::Add(const std::string& fault, std::function<MatrixXd(const LawAtStep&)> force) {
   LawEntry& entry = entries_.emplace_back();
   entry.fault = fault;
   entry.force = std::move(force);
@@ -108,72 +123,63 @@ LawEntry& LawEntryList::Add(const std::string& fault, std::function<MatrixXd(con
 }
 
 LawEntry& LawEntryList::AddEdit(const std::string& fault, const Edit& edit) {
-  LawEntry& entry = Add(fault, MakeForce(edit));
+  LawEntry& entry = Add(fault, [edit](const LawAtStep& at) -> MatrixXd {
+    LawInputs inputs = at.inputs;
+    edit(at, &inputs);
+    return at.CalcChange(inputs);
+  });
   entry.is_whole = true;
   return entry;
 }
 
-std::function<MatrixXd(const LawSnapshot&)> LawEntryList::MakeForce(const Edit& edit) const {
-  return [law = &law_, edit](const LawSnapshot& step) -> MatrixXd {
-    LawInputs inputs = step.inputs;
-    edit(step, &inputs);
-    VectorXd force = law->CalcForce(std::move(inputs));
-    if (force.size() == 0) return VectorXd::Zero(step.difference.size());
-    return force - step.inputs.now.force;
-  };
+LawEntry& LawEntryList::AddFactor(const std::string& fault, const Edit& remove) {
+  LawEntry& entry = Add(fault, [remove](const LawAtStep& at) -> MatrixXd {
+    LawInputs inputs = at.inputs;
+    remove(at, &inputs);
+    return -at.CalcChange(inputs);
+  });
+  entry.nominal = 1.0;
+  return entry;
 }
 
 void LawEntryList::AddFactors() {
   for (const LawPartName& name : law_.ListParts()) {
     if (name.is_of_acceleration && !law_.demands_acceleration()) continue;
     LawEntry& entry = Add(std::string(name.name) + " (" + name.symbol + "), factor",
-                          [law = &law_, name](const LawSnapshot& step) -> MatrixXd {
-                            if (name.remove == nullptr) return step.inputs.now.force;
-                            LawInputs inputs = step.inputs;
-                            VectorXd whole = inputs.now.force;
-                            if (name.without != nullptr) {
-                              name.without(&inputs);
-                              whole = law->CalcForce(inputs);
-                            }
-                            name.remove(&inputs);
-                            const VectorXd force = law->CalcForce(std::move(inputs));
-                            if (force.size() == 0 || whole.size() == 0)
-                              return VectorXd::Zero(step.difference.size());
-                            return name.doubles ? force - whole : whole - force;
+                          [name](const LawAtStep& at) -> MatrixXd {
+                            if (name.remove == nullptr) return at.force;
+                            LawInputs inputs = at.inputs;
+                            if (name.without != nullptr) name.without(&inputs);
+                            const LawAtStep whole(at.step, inputs, at.law);
+                            LawInputs changed = inputs;
+                            name.remove(&changed);
+                            return (name.doubles ? 1.0 : -1.0) * whole.CalcChange(changed);
                           });
     entry.nominal = 1.0;
     entry.parts = name.parts;
     entry.at_places = true;
   }
-  for (size_t gain = 0; gain < law_.gains().size(); ++gain) {
-    LawEntry& entry = Add("gain " + law_.gains()[gain] + ", factor",
-                          [law = &law_, gain](const LawSnapshot& step) -> MatrixXd {
-                            LawInputs inputs = step.inputs;
-                            law->RemoveGain(gain, &inputs);
-                            const VectorXd force = law->CalcForce(std::move(inputs));
-                            if (force.size() == 0) return VectorXd::Zero(step.difference.size());
-                            return step.inputs.now.force - force;
-                          });
-    entry.nominal = 1.0;
-  }
+  for (size_t gain = 0; gain < law_.gains().size(); ++gain)
+    AddFactor("gain " + law_.gains()[gain] + ", factor",
+              [law = &law_, gain](const LawAtStep&, LawInputs* inputs) { law->RemoveGain(gain, inputs); });
 }
 
 void LawEntryList::AddOldSignals() {
   for (const size_t age : {1U, 2U, 3U, 4U, 5U, 8U, 10U}) {
     const std::string when = age == 1 ? "of the step before" : fmt::format("of {} steps before", age);
-    const auto old = [age](const LawSnapshot& step) -> const LawStep* {
-      return step.before.size() >= age ? &step.before[age - 1] : nullptr;
+    const auto old = [age](const LawAtStep& at) -> const LawStep* {
+      return at.step.before.size() >= age ? &at.step.before[age - 1] : nullptr;
     };
-    LawEntry& torques = Add("torques " + when, [old](const LawSnapshot& step) -> MatrixXd {
-      const LawStep* const then = old(step);
-      if (then == nullptr) return VectorXd::Zero(step.difference.size());
-      return then->force - step.inputs.now.force;
+    LawEntry& torques = Add("torques " + when, [old](const LawAtStep& at) -> MatrixXd {
+      const LawStep* const then = old(at);
+      if (then == nullptr) return VectorXd::Zero(at.force.size());
+      return then->force - at.force;
     });
     torques.is_whole = true;
     torques.is_variant = age > 1;
     const auto add = [&](const std::string& what, void (*edit)(const LawStep&, LawInputs*)) {
-      AddEdit(fmt::format("{} {}", what, when), [old, edit](const LawSnapshot& step, LawInputs* inputs) {
-        if (const LawStep* const then = old(step)) edit(*then, inputs);
+      AddEdit(fmt::format("{} {}", what, when), [old, edit](const LawAtStep& at, LawInputs* inputs) {
+        if (const LawStep* const then = old(at)) edit(*then, inputs);
       }).is_variant = age > 1;
     };
     if (is_of_joints_) {
@@ -238,10 +244,10 @@ void LawEntryList::AddExchanges() {
   for (const auto& [i, j] : ListPairs()) {
     const std::string both = NameEntry(model_, i) + " and " + NameEntry(model_, j);
     LawEntry& torques = Add("torques of " + both + " exchanged",
-                            [this_model = &model_, i = i, j = j](const LawSnapshot& step) -> MatrixXd {
+                            [this_model = &model_, i = i, j = j](const LawAtStep& at) -> MatrixXd {
                               const ActuationMap actuation(*this_model);
-                              VectorXd tau(step.difference.size());
-                              actuation.CalcTorque(step.inputs.now.force, tau);
+                              VectorXd tau(at.force.size());
+                              actuation.CalcTorque(at.force, tau);
                               VectorXd change = VectorXd::Zero(tau.size());
                               change[i] = tau[j] - tau[i];
                               change[j] = -change[i];
@@ -250,13 +256,8 @@ void LawEntryList::AddExchanges() {
                             });
     torques.is_whole = true;
     torques.is_variant = i > 0;
-    if (is_of_joints_) {
-      AddEdit("errors of " + both + " exchanged", [i = i, j = j](const LawSnapshot&, LawInputs* inputs) {
-        std::swap(inputs->now.position_error[i], inputs->now.position_error[j]);
-        std::swap(inputs->velocity_error[i], inputs->velocity_error[j]);
-      });
-    }
-    AddEdit("M_bar' without the coupling of " + both, [i = i, j = j](const LawSnapshot&, LawInputs* inputs) {
+    if (is_of_joints_) AddSignalExchanges(both, i, j);
+    AddEdit("M_bar' without the coupling of " + both, [i = i, j = j](const LawAtStep&, LawInputs* inputs) {
       inputs->M(i, j) = inputs->M(j, i) = 0.0;
     }).is_variant = i > 0;
   }
@@ -270,10 +271,10 @@ void LawEntryList::AddJointTorques() {
     for (const JointTorque& kind : kJointTorques) {
       LawEntry& entry =
           Add(kind.fault,
-              [actuation = ActuationMap(model_), size = kind.size, i](const LawSnapshot& step) -> MatrixXd {
-                VectorXd own(step.difference.size());
+              [actuation = ActuationMap(model_), size = kind.size, i](const LawAtStep& at) -> MatrixXd {
+                VectorXd own(at.force.size());
                 actuation.CalcForce(VectorXd::Unit(own.size(), i), own);
-                return size(step.inputs.terms.xi[i]) * own;
+                return size(at.inputs.terms.xi[i]) * own;
               });
       entry.place = "law of " + NameEntry(model_, i);
       entry.unit = slides ? "N" : "N m";
@@ -283,46 +284,43 @@ void LawEntryList::AddJointTorques() {
 }
 
 void LawEntryList::AddMatrices() {
-  AddEdit("diagonal of M_bar' alone", [](const LawSnapshot&, LawInputs* inputs) {
+  AddEdit("diagonal of M_bar' alone", [](const LawAtStep&, LawInputs* inputs) {
     inputs->M = MatrixXd(inputs->M.diagonal().asDiagonal());
   });
-  AddEdit("C_bar' transposed", [](const LawSnapshot& step, LawInputs* inputs) {
-    inputs->terms.C_xi = step.inputs.C.transpose() * step.inputs.terms.xi;
-    inputs->C.transposeInPlace();
-  });
-  AddEdit("diagonal of C_bar' alone", [](const LawSnapshot& step, LawInputs* inputs) {
-    inputs->terms.C_xi = step.inputs.C.diagonal().cwiseProduct(step.inputs.terms.xi);
-    inputs->C = MatrixXd(inputs->C.diagonal().asDiagonal());
-  });
+  for (const EquationFault& equation : ListEquationFaults(model_)) {
+    const auto* const change = std::get_if<RobotChange>(&equation.change);
+    if (change == nullptr) continue;
+    AddEdit(equation.name, [this_model = &model_, make = change->make](const LawAtStep& at,
+                                                                       LawInputs* inputs) {
+      LawTerms& terms = inputs->terms;
+      make({*this_model, inputs->now.q, inputs->now.xi, inputs->M, inputs->C, terms.gravity, terms.friction});
+      terms.C_xi += (inputs->C - at.inputs.C) * inputs->now.xi;
+    }).is_variant = true;
+  }
 }
 
 void LawEntryList::AddObjectFaults() {
   AddEdit("sigma' is not projected into the null space",
-          [](const LawSnapshot&, LawInputs* inputs) { inputs->spec->projects = false; });
-  LawEntry& velocity = Add("desired velocity in the feedback (K_v X_d_dot), factor",
-                           [law = &law_](const LawSnapshot& step) -> MatrixXd {
-                             LawInputs inputs = step.inputs;
-                             inputs.now.desired.X_d_dot.setZero();
-                             return step.inputs.now.force - law->CalcForce(std::move(inputs));
-                           });
-  velocity.nominal = 1.0;
+          [](const LawAtStep&, LawInputs* inputs) { inputs->spec->projects = false; });
+  AddFactor("desired velocity in the feedback (K_v X_d_dot), factor",
+            [](const LawAtStep&, LawInputs* inputs) { inputs->now.desired.X_d_dot.setZero(); });
   AddEdit("tangential axes of the contact forces exchanged",
-          [](const LawSnapshot&, LawInputs* inputs) { inputs->exchanges_force_axes = true; });
+          [](const LawAtStep&, LawInputs* inputs) { inputs->exchanges_force_axes = true; });
   AddEdit("G^T in the place of G^+",
-          [](const LawSnapshot&, LawInputs* inputs) { inputs->spec->transposes_grasp = true; });
-  AddEdit("weight M_bar' of the pseudoinverse of J_B'", [](const LawSnapshot&, LawInputs* inputs) {
+          [](const LawAtStep&, LawInputs* inputs) { inputs->spec->transposes_grasp = true; });
+  AddEdit("weight M_bar' of the pseudoinverse of J_B'", [](const LawAtStep&, LawInputs* inputs) {
     inputs->spec->weight.kind = RedundancyWeight::Kind::kMass;
   });
-  AddEdit("weight 1 of the pseudoinverse of J_B'", [](const LawSnapshot&, LawInputs* inputs) {
+  AddEdit("weight 1 of the pseudoinverse of J_B'", [](const LawAtStep&, LawInputs* inputs) {
     inputs->spec->weight.kind = RedundancyWeight::Kind::kIdentity;
   });
   if (model_.base().type != BaseType::kDifferentialDrive) return;
-  LawEntry& map = Add("no E_bar' between forces and torques",
-                      [this_model = &model_](const LawSnapshot& step) -> MatrixXd {
-                        VectorXd force(step.difference.size());
-                        ActuationMap(*this_model).CalcForce(step.inputs.now.force, force);
-                        return force - step.inputs.now.force;
-                      });
+  LawEntry& map =
+      Add("no E_bar' between forces and torques", [this_model = &model_](const LawAtStep& at) -> MatrixXd {
+        VectorXd force(at.force.size());
+        ActuationMap(*this_model).CalcForce(at.force, force);
+        return force - at.force;
+      });
   map.is_whole = true;
 }
 

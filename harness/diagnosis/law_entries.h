@@ -1,10 +1,11 @@
 #pragma once
 
-// Faults of a law, each with the force that it leaves at a step: the right law is computed once more from
-// changed inputs.
+// Faults of a law, each with the force that it leaves at a step: the law is computed once more from changed
+// inputs.
 
 #include <functional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "controller/control/actuation.h"
@@ -24,33 +25,61 @@ std::vector<LawPlace> ListLawPlaces(const Setup& setup);
 /// The part of a force (n) that the torques of a place have.
 VectorXd KeepAt(const ActuationMap& actuation, const LawPlace& place, const VectorXd& force);
 
-/// A fault that a law may have.
+/// E_bar' tau' (n) of a law, right or wrong, from its inputs; empty where these have none.
+using LawForce = std::function<VectorXd(const LawInputs&)>;
+
+/// A law at a step, which other faults may have changed already.
+class LawAtStep {
+ public:
+  /// @param step, inputs, law outlive this.
+  LawAtStep(const LawSnapshot& step, const LawInputs& inputs, const LawForce& law)
+      : LawAtStep(step, inputs, law, law(inputs)) {}
+  LawAtStep(const LawSnapshot& step, const LawInputs& inputs, const LawForce& law, VectorXd force)
+      : step(step), inputs(inputs), law(law), force(std::move(force)) {}
+
+  /// The difference that other inputs make to the force.
+  [[nodiscard]] VectorXd CalcChange(const LawInputs& changed) const;
+  /// The acceleration that M_bar' makes a force (n).
+  [[nodiscard]] const VectorXd& demand() const;
+
+  const LawSnapshot& step;
+  const LawInputs& inputs;
+  const LawForce& law;
+  VectorXd force;  ///< Of `inputs`.
+
+ private:
+  mutable VectorXd demand_;
+};
+
+/// A fault that a law may have, of one size or several.
 struct LawEntry {
   std::string fault;
   std::string place = "law";
   std::string unit = {};
   double nominal = 0.0;      ///< Value of the right law.
+  double plausible = 0.0;    ///< Size that each number may plausibly have; 0 for any.
   unsigned parts = 0;        ///< Summands of LawPartName that a factor is of.
   bool at_places = false;    ///< Some torques alone may have it.
-  bool is_whole = false;     ///< It is there as a whole: its amplitude is 1.
+  bool is_whole = false;     ///< It is there as a whole: its size is 1.
   bool is_positive = false;  ///< Its value is not negative.
   bool is_variant = false;   ///< Another age, or another pair of joints, of an entry before it.
-  /// E_bar' (tau' - tau'_printed) at a step of amplitude 1 (n x p).
-  std::function<MatrixXd(const LawSnapshot&)> force;
+  /// E_bar' (tau' - tau'_printed) by its sizes (n x p), where that is linear in them.
+  std::function<MatrixXd(const LawAtStep&)> force = {};
+  /// Otherwise the same of these sizes (p), and sizes from which they are looked for.
+  std::function<VectorXd(const LawAtStep&, const VectorXd& sizes)> change = {};
+  std::vector<VectorXd> starts = {};
+  bool is_vector = false;  ///< Its sizes are a vector; otherwise the first one alone is shown.
+  /// Unit of the last size, where that is part of the name.
+  const char* shape_unit = nullptr;
+
+  /// E_bar' (tau' - tau'_printed) (n) of some sizes.
+  [[nodiscard]] VectorXd CalcChange(const LawAtStep& at, const VectorXd& sizes) const {
+    return change ? change(at, sizes) : VectorXd(force(at) * sizes);
+  }
 };
 
-/// A fault with one number, which the force is not linear in.
-struct FittedLawEntry {
-  std::string fault, unit;
-  double least, most;  ///< Of the number.
-  bool is_whole;
-  std::function<VectorXd(const LawSnapshot&, double)> force;
-};
-
-/// Faults that are linear in their size. @param law of the run; outlives the entries.
+/// All but those that the torques themselves show. @param law of the run; outlives the entries.
 std::vector<LawEntry> ListLawEntries(const Setup& setup, JudgedLaw* law);
-/// Faults that are not.
-std::vector<FittedLawEntry> ListFittedLawEntries(const Setup& setup, JudgedLaw* law);
 /// Faults that the sent torques themselves show: limits and rounding. @param places names of the entries of
 /// tau'.
 std::vector<LawEntry> ListTorqueEntries(const RobotModel& model, const std::vector<std::string>& places,

@@ -29,23 +29,27 @@ class LawEntryList {
 
  private:
   using Index = Eigen::Index;
-  using Edit = std::function<void(const LawSnapshot&, LawInputs*)>;
+  using Edit = std::function<void(const LawAtStep&, LawInputs*)>;
 
-  LawEntry& Add(const std::string& fault, std::function<MatrixXd(const LawSnapshot&)> force);
+  LawEntry& Add(const std::string& fault, std::function<MatrixXd(const LawAtStep&)> force);
   /// A fault that is there or not.
   LawEntry& AddEdit(const std::string& fault, const Edit& edit);
-  [[nodiscard]] std::function<MatrixXd(const LawSnapshot&)> MakeForce(const Edit& edit) const;
+  /// A factor of what an edit takes out.
+  LawEntry& AddFactor(const std::string& fault, const Edit& remove);
   void AddFactors();
   /// Signals of some steps before.
   void AddOldSignals();
   /// Pairs that may be taken for each other: all of a small robot, and neighbours of a large one.
   [[nodiscard]] std::vector<std::pair<Index, Index>> ListPairs() const;
   void AddExchanges();
+  /// @param both names of two joints.
+  void AddSignalExchanges(const std::string& both, Index i, Index j);
   void AddMatrices();
   void AddJointFaults();
   /// Terms of the model at another state than the measured one.
   void AddOtherStates();
   void AddFriction();
+  void AddFilters();
   /// The sum may have the error of this step, or not; what it was before the first step that was looked at is
   /// not known.
   void AddIntegrals();
@@ -53,6 +57,13 @@ class LawEntryList {
   void AddJointTorques();
   /// Numbers of the model that the law goes by.
   void AddModelFaults();
+  using Columns = std::function<MatrixXd(const LawAtStep&)>;
+  /// @param columns of the link's BodyVector.
+  void AddInertialFaults(const std::string& place, int link, const Columns& columns);
+  void AddGravityVector();
+  void AddArmatureFaults();
+  /// Joints that the law's model has in another order.
+  void AddJointOrder();
   void AddObjectFaults();
 
   const RobotModel& model_;

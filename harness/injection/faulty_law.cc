@@ -5,33 +5,6 @@
 #include "harness/injection/fault_kinds.h"
 
 namespace dexcheck {
-namespace {
-
-/// Reads the controller's own terms. @param terms keeps pointers into the model.
-void ReadTerms(const GraspModel& model, const MeasuredState& state, LawTerms* terms) {
-  const ModelTerms& robot = model.robot();
-  const GraspTerms& grasp = model.grasp();
-  terms->q = state.q;
-  terms->xi = state.xi;
-  terms->M = &robot.M();
-  terms->C = &robot.C();
-  terms->C_xi = robot.C() * state.xi;
-  terms->gravity = robot.gravity();
-  terms->friction = robot.friction();
-  terms->J = grasp.J_B();
-  terms->J_dot = &grasp.J_B_dot();
-  terms->J_dot_xi = grasp.J_B_dot() * state.xi;
-  terms->G = grasp.G();
-  terms->G_dot_T_V = grasp.G_dot().transpose() * grasp.V_Bo();
-  terms->X_Bo = grasp.X_Bo();
-  terms->V_Bo = grasp.V_Bo();
-  if (model.has_coordinates()) terms->X_o = grasp.X_o();
-  terms->M_hat = grasp.body().M_hat;
-  terms->C_hat_V = grasp.body().C_hat * grasp.V_Bo();
-  terms->N_o = grasp.body().N_o;
-}
-
-}  // namespace
 
 ScenarioLaw::ScenarioLaw(const Setup& setup)
     : law(setup.joints() != nullptr ? MakeJointLaw(setup) : MakeObjectLaw(setup)),
@@ -75,7 +48,7 @@ void FaultyLaw::Step(const Reading& reading, double t, Command* command) {
   step_.time = t;
   step_.command = *command;
   step_.model = &right_->model();
-  ReadTerms(right_->model(), reading.state, &terms_);
+  ReadTerms(right_->model(), reading.state.q, reading.state.xi, &terms_);
   snapshot_.inputs = law_.law->MakeInputs(step_, terms_);
   const VectorXd change = is_on ? CalcChange(reading.state) : VectorXd();
   if (change.size() > 0) {
@@ -83,6 +56,8 @@ void FaultyLaw::Step(const Reading& reading, double t, Command* command) {
     actuation_.CalcTorque(change, tau);
     command->tau += tau;
   }
+  snapshot_.inputs.now.sent = snapshot_.inputs.now.force;
+  if (change.size() > 0) snapshot_.inputs.now.sent += change;
   constexpr size_t kMemory = 16;  // steps, more than the oldest signal of an entry
   snapshot_.before.push_front(snapshot_.inputs.now);
   if (snapshot_.before.size() > kMemory) snapshot_.before.pop_back();
@@ -91,11 +66,14 @@ void FaultyLaw::Step(const Reading& reading, double t, Command* command) {
 VectorXd FaultyLaw::CalcChange(const MeasuredState& state) {
   if (snapshot_.inputs.now.force.size() == 0) return {};
   if (fault_) {
-    const MatrixXd force = fault_->amplitude * law_.entries[fault_->entry].force(snapshot_);
-    return fault_->place ? KeepAt(actuation_, *fault_->place, force.col(0)) : VectorXd(force.col(0));
+    const LawForce right = [this](const LawInputs& inputs) { return law_.law->CalcForce(inputs); };
+    const LawAtStep at(snapshot_, snapshot_.inputs, right, snapshot_.inputs.now.force);
+    const VectorXd force =
+        law_.entries[fault_->entry].CalcChange(at, VectorXd::Constant(1, fault_->amplitude));
+    return fault_->place ? KeepAt(actuation_, *fault_->place, force) : force;
   }
   LawInputs wrong = snapshot_.inputs;
-  ReadTerms(*model_, state, &wrong.terms);
+  ReadTerms(*model_, state.q, state.xi, &wrong.terms);
   wrong.M = model_->robot().M();
   wrong.C = model_->robot().C();
   wrong.J_dot = model_->grasp().J_B_dot();

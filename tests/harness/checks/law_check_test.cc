@@ -117,7 +117,7 @@ TEST(LawCheck, FaultsFromOutsideTheTableAreNamed) {
          const MatrixXd& C = model.robot().C();
          *tau += (C.transpose() - C) * model.robot().velocity();
        },
-       "C_bar' transposed"},
+       "Coriolis matrix transposed"},
       {[](const GraspModel&, VectorXd* tau) { std::swap((*tau)[5], (*tau)[6]); },
        "torques of panda_joint6 and panda_joint7 exchanged"},
       {[old = VectorXd()](const GraspModel&, VectorXd* tau) mutable {
@@ -132,6 +132,60 @@ TEST(LawCheck, FaultsFromOutsideTheTableAreNamed) {
         << name;  // torques may be above a motor's limit, too
     EXPECT_EQ(causes.front().outcome, CauseOutcome::kNamed);
     EXPECT_THAT(causes.front().Describe(), HasSubstr(name));
+  }
+}
+
+/// A law whose gravity goes by another model.
+class OtherGravity final : public Controller {
+ public:
+  OtherGravity(std::unique_ptr<Controller> law, RobotSpec spec)
+      : law_(std::move(law)), model_(std::move(spec)), terms_(model_) {}
+  void Follow(const Trajectory& motion) override { law_->Follow(motion); }
+  void Begin(double t, const Reading& reading) override { law_->Begin(t, reading); }
+  void Step(const Reading& reading, double t, Command* command) override {
+    law_->Step(reading, t, command);
+    terms_.SetState(reading.state.q, reading.state.xi);
+    terms_.CalcDynamics();
+    command->tau += terms_.gravity() - law_->model().robot().gravity();
+  }
+  const GraspModel& model() const override { return law_->model(); }
+
+ private:
+  std::unique_ptr<Controller> law_;
+  RobotModel model_;
+  ModelTerms terms_;
+};
+
+TEST(LawCheck, WhatIsWrongOfTheLawsModelIsNamed) {
+  struct WrongModel {
+    const char* fault;
+    const char* place;
+    void (*change)(RobotSpec* spec);
+    double size;
+  };
+  const WrongModel kModels[] = {
+      {"mass", "link panda_link4", [](RobotSpec* spec) { spec->joints[3].body.mass = 3.0; }, 3.0},
+      {"centre of mass off by", "link panda_link3",
+       [](RobotSpec* spec) { spec->joints[2].body.com += Vector3d(0.01, -0.02, 0.02); }, 0.03},
+      {"place off by", "joint panda_joint4",
+       [](RobotSpec* spec) { spec->joints[3].X_PB.pretranslate(Vector3d(0.0, 0.004, 0.003)); }, 0.005},
+      {"turned by", "joint panda_joint5",
+       [](RobotSpec* spec) { spec->joints[4].X_PB.rotate(Eigen::AngleAxisd(0.4, Vector3d::UnitY())); }, 0.4}};
+  for (const WrongModel& wrong : kModels) {
+    const ShippedRun shipped("panda-reach", {"duration=0.2", "settle=0.1", "expect.joints=1"});
+    LoopParts parts = MakeLoopParts(shipped.setup());
+    RobotSpec spec = shipped.setup().model().spec();
+    wrong.change(&spec);
+    parts.controller = std::make_unique<OtherGravity>(std::move(parts.controller), spec);
+    const Causes causes = RunParts(shipped.setup(), std::move(parts))->result().causes;
+    ASSERT_FALSE(causes.empty()) << wrong.fault;
+    const auto is_it = [&](const Fault& fault) {
+      return fault.fault == wrong.fault && fault.place.starts_with(wrong.place) &&
+             std::abs(fault.value - wrong.size) < 1e-6;
+    };
+    EXPECT_NE(causes.front().outcome, CauseOutcome::kNotExplained) << causes.front().Describe();
+    EXPECT_TRUE(std::ranges::any_of(causes.front().faults, is_it))
+        << wrong.fault << causes.front().Describe();
   }
 }
 

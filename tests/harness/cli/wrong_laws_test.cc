@@ -39,8 +39,8 @@ struct WrongLaw {
 constexpr WrongLaw kLaws[] = {
     {"g = size * g", "gravity (F_bar' (gravity)), factor"},
     {"C = 0 * C", "Coriolis forces (C_bar' q_dot), factor"},
-    {"C = C.T", "C_bar' transposed"},
-    {"C = np.diag(np.diag(C))", "diagonal of C_bar' alone"},
+    {"C = C.T", "Coriolis matrix transposed"},
+    {"C = np.diag(np.diag(C))", "Coriolis matrix without coupling"},
     {"M = np.diag(np.diag(M))", "diagonal of M_bar' alone"},
     {"M = M.copy(); M[i, k] = M[k, i] = 0", "M_bar' without the coupling of @pair"},
     {"M = size * M", "mass matrix M_bar' (M_bar' (q_d_ddot + K_v e_dot + K_p e)), factor"},
@@ -57,7 +57,12 @@ constexpr WrongLaw kLaws[] = {
     {"M = self.old(M.copy())", "M_bar' of the step before"},
     {"self.memory = v.copy() if self.memory is None else self.memory + 0.4 * (v - self.memory)\n"
      "        e_dot = v_d - self.memory",
-     "filter of the measured velocity in the feedback, share of the new one 0.4"},
+     "filter of the measured velocity in the feedback, share of the new one"},
+    {"self.memory = e_dot.copy() if self.memory is None else self.memory + 0.2 * (e_dot - self.memory)\n"
+     "        e_dot = self.memory",
+     "filter of the velocity error, share of the new one"},
+    {"M = np.tril(M)", "half of the mass matrix not mirrored"},
+    {"e[[i, k]] = e[[k, i]]", "position errors of @pair exchanged"},
     {"self.I = self.I + e * self.dt; e = e + 5 * self.I", "integral of the position error, gain"},
     {"x = e[i]; e[i] = e[k]; e[k] = x; x = e_dot[i]; e_dot[i] = e_dot[k]; e_dot[k] = x",
      "errors of @pair exchanged"},
@@ -70,6 +75,11 @@ constexpr WrongLaw kLaws[] = {
     {"return Kv * e_dot + Kp * e + g", "feedback that M_bar' does not multiply, and gravity alone", true},
     {"t = M @ (a_d + Kv * e_dot + Kp * e) + C @ v + g + F; t[[i, k]] = t[[k, i]]; return t",
      "torques of @pair exchanged", true},
+    {"t = M @ (a_d + Kv * e_dot + Kp * e) + C @ v + g + F; o = self.old(t); m = 2e-4 * abs(t).max()\n"
+     "        self.I = self.I or m; self.memory = o + np.clip(t - o, -self.I, self.I); return self.memory",
+     "limit of the change in a step of all torques", true},
+    {"return (M @ (a_d + Kv * e_dot + Kp * e) + C @ v + g + F).astype(np.float32).astype(float)",
+     "torques of single precision", true},
     {"return self.old(M @ (a_d + Kv * e_dot + Kp * e) + C @ v + g + F)", "torques of the step before", true},
     {"return np.round(M @ (a_d + Kv * e_dot + Kp * e) + C @ v + g + F, 2)", "all torques rounded to", true},
     {"t = M @ (a_d + Kv * e_dot + Kp * e) + C @ v + g + F; t[i] *= size; return t",
