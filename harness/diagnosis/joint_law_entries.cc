@@ -243,7 +243,7 @@ void LawEntryList::AddSignalExchanges(const std::string& both, Index i, Index j)
               if (kind.is_position) std::swap(inputs->now.position_error[i], inputs->now.position_error[j]);
               if (kind.is_velocity) std::swap(inputs->velocity_error[i], inputs->velocity_error[j]);
             });
-  // Where the law demands an acceleration at rest, torques that are exchanged would look so, too.
+  // Exchanged torques would look so, too, where the law demands an acceleration at rest.
   if (!law_.demands_acceleration())
     AddEdit("gravity of " + both + " exchanged", [i, j](const LawAtStep&, LawInputs* inputs) {
       std::swap(inputs->terms.gravity[i], inputs->terms.gravity[j]);

@@ -16,7 +16,7 @@ struct LawTerm {
   const LawPlace* place = nullptr;  ///< Torques that alone have it; null for all.
   VectorXd sizes;
 
-  /// Whether it is the same fault at the same place.
+  /// Whether both are one fault at one place.
   [[nodiscard]] bool IsLike(const LawTerm& other) const {
     return entry == other.entry && place == other.place;
   }

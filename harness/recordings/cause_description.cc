@@ -187,7 +187,10 @@ Fault CauseDescription::Describe(const TorqueFault& fault, const VectorXd& a, Ve
     const Vector3d now = model_.gravity() + a.head<3>();
     const double turned = std::atan2(now.cross(model_.gravity()).norm(), now.dot(model_.gravity()));
     one.value = now.norm();
-    one.detail = vector(now) + ", turned by " + FormatNumber(RadToDeg(turned), 3) + " deg";
+    constexpr double kNone = 0.1;  // of the model's: it has no direction
+    one.detail = vector(now);
+    if (now.norm() > kNone * model_.gravity().norm())
+      one.detail += ", turned by " + FormatNumber(RadToDeg(turned), 3) + " deg";
   } else if (fault.kind == kTorqueGain && std::abs(one.value + 1.0) < 0.2) {
     one.detail = "(the other sign)";
   } else if (fault.kind == kStribeckFriction) {

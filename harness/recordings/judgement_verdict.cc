@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <vector>
 
@@ -11,6 +12,8 @@
 namespace dexcheck {
 
 namespace {
+
+constexpr double kLeast = 5e-3;  // explained, that is said
 
 /// Returns " of 0.1 N m at elbow, where an error below 0.2 N m (3 % of its torque) would not show", for the
 /// joint where that is the largest part.
@@ -33,13 +36,12 @@ void AddCauses(const RecordingJudgement& judgement, Answer* answer) {
   for (const Explanation& one : judgement.causes) {
     if (one.outcome != CauseOutcome::kNotExplained || one.faults.empty())
       answer->causes.push_back(one.Describe());
-    else
+    else if (!std::isnan(one.faults.front().value))
       nearest += fmt::format("{}{} ({:.0f} %)", nearest.empty() ? "not explained; nearest: " : ", ",
                              one.faults.front().Describe(), 100.0 * std::min(1.0, one.fraction));
   }
   if (!nearest.empty()) answer->remarks.push_back(nearest);
   if (judgement.causes.empty()) return;
-  constexpr double kLeast = 5e-3;
   if (judgement.explained > kLeast)
     answer->remarks.push_back(
         fmt::format("{} {:.4g} % of the difference; {:.2g} times the noise remains",
@@ -98,17 +100,17 @@ Answer MakeAnswer(const RecordingJudgement& judgement, const RobotModel& robot,
       answer.sentence +=
           fmt::format("; noise at {} would hide an error of a fifth of the torque", JoinNames(hidden));
   } else if (are_velocities_alone && judgement.IsWhole()) {
-    say("DIFFERS", fmt::format("{} explains the torques of {}; its velocities are not the positions' "
-                               "derivatives and are not used",
-                               model, recording));
+    say("DIFFERS", fmt::format("the velocities of {} are not its positions' derivatives and are not used; "
+                               "{} explains its torques",
+                               recording, model));
   } else if (count == 0) {
     say("NOT EXPLAINED",
         fmt::format("{} does not explain {}, and no cause that is known does", model, recording));
   } else {
+    const std::string share =
+        judgement.explained > kLeast ? fmt::format(" by {:.3g} %", 100.0 * judgement.explained) : "";
     say("DIFFERS", fmt::format("{} does not explain {}; {}{}", model, recording, causes_do,
-                               judgement.IsWhole() ? ""
-                                                   : fmt::format(" by {:.3g} %, and more than noise is left",
-                                                                 100.0 * judgement.explained)));
+                               judgement.IsWhole() ? "" : share + ", and more than noise is left"));
   }
   answer.sentence += not_judged + ".";
   AddCauses(judgement, &answer);

@@ -52,7 +52,10 @@ Explanation MakeCause(const RobotModel& model, const LinkFrames& frames, const N
 bool MayBeOtherwise(const RecordingJudgement& judgement) {
   constexpr long kFewNumbers = 1;
   if (std::ranges::any_of(judgement.unjudged, &UnjudgedJoint::has_no_gain)) return true;
-  return !judgement.IsWhole() || judgement.by_causes.numbers > kFewNumbers;
+  constexpr double kWorse = 1.15;  // than all numbers of the model together
+  return !judgement.IsWhole() || judgement.by_causes.numbers > kFewNumbers ||
+         (judgement.by_causes.numbers > 0 &&
+          judgement.by_causes.held_left > kWorse * judgement.by_all.held_left);
 }
 
 /// Returns the sum over the joints of the residual's logarithm.
@@ -95,6 +98,11 @@ bool IsBetter(const Readings::Reading& one, const Readings::Reading& other) {
   if (a.IsWhole() != b.IsWhole()) return a.IsWhole();
   const long more = CountNumbers(one) - CountNumbers(other);
   constexpr double kWorse = 0.1, kMuchOfNumber = 0.25, kMuch = 0.4;  // in the logarithm
+  // What predicts the quarter that was held out much better is right, with as many numbers or a few more.
+  constexpr double kMuchBetter = 0.8;
+  constexpr long kFewMore = 2;
+  if (a.IsWhole() && more <= kFewMore && a.by_causes.held_left < kMuchBetter * b.by_causes.held_left)
+    return true;
   if (a.IsWhole())
     return more < 0 && CalcLeft(a) < CalcLeft(b) + kWorse * static_cast<double>(a.balances.size());
   return LeavesLess(a, b, kMuch, kMuchOfNumber * static_cast<double>(more));
