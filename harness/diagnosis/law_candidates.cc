@@ -99,7 +99,8 @@ void LawCandidates::DropRepeated() {
     const Candidate &a = candidates_[of], &b = candidates_[i];
     const unsigned parts = terms_[of].entry->parts, others = terms_[i].entry->parts;
     const bool is_sum = parts != 0 && (others & parts) == parts && a.place == b.place;
-    const bool is_factor = parts != 0 && others == 0 && b.columns.cols() == 1;
+    // A force with a size of its own, such as friction, may be what is there.
+    const bool is_factor = parts != 0 && others == 0 && b.columns.cols() == 1 && b.unit.empty();
     if (!is_sum && !is_factor) return false;
     constexpr double kSame = 1e-8;
     const auto column = a.columns.col(0), other = b.columns.col(0);
