@@ -271,6 +271,8 @@ class Judge {
     if (result_.IsWhole()) return false;
     const double left = 1.0 - estimator_.selection().fraction;
     constexpr double kMostLeft = 0.1;
+    // A force on a link for a while fits a part of anything that is large then.
+    if (fault.kind == TorqueFault::kPush && fault.push.joint < 0) return true;
     if (fault.IsFriction())
       return (fault.kind == TorqueFault::kStribeckFriction || fault.kind == TorqueFault::kLoadFriction) &&
              term.fraction - left < kMuch;

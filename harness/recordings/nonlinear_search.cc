@@ -205,11 +205,13 @@ double Refine(const RobotModel& model, size_t every, double settled, Begin* begi
 bool IsPlausible(const NonlinearFault& fault) {
   constexpr double kFarthest = 0.3, kMostTurn = 0.5;  // m, rad
   // A clock runs a little fast or slow, or has another rate.
-  constexpr double kDrift = 0.05;
+  constexpr double kDrift = 0.05, kLeastDrift = 1e-3, kLeastGain = 2e-3;
   const double octaves = fault.clock > 0.0 ? std::log2(fault.clock) : 0.5;
   return fault.shift.norm() <= kFarthest && fault.turn.norm() <= kMostTurn &&
          std::abs(octaves - std::round(octaves)) <= kDrift &&
-         (fault.number != Number::kGain || fault.factor > 0.0);
+         (fault.number != Number::kClock || std::abs(octaves) >= kLeastDrift) &&
+         (fault.number != Number::kGain ||
+          (fault.factor > 0.0 && std::abs(fault.factor - 1.0) >= kLeastGain));
 }
 
 }  // namespace

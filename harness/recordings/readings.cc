@@ -98,7 +98,7 @@ bool IsBetter(const Readings::Reading& one, const Readings::Reading& other) {
   if (a.IsWhole() != b.IsWhole()) return a.IsWhole();
   const long more = CountNumbers(one) - CountNumbers(other);
   constexpr double kWorse = 0.1, kMuchOfNumber = 0.25, kMuch = 0.4;  // in the logarithm
-  // What predicts the quarter that was held out much better is right, with as many numbers or a few more.
+  // A much better prediction of the quarter that was held out is worth a few numbers.
   constexpr double kMuchBetter = 0.8;
   constexpr long kFewMore = 2;
   if (a.IsWhole() && more <= kFewMore && a.by_causes.held_left < kMuchBetter * b.by_causes.held_left)
