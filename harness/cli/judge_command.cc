@@ -123,7 +123,12 @@ std::vector<std::string> Correct(const RecordingJudgement& judgement, const Judg
   file->Write(corrected.text);
   std::vector<std::string> remarks = {fmt::format("{}: {} of {} causes are corrected",
                                                   request.corrected.string(), corrected.written.size(),
-                                                  judgement.found.size())};
+                                                  judgement.causes.size())};
+  // A recording's own causes come first, and those of geometry.
+  for (size_t i = 0; i + judgement.found.size() < judgement.causes.size(); ++i) {
+    const Fault& fault = judgement.causes[i].faults.front();
+    remarks.push_back("not in it: " + fault.place + ": " + fault.fault);
+  }
   for (const std::string& one : corrected.left) remarks.push_back("not in it: " + one);
   return remarks;
 }
