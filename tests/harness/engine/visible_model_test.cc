@@ -1,4 +1,4 @@
-// What is drawn of a robot without shapes.
+// Robots without shapes are drawn as skeletons.
 
 #include "harness/engine/visible_model.h"
 
