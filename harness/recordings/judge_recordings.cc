@@ -64,13 +64,8 @@ class Judge {
     const TorqueRows held = MakeTorqueRows(set_, estimator_.faults(), /*is_held=*/true);
     VectorXd nothing = VectorXd::Zero(held.columns - 1);
     nothing.head(CountForced(set_)) = estimator_.CalcAmplitudes({}).head(CountForced(set_));
-    Index rank = 0;
-    result_.by_all.held_left = estimator_.CalcRms(
-        held, held.CalcLeft(estimator_.FitAmplitudes(TorqueEstimator::Part::kPlain, &rank)));
-    result_.by_all.numbers = rank;
-    for (const CauseTerm& term : selection.terms) result_.by_causes.numbers += term.amplitude.size();
-    result_.by_causes.numbers += CountForced(set_);
-    result_.by_causes.held_left = estimator_.CalcRms(held, held.CalcLeft(amplitudes));
+    result_.by_all = estimator_.PredictByAll(held);
+    result_.by_causes = estimator_.PredictByCauses(held);
     const VectorXd held_before = held.CalcLeft(nothing), held_after = held.CalcLeft(amplitudes);
     std::vector<size_t> first_fit, first_held;
     for (size_t recording = 0; recording < set_.size(); ++recording) {
@@ -251,6 +246,7 @@ class Judge {
       one.faults = {{"no cause of a possible size", fault.place, kNone, 0.0, "", ""}};
       one.rival.clear();
     } else if (Fault& first = one.faults.front(); std::isinf(first.error)) {
+      one.outcome = CauseOutcome::kNotExplained;
       first = {fault.fault, fault.place, kNone,
                0.0,         fault.unit,  "of a size that this motion does not determine"};
     }
@@ -261,24 +257,29 @@ class Judge {
 
   /// Whether more than noise is left, so that something else is at work, and all causes or this one explain
   /// little, or where far more is left not far more: a wrong mass fits a little of any. Dry and viscous
-  /// friction are named all the same, since drives have more shapes of it than are tried; a further shape
-  /// that explains little is not.
+  /// friction are named all the same, since drives have more shapes of it than are tried, unless a doubtful
+  /// cause explains more; a further shape that explains little is not.
   [[nodiscard]] bool IsDoubtful(const TorqueFault& fault, const CauseTerm& term) const {
     constexpr double kErrors = 3.0;  // standard errors from zero
     const VectorXd shown = term.error.array().isFinite().select(term.error, 0.0);
     const Index sizes = fault.HasVelocity() || fault.kind == TorqueFault::kSpring ? 1 : term.amplitude.size();
     if (term.amplitude.head(sizes).norm() < kErrors * shown.head(sizes).norm()) return true;
     if (result_.IsWhole()) return false;
+    if (result_.IsBeaten() && !fault.IsFriction()) return true;
     const double left = 1.0 - estimator_.selection().fraction;
     constexpr double kMostLeft = 0.1;
     // A force on a link for a while fits a part of anything that is large then.
     if (fault.kind == TorqueFault::kPush && fault.push.joint < 0) return true;
+    const bool is_nearest =
+        std::ranges::all_of(result_.found, [](const FoundFault& before) { return before.is_named; });
     if (fault.IsFriction())
-      return (fault.kind == TorqueFault::kStribeckFriction || fault.kind == TorqueFault::kLoadFriction) &&
-             term.fraction - left < kMuch;
+      return !is_nearest ||
+             ((fault.kind == TorqueFault::kStribeckFriction || fault.kind == TorqueFault::kLoadFriction ||
+               fault.kind == TorqueFault::kSquareFriction) &&
+              term.fraction - left < kMuch);
     // Measured, no bounds: the nearest cause of drawn torques that were cut off explains less than the last.
-    constexpr double kMost = 100.0;
-    return left > kMostLeft || (term.fraction - left < kMuch && fault.kind > TorqueFault::kArmature) ||
+    constexpr double kMainly = 0.5, kMost = 100.0;
+    return left > kMostLeft || term.fraction < kMainly ||
            (result_.left > kFar && fault.kind != TorqueFault::kPayload && term.fraction <= kMost * left);
   }
 
@@ -291,13 +292,10 @@ class Judge {
 
 }  // namespace
 
-bool RecordingJudgement::IsWhole() const {
-  // The noise of accelerations is known to a factor of two; how well the motion is predicted says more.
-  constexpr double kMuchBetter = 1.5;
-  const bool is_beaten = by_all.held_left > 0.0 && by_causes.held_left > kMuchBetter * by_all.held_left;
-  return !balances.empty() && !is_beaten &&
-         std::all_of(balances.begin(), balances.end(),
-                     [](const JointJudgement& one) { return one.left <= kMostNoise * one.noise; });
+bool RecordingJudgement::IsNoise() const {
+  return !balances.empty() && by_causes.held_left <= kMostNoise &&
+         std::ranges::all_of(balances,
+                             [](const JointJudgement& one) { return one.left <= kMostNoise * one.noise; });
 }
 
 size_t RecordingJudgement::CountExplaining() const {

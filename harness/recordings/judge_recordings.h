@@ -8,7 +8,7 @@
 
 #include "harness/recordings/cause_description.h"
 #include "harness/recordings/read_recordings.h"
-#include "harness/recordings/torque_candidates.h"
+#include "harness/recordings/torque_estimator.h"
 
 namespace dexcheck {
 
@@ -28,12 +28,6 @@ struct JointJudgement {
 
   /// Whether noise may hide an error of a fifth of the model's torque.
   [[nodiscard]] bool IsHidden() const { return hidden >= 0.2 * modelled; }
-};
-
-/// How well a set of numbers predicts the quarter that it was not fitted to.
-struct HeldPrediction {
-  long numbers = 0;
-  double held_left = 0.0;  ///< Root mean square of the rest, in units of noise.
 };
 
 /// Means over a block of time, for pictures. By judged joint.
@@ -64,9 +58,12 @@ struct RecordingJudgement {
 
   /// Causes that are more than the nearest that is known.
   [[nodiscard]] size_t CountExplaining() const;
-  /// Beside the causes no more than noise is left, and a fit of all numbers predicts the quarter that was
-  /// held out no better.
-  [[nodiscard]] bool IsWhole() const;
+  /// Beside the causes no more than noise is left, in the quarter that was held out as well.
+  [[nodiscard]] bool IsNoise() const;
+  /// A fit of all numbers predicts the quarter that was held out better than the causes do.
+  [[nodiscard]] bool IsBeaten() const { return by_causes.IsBeatenBy(by_all); }
+  /// The causes explain all that is to be explained.
+  [[nodiscard]] bool IsWhole() const { return IsNoise() && !IsBeaten(); }
   /// Noise may hide such errors at every joint.
   [[nodiscard]] bool IsHidden() const;
   /// Joints move, all that do are judged, and the residual is noise, with no cause, beside which errors of

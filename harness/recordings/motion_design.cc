@@ -33,7 +33,8 @@ std::vector<TorqueFault> ListDesignedFaults(const RobotModel& model, const std::
     using enum TorqueFault::Kind;
     const bool is_variant = fault.parameters > 0 || (fault.kind == kPayload && fault.sums.size() > 4);
     const bool is_of_all = fault.index < 0 && fault.kind != kGravity;
-    const bool is_left_out = fault.kind == kDelay || fault.kind == kLoadFriction;
+    const bool is_left_out = fault.kind == kDelay || fault.kind == kLoadFriction || fault.kind == kDrift ||
+                             fault.kind == kSquareFriction || fault.kind == kElasticity;
     return is_variant || is_of_all || is_left_out;
   });
   return faults;
@@ -163,7 +164,7 @@ class MotionDesigner {
     const std::vector<bool> all(joints_.size(), true);
     const size_t count = (times_.size() + kEvery - 1) / kEvery;
     for (size_t g = 0; g < times_.size(); g += kEvery) {
-      sample.time = times_[g];
+      sample.time = sample.passed = times_[g];
       motion.Calc(times_[g], &sample.q, &sample.qd, &sample.qdd);
       sample.direction = sample.qd.cwiseSign();
       for (int i = 0; i < model_.num_joints(); ++i)

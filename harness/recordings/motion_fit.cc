@@ -267,6 +267,7 @@ bool MotionFit::Emit(size_t centre, const Receiver& receive) {
   AdvanceVelocities(&fitted);
   const int time = ChannelOf(RecordedQuantity::kTime, -1);
   sample_.time = rows_ahead_[centre][time];
+  sample_.passed = sample_.time - begin_;
   const VectorXd times = window.col(time).array() - sample_.time;
   const VectorXd phases = refinements_.shaking * window.col(time);
   sample_.swing =

@@ -38,6 +38,7 @@ struct Refinements {
 /// zero.
 struct RecordedSample {
   double time = 0.0;
+  double passed = 0.0;  ///< Since the first row, s.
   VectorXd q, qd, qdd;
   VectorXd torque;                    ///< Measured, or the current; smoothed like the motion.
   VectorXd most_torque;               ///< The largest of those that were read ahead, less its noise.
@@ -174,7 +175,7 @@ class MotionFit {
   bool stands_ = false;
   long segment_ = 0, rows_ = 0, held_ = 0, held_run_ = 0, doubled_ = 0, empty_ = 0, gaps_ = 0;
   bool has_ended_ = false;
-  double step_ = 0.0;
+  double step_ = 0.0, begin_ = 0.0;
   mutable std::map<std::pair<size_t, int>, MatrixXd> even_;  // of CalcCoefficients, by half and order
   size_t half_ = 2, stride_ = 1;
   std::vector<bool> moves_;

@@ -99,6 +99,7 @@ void MotionFit::Analyse() {
   for (size_t i = 1; i < rows_ahead_.size(); ++i)
     steps.push_back(rows_ahead_[i][time] - rows_ahead_[i - 1][time]);
   step_ = Median(steps);
+  begin_ = rows_ahead_.front()[time];
   constexpr double kLongest = 0.5;
   if (step_ > kLongest)
     throw InputError(
@@ -206,9 +207,10 @@ bool MotionFit::Stands() const {
 }
 
 std::optional<Fault> MotionFit::CheckVelocity(int joint, const std::vector<size_t>& centres, size_t half) {
-  constexpr double kOff = 0.1, kShows = 5.0, kLate = 1.5, kErrors = 6.0, kExplains = 0.5;
+  constexpr double kOff = 0.015, kFarOff = 0.1, kShows = 5.0, kLate = 1.5, kErrors = 6.0, kExplains = 0.5;
   const int position = ChannelOf(RecordedQuantity::kPosition, joint),
-            velocity = ChannelOf(RecordedQuantity::kVelocity, joint);
+            velocity = ChannelOf(RecordedQuantity::kVelocity, joint),
+            time = ChannelOf(RecordedQuantity::kTime, -1);
   if (position < 0 || velocity < 0 || centres.empty()) return std::nullopt;
   // v = gain r + lag (-r'), of derivatives r and r' of the position, whose noise makes squares too large.
   Eigen::Matrix2d G = Eigen::Matrix2d::Zero(), noise = G;
@@ -218,7 +220,12 @@ std::optional<Fault> MotionFit::CheckVelocity(int joint, const std::vector<size_
     const MatrixXd window = GetWindow(centre, half);
     const MatrixXd C = CalcCoefficients(centre, half, kOrder);
     const Vector2d rates(C.row(1).dot(window.col(position)), -2.0 * C.row(2).dot(window.col(position)));
-    const double v = C.row(0).dot(window.col(velocity));
+    // Both are smoothed in the same way: the velocities as what they add up to.
+    VectorXd moved = VectorXd::Zero(window.rows());
+    for (Eigen::Index k = 1; k < moved.size(); ++k)
+      moved[k] = moved[k - 1] + 0.5 * (window(k, time) - window(k - 1, time)) *
+                                    (window(k, velocity) + window(k - 1, velocity));
+    const double v = C.row(1).dot(moved);
     const double variance = Square(noise_.position[joint]);
     G += rates * rates.transpose();
     noise.diagonal() += variance * Vector2d(C.row(1).squaredNorm(), 4.0 * C.row(2).squaredNorm());
@@ -229,23 +236,31 @@ std::optional<Fault> MotionFit::CheckVelocity(int joint, const std::vector<size_
   const Eigen::Matrix2d right = G - noise;
   const double gain = b[0] / right(0, 0);
   const std::string place = "joint " + model_->joint(joint).name;
-  if (std::abs(gain - 1.0) >= kOff)
-    return Fault{
-        "velocity gain", place, gain, 0.0, "", std::abs(gain + 1.0) < kOff ? "(the other sign)" : ""};
-  if (!(G(1, 1) > kShows * noise(1, 1))) return std::nullopt;
-  const Vector2d x = right.ldlt().solve(b);
-  const double left = std::max(0.0, squares - x.dot(b)), without = std::max(0.0, squares - gain * b[0]);
   // Windows that overlap have the same noise.
   const auto windows = static_cast<double>(rows_ahead_.size()) / static_cast<double>(2 * half + 1);
   const auto count = static_cast<double>(centres.size());
-  const double error = std::sqrt(left / right(1, 1) / std::max(1.0, std::min(windows, count) - 2.0) *
-                                 std::min(windows, count) / count);
+  const auto error_of = [&](double left, Eigen::Index k) {
+    return std::sqrt(left / right(k, k) / std::max(1.0, std::min(windows, count) - 2.0) *
+                     std::min(windows, count) / count);
+  };
+  const double without = std::max(0.0, squares - gain * b[0]), off = Square(gain - 1.0) * right(0, 0);
+  if (std::abs(gain - 1.0) >= std::max(kOff, kErrors * error_of(without, 0)) &&
+      off > kExplains * (off + without))
+    return Fault{
+        "velocity gain", place, gain, 0.0, "", std::abs(gain + 1.0) < kFarOff ? "(the other sign)" : ""};
+  const Fault other{"velocity", place, std::numeric_limits<double>::quiet_NaN(),
+                    0.0,        "",    "(not the position's derivative)"};
+  const std::optional<Fault> unless_late =
+      std::abs(gain - 1.0) >= kFarOff ? std::optional(other) : std::nullopt;
+  if (!(G(1, 1) > kShows * noise(1, 1))) return unless_late;
+  const Vector2d x = right.ldlt().solve(b);
+  const double left = std::max(0.0, squares - x.dot(b)), error = error_of(left, 1);
   // A logger may read velocities half a step before positions, as a leapfrog has them.
   constexpr double kLeast = 0.1;  // rows
   if (std::abs(x[1]) > std::max(kErrors * error, kLeast * step_) && std::abs(x[1]) < kLate * step_)
     velocity_lags_[joint] = x[1];
   if (x[1] < kLate * step_ || x[1] < kErrors * error || without - left < kExplains * without)
-    return std::nullopt;
+    return unless_late;
   return Fault{"velocity lag", place, x[1], error, "s", "(late or filtered)"};
 }
 

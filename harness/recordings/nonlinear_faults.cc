@@ -105,10 +105,10 @@ class NonlinearFaults {
   /// Adds a joint that stands elsewhere or has another axis. All that a fixed base carries turns with
   /// gravity.
   void AddGeometry(int joint) {
+    Add("axis", joint, 0.0, "rad").number = NonlinearFault::Number::kAxis;
     if (model_.joint(joint).parent < 0) return;
     Add("placement", joint, 0.0, "m").number = NonlinearFault::Number::kPlacement;
     Add("orientation", joint, 0.0, "rad").number = NonlinearFault::Number::kOrientation;
-    Add("axis", joint, 0.0, "rad").number = NonlinearFault::Number::kAxis;
   }
 
   void AddTorqueSign(int joint) {
@@ -180,8 +180,8 @@ class NonlinearFaults {
 Index NonlinearFault::CountNumbers() const {
   switch (number) {
     case Number::kPlacement:
-      return 3;
     case Number::kOrientation:
+      return 3;
     case Number::kAxis:
       return 2;
     default:

@@ -12,23 +12,32 @@ namespace {
 
 using Eigen::Index;
 
-/// The begin of a recording, and how well the model explains it.
-class Begin {
+/// Samples of a recording, and how well the model explains them.
+class Samples {
  public:
-  Begin(const RobotModel& model, Recording* recording) : model_(model) {
+  Samples(const RobotModel& model, Recording* recording) : model_(model) {
     constexpr size_t kRows = 3000;
     MotionFit motion(model, recording, kRows);
     joints_ = motion.joints();
     has_currents_ = motion.has_currents();
     velocity_faults_ = motion.faults();
+    size_t every = 1, count = 0;
     motion.Run([&](const RecordedSample& sample) {
+      if (count++ % every != 0) return true;
+      // All of a long recording counts, at fewer times.
+      if (samples_.size() == kRows) {
+        for (size_t i = 0; i < kRows / 2; ++i) samples_[i] = std::move(samples_[2 * i]);
+        samples_.resize(kRows / 2);
+        every *= 2;
+        if (count % every != 1) return true;
+      }
       samples_.push_back(sample);
       // A joint that friction holds has a torque that says nothing.
       const std::vector<bool> judged = motion.IsJudged(sample);
       for (const int joint : joints_)
         if (!judged[static_cast<size_t>(joint)])
           samples_.back().torque[joint] = std::numeric_limits<double>::quiet_NaN();
-      return samples_.size() < kRows;
+      return true;
     });
   }
 
@@ -48,6 +57,9 @@ class Begin {
       ranges << ranges.col(0).cwiseMin(sample.q), ranges.col(1).cwiseMax(sample.q);
     return ranges;
   }
+  [[nodiscard]] bool has_currents() const { return has_currents_; }
+  /// Takes the model's friction, and no offset, for the drives' from now on.
+  void TrustDrives() { trusts_drives_ = true; }
   /// Returns what friction, an offset and a current's scale leave of each joint's torque beside the model's
   /// (samples x joints), at every such sample; 0 where it is not judged.
   MatrixXd CalcResiduals(const NonlinearFault& undone, size_t every) {
@@ -73,11 +85,15 @@ class Begin {
         if (std::isnan(sample.torque[joint])) continue;
         // A current's scale is free.
         measured(i, place) = sample.torque[joint] - (has_currents_ ? 0.0 : torques[joint]);
+        const Joint& modelled = model_.joint(joint);
+        if (trusts_drives_)
+          measured(i, place) -=
+              modelled.damping * sample.qd[joint] + modelled.dry_friction * sample.direction[joint];
         columns[static_cast<size_t>(place)].row(i) << 1.0, sample.direction[joint], sample.qd[joint],
             has_currents_ ? torques[joint] : 0.0;
       }
     }
-    for (Index place = 0; place < joints; ++place) {
+    for (Index place = 0; place < joints && !trusts_drives_; ++place) {
       const MatrixXd& Z = columns[static_cast<size_t>(place)];
       auto y = measured.col(place);
       y -= (Z * SolveLeastSquares(Z.transpose() * Z, Z.transpose() * y)).eval();
@@ -90,7 +106,7 @@ class Begin {
 
   const RobotModel& model_;
   std::vector<int> joints_;
-  bool has_currents_ = false;
+  bool has_currents_ = false, trusts_drives_ = false;
   std::vector<Fault> velocity_faults_;
   std::vector<RecordedSample> samples_;
 };
@@ -105,7 +121,7 @@ double CalcMisfit(const MatrixXd& residuals) {
 
 using Number = NonlinearFault::Number;
 
-/// Changes a fault's numbers. @param axes 3 x 2: about which the joint turns.
+/// Changes a fault's numbers. @param axes 3 x 3: about the first of which the joint turns.
 void Change(const VectorXd& change, const MatrixXd& axes, NonlinearFault* fault) {
   switch (fault->number) {
     case Number::kNone:
@@ -124,7 +140,7 @@ void Change(const VectorXd& change, const MatrixXd& axes, NonlinearFault* fault)
       break;
     case Number::kOrientation:
     case Number::kAxis:
-      fault->turn += axes * change;
+      fault->turn += axes.leftCols(change.size()) * change;
       break;
   }
 }
@@ -149,24 +165,25 @@ double CalcValue(const NonlinearFault& fault) {
   return 0.0;
 }
 
-/// Two directions in its parent's frame, orthogonal to a joint's axis (3 x 2).
-MatrixXd FindPlane(const RobotModel& model, int joint) {
+/// Directions in its parent's frame: two orthogonal to a joint's axis, and the axis (3 x 3).
+MatrixXd FindDirections(const RobotModel& model, int joint) {
   const Joint& one = model.joint(joint);
   const Vector3d axis =
       one.X_PB.linear() * Eigen::AngleAxisd(one.mdh.alpha, Vector3d::UnitX()) * Vector3d::UnitZ();
   const Vector3d first = axis.unitOrthogonal();
-  return (MatrixXd(3, 2) << first, axis.cross(first)).finished();
+  return (MatrixXd(3, 3) << first, axis.cross(first), axis).finished();
 }
 
 /// Moves a fault's numbers to where it explains most, by Gauss and Newton's method. @param every of so many
 /// samples one counts. @param settled the misfit that a step less gains. @return the misfit there.
-double Refine(const RobotModel& model, size_t every, double settled, Begin* begin, NonlinearFault* fault) {
-  MatrixXd residuals = begin->CalcResiduals(*fault, every);
+double Refine(const RobotModel& model, size_t every, double settled, Samples* samples,
+              NonlinearFault* fault) {
+  MatrixXd residuals = samples->CalcResiduals(*fault, every);
   double misfit = CalcMisfit(residuals);
   if (fault->number == Number::kNone) return misfit;
-  const MatrixXd plane = fault->joint >= 0 ? FindPlane(model, fault->joint) : MatrixXd();
-  constexpr int kSteps = 10;
-  constexpr double kDifference = 1e-5, kLeastPart = 0.05, kUnseen = 1e-5;
+  const MatrixXd axes = fault->joint >= 0 ? FindDirections(model, fault->joint) : MatrixXd();
+  constexpr int kSteps = 20;
+  constexpr double kDifference = 1e-5, kLeastPart = 0.05, kUnseen = 1e-9;
   double gained = 1.0;
   for (int i = 0; i < kSteps && gained > settled; ++i) {
     const VectorXd weights =
@@ -175,20 +192,24 @@ double Refine(const RobotModel& model, size_t every, double settled, Begin* begi
     MatrixXd J(e.size(), fault->CountNumbers());
     for (Index k = 0; k < J.cols(); ++k) {
       NonlinearFault near = *fault;
-      Change(kDifference * VectorXd::Unit(J.cols(), k), plane, &near);
-      J.col(k) = ((begin->CalcResiduals(near, every) * weights.asDiagonal()).reshaped() - e) / kDifference;
+      Change(kDifference * VectorXd::Unit(J.cols(), k), axes, &near);
+      J.col(k) = ((samples->CalcResiduals(near, every) * weights.asDiagonal()).reshaped() - e) / kDifference;
     }
-    // A direction that the motion does not show stays as it is.
     MatrixXd H = J.transpose() * J;
-    const double least = kUnseen * H.diagonal().maxCoeff();
-    fault->shows_all = CalcSymmetricEigenvalues(H)[0] > least;
-    H.diagonal().array() += least;
+    // Each joint's residual has the norm 1: this is how far noise may move the direction that shows least.
+    const double weakest =
+        1.0 / std::sqrt(static_cast<double>(residuals.rows()) *
+                        std::max(CalcSymmetricEigenvalues(H)[0], std::numeric_limits<double>::min()));
+    constexpr double kShown = 0.1;
+    fault->shows_all = weakest < kShown * std::abs(CalcValue(*fault));
+    // A direction that the motion does not show stays as it is.
+    H.diagonal().array() += kUnseen * H.diagonal().maxCoeff();
     const VectorXd step = -SolveLeastSquares(H, J.transpose() * e);
     gained = 0.0;
     for (double part = 1.0; part > kLeastPart && gained == 0.0; part *= 0.5) {
       NonlinearFault near = *fault;
-      Change(part * step, plane, &near);
-      MatrixXd left = begin->CalcResiduals(near, every);
+      Change(part * step, axes, &near);
+      MatrixXd left = samples->CalcResiduals(near, every);
       const double then = CalcMisfit(left);
       if (!(then < misfit)) continue;
       gained = misfit - then;
@@ -218,16 +239,16 @@ bool IsPlausible(const NonlinearFault& fault) {
 
 std::optional<NonlinearFault> FindNonlinearFault(const RobotModel& model, Recording recording,
                                                  bool of_model) {
-  Begin begin(model, &recording);
-  std::vector<NonlinearFault> all = ListNonlinearFaults(model, recording, begin.CalcRanges());
+  Samples samples(model, &recording);
+  std::vector<NonlinearFault> all = ListNonlinearFaults(model, recording, samples.CalcRanges());
   // A few samples say which are worth all of them: of each kind and place the best number.
   constexpr size_t kFewSamples = 100, kFewFaults = 10;
-  const size_t few = std::max<size_t>(1, begin.size() / kFewSamples);
+  const size_t few = std::max<size_t>(1, samples.size() / kFewSamples);
   constexpr double kRoughly = 1e-3, kWell = 1e-6;
   std::vector<std::pair<double, NonlinearFault>> faults;
   for (NonlinearFault& one : all) {
     if (one.IsOfModel() != of_model) continue;
-    const double misfit = CalcMisfit(begin.CalcResiduals(one, few));
+    const double misfit = CalcMisfit(samples.CalcResiduals(one, few));
     const auto same = std::ranges::find_if(faults, [&](const auto& known) {
       const NonlinearFault& other = known.second;
       return one.number != Number::kNone && one.number == other.number && one.joint == other.joint &&
@@ -239,21 +260,30 @@ std::optional<NonlinearFault> FindNonlinearFault(const RobotModel& model, Record
       *same = {misfit, std::move(one)};
     }
   }
-  for (auto& [misfit, fault] : faults) misfit = Refine(model, few, kRoughly, &begin, &fault);
+  for (auto& [misfit, fault] : faults) misfit = Refine(model, few, kRoughly, &samples, &fault);
   std::ranges::sort(faults, {}, &std::pair<double, NonlinearFault>::first);
   faults.resize(std::min(faults.size(), kFewFaults));
   // The residual falls by a factor of three, of one joint or spread over several; with numbers something is
   // always explained.
   constexpr double kMuch = 1.1, kMuchOfNumber = 0.1;
-  const double as_read = CalcMisfit(begin.CalcResiduals({}, 1));
+  const double as_read = CalcMisfit(samples.CalcResiduals({}, 1));
   double best = as_read;
   std::optional<NonlinearFault> found;
   for (auto& [of_few, fault] : faults) {
-    const double misfit = Refine(model, 1, kWell, &begin, &fault);
+    const double misfit = Refine(model, 1, kWell, &samples, &fault);
     const double most = as_read - (fault.number != Number::kNone ? kMuchOfNumber : kMuch);
     if (misfit < std::min(best, most) && IsPlausible(fault)) best = misfit, found = std::move(fault);
   }
-  if (found && found->factor != 1.0 && begin.HasRatesOf(found->fault)) found->has_right_rates = true;
+  // What friction and an offset would take away may show the numbers better.
+  if (found && found->number != Number::kNone && !samples.has_currents()) {
+    NonlinearFault other = *found;
+    samples.TrustDrives();
+    constexpr double kLittle = 0.05;
+    const double misfit = Refine(model, 1, kWell, &samples, &other);
+    if (misfit < best + kLittle * static_cast<double>(model.num_joints()) && IsPlausible(other))
+      found = std::move(other);
+  }
+  if (found && found->factor != 1.0 && samples.HasRatesOf(found->fault)) found->has_right_rates = true;
   return found;
 }
 

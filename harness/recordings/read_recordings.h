@@ -61,6 +61,9 @@ class RecordingSet {
   [[nodiscard]] double& weight(size_t recording, size_t place) {
     return read_[recording].weight[static_cast<Eigen::Index>(place)];
   }
+  [[nodiscard]] double& noise(size_t recording, size_t place) {
+    return read_[recording].noise[static_cast<Eigen::Index>(place)];
+  }
   void ResetWeights();
 
   [[nodiscard]] const std::vector<int>& joints() const { return joints_; }

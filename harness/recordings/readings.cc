@@ -27,11 +27,12 @@ Explanation MakeCause(const RobotModel& model, const LinkFrames& frames, const N
   if (found.IsOfModel()) {
     one.channel = CauseChannel::kBalance;
     const int parent = model.joint(found.joint).parent;
-    const Matrix3d R = frames.Find(parent).linear();
-    one.faults.front().detail = (found.number == NonlinearFault::Number::kPlacement
-                                     ? "moved by " + FormatVector(R.transpose() * found.shift, 3) + " m"
-                                     : "turned by " + FormatVector(R.transpose() * found.turn, 3) + " rad") +
-                                " in " + frames.NameOf(model.link_name(parent));
+    const Matrix3d R = parent < 0 ? Matrix3d(Matrix3d::Identity()) : frames.Find(parent).linear();
+    one.faults.front().detail =
+        (found.number == NonlinearFault::Number::kPlacement
+             ? "moved by " + FormatVector(R.transpose() * found.shift, 3) + " m"
+             : "turned by " + FormatVector(R.transpose() * found.turn, 3) + " rad") +
+        (parent < 0 ? std::string(" in the base's frame") : " in " + frames.NameOf(model.link_name(parent)));
     if (!found.shows_all) one.faults.front().detail += ", as far as this motion shows it";
   }
   const bool is_offset = found.offset != 0.0 && found.joint >= 0 && model.joint(found.joint).parent < 0;
@@ -145,12 +146,12 @@ RecordingJudgement Readings::Run() {
   Search(/*of_model=*/false, &reading);
   Refine(&reading);
   Search(/*of_model=*/true, &reading);
-  // Beside much that nothing explains, a number explains a part of anything.
-  constexpr double kFar = 5.0;  // times the noise
+  // Beside what nothing explains, a number explains a part of anything.
+  for (const NonlinearFault& fault : reading.faults)
+    reading.judgement.by_causes.numbers += fault.CountNumbers();
   for (const NonlinearFault& fault : reading.faults) {
     Explanation one = MakeCause(model_, options_.frames, fault);
-    reading.judgement.by_causes.numbers += fault.CountNumbers();
-    if (fault.number != NonlinearFault::Number::kNone && reading.judgement.left > kFar)
+    if (fault.number != NonlinearFault::Number::kNone && !reading.judgement.IsWhole())
       one.outcome = CauseOutcome::kNotExplained;
     reading.judgement.causes.insert(reading.judgement.causes.begin(), std::move(one));
   }

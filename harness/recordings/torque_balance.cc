@@ -54,14 +54,14 @@ void TorqueBalance::ListColumns(bool has_currents) {
         columns.push_back({TorqueColumn::kBody, link, k});
     }
     columns.push_back({TorqueColumn::kTorque, joint});
-    for (const auto kind : {TorqueColumn::kPosition, TorqueColumn::kBacklash})
+    for (const auto kind : {TorqueColumn::kPosition, TorqueColumn::kBacklash, TorqueColumn::kElastic})
       for (int other = 0; other < model_->num_joints(); ++other) columns.push_back({kind, other});
     for (int k = 0; k < 2 * kCutOffs; ++k) columns.push_back({TorqueColumn::kCutOff, joint, k});
     for (int k = 0; k < 3; ++k) columns.push_back({TorqueColumn::kGravity, 0, k});
     if (has_currents) columns.push_back({TorqueColumn::kCurrent, joint});
-    for (const auto kind :
-         {TorqueColumn::kRate, TorqueColumn::kOffset, TorqueColumn::kDry, TorqueColumn::kViscous,
-          TorqueColumn::kAcceleration, TorqueColumn::kLoad, TorqueColumn::kAngle})
+    for (const auto kind : {TorqueColumn::kRate, TorqueColumn::kOffset, TorqueColumn::kDry,
+                            TorqueColumn::kViscous, TorqueColumn::kSquare, TorqueColumn::kTime,
+                            TorqueColumn::kAcceleration, TorqueColumn::kLoad, TorqueColumn::kAngle})
       columns.push_back({kind, joint});
     for (int k = 0; k < kFrictionShapes; ++k) columns.push_back({TorqueColumn::kFriction, joint, k});
     for (int k = 0; refinements_.shaking > 0.0 && k < shaking_.cols(); ++k)
@@ -102,6 +102,8 @@ double TorqueBalance::CalcEntry(int joint, const TorqueColumn& column, const Rec
     case TorqueColumn::kBacklash:
       return std::copysign(by_position_(joint, column.index),
                            by_position_(joint, column.index) * torques_[column.index]);
+    case TorqueColumn::kElastic:
+      return by_position_(joint, column.index) * torques_[column.index];
     case TorqueColumn::kCutOff:
       return CalcCutOff(joint, column.component, sample);
     case TorqueColumn::kGravity:
@@ -116,6 +118,10 @@ double TorqueBalance::CalcEntry(int joint, const TorqueColumn& column, const Rec
       return direction;
     case TorqueColumn::kViscous:
       return sample.qd[joint];
+    case TorqueColumn::kSquare:
+      return sample.qd[joint] * std::abs(sample.qd[joint]);
+    case TorqueColumn::kTime:
+      return sample.passed;
     case TorqueColumn::kAcceleration:
       return sample.qdd[joint];
     case TorqueColumn::kFriction:

@@ -23,6 +23,7 @@ struct TorqueColumn {
     kTorque,    ///< The model's torque of joint index, with its friction.
     kPosition,  ///< By the position of joint index.
     kBacklash,  ///< The same, with the sign of that joint's torque.
+    kElastic,   ///< The same, times that joint's torque.
     kCutOff,    ///< By component: 2 of each torque at which it may have been cut off.
     kGravity,   ///< By component of gravity.
     kRate,      ///< Of the measured torque.
@@ -30,6 +31,8 @@ struct TorqueColumn {
     kOffset,    ///< 1
     kDry,       ///< Direction of motion.
     kViscous,   ///< Velocity.
+    kSquare,    ///< Velocity times its size.
+    kTime,      ///< Since the first row, s.
     kAcceleration,
     kFriction,  ///< RecordedSample::friction, by component.
     kLoad,      ///< Direction times the size of the model's torque.

@@ -113,6 +113,9 @@ class FaultList {
                modelled.dry_friction, true, most);
     AddAtJoint(kViscousFriction, joint, "viscous friction", rate, {TorqueColumn::kViscous, joint},
                modelled.damping, true, FindMostViscous(joint));
+    AddAtJoint(kSquareFriction, joint, "friction that grows with the square of the velocity",
+               turns ? "N m s^2/rad^2" : "N s^2/m^2", {TorqueColumn::kSquare, joint}, 0.0, true,
+               FindMostPer(joint, extents_.speed.cwiseAbs2(), kSlow * kSlow));
     const bool has_stribeck = refinements_.stribeck.contains(joint);
     const bool has_smooth = refinements_.smooth.contains(joint);
     if (has_stribeck) AddKnownShape(kStribeckFriction, joint, "Stribeck friction", torque, 0.0);
@@ -143,6 +146,7 @@ class FaultList {
     AddAtJoint(kLoadFriction, joint, "friction that grows with the load", "", {TorqueColumn::kLoad, joint},
                0.0, true, 1.0);
     AddAtJoint(kOffset, joint, "torque offset", torque, {TorqueColumn::kOffset, joint}, 0.0, false, most);
+    AddAtJoint(kDrift, joint, "torque drift", torque + "/s", {TorqueColumn::kTime, joint}, 0.0, false, most);
     AddAtJoint(kArmature, joint, "armature", turns ? "kg m^2" : "kg", {TorqueColumn::kAcceleration, joint},
                modelled.armature, true, FindMostPer(joint, extents_.acceleration, kSlow));
     AddAtJoint(kTorqueGain, joint, "torque gain", "", {TorqueColumn::kTorque, joint}, 1.0, false, kMostGain)
@@ -170,6 +174,10 @@ class FaultList {
                                 {{{{TorqueColumn::kBacklash, joint}, -1, -0.5}}});
     backlash.is_possible = [](const VectorXd& a) { return a[0] > 0.0; };
     backlash.most = VectorXd::Constant(1, turns ? 0.2 : 0.02);
+    TorqueFault& elastic = Add(kElasticity, joint, "elasticity", "joint " + modelled.name,
+                               turns ? "rad/(N m)" : "m/N", {{{{TorqueColumn::kElastic, joint}, -1, -1.0}}});
+    elastic.is_possible = [](const VectorXd& a) { return a[0] > 0.0; };
+    elastic.most = VectorXd::Constant(1, (turns ? 0.2 : 0.02) / most);
     Add(kZero, joint, "position offset", "joint " + modelled.name, turns ? "rad" : "m",
         {{{{TorqueColumn::kPosition, joint}, -1, -1.0}}})
         .most = VectorXd::Constant(1, std::min(turns ? kPi : 1.0, width > 0.0 ? width : kInfinite));
@@ -310,7 +318,7 @@ class FaultList {
 
   /// A torque that has nothing to do with the model's is no gain.
   static bool IsGain(const VectorXd& a) {
-    constexpr double kLeast = 0.05;
+    constexpr double kLeast = 0.01;
     return std::abs(1.0 + a[0]) > kLeast;
   }
   /// Whether the recorded torque has nothing of the model's.

@@ -56,6 +56,7 @@ TorqueEstimator::TorqueEstimator(RecordingSet* recordings, size_t most_causes)
     ListFaults();
     Select();
   } while (recordings_->DropUnknownGains());
+  if (LowerNoise()) Select();
   if (AddPushes()) {
     excluded_.resize(faults_.size(), false);
     Select();
@@ -179,8 +180,9 @@ void TorqueEstimator::ScaleWhole(const std::vector<CauseTerm>& terms, TorqueFaul
   for (const CauseTerm& term : terms) {
     const TorqueFault& found = faults_[term.candidate];
     const bool is_recorded = found.kind == TorqueFault::kTorqueGain || found.kind == TorqueFault::kOffset ||
-                             found.kind == TorqueFault::kAllOffsets || found.kind == TorqueFault::kDelay ||
-                             found.kind == TorqueFault::kStuckTorque || found.kind == TorqueFault::kPush;
+                             found.kind == TorqueFault::kAllOffsets || found.kind == TorqueFault::kDrift ||
+                             found.kind == TorqueFault::kDelay || found.kind == TorqueFault::kStuckTorque ||
+                             found.kind == TorqueFault::kPush;
     if (is_recorded) continue;
     for (size_t k = 0; k < found.sums.size(); ++k)
       for (ColumnPart part : found.sums[k]) {
@@ -396,6 +398,32 @@ double TorqueEstimator::CalcBlockSize(const VectorXd& left) const {
   constexpr double kFewest = 100.0;
   return std::clamp(within * (1.0 + correlation) / (1.0 - correlation), 1.0,
                     std::max(1.0, rows_.samples / kFewest));
+}
+
+HeldPrediction TorqueEstimator::PredictByCauses(const TorqueRows& held) const {
+  HeldPrediction prediction{CountForced(*recordings_),
+                            CalcRms(held, held.CalcLeft(CalcAmplitudes(selection_.terms)))};
+  for (const CauseTerm& term : selection_.terms) prediction.numbers += term.amplitude.size();
+  return prediction;
+}
+
+HeldPrediction TorqueEstimator::PredictByAll(const TorqueRows& held) const {
+  Index rank = 0;
+  const VectorXd left = held.CalcLeft(FitAmplitudes(Part::kPlain, &rank));
+  return {rank, CalcRms(held, left)};
+}
+
+bool TorqueEstimator::LowerNoise() {
+  const TorqueRows held = MakeTorqueRows(*recordings_, faults_, /*is_held=*/true);
+  if (!PredictByCauses(held).IsBeatenBy(PredictByAll(held))) return false;
+  const VectorXd left = held.CalcLeft(FitAmplitudes(Part::kPlain, nullptr));
+  for (const TorqueRows::Part& part : held.parts) {
+    const double rms = recordings_->weight(part.recording, part.place) *
+                       left.segment(part.begin, part.size).norm() / std::sqrt(std::max(1.0, part.samples));
+    double& noise = recordings_->noise(part.recording, part.place);
+    noise = std::min(noise, rms);
+  }
+  return true;
 }
 
 bool TorqueEstimator::AddPushes() {
