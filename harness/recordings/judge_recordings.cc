@@ -66,6 +66,9 @@ class Judge {
     nothing.head(CountForced(set_)) = estimator_.CalcAmplitudes({}).head(CountForced(set_));
     result_.by_all = estimator_.PredictByAll(held);
     result_.by_causes = estimator_.PredictByCauses(held);
+    result_.has_pushes = std::ranges::any_of(selection.terms, [this](const CauseTerm& term) {
+      return estimator_.faults()[term.candidate].kind == TorqueFault::kPush;
+    });
     const VectorXd held_before = held.CalcLeft(nothing), held_after = held.CalcLeft(amplitudes);
     std::vector<size_t> first_fit, first_held;
     for (size_t recording = 0; recording < set_.size(); ++recording) {
@@ -293,7 +296,7 @@ class Judge {
 }  // namespace
 
 bool RecordingJudgement::IsNoise() const {
-  return !balances.empty() && by_causes.held_left <= kMostNoise &&
+  return !balances.empty() && (has_pushes || by_causes.held_left <= kMostNoise) &&
          std::ranges::all_of(balances,
                              [](const JointJudgement& one) { return one.left <= kMostNoise * one.noise; });
 }

@@ -49,6 +49,7 @@ struct RecordingJudgement {
   /// By the causes; by a plain least-squares fit of all bodies' numbers that the motion determines, friction,
   /// offsets and armatures.
   HeldPrediction by_causes, by_all;
+  bool has_pushes = false;  ///< Some cause begins or ends, in what was held out at an unknown time.
   std::vector<TorqueTrace> traces;
   std::vector<std::string> notes;
   long rows = 0;
@@ -58,7 +59,8 @@ struct RecordingJudgement {
 
   /// Causes that are more than the nearest that is known.
   [[nodiscard]] size_t CountExplaining() const;
-  /// Beside the causes no more than noise is left, in the quarter that was held out as well.
+  /// Beside the causes no more than noise is left, in the quarter that was held out as well but for the begin
+  /// and end of pushes.
   [[nodiscard]] bool IsNoise() const;
   /// A fit of all numbers predicts the quarter that was held out better than the causes do.
   [[nodiscard]] bool IsBeaten() const { return by_causes.IsBeatenBy(by_all); }
