@@ -174,6 +174,35 @@ MatrixXd FindDirections(const RobotModel& model, int joint) {
   return (MatrixXd(3, 3) << first, axis.cross(first), axis).finished();
 }
 
+/// Returns how many samples say something of their own: those that follow one another have similar noise.
+double CountIndependent(const MatrixXd& residuals) {
+  double next = 0.0, all = std::numeric_limits<double>::min();
+  for (Index place = 0; place < residuals.cols(); ++place) {
+    const auto e = residuals.col(place).normalized();
+    next += e.head(e.size() - 1).dot(e.tail(e.size() - 1));
+    all += e.squaredNorm();
+  }
+  constexpr double kMostAlike = 0.98;
+  const double alike = std::clamp(next / all, 0.0, kMostAlike);
+  return static_cast<double>(residuals.rows()) * (1.0 - alike) / (1.0 + alike);
+}
+
+/// Says how well the motion determines a fault's numbers. @param H their information, of residuals of norm 1
+/// at each joint. @param samples of these that say something of their own.
+void SetErrors(const MatrixXd& H, double samples, const MatrixXd& axes, NonlinearFault* fault) {
+  VectorXd along = VectorXd::Ones(1);
+  if (fault->number == Number::kGain || fault->number == Number::kClock) along[0] = CalcValue(*fault);
+  if (fault->IsOfModel())
+    along = fault->number == Number::kPlacement ? VectorXd(fault->shift)
+                                                : VectorXd(axes.leftCols(H.cols()).transpose() * fault->turn);
+  const double size = CalcValue(*fault), least = CalcSymmetricEigenvalues(H)[0];
+  if (fault->IsOfModel()) along.normalize();
+  fault->fault.error = std::sqrt(along.dot(SolveLeastSquares(H, along)) / samples);
+  constexpr double kShown = 0.1;
+  fault->shows_all = least * samples > 1.0 / Square(kShown * size);
+  if (!fault->shows_all) fault->fault.error = 0.0;
+}
+
 /// Moves a fault's numbers to where it explains most, by Gauss and Newton's method. @param every of so many
 /// samples one counts. @param settled the misfit that a step less gains. @return the misfit there.
 double Refine(const RobotModel& model, size_t every, double settled, Samples* samples,
@@ -196,12 +225,7 @@ double Refine(const RobotModel& model, size_t every, double settled, Samples* sa
       J.col(k) = ((samples->CalcResiduals(near, every) * weights.asDiagonal()).reshaped() - e) / kDifference;
     }
     MatrixXd H = J.transpose() * J;
-    // Each joint's residual has the norm 1: this is how far noise may move the direction that shows least.
-    const double weakest =
-        1.0 / std::sqrt(static_cast<double>(residuals.rows()) *
-                        std::max(CalcSymmetricEigenvalues(H)[0], std::numeric_limits<double>::min()));
-    constexpr double kShown = 0.1;
-    fault->shows_all = weakest < kShown * std::abs(CalcValue(*fault));
+    SetErrors(H, CountIndependent(residuals), axes, fault);
     // A direction that the motion does not show stays as it is.
     H.diagonal().array() += kUnseen * H.diagonal().maxCoeff();
     const VectorXd step = -SolveLeastSquares(H, J.transpose() * e);
@@ -227,6 +251,11 @@ bool IsPlausible(const NonlinearFault& fault) {
   constexpr double kFarthest = 0.3, kMostTurn = 0.5;  // m, rad
   // A clock runs a little fast or slow, or has another rate.
   constexpr double kDrift = 0.05, kLeastDrift = 1e-3, kLeastGain = 2e-3;
+  // What is no more than a few standard errors is noise.
+  constexpr double kErrors = 5.0;
+  const double off =
+      fault.fault.value - (fault.number == Number::kGain || fault.number == Number::kClock ? 1.0 : 0.0);
+  if (fault.number != Number::kNone && std::abs(off) < kErrors * fault.fault.error) return false;
   const double octaves = fault.clock > 0.0 ? std::log2(fault.clock) : 0.5;
   return fault.shift.norm() <= kFarthest && fault.turn.norm() <= kMostTurn &&
          std::abs(octaves - std::round(octaves)) <= kDrift &&
@@ -268,9 +297,16 @@ std::optional<NonlinearFault> FindNonlinearFault(const RobotModel& model, Record
   constexpr double kMuch = 1.1, kMuchOfNumber = 0.1;
   const double as_read = CalcMisfit(samples.CalcResiduals({}, 1));
   double best = as_read;
+  const auto count = static_cast<double>(samples.size());
+  const auto numbers_cost = [&](const NonlinearFault& fault) {
+    return fault.number == Number::kNone
+               ? 0.0
+               : static_cast<double>(fault.CountNumbers()) * (2.0 + 0.5 * std::log(count)) / count;
+  };
   std::optional<NonlinearFault> found;
   for (auto& [of_few, fault] : faults) {
-    const double misfit = Refine(model, 1, kWell, &samples, &fault);
+    // Numbers pay by the Bayesian information criterion: degrees are degrees, and no gain of 57.2.
+    const double misfit = Refine(model, 1, kWell, &samples, &fault) + numbers_cost(fault);
     const double most = as_read - (fault.number != Number::kNone ? kMuchOfNumber : kMuch);
     if (misfit < std::min(best, most) && IsPlausible(fault)) best = misfit, found = std::move(fault);
   }
