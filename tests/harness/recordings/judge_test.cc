@@ -152,6 +152,27 @@ TEST(Judge, ASpringIsNamed) {
   EXPECT_TRUE(NamesOnly(Judge(Record({spring})), "spring", "joint panda_joint2", 5.0));
 }
 
+TEST(Judge, DrivesOfWhichOneNumberIsOffAreNamed) {
+  const RecordedFault drag = {.act = [](double, const mjModel&, mjData* data) {
+    data->qfrc_applied[1] -= 4.0 * data->qvel[1] * std::abs(data->qvel[1]);
+  }};
+  const RecordedFault drift = {.record = [](RecordedTable* table) {
+    for (size_t i = 0; i < table->rows(); ++i)
+      table->Get("tau.panda_joint4")[i] += 0.1 * table->Get("time")[i];
+  }};
+  EXPECT_TRUE(NamesOnly(Judge(Record({drag})), "friction that grows with the square of the velocity",
+                        "joint panda_joint2", 4.0));
+  EXPECT_TRUE(NamesOnly(Judge(Record({drift})), "torque drift", "joint panda_joint4", 0.1));
+  RecordedTable table = Record({}, /*has_velocities=*/true);
+  ScaleColumns("qd.panda_joint3", 1.04, &table);
+  EXPECT_TRUE(NamesOnly(Judge(table), "velocity gain", "joint panda_joint3", 1.04));
+  // A stretch that the logger repeats makes no gain.
+  std::vector<double>& q = table.Get("q.panda_joint3");
+  std::fill(q.begin() + 3000, q.begin() + 4000, q[3000]);
+  const Fault first = Judge(table).causes.front().faults.front();
+  EXPECT_EQ(first.place + ": " + first.fault, "joint panda_joint3: velocity");
+}
+
 TEST(Judge, FewNumbersPredictWhatIsHeldOut) {
   const RecordingJudgement judgement = Judge(Record({DryFriction(1, 1.5), DryFriction(3, 1.0)}));
   // The simulator's dry friction turns over a velocity, which is a number of its own.
