@@ -82,9 +82,7 @@ std::string LinkFrames::NameOf(const std::string& link) const {
 LinkFrames ListLinkFrames(const RobotDescription& robot) {
   LinkFrames frames;
   for (const DescribedJoint& joint : robot.joints) frames.X_iL.push_back(joint.X_iL);
-  frames.kind = robot.format == RobotFormat::kUrdf   ? "link frame"
-                : robot.format == RobotFormat::kMjcf ? "body frame"
-                                                     : "row frame";
+  frames.kind = robot.format == RobotFormat::kMjcf ? "body frame" : "link frame";
   frames.file = fs::path(robot.spec.source).filename().string();
   return frames;
 }

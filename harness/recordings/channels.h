@@ -39,7 +39,7 @@ struct Channel {
 /// The frames in which a file gives its links' bodies.
 struct LinkFrames {
   std::vector<Pose> X_iL;        ///< By link, in frame i; empty where they are the frames i.
-  std::string kind = "frame i";  ///< "link frame", "body frame" or "row frame".
+  std::string kind = "frame i";  ///< "link frame" or "body frame".
   std::string file;              ///< Its name.
 
   [[nodiscard]] Pose Find(int link) const {

@@ -37,23 +37,25 @@ void AddCauses(const RecordingJudgement& judgement, Answer* answer) {
     if (one.outcome != CauseOutcome::kNotExplained || one.faults.empty())
       answer->causes.push_back(one.Describe());
     else if (!std::isnan(one.faults.front().value))
-      nearest += fmt::format("{}{} ({:.0f} %)", nearest.empty() ? "not explained; nearest: " : ", ",
-                             one.faults.front().Describe(), 100.0 * std::min(1.0, one.fraction));
+      nearest += fmt::format("{}{} ({:.0f} %)", nearest.empty() ? "" : ", ", one.faults.front().Describe(),
+                             100.0 * std::min(1.0, one.fraction));
   }
-  if (!nearest.empty()) answer->remarks.push_back(nearest);
+  if (!nearest.empty()) answer->remarks.push_back("nearest, but not shown to be causes: " + nearest);
   if (judgement.causes.empty()) return;
   if (judgement.explained > kLeast)
     answer->remarks.push_back(
-        fmt::format("{} {:.4g} % of the difference; {:.2g} times the noise remains",
+        fmt::format("{} {:.4g} % of the difference; the rest is {:.2g} times the noise",
                     answer->causes.empty() ? "the nearest would explain" : "the causes explain",
                     100.0 * judgement.explained, judgement.left));
   // A short recording is not divided: nothing is held out.
-  if (judgement.by_all.held_left > 0.0)
+  const HeldPrediction &causes = judgement.by_causes, &all = judgement.by_all;
+  if (all.held_left > 0.0)
     answer->remarks.push_back(fmt::format(
-        "in a quarter that was held out, {:.2g} times the noise remains beside {} number{}, and "
-        "{:.2g} times beside {} numbers of bodies, frictions, offsets and armatures",
-        judgement.by_causes.held_left, judgement.by_causes.numbers,
-        judgement.by_causes.numbers == 1 ? "" : "s", judgement.by_all.held_left, judgement.by_all.numbers));
+        "test on a held-out quarter: {} number{} of the causes leave{} {:.2g} times the noise, all {} "
+        "numbers of "
+        "the model {:.2g} times{}",
+        causes.numbers, causes.numbers == 1 ? "" : "s", causes.numbers == 1 ? "s" : "", causes.held_left,
+        all.numbers, all.held_left, judgement.IsBeaten() ? ": some cause is missing" : ""));
 }
 
 }  // namespace

@@ -404,6 +404,10 @@ HeldPrediction TorqueEstimator::PredictByCauses(const TorqueRows& held) const {
   HeldPrediction prediction{CountForced(*recordings_),
                             CalcRms(held, held.CalcLeft(CalcAmplitudes(selection_.terms)))};
   for (const CauseTerm& term : selection_.terms) prediction.numbers += term.amplitude.size();
+  double squares = 0.0;
+  for (const TorqueRows::Part& part : held.parts)
+    squares += part.samples * Square(CalcInexact(part) / recordings_->noise(part.recording, part.place));
+  prediction.inexact = std::sqrt(squares / std::max(1.0, held.samples));
   return prediction;
 }
 
@@ -421,9 +425,17 @@ bool TorqueEstimator::LowerNoise() {
     const double rms = recordings_->weight(part.recording, part.place) *
                        left.segment(part.begin, part.size).norm() / std::sqrt(std::max(1.0, part.samples));
     double& noise = recordings_->noise(part.recording, part.place);
-    noise = std::min(noise, rms);
+    noise = std::min(noise, std::hypot(rms, CalcInexact(part)));
   }
   return true;
+}
+
+double TorqueEstimator::CalcInexact(const TorqueRows::Part& part) const {
+  constexpr double kFraction = 1e-3;
+  const Index torque =
+      part.balance->Find(part.place, {TorqueColumn::kTorque, recordings_->joints()[part.place]});
+  const MatrixXd& products = part.balance->products(part.place);
+  return kFraction * std::sqrt(products(torque, torque) / std::max(1.0, part.samples));
 }
 
 bool TorqueEstimator::AddPushes() {
