@@ -182,9 +182,9 @@ double CountIndependent(const MatrixXd& residuals) {
     next += e.head(e.size() - 1).dot(e.tail(e.size() - 1));
     all += e.squaredNorm();
   }
-  constexpr double kMostAlike = 0.98;
-  const double alike = std::clamp(next / all, 0.0, kMostAlike);
-  return static_cast<double>(residuals.rows()) * (1.0 - alike) / (1.0 + alike);
+  constexpr double kMost = 0.98;
+  const double correlation = std::clamp(next / all, 0.0, kMost);
+  return static_cast<double>(residuals.rows()) * (1.0 - correlation) / (1.0 + correlation);
 }
 
 /// Says how well the motion determines a fault's numbers. @param H their information, of residuals of norm 1
@@ -251,7 +251,7 @@ bool IsPlausible(const NonlinearFault& fault) {
   constexpr double kFarthest = 0.3, kMostTurn = 0.5;  // m, rad
   // A clock runs a little fast or slow, or has another rate.
   constexpr double kDrift = 0.05, kLeastDrift = 1e-3, kLeastGain = 2e-3;
-  // What is no more than a few standard errors is noise.
+  // A few standard errors are noise.
   constexpr double kErrors = 5.0;
   const double off =
       fault.fault.value - (fault.number == Number::kGain || fault.number == Number::kClock ? 1.0 : 0.0);
@@ -310,7 +310,7 @@ std::optional<NonlinearFault> FindNonlinearFault(const RobotModel& model, Record
     const double most = as_read - (fault.number != Number::kNone ? kMuchOfNumber : kMuch);
     if (misfit < std::min(best, most) && IsPlausible(fault)) best = misfit, found = std::move(fault);
   }
-  // What friction and an offset would take away may show the numbers better.
+  // Torques that friction and an offset would take away may show the numbers better.
   if (found && found->number != Number::kNone && !samples.has_currents()) {
     NonlinearFault other = *found;
     samples.TrustDrives();

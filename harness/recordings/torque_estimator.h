@@ -17,7 +17,7 @@ inline constexpr double kMostNoise = 2.0;
 struct HeldPrediction {
   long numbers = 0;
   double held_left = 0.0;  ///< Root mean square of the rest, in units of noise.
-  /// What integrators and derivatives may be off without any noise, in units of noise: a thousandth of the
+  /// Errors of integrators and derivatives without any noise, in units of noise: a thousandth of the
   /// torques.
   double inexact = 0.0;
 
@@ -101,7 +101,7 @@ class TorqueEstimator {
   /// Lowers the noise to what a fit of all numbers leaves of the quarter that was held out, where that
   /// predicts better than the selection: the search ended too early. @return whether it does.
   bool LowerNoise();
-  /// Returns what integrators and derivatives may be off without any noise in a joint's torque, N m or N.
+  /// Returns the error of a joint's torque by integrators and derivatives without any noise, N m or N.
   [[nodiscard]] double CalcInexact(const TorqueRows::Part& part) const;
   /// Adds what may have pushed for a while; false when nothing stands out.
   bool AddPushes();
