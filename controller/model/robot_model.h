@@ -126,6 +126,8 @@ struct Joint {
   // those of all joints, of which CalcCouplingMap (harness/descriptions) takes those that are free.
   double dry_friction = 0.0;  ///< Coulomb friction, N m or N.
   std::optional<JointCoupling> coupling;
+  /// Axes of the link's own frame, in which the file gives its body, in frame i.
+  Matrix3d R_iL = Matrix3d::Identity();
 };
 
 /// A frame fixed to a link; a fingertip when it carries a sphere.

@@ -231,7 +231,7 @@ class TreeReader {
                             FromOwnFrame(parent, is_plain ? X_LB * row.X_before : X_LB), row.mdh, entry.lower,
                             entry.upper, entry.damping.value_or(0.0), entry.armature.value_or(0.0),
                             has_own_frame ? ExpressIn(link.body, row.written.X_iL) : link.body,
-                            entry.dry_friction.value_or(0.0), std::nullopt});
+                            entry.dry_friction.value_or(0.0), std::nullopt, row.written.X_iL.linear()});
     if (entry.mimic) mimics_.emplace(index, Mimic{&*entry.mimic, chain.prefix});
     rows_.push_back(row.written);
     rows_.back().states_damping = entry.damping.has_value();

@@ -1,7 +1,5 @@
 #include "harness/diagnosis/force_points.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <utility>
 
@@ -67,7 +65,6 @@ const Body* FindBody(const std::vector<Body>& bodies, const std::string& place) 
 Candidate MakeCandidate(const Body& body, const Vector3d& p) {
   Candidate candidate = *body.force;
   candidate.fault = kForceAtPoint;
-  candidate.detail = fmt::format("at ({:.4g}, {:.4g}, {:.4g}) m of its centre of mass", p.x(), p.y(), p.z());
   candidate.columns = body.AtPoint(p);
   candidate.parameters = 3;
   candidate.fitted = p;

@@ -91,7 +91,7 @@ bool ForceProblem::ExplainConstant(const Segment& segment, Causes* causes) {
   Causes found =
       DescribeSelection(StartExplanation(store_, CauseChannel::kBalance, segment), selection, candidates_,
                         [&](const Candidate& one, const VectorXd& amplitude, const VectorXd& error) {
-                          return MakeForceFault(one, amplitude, error, forces_->model().gravity());
+                          return MakeForceFault(one, amplitude, error, forces_->model());
                         });
   for (size_t i = 0; i < found.size(); ++i) {
     const CauseTerm& term = selection.terms[i];
@@ -117,8 +117,8 @@ bool ForceProblem::ExplainJoint(const Segment& segment, const CauseSelection& se
     if (!is_joint && (is_exact_ || !leaves_noise)) continue;
     Explanation one = DescribeFree(segment, torque);
     for (const CauseTerm& term : selection.terms)
-      one.faults.push_back(MakeForceFault(candidates_[term.candidate], term.amplitude, term.error,
-                                          forces_->model().gravity()));
+      one.faults.push_back(
+          MakeForceFault(candidates_[term.candidate], term.amplitude, term.error, forces_->model()));
     causes->push_back(one);
     return true;
   }

@@ -95,6 +95,29 @@ bool Jumps(const std::vector<DifferingStep>& steps, size_t k) {
   return (steps[k].apart.array() > (kJump * around.array()).max(kJumpNoise)).any();
 }
 
+/// Returns the axes of a link's own frame in frame i; of what is no link, its own.
+Matrix3d FindLinkAxes(const std::string& place, const RobotModel& model) {
+  const auto joint =
+      std::ranges::find_if(model.joints(), [&](const Joint& one) { return place == "link " + one.link; });
+  return joint == model.joints().end() ? Matrix3d(Matrix3d::Identity()) : joint->R_iL;
+}
+
+/// Turns vectors and tensors of a body from frame i.
+VectorXd TurnToLink(const Candidate& candidate, VectorXd a, const Matrix3d& R_Li) {
+  const auto turn = [&](Index at) { a.segment<3>(at) = (R_Li * a.segment<3>(at)).eval(); };
+  if (candidate.fault == "payload") {
+    turn(1);
+  } else if (candidate.fault == "inertia") {
+    a.head<6>() = ToEntries(R_Li * ToTensor(a.head<6>()) * R_Li.transpose());
+  } else if (candidate.fault == kCenter || candidate.fault == kCenterAlone ||
+             candidate.fault == kForceInAxes || candidate.fault == kMomentInAxes ||
+             candidate.fault == kForceAtPointInAxes) {
+    turn(0);
+    if (candidate.fault == kForceAtPointInAxes) turn(3);
+  }
+  return a;
+}
+
 }  // namespace
 
 double CalcGrowthBegin(const VectorXd& a, double end) {
@@ -102,8 +125,11 @@ double CalcGrowthBegin(const VectorXd& a, double end) {
   return end - a.head(size).dot(a.tail(size)) / a.head(size).squaredNorm();
 }
 
-Fault MakeForceFault(const Candidate& candidate, const VectorXd& a, const VectorXd& error,
-                     const Vector3d& gravity) {
+Fault MakeForceFault(const Candidate& candidate, const VectorXd& amplitude, const VectorXd& error,
+                     const RobotModel& model) {
+  const Vector3d& gravity = model.gravity();
+  const Matrix3d R_Li = FindLinkAxes(candidate.place, model).transpose();
+  const VectorXd a = TurnToLink(candidate, amplitude, R_Li);
   if (candidate.fault.ends_with(kGrows)) return MakeGrowing(candidate, a, error);
   Fault fault{candidate.fault,          candidate.place,
               candidate.nominal + a[0], error.size() > 0 ? error[0] : 0.0,
@@ -127,7 +153,8 @@ Fault MakeForceFault(const Candidate& candidate, const VectorXd& a, const Vector
     fault.value = a.head(size).norm();
     if (error.size() >= size) fault.error = error.head(size).norm();
     fault.detail = ShowVector(a.head(size));
-    if (candidate.fault == kForceAtPoint) fault.detail += " " + candidate.detail;
+    if (candidate.fault == kForceAtPoint)
+      fault.detail += " at " + ShowVector(R_Li * candidate.fitted) + " m of its centre of mass";
     if (candidate.fault == kForceAtPointInAxes) {
       const Vector3d f = a.head<3>();
       fault.fault = kForceAtPoint;

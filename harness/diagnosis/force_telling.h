@@ -12,9 +12,10 @@ namespace dexcheck {
 /// When a push was nothing, s. @param a what it grows by a second, and its size at time `end`.
 double CalcGrowthBegin(const VectorXd& a, double end);
 
-/// @param a its amplitudes. @param error their standard errors; empty for none. @param gravity the model's.
-Fault MakeForceFault(const Candidate& candidate, const VectorXd& a, const VectorXd& error,
-                     const Vector3d& gravity);
+/// Describes a fault; vectors of a body are in the link's own axes, as its file gives them.
+/// @param amplitude its amplitudes. @param error their standard errors; empty for none.
+Fault MakeForceFault(const Candidate& candidate, const VectorXd& amplitude, const VectorXd& error,
+                     const RobotModel& model);
 
 /// Steps of a store that differ.
 using Segment = std::vector<Eigen::Index>;

@@ -10,6 +10,7 @@
 #include "harness/diagnosis/force_telling.h"
 #include "harness/injection/drawn_faults.h"
 #include "tests/common/matchers.h"
+#include "tests/common/paper_robot.h"
 
 namespace dexcheck::testing::causes_test {
 namespace {
@@ -63,9 +64,21 @@ TEST(ExplanationTest, IsToldInALine) {
 // Gravity of another size along itself has one amplitude, and the name of one that points elsewhere.
 TEST(ForceFaultTest, SizeOfGravityIsGravity) {
   const Candidate candidate{.fault = force_fault::kGravitySize, .place = "world", .unit = "m/s^2"};
-  const Fault fault = MakeForceFault(candidate, VectorXd::Constant(1, -0.3), VectorXd::Constant(1, 0.01),
-                                     Vector3d(0.0, 0.0, -9.81));
+  const Fault fault =
+      MakeForceFault(candidate, VectorXd::Constant(1, -0.3), VectorXd::Constant(1, 0.01), ReadPanda());
   EXPECT_EQ(fault.Describe(), "world: gravity off by 0.3 +- 0.01 m/s^2 (0, 0, 0.3)");
+}
+
+TEST(ForceFaultTest, VectorsAreInTheAxesOfTheLinksFile) {
+  RobotSpec robot = ReadPanda().spec();
+  robot.joints[2].R_iL = Eigen::AngleAxisd(0.5 * kPi, Vector3d::UnitX()).toRotationMatrix();
+  const std::string place = "link " + robot.joints[2].link;
+  const auto describe = [&](const char* fault, const VectorXd& a) {
+    return MakeForceFault({.fault = fault, .place = place}, a, {}, RobotModel(robot)).detail;
+  };
+  EXPECT_EQ(describe(force_fault::kCenterAlone, Vector3d(0.0, 0.0, 0.01)), "(0, 0.01, 0)");
+  EXPECT_EQ(describe("inertia", Vector6d::Unit(2)), "(0, 1, 0, 0, 0, 0)");
+  EXPECT_EQ(describe("force", Vector3d(0.0, 0.0, 1.0)), "(0, 0, 1)") << "in world axes";
 }
 
 TEST(ExplanationTest, SameKindAndPlaceIsOneName) {
