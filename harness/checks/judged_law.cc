@@ -258,7 +258,8 @@ class JudgedJointLaw final : public JudgedLaw {
       force_ = terms.gravity + coulomb_ + viscous_;
     } else {
       force_.noalias() += *terms.M * desired_.q_ddot;
-      force_.noalias() += *terms.C * (desired_.q_dot - terms.xi);
+      demand_ = desired_.q_dot - terms.xi;
+      force_.noalias() += *terms.C * demand_;
     }
     force_ += gains_.K.cwiseProduct(position_error_);
     force_ += gains_.D.cwiseProduct(velocity_error_);

@@ -122,12 +122,15 @@ TEST(ClosedLoop, StepsWithoutAllocation) {
   const std::vector<std::string> real = {"sensing.latency=0.003",          "sensing.object_latency=0.002",
                                          "sensing.object_velocity=kalman", "sensing.object_acceleration=5",
                                          "actuation.coulomb=0.001",        "actuation.lag=0.001"};
+  const std::vector<std::string> friction = {"control.law=feedforward_pd", "control.coulomb=0.5",
+                                             "expect={}"};
   const std::pair<const char*, std::vector<std::string>> kRuns[] = {{"curve", {}},
                                                                     {"curve", {"plant.type=rigid"}},
                                                                     {"curve", {"plant.type=rigid_euler"}},
                                                                     {"curve", {"control.law=impedance"}},
                                                                     {"curve-real", real},
-                                                                    {"panda-reach", {}}};
+                                                                    {"panda-reach", {}},
+                                                                    {"panda-reach", friction}};
   for (const auto& [scenario, overrides] : kRuns) {
     SCOPED_TRACE(::testing::PrintToString(overrides));
     const ShippedRun run(scenario, overrides);
