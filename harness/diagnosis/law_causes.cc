@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <iterator>
 #include <limits>
 #include <utility>
 
@@ -19,75 +20,54 @@ using Eigen::Index;
 constexpr double kZero =
     1e-6;  // a value nearer to zero than this part of the right one is that of what is missing
 
-/// Factors of parts of the law, of which several may act on one torque: all torques' and one joint's, that of
-/// a sum and that of one of its summands.
-class LawFactors {
- public:
-  LawFactors(std::span<const LawPartName> names, const LawCandidates& all)
-      : names_(names), terms_(all.terms()), candidates_(all.candidates()) {}
+/// Whether one factor acts on all that the other one acts on: all torques' and one joint's, that of a sum and
+/// that of one of its summands.
+bool Holds(const LawTerm& one, const LawTerm& other) {
+  const unsigned parts = other.entry->parts;
+  const bool is_there = one.place_name() == other.place_name() || one.place_name() == "law";
+  return !one.IsLike(other) && is_there && parts != 0 && (parts & one.entry->parts) == parts;
+}
 
-  /// A factor that several have in common is no alternative to one of them.
-  void DropAlternatives(CauseSelection* selection) const {
-    for (CauseTerm& term : selection->terms) {
-      std::erase_if(term.same, [&](const auto& same) {
-        return std::ranges::any_of(selection->terms, [&](const CauseTerm& other) {
-          return &other != &term &&
-                 (Holds(other.candidate, same.first) || Holds(same.first, other.candidate));
-        });
+/// A factor that several have in common is no alternative to one of them.
+void DropAlternatives(LawExplanation* found) {
+  for (size_t i = 0; i < found->terms.size(); ++i)
+    std::erase_if(found->same[i], [&](const LawTerm& same) {
+      return std::ranges::any_of(found->terms, [&](const LawTerm& other) {
+        return !other.IsLike(found->terms[i]) && (Holds(other, same) || Holds(same, other));
       });
+    });
+}
+
+/// The fault's whole factor, and what it is of: what others have of it apart is theirs.
+void MakeWhole(const LawTerm& one, const std::vector<LawTerm>& terms, std::span<const LawPartName> names,
+               Fault* fault) {
+  constexpr std::string_view kOf = "law of ";
+  unsigned rest = one.entry->parts;
+  std::string joints;
+  for (const LawTerm& other : terms) {
+    if (Holds(other, one)) fault->value *= 1.0 + other.sizes[0];
+    if (!Holds(one, other)) continue;
+    if (other.place_name() == one.place_name()) {
+      rest &= ~other.entry->parts;
+    } else if (other.entry->parts == one.entry->parts) {
+      joints += (joints.empty() ? "" : ", ") + other.place_name().substr(kOf.size());
+    } else {
+      fault->detail +=
+          (fault->detail.empty() ? "but for " : ", ") + other.place_name() + ": " + other.entry->fault;
     }
   }
-
-  /// The candidate's whole factor, and what it is of: what others of the selection have of it apart is
-  /// theirs. @param is_sum whether their effects are added, and not those of one on what the other leaves.
-  void MakeWhole(const Candidate& one, const CauseSelection& selection, bool is_sum, Fault* fault) const {
-    const auto index = static_cast<size_t>(&one - candidates_.data());
-    unsigned rest = GetParts(index);
-    std::string joints;
-    for (const CauseTerm& term : selection.terms) {
-      const size_t other = term.candidate;
-      if (other == index) continue;
-      if (Holds(other, index)) fault->value += (is_sum ? 1.0 : fault->value) * term.amplitude[0];
-      if (!Holds(index, other)) continue;
-      const Candidate& apart = candidates_[other];
-      if (apart.place == one.place) {
-        rest &= ~GetParts(other);
-      } else if (GetParts(other) == GetParts(index)) {
-        joints += (joints.empty() ? "" : ", ") + apart.place.substr(kOf.size());
-      } else {
-        fault->detail += (fault->detail.empty() ? "but for " : ", ") + apart.place + ": " + apart.fault;
-      }
-    }
-    if (!joints.empty()) fault->place += " of all but " + joints;
-    const auto name = std::ranges::find(names_, rest, &LawPartName::parts);
-    if (rest != GetParts(index) && name != names_.end()) fault->fault = NameFactor(*name);
-    if (std::abs(fault->value) < kZero) fault->value = 0.0;
-  }
-
-  static std::string NameFactor(const LawPartName& name) {
-    return std::string(name.name) + " (" + name.symbol + "), factor";
-  }
-
- private:
-  static constexpr std::string_view kAll = "law", kOf = "law of ";
-  [[nodiscard]] unsigned GetParts(size_t candidate) const { return terms_[candidate].entry->parts; }
-  /// Whether one factor acts on all that the other one acts on.
-  [[nodiscard]] bool Holds(size_t one, size_t other) const {
-    const bool is_there =
-        candidates_[one].place == candidates_[other].place || candidates_[one].place == kAll;
-    return one != other && is_there && GetParts(other) != 0 &&
-           (GetParts(other) & GetParts(one)) == GetParts(other);
-  }
-
-  std::span<const LawPartName> names_;
-  std::span<const LawTerm> terms_;
-  std::span<const Candidate> candidates_;
-};
+  if (!joints.empty()) fault->place += " of all but " + joints;
+  const auto name = std::ranges::find(names, rest, &LawPartName::parts);
+  if (rest != one.entry->parts && name != names.end())
+    fault->fault = std::string(name->name) + " (" + name->symbol + "), factor";
+  if (std::abs(fault->value) < kZero) fault->value = 0.0;
+}
 
 /// A fault of several numbers without a unit has no size, and neither has one that is there as a whole.
-Fault DescribeLaw(const Candidate& one, const LawTerm& term, const VectorXd& error) {
+Fault DescribeLaw(const LawTerm& term, double error) {
   const LawEntry& entry = *term.entry;
-  Fault fault = DescribeNumber(one, term.sizes, entry.force && !entry.is_whole ? error : VectorXd());
+  Fault fault{entry.fault, term.place_name(), entry.nominal + term.sizes[0], error, entry.unit, ""};
+  if (!entry.force || entry.is_whole) fault.error = 0.0;
   if (entry.shape_unit != nullptr) {
     fault.fault += " " + FormatNumber(term.sizes.tail<1>()[0], 6) + " " + entry.shape_unit;
   } else if (entry.is_vector) {
@@ -97,103 +77,82 @@ Fault DescribeLaw(const Candidate& one, const LawTerm& term, const VectorXd& err
     fault.error = 0.0;
     fault.detail =
         FormatVector((term.sizes.array().abs() < kRounding * fault.value).select(0.0, term.sizes), kDigits);
-  } else if (one.unit.empty() && (entry.is_whole || term.sizes.size() > 1)) {
+  } else if (entry.unit.empty() && (entry.is_whole || term.sizes.size() > 1)) {
     fault.value = kNaN;
-  } else if (std::abs(fault.value) < kZero * std::abs(one.nominal)) {
+  } else if (std::abs(fault.value) < kZero * std::abs(entry.nominal)) {
     fault.value = 0.0;
   }
   return fault;
 }
 
+/// One explanation for each fault, the one that explains most first.
+Causes DescribeAll(const Explanation& start, const LawProblem& problem, const LawExplanation& found,
+                   std::span<const LawPartName> names) {
+  const LawProblem::Steps& steps = problem.fitted();
+  const VectorXd y = problem.GetDifferences(steps);
+  const MatrixXd slopes = problem.CalcSlopes(found.terms, steps, problem.CalcChanges(found.terms, steps));
+  const VectorXd scale = slopes.colwise().norm().cwiseMax(std::numeric_limits<double>::min());
+  const MatrixXd scaled = slopes * scale.cwiseInverse().asDiagonal();
+  const VectorXd squares =
+      scale.size() > 0 ? VectorXd(CalcPseudoinverse(scaled.transpose() * scaled).diagonal()) : scale;
+  const VectorXd errors = squares.cwiseMax(0.0).cwiseSqrt().cwiseQuotient(scale);
+  const auto describe = [&](const LawTerm& term, double error) {
+    Fault fault = DescribeLaw(term, error);
+    if (term.entry->nominal == 1.0 && term.entry->unit.empty()) MakeWhole(term, found.terms, names, &fault);
+    return fault;
+  };
+  Causes causes;
+  Index first = 0;
+  for (size_t i = 0; i < found.terms.size(); ++i) {
+    const LawTerm& term = found.terms[i];
+    std::vector<LawTerm> others = found.terms;
+    others.erase(others.begin() + static_cast<std::ptrdiff_t>(i));
+    Explanation& one = causes.emplace_back(start);
+    one.fraction = others.empty() ? 1.0 - found.left * static_cast<double>(y.size()) / y.squaredNorm()
+                                  : (y - problem.CalcChanges(others, steps)).squaredNorm() / y.squaredNorm();
+    one.left = std::sqrt(found.left);
+    one.faults.push_back(describe(term, term.CountNumbers() > 0 ? errors[first] : 0.0));
+    first += term.CountNumbers();
+    if (!found.same.empty())
+      for (const LawTerm& same : found.same[i]) one.faults.push_back(describe(same, 0.0));
+    one.SetOutcome();
+  }
+  std::ranges::stable_sort(causes, std::greater<>(), &Explanation::fraction);
+  return causes;
+}
+
 /// Causes of a law's differences, and whether they explain all but noise.
 struct FoundCauses {
   Causes causes;
-  bool holds = false;
+  bool is_enough = false;
 };
-
-/// A search's explanation as a selection of candidates.
-CauseSelection MakeSelection(const LawProblem& problem, const LawExplanation& found, LawCandidates* all) {
-  const VectorXd y = problem.GetDifferences(problem.fitted());
-  const MatrixXd slopes =
-      problem.CalcSlopes(found.terms, problem.fitted(), problem.CalcChanges(found.terms, problem.fitted()));
-  const VectorXd errors = CalcPseudoinverse(slopes.transpose() * slopes).diagonal().cwiseMax(0.0).cwiseSqrt();
-  const auto size = [](const LawTerm& term) {
-    return term.entry->force ? term.sizes : VectorXd(VectorXd::Ones(1));
-  };
-  CauseSelection selection;
-  selection.left = std::sqrt(found.left);
-  selection.fraction = 1.0 - found.left * static_cast<double>(y.size()) / y.squaredNorm();
-  Index first = 0;
-  for (size_t i = 0; i < found.terms.size(); ++i) {
-    const LawTerm& one = found.terms[i];
-    CauseTerm& term = selection.terms.emplace_back();
-    term.candidate = all->Find(one);
-    term.amplitude = size(one);
-    term.error = errors.segment(first, one.CountNumbers());
-    first += one.CountNumbers();
-    std::vector<LawTerm> others = found.terms;
-    others.erase(others.begin() + static_cast<std::ptrdiff_t>(i));
-    term.fraction = (y - problem.CalcChanges(others, problem.fitted())).squaredNorm() / y.squaredNorm();
-    for (const LawTerm& same : found.same[i]) term.same.emplace_back(all->Find(same), size(same));
-  }
-  std::ranges::sort(selection.terms, std::greater<>(), &CauseTerm::fraction);
-  return selection;
-}
 
 FoundCauses ExplainLaw(const StepStore& store, const Explanation& start, double noise) {
   const LawProblem problem(store, noise);
-  const VectorXd y = problem.GetDifferences(problem.fitted());
-  LawCandidates all(store, problem);
-  const auto get_term = [&](size_t candidate, const VectorXd& amplitude) {
-    LawTerm term = all.terms()[candidate];
-    if (term.entry->force) term.sizes = amplitude;
-    return term;
-  };
-  CauseSelection selection = SelectCauses(y, all.candidates(), {.most_terms = 4, .restarts = 0});
-  VectorXd left = problem.GetDifferences(problem.aside());
-  LawExplanation sum;
-  for (const CauseTerm& term : selection.terms) {
-    sum.terms.push_back(get_term(term.candidate, term.amplitude));
-    left -= problem.CalcChanges({sum.terms.back()}, problem.aside());
-  }
+  const std::vector<LawPlace> places = ListLawPlaces(store.setup());
+  std::vector<LawEntry> entries = ListLawEntries(store.setup(), store.law());
+  std::vector<std::string> names;
+  for (const SignalName& motor : store.motors())
+    names.push_back("law of " + motor.place.substr(sizeof("motor ") - 1));
+  std::ranges::move(ListTorqueEntries(store.setup().model(), names, problem.steps()),
+                    std::back_inserter(entries));
+  LawExplanation found = FindLawFaults(problem, entries, places);
   // Many faults would make what is little more than noise.
   constexpr double kMuch = 10.0;
-  const bool shows = noise == 1.0 || y.squaredNorm() > kMuch * kMuch * static_cast<double>(y.size());
-  FoundCauses result;
-  result.holds = shows && IsExplained(problem, sum.terms, selection.left * selection.left, left) &&
-                 (!sum.terms.empty() || problem.is_single());
-  bool is_sum = true;
-  if (shows && (!result.holds || sum.terms.size() > 1)) {
-    const Index cost = result.holds ? sum.CalcCost() : std::numeric_limits<Index>::max();
-    const LawExplanation found = FindLawFaults(problem, all, cost);
-    is_sum = found.terms.empty();
-    if (!is_sum) selection = MakeSelection(problem, found, &all);
-    result.holds = result.holds || !is_sum;
-  }
-  const LawFactors factors(store.law()->ListParts(), all);
-  factors.DropAlternatives(&selection);
-  result.causes =
-      DescribeSelection(start, selection, all.candidates(),
-                        [&](const Candidate& one, const VectorXd& amplitude, const VectorXd& error) {
-                          const auto index = static_cast<size_t>(&one - all.candidates().data());
-                          Fault fault = DescribeLaw(one, get_term(index, amplitude), error);
-                          if (one.nominal == 1.0 && one.unit.empty())
-                            factors.MakeWhole(one, selection, is_sum, &fault);
-                          return fault;
-                        });
+  const VectorXd y = problem.GetDifferences(problem.fitted());
+  found.is_enough =
+      found.is_enough && (noise == 1.0 || y.squaredNorm() > kMuch * kMuch * static_cast<double>(y.size()));
+  if (found.is_enough) DropAlternatives(&found);
+  FoundCauses result{DescribeAll(start, problem, found, store.law()->ListParts()), found.is_enough};
   if (problem.is_single()) {
     result.causes.push_back(start);
     result.causes.back().faults = {{"torques of single precision", "law", kNaN, 0.0, "", ""}};
   }
-  if (result.holds) return result;
+  if (result.is_enough) return result;
   // The nearest stands for all.
   result.causes.resize(1, start);
-  Explanation& one = result.causes.front();
-  one.outcome = CauseOutcome::kNotExplained;
-  one.faults.resize(std::min<size_t>(one.faults.size(), 1));
-  one.rival.clear();
-  one.fraction = selection.fraction;
-  one.left = selection.left;
+  result.causes.front().outcome = CauseOutcome::kNotExplained;
+  result.causes.front().faults.resize(std::min<size_t>(result.causes.front().faults.size(), 1));
   return result;
 }
 
@@ -210,9 +169,9 @@ Causes ExplainLaw(const StepStore& store) {
   FoundCauses exact = ExplainLaw(store, start, 1.0);
   // A law that has the engine's numbers differs from one that has the model's by the digits that these lack.
   const double tolerated = CalcBound(*FindCheck("law_torque"), store.setup().scenario()) / kLawTorqueBound;
-  if (exact.holds || tolerated == 1.0) return std::move(exact.causes);
+  if (exact.is_enough || tolerated == 1.0) return std::move(exact.causes);
   FoundCauses rough = ExplainLaw(store, start, tolerated);
-  return std::move(rough.holds ? rough.causes : exact.causes);
+  return std::move(rough.is_enough ? rough.causes : exact.causes);
 }
 
 }  // namespace dexcheck

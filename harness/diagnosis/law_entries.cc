@@ -35,17 +35,20 @@ Eigen::Index FindFirstDriven(const RobotModel& model) {
   return model.base().type == BaseType::kFloating ? model.num_base_velocities() : 0;
 }
 
+double CalcSign(double rate) { return rate == 0.0 ? 0.0 : std::copysign(1.0, rate); }
+
 struct JointTorque {
   const char* fault;
+  const char* unit;  // of a joint that turns
+  const char* unit_of_slide;
   double (*size)(double rate);  // of an amplitude of 1
 };
 constexpr JointTorque kJointTorques[] = {
-    {"torque", [](double) { return 1.0; }},
-    {"viscous friction", [](double rate) { return -rate; }},
-    {"compensation of viscous friction", [](double rate) { return rate; }},
-    {"dry friction", [](double rate) { return rate == 0.0 ? 0.0 : std::copysign(1.0, -rate); }},
-    {"compensation of dry friction",
-     [](double rate) { return rate == 0.0 ? 0.0 : std::copysign(1.0, rate); }}};
+    {"torque", "N m", "N", [](double) { return 1.0; }},
+    {"viscous friction", "N m s/rad", "N s/m", [](double rate) { return -rate; }},
+    {"compensation of viscous friction", "N m s/rad", "N s/m", [](double rate) { return rate; }},
+    {"dry friction", "N m", "N", [](double rate) { return -CalcSign(rate); }},
+    {"compensation of dry friction", "N m", "N", CalcSign}};
 
 }  // namespace
 
@@ -111,8 +114,22 @@ const VectorXd& LawAtStep::demand() const {
   if (demand_.size() > 0) return demand_;
   LawInputs heavier = inputs;
   heavier.M *= 2.0;
-  demand_ = step.inputs.M.ldlt().solve(CalcChange(heavier));
+  demand_ = inputs.M.ldlt().solve(CalcChange(heavier));
   return demand_;
+}
+
+bool LawTerm::CanBe() const {
+  constexpr double kPlausible = 300.0;   // of factors, which are units mistaken at the most
+  constexpr double kMostReversed = 3.0;  // of factors of the other sign
+  if (entry->plausible > 0.0 && sizes.cwiseAbs().maxCoeff() >= entry->plausible) return false;
+  if (entry->is_positive) return sizes[0] >= 0.0;
+  const bool is_factor = entry->nominal == 1.0 && entry->unit.empty();
+  return !is_factor || (std::abs(sizes[0]) < kPlausible && 1.0 + sizes[0] > -kMostReversed);
+}
+
+VectorXd LawTerm::CalcChange(const ActuationMap& actuation, const LawAtStep& at) const {
+  const VectorXd change = entry->change ? entry->change(at, sizes) : VectorXd(entry->force(at) * sizes);
+  return place != nullptr ? KeepAt(actuation, *place, change) : change;
 }
 
 LawEntry& LawEntryList::Add(const std::string& fault, std::function<MatrixXd(const LawAtStep&)> force) {
@@ -277,7 +294,7 @@ void LawEntryList::AddJointTorques() {
                 return size(at.inputs.terms.xi[i]) * own;
               });
       entry.place = "law of " + NameEntry(model_, i);
-      entry.unit = slides ? "N" : "N m";
+      entry.unit = slides ? kind.unit_of_slide : kind.unit;
       entry.is_positive = &kind != &kJointTorques[0];
     }
   }

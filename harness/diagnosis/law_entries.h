@@ -71,11 +71,27 @@ struct LawEntry {
   bool is_vector = false;  ///< Its sizes are a vector; otherwise the first one alone is shown.
   /// Unit of the last size, where that is part of the name.
   const char* shape_unit = nullptr;
+};
 
-  /// E_bar' (tau' - tau'_printed) (n) of some sizes.
-  [[nodiscard]] VectorXd CalcChange(const LawAtStep& at, const VectorXd& sizes) const {
-    return change ? change(at, sizes) : VectorXd(force(at) * sizes);
+/// A fault of a law with its sizes.
+struct LawTerm {
+  const LawEntry* entry = nullptr;
+  const LawPlace* place = nullptr;  ///< Torques that alone have it; null for all.
+  VectorXd sizes;
+
+  [[nodiscard]] const std::string& place_name() const {
+    return place != nullptr ? place->name : entry->place;
   }
+  /// Whether both are one fault at one place.
+  [[nodiscard]] bool IsLike(const LawTerm& other) const {
+    return entry == other.entry && place == other.place;
+  }
+  /// Numbers that are not known beforehand.
+  [[nodiscard]] Eigen::Index CountNumbers() const { return entry->is_whole ? 0 : sizes.size(); }
+  /// Whether the fault can have its sizes.
+  [[nodiscard]] bool CanBe() const;
+  /// The force that it adds to a law (n).
+  [[nodiscard]] VectorXd CalcChange(const ActuationMap& actuation, const LawAtStep& at) const;
 };
 
 /// All but those that the torques themselves show. @param law of the run; outlives the entries.

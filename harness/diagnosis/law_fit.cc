@@ -90,11 +90,6 @@ MatrixXd LawProblem::CalcColumns(const LawPlace* place, const Steps& steps,
   return columns;
 }
 
-VectorXd LawProblem::CalcChange(const LawAtStep& at, const LawTerm& fault) const {
-  const VectorXd change = fault.entry->CalcChange(at, fault.sizes);
-  return fault.place != nullptr ? KeepAt(actuation_, *fault.place, change) : change;
-}
-
 VectorXd LawProblem::CalcChanges(const std::vector<LawTerm>& faults, const Steps& steps) const {
   const Index n = model_.num_velocities();
   VectorXd all(n * static_cast<Index>(steps.size()));
@@ -123,28 +118,36 @@ MatrixXd LawProblem::CalcSlopes(std::vector<LawTerm> faults, const Steps& steps,
   return all;
 }
 
+VectorXd LawProblem::CalcScale(const LawTerm& fault, const MatrixXd& columns) {
+  VectorXd scale = columns.colwise().norm().cwiseMax(std::numeric_limits<double>::min());
+  // A direction of a vector that shows no more than rounding stays as it is.
+  if (fault.entry->plausible > 0.0 && scale.size() > 0) scale.setConstant(scale.maxCoeff());
+  return scale;
+}
+
+VectorXd LawProblem::Solve(const MatrixXd& columns, const VectorXd& scale, const VectorXd& y,
+                           double independent) {
+  Eigen::CompleteOrthogonalDecomposition<MatrixXd> solver;
+  solver.setThreshold(independent);
+  return solver.compute(columns * scale.cwiseInverse().asDiagonal()).solve(y).cwiseQuotient(scale);
+}
+
 double LawProblem::Fit(const Steps& steps, int iterations, std::vector<LawTerm>* faults) const {
   const VectorXd y = GetDifferences(steps);
   VectorXd changes = CalcChanges(*faults, steps), left = y - changes;
   constexpr double kEnough = 1e-3;  // of less than that nothing is left to gain
   for (int k = 0; k < iterations && left.squaredNorm() > kEnough * static_cast<double>(y.size()); ++k) {
-    MatrixXd slopes = CalcSlopes(*faults, steps, changes);
+    const MatrixXd slopes = CalcSlopes(*faults, steps, changes);
     if (slopes.cols() == 0) break;
-    // A direction of a vector that shows no more than rounding stays as it is.
     VectorXd scale(slopes.cols());
     Index first = 0;
     for (const LawTerm& fault : *faults) {
       const Index numbers = fault.CountNumbers();
-      const double largest = slopes.middleCols(first, numbers).colwise().norm().maxCoeff();
-      scale.segment(first, numbers).setConstant(std::max(largest, std::numeric_limits<double>::min()));
+      scale.segment(first, numbers) = CalcScale(fault, slopes.middleCols(first, numbers));
       first += numbers;
     }
-    slopes *= scale.cwiseInverse().asDiagonal();
-    Eigen::CompleteOrthogonalDecomposition<MatrixXd> solver;
     constexpr double kIndependent = 1e-10;  // less is rounding
-    solver.setThreshold(kIndependent);
-    solver.compute(slopes);
-    VectorXd step = solver.solve(left).cwiseQuotient(scale);
+    VectorXd step = Solve(slopes, scale, left, kIndependent);
     bool is_better = false;
     constexpr int kHalvings = 4;
     for (int half = 0; half < kHalvings && !is_better; ++half, step *= 0.5) {

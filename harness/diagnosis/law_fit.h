@@ -10,20 +10,6 @@
 
 namespace dexcheck {
 
-/// A fault of a law with its sizes.
-struct LawTerm {
-  const LawEntry* entry = nullptr;
-  const LawPlace* place = nullptr;  ///< Torques that alone have it; null for all.
-  VectorXd sizes;
-
-  /// Whether both are one fault at one place.
-  [[nodiscard]] bool IsLike(const LawTerm& other) const {
-    return entry == other.entry && place == other.place;
-  }
-  /// Numbers that are not known beforehand.
-  [[nodiscard]] Eigen::Index CountNumbers() const { return entry->is_whole ? 0 : sizes.size(); }
-};
-
 /// Steps at which the torques were not the law's, and what the explanation of their difference needs.
 class LawProblem {
  public:
@@ -33,7 +19,6 @@ class LawProblem {
   LawProblem(const StepStore& store, double noise);
 
   [[nodiscard]] const std::vector<const LawSnapshot*>& steps() const { return steps_; }
-  [[nodiscard]] const ActuationMap& actuation() const { return actuation_; }
   /// Whether the torques have the digits of single precision alone.
   [[nodiscard]] bool is_single() const { return is_single_; }
   /// Steps to which explanations are fitted; some of these; and those in which explanations have to hold.
@@ -57,21 +42,25 @@ class LawProblem {
     for (const LawTerm& fault : faults)
       laws.push_back([&, &fault = fault, &before = laws.back()](const LawInputs& inputs) -> VectorXd {
         const bool is_right = &fault == faults.data() && &inputs == &right.inputs;
-        if (is_right && right.force.size() > 0) return right.force + CalcChange(right, fault);
+        if (is_right && right.force.size() > 0) return right.force + fault.CalcChange(actuation_, right);
         const LawAtStep at(right.step, inputs, before);
         if (at.force.size() == 0) return {};
-        return at.force + CalcChange(at, fault);
+        return at.force + fault.CalcChange(actuation_, at);
       });
     if (faults.empty()) return use(right);
     use(LawAtStep(right.step, right.inputs, laws.back()));
   }
-  /// The force that a fault adds to a law (n).
-  [[nodiscard]] VectorXd CalcChange(const LawAtStep& at, const LawTerm& fault) const;
   /// The whitened force that these faults together add to the right law (n steps).
   [[nodiscard]] VectorXd CalcChanges(const std::vector<LawTerm>& faults, const Steps& steps) const;
   /// The derivatives of that by the numbers (n steps x numbers). @param changes CalcChanges of these.
   [[nodiscard]] MatrixXd CalcSlopes(std::vector<LawTerm> faults, const Steps& steps,
                                     const VectorXd& changes) const;
+  /// The sizes of a fault's columns: a vector's are of one size.
+  [[nodiscard]] static VectorXd CalcScale(const LawTerm& fault, const MatrixXd& columns);
+  /// The shortest sizes, in units of `scale`, of columns that leave least of y. @param independent part of a
+  /// column beside others that counts.
+  [[nodiscard]] static VectorXd Solve(const MatrixXd& columns, const VectorXd& scale, const VectorXd& y,
+                                      double independent);
   /// Moves the numbers to where these faults leave least of the differences, by Gauss and Newton. @return the
   /// mean square of that.
   double Fit(const Steps& steps, int iterations, std::vector<LawTerm>* faults) const;

@@ -1,10 +1,12 @@
 #pragma once
 
-// Faults of a law that act on each other: the effect of both is not the sum of their effects.
+// The faults of a law that explain its differences. Those that act on each other are fitted together: the
+// effect of both is not the sum of their effects.
 
+#include <span>
 #include <vector>
 
-#include "harness/diagnosis/law_candidates.h"
+#include "harness/diagnosis/law_fit.h"
 
 namespace dexcheck {
 
@@ -13,19 +15,13 @@ struct LawExplanation {
   std::vector<LawTerm> terms;
   /// By term, what would do in its place.
   std::vector<std::vector<LawTerm>> same;
-  double left = 0.0;  ///< Mean square of the remainder.
-
-  /// The faults and their numbers.
-  [[nodiscard]] Eigen::Index CalcCost() const;
+  double left = 0.0;       ///< Mean square of the remainder.
+  bool is_enough = false;  ///< Whether that is no more than noise, in the steps that are set aside, too.
 };
 
-/// Whether faults explain the differences. @param left mean square of what they leave of those that are
-/// fitted. @param aside what they leave of the others.
-bool IsExplained(const LawProblem& problem, const std::vector<LawTerm>& faults, double left,
-                 const VectorXd& aside);
-
-/// Looks for the fewest faults, three at the most, of which one is beside the other in the law: all are
-/// fitted together. @return without terms where none explains the differences at a lower cost.
-LawExplanation FindLawFaults(const LawProblem& problem, const LawCandidates& all, Eigen::Index cost);
+/// Looks for the fewest faults, three at the most, each at one of these places or of all torques. @return the
+/// one that leaves least where none explains the differences.
+LawExplanation FindLawFaults(const LawProblem& problem, std::span<const LawEntry> entries,
+                             std::span<const LawPlace> places);
 
 }  // namespace dexcheck

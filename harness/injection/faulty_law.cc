@@ -68,9 +68,9 @@ VectorXd FaultyLaw::CalcChange(const MeasuredState& state) {
   if (fault_) {
     const LawForce right = [this](const LawInputs& inputs) { return law_.law->CalcForce(inputs); };
     const LawAtStep at(snapshot_, snapshot_.inputs, right, snapshot_.inputs.now.force);
-    const VectorXd force =
-        law_.entries[fault_->entry].CalcChange(at, VectorXd::Constant(1, fault_->amplitude));
-    return fault_->place ? KeepAt(actuation_, *fault_->place, force) : force;
+    const LawTerm term{&law_.entries[fault_->entry], fault_->place ? &*fault_->place : nullptr,
+                       VectorXd::Constant(1, fault_->amplitude)};
+    return term.CalcChange(actuation_, at);
   }
   LawInputs wrong = snapshot_.inputs;
   ReadTerms(*model_, state.q, state.xi, &wrong.terms);

@@ -26,12 +26,12 @@ bool KnowsMotion(const FaultContext& context) {
 
 using IsWanted = bool (*)(const FaultContext& context, const LawEntry& entry);
 
-/// Places in the list of those entries that a kind is of.
-std::vector<size_t> ListEntries(const FaultContext& context, const ScenarioLaw& law, IsWanted is_wanted) {
+/// A place in the list of those entries that a kind is of.
+size_t DrawEntry(const FaultContext& context, const ScenarioLaw& law, IsWanted is_wanted) {
   std::vector<size_t> wanted;
   for (size_t i = 0; i < law.entries.size(); ++i)
     if (is_wanted(context, law.entries[i])) wanted.push_back(i);
-  return wanted;
+  return wanted[context.draw->Index(wanted.size())];
 }
 
 /// Factors of the law's parts; of laws other than the paper's those that all of them have.
@@ -61,11 +61,10 @@ LawPlace DrawPlace(const FaultContext& context) {
 
 InjectedFault Part(const FaultContext& context) {
   const ScenarioLaw law(context.setup);
-  const std::vector<size_t> parts = ListEntries(context, law, IsPart);
   const LawPlace place = DrawPlace(context);
   const bool is_of_one = place.name != "law";
-  size_t part = parts[context.draw->Index(parts.size())];
-  while (is_of_one && IsSum(law, law.entries[part])) part = parts[context.draw->Index(parts.size())];
+  size_t part = DrawEntry(context, law, IsPart);
+  while (is_of_one && IsSum(law, law.entries[part])) part = DrawEntry(context, law, IsPart);
   return MakeLawFault(law.entries[part], part, DrawFactor(context) - 1.0,
                       is_of_one ? std::optional(place) : std::nullopt);
 }
@@ -75,8 +74,7 @@ bool IsGain(const FaultContext& /*context*/, const LawEntry& entry) {
 }
 InjectedFault Gain(const FaultContext& context) {
   const ScenarioLaw law(context.setup);
-  const std::vector<size_t> gains = ListEntries(context, law, IsGain);
-  const size_t gain = gains[context.draw->Index(gains.size())];
+  const size_t gain = DrawEntry(context, law, IsGain);
   return MakeLawFault(law.entries[gain], gain, context.draw->Size(1e-3, 0.3), std::nullopt);
 }
 
@@ -94,8 +92,7 @@ bool IsFriction(const FaultContext& /*context*/, const LawEntry& entry) {
 InjectedFault Torque(const FaultContext& context) {
   const ScenarioLaw law(context.setup);
   const bool is_friction = !KnowsMotion(context) && context.draw->Index(2) == 0;
-  const std::vector<size_t> torques = ListEntries(context, law, is_friction ? IsFriction : IsTorque);
-  const size_t torque = torques[context.draw->Index(torques.size())];
+  const size_t torque = DrawEntry(context, law, is_friction ? IsFriction : IsTorque);
   const double size = is_friction ? context.draw->Positive(1e-2, 1.0) : context.draw->Size(1e-3, 0.1);
   return MakeLawFault(law.entries[torque], torque, size, std::nullopt);
 }
