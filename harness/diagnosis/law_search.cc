@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <iterator>
 #include <limits>
 #include <utility>
@@ -14,8 +13,9 @@ namespace {
 
 using Eigen::Index;
 
-constexpr size_t kFitted = 40, kFirsts = 40, kPairs = 40, kSeeds = 8, kNext = 10, kWidened = 3;
-
+// Faults whose sizes are searched that are fitted alone, faults beside which others are looked for, of many
+// faults fewer, sets that are fitted, and pairs beside which a third is looked for.
+constexpr size_t kAlone = 40, kFirsts = 40, kFewFirsts = 8, kNear = 8, kFitted = 40, kWidened = 3;
 constexpr double kVisible = 1e-7;  // part of a column beside others that shows
 
 /// The columns of a fault that are independent of each other.
@@ -24,6 +24,13 @@ Index CountRank(const LawTerm& fault, const MatrixXd& columns) {
   Eigen::ColPivHouseholderQR<MatrixXd> solver;
   solver.setThreshold(kVisible);
   return solver.compute(columns * LawProblem::CalcScale(fault, columns).cwiseInverse().asDiagonal()).rank();
+}
+
+/// Orthonormal columns of the same range.
+MatrixXd FindRange(const MatrixXd& columns) {
+  if (columns.cols() == 0) return columns;
+  const Eigen::ColPivHouseholderQR<MatrixXd> solver(columns);
+  return solver.householderQ() * MatrixXd::Identity(columns.rows(), solver.rank());
 }
 
 /// The square of what columns leave of y, both beside the orthonormal Q.
@@ -38,64 +45,51 @@ double CalcLeft(const MatrixXd& Q, MatrixXd columns, const VectorXd& rest) {
 class LawSearch {
  public:
   LawSearch(const LawProblem& problem, std::span<const LawEntry> entries, std::span<const LawPlace> places)
-      : problem_(problem),
-        entries_(entries),
-        places_(places),
-        whole_y_(problem.GetDifferences(problem.fitted())),
-        y_(problem.GetDifferences(problem.few())) {}
+      : problem_(problem), entries_(entries), places_(places), y_(problem.GetDifferences(problem.fitted())) {}
 
   LawExplanation Run() {
-    if (const LawExplanation none{.left = whole_y_.squaredNorm() / static_cast<double>(whole_y_.size())};
+    if (const LawExplanation none{.left = y_.squaredNorm() / static_cast<double>(y_.size())};
         problem_.is_single() && Explains(none))
       found_.push_back(none);
     for (const LawEntry& entry : entries_)
       if (entry.force) AddLinear(entry);
     DropRepeated();
-    for (size_t i = 0; i < effects_.size(); ++i) AddSingle(i);
-    std::vector<LawExplanation> fitted, pairs, triples;
-    Widen({}, kFitted, &fitted);
-    for (const LawExplanation& one : fitted) {
-      effects_.push_back({one.terms.front(), problem_.CalcChanges(one.terms, problem_.fitted())});
-      AddSingle(effects_.size() - 1);
-    }
-    std::ranges::stable_sort(singles_, {}, &Single::score);
-    if (found_.empty()) pairs = FitPairs();
-    for (size_t i = 0; i < std::min(kSeeds, singles_.size()) && found_.empty() && !are_many(); ++i)
-      Widen(singles_[i].one, kNext, &pairs);
-    std::ranges::sort(pairs, {}, &LawExplanation::left);
-    for (size_t i = 0; i < std::min(kWidened, pairs.size()) && found_.empty() && !are_many(); ++i)
-      Widen(pairs[i], kNext, &triples);
-    return Choose();
+    constexpr size_t kMany = 600;
+    are_many_ = effects_.size() > kMany;
+    std::vector<LawExplanation> singles, pairs, triples;
+    for (const Effect& one : effects_) AddSingle(one, &singles);
+    AddStarts();
+    Widen({LawExplanation()}, kAlone, &singles);
+    KeepBest(are_many_ ? kFewFirsts : kFirsts, &singles);
+    if (found_.empty()) Widen(singles, kFitted, &pairs);
+    KeepBest(kWidened, &pairs);
+    if (found_.empty()) Widen(pairs, kFitted, &triples);
+    // Where nothing explains the differences, the likeliest single fault is the nearest.
+    return found_.empty() && !singles.empty() ? singles.front() : Choose();
   }
 
  private:
   static constexpr int kFine = 20;  // iterations
-  /// Whether there are so many faults that only some of them are looked at beside others.
-  [[nodiscard]] bool are_many() const {
-    constexpr size_t kMany = 600;
-    return effects_.size() > kMany;
-  }
-  /// The effect of a fault alone in the steps that are fitted.
+  /// The effect of a fault alone in the steps that are fitted: of sizes of 1, or by the changes of sizes at
+  /// which they are searched.
   struct Effect {
     LawTerm term;
-    MatrixXd columns;  // of sizes of 1, or of a fault that is not linear its whole effect
-  };
-  struct Proposal {
-    LawTerm term;
-    double score;
-  };
-  struct Single {
-    size_t effect;
-    LawExplanation one;
-    double score;
+    MatrixXd columns;
   };
 
-  void AddLinear(const LawEntry& entry) {
+  /// Forces of sizes of 1 in a law that has other faults.
+  [[nodiscard]] std::vector<MatrixXd> CalcForces(const LawEntry& entry,
+                                                 const std::vector<LawTerm>& beside) const {
     std::vector<MatrixXd> forces;
     for (const size_t step : problem_.fitted())
-      problem_.At(step, {}, [&](const LawAtStep& at) { forces.push_back(entry.force(at)); });
+      problem_.At(step, beside, [&](const LawAtStep& at) { forces.push_back(entry.force(at)); });
+    return forces;
+  }
+
+  void AddLinear(const LawEntry& entry) {
+    const std::vector<MatrixXd> forces = CalcForces(entry, {});
     const Index p = forces.front().cols();
-    if (2 * p > whole_y_.size()) return;  // it would explain anything
+    if (2 * p > y_.size()) return;  // it would explain anything
     const auto add = [&](const LawPlace* place) {
       MatrixXd columns = problem_.CalcColumns(place, problem_.fitted(), forces);
       if (columns.squaredNorm() > 0.0)
@@ -121,7 +115,7 @@ class LawSearch {
       if (product * product < 0.5 * square * other.squaredNorm()) return false;  // saves time
       const VectorXd part = VectorXd::Constant(1, product / square);
       if (!((other - part[0] * column).norm() < kSame * other.norm())) return false;
-      const VectorXd size = part * (other.dot(whole_y_) / other.squaredNorm());
+      const VectorXd size = part * (other.dot(y_) / other.squaredNorm());
       return is_sum || LawTerm{a.term.entry, nullptr, size}.CanBe();
     };
     std::vector<Effect> kept;
@@ -132,70 +126,89 @@ class LawSearch {
   }
 
   /// Adds the explanation by one fault alone.
-  void AddSingle(size_t effect) {
-    const MatrixXd& columns = effects_[effect].columns;
-    LawTerm term = effects_[effect].term;
+  void AddSingle(const Effect& effect, std::vector<LawExplanation>* singles) {
+    LawTerm term = effect.term;
     VectorXd part = VectorXd::Ones(1);
-    if (term.entry->force && !term.entry->is_whole)
+    if (!term.entry->is_whole)
       term.sizes = part =
-          LawProblem::Solve(columns, LawProblem::CalcScale(term, columns), whole_y_, kVisible);
-    const auto rows = static_cast<double>(whole_y_.size());
-    LawExplanation one{.terms = {term}, .left = (whole_y_ - columns * part).squaredNorm() / rows};
+          LawProblem::Solve(effect.columns, LawProblem::CalcScale(term, effect.columns), y_, kVisible);
     if (!term.CanBe()) return;
-    const double score = CalcScore(one.left, term.CountNumbers(), rows);
-    if (term.entry->force && Explains(one)) found_.push_back(one);
-    singles_.push_back({effect, std::move(one), score});
+    const double square = (y_ - effect.columns * part).squaredNorm();
+    LawExplanation one{.terms = {std::move(term)}, .left = square / static_cast<double>(y_.size())};
+    if (Explains(one)) found_.push_back(one);
+    singles->push_back(std::move(one));
   }
 
-  /// Two faults of which the sum of the effects leaves least, fitted together.
-  std::vector<LawExplanation> FitPairs() {
-    struct Pair {
-      size_t first, second;
-      double score;
-    };
-    std::vector<Pair> pairs;
-    const auto rows = static_cast<double>(whole_y_.size());
-    for (size_t k = 0; k < std::min(are_many() ? kSeeds : kFirsts, singles_.size()); ++k) {
-      const size_t i = singles_[k].effect;
-      const Eigen::ColPivHouseholderQR<MatrixXd> first(effects_[i].columns);
-      const MatrixXd Q = first.householderQ() * MatrixXd::Identity(whole_y_.size(), first.rank());
-      const VectorXd beside = whole_y_ - Q * (Q.transpose() * whole_y_);
-      for (size_t j = 0; j < effects_.size() && !SearchLimit::IsOver(); ++j) {
-        const Index numbers = effects_[i].columns.cols() + effects_[j].columns.cols();
-        const double left = CalcLeft(Q, effects_[j].columns, beside) / rows;
-        if (i != j && std::isfinite(left)) pairs.push_back({i, j, CalcScore(left, numbers, rows)});
+  /// Adds the faults whose sizes are searched.
+  void AddStarts() {
+    for (const LawEntry& entry : entries_) {
+      for (const VectorXd& start : entry.starts) {
+        if (SearchLimit::IsOver()) return;
+        const std::vector<LawTerm> fault = {{&entry, nullptr, start}};
+        const VectorXd changes = problem_.CalcChanges(fault, problem_.fitted());
+        const MatrixXd slopes = problem_.CalcSlopes(fault, problem_.fitted(), changes);
+        MatrixXd columns(y_.size(), 1 + slopes.cols());
+        columns << changes, slopes;
+        effects_.push_back({fault.front(), std::move(columns)});
       }
     }
-    std::ranges::sort(pairs, {}, &Pair::score);
-    std::vector<LawExplanation> fitted;
-    for (size_t k = 0; k < std::min(kPairs, pairs.size()) && !SearchLimit::IsOver(); ++k)
-      Fit(std::numeric_limits<double>::infinity(),
-          {.terms = {effects_[pairs[k].first].term, effects_[pairs[k].second].term}}, &fitted);
-    return fitted;
   }
 
-  /// Adds the likeliest faults beside those of an explanation, each fitted together with these.
-  void Widen(const LawExplanation& one, size_t count, std::vector<LawExplanation>* next) {
-    std::vector<Proposal> proposals = Propose(one.terms);
-    std::ranges::sort(proposals, {}, &Proposal::score);
-    constexpr double kHopeless = 0.5;  // of what was left
-    for (size_t i = 0; i < std::min(count, proposals.size()) && !SearchLimit::IsOver(); ++i) {
-      LawExplanation wider = one;
-      wider.terms.push_back(std::move(proposals[i].term));
-      Fit(one.terms.empty() ? std::numeric_limits<double>::infinity() : kHopeless * one.left,
-          std::move(wider), next);
+  /// Keeps the likeliest.
+  void KeepBest(size_t count, std::vector<LawExplanation>* all) const {
+    std::ranges::stable_sort(*all, {},
+                             [&](const LawExplanation& one) { return CalcScore(one.left, one.terms); });
+    if (all->size() > count) all->resize(count);
+  }
+
+  /// Adds a fault to one of some explanations, those that by their effects leave least, and fits all
+  /// together.
+  void Widen(const std::vector<LawExplanation>& all, size_t count, std::vector<LawExplanation>* next) {
+    struct Proposal {
+      std::vector<LawTerm> terms;
+      double score;
+    };
+    std::vector<Proposal> proposals;
+    std::vector<MatrixXd> forces;
+    for (const LawExplanation& one : all) {
+      const VectorXd changes = problem_.CalcChanges(one.terms, problem_.fitted());
+      const MatrixXd Q = FindRange(problem_.CalcSlopes(one.terms, problem_.fitted(), changes));
+      const VectorXd rest = y_ - changes, beside = rest - Q * (Q.transpose() * rest);
+      const bool is_near = !are_many_ && !one.terms.empty() && &one < all.data() + kNear;
+      const LawEntry* last = nullptr;
+      for (const Effect& effect : effects_) {
+        if (SearchLimit::IsOver()) return;
+        const LawEntry& entry = *effect.term.entry;
+        const bool is_known = one.terms.empty() && entry.force;
+        if (is_known || Contains(one.terms, effect.term)) continue;
+        // Those of one fault at all its places follow each other.
+        if (is_near && entry.force && &entry != last) forces = CalcForces(entry, one.terms);
+        last = &entry;
+        const MatrixXd columns = is_near && entry.force
+                                     ? problem_.CalcColumns(effect.term.place, problem_.fitted(), forces)
+                                     : effect.columns;
+        Proposal wider{one.terms, 0.0};
+        wider.terms.push_back(effect.term);
+        const double left = CalcLeft(Q, columns, beside) / static_cast<double>(y_.size());
+        wider.score = CalcScore(left, wider.terms);
+        if (std::isfinite(left)) proposals.push_back(std::move(wider));
+      }
     }
+    std::ranges::stable_sort(proposals, {}, &Proposal::score);
+    if (proposals.size() > count) proposals.resize(count);
+    for (Proposal& one : proposals)
+      if (!SearchLimit::IsOver()) Fit({.terms = std::move(one.terms)}, next);
   }
 
-  /// Fits the faults together, and keeps them where they leave less than `most`.
-  void Fit(double most, LawExplanation one, std::vector<LawExplanation>* next) {
+  /// Fits the faults together.
+  void Fit(LawExplanation one, std::vector<LawExplanation>* next) {
     // Faults of the torques themselves act last, as in the list.
     std::ranges::sort(one.terms, {}, [](const LawTerm& term) { return term.entry; });
     if (one.terms.size() > 1 && !IsNew(one)) return;
     constexpr int kRough = 3;
     problem_.Fit(problem_.few(), kRough, &one.terms);
     one.left = problem_.Fit(problem_.fitted(), kFine, &one.terms);
-    if (!(one.left < most) || !std::ranges::all_of(one.terms, &LawTerm::CanBe)) return;
+    if (!std::ranges::all_of(one.terms, &LawTerm::CanBe)) return;
     if (Explains(one)) {
       DropNeedless(&one);
       found_.push_back(one);
@@ -218,46 +231,6 @@ class LawSearch {
     }
   }
 
-  /// All faults beside those of an explanation, with how likely each is by its derivative.
-  [[nodiscard]] std::vector<Proposal> Propose(const std::vector<LawTerm>& terms) const {
-    const LawProblem::Steps& steps = problem_.few();
-    const VectorXd changes = problem_.CalcChanges(terms, steps), rest = y_ - changes;
-    MatrixXd Q = problem_.CalcSlopes(terms, steps, changes);
-    if (Q.cols() > 0) Q = MatrixXd(Q.householderQr().householderQ() * MatrixXd::Identity(Q.rows(), Q.cols()));
-    const VectorXd beside = rest - Q * (Q.transpose() * rest);
-    std::vector<Proposal> proposals;
-    const auto add = [&](const LawTerm& term, const MatrixXd& columns, const VectorXd& what) {
-      const auto rows = static_cast<double>(y_.size());
-      const double left = CalcLeft(Q, columns, what) / rows;
-      if (std::isfinite(left)) proposals.push_back({term, CalcScore(left, 1 + term.sizes.size(), rows)});
-    };
-    const LawEntry* last = nullptr;
-    std::vector<MatrixXd> forces(steps.size());
-    for (const Effect& one : effects_) {
-      if (terms.empty()) break;  // these are known alone
-      const LawTerm& term = one.term;
-      const LawEntry& entry = *term.entry;
-      // Those of one fault at all its places follow each other.
-      for (size_t k = 0; k < steps.size() && (&entry != last || entry.change); ++k)
-        problem_.At(steps[k], terms, [&](const LawAtStep& at) {
-          forces[k] = entry.force ? entry.force(at) : MatrixXd(entry.change(at, term.sizes));
-        });
-      last = &entry;
-      if (!Contains(terms, term)) add(term, problem_.CalcColumns(term.place, steps, forces), beside);
-    }
-    for (const LawEntry& entry : entries_) {
-      for (const VectorXd& start : entry.starts) {
-        std::vector<LawTerm> wider = terms;
-        wider.push_back({&entry, nullptr, start});
-        const VectorXd others = problem_.CalcChanges(wider, steps), other = y_ - others;
-        const MatrixXd slopes = problem_.CalcSlopes(wider, steps, others).rightCols(start.size());
-        add(wider.back(), slopes, other - Q * (Q.transpose() * other));
-        if (start.isZero() && !terms.empty()) break;  // that far the others are no better
-      }
-    }
-    return proposals;
-  }
-
   static bool Contains(const std::vector<LawTerm>& terms, const LawTerm& term) {
     return std::ranges::any_of(terms, [&](const LawTerm& one) { return one.IsLike(term); });
   }
@@ -269,9 +242,12 @@ class LawSearch {
     return std::ranges::count(seen_, key) == 1;
   }
 
-  /// Minus twice the logarithm of the likelihood, with what each number costs. @param left mean square.
-  static double CalcScore(double left, Index numbers, double rows) {
-    return rows * std::log(1.0 + left) + static_cast<double>(numbers) * std::log(rows);
+  /// Minus twice the logarithm of the likelihood, with what faults and their numbers cost. @param left mean
+  /// square.
+  [[nodiscard]] double CalcScore(double left, const std::vector<LawTerm>& terms) const {
+    const auto rows = static_cast<double>(y_.size());
+    return rows * std::log(1.0 + left) +
+           static_cast<double>(static_cast<Index>(terms.size()) + CountNumbers(terms)) * std::log(rows);
   }
 
   [[nodiscard]] bool Explains(const LawExplanation& one) const {
@@ -282,7 +258,7 @@ class LawSearch {
     Index most = 0;
     for (const LawTerm& fault : one.terms) most = std::max(most, fault.CountNumbers());
     const Index numbers = CountNumbers(one.terms);
-    if (numbers > 1 && kRowsPerNumber * (3 * numbers - 2 * most) > whole_y_.size()) return false;
+    if (numbers > 1 && kRowsPerNumber * (3 * numbers - 2 * most) > y_.size()) return false;
     if (!(one.left <= kMostLeft * kMostLeft)) return false;
     const VectorXd aside =
         problem_.GetDifferences(problem_.aside()) - problem_.CalcChanges(one.terms, problem_.aside());
@@ -309,7 +285,7 @@ class LawSearch {
 
   /// The one of least cost, and what others have in the place of one of its faults.
   LawExplanation Choose() {
-    if (found_.empty()) return singles_.empty() ? LawExplanation{} : singles_.front().one;
+    if (found_.empty()) return {};
     std::vector<Index> costs;
     for (const LawExplanation& one : found_) costs.push_back(CalcCost(one));
     const auto least = std::ranges::min_element(costs);
@@ -335,10 +311,10 @@ class LawSearch {
   const LawProblem& problem_;
   std::span<const LawEntry> entries_;
   std::span<const LawPlace> places_;
-  VectorXd whole_y_, y_;  // of the steps that are fitted, and of few of these
+  VectorXd y_;  // of the steps that are fitted
   std::vector<Effect> effects_;
+  bool are_many_ = false;  // so that only some of them are looked at beside others
   std::vector<LawExplanation> found_;
-  std::vector<Single> singles_;  // the likeliest first
   std::vector<std::vector<std::pair<const LawEntry*, const LawPlace*>>> seen_;
 };
 
