@@ -219,6 +219,8 @@ class Search {
     MatrixXd covariance;
     VectorXd residual;
     double variance = 1.0;  // of the noise
+    /// Changes of the amplitudes that do not show together, and those of size 1 each; empty where all show.
+    MatrixXd hidden, each;
   };
 
   [[nodiscard]] Solution Solve(const std::vector<size_t>& set) const {
@@ -234,6 +236,22 @@ class Search {
     found.covariance = size.cwiseInverse().asDiagonal() * CalcPseudoinverse(scaled.transpose() * scaled) *
                        size.cwiseInverse().asDiagonal() * found.variance;
     return found;
+  }
+
+  /// Takes the least amplitudes where several share an effect.
+  void Share(const std::vector<size_t>& set, Solution* found) const {
+    constexpr double kTogether = 1e-11;  // rounding of columns that are combinations of others
+    const MatrixXd C = columns_.Collect(set);
+    const VectorXd size = C.colwise().norm().cwiseMax(std::numeric_limits<double>::min());
+    const MatrixXd scaled = C * size.cwiseInverse().asDiagonal();
+    Eigen::CompleteOrthogonalDecomposition<MatrixXd> factor(scaled.rows(), scaled.cols());
+    factor.setThreshold(kTogether);
+    factor.compute(scaled);
+    if (factor.rank() == scaled.cols()) return;
+    found->amplitude = factor.solve(y_).cwiseQuotient(size);
+    found->residual = y_ - C * found->amplitude;
+    found->each = size.cwiseInverse().asDiagonal();
+    found->hidden = found->each - found->each * (factor.pseudoInverse() * scaled);
   }
 
   /// Whether a candidate can have such amplitudes. @param begin of its visible columns.
@@ -326,7 +344,8 @@ class Search {
     result.residual = y_;
     const double all = y_.squaredNorm();
     if (!chosen_.empty()) {
-      const Solution found = Solve(chosen_);
+      Solution found = Solve(chosen_);
+      Share(chosen_, &found);
       result.residual = found.residual;
       Index begin = 0;
       for (size_t place = 0; place < chosen_.size(); ++place) {
@@ -338,6 +357,12 @@ class Search {
         if (const VectorXd& least = candidates_[term.candidate].least; least.size() > 0)
           term.amplitude = term.amplitude.cwiseMax(least);
         term.error = CalcErrors(visible, found.covariance.block(begin, begin, r, r));
+        if (found.hidden.size() > 0) {
+          constexpr double kHidden = 0.1;
+          const VectorXd hidden = (visible.basis * found.hidden.middleRows(begin, r)).rowwise().norm();
+          const VectorXd each = (visible.basis * found.each.middleRows(begin, r)).rowwise().norm();
+          term.error = (hidden.array() > kHidden * each.array()).select(kInfinity, term.error);
+        }
         Compare(place, criterion, all, &term);
         begin += r;
         result.terms.push_back(std::move(term));

@@ -367,5 +367,28 @@ TEST(CauseEstimator, TwoAreExchangedAtOnce) {
   EXPECT_EQ(ChosenOf(Select(y, candidates)), (std::vector<size_t>{10, 20}));
 }
 
+// Two links turn about one axis: only the sum of their inertias about it shows, and no sizes with a small
+// error are made up.
+TEST(CauseEstimator, AmplitudesThatOnlyShowTogetherHaveNoError) {
+  Random random(31);
+  const VectorXd shared = random.Normal();
+  std::vector<Candidate> candidates = random.Candidates();
+  VectorXd y = 100.0 * shared;
+  for (const size_t i : {size_t{3}, size_t{7}}) {
+    MatrixXd columns(kRows, 2);
+    columns << shared, random.Normal();
+    y += 100.0 * columns.col(1);
+    candidates[i].columns = columns;
+  }
+  const CauseSelection selection = Select(y, candidates);
+  ASSERT_EQ(selection.terms.size(), 2u);
+  EXPECT_NEAR(selection.terms[0].amplitude[0] + selection.terms[1].amplitude[0], 100.0, kRounding);
+  for (const CauseTerm& term : selection.terms) {
+    EXPECT_NEAR(term.amplitude[0], 50.0, 25.0);
+    EXPECT_TRUE(std::isinf(term.error[0])) << term.error[0];
+    EXPECT_NEAR(term.amplitude[1], 100.0, kErrors * term.error[1]);
+  }
+}
+
 }  // namespace
 }  // namespace dexcheck::testing::cause_estimator_test
