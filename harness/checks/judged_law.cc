@@ -152,6 +152,12 @@ class JudgedJointLaw final : public JudgedLaw {
         gains_(setup.joints()->gains),
         motion_(&setup.joints()->motion) {
     if (stands_) ground_.emplace(setup.model(), setup.feet(), gains_.stance->height);
+    if (setup.scenario().plant.implicit_damping) {
+      const RobotModel& model = setup.model();
+      damping_.setZero(model.num_velocities());
+      for (int k = 0; k < model.num_dofs(); ++k)
+        damping_[model.num_base_velocities() + k] = model.joint(model.joint_of_dof(k)).damping;
+    }
     for (VectorXd* vector : {&force_, &demand_, &true_demand_, &commanded_force_, &coulomb_, &viscous_,
                              &position_error_, &velocity_error_, &ground_force_})
       vector->setZero(setup.model().num_velocities());
@@ -297,6 +303,14 @@ class JudgedJointLaw final : public JudgedLaw {
     // The plant's motion beyond the rigid prediction is added. Where the controller measures otherwise, where
     // its torques arrive otherwise or the robot is pushed, all of that drives the error as well.
     demand_ += step.response.xi_dot;
+    if (damping_.size() > 0) {
+      // The engine's implicit damping integrates (M + dt D)^-1 M xi_dot.
+      damped_ = step.model->robot().M();
+      damped_.diagonal() += time_step_ * damping_;
+      damped_rates_ = time_step_ * damping_.cwiseProduct(step.response.xi_dot);
+      damped_.llt().solveInPlace(damped_rates_);
+      demand_ -= damped_rates_;
+    }
     if (predicted == nullptr) CalcDemand(truth.q, truth.xi, &true_demand_);
     demand_ -= predicted != nullptr ? *predicted : true_demand_;
     // Semi-implicit, as the plant: velocities first.
@@ -313,6 +327,8 @@ class JudgedJointLaw final : public JudgedLaw {
   VectorXd position_error_, velocity_error_;                 // n, q_d - q and q_d_dot - q_dot
   VectorXd ground_force_;                                    // n, J^T f that the ground is asked for
   std::optional<GroundContacts> ground_;                     // of a robot that stands
+  VectorXd damping_, damped_rates_;                          // n, of implicit damping; empty without
+  MatrixXd damped_;
   VectorXd q_, xi_;  // where the error dynamics have the joints; empty at first
 };
 
