@@ -12,20 +12,31 @@ namespace {
 using Eigen::Index;
 
 // The residual may be this fraction of what there was: wheels that slip do so with the load.
-constexpr double kExplains = 0.99;
+constexpr double kExplains = 0.95;
+// A wheel that is off by more of its size is none of this platform.
+constexpr double kLargestError = 0.5;
 // Noise is taken for this many times what the explanation leaves.
 constexpr double kLevel = 5.0;
 
 /// Two wheels that are off by different amounts are two faults, not one that both have and another of one.
+/// What explains hardly anything beside another is made by a platform that tilts.
 CauseSelection SelectWheels(const VectorXd& y, std::vector<Candidate>* candidates,
                             const CauseOptions& options) {
+  constexpr double kLeast = 0.05;  // of the fraction that the first explains
   CauseSelection selection = SelectCauses(y, *candidates, options);
-  const auto count =
-      std::count_if(selection.terms.begin(), selection.terms.end(), [&](const CauseTerm& term) {
-        return (*candidates)[term.candidate].fault == candidates->front().fault;
-      });
-  if (count < 2) return selection;
-  candidates->erase(candidates->begin());
+  const auto count = std::ranges::count_if(selection.terms, [&](const CauseTerm& term) {
+    return (*candidates)[term.candidate].fault == candidates->front().fault;
+  });
+  if (count > 1 && candidates->front().place == "wheels") {
+    candidates->erase(candidates->begin());
+    selection = SelectCauses(y, *candidates, options);
+  }
+  std::vector<Candidate> kept;
+  for (const CauseTerm& term : selection.terms)
+    if (term.fraction >= kLeast * selection.terms.front().fraction)
+      kept.push_back((*candidates)[term.candidate]);
+  if (kept.size() == selection.terms.size()) return selection;
+  *candidates = kept;
   return SelectCauses(y, *candidates, options);
 }
 
@@ -50,14 +61,15 @@ Causes ExplainRolling(const StepStore& store) {
                                               {"radius", base.wheel_joint_right.c_str(), base.wheel_radius},
                                               {"radius", base.wheel_joint_left.c_str(), base.wheel_radius}}) {
     const bool is_one = std::string_view(place) != "wheels";
-    candidates.push_back(
-        {.fault = fault,
-         .place = is_one ? std::string("wheel ") + place : place,
-         .unit = "m",
-         .nominal = nominal,
-         .columns = MatrixXd::Zero(2 * count, 1),
-         .scale = VectorXd::Constant(1, nominal),
-         .is_possible = [nominal = nominal](const VectorXd& a) { return nominal + a[0] > 0.0; }});
+    candidates.push_back({.fault = fault,
+                          .place = is_one ? std::string("wheel ") + place : place,
+                          .unit = "m",
+                          .nominal = nominal,
+                          .columns = MatrixXd::Zero(2 * count, 1),
+                          .scale = VectorXd::Constant(1, nominal),
+                          .is_possible = [nominal = nominal](const VectorXd& a) {
+                            return std::abs(a[0]) <= kLargestError * nominal;
+                          }});
   }
   for (Index k = 0; k < count; ++k) {
     const Index step = steps[static_cast<size_t>(k)];
