@@ -71,9 +71,10 @@ Entry MakeFact(const CheckRecord& check, const FailureMeaning& meaning) {
 /// Returns the meaning of an explanation of that channel.
 FailureMeaning MeaningOf(CauseChannel channel) {
   static const FailureMeaning kMeanings[] = {
-      {Cause::kSensing, Rank::kMeasurement},    {Cause::kActuator, Rank::kActuator},
-      {Cause::kControlLaw, Rank::kLaw},         {Cause::kContactGeometry, Rank::kObjectBalance},
-      {Cause::kWheelGeometry, Rank::kDecisive}, {Cause::kUnmodelledForce, Rank::kDecisive}};
+      {Cause::kSensing, Rank::kMeasurement},     {Cause::kActuator, Rank::kActuator},
+      {Cause::kControlLaw, Rank::kLaw},          {Cause::kContactGeometry, Rank::kObjectBalance},
+      {Cause::kModel, Rank::kMeasurement},       {Cause::kWheelGeometry, Rank::kDecisive},
+      {Cause::kUnmodelledForce, Rank::kDecisive}};
   return kMeanings[static_cast<size_t>(channel)];
 }
 

@@ -16,8 +16,8 @@ std::string Unit(const std::string& unit) { return unit.empty() ? "" : " " + uni
 }  // namespace
 
 const char* NameOf(CauseChannel channel) {
-  constexpr const char* kNames[] = {"measurement", "actuation", "law",        "contact",
-                                    "rolling",     "balance",   "observation"};
+  constexpr const char* kNames[] = {"measurement", "actuation", "law",     "contact",
+                                    "geometry",    "rolling",   "balance", "observation"};
   return kNames[static_cast<size_t>(channel)];
 }
 
@@ -32,19 +32,25 @@ std::string FormatVector(const Eigen::Ref<const VectorXd>& v, int digits) {
   return text + ")";
 }
 
-/// Returns a number with two digits of its standard error, and none beyond these.
-static std::string ShowSize(double value, double error) {
-  if (!(error > 0.0) || !std::isfinite(error)) return FormatNumber(value, 6);
+/// Returns a number with two digits of its standard error, and of six or more as show how it differs.
+static std::string ShowSize(double value, double error, double nominal) {
   const auto order = [](double x) { return static_cast<int>(std::floor(std::log10(x))); };
-  const int digits = value == 0.0 ? 1 : std::clamp(order(std::abs(value)) - order(error) + 2, 1, 6);
-  return FormatNumber(value, digits) + " +- " + FormatNumber(error, 2);
+  const double off = std::abs(value - nominal);
+  const int most =
+      nominal != 0.0 && off > 0.0 ? std::clamp(order(std::abs(nominal)) - order(off) + 3, 6, 15) : 6;
+  if (!(error > 0.0) || !std::isfinite(error)) return FormatNumber(value, most);
+  const int digits =
+      std::abs(value) > 0.0 ? std::clamp(order(std::abs(value)) - order(error) + 2, 1, most) : 1;
+  // Less than a hundredth of the error is nothing.
+  const double shown = std::abs(value) < 0.01 * error ? 0.0 : value;
+  return FormatNumber(shown, digits) + " +- " + FormatNumber(error, 2);
 }
 
 std::string Fault::Describe() const {
   if (fault == kUnknownFault) return place;
   const std::string where = place == "law" ? "" : place + ": ", more = detail.empty() ? "" : " " + detail;
   if (std::isnan(value)) return where + fault + more;
-  const std::string size = ShowSize(value, error);
+  const std::string size = ShowSize(value, error, nominal);
   constexpr std::string_view kFactor = ", factor";
   if (fault.ends_with(kFactor)) {
     // The formula of the part is in JSON.
@@ -62,8 +68,9 @@ std::string Fault::Describe() const {
     const bool is_near = digits > 6 && off > 3.0 * error;
     return part + be + "multiplied by " + (is_near ? FormatNumber(value, digits) : size) + more;
   }
-  return where + fault + " " + size + Unit(unit) +
-         (std::isinf(error) && detail.empty() ? ", a size that this motion does not show" : "") + more;
+  const bool is_hidden = std::isinf(error) && (detail.empty() || detail.front() == '(');
+  return where + fault + " " + size + Unit(unit) + more +
+         (is_hidden ? ", a size that this motion does not show" : "");
 }
 
 void Explanation::SetOutcome() {

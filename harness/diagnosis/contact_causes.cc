@@ -1,5 +1,6 @@
 #include <numeric>
 
+#include "controller/common/text.h"
 #include "harness/diagnosis/run_causes.h"
 #include "harness/diagnosis/telling.h"
 
@@ -36,6 +37,29 @@ std::vector<Candidate> ListShapes(const Setup& setup, Index tips, Index steps, d
 }
 
 }  // namespace
+
+Causes ExplainGeometry(const StepStore& store) {
+  constexpr double kRounding = 1e-10;  // m and rad
+  const RobotModel& model = store.setup().model();
+  Causes causes;
+  for (const StepStore::Misplaced& one : store.misplaced()) {
+    const double offset = one.offset.norm(), turn = RadToDeg(one.turn);
+    const std::string on = " on link " + model.link_name(model.joint(one.link).parent);
+    Explanation& cause = causes.emplace_back();
+    cause.channel = CauseChannel::kGeometry;
+    cause.from = one.from;
+    cause.fraction = 1.0;
+    Fault fault{"turned" + on + " by", "link " + model.link_name(one.link), turn, 0.0, "deg", ""};
+    if (offset > kRounding) {
+      fault.fault = "off its place" + on + " by";
+      fault.value = offset, fault.unit = "m",
+      fault.detail = FormatVector((one.offset.array().abs() > kRounding).select(one.offset, 0.0), 4);
+      if (one.turn > kRounding) fault.detail += " and turned by " + FormatNumber(turn, 4) + " deg";
+    }
+    cause.faults.push_back(fault);
+  }
+  return causes;
+}
 
 bool HasOtherShapes(const StepStore& store) {
   const auto mismatch = store.Get(StepStore::kContactMismatch);

@@ -133,11 +133,13 @@ Fault MakeForceFault(const Candidate& candidate, const VectorXd& amplitude, cons
   if (candidate.fault.ends_with(kGrows)) return MakeGrowing(candidate, a, error);
   Fault fault{candidate.fault,          candidate.place,
               candidate.nominal + a[0], error.size() > 0 ? error[0] : 0.0,
-              candidate.unit,           ""};
+              candidate.unit,           "",
+              candidate.nominal};
   const bool sticks = candidate.fault == kStuckBearing;
   if (sticks || candidate.fault == kBearing) {
     fault.fault = "dry friction";
-    fault.value = candidate.fitted[0] + candidate.nominal * a[0];  // beside what is declared
+    fault.nominal = candidate.fitted[0];
+    fault.value = fault.nominal + candidate.nominal * a[0];  // beside what is declared
     fault.error = sticks ? std::numeric_limits<double>::infinity() : fault.error * candidate.nominal;
     if (sticks) fault.detail = "or more: the joint sticks";
   } else if (candidate.fault == "spring") {

@@ -118,9 +118,11 @@ Causes ExplainRun(const StepStore& store, double void_from, const SearchOptions&
     Causes found = explain(from);
     std::move(found.begin(), found.end(), std::back_inserter(causes));
   };
-  for (const auto explain : {ExplainSignals, ExplainLaw, ExplainContacts}) add(explain, store);
+  for (const auto explain : {ExplainSignals, ExplainLaw, ExplainContacts, ExplainGeometry})
+    add(explain, store);
   const StepStore before = store.GetBefore(void_from);
-  for (const auto explain : {ExplainRolling, ExplainForces}) add(explain, before);
+  add(ExplainRolling, before);
+  if (store.misplaced().empty()) add(ExplainForces, before);
   if (stopped != nullptr) *stopped = limit.has_ended();
   DropConsequencesOfShapes(&causes);
   DropConsequences(store, &causes);

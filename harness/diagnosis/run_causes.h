@@ -15,6 +15,9 @@ Causes ExplainLaw(const StepStore& store);
 /// -+ w db / 2. What wheels slip and sink is noise.
 Causes ExplainRolling(const StepStore& store);
 
+/// Names links that the plant has elsewhere than the model.
+Causes ExplainGeometry(const StepStore& store);
+
 /// Whether fingertips and object touch at another distance than the declared ones, and the shapes that
 /// explain it.
 bool HasOtherShapes(const StepStore& store);
@@ -35,7 +38,8 @@ struct SearchOptions {
   double seconds = 2.0;
 };
 
-/// All: measurement, actuation, law, contact, rolling, balance. What no robot like this one can have is
+/// All: measurement, actuation, law, contact, geometry, rolling, balance. Forces that follow from links in
+/// other places are not explained. What no robot like this one can have is
 /// listed as not explained.
 /// @param void_from of FindVoid, s: wheels and balances are explained up to then.
 /// @param stopped whether the search ended before it was done, by its limit or by the user.

@@ -5,6 +5,7 @@
 
 #include "harness/checks/check_table.h"
 #include "harness/comparison/rounding_scales.h"
+#include "harness/engine/map_vector.h"
 
 namespace dexcheck {
 namespace {
@@ -32,7 +33,8 @@ StepStore::StepStore(const Setup& setup, JudgedLaw* law, double rolling_bound)
       law_(law),
       rolling_bound_(rolling_bound),
       root_mass_(std::sqrt(RoundingScales(setup.model()).total_mass())),
-      actuation_(setup.model()) {
+      actuation_(setup.model()),
+      kinematics_(MakeDataWithoutContacts(setup.engine())) {
   NameReadings();
   const RobotModel& model = setup.model();
   const Eigen::Index n = model.num_velocities(), m = CountOf(readings_);
@@ -114,6 +116,7 @@ void StepStore::Reset() {
   seen_ = size_ = added_ = 0, stride_ = 1, has_begun_ = false;
   motor_spans_.assign(motors_.size(), {});
   reading_spans_.assign(readings_.size(), {});
+  misplaced_.clear();
   largest_torque_ = 0.0;
 }
 
@@ -214,6 +217,7 @@ void StepStore::Add(const StepRecord& step, const StepAnalysis& analysis, bool d
   last_time_ = step.time;
   Pack(step, analysis, judged, row_);
   Watch(row_);
+  if (differs) FindMisplaced(step);
   if (!has_begun_ && !differs) {
     before_.col(seen_++ % kHistory) = row_;
     return;
@@ -241,6 +245,31 @@ void StepStore::Watch(const Eigen::Ref<const VectorXd>& row) {
   largest_torque_ = std::max(largest_torque_, torques.cwiseAbs().maxCoeff());
   watch(kTauDeclared, kTauReceived, kTorqueRounding * largest_torque_, &motor_spans_);
   watch(kDeclaredReading, kReading, 0.0, &reading_spans_);
+}
+
+void StepStore::FindMisplaced(const StepRecord& step) {
+  const PlantReading& plant = step.reading;
+  const mjModel& engine = setup_->engine();
+  if (!misplaced_.empty() || plant.body_positions.size() != 3 * engine.nbody || !plant.qpos.allFinite())
+    return;
+  std::copy_n(plant.qpos.data(), engine.nq, kinematics_->qpos);
+  mj_kinematics(&engine, kinematics_.get());
+  const std::vector<int>& bodies = setup_->adapter().link_bodies();
+  for (int link = 0; link < setup_->model().num_joints(); ++link) {
+    const int body = bodies[static_cast<size_t>(link + 1)];
+    const int parent = bodies[static_cast<size_t>(setup_->model().joint(link).parent + 1)];
+    if (body < 0 || parent < 0) continue;
+    const auto place = [&](const mjtNum* positions, const mjtNum* rotations) {
+      const Pose X = MapPose(rotations + 9 * parent, positions + 3 * parent);
+      return X.inverse(Eigen::Isometry) * MapPose(rotations + 9 * body, positions + 3 * body);
+    };
+    const Pose declared = place(kinematics_->xpos, kinematics_->xmat);
+    const Pose actual = place(plant.body_positions.data(), plant.body_rotations.data());
+    const Vector3d offset = actual.translation() - declared.translation();
+    const double turn = Eigen::AngleAxisd(Matrix3d(actual.linear() * declared.linear().transpose())).angle();
+    constexpr double kRounding = 1e-10;  // m and rad
+    if (offset.norm() > kRounding || turn > kRounding) misplaced_.push_back({link, step.time, offset, turn});
+  }
 }
 
 void StepStore::Keep(Eigen::Index block, const Eigen::Ref<const VectorXd>& row) {

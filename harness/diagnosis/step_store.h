@@ -3,12 +3,14 @@
 // The signals of the steps that are to be explained, from a little before the first that differs.
 
 #include <limits>
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "controller/control/actuation.h"
 #include "harness/checks/judged_law.h"
 #include "harness/checks/step_analysis.h"
+#include "harness/engine/engine.h"
 #include "harness/scenario/setup.h"
 
 namespace dexcheck {
@@ -88,6 +90,15 @@ class StepStore {
   };
   [[nodiscard]] const std::vector<Span>& motor_spans() const { return motor_spans_; }
   [[nodiscard]] const std::vector<Span>& reading_spans() const { return reading_spans_; }
+  /// A link that the plant has elsewhere on its parent than the engine's model: by its index, and how far, in
+  /// the parent's axes.
+  struct Misplaced {
+    int link = 0;
+    double from = 0.0;                   ///< s
+    Vector3d offset = Vector3d::Zero();  ///< m
+    double turn = 0.0;                   ///< rad
+  };
+  [[nodiscard]] const std::vector<Misplaced>& misplaced() const { return misplaced_; }
   /// Residual of the check `rolling`, m/s.
   [[nodiscard]] double rolling_bound() const { return rolling_bound_; }
   [[nodiscard]] JudgedLaw* law() const { return law_; }
@@ -102,6 +113,8 @@ class StepStore {
   void Pack(const StepRecord& step, const StepAnalysis& analysis, Judged judged, Eigen::Ref<VectorXd> row);
   /// Notes when signals differ.
   void Watch(const Eigen::Ref<const VectorXd>& row);
+  /// Notes which links are misplaced, until some are.
+  void FindMisplaced(const StepRecord& step);
   void Keep(Eigen::Index block, const Eigen::Ref<const VectorXd>& row);
 
   const Setup* setup_;
@@ -115,6 +128,8 @@ class StepStore {
   MatrixXd data_;
   std::vector<Eigen::Index> block_;  // of each step that is kept
   std::vector<Span> motor_spans_, reading_spans_;
+  std::shared_ptr<mjData> kinematics_;  // of the engine's model
+  std::vector<Misplaced> misplaced_;
   double largest_torque_ = 0.0;  // N m, declared
   VectorXd row_, force_;
   Eigen::Index seen_ = 0;  // steps in the ring

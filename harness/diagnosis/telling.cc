@@ -29,7 +29,8 @@ Fault DescribeNumber(const Candidate& candidate, const VectorXd& amplitude, cons
           candidate.nominal + amplitude[0],
           error.size() > 0 ? error[0] : 0.0,
           candidate.unit,
-          ""};
+          "",
+          candidate.nominal};
 }
 
 Causes DescribeSelection(const Explanation& start, const CauseSelection& selection,

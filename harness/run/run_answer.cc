@@ -20,14 +20,14 @@ std::string FindText(const Json& summary, const char* place) {
 
 /// Lists the causes, each with the channel that shows it.
 void AddCauses(const Json& causes, Answer* answer) {
-  bool has_class = false;
+  bool has_several = false;
   for (const Json& cause : causes) {
     const std::string channel = FindText(cause, "/channel");
     const std::string prefix = channel.empty() || channel == "observation" ? "" : channel + ": ";
     answer->causes.push_back(prefix + FindText(cause, "/text"));
-    has_class = has_class || FindText(cause, "/outcome") == "class";
+    has_several = has_several || (FindText(cause, "/outcome") == "class" && cause["faults"].size() > 1);
   }
-  if (has_class) answer->remarks.emplace_back("another motion may separate the causes joined by \"or\"");
+  if (has_several) answer->remarks.emplace_back("another motion may separate the causes joined by \"or\"");
 }
 
 /// Returns whether a motor is one that a run cannot drive.

@@ -5,6 +5,7 @@
 
 #include "controller/common/text.h"
 #include "harness/base/check_record.h"
+#include "harness/base/interrupts.h"
 #include "harness/base/version.h"
 #include "harness/engine/machine.h"
 
@@ -127,8 +128,11 @@ void Judge(const Setup& setup, const ClosedLoop& loop, const SearchOptions& sear
     result->attribution = Attribute(setup.constants(), loop.checks().model_checks(), steps,
                                     loop.checks().context(), &result->causes);
     if (stopped && result->attribution.cause != Cause::kNone)
-      result->attribution.evidence += "; the search for causes was stopped after " +
-                                      FormatNumber(search.seconds) + " s of processor time, or by hand";
+      result->attribution.evidence +=
+          "; the search for causes was stopped " +
+          (IsInterrupted() && !result->interrupted
+               ? "by hand"
+               : "after " + FormatNumber(search.seconds) + " s of processor time");
   }
   const bool disagrees = result->attribution.cause != Cause::kNone;
   result->verdict = disagrees ? Verdict::kDisagreement : Verdict::kPass;

@@ -52,6 +52,8 @@ void ThickenTube(mjModel* m) {
 }
 
 /// A quadruped's foot is 1 % larger.
+void MoveLink(mjModel* m) { m->body_pos[3 * mj_name2id(m, mjOBJ_BODY, "panda_link5") + 1] += 0.004; }
+
 void ThickenFoot(mjModel* m) {
   const int geom = mj_name2id(m, mjOBJ_GEOM, "fl_foot_geom");
   m->geom_size[3 * geom] *= 1.01;
@@ -128,6 +130,12 @@ TEST_P(CheckFaults, FailTheirCheck) {
   if (fault.change != nullptr) dynamic_cast<EnginePlant&>(*parts.plant).simulation().Change(fault.change);
   Runner runner(setup, /*check=*/true, std::move(parts));
   const RunResult& result = runner.Run([](const StepRecord&) {}, [] { return false; });
+  // A link in another place is named, and none of the loads that follow from it.
+  if (fault.change == MoveLink) {
+    ASSERT_EQ(result.causes.size(), 1u);
+    EXPECT_EQ(result.causes.front().faults.front().place, "link panda_link5");
+    EXPECT_NEAR(result.causes.front().faults.front().value, 0.004, 1e-12);
+  }
   const CheckRecord& check = runner.loop().checks().Find(fault.check);
   EXPECT_TRUE(check.failed) << check.worst << " of " << check.bound << "; " << result.failure;
   EXPECT_NE(result.verdict, Verdict::kPass);
@@ -168,6 +176,7 @@ INSTANTIATE_TEST_SUITE_P(
                    "panda-reach",
                    {"duration=0.5", "model.chain.0.links.link3.mass=3.3"},
                    Cause::kModel},
+        CheckFault{"bias_force", "panda-reach", {"duration=0.1"}, Cause::kModel, MoveLink},
         CheckFault{"equations_of_motion",
                    "stand",
                    {"duration=0.2", "model.base.shapes.0.mass=6.06", "expect={}"},
