@@ -1,5 +1,8 @@
 #include <algorithm>
+#include <cmath>
+#include <cstdlib>
 #include <optional>
+#include <tuple>
 
 #include "harness/diagnosis/force_problem.h"
 #include "harness/diagnosis/run_causes.h"
@@ -11,14 +14,46 @@ namespace {
 
 constexpr size_t kMostSegments = 8;
 
+/// The numbers of a text: directions, places, where springs relax.
+VectorXd ListNumbers(const std::string& text) {
+  std::vector<double> numbers;
+  for (const char* at = text.c_str(); *at != '\0';) {
+    char* end = nullptr;
+    const double number = std::strtod(at, &end);
+    if (end != at) numbers.push_back(number);
+    at = end != at ? end : at + 1;
+  }
+  return Eigen::Map<const VectorXd>(numbers.data(), static_cast<Eigen::Index>(numbers.size()));
+}
+
 /// Whether they have a fault in common.
 bool IsSame(const Explanation& a, const Explanation& b) {
-  constexpr double kSame = 0.02;
+  constexpr double kSame = 0.02, kDetails = 0.1;
   const double error = 3.0 * (a.faults.front().error + b.faults.front().error);
-  return std::any_of(a.faults.begin(), a.faults.end(), [&](const Fault& x) {
-    return std::any_of(b.faults.begin(), b.faults.end(), [&](const Fault& y) {
-      return x.IsLike(y) && std::abs(x.value - y.value) <= kSame * std::abs(x.value) + error;
+  return std::ranges::any_of(a.faults, [&](const Fault& x) {
+    const VectorXd numbers = ListNumbers(x.detail);
+    return std::ranges::any_of(b.faults, [&](const Fault& y) {
+      if (!x.IsLike(y) || std::abs(x.value - y.value) > kSame * std::abs(x.value) + error) return false;
+      const VectorXd others = ListNumbers(y.detail);
+      return numbers.size() != others.size() || (numbers - others).norm() <= kDetails * numbers.norm();
     });
+  });
+}
+
+/// Whether something acts independently of the motion, and may begin and end at any time.
+bool HasPush(const Causes& causes) {
+  return std::ranges::any_of(causes, [](const Explanation& one) {
+    return std::ranges::any_of(one.faults, [](const Fault& fault) {
+      return fault.fault.starts_with("force") || fault.fault.starts_with("torque") ||
+             fault.fault.starts_with("moment");
+    });
+  });
+}
+
+/// Whether one is free at each step, which explains anything at its place.
+bool IsFree(const Causes& causes) {
+  return std::ranges::any_of(causes, [](const Explanation& one) {
+    return one.faults.front().fault.ends_with(force_fault::kChanges);
   });
 }
 
@@ -27,6 +62,11 @@ struct Part {
   bool is_explained = false, is_exact = false;
   ForceProblem::Terms terms;
   Causes causes;
+
+  /// Simpler explanations have smaller ones.
+  [[nodiscard]] auto rank() const {
+    return std::tuple(!is_explained, !is_exact, IsFree(causes), terms.count);
+  }
 };
 
 Part ExplainPart(const StepStore& store, StepForces* forces, const Segment& segment, const Part* known) {
@@ -102,24 +142,22 @@ Causes ExplainParts(const StepStore& store, StepForces* forces, const std::vecto
     if (SearchLimit::IsOver()) return {};
     parts.push_back(ExplainPart(store, forces, one, nullptr));
   }
-  const auto is_simpler = [](const Part& a, const Part& b) {
-    if (a.is_explained != b.is_explained) return a.is_explained;
-    if (a.is_exact != b.is_exact) return a.is_exact;
-    return a.terms.count < b.terms.count;
-  };
-  const Part simplest = *std::min_element(parts.begin(), parts.end(), is_simpler);
+  const Part simplest = *std::ranges::min_element(
+      parts, {}, [](const Part& one) { return std::pair(one.rank(), HasPush(one.causes)); });
+  // What the robot has does not come and go, as pushes do.
+  const bool stays = !HasPush(simplest.causes);
   Causes causes;
   for (size_t i = 0; i < parts.size(); ++i) {
     if (SearchLimit::IsOver()) return {};
     if (simplest.is_explained) {
       Part beside = ExplainPart(store, forces, segments[i], &simplest);
       // A stretch that has the same faults by itself, and no more of them, knows them better.
-      const auto& own = parts[i].causes;
-      if (std::all_of(simplest.causes.begin(), simplest.causes.end(), [&](const auto& one) {
-            return std::any_of(own.begin(), own.end(), [&](const auto& other) { return IsSame(one, other); });
-          }))
-        beside.terms.count += simplest.terms.count;
-      if (is_simpler(beside, parts[i])) parts[i] = beside;
+      const bool has_them = std::ranges::all_of(simplest.causes, [&](const auto& one) {
+        return std::ranges::any_of(parts[i].causes, [&](const auto& other) { return IsSame(one, other); });
+      });
+      if (has_them) beside.terms.count += simplest.terms.count;
+      if (beside.rank() < parts[i].rank() || (stays && !has_them && beside.rank() == parts[i].rank()))
+        parts[i] = beside;
     }
     if (!parts[i].is_explained || (exactly && !parts[i].is_exact)) return {};
     for (const Explanation& one : parts[i].causes) {
@@ -168,7 +206,7 @@ Causes ExplainForces(const StepStore& store) {
   // One that grows from a time on explains all steps at once.
   ForceProblem growing(store, &forces, whole, 1.0, ForceProblem::Growth::kWithin);
   Causes grown;
-  if (found.size() != 1 && growing.ExplainConstant(whole, &grown) && growing.is_exact() &&
+  if (found.size() != 1 && growing.ExplainConstant(whole, &grown) && growing.is_exact() && !IsFree(grown) &&
       !SearchLimit::IsOver() && (found.empty() || grown.size() < found.size()))
     found = grown;
   if (!found.empty() && (!is_exact || found.size() < causes.size())) return found;

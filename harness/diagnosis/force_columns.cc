@@ -238,9 +238,9 @@ void StepForces::AddBody(const std::string& place, const MassProperties& body, c
   if (link == nullptr) return;
   payload << -wrench.mass, -wrench.first_moment, -wrench.inertia;
   Candidate& load = Next(candidates, "payload", place, "kg", 0.0, Masses(10));
-  load.is_possible = [reach = reach_](const VectorXd& a) {
-    return a.segment<3>(1).norm() <= reach * std::abs(a[0]);
-  };
+  // Its mass, place and inertia are worth several faults of one number.
+  load.parameters = 3;
+  load.is_possible = [reach = reach_](const VectorXd& a) { return a.segment<3>(1).norm() <= reach * a[0]; };
   add(load, payload);
 }
 

@@ -148,19 +148,39 @@ std::optional<ForceAtPoint> RefinePoint(const VectorXd& y, const std::vector<Tur
   return fit.force();
 }
 
-MatrixXd CalcCenterColumns(const std::string& place, const Vector3d& d,
+MatrixXd CalcCenterColumns(const std::string& place, const Vector3d& d, double more,
                            std::span<const Candidate> candidates) {
   const auto find = [&](const char* fault) -> const Candidate& {
     return *std::ranges::find_if(
         candidates, [&](const Candidate& one) { return one.fault == fault && one.place == place; });
   };
-  const Vector3d m_d = find("mass").nominal * d, half = 0.5 * m_d;
+  const double nominal = find("mass").nominal, mass = nominal + more;
+  const Vector3d m_d = mass * d, half = 0.5 * m_d;
   Eigen::Matrix<double, 6, 3> B;
   B.topRows<3>() = m_d.transpose().replicate<3, 1>();
   B.diagonal().setZero();
   B.bottomRows<3>() << -half[1], -half[0], 0.0, -half[2], 0.0, -half[0], 0.0, -half[2], -half[1];
   const MatrixXd& all = find(force_fault::kCenter).columns;
-  return all.leftCols<3>() + all.rightCols<6>() * B;
+  return mass / nominal * all.leftCols<3>() + all.rightCols<6>() * B;
+}
+
+Vector6d CalcMovedInertia(double mass, const Vector3d& d) {
+  const Matrix3d I = mass * (d.squaredNorm() * Matrix3d::Identity() - d * d.transpose());
+  Vector6d entries;
+  entries << I.diagonal(), I(0, 1), I(0, 2), I(1, 2);
+  return entries;
+}
+
+bool IsPossibleLoad(const VectorXd& amplitude, const VectorXd& error) {
+  constexpr double kErrors = 3.0, kRelative = 1e-3;
+  const Vector6d about = amplitude.tail<6>();
+  const Vector6d own =
+      about - CalcMovedInertia(amplitude[0], Vector3d(amplitude.segment<3>(1) / amplitude[0]));
+  Matrix3d I;
+  I << own[0], own[3], own[4], own[3], own[1], own[5], own[4], own[5], own[2];
+  // The largest principal moment is at most the sum of the others.
+  const double largest = DecomposeSymmetric(I).values[2];
+  return I.trace() - 2.0 * largest >= -kErrors * error.tail<6>().norm() - kRelative * about.norm();
 }
 
 }  // namespace dexcheck

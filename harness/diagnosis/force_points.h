@@ -40,7 +40,14 @@ std::optional<ForceAtPoint> RefinePoint(const VectorXd& y, const std::vector<Tur
 
 /// Columns of a centre of mass at `place` that is about d (m) off: by d it changes the inertia about the old
 /// one by b(d, d), b(d, e) = m (d^T e 1 - (d e^T + e d^T) / 2), and those of d_k get b(d, e_k).
-MatrixXd CalcCenterColumns(const std::string& place, const Vector3d& d,
+/// @param more mass than the nominal one, kg.
+MatrixXd CalcCenterColumns(const std::string& place, const Vector3d& d, double more,
                            std::span<const Candidate> candidates);
+
+/// b(d, d): Ixx, Iyy, Izz, Ixy, Ixz, Iyz.
+Vector6d CalcMovedInertia(double mass, const Vector3d& d);
+
+/// Whether a body can have a payload's amplitudes, within these errors: mass, first moment, inertia.
+bool IsPossibleLoad(const VectorXd& amplitude, const VectorXd& error);
 
 }  // namespace dexcheck

@@ -20,9 +20,11 @@ constexpr double kLeft = 3.0;
 // And of what there is to explain, squared, at least this fraction.
 constexpr double kLeastFraction = 0.99;
 // Noise is taken for this many times what the explanation leaves, down to rounding, in bounds of the checks,
-// and to what columns are known to; found anew so often.
-constexpr double kOfLeft = 5.0, kRounding = 1e-4, kExact = 1e-7;
+// and to what columns are known to, those of a platform to less; found anew so often.
+constexpr double kOfLeft = 5.0, kRounding = 1e-4, kExact = 1e-7, kExactOnWheels = 2e-5;
 constexpr int kMostLevels = 4;
+// Effect in units of the noise, root mean square, of an inertia that another centre of mass does not make.
+constexpr double kBeyond = 3.0;
 constexpr Index kMostSteps = 20;      // that are looked at
 constexpr Index kMostGrowing = 1000;  // pushes that grow, from all times that are tried
 
@@ -56,7 +58,8 @@ ForceProblem::ForceProblem(const StepStore& store, StepForces* forces, const Seg
   level_.setConstant(level);
   Build();
   first_level_ = level * (1.0 + (kAccuracy * CalcSizes(whole_y_)).array().square()).sqrt();
-  least_level_ = (kExact / kAccuracy * first_level_).cwiseMax(kRounding);
+  const bool rolls = forces->model().base().type == BaseType::kDifferentialDrive;
+  least_level_ = ((rolls ? kExactOnWheels : kExact) / kAccuracy * first_level_).cwiseMax(kRounding);
   SetLevel(first_level_);
   Complete();
 }
@@ -173,8 +176,7 @@ Explanation ForceProblem::DescribeFree(const Segment& segment, const Free& free)
   one.fraction = 1.0 - free.residual.squaredNorm() / y_.squaredNorm();
   one.left = std::sqrt(free.residual.squaredNorm() / static_cast<double>(y_.size()));
   one.outcome = CauseOutcome::kNamedClass;
-  one.faults.push_back(
-      {candidate.fault + " that changes, up to", candidate.place, free.largest, 0.0, candidate.unit, ""});
+  one.faults.push_back({candidate.fault + kChanges, candidate.place, free.largest, 0.0, candidate.unit, ""});
   return one;
 }
 
@@ -212,7 +214,11 @@ void ForceProblem::SetLevel(const Vector2d& level) {
 void ForceProblem::Complete() {
   candidates_.resize(constant_);
   y_ = whole_y_;
-  for (const CauseTerm& term : known_.amplitudes) y_ -= candidates_[term.candidate].columns * term.amplitude;
+  for (const CauseTerm& term : known_.amplitudes) {
+    Candidate& one = candidates_[term.candidate];
+    y_ -= one.columns * term.amplitude;
+    one.is_possible = [](const VectorXd&) { return false; };  // once more
+  }
   for (const ForceAtPoint& force : known_.points)
     candidates_.push_back(MakeForceAtPoint(force, turns_, candidates_));
   AddForcesAtPoints(y_, turns_, forces_->reach(), &candidates_);
@@ -365,19 +371,71 @@ bool ForceProblem::RefineCenters(const CauseSelection& selection) {
   for (const CauseTerm& term : selection.terms) {
     Candidate& one = candidates_[term.candidate];
     if (one.fault != kCenterAlone) continue;
-    one.columns = CalcCenterColumns(one.place, term.amplitude, candidates_);
+    double more = 0.0;  // kg
+    for (const CauseTerm& other : selection.terms) {
+      const Candidate& beside = candidates_[other.candidate];
+      const bool is_mass = beside.fault == "mass" || beside.fault == kMassWithInertia;
+      if (is_mass && beside.place == one.place) more += other.amplitude[0];
+    }
+    one.columns = CalcCenterColumns(one.place, term.amplitude, more, candidates_);
     is_refined = true;
   }
   return is_refined;
 }
 
-CauseSelection ForceProblem::SelectOnce() {
+CauseSelection ForceProblem::SelectRefined() {
   // A single step cannot distinguish faults.
   const CauseOptions options{.most_terms = std::min<size_t>(5, used_.size()),
                              .noise_block_size = static_cast<double>(steps_)};
   CauseSelection selection = SelectCauses(y_, candidates_, options);
   if (!SearchLimit::IsOver() && RefinePoints(selection)) selection = SelectCauses(y_, candidates_, options);
-  if (!SearchLimit::IsOver() && RefineCenters(selection)) selection = SelectCauses(y_, candidates_, options);
+  // Columns of a centre of mass depend on where it is.
+  constexpr int kMostRefinements = 3;
+  for (int i = 0; i < kMostRefinements && !SearchLimit::IsOver() && RefineCenters(selection); ++i)
+    selection = SelectCauses(y_, candidates_, options);
+  return selection;
+}
+
+bool ForceProblem::IsOneBody(const CauseTerm& term) const {
+  const Candidate& one = candidates_[term.candidate];
+  if ((one.fault != kCenter && one.fault != "payload") || !term.error.allFinite()) return true;
+  if (one.fault == "payload") return IsPossibleLoad(term.amplitude, term.error);
+  const auto find = [&](const char* fault) {
+    return std::ranges::find_if(candidates_, [&](const Candidate& other) {
+      return other.fault == fault && other.place == one.place;
+    });
+  };
+  const Vector6d beyond =
+      term.amplitude.tail<6>() - CalcMovedInertia(find("mass")->nominal, term.amplitude.head<3>());
+  return (find("inertia")->columns * beyond).norm() <= kBeyond * std::sqrt(static_cast<double>(y_.size()));
+}
+
+CauseSelection ForceProblem::SelectPlain() {
+  std::vector<std::pair<Candidate*, VectorXd>> hidden;
+  for (Candidate& one : candidates_) {
+    if (one.fault != "payload" && one.fault != kCenter) continue;
+    hidden.emplace_back(&one, one.scale);
+    one.scale.setZero();  // shows nothing
+  }
+  CauseSelection plain = SelectRefined();
+  for (auto& [one, scale] : hidden) one->scale = scale;
+  return plain;
+}
+
+CauseSelection ForceProblem::SelectOnce() {
+  CauseSelection selection = SelectRefined();
+  const bool is_possible =
+      std::ranges::all_of(selection.terms, [&](const CauseTerm& term) { return IsOneBody(term); });
+  const bool has_payload = std::ranges::any_of(
+      selection.terms, [&](const CauseTerm& term) { return candidates_[term.candidate].fault == "payload"; });
+  if ((has_payload || !is_possible) && !SearchLimit::IsOver()) {
+    const CauseSelection plain = SelectPlain();
+    const bool is_likelier = !is_possible || plain.criterion < selection.criterion;
+    if (is_likelier && plain.left <= std::max(1.0, selection.left) && !SearchLimit::IsOver())
+      selection = plain;
+  }
+  // No body has it, and there was no time to find what has.
+  if (!is_possible && SearchLimit::IsOver()) return {.residual = y_};
   for (const CauseTerm& term : selection.terms) {
     if (SearchLimit::IsOver()) break;
     if (candidates_[term.candidate].place != kWorld || selection.terms.size() == 1) continue;
@@ -388,7 +446,7 @@ CauseSelection ForceProblem::SelectOnce() {
     if (!forces_->SetGravity(g + change)) break;
     Build();
     Complete();
-    selection = SelectCauses(y_, candidates_, options);
+    selection = SelectRefined();
     break;
   }
   selection.left = CalcLeft(selection.residual);

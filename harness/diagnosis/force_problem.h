@@ -91,6 +91,12 @@ class ForceProblem {
   /// Corrects columns of a centre of mass, whose effect grows with its square, too.
   bool RefineCenters(const CauseSelection& selection);
   [[nodiscard]] CauseSelection SelectOnce();
+  [[nodiscard]] CauseSelection SelectRefined();
+  /// Payloads, and centres of mass by which inertias change freely, stand for several plainer faults:
+  /// without.
+  [[nodiscard]] CauseSelection SelectPlain();
+  /// Whether a payload or another centre of mass can be all that a term changes.
+  [[nodiscard]] bool IsOneBody(const CauseTerm& term) const;
 
   const StepStore& store_;
   StepForces* forces_;

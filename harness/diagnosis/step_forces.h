@@ -35,6 +35,8 @@ inline constexpr const char* kWorld = "world";  // its place
 inline constexpr const char* kContact = "contact further along the normal by";
 /// The ending of the name of a force, a moment or a torque that grows evenly in time.
 inline constexpr const char* kGrows = " that grows by";
+/// The ending of the name of one that is free at each step.
+inline constexpr const char* kChanges = " that changes, up to";
 }  // namespace force_fault
 
 /// Noise of one step: of the robot's rows s^2 1 + U U^T, of the object's that of each. s is rounding, and U

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <functional>
+#include <type_traits>
 
 #include "harness/diagnosis/run_causes.h"
 #include "tests/harness/run/shipped_run.h"
@@ -18,7 +19,9 @@ using Force = std::function<VectorXd(int k)>;
 VectorXd Torque(int i, double size) { return size * VectorXd::Unit(7, i); }
 
 /// Looks at `count` steps from the one at `first` on, each so many after the last.
-Causes Explain(int first, int every, int count, const Force& force) {
+/// @param force of k, and of the velocities (n) where it depends on them.
+template <typename ForceOf>
+Causes Explain(int first, int every, int count, const ForceOf& force) {
   ShippedRun run("panda-reach", {"duration=0.4"});
   StepStore store(run.setup(), nullptr, 1.0);
   int step = 0;
@@ -26,7 +29,11 @@ Causes Explain(int first, int every, int count, const Force& force) {
     const int k = (step++ - first) / every;
     if (step <= first || (step - 1 - first) % every != 0 || k >= count) return;
     StepAnalysis analysis = run.loop().checks().analysis();
-    analysis.robot.residual += force(k);
+    if constexpr (std::is_invocable_v<ForceOf, int>) {
+      analysis.robot.residual += force(k);
+    } else {
+      analysis.robot.residual += force(k, run.step().reading.state.xi);
+    }
     store.Add(run.step(), analysis, /*differs=*/true);
   });
   EXPECT_EQ(store.size(), count);
@@ -111,6 +118,22 @@ TEST(ForceCauses, SeveralAreNamed) {
       last = one->from;
     }
   }
+}
+
+// What a joint has stays while a push comes and goes there.
+TEST(ForceCauses, APushBesideFrictionOfItsJointIsNamed) {
+  const auto torque = [](int k, const VectorXd& xi) -> VectorXd {
+    return Torque(1, -0.4 * xi[1]) + Torque(1, 8 <= k && k < 16 ? 2.0 : 0.0);
+  };
+  const Causes causes = Explain(200, 4, 24, torque);
+  SCOPED_TRACE(DescribeCauses(causes, CauseChannel::kBalance));
+  ASSERT_EQ(causes.size(), 2u);
+  EXPECT_EQ(causes[0].faults.front().fault, "viscous friction");
+  EXPECT_FALSE(causes[0].ends);
+  const Fault* push = Find(causes[1], "torque");
+  ASSERT_NE(push, nullptr);
+  EXPECT_NEAR(std::abs(push->value), 2.0, 1e-6);
+  EXPECT_TRUE(causes[1].ends);
 }
 
 // Several faults explain anything in a single step: made-up torques are none of them.
