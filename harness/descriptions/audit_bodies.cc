@@ -12,6 +12,7 @@
 
 #include "controller/common/linear_algebra.h"
 #include "controller/common/text.h"
+#include "controller/model/rigid_body.h"
 #include "harness/descriptions/audit.h"
 #include "harness/descriptions/compiled_inertias.h"
 
@@ -51,6 +52,9 @@ class BodyAudit {
 
   void AuditPart(const DescribedPart& part) {
     const MassProperties& body = part.body;
+    if (part.largest_angle > 2.0 * kPi)
+      Add(AuditLevel::kSuspicious, "offset", part,
+          "is turned by " + Format(part.largest_angle) + " rad: as if angles were in degrees");
     if (!part.states_inertial) {
       if (!part.shapes.empty() && part.joint >= 0) {
         Add(AuditLevel::kNote, "inertial", part, "has geometry but no inertial: taken as massless");
@@ -163,15 +167,21 @@ class BodyAudit {
           "has its centre of mass " + Format(body.com) + " m outside of its geometry, by " + Format(beyond) +
               " m");
     }
-    // No point is farther away than the box's corners.
-    const double farthest = (low - body.com).cwiseAbs().cwiseMax((high - body.com).cwiseAbs()).squaredNorm();
-    const double largest = CalcMoments(body.inertia)[2];
-    constexpr double kAllowance = 1.5;  // covers and cables that the geometry leaves out
-    if (largest > kAllowance * body.mass * farthest) {
+    // Between two walls the second moment about the centre is largest with all mass at the walls.
+    const Vector3d spread = (body.com - low).cwiseProduct(high - body.com).cwiseMax(0.0);
+    Eigen::Index axis = 0;
+    (body.inertia.diagonal() - body.mass * (Vector3d::Constant(spread.sum()) - spread)).maxCoeff(&axis);
+    const double largest = body.inertia(axis, axis), most = body.mass * (spread.sum() - spread[axis]);
+    MassProperties as_of_origin = body;
+    as_of_origin.inertia -= CalcPointInertia(body.mass, body.com);
+    const bool is_of_origin = FindPhysicalInconsistency(as_of_origin).empty();
+    // Covers and cables that the geometry leaves out are far from where one would be about the origin.
+    const double allowance = is_of_origin ? 1.05 : 1.5;
+    if (largest > allowance * most) {
       Add(AuditLevel::kSuspicious, "inertia", part,
-          "has a principal moment of " + Format(largest) +
-              " kg m^2, more than its mass can have within its geometry, " + Format(body.mass * farthest) +
-              " kg m^2");
+          "has a moment of inertia of " + Format(largest) +
+              " kg m^2, more than its mass can have within its geometry, " + Format(most) + " kg m^2" +
+              (is_of_origin ? ": as if it were about the link's origin" : ""));
     }
   }
 

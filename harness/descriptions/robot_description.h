@@ -55,6 +55,7 @@ struct DescribedPart {
   int joint = -1;                ///< That moves it; -1 for the base.
   Pose X_iL = Pose::Identity();  ///< The link's own frame in that joint's frame i.
   std::vector<DescribedShape> shapes;
+  double largest_angle = 0.0;  ///< Of the roll, pitch and yaw of a fixed joint and of the inertial, rad.
 };
 
 /// A robot as one file describes it.

@@ -224,7 +224,7 @@ Pose UrdfFile::ReadOrigin(const Element& element, const std::string& key, double
   X.translation() = ReadVector(*origin, key, "xyz", Vector3d::Zero());
   if (origin->Attribute("rpy") == nullptr) return X;
   const Vector3d rpy = ReadVector(*origin, key, "rpy", Vector3d::Zero());
-  if (largest_angle != nullptr) *largest_angle = rpy.cwiseAbs().maxCoeff();
+  if (largest_angle != nullptr) *largest_angle = std::max(*largest_angle, rpy.cwiseAbs().maxCoeff());
   urdf::Rotation q;
   q.setFromRPY(rpy[0], rpy[1], rpy[2]);
   X.linear() = Eigen::Quaterniond(q.w, q.x, q.y, q.z).toRotationMatrix();

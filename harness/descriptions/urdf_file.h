@@ -65,7 +65,7 @@ class UrdfFile {
   Vector3d ReadVector(const tinyxml2::XMLElement& element, const std::string& key, const char* attribute,
                       const Vector3d& otherwise) const;
   /// The pose that the child `origin` of an element gives; the identity without one.
-  /// @param largest_angle of roll, pitch and yaw, rad; unchanged where none are given.
+  /// @param largest_angle raised to the largest of roll, pitch and yaw, rad.
   [[nodiscard]] Pose ReadOrigin(const tinyxml2::XMLElement& element, const std::string& key,
                                 double* largest_angle = nullptr) const;
 

@@ -81,6 +81,7 @@ class UrdfReader {
   struct Place {
     int joint;
     Pose X_iL;
+    double fixed_angle = 0.0;  ///< Of the fixed joint that the link hangs on, rad.
   };
 
   static std::string KeyOf(const UrdfJoint& joint) { return "joint " + Quote(joint.name) + ": "; }
@@ -160,7 +161,7 @@ class UrdfReader {
     if (!X_iJ.matrix().allFinite()) file_.Fail(joint.line, key + "origin: must be finite");
     if (joint.type == "fixed") {
       robot_.spec.frames.push_back({link, parent.joint, X_iJ, std::nullopt});
-      return {parent.joint, X_iJ};
+      return {parent.joint, X_iJ, largest_angle};
     }
     if (joint.type == "floating" || joint.type == "planar") {
       file_.Fail(joint.line, key + "type: must be fixed, revolute, continuous or prismatic, got " +
@@ -247,11 +248,12 @@ class UrdfReader {
     part.line = link.line;
     part.joint = place.joint;
     part.X_iL = place.X_iL;
+    part.largest_angle = place.fixed_angle;
     part.shapes = file_.ReadShapes(link);
     part.states_inertial = inertial != nullptr;
     if (inertial == nullptr) return;
     const std::string key = KeyOf(link);
-    part.X_LC = file_.ReadOrigin(*inertial, key);
+    part.X_LC = file_.ReadOrigin(*inertial, key, &part.largest_angle);
     const auto read = [&](const char* name, const char* attribute) {
       const Element* const element = inertial->FirstChildElement(name);
       if (element == nullptr) file_.Fail(inertial->GetLineNum(), key + name + ": " + attribute + ": missing");

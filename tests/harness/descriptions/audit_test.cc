@@ -56,6 +56,29 @@ std::string Describe(const AuditResult& result) {
   return text;
 }
 
+// About its origin, at one end of its box, a link has more than all mass at the ends has about the centre.
+TEST(Audit, AnInertiaAboutTheOriginIsNamed) {
+  const std::string about_origin =
+      ReplaceOnce(ReplaceOnce(kArms, "ixx=\"0.028\" ixy=\"0.001\"", "ixx=\"0.108\" ixy=\"0.001\""),
+                  "iyz=\"0.0004\" izz=\"0.029\"", "iyz=\"0.0004\" izz=\"0.1092\"");
+  EXPECT_THAT(
+      Describe(Audit(about_origin)),
+      ::testing::HasSubstr("link left_arm has a moment of inertia of 0.108 kg m^2, more than its mass "
+                           "can have within its geometry, 0.08"));
+  EXPECT_THAT(Describe(Audit(about_origin)), ::testing::HasSubstr("as if it were about the link's origin"));
+}
+
+TEST(Audit, DegreesOfAFixedJointAreNamed) {
+  const std::string camera =
+      "<link name=\"camera\"/><joint name=\"c\" type=\"fixed\"><origin rpy=\"0 ANGLE 0\"/>"
+      "<parent link=\"left_arm\"/><child link=\"camera\"/></joint></robot>";
+  const auto audit = [&](const char* angle) {
+    return Describe(Audit(ReplaceOnce(kArms, "</robot>", ReplaceOnce(camera, "ANGLE", angle))));
+  };
+  EXPECT_THAT(audit("90"), ::testing::HasSubstr("offset: link camera is turned by 90 rad"));
+  EXPECT_EQ(audit("1.5708"), "");
+}
+
 TEST(Audit, SoundRobotsAreGood) {
   const AuditResult result = Audit(kArms);
   EXPECT_TRUE(result.IsGood()) << Describe(result);
