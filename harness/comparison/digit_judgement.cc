@@ -235,7 +235,7 @@ class DigitJudge {
     ConstantFinding excess = finding;
     excess.units = units;
     excess.is_cause = true;
-    if (units <= 1.0 + kTie) return !IsTooLoose(excess, open / size);
+    if (units <= 1.0 + kTie) return units < kOneNumber || !IsTooLoose(excess, open / size);
     verdict_.excesses.push_back(std::move(excess));
     return false;
   }

@@ -226,7 +226,7 @@ void TermComparison::NoteWithin(size_t index, Eigen::Index row, Eigen::Index col
   }
   const double rounding = CalcBound(*term.entry, model().max_depth());
   const bool is_within_rounding = std::abs(entry.first - entry.second) <= rounding * term.scale(row, col);
-  if (!IsCause(term) || is_within_rounding || entry.units > 1.0) return;
+  if (!IsCause(term) || is_within_rounding || entry.units > 1.0 || entry.units < kOneNumber) return;
   const double open = 1.0 / (term.weight(row, col) * term.scale(row, col));
   if (loosest_ && open <= loosest_->units) return;
   loosest_ = entry;

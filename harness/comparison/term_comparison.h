@@ -29,6 +29,9 @@ struct Excess {
   double when = 0.0;
 };
 
+/// Numbers that differ by less than this fraction of the printed precision are one, printed in two forms.
+inline constexpr double kOneNumber = 1e-3;
+
 /// Keeps each term's numbers by each provider, and their records. Two providers are compared in all terms
 /// that both have. Bounds and scales are those of the analytic model's terms (rounding_scales.h). If one
 /// provider is reduced, all are: by T of CalcCouplingMap, at states in which the followers follow.
@@ -62,7 +65,8 @@ class TermComparison {
   /// The worst entry of each place whose error is above 1; empty before CompareWithin.
   [[nodiscard]] const std::vector<Excess>& excesses() const { return excesses_; }
   /// The entry of the causes with the coarsest comparison among those that differ by more than rounding and
-  /// by no more than U: `units` is U relative to the term's scale. None where there is no such entry.
+  /// kOneNumber and by no more than U: `units` is U relative to the term's scale. None where there is no such
+  /// entry.
   [[nodiscard]] const std::optional<Excess>& loosest() const { return loosest_; }
 
   /// Everything that scales are formed from. Nothing else is known of the state.

@@ -8,10 +8,11 @@
 namespace dexcheck {
 namespace {
 
-/// Moves the own frame, which may stand beside the joint's axis as an MJCF's does, to the row's place on it.
-Eigen::Translation3d MoveToAxis(const RobotDescription& robot, int joint) {
-  if (joint < 0) return Eigen::Translation3d(Vector3d::Zero());
-  return Eigen::Translation3d(robot.joints[static_cast<size_t>(joint)].X_iL.inverse().translation());
+/// The own frame in frame i, moved to the row's place on the joint's axis: an MJCF's may stand beside it.
+Pose PlaceOnAxis(const RobotDescription& robot, int joint) {
+  Pose X_iL = Pose::Identity();
+  if (joint >= 0) X_iL.linear() = robot.joints[static_cast<size_t>(joint)].X_iL.linear();
+  return X_iL;
 }
 
 Pose CalcRow(const Joint& joint, const MdhRow& mdh) {
@@ -28,10 +29,8 @@ std::vector<JointInLinkFrames> ListJointsInLinkFrames(const RobotDescription& ro
   std::vector<JointInLinkFrames> rows;
   for (size_t i = 0; i < robot.spec.joints.size(); ++i) {
     const Joint& joint = robot.spec.joints[i];
-    const Pose X_iL = robot.joints[i].X_iL * MoveToAxis(robot, static_cast<int>(i));
-    Pose X_jP = Pose::Identity();
-    if (joint.parent >= 0)
-      X_jP = robot.joints[static_cast<size_t>(joint.parent)].X_iL * MoveToAxis(robot, joint.parent);
+    const Pose X_iL = PlaceOnAxis(robot, static_cast<int>(i));
+    const Pose X_jP = PlaceOnAxis(robot, joint.parent);
     JointInLinkFrames& row = rows.emplace_back();
     row.parent = joint.parent;
     row.is_revolute = joint.type != JointType::kPrismatic;
@@ -67,7 +66,8 @@ std::vector<LinkPlace> PlaceLinks(const RobotDescription& a, const RobotDescript
     if (!HasParts(b, b_of_a[i])) continue;  // between several joints of one body there is none
     const Pose X_own = poses_a[i + 1].inverse(Eigen::Isometry) * poses_b[j + 1];
     places.push_back({static_cast<int>(i), b_of_a[i],
-                      a.joints[i].X_iL * X_own * b.joints[j].X_iL.inverse(Eigen::Isometry)});
+                      PlaceOnAxis(a, static_cast<int>(i)) * X_own *
+                          PlaceOnAxis(b, static_cast<int>(j)).inverse(Eigen::Isometry)});
   }
   return places;
 }
