@@ -342,21 +342,42 @@ std::vector<std::string> LeaveOutShared(const std::vector<EnginePart>& first,
   return lines;
 }
 
+namespace {
+
+/// Names of motors of one file that the other one has, too, or has not.
+std::vector<std::string> ListMotors(const std::vector<EnginePart>& own, const std::vector<EnginePart>& other,
+                                    bool is_shared) {
+  std::vector<std::string> names;
+  for (const EnginePart& part : own) {
+    if (part.kind == PartKind::kActuator && (FindPart(other, part.key) != nullptr) == is_shared)
+      names.push_back(part.name.substr(part.name.find(' ') + 1));
+  }
+  return names;
+}
+
+}  // namespace
+
 std::vector<std::string> ListLoneMotors(const std::vector<EnginePart>& first,
                                         const std::vector<EnginePart>& second, const std::string& first_file,
                                         const std::string& second_file) {
   std::vector<std::string> lines;
   const auto list = [&](const auto& own, const auto& other, const std::string& file) {
-    std::vector<std::string> names;
-    for (const EnginePart& part : own) {
-      if (part.kind == PartKind::kActuator && FindPart(other, part.key) == nullptr)
-        names.push_back(part.name.substr(part.name.find(' ') + 1));
-    }
+    const std::vector<std::string> names = ListMotors(own, other, false);
     if (!names.empty()) lines.push_back("motors only in " + file + ": " + JoinNames(names));
   };
   list(first, second, first_file);
   list(second, first, second_file);
   return lines;
+}
+
+std::vector<std::string> CompareMotorOrder(const std::vector<EnginePart>& first,
+                                           const std::vector<EnginePart>& second,
+                                           const std::string& first_file, const std::string& second_file) {
+  const std::vector<std::string> own = ListMotors(first, second, true),
+                                 other = ListMotors(second, first, true);
+  if (own == other) return {};
+  return {fmt::format("order of motors, and of their controls: {} in {}; {} in {}", JoinNames(own),
+                      first_file, JoinNames(other), second_file)};
 }
 
 }  // namespace dexcheck

@@ -73,4 +73,10 @@ std::vector<std::string> ListLoneMotors(const std::vector<EnginePart>& first,
                                         const std::vector<EnginePart>& second, const std::string& first_file,
                                         const std::string& second_file);
 
+/// Compares the order in which two files have the motors that both have, which is the order of controls.
+/// @return a line with both orders; none where they are one.
+std::vector<std::string> CompareMotorOrder(const std::vector<EnginePart>& first,
+                                           const std::vector<EnginePart>& second,
+                                           const std::string& first_file, const std::string& second_file);
+
 }  // namespace dexcheck

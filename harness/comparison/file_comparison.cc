@@ -150,6 +150,7 @@ std::vector<EnginePart> ListFirstParts(const DescriptionFile& first, const Engin
   const std::string file = first.path().filename(), other = comparison->second.filename();
   comparison->without_effect = CompareOptions(own_engine->opt, engine->opt, file, other);
   AppendTo(&comparison->without_effect, CompareContacts(own.notes, parts.notes));
+  AppendTo(&comparison->without_effect, CompareMotorOrder(own.parts, parts.parts, file, other));
   AppendTo(&comparison->not_compared, ListLoneMotors(own.parts, parts.parts, file, other));
   AppendTo(&comparison->not_compared, LeaveOutShared(own.parts, parts.parts, *own_engine, engine));
   return std::move(own.parts);

@@ -99,8 +99,16 @@ class MjcfDescriptionReader {
       for (int k = 0; k < count; ++k) place = AddJoint(first + k, k + 1 == count, place);
     }
     places_[static_cast<size_t>(body)] = place;
+    if (count == 0 && place.joint >= 0) AddFrame(body, place);
     AddPart(body, place, ReadEngineBody(engine_, body),
             ReadPose(engine_.body_ipos + 3 * body, engine_.body_iquat + 4 * body));
+  }
+
+  /// A body that is welded to a link is a frame on it, as a link of a URDF is, unless a site has its name.
+  void AddFrame(int body, const Place& place) {
+    const char* const name = engine_.names + engine_.name_bodyadr[body];
+    if (*name != '\0' && mj_name2id(&engine_, mjOBJ_SITE, name) < 0)
+      robot_.spec.frames.push_back({name, place.joint, place.X_iL, {}});
   }
 
   void AddPart(int body, const Place& place, const MassProperties& mass, const Pose& X_LC) {

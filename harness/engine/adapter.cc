@@ -108,10 +108,13 @@ void Adapter::MatchJoints(const std::string& engine_source) {
     known.insert(joint_ids_.back());
   }
   for (const Frame& frame : model_->frames()) {
-    const bool is_body =
-        frame.name == model_->link_name(frame.link) && link_bodies_[static_cast<size_t>(frame.link + 1)] >= 0;
-    frame_sites_.push_back(is_body ? mj_name2id(&engine, mjOBJ_SITE, frame.name.c_str())
-                                   : need(mjOBJ_SITE, "site", frame.name));
+    int body = link_bodies_[static_cast<size_t>(frame.link + 1)];
+    if (frame.name != model_->link_name(frame.link))
+      body = frame.sphere_radius ? -1 : FindByName(engine, mjOBJ_BODY, frame.name);
+    const int site = body >= 0 ? mj_name2id(&engine, mjOBJ_SITE, frame.name.c_str())
+                               : need(mjOBJ_SITE, "site", frame.name);
+    frame_sites_.push_back(site);
+    frame_bodies_.push_back(site >= 0 ? engine.site_bodyid[site] : body);
   }
   if (model_->object()) object_body_ = need(mjOBJ_BODY, "body", model_->object()->name);
   if (object_body_ >= 0 && engine.body_jntnum[object_body_] > 0) {

@@ -48,9 +48,11 @@ class Adapter {
   [[nodiscard]] const std::vector<int>& link_bodies() const { return link_bodies_; }
   /// All engine bodies that move as one with a link (welded to it), by the link's index + 1.
   [[nodiscard]] const std::vector<std::vector<int>>& welded_bodies() const { return welded_bodies_; }
-  /// Engine's site of each frame of the model; -1 for a frame without a site that has its link's name, and is
-  /// the frame of the link's body.
+  /// Engine's site of each frame of the model; -1 for a frame that is a body's: its link's, or that of a body
+  /// of its name.
   [[nodiscard]] const std::vector<int>& frame_sites() const { return frame_sites_; }
+  /// Engine's body that carries each frame.
+  [[nodiscard]] const std::vector<int>& frame_bodies() const { return frame_bodies_; }
   /// Engine's geom of a fingertip (FindTipSphere). @throws InputError unless it can touch.
   [[nodiscard]] int RequireTipGeom(int frame) const;
   /// Engine's body of the object; -1 without one.
@@ -102,7 +104,7 @@ class Adapter {
   std::vector<int> joint_qpos_;
   std::vector<int> link_bodies_;
   std::vector<std::vector<int>> welded_bodies_;
-  std::vector<int> frame_sites_;
+  std::vector<int> frame_sites_, frame_bodies_;
   std::vector<EngineWheel> wheels_;
   int object_body_ = -1, object_qpos_ = -1, object_dof_ = -1;
 

@@ -28,13 +28,6 @@ Pose EngineTerms::FramePose(int frame) const {
   return MapPose(data_->site_xmat + 9 * site, data_->site_xpos + 3 * site);
 }
 
-int EngineTerms::body_of(int frame) const {
-  const int site = adapter_->frame_sites()[static_cast<size_t>(frame)];
-  if (site >= 0) return engine_->site_bodyid[site];
-  const int link = adapter_->model().frame(frame).link;
-  return adapter_->link_bodies()[static_cast<size_t>(link + 1)];
-}
-
 const mjtNum* EngineTerms::PlaceOf(int frame) const {
   const int site = adapter_->frame_sites()[static_cast<size_t>(frame)];
   return site < 0 ? data_->xpos + 3 * body_of(frame) : data_->site_xpos + 3 * site;

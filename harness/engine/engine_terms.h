@@ -133,7 +133,7 @@ class EngineTerms {
 
   EngineTerms(const Adapter& adapter, Coordinates coordinates, std::span<const int> frames);
   [[nodiscard]] const Chain& chain_of(int frame) const { return chains_[static_cast<size_t>(frame)]; }
-  [[nodiscard]] int body_of(int frame) const;
+  [[nodiscard]] int body_of(int frame) const { return adapter_->frame_bodies()[static_cast<size_t>(frame)]; }
   /// A frame's origin in the world.
   [[nodiscard]] const mjtNum* PlaceOf(int frame) const;
   /// Motion of a point that a dof moves, per its rate: [linear; angular], world axes.
