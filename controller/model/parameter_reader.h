@@ -16,6 +16,7 @@ struct WrittenRow {
   /// The link's own frame L, in which the file gives its mass and what hangs on it, in frame i.
   Pose X_iL = Pose::Identity();
   bool is_plain = false;  ///< A plain transform (xyz, rpy, axis), not Denavit-Hartenberg parameters.
+  Vector3d rpy = Vector3d::Zero();  ///< Of a plain transform, rad.
   // Whether the file states these constants of the joint. What it does not state is zero in the model.
   bool states_damping = true;
   bool states_dry_friction = true;

@@ -177,6 +177,7 @@ void ReadPlainTransform(TomlTable& table, SegmentRow& row) {
   const std::optional<TomlValue> axis = table.Find("axis");
   const Vector3d z = axis ? ReadAxis(*axis) : Vector3d::UnitZ();
   row.written.is_plain = true;
+  row.written.rpy = table.FindAngles<3>("rpy").value_or(Vector3d::Zero());
   row.X_before = X_PL;
   if (z == Vector3d::UnitZ()) return;
   const Matrix3d R = MakeRotationFromZ(z);

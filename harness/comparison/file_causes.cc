@@ -9,6 +9,7 @@
 #include "harness/base/worst.h"
 #include "harness/comparison/description_match.h"
 #include "harness/corrections/candidate_search.h"
+#include "harness/corrections/link_match.h"
 
 namespace dexcheck {
 namespace {
@@ -162,19 +163,12 @@ void LeaveOutUnstated(const std::vector<std::string>& ignore, PrintedRobot* robo
 
 namespace {
 
-/// Takes out of a robot the frames that are links in the other one, unless links of one name carry both.
-void LeaveOutFrames(const PrintedRobot& other, PrintedRobot* robot) {
-  for (int i = robot->size() - 1; i > 0; --i) {
-    const bool is_link = std::ranges::any_of(other.links, [&](const PrintedLink& link) {
-      return !link.is_frame && link.name == robot->link(i).name;
-    });
-    if (!robot->link(i).is_frame || !is_link) continue;
-    // Frames carry nothing and stand last, so that links keep their numbers.
-    for (PrintedLink& link : robot->links) {
-      std::erase(link.children, i);
-      for (int& child : link.children) child -= child > i ? 1 : 0;
-    }
-    robot->links.erase(robot->links.begin() + i);
+/// Makes frames of links that are frames on their link in the other robot.
+void TakeFrames(const PrintedRobot& other, PrintedRobot* robot) {
+  for (PrintedLink& link : robot->links) {
+    link.is_frame = link.is_frame || (!Moves(link) && std::ranges::any_of(other.links, [&](const auto& one) {
+                      return one.is_frame && one.name == link.name;
+                    }));
   }
 }
 
@@ -192,8 +186,8 @@ void LeaveOutHalfTurns(PrintedRobot* robot) {
 }  // namespace
 
 void LeaveOutUnshared(PrintedRobot* a, PrintedRobot* b) {
-  LeaveOutFrames(*b, a);
-  LeaveOutFrames(*a, b);
+  TakeFrames(*b, a);
+  TakeFrames(*a, b);
   if (a->format != RobotFormat::kToml && b->format != RobotFormat::kToml) return;
   for (PrintedRobot* const robot : {a, b}) LeaveOutHalfTurns(robot);
 }
@@ -215,8 +209,8 @@ bool IsExplained(const std::string& check, const CorrectionItem& cause) {
       {"joint_spring", {kStiffness, kSpringAngle}},
       {"joint_coupling", {kMimic}},
       {"equality_constraint", {kMimic, kConstraint}},
-      {"motor_limit", {kEffort, kGear}},
-      {"motor_transmission", {kGear}},
+      {"motor_limit", {kEffort, kGear, kMotor}},
+      {"motor_transmission", {kGear, kMotor}},
       {"gravity_vector", {kGravity}}};
   const auto kinds = kKindsOfChecks.find(check);
   return std::ranges::any_of(cause.sites, [&](const Site& site) {

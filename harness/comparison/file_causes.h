@@ -44,8 +44,8 @@ struct FileCauses {
 /// state nothing: a limit of effort or velocity of 0.
 void LeaveOutUnstated(const std::vector<std::string>& ignore, PrintedRobot* robot);
 
-/// Takes out of both robots what says nothing beside the other one: frames that are links there, unless links
-/// of one name carry both, and beside a table ranges of half a turn to both sides, which a table states of a
+/// Makes frames of links that are frames in the other robot, and takes out of both what says nothing beside
+/// the other one: beside a table ranges of half a turn to both sides, which a table states of a
 /// joint without a range.
 void LeaveOutUnshared(PrintedRobot* a, PrintedRobot* b);
 

@@ -231,21 +231,28 @@ void CandidateSearch::SearchInertiaNumbers(const Part& part) {
       ToEntries(R.isIdentity(1e-9) ? part.open.inertia
                                    : Matrix3d(R.transpose().cwiseAbs() * part.open.inertia * R.cwiseAbs()));
   const std::string values = DescribeEntries(kInertiaNames, given6.data(), right6.data(), open.data());
-  const auto offer = [&](Kind kind, double bits, const std::string& shown, int component = 0) {
-    Try(part.Make({kind, SiteKind::kInertia, component}, bits, shown), part.link,
-        [right6, open](PrintedLink* made) {
-          made->inertial->I = right6;
-          made->inertial->half_I = open;
-        });
+  const auto offer = [&](Kind kind, double bits, const std::string& shown, int component = 0,
+                         bool in_second = false) {
+    EditTrial trial = part.Make({kind, SiteKind::kInertia, component}, bits, shown);
+    trial.fault.in_second = in_second;
+    Try(trial, part.link, [right6, open](PrintedLink* made) {
+      made->inertial->I = right6;
+      made->inertial->half_I = open;
+    });
   };
   offer(Kind::kNumber, CountEntries(6, given6.data(), right6.data(), open.data()), values);
   const auto solve = [](const Matrix3d& tensor) -> Vector3d {
     return Eigen::SelfAdjointEigenSolver<Matrix3d>(tensor).eigenvalues();
   };
   const bool same_moments = ((solve(I) - solve(right)).cwiseAbs().array() <= open.maxCoeff()).all();
+  const auto is_same = [](const auto& x, const auto& y, const auto& within) {
+    return ((x - y).cwiseAbs().array() <= within.array()).all();
+  };
+  const bool same_diagonal = is_same(given6.head<3>(), right6.head<3>(), open.head<3>());
+  if (same_diagonal && is_same(right6.tail<3>(), Vector3d::Zero(), open.tail<3>()))
+    offer(Kind::kNoProducts, 3.0, "", 0, true);
   if (given6.tail<3>().isZero()) {
-    if (((given6 - right6).head<3>().cwiseAbs().array() <= open.head<3>().array()).all())
-      offer(Kind::kNoProducts, 3.0, values);
+    if (same_diagonal) offer(Kind::kNoProducts, 3.0, values);
     if (same_moments) offer(Kind::kNoAxes, 5.0, "");
   } else if (same_moments && R.isIdentity(1e-12)) {
     // Both files print six equal numbers and one turns their frame: the rotation was lost, or made up.

@@ -60,6 +60,7 @@ class CandidateSearch {
   void SearchScalar(int link, JointScalar scalar);
   void SearchAxis(int link);
   void SearchRobot();
+  void SearchMotors(const Site& site);
 
   // place_candidates.cc
   void SearchPlace(int link);

@@ -73,6 +73,7 @@ struct SiteWords {
 constexpr SiteWords kSites[] = {{SiteKind::kCarrier, "carrier", "carrying link"},
                                 {SiteKind::kPresence, "joint", "joint"},
                                 {SiteKind::kName, "joint", "name"},
+                                {SiteKind::kLinkName, "link", "name"},
                                 {SiteKind::kType, "type", "type"},
                                 {SiteKind::kPosition, "origin", "position"},
                                 {SiteKind::kRotation, "rotation", "rotation"},
@@ -92,7 +93,8 @@ constexpr SiteWords kSites[] = {{SiteKind::kCarrier, "carrier", "carrying link"}
                                 {SiteKind::kCom, "com", "centre of mass"},
                                 {SiteKind::kInertia, "inertia", "inertia"},
                                 {SiteKind::kGravity, "gravity", "gravity"},
-                                {SiteKind::kConstraint, "constraint", "constraint"}};
+                                {SiteKind::kConstraint, "constraint", "constraint"},
+                                {SiteKind::kMotor, "motor", "driven joint"}};
 
 /// A kind in a name and in words; "{}" stands for its component.
 struct KindWords {
@@ -203,7 +205,7 @@ std::string NameComponent(const FileFault& fault, bool is_id) {
 }
 
 std::string DescribeKind(const FileFault& fault) {
-  if (fault.kind == Kind::kExchanged && fault.of == SiteKind::kName) return "exchanged";
+  if (fault.kind == Kind::kExchanged && IsName(fault.of)) return "exchanged";
   std::string component;
   if (fault.kind == Kind::kFrame) {
     FileFault rotation = fault;
@@ -229,7 +231,7 @@ bool IsSameFault(const FileFault& a, const FileFault& b) {
 
 std::string NamePlace(const PrintedLink& link, SiteKind kind) {
   if (link.is_frame) return "frame " + link.name;
-  if (IsOfBody(kind) || link.joint.name.empty()) return "link " + link.name;
+  if (IsOfBody(kind) || kind == SiteKind::kLinkName || link.joint.name.empty()) return "link " + link.name;
   return "joint " + link.joint.name;
 }
 

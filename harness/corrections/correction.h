@@ -17,6 +17,7 @@ enum class SiteKind {
   kCarrier,   ///< The link that carries it.
   kPresence,  ///< The joint and its link are in one file only.
   kName,
+  kLinkName,
   kType,
   kPosition,
   kRotation,
@@ -39,8 +40,10 @@ enum class SiteKind {
   // Quantities of the robot.
   kGravity,
   kConstraint,  ///< A constraint or spring between links.
+  kMotor,       ///< The joints that motors drive.
 };
 inline bool IsOfBody(SiteKind kind) { return kind >= SiteKind::kMass && kind <= SiteKind::kInertia; }
+inline bool IsName(SiteKind kind) { return kind == SiteKind::kName || kind == SiteKind::kLinkName; }
 inline bool IsOfPose(SiteKind kind) { return kind == SiteKind::kPosition || kind == SiteKind::kRotation; }
 inline SiteKind ToSite(JointScalar scalar) {
   return static_cast<SiteKind>(static_cast<int>(SiteKind::kDamping) + static_cast<int>(scalar));

@@ -73,8 +73,9 @@ struct SettledSite {
 /// One direction: what of `a` is wrong.
 class OneWay {
  public:
-  OneWay(const PrintedRobot& a, const PrintedRobot& b, bool is_second, bool by_tree, int* budget)
-      : pair_(a, b, by_tree), is_second_(is_second), budget_(budget) {}
+  OneWay(const PrintedRobot& a, const PrintedRobot& b, bool is_second, int* budget,
+         MatchBy by = MatchBy::kLinks)
+      : pair_(a, b, by), is_second_(is_second), budget_(budget) {}
 
   /// Counts the sites that differ with the cheapest frames.
   size_t CountSites() {
@@ -418,9 +419,9 @@ void TryReadings(const PrintedRobot& a, const PrintedRobot& b, bool of_second, i
                  FileCorrections* found) {
   constexpr double kReading = 10.0;
   constexpr double kClearer = 20.0;
-  const size_t sites = OneWay(a, b, false, false, budget).CountSites();
+  const size_t sites = OneWay(a, b, false, budget).CountSites();
   for (const WholeReading& reading : ListWholeReadings(of_second ? b : a)) {
-    OneWay way(of_second ? a : reading.robot, of_second ? reading.robot : b, false, false, budget);
+    OneWay way(of_second ? a : reading.robot, of_second ? reading.robot : b, false, budget);
     if (2 * way.CountSites() > sites) continue;
     FileCorrections read = way.Run();
     if (read.bits + kReading + kClearer >= found->bits) continue;
@@ -447,15 +448,17 @@ FileCorrections FindCorrections(const PrintedRobot& a, const PrintedRobot& b,
   constexpr double kClearer = 20.0;
   constexpr double kSeveral = 40.0;
   int budget = options.trials;
-  FileCorrections best = OneWay(a, b, false, false, &budget).Run();
+  FileCorrections best = OneWay(a, b, false, &budget).Run();
   if (best.agrees || best.bits <= kOneFault) return best;
   const auto take = [&](FileCorrections found) {
     if (!found.agrees && found.bits + kClearer < best.bits) best = std::move(found);
   };
-  // Joints whose names were exchanged are others' by them.
-  if (best.bits > kSeveral && MatchLinks(a, b, true).b_of_a != MatchLinks(a, b).b_of_a)
-    take(OneWay(a, b, false, true, &budget).Run());
-  take(OneWay(b, a, true, false, &budget).Run());
+  // Links or joints whose names were exchanged are others' by them.
+  for (const MatchBy by : {MatchBy::kTree, MatchBy::kJoints}) {
+    if (best.bits > kSeveral && MatchLinks(a, b, by).b_of_a != MatchLinks(a, b).b_of_a)
+      take(OneWay(a, b, false, &budget, by).Run());
+  }
+  take(OneWay(b, a, true, &budget).Run());
   for (const bool of_second : {false, true}) {
     if (best.bits > kSeveral) TryReadings(a, b, of_second, &budget, &best);
   }
@@ -481,7 +484,7 @@ std::string DescribeItem(const CorrectionItem& item, bool /*of_second*/) {
   }
   if (values.empty() || values.size() > kShown) return text;
   const bool is_name = item.fault.kind == CorrectionKind::kOfOther ||
-                       (item.fault.kind == CorrectionKind::kExchanged && item.fault.of != SiteKind::kName);
+                       (item.fault.kind == CorrectionKind::kExchanged && !IsName(item.fault.of));
   text += is_name ? " " : ": ";
   for (size_t k = 0; k < values.size(); ++k) text += (k > 0 ? "; " : "") + values[k];
   return text;

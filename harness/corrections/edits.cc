@@ -130,7 +130,11 @@ std::vector<LinkEdit> ListRowEdits(const PrintedOrigin& origin) {
       edits.back().fault.whole = true;
     };
     scale(Kind::kSignOf, k, 0.0, -1.0);
-    k % 2 == 0 ? scale(Kind::kDegrees, 0, 1.0, kDegree) : scale(Kind::kUnit, 0, 1.0, 1e-3);
+    if (k % 2 != 0) scale(Kind::kUnit, 0, 1.0, 1e-3);
+    // The only angle of a row is its rotation.
+    const double bits = row.r[0] != 0.0 && row.r[1] != 0.0 ? 1.0 : 4.5;
+    if (k % 2 == 0) scale(Kind::kDegrees, 0, bits, kDegree);
+    if (k % 2 == 0) scale(Kind::kRadians, 0, bits, 1.0 / kDegree);
   }
   return edits;
 }

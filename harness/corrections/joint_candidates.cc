@@ -198,6 +198,33 @@ void CandidateSearch::SearchJoint(int link) {
   }
 }
 
+/// Motors that drive other joints, which then have their gears and limits.
+void CandidateSearch::SearchMotors(const Site& site) {
+  PrintedRobot moved = pair_.a();
+  EditTrial trial = MakeTrial(Kind::kNumber, SiteKind::kMotor, 0.0);
+  for (PrintedMotor& motor : moved.motors) {
+    const int right = pair_.FindDriven(motor);
+    if (right < 0 || right == motor.link) continue;
+    trial.values += fmt::format("{}{} drives {} here, {} in the other file", trial.values.empty() ? "" : "; ",
+                                motor.name, moved.link(motor.link).joint.name, moved.link(right).joint.name);
+    trial.bits += 3.0;
+    motor.link = right;
+  }
+  TakeMotors(&moved);
+  std::vector<Site> right = {site};
+  for (const Site& other : sites_) {
+    if (other.kind == SiteKind::kConstraint && moved.constraints == pair_.b().constraints)
+      right.push_back(other);
+    if (other.kind != SiteKind::kGear && other.kind != SiteKind::kEffort) continue;
+    const JointScalar scalar = other.kind == SiteKind::kGear ? JointScalar::kGear : JointScalar::kEffort;
+    const std::optional<PrintedScalar> x = TakeScalar(moved.link(other.link), scalar, true);
+    const std::optional<PrintedScalar> y =
+        TakeScalar(pair_.b().link(pair_.Partner(other.link)), scalar, true);
+    if (x && y && !Differ(*x, *y)) right.push_back(other);
+  }
+  Add(trial, site.link, right);
+}
+
 /// Names, joints that one file lacks, and what is of the whole robot.
 void CandidateSearch::SearchRobot() {
   const PrintedRobot& a = pair_.a();
@@ -211,6 +238,11 @@ void CandidateSearch::SearchRobot() {
       AddSimple(MakeTrial(Kind::kExchanged, SiteKind::kName, 1.0,
                           fmt::format("{} should be {}", a.link(site.link).joint.name, right)),
                 site.link, [right](PrintedLink* made) { made->joint.name = right; });
+    } else if (site.kind == SiteKind::kLinkName) {
+      add(Kind::kExchanged, 1.0,
+          fmt::format("{} should be {}", a.link(site.link).name, b.link(pair_.Partner(site.link)).name));
+    } else if (site.kind == SiteKind::kMotor) {
+      SearchMotors(site);
     } else if (site.kind == SiteKind::kPresence) {
       const bool second = site.link < 0;
       const PrintedLink& link = second ? b.link(-1 - site.link) : a.link(site.link);

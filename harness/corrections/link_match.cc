@@ -41,12 +41,20 @@ class LinkMatcher {
     match_.a_of_b.assign(b.links.size(), -1);
   }
 
-  LinkMatch Run(bool by_tree) {
+  LinkMatch Run(MatchBy by) {
     std::map<std::string, int> links, joints;
     for (int j = 0; j < b_.size(); ++j) {
       links.emplace(b_.link(j).name, j);
       if (Moves(b_.link(j))) joints.emplace(b_.link(j).joint.name, j);
     }
+    std::vector<int> by_joint;
+    const auto match_joints = [&] {
+      for (int i = 0; i < a_.size(); ++i) {
+        const auto found = joints.find(a_.link(i).joint.name);
+        if (Moves(a_.link(i)) && found != joints.end() && Take(i, found->second)) by_joint.push_back(i);
+      }
+    };
+    if (by == MatchBy::kJoints) match_joints();
     for (int i = 0; i < a_.size(); ++i) {
       const auto found = links.find(a_.link(i).name);
       if (found == links.end()) continue;
@@ -55,15 +63,10 @@ class LinkMatcher {
       const bool is_frame = a_.link(i).is_frame || other.is_frame;
       if (!is_frame || (!Moves(a_.link(i)) && !Moves(other))) Take(i, found->second);
     }
-    std::vector<int> by_joint;
-    for (int i = 0; i < a_.size(); ++i) {
-      const auto found = joints.find(a_.link(i).joint.name);
-      if (!Moves(a_.link(i)) || found == joints.end() || !Take(i, found->second)) continue;
-      by_joint.push_back(i);
-    }
+    match_joints();
     MatchAlike(&by_joint);
     MatchRoot();
-    if (by_tree || std::ranges::any_of(by_joint, [&](int i) { return !IsCarriedAlike(i); })) {
+    if (by == MatchBy::kTree || std::ranges::any_of(by_joint, [&](int i) { return !IsCarriedAlike(i); })) {
       for (const int i : by_joint) {
         match_.a_of_b[Index(match_.b_of_a[Index(i)])] = -1;
         match_.b_of_a[Index(i)] = -1;
@@ -203,8 +206,8 @@ bool HasAxis(const PrintedLink& link) {
   return link.joint.kind == JointKind::kHinge || link.joint.kind == JointKind::kSlide;
 }
 
-LinkMatch MatchLinks(const PrintedRobot& a, const PrintedRobot& b, bool by_tree) {
-  return LinkMatcher(a, b).Run(by_tree);
+LinkMatch MatchLinks(const PrintedRobot& a, const PrintedRobot& b, MatchBy by) {
+  return LinkMatcher(a, b).Run(by);
 }
 
 std::vector<Node> ListNodes(const PrintedRobot& robot, const std::vector<int>& other) {
@@ -219,10 +222,13 @@ std::vector<Node> ListNodes(const PrintedRobot& robot, const std::vector<int>& o
       Node& node = nodes[at];
       home[at] = node.link = i;
       int from = i;
-      for (; from >= 0 && (from == i || nodes[static_cast<size_t>(from)].link < 0);
-           from = robot.link(from).parent)
+      const auto carries = [&](int k) {
+        return nodes[static_cast<size_t>(k)].link >= 0 && !robot.link(k).is_frame;
+      };
+      for (; from >= 0 && (from == i || !carries(from)); from = robot.link(from).parent)
         node.chain.insert(node.chain.begin(), from);
       node.parent = from;
+      if (link.is_frame) home[at] = above;
     } else if (!Moves(link) && above >= 0) {
       home[at] = above;
     }

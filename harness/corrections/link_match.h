@@ -16,8 +16,13 @@ struct LinkMatch {
 
 /// Matches links by name, then by their joints' names, then by similar names, then by the tree, which
 /// decides too where names contradict it.
-/// @param by_tree joints' names do not count.
-LinkMatch MatchLinks(const PrintedRobot& a, const PrintedRobot& b, bool by_tree = false);
+/// Whose names say which link is which.
+enum class MatchBy {
+  kLinks,   ///< Links' names; joints' where there are no such links.
+  kTree,    ///< Links' names; where there are no such links the tree.
+  kJoints,  ///< Joints' names; links' where there are no such joints.
+};
+LinkMatch MatchLinks(const PrintedRobot& a, const PrintedRobot& b, MatchBy by = MatchBy::kLinks);
 
 bool Moves(const PrintedLink& link);
 /// Whether a link turns about an axis or moves along one.

@@ -35,24 +35,32 @@ bool Differ(const PrintedScalar& a, const PrintedScalar& b) {
            (a.half + b.half) * (1.0 + kRounding) + kRounding * std::abs(b.value));
 }
 
-PrintedPair::PrintedPair(PrintedRobot a, PrintedRobot b, bool by_tree) : a_(std::move(a)), b_(std::move(b)) {
-  // A URDF does not say what drives a joint.
+PrintedPair::PrintedPair(PrintedRobot a, PrintedRobot b, MatchBy by) : a_(std::move(a)), b_(std::move(b)) {
+  // A URDF does not say how a motor makes its force, and its reductions are no gears of another file.
   if (a_.format == RobotFormat::kUrdf || b_.format == RobotFormat::kUrdf) {
-    for (PrintedRobot* const robot : {&a_, &b_})
+    for (PrintedRobot* const robot : {&a_, &b_}) {
       std::erase_if(robot->constraints, [](const std::string& text) { return text.starts_with(kServo); });
+      if (a_.format == b_.format || robot->format != RobotFormat::kUrdf) continue;
+      robot->has_motors = false;
+      for (PrintedLink& link : robot->links)
+        link.joint.scalars[static_cast<size_t>(JointScalar::kGear)].reset();
+    }
   }
-  match_ = MatchLinks(a_, b_, by_tree);
+  match_ = MatchLinks(a_, b_, by);
   nodes_ = ListNodes(a_, match_.b_of_a);
   nodes_b_ = ListNodes(b_, match_.a_of_b);
   for (int i = 0; i < a_.size(); ++i) {
     if (Partner(i) >= 0 && node(i).link >= 0 && node_b(Partner(i)).link >= 0) links_.push_back(i);
   }
   other_ = MeasureNodes(nodes_b_, &b_);
-  given_ = MeasureNodes(nodes_, &a_);
-  SetFrames(std::vector<Pose>(a_.links.size(), Pose::Identity()));
+  X_ab_.assign(a_.links.size(), Pose::Identity());
+  Measure();
 }
 
-void PrintedPair::Measure() { given_ = MeasureNodes(nodes_, &a_); }
+void PrintedPair::Measure() {
+  given_ = MeasureNodes(nodes_, &a_);
+  SetFrames(std::move(X_ab_));
+}
 
 void PrintedPair::MeasureOther(int link) {
   const auto j = static_cast<size_t>(Partner(link));
@@ -279,6 +287,11 @@ void PrintedPair::ListConstantSites(int link, std::vector<Site>* sites) const {
   }
 }
 
+int PrintedPair::FindDriven(const PrintedMotor& motor) const {
+  const auto other = std::ranges::find(b_.motors, motor.name, &PrintedMotor::name);
+  return other == b_.motors.end() ? -1 : match_.a_of_b[static_cast<size_t>(other->link)];
+}
+
 void PrintedPair::ListRobotSites(std::vector<Site>* sites) const {
   for (int i = 0; i < a_.size(); ++i) {
     if (Moves(a_.link(i)) && Partner(i) < 0) sites->push_back({SiteKind::kPresence, i});
@@ -293,13 +306,20 @@ void PrintedPair::ListRobotSites(std::vector<Site>* sites) const {
   const bool is_link = a_.format == RobotFormat::kMjcf && b_.format == RobotFormat::kMjcf;
   if (a_.floats && b_.floats && *a_.floats != *b_.floats && !is_link) sites->push_back({SiteKind::kType, 0});
   if (a_.constraints != b_.constraints) sites->push_back({SiteKind::kConstraint, 0});
+  const auto is_other = [&](const PrintedMotor& motor) {
+    const int link = FindDriven(motor);
+    return link >= 0 && link != motor.link;
+  };
+  if (std::ranges::any_of(a_.motors, is_other)) sites->push_back({SiteKind::kMotor, 0});
 }
 
 std::vector<Site> PrintedPair::ListSites() const {
   std::vector<Site> sites;
   std::set<std::string> names, names_b;
-  for (const PrintedLink& link : a_.links) names.insert(link.joint.name);
-  for (const PrintedLink& link : b_.links) names_b.insert(link.joint.name);
+  for (const auto& [robot, all] : {std::pair(&a_, &names), std::pair(&b_, &names_b)}) {
+    for (const PrintedLink& link : robot->links)
+      all->insert({"joint " + link.joint.name, "link " + link.name});
+  }
   const auto compare = [&](SiteKind kind, int link) {
     if (!(CompareNode(kind, link) <= 1.0)) sites.push_back({kind, link});
   };
@@ -314,11 +334,17 @@ std::vector<Site> PrintedPair::ListSites() const {
     } else if (!IsPlaced(link) && node(link).parent >= 0 && node_b(j).parent >= 0) {
       sites.push_back({SiteKind::kCarrier, link});
     }
-    const std::string& name = a_.link(link).joint.name;
-    const std::string& name_b = b_.link(j).joint.name;
-    if (Moves(a_.link(link)) && Moves(b_.link(j)) && name != name_b && names.contains(name_b) &&
-        names_b.contains(name))
-      sites.push_back({SiteKind::kName, link});
+    const PrintedLink& ours = a_.link(link);
+    const PrintedLink& theirs = b_.link(j);
+    const auto is_exchanged = [&](const std::string& name, const std::string& other) {
+      return name != other && names.contains(other) && names_b.contains(name);
+    };
+    if (Moves(ours) && Moves(theirs)) {
+      if (is_exchanged("joint " + ours.joint.name, "joint " + theirs.joint.name))
+        sites.push_back({SiteKind::kName, link});
+      if (is_exchanged("link " + ours.name, "link " + theirs.name))
+        sites.push_back({SiteKind::kLinkName, link});
+    }
     // A base that stands still needs no inertial.
     const bool bears = !(link == 0 || j == 0) || (!node(link).parts.empty() && !node_b(j).parts.empty());
     if (!bears || (node(link).parts.empty() && node_b(j).parts.empty())) continue;

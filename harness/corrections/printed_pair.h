@@ -33,8 +33,7 @@ struct GivenNode {
 
 class PrintedPair {
  public:
-  /// @param by_tree names of joints do not say which link is which.
-  PrintedPair(PrintedRobot a, PrintedRobot b, bool by_tree = false);
+  PrintedPair(PrintedRobot a, PrintedRobot b, MatchBy by = MatchBy::kLinks);
 
   [[nodiscard]] const PrintedRobot& a() const { return a_; }
   [[nodiscard]] PrintedRobot* mutable_a() { return &a_; }
@@ -73,6 +72,8 @@ class PrintedPair {
   void MeasureOther(int link);
   /// All that differs.
   [[nodiscard]] std::vector<Site> ListSites() const;
+  /// The first file's link whose joint the motor of that name drives in the second file; -1 without one.
+  [[nodiscard]] int FindDriven(const PrintedMotor& motor) const;
   /// Whether a file states some number of this kind at any joint.
   [[nodiscard]] static bool States(const PrintedRobot& robot, JointScalar scalar);
 

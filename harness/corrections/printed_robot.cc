@@ -1,5 +1,7 @@
 #include "harness/corrections/printed_robot.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cctype>
 #include <cmath>
@@ -137,6 +139,32 @@ int PrintedRobot::Add(PrintedLink added) {
   if (added.parent >= 0) link(added.parent).children.push_back(index);
   links.push_back(std::move(added));
   return index;
+}
+
+void TakeMotors(PrintedRobot* robot) {
+  std::erase_if(robot->constraints, [](const std::string& text) { return text.starts_with("servo "); });
+  for (int i = 0; i < robot->size(); ++i) {
+    PrintedLink& link = robot->link(i);
+    if (link.joint.kind == JointKind::kFixed) continue;
+    std::optional<PrintedScalar>& gear = link.joint.scalars[static_cast<size_t>(JointScalar::kGear)];
+    std::optional<PrintedScalar>& effort = link.joint.scalars[static_cast<size_t>(JointScalar::kEffort)];
+    gear.reset();
+    effort.reset();
+    for (const bool servos : {false, true}) {
+      const bool has_motor = servos && gear;
+      for (const PrintedMotor& motor : robot->motors) {
+        if (motor.link != i || motor.servo.empty() == servos) continue;
+        if (servos)
+          robot->constraints.push_back(fmt::format("{} joint {} {}",
+                                                   has_motor ? "servo beside the motor of" : kServo,
+                                                   link.joint.name, motor.servo));
+        if (!servos || !gear) gear = PrintedScalar{(gear ? gear->value : 0.0) + motor.gear, 0.0};
+        if (motor.effort)
+          effort = PrintedScalar{(effort ? effort->value : 0.0) + motor.effort->value, motor.effort->half};
+      }
+    }
+  }
+  std::ranges::sort(robot->constraints);
 }
 
 namespace {

@@ -111,6 +111,15 @@ struct PrintedLink {
 /// How a constraint begins that is a servo in the place of a motor, as the motors of many MJCFs are.
 inline constexpr const char* kServo = "servo at";
 
+/// A motor or servo of a joint.
+struct PrintedMotor {
+  std::string name;
+  int link = -1;  ///< That its joint moves.
+  double gear = 1.0;
+  std::optional<PrintedScalar> effort;  ///< Largest force, where it is the same in both directions.
+  std::string servo;                    ///< "(kp 5, kv 0.1)"; empty of a motor, whose force is its control.
+};
+
 struct PrintedRobot {
   std::string source;
   RobotFormat format = RobotFormat::kUrdf;
@@ -119,6 +128,7 @@ struct PrintedRobot {
   std::optional<bool> floats;            ///< Whether the root does; none where the file does not say it.
   std::vector<std::string> constraints;  ///< Between links, and springs and dampers between joints.
   bool has_motors = false;               ///< The file states motors.
+  std::vector<PrintedMotor> motors;      ///< Of an MJCF.
 
   [[nodiscard]] const PrintedLink& link(int index) const { return links[static_cast<size_t>(index)]; }
   [[nodiscard]] PrintedLink& link(int index) { return links[static_cast<size_t>(index)]; }
@@ -126,6 +136,10 @@ struct PrintedRobot {
   /// Adds a link below another one. @return its index.
   int Add(PrintedLink link);
 };
+
+/// Gives each joint the sum of the gears of its motors and the largest force that all of them may exert, and
+/// the robot its servos as constraints, since these pull at a joint whatever their control is.
+void TakeMotors(PrintedRobot* robot);
 
 /// A printed number and half a unit of its last digit.
 struct LinkNumber {

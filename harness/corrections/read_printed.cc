@@ -84,6 +84,25 @@ PrintedJoint ReadUrdfJoint(const UrdfJoint& joint) {
   return printed;
 }
 
+/// Gives joints the reductions of their transmissions.
+void ReadTransmissions(const Element& root, PrintedRobot* robot) {
+  for (const Element* const transmission : ListChildren(&root, "transmission")) {
+    std::string joint;
+    std::optional<PrintedScalar> reduction;
+    VisitElements(transmission, [&](const Element* element) {
+      const std::string_view name = element->Name();
+      if (name == "joint") joint = ReadAttribute(*element, "name");
+      if (name == "mechanicalReduction" && element->GetText() != nullptr)
+        reduction = ReadPrintedScalar(element->GetText());
+    });
+    const auto moved =
+        std::ranges::find_if(robot->links, [&](const PrintedLink& link) { return link.joint.name == joint; });
+    if (!reduction || moved == robot->links.end()) continue;
+    robot->has_motors = true;
+    moved->joint.scalars[static_cast<size_t>(JointScalar::kGear)] = reduction;
+  }
+}
+
 /// Half a unit of the last digit that a table needs for a number.
 PrintedScalar PrintShortest(double value) {
   constexpr int kDigits = 12;
@@ -116,10 +135,15 @@ PrintedOrigin PrintPose(const Pose& X) {
 }
 
 PrintedOrigin PrintRow(const Joint& joint, const WrittenRow& row, const Pose& X_jP) {
-  if (row.is_plain)
-    return PrintPose(X_jP.inverse() * joint.X_PB *
-                     CalcMdhTransform(joint.mdh.alpha, joint.mdh.a, joint.mdh.q, joint.mdh.d) * row.X_iL);
   PrintedOrigin origin;
+  if (row.is_plain) {
+    origin = PrintPose(X_jP.inverse() * joint.X_PB *
+                       CalcMdhTransform(joint.mdh.alpha, joint.mdh.a, joint.mdh.q, joint.mdh.d) * row.X_iL);
+    if (!TurnRollPitchYaw(row.rpy).isApprox(origin.CalcRotation(), 1e-9)) return origin;
+    origin.r.head<3>() = row.rpy;
+    origin.half_r.head<3>() = FindHalves<3>(row.rpy);
+    return origin;
+  }
   origin.form = RotationForm::kMdh;
   origin.X_before = X_jP.inverse() * joint.X_PB;
   origin.r.head<2>() << joint.mdh.alpha, joint.mdh.q;
@@ -254,6 +278,7 @@ PrintedRobot ReadPrintedUrdf(const std::string& text, const std::string& source)
     for (auto child = link.child_joints.rbegin(); child != link.child_joints.rend(); ++child)
       open.emplace_back(file.joint(*child).child, added);
   }
+  ReadTransmissions(*file.link(file.root()).element->Parent()->ToElement(), &robot);
   return robot;
 }
 

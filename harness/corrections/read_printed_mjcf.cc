@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <set>
 
 #include "controller/common/text.h"
 #include "harness/corrections/read_printed.h"
@@ -43,9 +42,7 @@ class PrintedMjcfReader {
     AddFrames();
     ReadEqualities();
     ReadTendons();
-    ReadMotors(false);
-    ReadMotors(true);
-    std::ranges::sort(robot_.constraints);
+    ReadMotors();
     return std::move(robot_);
   }
 
@@ -317,34 +314,25 @@ class PrintedMjcfReader {
     }
   }
 
-  /// The sum of the gears of each joint's motors, and the largest force that all of them may exert. What is
-  /// no motor pulls at its joint whatever its control is.
-  void ReadMotors(bool servos) {
+  void ReadMotors() {
     for (int i = 0; i < engine_.nu; ++i) {
       if (engine_.actuator_trntype[i] != mjTRN_JOINT) continue;
       robot_.has_motors = true;
-      const std::string name = NameOf(engine_, mjOBJ_JOINT, engine_.actuator_trnid[2 * i]);
+      PrintedMotor motor;
+      motor.name = NameOf(engine_, mjOBJ_ACTUATOR, i);
+      const std::string joint = NameOf(engine_, mjOBJ_JOINT, engine_.actuator_trnid[2 * i]);
+      const auto drives = [&](const PrintedLink& link) { return link.joint.name == joint; };
+      motor.link = static_cast<int>(std::ranges::find_if(robot_.links, drives) - robot_.links.begin());
+      motor.gear = engine_.actuator_gear[6 * i];
       const mjtNum* const bias = engine_.actuator_biasprm + mjNBIAS * i;
-      const bool is_servo = engine_.actuator_biastype[i] != mjBIAS_NONE && (bias[1] != 0.0 || bias[2] != 0.0);
-      if (!is_servo) motors_.insert(name);
-      if (is_servo && servos)
-        robot_.constraints.push_back(
-            fmt::format("{} joint {} (kp {:.6g}, kv {:.6g})",
-                        motors_.contains(name) ? "servo beside the motor of" : kServo, name, 0.0 - bias[1],
-                        0.0 - bias[2]));
-      for (PrintedLink& link : robot_.links) {
-        if (link.joint.name != name || link.joint.kind == JointKind::kFixed) continue;
-        std::optional<PrintedScalar>& gear = link.joint.scalars[static_cast<size_t>(JointScalar::kGear)];
-        if (is_servo != servos) continue;
-        if (!servos) gear = PrintedScalar{(gear ? gear->value : 0.0) + engine_.actuator_gear[6 * i], 0.0};
-        if (servos && !gear) gear = PrintedScalar{engine_.actuator_gear[6 * i], 0.0};
-        const std::optional<std::pair<double, double>> limits = FindForceLimits(engine_, i);
-        std::optional<PrintedScalar>& effort = link.joint.scalars[static_cast<size_t>(JointScalar::kEffort)];
-        if (limits && std::abs(limits->first + limits->second) <= 1e-9 * std::abs(limits->second))
-          effort = PrintedScalar{(effort ? effort->value : 0.0) + std::abs(limits->second),
-                                 kEngineDigits * std::abs(limits->second)};
-      }
+      if (engine_.actuator_biastype[i] != mjBIAS_NONE && (bias[1] != 0.0 || bias[2] != 0.0))
+        motor.servo = fmt::format("(kp {:.6g}, kv {:.6g})", 0.0 - bias[1], 0.0 - bias[2]);
+      const std::optional<std::pair<double, double>> limits = FindForceLimits(engine_, i);
+      if (limits && std::abs(limits->first + limits->second) <= 1e-9 * std::abs(limits->second))
+        motor.effort = {std::abs(limits->second), kEngineDigits * std::abs(limits->second)};
+      robot_.motors.push_back(std::move(motor));
     }
+    TakeMotors(&robot_);
   }
 
   const MjcfElement& root_;
@@ -355,7 +343,6 @@ class PrintedMjcfReader {
   std::array<char, 3> sequence_ = {'x', 'y', 'z'};
   PrintedRobot robot_;
   std::vector<PrintedLink> frames_;
-  std::set<std::string> motors_;  // joints that have one
   int body_ = 0;
 };
 

@@ -60,6 +60,7 @@ RobotDescription ReadTable(const std::string& text, const std::string& source) {
   for (size_t i = 0; i < robot.spec.joints.size(); ++i) {
     const Joint& joint = robot.spec.joints[i];
     static_cast<WrittenRow&>(robot.joints[i]) = rows[i];
+    robot.joints[i].largest_angle = rows[i].rpy.cwiseAbs().maxCoeff();
     AddPart(joint.link, joint.body, static_cast<int>(i), rows[i].X_iL, &robot);
   }
   NoteImpossibleBodies(&robot);

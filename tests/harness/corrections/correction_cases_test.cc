@@ -90,6 +90,20 @@ TEST(CorrectionCases, AFrameOnALinkIsCompared) {
   EXPECT_THAT(frames.items[0].places, ElementsAre("frame tip"));
 }
 
+TEST(CorrectionCases, AReductionOfATransmissionIsCompared) {
+  const auto write = [](const char* reduction) {
+    return Replace(kUrdf, "</robot>",
+                   std::string("<transmission name='t'><joint name='q2'/><actuator name='m'>") +
+                       "<mechanicalReduction>" + reduction +
+                       "</mechanicalReduction></actuator></transmission>"
+                       "</robot>");
+  };
+  const FileCorrections found = FindCorrections(Read("a.urdf", write("50")), Read("b.urdf", write("100")));
+  EXPECT_THAT(ListIds(found), ElementsAre("number.gear"));
+  // The gear of an MJCF is another thing.
+  EXPECT_TRUE(FindCorrections(Read("a.urdf", write("50")), Read("b.xml", kMjcf)).agrees);
+}
+
 TEST(CorrectionCases, AMountingIsNamed) {
   const FileCorrections found =
       Compare(Replace(kMjcf, "<body name='base'>", "<body name='base' euler='3.14159265 0 0'>"));
