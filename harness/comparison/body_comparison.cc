@@ -48,18 +48,6 @@ const MassProperties& FindBody(int joint, const RobotSpec& spec) {
 
 }  // namespace
 
-std::vector<Pose> PlaceLinkFrames(const RobotDescription& a, const RobotDescription& b) {
-  const std::vector<int> b_of_a = MatchJoints(a.spec, b.spec);
-  const std::vector<Pose> poses_a = CalcZeroPoses(a);
-  const std::vector<Pose> poses_b = CalcZeroPoses(b);
-  std::vector<Pose> placed(b_of_a.size(), Pose::Identity());
-  for (size_t i = 0; i < placed.size(); ++i) {
-    if (b_of_a[i] < 0) continue;
-    placed[i] = poses_a[i + 1].inverse(Eigen::Isometry) * poses_b[static_cast<size_t>(b_of_a[i] + 1)];
-  }
-  return placed;
-}
-
 ConstantChecks CompareBodies(const RobotDescription& a, const RobotDescription& b,
                              const std::vector<Pose>& X_ab) {
   ConstantChecks result;

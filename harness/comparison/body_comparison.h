@@ -12,11 +12,6 @@
 
 namespace dexcheck {
 
-/// Returns the pose of each link's own frame of `b` in that of `a`, by the joints of `a`, with all joints at
-/// zero.
-/// @param a, b as CompleteEachOther left them, here and below.
-std::vector<Pose> PlaceLinkFrames(const RobotDescription& a, const RobotDescription& b);
-
 /// Compares the centre of mass (check "link_com": x, y, z, m) and the inertia about it (check "link_inertia":
 /// xx, yy, zz, xy, xz, yz, kg m^2) of each link that has mass in both descriptions. All numbers are expressed
 /// in the link's own frame of `a`. Centres are relative to their distance from the link's origin or to the

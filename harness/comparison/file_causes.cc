@@ -14,11 +14,10 @@
 namespace dexcheck {
 namespace {
 
-constexpr const char* kScalars[][2] = {
-    {"damping", "N m s/rad"},    {"friction", "N m"},      {"armature", "kg m^2"},    {"effort limit", "N m"},
-    {"velocity limit", "rad/s"}, {"stiffness", "N m/rad"}, {"spring's angle", "rad"}, {"motor's gear", ""}};
-constexpr const char* kSlideUnits[] = {"N s/m", "N", "kg", "N", "m/s", "N/m", "m", ""};
-static_assert(std::size(kScalars) == kNumJointScalars);
+// Of hinges and of slides, by JointScalar.
+constexpr const char* kUnits[][kNumJointScalars] = {
+    {"N m s/rad", "N m", "kg m^2", "N m", "rad/s", "N m/rad", "rad", ""},
+    {"N s/m", "N", "kg", "N", "m/s", "N/m", "m", ""}};
 
 /// A number of a link or of the joint that moves it, as its file prints it.
 struct NamedNumber {
@@ -67,8 +66,8 @@ std::vector<NamedNumber> NameNumbers(const PrintedLink& link) {
   }
   for (size_t k = 0; k < kNumJointScalars; ++k) {
     if (joint.scalars[k])
-      numbers.push_back(
-          {kScalars[k][0], is_slide ? kSlideUnits[k] : kScalars[k][1], joint.scalars[k]->value});
+      numbers.push_back({NameSite(ToSite(static_cast<JointScalar>(k))), kUnits[is_slide ? 1 : 0][k],
+                         joint.scalars[k]->value});
   }
   if (joint.mimic) {
     numbers.push_back({"mimic multiplier", "", joint.mimic->multiplier.value});
@@ -132,7 +131,7 @@ FileCause MakeCause(const PrintedRobot& robot, CorrectionItem item,
   FileCause cause;
   const std::string file = name_file(item);
   item.in_second = false;
-  cause.text = (file.empty() ? "" : "in " + file + ", ") + DescribeItem(item, false);
+  cause.text = (file.empty() ? "" : "in " + file + ", ") + DescribeItem(item);
   cause.id = item.id;
   cause.places = item.places;
   cause.changes = ListChanges(robot, item);
@@ -211,6 +210,8 @@ bool IsExplained(const std::string& check, const CorrectionItem& cause) {
       {"equality_constraint", {kMimic, kConstraint}},
       {"motor_limit", {kEffort, kGear, kMotor}},
       {"motor_transmission", {kGear, kMotor}},
+      {"motor_gain", {kMotor}},
+      {"motor_bias", {kMotor}},
       {"gravity_vector", {kGravity}}};
   const auto kinds = kKindsOfChecks.find(check);
   return std::ranges::any_of(cause.sites, [&](const Site& site) {

@@ -52,13 +52,6 @@ std::vector<double> SolveOneAngle(const PrintedOrigin& origin, int angle, const 
   return solved;
 }
 
-void TakeBody(const BodyNumbers& body, PrintedLink* link) {
-  PrintedInertial& inertial = link->inertial.emplace();
-  inertial.mass.value = body.mass;
-  inertial.origin.t = body.com;
-  inertial.I = ToEntries(body.inertia);
-}
-
 }  // namespace
 
 struct CandidateSearch::Part {
@@ -141,7 +134,7 @@ void CandidateSearch::SearchBody(int link) {
   };
   if (node.parts.empty() || (pair_.given(link).body.mass == 0.0 && right.body.mass > 0.0)) {
     offer(MakeWhole(Kind::kMissing), fmt::format("mass {:.6g} in the other file", right.body.mass),
-          [&](PrintedLink* made) { TakeBody(right.body, made); });
+          GiveBody(right.body));
     if (node.parts.empty()) return;
   }
   const Node& theirs = pair_.node_b(pair_.Partner(link));
@@ -153,11 +146,9 @@ void CandidateSearch::SearchBody(int link) {
     return std::ranges::any_of(of.parts, [&](int part) { return robot.link(part).is_from_shapes; });
   };
   constexpr const char* kFromShapes = "MuJoCo computed it from the shapes";
-  if (is_from_shapes(pair_.a(), node))
-    offer(MakeWhole(Kind::kMissing), kFromShapes, [&](PrintedLink* made) { TakeBody(right.body, made); });
+  if (is_from_shapes(pair_.a(), node)) offer(MakeWhole(Kind::kMissing), kFromShapes, GiveBody(right.body));
   if (is_from_shapes(pair_.b(), theirs))
-    offer(MakeWhole(Kind::kMissing, true), kFromShapes,
-          [&](PrintedLink* made) { TakeBody(right.body, made); });
+    offer(MakeWhole(Kind::kMissing, true), kFromShapes, GiveBody(right.body));
   SearchLostParts(link);
   SearchLoad(link);
   for (const int k : node.parts) {
@@ -276,20 +267,10 @@ void CandidateSearch::SearchInertiaNumbers(const Part& part) {
 
 /// One convention of all parts of a body.
 void CandidateSearch::SearchAllParts(int link) {
-  const Node& node = pair_.node(link);
-  std::vector<std::vector<LinkEdit>> lists;
-  for (const int part : node.parts) {
-    lists.push_back(ListInertialEdits(pair_.a().link(part), {true}));
-  }
-  for (const LinkEdit& first : lists[0]) {
-    std::vector<PlacedEdit> edits;
-    for (size_t k = 0; k < lists.size(); ++k) {
-      const auto found = std::ranges::find_if(
-          lists[k], [&](const LinkEdit& edit) { return IsSameFault(edit.fault, first.fault); });
-      if (found != lists[k].end()) edits.push_back({node.parts[k], found->undo});
-    }
-    if (edits.size() > 1) Try({first.fault, first.bits, kBodyMask}, link, edits);
-  }
+  std::vector<LinkEdits> lists;
+  for (const int part : pair_.node(link).parts)
+    lists.push_back({part, ListInertialEdits(pair_.a().link(part), {true})});
+  TryTogether(lists, link, kBodyMask, true);
 }
 
 /// A convention of one part, and a convention or a number of another part or of the same, where nothing

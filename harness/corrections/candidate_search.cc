@@ -123,6 +123,24 @@ bool CandidateSearch::Try(const EditTrial& trial, int place, const std::vector<P
   return true;
 }
 
+void CandidateSearch::TryTogether(const std::vector<LinkEdits>& lists, int place, SiteMask kinds,
+                                  bool needs_all) {
+  std::vector<FileFault> tried;
+  for (const LinkEdits& list : lists) {
+    for (const LinkEdit& edit : list.edits) {
+      const auto is_same = [&](const FileFault& fault) { return IsSameFault(fault, edit.fault); };
+      if (std::ranges::any_of(tried, is_same)) continue;
+      tried.push_back(edit.fault);
+      std::vector<PlacedEdit> placed;
+      for (const auto& [link, edits] : lists) {
+        const auto own = std::ranges::find_if(edits, is_same, &LinkEdit::fault);
+        if (own != edits.end()) placed.push_back({link, own->undo});
+      }
+      if (placed.size() > 1) Try({edit.fault, edit.bits, kinds, "", needs_all}, place, placed);
+    }
+  }
+}
+
 void CandidateSearch::Add(const EditTrial& trial, int link, std::vector<Site> sites,
                           std::vector<LinkPatch> patches) {
   found_.push_back({trial.fault, link, std::move(sites), trial.bits, std::move(patches), trial.values});
@@ -178,6 +196,7 @@ std::optional<BodyNumbers> Subtract(const BodyNumbers& whole, const BodyNumbers&
 
 LinkUndo GiveBody(const BodyNumbers& body) {
   return [body](PrintedLink* made) {
+    if (!made->inertial) made->inertial.emplace();
     const Matrix3d R = made->inertial->origin.CalcRotation();
     made->inertial->mass.value = body.mass;
     made->inertial->origin.t = body.com;

@@ -45,6 +45,13 @@ class CandidateSearch {
   bool Try(const EditTrial& trial, int link, const LinkUndo& undo) {
     return Try(trial, link, std::vector<PlacedEdit>{{link, undo}});
   }
+  /// The edits of one of several links.
+  struct LinkEdits {
+    int link;
+    std::vector<LinkEdit> edits;
+  };
+  /// Tries each fault that several of these links may have, at all of them.
+  void TryTogether(const std::vector<LinkEdits>& lists, int place, SiteMask kinds, bool needs_all);
   struct TriedNode;
   [[nodiscard]] std::vector<TriedNode> ListTried(const std::vector<PlacedEdit>& edits) const;
   void Add(const EditTrial& trial, int link, std::vector<Site> sites, std::vector<LinkPatch> patches = {});

@@ -187,8 +187,7 @@ class OneWay {
         }
         std::vector<CorrectionItem> made = MakeItems(chosen.deal, sites, candidates);
         AddRivals(chosen, sites, candidates, &made[0]);
-        AddLeafRival(candidates[chosen.deal.candidates[0]], &made[0]);
-        AddTurnRival(candidates[chosen.deal.candidates[0]], &made[0]);
+        AddPlaceRival(candidates[chosen.deal.candidates[0]], &made[0]);
         for (CorrectionItem& item : made) {
           result.bits += item.bits;
           AddItem(std::move(item), &result.items);
@@ -352,57 +351,45 @@ class OneWay {
 
   void AddRivals(const ChosenDeal& chosen, const std::vector<Site>& sites,
                  const std::vector<CorrectionCandidate>& candidates, CorrectionItem* item) const {
-    std::vector<std::string> texts = {DescribeItem(*item, false)};
+    std::vector<std::string> texts = {DescribeItem(*item)};
     for (const Deal& deal : chosen.rivals) {
       CorrectionItem rival = MakeItems(deal, sites, candidates)[0];
       if (deal.candidates.size() < chosen.deal.candidates.size() && IsSameFault(rival.fault, item->fault))
         continue;
-      std::string text = DescribeItem(rival, false);
+      std::string text = DescribeItem(rival);
       if (std::ranges::find(texts, text) != texts.end()) continue;
       texts.push_back(std::move(text));
       item->rivals.push_back(std::move(rival));
     }
   }
 
-  /// If frames of links are free, a link that carries nothing is as well placed otherwise along its axis
-  /// as its centre of mass is elsewhere.
-  void AddLeafRival(const CorrectionCandidate& candidate, CorrectionItem* item) const {
+  /// If frames of links are free, a fault of a link is as well one of its place: another centre of mass of a
+  /// link that carries nothing its position along its axis, another axis its rotation with all it carries.
+  void AddPlaceRival(const CorrectionCandidate& candidate, CorrectionItem* item) const {
     const int link = candidate.link;
-    if (candidate.fault.of != SiteKind::kCom || candidate.fault.kind != CorrectionKind::kNumber ||
-        item->places.size() != 1 || pair_.Carrier(link) < 0 ||
+    const bool is_turn = candidate.fault.kind == CorrectionKind::kOtherAxis;
+    const bool is_com =
+        candidate.fault.of == SiteKind::kCom && candidate.fault.kind == CorrectionKind::kNumber;
+    if ((!is_turn && !is_com) || link < 0 || item->places.size() != 1 || pair_.Carrier(link) < 0 ||
         pair_.X_ab(link).isApprox(Pose::Identity(), 1e-9))
       return;
-    const auto is_on = [&](int k) { return pair_.node(k).parent == link; };
-    if (std::ranges::any_of(pair_.links(), is_on)) return;
-    const Vector3d apart = pair_.right(link).body.com - pair_.given(link).body.com;
-    const PrintedJoint& joint = pair_.a().link(link).joint;
-    const double across = joint.axis.normalized().cross(apart).norm();
-    constexpr double kAlong = 1e-3;  // of the distance
-    if (joint.kind == JointKind::kHinge && across > kAlong * apart.norm() + 1e-6) return;
-    const Vector3d moved = pair_.given(link).X.linear() * apart;
     CorrectionItem rival = *item;
     rival.rivals.clear();
     rival.patches.clear();
-    rival.fault.of = SiteKind::kPosition;
-    rival.id = NameFault(rival.fault);
-    rival.places = {NamePlace(pair_, link, SiteKind::kPosition)};
-    rival.values = {fmt::format("off by ({})", ShowVector(-moved))};
-    item->rivals.push_back(std::move(rival));
-  }
-
-  /// If frames of links are free, another axis is as well a link that is turned otherwise with all it
-  /// carries.
-  void AddTurnRival(const CorrectionCandidate& candidate, CorrectionItem* item) const {
-    const int link = candidate.link;
-    if (candidate.fault.kind != CorrectionKind::kOtherAxis || link < 0 || item->places.size() != 1 ||
-        pair_.Carrier(link) < 0 || pair_.X_ab(link).isApprox(Pose::Identity(), 1e-9))
-      return;
-    CorrectionItem rival = *item;
-    rival.rivals.clear();
-    rival.patches.clear();
-    rival.fault = {CorrectionKind::kNumber, SiteKind::kRotation};
+    rival.fault = {CorrectionKind::kNumber, is_turn ? SiteKind::kRotation : SiteKind::kPosition};
     rival.id = NameFault(rival.fault);
     rival.values = {""};
+    if (is_com) {
+      const auto is_on = [&](int k) { return pair_.node(k).parent == link; };
+      if (std::ranges::any_of(pair_.links(), is_on)) return;
+      const Vector3d apart = pair_.right(link).body.com - pair_.given(link).body.com;
+      const PrintedJoint& joint = pair_.a().link(link).joint;
+      const double across = joint.axis.normalized().cross(apart).norm();
+      constexpr double kAlong = 1e-3;  // of the distance
+      if (joint.kind == JointKind::kHinge && across > kAlong * apart.norm() + 1e-6) return;
+      rival.places = {NamePlace(pair_, link, SiteKind::kPosition)};
+      rival.values = {fmt::format("off by ({})", ShowVector(-(pair_.given(link).X.linear() * apart)))};
+    }
     item->rivals.push_back(std::move(rival));
   }
 
@@ -471,7 +458,7 @@ FileCorrections FindCorrections(const DescriptionFile& a, const DescriptionFile&
   return FindCorrections(ReadPrintedRobot(a, &b), ReadPrintedRobot(b, &a), options);
 }
 
-std::string DescribeItem(const CorrectionItem& item, bool /*of_second*/) {
+std::string DescribeItem(const CorrectionItem& item) {
   FileFault fault = item.fault;
   fault.in_second = false;
   std::string text = fmt::format("{}{}: {}", item.in_second ? "in the second file, " : "",

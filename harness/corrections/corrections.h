@@ -46,7 +46,6 @@ FileCorrections FindCorrections(const DescriptionFile& a, const DescriptionFile&
                                 const CorrectionOptions& options = {});
 
 /// One line: "joints q1, q2: rotation with its angles in degrees".
-/// @param of_second that of the result to which the item belongs.
-std::string DescribeItem(const CorrectionItem& item, bool of_second);
+std::string DescribeItem(const CorrectionItem& item);
 
 }  // namespace dexcheck

@@ -193,31 +193,34 @@ class InertialEdits {
       Add({kind, SiteKind::kCom, component}, 0.0,
           [M](Body* body, const PrintedLink&) { body->origin.t = (M * body->origin.t).eval(); });
     });
-    const auto move = [&](Kind kind, double bits, const FindPose& find, const auto& calc) {
-      Add({kind, SiteKind::kCom}, bits, [find, calc](Body* body, const PrintedLink& link) {
-        body->origin.t = calc(find(link), body->origin.t);
+    const auto move = [&](Kind kind, double bits, const FindPose& find, bool inverse) {
+      Add({kind, SiteKind::kCom}, bits, [find, inverse](Body* body, const PrintedLink& link) {
+        const Pose X = find(link);
+        body->origin.t = (inverse ? X.inverse() : X) * body->origin.t;
       });
     };
-    using Vector = Vector3d;
     for (const auto& [find, is_turned] : origins_) {
-      move(Kind::kInParent, 1.0, find,
-           [](const Pose& X, const Vector& c) { return Vector(X.inverse() * c); });
-      move(Kind::kToParent, 1.0, find, [](const Pose& X, const Vector& c) { return Vector(X * c); });
+      move(Kind::kInParent, 1.0, find, true);
+      move(Kind::kToParent, 1.0, find, false);
       if (!is_turned) continue;
-      move(Kind::kAlongParent, 1.0, find,
-           [](const Pose& X, const Vector& c) { return Vector(X.linear().transpose() * c); });
-      move(Kind::kAlongToParent, 1.0, find,
-           [](const Pose& X, const Vector& c) { return Vector(X.linear() * c); });
-      move(Kind::kPlaceAdded, 1.0, find,
-           [](const Pose& X, const Vector& c) { return Vector(c - X.translation()); });
-      move(Kind::kPlaceTaken, 1.0, find,
-           [](const Pose& X, const Vector& c) { return Vector(c + X.translation()); });
+      const auto turn = [find = find](const PrintedLink& link) {
+        Pose X = find(link);
+        X.translation().setZero();
+        return X;
+      };
+      const auto shift = [find = find](const PrintedLink& link) {
+        Pose X = find(link);
+        X.linear().setIdentity();
+        return X;
+      };
+      move(Kind::kAlongParent, 1.0, turn, true);
+      move(Kind::kAlongToParent, 1.0, turn, false);
+      move(Kind::kPlaceAdded, 1.0, shift, true);
+      move(Kind::kPlaceTaken, 1.0, shift, false);
     }
-    for (const Pose& X_LC : frames_.X_LC) {
+    for (const Pose& X_LC : frames_.X_LC)
       move(
-          Kind::kInChild, 2.0, [X_LC](const PrintedLink&) { return X_LC; },
-          [](const Pose& X, const Vector& c) { return Vector(X * c); });
-    }
+          Kind::kInChild, 2.0, [X_LC](const PrintedLink&) { return X_LC; }, false);
     if (R_.isIdentity(1e-9)) return;
     for (const bool to : {false, true}) {
       Add({to ? Kind::kToInertialAxes : Kind::kInertialAxes, SiteKind::kCom}, 2.0,

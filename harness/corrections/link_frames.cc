@@ -1,6 +1,5 @@
 #include "harness/corrections/link_frames.h"
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <Eigen/QR>
 #include <algorithm>
@@ -360,14 +359,7 @@ class FrameChooser {
       }
     }
     if (a == nullptr) return turns;
-    const Matrix3d V = Eigen::SelfAdjointEigenSolver<Matrix3d>(a->inertia).eigenvectors();
-    const Matrix3d W = Eigen::SelfAdjointEigenSolver<Matrix3d>(b->inertia).eigenvectors();
-    for (int signs = 0; signs < 8; ++signs) {
-      const Vector3d s((signs & 1) != 0 ? 1.0 : -1.0, (signs & 2) != 0 ? 1.0 : -1.0,
-                       (signs & 4) != 0 ? 1.0 : -1.0);
-      const Matrix3d R = V * s.asDiagonal() * W.transpose();
-      if (R.determinant() > 0.0) turns.push_back(R);
-    }
+    for (const Matrix3d& R : ListAxesTurns(b->inertia, a->inertia)) turns.push_back(R);
     return turns;
   }
 

@@ -87,18 +87,18 @@ class LinkMatcher {
   }
 
   void MatchAlike(std::vector<int>* by_joint) {
-    std::vector<std::string> names, others;
+    const auto list = [](const PrintedRobot& robot, const std::vector<int>& match, std::vector<int>* open) {
+      std::vector<std::string> names;
+      for (int i = 0; i < robot.size(); ++i) {
+        if (!Moves(robot.link(i)) || match[Index(i)] >= 0) continue;
+        names.push_back(robot.link(i).joint.name);
+        open->push_back(i);
+      }
+      return names;
+    };
     std::vector<int> open, open_b;
-    for (int i = 0; i < a_.size(); ++i) {
-      if (!Moves(a_.link(i)) || match_.b_of_a[Index(i)] >= 0) continue;
-      names.push_back(a_.link(i).joint.name);
-      open.push_back(i);
-    }
-    for (int j = 0; j < b_.size(); ++j) {
-      if (!Moves(b_.link(j)) || match_.a_of_b[Index(j)] >= 0) continue;
-      others.push_back(b_.link(j).joint.name);
-      open_b.push_back(j);
-    }
+    const std::vector<std::string> names = list(a_, match_.b_of_a, &open);
+    const std::vector<std::string> others = list(b_, match_.a_of_b, &open_b);
     const std::vector<std::string> similar = FindAlikeNames(names, others);
     for (size_t k = 0; k < similar.size(); ++k) {
       const auto found = std::ranges::find(others, similar[k]);

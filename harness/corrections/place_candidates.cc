@@ -1,6 +1,5 @@
 #include <fmt/format.h>
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
@@ -137,12 +136,9 @@ void CandidateSearch::SearchRotationNumbers(const Origin& origin) {
     const Vector3d r = origin.given.r.head<3>();
     for (int k = 0; k < 3; ++k) {
       // R = L turn(k) Q for the one angle.
-      const Matrix3d L = k == 0   ? Matrix3d(TurnAbout(2, r[2]) * TurnAbout(1, r[1]))
-                         : k == 1 ? TurnAbout(2, r[2])
-                                  : Matrix3d(Matrix3d::Identity());
-      const Matrix3d Q = k == 0   ? Matrix3d(Matrix3d::Identity())
-                         : k == 1 ? TurnAbout(0, r[0])
-                                  : Matrix3d(TurnAbout(1, r[1]) * TurnAbout(0, r[0]));
+      Matrix3d L = Matrix3d::Identity(), Q = Matrix3d::Identity();
+      for (int m = 2; m > k; --m) L *= TurnAbout(m, r[m]);
+      for (int m = k - 1; m >= 0; --m) Q *= TurnAbout(m, r[m]);
       const Vector3d solved = CalcRotationVector(L.transpose() * right * Q.transpose());
       Vector3d rest = solved;
       rest[k] = 0.0;
@@ -204,29 +200,21 @@ void CandidateSearch::SearchPoseNumbers(const Origin& origin) {
 }
 
 void CandidateSearch::SearchRowNumbers(const Origin& origin) {
-  const Pose X = origin.given.X_before.inverse() * origin.right;
-  const Matrix3d R = X.linear();
-  const double alpha = std::atan2(-R(1, 2), R(2, 2));
-  const double q = std::atan2(-R(0, 1), R(0, 0));
-  const double d = std::abs(std::cos(alpha)) > 0.5 ? X.translation().z() / std::cos(alpha)
-                                                   : -X.translation().y() / std::sin(alpha);
-  const double near = std::remainder(q - origin.given.r[1], 2.0 * kPi) + origin.given.r[1];
-  const Vector4d given(origin.given.r[0], origin.given.t[0], origin.given.r[1], origin.given.t[2]);
-  const Vector4d right(alpha, X.translation().x(), near, d);
+  PrintedOrigin row = origin.given;
+  row.SetRow(origin.right);
+  const auto list = [](const PrintedOrigin& o) { return Vector4d(o.r[0], o.t[0], o.r[1], o.t[2]); };
+  const Vector4d given = list(origin.given), right = list(row);
   const double length = std::max(origin.open_length.maxCoeff(), 1e-9);
   const Vector4d open(origin.open_angle, length, origin.open_angle, length);
   constexpr const char* kNames[] = {"alpha", "a", "q", "d"};
   // Numbers are printed in degrees.
-  Vector4d shown(RadToDeg(given[0]), given[1], RadToDeg(given[2]), given[3]);
-  Vector4d shown_right(RadToDeg(right[0]), right[1], RadToDeg(right[2]), right[3]);
-  const Vector4d shown_open(RadToDeg(open[0]), open[1], RadToDeg(open[2]), open[3]);
+  const auto show = [](const Vector4d& numbers) -> Vector4d {
+    return numbers.cwiseProduct(Vector4d(RadToDeg(1.0), 1.0, RadToDeg(1.0), 1.0));
+  };
   Try(origin.Make(CorrectionKind::kNumber, SiteKind::kPosition,
                   CountEntries(4, given.data(), right.data(), open.data()),
-                  DescribeEntries(kNames, shown.data(), shown_right.data(), shown_open.data()), true),
-      origin.link, [right](PrintedLink* link) {
-        link->origin.r.head<2>() << right[0], right[2];
-        link->origin.t << right[1], 0.0, right[3];
-      });
+                  DescribeEntries(kNames, show(given).data(), show(right).data(), show(open).data()), true),
+      origin.link, [row](PrintedLink* link) { link->origin = row; });
 }
 
 /// One convention of all origins that lead to parts of a link and to the joints on it.
@@ -248,25 +236,17 @@ void CandidateSearch::SearchAllOrigins(int link) {
     }
   }
   if (!has_welded || wrong == 0) return;
-  std::vector<std::pair<LinkEdit, std::vector<PlacedEdit>>> groups;
+  std::vector<LinkEdits> lists;
   for (const int k : origins) {
-    for (const LinkEdit& edit : ListOriginEdits(pair_.a().link(k).origin)) {
-      const bool is_turn = edit.fault.kind == CorrectionKind::kTurnOwn ||
-                           edit.fault.kind == CorrectionKind::kTurnParent ||
-                           edit.fault.kind == CorrectionKind::kMirror;
-      if (edit.fault.whole || is_turn ||
-          (edit.fault.of == SiteKind::kPosition && pair_.a().link(k).origin.t.isZero()))
-        continue;
-      const auto is_same = [&](const auto& group) { return IsSameFault(group.first.fault, edit.fault); };
-      auto group = std::ranges::find_if(groups, is_same);
-      if (group == groups.end()) group = groups.insert(groups.end(), {edit, {}});
-      group->second.push_back({k, edit.undo});
-    }
+    const PrintedOrigin& origin = pair_.a().link(k).origin;
+    lists.push_back({k, ListOriginEdits(origin)});
+    std::erase_if(lists.back().edits, [&](const LinkEdit& edit) {
+      return edit.fault.whole || edit.fault.kind == CorrectionKind::kTurnOwn ||
+             edit.fault.kind == CorrectionKind::kTurnParent || edit.fault.kind == CorrectionKind::kMirror ||
+             (edit.fault.of == SiteKind::kPosition && origin.t.isZero());
+    });
   }
-  for (const auto& [edit, edits] : groups) {
-    if (edits.size() > 1)
-      Try({edit.fault, edit.bits, kPoseMask | kBodyMask, "", false}, origins.back(), edits);
-  }
+  TryTogether(lists, origins.back(), kPoseMask | kBodyMask, false);
 }
 
 /// The origin of what is welded to a link, which shows in the body and in where joints on it stand.
@@ -309,14 +289,8 @@ void CandidateSearch::SearchWeld(int link) {
         part->origin.t = t;
         part->origin.half_t = open;
       });
-  const Matrix3d V = Eigen::SelfAdjointEigenSolver<Matrix3d>(right.inertia).eigenvectors();
-  const Matrix3d W = Eigen::SelfAdjointEigenSolver<Matrix3d>(given.inertia).eigenvectors();
   const bool is_none = origin.CalcRotation().isIdentity(1e-12);
-  for (int signs = 0; signs < 8; ++signs) {
-    const Vector3d s((signs & 1) != 0 ? 1.0 : -1.0, (signs & 2) != 0 ? 1.0 : -1.0,
-                     (signs & 4) != 0 ? 1.0 : -1.0);
-    const Matrix3d R = V * s.asDiagonal() * W.transpose();
-    if (R.determinant() < 0.0) continue;
+  for (const Matrix3d& R : ListAxesTurns(given.inertia, right.inertia)) {
     Try({{is_none ? CorrectionKind::kMissing : CorrectionKind::kNumber, SiteKind::kRotation},
          is_none ? 8.0 : 40.0,
          kPoseMask | kBodyMask,

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cctype>
 #include <cmath>
@@ -74,6 +75,19 @@ Vector3d CalcRotationVector(const Matrix3d& R) {
 
 double CalcAngle(const Matrix3d& R) { return CalcRotationVector(R).norm(); }
 
+std::vector<Matrix3d> ListAxesTurns(const Matrix3d& from, const Matrix3d& to) {
+  const Matrix3d V = Eigen::SelfAdjointEigenSolver<Matrix3d>(to).eigenvectors();
+  const Matrix3d W = Eigen::SelfAdjointEigenSolver<Matrix3d>(from).eigenvectors();
+  std::vector<Matrix3d> turns;
+  for (int signs = 0; signs < 8; ++signs) {
+    const Vector3d s((signs & 1) != 0 ? 1.0 : -1.0, (signs & 2) != 0 ? 1.0 : -1.0,
+                     (signs & 4) != 0 ? 1.0 : -1.0);
+    const Matrix3d R = V * s.asDiagonal() * W.transpose();
+    if (R.determinant() > 0.0) turns.push_back(R);
+  }
+  return turns;
+}
+
 Matrix3d PrintedOrigin::CalcRotation() const {
   switch (form) {
     case RotationForm::kNone:
@@ -118,6 +132,15 @@ void PrintedOrigin::SetRotation(const Matrix3d& R) {
   }
   form = RotationForm::kQuaternion;
   r = ToQuaternion(R);
+}
+
+void PrintedOrigin::SetRow(const Pose& pose) {
+  const Pose X = X_before.inverse() * pose;
+  const Matrix3d R = X.linear();  // Rot(x, alpha) Rot(z, q)
+  const double alpha = std::atan2(-R(1, 2), R(2, 2));
+  const double q = std::atan2(-R(0, 1), R(0, 0));
+  r.head<2>() << alpha, std::remainder(q - r[1], 2.0 * kPi) + r[1];
+  t << X.translation().x(), 0.0, Vector3d(0.0, -std::sin(alpha), std::cos(alpha)).dot(X.translation());
 }
 
 std::vector<LinkNumber> ListNumbers(PrintedOrigin* origin) {

@@ -46,6 +46,8 @@ struct PrintedOrigin {
   [[nodiscard]] Pose CalcPose() const;
   /// Takes another rotation, in the form of a quaternion unless it is roll, pitch, yaw.
   void SetRotation(const Matrix3d& R);
+  /// Takes the row behind X_before that is nearest to a pose.
+  void SetRow(const Pose& pose);
 };
 
 /// The mass and inertia of one element.
@@ -118,6 +120,7 @@ struct PrintedMotor {
   double gear = 1.0;
   std::optional<PrintedScalar> effort;  ///< Largest force, where it is the same in both directions.
   std::string servo;                    ///< "(kp 5, kv 0.1)"; empty of a motor, whose force is its control.
+  bool operator==(const PrintedMotor&) const = default;
 };
 
 struct PrintedRobot {
@@ -159,6 +162,8 @@ Matrix3d TurnQuaternion(const Vector4d& wxyz);
 /// Rotation vector and angle.
 Vector3d CalcRotationVector(const Matrix3d& R);
 double CalcAngle(const Matrix3d& R);
+/// The rotations that turn the principal axes of one tensor into those of another.
+std::vector<Matrix3d> ListAxesTurns(const Matrix3d& from, const Matrix3d& to);
 
 /// Numbers that were printed with more digits than the file's others of their kind are known no better: gives
 /// them the median half unit.

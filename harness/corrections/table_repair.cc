@@ -91,7 +91,10 @@ class TableRepair final : private RepairWriter {
 
   void WriteRow(const PrintedLink& link, PrintedOrigin origin) {
     const Entry row = Find("rows", link.joint.name);
-    if (link.origin.form == RotationForm::kMdh) FindRow(link.origin.X_before, &origin);
+    if (PrintedOrigin given = link.origin; given.form == RotationForm::kMdh) {
+      given.SetRow(origin.CalcPose());
+      if (given.CalcPose().isApprox(origin.CalcPose(), 1e-9)) origin = given;
+    }
     RefuseIf(origin.form != link.origin.form || row.states_convention, link, "its row");
     if (origin.form == RotationForm::kMdh) {
       Remove(row, "alpha_deg");
@@ -132,21 +135,6 @@ class TableRepair final : private RepairWriter {
     if (!IsTurned(before, origin)) return;
     Remove(entry, "rpy_deg");
     Set(entry, "rpy", JoinVector(Vector3d(origin.r.head<3>())));
-  }
-
-  /// Gives a pose the form of a row of modified parameters behind X_before, if it has one.
-  static void FindRow(const Pose& X_before, PrintedOrigin* origin) {
-    constexpr double kSame = 1e-9;
-    const Pose X = X_before.inverse() * origin->CalcPose();
-    const Matrix3d R = X.linear();  // Rot(x, alpha) Rot(z, q)
-    const double alpha = std::atan2(-R(1, 2), R(2, 2));
-    const double d = Vector3d(0.0, -std::sin(alpha), std::cos(alpha)).dot(X.translation());
-    PrintedOrigin row;
-    row.form = RotationForm::kMdh;
-    row.X_before = X_before;
-    row.r.head<2>() << alpha, std::atan2(-R(0, 1), R(0, 0));
-    row.t << X.translation().x(), 0.0, d;
-    if (row.CalcPose().isApprox(origin->CalcPose(), kSame)) *origin = row;
   }
 
   void WriteBody(const PrintedLink& before, const PrintedLink& after) {

@@ -33,7 +33,6 @@ std::vector<JointInLinkFrames> ListJointsInLinkFrames(const RobotDescription& ro
     const Pose X_jP = PlaceOnAxis(robot, joint.parent);
     JointInLinkFrames& row = rows.emplace_back();
     row.parent = joint.parent;
-    row.is_revolute = joint.type != JointType::kPrismatic;
     row.X_PL = X_jP.inverse() * CalcRow(joint, joint.mdh) * X_iL;
     row.axis = X_iL.linear().row(2).transpose();  // one of those that a ball joint turns about
     row.body = ExpressIn(joint.body, X_iL.inverse());
@@ -48,26 +47,33 @@ std::vector<Pose> CalcLinkPoses(const Pose& X_W0, const std::vector<JointInLinkF
   return poses;
 }
 
-std::vector<Pose> CalcZeroPoses(const RobotDescription& robot) {
-  const Base& base = robot.spec.base;
-  const Pose X_W0 = base.type == BaseType::kFloating ? Pose::Identity() : base.X_B0;
-  return CalcLinkPoses(X_W0, ListJointsInLinkFrames(robot));
+std::vector<Pose> PlaceLinkFrames(const RobotDescription& a, const RobotDescription& b) {
+  const auto calc_poses = [](const RobotDescription& robot) {
+    const Base& base = robot.spec.base;
+    const Pose X_W0 = base.type == BaseType::kFloating ? Pose::Identity() : base.X_B0;
+    return CalcLinkPoses(X_W0, ListJointsInLinkFrames(robot));
+  };
+  const std::vector<int> b_of_a = MatchJoints(a.spec, b.spec);
+  const std::vector<Pose> poses_a = calc_poses(a), poses_b = calc_poses(b);
+  std::vector<Pose> placed(b_of_a.size(), Pose::Identity());
+  for (size_t i = 0; i < placed.size(); ++i) {
+    if (b_of_a[i] >= 0)
+      placed[i] = poses_a[i + 1].inverse(Eigen::Isometry) * poses_b[static_cast<size_t>(b_of_a[i] + 1)];
+  }
+  return placed;
 }
 
 std::vector<LinkPlace> PlaceLinks(const RobotDescription& a, const RobotDescription& b) {
   const std::vector<int> b_of_a = MatchJoints(a.spec, b.spec);
   if (std::ranges::find(b_of_a, -1) != b_of_a.end()) return {};
-  const std::vector<Pose> poses_a = CalcZeroPoses(a);
-  const std::vector<Pose> poses_b = CalcZeroPoses(b);
+  const std::vector<Pose> placed = PlaceLinkFrames(a, b);
   std::vector<LinkPlace> places;
   if (a.spec.base.type == BaseType::kFloating) places.emplace_back();
   for (size_t i = 0; i < b_of_a.size(); ++i) {
-    const auto j = static_cast<size_t>(b_of_a[i]);
     if (!HasParts(b, b_of_a[i])) continue;  // between several joints of one body there is none
-    const Pose X_own = poses_a[i + 1].inverse(Eigen::Isometry) * poses_b[j + 1];
     places.push_back({static_cast<int>(i), b_of_a[i],
-                      PlaceOnAxis(a, static_cast<int>(i)) * X_own *
-                          PlaceOnAxis(b, static_cast<int>(j)).inverse(Eigen::Isometry)});
+                      PlaceOnAxis(a, static_cast<int>(i)) * placed[i] *
+                          PlaceOnAxis(b, b_of_a[i]).inverse(Eigen::Isometry)});
   }
   return places;
 }

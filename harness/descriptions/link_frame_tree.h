@@ -12,7 +12,6 @@ namespace dexcheck {
 /// A joint and its link in the link's own frame: the joint turns about, or slides along, `axis` there.
 struct JointInLinkFrames {
   int parent = -1;
-  bool is_revolute = true;
   Pose X_PL = Pose::Identity();  ///< The link's own frame in its parent's own frame, at q = 0.
   Vector3d axis = Vector3d::UnitZ();
   MassProperties body;  ///< In the own frame.
@@ -24,8 +23,9 @@ std::vector<JointInLinkFrames> ListJointsInLinkFrames(const RobotDescription& ro
 /// Pose of each link's own frame in the world, the base first, with all joints at zero.
 std::vector<Pose> CalcLinkPoses(const Pose& X_W0, const std::vector<JointInLinkFrames>& joints);
 
-/// Returns the poses of the links' own frames in the world as CalcLinkPoses has them.
-std::vector<Pose> CalcZeroPoses(const RobotDescription& robot);
+/// Frames of the links of `b` in those of `a`, by joint of `a`, as they stand with all joints at zero; the
+/// identity for a joint without partner.
+std::vector<Pose> PlaceLinkFrames(const RobotDescription& a, const RobotDescription& b);
 
 /// A link of two descriptions: which frame it has is each description's own choice.
 struct LinkPlace {

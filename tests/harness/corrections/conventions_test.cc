@@ -361,7 +361,7 @@ class Campaign {
     static constexpr const char* kOutcomes[] = {"", "CLASS", "NONE", "WRONG"};
     details_ += "\n  " + std::string(kOutcomes[static_cast<size_t>(outcome)]) + " " + where + name;
     for (const CorrectionItem& item : found.items)
-      details_ += fmt::format("\n    {}: {}", item.id, DescribeItem(item, found.of_second));
+      details_ += fmt::format("\n    {}: {}", item.id, DescribeItem(item));
   }
 
   enum class Outcome { kNamed, kInClass, kNotNamed, kWrong };

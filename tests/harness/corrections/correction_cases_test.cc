@@ -67,15 +67,15 @@ TEST(CorrectionCases, ASettingOfTheCompilerIsNamed) {
   FileCorrections found = Compare(Replace(kMjcf, "angle=", "boundmass='0.5' angle="));
   ASSERT_THAT(ListIds(found), ElementsAre("body.compiled"));
   EXPECT_TRUE(found.items[0].in_second);
-  EXPECT_THAT(DescribeItem(found.items[0], false), AllOf(HasSubstr("lower"), HasSubstr("boundmass"),
-                                                         HasSubstr("0.313 in the text, 0.5 in the engine")));
+  EXPECT_THAT(DescribeItem(found.items[0]), AllOf(HasSubstr("lower"), HasSubstr("boundmass"),
+                                                  HasSubstr("0.313 in the text, 0.5 in the engine")));
   EXPECT_EQ(found.items[0].explained, 1.0);
   const std::string thin = Replace(kMjcf, "0.00104 0.00231 0.00283", "0.00104 0.00131 0.00283");
   const DescriptionFile urdf = Read("arm.urdf", Replace(kUrdf, "iyy='0.00231'", "iyy='0.00131'"));
   EXPECT_TRUE(FindCorrections(urdf, Read("arm.xml", Replace(thin, "0.00283", "0.00231"))).items.size() == 1);
   found = FindCorrections(urdf, Read("arm.xml", Replace(thin, "angle=", "balanceinertia='true' angle=")));
   ASSERT_THAT(ListIds(found), ElementsAre("body.compiled"));
-  EXPECT_THAT(DescribeItem(found.items[0], false), HasSubstr("balanceinertia"));
+  EXPECT_THAT(DescribeItem(found.items[0]), HasSubstr("balanceinertia"));
 }
 
 TEST(CorrectionCases, AFrameOnALinkIsCompared) {

@@ -179,9 +179,8 @@ class Campaign {
                  Judge(fault, drawn.made, found) == Score::kMissed ? " MISSED" : "");
     fmt::print("\n");
     for (const CorrectionItem& item : found.items) {
-      fmt::print("    {:.0f}: {}\n", item.bits, DescribeItem(item, found.of_second));
-      for (const CorrectionItem& rival : item.rivals)
-        fmt::print("        or {}\n", DescribeItem(rival, found.of_second));
+      fmt::print("    {:.0f}: {}\n", item.bits, DescribeItem(item));
+      for (const CorrectionItem& rival : item.rivals) fmt::print("        or {}\n", DescribeItem(rival));
     }
     for (const std::string& left : found.unexplained) fmt::print("    not explained: {}\n", left);
   }
