@@ -94,7 +94,7 @@ constexpr SiteWords kSites[] = {{SiteKind::kCarrier, "carrier", "carrying link"}
                                 {SiteKind::kInertia, "inertia", "inertia"},
                                 {SiteKind::kGravity, "gravity", "gravity"},
                                 {SiteKind::kConstraint, "constraint", "constraint"},
-                                {SiteKind::kMotor, "motor", "driven joint"}};
+                                {SiteKind::kMotor, "motor", "motor"}};
 
 /// A kind in a name and in words; "{}" stands for its component.
 struct KindWords {

@@ -40,7 +40,7 @@ enum class SiteKind {
   // Quantities of the robot.
   kGravity,
   kConstraint,  ///< A constraint or spring between links.
-  kMotor,       ///< The joints that motors drive.
+  kMotor,       ///< The joints that motors drive, and gains of servos.
 };
 inline bool IsOfBody(SiteKind kind) { return kind >= SiteKind::kMass && kind <= SiteKind::kInertia; }
 inline bool IsName(SiteKind kind) { return kind == SiteKind::kName || kind == SiteKind::kLinkName; }

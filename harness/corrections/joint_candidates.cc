@@ -198,17 +198,23 @@ void CandidateSearch::SearchJoint(int link) {
   }
 }
 
-/// Motors that drive other joints, which then have their gears and limits.
+/// Motors that drive other joints, which then have their gears and limits, and servos of other gains.
 void CandidateSearch::SearchMotors(const Site& site) {
   PrintedRobot moved = pair_.a();
   EditTrial trial = MakeTrial(Kind::kNumber, SiteKind::kMotor, 0.0);
+  const auto say = [&](const std::string& text, double bits) {
+    trial.values += (trial.values.empty() ? "" : "; ") + text;
+    trial.bits += bits;
+  };
   for (PrintedMotor& motor : moved.motors) {
-    const int right = pair_.FindDriven(motor);
-    if (right < 0 || right == motor.link) continue;
-    trial.values += fmt::format("{}{} drives {} here, {} in the other file", trial.values.empty() ? "" : "; ",
-                                motor.name, moved.link(motor.link).joint.name, moved.link(right).joint.name);
-    trial.bits += 3.0;
-    motor.link = right;
+    const PrintedMotor right = pair_.FindRight(motor);
+    if (right.link != motor.link)
+      say(fmt::format("{} drives {} here, {} in the other file", motor.name,
+                      moved.link(motor.link).joint.name, moved.link(right.link).joint.name),
+          3.0);
+    if (right.servo != motor.servo)
+      say(fmt::format("{} {} here, {} in the other file", motor.name, motor.servo, right.servo), 12.0);
+    motor = right;
   }
   TakeMotors(&moved);
   std::vector<Site> right = {site};

@@ -287,9 +287,13 @@ void PrintedPair::ListConstantSites(int link, std::vector<Site>* sites) const {
   }
 }
 
-int PrintedPair::FindDriven(const PrintedMotor& motor) const {
+PrintedMotor PrintedPair::FindRight(PrintedMotor motor) const {
   const auto other = std::ranges::find(b_.motors, motor.name, &PrintedMotor::name);
-  return other == b_.motors.end() ? -1 : match_.a_of_b[static_cast<size_t>(other->link)];
+  if (other == b_.motors.end()) return motor;
+  const int link = match_.a_of_b[static_cast<size_t>(other->link)];
+  if (link >= 0) motor.link = link;
+  if (!motor.servo.empty() && !other->servo.empty()) motor.servo = other->servo;
+  return motor;
 }
 
 void PrintedPair::ListRobotSites(std::vector<Site>* sites) const {
@@ -306,10 +310,7 @@ void PrintedPair::ListRobotSites(std::vector<Site>* sites) const {
   const bool is_link = a_.format == RobotFormat::kMjcf && b_.format == RobotFormat::kMjcf;
   if (a_.floats && b_.floats && *a_.floats != *b_.floats && !is_link) sites->push_back({SiteKind::kType, 0});
   if (a_.constraints != b_.constraints) sites->push_back({SiteKind::kConstraint, 0});
-  const auto is_other = [&](const PrintedMotor& motor) {
-    const int link = FindDriven(motor);
-    return link >= 0 && link != motor.link;
-  };
+  const auto is_other = [&](const PrintedMotor& motor) { return FindRight(motor) != motor; };
   if (std::ranges::any_of(a_.motors, is_other)) sites->push_back({SiteKind::kMotor, 0});
 }
 

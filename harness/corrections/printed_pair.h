@@ -72,8 +72,8 @@ class PrintedPair {
   void MeasureOther(int link);
   /// All that differs.
   [[nodiscard]] std::vector<Site> ListSites() const;
-  /// The first file's link whose joint the motor of that name drives in the second file; -1 without one.
-  [[nodiscard]] int FindDriven(const PrintedMotor& motor) const;
+  /// A motor of the first file with the joint, and the gains of a servo, that it has in the second one.
+  [[nodiscard]] PrintedMotor FindRight(PrintedMotor motor) const;
   /// Whether a file states some number of this kind at any joint.
   [[nodiscard]] static bool States(const PrintedRobot& robot, JointScalar scalar);
 

@@ -136,9 +136,16 @@ TEST_F(TwoMjcfs, CompareWhichJointAServoMoves) {
   const std::string b = ReplaceOnce(kArm, kEnd, ReplaceOnce(text, "elbow", "shoulder"));
   EXPECT_TRUE(Compare(a, a).result.Agrees());
   const Comparison different = Compare(a, b);
+  EXPECT_EQ(List(different),
+            "1. robot: motor differs: p drives elbow here, shoulder in the other file; explains 100 %\n");
+}
+
+TEST_F(TwoMjcfs, CompareTheGainsOfAServo) {
+  const std::string text = "<actuator><position name='p' joint='elbow' kp='50'/></actuator></mujoco>";
+  const std::string a = ReplaceOnce(kArm, kEnd, text);
   EXPECT_EQ(
-      List(different),
-      "1. robot: driven joint differs: p drives elbow here, shoulder in the other file; explains 100 %\n");
+      List(Compare(a, ReplaceOnce(a, "kp='50'", "kp='60'"))),
+      "1. robot: motor differs: p (kp 50, kv 0) here, (kp 60, kv 0) in the other file; explains 100 %\n");
 }
 
 // No term depends on the order of controls, nor on a body without mass; but what uses them does.
