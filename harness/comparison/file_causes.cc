@@ -14,7 +14,7 @@
 namespace dexcheck {
 namespace {
 
-// Of hinges and of slides, by JointScalar.
+// Units at hinges and at slides, by JointScalar.
 constexpr const char* kUnits[][kNumJointScalars] = {
     {"N m s/rad", "N m", "kg m^2", "N m", "rad/s", "N m/rad", "rad", ""},
     {"N s/m", "N", "kg", "N", "m/s", "N/m", "m", ""}};
