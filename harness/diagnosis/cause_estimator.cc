@@ -358,8 +358,11 @@ class Search {
           term.amplitude = term.amplitude.cwiseMax(least);
         term.error = CalcErrors(visible, found.covariance.block(begin, begin, r, r));
         if (found.hidden.size() > 0) {
+          // Together with amplitudes of others.
           constexpr double kHidden = 0.1;
-          const VectorXd hidden = (visible.basis * found.hidden.middleRows(begin, r)).rowwise().norm();
+          MatrixXd shared = found.hidden.middleRows(begin, r);
+          shared.middleCols(begin, r).setZero();
+          const VectorXd hidden = (visible.basis * shared).rowwise().norm();
           const VectorXd each = (visible.basis * found.each.middleRows(begin, r)).rowwise().norm();
           term.error = (hidden.array() > kHidden * each.array()).select(kInfinity, term.error);
         }
