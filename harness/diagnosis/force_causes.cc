@@ -144,7 +144,7 @@ Causes ExplainParts(const StepStore& store, StepForces* forces, const std::vecto
   }
   const Part simplest = *std::ranges::min_element(
       parts, {}, [](const Part& one) { return std::pair(one.rank(), HasPush(one.causes)); });
-  // What the robot has does not come and go, as pushes do.
+  // Properties of the robot do not come and go, as pushes do.
   const bool stays = !HasPush(simplest.causes);
   Causes causes;
   for (size_t i = 0; i < parts.size(); ++i) {

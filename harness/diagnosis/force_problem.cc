@@ -59,7 +59,8 @@ ForceProblem::ForceProblem(const StepStore& store, StepForces* forces, const Seg
   Build();
   first_level_ = level * (1.0 + (kAccuracy * CalcSizes(whole_y_)).array().square()).sqrt();
   const bool rolls = forces->model().base().type == BaseType::kDifferentialDrive;
-  least_level_ = ((rolls ? kExactOnWheels : kExact) / kAccuracy * first_level_).cwiseMax(kRounding);
+  const Vector2d exact(rolls ? kExactOnWheels : kExact, kExact);
+  least_level_ = (exact / kAccuracy).cwiseProduct(first_level_).cwiseMax(kRounding);
   SetLevel(first_level_);
   Complete();
 }

@@ -19,7 +19,7 @@ constexpr double kLargestError = 0.5;
 constexpr double kLevel = 5.0;
 
 /// Two wheels that are off by different amounts are two faults, not one that both have and another of one.
-/// What explains hardly anything beside another is made by a platform that tilts.
+/// One that explains hardly anything beside another is made by a platform that tilts.
 CauseSelection SelectWheels(const VectorXd& y, std::vector<Candidate>* candidates,
                             const CauseOptions& options) {
   constexpr double kLeast = 0.05;  // of the fraction that the first explains
