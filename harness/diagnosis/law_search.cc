@@ -64,7 +64,7 @@ class LawSearch {
     if (found_.empty()) Widen(singles, kFitted, &pairs);
     KeepBest(kWidened, &pairs);
     if (found_.empty()) Widen(pairs, kFitted, &triples);
-    // Where nothing explains the differences, the likeliest single fault is the nearest.
+    // The likeliest single fault is the nearest where nothing explains the differences.
     return found_.empty() && !singles.empty() ? singles.front() : Choose();
   }
 

@@ -120,7 +120,7 @@ TEST(ForceCauses, SeveralAreNamed) {
   }
 }
 
-// What a joint has stays while a push comes and goes there.
+// A joint's own numbers stay while a push comes and goes there.
 TEST(ForceCauses, APushBesideFrictionOfItsJointIsNamed) {
   const auto torque = [](int k, const VectorXd& xi) -> VectorXd {
     return Torque(1, -0.4 * xi[1]) + Torque(1, 8 <= k && k < 16 ? 2.0 : 0.0);
