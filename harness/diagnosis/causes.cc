@@ -27,8 +27,11 @@ const char* NameOf(CauseOutcome outcome) {
 }
 
 std::string FormatVector(const Eigen::Ref<const VectorXd>& v, int digits) {
+  constexpr double kRounding = 1e-9;
+  const double rounding = v.size() > 0 ? kRounding * v.cwiseAbs().maxCoeff() : 0.0;
   std::string text = "(";
-  for (Eigen::Index i = 0; i < v.size(); ++i) text += (i > 0 ? ", " : "") + FormatNumber(v[i], digits);
+  for (Eigen::Index i = 0; i < v.size(); ++i)
+    text += (i > 0 ? ", " : "") + FormatNumber(std::abs(v[i]) < rounding ? 0.0 : v[i], digits);
   return text + ")";
 }
 

@@ -27,7 +27,7 @@ struct Fault {
   [[nodiscard]] std::string Describe() const;
 };
 
-/// "(0.1, 0, -0.2)" with so many digits.
+/// "(0.1, 0, -0.2)" with so many digits; entries that are rounding beside the largest are 0.
 std::string FormatVector(const Eigen::Ref<const VectorXd>& v, int digits);
 
 /// A fault that is none of those that are known.

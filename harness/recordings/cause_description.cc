@@ -23,11 +23,8 @@ std::optional<TorqueColumn::Kind> FindNumber(const TorqueFault& fault, const Tor
   return std::nullopt;
 }
 
-/// Entries that are rounding are 0.
-std::string ShowVector(const Eigen::Ref<const VectorXd>& v) {
-  const double rounding = 1e-9 * v.cwiseAbs().maxCoeff();
-  return FormatVector(v.unaryExpr([=](double x) { return std::abs(x) < rounding ? 0.0 : x; }), 3);
-}
+/// Three digits of each entry.
+std::string ShowVector(const Eigen::Ref<const VectorXd>& v) { return FormatVector(v, 3); }
 
 }  // namespace
 

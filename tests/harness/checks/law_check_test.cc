@@ -4,6 +4,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "tests/common/matchers.h"
 #include "tests/harness/run/changed_parts.h"
 #include "tests/harness/run/shipped_run.h"
@@ -76,8 +78,11 @@ Causes ExplainTorques(const std::function<void(const GraspModel& model, VectorXd
 TEST(LawCheck, ASmallTorqueIsNoZero) {
   const Causes causes = ExplainTorques([](const GraspModel&, VectorXd* tau) { (*tau)[3] += 1e-6; });
   ASSERT_FALSE(causes.empty());
-  EXPECT_NEAR(causes.front().faults.front().value, 1e-6, 1e-9) << causes.front().Describe();
-  EXPECT_EQ(causes.front().faults.front().place, "law of panda_joint4");
+  const auto& faults = causes.front().faults;  // so short a motion does not separate it from a factor
+  const auto torque = std::ranges::find(faults, "torque", &Fault::fault);
+  ASSERT_NE(torque, faults.end()) << causes.front().Describe();
+  EXPECT_NEAR(torque->value, 1e-6, 1e-9) << causes.front().Describe();
+  EXPECT_EQ(torque->place, "law of panda_joint4");
 }
 
 TEST(LawCheck, ASearchThatIsStoppedSaysSo) {

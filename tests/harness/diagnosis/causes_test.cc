@@ -78,7 +78,7 @@ TEST(ForceFaultTest, VectorsAreInTheAxesOfTheLinksFile) {
   };
   EXPECT_EQ(describe(force_fault::kCenterAlone, Vector3d(0.0, 0.0, 0.01)), "(0, 0.01, 0)");
   EXPECT_EQ(describe("inertia", Vector6d::Unit(2)), "(0, 1, 0, 0, 0, 0)");
-  EXPECT_EQ(describe("force", Vector3d(0.0, 0.0, 1.0)), "(0, 0, 1)") << "in world axes";
+  EXPECT_EQ(describe(force_fault::kForce, Vector3d(0.0, 0.0, 1.0)), "(0, 0, 1)") << "in world axes";
 }
 
 TEST(ExplanationTest, SameKindAndPlaceIsOneName) {
