@@ -152,6 +152,7 @@ std::vector<LinkNumber> ListNumbers(PrintedOrigin* origin) {
 
 std::vector<LinkNumber> ListNumbers(PrintedInertial* inertial) {
   std::vector<LinkNumber> numbers = ListNumbers(&inertial->origin);
+  numbers.reserve(numbers.size() + 7);
   numbers.push_back({&inertial->mass.value, &inertial->mass.half});
   for (int k = 0; k < 6; ++k) numbers.push_back({&inertial->I[k], &inertial->half_I[k]});
   return numbers;

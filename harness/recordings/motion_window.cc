@@ -248,10 +248,10 @@ std::optional<Fault> MotionFit::CheckVelocity(int joint, const std::vector<size_
       off > kExplains * (off + without))
     return Fault{
         "velocity gain", place, gain, 0.0, "", std::abs(gain + 1.0) < kFarOff ? "(the other sign)" : ""};
-  const Fault other{"velocity", place, std::numeric_limits<double>::quiet_NaN(),
-                    0.0,        "",    "(not the position's derivative)"};
-  const std::optional<Fault> unless_late =
-      std::abs(gain - 1.0) >= kFarOff ? std::optional(other) : std::nullopt;
+  std::optional<Fault> unless_late;
+  if (std::abs(gain - 1.0) >= kFarOff)
+    unless_late = Fault{"velocity", place, std::numeric_limits<double>::quiet_NaN(),
+                        0.0,        "",    "(not the position's derivative)"};
   if (!(G(1, 1) > kShows * noise(1, 1))) return unless_late;
   const Vector2d x = right.ldlt().solve(b);
   const double left = std::max(0.0, squares - x.dot(b)), error = error_of(left, 1);

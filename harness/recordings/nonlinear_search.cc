@@ -187,14 +187,18 @@ double CountIndependent(const MatrixXd& residuals) {
   return static_cast<double>(residuals.rows()) * (1.0 - correlation) / (1.0 + correlation);
 }
 
+/// Returns what Change moves of a wrong geometry. @param axes as for Change.
+VectorXd GetGeometry(const NonlinearFault& fault, const MatrixXd& axes) {
+  if (fault.number == Number::kPlacement) return fault.shift;
+  return axes.leftCols(fault.CountNumbers()).transpose() * fault.turn;
+}
+
 /// Says how well the motion determines a fault's numbers. @param H their information, of residuals of norm 1
 /// at each joint. @param samples of these that say something of their own.
 void SetErrors(const MatrixXd& H, double samples, const MatrixXd& axes, NonlinearFault* fault) {
   VectorXd along = VectorXd::Ones(1);
   if (fault->number == Number::kGain || fault->number == Number::kClock) along[0] = CalcValue(*fault);
-  if (fault->IsOfModel())
-    along = fault->number == Number::kPlacement ? VectorXd(fault->shift)
-                                                : VectorXd(axes.leftCols(H.cols()).transpose() * fault->turn);
+  if (fault->IsOfModel()) along = GetGeometry(*fault, axes);
   const double size = CalcValue(*fault), least = CalcSymmetricEigenvalues(H)[0];
   if (fault->IsOfModel()) along.normalize();
   fault->fault.error = std::sqrt(along.dot(SolveLeastSquares(H, along)) / samples);
@@ -213,6 +217,14 @@ double Refine(const RobotModel& model, size_t every, double settled, Samples* sa
   const MatrixXd axes = fault->joint >= 0 ? FindDirections(model, fault->joint) : MatrixXd();
   constexpr int kSteps = 20;
   constexpr double kDifference = 1e-5, kLeastPart = 0.05, kUnseen = 1e-9;
+  // A direction that the motion does not show stays small, m or rad.
+  constexpr double kUsual = 0.03;
+  const double prior =
+      fault->IsOfModel() ? 1.0 / (Square(kUsual) * static_cast<double>(residuals.rows())) : 0.0;
+  const auto unusual = [&](const NonlinearFault& one) {
+    return prior > 0.0 ? 0.5 * prior * GetGeometry(one, axes).squaredNorm() : 0.0;
+  };
+  misfit += unusual(*fault);
   double gained = 1.0;
   for (int i = 0; i < kSteps && gained > settled; ++i) {
     const VectorXd weights =
@@ -226,15 +238,16 @@ double Refine(const RobotModel& model, size_t every, double settled, Samples* sa
     }
     MatrixXd H = J.transpose() * J;
     SetErrors(H, CountIndependent(residuals), axes, fault);
-    // A direction that the motion does not show stays as it is.
-    H.diagonal().array() += kUnseen * H.diagonal().maxCoeff();
-    const VectorXd step = -SolveLeastSquares(H, J.transpose() * e);
+    H.diagonal().array() += prior + kUnseen * H.diagonal().maxCoeff();
+    VectorXd slope = J.transpose() * e;
+    if (prior > 0.0) slope += prior * GetGeometry(*fault, axes);
+    const VectorXd step = -SolveLeastSquares(H, slope);
     gained = 0.0;
     for (double part = 1.0; part > kLeastPart && gained == 0.0; part *= 0.5) {
       NonlinearFault near = *fault;
       Change(part * step, axes, &near);
       MatrixXd left = samples->CalcResiduals(near, every);
-      const double then = CalcMisfit(left);
+      const double then = CalcMisfit(left) + unusual(near);
       if (!(then < misfit)) continue;
       gained = misfit - then;
       misfit = then;
