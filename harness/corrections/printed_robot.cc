@@ -145,6 +145,7 @@ void PrintedOrigin::SetRow(const Pose& pose) {
 
 std::vector<LinkNumber> ListNumbers(PrintedOrigin* origin) {
   std::vector<LinkNumber> numbers;
+  numbers.reserve(7);
   for (int k = 0; k < 3; ++k) numbers.push_back({&origin->t[k], &origin->half_t[k]});
   for (int k = 0; k < 4; ++k) numbers.push_back({&origin->r[k], &origin->half_r[k]});
   return numbers;
