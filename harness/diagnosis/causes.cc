@@ -109,9 +109,11 @@ std::string FormatInterval(const Explanation& one) {
 std::string Explanation::Describe() const {
   std::string text;
   if (outcome == CauseOutcome::kNotExplained) {
-    text = "not explained" + (faults.empty() ? std::string() : "; nearest: " + faults.front().Describe()) +
-           " (" + FormatNumber(100.0 * fraction, 3) + " %, " + FormatNumber(left, 3) +
-           " times the noise is left)";
+    text = "not explained";
+    if (!faults.empty())
+      text += "; nearest: " + faults.front().Describe() + ", which explains " +
+              FormatNumber(100.0 * fraction, 3) + " % and leaves " + FormatNumber(left, 3) +
+              " times the noise";
   } else {
     for (size_t i = 0; i < std::min(faults.size(), kMostTold); ++i)
       text += (i == 0 ? "" : " or ") + faults[i].Describe();

@@ -57,7 +57,12 @@ Answer MakeRunAnswer(const Json& summary, std::span<const CheckRecord> checks) {
   }
   if (cause.empty() || cause == "none") return answer;
   if (summary.contains("causes")) AddCauses(summary["causes"], &answer);
-  const std::string evidence = FindText(summary, "/attribution/evidence");
+  std::string evidence = FindText(summary, "/attribution/evidence");
+  // Causes are listed already.
+  for (const Json& one : summary.value("causes", Json::array())) {
+    const std::string text = "; " + FindText(one, "/text");
+    if (const size_t at = evidence.find(text); at != std::string::npos) evidence.erase(at, text.size());
+  }
   if (answer.causes.empty() || answer.causes.front() != evidence)
     answer.remarks.push_back("evidence: " + evidence);
   if (summary.contains("checks") && HasServos(summary["checks"]))
