@@ -268,7 +268,9 @@ class Judge {
     const Index sizes = fault.HasVelocity() || fault.kind == TorqueFault::kSpring ? 1 : term.amplitude.size();
     if (term.amplitude.head(sizes).norm() < kErrors * shown.head(sizes).norm()) return true;
     if (result_.IsWhole()) return false;
-    if (result_.IsBeaten() && !fault.IsFriction()) return true;
+    // A payload is named by its mass and place, and has an inertia besides.
+    const bool is_beaten = result_.IsBeaten() && fault.kind != TorqueFault::kPayload;
+    if (is_beaten && !fault.IsFriction()) return true;
     const double left = 1.0 - estimator_.selection().fraction;
     constexpr double kMostLeft = 0.1;
     // A force on a link for a while fits a part of anything that is large then.
