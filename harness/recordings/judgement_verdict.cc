@@ -112,7 +112,9 @@ Answer MakeAnswer(const RecordingJudgement& judgement, const RobotModel& robot,
     const std::string share =
         judgement.explained > kLeast ? fmt::format(" by {:.3g} %", 100.0 * judgement.explained) : "";
     say("DIFFERS", fmt::format("{} does not explain {}; {}{}", model, recording, causes_do,
-                               judgement.IsWhole() ? "" : share + ", and more than noise is left"));
+                               judgement.IsWhole()   ? ""
+                               : judgement.IsNoise() ? ", and another cause is missing"
+                                                     : share + ", and more than noise is left"));
   }
   answer.sentence += not_judged + ".";
   AddCauses(judgement, &answer);
