@@ -55,7 +55,7 @@ bool MayBeOtherwise(const RecordingJudgement& judgement) {
   if (std::ranges::any_of(judgement.unjudged, &UnjudgedJoint::has_no_gain)) return true;
   constexpr double kWorse = 1.15;  // than all numbers of the model together
   return !judgement.IsWhole() || judgement.by_causes.numbers > kFewNumbers ||
-         (judgement.by_causes.numbers > 0 &&
+         (judgement.by_all.held_left > 0.0 &&
           judgement.by_causes.held_left > kWorse * judgement.by_all.held_left);
 }
 
