@@ -308,7 +308,8 @@ class JudgedJointLaw final : public JudgedLaw {
       damped_ = step.model->robot().M();
       damped_.diagonal() += time_step_ * damping_;
       damped_rates_ = time_step_ * damping_.cwiseProduct(step.response.xi_dot);
-      damped_.llt().solveInPlace(damped_rates_);
+      damped_factor_.compute(damped_);
+      damped_factor_.solveInPlace(damped_rates_);
       demand_ -= damped_rates_;
     }
     if (predicted == nullptr) CalcDemand(truth.q, truth.xi, &true_demand_);
@@ -329,6 +330,7 @@ class JudgedJointLaw final : public JudgedLaw {
   std::optional<GroundContacts> ground_;                     // of a robot that stands
   VectorXd damping_, damped_rates_;                          // n, of implicit damping; empty without
   MatrixXd damped_;
+  Eigen::LLT<MatrixXd> damped_factor_;
   VectorXd q_, xi_;  // where the error dynamics have the joints; empty at first
 };
 

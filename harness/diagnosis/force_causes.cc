@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <optional>
 #include <tuple>
 
@@ -14,28 +13,15 @@ namespace {
 
 constexpr size_t kMostSegments = 8;
 
-/// The numbers of a text: directions, places, where springs relax.
-VectorXd ListNumbers(const std::string& text) {
-  std::vector<double> numbers;
-  for (const char* at = text.c_str(); *at != '\0';) {
-    char* end = nullptr;
-    const double number = std::strtod(at, &end);
-    if (end != at) numbers.push_back(number);
-    at = end != at ? end : at + 1;
-  }
-  return Eigen::Map<const VectorXd>(numbers.data(), static_cast<Eigen::Index>(numbers.size()));
-}
-
 /// Whether they have a fault in common.
 bool IsSame(const Explanation& a, const Explanation& b) {
-  constexpr double kSame = 0.02, kDetails = 0.1;
+  constexpr double kSame = 0.02, kDirection = 0.1;
   const double error = 3.0 * (a.faults.front().error + b.faults.front().error);
   return std::ranges::any_of(a.faults, [&](const Fault& x) {
-    const VectorXd numbers = ListNumbers(x.detail);
     return std::ranges::any_of(b.faults, [&](const Fault& y) {
-      if (!x.IsLike(y) || std::abs(x.value - y.value) > kSame * std::abs(x.value) + error) return false;
-      const VectorXd others = ListNumbers(y.detail);
-      return numbers.size() != others.size() || (numbers - others).norm() <= kDetails * numbers.norm();
+      return x.IsLike(y) && std::abs(x.value - y.value) <= kSame * std::abs(x.value) + error &&
+             (x.numbers.size() != y.numbers.size() ||
+              (x.numbers - y.numbers).norm() <= kDirection * x.numbers.norm());
     });
   });
 }

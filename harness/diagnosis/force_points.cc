@@ -164,20 +164,11 @@ MatrixXd CalcCenterColumns(const std::string& place, const Vector3d& d, double m
   return mass / nominal * all.leftCols<3>() + all.rightCols<6>() * B;
 }
 
-Vector6d CalcMovedInertia(double mass, const Vector3d& d) {
-  const Matrix3d I = mass * (d.squaredNorm() * Matrix3d::Identity() - d * d.transpose());
-  Vector6d entries;
-  entries << I.diagonal(), I(0, 1), I(0, 2), I(1, 2);
-  return entries;
-}
-
 bool IsPossibleLoad(const VectorXd& amplitude, const VectorXd& error) {
   constexpr double kErrors = 3.0, kRelative = 1e-3;
   const Vector6d about = amplitude.tail<6>();
-  const Vector6d own =
-      about - CalcMovedInertia(amplitude[0], Vector3d(amplitude.segment<3>(1) / amplitude[0]));
-  Matrix3d I;
-  I << own[0], own[3], own[4], own[3], own[1], own[5], own[4], own[5], own[2];
+  const Matrix3d I =
+      ToTensor(about) - CalcPointInertia(amplitude[0], Vector3d(amplitude.segment<3>(1) / amplitude[0]));
   // The largest principal moment is at most the sum of the others.
   const double largest = DecomposeSymmetric(I).values[2];
   return I.trace() - 2.0 * largest >= -kErrors * error.tail<6>().norm() - kRelative * about.norm();

@@ -44,9 +44,6 @@ std::optional<ForceAtPoint> RefinePoint(const VectorXd& y, const std::vector<Tur
 MatrixXd CalcCenterColumns(const std::string& place, const Vector3d& d, double more,
                            std::span<const Candidate> candidates);
 
-/// b(d, d): Ixx, Iyy, Izz, Ixy, Ixz, Iyz.
-Vector6d CalcMovedInertia(double mass, const Vector3d& d);
-
 /// Whether a body can have a payload's amplitudes, within these errors: mass, first moment, inertia.
 bool IsPossibleLoad(const VectorXd& amplitude, const VectorXd& error);
 

@@ -407,7 +407,7 @@ bool ForceProblem::IsOneBody(const CauseTerm& term) const {
     });
   };
   const Vector6d beyond =
-      term.amplitude.tail<6>() - CalcMovedInertia(find("mass")->nominal, term.amplitude.head<3>());
+      term.amplitude.tail<6>() - ToEntries(CalcPointInertia(find("mass")->nominal, term.amplitude.head<3>()));
   return (find("inertia")->columns * beyond).norm() <= kBeyond * std::sqrt(static_cast<double>(y_.size()));
 }
 

@@ -49,6 +49,7 @@ struct RecordingJudgement {
   /// By the causes; by a plain least-squares fit of all bodies' numbers that the motion determines, friction,
   /// offsets and armatures.
   HeldPrediction by_causes, by_all;
+  long undone = 0;          ///< Numbers of faults that were undone before the causes were sought.
   bool has_pushes = false;  ///< Some cause begins or ends, in what was held out at an unknown time.
   std::vector<TorqueTrace> traces;
   std::vector<std::string> notes;
@@ -63,7 +64,7 @@ struct RecordingJudgement {
   /// and end of pushes.
   [[nodiscard]] bool IsNoise() const;
   /// A fit of all numbers predicts the quarter that was held out better than the causes do.
-  [[nodiscard]] bool IsBeaten() const { return by_causes.IsBeatenBy(by_all); }
+  [[nodiscard]] bool IsBeaten() const { return by_causes.IsBeatenBy(by_all, by_causes.numbers + undone > 0); }
   /// The causes explain all that is to be explained.
   [[nodiscard]] bool IsWhole() const { return IsNoise() && !IsBeaten(); }
   /// Noise may hide such errors at every joint.

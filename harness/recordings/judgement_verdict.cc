@@ -51,9 +51,8 @@ void AddCauses(const RecordingJudgement& judgement, Answer* answer) {
   const HeldPrediction &causes = judgement.by_causes, &all = judgement.by_all;
   if (all.held_left > 0.0)
     answer->remarks.push_back(fmt::format(
-        "test on a held-out quarter: {} number{} of the causes leave{} {:.2g} times the noise, all {} "
-        "numbers of "
-        "the model {:.2g} times{}",
+        "test on a held-out quarter: {} number{} of the causes leave{} {:.2g} times the noise, "
+        "all {} numbers of the model {:.2g} times{}",
         causes.numbers, causes.numbers == 1 ? "" : "s", causes.numbers == 1 ? "s" : "", causes.held_left,
         all.numbers, all.held_left, judgement.IsBeaten() ? ": some cause is missing" : ""));
 }

@@ -55,8 +55,7 @@ bool MayBeOtherwise(const RecordingJudgement& judgement) {
   if (std::ranges::any_of(judgement.unjudged, &UnjudgedJoint::has_no_gain)) return true;
   constexpr double kWorse = 1.15;  // than all numbers of the model together
   return !judgement.IsWhole() || judgement.by_causes.numbers > kFewNumbers ||
-         (judgement.by_all.held_left > 0.0 &&
-          judgement.by_causes.held_left > kWorse * judgement.by_all.held_left);
+         judgement.by_causes.IsWorseThan(judgement.by_all, kWorse);
 }
 
 /// Returns the sum over the joints of the residual's logarithm.
@@ -137,7 +136,9 @@ bool Readings::Reopen(const std::vector<NonlinearFault>& faults) {
 
 RecordingJudgement Readings::Judge(const std::vector<NonlinearFault>& faults,
                                    const Refinements& refinements) {
-  return judge_(Correct(model_, faults), refinements, count_);
+  RecordingJudgement judgement = judge_(Correct(model_, faults), refinements, count_);
+  for (const NonlinearFault& fault : faults) judgement.undone += fault.CountNumbers();
+  return judgement;
 }
 
 RecordingJudgement Readings::Run() {

@@ -419,7 +419,8 @@ HeldPrediction TorqueEstimator::PredictByAll(const TorqueRows& held) const {
 
 bool TorqueEstimator::LowerNoise() {
   const TorqueRows held = MakeTorqueRows(*recordings_, faults_, /*is_held=*/true);
-  if (!PredictByCauses(held).IsBeatenBy(PredictByAll(held))) return false;
+  const HeldPrediction by_causes = PredictByCauses(held);
+  if (!by_causes.IsBeatenBy(PredictByAll(held), by_causes.numbers > 0)) return false;
   const VectorXd left = held.CalcLeft(FitAmplitudes(Part::kPlain, nullptr));
   for (const TorqueRows::Part& part : held.parts) {
     const double rms = recordings_->weight(part.recording, part.place) *

@@ -21,14 +21,18 @@ struct HeldPrediction {
   /// torques.
   double inexact = 0.0;
 
+  /// Whether another prediction is better by more than a factor.
+  [[nodiscard]] bool IsWorseThan(const HeldPrediction& other, double factor) const {
+    return other.held_left > 0.0 &&
+           std::hypot(held_left, inexact) > factor * std::hypot(other.held_left, inexact);
+  }
   /// Whether a fit of all numbers predicts better. The noise of accelerations is known to a factor of two;
   /// this says more. Where the model is right, what all numbers fit is noise, and they predict worse: in 176
   /// recordings of right models the ratio was 0.4 to 1.12, and 1.44 in one of a coarse encoder.
-  [[nodiscard]] bool IsBeatenBy(const HeldPrediction& all) const {
+  /// @param has_numbers that some cause has; otherwise the model stands alone.
+  [[nodiscard]] bool IsBeatenBy(const HeldPrediction& all, bool has_numbers) const {
     constexpr double kBetter = 1.08, kBetterThanModel = 1.5;
-    return all.held_left > 0.0 &&
-           std::hypot(held_left, inexact) >
-               (numbers > 0 ? kBetter : kBetterThanModel) * std::hypot(all.held_left, inexact);
+    return IsWorseThan(all, has_numbers ? kBetter : kBetterThanModel);
   }
 };
 
