@@ -56,10 +56,11 @@ struct RecordedSample {
 struct MotionNoise {
   VectorXd position, velocity, torque;  ///< Of a single number.
   VectorXd smooth_position, smooth_torque,
-      acceleration;   ///< Of a sample, the last with what smoothing leaves out.
-  VectorXd wrench;    ///< Of a sample; empty for none.
-  double base = 0.0;  ///< Of a sample: the base's acceleration with gravity, m/s^2.
-  VectorXd rest;      ///< Velocity below which a joint is at rest.
+      acceleration;           ///< Of a sample, the last with what smoothing leaves out.
+  VectorXd wrench;            ///< Of a sample; empty for none.
+  double base = 0.0;          ///< Of a sample: the base's acceleration with gravity, m/s^2.
+  VectorXd rest;              ///< Velocity below which a joint is at rest.
+  bool is_quantised = false;  ///< The steps of an encoder are much of some position's noise.
 };
 
 /// Reads a recording once, in constant memory. Rows whose times are doubled are left out, so are those that

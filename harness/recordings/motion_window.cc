@@ -148,6 +148,11 @@ void MotionFit::Analyse() {
       return channel < 0 ? 0.0 : sigma[channel];
     };
     noise_.position[joint] = get(RecordedQuantity::kPosition);
+    constexpr double kMuch = 0.5;
+    if (const int position = ChannelOf(RecordedQuantity::kPosition, joint); position >= 0)
+      noise_.is_quantised =
+          noise_.is_quantised ||
+          (sigma[position] > 0.0 && FindQuantum(position) / std::sqrt(12.0) > kMuch * sigma[position]);
     noise_.velocity[joint] = get(RecordedQuantity::kVelocity);
     noise_.torque[joint] = get(Effort());
     for (const Row& row : rows_ahead_)

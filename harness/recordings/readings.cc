@@ -53,9 +53,10 @@ Explanation MakeCause(const RobotModel& model, const LinkFrames& frames, const N
 bool MayBeOtherwise(const RecordingJudgement& judgement) {
   constexpr long kFewNumbers = 1;
   if (std::ranges::any_of(judgement.unjudged, &UnjudgedJoint::has_no_gain)) return true;
-  constexpr double kWorse = 1.15;  // than all numbers of the model together
+  constexpr double kWorse = 1.15;  // than all numbers of the model together: a reason to look, no verdict
   return !judgement.IsWhole() || judgement.by_causes.numbers > kFewNumbers ||
-         judgement.by_causes.IsWorseThan(judgement.by_all, kWorse);
+         (judgement.by_all.held_left > 0.0 &&
+          judgement.by_causes.held_left > kWorse * judgement.by_all.held_left);
 }
 
 /// Returns the sum over the joints of the residual's logarithm.

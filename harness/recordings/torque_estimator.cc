@@ -407,6 +407,8 @@ HeldPrediction TorqueEstimator::PredictByCauses(const TorqueRows& held) const {
   double squares = 0.0;
   for (const TorqueRows::Part& part : held.parts)
     squares += part.samples * Square(CalcInexact(part) / recordings_->noise(part.recording, part.place));
+  for (size_t i = 0; i < recordings_->size(); ++i)
+    prediction.is_quantised = prediction.is_quantised || (*recordings_)[i].motion.is_quantised;
   prediction.inexact = std::sqrt(squares / std::max(1.0, held.samples));
   return prediction;
 }
@@ -432,7 +434,7 @@ bool TorqueEstimator::LowerNoise() {
 }
 
 double TorqueEstimator::CalcInexact(const TorqueRows::Part& part) const {
-  constexpr double kFraction = 1e-3;
+  constexpr double kFraction = 5e-4;
   const Index torque =
       part.balance->Find(part.place, {TorqueColumn::kTorque, recordings_->joints()[part.place]});
   const MatrixXd& products = part.balance->products(part.place);
