@@ -219,6 +219,14 @@ class Judge {
                                           fault.place, term.amplitude[0]));
       return;
     }
+    const auto is_integrator = [this](size_t candidate) {
+      return estimator_.faults()[candidate].kind == TorqueFault::kIntegrator;
+    };
+    if (is_integrator(term.candidate) ||
+        std::ranges::any_of(term.same, [&](const auto& one) { return is_integrator(one.first); })) {
+      result_.notes.push_back("an integrator's step explains a part: no cause");
+      return;
+    }
     Explanation one;
     one.channel = CauseChannel::kBalance;
     one.from = one.to = std::numeric_limits<double>::quiet_NaN();
@@ -298,7 +306,8 @@ class Judge {
 }  // namespace
 
 bool RecordingJudgement::IsNoise() const {
-  return !balances.empty() && (has_pushes || by_causes.held_left <= kMostNoise) &&
+  return !balances.empty() &&
+         (has_pushes || by_causes.held_left <= std::hypot(kMostNoise, by_causes.inexact)) &&
          std::ranges::all_of(balances,
                              [](const JointJudgement& one) { return one.left <= kMostNoise * one.noise; });
 }

@@ -84,6 +84,7 @@ bool MotionFit::Fill() {
       break;
     }
     if (recording_->Has(RecordedQuantity::kBase)) CheckBase(&row);
+    if (jumps_.size() > 0) row += jumps_;
     if (last_.size() > 0) {
       Unwrap(&row);
       const double passed = row[time] - last_[time];
@@ -238,9 +239,11 @@ void MotionFit::AverageFriction(int joint, const VectorXd& times, const VectorXd
 void MotionFit::AdvanceVelocities(MatrixXd* fitted) const {
   for (const auto& [joint, lag] : velocity_lags_) {
     auto polynomial = fitted->col(ChannelOf(RecordedQuantity::kVelocity, joint));
+    const double own = polynomial[0];
     // Horner's scheme, once for each coefficient: p(t + lag) in powers of t.
-    for (int low = refinements_.advances_velocities ? 0 : 1; low < kOrder; ++low)
+    for (int low = 0; low < kOrder; ++low)
       for (int k = kOrder - 1; k >= low; --k) polynomial[k] += lag * polynomial[k + 1];
+    if (!refinements_.advances_velocities) polynomial[0] = own;
   }
 }
 

@@ -78,7 +78,7 @@ class MotionFit {
   /// All samples, in time.
   void Run(const Receiver& receive);
 
-  /// Velocities that are wrong: "velocity gain" of joints, -1 for the other sign.
+  /// What is wrong with the recording itself: velocities, lost samples, jumps.
   [[nodiscard]] const std::vector<Fault>& faults() const { return faults_; }
   [[nodiscard]] const MotionNoise& noise() const { return noise_; }
   /// Joints with a position and a torque or current.
@@ -142,6 +142,13 @@ class MotionFit {
   /// Replaces wrong samples of a row that is ahead by the mean of those beside it.
   void ReplaceWrongSamples(size_t row);
   void ReportWrongSamples();
+  /// Of torques and positions, a row that four others contradict is wrong.
+  [[nodiscard]] bool IsSmooth(const Channel& channel) const {
+    return channel.quantity == Effort() || channel.quantity == RecordedQuantity::kPosition;
+  }
+  /// Takes away by what positions change from one row to the next though no velocity beside them says so (an
+  /// encoder that slips), and what the time does though positions do not (a clock that was set).
+  void UndoJumps();
   /// Returns the motion of a base whose pose was recorded, by the polynomials.
   [[nodiscard]] BaseMotion CalcBase(const MatrixXd& fitted) const;
   void CheckBase(Row* row) const;
@@ -168,10 +175,11 @@ class MotionFit {
   std::deque<long> segments_;  // of each row ahead
   std::vector<double> numbers_;
   Row last_;
-  std::map<int, double> turned_;         // by joint: what unwrapping adds, rad
-  std::map<int, long> wraps_;            // by joint
-  VectorXd most_alone_;                  // by channel: MeasureSteadiness; empty before
-  std::map<int, long> wrong_;            // by joint: samples that were replaced
+  std::map<int, double> turned_;                            // by joint: what unwrapping adds, rad
+  std::map<int, long> wraps_;                               // by joint
+  VectorXd most_alone_;                                     // by channel: MeasureSteadiness; empty before
+  std::map<std::pair<int, RecordedQuantity>, long> wrong_;  // by joint: samples that were replaced
+  VectorXd jumps_;                                          // by channel: added to later rows
   std::map<int, double> velocity_lags_;  // by joint: how much later than its velocity its position is, s
   bool stands_ = false;
   long segment_ = 0, rows_ = 0, held_ = 0, held_run_ = 0, doubled_ = 0, empty_ = 0, gaps_ = 0;

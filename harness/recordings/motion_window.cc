@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "controller/common/errors.h"
+#include "harness/recordings/jumps.h"
 #include "harness/recordings/motion_fit.h"
 
 namespace dexcheck {
@@ -48,8 +49,8 @@ void MotionFit::MeasureSteadiness() {
   // The first is 5.4 standard deviations of Gaussian noise: by chance, one of 15 million rows is replaced.
   constexpr double kTimes = 8.0, kQuanta = 3.0;
   most_alone_ = VectorXd::Zero(last_.size());
-  for (const int joint : judged_) {
-    const int channel = ChannelOf(Effort(), joint);
+  for (Eigen::Index channel = 0; channel < last_.size(); ++channel) {
+    if (!IsSmooth(recording_->channels[static_cast<size_t>(channel)])) continue;
     std::vector<double> bends;
     for (size_t i = 1; i + 1 < rows_ahead_.size(); ++i)
       bends.push_back(std::abs(rows_ahead_[i][channel] -
@@ -65,8 +66,9 @@ void MotionFit::ReplaceWrongSamples(size_t row) {
   if (rows_ahead_.size() <= 2 * kBeside) return;
   const size_t last = rows_ahead_.size() - 1;
   const size_t first = std::min(row < kBeside ? 0 : row - kBeside, last - 2 * kBeside);
-  for (const int joint : judged_) {
-    const int channel = ChannelOf(Effort(), joint);
+  for (Eigen::Index channel = 0; channel < last_.size(); ++channel) {
+    const Channel& own = recording_->channels[static_cast<size_t>(channel)];
+    if (!IsSmooth(own)) continue;
     const auto at = [&](size_t i) { return rows_ahead_[i][channel]; };
     const double mean = 0.5 * (at(row > 0 ? row - 1 : 1) + at(row < last ? row + 1 : last - 1));
     const double alone = std::abs(at(row) - mean);
@@ -75,16 +77,53 @@ void MotionFit::ReplaceWrongSamples(size_t row) {
       if (i != row) apart = std::max(apart, std::abs(at(i) - mean));
     if (!(alone > most_alone_[channel] && apart < kAgree * alone)) continue;
     rows_ahead_[row][channel] = mean;
-    ++wrong_[joint];
+    ++wrong_[{own.joint, own.quantity}];
   }
 }
 
 void MotionFit::ReportWrongSamples() {
   constexpr double kFew = 0.002;  // of the rows: these are noise
-  for (const auto& [joint, count] : wrong_)
+  for (const auto& [place, count] : wrong_) {
+    const std::string quantity = place.second == RecordedQuantity::kPosition ? "position" : "torque";
     if (const double share = static_cast<double>(count) / static_cast<double>(rows_); share > kFew)
-      faults_.push_back({"lost or wrong samples of the torque", "joint " + model_->joint(joint).name,
-                         100.0 * share, 0.0, "%", "(not used)"});
+      faults_.push_back({"lost or wrong samples of the " + quantity,
+                         "joint " + model_->joint(place.first).name, 100.0 * share, 0.0, "%", "(not used)"});
+  }
+}
+
+void MotionFit::UndoJumps() {
+  jumps_ = VectorXd::Zero(last_.size());
+  JumpOptions options{.time = ChannelOf(RecordedQuantity::kTime, -1),
+                      .quanta = VectorXd::Zero(last_.size()),
+                      .step = step_,
+                      .longest_gap = kGap};
+  for (Eigen::Index i = 0; i < last_.size(); ++i) {
+    if (recording_->channels[static_cast<size_t>(i)].quantity != RecordedQuantity::kPosition) continue;
+    options.positions.push_back(i);
+    options.quanta[i] = FindQuantum(i);
+  }
+  for (const auto& [at, jumps] : FindJumps(rows_ahead_, options)) {
+    for (const Jump& jump : jumps) {
+      for (size_t i = jump.row; i < rows_ahead_.size(); ++i) rows_ahead_[i][at] -= jump.size;
+      jumps_[at] -= jump.size;
+    }
+    const Jump& most =
+        *std::ranges::max_element(jumps, {}, [](const Jump& one) { return std::abs(one.size); });
+    std::string when = fmt::format("at {:.4g} s", rows_ahead_[most.row - 1][options.time]);
+    if (jumps.size() > 1) when += fmt::format(", the largest of {}", jumps.size());
+    const int joint = recording_->channels[static_cast<size_t>(at)].joint;
+    if (joint >= 0) {
+      const bool turns = model_->joint(joint).type == JointType::kRevolute;
+      faults_.push_back({"jump of the position", "joint " + model_->joint(joint).name, most.size, 0.0,
+                         turns ? "rad" : "m", when});
+    } else if (most.size > 0.0) {
+      faults_.push_back({"jump of the time", "all joints", most.size, 0.0, "s", when});
+    } else {
+      faults_.push_back({"lost rows", "all joints", std::numeric_limits<double>::quiet_NaN(), 0.0, "",
+                         when + " (the time has no gap)"});
+    }
+  }
+  last_ += jumps_;
 }
 
 void MotionFit::Analyse() {
@@ -95,20 +134,25 @@ void MotionFit::Analyse() {
         fmt::format("{}: has {} rows that differ, fewer than {}", name, rows_ahead_.size(), kFewest));
   }
   const int time = ChannelOf(RecordedQuantity::kTime, -1);
-  std::vector<double> steps;
-  for (size_t i = 1; i < rows_ahead_.size(); ++i)
-    steps.push_back(rows_ahead_[i][time] - rows_ahead_[i - 1][time]);
-  step_ = Median(steps);
+  const auto list_steps = [&] {
+    std::vector<double> steps;
+    for (size_t i = 1; i < rows_ahead_.size(); ++i)
+      steps.push_back(rows_ahead_[i][time] - rows_ahead_[i - 1][time]);
+    return steps;
+  };
+  step_ = Median(list_steps());
   begin_ = rows_ahead_.front()[time];
   constexpr double kLongest = 0.5;
   if (step_ > kLongest)
     throw InputError(
         fmt::format("{}: time: a row every {:.4g} s shows no motion; its unit may be another", name, step_));
+  MeasureSteadiness();
+  UndoJumps();
+  const std::vector<double> steps = list_steps();
   for (size_t i = 1; i < rows_ahead_.size(); ++i) {
     if (steps[i - 1] > kGap * step_) ++segment_, ++gaps_;
     segments_[i] = segment_;
   }
-  MeasureSteadiness();
   const Eigen::Index n = model_->num_joints();
   for (VectorXd* vector :
        {&noise_.position, &noise_.velocity, &noise_.torque, &noise_.smooth_position, &noise_.smooth_torque,
@@ -308,7 +352,7 @@ void MotionFit::CheckVelocities() {
   }
   recording_->channels = kept;
   for (Row& row : rows_ahead_) row = Row(row(columns));
-  last_ = Row(last_(columns));
+  for (VectorXd* const one : {&last_, &most_alone_, &jumps_}) *one = VectorXd((*one)(columns));
   noise_.velocity.setZero();
 }
 

@@ -55,8 +55,7 @@ bool MayBeOtherwise(const RecordingJudgement& judgement) {
   if (std::ranges::any_of(judgement.unjudged, &UnjudgedJoint::has_no_gain)) return true;
   constexpr double kWorse = 1.15;  // than all numbers of the model together: a reason to look, no verdict
   return !judgement.IsWhole() || judgement.by_causes.numbers > kFewNumbers ||
-         (judgement.by_all.held_left > 0.0 &&
-          judgement.by_causes.held_left > kWorse * judgement.by_all.held_left);
+         judgement.by_causes.IsWorseThan(judgement.by_all, kWorse);
 }
 
 /// Returns the sum over the joints of the residual's logarithm.
@@ -100,10 +99,9 @@ bool IsBetter(const Readings::Reading& one, const Readings::Reading& other) {
   const long more = CountNumbers(one) - CountNumbers(other);
   constexpr double kWorse = 0.1, kMuchOfNumber = 0.25, kMuch = 0.4;  // in the logarithm
   // A much better prediction of the quarter that was held out is worth a few numbers.
-  constexpr double kMuchBetter = 0.8;
+  constexpr double kMuchBetter = 1.25;
   constexpr long kFewMore = 2;
-  if (a.IsWhole() && more <= kFewMore && a.by_causes.held_left < kMuchBetter * b.by_causes.held_left)
-    return true;
+  if (a.IsWhole() && more <= kFewMore && b.by_causes.IsWorseThan(a.by_causes, kMuchBetter)) return true;
   if (a.IsWhole())
     return more < 0 && CalcLeft(a) < CalcLeft(b) + kWorse * static_cast<double>(a.balances.size());
   return LeavesLess(a, b, kMuch, kMuchOfNumber * static_cast<double>(more));
@@ -200,8 +198,10 @@ void Readings::Search(bool of_model, Reading* best) {
     now.judgement = Judge(now.faults, refinements_);
     // A wrong geometry always explains a part of something.
     if (of_model) Refine(&now);
-    const bool replaces_others =
-        now.judgement.IsWhole() && now.judgement.by_causes.numbers < CountNumbers(*best);
+    // Fewer numbers than before, or none at all.
+    const long others = now.judgement.by_causes.numbers;
+    const bool replaces_others = now.judgement.IsWhole() && (others < CountNumbers(*best) ||
+                                                             (others == 0 && !best->judgement.IsWhole()));
     const bool is_better = (!of_model || replaces_others) && IsBetter(now, *best);
     if (is_better) *best = now;
     if (of_model || (!is_better && fault->number != NonlinearFault::Number::kNone)) return;

@@ -29,6 +29,7 @@ TorqueBalance::TorqueBalance(const RobotModel& model, const std::vector<int>& jo
   by_position_.resize(n, n);
   shaking_.resize(n, 12);
   torques_.resize(n);
+  late_.resize(n);
   q_.resize(n);
   residual_ = VectorXd::Zero(static_cast<Index>(joints.size()));
   constexpr double kStep = 1e-6;
@@ -59,9 +60,10 @@ void TorqueBalance::ListColumns(bool has_currents) {
     for (int k = 0; k < 2 * kCutOffs; ++k) columns.push_back({TorqueColumn::kCutOff, joint, k});
     for (int k = 0; k < 3; ++k) columns.push_back({TorqueColumn::kGravity, 0, k});
     if (has_currents) columns.push_back({TorqueColumn::kCurrent, joint});
-    for (const auto kind : {TorqueColumn::kRate, TorqueColumn::kOffset, TorqueColumn::kDry,
-                            TorqueColumn::kViscous, TorqueColumn::kSquare, TorqueColumn::kTime,
-                            TorqueColumn::kAcceleration, TorqueColumn::kLoad, TorqueColumn::kAngle})
+    for (const auto kind :
+         {TorqueColumn::kRate, TorqueColumn::kLate, TorqueColumn::kOffset, TorqueColumn::kDry,
+          TorqueColumn::kViscous, TorqueColumn::kSquare, TorqueColumn::kTime, TorqueColumn::kAcceleration,
+          TorqueColumn::kLoad, TorqueColumn::kAngle})
       columns.push_back({kind, joint});
     for (int k = 0; k < kFrictionShapes; ++k) columns.push_back({TorqueColumn::kFriction, joint, k});
     for (int k = 0; refinements_.shaking > 0.0 && k < shaking_.cols(); ++k)
@@ -110,6 +112,8 @@ double TorqueBalance::CalcEntry(int joint, const TorqueColumn& column, const Rec
       return gravity_(joint, column.component);
     case TorqueColumn::kRate:
       return sample.torque_rate[joint];
+    case TorqueColumn::kLate:
+      return late_[joint] - model_->joint(joint).damping * sample.qdd[joint];
     case TorqueColumn::kCurrent:
       return sample.torque[joint];
     case TorqueColumn::kOffset:
@@ -190,8 +194,12 @@ void TorqueBalance::Add(const RecordedSample& sample, const std::vector<bool>& i
     regressor_.CalcTorques(by_position_.col(k));
     q_[k] = sample.q[k];
   }
+  constexpr double kDelay = 1e-6;  // s
+  regressor_.SetMotion(sample.q, sample.qd - kDelay * sample.qdd, sample.qdd, sample.base);
+  regressor_.CalcTorques(late_);
   regressor_.SetMotion(sample.q, sample.qd, sample.qdd, sample.base);
   regressor_.CalcTorques(torques_);
+  late_ = (late_ - torques_) / kDelay;
   regressor_.CalcGravityColumns(gravity_);
   if (!refinements_.gravity.isZero()) {
     BaseMotion turned = sample.base;
@@ -233,10 +241,16 @@ void TorqueBalance::Add(const RecordedSample& sample, const std::vector<bool>& i
   }
   residual_.setZero();
   for (size_t place = 0; place < joints_.size(); ++place) {
-    if (!is_judged[static_cast<size_t>(joints_[place])]) continue;
+    const int joint = joints_[place];
     auto row = parts_[place].col(used_[place]);
     FillRow(place, sample, row);
-    residual_[static_cast<Index>(place)] = row[row.size() - 1];
+    const double residual = row[row.size() - 1];
+    // Friction that holds a joint does not do everything.
+    constexpr double kFrictions = 4.0, kMuch = 0.3;
+    const double most =
+        std::max(kFrictions * model_->joint(joint).dry_friction, kMuch * sample.most_torque[joint]);
+    if (!is_judged[static_cast<size_t>(joint)] && !(std::abs(residual) > most)) continue;
+    residual_[static_cast<Index>(place)] = residual;
     block.sums[place] += row;
     block.counts[place] += 1.0;
     counts_[place] += 1.0;

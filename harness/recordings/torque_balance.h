@@ -27,6 +27,7 @@ struct TorqueColumn {
     kCutOff,    ///< By component: 2 of each torque at which it may have been cut off.
     kGravity,   ///< By component of gravity.
     kRate,      ///< Of the measured torque.
+    kLate,      ///< By a delay of the velocities.
     kCurrent,   ///< Measured.
     kOffset,    ///< 1
     kDry,       ///< Direction of motion.
@@ -131,7 +132,7 @@ class TorqueBalance {
   MatrixXd bodies_, gravity_, forces_, by_position_, shaking_;
   std::vector<WrenchPlace> wrenches_;
   MatrixXd wrench_squares_;
-  VectorXd torques_, q_, steps_, residual_;
+  VectorXd torques_, late_, q_, steps_, residual_;
 };
 
 }  // namespace dexcheck

@@ -281,8 +281,10 @@ class FaultList {
 
   void AddAll() {
     using enum TorqueFault::Kind;
-    Parts delay, gain;
+    Parts delay, gain, late, implicit;
     for (const int joint : joints_) {
+      late.push_back({{TorqueColumn::kLate, joint}, joint, 1.0});
+      implicit.push_back({{TorqueColumn::kAcceleration, joint}, joint, model_.joint(joint).damping});
       delay.push_back({{TorqueColumn::kRate, joint}, joint, -1.0});
       gain.push_back({{TorqueColumn::kTorque, joint}, joint, 1.0});
     }
@@ -296,6 +298,14 @@ class FaultList {
       TorqueFault& all = Add(kTorqueGain, -1, "torque gain", "all joints", "", {gain}, 1.0);
       all.is_possible = IsGain;
       all.most = VectorXd::Constant(1, kMostGain);
+    }
+    // A simulator's velocity is that of half a step before; its damping may be that of the step's end.
+    constexpr double kBeyond = 0.1;
+    for (const std::vector<Parts>& columns : {std::vector<Parts>{late}, {implicit}, {late, implicit}}) {
+      TorqueFault& one = Add(kIntegrator, -1, "integrator", "all joints", "s", columns);
+      const auto count = static_cast<Eigen::Index>(columns.size());
+      one.least = VectorXd::Constant(count, -kBeyond * extents_.step);
+      one.most = VectorXd::Constant(count, (1.0 + kBeyond) * extents_.step);
     }
     TorqueFault& gravity = Add(kGravity, -1, "gravity", "world", "m/s^2", {});
     for (int k = 0; k < 3; ++k) gravity.sums.push_back({{{TorqueColumn::kGravity, 0, k}, -1, 1.0}});

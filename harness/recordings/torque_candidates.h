@@ -50,6 +50,7 @@ struct TorqueFault : Candidate {
     kOffset,
     kDrift,
     kArmature,
+    kIntegrator,
     kTorqueGain,
     kStuckTorque,
     kDelay,

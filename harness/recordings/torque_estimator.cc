@@ -401,9 +401,23 @@ double TorqueEstimator::CalcBlockSize(const VectorXd& left) const {
 }
 
 HeldPrediction TorqueEstimator::PredictByCauses(const TorqueRows& held) const {
-  HeldPrediction prediction{CountForced(*recordings_),
-                            CalcRms(held, held.CalcLeft(CalcAmplitudes(selection_.terms)))};
-  for (const CauseTerm& term : selection_.terms) prediction.numbers += term.amplitude.size();
+  const VectorXd amplitudes = CalcAmplitudes(selection_.terms);
+  HeldPrediction prediction{CountForced(*recordings_), CalcRms(held, held.CalcLeft(amplitudes))};
+  for (const CauseTerm& term : selection_.terms)
+    if (faults_[term.candidate].kind != TorqueFault::kIntegrator) prediction.numbers += term.amplitude.size();
+  // What an integrator does is smooth and less than noise, so that the search may leave it.
+  const std::vector<Index> first = ListFirstColumns();
+  VectorXd signs(R_.cols());
+  signs << -amplitudes, 1.0;
+  for (size_t i = 0; i < faults_.size(); ++i) {
+    if (faults_[i].kind != TorqueFault::kIntegrator) continue;
+    const Index columns = CountColumns(faults_[i]);
+    const VectorXd change = SolveLeastSquares(R_.middleCols(first[i], columns), R_ * signs, kIndependent);
+    VectorXd with = amplitudes;
+    with.segment(first[i], columns) += change;
+    if (faults_[i].is_possible(with.segment(first[i], columns)))
+      prediction.held_left = std::min(prediction.held_left, CalcRms(held, held.CalcLeft(with)));
+  }
   double squares = 0.0;
   for (const TorqueRows::Part& part : held.parts)
     squares += part.samples * Square(CalcInexact(part) / recordings_->noise(part.recording, part.place));
@@ -434,7 +448,7 @@ bool TorqueEstimator::LowerNoise() {
 }
 
 double TorqueEstimator::CalcInexact(const TorqueRows::Part& part) const {
-  constexpr double kFraction = 5e-4;
+  constexpr double kFraction = 1.5e-4;
   const Index torque =
       part.balance->Find(part.place, {TorqueColumn::kTorque, recordings_->joints()[part.place]});
   const MatrixXd& products = part.balance->products(part.place);

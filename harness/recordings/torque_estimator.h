@@ -16,21 +16,22 @@ inline constexpr double kMostNoise = 2.0;
 /// How well a set of numbers predicts the quarter that it was not fitted to.
 struct HeldPrediction {
   long numbers = 0;
-  double held_left = 0.0;  ///< Root mean square of the rest, in units of noise.
-  /// Errors of integrators and derivatives without any noise, in units of noise: half a
-  /// thousandth of the torques.
-  double inexact = 0.0;
+  double held_left = 0.0;     ///< Root mean square of the rest, in units of noise.
+  double inexact = 0.0;       ///< Errors of integrators and derivatives without any noise, in units of noise.
   bool is_quantised = false;  ///< Noise is the steps of encoders, which depend on the motion.
 
+  /// Whether another prediction is better by more than a factor and than integrators are exact.
+  [[nodiscard]] bool IsWorseThan(const HeldPrediction& other, double factor) const {
+    return other.held_left > 0.0 && held_left > std::hypot(factor * other.held_left, inexact);
+  }
   /// Whether a fit of all numbers predicts better. The noise of accelerations is known to a factor of two;
-  /// this says more. Where the model is right, what all numbers fit is noise, and they predict worse: in 176
-  /// recordings of right models the ratio was 0.4 to 1.12, and 1.44 in one of an encoder of 12 bits.
+  /// this says more. Where the model is right, what all numbers fit is
+  /// noise, and they predict worse: in 176 recordings of right models the ratio was 0.4 to 1.12, and 1.44 in
+  /// one of an encoder of 12 bits.
   /// @param has_numbers that some cause has; otherwise the model stands alone.
   [[nodiscard]] bool IsBeatenBy(const HeldPrediction& all, bool has_numbers) const {
     constexpr double kBetter = 1.08, kBetterThanModel = 1.15, kBetterOfSteps = 1.5;
-    const double factor = has_numbers ? kBetter : is_quantised ? kBetterOfSteps : kBetterThanModel;
-    return all.held_left > 0.0 &&
-           std::hypot(held_left, inexact) > factor * std::hypot(all.held_left, inexact);
+    return IsWorseThan(all, has_numbers ? kBetter : is_quantised ? kBetterOfSteps : kBetterThanModel);
   }
 };
 

@@ -86,7 +86,7 @@ TEST_F(JudgeCommand, ReadsStandardInputAsItComes) {
                  {.folder = folder_.path()});
   EXPECT_EQ(result.exit_code, 1) << result.err;
   EXPECT_THAT(result.out, HasSubstr("what the model does not explain, rms by second"));
-  EXPECT_THAT(result.out, HasSubstr("joint panda_joint4: dry friction 0.5"));
+  EXPECT_THAT(result.out, HasSubstr("joint panda_joint4: dry friction 0.49999"));
 }
 
 TEST_F(JudgeCommand, ReadsAPipeFromItsFirstByte) {

@@ -45,6 +45,33 @@ RecordedFault DryFriction(int joint, double value) {
           [=](mjModel* robot) { robot->dof_frictionloss[joint] = value; }};
 }
 
+// Velocities of half a step before and damping of the step's end are no faults, with whatever step.
+TEST(Judge, IntegratorsOfRightSimulationsAreNoCause) {
+  std::mt19937 random(3);
+  for (const double step : {0.0005, 0.001, 0.002, 0.004})
+    for (const bool has_velocities : {false, true}) {
+      RobotSpec spec = ReadDescription(SourcePath("/controller/parameters/panda.toml")).spec;
+      RecordedFault damped;
+      std::vector<double> damping;
+      for (Joint& joint : spec.joints)
+        damping.push_back(joint.damping = std::uniform_real_distribution<>(0.0, 1.0)(random));
+      damped.change = [&](mjModel* robot) { mju_copy(robot->dof_damping, damping.data(), robot->nv); };
+      const RecordingOptions options{.duration = 5.0,
+                                     .step = step,
+                                     .engine_step = step,
+                                     .encoder_bits = 0,
+                                     .torque_noise = 0.0,
+                                     .has_velocities = has_velocities,
+                                     .velocity_noise = 0.0};
+      const RobotModel model(spec);
+      const RecordedTable table = RecordRobot(kMjcf, {damped}, options, &random);
+      std::vector<Recording> recordings;
+      recordings.push_back(ToRecording(model, table));
+      const RecordingJudgement judgement = JudgeRecordings(model, &recordings, {});
+      EXPECT_TRUE(judgement.Agrees()) << step << ' ' << has_velocities << Tell(judgement);
+    }
+}
+
 // One at a time, each set of frictions is nearly a gain of the torque, and bodies the rest.
 TEST(Judge, SeveralFrictionsOfAModelThatAreWrongAtOnceAreNamed) {
   RobotSpec spec = ReadDescription(SourcePath("/controller/parameters/panda.toml")).spec;
@@ -64,6 +91,33 @@ TEST(Judge, SeveralFrictionsOfAModelThatAreWrongAtOnceAreNamed) {
     EXPECT_NEAR(found.value, right, std::max(0.02, 3.0 * found.error)) << Tell(judgement);
     EXPECT_THAT(found.fault, ::testing::AnyOf("dry friction", "viscous friction"));
   }
+}
+
+TEST(Judge, JumpsAreNamedAndUndone) {
+  const RecordedTable right = Record({});
+  const size_t middle = right.rows() / 2;
+  const auto move_up = [&](const std::string& column, double by, RecordedTable* table) {
+    std::vector<double>& values = table->Get(column);
+    for (size_t i = middle; i < values.size(); ++i) values[i] += by;
+  };
+  RecordedTable slips = right, waits = right, loses = right, lies = right;
+  move_up("q.panda_joint4", 0.05, &slips);
+  EXPECT_TRUE(NamesOnly(Judge(slips), "jump of the position", "joint panda_joint4", 0.05));
+  move_up("time", 0.5, &waits);
+  EXPECT_TRUE(NamesOnly(Judge(waits), "jump of the time", "all joints", 0.5));
+  constexpr size_t kLost = 250;  // rows of 2 ms
+  for (std::vector<double>& column : loses.columns) {
+    const auto first = column.begin() + static_cast<std::ptrdiff_t>(middle);
+    column.erase(first, first + kLost);
+  }
+  std::vector<double>& time = loses.Get("time");
+  for (size_t i = middle; i < time.size(); ++i) time[i] -= 0.5;
+  const RecordingJudgement judgement = Judge(loses);
+  ASSERT_EQ(judgement.causes.size(), 1U) << Tell(judgement);
+  EXPECT_EQ(judgement.causes[0].faults[0].fault, "lost rows");
+  std::vector<double>& position = lies.Get("q.panda_joint2");
+  for (size_t i = 50; i < position.size(); i += 100) position[i] += 0.2;
+  EXPECT_TRUE(NamesOnly(Judge(lies), "lost or wrong samples of the position", "joint panda_joint2", 1.0));
 }
 
 TEST(Judge, VelocitiesOfAnotherSignAreSaidAndNotUsed) {
@@ -212,7 +266,8 @@ TEST(Judge, JointsWithoutPositionsAreSaid) {
 
 TEST(Judge, GapsAreNotSmoothedOver) {
   RecordedTable table = Record({DryFriction(1, 1.5)});
-  for (size_t i = table.rows() / 3; i < table.rows(); ++i) table.columns[0][i] += 5.0;
+  for (std::vector<double>& column : table.columns)
+    column.erase(column.begin() + 3000, column.begin() + 5000);
   EXPECT_TRUE(NamesOnly(Judge(table), "dry friction", "joint panda_joint2", 1.5));
 }
 

@@ -52,6 +52,7 @@ RecordedTable RecordRobot(const std::string& mjcf, const std::vector<RecordedFau
   MjModelPtr robot = LoadMjcf(std::filesystem::path(SourcePath("/" + mjcf)));
   for (const RecordedFault& one : faults)
     if (one.change) one.change(robot.get());
+  if (options.engine_step > 0.0) model->opt.timestep = robot->opt.timestep = options.engine_step;
   const MjDataPtr own(mj_makeData(model.get()));
   const MjDataPtr data(mj_makeData(robot.get()));
   const int n = model->nv;

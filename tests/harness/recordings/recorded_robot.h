@@ -35,6 +35,7 @@ struct RecordedFault {
 struct RecordingOptions {
   double duration = 20.0;      ///< s
   double step = 0.002;         ///< Between rows, s; a multiple of the engine's.
+  double engine_step = 0.0;    ///< s; 0 for the file's.
   int encoder_bits = 12;       ///< 0 for exact positions.
   double torque_noise = 0.02;  ///< Fraction of each joint's usual torque.
   bool has_velocities = false;
