@@ -11,8 +11,8 @@ namespace {
 
 using Eigen::Index;
 
-// Part of the residual, squared, that wheels explain: those that slip do so with the load. One that is 1 % too
-// large in scenario curve explains 0.976.
+// Part of the residual, squared, that wheels explain: those that slip do so with the load. One that is 1 %
+// too large in scenario curve explains 0.976.
 constexpr double kExplains = 0.95;
 // A wheel that is off by more of its size is none of this platform.
 constexpr double kLargestError = 0.5;

@@ -224,7 +224,7 @@ class Judge {
     };
     if (is_integrator(term.candidate) ||
         std::ranges::any_of(term.same, [&](const auto& one) { return is_integrator(one.first); })) {
-      result_.notes.push_back("an integrator's step explains a part: no cause");
+      result_.notes.push_back("the time step of a simulator explains a part of the torques: no cause");
       return;
     }
     Explanation one;

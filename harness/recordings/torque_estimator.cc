@@ -405,7 +405,7 @@ HeldPrediction TorqueEstimator::PredictByCauses(const TorqueRows& held) const {
   HeldPrediction prediction{CountForced(*recordings_), CalcRms(held, held.CalcLeft(amplitudes))};
   for (const CauseTerm& term : selection_.terms)
     if (faults_[term.candidate].kind != TorqueFault::kIntegrator) prediction.numbers += term.amplitude.size();
-  // What an integrator does is smooth and less than noise, so that the search may leave it.
+  // An integrator's share is smooth and less than noise: the search may have left it.
   const std::vector<Index> first = ListFirstColumns();
   VectorXd signs(R_.cols());
   signs << -amplitudes, 1.0;
