@@ -11,13 +11,13 @@
 
 namespace dexcheck {
 
-/// What a channel changes by from the row before to a row, though its velocities beside them do not say so.
+/// A channel's change from the row before to a row that its velocities beside them do not explain.
 struct Jump {
   size_t row = 0;
   double size = 0.0;
 };
 
-/// Where a recording's channels are, and how they change.
+/// A recording's channels, and how they change.
 struct JumpOptions {
   Eigen::Index time = 0;
   std::vector<Eigen::Index> positions;

@@ -78,7 +78,7 @@ class MotionFit {
   /// All samples, in time.
   void Run(const Receiver& receive);
 
-  /// What is wrong with the recording itself: velocities, lost samples, jumps.
+  /// Faults of the recording itself: velocities, lost samples, jumps.
   [[nodiscard]] const std::vector<Fault>& faults() const { return faults_; }
   [[nodiscard]] const MotionNoise& noise() const { return noise_; }
   /// Joints with a position and a torque or current.
@@ -142,7 +142,7 @@ class MotionFit {
   /// Replaces wrong samples of a row that is ahead by the mean of those beside it.
   void ReplaceWrongSamples(size_t row);
   void ReportWrongSamples();
-  /// Of torques and positions, a row that four others contradict is wrong.
+  /// Whether a row of a channel is wrong that four others contradict: torques and positions.
   [[nodiscard]] bool IsSmooth(const Channel& channel) const {
     return channel.quantity == Effort() || channel.quantity == RecordedQuantity::kPosition;
   }

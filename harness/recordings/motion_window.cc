@@ -305,7 +305,7 @@ std::optional<Fault> MotionFit::CheckVelocity(int joint, const std::vector<size_
   const Vector2d x = right.ldlt().solve(b);
   const double left = std::max(0.0, squares - x.dot(b)), error = error_of(left, 1);
   // A logger may read velocities half a step before positions, as a leapfrog has them.
-  constexpr double kLeast = 0.1;  // rows
+  constexpr double kLeast = 0.02;  // rows
   if (std::abs(x[1]) > std::max(kErrors * error, kLeast * step_) && std::abs(x[1]) < kLate * step_)
     velocity_lags_[joint] = x[1];
   if (x[1] < kLate * step_ || x[1] < kErrors * error || without - left < kExplains * without)

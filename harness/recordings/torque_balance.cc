@@ -247,9 +247,10 @@ void TorqueBalance::Add(const RecordedSample& sample, const std::vector<bool>& i
     const double residual = row[row.size() - 1];
     // Friction that holds a joint does not do everything.
     constexpr double kFrictions = 4.0, kMuch = 0.3;
-    const double most =
-        std::max(kFrictions * model_->joint(joint).dry_friction, kMuch * sample.most_torque[joint]);
-    if (!is_judged[static_cast<size_t>(joint)] && !(std::abs(residual) > most)) continue;
+    const double friction = model_->joint(joint).dry_friction;
+    const bool is_more = friction > 0.0 && std::abs(residual) > std::max(kFrictions * friction,
+                                                                         kMuch * sample.most_torque[joint]);
+    if (!is_judged[static_cast<size_t>(joint)] && !is_more) continue;
     residual_[static_cast<Index>(place)] = residual;
     block.sums[place] += row;
     block.counts[place] += 1.0;
