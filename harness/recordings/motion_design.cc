@@ -156,7 +156,7 @@ class MotionDesigner {
   VectorXd Follow(const SeriesMotion& motion, TorqueBalance* balance, VectorXd* squares) {
     constexpr size_t kEvery = 4;
     RecordedSample sample;
-    sample.torque_rate = sample.torque_bend = VectorXd::Zero(model_.num_joints());
+    sample.torque_rate = VectorXd::Zero(model_.num_joints());
     sample.most_torque = VectorXd::Constant(model_.num_joints(), std::numeric_limits<double>::infinity());
     sample.friction.resize(model_.num_joints(), kFrictionShapes);
     const MatrixXd shape_velocities = ListShapeVelocities(0.5 * limits_.velocity);

@@ -299,7 +299,6 @@ bool MotionFit::Emit(size_t centre, const Receiver& receive) {
           (window.col(torque).array().abs() > limit->second - kMostNoisy * noise_.torque[joint])
               .cast<double>()
               .mean();
-    sample_.torque_bend[joint] = 2.0 * fitted(2, torque);
     sample_.torque_rate[joint] = CalcTorqueRate(joint, centre, fitted.col(torque));
   }
   if (recording_->Has(RecordedQuantity::kBase)) sample_.base = CalcBase(fitted);

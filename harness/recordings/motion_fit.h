@@ -43,7 +43,6 @@ struct RecordedSample {
   VectorXd torque;                    ///< Measured, or the current; smoothed like the motion.
   VectorXd most_torque;               ///< The largest of those that were read ahead, less its noise.
   VectorXd torque_rate;               ///< Per s, the secant's over a delay that is known.
-  VectorXd torque_bend;               ///< Its second derivative, per s^2.
   BaseMotion base;                    ///< At rest where it was not recorded.
   VectorXd wrench;                    ///< Measured, on the link, N and N m; empty for none.
   VectorXd direction;                 ///< Sign of the velocity, averaged as the torque is; 0 at rest.

@@ -154,10 +154,10 @@ void MotionFit::Analyse() {
     segments_[i] = segment_;
   }
   const Eigen::Index n = model_->num_joints();
-  for (VectorXd* vector : {&noise_.position, &noise_.velocity, &noise_.torque, &noise_.smooth_position,
-                           &noise_.smooth_torque, &noise_.acceleration, &noise_.rest, &sample_.q, &sample_.qd,
-                           &sample_.qdd, &sample_.torque, &sample_.torque_rate, &sample_.torque_bend,
-                           &sample_.direction, &sample_.slowest, &sample_.beyond, &sample_.most_torque})
+  for (VectorXd* vector :
+       {&noise_.position, &noise_.velocity, &noise_.torque, &noise_.smooth_position, &noise_.smooth_torque,
+        &noise_.acceleration, &noise_.rest, &sample_.q, &sample_.qd, &sample_.qdd, &sample_.torque,
+        &sample_.torque_rate, &sample_.direction, &sample_.slowest, &sample_.beyond, &sample_.most_torque})
     *vector = VectorXd::Zero(n);
   sample_.friction = MatrixXd::Zero(n, kFrictionShapes);
   // Noise of each channel: what a polynomial over a short window leaves.

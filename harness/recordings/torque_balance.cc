@@ -27,7 +27,6 @@ TorqueBalance::TorqueBalance(const RobotModel& model, const std::vector<int>& jo
   gravity_.resize(n, 3);
   forces_.resize(n, 6);
   by_position_.resize(n, n);
-  inertia_.resize(n, n);
   shaking_.resize(n, 12);
   torques_.resize(n);
   late_.resize(n);
@@ -106,8 +105,7 @@ double TorqueBalance::CalcEntry(int joint, const TorqueColumn& column, const Rec
       return std::copysign(by_position_(joint, column.index),
                            by_position_(joint, column.index) * torques_[column.index]);
     case TorqueColumn::kElastic:
-      return by_position_(joint, column.index) * torques_[column.index] +
-             inertia_(joint, column.index) * sample.torque_bend[column.index];
+      return by_position_(joint, column.index) * torques_[column.index];
     case TorqueColumn::kCutOff:
       return CalcCutOff(joint, column.component, sample);
     case TorqueColumn::kGravity:
@@ -190,16 +188,11 @@ void TorqueBalance::CalcShakingColumns(const RecordedSample& sample) {
 
 void TorqueBalance::Add(const RecordedSample& sample, const std::vector<bool>& is_judged) {
   q_ = sample.q;
-  qdd_ = sample.qdd;
   for (Index k = 0; k < q_.size(); ++k) {
     q_[k] += steps_[k];
     regressor_.SetMotion(q_, sample.qd, sample.qdd, sample.base);
     regressor_.CalcTorques(by_position_.col(k));
     q_[k] = sample.q[k];
-    qdd_[k] += 1.0;
-    regressor_.SetMotion(q_, sample.qd, qdd_, sample.base);
-    regressor_.CalcTorques(inertia_.col(k));
-    qdd_[k] = sample.qdd[k];
   }
   constexpr double kDelay = 1e-6;  // s
   regressor_.SetMotion(sample.q, sample.qd - kDelay * sample.qdd, sample.qdd, sample.base);
@@ -207,7 +200,6 @@ void TorqueBalance::Add(const RecordedSample& sample, const std::vector<bool>& i
   regressor_.SetMotion(sample.q, sample.qd, sample.qdd, sample.base);
   regressor_.CalcTorques(torques_);
   late_ = (late_ - torques_) / kDelay;
-  inertia_.colwise() -= torques_;
   regressor_.CalcGravityColumns(gravity_);
   if (!refinements_.gravity.isZero()) {
     BaseMotion turned = sample.base;

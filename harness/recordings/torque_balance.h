@@ -23,7 +23,7 @@ struct TorqueColumn {
     kTorque,    ///< The model's torque of joint index, with its friction.
     kPosition,  ///< By the position of joint index.
     kBacklash,  ///< The same, with the sign of that joint's torque.
-    kElastic,   ///< By a position that is off in proportion to that joint's torque, with its acceleration.
+    kElastic,   ///< The same, times that joint's torque.
     kCutOff,    ///< By component: 2 of each torque at which it may have been cut off.
     kGravity,   ///< By component of gravity.
     kRate,      ///< Of the measured torque.
@@ -129,10 +129,10 @@ class TorqueBalance {
   std::vector<Block> blocks_;
   double block_samples_ = 1.0;
   // at the sample
-  MatrixXd bodies_, gravity_, forces_, by_position_, inertia_, shaking_;
+  MatrixXd bodies_, gravity_, forces_, by_position_, shaking_;
   std::vector<WrenchPlace> wrenches_;
   MatrixXd wrench_squares_;
-  VectorXd torques_, late_, q_, qdd_, steps_, residual_;
+  VectorXd torques_, late_, q_, steps_, residual_;
 };
 
 }  // namespace dexcheck
