@@ -19,6 +19,7 @@ class Search {
  public:
   Search(const std::deque<VectorXd>& rows, const JumpOptions& options)
       : rows_(rows), options_(options), noise_(VectorXd::Zero(options.quanta.size())) {
+    // The first is more than ten standard deviations of Gaussian noise.
     constexpr double kTimes = 20.0, kQuanta = 3.0;
     for (const Index at : options.positions) {
       std::vector<double> usual;
@@ -61,7 +62,7 @@ class Search {
     std::map<Index, double> jumped;
     for (const Index at : options_.positions) {
       const Vector2d range = CalcRange(row, at);
-      // When a row was is known to a row.
+      // The time of a row is known to one row.
       const double error = noise_[at] + range.cwiseAbs().maxCoeff();
       const double moved = Change(row, at);
       const auto is_by = [&](double steps) {

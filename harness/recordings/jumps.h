@@ -23,7 +23,7 @@ struct JumpOptions {
   std::vector<Eigen::Index> positions;
   VectorXd quanta;           ///< By channel: the steps of encoders, 0 for none.
   double step = 0.0;         ///< The usual time between rows, s.
-  double longest_gap = 0.0;  ///< That says nothing of what positions do meanwhile; times the usual step.
+  double longest_gap = 0.0;  ///< Times the usual step; over a longer one, positions may move anywhere.
 };
 
 /// Returns the jumps by channel. The time jumps ahead where no joint moves by more than in one row; it jumps

@@ -164,7 +164,7 @@ double RecordingSet::CalcNoise(const ReadRecording& one, size_t place) const {
     variance += balance.wrench_squares(place).dot(one.motion.wrench.cwiseAbs2()) / samples;
   variance += mean_square({TorqueColumn::kRate, joint}) *
               Square(gains_[static_cast<Index>(place)] * CalcTimeError(one));
-  // Polynomials leave as much of a motion without noise.
+  // Polynomials leave 1e-6 of the torques of a simulated Panda, whose recording has no noise.
   constexpr double kExact = 1e-5;
   return std::sqrt(variance + Square(kExact) * mean_square({TorqueColumn::kTorque, joint}) +
                    std::numeric_limits<double>::min());

@@ -245,11 +245,12 @@ void TorqueBalance::Add(const RecordedSample& sample, const std::vector<bool>& i
     auto row = parts_[place].col(used_[place]);
     FillRow(place, sample, row);
     const double residual = row[row.size() - 1];
-    // Friction that holds a joint does not do everything.
+    // A joint that friction holds: more than friction can do is judged.
     constexpr double kFrictions = 4.0, kMuch = 0.3;
     const double friction = model_->joint(joint).dry_friction;
-    const bool is_more = friction > 0.0 && std::abs(residual) > std::max(kFrictions * friction,
-                                                                         kMuch * sample.most_torque[joint]);
+    const bool is_more =
+        friction > 0.0 && sample.beyond[joint] == 0.0 &&
+        std::abs(residual) > std::max(kFrictions * friction, kMuch * sample.most_torque[joint]);
     if (!is_judged[static_cast<size_t>(joint)] && !is_more) continue;
     residual_[static_cast<Index>(place)] = residual;
     block.sums[place] += row;

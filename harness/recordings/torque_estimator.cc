@@ -415,7 +415,8 @@ HeldPrediction TorqueEstimator::PredictByCauses(const TorqueRows& held) const {
     const VectorXd change = SolveLeastSquares(R_.middleCols(first[i], columns), R_ * signs, kIndependent);
     VectorXd with = amplitudes;
     with.segment(first[i], columns) += change;
-    if (faults_[i].is_possible(with.segment(first[i], columns)))
+    const auto amplitude = with.segment(first[i], columns);
+    if (faults_[i].is_possible(amplitude) && (amplitude.array() >= faults_[i].least.array()).all())
       prediction.held_left = std::min(prediction.held_left, CalcRms(held, held.CalcLeft(with)));
   }
   double squares = 0.0;
@@ -448,6 +449,7 @@ bool TorqueEstimator::LowerNoise() {
 }
 
 double TorqueEstimator::CalcInexact(const TorqueRows::Part& part) const {
+  // A kink of the acceleration leaves up to 2e-4 of the torque of a stretch without noise.
   constexpr double kFraction = 1.5e-4;
   const Index torque =
       part.balance->Find(part.place, {TorqueColumn::kTorque, recordings_->joints()[part.place]});

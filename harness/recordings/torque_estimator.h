@@ -25,9 +25,8 @@ struct HeldPrediction {
     return other.held_left > 0.0 && held_left > std::hypot(factor * other.held_left, inexact);
   }
   /// Whether a fit of all numbers predicts better. The noise of accelerations is known to a factor of two;
-  /// this says more. Where the model is right, what all numbers fit is
-  /// noise, and they predict worse: in 176 recordings of right models the ratio was 0.4 to 1.12, and 1.44 in
-  /// one of an encoder of 12 bits.
+  /// this says more. Where the model is right, what all numbers fit is noise, and they predict worse: in 176
+  /// recordings of right models the ratio was 0.4 to 1.12, and 1.44 in one of an encoder of 12 bits.
   /// @param has_numbers that some cause has; otherwise the model stands alone.
   [[nodiscard]] bool IsBeatenBy(const HeldPrediction& all, bool has_numbers) const {
     constexpr double kBetter = 1.08, kBetterThanModel = 1.15, kBetterOfSteps = 1.5;
