@@ -20,7 +20,7 @@ class Samples {
     MotionFit motion(model, recording, kRows);
     joints_ = motion.joints();
     has_currents_ = motion.has_currents();
-    velocity_faults_ = motion.faults();
+    recording_faults_ = motion.faults();
     size_t every = 1, count = 0;
     motion.Run([&](const RecordedSample& sample) {
       if (count++ % every != 0) return true;
@@ -45,8 +45,9 @@ class Samples {
   /// Whether recorded velocities are the derivatives of positions that have this gain undone.
   [[nodiscard]] bool HasRatesOf(const Fault& gain) const {
     constexpr double kNear = 0.1;
-    return std::ranges::any_of(velocity_faults_, [&](const Fault& rate) {
-      return rate.place == gain.place && std::abs(rate.value * gain.value - 1.0) < kNear;
+    return std::ranges::any_of(recording_faults_, [&](const Fault& rate) {
+      return rate.fault == "velocity gain" && rate.place == gain.place &&
+             std::abs(rate.value * gain.value - 1.0) < kNear;
     });
   }
   /// Lowest and highest positions (n x 2).
@@ -107,7 +108,7 @@ class Samples {
   const RobotModel& model_;
   std::vector<int> joints_;
   bool has_currents_ = false, trusts_drives_ = false;
-  std::vector<Fault> velocity_faults_;
+  std::vector<Fault> recording_faults_;
   std::vector<RecordedSample> samples_;
 };
 
