@@ -61,6 +61,8 @@ StepAnalyzer::StepAnalyzer(const Setup& setup)
       vector->setZero(whole_->size());
     engine_force_.setZero(setup.engine().nv);
   }
+  const Eigen::Index entries = whole_ ? whole_->size() : n + (setup.has_object() ? 6 : 0);
+  for (VectorXd* vector : {&now_.motion.residual, &now_.motion.size}) vector->setZero(entries);
   now_.contacts.mismatch.setZero(static_cast<Eigen::Index>(setup.fingertips().size()));
   least_ = RoundingScales(setup.model()).CalcLeastForces();
   now_.setup = &setup;
@@ -133,6 +135,7 @@ void StepAnalyzer::Analyze() {
   CalcRobotResidual();
   ComparePrediction();
   if (setup_->has_object()) CalcObjectResidual();
+  if (!whole_) SetRigidMotion();
   now_.contacts.begins_holding = step.command.handling.holding && !was_holding_;
   was_holding_ = step.command.handling.holding;
   if (now_.contacts.begins_holding) ForgetSlip();
@@ -318,6 +321,17 @@ void StepAnalyzer::CalcWholeResidual() {
     if (IsWorse(left, now_.whole.residual.first)) now_.whole.residual = {left, static_cast<int>(i)};
   }
 
+  MotionBalance& motion = now_.motion;
+  motion.q = whole.q();
+  motion.nu = whole.nu().head(n);
+  motion.nu_dot = nu_dot_.head(n);
+  motion.residual = residual;
+  motion.size = whole_size_;
+  for (size_t i = 0; i < entries.size(); ++i) {
+    const auto k = static_cast<Eigen::Index>(i);
+    if (entries[i] >= 0) motion.residual[entries[i]] += step.drive.tau[k] - response.motor_torques[k];
+  }
+
   // (48) and (19): the same in the paper's coordinates.
   rolling_->SetState(step.reading.state.q, step.reading.state.xi);
   whole.WriteForces(residual, &engine_force_);
@@ -326,7 +340,28 @@ void StepAnalyzer::CalcWholeResidual() {
   if (!setup_->has_object()) return;
   const Matrix3d R_oB = step.reading.state.X_Bo.linear().transpose();
   now_.object.residual << R_oB * residual.segment<3>(n), residual.tail<3>();
+  motion.residual.tail<6>() = now_.object.residual;
   object_left_ << R_oB * whole_left_.segment<3>(n), whole_left_.tail<3>();
+}
+
+void StepAnalyzer::SetRigidMotion() {
+  const StepRecord& step = *now_.step;
+  MotionBalance& motion = now_.motion;
+  const Eigen::Index n = now_.robot.residual.size();
+  motion.q = step.reading.state.q;
+  motion.nu = step.reading.state.xi;
+  motion.nu_dot = step.response.xi_dot;
+  solver_force_ = step.drive.tau - step.response.motor_torques;
+  actuation_.CalcForce(solver_force_, motion.residual.head(n));
+  motion.residual.head(n) += now_.robot.residual;
+  // Rounding of equations that are solved together is that of the largest.
+  constexpr double kTogether = 1e4;
+  motion.size.head(n) = kTogether * now_.robot.balanced * now_.terms().M().diagonal().cwiseSqrt();
+  if (!setup_->has_object()) return;
+  const MassProperties& body = setup_->declared_object().body;
+  motion.residual.tail<6>() = now_.object.residual;
+  motion.size.segment<3>(n).setConstant(kTogether * now_.object.balanced);
+  motion.size.tail<3>() = motion.size.segment<3>(n) * std::sqrt(body.inertia.trace() / body.mass);
 }
 
 void StepAnalyzer::ComparePrediction() {

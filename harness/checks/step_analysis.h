@@ -112,6 +112,16 @@ struct Balance {
   double solver = kNaN;  ///< Relative size of the remaining error of the plant's solver.
 };
 
+/// The equations of motion at a step: those of the whole robot (WholeRobot) at the true state, or (48) of a
+/// plant that is not the engine's; and (19), of the object.
+struct MotionBalance {
+  VectorXd q, nu, nu_dot;  ///< Of the robot.
+  /// What they leave with the torques that motors gave, N and N m: the robot's entries of nu, then the force
+  /// on the object and its moment (Sigma_o), if there is one.
+  VectorXd residual;
+  VectorXd size;  ///< Sum of the magnitudes that each entry is the sum of.
+};
+
 /// Distance of the rigid constrained system under the same torques from the plant.
 struct RigidErrors {
   /// xi_dot_model - xi_dot|_M relative to |xi_dot_model|_M, or to the balanced forces where they are larger.
@@ -130,6 +140,7 @@ struct StepAnalysis {
   Balance<VectorXd> robot;
   Balance<Vector6d> object{.residual = Vector6d::Zero()};
   WholeErrors whole;
+  MotionBalance motion;
   RigidErrors rigid;
   std::optional<LawErrors> law;   ///< Errors of a known law that computed the torques of this step.
   double spectral_radius = kNaN;  ///< That of the law's sampled closed loop; NaN without error dynamics.
@@ -196,6 +207,8 @@ class StepAnalyzer {
   void PredictPart();
   void CalcRobotResidual();
   void CalcWholeResidual();
+  /// Sets MotionBalance of a plant that is not the engine's.
+  void SetRigidMotion();
   void ComparePrediction();
   void CalcObjectResidual();
   void FindFeet();

@@ -55,6 +55,9 @@ class WholeRobot {
 
   /// Evaluates all terms at the engine's state. @param qpos, qvel as the engine's (nq, nv).
   void SetState(const mjtNum* qpos, const mjtNum* qvel);
+  /// Positions of model() at that state.
+  [[nodiscard]] const VectorXd& q() const { return q_; }
+  [[nodiscard]] const VectorXd& nu() const { return nu_; }
   /// M of the robot's entries.
   [[nodiscard]] const MatrixXd& M() const { return terms_.M(); }
   /// Pose of a link or the object in the world.

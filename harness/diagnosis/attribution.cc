@@ -107,9 +107,7 @@ void AddFacts(std::span<const CheckRecord> steps, std::vector<Entry>* entries) {
     const FailureMeaning meaning = MeaningOf(check.name);
     if (!check.failed || meaning.cause == Cause::kNone || FindFailed(steps, meaning.sharper) != nullptr)
       continue;
-    const bool is_void = check.name == "equations_of_motion" || check.name == "inverse_dynamics_robot" ||
-                         check.name == "rolling";
-    if (is_void && check.failed_at >= void_from) continue;
+    if (check.name == "rolling" && check.failed_at >= void_from) continue;
     const Entry fact = MakeFact(check, meaning);
     const auto same = std::find_if(entries->begin(), entries->end(),
                                    [&](const Entry& other) { return other.meaning.cause == meaning.cause; });

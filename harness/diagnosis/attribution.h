@@ -27,8 +27,8 @@ struct AttributionResult {
   std::vector<Attribution> attributions;  ///< Of each failed check.
 };
 
-/// From when on the remainder of the balances and of the wheels' rolling is no fault's, s; endless for never:
-/// wheels slide, the solver stopped early, or two bodies touch that should not.
+/// From when on how wheels roll is no fault's, s; endless for never: wheels slide, the solver stopped early,
+/// or two bodies touch that should not.
 double FindVoid(std::span<const CheckRecord> steps);
 
 /// Attributes the failed checks of a run. Model checks compare both sides at one and the same state: when one

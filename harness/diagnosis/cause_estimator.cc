@@ -296,7 +296,7 @@ class Search {
         const bool is_noise = IsNoise(chosen_);
         if (IsNoise(others) || (!is_noise && alone <= criterion && alone <= best.criterion)) {
           chosen_ = others, criterion = alone, improved = true;
-        } else if (best.criterion < criterion - kEqualLogOdds * 1e-3 && best.candidate != chosen_[place]) {
+        } else if (best.criterion < criterion - options_.least_gain && best.candidate != chosen_[place]) {
           std::vector<size_t> exchanged = chosen_;
           exchanged[place] = best.candidate;
           if (is_noise && !IsNoise(exchanged)) continue;
@@ -327,7 +327,7 @@ class Search {
             return ExchangePairs(Exchange(first.criterion));
           }
           const Best second = FindBest(set);
-          if (!(second.criterion < criterion - kEqualLogOdds * 1e-3)) continue;
+          if (!(second.criterion < criterion - options_.least_gain)) continue;
           set.push_back(second.candidate);
           if (IsNoise(chosen_) && !IsNoise(set)) continue;
           chosen_ = set;

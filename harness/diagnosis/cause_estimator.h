@@ -71,6 +71,9 @@ struct CauseOptions {
   size_t restarts = 3;  ///< Other first choices that are tried where the first led nowhere.
   bool exchanges_pairs =
       true;  ///< Whether two terms are exchanged at once, too; with many of them that takes long.
+  /// By how much an exchange must lower the criterion. Where rows are known to rounding, an exchange that is
+  /// right lowers it by many times their number.
+  double least_gain = 0.005;
   /// Candidates of one column each with which the search begins once more, of all of them but the needless:
   /// what several explain together may look like something else to one at a time.
   std::vector<size_t> start;

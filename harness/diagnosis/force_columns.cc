@@ -78,15 +78,11 @@ VectorXd StepForces::Moved() const {
 }
 
 void StepForces::AddRobot(Candidate* candidate, const Eigen::Ref<const MatrixXd>& f) const {
-  auto rows = RowsOf(candidate);
-  rows.topRows(n_) = f;
-  Whiten(rows);
+  RowsOf(candidate).topRows(n_) = noise_.head(n_).cwiseInverse().asDiagonal() * f;
 }
 
 void StepForces::AddObject(Candidate* candidate, const Matrix6Xd& w) const {
-  auto rows = RowsOf(candidate);
-  rows.bottomRows<6>() = w;
-  Whiten(rows);
+  RowsOf(candidate).bottomRows<6>() = noise_.tail<6>().cwiseInverse().asDiagonal() * w;
 }
 
 void StepForces::AddColumns(Index begin, Index steps, std::vector<Candidate>* candidates) {
@@ -97,82 +93,38 @@ void StepForces::AddColumns(Index begin, Index steps, std::vector<Candidate>* ca
   for (int link = first_link_; link < model_.num_joints(); ++link) AddLink(link, candidates);
   if (store_.setup().has_object()) AddObjectForces(candidates);
   AddGravity(candidates);
-  if (HasOtherShapes(store_)) AddContacts(candidates);
-  if (model_.base().type == BaseType::kDifferentialDrive && model_.base().velocity == DriveVelocity::kTwist)
-    AddWheels(candidates);
-}
-
-void StepForces::AddWheels(std::vector<Candidate>* candidates) {
-  // Net torques of the wheels push the platform by W^T, and wheels that are farther apart turn with it.
-  const Base& base = model_.base();
-  const Vector2d tau = store_.Get(StepStore::kTauReceived).col(step_).head<2>();
-  const Vector2d v = store_.Get(StepStore::kVelocity).col(step_).head<2>();
-  const Vector2d v_dot = store_.Get(StepStore::kAcceleration).col(step_).head<2>();
-  const auto push = [&](const Vector3d& r_r_l_b) {
-    Matrix2d W;
-    W << 1.0 / r_r_l_b[0], 0.5 * r_r_l_b[2] / r_r_l_b[0], 1.0 / r_r_l_b[1], -0.5 * r_r_l_b[2] / r_r_l_b[1];
-    const WheelProperties& wheel = base.wheel;
-    Vector2d f =
-        W.transpose() * (tau - (wheel.spin_inertia + wheel.armature) * (W * v_dot) - wheel.damping * (W * v));
-    f[1] -= 0.5 * wheel.mass * r_r_l_b[2] * r_r_l_b[2] * v_dot[1];
-    return f;
-  };
-  const Vector3d nominal(base.wheel_radius, base.wheel_radius, base.wheel_distance);
-  constexpr double kStep = 1e-6;  // m, of the difference quotient
-  for (const auto& [fault, place, direction] :
-       {std::tuple{"radius", std::string("wheels"), Vector3d(1, 1, 0)},
-        {"radius", "wheel " + base.wheel_joint_right, Vector3d(1, 0, 0)},
-        {"radius", "wheel " + base.wheel_joint_left, Vector3d(0, 1, 0)},
-        {"distance", std::string("wheels"), Vector3d(0, 0, 1)}}) {
-    VectorXd f = VectorXd::Zero(n_);
-    f.head<2>() = (push(nominal + kStep * direction) - push(nominal - kStep * direction)) / (2.0 * kStep);
-    const double size = direction[2] > 0.0 ? base.wheel_distance : base.wheel_radius;
-    AddRobot(&Next(candidates, fault, place, "m", size, VectorXd::Constant(1, size)), f);
-  }
 }
 
 void StepForces::AddJoints(std::vector<Candidate>* candidates) {
-  const VectorXd q = store_.Get(StepStore::kPosition).col(step_);
-  VectorXd rate = terms_.velocity();
-  VectorXd acceleration = store_.Get(StepStore::kAcceleration).col(step_);
-  const Base& base = model_.base();
-  const int offset = model_.num_base_velocities();
-  const bool wheels = base.type == BaseType::kDifferentialDrive;
-  if (wheels) {
-    rate.head<2>() = CalcWheelRates(base, rate.head<2>());
-    acceleration.head<2>() = CalcWheelRates(base, acceleration.head<2>());
-  }
-  for (Index i = wheels ? 0 : offset; i < n_; ++i) {
-    const int dof = static_cast<int>(i) - offset;
-    const Joint* joint = dof < 0 ? nullptr : &model_.joints()[static_cast<size_t>(model_.joint_of_dof(dof))];
-    const bool slides = joint != nullptr && joint->type == JointType::kPrismatic;
+  const VectorXd q = Now(StepStore::kMotionPosition);
+  const VectorXd rate = Now(StepStore::kMotionVelocity);
+  const VectorXd acceleration = Now(StepStore::kMotionAcceleration);
+  for (int dof = 0; dof < model_.num_dofs(); ++dof) {
+    const Index i = model_.num_base_velocities() + dof;
+    const Joint& joint = model_.joint(model_.joint_of_dof(dof));
+    const bool slides = joint.type == JointType::kPrismatic;
     const std::string force = slides ? "N" : "N m";
-    const std::string place =
-        "joint " +
-        (joint == nullptr ? (i == 0 ? base.wheel_joint_right : base.wheel_joint_left) : model_.dof_name(dof));
-    VectorXd f(n_);
-    actuation_.CalcForce(VectorXd::Unit(n_, i), f);
+    const std::string place = "joint " + model_.dof_name(dof);
+    const VectorXd f = VectorXd::Unit(n_, i);
     AddRobot(&Next(candidates, "torque", place, force, 0.0, Weights(1)), f);
-    AddRobot(&Next(candidates, "armature", place, slides ? "kg" : "kg m^2",
-                   joint == nullptr ? base.wheel.armature : joint->armature, Masses(1)),
+    AddRobot(&Next(candidates, "armature", place, slides ? "kg" : "kg m^2", joint.armature, Masses(1)),
              VectorXd(-acceleration[i] * f));
-    AddRobot(&Next(candidates, "viscous friction", place, slides ? "N s/m" : "N m s/rad",
-                   joint == nullptr ? base.wheel.damping : joint->damping, Weights(1)),
+    AddRobot(&Next(candidates, "viscous friction", place, slides ? "N s/m" : "N m s/rad", joint.damping,
+                   Weights(1)),
              VectorXd(-rate[i] * f));
     const double sign = rate[i] > 0.0 ? 1.0 : rate[i] < 0.0 ? -1.0 : 0.0;
-    if (joint != nullptr) {
+    if (const Index known_row = FindDryFriction(dof); known_row >= 0) {
       // The plant says it, also for a joint that sticks. The largest value is reported.
-      const double known = store_.Get(StepStore::kDryFriction)(i, step_);
+      const double known = Now(StepStore::kDryFriction)[known_row];
       Candidate& bearing = Next(candidates, kBearing, place, force, 0.0, VectorXd::Ones(1));
       bearing.nominal = std::max(bearing.nominal, std::abs(known));
-      bearing.fitted = VectorXd::Constant(1, joint->dry_friction);
+      bearing.fitted = VectorXd::Constant(1, joint.dry_friction);
       bearing.parameters = -1;  // its size is known
       AddRobot(&bearing, VectorXd(known * f));
     }
-    AddRobot(&Next(candidates, "dry friction", place, force, joint == nullptr ? 0.0 : joint->dry_friction,
-                   Weights(1)),
+    AddRobot(&Next(candidates, "dry friction", place, force, joint.dry_friction, Weights(1)),
              VectorXd(-sign * f));
-    if (joint == nullptr || joint->type == JointType::kBall) continue;
+    if (joint.type == JointType::kBall) continue;
     MatrixXd spring(n_, 2);
     const double at = q[model_.position_index(model_.joint_of_dof(dof))];
     spring << -at * f, f;
@@ -246,14 +198,14 @@ void StepForces::AddBody(const std::string& place, const MassProperties& body, c
 
 void StepForces::AddLink(int index, std::vector<Candidate>* candidates) {
   const Link& link = links_[static_cast<size_t>(index - first_link_)];
-  const VectorXd xi_dot = store_.Get(StepStore::kAcceleration).col(step_);
+  const VectorXd nu_dot = Now(StepStore::kMotionAcceleration);
   AddBody("link " + model_.link_name(index), *link.body, link.X.linear(), link.J * terms_.velocity(),
-          link.J * xi_dot + link.J_dot * terms_.velocity(), &link, candidates);
+          link.J * nu_dot + link.J_dot * terms_.velocity(), &link, candidates);
 }
 
 void StepForces::AddObjectForces(std::vector<Candidate>* candidates) {
-  const VectorXd pose = store_.Get(StepStore::kObjectPose).col(step_);
-  const VectorXd motion = store_.Get(StepStore::kObjectMotion).col(step_);
+  const VectorXd pose = Now(StepStore::kObjectPose);
+  const VectorXd motion = Now(StepStore::kObjectMotion);
   const Matrix3d R = pose.head<9>().reshaped(3, 3);
   const ObjectModel& object = store_.setup().declared_object();
   const std::string place = "object " + object.name;
@@ -266,35 +218,20 @@ void StepForces::AddObjectForces(std::vector<Candidate>* candidates) {
   AddObject(&Next(candidates, "tether", place, "N/m", 0.0, Weights(4)), tether);
 }
 
-void StepForces::AddContacts(std::vector<Candidate>* candidates) {
-  const Matrix3d R_T = store_.Get(StepStore::kObjectPose).col(step_).head<9>().reshaped(3, 3).transpose();
-  const std::vector<int>& tips = store_.setup().fingertips();
-  for (size_t i = 0; i < tips.size(); ++i) {
-    const Frame& frame = model_.frames()[static_cast<size_t>(tips[i])];
-    const Link& link = links_[static_cast<size_t>(frame.link - first_link_)];
-    const Vector3d m = store_.Get(StepStore::kContactMoment).col(step_).segment<3>(3 * static_cast<Index>(i));
-    Candidate& contact = Next(candidates, kContact, "fingertip " + frame.name, "m", 0.0, VectorXd::Ones(1));
-    contact.is_possible = nullptr;
-    auto rows = RowsOf(&contact);
-    rows << -link.J.bottomRows<3>().transpose() * (link.X.linear().transpose() * m), Vector3d::Zero(),
-        R_T * m;
-    Whiten(rows);
-  }
-}
-
 void StepForces::AddGravity(std::vector<Candidate>* candidates) {
   // f = sum_b m_b J_b^T dg, w = [m R^T dg; 0]
   MatrixXd weights = MatrixXd::Zero(n_, 3);
   for (const Link& link : links_)
     weights += link.body->mass * link.J.topRows<3>().transpose() * link.X.linear().transpose();
-  Eigen::Matrix<double, 6, 3> object = Eigen::Matrix<double, 6, 3>::Zero();
-  const VectorXd pose = store_.Get(StepStore::kObjectPose).col(step_);
-  if (store_.setup().has_object())
+  Candidate& gravity = Next(candidates, kGravity, kWorld, "m/s^2", 0.0, VectorXd::Constant(3, 20.0));
+  AddRobot(&gravity, weights);
+  if (store_.setup().has_object()) {
+    Matrix6Xd object = Matrix6Xd::Zero(6, 3);
+    const VectorXd pose = Now(StepStore::kObjectPose);
     object.topRows<3>() =
         store_.setup().declared_object().body.mass * pose.head<9>().reshaped(3, 3).transpose();
-  Candidate& gravity = Next(candidates, kGravity, kWorld, "m/s^2", 0.0, VectorXd::Constant(3, 20.0));
-  RowsOf(&gravity) << weights, object;
-  Whiten(RowsOf(&gravity));
+    AddObject(&gravity, object);
+  }
   const MatrixXd all = RowsOf(&gravity);
   Candidate& size = Next(candidates, kGravitySize, kWorld, "m/s^2", 0.0, gravity.scale.head(1));
   size.is_possible = nullptr;

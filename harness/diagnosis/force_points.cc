@@ -21,21 +21,25 @@ constexpr int kMostIterations = 30;     // of Gauss-Newton
 struct Body {
   const Candidate *force, *moment;
   std::vector<Matrix3d> turns;
+  StepRange within;
 
   /// Effects of moments that `arm` makes of the body's turn, at each step.
   template <typename Arm>
   [[nodiscard]] MatrixXd CalcMoments(const Arm& arm) const {
-    MatrixXd columns(moment->columns.rows(), 3);
+    MatrixXd columns = MatrixXd::Zero(moment->columns.rows(), 3);
     const Index rows = columns.rows() / static_cast<Index>(turns.size());
-    for (size_t k = 0; k < turns.size(); ++k) {
-      const Index begin = static_cast<Index>(k) * rows;
-      columns.middleRows(begin, rows) = moment->columns.middleRows(begin, rows) * arm(turns[k]);
-    }
+    for (Index k = within.begin; k < within.end; ++k)
+      columns.middleRows(k * rows, rows) =
+          moment->columns.middleRows(k * rows, rows) * arm(turns[static_cast<size_t>(k)]);
     return columns;
   }
   /// y by the force, which acts at p: C_F + C_M [R p]x.
   [[nodiscard]] MatrixXd AtPoint(const Vector3d& p) const {
-    return force->columns + CalcMoments([&](const Matrix3d& R) { return Skew(R * p); });
+    MatrixXd columns = CalcMoments([&](const Matrix3d& R) { return Skew(R * p); });
+    const Index rows = columns.rows() / static_cast<Index>(turns.size());
+    const Index begin = within.begin * rows, count = (within.end - within.begin) * rows;
+    columns.middleRows(begin, count) += force->columns.middleRows(begin, count);
+    return columns;
   }
   /// y by the point where F acts: -C_M [F]x R.
   [[nodiscard]] MatrixXd ByPoint(const Vector3d& F) const {
@@ -50,16 +54,22 @@ std::vector<Body> ListBodies(const std::vector<Turns>& turns, const std::vector<
     const auto moment = std::find_if(candidates.begin(), candidates.end(), [&](const Candidate& one) {
       return one.fault == "moment" && one.place == force.place;
     });
-    Body body{&force, &*moment, {}};
+    Body body{&force, &*moment, {}, {0, static_cast<Index>(turns.size())}};
     for (const Turns& step : turns) body.turns.push_back(step[bodies.size()]);
     bodies.push_back(std::move(body));
   }
   return bodies;
 }
 
-const Body* FindBody(const std::vector<Body>& bodies, const std::string& place) {
-  return &*std::find_if(bodies.begin(), bodies.end(),
-                        [&](const Body& one) { return one.force->place == place; });
+/// The body of a force at a point, in the steps in which that acts.
+Body FindBody(const std::vector<Turns>& turns, const std::vector<Candidate>& candidates,
+              const ForceAtPoint& force) {
+  for (Body& body : ListBodies(turns, candidates)) {
+    if (body.force->place != force.place) continue;
+    body.within = force.within;
+    return body;
+  }
+  return {};
 }
 
 Candidate MakeCandidate(const Body& body, const Vector3d& p) {
@@ -104,7 +114,7 @@ class PointFit {
     return p_.norm() < reach;
   }
 
-  [[nodiscard]] ForceAtPoint force() const { return {body_->force->place, F_, p_}; }
+  [[nodiscard]] ForceAtPoint force() const { return {body_->force->place, F_, p_, body_->within}; }
   [[nodiscard]] Candidate Make() const { return MakeCandidate(*body_, p_); }
 
  private:
@@ -134,15 +144,14 @@ void AddForcesAtPoints(const VectorXd& y, const std::vector<Turns>& turns, doubl
 
 Candidate MakeForceAtPoint(const ForceAtPoint& force, const std::vector<Turns>& turns,
                            const std::vector<Candidate>& candidates) {
-  const std::vector<Body> bodies = ListBodies(turns, candidates);
-  return MakeCandidate(*FindBody(bodies, force.place), force.point);
+  return MakeCandidate(FindBody(turns, candidates, force), force.point);
 }
 
 std::optional<ForceAtPoint> RefinePoint(const VectorXd& y, const std::vector<Turns>& turns, double reach,
                                         const ForceAtPoint& start, const MatrixXd& beside,
                                         const std::vector<Candidate>& candidates) {
-  const std::vector<Body> bodies = ListBodies(turns, candidates);
-  PointFit fit(y, *FindBody(bodies, start.place));
+  const Body body = FindBody(turns, candidates, start);
+  PointFit fit(y, body);
   fit.Start(start);
   if (!fit.Improve(reach, beside)) return std::nullopt;
   return fit.force();

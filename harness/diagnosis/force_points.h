@@ -14,10 +14,17 @@ namespace dexcheck {
 /// Which way bodies are turned at one step: links, then the object, as their candidates follow each other.
 using Turns = std::vector<Matrix3d>;
 
+/// Rows of steps in which a fault acts.
+struct StepRange {
+  Eigen::Index begin = 0, end = 0;
+  bool operator==(const StepRange&) const = default;
+};
+
 /// A force (world, N) at a point of a body (its axes, of its centre of mass, m).
 struct ForceAtPoint {
   std::string place;
   Vector3d force, point;
+  StepRange within;
 };
 
 /// Adds a force that keeps its direction in the world and acts at a point of a body, for those bodies of

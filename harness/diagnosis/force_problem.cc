@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include "controller/common/linear_algebra.h"
+#include "harness/diagnosis/run_causes.h"
 #include "harness/diagnosis/search_limit.h"
 #include "harness/diagnosis/telling.h"
 
@@ -13,28 +15,17 @@ namespace {
 using Eigen::Index;
 using namespace force_fault;
 
-// Columns agree with what a fault does to this fraction: platforms tilt, and wheels slip, by as much.
-constexpr double kAccuracy = 1e-4;
-// A residual of this many times the noise is explained all the same.
-constexpr double kLeft = 3.0;
-// And of what there is to explain, squared, at least this fraction.
-constexpr double kLeastFraction = 0.99;
-// Noise is taken for this many times what the explanation leaves, down to rounding, in bounds of the checks,
-// and to what columns are known to, those of a platform to less; found anew so often.
-constexpr double kOfLeft = 5.0, kRounding = 1e-4, kExact = 1e-7, kExactOnWheels = 2e-5;
-constexpr int kMostLevels = 4;
+// A residual of this many times the noise is explained all the same; and one that is this part of what there
+// was, squared: an effect beside it that nothing names.
+constexpr double kLeft = 3.0, kLeftPart = 1e-12;
+constexpr size_t kFew = 2;  // faults that may leave such an effect: more of them are made to fit
 // Effect in units of the noise, root mean square, of an inertia that another centre of mass does not make.
 constexpr double kBeyond = 3.0;
-constexpr Index kMostSteps = 20;      // that are looked at
+// Fraction from which on columns that depend on the sizes of faults are made anew with these.
+constexpr double kNearly = 0.9;
+// Part of a column beside others that is no rounding, in all steps and in one.
+constexpr double kIndependent = 1e-12, kIndependentAtStep = 1e-9;
 constexpr Index kMostGrowing = 1000;  // pushes that grow, from all times that are tried
-
-/// An explanation of all steps is one of those from that time on, s.
-void SetBegin(const StepStore& store, const Segment& all, double since, Explanation* one) {
-  const auto time = store.Get(StepStore::kTime);
-  const auto first = std::find_if(all.begin(), all.end() - 1, [&](Index i) { return time(0, i) > since; });
-  const Explanation later = StartExplanation(store, one->channel, Segment(first, all.end()));
-  one->from = later.from, one->unseen_before = later.unseen_before;
-}
 
 /// Returns the key of a push that grows.
 std::string NameGrowing(const Candidate& push) { return push.place + push.fault + kGrows; }
@@ -44,82 +35,79 @@ bool IsPush(const Candidate& one) {
   return one.fault == "torque" || one.fault == kForce || one.fault == "moment";
 }
 
+/// Returns whether a fault may come and go: forces, and not what the robot is.
+bool MayEnd(const Candidate& one) {
+  return one.fault == "torque" || one.fault.starts_with("force") || one.fault.starts_with("moment");
+}
+
+/// Returns whether a fault may begin in a run: something may be picked up, too.
+bool MayBegin(const Candidate& one) { return MayEnd(one) || one.fault == "mass" || one.fault == "payload"; }
+
 }  // namespace
 
-ForceProblem::ForceProblem(const StepStore& store, StepForces* forces, const Segment& segment, double level,
-                           Growth growth)
-    : store_(store), forces_(forces), growth_(growth), is_faint_(level < 1.0) {
-  const auto count = static_cast<Index>(segment.size());
-  steps_ = std::min(count, kMostSteps);
-  for (Index i = 0; i < steps_; ++i)
-    used_.push_back(segment[static_cast<size_t>(steps_ == 1 ? 0 : i * (count - 1) / (steps_ - 1))]);
+ForceProblem::ForceProblem(const StepStore& store, StepForces* forces, const ForceSteps& steps, Growth growth)
+    : store_(store),
+      forces_(forces),
+      steps_(steps),
+      growth_(growth),
+      count_(static_cast<Index>(steps.rows.size())) {
   forces->SetGravity(forces->model().gravity());
-  // Errors of the columns hide what is smaller on the same side, robot or object.
-  level_.setConstant(level);
   Build();
-  first_level_ = level * (1.0 + (kAccuracy * CalcSizes(whole_y_)).array().square()).sqrt();
-  const bool rolls = forces->model().base().type == BaseType::kDifferentialDrive;
-  const Vector2d exact(rolls ? kExactOnWheels : kExact, kExact);
-  least_level_ = (exact / kAccuracy).cwiseProduct(first_level_).cwiseMax(kRounding);
-  SetLevel(first_level_);
-  Complete();
 }
 
-bool ForceProblem::IsExplained(double fraction, double left) const {
-  if (left <= 1.0 && !is_faint_) return fraction > 0.0;
-  return fraction >= kLeastFraction && left <= kLeft;
+bool ForceProblem::IsExplained(const CauseSelection& selection) {
+  const bool is_whole = selection.left <= kLeft;
+  return selection.fraction > 0.0 &&
+         (is_whole || (selection.terms.size() <= kFew && 1.0 - selection.fraction <= kLeftPart));
 }
 
-void ForceProblem::FixTerms(const Terms& known) {
-  known_ = known;
-  Complete();
-}
-
-bool ForceProblem::ExplainConstant(const Segment& segment, Causes* causes) {
-  terms_ = {};
-  is_exact_ = LeavesRounding(y_);
-  if (!known_.amplitudes.empty() && CalcLeft(y_) <= 1.0) return true;
+bool ForceProblem::ExplainConstant(Causes* causes) {
   CauseSelection selection = Select();
   if (growth_ == Growth::kWithin && !SearchLimit::IsOver() && NarrowGrowing(selection)) selection = Select();
-  if (!IsExplained(selection.fraction, selection.left)) return false;
-  for (const CauseTerm& term : selection.terms) {
-    const Candidate& one = candidates_[term.candidate];
-    terms_.count += term.amplitude.size();
-    if (one.fault == kForceAtPoint) {
-      terms_.points.push_back({one.place, term.amplitude, one.fitted});
-    } else {
-      terms_.amplitudes.push_back(term);
-    }
-  }
-  if (ExplainJoint(segment, selection, causes)) return true;
+  if (!IsExplained(selection)) return false;
+  if (ExplainJoint(selection, causes)) return true;
   Causes found =
-      DescribeSelection(StartExplanation(store_, CauseChannel::kBalance, segment), selection, candidates_,
+      DescribeSelection(StartExplanation(store_, CauseChannel::kBalance, steps_.all), selection, candidates_,
                         [&](const Candidate& one, const VectorXd& amplitude, const VectorXd& error) {
                           return MakeForceFault(one, amplitude, error, forces_->model());
                         });
-  for (size_t i = 0; i < found.size(); ++i) {
-    const CauseTerm& term = selection.terms[i];
-    const Candidate& one = candidates_[term.candidate];
-    if (one.fault.ends_with(kGrows))
-      SetBegin(store_, segment, CalcGrowthBegin(term.amplitude, one.nominal), &found[i]);
-  }
+  for (size_t i = 0; i < found.size(); ++i) SetTimes(selection.terms[i], &found[i]);
   std::move(found.begin(), found.end(), std::back_inserter(*causes));
   return true;
 }
 
-bool ForceProblem::ExplainJoint(const Segment& segment, const CauseSelection& selection,
-                                Causes* causes) const {
-  if (selection.terms.size() < 2) return false;
+void ForceProblem::SetTimes(const CauseTerm& term, Explanation* one) const {
+  const Candidate& candidate = candidates_[term.candidate];
+  const StepRange& within = within_[term.candidate];
+  if (within.begin > 0) {
+    one->from = steps_.rows[static_cast<size_t>(within.begin)][0];
+    one->unseen_before = 0.0;
+  }
+  if (within.end < count_) {
+    one->to = steps_.rows[static_cast<size_t>(within.end - 1)][0];
+    one->unseen_after = 0.0;
+    one->ends = true;
+  }
+  if (!candidate.fault.ends_with(kGrows)) return;
+  const double since = CalcGrowthBegin(term.amplitude, candidate.nominal);
+  const auto time = store_.Get(StepStore::kTime);
+  const std::vector<Index>& all = steps_.all;
+  const auto first = std::find_if(all.begin(), all.end() - 1, [&](Index i) { return time(0, i) > since; });
+  const Explanation later = StartExplanation(store_, one->channel, std::vector<Index>(first, all.end()));
+  one->from = later.from, one->unseen_before = later.unseen_before;
+}
+
+bool ForceProblem::ExplainJoint(const CauseSelection& selection, Causes* causes) const {
+  if (selection.terms.size() < 2 || is_exact_) return false;
   const std::string& place = candidates_[selection.terms.front().candidate].place;
   const bool is_of_one =
       std::all_of(selection.terms.begin(), selection.terms.end(),
                   [&](const CauseTerm& term) { return candidates_[term.candidate].place == place; });
-  if (is_exact_ && !is_of_one) return false;
   for (const Free& torque : FitAll({"torque"})) {
     const bool leaves_noise = torque.residual.squaredNorm() <= static_cast<double>(y_.size());
     const bool is_joint = is_of_one && candidates_[torque.candidate].place == place;
-    if (!is_joint && (is_exact_ || !leaves_noise)) continue;
-    Explanation one = DescribeFree(segment, torque);
+    if (!is_joint && !leaves_noise) continue;
+    Explanation one = DescribeFree(torque);
     for (const CauseTerm& term : selection.terms)
       one.faults.push_back(
           MakeForceFault(candidates_[term.candidate], term.amplitude, term.error, forces_->model()));
@@ -129,17 +117,20 @@ bool ForceProblem::ExplainJoint(const Segment& segment, const CauseSelection& se
   return false;
 }
 
-void ForceProblem::ExplainChanging(const Segment& segment, Causes* causes) const {
+void ForceProblem::ExplainChanging(Causes* causes) const {
   const std::vector<Free> all = FitAll({"torque", kForce, "moment", "force and moment"});
   if (all.empty()) return;
-  Explanation one = DescribeFree(segment, all.front());
-  if (!IsExplained(one.fraction, one.left)) one.outcome = CauseOutcome::kNotExplained;
+  Explanation one = DescribeFree(all.front());
+  // A wrench at the end of an arm explains whatever its joints do.
+  const Free& best = all.front();
+  const bool says_nothing = best.spans_rows && candidates_[best.candidate].fault != "torque";
+  if (!(one.left <= kLeft) || says_nothing) one.outcome = CauseOutcome::kNotExplained;
   for (size_t i = 1; i < all.size() && one.rival.empty(); ++i) {
     const double odds = 0.5 * (all[i].criterion - all.front().criterion);
     if (odds >= kEqualLogOdds) {
       one.SetRival(candidates_[all[i].candidate], odds);
     } else {
-      one.faults.push_back(DescribeFree(segment, all[i]).faults.front());
+      one.faults.push_back(DescribeFree(all[i]).faults.front());
     }
   }
   causes->push_back(one);
@@ -156,24 +147,25 @@ std::vector<ForceProblem::Free> ForceProblem::FitAll(std::initializer_list<const
 ForceProblem::Free ForceProblem::FitFree(size_t index) const {
   const Candidate& candidate = candidates_[index];
   Free free{.candidate = index, .residual = y_};
-  for (Index k = 0; k < steps_; ++k) {
+  for (Index k = 0; k < count_; ++k) {
     const Index begin = k * forces_->rows();
     const MatrixXd C = candidate.columns.middleRows(begin, forces_->rows());
     auto left = free.residual.segment(begin, forces_->rows());
-    constexpr double kIndependent = 1e-3;
-    const VectorXd a = SolveLeastSquares(C, left, kIndependent);
+    const VectorXd a = SolveLeastSquares(C, left, kIndependentAtStep);
     left -= C * a;
+    const auto used = (C.array() != 0.0).rowwise().any().count();
+    free.spans_rows = free.spans_rows || (used > 0 && C.cols() >= used);
     free.largest = std::max(free.largest, a.head(std::min<Index>(3, a.size())).norm());
   }
   const double rows = static_cast<double>(y_.size());
   free.criterion = rows * std::log(1.0 + free.residual.squaredNorm() / rows) +
-                   static_cast<double>(candidate.columns.cols() * steps_) * std::log(rows);
+                   static_cast<double>(candidate.columns.cols() * count_) * std::log(rows);
   return free;
 }
 
-Explanation ForceProblem::DescribeFree(const Segment& segment, const Free& free) const {
+Explanation ForceProblem::DescribeFree(const Free& free) const {
   const Candidate& candidate = candidates_[free.candidate];
-  Explanation one = StartExplanation(store_, CauseChannel::kBalance, segment);
+  Explanation one = StartExplanation(store_, CauseChannel::kBalance, steps_.all);
   one.fraction = 1.0 - free.residual.squaredNorm() / y_.squaredNorm();
   one.left = std::sqrt(free.residual.squaredNorm() / static_cast<double>(y_.size()));
   one.outcome = CauseOutcome::kNamedClass;
@@ -183,46 +175,102 @@ Explanation ForceProblem::DescribeFree(const Segment& segment, const Free& free)
 
 void ForceProblem::Build() {
   const Index rows = forces_->rows();
-  whole_y_.resize(rows * steps_);
+  y_.resize(rows * count_);
   candidates_.clear();
-  noise_.clear();
   turns_.clear();
-  forces_->SetLevel(level_);
-  for (Index i = 0; i < steps_; ++i) {
-    forces_->SetStep(used_[static_cast<size_t>(i)]);
-    noise_.push_back(forces_->noise());
+  for (Index i = 0; i < count_; ++i) {
+    forces_->SetStep(steps_.rows[static_cast<size_t>(i)]);
     turns_.push_back(forces_->ListTurns());
-    whole_y_.segment(i * rows, rows) = forces_->CalcResidual();
-    forces_->AddColumns(i * rows, steps_, &candidates_);
+    y_.segment(i * rows, rows) = forces_->CalcResidual();
+    forces_->AddColumns(i * rows, count_, &candidates_);
   }
+  constant_ = candidates_.size();
   AddGrowing();
   NameStuckBearings();
-  constant_ = candidates_.size();
-}
-
-void ForceProblem::SetLevel(const Vector2d& level) {
-  const Index rows = forces_->rows();
-  candidates_.resize(constant_);
-  for (Index i = 0; i < steps_; ++i) {
-    const StepNoise& noise = noise_[static_cast<size_t>(i)];
-    noise.ChangeLevel(level_, level, whole_y_.segment(i * rows, rows));
-    for (Candidate& one : candidates_)
-      noise.ChangeLevel(level_, level, one.columns.middleRows(i * rows, rows));
-  }
-  level_ = level;
-}
-
-void ForceProblem::Complete() {
-  candidates_.resize(constant_);
-  y_ = whole_y_;
-  for (const CauseTerm& term : known_.amplitudes) {
-    Candidate& one = candidates_[term.candidate];
-    y_ -= one.columns * term.amplitude;
-    one.is_possible = [](const VectorXd&) { return false; };  // once more
-  }
-  for (const ForceAtPoint& force : known_.points)
-    candidates_.push_back(MakeForceAtPoint(force, turns_, candidates_));
+  within_.assign(candidates_.size(), {0, count_});
+  AddProfiles();
   AddForcesAtPoints(y_, turns_, forces_->reach(), &candidates_);
+  within_.resize(candidates_.size(), {0, count_});
+}
+
+MatrixXd ForceProblem::Mask(MatrixXd columns, const StepRange& within) const {
+  const Index rows = forces_->rows();
+  columns.topRows(within.begin * rows).setZero();
+  columns.bottomRows((count_ - within.end) * rows).setZero();
+  return columns;
+}
+
+VectorXd ForceProblem::CalcChange(size_t jump) const {
+  const Index row = steps_.begins[jump];
+  return steps_.changes[jump].cwiseQuotient(store_.CalcNoise(steps_.rows[static_cast<size_t>(row)]));
+}
+
+std::vector<size_t> ForceProblem::RankAt(size_t jump) const {
+  constexpr size_t kFewest = 4, kMost = 12;  // more only of those that explain all
+  constexpr double kWhole = 1e-6;            // of the change, squared, what that leaves
+  const Index rows = forces_->rows();
+  const Index begin = steps_.begins[jump];
+  const VectorXd change = CalcChange(jump);
+  // By their columns: what each leaves. Of torques, several of which may begin or end at once, the largest.
+  std::map<Index, std::vector<std::pair<double, size_t>>> ranked;
+  for (size_t i = 0; i < constant_; ++i) {
+    if (!MayBegin(candidates_[i])) continue;
+    const MatrixXd C = candidates_[i].columns.middleRows(begin * rows, rows);
+    const bool is_torque = candidates_[i].fault == "torque";
+    ranked[is_torque ? 0 : C.cols()].emplace_back((change - C * SolveLeastSquares(C, change)).squaredNorm(),
+                                                  i);
+  }
+  std::vector<size_t> chosen;
+  for (auto& [width, some] : ranked) {
+    std::sort(some.begin(), some.end());
+    for (size_t k = 0; k < std::min(kMost, some.size()); ++k)
+      if (k < kFewest || some[k].first < kWhole * change.squaredNorm()) chosen.push_back(some[k].second);
+  }
+  return chosen;
+}
+
+void ForceProblem::AddProfiles() {
+  std::vector<std::vector<size_t>> chosen;
+  for (size_t j = 0; j < steps_.begins.size(); ++j) chosen.push_back(RankAt(j));
+  const auto add = [&](size_t candidate, const StepRange& within, size_t jump) {
+    Candidate one = candidates_[candidate];
+    one.columns = Mask(std::move(one.columns), within);
+    one.parameters += 1;
+    if (one.fault == "force and moment") AddPointProfile(one, within, jump);
+    candidates_.push_back(std::move(one));
+    within_.push_back(within);
+  };
+  for (size_t j = 0; j < chosen.size(); ++j) {
+    const Index begin = steps_.begins[j];
+    for (const size_t candidate : chosen[j]) {
+      add(candidate, {begin, count_}, j);
+      if (!MayEnd(candidates_[candidate])) continue;
+      add(candidate, {0, begin}, j);
+      for (size_t later = j + 1; later < chosen.size(); ++later)
+        if (std::ranges::find(chosen[later], candidate) != chosen[later].end())
+          add(candidate, {begin, steps_.begins[later]}, j);
+    }
+  }
+}
+
+void ForceProblem::AddPointProfile(const Candidate& both, const StepRange& within, size_t jump) {
+  const Index rows = forces_->rows(), begin = steps_.begins[jump];
+  const auto whole = std::ranges::find_if(
+      candidates_, [&](const Candidate& one) { return one.fault == both.fault && one.place == both.place; });
+  const VectorXd a = SolveLeastSquares(whole->columns.middleRows(begin * rows, rows), CalcChange(jump));
+  const Vector3d F = a.head<3>();
+  if (!(F.squaredNorm() > 0.0)) return;
+  const auto body = std::ranges::find_if(
+      candidates_, [&](const Candidate& one) { return one.fault == kForce && one.place == both.place; });
+  const auto index = std::ranges::count_if(candidates_.begin(), body,
+                                           [](const Candidate& one) { return one.fault == kForce; });
+  const Matrix3d& R = turns_[static_cast<size_t>(begin)][static_cast<size_t>(index)];
+  const Vector3d p = R.transpose() * F.cross(Vector3d(a.tail<3>())) / F.squaredNorm();
+  if (!(p.norm() < forces_->reach())) return;
+  Candidate point = MakeForceAtPoint({both.place, F, p, within}, turns_, candidates_);
+  point.parameters += 1;
+  candidates_.push_back(std::move(point));
+  within_.push_back(within);
 }
 
 void ForceProblem::AddGrowing() {
@@ -231,9 +279,9 @@ void ForceProblem::AddGrowing() {
   if (!growing_.empty())
     std::erase_if(pushes, [&](const Candidate& one) { return growing_.count(NameGrowing(one)) == 0; });
   // With many of them, not each time of their begin is tried.
-  const auto skipped = static_cast<Index>(pushes.size()) * steps_ / kMostGrowing;
+  const auto skipped = static_cast<Index>(pushes.size()) * count_ / kMostGrowing;
   // With one step they are only there to be known.
-  for (Index first = 0; first + 1 < std::max<Index>(2, steps_); first += 1 + skipped) {
+  for (Index first = 0; first + 1 < std::max<Index>(2, count_); first += 1 + skipped) {
     for (const Candidate& push : pushes) candidates_.push_back(MakeGrowing(push, first, skipped));
     if (growth_ == Growth::kBefore) break;
   }
@@ -244,36 +292,34 @@ bool ForceProblem::NarrowGrowing(const CauseSelection& selection) {
     if (const Candidate& one = candidates_[term.candidate]; one.fault.ends_with(kGrows))
       growing_.insert(one.place + one.fault);
   if (growing_.empty()) return false;
-  level_ = first_level_;
   Build();
-  Complete();
   return true;
 }
 
 Candidate ForceProblem::MakeGrowing(const Candidate& push, Index first, Index skipped) const {
   const auto time = store_.Get(StepStore::kTime);
-  const auto time_of = [&](Index k) { return time(0, used_[static_cast<size_t>(k)]); };
-  const double slack = store_.size() > 1 ? 2.0 * (time(0, 1) - time(0, 0)) : 0.0;
+  const auto time_of = [&](Index k) { return steps_.rows[static_cast<size_t>(k)][0]; };
+  constexpr double kRounding = 1e-9;  // s
   const Index rows = forces_->rows(), width = push.columns.cols();
   Candidate growing = push;
   growing.fault += kGrows;
   growing.unit += "/s";
   growing.nominal = store_.last_time();
   growing.scale = push.scale.replicate(2, 1);
-  growing.columns = MatrixXd::Zero(rows * steps_, 2 * width);
-  for (Index k = first; k < steps_; ++k) {
+  growing.columns = MatrixXd::Zero(rows * count_, 2 * width);
+  for (Index k = first; k < count_; ++k) {
     const auto at = push.columns.middleRows(k * rows, rows);
     growing.columns.middleRows(k * rows, rows) << (time_of(k) - growing.nominal) * at, at;
   }
   // A push that began before all that is kept did not show yet.
-  MatrixXd shows = push.columns.middleRows(first * rows, rows);
-  noise_[static_cast<size_t>(first)].ChangeLevel(level_, Vector2d::Ones(), shows);
-  const double earliest = (first > skipped ? time_of(first - 1 - skipped) : time(0, 0)) - slack;
-  growing.is_possible = [=, steps = steps_, last = time_of(std::min(first + skipped, steps_ - 1)) + slack,
+  const MatrixXd shows = push.columns.middleRows(first * rows, rows);
+  const double before = store_.size() > 1 ? 2.0 * time(0, 0) - time(0, 1) : time(0, 0);
+  const double earliest = (first > skipped ? time_of(first - 1 - skipped) : before) - kRounding;
+  growing.is_possible = [=, steps = count_, last = time_of(std::min(first + skipped, count_ - 1)) + kRounding,
                          end = growing.nominal](const VectorXd& a) {
     const double since = CalcGrowthBegin(a, end);
     const double hidden = (earliest - since) * (shows * a.head(width)).norm();
-    return steps > 1 && since <= last && hidden <= std::sqrt(static_cast<double>(rows));
+    return steps > 1 && since <= last && hidden <= kFails * std::sqrt(static_cast<double>(rows));
   };
   return growing;
 }
@@ -282,67 +328,23 @@ void ForceProblem::NameStuckBearings() {
   const RobotModel& model = forces_->model();
   for (Candidate& one : candidates_) {
     if (one.fault != kBearing) continue;
-    Index row = model.num_base_velocities();
-    while (one.place != "joint " + model.dof_name(static_cast<int>(row) - model.num_base_velocities())) ++row;
+    int dof = 0;
+    while (one.place != "joint " + model.dof_name(dof)) ++dof;
+    const Index row = model.num_base_velocities() + dof;
     // rad/s or m/s, and of the largest friction, which is one and the same wherever it slides
     constexpr double kSlides = 1e-4, kLargest = 1.0 - 1e-9;
     int sliding = 0;
-    for (const Index step : used_)
-      sliding += static_cast<int>(std::abs(store_.Get(StepStore::kVelocity)(row, step)) > kSlides &&
-                                  std::abs(store_.Get(StepStore::kDryFriction)(row, step)) >=
-                                      kLargest * one.nominal);
-    if (4 * sliding < steps_) one.fault = kStuckBearing;
+    for (const VectorXd& step : steps_.rows)
+      sliding += static_cast<int>(
+          std::abs(store_.Part(step, StepStore::kMotionVelocity)[row]) > kSlides &&
+          std::abs(store_.Part(step, StepStore::kDryFriction)[forces_->FindDryFriction(dof)]) >=
+              kLargest * one.nominal);
+    if (4 * sliding < count_) one.fault = kStuckBearing;
   }
 }
 
-Vector2d ForceProblem::CalcSizes(const VectorXd& y) const {
-  const Index n = forces_->rows() - 6;
-  Vector2d square = Vector2d::Zero();
-  for (Index k = 0; k < steps_; ++k) {
-    VectorXd robot = y.segment(k * (n + 6), n);
-    const MatrixXd& U = noise_[static_cast<size_t>(k)].uneven;
-    robot -= U * (U.transpose() * robot);
-    square += Vector2d(robot.squaredNorm(), y.segment<6>(k * (n + 6) + n).squaredNorm());
-  }
-  return (square.array() / (static_cast<double>(steps_) * Vector2d(n, 6).array())).sqrt();
-}
-
-double ForceProblem::CalcLeft(const VectorXd& y) const {
-  const Index n = forces_->rows() - 6;
-  double square = 0.0;
-  for (Index k = 0; k < steps_; ++k) {
-    square += (level_[0] / first_level_[0] * y.segment(k * (n + 6), n)).squaredNorm() +
-              (level_[1] / first_level_[1] * y.segment<6>(k * (n + 6) + n)).squaredNorm();
-  }
-  return std::sqrt(square / static_cast<double>(y.size()));
-}
-
-bool ForceProblem::LeavesRounding(const VectorXd& y) const {
-  return (level_.cwiseProduct(CalcSizes(y)).array() <= least_level_.array()).all();
-}
-
-CauseSelection ForceProblem::Select() {
-  Vector2d level = level_;  // of the best
-  const auto select = [&](const Vector2d& at) {
-    SetLevel(at);
-    Complete();
-    return SelectOnce();
-  };
-  CauseSelection best = SelectOnce();
-  if (best.terms.empty()) best = select(level = kFaint * level);
-  for (int i = 0; i < kMostLevels && IsExplained(best.fraction, best.left) && !SearchLimit::IsOver(); ++i) {
-    const Vector2d lower =
-        (kOfLeft * level_.cwiseProduct(CalcSizes(best.residual))).cwiseMax(least_level_).cwiseMin(level_);
-    if ((lower.array() > 0.5 * level_.array()).all()) break;
-    CauseSelection next = select(lower);
-    if (!IsExplained(next.fraction, next.left) || SearchLimit::IsOver()) break;
-    best = next;
-    level = lower;
-  }
-  if (!IsExplained(best.fraction, best.left) || is_exact_ || SearchLimit::IsOver()) return best;
-  // The noise level was estimated from the residual: more faults that leave but rounding are likelier.
-  if (CauseSelection exact = select(least_level_); is_exact_) return exact;
-  return select(level);
+double ForceProblem::CalcLeft(const VectorXd& y) {
+  return y.norm() / std::sqrt(static_cast<double>(y.size()));
 }
 
 bool ForceProblem::RefinePoints(const CauseSelection& selection) {
@@ -358,10 +360,12 @@ bool ForceProblem::RefinePoints(const CauseSelection& selection) {
       beside.conservativeResize(Eigen::NoChange, beside.cols() + columns.cols());
       beside.rightCols(columns.cols()) = columns;
     }
-    const ForceAtPoint start{one.place, term.amplitude, one.fitted};
+    const ForceAtPoint start{one.place, term.amplitude, one.fitted, within_[term.candidate]};
     const auto refined = RefinePoint(y_, turns_, forces_->reach(), start, beside, candidates_);
     if (!refined) continue;
+    const int parameters = one.parameters;
     one = MakeForceAtPoint(*refined, turns_, candidates_);
+    one.parameters = parameters;
     is_refined = true;
   }
   return is_refined;
@@ -378,7 +382,8 @@ bool ForceProblem::RefineCenters(const CauseSelection& selection) {
       const bool is_mass = beside.fault == "mass" || beside.fault == kMassWithInertia;
       if (is_mass && beside.place == one.place) more += other.amplitude[0];
     }
-    one.columns = CalcCenterColumns(one.place, term.amplitude, more, candidates_);
+    one.columns =
+        Mask(CalcCenterColumns(one.place, term.amplitude, more, candidates_), within_[term.candidate]);
     is_refined = true;
   }
   return is_refined;
@@ -386,9 +391,12 @@ bool ForceProblem::RefineCenters(const CauseSelection& selection) {
 
 CauseSelection ForceProblem::SelectRefined() {
   // A single step cannot distinguish faults.
-  const CauseOptions options{.most_terms = std::min<size_t>(5, used_.size()),
-                             .noise_block_size = static_cast<double>(steps_)};
+  const CauseOptions options{.most_terms = std::min<size_t>(5, steps_.rows.size()),
+                             .exchanges_pairs = !growing_.empty(),
+                             .least_gain = 0.5 * static_cast<double>(y_.size()),
+                             .independent = kIndependent};
   CauseSelection selection = SelectCauses(y_, candidates_, options);
+  if (selection.fraction < kNearly) return selection;
   if (!SearchLimit::IsOver() && RefinePoints(selection)) selection = SelectCauses(y_, candidates_, options);
   // Columns of a centre of mass depend on where it is.
   constexpr int kMostRefinements = 3;
@@ -423,7 +431,7 @@ CauseSelection ForceProblem::SelectPlain() {
   return plain;
 }
 
-CauseSelection ForceProblem::SelectOnce() {
+CauseSelection ForceProblem::Select() {
   CauseSelection selection = SelectRefined();
   const bool is_possible =
       std::ranges::all_of(selection.terms, [&](const CauseTerm& term) { return IsOneBody(term); });
@@ -446,13 +454,28 @@ CauseSelection ForceProblem::SelectOnce() {
     const Vector3d change = is_size ? Vector3d(term.amplitude[0] * g.normalized()) : Vector3d(term.amplitude);
     if (!forces_->SetGravity(g + change)) break;
     Build();
-    Complete();
     selection = SelectRefined();
     break;
   }
   selection.left = CalcLeft(selection.residual);
-  is_exact_ = LeavesRounding(selection.residual);
+  is_exact_ = selection.left <= 1.0;
   return selection;
+}
+
+Causes ExplainForces(const StepStore& store) {
+  Causes causes;
+  const ForceSteps steps = ListForceSteps(store);
+  if (steps.all.empty()) return causes;
+  StepForces forces(store);
+  ForceProblem problem(store, &forces, steps);
+  const bool is_explained = problem.ExplainConstant(&causes);
+  if ((is_explained && problem.is_exact()) || SearchLimit::IsOver()) return causes;
+  // One that grows from a time on.
+  ForceProblem growing(store, &forces, steps, ForceProblem::Growth::kWithin);
+  Causes grown;
+  if (growing.ExplainConstant(&grown) && growing.is_exact() && !SearchLimit::IsOver()) return grown;
+  if (!is_explained) problem.ExplainChanging(&causes);
+  return causes;
 }
 
 }  // namespace dexcheck

@@ -1,6 +1,6 @@
 #pragma once
 
-// The residual of the balances in some of the steps, and its explanation.
+// What the equations of motion leave in some steps, and its explanation.
 
 #include <initializer_list>
 #include <set>
@@ -10,52 +10,40 @@
 
 #include "harness/diagnosis/causes.h"
 #include "harness/diagnosis/force_points.h"
+#include "harness/diagnosis/force_steps.h"
 #include "harness/diagnosis/force_telling.h"
 #include "harness/diagnosis/step_forces.h"
 
 namespace dexcheck {
 
-/// Noise where the checks of the balances hold, in their bounds.
-inline constexpr double kFaint = 0.01;
-
-/// One residual and what explains it.
+/// One residual and what explains it: faults that are there in all steps, or between any two jumps.
 class ForceProblem {
  public:
   /// Pushes that grow: from before these steps on, or from between any two of them.
   enum class Growth { kBefore, kWithin };
-  /// @param level of the noise, in bounds of the checks.
-  ForceProblem(const StepStore& store, StepForces* forces, const Segment& segment, double level = 1.0,
+  ForceProblem(const StepStore& store, StepForces* forces, const ForceSteps& steps,
                Growth growth = Growth::kBefore);
 
   /// Whether the last explanation leaves no more than rounding.
   [[nodiscard]] bool is_exact() const { return is_exact_; }
   /// Whether the remainder is noise, or next to nothing beside what there was.
-  [[nodiscard]] bool IsExplained(double fraction, double left) const;
+  [[nodiscard]] static bool IsExplained(const CauseSelection& selection);
 
-  /// The terms of the last explanation with their sizes; forces at points by themselves.
-  struct Terms {
-    std::vector<CauseTerm> amplitudes;
-    std::vector<ForceAtPoint> points;
-    Eigen::Index count = 0;  ///< Of amplitudes.
-  };
-  [[nodiscard]] const Terms& terms() const { return terms_; }
-  /// Faults that are there, as other steps have shown.
-  void FixTerms(const Terms& known);
-
-  /// Faults that do not change.
-  bool ExplainConstant(const Segment& segment, Causes* causes);
+  /// Adds an explanation by faults that do not change, if there is one.
+  bool ExplainConstant(Causes* causes);
 
   /// One force that changes in time, free at each step.
-  void ExplainChanging(const Segment& segment, Causes* causes) const;
+  void ExplainChanging(Causes* causes) const;
 
  private:
   /// Several faults of one joint may be anything that acts there. So may several of other places, where they
   /// leave more than rounding and a torque of one joint, free at each step, does not.
-  bool ExplainJoint(const Segment& segment, const CauseSelection& selection, Causes* causes) const;
+  bool ExplainJoint(const CauseSelection& selection, Causes* causes) const;
   /// A candidate whose amplitudes are free at each step.
   struct Free {
     size_t candidate = SIZE_MAX;
     double criterion = 0.0, largest = 0.0;
+    bool spans_rows = false;  ///< It explains any residual of the rows that it has.
     VectorXd residual;
   };
   [[nodiscard]] Free FitFree(size_t index) const;
@@ -63,13 +51,21 @@ class ForceProblem {
   [[nodiscard]] std::vector<Free> FitAll(std::initializer_list<const char*> faults) const;
   /// A fault that is free at each step has no size, and is a class of all that may act there: a range that
   /// ends, a cable.
-  [[nodiscard]] Explanation DescribeFree(const Segment& segment, const Free& free) const;
+  [[nodiscard]] Explanation DescribeFree(const Free& free) const;
   /// Residual and candidates with the gravity that is known.
   void Build();
-  /// Their noise becomes another.
-  void SetLevel(const Vector2d& level);
-  /// Subtracts the known terms from the residual, and adds forces at points that explain the rest.
-  void Complete();
+  /// Adds candidates that act from one jump to another, those that explain best what both change.
+  void AddProfiles();
+  /// The candidates that explain best what changes at a jump.
+  [[nodiscard]] std::vector<size_t> RankAt(size_t jump) const;
+  /// Zeroes columns outside of the rows in which a candidate acts.
+  [[nodiscard]] MatrixXd Mask(MatrixXd columns, const StepRange& within) const;
+  /// Adds a force at the point of a body that explains what changes at a jump.
+  void AddPointProfile(const Candidate& both, const StepRange& within, size_t jump);
+  /// The change of the residual at a jump, over its noise.
+  [[nodiscard]] VectorXd CalcChange(size_t jump) const;
+  /// Describes when a term acts.
+  void SetTimes(const CauseTerm& term, Explanation* one) const;
   /// Adds pushes that grow evenly: their growth a second, and their size when the run ends.
   void AddGrowing();
   /// Only those that were selected, from each time on. @returns whether there are any.
@@ -79,18 +75,13 @@ class ForceProblem {
   [[nodiscard]] Candidate MakeGrowing(const Candidate& push, Eigen::Index first, Eigen::Index skipped) const;
   /// A joint that does not slide shows how much friction holds it, and not how much could.
   void NameStuckBearings();
-  /// Root mean square of the robot's and the object's rows, without what the platform may leave.
-  [[nodiscard]] Vector2d CalcSizes(const VectorXd& y) const;
-  [[nodiscard]] bool LeavesRounding(const VectorXd& y) const;
-  /// In units of the noise that there was at first.
-  [[nodiscard]] double CalcLeft(const VectorXd& y) const;
-  /// Bounds of checks hold for all robots; what an explanation leaves is how much noise there is in this one.
+  /// Root mean square, in units of the noise.
+  [[nodiscard]] static double CalcLeft(const VectorXd& y);
   [[nodiscard]] CauseSelection Select();
   /// Beside other faults a force acts elsewhere than by itself.
   bool RefinePoints(const CauseSelection& selection);
   /// Corrects columns of a centre of mass, whose effect grows with its square, too.
   bool RefineCenters(const CauseSelection& selection);
-  [[nodiscard]] CauseSelection SelectOnce();
   [[nodiscard]] CauseSelection SelectRefined();
   /// Payloads, and centres of mass by which inertias change freely, stand for several plainer faults:
   /// without.
@@ -100,19 +91,16 @@ class ForceProblem {
 
   const StepStore& store_;
   StepForces* forces_;
+  const ForceSteps& steps_;
   Growth growth_;
   std::set<std::string> growing_;  // that are tried; empty for all
-  bool is_faint_;                  // whether the checks of the balances hold
   bool is_exact_ = false;
   std::vector<Candidate> candidates_;
-  VectorXd whole_y_, y_;            // without known faults, too
-  size_t constant_ = 0;             // candidates that are none at points
-  std::vector<Eigen::Index> used_;  // steps of the store
-  Eigen::Index steps_ = 0;
-  Terms known_, terms_;
-  Vector2d first_level_, level_, least_level_;  // StepForces::SetLevel
-  std::vector<StepNoise> noise_;                // of each step
-  std::vector<Turns> turns_;                    // by the same index
+  std::vector<StepRange> within_;  // of each candidate
+  VectorXd y_;
+  size_t constant_ = 0;  // candidates that are there in all steps and do not grow
+  Eigen::Index count_;
+  std::vector<Turns> turns_;  // of each
 };
 
 }  // namespace dexcheck

@@ -18,10 +18,6 @@ constexpr double kTilted = 0.2;
 // A spring's stiffness by its torque: less shows only the torque, 1 / rad or 1 / m.
 constexpr double kSoft = 0.1;
 
-// Residuals whose change from one step to the next is further from that of the steps around than this, in
-// units of noise, and than this many times what theirs are, have begun, or ended.
-constexpr double kJumpNoise = 0.01, kJump = 5.0;
-
 std::string ShowVector(const Eigen::Ref<const VectorXd>& v) { return FormatVector(v, 4); }
 
 /// A value within so many standard errors of zero shows no size.
@@ -44,56 +40,6 @@ Fault MakeGrowing(const Candidate& candidate, const VectorXd& a, const VectorXd&
   RequireSize(&fault);
   fault.detail += "since " + FormatNumber(CalcGrowthBegin(a, candidate.nominal), 4) + " s";
   return fault;
-}
-
-/// A step that differs.
-struct DifferingStep {
-  Index index;
-  bool follows;     // the one before
-  VectorXd change;  // since then
-  Vector2d apart;   // how far that is from the neighbours' changes
-};
-
-/// Returns the root mean square of a step's rows, the robot's and the object's.
-Vector2d CalcSizes(const VectorXd& y) {
-  const Index n = y.size() - 6;
-  return {y.head(n).norm() / std::sqrt(static_cast<double>(n)), y.tail<6>().norm() / std::sqrt(6.0)};
-}
-
-std::vector<DifferingStep> ListDiffering(const StepStore& store, StepForces* forces) {
-  std::vector<DifferingStep> steps;
-  VectorXd before;
-  for (Index i = 0; i < store.size(); ++i) {
-    if (!(store.Get(StepStore::kNoise)(0, i) > 0.0)) continue;
-    forces->SetStep(i);
-    const VectorXd y = forces->CalcResidual();
-    if (forces->Differs(y)) {
-      const bool follows = !steps.empty() && steps.back().index == i - 1;
-      const VectorXd change = follows ? VectorXd(y - before) : y;
-      steps.push_back({i, follows, change, CalcSizes(change)});
-    }
-    before = y;
-  }
-  // A push that grows evenly changes as one of its neighbours does, even where it begins, or between two
-  // jumps.
-  for (size_t k = 0; k < steps.size(); ++k)
-    for (const size_t other : {k - 2, k - 1, k + 1, k + 2})
-      if (other < steps.size() && steps[other].follows)
-        steps[k].apart = steps[k].apart.cwiseMin(CalcSizes(steps[k].change - steps[other].change));
-  return steps;
-}
-
-/// Whether something begins or ends at step k, which its neighbours do not have: of two on a side one may be
-/// where something else begins.
-bool Jumps(const std::vector<DifferingStep>& steps, size_t k) {
-  if (!steps[k].follows) return true;
-  const auto calc = [&](size_t near, size_t far) -> Vector2d {
-    if (near >= steps.size() || !steps[near].follows) return Vector2d::Zero();  // as before the first
-    const bool has_both = far < steps.size() && steps[far].follows;
-    return steps[near].apart.cwiseMin(steps[has_both ? far : near].apart);
-  };
-  const Vector2d around = calc(k - 1, k - 2).cwiseMax(calc(k + 1, k + 2));
-  return (steps[k].apart.array() > (kJump * around.array()).max(kJumpNoise)).any();
 }
 
 /// Returns the axes of a link's own frame in frame i; of what is no link, its own.
@@ -192,17 +138,6 @@ Fault MakeForceFault(const Candidate& candidate, const VectorXd& amplitude, cons
     fault.detail = "by " + fault.detail + " m/s^2";
   }
   return fault;
-}
-
-void FindSegments(const StepStore& store, StepForces* forces, double level, Segment* whole,
-                  std::vector<Segment>* parts) {
-  forces->SetLevel(Vector2d::Constant(level));
-  const std::vector<DifferingStep> steps = ListDiffering(store, forces);
-  for (size_t k = 0; k < steps.size(); ++k) {
-    if (Jumps(steps, k)) parts->emplace_back();
-    whole->push_back(steps[k].index);
-    parts->back().push_back(steps[k].index);
-  }
 }
 
 }  // namespace dexcheck

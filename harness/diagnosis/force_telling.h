@@ -1,6 +1,6 @@
 #pragma once
 
-// Faults of the balances in words, and the steps that they are sought in.
+// Faults of the balances in words.
 
 #include <vector>
 
@@ -16,13 +16,5 @@ double CalcGrowthBegin(const VectorXd& a, double end);
 /// @param amplitude its amplitudes. @param error their standard errors; empty for none.
 Fault MakeForceFault(const Candidate& candidate, const VectorXd& amplitude, const VectorXd& error,
                      const RobotModel& model);
-
-/// Steps of a store that differ.
-using Segment = std::vector<Eigen::Index>;
-
-/// All steps that differ, and the same in parts that begin or end with a jump. @param level of the noise, in
-/// bounds of the checks.
-void FindSegments(const StepStore& store, StepForces* forces, double level, Segment* whole,
-                  std::vector<Segment>* parts);
 
 }  // namespace dexcheck

@@ -12,32 +12,6 @@
 namespace dexcheck {
 namespace {
 
-/// Contacts elsewhere are reported as other shapes.
-void DropConsequencesOfShapes(Causes* causes) {
-  std::erase_if(*causes, [](const Explanation& one) {
-    return one.channel == CauseChannel::kBalance && !one.faults.empty() &&
-           one.faults.front().fault == force_fault::kContact;
-  });
-}
-
-/// Wheels that roll otherwise make platform and wheels move as if something else acted on them.
-void DropConsequences(const StepStore& store, Causes* causes) {
-  if (std::none_of(causes->begin(), causes->end(), [](const Explanation& one) {
-        return one.channel == CauseChannel::kRolling && one.outcome != CauseOutcome::kNotExplained;
-      }))
-    return;
-  const Base& base = store.setup().model().base();
-  const std::string places[] = {"link " + base.link, "joint " + base.wheel_joint_right,
-                                "joint " + base.wheel_joint_left};
-  std::erase_if(*causes, [&](const Explanation& one) {
-    if (one.channel != CauseChannel::kBalance) return false;
-    if (one.faults.empty()) return false;
-    const std::string& place = one.faults.front().place;
-    return place.starts_with("wheel") ||
-           std::find(std::begin(places), std::end(places), place) != std::end(places);
-  });
-}
-
 /// The largest that a fault of each unit can be in this robot.
 class PlausibleSizes {
  public:
@@ -120,12 +94,9 @@ Causes ExplainRun(const StepStore& store, double void_from, const SearchOptions&
   };
   for (const auto explain : {ExplainSignals, ExplainLaw, ExplainContacts, ExplainGeometry})
     add(explain, store);
-  const StepStore before = store.GetBefore(void_from);
-  add(ExplainRolling, before);
-  if (store.misplaced().empty()) add(ExplainForces, before);
+  add(ExplainRolling, store.GetBefore(void_from));
+  if (store.misplaced().empty() && !store.has_misplaced_wheel()) add(ExplainForces, store);
   if (stopped != nullptr) *stopped = limit.has_ended();
-  DropConsequencesOfShapes(&causes);
-  DropConsequences(store, &causes);
   DropImpossible(store, &causes);
   std::stable_sort(causes.begin(), causes.end(),
                    [](const Explanation& a, const Explanation& b) { return a.channel < b.channel; });

@@ -23,13 +23,9 @@ Causes ExplainGeometry(const StepStore& store);
 bool HasOtherShapes(const StepStore& store);
 Causes ExplainContacts(const StepStore& store);
 
-/// Explains what the balances leave,
-///
-///   robot   M_bar' xi_dot + C_bar' xi + F_bar' + J_B'^T f_c - E_bar' tau' = f     (48)
-///   object  M_hat V_o_dot + C_hat V_o + N_o - G f_c = w                           (19)
-///
-/// with the plant's accelerations and forces, f whitened in the metric of the inertia, |f|_M^-1: forces and
-/// moments, other masses and inertias, armature, friction and springs of joints, another gravity.
+/// Explains what the equations of motion of the whole robot and its object leave with the plant's
+/// accelerations and forces (MotionBalance), each entry over its rounding: forces and moments, other masses
+/// and inertias, armature, friction and springs of joints, another gravity.
 Causes ExplainForces(const StepStore& store);
 
 struct SearchOptions {
@@ -41,7 +37,7 @@ struct SearchOptions {
 /// All: measurement, actuation, law, contact, geometry, rolling, balance. Forces that follow from links in
 /// other places are not explained. What no robot like this one can have is
 /// listed as not explained.
-/// @param void_from of FindVoid, s: wheels and balances are explained up to then.
+/// @param void_from of FindVoid, s: how wheels roll is explained up to then.
 /// @param stopped whether the search ended before it was done, by its limit or by the user.
 Causes ExplainRun(const StepStore& store, double void_from, const SearchOptions& options = {},
                   bool* stopped = nullptr);

@@ -200,7 +200,7 @@ VectorXd FindPositions(const StepStore& store, Index velocity) {
 std::vector<SignalSeries> ListSeries(const StepStore& store, bool motors) {
   // A step that a motor refuses has no torques.
   const bool is_refused =
-      motors && store.size() > 1 && store.Get(StepStore::kNoise)(0, store.size() - 1) == 0.0;
+      motors && store.size() > 1 && store.Get(StepStore::kSize)(0, store.size() - 1) == 0.0;
   const Index count = store.size() - (is_refused ? 1 : 0);
   const auto get = [&](StepStore::Signal signal) { return store.Get(signal).leftCols(count); };
   const auto expected = get(motors ? StepStore::kTauDeclared : StepStore::kDeclaredReading);

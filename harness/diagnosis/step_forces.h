@@ -1,13 +1,12 @@
 #pragma once
 
-// The residual of the balances at a step, and the columns of faults of size 1, both whitened.
+// What the equations of motion leave at a step (MotionBalance), and the columns of faults of size 1 in it,
+// both by entry over its rounding.
 
 #include <string>
 #include <vector>
 
-#include "controller/control/actuation.h"
 #include "controller/dynamics/model_terms.h"
-#include "controller/dynamics/tree_factor.h"
 #include "harness/diagnosis/cause_estimator.h"
 #include "harness/diagnosis/force_points.h"
 #include "harness/diagnosis/step_store.h"
@@ -32,55 +31,34 @@ inline constexpr const char* kGravity = "gravity off by";
 /// Along itself.
 inline constexpr const char* kGravitySize = "size of gravity off by";
 inline constexpr const char* kWorld = "world";  // its place
-inline constexpr const char* kContact = "contact further along the normal by";
 /// The ending of the name of a force, a moment or a torque that grows evenly in time.
 inline constexpr const char* kGrows = " that grows by";
 /// The ending of the name of one that is free at each step.
 inline constexpr const char* kChanges = " that changes, up to";
 }  // namespace force_fault
 
-/// Noise of one step: of the robot's rows s^2 1 + U U^T, of the object's that of each. s is rounding, and U
-/// has what a platform leaves that tilts and slips: the inertial forces of all links when it
-/// accelerates in six ways, and torques of its wheels, each as large as the check's bound.
-struct StepNoise {
-  Vector2d bounds = Vector2d::Ones();  ///< s and the object's at level 1.
-  MatrixXd uneven;                     ///< Orthonormal columns V of U = V diag(sizes) W^T.
-  VectorXd sizes;
-
-  /// Divides rows (n + 6 by any) by the noise at this level: by s and, in V, (1 + U U^T / s^2)^(1/2).
-  void Divide(const Vector2d& level, Eigen::Ref<MatrixXd> rows) const;
-  /// Rows that are divided by the noise at one level are by that at another.
-  void ChangeLevel(const Vector2d& from, const Vector2d& to, Eigen::Ref<MatrixXd> rows) const;
-
- private:
-  [[nodiscard]] Vector2d CalcNoise(const Vector2d& level) const;
-  /// (1 + sizes^2 / s^2)^(1/2)
-  [[nodiscard]] Eigen::ArrayXd CalcSpread(const Vector2d& level) const;
-  void Scale(const Vector2d& by, const Eigen::ArrayXd& along, Eigen::Ref<MatrixXd> rows) const;
-};
-
-/// Residual and columns of one step, whitened: of the robot L^-T f, L^T L its inertia, divided by its noise.
+/// Residual and columns of one step: the robot's entries, then the object's if there is one.
 class StepForces {
  public:
   explicit StepForces(const StepStore& store);
 
-  [[nodiscard]] Eigen::Index rows() const { return n_ + 6; }
+  [[nodiscard]] Eigen::Index rows() const { return rows_; }
   [[nodiscard]] const RobotModel& model() const { return model_; }
   /// In which masses that differ fall, m/s^2; the model's at first. @returns whether it is another.
   bool SetGravity(const Vector3d& gravity);
-  /// Noise of robot and object, times the bound of their checks: 1 at first.
-  void SetLevel(const Vector2d& level) { level_ = level; }
 
-  [[nodiscard]] const StepNoise& noise() const { return noise_; }
-
-  void SetStep(Eigen::Index step);
+  /// @param row of the store.
+  void SetStep(const Eigen::Ref<const VectorXd>& row);
+  /// A signal of that step.
+  [[nodiscard]] auto Now(StepStore::Signal signal) const { return store_.Part(row_, signal); }
+  /// The residual of that step over its rounding.
+  [[nodiscard]] VectorXd CalcResidual() const { return Now(StepStore::kResidual).cwiseQuotient(noise_); }
   /// How far links were apart at the most, m: where loads may be.
   [[nodiscard]] double reach() const { return reach_; }
   /// Which way links and object are turned at that step.
   [[nodiscard]] Turns ListTurns() const;
-  /// Whether the checks of the balances fail, or the remainder is more than noise.
-  [[nodiscard]] bool Differs(const VectorXd& residual) const;
-  [[nodiscard]] VectorXd CalcResidual() const;
+  /// Row of StepStore::kDryFriction of one of the joints' velocities; -1 for a wheel's.
+  [[nodiscard]] Eigen::Index FindDryFriction(int dof) const { return dof < wheels_ ? -1 : dry_ + dof; }
   /// Adds this step's rows to each candidate: `begin` is the first of them.
   void AddColumns(Eigen::Index begin, Eigen::Index steps, std::vector<Candidate>* candidates);
 
@@ -91,13 +69,10 @@ class StepForces {
     const MassProperties* body;
   };
 
-  /// Whitens robot's forces and object's wrenches (n + 6 by any).
-  void Whiten(Eigen::Ref<MatrixXd> f_w) const;
   /// This step's rows of a candidate.
   [[nodiscard]] auto RowsOf(Candidate* candidate) const {
     return candidate->columns.middleRows(begin_, rows());
   }
-  void CalcUneven();
   /// The next candidate of the list, made at the first step. @param scale plausible sizes.
   Candidate& Next(std::vector<Candidate>* candidates, const char* fault, const std::string& place,
                   const std::string& unit, double nominal, const VectorXd& scale);
@@ -116,23 +91,17 @@ class StepForces {
   void AddLink(int link, std::vector<Candidate>* candidates);
   void AddObjectForces(std::vector<Candidate>* candidates);
   void AddGravity(std::vector<Candidate>* candidates);
-  void AddWheels(std::vector<Candidate>* candidates);
-  /// Adds contacts that are not where they are declared to be: n x f on object and finger.
-  void AddContacts(std::vector<Candidate>* candidates);
 
   const StepStore& store_;
   RobotModel model_;  // with a frame at each link's centre of mass, after its own
   ModelTerms terms_;
-  TreeFactor factor_;
-  ActuationMap actuation_;
-  Eigen::Index n_;
-  int first_link_ = 0;
+  Eigen::Index n_, rows_;
+  int first_link_ = 0, wheels_ = 0, dry_ = 0;
   std::vector<Link> links_;
-  Eigen::Index step_ = 0, begin_ = 0, steps_ = 1;
+  VectorXd row_;  // of the store
+  Eigen::Index begin_ = 0, steps_ = 1;
   size_t next_ = 0;
-  Vector2d level_ = Vector2d::Ones();
-  StepNoise noise_;
-  double arm_ = 1.0;                  // of the object's inertia, m
+  VectorXd noise_;                    // of each entry
   double mass_ = 0.0, weight_ = 0.0;  // of all, kg and N
   double reach_ = 0.0;
   Vector3d gravity_;

@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "harness/checks/check_table.h"
-#include "harness/comparison/rounding_scales.h"
 #include "harness/engine/map_vector.h"
 
 namespace dexcheck {
@@ -17,6 +17,13 @@ constexpr const char* kContactEntries[][2] = {
     {"contact angle psi", "rad"},          {"overlap", "m"}};
 constexpr Eigen::Index kContactSize = std::size(kContactEntries);
 constexpr Eigen::Index kObjectSize = 12, kTouchSize = 2;
+
+// Rounding relative to summands: right runs leave a tenth of it, and the bound of the check
+// equations_of_motion is 30 times as much.
+constexpr double kRounding = 3e-15;
+// A residual jumps whose change from one step to the next is further from that of the steps around than this
+// many times what theirs are, this in units of noise, and this part of itself.
+constexpr double kJump = 5.0, kJumpNoise = 3.0, kJumpPart = 1e-7;
 
 /// Wheels of right runs roll to this fraction of the check's bound, and what slipping is.
 constexpr double kRollingRounding = 0.01;
@@ -32,21 +39,31 @@ StepStore::StepStore(const Setup& setup, JudgedLaw* law, double rolling_bound)
     : setup_(&setup),
       law_(law),
       rolling_bound_(rolling_bound),
-      root_mass_(std::sqrt(RoundingScales(setup.model()).total_mass())),
-      actuation_(setup.model()),
+      rounding_(std::max(kRounding, setup.scenario().tolerance)),
+      moving_model_(setup.scenario().plant.type == PlantType::kRigid
+                        ? setup.declared_model()
+                        : MakeWholeRobot(setup.declared_model(), setup.plant_adapter())),
       kinematics_(MakeDataWithoutContacts(setup.engine())) {
   NameReadings();
   const RobotModel& model = setup.model();
   const Eigen::Index n = model.num_velocities(), m = CountOf(readings_);
   const Eigen::Index tips = CountOf(setup.fingertips());
-  const Eigen::Index sizes[kSignalCount] = {
-      1, n, n, model.num_positions(), n, n, m, m, n, 6, 12, 12, n, 2, 1, 2, 2, 2, tips, 3 * tips, 1};
+  const Eigen::Index moving = moving_model_.num_velocities();
+  const Eigen::Index entries = moving + (setup.has_object() ? 6 : 0);
+  const Eigen::Index sizes[kSignalCount] = {1,      n,      n,       model.num_positions(),
+                                            n,      m,      m,       moving_model_.num_positions(),
+                                            moving, moving, entries, entries,
+                                            12,     12,     n,       2,
+                                            2,      2,      tips,    1};
   for (int i = 0; i < kSignalCount; ++i) offsets_[i + 1] = offsets_[i] + sizes[i];
   before_.resize(offsets_[kSignalCount], kHistory);
   data_.resize(offsets_[kSignalCount], kCapacity);  // its pages are used only when something differs
   block_.resize(kCapacity);
   row_.resize(offsets_[kSignalCount]);
-  force_.resize(n);
+  recent_.resize(offsets_[kSignalCount], kRecent);
+  changes_.resize(entries, kRecent);
+  apart_.resize(2, kRecent);
+  jumps_.resize(kMostJumps, {row_, row_, VectorXd(entries)});
   Reset();
 }
 
@@ -113,10 +130,12 @@ void StepStore::NameReadings() {
 }
 
 void StepStore::Reset() {
-  seen_ = size_ = added_ = 0, stride_ = 1, has_begun_ = false;
+  seen_ = size_ = added_ = num_recent_ = 0, stride_ = 1, has_begun_ = false;
+  num_jumps_ = 0;
   motor_spans_.assign(motors_.size(), {});
   reading_spans_.assign(readings_.size(), {});
   misplaced_.clear();
+  has_misplaced_wheel_ = false;
   largest_torque_ = 0.0;
 }
 
@@ -152,26 +171,20 @@ void StepStore::Pack(const StepRecord& step, const StepAnalysis& now, Judged jud
   const PlantResponse& response = step.response;
   at(kTime)[0] = step.time;
   at(kTauDeclared) = declared.tau;
-  if (answered) {
-    at(kTauReceived) = response.motor_torques;
-    at(kAcceleration) = response.xi_dot;
-  } else {
-    at(kTauReceived) = declared.tau;
-    at(kAcceleration).setZero();
-  }
+  at(kTauReceived) = answered ? response.motor_torques : declared.tau;
   at(kPosition) = step.reading.state.q;
   at(kVelocity) = step.reading.state.xi;
   PackReading(declared.measured, declared.measured, at(kDeclaredReading));
   PackReading(step.measured, declared.measured, at(kReading));
-  at(kRobotResidual).setZero();
-  at(kNoise).setZero();
-  at(kUneven).setZero();
-  at(kDryFriction).setZero();
+  at(kMotionPosition).setZero();
+  for (const Signal signal : {kMotionVelocity, kMotionAcceleration, kResidual, kSize, kDryFriction})
+    at(signal).setZero();
   if (has_forces) {
-    // Torques that motors did not give are their fault, and no force of its own.
-    force_ = step.drive.tau - response.motor_torques;
-    actuation_.CalcForce(force_, force_);
-    at(kRobotResidual) = now.robot.residual + force_;
+    at(kMotionPosition) = now.motion.q;
+    at(kMotionVelocity) = now.motion.nu;
+    at(kMotionAcceleration) = now.motion.nu_dot;
+    at(kResidual) = now.motion.residual;
+    at(kSize) = now.motion.size;
     if (response.dry_friction.size() == at(kDryFriction).size()) {
       at(kDryFriction) = response.dry_friction;
       for (int k = 0; k < setup_->model().num_dofs(); ++k) {
@@ -181,20 +194,7 @@ void StepStore::Pack(const StepRecord& step, const StepAnalysis& now, Judged jud
         force -= std::clamp(force, -declared, declared);
       }
     }
-    // The bounds of the inverse dynamics have it so, by entry.
-    at(kNoise) << 1e-6 * now.robot.balanced / std::sqrt(static_cast<double>(force_.size())),
-        1e-9 * std::max(now.findings.f_c.norm(), 1e-3) / std::sqrt(6.0);
-    // The columns of causes are those of a platform that is level and rolls: gravity along a floor that
-    // tilts, and sideways in a turn, on all masses.
-    double slip = 0.0;
-    for (const BodyContact& wheel : response.wheels) slip = std::max(slip, wheel.slip.norm());
-    const double turn = response.wheels.empty()
-                            ? 0.0
-                            : std::abs(CalcRollingTwist(setup_->model().base(), step.reading.state.xi)[1]);
-    at(kUneven)[0] =
-        (setup_->model().gravity().norm() * step.reading.departure.tilt + 2.0 * slip * turn) * root_mass_;
   }
-  at(kObjectResidual) = has_forces ? now.object.residual : Vector6d(Vector6d::Zero());
   const Pose& X_Bo = step.reading.state.X_Bo;
   at(kObjectPose).head<9>() = X_Bo.linear().reshaped();
   at(kObjectPose).tail<3>() = X_Bo.translation();
@@ -205,11 +205,6 @@ void StepStore::Pack(const StepRecord& step, const StepAnalysis& now, Judged jud
   if (has_forces && response.wheels.size() == 2)
     at(kWheelNoise) = now.wheels.slip.array() + kRollingRounding * rolling_bound_;
   at(kContactMismatch) = now.contacts.mismatch;
-  at(kContactMoment).setZero();
-  for (size_t i = 0; i < std::min(response.contacts.size(), setup_->fingertips().size()); ++i) {
-    const PlantContact& contact = response.contacts[i];
-    at(kContactMoment).segment<3>(3 * static_cast<Eigen::Index>(i)) = contact.normal.cross(contact.force);
-  }
   at(kLawDiffers)[0] = now.law && law_ != nullptr && law_->differs() ? 1.0 : 0.0;
 }
 
@@ -217,6 +212,7 @@ void StepStore::Add(const StepRecord& step, const StepAnalysis& analysis, bool d
   last_time_ = step.time;
   Pack(step, analysis, judged, row_);
   Watch(row_);
+  if (has_begun_ || differs) WatchJumps(row_);
   if (differs) FindMisplaced(step);
   if (!has_begun_ && !differs) {
     before_.col(seen_++ % kHistory) = row_;
@@ -247,6 +243,63 @@ void StepStore::Watch(const Eigen::Ref<const VectorXd>& row) {
   watch(kDeclaredReading, kReading, 0.0, &reading_spans_);
 }
 
+Vector2d StepStore::CalcApart(Eigen::Index step) const {
+  const Eigen::Index robot = moving_model_.num_velocities(), at = step % kRecent;
+  const VectorXd& noise = noise_;
+  Vector2d apart = Vector2d::Constant(std::numeric_limits<double>::infinity());
+  // A push that grows evenly changes as one of its neighbours does, even where it begins, or between two
+  // jumps.
+  for (const Eigen::Index other : {step - 2, step - 1, step + 1, step + 2}) {
+    const auto change = (changes_.col(at) - changes_.col(other % kRecent)).cwiseQuotient(noise);
+    const Eigen::Index object = change.size() - robot;
+    const Vector2d size(
+        change.head(robot).squaredNorm() / static_cast<double>(std::max<Eigen::Index>(1, robot)),
+        change.tail(object).squaredNorm() / 6.0);
+    apart = apart.cwiseMin(size.cwiseSqrt());
+  }
+  return apart;
+}
+
+void StepStore::WatchJumps(const Eigen::Ref<const VectorXd>& row) {
+  if (!HasForces(row)) {
+    num_recent_ = 0;
+    return;
+  }
+  const auto at = [](Eigen::Index step) { return step % kRecent; };
+  const Eigen::Index now = num_recent_++;
+  recent_.col(at(now)) = row;
+  noise_ = CalcNoise(row);
+  changes_.col(at(now)).setZero();
+  if (now > 0) {
+    changes_.col(at(now)) = Part(row, kResidual) - Part(recent_.col(at(now - 1)), kResidual);
+    // Friction that the plant says comes and goes.
+    const Eigen::Index count = setup_->model().num_dofs();
+    changes_.col(at(now)).segment(moving_model_.num_velocities() - count, count) -=
+        Part(row, kDryFriction).tail(count) - Part(recent_.col(at(now - 1)), kDryFriction).tail(count);
+  }
+  const Eigen::Index judged = now - 4;  // by two steps on each side, which are judged by two themselves
+  if (now - 2 >= 3) apart_.col(at(now - 2)) = CalcApart(now - 2);
+  if (judged < 5) return;
+  const auto around = apart_.col(at(judged - 2))
+                          .cwiseMin(apart_.col(at(judged - 1)))
+                          .cwiseMax(apart_.col(at(judged + 1)).cwiseMin(apart_.col(at(judged + 2))));
+  const double size =
+      Part(row, kResidual).cwiseQuotient(noise_).norm() / std::sqrt(static_cast<double>(noise_.size()));
+  const double least = std::max(kJumpNoise, kJumpPart * size);
+  if (!(apart_.col(at(judged)).array() > (kJump * around).array().max(least)).any()) return;
+  if (num_jumps_ < kMostJumps) {
+    Jump& jump = jumps_[num_jumps_];
+    jump.before = recent_.col(at(judged - 1));
+    jump.after = recent_.col(at(judged));
+    const auto earlier = changes_.col(at(judged - 1)), later = changes_.col(at(judged + 1));
+    jump.change = changes_.col(at(judged));
+    // The one beside may be a jump as well.
+    jump.change -=
+        earlier.cwiseQuotient(noise_).norm() < later.cwiseQuotient(noise_).norm() ? earlier : later;
+  }
+  ++num_jumps_;
+}
+
 void StepStore::FindMisplaced(const StepRecord& step) {
   const PlantReading& plant = step.reading;
   const mjModel& engine = setup_->engine();
@@ -254,11 +307,8 @@ void StepStore::FindMisplaced(const StepRecord& step) {
     return;
   std::copy_n(plant.qpos.data(), engine.nq, kinematics_->qpos);
   mj_kinematics(&engine, kinematics_.get());
-  const std::vector<int>& bodies = setup_->adapter().link_bodies();
-  for (int link = 0; link < setup_->model().num_joints(); ++link) {
-    const int body = bodies[static_cast<size_t>(link + 1)];
-    const int parent = bodies[static_cast<size_t>(setup_->model().joint(link).parent + 1)];
-    if (body < 0 || parent < 0) continue;
+  // Offset (m) and turn (rad) of a body in its parent's axes, beyond rounding.
+  const auto find = [&](int body, int parent) {
     const auto place = [&](const mjtNum* positions, const mjtNum* rotations) {
       const Pose X = MapPose(rotations + 9 * parent, positions + 3 * parent);
       return X.inverse(Eigen::Isometry) * MapPose(rotations + 9 * body, positions + 3 * body);
@@ -268,8 +318,22 @@ void StepStore::FindMisplaced(const StepRecord& step) {
     const Vector3d offset = actual.translation() - declared.translation();
     const double turn = Eigen::AngleAxisd(Matrix3d(actual.linear() * declared.linear().transpose())).angle();
     constexpr double kRounding = 1e-10;  // m and rad
-    if (offset.norm() > kRounding || turn > kRounding) misplaced_.push_back({link, step.time, offset, turn});
+    const bool differs = offset.norm() > kRounding || turn > kRounding;
+    return differs ? std::optional<Misplaced>({-1, step.time, offset, turn}) : std::nullopt;
+  };
+  const std::vector<int>& bodies = setup_->adapter().link_bodies();
+  for (int link = 0; link < setup_->model().num_joints(); ++link) {
+    const int body = bodies[static_cast<size_t>(link + 1)];
+    const int parent = bodies[static_cast<size_t>(setup_->model().joint(link).parent + 1)];
+    if (body < 0 || parent < 0) continue;
+    if (std::optional<Misplaced> found = find(body, parent)) {
+      found->link = link;
+      misplaced_.push_back(*found);
+    }
   }
+  for (const EngineWheel& wheel : setup_->adapter().wheels())
+    has_misplaced_wheel_ =
+        has_misplaced_wheel_ || (bodies[0] >= 0 && find(engine.jnt_bodyid[wheel.joint], bodies[0]));
 }
 
 void StepStore::Keep(Eigen::Index block, const Eigen::Ref<const VectorXd>& row) {

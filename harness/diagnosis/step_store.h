@@ -4,10 +4,11 @@
 
 #include <limits>
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
-#include "controller/control/actuation.h"
+#include "controller/model/robot_model.h"
 #include "harness/checks/judged_law.h"
 #include "harness/checks/step_analysis.h"
 #include "harness/engine/engine.h"
@@ -44,21 +45,20 @@ class StepStore {
     kTauReceived,      ///< n, N m
     kPosition,         ///< q', as it is.
     kVelocity,         ///< n, in the order of xi.
-    kAcceleration,     ///< n
     kDeclaredReading,  ///< m, what the declared sensing makes of the truth.
     kReading,          ///< m, what was measured.
-    kRobotResidual,    ///< n, of (48) with the torques that were received.
-    kObjectResidual,   ///< 6, of (19).
+    kMotionPosition,   ///< MotionBalance::q, nu, nu_dot, residual, size; size is 0 where there are no forces.
+    kMotionVelocity,
+    kMotionAcceleration,
+    kResidual,
+    kSize,
     kObjectPose,       ///< 12: rotation by columns, position.
     kObjectMotion,     ///< 12: V_Bo and V_Bo_dot.
     kDryFriction,      ///< n: what the plant says of it, beyond the declared; 0 where it says nothing.
-    kNoise,            ///< 2: of an entry of the robot's residual, in |.|_M^-1, and of the object's, N.
-    kUneven,           ///< What tilt and slip of the platform can make of a cause's column, in |.|_M^-1.
     kWheelRates,       ///< 2, right and left, rad/s.
     kWheelMismatch,    ///< 2, RollingFindings::mismatch, m/s.
     kWheelNoise,       ///< 2: what of that slipping is, and rounding, m/s; 0 without wheels.
     kContactMismatch,  ///< N: TouchFindings::mismatch, m.
-    kContactMoment,    ///< 3N: n x f of the normal into the object and the force on it, world, N.
     kLawDiffers,       ///< 1 where the torques are not the law's, else 0.
     kSignalCount
   };
@@ -79,15 +79,39 @@ class StepStore {
   [[nodiscard]] auto Get(Signal signal) const {
     return data_.block(offsets_[signal], 0, offsets_[signal + 1] - offsets_[signal], size_);
   }
+  /// A signal of a row: of a column of all signals.
+  [[nodiscard]] auto Part(const Eigen::Ref<const VectorXd>& row, Signal signal) const {
+    return row.segment(offsets_[signal], offsets_[signal + 1] - offsets_[signal]);
+  }
+  [[nodiscard]] auto Row(Eigen::Index step) const { return data_.col(step); }
+  /// Rounding of each entry of a row's residual: of its summands, or the scenario's tolerance.
+  [[nodiscard]] VectorXd CalcNoise(const Eigen::Ref<const VectorXd>& row) const {
+    return (rounding_ * Part(row, kSize)).cwiseMax(std::numeric_limits<double>::min());
+  }
+  /// Whether forces of a row were judged.
+  [[nodiscard]] bool HasForces(const Eigen::Ref<const VectorXd>& row) const {
+    return Part(row, kSize)[0] > 0.0;
+  }
   /// Whether the step's predecessors are those before it in the store.
   [[nodiscard]] bool HasHistory(Eigen::Index step) const;
   /// Time of the last step that was added, s.
   [[nodiscard]] double last_time() const { return last_time_; }
   [[nodiscard]] const Setup& setup() const { return *setup_; }
+  /// The robot whose equations of motion are judged: MotionBalance.
+  [[nodiscard]] const RobotModel& moving_model() const { return moving_model_; }
   /// When a signal differs from what is declared, of all steps, s; NaN for never.
   struct Span {
     double first = std::numeric_limits<double>::quiet_NaN(), last = first;
   };
+  /// What equations of motion leave begins or ends at a step: the rows of that step and of the one before,
+  /// and what the residual changes by, less what it changes by at a step beside.
+  struct Jump {
+    VectorXd before, after, change;
+  };
+  /// All jumps, in time; none where there are more than can be kept.
+  [[nodiscard]] std::span<const Jump> jumps() const {
+    return {jumps_.data(), num_jumps_ <= kMostJumps ? num_jumps_ : 0};
+  }
   [[nodiscard]] const std::vector<Span>& motor_spans() const { return motor_spans_; }
   [[nodiscard]] const std::vector<Span>& reading_spans() const { return reading_spans_; }
   /// A link that the plant has elsewhere on its parent than the engine's model: by its index, and how far, in
@@ -99,6 +123,8 @@ class StepStore {
     double turn = 0.0;                   ///< rad
   };
   [[nodiscard]] const std::vector<Misplaced>& misplaced() const { return misplaced_; }
+  /// Whether the plant has a wheel elsewhere on the platform: of another size, it stands higher.
+  [[nodiscard]] bool has_misplaced_wheel() const { return has_misplaced_wheel_; }
   /// Residual of the check `rolling`, m/s.
   [[nodiscard]] double rolling_bound() const { return rolling_bound_; }
   [[nodiscard]] JudgedLaw* law() const { return law_; }
@@ -107,21 +133,27 @@ class StepStore {
 
  private:
   static constexpr Eigen::Index kCapacity = 16 * kBlock;
+  static constexpr size_t kMostJumps = 8;
+  static constexpr Eigen::Index kRecent = 8;  // steps that a jump is seen by
 
   void NameReadings();
   void PackReading(const Reading& reading, const Reading& declared, Eigen::Ref<VectorXd> entries) const;
   void Pack(const StepRecord& step, const StepAnalysis& analysis, Judged judged, Eigen::Ref<VectorXd> row);
   /// Notes when signals differ.
   void Watch(const Eigen::Ref<const VectorXd>& row);
+  /// Notes where the residual jumps, some steps later.
+  void WatchJumps(const Eigen::Ref<const VectorXd>& row);
+  /// Returns how far the residual's change at a recent step is from that of any step around it, the robot's
+  /// and the object's root mean square over their noise.
+  [[nodiscard]] Vector2d CalcApart(Eigen::Index step) const;
   /// Notes which links are misplaced, until some are.
   void FindMisplaced(const StepRecord& step);
   void Keep(Eigen::Index block, const Eigen::Ref<const VectorXd>& row);
 
   const Setup* setup_;
   JudgedLaw* law_;
-  double rolling_bound_;
-  double root_mass_;  // of the robot, sqrt(kg)
-  ActuationMap actuation_;
+  double rolling_bound_, rounding_;
+  RobotModel moving_model_;
   std::vector<SignalName> readings_, motors_;
   Eigen::Index offsets_[kSignalCount + 1] = {};
   MatrixXd before_;  // ring of the last steps, before anything differed
@@ -130,8 +162,15 @@ class StepStore {
   std::vector<Span> motor_spans_, reading_spans_;
   std::shared_ptr<mjData> kinematics_;  // of the engine's model
   std::vector<Misplaced> misplaced_;
+  bool has_misplaced_wheel_ = false;
+  // The last steps with forces, by their number modulo kRecent: rows, changes of the residual since the step
+  // before, CalcApart.
+  MatrixXd recent_, changes_, apart_;
+  Eigen::Index num_recent_ = 0;
+  std::vector<Jump> jumps_;
+  size_t num_jumps_ = 0;
   double largest_torque_ = 0.0;  // N m, declared
-  VectorXd row_, force_;
+  VectorXd row_, noise_;
   Eigen::Index seen_ = 0;  // steps in the ring
   Eigen::Index size_ = 0, added_ = 0;
   Eigen::Index stride_ = 1;  // of blocks that are kept

@@ -1,6 +1,8 @@
 #include "harness/diagnosis/visible_columns.h"
 
 #include <Eigen/Cholesky>
+#include <Eigen/QR>
+#include <Eigen/SVD>
 #include <algorithm>
 #include <limits>
 #include <utility>
@@ -11,13 +13,10 @@ namespace dexcheck {
 
 using Eigen::Index;
 
-// A column of which less is left beside others, relative, says nothing of its own.
-constexpr double kIndependent = 1e-7;
-
 namespace {
 
-/// @param noise of the sum over all rows.
-Visible FindVisible(const Candidate& candidate, double noise) {
+/// @param noise of the sum over all rows. @param independent as of VisibleColumns.
+Visible FindVisible(const Candidate& candidate, double noise, double independent) {
   const MatrixXd& C = candidate.columns;
   const VectorXd scale = candidate.scale.size() > 0 ? candidate.scale : VectorXd(VectorXd::Ones(C.cols()));
   const bool is_bounded = candidate.scale.size() > 0;
@@ -30,14 +29,18 @@ Visible FindVisible(const Candidate& candidate, double noise) {
   const VectorXd size = C.colwise().norm().transpose();
   const VectorXd unit =
       is_bounded ? scale : VectorXd(size.unaryExpr([](double s) { return s > 0.0 ? 1.0 / s : 0.0; }));
-  const MatrixXd products = unit.asDiagonal() * (C.transpose() * C) * unit.asDiagonal();
-  const SymmetricEigen eigen = DecomposeSymmetric(products);
-  const double largest = eigen.values[C.cols() - 1];
-  const double least = std::max(is_bounded ? noise * noise : 0.0, kIndependent * kIndependent * largest);
+  // Singular values of R, C diag(unit) = Q R, have all their digits; those of C^T C only half of them.
+  const Eigen::HouseholderQR<MatrixXd> qr(C * unit.asDiagonal());
+  const MatrixXd R = qr.matrixQR().topRows(std::min(C.rows(), C.cols())).triangularView<Eigen::Upper>();
+  const Eigen::JacobiSVD<MatrixXd> svd(R, Eigen::ComputeFullV);
+  const VectorXd& values = svd.singularValues();
+  constexpr double kMostIndependent = 1e-7;
+  const double least =
+      std::max(is_bounded ? noise : 0.0, std::min(independent, kMostIndependent) * values[0]);
   Index visible = 0;
-  while (visible < C.cols() && eigen.values[C.cols() - 1 - visible] > least) ++visible;
+  while (visible < values.size() && values[visible] > least) ++visible;
   Visible result;
-  result.basis = unit.asDiagonal() * eigen.vectors.rightCols(visible);
+  result.basis = unit.asDiagonal() * svd.matrixV().leftCols(visible);
   result.columns = C * result.basis;
   result.unit = unit;
   return result;
@@ -60,7 +63,7 @@ VisibleColumns::VisibleColumns(std::span<const Candidate> candidates, const Vect
                                double independent)
     : y_(y), independent_(independent), begins_{0} {
   for (const Candidate& one : candidates) {
-    visible_.push_back(FindVisible(one, noise));
+    visible_.push_back(FindVisible(one, noise, independent));
     begins_.push_back(begins_.back() + visible_.back().columns.cols());
   }
   all_.resize(y.size(), begins_.back());
